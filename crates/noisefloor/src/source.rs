@@ -1,0 +1,143 @@
+//! What a renderer offers: samples on request.
+
+use crate::tile::Tile;
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+/// Linear RGB radiance of one pixel, Rec.709 primaries, arbitrary scale.
+pub type Rgb = [f32; 3];
+
+/// What a source counts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Unit {
+    /// Samples per pixel.
+    SamplesPerPixel,
+    /// Mutations per pixel, on average over the tile (Metropolis light transport).
+    MutationsPerPixel,
+}
+
+/// A source's description of itself.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct SourceInfo {
+    /// Who renders, for reports and error messages: `"ptwne cornell-box"`.
+    pub name: String,
+    /// Image width in pixels.
+    pub width: usize,
+    /// Image height in pixels.
+    pub height: usize,
+    /// The unit of work.
+    pub unit: Unit,
+    /// Whether samples can be aimed at single tiles. If not, every call samples all tiles.
+    pub aims: bool,
+}
+
+/// One tile's wish for samples.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Request {
+    /// The tile to sample.
+    pub tile: Tile,
+    /// Samples that this tile has been given before: the index of the first new one. A source that derives its random
+    /// numbers from (seed, pixel, sample index) is deterministic however the work is cut into batches.
+    pub first: u64,
+    /// New samples wanted for each pixel, at least one.
+    pub samples: u32,
+}
+
+/// New samples of one tile.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Batch {
+    /// The tile that was sampled.
+    pub tile: Tile,
+    /// Exact number of new samples behind each pixel. Normally what was asked for; a playback of stored images hands out
+    /// what it has. Zero says that this tile's source is exhausted.
+    pub samples: u32,
+    /// Mean of the new samples alone, row-major over the tile, `tile.pixels()` values (none if `samples` is zero).
+    /// Non-finite values are allowed: the film keeps them out and counts them.
+    pub mean: Vec<Rgb>,
+}
+
+/// A quick noise-free picture of the scene, the reference of Takouachet et al. 2017, §4.3.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Reference {
+    /// Width in pixels, the same as the source's.
+    pub width: usize,
+    /// Height in pixels, the same as the source's.
+    pub height: usize,
+    /// Linear radiance, row-major.
+    pub pixels: Vec<Rgb>,
+}
+
+/// Why a source gave no samples.
+#[derive(Debug, Error)]
+pub enum SourceError {
+    /// The renderer failed; the cause says how.
+    #[error("{name}: sampling failed{}", .tile.map(|t| format!(" in tile {t}")).unwrap_or_default())]
+    Failed {
+        /// The source's name.
+        name: String,
+        /// The tile it failed in, where one is to blame.
+        tile: Option<usize>,
+        /// What went wrong.
+        #[source]
+        cause: Box<dyn std::error::Error + Send + Sync>,
+    },
+    /// The source broke its contract.
+    #[error("{name} broke the contract of a source: {what}")]
+    Contract {
+        /// The source's name.
+        name: String,
+        /// What was promised and not kept.
+        what: String,
+    },
+}
+
+/// Adds samples to tiles on request. It never accumulates, judges, tone maps or stops: that is the oracle's part.
+///
+/// # Why it is shaped so
+/// All tiles that are still open come in one call, so that a source can spread them over its threads (or over one
+/// wavefront of a GPU). Batches are means of *new* samples alone, so that the film can keep two independent halves of any
+/// source, and no renderer has to know what a half buffer is.
+///
+/// # For implementers
+/// - Return one batch for each request, in the order of the requests. A source that cannot aim ([`SourceInfo::aims`] is
+///   false) is always asked for all tiles.
+/// - Samples must be independent of all samples handed out before, in this tile and in others.
+/// - The same seed must give the same samples, whatever the number of threads and however requests are cut into batches.
+/// - Use no reconstruction filter wider than a pixel unless you document it: shared samples correlate the noise of
+///   neighbours, and the model has learned from independent noise.
+///
+/// `tests/` has `check_source`, a contract that every source of this project passes; run it on yours.
+pub trait ProgressiveSource {
+    /// Describes the source. Must not change over its life.
+    fn info(&self) -> SourceInfo;
+
+    /// Adds samples to the tiles named.
+    ///
+    /// # Errors
+    /// [`SourceError`] if the renderer failed; samples of this call are then lost, all earlier ones stay valid.
+    fn sample(&mut self, requests: &[Request]) -> Result<Vec<Batch>, SourceError>;
+
+    /// Renders the quick noise-free reference, if this source has one. Called at most once, and only if the criterion
+    /// needs it.
+    ///
+    /// # Errors
+    /// [`SourceError`] if the renderer failed.
+    fn reference(&mut self) -> Result<Option<Reference>, SourceError> {
+        Ok(None)
+    }
+}
+
+impl<S: ProgressiveSource + ?Sized> ProgressiveSource for Box<S> {
+    fn info(&self) -> SourceInfo {
+        (**self).info()
+    }
+
+    fn sample(&mut self, requests: &[Request]) -> Result<Vec<Batch>, SourceError> {
+        (**self).sample(requests)
+    }
+
+    fn reference(&mut self) -> Result<Option<Reference>, SourceError> {
+        (**self).reference()
+    }
+}
