@@ -127,6 +127,12 @@ impl TileGrid {
         Tile { index, x, y, width, height }
     }
 
+    /// The row-major place of the tile that holds pixel (`x`, `y`), which must lie in the image.
+    #[inline]
+    pub fn index_at(&self, x: usize, y: usize) -> usize {
+        y / self.edge * self.columns() + x / self.edge
+    }
+
     /// All tiles, row-major.
     pub fn tiles(self) -> impl ExactSizeIterator<Item = Tile> {
         (0..self.len()).map(move |index| self.tile(index))
@@ -154,6 +160,7 @@ mod tests {
             let mut seen = vec![0u8; w * h];
             for tile in grid.tiles() {
                 prop_assert!(tile.width <= edge && tile.height <= edge);
+                prop_assert_eq!(grid.index_at(tile.x + tile.width - 1, tile.y), tile.index);
                 for row in tile.rows(w) {
                     seen[row].iter_mut().for_each(|s| *s += 1);
                 }

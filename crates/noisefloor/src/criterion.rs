@@ -1,0 +1,118 @@
+//! What decides that a tile is done.
+
+use crate::display::Display;
+use crate::film::Film;
+use crate::tile::Tile;
+use thiserror::Error;
+
+/// What a criterion looks at.
+#[derive(Clone, Copy, Debug)]
+pub struct View<'a> {
+    /// All samples so far.
+    pub film: &'a Film,
+    /// The frozen way from radiance to the screen.
+    pub display: &'a Display,
+    /// Display luminance of the quick reference in [0, 1], row-major over the image; there if [`Needs::reference`] is.
+    pub reference: Option<&'a [f32]>,
+}
+
+/// What a criterion needs; nothing else is made.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Needs {
+    /// Two half buffers.
+    pub halves: bool,
+    /// A quick noise-free reference.
+    pub reference: bool,
+}
+
+/// What a criterion says of one tile.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Verdict {
+    /// Whether the tile needs no more samples.
+    pub converged: bool,
+    /// Probability that an observer sees no difference from the converged picture, where the criterion has one.
+    pub probability: Option<f32>,
+    /// Samples per pixel at which the criterion expects to be satisfied, where it can tell.
+    pub expected_samples: Option<u64>,
+}
+
+/// Why a criterion could not judge.
+#[derive(Debug, Error, Clone, PartialEq, Eq)]
+pub enum CriterionError {
+    /// The source has no reference, and the criterion needs one.
+    #[error("{0} needs a ray-traced reference, and this source has none: use a model trained on halves")]
+    NoReference(String),
+    /// The criterion was trained for another tile size.
+    #[error(
+        "{name} judges tiles of {expected}×{expected} pixels only, not {width}×{height}: set the tile size to {expected} and use an image that it divides"
+    )]
+    TileSize {
+        /// The criterion.
+        name: String,
+        /// Edge of the tiles it can judge.
+        expected: usize,
+        /// Width of the tile it was given.
+        width: usize,
+        /// Height of the tile it was given.
+        height: usize,
+    },
+}
+
+/// Judges tiles of a film.
+///
+/// # Why it is shaped so
+/// All tiles that are due come in one call, so that a criterion can spread them over threads, or look at the whole image
+/// once. A criterion may keep state between calls (a rival that compares with the previous picture does): hence `&mut`.
+///
+/// # For implementers
+/// - Return one verdict for each tile, in their order.
+/// - Verdicts must not depend on the number of threads.
+/// - Say in [`StoppingCriterion::needs`] what you read; what you do not need is not rendered and not kept.
+pub trait StoppingCriterion {
+    /// A short name for reports: `"svm oracle"`.
+    fn name(&self) -> String;
+
+    /// What the criterion reads beside the mean picture.
+    fn needs(&self) -> Needs {
+        Needs::default()
+    }
+
+    /// Judges the tiles named, all of which have samples.
+    ///
+    /// # Errors
+    /// [`CriterionError`] if the criterion does not fit the job.
+    fn judge(&mut self, view: &View<'_>, tiles: &[Tile]) -> Result<Vec<Verdict>, CriterionError>;
+}
+
+impl<C: StoppingCriterion + ?Sized> StoppingCriterion for Box<C> {
+    fn name(&self) -> String {
+        (**self).name()
+    }
+
+    fn needs(&self) -> Needs {
+        (**self).needs()
+    }
+
+    fn judge(&mut self, view: &View<'_>, tiles: &[Tile]) -> Result<Vec<Verdict>, CriterionError> {
+        (**self).judge(view, tiles)
+    }
+}
+
+/// The simplest criterion: a fixed number of samples per pixel everywhere.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct FixedSamples(pub u64);
+
+impl StoppingCriterion for FixedSamples {
+    fn name(&self) -> String {
+        format!("{} samples per pixel", self.0)
+    }
+
+    fn judge(&mut self, view: &View<'_>, tiles: &[Tile]) -> Result<Vec<Verdict>, CriterionError> {
+        let verdict = |t: &Tile| Verdict {
+            converged: view.film.samples(t.index) >= self.0,
+            probability: None,
+            expected_samples: Some(self.0),
+        };
+        Ok(tiles.iter().map(verdict).collect())
+    }
+}

@@ -1,0 +1,222 @@
+//! From linear radiance to what a screen shows: exposure, tone mapping, sRGB encoding, luminance.
+
+use crate::source::Rgb;
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+/// Key of an average scene (Reinhard et al. 2002, §3.1): what the log-average luminance is mapped to.
+pub const DEFAULT_KEY: f32 = 0.18;
+
+/// δ of the log-average (Reinhard et al. 2002, eq. 1), as a share of the mean luminance. The paper leaves δ absolute; a
+/// relative one keeps the exposure of a scene in candela and of the same scene in nits × 10⁻⁶ the same.
+pub const DELTA: f64 = 1e-4;
+
+/// Rec.709 luminance of a linear RGB triple, in the unit of its input.
+#[inline]
+pub fn luminance([r, g, b]: Rgb) -> f32 {
+    0.2126 * r + 0.7152 * g + 0.0722 * b
+}
+
+/// sRGB encoding of one linear channel (IEC 61966-2-1): [0, 1] → [0, 1], clamped.
+#[inline]
+pub fn srgb_encode(linear: f32) -> f32 {
+    let x = linear.clamp(0.0, 1.0);
+    if x <= 0.003_130_8 { 12.92 * x } else { 1.055 * x.powf(1.0 / 2.4) - 0.055 }
+}
+
+/// Inverse of [`srgb_encode`]: [0, 1] → [0, 1], clamped.
+#[inline]
+pub fn srgb_decode(encoded: f32) -> f32 {
+    let x = encoded.clamp(0.0, 1.0);
+    if x <= 0.040_45 { x / 12.92 } else { ((x + 0.055) / 1.055).powf(2.4) }
+}
+
+/// How a scene is to be shown, before its exposure is known.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum ToneMapping {
+    /// The photographic operator, global form (Reinhard et al. 2002, eqs. 1–4).
+    Reinhard {
+        /// What the log-average luminance becomes, above 0; 0.18 for an average scene.
+        key: f32,
+        /// Smallest luminance that becomes white, after exposure, above 0; `None` compresses without burning out (eq. 3).
+        white: Option<f32>,
+    },
+    /// Plain sRGB: multiply, clamp to [0, 1], encode.
+    Srgb {
+        /// Factor on linear radiance, above 0; 1 shows radiance 1 as white.
+        exposure: f32,
+    },
+}
+
+impl Default for ToneMapping {
+    fn default() -> Self {
+        Self::Reinhard { key: DEFAULT_KEY, white: None }
+    }
+}
+
+/// A tone mapping parameter that is not a positive finite number.
+#[derive(Debug, Error, Clone, Copy, PartialEq)]
+#[error("{name} must be a positive finite number, not {value}")]
+pub struct ToneMappingError {
+    name: &'static str,
+    value: f32,
+}
+
+impl ToneMapping {
+    /// Checks the parameters.
+    ///
+    /// # Errors
+    /// [`ToneMappingError`] if one is not a positive finite number.
+    pub fn check(&self) -> Result<(), ToneMappingError> {
+        let positive = |name, value: f32| {
+            if value.is_finite() && value > 0.0 { Ok(()) } else { Err(ToneMappingError { name, value }) }
+        };
+        match *self {
+            Self::Reinhard { key, white } => {
+                positive("the key of Reinhard tone mapping", key)?;
+                white.map_or(Ok(()), |w| positive("the white point of Reinhard tone mapping", w))
+            }
+            Self::Srgb { exposure } => positive("the sRGB exposure", exposure),
+        }
+    }
+
+    /// Settles the exposure for a picture, once; the result is frozen, and is to be used for this picture, its halves and
+    /// its reference alike: a drifting log-average would read as noise. `pixels` are linear radiance; non-finite ones are
+    /// skipped. A black picture gets exposure 1.
+    pub fn settle(&self, pixels: &[Rgb]) -> Display {
+        match *self {
+            Self::Reinhard { key, white } => {
+                let exposure = log_average(pixels).map_or(1.0, |average| (f64::from(key) / average) as f32);
+                Display { exposure, curve: Curve::Reinhard { white } }
+            }
+            Self::Srgb { exposure } => Display { exposure, curve: Curve::Clamp },
+        }
+    }
+}
+
+/// exp(mean ln(δ + L)), Reinhard et al. 2002, eq. 1 with the 1/N inside the exponential as their text has it; `None` if no
+/// pixel is brighter than black.
+fn log_average(pixels: &[Rgb]) -> Option<f64> {
+    let luminances =
+        || pixels.iter().map(|&p| f64::from(luminance(p))).filter(|l| l.is_finite()).map(|l| l.max(0.0));
+    let count = luminances().count() as f64;
+    let mean = luminances().sum::<f64>() / count;
+    if !(mean > 0.0 && mean.is_finite()) {
+        return None;
+    }
+    let log_sum: f64 = luminances().map(|l| (DELTA * mean + l).ln()).sum();
+    Some((log_sum / count).exp())
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+enum Curve {
+    Clamp,
+    Reinhard { white: Option<f32> },
+}
+
+/// A tone mapping with its exposure settled: a fixed function from linear radiance to display values.
+///
+/// ```
+/// use noisefloor::ToneMapping;
+/// let grey = [[0.5_f32; 3]; 4];
+/// let display = ToneMapping::Reinhard { key: 0.18, white: None }.settle(&grey);
+/// // A uniform picture has its own luminance as log-average: it is shown at 0.18 / (1 + 0.18), then sRGB-encoded.
+/// let shown = display.luma([0.5; 3]);
+/// assert!((shown - 0.427).abs() < 1e-3, "{shown}");
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Display {
+    exposure: f32,
+    curve: Curve,
+}
+
+impl Display {
+    /// A picture that is shown as it is: exposure 1, clamped, sRGB.
+    pub const SRGB: Self = Self { exposure: 1.0, curve: Curve::Clamp };
+
+    /// The factor that linear radiance is multiplied by.
+    pub fn exposure(&self) -> f32 {
+        self.exposure
+    }
+
+    /// Linear radiance → linear display values in [0, 1]. Negative radiance shows as black.
+    #[inline]
+    pub fn map(&self, pixel: Rgb) -> Rgb {
+        let exposed = pixel.map(|c| (c * self.exposure).max(0.0));
+        let scale = match self.curve {
+            Curve::Clamp => 1.0,
+            Curve::Reinhard { white } => {
+                let l = luminance(exposed).min(1e30);
+                // eq. 4; without a white point eq. 3. Colours keep their ratios: L_d / L.
+                (1.0 + white.map_or(0.0, |w| l / (w * w))) / (1.0 + l)
+            }
+        };
+        exposed.map(|c| (c * scale).min(1.0))
+    }
+
+    /// Linear radiance → display-encoded sRGB in [0, 1].
+    #[inline]
+    pub fn encode(&self, pixel: Rgb) -> Rgb {
+        self.map(pixel).map(srgb_encode)
+    }
+
+    /// Linear radiance → display-encoded Rec.709 luminance in [0, 1]: the plane that observers are modelled on.
+    #[inline]
+    pub fn luma(&self, pixel: Rgb) -> f32 {
+        luminance(self.encode(pixel))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn known_values() {
+        assert_eq!(srgb_encode(0.0), 0.0);
+        assert!((srgb_encode(1.0) - 1.0).abs() < 1e-6);
+        assert!((srgb_encode(0.5) - 0.735_357).abs() < 1e-5);
+        // Burns out at the white point: L = white ⇒ L_d = 1.
+        let display = Display { exposure: 1.0, curve: Curve::Reinhard { white: Some(3.0) } };
+        assert!((display.map([3.0; 3])[0] - 1.0).abs() < 1e-6);
+        assert!((Display::SRGB.luma([1.0; 3]) - 1.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn log_average_of_known_pictures() {
+        let two = [[0.1_f32; 3], [10.0; 3]];
+        assert!((log_average(&two).unwrap() - 1.0).abs() < 1e-2);
+        assert_eq!(log_average(&[[0.0; 3]; 5]), None);
+        assert_eq!(log_average(&[[f32::NAN; 3]]), None);
+    }
+
+    #[test]
+    fn exposure_does_not_depend_on_the_unit_of_radiance() {
+        let picture: Vec<Rgb> = (0..100).map(|i| [i as f32 / 50.0, 0.3, 0.1]).collect();
+        let tone = ToneMapping::default();
+        for unit in [1e-6_f32, 1.0, 1e6] {
+            let scaled: Vec<Rgb> = picture.iter().map(|p| p.map(|c| c * unit)).collect();
+            let (a, b) = (tone.settle(&picture), tone.settle(&scaled));
+            for (p, s) in picture.iter().zip(&scaled) {
+                assert!((a.luma(*p) - b.luma(*s)).abs() < 1e-5, "unit {unit}");
+            }
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn stays_in_range_and_grows_with_radiance(l in 0.0f32..1e30, more in 1.0f32..10.0, reinhard: bool) {
+            let curve = if reinhard { Curve::Reinhard { white: None } } else { Curve::Clamp };
+            let display = Display { exposure: 1.0, curve };
+            let (a, b) = (display.luma([l; 3]), display.luma([l * more; 3]));
+            prop_assert!((0.0..=1.000_001).contains(&a) && a <= b + 1e-6, "{a} {b}");
+        }
+
+        #[test]
+        fn srgb_inverts(x in 0.0f32..1.0) {
+            prop_assert!((srgb_decode(srgb_encode(x)) - x).abs() < 2e-6);
+        }
+    }
+}

@@ -1,0 +1,147 @@
+//! The noise mask: an image minus its 3×3 Gaussian blur (Takouachet et al. 2017, §5.1).
+
+use ndarray::Array2;
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+/// A checked mask width: σ of the 3×3 Gaussian, in pixels, within [0.3, 1.5] (Takouachet et al. 2017, §5.1).
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "f32", into = "f32")]
+pub struct NoiseMask {
+    sigma: f32,
+}
+
+/// σ outside [0.3, 1.5].
+#[derive(Debug, Error, Clone, Copy, PartialEq)]
+#[error("the noise mask needs a σ within 0.3…1.5 pixels, not {0}")]
+pub struct SigmaError(pub f32);
+
+impl Default for NoiseMask {
+    /// σ = 1.
+    fn default() -> Self {
+        Self { sigma: 1.0 }
+    }
+}
+
+impl TryFrom<f32> for NoiseMask {
+    type Error = SigmaError;
+
+    fn try_from(sigma: f32) -> Result<Self, SigmaError> {
+        if (0.3..=1.5).contains(&sigma) { Ok(Self { sigma }) } else { Err(SigmaError(sigma)) }
+    }
+}
+
+impl From<NoiseMask> for f32 {
+    fn from(mask: NoiseMask) -> f32 {
+        mask.sigma
+    }
+}
+
+impl NoiseMask {
+    /// σ in pixels.
+    pub fn sigma(&self) -> f32 {
+        self.sigma
+    }
+
+    /// The weights of one row of the separable kernel: neighbour, centre; neighbour + centre + neighbour = 1.
+    pub fn weights(&self) -> (f32, f32) {
+        let neighbour = (-0.5 / (self.sigma * self.sigma)).exp();
+        let sum = 1.0 + 2.0 * neighbour;
+        (neighbour / sum, 1.0 / sum)
+    }
+
+    /// Share of the variance of white noise that the mask lets through: Σ (δ − g)², over the 3×3 kernel g.
+    /// Mask energies divided by it are variances of the pixels.
+    pub fn white_noise_gain(&self) -> f32 {
+        let (n, c) = self.weights();
+        let squares = 2.0 * n * n + c * c; // Σ g² of one direction
+        1.0 - 2.0 * c * c + squares * squares
+    }
+
+    /// The noise mask of a plane, of the same shape and unit. Pixels beyond the edge repeat the edge.
+    pub fn apply(&self, plane: &Array2<f32>) -> Array2<f32> {
+        let (height, width) = plane.dim();
+        let mut out = Array2::zeros((height, width));
+        if width == 0 || height == 0 {
+            return out;
+        }
+        let (n, c) = self.weights();
+        // Blur along columns into one row, then along that row.
+        let mut row = vec![0.0f32; width];
+        for y in 0..height {
+            let (above, here, below) =
+                (plane.row(y.saturating_sub(1)), plane.row(y), plane.row((y + 1).min(height - 1)));
+            for (x, sum) in row.iter_mut().enumerate() {
+                *sum = n * (above[x] + below[x]) + c * here[x];
+            }
+            let mut target = out.row_mut(y);
+            for x in 0..width {
+                let blurred = n * (row[x.saturating_sub(1)] + row[(x + 1).min(width - 1)]) + c * row[x];
+                target[x] = here[x] - blurred;
+            }
+        }
+        out
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn an_impulse_gives_the_kernel() {
+        let mut plane = Array2::zeros((5, 5));
+        plane[(2, 2)] = 1.0;
+        let mask = NoiseMask::default();
+        let (n, c) = mask.weights();
+        let out = mask.apply(&plane);
+        assert!((out[(2, 2)] - (1.0 - c * c)).abs() < 1e-6);
+        assert!((out[(2, 1)] + n * c).abs() < 1e-6);
+        assert!((out[(1, 1)] + n * n).abs() < 1e-6);
+        assert_eq!(out[(0, 2)], 0.0);
+        // exp(-1/2) and exp(-1) against the centre: the two-dimensional Gaussian of σ = 1.
+        assert!((n / c - (-0.5f32).exp()).abs() < 1e-6);
+    }
+
+    #[test]
+    fn white_noise_gain_is_the_energy_of_the_impulse_response() {
+        for sigma in [0.3, 0.7, 1.0, 1.5] {
+            let mask = NoiseMask::try_from(sigma).unwrap();
+            let mut plane = Array2::zeros((5, 5));
+            plane[(2, 2)] = 1.0;
+            let energy: f32 = mask.apply(&plane).iter().map(|v| v * v).sum();
+            assert!((energy - mask.white_noise_gain()).abs() < 1e-6);
+        }
+    }
+
+    #[test]
+    fn sigma_is_checked() {
+        for bad in [0.29, 1.51, f32::NAN, -1.0, f32::INFINITY] {
+            assert!(NoiseMask::try_from(bad).is_err(), "{bad}");
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn planes_without_detail_vanish(level in 0.0f32..1.0, slope in -0.01f32..0.01, sigma in 0.3f32..=1.5) {
+            let mask = NoiseMask::try_from(sigma).unwrap();
+            let ramp = Array2::from_shape_fn((8, 9), |(y, x)| level + slope * (x as f32 + 2.0 * y as f32));
+            let out = mask.apply(&ramp);
+            // The mask of a ramp is zero but at the repeated edge.
+            for y in 1..7 {
+                for x in 1..8 {
+                    prop_assert!(out[(y, x)].abs() < 1e-6);
+                }
+            }
+        }
+
+        #[test]
+        fn is_linear(a in -2.0f32..2.0, seed in 0u32..100) {
+            let mask = NoiseMask::default();
+            let plane = Array2::from_shape_fn((6, 7), |(y, x)| ((y * 31 + x * 17 + seed as usize) % 13) as f32 / 13.0);
+            let (scaled, out) = (mask.apply(&plane.mapv(|v| v * a)), mask.apply(&plane));
+            prop_assert!(scaled.iter().zip(&out).all(|(s, o)| (s - a * o).abs() < 1e-5));
+        }
+    }
+}

@@ -1,0 +1,195 @@
+//! When tiles are judged, and what ends them apart from the criterion.
+
+use crate::display::{ToneMapping, ToneMappingError};
+use crate::tile::DEFAULT_TILE;
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+/// When a tile is judged next.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Schedule {
+    /// After every `step` samples per pixel (Takouachet et al. 2017, §5.2: N = 100).
+    Every {
+        /// Samples per pixel between two verdicts, at least 2.
+        step: u32,
+    },
+    /// Spaced by the expected need: most of the way to where the criterion expects to be satisfied, at most doubling what the
+    /// tile has, in multiples of `step`. Fewer verdicts and fewer, larger batches; stops on the same grid.
+    Spaced {
+        /// The finest spacing, in samples per pixel, at least 2.
+        step: u32,
+    },
+}
+
+impl Schedule {
+    /// Share of the way to the expected need that is sampled before the next look: expectations err, and an early look is
+    /// cheap while late samples are not.
+    const APPROACH: f64 = 0.75;
+
+    fn step(self) -> u64 {
+        match self {
+            Self::Every { step } | Self::Spaced { step } => u64::from(step),
+        }
+    }
+
+    /// The number of samples at which to look again.
+    pub(crate) fn next(self, samples: u64, expected: Option<u64>) -> u64 {
+        let step = self.step();
+        let on_grid = |n: u64| (n / step).max(samples / step + 1) * step;
+        match self {
+            Self::Every { .. } => on_grid(0),
+            Self::Spaced { .. } => {
+                let missing = expected.map_or(0, |e| e.saturating_sub(samples)).min(samples.max(step));
+                on_grid(samples + (missing as f64 * Self::APPROACH) as u64)
+            }
+        }
+    }
+}
+
+/// A straight line from the threshold of the observers in the training data to that of another audience: T′ = a·T + b.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Audience {
+    /// Slope a, at least 0.
+    pub slope: f64,
+    /// Offset b, in samples per pixel.
+    pub offset: f64,
+}
+
+impl Audience {
+    /// The observers of the training data: T′ = T.
+    pub const TRAINED: Self = Self { slope: 1.0, offset: 0.0 };
+    /// Students of computer art: T′ = 1.94·T − 346, r = 0.78 (Takouachet et al. 2017, §7.3).
+    pub const ART_STUDENTS: Self = Self { slope: 1.94, offset: -346.0 };
+
+    /// Samples per pixel for this audience where the trained one needs `samples`; never fewer, since they are taken already.
+    pub fn samples(&self, samples: u64) -> u64 {
+        samples.max((self.slope * samples as f64 + self.offset).ceil().clamp(0.0, 1e15) as u64)
+    }
+}
+
+/// Parameters of a [`crate::Session`]; checked when it is made.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Params {
+    /// Tile edge in pixels, 16…512.
+    pub tile: usize,
+    /// The way to the screen.
+    pub tone_mapping: ToneMapping,
+    /// When tiles are judged.
+    pub schedule: Schedule,
+    /// No tile stops with fewer samples per pixel.
+    pub min_samples: u64,
+    /// Every tile stops at this many samples per pixel (Takouachet et al. 2017, §4.2.1: 10,000).
+    pub max_samples: u64,
+    /// Verdicts in a row that have to say "converged", at least 1.
+    pub consecutive: u32,
+    /// Whose eyes.
+    pub audience: Audience,
+}
+
+impl Default for Params {
+    fn default() -> Self {
+        Self {
+            tile: DEFAULT_TILE,
+            tone_mapping: ToneMapping::default(),
+            schedule: Schedule::Every { step: 100 },
+            min_samples: 100,
+            max_samples: 10_000,
+            consecutive: 1,
+            audience: Audience::TRAINED,
+        }
+    }
+}
+
+/// A parameter out of its range.
+#[derive(Debug, Error, Clone, PartialEq)]
+pub enum ParamsError {
+    /// The step is too small for two halves.
+    #[error("a step of {0} samples cannot be split into two halves: use at least 2")]
+    Step(u32),
+    /// The limits leave nothing.
+    #[error("at most {max} samples per pixel are allowed, but at least {min} (and at least 2) are asked for")]
+    Samples {
+        /// The minimum asked for.
+        min: u64,
+        /// The maximum asked for.
+        max: u64,
+    },
+    /// No verdict is needed.
+    #[error("at least one verdict must say that a tile has converged, not 0")]
+    Consecutive,
+    /// The line of the audience is not a rising line.
+    #[error("the audience line T′ = {0}·T + {1} needs finite numbers and a slope of at least 0")]
+    Audience(f64, f64),
+    /// The tone mapping.
+    #[error(transparent)]
+    ToneMapping(#[from] ToneMappingError),
+}
+
+impl Params {
+    /// Checks every parameter but the tile size, which [`crate::TileGrid::new`] checks with the image.
+    ///
+    /// # Errors
+    /// [`ParamsError`] naming the first one out of range.
+    pub fn check(&self) -> Result<(), ParamsError> {
+        self.tone_mapping.check()?;
+        let (Schedule::Every { step } | Schedule::Spaced { step }) = self.schedule;
+        if step < 2 {
+            return Err(ParamsError::Step(step));
+        }
+        if self.max_samples < self.min_samples.max(2) {
+            return Err(ParamsError::Samples { min: self.min_samples, max: self.max_samples });
+        }
+        if self.consecutive == 0 {
+            return Err(ParamsError::Consecutive);
+        }
+        let Audience { slope, offset } = self.audience;
+        if !(slope.is_finite() && slope >= 0.0 && offset.is_finite()) {
+            return Err(ParamsError::Audience(slope, offset));
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn the_paper_s_audience() {
+        assert_eq!(Audience::ART_STUDENTS.samples(1000), 1594);
+        assert_eq!(Audience::ART_STUDENTS.samples(100), 100); // the line gives −152
+        assert_eq!(Audience::TRAINED.samples(123), 123);
+    }
+
+    #[test]
+    fn every_step_is_every_step() {
+        let schedule = Schedule::Every { step: 100 };
+        assert_eq!([0, 99, 100, 250].map(|n| schedule.next(n, Some(5000))), [100, 100, 200, 300]);
+    }
+
+    #[test]
+    fn ranges_are_checked() {
+        let ok = Params::default();
+        assert_eq!(ok.check(), Ok(()));
+        assert!(Params { schedule: Schedule::Every { step: 1 }, ..ok }.check().is_err());
+        assert!(Params { max_samples: 50, ..ok }.check().is_err());
+        assert!(Params { max_samples: 1, min_samples: 0, ..ok }.check().is_err());
+        assert!(Params { consecutive: 0, ..ok }.check().is_err());
+        assert!(Params { audience: Audience { slope: f64::NAN, offset: 0.0 }, ..ok }.check().is_err());
+        assert!(Params { tone_mapping: ToneMapping::Srgb { exposure: 0.0 }, ..ok }.check().is_err());
+    }
+
+    proptest! {
+        #[test]
+        fn spacing_moves_on_but_never_more_than_doubles(n in 0u64..20_000, e in prop::option::of(0u64..50_000), step in 2u32..500) {
+            let next = Schedule::Spaced { step }.next(n, e);
+            prop_assert!(next > n && next.is_multiple_of(u64::from(step)));
+            prop_assert!(next <= n + n.max(u64::from(step)) + u64::from(step));
+            if let Some(e) = e.filter(|&e| e > n + u64::from(step)) {
+                prop_assert!(next < e + u64::from(step), "beyond the expected need");
+            }
+        }
+    }
+}

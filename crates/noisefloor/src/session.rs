@@ -1,0 +1,374 @@
+//! The loop, pushed: for a renderer that owns its own.
+
+use crate::criterion::{CriterionError, StoppingCriterion, Verdict, View};
+use crate::display::{Display, ToneMapping};
+use crate::film::{Film, FilmError};
+use crate::params::{Params, ParamsError};
+use crate::source::{Reference, Request, Rgb};
+use crate::tile::{Tile, TileError, TileGrid};
+use serde::{Deserialize, Serialize};
+use std::fmt;
+use thiserror::Error;
+
+/// Why a tile gets no more samples.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum StopReason {
+    /// The criterion is satisfied.
+    Converged,
+    /// The largest number of samples was reached first.
+    MaxSamples,
+    /// Time was up.
+    TimeLimit,
+    /// Somebody cancelled.
+    Cancelled,
+    /// The source has no more samples (a playback came to its end).
+    SourceExhausted,
+    /// The source or the criterion failed.
+    Failed,
+}
+
+impl fmt::Display for StopReason {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Converged => "converged",
+            Self::MaxSamples => "max-samples",
+            Self::TimeLimit => "time-limit",
+            Self::Cancelled => "cancelled",
+            Self::SourceExhausted => "source-exhausted",
+            Self::Failed => "failed",
+        })
+    }
+}
+
+/// A tile that is done.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Stop {
+    /// The tile.
+    pub tile: Tile,
+    /// Samples per pixel when it stopped.
+    pub samples: u64,
+    /// Probability, at the last verdict, that an observer sees no difference; `None` if never judged or not offered.
+    pub probability: Option<f32>,
+    /// Why.
+    pub reason: StopReason,
+}
+
+/// What can go wrong in a session.
+#[derive(Debug, Error)]
+pub enum SessionError {
+    /// A parameter out of range.
+    #[error(transparent)]
+    Params(#[from] ParamsError),
+    /// An image or tile size out of range.
+    #[error(transparent)]
+    Tile(#[from] TileError),
+    /// A batch that does not fit.
+    #[error(transparent)]
+    Film(#[from] FilmError),
+    /// A criterion that does not fit.
+    #[error(transparent)]
+    Criterion(#[from] CriterionError),
+    /// A reference of another size than the image.
+    #[error("the reference has {got} pixels, the image {expected}")]
+    Reference {
+        /// Pixels of the reference.
+        got: usize,
+        /// Pixels of the image.
+        expected: usize,
+    },
+}
+
+#[derive(Clone, Copy, Debug)]
+struct TileState {
+    /// Judge at this many samples.
+    next: u64,
+    /// Verdicts in a row that said "converged".
+    streak: u32,
+    verdict: Option<Verdict>,
+    /// Converged for the trained audience; this audience wants so many.
+    target: Option<u64>,
+    stop: Option<Stop>,
+}
+
+/// Film, criterion and limits, for a renderer that owns its loop: it pushes batches, asks which tiles are open and how much
+/// each deserves, and stops when none is.
+///
+/// ```
+/// use noisefloor::{FixedSamples, Params, Session};
+///
+/// let mut session = Session::new(640, 360, FixedSamples(200), Params::default())?;
+/// while !session.is_done() {
+///     for request in session.requests() {
+///         // Your renderer: the mean of `request.samples` new samples of each pixel of the tile.
+///         let mean = vec![[0.5; 3]; request.tile.pixels()];
+///         session.push(request.tile.index, request.samples, &mean)?;
+///     }
+///     session.judge()?;
+/// }
+/// assert!(session.stops().all(|stop| stop.samples == 200));
+/// # Ok::<(), noisefloor::SessionError>(())
+/// ```
+pub struct Session<C> {
+    film: Film,
+    criterion: C,
+    params: Params,
+    display: Option<Display>,
+    reference: Option<Reference>,
+    /// The reference as it is displayed, once the display is settled.
+    displayed_reference: Option<Vec<f32>>,
+    tiles: Vec<TileState>,
+}
+
+impl<C: StoppingCriterion> Session<C> {
+    /// Starts a session for an image of `width`×`height` pixels.
+    ///
+    /// # Errors
+    /// [`SessionError`] if a parameter or the size is out of range.
+    pub fn new(width: usize, height: usize, criterion: C, params: Params) -> Result<Self, SessionError> {
+        params.check()?;
+        let grid = TileGrid::new(width, height, params.tile)?;
+        let film = if criterion.needs().halves { Film::new(grid) } else { Film::without_halves(grid) };
+        let first = params.schedule.next(params.min_samples.saturating_sub(1), None).min(params.max_samples);
+        let tile = TileState { next: first, streak: 0, verdict: None, target: None, stop: None };
+        let tiles = vec![tile; grid.len()];
+        // Plain sRGB does not depend on the picture; an exposure by log-average has to wait for one.
+        let display = match params.tone_mapping {
+            ToneMapping::Srgb { .. } => Some(params.tone_mapping.settle(&[])),
+            ToneMapping::Reinhard { .. } => None,
+        };
+        Ok(Self { film, criterion, params, display, reference: None, displayed_reference: None, tiles })
+    }
+
+    /// The film.
+    pub fn film(&self) -> &Film {
+        &self.film
+    }
+
+    /// The criterion.
+    pub fn criterion(&self) -> &C {
+        &self.criterion
+    }
+
+    /// The parameters.
+    pub fn params(&self) -> &Params {
+        &self.params
+    }
+
+    /// The frozen way to the screen; `None` until it has settled.
+    pub fn display(&self) -> Option<&Display> {
+        self.display.as_ref()
+    }
+
+    /// Fixes the way to the screen before it settles by itself, for renderers that have an exposure of their own or finish one
+    /// tile before they start the next.
+    pub fn set_display(&mut self, display: Display) {
+        self.display = Some(display);
+        self.displayed_reference = None;
+    }
+
+    /// Hands over the quick noise-free reference, for criteria that need one.
+    ///
+    /// # Errors
+    /// [`SessionError::Reference`] if its size is not the image's.
+    pub fn set_reference(&mut self, reference: Reference) -> Result<(), SessionError> {
+        let grid = self.film.grid();
+        let expected = grid.width() * grid.height();
+        let fits = (reference.width, reference.height) == (grid.width(), grid.height());
+        if !fits || reference.pixels.len() != expected {
+            return Err(SessionError::Reference { got: reference.pixels.len(), expected });
+        }
+        self.reference = Some(reference);
+        self.displayed_reference = None;
+        Ok(())
+    }
+
+    /// What the open tiles deserve now. Empty when all are done. Where halves are kept, requests fill one half at a time, so
+    /// that the two stay even.
+    pub fn requests(&self) -> Vec<Request> {
+        let wish = |(index, state): (usize, &TileState)| {
+            if state.stop.is_some() {
+                return None;
+            }
+            let first = self.film.samples(index);
+            let goal = state.target.unwrap_or(state.next);
+            let wanted = if self.film.has_halves() {
+                let [a, b] = self.film.half_counts(index);
+                goal.div_ceil(2).saturating_sub(a.min(b)).min(goal.saturating_sub(first))
+            } else {
+                goal.saturating_sub(first)
+            };
+            let samples = u32::try_from(wanted.max(1)).unwrap_or(u32::MAX);
+            Some(Request { tile: self.film.grid().tile(index), first, samples })
+        };
+        self.tiles.iter().enumerate().filter_map(wish).collect()
+    }
+
+    /// Adds the mean of `samples` new samples of a tile, row-major over the tile. Tiles that are done take samples too: they
+    /// get better, and keep their stop.
+    ///
+    /// # Errors
+    /// [`FilmError`] if it does not fit; nothing is changed then.
+    pub fn push(&mut self, tile: usize, samples: u32, mean: &[Rgb]) -> Result<(), FilmError> {
+        self.film.add(tile, samples, mean)
+    }
+
+    /// Adds what is new in a running mean of `total` samples of a tile; see [`Film::add_running`].
+    ///
+    /// # Errors
+    /// [`FilmError`] if it does not fit; nothing is changed then.
+    pub fn push_running(&mut self, tile: usize, total: u64, mean: &[Rgb]) -> Result<(), FilmError> {
+        self.film.add_running(tile, total, mean)
+    }
+
+    /// Judges the tiles that are due, and returns those that are done by it.
+    ///
+    /// The first verdicts wait until every tile has samples: the exposure is settled then, once and for all, unless the tone
+    /// mapping is plain sRGB or [`Session::set_display`] was called.
+    ///
+    /// # Errors
+    /// [`CriterionError`] if the criterion does not fit the job.
+    pub fn judge(&mut self) -> Result<Vec<Stop>, CriterionError> {
+        let due: Vec<Tile> = self.film.grid().tiles().filter(|t| self.is_due(t.index)).collect();
+        if due.is_empty() || !self.settle_display() {
+            return Ok(Vec::new());
+        }
+        let (judged, waited): (Vec<Tile>, Vec<Tile>) =
+            due.into_iter().partition(|t| self.tiles[t.index].target.is_none());
+
+        // Tiles that had converged for the trained audience have now what this audience wants.
+        let mut stops: Vec<Stop> =
+            waited.iter().map(|t| self.stop(t.index, self.audience_reason(t.index))).collect();
+
+        // Ask the criterion for the others.
+        if !judged.is_empty() {
+            let Some(display) = &self.display else { return Ok(stops) };
+            let view = View { film: &self.film, display, reference: self.displayed_reference.as_deref() };
+            let verdicts = self.criterion.judge(&view, &judged)?;
+            for (tile, verdict) in judged.into_iter().zip(verdicts) {
+                stops.extend(self.take(tile.index, verdict));
+            }
+        }
+        Ok(stops)
+    }
+
+    /// Whether a tile has what its next verdict needs.
+    fn is_due(&self, index: usize) -> bool {
+        let state = &self.tiles[index];
+        let has_halves = !self.film.has_halves() || self.film.half_counts(index).iter().all(|&n| n > 0);
+        state.stop.is_none() && has_halves && self.film.samples(index) >= state.target.unwrap_or(state.next)
+    }
+
+    /// Settles exposure and reference; false if it is too early.
+    fn settle_display(&mut self) -> bool {
+        if self.display.is_none() {
+            if (0..self.tiles.len()).any(|t| self.film.samples(t) == 0) {
+                return false;
+            }
+            self.display = Some(self.params.tone_mapping.settle(&self.film.image()));
+        }
+        if let (Some(display), Some(reference), None) =
+            (&self.display, &self.reference, &self.displayed_reference)
+        {
+            self.displayed_reference = Some(reference.pixels.iter().map(|&p| display.luma(p)).collect());
+        }
+        true
+    }
+
+    /// Files one verdict; returns the stop if the tile is done by it.
+    fn take(&mut self, index: usize, verdict: Verdict) -> Option<Stop> {
+        let samples = self.film.samples(index);
+        let Params { schedule, consecutive, audience, max_samples, .. } = self.params;
+        let state = &mut self.tiles[index];
+        state.verdict = Some(verdict);
+        state.streak = if verdict.converged { state.streak + 1 } else { 0 };
+        if state.streak >= consecutive {
+            let target = audience.samples(samples);
+            if target <= samples {
+                return Some(self.stop(index, StopReason::Converged));
+            }
+            state.target = Some(target.min(max_samples).max(samples + 1));
+        }
+        if samples >= max_samples {
+            return Some(self.stop(index, StopReason::MaxSamples));
+        }
+        state.next = schedule.next(samples, verdict.expected_samples).min(max_samples);
+        None
+    }
+
+    /// Whether an audience's wish was granted or cut short by the limit.
+    fn audience_reason(&self, index: usize) -> StopReason {
+        let at_limit = self.film.samples(index) >= self.params.max_samples;
+        if at_limit { StopReason::MaxSamples } else { StopReason::Converged }
+    }
+
+    fn stop(&mut self, index: usize, reason: StopReason) -> Stop {
+        let state = &mut self.tiles[index];
+        let stop = Stop {
+            tile: self.film.grid().tile(index),
+            samples: self.film.samples(index),
+            probability: state.verdict.and_then(|v| v.probability),
+            reason,
+        };
+        *state.stop.insert(stop)
+    }
+
+    /// Ends one tile for a reason of the caller's. Does nothing if it is done already.
+    ///
+    /// # Panics
+    /// If the tile does not exist.
+    pub fn close(&mut self, tile: usize, reason: StopReason) -> Option<Stop> {
+        self.tiles[tile].stop.is_none().then(|| self.stop(tile, reason))
+    }
+
+    /// Ends every open tile for a reason of the caller's, and returns them.
+    pub fn close_all(&mut self, reason: StopReason) -> Vec<Stop> {
+        (0..self.tiles.len()).filter_map(|tile| self.close(tile, reason)).collect()
+    }
+
+    /// Whether every tile is done.
+    pub fn is_done(&self) -> bool {
+        self.open_tiles() == 0
+    }
+
+    /// Number of tiles that are not done.
+    pub fn open_tiles(&self) -> usize {
+        self.tiles.iter().filter(|t| t.stop.is_none()).count()
+    }
+
+    /// The tiles that are done, in row-major order.
+    pub fn stops(&self) -> impl Iterator<Item = Stop> {
+        self.tiles.iter().filter_map(|t| t.stop)
+    }
+
+    /// The last verdict on a tile.
+    ///
+    /// # Panics
+    /// If the tile does not exist.
+    pub fn verdict(&self, tile: usize) -> Option<Verdict> {
+        self.tiles[tile].verdict
+    }
+
+    /// Samples still to be taken, over all pixels, as the criterion expects it; `None` while any open tile is without an
+    /// expectation.
+    pub fn expected_samples_to_go(&self) -> Option<u64> {
+        let max = self.params.max_samples;
+        self.tiles.iter().enumerate().filter(|(_, state)| state.stop.is_none()).try_fold(
+            0,
+            |sum, (index, state)| {
+                let expected = match state.target {
+                    Some(target) => target,
+                    None => self.params.audience.samples(state.verdict?.expected_samples?),
+                };
+                let goal = expected.clamp(state.next.min(max), max);
+                let pixels = self.film.grid().tile(index).pixels() as u64;
+                Some(sum + goal.saturating_sub(self.film.samples(index)) * pixels)
+            },
+        )
+    }
+
+    /// Takes the session apart: film, and the display if it has settled.
+    pub fn into_film(self) -> (Film, Option<Display>) {
+        (self.film, self.display)
+    }
+}
