@@ -1,0 +1,103 @@
+//! From the planes of a tile to the numbers that the machine judges.
+
+mod compact;
+mod mask_pair;
+
+use crate::evidence::TilePlanes;
+use crate::mask::NoiseMask;
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+/// What is computed of a tile.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Descriptor {
+    /// A few dozen numbers, whatever the tile size: noise energies, and what masks them. The default.
+    Compact {
+        /// The noise mask.
+        mask: NoiseMask,
+    },
+    /// The paper's: the noise mask of the tile and of what it is held against, pixel by pixel (Takouachet et al. 2017, §5).
+    /// 2·edge² numbers, for tiles of exactly edge×edge pixels.
+    MaskPair {
+        /// The noise mask.
+        mask: NoiseMask,
+        /// Tile edge in pixels.
+        edge: usize,
+    },
+}
+
+impl Default for Descriptor {
+    fn default() -> Self {
+        Self::Compact { mask: NoiseMask::default() }
+    }
+}
+
+/// A tile that a descriptor cannot describe.
+#[derive(Debug, Error, Clone, Copy, PartialEq, Eq)]
+pub enum DescriptorError {
+    /// The paper's descriptor is for one tile size.
+    #[error("this descriptor is for tiles of {expected}×{expected} pixels, not {width}×{height}")]
+    TileSize {
+        /// Edge it is for.
+        expected: usize,
+        /// Width of the tile.
+        width: usize,
+        /// Height of the tile.
+        height: usize,
+    },
+}
+
+impl Descriptor {
+    /// A short name.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Compact { .. } => "compact",
+            Self::MaskPair { .. } => "mask-pair",
+        }
+    }
+
+    /// Version of the formulas: models trained with another one are refused.
+    pub fn version(&self) -> u16 {
+        1
+    }
+
+    /// Number of numbers.
+    #[expect(clippy::len_without_is_empty, reason = "a descriptor is never empty")]
+    pub fn len(&self) -> usize {
+        match self {
+            Self::Compact { .. } => compact::NAMES.len(),
+            Self::MaskPair { edge, .. } => 2 * edge * edge,
+        }
+    }
+
+    /// Appends the numbers of a tile to `out`.
+    ///
+    /// # Errors
+    /// [`DescriptorError`] if the tile has a size the descriptor is not for.
+    pub fn describe(&self, planes: &TilePlanes, out: &mut Vec<f32>) -> Result<(), DescriptorError> {
+        match *self {
+            Self::Compact { mask } => compact::describe(planes, mask, out),
+            Self::MaskPair { mask, edge } => {
+                let (width, height) = (planes.inner.width, planes.inner.height);
+                if (width, height) != (edge, edge) {
+                    return Err(DescriptorError::TileSize { expected: edge, width, height });
+                }
+                mask_pair::describe(planes, mask, out);
+            }
+        }
+        Ok(())
+    }
+
+    /// Changes a raw descriptor into what it would be with `factor` times the samples, if noise alone changes, as 1/√n. False if
+    /// the descriptor does not tell noise from picture.
+    pub(crate) fn project(&self, descriptor: &mut [f32], factor: f32) -> bool {
+        match self {
+            Self::Compact { .. } => {
+                compact::project(descriptor, factor);
+                true
+            }
+            Self::MaskPair { .. } => false,
+        }
+    }
+}

@@ -1,0 +1,333 @@
+//! Predicted thresholds against human ones.
+//!
+//! Scores are those of the rules of evidence in `docs/guide.md`: whole scenes left out, predictions clipped to the levels that
+//! observers could choose, real pictures scored apart from synthesised levels.
+
+use crate::descriptor::Descriptor;
+use crate::display::ToneMapping;
+use crate::evidence::Evidence;
+use crate::model::Model;
+pub use crate::model::Scores;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeSet;
+
+/// Where the picture of a level comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Origin {
+    /// Rendered with so many samples.
+    Real,
+    /// Made from a real picture and a converged one, with noise ∝ 1/√n.
+    Synthesised,
+}
+
+/// One zone at one number of samples.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Level {
+    /// Samples per pixel.
+    pub spp: f64,
+    /// Rendered or synthesised.
+    pub origin: Origin,
+    /// Standard deviation of the noise mask (σ = 1) of the residual over the zone, in display luminance: what the constant-noise
+    /// baseline goes by.
+    pub noise: f32,
+    /// The raw descriptor.
+    pub descriptor: Vec<f32>,
+}
+
+/// One zone of one scene: what people said of it, and its descriptor from noisy to converged.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Zone {
+    /// Scene.
+    pub scene: String,
+    /// Scenes of one group show the same room, and are left out together.
+    pub group: String,
+    /// Number within the scene.
+    pub zone: u32,
+    /// Samples per pixel at which people stopped seeing a difference.
+    pub human_spp: f64,
+    /// Whether `human_spp` is only known to lie at or above its value.
+    pub censored: bool,
+    /// Fewest samples that observers could choose.
+    pub first_spp: f64,
+    /// Most samples that observers could choose.
+    pub last_spp: f64,
+    /// By increasing `spp`.
+    pub levels: Vec<Level>,
+}
+
+/// Descriptors of a corpus: all that training and evaluation need of it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Table {
+    /// Which descriptor.
+    pub descriptor: Descriptor,
+    /// What the zones were held against.
+    pub evidence: Evidence,
+    /// How the pictures were shown.
+    pub tone_mapping: ToneMapping,
+    /// The zones.
+    pub zones: Vec<Zone>,
+}
+
+impl Table {
+    /// BLAKE3 of the table's numbers, hexadecimal: names the table in a model's record.
+    pub fn digest(&self) -> String {
+        let mut hash = blake3::Hasher::new();
+        for z in &self.zones {
+            hash.update(z.scene.as_bytes()).update(z.group.as_bytes()).update(&z.zone.to_le_bytes());
+            for spp in [z.human_spp, z.first_spp, z.last_spp] {
+                hash.update(&spp.to_le_bytes());
+            }
+            for level in &z.levels {
+                hash.update(&level.spp.to_le_bytes());
+                level.descriptor.iter().for_each(|v| {
+                    hash.update(&v.to_le_bytes());
+                });
+            }
+        }
+        hash.finalize().to_hex().to_string()
+    }
+
+    /// The groups, in alphabetical order.
+    pub fn groups(&self) -> Vec<&str> {
+        self.zones.iter().map(|z| z.group.as_str()).collect::<BTreeSet<_>>().into_iter().collect()
+    }
+
+    /// The scenes, in alphabetical order.
+    pub fn scenes(&self) -> Vec<&str> {
+        self.zones.iter().map(|z| z.scene.as_str()).collect::<BTreeSet<_>>().into_iter().collect()
+    }
+}
+
+/// The name of the group a scene belongs to by its name alone: its first word, which ends before a capital letter that follows
+/// a small one, or at `-` or `_`. `SdbCentre` and `SdbDroite` are two cameras in one room.
+pub fn group_of_scene(scene: &str) -> &str {
+    let mut previous = ' ';
+    for (at, c) in scene.char_indices() {
+        if at > 0 && (c == '-' || c == '_' || (c.is_uppercase() && previous.is_lowercase())) {
+            return &scene[..at];
+        }
+        previous = c;
+    }
+    scene
+}
+
+/// Samples at which a quantity, known at increasing levels, first reaches `goal`, interpolated in ln(spp); the first or last
+/// level if it has there or not yet. `None` without levels.
+fn crossing(levels: &[(f64, f64)], goal: f64) -> Option<f64> {
+    let at = levels.iter().position(|&(_, v)| v >= goal);
+    match at {
+        None => levels.last().map(|&(spp, _)| spp),
+        Some(0) => Some(levels[0].0),
+        Some(i) => {
+            let ((n0, v0), (n1, v1)) = (levels[i - 1], levels[i]);
+            let t = (goal - v0) / (v1 - v0);
+            Some((n0.ln() + t * (n1.ln() - n0.ln())).exp())
+        }
+    }
+}
+
+/// What a model says of a zone at each of its levels: decision values and probabilities.
+pub(crate) fn probabilities(model: &Model, zone: &Zone) -> Vec<f32> {
+    let mut scratch = Vec::new();
+    let probability = |level: &Level| {
+        scratch.clone_from(&level.descriptor);
+        model.probability(&mut scratch)
+    };
+    zone.levels.iter().map(probability).collect()
+}
+
+/// Log-odds: a scale on which the probability of a level is nearly linear in ln(spp).
+fn log_odds(p: f64) -> f64 {
+    let p = p.clamp(1e-9, 1.0 - 1e-9);
+    (p / (1.0 - p)).ln()
+}
+
+/// One zone's prediction.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Prediction {
+    /// Scene.
+    pub scene: String,
+    /// Zone.
+    pub zone: u32,
+    /// Human threshold, in samples per pixel.
+    pub human_spp: f64,
+    /// Whether that is only a lower bound.
+    pub censored: bool,
+    /// Predicted threshold, within what observers could choose.
+    pub predicted_spp: f64,
+    /// Real pictures of the zone that the prediction classifies as people did.
+    #[serde(skip)]
+    pub images_right: usize,
+    /// Real pictures of the zone.
+    #[serde(skip)]
+    pub images: usize,
+}
+
+impl Prediction {
+    /// A prediction whose real pictures are classified by `converged`.
+    fn new(zone: &Zone, spp: f64, converged: impl Fn(usize) -> bool) -> Self {
+        let real = || zone.levels.iter().enumerate().filter(|(_, l)| l.origin == Origin::Real);
+        let right = real().filter(|(i, l)| converged(*i) == (l.spp >= zone.human_spp));
+        Self {
+            scene: zone.scene.clone(),
+            zone: zone.zone,
+            human_spp: zone.human_spp,
+            censored: zone.censored,
+            predicted_spp: spp.clamp(zone.first_spp, zone.last_spp),
+            images_right: right.count(),
+            images: real().count(),
+        }
+    }
+
+    /// By a threshold alone, without looking at pictures.
+    fn by_threshold(zone: &Zone, spp: f64) -> Self {
+        Self::new(zone, spp, |i| zone.levels[i].spp >= spp)
+    }
+
+    fn log_ratio(&self) -> f64 {
+        (self.predicted_spp / self.human_spp).ln()
+    }
+}
+
+/// Predicts a zone's threshold: the samples at which P first reaches `threshold`.
+pub fn predict(model: &Model, threshold: f32, zone: &Zone) -> Prediction {
+    let p = probabilities(model, zone);
+    let odds: Vec<(f64, f64)> =
+        zone.levels.iter().zip(&p).map(|(l, &p)| (l.spp, log_odds(f64::from(p)))).collect();
+    let spp = crossing(&odds, log_odds(f64::from(threshold))).unwrap_or(zone.last_spp);
+    Prediction::new(zone, spp, |i| p[i] >= threshold)
+}
+
+/// Scores predictions. Censored thresholds stay out.
+pub fn score<'a>(predictions: impl Iterator<Item = &'a Prediction> + Clone) -> Scores {
+    let ratios = || predictions.clone().filter(|p| !p.censored).map(Prediction::log_ratio);
+    let zones = ratios().count();
+    let mean = |f: fn(f64) -> f64| ratios().map(f).sum::<f64>() / zones as f64;
+    Scores {
+        zones,
+        error_factor: mean(f64::abs).exp(),
+        bias_factor: mean(|r| r).exp(),
+        early_share: mean(|r| if r < -std::f64::consts::LN_2 { 1.0 } else { 0.0 }),
+    }
+}
+
+/// Share of real pictures that are classified as people did; `None` without any.
+pub fn image_accuracy<'a>(predictions: impl Iterator<Item = &'a Prediction> + Clone) -> Option<f64> {
+    let images: usize = predictions.clone().map(|p| p.images).sum();
+    let right: usize = predictions.map(|p| p.images_right).sum();
+    (images > 0).then(|| right as f64 / images as f64)
+}
+
+/// The constant-noise baseline: a zone has converged once the standard deviation of its noise mask falls to one constant, the
+/// geometric mean of what it is at the human thresholds of all other groups.
+pub fn constant_noise_baseline(table: &Table) -> Vec<Prediction> {
+    // Quietness −ln(noise) grows with samples.
+    let quietness = |zone: &Zone| -> Vec<(f64, f64)> {
+        zone.levels.iter().map(|l| (l.spp, -f64::from(l.noise).max(1e-9).ln())).collect()
+    };
+    let at = |zone: &Zone, spp: f64| {
+        let levels = quietness(zone);
+        let i = levels.iter().position(|&(n, _)| n >= spp).unwrap_or(levels.len() - 1).max(1);
+        let ((n0, q0), (n1, q1)) = (levels[i - 1], levels[i]);
+        q0 + (q1 - q0) * ((spp / n0).ln() / (n1 / n0).ln()).clamp(0.0, 1.0)
+    };
+    let usable = || table.zones.iter().filter(|z| z.levels.len() > 1);
+    let predict = |zone: &Zone| {
+        let others = || usable().filter(|o| o.group != zone.group && !o.censored);
+        let constant = others().map(|o| at(o, o.human_spp)).sum::<f64>() / others().count() as f64;
+        let spp = crossing(&quietness(zone), constant).unwrap_or(zone.last_spp);
+        Prediction::by_threshold(zone, spp)
+    };
+    usable().map(predict).collect()
+}
+
+/// The scene-median baseline: the median threshold of the same scene's other zones, which no predictor of unseen scenes can
+/// know. Scenes of a single zone stay out.
+pub fn scene_median_baseline(table: &Table) -> Vec<Prediction> {
+    let predict = |zone: &Zone| {
+        let same = |o: &&Zone| o.scene == zone.scene && o.zone != zone.zone && !o.censored;
+        let mut others: Vec<f64> = table.zones.iter().filter(same).map(|o| o.human_spp).collect();
+        others.sort_by(f64::total_cmp);
+        let middle = others.len() / 2;
+        let median = match others.len() {
+            0 => return None,
+            n if n % 2 == 0 => 0.5 * (others[middle - 1] + others[middle]),
+            _ => others[middle],
+        };
+        Some(Prediction::by_threshold(zone, median))
+    };
+    table.zones.iter().filter_map(predict).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn zone(scene: &str, number: u32, human_spp: f64, scale: f64) -> Zone {
+        let level = |i: i32| {
+            let spp = 20.0 * 1.5f64.powi(i);
+            Level { spp, origin: Origin::Real, noise: (scale / spp.sqrt()) as f32, descriptor: vec![] }
+        };
+        let group = group_of_scene(scene).to_owned();
+        let levels: Vec<Level> = (0..14).map(level).collect();
+        let last_spp = levels[13].spp;
+        Zone {
+            scene: scene.into(),
+            group,
+            zone: number,
+            human_spp,
+            censored: false,
+            first_spp: 20.0,
+            last_spp,
+            levels,
+        }
+    }
+
+    #[test]
+    fn groups_are_first_words() {
+        let groups = ["SdbCentre", "SdbDroite", "Appart1opt02", "staircase2-view0", "Bureau1", "a_b", ""];
+        assert_eq!(
+            groups.map(group_of_scene),
+            ["Sdb", "Sdb", "Appart1opt02", "staircase2", "Bureau1", "a", ""]
+        );
+    }
+
+    #[test]
+    fn crossings_are_interpolated_in_the_logarithm() {
+        let levels = [(100.0, 0.0), (400.0, 2.0), (800.0, 1.0)];
+        assert!((crossing(&levels, 1.0).unwrap() - 200.0).abs() < 1e-9);
+        assert_eq!(crossing(&levels, -1.0), Some(100.0));
+        assert_eq!(crossing(&levels, 3.0), Some(800.0));
+        assert_eq!(crossing(&[], 1.0), None);
+    }
+
+    /// Two scenes that people stop at the same noise: the baseline that knows this finds their thresholds exactly.
+    #[test]
+    fn constant_noise_is_right_where_noise_is_all() {
+        let zones = vec![zone("A", 0, 100.0, 1.0), zone("B", 0, 400.0, 2.0)];
+        let table = Table {
+            descriptor: Descriptor::default(),
+            evidence: Evidence::Halves,
+            tone_mapping: ToneMapping::Srgb { exposure: 1.0 },
+            zones,
+        };
+        let scores = score(constant_noise_baseline(&table).iter());
+        assert!((scores.error_factor - 1.0).abs() < 1e-3, "{scores:?}");
+        assert_eq!(scene_median_baseline(&table), vec![]);
+    }
+
+    #[test]
+    fn scores_are_the_geometric_ones() {
+        let predictions: Vec<Prediction> = [200.0, 50.0, 40.0, 100.0]
+            .map(|spp| Prediction::by_threshold(&zone("A", 0, 100.0, 1.0), spp))
+            .to_vec();
+        let scores = score(predictions.iter());
+        assert_eq!(scores.zones, 4);
+        assert!((scores.error_factor - (2.0f64 * 2.0 * 2.5).powf(0.25)).abs() < 1e-9);
+        assert!((scores.bias_factor - (2.0f64 / 2.0 / 2.5).powf(0.25)).abs() < 1e-9);
+        assert_eq!(scores.early_share, 0.25); // exactly half is not below half
+        let accuracy = image_accuracy(predictions.iter()).unwrap();
+        assert!(accuracy > 0.8 && accuracy < 1.0);
+    }
+}

@@ -1,0 +1,326 @@
+//! The model file: everything a verdict depends on.
+//!
+//! Layout: magic `NFMODEL` + 0, version (u32), length of the payload (u64), BLAKE3 of the payload (32 bytes), payload
+//! (bincode 2, standard configuration); numbers little-endian. All use of bincode is in this module.
+
+use crate::descriptor::Descriptor;
+use crate::display::ToneMapping;
+use crate::evidence::Evidence;
+use crate::params::Audience;
+use crate::svm::{Platt, Scaler, Svm};
+use serde::{Deserialize, Serialize};
+use std::io::{self, Read, Write};
+use thiserror::Error;
+
+const MAGIC: [u8; 8] = *b"NFMODEL\0";
+const VERSION: u32 = 1;
+/// Largest payload that is read: the paper's own model, 9,600 pairs of 2·128² numbers, would have 1.26 GB.
+const MAX_PAYLOAD: u64 = 2 << 30;
+
+/// Why a model cannot be used.
+#[derive(Debug, Error)]
+pub enum ModelError {
+    /// The file cannot be read or written.
+    #[error("the model cannot be read or written")]
+    Io(#[from] io::Error),
+    /// Not a model file.
+    #[error("this is not a noisefloor model: it does not begin with the model magic")]
+    Foreign,
+    /// Written by a later release.
+    #[error(
+        "the model has format version {found}, and this release reads up to {VERSION}: update noisefloor"
+    )]
+    Newer {
+        /// Version in the file.
+        found: u32,
+    },
+    /// The payload is shorter or longer than announced, or its checksum differs.
+    #[error("the model is damaged: {0}")]
+    Damaged(String),
+    /// The payload is announced with more than the limit.
+    #[error("the model announces {0} bytes, more than the limit of {MAX_PAYLOAD}")]
+    Oversized(u64),
+    /// The content contradicts itself.
+    #[error("the model does not hold together: {0}")]
+    Invalid(String),
+    /// The model was trained with another version of the descriptor than this release computes.
+    #[error(
+        "the model needs version {needed} of the {name} descriptor, and this release computes version {here}: train it again"
+    )]
+    Descriptor {
+        /// The descriptor.
+        name: &'static str,
+        /// Version the model was trained with.
+        needed: u16,
+        /// Version of this release.
+        here: u16,
+    },
+}
+
+/// Scores of predicted thresholds against human ones, over a set of zones.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Scores {
+    /// Zones scored.
+    pub zones: usize,
+    /// exp(mean |ln(predicted/human)|), at least 1.
+    pub error_factor: f64,
+    /// exp(mean ln(predicted/human)): above 1 stops late, below 1 early.
+    pub bias_factor: f64,
+    /// Share of zones stopped below half the human threshold, in [0, 1].
+    pub early_share: f64,
+}
+
+/// Where a model comes from.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct TrainingRecord {
+    /// What it was trained on, in words.
+    pub corpus: String,
+    /// BLAKE3 of the descriptor table, hexadecimal.
+    pub table_digest: String,
+    /// Scenes trained on.
+    pub scenes: Vec<String>,
+    /// Examples (zones × levels) trained on.
+    pub examples: usize,
+    /// C of the machine.
+    pub c: f64,
+    /// γ of the machine.
+    pub gamma: f64,
+    /// Scores on scenes left out, with C and γ chosen without them; `None` if not evaluated.
+    pub leave_one_scene_out: Option<Scores>,
+}
+
+/// A trained oracle.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Model {
+    /// What is computed of a tile.
+    pub descriptor: Descriptor,
+    /// Version of that descriptor the model was trained with.
+    pub descriptor_version: u16,
+    /// What the tile is held against.
+    pub evidence: Evidence,
+    /// How the training pictures were shown.
+    pub tone_mapping: ToneMapping,
+    /// From raw to scaled descriptors.
+    pub scaler: Scaler,
+    /// The machine.
+    pub svm: Svm,
+    /// From decision values to probabilities.
+    pub platt: Platt,
+    /// Whose thresholds it predicts, as a line from those of the training data.
+    pub audience: Audience,
+    /// Where it comes from.
+    pub record: TrainingRecord,
+}
+
+impl Model {
+    /// The model trained on the human data of LISIC (lisic9 and one SIN3D view), inside the library; see the project's
+    /// `docs/guide.md` for the command that makes it.
+    #[cfg(feature = "bundled-model")]
+    pub fn bundled() -> Self {
+        static BYTES: &[u8] = include_bytes!("../models/human.nfm");
+        Self::read(BYTES).expect("the bundled model is checked by a test")
+    }
+
+    /// Reads a model.
+    ///
+    /// # Errors
+    /// [`ModelError`] if it is foreign, damaged, oversized, newer, contradicts itself, or needs another descriptor version.
+    pub fn read(mut from: impl Read) -> Result<Self, ModelError> {
+        // Read the header. A file too short to have one is foreign.
+        let mut magic = [0; 8];
+        let whole = read_up_to(&mut from, &mut magic)?;
+        if !whole || magic != MAGIC {
+            return Err(ModelError::Foreign);
+        }
+        let mut header = [0; 4 + 8 + 32];
+        if !read_up_to(&mut from, &mut header)? {
+            return Err(ModelError::Damaged("it ends within its header".into()));
+        }
+        let (version, rest) = header.split_at(4);
+        let (length, checksum) = rest.split_at(8);
+        let version = u32::from_le_bytes(version.try_into().unwrap_or_default());
+        if version > VERSION {
+            return Err(ModelError::Newer { found: version });
+        }
+        let length = u64::from_le_bytes(length.try_into().unwrap_or_default());
+        if length > MAX_PAYLOAD {
+            return Err(ModelError::Oversized(length));
+        }
+
+        // Read the payload as far as there is one: memory grows with what arrives, not with what is announced.
+        let mut payload = Vec::new();
+        from.take(length + 1).read_to_end(&mut payload)?;
+        if payload.len() as u64 != length {
+            let relation = if (payload.len() as u64) < length { "ends before" } else { "goes on after" };
+            return Err(ModelError::Damaged(format!("it {relation} the {length} bytes it announces")));
+        }
+        if blake3::hash(&payload).as_bytes() != checksum {
+            return Err(ModelError::Damaged("its checksum differs".into()));
+        }
+        let config = bincode::config::standard().with_limit::<{ MAX_PAYLOAD as usize }>();
+        let (model, used) = bincode::serde::decode_from_slice::<Self, _>(&payload, config)
+            .map_err(|e| ModelError::Damaged(e.to_string()))?;
+        if used != payload.len() {
+            return Err(ModelError::Damaged("it has bytes left over".into()));
+        }
+        model.check()?;
+        Ok(model)
+    }
+
+    /// Writes the model.
+    ///
+    /// # Errors
+    /// [`ModelError::Io`] if it cannot be written, [`ModelError::Invalid`] if it could not be read again.
+    pub fn write(&self, mut to: impl Write) -> Result<(), ModelError> {
+        self.check()?;
+        let payload = self.payload()?;
+        to.write_all(&MAGIC)?;
+        to.write_all(&VERSION.to_le_bytes())?;
+        to.write_all(&(payload.len() as u64).to_le_bytes())?;
+        to.write_all(blake3::hash(&payload).as_bytes())?;
+        to.write_all(&payload)?;
+        Ok(())
+    }
+
+    /// BLAKE3 of the content, hexadecimal: names the model in reports.
+    pub fn digest(&self) -> String {
+        self.payload().map(|p| blake3::hash(&p).to_hex().to_string()).unwrap_or_default()
+    }
+
+    fn payload(&self) -> Result<Vec<u8>, ModelError> {
+        bincode::serde::encode_to_vec(self, bincode::config::standard())
+            .map_err(|e| ModelError::Invalid(e.to_string()))
+    }
+
+    /// Probability in [0, 1] that an observer sees no difference, of a raw descriptor, which is scaled in place.
+    ///
+    /// # Panics
+    /// If the descriptor has not the model's number of numbers.
+    pub fn probability(&self, descriptor: &mut [f32]) -> f32 {
+        self.scaler.apply(descriptor);
+        self.platt.probability(self.svm.decision(descriptor))
+    }
+
+    fn check(&self) -> Result<(), ModelError> {
+        let here = self.descriptor.version();
+        if self.descriptor_version != here {
+            let (name, needed) = (self.descriptor.name(), self.descriptor_version);
+            return Err(ModelError::Descriptor { name, needed, here });
+        }
+        let invalid = |what: &str| Err(ModelError::Invalid(what.into()));
+        let n = self.descriptor.len();
+        if self.scaler.mean.len() != n || self.scaler.scale.len() != n {
+            return invalid("scaler and descriptor differ in length");
+        }
+        if self.svm.coefficients.is_empty() || self.svm.vectors.len() != self.svm.coefficients.len() * n {
+            return invalid("support vectors and descriptor differ in length");
+        }
+        let numbers = [&self.scaler.mean, &self.scaler.scale, &self.svm.coefficients, &self.svm.vectors];
+        let scalars = [self.svm.rho, self.svm.gamma, self.platt.a, self.platt.b];
+        if !numbers.into_iter().flatten().chain(&scalars).all(|v| v.is_finite()) {
+            return invalid("a number is not finite");
+        }
+        if self.svm.gamma <= 0.0 {
+            return invalid("γ is not positive");
+        }
+        if self.tone_mapping.check().is_err() {
+            return invalid("the tone mapping is out of range");
+        }
+        Ok(())
+    }
+}
+
+/// Fills the buffer; false if the input ends before.
+fn read_up_to(from: &mut impl Read, buffer: &mut [u8]) -> Result<bool, io::Error> {
+    match from.read_exact(buffer) {
+        Ok(()) => Ok(true),
+        Err(e) if e.kind() == io::ErrorKind::UnexpectedEof => Ok(false),
+        Err(e) => Err(e),
+    }
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    /// A model that goes by the first number of the compact descriptor alone.
+    pub(crate) fn small() -> Model {
+        let descriptor = Descriptor::default();
+        let n = descriptor.len();
+        let mut vectors = vec![0.0; 2 * n];
+        (vectors[0], vectors[n]) = (-1.0, 1.0);
+        Model {
+            descriptor,
+            descriptor_version: descriptor.version(),
+            evidence: Evidence::Halves,
+            tone_mapping: ToneMapping::default(),
+            scaler: Scaler::identity(n),
+            svm: Svm { gamma: 0.1, rho: 0.0, coefficients: vec![1.0, -1.0], vectors },
+            platt: Platt { a: -2.0, b: 0.0 },
+            audience: Audience::TRAINED,
+            record: TrainingRecord::default(),
+        }
+    }
+
+    fn file() -> Vec<u8> {
+        let mut bytes = Vec::new();
+        small().write(&mut bytes).unwrap();
+        bytes
+    }
+
+    #[test]
+    fn survives_the_file() {
+        let model = Model::read(&file()[..]).unwrap();
+        assert_eq!(model, small());
+        assert_eq!(model.digest(), small().digest());
+    }
+
+    #[test]
+    fn each_fault_has_its_error() {
+        let read = |bytes: &[u8]| Model::read(bytes).unwrap_err();
+        assert!(matches!(read(b""), ModelError::Foreign));
+        assert!(matches!(read(b"\x89PNG\r\n\x1a\n and so on"), ModelError::Foreign));
+        let whole = file();
+        assert!(matches!(read(&whole[..20]), ModelError::Damaged(_)));
+        assert!(matches!(read(&whole[..whole.len() - 1]), ModelError::Damaged(_)));
+        assert!(matches!(read(&[&whole[..], b"x"].concat()), ModelError::Damaged(_)));
+        let mut newer = whole.clone();
+        newer[8] = 2;
+        assert!(matches!(read(&newer), ModelError::Newer { found: 2 }));
+        let mut oversized = whole.clone();
+        oversized[19] = 0xff;
+        assert!(matches!(read(&oversized), ModelError::Oversized(_)));
+    }
+
+    #[test]
+    fn contradictions_are_refused() {
+        let fails = |change: fn(&mut Model)| {
+            let mut model = small();
+            change(&mut model);
+            model.write(Vec::new()).unwrap_err()
+        };
+        assert!(matches!(fails(|m| m.svm.rho = f32::NAN), ModelError::Invalid(_)));
+        assert!(matches!(fails(|m| m.svm.gamma = 0.0), ModelError::Invalid(_)));
+        assert!(matches!(fails(|m| m.svm.vectors.truncate(3)), ModelError::Invalid(_)));
+        assert!(matches!(fails(|m| m.scaler.mean.clear()), ModelError::Invalid(_)));
+        assert!(matches!(fails(|m| m.descriptor_version = 99), ModelError::Descriptor { needed: 99, .. }));
+    }
+
+    proptest! {
+        #[test]
+        fn no_damaged_byte_goes_unnoticed(at in 0usize..4000, flip in 1u8..) {
+            let mut bytes = file();
+            let at = at % bytes.len();
+            bytes[at] ^= flip;
+            prop_assert!(Model::read(&bytes[..]).is_err());
+        }
+
+        #[test]
+        fn noise_is_never_a_model(bytes in prop::collection::vec(any::<u8>(), 0..300)) {
+            let framed = [&MAGIC[..], &bytes].concat();
+            prop_assert!(Model::read(&framed[..]).is_err());
+            prop_assert!(Model::read(&bytes[..]).is_err());
+        }
+    }
+}

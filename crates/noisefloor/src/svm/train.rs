@@ -1,0 +1,200 @@
+//! Training through linfa-svm.
+
+use super::{Platt, Svm};
+use linfa::composing::platt_scaling::{Platt as LinfaPlatt, platt_newton_method};
+use linfa::prelude::*;
+use ndarray::{Array1, ArrayView2};
+use thiserror::Error;
+
+/// Parameters of a C-SVC with RBF kernel.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct SvmParams {
+    /// Penalty C of a misclassified example of either class, above 0.
+    pub c: f64,
+    /// γ of the kernel exp(−γ‖x − y‖²), above 0.
+    pub gamma: f64,
+}
+
+impl SvmParams {
+    /// C = 2, γ = 2 (Takouachet et al. 2017, §4.3), for their descriptor.
+    pub const PAPER: Self = Self { c: 2.0, gamma: 2.0 };
+}
+
+/// Why a machine could not be trained.
+#[derive(Debug, Error)]
+pub enum SvmTrainError {
+    /// A parameter out of range.
+    #[error("C and γ must be positive finite numbers, not C = {c}, γ = {gamma}")]
+    Params {
+        /// C.
+        c: f64,
+        /// γ.
+        gamma: f64,
+    },
+    /// One of the two classes is missing.
+    #[error("training needs examples of both classes; of {examples} examples {converged} are converged")]
+    OneClass {
+        /// All examples.
+        examples: usize,
+        /// Those that are converged.
+        converged: usize,
+    },
+    /// Rows and labels differ in number, or a number is not finite.
+    #[error("training needs one label an example and finite numbers: {0}")]
+    Examples(String),
+    /// linfa-svm failed.
+    #[error("linfa-svm could not train the machine")]
+    Linfa(#[from] linfa_svm::SvmError),
+    /// Platt scaling failed.
+    #[error("Platt scaling of the decision values failed")]
+    Platt(#[from] linfa::composing::platt_scaling::PlattError),
+}
+
+/// Duality gap at which the solver ends; LIBSVM's default.
+const SOLVER_EPS: f64 = 1e-3;
+/// linfa drops support vectors lighter than this from its decision function; the same are left out here.
+const LIGHTEST: f64 = 100.0 * f64::EPSILON;
+
+/// Trains on scaled descriptors, one a row; `converged[i]` is the class of row i.
+///
+/// # Errors
+/// [`SvmTrainError`] if parameters or examples are out of range, or the solver fails.
+pub fn fit_svm(
+    rows: ArrayView2<'_, f64>,
+    converged: &[bool],
+    params: SvmParams,
+) -> Result<Svm, SvmTrainError> {
+    let SvmParams { c, gamma } = params;
+    if !(c.is_finite() && c > 0.0 && gamma.is_finite() && gamma > 0.0) {
+        return Err(SvmTrainError::Params { c, gamma });
+    }
+    if rows.nrows() != converged.len() || !rows.iter().all(|v| v.is_finite()) {
+        let what = format!("{} rows, {} labels", rows.nrows(), converged.len());
+        return Err(SvmTrainError::Examples(what));
+    }
+    let positive = converged.iter().filter(|&&c| c).count();
+    if positive == 0 || positive == converged.len() {
+        return Err(SvmTrainError::OneClass { examples: converged.len(), converged: positive });
+    }
+    let trained = fit_linfa(rows, converged, params)?;
+
+    // Keep the rows that carry weight.
+    let kept = || (0..rows.nrows()).filter(|&i| trained.alpha[i].abs() > LIGHTEST);
+    Ok(Svm {
+        gamma: gamma as f32,
+        rho: trained.rho as f32,
+        coefficients: kept().map(|i| trained.alpha[i] as f32).collect(),
+        vectors: kept().flat_map(|i| rows.row(i).to_vec()).map(|v| v as f32).collect(),
+    })
+}
+
+fn fit_linfa(
+    rows: ArrayView2<'_, f64>,
+    converged: &[bool],
+    SvmParams { c, gamma }: SvmParams,
+) -> Result<linfa_svm::Svm<f64, bool>, SvmTrainError> {
+    let data = DatasetBase::new(rows.to_owned(), Array1::from_vec(converged.to_vec()));
+    // linfa's Gaussian is exp(−‖x − y‖²/ε): ε = 1/γ.
+    let machine = linfa_svm::Svm::<f64, bool>::params()
+        .pos_neg_weights(c, c)
+        .gaussian_kernel(1.0 / gamma)
+        .eps(SOLVER_EPS);
+    let trained: linfa_svm::Svm<f64, bool> = machine.fit(&data)?;
+    Ok(trained)
+}
+
+/// Observers that each probability is put to in [`fit_platt`]: linfa's Platt scaling takes classes, not probabilities.
+const OBSERVERS: usize = 40;
+
+/// Fits the sigmoid to (decision value, probability that an observer sees no difference) of examples that the machine has not
+/// been trained on: each is put to 40 observers, of whom that share agrees (Platt 1999; Newton's method of Lin, Lin and Weng
+/// 2007 in linfa).
+///
+/// # Errors
+/// [`SvmTrainError::Platt`] if the fit does not converge.
+pub fn fit_platt(examples: &[(f32, f64)]) -> Result<Platt, SvmTrainError> {
+    let each = |&(decision, p): &(f32, f64)| {
+        (0..OBSERVERS).map(move |i| (f64::from(decision), (i as f64 + 0.5) / (OBSERVERS as f64) < p))
+    };
+    let (decisions, agree): (Vec<f64>, Vec<bool>) = examples.iter().flat_map(each).unzip();
+    let params = LinfaPlatt::<f64, ()>::params();
+    let (a, b) = platt_newton_method(
+        Array1::from_vec(decisions).view(),
+        Array1::from_vec(agree).view(),
+        params.check_ref()?,
+    )?;
+    Ok(Platt { a: a as f32, b: b as f32 })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use ndarray::{Array2, Axis};
+
+    /// Two seeded, overlapping clouds.
+    fn clouds(examples: usize, dimensions: usize) -> (Array2<f64>, Vec<bool>) {
+        let mut state = 42u64;
+        let mut uniform = || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 11) as f64 / (1u64 << 53) as f64
+        };
+        let labels: Vec<bool> = (0..examples).map(|i| i % 2 == 0).collect();
+        let rows = Array2::from_shape_fn((examples, dimensions), |(i, _)| {
+            3.0 * uniform() - 1.5 + if labels[i] { 0.5 } else { -0.5 }
+        });
+        (rows, labels)
+    }
+
+    /// Within 10⁻⁴ of linfa's own decision values, also with C = 100, where coefficients are large and roundings add up.
+    #[test]
+    fn prediction_equals_linfa() {
+        let (rows, labels) = clouds(300, 20);
+        for params in
+            [SvmParams { c: 1.0, gamma: 0.02 }, SvmParams { c: 100.0, gamma: 0.05 }, SvmParams::PAPER]
+        {
+            let ours = fit_svm(rows.view(), &labels, params).unwrap();
+            let theirs = fit_linfa(rows.view(), &labels, params).unwrap();
+            let (probe, _) = clouds(77, 20);
+            for x in probe.axis_iter(Axis(0)).chain(rows.axis_iter(Axis(0))) {
+                let decision = theirs.weighted_sum(&x) - theirs.rho;
+                let x32: Vec<f32> = x.iter().map(|&v| v as f32).collect();
+                let error = (f64::from(ours.decision(&x32)) - decision).abs();
+                assert!(error < 1e-4, "{params:?}: {error}");
+            }
+        }
+    }
+
+    #[test]
+    fn learns_to_tell_the_clouds_apart() {
+        let (rows, labels) = clouds(300, 20);
+        let svm = fit_svm(rows.view(), &labels, SvmParams { c: 1.0, gamma: 0.02 }).unwrap();
+        let right = rows.axis_iter(Axis(0)).zip(&labels).filter(|(x, l)| {
+            let x: Vec<f32> = x.iter().map(|&v| v as f32).collect();
+            (svm.decision(&x) > 0.0) == **l
+        });
+        assert!(right.count() > 285);
+    }
+
+    #[test]
+    fn platt_recovers_a_known_sigmoid() {
+        let truth = Platt { a: -1.7, b: 0.4 };
+        let examples: Vec<(f32, f64)> =
+            (-300..300).map(|i| i as f32 / 100.0).map(|f| (f, f64::from(truth.probability(f)))).collect();
+        let fitted = fit_platt(&examples).unwrap();
+        // Rounding to fortieths of observers limits the fit.
+        assert!((fitted.a - truth.a).abs() < 0.05 && (fitted.b - truth.b).abs() < 0.05, "{fitted:?}");
+    }
+
+    #[test]
+    fn bad_input_is_an_error() {
+        let (mut rows, labels) = clouds(10, 3);
+        let fit = |rows: &Array2<f64>, labels: &[bool], c| {
+            fit_svm(rows.view(), labels, SvmParams { c, gamma: 1.0 })
+        };
+        assert!(matches!(fit(&rows, &labels, 0.0), Err(SvmTrainError::Params { .. })));
+        assert!(matches!(fit(&rows, &[true; 10], 1.0), Err(SvmTrainError::OneClass { .. })));
+        assert!(matches!(fit(&rows, &labels[1..], 1.0), Err(SvmTrainError::Examples(_))));
+        rows[(3, 1)] = f64::NAN;
+        assert!(matches!(fit(&rows, &labels, 1.0), Err(SvmTrainError::Examples(_))));
+    }
+}

@@ -1,0 +1,330 @@
+//! Learning a model from a table of human thresholds, and scoring it on scenes it has not seen.
+
+use crate::evaluation::{Prediction, Scores, Table, Zone, predict, score};
+use crate::model::{Model, TrainingRecord};
+use crate::oracle::DEFAULT_THRESHOLD;
+use crate::params::Audience;
+use crate::svm::{Platt, Scaler, Svm, SvmParams, SvmTrainError, fit_platt, fit_svm};
+use ndarray::Array2;
+use rayon::prelude::*;
+use std::collections::BTreeSet;
+use thiserror::Error;
+
+/// Share of observers who see no difference at the recorded threshold (Takouachet et al. 2017, §4.2.2: "identical to the
+/// reference one by 95% of the observers").
+pub const OBSERVERS_AT_THRESHOLD: f64 = 0.95;
+
+/// How a model is to be trained.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TrainParams {
+    /// Pairs of C and γ to choose from, by leave-one-group-out.
+    pub candidates: Vec<SvmParams>,
+    /// Levels within this factor of the human threshold are examples; those beyond are clear anyway. Above 1.
+    pub range: f64,
+    /// Spread of the observers of one zone: scale of the logistic distribution of their thresholds in ln(samples), above 0.
+    pub spread: f64,
+}
+
+impl Default for TrainParams {
+    /// For the compact descriptor.
+    fn default() -> Self {
+        let candidates = [0.1, 1.0, 10.0]
+            .iter()
+            .flat_map(|&c| [0.003, 0.01, 0.03].map(|gamma| SvmParams { c, gamma }))
+            .collect();
+        Self { candidates, range: 8.0, spread: 0.28 }
+    }
+}
+
+/// Why a model could not be trained.
+#[derive(Debug, Error)]
+pub enum TrainError {
+    /// The machine.
+    #[error(transparent)]
+    Svm(#[from] SvmTrainError),
+    /// A parameter out of range.
+    #[error("training needs candidates for C and γ, a range above 1 and a spread above 0")]
+    Params,
+    /// Leaving groups out needs groups.
+    #[error("leaving scenes out needs at least {needed} groups of scenes; the corpus has {found}: {names}")]
+    Groups {
+        /// Groups needed.
+        needed: usize,
+        /// Groups found.
+        found: usize,
+        /// Their names.
+        names: String,
+    },
+}
+
+/// Share of observers who see no difference at `spp` samples in a zone with the recorded threshold `human`: a logistic
+/// psychometric function of ln(spp), which is [`OBSERVERS_AT_THRESHOLD`] at the threshold.
+pub fn observers_agreeing(spp: f64, human: f64, spread: f64) -> f64 {
+    let at_threshold = (OBSERVERS_AT_THRESHOLD / (1.0 - OBSERVERS_AT_THRESHOLD)).ln();
+    1.0 / (1.0 + (-(spp / human).ln() / spread - at_threshold).exp())
+}
+
+/// Machine and scaler, before calibration.
+struct Machine {
+    scaler: Scaler,
+    svm: Svm,
+}
+
+impl Machine {
+    fn fit(zones: &[&Zone], svm: SvmParams, range: f64) -> Result<Self, TrainError> {
+        let examples: Vec<(&[f32], bool)> =
+            zones.iter().flat_map(|z| examples(z, range)).map(|e| (e.descriptor, e.converged)).collect();
+        let scaler = Scaler::fit(examples.iter().map(|e| e.0));
+        let dimensions = examples.first().map_or(0, |e| e.0.len());
+        let mut rows = Array2::zeros((examples.len(), dimensions));
+        let mut scaled = Vec::new();
+        for (mut row, (descriptor, _)) in rows.rows_mut().into_iter().zip(&examples) {
+            scaled.clear();
+            scaled.extend_from_slice(descriptor);
+            scaler.apply(&mut scaled);
+            row.iter_mut().zip(&scaled).for_each(|(to, &from)| *to = f64::from(from));
+        }
+        let labels: Vec<bool> = examples.iter().map(|e| e.1).collect();
+        Ok(Self { scaler, svm: fit_svm(rows.view(), &labels, svm)? })
+    }
+
+    /// (decision value, share of observers that agree) of a zone's examples.
+    fn decisions<'a>(
+        &'a self,
+        zone: &'a Zone,
+        params: &'a TrainParams,
+    ) -> impl Iterator<Item = (f32, f64)> + 'a {
+        examples(zone, params.range).map(|e| {
+            let mut scaled = e.descriptor.to_vec();
+            self.scaler.apply(&mut scaled);
+            (self.svm.decision(&scaled), observers_agreeing(e.spp, zone.human_spp, params.spread))
+        })
+    }
+
+    fn into_model(self, table: &Table, platt: Platt, record: TrainingRecord) -> Model {
+        Model {
+            descriptor: table.descriptor,
+            descriptor_version: table.descriptor.version(),
+            evidence: table.evidence,
+            tone_mapping: table.tone_mapping,
+            scaler: self.scaler,
+            svm: self.svm,
+            platt,
+            audience: Audience::TRAINED,
+            record,
+        }
+    }
+}
+
+struct Example<'a> {
+    spp: f64,
+    descriptor: &'a [f32],
+    converged: bool,
+}
+
+/// A zone's levels near its threshold. Of a censored zone only what is certain: the levels below.
+fn examples(zone: &Zone, range: f64) -> impl Iterator<Item = Example<'_>> {
+    let near = move |spp: f64| (spp / zone.human_spp).ln().abs() <= range.ln() * (1.0 + 1e-9);
+    let certain = move |spp: f64| !zone.censored || spp < zone.human_spp;
+    zone.levels.iter().filter(move |l| near(l.spp) && certain(l.spp)).map(|l| Example {
+        spp: l.spp,
+        descriptor: &l.descriptor,
+        converged: l.spp >= zone.human_spp,
+    })
+}
+
+/// Trains on the zones of `groups` with C and γ chosen, and P calibrated, by leaving each group out in turn.
+fn fit_groups(
+    table: &Table,
+    groups: &[&str],
+    params: &TrainParams,
+) -> Result<(Machine, Platt, SvmParams), TrainError> {
+    if groups.len() < 2 {
+        let names = groups.join(", ");
+        return Err(TrainError::Groups { needed: 2, found: groups.len(), names });
+    }
+    let of = |wanted: &dyn Fn(&str) -> bool| -> Vec<&Zone> {
+        table.zones.iter().filter(|z| groups.contains(&z.group.as_str()) && wanted(&z.group)).collect()
+    };
+
+    // For each candidate: machines that have not seen one group judge that group; one sigmoid over all of it.
+    let held_out = |&candidate: &SvmParams| -> Result<(f64, Platt), TrainError> {
+        let mut folds = Vec::new();
+        let mut decisions = Vec::new();
+        for &group in groups {
+            let machine = Machine::fit(&of(&|g| g != group), candidate, params.range)?;
+            let zones = of(&|g| g == group);
+            zones.iter().for_each(|z| decisions.extend(machine.decisions(z, params)));
+            folds.push((machine, zones));
+        }
+        let platt = fit_platt(&decisions)?;
+        let record = TrainingRecord::default();
+        let predictions: Vec<Prediction> = folds
+            .into_iter()
+            .flat_map(|(machine, zones)| {
+                let model = machine.into_model(table, platt, record.clone());
+                zones.into_iter().map(|z| predict(&model, DEFAULT_THRESHOLD, z)).collect::<Vec<_>>()
+            })
+            .collect();
+        Ok((score(predictions.iter()).error_factor, platt))
+    };
+    let outcomes: Vec<(f64, Platt)> = params.candidates.par_iter().map(held_out).collect::<Result<_, _>>()?;
+    let best = (0..outcomes.len())
+        .min_by(|&i, &j| outcomes[i].0.total_cmp(&outcomes[j].0))
+        .ok_or(TrainError::Params)?;
+
+    // All groups train the machine; the sigmoid stays that of held-out decision values.
+    let chosen = params.candidates[best];
+    Ok((Machine::fit(&of(&|_| true), chosen, params.range)?, outcomes[best].1, chosen))
+}
+
+fn check(table: &Table, params: &TrainParams, needed: usize) -> Result<(), TrainError> {
+    if params.candidates.is_empty() || !(params.range > 1.0) || !(params.spread > 0.0) {
+        return Err(TrainError::Params);
+    }
+    let groups = table.groups();
+    if groups.len() < needed {
+        return Err(TrainError::Groups { needed, found: groups.len(), names: groups.join(", ") });
+    }
+    Ok(())
+}
+
+/// Predicts every zone by a model that has seen nothing of its group, not even to choose C, γ or the sigmoid. `on_fold` is
+/// called before each group with its name.
+///
+/// # Errors
+/// [`TrainError`] if the table has fewer than three groups, or training fails.
+pub fn leave_one_scene_out(
+    table: &Table,
+    params: &TrainParams,
+    mut on_fold: impl FnMut(&str),
+) -> Result<Vec<Prediction>, TrainError> {
+    check(table, params, 3)?;
+    let groups = table.groups();
+    let mut predictions = Vec::new();
+    for &left_out in &groups {
+        on_fold(left_out);
+        let others: Vec<&str> = groups.iter().copied().filter(|&g| g != left_out).collect();
+        let (machine, platt, _) = fit_groups(table, &others, params)?;
+        let model = machine.into_model(table, platt, TrainingRecord::default());
+        let zones = table.zones.iter().filter(|z| z.group == left_out);
+        predictions.extend(zones.map(|z| predict(&model, DEFAULT_THRESHOLD, z)));
+    }
+    Ok(predictions)
+}
+
+/// Trains a model on all of a table. `corpus` says in words where it comes from; `leave_one_scene_out` are the scores of
+/// [`leave_one_scene_out`], where they were computed.
+///
+/// # Errors
+/// [`TrainError`] if the table has fewer than two groups, or training fails.
+pub fn train(
+    table: &Table,
+    params: &TrainParams,
+    corpus: String,
+    leave_one_scene_out: Option<Scores>,
+) -> Result<Model, TrainError> {
+    check(table, params, 2)?;
+    let (machine, platt, SvmParams { c, gamma }) = fit_groups(table, &table.groups(), params)?;
+    let record = TrainingRecord {
+        corpus,
+        table_digest: table.digest(),
+        scenes: table.scenes().into_iter().map(str::to_owned).collect::<BTreeSet<_>>().into_iter().collect(),
+        examples: table.zones.iter().map(|z| examples(z, params.range).count()).sum(),
+        c,
+        gamma,
+        leave_one_scene_out,
+    };
+    Ok(machine.into_model(table, platt, record))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::descriptor::Descriptor;
+    use crate::display::ToneMapping;
+    use crate::evaluation::{Level, Origin};
+    use crate::evidence::Evidence;
+
+    /// Scenes where people stop at noise 0.01, whatever else: the first number is ln(noise), the others are distraction.
+    fn table(scenes: usize) -> Table {
+        let dimensions = Descriptor::default().len();
+        let mut state = 9u64;
+        let mut uniform = move || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 40) as f32 / (1u64 << 24) as f32
+        };
+        let mut zones = Vec::new();
+        for scene in 0..scenes {
+            for zone in 0..6u32 {
+                let noise_at_one = 0.1 + 0.3 * uniform();
+                let human_spp = f64::from(noise_at_one / 0.01).powi(2);
+                let levels = (0..24)
+                    .map(|i| {
+                        let spp = 20.0 * 1.3f64.powi(i);
+                        let noise = noise_at_one / (spp as f32).sqrt();
+                        let mut descriptor: Vec<f32> = (0..dimensions).map(|_| uniform()).collect();
+                        descriptor[0] = noise.ln();
+                        Level { spp, origin: Origin::Real, noise, descriptor }
+                    })
+                    .collect();
+                let (scene, group) = (format!("scene{scene}"), format!("scene{scene}"));
+                zones.push(Zone {
+                    scene,
+                    group,
+                    zone,
+                    human_spp,
+                    censored: false,
+                    first_spp: 20.0,
+                    last_spp: 8000.0,
+                    levels,
+                });
+            }
+        }
+        let tone_mapping = ToneMapping::Srgb { exposure: 1.0 };
+        Table { descriptor: Descriptor::default(), evidence: Evidence::Halves, tone_mapping, zones }
+    }
+
+    #[test]
+    fn finds_the_rule_that_people_follow_on_scenes_it_has_not_seen() {
+        let predictions = leave_one_scene_out(&table(4), &TrainParams::default(), |_| ()).unwrap();
+        assert_eq!(predictions.len(), 24);
+        // P = 0.9 is where nine in ten agree: by the psychometric function, a little before the recorded threshold of 95 %.
+        let params = TrainParams::default();
+        let nine_in_ten = (-params.spread * (19.0f64 / 9.0).ln()).exp();
+        assert!((observers_agreeing(nine_in_ten, 1.0, params.spread) - 0.9).abs() < 1e-9);
+        let errors = predictions.iter().map(|p| (p.predicted_spp / p.human_spp / nine_in_ten).ln().abs());
+        let error_factor = (errors.sum::<f64>() / 24.0).exp();
+        assert!(error_factor < 1.2, "{error_factor}");
+    }
+
+    #[test]
+    fn too_few_groups_are_an_error() {
+        assert!(matches!(
+            leave_one_scene_out(&table(2), &TrainParams::default(), |_| ()),
+            Err(TrainError::Groups { .. })
+        ));
+        assert!(matches!(
+            train(&table(1), &TrainParams::default(), String::new(), None),
+            Err(TrainError::Groups { .. })
+        ));
+    }
+
+    #[test]
+    fn training_is_deterministic_and_survives_the_file() {
+        let params =
+            TrainParams { candidates: vec![SvmParams { c: 1.0, gamma: 0.01 }], ..TrainParams::default() };
+        let one = train(&table(3), &params, "synthetic".into(), None).unwrap();
+        let two = train(&table(3), &params, "synthetic".into(), None).unwrap();
+        assert_eq!(one, two);
+        let mut file = Vec::new();
+        one.write(&mut file).unwrap();
+        assert_eq!(Model::read(&file[..]).unwrap(), one);
+    }
+
+    #[test]
+    fn the_recorded_threshold_is_the_95th_percentile() {
+        assert!((observers_agreeing(300.0, 300.0, 0.3) - 0.95).abs() < 1e-12);
+        assert!(observers_agreeing(30.0, 300.0, 0.3) < 0.02);
+    }
+}
