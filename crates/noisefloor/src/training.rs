@@ -189,14 +189,15 @@ fn check(table: &Table, params: &TrainParams, needed: usize) -> Result<(), Train
     Ok(())
 }
 
-/// Predicts every zone by a model that has seen nothing of its group, not even to choose C, γ or the sigmoid. `on_fold` is
-/// called before each group with its name.
+/// Predicts every zone, at P = `threshold`, by a model that has seen nothing of its group, not even to choose C, γ or the
+/// sigmoid. `on_fold` is called before each group with its name.
 ///
 /// # Errors
 /// [`TrainError`] if the table has fewer than three groups, or training fails.
 pub fn leave_one_scene_out(
     table: &Table,
     params: &TrainParams,
+    threshold: f32,
     mut on_fold: impl FnMut(&str),
 ) -> Result<Vec<Prediction>, TrainError> {
     check(table, params, 3)?;
@@ -208,7 +209,7 @@ pub fn leave_one_scene_out(
         let (machine, platt, _) = fit_groups(table, &others, params)?;
         let model = machine.into_model(table, platt, TrainingRecord::default());
         let zones = table.zones.iter().filter(|z| z.group == left_out);
-        predictions.extend(zones.map(|z| predict(&model, DEFAULT_THRESHOLD, z)));
+        predictions.extend(zones.map(|z| predict(&model, threshold, z)));
     }
     Ok(predictions)
 }
@@ -287,7 +288,8 @@ mod tests {
 
     #[test]
     fn finds_the_rule_that_people_follow_on_scenes_it_has_not_seen() {
-        let predictions = leave_one_scene_out(&table(4), &TrainParams::default(), |_| ()).unwrap();
+        let predictions =
+            leave_one_scene_out(&table(4), &TrainParams::default(), DEFAULT_THRESHOLD, |_| ()).unwrap();
         assert_eq!(predictions.len(), 24);
         // P = 0.9 is where nine in ten agree: by the psychometric function, a little before the recorded threshold of 95 %.
         let params = TrainParams::default();
@@ -301,7 +303,7 @@ mod tests {
     #[test]
     fn too_few_groups_are_an_error() {
         assert!(matches!(
-            leave_one_scene_out(&table(2), &TrainParams::default(), |_| ()),
+            leave_one_scene_out(&table(2), &TrainParams::default(), DEFAULT_THRESHOLD, |_| ()),
             Err(TrainError::Groups { .. })
         ));
         assert!(matches!(

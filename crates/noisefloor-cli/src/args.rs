@@ -1,0 +1,377 @@
+//! What can be typed, and what it means once checked.
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use noisefloor::{
+    Audience, DEFAULT_KEY, DEFAULT_THRESHOLD, DEFAULT_TILE, Display, Evidence, FixedSamples, Model, NoiseMask, Oracle,
+    Params, Schedule, StoppingCriterion, ToneMapping,
+};
+use anyhow::{Context, bail};
+use std::fs::File;
+use std::io::BufReader;
+use std::path::{Path, PathBuf};
+
+/// Tells progressive Monte Carlo renderers, tile by tile, when people stop seeing noise.
+///
+/// The oracle has learned from people: real observers said at how many samples per pixel they could no longer tell parts of real
+/// renders from the converged picture. `render` stops each tile of the built-in path tracer by it, `judge` applies it to pictures
+/// rendered elsewhere, `train` and `evaluate` make and score models.
+#[derive(Debug, Parser)]
+#[command(name = "noisefloor", version, max_term_width = 110, propagate_version = true)]
+pub struct Cli {
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    Render(Box<RenderArgs>),
+    Judge(JudgeArgs),
+    Train(TrainArgs),
+    Evaluate(EvaluateArgs),
+    Inspect(InspectArgs),
+    /// List the built-in scenes.
+    Scenes,
+}
+
+/// Render a scene, and stop each tile when nobody sees noise in it any more.
+///
+/// Writes into the output folder: image.exr (linear radiance, with samples, probability and stop as channels), image.png,
+/// stops.csv (a line a tile), stops.png (heat map over the picture), timeline.csv and report.json. Files appear whole or not at all
+/// and are refreshed while rendering (--autosave). Ctrl-C stops all tiles and writes what is there (exit code 130).
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  noisefloor render                                  the Cornell box, into out/cornell-box
+  noisefloor render glass --size 800x600 --seed 7    another scene; `noisefloor scenes` lists them
+  noisefloor render --criterion spp:1000             for comparison: a fixed number of samples
+  noisefloor render --audience art-students          for people who look harder (more samples)
+  noisefloor render --time 60 --against truth.exr    a minute at most; relMSE to a reference in timeline.csv")]
+pub struct RenderArgs {
+    /// Built-in scene to render (see `noisefloor scenes`).
+    #[arg(default_value = "cornell-box")]
+    pub scene: String,
+    /// Output folder [default: out/SCENE].
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Image size in pixels.
+    #[arg(long, value_name = "WxH", default_value = "512x512", value_parser = parse_size)]
+    pub size: (usize, usize),
+    /// Seed of the random numbers: same seed, same image and same stops, whatever the number of threads.
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+    /// Threads [default: one a core].
+    #[arg(long)]
+    pub threads: Option<usize>,
+    /// Longest path, in segments.
+    #[arg(long, default_value_t = 65, value_name = "N")]
+    pub max_depth: u32,
+    /// Without multiple importance sampling: the plain path tracing with next event estimation of the paper.
+    #[arg(long)]
+    pub no_mis: bool,
+    /// What stops a tile: `oracle`, or `spp:N` for N samples per pixel everywhere.
+    #[arg(long, default_value = "oracle", value_parser = parse_criterion)]
+    pub criterion: CriterionChoice,
+    #[command(flatten)]
+    pub oracle: OracleArgs,
+    #[command(flatten)]
+    pub tone: ToneArgs,
+    /// Tile edge in pixels, 16…512.
+    #[arg(long, default_value_t = DEFAULT_TILE, value_name = "PIXELS")]
+    pub tile: usize,
+    /// Samples per pixel between two verdicts on a tile.
+    #[arg(long, default_value_t = 100, value_name = "SPP")]
+    pub batch: u32,
+    /// When tiles are judged: after `every` batch, or `spaced` by the expected need, in multiples of the batch.
+    #[arg(long, value_enum, default_value_t = ScheduleChoice::Every)]
+    pub schedule: ScheduleChoice,
+    /// No tile stops before [default: the batch].
+    #[arg(long, value_name = "SPP")]
+    pub min_spp: Option<u64>,
+    /// Every tile stops at so many samples per pixel.
+    #[arg(long, default_value_t = 10_000, value_name = "SPP")]
+    pub max_spp: u64,
+    /// Stop all tiles after so many seconds of sampling.
+    #[arg(long, value_name = "SECONDS", value_parser = parse_seconds)]
+    pub time: Option<std::time::Duration>,
+    /// Verdicts in a row that have to say "converged".
+    #[arg(long, default_value_t = 1, value_name = "K")]
+    pub consecutive: u32,
+    /// Whose eyes: `observers` (of the training data), `art-students` (T' = 1.94 T - 346), or a line `a,b` for T' = a T + b.
+    #[arg(long, default_value = "observers", value_parser = parse_audience)]
+    pub audience: Audience,
+    /// Converged picture of the same size to compare with: relMSE in timeline.csv and report.json.
+    #[arg(long, value_name = "FILE.exr")]
+    pub against: Option<PathBuf>,
+    /// Refresh the files in the output folder every so many seconds while rendering; 0 for never.
+    #[arg(long, default_value_t = 30.0, value_name = "SECONDS")]
+    pub autosave: f64,
+    /// No progress bar and no summary.
+    #[arg(long, short)]
+    pub quiet: bool,
+}
+
+/// Say of each tile of a picture whether people would see noise in it.
+///
+/// Noise shows where two renderings of one scene differ, so a second picture is needed: same view, other samples. Several are
+/// pooled. The verdict is on IMAGE alone: its noise is worked out from the difference and the numbers of samples. PNGs are judged as
+/// they are shown; EXRs are tone mapped first.
+///
+/// Two stages of one progressive rendering share samples: say so with --nested.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  noisefloor judge a.exr --spp 256 --against b.exr --spp 256       two independent renderings
+  noisefloor judge 00100.png --spp 100 --against 00900.png --spp 900 --nested --heat-map verdict.png
+  noisefloor judge a.exr --spp 64 --against b.exr --spp 64 --json > verdicts.json")]
+pub struct JudgeArgs {
+    /// Picture to judge, PNG or EXR.
+    #[arg(value_name = "IMAGE")]
+    pub image: PathBuf,
+    /// Samples per pixel: first of IMAGE, then of each --against, in their order.
+    #[arg(long, required = true, value_name = "N")]
+    pub spp: Vec<f64>,
+    /// Another rendering of the same view. Repeat for more.
+    #[arg(long, required = true, value_name = "IMAGE")]
+    pub against: Vec<PathBuf>,
+    /// The pictures are stages of one progressive rendering: the smaller one's samples are in the larger one.
+    #[arg(long)]
+    pub nested: bool,
+    #[command(flatten)]
+    pub oracle: OracleArgs,
+    #[command(flatten)]
+    pub tone: ToneArgs,
+    /// Tile edge in pixels, 16…512.
+    #[arg(long, default_value_t = DEFAULT_TILE, value_name = "PIXELS")]
+    pub tile: usize,
+    /// Print JSON instead of a table.
+    #[arg(long)]
+    pub json: bool,
+    /// Write the probabilities as a heat map over the picture.
+    #[arg(long, value_name = "FILE.png")]
+    pub heat_map: Option<PathBuf>,
+}
+
+/// Train a model on human thresholds.
+///
+/// A corpus is a folder with thresholds.csv (scene, renderer, zone, x, y, width, height, human_spp, first_spp, last_spp) and the
+/// pictures: <scene>/<spp>.png, running means of one progressive rendering, or zone<NN>/batch_<first>_<last>.exr, means of those
+/// samples alone. C and γ are chosen, and probabilities calibrated, by leaving out one scene at a time.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  noisefloor train --corpus study/lisic9 --corpus study/staircase --out my.nfm
+  noisefloor train --table fixtures/human-table.csv --out my.nfm    from the table that ships, without any picture")]
+pub struct TrainArgs {
+    #[command(flatten)]
+    pub data: DataArgs,
+    /// Model file to write.
+    #[arg(long, value_name = "FILE")]
+    pub out: PathBuf,
+    /// Also write the table of descriptors, from which `--table` trains without the pictures.
+    #[arg(long, value_name = "FILE.csv")]
+    pub save_table: Option<PathBuf>,
+    /// Do not score on left-out scenes (the scores are then missing from the model's record).
+    #[arg(long)]
+    pub no_scores: bool,
+    #[command(flatten)]
+    pub search: SearchArgs,
+}
+
+/// Score predicted thresholds against human ones.
+///
+/// Predicts for each zone the samples per pixel at which P crosses the threshold, and compares with what people said: error factor
+/// exp(mean |ln ratio|), bias factor, share stopped below half the human threshold; beside it a constant noise level and the median of
+/// the same scene's other zones. Levels between the pictures given are synthesised (noise ∝ 1/√n); the accuracy on images counts
+/// real ones alone.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  noisefloor evaluate --table fixtures/human-table.csv --leave-one-scene-out
+  noisefloor evaluate --corpus study/mine --model my.nfm --json scores.json --csv zones.csv")]
+pub struct EvaluateArgs {
+    #[command(flatten)]
+    pub data: DataArgs,
+    /// Model to score [default: the bundled one, which has seen the zones it was trained on].
+    #[arg(long, value_name = "FILE", conflicts_with = "leave_one_scene_out")]
+    pub model: Option<PathBuf>,
+    /// Predict each scene by a model that has not seen it, nor another view of its room.
+    #[arg(long)]
+    pub leave_one_scene_out: bool,
+    /// Probability from which a tile counts as converged.
+    #[arg(long, default_value_t = DEFAULT_THRESHOLD, value_name = "P")]
+    pub threshold: f32,
+    /// Write scores as JSON.
+    #[arg(long, value_name = "FILE")]
+    pub json: Option<PathBuf>,
+    /// Write each zone's thresholds as CSV: scene,zone,human_spp,predicted_spp,censored.
+    #[arg(long, value_name = "FILE")]
+    pub csv: Option<PathBuf>,
+    #[command(flatten)]
+    pub search: SearchArgs,
+}
+
+/// Show what a model depends on and where it comes from.
+#[derive(Debug, Args)]
+pub struct InspectArgs {
+    /// Model file [default: the bundled model].
+    #[arg(value_name = "MODEL")]
+    pub model: Option<PathBuf>,
+    /// Print JSON.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Where the human thresholds are.
+#[derive(Debug, Args)]
+#[group(required = true, multiple = false)]
+pub struct DataArgs {
+    /// Corpus folder. Repeat for more.
+    #[arg(long, value_name = "DIR")]
+    pub corpus: Vec<PathBuf>,
+    /// Table of descriptors, written by `train --save-table`.
+    #[arg(long, value_name = "FILE.csv")]
+    pub table: Option<PathBuf>,
+}
+
+/// How to train.
+#[derive(Debug, Args)]
+pub struct SearchArgs {
+    /// σ of the noise mask, 0.3…1.5 pixels (for --corpus; a table has its own).
+    #[arg(long, default_value_t = 1.0)]
+    pub sigma: f32,
+    /// Values of C to choose from [default: a grid].
+    #[arg(long, value_delimiter = ',', value_name = "C,…")]
+    pub c: Vec<f64>,
+    /// Values of γ to choose from [default: a grid].
+    #[arg(long, value_delimiter = ',', value_name = "G,…")]
+    pub gamma: Vec<f64>,
+}
+
+/// Which oracle.
+#[derive(Debug, Args)]
+pub struct OracleArgs {
+    /// Model file [default: the bundled model].
+    #[arg(long, value_name = "FILE")]
+    pub model: Option<PathBuf>,
+    /// Probability, that an observer sees no difference, from which a tile counts as converged.
+    #[arg(long, default_value_t = DEFAULT_THRESHOLD, value_name = "P")]
+    pub threshold: f32,
+}
+
+/// The way from radiance to the screen.
+#[derive(Debug, Args)]
+pub struct ToneArgs {
+    /// Tone mapping of linear pictures.
+    #[arg(long, value_enum, default_value_t = ToneChoice::Reinhard)]
+    pub tone_mapping: ToneChoice,
+    /// Reinhard: what the log-average luminance becomes.
+    #[arg(long, default_value_t = DEFAULT_KEY)]
+    pub key: f32,
+    /// Reinhard: smallest luminance, after exposure, that becomes white [default: compress without burning out].
+    #[arg(long)]
+    pub white: Option<f32>,
+    /// sRGB: factor on radiance.
+    #[arg(long, default_value_t = 1.0)]
+    pub exposure: f32,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum ToneChoice {
+    /// Reinhard et al. 2002, global operator.
+    Reinhard,
+    /// Multiply, clamp, encode.
+    Srgb,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum ScheduleChoice {
+    Every,
+    Spaced,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum CriterionChoice {
+    Oracle,
+    Fixed(u64),
+}
+
+fn parse_size(text: &str) -> Result<(usize, usize), String> {
+    let parts = text.split_once(['x', 'X', '×']).and_then(|(w, h)| Some((w.parse().ok()?, h.parse().ok()?)));
+    let (width, height) = parts.ok_or("expected WIDTHxHEIGHT in pixels, such as 512x512")?;
+    noisefloor::check_image(width, height).map_err(|e| e.to_string())?;
+    Ok((width, height))
+}
+
+fn parse_criterion(text: &str) -> Result<CriterionChoice, String> {
+    match text.split_once(':') {
+        None if text == "oracle" => Ok(CriterionChoice::Oracle),
+        Some(("spp", n)) => match n.parse() {
+            Ok(n) if n > 0 => Ok(CriterionChoice::Fixed(n)),
+            _ => Err(format!("spp:{n} needs a positive whole number of samples, such as spp:1000")),
+        },
+        _ => Err("expected `oracle` or `spp:N`".into()),
+    }
+}
+
+fn parse_audience(text: &str) -> Result<Audience, String> {
+    match text {
+        "observers" => Ok(Audience::TRAINED),
+        "art-students" => Ok(Audience::ART_STUDENTS),
+        line => {
+            let parts = line.split_once(',').and_then(|(a, b)| Some((a.trim().parse().ok()?, b.trim().parse().ok()?)));
+            let (slope, offset) = parts.ok_or("expected `observers`, `art-students`, or a,b for T' = a T + b")?;
+            Ok(Audience { slope, offset })
+        }
+    }
+}
+
+fn parse_seconds(text: &str) -> Result<std::time::Duration, String> {
+    let seconds: f64 = text.parse().map_err(|_| "expected seconds, such as 60 or 0.5")?;
+    if !(seconds > 0.0) {
+        return Err("expected a time above 0 seconds".into());
+    }
+    std::time::Duration::try_from_secs_f64(seconds).map_err(|e| e.to_string())
+}
+
+impl ToneArgs {
+    /// The tone mapping, checked.
+    pub fn check(&self) -> anyhow::Result<ToneMapping> {
+        let tone = match self.tone_mapping {
+            ToneChoice::Reinhard => ToneMapping::Reinhard { key: self.key, white: self.white },
+            ToneChoice::Srgb => ToneMapping::Srgb { exposure: self.exposure },
+        };
+        tone.check()?;
+        Ok(tone)
+    }
+}
+
+impl OracleArgs {
+    /// The oracle, loaded and checked.
+    pub fn load(&self) -> anyhow::Result<Oracle> {
+        Ok(Oracle::new(load_model(self.model.as_deref())?, self.threshold)?)
+    }
+}
+
+/// Reads a model file, or the bundled model.
+pub fn load_model(path: Option<&Path>) -> anyhow::Result<Model> {
+    let Some(path) = path else { return Ok(Model::bundled()) };
+    let file = File::open(path).with_context(|| format!("{}: cannot be opened", path.display()))?;
+    Model::read(BufReader::new(file)).with_context(|| format!("{}", path.display()))
+}
+
+impl RenderArgs {
+    /// Session parameters, checked.
+    pub fn params(&self) -> anyhow::Result<Params> {
+        let schedule = match self.schedule {
+            ScheduleChoice::Every => Schedule::Every { step: self.batch },
+            ScheduleChoice::Spaced => Schedule::Spaced { step: self.batch },
+        };
+        let params = Params {
+            tile: self.tile,
+            tone_mapping: self.tone.check()?,
+            schedule,
+            min_samples: self.min_spp.unwrap_or(0),
+            max_samples: self.max_spp,
+            consecutive: self.consecutive,
+            audience: self.audience,
+        };
+        params.check()?;
+        Ok(params)
+    }
+}

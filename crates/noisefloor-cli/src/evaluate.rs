@@ -1,0 +1,141 @@
+//! `noisefloor evaluate`.
+
+use crate::args::{EvaluateArgs, load_model};
+use crate::output::{write_csv, write_json};
+use crate::train::{held_out, load_table, search};
+use anyhow::bail;
+use noisefloor::evaluation::{
+    Prediction, Scores, Table, constant_noise_baseline, image_accuracy, predict, scene_median_baseline, score,
+};
+use serde::Serialize;
+
+/// Scores of one way to predict.
+#[derive(Serialize)]
+struct Summary {
+    #[serde(flatten)]
+    scores: Scores,
+    /// Of real pictures alone.
+    image_accuracy: Option<f64>,
+}
+
+#[derive(Serialize)]
+struct Baselines {
+    constant: Summary,
+    scene_median: Summary,
+}
+
+#[derive(Serialize)]
+struct SceneSummary {
+    scene: String,
+    #[serde(flatten)]
+    summary: Summary,
+    baselines: Baselines,
+}
+
+#[derive(Serialize)]
+struct Report {
+    /// `leave-one-scene-out`, or the digest of the model scored.
+    predicted_by: String,
+    #[serde(flatten)]
+    summary: Summary,
+    baselines: Baselines,
+    scenes: Vec<SceneSummary>,
+    /// Zones whose human threshold is only a lower bound: not in the factors.
+    censored_zones: usize,
+    levels_real: usize,
+    levels_synthesised: usize,
+}
+
+pub fn run(args: &EvaluateArgs) -> anyhow::Result<()> {
+    if !(args.threshold > 0.0 && args.threshold < 1.0) {
+        bail!("--threshold must lie between 0 and 1, not {}", args.threshold);
+    }
+    let params = search(&args.search)?;
+    let model = if args.leave_one_scene_out { None } else { Some(load_model(args.model.as_deref())?) };
+    let table = load_table(&args.data, &args.search)?;
+    let (predicted_by, predictions) = match &model {
+        None => ("leave-one-scene-out".to_owned(), held_out(&table, &params, args.threshold)?),
+        Some(model) => {
+            if model.descriptor != table.descriptor {
+                bail!("the model goes by the {} descriptor {:?}, the table by {:?}", model.descriptor.name(), model.descriptor, table.descriptor);
+            }
+            (model.digest(), table.zones.iter().map(|z| predict(model, args.threshold, z)).collect())
+        }
+    };
+    let report = Report::new(predicted_by, &table, &predictions);
+    if let Some(path) = &args.json {
+        write_json(path, &report)?;
+    }
+    if let Some(path) = &args.csv {
+        write_csv(path, predictions.iter())?;
+    }
+    report.print(&model.map_or_else(String::new, |m| {
+        let seen: Vec<&str> = table.scenes().into_iter().filter(|s| m.record.scenes.iter().any(|t| t == s)).collect();
+        if seen.is_empty() { String::new() } else { format!("the model was trained on these scenes: {}", seen.join(", ")) }
+    }));
+    Ok(())
+}
+
+impl Summary {
+    fn of(predictions: &[&Prediction]) -> Self {
+        let all = || predictions.iter().copied();
+        Self { scores: score(all()), image_accuracy: image_accuracy(all()) }
+    }
+}
+
+impl Report {
+    fn new(predicted_by: String, table: &Table, predictions: &[Prediction]) -> Self {
+        let (constant, median) = (constant_noise_baseline(table), scene_median_baseline(table));
+        let summarise = |of: &[Prediction], keep: &dyn Fn(&Prediction) -> bool| {
+            Summary::of(&of.iter().filter(|p| keep(p)).collect::<Vec<_>>())
+        };
+        let baselines = |keep: &dyn Fn(&Prediction) -> bool| Baselines {
+            constant: summarise(&constant, keep),
+            scene_median: summarise(&median, keep),
+        };
+        let scene = |scene: &str| {
+            let keep = |p: &Prediction| p.scene == scene;
+            SceneSummary { scene: scene.into(), summary: summarise(predictions, &keep), baselines: baselines(&keep) }
+        };
+        let levels = || table.zones.iter().flat_map(|z| &z.levels);
+        let real = levels().filter(|l| l.origin == noisefloor::evaluation::Origin::Real).count();
+        Self {
+            predicted_by,
+            summary: summarise(predictions, &|_| true),
+            baselines: baselines(&|_| true),
+            scenes: table.scenes().into_iter().map(scene).collect(),
+            censored_zones: table.zones.iter().filter(|z| z.censored).count(),
+            levels_real: real,
+            levels_synthesised: levels().count() - real,
+        }
+    }
+
+    fn print(&self, note: &str) {
+        println!("{:22} zones  error  bias  early  images right    constant noise    scene median", "scene");
+        let line = |name: &str, s: &Summary, b: &Baselines| {
+            println!(
+                "{name:22} {:5}  ×{:<5.2} {:<5.2} {:4.0} %  {:>12}    {:>14}    {:>12}",
+                s.scores.zones,
+                s.scores.error_factor,
+                s.scores.bias_factor,
+                100.0 * s.scores.early_share,
+                s.image_accuracy.map_or("–".into(), |a| format!("{:.1} %", 100.0 * a)),
+                format!("×{:.2}, {:.0} % early", b.constant.scores.error_factor, 100.0 * b.constant.scores.early_share),
+                format!("×{:.2}", b.scene_median.scores.error_factor),
+            );
+        };
+        for scene in &self.scenes {
+            line(&scene.scene, &scene.summary, &scene.baselines);
+        }
+        line("all", &self.summary, &self.baselines);
+        println!(
+            "error = exp(mean |ln(predicted/human)|); bias = exp(mean ln(predicted/human)); early = stopped below half the human threshold.\n\
+             Thresholds are looked for on {} real and {} synthesised levels; \"images right\" counts real pictures alone. {} censored zones \
+             stay out of the factors.\nThe scene median knows the scene's other zones, which no predictor of unseen scenes can.",
+            self.levels_real, self.levels_synthesised, self.censored_zones
+        );
+        if !note.is_empty() {
+            println!("Note: {note}");
+        }
+    }
+}

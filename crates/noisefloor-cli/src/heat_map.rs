@@ -1,0 +1,192 @@
+//! A number a tile, drawn over the picture, with a legend.
+
+use embedded_graphics::mono_font::iso_8859_1::{FONT_6X10, FONT_7X13, FONT_7X13_BOLD};
+use embedded_graphics::mono_font::{MonoFont, MonoTextStyle};
+use embedded_graphics::pixelcolor::Rgb888;
+use embedded_graphics::prelude::*;
+use embedded_graphics::text::{Alignment, Baseline, Text, TextStyleBuilder};
+use noisefloor::{Rgb, Tile};
+use std::convert::Infallible;
+
+/// One tile and what is to be seen of it.
+pub struct Mark {
+    pub tile: Tile,
+    pub value: f64,
+    /// Written into the tile where there is room.
+    pub label: String,
+}
+
+/// How values become colours.
+pub struct Scale {
+    pub title: &'static str,
+    pub low: f64,
+    pub high: f64,
+    /// Logarithmic; `low` must then be positive.
+    pub log: bool,
+    pub colours: colorous::Gradient,
+}
+
+impl Scale {
+    fn place(&self, value: f64) -> f64 {
+        let f = |v: f64| if self.log { v.max(f64::MIN_POSITIVE).ln() } else { v };
+        let span = f(self.high) - f(self.low);
+        if span > 0.0 { ((f(value) - f(self.low)) / span).clamp(0.0, 1.0) } else { 0.5 }
+    }
+
+    fn value_at(&self, place: f64) -> f64 {
+        if self.log {
+            (self.low.ln() + place * (self.high.ln() - self.low.ln())).exp()
+        } else {
+            self.low + place * (self.high - self.low)
+        }
+    }
+
+    fn colour(&self, value: f64) -> [u8; 3] {
+        self.colours.eval_continuous(self.place(value)).as_array()
+    }
+}
+
+/// An RGB picture, row-major, 3 bytes a pixel.
+pub struct Canvas {
+    pub width: usize,
+    pub height: usize,
+    pub bytes: Vec<u8>,
+}
+
+impl OriginDimensions for Canvas {
+    fn size(&self) -> Size {
+        Size::new(self.width as u32, self.height as u32)
+    }
+}
+
+impl DrawTarget for Canvas {
+    type Color = Rgb888;
+    type Error = Infallible;
+
+    fn draw_iter<I: IntoIterator<Item = Pixel<Rgb888>>>(&mut self, pixels: I) -> Result<(), Infallible> {
+        for Pixel(at, colour) in pixels {
+            if let (Ok(x), Ok(y)) = (usize::try_from(at.x), usize::try_from(at.y)) {
+                self.set(x, y, [colour.r(), colour.g(), colour.b()]);
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Canvas {
+    fn new(width: usize, height: usize, colour: [u8; 3]) -> Self {
+        Self { width, height, bytes: colour.repeat(width * height) }
+    }
+
+    fn set(&mut self, x: usize, y: usize, colour: [u8; 3]) {
+        if x < self.width && y < self.height {
+            self.bytes[(y * self.width + x) * 3..][..3].copy_from_slice(&colour);
+        }
+    }
+
+    fn text(&mut self, text: &str, at: (usize, usize), font: &MonoFont<'_>, colour: [u8; 3], alignment: Alignment) {
+        let style = TextStyleBuilder::new().alignment(alignment).baseline(Baseline::Middle).build();
+        let character = MonoTextStyle::new(font, Rgb888::new(colour[0], colour[1], colour[2]));
+        let at = Point::new(at.0 as i32, at.1 as i32);
+        let Ok(_) = Text::with_text_style(text, at, character, style).draw(self);
+    }
+}
+
+const LEGEND: usize = 104;
+const PAPER: [u8; 3] = [250, 250, 250];
+const INK: [u8; 3] = [20, 20, 20];
+
+/// Display-encoded pixels in [0, 1] as bytes.
+pub fn to_bytes(encoded: &[Rgb]) -> Vec<u8> {
+    encoded.iter().flatten().map(|c| (c.clamp(0.0, 1.0) * 255.0).round() as u8).collect()
+}
+
+/// Draws `marks` over a display-encoded picture `width` pixels wide, legend at the right.
+pub fn draw(width: usize, encoded: &[Rgb], marks: &[Mark], scale: &Scale) -> Canvas {
+    let height = encoded.len() / width;
+    let mut canvas = Canvas::new(width + LEGEND, height.max(140), PAPER);
+
+    // The picture in grey below the colours, so that colour means the value alone.
+    for mark in marks {
+        let colour = scale.colour(mark.value);
+        for row in mark.tile.rows(width) {
+            for pixel in row {
+                let grey = 255.0 * noisefloor::luminance(encoded[pixel]);
+                let blend = colour.map(|c| (0.55 * f32::from(c) + 0.45 * grey).round() as u8);
+                canvas.set(pixel % width, pixel / width, blend);
+            }
+        }
+    }
+
+    // Borders and labels.
+    for Mark { tile, label, .. } in marks {
+        for x in tile.x..tile.x + tile.width {
+            canvas.set(x, tile.y, INK);
+        }
+        for y in tile.y..tile.y + tile.height {
+            canvas.set(tile.x, y, INK);
+        }
+        let (font, advance) = if tile.width >= 100 { (&FONT_7X13_BOLD, 7) } else { (&FONT_6X10, 6) };
+        if label.len() * advance + 4 <= tile.width && tile.height >= 14 {
+            let (x, y) = (tile.x + tile.width / 2, tile.y + tile.height / 2);
+            for (dx, dy) in [(0, 1), (2, 1), (1, 0), (1, 2)] {
+                canvas.text(label, (x + dx - 1, y + dy - 1), font, INK, Alignment::Center);
+            }
+            canvas.text(label, (x, y), font, [255; 3], Alignment::Center);
+        }
+    }
+
+    draw_legend(&mut canvas, width, height, scale);
+    canvas
+}
+
+fn draw_legend(canvas: &mut Canvas, width: usize, height: usize, scale: &Scale) {
+    let left = width + 12;
+    for (line, text) in scale.title.split('\n').enumerate() {
+        canvas.text(text, (left, 14 + 15 * line), &FONT_7X13_BOLD, INK, Alignment::Left);
+    }
+    let (top, bottom) = (50, height.max(140) - 16);
+    for y in top..=bottom {
+        let place = (bottom - y) as f64 / (bottom - top) as f64;
+        let colour = scale.colour(scale.value_at(place));
+        for x in left..left + 18 {
+            canvas.set(x, y, colour);
+        }
+    }
+    for tick in 0..5 {
+        let place = f64::from(tick) / 4.0;
+        let y = bottom - ((bottom - top) as f64 * place) as usize;
+        for x in left + 18..left + 23 {
+            canvas.set(x, y, INK);
+        }
+        let value = scale.value_at(place);
+        let text = if scale.high <= 1.0 { format!("{value:.2}") } else { format!("{value:.0}") };
+        canvas.text(&text, (left + 27, y), &FONT_7X13, INK, Alignment::Left);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_map_to_the_ends_of_the_scale() {
+        let scale = Scale { title: "", low: 100.0, high: 10_000.0, log: true, colours: colorous::VIRIDIS };
+        assert_eq!((scale.place(100.0), scale.place(10_000.0), scale.place(5.0)), (0.0, 1.0, 0.0));
+        assert!((scale.place(1000.0) - 0.5).abs() < 1e-9 && (scale.value_at(0.5) - 1000.0).abs() < 1e-6);
+        let flat = Scale { low: 7.0, high: 7.0, log: false, ..scale };
+        assert_eq!(flat.place(7.0), 0.5);
+    }
+
+    #[test]
+    fn colours_lie_over_their_tiles() {
+        let grid = noisefloor::TileGrid::new(64, 32, 32).unwrap();
+        let mark = |i: usize| Mark { tile: grid.tile(i), value: i as f64, label: String::new() };
+        let scale = Scale { title: "t", low: 0.0, high: 1.0, log: false, colours: colorous::VIRIDIS };
+        let canvas = draw(64, &vec![[0.0; 3]; 64 * 32], &[mark(0), mark(1)], &scale);
+        let at = |x: usize, y: usize| &canvas.bytes[(y * canvas.width + x) * 3..][..3];
+        // Over black: 55 % of viridis' first and last colour.
+        assert_eq!(at(16, 16), [68.0, 1.0, 84.0].map(|c: f32| (0.55 * c).round() as u8));
+        assert_eq!(at(48, 16), [253.0, 231.0, 37.0].map(|c: f32| (0.55 * c).round() as u8));
+    }
+}

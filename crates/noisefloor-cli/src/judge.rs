@@ -1,0 +1,186 @@
+//! `noisefloor judge`.
+
+use crate::args::JudgeArgs;
+use crate::heat_map::{self, Mark, Scale};
+use anyhow::{Context, bail};
+use noisefloor::{
+    Display, Evidence, Oracle, Rgb, Samples, Tile, TileGrid, TilePlanes, ToneMapping, Verdict, residual_scale, srgb_encode,
+};
+use noisefloor_exr::{Picture, read_picture, write_png};
+use rayon::prelude::*;
+use serde::Serialize;
+use std::path::Path;
+
+/// A picture, linear, and how many samples it has.
+struct Rendering {
+    size: (usize, usize),
+    pixels: Vec<Rgb>,
+    spp: f64,
+    /// Shown as it is, not tone mapped.
+    display_referred: bool,
+}
+
+/// One line of the verdict.
+#[derive(Serialize)]
+struct Row {
+    tile: usize,
+    x: usize,
+    y: usize,
+    width: usize,
+    height: usize,
+    probability: f32,
+    converged: bool,
+    /// Samples per pixel at which the tile should be converged; null if that is out of sight.
+    expected_spp: Option<u64>,
+}
+
+#[derive(Serialize)]
+struct Report<'a> {
+    image: &'a Path,
+    spp: f64,
+    model: String,
+    threshold: f32,
+    converged_tiles: usize,
+    tiles: &'a [Row],
+}
+
+pub fn run(args: &JudgeArgs) -> anyhow::Result<()> {
+    // Read and check everything that was typed.
+    let tone = args.tone.check()?;
+    let oracle = args.oracle.load()?;
+    if oracle.model().evidence != Evidence::Halves {
+        bail!("this model holds tiles against a ray-traced reference; `judge` needs one that holds them against other samples");
+    }
+    if args.spp.len() != 1 + args.against.len() {
+        bail!("--spp is needed once for each picture: {} given for {} pictures", args.spp.len(), 1 + args.against.len());
+    }
+    let image = read(&args.image, args.spp[0])?;
+    let others: Vec<Rendering> =
+        args.against.iter().zip(&args.spp[1..]).map(|(path, &spp)| read(path, spp)).collect::<anyhow::Result<_>>()?;
+    for (other, path) in others.iter().zip(&args.against) {
+        fits(&image, other).with_context(|| format!("{} against {}", args.image.display(), path.display()))?;
+    }
+    let (width, height) = image.size;
+    let grid = TileGrid::new(width, height, args.tile)?;
+
+    // Pool what the picture is held against, and work out its noise.
+    let samples = if args.nested { Samples::Nested } else { Samples::Independent };
+    let other = pool(others, image.spp, samples)?;
+    let scale = residual_scale(image.spp, other.spp, samples).with_context(|| {
+        format!("nested pictures of the same {} samples per pixel are the same picture: nothing to judge by", image.spp)
+    })?;
+    let display = if image.display_referred { Display::SRGB } else { tone.settle(&image.pixels) };
+    let rows = judge(&oracle, grid, &image, &other, &display, scale)?;
+
+    report(args, &oracle, &rows)?;
+    if let Some(path) = &args.heat_map {
+        let encoded: Vec<Rgb> = image.pixels.iter().map(|&p| display.encode(p)).collect();
+        let mark = |row: &Row| Mark {
+            tile: grid.tile(row.tile),
+            value: f64::from(row.probability),
+            label: format!("{:.2}", row.probability),
+        };
+        let marks: Vec<Mark> = rows.iter().map(mark).collect();
+        let title = "P(no noise\nis seen)";
+        let scale = Scale { title, low: 0.0, high: 1.0, log: false, colours: colorous::CIVIDIS };
+        let map = heat_map::draw(width, &encoded, &marks, &scale);
+        write_png(path, map.width, map.height, &map.bytes)?;
+    }
+    Ok(())
+}
+
+fn read(path: &Path, spp: f64) -> anyhow::Result<Rendering> {
+    if !(spp.is_finite() && spp > 0.0) {
+        bail!("{} needs a positive number of samples per pixel, not {spp}", path.display());
+    }
+    let picture = read_picture(path)?;
+    let (size, display_referred) = (picture.size(), matches!(picture, Picture::Display(_)));
+    let pixels = picture.into_linear().pixels;
+    if let Some(bad) = pixels.iter().position(|p| !p.iter().all(|c| c.is_finite())) {
+        let (x, y) = (bad % size.0, bad / size.0);
+        bail!("{}: pixel ({x}, {y}) is not finite; mend the render, or paint over it, before it is judged", path.display());
+    }
+    Ok(Rendering { size, pixels, spp, display_referred })
+}
+
+fn fits(image: &Rendering, other: &Rendering) -> anyhow::Result<()> {
+    let ((w, h), (ow, oh)) = (image.size, other.size);
+    if (w, h) != (ow, oh) {
+        bail!("the pictures have different sizes, {w}×{h} and {ow}×{oh}");
+    }
+    if image.display_referred != other.display_referred {
+        bail!("one is a PNG and one an EXR; compare pictures of one kind");
+    }
+    if image.pixels == other.pixels {
+        bail!("the pictures are the same to the last bit, so that nothing shows their noise; render one with another seed");
+    }
+    Ok(())
+}
+
+/// Independent renderings make one of all their samples. Of nested ones, the one that differs most in its samples says most.
+fn pool(others: Vec<Rendering>, image_spp: f64, samples: Samples) -> anyhow::Result<Rendering> {
+    let distance = |r: &Rendering| (1.0 / r.spp - 1.0 / image_spp).abs();
+    let pooled = match samples {
+        Samples::Nested => others.into_iter().max_by(|a, b| distance(a).total_cmp(&distance(b))),
+        Samples::Independent => others.into_iter().reduce(|mut all, one| {
+            let weight = (one.spp / (all.spp + one.spp)) as f32;
+            for (a, b) in all.pixels.iter_mut().flatten().zip(one.pixels.iter().flatten()) {
+                *a += (b - *a) * weight;
+            }
+            all.spp += one.spp;
+            all
+        }),
+    };
+    pooled.context("nothing to hold the picture against: give --against")
+}
+
+fn judge(
+    oracle: &Oracle,
+    grid: TileGrid,
+    image: &Rendering,
+    other: &Rendering,
+    display: &Display,
+    scale: f32,
+) -> anyhow::Result<Vec<Row>> {
+    let planes = |tile| {
+        TilePlanes::gather(grid, tile, |x, y| {
+            let pixel = y * grid.width() + x;
+            let shown = display.luma(image.pixels[pixel]);
+            (shown, (shown - display.luma(other.pixels[pixel])) * scale)
+        })
+    };
+    let tiles: Vec<Tile> = grid.tiles().collect();
+    let row = |&tile: &Tile| {
+        let verdict = oracle.judge_planes(&planes(tile), image.spp.round().max(1.0) as u64)?;
+        let Verdict { converged, probability, expected_samples } = verdict;
+        let Tile { index, x, y, width, height } = tile;
+        let (probability, expected_spp) = (probability.unwrap_or(0.0), expected_samples);
+        Ok(Row { tile: index, x, y, width, height, probability, converged, expected_spp })
+    };
+    tiles.par_iter().map(row).collect()
+}
+
+fn report(args: &JudgeArgs, oracle: &Oracle, rows: &[Row]) -> anyhow::Result<()> {
+    let converged_tiles = rows.iter().filter(|r| r.converged).count();
+    if args.json {
+        let report = Report {
+            image: &args.image,
+            spp: args.spp[0],
+            model: oracle.model().digest(),
+            threshold: oracle.threshold(),
+            converged_tiles,
+            tiles: rows,
+        };
+        println!("{}", serde_json::to_string_pretty(&report)?);
+        return Ok(());
+    }
+    println!("tile     x     y   size       P  verdict      expected spp");
+    for row in rows {
+        let verdict = if row.converged { "converged" } else { "noise seen" };
+        let expected = row.expected_spp.filter(|_| !row.converged).map_or(String::new(), |n| n.to_string());
+        let size = format!("{}×{}", row.width, row.height);
+        println!("{:4} {:5} {:5} {size:>8} {:6.3}  {verdict:10} {expected:>14}", row.tile, row.x, row.y, row.probability);
+    }
+    println!("{converged_tiles} of {} tiles converged at {} spp (P ≥ {})", rows.len(), args.spp[0], oracle.threshold());
+    Ok(())
+}

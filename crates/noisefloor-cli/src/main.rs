@@ -1,0 +1,50 @@
+//! The `noisefloor` command. What can be typed is in [`args`]; each other module runs one command.
+#![allow(missing_docs, reason = "a command has no public items")]
+#![allow(clippy::print_stdout, reason = "a command prints")]
+
+mod args;
+mod evaluate;
+mod heat_map;
+mod inspect;
+mod judge;
+mod render;
+mod train;
+
+use args::{Cli, Command};
+use clap::Parser;
+use std::process::ExitCode;
+
+/// Ended by Ctrl-C or SIGTERM, with everything written: 128 + SIGINT.
+const INTERRUPTED: u8 = 130;
+
+fn main() -> ExitCode {
+    let outcome = match Cli::parse().command {
+        Command::Render(args) => render::run(&args),
+        Command::Judge(args) => judge::run(&args).map(|()| ExitCode::SUCCESS),
+        Command::Train(args) => train::run(&args).map(|()| ExitCode::SUCCESS),
+        Command::Evaluate(args) => evaluate::run(&args).map(|()| ExitCode::SUCCESS),
+        Command::Inspect(args) => inspect::run(&args).map(|()| ExitCode::SUCCESS),
+        Command::Scenes => {
+            inspect::scenes();
+            Ok(ExitCode::SUCCESS)
+        }
+    };
+    outcome.unwrap_or_else(|error| {
+        eprintln!("error: {}", one_line(&error));
+        ExitCode::FAILURE
+    })
+}
+
+/// An error and its causes in one line; a cause that its parent already quotes is not said twice.
+fn one_line(error: &anyhow::Error) -> String {
+    let mut line = String::new();
+    for cause in error.chain().map(ToString::to_string) {
+        if !line.contains(&cause) {
+            if !line.is_empty() {
+                line.push_str(": ");
+            }
+            line.push_str(&cause);
+        }
+    }
+    line.replace('\n', " ")
+}

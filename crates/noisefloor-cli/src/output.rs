@@ -1,0 +1,286 @@
+//! The files that `render` writes.
+
+use crate::args::RenderArgs;
+use crate::heat_map::{self, Mark, Scale};
+use anyhow::{Context, bail};
+use noisefloor::{Clock, Display, Params, Progress, Rgb, Session, Stop, StopReason, StoppingCriterion};
+use noisefloor_exr::{RenderLayers, read_exr, write_atomic, write_exr, write_png};
+use serde::Serialize;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// Mean over pixels and channels of (x − r)²/(r² + ε), to a reference r.
+pub struct RelMse {
+    reference: Vec<Rgb>,
+}
+
+/// Keeps black pixels of the reference from dividing by zero; the value of Rousselle et al. 2011.
+const EPSILON: f64 = 0.01;
+
+impl RelMse {
+    pub fn load(path: &Path, (width, height): (usize, usize)) -> anyhow::Result<Self> {
+        let image = read_exr(path)?;
+        if (image.width, image.height) != (width, height) {
+            let (w, h) = (image.width, image.height);
+            bail!("{} has {w}×{h} pixels, the render {width}×{height}: set --size {w}x{h}", path.display());
+        }
+        if !image.pixels.iter().flatten().all(|c| c.is_finite()) {
+            bail!("{} has pixels that are not finite: it cannot be compared with", path.display());
+        }
+        Ok(Self { reference: image.pixels })
+    }
+
+    fn of(&self, image: &[Rgb]) -> f64 {
+        let each = image.iter().flatten().zip(self.reference.iter().flatten());
+        let sum: f64 = each.map(|(&x, &r)| f64::from(x - r).powi(2) / (f64::from(r).powi(2) + EPSILON)).sum();
+        sum / (3 * image.len()) as f64
+    }
+}
+
+/// One line of timeline.csv.
+#[derive(Clone, Copy, Serialize)]
+struct TimelineRow {
+    seconds: f64,
+    samples: u64,
+    active_tiles: usize,
+    rel_mse: Option<f64>,
+}
+
+/// One line of stops.csv. A tile that is still open has the reason `open`.
+#[derive(Serialize)]
+struct StopRow {
+    tile: usize,
+    x: usize,
+    y: usize,
+    width: usize,
+    height: usize,
+    spp: u64,
+    probability: Option<f32>,
+    reason: String,
+}
+
+/// report.json.
+#[derive(Serialize)]
+struct Report<'a> {
+    noisefloor: &'static str,
+    scene: &'a str,
+    width: usize,
+    height: usize,
+    seed: u64,
+    criterion: String,
+    /// BLAKE3 of the model.
+    model: Option<&'a str>,
+    params: &'a Params,
+    /// Display exposure that was settled.
+    exposure: Option<f32>,
+    complete: bool,
+    tiles: usize,
+    stops: BTreeMap<String, usize>,
+    /// Over all pixels.
+    samples: u64,
+    /// What uniform rendering at the largest stop would take.
+    samples_uniform: u64,
+    /// Samples kept out because they were not finite.
+    samples_rejected: u64,
+    seconds_source: Option<f64>,
+    seconds_oracle: Option<f64>,
+    seconds_total: Option<f64>,
+    rel_mse: Option<f64>,
+}
+
+/// The output folder, and what has been recorded for it.
+pub struct Output {
+    folder: PathBuf,
+    scene: String,
+    seed: u64,
+    model: Option<String>,
+    rel_mse: Option<RelMse>,
+    timeline: Vec<TimelineRow>,
+}
+
+impl Output {
+    /// Makes the folder, and makes sure that files can be written before hours are spent.
+    pub fn create(args: &RenderArgs, model: Option<String>, rel_mse: Option<RelMse>) -> anyhow::Result<Self> {
+        let folder = args.out.clone().unwrap_or_else(|| Path::new("out").join(&args.scene));
+        std::fs::create_dir_all(&folder)
+            .with_context(|| format!("{}: cannot make this folder; choose another with --out", folder.display()))?;
+        let output = Self {
+            folder,
+            scene: args.scene.clone(),
+            seed: args.seed,
+            model,
+            rel_mse,
+            timeline: Vec::new(),
+        };
+        output.write_timeline()?;
+        Ok(output)
+    }
+
+    /// Notes one batch.
+    pub fn record<C: StoppingCriterion>(&mut self, session: &Session<C>, progress: &Progress) {
+        let rel_mse = self.rel_mse.as_ref().map(|r| r.of(&session.film().image()));
+        let noisefloor::TimelinePoint { seconds, samples, active_tiles } = progress.now;
+        self.timeline.push(TimelineRow { seconds, samples, active_tiles, rel_mse });
+    }
+
+    /// Writes every file; `clock` when the run is over.
+    pub fn write<C: StoppingCriterion>(&self, session: &Session<C>, clock: Option<Clock>) -> anyhow::Result<()> {
+        let film = session.film();
+        let (width, height) = (film.grid().width(), film.grid().height());
+        let image = film.image();
+        let tiles = tile_states(session);
+
+        // image.exr: what each pixel's tile knows, as channels.
+        let mut spp = vec![0u32; image.len()];
+        let mut probability = vec![f32::NAN; image.len()];
+        let mut stopped = vec![false; image.len()];
+        for (stop, open) in &tiles {
+            for pixel in stop.tile.rows(width).flatten() {
+                spp[pixel] = u32::try_from(stop.samples).unwrap_or(u32::MAX);
+                probability[pixel] = stop.probability.unwrap_or(f32::NAN);
+                stopped[pixel] = !open;
+            }
+        }
+        let (spp, probability, stopped) = (Some(&spp[..]), Some(&probability[..]), Some(&stopped[..]));
+        let layers = RenderLayers { width, height, rgb: &image, spp, probability, stopped };
+        write_exr(self.folder.join("image.exr"), &layers)?;
+
+        // image.png and stops.png: as the oracle saw it.
+        let display = session.display().copied().unwrap_or_else(|| session.params().tone_mapping.settle(&image));
+        let encoded: Vec<Rgb> = image.iter().map(|&p| display.encode(p)).collect();
+        write_png(self.folder.join("image.png"), width, height, &heat_map::to_bytes(&encoded))?;
+        let map = heat_map::draw(width, &encoded, &marks(&tiles), &scale(&tiles));
+        write_png(self.folder.join("stops.png"), map.width, map.height, &map.bytes)?;
+
+        self.write_stops(&tiles)?;
+        self.write_timeline()?;
+        self.write_report(session, &tiles, &display, clock)
+    }
+
+    fn write_stops(&self, tiles: &[(Stop, bool)]) -> anyhow::Result<()> {
+        write_csv(&self.folder.join("stops.csv"), tiles.iter().map(|(stop, open)| {
+            let noisefloor::Tile { index, x, y, width, height } = stop.tile;
+            let reason = if *open { "open".into() } else { stop.reason.to_string() };
+            StopRow { tile: index, x, y, width, height, spp: stop.samples, probability: stop.probability, reason }
+        }))
+    }
+
+    fn write_timeline(&self) -> anyhow::Result<()> {
+        write_csv(&self.folder.join("timeline.csv"), self.timeline.iter())
+    }
+
+    fn write_report<C: StoppingCriterion>(
+        &self,
+        session: &Session<C>,
+        tiles: &[(Stop, bool)],
+        display: &Display,
+        clock: Option<Clock>,
+    ) -> anyhow::Result<()> {
+        let grid = session.film().grid();
+        let mut stops = BTreeMap::new();
+        for (stop, open) in tiles {
+            *stops.entry(if *open { "open".to_owned() } else { stop.reason.to_string() }).or_insert(0) += 1;
+        }
+        let report = Report {
+            noisefloor: env!("CARGO_PKG_VERSION"),
+            scene: &self.scene,
+            width: grid.width(),
+            height: grid.height(),
+            seed: self.seed,
+            criterion: session.criterion().name(),
+            model: self.model.as_deref(),
+            params: session.params(),
+            exposure: session.display().map(|_| display.exposure()),
+            complete: clock.is_some() && tiles.iter().all(|(_, open)| !open),
+            tiles: tiles.len(),
+            stops,
+            samples: session.film().total_samples(),
+            samples_uniform: uniform_samples(session),
+            samples_rejected: session.film().rejected(),
+            seconds_source: clock.map(|c| c.source_seconds),
+            seconds_oracle: clock.map(|c| c.criterion_seconds),
+            seconds_total: clock.map(|c| c.total_seconds),
+            rel_mse: self.timeline.last().and_then(|row| row.rel_mse),
+        };
+        write_json(&self.folder.join("report.json"), &report)
+    }
+
+    /// A few lines for people.
+    pub fn summarise<C: StoppingCriterion>(&self, session: &Session<C>, clock: Clock) {
+        let film = session.film();
+        let spp: Vec<u64> = session.stops().map(|s| s.samples).collect();
+        let converged = session.stops().filter(|s| s.reason == StopReason::Converged).count();
+        let (least, most) = (spp.iter().min().unwrap_or(&0), spp.iter().max().unwrap_or(&0));
+        let pixels = (film.grid().width() * film.grid().height()) as f64;
+        let share = film.total_samples() as f64 / uniform_samples(session).max(1) as f64;
+        println!(
+            "{converged} of {} tiles converged, after {least} to {most} samples per pixel ({:.0} on average: {:.0} % of uniform \
+             rendering at {most})",
+            spp.len(),
+            film.total_samples() as f64 / pixels,
+            100.0 * share,
+        );
+        println!(
+            "{:.1} s, of which {:.2} s ({:.2} %) in the oracle",
+            clock.total_seconds,
+            clock.criterion_seconds,
+            100.0 * clock.criterion_seconds / clock.total_seconds.max(1e-9),
+        );
+        if film.rejected() > 0 {
+            println!("{} samples were not finite and were kept out", film.rejected());
+        }
+        println!("written to {}", self.folder.display());
+    }
+}
+
+fn uniform_samples<C: StoppingCriterion>(session: &Session<C>) -> u64 {
+    let grid = session.film().grid();
+    let most = (0..grid.len()).map(|t| session.film().samples(t)).max().unwrap_or(0);
+    most * (grid.width() * grid.height()) as u64
+}
+
+/// Each tile's stop, or its state now and `true` if it is still open.
+fn tile_states<C: StoppingCriterion>(session: &Session<C>) -> Vec<(Stop, bool)> {
+    let stops: BTreeMap<usize, Stop> = session.stops().map(|s| (s.tile.index, s)).collect();
+    let state = |tile: noisefloor::Tile| match stops.get(&tile.index) {
+        Some(&stop) => (stop, false),
+        None => {
+            let probability = session.verdict(tile.index).and_then(|v| v.probability);
+            let samples = session.film().samples(tile.index);
+            (Stop { tile, samples, probability, reason: StopReason::Cancelled }, true)
+        }
+    };
+    session.film().grid().tiles().map(state).collect()
+}
+
+fn marks(tiles: &[(Stop, bool)]) -> Vec<Mark> {
+    let label = |stop: &Stop, open: bool| format!("{}{}", stop.samples, if open { "+" } else { "" });
+    tiles
+        .iter()
+        .map(|(stop, open)| Mark { tile: stop.tile, value: stop.samples as f64, label: label(stop, *open) })
+        .collect()
+}
+
+fn scale(tiles: &[(Stop, bool)]) -> Scale {
+    let spp = || tiles.iter().map(|(stop, _)| stop.samples.max(1) as f64);
+    let (low, high) = (spp().fold(f64::INFINITY, f64::min), spp().fold(1.0, f64::max));
+    Scale { title: "samples\nper pixel", low, high, log: true, colours: colorous::VIRIDIS }
+}
+
+/// Writes rows as CSV, atomically.
+pub fn write_csv<T: Serialize>(path: &Path, rows: impl Iterator<Item = T>) -> anyhow::Result<()> {
+    write_atomic(path, |to| {
+        let mut csv = csv::Writer::from_writer(to);
+        for row in rows {
+            csv.serialize(row)?;
+        }
+        csv.flush().map_err(csv::Error::from)
+    })?;
+    Ok(())
+}
+
+/// Writes JSON, atomically.
+pub fn write_json(path: &Path, value: &impl Serialize) -> anyhow::Result<()> {
+    write_atomic(path, |to| serde_json::to_writer_pretty(to, value))?;
+    Ok(())
+}

@@ -1,0 +1,114 @@
+//! `noisefloor render`.
+
+use crate::INTERRUPTED;
+use crate::args::{CriterionChoice, RenderArgs};
+use crate::output::{Output, RelMse};
+use anyhow::{Context, bail};
+use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressStyle};
+use noisefloor::{Driver, Event, FixedSamples, Params, Progress, ProgressiveSource, Session, StopReason, StoppingCriterion};
+use noisefloor_ptwne::{Options, Ptwne, scenes};
+use std::num::NonZeroUsize;
+use std::process::ExitCode;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+pub fn run(args: &RenderArgs) -> anyhow::Result<ExitCode> {
+    // Whatever can be wrong is found before anything is rendered.
+    let params = args.params()?;
+    let (width, height) = args.size;
+    let scene = scenes::by_name(&args.scene)
+        .with_context(|| format!("there is no built-in scene {:?}; `noisefloor scenes` lists them", args.scene))?;
+    let rel_mse = args.against.as_deref().map(|path| RelMse::load(path, args.size)).transpose()?;
+    if let Some(threads) = args.threads {
+        rayon::ThreadPoolBuilder::new().num_threads(threads).build_global().context("--threads")?;
+    }
+    let options = Options {
+        seed: args.seed,
+        max_depth: args.max_depth,
+        mis: !args.no_mis,
+        threads: args.threads.and_then(NonZeroUsize::new),
+        ..Options::default()
+    };
+    let source = Ptwne::new(scene, width, height, options)?;
+    match args.criterion {
+        CriterionChoice::Oracle => {
+            let oracle = args.oracle.load()?;
+            let digest = Some(oracle.model().digest());
+            let output = Output::create(args, digest, rel_mse)?;
+            drive(Driver::new(source, oracle, params)?, args, output)
+        }
+        CriterionChoice::Fixed(samples) => {
+            let params = Params { max_samples: params.max_samples.max(samples), ..params };
+            let output = Output::create(args, None, rel_mse)?;
+            drive(Driver::new(source, FixedSamples(samples), params)?, args, output)
+        }
+    }
+}
+
+fn drive<S: ProgressiveSource, C: StoppingCriterion>(
+    mut driver: Driver<S, C>,
+    args: &RenderArgs,
+    mut output: Output,
+) -> anyhow::Result<ExitCode> {
+    driver.set_time_limit(args.time);
+    cancel_on_signal(driver.cancel_flag())?;
+    let bar = progress_bar(args.quiet);
+    let autosave = Duration::try_from_secs_f64(args.autosave).context("--autosave")?;
+    let mut saved = Instant::now();
+    let mut unsaved: Option<anyhow::Error> = None;
+
+    // Render. A failure to save along the way is told at once, and rendering goes on: the disk may have room again.
+    let outcome = driver.run(|session, event| {
+        if let Event::BatchDone(progress) = event {
+            output.record(session, progress);
+            show(&bar, session, progress);
+            if !autosave.is_zero() && saved.elapsed() >= autosave {
+                unsaved = output.write(session, None).err();
+                if let Some(error) = &unsaved {
+                    bar.println(format!("warning: not saved: {}", crate::one_line(error)));
+                }
+                saved = Instant::now();
+            }
+        }
+    });
+    bar.finish_and_clear();
+
+    // Write what there is, also after a failure.
+    output.write(driver.session(), Some(driver.clock()))?;
+    outcome?;
+    if !args.quiet {
+        output.summarise(driver.session(), driver.clock());
+    }
+    let cancelled = driver.session().stops().any(|s| s.reason == StopReason::Cancelled);
+    Ok(if cancelled { ExitCode::from(INTERRUPTED) } else { ExitCode::SUCCESS })
+}
+
+/// The first signal asks the driver to end; a second one ends the process at once.
+fn cancel_on_signal(cancel: Arc<AtomicBool>) -> anyhow::Result<()> {
+    ctrlc::set_handler(move || {
+        if cancel.swap(true, Ordering::Relaxed) {
+            std::process::exit(i32::from(INTERRUPTED));
+        }
+        eprintln!("\nstopping after this batch; what is there will be written (again to quit at once)");
+    })
+    .context("the handler for Ctrl-C could not be set")
+}
+
+fn progress_bar(quiet: bool) -> ProgressBar {
+    let target = if quiet { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() };
+    let style = ProgressStyle::with_template("{bar:32} {pos}/{len} tiles done  {elapsed_precise}  {msg}");
+    let bar = ProgressBar::with_draw_target(Some(0), target);
+    style.map(|style| bar.clone().with_style(style)).unwrap_or(bar)
+}
+
+fn show<C: StoppingCriterion>(bar: &ProgressBar, session: &Session<C>, progress: &Progress) {
+    let pixels = (session.film().grid().width() * session.film().grid().height()) as f64;
+    let eta = match progress.eta_seconds {
+        Some(seconds) => format!("about {} to go", HumanDuration(Duration::from_secs_f64(seconds.clamp(0.0, 1e9)))),
+        None => "no estimate yet".into(),
+    };
+    bar.set_length(progress.tiles as u64);
+    bar.set_position((progress.tiles - progress.now.active_tiles) as u64);
+    bar.set_message(format!("{:.0} spp on average, {eta}", progress.now.samples as f64 / pixels));
+}

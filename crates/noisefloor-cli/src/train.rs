@@ -1,0 +1,112 @@
+//! `noisefloor train`, and what it shares with `evaluate`.
+
+use crate::args::{DataArgs, SearchArgs, TrainArgs};
+use anyhow::{Context, bail};
+use indicatif::{ProgressBar, ProgressStyle};
+use noisefloor::evaluation::{Prediction, Table, score};
+use noisefloor::training::{TrainParams, leave_one_scene_out, train};
+use noisefloor::{Descriptor, NoiseMask, SvmParams};
+use noisefloor_exr::table::{describe_corpora, read_table, write_table};
+use noisefloor_exr::write_atomic;
+use std::fs::File;
+use std::io::BufReader;
+
+pub fn run(args: &TrainArgs) -> anyhow::Result<()> {
+    let params = search(&args.search)?;
+    let table = load_table(&args.data, &args.search)?;
+    if let Some(path) = &args.save_table {
+        write_atomic(path, |to| write_table(&table, to))?;
+        eprintln!("table of {} zones written to {}", table.zones.len(), path.display());
+    }
+
+    // Scores on scenes left out, where there are enough to leave one out and still choose among the others.
+    let scores = if args.no_scores || table.groups().len() < 3 {
+        None
+    } else {
+        let predictions = held_out(&table, &params, noisefloor::DEFAULT_THRESHOLD)?;
+        Some(score(predictions.iter()))
+    };
+    let corpus = match &args.data.table {
+        Some(path) => path.display().to_string(),
+        None => args.data.corpus.iter().map(|p| p.display().to_string()).collect::<Vec<_>>().join(", "),
+    };
+    eprintln!("training on all scenes");
+    let model = train(&table, &params, corpus, scores)?;
+    write_atomic(&args.out, |to| model.write(to))?;
+
+    println!(
+        "{} support vectors of {} examples, C = {}, γ = {}; written to {}",
+        model.svm.coefficients.len(),
+        model.record.examples,
+        model.record.c,
+        model.record.gamma,
+        args.out.display()
+    );
+    if let Some(s) = scores {
+        println!(
+            "on left-out scenes: error factor {:.3}, bias factor {:.3}, {:.1} % of {} zones stopped below half",
+            s.error_factor,
+            s.bias_factor,
+            100.0 * s.early_share,
+            s.zones
+        );
+    }
+    Ok(())
+}
+
+/// Predictions on left-out scenes, with a bar.
+pub fn held_out(table: &Table, params: &TrainParams, threshold: f32) -> anyhow::Result<Vec<Prediction>> {
+    let bar = bar(table.groups().len() as u64, "scenes left out");
+    let mut begun = false;
+    let predictions = leave_one_scene_out(table, params, threshold, |group| {
+        if begun {
+            bar.inc(1);
+        }
+        begun = true;
+        bar.set_message(group.to_owned());
+    })?;
+    bar.finish_and_clear();
+    Ok(predictions)
+}
+
+fn bar(len: u64, what: &'static str) -> ProgressBar {
+    let style = ProgressStyle::with_template("{bar:32} {pos}/{len} {prefix}  {elapsed_precise}, {eta} to go  {msg}");
+    let bar = ProgressBar::new(len).with_prefix(what);
+    style.map(|style| bar.clone().with_style(style)).unwrap_or(bar)
+}
+
+/// The table that was asked for: read, or computed from pictures.
+pub fn load_table(data: &DataArgs, search: &SearchArgs) -> anyhow::Result<Table> {
+    let mask = NoiseMask::try_from(search.sigma).context("--sigma")?;
+    if let Some(path) = &data.table {
+        let file = File::open(path).with_context(|| format!("{}: cannot be opened", path.display()))?;
+        return read_table(BufReader::new(file)).with_context(|| format!("{}", path.display()));
+    }
+    let bar = bar(0, "zones described");
+    let table = describe_corpora(&data.corpus, Descriptor::Compact { mask }, |done, all| {
+        bar.set_length(all as u64);
+        bar.set_position(done as u64);
+    })?;
+    bar.finish_and_clear();
+    Ok(table)
+}
+
+/// How to train, checked.
+pub fn search(args: &SearchArgs) -> anyhow::Result<TrainParams> {
+    let mut params = TrainParams::default();
+    let given = |values: &[f64], default: fn(&SvmParams) -> f64| -> Vec<f64> {
+        if !values.is_empty() {
+            return values.to_vec();
+        }
+        let mut all: Vec<f64> = TrainParams::default().candidates.iter().map(default).collect();
+        all.sort_by(f64::total_cmp);
+        all.dedup();
+        all
+    };
+    let (cs, gammas) = (given(&args.c, |p| p.c), given(&args.gamma, |p| p.gamma));
+    if let Some(bad) = cs.iter().chain(&gammas).find(|v| !(v.is_finite() && **v > 0.0)) {
+        bail!("C and γ must be positive numbers, not {bad}");
+    }
+    params.candidates = cs.iter().flat_map(|&c| gammas.iter().map(move |&gamma| SvmParams { c, gamma })).collect();
+    Ok(params)
+}
