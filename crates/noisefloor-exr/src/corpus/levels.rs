@@ -1,0 +1,197 @@
+//! The images of zones, cut out with an apron.
+
+use super::{Zone, ZoneImages};
+use crate::decode_exr::read_exr;
+use crate::error::{CorpusError, StackError};
+use crate::frames::{self, Frame};
+use crate::picture::{Picture, read_picture};
+use noisefloor::Rgb;
+use std::collections::VecDeque;
+
+/// Widest border around a zone, in pixels, for filters that read across it.
+pub const APRON: usize = 8;
+
+/// What the numbers of a patch mean.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Encoding {
+    /// sRGB-encoded, 0…1: what the observer's display got.
+    Display,
+    /// Linear radiance, Rec.709.
+    Linear,
+}
+
+/// The zone inside a patch, in pixels of the patch.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Inner {
+    /// Left edge.
+    pub x: usize,
+    /// Top edge.
+    pub y: usize,
+    /// Width.
+    pub width: usize,
+    /// Height.
+    pub height: usize,
+}
+
+/// A zone's pixels, and up to [`APRON`] pixels around them where the image has any.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Patch {
+    /// Width with apron, in pixels.
+    pub width: usize,
+    /// Height with apron, in pixels.
+    pub height: usize,
+    /// Row-major, `width * height` values.
+    pub pixels: Vec<Rgb>,
+    /// The zone itself.
+    pub inner: Inner,
+}
+
+impl Patch {
+    /// The zone's own pixels, row-major, without the apron.
+    pub fn inner_pixels(&self) -> impl Iterator<Item = Rgb> {
+        let Inner { x, y, width, height } = self.inner;
+        (y..y + height).flat_map(move |row| self.pixels[row * self.width + x..][..width].iter().copied())
+    }
+}
+
+/// One real image of one zone: the mean of its samples `first`+1…`last`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Level {
+    /// Scene name.
+    pub scene: String,
+    /// The zone's number in the scene.
+    pub zone: u32,
+    /// Samples per pixel before the first one in this image: 0 for a running mean.
+    pub first: u64,
+    /// Cumulative samples per pixel with this image.
+    pub last: u64,
+    /// What the numbers mean: display values for a PNG, linear for an EXR.
+    pub encoding: Encoding,
+    /// The pixels.
+    pub patch: Patch,
+}
+
+/// An iterator over images of zones that decodes each image once, when it is needed. Ends after the first error.
+#[derive(Debug)]
+pub struct Levels<'a> {
+    jobs: VecDeque<Job<'a>>,
+    ready: VecDeque<Level>,
+    /// Size of the images of the stack being read; each stack starts with a job that forgets it.
+    size: Option<(usize, usize)>,
+}
+
+/// An image, and the zones it shows.
+#[derive(Debug)]
+struct Job<'a> {
+    starts_stack: bool,
+    batch: bool,
+    frame: Frame,
+    zones: Vec<&'a Zone>,
+}
+
+/// Every real image of one zone, samples ascending. For all zones of a scene,
+/// [`Corpus::scene_levels`](super::Corpus::scene_levels) decodes each shared image once instead of once a zone.
+///
+/// # Errors
+/// [`CorpusError::Stack`] if the zone's folder cannot be listed.
+pub fn zone_levels(zone: &Zone) -> Result<Levels<'_>, CorpusError> {
+    Levels::of(&[zone])
+}
+
+impl<'a> Levels<'a> {
+    pub(super) fn of(zones: &[&'a Zone]) -> Result<Self, CorpusError> {
+        let mut jobs = VecDeque::new();
+        let mut left = zones.to_vec();
+        while let Some(stack) = left.first().map(|zone| &zone.stack) {
+            // All zones that share a stack, together
+            let (sharing, rest): (Vec<&Zone>, Vec<&Zone>) =
+                left.iter().partition(|zone| zone.stack == *stack);
+            let (batch, frames) = match stack {
+                ZoneImages::RunningMeans(dir) => (false, frames::running_means(dir)?),
+                ZoneImages::Batches(dir) => (true, frames::batches(dir)?),
+            };
+            jobs.extend(frames.into_iter().enumerate().map(|(i, frame)| Job {
+                starts_stack: i == 0,
+                batch,
+                frame,
+                zones: sharing.clone(),
+            }));
+            left = rest;
+        }
+        Ok(Self { jobs, ready: VecDeque::new(), size: None })
+    }
+
+    fn run(&mut self, job: &Job<'a>) -> Result<(), CorpusError> {
+        let path = &job.frame.path;
+        let picture = if job.batch { read_exr(path).map(Picture::Linear) } else { read_picture(path) }
+            .map_err(StackError::from)?;
+
+        // All images of a stack have one size
+        let (width, height) = picture.size();
+        if job.starts_stack {
+            self.size = None;
+        }
+        let (w, h) = *self.size.get_or_insert((width, height));
+        if (w, h) != (width, height) {
+            let (path, got_width, got_height) = (path.clone(), width, height);
+            return Err(StackError::Size { path, width: w, height: h, got_width, got_height }.into());
+        }
+
+        let (encoding, pixels) = match &picture {
+            Picture::Linear(image) => (Encoding::Linear, &image.pixels),
+            Picture::Display(image) => (Encoding::Display, &image.pixels),
+        };
+        for zone in &job.zones {
+            // A batch is the zone alone
+            let (x, y) = if job.batch { (0, 0) } else { (zone.x, zone.y) };
+            let (exact, inside) = (
+                (zone.width, zone.height) == (w, h),
+                x.saturating_add(zone.width) <= w && y.saturating_add(zone.height) <= h,
+            );
+            if !inside || job.batch && !exact {
+                let (path, scene) = (path.clone(), zone.scene.clone());
+                return Err(CorpusError::Zone { path, scene, zone: zone.zone, width, height });
+            }
+            self.ready.push_back(Level {
+                scene: zone.scene.clone(),
+                zone: zone.zone,
+                first: if job.batch { job.frame.first } else { 0 },
+                last: job.frame.last,
+                encoding,
+                patch: cut(pixels, (w, h), Inner { x, y, width: zone.width, height: zone.height }),
+            });
+        }
+        Ok(())
+    }
+}
+
+impl Iterator for Levels<'_> {
+    type Item = Result<Level, CorpusError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        while self.ready.is_empty() {
+            let job = self.jobs.pop_front()?;
+            if let Err(e) = self.run(&job) {
+                self.jobs.clear();
+                self.ready.clear();
+                return Some(Err(e));
+            }
+        }
+        self.ready.pop_front().map(Ok)
+    }
+}
+
+/// The rectangle and its apron, clipped to an image of the size given.
+fn cut(pixels: &[Rgb], (width, height): (usize, usize), zone: Inner) -> Patch {
+    let (left, top) = (zone.x.saturating_sub(APRON), zone.y.saturating_sub(APRON));
+    let right = (zone.x + zone.width + APRON).min(width);
+    let bottom = (zone.y + zone.height + APRON).min(height);
+    Patch {
+        width: right - left,
+        height: bottom - top,
+        pixels: (top..bottom)
+            .flat_map(|y| pixels[y * width + left..y * width + right].iter().copied())
+            .collect(),
+        inner: Inner { x: zone.x - left, y: zone.y - top, ..zone },
+    }
+}

@@ -1,0 +1,142 @@
+//! Thresholds that observers gave, and the images they judged.
+//!
+//! A corpus is a folder with `thresholds.csv` (columns scene, renderer, zone, x, y, width, height, human_spp, first_spp,
+//! last_spp; one line a zone, in any order of columns) and one of two layouts:
+//! - a folder a scene, named as in the table, with running means named by samples per pixel (`<scene>/00100.png`), for any
+//!   number of scenes; zones are rectangles of these images;
+//! - a folder a zone (`zone07/batch_00060_00100.exr`) with batch means, for one scene; an image is the zone alone, and x, y say
+//!   where it lay in the full picture.
+
+mod levels;
+mod table;
+
+pub use levels::{APRON, Encoding, Inner, Level, Levels, Patch, zone_levels};
+
+use crate::error::CorpusError;
+use crate::frames;
+use std::path::{Path, PathBuf};
+
+/// A threshold at or above this many samples per pixel is censored: observers were offered no more.
+pub const CENSORED_SPP: f64 = 10_000.0;
+
+/// Where the images of a zone are.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum ZoneImages {
+    /// A folder of running means of the whole scene, shared by all its zones.
+    RunningMeans(PathBuf),
+    /// A folder of batch means of this zone alone.
+    Batches(PathBuf),
+}
+
+/// One zone of a scene, and the threshold observers gave for it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Zone {
+    /// Scene name.
+    pub scene: String,
+    /// Who rendered the images.
+    pub renderer: String,
+    /// Row-major number of the zone in the scene.
+    pub zone: u32,
+    /// Left edge in the full picture, in pixels.
+    pub x: usize,
+    /// Top edge in the full picture, in pixels.
+    pub y: usize,
+    /// Width in pixels.
+    pub width: usize,
+    /// Height in pixels.
+    pub height: usize,
+    /// Mean samples per pixel at which observers could no longer tell the zone from the reference; positive.
+    pub human_spp: f64,
+    /// Whether `human_spp` is only a lower bound: it is at least [`CENSORED_SPP`], or at least `last_spp`. Keep it out of means.
+    pub censored: bool,
+    /// Samples per pixel of the least converged image observers could choose.
+    pub first_spp: u64,
+    /// Samples per pixel of the most converged image observers could choose. Not all images up to it need be here.
+    pub last_spp: u64,
+    /// Where its images are.
+    pub stack: ZoneImages,
+}
+
+/// A corpus: zones with thresholds, in the order of the table.
+#[derive(Clone, Debug)]
+pub struct Corpus {
+    zones: Vec<Zone>,
+}
+
+impl Corpus {
+    /// Reads `thresholds.csv` and checks that the images of every zone are there, by name; opens none of them.
+    ///
+    /// # Errors
+    /// [`CorpusError`] with the line of a malformed row, or with the name of what is missing, doubled, or leaves a gap.
+    pub fn open(dir: impl AsRef<Path>) -> Result<Self, CorpusError> {
+        let dir = dir.as_ref();
+        let rows = table::read(&dir.join("thresholds.csv"))?;
+        let mut zones: Vec<Zone> = Vec::with_capacity(rows.len());
+        for row in rows {
+            let stack = images(dir, &row.scene, row.zone)?;
+
+            // Zone folders carry no scene name: one scene only. Scene folders are checked once a scene
+            let same = zones.iter().rev().find(|zone| zone.stack == stack);
+            match &stack {
+                ZoneImages::Batches(folder) => {
+                    let other = |zone: &&Zone| {
+                        matches!(zone.stack, ZoneImages::Batches(_)) && zone.scene != row.scene
+                    };
+                    if let Some(other) = zones.iter().find(other) {
+                        let (one, other) = (other.scene.clone(), row.scene);
+                        return Err(CorpusError::Scenes { dir: dir.to_owned(), one, other });
+                    }
+                    frames::batches(folder)?;
+                }
+                ZoneImages::RunningMeans(folder) if same.is_none() => {
+                    frames::running_means(folder)?;
+                }
+                ZoneImages::RunningMeans(_) => {}
+            }
+            zones.push(row.into_zone(stack));
+        }
+        Ok(Self { zones })
+    }
+
+    /// All zones, in the order of the table; at least one.
+    pub fn zones(&self) -> &[Zone] {
+        &self.zones
+    }
+
+    /// Names of the scenes, each once, in the order of the table.
+    pub fn scenes(&self) -> Vec<&str> {
+        let mut scenes: Vec<&str> = Vec::new();
+        for zone in &self.zones {
+            if !scenes.contains(&zone.scene.as_str()) {
+                scenes.push(&zone.scene);
+            }
+        }
+        scenes
+    }
+
+    /// Every real image of every zone of a scene, each image decoded once however many zones share it. Running means come
+    /// image by image, batches zone by zone, samples ascending.
+    ///
+    /// # Errors
+    /// [`CorpusError::Unknown`] if there is no such scene, [`CorpusError::Stack`] if its folders have changed since.
+    pub fn scene_levels(&self, scene: &str) -> Result<Levels<'_>, CorpusError> {
+        let zones: Vec<&Zone> = self.zones.iter().filter(|zone| zone.scene == scene).collect();
+        if zones.is_empty() {
+            return Err(CorpusError::Unknown { scene: scene.to_owned(), known: self.scenes().join(", ") });
+        }
+        Levels::of(&zones)
+    }
+}
+
+/// Where the images of a zone are: the scene's folder, or the zone's.
+fn images(dir: &Path, scene: &str, zone: u32) -> Result<ZoneImages, CorpusError> {
+    let of_scene = dir.join(scene);
+    let of_zone = dir.join(format!("zone{zone:02}"));
+    if of_scene.is_dir() {
+        Ok(ZoneImages::RunningMeans(of_scene))
+    } else if of_zone.is_dir() {
+        Ok(ZoneImages::Batches(of_zone))
+    } else {
+        Err(CorpusError::NoImages { dir: dir.to_owned(), scene: scene.to_owned(), zone, of_scene, of_zone })
+    }
+}

@@ -1,0 +1,242 @@
+//! EXR to linear RGB.
+//!
+//! Built on the block layer of the `exr` crate rather than on its image layer: so the size of every part is checked between
+//! header and pixels, only blocks of the part wanted are decoded, and the data window can be placed in the display window.
+
+use crate::error::PictureError;
+use crate::picture::{Format, LinearImage, Opened, check_size, guarded};
+use exr::block::UncompressedBlock;
+use exr::block::reader::ChunksReader;
+use exr::meta::attribute::SampleType;
+use exr::meta::header::Header;
+use exr::prelude::f16;
+use noisefloor::Rgb;
+use std::collections::HashSet;
+use std::path::Path;
+
+/// Largest block (tile or group of scan lines, all channels) that is decompressed, in bytes.
+const MAX_BLOCK_BYTES: usize = 1 << 30;
+/// Most channels named in an error message.
+const NAMES_SHOWN: usize = 20;
+
+/// Reads the colours of an EXR: 16- or 32-bit floats, or unsigned integers, in any compression the `exr` crate reads.
+///
+/// Of several parts and layers, the first that has R, G and B is read: in each part the unnamed one, then one named
+/// `Combined` (as in `ViewLayer.Combined.R`), then the first in alphabetical order. Without any, an unnamed Y alone is read as
+/// grey. Other channels, alpha among them, are left out; colour is as stored, that is premultiplied.
+///
+/// The picture is the display window. Where the data window is smaller, pixels are black; where it is larger (overscan), it is
+/// cropped. Of mip maps, the full resolution is read. Non-finite values are kept. Chromaticities are taken for Rec.709.
+///
+/// # Errors
+/// [`PictureError`] if the file is not an EXR, too long, too large (known from the header), broken, has no colour channels, or
+/// holds deep or subsampled pixels.
+pub fn read_exr(path: impl AsRef<Path>) -> Result<LinearImage, PictureError> {
+    let path = path.as_ref();
+    let opened = Opened::open(path)?;
+    if opened.format != Format::Exr {
+        return Err(opened.foreign(path, "an OpenEXR file"));
+    }
+    decode(path, opened)
+}
+
+pub(crate) fn decode(path: &Path, opened: Opened) -> Result<LinearImage, PictureError> {
+    guarded(path, "EXR", || decode_unguarded(path, opened))
+}
+
+fn decode_unguarded(path: &Path, opened: Opened) -> Result<LinearImage, PictureError> {
+    let broken = |reason: String| PictureError::Broken { path: path.to_owned(), format: "EXR", reason };
+
+    // Headers: which part, which channels, how large
+    let reader = exr::block::read(opened.reader, false).map_err(|e| broken(e.to_string()))?;
+    let choice = choose(path, reader.headers())?;
+    let part = reader.headers()[choice.part].clone();
+    check_part(path, &part)?;
+    let blocks = reader.headers().iter().try_fold(0usize, |sum, h| sum.checked_add(h.chunk_count));
+    if blocks.and_then(|n| n.checked_mul(8)).is_none_or(|table| table as u64 > opened.bytes) {
+        return Err(broken(format!("{} bytes cannot hold as many blocks as the header says", opened.bytes)));
+    }
+    let window = Window::of(path, &part)?;
+
+    // Pixels start black, where memory for them is to be had
+    let refused =
+        |_| PictureError::Memory { path: path.to_owned(), width: window.width, height: window.height };
+    Vec::<Rgb>::new().try_reserve_exact(window.width * window.height).map_err(refused)?;
+    let mut pixels = vec![[0.0; 3]; window.width * window.height];
+
+    // Blocks, one after another in this thread: a panic of a decoder in a thread pool would end the process
+    let wanted =
+        move |block: exr::block::BlockIndex| block.layer == choice.part && block.level.0 + block.level.1 == 0;
+    let chunks =
+        reader.filter_chunks(false, |_, _, block| wanted(block)).map_err(|e| broken(e.to_string()))?;
+    let mut decompressor = chunks.sequential_decompressor(false);
+    let (mut seen, mut area) = (HashSet::new(), 0);
+    while let Some(block) = decompressor.decompress_next_block() {
+        let block = block.map_err(|e| broken(e.to_string()))?;
+        if wanted(block.index) && seen.insert((block.index.pixel_position.0, block.index.pixel_position.1)) {
+            area += block.index.pixel_size.area();
+            place(&block, &part, choice.channels, &window, &mut pixels).map_err(|e| broken(e.to_string()))?;
+        }
+    }
+    if area != part.layer_size.area() {
+        return Err(broken(format!("{area} of {} pixels are there", part.layer_size.area())));
+    }
+    Ok(LinearImage { width: window.width, height: window.height, pixels })
+}
+
+/// A part of the file, and the places of R, G and B in its list of channels.
+#[derive(Clone, Copy)]
+struct Choice {
+    part: usize,
+    channels: [usize; 3],
+}
+
+fn choose(path: &Path, parts: &[Header]) -> Result<Choice, PictureError> {
+    let names: Vec<Vec<String>> =
+        parts.iter().map(|part| part.channels.list.iter().map(|c| c.name.to_string()).collect()).collect();
+
+    // Colour, then grey
+    let colour = names.iter().enumerate().find_map(|(part, names)| {
+        let [r, g, b] = layers(names).into_iter().find_map(|layer| {
+            let at = |channel: &str| names.iter().position(|name| *name == format!("{layer}{channel}"));
+            Some([at("R")?, at("G")?, at("B")?])
+        })?;
+        Some(Choice { part, channels: [r, g, b] })
+    });
+    let grey = || {
+        names.iter().enumerate().find_map(|(part, names)| {
+            // With chroma or as one of three coordinates, Y alone is not the picture
+            let alone = !names.iter().any(|name| ["RY", "BY", "X", "Z"].contains(&name.as_str()));
+            let y = names.iter().position(|name| name == "Y").filter(|_| alone)?;
+            Some(Choice { part, channels: [y; 3] })
+        })
+    };
+
+    colour.or_else(grey).ok_or_else(|| {
+        let all: Vec<&str> = names.iter().flatten().map(String::as_str).collect();
+        let missing: Vec<&str> = ["R", "G", "B"].into_iter().filter(|name| !all.contains(name)).collect();
+        let missing =
+            if missing.is_empty() { "R, G and B in one part".to_owned() } else { missing.join(", ") };
+        let found = match all.len() {
+            0 => "none".to_owned(),
+            n => all[..n.min(NAMES_SHOWN)].join(", ") + if n > NAMES_SHOWN { ", …" } else { "" },
+        };
+        PictureError::Channels { path: path.to_owned(), missing, found }
+    })
+}
+
+/// Prefixes of layers with a red channel, the likeliest picture first; the unnamed layer is the empty prefix.
+fn layers(names: &[String]) -> Vec<&str> {
+    let mut layers: Vec<&str> = names
+        .iter()
+        .filter_map(|n| n.strip_suffix('R'))
+        .filter(|l| l.is_empty() || l.ends_with('.'))
+        .collect();
+    layers.sort_by_key(|layer| {
+        (!layer.is_empty(), !(*layer == "Combined." || layer.ends_with(".Combined.")), *layer)
+    });
+    layers
+}
+
+fn check_part(path: &Path, part: &Header) -> Result<(), PictureError> {
+    let unsupported = |what, advice| Err(PictureError::Unsupported { path: path.to_owned(), what, advice });
+    if part.deep {
+        return unsupported("deep pixels are not read", "flatten the image");
+    }
+    if part.channels.list.iter().any(|channel| channel.sampling.0 != 1 || channel.sampling.1 != 1) {
+        return unsupported("subsampled channels are not read", "save every channel at full resolution");
+    }
+    check_size(path, part.layer_size.width(), part.layer_size.height())?;
+    let block = part.max_block_pixel_size();
+    let pixels = block.width().min(part.layer_size.width()) * block.height().min(part.layer_size.height());
+    match pixels.checked_mul(part.channels.bytes_per_pixel) {
+        Some(bytes) if bytes <= MAX_BLOCK_BYTES => Ok(()),
+        _ => unsupported(
+            "one of its tiles takes more than 1 GiB",
+            "save it in smaller tiles or with fewer channels",
+        ),
+    }
+}
+
+/// The display window, and where in it the data window starts.
+struct Window {
+    width: usize,
+    height: usize,
+    x: i64,
+    y: i64,
+}
+
+impl Window {
+    fn of(path: &Path, part: &Header) -> Result<Self, PictureError> {
+        let display = part.shared_attributes.display_window;
+        let (width, height) = (display.size.width(), display.size.height());
+        check_size(path, width, height)?;
+        let at = part.own_attributes.layer_position;
+        let (x, y) = (
+            i64::from(at.0) - i64::from(display.position.0),
+            i64::from(at.1) - i64::from(display.position.1),
+        );
+        let meets = |start: i64, data: usize, shown: usize| start < shown as i64 && start + data as i64 > 0;
+        if !meets(x, part.layer_size.width(), width) || !meets(y, part.layer_size.height(), height) {
+            let what = "its data window lies outside its display window";
+            return Err(PictureError::Unsupported {
+                path: path.to_owned(),
+                what,
+                advice: "save it uncropped",
+            });
+        }
+        Ok(Self { width, height, x, y })
+    }
+}
+
+/// Copies the colours of one block to where the display window shows them.
+fn place(
+    block: &UncompressedBlock,
+    part: &Header,
+    channels: [usize; 3],
+    window: &Window,
+    pixels: &mut [Rgb],
+) -> exr::error::UnitResult {
+    let mut values: Vec<f32> = Vec::new();
+    for line in block.lines(&part.channels) {
+        // Lines of other channels, and lines above or below the window
+        let y = line.location.position.1 as i64 + window.y;
+        if !channels.contains(&line.location.channel) || !(0..window.height as i64).contains(&y) {
+            continue;
+        }
+
+        // Samples of any type as f32
+        values.clear();
+        match part.channels.list[line.location.channel].sample_type {
+            SampleType::F16 => {
+                for v in line.read_samples::<f16>() {
+                    values.push(v?.to_f32());
+                }
+            }
+            SampleType::F32 => {
+                for v in line.read_samples::<f32>() {
+                    values.push(v?);
+                }
+            }
+            SampleType::U32 => {
+                for v in line.read_samples::<u32>() {
+                    values.push(v? as f32);
+                }
+            }
+        }
+
+        // The part of the line inside the window
+        let row = &mut pixels[y as usize * window.width..][..window.width];
+        let x = line.location.position.0 as i64 + window.x;
+        let skip = usize::try_from(-x).unwrap_or(0);
+        let shown = row.iter_mut().skip(usize::try_from(x).unwrap_or(0));
+        for (pixel, value) in shown.zip(values.iter().skip(skip)) {
+            for (colour, channel) in pixel.iter_mut().zip(channels) {
+                if channel == line.location.channel {
+                    *colour = *value;
+                }
+            }
+        }
+    }
+    Ok(())
+}

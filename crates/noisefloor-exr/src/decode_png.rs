@@ -1,0 +1,54 @@
+//! PNG to display values.
+
+use crate::error::PictureError;
+use crate::picture::{DisplayImage, Format, Opened, check_size, guarded};
+use image::codecs::png::PngDecoder;
+use image::{DynamicImage, ImageDecoder, Limits};
+use std::path::Path;
+
+/// Memory for everything in a PNG that is not pixels: rows, profiles, text.
+const MAX_PNG_EXTRA: u64 = 256 << 20;
+/// Most pixels that a byte of a PNG can stand for: deflate packs at best 1032:1, and a pixel has at least one bit.
+const PIXELS_A_BYTE: u64 = 1032 * 8;
+
+/// Reads a PNG as display values: sRGB-encoded RGB in 0…1, 8- or 16-bit codes divided by 255 or 65535.
+///
+/// Grey becomes three equal values, a palette its colours. Alpha is dropped, not composited. Gamma, chromaticity and colour
+/// profile chunks are ignored: values are taken for sRGB. Of an animation, the first picture is read.
+///
+/// # Errors
+/// [`PictureError`] if the file is not a PNG, too long, too large (known from the header) or broken.
+pub fn read_png(path: impl AsRef<Path>) -> Result<DisplayImage, PictureError> {
+    let path = path.as_ref();
+    let opened = Opened::open(path)?;
+    if opened.format != Format::Png {
+        return Err(opened.foreign(path, "a PNG file"));
+    }
+    decode(path, opened)
+}
+
+pub(crate) fn decode(path: &Path, opened: Opened) -> Result<DisplayImage, PictureError> {
+    let broken = |reason: String| PictureError::Broken { path: path.to_owned(), format: "PNG", reason };
+    guarded(path, "PNG", || {
+        // Header: size, and whether the file is long enough to hold so many pixels
+        let mut limits = Limits::no_limits();
+        limits.max_alloc = Some(MAX_PNG_EXTRA);
+        let decoder = PngDecoder::with_limits(opened.reader, limits).map_err(|e| broken(e.to_string()))?;
+        let (width, height) = decoder.dimensions();
+        let (width, height) = (width as usize, height as usize);
+        check_size(path, width, height)?;
+        if (width * height) as u64 > opened.bytes.saturating_mul(PIXELS_A_BYTE) {
+            return Err(broken(format!("{} bytes cannot hold {width}×{height} pixels", opened.bytes)));
+        }
+
+        // Pixels
+        let deep = decoder.color_type().bytes_per_pixel() > decoder.color_type().channel_count();
+        let image = DynamicImage::from_decoder(decoder).map_err(|e| broken(e.to_string()))?;
+        let pixels = if deep {
+            image.into_rgb16().pixels().map(|p| p.0.map(|v| f32::from(v) / 65535.0)).collect()
+        } else {
+            image.into_rgb8().pixels().map(|p| p.0.map(|v| f32::from(v) / 255.0)).collect()
+        };
+        Ok(DisplayImage { width, height, pixels })
+    })
+}

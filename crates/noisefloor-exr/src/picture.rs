@@ -1,0 +1,167 @@
+//! Pictures: linear or display-encoded, told apart by content.
+
+use crate::error::PictureError;
+use noisefloor::{Rgb, check_image};
+use std::fs::File;
+use std::io::{BufReader, Read, Seek};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::Path;
+
+/// Longest file that is read, in bytes: an EXR of [`noisefloor::MAX_PIXELS`] pixels in 32-bit floats, and room to spare.
+pub const MAX_FILE_BYTES: u64 = 1 << 32;
+
+/// Scene-referred picture: linear RGB, Rec.709 primaries, arbitrary scale. Values may be negative or non-finite.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LinearImage {
+    /// Width in pixels.
+    pub width: usize,
+    /// Height in pixels.
+    pub height: usize,
+    /// Row-major, `width * height` values.
+    pub pixels: Vec<Rgb>,
+}
+
+/// Display-referred picture: sRGB-encoded RGB in 0…1, as an observer's monitor got it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DisplayImage {
+    /// Width in pixels.
+    pub width: usize,
+    /// Height in pixels.
+    pub height: usize,
+    /// Row-major, `width * height` values.
+    pub pixels: Vec<Rgb>,
+}
+
+impl DisplayImage {
+    /// The same picture in linear light, by [`srgb_to_linear`]. Values that the display clipped stay at 1: what was above
+    /// is lost. One step of an 8-bit code is up to 0.9 % of full scale in linear light.
+    pub fn to_linear(&self) -> LinearImage {
+        let pixels = self.pixels.iter().map(|rgb| rgb.map(srgb_to_linear)).collect();
+        LinearImage { width: self.width, height: self.height, pixels }
+    }
+}
+
+/// A picture, and what its numbers mean.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Picture {
+    /// From an EXR file.
+    Linear(LinearImage),
+    /// From a PNG file.
+    Display(DisplayImage),
+}
+
+impl Picture {
+    /// Width and height in pixels.
+    pub fn size(&self) -> (usize, usize) {
+        match self {
+            Picture::Linear(image) => (image.width, image.height),
+            Picture::Display(image) => (image.width, image.height),
+        }
+    }
+
+    /// The picture in linear light; a PNG goes through [`DisplayImage::to_linear`].
+    pub fn into_linear(self) -> LinearImage {
+        match self {
+            Picture::Linear(image) => image,
+            Picture::Display(image) => image.to_linear(),
+        }
+    }
+}
+
+/// Reads an EXR or a PNG, whichever the first bytes say it is; the name does not matter.
+///
+/// # Errors
+/// [`PictureError`]: those of [`read_exr`](crate::read_exr) and [`read_png`](crate::read_png), and
+/// [`PictureError::Foreign`] if it is neither.
+pub fn read_picture(path: impl AsRef<Path>) -> Result<Picture, PictureError> {
+    let path = path.as_ref();
+    let opened = Opened::open(path)?;
+    match opened.format {
+        Format::Exr => crate::decode_exr::decode(path, opened).map(Picture::Linear),
+        Format::Png => crate::decode_png::decode(path, opened).map(Picture::Display),
+        _ => Err(opened.foreign(path, "an OpenEXR or PNG file")),
+    }
+}
+
+/// Decodes one sRGB-encoded value (IEC 61966-2-1): 0…1 to linear 0…1. Values below 0 take the straight part.
+pub fn srgb_to_linear(encoded: f32) -> f32 {
+    if encoded <= 0.04045 { encoded / 12.92 } else { ((encoded + 0.055) / 1.055).powf(2.4) }
+}
+
+/// Encodes one linear value as sRGB (IEC 61966-2-1), the inverse of [`srgb_to_linear`]. Not clamped.
+pub fn linear_to_srgb(linear: f32) -> f32 {
+    if linear <= 0.003_130_8 { linear * 12.92 } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 }
+}
+
+/// What the first bytes say.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Format {
+    Exr,
+    Png,
+    Empty,
+    Other,
+}
+
+/// A regular file of bearable length, at its first byte, whose format is known.
+pub(crate) struct Opened {
+    pub(crate) reader: BufReader<File>,
+    pub(crate) bytes: u64,
+    pub(crate) format: Format,
+}
+
+impl Opened {
+    pub(crate) fn open(path: &Path) -> Result<Self, PictureError> {
+        let io = |source| PictureError::Io { path: path.to_owned(), source };
+
+        // A pipe or a device would block or never end: only regular files are opened
+        let meta = std::fs::metadata(path).map_err(io)?;
+        if !meta.is_file() {
+            let (found, wanted) = ("a folder or a device", "a regular file");
+            return Err(PictureError::Foreign { path: path.to_owned(), found, wanted });
+        }
+        let bytes = meta.len();
+        if bytes > MAX_FILE_BYTES {
+            return Err(PictureError::Long { path: path.to_owned(), bytes, limit: MAX_FILE_BYTES });
+        }
+
+        let mut reader = BufReader::new(File::open(path).map_err(io)?);
+        let mut magic = Vec::with_capacity(8);
+        reader.by_ref().take(8).read_to_end(&mut magic).map_err(io)?;
+        reader.rewind().map_err(io)?;
+        let format = match magic.as_slice() {
+            [] => Format::Empty,
+            [0x76, 0x2f, 0x31, 0x01, ..] => Format::Exr,
+            [0x89, b'P', b'N', b'G', b'\r', b'\n', 0x1a, b'\n'] => Format::Png,
+            _ => Format::Other,
+        };
+        Ok(Self { reader, bytes, format })
+    }
+
+    pub(crate) fn foreign(&self, path: &Path, wanted: &'static str) -> PictureError {
+        let found = match self.format {
+            Format::Exr => "an OpenEXR file",
+            Format::Png => "a PNG file",
+            Format::Empty => "an empty file",
+            Format::Other => "something else",
+        };
+        PictureError::Foreign { path: path.to_owned(), found, wanted }
+    }
+}
+
+/// Checks a size from a header, before anything of that size is allocated.
+pub(crate) fn check_size(path: &Path, width: usize, height: usize) -> Result<(), PictureError> {
+    check_image(width, height).map_err(|source| PictureError::Size { path: path.to_owned(), source })
+}
+
+/// Runs a decoder. The decoders are other people's code over hostile bytes: where one of them panics (an index, or an
+/// overflow in builds that check it), the file is broken, and the program that reads it goes on. No state outlives the call.
+pub(crate) fn guarded<T>(
+    path: &Path,
+    format: &'static str,
+    decode: impl FnOnce() -> Result<T, PictureError>,
+) -> Result<T, PictureError> {
+    catch_unwind(AssertUnwindSafe(decode)).unwrap_or_else(|_| {
+        let reason = "the decoder met a contradiction and gave up".to_owned();
+        Err(PictureError::Broken { path: path.to_owned(), format, reason })
+    })
+}

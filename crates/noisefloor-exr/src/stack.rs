@@ -1,0 +1,200 @@
+//! A stack of images on disk, played back as a source.
+
+use crate::decode_exr::read_exr;
+use crate::error::StackError;
+use crate::frames::{self, Frame, Layout};
+use crate::picture::{LinearImage, read_picture};
+use noisefloor::{Batch, ProgressiveSource, Request, Rgb, SourceError, SourceInfo, Tile, Unit};
+use std::collections::VecDeque;
+use std::path::Path;
+use std::sync::Arc;
+
+/// Images kept in memory: a running mean and the one before it.
+const CACHED: usize = 2;
+
+/// A folder of images of one render, played back batch by batch. It samples nothing: it hands out what is stored.
+///
+/// # Layouts
+/// - **Running means** ([`StackSource::open_running_means`]): `00050.png`, `00100.exr`, … named by their samples per pixel,
+///   nested, so that the mean of the new samples alone is (n₂·I₂ − n₁·I₁)/(n₂ − n₁) in linear light. PNGs are linearised
+///   first. The difference amplifies their quantisation by n₂/(n₂ − n₁): between 9,900 and 9,950 spp by about 200, so that
+///   such a batch says little by itself and may be negative. It is not clamped: summed up again, the batches give the stored
+///   images. A value that the PNG clipped at 1 comes out as 1, so noise on highlights is lost.
+/// - **Batches** ([`StackSource::open_batches`]): `batch_<first>_<last>.exr`, each the mean of samples `first`+1…`last` alone.
+///
+/// # What a request gets
+/// The one stored batch that starts at [`Request::first`], with as many samples as it holds, whatever was asked for; an empty
+/// batch at the end of the stack; an error if no batch starts there. Single tiles can be asked for. Each image is decoded
+/// when it is first needed, and the last two are kept.
+#[derive(Debug)]
+pub struct StackSource {
+    name: String,
+    width: usize,
+    height: usize,
+    layout: Layout,
+    frames: Vec<Frame>,
+    cache: VecDeque<(usize, Arc<LinearImage>)>,
+}
+
+impl StackSource {
+    /// Opens a folder of either layout, whichever its file names follow.
+    ///
+    /// # Errors
+    /// [`StackError`] if they follow neither or both, or as of the two other constructors.
+    pub fn open(dir: impl AsRef<Path>) -> Result<Self, StackError> {
+        match frames::detect(dir.as_ref())? {
+            Layout::RunningMeans => Self::open_running_means(dir),
+            Layout::Batches => Self::open_batches(dir),
+        }
+    }
+
+    /// Opens a folder of running means, PNG or EXR, named by their samples per pixel. Reads the first of them.
+    ///
+    /// # Errors
+    /// [`StackError`] if the folder has none, two claim the same count, or the first cannot be read.
+    pub fn open_running_means(dir: impl AsRef<Path>) -> Result<Self, StackError> {
+        let frames = frames::running_means(dir.as_ref())?;
+        Self::with(dir.as_ref(), Layout::RunningMeans, frames)
+    }
+
+    /// Opens a folder of `batch_<first>_<last>.exr`. Reads the first of them.
+    ///
+    /// # Errors
+    /// [`StackError`] if the folder has none, they leave a gap or overlap (both files are named), they do not start at sample
+    /// 0, or the first cannot be read.
+    pub fn open_batches(dir: impl AsRef<Path>) -> Result<Self, StackError> {
+        let frames = frames::batches(dir.as_ref())?;
+        Self::with(dir.as_ref(), Layout::Batches, frames)
+    }
+
+    fn with(dir: &Path, layout: Layout, frames: Vec<Frame>) -> Result<Self, StackError> {
+        let first = read(layout, &frames[0].path)?;
+        let folder = dir.file_name().unwrap_or(dir.as_os_str()).to_string_lossy();
+        Ok(Self {
+            name: format!("stack {folder}"),
+            width: first.width,
+            height: first.height,
+            layout,
+            frames,
+            cache: VecDeque::from([(0, Arc::new(first))]),
+        })
+    }
+
+    /// Samples per pixel after each stored batch, ascending; the last is what the stack holds in all.
+    pub fn boundaries(&self) -> impl ExactSizeIterator<Item = u64> {
+        self.frames.iter().map(|frame| frame.last)
+    }
+
+    /// The image at a place of the stack, from memory or disk.
+    fn image(&mut self, index: usize) -> Result<Arc<LinearImage>, StackError> {
+        if let Some((_, image)) = self.cache.iter().find(|(cached, _)| *cached == index) {
+            return Ok(Arc::clone(image));
+        }
+        let path = &self.frames[index].path;
+        let image = Arc::new(read(self.layout, path)?);
+        if (image.width, image.height) != (self.width, self.height) {
+            return Err(StackError::Size {
+                path: path.clone(),
+                width: self.width,
+                height: self.height,
+                got_width: image.width,
+                got_height: image.height,
+            });
+        }
+        while self.cache.len() >= CACHED {
+            self.cache.pop_front();
+        }
+        self.cache.push_back((index, Arc::clone(&image)));
+        Ok(image)
+    }
+
+    fn batch(&mut self, request: &Request) -> Result<Batch, StackError> {
+        let tile = request.tile;
+        self.check_tile(&tile)?;
+        let Some(index) = self.frames.iter().position(|frame| frame.first == request.first) else {
+            let end = self.frames.last().map_or(0, |frame| frame.last);
+            if request.first == end {
+                return Ok(Batch { tile, samples: 0, mean: Vec::new() });
+            }
+            let starts = self.frames.iter().map(|frame| frame.first).chain([end]);
+            let near = starts.min_by_key(|start| start.abs_diff(request.first)).unwrap_or(0);
+            return Err(StackError::Boundary { first: request.first, near });
+        };
+
+        // The first running mean, and every batch, holds the new samples alone
+        let (first, last) = (self.frames[index].first, self.frames[index].last);
+        let old = match self.layout {
+            Layout::RunningMeans if index > 0 => Some(self.image(index - 1)?),
+            _ => None,
+        };
+        let new = self.image(index)?;
+        let mean = match old {
+            None => tile.rows(self.width).flat_map(|row| new.pixels[row].iter().copied()).collect(),
+            Some(old) => tile
+                .rows(self.width)
+                .flat_map(|row| old.pixels[row.clone()].iter().zip(&new.pixels[row]))
+                .map(|(old, new)| difference(old, first, new, last))
+                .collect(),
+        };
+        // frames.rs: every count fits 32 bits
+        Ok(Batch { tile, samples: (last - first) as u32, mean })
+    }
+
+    fn check_tile(&self, tile: &Tile) -> Result<(), StackError> {
+        let inside = |at: usize, len: usize, edge: usize| at.checked_add(len).is_some_and(|end| end <= edge);
+        if inside(tile.x, tile.width, self.width) && inside(tile.y, tile.height, self.height) {
+            return Ok(());
+        }
+        Err(StackError::Tile {
+            x: tile.x,
+            y: tile.y,
+            tile_width: tile.width,
+            tile_height: tile.height,
+            width: self.width,
+            height: self.height,
+        })
+    }
+}
+
+impl ProgressiveSource for StackSource {
+    fn info(&self) -> SourceInfo {
+        SourceInfo {
+            name: self.name.clone(),
+            width: self.width,
+            height: self.height,
+            unit: Unit::SamplesPerPixel,
+            aims: true,
+        }
+    }
+
+    fn sample(&mut self, requests: &[Request]) -> Result<Vec<Batch>, SourceError> {
+        // In the order of the samples, so that tiles at different depths do not decode an image twice
+        let mut order: Vec<usize> = (0..requests.len()).collect();
+        order.sort_by_key(|&i| requests[i].first);
+        let mut batches = Vec::with_capacity(requests.len());
+        for i in order {
+            let batch = self.batch(&requests[i]).map_err(|cause| SourceError::Failed {
+                name: self.name.clone(),
+                tile: Some(requests[i].tile.index),
+                cause: Box::new(cause),
+            })?;
+            batches.push((i, batch));
+        }
+        batches.sort_by_key(|(i, _)| *i);
+        Ok(batches.into_iter().map(|(_, batch)| batch).collect())
+    }
+}
+
+/// A batch is linear by definition; a running mean may be what an observer's display got.
+fn read(layout: Layout, path: &Path) -> Result<LinearImage, StackError> {
+    Ok(match layout {
+        Layout::RunningMeans => read_picture(path)?.into_linear(),
+        Layout::Batches => read_exr(path)?,
+    })
+}
+
+/// Mean of the samples after the first `n1`, from the means of the first `n1` and the first `n2`.
+fn difference(old: &Rgb, n1: u64, new: &Rgb, n2: u64) -> Rgb {
+    let (n1, n2) = (n1 as f64, n2 as f64);
+    std::array::from_fn(|c| ((n2 * f64::from(new[c]) - n1 * f64::from(old[c])) / (n2 - n1)) as f32)
+}

@@ -1,0 +1,23 @@
+//! Tests of noisefloor-exr, one module a subject.
+
+/// Thresholds and the images they belong to.
+#[cfg(test)]
+mod corpus;
+/// Broken files: every byte flip and cut is an error or a picture, never a panic.
+#[cfg(test)]
+mod hostile;
+/// What is read from EXR and PNG.
+#[cfg(test)]
+mod read;
+/// The human data in `../shared`, where they are.
+#[cfg(test)]
+mod shared;
+/// Playback of stacks.
+#[cfg(test)]
+mod stack;
+/// Files that others make, for the tests to read.
+#[cfg(test)]
+mod util;
+/// Round trips and atomic writing.
+#[cfg(test)]
+mod write;
