@@ -1,0 +1,444 @@
+//! Where rays meet surfaces: a bounding volume hierarchy, built by `obvhs` and walked four boxes and four surfaces at once.
+//! Why so: `docs/benchmarks/bvh.md`.
+
+use crate::math::{Ray, Vec3};
+use glam::Vec4;
+use obvhs::{BvhBuildParams, aabb::Aabb, bvh2::Bvh2, bvh2::builder::build_bvh2};
+
+/// A surface without its looks.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Shape {
+    /// The points `corner + u·e1 + v·e2`: with u, v ∈ [0, 1] a parallelogram (`whole`), else with u + v ≤ 1 a triangle.
+    Planar { corner: Vec3, e1: Vec3, e2: Vec3, whole: bool },
+    /// A sphere.
+    Sphere { centre: Vec3, radius: f32 },
+}
+
+impl Shape {
+    fn bounds(&self) -> Aabb {
+        match *self {
+            Shape::Planar { corner, e1, e2, whole } => {
+                let last = if whole { corner + e1 + e2 } else { corner };
+                Aabb::from_points(&[corner, corner + e1, corner + e2, last])
+            }
+            Shape::Sphere { centre, radius } => Aabb::new(centre - radius, centre + radius),
+        }
+    }
+}
+
+/// Where a ray met a surface.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Hit {
+    /// Distance along the ray; infinite if it met nothing.
+    pub(crate) t: f32,
+    /// Which surface.
+    pub(crate) prim: u32,
+    /// Coordinates on a planar surface along its edges.
+    pub(crate) uv: [f32; 2],
+}
+
+const MISS: Hit = Hit { t: f32::INFINITY, prim: u32::MAX, uv: [0.0; 2] };
+
+/// Marks a child that is a leaf; the other bits are its index.
+const LEAF: u32 = 1 << 31;
+/// By how much the edge of a planar surface is widened, in units of its edges: rays do not slip between neighbours.
+const EDGE: f32 = 2e-6;
+/// No pack of planar surfaces in a leaf.
+const NONE: u32 = u32::MAX;
+
+/// Four boxes: for each axis the lower and the upper bounds.
+#[derive(Clone, Debug)]
+struct Node {
+    bounds: [[Vec4; 2]; 3],
+    child: [u32; 4],
+}
+
+/// Up to four planar surfaces, one a lane. With c the corner and n the normal of length one, a ray o + t·d meets the plane
+/// at t = n·(c − o) / n·d, and there u and v are dot products with the dual basis of the edges. Lanes without a surface
+/// are all zero: t is then NaN and no comparison holds.
+#[derive(Clone, Debug, Default)]
+struct Pack {
+    corner: [Vec4; 3],
+    normal: [Vec4; 3],
+    dual_u: [Vec4; 3],
+    dual_v: [Vec4; 3],
+    /// One for parallelograms: u + v − whole·min(u, v) ≤ 1 bounds both kinds.
+    whole: Vec4,
+    prim: [u32; 4],
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Ball {
+    centre: Vec3,
+    radius: f32,
+    prim: u32,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Leaf {
+    pack: u32,
+    first_ball: u32,
+    balls: u32,
+}
+
+/// The hierarchy.
+#[derive(Clone, Debug)]
+pub(crate) struct Accel {
+    nodes: Vec<Node>,
+    leaves: Vec<Leaf>,
+    packs: Vec<Pack>,
+    balls: Vec<Ball>,
+    stack: usize,
+    extent: f32,
+}
+
+/// Nodes still to visit, with the distance at which each begins. Made once a job, so that no path allocates.
+#[derive(Clone, Debug)]
+pub(crate) struct Stack(Vec<(u32, f32)>);
+
+/// A ray spread over the lanes.
+struct Wide {
+    origin: [Vec4; 3],
+    dir: [Vec4; 3],
+    inverse: [Vec4; 3],
+    /// `origin`·`inverse`.
+    shift: [Vec4; 3],
+    /// For each axis, which bound the ray enters by.
+    enter: [usize; 3],
+}
+
+impl Wide {
+    #[inline]
+    fn new(ray: &Ray) -> Self {
+        // Keep inverses finite, so that no 0·∞ arises
+        let safe = |d: f32| 1.0 / if d.abs() < 1e-18 { 1e-18f32.copysign(d) } else { d };
+        let (o, d) = (ray.origin.to_array(), ray.dir.to_array());
+        let inverse = d.map(safe);
+        Self {
+            origin: o.map(Vec4::splat),
+            dir: d.map(Vec4::splat),
+            inverse: inverse.map(Vec4::splat),
+            shift: std::array::from_fn(|i| Vec4::splat(o[i] * inverse[i])),
+            enter: d.map(|d| usize::from(d.is_sign_negative())),
+        }
+    }
+}
+
+impl Node {
+    const EMPTY: Self =
+        Self { bounds: [[Vec4::splat(f32::MAX), Vec4::splat(f32::MIN)]; 3], child: [LEAF; 4] };
+
+    /// Where the ray enters each box, and which boxes it meets before `t_max`.
+    #[inline]
+    fn meet(&self, ray: &Wide, t_max: f32) -> (Vec4, u32) {
+        let near = |i: usize| self.bounds[i][ray.enter[i]] * ray.inverse[i] - ray.shift[i];
+        let far = |i: usize| self.bounds[i][1 - ray.enter[i]] * ray.inverse[i] - ray.shift[i];
+        let enter = near(0).max(near(1)).max(near(2).max(Vec4::ZERO));
+        // Rounding must not lose a box: Ize 2013, "Robust BVH Ray Traversal"
+        let leave = far(0).min(far(1)).min(far(2)) * 1.000_001;
+        (enter, enter.cmple(leave.min(Vec4::splat(t_max))).bitmask())
+    }
+}
+
+impl Pack {
+    fn set(&mut self, lane: usize, corner: Vec3, e1: Vec3, e2: Vec3, whole: bool, prim: u32) {
+        // The dual basis of (e1, e2) in their plane; in f64, as the area may be small
+        let (a, b) = (e1.as_dvec3(), e2.as_dvec3());
+        let n = a.cross(b);
+        let inverse = n.length_squared().recip();
+        let mut put = |what: &mut [Vec4; 3], v: glam::DVec3| {
+            for i in 0..3 {
+                what[i][lane] = v[i] as f32;
+            }
+        };
+        put(&mut self.corner, corner.as_dvec3());
+        put(&mut self.normal, n * inverse.sqrt());
+        put(&mut self.dual_u, b.cross(n) * inverse);
+        put(&mut self.dual_v, n.cross(a) * inverse);
+        self.whole[lane] = if whole { 1.0 } else { 0.0 };
+        self.prim[lane] = prim;
+    }
+
+    /// Distances, u, v and the lanes met before `t_max`.
+    #[inline]
+    fn meet(&self, ray: &Wide, t_max: f32) -> (Vec4, Vec4, Vec4, u32) {
+        let dot = |a: &[Vec4; 3], b: &[Vec4; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+        let to: [Vec4; 3] = std::array::from_fn(|i| self.corner[i] - ray.origin[i]);
+        let t = dot(&self.normal, &to) / dot(&self.normal, &ray.dir);
+        let at: [Vec4; 3] = std::array::from_fn(|i| ray.dir[i] * t - to[i]);
+        let (u, v) = (dot(&self.dual_u, &at), dot(&self.dual_v, &at));
+        let low = u.min(v);
+        let inside = low.cmpge(Vec4::splat(-EDGE))
+            & (u + v - self.whole * low).cmple(Vec4::splat(1.0 + EDGE))
+            & t.cmpgt(Vec4::ZERO)
+            & t.cmplt(Vec4::splat(t_max));
+        (t, u, v, inside.bitmask())
+    }
+}
+
+impl Ball {
+    /// Nearest distance in (0, `t_max`), else none. The discriminant is that of Haines et al. 2019 ("Precision
+    /// Improvements for Ray/Sphere Intersection"): from the point nearest the centre, not from b² − c.
+    #[inline]
+    fn meet(&self, ray: &Ray, t_max: f32) -> Option<f32> {
+        let to = self.centre - ray.origin;
+        let b = to.dot(ray.dir);
+        let discriminant = self.radius * self.radius - (to - ray.dir * b).length_squared();
+        if discriminant <= 0.0 {
+            return None;
+        }
+        let q = b + discriminant.sqrt().copysign(b);
+        let (r1, r2) = ((to.length_squared() - self.radius * self.radius) / q, q);
+        let (low, high) = if r1 < r2 { (r1, r2) } else { (r2, r1) };
+        let t = if low > 0.0 { low } else { high };
+        (t > 0.0 && t < t_max).then_some(t)
+    }
+}
+
+impl Accel {
+    /// Builds the hierarchy over `shapes`; planar ones must have an area.
+    pub(crate) fn new(shapes: &[Shape]) -> Self {
+        let (nodes, leaves, packs, balls) = (vec![Node::EMPTY], vec![], vec![], vec![]);
+        let mut accel = Self { nodes, leaves, packs, balls, stack: 4, extent: 1.0 };
+        if shapes.is_empty() {
+            return accel;
+        }
+        let bounds: Vec<Aabb> = shapes.iter().map(Shape::bounds).collect();
+        let params = BvhBuildParams {
+            pre_split: false, // would need triangles
+            max_prims_per_leaf: 4,
+            collapse_traversal_cost: 3.0,
+            ..BvhBuildParams::slow_build()
+        };
+        let tree = build_bvh2(&bounds, params, &mut std::time::Duration::default());
+        accel.extent = 0.5 * (tree.nodes[0].aabb().max - tree.nodes[0].aabb().min).length();
+        let mut depth = 1;
+        accel.widen(&tree, shapes, &mut depth);
+        accel.stack = 3 * depth + 4;
+        accel
+    }
+
+    /// Radius of a sphere around all surfaces.
+    pub(crate) fn extent(&self) -> f32 {
+        self.extent
+    }
+
+    /// Room for the nodes that a walk of this hierarchy can leave behind.
+    pub(crate) fn stack(&self) -> Stack {
+        Stack(vec![(0, 0.0); self.stack])
+    }
+
+    /// Collapses the binary tree: each wide node opens the largest of its inner children until it has four.
+    fn widen(&mut self, tree: &Bvh2, shapes: &[Shape], depth: &mut usize) {
+        let mut todo = vec![(0usize, vec![0usize], 1usize)];
+        while let Some((at, mut children, level)) = todo.pop() {
+            *depth = level.max(*depth);
+            while children.len() < 4 {
+                let inner = |i: &usize| !tree.nodes[children[*i]].is_leaf();
+                let area = |i: &usize| tree.nodes[children[*i]].aabb().half_area();
+                let Some(open) = (0..children.len()).filter(inner).max_by(|a, b| area(a).total_cmp(&area(b)))
+                else {
+                    break;
+                };
+                let first = tree.nodes[children.swap_remove(open)].first_index as usize;
+                children.extend([first, first + 1]);
+            }
+            for (lane, &child) in children.iter().enumerate() {
+                let node = &tree.nodes[child];
+                for axis in 0..3 {
+                    self.nodes[at].bounds[axis][0][lane] = node.aabb().min[axis];
+                    self.nodes[at].bounds[axis][1][lane] = node.aabb().max[axis];
+                }
+                self.nodes[at].child[lane] = if node.is_leaf() {
+                    let first = node.first_index as usize;
+                    let prims = &tree.primitive_indices[first..first + node.prim_count as usize];
+                    self.leaf(prims, shapes)
+                } else {
+                    let first = node.first_index as usize;
+                    let index = self.nodes.len();
+                    self.nodes.push(Node::EMPTY);
+                    todo.push((index, vec![first, first + 1], level + 1));
+                    index as u32
+                };
+            }
+        }
+    }
+
+    fn leaf(&mut self, prims: &[u32], shapes: &[Shape]) -> u32 {
+        let mut leaf = Leaf { pack: NONE, first_ball: self.balls.len() as u32, balls: 0 };
+        let mut pack = Pack::default();
+        let mut lane = 0;
+        for &prim in prims {
+            match shapes[prim as usize] {
+                Shape::Planar { corner, e1, e2, whole } => {
+                    pack.set(lane, corner, e1, e2, whole, prim);
+                    lane += 1;
+                }
+                Shape::Sphere { centre, radius } => {
+                    self.balls.push(Ball { centre, radius, prim });
+                    leaf.balls += 1;
+                }
+            }
+        }
+        if lane > 0 {
+            leaf.pack = self.packs.len() as u32;
+            self.packs.push(pack);
+        }
+        self.leaves.push(leaf);
+        LEAF | (self.leaves.len() - 1) as u32
+    }
+
+    /// The nearest surface along the ray. `SPHERES` says whether the scene has any.
+    #[inline]
+    pub(crate) fn closest<const SPHERES: bool>(&self, ray: &Ray, stack: &mut Stack) -> Hit {
+        let wide = Wide::new(ray);
+        let mut best = MISS;
+        let mut top = 0;
+        let mut node = 0u32;
+        loop {
+            if node & LEAF == 0 {
+                let n = &self.nodes[node as usize];
+                let (enter, mut mask) = n.meet(&wide, best.t);
+                if mask != 0 {
+                    // Go on with the nearest child, leave the others behind
+                    let enter = enter.to_array();
+                    let mut near = mask.trailing_zeros() as usize & 3;
+                    mask &= mask - 1;
+                    while mask != 0 {
+                        let mut other = mask.trailing_zeros() as usize & 3;
+                        mask &= mask - 1;
+                        if enter[other] < enter[near] {
+                            std::mem::swap(&mut near, &mut other);
+                        }
+                        stack.0[top] = (n.child[other], enter[other]);
+                        top += 1;
+                    }
+                    node = n.child[near];
+                    continue;
+                }
+            } else {
+                self.closest_in_leaf::<SPHERES>(node, ray, &wide, &mut best);
+            }
+            // Take back what still begins before the nearest surface found
+            loop {
+                if top == 0 {
+                    return best;
+                }
+                top -= 1;
+                let (next, t) = stack.0[top];
+                if t < best.t {
+                    node = next;
+                    break;
+                }
+            }
+        }
+    }
+
+    #[inline]
+    fn closest_in_leaf<const SPHERES: bool>(&self, node: u32, ray: &Ray, wide: &Wide, best: &mut Hit) {
+        let leaf = self.leaves[(node & !LEAF) as usize];
+        if !SPHERES || leaf.pack != NONE {
+            let pack = &self.packs[leaf.pack as usize];
+            let (t, u, v, mut mask) = pack.meet(wide, best.t);
+            if mask != 0 {
+                let (t, u, v) = (t.to_array(), u.to_array(), v.to_array());
+                while mask != 0 {
+                    let lane = mask.trailing_zeros() as usize & 3;
+                    mask &= mask - 1;
+                    if t[lane] < best.t {
+                        *best = Hit { t: t[lane], prim: pack.prim[lane], uv: [u[lane], v[lane]] };
+                    }
+                }
+            }
+        }
+        if SPHERES {
+            let first = leaf.first_ball as usize;
+            for ball in &self.balls[first..first + leaf.balls as usize] {
+                if let Some(t) = ball.meet(ray, best.t) {
+                    *best = Hit { t, prim: ball.prim, uv: [0.0; 2] };
+                }
+            }
+        }
+    }
+
+    /// Whether any surface lies on the ray before `t_max`.
+    #[inline]
+    pub(crate) fn blocked<const SPHERES: bool>(&self, ray: &Ray, t_max: f32, stack: &mut Stack) -> bool {
+        let wide = Wide::new(ray);
+        let mut top = 1;
+        stack.0[0].0 = 0;
+        while top > 0 {
+            top -= 1;
+            let node = stack.0[top].0;
+            if node & LEAF == 0 {
+                let n = &self.nodes[node as usize];
+                let (_, mut mask) = n.meet(&wide, t_max);
+                while mask != 0 {
+                    stack.0[top].0 = n.child[mask.trailing_zeros() as usize & 3];
+                    top += 1;
+                    mask &= mask - 1;
+                }
+                continue;
+            }
+            let leaf = self.leaves[(node & !LEAF) as usize];
+            if (!SPHERES || leaf.pack != NONE) && self.packs[leaf.pack as usize].meet(&wide, t_max).3 != 0 {
+                return true;
+            }
+            if SPHERES {
+                let first = leaf.first_ball as usize;
+                let balls = &self.balls[first..first + leaf.balls as usize];
+                if balls.iter().any(|ball| ball.meet(ray, t_max).is_some()) {
+                    return true;
+                }
+            }
+        }
+        false
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math;
+    use crate::rng::{Key, Rng};
+
+    /// The hierarchy finds what a loop over all surfaces finds.
+    #[test]
+    fn walk_agrees_with_a_loop() {
+        let mut rng = Rng::new(Key::new(7), 0, 0);
+        let mut point =
+            |scale: f32| Vec3::from_array([rng.one(), rng.one(), rng.one()]) * scale - 0.5 * scale;
+        let shapes: Vec<Shape> = (0..300)
+            .map(|i| match i % 3 {
+                0 => Shape::Sphere { centre: point(4.0), radius: 0.1 },
+                k => Shape::Planar { corner: point(4.0), e1: point(1.0), e2: point(1.0), whole: k == 1 },
+            })
+            .collect();
+        let accel = Accel::new(&shapes);
+        let alone: Vec<Accel> = shapes.iter().map(|s| Accel::new(&[*s])).collect();
+        let mut stack = accel.stack();
+        let mut met = 0;
+        for i in 0..5000 {
+            let mut rng = Rng::new(Key::new(8), i, 0);
+            let ray = Ray { origin: point(4.0), dir: math::sphere(rng.two()).normalize() };
+            let hit = accel.closest::<true>(&ray, &mut stack);
+            let all = alone.iter().map(|a| a.closest::<true>(&ray, &mut stack).t);
+            let best = all.fold(f32::INFINITY, f32::min);
+            assert_eq!(hit.t, best);
+            assert_eq!(accel.blocked::<true>(&ray, f32::INFINITY, &mut stack), best.is_finite());
+            if best.is_finite() {
+                met += 1;
+                assert!(!accel.blocked::<true>(&ray, best, &mut stack));
+            }
+        }
+        assert!(met > 500, "{met}");
+    }
+
+    #[test]
+    fn an_empty_hierarchy_is_met_by_nothing() {
+        let accel = Accel::new(&[]);
+        let ray = Ray { origin: Vec3::ZERO, dir: Vec3::new(0.0, 0.6, -0.8) };
+        assert!(accel.closest::<true>(&ray, &mut accel.stack()).t.is_infinite());
+        assert!(!accel.blocked::<false>(&ray, 1.0, &mut accel.stack()));
+    }
+}
