@@ -1,13 +1,13 @@
 //! What can be typed, and what it means once checked.
 
+use anyhow::Context;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use noisefloor::{
-    Audience, DEFAULT_KEY, DEFAULT_THRESHOLD, DEFAULT_TILE, Display, Evidence, FixedSamples, Model, NoiseMask, Oracle,
-    Params, Schedule, StoppingCriterion, ToneMapping,
+    Audience, DEFAULT_KEY, DEFAULT_THRESHOLD, DEFAULT_TILE, Model, Oracle, Params, Schedule, ToneMapping,
 };
-use anyhow::{Context, bail};
 use std::fs::File;
 use std::io::BufReader;
+use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
 /// Tells progressive Monte Carlo renderers, tile by tile, when people stop seeing noise.
@@ -60,7 +60,7 @@ pub struct RenderArgs {
     pub seed: u64,
     /// Threads [default: one a core].
     #[arg(long)]
-    pub threads: Option<usize>,
+    pub threads: Option<NonZeroUsize>,
     /// Longest path, in segments.
     #[arg(long, default_value_t = 65, value_name = "N")]
     pub max_depth: u32,
@@ -314,8 +314,11 @@ fn parse_audience(text: &str) -> Result<Audience, String> {
         "observers" => Ok(Audience::TRAINED),
         "art-students" => Ok(Audience::ART_STUDENTS),
         line => {
-            let parts = line.split_once(',').and_then(|(a, b)| Some((a.trim().parse().ok()?, b.trim().parse().ok()?)));
-            let (slope, offset) = parts.ok_or("expected `observers`, `art-students`, or a,b for T' = a T + b")?;
+            let parts = line
+                .split_once(',')
+                .and_then(|(a, b)| Some((a.trim().parse().ok()?, b.trim().parse().ok()?)));
+            let (slope, offset) =
+                parts.ok_or("expected `observers`, `art-students`, or a,b for T' = a T + b")?;
             Ok(Audience { slope, offset })
         }
     }

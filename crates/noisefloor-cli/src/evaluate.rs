@@ -57,7 +57,12 @@ pub fn run(args: &EvaluateArgs) -> anyhow::Result<()> {
         None => ("leave-one-scene-out".to_owned(), held_out(&table, &params, args.threshold)?),
         Some(model) => {
             if model.descriptor != table.descriptor {
-                bail!("the model goes by the {} descriptor {:?}, the table by {:?}", model.descriptor.name(), model.descriptor, table.descriptor);
+                bail!(
+                    "the model goes by the {} descriptor {:?}, the table by {:?}",
+                    model.descriptor.name(),
+                    model.descriptor,
+                    table.descriptor
+                );
             }
             (model.digest(), table.zones.iter().map(|z| predict(model, args.threshold, z)).collect())
         }
@@ -70,8 +75,13 @@ pub fn run(args: &EvaluateArgs) -> anyhow::Result<()> {
         write_csv(path, predictions.iter())?;
     }
     report.print(&model.map_or_else(String::new, |m| {
-        let seen: Vec<&str> = table.scenes().into_iter().filter(|s| m.record.scenes.iter().any(|t| t == s)).collect();
-        if seen.is_empty() { String::new() } else { format!("the model was trained on these scenes: {}", seen.join(", ")) }
+        let seen: Vec<&str> =
+            table.scenes().into_iter().filter(|s| m.record.scenes.iter().any(|t| t == s)).collect();
+        if seen.is_empty() {
+            String::new()
+        } else {
+            format!("the model was trained on these scenes: {}", seen.join(", "))
+        }
     }));
     Ok(())
 }
@@ -95,7 +105,11 @@ impl Report {
         };
         let scene = |scene: &str| {
             let keep = |p: &Prediction| p.scene == scene;
-            SceneSummary { scene: scene.into(), summary: summarise(predictions, &keep), baselines: baselines(&keep) }
+            SceneSummary {
+                scene: scene.into(),
+                summary: summarise(predictions, &keep),
+                baselines: baselines(&keep),
+            }
         };
         let levels = || table.zones.iter().flat_map(|z| &z.levels);
         let real = levels().filter(|l| l.origin == noisefloor::evaluation::Origin::Real).count();
@@ -120,7 +134,11 @@ impl Report {
                 s.scores.bias_factor,
                 100.0 * s.scores.early_share,
                 s.image_accuracy.map_or("–".into(), |a| format!("{:.1} %", 100.0 * a)),
-                format!("×{:.2}, {:.0} % early", b.constant.scores.error_factor, 100.0 * b.constant.scores.early_share),
+                format!(
+                    "×{:.2}, {:.0} % early",
+                    b.constant.scores.error_factor,
+                    100.0 * b.constant.scores.early_share
+                ),
                 format!("×{:.2}", b.scene_median.scores.error_factor),
             );
         };

@@ -84,7 +84,14 @@ impl Canvas {
         }
     }
 
-    fn text(&mut self, text: &str, at: (usize, usize), font: &MonoFont<'_>, colour: [u8; 3], alignment: Alignment) {
+    fn text(
+        &mut self,
+        text: &str,
+        at: (usize, usize),
+        font: &MonoFont<'_>,
+        colour: [u8; 3],
+        alignment: Alignment,
+    ) {
         let style = TextStyleBuilder::new().alignment(alignment).baseline(Baseline::Middle).build();
         let character = MonoTextStyle::new(font, Rgb888::new(colour[0], colour[1], colour[2]));
         let at = Point::new(at.0 as i32, at.1 as i32);

@@ -39,17 +39,32 @@ pub fn run(args: &InspectArgs) -> anyhow::Result<()> {
         return Ok(());
     }
     println!("digest           {}", summary.digest);
-    println!("descriptor       {} (version {}), {} numbers", descriptor.name(), summary.descriptor_version, summary.numbers);
-    println!("evidence         {}", match model.evidence {
-        Evidence::Halves => "the other half buffer",
-        Evidence::Reference => "a ray-traced reference",
-    });
-    println!("trained through  {}", match model.tone_mapping {
-        ToneMapping::Srgb { exposure } => format!("plain sRGB, exposure {exposure}"),
-        ToneMapping::Reinhard { key, white: None } => format!("Reinhard, key {key}"),
-        ToneMapping::Reinhard { key, white: Some(white) } => format!("Reinhard, key {key}, white {white}"),
-    });
-    println!("machine          C-SVC, RBF kernel, C = {}, γ = {}; {} support vectors of {} examples", record.c, record.gamma, summary.support_vectors, record.examples);
+    println!(
+        "descriptor       {} (version {}), {} numbers",
+        descriptor.name(),
+        summary.descriptor_version,
+        summary.numbers
+    );
+    println!(
+        "evidence         {}",
+        match model.evidence {
+            Evidence::Halves => "the other half buffer",
+            Evidence::Reference => "a ray-traced reference",
+        }
+    );
+    println!(
+        "trained through  {}",
+        match model.tone_mapping {
+            ToneMapping::Srgb { exposure } => format!("plain sRGB, exposure {exposure}"),
+            ToneMapping::Reinhard { key, white: None } => format!("Reinhard, key {key}"),
+            ToneMapping::Reinhard { key, white: Some(white) } =>
+                format!("Reinhard, key {key}, white {white}"),
+        }
+    );
+    println!(
+        "machine          C-SVC, RBF kernel, C = {}, γ = {}; {} support vectors of {} examples",
+        record.c, record.gamma, summary.support_vectors, record.examples
+    );
     println!("audience         T' = {} T + {}", model.audience.slope, model.audience.offset);
     println!("trained on       {}", record.corpus);
     println!("scenes           {}", record.scenes.join(", "));
@@ -65,7 +80,7 @@ pub fn run(args: &InspectArgs) -> anyhow::Result<()> {
 }
 
 pub fn scenes() {
-    for (name, what) in noisefloor_ptwne::scenes::list() {
-        println!("{name:18} {what}");
+    for scene in noisefloor_ptwne::scenes::list() {
+        println!("{:18} {}", scene.name, scene.description);
     }
 }

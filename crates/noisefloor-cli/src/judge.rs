@@ -4,7 +4,7 @@ use crate::args::JudgeArgs;
 use crate::heat_map::{self, Mark, Scale};
 use anyhow::{Context, bail};
 use noisefloor::{
-    Display, Evidence, Oracle, Rgb, Samples, Tile, TileGrid, TilePlanes, ToneMapping, Verdict, residual_scale, srgb_encode,
+    Display, Evidence, Oracle, Rgb, Samples, Tile, TileGrid, TilePlanes, Verdict, residual_scale,
 };
 use noisefloor_exr::{Picture, read_picture, write_png};
 use rayon::prelude::*;
@@ -18,6 +18,8 @@ struct Rendering {
     spp: f64,
     /// Shown as it is, not tone mapped.
     display_referred: bool,
+    /// Variance of the rounding of its display values.
+    rounding: f32,
 }
 
 /// One line of the verdict.
@@ -49,16 +51,27 @@ pub fn run(args: &JudgeArgs) -> anyhow::Result<()> {
     let tone = args.tone.check()?;
     let oracle = args.oracle.load()?;
     if oracle.model().evidence != Evidence::Halves {
-        bail!("this model holds tiles against a ray-traced reference; `judge` needs one that holds them against other samples");
+        bail!(
+            "this model holds tiles against a ray-traced reference; `judge` needs one that holds them against other samples"
+        );
     }
     if args.spp.len() != 1 + args.against.len() {
-        bail!("--spp is needed once for each picture: {} given for {} pictures", args.spp.len(), 1 + args.against.len());
+        bail!(
+            "--spp is needed once for each picture: {} given for {} pictures",
+            args.spp.len(),
+            1 + args.against.len()
+        );
     }
     let image = read(&args.image, args.spp[0])?;
-    let others: Vec<Rendering> =
-        args.against.iter().zip(&args.spp[1..]).map(|(path, &spp)| read(path, spp)).collect::<anyhow::Result<_>>()?;
+    let others: Vec<Rendering> = args
+        .against
+        .iter()
+        .zip(&args.spp[1..])
+        .map(|(path, &spp)| read(path, spp))
+        .collect::<anyhow::Result<_>>()?;
     for (other, path) in others.iter().zip(&args.against) {
-        fits(&image, other).with_context(|| format!("{} against {}", args.image.display(), path.display()))?;
+        fits(&image, other)
+            .with_context(|| format!("{} against {}", args.image.display(), path.display()))?;
     }
     let (width, height) = image.size;
     let grid = TileGrid::new(width, height, args.tile)?;
@@ -67,7 +80,10 @@ pub fn run(args: &JudgeArgs) -> anyhow::Result<()> {
     let samples = if args.nested { Samples::Nested } else { Samples::Independent };
     let other = pool(others, image.spp, samples)?;
     let scale = residual_scale(image.spp, other.spp, samples).with_context(|| {
-        format!("nested pictures of the same {} samples per pixel are the same picture: nothing to judge by", image.spp)
+        format!(
+            "nested pictures of the same {} samples per pixel are the same picture: nothing to judge by",
+            image.spp
+        )
     })?;
     let display = if image.display_referred { Display::SRGB } else { tone.settle(&image.pixels) };
     let rows = judge(&oracle, grid, &image, &other, &display, scale)?;
@@ -94,13 +110,17 @@ fn read(path: &Path, spp: f64) -> anyhow::Result<Rendering> {
         bail!("{} needs a positive number of samples per pixel, not {spp}", path.display());
     }
     let picture = read_picture(path)?;
-    let (size, display_referred) = (picture.size(), matches!(picture, Picture::Display(_)));
+    let (size, rounding) = (picture.size(), picture.rounding());
+    let display_referred = matches!(picture, Picture::Display(_));
     let pixels = picture.into_linear().pixels;
     if let Some(bad) = pixels.iter().position(|p| !p.iter().all(|c| c.is_finite())) {
         let (x, y) = (bad % size.0, bad / size.0);
-        bail!("{}: pixel ({x}, {y}) is not finite; mend the render, or paint over it, before it is judged", path.display());
+        bail!(
+            "{}: pixel ({x}, {y}) is not finite; mend the render, or paint over it, before it is judged",
+            path.display()
+        );
     }
-    Ok(Rendering { size, pixels, spp, display_referred })
+    Ok(Rendering { size, pixels, spp, display_referred, rounding })
 }
 
 fn fits(image: &Rendering, other: &Rendering) -> anyhow::Result<()> {
@@ -112,7 +132,9 @@ fn fits(image: &Rendering, other: &Rendering) -> anyhow::Result<()> {
         bail!("one is a PNG and one an EXR; compare pictures of one kind");
     }
     if image.pixels == other.pixels {
-        bail!("the pictures are the same to the last bit, so that nothing shows their noise; render one with another seed");
+        bail!(
+            "the pictures are the same to the last bit, so that nothing shows their noise; render one with another seed"
+        );
     }
     Ok(())
 }
@@ -127,6 +149,7 @@ fn pool(others: Vec<Rendering>, image_spp: f64, samples: Samples) -> anyhow::Res
             for (a, b) in all.pixels.iter_mut().flatten().zip(one.pixels.iter().flatten()) {
                 *a += (b - *a) * weight;
             }
+            all.rounding = all.rounding * (1.0 - weight).powi(2) + one.rounding * weight * weight;
             all.spp += one.spp;
             all
         }),
@@ -142,12 +165,15 @@ fn judge(
     display: &Display,
     scale: f32,
 ) -> anyhow::Result<Vec<Row>> {
+    // Both pictures were rounded, where they were.
+    let rounding = (image.rounding + other.rounding) * scale * scale;
     let planes = |tile| {
-        TilePlanes::gather(grid, tile, |x, y| {
+        let planes = TilePlanes::gather(image.size, tile, |x, y| {
             let pixel = y * grid.width() + x;
-            let shown = display.luma(image.pixels[pixel]);
-            (shown, (shown - display.luma(other.pixels[pixel])) * scale)
-        })
+            let (shown, against) = (display.encode(image.pixels[pixel]), display.encode(other.pixels[pixel]));
+            (shown, std::array::from_fn(|c| (shown[c] - against[c]) * scale))
+        });
+        TilePlanes { rounding, ..planes }
     };
     let tiles: Vec<Tile> = grid.tiles().collect();
     let row = |&tile: &Tile| {
@@ -179,8 +205,16 @@ fn report(args: &JudgeArgs, oracle: &Oracle, rows: &[Row]) -> anyhow::Result<()>
         let verdict = if row.converged { "converged" } else { "noise seen" };
         let expected = row.expected_spp.filter(|_| !row.converged).map_or(String::new(), |n| n.to_string());
         let size = format!("{}×{}", row.width, row.height);
-        println!("{:4} {:5} {:5} {size:>8} {:6.3}  {verdict:10} {expected:>14}", row.tile, row.x, row.y, row.probability);
+        println!(
+            "{:4} {:5} {:5} {size:>8} {:6.3}  {verdict:10} {expected:>14}",
+            row.tile, row.x, row.y, row.probability
+        );
     }
-    println!("{converged_tiles} of {} tiles converged at {} spp (P ≥ {})", rows.len(), args.spp[0], oracle.threshold());
+    println!(
+        "{converged_tiles} of {} tiles converged at {} spp (P ≥ {})",
+        rows.len(),
+        args.spp[0],
+        oracle.threshold()
+    );
     Ok(())
 }

@@ -7,6 +7,7 @@ mod evaluate;
 mod heat_map;
 mod inspect;
 mod judge;
+mod output;
 mod render;
 mod train;
 

@@ -102,16 +102,11 @@ impl Output {
     /// Makes the folder, and makes sure that files can be written before hours are spent.
     pub fn create(args: &RenderArgs, model: Option<String>, rel_mse: Option<RelMse>) -> anyhow::Result<Self> {
         let folder = args.out.clone().unwrap_or_else(|| Path::new("out").join(&args.scene));
-        std::fs::create_dir_all(&folder)
-            .with_context(|| format!("{}: cannot make this folder; choose another with --out", folder.display()))?;
-        let output = Self {
-            folder,
-            scene: args.scene.clone(),
-            seed: args.seed,
-            model,
-            rel_mse,
-            timeline: Vec::new(),
-        };
+        std::fs::create_dir_all(&folder).with_context(|| {
+            format!("{}: cannot make this folder; choose another with --out", folder.display())
+        })?;
+        let output =
+            Self { folder, scene: args.scene.clone(), seed: args.seed, model, rel_mse, timeline: Vec::new() };
         output.write_timeline()?;
         Ok(output)
     }
@@ -124,7 +119,11 @@ impl Output {
     }
 
     /// Writes every file; `clock` when the run is over.
-    pub fn write<C: StoppingCriterion>(&self, session: &Session<C>, clock: Option<Clock>) -> anyhow::Result<()> {
+    pub fn write<C: StoppingCriterion>(
+        &self,
+        session: &Session<C>,
+        clock: Option<Clock>,
+    ) -> anyhow::Result<()> {
         let film = session.film();
         let (width, height) = (film.grid().width(), film.grid().height());
         let image = film.image();
@@ -146,7 +145,8 @@ impl Output {
         write_exr(self.folder.join("image.exr"), &layers)?;
 
         // image.png and stops.png: as the oracle saw it.
-        let display = session.display().copied().unwrap_or_else(|| session.params().tone_mapping.settle(&image));
+        let display =
+            session.display().copied().unwrap_or_else(|| session.params().tone_mapping.settle(&image));
         let encoded: Vec<Rgb> = image.iter().map(|&p| display.encode(p)).collect();
         write_png(self.folder.join("image.png"), width, height, &heat_map::to_bytes(&encoded))?;
         let map = heat_map::draw(width, &encoded, &marks(&tiles), &scale(&tiles));
@@ -158,11 +158,23 @@ impl Output {
     }
 
     fn write_stops(&self, tiles: &[(Stop, bool)]) -> anyhow::Result<()> {
-        write_csv(&self.folder.join("stops.csv"), tiles.iter().map(|(stop, open)| {
-            let noisefloor::Tile { index, x, y, width, height } = stop.tile;
-            let reason = if *open { "open".into() } else { stop.reason.to_string() };
-            StopRow { tile: index, x, y, width, height, spp: stop.samples, probability: stop.probability, reason }
-        }))
+        write_csv(
+            &self.folder.join("stops.csv"),
+            tiles.iter().map(|(stop, open)| {
+                let noisefloor::Tile { index, x, y, width, height } = stop.tile;
+                let reason = if *open { "open".into() } else { stop.reason.to_string() };
+                StopRow {
+                    tile: index,
+                    x,
+                    y,
+                    width,
+                    height,
+                    spp: stop.samples,
+                    probability: stop.probability,
+                    reason,
+                }
+            }),
+        )
     }
 
     fn write_timeline(&self) -> anyhow::Result<()> {

@@ -3,33 +3,30 @@
 use crate::INTERRUPTED;
 use crate::args::{CriterionChoice, RenderArgs};
 use crate::output::{Output, RelMse};
-use anyhow::{Context, bail};
+use anyhow::Context;
 use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressStyle};
-use noisefloor::{Driver, Event, FixedSamples, Params, Progress, ProgressiveSource, Session, StopReason, StoppingCriterion};
+use noisefloor::{
+    Driver, Event, FixedSamples, Params, Progress, ProgressiveSource, Session, StopReason, StoppingCriterion,
+};
 use noisefloor_ptwne::{Options, Ptwne, scenes};
-use std::num::NonZeroUsize;
 use std::process::ExitCode;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 pub fn run(args: &RenderArgs) -> anyhow::Result<ExitCode> {
     // Whatever can be wrong is found before anything is rendered.
     let params = args.params()?;
     let (width, height) = args.size;
-    let scene = scenes::by_name(&args.scene)
-        .with_context(|| format!("there is no built-in scene {:?}; `noisefloor scenes` lists them", args.scene))?;
+    let scene = scenes::by_name(&args.scene).with_context(|| {
+        format!("there is no built-in scene {:?}; `noisefloor scenes` lists them", args.scene)
+    })?;
     let rel_mse = args.against.as_deref().map(|path| RelMse::load(path, args.size)).transpose()?;
     if let Some(threads) = args.threads {
-        rayon::ThreadPoolBuilder::new().num_threads(threads).build_global().context("--threads")?;
+        rayon::ThreadPoolBuilder::new().num_threads(threads.get()).build_global().context("--threads")?;
     }
-    let options = Options {
-        seed: args.seed,
-        max_depth: args.max_depth,
-        mis: !args.no_mis,
-        threads: args.threads.and_then(NonZeroUsize::new),
-        ..Options::default()
-    };
+    let options =
+        Options { seed: args.seed, max_depth: args.max_depth, mis: !args.no_mis, ..Options::default() };
     let source = Ptwne::new(scene, width, height, options)?;
     match args.criterion {
         CriterionChoice::Oracle => {
@@ -105,7 +102,9 @@ fn progress_bar(quiet: bool) -> ProgressBar {
 fn show<C: StoppingCriterion>(bar: &ProgressBar, session: &Session<C>, progress: &Progress) {
     let pixels = (session.film().grid().width() * session.film().grid().height()) as f64;
     let eta = match progress.eta_seconds {
-        Some(seconds) => format!("about {} to go", HumanDuration(Duration::from_secs_f64(seconds.clamp(0.0, 1e9)))),
+        Some(seconds) => {
+            format!("about {} to go", HumanDuration(Duration::from_secs_f64(seconds.clamp(0.0, 1e9))))
+        }
         None => "no estimate yet".into(),
     };
     bar.set_length(progress.tiles as u64);

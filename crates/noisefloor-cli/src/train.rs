@@ -70,7 +70,8 @@ pub fn held_out(table: &Table, params: &TrainParams, threshold: f32) -> anyhow::
 }
 
 fn bar(len: u64, what: &'static str) -> ProgressBar {
-    let style = ProgressStyle::with_template("{bar:32} {pos}/{len} {prefix}  {elapsed_precise}, {eta} to go  {msg}");
+    let style =
+        ProgressStyle::with_template("{bar:32} {pos}/{len} {prefix}  {elapsed_precise}, {eta} to go  {msg}");
     let bar = ProgressBar::new(len).with_prefix(what);
     style.map(|style| bar.clone().with_style(style)).unwrap_or(bar)
 }
@@ -107,6 +108,7 @@ pub fn search(args: &SearchArgs) -> anyhow::Result<TrainParams> {
     if let Some(bad) = cs.iter().chain(&gammas).find(|v| !(v.is_finite() && **v > 0.0)) {
         bail!("C and γ must be positive numbers, not {bad}");
     }
-    params.candidates = cs.iter().flat_map(|&c| gammas.iter().map(move |&gamma| SvmParams { c, gamma })).collect();
+    params.candidates =
+        cs.iter().flat_map(|&c| gammas.iter().map(move |&gamma| SvmParams { c, gamma })).collect();
     Ok(params)
 }

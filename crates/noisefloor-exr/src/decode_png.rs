@@ -44,11 +44,11 @@ pub(crate) fn decode(path: &Path, opened: Opened) -> Result<DisplayImage, Pictur
         // Pixels
         let deep = decoder.color_type().bytes_per_pixel() > decoder.color_type().channel_count();
         let image = DynamicImage::from_decoder(decoder).map_err(|e| broken(e.to_string()))?;
-        let pixels = if deep {
-            image.into_rgb16().pixels().map(|p| p.0.map(|v| f32::from(v) / 65535.0)).collect()
+        let (pixels, codes) = if deep {
+            (image.into_rgb16().pixels().map(|p| p.0.map(|v| f32::from(v) / 65535.0)).collect(), 65535.0)
         } else {
-            image.into_rgb8().pixels().map(|p| p.0.map(|v| f32::from(v) / 255.0)).collect()
+            (image.into_rgb8().pixels().map(|p| p.0.map(|v| f32::from(v) / 255.0)).collect(), 255.0)
         };
-        Ok(DisplayImage { width, height, pixels })
+        Ok(DisplayImage { width, height, pixels, step: 1.0 / codes })
     })
 }

@@ -5,6 +5,7 @@
 //! - [`write_exr`], [`write_png`], [`write_atomic`]: files that appear whole or not at all.
 //! - [`StackSource`]: a folder of images as a [`noisefloor::ProgressiveSource`].
 //! - [`corpus`]: thresholds that observers gave, together with the images they judged.
+//! - [`table`]: descriptors of a corpus, computed from its images, and read and written as CSV.
 //!
 //! Nothing here accumulates, tone maps or judges.
 //!
@@ -34,13 +35,12 @@ mod error;
 mod frames;
 mod picture;
 mod stack;
+pub mod table;
 mod write;
 
 pub use decode_exr::read_exr;
 pub use decode_png::read_png;
 pub use error::{CorpusError, PictureError, StackError, WriteError};
-pub use picture::{
-    DisplayImage, LinearImage, MAX_FILE_BYTES, Picture, linear_to_srgb, read_picture, srgb_to_linear,
-};
+pub use picture::{DisplayImage, LinearImage, MAX_FILE_BYTES, Picture, read_picture};
 pub use stack::StackSource;
 pub use write::{RenderLayers, write_atomic, write_exr, write_png};

@@ -1,7 +1,7 @@
 //! Pictures: linear or display-encoded, told apart by content.
 
 use crate::error::PictureError;
-use noisefloor::{Rgb, check_image};
+use noisefloor::{Rgb, check_image, srgb_decode};
 use std::fs::File;
 use std::io::{BufReader, Read, Seek};
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -30,13 +30,15 @@ pub struct DisplayImage {
     pub height: usize,
     /// Row-major, `width * height` values.
     pub pixels: Vec<Rgb>,
+    /// Distance of neighbouring codes: 1/255 or 1/65535. Values are rounded to multiples of it.
+    pub step: f32,
 }
 
 impl DisplayImage {
-    /// The same picture in linear light, by [`srgb_to_linear`]. Values that the display clipped stay at 1: what was above
+    /// The same picture in linear light, by [`srgb_decode`]. Values that the display clipped stay at 1: what was above
     /// is lost. One step of an 8-bit code is up to 0.9 % of full scale in linear light.
     pub fn to_linear(&self) -> LinearImage {
-        let pixels = self.pixels.iter().map(|rgb| rgb.map(srgb_to_linear)).collect();
+        let pixels = self.pixels.iter().map(|rgb| rgb.map(srgb_decode)).collect();
         LinearImage { width: self.width, height: self.height, pixels }
     }
 }
@@ -56,6 +58,14 @@ impl Picture {
         match self {
             Picture::Linear(image) => (image.width, image.height),
             Picture::Display(image) => (image.width, image.height),
+        }
+    }
+
+    /// Variance of the rounding of each display value: step²/12; 0 for a linear picture.
+    pub fn rounding(&self) -> f32 {
+        match self {
+            Picture::Linear(_) => 0.0,
+            Picture::Display(image) => image.step * image.step / 12.0,
         }
     }
 
@@ -81,16 +91,6 @@ pub fn read_picture(path: impl AsRef<Path>) -> Result<Picture, PictureError> {
         Format::Png => crate::decode_png::decode(path, opened).map(Picture::Display),
         _ => Err(opened.foreign(path, "an OpenEXR or PNG file")),
     }
-}
-
-/// Decodes one sRGB-encoded value (IEC 61966-2-1): 0…1 to linear 0…1. Values below 0 take the straight part.
-pub fn srgb_to_linear(encoded: f32) -> f32 {
-    if encoded <= 0.04045 { encoded / 12.92 } else { ((encoded + 0.055) / 1.055).powf(2.4) }
-}
-
-/// Encodes one linear value as sRGB (IEC 61966-2-1), the inverse of [`srgb_to_linear`]. Not clamped.
-pub fn linear_to_srgb(linear: f32) -> f32 {
-    if linear <= 0.003_130_8 { linear * 12.92 } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 }
 }
 
 /// What the first bytes say.

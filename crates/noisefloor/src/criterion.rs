@@ -2,6 +2,7 @@
 
 use crate::display::Display;
 use crate::film::Film;
+use crate::source::Rgb;
 use crate::tile::Tile;
 use thiserror::Error;
 
@@ -12,8 +13,8 @@ pub struct View<'a> {
     pub film: &'a Film,
     /// The frozen way from radiance to the screen.
     pub display: &'a Display,
-    /// Display luminance of the quick reference in [0, 1], row-major over the image; there if [`Needs::reference`] is.
-    pub reference: Option<&'a [f32]>,
+    /// The quick reference, display-encoded, row-major over the image; there if [`Needs::reference`] is.
+    pub reference: Option<&'a [Rgb]>,
 }
 
 /// What a criterion needs; nothing else is made.

@@ -5,11 +5,22 @@
 
 use crate::descriptor::Descriptor;
 use crate::display::ToneMapping;
-use crate::evidence::Evidence;
+use crate::evidence::{Evidence, ROUNDING_LUMINANCE, TilePlanes};
+use crate::mask::NoiseMask;
 use crate::model::Model;
 pub use crate::model::Scores;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
+
+/// Standard deviation of the noise mask (σ = 1) of the luminance residual over a zone, less known rounding noise; in display
+/// values. The constant-noise baseline goes by it.
+pub fn noise_level(planes: &TilePlanes) -> f32 {
+    let (mask, t) = (NoiseMask::default(), planes.inner);
+    let plane = mask.apply(&planes.residual);
+    let inner = plane.slice(ndarray::s![t.y..t.y + t.height, t.x..t.x + t.width]);
+    let variance = inner.iter().map(|v| v * v).sum::<f32>() / t.pixels() as f32;
+    (variance - mask.white_noise_gain() * planes.rounding * ROUNDING_LUMINANCE).max(0.0).sqrt()
+}
 
 /// Where the picture of a level comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -21,7 +32,7 @@ pub enum Origin {
     Synthesised,
 }
 
-/// One zone at one number of samples.
+/// One zone at one number of samples. Several levels may have the same number: other realisations of the noise.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Level {
     /// Samples per pixel.
@@ -67,6 +78,25 @@ pub struct Table {
     pub tone_mapping: ToneMapping,
     /// The zones.
     pub zones: Vec<Zone>,
+}
+
+impl Zone {
+    /// A quantity of the levels that observers could choose, by increasing samples; realisations of one level are averaged.
+    fn path(&self, quantity: impl Fn(usize) -> f64) -> Vec<(f64, f64)> {
+        let mut path: Vec<(f64, f64, f64)> = Vec::new();
+        for (i, level) in self.levels.iter().enumerate() {
+            if !(self.first_spp..=self.last_spp).contains(&level.spp) {
+                continue;
+            }
+            match path.last_mut() {
+                Some((spp, sum, count)) if *spp == level.spp => {
+                    (*sum, *count) = (*sum + quantity(i), *count + 1.0)
+                }
+                _ => path.push((level.spp, quantity(i), 1.0)),
+            }
+        }
+        path.into_iter().map(|(spp, sum, count)| (spp, sum / count)).collect()
+    }
 }
 
 impl Table {
@@ -193,8 +223,7 @@ impl Prediction {
 /// Predicts a zone's threshold: the samples at which P first reaches `threshold`.
 pub fn predict(model: &Model, threshold: f32, zone: &Zone) -> Prediction {
     let p = probabilities(model, zone);
-    let odds: Vec<(f64, f64)> =
-        zone.levels.iter().zip(&p).map(|(l, &p)| (l.spp, log_odds(f64::from(p)))).collect();
+    let odds = zone.path(|i| log_odds(f64::from(p[i])));
     let spp = crossing(&odds, log_odds(f64::from(threshold))).unwrap_or(zone.last_spp);
     Prediction::new(zone, spp, |i| p[i] >= threshold)
 }
@@ -223,9 +252,7 @@ pub fn image_accuracy<'a>(predictions: impl Iterator<Item = &'a Prediction> + Cl
 /// geometric mean of what it is at the human thresholds of all other groups.
 pub fn constant_noise_baseline(table: &Table) -> Vec<Prediction> {
     // Quietness −ln(noise) grows with samples.
-    let quietness = |zone: &Zone| -> Vec<(f64, f64)> {
-        zone.levels.iter().map(|l| (l.spp, -f64::from(l.noise).max(1e-9).ln())).collect()
-    };
+    let quietness = |zone: &Zone| zone.path(|i| -f64::from(zone.levels[i].noise).max(1e-9).ln());
     let at = |zone: &Zone, spp: f64| {
         let levels = quietness(zone);
         let i = levels.iter().position(|&(n, _)| n >= spp).unwrap_or(levels.len() - 1).max(1);

@@ -1,13 +1,17 @@
 //! What a tile is judged by: its display luminance, and what of it is noise.
 
-use crate::display::Display;
+use crate::display::{Display, luminance};
 use crate::film::Film;
-use crate::tile::{Tile, TileGrid};
+use crate::source::Rgb;
+use crate::tile::Tile;
 use ndarray::Array2;
 use serde::{Deserialize, Serialize};
 
-/// How far filters may read beyond a tile, in pixels, where neighbours exist.
+/// How far filters read beyond a tile, in pixels, and the block that tiles are cut into.
 pub const APRON: usize = 8;
+
+/// Luminance weights, squared and summed: variance of Y′ for unit variance of R′, G′ and B′.
+pub(crate) const ROUNDING_LUMINANCE: f32 = 0.2126 * 0.2126 + 0.7152 * 0.7152 + 0.0722 * 0.0722;
 
 /// What the noisy tile is held against.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -19,32 +23,46 @@ pub enum Evidence {
     Reference,
 }
 
-/// Display-encoded luminance of a tile and of an apron around it, as far as the image reaches.
+/// What is on the screen of a tile, and what of it is noise. All planes are display-encoded and have the same shape (rows,
+/// columns): the tile, whose edges are rounded up to multiples of [`APRON`], with an apron of that width around it. Neighbours are
+/// read where they exist; beyond the image, it is mirrored.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TilePlanes {
-    /// What is on the screen, in [0, 1]; shape (rows, columns) with the apron.
+    /// Luminance Y′ in [0, 1].
     pub image: Array2<f32>,
-    /// What of it is noise: `image` minus what it is held against, scaled so that its standard deviation is that of the
-    /// noise in `image`. Same shape.
+    /// Residual of the luminance Y′: the picture minus what it is held against, scaled so that its standard deviation is that
+    /// of the noise in the picture.
     pub residual: Array2<f32>,
+    /// Residual of the colour differences R′ − Y′ and B′ − Y′, scaled the same.
+    pub residual_colour: [Array2<f32>; 2],
+    /// Variance of known white rounding noise in each of the residuals of R′, G′ and B′; 0 for pictures in floating point.
+    pub rounding: f32,
     /// The tile itself within the planes: rows and columns of the planes that belong to it.
     pub inner: Tile,
 }
 
 impl TilePlanes {
-    /// Collects both planes; `pixel(x, y)` gives luminance and residual at image coordinates.
-    pub fn gather(grid: TileGrid, tile: Tile, pixel: impl Fn(usize, usize) -> (f32, f32)) -> Self {
-        let (x0, y0) = (tile.x.saturating_sub(APRON), tile.y.saturating_sub(APRON));
-        let (x1, y1) = (
-            (tile.x + tile.width + APRON).min(grid.width()),
-            (tile.y + tile.height + APRON).min(grid.height()),
-        );
-        let shape = (y1 - y0, x1 - x0);
-        let (mut image, mut residual) = (Array2::zeros(shape), Array2::zeros(shape));
-        for ((row, column), value) in image.indexed_iter_mut() {
-            (*value, residual[(row, column)]) = pixel(x0 + column, y0 + row);
+    /// Collects the planes of a tile of an image of `width`×`height` pixels, both at least 1; `pixel(x, y)` gives the
+    /// display-encoded picture and its residual at image coordinates.
+    pub fn gather(
+        (width, height): (usize, usize),
+        tile: Tile,
+        pixel: impl Fn(usize, usize) -> (Rgb, Rgb),
+    ) -> Self {
+        let padded = |edge: usize| edge.next_multiple_of(APRON) + 2 * APRON;
+        let shape = (padded(tile.height), padded(tile.width));
+        let zeros = || Array2::zeros(shape);
+        let (mut image, mut residual, mut red, mut blue) = (zeros(), zeros(), zeros(), zeros());
+        for (at, value) in image.indexed_iter_mut() {
+            let (x, y) = (mirror(tile.x + at.1, width), mirror(tile.y + at.0, height));
+            let (shown, noise) = pixel(x, y);
+            *value = luminance(shown);
+            residual[at] = luminance(noise);
+            red[at] = noise[0] - residual[at];
+            blue[at] = noise[2] - residual[at];
         }
-        Self { image, residual, inner: Tile { x: tile.x - x0, y: tile.y - y0, ..tile } }
+        let inner = Tile { x: APRON, y: APRON, ..tile };
+        Self { image, residual, residual_colour: [red, blue], rounding: 0.0, inner }
     }
 
     /// Evidence from the film's two halves.
@@ -56,28 +74,43 @@ impl TilePlanes {
     /// A pixel of which one half has no valid sample gives no evidence: its residual is 0.
     pub fn from_halves(film: &Film, display: &Display, tile: Tile) -> Self {
         let grid = film.grid();
-        Self::gather(grid, tile, |x, y| {
+        Self::gather((grid.width(), grid.height()), tile, |x, y| {
             let (owner, pixel) = (grid.index_at(x, y), y * grid.width() + x);
-            let image = display.luma(film.pixel(owner, pixel));
             let [(a, na), (b, nb)] = film.pixel_halves(owner, pixel);
             let (na, nb) = (na as f32, nb as f32);
             let scale = if na > 0.0 && nb > 0.0 { (na / (na + nb) * (nb / (na + nb))).sqrt() } else { 0.0 };
-            (image, (display.luma(a) - display.luma(b)) * scale)
+            (
+                display.encode(film.pixel(owner, pixel)),
+                difference(display.encode(a), display.encode(b), scale),
+            )
         })
     }
 
-    /// Evidence from a noise-free reference: the display luminance of the whole image, row-major.
+    /// Evidence from a noise-free reference: the whole image, display-encoded, row-major.
     ///
     /// # Panics
     /// If `reference` has fewer pixels than the film.
-    pub fn from_reference(film: &Film, display: &Display, reference: &[f32], tile: Tile) -> Self {
+    pub fn from_reference(film: &Film, display: &Display, reference: &[Rgb], tile: Tile) -> Self {
         let grid = film.grid();
-        Self::gather(grid, tile, |x, y| {
+        Self::gather((grid.width(), grid.height()), tile, |x, y| {
             let pixel = y * grid.width() + x;
-            let image = display.luma(film.pixel(grid.index_at(x, y), pixel));
-            (image, image - reference[pixel])
+            let shown = display.encode(film.pixel(grid.index_at(x, y), pixel));
+            (shown, difference(shown, reference[pixel], 1.0))
         })
     }
+}
+
+/// The image coordinate that shows at `place` of a plane that begins [`APRON`] before the image, mirrored at its first and last
+/// pixel.
+fn mirror(place: usize, edge: usize) -> usize {
+    let period = (2 * (edge - 1)).max(1);
+    let distance = place.abs_diff(APRON) % period;
+    distance.min(period - distance).min(edge - 1)
+}
+
+/// (a − b)·scale, channel by channel.
+fn difference(a: Rgb, b: Rgb, scale: f32) -> Rgb {
+    std::array::from_fn(|c| (a[c] - b[c]) * scale)
 }
 
 /// How two pictures of one scene were made from samples, for [`residual_scale`].
@@ -106,6 +139,7 @@ pub fn residual_scale(image: f64, other: f64, samples: Samples) -> Option<f32> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::tile::TileGrid;
 
     /// A seeded standard normal by the sum of twelve uniforms: variance exactly 1.
     fn noise(state: &mut u64) -> f32 {
@@ -148,14 +182,27 @@ mod tests {
     }
 
     #[test]
-    fn the_apron_ends_at_the_image() {
+    fn the_apron_reads_neighbours_and_mirrors_the_image_beyond_its_edge() {
         let grid = TileGrid::new(100, 40, 32).unwrap();
-        let planes = TilePlanes::gather(grid, grid.tile(0), |x, y| (x as f32, y as f32));
-        assert_eq!(planes.image.dim(), (40, 40));
-        assert_eq!((planes.inner.x, planes.inner.y), (0, 0));
-        let planes = TilePlanes::gather(grid, grid.tile(7), |x, y| (x as f32, y as f32));
-        assert_eq!(planes.image.dim(), (16, 12)); // rows 24…39, columns 88…99
-        assert_eq!((planes.inner.x, planes.inner.y, planes.inner.width), (8, 8, 4));
-        assert_eq!((planes.image[(8, 8)], planes.residual[(8, 8)]), (96.0, 32.0));
+        let plane =
+            |i: usize| TilePlanes::gather((100, 40), grid.tile(i), |x, y| ([x as f32; 3], [y as f32; 3]));
+        let close = |a: f32, b: f32| (a - b).abs() < 1e-4;
+        let first = plane(0);
+        assert_eq!(first.image.dim(), (48, 48));
+        assert!(
+            close(first.image[(8, 8)], 0.0)
+                && close(first.image[(8, 7)], 1.0)
+                && close(first.image[(8, 40)], 32.0)
+        );
+        let last = plane(7); // rows 32…39, columns 96…99
+        assert_eq!((last.image.dim(), last.inner.width), ((24, 24), 4));
+        assert!(close(last.image[(8, 8)], 96.0) && close(last.residual[(8, 8)], 32.0));
+        assert!(
+            close(last.image[(8, 12)], 98.0) && close(last.residual[(16, 8)], 38.0),
+            "mirrored at 99 and 39"
+        );
+        assert!(last.residual_colour.iter().all(|p| close(p[(8, 8)], 0.0)), "grey has no colour");
+        // Images smaller than the apron are mirrored more than once.
+        assert!((0..200).all(|place| mirror(place, 1) == 0 && mirror(place, 3) < 3));
     }
 }

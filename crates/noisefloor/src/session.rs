@@ -116,7 +116,7 @@ pub struct Session<C> {
     display: Option<Display>,
     reference: Option<Reference>,
     /// The reference as it is displayed, once the display is settled.
-    displayed_reference: Option<Vec<f32>>,
+    displayed_reference: Option<Vec<Rgb>>,
     tiles: Vec<TileState>,
 }
 
@@ -270,7 +270,7 @@ impl<C: StoppingCriterion> Session<C> {
         if let (Some(display), Some(reference), None) =
             (&self.display, &self.reference, &self.displayed_reference)
         {
-            self.displayed_reference = Some(reference.pixels.iter().map(|&p| display.luma(p)).collect());
+            self.displayed_reference = Some(reference.pixels.iter().map(|&p| display.encode(p)).collect());
         }
         true
     }

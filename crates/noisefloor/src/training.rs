@@ -247,7 +247,7 @@ mod tests {
     use crate::evaluation::{Level, Origin};
     use crate::evidence::Evidence;
 
-    /// Scenes where people stop at noise 0.01, whatever else: the first number is ln(noise), the others are distraction.
+    /// Scenes where people stop at noise 0.01, whatever else: the first number is ln(noise), the others distract.
     fn table(scenes: usize) -> Table {
         let dimensions = Descriptor::default().len();
         let mut state = 9u64;

@@ -67,6 +67,8 @@ pub struct Level {
     pub last: u64,
     /// What the numbers mean: display values for a PNG, linear for an EXR.
     pub encoding: Encoding,
+    /// Variance of the rounding of each value; see [`Picture::rounding`].
+    pub rounding: f32,
     /// The pixels.
     pub patch: Patch,
 }
@@ -158,6 +160,7 @@ impl<'a> Levels<'a> {
                 first: if job.batch { job.frame.first } else { 0 },
                 last: job.frame.last,
                 encoding,
+                rounding: picture.rounding(),
                 patch: cut(pixels, (w, h), Inner { x, y, width: zone.width, height: zone.height }),
             });
         }

@@ -12,7 +12,8 @@ use thiserror::Error;
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Descriptor {
-    /// A few dozen numbers, whatever the tile size: noise energies, and what masks them. The default.
+    /// Three numbers, whatever the tile size: how visible the noise is where it is most visible, and how much texture hides
+    /// it. The default.
     Compact {
         /// The noise mask.
         mask: NoiseMask,
@@ -68,6 +69,14 @@ impl Descriptor {
         match self {
             Self::Compact { .. } => compact::NAMES.len(),
             Self::MaskPair { edge, .. } => 2 * edge * edge,
+        }
+    }
+
+    /// What each number is, for the columns of tables.
+    pub fn number_names(&self) -> Vec<String> {
+        match self {
+            Self::Compact { .. } => compact::NAMES.map(str::to_owned).to_vec(),
+            Self::MaskPair { .. } => (0..self.len()).map(|i| format!("m{i}")).collect(),
         }
     }
 

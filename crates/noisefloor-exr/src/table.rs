@@ -1,0 +1,282 @@
+//! Descriptors of a corpus: computed from its images, and as CSV.
+//!
+//! Observers chose among many levels, of which a corpus has few images. Levels between them, and beyond, are synthesised:
+//! noise of unit variance a sample, Z = (mean of some samples − converged)·const, is laid over the converged picture R in the
+//! strength of the level, R + Z/√n. Two independent realisations of Z take turns as the noise in the picture and as the
+//! residual, as they do in two half buffers. Synthesised levels are marked so.
+
+use crate::corpus::{Corpus, Encoding, Level as Image, Patch};
+use crate::error::CorpusError;
+use noisefloor::evaluation::{Level, Origin, Table, Zone, group_of_scene, noise_level};
+use noisefloor::{
+    Descriptor, Display, Evidence, Rgb, Samples, Tile, TilePlanes, ToneMapping, residual_scale,
+};
+use rayon::prelude::*;
+use std::path::PathBuf;
+use thiserror::Error;
+
+mod csv_file;
+
+pub use csv_file::{read_table, write_table};
+
+/// Synthesised levels are 10·2^(k/2) samples per pixel: a grid that knows nothing of the thresholds.
+const GRID: std::ops::Range<i32> = -6..30;
+/// Levels are synthesised up to this factor below and above the human threshold, and wherever observers could choose.
+const REACH: f64 = 8.0;
+
+/// Why a table could not be computed, read or written.
+#[derive(Debug, Error)]
+pub enum TableError {
+    /// The corpus.
+    #[error(transparent)]
+    Corpus(#[from] CorpusError),
+    /// A zone has too few images.
+    #[error(
+        "{scene}, zone {zone}: {images} images are too few; two independent sets of samples and a converged picture are needed"
+    )]
+    TooFew {
+        /// The scene.
+        scene: String,
+        /// The zone.
+        zone: u32,
+        /// Its images.
+        images: usize,
+    },
+    /// The descriptor is for tiles of another size.
+    #[error("{scene}, zone {zone}: {source}")]
+    Descriptor {
+        /// The scene.
+        scene: String,
+        /// The zone.
+        zone: u32,
+        /// What does not fit.
+        source: noisefloor::DescriptorError,
+    },
+    /// The CSV is malformed.
+    #[error("line {line}: {what}")]
+    Row {
+        /// Line, from 1.
+        line: u64,
+        /// What is wrong with it.
+        what: String,
+    },
+    /// The CSV cannot be read or written.
+    #[error("the table cannot be read or written")]
+    Csv(#[from] csv::Error),
+}
+
+/// Describes every zone of the corpora, by half-buffer evidence. `on_zone(done, all)` is told of progress.
+///
+/// # Errors
+/// [`TableError`] if a corpus cannot be read, or a zone has too few images.
+pub fn describe_corpora(
+    folders: &[PathBuf],
+    descriptor: Descriptor,
+    mut on_zone: impl FnMut(usize, usize),
+) -> Result<Table, TableError> {
+    let corpora: Vec<Corpus> = folders.iter().map(Corpus::open).collect::<Result<_, _>>()?;
+    let all: usize = corpora.iter().map(|c| c.zones().len()).sum();
+    let mut zones = Vec::with_capacity(all);
+    for corpus in &corpora {
+        for scene in corpus.scenes() {
+            on_zone(zones.len(), all);
+            let images: Vec<Image> = corpus.scene_levels(scene)?.collect::<Result<_, _>>()?;
+            let of_scene: Vec<_> = corpus.zones().iter().filter(|z| z.scene == scene).collect();
+            let describe = |zone: &&crate::corpus::Zone| {
+                let images: Vec<&Image> = images.iter().filter(|i| i.zone == zone.zone).collect();
+                describe_zone(zone, &images, descriptor)
+            };
+            zones.extend(of_scene.par_iter().map(describe).collect::<Result<Vec<_>, _>>()?);
+        }
+    }
+    on_zone(all, all);
+    let tone_mapping = ToneMapping::Srgb { exposure: 1.0 };
+    Ok(Table { descriptor, evidence: Evidence::Halves, tone_mapping, zones })
+}
+
+fn describe_zone(
+    zone: &crate::corpus::Zone,
+    images: &[&Image],
+    descriptor: Descriptor,
+) -> Result<Zone, TableError> {
+    let (scene, number) = (zone.scene.clone(), zone.zone);
+    let too_few = TableError::TooFew { scene: scene.clone(), zone: number, images: images.len() };
+    let running = images.iter().all(|i| i.first == 0 && i.encoding == Encoding::Display);
+    let material =
+        if running { Material::from_running_means(images) } else { Material::from_batches(images) };
+    let material = material.ok_or(too_few)?;
+
+    let (first_spp, last_spp) = (zone.first_spp as f64, zone.last_spp as f64);
+    let (low, high) = (first_spp.min(zone.human_spp / REACH), last_spp.max(zone.human_spp * REACH));
+    let grid = GRID.map(|k| 10.0 * 2f64.powf(0.5 * f64::from(k))).filter(|n| (low..=high).contains(n));
+    let synthesised =
+        grid.flat_map(|spp| [0, 1].map(|turn| (spp, Origin::Synthesised, material.synthesise(spp, turn))));
+    let mut levels = Vec::new();
+    for (spp, origin, planes) in material.real().into_iter().chain(synthesised) {
+        let mut numbers = Vec::with_capacity(descriptor.len());
+        descriptor.describe(&planes, &mut numbers).map_err(|source| TableError::Descriptor {
+            scene: scene.clone(),
+            zone: number,
+            source,
+        })?;
+        levels.push(Level { spp, origin, noise: noise_level(&planes), descriptor: numbers });
+    }
+    levels.sort_by(|a, b| a.spp.total_cmp(&b.spp));
+    let group = group_of_scene(&scene).to_owned();
+    let (human_spp, censored) = (zone.human_spp, zone.censored);
+    Ok(Zone { scene, group, zone: number, human_spp, censored, first_spp, last_spp, levels })
+}
+
+/// Display-encoded pixels of a zone with its apron.
+type Pixels = Vec<Rgb>;
+
+/// One realisation of the noise: zero mean, variance that of a single sample.
+struct Noise {
+    pixels: Pixels,
+    /// Variance of the rounding in it.
+    rounding: f64,
+}
+
+/// A level that is there: samples, picture, and a residual with the noise of the picture.
+struct Real {
+    spp: f64,
+    shown: Pixels,
+    residual: Pixels,
+    rounding: f64,
+}
+
+/// What levels of one zone are made of.
+struct Material {
+    size: (usize, usize),
+    tile: Tile,
+    converged: Pixels,
+    converged_spp: f64,
+    noise: [Noise; 2],
+    real: Vec<Real>,
+}
+
+fn combine(a: &[Rgb], fa: f64, b: &[Rgb], fb: f64) -> Pixels {
+    let pixel =
+        |(a, b): (&Rgb, &Rgb)| std::array::from_fn(|c| (f64::from(a[c]) * fa + f64::from(b[c]) * fb) as f32);
+    a.iter().zip(b).map(pixel).collect()
+}
+
+impl Material {
+    fn frame(patch: &Patch) -> ((usize, usize), Tile) {
+        let inner = patch.inner;
+        let tile = Tile { index: 0, x: inner.x, y: inner.y, width: inner.width, height: inner.height };
+        ((patch.width, patch.height), tile)
+    }
+
+    /// Running means that contain one another, in display values. Realisations are the first `a` samples and the next `b − a`.
+    fn from_running_means(images: &[&Image]) -> Option<Self> {
+        let last = images.last()?;
+        let converged_spp = last.last as f64;
+        let early: Vec<&&Image> = images.iter().filter(|i| (i.last as f64) <= 0.5 * converged_spp).collect();
+
+        // Both realisations need many samples, and the second must not amplify rounding: at most threefold more before it than
+        // in it. Among equals, the first.
+        let pairs = early.iter().flat_map(|a| early.iter().map(move |b| (a, b)));
+        let usable = pairs.filter(|(a, b)| b.last > a.last && a.last <= 3 * (b.last - a.last));
+        let (a, b) = usable.min_by_key(|(a, b)| std::cmp::Reverse(a.last.min(b.last - a.last)))?;
+
+        // (mean of k samples − converged) has variance 1/k − 1/N, since the converged picture contains them.
+        let (na, nb) = (a.last as f64, b.last as f64);
+        let unit = |samples: f64| (1.0 / samples - 1.0 / converged_spp).sqrt().recip();
+        let converged = last.patch.pixels.clone();
+        let rounding = f64::from(last.rounding);
+        let scale = unit(na);
+        let first = Noise {
+            pixels: combine(&a.patch.pixels, scale, &converged, -scale),
+            rounding: 2.0 * rounding * scale * scale,
+        };
+        let (batch, scale) = (nb - na, unit(nb - na));
+        let second = combine(&b.patch.pixels, nb / batch, &a.patch.pixels, -na / batch);
+        let second = Noise {
+            pixels: combine(&second, scale, &converged, -scale),
+            rounding: rounding * (1.0 + (na * na + nb * nb) / (batch * batch)) * scale * scale,
+        };
+
+        // An early picture is held against the converged one, a late one against the early one with most samples.
+        let real = |image: &&Image| {
+            let is_early = (image.last as f64) <= 0.5 * converged_spp;
+            let other = if is_early { last } else { b };
+            let scale = residual_scale(image.last as f64, other.last as f64, Samples::Nested)?;
+            let scale = f64::from(scale);
+            Some(Real {
+                spp: image.last as f64,
+                shown: image.patch.pixels.clone(),
+                residual: combine(&image.patch.pixels, scale, &other.patch.pixels, -scale),
+                rounding: 2.0 * rounding * scale * scale,
+            })
+        };
+        let real = images.iter().filter_map(real).collect();
+        let (size, tile) = Self::frame(&last.patch);
+        Some(Self { size, tile, converged, converged_spp, noise: [first, second], real })
+    }
+
+    /// Means of separate batches, in linear light: real half buffers at every level.
+    fn from_batches(images: &[&Image]) -> Option<Self> {
+        let last = images.last()?;
+        let converged_spp = last.last as f64;
+        let encode = |linear: &[Rgb]| -> Pixels { linear.iter().map(|&p| Display::SRGB.encode(p)).collect() };
+        let mut halves =
+            [(0.0, vec![[0.0; 3]; last.patch.pixels.len()]), (0.0, vec![[0.0; 3]; last.patch.pixels.len()])];
+        let mut early = None;
+        let mut real = Vec::new();
+        for image in images {
+            // Each batch joins the half with fewer samples.
+            let half = usize::from(halves[1].0 < halves[0].0);
+            let samples = (image.last - image.first) as f64;
+            let (n, mean) = &mut halves[half];
+            *mean = combine(mean, *n / (*n + samples), &image.patch.pixels, samples / (*n + samples));
+            *n += samples;
+            let [(na, a), (nb, b)] = &halves;
+            if *nb == 0.0 {
+                continue;
+            }
+            let (a, b, all) = (encode(a), encode(b), encode(&combine(a, na / (na + nb), b, nb / (na + nb))));
+            let scale = (na * nb).sqrt() / (na + nb);
+            real.push(Real {
+                spp: image.last as f64,
+                shown: all,
+                residual: combine(&a, scale, &b, -scale),
+                rounding: 0.0,
+            });
+            if (image.last as f64) <= 0.5 * converged_spp {
+                early = Some(((*na, a), (*nb, b)));
+            }
+        }
+        let converged = real.last()?.shown.clone();
+        let noise = |(samples, mean): &(f64, Pixels)| {
+            let scale = (1.0 / samples - 1.0 / converged_spp).sqrt().recip();
+            Noise { pixels: combine(mean, scale, &converged, -scale), rounding: 0.0 }
+        };
+        let (a, b) = early?;
+        let noise = [noise(&a), noise(&b)];
+        let (size, tile) = Self::frame(&last.patch);
+        Some(Self { size, tile, converged, converged_spp, noise, real })
+    }
+
+    fn planes(&self, shown: &[Rgb], residual: &[Rgb], rounding: f64) -> TilePlanes {
+        let at = |x: usize, y: usize| y * self.size.0 + x;
+        let planes = TilePlanes::gather(self.size, self.tile, |x, y| (shown[at(x, y)], residual[at(x, y)]));
+        TilePlanes { rounding: rounding as f32, ..planes }
+    }
+
+    fn real(&self) -> Vec<(f64, Origin, TilePlanes)> {
+        let planes = |r: &Real| (r.spp, Origin::Real, self.planes(&r.shown, &r.residual, r.rounding));
+        self.real.iter().map(planes).collect()
+    }
+
+    /// The level of `spp` samples: one realisation (0 or 1) is the noise in the picture, the other the residual. The converged
+    /// picture has noise of its own, so that less is laid over it; beyond its samples none is.
+    fn synthesise(&self, spp: f64, realisation: usize) -> TilePlanes {
+        let (in_picture, held_against) = (&self.noise[realisation], &self.noise[1 - realisation]);
+        let missing = (1.0 / spp - 1.0 / self.converged_spp).max(0.0).sqrt();
+        let strength = (1.0 / spp).sqrt();
+        let shown = combine(&self.converged, 1.0, &in_picture.pixels, missing);
+        let residual = combine(&held_against.pixels, strength, &held_against.pixels, 0.0);
+        self.planes(&shown, &residual, held_against.rounding / spp)
+    }
+}
