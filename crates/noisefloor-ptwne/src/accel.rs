@@ -205,9 +205,8 @@ impl Accel {
         }
         let bounds: Vec<Aabb> = shapes.iter().map(Shape::bounds).collect();
         let params = BvhBuildParams {
-            pre_split: false, // would need triangles
-            max_prims_per_leaf: 4,
-            collapse_traversal_cost: 3.0,
+            pre_split: false,      // would need triangles
+            max_prims_per_leaf: 1, // leaves are made below
             ..BvhBuildParams::slow_build()
         };
         let tree = build_bvh2(&bounds, params, &mut std::time::Duration::default());
@@ -228,15 +227,17 @@ impl Accel {
         Stack(vec![(0, 0.0); self.stack])
     }
 
-    /// Collapses the binary tree: each wide node opens the largest of its inner children until it has four.
+    /// Collapses the binary tree: each wide node opens the largest of its inner children until it has four. What fits into
+    /// one pack is a leaf, for a pack costs no more than a node.
     fn widen(&mut self, tree: &Bvh2, shapes: &[Shape], depth: &mut usize) {
         let mut todo = vec![(0usize, vec![0usize], 1usize)];
         while let Some((at, mut children, level)) = todo.pop() {
             *depth = level.max(*depth);
             while children.len() < 4 {
-                let inner = |i: &usize| !tree.nodes[children[*i]].is_leaf();
+                let large = |i: &usize| few(tree, children[*i]).is_none();
                 let area = |i: &usize| tree.nodes[children[*i]].aabb().half_area();
-                let Some(open) = (0..children.len()).filter(inner).max_by(|a, b| area(a).total_cmp(&area(b)))
+                let Some(open) =
+                    (0..children.len()).filter(large).max_by(|a, b| area(a).total_cmp(&area(b)))
                 else {
                     break;
                 };
@@ -249,10 +250,8 @@ impl Accel {
                     self.nodes[at].bounds[axis][0][lane] = node.aabb().min[axis];
                     self.nodes[at].bounds[axis][1][lane] = node.aabb().max[axis];
                 }
-                self.nodes[at].child[lane] = if node.is_leaf() {
-                    let first = node.first_index as usize;
-                    let prims = &tree.primitive_indices[first..first + node.prim_count as usize];
-                    self.leaf(prims, shapes)
+                self.nodes[at].child[lane] = if let Some(prims) = few(tree, child) {
+                    self.leaf(&prims, shapes)
                 } else {
                     let first = node.first_index as usize;
                     let index = self.nodes.len();
@@ -394,6 +393,24 @@ impl Accel {
         }
         false
     }
+}
+
+/// The surfaces below a node, if they are at most four.
+fn few(tree: &Bvh2, root: usize) -> Option<Vec<u32>> {
+    let (mut found, mut todo) = (vec![], vec![root]);
+    while let Some(index) = todo.pop() {
+        let node = &tree.nodes[index];
+        let first = node.first_index as usize;
+        if node.is_leaf() {
+            found.extend(&tree.primitive_indices[first..first + node.prim_count as usize]);
+        } else {
+            todo.extend([first, first + 1]);
+        }
+        if found.len() + todo.len() > 4 {
+            return None;
+        }
+    }
+    Some(found)
 }
 
 #[cfg(test)]

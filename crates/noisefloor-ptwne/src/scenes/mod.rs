@@ -1,7 +1,11 @@
 //! Built-in scenes, all procedural.
 
 mod cornell;
+mod glass;
+mod halls;
 mod kit;
+mod outdoors;
+mod rooms;
 
 use crate::{Scene, SceneError};
 
@@ -16,10 +20,17 @@ pub struct Entry {
     pub description: &'static str,
 }
 
-const ALL: &[(Entry, Make)] = &[(
-    Entry { name: "cornell-box", description: "two boxes in a box: one area light, colour bleeding" },
-    cornell::cornell_box,
-)];
+const ALL: &[(Entry, Make)] = &[
+    (Entry { name: "cornell-box", description: "two boxes in a box: one area light, colour bleeding" }, cornell::cornell_box),
+    (Entry { name: "bulb", description: "a desk in a dim room under one very small light: hard shadows" }, rooms::bulb),
+    (Entry { name: "softbox", description: "metals of three roughnesses under a large soft light" }, rooms::softbox),
+    (Entry { name: "courtyard", description: "outdoors in sun and sky: brick, plaster, clipped trees" }, outdoors::courtyard),
+    (Entry { name: "door-ajar", description: "a room lit through a door that stands ajar: mostly indirect light" }, rooms::door),
+    (Entry { name: "glass-spheres", description: "glass and mirror balls in a box: caustics" }, glass::caustics),
+    (Entry { name: "arcade", description: "a hall of columns, brick and checkers under an open roof" }, halls::arcade),
+    (Entry { name: "lanterns", description: "a market street at night: 120 small lights" }, halls::lanterns),
+    (Entry { name: "plates", description: "metal plates of four roughnesses that mirror lights of four sizes" }, glass::plates),
+];
 
 /// All built-in scenes, in a fixed order.
 pub fn list() -> impl ExactSizeIterator<Item = Entry> {
@@ -31,4 +42,19 @@ pub fn by_name(name: &str) -> Option<Scene> {
     let (entry, make) = ALL.iter().find(|(entry, _)| entry.name == name)?;
     // Tests build all of them
     make(entry.name).ok()
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn every_scene_builds_and_names_are_unique() {
+        let names: std::collections::HashSet<_> = super::list().map(|entry| entry.name).collect();
+        assert_eq!(names.len(), super::ALL.len());
+        for (entry, make) in super::ALL {
+            let scene = make(entry.name).unwrap();
+            assert_eq!(scene.name(), entry.name);
+            assert!(scene.lights() > 0 && scene.surfaces() > 10);
+        }
+        assert!(super::by_name("no-such-scene").is_none());
+    }
 }
