@@ -146,7 +146,7 @@ impl Pack {
         let (a, b) = (e1.as_dvec3(), e2.as_dvec3());
         let n = a.cross(b);
         let inverse = n.length_squared().recip();
-        let mut put = |what: &mut [Vec4; 3], v: glam::DVec3| {
+        let put = |what: &mut [Vec4; 3], v: glam::DVec3| {
             for i in 0..3 {
                 what[i][lane] = v[i] as f32;
             }
@@ -236,8 +236,7 @@ impl Accel {
             while children.len() < 4 {
                 let large = |i: &usize| few(tree, children[*i]).is_none();
                 let area = |i: &usize| tree.nodes[children[*i]].aabb().half_area();
-                let Some(open) =
-                    (0..children.len()).filter(large).max_by(|a, b| area(a).total_cmp(&area(b)))
+                let Some(open) = (0..children.len()).filter(large).max_by(|a, b| area(a).total_cmp(&area(b)))
                 else {
                     break;
                 };

@@ -1,7 +1,7 @@
 //! How surfaces scatter. Directions are local, the normal is +z, and both point away from the surface.
 
 use crate::math::{self, Vec3};
-use std::f32::consts::{FRAC_1_PI, PI};
+use std::f32::consts::FRAC_1_PI;
 
 /// Schlick's approximation of the Fresnel term (Schlick 1994), for reflectance `f0` at normal incidence.
 #[inline]
@@ -88,15 +88,10 @@ impl Ggx {
     }
 }
 
-/// Density of the diffuse direction with cosine `cos`.
-#[inline]
-pub(crate) fn diffuse_pdf(cos: f32) -> f32 {
-    cos.max(0.0) / PI
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::f32::consts::PI;
 
     /// ∫ density over the hemisphere and ∫ f·cos agree with the sampled weights: both by midpoint rule over (θ, φ).
     #[test]

@@ -63,14 +63,6 @@ pub(crate) fn turn(u: f32) -> (f32, f32) {
     }
 }
 
-/// The unit disc by polar coordinates; area-preserving.
-#[inline]
-pub(crate) fn disc(u: [f32; 2]) -> (f32, f32) {
-    let (sin, cos) = turn(u[1]);
-    let r = u[0].sqrt();
-    (r * cos, r * sin)
-}
-
 /// A direction of the upper hemisphere, with density cos θ / π (Malley's method).
 #[inline]
 pub(crate) fn cosine_hemisphere(u: [f32; 2]) -> Vec3 {

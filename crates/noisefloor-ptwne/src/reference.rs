@@ -97,9 +97,7 @@ impl Tracer<'_> {
         sum + match kind {
             Kind::Diffuse => weight * colour * self.diffuse(&surface),
             Kind::Mirror => self.follow(&surface, mirrored, depth, weight * colour),
-            Kind::Conductor => {
-                self.follow(&surface, mirrored, depth, weight * bsdf::schlick(colour, cos))
-            }
+            Kind::Conductor => self.follow(&surface, mirrored, depth, weight * bsdf::schlick(colour, cos)),
             Kind::Glass => {
                 let eta = if surface.front { value } else { 1.0 / value };
                 let (reflectance, cos_t) = bsdf::fresnel(cos, eta);
@@ -137,7 +135,9 @@ impl Tracer<'_> {
         let mut sum = Vec3::ZERO;
         for light in &scene.lights.all {
             for i in 0..n * n {
-                let Some(Aim { dir, distance, pdf }) = light.aim(origin, self.stratum(i, n)) else { continue };
+                let Some(Aim { dir, distance, pdf }) = light.aim(origin, self.stratum(i, n)) else {
+                    continue;
+                };
                 if dir.dot(surface.flat) <= 0.0 {
                     continue;
                 }
@@ -176,7 +176,8 @@ impl Tracer<'_> {
         let Looks { colour: f0, value: alpha, .. } = surface.looks;
         let (ggx, frame) = (Ggx { alpha }, Frame::new(surface.normal));
         let wo = frame.to_local(-ray.dir);
-        let (n, points) = (if depth == 1 { self.strata.max(2) } else { 1 }, (self.strata * self.strata) as f32);
+        let (n, points) =
+            (if depth == 1 { self.strata.max(2) } else { 1 }, (self.strata * self.strata) as f32);
         let directions = (n * n) as f32;
         let follows = depth < MAX_SPECULAR && weight.max_element() >= MIN_WEIGHT;
 

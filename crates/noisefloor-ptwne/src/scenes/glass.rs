@@ -13,13 +13,14 @@ pub(super) fn caustics(name: &str) -> Result<Scene, SceneError> {
     let glass = k.material(Material::Glass { ior: 1.5, tint: [0.98, 0.99, 0.98] })?;
     let amber = k.material(Material::Glass { ior: 1.45, tint: [0.95, 0.66, 0.30] })?;
     let mirror = k.material(Material::Mirror { reflectance: [0.9; 3] })?;
-    let (x, z) = ([-1.4, 1.4], [-1.2, 1.4]);
+    let (x, z) = ([-1.4, 1.4], [-1.2, 4.8]);
 
     k.floor(0.0, x, z, true, floor, None);
     k.floor(2.2, x, z, false, white, None);
     k.wall([-1.4, -1.2], [1.4, -1.2], [0.0, 2.2], white);
-    k.wall([-1.4, 1.4], [-1.4, -1.2], [0.0, 2.2], ochre);
-    k.wall([1.4, -1.2], [1.4, 1.4], [0.0, 2.2], teal);
+    k.wall([-1.4, 4.8], [-1.4, -1.2], [0.0, 2.2], ochre);
+    k.wall([1.4, -1.2], [1.4, 4.8], [0.0, 2.2], teal);
+    k.wall([1.4, 4.8], [-1.4, 4.8], [0.0, 2.2], white);
     k.ball([-0.62, 0.52, -0.35], 0.52, mirror, None);
     k.ball([0.52, 0.46, 0.22], 0.46, glass, None);
     k.ball([-0.28, 0.22, 0.62], 0.22, amber, None);
@@ -61,9 +62,9 @@ pub(super) fn plates(name: &str) -> Result<Scene, SceneError> {
         (0.55, 0.26, [0.6, 0.8, 1.0]),
         (1.85, 0.42, [0.95, 0.7, 1.0]),
     ] {
-        let strength = 1.35 / (radius * radius);
+        let strength = 0.42 / (radius * radius);
         k.ball([x, lights[0], lights[1]], radius, black, glow(colour.map(|c: f32| c * strength)));
     }
-    k.floor(6.5, [-3.0, 3.0], [3.0, 6.0], false, black, glow([0.9; 3]));
+    k.floor(6.5, [-3.0, 3.0], [3.0, 6.0], false, black, glow([1.1; 3]));
     k.build()
 }

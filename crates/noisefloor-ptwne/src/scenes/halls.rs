@@ -19,10 +19,14 @@ pub(super) fn arcade(name: &str) -> Result<Scene, SceneError> {
     let bronze = k.metal([0.70, 0.50, 0.28], 0.25)?;
 
     k.sky(Environment {
-        zenith: [0.9, 1.35, 2.3],
-        horizon: [2.2, 2.4, 2.6],
+        zenith: [0.42, 0.66, 1.2],
+        horizon: [0.95, 1.1, 1.3],
         ground: [0.3, 0.28, 0.25],
-        sun: Some(Sun { direction: [0.42, 1.0, 0.16], angular_radius: 0.8, radiance: [9000.0, 7900.0, 6200.0] }),
+        sun: Some(Sun {
+            direction: [0.42, 1.0, 0.16],
+            angular_radius: 0.8,
+            radiance: [5200.0, 4500.0, 3500.0],
+        }),
     });
     k.floor(0.0, [-5.0, 5.0], [-10.0, 10.0], true, floor, None);
     // Outer walls, galleries over the aisles, walls above them
@@ -37,8 +41,16 @@ pub(super) fn arcade(name: &str) -> Result<Scene, SceneError> {
         slab(&mut k, 2.2, 2.6, [3.2, 3.6], plaster);
         slab(&mut k, 2.3, 2.5, [3.9, 4.6], brick);
         slab(&mut k, 3.6, 5.4, [6.4, 6.7], plaster);
-        let column =
-            [[0.34, 0.0], [0.34, 0.2], [0.26, 0.28], [0.24, 0.34], [0.21, 2.6], [0.25, 2.7], [0.36, 2.95], [0.36, 3.2]];
+        let column = [
+            [0.34, 0.0],
+            [0.34, 0.2],
+            [0.26, 0.28],
+            [0.24, 0.34],
+            [0.21, 2.6],
+            [0.25, 2.7],
+            [0.36, 2.95],
+            [0.36, 3.2],
+        ];
         let slim = [[0.2, 0.0], [0.13, 0.1], [0.11, 1.55], [0.2, 1.7], [0.2, 1.8]];
         for i in 0..8 {
             let z = -8.75 + 2.5 * i as f32;
@@ -56,7 +68,17 @@ pub(super) fn arcade(name: &str) -> Result<Scene, SceneError> {
     k.cuboid([-5.0, 0.0, 10.0], [5.0, 7.0, 10.4], brick);
     k.cuboid([-0.9, 0.0, -10.02], [0.9, 2.9, -9.98], cloths[0]);
     // Urns along the nave
-    let urn = [[0.0, 0.0], [0.3, 0.0], [0.3, 0.3], [0.14, 0.4], [0.32, 0.75], [0.34, 0.95], [0.2, 1.1], [0.26, 1.2], [0.0, 1.1]];
+    let urn = [
+        [0.0, 0.0],
+        [0.3, 0.0],
+        [0.3, 0.3],
+        [0.14, 0.4],
+        [0.32, 0.75],
+        [0.34, 0.95],
+        [0.2, 1.1],
+        [0.26, 1.2],
+        [0.0, 1.1],
+    ];
     for (x, z) in [(-1.35, 1.2), (1.35, 1.2), (-1.35, -4.0), (1.35, -4.0)] {
         k.lathe([x, 0.0, z], &urn, 36, true, bronze);
     }
@@ -66,18 +88,25 @@ pub(super) fn arcade(name: &str) -> Result<Scene, SceneError> {
 /// A market street at night: a hundred and more lanterns of many colours.
 pub(super) fn lanterns(name: &str) -> Result<Scene, SceneError> {
     let mut k = Kit::new(name, look([0.1, 1.8, 7.0], [0.0, 1.55, 0.0], 46.0))?;
-    let cobbles = Texture::Brick { brick: [0.30, 0.29, 0.29], mortar: [0.14, 0.13, 0.13], scale: [2.6, 4.0] };
+    let cobbles = Texture::Brick { brick: [0.42, 0.40, 0.39], mortar: [0.20, 0.19, 0.18], scale: [2.6, 4.0] };
     let cobbles = k.diffuse(cobbles)?;
-    let brick = Texture::Brick { brick: [0.50, 0.30, 0.22], mortar: [0.48, 0.45, 0.42], scale: [2.0, 4.5] };
+    let brick = Texture::Brick { brick: [0.60, 0.38, 0.28], mortar: [0.55, 0.45, 0.42], scale: [2.0, 4.5] };
     let brick = k.diffuse(brick)?;
     let plaster = k.diffuse([0.62, 0.56, 0.46])?;
     let wood = k.diffuse([0.36, 0.22, 0.12])?;
     let dark = k.diffuse([0.05, 0.05, 0.06])?;
-    let awnings = [k.diffuse([0.62, 0.14, 0.10])?, k.diffuse([0.66, 0.60, 0.48])?, k.diffuse([0.12, 0.30, 0.36])?];
-    let fruit = [k.diffuse([0.70, 0.30, 0.04])?, k.diffuse([0.55, 0.06, 0.05])?, k.diffuse([0.28, 0.42, 0.08])?];
+    let awnings =
+        [k.diffuse([0.62, 0.14, 0.10])?, k.diffuse([0.66, 0.60, 0.48])?, k.diffuse([0.12, 0.30, 0.36])?];
+    let fruit =
+        [k.diffuse([0.70, 0.30, 0.04])?, k.diffuse([0.55, 0.06, 0.05])?, k.diffuse([0.28, 0.42, 0.08])?];
     let copper = k.metal([0.90, 0.58, 0.44], 0.2)?;
 
-    k.sky(Environment { zenith: [0.006, 0.01, 0.028], horizon: [0.02, 0.024, 0.045], ground: [0.0; 3], sun: None });
+    k.sky(Environment {
+        zenith: [0.006, 0.01, 0.028],
+        horizon: [0.02, 0.024, 0.045],
+        ground: [0.0; 3],
+        sun: None,
+    });
     k.floor(0.0, [-4.0, 4.0], [-12.0, 9.0], true, cobbles, None);
     k.cuboid([-4.4, 0.0, -12.0], [-3.2, 5.0, 9.0], brick);
     k.cuboid([3.2, 0.0, -12.0], [4.4, 5.0, 9.0], plaster);
@@ -101,20 +130,30 @@ pub(super) fn lanterns(name: &str) -> Result<Scene, SceneError> {
             k.cuboid([side * 3.2 - 0.02, 3.0, z - 0.45], [side * 3.2 + 0.02, 4.1, z + 0.45], dark);
         }
     }
-    let kettle = [[0.0, 0.0], [0.4, 0.0], [0.55, 0.2], [0.58, 0.45], [0.4, 0.75], [0.12, 0.85], [0.1, 0.95], [0.0, 0.97]];
+    let kettle = [
+        [0.0, 0.0],
+        [0.4, 0.0],
+        [0.55, 0.2],
+        [0.58, 0.45],
+        [0.4, 0.75],
+        [0.12, 0.85],
+        [0.1, 0.95],
+        [0.0, 0.97],
+    ];
     k.lathe([-0.9, 0.0, 1.6], &kettle, 48, true, copper);
     k.turned([1.0, 0.0, 0.2], [0.7, 0.6, 0.7], 28.0, wood);
     k.turned([1.05, 0.6, 0.2], [0.5, 0.45, 0.5], -10.0, wood);
 
     // Lanterns on sagging strings across the street
-    let colours = [[1.0, 0.62, 0.28], [1.0, 0.42, 0.18], [0.95, 0.85, 0.6], [0.35, 0.75, 0.9], [0.95, 0.35, 0.45]];
+    let colours =
+        [[1.0, 0.62, 0.28], [1.0, 0.42, 0.18], [0.95, 0.85, 0.6], [0.35, 0.75, 0.9], [0.95, 0.35, 0.45]];
     for string in 0..12 {
         let z = -11.0 + 1.45 * string as f32;
         for i in 0..10 {
             let t = (i as f32 + 0.5) / 10.0;
             let y = 3.35 - 2.2 * t * (1.0 - t) + 0.25 * ((string * 7 % 5) as f32 / 5.0 - 0.4);
-            let colour = colours[(i * 3 + string * 2) % 5].map(|c: f32| c * 11.0);
-            k.ball([-3.1 + 6.2 * t, y, z + 0.3 * (t - 0.5)], 0.07, dark, glow(colour));
+            let colour = colours[(i * 3 + string * 2) % 5].map(|c: f32| c * 13.0);
+            k.ball([-3.1 + 6.2 * t, y, z + 0.3 * (t - 0.5)], 0.1, dark, glow(colour));
         }
     }
     k.build()

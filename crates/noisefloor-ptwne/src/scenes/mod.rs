@@ -21,15 +21,45 @@ pub struct Entry {
 }
 
 const ALL: &[(Entry, Make)] = &[
-    (Entry { name: "cornell-box", description: "two boxes in a box: one area light, colour bleeding" }, cornell::cornell_box),
-    (Entry { name: "bulb", description: "a desk in a dim room under one very small light: hard shadows" }, rooms::bulb),
-    (Entry { name: "softbox", description: "metals of three roughnesses under a large soft light" }, rooms::softbox),
-    (Entry { name: "courtyard", description: "outdoors in sun and sky: brick, plaster, clipped trees" }, outdoors::courtyard),
-    (Entry { name: "door-ajar", description: "a room lit through a door that stands ajar: mostly indirect light" }, rooms::door),
-    (Entry { name: "glass-spheres", description: "glass and mirror balls in a box: caustics" }, glass::caustics),
-    (Entry { name: "arcade", description: "a hall of columns, brick and checkers under an open roof" }, halls::arcade),
+    (
+        Entry { name: "cornell-box", description: "two boxes in a box: one area light, colour bleeding" },
+        cornell::cornell_box,
+    ),
+    (
+        Entry { name: "bulb", description: "a desk in a dim room under one very small light: hard shadows" },
+        rooms::bulb,
+    ),
+    (
+        Entry { name: "softbox", description: "metals of three roughnesses under a large soft light" },
+        rooms::softbox,
+    ),
+    (
+        Entry { name: "courtyard", description: "outdoors in sun and sky: brick, plaster, clipped trees" },
+        outdoors::courtyard,
+    ),
+    (
+        Entry {
+            name: "door-ajar",
+            description: "a room lit through a door that stands ajar: mostly indirect light",
+        },
+        rooms::door,
+    ),
+    (
+        Entry { name: "glass-spheres", description: "glass and mirror balls in a box: caustics" },
+        glass::caustics,
+    ),
+    (
+        Entry { name: "arcade", description: "a hall of columns, brick and checkers under an open roof" },
+        halls::arcade,
+    ),
     (Entry { name: "lanterns", description: "a market street at night: 120 small lights" }, halls::lanterns),
-    (Entry { name: "plates", description: "metal plates of four roughnesses that mirror lights of four sizes" }, glass::plates),
+    (
+        Entry {
+            name: "plates",
+            description: "metal plates of four roughnesses that mirror lights of four sizes",
+        },
+        glass::plates,
+    ),
 ];
 
 /// All built-in scenes, in a fixed order.

@@ -22,7 +22,11 @@ pub(super) fn courtyard(name: &str) -> Result<Scene, SceneError> {
         zenith: [0.16, 0.27, 0.56],
         horizon: [0.52, 0.60, 0.72],
         ground: [0.16, 0.15, 0.13],
-        sun: Some(Sun { direction: [0.55, 0.72, 0.45], angular_radius: 0.6, radiance: [3300.0, 2900.0, 2300.0] }),
+        sun: Some(Sun {
+            direction: [0.55, 0.72, 0.45],
+            angular_radius: 0.6,
+            radiance: [13000.0, 11400.0, 9000.0],
+        }),
     };
     k.sky(dome);
     k.floor(0.0, [-30.0, 30.0], [-30.0, 30.0], true, paving, None);
@@ -36,7 +40,8 @@ pub(super) fn courtyard(name: &str) -> Result<Scene, SceneError> {
     k.cuboid([-6.2, 3.0, -4.3], [6.2, 3.5, -3.8], plaster);
     let slope = [0.0, 1.0, -2.8];
     k.quad([-6.4, 3.5, -3.6], [12.8, 0.0, 0.0], slope, roof, None);
-    let column = [[0.26, 0.0], [0.26, 0.14], [0.19, 0.2], [0.16, 2.35], [0.2, 2.42], [0.28, 2.5], [0.28, 2.7]];
+    let column =
+        [[0.26, 0.0], [0.26, 0.14], [0.19, 0.2], [0.16, 2.35], [0.2, 2.42], [0.28, 2.5], [0.28, 2.7]];
     for i in 0..7 {
         k.lathe([-5.4 + 1.8 * i as f32, 0.3, -4.05], &column, 32, false, stone);
     }

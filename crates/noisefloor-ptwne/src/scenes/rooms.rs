@@ -32,7 +32,16 @@ pub(super) fn bulb(name: &str) -> Result<Scene, SceneError> {
     }
     let vase = [[0.0, 0.0], [0.16, 0.0], [0.24, 0.16], [0.25, 0.3], [0.16, 0.5], [0.09, 0.6], [0.14, 0.72]];
     k.lathe([-0.75, 0.6, -0.25], &vase, 48, true, clay);
-    let bowl = [[0.0, 0.0], [0.12, 0.0], [0.13, 0.03], [0.24, 0.12], [0.3, 0.24], [0.29, 0.24], [0.22, 0.12], [0.0, 0.04]];
+    let bowl = [
+        [0.0, 0.0],
+        [0.12, 0.0],
+        [0.13, 0.03],
+        [0.24, 0.12],
+        [0.3, 0.24],
+        [0.29, 0.24],
+        [0.22, 0.12],
+        [0.0, 0.04],
+    ];
     k.lathe([0.7, 0.6, 0.2], &bowl, 48, true, brass);
     k.turned([0.62, 0.60, -0.45], [0.55, 0.10, 0.40], 14.0, blue);
     k.turned([0.60, 0.70, -0.45], [0.48, 0.08, 0.36], -8.0, cream);
@@ -43,13 +52,13 @@ pub(super) fn bulb(name: &str) -> Result<Scene, SceneError> {
 
     // A bulb on a wire: a small sphere
     k.cuboid([0.045, 1.96, -0.205], [0.055, 3.2, -0.195], black);
-    k.ball([0.05, 1.9, -0.2], 0.035, black, glow([900.0, 720.0, 480.0]));
+    k.ball([0.05, 1.9, -0.2], 0.035, black, glow([1500.0, 1220.0, 840.0]));
     k.build()
 }
 
 /// A photographer's studio: metals of growing roughness and a draped still life under a soft box.
 pub(super) fn softbox(name: &str) -> Result<Scene, SceneError> {
-    let mut k = Kit::new(name, look([0.0, 1.5, 5.4], [0.0, 0.72, 0.0], 33.0))?;
+    let mut k = Kit::new(name, look([0.0, 1.5, 5.4], [0.0, 0.72, 0.0], 37.0))?;
     let paper = k.diffuse([0.55, 0.55, 0.57])?;
     let checker = Texture::Checker { colours: [[0.65, 0.65, 0.62], [0.12, 0.13, 0.16]], scale: [4.0, 4.0] };
     let checker = k.diffuse(checker)?;
@@ -83,7 +92,7 @@ pub(super) fn softbox(name: &str) -> Result<Scene, SceneError> {
     k.lathe([0.02, 0.18, 0.55], &cone, 40, false, red);
 
     // The soft box above, a strip from the left
-    k.floor(3.6, [-2.2, 2.2], [-1.2, 2.2], false, white, glow([3.1, 3.1, 3.0]));
+    k.floor(3.6, [-2.2, 2.2], [-1.2, 2.2], false, white, glow([2.8, 2.8, 2.7]));
     k.quad([-4.2, 0.4, 2.6], [0.0, 2.2, 0.0], [0.6, 0.0, 0.8], white, glow([2.2, 2.6, 3.4]));
     k.build()
 }
@@ -113,14 +122,23 @@ pub(super) fn door(name: &str) -> Result<Scene, SceneError> {
     k.cuboid([-2.5, 0.0, -0.1], [-2.4, 2.6, 4.0], wall);
     k.cuboid([-2.5, 2.1, -1.1], [-2.4, 2.6, -0.1], wall);
     k.turned([-2.1, 0.02, -0.35], [0.98, 2.06, 0.05], 35.0, wood);
-    k.floor(2.58, [-4.9, -2.9], [-1.9, 1.2], false, hall, glow([30.0, 27.0, 22.0]));
+    k.floor(2.58, [-4.9, -2.9], [-1.9, 1.2], false, hall, glow([44.0, 40.0, 33.0]));
 
     // Table with a still life
     k.cuboid([-0.75, 0.68, -1.2], [1.15, 0.75, -0.1], wood);
     for (x, z) in [(-0.68, -1.13), (1.0, -1.13), (-0.68, -0.25), (1.0, -0.25)] {
         k.cuboid([x, 0.0, z], [x + 0.08, 0.68, z + 0.08], wood);
     }
-    let pot = [[0.0, 0.0], [0.17, 0.0], [0.25, 0.1], [0.26, 0.2], [0.18, 0.32], [0.05, 0.36], [0.05, 0.4], [0.0, 0.42]];
+    let pot = [
+        [0.0, 0.0],
+        [0.17, 0.0],
+        [0.25, 0.1],
+        [0.26, 0.2],
+        [0.18, 0.32],
+        [0.05, 0.36],
+        [0.05, 0.4],
+        [0.0, 0.42],
+    ];
     k.lathe([-0.35, 0.75, -0.6], &pot, 48, true, steel);
     k.lathe([0.75, 0.75, -0.7], &pot, 48, true, red);
     k.ball([0.22, 0.93, -0.5], 0.18, glass, None);
