@@ -111,14 +111,14 @@ impl Wide {
     #[inline]
     fn new(ray: &Ray) -> Self {
         // Keep inverses finite, so that no 0·∞ arises
-        let safe = |d: f32| 1.0 / if d.abs() < 1e-18 { 1e-18f32.copysign(d) } else { d };
-        let (o, d) = (ray.origin.to_array(), ray.dir.to_array());
-        let inverse = d.map(safe);
+        let tiny = ray.dir.abs().cmplt(Vec3::splat(1e-18));
+        let inverse = Vec3::select(tiny, Vec3::splat(1e-18).copysign(ray.dir), ray.dir).recip();
+        let (o, d, shift) = (ray.origin.to_array(), ray.dir.to_array(), (ray.origin * inverse).to_array());
         Self {
             origin: o.map(Vec4::splat),
             dir: d.map(Vec4::splat),
-            inverse: inverse.map(Vec4::splat),
-            shift: std::array::from_fn(|i| Vec4::splat(o[i] * inverse[i])),
+            inverse: inverse.to_array().map(Vec4::splat),
+            shift: shift.map(Vec4::splat),
             enter: d.map(|d| usize::from(d.is_sign_negative())),
         }
     }
@@ -299,17 +299,19 @@ impl Accel {
                 let (enter, mut mask) = n.meet(&wide, best.t);
                 if mask != 0 {
                     // Go on with the nearest child, leave the others behind
-                    let enter = enter.to_array();
                     let mut near = mask.trailing_zeros() as usize & 3;
                     mask &= mask - 1;
-                    while mask != 0 {
-                        let mut other = mask.trailing_zeros() as usize & 3;
-                        mask &= mask - 1;
-                        if enter[other] < enter[near] {
-                            std::mem::swap(&mut near, &mut other);
+                    if mask != 0 {
+                        let enter = enter.to_array();
+                        while mask != 0 {
+                            let mut other = mask.trailing_zeros() as usize & 3;
+                            mask &= mask - 1;
+                            if enter[other] < enter[near] {
+                                std::mem::swap(&mut near, &mut other);
+                            }
+                            stack.0[top] = (n.child[other], enter[other]);
+                            top += 1;
                         }
-                        stack.0[top] = (n.child[other], enter[other]);
-                        top += 1;
                     }
                     node = n.child[near];
                     continue;
@@ -334,8 +336,10 @@ impl Accel {
 
     #[inline]
     fn closest_in_leaf<const SPHERES: bool>(&self, node: u32, ray: &Ray, wide: &Wide, best: &mut Hit) {
-        let leaf = self.leaves[(node & !LEAF) as usize];
-        if !SPHERES || leaf.pack != NONE {
+        let index = (node & !LEAF) as usize;
+        // Without spheres each leaf has one pack, of the same index
+        let leaf = if SPHERES { self.leaves[index] } else { Leaf { pack: index as u32, first_ball: 0, balls: 0 } };
+        if leaf.pack != NONE {
             let pack = &self.packs[leaf.pack as usize];
             let (t, u, v, mut mask) = pack.meet(wide, best.t);
             if mask != 0 {
@@ -378,8 +382,9 @@ impl Accel {
                 }
                 continue;
             }
-            let leaf = self.leaves[(node & !LEAF) as usize];
-            if (!SPHERES || leaf.pack != NONE) && self.packs[leaf.pack as usize].meet(&wide, t_max).3 != 0 {
+            let index = (node & !LEAF) as usize;
+            let leaf = if SPHERES { self.leaves[index] } else { Leaf { pack: index as u32, first_ball: 0, balls: 0 } };
+            if leaf.pack != NONE && self.packs[leaf.pack as usize].meet(&wide, t_max).3 != 0 {
                 return true;
             }
             if SPHERES {

@@ -152,7 +152,7 @@ pub(super) fn lanterns(name: &str) -> Result<Scene, SceneError> {
         for i in 0..10 {
             let t = (i as f32 + 0.5) / 10.0;
             let y = 3.35 - 2.2 * t * (1.0 - t) + 0.25 * ((string * 7 % 5) as f32 / 5.0 - 0.4);
-            let colour = colours[(i * 3 + string * 2) % 5].map(|c: f32| c * 13.0);
+            let colour = colours[(i * 3 + string * 2) % 5].map(|c: f32| c * 9.0);
             k.ball([-3.1 + 6.2 * t, y, z + 0.3 * (t - 0.5)], 0.1, dark, glow(colour));
         }
     }

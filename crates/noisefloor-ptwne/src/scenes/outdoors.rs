@@ -23,7 +23,7 @@ pub(super) fn courtyard(name: &str) -> Result<Scene, SceneError> {
         horizon: [0.52, 0.60, 0.72],
         ground: [0.16, 0.15, 0.13],
         sun: Some(Sun {
-            direction: [0.55, 0.72, 0.45],
+            direction: [0.75, 0.62, 0.12],
             angular_radius: 0.6,
             radiance: [13000.0, 11400.0, 9000.0],
         }),
