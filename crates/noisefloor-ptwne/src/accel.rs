@@ -1,5 +1,5 @@
 //! Where rays meet surfaces: a bounding volume hierarchy, built by `obvhs` and walked four boxes and four surfaces at once.
-//! Why so: `docs/benchmarks/bvh.md`.
+//! Why so: `docs/benchmarks/bvh.md` beside this crate.
 
 use crate::math::{Ray, Vec3};
 use glam::Vec4;
@@ -338,7 +338,8 @@ impl Accel {
     fn closest_in_leaf<const SPHERES: bool>(&self, node: u32, ray: &Ray, wide: &Wide, best: &mut Hit) {
         let index = (node & !LEAF) as usize;
         // Without spheres each leaf has one pack, of the same index
-        let leaf = if SPHERES { self.leaves[index] } else { Leaf { pack: index as u32, first_ball: 0, balls: 0 } };
+        let leaf =
+            if SPHERES { self.leaves[index] } else { Leaf { pack: index as u32, first_ball: 0, balls: 0 } };
         if leaf.pack != NONE {
             let pack = &self.packs[leaf.pack as usize];
             let (t, u, v, mut mask) = pack.meet(wide, best.t);
@@ -383,7 +384,11 @@ impl Accel {
                 continue;
             }
             let index = (node & !LEAF) as usize;
-            let leaf = if SPHERES { self.leaves[index] } else { Leaf { pack: index as u32, first_ball: 0, balls: 0 } };
+            let leaf = if SPHERES {
+                self.leaves[index]
+            } else {
+                Leaf { pack: index as u32, first_ball: 0, balls: 0 }
+            };
             if leaf.pack != NONE && self.packs[leaf.pack as usize].meet(&wide, t_max).3 != 0 {
                 return true;
             }
