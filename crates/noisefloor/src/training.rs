@@ -32,7 +32,7 @@ impl Default for TrainParams {
             .iter()
             .flat_map(|&c| [0.003, 0.01, 0.03].map(|gamma| SvmParams { c, gamma }))
             .collect();
-        Self { candidates, range: 8.0, spread: 0.28 }
+        Self { candidates, range: 8.0, spread: 0.44 }
     }
 }
 
