@@ -19,8 +19,8 @@ mod csv_file;
 
 pub use csv_file::{read_table, write_table};
 
-/// Synthesised levels are 10·2^(k/2) samples per pixel: a grid that knows nothing of the thresholds.
-const GRID: std::ops::Range<i32> = -6..30;
+/// Synthesised levels are 10·2^(3k/4) samples per pixel, in whole samples, for these k: a grid that knows nothing of the thresholds.
+const GRID: std::ops::Range<i32> = -4..20;
 /// Levels are synthesised up to this factor below and above the human threshold, and wherever observers could choose.
 const REACH: f64 = 8.0;
 
@@ -108,7 +108,7 @@ fn describe_zone(
 
     let (first_spp, last_spp) = (zone.first_spp as f64, zone.last_spp as f64);
     let (low, high) = (first_spp.min(zone.human_spp / REACH), last_spp.max(zone.human_spp * REACH));
-    let grid = GRID.map(|k| 10.0 * 2f64.powf(0.5 * f64::from(k))).filter(|n| (low..=high).contains(n));
+    let grid = GRID.map(|k| (10.0 * 2f64.powf(0.75 * f64::from(k))).round()).filter(|n| (low..=high).contains(n));
     let synthesised =
         grid.flat_map(|spp| [0, 1].map(|turn| (spp, Origin::Synthesised, material.synthesise(spp, turn))));
     let mut levels = Vec::new();
