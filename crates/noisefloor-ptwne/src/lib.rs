@@ -51,3 +51,7 @@ pub use material::{MIN_ROUGHNESS, Material};
 pub use renderer::{MAX_DEPTH, MAX_THREADS, Options, Ptwne};
 pub use scene::Scene;
 pub use texture::{ImageTexture, MAX_TEXTURE_PIXELS, Texture};
+
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -2,14 +2,16 @@
 //! Light that was scattered by a diffuse surface on its way is missing, as in the paper.
 //!
 //! # How fine
-//! [`GRID`]² rays a pixel through the centres of a grid. Each ray that meets a surface looks at n×n points of every light,
-//! one a stratum, and at n×n directions of the sky: n = 4 up to 4 lights, 2 up to 16, else 1. The points of the rays of one
-//! pixel are shifted against each other along a Hammersley set, alike in all pixels: a pixel sees [`GRID`]²·n² points of each
-//! light, and as all pixels see the same, there is no noise, but steps of 1/([`GRID`]·n)² in penumbrae.
+//! [`RAYS`] rays a pixel, through the points of a Hammersley set: one in each of 4×4 squares, and no two in one row or column
+//! of sixteen. Each ray that meets a surface looks at n×n points of every light, one a stratum, and at n×n directions of the
+//! sky: n = 4 up to 4 lights, 2 up to 16, else 1. The points of the rays of one pixel are shifted against each other, alike
+//! in all pixels: a pixel sees [`RAYS`]·n² points of each light, and as all pixels see the same, there is no noise, but steps
+//! of 1/([`RAYS`]·n²) in penumbrae. Of more than 32 lights, each ray of a pixel looks at every k-th, k = 2, 4, 8 or 16, in
+//! turn: all rays together look at each 16/k times.
 //!
 //! Mirrors and both sides of glass are followed to [`MAX_SPECULAR`] segments, down to a weight of [`MIN_WEIGHT`]. Rough
 //! conductors show n×n directions of the visible normals, one at deeper levels; what these meet and the points of the lights
-//! share by the balance heuristic (Veach 1997, §9.2.2).
+//! share by the balance heuristic (Veach 1997, §9.2.2). On diffuse surfaces that are seen so, n is at most 2.
 
 use crate::accel::Stack;
 use crate::bsdf::{self, Ggx};
@@ -21,8 +23,8 @@ use noisefloor::Rgb;
 use rayon::prelude::*;
 use std::f32::consts::FRAC_1_PI;
 
-/// Rays along each edge of a pixel.
-const GRID: u32 = 4;
+/// Rays through each pixel.
+const RAYS: u32 = 16;
 /// Longest chain of mirrors and glass.
 const MAX_SPECULAR: u32 = 10;
 /// Branches that weigh less are cut.
@@ -36,26 +38,37 @@ pub(crate) fn render(scene: &Scene, width: usize, height: usize) -> Vec<Rgb> {
         5..=16 => 2,
         _ => 1,
     };
+    let stride = (scene.lights.all.len() / 32).clamp(1, 16).next_power_of_two();
     let mut pixels = vec![[0.0; 3]; width * height];
     pixels.par_chunks_mut(width).with_max_len(1).enumerate().for_each(|(y, row)| {
-        let mut tracer = Tracer { scene, strata, shift: [0.0; 2], stack: scene.accel.stack() };
+        let mut tracer =
+            Tracer { scene, strata, shift: [0.0; 2], stride, turn: 0, stack: scene.accel.stack() };
         for (x, pixel) in row.iter_mut().enumerate() {
             let mut sum = Vec3::ZERO;
-            for i in 0..GRID * GRID {
-                tracer.shift = hammersley(i, GRID * GRID);
-                let (dx, dy) = ((i % GRID) as f32 + 0.5, (i / GRID) as f32 + 0.5);
-                let ray = lens.ray(x as f32 + dx / GRID as f32, y as f32 + dy / GRID as f32);
+            for i in 0..RAYS {
+                let [dx, dy] = hammersley(i, RAYS);
+                tracer.shift = shift(i);
+                // Rays that are neighbours in the pixel see different lights
+                tracer.turn = (i + i / 4) as usize % stride;
+                let ray = lens.ray(x as f32 + dx, y as f32 + dy);
                 sum += tracer.radiance(&ray, 1, Vec3::ONE, None);
             }
-            *pixel = (sum / (GRID * GRID) as f32).to_array();
+            *pixel = (sum / RAYS as f32).to_array();
         }
     });
     pixels
 }
 
-/// Point `i` of `n` of the Hammersley set.
+/// Point `i` of `n` of the Hammersley set, each in the middle of its row and column.
 fn hammersley(i: u32, n: u32) -> [f32; 2] {
-    [(i as f32 + 0.5) / n as f32, (i.reverse_bits() >> 8) as f32 / (1 << 24) as f32]
+    let half = 0.5 / n as f32;
+    [i as f32 / n as f32 + half, (i.reverse_bits() >> 8) as f32 / (1 << 24) as f32 + half]
+}
+
+/// Point `i` of the additive recurrence of the plastic number, well spread for any count, and unrelated to [`hammersley`].
+fn shift(i: u32) -> [f32; 2] {
+    let step = |a: f64| ((f64::from(i) + 0.5) * a).fract() as f32;
+    [step(0.754_877_666_246_693), step(0.569_840_290_998_053)]
 }
 
 struct Tracer<'a> {
@@ -63,6 +76,9 @@ struct Tracer<'a> {
     strata: u32,
     /// Where in each stratum its point lies.
     shift: [f32; 2],
+    /// Every how many lights the ray looks at, and the first.
+    stride: usize,
+    turn: usize,
     stack: Stack,
 }
 
@@ -95,7 +111,10 @@ impl Tracer<'_> {
         let cos = (-ray.dir.dot(surface.normal)).clamp(0.0, 1.0);
         let mirrored = math::reflect(ray.dir, surface.normal);
         sum + match kind {
-            Kind::Diffuse => weight * colour * self.diffuse(&surface),
+            Kind::Diffuse => {
+                let n = if sampled.is_some() { self.strata.min(2) } else { self.strata };
+                weight * colour * self.diffuse(&surface, n)
+            }
             Kind::Mirror => self.follow(&surface, mirrored, depth, weight * colour),
             Kind::Conductor => self.follow(&surface, mirrored, depth, weight * bsdf::schlick(colour, cos)),
             Kind::Glass => {
@@ -128,12 +147,11 @@ impl Tracer<'_> {
     }
 
     /// Sums `scattered` · radiance / density over the points of all lights that the surface sees.
-    fn lights(&mut self, surface: &Surface, scattered: impl Fn(Vec3, f32) -> Vec3) -> Vec3 {
+    fn lights(&mut self, surface: &Surface, n: u32, scattered: impl Fn(Vec3, f32) -> Vec3) -> Vec3 {
         let scene = self.scene;
         let origin = scene.leave(surface, surface.flat);
-        let n = self.strata;
         let mut sum = Vec3::ZERO;
-        for light in &scene.lights.all {
+        for light in scene.lights.all.iter().skip(self.turn).step_by(self.stride) {
             for i in 0..n * n {
                 let Some(Aim { dir, distance, pdf }) = light.aim(origin, self.stratum(i, n)) else {
                     continue;
@@ -146,7 +164,7 @@ impl Tracer<'_> {
                 let counts = share.max_element() > 0.0 && share.is_finite();
                 let shadow = Ray { origin, dir };
                 if counts && !scene.accel.blocked::<true>(&shadow, distance * 0.9999, &mut self.stack) {
-                    sum += share;
+                    sum += share * self.stride as f32;
                 }
             }
         }
@@ -154,11 +172,11 @@ impl Tracer<'_> {
     }
 
     /// Reflected direct light at albedo 1.
-    fn diffuse(&mut self, surface: &Surface) -> Vec3 {
+    fn diffuse(&mut self, surface: &Surface, n: u32) -> Vec3 {
         let normal = surface.normal;
-        let mut sum = self.lights(surface, |dir, _| Vec3::splat(dir.dot(normal).max(0.0) * FRAC_1_PI));
+        let mut sum = self.lights(surface, n, |dir, _| Vec3::splat(dir.dot(normal).max(0.0) * FRAC_1_PI));
         if let Some(dome) = &self.scene.dome {
-            let (n, frame) = (self.strata.max(2), Frame::new(normal));
+            let (n, frame) = (n.max(2), Frame::new(normal));
             for i in 0..n * n {
                 let dir = frame.to_world(math::cosine_hemisphere(self.stratum(i, n)));
                 if dir.dot(surface.flat) > 0.0 {
@@ -182,7 +200,7 @@ impl Tracer<'_> {
         let follows = depth < MAX_SPECULAR && weight.max_element() >= MIN_WEIGHT;
 
         let mut sum = weight
-            * self.lights(surface, |dir, pdf| {
+            * self.lights(surface, self.strata, |dir, pdf| {
                 let (f_cos, chosen, cos_h) = ggx.eval(wo, frame.to_local(dir));
                 let rival = if follows { chosen * directions } else { 0.0 };
                 bsdf::schlick(f0, cos_h) * (f_cos * (pdf * points / (pdf * points + rival)))

@@ -108,13 +108,14 @@ impl Kit {
         let y = [0.0, size[1], 0.0];
         let add = |a: P, b: P| [a[0] + b[0], a[1] + b[1], a[2] + b[2]];
         let low = [base[0] - 0.5 * (x[0] + z[0]), base[1], base[2] - 0.5 * (x[2] + z[2])];
-        // Front faces outward
+        // Front faces outward; u runs along the ground on the four sides
+        let minus = |a: P| a.map(|c| -c);
         self.quad(low, x, z, m, None);
         self.quad(add(low, y), z, x, m, None);
-        self.quad(low, y, x, m, None);
+        self.quad(add(low, x), minus(x), y, m, None);
         self.quad(add(low, z), x, y, m, None);
         self.quad(low, z, y, m, None);
-        self.quad(add(low, x), y, z, m, None);
+        self.quad(add(add(low, x), z), minus(z), y, m, None);
     }
 
     /// A surface of revolution around the vertical through `base`: `profile` is a list of (radius, height), from the bottom

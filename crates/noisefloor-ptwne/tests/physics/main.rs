@@ -4,6 +4,11 @@
 //! errors, estimated from at least 64 batches. By Student's t with 63 degrees of freedom a right renderer fails one such
 //! comparison by chance with p = 5e-6; the whole suite makes about a hundred: 5e-4.
 
+#![expect(
+    clippy::unwrap_used,
+    reason = "a panic in a test is how a test fails; clippy.toml covers test functions alone"
+)]
+
 mod determinism; // threads, batches, seeds, independence
 mod direct; // direct light in closed form, and the reference
 mod extremes; // nothing but finite numbers
