@@ -287,7 +287,7 @@ impl Accel {
     }
 
     /// The nearest surface along the ray. `SPHERES` says whether the scene has any.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn closest<const SPHERES: bool>(&self, ray: &Ray, stack: &mut Stack) -> Hit {
         let wide = Wide::new(ray);
         let mut best = MISS;
@@ -365,7 +365,7 @@ impl Accel {
     }
 
     /// Whether any surface lies on the ray before `t_max`.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn blocked<const SPHERES: bool>(&self, ray: &Ray, t_max: f32, stack: &mut Stack) -> bool {
         let wide = Wide::new(ray);
         let mut top = 1;

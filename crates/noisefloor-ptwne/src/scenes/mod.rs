@@ -1,4 +1,13 @@
-//! Built-in scenes, all procedural.
+//! Built-in scenes, all procedural: they differ in light, shapes and textures, and are framed for square images. Exposed so
+//! that both plain sRGB and Reinhard's operator show them well.
+//!
+//! ```
+//! use noisefloor_ptwne::scenes;
+//! for entry in scenes::list() {
+//!     println!("{:15} {}", entry.name, entry.description);
+//!     assert!(scenes::by_name(entry.name).is_some());
+//! }
+//! ```
 
 mod cornell;
 mod glass;
