@@ -108,7 +108,8 @@ fn describe_zone(
 
     let (first_spp, last_spp) = (zone.first_spp as f64, zone.last_spp as f64);
     let (low, high) = (first_spp.min(zone.human_spp / REACH), last_spp.max(zone.human_spp * REACH));
-    let grid = GRID.map(|k| (10.0 * 2f64.powf(0.75 * f64::from(k))).round()).filter(|n| (low..=high).contains(n));
+    let grid =
+        GRID.map(|k| (10.0 * 2f64.powf(0.75 * f64::from(k))).round()).filter(|n| (low..=high).contains(n));
     let synthesised =
         grid.flat_map(|spp| [0, 1].map(|turn| (spp, Origin::Synthesised, material.synthesise(spp, turn))));
     let mut levels = Vec::new();

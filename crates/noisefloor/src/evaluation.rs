@@ -10,7 +10,7 @@ use crate::mask::NoiseMask;
 use crate::model::Model;
 pub use crate::model::Scores;
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Standard deviation of the noise mask (σ = 1) of the luminance residual over a zone, less known rounding noise; in display
 /// values. The constant-noise baseline goes by it.
@@ -248,25 +248,36 @@ pub fn image_accuracy<'a>(predictions: impl Iterator<Item = &'a Prediction> + Cl
     (images > 0).then(|| right as f64 / images as f64)
 }
 
-/// The constant-noise baseline: a zone has converged once the standard deviation of its noise mask falls to one constant, the
-/// geometric mean of what it is at the human thresholds of all other groups.
+/// The constant-noise baseline: a zone has converged once the standard deviation of its noise mask falls to one constant. Of the
+/// noise levels at the human thresholds of all other groups, it is the one that errs least on those groups.
 pub fn constant_noise_baseline(table: &Table) -> Vec<Prediction> {
     // Quietness −ln(noise) grows with samples.
-    let quietness = |zone: &Zone| zone.path(|i| -f64::from(zone.levels[i].noise).max(1e-9).ln());
-    let at = |zone: &Zone, spp: f64| {
-        let levels = quietness(zone);
-        let i = levels.iter().position(|&(n, _)| n >= spp).unwrap_or(levels.len() - 1).max(1);
-        let ((n0, q0), (n1, q1)) = (levels[i - 1], levels[i]);
-        q0 + (q1 - q0) * ((spp / n0).ln() / (n1 / n0).ln()).clamp(0.0, 1.0)
+    let zones: Vec<(&Zone, Vec<(f64, f64)>)> = table
+        .zones
+        .iter()
+        .map(|zone| (zone, zone.path(|i| -f64::from(zone.levels[i].noise).max(1e-9).ln())))
+        .filter(|(_, path)| path.len() > 1)
+        .collect();
+    let predict = |(zone, path): &(&Zone, Vec<(f64, f64)>), quietness: f64| {
+        Prediction::by_threshold(zone, crossing(path, quietness).unwrap_or(zone.last_spp))
     };
-    let usable = || table.zones.iter().filter(|z| z.levels.len() > 1);
-    let predict = |zone: &Zone| {
-        let others = || usable().filter(|o| o.group != zone.group && !o.censored);
-        let constant = others().map(|o| at(o, o.human_spp)).sum::<f64>() / others().count() as f64;
-        let spp = crossing(&quietness(zone), constant).unwrap_or(zone.last_spp);
-        Prediction::by_threshold(zone, spp)
+    let constant = |left_out: &str| {
+        let others = || zones.iter().filter(|(z, _)| z.group != left_out && !z.censored);
+        let error =
+            |constant: f64| others().map(|other| predict(other, constant).log_ratio().abs()).sum::<f64>();
+        let candidates = others().filter_map(|(zone, path)| value_at(path, zone.human_spp));
+        candidates.map(|c| (error(c), c)).min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, c)| c)
     };
-    usable().map(predict).collect()
+    let of_group: BTreeMap<&str, Option<f64>> =
+        table.groups().into_iter().map(|g| (g, constant(g))).collect();
+    zones.iter().filter_map(|zone| Some(predict(zone, of_group[zone.0.group.as_str()]?))).collect()
+}
+
+/// A quantity at given samples, interpolated in ln(spp) between the levels around it.
+fn value_at(levels: &[(f64, f64)], spp: f64) -> Option<f64> {
+    let after = levels.iter().position(|&(n, _)| n >= spp).unwrap_or(levels.len() - 1).max(1);
+    let (&(n0, v0), &(n1, v1)) = (levels.get(after - 1)?, levels.get(after)?);
+    Some(v0 + (v1 - v0) * ((spp / n0).ln() / (n1 / n0).ln()).clamp(0.0, 1.0))
 }
 
 /// The scene-median baseline: the median threshold of the same scene's other zones, which no predictor of unseen scenes can

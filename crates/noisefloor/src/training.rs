@@ -30,10 +30,8 @@ pub struct TrainParams {
 impl Default for TrainParams {
     /// For the compact descriptor.
     fn default() -> Self {
-        let candidates = [0.3, 1.0, 3.0]
-            .iter()
-            .flat_map(|&c| [0.01, 0.03].map(|gamma| SvmParams { c, gamma }))
-            .collect();
+        let candidates =
+            [0.3, 1.0, 3.0].iter().flat_map(|&c| [0.01, 0.03].map(|gamma| SvmParams { c, gamma })).collect();
         Self { candidates, range: 8.0, spread: 0.46 }
     }
 }
