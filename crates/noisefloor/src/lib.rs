@@ -1,4 +1,30 @@
 //! Tells progressive Monte Carlo renderers, tile by tile, when people stop seeing noise.
+//!
+//! An oracle trained on human thresholds looks at each tile of a progressive rendering and says with which probability an
+//! observer sees no difference from the converged picture; after Takouachet et al. 2017, "Perception of noise and Global
+//! Illumination: toward an automatic stopping criterion based on SVM".
+//!
+//! - A renderer that owns its loop pushes samples into a [`Session`].
+//! - A renderer behind [`ProgressiveSource`] is driven by a [`Driver`].
+//! - [`Oracle`] is the [`StoppingCriterion`] made of a trained [`Model`]; [`FixedSamples`] is the simplest one.
+//! - [`Film`], [`Display`], [`TilePlanes`], [`NoiseMask`], [`Descriptor`] and [`Svm`] are the way from samples to a verdict.
+//! - [`evaluation`] scores predicted thresholds against human ones; `training`, behind the feature `train`, makes models.
+//!
+//! ```
+//! use noisefloor::{Oracle, Params, Session, StopReason};
+//!
+//! let mut session = Session::new(64, 64, Oracle::bundled(), Params { tile: 32, ..Params::default() })?;
+//! while !session.is_done() {
+//!     for request in session.requests() {
+//!         // A renderer of a grey wall, whose pixels differ by nothing: nobody sees noise.
+//!         let mean = vec![[0.5; 3]; request.tile.pixels()];
+//!         session.push(request.tile.index, request.samples, &mean)?;
+//!     }
+//!     session.judge()?;
+//! }
+//! assert!(session.stops().all(|stop| stop.reason == StopReason::Converged && stop.samples == 100));
+//! # Ok::<(), noisefloor::SessionError>(())
+//! ```
 
 mod criterion;
 mod descriptor;

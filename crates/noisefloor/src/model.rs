@@ -14,6 +14,8 @@ use thiserror::Error;
 
 const MAGIC: [u8; 8] = *b"NFMODEL\0";
 const VERSION: u32 = 1;
+#[cfg(feature = "bundled-model")]
+static BUNDLED: &[u8] = include_bytes!("../models/human.nfm");
 /// Largest payload that is read: the paper's own model, 9,600 pairs of 2·128² numbers, would have 1.26 GB.
 const MAX_PAYLOAD: u64 = 2 << 30;
 
@@ -117,8 +119,7 @@ impl Model {
     /// `docs/guide.md` for the command that makes it.
     #[cfg(feature = "bundled-model")]
     pub fn bundled() -> Self {
-        static BYTES: &[u8] = include_bytes!("../models/human.nfm");
-        Self::read(BYTES).expect("the bundled model is checked by a test")
+        Self::read(BUNDLED).expect("the bundled model is checked by a test")
     }
 
     /// Reads a model.
@@ -274,6 +275,15 @@ pub(crate) mod tests {
         let model = Model::read(&file()[..]).unwrap();
         assert_eq!(model, small());
         assert_eq!(model.digest(), small().digest());
+    }
+
+    #[cfg(feature = "bundled-model")]
+    #[test]
+    fn the_bundled_model_is_whole_small_and_scored() {
+        let model = Model::bundled();
+        assert!(BUNDLED.len() < 1 << 20);
+        assert_eq!(model.evidence, Evidence::Halves);
+        assert!(model.record.leave_one_scene_out.is_some_and(|s| s.zones == 128));
     }
 
     #[test]

@@ -124,3 +124,95 @@ impl StoppingCriterion for Oracle {
         tiles.par_iter().map(judge).collect()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::NoiseMask;
+    use crate::descriptor::Descriptor;
+    use crate::display::Display;
+    use crate::film::Film;
+    use crate::model::tests::small;
+    use crate::source::Rgb;
+    use crate::svm::{Scaler, Svm};
+    use crate::tile::TileGrid;
+
+    /// A film of 64×64 pixels with `samples` samples of standard deviation `sigma` around grey.
+    fn film(samples: u32, sigma: f32) -> Film {
+        let mut film = Film::new(TileGrid::new(64, 64, 64).unwrap());
+        let mut state = 5u64;
+        let mut bell = || {
+            let mut uniform = || {
+                state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+                (state >> 40) as f32 / (1 << 24) as f32
+            };
+            (uniform() + uniform() + uniform() + uniform() - 2.0) * 3f32.sqrt()
+        };
+        for _ in 0..2 {
+            let half = samples / 2;
+            let batch: Vec<Rgb> =
+                (0..64 * 64).map(|_| [0.2 + sigma * bell() / (half as f32).sqrt(); 3]).collect();
+            film.add(0, half, &batch).unwrap();
+        }
+        film
+    }
+
+    fn judge(oracle: &mut Oracle, film: &Film, reference: Option<&[Rgb]>) -> Result<Verdict, CriterionError> {
+        let view = View { film, display: &Display::SRGB, reference };
+        Ok(oracle.judge(&view, &[film.grid().tile(0)])?[0])
+    }
+
+    #[test]
+    fn the_threshold_is_checked() {
+        for bad in [0.0, 1.0, -1.0, f32::NAN] {
+            assert!(Oracle::new(small(), bad).is_err(), "{bad}");
+        }
+    }
+
+    #[cfg(feature = "bundled-model")]
+    #[test]
+    fn more_samples_are_less_visible_and_the_expected_need_is_near() {
+        let mut oracle = Oracle::bundled();
+        let few = judge(&mut oracle, &film(100, 0.5), None).unwrap();
+        let many = judge(&mut oracle, &film(100_000, 0.5), None).unwrap();
+        assert!(!few.converged && many.converged, "{few:?} {many:?}");
+        // At the samples that were expected, another realisation of the noise is about at the threshold.
+        let expected = few.expected_samples.unwrap() as u32;
+        let there = judge(&mut oracle, &film(expected, 0.5), None).unwrap().probability.unwrap();
+        assert!((0.8..0.97).contains(&there), "{expected}: {there}");
+        assert_eq!(many.expected_samples, Some(100_000));
+    }
+
+    #[cfg(feature = "bundled-model")]
+    #[test]
+    fn a_reference_is_evidence_as_good_as_halves() {
+        let model = Model { evidence: Evidence::Reference, ..Model::bundled() };
+        let mut oracle = Oracle::new(model, DEFAULT_THRESHOLD).unwrap();
+        assert_eq!(oracle.needs(), Needs { halves: false, reference: true });
+        let (noisy, grey) = (film(200, 0.5), vec![Display::SRGB.encode([0.2; 3]); 64 * 64]);
+        assert!(matches!(judge(&mut oracle, &noisy, None), Err(CriterionError::NoReference(_))));
+        let by_reference = judge(&mut oracle, &noisy, Some(&grey)).unwrap().probability.unwrap();
+        let by_halves = judge(&mut Oracle::bundled(), &noisy, None).unwrap().probability.unwrap();
+        // The converged picture is known here: both residuals have the same noise, in other realisations.
+        assert!((by_reference - by_halves).abs() < 0.1, "{by_reference} {by_halves}");
+    }
+
+    #[test]
+    fn the_paper_s_descriptor_judges_tiles_of_its_size_only() {
+        let descriptor = Descriptor::MaskPair { mask: NoiseMask::default(), edge: 64 };
+        let n = descriptor.len();
+        assert_eq!(n, 2 * 64 * 64);
+        let svm = Svm { gamma: 2.0, rho: 0.5, coefficients: vec![1.0], vectors: vec![0.0; n] };
+        let model = Model { descriptor, scaler: Scaler::identity(n), svm, ..small() };
+        let mut oracle = Oracle::new(model, DEFAULT_THRESHOLD).unwrap();
+        // No noise, no mask: the support vector itself, f = 1 − ρ.
+        let verdict = judge(&mut oracle, &film(100, 0.0), None).unwrap();
+        assert!((verdict.probability.unwrap() - 1.0 / (1.0 + (-1f32).exp())).abs() < 1e-5);
+        assert_eq!(verdict.expected_samples, None, "masks do not tell noise from picture");
+
+        let mut ragged = Film::new(TileGrid::new(40, 64, 64).unwrap());
+        ragged.add(0, 1, &[[0.0; 3]; 40 * 64]).unwrap();
+        let error = judge(&mut oracle, &ragged, None).unwrap_err();
+        assert!(matches!(error, CriterionError::TileSize { expected: 64, width: 40, .. }), "{error}");
+    }
+}

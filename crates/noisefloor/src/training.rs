@@ -36,6 +36,13 @@ impl Default for TrainParams {
     }
 }
 
+impl TrainParams {
+    /// For the paper's descriptor: its C and γ, [`SvmParams::PAPER`].
+    pub fn paper() -> Self {
+        Self { candidates: vec![SvmParams::PAPER], ..Self::default() }
+    }
+}
+
 /// Why a model could not be trained.
 #[derive(Debug, Error)]
 pub enum TrainError {
