@@ -152,7 +152,7 @@ pub struct JudgeArgs {
 /// Train a model on human thresholds.
 ///
 /// A corpus is a folder with thresholds.csv (scene, renderer, zone, x, y, width, height, human_spp, first_spp, last_spp) and the
-/// pictures: <scene>/<spp>.png, running means of one progressive rendering, or zone<NN>/batch_<first>_<last>.exr, means of those
+/// pictures: SCENE/SPP.png, running means of one progressive rendering, or zoneNN/batch_FIRST_LAST.exr, means of those
 /// samples alone. C and γ are chosen, and probabilities calibrated, by leaving out one scene at a time.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
@@ -326,7 +326,7 @@ fn parse_audience(text: &str) -> Result<Audience, String> {
 
 fn parse_seconds(text: &str) -> Result<std::time::Duration, String> {
     let seconds: f64 = text.parse().map_err(|_| "expected seconds, such as 60 or 0.5")?;
-    if !(seconds > 0.0) {
+    if seconds.is_nan() || seconds <= 0.0 {
         return Err("expected a time above 0 seconds".into());
     }
     std::time::Duration::try_from_secs_f64(seconds).map_err(|e| e.to_string())

@@ -1,5 +1,5 @@
 //! The `noisefloor` command. What can be typed is in [`args`]; each other module runs one command.
-#![allow(missing_docs, reason = "a command has no public items")]
+#![allow(missing_docs, unreachable_pub, reason = "a command has no public items")]
 #![allow(clippy::print_stdout, reason = "a command prints")]
 
 mod args;

@@ -67,10 +67,10 @@ impl Half {
     #[inline]
     fn add(&mut self, pixel: usize, value: Rgb, samples: u32, before: u64) {
         let weight = f64::from(samples) / (before + u64::from(samples)) as f64;
-        for channel in 0..3 {
-            let (mean, carry) = (&mut self.mean[pixel][channel], &mut self.carry[pixel][channel]);
+        let stored = self.mean[pixel].iter_mut().zip(&mut self.carry[pixel]);
+        for ((mean, carry), value) in stored.zip(value) {
             let old = f64::from(*mean) + f64::from(*carry) * ulp(*mean) / CARRY;
-            let new = old + (f64::from(value[channel]) - old) * weight;
+            let new = old + (f64::from(value) - old) * weight;
             *mean = new as f32;
             let step = ulp(*mean);
             let rest = if step > 0.0 { (new - f64::from(*mean)) / step * CARRY } else { 0.0 };

@@ -186,7 +186,8 @@ fn fit_groups(
 }
 
 fn check(table: &Table, params: &TrainParams, needed: usize) -> Result<(), TrainError> {
-    if params.candidates.is_empty() || !(params.range > 1.0) || !(params.spread > 0.0) {
+    let sound = params.range > 1.0 && params.spread > 0.0 && !params.candidates.is_empty();
+    if !sound {
         return Err(TrainError::Params);
     }
     let groups = table.groups();
