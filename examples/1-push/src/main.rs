@@ -41,11 +41,11 @@ fn radiance(x: f32, y: f32, n: u64) -> f32 {
     let [dx, dy, u, v] = [0, 1, 2, 3].map(|dimension| random(4 * n + dimension));
     let depth = 300.0 / (y + dy + 20.0); // the floor runs away towards the top of the picture
     let floor = [(x + dx - 192.0) / 200.0 * depth, depth];
-    let to_lamp = [2.0 * u - 1.0 - floor[0], 4.0, 2.0 * v + 2.0 - floor[1]];
+    let to_lamp = [0.8 * u - 0.4 - floor[0], 4.0, 0.8 * v + 2.6 - floor[1]];
     let to_ball = [-floor[0], 2.0, 2.5 - floor[1]];
     let dot = |a: [f32; 3], b: [f32; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
     let (square, along) = (dot(to_lamp, to_lamp), dot(to_lamp, to_ball));
-    let in_shadow = dot(to_ball, to_ball) - along * along / square < 0.5;
+    let in_shadow = dot(to_ball, to_ball) - along * along / square < 0.25;
     if in_shadow { 0.05 } else { 0.05 + 64.0 / (square * square) }
 }
 

@@ -71,10 +71,10 @@ impl Shadow {
         let colour = if dark_square { [0.35, 0.12, 0.08] } else { [0.8, 0.75, 0.65] };
 
         // One point of the lamp, behind the ball or not.
-        let to_lamp = [2.0 * u - 1.0 - floor[0], 4.0, 2.0 * v + 2.0 - floor[1]];
+        let to_lamp = [0.8 * u - 0.4 - floor[0], 4.0, 0.8 * v + 2.6 - floor[1]];
         let to_ball = [-floor[0], 2.0, 2.5 - floor[1]];
         let (square, along) = (dot(to_lamp, to_lamp), dot(to_lamp, to_ball));
-        let in_shadow = dot(to_ball, to_ball) - along * along / square < 0.5;
+        let in_shadow = dot(to_ball, to_ball) - along * along / square < 0.25;
         let light = if in_shadow { 0.05 } else { 0.05 + 64.0 / (square * square) };
         colour.map(|c| c * light)
     }
