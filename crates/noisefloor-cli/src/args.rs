@@ -41,7 +41,7 @@ pub enum Command {
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   noisefloor render                                  the Cornell box, into out/cornell-box
-  noisefloor render glass --size 800x600 --seed 7    another scene; `noisefloor scenes` lists them
+  noisefloor render glass-spheres --size 800x600 --seed 7    another scene; `noisefloor scenes` lists them
   noisefloor render --criterion spp:1000             for comparison: a fixed number of samples
   noisefloor render --audience art-students          for people who look harder (more samples)
   noisefloor render --time 60 --against truth.exr    a minute at most; relMSE to a reference in timeline.csv")]
@@ -53,7 +53,7 @@ pub struct RenderArgs {
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
     /// Image size in pixels.
-    #[arg(long, value_name = "WxH", default_value = "512x512", value_parser = parse_size)]
+    #[arg(long, value_name = "WxH", default_value = "384x384", value_parser = parse_size)]
     pub size: (usize, usize),
     /// Seed of the random numbers: same seed, same image and same stops, whatever the number of threads.
     #[arg(long, default_value_t = 1)]

@@ -3,16 +3,14 @@
 use crate::args::JudgeArgs;
 use crate::heat_map::{self, Mark, Scale};
 use anyhow::{Context, bail};
-use noisefloor::{
-    Display, Evidence, Oracle, Rgb, Samples, Tile, TileGrid, TilePlanes, Verdict, residual_scale,
-};
+use noisefloor::{Display, Evidence, Oracle, Rendering, Rgb, Samples, Tile, TileGrid, TilePlanes, Verdict};
 use noisefloor_exr::{Picture, read_picture, write_png};
 use rayon::prelude::*;
 use serde::Serialize;
 use std::path::Path;
 
 /// A picture, linear, and how many samples it has.
-struct Rendering {
+struct Input {
     size: (usize, usize),
     pixels: Vec<Rgb>,
     spp: f64,
@@ -63,7 +61,7 @@ pub fn run(args: &JudgeArgs) -> anyhow::Result<()> {
         );
     }
     let image = read(&args.image, args.spp[0])?;
-    let others: Vec<Rendering> = args
+    let others: Vec<Input> = args
         .against
         .iter()
         .zip(&args.spp[1..])
@@ -76,17 +74,11 @@ pub fn run(args: &JudgeArgs) -> anyhow::Result<()> {
     let (width, height) = image.size;
     let grid = TileGrid::new(width, height, args.tile)?;
 
-    // Pool what the picture is held against, and work out its noise.
+    // Pool what the picture is held against, and judge.
     let samples = if args.nested { Samples::Nested } else { Samples::Independent };
     let other = pool(others, image.spp, samples)?;
-    let scale = residual_scale(image.spp, other.spp, samples).with_context(|| {
-        format!(
-            "nested pictures of the same {} samples per pixel are the same picture: nothing to judge by",
-            image.spp
-        )
-    })?;
     let display = if image.display_referred { Display::SRGB } else { tone.settle(&image.pixels) };
-    let rows = judge(&oracle, grid, &image, &other, &display, scale)?;
+    let rows = judge(&oracle, grid, (&image, &other), &display, samples)?;
 
     report(args, &oracle, &rows)?;
     if let Some(path) = &args.heat_map {
@@ -105,7 +97,13 @@ pub fn run(args: &JudgeArgs) -> anyhow::Result<()> {
     Ok(())
 }
 
-fn read(path: &Path, spp: f64) -> anyhow::Result<Rendering> {
+impl Input {
+    fn rendering(&self) -> Rendering<'_> {
+        Rendering { pixels: &self.pixels, spp: self.spp, rounding: self.rounding }
+    }
+}
+
+fn read(path: &Path, spp: f64) -> anyhow::Result<Input> {
     if !(spp.is_finite() && spp > 0.0) {
         bail!("{} needs a positive number of samples per pixel, not {spp}", path.display());
     }
@@ -120,10 +118,10 @@ fn read(path: &Path, spp: f64) -> anyhow::Result<Rendering> {
             path.display()
         );
     }
-    Ok(Rendering { size, pixels, spp, display_referred, rounding })
+    Ok(Input { size, pixels, spp, display_referred, rounding })
 }
 
-fn fits(image: &Rendering, other: &Rendering) -> anyhow::Result<()> {
+fn fits(image: &Input, other: &Input) -> anyhow::Result<()> {
     let ((w, h), (ow, oh)) = (image.size, other.size);
     if (w, h) != (ow, oh) {
         bail!("the pictures have different sizes, {w}×{h} and {ow}×{oh}");
@@ -140,8 +138,8 @@ fn fits(image: &Rendering, other: &Rendering) -> anyhow::Result<()> {
 }
 
 /// Independent renderings make one of all their samples. Of nested ones, the one that differs most in its samples says most.
-fn pool(others: Vec<Rendering>, image_spp: f64, samples: Samples) -> anyhow::Result<Rendering> {
-    let distance = |r: &Rendering| (1.0 / r.spp - 1.0 / image_spp).abs();
+fn pool(others: Vec<Input>, image_spp: f64, samples: Samples) -> anyhow::Result<Input> {
+    let distance = |r: &Input| (1.0 / r.spp - 1.0 / image_spp).abs();
     let pooled = match samples {
         Samples::Nested => others.into_iter().max_by(|a, b| distance(a).total_cmp(&distance(b))),
         Samples::Independent => others.into_iter().reduce(|mut all, one| {
@@ -160,24 +158,21 @@ fn pool(others: Vec<Rendering>, image_spp: f64, samples: Samples) -> anyhow::Res
 fn judge(
     oracle: &Oracle,
     grid: TileGrid,
-    image: &Rendering,
-    other: &Rendering,
+    (image, other): (&Input, &Input),
     display: &Display,
-    scale: f32,
+    samples: Samples,
 ) -> anyhow::Result<Vec<Row>> {
-    // Both pictures were rounded, where they were.
-    let rounding = (image.rounding + other.rounding) * scale * scale;
-    let planes = |tile| {
-        let planes = TilePlanes::gather(image.size, tile, |x, y| {
-            let pixel = y * grid.width() + x;
-            let (shown, against) = (display.encode(image.pixels[pixel]), display.encode(other.pixels[pixel]));
-            (shown, std::array::from_fn(|c| (shown[c] - against[c]) * scale))
-        });
-        TilePlanes { rounding, ..planes }
+    let pair = (image.rendering(), other.rendering());
+    let same = || {
+        format!(
+            "nested pictures of the same {} samples per pixel are the same picture: nothing to judge by",
+            image.spp
+        )
     };
     let tiles: Vec<Tile> = grid.tiles().collect();
     let row = |&tile: &Tile| {
-        let verdict = oracle.judge_planes(&planes(tile), image.spp.round().max(1.0) as u64)?;
+        let planes = TilePlanes::from_pair(image.size, tile, display, pair, samples).with_context(same)?;
+        let verdict = oracle.judge_planes(&planes, image.spp.round().max(1.0) as u64)?;
         let Verdict { converged, probability, expected_samples } = verdict;
         let Tile { index, x, y, width, height } = tile;
         let (probability, expected_spp) = (probability.unwrap_or(0.0), expected_samples);

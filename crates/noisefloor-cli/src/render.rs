@@ -36,7 +36,9 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<ExitCode> {
             drive(Driver::new(source, oracle, params)?, args, output)
         }
         CriterionChoice::Fixed(samples) => {
-            let params = Params { max_samples: params.max_samples.max(samples), ..params };
+            // Exactly so many, not the next multiple of the batch.
+            let params = Params { max_samples: params.max_samples.min(samples), ..params };
+            params.check()?;
             let output = Output::create(args, None, rel_mse)?;
             drive(Driver::new(source, FixedSamples(samples), params)?, args, output)
         }

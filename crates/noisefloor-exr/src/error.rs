@@ -17,7 +17,7 @@ pub enum PictureError {
         source: io::Error,
     },
     /// The content is not of the format wanted.
-    #[error("{}: is {found}, not {wanted}; formats read are OpenEXR and PNG, told by content, not by name", path.display())]
+    #[error("{}: is {found}, not {wanted}; formats are told by content, not by name", path.display())]
     Foreign {
         /// The file.
         path: PathBuf,

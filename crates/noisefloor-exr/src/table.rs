@@ -61,7 +61,7 @@ pub enum TableError {
         what: String,
     },
     /// The CSV cannot be read or written.
-    #[error("the table cannot be read or written")]
+    #[error("the table cannot be read or written: {0}")]
     Csv(#[from] csv::Error),
 }
 

@@ -2,6 +2,7 @@
 
 use crate::display::Display;
 use crate::film::Film;
+use crate::params::Audience;
 use crate::source::Rgb;
 use crate::tile::Tile;
 use thiserror::Error;
@@ -78,6 +79,11 @@ pub trait StoppingCriterion {
         Needs::default()
     }
 
+    /// Whose thresholds its verdicts stand for, as a line from those of the training data.
+    fn audience(&self) -> Audience {
+        Audience::TRAINED
+    }
+
     /// Judges the tiles named, all of which have samples.
     ///
     /// # Errors
@@ -92,6 +98,10 @@ impl<C: StoppingCriterion + ?Sized> StoppingCriterion for Box<C> {
 
     fn needs(&self) -> Needs {
         (**self).needs()
+    }
+
+    fn audience(&self) -> Audience {
+        (**self).audience()
     }
 
     fn judge(&mut self, view: &View<'_>, tiles: &[Tile]) -> Result<Vec<Verdict>, CriterionError> {

@@ -86,6 +86,26 @@ impl TilePlanes {
         })
     }
 
+    /// Evidence on `image` from another rendering of the same view, both `width`×`height` pixels. `None` if the two say nothing
+    /// of the noise: see [`residual_scale`].
+    ///
+    /// # Panics
+    /// If a rendering has fewer pixels than that.
+    pub fn from_pair(
+        (width, height): (usize, usize),
+        tile: Tile,
+        display: &Display,
+        (image, other): (Rendering<'_>, Rendering<'_>),
+        samples: Samples,
+    ) -> Option<Self> {
+        let scale = residual_scale(image.spp, other.spp, samples)?;
+        let planes = Self::gather((width, height), tile, |x, y| {
+            let [a, b] = [image, other].map(|rendering| display.encode(rendering.pixels[y * width + x]));
+            (a, difference(a, b, scale))
+        });
+        Some(Self { rounding: (image.rounding + other.rounding) * scale * scale, ..planes })
+    }
+
     /// Evidence from a noise-free reference: the whole image, display-encoded, row-major.
     ///
     /// # Panics
@@ -106,6 +126,17 @@ fn mirror(place: usize, edge: usize) -> usize {
     let period = (2 * (edge - 1)).max(1);
     let distance = place.abs_diff(APRON) % period;
     distance.min(period - distance).min(edge - 1)
+}
+
+/// A picture of linear radiance, row-major, and the samples per pixel it was made of.
+#[derive(Clone, Copy, Debug)]
+pub struct Rendering<'a> {
+    /// Linear radiance, width × height pixels.
+    pub pixels: &'a [Rgb],
+    /// Samples per pixel, above 0.
+    pub spp: f64,
+    /// Variance of the rounding of its display values; 0 for pictures in floating point.
+    pub rounding: f32,
 }
 
 /// (a − b)·scale, channel by channel.
@@ -179,6 +210,31 @@ mod tests {
         // 900 samples that contain 100: Var(difference) = σ²(1/100 − 1/900).
         let nested = residual_scale(900.0, 100.0, Samples::Nested).unwrap();
         assert!((nested - (1.0f32 / 900.0 / (1.0 / 100.0 - 1.0 / 900.0)).sqrt()).abs() < 1e-6);
+    }
+
+    /// Two pictures of one film's halves say of their mean what the film says of it.
+    #[test]
+    fn a_pair_of_pictures_is_evidence_as_halves_are() {
+        let grid = TileGrid::new(32, 32, 32).unwrap();
+        let mut state = 3u64;
+        let mut half = |n: f32| -> Vec<Rgb> {
+            (0..1024).map(|_| [0.5 + 0.1 * noise(&mut state) / n.sqrt(); 3]).collect()
+        };
+        let (a, b) = (half(300.0), half(100.0));
+        let mut film = Film::new(grid);
+        film.add(0, 300, &a).unwrap();
+        film.add(0, 100, &b).unwrap();
+        let by_film = TilePlanes::from_halves(&film, &Display::SRGB, grid.tile(0));
+        let rendering = |pixels, spp| Rendering { pixels, spp, rounding: 0.01 };
+        // Half A alone has √(400/300) times the noise of both together.
+        let pair = (rendering(&a, 300.0), rendering(&b, 100.0));
+        let by_pair =
+            TilePlanes::from_pair((32, 32), grid.tile(0), &Display::SRGB, pair, Samples::Independent)
+                .unwrap();
+        for (f, p) in by_film.residual.iter().zip(&by_pair.residual) {
+            assert!((f * (400.0f32 / 300.0).sqrt() - p).abs() < 1e-6);
+        }
+        assert!((by_pair.rounding - 0.02 * 0.25).abs() < 1e-6);
     }
 
     #[test]

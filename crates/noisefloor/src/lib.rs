@@ -50,7 +50,7 @@ pub use display::{
     DEFAULT_KEY, DELTA, Display, ToneMapping, ToneMappingError, luminance, srgb_decode, srgb_encode,
 };
 pub use driver::{Clock, Driver, DriverError, Event, Progress, TimelinePoint};
-pub use evidence::{APRON, Evidence, Samples, TilePlanes, residual_scale};
+pub use evidence::{APRON, Evidence, Rendering, Samples, TilePlanes, residual_scale};
 pub use film::{Film, FilmError};
 pub use mask::{NoiseMask, SigmaError};
 pub use model::{Model, ModelError, Scores, TrainingRecord};

@@ -23,7 +23,7 @@ const MAX_PAYLOAD: u64 = 2 << 30;
 #[derive(Debug, Error)]
 pub enum ModelError {
     /// The file cannot be read or written.
-    #[error("the model cannot be read or written")]
+    #[error("the model cannot be read or written: {0}")]
     Io(#[from] io::Error),
     /// Not a model file.
     #[error("this is not a noisefloor model: it does not begin with the model magic")]
@@ -100,7 +100,8 @@ pub struct Model {
     pub descriptor_version: u16,
     /// What the tile is held against.
     pub evidence: Evidence,
-    /// How the training pictures were shown.
+    /// How the training pictures were shown. For the record: descriptors are of display values, whatever led to them, and a
+    /// session may show its picture in another way.
     pub tone_mapping: ToneMapping,
     /// From raw to scaled descriptors.
     pub scaler: Scaler,

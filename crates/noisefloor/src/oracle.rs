@@ -4,6 +4,7 @@ use crate::criterion::{CriterionError, Needs, StoppingCriterion, Verdict, View};
 use crate::descriptor::DescriptorError;
 use crate::evidence::{Evidence, TilePlanes};
 use crate::model::Model;
+use crate::params::Audience;
 use crate::tile::Tile;
 use rayon::prelude::*;
 use thiserror::Error;
@@ -108,6 +109,10 @@ impl StoppingCriterion for Oracle {
             Evidence::Halves => Needs { halves: true, reference: false },
             Evidence::Reference => Needs { halves: false, reference: true },
         }
+    }
+
+    fn audience(&self) -> Audience {
+        self.model.audience
     }
 
     fn judge(&mut self, view: &View<'_>, tiles: &[Tile]) -> Result<Vec<Verdict>, CriterionError> {

@@ -62,6 +62,11 @@ impl Audience {
     /// Students of computer art: T′ = 1.94·T − 346, r = 0.78 (Takouachet et al. 2017, §7.3).
     pub const ART_STUDENTS: Self = Self { slope: 1.94, offset: -346.0 };
 
+    /// The line of an audience that is given relative to this one.
+    pub fn then(&self, other: Self) -> Self {
+        Self { slope: other.slope * self.slope, offset: other.slope * self.offset + other.offset }
+    }
+
     /// Samples per pixel for this audience where the trained one needs `samples`; never fewer, since they are taken already.
     pub fn samples(&self, samples: u64) -> u64 {
         samples.max((self.slope * samples as f64 + self.offset).ceil().clamp(0.0, 1e15) as u64)
@@ -83,7 +88,7 @@ pub struct Params {
     pub max_samples: u64,
     /// Verdicts in a row that have to say "converged", at least 1.
     pub consecutive: u32,
-    /// Whose eyes.
+    /// Whose eyes, relative to those that the criterion stands for ([`crate::StoppingCriterion::audience`]).
     pub audience: Audience,
 }
 
@@ -161,6 +166,10 @@ mod tests {
         assert_eq!(Audience::ART_STUDENTS.samples(1000), 1594);
         assert_eq!(Audience::ART_STUDENTS.samples(100), 100); // the line gives −152
         assert_eq!(Audience::TRAINED.samples(123), 123);
+        // A model for twice the samples of the observers, shown to art students: 1.94·(2·1000) − 346.
+        let twice = Audience { slope: 2.0, offset: 0.0 };
+        assert_eq!(twice.then(Audience::ART_STUDENTS).samples(1000), 3534);
+        assert_eq!(Audience::TRAINED.then(Audience::ART_STUDENTS), Audience::ART_STUDENTS);
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use crate::criterion::{CriterionError, StoppingCriterion, Verdict, View};
 use crate::display::{Display, ToneMapping};
 use crate::film::{Film, FilmError};
-use crate::params::{Params, ParamsError};
+use crate::params::{Audience, Params, ParamsError};
 use crate::source::{Reference, Request, Rgb};
 use crate::tile::{Tile, TileError, TileGrid};
 use serde::{Deserialize, Serialize};
@@ -278,7 +278,8 @@ impl<C: StoppingCriterion> Session<C> {
     /// Files one verdict; returns the stop if the tile is done by it.
     fn take(&mut self, index: usize, verdict: Verdict) -> Option<Stop> {
         let samples = self.film.samples(index);
-        let Params { schedule, consecutive, audience, max_samples, .. } = self.params;
+        let Params { schedule, consecutive, max_samples, .. } = self.params;
+        let audience = self.audience();
         let state = &mut self.tiles[index];
         state.verdict = Some(verdict);
         state.streak = if verdict.converged { state.streak + 1 } else { 0 };
@@ -294,6 +295,11 @@ impl<C: StoppingCriterion> Session<C> {
         }
         state.next = schedule.next(samples, verdict.expected_samples).min(max_samples);
         None
+    }
+
+    /// The line from the thresholds of the training data to those wanted.
+    fn audience(&self) -> Audience {
+        self.criterion.audience().then(self.params.audience)
     }
 
     /// Whether an audience's wish was granted or cut short by the limit.
@@ -352,13 +358,13 @@ impl<C: StoppingCriterion> Session<C> {
     /// Samples still to be taken, over all pixels, as the criterion expects it; `None` while any open tile is without an
     /// expectation.
     pub fn expected_samples_to_go(&self) -> Option<u64> {
-        let max = self.params.max_samples;
+        let (max, audience) = (self.params.max_samples, self.audience());
         self.tiles.iter().enumerate().filter(|(_, state)| state.stop.is_none()).try_fold(
             0,
             |sum, (index, state)| {
                 let expected = match state.target {
                     Some(target) => target,
-                    None => self.params.audience.samples(state.verdict?.expected_samples?),
+                    None => audience.samples(state.verdict?.expected_samples?),
                 };
                 let goal = expected.clamp(state.next.min(max), max);
                 let pixels = self.film.grid().tile(index).pixels() as u64;
@@ -377,7 +383,7 @@ impl<C: StoppingCriterion> Session<C> {
 mod tests {
     use super::*;
     use crate::criterion::Needs;
-    use crate::params::{Audience, Schedule};
+    use crate::params::Schedule;
 
     /// Says "converged" from given samples on, with halves or without.
     struct From {

@@ -1,7 +1,7 @@
 //! Judge: says of each tile of an EXR file whether people would see noise in it, by another rendering of the same view.
 #![allow(clippy::print_stdout, reason = "an example prints")]
 
-use noisefloor::{DEFAULT_TILE, Oracle, Samples, TileGrid, TilePlanes, ToneMapping, residual_scale};
+use noisefloor::{DEFAULT_TILE, Oracle, Rendering, Samples, TileGrid, TilePlanes, ToneMapping};
 use noisefloor_exr::{LinearImage, read_exr};
 use std::error::Error;
 use std::process::ExitCode;
@@ -39,19 +39,16 @@ fn run() -> Result<(), Box<dyn Error>> {
 
     // How the picture is shown, the same for both: people see display values, not radiance.
     let display = ToneMapping::default().settle(&image.pixels);
-    // The two differ by the noise of both; this factor leaves the noise of the first.
-    let scale =
-        residual_scale(spp as f64, other_spp as f64, Samples::Independent).ok_or("too few samples")?;
+    let rendering = |picture, spp: u64| Rendering { pixels: picture, spp: spp as f64, rounding: 0.0 };
+    let pair = (rendering(&image.pixels[..], spp), rendering(&other.pixels[..], other_spp));
 
     let oracle = Oracle::bundled();
     let grid = TileGrid::new(image.width, image.height, DEFAULT_TILE)?;
     let mut converged = 0;
     for tile in grid.tiles() {
-        let planes = TilePlanes::gather(size, tile, |x, y| {
-            let [a, b] =
-                [&image, &other].map(|picture| display.encode(picture.pixels[y * picture.width + x]));
-            (a, std::array::from_fn(|c| (a[c] - b[c]) * scale))
-        });
+        // The two differ by the noise of both; of it, the evidence is the noise of the first.
+        let planes = TilePlanes::from_pair(size, tile, &display, pair, Samples::Independent)
+            .ok_or("no samples, no evidence")?;
         let verdict = oracle.judge_planes(&planes, spp)?;
         let says = match verdict.expected_samples {
             _ if verdict.converged => "no noise seen".into(),
