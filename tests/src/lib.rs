@@ -1,1 +1,290 @@
-//! Tests that cross crates.
+//! Tests that cross crates, and [`check_source`]: the contract of a source of samples, to be run on every one, and on yours.
+
+use noisefloor::{Batch, ProgressiveSource, Request, SourceInfo, Tile, TileGrid, check_image};
+
+/// Tile edge that sources are asked in: an image of 48×40 pixels has ragged tiles to the right and below.
+const EDGE: usize = 32;
+/// Largest correlation, in the unit of its standard error, that passes for chance.
+const LARGEST_Z: f64 = 6.0;
+/// Relative differences below this are rounding, not noise: about 64 roundings to f32.
+const ROUNDING: f64 = 64.0 / (1 << 24) as f64;
+/// Most batches that a playback is followed for, and a renderer.
+const MOST_BATCHES: [usize; 2] = [1000, 8];
+
+/// Checks all that a [`ProgressiveSource`] promises. `make` makes a source, the same one each time: same scene, same seed.
+///
+/// ```
+/// # use noisefloor::*;
+/// # struct Wall;
+/// # impl ProgressiveSource for Wall {
+/// #     fn info(&self) -> SourceInfo {
+/// #         SourceInfo { name: "wall".into(), width: 48, height: 40, unit: Unit::SamplesPerPixel, aims: true }
+/// #     }
+/// #     fn sample(&mut self, requests: &[Request]) -> Result<Vec<Batch>, SourceError> {
+/// #         Ok(requests.iter().map(|r| Batch { tile: r.tile, samples: r.samples, mean: vec![[0.2; 3]; r.tile.pixels()] }).collect())
+/// #     }
+/// # }
+/// noisefloor_tests::check_source(|| Wall);
+/// ```
+///
+/// # What is checked
+/// - The description is in range, does not change with use, and is the same for every source that `make` makes.
+/// - One batch a request, in the order of the requests, with the tile asked for and a value a pixel. No request, no batch.
+/// - Counts are exact: a renderer gives what is asked for until it ends; a playback gives what it has, whatever is asked for.
+///   Which of the two a source is, is told by its counts.
+/// - The same construction gives the same samples to the bit.
+/// - How requests are cut changes rounding alone: 8 + 24 samples are the 32 samples asked for at once. (Not for playbacks.)
+/// - Tiles asked for alone, or at other depths than their neighbours, get what they get when all are asked for. (If it aims.)
+/// - Batches of new samples are independent of those before, in the same tile and in others.
+/// - The reference, if there is one, has the image's size and is finite; rendering it changes no sample.
+/// - At its end a source gives empty batches, again and again.
+///
+/// Use an image with more than one tile of 32×32 pixels, both edges no multiple of 32: 48×40 is enough, and quick. A correlation
+/// is found from a few dozen noisy pixels on.
+///
+/// # How often a right source fails by chance
+/// Noise of a pixel is the difference x of two batches of equally many samples, which is symmetric around 0; so is that of two
+/// others, y. Given all |xy|, only signs are left to chance, independent from pixel to pixel, and z = Σxy/√Σ(xy)² exceeds 6 with
+/// p ≤ 2·exp(−6²/2) = 3.1e-8 (Hoeffding 1963), whatever the distribution. Four such z are looked at: p < 1.3e-7 a source. Batches
+/// of a playback are not of equal size; for them this holds as far as z is normal. The sources of this project are seeded: they
+/// pass always or never.
+///
+/// # Panics
+/// If a promise is not kept; the message says which.
+pub fn check_source<S: ProgressiveSource>(make: impl Fn() -> S) {
+    // A description that holds for every source made, before and after use
+    let info = make().info();
+    check_info(&info);
+    let start = || {
+        let source = make();
+        assert_eq!(source.info(), info, "two sources of one construction describe themselves differently");
+        Probe::new(source)
+    };
+    let rounds = |samples: &[u32]| {
+        let mut probe = start();
+        let rounds = samples.iter().map(|&n| probe.ask_all(n)).collect::<Vec<_>>();
+        assert_eq!(probe.source.info(), info, "the description changed with use");
+        rounds
+    };
+
+    // Exact counts
+    let (eight, three) = (rounds(&[8]), rounds(&[3]));
+    let playback = !(gives(&eight[0], 8) && gives(&three[0], 3));
+    let four = rounds(&[16; 4]);
+    if playback {
+        let other = rounds(&[1, 1000, 5, 7]);
+        assert!(same(&four, &other), "a playback gave other batches because other numbers were asked for");
+    } else {
+        check_counts(&four, &[16; 4]);
+    }
+
+    // Deterministic
+    assert!(same(&four, &rounds(&[16; 4])), "the same construction gave other samples the second time");
+
+    // However requests are cut
+    let whole = rounds(&[32]);
+    if !playback {
+        let parts = rounds(&[8, 24]);
+        check_counts(&parts, &[8, 24]);
+        if gives(&parts[1], 24) {
+            check_cut(&whole[0], &parts);
+        }
+    }
+
+    if info.aims {
+        check_aiming(start, &four);
+    }
+    check_independence(&four, (!playback).then_some(&whole[0]));
+
+    // The reference, which is nobody's sample
+    let mut probe = start();
+    check_reference(&mut probe.source, &info);
+    assert!(same(&[probe.ask_all(16)], &four[..1]), "rendering the reference changed the samples");
+
+    // The end, where it is near
+    let mut probe = start();
+    let over = |batches: &[Batch]| batches.iter().all(|b| b.samples == 0);
+    let most = MOST_BATCHES[usize::from(!playback)];
+    if (0..most).any(|_| over(&probe.ask_all(16))) {
+        assert!(over(&probe.ask_all(16)), "after its end the source has samples again");
+    }
+}
+
+/// A source, and how far each tile of it is.
+struct Probe<S> {
+    source: S,
+    tiles: Vec<Tile>,
+    taken: Vec<u64>,
+}
+
+impl<S: ProgressiveSource> Probe<S> {
+    fn new(source: S) -> Self {
+        let info = source.info();
+        let grid = TileGrid::new(info.width, info.height, EDGE).expect("the size was checked");
+        Self { source, tiles: grid.tiles().collect(), taken: vec![0; grid.len()] }
+    }
+
+    /// Asks for the next samples of some tiles, and checks the shape of the answer.
+    fn ask(&mut self, tiles: &[usize], samples: u32) -> Vec<Batch> {
+        let request = |&i: &usize| Request { tile: self.tiles[i], first: self.taken[i], samples };
+        let requests: Vec<Request> = tiles.iter().map(request).collect();
+        let batches =
+            self.source.sample(&requests).unwrap_or_else(|e| panic!("sampling failed: {e} ({e:?})"));
+        assert_eq!(batches.len(), requests.len(), "number of batches, for so many requests");
+        for (request, batch) in requests.iter().zip(&batches) {
+            let place = request.tile.index;
+            assert_eq!(batch.tile, request.tile, "batches are not in the order of the requests");
+            let pixels = if batch.samples == 0 { 0 } else { batch.tile.pixels() };
+            assert_eq!(
+                batch.mean.len(),
+                pixels,
+                "values in a batch of {} samples, tile {place}",
+                batch.samples
+            );
+            self.taken[place] += u64::from(batch.samples);
+        }
+        batches
+    }
+
+    /// Asks for all tiles, last first, and gives the batches in the order of the grid.
+    fn ask_all(&mut self, samples: u32) -> Vec<Batch> {
+        let order: Vec<usize> = (0..self.tiles.len()).rev().collect();
+        let mut batches = self.ask(&order, samples);
+        batches.reverse();
+        batches
+    }
+}
+
+fn check_info(info: &SourceInfo) {
+    assert!(!info.name.trim().is_empty(), "a source needs a name, for reports and messages");
+    check_image(info.width, info.height).unwrap_or_else(|e| panic!("{e}"));
+}
+
+fn gives(batches: &[Batch], samples: u32) -> bool {
+    batches.iter().all(|b| b.samples == samples)
+}
+
+/// Equal to the bit, NaN and −0 included.
+fn same(a: &[Vec<Batch>], b: &[Vec<Batch>]) -> bool {
+    let bits = |batch: &Batch| -> Vec<u32> { batch.mean.iter().flatten().map(|c| c.to_bits()).collect() };
+    let equal = |(a, b): (&Batch, &Batch)| a.tile == b.tile && a.samples == b.samples && bits(a) == bits(b);
+    a.len() == b.len() && a.iter().flatten().zip(b.iter().flatten()).all(equal)
+}
+
+/// As asked, until the end: then what was left, and nothing from then on.
+fn check_counts(rounds: &[Vec<Batch>], asked: &[u32]) {
+    for tile in 0..rounds[0].len() {
+        let mut ended = false;
+        for (batches, &asked) in rounds.iter().zip(asked) {
+            let Batch { samples, .. } = batches[tile];
+            let right = if ended { samples == 0 } else { samples <= asked };
+            assert!(right, "tile {tile}: {samples} samples where {asked} were asked for");
+            ended |= samples < asked;
+        }
+    }
+}
+
+/// The mean of the parts is the whole, but for rounding.
+fn check_cut(whole: &[Batch], parts: &[Vec<Batch>]) {
+    for (tile, all) in whole.iter().enumerate() {
+        for (pixel, all) in all.mean.iter().enumerate() {
+            for (c, &all) in all.iter().enumerate() {
+                let [a, b] = [0, 1].map(|round: usize| f64::from(parts[round][tile].mean[pixel][c]));
+                let (both, all) = ((8.0 * a + 24.0 * b) / 32.0, f64::from(all));
+                let size = a.abs().max(b.abs()).max(f64::from(f32::MIN_POSITIVE));
+                let close = (both - all).abs() <= ROUNDING * size || !(both.is_finite() && all.is_finite());
+                assert!(
+                    close,
+                    "samples depend on how requests are cut: tile {tile}, pixel {pixel}: {both} in two batches, {all} in one"
+                );
+            }
+        }
+    }
+}
+
+/// Tiles get the same samples alone as in company, and at whatever depth the others are.
+fn check_aiming<S: ProgressiveSource>(start: impl Fn() -> Probe<S>, rounds: &[Vec<Batch>]) {
+    let mut probe = start();
+    assert!(probe.ask(&[], 16).is_empty());
+    let last = probe.tiles.len() - 1;
+    let alone = probe.ask(&[last], 16);
+    assert!(
+        same(&[alone], &[vec![rounds[0][last].clone()]]),
+        "a tile asked for alone got other samples than in company"
+    );
+    let together = probe.ask_all(16);
+    for (tile, batch) in together.into_iter().enumerate() {
+        let depth = usize::from(tile == last);
+        let right = same(&[vec![batch]], &[vec![rounds[depth][tile].clone()]]);
+        assert!(right, "tile {tile} got other samples because its neighbours are at another depth");
+    }
+}
+
+/// Noise of two batches against noise of two others, in every way to pair four, and noise of a tile against the next one's.
+fn check_independence(rounds: &[Vec<Batch>], whole: Option<&Vec<Batch>>) {
+    if rounds.iter().flatten().any(|b| b.samples == 0) {
+        return;
+    }
+    let noise = |a: usize, b: usize| -> Vec<Vec<f64>> {
+        rounds[a].iter().zip(&rounds[b]).map(|(a, b)| difference(a, b)).collect()
+    };
+    let mut silent = true;
+    for [a, b, c, d] in [[0, 1, 2, 3], [0, 2, 1, 3], [0, 3, 1, 2]] {
+        let (x, y) = (noise(a, b), noise(c, d));
+        silent &= x.iter().chain(&y).flatten().all(|&v| v == 0.0);
+        let z = z(x.iter().flatten().zip(y.iter().flatten()));
+        assert!(
+            z.abs() < LARGEST_Z,
+            "successive batches are correlated: z = {z}; are they means of new samples alone?"
+        );
+    }
+
+    // Without noise there is nothing to correlate. But then a batch of another size is the same too
+    if let (true, Some(whole)) = (silent, whole) {
+        let again = whole.iter().zip(&rounds[0]).flat_map(|(a, b)| difference(a, b)).any(|v| v != 0.0);
+        assert!(!again, "every batch has the same samples again");
+    }
+
+    let x = noise(0, 1);
+    let width = |tile: usize| rounds[0][tile].tile.width;
+    let overlap = (1..x.len()).flat_map(|tile| {
+        let (w, before) = (width(tile), width(tile - 1));
+        let shared = x[tile].iter().enumerate().filter(move |(i, _)| i % w < before);
+        let x = &x;
+        shared.filter_map(move |(i, v)| Some((x[tile - 1].get(i / w * before + i % w)?, v)))
+    });
+    let z = z(overlap);
+    assert!(
+        z.abs() < LARGEST_Z,
+        "tiles have the same noise: z = {z}; are random numbers numbered from the tile's corner?"
+    );
+}
+
+/// Sum of the channels of a − b; 0 where that is rounding or not finite.
+fn difference(a: &Batch, b: &Batch) -> Vec<f64> {
+    let sum = |p: &[f32; 3]| p.iter().map(|&c| f64::from(c)).sum::<f64>();
+    let size = |p: &[f32; 3]| p.iter().map(|&c| f64::from(c).abs()).sum::<f64>();
+    let noise = |(a, b): (&[f32; 3], &[f32; 3])| {
+        let d = sum(a) - sum(b);
+        if d.is_finite() && d.abs() > ROUNDING * size(a).max(size(b)) { d } else { 0.0 }
+    };
+    a.mean.iter().zip(&b.mean).map(noise).collect()
+}
+
+/// Σxy/√Σ(xy)²; 0 without noise.
+fn z<'a>(pairs: impl Iterator<Item = (&'a f64, &'a f64)>) -> f64 {
+    let (sum, squares) =
+        pairs.fold((0.0, 0.0), |(sum, squares), (x, y)| (sum + x * y, squares + (x * y).powi(2)));
+    if squares > 0.0 { sum / f64::sqrt(squares) } else { 0.0 }
+}
+
+fn check_reference(source: &mut impl ProgressiveSource, info: &SourceInfo) {
+    let Some(reference) = source.reference().unwrap_or_else(|e| panic!("the reference failed: {e} ({e:?})"))
+    else {
+        return;
+    };
+    let size = (reference.width, reference.height);
+    assert_eq!(size, (info.width, info.height), "the reference has not the image's size");
+    assert_eq!(reference.pixels.len(), info.width * info.height, "pixels of the reference");
+    assert!(reference.pixels.iter().flatten().all(|c| c.is_finite()), "the reference is not finite");
+}

@@ -1,0 +1,144 @@
+use crate::kit::{Altered, Synthetic};
+use noisefloor::{Batch, ProgressiveSource, Reference, Request, SourceError, SourceInfo, Tile};
+use noisefloor_exr::{RenderLayers, StackSource, write_exr};
+use noisefloor_ptwne::{Options, Ptwne, scenes};
+use noisefloor_tests::check_source;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+const SIZE: (usize, usize) = (48, 40);
+
+fn synthetic() -> Synthetic {
+    Synthetic::new(SIZE.0, SIZE.1)
+}
+
+#[test]
+fn the_path_tracer_keeps_it() {
+    for name in ["cornell-box", "courtyard", "glass-spheres"] {
+        check_source(|| {
+            let options = Options { seed: 5, ..Options::default() };
+            Ptwne::new(scenes::by_name(name).unwrap(), SIZE.0, SIZE.1, options).unwrap()
+        });
+    }
+}
+
+#[test]
+fn synthetic_sources_keep_it() {
+    check_source(synthetic);
+    check_source(|| Synthetic { aims: false, ..synthetic() });
+    check_source(|| Synthetic { store: 100, ..synthetic() });
+    check_source(|| Synthetic::flat(SIZE.0, SIZE.1, |_, _| 0.3));
+    check_source(|| Synthetic::new(1, 1));
+}
+
+/// Batches of uneven size, as they are and as the running means they add up to.
+#[test]
+fn stacks_on_disk_keep_it() {
+    let (batches, means) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    let (width, height) = SIZE;
+    let tile = Tile { index: 0, x: 0, y: 0, width, height };
+    let (mut source, mut sum) = (synthetic(), vec![[0.0f64; 3]; width * height]);
+    let ends = [20u32, 60, 100, 140, 180];
+    for (i, last) in ends.into_iter().enumerate() {
+        let first = if i == 0 { 0 } else { ends[i - 1] };
+        let request = Request { tile, first: u64::from(first), samples: last - first };
+        let batch = source.sample(&[request]).unwrap().remove(0);
+        for (sum, value) in sum.iter_mut().flatten().zip(batch.mean.iter().flatten()) {
+            *sum += f64::from(*value) * f64::from(last - first);
+        }
+        let mean: Vec<_> = sum.iter().map(|p| p.map(|c| (c / f64::from(last)) as f32)).collect();
+        let name = format!("batch_{first:05}_{last:05}.exr");
+        write_exr(batches.path().join(name), &RenderLayers::rgb(width, height, &batch.mean)).unwrap();
+        let name = format!("{last:05}.exr");
+        write_exr(means.path().join(name), &RenderLayers::rgb(width, height, &mean)).unwrap();
+    }
+    check_source(|| StackSource::open_batches(batches.path()).unwrap());
+    check_source(|| StackSource::open_running_means(means.path()).unwrap());
+}
+
+/// What `check_source` says of a source.
+fn verdict<S: ProgressiveSource>(make: impl Fn() -> S) -> String {
+    let Err(panic) = catch_unwind(AssertUnwindSafe(|| check_source(make))) else { return "kept".into() };
+    let text = panic.downcast_ref::<String>().cloned();
+    text.or_else(|| panic.downcast_ref::<&str>().map(|s| (*s).to_owned())).unwrap_or_default()
+}
+
+fn broken(change: impl FnMut(&[Request], &mut Vec<Batch>) + Copy + 'static) -> String {
+    verdict(|| Altered::batches(synthetic(), change))
+}
+
+/// The contract notices; otherwise keeping it means nothing.
+#[test]
+fn broken_promises_are_noticed() {
+    let said = |said: String, expected: &str| assert!(said.contains(expected), "{said:?}, not {expected:?}");
+    said(broken(|_, _| ()), "kept");
+    said(broken(|_, b| drop(b.pop())), "number of batches");
+    said(broken(|_, b| b.reverse()), "order of the requests");
+    said(broken(|_, b| b.iter_mut().for_each(|b| b.mean.truncate(7))), "values in a batch");
+    said(broken(|_, b| b.iter_mut().for_each(|b| b.samples = 0)), "values in a batch of 0");
+    said(broken(|_, b| b.iter_mut().for_each(|b| b.samples += 1)), "other batches because other numbers");
+
+    // The first samples over and over
+    let again = |r: &[Request], b: &mut Vec<Batch>| {
+        let restart: Vec<_> = r.iter().map(|r| Request { first: 0, ..*r }).collect();
+        *b = synthetic().sample(&restart).unwrap();
+    };
+    let verdict_again = broken(again);
+    assert!(verdict_again.contains("how requests are cut"), "{verdict_again}");
+
+    // Random numbers that follow from the call, not from the sample: right but for cuts
+    let by_call = |r: &[Request], b: &mut Vec<Batch>| {
+        let seed = 100 + r.first().map_or(0, |r| r.first * 1000 + u64::from(r.samples));
+        *b = Synthetic { seed, ..synthetic() }.sample(r).unwrap();
+    };
+    said(broken(by_call), "how requests are cut");
+    said(broken(|r, b| b.iter_mut().for_each(|b| b.mean[0][0] *= r.len() as f32)), "alone");
+
+    // Random numbers numbered from the tile's corner
+    let from_corner = |r: &[Request], b: &mut Vec<Batch>| {
+        let moved: Vec<_> = r.iter().map(|r| Request { tile: Tile { x: 0, y: 0, ..r.tile }, ..*r }).collect();
+        *b = synthetic().sample(&moved).unwrap();
+        b.iter_mut().zip(r).for_each(|(b, r)| b.tile = r.tile);
+    };
+    said(broken(from_corner), "tiles have the same noise");
+}
+
+/// A playback of running means that forgets to take the difference.
+struct Running {
+    source: Synthetic,
+}
+
+impl ProgressiveSource for Running {
+    fn info(&self) -> SourceInfo {
+        self.source.info()
+    }
+
+    fn sample(&mut self, requests: &[Request]) -> Result<Vec<Batch>, SourceError> {
+        let all = |r: &Request| Request { first: 0, samples: r.first as u32 + 20, ..*r };
+        let mut batches = self.source.sample(&requests.iter().map(all).collect::<Vec<_>>())?;
+        batches.iter_mut().for_each(|b| b.samples = 20);
+        Ok(batches)
+    }
+}
+
+#[test]
+fn playbacks_and_references_that_break_it_are_noticed() {
+    let running = verdict(|| Running { source: synthetic() });
+    assert!(running.contains("successive batches are correlated"), "{running}");
+
+    let reference = |width: usize, value: f32| {
+        verdict(move || {
+            let image = move || Reference { width, height: SIZE.1, pixels: vec![[value; 3]; width * SIZE.1] };
+            Altered::reference(synthetic(), move || Some(image()))
+        })
+    };
+    assert_eq!(reference(SIZE.0, 0.5), "kept");
+    assert!(reference(SIZE.0 + 1, 0.5).contains("image's size"));
+    assert!(reference(SIZE.0, f32::NAN).contains("finite"));
+
+    let calls = std::cell::Cell::new(0);
+    let unsteady = verdict(|| {
+        calls.set(calls.get() + 1);
+        Synthetic { seed: calls.get(), ..synthetic() }
+    });
+    assert!(unsteady.contains("second time"), "{unsteady}");
+}

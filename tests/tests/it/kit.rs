@@ -1,0 +1,100 @@
+use noisefloor::{Batch, ProgressiveSource, Reference, Request, Rgb, SourceError, SourceInfo, Unit};
+
+/// Noise without a renderer. A sample of a pixel is radiance/p with probability p, and else black: mean `radiance`, standard
+/// deviation `noise`·`radiance`. All follows from (seed, pixel, sample).
+#[derive(Clone)]
+pub(crate) struct Synthetic {
+    pub(crate) size: (usize, usize),
+    pub(crate) seed: u64,
+    pub(crate) radiance: fn(usize, usize) -> f32,
+    /// Of one sample, relative.
+    pub(crate) noise: fn(usize, usize) -> f32,
+    /// Factor on all radiance.
+    pub(crate) unit: f32,
+    /// Samples per pixel that it has.
+    pub(crate) store: u64,
+    pub(crate) aims: bool,
+}
+
+impl Synthetic {
+    /// A ramp with a checker, noisier to the right.
+    pub(crate) fn new(width: usize, height: usize) -> Self {
+        let radiance = |x, y| 0.2 + 0.01 * (x % 64) as f32 + if (x / 6 + y / 6) % 2 == 0 { 0.1 } else { 0.0 };
+        let noise = |x, _| 0.1 + 0.004 * x as f32;
+        Self { size: (width, height), seed: 1, radiance, noise, unit: 1.0, store: u64::MAX, aims: true }
+    }
+
+    pub(crate) fn flat(width: usize, height: usize, radiance: fn(usize, usize) -> f32) -> Self {
+        Self { radiance, noise: |_, _| 0.0, ..Self::new(width, height) }
+    }
+
+    fn mean(&self, x: usize, y: usize, first: u64, samples: u32) -> Rgb {
+        let (radiance, noise) = ((self.radiance)(x, y) * self.unit, f64::from((self.noise)(x, y)));
+        let p = 1.0 / (1.0 + noise * noise);
+        let bound = if p < 1.0 { (p * 2f64.powi(64)) as u64 } else { u64::MAX };
+        let key = hash(self.seed ^ hash((y * self.size.0 + x) as u64));
+        let hits = (first..first + u64::from(samples)).filter(|i| hash(key ^ i) <= bound).count();
+        let share = (hits as f64 / f64::from(samples) / p) as f32;
+        [1.0, 0.8, 0.5].map(|c| c * radiance * share)
+    }
+}
+
+/// SplitMix64's finaliser.
+pub(crate) fn hash(mut x: u64) -> u64 {
+    x = x.wrapping_add(0x9e37_79b9_7f4a_7c15);
+    x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    x ^ (x >> 31)
+}
+
+impl ProgressiveSource for Synthetic {
+    fn info(&self) -> SourceInfo {
+        let ((width, height), unit) = (self.size, Unit::SamplesPerPixel);
+        SourceInfo { name: "synthetic".into(), width, height, unit, aims: self.aims }
+    }
+
+    fn sample(&mut self, requests: &[Request]) -> Result<Vec<Batch>, SourceError> {
+        let batch = |r: &Request| {
+            let samples = u64::from(r.samples).min(self.store.saturating_sub(r.first)) as u32;
+            let pixels = if samples == 0 { 0 } else { r.tile.pixels() };
+            let at = |i: usize| (r.tile.x + i % r.tile.width, r.tile.y + i / r.tile.width);
+            let mean = (0..pixels).map(at).map(|(x, y)| self.mean(x, y, r.first, samples)).collect();
+            Batch { tile: r.tile, samples, mean }
+        };
+        Ok(requests.iter().map(batch).collect())
+    }
+}
+
+/// A source with one thing changed: its batches, or its reference.
+pub(crate) struct Altered<S> {
+    pub(crate) source: S,
+    /// Given the requests and the right batches.
+    pub(crate) batches: Box<dyn FnMut(&[Request], &mut Vec<Batch>)>,
+    pub(crate) reference: Box<dyn FnMut() -> Option<Reference>>,
+}
+
+impl<S: ProgressiveSource> Altered<S> {
+    pub(crate) fn batches(source: S, change: impl FnMut(&[Request], &mut Vec<Batch>) + 'static) -> Self {
+        Self { source, batches: Box::new(change), reference: Box::new(|| None) }
+    }
+
+    pub(crate) fn reference(source: S, reference: impl FnMut() -> Option<Reference> + 'static) -> Self {
+        Self { source, batches: Box::new(|_, _| ()), reference: Box::new(reference) }
+    }
+}
+
+impl<S: ProgressiveSource> ProgressiveSource for Altered<S> {
+    fn info(&self) -> SourceInfo {
+        self.source.info()
+    }
+
+    fn sample(&mut self, requests: &[Request]) -> Result<Vec<Batch>, SourceError> {
+        let mut batches = self.source.sample(requests)?;
+        (self.batches)(requests, &mut batches);
+        Ok(batches)
+    }
+
+    fn reference(&mut self) -> Result<Option<Reference>, SourceError> {
+        Ok((self.reference)())
+    }
+}
