@@ -1,1 +1,224 @@
+use crate::kit::{Altered, Synthetic};
+use noisefloor::{
+    Batch, Driver, Event, Evidence, FixedSamples, Model, Oracle, Params, ProgressiveSource, Reference, Rgb,
+    Schedule, Session, Stop, StopReason, StoppingCriterion,
+};
+use noisefloor_ptwne::{Options, Ptwne, scenes};
+use std::cell::RefCell;
+use std::rc::Rc;
+use std::sync::atomic::Ordering;
 
+const TILE: Params = Params {
+    tile: 32,
+    tone_mapping: noisefloor::ToneMapping::Reinhard { key: noisefloor::DEFAULT_KEY, white: None },
+    schedule: Schedule::Every { step: 100 },
+    min_samples: 100,
+    max_samples: 3000,
+    consecutive: 1,
+    audience: noisefloor::Audience::TRAINED,
+};
+
+fn cornell() -> Ptwne {
+    let options = Options { seed: 1, ..Options::default() };
+    Ptwne::new(scenes::by_name("cornell-box").unwrap(), 96, 96, options).unwrap()
+}
+
+/// What came of a run, and the batches that made it.
+#[derive(Debug, PartialEq)]
+struct Outcome {
+    stops: Vec<Stop>,
+    image: Vec<Rgb>,
+    halves: Vec<[u64; 2]>,
+}
+
+impl Outcome {
+    fn of<C: StoppingCriterion>(session: &Session<C>) -> Self {
+        let film = session.film();
+        let halves = film.grid().tiles().map(|t| film.half_counts(t.index)).collect();
+        Self { stops: session.stops().collect(), image: film.image(), halves }
+    }
+
+    fn samples(&self) -> Vec<u64> {
+        self.stops.iter().map(|s| s.samples).collect()
+    }
+}
+
+fn run<S: ProgressiveSource, C: StoppingCriterion>(source: S, criterion: C, params: Params) -> Outcome {
+    let mut driver = Driver::new(source, criterion, params).unwrap();
+    driver.run(|_, _| ()).unwrap();
+    Outcome::of(driver.session())
+}
+
+/// A run by the bundled oracle on so many threads, and all batches in order.
+fn recorded(threads: usize) -> (Outcome, Vec<Batch>) {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+    pool.install(|| {
+        let log = Rc::new(RefCell::new(Vec::new()));
+        let to = Rc::clone(&log);
+        let source =
+            Altered::batches(cornell(), move |_, batches| to.borrow_mut().extend_from_slice(batches));
+        let outcome = run(source, Oracle::bundled(), TILE);
+        (outcome, log.take())
+    })
+}
+
+#[test]
+fn the_cornell_box_stops_by_itself_whatever_the_threads_and_whoever_owns_the_loop() {
+    let (outcome, batches) = recorded(1);
+    assert_eq!(outcome.stops.len(), 9);
+    for stop in &outcome.stops {
+        assert_eq!(stop.reason, StopReason::Converged, "{stop:?}");
+        assert!(stop.probability.is_some_and(|p| (0.9..=1.0).contains(&p)), "{stop:?}");
+    }
+    let samples = outcome.samples();
+    let (least, most) = (samples.iter().min().unwrap(), samples.iter().max().unwrap());
+    assert!(*most >= 2 * least, "tiles hardly differ: {samples:?}");
+
+    // Four threads: the same to the bit
+    let (four, _) = recorded(4);
+    assert_eq!(outcome, four);
+
+    // Pushed by a renderer that owns its loop: the same to the bit
+    let mut session = Session::new(96, 96, Oracle::bundled(), TILE).unwrap();
+    let mut batches = batches.into_iter().peekable();
+    while let Some(batch) = batches.next() {
+        session.push(batch.tile.index, batch.samples, &batch.mean).unwrap();
+        // The driver judges once a round; a round ends where the tiles begin anew
+        if batches.peek().is_none_or(|next| next.tile.index <= batch.tile.index) {
+            session.judge().unwrap();
+        }
+    }
+    assert!(session.is_done());
+    assert_eq!(outcome, Outcome::of(&session));
+}
+
+/// Renderers that keep a running mean push that: the same stops, but for what f32 takes from a difference of two means.
+#[test]
+fn running_means_stop_where_batches_do() {
+    let mut source = Synthetic::new(96, 32);
+    let pulled = run(source.clone(), Oracle::bundled(), TILE);
+    let mut session = Session::new(96, 32, Oracle::bundled(), TILE).unwrap();
+    let mut mean = vec![[0.0f64; 3]; 96 * 32];
+    while !session.is_done() {
+        for batch in source.sample(&session.requests()).unwrap() {
+            let before = session.film().samples(batch.tile.index);
+            let total = before + u64::from(batch.samples);
+            let pixels: Vec<usize> = batch.tile.rows(96).flatten().collect();
+            for (&pixel, new) in pixels.iter().zip(&batch.mean) {
+                for (mean, &new) in mean[pixel].iter_mut().zip(new) {
+                    *mean += (f64::from(new) - *mean) * f64::from(batch.samples) / total as f64;
+                }
+            }
+            let running: Vec<Rgb> = pixels.iter().map(|&p| mean[p].map(|c| c as f32)).collect();
+            session.push_running(batch.tile.index, total, &running).unwrap();
+        }
+        session.judge().unwrap();
+    }
+    assert_eq!(pulled.samples(), Outcome::of(&session).samples());
+}
+
+#[test]
+fn a_fixed_number_of_samples_is_that_everywhere() {
+    let fixed = run(cornell(), FixedSamples(200), TILE);
+    assert_eq!(fixed.samples(), [200; 9]);
+    assert!(fixed.stops.iter().all(|s| s.reason == StopReason::Converged && s.probability.is_none()));
+
+    // Which is the picture that one call gives, but for rounding; no halves were kept
+    let tile = noisefloor::Tile { index: 0, x: 0, y: 0, width: 96, height: 96 };
+    let whole = cornell().sample(&[noisefloor::Request { tile, first: 0, samples: 200 }]).unwrap().remove(0);
+    assert!(fixed.halves.iter().all(|&h| h == [200, 0]));
+    for (a, b) in fixed.image.iter().flatten().zip(whole.mean.iter().flatten()) {
+        assert!((a - b).abs() <= 1e-6 * b.abs(), "{a} {b}");
+    }
+}
+
+/// Spaced verdicts see fewer pictures: they stop on the same grid, never earlier than a neighbour's noise in the apron can make
+/// them (a step), and late by no more than a look at three quarters of the way to an expectation that errs by a third.
+#[test]
+fn spaced_verdicts_stop_about_where_frequent_ones_do() {
+    let count = |schedule: Schedule| {
+        let params = Params { schedule, max_samples: 10_000, ..TILE };
+        let mut driver = Driver::new(Synthetic::new(96, 64), Oracle::bundled(), params).unwrap();
+        let mut rounds = 0;
+        driver.run(|_, event| rounds += usize::from(matches!(event, Event::BatchDone(_)))).unwrap();
+        (Outcome::of(driver.session()).samples(), rounds)
+    };
+    let (every, rounds) = count(Schedule::Every { step: 20 });
+    let (spaced, fewer) = count(Schedule::Spaced { step: 20 });
+    for (&every, &spaced) in every.iter().zip(&spaced) {
+        assert!(spaced % 20 == 0 && spaced + 20 >= every && spaced <= every * 4 / 3 + 20, "{every} {spaced}");
+    }
+    assert!(every.iter().any(|&n| n >= 160), "nothing to save: {every:?}");
+    assert!(fewer < rounds, "{fewer} rounds against {rounds}");
+}
+
+#[test]
+fn limits_have_their_reasons() {
+    let limited = run(cornell(), Oracle::bundled(), Params { max_samples: 150, ..TILE });
+    for stop in &limited.stops {
+        match stop.reason {
+            StopReason::Converged => assert!(stop.probability >= Some(0.9), "{stop:?}"),
+            StopReason::MaxSamples => {
+                assert!(stop.samples == 150 && stop.probability < Some(0.9), "{stop:?}")
+            }
+            _ => panic!("{stop:?}"),
+        }
+    }
+    assert!(limited.samples().contains(&150));
+
+    // Cancelled after the first batch: what is there stays
+    let mut driver = Driver::new(cornell(), Oracle::bundled(), TILE).unwrap();
+    let flag = driver.cancel_flag();
+    driver
+        .run(|_, event| {
+            if matches!(event, Event::BatchDone(_)) {
+                flag.store(true, Ordering::Relaxed);
+            }
+        })
+        .unwrap();
+    let outcome = Outcome::of(driver.session());
+    assert!(
+        outcome.stops.iter().all(|s| s.reason == StopReason::Cancelled && s.samples == 50),
+        "{outcome:?}"
+    );
+    assert!(outcome.image.iter().flatten().any(|&c| c > 0.0));
+}
+
+#[test]
+fn a_stack_that_ends_says_so() {
+    let stops =
+        run(Synthetic { store: 130, noise: |_, _| 1.0, ..Synthetic::new(96, 32) }, Oracle::bundled(), TILE);
+    for stop in stops.stops {
+        assert_eq!((stop.samples, stop.reason), (130, StopReason::SourceExhausted));
+    }
+}
+
+#[test]
+fn the_reference_is_rendered_once_where_it_is_needed_and_never_elsewhere() {
+    // Halves are evidence enough
+    run(Altered::reference(Synthetic::new(64, 32), || panic!("nobody needs it")), Oracle::bundled(), TILE);
+    run(Altered::reference(Synthetic::new(64, 32), || panic!("nobody needs it")), FixedSamples(100), TILE);
+
+    // The same machine, held against a reference: here, the converged picture itself
+    let model = Model { evidence: Evidence::Reference, ..Model::bundled() };
+    let oracle = || Oracle::new(model.clone(), 0.9).unwrap();
+    let calls = Rc::new(RefCell::new(0));
+    let count = Rc::clone(&calls);
+    let converged = {
+        let mut exact = Synthetic { noise: |_, _| 0.0, ..Synthetic::new(64, 32) };
+        let tile = noisefloor::Tile { index: 0, x: 0, y: 0, width: 64, height: 32 };
+        exact.sample(&[noisefloor::Request { tile, first: 0, samples: 1 }]).unwrap().remove(0).mean
+    };
+    let source = Altered::reference(Synthetic::new(64, 32), move || {
+        *count.borrow_mut() += 1;
+        Some(Reference { width: 64, height: 32, pixels: converged.clone() })
+    });
+    let outcome = run(source, oracle(), TILE);
+    assert_eq!(*calls.borrow(), 1);
+    assert!(outcome.stops.iter().all(|s| s.reason == StopReason::Converged));
+    assert!(outcome.halves.iter().all(|h| h[1] == 0), "halves were kept, and nobody reads them");
+
+    // And the path tracer has one to give
+    let rendered = run(cornell(), oracle(), Params { max_samples: 100, ..TILE });
+    assert!(rendered.stops.iter().all(|s| s.probability.is_some()));
+}

@@ -1,13 +1,13 @@
 use noisefloor::{Batch, ProgressiveSource, Reference, Request, Rgb, SourceError, SourceInfo, Unit};
 
-/// Noise without a renderer. A sample of a pixel is radiance/p with probability p, and else black: mean `radiance`, standard
-/// deviation `noise`·`radiance`. All follows from (seed, pixel, sample).
+/// Noise without a renderer. A sample of a pixel is `radiance`·(1 ± `noise`), one as likely as the other. All follows from (seed,
+/// pixel, sample).
 #[derive(Clone)]
 pub(crate) struct Synthetic {
     pub(crate) size: (usize, usize),
     pub(crate) seed: u64,
     pub(crate) radiance: fn(usize, usize) -> f32,
-    /// Of one sample, relative.
+    /// Relative standard deviation of one sample, 0…1.
     pub(crate) noise: fn(usize, usize) -> f32,
     /// Factor on all radiance.
     pub(crate) unit: f32,
@@ -20,7 +20,7 @@ impl Synthetic {
     /// A ramp with a checker, noisier to the right.
     pub(crate) fn new(width: usize, height: usize) -> Self {
         let radiance = |x, y| 0.2 + 0.01 * (x % 64) as f32 + if (x / 6 + y / 6) % 2 == 0 { 0.1 } else { 0.0 };
-        let noise = |x, _| 0.1 + 0.004 * x as f32;
+        let noise = |x, _| (0.3 + 0.007 * x as f32).min(1.0);
         Self { size: (width, height), seed: 1, radiance, noise, unit: 1.0, store: u64::MAX, aims: true }
     }
 
@@ -30,12 +30,10 @@ impl Synthetic {
 
     fn mean(&self, x: usize, y: usize, first: u64, samples: u32) -> Rgb {
         let (radiance, noise) = ((self.radiance)(x, y) * self.unit, f64::from((self.noise)(x, y)));
-        let p = 1.0 / (1.0 + noise * noise);
-        let bound = if p < 1.0 { (p * 2f64.powi(64)) as u64 } else { u64::MAX };
         let key = hash(self.seed ^ hash((y * self.size.0 + x) as u64));
-        let hits = (first..first + u64::from(samples)).filter(|i| hash(key ^ i) <= bound).count();
-        let share = (hits as f64 / f64::from(samples) / p) as f32;
-        [1.0, 0.8, 0.5].map(|c| c * radiance * share)
+        let bright = (first..first + u64::from(samples)).filter(|i| hash(key ^ i) >> 63 == 1).count();
+        let factor = 1.0 + noise * (2.0 * bright as f64 / f64::from(samples) - 1.0);
+        [1.0, 0.8, 0.5].map(|c| c * radiance * factor as f32)
     }
 }
 

@@ -1,1 +1,36 @@
+use std::process::Command;
 
+/// Packages that `noisefloor` pulls in, by the cargo that runs this test, offline.
+fn dependencies(features: &[&str]) -> String {
+    let cargo = std::env::var_os("CARGO").unwrap_or_else(|| env!("CARGO").into());
+    let output = Command::new(cargo)
+        .args([
+            "tree",
+            "--offline",
+            "--locked",
+            "--package",
+            "noisefloor",
+            "--edges",
+            "normal",
+            "--prefix",
+            "none",
+        ])
+        .args(features)
+        .current_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/.."))
+        .output()
+        .unwrap();
+    let tree = String::from_utf8(output.stdout).unwrap();
+    assert!(output.status.success(), "cargo tree: {}", String::from_utf8_lossy(&output.stderr));
+    assert!(tree.starts_with("noisefloor v") && tree.contains("ndarray"), "{tree}");
+    tree
+}
+
+#[test]
+fn judging_alone_needs_no_machinery_of_training() {
+    for features in [&["--no-default-features"][..], &[]] {
+        let tree = dependencies(features);
+        assert!(!tree.contains("linfa"), "{features:?}:\n{tree}");
+    }
+    // Training does; so the test can fail
+    assert!(dependencies(&["--features", "train"]).contains("linfa-svm"));
+}

@@ -1,1 +1,128 @@
+use crate::kit::{Altered, Synthetic};
+use noisefloor::{
+    Driver, Oracle, Params, ProgressiveSource, Rgb, Schedule, Session, Stop, StopReason, TilePlanes,
+};
 
+/// A run by the bundled oracle.
+struct Run {
+    stops: Vec<Stop>,
+    image: Vec<Rgb>,
+    rejected: u64,
+}
+
+fn run(source: impl ProgressiveSource, params: Params) -> Run {
+    let mut driver = Driver::new(source, Oracle::bundled(), params).unwrap();
+    driver.run(|_, _| ()).unwrap();
+    let film = driver.session().film();
+    let stops: Vec<Stop> = driver.session().stops().collect();
+    for stop in &stops {
+        assert!(stop.probability.is_some_and(|p| (0.0..=1.0).contains(&p)), "{stop:?}");
+    }
+    Run { stops, image: film.image(), rejected: film.rejected() }
+}
+
+fn tiles_of(tile: usize) -> Params {
+    Params { tile, max_samples: 4000, ..Params::default() }
+}
+
+/// Radiance has no unit: whatever it is measured in, people see the same picture.
+#[test]
+fn the_unit_of_radiance_changes_nothing() {
+    let at = |unit: f32| run(Synthetic { unit, ..Synthetic::new(96, 48) }, tiles_of(32)).stops;
+    let usual = at(1.0);
+    assert!(usual.iter().any(|s| s.samples >= 300), "no noise to judge: {usual:?}");
+    for unit in [1e-30, 1e-8, 1e-4, 1e4, 1e8, 1e30] {
+        for (usual, stop) in usual.iter().zip(at(unit)) {
+            assert_eq!((usual.samples, usual.reason), (stop.samples, stop.reason), "unit {unit}");
+            // Display values differ by roundings of 1e-7 of each; noise of a step is 1/255, the machine's slope below 10 a unit of ln
+            let difference = (usual.probability.unwrap() - stop.probability.unwrap()).abs();
+            assert!(difference < 1e-3, "unit {unit}: {difference}");
+        }
+    }
+}
+
+#[test]
+fn what_is_constant_or_black_has_converged_at_once() {
+    let constant = |radiance: fn(usize, usize) -> f32| Synthetic::flat(80, 40, radiance);
+    for source in [constant(|_, _| 0.4), constant(|_, _| 0.0), constant(|_, _| 1e8), constant(|_, _| 1e-20)] {
+        let stops = run(source, tiles_of(32)).stops;
+        for stop in stops {
+            assert_eq!((stop.samples, stop.reason), (100, StopReason::Converged));
+            assert!(stop.probability.unwrap() > 0.99, "{stop:?}");
+        }
+    }
+}
+
+/// Samples that are not numbers are counted, kept out, and change no other tile by more than the step that a grain of exposure can.
+#[test]
+fn samples_that_are_not_finite_are_kept_out() {
+    let clean = run(Synthetic::new(96, 32), tiles_of(32));
+    for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+        let source = Altered::batches(Synthetic::new(96, 32), move |requests, batches| {
+            for (request, batch) in requests.iter().zip(batches.iter_mut()) {
+                if request.tile.index == 0 {
+                    // One pixel never has a valid sample, another one only its first batch not
+                    batch.mean[5][1] = bad;
+                    if request.first == 0 {
+                        batch.mean[9] = [bad; 3];
+                    }
+                }
+            }
+        });
+        let dirty = run(source, tiles_of(32));
+        assert!(dirty.image.iter().flatten().all(|c| c.is_finite()));
+        assert_eq!(dirty.image[5], [0.0; 3]);
+        assert_eq!(dirty.rejected, dirty.stops[0].samples + 50);
+        for (clean, dirty) in clean.stops.iter().zip(&dirty.stops) {
+            assert_eq!(dirty.reason, StopReason::Converged);
+            assert!(clean.samples.abs_diff(dirty.samples) <= 100, "{clean:?} {dirty:?}");
+        }
+    }
+}
+
+/// Pictures smaller than a tile, tiles as small and as large as they come, ragged ones of a few pixels.
+#[test]
+fn every_size_is_judged() {
+    for (width, height, tile, tiles) in
+        [(1, 1, 16, 1), (17, 16, 16, 2), (1, 40, 16, 3), (33, 35, 16, 9), (520, 20, 512, 2), (16, 16, 512, 1)]
+    {
+        let stops = run(Synthetic::new(width, height), tiles_of(tile)).stops;
+        assert_eq!(stops.len(), tiles);
+        for stop in stops {
+            let reasons = [StopReason::Converged, StopReason::MaxSamples];
+            assert!(reasons.contains(&stop.reason) && (100..=4000).contains(&stop.samples), "{stop:?}");
+        }
+    }
+}
+
+/// Halves of 1 and 10,000 samples: the residual has the noise of the mean of all 10,001.
+///
+/// Over 128×128 independent pixels of almost normal noise the standard deviation is known to 1/√(2·16384) = 0.55 %, and so is that of
+/// even halves; their ratio errs by 0.8 %. 5 of that, and 1 % for the curvature of the display curve under noise of 3 %: 5 %. Fails by
+/// chance with p < 1e-6.
+#[test]
+fn uneven_halves_have_the_noise_of_their_mean() {
+    let residual = |batches: [u32; 2]| {
+        let source = || Synthetic { radiance: |_, _| 0.4, noise: |_, _| 0.03, ..Synthetic::new(128, 128) };
+        let params = Params { schedule: Schedule::Every { step: 2 }, min_samples: 2, ..Params::default() };
+        let mut session = Session::new(128, 128, Oracle::bundled(), params).unwrap();
+        let tile = session.film().grid().tile(0);
+        let mut first = 0;
+        for samples in batches {
+            let request = noisefloor::Request { tile, first, samples };
+            let batch = source().sample(&[request]).unwrap().remove(0);
+            session.push(0, samples, &batch.mean).unwrap();
+            first += u64::from(samples);
+        }
+        assert_eq!(session.film().half_counts(0), batches.map(u64::from));
+        let stop = session.judge().unwrap()[0];
+        assert_eq!((stop.reason, stop.samples), (StopReason::Converged, 10_001));
+        let planes = TilePlanes::from_halves(session.film(), session.display().unwrap(), tile);
+        let inner = planes.inner;
+        let values = (0..inner.height * inner.width)
+            .map(|i| planes.residual[(inner.y + i / inner.width, inner.x + i % inner.width)]);
+        (values.map(|v| f64::from(v).powi(2)).sum::<f64>() / tile.pixels() as f64).sqrt()
+    };
+    let (even, uneven) = (residual([5001, 5000]), residual([1, 10_000]));
+    assert!((uneven / even - 1.0).abs() < 0.05, "{uneven} {even}");
+}

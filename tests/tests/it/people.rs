@@ -1,1 +1,73 @@
+use noisefloor::{Oracle, Samples, Tile, TilePlanes, residual_scale};
+use noisefloor_exr::corpus::{Corpus, ZoneImages};
+use noisefloor_exr::{DisplayImage, Picture, read_picture};
+use std::io::Write;
+use std::path::{Path, PathBuf};
 
+/// `human/<name>` in `NOISEFLOOR_SHARED`, or else in `../shared` beside the repository.
+fn human(name: &str) -> Option<PathBuf> {
+    let beside = || PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared"));
+    let root = std::env::var_os("NOISEFLOOR_SHARED").map_or_else(beside, PathBuf::from);
+    let path = root.join("human").join(name);
+    if path.is_dir() {
+        return Some(path);
+    }
+    // Past the capture of the test harness, which keeps what passing tests print to itself
+    let stderr = &mut std::io::stderr();
+    writeln!(stderr, "SKIPPED: no {}; set NOISEFLOOR_SHARED to the folder of shared data", path.display())
+        .unwrap();
+    None
+}
+
+/// A picture as observers saw it, and its samples per pixel.
+fn shown(folder: &Path, spp: u64) -> (DisplayImage, f64) {
+    match read_picture(folder.join(format!("{spp:05}.png"))).unwrap() {
+        Picture::Display(image) => (image, spp as f64),
+        Picture::Linear(_) => panic!("a PNG is display-encoded"),
+    }
+}
+
+/// Whether a zone of a picture has converged, by the difference to another stage of the same rendering.
+fn converged(
+    oracle: &Oracle,
+    (image, spp): &(DisplayImage, f64),
+    (other, of): &(DisplayImage, f64),
+    zone: Tile,
+) -> bool {
+    let scale = residual_scale(*spp, *of, Samples::Nested).unwrap();
+    let planes = TilePlanes::gather((image.width, image.height), zone, |x, y| {
+        let (a, b) = (image.pixels[y * image.width + x], other.pixels[y * image.width + x]);
+        (a, std::array::from_fn(|c| (a[c] - b[c]) * scale))
+    });
+    let rounding = 2.0 * image.step * image.step / 12.0 * scale * scale;
+    oracle.judge_planes(&TilePlanes { rounding, ..planes }, *spp as u64).unwrap().converged
+}
+
+/// Of what production renderers made: most zones of the first pictures are noisy, most of the last ones are not.
+#[test]
+fn early_pictures_are_noisy_and_last_ones_are_not() {
+    let Some(dir) = human("lisic9") else { return };
+    let corpus = Corpus::open(&dir).unwrap();
+    let oracle = Oracle::bundled();
+    let (mut zones, mut early, mut late) = (0, 0, 0);
+    for scene in corpus.scenes() {
+        let of_scene = || corpus.zones().iter().filter(|z| z.scene == scene);
+        let ZoneImages::RunningMeans(folder) = &of_scene().next().unwrap().stack else { panic!("{scene}") };
+        let name = |path: PathBuf| path.file_stem()?.to_str()?.parse::<u64>().ok();
+        let mut spp: Vec<u64> =
+            std::fs::read_dir(folder).unwrap().filter_map(|e| name(e.unwrap().path())).collect();
+        spp.sort_unstable();
+        // The last picture is held against the early one with most samples: the first has too few to say much
+        let most_early = *spp.iter().rfind(|&&n| 2 * n <= spp[spp.len() - 1]).unwrap();
+        let [first, middle, last] = [spp[0], most_early, spp[spp.len() - 1]].map(|n| shown(folder, n));
+        for z in of_scene() {
+            let zone = Tile { index: 0, x: z.x, y: z.y, width: z.width, height: z.height };
+            zones += 1;
+            early += usize::from(converged(&oracle, &first, &last, zone));
+            late += usize::from(converged(&oracle, &last, &middle, zone));
+        }
+    }
+    assert_eq!(zones, 112);
+    assert!(early * 2 < zones, "{early} of {zones} zones have converged in the first pictures");
+    assert!(late * 5 > zones * 4, "{late} of {zones} zones have converged in the last pictures");
+}
