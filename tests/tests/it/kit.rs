@@ -63,11 +63,13 @@ impl ProgressiveSource for Synthetic {
     }
 }
 
+/// Given the requests and the right batches, makes others of them.
+pub(crate) type Change = Box<dyn FnMut(&[Request], &mut Vec<Batch>)>;
+
 /// A source with one thing changed: its batches, or its reference.
 pub(crate) struct Altered<S> {
     pub(crate) source: S,
-    /// Given the requests and the right batches.
-    pub(crate) batches: Box<dyn FnMut(&[Request], &mut Vec<Batch>)>,
+    pub(crate) batches: Change,
     pub(crate) reference: Box<dyn FnMut() -> Option<Reference>>,
 }
 

@@ -1,8 +1,20 @@
 //! Tests that cross crates, one module a subject.
 
-mod contract; // what every source promises, and that broken promises are noticed
-mod end_to_end; // driver, oracle and renderer together
-mod kit; // sources made by hand
-mod no_linfa; // judging alone needs no machinery of training
-mod numerics; // extreme radiance, odd sizes, uneven halves
-mod people; // what people said of real renders
+/// What every source promises, and that broken promises are noticed.
+#[cfg(test)]
+mod contract;
+/// Driver, oracle and renderer together.
+#[cfg(test)]
+mod end_to_end;
+/// Sources made by hand.
+#[cfg(test)]
+mod kit;
+/// Judging alone needs no machinery of training.
+#[cfg(test)]
+mod no_linfa;
+/// Extreme radiance, odd sizes, uneven halves.
+#[cfg(test)]
+mod numerics;
+/// What people said of real renders.
+#[cfg(test)]
+mod people;

@@ -1,0 +1,198 @@
+use crate::kit::{FILES, fail, grey_exr, succeed, text, tiny};
+use std::path::Path;
+use tempfile::{TempDir, tempdir};
+
+/// A folder with pictures, right and wrong.
+struct Case {
+    folder: TempDir,
+}
+
+impl Case {
+    fn new() -> Self {
+        let case = Self { folder: tempdir().unwrap() };
+        grey_exr(&case.path("a.exr"), (32, 32), 1, 0.4);
+        grey_exr(&case.path("b.exr"), (32, 32), 2, 0.4);
+        grey_exr(&case.path("small.exr"), (32, 16), 3, 0.4);
+        grey_exr(&case.path("nan.exr"), (32, 32), 4, f32::NAN);
+        std::fs::write(case.path("text.exr"), "not a picture\n").unwrap();
+        case
+    }
+
+    fn path(&self, name: &str) -> std::path::PathBuf {
+        self.folder.path().join(name)
+    }
+
+    /// Judges one picture against another, which must fail.
+    fn judge(&self, image: &str, against: &str, more: &[&str], words: &[&str]) {
+        let (image, against) = (self.path(image), self.path(against));
+        let mut args = vec!["judge", text(&image), "--against", text(&against), "--tile", "32"];
+        args.extend(more);
+        fail(&args, words);
+    }
+}
+
+const SPP: [&str; 4] = ["--spp", "16", "--spp", "16"];
+
+#[test]
+fn pictures() {
+    let case = Case::new();
+    case.judge("a.exr", "absent.exr", &SPP, &["absent.exr"]);
+    case.judge("absent.exr", "a.exr", &SPP, &["absent.exr"]);
+    case.judge("text.exr", "b.exr", &SPP, &["text.exr", "EXR"]);
+    case.judge("nan.exr", "b.exr", &SPP, &["nan.exr", "(0, 0)", "finite"]);
+    case.judge("a.exr", "nan.exr", &SPP, &["nan.exr", "finite"]);
+    case.judge("a.exr", "small.exr", &SPP, &["small.exr", "32×32", "32×16"]);
+    case.judge("a.exr", "a.exr", &SPP, &["same"]);
+    case.judge("a.exr", ".", &SPP, &["folder"]);
+    case.judge("a.exr", "b.exr", &["--spp", "0", "--spp", "16"], &["a.exr", "positive", "0"]);
+    case.judge("a.exr", "b.exr", &["--spp", "16", "--spp", "nan"], &["b.exr", "positive"]);
+    case.judge("a.exr", "b.exr", &["--spp", "16"], &["--spp", "1 given for 2"]);
+    case.judge("a.exr", "b.exr", &["--spp", "16", "--spp", "16", "--spp", "16"], &["3 given for 2"]);
+    case.judge("a.exr", "b.exr", &["--spp", "16", "--spp", "16", "--nested"], &["same"]);
+    case.judge("a.exr", "b.exr", &["--spp", "16", "--spp", "16", "--threshold", "1"], &["threshold"]);
+
+    let (a, b) = (case.path("a.exr"), case.path("b.exr"));
+    fail(
+        &["judge", text(&a), "--spp", "9", "--against", text(&b), "--spp", "9", "--tile", "0"],
+        &["tile", "16…512"],
+    );
+    fail(&["judge", text(&a), "--spp", "9"], &["--against"]);
+    let below = a.join("heat.png");
+    let args = ["--heat-map", text(&below)];
+    case.judge("a.exr", "b.exr", &[&SPP[..], &args].concat(), &["heat.png"]);
+}
+
+#[test]
+fn models() {
+    let case = Case::new();
+    let good = include_bytes!("../../../noisefloor/models/human.nfm");
+    let write = |name: &str, change: &dyn Fn(&mut Vec<u8>)| {
+        let mut bytes = good.to_vec();
+        change(&mut bytes);
+        std::fs::write(case.path(name), bytes).unwrap();
+        case.path(name)
+    };
+    let damaged = write("damaged.nfm", &|b| b[100] ^= 1);
+    let cut = write("cut.nfm", &|b| b.truncate(b.len() / 2));
+    let newer = write("newer.nfm", &|b| b[8] = 99);
+    let huge = write("huge.nfm", &|b| b[12..20].fill(0xff));
+    let models: [(&Path, &[&str]); 6] = [
+        (&damaged, &["damaged.nfm", "damaged"]),
+        (&cut, &["cut.nfm", "damaged"]),
+        (&newer, &["newer.nfm", "version 99", "update"]),
+        (&huge, &["huge.nfm", "limit"]),
+        (&case.path("text.exr"), &["text.exr", "not a noisefloor model"]),
+        (&case.path("absent.nfm"), &["absent.nfm"]),
+    ];
+    let out = case.path("out");
+    for (model, words) in models {
+        fail(&["inspect", text(model)], words);
+        fail(&tiny(text(&out), &["--model", text(model)]), words);
+        case.judge("a.exr", "b.exr", &[&SPP[..], &["--model", text(model)]].concat(), words);
+    }
+    assert!(!out.exists(), "a folder was made for a render that could not begin");
+}
+
+#[test]
+fn options() {
+    let case = Case::new();
+    let (out, truth) = (case.path("out"), case.path("small.exr"));
+    let bad: [(&[&str], &[&str]); 22] = [
+        (&["no-such-scene"], &["no-such-scene", "noisefloor scenes"]),
+        (&["--tile", "0"], &["tile", "16…512"]),
+        (&["--tile", "513"], &["513", "16…512"]),
+        (&["--size", "64"], &["64"]),
+        (&["--size", "0x64"], &["0×64"]),
+        (&["--size", "99999x99999"], &["65536"]),
+        (&["--threads", "0"], &["--threads"]),
+        (&["--batch", "1"], &["at least 2"]),
+        (&["--batch", "-3"], &["-3"]),
+        (&["--max-spp", "0"], &["samples per pixel"]),
+        (&["--min-spp", "300"], &["300"]),
+        (&["--consecutive", "0"], &["at least one"]),
+        (&["--criterion", "spp:0"], &["spp:0"]),
+        (&["--criterion", "psychic"], &["spp:N"]),
+        (&["--audience", "bats"], &["observers"]),
+        (&["--audience", "nan,0"], &["finite"]),
+        (&["--time", "0"], &["above 0"]),
+        (&["--threshold", "nan"], &["threshold"]),
+        (&["--key", "0"], &["key"]),
+        (&["--max-depth", "0"], &["max_depth"]),
+        (&["--against", text(&truth)], &["small.exr", "32×16", "64×64"]),
+        (&["--against", "absent.exr"], &["absent.exr"]),
+    ];
+    for (args, words) in bad {
+        let mut all = tiny(text(&out), args);
+        // An option given twice would be refused for that
+        if let Some(at) =
+            all.iter().position(|a| args[0].starts_with("--") && *a == args[0]).filter(|&at| at < 9)
+        {
+            all.drain(at..at + 2);
+        }
+        fail(&all, words);
+    }
+    fail(&["paint"], &["paint"]);
+    fail(&["inspect", "--sigma", "1"], &["--sigma"]);
+}
+
+#[test]
+fn folders_that_cannot_be_written() {
+    // Below a file there is no folder, for root neither
+    let case = Case::new();
+    let below = case.path("a.exr").join("out");
+    fail(&tiny(text(&below), &[]), &["a.exr", "--out"]);
+    // A file in the place of an output
+    let out = case.path("out");
+    std::fs::create_dir_all(out.join("timeline.csv")).unwrap();
+    fail(&tiny(text(&out), &[]), &["timeline.csv"]);
+}
+
+#[test]
+fn corpora() {
+    let case = Case::new();
+    let (folder, model) = (case.folder.path(), case.path("model.nfm"));
+    let train = |more: &[&str], words: &[&str]| {
+        let mut args = vec!["train", "--out", text(&model)];
+        args.extend(more);
+        fail(&args, words);
+        let mut args = vec!["evaluate"];
+        args.extend(more);
+        fail(&args, words);
+        assert!(!model.exists());
+    };
+    train(&["--corpus", text(folder)], &["thresholds.csv"]);
+    train(&["--corpus", "absent"], &["absent"]);
+    train(&["--table", "absent.csv"], &["absent.csv"]);
+    train(&[], &["--corpus"]);
+    train(&["--corpus", text(folder), "--table", "x.csv"], &["--table"]);
+    for sigma in ["0.29", "1.51", "nan"] {
+        train(&["--corpus", text(folder), "--sigma", sigma], &["--sigma", "0.3", "1.5"]);
+    }
+    train(&["--corpus", text(folder), "--c", "0"], &["positive"]);
+    let table = case.path("text.exr");
+    train(&["--table", text(&table)], &["text.exr", "line 1"]);
+    fail(&["evaluate", "--table", text(&table), "--threshold", "0"], &["--threshold"]);
+}
+
+/// What a failed run leaves of an earlier one's files: every byte.
+fn keeps_earlier_files(bad: &[&str], words: &[&str]) {
+    let folder = tempdir().unwrap();
+    let out = text(folder.path());
+    succeed(&tiny(out, &["--criterion", "spp:100"]));
+    let read = || FILES.map(|name| std::fs::read(folder.path().join(name)).unwrap());
+    let before = read();
+    let mut args = vec!["render", "--quiet", "--size", "64x64", "--out", out];
+    args.extend(bad);
+    fail(&args, words);
+    for ((name, before), after) in FILES.iter().zip(before).zip(read()) {
+        assert!(before == after, "{name} was touched by a run that failed: {bad:?}");
+    }
+}
+
+#[test]
+fn earlier_files_stay_when_a_run_cannot_begin() {
+    keeps_earlier_files(&["no-such-scene"], &["no-such-scene"]);
+    keeps_earlier_files(&["--model", "absent.nfm"], &["absent.nfm"]);
+    keeps_earlier_files(&["--against", "absent.exr"], &["absent.exr"]);
+    keeps_earlier_files(&["--consecutive", "0"], &["at least one"]);
+}

@@ -1,0 +1,70 @@
+use crate::kit::succeed;
+
+#[test]
+fn every_subcommand_explains_itself() {
+    let options: [(&str, &[&str]); 6] = [
+        (
+            "render",
+            &[
+                "--out",
+                "--size",
+                "--tile",
+                "--batch",
+                "--min-spp",
+                "--max-spp",
+                "--time",
+                "--seed",
+                "--threads",
+                "--model",
+            ],
+        ),
+        (
+            "judge",
+            &[
+                "--spp",
+                "--against",
+                "--nested",
+                "--json",
+                "--heat-map",
+                "--tile",
+                "--model",
+                "--tone-mapping",
+            ],
+        ),
+        ("train", &["--corpus", "--table", "--out", "--save-table", "--sigma"]),
+        ("evaluate", &["--corpus", "--model", "--leave-one-scene-out", "--json", "--csv"]),
+        ("inspect", &["MODEL", "--json"]),
+        ("scenes", &["--help"]),
+    ];
+    let all = succeed(&["--help"]);
+    for (name, options) in options {
+        assert!(all.contains(name), "{name} is not in\n{all}");
+        let help = succeed(&[name, "--help"]);
+        for option in options {
+            assert!(help.contains(option), "{option} is not in the help of {name}:\n{help}");
+        }
+    }
+    let render = succeed(&["render", "--help"]);
+    for option in [
+        "--tone-mapping",
+        "--audience",
+        "--criterion",
+        "--against",
+        "--autosave",
+        "--schedule",
+        "--threshold",
+    ] {
+        assert!(render.contains(option), "{option} is not in\n{render}");
+    }
+    assert!(succeed(&["--version"]).starts_with("noisefloor "));
+}
+
+#[test]
+fn at_least_six_scenes_are_listed() {
+    let scenes = succeed(&["scenes"]);
+    assert!(scenes.lines().count() >= 6 && scenes.contains("cornell-box"), "{scenes}");
+    assert!(
+        scenes.lines().all(|line| line.split_whitespace().count() > 2),
+        "a name and what it shows:\n{scenes}"
+    );
+}

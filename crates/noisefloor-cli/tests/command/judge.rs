@@ -1,0 +1,83 @@
+use crate::kit::{grey_exr, succeed, text, tiny};
+use noisefloor_exr::{Picture, read_picture};
+use serde_json::Value;
+use std::path::PathBuf;
+use tempfile::tempdir;
+
+#[test]
+fn two_renders_with_two_seeds() {
+    let folder = tempdir().unwrap();
+    let render = |seed: &str, spp: &str| -> PathBuf {
+        let out = folder.path().join(format!("{seed}-{spp}"));
+        succeed(&tiny(text(&out), &["--seed", seed, "--criterion", spp]));
+        out.join("image.exr")
+    };
+    let judge = |a: &PathBuf, b: &PathBuf, spp: &str, more: &[&str]| {
+        let mut args =
+            vec!["judge", text(a), "--spp", spp, "--against", text(b), "--spp", spp, "--tile", "32"];
+        args.extend(more);
+        succeed(&args)
+    };
+
+    // As JSON: noisy at 100, and what is expected lies above
+    let noisy = [render("1", "spp:100"), render("2", "spp:100")];
+    let report: Value = serde_json::from_str(&judge(&noisy[0], &noisy[1], "100", &["--json"])).unwrap();
+    assert_eq!(
+        (report["spp"].as_f64(), report["threshold"].as_f64().map(|t| t as f32)),
+        (Some(100.0), Some(0.9))
+    );
+    assert_eq!(report["model"].as_str().map(str::len), Some(64));
+    let tiles = report["tiles"].as_array().unwrap();
+    assert_eq!(tiles.len(), 4);
+    let converged = |tile: &Value| tile["converged"].as_bool().unwrap();
+    assert_eq!(
+        report["converged_tiles"].as_u64(),
+        Some(tiles.iter().filter(|t| converged(t)).count() as u64)
+    );
+    for tile in tiles {
+        let p = tile["probability"].as_f64().unwrap();
+        assert_eq!(p as f32 >= 0.9, converged(tile), "{tile}");
+        let expected = tile["expected_spp"].as_u64().unwrap();
+        assert!(
+            (0.0..=1.0).contains(&p) && if converged(tile) { expected == 100 } else { expected > 100 },
+            "{tile}"
+        );
+    }
+    assert!(!converged(&tiles[0]), "{report}");
+
+    // As a table, with a heat map
+    let map = folder.path().join("map.png");
+    let said = judge(&noisy[0], &noisy[1], "100", &["--heat-map", text(&map)]);
+    assert_eq!(said.lines().count(), 6, "{said}");
+    assert!(said.contains("noise seen") && said.contains("of 4 tiles"), "{said}");
+    assert!(std::fs::read(&map).unwrap().starts_with(b"\x89PNG\r\n\x1a\n"));
+    let Picture::Display(map) = read_picture(&map).unwrap() else { panic!("a PNG") };
+    assert!(map.width > 64 && map.height >= 64);
+
+    // Nested stages of one rendering agree with independent ones about where noise is
+    let more = render("1", "spp:1000");
+    let args =
+        ["judge", text(&noisy[0]), "--spp", "100", "--against", text(&more), "--spp", "1000", "--nested"];
+    let nested: Value =
+        serde_json::from_str(&succeed(&[&args[..], &["--tile", "32", "--json"]].concat())).unwrap();
+    for (a, b) in tiles.iter().zip(nested["tiles"].as_array().unwrap()) {
+        let difference = a["probability"].as_f64().unwrap() - b["probability"].as_f64().unwrap();
+        assert!(difference.abs() < 0.25, "{a} {b}");
+    }
+}
+
+/// The same noise claimed to be that of more samples is the same noise: P goes by what is seen.
+#[test]
+fn extreme_counts_and_sizes_are_judged() {
+    let folder = tempdir().unwrap();
+    let [a, b] = ["a.exr", "b.exr"].map(|name| folder.path().join(name));
+    for size in [(1, 1), (17, 16)] {
+        grey_exr(&a, size, 1, 0.4);
+        grey_exr(&b, size, 2, 0.5);
+        for spp in ["1", "1e18", "0.001"] {
+            let args = ["judge", text(&a), "--spp", spp, "--against", text(&b), "--spp", spp, "--json"];
+            let report: Value = serde_json::from_str(&succeed(&args)).unwrap();
+            assert!(report["tiles"][0]["probability"].as_f64().is_some(), "{report}");
+        }
+    }
+}

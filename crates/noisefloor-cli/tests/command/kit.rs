@@ -1,0 +1,97 @@
+use noisefloor_exr::{RenderLayers, write_exr};
+use serde_json::Value;
+use std::path::Path;
+use std::process::{Command, Output};
+
+pub(crate) fn command(args: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_noisefloor"));
+    command.args(args);
+    command
+}
+
+pub(crate) fn run(args: &[&str]) -> Output {
+    command(args).output().unwrap()
+}
+
+pub(crate) fn stderr(output: &Output) -> String {
+    String::from_utf8(output.stderr.clone()).unwrap()
+}
+
+/// Runs what must succeed; its standard output.
+pub(crate) fn succeed(args: &[&str]) -> String {
+    let output = run(args);
+    assert!(output.status.success(), "{args:?}: {}\n{}", output.status, stderr(&output));
+    String::from_utf8(output.stdout).unwrap()
+}
+
+/// Runs what must fail with exit code 1 and one line that has all of `words` in it. What clap refuses has exit code 2, and may say
+/// more.
+pub(crate) fn fail(args: &[&str], words: &[&str]) {
+    let output = run(args);
+    let said = stderr(&output);
+    assert!(!said.contains("panicked"), "{args:?} panicked:\n{said}");
+    assert!(said.starts_with("error: "), "{args:?}: {said:?}");
+    match output.status.code() {
+        Some(1) => {
+            assert!(said.ends_with('\n') && said.lines().count() == 1, "{args:?}, in one line:\n{said}")
+        }
+        Some(2) => {}
+        code => panic!("{args:?}: exit code {code:?}\n{said}"),
+    }
+    for word in words {
+        assert!(said.contains(word), "{args:?}: {word:?} is not in {said:?}");
+    }
+}
+
+/// A render of 64×64 pixels in four tiles, in about half a second.
+pub(crate) fn tiny<'a>(out: &'a str, more: &[&'a str]) -> Vec<&'a str> {
+    let small = ["render", "--size", "64x64", "--tile", "32", "--max-spp", "200", "--quiet", "--out", out];
+    small.iter().chain(more).copied().collect()
+}
+
+pub(crate) const FILES: [&str; 6] =
+    ["image.exr", "image.png", "stops.csv", "stops.png", "timeline.csv", "report.json"];
+
+pub(crate) fn text(path: &Path) -> &str {
+    path.to_str().unwrap()
+}
+
+pub(crate) fn json(path: &Path) -> Value {
+    serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap()
+}
+
+/// Header and rows.
+pub(crate) fn table(path: &Path) -> (Vec<String>, Vec<Vec<String>>) {
+    let mut reader = csv::Reader::from_path(path).unwrap();
+    let fields = |record: &csv::StringRecord| record.iter().map(str::to_owned).collect::<Vec<_>>();
+    let header = fields(reader.headers().unwrap());
+    (header, reader.records().map(|r| fields(&r.unwrap())).collect())
+}
+
+/// One column of a table.
+pub(crate) fn column(path: &Path, name: &str) -> Vec<String> {
+    let (header, rows) = table(path);
+    let at = header.iter().position(|h| h == name).unwrap_or_else(|| panic!("{name} is not in {header:?}"));
+    rows.into_iter().map(|mut row| row.swap_remove(at)).collect()
+}
+
+/// An EXR of noise around grey, drawn from (seed, pixel); pixel 0 is `first`.
+pub(crate) fn grey_exr(path: &Path, (width, height): (usize, usize), seed: u64, first: f32) {
+    let mut random = random(seed);
+    let mut rgb: Vec<[f32; 3]> = (0..width * height).map(|_| [0.4 + 0.1 * random() as f32; 3]).collect();
+    rgb[0] = [first; 3];
+    write_exr(path, &RenderLayers::rgb(width, height, &rgb)).unwrap();
+}
+
+/// Standard normal numbers by the sum of twelve uniform ones.
+pub(crate) fn random(seed: u64) -> impl FnMut() -> f64 {
+    let mut state = seed;
+    move || {
+        let mut sum = -6.0;
+        for _ in 0..12 {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            sum += (state >> 40) as f64 / f64::from(1u32 << 24);
+        }
+        sum
+    }
+}

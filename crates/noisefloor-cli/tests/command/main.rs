@@ -1,0 +1,23 @@
+//! Tests of the `noisefloor` command as it is run: exit codes, files, and one line an error. One module a subject.
+
+/// One line, no panic, nothing lost.
+#[cfg(test)]
+mod bad_input;
+/// Every subcommand explains itself.
+#[cfg(test)]
+mod help;
+/// Verdicts on pictures.
+#[cfg(test)]
+mod judge;
+/// Running the command.
+#[cfg(test)]
+mod kit;
+/// Train, inspect, evaluate.
+#[cfg(test)]
+mod learn;
+/// What is written, and that it is the same again.
+#[cfg(test)]
+mod render;
+/// Ctrl-C, and worse.
+#[cfg(test)]
+mod signals;

@@ -1,0 +1,125 @@
+use crate::kit::{FILES, column, json, succeed, table, text, tiny};
+use noisefloor_exr::{Picture, read_exr, read_picture};
+use tempfile::tempdir;
+
+const STOPS: &str = "tile,x,y,width,height,spp,probability,reason";
+
+#[test]
+fn writes_all_it_promises() {
+    let folder = tempdir().unwrap();
+    let out = folder.path().join("new/deep");
+    succeed(&tiny(text(&out), &["--seed", "7"]));
+    let mut written: Vec<_> =
+        std::fs::read_dir(&out).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
+    written.sort();
+    let mut promised = FILES.map(str::to_owned).to_vec();
+    promised.sort();
+    assert_eq!(written, promised);
+
+    // A line a tile
+    let stops = out.join("stops.csv");
+    assert_eq!(std::fs::read_to_string(&stops).unwrap().lines().next(), Some(STOPS));
+    let (_, rows) = table(&stops);
+    let places: Vec<_> = rows.iter().map(|r| r[..5].join(",")).collect();
+    assert_eq!(places, ["0,0,0,32,32", "1,32,0,32,32", "2,0,32,32,32", "3,32,32,32,32"]);
+    for row in &rows {
+        let (spp, p): (u64, f32) = (row[5].parse().unwrap(), row[6].parse().unwrap());
+        match row[7].as_str() {
+            "converged" => assert!((100..=200).contains(&spp) && (0.9..=1.0).contains(&p), "{row:?}"),
+            "max-samples" => assert!(spp == 200 && (0.0..0.9).contains(&p), "{row:?}"),
+            _ => panic!("{row:?}"),
+        }
+    }
+
+    // What a report has to say; samples are those of the stops
+    let report = json(&out.join("report.json"));
+    let spp = || rows.iter().map(|r| r[5].parse::<u64>().unwrap());
+    assert_eq!((report["scene"].as_str(), report["seed"].as_u64()), (Some("cornell-box"), Some(7)));
+    assert_eq!(report["samples"].as_u64(), Some(spp().sum::<u64>() * 32 * 32));
+    assert_eq!(report["samples_uniform"].as_u64(), Some(spp().max().unwrap() * 64 * 64));
+    assert_eq!(report["complete"].as_bool(), Some(true));
+    assert!(report["seconds_source"].as_f64() > Some(0.0) && report["seconds_oracle"].as_f64() > Some(0.0));
+    let digest = report["model"].as_str().unwrap();
+    assert!(succeed(&["inspect"]).contains(digest) && digest.len() == 64);
+
+    // History, and how it ended
+    let timeline = out.join("timeline.csv");
+    assert_eq!(
+        std::fs::read_to_string(&timeline).unwrap().lines().next(),
+        Some("seconds,samples,active_tiles,rel_mse")
+    );
+    let samples: Vec<u64> = column(&timeline, "samples").iter().map(|n| n.parse().unwrap()).collect();
+    assert!(samples.is_sorted() && samples.last() == Some(&report["samples"].as_u64().unwrap()));
+    assert_eq!(column(&timeline, "active_tiles").last().unwrap(), "0");
+    assert!(column(&timeline, "rel_mse").iter().all(String::is_empty));
+
+    // Pictures: the linear one is the other one, tone mapped by the exposure that is reported
+    let (linear, shown) =
+        (read_exr(out.join("image.exr")).unwrap(), read_picture(out.join("image.png")).unwrap());
+    let Picture::Display(shown) = shown else { panic!("a PNG is display-encoded") };
+    assert_eq!((linear.width, linear.height, shown.width, shown.height), (64, 64, 64, 64));
+    let exposure = report["exposure"].as_f64().unwrap() as f32;
+    for (linear, shown) in linear.pixels.iter().zip(&shown.pixels) {
+        let exposed = linear.map(|c| c * exposure);
+        let scale = 1.0 / (1.0 + noisefloor::luminance(exposed));
+        for (c, s) in exposed.iter().zip(shown) {
+            let expected = noisefloor::srgb_encode((c * scale).min(1.0));
+            assert!((expected - s).abs() < 0.6 / 255.0, "{expected} {s}");
+        }
+    }
+    let Picture::Display(map) = read_picture(out.join("stops.png")).unwrap() else { panic!("a PNG") };
+    assert!(map.width > 64 && map.height >= 64, "a legend beside the picture");
+}
+
+#[test]
+fn the_same_seed_gives_the_same_files_whatever_the_threads() {
+    let folder = tempdir().unwrap();
+    let render = |name: &str, seed: &str, threads: &str| {
+        let out = folder.path().join(name);
+        succeed(&tiny(text(&out), &["--seed", seed, "--threads", threads]));
+        ["image.exr", "stops.csv"].map(|name| std::fs::read(out.join(name)).unwrap())
+    };
+    let one = render("one", "3", "1");
+    assert!(one == render("again", "3", "1"), "another picture the second time");
+    assert!(one == render("two", "3", "2"), "another picture on two threads");
+    assert!(one != render("other", "4", "2"), "the same picture from another seed");
+}
+
+#[test]
+fn a_fixed_number_of_samples() {
+    let folder = tempdir().unwrap();
+    succeed(&tiny(text(folder.path()), &["bulb", "--criterion", "spp:100"]));
+    let stops = folder.path().join("stops.csv");
+    assert_eq!(column(&stops, "spp"), ["100"; 4]);
+    assert_eq!(column(&stops, "reason"), ["converged"; 4]);
+    assert_eq!(column(&stops, "probability"), [""; 4]);
+    let report = json(&folder.path().join("report.json"));
+    assert!(report["model"].is_null() && report["scene"] == "bulb");
+}
+
+#[test]
+fn the_error_to_a_reference_falls() {
+    let folder = tempdir().unwrap();
+    let (truth, out) = (folder.path().join("truth"), folder.path().join("out"));
+    succeed(&tiny(text(&truth), &["--criterion", "spp:1000", "--seed", "1"]));
+    let against = truth.join("image.exr");
+    let more = ["--criterion", "spp:200", "--seed", "2", "--batch", "20", "--against", text(&against)];
+    succeed(&tiny(text(&out), &more));
+    let errors: Vec<f64> =
+        column(&out.join("timeline.csv"), "rel_mse").iter().map(|e| e.parse().unwrap()).collect();
+    let (first, last) = (errors[0], errors[errors.len() - 1]);
+    // Tenfold the samples: a tenth of the variance, and the reference's own, a fifth of what is left
+    assert!(errors.len() >= 10 && last < 0.3 * first, "{errors:?}");
+    assert_eq!(json(&out.join("report.json"))["rel_mse"].as_f64(), Some(last));
+}
+
+#[test]
+fn time_is_kept() {
+    let folder = tempdir().unwrap();
+    let begun = std::time::Instant::now();
+    let args = ["--criterion", "spp:100000000", "--time", "1", "--threads", "1"];
+    succeed(&tiny(text(folder.path()), &args));
+    let seconds = begun.elapsed().as_secs_f64();
+    assert!((1.0..20.0).contains(&seconds), "{seconds} s");
+    assert_eq!(column(&folder.path().join("stops.csv"), "reason"), ["time-limit"; 4]);
+}

@@ -1,0 +1,85 @@
+use crate::kit::{FILES, command, json, succeed, table, text};
+use noisefloor_exr::{read_exr, read_picture};
+use std::path::Path;
+use std::process::{Child, Command, ExitStatus, Stdio};
+use std::time::{Duration, Instant};
+use tempfile::tempdir;
+
+/// A render that would take days.
+fn long(out: &Path, autosave: &str) -> Child {
+    let args = ["render", "--size", "64x64", "--tile", "32", "--criterion", "spp:1000000000", "--quiet"];
+    let mut command = command(&args);
+    command.args(["--threads", "1", "--autosave", autosave, "--out"]).arg(out);
+    command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap()
+}
+
+fn signal(child: &Child, name: &str) {
+    assert!(Command::new("kill").args([name, &child.id().to_string()]).status().unwrap().success());
+}
+
+/// Waits until something is so, for 30 s at most.
+fn wait_for<T>(what: &str, mut test: impl FnMut() -> Option<T>) -> T {
+    let begun = Instant::now();
+    loop {
+        if let Some(found) = test() {
+            return found;
+        }
+        assert!(begun.elapsed() < Duration::from_secs(30), "{what}: not within 30 s");
+        std::thread::sleep(Duration::from_millis(20));
+    }
+}
+
+fn end(mut child: Child) -> ExitStatus {
+    wait_for("the end", || child.try_wait().unwrap())
+}
+
+/// Every file can be read from beginning to end.
+fn assert_whole(out: &Path) {
+    assert!(FILES.iter().all(|name| out.join(name).is_file()));
+    assert_eq!(read_exr(out.join("image.exr")).unwrap().pixels.len(), 64 * 64);
+    read_picture(out.join("image.png")).unwrap();
+    read_picture(out.join("stops.png")).unwrap();
+    assert_eq!(table(&out.join("stops.csv")).1.len(), 4);
+    table(&out.join("timeline.csv"));
+    assert_eq!(json(&out.join("report.json"))["tiles"], 4);
+}
+
+#[test]
+fn an_interrupt_ends_with_what_is_there_written() {
+    let folder = tempdir().unwrap();
+    let out = folder.path();
+    for name in ["-INT", "-TERM"] {
+        let child = long(out, "0");
+        // The handler is set before the first batch; without autosave nothing but the empty history tells that it has begun
+        wait_for("the history", || out.join("timeline.csv").exists().then_some(()));
+        std::thread::sleep(Duration::from_millis(700));
+        signal(&child, name);
+        assert_eq!(end(child).code(), Some(130), "{name}");
+        assert_whole(out);
+        assert!(table(&out.join("stops.csv")).1.iter().all(|row| row[7] == "cancelled" && row[5] != "0"));
+        std::fs::remove_dir_all(out).unwrap();
+    }
+    std::fs::create_dir(out).unwrap();
+}
+
+#[test]
+fn what_was_saved_survives_a_kill() {
+    let folder = tempdir().unwrap();
+    let out = folder.path();
+    let child = long(out, "0.2");
+    // The report is written last. Then let it save a few times more, and die wherever it is
+    wait_for("the first save", || out.join("report.json").exists().then_some(()));
+    std::thread::sleep(Duration::from_millis(555));
+    signal(&child, "-KILL");
+    assert_eq!(end(child).code(), None);
+    assert_whole(out);
+    let report = json(&out.join("report.json"));
+    assert_eq!(report["complete"], false);
+    assert!(table(&out.join("stops.csv")).1.iter().all(|row| row[7] == "open"));
+
+    // And does not stand in the way of the next run
+    let small = ["render", "--size", "64x64", "--tile", "32", "--criterion", "spp:100", "--quiet", "--out"];
+    succeed(&[&small[..], &[text(out)]].concat());
+    assert_whole(out);
+    assert_eq!(json(&out.join("report.json"))["complete"], true);
+}
