@@ -126,3 +126,22 @@ fn uneven_halves_have_the_noise_of_their_mean() {
     let (even, uneven) = (residual([5001, 5000]), residual([1, 10_000]));
     assert!((uneven / even - 1.0).abs() < 0.05, "{uneven} {even}");
 }
+
+/// A single sample of 10¹² before the exposure settles. It is one pixel of thousands: nobody's screen goes dark, and the tiles
+/// beside it stop where they do without it, to a step.
+#[test]
+fn one_firefly_leaves_the_other_tiles_alone() {
+    let clean = run(Synthetic::new(96, 64), tiles_of(32));
+    let source = Altered::batches(Synthetic::new(96, 64), |requests, batches| {
+        for (request, batch) in requests.iter().zip(batches.iter_mut()) {
+            if request.tile.index == 0 && request.first == 0 {
+                batch.mean[5 + 32 * 5] = [1e12 / batch.samples as f32; 3];
+            }
+        }
+    });
+    let dirty = run(source, tiles_of(32));
+    assert!(dirty.image.iter().flatten().all(|c| c.is_finite()));
+    for (clean, dirty) in clean.stops.iter().zip(&dirty.stops).filter(|(stop, _)| stop.tile.index != 0) {
+        assert!(clean.samples.abs_diff(dirty.samples) <= 100, "{clean:?}\n{dirty:?}");
+    }
+}
