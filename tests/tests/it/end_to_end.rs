@@ -222,3 +222,22 @@ fn the_reference_is_rendered_once_where_it_is_needed_and_never_elsewhere() {
     let rendered = run(cornell(), oracle(), Params { max_samples: 100, ..TILE });
     assert!(rendered.stops.iter().all(|s| s.probability.is_some()));
 }
+
+/// A tile whose source has nothing at all is done at once; the exposure, and with it every other tile, does not wait for it.
+#[test]
+fn a_tile_without_samples_does_not_hold_up_the_others() {
+    let calls = Rc::new(RefCell::new(0));
+    let count = Rc::clone(&calls);
+    let source = Altered::batches(Synthetic::new(64, 32), move |_, batches| {
+        *count.borrow_mut() += 1;
+        for batch in batches.iter_mut().filter(|b| b.tile.index == 0) {
+            (batch.samples, batch.mean) = (0, Vec::new());
+        }
+    });
+    let mut driver = Driver::new(source, Oracle::bundled(), TILE).unwrap();
+    let flag = driver.cancel_flag();
+    driver.run(|_, _| flag.store(*calls.borrow() > 200, Ordering::Relaxed)).unwrap();
+    let stops = Outcome::of(driver.session()).stops;
+    assert_eq!((stops[0].samples, stops[0].reason), (0, StopReason::SourceExhausted));
+    assert_eq!(stops[1].reason, StopReason::Converged, "{:?}", stops[1]);
+}
