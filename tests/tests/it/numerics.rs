@@ -145,3 +145,14 @@ fn one_firefly_leaves_the_other_tiles_alone() {
         assert!(clean.samples.abs_diff(dirty.samples) <= 100, "{clean:?}\n{dirty:?}");
     }
 }
+
+/// Where every sample was kept out there is no evidence of anything: that is not "converged".
+#[test]
+fn a_tile_without_a_valid_sample_never_converges() {
+    let source = Altered::batches(Synthetic::new(64, 32), |_, batches| {
+        batches.iter_mut().filter(|b| b.tile.index == 0).for_each(|b| b.mean.fill([f32::NAN; 3]));
+    });
+    let run = run(source, tiles_of(32));
+    assert_eq!(run.stops[1].reason, StopReason::Converged);
+    assert_eq!(run.stops[0].reason, StopReason::MaxSamples, "{:?}", run.stops[0]);
+}
