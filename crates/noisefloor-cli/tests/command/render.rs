@@ -123,3 +123,13 @@ fn time_is_kept() {
     assert!((1.0..20.0).contains(&seconds), "{seconds} s");
     assert_eq!(column(&folder.path().join("stops.csv"), "reason"), ["time-limit"; 4]);
 }
+
+#[test]
+fn a_fixed_number_of_samples_need_not_be_a_multiple_of_the_batch() {
+    let folder = tempdir().unwrap();
+    for spp in ["30", "150"] {
+        let criterion = format!("spp:{spp}");
+        succeed(&tiny(text(folder.path()), &["--criterion", &criterion]));
+        assert_eq!(column(&folder.path().join("stops.csv"), "spp"), [spp; 4]);
+    }
+}
