@@ -196,3 +196,9 @@ fn earlier_files_stay_when_a_run_cannot_begin() {
     keeps_earlier_files(&["--against", "absent.exr"], &["absent.exr"]);
     keeps_earlier_files(&["--consecutive", "0"], &["at least one"]);
 }
+
+#[test]
+fn earlier_files_stay_when_the_last_check_fails() {
+    keeps_earlier_files(&["--tile", "0"], &["16…512"]);
+    keeps_earlier_files(&["--autosave", "nan"], &["--autosave"]);
+}
