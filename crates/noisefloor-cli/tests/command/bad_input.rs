@@ -202,3 +202,13 @@ fn earlier_files_stay_when_the_last_check_fails() {
     keeps_earlier_files(&["--tile", "0"], &["16…512"]);
     keeps_earlier_files(&["--autosave", "nan"], &["--autosave"]);
 }
+
+/// Before the work, and not after it.
+#[test]
+fn a_model_that_cannot_be_written_is_not_trained() {
+    let corpora = crate::learn::Corpora::new();
+    let out = corpora.paths[0].join("thresholds.csv/my.nfm");
+    let mut args = corpora.args("train");
+    args.extend(["--out", text(&out)]);
+    fail(&args, &["my.nfm"]);
+}
