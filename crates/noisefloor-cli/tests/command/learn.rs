@@ -216,3 +216,14 @@ fn a_scene_alone_cannot_be_left_out() {
     }
     assert!(!out.exists());
 }
+
+#[test]
+fn columns_are_in_the_order_that_is_documented() {
+    let corpora = Corpora::new();
+    let zones = corpora.folder.path().join("zones.csv");
+    let mut args = corpora.args("evaluate");
+    args.extend(["--csv", text(&zones)]);
+    succeed(&args);
+    let text = std::fs::read_to_string(&zones).unwrap();
+    assert_eq!(text.lines().next(), Some("scene,zone,human_spp,predicted_spp,censored"));
+}
