@@ -83,3 +83,21 @@ fn what_was_saved_survives_a_kill() {
     assert_whole(out);
     assert_eq!(json(&out.join("report.json"))["complete"], true);
 }
+
+/// The disk may have room again: rendering goes on, and says what it could not save, to a log file too.
+#[test]
+fn a_save_that_fails_is_told() {
+    let folder = tempdir().unwrap();
+    let (out, away) = (folder.path().join("out"), folder.path().join("away"));
+    let child = long(&out, "0.2");
+    wait_for("the first save", || out.join("report.json").exists().then_some(()));
+    std::fs::rename(&out, &away).unwrap();
+    std::thread::sleep(Duration::from_millis(700));
+    std::fs::rename(&away, &out).unwrap();
+    signal(&child, "-INT");
+    let output = child.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(130));
+    assert_whole(&out);
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert!(said.contains("warning: not saved"), "{said:?}");
+}
