@@ -86,9 +86,9 @@ pub struct RenderArgs {
     /// No tile stops before [default: the batch].
     #[arg(long, value_name = "SPP")]
     pub min_spp: Option<u64>,
-    /// Every tile stops at so many samples per pixel.
-    #[arg(long, default_value_t = 10_000, value_name = "SPP")]
-    pub max_spp: u64,
+    /// Every tile stops at so many samples per pixel [default: 10000; N with --criterion spp:N].
+    #[arg(long, value_name = "SPP")]
+    pub max_spp: Option<u64>,
     /// Stop all tiles after so many seconds of sampling.
     #[arg(long, value_name = "SECONDS", value_parser = parse_seconds)]
     pub time: Option<std::time::Duration>,
@@ -102,8 +102,8 @@ pub struct RenderArgs {
     #[arg(long, value_name = "FILE.exr")]
     pub against: Option<PathBuf>,
     /// Refresh the files in the output folder every so many seconds while rendering; 0 for never.
-    #[arg(long, default_value_t = 30.0, value_name = "SECONDS")]
-    pub autosave: f64,
+    #[arg(long, default_value = "30", value_name = "SECONDS", value_parser = parse_pause)]
+    pub autosave: std::time::Duration,
     /// No progress bar and no summary.
     #[arg(long, short)]
     pub quiet: bool,
@@ -332,6 +332,10 @@ fn parse_seconds(text: &str) -> Result<std::time::Duration, String> {
     std::time::Duration::try_from_secs_f64(seconds).map_err(|e| e.to_string())
 }
 
+fn parse_pause(text: &str) -> Result<std::time::Duration, String> {
+    if text.parse() == Ok(0.0) { Ok(std::time::Duration::ZERO) } else { parse_seconds(text) }
+}
+
 impl ToneArgs {
     /// The tone mapping, checked.
     pub fn check(&self) -> anyhow::Result<ToneMapping> {
@@ -365,12 +369,17 @@ impl RenderArgs {
             ScheduleChoice::Every => Schedule::Every { step: self.batch },
             ScheduleChoice::Spaced => Schedule::Spaced { step: self.batch },
         };
+        let max_samples = match self.criterion {
+            CriterionChoice::Oracle => self.max_spp.unwrap_or(Params::default().max_samples),
+            // Exactly so many, not the next multiple of the batch.
+            CriterionChoice::Fixed(samples) => self.max_spp.map_or(samples, |most| most.min(samples)),
+        };
         let params = Params {
             tile: self.tile,
             tone_mapping: self.tone.check()?,
             schedule,
             min_samples: self.min_spp.unwrap_or(0),
-            max_samples: self.max_spp,
+            max_samples,
             consecutive: self.consecutive,
             audience: self.audience,
         };

@@ -7,6 +7,7 @@ use anyhow::bail;
 use noisefloor::evaluation::{
     Prediction, Scores, Table, constant_noise_baseline, image_accuracy, predict, scene_median_baseline, score,
 };
+use noisefloor_exr::check_writable;
 use serde::Serialize;
 
 /// Scores of one way to predict.
@@ -51,6 +52,9 @@ pub fn run(args: &EvaluateArgs) -> anyhow::Result<()> {
         bail!("--threshold must lie between 0 and 1, not {}", args.threshold);
     }
     let params = search(&args.search)?;
+    for path in args.json.iter().chain(&args.csv) {
+        check_writable(path)?;
+    }
     let model = if args.leave_one_scene_out { None } else { Some(load_model(args.model.as_deref())?) };
     let table = load_table(&args.data, &args.search)?;
     let (predicted_by, predictions) = match &model {

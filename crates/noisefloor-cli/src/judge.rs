@@ -4,7 +4,7 @@ use crate::args::JudgeArgs;
 use crate::heat_map::{self, Mark, Scale};
 use anyhow::{Context, bail};
 use noisefloor::{Display, Evidence, Oracle, Rendering, Rgb, Samples, Tile, TileGrid, TilePlanes, Verdict};
-use noisefloor_exr::{Picture, read_picture, write_png};
+use noisefloor_exr::{Picture, check_writable, read_picture, write_png};
 use rayon::prelude::*;
 use serde::Serialize;
 use std::path::Path;
@@ -59,6 +59,9 @@ pub fn run(args: &JudgeArgs) -> anyhow::Result<()> {
             args.spp.len(),
             1 + args.against.len()
         );
+    }
+    if let Some(path) = &args.heat_map {
+        check_writable(path)?;
     }
     let image = read(&args.image, args.spp[0])?;
     let others: Vec<Input> = args

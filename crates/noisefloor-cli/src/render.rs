@@ -6,7 +6,7 @@ use crate::output::{Output, RelMse};
 use anyhow::Context;
 use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressStyle};
 use noisefloor::{
-    Driver, Event, FixedSamples, Params, Progress, ProgressiveSource, Session, StopReason, StoppingCriterion,
+    Driver, Event, FixedSamples, Progress, ProgressiveSource, Session, StopReason, StoppingCriterion,
 };
 use noisefloor_ptwne::{Options, Ptwne, scenes};
 use std::process::ExitCode;
@@ -32,15 +32,10 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<ExitCode> {
         CriterionChoice::Oracle => {
             let oracle = args.oracle.load()?;
             let digest = Some(oracle.model().digest());
-            let output = Output::create(args, digest, rel_mse)?;
-            drive(Driver::new(source, oracle, params)?, args, output)
+            drive(Driver::new(source, oracle, params)?, args, digest, rel_mse)
         }
         CriterionChoice::Fixed(samples) => {
-            // Exactly so many, not the next multiple of the batch.
-            let params = Params { max_samples: params.max_samples.min(samples), ..params };
-            params.check()?;
-            let output = Output::create(args, None, rel_mse)?;
-            drive(Driver::new(source, FixedSamples(samples), params)?, args, output)
+            drive(Driver::new(source, FixedSamples(samples), params)?, args, None, rel_mse)
         }
     }
 }
@@ -48,14 +43,15 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<ExitCode> {
 fn drive<S: ProgressiveSource, C: StoppingCriterion>(
     mut driver: Driver<S, C>,
     args: &RenderArgs,
-    mut output: Output,
+    model: Option<String>,
+    rel_mse: Option<RelMse>,
 ) -> anyhow::Result<ExitCode> {
+    let mut output = Output::create(args, model, rel_mse)?;
     driver.set_time_limit(args.time);
     cancel_on_signal(driver.cancel_flag())?;
     let bar = progress_bar(args.quiet);
-    let autosave = Duration::try_from_secs_f64(args.autosave).context("--autosave")?;
+    let autosave = args.autosave;
     let mut saved = Instant::now();
-    let mut unsaved: Option<anyhow::Error> = None;
 
     // Render. A failure to save along the way is told at once, and rendering goes on: the disk may have room again.
     let outcome = driver.run(|session, event| {
@@ -63,9 +59,8 @@ fn drive<S: ProgressiveSource, C: StoppingCriterion>(
             output.record(session, progress);
             show(&bar, session, progress);
             if !autosave.is_zero() && saved.elapsed() >= autosave {
-                unsaved = output.write(session, None).err();
-                if let Some(error) = &unsaved {
-                    bar.println(format!("warning: not saved: {}", crate::one_line(error)));
+                if let Err(error) = output.write(session, None) {
+                    bar.suspend(|| eprintln!("warning: not saved: {}", crate::one_line(&error)));
                 }
                 saved = Instant::now();
             }

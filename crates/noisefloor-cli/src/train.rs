@@ -7,12 +7,15 @@ use noisefloor::evaluation::{Prediction, Table, score};
 use noisefloor::training::{TrainParams, leave_one_scene_out, train};
 use noisefloor::{Descriptor, NoiseMask, SvmParams};
 use noisefloor_exr::table::{describe_corpora, read_table, write_table};
-use noisefloor_exr::write_atomic;
+use noisefloor_exr::{check_writable, write_atomic};
 use std::fs::File;
 use std::io::BufReader;
 
 pub fn run(args: &TrainArgs) -> anyhow::Result<()> {
     let params = search(&args.search)?;
+    for path in args.save_table.iter().chain([&args.out]) {
+        check_writable(path)?;
+    }
     let table = load_table(&args.data, &args.search)?;
     if let Some(path) = &args.save_table {
         write_atomic(path, |to| write_table(&table, to))?;

@@ -2,7 +2,7 @@
 //!
 //! - [`read_picture`], [`read_exr`], [`read_png`]: linear EXR and display-encoded PNG, told apart by content. Files are
 //!   hostile until parsed: sizes are checked before pixels are allocated, and a broken file is a [`PictureError`].
-//! - [`write_exr`], [`write_png`], [`write_atomic`]: files that appear whole or not at all.
+//! - [`write_exr`], [`write_png`], [`write_atomic`], [`check_writable`]: files that appear whole or not at all.
 //! - [`StackSource`]: a folder of images as a [`noisefloor::ProgressiveSource`].
 //! - [`corpus`]: thresholds that observers gave, together with the images they judged.
 //! - [`table`]: descriptors of a corpus, computed from its images, and read and written as CSV.
@@ -43,4 +43,4 @@ pub use decode_png::read_png;
 pub use error::{CorpusError, PictureError, StackError, WriteError};
 pub use picture::{DisplayImage, LinearImage, MAX_FILE_BYTES, Picture, read_picture};
 pub use stack::StackSource;
-pub use write::{RenderLayers, write_atomic, write_exr, write_png};
+pub use write::{RenderLayers, check_writable, write_atomic, write_exr, write_png};

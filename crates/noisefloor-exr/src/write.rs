@@ -41,34 +41,10 @@ where
     let path = path.as_ref();
     let failed = |source: Box<dyn Error + Send + Sync>| WriteError::Failed { path: path.to_owned(), source };
 
-    // Where to: never in place of a folder, a device or a link
-    let target = match std::fs::metadata(path) {
-        Ok(meta) if meta.is_file() => std::fs::canonicalize(path).map_err(|e| failed(e.into()))?,
-        Ok(_) => return Err(WriteError::NotAFile { path: path.to_owned() }),
-        Err(_) => path.to_owned(),
-    };
-    if target.file_name().is_none() {
-        return Err(WriteError::NotAFile { path: path.to_owned() });
-    }
-    let folder = match target.parent() {
-        Some(parent) if !parent.as_os_str().is_empty() => parent.to_owned(),
-        _ => PathBuf::from("."),
-    };
+    let place = Place::find(path)?;
 
     // Write beside it
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(".noisefloor-").suffix(".tmp");
-    #[cfg(unix)]
-    {
-        // As any new file: what the umask leaves, not the owner alone as is usual for temporary files
-        use std::os::unix::fs::PermissionsExt;
-        builder.permissions(std::fs::Permissions::from_mode(0o666));
-    }
-    let mut temporary = builder.tempfile_in(&folder).map_err(|source| WriteError::Folder {
-        path: path.to_owned(),
-        folder: folder.clone(),
-        source,
-    })?;
+    let mut temporary = place.temporary()?;
     let mut writer = BufWriter::new(temporary.as_file_mut());
     write(&mut writer).map_err(|e| failed(e.into()))?;
     writer.flush().map_err(|e| failed(e.into()))?;
@@ -76,8 +52,57 @@ where
 
     // Complete on disk, then under its name
     temporary.as_file().sync_all().map_err(|e| failed(e.into()))?;
-    temporary.persist(&target).map_err(|e| failed(e.error.into()))?;
+    temporary.persist(&place.target).map_err(|e| failed(e.error.into()))?;
     Ok(())
+}
+
+/// Where a file is to go.
+struct Place<'a> {
+    path: &'a Path,
+    /// Behind symbolic links.
+    target: PathBuf,
+    folder: PathBuf,
+}
+
+impl<'a> Place<'a> {
+    /// Never in place of a folder or a device.
+    fn find(path: &'a Path) -> Result<Self, WriteError> {
+        let failed = |e: std::io::Error| WriteError::Failed { path: path.to_owned(), source: e.into() };
+        let target = match std::fs::metadata(path) {
+            Ok(meta) if meta.is_file() => std::fs::canonicalize(path).map_err(failed)?,
+            Ok(_) => return Err(WriteError::NotAFile { path: path.to_owned() }),
+            Err(_) => path.to_owned(),
+        };
+        if target.file_name().is_none() {
+            return Err(WriteError::NotAFile { path: path.to_owned() });
+        }
+        let folder = match target.parent() {
+            Some(parent) if !parent.as_os_str().is_empty() => parent.to_owned(),
+            _ => PathBuf::from("."),
+        };
+        Ok(Self { path, target, folder })
+    }
+
+    fn temporary(&self) -> Result<tempfile::NamedTempFile, WriteError> {
+        let mut builder = tempfile::Builder::new();
+        builder.prefix(".noisefloor-").suffix(".tmp");
+        #[cfg(unix)]
+        {
+            // As any new file: what the umask leaves, not the owner alone as is usual for temporary files
+            use std::os::unix::fs::PermissionsExt;
+            builder.permissions(std::fs::Permissions::from_mode(0o666));
+        }
+        let (path, folder) = (self.path.to_owned(), self.folder.clone());
+        builder.tempfile_in(&self.folder).map_err(|source| WriteError::Folder { path, folder, source })
+    }
+}
+
+/// Checks that a file could be written there, for commands that would work for hours before they do. Writes nothing.
+///
+/// # Errors
+/// Those of [`write_atomic`].
+pub fn check_writable(path: impl AsRef<Path>) -> Result<(), WriteError> {
+    Place::find(path.as_ref()).and_then(|place| place.temporary()).map(drop)
 }
 
 /// A render and what the oracle knows about each of its pixels.

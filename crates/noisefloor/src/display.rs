@@ -7,8 +7,8 @@ use thiserror::Error;
 /// Key of an average scene (Reinhard et al. 2002, §3.1): what the log-average luminance is mapped to.
 pub const DEFAULT_KEY: f32 = 0.18;
 
-/// δ of the log-average (Reinhard et al. 2002, eq. 1), as a share of the mean luminance. The paper leaves δ absolute; a
-/// relative one keeps the exposure of a scene in candela and of the same scene in nits × 10⁻⁶ the same.
+/// δ of the log-average (Reinhard et al. 2002, eq. 1), as a share of the geometric mean of the luminances above zero. The paper
+/// leaves δ absolute; a relative one makes the unit of radiance irrelevant, and a geometric mean no prey to fireflies.
 pub const DELTA: f64 = 1e-4;
 
 /// Rec.709 luminance of a linear RGB triple, in the unit of its input.
@@ -98,15 +98,13 @@ impl ToneMapping {
 /// exp(mean ln(δ + L)), Reinhard et al. 2002, eq. 1 with the 1/N inside the exponential as their text has it; `None` if no
 /// pixel is brighter than black.
 fn log_average(pixels: &[Rgb]) -> Option<f64> {
-    let luminances =
-        || pixels.iter().map(|&p| f64::from(luminance(p))).filter(|l| l.is_finite()).map(|l| l.max(0.0));
-    let count = luminances().count() as f64;
-    let mean = luminances().sum::<f64>() / count;
-    if !(mean > 0.0 && mean.is_finite()) {
-        return None;
-    }
-    let log_sum: f64 = luminances().map(|l| (DELTA * mean + l).ln()).sum();
-    Some((log_sum / count).exp())
+    let luminances = || pixels.iter().map(|&p| f64::from(luminance(p))).filter(|l| l.is_finite());
+    let geometric_mean = |of: &dyn Fn(f64) -> Option<f64>| {
+        let (sum, count) = luminances().filter_map(of).fold((0.0, 0u64), |(sum, n), l| (sum + l.ln(), n + 1));
+        (count > 0).then(|| (sum / count as f64).exp())
+    };
+    let delta = DELTA * geometric_mean(&|l| (l > 0.0).then_some(l))?;
+    geometric_mean(&|l| Some(delta + l.max(0.0)))
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]

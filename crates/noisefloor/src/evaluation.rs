@@ -182,10 +182,10 @@ pub struct Prediction {
     pub zone: u32,
     /// Human threshold, in samples per pixel.
     pub human_spp: f64,
-    /// Whether that is only a lower bound.
-    pub censored: bool,
     /// Predicted threshold, within what observers could choose.
     pub predicted_spp: f64,
+    /// Whether the human threshold is only a lower bound.
+    pub censored: bool,
     /// Real pictures of the zone that the prediction classifies as people did.
     #[serde(skip)]
     pub images_right: usize,

@@ -214,6 +214,18 @@ impl Film {
         Ok(tile)
     }
 
+    /// Pixels of a tile of which a half that is kept has no valid sample.
+    ///
+    /// # Panics
+    /// If the tile does not exist.
+    pub fn unsampled_pixels(&self, tile: usize) -> usize {
+        let rect = self.grid.tile(tile);
+        let lacks = |pixel: usize| {
+            self.halves.iter().zip(self.counts[tile]).any(|(half, count)| half.rejected(pixel) >= count)
+        };
+        rect.rows(self.grid.width()).flatten().filter(|&pixel| lacks(pixel)).count()
+    }
+
     /// The halves of one pixel of `tile`, each with its number of valid samples.
     #[inline]
     pub(crate) fn pixel_halves(&self, tile: usize, pixel: usize) -> [(Rgb, u64); 2] {
@@ -277,6 +289,7 @@ mod tests {
         assert!((pixel(0) - 2.0).abs() < 1e-6);
         assert!((pixel(3) - 2.5).abs() < 1e-6, "mean of the two that count: {}", pixel(3));
         assert_eq!(film.rejected(), 10);
+        assert_eq!(film.unsampled_pixels(1), 0);
         assert!(image.iter().flatten().all(|c| c.is_finite()));
     }
 

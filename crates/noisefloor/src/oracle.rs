@@ -12,6 +12,9 @@ use thiserror::Error;
 /// P at which two pictures count as identical (Takouachet et al. 2017, §4.4).
 pub const DEFAULT_THRESHOLD: f32 = 0.9;
 
+/// A tile of which more than one in so many pixels has no valid sample is not called converged: it gives no evidence.
+const NO_EVIDENCE: usize = 16;
+
 /// A probability threshold outside (0, 1).
 #[derive(Debug, Error, Clone, Copy, PartialEq)]
 #[error("the probability threshold must lie between 0 and 1, not {0}")]
@@ -117,6 +120,9 @@ impl StoppingCriterion for Oracle {
 
     fn judge(&mut self, view: &View<'_>, tiles: &[Tile]) -> Result<Vec<Verdict>, CriterionError> {
         let judge = |&tile: &Tile| {
+            if view.film.unsampled_pixels(tile.index) > tile.pixels() / NO_EVIDENCE {
+                return Ok(Verdict { converged: false, probability: Some(0.0), expected_samples: None });
+            }
             let planes = match self.model.evidence {
                 Evidence::Halves => TilePlanes::from_halves(view.film, view.display, tile),
                 Evidence::Reference => {
@@ -216,7 +222,7 @@ mod tests {
         assert_eq!(verdict.expected_samples, None, "masks do not tell noise from picture");
 
         let mut ragged = Film::new(TileGrid::new(40, 64, 64).unwrap());
-        ragged.add(0, 1, &[[0.0; 3]; 40 * 64]).unwrap();
+        (0..2).for_each(|_| ragged.add(0, 1, &[[0.0; 3]; 40 * 64]).unwrap());
         let error = judge(&mut oracle, &ragged, None).unwrap_err();
         assert!(matches!(error, CriterionError::TileSize { expected: 64, width: 40, .. }), "{error}");
     }

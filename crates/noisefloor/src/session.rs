@@ -223,7 +223,7 @@ impl<C: StoppingCriterion> Session<C> {
 
     /// Judges the tiles that are due, and returns those that are done by it.
     ///
-    /// The first verdicts wait until every tile has samples: the exposure is settled then, once and for all, unless the tone
+    /// The first verdicts wait until every open tile has samples: the exposure is settled then, once and for all, unless the tone
     /// mapping is plain sRGB or [`Session::set_display`] was called.
     ///
     /// # Errors
@@ -262,7 +262,9 @@ impl<C: StoppingCriterion> Session<C> {
     /// Settles exposure and reference; false if it is too early.
     fn settle_display(&mut self) -> bool {
         if self.display.is_none() {
-            if (0..self.tiles.len()).any(|t| self.film.samples(t) == 0) {
+            // A tile that is done without samples has none to wait for.
+            let waits = |(t, state): (usize, &TileState)| state.stop.is_none() && self.film.samples(t) == 0;
+            if self.tiles.iter().enumerate().any(waits) {
                 return false;
             }
             self.display = Some(self.params.tone_mapping.settle(&self.film.image()));
