@@ -117,8 +117,9 @@ fn the_error_to_a_reference_falls() {
 fn time_is_kept() {
     let folder = tempdir().unwrap();
     let begun = std::time::Instant::now();
-    let args = ["--criterion", "spp:100000000", "--time", "1", "--threads", "1"];
-    succeed(&tiny(text(folder.path()), &args));
+    let mut args = vec!["render", "bulb", "--size", "64x64", "--tile", "32", "--out", text(folder.path())];
+    args.extend(["--criterion", "spp:100000000", "--time", "1", "--threads", "1"]);
+    succeed(&args);
     let seconds = begun.elapsed().as_secs_f64();
     assert!((1.0..20.0).contains(&seconds), "{seconds} s");
     assert_eq!(column(&folder.path().join("stops.csv"), "reason"), ["time-limit"; 4]);
