@@ -2,6 +2,7 @@
 
 use crate::source::Rgb;
 use serde::{Deserialize, Serialize};
+use std::sync::LazyLock;
 use thiserror::Error;
 
 /// Key of an average scene (Reinhard et al. 2002, §3.1): what the log-average luminance is mapped to.
@@ -18,10 +19,24 @@ pub fn luminance([r, g, b]: Rgb) -> f32 {
 }
 
 /// sRGB encoding of one linear channel (IEC 61966-2-1): [0, 1] → [0, 1], clamped.
+///
+/// From a table over √x, along which the curve is nearly straight: within 10⁻⁶ of the formula (most at the kink between its two parts), and several times faster. Every
+/// verdict encodes each pixel nine times.
 #[inline]
 pub fn srgb_encode(linear: f32) -> f32 {
-    let x = linear.clamp(0.0, 1.0);
-    if x <= 0.003_130_8 { 12.92 * x } else { 1.055 * x.powf(1.0 / 2.4) - 0.055 }
+    let place = linear.clamp(0.0, 1.0).sqrt() * SRGB_STEPS as f32;
+    let below = (place as usize).min(SRGB_STEPS - 1);
+    let table = &*SRGB_TABLE;
+    table[below] + (table[below + 1] - table[below]) * (place - below as f32)
+}
+
+const SRGB_STEPS: usize = 4096;
+static SRGB_TABLE: LazyLock<Box<[f32]>> = LazyLock::new(|| {
+    (0..=SRGB_STEPS).map(|i| srgb_formula((i as f64 / SRGB_STEPS as f64).powi(2)) as f32).collect()
+});
+
+fn srgb_formula(linear: f64) -> f64 {
+    if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 }
 }
 
 /// Inverse of [`srgb_encode`]: [0, 1] → [0, 1], clamped.
@@ -201,6 +216,16 @@ mod tests {
                 assert!((a.luma(*p) - b.luma(*s)).abs() < 1e-5, "unit {unit}");
             }
         }
+    }
+
+    #[test]
+    fn the_table_is_the_formula() {
+        let worst = (0..1_000_000)
+            .map(|i| i as f32 / 1e6)
+            .map(|x| (f64::from(srgb_encode(x)) - srgb_formula(f64::from(x))).abs())
+            .fold(0.0, f64::max);
+        assert!(worst < 1e-6, "{worst}");
+        assert_eq!((srgb_encode(-1.0), srgb_encode(f32::NAN).is_nan()), (0.0, true));
     }
 
     proptest! {

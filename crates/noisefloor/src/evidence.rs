@@ -51,16 +51,22 @@ impl TilePlanes {
     ) -> Self {
         let padded = |edge: usize| edge.next_multiple_of(APRON) + 2 * APRON;
         let shape = (padded(tile.height), padded(tile.width));
-        let zeros = || Array2::zeros(shape);
-        let (mut image, mut residual, mut red, mut blue) = (zeros(), zeros(), zeros(), zeros());
-        for (at, value) in image.indexed_iter_mut() {
-            let (x, y) = (mirror(tile.x + at.1, width), mirror(tile.y + at.0, height));
-            let (shown, noise) = pixel(x, y);
-            *value = luminance(shown);
-            residual[at] = luminance(noise);
-            red[at] = noise[0] - residual[at];
-            blue[at] = noise[2] - residual[at];
+        let columns: Vec<usize> = (0..shape.1).map(|place| mirror(tile.x + place, width)).collect();
+        let plane = || Vec::with_capacity(shape.0 * shape.1);
+        let (mut image, mut residual, mut red, mut blue) = (plane(), plane(), plane(), plane());
+        for row in 0..shape.0 {
+            let y = mirror(tile.y + row, height);
+            for &x in &columns {
+                let (shown, noise) = pixel(x, y);
+                let luma = luminance(noise);
+                image.push(luminance(shown));
+                residual.push(luma);
+                red.push(noise[0] - luma);
+                blue.push(noise[2] - luma);
+            }
         }
+        let [image, residual, red, blue] = [image, residual, red, blue]
+            .map(|values| Array2::from_shape_vec(shape, values).expect("one value a pixel"));
         let inner = Tile { x: APRON, y: APRON, ..tile };
         Self { image, residual, residual_colour: [red, blue], rounding: 0.0, inner }
     }
@@ -75,14 +81,13 @@ impl TilePlanes {
     pub fn from_halves(film: &Film, display: &Display, tile: Tile) -> Self {
         let grid = film.grid();
         Self::gather((grid.width(), grid.height()), tile, |x, y| {
-            let (owner, pixel) = (grid.index_at(x, y), y * grid.width() + x);
-            let [(a, na), (b, nb)] = film.pixel_halves(owner, pixel);
+            let (owner, pixel) = (tile.owner(grid, x, y), y * grid.width() + x);
+            let halves = film.pixel_halves(owner, pixel);
+            let [(a, na), (b, nb)] = halves;
             let (na, nb) = (na as f32, nb as f32);
             let scale = if na > 0.0 && nb > 0.0 { (na / (na + nb) * (nb / (na + nb))).sqrt() } else { 0.0 };
-            (
-                display.encode(film.pixel(owner, pixel)),
-                difference(display.encode(a), display.encode(b), scale),
-            )
+            let noise = difference(display.encode(a), display.encode(b), scale);
+            (display.encode(Film::mean(halves)), noise)
         })
     }
 
@@ -114,7 +119,7 @@ impl TilePlanes {
         let grid = film.grid();
         Self::gather((grid.width(), grid.height()), tile, |x, y| {
             let pixel = y * grid.width() + x;
-            let shown = display.encode(film.pixel(grid.index_at(x, y), pixel));
+            let shown = display.encode(Film::mean(film.pixel_halves(tile.owner(grid, x, y), pixel)));
             (shown, difference(shown, reference[pixel], 1.0))
         })
     }

@@ -237,8 +237,13 @@ impl Film {
 
     /// Mean of all valid samples of one pixel of `tile`; black where there are none.
     #[inline]
-    pub(crate) fn pixel(&self, tile: usize, pixel: usize) -> Rgb {
-        let [(a, na), (b, nb)] = self.pixel_halves(tile, pixel);
+    fn pixel(&self, tile: usize, pixel: usize) -> Rgb {
+        Self::mean(self.pixel_halves(tile, pixel))
+    }
+
+    /// The mean that halves and their numbers of samples make together.
+    #[inline]
+    pub(crate) fn mean([(a, na), (b, nb)]: [(Rgb, u64); 2]) -> Rgb {
         let weight = (na as f64 / ((na + nb).max(1)) as f64) as f32;
         std::array::from_fn(|c| b[c] + (a[c] - b[c]) * weight)
     }

@@ -35,6 +35,13 @@ impl Tile {
         self.width * self.height
     }
 
+    /// The place in the grid of the tile that holds pixel (`x`, `y`), which is mostly this one.
+    #[inline]
+    pub(crate) fn owner(&self, grid: TileGrid, x: usize, y: usize) -> usize {
+        let inside = x.wrapping_sub(self.x) < self.width && y.wrapping_sub(self.y) < self.height;
+        if inside { self.index } else { grid.index_at(x, y) }
+    }
+
     /// The rows of this tile as ranges into a row-major image `image_width` pixels wide.
     pub fn rows(self, image_width: usize) -> impl Iterator<Item = std::ops::Range<usize>> {
         (self.y..self.y + self.height).map(move |y| {

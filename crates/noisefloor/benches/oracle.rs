@@ -1,0 +1,55 @@
+//! What a verdict on one tile of 128×128 pixels costs, and its parts.
+#![allow(missing_docs, reason = "a benchmark")]
+
+use criterion::{Criterion, criterion_group, criterion_main};
+use noisefloor::{Display, Film, NoiseMask, Oracle, Rgb, StoppingCriterion, TileGrid, TilePlanes, View};
+use std::hint::black_box;
+
+fn film() -> Film {
+    let mut film = Film::new(TileGrid::new(384, 384, 128).expect("a valid grid"));
+    let mut state = 1u64;
+    let mut uniform = || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 40) as f32 / (1 << 24) as f32
+    };
+    for _ in 0..2 {
+        for tile in 0..9 {
+            let batch: Vec<Rgb> =
+                (0..128 * 128).map(|_| [0.2 + 0.1 * uniform(), 0.3, 0.1 * uniform()]).collect();
+            film.add(tile, 50, &batch).expect("it fits");
+        }
+    }
+    film
+}
+
+fn verdict(c: &mut Criterion) {
+    let (film, display) = (film(), Display::SRGB);
+    let tile = film.grid().tile(4);
+    let mut oracle = Oracle::bundled();
+    let planes = TilePlanes::from_halves(&film, &display, tile);
+    let mut numbers = Vec::new();
+    oracle.model().descriptor.describe(&planes, &mut numbers).expect("any tile");
+
+    let mut group = c.benchmark_group("tile of 128x128");
+    group.bench_function("planes", |b| b.iter(|| TilePlanes::from_halves(black_box(&film), &display, tile)));
+    group.bench_function("noise mask", |b| b.iter(|| NoiseMask::default().apply(black_box(&planes.image))));
+    group.bench_function("descriptor", |b| {
+        b.iter(|| {
+            numbers.clear();
+            oracle.model().descriptor.describe(black_box(&planes), &mut numbers)
+        });
+    });
+    group.bench_function("query", |b| {
+        let mut scratch = numbers.clone();
+        b.iter(|| {
+            scratch.copy_from_slice(black_box(&numbers));
+            oracle.model().probability(&mut scratch)
+        });
+    });
+    let view = View { film: &film, display: &display, reference: None };
+    group.bench_function("verdict", |b| b.iter(|| oracle.judge(&view, black_box(&[tile]))));
+    group.finish();
+}
+
+criterion_group!(benches, verdict);
+criterion_main!(benches);
