@@ -288,3 +288,12 @@ fn check_reference(source: &mut impl ProgressiveSource, info: &SourceInfo) {
     assert_eq!(reference.pixels.len(), info.width * info.height, "pixels of the reference");
     assert!(reference.pixels.iter().flatten().all(|c| c.is_finite()), "the reference is not finite");
 }
+
+/// The Rust blocks of README and guide, run as doctests.
+#[cfg(doctest)]
+mod documents {
+    #[doc = include_str!("../../README.md")]
+    struct Readme;
+    #[doc = include_str!("../../docs/guide.md")]
+    struct Guide;
+}

@@ -1,5 +1,8 @@
 //! Tests that cross crates, one module a subject.
 
+/// The table that ships, the model made of it, and how close it is to people.
+#[cfg(test)]
+mod accuracy;
 /// What every source promises, and that broken promises are noticed.
 #[cfg(test)]
 mod contract;
@@ -9,6 +12,9 @@ mod end_to_end;
 /// Sources made by hand.
 #[cfg(test)]
 mod kit;
+/// The oldest Rust that is promised.
+#[cfg(test)]
+mod msrv;
 /// Judging alone needs no machinery of training.
 #[cfg(test)]
 mod no_linfa;
