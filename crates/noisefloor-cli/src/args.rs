@@ -115,7 +115,8 @@ pub struct RenderArgs {
 /// pooled. The verdict is on IMAGE alone: its noise is worked out from the difference and the numbers of samples. PNGs are judged as
 /// they are shown; EXRs are tone mapped first.
 ///
-/// Two stages of one progressive rendering share samples: say so with --nested.
+/// Two stages of one progressive rendering share samples. Where that can be told from the pictures it is taken into account, and said;
+/// --nested and --independent decide it.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   noisefloor judge a.exr --spp 256 --against b.exr --spp 256       two independent renderings
@@ -134,6 +135,9 @@ pub struct JudgeArgs {
     /// The pictures are stages of one progressive rendering: the smaller one's samples are in the larger one.
     #[arg(long)]
     pub nested: bool,
+    /// The pictures share no samples, whatever they look like.
+    #[arg(long, conflicts_with = "nested")]
+    pub independent: bool,
     #[command(flatten)]
     pub oracle: OracleArgs,
     #[command(flatten)]
@@ -221,8 +225,8 @@ pub struct InspectArgs {
 #[derive(Debug, Args)]
 #[group(required = true, multiple = false)]
 pub struct DataArgs {
-    /// Corpus folder. Repeat for more.
-    #[arg(long, value_name = "DIR")]
+    /// Corpus folders.
+    #[arg(long, value_name = "DIR", num_args = 1..)]
     pub corpus: Vec<PathBuf>,
     /// Table of descriptors, written by `train --save-table`.
     #[arg(long, value_name = "FILE.csv")]

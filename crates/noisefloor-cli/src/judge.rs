@@ -3,7 +3,10 @@
 use crate::args::JudgeArgs;
 use crate::heat_map::{self, Mark, Scale};
 use anyhow::{Context, bail};
-use noisefloor::{Display, Evidence, Oracle, Rendering, Rgb, Samples, Tile, TileGrid, TilePlanes, Verdict};
+use ndarray::Array2;
+use noisefloor::{
+    Display, Evidence, NoiseMask, Oracle, Rendering, Rgb, Samples, Tile, TileGrid, TilePlanes, Verdict,
+};
 use noisefloor_exr::{Picture, check_writable, read_picture, write_png};
 use rayon::prelude::*;
 use serde::Serialize;
@@ -78,9 +81,19 @@ pub fn run(args: &JudgeArgs) -> anyhow::Result<()> {
     let grid = TileGrid::new(width, height, args.tile)?;
 
     // Pool what the picture is held against, and judge.
-    let samples = if args.nested { Samples::Nested } else { Samples::Independent };
-    let other = pool(others, image.spp, samples)?;
     let display = if image.display_referred { Display::SRGB } else { tone.settle(&image.pixels) };
+    let samples =
+        if args.nested || (!args.independent && others.iter().any(|o| shares_samples(&image, o, &display))) {
+            Samples::Nested
+        } else {
+            Samples::Independent
+        };
+    if samples == Samples::Nested && !args.nested {
+        eprintln!(
+            "note: the pictures share samples, as stages of one rendering do, and are judged as --nested; --independent overrules"
+        );
+    }
+    let other = pool(others, image.spp, samples)?;
     let rows = judge(&oracle, grid, (&image, &other), &display, samples)?;
 
     report(args, &oracle, &rows)?;
@@ -156,6 +169,34 @@ fn pool(others: Vec<Input>, image_spp: f64, samples: Samples) -> anyhow::Result<
         }),
     };
     pooled.context("nothing to hold the picture against: give --against")
+}
+
+/// Whether two pictures look like stages of one rendering, in the noise masks of their green channels.
+///
+/// With d = A − B and s = A + B, Σd·s is N·(Var A − Var B) = Nσ²·(1/a − 1/b) either way, since texture does not correlate with d. Σd² is
+/// Nσ²·(1/a + 1/b) for independent samples, and Nσ²·|1/a − 1/b| for nested ones. Between the two expected ratios, the nearer one in the
+/// logarithm decides; where they differ by less than threefold it cannot be told, and matters little. As many samples are not nested.
+fn shares_samples(image: &Input, other: &Input, display: &Display) -> bool {
+    let (a, b) = (1.0 / image.spp, 1.0 / other.spp);
+    let independent = (a + b) / (a - b).abs();
+    if !independent.is_finite() || independent < 3.0 {
+        return false;
+    }
+    let mask = NoiseMask::default();
+    let green = |input: &Input| {
+        let encoded = input.pixels.iter().map(|p| display.encode(*p)[1]).collect();
+        Array2::from_shape_vec((input.size.1, input.size.0), encoded).map(|plane| mask.apply(&plane))
+    };
+    let (Ok(image_mask), Ok(other_mask)) = (green(image), green(other)) else { return false };
+    let (mut difference, mut product) = (0.0f64, 0.0f64);
+    for (&x, &y) in image_mask.iter().zip(&other_mask) {
+        let (d, s) = (f64::from(x - y), f64::from(x + y));
+        difference += d * d;
+        product += d * s * (a - b).signum();
+    }
+    let rounding = f64::from(mask.white_noise_gain() * (image.rounding + other.rounding));
+    difference -= rounding * image.pixels.len() as f64;
+    difference > 0.0 && product > difference / independent.sqrt()
 }
 
 fn judge(

@@ -4,7 +4,7 @@ use crate::args::RenderArgs;
 use crate::heat_map::{self, Mark, Scale};
 use anyhow::{Context, bail};
 use noisefloor::{Clock, Display, Params, Progress, Rgb, Session, Stop, StopReason, StoppingCriterion};
-use noisefloor_exr::{RenderLayers, read_exr, write_atomic, write_exr, write_png};
+use noisefloor_exr::{RenderLayers, check_writable, read_exr, write_atomic, write_exr, write_png};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -105,10 +105,8 @@ impl Output {
         std::fs::create_dir_all(&folder).with_context(|| {
             format!("{}: cannot make this folder; choose another with --out", folder.display())
         })?;
-        let output =
-            Self { folder, scene: args.scene.clone(), seed: args.seed, model, rel_mse, timeline: Vec::new() };
-        output.write_timeline()?;
-        Ok(output)
+        check_writable(folder.join("image.exr"))?;
+        Ok(Self { folder, scene: args.scene.clone(), seed: args.seed, model, rel_mse, timeline: Vec::new() })
     }
 
     /// Notes one batch.

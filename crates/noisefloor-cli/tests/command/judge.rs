@@ -1,4 +1,4 @@
-use crate::kit::{grey_exr, succeed, text, tiny};
+use crate::kit::{grey_exr, run, stderr, succeed, text, tiny};
 use noisefloor_exr::{Picture, read_picture};
 use serde_json::Value;
 use std::path::PathBuf;
@@ -80,4 +80,33 @@ fn extreme_counts_and_sizes_are_judged() {
             assert!(report["tiles"][0]["probability"].as_f64().is_some(), "{report}");
         }
     }
+}
+
+/// Renders of one seed contain one another: the second picture holds all samples of the first.
+#[test]
+fn stages_of_one_rendering_are_told_from_independent_ones() {
+    let folder = tempdir().unwrap();
+    let render = |name: &str, seed: &str, spp: &str| {
+        let out = folder.path().join(name);
+        succeed(&tiny(text(&out), &["--seed", seed, "--criterion", spp]));
+        out.join("image.exr")
+    };
+    let (first, later, other) =
+        (render("a", "1", "spp:64"), render("b", "1", "spp:80"), render("c", "2", "spp:80"));
+    let verdict = |against: &PathBuf, more: &[&str]| {
+        let mut args = vec!["judge", text(&first), "--spp", "64", "--against", text(against), "--spp", "80"];
+        args.extend(["--tile", "32", "--json"]);
+        args.extend(more);
+        let output = run(&args);
+        let report: Value = serde_json::from_slice(&output.stdout).unwrap();
+        let probability = report["tiles"][0]["probability"].as_f64().unwrap();
+        (probability, stderr(&output).contains("note: the pictures share samples"))
+    };
+    let (nested, told) = verdict(&later, &[]);
+    let (independent, told_independent) = verdict(&other, &[]);
+    assert!(told && !told_independent);
+    assert_eq!(verdict(&later, &["--nested"]), (nested, false));
+    // Both see the same noise; taken for independent, the shared samples hide most of it.
+    assert!((nested - independent).abs() < 0.15, "{nested} {independent}");
+    assert!(verdict(&later, &["--independent"]).0 > nested + 0.1);
 }
