@@ -2,8 +2,9 @@
 
 use crate::args::{EvaluateArgs, load_model};
 use crate::output::{write_csv, write_json};
-use crate::train::{held_out, load_table, search};
+use crate::train::{descriptor, held_out, load_table, search};
 use anyhow::bail;
+use noisefloor::Model;
 use noisefloor::evaluation::{
     Prediction, Scores, Table, constant_noise_baseline, image_accuracy, predict, scene_median_baseline, score,
 };
@@ -56,7 +57,9 @@ pub fn run(args: &EvaluateArgs) -> anyhow::Result<()> {
         check_writable(path)?;
     }
     let model = if args.leave_one_scene_out { None } else { Some(load_model(args.model.as_deref())?) };
-    let table = load_table(&args.data, &args.search)?;
+    // A model is scored by its own descriptor.
+    let trained_with = descriptor(&args.search)?;
+    let table = load_table(&args.data, model.as_ref().map_or(trained_with, |m| m.descriptor))?;
     let (predicted_by, predictions) = match &model {
         None => ("leave-one-scene-out".to_owned(), held_out(&table, &params, args.threshold)?),
         Some(model) => {
@@ -78,15 +81,19 @@ pub fn run(args: &EvaluateArgs) -> anyhow::Result<()> {
     if let Some(path) = &args.csv {
         write_csv(path, predictions.iter())?;
     }
-    report.print(&model.map_or_else(String::new, |m| {
-        let seen: Vec<&str> =
-            table.scenes().into_iter().filter(|s| m.record.scenes.iter().any(|t| t == s)).collect();
-        if seen.is_empty() {
-            String::new()
-        } else {
-            format!("the model was trained on these scenes: {}", seen.join(", "))
-        }
-    }));
+    report.print();
+
+    // What flatters a number stands beside it.
+    let seen = |m: &Model| -> Vec<String> {
+        m.record.scenes.iter().filter(|s| table.scenes().contains(&s.as_str())).cloned().collect()
+    };
+    let seen = model.as_ref().map(seen).unwrap_or_default();
+    if !seen.is_empty() {
+        println!("Note: the model was trained on these scenes: {}.", seen.join(", "));
+    }
+    if table.groups().len() == 1 {
+        println!("Note: with one group of scenes, the constant is fitted to the very zones it predicts.");
+    }
     Ok(())
 }
 
@@ -128,22 +135,24 @@ impl Report {
         }
     }
 
-    fn print(&self, note: &str) {
-        println!("{:22} zones  error  bias  early  images right    constant noise    scene median", "scene");
+    fn print(&self) {
+        println!("{:22} zones  error  bias   early  images right    constant noise    scene median", "scene");
         let line = |name: &str, s: &Summary, b: &Baselines| {
+            // A scene of one zone has no median of others.
+            let factor = |f: f64| if f.is_finite() { format!("×{f:.2}") } else { "–".into() };
             println!(
-                "{name:22} {:5}  ×{:<5.2} {:<5.2} {:4.0} %  {:>12}    {:>14}    {:>12}",
+                "{name:22} {:5}  {:6} {:6} {:3.0} %  {:>12}    {:>14}    {:>12}",
                 s.scores.zones,
-                s.scores.error_factor,
-                s.scores.bias_factor,
+                factor(s.scores.error_factor),
+                factor(s.scores.bias_factor),
                 100.0 * s.scores.early_share,
                 s.image_accuracy.map_or("–".into(), |a| format!("{:.1} %", 100.0 * a)),
                 format!(
-                    "×{:.2}, {:.0} % early",
-                    b.constant.scores.error_factor,
+                    "{}, {:.0} % early",
+                    factor(b.constant.scores.error_factor),
                     100.0 * b.constant.scores.early_share
                 ),
-                format!("×{:.2}", b.scene_median.scores.error_factor),
+                factor(b.scene_median.scores.error_factor),
             );
         };
         for scene in &self.scenes {
@@ -156,8 +165,5 @@ impl Report {
              stay out of the factors.\nThe scene median knows the scene's other zones, which no predictor of unseen scenes can.",
             self.levels_real, self.levels_synthesised, self.censored_zones
         );
-        if !note.is_empty() {
-            println!("Note: {note}");
-        }
     }
 }

@@ -16,7 +16,7 @@ pub fn run(args: &TrainArgs) -> anyhow::Result<()> {
     for path in args.save_table.iter().chain([&args.out]) {
         check_writable(path)?;
     }
-    let table = load_table(&args.data, &args.search)?;
+    let table = load_table(&args.data, descriptor(&args.search)?)?;
     if let Some(path) = &args.save_table {
         write_atomic(path, |to| write_table(&table, to))?;
         eprintln!("table of {} zones written to {}", table.zones.len(), path.display());
@@ -80,19 +80,23 @@ fn bar(len: u64, what: &'static str) -> ProgressBar {
 }
 
 /// The table that was asked for: read, or computed from pictures.
-pub fn load_table(data: &DataArgs, search: &SearchArgs) -> anyhow::Result<Table> {
-    let mask = NoiseMask::try_from(search.sigma).context("--sigma")?;
+pub fn load_table(data: &DataArgs, descriptor: Descriptor) -> anyhow::Result<Table> {
     if let Some(path) = &data.table {
         let file = File::open(path).with_context(|| format!("{}: cannot be opened", path.display()))?;
         return read_table(BufReader::new(file)).with_context(|| format!("{}", path.display()));
     }
     let bar = bar(0, "zones described");
-    let table = describe_corpora(&data.corpus, Descriptor::Compact { mask }, |done, all| {
+    let table = describe_corpora(&data.corpus, descriptor, |done, all| {
         bar.set_length(all as u64);
         bar.set_position(done as u64);
     })?;
     bar.finish_and_clear();
     Ok(table)
+}
+
+/// The descriptor to train with, checked.
+pub fn descriptor(args: &SearchArgs) -> anyhow::Result<Descriptor> {
+    Ok(Descriptor::Compact { mask: NoiseMask::try_from(args.sigma).context("--sigma")? })
 }
 
 /// How to train, checked.

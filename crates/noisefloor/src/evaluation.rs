@@ -249,7 +249,8 @@ pub fn image_accuracy<'a>(predictions: impl Iterator<Item = &'a Prediction> + Cl
 }
 
 /// The constant-noise baseline: a zone has converged once the standard deviation of its noise mask falls to one constant. Of the
-/// noise levels at the human thresholds of all other groups, it is the one that errs least on those groups.
+/// noise levels at the human thresholds of all other groups, it is the one that errs least on those groups. In a table of one
+/// group there are no others: the constant is then fitted to what it predicts, and flattered.
 pub fn constant_noise_baseline(table: &Table) -> Vec<Prediction> {
     // Quietness −ln(noise) grows with samples.
     let zones: Vec<(&Zone, Vec<(f64, f64)>)> = table
@@ -262,7 +263,8 @@ pub fn constant_noise_baseline(table: &Table) -> Vec<Prediction> {
         Prediction::by_threshold(zone, crossing(path, quietness).unwrap_or(zone.last_spp))
     };
     let constant = |left_out: &str| {
-        let others = || zones.iter().filter(|(z, _)| z.group != left_out && !z.censored);
+        let alone = zones.iter().all(|(z, _)| z.group == left_out);
+        let others = || zones.iter().filter(|(z, _)| (alone || z.group != left_out) && !z.censored);
         let error =
             |constant: f64| others().map(|other| predict(other, constant).log_ratio().abs()).sum::<f64>();
         let candidates = others().filter_map(|(zone, path)| value_at(path, zone.human_spp));
