@@ -69,8 +69,9 @@ fn drive<S: ProgressiveSource, C: StoppingCriterion>(
     bar.finish_and_clear();
 
     // Write what there is, also after a failure.
-    output.write(driver.session(), Some(driver.clock()))?;
+    let written = output.write(driver.session(), Some(driver.clock()));
     outcome?;
+    written?;
     if !args.quiet {
         output.summarise(driver.session(), driver.clock());
     }
@@ -91,7 +92,7 @@ fn cancel_on_signal(cancel: Arc<AtomicBool>) -> anyhow::Result<()> {
 
 fn progress_bar(quiet: bool) -> ProgressBar {
     let target = if quiet { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() };
-    let style = ProgressStyle::with_template("{bar:32} {pos}/{len} tiles done  {elapsed_precise}  {msg}");
+    let style = ProgressStyle::with_template("{bar:20} {pos}/{len} tiles done, {elapsed}, {msg}");
     let bar = ProgressBar::with_draw_target(Some(0), target);
     style.map(|style| bar.clone().with_style(style)).unwrap_or(bar)
 }
@@ -100,11 +101,12 @@ fn show<C: StoppingCriterion>(bar: &ProgressBar, session: &Session<C>, progress:
     let pixels = (session.film().grid().width() * session.film().grid().height()) as f64;
     let eta = match progress.eta_seconds {
         Some(seconds) => {
-            format!("about {} to go", HumanDuration(Duration::from_secs_f64(seconds.clamp(0.0, 1e9))))
+            let left = Duration::from_secs(seconds.clamp(0.0, 1e9) as u64);
+            format!("about {} to go", HumanDuration(left))
         }
         None => "no estimate yet".into(),
     };
     bar.set_length(progress.tiles as u64);
     bar.set_position((progress.tiles - progress.now.active_tiles) as u64);
-    bar.set_message(format!("{:.0} spp on average, {eta}", progress.now.samples as f64 / pixels));
+    bar.set_message(format!("{:.0} spp, {eta}", progress.now.samples as f64 / pixels));
 }
