@@ -49,10 +49,10 @@ fn an_interrupt_ends_with_what_is_there_written() {
     let folder = tempdir().unwrap();
     let out = folder.path();
     for name in ["-INT", "-TERM"] {
-        let child = long(out, "0");
-        // The handler is set before the first batch; without autosave nothing but the empty history tells that it has begun
-        wait_for("the history", || out.join("timeline.csv").exists().then_some(()));
-        std::thread::sleep(Duration::from_millis(700));
+        let child = long(out, "0.5");
+        // The handler is set before the first batch
+        wait_for("the first save", || out.join("report.json").exists().then_some(()));
+        std::thread::sleep(Duration::from_millis(200));
         signal(&child, name);
         assert_eq!(end(child).code(), Some(130), "{name}");
         assert_whole(out);
