@@ -7,7 +7,6 @@ use crate::params::Audience;
 use crate::svm::{Platt, Scaler, Svm, SvmParams, SvmTrainError, fit_platt, fit_svm};
 use ndarray::Array2;
 use rayon::prelude::*;
-use std::collections::BTreeSet;
 use thiserror::Error;
 
 /// Share of observers who see no difference at the recorded threshold, as it is read here (Takouachet et al. 2017, §4.2.2:
@@ -142,16 +141,12 @@ fn examples(zone: &Zone, range: f64) -> impl Iterator<Item = Example<'_>> {
     })
 }
 
-/// Trains on the zones of `groups` with C and γ chosen, and P calibrated, by leaving each group out in turn.
+/// Trains on the zones of `groups`, at least two, with C and γ chosen, and P calibrated, by leaving each group out in turn.
 fn fit_groups(
     table: &Table,
     groups: &[&str],
     params: &TrainParams,
 ) -> Result<(Machine, Platt, SvmParams), TrainError> {
-    if groups.len() < 2 {
-        let names = groups.join(", ");
-        return Err(TrainError::Groups { needed: 2, found: groups.len(), names });
-    }
     let of = |wanted: &dyn Fn(&str) -> bool| -> Vec<&Zone> {
         table.zones.iter().filter(|z| groups.contains(&z.group.as_str()) && wanted(&z.group)).collect()
     };
@@ -240,7 +235,7 @@ pub fn train(
     let record = TrainingRecord {
         corpus,
         table_digest: table.digest(),
-        scenes: table.scenes().into_iter().map(str::to_owned).collect::<BTreeSet<_>>().into_iter().collect(),
+        scenes: table.scenes().into_iter().map(str::to_owned).collect(),
         examples: table.zones.iter().map(|z| examples(z, params.range).count()).sum(),
         c,
         gamma,
