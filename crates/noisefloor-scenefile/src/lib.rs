@@ -1,0 +1,41 @@
+//! Reads scenes from files for [`noisefloor_ptwne`]: glTF 2.0 (`.gltf`, `.glb`) and the subset of Mitsuba's XML (versions 0.5
+//! to 3) that research scenes use.
+//!
+//! Files are hostile until parsed: every length is checked before anything is allocated, every error says which file and where,
+//! and what is not supported is named, with whether it was ignored or is fatal.
+
+mod error;
+mod gltf;
+mod mitsuba;
+mod picture;
+
+pub use error::{LoadError, Place, Warning};
+
+use noisefloor_ptwne::Scene;
+use std::path::Path;
+
+/// A scene from a file, and what the file says about how to render it.
+#[derive(Debug)]
+pub struct Loaded {
+    /// The scene.
+    pub scene: Scene,
+    /// Image size in pixels that the file asks for.
+    pub size: Option<(usize, usize)>,
+    /// Longest path, in segments, that the file asks for.
+    pub max_depth: Option<u32>,
+    /// What was ignored or replaced.
+    pub warnings: Vec<Warning>,
+}
+
+/// Loads the scene in `path`; its extension says which format: `.gltf`, `.glb` or `.xml`.
+///
+/// # Errors
+/// [`LoadError`] if a file cannot be read or parsed, or asks for something that cannot be left out.
+pub fn load(path: &Path) -> Result<Loaded, LoadError> {
+    let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
+    match extension.as_str() {
+        "gltf" | "glb" => gltf::load(path),
+        "xml" => mitsuba::load(path),
+        _ => Err(LoadError::Format { path: path.to_owned() }),
+    }
+}
