@@ -9,9 +9,11 @@ use obvhs::{BvhBuildParams, aabb::Aabb, bvh2::Bvh2, bvh2::builder::build_bvh2};
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Shape {
     /// The points `corner + u·e1 + v·e2`: with u, v ∈ [0, 1] a parallelogram (`whole`), else with u + v ≤ 1 a triangle.
-    Planar { corner: Vec3, e1: Vec3, e2: Vec3, whole: bool },
+    Planar { corner: glam::Vec3, e1: glam::Vec3, e2: glam::Vec3, whole: bool },
     /// A sphere.
-    Sphere { centre: Vec3, radius: f32 },
+    Sphere { centre: glam::Vec3, radius: f32 },
+    /// An ellipse: the points `centre + u·e1 + v·e2` with u² + v² ≤ 1.
+    Disk { centre: glam::Vec3, e1: glam::Vec3, e2: glam::Vec3 },
 }
 
 impl Shape {
@@ -19,11 +21,28 @@ impl Shape {
         match *self {
             Shape::Planar { corner, e1, e2, whole } => {
                 let last = if whole { corner + e1 + e2 } else { corner };
-                Aabb::from_points(&[corner, corner + e1, corner + e2, last])
+                Aabb::from_points(&[corner, corner + e1, corner + e2, last].map(Vec3::from))
             }
-            Shape::Sphere { centre, radius } => Aabb::new(centre - radius, centre + radius),
+            Shape::Sphere { centre, radius } => Aabb::new((centre - radius).into(), (centre + radius).into()),
+            Shape::Disk { centre, e1, e2 } => {
+                let reach = (e1 * e1 + e2 * e2).map(f32::sqrt);
+                Aabb::new((centre - reach).into(), (centre + reach).into())
+            }
         }
     }
+
+    /// Whether a pack has room for it: it is planar and straight.
+    fn packs(&self) -> bool {
+        matches!(self, Shape::Planar { .. })
+    }
+}
+
+/// The normal and the dual basis of two edges, in f64: the area may be small.
+fn dual(e1: glam::Vec3, e2: glam::Vec3) -> [glam::DVec3; 3] {
+    let (a, b) = (e1.as_dvec3(), e2.as_dvec3());
+    let n = a.cross(b);
+    let inverse = n.length_squared().recip();
+    [n * inverse.sqrt(), b.cross(n) * inverse, n.cross(a) * inverse]
 }
 
 /// Where a ray met a surface.
@@ -31,13 +50,23 @@ impl Shape {
 pub(crate) struct Hit {
     /// Distance along the ray; infinite if it met nothing.
     pub(crate) t: f32,
-    /// Which surface.
-    pub(crate) prim: u32,
+    /// Which surface, in the order of the hierarchy: see [`Accel::place`].
+    slot: u32,
     /// Coordinates on a planar surface along its edges.
     pub(crate) uv: [f32; 2],
 }
 
-const MISS: Hit = Hit { t: f32::INFINITY, prim: u32::MAX, uv: [0.0; 2] };
+const MISS: Hit = Hit { t: f32::INFINITY, slot: u32::MAX, uv: [0.0; 2] };
+
+impl Hit {
+    #[inline]
+    pub(crate) fn is_miss(&self) -> bool {
+        self.slot == u32::MAX
+    }
+}
+
+/// Marks the slot of a round surface.
+const ROUND: u32 = 1 << 31;
 
 /// Marks a child that is a leaf; the other bits are its index.
 const LEAF: u32 = 1 << 31;
@@ -67,18 +96,25 @@ struct Pack {
     prim: [u32; 4],
 }
 
+/// A sphere or an ellipse.
 #[derive(Clone, Copy, Debug)]
-struct Ball {
+struct Round {
     centre: Vec3,
-    radius: f32,
     prim: u32,
+    form: Form,
+}
+
+#[derive(Clone, Copy, Debug)]
+enum Form {
+    Sphere { radius: f32 },
+    Disk { normal: Vec3, dual_u: Vec3, dual_v: Vec3 },
 }
 
 #[derive(Clone, Copy, Debug)]
 struct Leaf {
     pack: u32,
-    first_ball: u32,
-    balls: u32,
+    first_round: u32,
+    rounds: u32,
 }
 
 /// The hierarchy.
@@ -87,9 +123,9 @@ pub(crate) struct Accel {
     nodes: Vec<Node>,
     leaves: Vec<Leaf>,
     packs: Vec<Pack>,
-    balls: Vec<Ball>,
+    rounds: Vec<Round>,
     stack: usize,
-    extent: f32,
+    bounds: [Vec3; 2],
 }
 
 /// Nodes still to visit, with the distance at which each begins. Made once a job, so that no path allocates.
@@ -141,20 +177,23 @@ impl Node {
 }
 
 impl Pack {
-    fn set(&mut self, lane: usize, corner: Vec3, e1: Vec3, e2: Vec3, whole: bool, prim: u32) {
-        // The dual basis of (e1, e2) in their plane; in f64, as the area may be small
-        let (a, b) = (e1.as_dvec3(), e2.as_dvec3());
-        let n = a.cross(b);
-        let inverse = n.length_squared().recip();
+    fn set(
+        &mut self,
+        lane: usize,
+        corner: glam::Vec3,
+        [normal, u, v]: [glam::DVec3; 3],
+        whole: bool,
+        prim: u32,
+    ) {
         let put = |what: &mut [Vec4; 3], v: glam::DVec3| {
             for i in 0..3 {
                 what[i][lane] = v[i] as f32;
             }
         };
         put(&mut self.corner, corner.as_dvec3());
-        put(&mut self.normal, n * inverse.sqrt());
-        put(&mut self.dual_u, b.cross(n) * inverse);
-        put(&mut self.dual_v, n.cross(a) * inverse);
+        put(&mut self.normal, normal);
+        put(&mut self.dual_u, u);
+        put(&mut self.dual_v, v);
         self.whole[lane] = if whole { 1.0 } else { 0.0 };
         self.prim[lane] = prim;
     }
@@ -176,30 +215,59 @@ impl Pack {
     }
 }
 
-impl Ball {
-    /// Nearest distance in (0, `t_max`), else none. The discriminant is that of Haines et al. 2019 ("Precision
-    /// Improvements for Ray/Sphere Intersection"): from the point nearest the centre, not from b² − c.
-    #[inline]
-    fn meet(&self, ray: &Ray, t_max: f32) -> Option<f32> {
-        let to = self.centre - ray.origin;
-        let b = to.dot(ray.dir);
-        let discriminant = self.radius * self.radius - (to - ray.dir * b).length_squared();
-        if discriminant <= 0.0 {
-            return None;
-        }
-        let q = b + discriminant.sqrt().copysign(b);
-        let (r1, r2) = ((to.length_squared() - self.radius * self.radius) / q, q);
-        let (low, high) = if r1 < r2 { (r1, r2) } else { (r2, r1) };
-        let t = if low > 0.0 { low } else { high };
-        (t > 0.0 && t < t_max).then_some(t)
+impl Round {
+    fn new(shape: &Shape, prim: u32) -> Self {
+        let (centre, form) = match *shape {
+            Shape::Sphere { centre, radius } => (centre, Form::Sphere { radius }),
+            Shape::Disk { centre, e1, e2 } | Shape::Planar { corner: centre, e1, e2, .. } => {
+                let [normal, dual_u, dual_v] = dual(e1, e2).map(|v| v.as_vec3a());
+                (centre, Form::Disk { normal, dual_u, dual_v })
+            }
+        };
+        Self { centre: centre.into(), prim, form }
     }
+
+    /// Nearest distance in (0, `t_max`) and coordinates along the edges, else none.
+    #[inline]
+    fn meet(&self, ray: &Ray, t_max: f32) -> Option<(f32, [f32; 2])> {
+        let to = self.centre - ray.origin;
+        let (t, uv) = match self.form {
+            Form::Sphere { radius } => (sphere(to, ray.dir, radius)?, [0.0; 2]),
+            Form::Disk { normal, dual_u, dual_v } => {
+                let t = normal.dot(to) / normal.dot(ray.dir);
+                let at = ray.dir * t - to;
+                let uv = [dual_u.dot(at), dual_v.dot(at)];
+                // False for NaN too
+                if !(uv[0] * uv[0] + uv[1] * uv[1] <= 1.0) {
+                    return None;
+                }
+                (t, uv)
+            }
+        };
+        (t > 0.0 && t < t_max).then_some((t, uv))
+    }
+}
+
+/// Where a ray from the origin first meets a sphere around `to`, in front. The discriminant is that of Haines et al. 2019
+/// ("Precision Improvements for Ray/Sphere Intersection"): from the point nearest the centre, not from b² − c.
+#[inline]
+fn sphere(to: Vec3, dir: Vec3, radius: f32) -> Option<f32> {
+    let b = to.dot(dir);
+    let discriminant = radius * radius - (to - dir * b).length_squared();
+    if discriminant <= 0.0 {
+        return None;
+    }
+    let q = b + discriminant.sqrt().copysign(b);
+    let (r1, r2) = ((to.length_squared() - radius * radius) / q, q);
+    let (low, high) = if r1 < r2 { (r1, r2) } else { (r2, r1) };
+    Some(if low > 0.0 { low } else { high })
 }
 
 impl Accel {
     /// Builds the hierarchy over `shapes`; planar ones must have an area.
     pub(crate) fn new(shapes: &[Shape]) -> Self {
-        let (nodes, leaves, packs, balls) = (vec![Node::EMPTY], vec![], vec![], vec![]);
-        let mut accel = Self { nodes, leaves, packs, balls, stack: 4, extent: 1.0 };
+        let (nodes, leaves, packs, rounds) = (vec![Node::EMPTY], vec![], vec![], vec![]);
+        let mut accel = Self { nodes, leaves, packs, rounds, stack: 4, bounds: [Vec3::NEG_ONE, Vec3::ONE] };
         if shapes.is_empty() {
             return accel;
         }
@@ -210,16 +278,22 @@ impl Accel {
             ..BvhBuildParams::slow_build()
         };
         let tree = build_bvh2(&bounds, params, &mut std::time::Duration::default());
-        accel.extent = 0.5 * (tree.nodes[0].aabb().max - tree.nodes[0].aabb().min).length();
+        accel.bounds = [tree.nodes[0].aabb().min, tree.nodes[0].aabb().max];
         let mut depth = 1;
         accel.widen(&tree, shapes, &mut depth);
         accel.stack = 3 * depth + 4;
+        // Leaves are looked up only where there are round surfaces
+        if shapes.iter().all(Shape::packs) {
+            accel.leaves = vec![];
+        }
+        accel.nodes.shrink_to_fit();
+        accel.packs.shrink_to_fit();
         accel
     }
 
-    /// Radius of a sphere around all surfaces.
-    pub(crate) fn extent(&self) -> f32 {
-        self.extent
+    /// Lowest and highest corner of a box around all surfaces.
+    pub(crate) fn bounds(&self) -> [Vec3; 2] {
+        self.bounds
     }
 
     /// Room for the nodes that a walk of this hierarchy can leave behind.
@@ -263,19 +337,17 @@ impl Accel {
     }
 
     fn leaf(&mut self, prims: &[u32], shapes: &[Shape]) -> u32 {
-        let mut leaf = Leaf { pack: NONE, first_ball: self.balls.len() as u32, balls: 0 };
+        let mut leaf = Leaf { pack: NONE, first_round: self.rounds.len() as u32, rounds: 0 };
         let mut pack = Pack::default();
         let mut lane = 0;
         for &prim in prims {
-            match shapes[prim as usize] {
-                Shape::Planar { corner, e1, e2, whole } => {
-                    pack.set(lane, corner, e1, e2, whole, prim);
-                    lane += 1;
-                }
-                Shape::Sphere { centre, radius } => {
-                    self.balls.push(Ball { centre, radius, prim });
-                    leaf.balls += 1;
-                }
+            let shape = &shapes[prim as usize];
+            if let Shape::Planar { corner, e1, e2, whole } = *shape {
+                pack.set(lane, corner, dual(e1, e2), whole, prim);
+                lane += 1;
+            } else {
+                self.rounds.push(Round::new(shape, prim));
+                leaf.rounds += 1;
             }
         }
         if lane > 0 {
@@ -286,9 +358,44 @@ impl Accel {
         LEAF | (self.leaves.len() - 1) as u32
     }
 
-    /// The nearest surface along the ray. `SPHERES` says whether the scene has any.
+    /// What `hit` met, which must not be a miss.
+    #[inline]
+    pub(crate) fn place(&self, hit: &Hit) -> Place {
+        if hit.slot & ROUND == 0 {
+            let (pack, lane) = (&self.packs[(hit.slot >> 2) as usize], (hit.slot & 3) as usize);
+            let at = |v: &[Vec4; 3]| Vec3::new(v[0][lane], v[1][lane], v[2][lane]);
+            return Place {
+                prim: pack.prim[lane],
+                corner: at(&pack.corner),
+                local: Local::Plane { normal: at(&pack.normal) },
+            };
+        }
+        let round = &self.rounds[(hit.slot & !ROUND) as usize];
+        let local = match round.form {
+            Form::Sphere { radius } => Local::Sphere { radius },
+            Form::Disk { normal, .. } => Local::Plane { normal },
+        };
+        Place { prim: round.prim, corner: round.centre, local }
+    }
+
+    /// The nearest surface along the ray. `solid` says whether the ray meets a surface, given by its index, at (u, v), or
+    /// passes through a hole there.
+    #[inline]
+    pub(crate) fn closest(&self, ray: &Ray, stack: &mut Stack, solid: impl Fn(u32, [f32; 2]) -> bool) -> Hit {
+        if self.rounds.is_empty() {
+            self.nearest::<false>(ray, stack, solid)
+        } else {
+            self.nearest::<true>(ray, stack, solid)
+        }
+    }
+
     #[inline(always)]
-    pub(crate) fn closest<const SPHERES: bool>(&self, ray: &Ray, stack: &mut Stack) -> Hit {
+    fn nearest<const ROUNDS: bool>(
+        &self,
+        ray: &Ray,
+        stack: &mut Stack,
+        solid: impl Fn(u32, [f32; 2]) -> bool,
+    ) -> Hit {
         let wide = Wide::new(ray);
         let mut best = MISS;
         let mut top = 0;
@@ -317,7 +424,7 @@ impl Accel {
                     continue;
                 }
             } else {
-                self.closest_in_leaf::<SPHERES>(node, ray, &wide, &mut best);
+                self.closest_in_leaf::<ROUNDS>(node, ray, &wide, &mut best, &solid);
             }
             // Take back what still begins before the nearest surface found
             loop {
@@ -335,11 +442,15 @@ impl Accel {
     }
 
     #[inline]
-    fn closest_in_leaf<const SPHERES: bool>(&self, node: u32, ray: &Ray, wide: &Wide, best: &mut Hit) {
-        let index = (node & !LEAF) as usize;
-        // Without spheres each leaf has one pack, of the same index
-        let leaf =
-            if SPHERES { self.leaves[index] } else { Leaf { pack: index as u32, first_ball: 0, balls: 0 } };
+    fn closest_in_leaf<const ROUNDS: bool>(
+        &self,
+        node: u32,
+        ray: &Ray,
+        wide: &Wide,
+        best: &mut Hit,
+        solid: &impl Fn(u32, [f32; 2]) -> bool,
+    ) {
+        let leaf = self.leaf_of::<ROUNDS>(node);
         if leaf.pack != NONE {
             let pack = &self.packs[leaf.pack as usize];
             let (t, u, v, mut mask) = pack.meet(wide, best.t);
@@ -348,25 +459,56 @@ impl Accel {
                 while mask != 0 {
                     let lane = mask.trailing_zeros() as usize & 3;
                     mask &= mask - 1;
-                    if t[lane] < best.t {
-                        *best = Hit { t: t[lane], prim: pack.prim[lane], uv: [u[lane], v[lane]] };
+                    if t[lane] < best.t && solid(pack.prim[lane], [u[lane], v[lane]]) {
+                        *best =
+                            Hit { t: t[lane], slot: leaf.pack << 2 | lane as u32, uv: [u[lane], v[lane]] };
                     }
                 }
             }
         }
-        if SPHERES {
-            let first = leaf.first_ball as usize;
-            for ball in &self.balls[first..first + leaf.balls as usize] {
-                if let Some(t) = ball.meet(ray, best.t) {
-                    *best = Hit { t, prim: ball.prim, uv: [0.0; 2] };
+        if ROUNDS {
+            for index in leaf.first_round..leaf.first_round + leaf.rounds {
+                let round = &self.rounds[index as usize];
+                if let Some((t, uv)) = round.meet(ray, best.t)
+                    && solid(round.prim, uv)
+                {
+                    *best = Hit { t, slot: ROUND | index, uv };
                 }
             }
         }
     }
 
-    /// Whether any surface lies on the ray before `t_max`.
+    /// Without round surfaces each leaf has one pack, of the same index.
+    #[inline]
+    fn leaf_of<const ROUNDS: bool>(&self, node: u32) -> Leaf {
+        let index = node & !LEAF;
+        if ROUNDS { self.leaves[index as usize] } else { Leaf { pack: index, first_round: 0, rounds: 0 } }
+    }
+
+    /// Whether any surface lies on the ray before `t_max`; `HOLES` says whether some have holes, which `solid` knows.
+    #[inline]
+    pub(crate) fn blocked<const HOLES: bool>(
+        &self,
+        ray: &Ray,
+        t_max: f32,
+        stack: &mut Stack,
+        solid: impl Fn(u32, [f32; 2]) -> bool,
+    ) -> bool {
+        if self.rounds.is_empty() {
+            self.any::<false, HOLES>(ray, t_max, stack, solid)
+        } else {
+            self.any::<true, HOLES>(ray, t_max, stack, solid)
+        }
+    }
+
     #[inline(always)]
-    pub(crate) fn blocked<const SPHERES: bool>(&self, ray: &Ray, t_max: f32, stack: &mut Stack) -> bool {
+    fn any<const ROUNDS: bool, const HOLES: bool>(
+        &self,
+        ray: &Ray,
+        t_max: f32,
+        stack: &mut Stack,
+        solid: impl Fn(u32, [f32; 2]) -> bool,
+    ) -> bool {
         let wide = Wide::new(ray);
         let mut top = 1;
         stack.0[0].0 = 0;
@@ -383,25 +525,88 @@ impl Accel {
                 }
                 continue;
             }
-            let index = (node & !LEAF) as usize;
-            let leaf = if SPHERES {
-                self.leaves[index]
-            } else {
-                Leaf { pack: index as u32, first_ball: 0, balls: 0 }
-            };
-            if leaf.pack != NONE && self.packs[leaf.pack as usize].meet(&wide, t_max).3 != 0 {
-                return true;
-            }
-            if SPHERES {
-                let first = leaf.first_ball as usize;
-                let balls = &self.balls[first..first + leaf.balls as usize];
-                if balls.iter().any(|ball| ball.meet(ray, t_max).is_some()) {
+            let leaf = self.leaf_of::<ROUNDS>(node);
+            if leaf.pack != NONE {
+                let pack = &self.packs[leaf.pack as usize];
+                let (_, u, v, mut mask) = pack.meet(&wide, t_max);
+                if !HOLES && mask != 0 {
                     return true;
+                }
+                while mask != 0 {
+                    let lane = mask.trailing_zeros() as usize & 3;
+                    mask &= mask - 1;
+                    if solid(pack.prim[lane], [u[lane], v[lane]]) {
+                        return true;
+                    }
+                }
+            }
+            if ROUNDS {
+                let first = leaf.first_round as usize;
+                for round in &self.rounds[first..first + leaf.rounds as usize] {
+                    if let Some((_, uv)) = round.meet(ray, t_max)
+                        && solid(round.prim, uv)
+                    {
+                        return true;
+                    }
                 }
             }
         }
         false
     }
+
+    /// Whether any box of the hierarchy reaches into the pyramid of rays from `apex` between planes through it, whose normals
+    /// point inward. May say yes where there is nothing, never no where there is something.
+    pub(crate) fn reaches_into(&self, apex: Vec3, inward: &[Vec3; 4]) -> bool {
+        let mut todo = vec![0u32];
+        while let Some(index) = todo.pop() {
+            let node = &self.nodes[index as usize];
+            for lane in 0..4 {
+                let bound =
+                    |end: usize| Vec3::from_array(std::array::from_fn(|axis| node.bounds[axis][end][lane]));
+                let (low, high) = (bound(0) - apex, bound(1) - apex);
+                // Empty lanes have low > high. A thousandth of the size, and of the distance, covers rounding
+                let slack = 1e-3 * high.abs().max(low.abs()).max_element();
+                let meets = |n: &Vec3| Vec3::select(n.cmpgt(Vec3::ZERO), high, low).dot(*n) >= -slack;
+                if low.cmple(high).all() && inward.iter().all(meets) {
+                    match node.child[lane] {
+                        child if child & LEAF == 0 => todo.push(child),
+                        _ => return true,
+                    }
+                }
+            }
+        }
+        false
+    }
+
+    /// Bytes that the hierarchy takes.
+    pub(crate) fn bytes(&self) -> usize {
+        size_of_val(self.nodes.as_slice())
+            + size_of_val(self.leaves.as_slice())
+            + size_of_val(self.packs.as_slice())
+            + size_of_val(self.rounds.as_slice())
+    }
+}
+
+/// What a hit met.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Place {
+    /// Its index among the shapes.
+    pub(crate) prim: u32,
+    /// A point of its plane; the centre of a sphere or ellipse.
+    pub(crate) corner: Vec3,
+    pub(crate) local: Local,
+}
+
+/// What a surface is like where it was met.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Local {
+    /// Flat; the normal of its front, of length 1.
+    Plane {
+        normal: Vec3,
+    },
+    Sphere {
+        radius: f32,
+    },
 }
 
 /// The surfaces below a node, if they are at most four.
@@ -433,10 +638,11 @@ mod tests {
     fn walk_agrees_with_a_loop() {
         let mut rng = Rng::new(Key::new(7), 0, 0);
         let mut point =
-            |scale: f32| Vec3::from_array([rng.one(), rng.one(), rng.one()]) * scale - 0.5 * scale;
+            |scale: f32| glam::Vec3::from_array([rng.one(), rng.one(), rng.one()]) * scale - 0.5 * scale;
         let shapes: Vec<Shape> = (0..300)
             .map(|i| match i % 3 {
                 0 => Shape::Sphere { centre: point(4.0), radius: 0.1 },
+                1 if i % 2 == 0 => Shape::Disk { centre: point(4.0), e1: point(1.0), e2: point(1.0) },
                 k => Shape::Planar { corner: point(4.0), e1: point(1.0), e2: point(1.0), whole: k == 1 },
             })
             .collect();
@@ -446,15 +652,15 @@ mod tests {
         let mut met = 0;
         for i in 0..5000 {
             let mut rng = Rng::new(Key::new(8), i, 0);
-            let ray = Ray { origin: point(4.0), dir: math::sphere(rng.two()).normalize() };
-            let hit = accel.closest::<true>(&ray, &mut stack);
-            let all = alone.iter().map(|a| a.closest::<true>(&ray, &mut stack).t);
+            let ray = Ray { origin: point(4.0).into(), dir: math::sphere(rng.two()).normalize() };
+            let hit = accel.closest(&ray, &mut stack, |_, _| true);
+            let all = alone.iter().map(|a| a.closest(&ray, &mut stack, |_, _| true).t);
             let best = all.fold(f32::INFINITY, f32::min);
             assert_eq!(hit.t, best);
-            assert_eq!(accel.blocked::<true>(&ray, f32::INFINITY, &mut stack), best.is_finite());
+            assert_eq!(accel.blocked::<true>(&ray, f32::INFINITY, &mut stack, |_, _| true), best.is_finite());
             if best.is_finite() {
                 met += 1;
-                assert!(!accel.blocked::<true>(&ray, best, &mut stack));
+                assert!(!accel.blocked::<true>(&ray, best, &mut stack, |_, _| true));
             }
         }
         assert!(met > 500, "{met}");
@@ -464,7 +670,7 @@ mod tests {
     fn an_empty_hierarchy_is_met_by_nothing() {
         let accel = Accel::new(&[]);
         let ray = Ray { origin: Vec3::ZERO, dir: Vec3::new(0.0, 0.6, -0.8) };
-        assert!(accel.closest::<true>(&ray, &mut accel.stack()).t.is_infinite());
-        assert!(!accel.blocked::<false>(&ray, 1.0, &mut accel.stack()));
+        assert!(accel.closest(&ray, &mut accel.stack(), |_, _| true).t.is_infinite());
+        assert!(!accel.blocked::<false>(&ray, 1.0, &mut accel.stack(), |_, _| true));
     }
 }

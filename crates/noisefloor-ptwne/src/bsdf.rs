@@ -3,6 +3,9 @@
 use crate::math::{self, Vec3};
 use std::f32::consts::FRAC_1_PI;
 
+/// Stands for the density of a direction that could not have been chosen otherwise: mirrors, glass, camera rays.
+pub(crate) const DELTA: f32 = f32::INFINITY;
+
 /// Schlick's approximation of the Fresnel term (Schlick 1994), for reflectance `f0` at normal incidence.
 #[inline]
 pub(crate) fn schlick(f0: Vec3, cos: f32) -> Vec3 {
@@ -23,6 +26,51 @@ pub(crate) fn fresnel(cos_i: f32, eta: f32) -> (f32, f32) {
     let parallel = (eta * cos_i - cos_t) / (eta * cos_i + cos_t);
     let perpendicular = (cos_i - eta * cos_t) / (cos_i + eta * cos_t);
     (0.5 * (parallel * parallel + perpendicular * perpendicular), cos_t)
+}
+
+/// Reflectance of a conductor with index of refraction η + ik, unpolarised, at `cos` ≥ 0 (Born, Wolf 1999, §14.2, in the
+/// form without complex numbers).
+#[inline]
+pub(crate) fn fresnel_complex(eta: Vec3, k: Vec3, cos: f32) -> Vec3 {
+    let (cos2, sin2) = (cos * cos, (1.0 - cos * cos).max(0.0));
+    let t = eta * eta - k * k - Vec3::splat(sin2);
+    // a² + b² and a, of √((η + ik)² − sin²) = a + ib
+    let sum = (t * t + 4.0 * eta * eta * k * k).map(f32::sqrt);
+    let a = (0.5 * (sum + t)).max(Vec3::ZERO).map(f32::sqrt);
+    let (x, y) = (sum + Vec3::splat(cos2), 2.0 * cos * a);
+    let perpendicular = (x - y) / (x + y);
+    let (x, y) = (cos2 * sum + Vec3::splat(sin2 * sin2), y * sin2);
+    0.5 * perpendicular * (Vec3::ONE + (x - y) / (x + y))
+}
+
+/// The Fresnel term of what reflects without letting light in.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Fresnel {
+    /// One: a perfect mirror.
+    None,
+    /// Schlick's, with the colour at normal incidence.
+    Schlick,
+    /// Of a conductor; the colour is a factor.
+    Complex { eta: Vec3, k: Vec3 },
+}
+
+impl Fresnel {
+    #[inline]
+    pub(crate) fn at(&self, colour: Vec3, cos: f32) -> Vec3 {
+        match *self {
+            Self::None => colour,
+            Self::Schlick => schlick(colour, cos),
+            Self::Complex { eta, k } => colour * fresnel_complex(eta, k, cos),
+        }
+    }
+}
+
+/// Reflectance and transmittance of a thin pane: all reflections between its boundaries summed. They add up to one.
+#[inline]
+pub(crate) fn pane(cos: f32, eta: f32) -> f32 {
+    let (r, _) = fresnel(cos, eta);
+    // r + t²r + t²r³ + … with t = 1 − r
+    2.0 * r / (1.0 + r)
 }
 
 /// Snell's law: the direction of `dir` (towards the surface) behind a surface with normal `n` against it.
@@ -85,6 +133,261 @@ impl Ggx {
         }
         let (lo, li) = (self.lambda(wo), self.lambda(wi));
         (wi, (1.0 + lo) / (1.0 + lo + li), cos_h)
+    }
+}
+
+/// A rough or smooth dielectric boundary over a base: how much light it lets through, tabulated once a material.
+#[derive(Clone, Debug)]
+pub(crate) struct Coat {
+    pub(crate) ior: f32,
+    rows: Vec<Row>,
+}
+
+/// Transmittance for one roughness.
+#[derive(Clone, Debug)]
+struct Row {
+    /// Share of light from one direction that gets in: at cosines of (i/[`STEPS`])².
+    at: [f32; STEPS + 1],
+    /// The same for uniform light from outside: 2∫T(μ)μ dμ.
+    mean: f32,
+}
+
+/// Steps of the tables in the cosine, and in α where it varies. Squares of even steps are dense where T bends, at grazing
+/// angles: linear interpolation is then good to 1e-3.
+const STEPS: usize = 64;
+const ALPHAS: usize = 24;
+
+impl Coat {
+    /// A coat of index `ior`, of roughness `alpha`, or of any if that is `None`.
+    pub(crate) fn new(ior: f32, alpha: Option<f32>) -> Self {
+        let rows = match alpha {
+            Some(alpha) => vec![Row::new(ior, alpha)],
+            None => (0..=ALPHAS).map(|i| Row::new(ior, i as f32 / ALPHAS as f32)).collect(),
+        };
+        Self { ior, rows }
+    }
+
+    /// Blends what `of` says of the two rows around `alpha`.
+    #[inline]
+    fn blend(&self, alpha: f32, of: impl Fn(&Row) -> f32) -> f32 {
+        match self.rows.as_slice() {
+            [only] => of(only),
+            rows => {
+                let x = alpha.clamp(0.0, 1.0) * ALPHAS as f32;
+                let i = (x as usize).min(ALPHAS - 1);
+                let (low, high) = (of(&rows[i]), of(&rows[i + 1]));
+                low + (high - low) * (x - i as f32)
+            }
+        }
+    }
+
+    /// Share of the light from a direction of cosine `cos` that gets in.
+    #[inline]
+    pub(crate) fn transmittance(&self, alpha: f32, cos: f32) -> f32 {
+        let x = cos.clamp(0.0, 1.0).sqrt() * STEPS as f32;
+        let i = (x as usize).min(STEPS - 1);
+        self.blend(alpha, |row| row.at[i] + (row.at[i + 1] - row.at[i]) * (x - i as f32))
+    }
+
+    /// What the base's albedo, times the transmittances of both directions and the cosine of the incoming one, is to be
+    /// multiplied by: 1/π, refraction, and all reflections between base and coat.
+    ///
+    /// By reciprocity a share of 1 − T̄/η² of diffuse light from inside is reflected back, T̄ = 2∫T(μ)μ dμ: a white base
+    /// loses nothing.
+    #[inline]
+    pub(crate) fn base(&self, alpha: f32, albedo: Vec3, nonlinear: bool) -> Vec3 {
+        let mean = self.blend(alpha, |row| row.mean);
+        let eta2 = self.ior * self.ior;
+        let bounces = if nonlinear { albedo } else { Vec3::ONE };
+        albedo * FRAC_1_PI / (Vec3::splat(eta2) - bounces * (eta2 - mean))
+    }
+}
+
+impl Row {
+    fn new(ior: f32, alpha: f32) -> Self {
+        let rough = alpha >= crate::MIN_ROUGHNESS;
+        let transmittance = |cos: f32| {
+            if !rough {
+                return 1.0 - fresnel(cos, ior).0;
+            }
+            // Reflectance: the mean of F·G₂/G₁ over visible normals
+            const SIDE: u32 = 24;
+            let cos = cos.max(1e-3);
+            let wo = Vec3::new((1.0 - cos * cos).sqrt(), 0.0, cos);
+            let ggx = Ggx { alpha };
+            let point = |i: u32| (i as f32 + 0.5) / SIDE as f32;
+            let reflected: f64 = (0..SIDE * SIDE)
+                .map(|i| {
+                    let (_, weight, cos_h) = ggx.sample(wo, [point(i % SIDE), point(i / SIDE)]);
+                    f64::from(weight * fresnel(cos_h, ior).0)
+                })
+                .sum();
+            1.0 - (reflected / f64::from(SIDE * SIDE)) as f32
+        };
+        let at = std::array::from_fn(|i| transmittance((i as f32 / STEPS as f32).powi(2)));
+        // ∫ over μ = s², dμ = 2s ds, Simpson's rule
+        let integrand = |i: usize| f64::from(at[i]) * 4.0 * (i as f64 / STEPS as f64).powi(3);
+        let weight = |i: usize| match i {
+            0 | STEPS => 1.0,
+            i if i % 2 == 1 => 4.0,
+            _ => 2.0,
+        };
+        let mean: f64 = (0..=STEPS).map(|i| weight(i) * integrand(i)).sum::<f64>() / (3.0 * STEPS as f64);
+        Self { at, mean: mean as f32 }
+    }
+}
+
+/// Microfacets, of metal or of a coat, and a diffuse base below a coat, seen from one direction.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Glossy<'a> {
+    ggx: Ggx,
+    fresnel: &'a Fresnel,
+    /// Colour of the metal, and its share.
+    metal: Vec3,
+    metal_share: f32,
+    /// The coat, and the factor on its reflection.
+    coat: Option<&'a Coat>,
+    specular: Vec3,
+    /// What [`Coat::base`] says, times the transmittance of the outgoing direction.
+    base: Vec3,
+    /// Probability of choosing a microfacet.
+    facet: f32,
+    /// Whether the coat is too smooth for microfacets.
+    smooth: bool,
+}
+
+impl<'a> Glossy<'a> {
+    pub(crate) fn metal(fresnel: &'a Fresnel, colour: Vec3, alpha: f32) -> Self {
+        let ggx = Ggx { alpha };
+        let (coat, zero) = (None, Vec3::ZERO);
+        Self {
+            ggx,
+            fresnel,
+            metal: colour,
+            metal_share: 1.0,
+            coat,
+            specular: zero,
+            base: zero,
+            facet: 1.0,
+            smooth: false,
+        }
+    }
+
+    pub(crate) fn plastic(
+        coat: &'a Coat,
+        diffuse: Vec3,
+        specular: Vec3,
+        alpha: f32,
+        nonlinear: bool,
+        cos: f32,
+    ) -> Self {
+        let through = coat.transmittance(alpha, cos);
+        let (reflected, inside) = ((1.0 - through) * specular.max_element(), through * diffuse.max_element());
+        Self {
+            ggx: Ggx { alpha },
+            fresnel: &Fresnel::None,
+            metal: Vec3::ZERO,
+            metal_share: 0.0,
+            coat: Some(coat),
+            specular,
+            base: coat.base(alpha, diffuse, nonlinear) * through,
+            facet: share(reflected, inside),
+            smooth: alpha < crate::MIN_ROUGHNESS,
+        }
+    }
+
+    pub(crate) fn blend(coat: &'a Coat, base: Vec3, alpha: f32, metallic: f32, cos: f32) -> Self {
+        let plastic = Self::plastic(coat, base, Vec3::ONE, alpha, true, cos);
+        let through = coat.transmittance(alpha, cos);
+        let reflected = metallic * schlick(base, cos).max_element() + (1.0 - metallic) * (1.0 - through);
+        Self {
+            fresnel: &Fresnel::Schlick,
+            metal: base,
+            metal_share: metallic,
+            specular: Vec3::splat(1.0 - metallic),
+            base: plastic.base * (1.0 - metallic),
+            facet: share(reflected, (1.0 - metallic) * through * base.max_element()),
+            ..plastic
+        }
+    }
+
+    /// Fresnel terms of all microfacets at a half vector of cosine `cos_h`.
+    #[inline]
+    fn reflectance(&self, cos_h: f32) -> Vec3 {
+        let mut sum = Vec3::ZERO;
+        if self.metal_share > 0.0 {
+            sum += self.metal_share * self.fresnel.at(self.metal, cos_h);
+        }
+        if let Some(coat) = self.coat {
+            sum += self.specular * fresnel(cos_h, coat.ior).0;
+        }
+        sum
+    }
+
+    /// f·cos θᵢ of the microfacets, and their density. A smooth coat has none.
+    #[inline]
+    pub(crate) fn facets(&self, wo: Vec3, wi: Vec3) -> (Vec3, f32) {
+        if self.smooth || wi.z <= 0.0 {
+            return (Vec3::ZERO, 0.0);
+        }
+        let (facets, density, cos_h) = self.ggx.eval(wo, wi);
+        (self.reflectance(cos_h) * facets, density)
+    }
+
+    /// f·cos θᵢ of the base below the coat.
+    #[inline]
+    pub(crate) fn base(&self, wi: Vec3) -> Vec3 {
+        match self.coat {
+            Some(coat) if wi.z > 0.0 => self.base * (coat.transmittance(self.ggx.alpha, wi.z) * wi.z),
+            _ => Vec3::ZERO,
+        }
+    }
+
+    /// f·cos θᵢ, and the density of [`Glossy::sample`].
+    #[inline]
+    pub(crate) fn eval(&self, wo: Vec3, wi: Vec3) -> (Vec3, f32) {
+        let (f, density) = self.facets(wo, wi);
+        (f + self.base(wi), self.facet * density + (1.0 - self.facet) * FRAC_1_PI * wi.z.max(0.0))
+    }
+
+    /// A direction of reflection by microfacets or a smooth coat, its weight f·cos θᵢ / density, and its density.
+    #[inline]
+    pub(crate) fn reflect(&self, wo: Vec3, u: [f32; 2]) -> Option<(Vec3, Vec3, f32)> {
+        if self.smooth {
+            return Some((Vec3::new(-wo.x, -wo.y, wo.z), self.reflectance(wo.z), DELTA));
+        }
+        let (wi, weight, cos_h) = self.ggx.sample(wo, u);
+        let (_, density, _) = self.ggx.eval(wo, wi);
+        (weight > 0.0).then(|| (wi, self.reflectance(cos_h) * weight, density))
+    }
+
+    /// A direction, its weight f·cos θᵢ / density, and its density; `None` if nothing is scattered.
+    #[inline]
+    pub(crate) fn sample(&self, wo: Vec3, [pick, u, v]: [f32; 3]) -> Option<(Vec3, Vec3, f32)> {
+        let wi = if pick < self.facet {
+            let (wi, weight, density) = self.reflect(wo, [u, v])?;
+            if self.coat.is_none() || density == DELTA {
+                return Some((wi, weight / self.facet, density));
+            }
+            wi
+        } else {
+            math::cosine_hemisphere([u, v])
+        };
+        let (f, pdf) = self.eval(wo, wi);
+        // Also false for NaN
+        (pdf > 0.0).then(|| (wi, f / pdf, pdf))
+    }
+}
+
+/// Probability of choosing the first of two lobes that reflect so much; neither is starved.
+#[inline]
+fn share(first: f32, second: f32) -> f32 {
+    if second <= 0.0 {
+        1.0
+    } else if first <= 0.0 {
+        0.0
+    } else {
+        (first / (first + second)).clamp(0.1, 0.9)
     }
 }
 

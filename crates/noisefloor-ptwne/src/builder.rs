@@ -2,13 +2,13 @@
 
 use crate::accel::Shape;
 use crate::camera::Camera;
-use crate::environment::{Environment, check_radiance};
+use crate::environment::{Environment, EnvironmentMap, check_radiance};
 use crate::error::SceneError;
-use crate::light::Light;
-use crate::material::{Looks, Material};
-use crate::math::Vec3;
-use crate::scene::{Detail, NO, Prim, Scene};
+use crate::light::{Light, Punctual};
+use crate::material::{Cover, Looks, Material};
+use crate::scene::{Group, NO, Parts, Scene, Surroundings};
 use crate::texture::Texture;
+use glam::Vec3;
 use noisefloor::Rgb;
 
 /// Largest number of surfaces (triangles, parallelograms, spheres) of a scene.
@@ -23,19 +23,26 @@ pub const MIN_AREA: f32 = 1e-18;
 pub struct MaterialId(u32);
 
 /// Light that a surface gives off, the same in all directions, besides what it reflects.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Emission {
     /// Linear radiance, 0…1e12.
     pub radiance: Rgb,
+    /// Multiplies the radiance, by the texture coordinates of the surface; spheres have none for this.
+    pub texture: Option<Texture>,
     /// Whether the back shines too. The front of a triangle is where its corners run counter-clockwise, that of a
-    /// parallelogram where `e1`×`e2` points to, that of a sphere its outside.
+    /// parallelogram or ellipse where `e1`×`e2` points to, that of a sphere its outside.
     pub two_sided: bool,
 }
 
 impl Emission {
     /// Light from the front.
     pub fn front(radiance: Rgb) -> Self {
-        Self { radiance, two_sided: false }
+        Self { radiance, texture: None, two_sided: false }
+    }
+
+    /// Light from both sides.
+    pub fn two_sided(radiance: Rgb) -> Self {
+        Self { two_sided: true, ..Self::front(radiance) }
     }
 }
 
@@ -70,12 +77,7 @@ pub struct Mesh<'a> {
 pub struct SceneBuilder {
     name: String,
     camera: Camera,
-    environment: Option<Environment>,
-    looks: Vec<Looks>,
-    textures: Vec<Option<Texture>>,
-    prims: Vec<Prim>,
-    details: Vec<Detail>,
-    lights: Vec<Light>,
+    parts: Parts,
 }
 
 impl SceneBuilder {
@@ -85,37 +87,52 @@ impl SceneBuilder {
     /// [`SceneError`] if the camera looks nowhere or a number is out of range.
     pub fn new(name: impl Into<String>, camera: Camera) -> Result<Self, SceneError> {
         camera.check()?;
-        Ok(Self {
-            name: name.into(),
-            camera,
-            environment: None,
-            looks: vec![],
-            textures: vec![],
-            prims: vec![],
-            details: vec![],
-            lights: vec![],
-        })
+        Ok(Self { name: name.into(), camera, parts: Parts::default() })
     }
 
-    /// Adds a material.
+    /// Adds a material that covers its surfaces wholly and on both sides.
+    ///
+    /// # Errors
+    /// As [`SceneBuilder::material_with`].
+    pub fn material(&mut self, material: Material) -> Result<MaterialId, SceneError> {
+        self.material_with(material, Cover::default())
+    }
+
+    /// Adds a material, with holes or for one side.
     ///
     /// # Errors
     /// [`SceneError`] if a reflectance, index of refraction or roughness is out of range, or an image has the wrong length.
-    pub fn material(&mut self, material: Material) -> Result<MaterialId, SceneError> {
-        material.check()?;
-        let (looks, texture) = material.looks();
-        self.looks.push(looks);
-        self.textures.push(texture);
-        Ok(MaterialId(self.looks.len() as u32 - 1))
+    pub fn material_with(&mut self, material: Material, cover: Cover) -> Result<MaterialId, SceneError> {
+        self.parts.looks.push(Looks::new(material, cover)?);
+        Ok(MaterialId(self.parts.looks.len() as u32 - 1))
     }
 
-    /// Surrounds the scene with a sky. Without one, the surroundings are black.
+    /// Surrounds the scene with a sky, instead of what surrounded it before. Without one, the surroundings are black.
     ///
     /// # Errors
     /// [`SceneError`] if a radiance is negative or not finite, or the sun's size is out of range.
     pub fn environment(&mut self, environment: Environment) -> Result<(), SceneError> {
         environment.check()?;
-        self.environment = Some(environment);
+        self.parts.surroundings = Some(Surroundings::Dome(environment));
+        Ok(())
+    }
+
+    /// Surrounds the scene with an image, instead of what surrounded it before.
+    ///
+    /// # Errors
+    /// [`SceneError`] if the image has the wrong length, a radiance is negative or not finite, or the rotation is none.
+    pub fn environment_map(&mut self, map: EnvironmentMap) -> Result<(), SceneError> {
+        map.check()?;
+        self.parts.surroundings = Some(Surroundings::Map(map));
+        Ok(())
+    }
+
+    /// Adds a light without size.
+    ///
+    /// # Errors
+    /// [`SceneError`] if a number is not finite or out of range, or a direction is zero.
+    pub fn punctual(&mut self, light: Punctual) -> Result<(), SceneError> {
+        self.parts.lights.push(Light::punctual(light)?);
         Ok(())
     }
 
@@ -132,15 +149,26 @@ impl SceneBuilder {
         material: MaterialId,
         emission: Option<Emission>,
     ) -> Result<(), SceneError> {
-        self.check_material(material, emission)?;
         let [corner, e1, e2] = [position(corner)?, position(e1)?, position(e2)?];
-        let detail = if self.textures[material.0 as usize].is_some() {
-            let uvs = [[0.0, 0.0], [e1.length(), 0.0], [0.0, e2.length()]];
-            self.detail(Detail { normals: None, uvs })
-        } else {
-            NO
-        };
-        self.planar(corner, e1, e2, true, detail, material, emission)
+        let uvs = [[0.0, 0.0], [e1.length(), 0.0], [0.0, e2.length()]];
+        self.alone(Shape::Planar { corner, e1, e2, whole: true }, Some(uvs), material, emission)
+    }
+
+    /// Adds an ellipse: `centre` + u·`e1` + v·`e2` for u² + v² ≤ 1. Texture coordinates are (u + 1, v + 1)/2.
+    ///
+    /// # Errors
+    /// As [`SceneBuilder::parallelogram`].
+    pub fn disk(
+        &mut self,
+        centre: [f32; 3],
+        e1: [f32; 3],
+        e2: [f32; 3],
+        material: MaterialId,
+        emission: Option<Emission>,
+    ) -> Result<(), SceneError> {
+        let [centre, e1, e2] = [position(centre)?, position(e1)?, position(e2)?];
+        let uvs = [[0.5, 0.5], [1.0, 0.5], [0.5, 1.0]];
+        self.alone(Shape::Disk { centre, e1, e2 }, Some(uvs), material, emission)
     }
 
     /// Adds a sphere. Texture coordinates are azimuth and polar angle in 0…1; v = 1 is the top.
@@ -155,7 +183,6 @@ impl SceneBuilder {
         material: MaterialId,
         emission: Option<Emission>,
     ) -> Result<(), SceneError> {
-        self.check_material(material, emission)?;
         let centre = position(centre)?;
         if !(1e-9..=MAX_COORDINATE).contains(&radius) {
             return Err(SceneError::Range {
@@ -164,21 +191,20 @@ impl SceneBuilder {
                 range: "1e-9…1e6",
             });
         }
-        self.push(Shape::Sphere { centre, radius }, Vec3::ZERO, NO, material, emission)
+        self.alone(Shape::Sphere { centre, radius }, None, material, emission)
     }
 
-    /// Adds the triangles of a mesh. Triangles without area are left out.
+    /// Adds the triangles of a mesh, but for those without area, and returns how many those are.
     ///
     /// # Errors
     /// [`SceneError`] if a number is not finite or too large, an index or a length does not fit, the material is not of this
-    /// builder, or the mesh shines and a triangle has no area.
+    /// builder, or the mesh shines and has no area at all.
     pub fn mesh(
         &mut self,
         mesh: &Mesh<'_>,
         material: MaterialId,
         emission: Option<Emission>,
-    ) -> Result<(), SceneError> {
-        self.check_material(material, emission)?;
+    ) -> Result<usize, SceneError> {
         let vertices = mesh.positions.len();
         for (what, found) in [("normals", mesh.normals.len()), ("texture coordinates", mesh.uvs.len())] {
             if found != 0 && found != vertices {
@@ -188,39 +214,44 @@ impl SceneBuilder {
         if !mesh.uvs.iter().flatten().all(|x| x.is_finite()) {
             return Err(SceneError::NotFinite { what: "a texture coordinate" });
         }
-        for triangle in mesh.indices {
-            if let Some(&index) = triangle.iter().find(|i| **i as usize >= vertices) {
-                return Err(SceneError::Index { index, vertices });
-            }
-            let at = triangle.map(|i| i as usize);
-            let [a, b, c] = [
-                position(mesh.positions[at[0]])?,
-                position(mesh.positions[at[1]])?,
-                position(mesh.positions[at[2]])?,
-            ];
-            let mut normals = None;
-            if !mesh.normals.is_empty() {
-                let n = [
-                    position(mesh.normals[at[0]])?,
-                    position(mesh.normals[at[1]])?,
-                    position(mesh.normals[at[2]])?,
-                ];
-                let n = n.map(Vec3::normalize_or_zero);
-                normals = n.iter().all(|n| *n != Vec3::ZERO).then_some(n);
-            }
-            let detail = if normals.is_some() || !mesh.uvs.is_empty() {
-                let uvs = if mesh.uvs.is_empty() {
-                    [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]
-                } else {
-                    at.map(|i| mesh.uvs[i])
-                };
-                self.detail(Detail { normals, uvs })
-            } else {
-                NO
-            };
-            self.planar(a, b - a, c - a, false, detail, material, emission)?;
+        for p in mesh.positions.iter().chain(mesh.normals) {
+            position(*p)?;
         }
-        Ok(())
+        if let Some(&index) = mesh.indices.iter().flatten().find(|i| **i as usize >= vertices) {
+            return Err(SceneError::Index { index, vertices });
+        }
+        let detailed = !mesh.normals.is_empty() || !mesh.uvs.is_empty();
+        let (mut group, shine) = self.group(material, emission.as_ref())?;
+        if detailed {
+            let details = &mut self.parts.details;
+            group.corners = index(details.corners.len())?;
+            if !mesh.normals.is_empty() {
+                group.normals = index(details.normals.len())?;
+                let unit = |n: &[f32; 3]| Vec3::from(*n).as_dvec3().normalize_or_zero().as_vec3().to_array();
+                details.normals.extend(mesh.normals.iter().map(unit));
+            }
+            if !mesh.uvs.is_empty() {
+                group.uvs = index(details.uvs.len())?;
+                details.uvs.extend(mesh.uvs);
+            }
+        }
+        let mut left_out = 0;
+        for triangle in mesh.indices {
+            let [a, b, c] = triangle.map(|i| Vec3::from(mesh.positions[i as usize]));
+            let shape = Shape::Planar { corner: a, e1: b - a, e2: c - a, whole: false };
+            if self.push(shape, shine)? {
+                if detailed {
+                    self.parts.details.corners.push(*triangle);
+                }
+            } else {
+                left_out += 1;
+            }
+        }
+        if left_out == mesh.indices.len() && emission.is_some() {
+            return Err(SceneError::EmptyEmitter);
+        }
+        self.close(group);
+        Ok(left_out)
     }
 
     /// Builds the scene.
@@ -228,76 +259,108 @@ impl SceneBuilder {
     /// # Errors
     /// [`SceneError::TooLarge`] if it has more than [`MAX_SURFACES`].
     pub fn build(self) -> Result<Scene, SceneError> {
-        if self.prims.len() > MAX_SURFACES {
-            return Err(SceneError::TooLarge {
-                what: "surfaces",
-                found: self.prims.len(),
-                limit: MAX_SURFACES,
-            });
-        }
-        Ok(Scene::new(
-            self.name,
-            self.camera,
-            self.environment,
-            self.looks,
-            self.textures,
-            self.prims,
-            self.details,
-            self.lights,
-        ))
+        Ok(Scene::new(self.name, self.camera, self.parts))
     }
 
-    fn check_material(&self, material: MaterialId, emission: Option<Emission>) -> Result<(), SceneError> {
-        if material.0 as usize >= self.looks.len() {
+    /// A group for what comes next, and how it shines.
+    fn group(
+        &mut self,
+        material: MaterialId,
+        emission: Option<&Emission>,
+    ) -> Result<(Group, Option<Shine>), SceneError> {
+        if material.0 as usize >= self.parts.looks.len() {
             return Err(SceneError::Material(material.0));
         }
-        emission.map_or(Ok(()), |e| check_radiance(e.radiance))
-    }
-
-    fn detail(&mut self, detail: Detail) -> u32 {
-        self.details.push(detail);
-        self.details.len() as u32 - 1
-    }
-
-    #[expect(clippy::too_many_arguments, reason = "one row of the table of surfaces")]
-    fn planar(
-        &mut self,
-        corner: Vec3,
-        e1: Vec3,
-        e2: Vec3,
-        whole: bool,
-        detail: u32,
-        material: MaterialId,
-        emission: Option<Emission>,
-    ) -> Result<(), SceneError> {
-        // In f64: the squares of small edges vanish in f32
-        let n = e1.as_dvec3().cross(e2.as_dvec3());
-        if n.length() * 0.5 < f64::from(MIN_AREA) {
-            return if emission.is_some() { Err(SceneError::EmptyEmitter) } else { Ok(()) };
+        if let Some(emission) = emission {
+            check_radiance(emission.radiance)?;
+            if let Some(texture) = &emission.texture {
+                texture.check()?;
+            }
         }
-        let normal = n.normalize().as_vec3a();
-        self.push(Shape::Planar { corner, e1, e2, whole }, normal, detail, material, emission)
+        let shine = emission.filter(|e| e.radiance != [0.0; 3]).map(|e| Shine {
+            radiance: e.radiance,
+            two_sided: e.two_sided,
+            texture: e.texture.as_ref().map_or(NO, |texture| {
+                self.parts.glows.push(texture.clone());
+                self.parts.glows.len() as u32 - 1
+            }),
+        });
+        let light = if shine.is_some() { index(self.parts.lights.len())? } else { NO };
+        let first = index(self.parts.shapes.len())?;
+        Ok((Group { first, material: material.0, light, corners: NO, normals: NO, uvs: NO }, shine))
     }
 
-    fn push(
+    /// Adds the group of the surfaces that came since.
+    fn close(&mut self, group: Group) {
+        if self.parts.shapes.len() > group.first as usize {
+            let number = self.parts.groups.len() as u32;
+            self.parts.groups.push(group);
+            self.parts.group_of.resize(self.parts.shapes.len(), number);
+        }
+    }
+
+    /// Adds a surface that is a group of its own, with texture coordinates at the ends of its edges.
+    fn alone(
         &mut self,
         shape: Shape,
-        normal: Vec3,
-        detail: u32,
+        uvs: Option<[[f32; 2]; 3]>,
         material: MaterialId,
         emission: Option<Emission>,
     ) -> Result<(), SceneError> {
-        let mut light = NO;
-        if let Some(e) = emission.filter(|e| e.radiance != [0.0; 3]) {
-            light = self.lights.len() as u32;
-            self.lights.push(Light::surface(shape, Vec3::from_array(e.radiance), e.two_sided));
+        let (mut group, shine) = self.group(material, emission.as_ref())?;
+        let textured =
+            self.parts.looks[material.0 as usize].is_textured() || shine.is_some_and(|s| s.texture != NO);
+        if !self.push(shape, shine)? {
+            return if emission.is_some() { Err(SceneError::EmptyEmitter) } else { Ok(()) };
         }
-        self.prims.push(Prim { shape, normal, material: material.0, light, detail });
+        if let Some(uvs) = uvs.filter(|_| textured) {
+            group.corners = index(self.parts.details.corners.len())?;
+            group.uvs = index(self.parts.details.uvs.len())?;
+            self.parts.details.corners.push([0, 1, 2]);
+            self.parts.details.uvs.extend(uvs);
+        }
+        self.close(group);
         Ok(())
+    }
+
+    /// Adds a surface, and its light if it shines; not if it has no area.
+    fn push(&mut self, shape: Shape, shine: Option<Shine>) -> Result<bool, SceneError> {
+        if let Shape::Planar { e1, e2, .. } | Shape::Disk { e1, e2, .. } = shape {
+            // In f64: the squares of small edges vanish in f32
+            let area = 0.5 * e1.as_dvec3().cross(e2.as_dvec3()).length();
+            if area < f64::from(MIN_AREA) {
+                return Ok(false);
+            }
+        }
+        let parts = &mut self.parts;
+        let prim = parts.shapes.len();
+        if prim >= MAX_SURFACES {
+            return Err(SceneError::TooLarge { what: "surfaces", found: prim + 1, limit: MAX_SURFACES });
+        }
+        if let Some(Shine { radiance, two_sided, texture }) = shine {
+            let light = Light::surface(&shape, radiance.into(), two_sided, prim as u32);
+            parts.lights.push(Light { texture, ..light });
+        }
+        parts.shapes.push(shape);
+        Ok(true)
     }
 }
 
-fn position(p: [f32; 3]) -> Result<Vec3, SceneError> {
+/// An emission whose texture is among those of the scene.
+#[derive(Clone, Copy, Debug)]
+struct Shine {
+    radiance: Rgb,
+    two_sided: bool,
+    texture: u32,
+}
+
+/// A number of things as an index.
+fn index(count: usize) -> Result<u32, SceneError> {
+    let found = u32::try_from(count).ok().filter(|i| *i < 1 << 31);
+    found.ok_or(SceneError::TooLarge { what: "corners", found: count, limit: 1 << 31 })
+}
+
+pub(crate) fn position(p: [f32; 3]) -> Result<Vec3, SceneError> {
     for value in p {
         if !value.is_finite() {
             return Err(SceneError::NotFinite { what: "a position or normal" });
@@ -306,7 +369,7 @@ fn position(p: [f32; 3]) -> Result<Vec3, SceneError> {
             return Err(SceneError::Range { what: "a position or normal", value, range: "−1e6…1e6" });
         }
     }
-    Ok(Vec3::from_array(p))
+    Ok(p.into())
 }
 
 #[cfg(test)]
@@ -352,8 +415,12 @@ mod tests {
         let positions = [[0.0; 3], [1.0, 0.0, 0.0], [2.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
         let mesh =
             Mesh { positions: &positions, indices: &[[0, 1, 2], [0, 0, 3], [0, 1, 3]], ..Mesh::default() };
-        b.mesh(&mesh, m, None).unwrap();
-        assert_eq!(b.mesh(&mesh, m, Some(Emission::front([1.0; 3]))), Err(SceneError::EmptyEmitter));
-        assert_eq!(b.build().unwrap().surfaces(), 1);
+        let light = || Some(Emission::front([1.0; 3]));
+        assert_eq!(b.mesh(&mesh, m, None), Ok(2));
+        assert_eq!(b.mesh(&mesh, m, light()), Ok(2));
+        let mesh = Mesh { indices: &[[0, 1, 2]], ..mesh };
+        assert_eq!(b.mesh(&mesh, m, light()), Err(SceneError::EmptyEmitter));
+        let scene = b.build().unwrap();
+        assert_eq!((scene.surfaces(), scene.lights()), (2, 1));
     }
 }

@@ -58,6 +58,18 @@ pub(crate) struct Lens {
 }
 
 impl Lens {
+    /// The eye, and the inward normals of the four planes through it and the sides of a rectangle of pixels.
+    pub(crate) fn pyramid(&self, x: [f32; 2], y: [f32; 2]) -> (Vec3, [Vec3; 4]) {
+        let at = |x: f32, y: f32| self.corner + self.right * x + self.down * y;
+        let corners = [at(x[0], y[0]), at(x[1], y[0]), at(x[1], y[1]), at(x[0], y[1])];
+        let middle = at(0.5 * (x[0] + x[1]), 0.5 * (y[0] + y[1]));
+        let normals = std::array::from_fn(|i| {
+            let n = corners[i].cross(corners[(i + 1) % 4]).normalize_or_zero();
+            if n.dot(middle) < 0.0 { -n } else { n }
+        });
+        (self.eye, normals)
+    }
+
     /// The ray through (x, y) in pixels from the top left corner.
     #[inline]
     pub(crate) fn ray(&self, x: f32, y: f32) -> Ray {

@@ -1,8 +1,11 @@
 //! Light from infinitely far away.
 
+use crate::alias::Alias;
 use crate::error::SceneError;
-use crate::math::Vec3;
+use crate::math::{self, Vec3};
+use crate::texture::MAX_TEXTURE_PIXELS;
 use noisefloor::Rgb;
+use std::f32::consts::FRAC_1_PI;
 
 /// A sky: a smooth dome and, if wanted, a sun. Up is +y. Linear radiance, any non-negative scale.
 ///
@@ -93,5 +96,226 @@ impl Dome {
             // A short blend below the horizon hides the edge
             self.horizon.lerp(self.ground, (dir.y * -12.0).min(1.0))
         }
+    }
+}
+
+/// Light from infinitely far away as an image of all directions.
+#[derive(Clone, Debug, PartialEq)]
+pub struct EnvironmentMap {
+    /// Width in pixels: all around.
+    pub width: usize,
+    /// Height in pixels: from +y at the top to −y at the bottom, by equal angles.
+    pub height: usize,
+    /// Linear radiance, row-major, `width`·`height` values, each channel 0…1e12. A direction (x, y, z) of the map's own axes
+    /// is seen at u = atan2(x, −z)/2π and v = acos(y)/π of the width and height; between pixels it is interpolated.
+    pub pixels: Vec<Rgb>,
+    /// Rows of the rotation that takes the map's axes to the scene's.
+    pub to_world: [[f32; 3]; 3],
+}
+
+impl EnvironmentMap {
+    pub(crate) fn check(&self) -> Result<(), SceneError> {
+        let (width, height) = (self.width, self.height);
+        let size = width.checked_mul(height).filter(|s| (1..=MAX_TEXTURE_PIXELS).contains(s));
+        if size != Some(self.pixels.len()) {
+            return Err(SceneError::Image { width, height, found: self.pixels.len() });
+        }
+        let m = glam::DMat3::from_cols_array_2d(&self.to_world.map(|row| row.map(f64::from)));
+        // A rotation, to what six digits in a file leave of it
+        let off = (m * m.transpose() - glam::DMat3::IDENTITY).to_cols_array();
+        if !off.iter().all(|x| x.abs() < 1e-4) {
+            return Err(SceneError::Rotation);
+        }
+        self.pixels.iter().try_for_each(|p| check_radiance(*p))
+    }
+}
+
+/// An environment map, ready to be looked up and to be sampled by its brightness.
+#[derive(Clone, Debug)]
+pub(crate) struct Map {
+    width: usize,
+    height: usize,
+    pixels: Vec<Rgb>,
+    /// Rows take the map's axes to the scene's; columns, back.
+    to_world: [Vec3; 3],
+    /// Walker's alias table over pixels, and each pixel's probability.
+    table: Alias,
+    chance: Vec<f32>,
+    /// Mean radiance over the sphere.
+    pub(crate) mean: Vec3,
+}
+
+impl Map {
+    pub(crate) fn new(map: EnvironmentMap) -> Self {
+        let EnvironmentMap { width, height, pixels, to_world } = map;
+        // A pixel is chosen by its solid angle and its mean luminance: of the interpolated image, over a pixel, that is the
+        // mean of nine neighbours with the weights 1/8, 3/4, 1/8 in each direction
+        let at = |x: usize, y: usize| Vec3::from_array(pixels[y * width + x]);
+        let across = |x: usize, y: usize| {
+            0.75 * at(x, y) + 0.125 * (at((x + 1) % width, y) + at((x + width - 1) % width, y))
+        };
+        let mut weights = Vec::with_capacity(width * height);
+        let (mut mean, mut total) = (glam::DVec3::ZERO, 0.0);
+        for y in 0..height {
+            let band = solid_angle(y, height);
+            for x in 0..width {
+                let colour = 0.75 * across(x, y)
+                    + 0.125 * (across(x, y.saturating_sub(1)) + across(x, (y + 1).min(height - 1)));
+                weights.push(f64::from(math::luminance(colour)) * band);
+                mean += colour.as_dvec3() * band;
+                total += band;
+            }
+        }
+        let sum: f64 = weights.iter().sum();
+        let chance = weights.iter().map(|w| if sum > 0.0 { (w / sum) as f32 } else { 0.0 }).collect();
+        Self {
+            width,
+            height,
+            table: Alias::new(&weights),
+            chance,
+            mean: (mean / total).as_vec3a(),
+            pixels,
+            to_world: to_world.map(Vec3::from_array),
+        }
+    }
+
+    /// Where in the map `dir` is seen: u and v, and its height above the map's horizon.
+    #[inline]
+    fn place(&self, dir: Vec3) -> [f32; 3] {
+        let [a, b, c] = self.to_world;
+        let local = a * dir.x + b * dir.y + c * dir.z;
+        let u = local.x.atan2(-local.z) * (0.5 * FRAC_1_PI);
+        let y = local.y.clamp(-1.0, 1.0);
+        [if u < 0.0 { u + 1.0 } else { u }, y.acos() * FRAC_1_PI, y]
+    }
+
+    /// Radiance from `dir`, and the density of [`Map::sample`] there.
+    #[inline]
+    pub(crate) fn radiance(&self, dir: Vec3) -> (Vec3, f32) {
+        let [u, v, y] = self.place(dir);
+        let column = ((u * self.width as f32) as usize).min(self.width - 1);
+        let row = ((v * self.height as f32) as usize).min(self.height - 1);
+        let sin = (1.0 - y * y).max(1e-12).sqrt();
+        (self.lookup(u, v), self.chance[row * self.width + column] * self.per_pixel() / sin)
+    }
+
+    /// Density in solid angle, times the sine, of a direction that is uniform in a pixel.
+    #[inline]
+    fn per_pixel(&self) -> f32 {
+        (self.width * self.height) as f32 * (0.5 * FRAC_1_PI * FRAC_1_PI)
+    }
+
+    #[inline]
+    fn lookup(&self, u: f32, v: f32) -> Vec3 {
+        let (x, y) = (u * self.width as f32 - 0.5, v * self.height as f32 - 0.5);
+        let (x0, y0) = (x.floor(), y.floor());
+        let column = |i: isize| i.rem_euclid(self.width as isize) as usize;
+        let row = |i: isize| i.clamp(0, self.height as isize - 1) as usize * self.width;
+        let (x1, x2) = (column(x0 as isize), column(x0 as isize + 1));
+        let (y1, y2) = (row(y0 as isize), row(y0 as isize + 1));
+        let at = |i: usize| Vec3::from_array(self.pixels[i]);
+        let (fx, fy) = (x - x0, y - y0);
+        at(y1 + x1).lerp(at(y1 + x2), fx).lerp(at(y2 + x1).lerp(at(y2 + x2), fx), fy)
+    }
+
+    /// A direction, its radiance and its density in solid angle.
+    #[inline]
+    pub(crate) fn sample(&self, u: [f32; 2], more: f32) -> Option<(Vec3, Vec3, f32)> {
+        let (index, rest) = self.table.choose(u[0], more);
+        let chance = self.chance[index];
+        let (column, row) = (index % self.width, index / self.width);
+        let (x, y) = ((column as f32 + rest) / self.width as f32, (row as f32 + u[1]) / self.height as f32);
+        let ((sin_u, cos_u), (sin_v, cos_v)) = (math::turn(x), math::turn(0.5 * y));
+        let [a, b, c] = self.to_world;
+        let local = Vec3::new(sin_u * sin_v, cos_v, -cos_u * sin_v);
+        let dir = Vec3::new(a.dot(local), b.dot(local), c.dot(local));
+        let pdf = chance * self.per_pixel() / sin_v.max(1e-6);
+        (chance > 0.0).then(|| (dir.normalize(), self.lookup(x, y), pdf))
+    }
+}
+
+/// Solid angle of a pixel in row `y`, up to what is common to all.
+fn solid_angle(y: usize, height: usize) -> f64 {
+    let edge = |y: usize| (std::f64::consts::PI * y as f64 / height as f64).cos();
+    edge(y) - edge(y + 1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::rng::{Key, Rng};
+
+    fn uneven() -> Map {
+        let mut rng = Rng::new(Key::new(1), 0, 0);
+        let pixels: Vec<Rgb> = (0..16 * 8).map(|_| [rng.one().powi(6); 3]).collect();
+        // A turn around (1, 1, 1) by a third
+        let to_world = [[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+        let map = EnvironmentMap { width: 16, height: 8, pixels, to_world };
+        map.check().unwrap();
+        Map::new(map)
+    }
+
+    /// Where it samples is where it looks, with the density it says; and the mean of radiance / density over the map's own
+    /// samples is ∫L dω, as it is over uniform directions.
+    #[test]
+    fn maps_sample_what_they_show() {
+        let (map, mut rng) = (uneven(), Rng::new(Key::new(2), 0, 0));
+        let n = 40_000;
+        let (mut own, mut own2, mut even, mut even2) = (0.0, 0.0, 0.0, 0.0);
+        for _ in 0..n {
+            let (dir, radiance, pdf) = map.sample(rng.two(), rng.one()).unwrap();
+            let (seen, density) = map.radiance(dir);
+            // Rounding may put a direction into the next pixel
+            if (pdf - density).abs() < 1e-3 * pdf {
+                assert!((seen - radiance).abs().max_element() < 1e-4, "{seen} {radiance}");
+            }
+            let x = f64::from(radiance.x / pdf);
+            own += x;
+            own2 += x * x;
+            let y =
+                f64::from(map.radiance(math::sphere(rng.two()).normalize()).0.x) * 4.0 * std::f64::consts::PI;
+            even += y;
+            even2 += y * y;
+        }
+        let n = f64::from(n);
+        let error = ((own2 / n - (own / n).powi(2)) / n + (even2 / n - (even / n).powi(2)) / n).sqrt();
+        // Five standard errors
+        assert!(((own - even) / n).abs() < 5.0 * error, "{} {} ± {error}", own / n, even / n);
+        // Uniform directions are noisier by far: what is left is variation within pixels
+        let variance = |sum: f64, squares: f64| squares / n - (sum / n).powi(2);
+        let (own, even) = (variance(own, own2), variance(even, even2));
+        assert!(own < 0.5 * even, "{own} {even}");
+    }
+
+    #[test]
+    fn maps_are_the_right_way_round() {
+        // Brightest pixel: column 0 of 8, row 0 of 4: toward −z turned a little to +x, and up
+        let mut pixels = vec![[0.0; 3]; 32];
+        pixels[0] = [1.0; 3];
+        let to_world = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        let map = Map::new(EnvironmentMap { width: 8, height: 4, pixels, to_world });
+        let (u, v) = (0.5 / 8.0 * std::f32::consts::TAU, 0.5 / 4.0 * std::f32::consts::PI);
+        let dir = Vec3::new(u.sin() * v.sin(), v.cos(), -u.cos() * v.sin());
+        assert!((map.radiance(dir).0.x - 1.0).abs() < 1e-5);
+        assert_eq!(map.radiance(-dir).0.x, 0.0);
+    }
+
+    #[test]
+    fn maps_are_checked() {
+        let good = EnvironmentMap {
+            width: 2,
+            height: 1,
+            pixels: vec![[1.0; 3]; 2],
+            to_world: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+        };
+        good.check().unwrap();
+        let with = |change: fn(&mut EnvironmentMap)| {
+            let mut map = good.clone();
+            change(&mut map);
+            map.check().unwrap_err()
+        };
+        assert!(matches!(with(|m| m.width = 3), SceneError::Image { .. }));
+        assert!(matches!(with(|m| m.pixels[1][2] = f32::NAN), SceneError::NotFinite { .. }));
+        assert_eq!(with(|m| m.to_world[0][0] = 2.0), SceneError::Rotation);
     }
 }

@@ -58,6 +58,11 @@ pub enum SceneError {
     /// The camera looks nowhere: eye and target coincide, or its up vector is parallel to the view.
     #[error("the camera looks nowhere: eye and target coincide, or up is parallel to the view")]
     Camera,
+    /// Three rows are not those of a rotation.
+    #[error(
+        "the axes of an environment map are no rotation: each must have length 1, and stand upright on the others"
+    )]
+    Rotation,
     /// The scene has more of something than the limit allows.
     #[error("the scene has {found} {what}, more than {limit}")]
     TooLarge {
@@ -86,6 +91,9 @@ pub enum RenderError {
         /// The range it must lie in, for people.
         range: &'static str,
     },
+    /// The clamp is not a positive, finite radiance.
+    #[error("option `clamp` is {0}; it must be a radiance above 0")]
+    Clamp(f32),
     /// Threads could not be started.
     #[error("threads could not be started")]
     Threads(#[from] rayon::ThreadPoolBuildError),

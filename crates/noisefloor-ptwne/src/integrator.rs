@@ -1,12 +1,11 @@
 //! Path tracing with next event estimation.
 
-use crate::accel::Stack;
-use crate::bsdf::{self, Ggx};
-use crate::light::Light;
-use crate::material::{Kind, Looks};
+use crate::accel::{Hit, Stack};
+use crate::bsdf::{self, DELTA};
+use crate::material::{Kind, Paint};
 use crate::math::{self, Frame, Ray, Vec3, power_heuristic};
-use crate::rng::Rng;
-use crate::scene::{NO, Scene, Surface};
+use crate::sampler::Sampler;
+use crate::scene::{Needs, Scene, Surface};
 use std::f32::consts::FRAC_1_PI;
 
 /// What the integrator must know besides the scene.
@@ -20,226 +19,317 @@ pub(crate) struct Settings {
     pub(crate) mis: bool,
 }
 
-/// Stands for the density of a direction that no light could be aimed along: camera rays, mirrors, glass.
-const DELTA: f32 = f32::INFINITY;
-
 /// An estimator of radiance along a camera ray.
-pub(crate) type Estimator = fn(&Scene, Settings, Ray, &mut Rng, &mut Stack) -> Vec3;
+pub(crate) type Estimator = fn(&Scene, Settings, Ray, &mut Sampler, &mut Stack) -> Vec3;
 
-/// The estimator that has what the scene needs, and nothing else.
-pub(crate) fn estimator(scene: &Scene) -> Estimator {
-    let n = scene.needs;
-    match (n.surfaces, n.bsdfs, n.sky) {
-        (false, false, false) => radiance::<false, false, false>,
-        (false, false, true) => radiance::<false, false, true>,
-        (false, true, false) => radiance::<false, true, false>,
-        (false, true, true) => radiance::<false, true, true>,
-        (true, false, false) => radiance::<true, false, false>,
-        (true, false, true) => radiance::<true, false, true>,
-        (true, true, false) => radiance::<true, true, false>,
-        (true, true, true) => radiance::<true, true, true>,
-    }
+// Needs as bits of a constant
+const TEXTURES: u8 = 1;
+const GLOSSY: u8 = 2;
+const SPECULAR: u8 = 4;
+const SKY: u8 = 8;
+const HOLES: u8 = 16;
+
+/// The estimator for scenes that have no more than this.
+pub(crate) fn estimator(needs: Needs) -> Estimator {
+    const ALL: [Estimator; 32] = [
+        radiance::<0>,
+        radiance::<1>,
+        radiance::<2>,
+        radiance::<3>,
+        radiance::<4>,
+        radiance::<5>,
+        radiance::<6>,
+        radiance::<7>,
+        radiance::<8>,
+        radiance::<9>,
+        radiance::<10>,
+        radiance::<11>,
+        radiance::<12>,
+        radiance::<13>,
+        radiance::<14>,
+        radiance::<15>,
+        radiance::<16>,
+        radiance::<17>,
+        radiance::<18>,
+        radiance::<19>,
+        radiance::<20>,
+        radiance::<21>,
+        radiance::<22>,
+        radiance::<23>,
+        radiance::<24>,
+        radiance::<25>,
+        radiance::<26>,
+        radiance::<27>,
+        radiance::<28>,
+        radiance::<29>,
+        radiance::<30>,
+        radiance::<31>,
+    ];
+    let Needs { textures, glossy, specular, sky, holes } = needs;
+    let bits = [(textures, TEXTURES), (glossy, GLOSSY), (specular, SPECULAR), (sky, SKY), (holes, HOLES)];
+    ALL[bits.iter().map(|(has, bit)| u8::from(*has) * bit).sum::<u8>() as usize]
 }
 
 /// One sample of the radiance along `ray` (Kajiya 1986; next event estimation: Shirley et al. 1996).
-fn radiance<const SURFACES: bool, const BSDFS: bool, const SKY: bool>(
+fn radiance<const NEEDS: u8>(
     scene: &Scene,
     settings: Settings,
-    mut ray: Ray,
-    rng: &mut Rng,
+    ray: Ray,
+    sampler: &mut Sampler,
     stack: &mut Stack,
 ) -> Vec3 {
-    let mut sum = Vec3::ZERO;
-    let mut throughput = Vec3::ONE;
-    // Density with which the ray's direction was chosen, and where from
-    let mut density = DELTA;
-    let mut depth = 0;
-    loop {
-        depth += 1;
-        let hit = scene.accel.closest::<SURFACES>(&ray, stack);
-        if hit.prim == NO {
-            if SKY {
-                sum += throughput * sky(scene, settings, ray.dir, density);
-            }
-            return sum;
-        }
-        let prim = &scene.prims[hit.prim as usize];
-        let surface = scene.surface::<SURFACES>(&ray, &hit, prim);
+    let seed = if NEEDS & HOLES != 0 { sampler.seed() } else { 0 };
+    Walk::<NEEDS> { scene, settings, sampler, stack, seed }.radiance(ray)
+}
 
-        // Light met by scattering
-        if prim.light != NO {
-            let light = &scene.lights.all[prim.light as usize];
-            let cos = -ray.dir.dot(surface.flat) * if surface.front { 1.0 } else { -1.0 };
-            if light.shines(cos) {
-                let weight =
-                    met_weight(settings, density, || light.pdf(ray.origin, hit.t, cos) * light.chance);
-                sum += throughput * light.radiance * weight;
-            }
-        }
-        if depth >= settings.max_depth {
-            return sum;
-        }
+/// One path.
+struct Walk<'a, const NEEDS: u8> {
+    scene: &'a Scene,
+    settings: Settings,
+    sampler: &'a mut Sampler,
+    stack: &'a mut Stack,
+    /// Of decisions about holes; another for each ray.
+    seed: u64,
+}
 
-        // Scatter: next event estimation, then a new direction
-        let scattered = if !BSDFS || surface.looks.kind == Kind::Diffuse {
-            diffuse::<SURFACES>(scene, settings, &surface, throughput, &mut sum, rng, stack)
-        } else if surface.looks.kind == Kind::Rough {
-            rough::<SURFACES>(scene, settings, &ray, &surface, throughput, &mut sum, rng, stack)
-        } else {
-            let (dir, weight) = specular(&ray, &surface, rng);
-            Some((dir, weight, DELTA))
-        };
-        let Some((dir, weight, pdf)) = scattered else { return sum };
-        throughput *= weight;
-        density = pdf;
+/// A new direction, its weight f·cos θ / density, its density, and a number left over for Russian roulette.
+struct Scattered {
+    dir: Vec3,
+    weight: Vec3,
+    pdf: f32,
+    roulette: f32,
+}
 
-        // Russian roulette (Arvo, Kirk 1990)
-        if depth >= settings.roulette {
-            let survive = throughput.max_element().min(0.95);
-            if rng.one() >= survive {
+impl<'a, const NEEDS: u8> Walk<'a, NEEDS> {
+    #[inline(always)]
+    fn radiance(&mut self, mut ray: Ray) -> Vec3 {
+        let scene = self.scene;
+        let mut sum = Vec3::ZERO;
+        let mut throughput = Vec3::ONE;
+        // Density with which the ray's direction was chosen
+        let mut density = DELTA;
+        let mut depth = 0;
+        loop {
+            depth += 1;
+            let hit = self.closest(&ray);
+            if hit.is_miss() {
+                if NEEDS & SKY != 0 {
+                    sum += throughput
+                        * scene.beyond(ray.dir, |pdf, chance| self.met_weight(density, pdf * chance));
+                }
                 return sum;
             }
-            throughput /= survive;
-        }
-        if throughput.max_element() <= 0.0 {
-            return sum;
-        }
-        ray = Ray { origin: scene.leave(&surface, dir), dir };
-    }
-}
+            let surface = self.surface(&ray, &hit);
 
-/// Share of light met by scattering with `density` that counts; `aimed` is the density of next event estimation there.
-#[inline]
-fn met_weight(settings: Settings, density: f32, aimed: impl FnOnce() -> f32) -> f32 {
-    if density == DELTA {
-        1.0
-    } else if settings.mis {
-        power_heuristic(density, aimed())
-    } else {
-        0.0
-    }
-}
-
-/// Radiance of the sky for a ray that met nothing. The dome is gathered by scattering alone, the sun also by next events.
-#[inline]
-fn sky(scene: &Scene, settings: Settings, dir: Vec3, density: f32) -> Vec3 {
-    let mut sum = scene.dome.as_ref().map_or(Vec3::ZERO, |dome| dome.radiance(dir));
-    if let Some(sun) = scene.sun.map(|i| &scene.lights.all[i]).filter(|sun| sun.covers(dir)) {
-        let weight = met_weight(settings, density, || sun.pdf(Vec3::ZERO, 0.0, 1.0) * sun.chance);
-        sum += sun.radiance * weight;
-    }
-    sum
-}
-
-/// A point on a light that the surface sees: its direction and cosine at the surface, radiance over density, and density.
-/// `None` if there is none, or something is in between. `weigh` says by what the radiance is multiplied for a direction, zero
-/// if nothing is scattered there; the ray is then not traced.
-#[inline]
-fn next_event<const SURFACES: bool>(
-    scene: &Scene,
-    surface: &Surface,
-    rng: &mut Rng,
-    stack: &mut Stack,
-    weigh: impl FnOnce(Vec3, f32) -> Vec3,
-) -> Vec3 {
-    if scene.lights.all.is_empty() {
-        return Vec3::ZERO;
-    }
-    let light: &Light =
-        if scene.lights.all.len() == 1 { &scene.lights.all[0] } else { scene.lights.choose(rng.one()) };
-    let origin = scene.leave(surface, surface.flat);
-    let Some(aim) = light.aim(origin, rng.two()) else { return Vec3::ZERO };
-    if aim.dir.dot(surface.flat) <= 0.0 {
-        return Vec3::ZERO;
-    }
-    let pdf = aim.pdf * light.chance;
-    let share = weigh(aim.dir, pdf) * light.radiance / pdf;
-    // Also false for NaN: a density beyond the range of f32 is no light
-    if !(share.max_element() > 0.0 && share.max_element() < f32::MAX) {
-        return Vec3::ZERO;
-    }
-    let shadow = Ray { origin, dir: aim.dir };
-    if scene.accel.blocked::<SURFACES>(&shadow, aim.distance * 0.9999, stack) { Vec3::ZERO } else { share }
-}
-
-type Scattered = Option<(Vec3, Vec3, f32)>;
-
-/// Lambertian reflection: the new direction, its weight and its density.
-#[inline]
-fn diffuse<const SURFACES: bool>(
-    scene: &Scene,
-    settings: Settings,
-    surface: &Surface,
-    throughput: Vec3,
-    sum: &mut Vec3,
-    rng: &mut Rng,
-    stack: &mut Stack,
-) -> Scattered {
-    let albedo = surface.looks.colour;
-    *sum += throughput
-        * next_event::<SURFACES>(scene, surface, rng, stack, |dir, pdf| {
-            let scattering = dir.dot(surface.normal).max(0.0) * FRAC_1_PI;
-            let weight = if settings.mis { power_heuristic(pdf, scattering) } else { 1.0 };
-            albedo * (scattering * weight)
-        });
-    let local = math::cosine_hemisphere(rng.two());
-    let dir = Frame::new(surface.normal).to_world(local);
-    // A shading normal can send the ray below the surface: no light from there
-    if SURFACES && dir.dot(surface.flat) <= 0.0 {
-        return None;
-    }
-    Some((dir, albedo, local.z * FRAC_1_PI))
-}
-
-/// Reflection by GGX microfacets.
-#[inline(never)]
-#[expect(clippy::too_many_arguments, reason = "a part of the inner loop, cut out for reading")]
-fn rough<const SURFACES: bool>(
-    scene: &Scene,
-    settings: Settings,
-    ray: &Ray,
-    surface: &Surface,
-    throughput: Vec3,
-    sum: &mut Vec3,
-    rng: &mut Rng,
-    stack: &mut Stack,
-) -> Scattered {
-    let Looks { colour: f0, value: alpha, .. } = surface.looks;
-    let ggx = Ggx { alpha };
-    let frame = Frame::new(surface.normal);
-    let wo = frame.to_local(-ray.dir);
-    *sum += throughput
-        * next_event::<SURFACES>(scene, surface, rng, stack, |dir, pdf| {
-            let (f_cos, scattering, cos_h) = ggx.eval(wo, frame.to_local(dir));
-            let weight = if settings.mis { power_heuristic(pdf, scattering) } else { 1.0 };
-            bsdf::schlick(f0, cos_h) * (f_cos * weight)
-        });
-    let (wi, weight, cos_h) = ggx.sample(wo, rng.two());
-    let dir = frame.to_world(wi);
-    if weight <= 0.0 || dir.dot(surface.flat) <= 0.0 {
-        return None;
-    }
-    let (_, pdf, _) = ggx.eval(wo, wi);
-    Some((dir.normalize(), bsdf::schlick(f0, cos_h) * weight, pdf))
-}
-
-/// Mirror and glass: the new direction and its weight. Glass chooses reflection with the probability of its Fresnel term.
-#[inline(never)]
-fn specular(ray: &Ray, surface: &Surface, rng: &mut Rng) -> (Vec3, Vec3) {
-    let Looks { kind, colour, value, .. } = surface.looks;
-    let n = surface.normal;
-    let cos = (-ray.dir.dot(n)).clamp(0.0, 1.0);
-    match kind {
-        Kind::Glass => {
-            let eta = if surface.front { value } else { 1.0 / value };
-            let (reflectance, cos_t) = bsdf::fresnel(cos, eta);
-            if rng.one() < reflectance {
-                (math::reflect(ray.dir, n), Vec3::ONE)
+            // Light met by scattering
+            let emitted = if NEEDS & TEXTURES != 0 {
+                scene.emitted::<true>(&surface, &hit, ray.dir)
             } else {
-                (bsdf::refract(ray.dir, n, cos, cos_t, eta), colour)
+                scene.emitted::<false>(&surface, &hit, ray.dir)
+            };
+            if let Some((radiance, light, cos)) = emitted {
+                let aimed =
+                    if density == DELTA { 0.0 } else { light.pdf(ray.origin, hit.t, cos) * light.chance };
+                sum += throughput * radiance * self.met_weight(density, aimed);
             }
+            if depth >= self.settings.max_depth || surface.looks.one_sided && !surface.front {
+                return sum;
+            }
+
+            // Scatter: next event estimation, then a new direction
+            let Some(next) = self.scatter(&ray, &surface, throughput, &mut sum) else { return sum };
+            throughput *= next.weight;
+            density = next.pdf;
+
+            // Russian roulette (Arvo, Kirk 1990)
+            if depth >= self.settings.roulette {
+                let survive = throughput.max_element().min(0.95);
+                if next.roulette >= survive {
+                    return sum;
+                }
+                throughput /= survive;
+            }
+            if throughput.max_element() <= 0.0 {
+                return sum;
+            }
+            ray = Ray { origin: scene.leave(&surface, next.dir), dir: next.dir };
         }
-        Kind::Conductor => (math::reflect(ray.dir, n), bsdf::schlick(colour, cos)),
-        _ => (math::reflect(ray.dir, n), colour),
+    }
+
+    #[inline(always)]
+    fn closest(&mut self, ray: &Ray) -> Hit {
+        if NEEDS & HOLES != 0 {
+            self.seed = self.seed.wrapping_add(1);
+            self.scene.closest::<true>(ray, self.stack, self.seed)
+        } else {
+            self.scene.closest::<false>(ray, self.stack, 0)
+        }
+    }
+
+    #[inline(always)]
+    fn blocked(&mut self, ray: &Ray, distance: f32) -> bool {
+        if NEEDS & HOLES != 0 {
+            self.seed = self.seed.wrapping_add(1);
+            self.scene.blocked::<true>(ray, distance, self.stack, self.seed)
+        } else {
+            self.scene.blocked::<false>(ray, distance, self.stack, 0)
+        }
+    }
+
+    #[inline(always)]
+    fn surface(&self, ray: &Ray, hit: &Hit) -> Surface<'a> {
+        let scene = self.scene;
+        if NEEDS & TEXTURES != 0 { scene.surface::<true>(ray, hit) } else { scene.surface::<false>(ray, hit) }
+    }
+
+    /// Share of light met by scattering with `density` that counts; `aimed` is the density of next event estimation there.
+    #[inline(always)]
+    fn met_weight(&self, density: f32, aimed: f32) -> f32 {
+        if density == DELTA {
+            1.0
+        } else if self.settings.mis {
+            power_heuristic(density, aimed)
+        } else {
+            0.0
+        }
+    }
+
+    /// A colour of the surface.
+    #[inline(always)]
+    fn colour(&self, paint: &Paint, surface: &Surface<'_>) -> Vec3 {
+        if NEEDS & TEXTURES != 0 { paint.at::<true>(surface.uv) } else { paint.at::<false>(surface.uv) }
+    }
+
+    #[inline(always)]
+    fn scatter(
+        &mut self,
+        ray: &Ray,
+        surface: &Surface<'a>,
+        throughput: Vec3,
+        sum: &mut Vec3,
+    ) -> Option<Scattered> {
+        match &surface.looks.kind {
+            Kind::Diffuse { albedo } => {
+                let albedo = self.colour(albedo, surface);
+                self.diffuse(albedo, surface, throughput, sum)
+            }
+            Kind::Metal { .. } | Kind::Plastic { .. } | Kind::Blend { .. } if NEEDS & GLOSSY != 0 => {
+                self.glossy(ray, surface, throughput, sum)
+            }
+            _ if NEEDS & SPECULAR != 0 => Some(self.specular(ray, surface)),
+            _ => None,
+        }
+    }
+
+    /// Light from a point of a light that the surface sees: radiance over density, times what `weigh` says for the direction and
+    /// its density; zero if nothing is scattered there. The ray is then not traced.
+    #[inline(always)]
+    fn next_event(&mut self, surface: &Surface<'_>, weigh: impl FnOnce(Vec3, f32) -> Vec3) -> Vec3 {
+        let scene = self.scene;
+        if scene.lights.all.is_empty() {
+            return Vec3::ZERO;
+        }
+        let [pick, u, v, more] = self.sampler.four();
+        let Some(light) = scene.lights.choose(pick, more) else { return Vec3::ZERO };
+        let origin = scene.leave(surface, surface.flat);
+        let point = [u, v, more];
+        let aim = if NEEDS & TEXTURES != 0 {
+            scene.aim::<true>(light, origin, point)
+        } else {
+            scene.aim::<false>(light, origin, point)
+        };
+        let Some(aim) = aim.filter(|aim| aim.dir.dot(surface.flat) > 0.0) else { return Vec3::ZERO };
+        let share = weigh(aim.dir, aim.pdf * light.chance) * aim.value / light.chance;
+        // Also false for NaN: a density beyond the range of f32 is no light
+        if !(share.max_element() > 0.0 && share.max_element() < f32::MAX) {
+            return Vec3::ZERO;
+        }
+        let shadow = Ray { origin, dir: aim.dir };
+        if self.blocked(&shadow, aim.distance * 0.9999) { Vec3::ZERO } else { share }
+    }
+
+    /// Lambertian reflection.
+    #[inline(always)]
+    fn diffuse(
+        &mut self,
+        albedo: Vec3,
+        surface: &Surface<'a>,
+        throughput: Vec3,
+        sum: &mut Vec3,
+    ) -> Option<Scattered> {
+        let mis = self.settings.mis;
+        *sum += throughput
+            * self.next_event(surface, |dir, pdf| {
+                let scattering = dir.dot(surface.normal).max(0.0) * FRAC_1_PI;
+                let weight = if mis { power_heuristic(pdf, scattering) } else { 1.0 };
+                albedo * (scattering * weight)
+            });
+        let [u, v, roulette, _] = self.sampler.four();
+        let local = math::cosine_hemisphere([u, v]);
+        let dir = Frame::new(surface.normal).to_world(local);
+        // A shading normal can send the ray below the surface: no light from there
+        if NEEDS & TEXTURES != 0 && dir.dot(surface.flat) <= 0.0 {
+            return None;
+        }
+        Some(Scattered { dir, weight: albedo, pdf: local.z * FRAC_1_PI, roulette })
+    }
+
+    /// Microfacets and coats.
+    #[inline(never)]
+    fn glossy(
+        &mut self,
+        ray: &Ray,
+        surface: &Surface<'a>,
+        throughput: Vec3,
+        sum: &mut Vec3,
+    ) -> Option<Scattered> {
+        let frame = Frame::new(surface.normal);
+        let wo = frame.to_local(-ray.dir);
+        let glossy =
+            if NEEDS & TEXTURES != 0 { surface.glossy::<true>(wo.z) } else { surface.glossy::<false>(wo.z) }?;
+        let mis = self.settings.mis;
+        *sum += throughput
+            * self.next_event(surface, |dir, pdf| {
+                let (f_cos, scattering) = glossy.eval(wo, frame.to_local(dir));
+                f_cos * if mis { power_heuristic(pdf, scattering) } else { 1.0 }
+            });
+        let [pick, u, v, roulette] = self.sampler.four();
+        let (wi, weight, pdf) = glossy.sample(wo, [pick, u, v])?;
+        let dir = frame.to_world(wi);
+        if dir.dot(surface.flat) <= 0.0 {
+            return None;
+        }
+        Some(Scattered { dir: dir.normalize(), weight, pdf, roulette })
+    }
+
+    /// Mirror and glass. Glass chooses reflection with the probability of its Fresnel term.
+    #[inline(never)]
+    fn specular(&mut self, ray: &Ray, surface: &Surface<'a>) -> Scattered {
+        let n = surface.normal;
+        let cos = (-ray.dir.dot(n)).clamp(0.0, 1.0);
+        let [pick, roulette, ..] = self.sampler.four();
+        let (dir, weight) = match &surface.looks.kind {
+            Kind::Glass { ior, tint } => {
+                let eta = if surface.front { *ior } else { 1.0 / ior };
+                let (reflectance, cos_t) = bsdf::fresnel(cos, eta);
+                if pick < reflectance {
+                    (math::reflect(ray.dir, n), Vec3::ONE)
+                } else {
+                    (bsdf::refract(ray.dir, n, cos, cos_t, eta), *tint)
+                }
+            }
+            Kind::ThinGlass { ior, tint } => {
+                if pick < bsdf::pane(cos, *ior) {
+                    (math::reflect(ray.dir, n), Vec3::ONE)
+                } else {
+                    (ray.dir, *tint)
+                }
+            }
+            Kind::Mirror { fresnel, colour } => {
+                (math::reflect(ray.dir, n), fresnel.at(self.colour(colour, surface), cos))
+            }
+            _ => (ray.dir, Vec3::ZERO),
+        };
+        Scattered { dir, weight, pdf: DELTA, roulette }
     }
 }

@@ -27,11 +27,13 @@
 //! number that depends on threads.
 
 mod accel;
+mod alias;
 mod bsdf;
 mod builder;
 mod camera;
 mod environment;
 mod error;
+mod filter;
 mod integrator;
 mod light;
 mod material;
@@ -39,18 +41,22 @@ mod math;
 mod reference;
 mod renderer;
 mod rng;
+mod sampler;
 mod scene;
 pub mod scenes;
 mod texture;
 
 pub use builder::{Emission, MAX_COORDINATE, MAX_SURFACES, MIN_AREA, MaterialId, Mesh, SceneBuilder};
 pub use camera::Camera;
-pub use environment::{Environment, Sun};
+pub use environment::{Environment, EnvironmentMap, Sun};
 pub use error::{RenderError, SceneError};
-pub use material::{MIN_ROUGHNESS, Material};
-pub use renderer::{MAX_DEPTH, MAX_THREADS, Options, Ptwne};
-pub use scene::Scene;
-pub use texture::{ImageTexture, MAX_TEXTURE_PIXELS, Texture};
+pub use filter::Filter;
+pub use light::Punctual;
+pub use material::{Cover, MIN_ROUGHNESS, Material};
+pub use renderer::{Counts, MAX_DEPTH, MAX_THREADS, Options, Ptwne};
+pub use sampler::Sampling;
+pub use scene::{Needs, Scene};
+pub use texture::{ImageTexture, MAX_TEXTURE_PIXELS, Pixels, Texture, Wrap};
 
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]

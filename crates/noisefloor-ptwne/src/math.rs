@@ -71,6 +71,14 @@ pub(crate) fn cosine_hemisphere(u: [f32; 2]) -> Vec3 {
     Vec3::new(r * cos, r * sin, (1.0 - u[0]).sqrt())
 }
 
+/// A point of the unit disk, uniform in area.
+#[inline]
+pub(crate) fn disk(u: [f32; 2]) -> [f32; 2] {
+    let (sin, cos) = turn(u[1]);
+    let r = u[0].sqrt();
+    [r * cos, r * sin]
+}
+
 /// A direction of the unit sphere, with density 1 / 4π.
 #[inline]
 pub(crate) fn sphere(u: [f32; 2]) -> Vec3 {

@@ -4,21 +4,21 @@
 //! # How fine
 //! [`RAYS`] rays a pixel, through the points of a Hammersley set: one in each of 4×4 squares, and no two in one row or column
 //! of sixteen. Each ray that meets a surface looks at n×n points of every light, one a stratum, and at n×n directions of the
-//! sky: n = 4 up to 4 lights, 2 up to 16, else 1. The points of the rays of one pixel are shifted against each other, alike
+//! sky (an image of it is a light, seen by its brightness): n = 4 up to 4 lights, 2 up to 16, else 1. The points of the rays of one pixel are shifted against each other, alike
 //! in all pixels: a pixel sees [`RAYS`]·n² points of each light, and as all pixels see the same, there is no noise, but steps
 //! of 1/([`RAYS`]·n²) in penumbrae. Of more than 32 lights, each ray of a pixel looks at every k-th, k = 2, 4, 8 or 16, in
 //! turn: all rays together look at each 16/k times.
 //!
-//! Mirrors and both sides of glass are followed to [`MAX_SPECULAR`] segments, down to a weight of [`MIN_WEIGHT`]. Rough
-//! conductors show n×n directions of the visible normals, one at deeper levels; what these meet and the points of the lights
+//! Mirrors and both sides of glass are followed to [`MAX_SPECULAR`] segments, down to a weight of [`MIN_WEIGHT`]. Microfacets
+//! show n×n directions of the visible normals, one at deeper levels; what these meet and the points of the lights
 //! share by the balance heuristic (Veach 1997, §9.2.2). On diffuse surfaces that are seen so, n is at most 2.
 
 use crate::accel::Stack;
-use crate::bsdf::{self, Ggx};
+use crate::bsdf::{self, DELTA};
 use crate::light::Aim;
-use crate::material::{Kind, Looks};
+use crate::material::Kind;
 use crate::math::{self, Frame, Ray, Vec3};
-use crate::scene::{NO, Scene, Surface};
+use crate::scene::{Scene, Sky, Surface};
 use noisefloor::Rgb;
 use rayon::prelude::*;
 use std::f32::consts::FRAC_1_PI;
@@ -41,13 +41,14 @@ pub(crate) fn render(scene: &Scene, width: usize, height: usize) -> Vec<Rgb> {
     let stride = (scene.lights.all.len() / 32).clamp(1, 16).next_power_of_two();
     let mut pixels = vec![[0.0; 3]; width * height];
     pixels.par_chunks_mut(width).with_max_len(1).enumerate().for_each(|(y, row)| {
-        let mut tracer =
-            Tracer { scene, strata, shift: [0.0; 2], stride, turn: 0, stack: scene.accel.stack() };
+        let stack = scene.accel.stack();
+        let mut tracer = Tracer { scene, strata, shift: [0.0; 2], ray: 0, stride, turn: 0, stack };
         for (x, pixel) in row.iter_mut().enumerate() {
             let mut sum = Vec3::ZERO;
             for i in 0..RAYS {
                 let [dx, dy] = hammersley(i, RAYS);
                 tracer.shift = shift(i);
+                tracer.ray = u64::from(i);
                 // Rays that are neighbours in the pixel see different lights
                 tracer.turn = (i + i / 4) as usize % stride;
                 let ray = lens.ray(x as f32 + dx, y as f32 + dy);
@@ -76,6 +77,8 @@ struct Tracer<'a> {
     strata: u32,
     /// Where in each stratum its point lies.
     shift: [f32; 2],
+    /// Which of the pixel's rays this is: decides about holes, alike in all pixels.
+    ray: u64,
     /// Every how many lights the ray looks at, and the first.
     stride: usize,
     turn: usize,
@@ -87,52 +90,57 @@ impl Tracer<'_> {
     /// of directions it chose: light is then shared with the points of the lights.
     fn radiance(&mut self, ray: &Ray, depth: u32, weight: Vec3, sampled: Option<(f32, u32)>) -> Vec3 {
         let scene = self.scene;
-        let hit = scene.accel.closest::<true>(ray, &mut self.stack);
+        let hit = scene.closest::<true>(ray, &mut self.stack, self.ray);
         let points = (self.strata * self.strata) as f32;
         let share = |pdf: f32| sampled.map_or(1.0, |(p, n)| p * n as f32 / (p * n as f32 + pdf * points));
-        if hit.prim == NO {
-            let mut sum = scene.dome.as_ref().map_or(Vec3::ZERO, |dome| dome.radiance(ray.dir));
-            if let Some(sun) = scene.sun.map(|i| &scene.lights.all[i]).filter(|sun| sun.covers(ray.dir)) {
-                sum += sun.radiance * share(sun.pdf(ray.origin, hit.t, 1.0));
-            }
-            return weight * sum;
+        if hit.is_miss() {
+            return weight * scene.beyond(ray.dir, |pdf, _| share(pdf));
         }
-        let prim = &scene.prims[hit.prim as usize];
-        let surface = scene.surface::<true>(ray, &hit, prim);
+        let surface = scene.surface::<true>(ray, &hit);
         let mut sum = Vec3::ZERO;
-        if prim.light != NO {
-            let light = &scene.lights.all[prim.light as usize];
-            let cos = -ray.dir.dot(surface.flat) * if surface.front { 1.0 } else { -1.0 };
-            if light.shines(cos) {
-                sum += weight * light.radiance * share(light.pdf(ray.origin, hit.t, cos));
-            }
+        if let Some((radiance, light, cos)) = scene.emitted::<true>(&surface, &hit, ray.dir) {
+            sum += weight * radiance * share(light.pdf(ray.origin, hit.t, cos));
         }
-        let Looks { kind, colour, value, .. } = surface.looks;
+        if surface.looks.one_sided && !surface.front {
+            return sum;
+        }
         let cos = (-ray.dir.dot(surface.normal)).clamp(0.0, 1.0);
         let mirrored = math::reflect(ray.dir, surface.normal);
-        sum + match kind {
-            Kind::Diffuse => {
+        // Both branches of glass
+        let mut split = |reflectance: f32, dir: Vec3, tint: Vec3| {
+            let mut both = self.follow(&surface, mirrored, depth, weight * reflectance);
+            if reflectance < 1.0 {
+                both += self.follow(&surface, dir, depth, weight * tint * (1.0 - reflectance));
+            }
+            both
+        };
+        sum + match &surface.looks.kind {
+            Kind::Diffuse { albedo } => {
                 let n = if sampled.is_some() { self.strata.min(2) } else { self.strata };
-                weight * colour * self.diffuse(&surface, n)
+                let normal = surface.normal;
+                let lambert = |dir: Vec3| Vec3::splat(dir.dot(normal).max(0.0) * FRAC_1_PI);
+                weight
+                    * albedo.at::<true>(surface.uv)
+                    * (self.lights(&surface, n, |dir, _| lambert(dir)) + self.dome(&surface, n, lambert))
             }
-            Kind::Mirror => self.follow(&surface, mirrored, depth, weight * colour),
-            Kind::Conductor => self.follow(&surface, mirrored, depth, weight * bsdf::schlick(colour, cos)),
-            Kind::Glass => {
-                let eta = if surface.front { value } else { 1.0 / value };
+            Kind::Mirror { fresnel, colour } => {
+                let factor = fresnel.at(colour.at::<true>(surface.uv), cos);
+                self.follow(&surface, mirrored, depth, weight * factor)
+            }
+            Kind::Glass { ior, tint } => {
+                let eta = if surface.front { *ior } else { 1.0 / ior };
                 let (reflectance, cos_t) = bsdf::fresnel(cos, eta);
-                let mut both = self.follow(&surface, mirrored, depth, weight * reflectance);
-                if reflectance < 1.0 {
-                    let dir = bsdf::refract(ray.dir, surface.normal, cos, cos_t, eta);
-                    both += self.follow(&surface, dir, depth, weight * colour * (1.0 - reflectance));
-                }
-                both
+                split(reflectance, bsdf::refract(ray.dir, surface.normal, cos, cos_t, eta), *tint)
             }
-            Kind::Rough => self.rough(ray, &surface, depth, weight),
+            Kind::ThinGlass { ior, tint } => split(bsdf::pane(cos, *ior), ray.dir, *tint),
+            Kind::Metal { .. } | Kind::Plastic { .. } | Kind::Blend { .. } => {
+                self.glossy(ray, &surface, depth, weight, sampled.is_some())
+            }
         }
     }
 
     /// Radiance from `dir`, if the chain may go on.
-    fn follow(&mut self, surface: &Surface, dir: Vec3, depth: u32, weight: Vec3) -> Vec3 {
+    fn follow(&mut self, surface: &Surface<'_>, dir: Vec3, depth: u32, weight: Vec3) -> Vec3 {
         if depth >= MAX_SPECULAR || weight.max_element() < MIN_WEIGHT {
             return Vec3::ZERO;
         }
@@ -147,23 +155,30 @@ impl Tracer<'_> {
     }
 
     /// Sums `scattered` · radiance / density over the points of all lights that the surface sees.
-    fn lights(&mut self, surface: &Surface, n: u32, scattered: impl Fn(Vec3, f32) -> Vec3) -> Vec3 {
+    fn lights(&mut self, surface: &Surface<'_>, n: u32, scattered: impl Fn(Vec3, f32) -> Vec3) -> Vec3 {
         let scene = self.scene;
         let origin = scene.leave(surface, surface.flat);
         let mut sum = Vec3::ZERO;
-        for light in scene.lights.all.iter().skip(self.turn).step_by(self.stride) {
+        let shining = scene.lights.all.iter().skip(self.turn).step_by(self.stride).filter(|l| l.chance > 0.0);
+        for light in shining {
+            // One point is all there is of a light without size
+            let n = if light.has_size() { n } else { 1 };
             for i in 0..n * n {
-                let Some(Aim { dir, distance, pdf }) = light.aim(origin, self.stratum(i, n)) else {
+                let [u, v] = self.stratum(i, n);
+                let Some(Aim { dir, distance, value, pdf, .. }) =
+                    scene.aim::<true>(light, origin, [u, v, 0.0])
+                else {
                     continue;
                 };
                 if dir.dot(surface.flat) <= 0.0 {
                     continue;
                 }
-                let share = scattered(dir, pdf) * light.radiance / (pdf * (n * n) as f32);
+                let share = scattered(dir, pdf) * value / (n * n) as f32;
                 // A share that is not finite is one whose density is beyond f32
                 let counts = share.max_element() > 0.0 && share.is_finite();
                 let shadow = Ray { origin, dir };
-                if counts && !scene.accel.blocked::<true>(&shadow, distance * 0.9999, &mut self.stack) {
+                let seed = self.ray * 256 + u64::from(i);
+                if counts && !scene.blocked::<true>(&shadow, distance * 0.9999, &mut self.stack, seed) {
                     sum += share * self.stride as f32;
                 }
             }
@@ -171,29 +186,38 @@ impl Tracer<'_> {
         sum
     }
 
-    /// Reflected direct light at albedo 1.
-    fn diffuse(&mut self, surface: &Surface, n: u32) -> Vec3 {
-        let normal = surface.normal;
-        let mut sum = self.lights(surface, n, |dir, _| Vec3::splat(dir.dot(normal).max(0.0) * FRAC_1_PI));
-        if let Some(dome) = &self.scene.dome {
-            let (n, frame) = (n.max(2), Frame::new(normal));
-            for i in 0..n * n {
-                let dir = frame.to_world(math::cosine_hemisphere(self.stratum(i, n)));
-                if dir.dot(surface.flat) > 0.0 {
-                    let ray = Ray { origin: self.scene.leave(surface, dir), dir };
-                    if !self.scene.accel.blocked::<true>(&ray, f32::INFINITY, &mut self.stack) {
-                        sum += dome.radiance(dir) / (n * n) as f32;
-                    }
+    /// Sums `scattered` · radiance / density over directions of a smooth sky that the surface sees. An image is a light.
+    fn dome(&mut self, surface: &Surface<'_>, n: u32, scattered: impl Fn(Vec3) -> Vec3) -> Vec3 {
+        let Some(Sky::Dome(dome)) = &self.scene.sky else { return Vec3::ZERO };
+        let mut sum = Vec3::ZERO;
+        let (n, frame) = (n.max(2), Frame::new(surface.normal));
+        for i in 0..n * n {
+            let local = math::cosine_hemisphere(self.stratum(i, n));
+            let dir = frame.to_world(local);
+            if dir.dot(surface.flat) > 0.0 {
+                let ray = Ray { origin: self.scene.leave(surface, dir), dir };
+                let seed = self.ray * 256 + u64::from(i);
+                if !self.scene.blocked::<true>(&ray, f32::INFINITY, &mut self.stack, seed) {
+                    let pdf = local.z.max(1e-6) * FRAC_1_PI;
+                    sum += scattered(dir) * dome.radiance(dir) / (pdf * (n * n) as f32);
                 }
             }
         }
         sum
     }
 
-    fn rough(&mut self, ray: &Ray, surface: &Surface, depth: u32, weight: Vec3) -> Vec3 {
-        let Looks { colour: f0, value: alpha, .. } = surface.looks;
-        let (ggx, frame) = (Ggx { alpha }, Frame::new(surface.normal));
+    /// Microfacets and coats: what the facets mirror, and direct light on the base.
+    fn glossy(
+        &mut self,
+        ray: &Ray,
+        surface: &Surface<'_>,
+        depth: u32,
+        weight: Vec3,
+        seen_blurred: bool,
+    ) -> Vec3 {
+        let frame = Frame::new(surface.normal);
         let wo = frame.to_local(-ray.dir);
+        let Some(glossy) = surface.glossy::<true>(wo.z) else { return Vec3::ZERO };
         let (n, points) =
             (if depth == 1 { self.strata.max(2) } else { 1 }, (self.strata * self.strata) as f32);
         let directions = (n * n) as f32;
@@ -201,19 +225,24 @@ impl Tracer<'_> {
 
         let mut sum = weight
             * self.lights(surface, self.strata, |dir, pdf| {
-                let (f_cos, chosen, cos_h) = ggx.eval(wo, frame.to_local(dir));
-                let rival = if follows { chosen * directions } else { 0.0 };
-                bsdf::schlick(f0, cos_h) * (f_cos * (pdf * points / (pdf * points + rival)))
+                let wi = frame.to_local(dir);
+                let (facets, chosen) = glossy.facets(wo, wi);
+                let rival = if follows && pdf < DELTA { chosen * directions / (pdf * points) } else { 0.0 };
+                glossy.base(wi) + facets / (1.0 + rival)
             });
+        let n_base = if seen_blurred { self.strata.min(2) } else { self.strata };
+        sum += weight * self.dome(surface, n_base, |dir| glossy.base(frame.to_local(dir)));
         for i in 0..if follows { n * n } else { 0 } {
-            let (wi, g, cos_h) = ggx.sample(wo, self.stratum(i, n));
+            let Some((wi, factor, pdf)) = glossy.reflect(wo, self.stratum(i, n)) else { continue };
             let dir = frame.to_world(wi).normalize();
-            if g > 0.0 && dir.dot(surface.flat) > 0.0 {
-                let (_, pdf, _) = ggx.eval(wo, wi);
-                let weight = weight * bsdf::schlick(f0, cos_h) * (g / directions);
-                let ray = Ray { origin: self.scene.leave(surface, dir), dir };
-                sum += self.radiance(&ray, depth + 1, weight, Some((pdf, n * n)));
+            if dir.dot(surface.flat) <= 0.0 {
+                continue;
             }
+            let ray = Ray { origin: self.scene.leave(surface, dir), dir };
+            if pdf == DELTA {
+                return sum + self.radiance(&ray, depth + 1, weight * factor, None);
+            }
+            sum += self.radiance(&ray, depth + 1, weight * factor / directions, Some((pdf, n * n)));
         }
         sum
     }

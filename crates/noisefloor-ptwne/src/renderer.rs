@@ -1,13 +1,18 @@
 //! The renderer as a source of samples.
 
+use crate::camera::Lens;
 use crate::error::{OutsideError, RenderError};
+use crate::filter::Filter;
 use crate::integrator::{Estimator, Settings, estimator};
-use crate::rng::{Key, Rng};
-use crate::scene::Scene;
-use noisefloor::{Batch, ProgressiveSource, Reference, Request, Rgb, SourceError, SourceInfo, Unit};
+use crate::math::Vec3;
+use crate::rng::Key;
+use crate::sampler::{Sampler, Sampling};
+use crate::scene::{Needs, Scene};
+use noisefloor::{Batch, ProgressiveSource, Reference, Request, Rgb, SourceError, SourceInfo, Tile, Unit};
 use rayon::prelude::*;
 use std::num::NonZeroUsize;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Deepest path that can be asked for, in segments.
 pub const MAX_DEPTH: u32 = 10_000;
@@ -15,7 +20,7 @@ pub const MAX_DEPTH: u32 = 10_000;
 pub const MAX_THREADS: usize = 1024;
 
 /// How to render.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Options {
     /// Seed of all random numbers.
     pub seed: u64,
@@ -26,23 +31,40 @@ pub struct Options {
     /// Whether next events and scattering share lights by multiple importance sampling. If not, this is plain path tracing
     /// with next event estimation: lights met by scattering count only after the camera, mirrors and glass.
     pub mis: bool,
+    /// How the samples of a pixel are spread.
+    pub sampling: Sampling,
+    /// How pixels weigh the light around them.
+    pub filter: Filter,
+    /// Largest channel of a sample, above 0; brighter samples are scaled down to it, and counted. That loses light: `None`, the
+    /// default, keeps all.
+    pub clamp: Option<f32>,
     /// Threads of a pool of its own, at most [`MAX_THREADS`]; `None`: the rayon pool that the caller is in. Images do not
     /// depend on it.
     pub threads: Option<NonZeroUsize>,
 }
 
 impl Default for Options {
-    /// Seed 0, paths of up to 65 segments, roulette from the fifth on, multiple importance sampling, the caller's threads.
+    /// Seed 0, paths of up to 65 segments, roulette from the fifth on, multiple importance sampling, independent samples, a box
+    /// filter, no clamping, the caller's threads.
     fn default() -> Self {
-        Self { seed: 0, max_depth: 65, roulette: 5, mis: true, threads: None }
+        Self {
+            seed: 0,
+            max_depth: 65,
+            roulette: 5,
+            mis: true,
+            sampling: Sampling::Independent,
+            filter: Filter::Box,
+            clamp: None,
+            threads: None,
+        }
     }
 }
 
 /// Path tracing with next event estimation, of a scene, at a resolution.
 ///
-/// Samples are spread uniformly over each pixel (a box filter one pixel wide), all random numbers follow from (seed, pixel,
-/// sample index), and the mean of a batch is summed in f64: images are the same to the bit whatever the threads, and means
-/// are the same to the rounding of f32 however requests are cut.
+/// All random numbers follow from (seed, pixel, sample index), and the mean of a batch is summed in f64: images are the same
+/// to the bit whatever the threads, and means are the same to the rounding of f32 however requests are cut. A sample counts
+/// for one pixel alone, whatever the filter, so that noise is independent from pixel to pixel.
 #[derive(Debug)]
 pub struct Ptwne {
     pub(crate) scene: Arc<Scene>,
@@ -51,6 +73,28 @@ pub struct Ptwne {
     options: Options,
     estimator: Estimator,
     pool: Option<rayon::ThreadPool>,
+    tally: Tally,
+}
+
+/// What became of the samples so far.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Counts {
+    /// Samples taken.
+    pub samples: u64,
+    /// Those that were not finite, or negative, and counted as black.
+    pub dropped: u64,
+    /// Those that were scaled down to [`Options::clamp`].
+    pub clamped: u64,
+    /// Those of tiles that see nothing but the background, for which no ray was traced.
+    pub background: u64,
+}
+
+#[derive(Debug, Default)]
+struct Tally {
+    samples: AtomicU64,
+    dropped: AtomicU64,
+    clamped: AtomicU64,
+    background: AtomicU64,
 }
 
 impl Ptwne {
@@ -72,14 +116,34 @@ impl Ptwne {
         if options.roulette == 0 {
             return bad("roulette", 0, "at least 1 segment");
         }
+        if let Some(clamp) = options.clamp.filter(|c| !(*c > 0.0 && c.is_finite())) {
+            return Err(RenderError::Clamp(clamp));
+        }
         let pool = match options.threads.map(NonZeroUsize::get) {
             Some(threads) if threads > MAX_THREADS => return bad("threads", threads, "1…1024"),
             Some(threads) => Some(rayon::ThreadPoolBuilder::new().num_threads(threads).build()?),
             None => None,
         };
         let scene = scene.into();
-        let estimator = estimator(&scene);
-        Ok(Self { scene, width, height, options, estimator, pool })
+        let estimator = estimator(scene.needs);
+        Ok(Self { scene, width, height, options, estimator, pool, tally: Tally::default() })
+    }
+
+    /// Renders with code for more than the scene has. Images are the same; it shows what leaving that code out saves.
+    pub fn burden(&mut self, more: Needs) {
+        self.estimator = estimator(self.scene.needs.with(more));
+    }
+
+    /// What became of the samples so far.
+    pub fn counts(&self) -> Counts {
+        let read = |a: &AtomicU64| a.load(Ordering::Relaxed);
+        let Tally { samples, dropped, clamped, background } = &self.tally;
+        Counts {
+            samples: read(samples),
+            dropped: read(dropped),
+            clamped: read(clamped),
+            background: read(background),
+        }
     }
 
     /// The options.
@@ -96,24 +160,55 @@ impl Ptwne {
     }
 
     /// The mean of the samples of each pixel of one row of a tile.
-    fn row(&self, request: &Request, y: usize, out: &mut [Rgb]) {
-        let lens = self.scene.camera.lens(self.width, self.height);
+    fn row(&self, lens: &Lens, job: Job<'_>) {
+        let Job { request, y, empty, out } = job;
         let key = Key::new(self.options.seed);
-        let Options { max_depth, roulette, mis, .. } = self.options;
+        let Options { max_depth, roulette, mis, sampling, filter, clamp, .. } = self.options;
         let settings = Settings { max_depth, roulette, mis };
         let mut stack = self.scene.accel.stack();
+        let (mut dropped, mut clamped) = (0, 0);
         for (i, mean) in out.iter_mut().enumerate() {
             let x = request.tile.x + i;
             let pixel = (y * self.width + x) as u64;
             let mut sum = glam::DVec3::ZERO;
             for k in 0..u64::from(request.samples) {
-                let mut rng = Rng::new(key, pixel, request.first.wrapping_add(k));
-                let [dx, dy] = rng.two();
+                let mut sampler = Sampler::new(sampling, key, pixel, request.first.wrapping_add(k));
+                let [u, v, ..] = sampler.four();
+                let [dx, dy] = filter.offset([u, v]);
                 let ray = lens.ray(x as f32 + dx, y as f32 + dy);
-                sum += (self.estimator)(&self.scene, settings, ray, &mut rng, &mut stack).as_dvec3();
+                let mut sample = if empty {
+                    self.scene.beyond(ray.dir, |_, _| 1.0)
+                } else {
+                    (self.estimator)(&self.scene, settings, ray, &mut sampler, &mut stack)
+                };
+                // Also true for NaN
+                if !(sample.min_element() >= 0.0 && sample.max_element() < f32::INFINITY) {
+                    (sample, dropped) = (Vec3::ZERO, dropped + 1);
+                }
+                if let Some(limit) = clamp
+                    && sample.max_element() > limit
+                {
+                    (sample, clamped) = (sample * (limit / sample.max_element()), clamped + 1);
+                }
+                sum += sample.as_dvec3();
             }
             *mean = (sum / f64::from(request.samples)).as_vec3().to_array();
         }
+        let add = |to: &AtomicU64, count: u64| to.fetch_add(count, Ordering::Relaxed);
+        let samples = out.len() as u64 * u64::from(request.samples);
+        add(&self.tally.samples, samples);
+        add(&self.tally.background, if empty { samples } else { 0 });
+        add(&self.tally.dropped, dropped);
+        add(&self.tally.clamped, clamped);
+    }
+
+    /// Whether no ray through the tile can meet a surface.
+    fn is_empty(&self, lens: &Lens, tile: &Tile) -> bool {
+        // Samples of neighbouring pixels' light reach as far as the filter
+        let reach = self.options.filter.reach();
+        let span = |from: usize, size: usize| [from as f32 - reach, (from + size) as f32 + reach];
+        let (eye, planes) = lens.pyramid(span(tile.x, tile.width), span(tile.y, tile.height));
+        !self.scene.accel.reaches_into(eye, &planes)
     }
 
     fn fail(
@@ -123,6 +218,15 @@ impl Ptwne {
     ) -> SourceError {
         SourceError::Failed { name: self.info().name, tile, cause: Box::new(cause) }
     }
+}
+
+/// A row of a tile.
+struct Job<'a> {
+    request: &'a Request,
+    y: usize,
+    /// Whether the tile sees nothing but the background.
+    empty: bool,
+    out: &'a mut [Rgb],
 }
 
 impl ProgressiveSource for Ptwne {
@@ -158,17 +262,17 @@ impl ProgressiveSource for Ptwne {
             })
             .collect();
         // Rows of all tiles are the jobs: small enough that no thread waits long for the last one
-        let jobs: Vec<(&Request, usize, &mut [Rgb])> = requests
+        let lens = this.scene.camera.lens(width, height);
+        let jobs: Vec<Job<'_>> = requests
             .iter()
             .zip(&mut batches)
             .flat_map(|(request, batch)| {
+                let empty = this.is_empty(&lens, &request.tile);
                 let rows = batch.mean.chunks_mut(request.tile.width.max(1)).enumerate();
-                rows.map(move |(row, out)| (request, request.tile.y + row, out))
+                rows.map(move |(row, out)| Job { request, y: request.tile.y + row, empty, out })
             })
             .collect();
-        this.on_threads(|| {
-            jobs.into_par_iter().with_max_len(1).for_each(|(request, y, out)| this.row(request, y, out));
-        });
+        this.on_threads(|| jobs.into_par_iter().with_max_len(1).for_each(|job| this.row(&lens, job)));
         Ok(batches)
     }
 

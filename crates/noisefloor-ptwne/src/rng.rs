@@ -12,14 +12,20 @@ impl Key {
 }
 
 /// Increment of SplitMix64: 2⁶⁴ over the golden ratio, made odd.
-const GOLDEN: u64 = 0x9e37_79b9_7f4a_7c15;
+pub(crate) const GOLDEN: u64 = 0x9e37_79b9_7f4a_7c15;
 
 /// SplitMix64's finaliser, a bijection on 64 bits (Steele, Lea, Flood 2014; constants: Stafford's variant 13).
 #[inline]
-fn mix(mut z: u64) -> u64 {
+pub(crate) fn mix(mut z: u64) -> u64 {
     z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
     z ^ (z >> 31)
+}
+
+/// A hash of 32 bits of which all matter, uniform in [0, 1).
+#[inline]
+pub(crate) fn hash(seed: u64, index: u32) -> f32 {
+    unit((mix(seed ^ u64::from(index).wrapping_mul(GOLDEN)) >> 40) as u32)
 }
 
 /// xoroshiro128++ (Blackman, Vigna 2021), started at a hash of (seed, pixel, sample index): one short stream for each
@@ -49,7 +55,7 @@ impl Rng {
     }
 
     /// Uniform in [0, 1), a multiple of 2⁻²⁴.
-    #[inline]
+    #[cfg(test)]
     pub(crate) fn one(&mut self) -> f32 {
         unit((self.next() >> 40) as u32)
     }

@@ -3,6 +3,7 @@
 use crate::error::SceneError;
 use crate::math::Vec3;
 use noisefloor::Rgb;
+use std::sync::{Arc, LazyLock};
 
 /// Largest number of pixels of an image texture.
 pub const MAX_TEXTURE_PIXELS: usize = 1 << 26;
@@ -36,21 +37,95 @@ pub enum Texture {
         /// Cells of the first octave for each unit of u and v.
         scale: [f32; 2],
     },
-    /// An image, bilinearly interpolated, repeated in u and v.
+    /// An image.
     Image(ImageTexture),
 }
 
-/// An image in memory, row-major from the top left; v = 0 is the bottom row.
+/// An image in memory. It covers the unit square of u and v; v = 0 is the bottom row.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ImageTexture {
     /// Width in pixels.
     pub width: usize,
     /// Height in pixels.
     pub height: usize,
-    /// Linear reflectance, `width`·`height` values, each channel in 0…1.
-    pub pixels: Vec<Rgb>,
-    /// Repeats for each unit of u and v.
-    pub scale: [f32; 2],
+    /// `width`·`height` pixels, row-major from the top left.
+    pub pixels: Pixels,
+    /// Two rows of an affine map from (u, v, 1) to where in the image to look; usually [`ImageTexture::IDENTITY`].
+    pub to_uv: [[f32; 3]; 2],
+    /// Multiplies the image.
+    pub factor: Rgb,
+    /// What is beyond the unit square, in u and in v.
+    pub wrap: [Wrap; 2],
+    /// Whether a pixel has one colour, or colours are interpolated between pixels.
+    pub nearest: bool,
+}
+
+/// Pixels of an image, shared by all textures that are made of it.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Pixels {
+    /// Eight bits a channel, encoded as sRGB (IEC 61966-2-1).
+    Srgb8(Arc<[[u8; 3]]>),
+    /// Eight bits a channel, linear: 255 is 1.
+    Linear8(Arc<[[u8; 3]]>),
+    /// Linear.
+    Float(Arc<[Rgb]>),
+}
+
+/// What an image shows beyond the unit square.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Wrap {
+    /// Itself again.
+    #[default]
+    Repeat,
+    /// Itself, every other time mirrored.
+    Mirror,
+    /// Its border.
+    Clamp,
+}
+
+impl Pixels {
+    fn len(&self) -> usize {
+        match self {
+            Pixels::Srgb8(p) | Pixels::Linear8(p) => p.len(),
+            Pixels::Float(p) => p.len(),
+        }
+    }
+
+    #[inline]
+    fn at(&self, index: usize) -> Vec3 {
+        let eight = |p: &[[u8; 3]], table: &[f32; 256]| {
+            let [r, g, b] = p[index];
+            Vec3::new(table[usize::from(r)], table[usize::from(g)], table[usize::from(b)])
+        };
+        match self {
+            Pixels::Srgb8(p) => eight(p, &TABLES.0),
+            Pixels::Linear8(p) => eight(p, &TABLES.1),
+            Pixels::Float(p) => Vec3::from_array(p[index]),
+        }
+    }
+}
+
+/// The 256 values of a channel that is encoded as sRGB, and of a linear one.
+static TABLES: LazyLock<([f32; 256], [f32; 256])> = LazyLock::new(|| {
+    let linear = |i: usize| i as f64 / 255.0;
+    let decode = |x: f64| if x <= 0.04045 { x / 12.92 } else { ((x + 0.055) / 1.055).powf(2.4) };
+    (std::array::from_fn(|i| decode(linear(i)) as f32), std::array::from_fn(|i| linear(i) as f32))
+});
+
+impl Wrap {
+    /// The pixel of `0..size` that stands at `index`.
+    #[inline]
+    fn pixel(self, index: i64, size: usize) -> usize {
+        let n = size as i64;
+        (match self {
+            Wrap::Repeat => index.rem_euclid(n),
+            Wrap::Mirror => {
+                let i = index.rem_euclid(2 * n);
+                if i < n { i } else { 2 * n - 1 - i }
+            }
+            Wrap::Clamp => index.clamp(0, n - 1),
+        }) as usize
+    }
 }
 
 impl From<Rgb> for Texture {
@@ -73,19 +148,13 @@ pub(crate) fn check_reflectance(colour: Rgb) -> Result<(), SceneError> {
 }
 
 impl Texture {
+    /// Checks that it is a reflectance everywhere.
     pub(crate) fn check(&self) -> Result<(), SceneError> {
         let (colours, scale): (&[Rgb], _) = match self {
             Texture::Colour(c) => return check_reflectance(*c),
             Texture::Checker { colours, scale } | Texture::Noise { colours, scale } => (colours, scale),
             Texture::Brick { brick, mortar, scale } => (&[*brick, *mortar], scale),
-            Texture::Image(image) => {
-                let ImageTexture { width, height, ref pixels, ref scale } = *image;
-                let size = width.checked_mul(height).filter(|s| (1..=MAX_TEXTURE_PIXELS).contains(s));
-                if size != Some(pixels.len()) {
-                    return Err(SceneError::Image { width, height, found: pixels.len() });
-                }
-                (pixels.as_slice(), scale)
-            }
+            Texture::Image(image) => return image.check(),
         };
         if !scale.iter().all(|s| s.is_finite()) {
             return Err(SceneError::NotFinite { what: "the scale of a texture" });
@@ -99,6 +168,18 @@ impl Texture {
             Texture::Colour(c) => Some(Vec3::from_array(*c)),
             _ => None,
         }
+    }
+
+    /// The mean colour: of an image, of its pixels; of a pattern, of a grid over the unit square.
+    pub(crate) fn mean(&self) -> Vec3 {
+        if let Texture::Image(image) = self {
+            let sum: glam::DVec3 = (0..image.pixels.len()).map(|i| image.pixels.at(i).as_dvec3()).sum();
+            return (sum / image.pixels.len() as f64).as_vec3a() * Vec3::from_array(image.factor);
+        }
+        const SIDE: u32 = 64;
+        let centre = |i: u32| (i as f32 + 0.5) / SIDE as f32;
+        let points = (0..SIDE * SIDE).map(|i| self.eval(centre(i % SIDE), centre(i / SIDE)));
+        points.sum::<Vec3>() / (SIDE * SIDE) as f32
     }
 
     /// The colour at (u, v).
@@ -134,17 +215,50 @@ impl Texture {
 }
 
 impl ImageTexture {
+    /// The map that leaves (u, v) as they are.
+    pub const IDENTITY: [[f32; 3]; 2] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+
+    /// An image that covers the unit square of u and v and repeats beyond.
+    pub fn new(width: usize, height: usize, pixels: Pixels) -> Self {
+        let (factor, wrap) = ([1.0; 3], [Wrap::Repeat; 2]);
+        Self { width, height, pixels, to_uv: Self::IDENTITY, factor, wrap, nearest: false }
+    }
+
+    fn check(&self) -> Result<(), SceneError> {
+        let (width, height) = (self.width, self.height);
+        let size = width.checked_mul(height).filter(|s| (1..=MAX_TEXTURE_PIXELS).contains(s));
+        if size != Some(self.pixels.len()) {
+            return Err(SceneError::Image { width, height, found: self.pixels.len() });
+        }
+        if !self.to_uv.iter().flatten().all(|x| x.is_finite()) {
+            return Err(SceneError::NotFinite { what: "the scale of a texture" });
+        }
+        check_reflectance(self.factor)?;
+        match &self.pixels {
+            Pixels::Float(pixels) => pixels.iter().try_for_each(|p| check_reflectance(*p)),
+            Pixels::Srgb8(_) | Pixels::Linear8(_) => Ok(()),
+        }
+    }
+
     fn eval(&self, u: f32, v: f32) -> Vec3 {
-        let x = (u * self.scale[0]).rem_euclid(1.0) * self.width as f32 - 0.5;
-        let y = (1.0 - (v * self.scale[1]).rem_euclid(1.0)) * self.height as f32 - 0.5;
-        let (x0, y0) = (x.floor(), y.floor());
-        let at = |dx: f32, dy: f32| {
-            let column = ((x0 + dx) as isize).rem_euclid(self.width as isize) as usize;
-            let row = ((y0 + dy) as isize).rem_euclid(self.height as isize) as usize;
-            Vec3::from_array(self.pixels[row * self.width + column])
+        let place = |row: [f32; 3]| row[0] * u + row[1] * v + row[2];
+        let (u, v) = (place(self.to_uv[0]), place(self.to_uv[1]));
+        // Beyond 2⁴⁰ pixels f32 cannot tell where it is: anything will do, but nothing may overflow
+        let x = (u * self.width as f32 - 0.5).clamp(-1e12, 1e12);
+        let y = ((1.0 - v) * self.height as f32 - 0.5).clamp(-1e12, 1e12);
+        let at = |x: f32, y: f32| {
+            let column = self.wrap[0].pixel(x as i64, self.width);
+            self.pixels.at(self.wrap[1].pixel(y as i64, self.height) * self.width + column)
         };
+        let factor = Vec3::from_array(self.factor);
+        if self.nearest {
+            return at((x + 0.5).floor(), (y + 0.5).floor()) * factor;
+        }
+        let (x0, y0) = (x.floor(), y.floor());
         let (fx, fy) = (x - x0, y - y0);
-        at(0.0, 0.0).lerp(at(1.0, 0.0), fx).lerp(at(0.0, 1.0).lerp(at(1.0, 1.0), fx), fy)
+        let top = at(x0, y0).lerp(at(x0 + 1.0, y0), fx);
+        let bottom = at(x0, y0 + 1.0).lerp(at(x0 + 1.0, y0 + 1.0), fx);
+        top.lerp(bottom, fy) * factor
     }
 }
 
@@ -172,7 +286,7 @@ mod tests {
     #[test]
     fn patterns_stay_between_their_colours() {
         let (a, b) = ([0.1; 3], [0.9; 3]);
-        let image = ImageTexture { width: 2, height: 2, pixels: vec![a, b, b, a], scale: [1.0; 2] };
+        let image = ImageTexture::new(2, 2, Pixels::Float([a, b, b, a].into()));
         for texture in [
             Texture::Checker { colours: [a, b], scale: [4.0; 2] },
             Texture::Noise { colours: [a, b], scale: [4.0; 2] },
@@ -189,13 +303,26 @@ mod tests {
 
     #[test]
     fn images_are_checked_and_the_right_way_up() {
-        let bad = ImageTexture { width: 2, height: 2, pixels: vec![[0.0; 3]; 3], scale: [1.0; 2] };
+        let bad = ImageTexture::new(2, 2, Pixels::Linear8([[0; 3]; 3].into()));
         let error = Texture::Image(bad).check().unwrap_err();
         assert_eq!(error, SceneError::Image { width: 2, height: 2, found: 3 });
-        let pixels = vec![[1.0; 3], [1.0; 3], [0.0; 3], [0.0; 3]];
-        let image = ImageTexture { width: 2, height: 2, pixels, scale: [1.0; 2] };
-        assert_eq!(Texture::Image(image.clone()).eval(0.5, 0.75), Vec3::ONE);
-        assert_eq!(Texture::Image(image).eval(0.5, 0.25), Vec3::ZERO);
+        let top_white = Pixels::Srgb8([[255; 3], [255; 3], [0; 3], [0; 3]].into());
+        let mut image = ImageTexture::new(2, 2, top_white);
+        let at = |image: &ImageTexture, v: f32| Texture::Image(image.clone()).eval(0.5, v).x;
+        assert_eq!((at(&image, 0.75), at(&image, 0.25)), (1.0, 0.0));
+        assert_eq!(at(&image, 0.5), 0.5);
+        image.nearest = true;
+        assert_eq!((at(&image, 0.51), at(&image, 0.49)), (1.0, 0.0));
+        // One unit up: the same again, mirrored, and the border
+        let all = [Wrap::Repeat, Wrap::Mirror, Wrap::Clamp].map(|wrap| {
+            image.wrap[1] = wrap;
+            (at(&image, 1.25), at(&image, 1.75))
+        });
+        assert_eq!(all, [(0.0, 1.0), (1.0, 0.0), (1.0, 1.0)]);
+        image.to_uv = [[0.0, 1.0, 0.0], [0.0, 0.5, 0.25]];
+        image.wrap[1] = Wrap::Repeat;
+        assert_eq!((at(&image, 0.0), at(&image, 1.0)), (0.0, 1.0));
+        assert!(at(&image, f32::MAX).is_finite());
         assert!(Texture::Colour([1.1, 0.0, 0.0]).check().is_err());
         assert!(Texture::Colour([f32::NAN, 0.0, 0.0]).check().is_err());
     }

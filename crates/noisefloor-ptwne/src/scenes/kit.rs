@@ -154,7 +154,7 @@ impl Kit {
             }
         }
         let mesh = Mesh { positions: &positions, normals: &normals, uvs: &uvs, indices: &indices };
-        let result = self.builder.mesh(&mesh, m, None);
+        let result = self.builder.mesh(&mesh, m, None).map(|_| ());
         self.keep(result);
     }
 }

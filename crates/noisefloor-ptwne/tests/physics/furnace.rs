@@ -9,18 +9,18 @@ const UP: [f32; 3] = [0.0, 1.0, 0.0];
 #[test]
 fn closed_rooms_have_the_radiance_of_the_geometric_series() {
     let camera = look([0.1, 0.05, 0.2], [0.0, 0.0, -1.0], UP, 60.0);
-    let light = Some(Emission { radiance: [0.5, 0.5, 0.5], two_sided: true });
+    let light = || Some(Emission::two_sided([0.5, 0.5, 0.5]));
     let sphere = |b: &mut SceneBuilder| {
         let m = b.material(Material::diffuse([0.6, 0.3, 0.0])).unwrap();
-        b.sphere([0.0; 3], 1.0, m, light).unwrap();
+        b.sphere([0.0; 3], 1.0, m, light()).unwrap();
     };
     let cube = |b: &mut SceneBuilder| {
         let m = b.material(Material::diffuse([0.6, 0.3, 0.0])).unwrap();
         let (x, y, z) = ([2.0, 0.0, 0.0], [0.0, 2.0, 0.0], [0.0, 0.0, 2.0]);
         for (e1, e2) in [(x, y), (y, z), (z, x)] {
-            b.parallelogram([-1.0; 3], e1, e2, m, light).unwrap();
+            b.parallelogram([-1.0; 3], e1, e2, m, light()).unwrap();
             let e3: [f32; 3] = std::array::from_fn(|i| 1.0 - e1[i] - e2[i]);
-            b.parallelogram(e3, e1, e2, m, light).unwrap();
+            b.parallelogram(e3, e1, e2, m, light()).unwrap();
         }
     };
     for mis in [true, false] {

@@ -1,0 +1,112 @@
+//! Where the random numbers of a path come from.
+
+use crate::rng::{GOLDEN, Key, Rng, mix};
+
+/// How the samples of a pixel are spread.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Sampling {
+    /// Independent samples: noise as people saw it in the training data.
+    #[default]
+    Independent,
+    /// Owen-scrambled Sobol points (Burley 2020, "Practical Hash-based Owen Scrambling"), four dimensions at a time, each four
+    /// shuffled and scrambled for each pixel anew. Less noise, but the halves of a pixel are no longer independent, and the
+    /// bundled model has not seen such noise: `docs/samplers.md` of the project says what follows.
+    Sobol,
+}
+
+/// The numbers of one path, four at a time.
+#[derive(Clone, Debug)]
+pub(crate) enum Sampler {
+    Independent(Rng),
+    /// Point `index` of the sequence of `seed`, which changes from one four to the next.
+    Sobol {
+        index: u32,
+        seed: u64,
+    },
+}
+
+/// Length of a Sobol sequence; after it the next one begins, scrambled on its own.
+const POINTS: u64 = 1 << 16;
+
+impl Sampler {
+    #[inline]
+    pub(crate) fn new(sampling: Sampling, key: Key, pixel: u64, sample: u64) -> Self {
+        match sampling {
+            Sampling::Independent => Self::Independent(Rng::new(key, pixel, sample)),
+            Sampling::Sobol => Self::Sobol {
+                index: (sample % POINTS) as u32,
+                seed: Rng::new(key, pixel, sample / POINTS).next(),
+            },
+        }
+    }
+
+    /// Four numbers in [0, 1), unrelated to all others of the path.
+    #[inline]
+    pub(crate) fn four(&mut self) -> [f32; 4] {
+        match self {
+            Self::Independent(rng) => {
+                let ([a, b], [c, d]) = (rng.two(), rng.two());
+                [a, b, c, d]
+            }
+            Self::Sobol { index, seed } => sobol(*index, seed),
+        }
+    }
+
+    /// A seed that no other path has, for decisions that are hashed rather than drawn in order.
+    #[inline]
+    pub(crate) fn seed(&mut self) -> u64 {
+        match self {
+            Self::Independent(rng) => rng.next(),
+            Self::Sobol { index, seed } => mix(*seed ^ (u64::from(*index) << 32)),
+        }
+    }
+}
+
+/// Padding after Burley: the same four dimensions again and again, with another seed for each four.
+#[inline(never)]
+fn sobol(index: u32, seed: &mut u64) -> [f32; 4] {
+    *seed = mix(seed.wrapping_add(GOLDEN));
+    sobol_burley::sample_4d(index, 0, *seed as u32)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The first 4ᵏ points have one in each of 2ᵏ×2ᵏ cells, in the planes of the first and of the last two dimensions.
+    #[test]
+    fn sobol_points_are_stratified() {
+        let key = Key::new(3);
+        for (k, set) in [(3u32, 0), (4, 5)] {
+            let side = 1usize << k;
+            let mut cells = vec![[0; 2]; side * side];
+            for sample in 0..(side * side) as u64 {
+                let mut sampler = Sampler::new(Sampling::Sobol, key, 17, sample);
+                let mut point = sampler.four();
+                (0..set).for_each(|_| point = sampler.four());
+                for (plane, xy) in [[point[0], point[1]], [point[2], point[3]]].iter().enumerate() {
+                    let cell = xy.map(|x| (x * side as f32) as usize);
+                    cells[cell[1] * side + cell[0]][plane] += 1;
+                }
+            }
+            assert!(cells.iter().all(|c| c[0] == 1), "{cells:?}");
+        }
+    }
+
+    /// Pixels and fours have scrambles of their own: the correlation of 2¹⁶ pairs is standard normal over √n; 5σ.
+    #[test]
+    fn sobol_scrambles_are_unrelated() {
+        let (key, n) = (Key::new(4), 1u64 << 16);
+        let (mut pixels, mut fours) = (0.0, 0.0);
+        for pixel in 0..n {
+            let mut one = Sampler::new(Sampling::Sobol, key, pixel, 5);
+            let mut other = Sampler::new(Sampling::Sobol, key, pixel + 1, 5);
+            let (a, b, c) = (one.four()[0], one.four()[0], other.four()[0]);
+            fours += (f64::from(a) - 0.5) * (f64::from(b) - 0.5);
+            pixels += (f64::from(a) - 0.5) * (f64::from(c) - 0.5);
+        }
+        for sum in [pixels, fours] {
+            assert!((sum * 12.0 / (n as f64).sqrt()).abs() < 5.0, "{sum}");
+        }
+    }
+}
