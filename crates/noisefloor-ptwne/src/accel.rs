@@ -389,7 +389,7 @@ impl Accel {
         }
     }
 
-    #[inline(always)]
+    #[inline(never)]
     fn nearest<const ROUNDS: bool>(
         &self,
         ray: &Ray,
@@ -501,7 +501,7 @@ impl Accel {
         }
     }
 
-    #[inline(always)]
+    #[inline(never)]
     fn any<const ROUNDS: bool, const HOLES: bool>(
         &self,
         ray: &Ray,
