@@ -35,6 +35,23 @@ impl fmt::Display for Place {
     }
 }
 
+impl Place {
+    /// [`LoadError::Bad`] here.
+    pub(crate) fn bad(self, what: impl fmt::Display) -> LoadError {
+        LoadError::Bad { place: self, what: what.to_string() }
+    }
+
+    /// [`LoadError::Unsupported`] here.
+    pub(crate) fn unsupported(self, what: impl fmt::Display) -> LoadError {
+        LoadError::Unsupported { place: self, what: what.to_string() }
+    }
+
+    /// [`LoadError::TooLarge`] here, if `found` is above `limit`.
+    pub(crate) fn at_most(self, what: &'static str, found: u64, limit: u64) -> Result<(), LoadError> {
+        if found > limit { Err(LoadError::TooLarge { place: self, what, found, limit }) } else { Ok(()) }
+    }
+}
+
 /// Something in a file that the renderer does without.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Warning {

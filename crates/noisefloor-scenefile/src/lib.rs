@@ -5,6 +5,7 @@
 //! and what is not supported is named, with whether it was ignored or is fatal.
 
 mod error;
+mod files;
 mod gltf;
 mod mitsuba;
 mod picture;

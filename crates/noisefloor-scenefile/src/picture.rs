@@ -1,1 +1,108 @@
 //! Pictures for textures and environments.
+
+use crate::error::{LoadError, Place};
+use crate::files::{self, MAX_FILE_BYTES};
+use image::codecs::hdr::HdrDecoder;
+use image::codecs::jpeg::JpegDecoder;
+use image::codecs::png::PngDecoder;
+use image::{DynamicImage, ImageDecoder, ImageFormat, Limits};
+use noisefloor::Rgb;
+use noisefloor_ptwne::MAX_TEXTURE_PIXELS;
+use std::io::Cursor;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::Path;
+
+/// Memory for what a decoder keeps besides the pixels: rows, profiles, text.
+const MAX_EXTRA: u64 = 64 << 20;
+/// Most pixels that a byte of a file can stand for: deflate packs at best 1032:1, and a pixel has at least one bit. The other
+/// formats pack less.
+const PIXELS_A_BYTE: u64 = 1032 * 8;
+
+/// A picture as its file has it.
+#[derive(Debug)]
+pub(crate) struct Picture {
+    /// Width in pixels.
+    pub(crate) width: usize,
+    /// Height in pixels.
+    pub(crate) height: usize,
+    /// Row-major from the top left.
+    pub(crate) samples: Samples,
+}
+
+/// Pixels of a [`Picture`].
+#[derive(Debug)]
+pub(crate) enum Samples {
+    /// Codes of 8 bits with alpha, usually sRGB-encoded. Grey is three equal codes; without alpha, it is 255.
+    Eight(Vec<[u8; 4]>),
+    /// Codes of 16 bits, as above.
+    Sixteen(Vec<[u16; 4]>),
+    /// Linear values, from EXR and Radiance files. They may be negative or not finite.
+    Linear(Vec<Rgb>),
+}
+
+/// Reads the EXR, Radiance, PNG or JPEG file in `path`, named at `place`. Its content says which it is, not its name.
+///
+/// # Errors
+/// [`LoadError`] if the file cannot be read, is of another format, broken, or has more than [`MAX_TEXTURE_PIXELS`] pixels
+/// (known from its header).
+pub(crate) fn read(path: &Path, place: &Place) -> Result<Picture, LoadError> {
+    let bytes = files::read(path, MAX_FILE_BYTES, place)?;
+    let here = Place::file(path);
+    if !bytes.starts_with(&[0x76, 0x2f, 0x31, 0x01]) {
+        return decode(&bytes, &here);
+    }
+    let image = noisefloor_exr::read_exr(path).map_err(|e| here.clone().bad(e))?;
+    check_size(image.width as u64, image.height as u64, &here)?;
+    Ok(Picture { width: image.width, height: image.height, samples: Samples::Linear(image.pixels) })
+}
+
+/// Decodes the Radiance, PNG or JPEG file `bytes`, which are at `place`.
+///
+/// # Errors
+/// As [`read`].
+pub(crate) fn decode(bytes: &[u8], place: &Place) -> Result<Picture, LoadError> {
+    let broken = |e: image::ImageError| place.clone().bad(format!("the picture is broken: {e}"));
+    // The decoders are other people's code over hostile bytes: where one of them panics, the file is broken, and the
+    // program that reads it goes on. No state outlives the call.
+    let decoded = catch_unwind(AssertUnwindSafe(|| match image::guess_format(bytes) {
+        Ok(ImageFormat::Png) => {
+            let mut limits = Limits::no_limits();
+            limits.max_alloc = Some(MAX_EXTRA);
+            pixels(PngDecoder::with_limits(Cursor::new(bytes), limits).map_err(broken)?, bytes.len(), place)
+        }
+        Ok(ImageFormat::Jpeg) => pixels(JpegDecoder::new(Cursor::new(bytes)).map_err(broken)?, bytes.len(), place),
+        Ok(ImageFormat::Hdr) => pixels(HdrDecoder::new(Cursor::new(bytes)).map_err(broken)?, bytes.len(), place),
+        _ => Err(place.clone().unsupported("a picture that is neither PNG, JPEG, OpenEXR nor Radiance")),
+    }));
+    decoded.unwrap_or_else(|_| Err(place.clone().bad("the picture is broken: its decoder gave up")))
+}
+
+/// The pixels behind a decoder that has read the header of a file of `bytes` bytes.
+fn pixels(decoder: impl ImageDecoder, bytes: usize, place: &Place) -> Result<Picture, LoadError> {
+    let (width, height) = decoder.dimensions();
+    check_size(u64::from(width), u64::from(height), place)?;
+    if u64::from(width) * u64::from(height) > (bytes as u64).saturating_mul(PIXELS_A_BYTE) {
+        return Err(place.clone().bad(format!("{bytes} bytes cannot hold {width}×{height} pixels")));
+    }
+    let image = DynamicImage::from_decoder(decoder)
+        .map_err(|e| place.clone().bad(format!("the picture is broken: {e}")))?;
+    let samples = match image {
+        DynamicImage::ImageLuma16(_)
+        | DynamicImage::ImageLumaA16(_)
+        | DynamicImage::ImageRgb16(_)
+        | DynamicImage::ImageRgba16(_) => Samples::Sixteen(image.into_rgba16().pixels().map(|p| p.0).collect()),
+        DynamicImage::ImageRgb32F(_) | DynamicImage::ImageRgba32F(_) => {
+            Samples::Linear(image.into_rgb32f().pixels().map(|p| p.0).collect())
+        }
+        _ => Samples::Eight(image.into_rgba8().pixels().map(|p| p.0).collect()),
+    };
+    Ok(Picture { width: width as usize, height: height as usize, samples })
+}
+
+/// Checks a size from a header, before anything of that size is allocated.
+fn check_size(width: u64, height: u64, place: &Place) -> Result<(), LoadError> {
+    if width == 0 || height == 0 {
+        return Err(place.clone().bad("the picture is empty"));
+    }
+    place.clone().at_most("pixels", width.saturating_mul(height), MAX_TEXTURE_PIXELS as u64)
+}

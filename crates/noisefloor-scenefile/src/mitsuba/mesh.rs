@@ -1,0 +1,100 @@
+//! Triangles between a mesh file and the renderer.
+
+use crate::error::{LoadError, Place};
+use glam::{DMat3, DMat4, DVec3, Vec3};
+
+/// Indexed triangles. Normals and texture coordinates are one a position, or none.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Triangles {
+    /// Corners.
+    pub(super) positions: Vec<[f32; 3]>,
+    /// Shading normals, of any length; 0 where there is none.
+    pub(super) normals: Vec<[f32; 3]>,
+    /// Texture coordinates.
+    pub(super) uvs: Vec<[f32; 2]>,
+    /// Corners of each triangle; the front is where they run counter-clockwise.
+    pub(super) indices: Vec<[u32; 3]>,
+}
+
+impl Triangles {
+    /// Checks that indices are in range and numbers finite.
+    ///
+    /// # Errors
+    /// [`LoadError::Bad`] at `place`.
+    pub(super) fn check(&self, place: &Place) -> Result<(), LoadError> {
+        let count = self.positions.len();
+        if let Some(face) = self.indices.iter().position(|t| t.iter().any(|i| *i as usize >= count)) {
+            let triangle = self.indices[face];
+            let what = format!("face {face} has corners {triangle:?}, but there are {count} vertices");
+            return Err(place.clone().bad(what));
+        }
+        let finite = |rows: &[[f32; 3]]| rows.iter().position(|row| row.iter().any(|x| !x.is_finite()));
+        let uvs = self.uvs.iter().position(|row| row.iter().any(|x| !x.is_finite()));
+        match finite(&self.positions).or(finite(&self.normals)).or(uvs) {
+            Some(vertex) => Err(place.clone().bad(format!("vertex {vertex} has a number that is not finite"))),
+            None => Ok(()),
+        }
+    }
+
+    /// Moves positions and normals.
+    pub(super) fn transform(&mut self, to_world: DMat4) {
+        for position in &mut self.positions {
+            *position = to_world.transform_point3(Vec3::from_array(*position).as_dvec3()).as_vec3().to_array();
+        }
+        let matrix = normal_matrix(to_world);
+        for normal in &mut self.normals {
+            let moved = matrix * Vec3::from_array(*normal).as_dvec3();
+            *normal = moved.normalize_or_zero().as_vec3().to_array();
+        }
+    }
+
+    /// Gives each vertex the mean of the normals of its triangles, weighted by their angles there (Thürmer and Wüthrich
+    /// 1998), as Mitsuba does for meshes without normals.
+    pub(super) fn smooth(&mut self) {
+        let mut sums = vec![Vec3::ZERO; self.positions.len()];
+        for triangle in &self.indices {
+            let corners = triangle.map(|i| Vec3::from_array(self.positions[i as usize]));
+            let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalize_or_zero();
+            for at in 0..3 {
+                let [a, b, c] = [0, 1, 2].map(|k| corners[(at + k) % 3]);
+                let (ab, ac) = ((b - a).normalize_or_zero(), (c - a).normalize_or_zero());
+                if ab != Vec3::ZERO && ac != Vec3::ZERO {
+                    sums[triangle[at] as usize] += normal * ab.angle_between(ac);
+                }
+            }
+        }
+        self.normals = sums.iter().map(|sum| sum.normalize_or_zero().to_array()).collect();
+    }
+
+    /// Turns the triangles whose corners run the other way than their normals point: what is the front, for reflection and
+    /// for emission, Mitsuba tells by the shading normals.
+    pub(super) fn face_normals_outwards(&mut self) {
+        for triangle in &mut self.indices {
+            let at = |rows: &[[f32; 3]]| triangle.map(|i| Vec3::from_array(rows[i as usize]));
+            let [a, b, c] = at(&self.positions);
+            let front: Vec3 = at(&self.normals).iter().sum();
+            if (b - a).cross(c - a).dot(front) < 0.0 {
+                triangle.swap(1, 2);
+            }
+        }
+    }
+
+    /// Exchanges front and back.
+    pub(super) fn flip(&mut self) {
+        for normal in &mut self.normals {
+            *normal = normal.map(|x| -x);
+        }
+        for triangle in &mut self.indices {
+            triangle.swap(1, 2);
+        }
+    }
+}
+
+/// The matrix that takes normals along: the inverse transpose of the upper left 3×3, but for a positive factor. It is had from
+/// cofactors, so that it exists where a transform flattens, too.
+pub(super) fn normal_matrix(to_world: DMat4) -> DMat3 {
+    let [x, y, z] = [to_world.x_axis, to_world.y_axis, to_world.z_axis].map(|axis| axis.truncate());
+    let sign = if x.cross(y).dot(z) < 0.0 { -1.0 } else { 1.0 };
+    let column = |a: DVec3, b: DVec3| a.cross(b) * sign;
+    DMat3::from_cols(column(y, z), column(z, x), column(x, y))
+}

@@ -1,0 +1,66 @@
+//! Mitsuba XML, versions 0.5 to 3.
+//!
+//! `xml` makes a tree of the file, `values` reads numbers, colours and transforms from it, and `context` follows references,
+//! and notes what nobody has read: that is warned of. The rest is a module for each part of a scene.
+
+mod bsdfs;
+mod context;
+mod emitters;
+mod mesh;
+mod obj;
+mod ply;
+mod sensor;
+mod serialized;
+mod shapes;
+mod textures;
+mod values;
+mod xml;
+
+use crate::error::{LoadError, Place};
+use crate::{Loaded, files};
+use context::Context;
+use noisefloor_ptwne::SceneBuilder;
+use shapes::Materials;
+use std::path::Path;
+use xml::Document;
+
+/// Loads the scene in `path`.
+pub(crate) fn load(path: &Path) -> Result<Loaded, LoadError> {
+    let bytes = files::read(path, xml::MAX_XML_BYTES, &Place::file(path))?;
+    let document = Document::parse(&bytes, path)?;
+    let context = Context::new(&document)?;
+    let root = &document.root;
+    root.read();
+    if let Some(include) = root.all("include").next() {
+        return Err(context.unsupported(include, "<include>"));
+    }
+
+    // What looks at the scene
+    let sensors: Vec<_> = root.all("sensor").collect();
+    let sensor = sensors.first().ok_or_else(|| Place::file(path).bad("the scene has no <sensor>"))?;
+    for other in &sensors[1..] {
+        other.irrelevant();
+        context.warn(other, "only the first sensor is used");
+    }
+    let (camera, size) = context.camera(sensor)?;
+    let max_depth = root.all("integrator").next().map_or(Ok(None), |element| context.max_depth(element))?;
+
+    // What is in it
+    let name = path.file_stem().unwrap_or_default().to_string_lossy();
+    let mut builder = SceneBuilder::new(name, camera).map_err(context.refused(sensor))?;
+    let mut materials = Materials::new();
+    for shape in root.all("shape") {
+        context.shape(shape, &mut builder, &mut materials)?;
+    }
+    let mut surroundings = 0;
+    for emitter in root.all("emitter") {
+        surroundings += usize::from(context.emitter(emitter, &mut builder)?);
+        if surroundings > 1 {
+            return Err(context.bad(emitter, "a second emitter surrounds the scene; there can be only one"));
+        }
+    }
+
+    let scene = builder.build().map_err(|cause| LoadError::Scene { place: Place::file(path), cause })?;
+    context.warn_of_unread();
+    Ok(Loaded { scene, size, max_depth, warnings: context.into_warnings() })
+}

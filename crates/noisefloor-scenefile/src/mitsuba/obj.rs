@@ -1,0 +1,167 @@
+//! Wavefront OBJ: positions, normals, texture coordinates and faces; all else is left out.
+//!
+//! Read here and not by a crate: tobj 4.0.5 panics where a texture coordinate or normal is out of range (in builds that check
+//! for overflow; in others it takes the wrong one), gives vertices the normals of others where some corners have none, and
+//! does not say on which line an error is. To check a file before tobj sees it takes as much code as to read it.
+
+use super::mesh::Triangles;
+use crate::error::{LoadError, Place};
+use std::collections::HashMap;
+use std::path::Path;
+
+/// Position, texture coordinates and normal of a corner, as indices.
+type Corner = (u32, Option<u32>, Option<u32>);
+
+/// Reads the OBJ file `bytes`, which came from `path`. Polygons become fans. Corners that agree in all their indices become
+/// one vertex. Where some corners have no normal or texture coordinates, these are 0.
+///
+/// # Errors
+/// [`LoadError::Bad`] if a number or an index is.
+pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<Triangles, LoadError> {
+    // Names and comments may be in any encoding
+    let text = String::from_utf8_lossy(bytes);
+    let mut reader = Reader { path, ..Reader::default() };
+    for (index, line) in text.lines().enumerate() {
+        reader.line = index + 1;
+        reader.line(line)?;
+    }
+
+    let mut mesh = reader.mesh;
+    if !reader.has_normals {
+        mesh.normals.clear();
+    }
+    if !reader.has_uvs {
+        mesh.uvs.clear();
+    }
+    Ok(mesh)
+}
+
+struct Reader<'a> {
+    path: &'a Path,
+    line: usize,
+    positions: Vec<[f32; 3]>,
+    uvs: Vec<[f32; 2]>,
+    normals: Vec<[f32; 3]>,
+    vertices: HashMap<Corner, u32>,
+    polygon: Vec<u32>,
+    mesh: Triangles,
+    has_uvs: bool,
+    has_normals: bool,
+}
+
+impl Default for Reader<'_> {
+    fn default() -> Self {
+        Self {
+            path: Path::new(""),
+            line: 0,
+            positions: vec![],
+            uvs: vec![],
+            normals: vec![],
+            vertices: HashMap::new(),
+            polygon: vec![],
+            mesh: Triangles::default(),
+            has_uvs: false,
+            has_normals: false,
+        }
+    }
+}
+
+impl Reader<'_> {
+    fn bad(&self, what: String) -> LoadError {
+        Place::part(self.path, format_args!("line {}", self.line)).bad(what)
+    }
+
+    fn line(&mut self, line: &str) -> Result<(), LoadError> {
+        let mut words = line.split_ascii_whitespace();
+        match words.next() {
+            Some("v") => {
+                let position = self.numbers(&mut words)?;
+                self.positions.push(position);
+            }
+            Some("vn") => {
+                let normal = self.numbers(&mut words)?;
+                self.normals.push(normal);
+            }
+            Some("vt") => {
+                // One number is allowed: the second is then 0
+                let u = self.numbers::<1>(&mut words)?[0];
+                let v = if words.clone().next().is_some() { self.numbers::<1>(&mut words)?[0] } else { 0.0 };
+                self.uvs.push([u, v]);
+            }
+            Some("f") => self.face(words)?,
+            _ => {}
+        }
+        Ok(())
+    }
+
+    fn numbers<'w, const N: usize>(
+        &self,
+        words: &mut impl Iterator<Item = &'w str>,
+    ) -> Result<[f32; N], LoadError> {
+        let mut numbers = [0.0; N];
+        for number in &mut numbers {
+            let word = words.next().ok_or_else(|| self.bad(format!("fewer than {N} numbers")))?;
+            *number = word
+                .parse()
+                .ok()
+                .filter(|n: &f32| n.is_finite())
+                .ok_or_else(|| self.bad(format!("`{word}` is not a finite number")))?;
+        }
+        Ok(numbers)
+    }
+
+    fn face<'w>(&mut self, words: impl Iterator<Item = &'w str>) -> Result<(), LoadError> {
+        self.polygon.clear();
+        for word in words {
+            if word.starts_with('#') {
+                break;
+            }
+            let corner = self.corner(word)?;
+            let vertex = self.vertex(corner);
+            self.polygon.push(vertex);
+        }
+        if self.polygon.len() < 3 {
+            return Err(self.bad(format!("a face of {} corners; at least 3 are needed", self.polygon.len())));
+        }
+        for pair in self.polygon[1..].windows(2) {
+            self.mesh.indices.push([self.polygon[0], pair[0], pair[1]]);
+        }
+        Ok(())
+    }
+
+    /// `position/texture/normal`, of which the last two may be missing.
+    fn corner(&self, word: &str) -> Result<Corner, LoadError> {
+        let mut parts = word.split('/');
+        let mut index = |what: &str, count: usize| {
+            let Some(part) = parts.next().filter(|part| !part.is_empty()) else { return Ok(None) };
+            // From 1, or back from the last so far
+            let found = part.parse::<i64>().ok().and_then(|i| match i {
+                1.. => usize::try_from(i - 1).ok(),
+                _ => i.checked_neg().and_then(|back| count.checked_sub(usize::try_from(back).ok()?)),
+            });
+            match found.filter(|found| *found < count) {
+                Some(found) => Ok(Some(found as u32)),
+                None => Err(self.bad(format!("`{word}`: there is no {what} {part}; {count} are given so far"))),
+            }
+        };
+        let position = index("position", self.positions.len())?;
+        let uv = index("texture coordinate", self.uvs.len())?;
+        let normal = index("normal", self.normals.len())?;
+        match (position, parts.next()) {
+            (Some(position), None) => Ok((position, uv, normal)),
+            _ => Err(self.bad(format!("`{word}` is not a corner; expected position/texture/normal"))),
+        }
+    }
+
+    fn vertex(&mut self, corner: Corner) -> u32 {
+        let (position, uv, normal) = corner;
+        *self.vertices.entry(corner).or_insert_with(|| {
+            self.has_uvs |= uv.is_some();
+            self.has_normals |= normal.is_some();
+            self.mesh.positions.push(self.positions[position as usize]);
+            self.mesh.uvs.push(uv.map_or([0.0; 2], |i| self.uvs[i as usize]));
+            self.mesh.normals.push(normal.map_or([0.0; 3], |i| self.normals[i as usize]));
+            self.mesh.positions.len() as u32 - 1
+        })
+    }
+}

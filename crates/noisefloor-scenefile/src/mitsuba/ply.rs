@@ -1,0 +1,159 @@
+//! PLY, text and binary: positions, normals, texture coordinates and faces; all else is left out.
+
+use super::mesh::Triangles;
+use crate::error::{LoadError, Place};
+use ply_rs_bw::parser::{Parser, Reader};
+use ply_rs_bw::ply::{
+    ElementDef, Encoding, Property, PropertyAccess, PropertyAccessResult, PropertyType, ScalarType,
+};
+use std::path::Path;
+
+/// Reads the PLY file `bytes`, which came from `path`. Polygons become fans.
+///
+/// # Errors
+/// [`LoadError::Bad`] if the file is cut short or corrupt, or its header asks for more than the file holds.
+pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<Triangles, LoadError> {
+    let place = Place::file(path);
+    let bad = |e: ply_rs_bw::parser::ParseError| place.clone().bad(format!("the PLY file is broken: {e}"));
+
+    let mut reader = Reader::new(bytes);
+    let header = Parser::<Skipped>::new().read_header(&mut reader).map_err(bad)?;
+    // The parser makes as many elements as the header says, even of elements that take no bytes
+    let needed = header.elements.iter().try_fold(0u64, |sum, (_, element)| {
+        sum.checked_add(least_bytes(element, header.encoding).checked_mul(element.count as u64)?)
+    });
+    let empty = header.elements.iter().any(|(_, e)| e.properties.is_empty() && e.count > 0);
+    if empty || needed.is_none_or(|needed| needed > bytes.len() as u64) {
+        return Err(place.clone().bad("the header asks for more elements than the file holds"));
+    }
+
+    let mut mesh = Triangles::default();
+    for (name, element) in &header.elements {
+        match name.as_str() {
+            "vertex" => {
+                let vertices = Parser::<Vertex>::new().read_payload_for_element(&mut reader, element, &header);
+                let has = |names: [&str; 2]| names.iter().all(|name| element.properties.contains_key(*name));
+                let uvs = has(["u", "v"]) || has(["s", "t"]);
+                let normals = has(["nx", "ny"]) && has(["ny", "nz"]);
+                if !(has(["x", "y"]) && has(["y", "z"])) {
+                    return Err(place.clone().bad("its vertices have no x, y and z"));
+                }
+                for vertex in vertices.map_err(bad)? {
+                    mesh.positions.push(vertex.position);
+                    if normals {
+                        mesh.normals.push(vertex.normal);
+                    }
+                    if uvs {
+                        mesh.uvs.push(vertex.uv);
+                    }
+                }
+            }
+            "face" => {
+                let faces = Parser::<Face>::new().read_payload_for_element(&mut reader, element, &header);
+                for (index, face) in faces.map_err(bad)?.iter().enumerate() {
+                    let Some(corners) = face.corners.as_deref().filter(|corners| corners.len() >= 3) else {
+                        let what = format!("face {index} has no `vertex_indices`, or fewer than 3");
+                        return Err(place.clone().bad(what));
+                    };
+                    for pair in corners[1..].windows(2) {
+                        mesh.indices.push([corners[0], pair[0], pair[1]]);
+                    }
+                }
+            }
+            _ => {
+                let skipped = Parser::<Skipped>::new().read_payload_for_element(&mut reader, element, &header);
+                skipped.map_err(bad)?;
+            }
+        }
+    }
+    Ok(mesh)
+}
+
+/// The fewest bytes that an element takes.
+fn least_bytes(element: &ElementDef, encoding: Encoding) -> u64 {
+    let size = |scalar: &ScalarType| match (encoding, scalar) {
+        // A digit and what parts it from the next
+        (Encoding::Ascii, _) => 2,
+        (_, ScalarType::Char | ScalarType::UChar) => 1,
+        (_, ScalarType::Short | ScalarType::UShort) => 2,
+        (_, ScalarType::Int | ScalarType::UInt | ScalarType::Float) => 4,
+        (_, ScalarType::Double) => 8,
+    };
+    let bytes: u64 = element
+        .properties
+        .iter()
+        .map(|(_, property)| match &property.data_type {
+            PropertyType::Scalar(scalar) => size(scalar),
+            PropertyType::List(count, _) => size(count),
+        })
+        .sum();
+    // The last line of a text may lack its end
+    if encoding == Encoding::Ascii { bytes.saturating_sub(1) } else { bytes }
+}
+
+#[derive(Default)]
+struct Vertex {
+    position: [f32; 3],
+    normal: [f32; 3],
+    uv: [f32; 2],
+}
+
+impl PropertyAccess for Vertex {
+    fn new() -> Self {
+        Self::default()
+    }
+
+    fn set_property(&mut self, name: &str, value: Property) -> PropertyAccessResult {
+        let slot = match name {
+            "x" => &mut self.position[0],
+            "y" => &mut self.position[1],
+            "z" => &mut self.position[2],
+            "nx" => &mut self.normal[0],
+            "ny" => &mut self.normal[1],
+            "nz" => &mut self.normal[2],
+            "u" | "s" => &mut self.uv[0],
+            "v" | "t" => &mut self.uv[1],
+            _ => return PropertyAccessResult::Ignored,
+        };
+        match value.to_f32_lossy() {
+            Some(value) => {
+                *slot = value;
+                PropertyAccessResult::Set
+            }
+            None => PropertyAccessResult::UnsupportedType,
+        }
+    }
+}
+
+#[derive(Default)]
+struct Face {
+    corners: Option<Vec<u32>>,
+}
+
+impl PropertyAccess for Face {
+    fn new() -> Self {
+        Self::default()
+    }
+
+    fn set_property(&mut self, name: &str, value: Property) -> PropertyAccessResult {
+        if name != "vertex_indices" && name != "vertex_index" {
+            return PropertyAccessResult::Ignored;
+        }
+        match value.to_u32_list() {
+            Some(corners) => {
+                self.corners = Some(corners);
+                PropertyAccessResult::Set
+            }
+            None => PropertyAccessResult::UnsupportedType,
+        }
+    }
+}
+
+/// An element that is passed over.
+struct Skipped;
+
+impl PropertyAccess for Skipped {
+    fn new() -> Self {
+        Self
+    }
+}

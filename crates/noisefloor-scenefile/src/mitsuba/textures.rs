@@ -1,0 +1,198 @@
+//! Textures.
+
+use super::context::Context;
+use super::values::Use;
+use super::xml::Element;
+use crate::error::{LoadError, Place};
+use crate::picture::{self, Picture, Samples};
+use noisefloor::{Rgb, srgb_decode};
+use noisefloor_ptwne::{ImageTexture, Pixels, Texture, Wrap};
+use std::sync::Arc;
+
+/// A picture, ready for textures.
+#[derive(Clone, Debug)]
+pub(super) struct Raster {
+    width: usize,
+    height: usize,
+    pixels: Pixels,
+}
+
+impl<'d> Context<'d> {
+    /// The factor called `name`, constant or not, each channel in 0…1, or else `default`.
+    pub(super) fn factor(&self, object: &'d Element, name: &str, default: f32) -> Result<Texture, LoadError> {
+        match self.texture(object, name)? {
+            Some(element) => Ok(self.image(element, Use::Factor)?.1),
+            None => self.constant_factor(object, name, default).map(Texture::Colour),
+        }
+    }
+
+    /// As [`Self::factor`], but it must be constant.
+    pub(super) fn constant_factor(
+        &self,
+        object: &'d Element,
+        name: &str,
+        default: f32,
+    ) -> Result<Rgb, LoadError> {
+        if let Some(texture) = self.texture(object, name)? {
+            return Err(self.unsupported(texture, format!("a texture as `{name}`")));
+        }
+        let colour = self.colour(object, name, Use::Factor)?.unwrap_or([default; 3]);
+        if colour.iter().any(|c| *c > 1.0) {
+            self.warn(object.get(name).unwrap_or(object), format!("`{name}` is {colour:?}; values above 1 become 1"));
+        }
+        Ok(colour.map(|c| c.min(1.0)))
+    }
+
+    /// The light called `name`, 1 if there is none, and what multiplies it over the surface.
+    pub(super) fn light(&self, object: &'d Element, name: &str) -> Result<(Rgb, Option<Texture>), LoadError> {
+        if let Some(element) = self.texture(object, name)? {
+            let (scale, texture) = self.image(element, Use::Light)?;
+            return Ok(([scale; 3], Some(texture)));
+        }
+        Ok((self.colour(object, name, Use::Light)?.unwrap_or([1.0; 3]), None))
+    }
+
+    /// The texture called `name`, if what is called so is one.
+    fn texture(&self, object: &'d Element, name: &str) -> Result<Option<&'d Element>, LoadError> {
+        match object.get(name) {
+            Some(element) if element.tag == "texture" || element.tag == "ref" => {
+                let texture = self.resolve(element)?;
+                if texture.tag == "texture" {
+                    return Ok(Some(texture));
+                }
+                Err(self.bad(element, format!("`{name}` is {}; expected a texture", texture.label())))
+            }
+            _ => Ok(None),
+        }
+    }
+
+    /// A texture, and what it is to be multiplied with: 1, but for lights brighter than 1.
+    fn image(&self, element: &'d Element, usage: Use) -> Result<(f32, Texture), LoadError> {
+        let (scale, image) = match element.kind() {
+            "bitmap" => self.bitmap(element, usage)?,
+            "checkerboard" => (1.0, self.checkerboard(element)?),
+            _ => return Err(self.unsupported(element, element.label())),
+        };
+        Ok((scale, Texture::Image(image)))
+    }
+
+    fn bitmap(&self, element: &'d Element, usage: Use) -> Result<(f32, ImageTexture), LoadError> {
+        let place = self.place(element);
+        let name = self.string(element, "filename")?;
+        let name = name.ok_or_else(|| self.bad(element, "a bitmap needs a `filename`"))?;
+        let raw = self.boolean(element, "raw", false)?;
+        let Raster { width, height, pixels } = self.raster(name, raw, &place)?;
+        let (scale, pixels) = self.fit(element, pixels, usage)?;
+
+        let nearest = match self.string(element, "filter_type")?.unwrap_or("bilinear") {
+            "nearest" => true,
+            // What older versions filter over footprints is interpolated
+            "bilinear" | "trilinear" | "ewa" => false,
+            other => return Err(self.unsupported(element, format!("the filter `{other}`"))),
+        };
+        let wrap = match self.string(element, "wrap_mode")?.unwrap_or("repeat") {
+            "repeat" => Wrap::Repeat,
+            "mirror" => Wrap::Mirror,
+            "clamp" => Wrap::Clamp,
+            other => return Err(self.unsupported(element, format!("the wrap mode `{other}`"))),
+        };
+        let to_uv = self.to_uv(element)?;
+        let image = ImageTexture::new(width, height, pixels);
+        Ok((scale, ImageTexture { to_uv, wrap: [wrap; 2], nearest, ..image }))
+    }
+
+    /// Brings the pixels of a picture into 0…1: those of factors are clamped, lights are scaled.
+    fn fit(&self, element: &Element, pixels: Pixels, usage: Use) -> Result<(f32, Pixels), LoadError> {
+        let Pixels::Float(values) = &pixels else { return Ok((1.0, pixels)) };
+        let flat = || values.iter().flatten();
+        if !flat().all(|v| v.is_finite()) {
+            return Err(self.bad(element, "the picture has values that are not finite"));
+        }
+        let peak = flat().fold(0.0, |peak: f32, v| peak.max(*v));
+        let scale = if usage == Use::Light { peak.max(1.0) } else { 1.0 };
+        let outside = flat().filter(|v| !(0.0..=scale).contains(*v)).count();
+        if outside > 0 {
+            self.warn(element, format!("{outside} values of the picture are outside 0…1 and are clamped"));
+        }
+        if outside == 0 && scale == 1.0 {
+            return Ok((scale, pixels));
+        }
+        Ok((scale, Pixels::Float(values.iter().map(|p| p.map(|v| v.clamp(0.0, scale) / scale)).collect())))
+    }
+
+    /// Two by two squares in the unit square.
+    fn checkerboard(&self, element: &'d Element) -> Result<ImageTexture, LoadError> {
+        let a = self.constant_factor(element, "color0", 0.4)?;
+        let b = self.constant_factor(element, "color1", 0.2)?;
+        let image = ImageTexture::new(2, 2, Pixels::Float(Arc::new([a, b, b, a])));
+        Ok(ImageTexture { to_uv: self.to_uv(element)?, nearest: true, ..image })
+    }
+
+    /// `to_uv`, for v that counts from below: Mitsuba's counts from the top of the picture.
+    fn to_uv(&self, element: &'d Element) -> Result<[[f32; 3]; 2], LoadError> {
+        let matrix = self.transform(element, "to_uv")?;
+        let [[a, b, c], [d, e, f]] = [matrix.row(0), matrix.row(1)].map(|row| [row.x, row.y, row.w]);
+        let number = |name: &str, missing| Ok::<_, LoadError>(self.float(element, name)?.unwrap_or(missing));
+        // Older versions
+        let (us, vs) = (number("uscale", 1.0)?, number("vscale", 1.0)?);
+        let (uo, vo) = (number("uoffset", 0.0)?, number("voffset", 0.0)?);
+        let ([a, b, c], [d, e, f]) = ([a * us, b * us, c * us + uo], [d * vs, e * vs, f * vs + vo]);
+        Ok([[a, -b, b + c], [-d, e, 1.0 - e - f]].map(|row| row.map(|x| x as f32)))
+    }
+
+    /// The picture called `name`. Codes of 8 and 16 bits are sRGB-encoded unless `raw`.
+    pub(super) fn raster(&self, name: &str, raw: bool, place: &Place) -> Result<Raster, LoadError> {
+        let path = self.folder.find(name, place)?;
+        let key = (path, raw);
+        if let Some(found) = self.rasters.borrow().get(&key) {
+            return Ok(found.clone());
+        }
+        let Picture { width, height, samples } = picture::read(&key.0, place)?;
+        let pixels = match samples {
+            Samples::Eight(codes) if raw => Pixels::Linear8(codes.iter().map(|[r, g, b, _]| [*r, *g, *b]).collect()),
+            Samples::Eight(codes) => Pixels::Srgb8(codes.iter().map(|[r, g, b, _]| [*r, *g, *b]).collect()),
+            Samples::Sixteen(codes) => {
+                let linear = |code: u16| {
+                    let value = f32::from(code) / 65535.0;
+                    if raw { value } else { srgb_decode(value) }
+                };
+                Pixels::Float(codes.iter().map(|[r, g, b, _]| [*r, *g, *b].map(linear)).collect())
+            }
+            Samples::Linear(values) => Pixels::Float(values.into()),
+        };
+        let raster = Raster { width, height, pixels };
+        self.rasters.borrow_mut().insert(key, raster.clone());
+        Ok(raster)
+    }
+}
+
+impl Raster {
+    /// Width, height, and linear values.
+    pub(super) fn linear(&self) -> (usize, usize, Vec<Rgb>) {
+        (self.width, self.height, linear(&self.pixels))
+    }
+}
+
+/// Linear values of pixels.
+fn linear(pixels: &Pixels) -> Vec<Rgb> {
+    let linear = |code: u8| f32::from(code) / 255.0;
+    match pixels {
+        Pixels::Srgb8(codes) => codes.iter().map(|p| p.map(|code| srgb_decode(linear(code)))).collect(),
+        Pixels::Linear8(codes) => codes.iter().map(|p| p.map(linear)).collect(),
+        Pixels::Float(values) => values.to_vec(),
+    }
+}
+
+/// The luminance of a texture: Mitsuba's opacity. The alpha of a picture has no part in it.
+pub(super) fn luminance(texture: Texture) -> Texture {
+    let grey = |colour: Rgb| [noisefloor::luminance(colour).clamp(0.0, 1.0); 3];
+    match texture {
+        Texture::Colour(colour) => Texture::Colour(grey(colour)),
+        Texture::Image(image) => {
+            let pixels = Pixels::Float(linear(&image.pixels).into_iter().map(grey).collect());
+            Texture::Image(ImageTexture { pixels, ..image })
+        }
+        // This reader makes no others
+        other => other,
+    }
+}
