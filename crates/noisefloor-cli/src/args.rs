@@ -42,31 +42,42 @@ pub enum Command {
 #[command(after_help = "Examples:
   noisefloor render                                  the Cornell box, into out/cornell-box
   noisefloor render glass-spheres --size 800x600 --seed 7    another scene; `noisefloor scenes` lists them
+  noisefloor render hall/scene.xml --out out/hall    a scene from a file: .gltf, .glb, or Mitsuba .xml
   noisefloor render --criterion spp:1000             for comparison: a fixed number of samples
   noisefloor render --audience art-students          for people who look harder (more samples)
   noisefloor render --time 60 --against truth.exr    a minute at most; relMSE to a reference in timeline.csv")]
 pub struct RenderArgs {
-    /// Built-in scene to render (see `noisefloor scenes`).
+    /// Built-in scene (see `noisefloor scenes`), or a scene file: glTF 2.0 (.gltf, .glb) or Mitsuba XML (.xml).
     #[arg(default_value = "cornell-box")]
     pub scene: String,
     /// Output folder [default: out/SCENE].
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
-    /// Image size in pixels.
-    #[arg(long, value_name = "WxH", default_value = "384x384", value_parser = parse_size)]
-    pub size: (usize, usize),
+    /// Image size in pixels [default: what the scene file says, else 384x384].
+    #[arg(long, value_name = "WxH", value_parser = parse_size)]
+    pub size: Option<(usize, usize)>,
     /// Seed of the random numbers: same seed, same image and same stops, whatever the number of threads.
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
     /// Threads [default: one a core].
     #[arg(long)]
     pub threads: Option<NonZeroUsize>,
-    /// Longest path, in segments.
-    #[arg(long, default_value_t = 65, value_name = "N")]
-    pub max_depth: u32,
+    /// Longest path, in segments: 1 is light seen directly, 2 is direct light [default: what the scene file says, else 65].
+    #[arg(long, value_name = "N")]
+    pub max_depth: Option<u32>,
     /// Without multiple importance sampling: the plain path tracing with next event estimation of the paper.
     #[arg(long)]
     pub no_mis: bool,
+    /// How the samples of a pixel are spread. The model was trained on independent ones.
+    #[arg(long, value_enum, default_value_t = SamplerChoice::Independent)]
+    pub sampler: SamplerChoice,
+    /// How pixels weigh the light around them.
+    #[arg(long, value_enum, default_value_t = FilterChoice::Box)]
+    pub filter: FilterChoice,
+    /// Scale samples down whose largest channel is brighter than this. Takes away fireflies, and light; how often is in
+    /// report.json [default: never].
+    #[arg(long, value_name = "RADIANCE")]
+    pub clamp: Option<f32>,
     /// What stops a tile: `oracle`, or `spp:N` for N samples per pixel everywhere.
     #[arg(long, default_value = "oracle", value_parser = parse_criterion)]
     pub criterion: CriterionChoice,
@@ -281,6 +292,24 @@ pub enum ToneChoice {
     Reinhard,
     /// Multiply, clamp, encode.
     Srgb,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum SamplerChoice {
+    /// Each sample on its own.
+    Independent,
+    /// Owen-scrambled Sobol points: less noise, but of a kind that the model has not seen.
+    Sobol,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum FilterChoice {
+    /// The pixel itself.
+    Box,
+    /// A tent over two pixels.
+    Tent,
+    /// A Gaussian with a standard deviation of half a pixel.
+    Gaussian,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]

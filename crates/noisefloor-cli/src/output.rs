@@ -5,6 +5,7 @@ use crate::heat_map::{self, Mark, Scale};
 use anyhow::{Context, bail};
 use noisefloor::{Clock, Display, Params, Progress, Rgb, Session, Stop, StopReason, StoppingCriterion};
 use noisefloor_exr::{RenderLayers, check_writable, read_exr, write_atomic, write_exr, write_png};
+use noisefloor_ptwne::Counts;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -80,8 +81,14 @@ struct Report<'a> {
     samples: u64,
     /// What uniform rendering at the largest stop would take.
     samples_uniform: u64,
-    /// Samples kept out because they were not finite.
+    /// Samples kept out by the film because they were not finite.
     samples_rejected: u64,
+    /// Samples that the renderer counted as black because they were not finite.
+    samples_dropped: Option<u64>,
+    /// Samples that were scaled down to `--clamp`.
+    samples_clamped: Option<u64>,
+    /// Samples of tiles that see nothing but the background: no ray was traced for them.
+    samples_background: Option<u64>,
     seconds_source: Option<f64>,
     seconds_oracle: Option<f64>,
     seconds_total: Option<f64>,
@@ -101,7 +108,7 @@ pub struct Output {
 impl Output {
     /// Makes the folder, and makes sure that files can be written before hours are spent.
     pub fn create(args: &RenderArgs, model: Option<String>, rel_mse: Option<RelMse>) -> anyhow::Result<Self> {
-        let folder = args.out.clone().unwrap_or_else(|| Path::new("out").join(&args.scene));
+        let folder = args.out.clone().unwrap_or_else(|| Path::new("out").join(short_name(&args.scene)));
         std::fs::create_dir_all(&folder).with_context(|| {
             format!("{}: cannot make this folder; choose another with --out", folder.display())
         })?;
@@ -116,11 +123,11 @@ impl Output {
         self.timeline.push(TimelineRow { seconds, samples, active_tiles, rel_mse });
     }
 
-    /// Writes every file; `clock` when the run is over.
+    /// Writes every file; with the time it took and what became of the samples when the run is over.
     pub fn write<C: StoppingCriterion>(
         &self,
         session: &Session<C>,
-        clock: Option<Clock>,
+        over: Option<(Clock, Counts)>,
     ) -> anyhow::Result<()> {
         let film = session.film();
         let (width, height) = (film.grid().width(), film.grid().height());
@@ -152,7 +159,7 @@ impl Output {
 
         self.write_stops(&tiles)?;
         self.write_timeline()?;
-        self.write_report(session, &tiles, &display, clock)
+        self.write_report(session, &tiles, &display, over)
     }
 
     fn write_stops(&self, tiles: &[(Stop, bool)]) -> anyhow::Result<()> {
@@ -184,8 +191,9 @@ impl Output {
         session: &Session<C>,
         tiles: &[(Stop, bool)],
         display: &Display,
-        clock: Option<Clock>,
+        over: Option<(Clock, Counts)>,
     ) -> anyhow::Result<()> {
+        let (clock, counts) = over.unzip();
         let grid = session.film().grid();
         let mut stops = BTreeMap::new();
         for (stop, open) in tiles {
@@ -207,6 +215,9 @@ impl Output {
             samples: session.film().total_samples(),
             samples_uniform: uniform_samples(session),
             samples_rejected: session.film().rejected(),
+            samples_dropped: counts.map(|c| c.dropped),
+            samples_clamped: counts.map(|c| c.clamped),
+            samples_background: counts.map(|c| c.background),
             seconds_source: clock.map(|c| c.source_seconds),
             seconds_oracle: clock.map(|c| c.criterion_seconds),
             seconds_total: clock.map(|c| c.total_seconds),
@@ -216,7 +227,7 @@ impl Output {
     }
 
     /// A few lines for people.
-    pub fn summarise<C: StoppingCriterion>(&self, session: &Session<C>, clock: Clock) {
+    pub fn summarise<C: StoppingCriterion>(&self, session: &Session<C>, clock: Clock, counts: Counts) {
         let film = session.film();
         let spp: Vec<u64> = session.stops().map(|s| s.samples).collect();
         let converged = session.stops().filter(|s| s.reason == StopReason::Converged).count();
@@ -236,11 +247,25 @@ impl Output {
             clock.criterion_seconds,
             100.0 * clock.criterion_seconds / clock.total_seconds.max(1e-9),
         );
-        if film.rejected() > 0 {
-            println!("{} samples were not finite and were kept out", film.rejected());
+        for (count, what) in [
+            (film.rejected(), "were not finite and were kept out"),
+            (counts.dropped, "were not finite and counted as black"),
+            (counts.clamped, "were brighter than --clamp and scaled down"),
+        ] {
+            if count > 0 {
+                println!("{count} samples {what}");
+            }
         }
         println!("written to {}", self.folder.display());
     }
+}
+
+/// The scene's name, or the name of its file without the extension; of the file's folder, if that says no more than "scene".
+fn short_name(scene: &str) -> &str {
+    let path = Path::new(scene);
+    let stem = path.file_stem().and_then(|s| s.to_str()).unwrap_or(scene);
+    let folder = path.parent().and_then(Path::file_name).and_then(|s| s.to_str());
+    folder.filter(|_| stem == "scene").unwrap_or(stem)
 }
 
 fn uniform_samples<C: StoppingCriterion>(session: &Session<C>) -> u64 {

@@ -1,32 +1,51 @@
 //! `noisefloor render`.
 
 use crate::INTERRUPTED;
-use crate::args::{CriterionChoice, RenderArgs};
+use crate::args::{CriterionChoice, FilterChoice, RenderArgs, SamplerChoice};
 use crate::output::{Output, RelMse};
-use anyhow::Context;
+use anyhow::{Context, bail};
 use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressStyle};
-use noisefloor::{
-    Driver, Event, FixedSamples, Progress, ProgressiveSource, Session, StopReason, StoppingCriterion,
-};
-use noisefloor_ptwne::{Options, Ptwne, scenes};
+use noisefloor::{Driver, Event, FixedSamples, Progress, Session, StopReason, StoppingCriterion};
+use noisefloor_ptwne::{Filter, Options, Ptwne, Sampling, scenes};
+use noisefloor_scenefile::Loaded;
+use std::path::Path;
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
+/// Where neither the command nor the scene says: a Cornell box takes half a minute.
+const DEFAULT_SIZE: (usize, usize) = (384, 384);
+const DEFAULT_DEPTH: u32 = 65;
+
 pub fn run(args: &RenderArgs) -> anyhow::Result<ExitCode> {
     // Whatever can be wrong is found before anything is rendered.
     let params = args.params()?;
-    let (width, height) = args.size;
-    let scene = scenes::by_name(&args.scene).with_context(|| {
-        format!("there is no built-in scene {:?}; `noisefloor scenes` lists them", args.scene)
-    })?;
-    let rel_mse = args.against.as_deref().map(|path| RelMse::load(path, args.size)).transpose()?;
+    let Loaded { scene, size, max_depth, warnings } = load(&args.scene)?;
+    if !args.quiet {
+        warnings.iter().for_each(|warning| eprintln!("warning: {warning}"));
+    }
+    let (width, height) = args.size.or(size).unwrap_or(DEFAULT_SIZE);
+    let rel_mse = args.against.as_deref().map(|path| RelMse::load(path, (width, height))).transpose()?;
     if let Some(threads) = args.threads {
         rayon::ThreadPoolBuilder::new().num_threads(threads.get()).build_global().context("--threads")?;
     }
-    let options =
-        Options { seed: args.seed, max_depth: args.max_depth, mis: !args.no_mis, ..Options::default() };
+    let options = Options {
+        seed: args.seed,
+        max_depth: args.max_depth.or(max_depth).unwrap_or(DEFAULT_DEPTH),
+        mis: !args.no_mis,
+        sampling: match args.sampler {
+            SamplerChoice::Independent => Sampling::Independent,
+            SamplerChoice::Sobol => Sampling::Sobol,
+        },
+        filter: match args.filter {
+            FilterChoice::Box => Filter::Box,
+            FilterChoice::Tent => Filter::Tent,
+            FilterChoice::Gaussian => Filter::Gaussian,
+        },
+        clamp: args.clamp,
+        ..Options::default()
+    };
     let source = Ptwne::new(scene, width, height, options)?;
     match args.criterion {
         CriterionChoice::Oracle => {
@@ -40,8 +59,22 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<ExitCode> {
     }
 }
 
-fn drive<S: ProgressiveSource, C: StoppingCriterion>(
-    mut driver: Driver<S, C>,
+/// A built-in scene of that name, or the scene in that file.
+fn load(scene: &str) -> anyhow::Result<Loaded> {
+    if let Some(scene) = scenes::by_name(scene) {
+        return Ok(Loaded { scene, size: None, max_depth: None, warnings: vec![] });
+    }
+    let path = Path::new(scene);
+    if path.extension().is_none() && !path.exists() {
+        bail!(
+            "there is no built-in scene {scene:?}, nor a file of that name; `noisefloor scenes` lists the built-in ones"
+        );
+    }
+    Ok(noisefloor_scenefile::load(path)?)
+}
+
+fn drive<C: StoppingCriterion>(
+    mut driver: Driver<Ptwne, C>,
     args: &RenderArgs,
     model: Option<String>,
     rel_mse: Option<RelMse>,
@@ -69,11 +102,11 @@ fn drive<S: ProgressiveSource, C: StoppingCriterion>(
     bar.finish_and_clear();
 
     // Write what there is, also after a failure.
-    let written = output.write(driver.session(), Some(driver.clock()));
+    let written = output.write(driver.session(), Some((driver.clock(), driver.source().counts())));
     outcome?;
     written?;
     if !args.quiet {
-        output.summarise(driver.session(), driver.clock());
+        output.summarise(driver.session(), driver.clock(), driver.source().counts());
     }
     let cancelled = driver.session().stops().any(|s| s.reason == StopReason::Cancelled);
     Ok(if cancelled { ExitCode::from(INTERRUPTED) } else { ExitCode::SUCCESS })

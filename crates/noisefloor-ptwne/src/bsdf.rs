@@ -148,8 +148,8 @@ pub(crate) struct Coat {
 struct Row {
     /// Share of light from one direction that gets in: at cosines of (i/[`STEPS`])².
     at: [f32; STEPS + 1],
-    /// The same for uniform light from outside: 2∫T(μ)μ dμ.
-    mean: f32,
+    /// Share of diffuse light from inside that is reflected back.
+    inside: f32,
 }
 
 /// Steps of the tables in the cosine, and in α where it varies. Squares of even steps are dense where T bends, at grazing
@@ -191,50 +191,46 @@ impl Coat {
 
     /// What the base's albedo, times the transmittances of both directions and the cosine of the incoming one, is to be
     /// multiplied by: 1/π, refraction, and all reflections between base and coat.
-    ///
-    /// By reciprocity a share of 1 − T̄/η² of diffuse light from inside is reflected back, T̄ = 2∫T(μ)μ dμ: a white base
-    /// loses nothing.
     #[inline]
     pub(crate) fn base(&self, alpha: f32, albedo: Vec3, nonlinear: bool) -> Vec3 {
-        let mean = self.blend(alpha, |row| row.mean);
-        let eta2 = self.ior * self.ior;
+        let inside = self.blend(alpha, |row| row.inside);
         let bounces = if nonlinear { albedo } else { Vec3::ONE };
-        albedo * FRAC_1_PI / (Vec3::splat(eta2) - bounces * (eta2 - mean))
+        albedo * FRAC_1_PI / (self.ior * self.ior * (Vec3::ONE - bounces * inside))
     }
 }
 
 impl Row {
     fn new(ior: f32, alpha: f32) -> Self {
-        let rough = alpha >= crate::MIN_ROUGHNESS;
-        let transmittance = |cos: f32| {
-            if !rough {
-                return 1.0 - fresnel(cos, ior).0;
-            }
-            // Reflectance: the mean of F·G₂/G₁ over visible normals
-            const SIDE: u32 = 24;
-            let cos = cos.max(1e-3);
-            let wo = Vec3::new((1.0 - cos * cos).sqrt(), 0.0, cos);
-            let ggx = Ggx { alpha };
-            let point = |i: u32| (i as f32 + 0.5) / SIDE as f32;
-            let reflected: f64 = (0..SIDE * SIDE)
-                .map(|i| {
-                    let (_, weight, cos_h) = ggx.sample(wo, [point(i % SIDE), point(i / SIDE)]);
-                    f64::from(weight * fresnel(cos_h, ior).0)
-                })
-                .sum();
-            1.0 - (reflected / f64::from(SIDE * SIDE)) as f32
-        };
-        let at = std::array::from_fn(|i| transmittance((i as f32 / STEPS as f32).powi(2)));
-        // ∫ over μ = s², dμ = 2s ds, Simpson's rule
-        let integrand = |i: usize| f64::from(at[i]) * 4.0 * (i as f64 / STEPS as f64).powi(3);
-        let weight = |i: usize| match i {
-            0 | STEPS => 1.0,
-            i if i % 2 == 1 => 4.0,
-            _ => 2.0,
-        };
-        let mean: f64 = (0..=STEPS).map(|i| weight(i) * integrand(i)).sum::<f64>() / (3.0 * STEPS as f64);
-        Self { at, mean: mean as f32 }
+        let at = std::array::from_fn(|i| 1.0 - reflectance(ior, alpha, (i as f32 / STEPS as f32).powi(2)));
+        // 2∫R(μ)μ dμ with μ = s², by the midpoint rule
+        let inside = (0..4 * STEPS)
+            .map(|i| {
+                let s = (f64::from(i as u32) + 0.5) / (4 * STEPS) as f64;
+                f64::from(reflectance(1.0 / ior, alpha, (s * s) as f32)) * 4.0 * s.powi(3)
+            })
+            .sum::<f64>()
+            / (4 * STEPS) as f64;
+        Self { at, inside: inside as f32 }
     }
+}
+
+/// Share of the light from a direction that a boundary reflects by microfacets, once: the mean of F·G₂/G₁ over visible normals.
+fn reflectance(eta: f32, alpha: f32, cos: f32) -> f32 {
+    if alpha < crate::MIN_ROUGHNESS {
+        return fresnel(cos, eta).0;
+    }
+    const SIDE: u32 = 24;
+    let cos = cos.max(1e-3);
+    let wo = Vec3::new((1.0 - cos * cos).sqrt(), 0.0, cos);
+    let ggx = Ggx { alpha };
+    let point = |i: u32| (i as f32 + 0.5) / SIDE as f32;
+    let reflected: f64 = (0..SIDE * SIDE)
+        .map(|i| {
+            let (_, weight, cos_h) = ggx.sample(wo, [point(i % SIDE), point(i / SIDE)]);
+            f64::from(weight * fresnel(cos_h, eta).0)
+        })
+        .sum();
+    (reflected / f64::from(SIDE * SIDE)) as f32
 }
 
 /// Microfacets, of metal or of a coat, and a diffuse base below a coat, seen from one direction.

@@ -113,18 +113,32 @@ static TABLES: LazyLock<([f32; 256], [f32; 256])> = LazyLock::new(|| {
 });
 
 impl Wrap {
-    /// The pixel of `0..size` that stands at `index`.
+    /// The two pixels of `0..size` that stand around `x`, counted from the middle of the first pixel, and how far `x` is from
+    /// the first to the second.
     #[inline]
-    fn pixel(self, index: i64, size: usize) -> usize {
-        let n = size as i64;
-        (match self {
-            Wrap::Repeat => index.rem_euclid(n),
-            Wrap::Mirror => {
-                let i = index.rem_euclid(2 * n);
-                if i < n { i } else { 2 * n - 1 - i }
+    fn around(self, x: f32, size: usize) -> (usize, usize, f32) {
+        // Into one or two periods; where f32 cannot tell pixels apart any more, anything will do
+        let n = size as f32;
+        let period = if self == Wrap::Mirror { 2.0 * n } else { n };
+        let x = match self {
+            Wrap::Clamp => x.clamp(-1.0, n),
+            Wrap::Repeat | Wrap::Mirror => x - (x / period).floor() * period,
+        };
+        let x0 = x.floor();
+        let first = x0 as i32;
+        let pixel = |i: i32| {
+            let n = size as i32;
+            match self {
+                Wrap::Repeat => i % n,
+                Wrap::Mirror => {
+                    let i = i % (2 * n);
+                    if i < n { i } else { 2 * n - 1 - i }
+                }
+                Wrap::Clamp => i.clamp(0, n - 1),
             }
-            Wrap::Clamp => index.clamp(0, n - 1),
-        }) as usize
+            .clamp(0, n - 1) as usize
+        };
+        (pixel(first), pixel(first + 1), x - x0)
     }
 }
 
@@ -243,22 +257,15 @@ impl ImageTexture {
     fn eval(&self, u: f32, v: f32) -> Vec3 {
         let place = |row: [f32; 3]| row[0] * u + row[1] * v + row[2];
         let (u, v) = (place(self.to_uv[0]), place(self.to_uv[1]));
-        // Beyond 2⁴⁰ pixels f32 cannot tell where it is: anything will do, but nothing may overflow
-        let x = (u * self.width as f32 - 0.5).clamp(-1e12, 1e12);
-        let y = ((1.0 - v) * self.height as f32 - 0.5).clamp(-1e12, 1e12);
-        let at = |x: f32, y: f32| {
-            let column = self.wrap[0].pixel(x as i64, self.width);
-            self.pixels.at(self.wrap[1].pixel(y as i64, self.height) * self.width + column)
-        };
+        let (x0, x1, fx) = self.wrap[0].around(u * self.width as f32 - 0.5, self.width);
+        let (y0, y1, fy) = self.wrap[1].around((1.0 - v) * self.height as f32 - 0.5, self.height);
+        let at = |x: usize, y: usize| self.pixels.at(y * self.width + x);
         let factor = Vec3::from_array(self.factor);
         if self.nearest {
-            return at((x + 0.5).floor(), (y + 0.5).floor()) * factor;
+            let (x, y) = (if fx < 0.5 { x0 } else { x1 }, if fy < 0.5 { y0 } else { y1 });
+            return at(x, y) * factor;
         }
-        let (x0, y0) = (x.floor(), y.floor());
-        let (fx, fy) = (x - x0, y - y0);
-        let top = at(x0, y0).lerp(at(x0 + 1.0, y0), fx);
-        let bottom = at(x0, y0 + 1.0).lerp(at(x0 + 1.0, y0 + 1.0), fx);
-        top.lerp(bottom, fy) * factor
+        at(x0, y0).lerp(at(x1, y0), fx).lerp(at(x0, y1).lerp(at(x1, y1), fx), fy) * factor
     }
 }
 

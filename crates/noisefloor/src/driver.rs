@@ -139,6 +139,11 @@ impl<S: ProgressiveSource, C: StoppingCriterion> Driver<S, C> {
         &mut self.session
     }
 
+    /// The source, between two runs.
+    pub fn source(&self) -> &S {
+        &self.source
+    }
+
     /// Takes the driver apart: the source as the run left it, and the session.
     pub fn into_parts(self) -> (S, Session<C>) {
         (self.source, self.session)

@@ -25,7 +25,8 @@ fn tiny_bright_lights_and_grazing_cameras_stay_finite() {
             b.parallelogram([-1e4, 0.0, -1e4], [0.0, 0.0, 2e4], [2e4, 0.0, 0.0], floor, None).unwrap();
             b.parallelogram([-0.5, 0.1, 0.0], [1.0, 0.3, 0.0], [0.0, 0.3, 0.8], rough, None).unwrap();
             b.sphere([0.3, 0.2, 0.4], 0.2, glass, None).unwrap();
-            b.parallelogram([0.0, 1e-3, 0.0], [size, 0.0, 0.0], [0.0, 0.0, size], floor, light.clone()).unwrap();
+            b.parallelogram([0.0, 1e-3, 0.0], [size, 0.0, 0.0], [0.0, 0.0, size], floor, light.clone())
+                .unwrap();
             b.sphere([-0.4, 0.5, 0.0], size, rough, light).unwrap();
             let needle = [[0.0; 3], [1.0, 1e-7, 0.0], [2.0, 1.5e-7, 0.0]];
             b.mesh(
