@@ -1,8 +1,0 @@
-//! glTF 2.0.
-
-use crate::{LoadError, Loaded};
-use std::path::Path;
-
-pub(crate) fn load(path: &Path) -> Result<Loaded, LoadError> {
-    Err(LoadError::Format { path: path.to_owned() })
-}

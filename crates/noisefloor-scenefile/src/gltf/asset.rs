@@ -1,0 +1,180 @@
+//! A glTF file as it is: its JSON, and the bytes that it names.
+
+use super::uri;
+use crate::{LoadError, Place};
+use gltf::json::root::Get;
+use gltf::json::{Buffer, Index, Root, buffer, deserialize};
+use std::cell::{Cell, OnceCell};
+use std::path::Path;
+
+/// Most bytes that a scene may have in all its files.
+pub(super) const MAX_BYTES: u64 = 1 << 32;
+/// Most objects, arrays and commas of the JSON: a few bytes of text become an object of up to a kilobyte.
+const MAX_VALUES: u64 = 1 << 22;
+
+/// A parsed file. Nothing that the JSON says is checked beyond the types of its fields.
+#[derive(Debug)]
+pub(super) struct Asset<'a> {
+    pub(super) path: &'a Path,
+    pub(super) root: Root,
+    binary: Option<&'a [u8]>,
+    /// Those that are not the binary chunk, filled when first asked for.
+    buffers: Vec<OnceCell<Vec<u8>>>,
+    bytes: Cell<u64>,
+}
+
+impl<'a> Asset<'a> {
+    /// Parses `file`, the bytes of `path`: JSON or GLB.
+    pub(super) fn parse(path: &'a Path, file: &'a [u8]) -> Result<Self, LoadError> {
+        let (json, binary) = if file.starts_with(b"glTF") { split_glb(path, file)? } else { (file, None) };
+        let values = json.iter().filter(|b| matches!(b, b'{' | b'[' | b',')).count() as u64;
+        Place::file(path).at_most("JSON values", values, MAX_VALUES)?;
+        let root: Root = deserialize::from_slice(json).map_err(|e| {
+            Place::part(path, format_args!("line {} of the JSON", e.line()))
+                .bad(format_args!("not the JSON of a glTF file: {e}"))
+        })?;
+        let buffers = root.buffers.iter().map(|_| OnceCell::new()).collect();
+        Ok(Self { path, root, binary, buffers, bytes: Cell::new(file.len() as u64) })
+    }
+
+    /// The element of that index, named by `place`; `kind` is what to call it.
+    pub(super) fn get<T>(&self, index: Index<T>, kind: &str, place: &Place) -> Result<&T, LoadError>
+    where
+        Root: Get<T>,
+    {
+        let missing = || place.clone().bad(format_args!("{kind} {} does not exist", index.value()));
+        self.root.get(index).ok_or_else(missing)
+    }
+
+    /// Bytes in all the files read so far: what is allocated stays in proportion to them.
+    pub(super) fn bytes(&self) -> u64 {
+        self.bytes.get()
+    }
+
+    /// The bytes of a buffer view that `place` names.
+    pub(super) fn view(&self, index: Index<buffer::View>, place: &Place) -> Result<&[u8], LoadError> {
+        let view = self.get(index, "buffer view", place)?;
+        let bytes = self.buffer(view.buffer, place)?;
+        let start = view.byte_offset.unwrap_or_default().0;
+        let end = start.checked_add(view.byte_length.0);
+        let range = usize::try_from(start).ok().zip(end.and_then(|end| usize::try_from(end).ok()));
+        range.and_then(|(start, end)| bytes.get(start..end)).ok_or_else(|| {
+            Place::part(self.path, format_args!("buffer view {}", index.value())).bad(format_args!(
+                "{} bytes from byte {start} reach past the end of buffer {}, which has {}",
+                view.byte_length.0,
+                view.buffer.value(),
+                bytes.len()
+            ))
+        })
+    }
+
+    /// The bytes that `uri` names. They count towards [`MAX_BYTES`].
+    pub(super) fn resolve(&self, uri: &str, place: &Place) -> Result<Vec<u8>, LoadError> {
+        let bytes = uri::read(uri, self.path, place, MAX_BYTES.saturating_sub(self.bytes()))?;
+        self.bytes.set(self.bytes() + bytes.len() as u64);
+        Ok(bytes)
+    }
+
+    fn buffer(&self, index: Index<Buffer>, place: &Place) -> Result<&[u8], LoadError> {
+        let buffer = self.get(index, "buffer", place)?;
+        let place = || Place::part(self.path, name("buffer", index.value(), buffer.name.as_deref()));
+        let bytes = match (&buffer.uri, self.buffers[index.value()].get(), self.binary) {
+            (Some(_), Some(bytes), _) => bytes,
+            (Some(uri), None, _) => {
+                let bytes = self.resolve(uri, &place())?;
+                self.buffers[index.value()].get_or_init(|| bytes)
+            }
+            (None, _, Some(binary)) if index.value() == 0 => binary,
+            (None, ..) => {
+                return Err(place().bad("it has neither a `uri` nor the binary chunk of a GLB file"));
+            }
+        };
+        // What is past byteLength is padding
+        let length = buffer.byte_length.0;
+        usize::try_from(length).ok().and_then(|length| bytes.get(..length)).ok_or_else(|| {
+            place().bad(format_args!("its byteLength is {length}, but it has {} bytes", bytes.len()))
+        })
+    }
+}
+
+/// What to call an element: `mesh 3 "Table"`.
+pub(super) fn name(kind: &str, index: usize, name: Option<&str>) -> String {
+    match name {
+        Some(name) => format!("{kind} {index} {:?}", name.chars().take(60).collect::<String>()),
+        None => format!("{kind} {index}"),
+    }
+}
+
+/// The JSON and the binary chunk of a GLB file (glTF 2.0, §4.4).
+fn split_glb<'a>(path: &Path, file: &'a [u8]) -> Result<(&'a [u8], Option<&'a [u8]>), LoadError> {
+    let place = Place::part(path, "GLB header");
+    let Some((header, _)) = file.split_first_chunk::<12>() else {
+        return Err(place.bad(format_args!("a GLB file has at least 12 bytes, this one has {}", file.len())));
+    };
+    let [_, version, length] = words(header);
+    if version != 2 {
+        return Err(place.unsupported(format_args!("version {version} of GLB")));
+    }
+    let mut chunks = file.get(12..length as usize).ok_or_else(|| {
+        let found = file.len();
+        place.clone().bad(format_args!(
+            "it says that the file has {length} bytes, but it has {found}; it may be cut short"
+        ))
+    })?;
+    let (kind, json) = next_chunk(path, &mut chunks)?;
+    if kind != *b"JSON" {
+        return Err(place.bad("the first chunk is not JSON"));
+    }
+    if chunks.is_empty() {
+        return Ok((json, None));
+    }
+    let (kind, binary) = next_chunk(path, &mut chunks)?;
+    // Chunks of unknown kinds are to be ignored
+    Ok((json, (kind == *b"BIN\0").then_some(binary)))
+}
+
+/// Takes the first chunk of a GLB file off `bytes`: its kind and its contents.
+fn next_chunk<'a>(path: &Path, bytes: &mut &'a [u8]) -> Result<([u8; 4], &'a [u8]), LoadError> {
+    let place = Place::part(path, "GLB chunk");
+    let Some((header, rest)) = bytes.split_first_chunk::<8>() else {
+        return Err(place.bad(format_args!("its header has 8 bytes, but only {} follow", bytes.len())));
+    };
+    let [length, kind] = words(header);
+    let Some((contents, rest)) = rest.split_at_checked(length as usize) else {
+        return Err(
+            place.bad(format_args!("it says that it has {length} bytes, but only {} follow", rest.len()))
+        );
+    };
+    *bytes = rest;
+    Ok((kind.to_le_bytes(), contents))
+}
+
+/// Little-endian words.
+fn words<const N: usize>(bytes: &[u8]) -> [u32; N] {
+    std::array::from_fn(|i| u32::from_le_bytes(std::array::from_fn(|j| bytes[4 * i + j])))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn glb_files_are_split_into_their_chunks() {
+        let mut file = b"glTF\x02\0\0\0".to_vec();
+        file.extend(40u32.to_le_bytes());
+        file.extend(4u32.to_le_bytes());
+        file.extend(b"JSON{}  ");
+        file.extend(8u32.to_le_bytes());
+        file.extend(b"BIN\0abcdefgh");
+        assert_eq!(file.len(), 40);
+        let path = Path::new("a.glb");
+        let (json, binary) = split_glb(path, &file).unwrap();
+        assert_eq!((json, binary), (&b"{}  "[..], Some(&b"abcdefgh"[..])));
+        for length in 0..40 {
+            assert!(split_glb(path, &file[..length]).is_err(), "cut at {length}");
+        }
+        // A header that is shorter than itself
+        file[8] = 3;
+        assert!(split_glb(path, &file).is_err());
+    }
+}

@@ -1,0 +1,250 @@
+//! Materials (glTF 2.0, §3.9) with their extensions.
+
+use super::asset::{Asset, name};
+use super::notes::Notes;
+use super::texture::{Encoding, Textures, set};
+use crate::{LoadError, Place};
+use gltf::json::material::{AlphaMode, Material as Source};
+use gltf::json::texture::Info;
+use gltf::json::validation::Checked;
+use gltf::json::{Index, extensions};
+use noisefloor::Rgb;
+use noisefloor_ptwne::{Cover, Emission, ImageTexture, Material, MaterialId, SceneBuilder, Texture};
+use std::collections::HashMap;
+
+/// Indices of refraction that the renderer takes for a material that is not transparent.
+const MIN_COAT_IOR: f32 = 1.001;
+const MAX_IOR: f32 = 4.0;
+
+/// A material in the scene.
+#[derive(Clone, Debug)]
+pub(super) struct Look {
+    pub(super) id: MaterialId,
+    pub(super) emission: Option<Emission>,
+    /// The set of texture coordinates of its textures, if it has any.
+    pub(super) set: Option<u32>,
+}
+
+/// Materials, added to the scene when first asked for.
+#[derive(Debug)]
+pub(super) struct Materials<'a> {
+    asset: &'a Asset<'a>,
+    textures: Textures<'a>,
+    looks: HashMap<Option<usize>, Look>,
+}
+
+impl<'a> Materials<'a> {
+    pub(super) fn new(asset: &'a Asset<'a>) -> Self {
+        Self { asset, textures: Textures::new(asset), looks: HashMap::new() }
+    }
+
+    /// The material of that index, named by `place`; or glTF's default material.
+    pub(super) fn look(
+        &mut self,
+        index: Option<Index<Source>>,
+        place: &Place,
+        builder: &mut SceneBuilder,
+        notes: &mut Notes,
+    ) -> Result<Look, LoadError> {
+        let key = index.map(|index| index.value());
+        if let Some(look) = self.looks.get(&key) {
+            return Ok(look.clone());
+        }
+        let default = Source::default();
+        let (source, called) = match index {
+            Some(index) => {
+                let source = self.asset.get(index, "material", place)?;
+                (source, name("material", index.value(), source.name.as_deref()))
+            }
+            None => (&default, "default material".to_owned()),
+        };
+        let place = Place::part(self.asset.path, called);
+        let mut reader = Reader { source, place, set: None, textures: &mut self.textures, notes };
+        let (material, cover, emission) = reader.read()?;
+        let (set, place) = (reader.set, reader.place);
+        let id = builder.material_with(material, cover).map_err(|cause| LoadError::Scene { place, cause })?;
+        let look = Look { id, emission, set };
+        self.looks.insert(key, look.clone());
+        Ok(look)
+    }
+}
+
+/// Reads one material.
+struct Reader<'m, 'a> {
+    source: &'m Source,
+    place: Place,
+    set: Option<u32>,
+    textures: &'m mut Textures<'a>,
+    notes: &'m mut Notes,
+}
+
+impl<'m> Reader<'m, '_> {
+    fn read(&mut self) -> Result<(Material, Cover, Option<Emission>), LoadError> {
+        let source = self.source;
+        let pbr = &source.pbr_metallic_roughness;
+        let ignored = [
+            ("a normal map", source.normal_texture.is_some()),
+            ("an occlusion map", source.occlusion_texture.is_some()),
+        ];
+        for (what, _) in ignored.iter().filter(|(_, there)| *there) {
+            self.notes.warn(&self.place, format_args!("{what} is ignored"));
+        }
+        self.notes.extensions(&self.place, source.extensions.iter().flat_map(|e| e.others.keys()));
+        self.notes.extensions(&self.place, pbr.extensions.iter().flat_map(|e| e.others.keys()));
+
+        // The first texture chooses the set of texture coordinates
+        let [base_texture, metal_texture, emissive_texture] =
+            [&pbr.base_color_texture, &pbr.metallic_roughness_texture, &source.emissive_texture]
+                .map(Option::as_ref);
+        self.set = [base_texture, metal_texture, emissive_texture].into_iter().flatten().map(set).next();
+
+        let material = match self.transmission(base_texture)? {
+            Some(glass) => glass,
+            None => self.opaque(base_texture, metal_texture)?,
+        };
+        // The inside of glass is part of it
+        let glass = matches!(material, Material::Glass { .. });
+        let cover = Cover { opacity: self.opacity(base_texture)?, one_sided: !source.double_sided && !glass };
+        Ok((material, cover, self.emission(emissive_texture)?))
+    }
+
+    /// Colour times texture.
+    fn colour(
+        &mut self,
+        factor: Rgb,
+        texture: Option<&Info>,
+        encoding: Encoding,
+    ) -> Result<Texture, LoadError> {
+        let Some(info) = texture.filter(|info| self.fits(info)) else { return Ok(factor.into()) };
+        let image = self.textures.colour(info, encoding, &self.place, self.notes)?;
+        Ok(Texture::Image(ImageTexture { factor, ..image }))
+    }
+
+    /// Whether a texture uses the material's set of texture coordinates: meshes have one.
+    fn fits(&mut self, info: &Info) -> bool {
+        let fits = Some(set(info)) == self.set;
+        if !fits {
+            let what = format_args!(
+                "texture {} is ignored: it uses set {} of texture coordinates, another texture set {}",
+                info.index.value(),
+                set(info),
+                self.set.unwrap_or_default()
+            );
+            self.notes.warn(&self.place, what);
+        }
+        fits
+    }
+
+    fn opaque(&mut self, base: Option<&Info>, metal: Option<&Info>) -> Result<Material, LoadError> {
+        let pbr = &self.source.pbr_metallic_roughness;
+        let [r, g, b, _] = pbr.base_color_factor.0;
+        let factor = [r, g, b].map(|x| self.within(x, "baseColorFactor", 0.0, 1.0));
+        let base = self.colour(factor, base, Encoding::Srgb)?;
+        let roughness = self.within(pbr.roughness_factor.0, "roughnessFactor", 0.0, 1.0);
+        let metallic = self.within(pbr.metallic_factor.0, "metallicFactor", 0.0, 1.0);
+        let metallic_roughness = self.colour([1.0, roughness, metallic], metal, Encoding::Linear)?;
+        let ior = self.ior(MIN_COAT_IOR);
+        Ok(Material::MetallicRoughness { base, metallic_roughness, ior })
+    }
+
+    /// `KHR_materials_transmission`: all or nothing, and smooth.
+    fn transmission(&mut self, base: Option<&Info>) -> Result<Option<Material>, LoadError> {
+        let Some(transmission) = self.extensions().and_then(|e| e.transmission.as_ref()) else {
+            return Ok(None);
+        };
+        if transmission.transmission_texture.is_some() {
+            self.notes.warn(&self.place, "the texture of its transmission is ignored, its factor used alone");
+        }
+        let share = self.within(transmission.transmission_factor.0, "transmissionFactor", 0.0, 1.0);
+        if share > 0.0 && share < 1.0 {
+            let what = if share >= 0.5 { "1: all glass" } else { "0: opaque" };
+            self.notes.warn(&self.place, format_args!("a transmissionFactor of {share} is taken for {what}"));
+        }
+        if share < 0.5 {
+            return Ok(None);
+        }
+        let pbr = &self.source.pbr_metallic_roughness;
+        if pbr.roughness_factor.0 > 0.0 {
+            let what = format_args!("a roughness of {} is ignored: glass is smooth", pbr.roughness_factor.0);
+            self.notes.warn(&self.place, what);
+        }
+        if base.is_some() {
+            self.notes.warn(&self.place, "its base colour texture is ignored: glass has one tint");
+        }
+        let [r, g, b, _] = pbr.base_color_factor.0;
+        let tint = [r, g, b].map(|x| self.within(x, "baseColorFactor", 0.0, 1.0));
+        Ok(Some(Material::Glass { ior: self.ior(0.25), tint }))
+    }
+
+    fn opacity(&mut self, base: Option<&Info>) -> Result<Option<Texture>, LoadError> {
+        let [.., alpha] = self.source.pbr_metallic_roughness.base_color_factor.0;
+        let (alpha, cutoff) = match self.source.alpha_mode {
+            Checked::Valid(AlphaMode::Opaque) => return Ok(None),
+            Checked::Valid(AlphaMode::Blend) => {
+                (self.within(alpha, "alpha of baseColorFactor", 0.0, 1.0), None)
+            }
+            Checked::Valid(AlphaMode::Mask) => (alpha, Some(self.source.alpha_cutoff.unwrap_or_default().0)),
+            Checked::Invalid => return Err(self.place.clone().bad("its alphaMode is not one of glTF's")),
+        };
+        // The texture's own alpha is opaque where alpha·texture ≥ cutoff
+        let threshold = cutoff.map(|cutoff| if alpha > 0.0 { cutoff / alpha } else { f32::INFINITY });
+        let image = match base.filter(|info| Some(set(info)) == self.set) {
+            Some(info) => self.textures.opacity(info, threshold, &self.place)?,
+            None => None,
+        };
+        let factor = match cutoff {
+            None => alpha,
+            // With an image, its pixels have the answer
+            Some(cutoff) => {
+                if image.is_some() || alpha >= cutoff {
+                    1.0
+                } else {
+                    0.0
+                }
+            }
+        };
+        Ok(match image {
+            Some(image) => Some(Texture::Image(ImageTexture { factor: [factor; 3], ..image })),
+            None => (factor < 1.0).then_some(Texture::Colour([factor; 3])),
+        })
+    }
+
+    fn emission(&mut self, texture: Option<&Info>) -> Result<Option<Emission>, LoadError> {
+        let strength = self
+            .extensions()
+            .and_then(|e| e.emissive_strength.as_ref())
+            .map_or(1.0, |e| e.emissive_strength.0);
+        let factor = self.source.emissive_factor.0;
+        let radiance = factor.map(|x| self.within(x * strength, "emission", 0.0, f32::MAX));
+        if radiance == [0.0; 3] {
+            return Ok(None);
+        }
+        let two_sided = self.source.double_sided;
+        let texture = match texture {
+            // A lamp that shines all over instead of in places would be worse than none
+            Some(info) if !self.fits(info) => return Ok(None),
+            Some(_) => Some(self.colour([1.0; 3], texture, Encoding::Srgb)?),
+            None => None,
+        };
+        Ok(Some(Emission { radiance, texture, two_sided }))
+    }
+
+    /// Index of refraction.
+    fn ior(&mut self, min: f32) -> f32 {
+        let ior = self.extensions().and_then(|e| e.ior.as_ref()).map_or(1.5, |e| e.ior.0);
+        self.within(ior, "index of refraction", min, MAX_IOR)
+    }
+
+    /// The nearest number in a range, with a warning if it is another.
+    fn within(&mut self, x: f32, what: &str, min: f32, max: f32) -> f32 {
+        let nearest = x.clamp(min, max);
+        if nearest != x {
+            self.notes.warn(&self.place, format_args!("{what} is {x}, taken for {nearest}"));
+        }
+        nearest
+    }
+
+    fn extensions(&self) -> Option<&'m extensions::material::Material> {
+        self.source.extensions.as_ref()
+    }
+}

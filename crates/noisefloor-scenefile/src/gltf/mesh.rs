@@ -1,0 +1,168 @@
+//! Triangles of meshes (glTF 2.0, §3.7).
+
+use super::accessor::{floats, indices};
+use super::asset::Asset;
+use crate::{LoadError, Place};
+use glam::{DAffine3, DVec3};
+use gltf::json::mesh::{Mode, Primitive, Semantic};
+use gltf::json::validation::Checked;
+use gltf::json::{Accessor, Index};
+
+/// An indexed mesh, as the renderer takes it. `normals` and `uvs` may be empty.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Triangles {
+    pub(super) positions: Vec<[f32; 3]>,
+    pub(super) normals: Vec<[f32; 3]>,
+    pub(super) uvs: Vec<[f32; 2]>,
+    pub(super) indices: Vec<[u32; 3]>,
+}
+
+/// The accessor of an attribute, if there is one.
+pub(super) fn attribute(primitive: &Primitive, semantic: Semantic) -> Option<Index<Accessor>> {
+    primitive.attributes.get(&Checked::Valid(semantic)).copied()
+}
+
+/// The corners of a primitive, before its node's transform.
+pub(super) fn positions(
+    asset: &Asset<'_>,
+    primitive: &Primitive,
+    place: &Place,
+) -> Result<Vec<[f32; 3]>, LoadError> {
+    let Some(positions) = attribute(primitive, Semantic::Positions) else { return Ok(vec![]) };
+    floats(asset, positions, place)
+}
+
+/// The triangles of a primitive, before its node's transform, with the texture coordinates of that set.
+pub(super) fn triangles(
+    asset: &Asset<'_>,
+    primitive: &Primitive,
+    mode: Mode,
+    set: Option<u32>,
+    place: &Place,
+) -> Result<Triangles, LoadError> {
+    let positions = positions(asset, primitive, place)?;
+    let alike = |accessor: Option<Index<Accessor>>, what: &str| match accessor {
+        Some(index) => {
+            let (found, expected) = (asset.get(index, "accessor", place)?.count.0, positions.len());
+            if found != expected as u64 {
+                return Err(place
+                    .clone()
+                    .bad(format_args!("it has {expected} positions, but {found} {what}")));
+            }
+            Ok(Some(index))
+        }
+        None => Ok(None),
+    };
+    let normals = match alike(attribute(primitive, Semantic::Normals), "normals")? {
+        Some(normals) => floats(asset, normals, place)?,
+        None => vec![],
+    };
+    let set = set.and_then(|set| attribute(primitive, Semantic::TexCoords(set)));
+    let uvs = match alike(set, "texture coordinates")? {
+        // The first row of an image is at v = 0 in glTF, at v = 1 in the renderer
+        Some(uvs) => floats(asset, uvs, place)?.into_iter().map(|[u, v]: [f32; 2]| [u, 1.0 - v]).collect(),
+        None => vec![],
+    };
+    let corners = match primitive.indices {
+        Some(accessor) => indices(asset, accessor, place)?,
+        None => (0..u32::try_from(positions.len()).unwrap_or(u32::MAX)).collect(),
+    };
+    Ok(Triangles { positions, normals, uvs, indices: assemble(mode, &corners) })
+}
+
+/// Number of triangles of a mode that `corners` make.
+pub(super) fn count(mode: Mode, corners: u64) -> u64 {
+    match mode {
+        Mode::Triangles => corners / 3,
+        Mode::TriangleStrip | Mode::TriangleFan => corners.saturating_sub(2),
+        Mode::Points | Mode::Lines | Mode::LineLoop | Mode::LineStrip => 0,
+    }
+}
+
+/// Triangles from the corners of a mode. Incomplete ones are left out, as the specification says.
+fn assemble(mode: Mode, corners: &[u32]) -> Vec<[u32; 3]> {
+    let (groups, _) = corners.as_chunks::<3>();
+    let windows = corners.windows(3).map(|w| [w[0], w[1], w[2]]);
+    match mode {
+        Mode::Triangles => groups.to_vec(),
+        Mode::TriangleStrip => {
+            windows.enumerate().map(|(i, [a, b, c])| if i % 2 == 0 { [a, b, c] } else { [a, c, b] }).collect()
+        }
+        Mode::TriangleFan => {
+            corners.get(1..).unwrap_or_default().windows(2).map(|w| [w[0], w[1], corners[0]]).collect()
+        }
+        Mode::Points | Mode::Lines | Mode::LineLoop | Mode::LineStrip => vec![],
+    }
+}
+
+impl Triangles {
+    /// Moves the triangles to where a node is in the world.
+    pub(super) fn place(&mut self, to_world: &DAffine3) {
+        for p in &mut self.positions {
+            *p = moved(*p, to_world);
+        }
+        // Normals go by the inverse transpose. That is the matrix of cofactors over the determinant, of which a normal needs
+        // the sign only; the cofactors exist even of a scale by zero.
+        let [x, y, z] = [to_world.matrix3.x_axis, to_world.matrix3.y_axis, to_world.matrix3.z_axis];
+        let mirrored = to_world.matrix3.determinant() < 0.0;
+        let sign = if mirrored { -1.0 } else { 1.0 };
+        let [x, y, z] = [y.cross(z), z.cross(x), x.cross(y)].map(|c| c * sign);
+        for n in &mut self.normals {
+            let [a, b, c] = n.map(f64::from);
+            *n = (x * a + y * b + z * c).normalize_or_zero().as_vec3().to_array();
+        }
+        if mirrored {
+            for [_, b, c] in &mut self.indices {
+                std::mem::swap(b, c);
+            }
+        }
+    }
+}
+
+/// A point in the world.
+pub(super) fn moved(p: [f32; 3], to_world: &DAffine3) -> [f32; 3] {
+    to_world.transform_point3(DVec3::from_array(p.map(f64::from))).as_vec3().to_array()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::{DMat3, DQuat};
+
+    #[test]
+    fn modes_make_triangles_that_face_alike() {
+        let corners = [0, 1, 2, 3, 4];
+        assert_eq!(assemble(Mode::Triangles, &corners), [[0, 1, 2]]);
+        assert_eq!(assemble(Mode::TriangleStrip, &corners), [[0, 1, 2], [1, 3, 2], [2, 3, 4]]);
+        assert_eq!(assemble(Mode::TriangleFan, &corners), [[1, 2, 0], [2, 3, 0], [3, 4, 0]]);
+        for mode in [Mode::Triangles, Mode::TriangleStrip, Mode::TriangleFan, Mode::Lines] {
+            for length in 0..=5 {
+                let found = assemble(mode, &corners[..length]).len() as u64;
+                assert_eq!(found, count(mode, length as u64), "{mode:?} of {length}");
+            }
+        }
+    }
+
+    #[test]
+    fn normals_stay_perpendicular_and_in_front() {
+        let triangle = Triangles {
+            positions: vec![[0.0; 3], [1.0, 0.0, 0.5], [0.0, 1.0, 0.25]],
+            normals: vec![[-0.5, -0.25, 1.0]; 3],
+            uvs: vec![],
+            indices: vec![[0, 1, 2]],
+        };
+        let turn = DMat3::from_quat(DQuat::from_euler(glam::EulerRot::XYZ, 0.3, -1.1, 2.0));
+        for scale in [[1.0, 1.0, 1.0], [3.0, 0.5, 1.0], [-1.0, 2.0, 0.7], [-1.0, -1.0, -1.0]] {
+            let matrix = turn * DMat3::from_diagonal(DVec3::from_array(scale));
+            let mut moved = triangle.clone();
+            moved.place(&DAffine3::from_mat3_translation(matrix, DVec3::new(1.0, 2.0, 3.0)));
+            let [a, b, c] =
+                moved.indices[0].map(|i| DVec3::from_array(moved.positions[i as usize].map(f64::from)));
+            let normal = (b - a).cross(c - a).normalize();
+            for n in moved.normals {
+                let n = DVec3::from_array(n.map(f64::from));
+                assert!((n - normal).length() < 1e-6, "{scale:?}: {n} for {normal}");
+            }
+        }
+    }
+}

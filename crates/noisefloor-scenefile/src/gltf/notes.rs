@@ -1,0 +1,67 @@
+//! What a load does without.
+
+use super::asset::Asset;
+use crate::{LoadError, Place, Warning};
+use std::collections::BTreeSet;
+use std::fmt;
+
+/// Extensions that a file may require. Of `KHR_materials_unlit` the specification gives a lit fallback, which is used;
+/// `KHR_mesh_quantization` is but a wider choice of accessors, all of which are read.
+const KNOWN: [&str; 7] = [
+    "KHR_lights_punctual",
+    "KHR_materials_emissive_strength",
+    "KHR_materials_ior",
+    "KHR_materials_transmission",
+    "KHR_materials_unlit",
+    "KHR_mesh_quantization",
+    "KHR_texture_transform",
+];
+
+/// Collects warnings.
+#[derive(Debug, Default)]
+pub(super) struct Notes {
+    warnings: Vec<Warning>,
+    /// Extensions that some warning names.
+    extensions: BTreeSet<String>,
+}
+
+impl Notes {
+    /// Something is ignored or replaced.
+    pub(super) fn warn(&mut self, place: &Place, what: impl fmt::Display) {
+        self.warnings.push(Warning { place: place.clone(), what: what.to_string() });
+    }
+
+    /// An element has these extensions, which are ignored.
+    pub(super) fn extensions<'n>(&mut self, place: &Place, names: impl IntoIterator<Item = &'n String>) {
+        for name in names {
+            self.warn(place, format_args!("the extension {name} is ignored"));
+            self.extensions.insert(name.clone());
+        }
+    }
+
+    /// All warnings, with those for the extensions that the file uses but no element that was read.
+    pub(super) fn finish(mut self, asset: &Asset<'_>) -> Vec<Warning> {
+        let place = Place::part(asset.path, "extensionsUsed");
+        for name in &asset.root.extensions_used {
+            if !KNOWN.contains(&name.as_str()) && !self.extensions.contains(name) {
+                self.warn(&place, format_args!("the extension {name} is ignored"));
+            }
+        }
+        self.warnings
+    }
+}
+
+/// Checks that the file requires no later version of glTF and no extension that would be missed.
+pub(super) fn check_required(asset: &Asset<'_>) -> Result<(), LoadError> {
+    let header = &asset.root.asset;
+    let version = header.min_version.as_ref().unwrap_or(&header.version);
+    if header.min_version.as_ref().is_some_and(|v| v != "2.0") || !version.starts_with("2.") {
+        return Err(Place::part(asset.path, "asset").unsupported(format_args!("version {version:?} of glTF")));
+    }
+    let required = &asset.root.extensions_required;
+    match required.iter().find(|name| !KNOWN.contains(&name.as_str())) {
+        Some(name) => Err(Place::part(asset.path, "extensionsRequired")
+            .unsupported(format_args!("the extension {name}, which the file requires,"))),
+        None => Ok(()),
+    }
+}

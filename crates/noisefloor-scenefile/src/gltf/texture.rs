@@ -1,0 +1,245 @@
+//! Textures: images, their samplers (glTF 2.0, §3.8), and `KHR_texture_transform`.
+
+use super::asset::{Asset, name};
+use super::notes::Notes;
+use crate::picture::{self, Samples};
+use crate::{LoadError, Place};
+use gltf::json::extensions::texture::TextureTransform;
+use gltf::json::texture::{Info, MagFilter, Sampler, WrappingMode};
+use gltf::json::validation::Checked;
+use gltf::json::{Image, Index};
+use noisefloor_ptwne::{ImageTexture, MAX_TEXTURE_PIXELS, Pixels, Wrap};
+use std::collections::HashMap;
+use std::sync::Arc;
+
+/// Most pixels of all images together: a small file can make a large image, and a file can name many.
+const MAX_PIXELS: u64 = 4 * MAX_TEXTURE_PIXELS as u64;
+
+/// What the numbers of an image mean.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Encoding {
+    /// Colours, encoded as sRGB.
+    Srgb,
+    /// Shares.
+    Linear,
+}
+
+/// Three channels of an image, shared by all that show them.
+type Codes = Arc<[[u8; 3]]>;
+
+/// A decoded image, shared by all textures that show it.
+#[derive(Clone, Debug)]
+struct Decoded {
+    width: usize,
+    height: usize,
+    colour: Codes,
+    /// None if it is opaque.
+    alpha: Option<Arc<[u8]>>,
+}
+
+/// Images, decoded when first asked for.
+#[derive(Debug)]
+pub(super) struct Textures<'a> {
+    asset: &'a Asset<'a>,
+    images: HashMap<usize, Decoded>,
+    /// By image, and the smallest alpha that is opaque if there is such a threshold.
+    opacities: HashMap<(usize, Option<u16>), Codes>,
+    pixels: u64,
+}
+
+impl<'a> Textures<'a> {
+    pub(super) fn new(asset: &'a Asset<'a>) -> Self {
+        Self { asset, images: HashMap::new(), opacities: HashMap::new(), pixels: 0 }
+    }
+
+    /// The colours of a texture, that the element at `place` uses.
+    pub(super) fn colour(
+        &mut self,
+        info: &Info,
+        encoding: Encoding,
+        place: &Place,
+        notes: &mut Notes,
+    ) -> Result<ImageTexture, LoadError> {
+        let (_, mut texture) = self.texture(info, place, notes)?;
+        if let (Encoding::Linear, Pixels::Srgb8(pixels)) = (encoding, &texture.pixels) {
+            texture.pixels = Pixels::Linear8(pixels.clone());
+        }
+        Ok(texture)
+    }
+
+    /// Alpha of a texture, if it is not opaque all over. With a threshold, 1 where alpha reaches it, and 0 elsewhere.
+    pub(super) fn opacity(
+        &mut self,
+        info: &Info,
+        threshold: Option<f32>,
+        place: &Place,
+    ) -> Result<Option<ImageTexture>, LoadError> {
+        // What it has to say of extensions has been said for the colours
+        let (image, mut texture) = self.texture(info, place, &mut Notes::default())?;
+        let Some(alpha) = self.images.get(&image).and_then(|decoded| decoded.alpha.clone()) else {
+            return Ok(None);
+        };
+        let threshold = threshold.map(|t| (0..=255).find(|a| f32::from(*a) / 255.0 >= t).unwrap_or(256));
+        let opacity = match self.opacities.get(&(image, threshold)) {
+            Some(opacity) => opacity.clone(),
+            None => {
+                self.count(alpha.len(), place)?;
+                let opacity: Codes = match threshold {
+                    Some(t) => alpha.iter().map(|a| [if u16::from(*a) >= t { 255 } else { 0 }; 3]).collect(),
+                    None => alpha.iter().map(|a| [*a; 3]).collect(),
+                };
+                self.opacities.insert((image, threshold), opacity.clone());
+                opacity
+            }
+        };
+        texture.pixels = Pixels::Linear8(opacity);
+        Ok(Some(texture))
+    }
+
+    /// The texture with its colours taken for sRGB, and the index of its image.
+    fn texture(
+        &mut self,
+        info: &Info,
+        place: &Place,
+        notes: &mut Notes,
+    ) -> Result<(usize, ImageTexture), LoadError> {
+        let asset = self.asset;
+        let texture = asset.get(info.index, "texture", place)?;
+        let here = Place::part(asset.path, name("texture", info.index.value(), texture.name.as_deref()));
+        notes.extensions(&here, texture.extensions.iter().flat_map(|e| e.others.keys()));
+        notes.extensions(place, info.extensions.iter().flat_map(|e| e.others.keys()));
+        let Decoded { width, height, colour, .. } = self.decoded(texture.source, &here, notes)?;
+        let default = Sampler::default();
+        let sampler = match texture.sampler {
+            Some(sampler) => asset.get(sampler, "sampler", &here)?,
+            None => &default,
+        };
+        let wrap = [wrap(sampler.wrap_s, &here)?, wrap(sampler.wrap_t, &here)?];
+        let nearest = match sampler.mag_filter {
+            None | Some(Checked::Valid(MagFilter::Linear)) => false,
+            Some(Checked::Valid(MagFilter::Nearest)) => true,
+            Some(Checked::Invalid) => {
+                return Err(here.bad("the magFilter of its sampler is not one of glTF's"));
+            }
+        };
+        let transform = info.extensions.as_ref().and_then(|e| e.texture_transform.as_ref());
+        let to_uv = transform.map_or(ImageTexture::IDENTITY, to_uv);
+        let (pixels, factor) = (Pixels::Srgb8(colour), [1.0; 3]);
+        let shown = ImageTexture { width, height, pixels, to_uv, factor, wrap, nearest };
+        Ok((texture.source.value(), shown))
+    }
+
+    fn decoded(
+        &mut self,
+        index: Index<Image>,
+        place: &Place,
+        notes: &mut Notes,
+    ) -> Result<Decoded, LoadError> {
+        if let Some(decoded) = self.images.get(&index.value()) {
+            return Ok(decoded.clone());
+        }
+        let image = self.asset.get(index, "image", place)?;
+        let here = Place::part(self.asset.path, name("image", index.value(), image.name.as_deref()));
+        notes.extensions(&here, image.extensions.iter().flat_map(|e| e.others.keys()));
+        let picture = match (image.buffer_view, &image.uri) {
+            (Some(view), _) => picture::decode(self.asset.view(view, &here)?, &here)?,
+            (None, Some(uri)) => picture::decode(&self.asset.resolve(uri, &here)?, &here)?,
+            (None, None) => return Err(here.bad("it has neither a `bufferView` nor a `uri`")),
+        };
+        let rgba = match picture.samples {
+            Samples::Eight(rgba) => rgba,
+            Samples::Sixteen(rgba) => rgba.into_iter().map(|p| p.map(eight_bits)).collect(),
+            Samples::Linear(_) => return Err(here.unsupported("an image that is neither PNG nor JPEG")),
+        };
+        self.count(rgba.len(), &here)?;
+        let opaque = rgba.iter().all(|[.., a]| *a == 255);
+        let decoded = Decoded {
+            width: picture.width,
+            height: picture.height,
+            colour: rgba.iter().map(|[r, g, b, _]| [*r, *g, *b]).collect(),
+            alpha: (!opaque).then(|| rgba.iter().map(|[.., a]| *a).collect()),
+        };
+        self.images.insert(index.value(), decoded.clone());
+        Ok(decoded)
+    }
+
+    /// Counts pixels against [`MAX_PIXELS`].
+    fn count(&mut self, pixels: usize, place: &Place) -> Result<(), LoadError> {
+        self.pixels += pixels as u64;
+        place.clone().at_most("pixels of images in all", self.pixels, MAX_PIXELS)
+    }
+}
+
+/// The set of texture coordinates of a texture.
+pub(super) fn set(info: &Info) -> u32 {
+    let transform = info.extensions.as_ref().and_then(|e| e.texture_transform.as_ref());
+    transform.and_then(|t| t.tex_coord).unwrap_or(info.tex_coord)
+}
+
+/// The nearest code of 8 bits.
+fn eight_bits(code: u16) -> u8 {
+    ((u32::from(code) * 255 + 32767) / 65535) as u8
+}
+
+fn wrap(mode: Checked<WrappingMode>, place: &Place) -> Result<Wrap, LoadError> {
+    match mode {
+        Checked::Valid(WrappingMode::Repeat) => Ok(Wrap::Repeat),
+        Checked::Valid(WrappingMode::MirroredRepeat) => Ok(Wrap::Mirror),
+        Checked::Valid(WrappingMode::ClampToEdge) => Ok(Wrap::Clamp),
+        Checked::Invalid => Err(place.clone().bad("a wrapping mode of its sampler is not one of glTF's")),
+    }
+}
+
+/// The transform for texture coordinates with v = 0 at the bottom, where glTF has it at the top.
+///
+/// glTF scales, then rotates, then shifts: with s, c the sine and cosine,
+/// u′ = c·sx·u + s·sy·v + ox and v′ = −s·sx·u + c·sy·v + oy. Here 1 − v stands for v on both sides.
+fn to_uv(transform: &TextureTransform) -> [[f32; 3]; 2] {
+    let (s, c) = transform.rotation.0.sin_cos();
+    let [sx, sy] = transform.scale.0;
+    let [ox, oy] = transform.offset.0;
+    [[c * sx, -s * sy, s * sy + ox], [s * sx, c * sy, 1.0 - c * sy - oy]]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use gltf::json::extensions::texture::{
+        TextureTransformOffset, TextureTransformRotation, TextureTransformScale,
+    };
+    use std::f32::consts::FRAC_PI_2;
+
+    /// Where the transform puts (u, v), both with v = 0 at the top as in glTF.
+    fn moved(offset: [f32; 2], rotation: f32, scale: [f32; 2], [u, v]: [f32; 2]) -> [f32; 2] {
+        let transform = TextureTransform {
+            offset: TextureTransformOffset(offset),
+            rotation: TextureTransformRotation(rotation),
+            scale: TextureTransformScale(scale),
+            ..TextureTransform::default()
+        };
+        let [x, y] = to_uv(&transform).map(|row| row[0] * u + row[1] * (1.0 - v) + row[2]);
+        [x, 1.0 - y]
+    }
+
+    #[test]
+    fn transforms_are_those_of_gltf() {
+        let close = |a: [f32; 2], b: [f32; 2]| (a[0] - b[0]).abs() < 1e-6 && (a[1] - b[1]).abs() < 1e-6;
+        let p = [0.25, 0.75];
+        assert!(close(moved([0.0; 2], 0.0, [1.0; 2], p), p));
+        assert!(close(moved([0.5, 0.125], 0.0, [1.0; 2], p), [0.75, 0.875]));
+        assert!(close(moved([0.0; 2], 0.0, [2.0, 3.0], p), [0.5, 2.25]));
+        // A quarter turn counter-clockwise about the top left, v running down: right goes up
+        assert!(close(moved([0.0; 2], FRAC_PI_2, [1.0; 2], [1.0, 0.0]), [0.0, -1.0]));
+        assert!(close(moved([0.0; 2], FRAC_PI_2, [1.0; 2], [0.0, 1.0]), [1.0, 0.0]));
+        // The example of the specification: the lower left quarter of the image, turned clockwise
+        let example = |uv| moved([0.0, 1.0], FRAC_PI_2, [0.5; 2], uv);
+        assert!(close(example([0.0, 0.0]), [0.0, 1.0]) && close(example([1.0, 1.0]), [0.5, 0.5]));
+        // Scale first, shift last
+        assert!(close(moved([0.5, 1.0], FRAC_PI_2, [2.0, 3.0], [1.0, 0.0]), [0.5, -1.0]));
+    }
+
+    #[test]
+    fn codes_are_rounded() {
+        assert_eq!([0, 128, 129, 32768, 65535].map(eight_bits), [0, 0, 1, 128, 255]);
+    }
+}

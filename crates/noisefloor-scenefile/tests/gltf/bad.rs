@@ -1,0 +1,234 @@
+//! Bad files: what is said of them names the place, and nothing is allocated for what they only claim to have.
+
+use crate::kit::{Maker, base64, json, load};
+use gltf::json::Value;
+use noisefloor_scenefile::LoadError;
+
+/// A lit scene with a textured wall.
+fn good() -> Maker {
+    let mut maker = Maker::new();
+    let mesh = maker.rectangle(
+        [-1.0, 1.0],
+        [-1.0, 1.0],
+        -1.0,
+        r#"{"name": "Oak", "pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}"#,
+    );
+    maker.texture(1, &[[9, 9, 9, 255]], r#"{"wrapS": 33648}"#);
+    maker.root["meshes"][0]["name"] = "Table".into();
+    maker.node(&format!(r#"{{"mesh": {mesh}}}"#));
+    maker.root["extensions"]["KHR_lights_punctual"]["lights"] = json(r#"[{"type": "point"}]"#);
+    maker.node(r#"{"extensions": {"KHR_lights_punctual": {"light": 0}}}"#);
+    maker
+}
+
+/// What is said of the good scene with `value` at `pointer`.
+fn error(pointer: &str, value: &str) -> LoadError {
+    let mut maker = good();
+    let (parent, key) = pointer.rsplit_once('/').unwrap();
+    let parent = maker.root.pointer_mut(parent).unwrap_or_else(|| panic!("no {pointer}"));
+    match parent {
+        Value::Array(elements) => elements[key.parse::<usize>().unwrap()] = json(value),
+        parent => parent[key] = json(value),
+    }
+    match maker.load() {
+        Err(error) => error,
+        Ok(_) => panic!("{value} at {pointer} is accepted"),
+    }
+}
+
+#[test]
+fn the_good_scene_is_good() {
+    let loaded = good().load().unwrap();
+    assert!(loaded.warnings.is_empty(), "{:?}", loaded.warnings);
+    assert_eq!(loaded.scene.surfaces(), 2);
+}
+
+#[test]
+fn every_error_names_its_place() {
+    let table = r#"mesh 0 "Table", primitive 0: "#;
+    for (pointer, value, place, what) in [
+        // Indices that lead nowhere
+        ("/scene", "7", "scene.gltf: ", "scene 7 does not exist"),
+        ("/scenes/0/nodes/0", "99", "scene.gltf: ", "node 99 does not exist"),
+        ("/nodes/0/camera", "9", "node 0: ", "camera 9 does not exist"),
+        ("/nodes/1/mesh", "9", "node 1: ", "mesh 9 does not exist"),
+        ("/nodes/2/extensions/KHR_lights_punctual/light", "1", "node 2: ", "light 1 does not exist"),
+        ("/meshes/0/primitives/0/attributes/POSITION", "99", table, "accessor 99 does not exist"),
+        ("/meshes/0/primitives/0/indices", "99", table, "accessor 99 does not exist"),
+        ("/meshes/0/primitives/0/material", "99", table, "material 99 does not exist"),
+        ("/accessors/0/bufferView", "99", table, "buffer view 99 does not exist"),
+        ("/bufferViews/0/buffer", "1", table, "buffer 1 does not exist"),
+        (
+            "/materials/0/pbrMetallicRoughness/baseColorTexture/index",
+            "5",
+            r#"material 0 "Oak": "#,
+            "texture 5",
+        ),
+        ("/textures/0/source", "5", "texture 0: ", "image 5 does not exist"),
+        ("/textures/0/sampler", "5", "texture 0: ", "sampler 5 does not exist"),
+        // What glTF does not have
+        ("/accessors/0/componentType", "5124", table, "componentType of accessor 0"),
+        ("/accessors/0/type", r#""VEC2""#, table, "accessor 0: an element must have 3 numbers here, not 2"),
+        ("/accessors/0/type", r#""VEC5""#, table, "accessor 0: an element must have 3 numbers here"),
+        ("/accessors/2/componentType", "5122", table, "accessor 2: indices are unsigned"),
+        ("/meshes/0/primitives/0/mode", "7", table, "mode"),
+        ("/samplers/0/wrapS", "1", "texture 0: ", "wrapping mode"),
+        ("/samplers/0/magFilter", "1", "texture 0: ", "magFilter"),
+        ("/materials/0/alphaMode", r#""FOG""#, r#"material 0 "Oak": "#, "alphaMode"),
+        ("/cameras/0/type", r#""fisheye""#, "camera 0: ", "perspective"),
+        ("/extensions/KHR_lights_punctual/lights/0/type", r#""spot""#, "light 0: ", "spot light"),
+        // Lengths
+        ("/accessors/0/count", "5", table, "accessor 0: 5 elements of 12 bytes"),
+        ("/accessors/0/count", "18446744073709551615", table, "vertices up to here"),
+        ("/accessors/2/count", "18446744073709551615", table, "triangles up to here"),
+        ("/accessors/1/count", "18446744073709551615", table, "4 positions, but 18446744073709551615"),
+        ("/accessors/0/byteOffset", "4", table, "accessor 0: 4 elements of 12 bytes"),
+        ("/accessors/0/byteOffset", "18446744073709551615", table, "accessor 0"),
+        ("/bufferViews/0/byteStride", "8", table, "accessor 0: a byteStride of 8"),
+        ("/bufferViews/0/byteStride", "18446744073709551615", table, "accessor 0"),
+        ("/bufferViews/0/byteLength", "999999", "buffer view 0: ", "999999 bytes from byte 0"),
+        ("/bufferViews/0/byteOffset", "18446744073709551615", "buffer view 0: ", "past the end"),
+        ("/bufferViews/1/byteLength", "24", table, "accessor 1: 4 elements of 8 bytes, 8 apart from byte 0"),
+        ("/accessors/1/count", "3", table, "4 positions, but 3 texture coordinates"),
+        // Hierarchies
+        ("/nodes/2/children", "[2]", "node 2: ", "reached twice"),
+        ("/nodes/2/children", "[1]", "node 1: ", "reached twice"),
+        ("/nodes/1/rotation", "[0, 0, 0, 0]", "node 1: ", "rotation"),
+        ("/nodes/1/rotation", "[1e39, 0, 0, 0]", "node 1: ", "rotation"),
+        // What the renderer does not take
+        ("/nodes/1/translation", "[1e9, 0, 0]", table, "outside"),
+        ("/nodes/1/scale", "[1e39, 0, 0]", table, "not finite"),
+        ("/nodes/0/scale", "[0, 0, 0]", "scene.gltf", "camera looks nowhere"),
+        ("/cameras/0/perspective/yfov", "4", "scene.gltf", "field of view"),
+        ("/extensions/KHR_lights_punctual/lights/0/intensity", "-1", "light 0", "outside"),
+        // Images and buffers
+        ("/images/0/uri", r#""data:image/png;base64,AAAA""#, "image 0: ", "picture"),
+        ("/images/0/uri", "null", "image 0: ", "neither"),
+        ("/images/0/uri", r#""data:image/png,AAAA""#, "image 0: ", "not base64"),
+        ("/images/0/uri", r#""data:image/png;base64""#, "image 0: ", "comma"),
+        ("/images/0/uri", r#""data:;base64,A*AA""#, "image 0: ", "not base64"),
+        ("/images/0/uri", r#""../secret.png""#, "image 0: ", "outside the folder"),
+        ("/images/0/uri", r#""%2e%2e/secret.png""#, "image 0: ", "outside the folder"),
+        ("/images/0/uri", r#""/etc/passwd""#, "image 0: ", "outside the folder"),
+        ("/images/0/uri", r#""file:///etc/passwd""#, "image 0: ", "scheme \"file\""),
+        ("/images/0/uri", r#""http://localhost/a.png""#, "image 0: ", "scheme \"http\""),
+        ("/images/0/uri", r#""missing.png""#, "image 0", "cannot be read"),
+        ("/images/0/uri", r#""%zz.png""#, "image 0: ", "not a URI"),
+        ("/buffers", r#"[{"byteLength": 4}]"#, "buffer 0: ", "neither"),
+        (
+            "/buffers",
+            r#"[{"name": "B", "byteLength": 4, "uri": "data:;base64,AAAA"}]"#,
+            r#"buffer 0 "B": "#,
+            "byteLength is 4",
+        ),
+        (
+            "/buffers",
+            r#"[{"byteLength": 18446744073709551615, "uri": "data:;base64,AAAA"}]"#,
+            "buffer 0: ",
+            "byteLength",
+        ),
+        // The whole
+        ("/asset/version", r#""1.0""#, "asset: ", "version \"1.0\""),
+        ("/asset/minVersion", r#""2.1""#, "asset: ", "version \"2.1\""),
+        ("/asset/version", "2", "line 1 of the JSON: ", "not the JSON of a glTF file"),
+        (
+            "/extensionsRequired",
+            r#"["KHR_draco_mesh_compression"]"#,
+            "extensionsRequired: ",
+            "KHR_draco_mesh_compression",
+        ),
+        ("/scenes", "[]", "scene.gltf: ", "scene 0 does not exist"),
+    ] {
+        let error = error(pointer, value);
+        let mut text = error.to_string();
+        if let Some(source) = std::error::Error::source(&error) {
+            text = format!("{text}: {source}");
+        }
+        assert!(
+            text.contains(place) && text.contains(what),
+            "{value} at {pointer}: {text}, expected {place} … {what}"
+        );
+    }
+}
+
+#[test]
+fn a_file_must_have_something_to_see() {
+    for (scene, what) in
+        [(r#""scenes": []"#, "has no scene"), (r#""scenes": [{"nodes": []}]"#, "neither a camera nor a mesh")]
+    {
+        let text = format!(r#"{{"asset": {{"version": "2.0"}}, {scene}}}"#);
+        let error = load("a.gltf", text.as_bytes()).unwrap_err().to_string();
+        assert!(error.contains(what), "{error}");
+    }
+}
+
+#[test]
+fn nothing_is_allocated_for_what_is_only_claimed() {
+    // Zeros without data: a gigabyte of positions from a few hundred bytes
+    let mut maker = good();
+    let accessor = &mut maker.root["accessors"][0];
+    accessor.as_object_mut().unwrap().remove("bufferView");
+    accessor["count"] = 90_000_000.into();
+    let error = maker.load().unwrap_err();
+    assert!(matches!(error, LoadError::TooLarge { what: "elements without data", .. }), "{error}");
+
+    // Three times a mesh that claims half of the most triangles
+    let mut maker = good();
+    maker.root["accessors"][2]["count"] = (3u64 << 25).into();
+    maker.node(r#"{"mesh": 0}"#);
+    maker.node(r#"{"mesh": 0}"#);
+    let error = maker.load().unwrap_err();
+    assert!(matches!(error, LoadError::TooLarge { what: "triangles up to here", .. }), "{error}");
+
+    // An image whose header claims 2³⁰ pixels
+    let mut png = b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR\0\0\x80\0\0\0\x80\0\x08\x02\0\0\0".to_vec();
+    png.extend([0x53, 0x0c, 0x3a, 0x71]);
+    let mut maker = good();
+    maker.root["images"][0] = json(&format!(r#"{{"uri": "data:image/png;base64,{}"}}"#, base64(&png)));
+    assert!(maker.load().unwrap_err().to_string().contains("image 0"));
+
+    // Objects of half a kilobyte from three bytes each
+    let text = format!(r#"{{"asset": {{"version": "2.0"}}, "nodes": [{}{{}}]}}"#, "{},".repeat(1 << 22));
+    let error = load("a.gltf", text.as_bytes()).unwrap_err();
+    assert!(matches!(error, LoadError::TooLarge { what: "JSON values", .. }), "{error}");
+
+    // Deep nesting
+    let text = format!(r#"{{"asset": {{"version": "2.0", "extras": {}}}}}"#, "[".repeat(1 << 20));
+    let error = load("a.gltf", text.as_bytes()).unwrap_err().to_string();
+    assert!(error.contains("line 1 of the JSON"), "{error}");
+}
+
+#[test]
+fn long_chains_of_nodes_are_walked() {
+    let mut maker = good();
+    for i in 3..50_000 {
+        maker.push("nodes", &format!(r#"{{"children": [{}]}}"#, i + 1));
+    }
+    maker.push("nodes", r#"{"mesh": 0}"#);
+    maker.root["nodes"][2] = json(r#"{"children": [3]}"#);
+    assert_eq!(maker.load().unwrap().scene.surfaces(), 4);
+    // Back to the start
+    maker.root["nodes"][50_000] = json(r#"{"children": [2]}"#);
+    let error = maker.load().unwrap_err().to_string();
+    assert!(error.contains("node 2: it is reached twice"), "{error}");
+}
+
+#[test]
+fn glb_files_that_are_cut_short_say_so() {
+    let file = good().glb();
+    assert!(load("a.glb", &file).is_ok());
+    for length in (0..file.len()).step_by(7) {
+        let error = load("a.glb", &file[..length]).unwrap_err();
+        assert!(error.to_string().contains("a.glb"), "{error}");
+    }
+    // The length in the header is right, but the chunk is longer than the file
+    let mut cut = file[..file.len() - 8].to_vec();
+    let length = (cut.len() as u32).to_le_bytes();
+    cut[8..12].copy_from_slice(&length);
+    let error = load("a.glb", &cut).unwrap_err().to_string();
+    assert!(error.contains("GLB chunk"), "{error}");
+    let mut version = file;
+    version[4] = 1;
+    let error = load("a.glb", &version).unwrap_err().to_string();
+    assert!(error.contains("version 1 of GLB is not supported"), "{error}");
+}

@@ -1,0 +1,15 @@
+//! glTF files that the tests make themselves.
+//!
+//! Renders are seeded; where they have noise, a tolerance is at least four standard errors.
+
+#![expect(
+    clippy::unwrap_used,
+    reason = "a panic in a test is how a test fails; clippy.toml covers test functions alone"
+)]
+
+mod bad; // bad files, and what is said of them
+mod fuzz; // thousands of files with damage
+mod geometry; // where triangles and cameras are
+mod kit;
+mod lights; // lights without size
+mod materials; // what surfaces look like

@@ -1,0 +1,335 @@
+//! What surfaces look like: radiance in closed form.
+
+use crate::kit::{Maker, assert_warns, json, render};
+use noisefloor::Rgb;
+
+const NEAREST: &str = r#"{"magFilter": 9728}"#;
+/// All but a mirror of that colour, seen head on.
+const POLISHED: &str = r#""metallicFactor": 1, "roughnessFactor": 0"#;
+
+/// A rectangle that fills the image, at z = −1.
+fn wall(material: &str) -> Maker {
+    let mut maker = Maker::new();
+    let mesh = maker.rectangle([-1.0, 1.0], [-1.0, 1.0], -1.0, material);
+    maker.node(&format!(r#"{{"mesh": {mesh}}}"#));
+    maker
+}
+
+/// The wall through a field of view of half a degree: head on.
+fn near(mut maker: Maker) -> Maker {
+    maker.root["cameras"][0]["perspective"]["yfov"] = json("0.01");
+    maker
+}
+
+fn mean(maker: &Maker, samples: u32, max_depth: u32) -> Rgb {
+    let pixels = render(maker.load().unwrap(), 8, samples, max_depth);
+    std::array::from_fn(|c| pixels.iter().map(|p| p[c]).sum::<f32>() / 64.0)
+}
+
+fn assert_close(found: Rgb, expected: Rgb, tolerance: f32) {
+    let close = found.iter().zip(expected).all(|(a, b)| (a - b).abs() <= tolerance);
+    assert!(close, "{found:?}, expected {expected:?} within {tolerance}");
+}
+
+/// sRGB decoded (IEC 61966-2-1).
+fn linear(code: u8) -> f32 {
+    ((f32::from(code) / 255.0 + 0.055) / 1.055).powf(2.4)
+}
+
+/// Without lights the surroundings have a radiance of 1; a lossless wall then has that, too.
+#[test]
+fn white_walls_in_white_surroundings_cannot_be_seen() {
+    for metallic in [0, 1] {
+        let material =
+            format!(r#"{{"pbrMetallicRoughness": {{"metallicFactor": {metallic}, "roughnessFactor": 0}}}}"#);
+        let maker = wall(&material);
+        assert_warns(&maker.load().unwrap(), &["no light", "a radiance of 1"]);
+        // All but without noise: roulette, and light that is lost after 65 segments
+        assert_close(mean(&maker, 4096, 65), [1.0; 3], 2e-3);
+    }
+}
+
+/// Head on, Schlick's metal has its base colour.
+#[test]
+fn colours_are_texture_times_factor() {
+    let factor =
+        format!(r#"{{"pbrMetallicRoughness": {{"baseColorFactor": [0.8, 0.5, 0.1, 1], {POLISHED}}}}}"#);
+    assert_close(mean(&near(wall(&factor)), 16, 9), [0.8, 0.5, 0.1], 1e-4);
+
+    let mut textured = near(wall(&factor));
+    let texture = textured.texture(1, &[[188, 255, 100, 255]], "{}");
+    textured.root["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"]["index"] = texture.into();
+    let expected = [0.8 * linear(188), 0.5, 0.1 * linear(100)];
+    assert_close(mean(&textured, 16, 9), expected, 1e-4);
+
+    // Metal is blue and roughness green, both linear: red changes nothing. Half metal is half a metal, half a polished coat
+    // on the colour: head on, that reflects ((1.5 − 1)/(1.5 + 1))² = 0.04, and nothing comes from a black base. A standard
+    // error of √(0.02·0.98/64/4096) = 2.7e-4
+    let black = r#"{"pbrMetallicRoughness": {"baseColorFactor": [0, 0, 0, 1], "metallicFactor": 0.5}}"#;
+    let mut half = near(wall(black));
+    let texture = half.texture(1, &[[255, 0, 255, 255]], "{}");
+    half.root["materials"][0]["pbrMetallicRoughness"]["metallicRoughnessTexture"]["index"] = texture.into();
+    assert_close(mean(&half, 4096, 9), [0.02; 3], 1.4e-3);
+    // The index of refraction makes the coat: ((2 − 1)/(2 + 1))²
+    half.root["materials"][0]["extensions"] = json(r#"{"KHR_materials_ior": {"ior": 2}}"#);
+    assert_close(mean(&half, 4096, 9), [0.5 / 9.0; 3], 2e-3);
+}
+
+#[test]
+fn factors_out_of_range_are_clamped_with_a_warning() {
+    let maker = near(wall(&format!(
+        r#"{{"pbrMetallicRoughness": {{"baseColorFactor": [1.5, -1, 0.5, 1], {POLISHED}}}}}"#
+    )));
+    let loaded = maker.load().unwrap();
+    assert_warns(&loaded, &["material 0", "baseColorFactor is 1.5, taken for 1"]);
+    assert_warns(&loaded, &["material 0", "baseColorFactor is -1, taken for 0"]);
+    assert_close(mean(&maker, 16, 9), [1.0, 0.0, 0.5], 1e-4);
+}
+
+/// Red and green above blue and white.
+const FOUR: [[u8; 4]; 4] = [[255, 0, 0, 255], [0, 255, 0, 255], [0, 0, 255, 255], [255; 4]];
+
+/// A lamp with the four colours, seen as a drawing of `size`×`size` letters.
+fn four(size: usize, sampler: &str, edit: impl FnOnce(&mut Maker)) -> Vec<String> {
+    let mut maker = wall(r#"{"emissiveFactor": [1, 1, 1], "emissiveTexture": {"index": 0}}"#);
+    maker.texture(2, &FOUR, sampler);
+    edit(&mut maker);
+    let pixels = render(maker.load().unwrap(), size, 16, 1);
+    let letter = |p: &Rgb| match p.map(|x| x > 0.5) {
+        [true, false, false] => 'r',
+        [false, true, false] => 'g',
+        [false, false, true] => 'b',
+        [true, true, true] => 'w',
+        _ => '?',
+    };
+    pixels.chunks(size).map(|row| row.iter().map(letter).collect()).collect()
+}
+
+/// Gives the texture a transform.
+fn transform(extension: &'static str) -> impl Fn(&mut Maker) {
+    move |maker| {
+        let texture = &mut maker.root["materials"][0]["emissiveTexture"];
+        texture["extensions"]["KHR_texture_transform"] = json(extension);
+    }
+}
+
+#[test]
+fn textures_are_the_right_way_up() {
+    assert_eq!(four(2, NEAREST, |_| ()), ["rg", "bw"]);
+    let offset = transform(r#"{"offset": [0.5, 0]}"#);
+    assert_eq!(four(2, NEAREST, offset), ["gr", "wb"]);
+    assert_eq!(four(2, NEAREST, transform(r#"{"offset": [0, 0.5]}"#)), ["bw", "rg"]);
+    // The top left quarter of the image alone
+    assert_eq!(four(2, NEAREST, transform(r#"{"scale": [0.5, 0.5]}"#)), ["rr", "rr"]);
+    assert_eq!(four(2, NEAREST, transform(r#"{"scale": [0.5, 0.5], "offset": [0.5, 0]}"#)), ["gg", "gg"]);
+    // Coordinates turn counter-clockwise about the top left, the image clockwise: what was at its bottom left is at its top
+    // left, but one image further up
+    assert_eq!(four(2, NEAREST, transform(r#"{"rotation": 1.5707963}"#)), ["br", "wg"]);
+}
+
+#[test]
+fn textures_wrap_as_their_sampler_says() {
+    let twice = || transform(r#"{"scale": [2, 2]}"#);
+    assert_eq!(four(4, NEAREST, twice()), ["rgrg", "bwbw", "rgrg", "bwbw"]);
+    let mirrored = r#"{"magFilter": 9728, "wrapS": 33648, "wrapT": 33648}"#;
+    assert_eq!(four(4, mirrored, twice()), ["rggr", "bwwb", "bwwb", "rggr"]);
+    let clamped = r#"{"magFilter": 9728, "wrapS": 33071, "wrapT": 33648}"#;
+    assert_eq!(four(4, clamped, twice()), ["rggg", "bwww", "bwww", "rggg"]);
+}
+
+/// Between the centres of two texels there is something of both, unless the filter is nearest.
+#[test]
+fn textures_are_interpolated_unless_nearest() {
+    for (sampler, middle) in
+        [("{}", [0.25, 0.75]), (r#"{"magFilter": 9729}"#, [0.25, 0.75]), (NEAREST, [0.0, 1.0])]
+    {
+        let mut maker = wall(r#"{"emissiveFactor": [1, 1, 1], "emissiveTexture": {"index": 0}}"#);
+        maker.texture(2, &[[0, 0, 0, 255], [255; 4]], sampler);
+        let pixels = render(maker.load().unwrap(), 4, 4096, 1);
+        // Means over a quarter of the image on either side of the middle: from u = ¼ to ½, 0 to ½ linearly
+        for (x, expected) in [(1, middle[0]), (2, middle[1])] {
+            assert!((pixels[4 + x][0] - expected).abs() < 0.02, "{sampler}: {} at {x}", pixels[4 + x][0]);
+        }
+    }
+}
+
+#[test]
+fn the_set_of_texture_coordinates_is_the_materials() {
+    // Set 1 is upside down
+    let second = |maker: &mut Maker| {
+        let uvs = maker.floats(&[[0.0f32, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]);
+        maker.root["meshes"][0]["primitives"][0]["attributes"]["TEXCOORD_1"] = uvs.into();
+    };
+    let drawn = four(2, NEAREST, |maker| {
+        second(maker);
+        maker.root["materials"][0]["emissiveTexture"]["texCoord"] = 1.into();
+    });
+    assert_eq!(drawn, ["bw", "rg"]);
+    let drawn = four(2, NEAREST, |maker| {
+        second(maker);
+        transform(r#"{"texCoord": 1}"#)(maker);
+    });
+    assert_eq!(drawn, ["bw", "rg"]);
+
+    // Another texture with another set cannot be shown
+    let mut maker = wall(
+        r#"{"emissiveFactor": [1, 1, 1], "emissiveTexture": {"index": 0, "texCoord": 1},
+            "pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}"#,
+    );
+    maker.texture(2, &FOUR, NEAREST);
+    let loaded = maker.load().unwrap();
+    assert_warns(&loaded, &["material 0", "texture 0 is ignored", "set 1"]);
+    assert_warns(&loaded, &["no light"]);
+
+    // Nor one without coordinates
+    let mut maker = wall(r#"{"emissiveFactor": [1, 1, 1], "emissiveTexture": {"index": 0, "texCoord": 7}}"#);
+    maker.texture(2, &FOUR, NEAREST);
+    assert_warns(&maker.load().unwrap(), &["mesh 0, primitive 0", "no set 7"]);
+}
+
+#[test]
+fn emission_has_strength() {
+    let maker = wall(
+        r#"{"emissiveFactor": [1, 0.5, 0.1], "extensions": {"KHR_materials_emissive_strength": {"emissiveStrength": 20}}}"#,
+    );
+    assert_close(mean(&maker, 1, 1), [20.0, 10.0, 2.0], 1e-5);
+}
+
+/// A wall that gives off 1 in front of one that gives off 3.
+fn veil(material: &str) -> Maker {
+    let mut maker = wall(material);
+    let behind = maker.rectangle([-9.0, 9.0], [-9.0, 9.0], -2.0, r#"{"emissiveFactor": [3, 3, 3]}"#);
+    maker.node(&format!(r#"{{"mesh": {behind}}}"#));
+    maker
+}
+
+#[test]
+fn blended_surfaces_cover_by_alpha() {
+    let material = |alpha: f32, mode: &str| {
+        format!(
+            r#"{{"emissiveFactor": [1, 1, 1], "alphaMode": "{mode}",
+                "pbrMetallicRoughness": {{"baseColorFactor": [0, 0, 0, {alpha}]}}}}"#
+        )
+    };
+    // A standard error of 2·√(0.25·0.75/64/4096) = 1.7e-3; direct light alone, so that a ray that goes on is of length 2
+    for (alpha, mode, expected) in [
+        (0.25, "OPAQUE", 1.0),
+        (0.25, "BLEND", 2.5),
+        (1.0, "BLEND", 1.0),
+        (0.49, "MASK", 3.0),
+        (0.5, "MASK", 1.0),
+    ] {
+        assert_close(mean(&veil(&material(alpha, mode)), 4096, 1), [expected; 3], 9e-3);
+    }
+
+    // Alpha of the texture times that of the factor: 102/255·0.5 = 0.2
+    let mut maker = veil(&material(0.5, "BLEND"));
+    let texture = maker.texture(1, &[[255, 255, 255, 102]], NEAREST);
+    maker.root["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"]["index"] = texture.into();
+    assert_close(mean(&maker, 4096, 1), [0.2 + 0.8 * 3.0; 3], 9e-3);
+}
+
+#[test]
+fn masks_are_sharp() {
+    // Alpha 0.4 and 0.8, times 0.5: against a cutoff of 0.3, a hole on the left
+    let mut maker = veil(
+        r#"{"emissiveFactor": [1, 1, 1], "alphaMode": "MASK", "alphaCutoff": 0.3,
+            "pbrMetallicRoughness": {"baseColorFactor": [0, 0, 0, 0.5], "baseColorTexture": {"index": 0}}}"#,
+    );
+    maker.texture(2, &[[9, 9, 9, 102], [9, 9, 9, 204]], NEAREST);
+    let pixels = render(maker.load().unwrap(), 2, 64, 1);
+    assert_eq!(pixels.iter().map(|p| p[0]).collect::<Vec<_>>(), [3.0, 1.0, 3.0, 1.0]);
+    // A cutoff that nothing reaches
+    maker.root["materials"][0]["alphaCutoff"] = json("0.6");
+    let pixels = render(maker.load().unwrap(), 2, 64, 1);
+    assert_eq!(pixels.iter().map(|p| p[0]).collect::<Vec<_>>(), [3.0; 4]);
+}
+
+#[test]
+fn backs_are_black_unless_double_sided() {
+    for (double, expected) in [(false, 0.0), (true, 1.0)] {
+        let mut maker =
+            wall(&format!(r#"{{"doubleSided": {double}, "pbrMetallicRoughness": {{{POLISHED}}}}}"#));
+        maker.root["nodes"][1] = json(r#"{"mesh": 0, "rotation": [0, 1, 0, 0], "translation": [0, 0, -2]}"#);
+        assert_close(mean(&maker, 16, 9), [expected; 3], 1e-4);
+        maker.root["materials"][0]["emissiveFactor"] = json("[0.5, 0.5, 0.5]");
+        assert_close(mean(&maker, 16, 1), [expected * 0.5; 3], 1e-4);
+    }
+}
+
+#[test]
+fn transmission_is_glass() {
+    let glass = |factor: f32, roughness: f32| {
+        near(wall(&format!(
+            r#"{{"extensions": {{"KHR_materials_transmission": {{"transmissionFactor": {factor}}},
+                                 "KHR_materials_ior": {{"ior": 2}}}},
+                "pbrMetallicRoughness": {{"baseColorFactor": [0.5, 1, 0, 1], "roughnessFactor": {roughness}}}}}"#
+        )))
+    };
+    // Head on, ((2 − 1)/(2 + 1))² is reflected, and the rest tinted; a standard error of √(8/81/64/4096) = 6e-4
+    let r = 1.0 / 9.0;
+    let expected = [r + 0.5 * (1.0 - r), 1.0, r];
+    let clear = glass(1.0, 0.0);
+    assert_close(mean(&clear, 4096, 9), expected, 5e-3);
+    assert_eq!(clear.load().unwrap().warnings.len(), 1, "that there is no light");
+    let frosted = glass(0.75, 0.5);
+    assert_close(mean(&frosted, 4096, 9), expected, 5e-3);
+    let loaded = frosted.load().unwrap();
+    assert_warns(&loaded, &["material 0", "roughness of 0.5"]);
+    assert_warns(&loaded, &["material 0", "transmissionFactor of 0.75", "all glass"]);
+    // Seen from within as well, though glTF's materials are one-sided unless they say otherwise
+    let mut back = glass(1.0, 0.0);
+    back.root["nodes"][1] = json(r#"{"mesh": 0, "rotation": [0, 1, 0, 0], "translation": [0, 0, -2]}"#);
+    assert_close(mean(&back, 4096, 9), expected, 5e-3);
+    assert_warns(&glass(0.25, 0.0).load().unwrap(), &["material 0", "transmissionFactor of 0.25", "opaque"]);
+}
+
+#[test]
+fn what_is_ignored_is_named() {
+    let mut maker = wall(
+        r#"{"name": "Oak", "normalTexture": {"index": 0}, "occlusionTexture": {"index": 0},
+            "pbrMetallicRoughness": {"baseColorTexture": {"index": 0, "extensions": {"EXT_info": {}}}},
+            "extensions": {"KHR_materials_unlit": {}, "KHR_materials_clearcoat": {"clearcoatFactor": 1}}}"#,
+    );
+    maker.texture(1, &[[9; 4]], r#"{}"#);
+    maker.root["textures"][0]["extensions"] = json(r#"{"EXT_texture": {}}"#);
+    maker.root["extensionsUsed"] = json(r#"["KHR_materials_unlit", "KHR_materials_clearcoat"]"#);
+    maker.root["extensionsRequired"] = json(r#"["KHR_materials_unlit"]"#);
+    let loaded = maker.load().unwrap();
+    for parts in [
+        [r#"material 0 "Oak""#, "a normal map"],
+        [r#"material 0 "Oak""#, "an occlusion map"],
+        [r#"material 0 "Oak""#, "KHR_materials_unlit"],
+        [r#"material 0 "Oak""#, "KHR_materials_clearcoat"],
+        [r#"material 0 "Oak""#, "EXT_info"],
+        ["texture 0", "EXT_texture"],
+        ["scene.gltf", "no light"],
+    ] {
+        assert_warns(&loaded, &parts);
+    }
+    assert_eq!(loaded.warnings.len(), 7, "{:#?}", loaded.warnings);
+}
+
+#[test]
+fn images_come_from_views_and_files_too() {
+    let mut maker = wall(r#"{"emissiveFactor": [1, 1, 1], "emissiveTexture": {"index": 0}}"#);
+    let mut jpeg = std::io::Cursor::new(vec![]);
+    let grey = image::RgbImage::from_pixel(8, 8, image::Rgb([188; 3]));
+    grey.write_to(&mut jpeg, image::ImageFormat::Jpeg).unwrap();
+    let view = maker.view(jpeg.get_ref(), "");
+    maker.push("images", &format!(r#"{{"bufferView": {view}, "mimeType": "image/jpeg"}}"#));
+    maker.push("textures", r#"{"source": 0}"#);
+    // JPEG is good to a code or two
+    assert_close(mean(&maker, 4, 1), [linear(188); 3], 0.02);
+
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::create_dir(folder.path().join("maps")).unwrap();
+    grey.save_with_format(folder.path().join("maps/grey map.png"), image::ImageFormat::Png).unwrap();
+    maker.root["images"][0] = json(r#"{"uri": "maps/grey%20map.png"}"#);
+    maker.root["buffers"] = json(&format!(r#"[{{"uri": "all.bin", "byteLength": {}}}]"#, maker.bytes.len()));
+    std::fs::write(folder.path().join("all.bin"), &maker.bytes).unwrap();
+    std::fs::write(folder.path().join("a.gltf"), maker.gltf()).unwrap();
+    let loaded = noisefloor_scenefile::load(&folder.path().join("a.gltf")).unwrap();
+    let pixels = render(loaded, 2, 1, 1);
+    assert!(pixels.iter().all(|p| (p[0] - linear(188)).abs() < 1e-5), "{pixels:?}");
+}
