@@ -239,13 +239,19 @@ impl<'a, const NEEDS: u8> Walk<'a, NEEDS> {
             scene.aim::<false>(light, origin, point)
         };
         let Some(aim) = aim.filter(|aim| aim.dir.dot(surface.flat) > 0.0) else { return Vec3::ZERO };
-        let share = weigh(aim.dir, aim.pdf * light.chance) * aim.value / light.chance;
+        let mut share = weigh(aim.dir, aim.pdf * light.chance) * aim.value / light.chance;
         // Also false for NaN: a density beyond the range of f32 is no light
         if !(share.max_element() > 0.0 && share.max_element() < f32::MAX) {
             return Vec3::ZERO;
         }
         let shadow = Ray { origin, dir: aim.dir };
-        if self.blocked(&shadow, aim.distance * 0.9999) { Vec3::ZERO } else { share }
+        if self.blocked(&shadow, aim.distance * 0.9999) {
+            return Vec3::ZERO;
+        }
+        if NEEDS & SKY != 0 {
+            share *= scene.revealed(light, aim.dir);
+        }
+        share
     }
 
     /// Lambertian reflection.

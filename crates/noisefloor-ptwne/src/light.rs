@@ -105,7 +105,8 @@ pub(crate) struct Aim {
     pub(crate) dir: Vec3,
     /// Infinite for what is far away.
     pub(crate) distance: f32,
-    /// Radiance over density in solid angle, given the light.
+    /// Radiance over density in solid angle, given the light. Of the environment map, one over the density: its radiance is
+    /// looked up once nothing is in between, as looking it up takes longer than finding that out.
     pub(crate) value: Vec3,
     /// That density; [`DELTA`] if the light cannot be met by chance.
     pub(crate) pdf: f32,
@@ -232,8 +233,8 @@ impl Light {
                 Some(self.aimed(dir, f32::INFINITY, math::cone_pdf(one_minus_cos), u))
             }
             Place::Map => {
-                let (dir, radiance, pdf) = map?.sample(u, more)?;
-                Some(Aim { dir, distance: f32::INFINITY, value: radiance / pdf, pdf, uv: u })
+                let (dir, pdf) = map?.sample(u, more)?;
+                Some(Aim { dir, distance: f32::INFINITY, value: Vec3::ONE / pdf, pdf, uv: u })
             }
             Place::Point { position, axis, inner, outer } => {
                 let to = position - from;

@@ -179,7 +179,7 @@ impl Tracer<'_> {
                 let shadow = Ray { origin, dir };
                 let seed = self.ray * 256 + u64::from(i);
                 if counts && !scene.blocked::<true>(&shadow, distance * 0.9999, &mut self.stack, seed) {
-                    sum += share * self.stride as f32;
+                    sum += share * scene.revealed(light, dir) * self.stride as f32;
                 }
             }
         }

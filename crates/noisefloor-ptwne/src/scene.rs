@@ -4,7 +4,7 @@ use crate::accel::{Accel, Hit, Local, Shape, Stack};
 use crate::bsdf::Glossy;
 use crate::camera::Camera;
 use crate::environment::{Dome, Environment, EnvironmentMap, Map};
-use crate::light::{Aim, Light, Lights};
+use crate::light::{Aim, Light, Lights, Place};
 use crate::material::{Kind, Looks, MIN_ROUGHNESS};
 use crate::math::{Ray, Vec3};
 use crate::rng;
@@ -253,9 +253,8 @@ impl Scene {
         match &self.sky {
             None => Vec3::ZERO,
             Some(Sky::Map(map)) => {
-                let (radiance, pdf) = map.radiance(dir);
                 // The map is the last light
-                radiance * weigh(pdf, self.lights.all[self.lights.all.len() - 1].chance)
+                map.radiance(dir) * weigh(map.pdf(dir), self.lights.all[self.lights.all.len() - 1].chance)
             }
             Some(Sky::Dome(dome)) => {
                 let mut sum = dome.radiance(dir);
@@ -355,6 +354,15 @@ impl Scene {
             aim.value *= self.glow(light, aim.uv);
         }
         Some(aim)
+    }
+
+    /// What [`Aim::value`] still lacks.
+    #[inline]
+    pub(crate) fn revealed(&self, light: &Light, dir: Vec3) -> Vec3 {
+        match (&light.place, self.map()) {
+            (Place::Map, Some(map)) => map.radiance(dir),
+            _ => Vec3::ONE,
+        }
     }
 
     /// What the ray met. `TEXTURES` says whether the scene has any, or smooth normals.
