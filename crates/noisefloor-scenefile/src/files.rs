@@ -46,9 +46,8 @@ impl Folder {
 
         // Links
         let path = self.path.join(name);
-        let missing = |cause: io::Error| {
-            read(io::Error::new(cause.kind(), format!("`{}`: {cause}", path.display())))
-        };
+        let missing =
+            |cause: io::Error| read(io::Error::new(cause.kind(), format!("`{}`: {cause}", path.display())));
         let real = path.canonicalize().map_err(missing)?;
         let folder = self.path.canonicalize().map_err(missing)?;
         if real.starts_with(folder) { Ok(path) } else { Err(outside()) }

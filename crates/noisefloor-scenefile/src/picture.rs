@@ -70,8 +70,12 @@ pub(crate) fn decode(bytes: &[u8], place: &Place) -> Result<Picture, LoadError> 
             limits.max_alloc = Some(MAX_EXTRA);
             pixels(PngDecoder::with_limits(Cursor::new(bytes), limits).map_err(broken)?, bytes.len(), place)
         }
-        Ok(ImageFormat::Jpeg) => pixels(JpegDecoder::new(Cursor::new(bytes)).map_err(broken)?, bytes.len(), place),
-        Ok(ImageFormat::Hdr) => pixels(HdrDecoder::new(Cursor::new(bytes)).map_err(broken)?, bytes.len(), place),
+        Ok(ImageFormat::Jpeg) => {
+            pixels(JpegDecoder::new(Cursor::new(bytes)).map_err(broken)?, bytes.len(), place)
+        }
+        Ok(ImageFormat::Hdr) => {
+            pixels(HdrDecoder::new(Cursor::new(bytes)).map_err(broken)?, bytes.len(), place)
+        }
         _ => Err(place.clone().unsupported("a picture that is neither PNG, JPEG, OpenEXR nor Radiance")),
     }));
     decoded.unwrap_or_else(|_| Err(place.clone().bad("the picture is broken: its decoder gave up")))
@@ -90,7 +94,9 @@ fn pixels(decoder: impl ImageDecoder, bytes: usize, place: &Place) -> Result<Pic
         DynamicImage::ImageLuma16(_)
         | DynamicImage::ImageLumaA16(_)
         | DynamicImage::ImageRgb16(_)
-        | DynamicImage::ImageRgba16(_) => Samples::Sixteen(image.into_rgba16().pixels().map(|p| p.0).collect()),
+        | DynamicImage::ImageRgba16(_) => {
+            Samples::Sixteen(image.into_rgba16().pixels().map(|p| p.0).collect())
+        }
         DynamicImage::ImageRgb32F(_) | DynamicImage::ImageRgba32F(_) => {
             Samples::Linear(image.into_rgb32f().pixels().map(|p| p.0).collect())
         }

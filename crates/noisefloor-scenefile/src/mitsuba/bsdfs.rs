@@ -92,7 +92,11 @@ impl<'d> Context<'d> {
         match element.kind() {
             "diffuse" => {
                 // Older versions have another name for it, too
-                let name = if element.get("diffuse_reflectance").is_some() { "diffuse_reflectance" } else { "reflectance" };
+                let name = if element.get("diffuse_reflectance").is_some() {
+                    "diffuse_reflectance"
+                } else {
+                    "reflectance"
+                };
                 Ok(Surface::one_sided(Material::Diffuse { albedo: self.factor(element, name, 0.5)? }))
             }
             "plastic" | "roughplastic" => self.plastic(element).map(Surface::one_sided),
@@ -135,7 +139,9 @@ impl<'d> Context<'d> {
         match parts.as_slice() {
             [one] => Ok(one),
             [] => Err(self.bad(element, format!("{} needs a <bsdf> in it", element.label()))),
-            _ => Err(self.unsupported(element, format!("{} with more than one <bsdf> in it", element.label()))),
+            _ => {
+                Err(self.unsupported(element, format!("{} with more than one <bsdf> in it", element.label())))
+            }
         }
     }
 
@@ -167,7 +173,8 @@ impl<'d> Context<'d> {
                 Some((_, eta, k)) => (*eta, *k),
                 None => {
                     let known: Vec<&str> = METALS.iter().map(|metal| metal.0).collect();
-                    let what = format!("the metal `{name}` (known: none, {}; or give eta and k)", known.join(", "));
+                    let what =
+                        format!("the metal `{name}` (known: none, {}; or give eta and k)", known.join(", "));
                     return Err(self.unsupported(element, what));
                 }
             },
@@ -201,7 +208,8 @@ impl<'d> Context<'d> {
         element.ignore(&["sample_visible"]);
         match self.string(element, "distribution")?.unwrap_or("beckmann") {
             "ggx" => {}
-            other => self.warn(element, format!("the distribution `{other}` is replaced by `ggx` of the same alpha")),
+            other => self
+                .warn(element, format!("the distribution `{other}` is replaced by `ggx` of the same alpha")),
         }
         let number = |name: &str| match element.get(name) {
             Some(texture) if texture.tag == "texture" || texture.tag == "ref" => {
@@ -232,7 +240,10 @@ impl<'d> Context<'d> {
                 let material = child.attribute("value").unwrap_or_default();
                 Some(by_name(material).ok_or_else(|| {
                     let known: Vec<&str> = INDICES.iter().map(|index| index.0).collect();
-                    self.unsupported(child, format!("the material `{material}` (known: {})", known.join(", ")))
+                    self.unsupported(
+                        child,
+                        format!("the material `{material}` (known: {})", known.join(", ")),
+                    )
                 })?)
             }
             Some(_) => self.float(element, name)?,

@@ -9,7 +9,11 @@ use noisefloor_ptwne::{Emission, Environment, EnvironmentMap, Punctual, SceneBui
 
 impl<'d> Context<'d> {
     /// Adds an emitter to the scene. The result is whether it surrounds the scene.
-    pub(super) fn emitter(&self, element: &'d Element, builder: &mut SceneBuilder) -> Result<bool, LoadError> {
+    pub(super) fn emitter(
+        &self,
+        element: &'d Element,
+        builder: &mut SceneBuilder,
+    ) -> Result<bool, LoadError> {
         element.ignore(&["sampling_weight"]);
         let refused = self.refused(element);
         match element.kind() {

@@ -31,7 +31,9 @@ impl Triangles {
         let finite = |rows: &[[f32; 3]]| rows.iter().position(|row| row.iter().any(|x| !x.is_finite()));
         let uvs = self.uvs.iter().position(|row| row.iter().any(|x| !x.is_finite()));
         match finite(&self.positions).or(finite(&self.normals)).or(uvs) {
-            Some(vertex) => Err(place.clone().bad(format!("vertex {vertex} has a number that is not finite"))),
+            Some(vertex) => {
+                Err(place.clone().bad(format!("vertex {vertex} has a number that is not finite")))
+            }
             None => Ok(()),
         }
     }
@@ -39,7 +41,8 @@ impl Triangles {
     /// Moves positions and normals.
     pub(super) fn transform(&mut self, to_world: DMat4) {
         for position in &mut self.positions {
-            *position = to_world.transform_point3(Vec3::from_array(*position).as_dvec3()).as_vec3().to_array();
+            *position =
+                to_world.transform_point3(Vec3::from_array(*position).as_dvec3()).as_vec3().to_array();
         }
         let matrix = normal_matrix(to_world);
         for normal in &mut self.normals {
@@ -97,4 +100,70 @@ pub(super) fn normal_matrix(to_world: DMat4) -> DMat3 {
     let sign = if x.cross(y).dot(z) < 0.0 { -1.0 } else { 1.0 };
     let column = |a: DVec3, b: DVec3| a.cross(b) * sign;
     DMat3::from_cols(column(y, z), column(z, x), column(x, y))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::path::Path;
+
+    /// Two triangles that share an edge and are bent along it.
+    fn bent() -> Triangles {
+        let positions = vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, -3.0, 5.0]];
+        Triangles { positions, indices: vec![[0, 1, 2], [1, 0, 3]], ..Triangles::default() }
+    }
+
+    #[test]
+    fn smooth_normals_are_those_of_mitsuba() {
+        let mut mesh = bent();
+        mesh.smooth();
+        // What Mitsuba 3.9.1 computes
+        let want = [[0.0, 0.493, 0.870], [0.0, 0.624, 0.782], [0.0, 0.0, 1.0], [0.0, 0.857, 0.514]];
+        for (normal, want) in mesh.normals.iter().zip(want) {
+            let off = (Vec3::from_array(*normal) - Vec3::from_array(want)).length();
+            assert!(off < 1e-3, "{normal:?} {want:?}");
+        }
+    }
+
+    #[test]
+    fn normals_stay_perpendicular_and_fronts_follow_them() {
+        let matrix = DMat4::from_cols_array(&[
+            2.0, 0.0, 0.0, 0.0, 0.5, -1.0, 0.3, 0.0, 0.0, 0.2, 3.0, 0.0, 1.0, 2.0, 3.0, 1.0,
+        ]);
+        let mut mesh = bent();
+        mesh.indices.truncate(1);
+        mesh.normals = vec![[0.0, 0.0, 2.0]; 4];
+        mesh.transform(matrix);
+        let corners =
+            |mesh: &Triangles| mesh.indices[0].map(|i| Vec3::from_array(mesh.positions[i as usize]));
+        let [a, b, c] = corners(&mesh);
+        let normal = Vec3::from_array(mesh.normals[0]);
+        assert!((normal.length() - 1.0).abs() < 1e-6);
+        assert!(normal.dot(b - a).abs() < 1e-6 && normal.dot(c - a).abs() < 1e-6);
+
+        // The determinant is negative: the corners now run clockwise as seen from where the normals point
+        assert!((b - a).cross(c - a).dot(normal) < 0.0);
+        mesh.face_normals_outwards();
+        let [a, b, c] = corners(&mesh);
+        assert!((b - a).cross(c - a).dot(normal) > 0.0);
+        mesh.flip();
+        let [a, b, c] = corners(&mesh);
+        assert!(
+            (b - a).cross(c - a).dot(normal) < 0.0 && Vec3::from_array(mesh.normals[0]).dot(normal) < 0.0
+        );
+    }
+
+    #[test]
+    fn what_does_not_fit_is_an_error() {
+        let place = Place::file(Path::new("a.ply"));
+        bent().check(&place).unwrap();
+        let mut mesh = bent();
+        mesh.indices[1][2] = 4;
+        let error = mesh.check(&place).unwrap_err().to_string();
+        assert_eq!(error, "a.ply: face 1 has corners [1, 0, 4], but there are 4 vertices");
+        let mut mesh = bent();
+        mesh.positions[2][0] = f32::NAN;
+        let error = mesh.check(&place).unwrap_err().to_string();
+        assert_eq!(error, "a.ply: vertex 2 has a number that is not finite");
+    }
 }

@@ -141,7 +141,9 @@ impl Reader<'_> {
             });
             match found.filter(|found| *found < count) {
                 Some(found) => Ok(Some(found as u32)),
-                None => Err(self.bad(format!("`{word}`: there is no {what} {part}; {count} are given so far"))),
+                None => {
+                    Err(self.bad(format!("`{word}`: there is no {what} {part}; {count} are given so far")))
+                }
             }
         };
         let position = index("position", self.positions.len())?;
@@ -163,5 +165,67 @@ impl Reader<'_> {
             self.mesh.normals.push(normal.map_or([0.0; 3], |i| self.normals[i as usize]));
             self.mesh.positions.len() as u32 - 1
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn parse_text(text: &str) -> Result<Triangles, String> {
+        parse(text.as_bytes(), Path::new("a.obj")).map_err(|e| e.to_string())
+    }
+
+    const CORNERS: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n";
+
+    #[test]
+    fn polygons_become_fans_of_shared_vertices() {
+        let mesh = parse_text(&format!("# a square\no x\n{CORNERS}usemtl m\nf 1 2 3 4 # all\nf -4 -2 -1\n"))
+            .unwrap();
+        assert_eq!(mesh.indices, [[0, 1, 2], [0, 2, 3], [0, 2, 3]]);
+        assert_eq!(mesh.positions, [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]]);
+        assert!(mesh.normals.is_empty() && mesh.uvs.is_empty());
+    }
+
+    #[test]
+    fn corners_that_differ_are_vertices_of_their_own() {
+        let text = format!("{CORNERS}vt 0.25 0.5\nvt 0.75\nvn 0 0 2\nf 1/1/1 2/2/1 3//1\nf 1/1/1 3 4/2\n");
+        let mesh = parse_text(&text).unwrap();
+        assert_eq!(mesh.indices, [[0, 1, 2], [0, 3, 4]]);
+        assert_eq!(mesh.uvs, [[0.25, 0.5], [0.75, 0.0], [0.0, 0.0], [0.0, 0.0], [0.75, 0.0]]);
+        let (up, none) = ([0.0, 0.0, 2.0], [0.0; 3]);
+        assert_eq!(mesh.normals, [up, up, up, none, none]);
+    }
+
+    #[test]
+    fn names_may_be_in_any_encoding() {
+        let bytes = [b"g caf\xe9\n".as_slice(), CORNERS.as_bytes(), b"f 1 2 3\n"].concat();
+        assert_eq!(parse(&bytes, Path::new("a.obj")).unwrap().indices, [[0, 1, 2]]);
+    }
+
+    #[test]
+    fn errors_say_the_line() {
+        for (line, what) in [
+            ("v 1 2", "fewer than 3 numbers"),
+            ("v 1 2 x", "`x` is not a finite number"),
+            ("vn 1 nan 2", "`nan` is not a finite number"),
+            ("vt 1e99", "`1e99` is not a finite number"),
+            ("f 1 2", "a face of 2 corners; at least 3 are needed"),
+            ("f 1 2 5", "`5`: there is no position 5; 4 are given so far"),
+            ("f 1 2 0", "`0`: there is no position 0; 4 are given so far"),
+            ("f 1 2 -5", "`-5`: there is no position -5; 4 are given so far"),
+            (
+                "f 1 2 -9223372036854775808",
+                "`-9223372036854775808`: there is no position -9223372036854775808; 4 are given so far",
+            ),
+            ("f 1/-9 2 3", "`1/-9`: there is no texture coordinate -9; 0 are given so far"),
+            ("f 1//2 2 3", "`1//2`: there is no normal 2; 0 are given so far"),
+            ("f 1 2 /1", "`/1`: there is no texture coordinate 1; 0 are given so far"),
+            ("f 1 2 //", "`//` is not a corner; expected position/texture/normal"),
+            ("f 1 2 3///", "`3///` is not a corner; expected position/texture/normal"),
+        ] {
+            let error = parse_text(&format!("{CORNERS}{line}\n")).unwrap_err();
+            assert_eq!(error, format!("a.obj: line 5: {what}"));
+        }
     }
 }

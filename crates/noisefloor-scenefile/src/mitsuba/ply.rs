@@ -8,13 +8,21 @@ use ply_rs_bw::ply::{
 };
 use std::path::Path;
 
+/// Most characters of a message of the parser that are passed on.
+const MAX_MESSAGE: usize = 200;
+
 /// Reads the PLY file `bytes`, which came from `path`. Polygons become fans.
 ///
 /// # Errors
 /// [`LoadError::Bad`] if the file is cut short or corrupt, or its header asks for more than the file holds.
 pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<Triangles, LoadError> {
     let place = Place::file(path);
-    let bad = |e: ply_rs_bw::parser::ParseError| place.clone().bad(format!("the PLY file is broken: {e}"));
+    // Its messages repeat whole lines, however long
+    let bad = |e: ply_rs_bw::parser::ParseError| {
+        let message: String =
+            e.to_string().chars().map(|c| if c.is_control() { ' ' } else { c }).take(MAX_MESSAGE).collect();
+        place.clone().bad(format!("the PLY file is broken: {message}"))
+    };
 
     let mut reader = Reader::new(bytes);
     let header = Parser::<Skipped>::new().read_header(&mut reader).map_err(bad)?;
@@ -31,7 +39,8 @@ pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<Triangles, LoadError> {
     for (name, element) in &header.elements {
         match name.as_str() {
             "vertex" => {
-                let vertices = Parser::<Vertex>::new().read_payload_for_element(&mut reader, element, &header);
+                let vertices =
+                    Parser::<Vertex>::new().read_payload_for_element(&mut reader, element, &header);
                 let has = |names: [&str; 2]| names.iter().all(|name| element.properties.contains_key(*name));
                 let uvs = has(["u", "v"]) || has(["s", "t"]);
                 let normals = has(["nx", "ny"]) && has(["ny", "nz"]);
@@ -61,7 +70,8 @@ pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<Triangles, LoadError> {
                 }
             }
             _ => {
-                let skipped = Parser::<Skipped>::new().read_payload_for_element(&mut reader, element, &header);
+                let skipped =
+                    Parser::<Skipped>::new().read_payload_for_element(&mut reader, element, &header);
                 skipped.map_err(bad)?;
             }
         }
@@ -155,5 +165,101 @@ struct Skipped;
 impl PropertyAccess for Skipped {
     fn new() -> Self {
         Self
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const HEADER: &str = "element vertex 4\nproperty float x\nproperty double y\nproperty float z\nproperty float nx\n\
+        property float ny\nproperty float nz\nproperty float s\nproperty float t\nproperty uchar red\n\
+        element extra 1\nproperty list uchar short all\n\
+        element face 1\nproperty list uchar int vertex_indices\nend_header\n";
+
+    fn text() -> String {
+        format!(
+            "ply\nformat ascii 1.0\ncomment by hand\n{HEADER}\
+             0 0 0 0 0 1 0 0 7\n1 0 0 0 0 1 1 0 7\n1 1 0 0 0 1 1 0.5 7\n0 1 0 0 0 1 0 0.5 7\n2 5 6\n4 0 1 2 3\n"
+        )
+    }
+
+    fn binary(little: bool) -> Vec<u8> {
+        let order = if little { "little" } else { "big" };
+        let mut bytes = format!("ply\nformat binary_{order}_endian 1.0\n{HEADER}").into_bytes();
+        let mut put = |big: &[u8]| {
+            if little { bytes.extend(big.iter().rev()) } else { bytes.extend(big) }
+        };
+        for [x, y] in [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0f32]] {
+            put(&x.to_be_bytes());
+            put(&f64::from(y).to_be_bytes());
+            for v in [0.0, 0.0, 0.0, 1.0, x, 0.5 * y] {
+                put(&f32::to_be_bytes(v));
+            }
+            put(&[7]);
+        }
+        put(&[2]);
+        put(&5i16.to_be_bytes());
+        put(&6i16.to_be_bytes());
+        put(&[4]);
+        for corner in 0..4i32 {
+            put(&corner.to_be_bytes());
+        }
+        bytes
+    }
+
+    #[test]
+    fn all_encodings_say_the_same() {
+        for bytes in [text().into_bytes(), binary(true), binary(false)] {
+            let mesh = parse(&bytes, Path::new("a.ply")).unwrap();
+            assert_eq!(mesh.positions, [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]]);
+            assert_eq!(mesh.normals, [[0.0, 0.0, 1.0]; 4]);
+            assert_eq!(mesh.uvs, [[0.0, 0.0], [1.0, 0.0], [1.0, 0.5], [0.0, 0.5]]);
+            assert_eq!(mesh.indices, [[0, 1, 2], [0, 2, 3]]);
+        }
+    }
+
+    #[test]
+    fn every_cut_is_an_error() {
+        for bytes in [text().into_bytes(), binary(true), binary(false)] {
+            // But for the end of the last line of a text
+            let needed = if bytes.starts_with(b"ply\nformat ascii") { bytes.len() - 1 } else { bytes.len() };
+            for length in 0..needed {
+                assert!(parse(&bytes[..length], Path::new("a.ply")).is_err(), "{length} bytes");
+            }
+        }
+    }
+
+    #[test]
+    fn absurd_headers_are_errors() {
+        let vertex = "property float x\nproperty float y\nproperty float z\n";
+        for (header, what) in [
+            ("element vertex 4000000000\nproperty float x\n".to_owned(), "more elements than the file holds"),
+            (
+                "element vertex 18446744073709551615\nproperty float x\n".to_owned(),
+                "more elements than the file holds",
+            ),
+            ("element nothing 18446744073709551615\n".to_owned(), "more elements than the file holds"),
+            (
+                format!("element vertex 0\n{vertex}element face 1\nproperty list uint int vertex_indices\n"),
+                "file is broken",
+            ),
+            ("element vertex 1\nproperty float x\nproperty float y\n".to_owned(), "no x, y and z"),
+            (
+                format!(
+                    "element vertex 0\n{vertex}element face 1\nproperty list uchar float vertex_indices\n"
+                ),
+                "file is broken",
+            ),
+            (
+                format!("element vertex 0\n{vertex}element face 1\nproperty int other\n"),
+                "no `vertex_indices`",
+            ),
+        ] {
+            let file = format!("ply\nformat binary_little_endian 1.0\n{header}end_header\n");
+            let bytes = [file.as_bytes(), &[0xff; 8]].concat();
+            let error = parse(&bytes, Path::new("a.ply")).unwrap_err().to_string();
+            assert!(error.starts_with("a.ply: ") && error.contains(what), "{header}: {error}");
+        }
     }
 }

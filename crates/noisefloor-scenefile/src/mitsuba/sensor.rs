@@ -31,7 +31,9 @@ impl<'d> Context<'d> {
         let to_world = self.transform(sensor, "to_world")?;
         let axes = DMat3::from_mat4(to_world);
         if axes.determinant() < 0.0 {
-            return Err(self.unsupported(sensor, "a mirrored camera (its `to_world` has a negative determinant)"));
+            return Err(
+                self.unsupported(sensor, "a mirrored camera (its `to_world` has a negative determinant)")
+            );
         }
         let (eye, view) = (to_world.w_axis.truncate(), axes.z_axis.normalize_or_zero());
         // Far from 0, a target close by would be rounded
@@ -46,7 +48,14 @@ impl<'d> Context<'d> {
         let Some(film) = films.first() else { return Ok(None) };
         film.children.iter().filter(|c| c.tag == "rfilter").for_each(Element::irrelevant);
         // How the image is stored
-        film.ignore(&["pixel_format", "component_format", "file_format", "high_quality_edges", "sample_border", "banner"]);
+        film.ignore(&[
+            "pixel_format",
+            "component_format",
+            "file_format",
+            "high_quality_edges",
+            "sample_border",
+            "banner",
+        ]);
         let edge = |name: &str, default: usize| match self.integer(film, name)? {
             None => Ok(default),
             Some(edge @ 1..=MAX_EDGE) => Ok(edge as usize),
@@ -64,7 +73,8 @@ impl<'d> Context<'d> {
             (None, length) => {
                 let length = length.unwrap_or("50mm").trim().trim_end_matches("mm");
                 let length = length.parse().ok().filter(|length: &f64| *length > 0.0 && length.is_finite());
-                let length = length.ok_or_else(|| self.bad(sensor, "`focal_length` is not a length in mm"))?;
+                let length =
+                    length.ok_or_else(|| self.bad(sensor, "`focal_length` is not a length in mm"))?;
                 ((2.0 * (36f64.hypot(24.0) / (2.0 * length)).atan()).to_degrees(), "diagonal")
             }
         };
@@ -77,7 +87,12 @@ impl<'d> Context<'d> {
             "diagonal" => width.hypot(height),
             "smaller" => width.min(height),
             "larger" => width.max(height),
-            other => return Err(self.bad(sensor, format!("`fov_axis` is `{other}`; expected x, y, diagonal, smaller or larger"))),
+            other => {
+                return Err(self.bad(
+                    sensor,
+                    format!("`fov_axis` is `{other}`; expected x, y, diagonal, smaller or larger"),
+                ));
+            }
         };
         let slope = (0.5 * fov.to_radians()).tan() * height / across;
         Ok(2.0 * slope.atan().to_degrees())
@@ -111,7 +126,9 @@ impl<'d> Context<'d> {
             None | Some(-1) => Ok(None),
             Some(depth) => match u32::try_from(depth) {
                 Ok(depth @ 1..) => Ok(Some(depth)),
-                _ => Err(self.bad(integrator, format!("`max_depth` is {depth}; it must be −1 or at least 1"))),
+                _ => {
+                    Err(self.bad(integrator, format!("`max_depth` is {depth}; it must be −1 or at least 1")))
+                }
             },
         }
     }

@@ -134,7 +134,9 @@ impl Inflated<'_> {
     fn bytes(&mut self, count: u64) -> Result<Vec<u8>, LoadError> {
         let bad = |what: String| self.place.clone().bad(what);
         self.left = self.left.checked_sub(count).ok_or_else(|| {
-            bad(format!("the mesh says it has {count} bytes more, which the file cannot hold or are too many"))
+            bad(format!(
+                "the mesh says it has {count} bytes more, which the file cannot hold or are too many"
+            ))
         })?;
         // Grows with what comes, whatever the counts say
         let mut bytes = Vec::new();
@@ -147,5 +149,128 @@ impl Inflated<'_> {
             return Err(bad(format!("the mesh ends {} bytes early", count - bytes.len() as u64)));
         }
         Ok(bytes)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use flate2::Compression;
+    use flate2::write::ZlibEncoder;
+    use std::io::Write;
+
+    /// The inside of a mesh of one triangle, `x` of whose third corner tells it from others.
+    fn inside(version: u16, flags: u32, x: f32) -> Vec<u8> {
+        let mut bytes = flags.to_le_bytes().to_vec();
+        if version == 4 {
+            bytes.extend(b"name\0");
+        }
+        bytes.extend([3u64, 1].map(u64::to_le_bytes).concat());
+        let mut put = |numbers: &[f32]| {
+            for v in numbers {
+                if flags & DOUBLE != 0 {
+                    bytes.extend(f64::from(*v).to_le_bytes())
+                } else {
+                    bytes.extend(v.to_le_bytes())
+                }
+            }
+        };
+        put(&[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, x, 1.0, 0.0]);
+        for (flag, numbers) in
+            [(HAS_NORMALS, [0.0, 0.6, 0.8].repeat(3)), (HAS_UVS, vec![0.25; 6]), (HAS_COLOURS, vec![0.5; 9])]
+        {
+            if flags & flag != 0 {
+                put(&numbers);
+            }
+        }
+        bytes.extend([0u32, 1, 2].map(u32::to_le_bytes).concat());
+        bytes
+    }
+
+    fn file(version: u16, meshes: &[Vec<u8>]) -> Vec<u8> {
+        let (mut bytes, mut starts) = (Vec::new(), Vec::new());
+        for mesh in meshes {
+            starts.push(bytes.len() as u64);
+            bytes.extend(MAGIC.to_le_bytes());
+            bytes.extend(version.to_le_bytes());
+            let mut encoder = ZlibEncoder::new(&mut bytes, Compression::default());
+            encoder.write_all(mesh).unwrap();
+            encoder.finish().unwrap();
+        }
+        for start in &starts {
+            bytes.extend(&start.to_le_bytes()[..if version == 4 { 8 } else { 4 }]);
+        }
+        bytes.extend((starts.len() as u32).to_le_bytes());
+        bytes
+    }
+
+    fn read(bytes: &[u8], index: usize) -> Result<(Triangles, bool), String> {
+        parse(bytes, index, Path::new("a.serialized")).map_err(|e| e.to_string())
+    }
+
+    #[test]
+    fn versions_precisions_and_contents_are_read() {
+        for version in [3, 4] {
+            for width in [SINGLE, DOUBLE] {
+                let plain = inside(version, width | FACE_NORMALS, 0.5);
+                let full = inside(version, width | HAS_NORMALS | HAS_UVS | HAS_COLOURS, 0.25);
+                let bytes = file(version, &[plain, full]);
+                let (mesh, flat) = read(&bytes, 0).unwrap();
+                assert!(flat && mesh.normals.is_empty() && mesh.uvs.is_empty());
+                assert_eq!(mesh.positions, [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.5, 1.0, 0.0]]);
+                let (mesh, flat) = read(&bytes, 1).unwrap();
+                assert!(!flat);
+                assert_eq!(mesh.positions[2], [0.25, 1.0, 0.0]);
+                assert_eq!((mesh.normals, mesh.uvs), (vec![[0.0, 0.6, 0.8]; 3], vec![[0.25; 2]; 3]));
+                assert_eq!(mesh.indices, [[0, 1, 2]]);
+                let error = read(&bytes, 2).unwrap_err();
+                assert_eq!(
+                    error,
+                    "a.serialized: mesh 2: there are only 2 meshes in the file, numbered from 0"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn every_cut_is_an_error() {
+        let bytes = file(4, &[inside(4, SINGLE | HAS_UVS, 0.5)]);
+        for length in 0..bytes.len() {
+            assert!(read(&bytes[..length], 0).is_err(), "{length} bytes");
+        }
+    }
+
+    #[test]
+    fn counts_are_checked_before_memory_is_taken() {
+        for count in [u64::MAX, 1 << 61, 1 << 40, 1 << 28, 1 << 20] {
+            for at in [9, 17] {
+                let mut mesh = inside(4, SINGLE, 0.5);
+                mesh[at..at + 8].copy_from_slice(&count.to_le_bytes());
+                let error = read(&file(4, &[mesh]), 0).unwrap_err();
+                assert!(error.contains("which the file cannot hold"), "{count}: {error}");
+            }
+        }
+        let mut mesh = inside(4, SINGLE, 0.5);
+        mesh[17] = 2;
+        assert!(read(&file(4, &[mesh]), 0).unwrap_err().contains("ends 12 bytes early"));
+    }
+
+    #[test]
+    fn what_is_no_mesh_is_named() {
+        let good = file(4, &[inside(4, SINGLE, 0.5)]);
+        let with = |at: usize, value: u8| {
+            let mut bytes = good.clone();
+            bytes[at] = value;
+            read(&bytes, 0).unwrap_err()
+        };
+        assert!(with(0, 0).contains("this is not a serialized mesh"));
+        assert!(with(2, 2).contains("version 2 of serialized meshes is not supported"));
+        assert!(with(4, 0).contains("cannot be inflated"));
+        assert!(with(good.len() - 12, 0xff).contains("the table of meshes is corrupt"));
+        assert!(with(good.len() - 1, 0xff).contains("no table"));
+        let neither = file(4, &[inside(4, HAS_UVS, 0.5)]);
+        assert!(read(&neither, 0).unwrap_err().contains("neither single nor double"));
+        let long = file(4, &[[&SINGLE.to_le_bytes()[..], &[b'a'; 9000]].concat()]);
+        assert!(read(&long, 0).unwrap_err().contains("bytes in a name, more than 4096"));
     }
 }

@@ -101,7 +101,8 @@ impl<'d> Context<'d> {
     fn mesh_file(&self, element: &'d Element) -> Result<(Triangles, bool), LoadError> {
         let place = self.place(element);
         let name = self.string(element, "filename")?;
-        let name = name.ok_or_else(|| self.bad(element, format!("{} needs a `filename`", element.label())))?;
+        let name =
+            name.ok_or_else(|| self.bad(element, format!("{} needs a `filename`", element.label())))?;
         let path = self.folder.find(name, &place)?;
         let bytes = files::read(&path, MAX_FILE_BYTES, &place)?;
         let (mesh, flat) = match element.kind() {
@@ -109,7 +110,8 @@ impl<'d> Context<'d> {
             "ply" => (ply::parse(&bytes, &path)?, false),
             _ => {
                 let index = self.integer(element, "shape_index")?.unwrap_or(0);
-                let index = usize::try_from(index).map_err(|_| self.bad(element, "`shape_index` is negative"))?;
+                let index =
+                    usize::try_from(index).map_err(|_| self.bad(element, "`shape_index` is negative"))?;
                 serialized::parse(&bytes, index, &path)?
             }
         };
@@ -132,7 +134,10 @@ impl<'d> Context<'d> {
             self.warn(element, "the mesh has no faces");
         }
         if left_out > 0 {
-            self.warn(element, format!("{left_out} of {} faces have no area and are left out", indices.len()));
+            self.warn(
+                element,
+                format!("{left_out} of {} faces have no area and are left out", indices.len()),
+            );
         }
         Ok(())
     }

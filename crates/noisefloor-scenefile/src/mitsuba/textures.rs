@@ -38,7 +38,10 @@ impl<'d> Context<'d> {
         }
         let colour = self.colour(object, name, Use::Factor)?.unwrap_or([default; 3]);
         if colour.iter().any(|c| *c > 1.0) {
-            self.warn(object.get(name).unwrap_or(object), format!("`{name}` is {colour:?}; values above 1 become 1"));
+            self.warn(
+                object.get(name).unwrap_or(object),
+                format!("`{name}` is {colour:?}; values above 1 become 1"),
+            );
         }
         Ok(colour.map(|c| c.min(1.0)))
     }
@@ -149,7 +152,9 @@ impl<'d> Context<'d> {
         }
         let Picture { width, height, samples } = picture::read(&key.0, place)?;
         let pixels = match samples {
-            Samples::Eight(codes) if raw => Pixels::Linear8(codes.iter().map(|[r, g, b, _]| [*r, *g, *b]).collect()),
+            Samples::Eight(codes) if raw => {
+                Pixels::Linear8(codes.iter().map(|[r, g, b, _]| [*r, *g, *b]).collect())
+            }
             Samples::Eight(codes) => Pixels::Srgb8(codes.iter().map(|[r, g, b, _]| [*r, *g, *b]).collect()),
             Samples::Sixteen(codes) => {
                 let linear = |code: u16| {

@@ -65,7 +65,9 @@ impl Context<'_> {
             _ => match self.numbers(element, value)?.as_slice() {
                 [grey] => [*grey as f32; 3],
                 [r, g, b] => [*r as f32, *g as f32, *b as f32],
-                other => return Err(self.bad(element, format!("{} numbers; a colour has 1 or 3", other.len()))),
+                other => {
+                    return Err(self.bad(element, format!("{} numbers; a colour has 1 or 3", other.len())));
+                }
             },
         };
         if colour.iter().any(|c| *c < 0.0 || !c.is_finite()) {
@@ -77,7 +79,8 @@ impl Context<'_> {
     /// `#rrggbb`, or three numbers in 0…1, sRGB-encoded.
     fn srgb(&self, element: &Element, value: &str) -> Result<Rgb, LoadError> {
         let codes = match value.trim().strip_prefix('#').filter(|hex| hex.len() == 6 && hex.is_ascii()) {
-            Some(hex) => [0, 2, 4].map(|at| u8::from_str_radix(&hex[at..at + 2], 16).ok().map(|c| f32::from(c) / 255.0)),
+            Some(hex) => [0, 2, 4]
+                .map(|at| u8::from_str_radix(&hex[at..at + 2], 16).ok().map(|c| f32::from(c) / 255.0)),
             None => match self.numbers(element, value)?.as_slice() {
                 [r, g, b] => [*r, *g, *b].map(|c| Some(c as f32)),
                 _ => [None; 3],
@@ -91,10 +94,11 @@ impl Context<'_> {
 
     /// One number, or wavelengths that all have the same.
     fn constant_spectrum(&self, element: &Element, value: &str) -> Result<f32, LoadError> {
-        let mut levels = value.split([',', ' ', '\t', '\n', '\r']).filter(|word| !word.is_empty()).map(|word| {
-            let level = word.split_once(':').map_or(word, |(_, level)| level);
-            self.number(element, level)
-        });
+        let mut levels =
+            value.split([',', ' ', '\t', '\n', '\r']).filter(|word| !word.is_empty()).map(|word| {
+                let level = word.split_once(':').map_or(word, |(_, level)| level);
+                self.number(element, level)
+            });
         let first = levels.next().ok_or_else(|| self.bad(element, "the spectrum is empty"))??;
         for level in levels {
             if level? != first {
@@ -108,7 +112,9 @@ impl Context<'_> {
     pub(super) fn point(&self, object: &Element, name: &str) -> Result<Option<DVec3>, LoadError> {
         let Some(element) = object.get(name) else { return Ok(None) };
         if element.tag != "point" && element.tag != "vector" {
-            return Err(self.bad(element, format!("`{name}` is a <{}>; expected a point or vector", element.tag)));
+            return Err(
+                self.bad(element, format!("`{name}` is a <{}>; expected a point or vector", element.tag))
+            );
         }
         self.triple(element, 0.0).map(Some)
     }
@@ -134,7 +140,8 @@ impl Context<'_> {
             "translate" => Ok(DMat4::from_translation(self.triple(step, 0.0)?)),
             "scale" => Ok(DMat4::from_scale(self.triple(step, 1.0)?)),
             "rotate" => {
-                let angle = step.attribute("angle").ok_or_else(|| self.bad(step, "a rotation needs an angle"))?;
+                let angle =
+                    step.attribute("angle").ok_or_else(|| self.bad(step, "a rotation needs an angle"))?;
                 let angle = self.number(step, angle)?;
                 let axis = self.triple(step, 0.0)?.try_normalize();
                 let axis = axis.ok_or_else(|| self.bad(step, "a rotation needs an axis that is not 0"))?;
@@ -174,8 +181,8 @@ impl Context<'_> {
         let (origin, target, up) = (point("origin")?, point("target")?, point("up")?);
         let view = (target - origin).try_normalize();
         let left = view.and_then(|view| up.cross(view).try_normalize().map(|left| (view, left)));
-        let (view, left) =
-            left.ok_or_else(|| self.bad(step, "origin and target are the same, or `up` points along the view"))?;
+        let (view, left) = left
+            .ok_or_else(|| self.bad(step, "origin and target are the same, or `up` points along the view"))?;
         let up = view.cross(left);
         Ok(DMat4::from_cols(left.extend(0.0), up.extend(0.0), view.extend(0.0), origin.extend(1.0)))
     }

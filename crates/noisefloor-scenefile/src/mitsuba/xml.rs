@@ -135,7 +135,8 @@ impl Document {
         let text = std::str::from_utf8(bytes).map_err(|e| bad(format!("the file is not UTF-8: {e}")))?;
         check_attributes(text, path)?;
         // Without a DTD, entities cannot multiply
-        let options = ParsingOptions { allow_dtd: false, nodes_limit: MAX_NODES, ..ParsingOptions::default() };
+        let options =
+            ParsingOptions { allow_dtd: false, nodes_limit: MAX_NODES, ..ParsingOptions::default() };
         let tree = roxmltree::Document::parse_with_options(text, options).map_err(|e| {
             let place = Place::part(path, format_args!("line {}", e.pos().row));
             place.bad(format!("the XML is broken: {e}"))
@@ -166,7 +167,11 @@ impl Document {
 /// Checks what the parser takes quadratic time for: attributes of one element, and name spaces.
 fn check_attributes(text: &str, path: &Path) -> Result<(), LoadError> {
     let place = Place::file(path);
-    place.clone().at_most("name spaces", text.matches("xmlns").take(MAX_NAMESPACES + 1).count() as u64, MAX_NAMESPACES as u64)?;
+    place.clone().at_most(
+        "name spaces",
+        text.matches("xmlns").take(MAX_NAMESPACES + 1).count() as u64,
+        MAX_NAMESPACES as u64,
+    )?;
     // No attribute contains `<`, and each has two quotes
     let quotes = |tag: &str| tag.bytes().filter(|b| matches!(b, b'"' | b'\'')).count();
     let most = text.split('<').filter(|tag| !tag.starts_with("!--")).map(quotes).max().unwrap_or(0);
