@@ -70,9 +70,10 @@ impl<'d> Context<'d> {
     pub(super) fn warn(&self, element: &Element, what: impl fmt::Display) {
         let warning = Warning { place: self.place(element), what: what.to_string() };
         let mut warnings = self.warnings.borrow_mut();
-        if warnings.len() < MAX_WARNINGS && !warnings.contains(&warning) {
-            warnings.push(warning);
-            if warnings.len() == MAX_WARNINGS {
+        if warnings.len() <= MAX_WARNINGS && !warnings.contains(&warning) {
+            if warnings.len() < MAX_WARNINGS {
+                warnings.push(warning);
+            } else {
                 let what = "further warnings are left out".to_owned();
                 warnings.push(Warning { place: Place::file(&self.document.path), what });
             }

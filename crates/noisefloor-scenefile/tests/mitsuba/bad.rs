@@ -1,0 +1,243 @@
+use crate::util::{CAMERA, Folder};
+
+const RECTANGLE: &str = r#"<shape type="rectangle"/>"#;
+
+fn folder() -> Folder {
+    Folder::new()
+        .with("broken.png", b"\x89PNG\r\n\x1a\nand so on")
+        .with("text.png", "not a picture")
+        .with("empty.obj", "")
+        .with("bad.obj", "v 0 0 0\nf 1 2 3\n")
+        .with("flat.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nf 1 1 2\nf 1 2 2\n")
+        .with("short.ply", "ply\nformat ascii 1.0\nelement vertex 99\nproperty float x\nend_header\n0\n")
+        .with("bad.serialized", [0x1c, 0x04, 0x04, 0x00, 1, 2, 3])
+        .with_exr("nan.exr", 1, &[[f32::NAN, 0.0, 0.0]])
+        .with_png("good.png", 1, &[[1, 2, 3, 4]])
+}
+
+/// Errors, each with its file and, in the scene file, its line.
+#[test]
+fn errors_say_where_and_what() {
+    let folder = folder();
+    let outside = if cfg!(windows) { "C:\\x.png" } else { "/etc/hostname" };
+    let bitmap = |name: &str| {
+        format!(
+            "<shape type=\"rectangle\">\n<bsdf type=\"diffuse\"><texture type=\"bitmap\" name=\"reflectance\"><string name=\"filename\" value=\"{name}\"/></texture></bsdf></shape>"
+        )
+    };
+    let mesh = |kind: &str, name: &str| {
+        format!("\n<shape type=\"{kind}\"><string name=\"filename\" value=\"{name}\"/></shape>")
+    };
+    let bsdf = |inside: &str| format!("<shape type=\"rectangle\">\n{inside}</shape>");
+    let light = |inside: &str| {
+        format!("<shape type=\"rectangle\"><emitter type=\"area\">\n{inside}</emitter></shape>")
+    };
+    let move_by = |inside: &str| {
+        format!("<shape type=\"rectangle\"><transform name=\"to_world\">\n{inside}</transform></shape>")
+    };
+    for (body, want) in [
+        // Files
+        (bitmap("missing.png"), "scene.xml: line 3 cannot be read: `"),
+        (bitmap("../good.png"), "scene.xml: line 3: `../good.png` lies outside the folder of the scene"),
+        (bitmap("a/../../good.png"), "lies outside the folder of the scene"),
+        (bitmap(outside), "lies outside the folder of the scene"),
+        (bitmap("."), "line 3 cannot be read: `"),
+        (bitmap("broken.png"), "broken.png: the picture is broken"),
+        (bitmap("text.png"), "text.png: a picture that is neither PNG, JPEG, OpenEXR nor Radiance is not supported"),
+        (bitmap("nan.exr"), "line 3: the picture has values that are not finite"),
+        (mesh("obj", "bad.obj"), "bad.obj: line 2: `2`: there is no position 2"),
+        (mesh("ply", "short.ply"), "short.ply: the header asks for more elements than the file holds"),
+        (mesh("serialized", "bad.serialized"), "bad.serialized: mesh 0: the file is cut short"),
+        (mesh("obj", "missing.obj"), "line 3 cannot be read"),
+        ("<shape type=\"obj\"/>".to_owned(), "line 2: <shape type=\"obj\"> needs a `filename`"),
+        (format!("<include filename=\"b.xml\"/>{RECTANGLE}"), "line 2: <include> is not supported"),
+        // Kinds
+        ("\n<shape type=\"hair\"/>".to_owned(), "line 3: <shape type=\"hair\"> is not supported"),
+        (bsdf("<bsdf type=\"hair\"/>"), "line 3: <bsdf type=\"hair\"> is not supported"),
+        (bsdf("<bsdf type=\"twosided\"/>"), "line 3: <bsdf type=\"twosided\"> needs a <bsdf> in it"),
+        (bsdf("<bsdf type=\"twosided\"><bsdf type=\"diffuse\"/><bsdf type=\"diffuse\"/></bsdf>"), "with more than one <bsdf> in it is not supported"),
+        (bsdf("<bsdf type=\"mask\"><bsdf type=\"mask\"><bsdf type=\"diffuse\"/></bsdf></bsdf>"), "line 3: a mask in a mask is not supported"),
+        (bsdf("<bsdf type=\"diffuse\"/><bsdf type=\"diffuse\"/>"), "line 3: a shape has at most one bsdf"),
+        (bsdf("<emitter type=\"area\"/><emitter type=\"area\"/>"), "line 3: a shape has at most one emitter"),
+        (bsdf("<emitter type=\"point\"/>"), "line 3: <emitter type=\"point\"> in a shape is not supported"),
+        ("<emitter type=\"sunsky\"/>".to_owned(), "line 2: <emitter type=\"sunsky\"> is not supported"),
+        // Values
+        (bsdf("<bsdf type=\"diffuse\"><rgb name=\"reflectance\" value=\"1 2\"/></bsdf>"), "line 3: 2 numbers; a colour has 1 or 3"),
+        (bsdf("<bsdf type=\"diffuse\"><rgb name=\"reflectance\" value=\"-1\"/></bsdf>"), "is negative or too large"),
+        (bsdf("<bsdf type=\"diffuse\"><rgb name=\"reflectance\" value=\"inf\"/></bsdf>"), "line 3: `inf` is not a finite number"),
+        (bsdf("<bsdf type=\"diffuse\"><rgb name=\"reflectance\"/></bsdf>"), "line 3: `reflectance` has no value"),
+        (bsdf("<bsdf type=\"diffuse\"><string name=\"reflectance\" value=\"red\"/></bsdf>"), "line 3: `reflectance` is a <string>; expected <rgb>, <srgb>"),
+        (bsdf("<bsdf type=\"diffuse\"><srgb name=\"reflectance\" value=\"#12345\"/></bsdf>"), "line 3: `#12345` is not a finite number"),
+        (bsdf("<bsdf type=\"diffuse\"><srgb name=\"reflectance\" value=\"#12345é\"/></bsdf>"), "is not a finite number"),
+        (bsdf("<bsdf type=\"diffuse\"><srgb name=\"reflectance\" value=\"#12345g\"/></bsdf>"), "line 3: `#12345g` is neither #rrggbb nor three numbers"),
+        (bsdf("<bsdf type=\"diffuse\"><spectrum name=\"reflectance\" value=\"400:0.1, 500:0.2\"/></bsdf>"), "line 3: a spectrum that is not the same at all wavelengths is not supported"),
+        (bsdf("<bsdf type=\"diffuse\"><texture type=\"wood\" name=\"reflectance\"/></bsdf>"), "line 3: <texture type=\"wood\" name=\"reflectance\"> is not supported"),
+        (bsdf("<bsdf type=\"plastic\"><float name=\"int_ior\" value=\"1\"/><float name=\"ext_ior\" value=\"2\"/></bsdf>"), "line 2: an index of refraction is 0.5, outside 1…4"),
+        (bsdf("<bsdf type=\"dielectric\"><float name=\"int_ior\" value=\"0\"/></bsdf>"), "line 3: `int_ior` must be above 0"),
+        (bsdf("<bsdf type=\"dielectric\"><string name=\"int_ior\" value=\"jelly\"/></bsdf>"), "line 3: the material `jelly` (known: vacuum, air"),
+        (bsdf("<bsdf type=\"conductor\"><rgb name=\"eta\" value=\"1\"/></bsdf>"), "line 3: give both `eta` and `k`, or `material`"),
+        (bsdf("<bsdf type=\"roughconductor\"><float name=\"alpha_u\" value=\"0.1\"/><float name=\"alpha_v\" value=\"0.2\"/></bsdf>"), "line 3: roughness that depends on direction is not supported"),
+        (bsdf("<bsdf type=\"roughconductor\"><texture name=\"alpha\" type=\"checkerboard\"/></bsdf>"), "line 3: a texture as `alpha` is not supported"),
+        (light("<string name=\"radiance\" value=\"1\"/>"), "line 3: `radiance` is a <string>"),
+        (light("<rgb name=\"radiance\" value=\"1e13\"/>"), "scene.xml: line 2: "),
+        (light("<ref name=\"radiance\" id=\"x\"/></emitter></shape><bsdf type=\"diffuse\" id=\"x\"/><shape type=\"cube\"><emitter type=\"area\">"), "expected a texture"),
+        ("<shape type=\"rectangle\"><boolean name=\"flip_normals\" value=\"maybe\"/></shape>".to_owned(), "line 2: `maybe` is neither true nor false"),
+        ("<shape type=\"sphere\"><float name=\"radius\" value=\"one\"/></shape>".to_owned(), "line 2: `one` is not a finite number"),
+        ("<shape type=\"sphere\"><float name=\"radius\" value=\"0\"/></shape>".to_owned(), "line 2: the radius of a sphere is 0"),
+        ("<shape type=\"sphere\"><float name=\"center\" value=\"0\"/></shape>".to_owned(), "line 2: `center` is a <float>; expected a point or vector"),
+        ("<shape type=\"serialized\"><string name=\"filename\" value=\"bad.serialized\"/><integer name=\"shape_index\" value=\"-1\"/></shape>".to_owned(), "line 2: `shape_index` is negative"),
+        ("<shape type=\"rectangle\"><float name=\"to_world\" value=\"1\"/></shape>".to_owned(), "line 2: `to_world` is a <float>; expected a transform"),
+        // Transforms
+        (move_by("<twist x=\"1\"/>"), "line 3: <twist> in a transform is not supported"),
+        (move_by("<rotate y=\"1\"/>"), "line 3: a rotation needs an angle"),
+        (move_by("<rotate angle=\"1\"/>"), "line 3: a rotation needs an axis that is not 0"),
+        (move_by("<matrix value=\"1 2 3\"/>"), "line 3: 3 numbers; a matrix has 9 or 16"),
+        (move_by("<matrix value=\"1 0 0 0 0 1 0 0 0 0 1 0 0 0 1 1\"/>"), "line 3: a matrix whose last row is not 0 0 0 1 is not supported"),
+        (move_by("<lookat origin=\"1,2,3\" target=\"1,2,3\"/>"), "line 3: origin and target are the same"),
+        (move_by("<lookat origin=\"1,2,3\"/>"), "line 3: `target` is missing"),
+        (move_by("<translate x=\"1e300\"/><scale value=\"1e300\"/>"), "line 2: the transform is too large"),
+        (move_by("<translate x=\"1e7\"/>"), "line 2: "),
+    ] {
+        let error = folder.body(&body).err().unwrap_or_else(|| panic!("{body} is taken"));
+        assert!(error.contains(want), "{body}\n{error}\nwant: {want}");
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn links_do_not_lead_out() {
+    let elsewhere = Folder::new().with_png("a.png", 1, &[[1, 2, 3, 4]]);
+    let folder = Folder::new();
+    std::os::unix::fs::symlink(elsewhere.path(), folder.path().join("link")).unwrap();
+    let body = "<emitter type=\"envmap\"><string name=\"filename\" value=\"link/a.png\"/></emitter>";
+    assert!(folder.body(body).unwrap_err().contains("`link/a.png` lies outside the folder of the scene"));
+}
+
+/// What is left out is warned of, with its line; what makes no difference is not.
+#[test]
+fn warnings_say_what_is_left_out() {
+    let folder = folder();
+    for (body, want) in [
+        (
+            "<shape type=\"obj\"><string name=\"filename\" value=\"flat.obj\"/></shape>",
+            "line 2: 2 of 3 faces have no area and are left out",
+        ),
+        (
+            "<shape type=\"obj\"><string name=\"filename\" value=\"empty.obj\"/></shape>",
+            "line 2: the mesh has no faces",
+        ),
+        (
+            "<shape type=\"cube\">\n<float name=\"unheard_of\" value=\"1\"/></shape>",
+            "line 3: <float name=\"unheard_of\"> is ignored",
+        ),
+        (
+            "<shape type=\"cube\">\n<medium name=\"interior\" type=\"homogeneous\"><float name=\"x\" value=\"1\"/></medium></shape>",
+            "line 3: <medium type=\"homogeneous\" name=\"interior\"> is ignored",
+        ),
+        ("\n<volume type=\"grid\"/>", "line 3: <volume type=\"grid\"> is ignored"),
+        (
+            "<shape type=\"cube\"><bsdf type=\"roughplastic\"><float name=\"alpha\" value=\"0.2\"/></bsdf></shape>",
+            "line 2: the distribution `beckmann` is replaced by `ggx` of the same alpha",
+        ),
+        (
+            "<shape type=\"cube\"><bsdf type=\"dielectric\"><float name=\"specular_reflectance\" value=\"0.5\"/></bsdf></shape>",
+            "line 2: `specular_reflectance` [0.5, 0.5, 0.5] is ignored: it is 1",
+        ),
+        (
+            "<shape type=\"disk\"><bsdf type=\"diffuse\"><texture name=\"reflectance\" type=\"checkerboard\"/></bsdf></shape>",
+            "line 2: the texture is not laid on the disk in rings",
+        ),
+        (
+            "<shape type=\"sphere\"><bsdf type=\"diffuse\"><texture name=\"reflectance\" type=\"checkerboard\"/></bsdf></shape>",
+            "line 2: the texture is laid on the sphere with its top towards +y of the scene",
+        ),
+    ] {
+        let warnings = folder.body(body).unwrap_or_else(|e| panic!("{body}: {e}")).warnings;
+        let warnings: Vec<String> = warnings.iter().map(ToString::to_string).collect();
+        assert!(
+            warnings.len() == 1 && warnings[0].ends_with(&format!("scene.xml: {want}")),
+            "{body}: {warnings:?}"
+        );
+    }
+    // As many as a thousand
+    let many = "<x/>\n".repeat(5000);
+    let warnings = folder.body(&many).unwrap().warnings;
+    assert_eq!(warnings.len(), 1001);
+    assert!(warnings[1000].to_string().ends_with("scene.xml: further warnings are left out"));
+}
+
+#[test]
+fn what_is_no_scene_is_an_error() {
+    let folder = Folder::new();
+    for (text, want) in [
+        ("", "scene.xml: line 1: the XML is broken"),
+        ("<scene version=\"3.0.0\">\n<a></scene>", "scene.xml: line 2: the XML is broken"),
+        ("<world version=\"3.0.0\"/>", "expected <scene version=\"…\"> of Mitsuba"),
+        ("<scene/>", "expected <scene version=\"…\"> of Mitsuba"),
+        ("<scene version=\"new\"/>", "expected <scene version=\"…\"> of Mitsuba"),
+        ("<scene version=\"4.0.0\"/>", "version 4.0.0 of Mitsuba's scenes is not supported"),
+        ("<!DOCTYPE x [<!ENTITY a \"b\">]><scene version=\"3.0.0\"/>", "the XML is broken"),
+        (
+            "<scene version=\"3.0.0\">\n<default name=\"a\"/></scene>",
+            "line 2: a <default> needs a name and a value",
+        ),
+    ] {
+        let error = folder.load(text).unwrap_err();
+        assert!(error.contains(want), "{text}: {error}");
+    }
+    std::fs::write(folder.path().join("bytes.xml"), [0xff, 0xfe]).unwrap();
+    let error = noisefloor_scenefile::load(&folder.path().join("bytes.xml")).unwrap_err();
+    assert!(error.to_string().contains("not UTF-8"));
+    assert!(
+        noisefloor_scenefile::load(&folder.path().join("none.xml"))
+            .unwrap_err()
+            .to_string()
+            .contains("cannot be read")
+    );
+}
+
+/// What would take long, or much memory, or the stack, is refused at once.
+#[test]
+fn what_is_too_large_is_an_error() {
+    let folder = Folder::new();
+    let scene = |inside: &str| format!("<scene version=\"3.0.0\">{CAMERA}{inside}</scene>");
+    let deep = scene(&("<a>".repeat(100_000) + &"</a>".repeat(100_000)));
+    assert!(folder.load(&deep).unwrap_err().contains("33 levels of elements, more than 32"));
+    let attributes: String = (0..200_000).map(|i| format!(" b{i}='1'")).collect();
+    assert!(
+        folder
+            .load(&scene(&format!("<a{attributes}/>")))
+            .unwrap_err()
+            .contains("attributes of one element, more than 64")
+    );
+    let spaces: String = (0..3000).map(|i| format!("<a xmlns:n{i}='u{i}'>")).collect();
+    assert!(folder.load(&scene(&spaces)).unwrap_err().contains("17 name spaces, more than 16"));
+    assert!(folder.load(&scene(&"<a/>".repeat(1 << 20))).unwrap_err().contains("the XML is broken"));
+
+    // Twenty doublings of a hundred bytes
+    let mut bomb = format!("<default name='p0' value='{}'/>", "x".repeat(100));
+    for i in 0..20 {
+        bomb += &format!("<default name='p{}' value='$p{i}$p{i}'/>", i + 1);
+    }
+    assert!(folder.load(&scene(&bomb)).unwrap_err().contains("bytes in parameters, more than 67108864"));
+
+    // A PNG whose header claims more than its bytes can hold, and one above the limit
+    for (width, height, want) in [
+        (8000u32, 8000u32, "bytes cannot hold 8000×8000 pixels"),
+        (65_000, 65_000, "4225000000 pixels, more than"),
+    ] {
+        let header =
+            [b"IHDR".as_slice(), &width.to_be_bytes(), &height.to_be_bytes(), &[8, 2, 0, 0, 0]].concat();
+        let chunk = |data: &[u8]| {
+            let mut crc = flate2::Crc::new();
+            crc.update(data);
+            [&(data.len() as u32 - 4).to_be_bytes(), data, &crc.sum().to_be_bytes()].concat()
+        };
+        let png = [b"\x89PNG\r\n\x1a\n".to_vec(), chunk(&header), chunk(b"IDAT")].concat();
+        let folder = Folder::new().with("a.png", png);
+        let error = folder
+            .body("<emitter type=\"envmap\"><string name=\"filename\" value=\"a.png\"/></emitter>")
+            .unwrap_err();
+        assert!(error.contains(want), "{error}");
+    }
+}

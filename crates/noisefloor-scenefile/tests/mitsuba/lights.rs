@@ -1,0 +1,81 @@
+use crate::util::{Folder, close};
+use std::f32::consts::FRAC_1_PI;
+
+const FLOOR: &str = r#"<shape type="rectangle"><transform name="to_world"><scale value="100"/></transform><bsdf type="diffuse"><float name="reflectance" value="0.8"/></bsdf></shape>"#;
+
+#[test]
+fn lights_without_size_light_a_floor() {
+    let folder = Folder::new();
+    for (light, irradiance) in [
+        (
+            r#"<emitter type="point"><point name="position" x="0" y="0" z="2"/><rgb name="intensity" value="4, 8, 0"/></emitter>"#,
+            [1.0, 2.0, 0.0],
+        ),
+        (
+            r#"<emitter type="point"><transform name="to_world"><translate z="4"/></transform><rgb name="intensity" value="16"/></emitter>"#,
+            [1.0; 3],
+        ),
+        (
+            r#"<emitter type="directional"><vector name="direction" x="0" y="3" z="-4"/><rgb name="irradiance" value="5, 0, 0"/></emitter>"#,
+            [4.0, 0.0, 0.0],
+        ),
+        (
+            r#"<emitter type="directional"><transform name="to_world"><rotate x="1" angle="180"/></transform><rgb name="irradiance" value="5"/></emitter>"#,
+            [5.0; 3],
+        ),
+        (r#"<emitter type="directional"><rgb name="irradiance" value="5"/></emitter>"#, [0.0; 3]),
+        (
+            r#"<emitter type="spot"><transform name="to_world"><lookat origin="0,0,2" target="0,0,0" up="0,1,0"/></transform><rgb name="intensity" value="4"/></emitter>"#,
+            [1.0; 3],
+        ),
+        (
+            r#"<emitter type="spot"><transform name="to_world"><lookat origin="0,0,2" target="2,0,0" up="0,1,0"/></transform><rgb name="intensity" value="4"/></emitter>"#,
+            [0.0; 3],
+        ),
+    ] {
+        let want = irradiance.map(|e| e * 0.8 * FRAC_1_PI);
+        close(folder.see(&format!("{FLOOR}{light}")), want, 1e-3, light);
+    }
+    let spot = folder.body(r#"<emitter type="spot"/>"#).unwrap();
+    assert!(spot.warnings[0].to_string().contains("line 2: the spot fades towards its edge"));
+}
+
+#[test]
+fn surroundings_are_seen() {
+    let folder = Folder::new();
+    let constant = r#"<emitter type="constant"><rgb name="radiance" value="0.25, 0.5, 1"/></emitter>"#;
+    close(folder.see(constant), [0.25, 0.5, 1.0], 1e-5, constant);
+    let two = folder.body(&format!("{constant}\n{constant}")).unwrap_err();
+    assert!(two.contains("line 3: a second emitter surrounds the scene"), "{two}");
+}
+
+/// The camera looks along −z of the scene, so sees the map where u is 0 between the last column and the first; turned by +90°
+/// about y, the map's +x comes to be there, at u = ¼.
+#[test]
+fn maps_lie_as_in_mitsuba() {
+    let columns: Vec<[f32; 3]> = (0..2 * 8).map(|i| [(i % 8) as f32, 0.0, 1.0]).collect();
+    let folder = Folder::new().with_exr("sky.exr", 8, &columns).with_png("sky.png", 1, &[[255, 188, 0, 255]]);
+    for (more, want) in [
+        ("", [3.5, 0.0, 1.0]),
+        (r#"<float name="scale" value="2"/>"#, [7.0, 0.0, 2.0]),
+        (r#"<transform name="to_world"><rotate y="1" angle="90"/></transform>"#, [1.5, 0.0, 1.0]),
+        (r#"<transform name="to_world"><rotate y="1" angle="-90"/></transform>"#, [5.5, 0.0, 1.0]),
+        // Mirrored after it is turned
+        (
+            r#"<transform name="to_world"><rotate y="1" angle="90"/><scale x="-1"/></transform>"#,
+            [1.5, 0.0, 1.0],
+        ),
+        (
+            r#"<transform name="to_world"><scale x="-1"/><rotate y="1" angle="90"/></transform>"#,
+            [5.5, 0.0, 1.0],
+        ),
+        (r#"<transform name="to_world"><scale z="-3" x="3" y="3"/></transform>"#, [3.5, 0.0, 1.0]),
+    ] {
+        let body =
+            format!(r#"<emitter type="envmap"><string name="filename" value="sky.exr"/>{more}</emitter>"#);
+        close(folder.see(&body), want, 2e-3, more);
+    }
+    // Codes are decoded
+    let body = r#"<emitter type="envmap"><string name="filename" value="sky.png"/></emitter>"#;
+    close(folder.see(body), [1.0, 0.5029, 0.0], 1e-3, body);
+}

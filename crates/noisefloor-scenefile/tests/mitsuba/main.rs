@@ -1,0 +1,26 @@
+//! Tests of Mitsuba scenes, one module a subject.
+
+/// What is broken, unsupported or too large, and what is only warned of.
+#[cfg(test)]
+mod bad;
+/// Broken files: every flip and cut is an error or a scene, never a panic.
+#[cfg(test)]
+mod hostile;
+/// Lights and surroundings.
+#[cfg(test)]
+mod lights;
+/// Surfaces and textures.
+#[cfg(test)]
+mod materials;
+/// Camera, image size, path length; parameters and references.
+#[cfg(test)]
+mod setup;
+/// Shapes and their fronts.
+#[cfg(test)]
+mod shapes;
+/// The scenes in `../shared`, where they are.
+#[cfg(test)]
+mod shared;
+/// Scenes to write, load and look at.
+#[cfg(test)]
+mod util;

@@ -1,0 +1,205 @@
+use crate::util::{Folder, close};
+
+const SKY: &str = r#"<emitter type="constant"><rgb name="radiance" value="1"/></emitter>"#;
+
+/// A 2 × 2 picture: red, green; grey, white; all transparent but one.
+fn folder() -> Folder {
+    Folder::new()
+        .with_png("a.png", 2, &[[255, 0, 0, 0], [0, 255, 0, 255], [128, 128, 128, 0], [255, 255, 255, 0]])
+        .with_exr("bright.exr", 1, &[[4.0, 2.0, -1.0]])
+}
+
+/// The rectangle from −1 to 1 shines with a texture, and the camera sees the middle of it, which is moved to (u, v) of 0…1
+/// from the lower left.
+fn shine(folder: &Folder, texture: &str, u: f32, v: f32) -> [f32; 3] {
+    folder.see(&format!(
+        r#"<shape type="rectangle"><transform name="to_world"><translate x="{}" y="{}"/></transform><emitter type="area"><texture name="radiance" {texture}</texture></emitter></shape>"#,
+        1.0 - 2.0 * u,
+        1.0 - 2.0 * v
+    ))
+}
+
+const BITMAP: &str =
+    r#"type="bitmap"><string name="filename" value="a.png"/><string name="filter_type" value="nearest"/>"#;
+const RED: [f32; 3] = [1.0, 0.0, 0.0];
+const GREEN: [f32; 3] = [0.0, 1.0, 0.0];
+const GREY: [f32; 3] = [0.215_86; 3];
+const WHITE: [f32; 3] = [1.0; 3];
+const QUARTERS: [(f32, f32); 4] = [(0.25, 0.25), (0.75, 0.25), (0.25, 0.75), (0.75, 0.75)];
+
+/// The four quarters, as Mitsuba 3.9.1 has them at u, v = ¼ and ¾: v runs down the picture.
+#[test]
+fn bitmaps_lie_as_in_mitsuba() {
+    let folder = folder();
+    for (more, want) in [
+        ("", [RED, GREEN, GREY, WHITE]),
+        (r#"<boolean name="raw" value="true"/>"#, [RED, GREEN, [128.0 / 255.0; 3], WHITE]),
+        (r#"<transform name="to_uv"><translate x="0.5"/></transform>"#, [GREEN, RED, WHITE, GREY]),
+        (r#"<transform name="to_uv"><translate y="0.5"/></transform>"#, [GREY, WHITE, RED, GREEN]),
+        (r#"<transform name="to_uv"><scale x="0.5"/></transform>"#, [RED, RED, GREY, GREY]),
+        (
+            r#"<transform name="to_uv"><translate x="1"/></transform><string name="wrap_mode" value="clamp"/>"#,
+            [GREEN, GREEN, WHITE, WHITE],
+        ),
+        (
+            r#"<transform name="to_uv"><translate x="1"/></transform><string name="wrap_mode" value="mirror"/>"#,
+            [GREEN, RED, WHITE, GREY],
+        ),
+        (
+            r#"<transform name="to_uv"><rotate z="1" angle="90"/></transform><string name="wrap_mode" value="repeat"/>"#,
+            [GREEN, WHITE, RED, GREY],
+        ),
+    ] {
+        for ((u, v), want) in QUARTERS.into_iter().zip(want) {
+            close(shine(&folder, &format!("{BITMAP}{more}"), u, v), want, 1e-3, &format!("{more} {u} {v}"));
+        }
+    }
+    // Between pixels
+    let bilinear = BITMAP.replace("nearest", "bilinear");
+    let middle = shine(&folder, &bilinear, 0.5, 0.25);
+    assert!(
+        (middle[0] - 0.5).abs() < 0.01 && (middle[1] - 0.5).abs() < 0.01 && middle[2] < 0.01,
+        "{middle:?}"
+    );
+}
+
+#[test]
+fn checkerboards_lie_as_in_mitsuba() {
+    for ((u, v), want) in QUARTERS.into_iter().zip([0.4, 0.2, 0.2, 0.4]) {
+        close(shine(&folder(), r#"type="checkerboard">"#, u, v), [want; 3], 1e-4, "checkerboard");
+    }
+    let twice = r#"type="checkerboard"><rgb name="color0" value="1, 0, 0"/><transform name="to_uv"><scale x="2" y="2"/></transform>"#;
+    close(shine(&folder(), twice, 0.125, 0.125), [1.0, 0.0, 0.0], 1e-4, "checkerboard");
+    close(shine(&folder(), twice, 0.375, 0.125), [0.2; 3], 1e-4, "checkerboard");
+    close(shine(&folder(), twice, 0.625, 0.125), [1.0, 0.0, 0.0], 1e-4, "checkerboard");
+}
+
+/// OBJ files have v run up the picture, PLY files as Mitsuba.
+#[test]
+fn mesh_files_have_their_own_ways_up() {
+    let obj = "v -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nf 1/1 2/2 3/3 4/4\n";
+    let ply = "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n\
+        property float u\nproperty float v\nelement face 2\nproperty list uchar int vertex_indices\nend_header\n\
+        -1 -1 0 0 0\n1 -1 0 1 0\n1 1 0 1 1\n-1 1 0 0 1\n3 0 1 2\n3 0 2 3\n";
+    let folder = folder().with("a.obj", obj).with("a.ply", ply);
+    let flip = |value| format!(r#"<boolean name="flip_tex_coords" value="{value}"/>"#);
+    for (file, more, want) in [
+        ("obj", String::new(), [GREY, WHITE, RED, GREEN]),
+        ("obj", flip("false"), [RED, GREEN, GREY, WHITE]),
+        ("ply", String::new(), [RED, GREEN, GREY, WHITE]),
+        ("ply", flip("true"), [GREY, WHITE, RED, GREEN]),
+    ] {
+        for ((u, v), want) in QUARTERS.into_iter().zip(want) {
+            let (x, y) = (1.0 - 2.0 * u, 1.0 - 2.0 * v);
+            let got = folder.see(&format!(
+                r#"<shape type="{file}"><string name="filename" value="a.{file}"/>{more}<transform name="to_world"><translate x="{x}" y="{y}"/></transform><emitter type="area"><texture name="radiance" {BITMAP}</texture></emitter></shape>"#
+            ));
+            close(got, want, 1e-3, &format!("{file} {more} {u} {v}"));
+        }
+    }
+    // Each side of a cube has the whole picture; on +z, u runs along y and v along x
+    for ((u, v), want) in QUARTERS.into_iter().zip([RED, GREEN, GREY, WHITE]) {
+        let (y, x) = (1.0 - 2.0 * u, 1.0 - 2.0 * v);
+        let got = folder.see(&format!(
+            r#"<shape type="cube"><transform name="to_world"><translate x="{x}" y="{y}"/></transform><emitter type="area"><texture name="radiance" {BITMAP}</texture></emitter></shape>"#
+        ));
+        close(got, want, 1e-3, "cube");
+    }
+}
+
+#[test]
+fn bright_pictures_shine_and_factors_are_clamped() {
+    let folder = folder();
+    let bright = BITMAP.replace("a.png", "bright.exr");
+    close(shine(&folder, &bright, 0.5, 0.5), [4.0, 2.0, 0.0], 1e-3, "light");
+    let body = format!(
+        r#"<shape type="rectangle"><bsdf type="diffuse"><texture name="reflectance" {bright}</texture></bsdf></shape>{SKY}"#
+    );
+    let loaded = folder.body(&body).unwrap();
+    assert!(
+        loaded.warnings[0].to_string().contains("line 2: 3 values of the picture are outside 0…1"),
+        "{:?}",
+        loaded.warnings
+    );
+    let body = r#"<shape type="rectangle"><bsdf type="conductor"><rgb name="specular_reflectance" value="1.5, 1, 0.5"/></bsdf></shape>"#;
+    let loaded = folder.body(body).unwrap();
+    assert!(loaded.warnings[0].to_string().contains("values above 1 become 1"));
+    close(folder.see(&format!("{body}{SKY}")), [1.0, 1.0, 0.5], 1e-4, body);
+}
+
+/// What the camera sees of a rectangle in a white sky, from the front and from behind.
+fn in_the_sky(folder: &Folder, bsdf: &str) -> [[f32; 3]; 2] {
+    ["0", "180"].map(|angle| {
+        folder.see(&format!(
+            r#"<shape type="rectangle"><transform name="to_world"><rotate y="1" angle="{angle}"/></transform>{bsdf}</shape>{SKY}"#
+        ))
+    })
+}
+
+#[test]
+fn surfaces_reflect_a_white_sky_as_they_should() {
+    let folder = folder();
+    let (black, white) = ([0.0; 3], [1.0; 3]);
+    let metal = r#"<rgb name="eta" value="0.2, 0.9, 1.1"/><rgb name="k" value="3.9, 2.5, 2.1"/>"#;
+    // Reflectance at normal incidence: ((η − 1)² + k²)/((η + 1)² + k²)
+    let normal = |eta: f32, k: f32| ((eta - 1.0).powi(2) + k * k) / ((eta + 1.0).powi(2) + k * k);
+    let copper = [normal(0.2, 3.9), normal(0.9, 2.5), normal(1.1, 2.1)];
+    let half = r#"<rgb name="reflectance" value="0.5, 0.25, 0"/>"#;
+    for (bsdf, front, behind) in [
+        (String::new(), [0.5; 3], black),
+        (r#"<bsdf type="diffuse"/>"#.to_owned(), [0.5; 3], black),
+        (format!(r#"<bsdf type="diffuse">{half}</bsdf>"#), [0.5, 0.25, 0.0], black),
+        (format!(r#"<bsdf type="twosided"><bsdf type="diffuse">{half}</bsdf></bsdf>"#), [0.5, 0.25, 0.0], [0.5, 0.25, 0.0]),
+        (r##"<bsdf type="diffuse"><srgb name="reflectance" value="#ffff00"/></bsdf>"##.to_owned(), [1.0, 1.0, 0.0], black),
+        (r#"<bsdf type="conductor"/>"#.to_owned(), white, black),
+        (r#"<bsdf type="conductor"><string name="material" value="none"/></bsdf>"#.to_owned(), white, black),
+        (format!(r#"<bsdf type="conductor">{metal}</bsdf>"#), copper, black),
+        (format!(r#"<bsdf type="twosided"><bsdf type="conductor">{metal}</bsdf></bsdf>"#), copper, copper),
+        (r#"<bsdf type="dielectric"/>"#.to_owned(), white, white),
+        (r#"<bsdf type="thindielectric"><string name="int_ior" value="diamond"/></bsdf>"#.to_owned(), white, white),
+        (r#"<bsdf type="mask"><float name="opacity" value="0.25"/><bsdf type="diffuse"><float name="reflectance" value="0"/></bsdf></bsdf>"#.to_owned(), [0.75; 3], [0.75; 3]),
+        (r#"<bsdf type="bumpmap"><texture type="bitmap"><string name="filename" value="no.png"/></texture><bsdf type="diffuse"/></bsdf>"#.to_owned(), [0.5; 3], black),
+    ] {
+        let [seen, seen_behind] = in_the_sky(&folder, &bsdf);
+        // 4096 samples of values in 0…1 are within 0.03 of their mean but once in 10⁴
+        close(seen, front, 0.06, &bsdf);
+        close(seen_behind, behind, 0.06, &bsdf);
+    }
+    // Rough surfaces lose a little between their facets, coats lose none: white under white is nearly white
+    for bsdf in [
+        r#"<bsdf type="plastic"><rgb name="diffuse_reflectance" value="1"/></bsdf>"#,
+        r#"<bsdf type="roughplastic"><rgb name="diffuse_reflectance" value="1"/><string name="distribution" value="ggx"/><boolean name="nonlinear" value="true"/></bsdf>"#,
+        r#"<bsdf type="roughconductor"><float name="alpha" value="0.05"/><string name="distribution" value="ggx"/></bsdf>"#,
+    ] {
+        let [seen, behind] = in_the_sky(&folder, bsdf);
+        close(seen, white, 0.05, bsdf);
+        assert_eq!(behind, black, "{bsdf}");
+        assert_eq!(folder.body(&format!(r#"<shape type="cube">{bsdf}</shape>"#)).unwrap().warnings, []);
+    }
+    // A name for a metal, and the list where there is none
+    let gold =
+        in_the_sky(&folder, r#"<bsdf type="conductor"><string name="material" value="Au"/></bsdf>"#)[0];
+    close(gold, [normal(0.143, 3.983), normal(0.3753, 2.3856), normal(1.442, 1.6034)], 1e-3, "gold");
+    let error = folder.body(
+        r#"<shape type="cube"><bsdf type="conductor"><string name="material" value="Xx"/></bsdf></shape>"#,
+    );
+    assert!(
+        error.unwrap_err().contains(
+            "the metal `Xx` (known: none, Ag, Al, Au, Cr, Cu, W; or give eta and k) is not supported"
+        )
+    );
+}
+
+/// Opacity is luminance: 0.7152 where the picture is green, whatever its alpha.
+#[test]
+fn masks_take_the_luminance_of_pictures() {
+    let folder = folder();
+    for ((u, v), opacity) in QUARTERS.into_iter().zip([0.2126, 0.7152, 0.2159, 1.0]) {
+        let (x, y) = (1.0 - 2.0 * u, 1.0 - 2.0 * v);
+        let seen = folder.see(&format!(
+            r#"<shape type="rectangle"><transform name="to_world"><translate x="{x}" y="{y}"/></transform><bsdf type="mask"><texture name="opacity" {BITMAP}</texture><bsdf type="twosided"><bsdf type="diffuse"><float name="reflectance" value="0"/></bsdf></bsdf></bsdf></shape>{SKY}"#
+        ));
+        // Four standard deviations of 4096 samples
+        assert!((seen[0] - (1.0 - opacity)).abs() < 0.03, "{u} {v}: {seen:?}");
+    }
+}

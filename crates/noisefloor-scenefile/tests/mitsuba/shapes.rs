@@ -1,0 +1,147 @@
+use crate::util::{Folder, close};
+
+const LIGHT: &str = r#"<emitter type="area"><rgb name="radiance" value="1, 2, 3"/></emitter>"#;
+
+fn folder() -> Folder {
+    let with_normals = "v -9 -9 0\nv 9 -9 0\nv 0 9 0\nvn 0 0.6 0.8\nf 1//1 2//1 3//1\n";
+    let ply = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
+        element face 1\nproperty list uchar int vertex_indices\nend_header\n-9 -9 0\n9 -9 0\n0 9 0\n3 0 1 2\n";
+    Folder::new()
+        .with("bare.obj", "v -9 -9 0\nv 9 -9 0\nv 0 9 0\nf 1 2 3\n")
+        .with("normals.obj", with_normals)
+        .with("backwards.obj", with_normals.replace("0.8", "-0.8"))
+        .with("bare.ply", ply)
+}
+
+/// Which side shines, as Mitsuba 3.9.1 has it: from shading normals where there are any, from the corners where not.
+#[test]
+fn fronts_are_those_of_mitsuba() {
+    let folder = folder();
+    let rectangle = r#"<shape type="rectangle">"#;
+    let disk = r#"<shape type="disk">"#;
+    let cube = r#"<shape type="cube">"#;
+    let bare = r#"<shape type="obj"><string name="filename" value="bare.obj"/>"#;
+    let ply = r#"<shape type="ply"><string name="filename" value="bare.ply"/>"#;
+    let normals = r#"<shape type="obj"><string name="filename" value="normals.obj"/>"#;
+    let backwards = r#"<shape type="obj"><string name="filename" value="backwards.obj"/>"#;
+    let flat = r#"<boolean name="face_normals" value="true"/>"#;
+    let flip = r#"<boolean name="flip_normals" value="true"/>"#;
+    let (as_is, x, z) = ("", r#"<scale x="-1"/>"#, r#"<scale z="-1"/>"#);
+    let behind = r#"<rotate y="1" angle="180"/>"#;
+    for (shape, more, to_world, shines) in [
+        (rectangle, "", as_is, true),
+        (rectangle, "", behind, false),
+        (rectangle, "", x, true),
+        (rectangle, "", z, false),
+        (rectangle, flip, as_is, false),
+        (rectangle, flip, x, false),
+        (rectangle, flip, z, true),
+        (disk, "", as_is, true),
+        (disk, "", behind, false),
+        (disk, "", x, true),
+        (disk, "", z, false),
+        (disk, flip, as_is, false),
+        (cube, "", as_is, true),
+        (cube, "", behind, true),
+        (cube, "", x, true),
+        (cube, "", z, true),
+        (cube, flip, as_is, false),
+        (bare, "", as_is, true),
+        (bare, "", x, false),
+        (bare, "", z, true),
+        (bare, flip, as_is, false),
+        (bare, flip, x, true),
+        (bare, flat, x, false),
+        (ply, "", as_is, true),
+        (ply, "", x, false),
+        (normals, "", as_is, true),
+        (normals, "", x, true),
+        (normals, "", z, false),
+        (normals, flip, as_is, false),
+        (normals, flip, z, true),
+        (normals, flat, x, false),
+        (normals, flat, z, true),
+        (backwards, "", as_is, false),
+        (backwards, "", z, true),
+        (backwards, flat, as_is, true),
+        (backwards, flip, as_is, true),
+    ] {
+        let body =
+            format!(r#"{shape}{more}<transform name="to_world">{to_world}</transform>{LIGHT}</shape>"#);
+        let want = if shines { [1.0, 2.0, 3.0] } else { [0.0; 3] };
+        close(folder.see(&body), want, 1e-5, &body);
+    }
+}
+
+/// Where the shapes end: the camera sees what is on the z axis.
+#[test]
+fn shapes_have_the_sizes_of_mitsuba() {
+    let folder = Folder::new();
+    let moved = |shape: &str, x: f32, y: f32| {
+        let body = format!(
+            r#"<shape type="{shape}"><transform name="to_world"><translate x="{x}" y="{y}"/></transform>{LIGHT}</shape>"#
+        );
+        folder.see(&body) == [1.0, 2.0, 3.0]
+    };
+    for (shape, x, y, seen) in [
+        ("rectangle", 0.99, -0.99, true),
+        ("rectangle", 1.01, 0.0, false),
+        ("cube", -0.99, 0.99, true),
+        ("cube", 0.0, 1.01, false),
+        ("disk", 0.99, 0.0, true),
+        ("disk", 0.72, 0.72, false),
+        ("sphere", 0.0, 0.99, true),
+        ("sphere", 0.72, 0.72, false),
+    ] {
+        assert_eq!(moved(shape, x, y), seen, "{shape} {x} {y}");
+    }
+    let ball = |to_world: &str| {
+        let body = format!(
+            r#"<shape type="sphere"><point name="center" x="1" y="2" z="3"/><float name="radius" value="0.5"/><transform name="to_world">{to_world}</transform>{LIGHT}</shape>"#
+        );
+        folder.see(&body) == [1.0, 2.0, 3.0]
+    };
+    // Centre and radius go through the transform
+    assert!(ball(r#"<scale value="0.5"/><translate value="-0.5, -0.8, 0"/>"#));
+    assert!(!ball(r#"<scale value="0.5"/><translate value="-0.5, -0.7, 0"/>"#));
+}
+
+#[test]
+fn spheres_inside_out_are_glass_of_the_reciprocal_index_or_refused() {
+    let folder = Folder::new();
+    let flip = r#"<boolean name="flip_normals" value="true"/>"#;
+    let error = folder.body(&format!(r#"<shape type="sphere">{flip}{LIGHT}</shape>"#)).unwrap_err();
+    assert!(error.ends_with("line 2: a sphere that shines inwards is not supported"), "{error}");
+    let mirrored = r#"<transform name="to_world"><scale z="-2" x="2" y="2"/></transform>"#;
+    let both = folder.body(&format!(r#"<shape type="sphere">{flip}{mirrored}{LIGHT}</shape>"#)).unwrap();
+    assert_eq!((both.scene.lights(), both.warnings.len()), (1, 0));
+    let stretched = r#"<shape type="sphere"><transform name="to_world"><scale x="2"/></transform></shape>"#;
+    assert!(folder.body(stretched).unwrap_err().contains("stretched or sheared"));
+    let one_sided = folder.body(&format!(r#"<shape type="sphere">{flip}</shape>"#)).unwrap();
+    assert!(one_sided.warnings[0].to_string().contains("line 2: the sphere is seen from outside, too"));
+
+    // Reflection alone, 53° from the normal: total in a bubble, past asin(1/1.5) = 42°, and little on a ball
+    let reflected = |flip: &str| {
+        folder.see(&format!(
+            r#"<shape type="sphere">{flip}<transform name="to_world"><translate x="0.8"/></transform><bsdf type="dielectric"><float name="int_ior" value="1.5"/><float name="ext_ior" value="1"/><float name="specular_transmittance" value="0"/></bsdf></shape><emitter type="constant"/>"#
+        ))
+    };
+    close(reflected(flip), [1.0; 3], 1e-3, "bubble");
+    assert!(reflected("")[0] < 0.15);
+}
+
+#[test]
+fn smooth_meshes_and_flat_ones_differ() {
+    // A roof whose ridge is seen from above, lit along +x −z: without normals, Mitsuba smooths the ridge away
+    let folder = Folder::new().with("roof.obj", "v 0 -9 0\nv 0 9 0\nv 9 0 -9\nv -9 0 -9\nf 1 3 2\nf 1 2 4\n");
+    let roof = |more: &str| {
+        folder.see(&format!(
+            r#"<emitter type="directional"><vector name="direction" x="-1" y="0" z="-1"/><rgb name="irradiance" value="1"/></emitter>
+            <shape type="obj"><string name="filename" value="roof.obj"/>{more}<transform name="to_world"><translate x="-0.02"/></transform><bsdf type="twosided"><bsdf type="diffuse"><rgb name="reflectance" value="1"/></bsdf></bsdf></shape>"#
+        ))
+    };
+    let inverse_pi = std::f32::consts::FRAC_1_PI;
+    // The eastern side faces the light; smooth, the ridge is turned by 45° to it
+    close(roof(r#"<boolean name="face_normals" value="true"/>"#), [inverse_pi; 3], 1e-2, "flat");
+    close(roof(""), [inverse_pi * 0.5f32.sqrt(); 3], 1e-2, "smooth");
+}
