@@ -1,12 +1,14 @@
 //! Surfaces: Mitsuba's `bsdf` elements.
 
 use super::context::Context;
-use super::textures::luminance;
 use super::values::Use;
 use super::xml::Element;
 use crate::error::LoadError;
 use noisefloor::Rgb;
 use noisefloor_ptwne::{Cover, Material, Texture};
+
+/// How deep surfaces may nest.
+const MAX_NESTED: u64 = 16;
 
 /// Indices of refraction that have names: visible light, room temperature.
 const INDICES: [(&str, f64); 14] = [
@@ -79,13 +81,20 @@ impl<'d> Context<'d> {
     /// # Errors
     /// [`LoadError`] if it is broken, of a kind that is not supported, or in itself.
     pub(super) fn surface(&self, element: &'d Element) -> Result<Surface, LoadError> {
-        if self.open.borrow().contains(&element.serial) {
+        let serial = element.serial;
+        if let Some(known) = self.surfaces.borrow().get(&serial) {
+            return Ok(known.clone());
+        }
+        if self.open.borrow().contains(&serial) {
             return Err(self.bad(element, format!("{} refers to itself", element.label())));
         }
-        self.open.borrow_mut().push(element.serial);
-        let surface = self.surface_of_kind(element);
+        // By reference, surfaces may nest deeper than elements do
+        self.open.borrow_mut().push(serial);
+        self.place(element).at_most("nested surfaces", self.open.borrow().len() as u64, MAX_NESTED)?;
+        let surface = self.surface_of_kind(element)?;
         self.open.borrow_mut().pop();
-        surface
+        self.surfaces.borrow_mut().insert(serial, surface.clone());
+        Ok(surface)
     }
 
     fn surface_of_kind(&self, element: &'d Element) -> Result<Surface, LoadError> {
@@ -113,7 +122,7 @@ impl<'d> Context<'d> {
                 if surface.cover.opacity.is_some() {
                     return Err(self.unsupported(element, "a mask in a mask"));
                 }
-                let opacity = luminance(self.factor(element, "opacity", 0.5)?);
+                let opacity = self.luminance(element, self.factor(element, "opacity", 0.5)?)?;
                 Ok(Surface { cover: Cover { opacity: Some(opacity), ..surface.cover }, ..surface })
             }
             kind @ ("bumpmap" | "normalmap") => {
@@ -128,14 +137,7 @@ impl<'d> Context<'d> {
 
     /// The one surface in another.
     fn nested(&self, element: &'d Element) -> Result<&'d Element, LoadError> {
-        // Some have names
-        let mut parts = self.parts(element, &["bsdf"])?;
-        for child in element.children.iter().filter(|c| c.tag == "ref" && c.attribute("name").is_some()) {
-            let part = self.resolve(child)?;
-            if part.tag == "bsdf" {
-                parts.push(part);
-            }
-        }
+        let parts = self.parts(element, "bsdf")?;
         match parts.as_slice() {
             [one] => Ok(one),
             [] => Err(self.bad(element, format!("{} needs a <bsdf> in it", element.label()))),

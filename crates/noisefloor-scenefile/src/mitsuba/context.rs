@@ -1,17 +1,20 @@
 //! What the readers of all parts of a scene share.
 
+use super::bsdfs::Surface;
 use super::textures::Raster;
 use super::xml::{Document, Element};
 use crate::error::{LoadError, Place, Warning};
 use crate::files::Folder;
 use noisefloor_ptwne::SceneError;
-use std::cell::RefCell;
+use std::cell::{Cell, RefCell};
 use std::collections::HashMap;
 use std::fmt;
 use std::path::PathBuf;
 
 /// Most warnings that are kept.
 const MAX_WARNINGS: usize = 1000;
+/// Most pixels that the pictures of a scene have together, where they are kept more than once counted as often.
+const MAX_PIXELS: u64 = 1 << 27;
 
 /// A scene file that is being read.
 #[derive(Debug)]
@@ -21,8 +24,11 @@ pub(super) struct Context<'d> {
     pub(super) folder: Folder,
     /// Pictures that have been read, by file and whether their codes are linear.
     pub(super) rasters: RefCell<HashMap<(PathBuf, bool), Raster>>,
-    /// Serial numbers of the nested surfaces that are being read.
+    /// Surfaces that have been read, by the serial number of their element.
+    pub(super) surfaces: RefCell<HashMap<usize, Surface>>,
+    /// Serial numbers of the surfaces that are being read, one in another.
     pub(super) open: RefCell<Vec<usize>>,
+    pixels: Cell<u64>,
     identified: HashMap<&'d str, &'d Element>,
     warnings: RefCell<Vec<Warning>>,
 }
@@ -33,7 +39,9 @@ impl<'d> Context<'d> {
             document,
             folder: Folder::of(&document.path),
             rasters: RefCell::default(),
+            surfaces: RefCell::default(),
             open: RefCell::default(),
+            pixels: Cell::new(0),
             identified: HashMap::new(),
             warnings: RefCell::default(),
         };
@@ -85,31 +93,31 @@ impl<'d> Context<'d> {
         self.warnings.into_inner()
     }
 
+    /// Counts pixels that are kept, and refuses more than [`MAX_PIXELS`].
+    pub(super) fn count_pixels(&self, element: &Element, count: usize) -> Result<(), LoadError> {
+        self.pixels.set(self.pixels.get().saturating_add(count as u64));
+        self.place(element).at_most("pixels in all pictures so far", self.pixels.get(), MAX_PIXELS)
+    }
+
     /// The element itself, or, if it is a `ref`, what it refers to.
     pub(super) fn resolve(&self, element: &'d Element) -> Result<&'d Element, LoadError> {
-        element.read();
         if element.tag != "ref" {
             return Ok(element);
         }
         let id = element.attribute("id").ok_or_else(|| self.bad(element, "a <ref> needs an id"))?;
         let found = self.identified.get(id).copied();
-        let found = found.ok_or_else(|| self.bad(element, format!("nothing has the id `{id}`")))?;
-        found.read();
-        Ok(found)
+        found.ok_or_else(|| self.bad(element, format!("nothing has the id `{id}`")))
     }
 
-    /// What is in `object` with one of the `tags`, itself or by reference.
-    pub(super) fn parts(&self, object: &'d Element, tags: &[&str]) -> Result<Vec<&'d Element>, LoadError> {
+    /// What is in `object` with the tag `tag`, itself or by reference; it is now read.
+    pub(super) fn parts(&self, object: &'d Element, tag: &str) -> Result<Vec<&'d Element>, LoadError> {
         let mut parts = Vec::new();
         for child in &object.children {
-            if tags.contains(&child.tag.as_str()) {
+            let part = self.resolve(child)?;
+            if part.tag == tag {
                 child.read();
-                parts.push(child);
-            } else if child.tag == "ref" && child.attribute("name").is_none() {
-                let part = self.resolve(child)?;
-                if tags.contains(&part.tag.as_str()) {
-                    parts.push(part);
-                }
+                part.read();
+                parts.push(part);
             }
         }
         Ok(parts)

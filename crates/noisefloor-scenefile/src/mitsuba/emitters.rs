@@ -54,7 +54,7 @@ impl<'d> Context<'d> {
 
     /// The light of a shape, if it gives off any.
     pub(super) fn emission(&self, shape: &'d Element) -> Result<Option<Emission>, LoadError> {
-        let emitters = self.parts(shape, &["emitter"])?;
+        let emitters = self.parts(shape, "emitter")?;
         let element = match emitters.as_slice() {
             [] => return Ok(None),
             [one] => one,
@@ -87,8 +87,9 @@ impl<'d> Context<'d> {
     fn environment_map(&self, element: &'d Element) -> Result<EnvironmentMap, LoadError> {
         let name = self.string(element, "filename")?;
         let name = name.ok_or_else(|| self.bad(element, "an envmap needs a `filename`"))?;
-        let raster = self.raster(name, false, &self.place(element))?;
+        let raster = self.raster(element, name, false)?;
         let (width, height, mut pixels) = raster.linear();
+        self.count_pixels(element, pixels.len())?;
 
         // Brightness
         let scale = self.float(element, "scale")?.unwrap_or(1.0) as f32;

@@ -20,7 +20,18 @@ type Corner = (u32, Option<u32>, Option<u32>);
 pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<Triangles, LoadError> {
     // Names and comments may be in any encoding
     let text = String::from_utf8_lossy(bytes);
-    let mut reader = Reader { path, ..Reader::default() };
+    let mut reader = Reader {
+        path,
+        line: 0,
+        positions: vec![],
+        uvs: vec![],
+        normals: vec![],
+        vertices: HashMap::new(),
+        polygon: vec![],
+        mesh: Triangles::default(),
+        has_uvs: false,
+        has_normals: false,
+    };
     for (index, line) in text.lines().enumerate() {
         reader.line = index + 1;
         reader.line(line)?;
@@ -36,34 +47,21 @@ pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<Triangles, LoadError> {
     Ok(mesh)
 }
 
+/// What has been read so far.
 struct Reader<'a> {
     path: &'a Path,
+    /// From 1.
     line: usize,
     positions: Vec<[f32; 3]>,
     uvs: Vec<[f32; 2]>,
     normals: Vec<[f32; 3]>,
+    /// Where in the mesh a corner is.
     vertices: HashMap<Corner, u32>,
+    /// Vertices of the face that is being read.
     polygon: Vec<u32>,
     mesh: Triangles,
     has_uvs: bool,
     has_normals: bool,
-}
-
-impl Default for Reader<'_> {
-    fn default() -> Self {
-        Self {
-            path: Path::new(""),
-            line: 0,
-            positions: vec![],
-            uvs: vec![],
-            normals: vec![],
-            vertices: HashMap::new(),
-            polygon: vec![],
-            mesh: Triangles::default(),
-            has_uvs: false,
-            has_normals: false,
-        }
-    }
 }
 
 impl Reader<'_> {

@@ -44,7 +44,7 @@ impl<'d> Context<'d> {
     }
 
     fn film_size(&self, sensor: &'d Element) -> Result<Option<(usize, usize)>, LoadError> {
-        let films = self.parts(sensor, &["film"])?;
+        let films = self.parts(sensor, "film")?;
         let Some(film) = films.first() else { return Ok(None) };
         film.children.iter().filter(|c| c.tag == "rfilter").for_each(Element::irrelevant);
         // How the image is stored
@@ -101,9 +101,7 @@ impl<'d> Context<'d> {
     /// Longest path in segments, of what renders the scene in Mitsuba; none if it has no limit.
     pub(super) fn max_depth(&self, integrator: &'d Element) -> Result<Option<u32>, LoadError> {
         integrator.ignore(&["rr_depth"]);
-        if !self.boolean(integrator, "hide_emitters", false)? {
-            integrator.ignore(&["hide_emitters"]);
-        } else {
+        if self.boolean(integrator, "hide_emitters", false)? {
             self.warn(integrator, "`hide_emitters` is ignored: emitters are seen");
         }
         match integrator.kind() {

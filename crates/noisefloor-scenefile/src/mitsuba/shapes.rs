@@ -7,12 +7,12 @@ use super::xml::Element;
 use super::{obj, ply, serialized};
 use crate::error::{LoadError, Place};
 use crate::files::{self, MAX_FILE_BYTES};
-use glam::{DVec3, Vec3};
+use glam::{DMat3, DVec3, Vec3};
 use noisefloor_ptwne::{Emission, Material, MaterialId, Mesh, SceneBuilder};
 use std::collections::HashMap;
 
-/// Materials in the scene, by the serial number of their element.
-pub(super) type Materials = HashMap<usize, MaterialId>;
+/// Materials in the scene, by the serial number of their element, and whether they are inside out.
+pub(super) type Materials = HashMap<(usize, bool), MaterialId>;
 
 impl<'d> Context<'d> {
     /// Adds a shape to the scene.
@@ -23,39 +23,53 @@ impl<'d> Context<'d> {
         materials: &mut Materials,
     ) -> Result<(), LoadError> {
         let emission = self.emission(element)?;
-        let (serial, surface) = match self.parts(element, &["bsdf"])?.as_slice() {
+        let (serial, surface) = match self.parts(element, "bsdf")?.as_slice() {
             [] => (None, Surface::missing(emission.is_some())),
             [one] => (Some(one.serial), self.surface(one)?),
             [_, second, ..] => return Err(self.bad(second, "a shape has at most one bsdf")),
         };
-        // Round shapes with textures or inside out need what is theirs alone
-        let mut material = |surface: Surface, builder: &mut SceneBuilder| -> Result<MaterialId, LoadError> {
-            if let Some(known) = serial.and_then(|serial| materials.get(&serial)) {
-                return Ok(*known);
+        let inside_out = element.kind() == "sphere" && self.is_inside_out(element)?;
+        let textured = surface.is_textured();
+        let material = match serial.and_then(|serial| materials.get(&(serial, inside_out))) {
+            Some(known) => *known,
+            None => {
+                let Surface { material, cover } =
+                    if inside_out { self.inside_out(element, surface) } else { surface };
+                let id = builder.material_with(material, cover).map_err(self.refused(element))?;
+                if let Some(serial) = serial {
+                    materials.insert((serial, inside_out), id);
+                }
+                id
             }
-            let Surface { material, cover } = surface;
-            let id = builder.material_with(material, cover).map_err(self.refused(element))?;
-            if let Some(serial) = serial {
-                materials.insert(serial, id);
-            }
-            Ok(id)
         };
+        let glows = emission.as_ref().is_some_and(|emission| emission.texture.is_some());
 
         match element.kind() {
             "obj" | "ply" | "serialized" | "rectangle" | "cube" => {
                 let mesh = self.triangles(element)?;
-                let material = material(surface, builder)?;
                 self.add(element, &mesh, builder, material, emission)
             }
             "disk" => {
-                if surface.is_textured() || emission.as_ref().is_some_and(|e| e.texture.is_some()) {
+                if textured || glows {
                     self.warn(element, "the texture is not laid on the disk in rings");
                 }
-                let (centre, e1, e2) = self.disk(element)?;
-                let material = material(surface, builder)?;
+                let [centre, e1, e2] = self.disk(element)?;
                 builder.disk(centre, e1, e2, material, emission).map_err(self.refused(element))
             }
-            "sphere" => self.sphere(element, builder, surface, emission),
+            "sphere" if glows => Err(self.unsupported(element, "a sphere that shines with a texture")),
+            "sphere" if inside_out && emission.is_some() => {
+                Err(self.unsupported(element, "a sphere that shines inwards"))
+            }
+            "sphere" => {
+                if textured {
+                    self.warn(
+                        element,
+                        "the texture is laid on the sphere with its top towards +y of the scene",
+                    );
+                }
+                let (centre, radius) = self.sphere(element)?;
+                builder.sphere(centre, radius, material, emission).map_err(self.refused(element))
+            }
             _ => Err(self.unsupported(element, element.label())),
         }
     }
@@ -143,7 +157,7 @@ impl<'d> Context<'d> {
     }
 
     /// Centre and axes of a disk, whose front is where their cross product points.
-    fn disk(&self, element: &'d Element) -> Result<([f32; 3], [f32; 3], [f32; 3]), LoadError> {
+    fn disk(&self, element: &'d Element) -> Result<[[f32; 3]; 3], LoadError> {
         let to_world = self.transform(element, "to_world")?;
         let [e1, mut e2] = [to_world.x_axis, to_world.y_axis].map(|axis| axis.truncate());
         let mut front = normal_matrix(to_world) * DVec3::Z;
@@ -153,55 +167,43 @@ impl<'d> Context<'d> {
         if e1.cross(e2).dot(front) < 0.0 {
             e2 = -e2;
         }
-        let array = |v: DVec3| v.as_vec3().to_array();
-        Ok((array(to_world.w_axis.truncate()), array(e1), array(e2)))
+        Ok([to_world.w_axis.truncate(), e1, e2].map(|v| v.as_vec3().to_array()))
     }
 
-    fn sphere(
-        &self,
-        element: &'d Element,
-        builder: &mut SceneBuilder,
-        mut surface: Surface,
-        emission: Option<Emission>,
-    ) -> Result<(), LoadError> {
-        // Centre and radius
+    /// Centre and radius of a sphere.
+    fn sphere(&self, element: &'d Element) -> Result<([f32; 3], f32), LoadError> {
         let to_world = self.transform(element, "to_world")?;
         let centre = self.point(element, "center")?.unwrap_or(DVec3::ZERO);
         let radius = self.float(element, "radius")?.unwrap_or(1.0);
         let axes = [to_world.x_axis, to_world.y_axis, to_world.z_axis].map(|axis| axis.truncate());
         let scale = axes[0].length();
-        let close = |a: f64, b: f64| (a - b).abs() <= 1e-4 * scale * scale.max(1.0);
-        let even = axes.iter().all(|axis| close(axis.length(), scale))
+        // To what six digits in a file leave of a rotation
+        let close = |a: f64, b: f64| (a - b).abs() <= 1e-4 * b.abs().max(scale * scale);
+        let even = axes.iter().all(|axis| close(axis.length_squared(), scale * scale))
             && [(0, 1), (1, 2), (2, 0)].iter().all(|(a, b)| close(axes[*a].dot(axes[*b]), 0.0));
         if !even {
             return Err(self.unsupported(element, "a sphere that is stretched or sheared"));
         }
-
-        // Mitsuba's mirrored spheres are inside out, the renderer's never
-        let mirrored = axes[0].cross(axes[1]).dot(axes[2]) < 0.0;
-        if mirrored != self.boolean(element, "flip_normals", false)? {
-            if emission.is_some() {
-                return Err(self.unsupported(element, "a sphere that shines inwards"));
-            }
-            if let Material::Glass { ior, .. } = &mut surface.material {
-                *ior = ior.recip();
-            }
-            if surface.cover.one_sided {
-                self.warn(element, "the sphere is seen from outside, too, though its surface is one-sided");
-                surface.cover.one_sided = false;
-            }
-        }
-
-        if emission.as_ref().is_some_and(|emission| emission.texture.is_some()) {
-            return Err(self.unsupported(element, "a sphere that shines with a texture"));
-        }
-        if surface.is_textured() {
-            self.warn(element, "the texture is laid on the sphere with its top towards +y of the scene");
-        }
-        let refused = self.refused(element);
-        let material = builder.material_with(surface.material, surface.cover).map_err(&refused)?;
         let centre = to_world.transform_point3(centre).as_vec3().to_array();
-        builder.sphere(centre, (radius.abs() * scale) as f32, material, emission).map_err(&refused)
+        Ok((centre, (radius * scale) as f32))
+    }
+
+    /// Whether the front of a sphere is its inside: Mitsuba's mirrored spheres are so.
+    fn is_inside_out(&self, element: &'d Element) -> Result<bool, LoadError> {
+        let mirrored = DMat3::from_mat4(self.transform(element, "to_world")?).determinant() < 0.0;
+        Ok(mirrored != self.boolean(element, "flip_normals", false)?)
+    }
+
+    /// The surface that looks from its front as `surface` does from its back.
+    fn inside_out(&self, element: &Element, mut surface: Surface) -> Surface {
+        if let Material::Glass { ior, .. } = &mut surface.material {
+            *ior = ior.recip();
+        }
+        if surface.cover.one_sided {
+            self.warn(element, "the sphere is seen from outside, too, though its surface is one-sided");
+            surface.cover.one_sided = false;
+        }
+        surface
     }
 }
 

@@ -3,7 +3,7 @@
 use super::context::Context;
 use super::values::Use;
 use super::xml::Element;
-use crate::error::{LoadError, Place};
+use crate::error::LoadError;
 use crate::picture::{self, Picture, Samples};
 use noisefloor::{Rgb, srgb_decode};
 use noisefloor_ptwne::{ImageTexture, Pixels, Texture, Wrap};
@@ -61,6 +61,7 @@ impl<'d> Context<'d> {
             Some(element) if element.tag == "texture" || element.tag == "ref" => {
                 let texture = self.resolve(element)?;
                 if texture.tag == "texture" {
+                    texture.read();
                     return Ok(Some(texture));
                 }
                 Err(self.bad(element, format!("`{name}` is {}; expected a texture", texture.label())))
@@ -80,11 +81,10 @@ impl<'d> Context<'d> {
     }
 
     fn bitmap(&self, element: &'d Element, usage: Use) -> Result<(f32, ImageTexture), LoadError> {
-        let place = self.place(element);
         let name = self.string(element, "filename")?;
         let name = name.ok_or_else(|| self.bad(element, "a bitmap needs a `filename`"))?;
         let raw = self.boolean(element, "raw", false)?;
-        let Raster { width, height, pixels } = self.raster(name, raw, &place)?;
+        let Raster { width, height, pixels } = self.raster(element, name, raw)?;
         let (scale, pixels) = self.fit(element, pixels, usage)?;
 
         let nearest = match self.string(element, "filter_type")?.unwrap_or("bilinear") {
@@ -120,6 +120,7 @@ impl<'d> Context<'d> {
         if outside == 0 && scale == 1.0 {
             return Ok((scale, pixels));
         }
+        self.count_pixels(element, values.len())?;
         Ok((scale, Pixels::Float(values.iter().map(|p| p.map(|v| v.clamp(0.0, scale) / scale)).collect())))
     }
 
@@ -143,14 +144,31 @@ impl<'d> Context<'d> {
         Ok([[a, -b, b + c], [-d, e, 1.0 - e - f]].map(|row| row.map(|x| x as f32)))
     }
 
+    /// The luminance of a texture: Mitsuba's opacity. The alpha of a picture has no part in it.
+    pub(super) fn luminance(&self, element: &Element, texture: Texture) -> Result<Texture, LoadError> {
+        let grey = |colour: Rgb| [noisefloor::luminance(colour).clamp(0.0, 1.0); 3];
+        Ok(match texture {
+            Texture::Colour(colour) => Texture::Colour(grey(colour)),
+            Texture::Image(image) => {
+                self.count_pixels(element, image.width * image.height)?;
+                let pixels = Pixels::Float(linear(&image.pixels).into_iter().map(grey).collect());
+                Texture::Image(ImageTexture { pixels, ..image })
+            }
+            // This reader makes no others
+            other => other,
+        })
+    }
+
     /// The picture called `name`. Codes of 8 and 16 bits are sRGB-encoded unless `raw`.
-    pub(super) fn raster(&self, name: &str, raw: bool, place: &Place) -> Result<Raster, LoadError> {
+    pub(super) fn raster(&self, element: &Element, name: &str, raw: bool) -> Result<Raster, LoadError> {
+        let place = &self.place(element);
         let path = self.folder.find(name, place)?;
         let key = (path, raw);
         if let Some(found) = self.rasters.borrow().get(&key) {
             return Ok(found.clone());
         }
         let Picture { width, height, samples } = picture::read(&key.0, place)?;
+        self.count_pixels(element, width * height)?;
         let pixels = match samples {
             Samples::Eight(codes) if raw => {
                 Pixels::Linear8(codes.iter().map(|[r, g, b, _]| [*r, *g, *b]).collect())
@@ -185,19 +203,5 @@ fn linear(pixels: &Pixels) -> Vec<Rgb> {
         Pixels::Srgb8(codes) => codes.iter().map(|p| p.map(|code| srgb_decode(linear(code)))).collect(),
         Pixels::Linear8(codes) => codes.iter().map(|p| p.map(linear)).collect(),
         Pixels::Float(values) => values.to_vec(),
-    }
-}
-
-/// The luminance of a texture: Mitsuba's opacity. The alpha of a picture has no part in it.
-pub(super) fn luminance(texture: Texture) -> Texture {
-    let grey = |colour: Rgb| [noisefloor::luminance(colour).clamp(0.0, 1.0); 3];
-    match texture {
-        Texture::Colour(colour) => Texture::Colour(grey(colour)),
-        Texture::Image(image) => {
-            let pixels = Pixels::Float(linear(&image.pixels).into_iter().map(grey).collect());
-            Texture::Image(ImageTexture { pixels, ..image })
-        }
-        // This reader makes no others
-        other => other,
     }
 }

@@ -1,5 +1,6 @@
 use crate::util::Folder;
 use noisefloor_scenefile::load;
+use std::path::Path;
 
 /// A scene with every kind of file, all small. `mesh.serialized` holds no names, so that every byte of it matters.
 fn folder() -> Folder {
@@ -84,6 +85,12 @@ impl Random {
     }
 }
 
+/// Writes a file anew. To cut one short first makes some file systems wait for the disk.
+fn replace(path: &Path, bytes: &[u8]) {
+    std::fs::remove_file(path).unwrap();
+    std::fs::write(path, bytes).unwrap();
+}
+
 /// Changed files are scenes or errors that name a file of the folder. That they never panic is seen by this ending.
 #[test]
 fn changed_bytes_never_panic() {
@@ -121,13 +128,13 @@ fn changed_bytes_never_panic() {
                 }
             }
         }
-        std::fs::write(&path, &bytes).unwrap();
+        replace(&path, &bytes);
         if let Err(error) = load(&scene) {
             broken += 1;
             let folder = folder.path().display().to_string();
             assert!(error.to_string().contains(&folder), "round {round}: {error}");
         }
-        std::fs::write(&path, original).unwrap();
+        replace(&path, &original);
     }
     // Most changes matter
     assert!(broken > 1000, "{broken}");

@@ -183,6 +183,16 @@ fn references_may_come_first_and_must_not_go_round() {
             .unwrap_err()
             .contains("taken already")
     );
+    let chain: String = (0..10_000)
+        .map(|i| format!(r#"<bsdf type="twosided" id="{i}"><ref id="{}"/></bsdf>"#, i + 1))
+        .collect();
+    let error = folder.body(&format!(
+        r#"{chain}<bsdf type="diffuse" id="10000"/><shape type="cube"><ref id="0"/></shape>"#
+    ));
+    assert!(error.unwrap_err().contains("17 nested surfaces, more than 16"));
+    // In a texture that is referred to, what is not read is warned of
+    let texture = r#"<texture type="checkerboard" id="t"><float name="x" value="1"/></texture><shape type="cube"><bsdf type="diffuse"><ref name="reflectance" id="t"/></bsdf></shape>"#;
+    assert!(folder.body(texture).unwrap().warnings[0].to_string().ends_with("<float name=\"x\"> is ignored"));
     // What nobody refers to is neither read nor warned of
     assert_eq!(folder.body(r#"<bsdf type="unheard-of" id="a"/>"#).unwrap().warnings, []);
 }
