@@ -237,10 +237,10 @@ impl Round {
                 let t = normal.dot(to) / normal.dot(ray.dir);
                 let at = ray.dir * t - to;
                 let uv = [dual_u.dot(at), dual_v.dot(at)];
-                // False for NaN too
-                if !(uv[0] * uv[0] + uv[1] * uv[1] <= 1.0) {
+                if uv[0] * uv[0] + uv[1] * uv[1] > 1.0 {
                     return None;
                 }
+                // Along the plane t is NaN, and not below `t_max`
                 (t, uv)
             }
         };

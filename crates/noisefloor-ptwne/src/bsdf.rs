@@ -140,6 +140,8 @@ impl Ggx {
 #[derive(Clone, Debug)]
 pub(crate) struct Coat {
     pub(crate) ior: f32,
+    /// GGX α; none if it varies.
+    alpha: Option<f32>,
     rows: Vec<Row>,
 }
 
@@ -164,7 +166,12 @@ impl Coat {
             Some(alpha) => vec![Row::new(ior, alpha)],
             None => (0..=ALPHAS).map(|i| Row::new(ior, i as f32 / ALPHAS as f32)).collect(),
         };
-        Self { ior, rows }
+        Self { ior, alpha, rows }
+    }
+
+    /// Whether this is what [`Coat::new`] would make.
+    pub(crate) fn is_for(&self, ior: f32, alpha: Option<f32>) -> bool {
+        (self.ior, self.alpha) == (ior, alpha)
     }
 
     /// Blends what `of` says of the two rows around `alpha`.

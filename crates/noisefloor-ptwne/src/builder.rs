@@ -1,6 +1,7 @@
 //! Builds scenes from meshes, spheres, materials, emitters, an environment and a camera.
 
 use crate::accel::Shape;
+use crate::bsdf::Coat;
 use crate::camera::Camera;
 use crate::environment::{Environment, EnvironmentMap, check_radiance};
 use crate::error::SceneError;
@@ -10,6 +11,7 @@ use crate::scene::{Group, NO, Parts, Scene, Surroundings};
 use crate::texture::Texture;
 use glam::Vec3;
 use noisefloor::Rgb;
+use std::sync::Arc;
 
 /// Largest number of surfaces (triangles, parallelograms, spheres) of a scene.
 pub const MAX_SURFACES: usize = 1 << 26;
@@ -78,6 +80,7 @@ pub struct SceneBuilder {
     name: String,
     camera: Camera,
     parts: Parts,
+    coats: Vec<Arc<Coat>>,
 }
 
 impl SceneBuilder {
@@ -87,7 +90,7 @@ impl SceneBuilder {
     /// [`SceneError`] if the camera looks nowhere or a number is out of range.
     pub fn new(name: impl Into<String>, camera: Camera) -> Result<Self, SceneError> {
         camera.check()?;
-        Ok(Self { name: name.into(), camera, parts: Parts::default() })
+        Ok(Self { name: name.into(), camera, parts: Parts::default(), coats: vec![] })
     }
 
     /// Adds a material that covers its surfaces wholly and on both sides.
@@ -103,7 +106,7 @@ impl SceneBuilder {
     /// # Errors
     /// [`SceneError`] if a reflectance, index of refraction or roughness is out of range, or an image has the wrong length.
     pub fn material_with(&mut self, material: Material, cover: Cover) -> Result<MaterialId, SceneError> {
-        self.parts.looks.push(Looks::new(material, cover)?);
+        self.parts.looks.push(Looks::new(material, cover, &mut self.coats)?);
         Ok(MaterialId(self.parts.looks.len() as u32 - 1))
     }
 

@@ -5,6 +5,7 @@ use crate::error::SceneError;
 use crate::math::Vec3;
 use crate::texture::{Texture, check_reflectance};
 use noisefloor::Rgb;
+use std::sync::Arc;
 
 /// Smallest roughness (GGX α) that is treated as rough; below it a surface is a mirror.
 pub const MIN_ROUGHNESS: f32 = 1e-3;
@@ -116,8 +117,8 @@ pub(crate) enum Kind {
     Glass { ior: f32, tint: Vec3 },
     ThinGlass { ior: f32, tint: Vec3 },
     Metal { fresnel: Fresnel, colour: Paint, alpha: f32 },
-    Plastic { diffuse: Paint, specular: Vec3, alpha: f32, nonlinear: bool, coat: Box<Coat> },
-    Blend { base: Paint, metallic_roughness: Paint, coat: Box<Coat> },
+    Plastic { diffuse: Paint, specular: Vec3, alpha: f32, nonlinear: bool, coat: Arc<Coat> },
+    Blend { base: Paint, metallic_roughness: Paint, coat: Arc<Coat> },
 }
 
 impl Paint {
@@ -192,7 +193,12 @@ impl Material {
 
 impl Looks {
     /// Checks a material and its cover, and makes them ready for the inner loop.
-    pub(crate) fn new(material: Material, cover: Cover) -> Result<Self, SceneError> {
+    /// Coats that are alike are shared: they are tables.
+    pub(crate) fn new(
+        material: Material,
+        cover: Cover,
+        coats: &mut Vec<Arc<Coat>>,
+    ) -> Result<Self, SceneError> {
         material.check()?;
         cover.opacity.as_ref().map_or(Ok(()), Texture::check)?;
         let metal = |fresnel, colour, alpha: f32| {
@@ -200,6 +206,13 @@ impl Looks {
                 Kind::Mirror { fresnel, colour }
             } else {
                 Kind::Metal { fresnel, colour, alpha }
+            }
+        };
+        let mut coat = |ior, alpha| match coats.iter().find(|c| c.is_for(ior, alpha)) {
+            Some(coat) => coat.clone(),
+            None => {
+                coats.push(Arc::new(Coat::new(ior, alpha)));
+                coats[coats.len() - 1].clone()
             }
         };
         let kind = match material {
@@ -221,14 +234,14 @@ impl Looks {
                 specular: specular.into(),
                 alpha: roughness,
                 nonlinear,
-                coat: Box::new(Coat::new(ior, Some(roughness))),
+                coat: coat(ior, Some(roughness)),
             },
             Material::MetallicRoughness { base, metallic_roughness, ior } => {
                 let fixed = metallic_roughness.constant().map(|c| (c.y * c.y).max(MIN_ROUGHNESS));
                 Kind::Blend {
                     base: Paint::new(base),
                     metallic_roughness: Paint::new(metallic_roughness),
-                    coat: Box::new(Coat::new(ior, fixed)),
+                    coat: coat(ior, fixed),
                 }
             }
         };
