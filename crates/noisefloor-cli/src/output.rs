@@ -107,13 +107,18 @@ pub struct Output {
 
 impl Output {
     /// Makes the folder, and makes sure that files can be written before hours are spent.
-    pub fn create(args: &RenderArgs, model: Option<String>, rel_mse: Option<RelMse>) -> anyhow::Result<Self> {
-        let folder = args.out.clone().unwrap_or_else(|| Path::new("out").join(short_name(&args.scene)));
+    pub fn create(
+        args: &RenderArgs,
+        scene: String,
+        model: Option<String>,
+        rel_mse: Option<RelMse>,
+    ) -> anyhow::Result<Self> {
+        let folder = args.out.clone().unwrap_or_else(|| Path::new("out").join(&scene));
         std::fs::create_dir_all(&folder).with_context(|| {
             format!("{}: cannot make this folder; choose another with --out", folder.display())
         })?;
         check_writable(folder.join("image.exr"))?;
-        Ok(Self { folder, scene: args.scene.clone(), seed: args.seed, model, rel_mse, timeline: Vec::new() })
+        Ok(Self { folder, scene, seed: args.seed, model, rel_mse, timeline: Vec::new() })
     }
 
     /// Notes one batch.
@@ -258,14 +263,6 @@ impl Output {
         }
         println!("written to {}", self.folder.display());
     }
-}
-
-/// The scene's name, or the name of its file without the extension; of the file's folder, if that says no more than "scene".
-fn short_name(scene: &str) -> &str {
-    let path = Path::new(scene);
-    let stem = path.file_stem().and_then(|s| s.to_str()).unwrap_or(scene);
-    let folder = path.parent().and_then(Path::file_name).and_then(|s| s.to_str());
-    folder.filter(|_| stem == "scene").unwrap_or(stem)
 }
 
 fn uniform_samples<C: StoppingCriterion>(session: &Session<C>) -> u64 {

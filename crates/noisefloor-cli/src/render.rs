@@ -30,6 +30,7 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<ExitCode> {
     if let Some(threads) = args.threads {
         rayon::ThreadPoolBuilder::new().num_threads(threads.get()).build_global().context("--threads")?;
     }
+    let name = scene.name().to_owned();
     let options = Options {
         seed: args.seed,
         max_depth: args.max_depth.or(max_depth).unwrap_or(DEFAULT_DEPTH),
@@ -51,10 +52,10 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<ExitCode> {
         CriterionChoice::Oracle => {
             let oracle = args.oracle.load()?;
             let digest = Some(oracle.model().digest());
-            drive(Driver::new(source, oracle, params)?, args, digest, rel_mse)
+            drive(Driver::new(source, oracle, params)?, args, name, digest, rel_mse)
         }
         CriterionChoice::Fixed(samples) => {
-            drive(Driver::new(source, FixedSamples(samples), params)?, args, None, rel_mse)
+            drive(Driver::new(source, FixedSamples(samples), params)?, args, name, None, rel_mse)
         }
     }
 }
@@ -76,10 +77,11 @@ fn load(scene: &str) -> anyhow::Result<Loaded> {
 fn drive<C: StoppingCriterion>(
     mut driver: Driver<Ptwne, C>,
     args: &RenderArgs,
+    scene: String,
     model: Option<String>,
     rel_mse: Option<RelMse>,
 ) -> anyhow::Result<ExitCode> {
-    let mut output = Output::create(args, model, rel_mse)?;
+    let mut output = Output::create(args, scene, model, rel_mse)?;
     driver.set_time_limit(args.time);
     cancel_on_signal(driver.cancel_flag())?;
     let bar = progress_bar(args.quiet);

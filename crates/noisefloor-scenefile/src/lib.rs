@@ -40,3 +40,10 @@ pub fn load(path: &Path) -> Result<Loaded, LoadError> {
         _ => Err(LoadError::Format { path: path.to_owned() }),
     }
 }
+
+/// What a scene is called: as its file, or as the folder if the file's name says no more than "scene".
+fn title(path: &Path) -> String {
+    let stem = path.file_stem();
+    let folder = path.parent().and_then(Path::file_name).filter(|_| stem.is_some_and(|s| s == "scene"));
+    folder.or(stem).unwrap_or_default().to_string_lossy().into_owned()
+}

@@ -43,7 +43,7 @@ pub(crate) fn load(path: &Path) -> Result<Loaded, LoadError> {
             camera::framing(bounds(&asset, &placed)?)
         }
     };
-    let title = path.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
+    let title = crate::title(path);
     let refused = |cause| LoadError::Scene { place: whole.clone(), cause };
     let builder = SceneBuilder::new(title, camera).map_err(refused)?;
 

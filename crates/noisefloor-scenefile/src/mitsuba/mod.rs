@@ -52,7 +52,7 @@ pub(crate) fn load(path: &Path) -> Result<Loaded, LoadError> {
     let max_depth = root.all("integrator").next().map_or(Ok(None), |element| context.max_depth(element))?;
 
     // What is in it
-    let name = path.file_stem().unwrap_or_default().to_string_lossy();
+    let name = crate::title(path);
     let mut builder = SceneBuilder::new(name, camera).map_err(context.refused(sensor))?;
     let mut materials = Materials::new();
     for shape in root.all("shape") {
