@@ -80,7 +80,13 @@ pub fn run(args: &InspectArgs) -> anyhow::Result<()> {
 }
 
 pub fn scenes() {
-    for scene in noisefloor_ptwne::scenes::list() {
-        println!("{:18} {}", scene.name, scene.description);
-    }
+    use noisefloor_ptwne::scenes::{list, stiff};
+    let show = |heading, scenes: &mut dyn Iterator<Item = noisefloor_ptwne::scenes::Entry>| {
+        println!("{heading}");
+        for scene in scenes {
+            println!("  {:16} {}", scene.name, scene.description);
+        }
+    };
+    show("Scenes:", &mut list());
+    show("Stiff scenes, hard on a renderer:", &mut stiff());
 }

@@ -68,6 +68,11 @@ impl Kit {
         self.keep(result);
     }
 
+    pub(super) fn mesh(&mut self, mesh: &Mesh<'_>, material: MaterialId) {
+        let result = self.builder.mesh(mesh, material, None).map(|_| ());
+        self.keep(result);
+    }
+
     /// A horizontal rectangle at height `y` over x0…x1 and z0…z1, front up or down.
     pub(super) fn floor(
         &mut self,
@@ -153,8 +158,6 @@ impl Kit {
                 indices.extend([[a, a + 2, a + 1], [a + 1, a + 2, a + 3]]);
             }
         }
-        let mesh = Mesh { positions: &positions, normals: &normals, uvs: &uvs, indices: &indices };
-        let result = self.builder.mesh(&mesh, m, None).map(|_| ());
-        self.keep(result);
+        self.mesh(&Mesh { positions: &positions, normals: &normals, uvs: &uvs, indices: &indices }, m);
     }
 }

@@ -1,5 +1,5 @@
 //! Built-in scenes, all procedural: they differ in light, shapes and textures, and are framed for square images. Exposed so
-//! that both plain sRGB and Reinhard's operator show them well.
+//! that both plain sRGB and Reinhard's operator show them well; but for the stiff ones, where that is not possible.
 //!
 //! ```
 //! use noisefloor_ptwne::scenes;
@@ -15,6 +15,7 @@ mod halls;
 mod kit;
 mod outdoors;
 mod rooms;
+mod stiff;
 
 use crate::{Scene, SceneError};
 
@@ -29,7 +30,7 @@ pub struct Entry {
     pub description: &'static str,
 }
 
-const ALL: &[(Entry, Make)] = &[
+const ORDINARY: &[(Entry, Make)] = &[
     (
         Entry { name: "cornell-box", description: "two boxes in a box: one area light, colour bleeding" },
         cornell::cornell_box,
@@ -71,14 +72,50 @@ const ALL: &[(Entry, Make)] = &[
     ),
 ];
 
-/// All built-in scenes, in a fixed order.
+const STIFF: &[(Entry, Make)] = &[
+    (
+        Entry { name: "caustic", description: "light of a small lamp through glass, found by chance alone" },
+        stiff::caustic,
+    ),
+    (
+        Entry { name: "keyhole", description: "a dark room, lit through the keyhole of its door" },
+        stiff::keyhole,
+    ),
+    (Entry { name: "pinpoint", description: "one lamp of radius 1e-4" }, stiff::pinpoint),
+    (
+        Entry { name: "decades", description: "nine niches under lamps of radiance 1e-8 to 1e8" },
+        stiff::decades,
+    ),
+    (
+        Entry {
+            name: "needles",
+            description: "needle triangles around a bright lamp, and sheets that nearly touch",
+        },
+        stiff::needles,
+    ),
+    (Entry { name: "far-away", description: "columns a million units from the origin" }, stiff::far_away),
+    (Entry { name: "million", description: "hills of a million triangles" }, stiff::million),
+    (
+        Entry { name: "grazing", description: "camera and lamps just above plates of many roughnesses" },
+        stiff::grazing,
+    ),
+    (Entry { name: "black", description: "black things under a lamp: nothing to see" }, stiff::black),
+    (Entry { name: "unlit", description: "a still life without any light: nothing to see" }, stiff::unlit),
+];
+
+/// The ordinary built-in scenes, in a fixed order.
 pub fn list() -> impl ExactSizeIterator<Item = Entry> {
-    ALL.iter().map(|(entry, _)| *entry)
+    ORDINARY.iter().map(|(entry, _)| *entry)
 }
 
-/// The scene of this name, if there is one.
+/// Scenes that are hard on a renderer, each for one reason: for tests, and for looking at known trouble.
+pub fn stiff() -> impl ExactSizeIterator<Item = Entry> {
+    STIFF.iter().map(|(entry, _)| *entry)
+}
+
+/// The scene of this name, ordinary or stiff, if there is one.
 pub fn by_name(name: &str) -> Option<Scene> {
-    let (entry, make) = ALL.iter().find(|(entry, _)| entry.name == name)?;
+    let (entry, make) = ORDINARY.iter().chain(STIFF).find(|(entry, _)| entry.name == name)?;
     // Tests build all of them
     make(entry.name).ok()
 }
@@ -87,12 +124,14 @@ pub fn by_name(name: &str) -> Option<Scene> {
 mod tests {
     #[test]
     fn every_scene_builds_and_names_are_unique() {
-        let names: std::collections::HashSet<_> = super::list().map(|entry| entry.name).collect();
-        assert_eq!(names.len(), super::ALL.len());
-        for (entry, make) in super::ALL {
+        let all = || super::ORDINARY.iter().chain(super::STIFF);
+        let names: std::collections::HashSet<_> = all().map(|(entry, _)| entry.name).collect();
+        assert_eq!(names.len(), all().count());
+        for (entry, make) in all() {
             let scene = make(entry.name).unwrap();
             assert_eq!(scene.name(), entry.name);
-            assert!(scene.lights() > 0 && scene.surfaces() > 10);
+            assert!(scene.surfaces() > 8);
+            assert_eq!(scene.lights() > 0, entry.name != "unlit");
         }
         assert!(super::by_name("no-such-scene").is_none());
     }
