@@ -31,10 +31,25 @@ impl Shape {
         }
     }
 
+    /// The same shape, elsewhere.
+    pub(crate) fn moved(self, by: glam::Vec3) -> Self {
+        match self {
+            Shape::Planar { corner, e1, e2, whole } => Shape::Planar { corner: corner + by, e1, e2, whole },
+            Shape::Sphere { centre, radius } => Shape::Sphere { centre: centre + by, radius },
+            Shape::Disk { centre, e1, e2 } => Shape::Disk { centre: centre + by, e1, e2 },
+        }
+    }
+
     /// Whether a pack has room for it: it is planar and straight.
     fn packs(&self) -> bool {
         matches!(self, Shape::Planar { .. })
     }
+}
+
+/// Lowest and highest corner of a box around shapes; none if there are no shapes.
+pub(crate) fn bounds(shapes: &[Shape]) -> Option<[Vec3; 2]> {
+    let all = shapes.iter().map(Shape::bounds).reduce(|a, b| a.union(&b))?;
+    Some([all.min, all.max])
 }
 
 /// The normal and the dual basis of two edges, in f64: the area may be small.

@@ -31,8 +31,8 @@ impl Camera {
         if across.length_squared() < 1e-10 { Err(SceneError::Camera) } else { Ok(()) }
     }
 
-    /// The camera at work on an image of `width`×`height` pixels.
-    pub(crate) fn lens(&self, width: usize, height: usize) -> Lens {
+    /// The camera at work on an image of `width`×`height` pixels, in coordinates that begin at `origin`.
+    pub(crate) fn lens(&self, width: usize, height: usize, origin: Vec3) -> Lens {
         let eye = Vec3::from_array(self.eye);
         let view = (Vec3::from_array(self.target) - eye).normalize();
         let right = view.cross(Vec3::from_array(self.up)).normalize();
@@ -40,7 +40,7 @@ impl Camera {
         // Height of a pixel on the plane one unit away
         let pixel = 2.0 * (0.5 * self.vertical_fov.to_radians()).tan() / height as f32;
         Lens {
-            eye,
+            eye: eye - origin,
             corner: view - right * (0.5 * width as f32 * pixel) - down * (0.5 * height as f32 * pixel),
             right: right * pixel,
             down: down * pixel,
@@ -90,7 +90,7 @@ mod tests {
             vertical_fov: 40.0,
         };
         camera.check().unwrap();
-        let lens = camera.lens(320, 200);
+        let lens = camera.lens(320, 200, Vec3::ZERO);
         let view = (Vec3::new(4.0, 2.5, -1.0) - Vec3::new(1.0, 2.0, 3.0)).normalize();
         assert!((lens.ray(160.0, 100.0).dir - view).length() < 1e-6);
         // The top and bottom middles are one field of view apart, and the top is up

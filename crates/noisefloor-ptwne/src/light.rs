@@ -300,6 +300,16 @@ impl Light {
         }
     }
 
+    /// Moves it, if it is anywhere.
+    pub(crate) fn shift(&mut self, by: Vec3) {
+        match &mut self.place {
+            Place::Planar { corner: at, .. }
+            | Place::Sphere { centre: at, .. }
+            | Place::Point { position: at, .. } => *at += by,
+            Place::Sun { .. } | Place::Map | Place::Distant { .. } => {}
+        }
+    }
+
     /// Whether it is seen under a solid angle.
     pub(crate) fn has_size(&self) -> bool {
         !matches!(self.place, Place::Point { .. } | Place::Distant { .. })

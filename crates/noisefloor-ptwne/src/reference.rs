@@ -32,7 +32,7 @@ const MIN_WEIGHT: f32 = 2e-3;
 
 /// Renders the reference, row-major.
 pub(crate) fn render(scene: &Scene, width: usize, height: usize) -> Vec<Rgb> {
-    let lens = scene.camera.lens(width, height);
+    let lens = scene.lens(width, height);
     let strata = match scene.lights.all.len() {
         0..=4 => 4,
         5..=16 => 2,

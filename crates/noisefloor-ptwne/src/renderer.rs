@@ -262,7 +262,7 @@ impl ProgressiveSource for Ptwne {
             })
             .collect();
         // Rows of all tiles are the jobs: small enough that no thread waits long for the last one
-        let lens = this.scene.camera.lens(width, height);
+        let lens = this.scene.lens(width, height);
         let jobs: Vec<Job<'_>> = requests
             .iter()
             .zip(&mut batches)

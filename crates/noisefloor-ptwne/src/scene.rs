@@ -1,14 +1,18 @@
 //! A scene, ready to be rendered.
 
-use crate::accel::{Accel, Hit, Local, Shape, Stack};
+use crate::accel::{self, Accel, Hit, Local, Shape, Stack};
 use crate::bsdf::Glossy;
-use crate::camera::Camera;
+use crate::camera::{Camera, Lens};
 use crate::environment::{Dome, Environment, EnvironmentMap, Map};
 use crate::light::{Aim, Light, Lights, Place};
 use crate::material::{Kind, Looks, MIN_ROUGHNESS};
 use crate::math::{Ray, Vec3};
 use crate::rng;
 use crate::texture::Texture;
+
+/// A scene whose middle is this many times as far from the origin as it is large is moved there: of each coordinate f32 keeps
+/// 24 bits, and those that only say where the scene is are lost to it.
+const FAR: f32 = 16.0;
 
 /// "None" among indices.
 pub(crate) const NO: u32 = u32::MAX;
@@ -101,7 +105,9 @@ pub(crate) struct Parts {
 #[derive(Clone, Debug)]
 pub struct Scene {
     pub(crate) name: String,
-    pub(crate) camera: Camera,
+    camera: Camera,
+    /// Where the scene's coordinates begin, in the caller's.
+    origin: Vec3,
     pub(crate) sky: Option<Sky>,
     pub(crate) looks: Vec<Looks>,
     pub(crate) group_of: Vec<u32>,
@@ -135,7 +141,16 @@ pub(crate) struct Surface<'a> {
 
 impl Scene {
     pub(crate) fn new(name: String, camera: Camera, parts: Parts) -> Self {
-        let Parts { surroundings, looks, shapes, group_of, groups, details, mut lights, glows } = parts;
+        let Parts { surroundings, looks, mut shapes, group_of, groups, details, mut lights, glows } = parts;
+        let mut origin = Vec3::ZERO;
+        if let Some([low, high]) = accel::bounds(&shapes) {
+            let middle = 0.5 * (low + high);
+            if middle.abs().max_element() > FAR * 0.5 * (high - low).length() {
+                origin = middle;
+                shapes.iter_mut().for_each(|shape| *shape = shape.moved(-glam::Vec3::from(origin)));
+                lights.iter_mut().for_each(|light| light.shift(-origin));
+            }
+        }
         let accel = Accel::new(&shapes);
         drop(shapes);
         let bounds = accel.bounds();
@@ -171,6 +186,7 @@ impl Scene {
         Self {
             name,
             camera,
+            origin,
             sky,
             looks,
             group_of,
@@ -203,6 +219,11 @@ impl Scene {
         camera.check()?;
         self.camera = camera;
         Ok(self)
+    }
+
+    /// The camera at work on an image of `width`×`height` pixels.
+    pub(crate) fn lens(&self, width: usize, height: usize) -> Lens {
+        self.camera.lens(width, height, self.origin)
     }
 
     /// Number of surfaces: triangles, parallelograms, spheres and ellipses.

@@ -15,3 +15,4 @@ mod extremes; // nothing but finite numbers
 mod furnace; // energy neither made nor lost
 mod kit;
 mod mis; // with and without multiple importance sampling
+mod stiff; // scenes with known trouble

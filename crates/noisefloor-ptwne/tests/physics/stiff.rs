@@ -1,0 +1,118 @@
+//! The stiff scenes: what mathematics says of them, and nothing lost.
+
+use crate::kit::{agrees, batch, look, mean, scene};
+use noisefloor::{ProgressiveSource, Rgb};
+use noisefloor_ptwne::{Camera, Emission, Material, Mesh, Options, Ptwne, Punctual, Scene, scenes};
+
+const UP: [f32; 3] = [0.0, 1.0, 0.0];
+
+fn stiff(name: &str, camera: Option<Camera>) -> Scene {
+    let scene = scenes::by_name(name).unwrap();
+    camera.into_iter().fold(scene, |scene, camera| scene.with_camera(camera).unwrap())
+}
+
+#[test]
+fn without_light_or_reflection_there_is_nothing() {
+    for name in ["black", "unlit"] {
+        let mut source = Ptwne::new(stiff(name, None), 32, 32, Options::default()).unwrap();
+        assert!(batch(&mut source, 0, 16).iter().all(|p| *p == [0.0; 3]));
+        assert!(source.reference().unwrap().unwrap().pixels.iter().all(|p| *p == [0.0; 3]));
+    }
+}
+
+/// A ball of 1e-4 lights as a point of intensity πr²L does: at a spot of the wall, albedo/π · πr²L cos θ / d².
+#[test]
+fn a_pinpoint_lights_as_a_point() {
+    let camera = look([-2.0, 2.6, 1.0], [-2.0, 2.6, -1.5], UP, 0.05);
+    let d2 = 1.6 * 1.6 + 2.9 * 2.9;
+    let expected = 0.75 * 1e-8 * 6e8 * 2.9 / f64::powf(d2, 1.5);
+    for mis in [true, false] {
+        let options = Options { mis, max_depth: 2, ..Options::default() };
+        agrees(mean(stiff("pinpoint", Some(camera)), 4, 64, 20, 0, options), expected, 1e-3);
+    }
+    let mut source = Ptwne::new(stiff("pinpoint", Some(camera)), 4, 4, Options::default()).unwrap();
+    let reference = f64::from(source.reference().unwrap().unwrap().pixels[5][0]);
+    assert!((reference - expected).abs() < 1e-3 * expected, "{reference} {expected}");
+}
+
+/// A keyhole through which nothing but the lamp is seen lights as if it shone itself: opposite, at distance d, a hole of a×b
+/// has the form factor ab/πd², but for (a² + b²)/d², 7e-4 here.
+#[test]
+fn a_keyhole_lights_as_a_small_lamp() {
+    let camera = look([0.31, 1.06, 0.0], [0.31, 1.06, 4.0], UP, 0.05);
+    let expected = 0.75 * 1600.0 * 0.06 * 0.12 / (std::f64::consts::PI * 25.0);
+    let options = Options { max_depth: 2, ..Options::default() };
+    agrees(mean(stiff("keyhole", Some(camera)), 4, 64, 800, 0, options), expected, 2e-3);
+}
+
+/// Sixteen decades in one picture. Each panel has its own radiance exactly; and as niches at the corners, and those at the
+/// edges, are mirror images, so are their pictures, but for their panels' radiance.
+#[test]
+fn decades_keep_to_themselves() {
+    const SIZE: usize = 96;
+    let mut source = Ptwne::new(stiff("decades", None), SIZE, SIZE, Options::default()).unwrap();
+    let batches: Vec<Vec<Rgb>> = (0..64).map(|i| batch(&mut source, 4 * i, 4)).collect();
+    assert_eq!(source.counts().dropped, 0);
+    let radiance = |i: usize| 10f64.powi(2 * i as i32 - 8);
+    // Middles of niches are 28 pixels apart
+    let middle = |i: usize| [20 + 28 * (i % 3), 20 + 28 * (i / 3)];
+    let mut niches = vec![];
+    for i in 0..9 {
+        let [x, y] = middle(i);
+        let panel = f64::from(batches[0][y * SIZE + x][0]);
+        assert!((panel - radiance(i)).abs() < 1e-6 * radiance(i), "{panel} {}", radiance(i));
+        // The niche without its panel, and its standard error
+        let within = |range: usize| {
+            move |p: &usize| (p % SIZE).abs_diff(x) <= range && (p / SIZE).abs_diff(y) <= range
+        };
+        let wall: Vec<usize> = (0..SIZE * SIZE).filter(within(12)).filter(|p| !within(6)(p)).collect();
+        let means: Vec<f64> = batches
+            .iter()
+            .map(|b| wall.iter().map(|p| f64::from(b[*p][0]) / radiance(i)).sum::<f64>() / wall.len() as f64)
+            .collect();
+        let mean = means.iter().sum::<f64>() / 64.0;
+        let variance = means.iter().map(|m| (m - mean).powi(2)).sum::<f64>() / 63.0;
+        niches.push((mean, (variance / 64.0).sqrt()));
+    }
+    for (a, b) in [(0, 2), (2, 6), (6, 8), (1, 3), (3, 5), (5, 7)] {
+        let ((x, e), (y, f)) = (niches[a], niches[b]);
+        assert!((x - y).abs() < 5.0 * e.hypot(f), "niches {a}, {b}: {niches:?}");
+        assert!(e.hypot(f) < 0.05 * x, "{niches:?}");
+    }
+}
+
+/// A scene far away is the same scene: its numbers are multiples of 1/16, which f32 still holds there.
+#[test]
+fn far_away_is_as_near() {
+    let at = |to: [f32; 3], p: [f32; 3]| -> [f32; 3] { std::array::from_fn(|i| to[i] + p[i]) };
+    let camera = |to, eye| look(at(to, eye), at(to, [0.0, -40.0, 0.0]), UP, 40.0);
+    let build = |to: [f32; 3]| {
+        scene(camera(to, [100.0, 60.0, 420.0]), |b| {
+            let grey = b.material(Material::diffuse([0.6; 3])).unwrap();
+            let metal = b
+                .material(Material::RoughConductor { reflectance: [0.9; 3].into(), roughness: 0.2 })
+                .unwrap();
+            let glass = b.material(Material::Glass { ior: 1.5, tint: [0.9; 3] }).unwrap();
+            let corner = at(to, [-300.0, -128.0, -300.0]);
+            b.parallelogram(corner, [0.0, 0.0, 600.0], [600.0, 0.0, 0.0], grey, None).unwrap();
+            b.sphere(at(to, [-90.0, -68.0, 0.0]), 60.0, metal, None).unwrap();
+            b.sphere(at(to, [70.0, -78.0, 60.0]), 50.0, glass, None).unwrap();
+            let light = || Some(Emission::front([6.0; 3]));
+            b.disk(at(to, [0.0, 128.0, 0.0]), [90.0, 0.0, 0.0], [0.0, 0.0, 60.0], grey, light()).unwrap();
+            let corners =
+                [[-60.0, 10.5, -200.0], [60.0, 0.0, -200.0], [0.0, 100.0, -180.0625]].map(|p| at(to, p));
+            let mesh = Mesh { positions: &corners, indices: &[[0, 1, 2]], ..Mesh::default() };
+            b.mesh(&mesh, metal, light()).unwrap();
+            let position = at(to, [200.0, 100.0, 200.0]);
+            b.punctual(Punctual::Point { position, intensity: [40_000.0; 3] }).unwrap();
+        })
+    };
+    let render = |scene| {
+        let mut source = Ptwne::new(scene, 32, 32, Options::default()).unwrap();
+        (batch(&mut source, 0, 8), source.reference().unwrap().unwrap().pixels)
+    };
+    let (here, there) = ([0.0; 3], [998_000.0, -999_000.0, 997_000.0]);
+    assert_eq!(render(build(here)), render(build(there)));
+    let aside = |to| build(to).with_camera(camera(to, [-200.0, 20.0, 300.0])).unwrap();
+    assert_eq!(render(aside(here)), render(aside(there)));
+}
