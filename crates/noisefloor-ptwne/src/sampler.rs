@@ -52,11 +52,12 @@ impl Sampler {
         }
     }
 
-    /// A seed that no other path has, for decisions that are hashed rather than drawn in order.
+    /// A seed that no other path has, for decisions that are hashed rather than drawn in order. It takes no number: paths that
+    /// do not need it go on alike.
     #[inline]
-    pub(crate) fn seed(&mut self) -> u64 {
+    pub(crate) fn seed(&self) -> u64 {
         match self {
-            Self::Independent(rng) => rng.next(),
+            Self::Independent(rng) => rng.clone().next(),
             Self::Sobol { index, seed } => mix(*seed ^ (u64::from(*index) << 32)),
         }
     }
