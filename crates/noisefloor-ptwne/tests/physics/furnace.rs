@@ -1,7 +1,7 @@
 //! Furnaces: closed rooms and uniform surroundings, where radiance is known.
 
 use crate::kit::{agrees, look, mean, scene};
-use noisefloor_ptwne::{Emission, Environment, Material, Options, SceneBuilder};
+use noisefloor_ptwne::{Emission, Environment, Material, Options, SceneBuilder, Texture};
 
 const UP: [f32; 3] = [0.0, 1.0, 0.0];
 
@@ -53,23 +53,60 @@ fn lossless_balls_cannot_be_seen() {
     }
 }
 
-/// Directional albedo of single-scattering GGX with F = 1, by midpoint rule over the hemisphere, in f64, written from
+/// The share of light from all around that a plane sends to a camera at an angle from its normal: its directional albedo, and
+/// the standard error.
+fn albedo(material: Material, degrees: f32, samples: u32) -> (f64, f64) {
+    let (sin, cos) = degrees.to_radians().sin_cos();
+    let camera = look([4.0 * sin, 4.0 * cos, 0.0], [0.0; 3], [0.0, 0.1, 1.0], 0.5);
+    let scene = scene(camera, |b| {
+        let m = b.material(material).unwrap();
+        b.parallelogram([-9.0, 0.0, -9.0], [0.0, 0.0, 18.0], [18.0, 0.0, 0.0], m, None).unwrap();
+        b.environment(Environment::constant([1.0; 3])).unwrap();
+    });
+    mean(scene, 4, 64, samples, 0, Options::default())
+}
+
+/// Reflectance of a boundary with the index of refraction η + ik, from Fresnel's equations with complex numbers.
+fn reflectance(cos: f64, eta: f64, k: f64) -> f64 {
+    type C = [f64; 2];
+    let mul = |a: C, b: C| [a[0] * b[0] - a[1] * b[1], a[0] * b[1] + a[1] * b[0]];
+    let norm = |a: C| a[0] * a[0] + a[1] * a[1];
+    let n = [eta, k];
+    let n2 = mul(n, n);
+    // cos of refraction: √(1 − sin²/n²)
+    let sin2 = 1.0 - cos * cos;
+    let c2 = [1.0 - sin2 * n2[0] / norm(n2), sin2 * n2[1] / norm(n2)];
+    let length = norm(c2).sqrt();
+    let cos_t = [((length + c2[0]) / 2.0).max(0.0).sqrt(), ((length - c2[0]) / 2.0).max(0.0).sqrt()];
+    let (n_cos, n_cos_t) = ([eta * cos, k * cos], mul(n, cos_t));
+    let perpendicular = norm([cos - n_cos_t[0], -n_cos_t[1]]) / norm([cos + n_cos_t[0], n_cos_t[1]]);
+    let parallel =
+        norm([n_cos[0] - cos_t[0], n_cos[1] - cos_t[1]]) / norm([n_cos[0] + cos_t[0], n_cos[1] + cos_t[1]]);
+    0.5 * (perpendicular + parallel)
+}
+
+/// Schlick's approximation.
+fn schlick(f0: f64, cos: f64) -> f64 {
+    f0 + (1.0 - f0) * (1.0 - cos).powi(5)
+}
+
+/// Directional albedo of single-scattering GGX with a Fresnel term, by midpoint rule over the hemisphere, in f64, written from
 /// Walter et al. 2007 and Heitz 2014 independently of the renderer.
-fn directional_albedo(alpha: f64, cos_o: f64) -> f64 {
-    let n = 1200;
+fn directional_albedo(alpha: f64, cos_o: f64, n: u32, fresnel: impl Fn(f64) -> f64) -> f64 {
     let (wo, a2) = ([(1.0 - cos_o * cos_o).sqrt(), 0.0, cos_o], alpha * alpha);
     let lambda = |cos: f64| 0.5 * ((1.0 + a2 * (1.0 / (cos * cos) - 1.0)).sqrt() - 1.0);
     let half_pi = std::f64::consts::FRAC_PI_2;
     let mut sum = 0.0;
     for i in 0..n {
-        let (sin_i, cos_i) = ((i as f64 + 0.5) / n as f64 * half_pi).sin_cos();
+        let (sin_i, cos_i) = ((f64::from(i) + 0.5) / f64::from(n) * half_pi).sin_cos();
+        let g = 1.0 / (1.0 + lambda(cos_o) + lambda(cos_i));
         for j in 0..n {
-            let phi = (j as f64 + 0.5) / n as f64 * 2.0 * half_pi; // half a turn: symmetric
+            let phi = (f64::from(j) + 0.5) / f64::from(n) * 2.0 * half_pi; // half a turn: symmetric
             let h = [wo[0] + sin_i * phi.cos(), sin_i * phi.sin(), wo[2] + cos_i];
-            let cos2_h = h[2] * h[2] / h.iter().map(|x| x * x).sum::<f64>();
-            let d = a2 / (std::f64::consts::PI * (cos2_h * (a2 - 1.0) + 1.0).powi(2));
-            let g = 1.0 / (1.0 + lambda(cos_o) + lambda(cos_i));
-            sum += d * g / (4.0 * cos_o) * sin_i;
+            let length2 = h.iter().map(|x| x * x).sum::<f64>();
+            let d = a2 / (std::f64::consts::PI * (h[2] * h[2] / length2 * (a2 - 1.0) + 1.0).powi(2));
+            // wo·h of the half vector of length 1
+            sum += d * g / (4.0 * cos_o) * sin_i * fresnel(0.5 * length2.sqrt());
         }
     }
     sum * 2.0 * half_pi * 2.0 * half_pi / f64::from(n * n)
@@ -78,18 +115,138 @@ fn directional_albedo(alpha: f64, cos_o: f64) -> f64 {
 /// A rough conductor with F = 1 loses what its microfacets mask, and no more.
 #[test]
 fn rough_conductors_lose_what_is_masked() {
-    for (roughness, degrees) in [(0.2f32, 20.0f32), (0.5, 50.0), (1.0, 0.1), (1.0, 75.0)] {
-        let (sin, cos) = degrees.to_radians().sin_cos();
-        let camera = look([4.0 * sin, 4.0 * cos, 0.0], [0.0; 3], [0.0, 0.1, 1.0], 0.5);
-        let scene = scene(camera, |b| {
-            let metal = Material::RoughConductor { reflectance: [1.0; 3].into(), roughness };
-            let m = b.material(metal).unwrap();
-            b.parallelogram([-9.0, 0.0, -9.0], [0.0, 0.0, 18.0], [18.0, 0.0, 0.0], m, None).unwrap();
-            b.environment(Environment::constant([1.0; 3])).unwrap();
-        });
-        let expected = directional_albedo(f64::from(roughness), f64::from(cos));
+    for (roughness, degrees) in [(0.2f32, 20.0f32), (0.5, 50.0), (1.0, 0.1), (1.0, 75.0), (0.1, 85.0)] {
+        let metal = Material::RoughConductor { reflectance: [1.0; 3].into(), roughness };
+        let cos = f64::from(degrees.to_radians().cos());
+        let expected = directional_albedo(f64::from(roughness), cos, 1200, |_| 1.0);
         assert!(expected < 1.0 + 1e-4);
         // The bias covers the quadrature
-        agrees(mean(scene, 4, 64, 200, 0, Options::default()), expected, 1e-3);
+        agrees(albedo(metal, degrees, 200), expected, 1e-3);
+    }
+}
+
+/// Smooth boundaries reflect and let through what Fresnel says; what is diffuse, its albedo.
+#[test]
+fn smooth_surfaces_are_fresnels() {
+    for degrees in [0.1f32, 40.0, 80.0] {
+        let cos = f64::from(degrees.to_radians().cos());
+        // The field of view is 0.5°: at 80° that is 1e-3 of a reflectance
+        let test = |material: Material, expected: f64| agrees(albedo(material, degrees, 100), expected, 2e-3);
+        test(Material::diffuse([0.7; 3]), 0.7);
+        test(Material::Mirror { reflectance: [0.9; 3] }, 0.9);
+        let r = reflectance(cos, 1.5, 0.0);
+        test(Material::Glass { ior: 1.5, tint: [0.8; 3] }, r + (1.0 - r) * 0.8);
+        // Two boundaries: r + t² r (1 + r² + r⁴ + …), t = 1 − r
+        let both = r + (1.0 - r) * (1.0 - r) * r / (1.0 - r * r);
+        test(Material::ThinGlass { ior: 1.5, tint: [0.8; 3] }, both + (1.0 - both) * 0.8);
+        for (eta, k) in [(0.2, 3.9), (2.9, 3.0), (1.5, 0.0)] {
+            let metal = Material::Conductor {
+                eta: [eta as f32; 3],
+                k: [k as f32; 3],
+                reflectance: [1.0; 3].into(),
+                roughness: 0.0,
+            };
+            test(metal, reflectance(cos, eta, k));
+        }
+        let polished = Material::RoughConductor { reflectance: [0.4; 3].into(), roughness: 0.0 };
+        test(polished, schlick(0.4, cos));
+    }
+}
+
+/// Rough conductors of a colour reflect their Fresnel term over the visible microfacets, and never more than they meet.
+#[test]
+fn rough_conductors_are_fresnels_over_facets() {
+    for (roughness, degrees) in [(0.15f32, 30.0f32), (0.5, 70.0), (1.0, 10.0)] {
+        let (alpha, cos) = (f64::from(roughness), f64::from(degrees.to_radians().cos()));
+        let schlicks = Material::RoughConductor { reflectance: [0.5; 3].into(), roughness };
+        let expected = directional_albedo(alpha, cos, 800, |c| schlick(0.5, c));
+        agrees(albedo(schlicks, degrees, 200), expected, 2e-3);
+        let (eta, k, reflectances) = ([0.2; 3], [3.9; 3], [1.0; 3].into());
+        let gold = Material::Conductor { eta, k, reflectance: reflectances, roughness };
+        let expected = directional_albedo(alpha, cos, 800, |c| reflectance(c, 0.2, 3.9));
+        assert!(expected < 1.0);
+        agrees(albedo(gold, degrees, 200), expected, 2e-3);
+    }
+}
+
+fn plastic(albedo: f32, roughness: f32, nonlinear: bool) -> Material {
+    Material::Plastic { diffuse: [albedo; 3].into(), specular: [1.0; 3], ior: 1.5, roughness, nonlinear }
+}
+
+/// What a coat reflects of one direction, and a base of albedo ρ lets out again: light that got in is reflected by the base
+/// and by the coat from below in turn, until it gets out.
+fn coated(reflected: f64, albedo: f64, inner: f64) -> f64 {
+    reflected + (1.0 - reflected) * albedo * (1.0 - inner) / (1.0 - albedo * inner)
+}
+
+#[test]
+fn smooth_coats_keep_the_light_of_their_base() {
+    // Diffuse light from inside: 2∫R(μ)μ dμ, with total reflection beyond the critical angle
+    let n = 20_000;
+    let inner: f64 = (0..n)
+        .map(|i| {
+            let cos = (f64::from(i) + 0.5) / f64::from(n);
+            let sin2 = 2.25 * (1.0 - cos * cos);
+            // By reciprocity as from outside, at the refracted angle
+            let r = if sin2 >= 1.0 { 1.0 } else { reflectance((1.0 - sin2).sqrt(), 1.5, 0.0) };
+            2.0 * r * cos / f64::from(n)
+        })
+        .sum();
+    for degrees in [0.1f32, 55.0, 80.0] {
+        let r = reflectance(f64::from(degrees.to_radians().cos()), 1.5, 0.0);
+        for rho in [1.0f32, 0.5] {
+            let albedo_of = |nonlinear| albedo(plastic(rho, 0.0, nonlinear), degrees, 200);
+            // The table of the coat is good to 1e-3, and the view is 0.5° wide
+            agrees(albedo_of(true), coated(r, f64::from(rho), inner), 3e-3);
+            agrees(albedo_of(false), r + (1.0 - r) * f64::from(rho), 3e-3);
+        }
+    }
+}
+
+/// What the facets of a rough coat do not reflect gets in, masked light too: a white base loses nothing.
+#[test]
+fn rough_coats_keep_the_light_of_their_base() {
+    for (roughness, degrees) in
+        [(0.001f32, 80.0f32), (0.02, 85.0), (0.0, 89.0), (0.05, 89.0), (0.3, 45.0), (1.0, 10.0), (1.0, 85.0)]
+    {
+        for nonlinear in [true, false] {
+            agrees(albedo(plastic(1.0, roughness, nonlinear), degrees, 400), 1.0, 3e-3);
+        }
+    }
+    // A grey base, against quadratures alone
+    let reflected = |cos: f64| directional_albedo(0.4, cos, 250, |c| reflectance(c, 1.5, 0.0));
+    let steps = 24;
+    let through: f64 = (0..steps)
+        .map(|i| (f64::from(i) + 0.5) / f64::from(steps))
+        .map(|cos| 2.0 * cos * (1.0 - reflected(cos)) / f64::from(steps))
+        .sum();
+    let expected = coated(reflected(0.5), 0.5, 1.0 - through / 2.25);
+    agrees(albedo(plastic(0.5, 0.4, true), 60.0, 400), expected, 5e-3);
+}
+
+/// White metal loses what its facets mask, a white dielectric nothing, and no blend makes light.
+#[test]
+fn blends_of_metal_and_dielectric_make_no_light() {
+    for (g, degrees) in [(0.0f32, 80.0f32), (0.3, 85.0), (0.6, 60.0), (1.0, 20.0), (1.0, 80.0)] {
+        let alpha = (g * g).max(noisefloor_ptwne::MIN_ROUGHNESS);
+        let cos = f64::from(degrees.to_radians().cos());
+        // Facets of 1e-3 mask nothing at 80°, and are too narrow for the quadrature
+        let metal = if g == 0.0 { 1.0 } else { directional_albedo(f64::from(alpha), cos, 800, |_| 1.0) };
+        for share in [0.0f32, 0.5, 1.0] {
+            let (base, metallic_roughness) = ([1.0; 3].into(), [0.0, g, share].into());
+            let material = Material::MetallicRoughness { base, metallic_roughness, ior: 1.5 };
+            let expected = 1.0 + f64::from(share) * (metal - 1.0);
+            agrees(albedo(material, degrees, 400), expected, 4e-3);
+        }
+    }
+    // Of a roughness that varies, as far as the renderer knows: it then reads the coat between two rows of a table
+    for g in [0.02f32, 0.1, 0.146, 0.19, 0.31, 0.55, 0.97] {
+        for degrees in [10.0f32, 60.0, 80.0, 85.0] {
+            let metallic_roughness = Texture::Checker { colours: [[0.0, g, 0.0]; 2], scale: [1.0; 2] };
+            let base = [1.0; 3].into();
+            let got =
+                albedo(Material::MetallicRoughness { base, metallic_roughness, ior: 1.5 }, degrees, 200);
+            agrees(got, 1.0, 5e-3);
+        }
     }
 }
