@@ -2,7 +2,10 @@
 
 use crate::kit::{agrees, batch, look, mean, scene};
 use noisefloor::ProgressiveSource;
-use noisefloor_ptwne::{Camera, Emission, Environment, Material, Options, Ptwne, Scene, Sun, scenes};
+use noisefloor_ptwne::{
+    Camera, Cover, Emission, Environment, EnvironmentMap, ImageTexture, Material, MaterialId, Mesh, Options,
+    Pixels, Ptwne, Punctual, Scene, SceneBuilder, Sun, Texture, scenes,
+};
 
 const DIRECT: u32 = 2;
 
@@ -12,7 +15,7 @@ fn spot() -> Camera {
 }
 
 /// A floor of albedo 0.5 and one light.
-fn lit(light: impl FnOnce(&mut noisefloor_ptwne::SceneBuilder, noisefloor_ptwne::MaterialId)) -> Scene {
+fn lit(light: impl FnOnce(&mut SceneBuilder, MaterialId)) -> Scene {
     scene(spot(), |b| {
         let grey = b.material(Material::diffuse([0.5; 3])).unwrap();
         let black = b.material(Material::diffuse([0.0; 3])).unwrap();
@@ -23,13 +26,18 @@ fn lit(light: impl FnOnce(&mut noisefloor_ptwne::SceneBuilder, noisefloor_ptwne:
 
 /// Checks both estimators and the reference. The spot's size and f32 are good for 2e-3, the quadrature for 1e-2.
 fn check(scene: &Scene, expected: f64) {
+    check_samples(scene, expected);
+    let mut source = Ptwne::new(scene.clone(), 4, 4, Options::default()).unwrap();
+    let reference = f64::from(source.reference().unwrap().unwrap().pixels[5][0]);
+    assert!((reference - expected).abs() < 1e-2 * expected, "reference {reference}, expected {expected}");
+}
+
+/// Checks both estimators.
+fn check_samples(scene: &Scene, expected: f64) {
     for mis in [true, false] {
         let options = Options { mis, max_depth: DIRECT, ..Options::default() };
         agrees(mean(scene.clone(), 4, 64, 100, 0, options), expected, 2e-3);
     }
-    let mut source = Ptwne::new(scene.clone(), 4, 4, Options::default()).unwrap();
-    let reference = f64::from(source.reference().unwrap().unwrap().pixels[5][0]);
-    assert!((reference - expected).abs() < 1e-2 * expected, "reference {reference}, expected {expected}");
 }
 
 /// Form factor of a parallel rectangle with a corner straight above (Howell's catalogue, C-11): a, b are its edges over the
@@ -91,6 +99,183 @@ fn the_sun_lights_by_its_projected_solid_angle() {
     let scene = lit(|b, _| b.environment(Environment { sun: Some(sun), ..dark }).unwrap());
     let cos = 0.8 / (0.77f64).sqrt();
     check(&scene, 0.5 * 100.0 * 2f64.to_radians().sin().powi(2) * cos);
+}
+
+/// ∫ cos cos / πd² over an ellipse, in f64, by midpoint rule over its disk: the form factor from the origin.
+fn ellipse(centre: [f64; 3], e1: [f64; 3], e2: [f64; 3], normal: [f64; 3]) -> f64 {
+    let n = 400;
+    let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+    let area = std::f64::consts::PI * (dot(e1, e1) * dot(e2, e2) - dot(e1, e2).powi(2)).sqrt();
+    let mut sum = 0.0;
+    for i in 0..n * n {
+        let r = ((f64::from(i / n) + 0.5) / f64::from(n)).sqrt();
+        let (sin, cos) = ((f64::from(i % n) + 0.5) / f64::from(n) * std::f64::consts::TAU).sin_cos();
+        let p: [f64; 3] = std::array::from_fn(|k| centre[k] + r * (cos * e1[k] + sin * e2[k]));
+        let d2 = dot(p, p);
+        sum += p[1] * -dot(p, normal) / (std::f64::consts::PI * d2 * d2);
+    }
+    sum * area / f64::from(n * n)
+}
+
+/// A disc straight above: F = r²/(h² + r²). Ellipses elsewhere, by quadrature, which that checks too.
+#[test]
+fn discs_light_by_their_form_factor() {
+    let light = || Some(Emission::front([3.0; 3]));
+    let round =
+        |r: f32| lit(|b, m| b.disk([0.0, 2.0, 0.0], [r, 0.0, 0.0], [0.0, 0.0, r], m, light()).unwrap());
+    let closed = 0.5 * 3.0 * 0.64 / 4.64;
+    let summed = ellipse([0.0, 2.0, 0.0], [0.8, 0.0, 0.0], [0.0, 0.0, 0.8], [0.0, -1.0, 0.0]);
+    assert!((0.5 * 3.0 * summed - closed).abs() < 1e-4 * closed);
+    check(&round(0.8), closed);
+    check(&round(0.01), 0.5 * 3.0 * 1e-4 / 4.0001);
+    let aslant = lit(|b, m| {
+        b.disk([0.7, 1.5, -0.4], [0.6, 0.3, 0.0], [0.0, 0.0, 0.3], m, light()).unwrap();
+    });
+    // e1 × e2 = (0.09, −0.18, 0)
+    let normal = [1.0 / 5f64.sqrt(), -2.0 / 5f64.sqrt(), 0.0];
+    check(&aslant, 1.5 * ellipse([0.7, 1.5, -0.4], [0.6, 0.3, 0.0], [0.0, 0.0, 0.3], normal));
+}
+
+/// Lights without size: E = I cos θ / d², with glTF's fade for spots; and E = E₀ cos θ from far away.
+#[test]
+fn punctual_lights_have_no_noise() {
+    let (position, down, intensity) = ([1.0, 2.0, -1.0], [0.0, -3.0, 0.0], [5.0; 3]);
+    let point = 5.0 / 6.0 * 2.0 / 6f64.sqrt() * 0.5 / std::f64::consts::PI;
+    check(&lit(|b, _| b.punctual(Punctual::Point { position, intensity }).unwrap()), point);
+    let spot = |inner, outer| {
+        let light = Punctual::Spot { position, direction: down, intensity, inner, outer };
+        lit(|b, _| b.punctual(light).unwrap())
+    };
+    // The origin is seen 35.26° off the axis
+    let cos = |degrees: f64| degrees.to_radians().cos();
+    let fade = (2.0 / 6f64.sqrt() - cos(50.0)) / (cos(20.0) - cos(50.0));
+    check(&spot(20.0, 50.0), point * fade * fade);
+    check(&spot(40.0, 50.0), point);
+    let mut dark = Ptwne::new(spot(10.0, 35.0), 4, 4, Options::default()).unwrap();
+    assert_eq!(batch(&mut dark, 0, 16), vec![[0.0; 3]; 16]);
+    let distant = Punctual::Distant { direction: [0.5, -1.0, 0.5], irradiance: [2.0; 3] };
+    let expected = 2.0 * 0.5 / std::f64::consts::PI / 1.5f64.sqrt();
+    check(&lit(|b, _| b.punctual(distant).unwrap()), expected);
+}
+
+/// An image of all directions: one bright pixel on grey, and light from one half, against a quadrature of the interpolated
+/// image in f64.
+#[test]
+fn environment_maps_light_by_their_image() {
+    let (width, height) = (16usize, 8usize);
+    let one = (0..width * height).map(|i| if i == 2 * width + 5 { 200.0 } else { 0.3 });
+    let half = (0..width * height).map(|i| if i % width < width / 2 { 1.0 } else { 0.0 });
+    for values in [one.collect::<Vec<f64>>(), half.collect()] {
+        let at = |x: i64, y: i64| {
+            values[y.clamp(0, height as i64 - 1) as usize * width + x.rem_euclid(width as i64) as usize]
+        };
+        let sub = 32;
+        let (columns, rows) = (width * sub, height * sub);
+        let mut irradiance = 0.0;
+        for i in 0..columns * rows {
+            let [u, v] =
+                [(i % columns) as f64 + 0.5, (i / columns) as f64 + 0.5].map(|x| x / sub as f64 - 0.5);
+            let (x, y) = (u.floor(), v.floor());
+            let (fx, fy) = (u - x, v - y);
+            let row = |y| at(x as i64, y) * (1.0 - fx) + at(x as i64 + 1, y) * fx;
+            let radiance = row(y as i64) * (1.0 - fy) + row(y as i64 + 1) * fy;
+            let (sin, cos) = ((v + 0.5) / height as f64 * std::f64::consts::PI).sin_cos();
+            irradiance += radiance * cos.max(0.0) * sin;
+        }
+        irradiance *= 2.0 * std::f64::consts::PI.powi(2) / (columns * rows) as f64;
+        let pixels = values.iter().map(|v| [*v as f32; 3]).collect();
+        let to_world = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        let map = EnvironmentMap { width, height, pixels, to_world };
+        let scene = lit(|b, _| b.environment_map(map).unwrap());
+        let expected = 0.5 / std::f64::consts::PI * irradiance;
+        check_samples(&scene, expected);
+        // The reference looks at 256 points of the map, of which few see its bright pixel
+        let mut source = Ptwne::new(scene, 4, 4, Options::default()).unwrap();
+        let reference = f64::from(source.reference().unwrap().unwrap().pixels[5][0]);
+        assert!((reference - expected).abs() < 0.1 * expected, "reference {reference}, {expected}");
+    }
+}
+
+/// Four quarters of radiance 0, 1, 2, 4, each with a corner above the origin.
+#[test]
+fn textured_lights_shine_by_their_image() {
+    let pixels = [0.0, 0.25, 0.5, 1.0].map(|x| [x; 3]);
+    let mut image = ImageTexture::new(2, 2, Pixels::Float(pixels.into()));
+    image.nearest = true;
+    let (positions, uvs) = (
+        [[-1.0, 2.0, -1.0], [2.0, 2.0, -1.0], [2.0, 2.0, 0.5], [-1.0, 2.0, 0.5]],
+        [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]],
+    );
+    let mesh = Mesh { positions: &positions, uvs: &uvs, indices: &[[0, 1, 2], [0, 2, 3]], ..Mesh::default() };
+    let light = Emission { texture: Some(Texture::Image(image)), ..Emission::front([4.0; 3]) };
+    let scene = lit(|b, m| assert_eq!(b.mesh(&mesh, m, Some(light)), Ok(0)));
+    // The image's middle is x = 0.5, z = −0.25; v = 0, its bottom row, is at z = −1
+    let rect = |x: [f64; 2], z: [f64; 2]| {
+        let f = |a: f64, b: f64| corner(a.abs() / 2.0, b.abs() / 2.0) * a.signum() * b.signum();
+        f(x[1], z[1]) - f(x[0], z[1]) - f(x[1], z[0]) + f(x[0], z[0])
+    };
+    let ([left, right], [far, near]) = ([[-1.0, 0.5], [0.5, 2.0]], [[-1.0, -0.25], [-0.25, 0.5]]);
+    let f = 1.0 * rect(right, near) + 2.0 * rect(left, far) + 4.0 * rect(right, far);
+    check(&scene, 0.5 * f);
+}
+
+/// A plate between floor and light, and half of it or each second ray's worth is not there.
+#[test]
+fn holes_let_light_through() {
+    let with = |opacity: Texture, light: &dyn Fn(&mut SceneBuilder, MaterialId)| {
+        lit(|b, m| {
+            let cover = Cover { opacity: Some(opacity), one_sided: false };
+            let plate = b.material_with(Material::diffuse([0.0; 3]), cover).unwrap();
+            b.parallelogram([-2.0, 1.5, -2.0], [4.0, 0.0, 0.0], [0.0, 0.0, 4.0], plate, None).unwrap();
+            light(b, m);
+        })
+    };
+    let point = |b: &mut SceneBuilder, _| {
+        b.punctual(Punctual::Point { position: [0.5, 2.0, 0.5], intensity: [5.0; 3] }).unwrap();
+    };
+    let panel = |b: &mut SceneBuilder, m| {
+        let light = Some(Emission::front([3.0; 3]));
+        b.parallelogram([-1.0, 2.0, -1.0], [2.0, 0.0, 0.0], [0.0, 0.0, 2.0], m, light).unwrap();
+    };
+    let whole = (5.0 * 2.0 / 4.5f64.powf(1.5) * 0.5 / std::f64::consts::PI, 1.5 * 4.0 * corner(0.5, 0.5));
+    check_samples(&with([0.3, 0.4, 0.5].into(), &point), 0.6 * whole.0);
+    check_samples(&with([0.5; 3].into(), &panel), 0.5 * whole.1);
+    // Texture coordinates run in scene units: the left half of four is there
+    let mut image = ImageTexture::new(2, 1, Pixels::Linear8([[255; 3], [0; 3]].into()));
+    (image.nearest, image.to_uv) = (true, [[0.25, 0.0, 0.0], [0.0, 0.25, 0.0]]);
+    check(&with(Texture::Image(image.clone()), &panel), 0.5 * whole.1);
+    check(&with(Texture::Image(image), &point), whole.0);
+}
+
+/// Straight through two plates of which a third and a half is there, to a sky of radiance 1, besides what they reflect.
+#[test]
+fn holes_are_looked_through() {
+    let camera = look([0.0, 0.0, 4.0], [0.0; 3], [0.0, 1.0, 0.0], 20.0);
+    let scene = scene(camera, |b| {
+        for (z, opacity) in [(0.0, 1.0 / 3.0), (-1.0, 0.5)] {
+            let cover = Cover { opacity: Some([opacity; 3].into()), one_sided: false };
+            let m = b.material_with(Material::diffuse([0.0; 3]), cover).unwrap();
+            b.parallelogram([-9.0, -9.0, z], [18.0, 0.0, 0.0], [0.0, 18.0, 0.0], m, None).unwrap();
+        }
+        b.environment(Environment::constant([1.0; 3])).unwrap();
+    });
+    agrees(mean(scene, 16, 64, 16, 0, Options::default()), 1.0 / 3.0, 1e-6);
+}
+
+#[test]
+fn backs_of_one_sided_surfaces_are_black() {
+    for (z, expected) in [(4.0, 0.5), (-4.0, 0.0)] {
+        let scene = scene(look([0.0, 0.0, z], [0.0; 3], [0.0, 1.0, 0.0], 20.0), |b| {
+            let cover = Cover { opacity: None, one_sided: true };
+            let m = b.material_with(Material::diffuse([0.5; 3]), cover).unwrap();
+            b.parallelogram([-9.0, -9.0, 0.0], [18.0, 0.0, 0.0], [0.0, 18.0, 0.0], m, None).unwrap();
+            b.environment(Environment::constant([1.0; 3])).unwrap();
+        });
+        let mut source = Ptwne::new(scene, 4, 4, Options::default()).unwrap();
+        let mut all = batch(&mut source, 0, 4);
+        all.extend(source.reference().unwrap().unwrap().pixels);
+        assert!(all.iter().flatten().all(|x| (x - expected).abs() < 1e-5), "{all:?}");
+    }
 }
 
 /// In the Cornell box, cut to direct light, the reference is what the path tracer converges to.
