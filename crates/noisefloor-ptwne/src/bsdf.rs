@@ -142,7 +142,18 @@ pub(crate) struct Coat {
     pub(crate) ior: f32,
     /// GGX α; none if it varies.
     alpha: Option<f32>,
+    inside: Inside,
     rows: Vec<Row>,
+}
+
+/// What becomes of light that a rough coat reflects back onto its base.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Inside {
+    /// All that does not get out comes back. By reciprocity that is 1 − T̄/η² of diffuse light, T̄ = 2∫T(μ)μ dμ: a white base
+    /// loses nothing.
+    Kept,
+    /// Facets reflect it once, as they do outside; what they mask is lost.
+    Once,
 }
 
 /// Transmittance for one roughness.
@@ -161,17 +172,17 @@ const ALPHAS: usize = 24;
 
 impl Coat {
     /// A coat of index `ior`, of roughness `alpha`, or of any if that is `None`.
-    pub(crate) fn new(ior: f32, alpha: Option<f32>) -> Self {
+    pub(crate) fn new(ior: f32, alpha: Option<f32>, inside: Inside) -> Self {
         let rows = match alpha {
-            Some(alpha) => vec![Row::new(ior, alpha)],
-            None => (0..=ALPHAS).map(|i| Row::new(ior, (i as f32 / ALPHAS as f32).powi(2))).collect(),
+            Some(alpha) => vec![Row::new(ior, alpha, inside)],
+            None => (0..=ALPHAS).map(|i| Row::new(ior, (i as f32 / ALPHAS as f32).powi(2), inside)).collect(),
         };
-        Self { ior, alpha, rows }
+        Self { ior, alpha, inside, rows }
     }
 
     /// Whether this is what [`Coat::new`] would make.
-    pub(crate) fn is_for(&self, ior: f32, alpha: Option<f32>) -> bool {
-        (self.ior, self.alpha) == (ior, alpha)
+    pub(crate) fn is_for(&self, ior: f32, alpha: Option<f32>, inside: Inside) -> bool {
+        (self.ior, self.alpha, self.inside) == (ior, alpha, inside)
     }
 
     /// Blends what `of` says of the two rows around `alpha`.
@@ -207,18 +218,28 @@ impl Coat {
 }
 
 impl Row {
-    fn new(ior: f32, alpha: f32) -> Self {
-        let at = std::array::from_fn(|i| 1.0 - reflectance(ior, alpha, (i as f32 / STEPS as f32).powi(2)));
-        // 2∫R(μ)μ dμ with μ = s², by the midpoint rule
-        let inside = (0..4 * STEPS)
-            .map(|i| {
-                let s = (f64::from(i as u32) + 0.5) / (4 * STEPS) as f64;
-                f64::from(reflectance(1.0 / ior, alpha, (s * s) as f32)) * 4.0 * s.powi(3)
-            })
-            .sum::<f64>()
-            / (4 * STEPS) as f64;
+    fn new(ior: f32, alpha: f32, inside: Inside) -> Self {
+        let at: [f32; STEPS + 1] =
+            std::array::from_fn(|i| 1.0 - reflectance(ior, alpha, (i as f32 / STEPS as f32).powi(2)));
+        let inside = match inside {
+            Inside::Kept => {
+                1.0 - mean(|s| f64::from(at[(s * STEPS as f64).round() as usize])) / f64::from(ior * ior)
+            }
+            Inside::Once => mean(|s| f64::from(reflectance(1.0 / ior, alpha, (s * s) as f32))),
+        };
         Self { at, inside: inside as f32 }
     }
+}
+
+/// 2∫f(μ)μ dμ with μ = s², by Simpson's rule over [`STEPS`] steps in s.
+fn mean(f: impl Fn(f64) -> f64) -> f64 {
+    let weight = |i: usize| match i {
+        0 | STEPS => 1.0,
+        i if i % 2 == 1 => 4.0,
+        _ => 2.0,
+    };
+    let at = |i: usize| i as f64 / STEPS as f64;
+    (0..=STEPS).map(|i| weight(i) * f(at(i)) * 4.0 * at(i).powi(3)).sum::<f64>() / (3.0 * STEPS as f64)
 }
 
 /// Share of the light from a direction that a boundary reflects by microfacets, once: the mean of F·G₂/G₁ over visible normals.
@@ -457,7 +478,7 @@ mod tests {
             let metallic_roughness = [0.0, roughness, metal].into();
             all.push(Material::MetallicRoughness { base: colour.into(), metallic_roughness, ior: 1.5 });
         }
-        all.into_iter().map(|m| (m.clone(), Looks::new(m, Cover::default()).unwrap())).collect()
+        all.into_iter().map(|m| (m.clone(), Looks::new(m, Cover::default(), &mut vec![]).unwrap())).collect()
     }
 
     /// What looks so, seen from `wo`.
