@@ -18,6 +18,7 @@ use crate::bsdf::{self, DELTA};
 use crate::light::Aim;
 use crate::material::Kind;
 use crate::math::{self, Frame, Ray, Vec3};
+use crate::rng::{Key, Rng};
 use crate::scene::{Scene, Sky, Surface};
 use noisefloor::Rgb;
 use rayon::prelude::*;
@@ -30,8 +31,9 @@ const MAX_SPECULAR: u32 = 10;
 /// Branches that weigh less are cut.
 const MIN_WEIGHT: f32 = 2e-3;
 
-/// Renders the reference, row-major.
-pub(crate) fn render(scene: &Scene, width: usize, height: usize) -> Vec<Rgb> {
+/// Renders the reference, row-major. `key` turns the points of all pixels by the same amount: another quadrature as good.
+pub(crate) fn render(scene: &Scene, width: usize, height: usize, key: Key) -> Vec<Rgb> {
+    let turn = Rng::new(key, 0, 0).two();
     let lens = scene.lens(width, height);
     let strata = match scene.lights.all.len() {
         0..=4 => 4,
@@ -47,7 +49,7 @@ pub(crate) fn render(scene: &Scene, width: usize, height: usize) -> Vec<Rgb> {
             let mut sum = Vec3::ZERO;
             for i in 0..RAYS {
                 let [dx, dy] = hammersley(i, RAYS);
-                tracer.shift = shift(i);
+                tracer.shift = std::array::from_fn(|k| (shift(i)[k] + turn[k]).fract());
                 tracer.ray = u64::from(i);
                 // Rays that are neighbours in the pixel see different lights
                 tracer.turn = (i + i / 4) as usize % stride;
@@ -190,7 +192,7 @@ impl Tracer<'_> {
     fn dome(&mut self, surface: &Surface<'_>, n: u32, scattered: impl Fn(Vec3) -> Vec3) -> Vec3 {
         let Some(Sky::Dome(dome)) = &self.scene.sky else { return Vec3::ZERO };
         let mut sum = Vec3::ZERO;
-        let (n, frame) = (n.max(2), Frame::new(surface.normal));
+        let (n, frame) = (2 * n, Frame::new(surface.normal));
         for i in 0..n * n {
             let local = math::cosine_hemisphere(self.stratum(i, n));
             let dir = frame.to_world(local);

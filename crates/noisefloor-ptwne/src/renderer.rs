@@ -277,7 +277,8 @@ impl ProgressiveSource for Ptwne {
     }
 
     fn reference(&mut self) -> Result<Option<Reference>, SourceError> {
-        let pixels = self.on_threads(|| crate::reference::render(&self.scene, self.width, self.height));
+        let key = Key::new(self.options.seed);
+        let pixels = self.on_threads(|| crate::reference::render(&self.scene, self.width, self.height, key));
         Ok(Some(Reference { width: self.width, height: self.height, pixels }))
     }
 }

@@ -1,0 +1,67 @@
+//! What the quick ray-traced reference costs, and how free of noise it is: `reference SIZE SCENE…`, scenes by name or file; prints a
+//! table in Markdown.
+//!
+//! Two references of different seeds are two quadratures of the same light. What they differ by, divided by √2, is the error of one;
+//! through tone mapping and the noise mask it is what the oracle would take for noise.
+
+#![expect(clippy::print_stdout, reason = "a table for people")]
+
+use ndarray::Array2;
+use noisefloor::{NoiseMask, ProgressiveSource, Request, Tile, TileGrid, ToneMapping};
+use noisefloor_ptwne::{Options, Ptwne, Scene, scenes};
+use std::error::Error;
+use std::path::Path;
+use std::sync::Arc;
+use std::time::Instant;
+
+/// Samples per pixel that the path tracer is timed with.
+const SAMPLES: u32 = 8;
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let args: Vec<String> = std::env::args().skip(1).collect();
+    let [size, names @ ..] = args.as_slice() else { return Err("reference SIZE SCENE…".into()) };
+    let size: usize = size.parse()?;
+    println!("| scene | seconds | as many as … spp | mask deviation, /255 | of the worst tile |");
+    println!("|---|---|---|---|---|");
+    for name in names {
+        let scene = match scenes::by_name(name) {
+            Some(scene) => scene,
+            None => noisefloor_scenefile::load(Path::new(name))?.scene,
+        };
+        println!("{}", row(&Arc::new(scene), size)?);
+    }
+    Ok(())
+}
+
+fn row(scene: &Arc<Scene>, size: usize) -> Result<String, Box<dyn Error>> {
+    let source = |seed| Ptwne::new(scene.clone(), size, size, Options { seed, ..Options::default() });
+    let mut images = Vec::new();
+    let start = Instant::now();
+    for seed in [1, 2] {
+        images.push(source(seed)?.reference()?.ok_or("no reference")?.pixels);
+    }
+    let seconds = start.elapsed().as_secs_f64() / 2.0;
+    let start = Instant::now();
+    let tile = Tile { index: 0, x: 0, y: 0, width: size, height: size };
+    let rendered = source(1)?.sample(&[Request { tile, first: 0, samples: SAMPLES }])?;
+    let one_sample = start.elapsed().as_secs_f64() / f64::from(SAMPLES);
+
+    // The exposure is that of the picture that the reference is held against
+    let display = ToneMapping::default().settle(&rendered[0].mean);
+    let error = |y: usize, x: usize| {
+        let luma = |image: usize| display.luma(images[image][y * size + x]);
+        (luma(0) - luma(1)) * std::f32::consts::FRAC_1_SQRT_2 * 255.0
+    };
+    let mask = NoiseMask::default().apply(&Array2::from_shape_fn((size, size), |(y, x)| error(y, x)));
+    let tiles: Vec<f64> = TileGrid::new(size, size, 128)?
+        .tiles()
+        .map(|t| {
+            let squares = (t.y..t.y + t.height).flat_map(|y| (t.x..t.x + t.width).map(move |x| (y, x)));
+            squares.map(|at| f64::from(mask[at]).powi(2)).sum::<f64>() / t.pixels() as f64
+        })
+        .collect();
+    let worst = tiles.iter().copied().fold(0.0, f64::max).sqrt();
+    let all = (tiles.iter().sum::<f64>() / tiles.len() as f64).sqrt();
+    let name = scene.name();
+    Ok(format!("| {name} | {seconds:.1} | {:.0} | {all:.2} | {worst:.2} |", seconds / one_sample))
+}
