@@ -2,6 +2,7 @@
 
 use crate::args::{InspectArgs, load_model};
 use noisefloor::{Audience, Descriptor, Evidence, Model, Scores, ToneMapping, TrainingRecord};
+use noisefloor_ptwne::scenes;
 use serde::Serialize;
 
 /// What there is to say of a model, without its numbers.
@@ -80,13 +81,12 @@ pub fn run(args: &InspectArgs) -> anyhow::Result<()> {
 }
 
 pub fn scenes() {
-    use noisefloor_ptwne::scenes::{list, stiff};
-    let show = |heading, scenes: &mut dyn Iterator<Item = noisefloor_ptwne::scenes::Entry>| {
+    let show = |heading, scenes: &mut dyn Iterator<Item = scenes::Entry>| {
         println!("{heading}");
         for scene in scenes {
             println!("  {:16} {}", scene.name, scene.description);
         }
     };
-    show("Scenes:", &mut list());
-    show("Stiff scenes, hard on a renderer:", &mut stiff());
+    show("Scenes to render:", &mut scenes::list());
+    show("Stiff scenes, each hard on a renderer:", &mut scenes::stiff());
 }
