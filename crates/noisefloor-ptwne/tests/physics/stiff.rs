@@ -10,17 +10,18 @@ const UP: [f32; 3] = [0.0, 1.0, 0.0];
 
 /// A black shell in surroundings of radiance 1, seen from within: any light came through a crack.
 fn leaks(positions: &[[f32; 3]], indices: &[[u32; 3]], eye: [f32; 3]) -> f64 {
-    let mut sum = 0.0;
-    for target in [[1.0, 0.01, 0.0], [-1.0, 0.0, 0.2], [0.0, 0.3, 1.0], [0.1, 0.0, -1.0]] {
-        let camera = look(eye, std::array::from_fn(|i| eye[i] + target[i]), UP, 100.0);
-        let shell = scene(camera, |b| {
-            let black = b.material(Material::diffuse([0.0; 3])).unwrap();
-            b.mesh(&Mesh { positions, indices, ..Mesh::default() }, black, None).unwrap();
-            b.environment(Environment::constant([1.0; 3])).unwrap();
-        });
-        sum += mean(shell, 128, 2, 8, 1, Options::default()).0 / 4.0;
-    }
-    sum
+    let towards = |target: [f32; 3]| look(eye, std::array::from_fn(|i| eye[i] + target[i]), UP, 100.0);
+    let targets = [[1.0, 0.01, 0.0], [-1.0, 0.0, 0.2], [0.0, 0.3, 1.0], [0.1, 0.0, -1.0]];
+    let shell = scene(towards(targets[0]), |b| {
+        let black = b.material(Material::diffuse([0.0; 3])).unwrap();
+        b.mesh(&Mesh { positions, indices, ..Mesh::default() }, black, None).unwrap();
+        b.environment(Environment::constant([1.0; 3])).unwrap();
+    });
+    let seen = |target| {
+        let shell = shell.clone().with_camera(towards(target)).unwrap();
+        mean(shell, 128, 2, 8, 1, Options::default()).0
+    };
+    targets.map(seen).iter().sum::<f64>() / 4.0
 }
 
 /// A drum of triangles between lids: needles, and small ones, around the origin and away from it.
