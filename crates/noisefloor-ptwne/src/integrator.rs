@@ -5,7 +5,7 @@ use crate::bsdf::{self, DELTA};
 use crate::material::{Kind, Paint};
 use crate::math::{self, Frame, Ray, Vec3, power_heuristic};
 use crate::sampler::Sampler;
-use crate::scene::{Needs, Scene, Surface};
+use crate::scene::{Holes, Needs, Scene, Surface};
 use std::f32::consts::FRAC_1_PI;
 
 /// What the integrator must know besides the scene.
@@ -160,9 +160,9 @@ impl<'a, const NEEDS: u8> Walk<'a, NEEDS> {
     fn closest(&mut self, ray: &Ray) -> Hit {
         if NEEDS & HOLES != 0 {
             self.seed = self.seed.wrapping_add(1);
-            self.scene.closest::<true>(ray, self.stack, self.seed)
+            self.scene.closest::<true>(ray, self.stack, Holes::Drawn(self.seed))
         } else {
-            self.scene.closest::<false>(ray, self.stack, 0)
+            self.scene.closest::<false>(ray, self.stack, Holes::Drawn(0))
         }
     }
 
@@ -170,9 +170,9 @@ impl<'a, const NEEDS: u8> Walk<'a, NEEDS> {
     fn blocked(&mut self, ray: &Ray, distance: f32) -> bool {
         if NEEDS & HOLES != 0 {
             self.seed = self.seed.wrapping_add(1);
-            self.scene.blocked::<true>(ray, distance, self.stack, self.seed)
+            self.scene.blocked::<true>(ray, distance, self.stack, Holes::Drawn(self.seed))
         } else {
-            self.scene.blocked::<false>(ray, distance, self.stack, 0)
+            self.scene.blocked::<false>(ray, distance, self.stack, Holes::Drawn(0))
         }
     }
 

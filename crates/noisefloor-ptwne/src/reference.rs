@@ -9,6 +9,8 @@
 //! of 1/([`RAYS`]·n²) in penumbrae. Of more than 32 lights, each ray of a pixel looks at every k-th, k = 2, 4, 8 or 16, in
 //! turn: all rays together look at each 16/k times.
 //!
+//! Of the rays that meet a surface with holes, a share passes that is right to one in [`RAYS`], or in [`RAYS`]·n² towards lights.
+//!
 //! Mirrors and both sides of glass are followed to [`MAX_SPECULAR`] segments, down to a weight of [`MIN_WEIGHT`]. Microfacets
 //! show n×n directions of the visible normals, one at deeper levels; what these meet and the points of the lights
 //! share by the balance heuristic (Veach 1997, §9.2.2). On diffuse surfaces that are seen so, n is at most 2.
@@ -19,7 +21,7 @@ use crate::light::Aim;
 use crate::material::Kind;
 use crate::math::{self, Frame, Ray, Vec3};
 use crate::rng::{Key, Rng};
-use crate::scene::{Scene, Sky, Surface};
+use crate::scene::{Holes, Scene, Sky, Surface};
 use noisefloor::Rgb;
 use rayon::prelude::*;
 use std::f32::consts::FRAC_1_PI;
@@ -50,7 +52,7 @@ pub(crate) fn render(scene: &Scene, width: usize, height: usize, key: Key) -> Ve
             for i in 0..RAYS {
                 let [dx, dy] = hammersley(i, RAYS);
                 tracer.shift = std::array::from_fn(|k| (shift(i)[k] + turn[k]).fract());
-                tracer.ray = u64::from(i);
+                tracer.ray = i;
                 // Rays that are neighbours in the pixel see different lights
                 tracer.turn = (i + i / 4) as usize % stride;
                 let ray = lens.ray(x as f32 + dx, y as f32 + dy);
@@ -80,7 +82,7 @@ struct Tracer<'a> {
     /// Where in each stratum its point lies.
     shift: [f32; 2],
     /// Which of the pixel's rays this is: decides about holes, alike in all pixels.
-    ray: u64,
+    ray: u32,
     /// Every how many lights the ray looks at, and the first.
     stride: usize,
     turn: usize,
@@ -92,7 +94,7 @@ impl Tracer<'_> {
     /// of directions it chose: light is then shared with the points of the lights.
     fn radiance(&mut self, ray: &Ray, depth: u32, weight: Vec3, sampled: Option<(f32, u32)>) -> Vec3 {
         let scene = self.scene;
-        let hit = scene.closest::<true>(ray, &mut self.stack, self.ray);
+        let hit = scene.closest::<true>(ray, &mut self.stack, Holes::Shared(self.ray));
         let points = (self.strata * self.strata) as f32;
         let share = |pdf: f32| sampled.map_or(1.0, |(p, n)| p * n as f32 / (p * n as f32 + pdf * points));
         if hit.is_miss() {
@@ -179,8 +181,8 @@ impl Tracer<'_> {
                 // A share that is not finite is one whose density is beyond f32
                 let counts = share.max_element() > 0.0 && share.is_finite();
                 let shadow = Ray { origin, dir };
-                let seed = self.ray * 256 + u64::from(i);
-                if counts && !scene.blocked::<true>(&shadow, distance * 0.9999, &mut self.stack, seed) {
+                let holes = Holes::Shared(self.ray * n * n + i);
+                if counts && !scene.blocked::<true>(&shadow, distance * 0.9999, &mut self.stack, holes) {
                     sum += share * scene.revealed(light, dir) * self.stride as f32;
                 }
             }
@@ -198,8 +200,8 @@ impl Tracer<'_> {
             let dir = frame.to_world(local);
             if dir.dot(surface.flat) > 0.0 {
                 let ray = Ray { origin: self.scene.leave(surface, dir), dir };
-                let seed = self.ray * 256 + u64::from(i);
-                if !self.scene.blocked::<true>(&ray, f32::INFINITY, &mut self.stack, seed) {
+                let holes = Holes::Shared(self.ray * n * n + i);
+                if !self.scene.blocked::<true>(&ray, f32::INFINITY, &mut self.stack, holes) {
                     let pdf = local.z.max(1e-6) * FRAC_1_PI;
                     sum += scattered(dir) * dome.radiance(dir) / (pdf * (n * n) as f32);
                 }

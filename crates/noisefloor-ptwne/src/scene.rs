@@ -72,6 +72,16 @@ impl Needs {
     }
 }
 
+/// How a ray decides whether it meets a surface with holes.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Holes {
+    /// By chance, from a seed of its own.
+    Drawn(u64),
+    /// As ray `i` of many that share the work: of each 2ᵏ that follow each other, each surface lets pass as many as it should,
+    /// to the nearest, and other ones than other surfaces do.
+    Shared(u32),
+}
+
 /// What surrounds a scene.
 #[derive(Clone, Debug)]
 pub(crate) enum Sky {
@@ -287,40 +297,44 @@ impl Scene {
         }
     }
 
-    /// The nearest surface along the ray; `seed` decides about holes.
+    /// The nearest surface along the ray.
     #[inline]
-    pub(crate) fn closest<const HOLES: bool>(&self, ray: &Ray, stack: &mut Stack, seed: u64) -> Hit {
+    pub(crate) fn closest<const HOLES: bool>(&self, ray: &Ray, stack: &mut Stack, holes: Holes) -> Hit {
         if HOLES {
-            self.accel.closest(ray, stack, |prim, uv| self.is_solid(prim, uv, seed))
+            self.accel.closest(ray, stack, |prim, uv| self.is_solid(prim, uv, holes))
         } else {
             self.accel.closest(ray, stack, |_, _| true)
         }
     }
 
-    /// Whether any surface lies on the ray before `t_max`; `seed` decides about holes.
+    /// Whether any surface lies on the ray before `t_max`.
     #[inline]
     pub(crate) fn blocked<const HOLES: bool>(
         &self,
         ray: &Ray,
         t_max: f32,
         stack: &mut Stack,
-        seed: u64,
+        holes: Holes,
     ) -> bool {
         if HOLES {
-            self.accel.blocked::<true>(ray, t_max, stack, |prim, uv| self.is_solid(prim, uv, seed))
+            self.accel.blocked::<true>(ray, t_max, stack, |prim, uv| self.is_solid(prim, uv, holes))
         } else {
             self.accel.blocked::<false>(ray, t_max, stack, |_, _| true)
         }
     }
 
-    fn is_solid(&self, prim: u32, uv: [f32; 2], seed: u64) -> bool {
+    fn is_solid(&self, prim: u32, uv: [f32; 2], holes: Holes) -> bool {
         let group = &self.groups[self.group_of[prim as usize] as usize];
         match &self.looks[group.material as usize].opacity {
             None => true,
             Some(opacity) => {
                 let [u, v] = self.texture_coordinates(group, prim, uv);
                 let c = opacity.eval(u, v);
-                rng::hash(seed, prim) < (c.x + c.y + c.z) * (1.0 / 3.0)
+                let number = match holes {
+                    Holes::Drawn(seed) => rng::hash(seed, prim),
+                    Holes::Shared(i) => sobol_burley::sample(i, 0, rng::mix(u64::from(prim) + 1) as u32),
+                };
+                number < (c.x + c.y + c.z) * (1.0 / 3.0)
             }
         }
     }
