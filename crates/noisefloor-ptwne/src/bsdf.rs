@@ -115,17 +115,23 @@ impl Ggx {
         (base / (1.0 + lo + li), base / (1.0 + lo), wo.dot(h).max(0.0))
     }
 
-    /// A direction of reflection from the distribution of visible normals (Dupuy, Benyoub 2023), and its weight
-    /// f·cos θᵢ / density = G₂/G₁ without the Fresnel term, and the half vector's cosine. Weight 0: nothing is reflected.
+    /// A normal from the distribution of those that `wo` sees (Dupuy, Benyoub 2023).
     #[inline]
-    pub(crate) fn sample(self, wo: Vec3, u: [f32; 2]) -> (Vec3, f32, f32) {
+    fn visible_normal(self, wo: Vec3, u: [f32; 2]) -> Vec3 {
         // Stretch, take a normal of the hemisphere as the sum of wo and a point of a spherical cap, and stretch back
         let stretched = Vec3::new(wo.x * self.alpha, wo.y * self.alpha, wo.z).normalize();
         let z = (1.0 - u[0]) * (1.0 + stretched.z) - stretched.z;
         let r = (1.0 - z * z).max(0.0).sqrt();
         let (sin, cos) = math::turn(u[1]);
         let c = Vec3::new(r * cos, r * sin, z) + stretched;
-        let h = Vec3::new(c.x * self.alpha, c.y * self.alpha, c.z.max(1e-7)).normalize();
+        Vec3::new(c.x * self.alpha, c.y * self.alpha, c.z.max(1e-7)).normalize()
+    }
+
+    /// A direction of reflection from the distribution of visible normals (Dupuy, Benyoub 2023), and its weight
+    /// f·cos θᵢ / density = G₂/G₁ without the Fresnel term, and the half vector's cosine. Weight 0: nothing is reflected.
+    #[inline]
+    pub(crate) fn sample(self, wo: Vec3, u: [f32; 2]) -> (Vec3, f32, f32) {
+        let h = self.visible_normal(wo, u);
         let cos_h = wo.dot(h);
         let wi = h * (2.0 * cos_h) - wo;
         if wi.z <= 0.0 || cos_h <= 0.0 {
@@ -152,7 +158,7 @@ pub(crate) enum Inside {
     /// All that does not get out comes back. By reciprocity that is 1 − T̄/η² of diffuse light, T̄ = 2∫T(μ)μ dμ: a white base
     /// loses nothing.
     Kept,
-    /// Facets reflect it once, as they do outside; what they mask is lost.
+    /// Facets let it in, reflect it and let it out once each, and what they mask is lost.
     Once,
 }
 
@@ -219,13 +225,18 @@ impl Coat {
 
 impl Row {
     fn new(ior: f32, alpha: f32, inside: Inside) -> Self {
-        let at: [f32; STEPS + 1] =
-            std::array::from_fn(|i| 1.0 - reflectance(ior, alpha, (i as f32 / STEPS as f32).powi(2)));
+        let at: [f32; STEPS + 1] = std::array::from_fn(|i| {
+            let cos = (i as f32 / STEPS as f32).powi(2);
+            match inside {
+                Inside::Kept => 1.0 - reflectance(ior, alpha, cos),
+                Inside::Once => once(ior, alpha, cos)[1],
+            }
+        });
         let inside = match inside {
             Inside::Kept => {
                 1.0 - mean(|s| f64::from(at[(s * STEPS as f64).round() as usize])) / f64::from(ior * ior)
             }
-            Inside::Once => mean(|s| f64::from(reflectance(1.0 / ior, alpha, (s * s) as f32))),
+            Inside::Once => mean(|s| f64::from(once(1.0 / ior, alpha, (s * s) as f32)[0])),
         };
         Self { at, inside: inside as f32 }
     }
@@ -242,23 +253,52 @@ fn mean(f: impl Fn(f64) -> f64) -> f64 {
     (0..=STEPS).map(|i| weight(i) * f(at(i)) * 4.0 * at(i).powi(3)).sum::<f64>() / (3.0 * STEPS as f64)
 }
 
-/// Share of the light from a direction that a boundary reflects by microfacets, once: the mean of F·G₂/G₁ over visible normals.
+/// Share of the light from a direction that a boundary reflects by microfacets: the mean of F·G₂/G₁ over visible normals.
 fn reflectance(eta: f32, alpha: f32, cos: f32) -> f32 {
     if alpha < crate::MIN_ROUGHNESS {
         return fresnel(cos, eta).0;
     }
+    let [reflected] = over_facets(alpha, cos, |ggx, wo, u| {
+        let (_, weight, cos_h) = ggx.sample(wo, u);
+        [weight * fresnel(cos_h, eta).0]
+    });
+    reflected
+}
+
+/// Shares of the light from a direction that a rough boundary reflects and lets through, once, with masking by [`Ggx::lambda`] of
+/// the new direction alone (Walter et al. 2007, §5): the means of F·G₁ and (1 − F)·G₁ over visible normals.
+fn once(eta: f32, alpha: f32, cos: f32) -> [f32; 2] {
+    over_facets(alpha, cos, |ggx, wo, u| {
+        let h = ggx.visible_normal(wo, u);
+        let cos_h = wo.dot(h);
+        let (reflectance, cos_t) = fresnel(cos_h.clamp(0.0, 1.0), eta);
+        let mirrored = h * (2.0 * cos_h) - wo;
+        let refracted = refract(-wo, h, cos_h, cos_t, eta);
+        let kept = |leaves: bool, w: Vec3| if leaves { 1.0 / (1.0 + ggx.lambda(w)) } else { 0.0 };
+        [
+            reflectance * kept(mirrored.z > 0.0, mirrored),
+            (1.0 - reflectance) * kept(refracted.z < 0.0, refracted),
+        ]
+    })
+}
+
+/// The mean of `f` over a grid of numbers by which facets are chosen.
+fn over_facets<const N: usize>(
+    alpha: f32,
+    cos: f32,
+    f: impl Fn(Ggx, Vec3, [f32; 2]) -> [f32; N],
+) -> [f32; N] {
     const SIDE: u32 = 24;
     let cos = cos.max(1e-3);
     let wo = Vec3::new((1.0 - cos * cos).sqrt(), 0.0, cos);
-    let ggx = Ggx { alpha };
     let point = |i: u32| (i as f32 + 0.5) / SIDE as f32;
-    let reflected: f64 = (0..SIDE * SIDE)
-        .map(|i| {
-            let (_, weight, cos_h) = ggx.sample(wo, [point(i % SIDE), point(i / SIDE)]);
-            f64::from(weight * fresnel(cos_h, eta).0)
-        })
-        .sum();
-    (reflected / f64::from(SIDE * SIDE)) as f32
+    let mut sums = [0.0; N];
+    for i in 0..SIDE * SIDE {
+        for (sum, value) in sums.iter_mut().zip(f(Ggx { alpha }, wo, [point(i % SIDE), point(i / SIDE)])) {
+            *sum += f64::from(value);
+        }
+    }
+    sums.map(|sum| (sum / f64::from(SIDE * SIDE)) as f32)
 }
 
 /// Microfacets, of metal or of a coat, and a diffuse base below a coat, seen from one direction.

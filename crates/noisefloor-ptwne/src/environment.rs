@@ -239,16 +239,41 @@ impl Map {
     #[inline]
     pub(crate) fn sample(&self, u: [f32; 2], more: f32) -> Option<(Vec3, f32)> {
         let (index, rest) = self.table.choose(u[0], more);
-        let chance = self.chance[index];
+        (self.chance[index] > 0.0).then(|| self.direction(index, [rest, u[1]]))
+    }
+
+    /// The direction at `at` in the unit square of a cell, and its density.
+    #[inline]
+    fn direction(&self, index: usize, at: [f32; 2]) -> (Vec3, f32) {
         let [columns, rows] = self.cells;
-        let x = ((index % columns) as f32 + rest) / columns as f32;
-        let y = ((index / columns) as f32 + u[1]) / rows as f32;
+        let x = ((index % columns) as f32 + at[0]) / columns as f32;
+        let y = ((index / columns) as f32 + at[1]) / rows as f32;
         let ((sin_u, cos_u), (sin_v, cos_v)) = (math::turn(x), math::turn(0.5 * y));
         let [a, b, c] = self.to_world;
         let local = Vec3::new(sin_u * sin_v, cos_v, -cos_u * sin_v);
         let dir = Vec3::new(a.dot(local), b.dot(local), c.dot(local));
-        let pdf = chance * self.per_cell() / sin_v.max(1e-6);
-        (chance > 0.0).then(|| (dir.normalize(), pdf))
+        (dir.normalize(), self.chance[index] * self.per_cell() / sin_v.max(1e-6))
+    }
+}
+
+impl Map {
+    /// `count` directions with their densities, spread evenly over the brightness, for quadrature: the middles of `count` equal
+    /// shares of it, in the order of the cells, moved on by `turn` of a share.
+    pub(crate) fn spread(&self, count: u32, turn: f32) -> Vec<(Vec3, f32)> {
+        let target = |k: u32| (f64::from(k) + f64::from(turn)) / f64::from(count);
+        let (mut found, mut below) = (Vec::with_capacity(count as usize), 0.0);
+        for (index, &chance) in self.chance.iter().enumerate() {
+            let chance = f64::from(chance);
+            while (found.len() as u32) < count && target(found.len() as u32) < below + chance {
+                let k = found.len() as u32;
+                let rest = ((target(k) - below) / chance).clamp(0.0, 1.0) as f32;
+                // In the other direction, the binary digits of k mirrored
+                let across = (k.reverse_bits() >> 8) as f32 / (1 << 24) as f32;
+                found.push(self.direction(index, [rest, across]));
+            }
+            below += chance;
+        }
+        found
     }
 }
 

@@ -114,6 +114,14 @@ pub(crate) struct Aim {
     pub(crate) uv: [f32; 2],
 }
 
+impl Aim {
+    /// A direction of the environment map.
+    #[inline]
+    pub(crate) fn far(dir: Vec3, pdf: f32) -> Self {
+        Self { dir, distance: f32::INFINITY, value: Vec3::ONE / pdf, pdf, uv: [0.0; 2] }
+    }
+}
+
 impl Light {
     fn new(place: Place, radiance: Vec3) -> Self {
         Self { place, radiance, two_sided: false, texture: NO, prim: NO, chance: 0.0 }
@@ -234,7 +242,7 @@ impl Light {
             }
             Place::Map => {
                 let (dir, pdf) = map?.sample(u, more)?;
-                Some(Aim { dir, distance: f32::INFINITY, value: Vec3::ONE / pdf, pdf, uv: u })
+                Some(Aim::far(dir, pdf))
             }
             Place::Point { position, axis, inner, outer } => {
                 let to = position - from;
@@ -308,6 +316,11 @@ impl Light {
             | Place::Point { position: at, .. } => *at += by,
             Place::Sun { .. } | Place::Map | Place::Distant { .. } => {}
         }
+    }
+
+    /// Whether it is the environment map.
+    pub(crate) fn is_map(&self) -> bool {
+        matches!(self.place, Place::Map)
     }
 
     /// Whether it is seen under a solid angle.

@@ -35,7 +35,7 @@ const MIN_WEIGHT: f32 = 2e-3;
 
 /// Renders the reference, row-major. `key` turns the points of all pixels by the same amount: another quadrature as good.
 pub(crate) fn render(scene: &Scene, width: usize, height: usize, key: Key) -> Vec<Rgb> {
-    let turn = Rng::new(key, 0, 0).two();
+    let turn = Rng::new(key, 0, 0).two().map(|u| (u * RAYS as f32) as u32);
     let lens = scene.lens(width, height);
     let strata = match scene.lights.all.len() {
         0..=4 => 4,
@@ -43,15 +43,17 @@ pub(crate) fn render(scene: &Scene, width: usize, height: usize, key: Key) -> Ve
         _ => 1,
     };
     let stride = (scene.lights.all.len() / 32).clamp(1, 16).next_power_of_two();
+    let first = (turn[0] as f32 + 0.5) / RAYS as f32;
+    let map = scene.map().map_or(vec![], |map| map.spread(RAYS * strata * strata, first));
     let mut pixels = vec![[0.0; 3]; width * height];
     pixels.par_chunks_mut(width).with_max_len(1).enumerate().for_each(|(y, row)| {
         let stack = scene.accel.stack();
-        let mut tracer = Tracer { scene, strata, shift: [0.0; 2], ray: 0, stride, turn: 0, stack };
+        let mut tracer = Tracer { scene, strata, shift: [0.0; 2], ray: 0, map: &map, stride, turn: 0, stack };
         for (x, pixel) in row.iter_mut().enumerate() {
             let mut sum = Vec3::ZERO;
             for i in 0..RAYS {
                 let [dx, dy] = hammersley(i, RAYS);
-                tracer.shift = std::array::from_fn(|k| (shift(i)[k] + turn[k]).fract());
+                tracer.shift = shift(i, turn);
                 tracer.ray = i;
                 // Rays that are neighbours in the pixel see different lights
                 tracer.turn = (i + i / 4) as usize % stride;
@@ -70,10 +72,11 @@ fn hammersley(i: u32, n: u32) -> [f32; 2] {
     [i as f32 / n as f32 + half, (i.reverse_bits() >> 8) as f32 / (1 << 24) as f32 + half]
 }
 
-/// Point `i` of the additive recurrence of the plastic number, well spread for any count, and unrelated to [`hammersley`].
-fn shift(i: u32) -> [f32; 2] {
-    let step = |a: f64| ((f64::from(i) + 0.5) * a).fract() as f32;
-    [step(0.754_877_666_246_693), step(0.569_840_290_998_053)]
+/// Where the points of ray `i` lie in their strata: a Hammersley set too, run through in another order than the rays' own, and
+/// turned. The rays of a pixel have all sixteen values in each direction, so that the points lie evenly whatever the turn.
+fn shift(i: u32, turn: [u32; 2]) -> [f32; 2] {
+    let order = [i * 5 + 3, (i * 11 + 7).reverse_bits() >> 28];
+    std::array::from_fn(|k| ((order[k] + turn[k]) % RAYS) as f32 / RAYS as f32 + 0.5 / RAYS as f32)
 }
 
 struct Tracer<'a> {
@@ -83,6 +86,8 @@ struct Tracer<'a> {
     shift: [f32; 2],
     /// Which of the pixel's rays this is: decides about holes, alike in all pixels.
     ray: u32,
+    /// Points of the environment map, for all rays of a pixel.
+    map: &'a [(Vec3, f32)],
     /// Every how many lights the ray looks at, and the first.
     stride: usize,
     turn: usize,
@@ -168,12 +173,15 @@ impl Tracer<'_> {
             // One point is all there is of a light without size
             let n = if light.has_size() { n } else { 1 };
             for i in 0..n * n {
-                let [u, v] = self.stratum(i, n);
-                let Some(Aim { dir, distance, value, pdf, .. }) =
+                let aim = if light.is_map() {
+                    // Of the points of all rays, every sixteenth is this one's; where fewer are looked at, every other
+                    let step = self.strata * self.strata / (n * n);
+                    self.map.get((i * step * RAYS + self.ray) as usize).map(|&(dir, pdf)| Aim::far(dir, pdf))
+                } else {
+                    let [u, v] = self.stratum(i, n);
                     scene.aim::<true>(light, origin, [u, v, 0.0])
-                else {
-                    continue;
                 };
+                let Some(Aim { dir, distance, value, pdf, .. }) = aim else { continue };
                 if dir.dot(surface.flat) <= 0.0 {
                     continue;
                 }

@@ -18,9 +18,9 @@ fn main() -> Result<(), Box<dyn Error>> {
     let [rounds, names @ ..] = args.as_slice() else { return Err("needs ROUNDS SCENE…".into()) };
     let rounds: usize = rounds.parse()?;
     println!(
-        "| scene | needs | M samples/s | + textures | + glossy | + specular | + sky | + holes | + all | background | idle lights |"
+        "| scene | needs | M samples/s | + textures | + glossy | + specular | + sky | + holes | + all | background | idle lights | bytes a surface |"
     );
-    println!("|---|---|---|---|---|---|---|---|---|---|---|");
+    println!("|---|---|---|---|---|---|---|---|---|---|---|---|");
     for name in names {
         let scene = match scenes::by_name(name) {
             Some(scene) => scene,
@@ -86,5 +86,6 @@ fn row(scene: &Arc<Scene>, rounds: usize) -> Result<String, Box<dyn Error>> {
     let counts = sources[0].1.counts();
     cells.push(format!("{:.0} %", 100.0 * counts.background as f64 / counts.samples as f64));
     cells.push(format!("{} of {}", scene.idle_lights(), scene.lights()));
+    cells.push(format!("{}", scene.geometry_bytes() / scene.surfaces().max(1)));
     Ok(format!("| {} |", cells.join(" | ")))
 }

@@ -47,3 +47,7 @@ fn title(path: &Path) -> String {
     let folder = path.parent().and_then(Path::file_name).filter(|_| stem.is_some_and(|s| s == "scene"));
     folder.or(stem).unwrap_or_default().to_string_lossy().into_owned()
 }
+
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -212,3 +212,24 @@ fn a_model_that_cannot_be_written_is_not_trained() {
     args.extend(["--out", text(&out)]);
     fail(&args, &["my.nfm"]);
 }
+
+/// Scene files that are absent, of no known kind, or wrong: said with file and line.
+#[test]
+fn scene_files() {
+    let case = Case::new();
+    let render = |name: &str, words: &[&str]| {
+        let (scene, out) = (case.path(name), case.path("out"));
+        fail(&["render", text(&scene), "--out", text(&out)], words);
+    };
+    std::fs::write(case.path("cut.xml"), "<scene version=\"3.0.0\">\n  <shape type=\"cube\">\n").unwrap();
+    std::fs::write(case.path("odd.xml"), "<scene version=\"3.0.0\">\n<shape type=\"teapot\"/>\n</scene>")
+        .unwrap();
+    std::fs::write(case.path("cut.glb"), "glTF").unwrap();
+    render("absent.xml", &["absent.xml"]);
+    render("a.exr", &["a.exr", ".gltf, .glb or .xml"]);
+    render("cut.xml", &["cut.xml", "line"]);
+    render("odd.xml", &["odd.xml"]);
+    render("cut.glb", &["cut.glb"]);
+    fail(&["render", "cornell-bx"], &["cornell-bx", "noisefloor scenes"]);
+    fail(&["render", "--clamp", "0", "--out", text(&case.path("out"))], &["clamp"]);
+}
