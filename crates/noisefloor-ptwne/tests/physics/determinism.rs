@@ -146,3 +146,28 @@ fn bad_options_and_tiles_are_errors() {
     let none = cornell(Options::default()).sample(&[Request { tile, first: 0, samples: 0 }]).unwrap();
     assert!(none[0].samples == 0 && none[0].mean.is_empty());
 }
+
+/// Tiles that see nothing but the sky trace no rays, and look the same: as parts of an image they do or do not.
+#[test]
+fn background_tiles_trace_no_rays() {
+    let scene = crate::kit::scene(crate::kit::look([0.0, 0.0, 9.0], [0.0; 3], [0.0, 1.0, 0.0], 40.0), |b| {
+        let grey = b.material(noisefloor_ptwne::Material::diffuse([0.5; 3])).unwrap();
+        b.sphere([0.0; 3], 0.5, grey, None).unwrap();
+        let sky = noisefloor_ptwne::Environment {
+            zenith: [0.1, 0.2, 0.9],
+            ..noisefloor_ptwne::Environment::constant([0.5; 3])
+        };
+        b.environment(sky).unwrap();
+    });
+    let mut source = Ptwne::new(scene, 96, 96, Options::default()).unwrap();
+    let whole = batch(&mut source, 0, 4);
+    assert_eq!(source.counts().background, 0);
+    let tiles = TileGrid::new(96, 96, 32).unwrap().tiles();
+    let requests: Vec<Request> = tiles.map(|tile| Request { tile, first: 0, samples: 4 }).collect();
+    for batch in source.sample(&requests).unwrap() {
+        let part: Vec<_> = batch.tile.rows(96).flat_map(|row| whole[row].to_vec()).collect();
+        assert_eq!(batch.mean, part);
+    }
+    // The ball is in the middle tile alone, give or take its box
+    assert_eq!(source.counts().background, 8 * 32 * 32 * 4);
+}
