@@ -10,7 +10,7 @@ pub enum Sampling {
     Independent,
     /// Owen-scrambled Sobol points (Burley 2020, "Practical Hash-based Owen Scrambling"), four dimensions at a time, each four
     /// shuffled and scrambled for each pixel anew. Less noise, but the halves of a pixel are no longer independent, and the
-    /// bundled model has not seen such noise: `docs/samplers.md` of the project says what follows.
+    /// bundled model has not seen such noise: `docs/benchmarks/renderer.md` of the project says what follows.
     Sobol,
 }
 
