@@ -3,13 +3,13 @@
 //!
 //! # How fine
 //! [`RAYS`] rays a pixel, through the points of a Hammersley set: one in each of 4×4 squares, and no two in one row or column
-//! of sixteen. Each ray that meets a surface looks at n×n points of every light, one a stratum, and at n×n directions of the
-//! sky (an image of it is a light, seen by its brightness): n = 4 up to 4 lights, 2 up to 16, else 1. The points of the rays of one pixel are shifted against each other, alike
-//! in all pixels: a pixel sees [`RAYS`]·n² points of each light, and as all pixels see the same, there is no noise, but steps
-//! of 1/([`RAYS`]·n²) in penumbrae. Of more than 32 lights, each ray of a pixel looks at every k-th, k = 2, 4, 8 or 16, in
-//! turn: all rays together look at each 16/k times.
-//!
-//! Of the rays that meet a surface with holes, a share passes that is right to one in [`RAYS`], or in [`RAYS`]·n² towards lights.
+//! of sixteen. Each ray that meets a surface looks at n×n points of every light, one a stratum: n = 4 up to 4 lights, 2 up to
+//! 16, else 1; and at 2n×2n directions of a smooth sky. An image of the sky is a light, of which all rays of a pixel look at
+//! points that stand for equal shares of its brightness. The points of the rays of one pixel are shifted against each other,
+//! alike in all pixels: a pixel sees [`RAYS`]·n² points of each light, and as all pixels see the same, there is no noise, but
+//! steps of 1/([`RAYS`]·n²) in penumbrae. Of more than 32 lights, each ray of a pixel looks at every k-th, k = 2, 4, 8 or 16,
+//! in turn: all rays together look at each 16/k times. Of the rays that meet a surface with holes, a share passes that is
+//! right to one in [`RAYS`], or in [`RAYS`]·n² towards lights.
 //!
 //! Mirrors and both sides of glass are followed to [`MAX_SPECULAR`] segments, down to a weight of [`MIN_WEIGHT`]. Microfacets
 //! show n×n directions of the visible normals, one at deeper levels; what these meet and the points of the lights
