@@ -3,7 +3,8 @@
 use anyhow::Context;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use noisefloor::{
-    Audience, DEFAULT_KEY, DEFAULT_THRESHOLD, DEFAULT_TILE, Model, Oracle, Params, Schedule, ToneMapping,
+    Audience, DEFAULT_KEY, DEFAULT_THRESHOLD, DEFAULT_TILE, Evidence, Model, Oracle, Params, Schedule,
+    ToneMapping,
 };
 use std::fs::File;
 use std::io::BufReader;
@@ -250,6 +251,9 @@ pub struct SearchArgs {
     /// σ of the noise mask, 0.3…1.5 pixels (for --corpus; a table has its own).
     #[arg(long, default_value_t = 1.0)]
     pub sigma: f32,
+    /// What pictures are held against (for --corpus; a table has its own).
+    #[arg(long, value_enum, default_value_t = EvidenceChoice::Halves)]
+    pub evidence: EvidenceChoice,
     /// Values of C to choose from [default: a grid].
     #[arg(long, value_delimiter = ',', value_name = "C,…")]
     pub c: Vec<f64>,
@@ -284,6 +288,26 @@ pub struct ToneArgs {
     /// sRGB: factor on radiance.
     #[arg(long, default_value_t = 1.0)]
     pub exposure: f32,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum EvidenceChoice {
+    /// The other half buffer: no reference is needed.
+    Halves,
+    /// A noise-free reference; of a corpus, the most converged picture stands in for it.
+    Reference,
+    /// Nothing but the picture itself. For comparison.
+    Alone,
+}
+
+impl From<EvidenceChoice> for Evidence {
+    fn from(choice: EvidenceChoice) -> Self {
+        match choice {
+            EvidenceChoice::Halves => Self::Halves,
+            EvidenceChoice::Reference => Self::Reference,
+            EvidenceChoice::Alone => Self::Alone,
+        }
+    }
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]

@@ -57,18 +57,21 @@ pub fn run(args: &EvaluateArgs) -> anyhow::Result<()> {
         check_writable(path)?;
     }
     let model = if args.leave_one_scene_out { None } else { Some(load_model(args.model.as_deref())?) };
-    // A model is scored by its own descriptor.
-    let trained_with = descriptor(&args.search)?;
-    let table = load_table(&args.data, model.as_ref().map_or(trained_with, |m| m.descriptor))?;
+    // A model is scored by its own descriptor and evidence.
+    let trained_with = (descriptor(&args.search)?, args.search.evidence.into());
+    let (descriptor, evidence) = model.as_ref().map_or(trained_with, |m| (m.descriptor, m.evidence));
+    let table = load_table(&args.data, descriptor, evidence)?;
     let (predicted_by, predictions) = match &model {
         None => ("leave-one-scene-out".to_owned(), held_out(&table, &params, args.threshold)?),
         Some(model) => {
-            if model.descriptor != table.descriptor {
+            if (model.descriptor, model.evidence) != (table.descriptor, table.evidence) {
                 bail!(
-                    "the model goes by the {} descriptor {:?}, the table by {:?}",
+                    "the model goes by the {} descriptor {:?} and {:?} as evidence, the table by {:?} and {:?}",
                     model.descriptor.name(),
                     model.descriptor,
-                    table.descriptor
+                    model.evidence,
+                    table.descriptor,
+                    table.evidence
                 );
             }
             (model.digest(), table.zones.iter().map(|z| predict(model, args.threshold, z)).collect())

@@ -50,6 +50,7 @@ pub fn run(args: &InspectArgs) -> anyhow::Result<()> {
         "evidence         {}",
         match model.evidence {
             Evidence::Halves => "the other half buffer",
+            Evidence::Alone => "none: the picture alone",
             Evidence::Reference => "a ray-traced reference",
         }
     );

@@ -53,7 +53,7 @@ pub fn run(args: &JudgeArgs) -> anyhow::Result<()> {
     let oracle = args.oracle.load()?;
     if oracle.model().evidence != Evidence::Halves {
         bail!(
-            "this model holds tiles against a ray-traced reference; `judge` needs one that holds them against other samples"
+            "this model does not hold tiles against other samples, as `judge` does: use one that was trained on half buffers"
         );
     }
     if args.spp.len() != 1 + args.against.len() {
@@ -214,15 +214,18 @@ fn judge(
         )
     };
     let tiles: Vec<Tile> = grid.tiles().collect();
-    let row = |&tile: &Tile| {
+    let describe = |&tile: &Tile| {
         let planes = TilePlanes::from_pair(image.size, tile, display, pair, samples).with_context(same)?;
-        let verdict = oracle.judge_planes(&planes, image.spp.round().max(1.0) as u64)?;
+        anyhow::Ok(oracle.describe(&planes, image.spp.max(1.0))?)
+    };
+    let described = tiles.par_iter().map(describe).collect::<Result<Vec<_>, _>>()?;
+    let row = |(tile, verdict): (Tile, Verdict)| {
         let Verdict { converged, probability, expected_samples } = verdict;
         let Tile { index, x, y, width, height } = tile;
         let (probability, expected_spp) = (probability.unwrap_or(0.0), expected_samples);
-        Ok(Row { tile: index, x, y, width, height, probability, converged, expected_spp })
+        Row { tile: index, x, y, width, height, probability, converged, expected_spp }
     };
-    tiles.par_iter().map(row).collect()
+    Ok(tiles.into_iter().zip(oracle.judge_described(&described)).map(row).collect())
 }
 
 fn report(args: &JudgeArgs, oracle: &Oracle, rows: &[Row]) -> anyhow::Result<()> {

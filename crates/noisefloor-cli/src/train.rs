@@ -5,7 +5,7 @@ use anyhow::{Context, bail};
 use indicatif::{ProgressBar, ProgressStyle};
 use noisefloor::evaluation::{Prediction, Table, score};
 use noisefloor::training::{TrainParams, leave_one_scene_out, train};
-use noisefloor::{Descriptor, NoiseMask, SvmParams};
+use noisefloor::{Descriptor, Evidence, NoiseMask, SvmParams};
 use noisefloor_exr::table::{describe_corpora, read_table, write_table};
 use noisefloor_exr::{check_writable, write_atomic};
 use std::fs::File;
@@ -16,7 +16,7 @@ pub fn run(args: &TrainArgs) -> anyhow::Result<()> {
     for path in args.save_table.iter().chain([&args.out]) {
         check_writable(path)?;
     }
-    let table = load_table(&args.data, descriptor(&args.search)?)?;
+    let table = load_table(&args.data, descriptor(&args.search)?, args.search.evidence.into())?;
     if let Some(path) = &args.save_table {
         write_atomic(path, |to| write_table(&table, to))?;
         eprintln!("table of {} zones written to {}", table.zones.len(), path.display());
@@ -80,13 +80,13 @@ fn bar(len: u64, what: &'static str) -> ProgressBar {
 }
 
 /// The table that was asked for: read, or computed from pictures.
-pub fn load_table(data: &DataArgs, descriptor: Descriptor) -> anyhow::Result<Table> {
+pub fn load_table(data: &DataArgs, descriptor: Descriptor, evidence: Evidence) -> anyhow::Result<Table> {
     if let Some(path) = &data.table {
         let file = File::open(path).with_context(|| format!("{}: cannot be opened", path.display()))?;
         return read_table(BufReader::new(file)).with_context(|| format!("{}", path.display()));
     }
     let bar = bar(0, "zones described");
-    let table = describe_corpora(&data.corpus, descriptor, |done, all| {
+    let table = describe_corpora(&data.corpus, descriptor, evidence, |done, all| {
         bar.set_length(all as u64);
         bar.set_position(done as u64);
     })?;

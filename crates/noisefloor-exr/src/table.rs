@@ -9,9 +9,10 @@ use crate::corpus::{Corpus, Encoding, Level as Image, Patch};
 use crate::error::CorpusError;
 use noisefloor::evaluation::{Level, Origin, Table, Zone, group_of_scene, noise_level};
 use noisefloor::{
-    Descriptor, Display, Evidence, Rgb, Samples, Tile, TilePlanes, ToneMapping, residual_scale,
+    Described, Descriptor, Display, Evidence, Rgb, Samples, Tile, TilePlanes, ToneMapping, residual_scale,
 };
 use rayon::prelude::*;
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 use thiserror::Error;
 
@@ -65,13 +66,17 @@ pub enum TableError {
     Csv(#[from] csv::Error),
 }
 
-/// Describes every zone of the corpora, by half-buffer evidence. `on_zone(done, all)` is told of progress.
+/// Describes every zone of the corpora, by the evidence given. `on_zone(done, all)` is told of progress. The zones of a scene
+/// are its picture.
+///
+/// [`Evidence::Reference`] holds pictures against the most converged one: a ray-traced reference is not part of a corpus.
 ///
 /// # Errors
 /// [`TableError`] if a corpus cannot be read, or a zone has too few images.
 pub fn describe_corpora(
     folders: &[PathBuf],
     descriptor: Descriptor,
+    evidence: Evidence,
     mut on_zone: impl FnMut(usize, usize),
 ) -> Result<Table, TableError> {
     let corpora: Vec<Corpus> = folders.iter().map(Corpus::open).collect::<Result<_, _>>()?;
@@ -82,23 +87,46 @@ pub fn describe_corpora(
             on_zone(zones.len(), all);
             let images: Vec<Image> = corpus.scene_levels(scene)?.collect::<Result<_, _>>()?;
             let of_scene: Vec<_> = corpus.zones().iter().filter(|z| z.scene == scene).collect();
+            let spp = synthesised_levels(&of_scene);
             let describe = |zone: &&crate::corpus::Zone| {
                 let images: Vec<&Image> = images.iter().filter(|i| i.zone == zone.zone).collect();
-                describe_zone(zone, &images, descriptor)
+                describe_zone(zone, &images, &spp, descriptor, evidence)
             };
-            zones.extend(of_scene.par_iter().map(describe).collect::<Result<Vec<_>, _>>()?);
+            let described = of_scene.par_iter().map(describe).collect::<Result<Vec<_>, _>>()?;
+            zones.extend(in_picture(described, descriptor));
         }
     }
     on_zone(all, all);
     let tone_mapping = ToneMapping::Srgb { exposure: 1.0 };
-    Ok(Table { descriptor, evidence: Evidence::Halves, tone_mapping, zones })
+    Ok(Table { descriptor, evidence, tone_mapping, zones })
 }
 
+/// The levels that are synthesised for each zone of a scene, in samples per pixel.
+fn synthesised_levels(zones: &[&crate::corpus::Zone]) -> Vec<f64> {
+    let least = |z: &&crate::corpus::Zone| (z.first_spp as f64).min(z.human_spp / REACH);
+    let most = |z: &&crate::corpus::Zone| (z.last_spp as f64).max(z.human_spp * REACH);
+    let low = zones.iter().map(least).fold(f64::INFINITY, f64::min);
+    let high = zones.iter().map(most).fold(0.0, f64::max);
+    let grid = GRID.map(|k| (10.0 * 2f64.powf(0.75 * f64::from(k))).round());
+    grid.filter(|n| (low..=high).contains(n)).collect()
+}
+
+/// A level before it is seen in its picture.
+struct Alone {
+    spp: f64,
+    origin: Origin,
+    noise: f32,
+    described: Described,
+}
+
+/// A zone, of which the levels are still to come, and these.
 fn describe_zone(
     zone: &crate::corpus::Zone,
     images: &[&Image],
+    synthesised: &[f64],
     descriptor: Descriptor,
-) -> Result<Zone, TableError> {
+    evidence: Evidence,
+) -> Result<(Zone, Vec<Alone>), TableError> {
     let (scene, number) = (zone.scene.clone(), zone.zone);
     let too_few = TableError::TooFew { scene: scene.clone(), zone: number, images: images.len() };
     let running = images.iter().all(|i| i.first == 0 && i.encoding == Encoding::Display);
@@ -106,26 +134,50 @@ fn describe_zone(
         if running { Material::from_running_means(images) } else { Material::from_batches(images) };
     let material = material.ok_or(too_few)?;
 
-    let (first_spp, last_spp) = (zone.first_spp as f64, zone.last_spp as f64);
-    let (low, high) = (first_spp.min(zone.human_spp / REACH), last_spp.max(zone.human_spp * REACH));
-    let grid =
-        GRID.map(|k| (10.0 * 2f64.powf(0.75 * f64::from(k))).round()).filter(|n| (low..=high).contains(n));
-    let synthesised =
-        grid.flat_map(|spp| [0, 1].map(|turn| (spp, Origin::Synthesised, material.synthesise(spp, turn))));
+    let synthesised = synthesised.iter().flat_map(|&spp| {
+        [0, 1].map(|turn| (spp, Origin::Synthesised, material.synthesise(spp, turn, evidence)))
+    });
     let mut levels = Vec::new();
-    for (spp, origin, planes) in material.real().into_iter().chain(synthesised) {
-        let mut numbers = Vec::with_capacity(descriptor.len());
-        descriptor.describe(&planes, &mut numbers).map_err(|source| TableError::Descriptor {
+    for (spp, origin, planes) in material.real(evidence).into_iter().chain(synthesised) {
+        let described = descriptor.describe(&planes, spp).map_err(|source| TableError::Descriptor {
             scene: scene.clone(),
             zone: number,
             source,
         })?;
-        levels.push(Level { spp, origin, noise: noise_level(&planes), descriptor: numbers });
+        levels.push(Alone { spp, origin, noise: noise_level(&planes), described });
     }
     levels.sort_by(|a, b| a.spp.total_cmp(&b.spp));
-    let group = group_of_scene(&scene).to_owned();
+    let (group, levels_to_come) = (group_of_scene(&scene).to_owned(), Vec::new());
     let (human_spp, censored) = (zone.human_spp, zone.censored);
-    Ok(Zone { scene, group, zone: number, human_spp, censored, first_spp, last_spp, levels })
+    let (first_spp, last_spp) = (zone.first_spp as f64, zone.last_spp as f64);
+    let zone =
+        Zone { scene, group, zone: number, human_spp, censored, first_spp, last_spp, levels: levels_to_come };
+    Ok((zone, levels))
+}
+
+/// Sees each level of each zone of one scene beside the same level of the other zones.
+fn in_picture(zones: Vec<(Zone, Vec<Alone>)>, descriptor: Descriptor) -> Vec<Zone> {
+    let (mut zones, levels): (Vec<Zone>, Vec<Vec<Alone>>) = zones.into_iter().unzip();
+    // Of equal samples, the first belongs to the first of other zones: realisations of the noise come in one order.
+    let mut pictures: BTreeMap<(u64, bool, usize), Vec<(usize, Alone)>> = BTreeMap::new();
+    for (zone, levels) in levels.into_iter().enumerate() {
+        let mut before: Option<(u64, bool, usize)> = None;
+        for level in levels {
+            let (spp, real) = (level.spp.to_bits(), level.origin == Origin::Real);
+            let turn = before.filter(|b| (b.0, b.1) == (spp, real)).map_or(0, |b| b.2 + 1);
+            before = Some((spp, real, turn));
+            pictures.entry((spp, real, turn)).or_default().push((zone, level));
+        }
+    }
+    // Positive numbers are sorted as their bits are.
+    for picture in pictures.into_values() {
+        let described: Vec<Described> = picture.iter().map(|(_, l)| l.described.clone()).collect();
+        for ((zone, level), numbers) in picture.into_iter().zip(descriptor.in_picture(&described)) {
+            let Alone { spp, origin, noise, .. } = level;
+            zones[zone].levels.push(Level { spp, origin, noise, descriptor: numbers });
+        }
+    }
+    zones
 }
 
 /// Display-encoded pixels of a zone with its apron.
@@ -152,6 +204,8 @@ struct Material {
     tile: Tile,
     converged: Pixels,
     converged_spp: f64,
+    /// Variance of the rounding of each picture.
+    rounding: f64,
     noise: [Noise; 2],
     real: Vec<Real>,
 }
@@ -213,7 +267,7 @@ impl Material {
         };
         let real = images.iter().filter_map(real).collect();
         let (size, tile) = Self::frame(&last.patch);
-        Some(Self { size, tile, converged, converged_spp, noise: [first, second], real })
+        Some(Self { size, tile, converged, converged_spp, rounding, noise: [first, second], real })
     }
 
     /// Means of separate batches, in linear light: real half buffers at every level.
@@ -256,7 +310,7 @@ impl Material {
         let (a, b) = early?;
         let noise = [noise(&a), noise(&b)];
         let (size, tile) = Self::frame(&last.patch);
-        Some(Self { size, tile, converged, converged_spp, noise, real })
+        Some(Self { size, tile, converged, converged_spp, rounding: 0.0, noise, real })
     }
 
     fn planes(&self, shown: &[Rgb], residual: &[Rgb], rounding: f64) -> TilePlanes {
@@ -265,19 +319,36 @@ impl Material {
         TilePlanes { rounding: rounding as f32, ..planes }
     }
 
-    fn real(&self) -> Vec<(f64, Origin, TilePlanes)> {
-        let planes = |r: &Real| (r.spp, Origin::Real, self.planes(&r.shown, &r.residual, r.rounding));
-        self.real.iter().map(planes).collect()
+    /// A picture held against the converged one as it is.
+    fn to_converged(&self, shown: &[Rgb], rounding: f64) -> TilePlanes {
+        self.planes(shown, &combine(shown, 1.0, &self.converged, -1.0), rounding)
     }
 
-    /// The level of `spp` samples: one realisation (0 or 1) is the noise in the picture, the other the residual. The converged
+    fn real(&self, evidence: Evidence) -> Vec<(f64, Origin, TilePlanes)> {
+        let planes = |r: &Real| match evidence {
+            Evidence::Halves => self.planes(&r.shown, &r.residual, r.rounding),
+            Evidence::Reference => self.to_converged(&r.shown, 2.0 * self.rounding),
+            Evidence::Alone => self.planes(&r.shown, &r.shown, self.rounding),
+        };
+        self.real.iter().map(|r| (r.spp, Origin::Real, planes(r))).collect()
+    }
+
+    /// The level of `spp` samples: one realisation (0 or 1) is the noise in the picture, the other that of half buffers. The converged
     /// picture has noise of its own, so that less is laid over it; beyond its samples none is.
-    fn synthesise(&self, spp: f64, realisation: usize) -> TilePlanes {
+    fn synthesise(&self, spp: f64, realisation: usize, evidence: Evidence) -> TilePlanes {
         let (in_picture, held_against) = (&self.noise[realisation], &self.noise[1 - realisation]);
         let missing = (1.0 / spp - 1.0 / self.converged_spp).max(0.0).sqrt();
         let strength = (1.0 / spp).sqrt();
         let shown = combine(&self.converged, 1.0, &in_picture.pixels, missing);
-        let residual = combine(&held_against.pixels, strength, &held_against.pixels, 0.0);
-        self.planes(&shown, &residual, held_against.rounding / spp)
+        let rounding = in_picture.rounding * missing * missing;
+        match evidence {
+            Evidence::Halves => {
+                let residual = combine(&held_against.pixels, strength, &held_against.pixels, 0.0);
+                self.planes(&shown, &residual, held_against.rounding / spp)
+            }
+            // The rounding of the converged picture is in both, and falls out of their difference.
+            Evidence::Reference => self.to_converged(&shown, rounding),
+            Evidence::Alone => self.planes(&shown, &shown, rounding + self.rounding),
+        }
     }
 }

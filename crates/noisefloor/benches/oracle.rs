@@ -27,17 +27,14 @@ fn verdict(c: &mut Criterion) {
     let tile = film.grid().tile(4);
     let mut oracle = Oracle::bundled();
     let planes = TilePlanes::from_halves(&film, &display, tile);
-    let mut numbers = Vec::new();
-    oracle.model().descriptor.describe(&planes, &mut numbers).expect("any tile");
+    let described = oracle.describe(&planes, 100.0).expect("any tile");
+    let numbers = oracle.model().descriptor.in_picture(&[described]).remove(0);
 
     let mut group = c.benchmark_group("tile of 128x128");
     group.bench_function("planes", |b| b.iter(|| TilePlanes::from_halves(black_box(&film), &display, tile)));
     group.bench_function("noise mask", |b| b.iter(|| NoiseMask::default().apply(black_box(&planes.image))));
     group.bench_function("descriptor", |b| {
-        b.iter(|| {
-            numbers.clear();
-            oracle.model().descriptor.describe(black_box(&planes), &mut numbers)
-        });
+        b.iter(|| oracle.describe(black_box(&planes), 100.0));
     });
     group.bench_function("query", |b| {
         let mut scratch = numbers.clone();

@@ -19,8 +19,10 @@ pub(crate) const ROUNDING_LUMINANCE: f32 = 0.2126 * 0.2126 + 0.7152 * 0.7152 + 0
 pub enum Evidence {
     /// The other half buffer: no reference is needed.
     Halves,
-    /// A quick ray-traced, noise-free reference (Takouachet et al. 2017, §4.3).
+    /// A noise-free reference: in the paper a quick ray-traced one (Takouachet et al. 2017, §4.3).
     Reference,
+    /// Nothing: all that the masks let through of the picture counts as noise. For comparison, and no good on texture.
+    Alone,
 }
 
 /// What is on the screen of a tile, and what of it is noise. All planes are display-encoded and have the same shape (rows,
@@ -33,8 +35,6 @@ pub struct TilePlanes {
     /// Residual of the luminance Y′: the picture minus what it is held against, scaled so that its standard deviation is that
     /// of the noise in the picture.
     pub residual: Array2<f32>,
-    /// Residual of the colour differences R′ − Y′ and B′ − Y′, scaled the same.
-    pub residual_colour: [Array2<f32>; 2],
     /// Variance of known white rounding noise in each of the residuals of R′, G′ and B′; 0 for pictures in floating point.
     pub rounding: f32,
     /// The tile itself within the planes: rows and columns of the planes that belong to it.
@@ -53,22 +53,19 @@ impl TilePlanes {
         let shape = (padded(tile.height), padded(tile.width));
         let columns: Vec<usize> = (0..shape.1).map(|place| mirror(tile.x + place, width)).collect();
         let plane = || Vec::with_capacity(shape.0 * shape.1);
-        let (mut image, mut residual, mut red, mut blue) = (plane(), plane(), plane(), plane());
+        let (mut image, mut residual) = (plane(), plane());
         for row in 0..shape.0 {
             let y = mirror(tile.y + row, height);
             for &x in &columns {
                 let (shown, noise) = pixel(x, y);
-                let luma = luminance(noise);
                 image.push(luminance(shown));
-                residual.push(luma);
-                red.push(noise[0] - luma);
-                blue.push(noise[2] - luma);
+                residual.push(luminance(noise));
             }
         }
-        let [image, residual, red, blue] = [image, residual, red, blue]
-            .map(|values| Array2::from_shape_vec(shape, values).expect("one value a pixel"));
+        let [image, residual] =
+            [image, residual].map(|values| Array2::from_shape_vec(shape, values).expect("one value a pixel"));
         let inner = Tile { x: APRON, y: APRON, ..tile };
-        Self { image, residual, residual_colour: [red, blue], rounding: 0.0, inner }
+        Self { image, residual, rounding: 0.0, inner }
     }
 
     /// Evidence from the film's two halves.
@@ -121,6 +118,16 @@ impl TilePlanes {
             let pixel = y * grid.width() + x;
             let shown = display.encode(Film::mean(film.pixel_halves(tile.owner(grid, x, y), pixel)));
             (shown, difference(shown, reference[pixel], 1.0))
+        })
+    }
+
+    /// No evidence but the picture itself: its residual is the picture.
+    pub fn from_picture(film: &Film, display: &Display, tile: Tile) -> Self {
+        let grid = film.grid();
+        Self::gather((grid.width(), grid.height()), tile, |x, y| {
+            let halves = film.pixel_halves(tile.owner(grid, x, y), y * grid.width() + x);
+            let shown = display.encode(Film::mean(halves));
+            (shown, shown)
         })
     }
 }
@@ -262,7 +269,6 @@ mod tests {
             close(last.image[(8, 12)], 98.0) && close(last.residual[(16, 8)], 38.0),
             "mirrored at 99 and 39"
         );
-        assert!(last.residual_colour.iter().all(|p| close(p[(8, 8)], 0.0)), "grey has no colour");
         // Images smaller than the apron are mirrored more than once.
         assert!((0..200).all(|place| mirror(place, 1) == 0 && mirror(place, 3) < 3));
     }

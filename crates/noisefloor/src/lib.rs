@@ -45,7 +45,7 @@ mod tile;
 pub mod training;
 
 pub use criterion::{CriterionError, FixedSamples, Needs, StoppingCriterion, Verdict, View};
-pub use descriptor::{Descriptor, DescriptorError};
+pub use descriptor::{Described, Descriptor, DescriptorError};
 pub use display::{
     DEFAULT_KEY, DELTA, Display, ToneMapping, ToneMappingError, luminance, srgb_decode, srgb_encode,
 };

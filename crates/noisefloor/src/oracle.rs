@@ -1,7 +1,7 @@
 //! The oracle: a trained model as a stopping criterion.
 
 use crate::criterion::{CriterionError, Needs, StoppingCriterion, Verdict, View};
-use crate::descriptor::DescriptorError;
+use crate::descriptor::{Described, DescriptorError};
 use crate::evidence::{Evidence, TilePlanes};
 use crate::model::Model;
 use crate::params::Audience;
@@ -25,6 +25,8 @@ pub struct ThresholdError(pub f32);
 pub struct Oracle {
     model: Model,
     threshold: f32,
+    /// What tiles of the picture were like when last described, for the picture's numbers; of tiles by index.
+    described: Vec<Option<Described>>,
 }
 
 impl Oracle {
@@ -34,7 +36,7 @@ impl Oracle {
     /// [`ThresholdError`] unless 0 < `threshold` < 1.
     pub fn new(model: Model, threshold: f32) -> Result<Self, ThresholdError> {
         if threshold > 0.0 && threshold < 1.0 {
-            Ok(Self { model, threshold })
+            Ok(Self { model, threshold, described: Vec::new() })
         } else {
             Err(ThresholdError(threshold))
         }
@@ -43,7 +45,7 @@ impl Oracle {
     /// The bundled model at P ≥ 0.9.
     #[cfg(feature = "bundled-model")]
     pub fn bundled() -> Self {
-        Self { model: Model::bundled(), threshold: DEFAULT_THRESHOLD }
+        Self { model: Model::bundled(), threshold: DEFAULT_THRESHOLD, described: Vec::new() }
     }
 
     /// The model.
@@ -56,19 +58,29 @@ impl Oracle {
         self.threshold
     }
 
-    /// Judges one tile by its planes, which have `samples` samples per pixel.
+    /// Describes one tile of a picture by its planes, which have `samples` samples per pixel, above 0. [`Oracle::judge_described`]
+    /// wants all tiles of the picture.
     ///
     /// # Errors
     /// [`CriterionError::TileSize`] if the model is for tiles of another size.
-    pub fn judge_planes(&self, planes: &TilePlanes, samples: u64) -> Result<Verdict, CriterionError> {
-        let mut raw = Vec::with_capacity(self.model.descriptor.len());
-        self.model.descriptor.describe(planes, &mut raw).map_err(|e| self.misfit(e))?;
-        let mut scaled = raw.clone();
+    pub fn describe(&self, planes: &TilePlanes, samples: f64) -> Result<Described, CriterionError> {
+        self.model.descriptor.describe(planes, samples).map_err(|e| self.misfit(e))
+    }
+
+    /// Judges the tiles that make up a picture, or as many as there are of it: people see a tile in its picture, and so does
+    /// the model. One verdict a tile.
+    pub fn judge_described(&self, tiles: &[Described]) -> Vec<Verdict> {
+        let numbers = self.model.descriptor.in_picture(tiles);
+        tiles.iter().zip(numbers).map(|(tile, raw)| self.verdict(&raw, tile.samples.round() as u64)).collect()
+    }
+
+    /// A verdict by a whole, raw descriptor.
+    fn verdict(&self, raw: &[f32], samples: u64) -> Verdict {
+        let mut scaled = raw.to_vec();
         let probability = self.model.probability(&mut scaled);
         let converged = probability >= self.threshold;
-        let expected_samples =
-            if converged { Some(samples) } else { self.expect(&raw, &mut scaled, samples) };
-        Ok(Verdict { converged, probability: Some(probability), expected_samples })
+        let expected_samples = if converged { Some(samples) } else { self.expect(raw, &mut scaled, samples) };
+        Verdict { converged, probability: Some(probability), expected_samples }
     }
 
     fn misfit(
@@ -111,6 +123,7 @@ impl StoppingCriterion for Oracle {
         match self.model.evidence {
             Evidence::Halves => Needs { halves: true, reference: false },
             Evidence::Reference => Needs { halves: false, reference: true },
+            Evidence::Alone => Needs::default(),
         }
     }
 
@@ -118,21 +131,47 @@ impl StoppingCriterion for Oracle {
         self.model.audience
     }
 
+    /// Tiles that are not named count for the picture as they were when last described: they are looked at again if their
+    /// samples have changed since.
     fn judge(&mut self, view: &View<'_>, tiles: &[Tile]) -> Result<Vec<Verdict>, CriterionError> {
-        let judge = |&tile: &Tile| {
-            if view.film.unsampled_pixels(tile.index) > tile.pixels() / NO_EVIDENCE {
-                return Ok(Verdict { converged: false, probability: Some(0.0), expected_samples: None });
+        let grid = view.film.grid();
+        self.described.resize(grid.len(), None);
+        let mut due = vec![false; grid.len()];
+        tiles.iter().for_each(|t| due[t.index] = true);
+        let this: &Self = self;
+        let describe = |tile: Tile| {
+            let samples = view.film.samples(tile.index) as f64;
+            let known = this.described[tile.index].as_ref().is_some_and(|d| d.samples == samples);
+            if known && !due[tile.index] {
+                return Ok(this.described[tile.index].clone());
             }
-            let planes = match self.model.evidence {
+            if view.film.unsampled_pixels(tile.index) > tile.pixels() / NO_EVIDENCE {
+                return Ok(None);
+            }
+            let planes = match this.model.evidence {
                 Evidence::Halves => TilePlanes::from_halves(view.film, view.display, tile),
                 Evidence::Reference => {
-                    let reference = view.reference.ok_or_else(|| CriterionError::NoReference(self.name()))?;
+                    let reference = view.reference.ok_or_else(|| CriterionError::NoReference(this.name()))?;
                     TilePlanes::from_reference(view.film, view.display, reference, tile)
                 }
+                Evidence::Alone => TilePlanes::from_picture(view.film, view.display, tile),
             };
-            self.judge_planes(&planes, view.film.samples(tile.index))
+            this.describe(&planes, samples).map(Some)
         };
-        tiles.par_iter().map(judge).collect()
+        let all: Vec<Tile> = grid.tiles().collect();
+        self.described = all.into_par_iter().map(describe).collect::<Result<_, _>>()?;
+
+        // Judge all that can be seen, and hand out what was asked for.
+        let seen: Vec<Described> = self.described.iter().flatten().cloned().collect();
+        let mut judged = self.model.descriptor.in_picture(&seen).into_iter();
+        let mut numbers: Vec<Option<Vec<f32>>> =
+            self.described.iter().map(|d| d.as_ref().and_then(|_| judged.next())).collect();
+        let asked: Vec<Option<Vec<f32>>> = tiles.iter().map(|t| numbers[t.index].take()).collect();
+        let judge = |(tile, raw): (&Tile, Option<Vec<f32>>)| match raw {
+            Some(raw) => self.verdict(&raw, view.film.samples(tile.index)),
+            None => Verdict { converged: false, probability: Some(0.0), expected_samples: None },
+        };
+        Ok(tiles.par_iter().zip(asked).map(judge).collect())
     }
 }
 

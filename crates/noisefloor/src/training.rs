@@ -24,7 +24,7 @@ pub struct TrainParams {
     pub range: f64,
     /// Spread of the observers of one zone: scale of the logistic distribution of their thresholds in ln(samples), above 0. The
     /// human data give means alone; the default is where thresholds predicted on left-out scenes are neither early nor late,
-    /// and amounts to a standard deviation of 0.42 in ln(contrast).
+    /// and amounts to a standard deviation of 0.29 in ln(contrast).
     pub spread: f64,
 }
 
@@ -32,8 +32,8 @@ impl Default for TrainParams {
     /// For the compact descriptor.
     fn default() -> Self {
         let candidates =
-            [0.3, 1.0, 3.0].iter().flat_map(|&c| [0.01, 0.03].map(|gamma| SvmParams { c, gamma })).collect();
-        Self { candidates, range: 8.0, spread: 0.46 }
+            [0.1, 0.3, 1.0].iter().flat_map(|&c| [0.003, 0.01].map(|gamma| SvmParams { c, gamma })).collect();
+        Self { candidates, range: 8.0, spread: 0.32 }
     }
 }
 

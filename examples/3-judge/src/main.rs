@@ -44,12 +44,16 @@ fn run() -> Result<(), Box<dyn Error>> {
 
     let oracle = Oracle::bundled();
     let grid = TileGrid::new(image.width, image.height, DEFAULT_TILE)?;
-    let mut converged = 0;
+    let mut described = Vec::new();
     for tile in grid.tiles() {
         // The two differ by the noise of both; of it, the evidence is the noise of the first.
         let planes = TilePlanes::from_pair(size, tile, &display, pair, Samples::Independent)
             .ok_or("no samples, no evidence")?;
-        let verdict = oracle.judge_planes(&planes, spp)?;
+        described.push(oracle.describe(&planes, spp as f64)?);
+    }
+    // A tile is judged in its picture, as people do.
+    let mut converged = 0;
+    for (tile, verdict) in grid.tiles().zip(oracle.judge_described(&described)) {
         let says = match verdict.expected_samples {
             _ if verdict.converged => "no noise seen".into(),
             Some(expected) => format!("noise seen; clean at about {expected} spp"),

@@ -3,7 +3,7 @@
 
 use noisefloor::evaluation::{Prediction, Table, constant_noise_baseline, score};
 use noisefloor::training::{TrainParams, leave_one_scene_out, train};
-use noisefloor::{DEFAULT_THRESHOLD, Descriptor, Model};
+use noisefloor::{DEFAULT_THRESHOLD, Descriptor, Evidence, Model};
 use noisefloor_exr::table::{describe_corpora, read_table};
 use noisefloor_exr::write_atomic;
 use std::error::Error;
@@ -42,7 +42,7 @@ fn run() -> Result<(), Box<dyn Error>> {
             }
             Err(error) => return Err(format!("{TABLE}: {error}").into()),
         },
-        folders => describe_corpora(folders, Descriptor::default(), |done, all| {
+        folders => describe_corpora(folders, Descriptor::default(), Evidence::Halves, |done, all| {
             eprintln!("{done} of {all} zones described");
         })?,
     };

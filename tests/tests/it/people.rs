@@ -1,5 +1,5 @@
 use noisefloor::{Oracle, Samples, Tile, TilePlanes, residual_scale};
-use noisefloor_exr::corpus::{Corpus, ZoneImages};
+use noisefloor_exr::corpus::{Corpus, Zone, ZoneImages};
 use noisefloor_exr::{DisplayImage, Picture, read_picture};
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -27,20 +27,24 @@ fn shown(folder: &Path, spp: u64) -> (DisplayImage, f64) {
     }
 }
 
-/// Whether a zone of a picture has converged, by the difference to another stage of the same rendering.
+/// How many zones of a picture have converged, by the difference to another stage of the same rendering.
 fn converged(
     oracle: &Oracle,
     (image, spp): &(DisplayImage, f64),
     (other, of): &(DisplayImage, f64),
-    zone: Tile,
-) -> bool {
+    zones: &[Tile],
+) -> usize {
     let scale = residual_scale(*spp, *of, Samples::Nested).unwrap();
-    let planes = TilePlanes::gather((image.width, image.height), zone, |x, y| {
-        let (a, b) = (image.pixels[y * image.width + x], other.pixels[y * image.width + x]);
-        (a, std::array::from_fn(|c| (a[c] - b[c]) * scale))
-    });
     let rounding = 2.0 * image.step * image.step / 12.0 * scale * scale;
-    oracle.judge_planes(&TilePlanes { rounding, ..planes }, *spp as u64).unwrap().converged
+    let describe = |&zone: &Tile| {
+        let planes = TilePlanes::gather((image.width, image.height), zone, |x, y| {
+            let (a, b) = (image.pixels[y * image.width + x], other.pixels[y * image.width + x]);
+            (a, std::array::from_fn(|c| (a[c] - b[c]) * scale))
+        });
+        oracle.describe(&TilePlanes { rounding, ..planes }, *spp).unwrap()
+    };
+    let described: Vec<_> = zones.iter().map(describe).collect();
+    oracle.judge_described(&described).iter().filter(|v| v.converged).count()
 }
 
 /// Of what production renderers made: most zones of the first pictures are noisy, most of the last ones are not.
@@ -60,12 +64,11 @@ fn early_pictures_are_noisy_and_last_ones_are_not() {
         // The last picture is held against the early one with most samples: the first has too few to say much
         let most_early = *spp.iter().rfind(|&&n| 2 * n <= spp[spp.len() - 1]).unwrap();
         let [first, middle, last] = [spp[0], most_early, spp[spp.len() - 1]].map(|n| shown(folder, n));
-        for z in of_scene() {
-            let zone = Tile { index: 0, x: z.x, y: z.y, width: z.width, height: z.height };
-            zones += 1;
-            early += usize::from(converged(&oracle, &first, &last, zone));
-            late += usize::from(converged(&oracle, &last, &middle, zone));
-        }
+        let tile = |z: &Zone| Tile { index: 0, x: z.x, y: z.y, width: z.width, height: z.height };
+        let tiles: Vec<Tile> = of_scene().map(tile).collect();
+        zones += tiles.len();
+        early += converged(&oracle, &first, &last, &tiles);
+        late += converged(&oracle, &last, &middle, &tiles);
     }
     assert_eq!(zones, 112);
     assert!(early * 2 < zones, "{early} of {zones} zones have converged in the first pictures");

@@ -12,8 +12,8 @@ use thiserror::Error;
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Descriptor {
-    /// Three numbers, whatever the tile size: how visible the noise is where it is most visible, and how much texture hides
-    /// it. The default.
+    /// Six numbers, whatever the tile size: how visible the noise is where it is most visible, how much texture hides it, and
+    /// the same of the whole picture. The default.
     Compact {
         /// The noise mask.
         mask: NoiseMask,
@@ -49,6 +49,17 @@ pub enum DescriptorError {
     },
 }
 
+/// A tile's own numbers, and what it takes to see them beside those of the rest of its picture.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Described {
+    /// What [`Descriptor::describe`] found.
+    pub own: Vec<f32>,
+    /// Samples per pixel of the tile, above 0.
+    pub samples: f64,
+    /// Pixels of the tile: its weight in the picture.
+    pub area: f64,
+}
+
 impl Descriptor {
     /// A short name.
     pub fn name(&self) -> &'static str {
@@ -60,10 +71,13 @@ impl Descriptor {
 
     /// Version of the formulas: models trained with another one are refused.
     pub fn version(&self) -> u16 {
-        1
+        match self {
+            Self::Compact { .. } => 2,
+            Self::MaskPair { .. } => 1,
+        }
     }
 
-    /// Number of numbers.
+    /// Number of numbers, the picture's included.
     #[expect(clippy::len_without_is_empty, reason = "a descriptor is never empty")]
     pub fn len(&self) -> usize {
         match self {
@@ -80,22 +94,30 @@ impl Descriptor {
         }
     }
 
-    /// Appends the numbers of a tile to `out`.
+    /// Describes a tile, which has `samples` samples per pixel, by itself.
     ///
     /// # Errors
     /// [`DescriptorError`] if the tile has a size the descriptor is not for.
-    pub fn describe(&self, planes: &TilePlanes, out: &mut Vec<f32>) -> Result<(), DescriptorError> {
-        match *self {
-            Self::Compact { mask } => compact::describe(planes, mask, out),
+    pub fn describe(&self, planes: &TilePlanes, samples: f64) -> Result<Described, DescriptorError> {
+        let own = match *self {
+            Self::Compact { mask } => compact::describe(planes, mask).to_vec(),
             Self::MaskPair { mask, edge } => {
                 let (width, height) = (planes.inner.width, planes.inner.height);
                 if (width, height) != (edge, edge) {
                     return Err(DescriptorError::TileSize { expected: edge, width, height });
                 }
-                mask_pair::describe(planes, mask, out);
+                mask_pair::describe(planes, mask)
             }
+        };
+        Ok(Described { own, samples, area: planes.inner.pixels() as f64 })
+    }
+
+    /// The whole descriptor of each of the tiles that make up a picture, or what is there of it.
+    pub fn in_picture(&self, tiles: &[Described]) -> Vec<Vec<f32>> {
+        match self {
+            Self::Compact { .. } => compact::in_picture(tiles),
+            Self::MaskPair { .. } => tiles.iter().map(|t| t.own.clone()).collect(),
         }
-        Ok(())
     }
 
     /// Changes a raw descriptor into what it would be with `factor` times the samples, if noise alone changes, as 1/√n. False if
