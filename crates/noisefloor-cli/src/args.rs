@@ -199,7 +199,9 @@ pub struct TrainArgs {
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   noisefloor evaluate --table fixtures/human-table.csv --leave-one-scene-out
-  noisefloor evaluate --corpus study/mine --model my.nfm --json scores.json --csv zones.csv")]
+  noisefloor evaluate --corpus study/mine --model my.nfm --json scores.json --csv zones.csv
+  noisefloor evaluate --corpus study/mine --leave-one-scene-out --figures out/scores
+  noisefloor evaluate --table fixtures/human-table.csv --leave-one-scene-out --without picture_noise")]
 pub struct EvaluateArgs {
     #[command(flatten)]
     pub data: DataArgs,
@@ -218,6 +220,13 @@ pub struct EvaluateArgs {
     /// Write each zone's thresholds as CSV: scene,zone,human_spp,predicted_spp,censored.
     #[arg(long, value_name = "FILE")]
     pub csv: Option<PathBuf>,
+    /// Draw into this folder: both thresholds of each zone (over the pictures, with --corpus), one against the other, and the
+    /// reliability of P.
+    #[arg(long, value_name = "DIR")]
+    pub figures: Option<PathBuf>,
+    /// Leave numbers out of the descriptor, by their names in the table, to see what they are worth.
+    #[arg(long, value_name = "NAME,…", value_delimiter = ',', requires = "leave_one_scene_out")]
+    pub without: Vec<String>,
     #[command(flatten)]
     pub search: SearchArgs,
 }

@@ -1,13 +1,16 @@
 //! `noisefloor evaluate`.
 
 use crate::args::{EvaluateArgs, load_model};
+use crate::figures;
 use crate::output::{write_csv, write_json};
 use crate::train::{descriptor, held_out, load_table, search};
-use anyhow::bail;
+use anyhow::{anyhow, bail};
 use noisefloor::Model;
 use noisefloor::evaluation::{
-    Prediction, Scores, Table, constant_noise_baseline, image_accuracy, predict, scene_median_baseline, score,
+    Prediction, ReliabilityBin, Scores, Table, calibration_error, constant_noise_baseline, image_accuracy,
+    predict, reliability, scene_median_baseline, score,
 };
+use noisefloor::training::observers_agreeing;
 use noisefloor_exr::check_writable;
 use serde::Serialize;
 
@@ -42,6 +45,11 @@ struct Report {
     summary: Summary,
     baselines: Baselines,
     scenes: Vec<SceneSummary>,
+    /// P against the share of observers who see no difference, as `training::observers_agreeing` has it.
+    reliability: Vec<ReliabilityBin>,
+    calibration_error: f64,
+    /// P against the recorded mean threshold as a step from 0 to 1, which P does not stand for.
+    calibration_error_of_step: f64,
     /// Zones whose human threshold is only a lower bound: not in the factors.
     censored_zones: usize,
     levels_real: usize,
@@ -60,7 +68,9 @@ pub fn run(args: &EvaluateArgs) -> anyhow::Result<()> {
     // A model is scored by its own descriptor and evidence.
     let trained_with = (descriptor(&args.search)?, args.search.evidence.into());
     let (descriptor, evidence) = model.as_ref().map_or(trained_with, |m| (m.descriptor, m.evidence));
-    let table = load_table(&args.data, descriptor, evidence)?;
+    let table = load_table(&args.data, descriptor, evidence)?.without(&args.without).map_err(|name| {
+        anyhow!("--without {name}: the numbers of the table are {}", descriptor.number_names().join(", "))
+    })?;
     let (predicted_by, predictions) = match &model {
         None => ("leave-one-scene-out".to_owned(), held_out(&table, &params, args.threshold)?),
         Some(model) => {
@@ -77,12 +87,15 @@ pub fn run(args: &EvaluateArgs) -> anyhow::Result<()> {
             (model.digest(), table.zones.iter().map(|z| predict(model, args.threshold, z)).collect())
         }
     };
-    let report = Report::new(predicted_by, &table, &predictions);
+    let report = Report::new(predicted_by, &table, &predictions, params.spread);
     if let Some(path) = &args.json {
         write_json(path, &report)?;
     }
     if let Some(path) = &args.csv {
         write_csv(path, predictions.iter())?;
+    }
+    if let Some(dir) = &args.figures {
+        figures::write(dir, &args.data.corpus, &predictions, &report.reliability)?;
     }
     report.print();
 
@@ -108,7 +121,7 @@ impl Summary {
 }
 
 impl Report {
-    fn new(predicted_by: String, table: &Table, predictions: &[Prediction]) -> Self {
+    fn new(predicted_by: String, table: &Table, predictions: &[Prediction], spread: f64) -> Self {
         let (constant, median) = (constant_noise_baseline(table), scene_median_baseline(table));
         let summarise = |of: &[Prediction], keep: &dyn Fn(&Prediction) -> bool| {
             Summary::of(&of.iter().filter(|p| keep(p)).collect::<Vec<_>>())
@@ -127,8 +140,14 @@ impl Report {
         };
         let levels = || table.zones.iter().flat_map(|z| &z.levels);
         let real = levels().filter(|l| l.origin == noisefloor::evaluation::Origin::Real).count();
+        let agreeing = |spp: f64, human: f64| observers_agreeing(spp, human, spread);
+        let step = |spp: f64, human: f64| f64::from(u8::from(spp >= human));
+        let curve = reliability(predictions.iter(), agreeing);
         Self {
             predicted_by,
+            calibration_error: calibration_error(&curve),
+            calibration_error_of_step: calibration_error(&reliability(predictions.iter(), step)),
+            reliability: curve,
             summary: summarise(predictions, &|_| true),
             baselines: baselines(&|_| true),
             scenes: table.scenes().into_iter().map(scene).collect(),
@@ -162,6 +181,11 @@ impl Report {
             line(&scene.scene, &scene.summary, &scene.baselines);
         }
         line("all", &self.summary, &self.baselines);
+        println!(
+            "calibration error of P: {:.3} against the share of observers (assumed: logistic around the recorded threshold), {:.3} against \
+             the recorded threshold as a step",
+            self.calibration_error, self.calibration_error_of_step
+        );
         println!(
             "error = exp(mean |ln(predicted/human)|); bias = exp(mean ln(predicted/human)); early = stopped below half the human threshold.\n\
              Thresholds are looked for on {} real and {} synthesised levels; \"images right\" counts real pictures alone. {} censored zones \

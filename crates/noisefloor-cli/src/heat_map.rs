@@ -167,7 +167,8 @@ fn draw_legend(canvas: &mut Canvas, width: usize, height: usize, scale: &Scale) 
             canvas.set(x, y, INK);
         }
         let value = scale.value_at(place);
-        let text = if scale.high <= 1.0 { format!("{value:.2}") } else { format!("{value:.0}") };
+        let digits = if scale.high <= 10.0 { 2 } else { 0 };
+        let text = format!("{value:.digits$}");
         canvas.text(&text, (left + 27, y), &FONT_7X13, INK, Alignment::Left);
     }
 }

@@ -4,6 +4,7 @@
 
 mod args;
 mod evaluate;
+mod figures;
 mod heat_map;
 mod inspect;
 mod judge;

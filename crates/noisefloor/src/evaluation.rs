@@ -100,6 +100,23 @@ impl Zone {
 }
 
 impl Table {
+    /// Takes away numbers of the descriptor, named as in its columns: to see what each is worth. A machine that is trained on what
+    /// is left can be scored, but is not a model.
+    ///
+    /// # Errors
+    /// The name that is not a column.
+    pub fn without(mut self, names: &[String]) -> Result<Self, String> {
+        let mut columns = self.descriptor.number_names();
+        for name in names {
+            let at = columns.iter().position(|c| c == name).ok_or_else(|| name.clone())?;
+            columns.remove(at);
+            self.zones.iter_mut().flat_map(|z| &mut z.levels).for_each(|l| {
+                l.descriptor.remove(at);
+            });
+        }
+        Ok(self)
+    }
+
     /// BLAKE3 of the table's numbers, hexadecimal: names the table in a model's record.
     pub fn digest(&self) -> String {
         let mut hash = blake3::Hasher::new();
@@ -192,6 +209,9 @@ pub struct Prediction {
     /// Real pictures of the zone.
     #[serde(skip)]
     pub images: usize,
+    /// Samples per pixel of each level and the probability there, where the predictor has one.
+    #[serde(skip)]
+    pub probabilities: Vec<(f64, f32)>,
 }
 
 impl Prediction {
@@ -207,6 +227,7 @@ impl Prediction {
             predicted_spp: spp.clamp(zone.first_spp, zone.last_spp),
             images_right: right.count(),
             images: real().count(),
+            probabilities: Vec::new(),
         }
     }
 
@@ -225,7 +246,8 @@ pub fn predict(model: &Model, threshold: f32, zone: &Zone) -> Prediction {
     let p = probabilities(model, zone);
     let odds = zone.path(|i| log_odds(f64::from(p[i])));
     let spp = crossing(&odds, log_odds(f64::from(threshold))).unwrap_or(zone.last_spp);
-    Prediction::new(zone, spp, |i| p[i] >= threshold)
+    let probabilities = zone.levels.iter().map(|l| l.spp).zip(p.iter().copied()).collect();
+    Prediction { probabilities, ..Prediction::new(zone, spp, |i| p[i] >= threshold) }
 }
 
 /// Scores predictions. Censored thresholds stay out.
@@ -239,6 +261,50 @@ pub fn score<'a>(predictions: impl Iterator<Item = &'a Prediction> + Clone) -> S
         bias_factor: mean(|r| r).exp(),
         early_share: mean(|r| if r < -std::f64::consts::LN_2 { 1.0 } else { 0.0 }),
     }
+}
+
+/// Levels within this factor of the human threshold say how well probabilities are calibrated: further ones are easy, and would
+/// flatter.
+const CALIBRATION_RANGE: f64 = 8.0;
+
+/// Levels whose probabilities lie in one tenth of the scale.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ReliabilityBin {
+    /// Mean of the predicted probabilities.
+    pub predicted: f64,
+    /// Mean of what was observed.
+    pub observed: f64,
+    /// Levels.
+    pub levels: usize,
+}
+
+/// The reliability curve, in ten bins of equal width, of which empty ones are left out. `observed(spp, human_spp)` is the
+/// probability that was observed, or 0 or 1. Levels further than eightfold from the threshold, and censored zones, stay out.
+pub fn reliability<'a>(
+    predictions: impl Iterator<Item = &'a Prediction>,
+    observed: impl Fn(f64, f64) -> f64,
+) -> Vec<ReliabilityBin> {
+    let mut bins = [(0.0, 0.0, 0usize); 10];
+    for p in predictions.filter(|p| !p.censored) {
+        for &(spp, probability) in &p.probabilities {
+            if (spp / p.human_spp).ln().abs() <= CALIBRATION_RANGE.ln() {
+                let bin = &mut bins[((probability * 10.0) as usize).min(9)];
+                *bin = (bin.0 + f64::from(probability), bin.1 + observed(spp, p.human_spp), bin.2 + 1);
+            }
+        }
+    }
+    let mean = |(predicted, observed, levels): (f64, f64, usize)| ReliabilityBin {
+        predicted: predicted / levels as f64,
+        observed: observed / levels as f64,
+        levels,
+    };
+    bins.into_iter().filter(|b| b.2 > 0).map(mean).collect()
+}
+
+/// Expected calibration error: the mean distance of a reliability curve from the diagonal, by levels.
+pub fn calibration_error(bins: &[ReliabilityBin]) -> f64 {
+    let levels: usize = bins.iter().map(|b| b.levels).sum();
+    bins.iter().map(|b| (b.predicted - b.observed).abs() * b.levels as f64).sum::<f64>() / levels as f64
 }
 
 /// Share of real pictures that are classified as people did; `None` without any.
@@ -355,6 +421,41 @@ mod tests {
         let scores = score(constant_noise_baseline(&table).iter());
         assert!((scores.error_factor - 1.0).abs() < 1e-3, "{scores:?}");
         assert_eq!(scene_median_baseline(&table), vec![]);
+    }
+
+    /// Probabilities of 0.25 and 0.75 that come true in a quarter and in half of the cases.
+    #[test]
+    fn calibration_is_the_distance_from_the_diagonal() {
+        let levels = |p: f32, n: usize| (0..n).map(move |_| (100.0, p));
+        let mut prediction = Prediction::by_threshold(&zone("A", 0, 100.0, 1.0), 100.0);
+        prediction.probabilities = levels(0.25, 40).chain(levels(0.75, 20)).collect();
+        // Ninefold away: stays out.
+        prediction.probabilities.push((900.0, 0.5));
+        let turn = std::cell::Cell::new(0);
+        let observed = |_, _| {
+            turn.set(turn.get() + 1);
+            let every = if turn.get() <= 40 { 4 } else { 2 };
+            if turn.get() % every == 0 { 1.0 } else { 0.0 }
+        };
+        let bins = reliability([&prediction].into_iter(), observed);
+        assert_eq!(bins.len(), 2);
+        assert_eq!((bins[0].observed, bins[1].observed, bins[1].levels), (0.25, 0.5, 20));
+        assert!((calibration_error(&bins) - 0.25 / 3.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn columns_are_taken_away_by_name() {
+        let mut zone = zone("A", 0, 100.0, 1.0);
+        zone.levels.iter_mut().for_each(|l| l.descriptor = vec![0.0, 1.0, 2.0, 3.0, 4.0, 5.0]);
+        let table = Table {
+            descriptor: Descriptor::default(),
+            evidence: Evidence::Halves,
+            tone_mapping: ToneMapping::Srgb { exposure: 1.0 },
+            zones: vec![zone],
+        };
+        let less = table.clone().without(&["picture_noise".into(), "textured_area".into()]).unwrap();
+        assert!(less.zones[0].levels.iter().all(|l| l.descriptor == [0.0, 2.0, 4.0, 5.0]));
+        assert_eq!(table.without(&["colour".into()]), Err("colour".into()));
     }
 
     #[test]
