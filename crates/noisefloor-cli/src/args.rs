@@ -36,9 +36,9 @@ pub enum Command {
 
 /// Render a scene, and stop each tile when nobody sees noise in it any more.
 ///
-/// Writes into the output folder: image.exr (linear radiance, with samples, probability and stop as channels), image.png,
-/// stops.csv (a line a tile), stops.png (heat map over the picture), timeline.csv and report.json. Files appear whole or not at all
-/// and are refreshed while rendering (--autosave). Ctrl-C stops all tiles and writes what is there (exit code 130).
+/// Writes into the output folder: image.exr (linear radiance, with samples, probability, stop and visible noise as channels),
+/// image.png, stops.csv (a line a tile), stops.png (heat map over the picture), noise.png (where noise is still seen, and how
+/// strongly), timeline.csv and report.json. Files appear whole or not at all and are refreshed while rendering (--autosave). Ctrl-C stops all tiles and writes what is there (exit code 130).
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   noisefloor render                                  the Cornell box, into out/cornell-box
@@ -133,6 +133,7 @@ pub struct RenderArgs {
 #[command(after_help = "Examples:
   noisefloor judge a.exr --spp 256 --against b.exr --spp 256       two independent renderings
   noisefloor judge 00100.png --spp 100 --against 00900.png --spp 900 --nested --heat-map verdict.png
+  noisefloor judge a.exr --spp 64 --against b.exr --spp 64 --noise-map noise.png
   noisefloor judge a.exr --spp 64 --against b.exr --spp 64 --json > verdicts.json")]
 pub struct JudgeArgs {
     /// Picture to judge, PNG or EXR.
@@ -163,6 +164,12 @@ pub struct JudgeArgs {
     /// Write the probabilities as a heat map over the picture.
     #[arg(long, value_name = "FILE.png")]
     pub heat_map: Option<PathBuf>,
+    /// Write a map of the visible noise, block by block of 8x8 pixels, over the picture.
+    #[arg(long, value_name = "FILE.png")]
+    pub noise_map: Option<PathBuf>,
+    /// Write the picture as linear EXR, with probability and visible noise (in 8-bit steps) as channels.
+    #[arg(long, value_name = "FILE.exr")]
+    pub exr: Option<PathBuf>,
 }
 
 /// Train a model on human thresholds.

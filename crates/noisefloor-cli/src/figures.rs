@@ -62,6 +62,7 @@ pub fn write(
             high: WIDEST_RATIO,
             log: true,
             colours: colorous::PURPLE_ORANGE,
+            landmark: None,
         };
         let map = heat_map::draw(picture.width, &picture.pixels, &marks, &scale);
         write_png(dir.join(format!("zones-{scene}.png")), map.width, map.height, &map.bytes)?;

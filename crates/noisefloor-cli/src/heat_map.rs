@@ -1,5 +1,6 @@
-//! A number a tile, drawn over the picture, with a legend.
+//! A number a tile, or one a pixel, drawn over the picture, with a legend.
 
+use colorous::INFERNO;
 use embedded_graphics::mono_font::iso_8859_1::{FONT_6X10, FONT_7X13, FONT_7X13_BOLD};
 use embedded_graphics::mono_font::{MonoFont, MonoTextStyle};
 use embedded_graphics::pixelcolor::Rgb888;
@@ -24,6 +25,8 @@ pub struct Scale {
     /// Logarithmic; `low` must then be positive.
     pub log: bool,
     pub colours: colorous::Gradient,
+    /// A value to be marked in the legend, and its name.
+    pub landmark: Option<(f64, &'static str)>,
 }
 
 impl Scale {
@@ -44,6 +47,12 @@ impl Scale {
     fn colour(&self, value: f64) -> [u8; 3] {
         self.colours.eval_continuous(self.place(value)).as_array()
     }
+}
+
+/// Visible noise, always on one scale, so that maps of different pictures and stages compare; `just_visible` is marked as seen.
+pub fn noise_scale(just_visible: Option<f32>) -> Scale {
+    let landmark = just_visible.map(|v| (f64::from(v), "seen"));
+    Scale { title: "visible noise\n8-bit steps", low: 1.0, high: 16.0, log: true, colours: INFERNO, landmark }
 }
 
 /// An RGB picture, row-major, 3 bytes a pixel.
@@ -100,6 +109,8 @@ impl Canvas {
 }
 
 const LEGEND: usize = 104;
+/// The legend needs some room.
+const LEAST_HEIGHT: usize = 140;
 const PAPER: [u8; 3] = [250, 250, 250];
 const INK: [u8; 3] = [20, 20, 20];
 
@@ -111,7 +122,7 @@ pub fn to_bytes(encoded: &[Rgb]) -> Vec<u8> {
 /// Draws `marks` over a display-encoded picture `width` pixels wide, legend at the right.
 pub fn draw(width: usize, encoded: &[Rgb], marks: &[Mark], scale: &Scale) -> Canvas {
     let height = encoded.len() / width;
-    let mut canvas = Canvas::new(width + LEGEND, height.max(140), PAPER);
+    let mut canvas = Canvas::new(width + LEGEND, height.max(LEAST_HEIGHT), PAPER);
 
     // The picture in grey below the colours, so that colour means the value alone.
     for mark in marks {
@@ -147,12 +158,27 @@ pub fn draw(width: usize, encoded: &[Rgb], marks: &[Mark], scale: &Scale) -> Can
     canvas
 }
 
+/// Draws one value a pixel over a display-encoded picture `width` pixels wide, legend at the right. The picture is dark and grey
+/// below the colours; it stays bare where a value is NaN.
+pub fn draw_field(width: usize, encoded: &[Rgb], values: &[f32], scale: &Scale) -> Canvas {
+    let height = encoded.len() / width;
+    let mut canvas = Canvas::new(width + LEGEND, height.max(LEAST_HEIGHT), PAPER);
+    for (pixel, (&rgb, &value)) in encoded.iter().zip(values).enumerate() {
+        let grey = 255.0 * noisefloor::luminance(rgb);
+        let colour = if value.is_nan() { [0; 3] } else { scale.colour(f64::from(value)) };
+        let blend = colour.map(|c| (0.7 * f32::from(c) + 0.3 * grey).round() as u8);
+        canvas.set(pixel % width, pixel / width, blend);
+    }
+    draw_legend(&mut canvas, width, height, scale);
+    canvas
+}
+
 fn draw_legend(canvas: &mut Canvas, width: usize, height: usize, scale: &Scale) {
     let left = width + 12;
     for (line, text) in scale.title.split('\n').enumerate() {
         canvas.text(text, (left, 14 + 15 * line), &FONT_7X13_BOLD, INK, Alignment::Left);
     }
-    let (top, bottom) = (50, height.max(140) - 16);
+    let (top, bottom) = (50, height.max(LEAST_HEIGHT) - 16);
     for y in top..=bottom {
         let place = (bottom - y) as f64 / (bottom - top) as f64;
         let colour = scale.colour(scale.value_at(place));
@@ -171,6 +197,16 @@ fn draw_legend(canvas: &mut Canvas, width: usize, height: usize, scale: &Scale) 
         let text = format!("{value:.digits$}");
         canvas.text(&text, (left + 27, y), &FONT_7X13, INK, Alignment::Left);
     }
+    if let Some((value, name)) = scale.landmark {
+        let y = bottom - ((bottom - top) as f64 * scale.place(value)) as usize;
+        for x in left - 3..left + 50 {
+            canvas.set(x, y, INK);
+        }
+        for x in left..left + 18 {
+            canvas.set(x, y, PAPER);
+        }
+        canvas.text(name, (left + 53, y), &FONT_7X13, INK, Alignment::Left);
+    }
 }
 
 #[cfg(test)]
@@ -179,7 +215,14 @@ mod tests {
 
     #[test]
     fn values_map_to_the_ends_of_the_scale() {
-        let scale = Scale { title: "", low: 100.0, high: 10_000.0, log: true, colours: colorous::VIRIDIS };
+        let scale = Scale {
+            title: "",
+            low: 100.0,
+            high: 10_000.0,
+            log: true,
+            colours: colorous::VIRIDIS,
+            landmark: None,
+        };
         assert_eq!((scale.place(100.0), scale.place(10_000.0), scale.place(5.0)), (0.0, 1.0, 0.0));
         assert!((scale.place(1000.0) - 0.5).abs() < 1e-9 && (scale.value_at(0.5) - 1000.0).abs() < 1e-6);
         let flat = Scale { low: 7.0, high: 7.0, log: false, ..scale };
@@ -190,11 +233,38 @@ mod tests {
     fn colours_lie_over_their_tiles() {
         let grid = noisefloor::TileGrid::new(64, 32, 32).unwrap();
         let mark = |i: usize| Mark { tile: grid.tile(i), value: i as f64, label: String::new() };
-        let scale = Scale { title: "t", low: 0.0, high: 1.0, log: false, colours: colorous::VIRIDIS };
+        let scale =
+            Scale { title: "t", low: 0.0, high: 1.0, log: false, colours: colorous::VIRIDIS, landmark: None };
         let canvas = draw(64, &vec![[0.0; 3]; 64 * 32], &[mark(0), mark(1)], &scale);
         let at = |x: usize, y: usize| &canvas.bytes[(y * canvas.width + x) * 3..][..3];
         // Over black: 55 % of viridis' first and last colour.
         assert_eq!(at(16, 16), [68.0, 1.0, 84.0].map(|c: f32| (0.55 * c).round() as u8));
         assert_eq!(at(48, 16), [253.0, 231.0, 37.0].map(|c: f32| (0.55 * c).round() as u8));
+    }
+
+    #[test]
+    fn fields_lie_over_a_dark_picture() {
+        let scale = Scale {
+            title: "t",
+            low: 1.0,
+            high: 16.0,
+            log: true,
+            colours: INFERNO,
+            landmark: Some((4.0, "here")),
+        };
+        let canvas =
+            draw_field(4, &[[0.0; 3], [1.0; 3], [0.0; 3], [1.0; 3]], &[0.0, 16.0, 100.0, f32::NAN], &scale);
+        let at = |x: usize| &canvas.bytes[x * 3..][..3];
+        let over = |colour: [f32; 3], grey: f32| colour.map(|c| (0.7 * c + 0.3 * 255.0 * grey).round() as u8);
+        // The first colour of the gradient, its last one twice, and none.
+        let last = [252.0, 255.0, 164.0];
+        assert_eq!(at(0), over([0.0, 0.0, 4.0], 0.0));
+        assert_eq!(
+            (at(1), at(2), at(3)),
+            (&over(last, 1.0)[..], &over(last, 0.0)[..], &over([0.0; 3], 1.0)[..])
+        );
+        // The landmark lies across the middle of the bar.
+        let y = LEAST_HEIGHT - 16 - (LEAST_HEIGHT - 16 - 50) / 2;
+        assert_eq!(&canvas.bytes[(y * canvas.width + 4 + 12) * 3..][..3], PAPER);
     }
 }

@@ -7,7 +7,7 @@ use ndarray::Array2;
 use noisefloor::{
     Display, Evidence, NoiseMask, Oracle, Rendering, Rgb, Samples, Tile, TileGrid, TilePlanes, Verdict,
 };
-use noisefloor_exr::{Picture, check_writable, read_picture, write_png};
+use noisefloor_exr::{Picture, RenderLayers, check_writable, read_picture, write_exr, write_png};
 use rayon::prelude::*;
 use serde::Serialize;
 use std::path::Path;
@@ -63,8 +63,15 @@ pub fn run(args: &JudgeArgs) -> anyhow::Result<()> {
             1 + args.against.len()
         );
     }
-    if let Some(path) = &args.heat_map {
+    for path in [&args.heat_map, &args.noise_map, &args.exr].into_iter().flatten() {
         check_writable(path)?;
+    }
+    let just_visible = oracle.just_visible();
+    if args.noise_map.is_some() && just_visible.is_none() {
+        let name = oracle.model().descriptor.name();
+        bail!(
+            "--noise-map: a model with the {name} descriptor has no map of visible noise; use one with the compact descriptor"
+        );
     }
     let image = read(&args.image, args.spp[0])?;
     let others: Vec<Input> = args
@@ -94,11 +101,31 @@ pub fn run(args: &JudgeArgs) -> anyhow::Result<()> {
         );
     }
     let other = pool(others, image.spp, samples)?;
-    let rows = judge(&oracle, grid, (&image, &other), &display, samples)?;
-
+    let evidence = |tile: Tile| evidence(tile, (&image, &other), &display, samples);
+    let rows = judge(&oracle, grid, image.spp, evidence)?;
     report(args, &oracle, &rows)?;
+
+    // Draw what was asked for.
+    let wants_noise = args.noise_map.is_some() || args.exr.is_some();
+    let noise = if wants_noise { oracle.map_visible_noise(grid, |t| evidence(t).map(Some))? } else { None };
+    let encode = || image.pixels.iter().map(|&p| display.encode(p)).collect::<Vec<Rgb>>();
+    if let (Some(path), Some(noise)) = (&args.noise_map, &noise) {
+        let map = heat_map::draw_field(width, &encode(), noise, &heat_map::noise_scale(just_visible));
+        write_png(path, map.width, map.height, &map.bytes)?;
+    }
+    if let Some(path) = &args.exr {
+        let mut probability = vec![f32::NAN; image.pixels.len()];
+        for row in &rows {
+            grid.tile(row.tile).rows(width).flatten().for_each(|pixel| probability[pixel] = row.probability);
+        }
+        let layers = RenderLayers {
+            probability: Some(&probability),
+            visible_noise: noise.as_deref(),
+            ..RenderLayers::rgb(width, height, &image.pixels)
+        };
+        write_exr(path, &layers)?;
+    }
     if let Some(path) = &args.heat_map {
-        let encoded: Vec<Rgb> = image.pixels.iter().map(|&p| display.encode(p)).collect();
         let mark = |row: &Row| Mark {
             tile: grid.tile(row.tile),
             value: f64::from(row.probability),
@@ -106,8 +133,9 @@ pub fn run(args: &JudgeArgs) -> anyhow::Result<()> {
         };
         let marks: Vec<Mark> = rows.iter().map(mark).collect();
         let title = "P(no noise\nis seen)";
-        let scale = Scale { title, low: 0.0, high: 1.0, log: false, colours: colorous::CIVIDIS };
-        let map = heat_map::draw(width, &encoded, &marks, &scale);
+        let scale =
+            Scale { title, low: 0.0, high: 1.0, log: false, colours: colorous::CIVIDIS, landmark: None };
+        let map = heat_map::draw(width, &encode(), &marks, &scale);
         write_png(path, map.width, map.height, &map.bytes)?;
     }
     Ok(())
@@ -199,25 +227,30 @@ fn shares_samples(image: &Input, other: &Input, display: &Display) -> bool {
     difference > 0.0 && product > difference / independent.sqrt()
 }
 
-fn judge(
-    oracle: &Oracle,
-    grid: TileGrid,
+/// What a tile is judged by.
+fn evidence(
+    tile: Tile,
     (image, other): (&Input, &Input),
     display: &Display,
     samples: Samples,
-) -> anyhow::Result<Vec<Row>> {
+) -> anyhow::Result<TilePlanes> {
     let pair = (image.rendering(), other.rendering());
-    let same = || {
+    TilePlanes::from_pair(image.size, tile, display, pair, samples).with_context(|| {
         format!(
             "nested pictures of the same {} samples per pixel are the same picture: nothing to judge by",
             image.spp
         )
-    };
+    })
+}
+
+fn judge(
+    oracle: &Oracle,
+    grid: TileGrid,
+    spp: f64,
+    evidence: impl Fn(Tile) -> anyhow::Result<TilePlanes> + Sync,
+) -> anyhow::Result<Vec<Row>> {
     let tiles: Vec<Tile> = grid.tiles().collect();
-    let describe = |&tile: &Tile| {
-        let planes = TilePlanes::from_pair(image.size, tile, display, pair, samples).with_context(same)?;
-        anyhow::Ok(oracle.describe(&planes, image.spp.max(1.0))?)
-    };
+    let describe = |&tile: &Tile| anyhow::Ok(oracle.describe(&evidence(tile)?, spp.max(1.0))?);
     let described = tiles.par_iter().map(describe).collect::<Result<Vec<_>, _>>()?;
     let row = |(tile, verdict): (Tile, Verdict)| {
         let Verdict { converged, probability, expected_samples } = verdict;

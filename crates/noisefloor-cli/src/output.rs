@@ -95,12 +95,20 @@ struct Report<'a> {
     rel_mse: Option<f64>,
 }
 
+/// What reports say of a model.
+pub struct ModelFacts {
+    /// BLAKE3 of the model.
+    pub digest: String,
+    /// Visible noise from which it is seen.
+    pub just_visible: Option<f32>,
+}
+
 /// The output folder, and what has been recorded for it.
 pub struct Output {
     folder: PathBuf,
     scene: String,
     seed: u64,
-    model: Option<String>,
+    model: Option<ModelFacts>,
     rel_mse: Option<RelMse>,
     timeline: Vec<TimelineRow>,
 }
@@ -110,7 +118,7 @@ impl Output {
     pub fn create(
         args: &RenderArgs,
         scene: String,
-        model: Option<String>,
+        model: Option<ModelFacts>,
         rel_mse: Option<RelMse>,
     ) -> anyhow::Result<Self> {
         let folder = args.out.clone().unwrap_or_else(|| Path::new("out").join(&scene));
@@ -150,17 +158,28 @@ impl Output {
                 stopped[pixel] = !open;
             }
         }
-        let (spp, probability, stopped) = (Some(&spp[..]), Some(&probability[..]), Some(&stopped[..]));
-        let layers = RenderLayers { width, height, rgb: &image, spp, probability, stopped };
+        let noise = session.visible_noise();
+        let layers = RenderLayers {
+            spp: Some(&spp),
+            probability: Some(&probability),
+            stopped: Some(&stopped),
+            visible_noise: noise.as_deref(),
+            ..RenderLayers::rgb(width, height, &image)
+        };
         write_exr(self.folder.join("image.exr"), &layers)?;
 
-        // image.png and stops.png: as the oracle saw it.
+        // image.png, stops.png and noise.png: as the oracle saw it.
         let display =
             session.display().copied().unwrap_or_else(|| session.params().tone_mapping.settle(&image));
         let encoded: Vec<Rgb> = image.iter().map(|&p| display.encode(p)).collect();
         write_png(self.folder.join("image.png"), width, height, &heat_map::to_bytes(&encoded))?;
         let map = heat_map::draw(width, &encoded, &marks(&tiles), &scale(&tiles));
         write_png(self.folder.join("stops.png"), map.width, map.height, &map.bytes)?;
+        if let Some(noise) = &noise {
+            let scale = heat_map::noise_scale(self.model.as_ref().and_then(|m| m.just_visible));
+            let map = heat_map::draw_field(width, &encoded, noise, &scale);
+            write_png(self.folder.join("noise.png"), map.width, map.height, &map.bytes)?;
+        }
 
         self.write_stops(&tiles)?;
         self.write_timeline()?;
@@ -211,7 +230,7 @@ impl Output {
             height: grid.height(),
             seed: self.seed,
             criterion: session.criterion().name(),
-            model: self.model.as_deref(),
+            model: self.model.as_ref().map(|m| m.digest.as_str()),
             params: session.params(),
             exposure: session.display().map(|_| display.exposure()),
             complete: clock.is_some() && tiles.iter().all(|(_, open)| !open),
@@ -296,7 +315,7 @@ fn marks(tiles: &[(Stop, bool)]) -> Vec<Mark> {
 fn scale(tiles: &[(Stop, bool)]) -> Scale {
     let spp = || tiles.iter().map(|(stop, _)| stop.samples.max(1) as f64);
     let (low, high) = (spp().fold(f64::INFINITY, f64::min), spp().fold(1.0, f64::max));
-    Scale { title: "samples\nper pixel", low, high, log: true, colours: colorous::VIRIDIS }
+    Scale { title: "samples\nper pixel", low, high, log: true, colours: colorous::VIRIDIS, landmark: None }
 }
 
 /// Writes rows as CSV, atomically.

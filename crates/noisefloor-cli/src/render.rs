@@ -2,7 +2,7 @@
 
 use crate::INTERRUPTED;
 use crate::args::{CriterionChoice, FilterChoice, RenderArgs, SamplerChoice};
-use crate::output::{Output, RelMse};
+use crate::output::{ModelFacts, Output, RelMse};
 use anyhow::{Context, bail};
 use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressStyle};
 use noisefloor::{Driver, Event, FixedSamples, Progress, Session, StopReason, StoppingCriterion};
@@ -51,8 +51,8 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<ExitCode> {
     match args.criterion {
         CriterionChoice::Oracle => {
             let oracle = args.oracle.load()?;
-            let digest = Some(oracle.model().digest());
-            drive(Driver::new(source, oracle, params)?, args, name, digest, rel_mse)
+            let facts = ModelFacts { digest: oracle.model().digest(), just_visible: oracle.just_visible() };
+            drive(Driver::new(source, oracle, params)?, args, name, Some(facts), rel_mse)
         }
         CriterionChoice::Fixed(samples) => {
             drive(Driver::new(source, FixedSamples(samples), params)?, args, name, None, rel_mse)
@@ -78,7 +78,7 @@ fn drive<C: StoppingCriterion>(
     mut driver: Driver<Ptwne, C>,
     args: &RenderArgs,
     scene: String,
-    model: Option<String>,
+    model: Option<ModelFacts>,
     rel_mse: Option<RelMse>,
 ) -> anyhow::Result<ExitCode> {
     let mut output = Output::create(args, scene, model, rel_mse)?;

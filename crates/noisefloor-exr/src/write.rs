@@ -120,12 +120,14 @@ pub struct RenderLayers<'a> {
     pub probability: Option<&'a [f32]>,
     /// Whether the pixel's tile has stopped; written as floats `oracle.stop`, 1 or 0.
     pub stopped: Option<&'a [bool]>,
+    /// How visible the noise is, in 8-bit display steps; written as floats `oracle.visible_noise`. NaN where there is no evidence.
+    pub visible_noise: Option<&'a [f32]>,
 }
 
 impl<'a> RenderLayers<'a> {
     /// A picture without extra layers.
     pub fn rgb(width: usize, height: usize, rgb: &'a [Rgb]) -> Self {
-        Self { width, height, rgb, spp: None, probability: None, stopped: None }
+        Self { width, height, rgb, spp: None, probability: None, stopped: None, visible_noise: None }
     }
 }
 
@@ -162,6 +164,10 @@ pub fn write_exr(path: impl AsRef<Path>, layers: &RenderLayers<'_>) -> Result<()
         check("stopped", stopped.len())?;
         let stopped = stopped.iter().map(|&s| f32::from(u8::from(s))).collect();
         channels.push(AnyChannel::new("oracle.stop", FlatSamples::F32(stopped)));
+    }
+    if let Some(noise) = layers.visible_noise {
+        check("visible_noise", noise.len())?;
+        channels.push(AnyChannel::new("oracle.visible_noise", FlatSamples::F32(noise.to_vec())));
     }
 
     let attributes =

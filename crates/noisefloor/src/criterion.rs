@@ -84,6 +84,13 @@ pub trait StoppingCriterion {
         Audience::TRAINED
     }
 
+    /// How visible the noise is at each pixel of the image, row-major, in 8-bit display steps; NaN where a tile gives no evidence.
+    /// `None` if the criterion cannot say, which is the default. Costs as much as a verdict on every tile, and is asked for where a
+    /// map is wanted, never for a verdict.
+    fn visible_noise(&self, _view: &View<'_>) -> Option<Vec<f32>> {
+        None
+    }
+
     /// Judges the tiles named, all of which have samples.
     ///
     /// # Errors
@@ -102,6 +109,10 @@ impl<C: StoppingCriterion + ?Sized> StoppingCriterion for Box<C> {
 
     fn audience(&self) -> Audience {
         (**self).audience()
+    }
+
+    fn visible_noise(&self, view: &View<'_>) -> Option<Vec<f32>> {
+        (**self).visible_noise(view)
     }
 
     fn judge(&mut self, view: &View<'_>, tiles: &[Tile]) -> Result<Vec<Verdict>, CriterionError> {

@@ -5,7 +5,7 @@ use crate::descriptor::{Described, DescriptorError};
 use crate::evidence::{Evidence, TilePlanes};
 use crate::model::Model;
 use crate::params::Audience;
-use crate::tile::Tile;
+use crate::tile::{Tile, TileGrid};
 use rayon::prelude::*;
 use thiserror::Error;
 
@@ -83,6 +83,66 @@ impl Oracle {
         Verdict { converged, probability: Some(probability), expected_samples }
     }
 
+    /// The visible noise (see [`crate::Descriptor::visible_noise`]) from which it is seen: of an even noise in a tile of the mean
+    /// texture of the training data, where P crosses the threshold. `None` if the descriptor does not tell noise from picture.
+    pub fn just_visible(&self) -> Option<f32> {
+        let Model { descriptor, scaler, .. } = &self.model;
+        let at = |doublings: f32| {
+            let mut raw = scaler.mean.clone();
+            descriptor.project(&mut raw, doublings.exp2());
+            raw
+        };
+        let (mut noisy, mut clean) = (-20.0f32, 20.0f32);
+        while clean - noisy > 0.01 {
+            let middle = 0.5 * (noisy + clean);
+            let seen = self.model.probability(&mut at(middle)) < self.threshold;
+            if seen { noisy = middle } else { clean = middle }
+        }
+        descriptor.pooled_visible_noise(&at(clean))
+    }
+
+    /// The visible noise of a whole image (see [`crate::Descriptor::visible_noise`]), row-major, from the planes of its tiles; NaN
+    /// where `planes` has none. `None` if the descriptor does not tell noise from picture.
+    ///
+    /// # Errors
+    /// Those of `planes`.
+    pub fn map_visible_noise<E: Send>(
+        &self,
+        grid: TileGrid,
+        planes: impl Fn(Tile) -> Result<Option<TilePlanes>, E> + Sync,
+    ) -> Result<Option<Vec<f32>>, E> {
+        let tiles: Vec<Tile> = grid.tiles().collect();
+        let map_of = |&tile: &Tile| Ok(planes(tile)?.map(|p| self.model.descriptor.visible_noise(&p)));
+        let maps: Vec<_> = tiles.par_iter().map(map_of).collect::<Result<_, _>>()?;
+        let mut image = vec![f32::NAN; grid.width() * grid.height()];
+        for (tile, map) in tiles.iter().zip(maps) {
+            match map {
+                Some(Some(map)) => {
+                    let pixels = tile.rows(grid.width()).flatten();
+                    pixels.zip(&map).for_each(|(pixel, &value)| image[pixel] = value);
+                }
+                Some(None) => return Ok(None),
+                None => {}
+            }
+        }
+        Ok(Some(image))
+    }
+
+    /// What a tile is judged by; `None` if too many of its pixels have no evidence.
+    fn planes(&self, view: &View<'_>, tile: Tile) -> Result<Option<TilePlanes>, CriterionError> {
+        if view.film.unsampled_pixels(tile.index) > tile.pixels() / NO_EVIDENCE {
+            return Ok(None);
+        }
+        Ok(Some(match self.model.evidence {
+            Evidence::Halves => TilePlanes::from_halves(view.film, view.display, tile),
+            Evidence::Reference => {
+                let reference = view.reference.ok_or_else(|| CriterionError::NoReference(self.name()))?;
+                TilePlanes::from_reference(view.film, view.display, reference, tile)
+            }
+            Evidence::Alone => TilePlanes::from_picture(view.film, view.display, tile),
+        }))
+    }
+
     fn misfit(
         &self,
         DescriptorError::TileSize { expected, width, height }: DescriptorError,
@@ -131,6 +191,10 @@ impl StoppingCriterion for Oracle {
         self.model.audience
     }
 
+    fn visible_noise(&self, view: &View<'_>) -> Option<Vec<f32>> {
+        self.map_visible_noise(view.film.grid(), |tile| self.planes(view, tile)).ok()?
+    }
+
     /// Tiles that are not named count for the picture as they were when last described: they are looked at again if their
     /// samples have changed since.
     fn judge(&mut self, view: &View<'_>, tiles: &[Tile]) -> Result<Vec<Verdict>, CriterionError> {
@@ -141,22 +205,12 @@ impl StoppingCriterion for Oracle {
         let this: &Self = self;
         let describe = |tile: Tile| {
             let samples = view.film.samples(tile.index) as f64;
-            let known = this.described[tile.index].as_ref().is_some_and(|d| d.samples == samples);
-            if known && !due[tile.index] {
-                return Ok(this.described[tile.index].clone());
+            let known =
+                this.described[tile.index].as_ref().filter(|d| d.samples == samples && !due[tile.index]);
+            if known.is_some() {
+                return Ok(known.cloned());
             }
-            if view.film.unsampled_pixels(tile.index) > tile.pixels() / NO_EVIDENCE {
-                return Ok(None);
-            }
-            let planes = match this.model.evidence {
-                Evidence::Halves => TilePlanes::from_halves(view.film, view.display, tile),
-                Evidence::Reference => {
-                    let reference = view.reference.ok_or_else(|| CriterionError::NoReference(this.name()))?;
-                    TilePlanes::from_reference(view.film, view.display, reference, tile)
-                }
-                Evidence::Alone => TilePlanes::from_picture(view.film, view.display, tile),
-            };
-            this.describe(&planes, samples).map(Some)
+            this.planes(view, tile)?.map(|planes| this.describe(&planes, samples)).transpose()
         };
         let all: Vec<Tile> = grid.tiles().collect();
         self.described = all.into_par_iter().map(describe).collect::<Result<_, _>>()?;
@@ -185,7 +239,6 @@ mod tests {
     use crate::model::tests::small;
     use crate::source::Rgb;
     use crate::svm::{Scaler, Svm};
-    use crate::tile::TileGrid;
 
     /// A film of 64×64 pixels with `samples` samples of standard deviation `sigma` around grey.
     fn film(samples: u32, sigma: f32) -> Film {
@@ -247,6 +300,20 @@ mod tests {
         assert!((by_reference - by_halves).abs() < 0.1, "{by_reference} {by_halves}");
     }
 
+    #[cfg(feature = "bundled-model")]
+    #[test]
+    fn noise_that_is_just_visible_is_where_p_crosses() {
+        let oracle = Oracle::bundled();
+        let just = oracle.just_visible().unwrap();
+        let descriptor = |amplitude: f32| {
+            let mut raw = oracle.model().scaler.mean.clone();
+            let here = oracle.model().descriptor.pooled_visible_noise(&raw).unwrap();
+            oracle.model().descriptor.project(&mut raw, (here / amplitude).powi(2));
+            oracle.model().probability(&mut raw)
+        };
+        assert!(descriptor(0.99 * just) > DEFAULT_THRESHOLD && descriptor(1.01 * just) < DEFAULT_THRESHOLD);
+    }
+
     #[test]
     fn the_paper_s_descriptor_judges_tiles_of_its_size_only() {
         let descriptor = Descriptor::MaskPair { mask: NoiseMask::default(), edge: 64 };
@@ -259,6 +326,10 @@ mod tests {
         let verdict = judge(&mut oracle, &film(100, 0.0), None).unwrap();
         assert!((verdict.probability.unwrap() - 1.0 / (1.0 + (-1f32).exp())).abs() < 1e-5);
         assert_eq!(verdict.expected_samples, None, "masks do not tell noise from picture");
+        assert_eq!(oracle.just_visible(), None);
+        let film = film(100, 0.0);
+        let view = View { film: &film, display: &Display::SRGB, reference: None };
+        assert_eq!(oracle.visible_noise(&view), None);
 
         let mut ragged = Film::new(TileGrid::new(40, 64, 64).unwrap());
         (0..2).for_each(|_| ragged.add(0, 1, &[[0.0; 3]; 40 * 64]).unwrap());

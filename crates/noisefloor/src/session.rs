@@ -357,6 +357,13 @@ impl<C: StoppingCriterion> Session<C> {
         self.tiles[tile].verdict
     }
 
+    /// How visible the noise is at each pixel of the image, row-major, in 8-bit display steps (see [`crate::Descriptor::visible_noise`]);
+    /// NaN where there is no evidence. Computed at each call. `None` before the display has settled, and if the criterion cannot say.
+    pub fn visible_noise(&self) -> Option<Vec<f32>> {
+        let reference = self.displayed_reference.as_deref();
+        self.criterion.visible_noise(&View { film: &self.film, display: self.display.as_ref()?, reference })
+    }
+
     /// Samples still to be taken, over all pixels, as the criterion expects it; `None` while any open tile is without an
     /// expectation.
     pub fn expected_samples_to_go(&self) -> Option<u64> {

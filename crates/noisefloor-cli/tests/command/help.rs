@@ -26,6 +26,8 @@ fn every_subcommand_explains_itself() {
                 "--nested",
                 "--json",
                 "--heat-map",
+                "--noise-map",
+                "--exr",
                 "--tile",
                 "--model",
                 "--tone-mapping",

@@ -1,5 +1,5 @@
 use crate::kit::{grey_exr, run, stderr, succeed, text, tiny};
-use noisefloor_exr::{Picture, read_picture};
+use noisefloor_exr::{Picture, read_exr, read_picture};
 use serde_json::Value;
 use std::path::PathBuf;
 use tempfile::tempdir;
@@ -53,6 +53,24 @@ fn two_renders_with_two_seeds() {
     assert!(std::fs::read(&map).unwrap().starts_with(b"\x89PNG\r\n\x1a\n"));
     let Picture::Display(map) = read_picture(&map).unwrap() else { panic!("a PNG") };
     assert!(map.width > 64 && map.height >= 64);
+
+    // Where noise is seen: as a map, and as channels of an EXR of the picture
+    let (map, exr) = (folder.path().join("noise.png"), folder.path().join("noise.exr"));
+    judge(&noisy[0], &noisy[1], "100", &["--noise-map", text(&map), "--exr", text(&exr)]);
+    let Picture::Display(map) = read_picture(&map).unwrap() else { panic!("a PNG") };
+    assert!(map.width > 64 && map.height >= 64);
+    assert_eq!(read_exr(&exr).unwrap().pixels, read_exr(&noisy[0]).unwrap().pixels);
+    let layers = exr::prelude::read_all_flat_layers_from_file(&exr).unwrap();
+    let channel = |name: &str| -> Vec<f32> {
+        let channels = &layers.layer_data[0].channel_data.list;
+        channels.iter().find(|c| c.name.to_string() == name).unwrap().sample_data.values_as_f32().collect()
+    };
+    let (p, noise) = (channel("oracle.P"), channel("oracle.visible_noise"));
+    for tile in tiles {
+        let [x, y] = ["x", "y"].map(|edge| tile[edge].as_u64().unwrap() as usize);
+        assert_eq!(f64::from(p[y * 64 + x]) as f32, tile["probability"].as_f64().unwrap() as f32);
+    }
+    assert!(noise.iter().all(|v| (0.0..255.0).contains(v)) && noise.iter().any(|&v| v > 2.0));
 
     // Nested stages of one rendering agree with independent ones about where noise is
     let more = render("1", "spp:1000");

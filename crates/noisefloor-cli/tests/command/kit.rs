@@ -49,6 +49,7 @@ pub(crate) fn tiny<'a>(out: &'a str, more: &[&'a str]) -> Vec<&'a str> {
     small.iter().chain(more).copied().collect()
 }
 
+/// What every render writes; the oracle adds noise.png.
 pub(crate) const FILES: [&str; 6] =
     ["image.exr", "image.png", "stops.csv", "stops.png", "timeline.csv", "report.json"];
 

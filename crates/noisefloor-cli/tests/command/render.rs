@@ -12,7 +12,7 @@ fn writes_all_it_promises() {
     let mut written: Vec<_> =
         std::fs::read_dir(&out).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
     written.sort();
-    let mut promised = FILES.map(str::to_owned).to_vec();
+    let mut promised: Vec<_> = FILES.iter().chain(&["noise.png"]).map(|&name| name.to_owned()).collect();
     promised.sort();
     assert_eq!(written, promised);
 
@@ -67,8 +67,10 @@ fn writes_all_it_promises() {
             assert!((expected - s).abs() < 0.6 / 255.0, "{expected} {s}");
         }
     }
-    let Picture::Display(map) = read_picture(out.join("stops.png")).unwrap() else { panic!("a PNG") };
-    assert!(map.width > 64 && map.height >= 64, "a legend beside the picture");
+    for map in ["stops.png", "noise.png"] {
+        let Picture::Display(map) = read_picture(out.join(map)).unwrap() else { panic!("a PNG") };
+        assert!(map.width > 64 && map.height >= 64, "a legend beside the picture");
+    }
 }
 
 #[test]
@@ -95,6 +97,7 @@ fn a_fixed_number_of_samples() {
     assert_eq!(column(&stops, "probability"), [""; 4]);
     let report = json(&folder.path().join("report.json"));
     assert!(report["model"].is_null() && report["scene"] == "bulb");
+    assert!(!folder.path().join("noise.png").exists(), "a number of samples knows of no noise");
 }
 
 #[test]

@@ -13,10 +13,12 @@ fn exr_there_and_back_with_layers() {
     let spp: Vec<u32> = (0..35 * 20).map(|i| 4_000_000_000 - i).collect();
     let stopped = vec![true; 35 * 20];
     let probability = vec![0.9; 35 * 20];
+    let noise: Vec<f32> = (0..35 * 20).map(|i| i as f32).collect();
     let layers = RenderLayers {
         spp: Some(&spp),
         probability: Some(&probability),
         stopped: Some(&stopped),
+        visible_noise: Some(&noise),
         ..RenderLayers::rgb(35, 20, &rgb)
     };
     write_exr(&path, &layers).unwrap();
@@ -27,10 +29,11 @@ fn exr_there_and_back_with_layers() {
     let image = exr::prelude::read_all_flat_layers_from_file(&path).unwrap();
     let channels = &image.layer_data[0].channel_data.list;
     let names: Vec<String> = channels.iter().map(|c| c.name.to_string()).collect();
-    assert_eq!(names, ["B", "G", "R", "oracle.P", "oracle.spp", "oracle.stop"]);
+    assert_eq!(names, ["B", "G", "R", "oracle.P", "oracle.spp", "oracle.stop", "oracle.visible_noise"]);
     assert_eq!(channels[3].sample_data, exr::prelude::FlatSamples::F32(probability));
     assert_eq!(channels[4].sample_data, exr::prelude::FlatSamples::U32(spp));
     assert_eq!(channels[5].sample_data, exr::prelude::FlatSamples::F32(vec![1.0; 35 * 20]));
+    assert_eq!(channels[6].sample_data, exr::prelude::FlatSamples::F32(noise));
 }
 
 #[test]

@@ -46,8 +46,13 @@ const TEXTURE_FLOOR: f32 = 4.0;
 /// Energies are in squared steps of 8-bit display values.
 const STEP: f32 = 1.0 / 255.0;
 
-/// The tile's own numbers.
-pub(super) fn describe(planes: &TilePlanes, mask: NoiseMask) -> [f32; OWN] {
+/// What the numbers are pooled from, on the grid of 8×8-pixel blocks; energies in squared 8-bit steps.
+struct Blocks {
+    visible: Array2<f32>,
+    texture: Array2<f32>,
+}
+
+fn blocks(planes: &TilePlanes, mask: NoiseMask) -> Blocks {
     // Mask energies on blocks: noise, and the picture itself.
     let noise = energies(&planes.residual, mask, planes.rounding * ROUNDING_LUMINANCE);
     let picture = energies(&planes.image, mask, 0.0);
@@ -64,9 +69,15 @@ pub(super) fn describe(planes: &TilePlanes, mask: NoiseMask) -> [f32; OWN] {
         }
     }
 
-    // Pool over the blocks. Sums run over ratios to the largest energy, so that no power overflows.
     visible
         .zip_mut_with(&brightness, |v, &l| *v *= (l.max(0.0) + BRIGHTNESS_OFFSET).powf(BRIGHTNESS_EXPONENT));
+    Blocks { visible, texture }
+}
+
+/// The tile's own numbers.
+pub(super) fn describe(planes: &TilePlanes, mask: NoiseMask) -> [f32; OWN] {
+    let Blocks { visible, texture } = blocks(planes, mask);
+    // Pool over the blocks. Sums run over ratios to the largest energy, so that no power overflows.
     let blocks = visible.len() as f32;
     let largest = visible.iter().copied().fold(f32::MIN_POSITIVE, f32::max);
     let pooled = visible.iter().map(|v| (v / largest).powf(0.5 * POOLING)).sum::<f32>() / blocks;
@@ -77,6 +88,19 @@ pub(super) fn describe(planes: &TilePlanes, mask: NoiseMask) -> [f32; OWN] {
         texture.iter().map(|t| log_amplitude(t + TEXTURE_FLOOR)).sum::<f32>() / blocks,
         log_amplitude(texture.sum() / blocks + TEXTURE_FLOOR),
     ]
+}
+
+/// The amplitude of visible noise at each pixel of the tile, that of its block, in 8-bit steps. Its mean of order [`POOLING`] over
+/// the blocks is what the first number is the logarithm of.
+pub(super) fn visible_noise(planes: &TilePlanes, mask: NoiseMask) -> Array2<f32> {
+    let Blocks { visible, .. } = blocks(planes, mask);
+    let shape = (planes.inner.height, planes.inner.width);
+    Array2::from_shape_fn(shape, |(y, x)| visible[(y / BLOCK, x / BLOCK)].sqrt())
+}
+
+/// The amplitude behind the first number, in 8-bit steps.
+pub(super) fn pooled_amplitude(descriptor: &[f32]) -> f32 {
+    noise_energy(descriptor[0]).sqrt() as f32
 }
 
 /// Noise energy above the floor, of a noise number.
@@ -246,6 +270,47 @@ mod tests {
             // 4096/4ˢ pixels, neighbours correlated by the mask: a standard error below 2.5 %·2ˢ; 4 σ.
             let tolerance = 0.1 * (1 << scale) as f32;
             assert!((energy.mean().unwrap() / expected - 1.0).abs() < tolerance, "scale {scale}");
+        }
+    }
+
+    /// White noise of known σ on flat grey: a mask energy of σ²·gain/4ˢ at each scale s, weighted by scale and brightness.
+    #[test]
+    fn the_map_shows_white_noise_as_strong_as_it_is() {
+        let mut planes =
+            tile(Recipe { seed: 7, base: 0.5, ramp: (0.0, 0.0), checker: (0.0, 4), noise: 0.01 });
+        // Noise of one strength everywhere, and a picture without any, so that nothing passes for texture.
+        let corner =
+            |((y, x), v): ((usize, usize), &mut f32)| *v /= if x >= 56 && y < 24 { 4.0 } else { 1.0 };
+        planes.residual.indexed_iter_mut().for_each(corner);
+        planes.image.fill(0.5);
+        let mask = NoiseMask::default();
+        let map = visible_noise(&planes, mask);
+        assert_eq!(map.dim(), (64, 64));
+
+        let variance = 0.01 * 0.01 * 4.0 / 12.0 / (STEP * STEP);
+        let scales: f32 = SCALES.iter().enumerate().map(|(s, w)| w / (1 << (2 * s)) as f32).sum();
+        let brightness = (0.5 + BRIGHTNESS_OFFSET).powf(BRIGHTNESS_EXPONENT);
+        let expected = variance * mask.white_noise_gain() * scales * brightness;
+        // Half of the energy is in the first scale (standard error 2.5 %), a quarter, a fifth and a twentieth in the others
+        // (5, 10, 20 %), as in `white_noise_has_the_energy_it_should`: 3 % in all; 4 σ.
+        let energy = map.mapv(|v| v * v).mean().unwrap();
+        assert!((energy / expected - 1.0).abs() < 0.12, "{energy} against {expected}");
+    }
+
+    #[test]
+    fn the_first_number_is_pooled_from_the_map() {
+        for seed in 1..5 {
+            let recipe = Recipe { seed, base: 0.3, ramp: (0.4, 0.1), checker: (0.1, 5), noise: 0.02 };
+            let planes = tile(recipe);
+            let map = visible_noise(&planes, NoiseMask::default()).mapv(f64::from);
+            let mean = map.mapv(|v| v.powf(POOLING.into())).mean().unwrap().powf(1.0 / f64::from(POOLING));
+            let descriptor = describe_tile(&planes);
+            let number = 0.5 * (mean * mean + f64::from(NOISE_FLOOR)).ln();
+            assert!(
+                (f64::from(descriptor[0]) - number).abs() < 1e-4,
+                "seed {seed}: {descriptor:?}, {number}"
+            );
+            assert!((f64::from(pooled_amplitude(&descriptor)) / mean - 1.0).abs() < 1e-4, "seed {seed}");
         }
     }
 

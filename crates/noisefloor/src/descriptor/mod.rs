@@ -5,6 +5,7 @@ mod mask_pair;
 
 use crate::evidence::TilePlanes;
 use crate::mask::NoiseMask;
+use ndarray::Array2;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
@@ -117,6 +118,36 @@ impl Descriptor {
         match self {
             Self::Compact { .. } => compact::in_picture(tiles),
             Self::MaskPair { .. } => tiles.iter().map(|t| t.own.clone()).collect(),
+        }
+    }
+
+    /// How visible the noise is at each pixel of the tile (its rows × its columns): an amplitude in 8-bit display steps, weighted
+    /// by scale, colour and brightness and lowered by texture as the descriptor weighs it, for each block of 8×8 pixels. What the
+    /// verdict on the tile goes by is pooled from this. `None` if the descriptor does not tell noise from picture.
+    ///
+    /// ```
+    /// use noisefloor::{Descriptor, TileGrid, TilePlanes};
+    /// let tile = TileGrid::new(32, 16, 32)?.tile(0);
+    /// let checker = |x: usize, y: usize| if (x + y) % 2 == 0 { [0.01; 3] } else { [-0.01; 3] };
+    /// let noise_at_the_left = |x, y| ([0.5; 3], if x < 16 { checker(x, y) } else { [0.0; 3] });
+    /// let planes = TilePlanes::gather((32, 16), tile, noise_at_the_left);
+    /// let map = Descriptor::default().visible_noise(&planes).unwrap();
+    /// assert_eq!(map.dim(), (16, 32));
+    /// assert!(map[(8, 0)] > 1.0 && map[(8, 31)] < 0.01);
+    /// # Ok::<(), noisefloor::TileError>(())
+    /// ```
+    pub fn visible_noise(&self, planes: &TilePlanes) -> Option<Array2<f32>> {
+        match *self {
+            Self::Compact { mask } => Some(compact::visible_noise(planes, mask)),
+            Self::MaskPair { .. } => None,
+        }
+    }
+
+    /// The amplitude of [`Descriptor::visible_noise`] that a raw descriptor has pooled.
+    pub(crate) fn pooled_visible_noise(&self, descriptor: &[f32]) -> Option<f32> {
+        match self {
+            Self::Compact { .. } => Some(compact::pooled_amplitude(descriptor)),
+            Self::MaskPair { .. } => None,
         }
     }
 
