@@ -224,7 +224,7 @@ pub struct EvaluateArgs {
     /// Write scores as JSON.
     #[arg(long, value_name = "FILE")]
     pub json: Option<PathBuf>,
-    /// Write each zone's thresholds as CSV: scene,zone,human_spp,predicted_spp,censored.
+    /// Write each zone's thresholds as CSV: scene,zone,human_spp,predicted_spp,censored,unfamiliar.
     #[arg(long, value_name = "FILE")]
     pub csv: Option<PathBuf>,
     /// Draw into this folder: both thresholds of each zone (over the pictures, with --corpus), one against the other, and the

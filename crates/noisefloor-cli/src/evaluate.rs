@@ -52,6 +52,8 @@ struct Report {
     calibration_error_of_step: f64,
     /// Zones whose human threshold is only a lower bound: not in the factors.
     censored_zones: usize,
+    /// Zones unlike any that the model which predicts them was tried on.
+    unfamiliar_zones: usize,
     levels_real: usize,
     levels_synthesised: usize,
 }
@@ -152,6 +154,7 @@ impl Report {
             baselines: baselines(&|_| true),
             scenes: table.scenes().into_iter().map(scene).collect(),
             censored_zones: table.zones.iter().filter(|z| z.censored).count(),
+            unfamiliar_zones: predictions.iter().filter(|p| p.unfamiliar).count(),
             levels_real: real,
             levels_synthesised: levels().count() - real,
         }
@@ -189,8 +192,8 @@ impl Report {
         println!(
             "error = exp(mean |ln(predicted/human)|); bias = exp(mean ln(predicted/human)); early = stopped below half the human threshold.\n\
              Thresholds are looked for on {} real and {} synthesised levels; \"images right\" counts real pictures alone. {} censored zones \
-             stay out of the factors.\nThe scene median knows the scene's other zones, which no predictor of unseen scenes can.",
-            self.levels_real, self.levels_synthesised, self.censored_zones
+             stay out of the factors, {} zones are unfamiliar to the model that predicts them.\nThe scene median knows the scene's other zones, which no predictor of unseen scenes can.",
+            self.levels_real, self.levels_synthesised, self.censored_zones, self.unfamiliar_zones
         );
     }
 }

@@ -53,6 +53,7 @@ pub fn write(
                 tile: *places.get(&(p.scene.clone(), p.zone))?,
                 value: p.predicted_spp / p.human_spp,
                 label: format!("{:.0} | {:.0}", p.human_spp, p.predicted_spp),
+                unfamiliar: p.unfamiliar,
             })
         };
         let marks: Vec<Mark> = zones.iter().filter_map(mark).collect();

@@ -15,6 +15,8 @@ pub struct Mark {
     pub value: f64,
     /// Written into the tile where there is room.
     pub label: String,
+    /// The tile is unfamiliar to the model: marked in its corner.
+    pub unfamiliar: bool,
 }
 
 /// How values become colours.
@@ -93,6 +95,16 @@ impl Canvas {
         }
     }
 
+    /// A white triangle with an edge of ink, its right angle at (x, y).
+    fn corner(&mut self, x: usize, y: usize) {
+        for row in 0..CORNER {
+            for column in 0..CORNER - row {
+                let on_edge = row + column >= CORNER - 2;
+                self.set(x + column, y + row, if on_edge { INK } else { PAPER });
+            }
+        }
+    }
+
     fn text(
         &mut self,
         text: &str,
@@ -111,6 +123,8 @@ impl Canvas {
 const LEGEND: usize = 104;
 /// The legend needs some room.
 const LEAST_HEIGHT: usize = 140;
+/// Edge of the mark on unfamiliar tiles; fits into the smallest tile.
+const CORNER: usize = 11;
 const PAPER: [u8; 3] = [250, 250, 250];
 const INK: [u8; 3] = [20, 20, 20];
 
@@ -137,7 +151,7 @@ pub fn draw(width: usize, encoded: &[Rgb], marks: &[Mark], scale: &Scale) -> Can
     }
 
     // Borders and labels.
-    for Mark { tile, label, .. } in marks {
+    for Mark { tile, label, unfamiliar, .. } in marks {
         for x in tile.x..tile.x + tile.width {
             canvas.set(x, tile.y, INK);
         }
@@ -152,9 +166,19 @@ pub fn draw(width: usize, encoded: &[Rgb], marks: &[Mark], scale: &Scale) -> Can
             }
             canvas.text(label, (x, y), font, [255; 3], Alignment::Center);
         }
+        if *unfamiliar {
+            canvas.corner(tile.x + 1, tile.y + 1);
+        }
     }
 
-    draw_legend(&mut canvas, width, height, scale);
+    let lowest = height.max(LEAST_HEIGHT) - 16;
+    if marks.iter().any(|m| m.unfamiliar) {
+        canvas.corner(width + 12, lowest - 1);
+        canvas.text("unfamiliar", (width + 27, lowest + 4), &FONT_7X13, INK, Alignment::Left);
+        draw_legend(&mut canvas, width, lowest - 20, scale);
+    } else {
+        draw_legend(&mut canvas, width, lowest, scale);
+    }
     canvas
 }
 
@@ -169,16 +193,16 @@ pub fn draw_field(width: usize, encoded: &[Rgb], values: &[f32], scale: &Scale) 
         let blend = colour.map(|c| (0.7 * f32::from(c) + 0.3 * grey).round() as u8);
         canvas.set(pixel % width, pixel / width, blend);
     }
-    draw_legend(&mut canvas, width, height, scale);
+    draw_legend(&mut canvas, width, height.max(LEAST_HEIGHT) - 16, scale);
     canvas
 }
 
-fn draw_legend(canvas: &mut Canvas, width: usize, height: usize, scale: &Scale) {
+fn draw_legend(canvas: &mut Canvas, width: usize, bottom: usize, scale: &Scale) {
     let left = width + 12;
     for (line, text) in scale.title.split('\n').enumerate() {
         canvas.text(text, (left, 14 + 15 * line), &FONT_7X13_BOLD, INK, Alignment::Left);
     }
-    let (top, bottom) = (50, height.max(LEAST_HEIGHT) - 16);
+    let top = 50;
     for y in top..=bottom {
         let place = (bottom - y) as f64 / (bottom - top) as f64;
         let colour = scale.colour(scale.value_at(place));
@@ -232,7 +256,8 @@ mod tests {
     #[test]
     fn colours_lie_over_their_tiles() {
         let grid = noisefloor::TileGrid::new(64, 32, 32).unwrap();
-        let mark = |i: usize| Mark { tile: grid.tile(i), value: i as f64, label: String::new() };
+        let mark =
+            |i: usize| Mark { tile: grid.tile(i), value: i as f64, label: String::new(), unfamiliar: i == 1 };
         let scale =
             Scale { title: "t", low: 0.0, high: 1.0, log: false, colours: colorous::VIRIDIS, landmark: None };
         let canvas = draw(64, &vec![[0.0; 3]; 64 * 32], &[mark(0), mark(1)], &scale);
@@ -240,6 +265,9 @@ mod tests {
         // Over black: 55 % of viridis' first and last colour.
         assert_eq!(at(16, 16), [68.0, 1.0, 84.0].map(|c: f32| (0.55 * c).round() as u8));
         assert_eq!(at(48, 16), [253.0, 231.0, 37.0].map(|c: f32| (0.55 * c).round() as u8));
+        // The mark of the second tile, and its like in the legend.
+        assert_eq!((at(34, 2), at(64 + 13, LEAST_HEIGHT - 16)), (&PAPER[..], &PAPER[..]));
+        assert_ne!(at(2, 2), PAPER);
     }
 
     #[test]

@@ -16,13 +16,16 @@ struct Summary<'a> {
     tone_mapping: ToneMapping,
     support_vectors: usize,
     gamma: f32,
+    /// Zones whose texture is familiar, and how far around them it still is, in standard deviations; null if all is.
+    familiar_zones: Option<usize>,
+    familiar_reach: Option<f32>,
     audience: Audience,
     record: &'a TrainingRecord,
 }
 
 pub fn run(args: &InspectArgs) -> anyhow::Result<()> {
     let model = load_model(args.model.as_deref())?;
-    let Model { descriptor, svm, record, .. } = &model;
+    let Model { descriptor, svm, familiarity, record, .. } = &model;
     let summary = Summary {
         digest: model.digest(),
         descriptor,
@@ -32,6 +35,8 @@ pub fn run(args: &InspectArgs) -> anyhow::Result<()> {
         tone_mapping: model.tone_mapping,
         support_vectors: svm.coefficients.len(),
         gamma: svm.gamma,
+        familiar_zones: familiarity.as_ref().map(|f| f.zones.len()),
+        familiar_reach: familiarity.as_ref().map(|f| f.reach),
         audience: model.audience,
         record,
     };
@@ -67,6 +72,11 @@ pub fn run(args: &InspectArgs) -> anyhow::Result<()> {
         "machine          C-SVC, RBF kernel, C = {}, γ = {}; {} support vectors of {} examples",
         record.c, record.gamma, summary.support_vectors, record.examples
     );
+    if let (Some(zones), Some(reach)) = (summary.familiar_zones, summary.familiar_reach) {
+        println!(
+            "familiar         {zones} zones, and textures within {reach:.3} standard deviations of them"
+        );
+    }
     println!("audience         T' = {} T + {}", model.audience.slope, model.audience.offset);
     println!("trained on       {}", record.corpus);
     println!("scenes           {}", record.scenes.join(", "));

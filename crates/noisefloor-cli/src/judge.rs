@@ -35,6 +35,8 @@ struct Row {
     converged: bool,
     /// Samples per pixel at which the tile should be converged; null if that is out of sight.
     expected_spp: Option<u64>,
+    /// Whether its texture is unlike any that the model has been tried on; P is then that of half the samples.
+    unfamiliar: bool,
 }
 
 #[derive(Serialize)]
@@ -44,6 +46,7 @@ struct Report<'a> {
     model: String,
     threshold: f32,
     converged_tiles: usize,
+    unfamiliar_tiles: usize,
     tiles: &'a [Row],
 }
 
@@ -130,6 +133,7 @@ pub fn run(args: &JudgeArgs) -> anyhow::Result<()> {
             tile: grid.tile(row.tile),
             value: f64::from(row.probability),
             label: format!("{:.2}", row.probability),
+            unfamiliar: row.unfamiliar,
         };
         let marks: Vec<Mark> = rows.iter().map(mark).collect();
         let title = "P(no noise\nis seen)";
@@ -253,16 +257,17 @@ fn judge(
     let describe = |&tile: &Tile| anyhow::Ok(oracle.describe(&evidence(tile)?, spp.max(1.0))?);
     let described = tiles.par_iter().map(describe).collect::<Result<Vec<_>, _>>()?;
     let row = |(tile, verdict): (Tile, Verdict)| {
-        let Verdict { converged, probability, expected_samples } = verdict;
+        let Verdict { converged, probability, expected_samples, unfamiliar } = verdict;
         let Tile { index, x, y, width, height } = tile;
         let (probability, expected_spp) = (probability.unwrap_or(0.0), expected_samples);
-        Row { tile: index, x, y, width, height, probability, converged, expected_spp }
+        Row { tile: index, x, y, width, height, probability, converged, expected_spp, unfamiliar }
     };
     Ok(tiles.into_iter().zip(oracle.judge_described(&described)).map(row).collect())
 }
 
 fn report(args: &JudgeArgs, oracle: &Oracle, rows: &[Row]) -> anyhow::Result<()> {
     let converged_tiles = rows.iter().filter(|r| r.converged).count();
+    let unfamiliar_tiles = rows.iter().filter(|r| r.unfamiliar).count();
     if args.json {
         let report = Report {
             image: &args.image,
@@ -270,6 +275,7 @@ fn report(args: &JudgeArgs, oracle: &Oracle, rows: &[Row]) -> anyhow::Result<()>
             model: oracle.model().digest(),
             threshold: oracle.threshold(),
             converged_tiles,
+            unfamiliar_tiles,
             tiles: rows,
         };
         println!("{}", serde_json::to_string_pretty(&report)?);
@@ -281,8 +287,12 @@ fn report(args: &JudgeArgs, oracle: &Oracle, rows: &[Row]) -> anyhow::Result<()>
         let expected = row.expected_spp.filter(|_| !row.converged).map_or(String::new(), |n| n.to_string());
         let size = format!("{}×{}", row.width, row.height);
         println!(
-            "{:4} {:5} {:5} {size:>8} {:6.3}  {verdict:10} {expected:>14}",
-            row.tile, row.x, row.y, row.probability
+            "{:4} {:5} {:5} {size:>8} {:6.3}  {verdict:10} {expected:>14}{}",
+            row.tile,
+            row.x,
+            row.y,
+            row.probability,
+            if row.unfamiliar { "  unfamiliar" } else { "" }
         );
     }
     println!(
@@ -291,5 +301,10 @@ fn report(args: &JudgeArgs, oracle: &Oracle, rows: &[Row]) -> anyhow::Result<()>
         args.spp[0],
         oracle.threshold()
     );
+    if unfamiliar_tiles > 0 {
+        println!(
+            "{unfamiliar_tiles} tiles have texture unlike any the model was tried on: their P is that of half the samples, and less certain"
+        );
+    }
     Ok(())
 }

@@ -58,6 +58,7 @@ struct StopRow {
     spp: u64,
     probability: Option<f32>,
     reason: String,
+    unfamiliar: bool,
 }
 
 /// report.json.
@@ -77,6 +78,8 @@ struct Report<'a> {
     complete: bool,
     tiles: usize,
     stops: BTreeMap<String, usize>,
+    /// Tiles with texture unlike any that the model has been tried on.
+    unfamiliar_tiles: usize,
     /// Over all pixels.
     samples: u64,
     /// What uniform rendering at the largest stop would take.
@@ -201,6 +204,7 @@ impl Output {
                     spp: stop.samples,
                     probability: stop.probability,
                     reason,
+                    unfamiliar: stop.unfamiliar,
                 }
             }),
         )
@@ -236,6 +240,7 @@ impl Output {
             complete: clock.is_some() && tiles.iter().all(|(_, open)| !open),
             tiles: tiles.len(),
             stops,
+            unfamiliar_tiles: tiles.iter().filter(|(stop, _)| stop.unfamiliar).count(),
             samples: session.film().total_samples(),
             samples_uniform: uniform_samples(session),
             samples_rejected: session.film().rejected(),
@@ -265,6 +270,13 @@ impl Output {
             film.total_samples() as f64 / pixels,
             100.0 * share,
         );
+        let unfamiliar = session.stops().filter(|s| s.unfamiliar).count();
+        if unfamiliar > 0 {
+            println!(
+                "{unfamiliar} tiles have texture unlike any the model was tried on: they got twice the samples it asks for, and their \
+                 verdicts are less certain"
+            );
+        }
         println!(
             "{:.1} s, of which {:.2} s ({:.2} %) in the oracle",
             clock.total_seconds,
@@ -296,9 +308,15 @@ fn tile_states<C: StoppingCriterion>(session: &Session<C>) -> Vec<(Stop, bool)> 
     let state = |tile: noisefloor::Tile| match stops.get(&tile.index) {
         Some(&stop) => (stop, false),
         None => {
-            let probability = session.verdict(tile.index).and_then(|v| v.probability);
-            let samples = session.film().samples(tile.index);
-            (Stop { tile, samples, probability, reason: StopReason::Cancelled }, true)
+            let verdict = session.verdict(tile.index);
+            let stop = Stop {
+                tile,
+                samples: session.film().samples(tile.index),
+                probability: verdict.and_then(|v| v.probability),
+                reason: StopReason::Cancelled,
+                unfamiliar: verdict.is_some_and(|v| v.unfamiliar),
+            };
+            (stop, true)
         }
     };
     session.film().grid().tiles().map(state).collect()
@@ -306,10 +324,13 @@ fn tile_states<C: StoppingCriterion>(session: &Session<C>) -> Vec<(Stop, bool)> 
 
 fn marks(tiles: &[(Stop, bool)]) -> Vec<Mark> {
     let label = |stop: &Stop, open: bool| format!("{}{}", stop.samples, if open { "+" } else { "" });
-    tiles
-        .iter()
-        .map(|(stop, open)| Mark { tile: stop.tile, value: stop.samples as f64, label: label(stop, *open) })
-        .collect()
+    let mark = |(stop, open): &(Stop, bool)| Mark {
+        tile: stop.tile,
+        value: stop.samples as f64,
+        label: label(stop, *open),
+        unfamiliar: stop.unfamiliar,
+    };
+    tiles.iter().map(mark).collect()
 }
 
 fn scale(tiles: &[(Stop, bool)]) -> Scale {

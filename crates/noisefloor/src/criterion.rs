@@ -36,6 +36,8 @@ pub struct Verdict {
     pub probability: Option<f32>,
     /// Samples per pixel at which the criterion expects to be satisfied, where it can tell.
     pub expected_samples: Option<u64>,
+    /// Whether the tile is unlike anything that the criterion was made for, so that its word has to be taken with care.
+    pub unfamiliar: bool,
 }
 
 /// Why a criterion could not judge.
@@ -134,6 +136,7 @@ impl StoppingCriterion for FixedSamples {
             converged: view.film.samples(t.index) >= self.0,
             probability: None,
             expected_samples: Some(self.0),
+            unfamiliar: false,
         };
         Ok(tiles.iter().map(verdict).collect())
     }

@@ -81,6 +81,12 @@ pub struct Table {
 }
 
 impl Zone {
+    /// The level nearest to the human threshold; `None` without levels.
+    pub(crate) fn at_threshold(&self) -> Option<&Level> {
+        let distance = |level: &Level| (level.spp / self.human_spp).ln().abs();
+        self.levels.iter().min_by(|a, b| distance(a).total_cmp(&distance(b)))
+    }
+
     /// A quantity of the levels that observers could choose, by increasing samples; realisations of one level are averaged.
     fn path(&self, quantity: impl Fn(usize) -> f64) -> Vec<(f64, f64)> {
         let mut path: Vec<(f64, f64, f64)> = Vec::new();
@@ -203,6 +209,8 @@ pub struct Prediction {
     pub predicted_spp: f64,
     /// Whether the human threshold is only a lower bound.
     pub censored: bool,
+    /// Whether the zone, at its human threshold, is unfamiliar to the model that predicts.
+    pub unfamiliar: bool,
     /// Real pictures of the zone that the prediction classifies as people did.
     #[serde(skip)]
     pub images_right: usize,
@@ -224,6 +232,7 @@ impl Prediction {
             zone: zone.zone,
             human_spp: zone.human_spp,
             censored: zone.censored,
+            unfamiliar: false,
             predicted_spp: spp.clamp(zone.first_spp, zone.last_spp),
             images_right: right.count(),
             images: real().count(),
@@ -247,7 +256,8 @@ pub fn predict(model: &Model, threshold: f32, zone: &Zone) -> Prediction {
     let odds = zone.path(|i| log_odds(f64::from(p[i])));
     let spp = crossing(&odds, log_odds(f64::from(threshold))).unwrap_or(zone.last_spp);
     let probabilities = zone.levels.iter().map(|l| l.spp).zip(p.iter().copied()).collect();
-    Prediction { probabilities, ..Prediction::new(zone, spp, |i| p[i] >= threshold) }
+    let unfamiliar = zone.at_threshold().is_some_and(|level| !model.is_familiar(&level.descriptor));
+    Prediction { probabilities, unfamiliar, ..Prediction::new(zone, spp, |i| p[i] >= threshold) }
 }
 
 /// Scores predictions. Censored thresholds stay out.

@@ -8,6 +8,7 @@
 //! - A renderer behind [`ProgressiveSource`] is driven by a [`Driver`].
 //! - [`Oracle`] is the [`StoppingCriterion`] made of a trained [`Model`]; [`FixedSamples`] is the simplest one.
 //! - [`Film`], [`Display`], [`TilePlanes`], [`NoiseMask`], [`Descriptor`] and [`Svm`] are the way from samples to a verdict.
+//! - [`Familiarity`] is what a model has been tried on; elsewhere it asks for twice the samples.
 //! - [`evaluation`] scores predicted thresholds against human ones; `training`, behind the feature `train`, makes models.
 //!
 //! ```
@@ -32,6 +33,7 @@ mod display;
 mod driver;
 pub mod evaluation;
 mod evidence;
+mod familiarity;
 mod film;
 mod mask;
 mod model;
@@ -51,6 +53,7 @@ pub use display::{
 };
 pub use driver::{Clock, Driver, DriverError, Event, Progress, TimelinePoint};
 pub use evidence::{APRON, Evidence, Rendering, Samples, TilePlanes, residual_scale};
+pub use familiarity::Familiarity;
 pub use film::{Film, FilmError};
 pub use mask::{NoiseMask, SigmaError};
 pub use model::{Model, ModelError, Scores, TrainingRecord};

@@ -6,6 +6,7 @@
 use crate::descriptor::Descriptor;
 use crate::display::ToneMapping;
 use crate::evidence::Evidence;
+use crate::familiarity::{CAUTION, Familiarity};
 use crate::params::Audience;
 use crate::svm::{Platt, Scaler, Svm};
 use serde::{Deserialize, Serialize};
@@ -13,7 +14,7 @@ use std::io::{self, Read, Write};
 use thiserror::Error;
 
 const MAGIC: [u8; 8] = *b"NFMODEL\0";
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 #[cfg(feature = "bundled-model")]
 static BUNDLED: &[u8] = include_bytes!("../models/human.nfm");
 /// Largest payload that is read: the paper's own model, 9,600 pairs of 2·128² numbers, would have 1.26 GB.
@@ -30,9 +31,17 @@ pub enum ModelError {
     Foreign,
     /// Written by a later release.
     #[error(
-        "the model has format version {found}, and this release reads up to {VERSION}: update noisefloor"
+        "the model has format version {found}, and this release reads version {VERSION}: update noisefloor"
     )]
     Newer {
+        /// Version in the file.
+        found: u32,
+    },
+    /// Written by an earlier release, whose models lack what this one needs.
+    #[error(
+        "the model has format version {found}, and this release reads version {VERSION}: train it again, with this release"
+    )]
+    Older {
         /// Version in the file.
         found: u32,
     },
@@ -109,6 +118,8 @@ pub struct Model {
     pub svm: Svm,
     /// From decision values to probabilities.
     pub platt: Platt,
+    /// What pictures it has been tried on; `None` if the descriptor does not tell noise from picture.
+    pub familiarity: Option<Familiarity>,
     /// Whose thresholds it predicts, as a line from those of the training data.
     pub audience: Audience,
     /// Where it comes from.
@@ -126,7 +137,7 @@ impl Model {
     /// Reads a model.
     ///
     /// # Errors
-    /// [`ModelError`] if it is foreign, damaged, oversized, newer, contradicts itself, or needs another descriptor version.
+    /// [`ModelError`] if it is foreign, damaged, oversized, newer, older, contradicts itself, or needs another descriptor version.
     pub fn read(mut from: impl Read) -> Result<Self, ModelError> {
         // Read the header. A file too short to have one is foreign.
         let mut magic = [0; 8];
@@ -143,6 +154,9 @@ impl Model {
         let version = u32::from_le_bytes(version.try_into().unwrap_or_default());
         if version > VERSION {
             return Err(ModelError::Newer { found: version });
+        }
+        if version < VERSION {
+            return Err(ModelError::Older { found: version });
         }
         let length = u64::from_le_bytes(length.try_into().unwrap_or_default());
         if length > MAX_PAYLOAD {
@@ -194,11 +208,24 @@ impl Model {
             .map_err(|e| ModelError::Invalid(e.to_string()))
     }
 
-    /// Probability in [0, 1] that an observer sees no difference, of a raw descriptor, which is scaled in place.
+    /// Whether a tile shows texture such as the training zones had, by its raw descriptor; see [`Familiarity`]. Always so if the
+    /// descriptor does not tell noise from picture.
+    pub fn is_familiar(&self, descriptor: &[f32]) -> bool {
+        let Some(known) = &self.familiarity else { return true };
+        let mut scaled = descriptor.to_vec();
+        self.scaler.apply(&mut scaled);
+        known.includes(&self.descriptor.texture_of(&scaled))
+    }
+
+    /// Probability in [0, 1] that an observer sees no difference, of a raw descriptor, which is scaled in place. Of an unfamiliar
+    /// one it is what P would be with half of the samples.
     ///
     /// # Panics
     /// If the descriptor has not the model's number of numbers.
     pub fn probability(&self, descriptor: &mut [f32]) -> f32 {
+        if !self.is_familiar(descriptor) {
+            self.descriptor.project(descriptor, 1.0 / CAUTION);
+        }
         self.scaler.apply(descriptor);
         self.platt.probability(self.svm.decision(descriptor))
     }
@@ -216,6 +243,15 @@ impl Model {
         }
         if self.svm.coefficients.is_empty() || self.svm.vectors.len() != self.svm.coefficients.len() * n {
             return invalid("support vectors and descriptor differ in length");
+        }
+        if let Some(Familiarity { zones, reach }) = &self.familiarity {
+            let known = self.descriptor.texture_numbers();
+            if known == 0 || zones.is_empty() || zones.iter().any(|zone| zone.len() != known) {
+                return invalid("familiar zones and descriptor differ in length");
+            }
+            if !(*reach >= 0.0 && reach.is_finite() && zones.iter().flatten().all(|v| v.is_finite())) {
+                return invalid("what is familiar is not a finite number");
+            }
         }
         let numbers = [&self.scaler.mean, &self.scaler.scale, &self.svm.coefficients, &self.svm.vectors];
         let scalars = [self.svm.rho, self.svm.gamma, self.platt.a, self.platt.b];
@@ -260,6 +296,7 @@ pub(crate) mod tests {
             scaler: Scaler::identity(n),
             svm: Svm { gamma: 0.1, rho: 0.0, coefficients: vec![1.0, -1.0], vectors },
             platt: Platt { a: -2.0, b: 0.0 },
+            familiarity: None,
             audience: Audience::TRAINED,
             record: TrainingRecord::default(),
         }
@@ -287,6 +324,45 @@ pub(crate) mod tests {
         assert!(model.record.leave_one_scene_out.is_some_and(|s| s.zones == 128));
     }
 
+    /// An unfamiliar tile has the P that a familiar one of the same noise has with half of the samples.
+    #[test]
+    fn what_is_unfamiliar_is_judged_as_if_it_had_half_the_samples() {
+        let zones = vec![vec![0.5; small().descriptor.texture_numbers()]];
+        let cautious = Model { familiarity: Some(Familiarity { zones, reach: 0.1 }), ..small() };
+        let mut tile = vec![0.5; small().descriptor.len()];
+        assert!(cautious.is_familiar(&tile) && small().is_familiar(&tile));
+        assert_eq!(cautious.probability(&mut tile.clone()), small().probability(&mut tile.clone()));
+
+        tile[1] += 0.11;
+        assert!(!cautious.is_familiar(&tile) && small().is_familiar(&tile));
+        let mut halved = tile.clone();
+        small().descriptor.project(&mut halved, 0.5);
+        let p = cautious.probability(&mut tile.clone());
+        assert_eq!(p, small().probability(&mut halved));
+        assert!(p < small().probability(&mut tile));
+    }
+
+    #[cfg(feature = "bundled-model")]
+    #[test]
+    fn clean_tiles_are_converged_and_noisy_ones_are_not_whatever_the_texture() {
+        let model = Model::bundled();
+        for textured in 0..=17 {
+            // From no texture at all, ln 2, to a checkerboard of black and white, ln 128.
+            let texture = 0.693 + 0.25 * textured as f32;
+            let p = |noise: f32| {
+                let mut tile = vec![texture; model.descriptor.len()];
+                // Of the tile and of its picture.
+                (tile[0], tile[3]) = (noise, noise);
+                model.probability(&mut tile)
+            };
+            // From no noise, at the floor, to white noise from black to white: 128 steps, which the masks and the weights of the
+            // scales let through almost whole.
+            let path: Vec<f32> = (0..=83).map(|i| p(-3.45 + 0.1 * i as f32)).collect();
+            assert!(path[0] > 0.99 && path[83] < 0.02, "{texture}: {path:?}");
+            assert!(path.windows(2).all(|w| w[1] <= w[0] + 1e-3), "{texture}: {path:?}");
+        }
+    }
+
     #[test]
     fn each_fault_has_its_error() {
         let read = |bytes: &[u8]| Model::read(bytes).unwrap_err();
@@ -297,8 +373,10 @@ pub(crate) mod tests {
         assert!(matches!(read(&whole[..whole.len() - 1]), ModelError::Damaged(_)));
         assert!(matches!(read(&[&whole[..], b"x"].concat()), ModelError::Damaged(_)));
         let mut newer = whole.clone();
-        newer[8] = 2;
-        assert!(matches!(read(&newer), ModelError::Newer { found: 2 }));
+        newer[8] = 3;
+        assert!(matches!(read(&newer), ModelError::Newer { found: 3 }));
+        newer[8] = 1;
+        assert!(matches!(read(&newer), ModelError::Older { found: 1 }));
         let mut oversized = whole.clone();
         oversized[19] = 0xff;
         assert!(matches!(read(&oversized), ModelError::Oversized(_)));
@@ -315,6 +393,14 @@ pub(crate) mod tests {
         assert!(matches!(fails(|m| m.svm.gamma = 0.0), ModelError::Invalid(_)));
         assert!(matches!(fails(|m| m.svm.vectors.truncate(3)), ModelError::Invalid(_)));
         assert!(matches!(fails(|m| m.scaler.mean.clear()), ModelError::Invalid(_)));
+        let n = small().descriptor.texture_numbers();
+        let known = |zone: Vec<f32>, reach| Some(Familiarity { zones: vec![zone], reach });
+        let none = Some(Familiarity { zones: vec![], reach: 1.0 });
+        let short = known(vec![0.0; n - 1], 1.0);
+        for familiarity in [none, short, known(vec![0.0; n], -1.0), known(vec![f32::NAN; n], 1.0)] {
+            let model = Model { familiarity, ..small() };
+            assert!(matches!(model.write(Vec::new()).unwrap_err(), ModelError::Invalid(_)));
+        }
         assert!(matches!(fails(|m| m.descriptor_version = 99), ModelError::Descriptor { needed: 99, .. }));
     }
 

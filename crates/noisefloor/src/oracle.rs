@@ -76,11 +76,12 @@ impl Oracle {
 
     /// A verdict by a whole, raw descriptor.
     fn verdict(&self, raw: &[f32], samples: u64) -> Verdict {
+        let unfamiliar = !self.model.is_familiar(raw);
         let mut scaled = raw.to_vec();
         let probability = self.model.probability(&mut scaled);
         let converged = probability >= self.threshold;
         let expected_samples = if converged { Some(samples) } else { self.expect(raw, &mut scaled, samples) };
-        Verdict { converged, probability: Some(probability), expected_samples }
+        Verdict { converged, probability: Some(probability), expected_samples, unfamiliar }
     }
 
     /// The visible noise (see [`crate::Descriptor::visible_noise`]) from which it is seen: of an even noise in a tile of the mean
@@ -223,7 +224,12 @@ impl StoppingCriterion for Oracle {
         let asked: Vec<Option<Vec<f32>>> = tiles.iter().map(|t| numbers[t.index].take()).collect();
         let judge = |(tile, raw): (&Tile, Option<Vec<f32>>)| match raw {
             Some(raw) => self.verdict(&raw, view.film.samples(tile.index)),
-            None => Verdict { converged: false, probability: Some(0.0), expected_samples: None },
+            None => Verdict {
+                converged: false,
+                probability: Some(0.0),
+                expected_samples: None,
+                unfamiliar: false,
+            },
         };
         Ok(tiles.par_iter().zip(asked).map(judge).collect())
     }
@@ -242,6 +248,11 @@ mod tests {
 
     /// A film of 64×64 pixels with `samples` samples of standard deviation `sigma` around grey.
     fn film(samples: u32, sigma: f32) -> Film {
+        film_of(|_| 0.2, samples, sigma)
+    }
+
+    /// The same around a picture that is given by the number of the pixel.
+    fn film_of(picture: fn(usize) -> f32, samples: u32, sigma: f32) -> Film {
         let mut film = Film::new(TileGrid::new(64, 64, 64).unwrap());
         let mut state = 5u64;
         let mut bell = || {
@@ -254,7 +265,7 @@ mod tests {
         for _ in 0..2 {
             let half = samples / 2;
             let batch: Vec<Rgb> =
-                (0..64 * 64).map(|_| [0.2 + sigma * bell() / (half as f32).sqrt(); 3]).collect();
+                (0..64 * 64).map(|i| [picture(i) + sigma * bell() / (half as f32).sqrt(); 3]).collect();
             film.add(0, half, &batch).unwrap();
         }
         film
@@ -312,6 +323,49 @@ mod tests {
             oracle.model().probability(&mut raw)
         };
         assert!(descriptor(0.99 * just) > DEFAULT_THRESHOLD && descriptor(1.01 * just) < DEFAULT_THRESHOLD);
+    }
+
+    /// Single pixels of black and white: more contrast than any zone of the training data has.
+    #[cfg(feature = "bundled-model")]
+    fn checker(pixel: usize) -> f32 {
+        if (pixel + pixel / 64).is_multiple_of(2) { 0.0 } else { 1.0 }
+    }
+
+    #[cfg(feature = "bundled-model")]
+    #[test]
+    fn what_nobody_was_asked_about_is_told_from_what_is_only_noisy_or_clean() {
+        let verdict = |film: &Film| judge(&mut Oracle::bundled(), film, None).unwrap();
+        // Black, next to black, and flat: nothing unheard of, and nothing to see.
+        for picture in [|_| 0.0, |_| 1e-9, |_| 0.2] {
+            let flat = verdict(&film_of(picture, 100, 0.0));
+            assert!(!flat.unfamiliar && flat.converged, "{flat:?}");
+        }
+        // Noise alone, however much, is no texture: it is not converged, and is expected to be.
+        for sigma in [1.0, 10.0] {
+            let noisy = verdict(&film_of(|_| 0.2, 100, sigma));
+            assert!(
+                !noisy.unfamiliar && !noisy.converged && noisy.expected_samples > Some(1000),
+                "{noisy:?}"
+            );
+        }
+        // More contrast than any zone had: said, and done all the same when it is clean.
+        let contrast = verdict(&film_of(checker, 100, 0.0));
+        assert!(contrast.unfamiliar && contrast.converged, "{contrast:?}");
+    }
+
+    #[cfg(feature = "bundled-model")]
+    #[test]
+    fn an_unfamiliar_tile_gets_twice_the_samples() {
+        let careless = Model { familiarity: None, ..Model::bundled() };
+        let film = film_of(checker, 100, 2.0);
+        let expected = |model: Model| {
+            let verdict = judge(&mut Oracle::new(model, DEFAULT_THRESHOLD).unwrap(), &film, None).unwrap();
+            assert!(!verdict.converged, "{verdict:?}");
+            verdict.expected_samples.unwrap() as f64
+        };
+        let ratio = expected(Model::bundled()) / expected(careless);
+        // The expected need is found to a fiftieth of a doubling, each time.
+        assert!((ratio.log2() - 1.0).abs() < 0.04, "{ratio}");
     }
 
     #[test]

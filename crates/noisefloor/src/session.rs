@@ -52,6 +52,8 @@ pub struct Stop {
     pub probability: Option<f32>,
     /// Why.
     pub reason: StopReason,
+    /// Whether the last verdict said that the tile is unlike anything the criterion was made for.
+    pub unfamiliar: bool,
 }
 
 /// What can go wrong in a session.
@@ -317,6 +319,7 @@ impl<C: StoppingCriterion> Session<C> {
             samples: self.film.samples(index),
             probability: state.verdict.and_then(|v| v.probability),
             reason,
+            unfamiliar: state.verdict.is_some_and(|v| v.unfamiliar),
         };
         *state.stop.insert(stop)
     }
@@ -420,6 +423,7 @@ mod tests {
                     converged: samples >= enough,
                     probability: Some(0.5),
                     expected_samples: Some(enough),
+                    unfamiliar: tile.index == 1,
                 }
             };
             Ok(tiles.iter().map(verdict).collect())
@@ -447,6 +451,7 @@ mod tests {
         let expected = [(300, Converged), (600, Converged), (900, Converged)];
         let mut s = session(300, true, Params::default());
         assert_eq!(run(&mut s), expected);
+        assert!(s.stops().map(|stop| stop.unfamiliar).eq([false, true, false]));
         assert_eq!(s.film().half_counts(1), [300, 300]);
         assert_eq!(run(&mut session(300, false, Params::default())), expected);
     }

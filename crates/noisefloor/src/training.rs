@@ -1,6 +1,7 @@
 //! Learning a model from a table of human thresholds, and scoring it on scenes it has not seen.
 
 use crate::evaluation::{Prediction, Scores, Table, Zone, predict, score};
+use crate::familiarity::{Familiarity, nearest};
 use crate::model::{Model, TrainingRecord};
 use crate::oracle::DEFAULT_THRESHOLD;
 use crate::params::Audience;
@@ -109,7 +110,13 @@ impl Machine {
         })
     }
 
-    fn into_model(self, table: &Table, platt: Platt, record: TrainingRecord) -> Model {
+    fn into_model(
+        self,
+        table: &Table,
+        platt: Platt,
+        familiarity: Option<Familiarity>,
+        record: TrainingRecord,
+    ) -> Model {
         Model {
             descriptor: table.descriptor,
             descriptor_version: table.descriptor.version(),
@@ -118,6 +125,7 @@ impl Machine {
             scaler: self.scaler,
             svm: self.svm,
             platt,
+            familiarity,
             audience: Audience::TRAINED,
             record,
         }
@@ -166,7 +174,7 @@ fn fit_groups(
         let predictions: Vec<Prediction> = folds
             .into_iter()
             .flat_map(|(machine, zones)| {
-                let model = machine.into_model(table, platt, record.clone());
+                let model = machine.into_model(table, platt, None, record.clone());
                 zones.into_iter().map(|z| predict(&model, DEFAULT_THRESHOLD, z)).collect::<Vec<_>>()
             })
             .collect();
@@ -180,6 +188,38 @@ fn fit_groups(
     // All groups train the machine; the sigmoid stays that of held-out decision values.
     let chosen = params.candidates[best];
     Ok((Machine::fit(&of(&|_| true), chosen, params.range)?, outcomes[best].1, chosen))
+}
+
+/// Share of the zones of left-out scenes that are familiar to the others.
+const FAMILIAR: f64 = 0.95;
+
+/// What pictures the zones of `groups` show, and how far from those of the others the zones of each group lie. `None` if the
+/// descriptor does not tell noise from picture.
+fn familiarity(table: &Table, groups: &[&str], scaler: &Scaler) -> Option<Familiarity> {
+    let whole = table.descriptor.len();
+    if table.descriptor.texture_numbers() == 0 {
+        return None;
+    }
+    let known: Vec<(&str, Vec<f32>)> = table
+        .zones
+        .iter()
+        .filter(|zone| groups.contains(&zone.group.as_str()))
+        .filter_map(|zone| {
+            // A descriptor of which numbers were taken away does not say which are left.
+            let mut numbers = zone.at_threshold()?.descriptor.clone();
+            (numbers.len() == whole).then(|| {
+                scaler.apply(&mut numbers);
+                (zone.group.as_str(), table.descriptor.texture_of(&numbers))
+            })
+        })
+        .collect();
+    let others = |group| known.iter().filter(move |(of, _)| *of != group).map(|(_, numbers)| numbers);
+    let mut distances: Vec<f32> =
+        known.iter().map(|(group, numbers)| nearest(others(*group), numbers)).collect();
+    distances.sort_by(f32::total_cmp);
+    let within = (FAMILIAR * distances.len() as f64).ceil() as usize;
+    let reach = *distances.get(within.checked_sub(1)?)?;
+    Some(Familiarity { zones: known.into_iter().map(|(_, numbers)| numbers).collect(), reach })
 }
 
 fn check(table: &Table, params: &TrainParams, needed: usize) -> Result<(), TrainError> {
@@ -212,7 +252,8 @@ pub fn leave_one_scene_out(
         on_fold(left_out);
         let others: Vec<&str> = groups.iter().copied().filter(|&g| g != left_out).collect();
         let (machine, platt, _) = fit_groups(table, &others, params)?;
-        let model = machine.into_model(table, platt, TrainingRecord::default());
+        let known = familiarity(table, &others, &machine.scaler);
+        let model = machine.into_model(table, platt, known, TrainingRecord::default());
         let zones = table.zones.iter().filter(|z| z.group == left_out);
         predictions.extend(zones.map(|z| predict(&model, threshold, z)));
     }
@@ -232,6 +273,7 @@ pub fn train(
 ) -> Result<Model, TrainError> {
     check(table, params, 2)?;
     let (machine, platt, SvmParams { c, gamma }) = fit_groups(table, &table.groups(), params)?;
+    let known = familiarity(table, &table.groups(), &machine.scaler);
     let record = TrainingRecord {
         corpus,
         table_digest: table.digest(),
@@ -241,7 +283,7 @@ pub fn train(
         gamma,
         leave_one_scene_out,
     };
-    Ok(machine.into_model(table, platt, record))
+    Ok(machine.into_model(table, platt, known, record))
 }
 
 #[cfg(test)]
@@ -303,6 +345,32 @@ mod tests {
         let errors = predictions.iter().map(|p| (p.predicted_spp / p.human_spp / nine_in_ten).ln().abs());
         let error_factor = (errors.sum::<f64>() / 24.0).exp();
         assert!(error_factor < 1.2, "{error_factor}");
+    }
+
+    /// Zones at 0, 1, 2, … in one number of texture, each of a group of its own: all are 1 from the next.
+    #[test]
+    fn what_scenes_have_in_common_is_familiar() {
+        let mut table = table(4);
+        table.zones.truncate(20);
+        for (i, zone) in table.zones.iter_mut().enumerate() {
+            zone.group = format!("{i}");
+            for level in &mut zone.levels {
+                level.descriptor[1..].fill(0.0);
+                level.descriptor[1] = i as f32;
+            }
+        }
+        // One lies apart: it is the one in twenty that is not familiar to the others.
+        table.zones[19].levels.iter_mut().for_each(|level| level.descriptor[1] = 30.0);
+        let scaler = Scaler::identity(table.descriptor.len());
+        let known = familiarity(&table, &table.groups(), &scaler).unwrap();
+        assert_eq!(known.reach, 1.0);
+        let includes = |texture: f32| {
+            let mut numbers = vec![0.0; table.descriptor.texture_numbers()];
+            numbers[0] = texture;
+            known.includes(&numbers)
+        };
+        assert!(includes(-1.0) && includes(18.9) && includes(30.5));
+        assert!(!includes(-1.1) && !includes(25.0) && !includes(40.0));
     }
 
     #[test]

@@ -225,5 +225,5 @@ fn columns_are_in_the_order_that_is_documented() {
     args.extend(["--csv", text(&zones)]);
     succeed(&args);
     let text = std::fs::read_to_string(&zones).unwrap();
-    assert_eq!(text.lines().next(), Some("scene,zone,human_spp,predicted_spp,censored"));
+    assert_eq!(text.lines().next(), Some("scene,zone,human_spp,predicted_spp,censored,unfamiliar"));
 }

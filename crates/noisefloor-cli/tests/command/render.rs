@@ -2,7 +2,7 @@ use crate::kit::{FILES, column, json, succeed, table, text, tiny};
 use noisefloor_exr::{Picture, read_exr, read_picture};
 use tempfile::tempdir;
 
-const STOPS: &str = "tile,x,y,width,height,spp,probability,reason";
+const STOPS: &str = "tile,x,y,width,height,spp,probability,reason,unfamiliar";
 
 #[test]
 fn writes_all_it_promises() {
@@ -38,6 +38,8 @@ fn writes_all_it_promises() {
     assert_eq!(report["samples"].as_u64(), Some(spp().sum::<u64>() * 32 * 32));
     assert_eq!(report["samples_uniform"].as_u64(), Some(spp().max().unwrap() * 64 * 64));
     assert_eq!(report["complete"].as_bool(), Some(true));
+    let unfamiliar = rows.iter().filter(|r| r[8] == "true").count() as u64;
+    assert_eq!(report["unfamiliar_tiles"].as_u64(), Some(unfamiliar));
     assert!(report["seconds_source"].as_f64() > Some(0.0) && report["seconds_oracle"].as_f64() > Some(0.0));
     let digest = report["model"].as_str().unwrap();
     assert!(succeed(&["inspect"]).contains(digest) && digest.len() == 64);

@@ -26,6 +26,8 @@ pub(super) const NAMES: [&str; 6] = [
 pub(super) const OWN: usize = 3;
 /// Which of them are noise, the tile's and the picture's.
 const NOISE: [usize; 2] = [0, OWN];
+/// Which of the tile's own are texture, and stay as they are when noise falls.
+pub(super) const TEXTURE: [usize; 2] = [1, 2];
 
 /// Edge of a block at full resolution, in pixels; the apron is one block.
 const BLOCK: usize = APRON;
@@ -382,6 +384,7 @@ mod tests {
             project(&mut projected, factor);
             planes.residual.mapv_inplace(|v| v / factor.sqrt());
             let real = whole(&planes, 10.0 * factor);
+            prop_assert!(TEXTURE.iter().all(|&i| real[i] == projected[i]));
             prop_assert!(real.iter().zip(&projected).all(|(r, p)| (r - p).abs() < 1e-3), "{real:?} {projected:?}");
         }
 

@@ -151,6 +151,23 @@ impl Descriptor {
         }
     }
 
+    /// Those of the numbers that are the tile's own texture, and stay as they are when noise falls; empty if the descriptor does not
+    /// tell noise from picture.
+    pub(crate) fn texture_of(&self, numbers: &[f32]) -> Vec<f32> {
+        match self {
+            Self::Compact { .. } => compact::TEXTURE.map(|i| numbers[i]).to_vec(),
+            Self::MaskPair { .. } => Vec::new(),
+        }
+    }
+
+    /// How many of the numbers are texture.
+    pub(crate) fn texture_numbers(&self) -> usize {
+        match self {
+            Self::Compact { .. } => compact::TEXTURE.len(),
+            Self::MaskPair { .. } => 0,
+        }
+    }
+
     /// Changes a raw descriptor into what it would be with `factor` times the samples, if noise alone changes, as 1/√n. False if
     /// the descriptor does not tell noise from picture.
     pub(crate) fn project(&self, descriptor: &mut [f32], factor: f32) -> bool {
