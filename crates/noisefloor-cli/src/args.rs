@@ -29,6 +29,7 @@ pub enum Command {
     Judge(JudgeArgs),
     Train(TrainArgs),
     Evaluate(EvaluateArgs),
+    Audience(AudienceArgs),
     Inspect(InspectArgs),
     /// List the built-in scenes.
     Scenes,
@@ -236,6 +237,36 @@ pub struct EvaluateArgs {
     pub without: Vec<String>,
     #[command(flatten)]
     pub search: SearchArgs,
+}
+
+/// Work out how much harder than the observers of a model other people look.
+#[derive(Debug, Args)]
+pub struct AudienceArgs {
+    #[command(subcommand)]
+    pub command: AudienceCommand,
+}
+
+#[derive(Debug, Subcommand)]
+pub enum AudienceCommand {
+    Fit(FitArgs),
+}
+
+/// Fit the line T' = a T + b from the thresholds T of the observers to those of an audience, T'.
+///
+/// Show your audience zones for which thresholds of the observers are known, or that a model predicts. FILE.csv has a line a zone, and
+/// the columns `observers` and `audience`, in samples per pixel; others are passed over. Prints the line (median of slopes, which
+/// bears outliers), Pearson's r, 95 % intervals of a and b by bootstrap, and what to give to `render`.
+#[derive(Debug, Args)]
+#[command(after_help = "Example:
+  noisefloor audience fit students.csv
+  noisefloor render --audience 1.94,-346")]
+pub struct FitArgs {
+    /// Pairs of thresholds.
+    #[arg(value_name = "FILE.csv")]
+    pub file: PathBuf,
+    /// Print JSON.
+    #[arg(long)]
+    pub json: bool,
 }
 
 /// Show what a model depends on and where it comes from.

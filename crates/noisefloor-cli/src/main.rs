@@ -3,6 +3,7 @@
 #![allow(clippy::print_stdout, reason = "a command prints")]
 
 mod args;
+mod audience;
 mod evaluate;
 mod figures;
 mod heat_map;
@@ -25,6 +26,7 @@ fn main() -> ExitCode {
         Command::Judge(args) => judge::run(&args).map(|()| ExitCode::SUCCESS),
         Command::Train(args) => train::run(&args).map(|()| ExitCode::SUCCESS),
         Command::Evaluate(args) => evaluate::run(&args).map(|()| ExitCode::SUCCESS),
+        Command::Audience(args) => audience::run(&args.command).map(|()| ExitCode::SUCCESS),
         Command::Inspect(args) => inspect::run(&args).map(|()| ExitCode::SUCCESS),
         Command::Scenes => {
             inspect::scenes();

@@ -9,6 +9,7 @@
 //! - [`Oracle`] is the [`StoppingCriterion`] made of a trained [`Model`]; [`FixedSamples`] is the simplest one.
 //! - [`Film`], [`Display`], [`TilePlanes`], [`NoiseMask`], [`Descriptor`] and [`Svm`] are the way from samples to a verdict.
 //! - [`Familiarity`] is what a model has been tried on; elsewhere it asks for twice the samples.
+//! - [`AudienceFit`] is the line from the thresholds of one public to those of another.
 //! - [`evaluation`] scores predicted thresholds against human ones; `training`, behind the feature `train`, makes models.
 //!
 //! ```
@@ -27,6 +28,7 @@
 //! # Ok::<(), noisefloor::SessionError>(())
 //! ```
 
+mod audience;
 mod criterion;
 mod descriptor;
 mod display;
@@ -46,6 +48,7 @@ mod tile;
 #[cfg(feature = "train")]
 pub mod training;
 
+pub use audience::{AudienceFit, AudienceFitError, MAX_PAIRS, MIN_PAIRS};
 pub use criterion::{CriterionError, FixedSamples, Needs, StoppingCriterion, Verdict, View};
 pub use descriptor::{Described, Descriptor, DescriptorError};
 pub use display::{

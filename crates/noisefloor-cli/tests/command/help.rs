@@ -2,7 +2,7 @@ use crate::kit::succeed;
 
 #[test]
 fn every_subcommand_explains_itself() {
-    let options: [(&str, &[&str]); 6] = [
+    let options: [(&str, &[&str]); 7] = [
         (
             "render",
             &[
@@ -35,6 +35,7 @@ fn every_subcommand_explains_itself() {
         ),
         ("train", &["--corpus", "--table", "--out", "--save-table", "--sigma"]),
         ("evaluate", &["--corpus", "--model", "--leave-one-scene-out", "--json", "--csv"]),
+        ("audience", &["fit"]),
         ("inspect", &["MODEL", "--json"]),
         ("scenes", &["--help"]),
     ];

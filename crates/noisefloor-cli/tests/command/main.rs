@@ -1,5 +1,8 @@
 //! Tests of the `noisefloor` command as it is run: exit codes, files, and one line an error. One module a subject.
 
+/// Lines from one public to another.
+#[cfg(test)]
+mod audience;
 /// One line, no panic, nothing lost.
 #[cfg(test)]
 mod bad_input;
