@@ -99,7 +99,7 @@ impl Canvas {
     fn corner(&mut self, x: usize, y: usize) {
         for row in 0..CORNER {
             for column in 0..CORNER - row {
-                let on_edge = row + column >= CORNER - 2;
+                let on_edge = row == 0 || column == 0 || row + column >= CORNER - 2;
                 self.set(x + column, y + row, if on_edge { INK } else { PAPER });
             }
         }
