@@ -1,5 +1,7 @@
 //! Support vector machine: prediction here; training behind the feature `train`.
 
+#[cfg(feature = "train")]
+mod gram;
 mod platt;
 mod predict;
 #[cfg(feature = "train")]
@@ -8,4 +10,7 @@ mod train;
 pub use platt::Platt;
 pub use predict::{Scaler, Svm};
 #[cfg(feature = "train")]
-pub use train::{SvmParams, SvmTrainError, fit_platt, fit_svm};
+pub use {
+    gram::{coordinates, squared_distances},
+    train::{SvmParams, SvmTrainError, Weights, fit_platt, fit_svm, fit_weights},
+};

@@ -1,5 +1,6 @@
 //! Training through linfa-svm.
 
+use super::gram::{coordinates, squared_distances};
 use super::{Platt, Svm};
 use linfa::composing::platt_scaling::{Platt as LinfaPlatt, platt_newton_method};
 use linfa::prelude::*;
@@ -55,6 +56,18 @@ const SOLVER_EPS: f64 = 1e-3;
 /// linfa drops support vectors lighter than this from its decision function; the same are left out here.
 const LIGHTEST: f64 = 100.0 * f64::EPSILON;
 
+/// Rows longer than this are trained on through [`coordinates`]: the matrix product then costs less than linfa's kernel.
+const WIDE: usize = 256;
+
+/// What a machine has learned of its examples.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Weights {
+    /// αᵢ·yᵢ of each example, in their order; 0 for those that are no support vectors.
+    pub alpha: Vec<f64>,
+    /// ρ: subtracted from the weighted sum.
+    pub rho: f64,
+}
+
 /// Trains on scaled descriptors, one a row; `converged[i]` is the class of row i.
 ///
 /// # Errors
@@ -64,6 +77,28 @@ pub fn fit_svm(
     converged: &[bool],
     params: SvmParams,
 ) -> Result<Svm, SvmTrainError> {
+    let weights = fit_weights(rows, converged, params)?;
+
+    // Keep the rows that carry weight.
+    let kept = || (0..rows.nrows()).filter(|&i| weights.alpha[i] != 0.0);
+    Ok(Svm {
+        gamma: params.gamma as f32,
+        rho: weights.rho as f32,
+        coefficients: kept().map(|i| weights.alpha[i] as f32).collect(),
+        vectors: kept().flat_map(|i| rows.row(i).to_vec()).map(|v| v as f32).collect(),
+    })
+}
+
+/// As [`fit_svm`], but leaves the rows with the caller. Only the distances between rows matter: for several machines on parts of the
+/// same long rows, compute their [`coordinates`] once.
+///
+/// # Errors
+/// Those of [`fit_svm`].
+pub fn fit_weights(
+    rows: ArrayView2<'_, f64>,
+    converged: &[bool],
+    params: SvmParams,
+) -> Result<Weights, SvmTrainError> {
     let SvmParams { c, gamma } = params;
     if !(c.is_finite() && c > 0.0 && gamma.is_finite() && gamma > 0.0) {
         return Err(SvmTrainError::Params { c, gamma });
@@ -76,16 +111,14 @@ pub fn fit_svm(
     if positive == 0 || positive == converged.len() {
         return Err(SvmTrainError::OneClass { examples: converged.len(), converged: positive });
     }
-    let trained = fit_linfa(rows, converged, params)?;
-
-    // Keep the rows that carry weight.
-    let kept = || (0..rows.nrows()).filter(|&i| trained.alpha[i].abs() > LIGHTEST);
-    Ok(Svm {
-        gamma: gamma as f32,
-        rho: trained.rho as f32,
-        coefficients: kept().map(|i| trained.alpha[i] as f32).collect(),
-        vectors: kept().flat_map(|i| rows.row(i).to_vec()).map(|v| v as f32).collect(),
-    })
+    let trained = if rows.ncols() > WIDE {
+        let short = coordinates(squared_distances(rows, |_, _| ()).view());
+        fit_linfa(short.view(), converged, params)?
+    } else {
+        fit_linfa(rows, converged, params)?
+    };
+    let weight = |a: f64| if a.abs() > LIGHTEST { a } else { 0.0 };
+    Ok(Weights { alpha: trained.alpha.iter().map(|&a| weight(a)).collect(), rho: trained.rho })
 }
 
 fn fit_linfa(
@@ -145,16 +178,22 @@ mod tests {
         (rows, labels)
     }
 
-    /// Within 10⁻⁴ of linfa's own decision values, also with C = 100, where coefficients are large and roundings add up.
+    /// Within 10⁻⁴ of linfa's own decision values, also with C = 100, where coefficients are large and roundings add up; and for rows that
+    /// linfa is given as coordinates.
     #[test]
     fn prediction_equals_linfa() {
-        let (rows, labels) = clouds(300, 20);
-        for params in
-            [SvmParams { c: 1.0, gamma: 0.02 }, SvmParams { c: 100.0, gamma: 0.05 }, SvmParams::PAPER]
-        {
+        for (examples, dimensions, c, gamma) in [
+            (300, 20, 1.0, 0.02),
+            (300, 20, 100.0, 0.05),
+            (300, 20, 2.0, 2.0),
+            (120, WIDE + 44, 2.0, 0.002),
+            (120, WIDE + 44, 2.0, 2.0),
+        ] {
+            let params = SvmParams { c, gamma };
+            let (rows, labels) = clouds(examples, dimensions);
             let ours = fit_svm(rows.view(), &labels, params).unwrap();
             let theirs = fit_linfa(rows.view(), &labels, params).unwrap();
-            let (probe, _) = clouds(77, 20);
+            let (probe, _) = clouds(77, dimensions);
             for x in probe.axis_iter(Axis(0)).chain(rows.axis_iter(Axis(0))) {
                 let decision = theirs.weighted_sum(&x) - theirs.rho;
                 let x32: Vec<f32> = x.iter().map(|&v| v as f32).collect();

@@ -1,0 +1,193 @@
+//! Distances between long rows, all at once, and short rows with the same distances.
+//!
+//! linfa-svm computes its kernel matrix from rows, one scalar after another in one thread, and takes no matrix that is there
+//! already. For the paper's descriptor, 9,600 rows of 32,768 numbers, that would take hours. Here the distances come from a blocked
+//! matrix product, and linfa is given rows of as few numbers as have these distances.
+
+use ndarray::linalg::general_mat_mul;
+use ndarray::{Array1, Array2, ArrayView2, Axis, s};
+use rayon::prelude::*;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// Rows in a block of the product.
+const BLOCK: usize = 256;
+/// Columns that are multiplied at a time: two panels of 256×2,048 numbers are 8 MB a thread.
+const PANEL: usize = 2048;
+/// Coordinates end where what is left of every squared distance is below this share of the largest: far below what the `f32` of
+/// [`Svm::decision`](super::Svm::decision) tell apart, and well above the rounding of the product.
+const NEGLIGIBLE: f64 = 1e-10;
+
+/// Squared distances ‖xᵢ − xⱼ‖² of all pairs of rows, n×n, symmetric, in `f64` whatever the rows are kept in. `on_block(done, all)` is
+/// told of progress. The same to the bit whatever the number of threads.
+///
+/// From ‖x‖² + ‖y‖² − 2x·y of rows less their mean, which keeps cancellation small: within (2d + 16)·u·(‖x‖² + ‖y‖²) for rows of d numbers,
+/// u = 2⁻⁵³.
+pub fn squared_distances<T: Copy + Into<f64> + Send + Sync>(
+    rows: ArrayView2<'_, T>,
+    on_block: impl Fn(usize, usize) + Sync,
+) -> Array2<f64> {
+    let (n, dimensions) = rows.dim();
+    if n == 0 {
+        return Array2::zeros((0, 0));
+    }
+    let mean: Vec<f64> = (0..dimensions)
+        .into_par_iter()
+        .map(|c| rows.column(c).iter().map(|&v| v.into()).sum::<f64>() / n as f64)
+        .collect();
+    let centred = |row: usize, column: usize| rows[(row, column)].into() - mean[column];
+    let norms: Vec<f64> =
+        (0..n).into_par_iter().map(|i| (0..dimensions).map(|c| centred(i, c)).map(|v| v * v).sum()).collect();
+
+    // A band of rows at a time, against the bands up to itself; panels and blocks in a fixed order.
+    let mut squared = Array2::zeros((n, n));
+    let bands: Vec<_> = squared.axis_chunks_iter_mut(Axis(0), BLOCK).enumerate().collect();
+    let (all, done) = (bands.len() * (bands.len() + 1) / 2, AtomicUsize::new(0));
+    bands.into_par_iter().rev().for_each(|(band, mut squared)| {
+        let (first, height) = (band * BLOCK, squared.nrows());
+        let mut products = Array2::<f64>::zeros((height, first + height));
+        for left in (0..dimensions).step_by(PANEL) {
+            let width = PANEL.min(dimensions - left);
+            let panel = |first: usize, rows: usize| {
+                Array2::from_shape_fn((rows, width), |(i, c)| centred(first + i, left + c))
+            };
+            let ours = panel(first, height);
+            for other in (0..=first).step_by(BLOCK) {
+                let theirs = panel(other, BLOCK.min(n - other));
+                let mut target = products.slice_mut(s![.., other..other + theirs.nrows()]);
+                general_mat_mul(1.0, &ours, &theirs.t(), 1.0, &mut target);
+            }
+        }
+        for (((i, j), to), product) in
+            squared.slice_mut(s![.., ..first + height]).indexed_iter_mut().zip(&products)
+        {
+            *to = if first + i == j { 0.0 } else { (norms[first + i] + norms[j] - 2.0 * product).max(0.0) };
+        }
+        on_block(done.fetch_add(band + 1, Ordering::Relaxed) + band + 1, all);
+    });
+    for i in 0..n {
+        for j in i + 1..n {
+            squared[(i, j)] = squared[(j, i)];
+        }
+    }
+    squared
+}
+
+/// Rows of as few numbers as have the given squared distances (n×n, symmetric, of points), up to 10⁻¹⁰ of the largest: the Cholesky
+/// factor, with pivots, of the inner products about the first point. At most n − 1 numbers a row; fewer where points lie in
+/// a plane of fewer dimensions.
+///
+/// # Panics
+/// If `squared` is not square.
+pub fn coordinates(squared: ArrayView2<'_, f64>) -> Array2<f64> {
+    assert_eq!(squared.nrows(), squared.ncols(), "squared distances are a square matrix");
+    let n = squared.nrows();
+    if n == 0 {
+        return Array2::zeros((0, 0));
+    }
+    let from_first = squared.row(0);
+    let enough = NEGLIGIBLE * squared.iter().copied().fold(0.0, f64::max);
+    let mut rows = vec![Vec::<f64>::new(); n];
+    let mut left: Array1<f64> = from_first.to_owned();
+    loop {
+        let pivot = (0..n).max_by(|&i, &j| left[i].total_cmp(&left[j])).unwrap_or(0);
+        if left[pivot] <= enough {
+            break;
+        }
+        let (root, of_pivot) = (left[pivot].sqrt(), rows[pivot].clone());
+        let to_pivot = squared.row(pivot);
+        rows.par_iter_mut().enumerate().for_each(|(i, row)| {
+            let product = 0.5 * (from_first[i] + from_first[pivot] - to_pivot[i]);
+            let known: f64 = row.iter().zip(&of_pivot).map(|(a, b)| a * b).sum();
+            row.push((product - known) / root);
+        });
+        for (left, row) in left.iter_mut().zip(&rows) {
+            *left -= row.last().map_or(0.0, |v| v * v);
+        }
+        left[pivot] = 0.0;
+    }
+    let mut out = Array2::zeros((n, rows[0].len()));
+    for (mut to, row) in out.axis_iter_mut(Axis(0)).zip(&rows) {
+        to.iter_mut().zip(row).for_each(|(to, &from)| *to = from);
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Seeded uniform numbers in [-1, 1].
+    fn uniform(mut state: u64) -> impl FnMut() -> f32 {
+        move || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 40) as f32 / (1u64 << 23) as f32 - 1.0
+        }
+    }
+
+    fn naive(rows: &Array2<f32>) -> Array2<f64> {
+        let n = rows.nrows();
+        Array2::from_shape_fn((n, n), |(i, j)| {
+            rows.row(i).iter().zip(rows.row(j)).map(|(a, b)| (f64::from(*a) - f64::from(*b)).powi(2)).sum()
+        })
+    }
+
+    /// More rows than a block and more columns than a panel, neither a multiple; far from the origin, so that the mean matters.
+    #[test]
+    fn distances_are_those_of_the_definition() {
+        let mut next = uniform(3);
+        let rows = Array2::from_shape_fn((BLOCK + 45, PANEL + 77), |_| 10.0 + next());
+        let (ours, exact) = (squared_distances(rows.view(), |_, _| ()), naive(&rows));
+        // Rows less their mean have squares below 4 each; the definition itself rounds d additions of its result.
+        let d = rows.ncols() as f64;
+        let bound = (2.0 * d + 16.0) * 0.5 * f64::EPSILON * 8.0 * d + d * 0.5 * f64::EPSILON * 4.0 * d;
+        assert!(ours.iter().zip(&exact).all(|(a, b)| (a - b).abs() <= bound));
+        assert!((0..rows.nrows()).all(|i| ours[(i, i)] == 0.0));
+        assert_eq!(ours, ours.t());
+    }
+
+    #[test]
+    fn known_distances() {
+        let rows = ndarray::array![[0.0f32, 0.0], [3.0, 4.0], [3.0, 0.0]];
+        let squared = squared_distances(rows.view(), |done, all| assert_eq!((done, all), (1, 1)));
+        let known = ndarray::array![[0.0, 25.0, 9.0], [25.0, 0.0, 16.0], [9.0, 16.0, 0.0]];
+        assert!(squared.iter().zip(&known).all(|(a, b)| (a - b).abs() < 1e-13));
+        assert_eq!(coordinates(squared.view()).ncols(), 2);
+    }
+
+    #[test]
+    fn threads_do_not_change_a_bit() {
+        let mut next = uniform(5);
+        let rows = Array2::from_shape_fn((2 * BLOCK + 9, 300), |_| next());
+        let with = |threads: usize| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| {
+                let squared = squared_distances(rows.view(), |_, _| ());
+                let short = coordinates(squared.slice(s![..40, ..40]));
+                (squared, short)
+            })
+        };
+        assert_eq!(with(1), with(3));
+    }
+
+    /// Points of three dimensions among 500 numbers: three coordinates, or a few more for the rounding to `f32`, and the same distances.
+    #[test]
+    fn coordinates_keep_distances_in_as_few_numbers_as_there_are_dimensions() {
+        let mut next = uniform(7);
+        let axes = Array2::from_shape_fn((3, 500), |_| next());
+        let weights = Array2::from_shape_fn((60, 3), |_| next());
+        let squared = squared_distances(weights.dot(&axes).view(), |_, _| ());
+        let short = coordinates(squared.view());
+        assert_eq!(short.ncols(), 3);
+        let largest = squared.iter().copied().fold(0.0, f64::max);
+        let again = squared_distances(short.view(), |_, _| ());
+        // Each point is off by at most √(10⁻¹⁰) of the largest distance, at right angles to all coordinates.
+        let worst = squared.iter().zip(&again).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        assert!(worst <= 4.0 * NEGLIGIBLE * largest, "{worst}");
+    }
+
+    #[test]
+    fn points_that_coincide_have_no_coordinates() {
+        assert_eq!(coordinates(Array2::zeros((4, 4)).view()).dim(), (4, 0));
+        assert_eq!(squared_distances(Array2::<f32>::zeros((0, 5)).view(), |_, _| ()).dim(), (0, 0));
+    }
+}
