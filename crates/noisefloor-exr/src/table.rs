@@ -5,7 +5,7 @@
 //! strength of the level, R + Z/√n. Two independent realisations of Z take turns as the noise in the picture and as the
 //! residual, as they do in two half buffers. Synthesised levels are marked so.
 
-use crate::corpus::{Corpus, Encoding, Level as Image, Patch};
+use crate::corpus::{self, Corpus, Encoding, Level as Image, Patch};
 use crate::error::CorpusError;
 use noisefloor::evaluation::{Level, Origin, Table, Zone, group_of_scene, noise_level};
 use noisefloor::{
@@ -19,6 +19,9 @@ use thiserror::Error;
 mod csv_file;
 
 pub use csv_file::{read_table, write_table};
+
+/// A corpus level: samples per pixel, where it comes from, and what is to be described of it.
+type Shown = (f64, Origin, TilePlanes);
 
 /// Synthesised levels are 10·2^(3k/4) samples per pixel, in whole samples, for these k: a grid that knows nothing of the thresholds.
 const GRID: std::ops::Range<i32> = -4..20;
@@ -77,6 +80,40 @@ pub fn describe_corpora(
     folders: &[PathBuf],
     descriptor: Descriptor,
     evidence: Evidence,
+    on_zone: impl FnMut(usize, usize),
+) -> Result<Table, TableError> {
+    let levels = |scene: &[&corpus::Zone], _: &corpus::Zone, material: &Material| {
+        Ok(material.levels(&synthesised_levels(scene), evidence))
+    };
+    describe(folders, descriptor, evidence, levels, on_zone)
+}
+
+/// Describes every zone as the paper does (Takouachet et al. 2017, §4.3): the `edge`×`edge` pixels at its centre, at `levels` levels with
+/// equal steps up to its most converged image, each held against that image. All these levels are synthesised, from the two
+/// realisations of the noise in turn; the real images, but for the most converged one, are there besides. `on_zone(done, all)` is told of
+/// progress.
+///
+/// The paper holds against a ray-traced reference instead, which human corpora do not have.
+///
+/// # Errors
+/// [`TableError`] if a corpus cannot be read, or a zone has too few images or is smaller than `edge`×`edge` pixels.
+pub fn describe_pairs(
+    folders: &[PathBuf],
+    descriptor: Descriptor,
+    edge: usize,
+    levels: usize,
+    on_zone: impl FnMut(usize, usize),
+) -> Result<Table, TableError> {
+    let levels =
+        |_: &[&corpus::Zone], zone: &corpus::Zone, material: &Material| material.pairs(zone, edge, levels);
+    describe(folders, descriptor, Evidence::Reference, levels, on_zone)
+}
+
+fn describe(
+    folders: &[PathBuf],
+    descriptor: Descriptor,
+    evidence: Evidence,
+    levels: impl Fn(&[&corpus::Zone], &corpus::Zone, &Material) -> Result<Vec<Shown>, TableError> + Sync,
     mut on_zone: impl FnMut(usize, usize),
 ) -> Result<Table, TableError> {
     let corpora: Vec<Corpus> = folders.iter().map(Corpus::open).collect::<Result<_, _>>()?;
@@ -87,10 +124,10 @@ pub fn describe_corpora(
             on_zone(zones.len(), all);
             let images: Vec<Image> = corpus.scene_levels(scene)?.collect::<Result<_, _>>()?;
             let of_scene: Vec<_> = corpus.zones().iter().filter(|z| z.scene == scene).collect();
-            let spp = synthesised_levels(&of_scene);
-            let describe = |zone: &&crate::corpus::Zone| {
+            let describe = |zone: &&corpus::Zone| {
                 let images: Vec<&Image> = images.iter().filter(|i| i.zone == zone.zone).collect();
-                describe_zone(zone, &images, &spp, descriptor, evidence)
+                let material = Material::of(zone, &images)?;
+                describe_zone(zone, levels(&of_scene, zone, &material)?, descriptor)
             };
             let described = of_scene.par_iter().map(describe).collect::<Result<Vec<_>, _>>()?;
             zones.extend(in_picture(described, descriptor));
@@ -102,9 +139,9 @@ pub fn describe_corpora(
 }
 
 /// The levels that are synthesised for each zone of a scene, in samples per pixel.
-fn synthesised_levels(zones: &[&crate::corpus::Zone]) -> Vec<f64> {
-    let least = |z: &&crate::corpus::Zone| (z.first_spp as f64).min(z.human_spp / REACH);
-    let most = |z: &&crate::corpus::Zone| (z.last_spp as f64).max(z.human_spp * REACH);
+fn synthesised_levels(zones: &[&corpus::Zone]) -> Vec<f64> {
+    let least = |z: &&corpus::Zone| (z.first_spp as f64).min(z.human_spp / REACH);
+    let most = |z: &&corpus::Zone| (z.last_spp as f64).max(z.human_spp * REACH);
     let low = zones.iter().map(least).fold(f64::INFINITY, f64::min);
     let high = zones.iter().map(most).fold(0.0, f64::max);
     let grid = GRID.map(|k| (10.0 * 2f64.powf(0.75 * f64::from(k))).round());
@@ -121,38 +158,31 @@ struct Alone {
 
 /// A zone, of which the levels are still to come, and these.
 fn describe_zone(
-    zone: &crate::corpus::Zone,
-    images: &[&Image],
-    synthesised: &[f64],
+    zone: &corpus::Zone,
+    shown: Vec<Shown>,
     descriptor: Descriptor,
-    evidence: Evidence,
 ) -> Result<(Zone, Vec<Alone>), TableError> {
-    let (scene, number) = (zone.scene.clone(), zone.zone);
-    let too_few = TableError::TooFew { scene: scene.clone(), zone: number, images: images.len() };
-    let running = images.iter().all(|i| i.first == 0 && i.encoding == Encoding::Display);
-    let material =
-        if running { Material::from_running_means(images) } else { Material::from_batches(images) };
-    let material = material.ok_or(too_few)?;
-
-    let synthesised = synthesised.iter().flat_map(|&spp| {
-        [0, 1].map(|turn| (spp, Origin::Synthesised, material.synthesise(spp, turn, evidence)))
-    });
-    let mut levels = Vec::new();
-    for (spp, origin, planes) in material.real(evidence).into_iter().chain(synthesised) {
-        let described = descriptor.describe(&planes, spp).map_err(|source| TableError::Descriptor {
-            scene: scene.clone(),
-            zone: number,
-            source,
-        })?;
+    let mut levels = Vec::with_capacity(shown.len());
+    for (spp, origin, planes) in shown {
+        let described = descriptor.describe(&planes, spp).map_err(|e| does_not_fit(zone, e))?;
         levels.push(Alone { spp, origin, noise: noise_level(&planes), described });
     }
     levels.sort_by(|a, b| a.spp.total_cmp(&b.spp));
-    let (group, levels_to_come) = (group_of_scene(&scene).to_owned(), Vec::new());
-    let (human_spp, censored) = (zone.human_spp, zone.censored);
-    let (first_spp, last_spp) = (zone.first_spp as f64, zone.last_spp as f64);
-    let zone =
-        Zone { scene, group, zone: number, human_spp, censored, first_spp, last_spp, levels: levels_to_come };
+    let zone = Zone {
+        scene: zone.scene.clone(),
+        group: group_of_scene(&zone.scene).to_owned(),
+        zone: zone.zone,
+        human_spp: zone.human_spp,
+        censored: zone.censored,
+        first_spp: zone.first_spp as f64,
+        last_spp: zone.last_spp as f64,
+        levels: Vec::new(),
+    };
     Ok((zone, levels))
+}
+
+fn does_not_fit(zone: &corpus::Zone, source: noisefloor::DescriptorError) -> TableError {
+    TableError::Descriptor { scene: zone.scene.clone(), zone: zone.zone, source }
 }
 
 /// Sees each level of each zone of one scene beside the same level of the other zones.
@@ -217,6 +247,13 @@ fn combine(a: &[Rgb], fa: f64, b: &[Rgb], fb: f64) -> Pixels {
 }
 
 impl Material {
+    fn of(zone: &corpus::Zone, images: &[&Image]) -> Result<Self, TableError> {
+        let running = images.iter().all(|i| i.first == 0 && i.encoding == Encoding::Display);
+        let material = if running { Self::from_running_means(images) } else { Self::from_batches(images) };
+        let (scene, zone, images) = (zone.scene.clone(), zone.zone, images.len());
+        material.ok_or(TableError::TooFew { scene, zone, images })
+    }
+
     fn frame(patch: &Patch) -> ((usize, usize), Tile) {
         let inner = patch.inner;
         let tile = Tile { index: 0, x: inner.x, y: inner.y, width: inner.width, height: inner.height };
@@ -313,42 +350,72 @@ impl Material {
         Some(Self { size, tile, converged, converged_spp, rounding: 0.0, noise, real })
     }
 
-    fn planes(&self, shown: &[Rgb], residual: &[Rgb], rounding: f64) -> TilePlanes {
+    fn planes(&self, tile: Tile, shown: &[Rgb], residual: &[Rgb], rounding: f64) -> TilePlanes {
         let at = |x: usize, y: usize| y * self.size.0 + x;
-        let planes = TilePlanes::gather(self.size, self.tile, |x, y| (shown[at(x, y)], residual[at(x, y)]));
+        let planes = TilePlanes::gather(self.size, tile, |x, y| (shown[at(x, y)], residual[at(x, y)]));
         TilePlanes { rounding: rounding as f32, ..planes }
     }
 
     /// A picture held against the converged one as it is.
-    fn to_converged(&self, shown: &[Rgb], rounding: f64) -> TilePlanes {
-        self.planes(shown, &combine(shown, 1.0, &self.converged, -1.0), rounding)
+    fn to_converged(&self, tile: Tile, shown: &[Rgb], rounding: f64) -> TilePlanes {
+        self.planes(tile, shown, &combine(shown, 1.0, &self.converged, -1.0), rounding)
     }
 
-    fn real(&self, evidence: Evidence) -> Vec<(f64, Origin, TilePlanes)> {
+    /// Real levels, and those of `synthesised`, twice each: two realisations of the noise.
+    fn levels(&self, synthesised: &[f64], evidence: Evidence) -> Vec<Shown> {
         let planes = |r: &Real| match evidence {
-            Evidence::Halves => self.planes(&r.shown, &r.residual, r.rounding),
-            Evidence::Reference => self.to_converged(&r.shown, 2.0 * self.rounding),
-            Evidence::Alone => self.planes(&r.shown, &r.shown, self.rounding),
+            Evidence::Halves => self.planes(self.tile, &r.shown, &r.residual, r.rounding),
+            Evidence::Reference => self.to_converged(self.tile, &r.shown, 2.0 * self.rounding),
+            Evidence::Alone => self.planes(self.tile, &r.shown, &r.shown, self.rounding),
         };
-        self.real.iter().map(|r| (r.spp, Origin::Real, planes(r))).collect()
+        let real = self.real.iter().map(|r| (r.spp, Origin::Real, planes(r)));
+        let synthesised = synthesised.iter().flat_map(|&spp| {
+            [0, 1].map(|turn| (spp, Origin::Synthesised, self.synthesise(spp, turn, evidence)))
+        });
+        real.chain(synthesised).collect()
     }
 
-    /// The level of `spp` samples: one realisation (0 or 1) is the noise in the picture, the other that of half buffers. The converged
-    /// picture has noise of its own, so that less is laid over it; beyond its samples none is.
-    fn synthesise(&self, spp: f64, realisation: usize, evidence: Evidence) -> TilePlanes {
-        let (in_picture, held_against) = (&self.noise[realisation], &self.noise[1 - realisation]);
+    /// Levels of the centre, held against the most converged image.
+    fn pairs(&self, zone: &corpus::Zone, edge: usize, levels: usize) -> Result<Vec<Shown>, TableError> {
+        let Tile { x, y, width, height, .. } = self.tile;
+        if width < edge || height < edge {
+            let error = noisefloor::DescriptorError::TileSize { expected: edge, width, height };
+            return Err(does_not_fit(zone, error));
+        }
+        let (x, y) = (x + (width - edge) / 2, y + (height - edge) / 2);
+        let centre = Tile { index: 0, x, y, width: edge, height: edge };
+        let pair = |shown: &[Rgb]| self.to_converged(centre, shown, 0.0);
+        let real = self.real.iter().filter(|r| r.spp < self.converged_spp);
+        let real = real.map(|r| (r.spp, Origin::Real, pair(&r.shown)));
+        let synthesised = (1..=levels).map(|k| {
+            let spp = self.converged_spp * k as f64 / levels as f64;
+            (spp, Origin::Synthesised, pair(&self.shown(spp, k % 2)))
+        });
+        Ok(real.chain(synthesised).collect())
+    }
+
+    /// The picture of `spp` samples, its noise one realisation (0 or 1). The converged picture has noise of its own, so that less is
+    /// laid over it; beyond its samples none is.
+    fn shown(&self, spp: f64, realisation: usize) -> Pixels {
         let missing = (1.0 / spp - 1.0 / self.converged_spp).max(0.0).sqrt();
+        combine(&self.converged, 1.0, &self.noise[realisation].pixels, missing)
+    }
+
+    /// The level of `spp` samples: one realisation (0 or 1) is the noise in the picture, the other the residual.
+    fn synthesise(&self, spp: f64, realisation: usize, evidence: Evidence) -> TilePlanes {
+        let held_against = &self.noise[1 - realisation];
         let strength = (1.0 / spp).sqrt();
-        let shown = combine(&self.converged, 1.0, &in_picture.pixels, missing);
-        let rounding = in_picture.rounding * missing * missing;
+        let shown = self.shown(spp, realisation);
+        let missing = (1.0 / spp - 1.0 / self.converged_spp).max(0.0);
+        let rounding = self.noise[realisation].rounding * missing;
         match evidence {
             Evidence::Halves => {
                 let residual = combine(&held_against.pixels, strength, &held_against.pixels, 0.0);
-                self.planes(&shown, &residual, held_against.rounding / spp)
+                self.planes(self.tile, &shown, &residual, held_against.rounding / spp)
             }
             // The rounding of the converged picture is in both, and falls out of their difference.
-            Evidence::Reference => self.to_converged(&shown, rounding),
-            Evidence::Alone => self.planes(&shown, &shown, rounding + self.rounding),
+            Evidence::Reference => self.to_converged(self.tile, &shown, rounding),
+            Evidence::Alone => self.planes(self.tile, &shown, &shown, rounding + self.rounding),
         }
     }
 }

@@ -1,7 +1,7 @@
 //! From the planes of a tile to the numbers that the machine judges.
 
 mod compact;
-mod mask_pair;
+mod pair;
 
 use crate::evidence::TilePlanes;
 use crate::mask::NoiseMask;
@@ -24,6 +24,12 @@ pub enum Descriptor {
     MaskPair {
         /// The noise mask.
         mask: NoiseMask,
+        /// Tile edge in pixels.
+        edge: usize,
+    },
+    /// The paper's first try, without a mask, which failed: the luminance of the tile and of what it is held against, pixel by
+    /// pixel (Takouachet et al. 2017, §4.3, §4.4). 2·edge² numbers, for tiles of exactly edge×edge pixels.
+    LuminancePair {
         /// Tile edge in pixels.
         edge: usize,
     },
@@ -67,6 +73,7 @@ impl Descriptor {
         match self {
             Self::Compact { .. } => "compact",
             Self::MaskPair { .. } => "mask-pair",
+            Self::LuminancePair { .. } => "luminance-pair",
         }
     }
 
@@ -74,7 +81,7 @@ impl Descriptor {
     pub fn version(&self) -> u16 {
         match self {
             Self::Compact { .. } => 2,
-            Self::MaskPair { .. } => 1,
+            Self::MaskPair { .. } | Self::LuminancePair { .. } => 1,
         }
     }
 
@@ -83,7 +90,7 @@ impl Descriptor {
     pub fn len(&self) -> usize {
         match self {
             Self::Compact { .. } => compact::NAMES.len(),
-            Self::MaskPair { edge, .. } => 2 * edge * edge,
+            Self::MaskPair { edge, .. } | Self::LuminancePair { edge } => 2 * edge * edge,
         }
     }
 
@@ -92,6 +99,7 @@ impl Descriptor {
         match self {
             Self::Compact { .. } => compact::NAMES.map(str::to_owned).to_vec(),
             Self::MaskPair { .. } => (0..self.len()).map(|i| format!("m{i}")).collect(),
+            Self::LuminancePair { .. } => (0..self.len()).map(|i| format!("l{i}")).collect(),
         }
     }
 
@@ -100,14 +108,20 @@ impl Descriptor {
     /// # Errors
     /// [`DescriptorError`] if the tile has a size the descriptor is not for.
     pub fn describe(&self, planes: &TilePlanes, samples: f64) -> Result<Described, DescriptorError> {
+        let fits = |edge: usize| {
+            let (width, height) = (planes.inner.width, planes.inner.height);
+            let error = DescriptorError::TileSize { expected: edge, width, height };
+            if (width, height) == (edge, edge) { Ok(()) } else { Err(error) }
+        };
         let own = match *self {
             Self::Compact { mask } => compact::describe(planes, mask).to_vec(),
             Self::MaskPair { mask, edge } => {
-                let (width, height) = (planes.inner.width, planes.inner.height);
-                if (width, height) != (edge, edge) {
-                    return Err(DescriptorError::TileSize { expected: edge, width, height });
-                }
-                mask_pair::describe(planes, mask)
+                fits(edge)?;
+                pair::masks(planes, mask)
+            }
+            Self::LuminancePair { edge } => {
+                fits(edge)?;
+                pair::luminances(planes)
             }
         };
         Ok(Described { own, samples, area: planes.inner.pixels() as f64 })
@@ -117,12 +131,14 @@ impl Descriptor {
     pub fn in_picture(&self, tiles: &[Described]) -> Vec<Vec<f32>> {
         match self {
             Self::Compact { .. } => compact::in_picture(tiles),
-            Self::MaskPair { .. } => tiles.iter().map(|t| t.own.clone()).collect(),
+            Self::MaskPair { .. } | Self::LuminancePair { .. } => {
+                tiles.iter().map(|t| t.own.clone()).collect()
+            }
         }
     }
 
     /// How visible the noise is at each pixel of the tile (its rows × its columns): an amplitude in 8-bit display steps, weighted
-    /// by scale, colour and brightness and lowered by texture as the descriptor weighs it, for each block of 8×8 pixels. What the
+    /// by scale and brightness and lowered by texture as the descriptor weighs it, for each block of 8×8 pixels. What the
     /// verdict on the tile goes by is pooled from this. `None` if the descriptor does not tell noise from picture.
     ///
     /// ```
@@ -139,7 +155,7 @@ impl Descriptor {
     pub fn visible_noise(&self, planes: &TilePlanes) -> Option<Array2<f32>> {
         match *self {
             Self::Compact { mask } => Some(compact::visible_noise(planes, mask)),
-            Self::MaskPair { .. } => None,
+            Self::MaskPair { .. } | Self::LuminancePair { .. } => None,
         }
     }
 
@@ -147,7 +163,7 @@ impl Descriptor {
     pub(crate) fn pooled_visible_noise(&self, descriptor: &[f32]) -> Option<f32> {
         match self {
             Self::Compact { .. } => Some(compact::pooled_amplitude(descriptor)),
-            Self::MaskPair { .. } => None,
+            Self::MaskPair { .. } | Self::LuminancePair { .. } => None,
         }
     }
 
@@ -156,7 +172,7 @@ impl Descriptor {
     pub(crate) fn texture_of(&self, numbers: &[f32]) -> Vec<f32> {
         match self {
             Self::Compact { .. } => compact::TEXTURE.map(|i| numbers[i]).to_vec(),
-            Self::MaskPair { .. } => Vec::new(),
+            Self::MaskPair { .. } | Self::LuminancePair { .. } => Vec::new(),
         }
     }
 
@@ -164,7 +180,7 @@ impl Descriptor {
     pub(crate) fn texture_numbers(&self) -> usize {
         match self {
             Self::Compact { .. } => compact::TEXTURE.len(),
-            Self::MaskPair { .. } => 0,
+            Self::MaskPair { .. } | Self::LuminancePair { .. } => 0,
         }
     }
 
@@ -176,7 +192,7 @@ impl Descriptor {
                 compact::project(descriptor, factor);
                 true
             }
-            Self::MaskPair { .. } => false,
+            Self::MaskPair { .. } | Self::LuminancePair { .. } => false,
         }
     }
 }
