@@ -11,6 +11,7 @@ mod inspect;
 mod judge;
 mod output;
 mod render;
+mod reproduce;
 mod train;
 
 use args::{Cli, Command};
@@ -27,6 +28,7 @@ fn main() -> ExitCode {
         Command::Train(args) => train::run(&args).map(|()| ExitCode::SUCCESS),
         Command::Evaluate(args) => evaluate::run(&args).map(|()| ExitCode::SUCCESS),
         Command::Audience(args) => audience::run(&args.command).map(|()| ExitCode::SUCCESS),
+        Command::Reproduce(args) => reproduce::run(&args),
         Command::Inspect(args) => inspect::run(&args).map(|()| ExitCode::SUCCESS),
         Command::Scenes => {
             inspect::scenes();

@@ -72,7 +72,8 @@ pub fn held_out(table: &Table, params: &TrainParams, threshold: f32) -> anyhow::
     Ok(predictions)
 }
 
-fn bar(len: u64, what: &'static str) -> ProgressBar {
+/// A bar with an estimate of the time left.
+pub fn bar(len: u64, what: &'static str) -> ProgressBar {
     let style =
         ProgressStyle::with_template("{bar:32} {pos}/{len} {prefix}  {elapsed_precise}, {eta} to go  {msg}");
     let bar = ProgressBar::new(len).with_prefix(what);

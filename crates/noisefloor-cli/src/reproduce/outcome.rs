@@ -1,0 +1,216 @@
+//! One protocol, carried out.
+
+use super::Geometry;
+use super::pairs::{Pairs, Scaling};
+use super::protocol::{Protocol, Split};
+use crate::train::bar;
+use anyhow::Context;
+use ndarray::Axis;
+use noisefloor::{Descriptor, Svm, SvmParams, Weights, fit_weights};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+use std::fs::File;
+use std::io::Read;
+use std::path::Path;
+use std::time::Instant;
+
+/// Machines that train at once: linfa trains in one thread, and each holds a kernel matrix of up to 0.7 GB.
+const AT_ONCE: usize = 2;
+/// Queries that are timed.
+const QUERIES: usize = 15;
+/// Longest result that is read, in bytes.
+const MAX_BYTES: u64 = 1 << 20;
+
+/// What a result depends on.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Fingerprint {
+    /// Of all pairs and their labels.
+    pub table_digest: String,
+    pub pairs: Descriptor,
+    pub scaling: Scaling,
+    pub protocol: Protocol,
+    pub params: SvmParams,
+    pub version: String,
+}
+
+impl Fingerprint {
+    pub fn new(digest: &str, pairs: Descriptor, scaling: Scaling, protocol: Protocol) -> Self {
+        let (params, version) = (SvmParams::PAPER, env!("CARGO_PKG_VERSION").to_owned());
+        Self { table_digest: digest.to_owned(), pairs, scaling, protocol, params, version }
+    }
+
+    pub fn name(&self) -> String {
+        format!("{}-{}-{}", self.pairs.name(), self.scaling.name(), self.protocol.name())
+    }
+
+    pub fn file_name(&self) -> String {
+        self.name() + ".json"
+    }
+}
+
+/// Pairs that were asked about, and those told right, by class.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Count {
+    pub noisy: usize,
+    pub noisy_right: usize,
+    pub identical: usize,
+    pub identical_right: usize,
+}
+
+impl Count {
+    fn note(&mut self, converged: bool, right: bool) {
+        let (all, of_them) = if converged {
+            (&mut self.identical, &mut self.identical_right)
+        } else {
+            (&mut self.noisy, &mut self.noisy_right)
+        };
+        *all += 1;
+        *of_them += usize::from(right);
+    }
+
+    pub fn add(self, other: Self) -> Self {
+        Self {
+            noisy: self.noisy + other.noisy,
+            noisy_right: self.noisy_right + other.noisy_right,
+            identical: self.identical + other.identical,
+            identical_right: self.identical_right + other.identical_right,
+        }
+    }
+}
+
+/// One machine of a protocol.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Machine {
+    pub asked: String,
+    pub examples: usize,
+    pub support_vectors: usize,
+    /// In linfa, from coordinates.
+    pub seconds_training: f64,
+    pub synthesised: Count,
+    pub real: Count,
+}
+
+/// What it costs to ask a machine.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Query {
+    /// Median, one thread.
+    pub seconds: f64,
+    /// Support vectors and coefficients as `f32`.
+    pub model_bytes: usize,
+    /// Largest difference between the decision values of the queries, in `f32` from long rows, and those that the scores go by, in `f64`
+    /// from the matrix product.
+    pub largest_difference: f64,
+}
+
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Outcome {
+    #[serde(flatten)]
+    pub of: Fingerprint,
+    /// For the matrix product of all rows, which all protocols share.
+    pub seconds_distances: f64,
+    pub seconds_coordinates: f64,
+    /// Numbers in a row that linfa was given.
+    pub coordinates: usize,
+    pub machines: Vec<Machine>,
+    pub query: Option<Query>,
+}
+
+impl Outcome {
+    /// The result if it is there, whole, and `of` just that; otherwise `of` again.
+    pub fn read(path: &Path, of: Fingerprint) -> Result<Self, Fingerprint> {
+        let mut text = Vec::new();
+        let read = File::open(path).and_then(|file| file.take(MAX_BYTES).read_to_end(&mut text));
+        let outcome = read.ok().and_then(|_| serde_json::from_slice::<Self>(&text).ok());
+        outcome.filter(|outcome| outcome.of == of).ok_or(of)
+    }
+
+    pub fn compute(of: Fingerprint, pairs: &Pairs, geometry: &Geometry) -> anyhow::Result<Self> {
+        let splits = of.protocol.splits(pairs);
+        let bar = bar(splits.len() as u64, "machines trained").with_message(of.name());
+        let mut trained = Vec::new();
+        for splits in splits.chunks(AT_ONCE) {
+            let train = |split: &Split| -> anyhow::Result<(Machine, Weights)> {
+                let trained = train(split, pairs, geometry, of.params)
+                    .with_context(|| format!("the machine to be asked about {}", split.asked));
+                bar.inc(1);
+                trained
+            };
+            trained.extend(splits.par_iter().map(train).collect::<Result<Vec<_>, _>>()?);
+        }
+        bar.finish_and_clear();
+
+        // The machine that has learned all is the one to be used, so it is the one to be timed.
+        let query = (of.protocol == Protocol::Learned)
+            .then(|| ask(&splits[0], &trained[0].1, pairs, geometry, of.params));
+        Ok(Self {
+            of,
+            seconds_distances: geometry.seconds_distances,
+            seconds_coordinates: geometry.seconds_coordinates,
+            coordinates: geometry.short.ncols(),
+            machines: trained.into_iter().map(|(machine, _)| machine).collect(),
+            query,
+        })
+    }
+}
+
+fn train(
+    split: &Split,
+    pairs: &Pairs,
+    geometry: &Geometry,
+    params: SvmParams,
+) -> anyhow::Result<(Machine, Weights)> {
+    let begun = Instant::now();
+    let labels: Vec<bool> = split.learn.iter().map(|&i| pairs.known[i].converged).collect();
+    let weights = fit_weights(geometry.short.select(Axis(0), &split.learn).view(), &labels, params)?;
+    let seconds_training = begun.elapsed().as_secs_f64();
+
+    let decide = |&i: &usize| decision(i, split, &weights, geometry, params);
+    let decisions: Vec<f64> = split.ask.par_iter().map(decide).collect();
+    let (mut synthesised, mut real) = (Count::default(), Count::default());
+    for (&i, decision) in split.ask.iter().zip(decisions) {
+        let converged = pairs.known[i].converged;
+        let count = if i < pairs.synthesised { &mut synthesised } else { &mut real };
+        count.note(converged, (decision > 0.0) == converged);
+    }
+    let machine = Machine {
+        asked: split.asked.clone(),
+        examples: split.learn.len(),
+        support_vectors: weights.alpha.iter().filter(|&&a| a != 0.0).count(),
+        seconds_training,
+        synthesised,
+        real,
+    };
+    Ok((machine, weights))
+}
+
+/// Decision value of a row, from the distances that are there.
+fn decision(row: usize, split: &Split, weights: &Weights, geometry: &Geometry, params: SvmParams) -> f64 {
+    let squared = geometry.squared.row(row);
+    let terms = split.learn.iter().zip(&weights.alpha).filter(|(_, alpha)| **alpha != 0.0);
+    terms.map(|(&i, alpha)| alpha * (-params.gamma * squared[i]).exp()).sum::<f64>() - weights.rho
+}
+
+fn ask(split: &Split, weights: &Weights, pairs: &Pairs, geometry: &Geometry, params: SvmParams) -> Query {
+    let kept = || split.learn.iter().zip(&weights.alpha).filter(|(_, alpha)| **alpha != 0.0);
+    let svm = Svm {
+        gamma: params.gamma as f32,
+        rho: weights.rho as f32,
+        coefficients: kept().map(|(_, &alpha)| alpha as f32).collect(),
+        vectors: kept().flat_map(|(&i, _)| pairs.rows.row(i).to_vec()).collect(),
+    };
+    let (mut seconds, mut largest_difference) = (Vec::new(), 0.0f64);
+    for &row in split.ask.iter().step_by(split.ask.len().div_ceil(QUERIES)) {
+        let x = pairs.rows.row(row).to_vec();
+        let begun = Instant::now();
+        let answer = svm.decision(&x);
+        seconds.push(begun.elapsed().as_secs_f64());
+        let difference = f64::from(answer) - decision(row, split, weights, geometry, params);
+        largest_difference = largest_difference.max(difference.abs());
+    }
+    seconds.sort_by(f64::total_cmp);
+    Query {
+        seconds: seconds[seconds.len() / 2],
+        model_bytes: size_of::<f32>() * (svm.vectors.len() + svm.coefficients.len()),
+        largest_difference,
+    }
+}
