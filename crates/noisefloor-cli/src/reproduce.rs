@@ -11,8 +11,8 @@ use crate::args::ReproduceArgs;
 use crate::output::write_json;
 use crate::train::bar;
 use anyhow::Context;
-use ndarray::{Array2, s};
-use noisefloor::{Descriptor, NoiseMask, coordinates, squared_distances};
+use ndarray::Array2;
+use noisefloor::{Descriptor, NoiseMask};
 use noisefloor_exr::table::describe_pairs;
 use noisefloor_exr::{check_writable, write_atomic};
 use outcome::{Fingerprint, Outcome};
@@ -28,25 +28,19 @@ use std::time::Instant;
 pub struct Geometry {
     /// ‖x − y‖² of all rows: synthesised pairs, then real ones.
     pub squared: Array2<f64>,
-    /// Rows of the synthesised pairs with the same distances: what linfa is given.
-    pub short: Array2<f64>,
-    pub seconds_distances: f64,
-    pub seconds_coordinates: f64,
+    pub seconds: f64,
 }
 
 impl Geometry {
     fn of(pairs: &Pairs) -> Self {
         let bar = bar(0, "blocks of the matrix product");
         let begun = Instant::now();
-        let squared = squared_distances(pairs.rows.view(), |done, all| {
+        let squared = pairs.squared_distances(|done, all| {
             bar.set_length(all as u64);
             bar.set_position(done as u64);
         });
-        let seconds_distances = begun.elapsed().as_secs_f64();
         bar.finish_and_clear();
-        let begun = Instant::now();
-        let short = coordinates(squared.slice(s![..pairs.synthesised, ..pairs.synthesised]));
-        Self { squared, short, seconds_distances, seconds_coordinates: begun.elapsed().as_secs_f64() }
+        Self { squared, seconds: begun.elapsed().as_secs_f64() }
     }
 }
 

@@ -66,9 +66,7 @@ pub use session::{Session, SessionError, Stop, StopReason};
 pub use source::{Batch, ProgressiveSource, Reference, Request, Rgb, SourceError, SourceInfo, Unit};
 pub use svm::{Platt, Scaler, Svm};
 #[cfg(feature = "train")]
-pub use svm::{
-    SvmParams, SvmTrainError, Weights, coordinates, fit_platt, fit_svm, fit_weights, squared_distances,
-};
+pub use svm::{SvmParams, SvmTrainError, Weights, fit_platt, fit_svm, fit_weights, squared_distances};
 pub use tile::{
     DEFAULT_TILE, MAX_EDGE, MAX_PIXELS, MAX_TILE, MIN_TILE, Tile, TileError, TileGrid, check_image,
 };

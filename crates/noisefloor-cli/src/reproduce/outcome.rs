@@ -14,7 +14,7 @@ use std::io::Read;
 use std::path::Path;
 use std::time::Instant;
 
-/// Machines that train at once: linfa trains in one thread, and each holds a kernel matrix of up to 0.7 GB.
+/// Machines that train at once: the solver runs in one thread, and each holds two matrices of up to 0.7 GB.
 const AT_ONCE: usize = 2;
 /// Queries that are timed.
 const QUERIES: usize = 15;
@@ -84,7 +84,7 @@ pub struct Machine {
     pub asked: String,
     pub examples: usize,
     pub support_vectors: usize,
-    /// In linfa, from coordinates.
+    /// From distances.
     pub seconds_training: f64,
     pub synthesised: Count,
     pub real: Count,
@@ -108,9 +108,6 @@ pub struct Outcome {
     pub of: Fingerprint,
     /// For the matrix product of all rows, which all protocols share.
     pub seconds_distances: f64,
-    pub seconds_coordinates: f64,
-    /// Numbers in a row that linfa was given.
-    pub coordinates: usize,
     pub machines: Vec<Machine>,
     pub query: Option<Query>,
 }
@@ -144,9 +141,7 @@ impl Outcome {
             .then(|| ask(&splits[0], &trained[0].1, pairs, geometry, of.params));
         Ok(Self {
             of,
-            seconds_distances: geometry.seconds_distances,
-            seconds_coordinates: geometry.seconds_coordinates,
-            coordinates: geometry.short.ncols(),
+            seconds_distances: geometry.seconds,
             machines: trained.into_iter().map(|(machine, _)| machine).collect(),
             query,
         })
@@ -161,7 +156,9 @@ fn train(
 ) -> anyhow::Result<(Machine, Weights)> {
     let begun = Instant::now();
     let labels: Vec<bool> = split.learn.iter().map(|&i| pairs.known[i].converged).collect();
-    let weights = fit_weights(geometry.short.select(Axis(0), &split.learn).view(), &labels, params)?;
+    let learn = split.learn.as_slice();
+    let squared = geometry.squared.select(Axis(0), learn).select(Axis(1), learn);
+    let weights = fit_weights(squared.view(), &labels, params)?;
     let seconds_training = begun.elapsed().as_secs_f64();
 
     let decide = |&i: &usize| decision(i, split, &weights, geometry, params);
@@ -196,11 +193,11 @@ fn ask(split: &Split, weights: &Weights, pairs: &Pairs, geometry: &Geometry, par
         gamma: params.gamma as f32,
         rho: weights.rho as f32,
         coefficients: kept().map(|(_, &alpha)| alpha as f32).collect(),
-        vectors: kept().flat_map(|(&i, _)| pairs.rows.row(i).to_vec()).collect(),
+        vectors: kept().flat_map(|(&i, _)| pairs.row(i)).collect(),
     };
     let (mut seconds, mut largest_difference) = (Vec::new(), 0.0f64);
     for &row in split.ask.iter().step_by(split.ask.len().div_ceil(QUERIES)) {
-        let x = pairs.rows.row(row).to_vec();
+        let x = pairs.row(row);
         let begun = Instant::now();
         let answer = svm.decision(&x);
         seconds.push(begun.elapsed().as_secs_f64());

@@ -2,8 +2,8 @@
 
 use anyhow::bail;
 use ndarray::Array2;
-use noisefloor::Scaler;
 use noisefloor::evaluation::{Level, Origin, Table};
+use noisefloor::{Scaler, squared_distances};
 use serde::{Deserialize, Serialize};
 
 /// What is written into the rows. The paper does not say.
@@ -30,6 +30,8 @@ impl Scaling {
 
 /// What is known of a pair.
 pub struct Pair {
+    /// Row of its reference.
+    pub zone: usize,
     pub group: String,
     pub converged: bool,
 }
@@ -40,9 +42,11 @@ pub struct Loaded {
     pub table: Table,
 }
 
-/// Pairs as rows of a matrix: synthesised ones first, then real ones.
+/// Pairs as rows of matrices: synthesised ones first, then real ones. A row of numbers is that of the tile, then that of its reference,
+/// which all pairs of a zone share.
 pub struct Pairs {
-    pub rows: Array2<f32>,
+    pub tiles: Array2<f32>,
+    pub references: Array2<f32>,
     pub known: Vec<Pair>,
     /// How many are synthesised.
     pub synthesised: usize,
@@ -52,48 +56,64 @@ pub struct Pairs {
 impl Loaded {
     /// Of a censored zone only the levels below its threshold are certain.
     pub fn into_pairs(mut self) -> anyhow::Result<Pairs> {
-        let dimensions = self.table.descriptor.len();
-        let (mut numbers, mut known, mut synthesised) = (Vec::new(), Vec::new(), 0);
+        let groups = self.table.groups();
+        if groups.len() < 3 {
+            let (found, names) = (groups.len(), groups.join(", "));
+            bail!("leaving scenes out needs at least 3 groups of scenes; the corpus has {found}: {names}");
+        }
+        let half = self.table.descriptor.len() / 2;
+        let (mut tiles, mut known, mut synthesised) = (Vec::new(), Vec::new(), 0);
+        let mut references = Array2::zeros((self.table.zones.len(), half));
         for origin in [Origin::Synthesised, Origin::Real] {
-            for zone in &mut self.table.zones {
-                let certain = |level: &Level| !zone.censored || level.spp < zone.human_spp;
-                for level in zone.levels.iter_mut().filter(|l| l.origin == origin && certain(l)) {
-                    // Moved, not copied: all pairs are gigabytes.
-                    numbers.append(&mut level.descriptor);
-                    let converged = level.spp >= zone.human_spp;
-                    known.push(Pair { group: zone.group.clone(), converged });
+            for (zone, of_zone) in self.table.zones.iter_mut().enumerate() {
+                let certain = |level: &Level| !of_zone.censored || level.spp < of_zone.human_spp;
+                for level in of_zone.levels.iter_mut().filter(|l| l.origin == origin && certain(l)) {
+                    // Taken, not copied: all pairs together are large.
+                    let numbers = std::mem::take(&mut level.descriptor);
+                    tiles.extend_from_slice(&numbers[..half]);
+                    references
+                        .row_mut(zone)
+                        .iter_mut()
+                        .zip(&numbers[half..])
+                        .for_each(|(to, from)| *to = *from);
+                    let converged = level.spp >= of_zone.human_spp;
+                    known.push(Pair { zone, group: of_zone.group.clone(), converged });
                 }
             }
             if origin == Origin::Synthesised {
                 synthesised = known.len();
             }
         }
-        let groups = self.table.groups();
-        if groups.len() < 3 {
-            bail!(
-                "leaving scenes out needs at least 3 groups of scenes; the corpus has {}: {}",
-                groups.len(),
-                groups.join(", ")
-            );
-        }
-        let rows = Array2::from_shape_vec((known.len(), dimensions), numbers)?;
-        Ok(Pairs { rows, known, synthesised, scaling: Scaling::Display })
+        let tiles = Array2::from_shape_vec((known.len(), half), tiles)?;
+        Ok(Pairs { tiles, references, known, synthesised, scaling: Scaling::Display })
     }
 }
 
 impl Pairs {
-    /// Brings the rows from display values to `scaling`, if they are not there yet.
+    /// Brings the numbers from display values to `scaling`, if they are not there yet.
     pub fn scale(&mut self, scaling: Scaling) {
         if (self.scaling, scaling) == (Scaling::Display, Scaling::Standardised) {
-            let learned = self.rows.rows().into_iter().take(self.synthesised);
-            let scaler = Scaler::fit(learned.map(|r| r.to_slice().unwrap_or_default()));
-            for mut row in self.rows.rows_mut() {
-                if let Some(row) = row.as_slice_mut() {
-                    scaler.apply(row);
-                }
-            }
+            let learned = self.known[..self.synthesised].iter().map(|p| p.zone);
+            standardise(&mut self.tiles, 0..self.synthesised);
+            standardise(&mut self.references, learned);
             self.scaling = scaling;
         }
+    }
+
+    /// All numbers of a pair.
+    pub fn row(&self, i: usize) -> Vec<f32> {
+        self.tiles.row(i).iter().chain(self.references.row(self.known[i].zone)).copied().collect()
+    }
+
+    /// ‖x − y‖² of all pairs: that of the tiles and that of the references.
+    pub fn squared_distances(&self, on_block: impl Fn(usize, usize) + Sync) -> Array2<f64> {
+        let mut squared = squared_distances(self.tiles.view(), on_block);
+        let references = squared_distances(self.references.view(), |_, _| ());
+        for (mut row, one) in squared.rows_mut().into_iter().zip(&self.known) {
+            let between = references.row(one.zone);
+            row.iter_mut().zip(&self.known).for_each(|(to, other)| *to += between[other.zone]);
+        }
+        squared
     }
 
     /// Names of the groups, sorted, each once.
@@ -102,5 +122,15 @@ impl Pairs {
         groups.sort_unstable();
         groups.dedup();
         groups
+    }
+}
+
+/// Each column with mean 0 and standard deviation 1 over the rows named.
+fn standardise(rows: &mut Array2<f32>, over: impl Iterator<Item = usize> + Clone) {
+    let scaler = Scaler::fit(over.map(|i| rows.row(i).to_slice().unwrap_or_default()));
+    for mut row in rows.rows_mut() {
+        if let Some(row) = row.as_slice_mut() {
+            scaler.apply(row);
+        }
     }
 }

@@ -154,9 +154,7 @@ fn cost(outcome: &Outcome, query: &Query) -> Vec<String> {
     let mut row = what(outcome);
     row.extend([
         format!("{:.0}", outcome.seconds_distances),
-        outcome.coordinates.to_string(),
-        format!("{:.1}", outcome.seconds_coordinates),
-        format!("{:.0}", outcome.machines.iter().map(|m| m.seconds_training).sum::<f64>()),
+        format!("{:.1}", outcome.machines.iter().map(|m| m.seconds_training).sum::<f64>()),
         format!("{:.3}", query.seconds),
         format!("{:.0}", query.model_bytes as f64 / 1e6),
         format!("{:.0e}", query.largest_difference),

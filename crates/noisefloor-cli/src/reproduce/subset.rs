@@ -3,7 +3,7 @@
 use super::pairs::Pairs;
 use crate::output::write_json;
 use anyhow::bail;
-use ndarray::{ArrayView2, Axis};
+use ndarray::{Array2, ArrayView2};
 use noisefloor::{SvmParams, fit_svm};
 use noisefloor_exr::write_atomic;
 use serde::Serialize;
@@ -35,7 +35,8 @@ pub fn dump(pairs: &Pairs, count: usize, out: &Path) -> anyhow::Result<()> {
     let spread = |offset: usize| (0..count).map(move |i| (2 * i + offset) * pairs.synthesised / (2 * count));
     let rows: Vec<usize> = spread(0).chain(spread(1)).collect();
     let identical: Vec<bool> = rows.iter().map(|&i| pairs.known[i].converged).collect();
-    let rows = pairs.rows.select(Axis(0), &rows);
+    let numbers = rows.iter().flat_map(|&i| pairs.row(i)).collect();
+    let rows = Array2::from_shape_vec((rows.len(), 2 * pairs.tiles.ncols()), numbers)?;
     write_atomic(out.join("rows.npy"), |to| write_npy(rows.view(), to))?;
 
     let params = SvmParams::PAPER;

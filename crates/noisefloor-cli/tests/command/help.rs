@@ -36,6 +36,7 @@ fn every_subcommand_explains_itself() {
         ("train", &["--corpus", "--table", "--out", "--save-table", "--sigma"]),
         ("evaluate", &["--corpus", "--model", "--leave-one-scene-out", "--json", "--csv"]),
         ("audience", &["fit"]),
+        ("reproduce", &["--corpus", "--out", "--edge", "--levels", "--dump-subset"]),
         ("inspect", &["MODEL", "--json"]),
         ("scenes", &["--help"]),
     ];

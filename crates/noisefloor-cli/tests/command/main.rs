@@ -21,6 +21,9 @@ mod learn;
 /// What is written, and that it is the same again.
 #[cfg(test)]
 mod render;
+/// The paper's protocols: run, resumed, refused.
+#[cfg(test)]
+mod reproduce;
 /// Ctrl-C, and worse.
 #[cfg(test)]
 mod signals;

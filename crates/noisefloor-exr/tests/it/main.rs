@@ -6,6 +6,9 @@ mod corpus;
 /// Broken files: every byte flip and cut is an error or a picture, never a panic.
 #[cfg(test)]
 mod hostile;
+/// The paper's pairs.
+#[cfg(test)]
+mod pairs;
 /// What is read from EXR and PNG.
 #[cfg(test)]
 mod read;

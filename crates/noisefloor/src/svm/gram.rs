@@ -1,11 +1,7 @@
-//! Distances between long rows, all at once, and short rows with the same distances.
-//!
-//! linfa-svm computes its kernel matrix from rows, one scalar after another in one thread, and takes no matrix that is there
-//! already. For the paper's descriptor, 9,600 rows of 32,768 numbers, that would take hours. Here the distances come from a blocked
-//! matrix product, and linfa is given rows of as few numbers as have these distances.
+//! Distances between long rows, all at once, by a blocked matrix product.
 
 use ndarray::linalg::general_mat_mul;
-use ndarray::{Array1, Array2, ArrayView2, Axis, s};
+use ndarray::{Array2, ArrayView2, Axis, s};
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -13,10 +9,6 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 const BLOCK: usize = 256;
 /// Columns that are multiplied at a time: two panels of 256×2,048 numbers are 8 MB a thread.
 const PANEL: usize = 2048;
-/// Coordinates end where what is left of every squared distance is below this share of the largest: far below what the `f32` of
-/// [`Svm::decision`](super::Svm::decision) tell apart, and well above the rounding of the product.
-const NEGLIGIBLE: f64 = 1e-10;
-
 /// Squared distances ‖xᵢ − xⱼ‖² of all pairs of rows, n×n, symmetric, in `f64` whatever the rows are kept in. `on_block(done, all)` is
 /// told of progress. The same to the bit whatever the number of threads.
 ///
@@ -72,46 +64,6 @@ pub fn squared_distances<T: Copy + Into<f64> + Send + Sync>(
     squared
 }
 
-/// Rows of as few numbers as have the given squared distances (n×n, symmetric, of points), up to 10⁻¹⁰ of the largest: the Cholesky
-/// factor, with pivots, of the inner products about the first point. At most n − 1 numbers a row; fewer where points lie in
-/// a plane of fewer dimensions.
-///
-/// # Panics
-/// If `squared` is not square.
-pub fn coordinates(squared: ArrayView2<'_, f64>) -> Array2<f64> {
-    assert_eq!(squared.nrows(), squared.ncols(), "squared distances are a square matrix");
-    let n = squared.nrows();
-    if n == 0 {
-        return Array2::zeros((0, 0));
-    }
-    let from_first = squared.row(0);
-    let enough = NEGLIGIBLE * squared.iter().copied().fold(0.0, f64::max);
-    let mut rows = vec![Vec::<f64>::new(); n];
-    let mut left: Array1<f64> = from_first.to_owned();
-    loop {
-        let pivot = (0..n).max_by(|&i, &j| left[i].total_cmp(&left[j])).unwrap_or(0);
-        if left[pivot] <= enough {
-            break;
-        }
-        let (root, of_pivot) = (left[pivot].sqrt(), rows[pivot].clone());
-        let to_pivot = squared.row(pivot);
-        rows.par_iter_mut().enumerate().for_each(|(i, row)| {
-            let product = 0.5 * (from_first[i] + from_first[pivot] - to_pivot[i]);
-            let known: f64 = row.iter().zip(&of_pivot).map(|(a, b)| a * b).sum();
-            row.push((product - known) / root);
-        });
-        for (left, row) in left.iter_mut().zip(&rows) {
-            *left -= row.last().map_or(0.0, |v| v * v);
-        }
-        left[pivot] = 0.0;
-    }
-    let mut out = Array2::zeros((n, rows[0].len()));
-    for (mut to, row) in out.axis_iter_mut(Axis(0)).zip(&rows) {
-        to.iter_mut().zip(row).for_each(|(to, &from)| *to = from);
-    }
-    out
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -151,7 +103,6 @@ mod tests {
         let squared = squared_distances(rows.view(), |done, all| assert_eq!((done, all), (1, 1)));
         let known = ndarray::array![[0.0, 25.0, 9.0], [25.0, 0.0, 16.0], [9.0, 16.0, 0.0]];
         assert!(squared.iter().zip(&known).all(|(a, b)| (a - b).abs() < 1e-13));
-        assert_eq!(coordinates(squared.view()).ncols(), 2);
     }
 
     #[test]
@@ -160,34 +111,13 @@ mod tests {
         let rows = Array2::from_shape_fn((2 * BLOCK + 9, 300), |_| next());
         let with = |threads: usize| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-            pool.install(|| {
-                let squared = squared_distances(rows.view(), |_, _| ());
-                let short = coordinates(squared.slice(s![..40, ..40]));
-                (squared, short)
-            })
+            pool.install(|| squared_distances(rows.view(), |_, _| ()))
         };
         assert_eq!(with(1), with(3));
     }
 
-    /// Points of three dimensions among 500 numbers: three coordinates, or a few more for the rounding to `f32`, and the same distances.
     #[test]
-    fn coordinates_keep_distances_in_as_few_numbers_as_there_are_dimensions() {
-        let mut next = uniform(7);
-        let axes = Array2::from_shape_fn((3, 500), |_| next());
-        let weights = Array2::from_shape_fn((60, 3), |_| next());
-        let squared = squared_distances(weights.dot(&axes).view(), |_, _| ());
-        let short = coordinates(squared.view());
-        assert_eq!(short.ncols(), 3);
-        let largest = squared.iter().copied().fold(0.0, f64::max);
-        let again = squared_distances(short.view(), |_, _| ());
-        // Each point is off by at most √(10⁻¹⁰) of the largest distance, at right angles to all coordinates.
-        let worst = squared.iter().zip(&again).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-        assert!(worst <= 4.0 * NEGLIGIBLE * largest, "{worst}");
-    }
-
-    #[test]
-    fn points_that_coincide_have_no_coordinates() {
-        assert_eq!(coordinates(Array2::zeros((4, 4)).view()).dim(), (4, 0));
+    fn no_rows_have_no_distances() {
         assert_eq!(squared_distances(Array2::<f32>::zeros((0, 5)).view(), |_, _| ()).dim(), (0, 0));
     }
 }

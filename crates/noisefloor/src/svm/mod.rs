@@ -5,12 +5,15 @@ mod gram;
 mod platt;
 mod predict;
 #[cfg(feature = "train")]
+mod solver;
+#[cfg(feature = "train")]
 mod train;
 
 pub use platt::Platt;
 pub use predict::{Scaler, Svm};
 #[cfg(feature = "train")]
 pub use {
-    gram::{coordinates, squared_distances},
-    train::{SvmParams, SvmTrainError, Weights, fit_platt, fit_svm, fit_weights},
+    gram::squared_distances,
+    solver::{Weights, fit_weights},
+    train::{SvmParams, SvmTrainError, fit_platt, fit_svm},
 };

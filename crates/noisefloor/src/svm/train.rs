@@ -1,6 +1,7 @@
-//! Training through linfa-svm.
+//! Training through linfa-svm, or from a matrix product where rows are long.
 
-use super::gram::{coordinates, squared_distances};
+use super::gram::squared_distances;
+use super::solver::{Weights, fit_weights};
 use super::{Platt, Svm};
 use linfa::composing::platt_scaling::{Platt as LinfaPlatt, platt_newton_method};
 use linfa::prelude::*;
@@ -52,21 +53,12 @@ pub enum SvmTrainError {
 }
 
 /// Duality gap at which the solver ends; LIBSVM's default.
-const SOLVER_EPS: f64 = 1e-3;
+pub(super) const SOLVER_EPS: f64 = 1e-3;
 /// linfa drops support vectors lighter than this from its decision function; the same are left out here.
-const LIGHTEST: f64 = 100.0 * f64::EPSILON;
+pub(super) const LIGHTEST: f64 = 100.0 * f64::EPSILON;
 
-/// Rows longer than this are trained on through [`coordinates`]: the matrix product then costs less than linfa's kernel.
+/// Rows longer than this are trained on from a matrix product, by [`fit_weights`]; linfa's kernel would take longer than all the rest.
 const WIDE: usize = 256;
-
-/// What a machine has learned of its examples.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Weights {
-    /// αᵢ·yᵢ of each example, in their order; 0 for those that are no support vectors.
-    pub alpha: Vec<f64>,
-    /// ρ: subtracted from the weighted sum.
-    pub rho: f64,
-}
 
 /// Trains on scaled descriptors, one a row; `converged[i]` is the class of row i.
 ///
@@ -77,29 +69,30 @@ pub fn fit_svm(
     converged: &[bool],
     params: SvmParams,
 ) -> Result<Svm, SvmTrainError> {
-    let weights = fit_weights(rows, converged, params)?;
+    check(rows, converged, params)?;
+    let Weights { alpha, rho } = if rows.ncols() > WIDE {
+        fit_weights(squared_distances(rows, |_, _| ()).view(), converged, params)?
+    } else {
+        let trained = fit_linfa(rows, converged, params)?;
+        Weights { alpha: trained.alpha, rho: trained.rho }
+    };
 
     // Keep the rows that carry weight.
-    let kept = || (0..rows.nrows()).filter(|&i| weights.alpha[i] != 0.0);
+    let kept = || (0..rows.nrows()).filter(|&i| alpha[i].abs() > LIGHTEST);
     Ok(Svm {
         gamma: params.gamma as f32,
-        rho: weights.rho as f32,
-        coefficients: kept().map(|i| weights.alpha[i] as f32).collect(),
+        rho: rho as f32,
+        coefficients: kept().map(|i| alpha[i] as f32).collect(),
         vectors: kept().flat_map(|i| rows.row(i).to_vec()).map(|v| v as f32).collect(),
     })
 }
 
-/// As [`fit_svm`], but leaves the rows with the caller. Only the distances between rows matter: for several machines on parts of the
-/// same long rows, compute their [`coordinates`] once.
-///
-/// # Errors
-/// Those of [`fit_svm`].
-pub fn fit_weights(
+/// Checks parameters, that every row has a label, that all numbers are finite and both classes there.
+pub(super) fn check(
     rows: ArrayView2<'_, f64>,
     converged: &[bool],
-    params: SvmParams,
-) -> Result<Weights, SvmTrainError> {
-    let SvmParams { c, gamma } = params;
+    SvmParams { c, gamma }: SvmParams,
+) -> Result<(), SvmTrainError> {
     if !(c.is_finite() && c > 0.0 && gamma.is_finite() && gamma > 0.0) {
         return Err(SvmTrainError::Params { c, gamma });
     }
@@ -111,14 +104,7 @@ pub fn fit_weights(
     if positive == 0 || positive == converged.len() {
         return Err(SvmTrainError::OneClass { examples: converged.len(), converged: positive });
     }
-    let trained = if rows.ncols() > WIDE {
-        let short = coordinates(squared_distances(rows, |_, _| ()).view());
-        fit_linfa(short.view(), converged, params)?
-    } else {
-        fit_linfa(rows, converged, params)?
-    };
-    let weight = |a: f64| if a.abs() > LIGHTEST { a } else { 0.0 };
-    Ok(Weights { alpha: trained.alpha.iter().map(|&a| weight(a)).collect(), rho: trained.rho })
+    Ok(())
 }
 
 fn fit_linfa(
@@ -178,8 +164,8 @@ mod tests {
         (rows, labels)
     }
 
-    /// Within 10⁻⁴ of linfa's own decision values, also with C = 100, where coefficients are large and roundings add up; and for rows that
-    /// linfa is given as coordinates.
+    /// Within 10⁻⁴ of linfa's own decision values, also with C = 100, where coefficients are large and roundings add up; and for long
+    /// rows, which linfa does not train.
     #[test]
     fn prediction_equals_linfa() {
         for (examples, dimensions, c, gamma) in [
@@ -200,6 +186,20 @@ mod tests {
                 let error = (f64::from(ours.decision(&x32)) - decision).abs();
                 assert!(error < 1e-4, "{params:?}: {error}");
             }
+        }
+    }
+
+    /// The solver on a kernel matrix takes the steps that linfa's takes: the same weights, but for rounding.
+    #[test]
+    fn weights_equal_linfa_s() {
+        let (rows, labels) = clouds(300, 20);
+        let squared = squared_distances(rows.view(), |_, _| ());
+        for (c, gamma) in [(1.0, 0.02), (100.0, 0.05), (2.0, 2.0), (1e3, 1e-4)] {
+            let params = SvmParams { c, gamma };
+            let ours = fit_weights(squared.view(), &labels, params).unwrap();
+            let theirs = fit_linfa(rows.view(), &labels, params).unwrap();
+            let worst = ours.alpha.iter().zip(&theirs.alpha).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            assert!(worst < 1e-6 * c && (ours.rho - theirs.rho).abs() < 1e-6, "{params:?}: {worst}");
         }
     }
 
