@@ -96,11 +96,13 @@ fn outcomes_of(args: &ReproduceArgs, descriptor: Descriptor) -> anyhow::Result<V
                     let pairs = pairs.as_mut().context("the pairs have been loaded")?;
                     pairs.scale(scaling);
                     let geometry = geometry.get_or_insert_with(|| Geometry::of(pairs));
-                    let name = of.name();
-                    let outcome = Outcome::compute(of, pairs, geometry).context(name)?;
-                    write_json(&path(&outcome.of), &outcome)?;
-                    eprintln!("{} written", path(&outcome.of).display());
-                    outcome
+                    let (name, path) = (of.name(), path(&of));
+                    write_json(&path, &Outcome::compute(of.clone(), pairs, geometry).context(name)?)?;
+                    eprintln!("{} written", path.display());
+                    // As the next run will read it: times may lose their last bit on the way.
+                    Outcome::read(&path, of)
+                        .ok()
+                        .with_context(|| format!("{} has been changed", path.display()))?
                 }
             };
             outcomes.push(outcome);

@@ -129,7 +129,7 @@ fn what_cannot_be_reproduced_is_named() {
     };
     let both = [text(means), text(batches)];
     with(&["absent"], &[], &["absent", "thresholds.csv"]);
-    with(&both, &[], &["Attic", "zone 0", "128×128", "64×64"]);
+    with(&both, &[], &["Attic, zone", "128×128", "64×64"]);
     with(&both, &["--edge", "9"], &["--edge", "16…512"]);
     with(&both, &["--levels", "1000000"], &["--levels", "10…1000"]);
     with(&both, &["--edge", "16", "--dump-subset", "5000"], &["--dump-subset", "450"]);

@@ -1,4 +1,5 @@
 use crate::kit::{FILES, command, json, succeed, table, text};
+use crate::learn::Corpora;
 use noisefloor_exr::{read_exr, read_picture};
 use std::path::Path;
 use std::process::{Child, Command, ExitStatus, Stdio};
@@ -100,4 +101,20 @@ fn a_save_that_fails_is_told() {
     assert_whole(&out);
     let said = String::from_utf8(output.stderr).unwrap();
     assert!(said.contains("warning: not saved"), "{said:?}");
+}
+
+/// Sixteen results, of which the first is there: it is whole, and no report claims to have all.
+#[test]
+fn what_is_reproduced_so_far_survives_an_interrupt() {
+    let (corpora, folder) = (Corpora::new(), tempdir().unwrap());
+    let out = folder.path();
+    let [means, batches] = &corpora.paths;
+    let args = ["reproduce", "--edge", "64", "--levels", "100", "--corpus", text(means), text(batches)];
+    let child = command(&args).args(["--out", text(out)]).stderr(Stdio::null()).spawn().unwrap();
+    let first = out.join("luminance-pair-display-learned.json");
+    wait_for("the first result", || first.exists().then_some(()));
+    signal(&child, "-INT");
+    assert_eq!(end(child).code(), Some(130));
+    assert_eq!(json(&first)["machines"][0]["examples"], 1200);
+    assert!(!out.join("reproduce.json").exists());
 }
