@@ -102,8 +102,8 @@ impl<'m> Reader<'m, '_> {
             Some(glass) => glass,
             None => self.opaque(base_texture, metal_texture)?,
         };
-        // The inside of glass is part of it
-        let glass = matches!(material, Material::Glass { .. });
+        // The inside of glass is part of it, and a pane has no inside
+        let glass = matches!(material, Material::Glass { .. } | Material::ThinGlass { .. });
         let cover = Cover { opacity: self.opacity(base_texture)?, one_sided: !source.double_sided && !glass };
         Ok((material, cover, self.emission(emissive_texture)?))
     }
@@ -147,7 +147,8 @@ impl<'m> Reader<'m, '_> {
         Ok(Material::MetallicRoughness { base, metallic_roughness, ior })
     }
 
-    /// `KHR_materials_transmission`: all or nothing, and smooth.
+    /// `KHR_materials_transmission`: all or nothing, and smooth. A pane, unless `KHR_materials_volume` says that the surface
+    /// bounds a volume.
     fn transmission(&mut self, base: Option<&Info>) -> Result<Option<Material>, LoadError> {
         let Some(transmission) = self.extensions().and_then(|e| e.transmission.as_ref()) else {
             return Ok(None);
@@ -173,7 +174,22 @@ impl<'m> Reader<'m, '_> {
         }
         let [r, g, b, _] = pbr.base_color_factor.0;
         let tint = [r, g, b].map(|x| self.within(x, "baseColorFactor", 0.0, 1.0));
-        Ok(Some(Material::Glass { ior: self.ior(0.25), tint }))
+        let ior = self.ior(0.25);
+        Ok(Some(if self.is_solid() {
+            Material::Glass { ior, tint }
+        } else {
+            Material::ThinGlass { ior, tint }
+        }))
+    }
+
+    /// Whether the surface bounds a volume, whose extent is that of the mesh: the thickness serves renderers that do not trace it.
+    fn is_solid(&mut self) -> bool {
+        let volume = self.extensions().and_then(|e| e.volume.as_ref());
+        let Some(volume) = volume.filter(|volume| volume.thickness_factor.0 > 0.0) else { return false };
+        if volume.attenuation_distance.0.is_finite() && volume.attenuation_color.0 != [1.0; 3] {
+            self.notes.warn(&self.place, "the attenuation in its volume is ignored: glass is clear");
+        }
+        true
     }
 
     fn opacity(&mut self, base: Option<&Info>) -> Result<Option<Texture>, LoadError> {

@@ -7,12 +7,13 @@ use std::fmt;
 
 /// Extensions that a file may require. Of `KHR_materials_unlit` the specification gives a lit fallback, which is used;
 /// `KHR_mesh_quantization` is but a wider choice of accessors, all of which are read.
-const KNOWN: [&str; 7] = [
+const KNOWN: [&str; 8] = [
     "KHR_lights_punctual",
     "KHR_materials_emissive_strength",
     "KHR_materials_ior",
     "KHR_materials_transmission",
     "KHR_materials_unlit",
+    "KHR_materials_volume",
     "KHR_mesh_quantization",
     "KHR_texture_transform",
 ];

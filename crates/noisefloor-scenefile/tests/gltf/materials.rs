@@ -257,31 +257,56 @@ fn backs_are_black_unless_double_sided() {
     }
 }
 
+/// A wall of glass of index 2, with more extensions.
+fn glass(factor: f32, roughness: f32, more: &str) -> Maker {
+    near(wall(&format!(
+        r#"{{"extensions": {{"KHR_materials_transmission": {{"transmissionFactor": {factor}}},
+                             "KHR_materials_ior": {{"ior": 2}}{more}}},
+            "pbrMetallicRoughness": {{"baseColorFactor": [0.5, 1, 0, 1], "roughnessFactor": {roughness}}}}}"#
+    )))
+}
+
+/// The wall's back, seen from as far.
+fn turned(mut maker: Maker) -> Maker {
+    maker.root["nodes"][1] = json(r#"{"mesh": 0, "rotation": [0, 1, 0, 0], "translation": [0, 0, -2]}"#);
+    maker
+}
+
 #[test]
-fn transmission_is_glass() {
-    let glass = |factor: f32, roughness: f32| {
-        near(wall(&format!(
-            r#"{{"extensions": {{"KHR_materials_transmission": {{"transmissionFactor": {factor}}},
-                                 "KHR_materials_ior": {{"ior": 2}}}},
-                "pbrMetallicRoughness": {{"baseColorFactor": [0.5, 1, 0, 1], "roughnessFactor": {roughness}}}}}"#
-        )))
-    };
-    // Head on, ((2 − 1)/(2 + 1))² is reflected, and the rest tinted; a standard error of √(8/81/64/4096) = 6e-4
-    let r = 1.0 / 9.0;
+fn transmission_without_a_volume_is_a_pane() {
+    // Head on, R = ((2 − 1)/(2 + 1))² is reflected at each side, 2R/(1 + R) by both together, and the rest tinted once; a
+    // standard error of √(0.2·0.8/64/4096) = 8e-4
+    let r = 0.2;
     let expected = [r + 0.5 * (1.0 - r), 1.0, r];
-    let clear = glass(1.0, 0.0);
-    assert_close(mean(&clear, 4096, 9), expected, 5e-3);
-    assert_eq!(clear.load().unwrap().warnings.len(), 1, "that there is no light");
-    let frosted = glass(0.75, 0.5);
+    let thin = ["", r#", "KHR_materials_volume": {"thicknessFactor": 0, "attenuationDistance": 1}"#];
+    for clear in thin.map(|more| glass(1.0, 0.0, more)) {
+        assert_close(mean(&clear, 4096, 9), expected, 5e-3);
+        assert_eq!(clear.load().unwrap().warnings.len(), 1, "that there is no light");
+    }
+    let frosted = glass(0.75, 0.5, "");
     assert_close(mean(&frosted, 4096, 9), expected, 5e-3);
     let loaded = frosted.load().unwrap();
     assert_warns(&loaded, &["material 0", "roughness of 0.5"]);
     assert_warns(&loaded, &["material 0", "transmissionFactor of 0.75", "all glass"]);
-    // Seen from within as well, though glTF's materials are one-sided unless they say otherwise
-    let mut back = glass(1.0, 0.0);
-    back.root["nodes"][1] = json(r#"{"mesh": 0, "rotation": [0, 1, 0, 0], "translation": [0, 0, -2]}"#);
-    assert_close(mean(&back, 4096, 9), expected, 5e-3);
-    assert_warns(&glass(0.25, 0.0).load().unwrap(), &["material 0", "transmissionFactor of 0.25", "opaque"]);
+    // Seen from behind as well, though glTF's materials are one-sided unless they say otherwise
+    assert_close(mean(&turned(glass(1.0, 0.0, "")), 4096, 9), expected, 5e-3);
+    let opaque = glass(0.25, 0.0, "").load().unwrap();
+    assert_warns(&opaque, &["material 0", "transmissionFactor of 0.25", "opaque"]);
+}
+
+#[test]
+fn transmission_into_a_volume_is_solid_glass() {
+    // Head on, R is reflected and the rest tinted; a standard error of √(8/81/64/4096) = 6e-4
+    let r = 1.0 / 9.0;
+    let expected = [r + 0.5 * (1.0 - r), 1.0, r];
+    let solid = glass(1.0, 0.0, r#", "KHR_materials_volume": {"thicknessFactor": 0.1}"#);
+    assert_close(mean(&solid, 4096, 9), expected, 5e-3);
+    assert_eq!(solid.load().unwrap().warnings.len(), 1, "that there is no light");
+    // Seen from within as well
+    assert_close(mean(&turned(solid), 4096, 9), expected, 5e-3);
+    let volume = r#""thicknessFactor": 1, "attenuationDistance": 2, "attenuationColor": [1, 0, 0]"#;
+    let tinted = glass(1.0, 0.0, &format!(r#", "KHR_materials_volume": {{{volume}}}"#)).load().unwrap();
+    assert_warns(&tinted, &["material 0", "attenuation in its volume is ignored"]);
 }
 
 #[test]
