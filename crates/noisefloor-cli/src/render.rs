@@ -6,7 +6,7 @@ use crate::output::{ModelFacts, Output, RelMse};
 use anyhow::{Context, bail};
 use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressStyle};
 use noisefloor::{Driver, Event, FixedSamples, Progress, Session, StopReason, StoppingCriterion};
-use noisefloor_ptwne::{Filter, Options, Ptwne, Sampling, scenes};
+use noisefloor_ptwne::{Estimator, Filter, Options, Ptwne, Sampling, scenes};
 use noisefloor_scenefile::Loaded;
 use std::path::Path;
 use std::process::ExitCode;
@@ -34,7 +34,7 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<ExitCode> {
     let options = Options {
         seed: args.seed,
         max_depth: args.max_depth.or(max_depth).unwrap_or(DEFAULT_DEPTH),
-        mis: !args.no_mis,
+        estimator: if args.no_mis { Estimator::NextEvents } else { Estimator::Mis },
         sampling: match args.sampler {
             SamplerChoice::Independent => Sampling::Independent,
             SamplerChoice::Sobol => Sampling::Sobol,

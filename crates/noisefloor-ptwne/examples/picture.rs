@@ -2,7 +2,7 @@
 //! command of the project does this properly.
 
 use noisefloor::{ProgressiveSource, Request, Rgb, TileGrid};
-use noisefloor_ptwne::{Options, Ptwne, scenes};
+use noisefloor_ptwne::{Estimator, Options, Ptwne, scenes};
 use std::error::Error;
 use std::time::Instant;
 
@@ -14,12 +14,9 @@ fn main() -> Result<(), Box<dyn Error>> {
     let (spp, size): (u32, usize) = (spp.parse()?, size.parse()?);
     let scene = scenes::by_name(name).ok_or("no such scene")?;
     eprint!("{name}: {} surfaces, {} lights", scene.surfaces(), scene.lights());
-    let mut source = Ptwne::new(
-        scene,
-        size,
-        size,
-        Options { mis: !rest.contains(&"plain".into()), ..Options::default() },
-    )?;
+    let plain = rest.iter().any(|a| a == "plain");
+    let estimator = if plain { Estimator::NextEvents } else { Estimator::Mis };
+    let mut source = Ptwne::new(scene, size, size, Options { estimator, ..Options::default() })?;
     let start = Instant::now();
     let mut image = vec![[0.0; 3]; size * size];
     if rest.iter().any(|a| a == "reference") {

@@ -15,12 +15,24 @@ pub(crate) struct Settings {
     pub(crate) max_depth: u32,
     /// Number of segments from which on paths end by Russian roulette.
     pub(crate) roulette: u32,
-    /// Multiple importance sampling, or lights by next event estimation alone.
-    pub(crate) mis: bool,
+    pub(crate) estimator: Estimator,
 }
 
-/// An estimator of radiance along a camera ray.
-pub(crate) type Estimator = fn(&Scene, Settings, Ray, &mut Sampler, &mut Stack) -> Vec3;
+/// How light finds its way into paths. All converge to the same picture.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Estimator {
+    /// By next events and by scattering, which share it by multiple importance sampling.
+    #[default]
+    Mis,
+    /// By next events alone, as in Takouachet et al. 2017, §4.2: lights met by scattering count only after the camera, mirrors
+    /// and glass.
+    NextEvents,
+    /// By scattering alone. A check of the other two: lights without size, which cannot be met, are black, and small ones noise.
+    BruteForce,
+}
+
+/// The radiance along a camera ray, sampled.
+pub(crate) type Sample = fn(&Scene, Settings, Ray, &mut Sampler, &mut Stack) -> Vec3;
 
 // Needs as bits of a constant
 const TEXTURES: u8 = 1;
@@ -29,9 +41,9 @@ const SPECULAR: u8 = 4;
 const SKY: u8 = 8;
 const HOLES: u8 = 16;
 
-/// The estimator for scenes that have no more than this.
-pub(crate) fn estimator(needs: Needs) -> Estimator {
-    const ALL: [Estimator; 32] = [
+/// The integrator for scenes that have no more than this.
+pub(crate) fn integrator(needs: Needs) -> Sample {
+    const ALL: [Sample; 32] = [
         radiance::<0>,
         radiance::<1>,
         radiance::<2>,
@@ -185,12 +197,11 @@ impl<'a, const NEEDS: u8> Walk<'a, NEEDS> {
     /// Share of light met by scattering with `density` that counts; `aimed` is the density of next event estimation there.
     #[inline(always)]
     fn met_weight(&self, density: f32, aimed: f32) -> f32 {
-        if density == DELTA {
-            1.0
-        } else if self.settings.mis {
-            power_heuristic(density, aimed)
-        } else {
-            0.0
+        match self.settings.estimator {
+            _ if density == DELTA => 1.0,
+            Estimator::Mis => power_heuristic(density, aimed),
+            Estimator::NextEvents => 0.0,
+            Estimator::BruteForce => 1.0,
         }
     }
 
@@ -226,7 +237,7 @@ impl<'a, const NEEDS: u8> Walk<'a, NEEDS> {
     #[inline(always)]
     fn next_event(&mut self, surface: &Surface<'_>, weigh: impl FnOnce(Vec3, f32) -> Vec3) -> Vec3 {
         let scene = self.scene;
-        if scene.lights.all.is_empty() {
+        if scene.lights.all.is_empty() || self.settings.estimator == Estimator::BruteForce {
             return Vec3::ZERO;
         }
         let [pick, u, v, more] = self.sampler.four();
@@ -263,7 +274,7 @@ impl<'a, const NEEDS: u8> Walk<'a, NEEDS> {
         throughput: Vec3,
         sum: &mut Vec3,
     ) -> Option<Scattered> {
-        let mis = self.settings.mis;
+        let mis = self.settings.estimator == Estimator::Mis;
         *sum += throughput
             * self.next_event(surface, |dir, pdf| {
                 let scattering = dir.dot(surface.normal).max(0.0) * FRAC_1_PI;
@@ -293,7 +304,7 @@ impl<'a, const NEEDS: u8> Walk<'a, NEEDS> {
         let wo = frame.to_local(-ray.dir);
         let glossy =
             if NEEDS & TEXTURES != 0 { surface.glossy::<true>(wo.z) } else { surface.glossy::<false>(wo.z) }?;
-        let mis = self.settings.mis;
+        let mis = self.settings.estimator == Estimator::Mis;
         *sum += throughput
             * self.next_event(surface, |dir, pdf| {
                 let (f_cos, scattering) = glossy.eval(wo, frame.to_local(dir));

@@ -51,6 +51,7 @@ pub use camera::Camera;
 pub use environment::{Environment, EnvironmentMap, Sun};
 pub use error::{RenderError, SceneError};
 pub use filter::Filter;
+pub use integrator::Estimator;
 pub use light::Punctual;
 pub use material::{Cover, MIN_ROUGHNESS, Material};
 pub use renderer::{Counts, MAX_DEPTH, MAX_THREADS, Options, Ptwne};

@@ -3,7 +3,7 @@
 use crate::camera::Lens;
 use crate::error::{OutsideError, RenderError};
 use crate::filter::Filter;
-use crate::integrator::{Estimator, Settings, estimator};
+use crate::integrator::{Estimator, Sample, Settings, integrator};
 use crate::math::Vec3;
 use crate::rng::Key;
 use crate::sampler::{Sampler, Sampling};
@@ -28,9 +28,8 @@ pub struct Options {
     pub max_depth: u32,
     /// Number of segments from which on Russian roulette ends paths, at least 1.
     pub roulette: u32,
-    /// Whether next events and scattering share lights by multiple importance sampling. If not, this is plain path tracing
-    /// with next event estimation: lights met by scattering count only after the camera, mirrors and glass.
-    pub mis: bool,
+    /// How light finds its way into paths.
+    pub estimator: Estimator,
     /// How the samples of a pixel are spread.
     pub sampling: Sampling,
     /// How pixels weigh the light around them.
@@ -51,7 +50,7 @@ impl Default for Options {
             seed: 0,
             max_depth: 65,
             roulette: 5,
-            mis: true,
+            estimator: Estimator::Mis,
             sampling: Sampling::Independent,
             filter: Filter::Box,
             clamp: None,
@@ -71,7 +70,7 @@ pub struct Ptwne {
     pub(crate) width: usize,
     pub(crate) height: usize,
     options: Options,
-    estimator: Estimator,
+    integrator: Sample,
     pool: Option<rayon::ThreadPool>,
     tally: Tally,
 }
@@ -125,13 +124,13 @@ impl Ptwne {
             None => None,
         };
         let scene = scene.into();
-        let estimator = estimator(scene.needs);
-        Ok(Self { scene, width, height, options, estimator, pool, tally: Tally::default() })
+        let integrator = integrator(scene.needs);
+        Ok(Self { scene, width, height, options, integrator, pool, tally: Tally::default() })
     }
 
     /// Renders with code for more than the scene has. Images are the same; it shows what leaving that code out saves.
     pub fn burden(&mut self, more: Needs) {
-        self.estimator = estimator(self.scene.needs.with(more));
+        self.integrator = integrator(self.scene.needs.with(more));
     }
 
     /// What became of the samples so far.
@@ -163,8 +162,8 @@ impl Ptwne {
     fn row(&self, lens: &Lens, job: Job<'_>) {
         let Job { request, y, empty, out } = job;
         let key = Key::new(self.options.seed);
-        let Options { max_depth, roulette, mis, sampling, filter, clamp, .. } = self.options;
-        let settings = Settings { max_depth, roulette, mis };
+        let Options { max_depth, roulette, estimator, sampling, filter, clamp, .. } = self.options;
+        let settings = Settings { max_depth, roulette, estimator };
         let mut stack = self.scene.accel.stack();
         let (mut dropped, mut clamped) = (0, 0);
         for (i, mean) in out.iter_mut().enumerate() {
@@ -179,7 +178,7 @@ impl Ptwne {
                 let mut sample = if empty {
                     self.scene.beyond(ray.dir, |_, _| 1.0)
                 } else {
-                    (self.estimator)(&self.scene, settings, ray, &mut sampler, &mut stack)
+                    (self.integrator)(&self.scene, settings, ray, &mut sampler, &mut stack)
                 };
                 // Also true for NaN
                 if !(sample.min_element() >= 0.0 && sample.max_element() < f32::INFINITY) {

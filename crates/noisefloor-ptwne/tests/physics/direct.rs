@@ -3,8 +3,8 @@
 use crate::kit::{agrees, batch, look, mean, scene};
 use noisefloor::ProgressiveSource;
 use noisefloor_ptwne::{
-    Camera, Cover, Emission, Environment, EnvironmentMap, ImageTexture, Material, MaterialId, Mesh, Options,
-    Pixels, Ptwne, Punctual, Scene, SceneBuilder, Sun, Texture, scenes,
+    Camera, Cover, Emission, Environment, EnvironmentMap, Estimator, ImageTexture, Material, MaterialId,
+    Mesh, Options, Pixels, Ptwne, Punctual, Scene, SceneBuilder, Sun, Texture, scenes,
 };
 
 const DIRECT: u32 = 2;
@@ -24,7 +24,7 @@ fn lit(light: impl FnOnce(&mut SceneBuilder, MaterialId)) -> Scene {
     })
 }
 
-/// Checks both estimators and the reference. The spot's size and f32 are good for 2e-3, the quadrature for 1e-2.
+/// Checks next events and the reference. The spot's size and f32 are good for 2e-3, the quadrature for 1e-2.
 fn check(scene: &Scene, expected: f64) {
     check_samples(scene, expected);
     let mut source = Ptwne::new(scene.clone(), 4, 4, Options::default()).unwrap();
@@ -32,12 +32,18 @@ fn check(scene: &Scene, expected: f64) {
     assert!((reference - expected).abs() < 1e-2 * expected, "reference {reference}, expected {expected}");
 }
 
-/// Checks both estimators.
+/// Checks next events, shared with scattering and alone.
 fn check_samples(scene: &Scene, expected: f64) {
-    for mis in [true, false] {
-        let options = Options { mis, max_depth: DIRECT, ..Options::default() };
+    for estimator in [Estimator::Mis, Estimator::NextEvents] {
+        let options = Options { estimator, max_depth: DIRECT, ..Options::default() };
         agrees(mean(scene.clone(), 4, 64, 100, 0, options), expected, 2e-3);
     }
+}
+
+/// Checks scattering alone, for lights that fill a good share of the sky: one path in ten or more meets them.
+fn check_brute_force(scene: &Scene, expected: f64) {
+    let options = Options { estimator: Estimator::BruteForce, max_depth: DIRECT, ..Options::default() };
+    agrees(mean(scene.clone(), 4, 64, 200, 0, options), expected, 2e-3);
 }
 
 /// Form factor of a parallel rectangle with a corner straight above (Howell's catalogue, C-11): a, b are its edges over the
@@ -63,6 +69,7 @@ fn a_rectangle_lights_by_its_form_factor() {
     let f: f64 =
         [(0.25, 0.5), (0.75, 0.5), (0.25, 0.25), (0.75, 0.25)].iter().map(|&(a, b)| corner(a, b)).sum();
     check(&scene, 0.5 * 3.0 * f);
+    check_brute_force(&scene, 0.5 * 3.0 * f);
 }
 
 #[test]
@@ -127,6 +134,7 @@ fn discs_light_by_their_form_factor() {
     let summed = ellipse([0.0, 2.0, 0.0], [0.8, 0.0, 0.0], [0.0, 0.0, 0.8], [0.0, -1.0, 0.0]);
     assert!((0.5 * 3.0 * summed - closed).abs() < 1e-4 * closed);
     check(&round(0.8), closed);
+    check_brute_force(&round(0.8), closed);
     check(&round(0.01), 0.5 * 3.0 * 1e-4 / 4.0001);
     let aslant = lit(|b, m| {
         b.disk([0.7, 1.5, -0.4], [0.6, 0.3, 0.0], [0.0, 0.0, 0.3], m, light()).unwrap();
@@ -151,8 +159,12 @@ fn punctual_lights_have_no_noise() {
     let fade = (2.0 / 6f64.sqrt() - cos(50.0)) / (cos(20.0) - cos(50.0));
     check(&spot(20.0, 50.0), point * fade * fade);
     check(&spot(40.0, 50.0), point);
-    let mut dark = Ptwne::new(spot(10.0, 35.0), 4, 4, Options::default()).unwrap();
-    assert_eq!(batch(&mut dark, 0, 16), vec![[0.0; 3]; 16]);
+    // Out of the cone there is no light; and by scattering, no point is ever met
+    let by_chance = Options { estimator: Estimator::BruteForce, ..Options::default() };
+    for (scene, options) in [(spot(10.0, 35.0), Options::default()), (spot(40.0, 50.0), by_chance)] {
+        let mut dark = Ptwne::new(scene, 4, 4, options).unwrap();
+        assert_eq!(batch(&mut dark, 0, 16), vec![[0.0; 3]; 16]);
+    }
     let distant = Punctual::Distant { direction: [0.5, -1.0, 0.5], irradiance: [2.0; 3] };
     let expected = 2.0 * 0.5 / std::f64::consts::PI / 1.5f64.sqrt();
     check(&lit(|b, _| b.punctual(distant).unwrap()), expected);
@@ -189,6 +201,7 @@ fn environment_maps_light_by_their_image() {
         let scene = lit(|b, _| b.environment_map(map).unwrap());
         let expected = 0.5 / std::f64::consts::PI * irradiance;
         check_samples(&scene, expected);
+        check_brute_force(&scene, expected);
         // The reference looks at 256 points of the map, of which each stands for 1/256 of its light
         let mut source = Ptwne::new(scene, 4, 4, Options::default()).unwrap();
         let reference = f64::from(source.reference().unwrap().unwrap().pixels[5][0]);
@@ -217,6 +230,7 @@ fn textured_lights_shine_by_their_image() {
     let ([left, right], [far, near]) = ([[-1.0, 0.5], [0.5, 2.0]], [[-1.0, -0.25], [-0.25, 0.5]]);
     let f = 1.0 * rect(right, near) + 2.0 * rect(left, far) + 4.0 * rect(right, far);
     check(&scene, 0.5 * f);
+    check_brute_force(&scene, 0.5 * f);
 }
 
 /// A plate between floor and light, and half of it or each second ray's worth is not there.

@@ -1,7 +1,7 @@
 //! Furnaces: closed rooms and uniform surroundings, where radiance is known.
 
 use crate::kit::{agrees, look, mean, scene};
-use noisefloor_ptwne::{Emission, Environment, Material, Options, SceneBuilder, Texture};
+use noisefloor_ptwne::{Emission, Environment, Estimator, Material, Options, SceneBuilder, Texture};
 
 const UP: [f32; 3] = [0.0, 1.0, 0.0];
 
@@ -23,8 +23,8 @@ fn closed_rooms_have_the_radiance_of_the_geometric_series() {
             b.parallelogram(e3, e1, e2, m, light()).unwrap();
         }
     };
-    for mis in [true, false] {
-        let options = Options { mis, seed: 3, ..Options::default() };
+    for estimator in [Estimator::Mis, Estimator::NextEvents, Estimator::BruteForce] {
+        let options = Options { estimator, seed: 3, ..Options::default() };
         for (channel, albedo) in [(0, 0.6), (1, 0.3)] {
             // The offset of ray origins and 0.9999 of shadow rays: less than 1e-3 of the light is lost in corners
             agrees(mean(scene(camera, sphere), 8, 64, 40, channel, options), 0.5 / (1.0 - albedo), 1e-3);

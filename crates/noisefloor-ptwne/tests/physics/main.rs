@@ -14,5 +14,5 @@ mod direct; // direct light in closed form, and the reference
 mod extremes; // nothing but finite numbers
 mod furnace; // energy neither made nor lost
 mod kit;
-mod mis; // with and without multiple importance sampling
+mod mis; // next events, scattering, and both
 mod stiff; // scenes with known trouble

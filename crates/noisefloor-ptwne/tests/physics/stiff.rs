@@ -3,7 +3,7 @@
 use crate::kit::{agrees, batch, look, mean, scene};
 use noisefloor::{ProgressiveSource, Rgb};
 use noisefloor_ptwne::{
-    Camera, Emission, Environment, Material, Mesh, Options, Ptwne, Punctual, Scene, scenes,
+    Camera, Emission, Environment, Estimator, Material, Mesh, Options, Ptwne, Punctual, Scene, scenes,
 };
 
 const UP: [f32; 3] = [0.0, 1.0, 0.0];
@@ -75,8 +75,8 @@ fn a_pinpoint_lights_as_a_point() {
     let camera = look([-2.0, 2.6, 1.0], [-2.0, 2.6, -1.5], UP, 0.05);
     let d2 = 1.6 * 1.6 + 2.9 * 2.9;
     let expected = 0.75 * 1e-8 * 6e8 * 2.9 / f64::powf(d2, 1.5);
-    for mis in [true, false] {
-        let options = Options { mis, max_depth: 2, ..Options::default() };
+    for estimator in [Estimator::Mis, Estimator::NextEvents] {
+        let options = Options { estimator, max_depth: 2, ..Options::default() };
         agrees(mean(stiff("pinpoint", Some(camera)), 4, 64, 20, 0, options), expected, 1e-3);
     }
     let mut source = Ptwne::new(stiff("pinpoint", Some(camera)), 4, 4, Options::default()).unwrap();
