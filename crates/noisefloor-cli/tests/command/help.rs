@@ -2,7 +2,7 @@ use crate::kit::succeed;
 
 #[test]
 fn every_subcommand_explains_itself() {
-    let options: [(&str, &[&str]); 7] = [
+    let options: [(&str, &[&str]); 8] = [
         (
             "render",
             &[
