@@ -23,7 +23,7 @@ struct Picture {
 
 /// Edge of the zones, in pixels, where no corpus says where they lie.
 const ZONE: usize = 100;
-const GREY: Rgb = [0.5; 3];
+const GREY: Rgb = [0.85; 3];
 /// Of the ratio of predicted and human thresholds: beyond, colours are at their end.
 const WIDEST_RATIO: f64 = 3.0;
 
@@ -58,7 +58,7 @@ pub fn write(
         };
         let marks: Vec<Mark> = zones.iter().filter_map(mark).collect();
         let scale = Scale {
-            title: "spp: people\n| model,\ntheir ratio",
+            title: "people|model\nand ratio",
             low: 1.0 / WIDEST_RATIO,
             high: WIDEST_RATIO,
             log: true,

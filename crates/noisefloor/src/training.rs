@@ -80,10 +80,10 @@ struct Machine {
 }
 
 impl Machine {
-    fn fit(zones: &[&Zone], svm: SvmParams, range: f64) -> Result<Self, TrainError> {
+    fn fit(zones: &[&Zone], svm: SvmParams, range: f64, least_deviation: f64) -> Result<Self, TrainError> {
         let examples: Vec<(&[f32], bool)> =
             zones.iter().flat_map(|z| examples(z, range)).map(|e| (e.descriptor, e.converged)).collect();
-        let scaler = Scaler::fit(examples.iter().map(|e| e.0));
+        let scaler = Scaler::fit(examples.iter().map(|e| e.0), least_deviation);
         let dimensions = examples.first().map_or(0, |e| e.0.len());
         let mut rows = Array2::zeros((examples.len(), dimensions));
         let mut scaled = Vec::new();
@@ -159,12 +159,14 @@ fn fit_groups(
         table.zones.iter().filter(|z| groups.contains(&z.group.as_str()) && wanted(&z.group)).collect()
     };
 
+    let least_deviation = table.descriptor.least_deviation();
+
     // For each candidate: machines that have not seen one group judge that group; one sigmoid over all of it.
     let held_out = |&candidate: &SvmParams| -> Result<(f64, Platt), TrainError> {
         let mut folds = Vec::new();
         let mut decisions = Vec::new();
         for &group in groups {
-            let machine = Machine::fit(&of(&|g| g != group), candidate, params.range)?;
+            let machine = Machine::fit(&of(&|g| g != group), candidate, params.range, least_deviation)?;
             let zones = of(&|g| g == group);
             zones.iter().for_each(|z| decisions.extend(machine.decisions(z, params)));
             folds.push((machine, zones));
@@ -187,7 +189,7 @@ fn fit_groups(
 
     // All groups train the machine; the sigmoid stays that of held-out decision values.
     let chosen = params.candidates[best];
-    Ok((Machine::fit(&of(&|_| true), chosen, params.range)?, outcomes[best].1, chosen))
+    Ok((Machine::fit(&of(&|_| true), chosen, params.range, least_deviation)?, outcomes[best].1, chosen))
 }
 
 /// Share of the zones of left-out scenes that are familiar to the others.

@@ -127,7 +127,7 @@ impl Pairs {
 
 /// Each column with mean 0 and standard deviation 1 over the rows named.
 fn standardise(rows: &mut Array2<f32>, over: impl Iterator<Item = usize> + Clone) {
-    let scaler = Scaler::fit(over.map(|i| rows.row(i).to_slice().unwrap_or_default()));
+    let scaler = Scaler::fit(over.map(|i| rows.row(i).to_slice().unwrap_or_default()), 0.0);
     for mut row in rows.rows_mut() {
         if let Some(row) = row.as_slice_mut() {
             scaler.apply(row);

@@ -176,6 +176,14 @@ impl Descriptor {
         }
     }
 
+    /// Standard deviation over the training data that is taken for granted, in the unit of the numbers.
+    pub(crate) fn least_deviation(&self) -> f64 {
+        match self {
+            Self::Compact { .. } => compact::LEAST_DEVIATION,
+            Self::MaskPair { .. } | Self::LuminancePair { .. } => 0.0,
+        }
+    }
+
     /// How many of the numbers are texture.
     pub(crate) fn texture_numbers(&self) -> usize {
         match self {

@@ -17,8 +17,9 @@ impl Scaler {
         Self { mean: vec![0.0; dimensions], scale: vec![1.0; dimensions] }
     }
 
-    /// Learns from rows of equal length.
-    pub fn fit<'a>(rows: impl Iterator<Item = &'a [f32]> + Clone) -> Self {
+    /// Learns from rows of equal length. A column whose standard deviation is below `least`, at least 0, is scaled as if it had that:
+    /// differences that are nothing are not blown up to matter as much as the others.
+    pub fn fit<'a>(rows: impl Iterator<Item = &'a [f32]> + Clone, least: f64) -> Self {
         let dimensions = rows.clone().next().map_or(0, <[f32]>::len);
         let count = rows.clone().count().max(1) as f64;
         let column =
@@ -26,7 +27,7 @@ impl Scaler {
         let (mut mean, mut scale) = (Vec::new(), Vec::new());
         for c in 0..dimensions {
             let m = column(c, &|v| v);
-            let deviation = column(c, &|v| (v - m) * (v - m)).sqrt();
+            let deviation = column(c, &|v| (v - m) * (v - m)).sqrt().max(least);
             mean.push(m as f32);
             scale.push(if deviation > 1e-9 { (1.0 / deviation) as f32 } else { 1.0 });
         }
@@ -103,10 +104,15 @@ mod tests {
     #[test]
     fn scaler_standardises() {
         let rows = [[1.0f32, 5.0], [3.0, 5.0]];
-        let scaler = Scaler::fit(rows.iter().map(|r| &r[..]));
+        let scaler = Scaler::fit(rows.iter().map(|r| &r[..]), 0.0);
         let mut row = rows[1];
         scaler.apply(&mut row);
         assert_eq!(row, [1.0, 0.0]);
+        // Deviations of 1 and 0 where at least 4 is taken for granted.
+        let careful = Scaler::fit(rows.iter().map(|r| &r[..]), 4.0);
+        let mut row = [6.0, 9.0];
+        careful.apply(&mut row);
+        assert_eq!(row, [1.0, 1.0]);
     }
 
     proptest! {
