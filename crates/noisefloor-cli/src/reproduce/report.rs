@@ -1,6 +1,6 @@
 //! All results together: reproduce.json, and the tables that are printed and written to reproduce.md.
 
-use super::outcome::{Count, Outcome, Query};
+use super::outcome::{Count, Machine, Outcome, Query};
 use super::protocol::Protocol;
 use crate::args::ReproduceArgs;
 use serde::Serialize;
@@ -22,7 +22,8 @@ impl Report {
         let notes = vec![
             format!(
                 "All levels that are learned are synthesised: {} a zone with equal steps up to its most converged image, noise ∝ 1/√n \
-                 from two realisations in turn. Real images ({}) are asked about, never learned, and counted apart.",
+                 from two realisations in turn. Real images ({}) are asked about, never learned, and counted apart; but the noise that is laid over a scene is taken \
+                 from them.",
                 args.levels,
                 real.noisy + real.identical,
             ),
@@ -41,56 +42,49 @@ impl Report {
     }
 
     pub fn markdown(&self) -> String {
-        let mut text = format!(
-            "{} pairs of {e}×{e} pixels a representation, C = 2, γ = 2.\n\n",
-            self.outcomes.first().map_or(0, |o| o.machines.iter().map(|m| m.examples).max().unwrap_or(0)),
-            e = self.edge,
-        );
+        let learned = self.outcomes.iter().flat_map(|o| &o.machines).map(|m| m.examples).max().unwrap_or(0);
+        let mut text = format!("{learned} pairs of {e}×{e} pixels, C = 2, γ = 2.\n\n", e = self.edge);
+
+        let [right, noisy, identical, always] = SHARES;
+        let [real, real_noisy, real_identical, real_always] = SHARES_OF_REAL;
         let header = [
             "pairs of",
             "values",
             "asked about",
-            "right",
-            "noisy right",
-            "identical right",
-            "always identical",
-            "real images right",
-            "of them noisy",
-            "identical",
-            "always identical",
+            right,
+            noisy,
+            identical,
+            always,
+            real,
+            real_noisy,
+            real_identical,
+            real_always,
             "support vectors",
         ];
-        text += &table(&header, self.outcomes.iter().map(scores).collect());
+        text += &table(header, self.outcomes.iter().map(scores).collect());
         text += "\n";
-        let header = [
-            "pairs of",
-            "values",
-            "distances, s",
-            "coordinates",
-            "s",
-            "training, s",
-            "query, s",
-            "model, MB",
-            "f32 − f64",
-        ];
+
+        let header =
+            ["pairs of", "values", "distances, s", "training, s", "query, s", "model, MB", "f32 − f64"];
         let costs = self.outcomes.iter().filter_map(|o| o.query.as_ref().map(|q| cost(o, q)));
-        text += &table(&header, costs.collect());
+        text += &table(header, costs.collect());
         text += "\n";
-        let left_out = self.outcomes.iter().filter(|o| o.of.protocol == Protocol::SceneLeftOut);
+
         let header = [
             "pairs of",
             "values",
             "scene left out",
-            "right",
-            "noisy right",
-            "identical right",
-            "always identical",
-            "real images right",
-            "of them noisy",
-            "identical",
-            "always identical",
+            right,
+            noisy,
+            identical,
+            always,
+            real,
+            real_noisy,
+            real_identical,
+            real_always,
         ];
-        text += &table(&header, left_out.flat_map(scenes).collect());
+        let left_out = self.outcomes.iter().filter(|o| o.of.protocol == Protocol::SceneLeftOut);
+        text += &table(header, left_out.flat_map(scenes).collect());
         text += "\n";
         for note in &self.notes {
             text += &format!("- {note}\n");
@@ -99,11 +93,13 @@ impl Report {
     }
 }
 
+const SHARES: [&str; 4] = ["right", "noisy right", "identical right", "always identical"];
+const SHARES_OF_REAL: [&str; 4] =
+    ["real images right", "of them noisy", "of them identical", "real, always identical"];
+
 /// Synthesised and real pairs that were asked about, over all machines.
 fn total(outcome: &Outcome) -> (Count, Count) {
-    let sum = |of: fn(&super::outcome::Machine) -> Count| {
-        outcome.machines.iter().map(of).fold(Count::default(), Count::add)
-    };
+    let sum = |of: fn(&Machine) -> Count| outcome.machines.iter().map(of).fold(Count::default(), Count::add);
     (sum(|m| m.synthesised), sum(|m| m.real))
 }
 
@@ -121,73 +117,68 @@ fn shares(count: Count) -> [String; 4] {
     ]
 }
 
-fn what(outcome: &Outcome) -> Vec<String> {
+fn what(outcome: &Outcome) -> [String; 2] {
     let pairs = outcome.of.pairs.name().trim_end_matches("-pair");
-    vec![pairs.to_owned(), outcome.of.scaling.name().to_owned()]
+    [pairs.to_owned(), outcome.of.scaling.name().to_owned()]
 }
 
-fn scores(outcome: &Outcome) -> Vec<String> {
+fn scores(outcome: &Outcome) -> [String; 12] {
     let asked = match outcome.of.protocol {
         Protocol::Learned => "the pairs learned",
         Protocol::PairsHeldOut => "a fifth of the pairs, held out",
         Protocol::HalfTheScenes => "the other half of the scenes",
         Protocol::SceneLeftOut => "each scene, left out",
     };
-    let (synthesised, real) = total(outcome);
     let vectors = |pick: fn(f64, f64) -> f64| {
         let shares = outcome.machines.iter().map(|m| m.support_vectors as f64 / m.examples as f64);
-        shares.reduce(pick).unwrap_or(0.0)
+        100.0 * shares.reduce(pick).unwrap_or(0.0)
     };
     let vectors = match outcome.machines.as_slice() {
         [one] => format!("{} of {}", one.support_vectors, one.examples),
-        _ => format!("{:.0}…{:.0} %", 100.0 * vectors(f64::min), 100.0 * vectors(f64::max)),
+        _ => format!("{:.0}…{:.0} %", vectors(f64::min), vectors(f64::max)),
     };
-    let mut row = what(outcome);
-    row.push(asked.into());
-    row.extend(shares(synthesised));
-    row.extend(shares(real));
-    row.push(vectors);
-    row
+    let [pairs, values] = what(outcome);
+    let (synthesised, real) = total(outcome);
+    let ([a, b, c, d], [e, f, g, h]) = (shares(synthesised), shares(real));
+    [pairs, values, asked.to_owned(), a, b, c, d, e, f, g, h, vectors]
 }
 
-fn cost(outcome: &Outcome, query: &Query) -> Vec<String> {
-    let mut row = what(outcome);
-    row.extend([
+fn cost(outcome: &Outcome, query: &Query) -> [String; 7] {
+    let [pairs, values] = what(outcome);
+    let training: f64 = outcome.machines.iter().map(|m| m.seconds_training).sum();
+    [
+        pairs,
+        values,
         format!("{:.0}", outcome.seconds_distances),
-        format!("{:.1}", outcome.machines.iter().map(|m| m.seconds_training).sum::<f64>()),
+        format!("{training:.1}"),
         format!("{:.3}", query.seconds),
         format!("{:.0}", query.model_bytes as f64 / 1e6),
         format!("{:.0e}", query.largest_difference),
-    ]);
-    row
+    ]
 }
 
-fn scenes(outcome: &Outcome) -> Vec<Vec<String>> {
-    let row = |machine: &super::outcome::Machine| {
-        let mut row = what(outcome);
-        row.push(machine.asked.clone());
-        row.extend(shares(machine.synthesised));
-        row.extend(shares(machine.real));
-        row
+fn scenes(outcome: &Outcome) -> Vec<[String; 11]> {
+    let row = |machine: &Machine| {
+        let [pairs, values] = what(outcome);
+        let ([a, b, c, d], [e, f, g, h]) = (shares(machine.synthesised), shares(machine.real));
+        [pairs, values, machine.asked.clone(), a, b, c, d, e, f, g, h]
     };
     outcome.machines.iter().map(row).collect()
 }
 
 /// A Markdown table that reads well on a terminal, too.
-fn table(header: &[&str], rows: Vec<Vec<String>>) -> String {
+fn table<const COLUMNS: usize>(header: [&str; COLUMNS], rows: Vec<[String; COLUMNS]>) -> String {
     let width = |column: usize| {
-        let cells = rows.iter().filter_map(|r| r.get(column)).map(|cell| cell.chars().count());
+        let cells = rows.iter().map(|r| r[column].chars().count());
         cells.chain([header[column].chars().count()]).max().unwrap_or(0)
     };
-    let widths: Vec<usize> = (0..header.len()).map(width).collect();
-    let line = |cells: &[String]| {
-        let padded = cells.iter().zip(&widths).map(|(cell, width)| format!(" {cell:width$} "));
+    let widths: [usize; COLUMNS] = std::array::from_fn(width);
+    let line = |cells: &[String; COLUMNS]| {
+        let padded = cells.iter().zip(widths).map(|(cell, width)| format!(" {cell:width$} "));
         format!("|{}|\n", padded.collect::<Vec<_>>().join("|"))
     };
-    let rule: Vec<String> = widths.iter().map(|&width| "-".repeat(width)).collect();
-    let header: Vec<String> = header.iter().map(ToString::to_string).collect();
-    let rows = rows.iter().map(|row| line(row)).collect::<String>();
-    line(&header) + &line(&rule) + &rows
+    let rule = widths.map(|width| "-".repeat(width));
+    line(&header.map(str::to_owned)) + &line(&rule) + &rows.iter().map(line).collect::<String>()
 }
 
 #[cfg(test)]
@@ -203,7 +194,7 @@ mod tests {
 
     #[test]
     fn tables_line_up() {
-        let rows = vec![vec!["×1".to_owned(), "long".into()], vec!["2".into(), "x".into()]];
-        assert_eq!(table(&["a", "b"], rows), "| a  | b    |\n| -- | ---- |\n| ×1 | long |\n| 2  | x    |\n");
+        let rows = vec![["×1".to_owned(), "long".into()], ["2".into(), "x".into()]];
+        assert_eq!(table(["a", "b"], rows), "| a  | b    |\n| -- | ---- |\n| ×1 | long |\n| 2  | x    |\n");
     }
 }
