@@ -276,7 +276,7 @@ pub struct FitArgs {
 /// γ = 2. On luminances it failed (P ≈ 23 %), on noise masks 97.98 % were told right. Here both, with values as displayed and
 /// standardised, asked about the pairs that were learned, a fifth held out, the other half of the scenes, and each scene left out.
 ///
-/// With the eight scenes of the human data: 128 zones × 75 levels = 9,600 pairs of 32,768 numbers, 6 GB of memory, the better part of an hour.
+/// With the eight scenes of the human data: 128 zones × 75 levels = 9,600 pairs of 32,768 numbers, 5 GB of memory, some twenty minutes on two cores.
 /// Every result is written whole as soon as it is there; after Ctrl-C (exit code 130) the same command goes on from there. All is
 /// together in reproduce.json and reproduce.md when it is done.
 ///
