@@ -342,6 +342,12 @@ pub(crate) mod tests {
         assert!(p < small().probability(&mut tile));
     }
 
+    #[test]
+    fn the_model_for_references_is_whole() {
+        let model = Model::read(&include_bytes!("../models/human-reference.nfm")[..]).unwrap();
+        assert_eq!((model.evidence, model.record.scenes.len()), (Evidence::Reference, 8));
+    }
+
     #[cfg(feature = "bundled-model")]
     #[test]
     fn clean_tiles_are_converged_and_noisy_ones_are_not_whatever_the_texture() {
