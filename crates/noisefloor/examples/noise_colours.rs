@@ -97,6 +97,9 @@ fn visible(kernel: fn(isize, isize) -> f64) -> f64 {
     sum / (N * N) as f64
 }
 
+/// Display value at a pixel.
+type Picture = fn(usize, usize) -> f64;
+
 struct Random(u64);
 
 impl Random {
@@ -130,7 +133,7 @@ fn shaped(kind: &Kind, random: &mut Random) -> Array2<f64> {
 
 /// Samples the model asks for, over those that are there: geometric mean over tiles and seeds. `amplitude` is that of the noise of
 /// the mean of both halves, in display values.
-fn asked(oracle: &Oracle, kind: &Kind, clean: fn(usize, usize) -> f64, amplitude: f64) -> f64 {
+fn asked(oracle: &Oracle, kind: &Kind, clean: Picture, amplitude: f64) -> f64 {
     let grid = TileGrid::new(SIZE, SIZE, TILE).expect("a valid grid");
     let (mut sum, mut count) = (0.0, 0.0);
     for seed in 1..=SEEDS {
@@ -166,9 +169,8 @@ fn main() {
     let oracle = Oracle::bundled();
     let flat = |_: usize, _: usize| 0.5;
     let ramp = |x: usize, y: usize| 0.2 + 0.5 * x as f64 / SIZE as f64 + 0.1 * y as f64 / SIZE as f64;
-    let checker = |x: usize, y: usize| 0.5 + if (x / 6 + y / 6) % 2 == 0 { 0.03 } else { -0.03 };
-    let pictures: [(&str, fn(usize, usize) -> f64); 3] =
-        [("flat", flat), ("ramp", ramp), ("checker", checker)];
+    let checker = |x: usize, y: usize| 0.5 + if (x / 6 + y / 6).is_multiple_of(2) { 0.03 } else { -0.03 };
+    let pictures: [(&str, Picture); 3] = [("flat", flat), ("ramp", ramp), ("checker", checker)];
     println!("| noise | {} |", pictures.map(|p| p.0).join(" | "));
     println!("|---|{}", "---|".repeat(pictures.len()));
     let independent = visible(at_centre);
