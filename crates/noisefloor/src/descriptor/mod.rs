@@ -177,6 +177,7 @@ impl Descriptor {
     }
 
     /// Standard deviation over the training data that is taken for granted, in the unit of the numbers.
+    #[cfg(feature = "train")]
     pub(crate) fn least_deviation(&self) -> f64 {
         match self {
             Self::Compact { .. } => compact::LEAST_DEVIATION,
