@@ -40,7 +40,8 @@ pub enum Command {
 ///
 /// Writes into the output folder: image.exr (linear radiance, with samples, probability, stop and visible noise as channels),
 /// image.png, stops.csv (a line a tile), stops.png (heat map over the picture), noise.png (where noise is still seen, and how
-/// strongly), timeline.csv and report.json. Files appear whole or not at all and are refreshed while rendering (--autosave). Ctrl-C stops all tiles and writes what is there (exit code 130).
+/// strongly), timeline.csv and report.json. Files appear whole or not at all and are refreshed while rendering (--autosave).
+/// Ctrl-C stops all tiles and writes what is there (exit code 130).
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   noisefloor render                                  the Cornell box, into out/cornell-box

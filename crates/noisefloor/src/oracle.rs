@@ -197,10 +197,17 @@ impl StoppingCriterion for Oracle {
     }
 
     /// Tiles that are not named count for the picture as they were when last described: they are looked at again if their
-    /// samples have changed since.
+    /// samples have changed since. Use an oracle of its own for each film: one with as many tiles and samples is not told from
+    /// another.
     fn judge(&mut self, view: &View<'_>, tiles: &[Tile]) -> Result<Vec<Verdict>, CriterionError> {
         let grid = view.film.grid();
-        self.described.resize(grid.len(), None);
+        // Another film than the last one, if it has other tiles or fewer samples.
+        let fewer = |(tile, d): (usize, &Option<Described>)| {
+            d.as_ref().is_some_and(|d| d.samples > view.film.samples(tile) as f64)
+        };
+        if self.described.len() != grid.len() || self.described.iter().enumerate().any(fewer) {
+            self.described = vec![None; grid.len()];
+        }
         let mut due = vec![false; grid.len()];
         tiles.iter().for_each(|t| due[t.index] = true);
         let this: &Self = self;
@@ -219,9 +226,9 @@ impl StoppingCriterion for Oracle {
         // Judge all that can be seen, and hand out what was asked for.
         let seen: Vec<Described> = self.described.iter().flatten().cloned().collect();
         let mut judged = self.model.descriptor.in_picture(&seen).into_iter();
-        let mut numbers: Vec<Option<Vec<f32>>> =
+        let numbers: Vec<Option<Vec<f32>>> =
             self.described.iter().map(|d| d.as_ref().and_then(|_| judged.next())).collect();
-        let asked: Vec<Option<Vec<f32>>> = tiles.iter().map(|t| numbers[t.index].take()).collect();
+        let asked: Vec<Option<Vec<f32>>> = tiles.iter().map(|t| numbers[t.index].clone()).collect();
         let judge = |(tile, raw): (&Tile, Option<Vec<f32>>)| match raw {
             Some(raw) => self.verdict(&raw, view.film.samples(tile.index)),
             None => Verdict {
@@ -366,6 +373,41 @@ mod tests {
         let ratio = expected(Model::bundled()) / expected(careless);
         // The expected need is found to a fiftieth of a doubling, each time.
         assert!((ratio.log2() - 1.0).abs() < 0.04, "{ratio}");
+    }
+
+    /// A film of two tiles, the second much noisier, with `samples` samples.
+    fn two_tiles(samples: u32) -> Film {
+        let mut film = Film::new(TileGrid::new(128, 64, 64).unwrap());
+        for tile in 0..2 {
+            let half = |seed: usize| -> Vec<Rgb> {
+                let sign =
+                    |i: usize| if ((i * 7919 + seed * 104_729) / 31).is_multiple_of(2) { 1.0 } else { -1.0 };
+                let sigma = if tile == 0 { 0.01 } else { 0.1 };
+                (0..64 * 64).map(|i| [0.2 + sigma * sign(i); 3]).collect()
+            };
+            (1..=2).for_each(|seed| film.add(tile, samples / 2, &half(seed)).unwrap());
+        }
+        film
+    }
+
+    #[test]
+    fn tiles_are_judged_in_their_picture_whoever_is_asked_about() {
+        let (film, fresh) = (two_tiles(100), || Oracle::new(small(), DEFAULT_THRESHOLD).unwrap());
+        let ask = |oracle: &mut Oracle, film: &Film, tiles: &[usize]| {
+            let tiles: Vec<Tile> = tiles.iter().map(|&t| film.grid().tile(t)).collect();
+            oracle.judge(&View { film, display: &Display::SRGB, reference: None }, &tiles).unwrap()
+        };
+        let both = ask(&mut fresh(), &film, &[0, 1]);
+        assert_eq!(ask(&mut fresh(), &film, &[1, 0, 1]), [both[1], both[0], both[1]]);
+        // What was found of another film is forgotten.
+        let mut used = fresh();
+        ask(&mut used, &two_tiles(400), &[0, 1]);
+        assert_eq!(ask(&mut used, &film, &[0])[0], both[0]);
+        assert_eq!(used.described, {
+            let mut o = fresh();
+            ask(&mut o, &film, &[0]);
+            o.described
+        });
     }
 
     #[test]

@@ -100,6 +100,9 @@ pub(super) fn check(
         let what = format!("{} rows, {} labels", rows.nrows(), converged.len());
         return Err(SvmTrainError::Examples(what));
     }
+    if rows.ncols() == 0 {
+        return Err(SvmTrainError::Examples("rows without numbers".into()));
+    }
     let positive = converged.iter().filter(|&&c| c).count();
     if positive == 0 || positive == converged.len() {
         return Err(SvmTrainError::OneClass { examples: converged.len(), converged: positive });
@@ -233,6 +236,8 @@ mod tests {
         assert!(matches!(fit(&rows, &labels, 0.0), Err(SvmTrainError::Params { .. })));
         assert!(matches!(fit(&rows, &[true; 10], 1.0), Err(SvmTrainError::OneClass { .. })));
         assert!(matches!(fit(&rows, &labels[1..], 1.0), Err(SvmTrainError::Examples(_))));
+        let empty = Array2::zeros((10, 0));
+        assert!(matches!(fit(&empty, &labels, 1.0), Err(SvmTrainError::Examples(_))));
         rows[(3, 1)] = f64::NAN;
         assert!(matches!(fit(&rows, &labels, 1.0), Err(SvmTrainError::Examples(_))));
     }
