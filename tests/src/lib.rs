@@ -1,6 +1,8 @@
 //! Tests that cross crates, and [`check_source`]: the contract of a source of samples, to be run on every one, and on yours.
 
-use noisefloor::{Batch, ProgressiveSource, Request, SourceInfo, Tile, TileGrid, check_image};
+use noisefloor::{Batch, ProgressiveSource, Repeats, Request, SourceInfo, Tile, TileGrid, Unit, check_image};
+use statrs::distribution::{ContinuousCDF, StudentsT};
+use std::cmp::Ordering;
 
 /// Tile edge that sources are asked in: an image of 48×40 pixels has ragged tiles to the right and below.
 const EDGE: usize = 32;
@@ -8,6 +10,12 @@ const EDGE: usize = 32;
 const LARGEST_Z: f64 = 6.0;
 /// Relative differences below this are rounding, not noise: about 64 roundings to f32.
 const ROUNDING: f64 = 64.0 / (1 << 24) as f64;
+/// Rounds of 16 samples that are looked at for independence, of samples and of mutations.
+const ROUNDS: [usize; 2] = [4, 64];
+/// Batches of 32 samples that are held against as many in four parts.
+const LONG: usize = 12;
+/// False-alarm rate of each comparison of those.
+const FALSE_ALARM: f64 = 1e-8;
 /// Most batches that a playback is followed for, and a renderer.
 const MOST_BATCHES: [usize; 2] = [1000, 8];
 
@@ -18,7 +26,7 @@ const MOST_BATCHES: [usize; 2] = [1000, 8];
 /// # struct Wall;
 /// # impl ProgressiveSource for Wall {
 /// #     fn info(&self) -> SourceInfo {
-/// #         SourceInfo { name: "wall".into(), width: 48, height: 40, unit: Unit::SamplesPerPixel, aims: true }
+/// #         SourceInfo { name: "wall".into(), width: 48, height: 40, unit: Unit::SamplesPerPixel, aims: true, repeats: Repeats::Samples }
 /// #     }
 /// #     fn sample(&mut self, requests: &[Request]) -> Result<Vec<Batch>, SourceError> {
 /// #         Ok(requests.iter().map(|r| Batch { tile: r.tile, samples: r.samples, mean: vec![[0.2; 3]; r.tile.pixels()] }).collect())
@@ -32,22 +40,33 @@ const MOST_BATCHES: [usize; 2] = [1000, 8];
 /// - One batch a request, in the order of the requests, with the tile asked for and a value a pixel. No request, no batch.
 /// - Counts are exact: a renderer gives what is asked for until it ends; a playback gives what it has, whatever is asked for.
 ///   Which of the two a source is, is told by its counts.
-/// - The same construction gives the same samples to the bit.
-/// - How requests are cut changes rounding alone: 8 + 24 samples are the 32 samples asked for at once. (Not for playbacks.)
-/// - Tiles asked for alone, or at other depths than their neighbours, get what they get when all are asked for. (If it aims.)
+/// - What [`SourceInfo::repeats`] promises. [`Repeats::Calls`]: the same construction gives the same samples to the bit.
+///   [`Repeats::Samples`]: also, how requests are cut changes rounding alone (8 + 24 samples are the 32 samples asked for at
+///   once), and tiles asked for alone, or at other depths than their neighbours, get what they get when all are asked for.
+/// - However requests are cut, the distribution is the same: 12 batches of 32 samples against 12 of 8 + 8 + 8 + 8.
 /// - Batches of new samples are independent of those before, in the same tile and in others.
 /// - The reference, if there is one, has the image's size and is finite; rendering it changes no sample.
 /// - At its end a source gives empty batches, again and again.
+///
+/// A playback is not cut, nor asked for single tiles at other depths.
 ///
 /// Use an image with more than one tile of 32×32 pixels, both edges no multiple of 32: 48×40 is enough, and quick. A correlation
 /// is found from a few dozen noisy pixels on.
 ///
 /// # How often a right source fails by chance
-/// Noise of a pixel is the difference x of two batches of equally many samples, which is symmetric around 0; so is that of two
-/// others, y. Given all |xy|, only signs are left to chance, independent from pixel to pixel, and z = Σxy/√Σ(xy)² exceeds 6 with
-/// p ≤ 2·exp(−6²/2) = 3.1e-8 (Hoeffding 1963), whatever the distribution. Four such z are looked at: p < 1.3e-7 a source. Batches
-/// of a playback are not of equal size; for them this holds as far as z is normal. The sources of this project are seeded: they
-/// pass always or never.
+/// *Independence.* Noise of a pixel is the difference x of two batches of equally many samples, which is symmetric around 0; so is
+/// that of two others, y. Given all |xy|, only signs are left to chance, independent from pixel to pixel, and z = Σxy/√Σ(xy)²
+/// exceeds 6 with p ≤ 2·exp(−6²/2) = 3.1e-8 (Hoeffding 1963), whatever the distribution. Four such z are looked at: p < 1.3e-7 a
+/// source. Batches of a playback are not of equal size; for them this holds as far as z is normal. Where work is counted in
+/// mutations, neighbouring pixels share a Markov chain: signs are then those of whole tiles, in 64 batches instead of 4.
+///
+/// *Distribution.* Two numbers a batch, the mean over its pixels and the mean square of its deviations (each pixel's in units of
+/// its own standard deviation over all batches), are compared by Welch's t (1947), with the two-sided quantile of p = 1e-8. Where
+/// work is counted in samples, pixels are independent, and so are the ranks, among the 24 batches, that the long ones have in
+/// each: their cumulative frequencies (the Kolmogorov–Smirnov comparison, pixel by pixel) are off by 6 standard errors with
+/// p < 2e-9 each, 23 of them, by the normal approximation. Together p < 1e-7 a source.
+///
+/// The sources of this project are seeded where their renderers are: they pass always or never.
 ///
 /// # Panics
 /// If a promise is not kept; the message says which.
@@ -70,36 +89,52 @@ pub fn check_source<S: ProgressiveSource>(make: impl Fn() -> S) {
     // Exact counts
     let (eight, three) = (rounds(&[8]), rounds(&[3]));
     let playback = !(gives(&eight[0], 8) && gives(&three[0], 3));
-    let four = rounds(&[16; 4]);
+    let several = rounds(&[16; ROUNDS[1]][..ROUNDS[usize::from(info.unit == Unit::MutationsPerPixel)]]);
+    let four = &several[..4];
     if playback {
         let other = rounds(&[1, 1000, 5, 7]);
-        assert!(same(&four, &other), "a playback gave other batches because other numbers were asked for");
+        assert!(same(four, &other), "a playback gave other batches because other numbers were asked for");
     } else {
-        check_counts(&four, &[16; 4]);
+        check_counts(four, &[16; 4]);
     }
 
-    // Deterministic
-    assert!(same(&four, &rounds(&[16; 4])), "the same construction gave other samples the second time");
+    // Repeatable
+    let promises = |least| info.repeats == Repeats::Samples || info.repeats == least;
+    if promises(Repeats::Calls) {
+        assert!(same(four, &rounds(&[16; 4])), "the same construction gave other samples the second time");
+    }
 
-    // However requests are cut
+    // However requests are cut, to the bit
     let whole = rounds(&[32]);
     if !playback {
         let parts = rounds(&[8, 24]);
         check_counts(&parts, &[8, 24]);
-        if gives(&parts[1], 24) {
+        if promises(Repeats::Samples) && gives(&parts[1], 24) {
             check_cut(&whole[0], &parts);
         }
     }
-
     if info.aims {
-        check_aiming(start, &four);
+        check_aiming(start, four, promises(Repeats::Samples));
     }
-    check_independence(&four, (!playback).then_some(&whole[0]));
+
+    // Independent, and of one distribution
+    check_independence(&several, (!playback).then_some(&whole[0]), info.unit);
+    if !playback {
+        let mut probe = start();
+        let long: Vec<_> = (0..LONG).map(|_| probe.ask_all(32)).collect();
+        let short: Vec<_> = (0..4 * LONG).map(|_| probe.ask_all(8)).collect();
+        if gives(&short[4 * LONG - 1], 8) {
+            check_distribution(&long, &short, info.unit);
+        }
+    }
 
     // The reference, which is nobody's sample
     let mut probe = start();
     check_reference(&mut probe.source, &info);
-    assert!(same(&[probe.ask_all(16)], &four[..1]), "rendering the reference changed the samples");
+    let after = [probe.ask_all(16)];
+    if promises(Repeats::Calls) {
+        assert!(same(&after, &four[..1]), "rendering the reference changed the samples");
+    }
 
     // The end, where it is near
     let mut probe = start();
@@ -202,17 +237,108 @@ fn check_cut(whole: &[Batch], parts: &[Vec<Batch>]) {
     }
 }
 
-/// Tiles get the same samples alone as in company, and at whatever depth the others are.
-fn check_aiming<S: ProgressiveSource>(start: impl Fn() -> Probe<S>, rounds: &[Vec<Batch>]) {
+/// Means over 32 samples have one distribution, asked for at once or in four parts.
+fn check_distribution(long: &[Vec<Batch>], short: &[Vec<Batch>], unit: Unit) {
+    let value = |p: &[f32; 3]| p.iter().map(|&c| f64::from(c)).sum::<f64>();
+    let values =
+        |batches: &Vec<Batch>| -> Vec<f64> { batches.iter().flat_map(|b| &b.mean).map(value).collect() };
+    let mean = |parts: &[Vec<f64>]| -> Vec<f64> {
+        (0..parts[0].len()).map(|i| parts.iter().map(|p| p[i]).sum::<f64>() / parts.len() as f64).collect()
+    };
+    let parts: Vec<_> = short.iter().map(values).collect();
+    let batches: Vec<_> = long.iter().map(values).chain(parts.chunks(4).map(mean)).collect();
+
+    // Noise alone, each pixel in its own unit. Pixels without noise, or with a sample that is not finite, have none to compare
+    let centre = mean(&batches);
+    let variance =
+        |i: usize| batches.iter().map(|b| (b[i] - centre[i]).powi(2)).sum::<f64>() / batches.len() as f64;
+    let noisy: Vec<(usize, f64)> = (0..centre.len())
+        .map(|i| (i, variance(i).sqrt()))
+        .filter(|&(i, deviation)| deviation.is_finite() && deviation > ROUNDING * centre[i].abs())
+        .collect();
+    if noisy.is_empty() {
+        return;
+    }
+    let deviations =
+        |b: &Vec<f64>| -> Vec<f64> { noisy.iter().map(|&(i, unit)| (b[i] - centre[i]) / unit).collect() };
+    let batches: Vec<_> = batches.iter().map(deviations).collect();
+    let level = |b: &Vec<f64>| b.iter().sum::<f64>() / b.len() as f64;
+    let spread = |b: &Vec<f64>| b.iter().map(|d| d * d).sum::<f64>() / b.len() as f64;
+    for (what, number) in [("mean", &level as &dyn Fn(&Vec<f64>) -> f64), ("noise", &spread)] {
+        let numbers: Vec<f64> = batches.iter().map(number).collect();
+        let (long, short) = numbers.split_at(LONG);
+        assert!(
+            welch(long, short) > FALSE_ALARM,
+            "the {what} of 32 samples depends on how requests are cut: {long:.3?} at once, {short:.3?} in four parts"
+        );
+    }
+    if unit == Unit::SamplesPerPixel {
+        check_ranks(&batches);
+    }
+}
+
+/// Probability that the means of two groups differ by as much, or more, by chance: Welch's t-test (1947), two-sided.
+fn welch(a: &[f64], b: &[f64]) -> f64 {
+    let [(mean_a, error_a, freedom_a), (mean_b, error_b, freedom_b)] = [a, b].map(|group| {
+        let n = group.len() as f64;
+        let mean = group.iter().sum::<f64>() / n;
+        let variance = group.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (n - 1.0);
+        (mean, variance / n, n - 1.0)
+    });
+    let error = error_a + error_b;
+    let freedom = error * error / (error_a * error_a / freedom_a + error_b * error_b / freedom_b);
+    let t = StudentsT::new(0.0, 1.0, freedom).expect("noisy batches vary");
+    2.0 * t.sf((mean_a - mean_b).abs() / error.sqrt())
+}
+
+/// The first half of the batches are no higher nor lower in each pixel than the second.
+fn check_ranks(batches: &[Vec<f64>]) {
+    let (all, pixels) = (batches.len(), batches[0].len());
+    let mut below = vec![0.0; all];
+    let of_pixel = |pixel: usize| batches.iter().map(|b| b[pixel]).collect::<Vec<f64>>();
+    for (pixel, values) in (0..pixels).map(of_pixel).enumerate() {
+        // Equal values have no rank of their own: their order is as good as chance, and chance must not know who they are
+        let tie = |batch: usize| {
+            (pixel as u64 * all as u64 + batch as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15).rotate_left(32)
+        };
+        let mut order: Vec<usize> = (0..all).collect();
+        order.sort_by(|&a, &b| {
+            let by_value = values[a].partial_cmp(&values[b]).unwrap_or(Ordering::Equal);
+            by_value.then_with(|| tie(a).cmp(&tie(b)))
+        });
+        for (rank, &batch) in order.iter().enumerate() {
+            below[rank] += f64::from(u8::from(batch < all / 2));
+        }
+    }
+    let mut sum = 0.0;
+    for (rank, count) in below.iter().enumerate().take(all - 1) {
+        // Of the lowest `drawn` of `all` batches, half of them long: hypergeometric
+        sum += count;
+        let (drawn, all) = ((rank + 1) as f64, all as f64);
+        let variance = drawn * 0.25 * (all - drawn) / (all - 1.0) * pixels as f64;
+        let z = (sum - drawn / 2.0 * pixels as f64) / variance.sqrt();
+        assert!(
+            z.abs() < LARGEST_Z,
+            "the distribution of 32 samples depends on how requests are cut: z = {z} at quantile {:.2}",
+            drawn / all
+        );
+    }
+}
+
+/// Tiles can be asked for alone. To the bit, they get the same samples then, and at whatever depth the others are.
+fn check_aiming<S: ProgressiveSource>(start: impl Fn() -> Probe<S>, rounds: &[Vec<Batch>], to_the_bit: bool) {
     let mut probe = start();
     assert!(probe.ask(&[], 16).is_empty());
     let last = probe.tiles.len() - 1;
     let alone = probe.ask(&[last], 16);
+    let together = probe.ask_all(16);
+    if !to_the_bit {
+        return;
+    }
     assert!(
         same(&[alone], &[vec![rounds[0][last].clone()]]),
         "a tile asked for alone got other samples than in company"
     );
-    let together = probe.ask_all(16);
     for (tile, batch) in together.into_iter().enumerate() {
         let depth = usize::from(tile == last);
         let right = same(&[vec![batch]], &[vec![rounds[depth][tile].clone()]]);
@@ -221,18 +347,28 @@ fn check_aiming<S: ProgressiveSource>(start: impl Fn() -> Probe<S>, rounds: &[Ve
 }
 
 /// Noise of two batches against noise of two others, in every way to pair four, and noise of a tile against the next one's.
-fn check_independence(rounds: &[Vec<Batch>], whole: Option<&Vec<Batch>>) {
+fn check_independence(rounds: &[Vec<Batch>], whole: Option<&Vec<Batch>>, unit: Unit) {
     if rounds.iter().flatten().any(|b| b.samples == 0) {
         return;
     }
-    let noise = |a: usize, b: usize| -> Vec<Vec<f64>> {
-        rounds[a].iter().zip(&rounds[b]).map(|(a, b)| difference(a, b)).collect()
+    let noise = |a: &Vec<Batch>, b: &Vec<Batch>| -> Vec<Vec<f64>> {
+        a.iter().zip(b).map(|(a, b)| difference(a, b)).collect()
+    };
+    // Products whose signs are independent: pixel by pixel, or tile by tile
+    let products = |pairs: Vec<(f64, f64)>| -> Vec<f64> {
+        let products = pairs.into_iter().map(|(x, y)| x * y);
+        if unit == Unit::SamplesPerPixel { products.collect() } else { vec![products.sum()] }
     };
     let mut silent = true;
     for [a, b, c, d] in [[0, 1, 2, 3], [0, 2, 1, 3], [0, 3, 1, 2]] {
-        let (x, y) = (noise(a, b), noise(c, d));
-        silent &= x.iter().chain(&y).flatten().all(|&v| v == 0.0);
-        let z = z(x.iter().flatten().zip(y.iter().flatten()));
+        let mut terms = Vec::new();
+        for four in rounds.chunks_exact(4) {
+            for (x, y) in noise(&four[a], &four[b]).into_iter().zip(noise(&four[c], &four[d])) {
+                silent &= x.iter().chain(&y).all(|&v| v == 0.0);
+                terms.extend(products(x.into_iter().zip(y).collect()));
+            }
+        }
+        let z = z(&terms);
         assert!(
             z.abs() < LARGEST_Z,
             "successive batches are correlated: z = {z}; are they means of new samples alone?"
@@ -245,15 +381,18 @@ fn check_independence(rounds: &[Vec<Batch>], whole: Option<&Vec<Batch>>) {
         assert!(!again, "every batch has the same samples again");
     }
 
-    let x = noise(0, 1);
-    let width = |tile: usize| rounds[0][tile].tile.width;
-    let overlap = (1..x.len()).flat_map(|tile| {
-        let (w, before) = (width(tile), width(tile - 1));
-        let shared = x[tile].iter().enumerate().filter(move |(i, _)| i % w < before);
-        let x = &x;
-        shared.filter_map(move |(i, v)| Some((x[tile - 1].get(i / w * before + i % w)?, v)))
-    });
-    let z = z(overlap);
+    let mut terms = Vec::new();
+    for four in rounds.chunks_exact(4) {
+        let x = noise(&four[0], &four[1]);
+        let width = |tile: usize| rounds[0][tile].tile.width;
+        for tile in 1..x.len() {
+            let (w, before) = (width(tile), width(tile - 1));
+            let shared = x[tile].iter().enumerate().filter(|(i, _)| i % w < before);
+            let pairs = shared.filter_map(|(i, &v)| Some((*x[tile - 1].get(i / w * before + i % w)?, v)));
+            terms.extend(products(pairs.collect()));
+        }
+    }
+    let z = z(&terms);
     assert!(
         z.abs() < LARGEST_Z,
         "tiles have the same noise: z = {z}; are random numbers numbered from the tile's corner?"
@@ -271,10 +410,9 @@ fn difference(a: &Batch, b: &Batch) -> Vec<f64> {
     a.mean.iter().zip(&b.mean).map(noise).collect()
 }
 
-/// Σxy/√Σ(xy)²; 0 without noise.
-fn z<'a>(pairs: impl Iterator<Item = (&'a f64, &'a f64)>) -> f64 {
-    let (sum, squares) =
-        pairs.fold((0.0, 0.0), |(sum, squares), (x, y)| (sum + x * y, squares + (x * y).powi(2)));
+/// Σt/√Σt²; 0 without noise.
+fn z(terms: &[f64]) -> f64 {
+    let (sum, squares) = terms.iter().fold((0.0, 0.0), |(sum, squares), t| (sum + t, squares + t * t));
     if squares > 0.0 { sum / f64::sqrt(squares) } else { 0.0 }
 }
 
@@ -287,6 +425,18 @@ fn check_reference(source: &mut impl ProgressiveSource, info: &SourceInfo) {
     assert_eq!(size, (info.width, info.height), "the reference has not the image's size");
     assert_eq!(reference.pixels.len(), info.width * info.height, "pixels of the reference");
     assert!(reference.pixels.iter().flatten().all(|c| c.is_finite()), "the reference is not finite");
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// As `scipy.stats.ttest_ind(a, b, equal_var=False)` has it: t = −2.00455, ν = 6.97447.
+    #[test]
+    fn welch_is_as_published() {
+        let p = welch(&[1.0, 2.0, 4.0, 7.0], &[3.0, 5.0, 9.0, 9.5, 12.0]);
+        assert!((p - 0.085_195_899_6).abs() < 1e-9, "{p}");
+    }
 }
 
 /// The Rust blocks of README and guide, run as doctests.

@@ -4,7 +4,7 @@ use crate::decode_exr::read_exr;
 use crate::error::StackError;
 use crate::frames::{self, Frame, Layout};
 use crate::picture::{LinearImage, read_picture};
-use noisefloor::{Batch, ProgressiveSource, Request, Rgb, SourceError, SourceInfo, Tile, Unit};
+use noisefloor::{Batch, ProgressiveSource, Repeats, Request, Rgb, SourceError, SourceInfo, Tile, Unit};
 use std::collections::VecDeque;
 use std::path::Path;
 use std::sync::Arc;
@@ -164,6 +164,7 @@ impl ProgressiveSource for StackSource {
             height: self.height,
             unit: Unit::SamplesPerPixel,
             aims: true,
+            repeats: Repeats::Samples,
         }
     }
 

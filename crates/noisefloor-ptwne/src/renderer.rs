@@ -8,7 +8,9 @@ use crate::math::Vec3;
 use crate::rng::Key;
 use crate::sampler::{Sampler, Sampling};
 use crate::scene::{Needs, Scene};
-use noisefloor::{Batch, ProgressiveSource, Reference, Request, Rgb, SourceError, SourceInfo, Tile, Unit};
+use noisefloor::{
+    Batch, ProgressiveSource, Reference, Repeats, Request, Rgb, SourceError, SourceInfo, Tile, Unit,
+};
 use rayon::prelude::*;
 use std::num::NonZeroUsize;
 use std::sync::Arc;
@@ -236,6 +238,7 @@ impl ProgressiveSource for Ptwne {
             height: self.height,
             unit: Unit::SamplesPerPixel,
             aims: true,
+            repeats: Repeats::Samples,
         }
     }
 

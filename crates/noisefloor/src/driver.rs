@@ -85,7 +85,7 @@ pub struct Clock {
 /// struct Wall;
 /// impl ProgressiveSource for Wall {
 ///     fn info(&self) -> SourceInfo {
-///         SourceInfo { name: "wall".into(), width: 64, height: 32, unit: Unit::SamplesPerPixel, aims: true }
+///         SourceInfo { name: "wall".into(), width: 64, height: 32, unit: Unit::SamplesPerPixel, aims: true, repeats: Repeats::Samples }
 ///     }
 ///     fn sample(&mut self, requests: &[Request]) -> Result<Vec<Batch>, SourceError> {
 ///         Ok(requests.iter().map(|r| Batch { tile: r.tile, samples: r.samples, mean: vec![[0.2; 3]; r.tile.pixels()] }).collect())
@@ -294,7 +294,7 @@ impl<S: ProgressiveSource, C: StoppingCriterion> Driver<S, C> {
 mod tests {
     use super::*;
     use crate::criterion::{FixedSamples, Needs, Verdict, View};
-    use crate::source::{SourceInfo, Unit};
+    use crate::source::{Repeats, SourceInfo, Unit};
     use crate::tile::Tile;
 
     /// A grey source that can be told to misbehave.
@@ -311,7 +311,14 @@ mod tests {
     impl ProgressiveSource for Grey {
         fn info(&self) -> SourceInfo {
             let unit = Unit::SamplesPerPixel;
-            SourceInfo { name: "grey".into(), width: 70, height: 32, unit, aims: !self.cannot_aim }
+            SourceInfo {
+                name: "grey".into(),
+                width: 70,
+                height: 32,
+                unit,
+                aims: !self.cannot_aim,
+                repeats: Repeats::Samples,
+            }
         }
 
         fn sample(&mut self, requests: &[Request]) -> Result<Vec<Batch>, SourceError> {

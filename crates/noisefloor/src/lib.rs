@@ -63,7 +63,7 @@ pub use model::{Model, ModelError, Scores, TrainingRecord};
 pub use oracle::{DEFAULT_THRESHOLD, Oracle, ThresholdError};
 pub use params::{Audience, Params, ParamsError, Schedule};
 pub use session::{Session, SessionError, Stop, StopReason};
-pub use source::{Batch, ProgressiveSource, Reference, Request, Rgb, SourceError, SourceInfo, Unit};
+pub use source::{Batch, ProgressiveSource, Reference, Repeats, Request, Rgb, SourceError, SourceInfo, Unit};
 pub use svm::{Platt, Scaler, Svm};
 #[cfg(feature = "train")]
 pub use svm::{SvmParams, SvmTrainError, Weights, fit_platt, fit_svm, fit_weights, squared_distances};

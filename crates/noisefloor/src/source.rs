@@ -17,6 +17,20 @@ pub enum Unit {
     MutationsPerPixel,
 }
 
+/// What the same seed repeats. Each kind keeps what the next one promises.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Repeats {
+    /// Every sample: it follows from (seed, pixel, index of the sample), however requests are cut and whatever other tiles are
+    /// asked for with it. Only rounding of the means differs.
+    Samples,
+    /// Every call: the same requests in the same order give the same bits. Cut otherwise, they give other samples of the same
+    /// distribution.
+    Calls,
+    /// Nothing: threads race, say. The distribution is the same.
+    Nothing,
+}
+
 /// A source's description of itself.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SourceInfo {
@@ -30,6 +44,8 @@ pub struct SourceInfo {
     pub unit: Unit,
     /// Whether samples can be aimed at single tiles. If not, every call samples all tiles.
     pub aims: bool,
+    /// What the same seed repeats.
+    pub repeats: Repeats,
 }
 
 /// One tile's wish for samples.
@@ -103,7 +119,8 @@ pub enum SourceError {
 /// - Return one batch for each request, in the order of the requests. A source that cannot aim ([`SourceInfo::aims`] is
 ///   false) is always asked for all tiles.
 /// - Samples must be independent of all samples handed out before, in this tile and in others.
-/// - The same seed must give the same samples, whatever the number of threads and however requests are cut into batches.
+/// - The same seed should give the same samples, whatever the number of threads and however requests are cut into batches.
+///   What of that is kept is said by [`SourceInfo::repeats`]: a run is as reproducible as its source.
 /// - Use no reconstruction filter wider than a pixel unless you document it: shared samples correlate the noise of
 ///   neighbours, and the model has learned from independent noise.
 ///

@@ -1,5 +1,7 @@
-use crate::kit::{Altered, Synthetic};
-use noisefloor::{Batch, ProgressiveSource, Reference, Request, SourceError, SourceInfo, Tile};
+use crate::kit::{Altered, Synthetic, hash};
+use noisefloor::{
+    Batch, ProgressiveSource, Reference, Repeats, Request, SourceError, SourceInfo, Tile, Unit,
+};
 use noisefloor_exr::{RenderLayers, StackSource, write_exr};
 use noisefloor_ptwne::{Options, Ptwne, scenes};
 use noisefloor_tests::check_source;
@@ -100,6 +102,65 @@ fn broken_promises_are_noticed() {
         b.iter_mut().zip(r).for_each(|(b, r)| b.tile = r.tile);
     };
     said(broken(from_corner), "tiles have the same noise");
+}
+
+/// Random numbers that follow from the call, not from the sample; then the batch is changed.
+fn by_call(repeats: Repeats, change: impl Fn(&Request, &mut Batch) + Copy + 'static) -> String {
+    verdict(move || {
+        let mut calls = 0;
+        Altered::batches(Synthetic { repeats, ..synthetic() }, move |requests, batches| {
+            calls += 1;
+            *batches = Synthetic { seed: 100 + calls, ..synthetic() }.sample(requests).unwrap();
+            requests.iter().zip(batches).for_each(|(request, batch)| change(request, batch));
+        })
+    })
+}
+
+#[test]
+fn who_promises_less_is_held_to_less_and_no_less() {
+    let said = |said: String, expected: &str| assert!(said.contains(expected), "{said:?}, not {expected:?}");
+    said(by_call(Repeats::Samples, |_, _| ()), "how requests are cut");
+    said(by_call(Repeats::Calls, |_, _| ()), "kept");
+    said(by_call(Repeats::Nothing, |_, _| ()), "kept");
+
+    // Small batches a little darker; half of the samples they claim; all the noise in a tenth of the pixels of a batch
+    let dark = |r: &Request, b: &mut Batch| {
+        b.mean.iter_mut().flatten().for_each(|c| *c *= if r.samples == 8 { 0.97 } else { 1.0 })
+    };
+    said(by_call(Repeats::Calls, dark), "the mean of 32 samples depends on how requests are cut");
+    let few = |r: &Request, b: &mut Batch| {
+        if r.samples == 8 {
+            let fewer = Request { samples: 4, first: 10_000 + r.first, ..*r };
+            b.mean = synthetic().sample(&[fewer]).unwrap().remove(0).mean;
+        }
+    };
+    said(by_call(Repeats::Nothing, few), "the noise of 32 samples depends on how requests are cut");
+    // Every other batch is the one before, which a renderer does that forgets to change its seed
+    let twice = |r: &Request, b: &mut Batch| {
+        let first = r.first / u64::from(2 * r.samples) * u64::from(2 * r.samples);
+        b.mean = synthetic().sample(&[Request { first, ..*r }]).unwrap().remove(0).mean;
+    };
+    said(by_call(Repeats::Calls, twice), "correlated");
+}
+
+/// Work in mutations: neighbouring pixels of a batch share their noise, which is no fault there.
+#[test]
+fn noise_that_pixels_share_is_no_fault_of_a_markov_chain() {
+    let shared = |unit: Unit| {
+        verdict(move || {
+            let source = Synthetic { repeats: Repeats::Calls, unit, ..synthetic() };
+            Altered::batches(source, |requests, batches| {
+                for (r, batch) in requests.iter().zip(batches) {
+                    let key = hash(r.first) ^ hash(r.tile.index as u64 + 77) ^ hash(u64::from(r.samples));
+                    let noise =
+                        |row: usize| (hash(key ^ row as u64) >> 11) as f64 / (1u64 << 53) as f64 - 0.5;
+                    let noise = |i: usize| noise(i / r.tile.width / 8) / f64::from(r.samples).sqrt();
+                    batch.mean = (0..r.tile.pixels()).map(|i| [0.5 + noise(i) as f32; 3]).collect();
+                }
+            })
+        })
+    };
+    assert_eq!(shared(Unit::MutationsPerPixel), "kept");
 }
 
 /// A playback of running means that forgets to take the difference.

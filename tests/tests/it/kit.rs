@@ -1,4 +1,4 @@
-use noisefloor::{Batch, ProgressiveSource, Reference, Request, Rgb, SourceError, SourceInfo, Unit};
+use noisefloor::{Batch, ProgressiveSource, Reference, Repeats, Request, Rgb, SourceError, SourceInfo, Unit};
 
 /// Noise without a renderer. A sample of a pixel is `radiance`·(1 ± `noise`), one as likely as the other. All follows from (seed,
 /// pixel, sample).
@@ -10,10 +10,12 @@ pub(crate) struct Synthetic {
     /// Relative standard deviation of one sample, 0…1.
     pub(crate) noise: fn(usize, usize) -> f32,
     /// Factor on all radiance.
-    pub(crate) unit: f32,
+    pub(crate) brightness: f32,
     /// Samples per pixel that it has.
     pub(crate) store: u64,
     pub(crate) aims: bool,
+    pub(crate) repeats: Repeats,
+    pub(crate) unit: Unit,
 }
 
 impl Synthetic {
@@ -21,7 +23,17 @@ impl Synthetic {
     pub(crate) fn new(width: usize, height: usize) -> Self {
         let radiance = |x, y| 0.2 + 0.01 * (x % 64) as f32 + if (x / 6 + y / 6) % 2 == 0 { 0.1 } else { 0.0 };
         let noise = |x, _| (0.3 + 0.007 * x as f32).min(1.0);
-        Self { size: (width, height), seed: 1, radiance, noise, unit: 1.0, store: u64::MAX, aims: true }
+        Self {
+            size: (width, height),
+            seed: 1,
+            radiance,
+            noise,
+            brightness: 1.0,
+            store: u64::MAX,
+            aims: true,
+            repeats: Repeats::Samples,
+            unit: Unit::SamplesPerPixel,
+        }
     }
 
     pub(crate) fn flat(width: usize, height: usize, radiance: fn(usize, usize) -> f32) -> Self {
@@ -29,7 +41,7 @@ impl Synthetic {
     }
 
     fn mean(&self, x: usize, y: usize, first: u64, samples: u32) -> Rgb {
-        let (radiance, noise) = ((self.radiance)(x, y) * self.unit, f64::from((self.noise)(x, y)));
+        let (radiance, noise) = ((self.radiance)(x, y) * self.brightness, f64::from((self.noise)(x, y)));
         let key = hash(self.seed ^ hash((y * self.size.0 + x) as u64));
         let bright = (first..first + u64::from(samples)).filter(|i| hash(key ^ i) >> 63 == 1).count();
         let factor = 1.0 + noise * (2.0 * bright as f64 / f64::from(samples) - 1.0);
@@ -47,8 +59,15 @@ pub(crate) fn hash(mut x: u64) -> u64 {
 
 impl ProgressiveSource for Synthetic {
     fn info(&self) -> SourceInfo {
-        let ((width, height), unit) = (self.size, Unit::SamplesPerPixel);
-        SourceInfo { name: "synthetic".into(), width, height, unit, aims: self.aims }
+        let (width, height) = self.size;
+        SourceInfo {
+            name: "synthetic".into(),
+            width,
+            height,
+            unit: self.unit,
+            aims: self.aims,
+            repeats: self.repeats,
+        }
     }
 
     fn sample(&mut self, requests: &[Request]) -> Result<Vec<Batch>, SourceError> {

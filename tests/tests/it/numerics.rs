@@ -28,7 +28,7 @@ fn tiles_of(tile: usize) -> Params {
 /// Radiance has no unit: whatever it is measured in, people see the same picture.
 #[test]
 fn the_unit_of_radiance_changes_nothing() {
-    let at = |unit: f32| run(Synthetic { unit, ..Synthetic::new(96, 48) }, tiles_of(32)).stops;
+    let at = |brightness: f32| run(Synthetic { brightness, ..Synthetic::new(96, 48) }, tiles_of(32)).stops;
     let usual = at(1.0);
     assert!(usual.iter().any(|s| s.samples > 100), "no noise to judge: {usual:?}");
     for unit in [1e-30, 1e-8, 1e-4, 1e4, 1e8, 1e30] {
