@@ -281,8 +281,8 @@ pub struct FitArgs {
 /// Every result is written whole as soon as it is there; after Ctrl-C (exit code 130) the same command goes on from there. All is
 /// together in reproduce.json and reproduce.md when it is done.
 ///
-/// Levels are synthesised between the images given (noise ∝ 1/√n), and real images scored apart; the most converged image stands in
-/// for the ray-traced reference of the paper.
+/// Levels are synthesised between the images given (noise ∝ 1/√n), and real images scored apart. Pictures are held
+/// against SCENE/reference.exr; without, the most converged image stands in for the ray-traced reference of the paper.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   noisefloor reproduce --corpus study/lisic9 study/staircase
@@ -378,7 +378,7 @@ pub struct ToneArgs {
 pub enum EvidenceChoice {
     /// The other half buffer: no reference is needed.
     Halves,
-    /// A noise-free reference; of a corpus, the most converged picture stands in for it.
+    /// A noise-free reference: of a corpus, SCENE/reference.exr, else the most converged picture stands in for it.
     Reference,
     /// Nothing but the picture itself. For comparison.
     Alone,

@@ -46,6 +46,14 @@ pub enum TableError {
         /// Its images.
         images: usize,
     },
+    /// The reference has another size than the images.
+    #[error("{scene}, zone {zone}: reference.exr has not the size of the full picture")]
+    Reference {
+        /// The scene.
+        scene: String,
+        /// The zone.
+        zone: u32,
+    },
     /// The descriptor is for tiles of another size.
     #[error("{scene}, zone {zone}: {source}")]
     Descriptor {
@@ -72,7 +80,8 @@ pub enum TableError {
 /// Describes every zone of the corpora, by the evidence given. `on_zone(done, all)` is told of progress. The zones of a scene
 /// are its picture.
 ///
-/// [`Evidence::Reference`] holds pictures against the most converged one: a ray-traced reference is not part of a corpus.
+/// [`Evidence::Reference`] holds pictures against the scene's reference ([`Corpus::scene_reference`]); where it has none, the most
+/// converged picture stands in for it.
 ///
 /// # Errors
 /// [`TableError`] if a corpus cannot be read, or a zone has too few images.
@@ -89,11 +98,9 @@ pub fn describe_corpora(
 }
 
 /// Describes every zone as the paper does (Takouachet et al. 2017, §4.3): the `edge`×`edge` pixels at its centre, at `levels` levels with
-/// equal steps up to its most converged image, each held against that image. All these levels are synthesised, from the two
+/// equal steps up to its most converged image, each held against the scene's reference, or that image. All these levels are synthesised, from the two
 /// realisations of the noise in turn; the real images, but for the most converged one, are there besides. `on_zone(done, all)` is told of
 /// progress.
-///
-/// The paper holds against a ray-traced reference instead, which human corpora do not have.
 ///
 /// # Errors
 /// [`TableError`] if a corpus cannot be read, or a zone has too few images or is smaller than `edge`×`edge` pixels.
@@ -124,12 +131,14 @@ fn describe(
             on_zone(zones.len(), all);
             let images: Vec<Image> = corpus.scene_levels(scene)?.collect::<Result<_, _>>()?;
             let of_scene: Vec<_> = corpus.zones().iter().filter(|z| z.scene == scene).collect();
-            let describe = |zone: &&corpus::Zone| {
+            let references =
+                if evidence == Evidence::Reference { corpus.scene_reference(scene)? } else { None };
+            let describe = |(i, zone): (usize, &&corpus::Zone)| {
                 let images: Vec<&Image> = images.iter().filter(|i| i.zone == zone.zone).collect();
-                let material = Material::of(zone, &images)?;
+                let material = Material::of(zone, &images, references.as_ref().map(|r| &r[i]))?;
                 describe_zone(zone, levels(&of_scene, zone, &material)?, descriptor)
             };
-            let described = of_scene.par_iter().map(describe).collect::<Result<Vec<_>, _>>()?;
+            let described = of_scene.par_iter().enumerate().map(describe).collect::<Result<Vec<_>, _>>()?;
             zones.extend(in_picture(described, descriptor));
         }
     }
@@ -234,6 +243,8 @@ struct Material {
     tile: Tile,
     converged: Pixels,
     converged_spp: f64,
+    /// The scene's noise-free reference.
+    reference: Option<Pixels>,
     /// Variance of the rounding of each picture.
     rounding: f64,
     noise: [Noise; 2],
@@ -247,11 +258,19 @@ fn combine(a: &[Rgb], fa: f64, b: &[Rgb], fb: f64) -> Pixels {
 }
 
 impl Material {
-    fn of(zone: &corpus::Zone, images: &[&Image]) -> Result<Self, TableError> {
+    fn of(zone: &corpus::Zone, images: &[&Image], reference: Option<&Patch>) -> Result<Self, TableError> {
         let running = images.iter().all(|i| i.first == 0 && i.encoding == Encoding::Display);
         let material = if running { Self::from_running_means(images) } else { Self::from_batches(images) };
         let (scene, zone, images) = (zone.scene.clone(), zone.zone, images.len());
-        material.ok_or(TableError::TooFew { scene, zone, images })
+        let Some(mut material) = material else { return Err(TableError::TooFew { scene, zone, images }) };
+        if let Some(patch) = reference {
+            let size = material.size;
+            if (patch.width, patch.height) != size {
+                return Err(TableError::Reference { scene, zone });
+            }
+            material.reference = Some(patch.pixels.iter().map(|&p| Display::SRGB.encode(p)).collect());
+        }
+        Ok(material)
     }
 
     fn frame(patch: &Patch) -> ((usize, usize), Tile) {
@@ -304,7 +323,16 @@ impl Material {
         };
         let real = images.iter().filter_map(real).collect();
         let (size, tile) = Self::frame(&last.patch);
-        Some(Self { size, tile, converged, converged_spp, rounding, noise: [first, second], real })
+        Some(Self {
+            size,
+            tile,
+            converged,
+            converged_spp,
+            reference: None,
+            rounding,
+            noise: [first, second],
+            real,
+        })
     }
 
     /// Means of separate batches, in linear light: real half buffers at every level.
@@ -347,7 +375,7 @@ impl Material {
         let (a, b) = early?;
         let noise = [noise(&a), noise(&b)];
         let (size, tile) = Self::frame(&last.patch);
-        Some(Self { size, tile, converged, converged_spp, rounding: 0.0, noise, real })
+        Some(Self { size, tile, converged, converged_spp, reference: None, rounding: 0.0, noise, real })
     }
 
     fn planes(&self, tile: Tile, shown: &[Rgb], residual: &[Rgb], rounding: f64) -> TilePlanes {
@@ -356,16 +384,20 @@ impl Material {
         TilePlanes { rounding: rounding as f32, ..planes }
     }
 
-    /// A picture held against the converged one as it is.
-    fn to_converged(&self, tile: Tile, shown: &[Rgb], rounding: f64) -> TilePlanes {
-        self.planes(tile, shown, &combine(shown, 1.0, &self.converged, -1.0), rounding)
+    /// A picture held against the reference, or the converged one, as it is.
+    fn to_reference(&self, tile: Tile, shown: &[Rgb], rounding: f64) -> TilePlanes {
+        let reference = self.reference.as_ref().unwrap_or(&self.converged);
+        self.planes(tile, shown, &combine(shown, 1.0, reference, -1.0), rounding)
     }
 
     /// Real levels, and those of `synthesised`, twice each: two realisations of the noise.
     fn levels(&self, synthesised: &[f64], evidence: Evidence) -> Vec<Shown> {
         let planes = |r: &Real| match evidence {
             Evidence::Halves => self.planes(self.tile, &r.shown, &r.residual, r.rounding),
-            Evidence::Reference => self.to_converged(self.tile, &r.shown, 2.0 * self.rounding),
+            Evidence::Reference => {
+                let pictures = if self.reference.is_some() { 1.0 } else { 2.0 };
+                self.to_reference(self.tile, &r.shown, pictures * self.rounding)
+            }
             Evidence::Alone => self.planes(self.tile, &r.shown, &r.shown, self.rounding),
         };
         let real = self.real.iter().map(|r| (r.spp, Origin::Real, planes(r)));
@@ -384,7 +416,7 @@ impl Material {
         }
         let (x, y) = (x + (width - edge) / 2, y + (height - edge) / 2);
         let centre = Tile { index: 0, x, y, width: edge, height: edge };
-        let pair = |shown: &[Rgb]| self.to_converged(centre, shown, 0.0);
+        let pair = |shown: &[Rgb]| self.to_reference(centre, shown, 0.0);
         let real = self.real.iter().filter(|r| r.spp < self.converged_spp);
         let real = real.map(|r| (r.spp, Origin::Real, pair(&r.shown)));
         let synthesised = (1..=levels).map(|k| {
@@ -414,7 +446,10 @@ impl Material {
                 self.planes(self.tile, &shown, &residual, held_against.rounding / spp)
             }
             // The rounding of the converged picture is in both, and falls out of their difference.
-            Evidence::Reference => self.to_converged(self.tile, &shown, rounding),
+            Evidence::Reference => {
+                let own = if self.reference.is_some() { self.rounding } else { 0.0 };
+                self.to_reference(self.tile, &shown, rounding + own)
+            }
             Evidence::Alone => self.planes(self.tile, &shown, &shown, rounding + self.rounding),
         }
     }

@@ -27,8 +27,8 @@ impl Report {
                 args.levels,
                 real.noisy + real.identical,
             ),
-            "No ray-traced reference exists for these scenes: the most converged image stands in for it. The paper's reference has no \
-             noise, and other light."
+            "Where a scene has no reference.exr, the most converged image stands in for the ray-traced reference. The paper's reference has \
+             no noise, and other light."
                 .into(),
             "The paper states neither the scaling of its values nor which pairs its accuracy is of. Here: display values, white at 1, and \
              each number standardised over all synthesised pairs (also those that are asked about); and four ways to choose the pairs."

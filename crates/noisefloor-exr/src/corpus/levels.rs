@@ -11,6 +11,9 @@ use std::collections::VecDeque;
 /// Widest border around a zone, in pixels, for filters that read across it.
 pub const APRON: usize = 8;
 
+/// Name of a scene's noise-free reference.
+const REFERENCE: &str = "reference.exr";
+
 /// What the numbers of a patch mean.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Encoding {
@@ -161,11 +164,36 @@ impl<'a> Levels<'a> {
                 last: job.frame.last,
                 encoding,
                 rounding: picture.rounding(),
-                patch: cut(pixels, (w, h), Inner { x, y, width: zone.width, height: zone.height }),
+                patch: cut(pixels, (w, h), Inner { x, y, width: zone.width, height: zone.height }, APRON),
             });
         }
         Ok(())
     }
+}
+
+/// The reference of a scene cut into patches of the same shape as its images', zone by zone; `None` if there is none.
+pub(super) fn reference(zones: &[&Zone]) -> Result<Option<Vec<Patch>>, CorpusError> {
+    let Some(first) = zones.first() else { return Ok(None) };
+    let folder = match &first.stack {
+        ZoneImages::RunningMeans(dir) => Some(dir.as_path()),
+        ZoneImages::Batches(dir) => dir.parent(),
+    };
+    let Some(path) = folder.map(|dir| dir.join(REFERENCE)).filter(|path| path.is_file()) else {
+        return Ok(None);
+    };
+    let image = read_exr(&path).map_err(StackError::from)?;
+    let (width, height) = (image.width, image.height);
+    let cut_out = |zone: &&Zone| {
+        let Zone { x, y, width: w, height: h, .. } = **zone;
+        if x.saturating_add(w) > width || y.saturating_add(h) > height {
+            let (path, scene) = (path.clone(), zone.scene.clone());
+            return Err(CorpusError::Zone { path, scene, zone: zone.zone, width, height });
+        }
+        // A batch is the zone alone
+        let apron = if matches!(zone.stack, ZoneImages::Batches(_)) { 0 } else { APRON };
+        Ok(cut(&image.pixels, (width, height), Inner { x, y, width: w, height: h }, apron))
+    };
+    zones.iter().map(cut_out).collect::<Result<_, _>>().map(Some)
 }
 
 impl Iterator for Levels<'_> {
@@ -185,10 +213,10 @@ impl Iterator for Levels<'_> {
 }
 
 /// The rectangle and its apron, clipped to an image of the size given.
-fn cut(pixels: &[Rgb], (width, height): (usize, usize), zone: Inner) -> Patch {
-    let (left, top) = (zone.x.saturating_sub(APRON), zone.y.saturating_sub(APRON));
-    let right = (zone.x + zone.width + APRON).min(width);
-    let bottom = (zone.y + zone.height + APRON).min(height);
+fn cut(pixels: &[Rgb], (width, height): (usize, usize), zone: Inner, apron: usize) -> Patch {
+    let (left, top) = (zone.x.saturating_sub(apron), zone.y.saturating_sub(apron));
+    let right = (zone.x + zone.width + apron).min(width);
+    let bottom = (zone.y + zone.height + apron).min(height);
     Patch {
         width: right - left,
         height: bottom - top,

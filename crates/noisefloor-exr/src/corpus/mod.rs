@@ -6,6 +6,9 @@
 //!   number of scenes; zones are rectangles of these images;
 //! - a folder a zone (`zone07/batch_00060_00100.exr`) with batch means, for one scene; an image is the zone alone, and x, y say
 //!   where it lay in the full picture.
+//!
+//! A scene may have a noise-free reference of the full picture, in linear light, in its folder or beside those of its zones:
+//! `reference.exr`.
 
 mod levels;
 mod table;
@@ -120,11 +123,25 @@ impl Corpus {
     /// # Errors
     /// [`CorpusError::Unknown`] if there is no such scene, [`CorpusError::Stack`] if its folders have changed since.
     pub fn scene_levels(&self, scene: &str) -> Result<Levels<'_>, CorpusError> {
+        Levels::of(&self.scene_zones(scene)?)
+    }
+
+    /// The noise-free reference of a scene in linear light, cut into patches like those of its images, in the order of its zones;
+    /// `None` if there is none.
+    ///
+    /// # Errors
+    /// [`CorpusError::Unknown`] if there is no such scene, [`CorpusError::Stack`] if the reference cannot be read,
+    /// [`CorpusError::Zone`] if a zone lies outside it.
+    pub fn scene_reference(&self, scene: &str) -> Result<Option<Vec<Patch>>, CorpusError> {
+        levels::reference(&self.scene_zones(scene)?)
+    }
+
+    fn scene_zones(&self, scene: &str) -> Result<Vec<&Zone>, CorpusError> {
         let zones: Vec<&Zone> = self.zones.iter().filter(|zone| zone.scene == scene).collect();
         if zones.is_empty() {
             return Err(CorpusError::Unknown { scene: scene.to_owned(), known: self.scenes().join(", ") });
         }
-        Levels::of(&zones)
+        Ok(zones)
     }
 }
 

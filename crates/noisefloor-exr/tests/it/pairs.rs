@@ -1,7 +1,7 @@
 use noisefloor::evaluation::Origin;
 use noisefloor::{Descriptor, NoiseMask};
 use noisefloor_exr::table::{TableError, describe_pairs};
-use noisefloor_exr::write_png;
+use noisefloor_exr::{RenderLayers, write_exr, write_png};
 use std::path::Path;
 
 const EDGE: usize = 24;
@@ -83,4 +83,32 @@ fn a_pair_is_the_noisy_centre_and_the_most_converged_one() {
         matches!(error, TableError::Descriptor { .. }) && error.to_string().contains("Wall, zone 0"),
         "{error}"
     );
+}
+
+#[test]
+fn a_scene_with_a_reference_is_held_against_it() {
+    let folder = tempfile::tempdir().unwrap();
+    corpus(folder.path());
+    let folders = [folder.path().to_owned()];
+    let describe = || describe_pairs(&folders, Descriptor::LuminancePair { edge: 16 }, 16, 20, |_, _| ());
+    let alone = describe().unwrap();
+
+    // 0.5 of linear light is 0.7354 on an sRGB display (IEC 61966-2-1)
+    let reference = |edge: usize| {
+        let pixels = vec![[0.5; 3]; edge * edge];
+        let layers = RenderLayers::rgb(edge, edge, &pixels);
+        write_exr(folder.path().join("Wall/reference.exr"), &layers).unwrap();
+        describe()
+    };
+    let table = reference(EDGE).unwrap();
+    for (level, alone) in table.zones[0].levels.iter().zip(&alone.zones[0].levels) {
+        assert_eq!(level.descriptor[..256], alone.descriptor[..256], "the picture is the same");
+        for value in &level.descriptor[256..] {
+            assert!((value - 0.735_357).abs() < 1e-5, "{value}");
+        }
+    }
+    for edge in [EDGE - 1, EDGE + 20] {
+        let error = reference(edge).unwrap_err().to_string();
+        assert!(error.contains("Wall") && error.contains("reference.exr"), "{error}");
+    }
 }
