@@ -1,17 +1,18 @@
 use crate::kit::{FILES, command, json, succeed, table, text};
 use crate::learn::Corpora;
 use noisefloor_exr::{read_exr, read_picture};
+use std::fs::File;
 use std::path::Path;
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
 use tempfile::tempdir;
 
 /// A render that would take days.
-fn long(out: &Path, autosave: &str) -> Child {
+fn long(out: &Path, autosave: &str, stderr: Stdio) -> Child {
     let args = ["render", "--size", "64x64", "--tile", "32", "--criterion", "spp:1000000000", "--quiet"];
     let mut command = command(&args);
     command.args(["--threads", "1", "--autosave", autosave, "--out"]).arg(out);
-    command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap()
+    command.stdout(Stdio::null()).stderr(stderr).spawn().unwrap()
 }
 
 fn signal(child: &Child, name: &str) {
@@ -50,7 +51,7 @@ fn an_interrupt_ends_with_what_is_there_written() {
     let folder = tempdir().unwrap();
     let out = folder.path();
     for name in ["-INT", "-TERM"] {
-        let child = long(out, "0.5");
+        let child = long(out, "0.5", Stdio::null());
         // The handler is set before the first batch
         wait_for("the first save", || out.join("report.json").exists().then_some(()));
         std::thread::sleep(Duration::from_millis(200));
@@ -67,7 +68,7 @@ fn an_interrupt_ends_with_what_is_there_written() {
 fn what_was_saved_survives_a_kill() {
     let folder = tempdir().unwrap();
     let out = folder.path();
-    let child = long(out, "0.2");
+    let child = long(out, "0.2", Stdio::null());
     // The report is written last. Then let it save a few times more, and die wherever it is
     wait_for("the first save", || out.join("report.json").exists().then_some(()));
     std::thread::sleep(Duration::from_millis(555));
@@ -90,17 +91,16 @@ fn what_was_saved_survives_a_kill() {
 fn a_save_that_fails_is_told() {
     let folder = tempdir().unwrap();
     let (out, away) = (folder.path().join("out"), folder.path().join("away"));
-    let child = long(&out, "0.2");
+    let log = folder.path().join("stderr");
+    let child = long(&out, "0.2", File::create(&log).unwrap().into());
     wait_for("the first save", || out.join("report.json").exists().then_some(()));
     std::fs::rename(&out, &away).unwrap();
-    std::thread::sleep(Duration::from_millis(700));
+    let told = || std::fs::read_to_string(&log).unwrap().contains("warning: not saved").then_some(());
+    wait_for("the warning", told);
     std::fs::rename(&away, &out).unwrap();
     signal(&child, "-INT");
-    let output = child.wait_with_output().unwrap();
-    assert_eq!(output.status.code(), Some(130));
+    assert_eq!(end(child).code(), Some(130));
     assert_whole(&out);
-    let said = String::from_utf8(output.stderr).unwrap();
-    assert!(said.contains("warning: not saved"), "{said:?}");
 }
 
 /// Sixteen results, of which the first is there: it is whole, and no report claims to have all.
