@@ -1,0 +1,179 @@
+"""The other end of noisefloor-sidecar: serves a renderer over standard input and output.
+
+A host script defines a class and hands it to `serve`:
+
+    import os, sys
+    sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+    import host
+
+    class Renderer:
+        def __init__(self, init): ...   # imports the renderer, loads init["scene"]
+        info = {...}                    # name, width, height, unit, repeats, warnings
+        def sample(self, tiles): ...    # [(samples, array of height x width x 3 float32), ...], in the order of the tiles
+        def reference(self): ...        # None, or an array of the whole image
+
+    host.serve(Renderer)
+
+Import the renderer in `__init__`, not at the top: what it prints while it loads must not get into the stream of frames.
+A frame is two little-endian u32 (length of header, length of payload), a header (a JSON object) and a payload (raw
+little-endian float32, RGB, top row first). There is one reply to a request, in order. Needs the standard library alone.
+"""
+
+import json
+import os
+import queue
+import signal
+import struct
+import sys
+import threading
+import traceback
+
+PROTOCOL = 1
+MAX_HEADER = 1 << 20
+PR_SET_PDEATHSIG = 1
+# A long scene name or stack of causes must not push a reply over the limit.
+MAX_ERROR = 4000
+
+
+class TileError(Exception):
+    """A failure that one tile is to blame for."""
+
+    def __init__(self, tile, message):
+        super().__init__(message)
+        self.tile = tile
+
+
+def serve(Host):
+    """Answers requests until standard input ends or a request says quit. Does not return."""
+    # Ctrl-C in a terminal reaches every process of the group; when to stop is for the parent to say.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+    # The protocol gets descriptors of its own. Whatever prints to standard output from now on, Python or not, prints to
+    # standard error; whatever reads standard input reads nothing.
+    requests_from = os.fdopen(os.dup(0), "rb")
+    replies_to = os.fdopen(os.dup(1), "wb")
+    nothing = os.open(os.devnull, os.O_RDONLY)
+    os.dup2(nothing, 0)
+    os.close(nothing)
+    os.dup2(2, 1)
+
+    # On Linux the kernel ends this process with the thread that started it, whatever the renderer is busy with.
+    if sys.platform == "linux":
+        import ctypes
+
+        ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, int(signal.SIGKILL))
+
+    # The end of standard input is noticed while the renderer is busy, too: a renderer whose parent is gone must not go on.
+    requests = queue.SimpleQueue()
+    threading.Thread(target=_receive, args=(requests_from, requests), daemon=True).start()
+
+    renderer = None
+    while True:
+        request = requests.get()
+        payload = []
+        try:
+            renderer, reply, payload = _answer(Host, renderer, request)
+        except BaseException as error:  # a renderer may raise SystemExit, too
+            traceback.print_exc()
+            reply, payload = {"ok": False, "error": _describe(error)}, []
+            if isinstance(error, TileError):
+                reply["tile"] = error.tile
+        _send(replies_to, reply, payload)
+        if request.get("op") == "quit":
+            _end()
+
+
+def _answer(Host, renderer, request):
+    """The renderer from now on, the reply, and its payload."""
+    op = request.get("op")
+    if op == "quit":
+        return renderer, {"ok": True}, []
+    if op == "init":
+        if request.get("protocol") != PROTOCOL:
+            raise ValueError(f"protocol {request.get('protocol')} is asked for, this is {PROTOCOL}")
+        renderer = Host(request)
+        return renderer, {"ok": True, **renderer.info}, []
+    if renderer is None:
+        raise ValueError("the first request has to be init")
+    if op == "sample":
+        tiles = request["tiles"]
+        for tile in tiles:
+            _check(tile, renderer.info)
+        batches = renderer.sample(tiles)
+        if len(batches) != len(tiles):
+            raise ValueError(f"{len(batches)} batches for {len(tiles)} tiles")
+        payload = []
+        for tile, (samples, mean) in zip(tiles, batches):
+            if samples > 0:
+                payload.append(_bytes(mean, tile["width"], tile["height"]))
+        return renderer, {"ok": True, "samples": [int(samples) for samples, _ in batches]}, payload
+    if op == "reference":
+        image = renderer.reference()
+        if image is None:
+            return renderer, {"ok": True, "reference": False}, []
+        payload = [_bytes(image, renderer.info["width"], renderer.info["height"])]
+        return renderer, {"ok": True, "reference": True}, payload
+    raise ValueError(f"{op!r} is no operation")
+
+
+def _check(tile, info):
+    x, y, width, height = tile["x"], tile["y"], tile["width"], tile["height"]
+    if min(x, y) < 0 or min(width, height) < 1 or x + width > info["width"] or y + height > info["height"]:
+        size = f"{info['width']}x{info['height']}"
+        raise TileError(tile["index"], f"{width}x{height} pixels at {x}, {y} are not inside the image of {size}")
+    if tile["samples"] < 1:
+        raise TileError(tile["index"], "at least one sample has to be asked for")
+
+
+def _bytes(array, width, height):
+    """The bytes of an array of float32, without a copy where it lies in one piece."""
+    view = memoryview(array)
+    data = view.cast("B") if view.c_contiguous else memoryview(view.tobytes())
+    if data.nbytes != 12 * width * height:
+        raise ValueError(f"{data.nbytes} bytes for {width}x{height} pixels of three float32")
+    return data
+
+
+def _receive(stream, requests):
+    try:
+        while True:
+            prefix = stream.read(8)
+            if len(prefix) < 8:
+                break
+            header, payload = struct.unpack("<II", prefix)
+            if header > MAX_HEADER or payload != 0:
+                break
+            text = stream.read(header)
+            if len(text) < header:
+                break
+            requests.put(json.loads(text))
+    except BaseException:
+        traceback.print_exc()
+    _end()
+
+
+def _send(stream, reply, payload):
+    header = json.dumps(reply).encode()
+    try:
+        stream.write(struct.pack("<II", len(header), sum(part.nbytes for part in payload)))
+        stream.write(header)
+        for part in payload:
+            stream.write(part)
+        stream.flush()
+    except OSError:  # the parent is gone
+        _end()
+
+
+def _describe(error):
+    name = type(error).__name__
+    return f"{name}: {error}"[:MAX_ERROR] if str(error) else name
+
+
+def _end():
+    """Ends the process without running the renderer's destructors, which may hang or crash."""
+    for stream in (sys.stdout, sys.stderr):
+        try:
+            stream.flush()
+        except (OSError, ValueError):
+            pass
+    os._exit(0)
