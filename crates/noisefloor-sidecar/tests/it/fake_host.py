@@ -1,0 +1,159 @@
+"""A renderer that can be told to misbehave by the options of init: "how", and "once", a file that says it was done.
+
+It misbehaves when samples after the first are asked for."""
+
+import os
+import sys
+
+sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+import array
+import json
+import struct
+import time
+
+import host
+
+# The descriptor of the replies is what host.py duplicates last.
+duplicate = os.dup
+replies = None
+
+
+def remember(descriptor):
+    global replies
+    replies = duplicate(descriptor)
+    return replies
+
+
+os.dup = remember
+
+
+def value(seed, x, y, sample, channel):
+    """The renderer, which tests compute again."""
+    return (seed * 31 + x * 7 + y * 13 + sample * 17 + channel * 5) % 97 / 97
+
+
+def send(header, payload=0):
+    """Past host.py, straight into the stream of replies."""
+    with open(replies, "wb", buffering=0, closefd=False) as stream:
+        stream.write(struct.pack("<II", len(header), payload) + header)
+    time.sleep(1000)
+
+
+class Fake:
+    def __init__(self, init):
+        self.seed, self.options = init["seed"], init["options"]
+        self.info = {
+            "name": "Fake 1",
+            "width": init["width"] or 48,
+            "height": init["height"] or 40,
+            "unit": "samples-per-pixel",
+            "repeats": "samples",
+            "warnings": ["max_depth %s, threads %s" % (init["max_depth"], init["threads"])],
+        }
+        starts = 0
+        if "pids" in self.options:
+            with open(self.options["pids"], "a+") as file:
+                file.write("%d\n" % os.getpid())
+                file.seek(0)
+                starts = len(file.readlines())
+        if self.told("refuse the scene"):
+            raise ValueError("no such lamp")
+        if self.told("die at once"):
+            os._exit(3)
+        if self.told("claim a huge image"):
+            self.info["width"] = 1 << 40
+        if self.told("describe nothing"):
+            self.info = {}
+        if self.told("ignore the end"):
+            host._end = lambda: time.sleep(1000)
+        if self.options.get("how") == "change" and starts > 1:
+            self.info["width"] += 1
+
+    def told(self, how):
+        if self.options.get("how") != how:
+            return False
+        once = self.options.get("once")
+        if once is None:
+            return True
+        if os.path.exists(once):
+            return False
+        open(once, "w").close()
+        return True
+
+    def sample(self, tiles):
+        late = any(tile["first"] > 0 for tile in tiles)
+        if late:
+            self.misbehave()
+        batches = []
+        for tile in tiles:
+            samples, first = tile["samples"], tile["first"]
+            mean = array.array("f", (
+                sum(value(self.seed, x, y, first + s, c) for s in range(samples)) / samples
+                for y in range(tile["y"], tile["y"] + tile["height"])
+                for x in range(tile["x"], tile["x"] + tile["width"])
+                for c in range(3)
+            ))
+            if late and tile["index"] == 1:
+                if self.told("send NaN"):
+                    mean = array.array("f", [float("nan"), float("inf"), float("-inf")] * (len(mean) // 3))
+                if self.told("send some NaN"):
+                    mean[5] = float("nan")
+                if self.told("send too little"):
+                    mean = mean[3:]
+                if self.told("be exhausted"):
+                    samples = 0
+            batches.append((samples, mean))
+        if late and self.told("forget a tile"):
+            batches.pop()
+        return batches
+
+    def misbehave(self):
+        if self.told("print"):
+            print("to standard output", flush=True)
+            os.system("echo a child to standard output")
+            os.write(1, b"\xff" * 10000)
+        if self.told("read standard input"):
+            assert sys.stdin.read() == ""
+        if self.told("die") or self.told("change"):
+            sys.stderr.write("x" * 10000 + "\nout of lamps\n")
+            os._exit(7)
+        if self.told("exit"):
+            sys.exit("I want out")
+        if self.told("crash"):
+            os.abort()
+        if self.told("hang"):
+            time.sleep(1000)
+        if self.told("refuse"):
+            raise host.TileError(2, "no memory for textures")
+        if self.told("close standard output"):
+            os.close(replies)
+            time.sleep(1000)
+        if self.told("announce a long payload"):
+            send(b"{}", 0xFFFFFFFF)
+        if self.told("announce a pixel too many"):
+            send(b"{}", 12 * 48 * 40 + 12)
+        if self.told("announce a long header"):
+            send(b" " * ((1 << 20) + 1))
+        if self.told("send no JSON"):
+            send(b"\xff{")
+        if self.told("send a list"):
+            send(b"[1, 2]")
+        if self.told("nest deeply"):
+            send(b'{"x":' * 200000)
+        if self.told("send strange counts"):
+            send(json.dumps({"ok": True, "samples": [-1, 1e99, 3, 4]}).encode())
+        if self.told("send too few counts"):
+            send(json.dumps({"ok": True, "samples": [0]}).encode())
+        if self.told("send no counts"):
+            send(json.dumps({"ok": True}).encode())
+        if self.told("stop in the middle"):
+            os.write(replies, struct.pack("<II", 100, 0) + b"{")
+            os._exit(0)
+
+    def reference(self):
+        if self.options.get("how") == "have a reference":
+            return array.array("f", [0.25] * (3 * self.info["width"] * self.info["height"]))
+        return None
+
+
+host.serve(Fake)

@@ -1,0 +1,97 @@
+use noisefloor::{Request, Rgb, Tile, TileGrid};
+use noisefloor_sidecar::{Adapter, Job, Renderer, Sidecar, SidecarError};
+use serde_json::{Map, Value, json};
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::time::Duration;
+use tempfile::TempDir;
+
+pub(crate) const FAKE: Renderer = Renderer {
+    name: "fake",
+    title: "Fake",
+    script: include_str!("fake_host.py"),
+    requirements: "",
+    pythons: &[10, 11, 12, 13, 14],
+    probe: "print('1.0')",
+};
+
+/// The image of the fake renderer: 4 tiles of 32 pixels, all but the first ragged.
+pub(crate) const SIZE: (usize, usize) = (48, 40);
+
+/// An interpreter, or `None` with a word about it.
+pub(crate) fn python() -> Option<PathBuf> {
+    let python = if cfg!(windows) { "python" } else { "python3" };
+    let runs = Command::new(python).arg("-V").output().is_ok_and(|o| o.status.success());
+    if !runs {
+        eprintln!("SKIPPED: no {python} on the path, the sidecar is not tested");
+    }
+    runs.then(|| python.into())
+}
+
+/// Calls of the fake renderer, with a folder for its files.
+pub(crate) struct Fake {
+    python: PathBuf,
+    pub(crate) folder: TempDir,
+    pub(crate) options: Map<String, Value>,
+    pub(crate) job: Job,
+}
+
+impl Fake {
+    /// `None`, aloud, without Python.
+    pub(crate) fn new(how: &str) -> Option<Self> {
+        let python = python()?;
+        let folder = tempfile::tempdir().unwrap();
+        let scene = folder.path().join("scene π.fake");
+        std::fs::write(&scene, "lamps").unwrap();
+        let mut options = Map::new();
+        options.insert("how".into(), json!(how));
+        options.insert("pids".into(), json!(folder.path().join("pids")));
+        let job = Job { timeout: Duration::from_secs(60), seed: 5, ..Job::new(scene) };
+        Some(Self { python, folder, options, job })
+    }
+
+    /// It misbehaves in one process, and in no other.
+    pub(crate) fn once(mut self) -> Self {
+        self.options.insert("once".into(), json!(self.folder.path().join("once")));
+        self
+    }
+
+    pub(crate) fn open(&self) -> Result<Sidecar, SidecarError> {
+        let adapter = Adapter { options: self.options.clone(), ..Adapter::default() };
+        Sidecar::open(&FAKE, &self.python, &self.job, adapter)
+    }
+
+    /// Process numbers of all processes so far.
+    pub(crate) fn pids(&self) -> Vec<u32> {
+        pids(&self.folder.path().join("pids"))
+    }
+}
+
+pub(crate) fn pids(file: &Path) -> Vec<u32> {
+    let text = std::fs::read_to_string(file).unwrap_or_default();
+    text.lines().filter_map(|line| line.parse().ok()).collect()
+}
+
+pub(crate) fn tiles() -> Vec<Tile> {
+    TileGrid::new(SIZE.0, SIZE.1, 32).unwrap().tiles().collect()
+}
+
+pub(crate) fn requests(first: u64, samples: u32) -> Vec<Request> {
+    tiles().into_iter().map(|tile| Request { tile, first, samples }).collect()
+}
+
+/// What fake_host.py renders.
+pub(crate) fn expected(seed: u64, request: &Request) -> Vec<Rgb> {
+    let Request { tile, first, samples } = *request;
+    let value = |x: usize, y: usize, s: u64, c: usize| {
+        let mixed = (seed * 31 + x as u64 * 7 + y as u64 * 13 + s * 17 + c as u64 * 5) % 97;
+        mixed as f64 / 97.0
+    };
+    let mean = |x, y, c| {
+        let sum: f64 = (first..first + u64::from(samples)).map(|s| value(x, y, s, c)).sum();
+        (sum / f64::from(samples)) as f32
+    };
+    let pixels =
+        (tile.y..tile.y + tile.height).flat_map(|y| (tile.x..tile.x + tile.width).map(move |x| (x, y)));
+    pixels.map(|(x, y)| [0, 1, 2].map(|c| mean(x, y, c))).collect()
+}

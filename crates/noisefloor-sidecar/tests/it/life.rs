@@ -1,0 +1,116 @@
+//! Nothing is left behind, and nothing piles up. Processes are looked at in /proc.
+#![cfg(target_os = "linux")]
+
+use crate::kit::{Fake, pids, requests};
+use noisefloor::ProgressiveSource;
+use serde_json::json;
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
+fn alive(pid: u32) -> bool {
+    // A zombie is dead: somebody else has to reap the children of a killed parent
+    let stat = std::fs::read_to_string(format!("/proc/{pid}/stat")).unwrap_or_default();
+    stat.rsplit_once(')').is_some_and(|(_, rest)| !rest.trim_start().starts_with(['Z', 'X']))
+}
+
+fn gone_within(pid: u32, limit: Duration) -> bool {
+    let begun = Instant::now();
+    while alive(pid) && begun.elapsed() < limit {
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    !alive(pid)
+}
+
+#[test]
+fn no_process_outlives_its_source() {
+    for how in ["work", "ignore the end", "hang", "close standard output", "die"] {
+        let Some(mut fake) = Fake::new(how) else { return };
+        fake.job.timeout = Duration::from_secs(2);
+        let mut source = fake.open().unwrap();
+        assert!(alive(fake.pids()[0]));
+        source.sample(&requests(0, 1)).unwrap();
+        // Whether it fails is not of interest here
+        let _ = source.sample(&requests(1, 1));
+        drop(source);
+        let left: Vec<u32> = fake.pids().into_iter().filter(|&pid| alive(pid)).collect();
+        assert!(left.is_empty(), "{how}: {left:?}");
+    }
+}
+
+/// Run by the test below in a process of its own, which is killed.
+#[test]
+fn the_parent_that_is_killed() {
+    let Ok(how) = std::env::var("SIDECAR_TEST_PARENT") else { return };
+    let Some(mut fake) = Fake::new(&how) else { return };
+    let pids = std::env::var("SIDECAR_TEST_PIDS").unwrap();
+    fake.options.insert("pids".into(), json!(pids));
+    let mut source = fake.open().unwrap();
+    source.sample(&requests(0, 1)).unwrap();
+    std::fs::write(format!("{pids}.ready"), "").unwrap();
+    // Busy for a long time, or idle for one
+    let _ = source.sample(&requests(1, 1));
+    std::thread::sleep(Duration::from_secs(1000));
+}
+
+#[test]
+fn no_process_outlives_a_killed_parent() {
+    for how in ["work", "hang", "ignore the end"] {
+        let Some(fake) = Fake::new("work") else { return };
+        let file = fake.folder.path().join("child pids");
+        let mut parent = Command::new(std::env::current_exe().unwrap())
+            .args(["--exact", "life::the_parent_that_is_killed"])
+            .env("SIDECAR_TEST_PARENT", how)
+            .env("SIDECAR_TEST_PIDS", &file)
+            .stdout(Stdio::null())
+            .spawn()
+            .unwrap();
+        let ready = fake.folder.path().join("child pids.ready");
+        let begun = Instant::now();
+        while !ready.exists() && begun.elapsed() < Duration::from_secs(60) {
+            std::thread::sleep(Duration::from_millis(10));
+        }
+        std::thread::sleep(Duration::from_millis(200));
+        let pid = pids(&file)[0];
+        assert!(alive(pid), "{how}");
+        // SIGKILL
+        parent.kill().unwrap();
+        parent.wait().unwrap();
+        assert!(gone_within(pid, Duration::from_secs(10)), "{how}: process {pid} is left behind");
+    }
+}
+
+/// Resident memory in KiB.
+fn resident(pid: u32) -> u64 {
+    let status = std::fs::read_to_string(format!("/proc/{pid}/status")).unwrap();
+    let line = status.lines().find_map(|l| l.strip_prefix("VmRSS:")).unwrap();
+    line.trim().trim_end_matches(" kB").parse().unwrap()
+}
+
+/// Run by the test below in a process of its own, whose memory is its own.
+#[test]
+fn the_parent_that_is_weighed() {
+    if std::env::var_os("SIDECAR_TEST_WEIGH").is_none() {
+        return;
+    }
+    let Some(fake) = Fake::new("work") else { return };
+    let mut source = fake.open().unwrap();
+    let mut call = |n: u64| assert_eq!(source.sample(&requests(n, 1)).unwrap().len(), 4);
+    (0..100).for_each(&mut call);
+    let pids = [std::process::id(), fake.pids()[0]];
+    let before = pids.map(resident);
+    (100..1100).for_each(&mut call);
+    for (before, after) in before.into_iter().zip(pids.map(resident)) {
+        // A call moves 23 KB each way: a leak of one in twenty would show
+        assert!(after < before + 1024, "{before} KiB before, {after} KiB after 1,000 calls");
+    }
+}
+
+#[test]
+fn memory_is_flat_over_a_thousand_calls() {
+    let weighed = Command::new(std::env::current_exe().unwrap())
+        .args(["--exact", "life::the_parent_that_is_weighed", "--nocapture"])
+        .env("SIDECAR_TEST_WEIGH", "1")
+        .output()
+        .unwrap();
+    assert!(weighed.status.success(), "{}", String::from_utf8_lossy(&weighed.stdout));
+}
