@@ -1,5 +1,6 @@
 //! What can go wrong with a renderer in another process. Every message says what, where, and what to do.
 
+use crate::renderer::Renderer;
 use std::io;
 use std::path::PathBuf;
 use std::process::ExitStatus;
@@ -20,6 +21,14 @@ pub struct SidecarError {
     pub cause: Box<SidecarCause>,
     /// The end of what it said on standard error, at most 4 KiB; may be empty.
     pub last_words: String,
+}
+
+impl SidecarError {
+    /// Before there was a process.
+    pub(crate) fn at_the_start(renderer: &Renderer, cause: SidecarCause) -> Self {
+        let (renderer, doing) = (renderer.title.to_owned(), "starting".to_owned());
+        Self { renderer, doing, tile: None, cause: Box::new(cause), last_words: String::new() }
+    }
 }
 
 /// What went wrong with a renderer in another process.

@@ -65,6 +65,10 @@ impl Process {
         Ok(Self { child, orders: Some(orders), replies, tail, broken: false })
     }
 
+    pub(crate) fn id(&self) -> u32 {
+        self.child.id()
+    }
+
     /// Sends a request and waits for its reply.
     pub(crate) fn call(
         &mut self,

@@ -141,16 +141,21 @@ impl Sidecar {
         job: &Job,
         adapter: Adapter,
     ) -> Result<Self, SidecarError> {
-        let launch = Launch::new(renderer, python, job, &adapter).map_err(|cause| SidecarError {
-            renderer: renderer.title.to_owned(),
-            doing: "starting".to_owned(),
-            tile: None,
-            cause: Box::new(cause),
-            last_words: String::new(),
-        })?;
+        let launch = Launch::new(renderer, python, job, &adapter)
+            .map_err(|cause| SidecarError::at_the_start(renderer, cause))?;
         let (process, info, said) = launch.start()?;
         let warnings = adapter.warnings.into_iter().chain(said).collect();
         Ok(Self { launch, process: Some(process), info, warnings, restarts: Vec::new() })
+    }
+
+    /// The same with the interpreter that [`find`](crate::find) finds.
+    ///
+    /// # Errors
+    /// [`SidecarError`] if there is none, too.
+    pub fn start(renderer: &Renderer, job: &Job, adapter: Adapter) -> Result<Self, SidecarError> {
+        let python =
+            setup::find(renderer).map_err(|error| SidecarError::at_the_start(renderer, error.into()))?;
+        Self::open(renderer, &python, job, adapter)
     }
 
     /// What the user should know: features of the scene that are ignored, a slower variant that had to do.
@@ -161,6 +166,11 @@ impl Sidecar {
     /// The failures that were mended by a new process, in order.
     pub fn restarts(&self) -> &[SidecarError] {
         &self.restarts
+    }
+
+    /// The number of its process, for whoever watches it; `None` between a failure and the next call.
+    pub fn process_id(&self) -> Option<u32> {
+        self.process.as_ref().map(Process::id)
     }
 
     /// Does one call, and once more in a new process where that may help.

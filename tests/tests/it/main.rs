@@ -12,6 +12,9 @@ mod end_to_end;
 /// Sources made by hand.
 #[cfg(test)]
 mod kit;
+/// Mitsuba, where it is installed.
+#[cfg(test)]
+mod mitsuba;
 /// The oldest Rust that is promised.
 #[cfg(test)]
 mod msrv;

@@ -1,0 +1,339 @@
+"""Mitsuba 3 as a source of samples for noisefloor. See host.py for the protocol."""
+
+import os
+import sys
+
+sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+import host
+
+# Lanes of one wavefront: 12 bytes of results each.
+LANES = 1 << 22
+# Edge of the blocks of the scalar variant, which number its random streams. Fixed, so that they do not depend on threads.
+BLOCK = 16
+# Integrators that sample single rays: along paths, at first hits alone, or by way of other integrators.
+PATHS, FIRST_HITS, WRAPPERS = ("path", "volpath", "volpathmis"), ("direct", "depth"), ("aov", "moment", "stokes")
+# Increment and multipliers of SplitMix64 (Steele, Lea and Flood 2014).
+GOLDEN, MIX_1, MIX_2 = 0x9E3779B97F4A7C15, 0xBF58476D1CE4E5B9, 0x94D049BB133111EB
+# Divides the second word of a stream's seed from the first.
+SECOND = 0xD1B54A32D192ED03
+
+
+class Mitsuba:
+    """Loads the scene, and hands tiles to the variant that fits."""
+
+    def __init__(self, init):
+        import mitsuba as mi
+
+        warnings = []
+        variant = choose_variant(mi, init["options"]["variant"], warnings)
+        collector = collect_warnings(mi, warnings)
+        if init["threads"] is not None:
+            import drjit
+
+            drjit.set_thread_count(init["threads"])
+        parts = load(mi, init, warnings)
+        collector.loading = False
+        kind = Scalar if variant.startswith("scalar") else Wavefront
+        self.renderer = kind(mi, *parts, init["seed"])
+        film = self.renderer.film
+        self.info = {
+            "name": f"Mitsuba {mi.__version__} ({variant})",
+            "width": film["width"],
+            "height": film["height"],
+            "unit": "samples-per-pixel",
+            "repeats": self.renderer.repeats,
+            "warnings": warnings,
+        }
+
+    def sample(self, tiles):
+        return self.renderer.sample(tiles)
+
+    def reference(self):
+        return None
+
+
+def choose_variant(mi, wanted, warnings):
+    """Sets the variant, or the scalar one where that does not work here."""
+    try:
+        mi.set_variant(wanted)
+        if not wanted.startswith("scalar"):
+            # The compiler is looked for when it is first needed.
+            import drjit
+
+            drjit.eval(mi.Float(1) + drjit.arange(mi.Float, 2))
+        return wanted
+    except Exception as error:
+        fallback = "scalar_rgb"
+        if wanted == fallback:
+            raise
+        reason = str(error).strip().splitlines()[-1]
+        warnings.append(f"{wanted} does not work here ({reason}); {fallback}, which is slower, has to do")
+        mi.set_variant(fallback)
+        return fallback
+
+
+def collect_warnings(mi, warnings):
+    """What Mitsuba warns of while it loads is the user's to know."""
+
+    class Collector(mi.Appender):
+        loading = True
+
+        def append(self, level, text):
+            print(text, file=sys.stderr)
+            if self.loading and level >= mi.LogLevel.Warn:
+                warnings.append(" ".join(text.split()))
+
+        def log_progress(self, progress, name, formatted, eta, ptr=None):
+            pass
+
+    collector = Collector()
+    mi.logger().clear_appenders()
+    mi.logger().add_appender(collector)
+    mi.set_log_level(mi.LogLevel.Warn)
+    return collector
+
+
+def load(mi, init, warnings):
+    """The scene with a box filter, independent samples and the size and depth wanted; its sensor, integrator and film."""
+    path = init["scene"]
+    mi.file_resolver().append(os.path.dirname(path))
+    config = mi.parser.ParserConfig(mi.variant())
+    state = mi.parser.parse_file(config, path)
+    mi.parser.transform_all(config, state)
+    nodes = state.nodes
+
+    for node in nodes:
+        if node.type == mi.ObjectType.Integrator:
+            edit_integrator(mi, node.props, init, warnings)
+
+    # One sensor, whose film and sampler are ours.
+    sensors = [node.props for node in nodes if node.type == mi.ObjectType.Sensor]
+    if not sensors:
+        raise ValueError("the scene has no sensor; add one")
+    if len(sensors) > 1:
+        warnings.append(f"the scene has {len(sensors)} sensors; the first one is used")
+    props, film = sensors[0], None
+    for key in list(props.keys()):
+        value = props[key]
+        if isinstance(value, mi.Properties.ResolvedReference):
+            child = nodes[value.index()]
+            if child.type == mi.ObjectType.Film:
+                film = read_film(child.props, init, warnings)
+            if child.type in (mi.ObjectType.Film, mi.ObjectType.Sampler):
+                del props[key]
+    film = film or read_film(mi.Properties(), init, warnings)
+    plugin = {"type": "hdrfilm", "pixel_format": "rgb", "filter": {"type": "box"}}
+    plugin |= {"width": film["full_width"], "height": film["full_height"]}
+    plugin |= {"crop_width": film["width"], "crop_height": film["height"]}
+    plugin |= {"crop_offset_x": film["x"], "crop_offset_y": film["y"]}
+    props["film"] = mi.load_dict(plugin)
+    props["sampler"] = mi.load_dict({"type": "independent"})
+
+    scene = mi.parser.instantiate(config, state)
+    if isinstance(scene, list):
+        scene = scene[0]
+    integrator = scene.integrator()
+    if integrator is None:
+        depth = {} if init["max_depth"] is None else {"max_depth": init["max_depth"]}
+        integrator = mi.load_dict({"type": "path", **depth})
+    return scene, scene.sensors()[0], integrator, film
+
+
+def edit_integrator(mi, props, init, warnings):
+    """Sets the depth wanted. An integrator that cannot sample single rays makes way for a path tracer."""
+    name = props.plugin_name()
+    if name not in PATHS + FIRST_HITS + WRAPPERS:
+        warnings.append(f"the integrator {name} is not driven from here; path, which is, takes its place")
+        name = "path"
+        props.set_plugin_name(name)
+        for key in list(props.keys()):
+            if key not in ("max_depth", "rr_depth", "hide_emitters"):
+                del props[key]
+    if init["max_depth"] is not None:
+        if name in PATHS:
+            props["max_depth"] = init["max_depth"]
+        if name in FIRST_HITS:
+            warnings.append(f"the integrator {name} has no depth that could be set")
+    if mi.variant().startswith("scalar"):
+        props["block_size"] = BLOCK
+
+
+def read_film(props, init, warnings):
+    """Sizes of a film: the whole, and the crop of it that is the image."""
+    width, height = props.get("width", 768), props.get("height", 576)
+    film = {"full_width": width, "full_height": height}
+    film |= {"width": props.get("crop_width", width), "height": props.get("crop_height", height)}
+    film |= {"x": props.get("crop_offset_x", 0), "y": props.get("crop_offset_y", 0)}
+    if init["width"] is not None:
+        if (film["width"], film["height"]) != (width, height):
+            warnings.append("the crop window of the scene is not used, since another size is asked for")
+        width, height = init["width"], init["height"]
+        film = {"full_width": width, "full_height": height, "width": width, "height": height, "x": 0, "y": 0}
+    return film
+
+
+class Wavefront:
+    """All pixels of all tiles in one wavefront, a lane a sample. Every sample has a random stream of its own, which follows from
+    (seed, pixel, index of the sample)."""
+
+    repeats = "samples"
+
+    def __init__(self, mi, scene, sensor, integrator, film, seed):
+        import drjit as dr
+        import numpy as np
+
+        self.mi, self.dr, self.np = mi, dr, np
+        self.scene, self.sensor, self.integrator, self.film = scene, sensor, integrator, film
+        self.seed = np.uint64(seed)
+
+        class Streams(mi.Sampler):
+            """A sampler whose lanes are seeded one by one; Mitsuba's own number theirs."""
+
+            def __init__(self):
+                super().__init__(mi.Properties())
+                self.rng = mi.PCG32()
+
+            def next_1d(self, active=True):
+                return self.rng.next_float32(mi.Bool(active))
+
+            def next_2d(self, active=True):
+                return mi.Point2f(self.next_1d(active), self.next_1d(active))
+
+        self.sampler = Streams()
+
+    def sample(self, tiles):
+        # Tiles that want equally many samples share wavefronts.
+        groups = {}
+        for place, tile in enumerate(tiles):
+            groups.setdefault(tile["samples"], []).append(place)
+        batches = [None] * len(tiles)
+        for samples, places in groups.items():
+            means = self.means([tiles[place] for place in places], samples)
+            for place, mean in zip(places, means):
+                batches[place] = (samples, mean)
+        return batches
+
+    def means(self, tiles, samples):
+        np = self.np
+        x, y, first = (np.concatenate(column) for column in zip(*(self.pixels(tile) for tile in tiles)))
+        # Parts of samples and of pixels that fit a wavefront. Parts of samples depend on nothing but their number, so that
+        # sums are the same in any company.
+        part = min(samples, 1 << 12)
+        rows = max(LANES // part, 1)
+        sums = np.zeros((len(x), 3))
+        for start in range(0, len(x), rows):
+            some = slice(start, start + rows)
+            for done in range(0, samples, part):
+                lanes = min(part, samples - done)
+                sums[some] += self.wavefront(x[some], y[some], first[some] + np.uint64(done), lanes)
+        means = (sums / samples).astype(np.float32)
+        ends = np.cumsum([tile["width"] * tile["height"] for tile in tiles])
+        return np.split(means, ends[:-1])
+
+    def pixels(self, tile):
+        """Column and row of each pixel of a tile, row by row, and the index of its first sample."""
+        np = self.np
+        y, x = np.mgrid[tile["y"] : tile["y"] + tile["height"], tile["x"] : tile["x"] + tile["width"]]
+        first = np.full(x.size, tile["first"], np.uint64)
+        return x.ravel().astype(np.uint32), y.ravel().astype(np.uint32), first
+
+    def wavefront(self, x, y, first, samples):
+        """Sums of so many samples of these pixels."""
+        mi, dr, np = self.mi, self.dr, self.np
+        # Opaque: a number of samples that were part of the kernel would be compiled anew for every other.
+        each = dr.opaque(mi.UInt32, samples)
+        lane = dr.arange(mi.UInt32, len(x) * samples)
+        row = lane // each
+        column_x, column_y = dr.gather(mi.UInt32, mi.UInt32(x), row), dr.gather(mi.UInt32, mi.UInt32(y), row)
+
+        # A stream for (seed, pixel, index of the sample). The mix is a bijection: no two samples of a pixel share a stream, and
+        # those of different pixels do by chance alone, once in 2^127.
+        pixel = mix(y.astype(np.uint64) << np.uint64(32) | x.astype(np.uint64), np.uint64)
+        key = dr.gather(mi.UInt64, mi.UInt64(mix(pixel ^ self.seed, np.uint64)), row)
+        index = dr.gather(mi.UInt64, mi.UInt64(first), row) + mi.UInt64(lane - row * each)
+        state = mix(key + index * mi.UInt64(GOLDEN), mi.UInt64)
+        self.sampler.rng = mi.PCG32(1, state, mix(state ^ mi.UInt64(SECOND), mi.UInt64))
+
+        # A camera ray through a uniform place in the pixel: that is the box filter.
+        draw, sensor, film = self.sampler, self.sensor, self.film
+        offset = draw.next_2d()
+        place = mi.Point2f((column_x + offset.x) / film["width"], (column_y + offset.y) / film["height"])
+        lens = draw.next_2d() if sensor.needs_aperture_sample() else mi.Point2f(0.5)
+        time = mi.Float(sensor.shutter_open())
+        if sensor.shutter_open_time() > 0:
+            time += draw.next_1d() * sensor.shutter_open_time()
+        ray, weight = sensor.sample_ray_differential(time, 0.5, place, lens)
+
+        radiance = weight * self.integrator.sample(self.scene, draw, ray, sensor.get_medium())[0]
+        dr.eval(radiance)
+        each_lane = [channel.numpy().reshape(len(x), samples) for channel in radiance]
+        return np.stack([channel.sum(axis=1, dtype=np.float64) for channel in each_lane], axis=-1)
+
+
+def mix(x, word):
+    """The finaliser of SplitMix64, of 64-bit words of numpy or Dr.Jit."""
+    x = (x ^ (x >> word(30))) * word(MIX_1)
+    x = (x ^ (x >> word(27))) * word(MIX_2)
+    return x ^ (x >> word(31))
+
+
+class Scalar:
+    """Tiles one after the other, as crop windows.
+
+    Mitsuba numbers the streams of a crop window seed x area + (0, 1, ...), in 32 bits, a stream a pixel, in blocks. Equal or
+    neighbouring seeds for windows of different area therefore share streams. Here every window gets numbers that no window had
+    before, by a seed that is worked out from them."""
+
+    repeats = "calls"
+
+    def __init__(self, mi, scene, sensor, integrator, film, seed):
+        import numpy as np
+
+        self.mi, self.np = mi, np
+        self.scene, self.sensor, self.integrator, self.film = scene, sensor, integrator, film
+        self.crop = mi.traverse(sensor)
+        self.seed = seed
+        self.next_stream = None
+
+    def sample(self, tiles):
+        if self.next_stream is None:
+            # Where the numbers start follows from the first request: a process that takes the place of another one must not
+            # begin with the streams that the other began with.
+            word = self.seed
+            for tile in tiles:
+                for value in (tile["index"], tile["first"]):
+                    word = mix_integer(word ^ mix_integer(value + GOLDEN))
+            self.next_stream = word % (1 << 32)
+        return [(tile["samples"], self.mean(tile)) for tile in tiles]
+
+    def mean(self, tile):
+        mi, np = self.mi, self.np
+        self.crop["film.crop_size"] = [tile["width"], tile["height"]]
+        self.crop["film.crop_offset"] = [self.film["x"] + tile["x"], self.film["y"] + tile["y"]]
+        self.crop.update()
+        seed = self.seed_for(tile["width"], tile["height"])
+        image = self.integrator.render(self.scene, sensor=self.sensor, seed=seed, spp=tile["samples"])
+        # Colour comes first, before whatever else an integrator puts out.
+        return np.ascontiguousarray(np.array(image)[:, :, :3], np.float32)
+
+    def seed_for(self, width, height):
+        """The seed that makes a window of this size begin at the next stream that is free."""
+        area = width * height
+        # seed x area reaches multiples of the power of two in the area alone, by the inverse of its odd part.
+        power = area & -area
+        blocks = -(-width // BLOCK) * -(-height // BLOCK)
+        begin = -(-self.next_stream // power) * power
+        self.next_stream = begin + blocks * BLOCK * BLOCK
+        modulus = (1 << 32) // power
+        return begin // power * pow(area // power, -1, modulus) % modulus if modulus > 1 else 0
+
+
+def mix_integer(x):
+    """`mix` of a Python integer."""
+    mask = (1 << 64) - 1
+    x = ((x & mask) ^ (x & mask) >> 30) * MIX_1 & mask
+    x = (x ^ x >> 27) * MIX_2 & mask
+    return x ^ x >> 31
+
+
+host.serve(Mitsuba)

@@ -1,0 +1,261 @@
+use crate::kit::{alive, resident, usable};
+use noisefloor::{ProgressiveSource, Repeats, Request, Rgb, SourceError, Tile, TileGrid};
+use noisefloor_exr::{RenderLayers, write_exr};
+use noisefloor_mitsuba::{RENDERER, Variant, open_as};
+use noisefloor_ptwne::{Options, Ptwne, scenes};
+use noisefloor_sidecar::{Job, Sidecar};
+use noisefloor_tests::check_source;
+use std::collections::HashSet;
+use std::path::{Path, PathBuf};
+
+const CORNELL_BOX: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../fixtures/cornell-box.xml");
+const SIZE: (usize, usize) = (48, 40);
+
+fn open(scene: impl Into<PathBuf>, size: (usize, usize), variant: Variant) -> Sidecar {
+    let job = Job { seed: 7, size: Some(size), ..Job::new(scene) };
+    open_as(&job, variant).unwrap_or_else(|e| panic!("{e}"))
+}
+
+#[test]
+fn the_wavefront_keeps_the_contract() {
+    if !usable(&RENDERER) {
+        return;
+    }
+    let make = || open(CORNELL_BOX, SIZE, Variant::Llvm);
+    let source = make();
+    assert_eq!(source.info().repeats, Repeats::Samples, "{:?}", source.warnings());
+    check_source(make);
+}
+
+#[test]
+fn crop_windows_keep_the_contract() {
+    if !usable(&RENDERER) {
+        return;
+    }
+    let make = || open(CORNELL_BOX, SIZE, Variant::Scalar);
+    assert_eq!(make().info().repeats, Repeats::Calls);
+    check_source(make);
+}
+
+/// The same scene by two renderers: tile by tile the same mean. Each z exceeds 6 with p = 2e-9, and 24 are looked at; the sources are
+/// seeded.
+#[test]
+fn it_renders_what_our_renderer_does() {
+    if !usable(&RENDERER) {
+        return;
+    }
+    let options = Options { seed: 3, max_depth: 65, ..Options::default() };
+    let ours = Ptwne::new(scenes::by_name("cornell-box").unwrap(), SIZE.0, SIZE.1, options).unwrap();
+    let expected = moments(ours);
+    for variant in [Variant::Llvm, Variant::Scalar] {
+        for (tile, (a, b)) in moments(open(CORNELL_BOX, SIZE, variant)).iter().zip(&expected).enumerate() {
+            for c in 0..3 {
+                let z = (a[c].0 - b[c].0) / (a[c].1 + b[c].1).sqrt();
+                assert!(z.abs() < 6.0, "{variant:?}, tile {tile}, channel {c}: {a:?} and {b:?}, z = {z}");
+            }
+        }
+    }
+}
+
+/// Mean of each tile and channel over 64 batches of 16 samples, and the variance of that mean.
+fn moments(mut source: impl ProgressiveSource) -> Vec<[(f64, f64); 3]> {
+    const BATCHES: u64 = 64;
+    let mut sums = vec![[(0.0, 0.0); 3]; 4];
+    for batch in 0..BATCHES {
+        let tiles = TileGrid::new(SIZE.0, SIZE.1, 32).unwrap();
+        let requests: Vec<_> =
+            tiles.tiles().map(|tile| Request { tile, first: 16 * batch, samples: 16 }).collect();
+        for (batch, sums) in source.sample(&requests).unwrap().iter().zip(&mut sums) {
+            for (c, sum) in sums.iter_mut().enumerate() {
+                let mean = batch.mean.iter().map(|p| f64::from(p[c])).sum::<f64>() / batch.mean.len() as f64;
+                *sum = (sum.0 + mean, sum.1 + mean * mean);
+            }
+        }
+    }
+    let n = BATCHES as f64;
+    let moments = |(sum, squares): (f64, f64)| (sum / n, (squares / n - (sum / n).powi(2)) / (n - 1.0));
+    sums.into_iter().map(|tile| tile.map(moments)).collect()
+}
+
+/// What a path of one segment sees is light alone; the panel of the Cornell box is in its upper half.
+#[test]
+fn depth_and_size_are_those_asked_for() {
+    if !usable(&RENDERER) {
+        return;
+    }
+    for variant in [Variant::Llvm, Variant::Scalar] {
+        let job = Job { size: Some((33, 31)), max_depth: Some(1), ..Job::new(CORNELL_BOX) };
+        let mut source = open_as(&job, variant).unwrap();
+        assert_eq!((source.info().width, source.info().height), (33, 31));
+        let half = |index, y, height| Request {
+            tile: Tile { index, x: 0, y, width: 33, height },
+            first: 0,
+            samples: 16,
+        };
+        let batches = source.sample(&[half(0, 0, 15), half(1, 15, 16)]).unwrap();
+        let light = |i: usize| batches[i].mean.iter().flatten().filter(|&&c| c > 0.0).count();
+        assert!(light(0) > 0 && light(1) == 0, "{variant:?}: {} {}", light(0), light(1));
+        drop(source);
+        // Without wishes, those of the file
+        let source = open_as(&Job::new(CORNELL_BOX), variant).unwrap();
+        assert_eq!((source.info().width, source.info().height), (512, 512));
+    }
+}
+
+/// A plane under a sky, seen from infinity: what a pixel gets follows from its random numbers alone, not from its place.
+fn plane(folder: &Path) -> PathBuf {
+    let (width, height) = (32, 16);
+    let at = |i: usize| (i as f32).mul_add(0.37, 1.0).sin().mul_add(0.4, 1.0);
+    let sky: Vec<Rgb> = (0..width * height).map(|i| [at(i), at(i * 7), at(i * 13)]).collect();
+    write_exr(folder.join("sky.exr"), &RenderLayers::rgb(width, height, &sky)).unwrap();
+    let scene = folder.join("plane.xml");
+    let text = r#"<scene version="3.0.0">
+        <integrator type="path"><integer name="max_depth" value="2"/></integrator>
+        <sensor type="orthographic">
+            <transform name="to_world"><lookat origin="0, 0, 5" target="0, 0, 0" up="0, 1, 0"/></transform>
+        </sensor>
+        <shape type="rectangle">
+            <transform name="to_world"><scale value="4"/></transform>
+            <bsdf type="diffuse"/>
+        </shape>
+        <emitter type="envmap"><string name="filename" value="sky.exr"/></emitter>
+    </scene>"#;
+    std::fs::write(&scene, text).unwrap();
+    scene
+}
+
+fn request(index: usize, (x, y): (usize, usize), (width, height): (usize, usize), first: u64) -> Request {
+    Request { tile: Tile { index, x, y, width, height }, first, samples: 1 }
+}
+
+fn values(source: &mut Sidecar, request: Request) -> Vec<[u32; 3]> {
+    source.sample(&[request]).unwrap().remove(0).mean.iter().map(|p| p.map(f32::to_bits)).collect()
+}
+
+/// The trap of the scalar variant: it numbers streams seed × area + pixel, so that windows of different areas share streams under equal or
+/// neighbouring seeds. Where two pixels share a stream they get the same value to the bit, and by chance three channels never do.
+#[test]
+fn no_two_pixels_or_batches_share_random_numbers() {
+    if !usable(&RENDERER) {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let scene = plane(folder.path());
+
+    // The test can fail: two processes whose first request is of one index start with the same streams, wherever the tile is
+    let mut one = open(&scene, (128, 128), Variant::Scalar);
+    let mut other = open(&scene, (128, 128), Variant::Scalar);
+    let same = values(&mut one, request(3, (0, 0), (16, 16), 0))
+        == values(&mut other, request(3, (64, 32), (16, 16), 0));
+    assert!(
+        same,
+        "the value of a pixel does not follow from its random numbers alone: this test shows nothing"
+    );
+
+    for variant in [Variant::Llvm, Variant::Scalar] {
+        let mut source = open(&scene, (128, 128), variant);
+        let mut seen = HashSet::new();
+        let mut pixels = 0;
+        let places = [(0, 0), (64, 0)];
+        let sizes = [(16, 16), (32, 16), (16, 32), (32, 32), (24, 16), (7, 5), (1, 1), (64, 64), (33, 31)];
+        for first in 0..50 {
+            let values =
+                values(&mut source, request(0, places[first % 2], sizes[first % sizes.len()], first as u64));
+            pixels += values.len();
+            seen.extend(values);
+        }
+        let shared = pixels - seen.len();
+        assert!(
+            shared == 0,
+            "{variant:?}: {shared} of {pixels} pixels share their random numbers with another"
+        );
+    }
+}
+
+/// A restart begins with other streams than the process before it began with.
+#[test]
+fn a_new_process_does_not_repeat_the_old_one() {
+    if !usable(&RENDERER) {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let scene = plane(folder.path());
+    for variant in [Variant::Llvm, Variant::Scalar] {
+        let begin = |first| values(&mut open(&scene, (32, 32), variant), request(0, (0, 0), (32, 32), first));
+        let (start, again, later) = (begin(0), begin(0), begin(1));
+        assert!(start == again, "{variant:?}: another picture the second time");
+        let old: HashSet<_> = start.into_iter().collect();
+        assert!(!later.iter().any(|value| old.contains(value)), "{variant:?}: the first streams come again");
+    }
+}
+
+#[test]
+fn scenes_that_cannot_be_loaded_are_errors() {
+    if !usable(&RENDERER) {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    for (name, text, words) in [
+        ("empty.xml", "", "empty.xml"),
+        ("blind.xml", r#"<scene version="3.0.0"/>"#, "no sensor"),
+        (
+            "lost.xml",
+            r#"<scene version="3.0.0"><sensor type="perspective"/><shape type="obj"><string name="filename" value="gone.obj"/></shape></scene>"#,
+            "gone.obj",
+        ),
+    ] {
+        let scene = folder.path().join(name);
+        std::fs::write(&scene, text).unwrap();
+        let error = open_as(&Job::new(&scene), Variant::Scalar).unwrap_err().to_string();
+        assert!(error.contains(words) && error.contains(name), "{error}");
+    }
+}
+
+/// A process that is killed from outside costs a restart, and no samples.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_killed_process_is_replaced_and_none_is_left() {
+    if !usable(&RENDERER) {
+        return;
+    }
+    let mut source = open(CORNELL_BOX, SIZE, Variant::Llvm);
+    let tile = TileGrid::new(SIZE.0, SIZE.1, 32).unwrap().tile(0);
+    let mut sample = |source: &mut Sidecar, first| -> Result<Vec<Rgb>, SourceError> {
+        Ok(source.sample(&[Request { tile, first, samples: 4 }])?.remove(0).mean)
+    };
+    let before = sample(&mut source, 4).unwrap();
+    let first = source.process_id().unwrap();
+    let killed = std::process::Command::new("kill").args(["-9", &first.to_string()]).status().unwrap();
+    assert!(killed.success());
+    assert_eq!(sample(&mut source, 4).unwrap(), before);
+    assert_eq!(source.restarts().len(), 1);
+    let second = source.process_id().unwrap();
+    assert!(first != second && alive(second));
+    drop(source);
+    assert!(!alive(first) && !alive(second));
+}
+
+/// A leak of a tile's batch in every call (48 KB of means and random numbers) would be 47 MB.
+#[test]
+fn memory_is_flat_over_a_thousand_calls() {
+    if !usable(&RENDERER) {
+        return;
+    }
+    for variant in [Variant::Llvm, Variant::Scalar] {
+        let mut source = open(CORNELL_BOX, SIZE, variant);
+        let tile = TileGrid::new(SIZE.0, SIZE.1, 32).unwrap().tile(0);
+        let mut call = |first| source.sample(&[Request { tile, first, samples: 4 }]).map(|_| ()).unwrap();
+        (0..100).for_each(&mut call);
+        let process = source.process_id().unwrap();
+        let Some(before) = resident(process) else {
+            return eprintln!("SKIPPED: nothing tells the memory of a process");
+        };
+        let mut call = |first| source.sample(&[Request { tile, first, samples: 4 }]).map(|_| ()).unwrap();
+        (100..1100).for_each(&mut call);
+        let after = resident(process).unwrap();
+        assert!(
+            after < before + 16 * 1024,
+            "{variant:?}: {before} KiB before, {after} KiB after 1,000 calls"
+        );
+    }
+}
