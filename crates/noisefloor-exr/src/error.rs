@@ -59,7 +59,7 @@ pub enum PictureError {
     Broken {
         /// The file.
         path: PathBuf,
-        /// `"EXR"` or `"PNG"`.
+        /// `"EXR"`, `"PFM"` or `"PNG"`.
         format: &'static str,
         /// What the decoder met.
         reason: String,
@@ -84,6 +84,85 @@ pub enum PictureError {
         /// What to do about it.
         advice: &'static str,
     },
+}
+
+/// Why a command gave no samples.
+#[derive(Debug, Error)]
+pub enum CommandError {
+    /// The template is not a command.
+    #[error("the command {template:?}: {why}")]
+    Template {
+        /// The command with its placeholders.
+        template: String,
+        /// What is wrong with it, and what to do.
+        why: String,
+    },
+    /// The size of the picture is not known.
+    #[error("the size of the picture is not known: {0}; say it with --size")]
+    Size(String),
+    /// No scratch folder.
+    #[error("{}: no folder for its pictures: {source}; set TMPDIR to a folder that you may write to", folder.display())]
+    Folder {
+        /// The folder for temporary files.
+        folder: PathBuf,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// The program could not be started.
+    #[error("{program}: cannot be started: {source}; check its name and the path")]
+    Start {
+        /// The program.
+        program: String,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// The program ended with an error, or took too long and was killed.
+    #[error("{command}: {how}; its last words: {said}")]
+    Failed {
+        /// The whole command.
+        command: String,
+        /// How it ended.
+        how: String,
+        /// The last lines of its output.
+        said: String,
+    },
+    /// The program left no picture, or several.
+    #[error(
+        "{command}: it left {found} where one picture is expected; write to {{out}}.exr or {{out}}.pfm; its last words: {said}"
+    )]
+    Output {
+        /// The whole command.
+        command: String,
+        /// `no file`, or names of several.
+        found: String,
+        /// The last lines of its output.
+        said: String,
+    },
+    /// The picture has neither the size of the tile nor that of the whole.
+    #[error(
+        "{command}: its picture has {got_width}×{got_height} pixels, neither {width}×{height} as asked for nor those of the whole image"
+    )]
+    Picture {
+        /// The whole command.
+        command: String,
+        /// Width asked for, in pixels.
+        width: usize,
+        /// Height asked for, in pixels.
+        height: usize,
+        /// The picture's width in pixels.
+        got_width: usize,
+        /// The picture's height in pixels.
+        got_height: usize,
+    },
+    /// The picture is display-encoded.
+    #[error("{command}: its picture is a PNG, whose values are clipped and encoded; write EXR or PFM")]
+    Display {
+        /// The whole command.
+        command: String,
+    },
+    /// The picture could not be read.
+    #[error(transparent)]
+    Read(#[from] PictureError),
 }
 
 /// Why a file could not be written. What was there before is untouched.

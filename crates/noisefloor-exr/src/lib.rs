@@ -1,9 +1,10 @@
 //! Pictures in and out, and stacks of pictures on disk played back as a source of samples.
 //!
-//! - [`read_picture`], [`read_exr`], [`read_png`]: linear EXR and display-encoded PNG, told apart by content. Files are
+//! - [`read_picture`], [`read_exr`], [`read_pfm`], [`read_png`]: linear EXR and PFM and display-encoded PNG, told apart by content. Files are
 //!   hostile until parsed: sizes are checked before pixels are allocated, and a broken file is a [`PictureError`].
 //! - [`write_exr`], [`write_png`], [`write_atomic`], [`check_writable`]: files that appear whole or not at all.
 //! - [`StackSource`]: a folder of images as a [`noisefloor::ProgressiveSource`].
+//! - [`CommandSource`]: any program that renders into a file, as a source.
 //! - [`corpus`]: thresholds that observers gave, together with the images they judged.
 //! - [`table`]: descriptors of a corpus, computed from its images, and read and written as CSV.
 //!
@@ -28,8 +29,10 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod command;
 pub mod corpus;
 mod decode_exr;
+mod decode_pfm;
 mod decode_png;
 mod error;
 mod frames;
@@ -38,9 +41,11 @@ mod stack;
 pub mod table;
 mod write;
 
+pub use command::{CommandOptions, CommandSource};
 pub use decode_exr::read_exr;
+pub use decode_pfm::read_pfm;
 pub use decode_png::read_png;
-pub use error::{CorpusError, PictureError, StackError, WriteError};
+pub use error::{CommandError, CorpusError, PictureError, StackError, WriteError};
 pub use picture::{DisplayImage, LinearImage, MAX_FILE_BYTES, Picture, read_picture};
 pub use stack::StackSource;
 pub use write::{RenderLayers, check_writable, write_atomic, write_exr, write_png};

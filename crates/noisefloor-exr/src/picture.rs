@@ -46,7 +46,7 @@ impl DisplayImage {
 /// A picture, and what its numbers mean.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Picture {
-    /// From an EXR file.
+    /// From an EXR or PFM file.
     Linear(LinearImage),
     /// From a PNG file.
     Display(DisplayImage),
@@ -78,18 +78,19 @@ impl Picture {
     }
 }
 
-/// Reads an EXR or a PNG, whichever the first bytes say it is; the name does not matter.
+/// Reads an EXR, a PFM or a PNG, whichever the first bytes say it is; the name does not matter.
 ///
 /// # Errors
-/// [`PictureError`]: those of [`read_exr`](crate::read_exr) and [`read_png`](crate::read_png), and
-/// [`PictureError::Foreign`] if it is neither.
+/// [`PictureError`]: those of [`read_exr`](crate::read_exr), [`read_pfm`](crate::read_pfm) and [`read_png`](crate::read_png),
+/// and [`PictureError::Foreign`] if it is none of them.
 pub fn read_picture(path: impl AsRef<Path>) -> Result<Picture, PictureError> {
     let path = path.as_ref();
     let opened = Opened::open(path)?;
     match opened.format {
         Format::Exr => crate::decode_exr::decode(path, opened).map(Picture::Linear),
+        Format::Pfm => crate::decode_pfm::decode(path, opened).map(Picture::Linear),
         Format::Png => crate::decode_png::decode(path, opened).map(Picture::Display),
-        _ => Err(opened.foreign(path, "an OpenEXR or PNG file")),
+        _ => Err(opened.foreign(path, "an OpenEXR, PFM or PNG file")),
     }
 }
 
@@ -97,6 +98,7 @@ pub fn read_picture(path: impl AsRef<Path>) -> Result<Picture, PictureError> {
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Format {
     Exr,
+    Pfm,
     Png,
     Empty,
     Other,
@@ -131,6 +133,7 @@ impl Opened {
         let format = match magic.as_slice() {
             [] => Format::Empty,
             [0x76, 0x2f, 0x31, 0x01, ..] => Format::Exr,
+            [b'P', b'F' | b'f', b'\n' | b'\r', ..] => Format::Pfm,
             [0x89, b'P', b'N', b'G', b'\r', b'\n', 0x1a, b'\n'] => Format::Png,
             _ => Format::Other,
         };
@@ -140,6 +143,7 @@ impl Opened {
     pub(crate) fn foreign(&self, path: &Path, wanted: &'static str) -> PictureError {
         let found = match self.format {
             Format::Exr => "an OpenEXR file",
+            Format::Pfm => "a PFM file",
             Format::Png => "a PNG file",
             Format::Empty => "an empty file",
             Format::Other => "something else",

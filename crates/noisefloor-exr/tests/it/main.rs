@@ -1,5 +1,8 @@
 //! Tests of noisefloor-exr, one module a subject.
 
+/// Programs that render into files.
+#[cfg(test)]
+mod command;
 /// Thresholds and the images they belong to.
 #[cfg(test)]
 mod corpus;
@@ -9,6 +12,9 @@ mod hostile;
 /// The paper's pairs.
 #[cfg(test)]
 mod pairs;
+/// What is read from PFM, and what is refused.
+#[cfg(test)]
+mod pfm;
 /// What is read from EXR and PNG.
 #[cfg(test)]
 mod read;
