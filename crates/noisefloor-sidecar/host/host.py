@@ -14,6 +14,7 @@ A host script defines a class and hands it to `serve`:
 
     host.serve(Renderer)
 
+`TileError` blames a failure on a tile; `rectangles` joins tiles for renderers to which every piece costs a start.
 Import the renderer in `__init__`, not at the top: what it prints while it loads must not get into the stream of frames.
 A frame is two little-endian u32 (length of header, length of payload), a header (a JSON object) and a payload (raw
 little-endian float32, RGB, top row first). There is one reply to a request, in order. Needs the standard library alone.
@@ -81,6 +82,29 @@ def serve(Host):
         _send(replies_to, reply, payload)
         if request.get("op") == "quit":
             _end()
+
+
+def rectangles(tiles, alike):
+    """Joins tiles that are `alike` in what these keys name into rectangles, for renderers to which each rectangle costs a start:
+    first along rows, then rows of one extent. Yields (x, y, width, height), the values of the keys, and which tiles are inside."""
+
+    def join(parts, along, extent, across, other):
+        joined = []
+        for part in sorted(parts, key=lambda p: (*(p[key] for key in alike), p[across], p[other], p[along])):
+            last = joined[-1] if joined else None
+            same = last and all(last[key] == part[key] for key in [*alike, across, other])
+            if same and last[along] + last[extent] == part[along]:
+                last[extent] += part[extent]
+                last["members"] = last["members"] + part["members"]
+            else:
+                joined.append(dict(part))
+        return joined
+
+    parts = [{**tile, "members": [position]} for position, tile in enumerate(tiles)]
+    parts = join(join(parts, "x", "width", "y", "height"), "y", "height", "x", "width")
+    for part in parts:
+        region = tuple(part[side] for side in ["x", "y", "width", "height"])
+        yield region, tuple(part[key] for key in alike), part["members"]
 
 
 def _answer(Host, renderer, request):

@@ -1,0 +1,169 @@
+"""Serves Cycles (bpy, Blender as a module) to noisefloor-cycles.
+
+A scene is a .blend file; scripts inside are not run. Or it is a .py file, which is run, and builds the scene. No options.
+
+Samples come in blocks of 16, each block a pattern of its own: the first 16 points of Cycles' Sobol table, scrambled by a seed
+that follows from the block. Sample k of a pixel thereby follows from seed, pixel and k, however requests are cut, and batches
+of whole blocks are independent. Successive subsets of one long pattern, which Cycles offers too, are not: each fills the gaps
+of those before, so that halves made of them differ by more than the error of their mean.
+"""
+
+import hashlib
+import os
+import runpy
+import shutil
+import sys
+import tempfile
+
+sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+import host
+
+# Samples of a block. Longer patterns have less noise at edges of lamps, and nowhere else; they would have to be cut more often
+BLOCK = 16
+
+
+class Cycles:
+    def __init__(self, init):
+        if init.get("options"):
+            raise ValueError(f"there is nothing to choose: {init['options']}")
+
+        import bpy
+        import numpy
+
+        # Blender reports every render on standard output; what goes wrong goes to standard error
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, 1)
+        os.close(nowhere)
+
+        self.bpy, self.np, self.seed = bpy, numpy, init["seed"]
+        path = init["scene"]
+        if path.endswith(".py"):
+            runpy.run_path(path)
+        else:
+            bpy.ops.wm.open_mainfile(filepath=path, load_ui=False, use_scripts=False)
+        self.scene = bpy.context.scene
+        if self.scene.camera is None:
+            raise ValueError(f"{path} has no camera")
+        warnings = self._configure(init)
+        self.memory = "/dev/shm" if os.access("/dev/shm", os.W_OK) else None
+        self.info = {
+            "name": f"Cycles {bpy.app.version_string}",
+            "width": self.scene.render.resolution_x,
+            "height": self.scene.render.resolution_y,
+            "unit": "samples-per-pixel",
+            "repeats": "samples",
+            "warnings": warnings,
+        }
+
+    def _configure(self, init):
+        """Makes the scene render plain samples; returns warnings."""
+        render, cycles = self.scene.render, self.scene.cycles
+        warnings = []
+        if render.engine != "CYCLES":
+            warnings.append(f"the scene was made for {render.engine}; Cycles renders it")
+            render.engine = "CYCLES"
+        cycles.device = "CPU"
+        render.use_persistent_data = True
+        if init.get("threads"):
+            render.threads_mode, render.threads = "FIXED", init["threads"]
+
+        # Size, in pixels, of which every render does a part
+        for side, axis in [("width", "x"), ("height", "y")]:
+            own = getattr(render, f"resolution_{axis}") * render.resolution_percentage // 100
+            setattr(render, f"resolution_{axis}", init.get(side) or own)
+        render.resolution_percentage = 100
+        render.use_border = render.use_crop_to_border = True
+        cycles.use_auto_tile = False
+
+        # Every sample counts in one pixel alone, and in full
+        cycles.pixel_filter_type, cycles.filter_width = "BOX", 1.0
+        cycles.sample_clamp_direct = cycles.sample_clamp_indirect = 0.0
+        cycles.light_sampling_threshold = 0.0
+        cycles.use_adaptive_sampling = cycles.use_denoising = cycles.use_guiding = False
+        cycles.time_limit = 0.0
+        cycles.use_layer_samples = "IGNORE"
+        # The other patterns and scramblings make neighbouring pixels alike, or unlike, on purpose
+        cycles.sampling_pattern = "TABULATED_SOBOL"
+        cycles.auto_scrambling_distance, cycles.scrambling_distance = False, 1.0
+        cycles.use_animated_seed = False
+        cycles.samples, cycles.use_sample_subset = BLOCK, True
+
+        depth = init.get("max_depth")
+        if depth is not None:
+            # Cycles counts bounces; even with none, light comes by a lit surface
+            if depth < 2:
+                raise ValueError("Cycles cannot render directly seen light alone: max_depth has to be 2 at least")
+            for kind in ["max", "diffuse", "glossy", "transmission", "volume"]:
+                setattr(cycles, f"{kind}_bounces", depth - 2)
+
+        # Radiance as it is, without what Blender does to pictures afterwards
+        render.use_compositing = render.use_sequencer = render.use_multiview = False
+        settings = render.image_settings
+        settings.file_format, settings.color_mode = "OPEN_EXR", "RGB"
+        settings.color_depth, settings.exr_codec = "32", "NONE"
+        return warnings
+
+    def sample(self, tiles):
+        answers = [None] * len(tiles)
+        folder = tempfile.mkdtemp(prefix="noisefloor-", dir=self.memory)
+        try:
+            for region, (first, samples), members in host.rectangles(tiles, ["first", "samples"]):
+                mean = self._mean(region, first, samples, os.path.join(folder, "part.exr"))
+                for member in members:
+                    t = tiles[member]
+                    x, y = t["x"] - region[0], t["y"] - region[1]
+                    part = mean[y : y + t["height"], x : x + t["width"]]
+                    answers[member] = (samples, self.np.ascontiguousarray(part, self.np.float32))
+        finally:
+            shutil.rmtree(folder, ignore_errors=True)
+        return answers
+
+    def reference(self):
+        return None
+
+    def _mean(self, region, first, samples, path):
+        """Mean of samples first…first + samples of a region, block by block."""
+        self._aim(*region)
+        total, done = 0.0, 0
+        while done < samples:
+            block, offset = divmod(first + done, BLOCK)
+            length = min(BLOCK - offset, samples - done)
+            total = total + self._render(block, offset, length, path) * length
+            done += length
+        return total / samples
+
+    def _aim(self, x, y, width, height):
+        """Confines renders to a region; its y counts from the top, Blender's from the bottom."""
+        render = self.scene.render
+        across, down = render.resolution_x, render.resolution_y
+        bottom = down - y - height
+        # Blender cuts edges down to whole pixels: a quarter keeps them clear of rounding
+        render.border_min_x, render.border_max_x = (x + 0.25) / across, min(1.0, (x + width + 0.25) / across)
+        render.border_min_y, render.border_max_y = (bottom + 0.25) / down, min(1.0, (bottom + height + 0.25) / down)
+        self.shape = (height, width, 3)
+
+    def _render(self, block, offset, length, path):
+        """Mean of some samples of a block, rows from the top, as float64."""
+        cycles, images = self.scene.cycles, self.bpy.data.images
+        digest = hashlib.blake2b(f"{self.seed} {block}".encode(), digest_size=4).digest()
+        cycles.seed = int.from_bytes(digest, "little") >> 1
+        cycles.sample_offset, cycles.sample_subset_length = offset, length
+        self.bpy.ops.render.render()
+        # The pixels of a render result are out of a script's reach: only a file has them
+        images["Render Result"].save_render(path)
+        image = images.load(path, check_existing=False)
+        try:
+            image.colorspace_settings.name = "Non-Color"
+            pixels = self.np.empty(len(image.pixels), self.np.float32)
+            image.pixels.foreach_get(pixels)
+            width, height = image.size
+            picture = pixels.reshape(height, width, image.channels)[::-1, :, :3]
+        finally:
+            images.remove(image)
+        if picture.shape != self.shape:
+            raise RuntimeError(f"a region of {self.shape} came back as {picture.shape}")
+        return picture.astype(self.np.float64)
+
+
+if __name__ == "__main__":
+    host.serve(Cycles)
