@@ -27,3 +27,6 @@ mod numerics;
 /// What people said of real renders.
 #[cfg(test)]
 mod people;
+/// LuxCore and Cycles, where they are installed.
+#[cfg(test)]
+mod renderers;
