@@ -16,12 +16,12 @@
 //!
 //! # Samples
 //! The source repeats samples, however requests are cut. They come in blocks of 16 points of Cycles' own Sobol table, each with a
-//! seed of its own: batches of whole blocks are independent. Of batches that are not multiples of 16, each shares one block
-//! with the one before, and the noise of halves that are made of them looks up to a few per cent larger than it is. Cycles
-//! renders a block of a rectangle of tiles at a time, which costs some 10 ms beside the samples.
+//! seed of its own: batches of whole blocks are independent. Of batches that are not multiples of 16, each shares a block with
+//! the one before, whose parts fill each other's gaps: halves made of them differ a little more than they should, and at edges of
+//! lamps much more. Cycles renders a block of a rectangle of tiles at a time, which costs some 5 ms beside the samples.
 //!
-//! Where light is all but even over a pixel, noise falls as that of independent samples does. At edges of lamps it falls faster
-//! inside a block: errors there are smaller than a model expects that has learned from independent samples.
+//! In nearly all pixels noise falls with the number of samples as that of independent ones does. At edges of lamps it falls
+//! faster inside a block.
 
 use noisefloor_sidecar::{Adapter, Job, Renderer, Sidecar, SidecarError};
 
