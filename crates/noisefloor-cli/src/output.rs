@@ -5,7 +5,7 @@ use crate::heat_map::{self, Mark, Scale};
 use anyhow::{Context, bail};
 use noisefloor::{Clock, Display, Params, Progress, Rgb, Session, Stop, StopReason, StoppingCriterion};
 use noisefloor_exr::{RenderLayers, check_writable, read_exr, write_atomic, write_exr, write_png};
-use noisefloor_ptwne::Counts;
+use noisefloor_ptwne::Ptwne;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -92,6 +92,11 @@ struct Report<'a> {
     samples_clamped: Option<u64>,
     /// Samples of tiles that see nothing but the background: no ray was traced for them.
     samples_background: Option<u64>,
+    /// Of the ray-traced reference, if the criterion asked for one: samples of a pixel, and the deviation of its noise mask as it
+    /// estimates it, over all blocks and in the worst.
+    reference_samples: Option<f64>,
+    reference_deviation: Option<f32>,
+    reference_worst: Option<f32>,
     seconds_source: Option<f64>,
     seconds_oracle: Option<f64>,
     seconds_total: Option<f64>,
@@ -143,7 +148,7 @@ impl Output {
     pub fn write<C: StoppingCriterion>(
         &self,
         session: &Session<C>,
-        over: Option<(Clock, Counts)>,
+        over: Option<(Clock, &Ptwne)>,
     ) -> anyhow::Result<()> {
         let film = session.film();
         let (width, height) = (film.grid().width(), film.grid().height());
@@ -219,9 +224,11 @@ impl Output {
         session: &Session<C>,
         tiles: &[(Stop, bool)],
         display: &Display,
-        over: Option<(Clock, Counts)>,
+        over: Option<(Clock, &Ptwne)>,
     ) -> anyhow::Result<()> {
-        let (clock, counts) = over.unzip();
+        let (clock, source) = over.unzip();
+        let counts = source.map(Ptwne::counts);
+        let noise = source.and_then(Ptwne::reference_noise);
         let grid = session.film().grid();
         let mut stops = BTreeMap::new();
         for (stop, open) in tiles {
@@ -247,6 +254,9 @@ impl Output {
             samples_dropped: counts.map(|c| c.dropped),
             samples_clamped: counts.map(|c| c.clamped),
             samples_background: counts.map(|c| c.background),
+            reference_samples: noise.map(|n| n.samples),
+            reference_deviation: noise.map(|n| n.deviation()),
+            reference_worst: noise.map(|n| n.worst()),
             seconds_source: clock.map(|c| c.source_seconds),
             seconds_oracle: clock.map(|c| c.criterion_seconds),
             seconds_total: clock.map(|c| c.total_seconds),
@@ -256,7 +266,8 @@ impl Output {
     }
 
     /// A few lines for people.
-    pub fn summarise<C: StoppingCriterion>(&self, session: &Session<C>, clock: Clock, counts: Counts) {
+    pub fn summarise<C: StoppingCriterion>(&self, session: &Session<C>, clock: Clock, source: &Ptwne) {
+        let counts = source.counts();
         let film = session.film();
         let spp: Vec<u64> = session.stops().map(|s| s.samples).collect();
         let converged = session.stops().filter(|s| s.reason == StopReason::Converged).count();
@@ -290,6 +301,22 @@ impl Output {
         ] {
             if count > 0 {
                 println!("{count} samples {what}");
+            }
+        }
+        if let Some(noise) = source.reference_noise() {
+            println!(
+                "the reference took {:.0} samples a pixel; deviation of its noise mask {:.2}/255, {:.2}/255 in its worst block",
+                noise.samples,
+                255.0 * noise.deviation(),
+                255.0 * noise.worst(),
+            );
+            if noise.unsettled > 0 {
+                println!(
+                    "warning: {} of {} blocks of the reference are noisier than it promises: tiles there may be stopped too late; \
+                     a model trained on half buffers needs no reference",
+                    noise.unsettled,
+                    noise.deviations.len()
+                );
             }
         }
         println!("written to {}", self.folder.display());

@@ -104,11 +104,11 @@ fn drive<C: StoppingCriterion>(
     bar.finish_and_clear();
 
     // Write what there is, also after a failure.
-    let written = output.write(driver.session(), Some((driver.clock(), driver.source().counts())));
+    let written = output.write(driver.session(), Some((driver.clock(), driver.source())));
     outcome?;
     written?;
     if !args.quiet {
-        output.summarise(driver.session(), driver.clock(), driver.source().counts());
+        output.summarise(driver.session(), driver.clock(), driver.source());
     }
     let cancelled = driver.session().stops().any(|s| s.reason == StopReason::Cancelled);
     Ok(if cancelled { ExitCode::from(INTERRUPTED) } else { ExitCode::SUCCESS })

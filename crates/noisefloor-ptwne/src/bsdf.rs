@@ -398,6 +398,11 @@ impl<'a> Glossy<'a> {
         (self.reflectance(cos_h) * facets, density)
     }
 
+    /// Whether there is a base below a coat.
+    pub(crate) fn has_base(&self) -> bool {
+        self.base != Vec3::ZERO
+    }
+
     /// f·cos θᵢ of the base below the coat.
     #[inline]
     pub(crate) fn base(&self, wi: Vec3) -> Vec3 {

@@ -256,25 +256,77 @@ impl Map {
     }
 }
 
-impl Map {
-    /// `count` directions with their densities, spread evenly over the brightness, for quadrature: the middles of `count` equal
-    /// shares of it, in the order of the cells, moved on by `turn` of a share.
-    pub(crate) fn spread(&self, count: u32, turn: f32) -> Vec<(Vec3, f32)> {
-        let target = |k: u32| (f64::from(k) + f64::from(turn)) / f64::from(count);
-        let (mut found, mut below) = (Vec::with_capacity(count as usize), 0.0);
-        for (index, &chance) in self.chance.iter().enumerate() {
-            let chance = f64::from(chance);
-            while (found.len() as u32) < count && target(found.len() as u32) < below + chance {
-                let k = found.len() as u32;
-                let rest = ((target(k) - below) / chance).clamp(0.0, 1.0) as f32;
-                // In the other direction, the binary digits of k mirrored
-                let across = (k.reverse_bits() >> 8) as f32 / (1 << 24) as f32;
-                found.push(self.direction(index, [rest, across]));
-            }
-            below += chance;
-        }
-        found
+/// Most columns and rows of [`Cells`].
+const COARSE: [usize; 2] = [32, 16];
+
+/// The environment map cut into coarse cells, to be chosen among by other chances than their brightness. Within one, directions
+/// are chosen by brightness: rows by one number, columns by the other, so that what is even in the numbers is even in the map.
+#[derive(Debug)]
+pub(crate) struct Cells<'a> {
+    map: &'a Map,
+    columns: usize,
+    /// Chance of each cell by its brightness, row-major.
+    pub(crate) chances: Vec<f32>,
+}
+
+impl<'a> Cells<'a> {
+    pub(crate) fn new(map: &'a Map) -> Self {
+        let [columns, rows]: [usize; 2] = std::array::from_fn(|k| map.cells[k].min(COARSE[k]));
+        let mut cells = Self { map, columns, chances: vec![0.0; columns * rows] };
+        cells.chances =
+            (0..columns * rows).map(|i| cells.rows(i).map(|y| cells.row_chance(i, y)).sum()).collect();
+        cells
     }
+
+    /// The map's own rows and columns that cell `index` has.
+    fn rows(&self, index: usize) -> std::ops::Range<usize> {
+        let n = self.chances.len() / self.columns;
+        let (i, of) = (index / self.columns, self.map.cells[1]);
+        i * of / n..(i + 1) * of / n
+    }
+
+    fn columns(&self, index: usize) -> std::ops::Range<usize> {
+        let (i, of) = (index % self.columns, self.map.cells[0]);
+        i * of / self.columns..(i + 1) * of / self.columns
+    }
+
+    fn row_chance(&self, index: usize, row: usize) -> f32 {
+        self.columns(index).map(|x| self.map.chance[row * self.map.cells[0] + x]).sum()
+    }
+
+    /// The cell that `dir` lies in.
+    pub(crate) fn cell(&self, dir: Vec3) -> usize {
+        let [u, v, _] = self.map.place(dir);
+        let fine = |x: f32, n: usize| ((x * n as f32) as usize).min(n - 1);
+        let [columns, rows] = self.map.cells;
+        let n = self.chances.len() / self.columns;
+        // The last coarse cell that begins no later
+        let coarse = |i: usize, n: usize, of: usize| ((i + 1) * n - 1) / of;
+        coarse(fine(v, rows), n, rows) * self.columns + coarse(fine(u, columns), self.columns, columns)
+    }
+
+    /// A direction within a cell, and its density in solid angle among those of the cell.
+    pub(crate) fn sample(&self, index: usize, u: [f32; 2]) -> Option<(Vec3, f32)> {
+        let (row, v) = pick(self.rows(index), self.chances[index] * u[0], |y| self.row_chance(index, y))?;
+        let at = |x: usize| self.map.chance[row * self.map.cells[0] + x];
+        let (column, u) = pick(self.columns(index), self.row_chance(index, row) * u[1], at)?;
+        let (dir, pdf) = self.map.direction(row * self.map.cells[0] + column, [u, v]);
+        Some((dir, pdf / self.chances[index]))
+    }
+}
+
+/// The first of `range` whose chances, summed, exceed `u`, and where in its own chance `u` lies, 0…1.
+fn pick(range: std::ops::Range<usize>, mut u: f32, chance: impl Fn(usize) -> f32) -> Option<(usize, f32)> {
+    let mut last = None;
+    for (i, chance) in range.map(|i| (i, chance(i))).filter(|(_, chance)| *chance > 0.0) {
+        if u < chance {
+            return Some((i, u / chance));
+        }
+        u -= chance;
+        // Rounding may exceed the sum
+        last = Some((i, 1.0 - f32::EPSILON));
+    }
+    last
 }
 
 /// Solid angle of a pixel in row `y`, up to what is common to all.
@@ -361,6 +413,32 @@ mod tests {
         let (mean, n) = (sum / f64::from(n), f64::from(n));
         let error = ((squares / n - mean * mean) / n).sqrt();
         assert!((mean - exact).abs() < 5.0 * error + 1e-3 * exact, "{mean} ± {error}, {exact}");
+    }
+
+    /// Cells share the map among them, and what is chosen within one has, times the cell's chance, the density of the map's own choice.
+    #[test]
+    fn cells_are_parts_of_their_map() {
+        let (small, mut rng) = (uneven(), Rng::new(Key::new(4), 0, 0));
+        // 75 and 37 rows and columns do not divide into 32 and 16
+        let pixels: Vec<Rgb> = (0..75 * 37).map(|_| [rng.one().powi(6); 3]).collect();
+        let to_world = small.to_world.map(|row| row.to_array());
+        let large = Map::new(EnvironmentMap { width: 75, height: 37, pixels, to_world });
+        for map in [small, large] {
+            let cells = Cells::new(&map);
+            assert!((cells.chances.iter().sum::<f32>() - 1.0).abs() < 1e-5);
+            let (mut same, n) = (0, 20);
+            for (cell, chance) in cells.chances.iter().enumerate() {
+                for _ in 0..n {
+                    let (dir, pdf) = cells.sample(cell, rng.two()).unwrap();
+                    let own = map.pdf(dir);
+                    // At the poles, the sine that the density is divided by is not known to f32
+                    let known = map.place(dir)[2].abs() > 0.999 || (pdf * chance - own).abs() < 1e-3 * own;
+                    same += usize::from(cells.cell(dir) == cell && known);
+                }
+            }
+            // Rounding may put a direction into the next cell
+            assert!(same > n * cells.chances.len() * 499 / 500, "{same}");
+        }
     }
 
     #[test]

@@ -23,7 +23,7 @@
 //!
 //! # Where things are
 //! Light transport is in `integrator`, scattering in `bsdf`, emitters in `light`, rays meeting surfaces in `accel`, random
-//! numbers in `rng`, the reference in `reference`. What is absent: state between samples, allocation along paths, and any
+//! numbers in `rng`, the reference in `reference`, its samples in `direct`, its choice of lights in `guide`. What is absent: state between samples, allocation along paths, and any
 //! number that depends on threads.
 
 mod accel;
@@ -31,9 +31,11 @@ mod alias;
 mod bsdf;
 mod builder;
 mod camera;
+mod direct;
 mod environment;
 mod error;
 mod filter;
+mod guide;
 mod integrator;
 mod light;
 mod material;
@@ -54,6 +56,7 @@ pub use filter::Filter;
 pub use integrator::Estimator;
 pub use light::Punctual;
 pub use material::{Cover, MIN_ROUGHNESS, Material};
+pub use reference::ReferenceNoise;
 pub use renderer::{Counts, MAX_DEPTH, MAX_THREADS, Options, Ptwne};
 pub use sampler::Sampling;
 pub use scene::{Needs, Scene};

@@ -318,16 +318,6 @@ impl Light {
         }
     }
 
-    /// Whether it is the environment map.
-    pub(crate) fn is_map(&self) -> bool {
-        matches!(self.place, Place::Map)
-    }
-
-    /// Whether it is seen under a solid angle.
-    pub(crate) fn has_size(&self) -> bool {
-        !matches!(self.place, Place::Point { .. } | Place::Distant { .. })
-    }
-
     /// Whether `dir` points into the sun.
     #[inline]
     pub(crate) fn covers(&self, dir: Vec3) -> bool {

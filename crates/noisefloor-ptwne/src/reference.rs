@@ -1,261 +1,229 @@
-//! The quick ray-traced reference: direct light, and what mirrors and glass show of it (Takouachet et al. 2017, §4.3).
-//! Light that was scattered by a diffuse surface on its way is missing, as in the paper.
+//! The ray-traced reference: direct light, and what mirrors and glass show of it (Takouachet et al. 2017, §4.3). Light that was
+//! scattered by a diffuse surface on its way is missing, as in the paper. Samples of it are in [`direct`](crate::direct).
 //!
-//! # How fine
-//! [`RAYS`] rays a pixel, through the points of a Hammersley set: one in each of 4×4 squares, and no two in one row or column
-//! of sixteen. Each ray that meets a surface looks at n×n points of every light, one a stratum: n = 4 up to 4 lights, 2 up to
-//! 16, else 1; and at 2n×2n directions of a smooth sky. An image of the sky is a light, of which all rays of a pixel look at
-//! points that stand for equal shares of its brightness. The points of the rays of one pixel are shifted against each other,
-//! alike in all pixels: a pixel sees [`RAYS`]·n² points of each light, and as all pixels see the same, there is no noise, but
-//! steps of 1/([`RAYS`]·n²) in penumbrae. Of more than 32 lights, each ray of a pixel looks at every k-th, k = 2, 4, 8 or 16,
-//! in turn: all rays together look at each 16/k times. Of the rays that meet a surface with holes, a share passes that is
-//! right to one in [`RAYS`], or in [`RAYS`]·n² towards lights.
+//! # How free of noise
+//! Blocks of [`BLOCK`]² pixels are worked on each on its own. A block first learns which lights it sees. Then its pixels take samples
+//! in two halves, with scrambles of their own, so that half of what the halves differ by is an estimate of the error of their mean.
+//! Pixels are shown as the path-traced picture would be, and those whose samples do most against the error take twice as many, until
+//! the root mean square over the block is below [`BOUND`], or pixels have [`MOST`] samples in each half: [`ReferenceNoise`] says what
+//! noise was left.
 //!
-//! Mirrors and both sides of glass are followed to [`MAX_SPECULAR`] segments, down to a weight of [`MIN_WEIGHT`]. Microfacets
-//! show n×n directions of the visible normals, one at deeper levels; what these meet and the points of the lights
-//! share by the balance heuristic (Veach 1997, §9.2.2). On diffuse surfaces that are seen so, n is at most 2.
+//! The pixels have scrambles of their own too. With one for all, the mask at full resolution has a third less noise, as neighbours err
+//! alike; but at the coarser scales that the oracle looks at it has up to two and a half times as much.
+//!
+//! No block knows of another, and nothing depends on threads. What two halves cannot tell is what both miss: an edge that both see
+//! alike. So where neighbours differ, an error is assumed that the samples of a pixel would leave of such an edge.
 
-use crate::accel::Stack;
-use crate::bsdf::{self, DELTA};
-use crate::light::Aim;
-use crate::material::Kind;
-use crate::math::{self, Frame, Ray, Vec3};
+use crate::camera::Lens;
+use crate::direct::Tracer;
+use crate::guide::{Found, Guide, Parts};
+use crate::math::Vec3;
 use crate::rng::{Key, Rng};
-use crate::scene::{Holes, Scene, Sky, Surface};
-use noisefloor::Rgb;
+use crate::scene::Scene;
+use glam::DVec3;
+use noisefloor::{Display, NoiseMask, Rgb};
 use rayon::prelude::*;
-use std::f32::consts::FRAC_1_PI;
+use std::ops::Range;
 
-/// Rays through each pixel.
-const RAYS: u32 = 16;
-/// Longest chain of mirrors and glass.
-const MAX_SPECULAR: u32 = 10;
-/// Branches that weigh less are cut.
-const MIN_WEIGHT: f32 = 2e-3;
+/// Side of a block: small enough that its pixels see much the same lights.
+const BLOCK: usize = 16;
+/// Root mean square of the errors of a block's pixels, in display values. The noise mask (σ = 1) lets 0.85 of it through: 0.3/255,
+/// less than a tenth of the energy that the keenest observers see.
+const BOUND: f32 = 0.36 / 255.0;
+/// Fewest and most samples of each half of a pixel.
+const FEWEST: u32 = 16;
+const MOST: u32 = 1024;
+/// Samples of each pixel from which its block learns about the lights, and how often: each time it looks where it saw some before.
+const LEARNING: u32 = 8;
+const LESSONS: u32 = 2;
+/// What n points of a pixel leave of the contrast of an edge through it: about this times n^−¾ (measured).
+const EDGE: f32 = 0.25;
 
-/// Renders the reference, row-major. `key` turns the points of all pixels by the same amount: another quadrature as good.
-pub(crate) fn render(scene: &Scene, width: usize, height: usize, key: Key) -> Vec<Rgb> {
-    let turn = Rng::new(key, 0, 0).two().map(|u| (u * RAYS as f32) as u32);
+/// A reference.
+pub(crate) struct Picture {
+    /// Row-major.
+    pub(crate) pixels: Vec<Rgb>,
+    pub(crate) noise: ReferenceNoise,
+}
+
+/// What a reference estimates of its own noise, from what its two halves differ by. Units are display values: 1/255 is a step of 8 bits.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ReferenceNoise {
+    /// Samples of a pixel, both halves together, on average. Each costs a ray to a surface and up to eight from each surface on its way.
+    pub samples: f64,
+    /// Blocks of 16×16 pixels in a row; those at the right and bottom edges may be smaller.
+    pub columns: usize,
+    /// Deviation of the noise mask (σ = 1) of each block, row-major, at least 0.
+    pub deviations: Vec<f32>,
+    /// Blocks that have more noise than the reference promises, 0.305/255, after 2,048 samples of pixels that needed them.
+    pub unsettled: usize,
+}
+
+impl ReferenceNoise {
+    /// Root mean square over all blocks.
+    pub fn deviation(&self) -> f32 {
+        let sum: f32 = self.deviations.iter().map(|d| d * d).sum();
+        (sum / self.deviations.len().max(1) as f32).sqrt()
+    }
+
+    /// The largest deviation of a block.
+    pub fn worst(&self) -> f32 {
+        self.deviations.iter().copied().fold(0.0, f32::max)
+    }
+}
+
+/// Renders the reference. `display` is how the path-traced picture would be shown.
+pub(crate) fn render(scene: &Scene, [width, height]: [usize; 2], key: Key, display: &Display) -> Picture {
     let lens = scene.lens(width, height);
-    let strata = match scene.lights.all.len() {
-        0..=4 => 4,
-        5..=16 => 2,
-        _ => 1,
-    };
-    let stride = (scene.lights.all.len() / 32).clamp(1, 16).next_power_of_two();
-    let first = (turn[0] as f32 + 0.5) / RAYS as f32;
-    let map = scene.map().map_or(vec![], |map| map.spread(RAYS * strata * strata, first));
+    let parts = Parts::new(scene);
+    let columns = width.div_ceil(BLOCK);
+    let count = columns * height.div_ceil(BLOCK);
+    let blocks: Vec<(Block<'_>, f32)> = (0..count)
+        .into_par_iter()
+        .with_max_len(1)
+        .map(|i| {
+            let at = [i % columns * BLOCK, i / columns * BLOCK];
+            let size = [BLOCK.min(width - at[0]), BLOCK.min(height - at[1])];
+            let first = (at[1] * width + at[0]) as u64;
+            let pixels = vec![Pixel::default(); size[0] * size[1]];
+            let mut block = Block { lens: &lens, key, display, at, size, first, pixels };
+            let error = block.render(&mut Tracer::new(scene, Guide::by_power(&parts)), &parts);
+            (block, error)
+        })
+        .collect();
+
+    let through = NoiseMask::default().white_noise_gain().sqrt();
+    let mut noise = ReferenceNoise { samples: 0.0, columns, deviations: vec![], unsettled: 0 };
     let mut pixels = vec![[0.0; 3]; width * height];
-    pixels.par_chunks_mut(width).with_max_len(1).enumerate().for_each(|(y, row)| {
-        let stack = scene.accel.stack();
-        let mut tracer = Tracer { scene, strata, shift: [0.0; 2], ray: 0, map: &map, stride, turn: 0, stack };
-        for (x, pixel) in row.iter_mut().enumerate() {
-            let mut sum = Vec3::ZERO;
-            for i in 0..RAYS {
-                let [dx, dy] = hammersley(i, RAYS);
-                tracer.shift = shift(i, turn);
-                tracer.ray = i;
-                // Rays that are neighbours in the pixel see different lights
-                tracer.turn = (i + i / 4) as usize % stride;
-                let ray = lens.ray(x as f32 + dx, y as f32 + dy);
-                sum += tracer.radiance(&ray, 1, Vec3::ONE, None);
+    let mut samples = 0;
+    for (block, error) in blocks {
+        for (row, from) in block.pixels.chunks(block.size[0]).enumerate() {
+            let start = (block.at[1] + row) * width + block.at[0];
+            for (to, pixel) in pixels[start..].iter_mut().zip(from) {
+                *to = pixel.mean();
+                samples += 2 * u64::from(pixel.count);
             }
-            *pixel = (sum / RAYS as f32).to_array();
         }
-    });
-    pixels
+        noise.deviations.push(error * through);
+        noise.unsettled += usize::from(error > BOUND);
+    }
+    noise.samples = samples as f64 / pixels.len() as f64;
+    Picture { pixels, noise }
 }
 
-/// Point `i` of `n` of the Hammersley set, each in the middle of its row and column.
-fn hammersley(i: u32, n: u32) -> [f32; 2] {
-    let half = 0.5 / n as f32;
-    [i as f32 / n as f32 + half, (i.reverse_bits() >> 8) as f32 / (1 << 24) as f32 + half]
+/// Sums of samples, of two halves that have the same number.
+#[derive(Clone, Copy, Debug, Default)]
+struct Pixel {
+    halves: [DVec3; 2],
+    count: u32,
 }
 
-/// Where the points of ray `i` lie in their strata: a Hammersley set too, run through in another order than the rays' own, and
-/// turned. The rays of a pixel have all sixteen values in each direction, so that the points lie evenly whatever the turn.
-fn shift(i: u32, turn: [u32; 2]) -> [f32; 2] {
-    let order = [i * 5 + 3, (i * 11 + 7).reverse_bits() >> 28];
-    std::array::from_fn(|k| ((order[k] + turn[k]) % RAYS) as f32 / RAYS as f32 + 0.5 / RAYS as f32)
-}
-
-struct Tracer<'a> {
-    scene: &'a Scene,
-    strata: u32,
-    /// Where in each stratum its point lies.
-    shift: [f32; 2],
-    /// Which of the pixel's rays this is: decides about holes, alike in all pixels.
-    ray: u32,
-    /// Points of the environment map, for all rays of a pixel.
-    map: &'a [(Vec3, f32)],
-    /// Every how many lights the ray looks at, and the first.
-    stride: usize,
-    turn: usize,
-    stack: Stack,
-}
-
-impl Tracer<'_> {
-    /// Radiance along `ray`, times `weight`. `sampled` is the density of a direction chosen by a rough surface, with the number
-    /// of directions it chose: light is then shared with the points of the lights.
-    fn radiance(&mut self, ray: &Ray, depth: u32, weight: Vec3, sampled: Option<(f32, u32)>) -> Vec3 {
-        let scene = self.scene;
-        let hit = scene.closest::<true>(ray, &mut self.stack, Holes::Shared(self.ray));
-        let points = (self.strata * self.strata) as f32;
-        let share = |pdf: f32| sampled.map_or(1.0, |(p, n)| p * n as f32 / (p * n as f32 + pdf * points));
-        if hit.is_miss() {
-            return weight * scene.beyond(ray.dir, |pdf, _| share(pdf));
-        }
-        let surface = scene.surface::<true>(ray, &hit);
-        let mut sum = Vec3::ZERO;
-        if let Some((radiance, light, cos)) = scene.emitted::<true>(&surface, &hit, ray.dir) {
-            sum += weight * radiance * share(light.pdf(ray.origin, hit.t, cos));
-        }
-        if surface.looks.one_sided && !surface.front {
-            return sum;
-        }
-        let cos = (-ray.dir.dot(surface.normal)).clamp(0.0, 1.0);
-        let mirrored = math::reflect(ray.dir, surface.normal);
-        // Both branches of glass
-        let mut split = |reflectance: f32, dir: Vec3, tint: Vec3| {
-            let mut both = self.follow(&surface, mirrored, depth, weight * reflectance);
-            if reflectance < 1.0 {
-                both += self.follow(&surface, dir, depth, weight * tint * (1.0 - reflectance));
-            }
-            both
-        };
-        sum + match &surface.looks.kind {
-            Kind::Diffuse { albedo } => {
-                let n = if sampled.is_some() { self.strata.min(2) } else { self.strata };
-                let normal = surface.normal;
-                let lambert = |dir: Vec3| Vec3::splat(dir.dot(normal).max(0.0) * FRAC_1_PI);
-                weight
-                    * albedo.at::<true>(surface.uv)
-                    * (self.lights(&surface, n, |dir, _| lambert(dir)) + self.dome(&surface, n, lambert))
-            }
-            Kind::Mirror { fresnel, colour } => {
-                let factor = fresnel.at(colour.at::<true>(surface.uv), cos);
-                self.follow(&surface, mirrored, depth, weight * factor)
-            }
-            Kind::Glass { ior, tint } => {
-                let eta = if surface.front { *ior } else { 1.0 / ior };
-                let (reflectance, cos_t) = bsdf::fresnel(cos, eta);
-                split(reflectance, bsdf::refract(ray.dir, surface.normal, cos, cos_t, eta), *tint)
-            }
-            Kind::ThinGlass { ior, tint } => split(bsdf::pane(cos, *ior), ray.dir, *tint),
-            Kind::Metal { .. } | Kind::Plastic { .. } | Kind::Blend { .. } => {
-                self.glossy(ray, &surface, depth, weight, sampled.is_some())
-            }
-        }
+impl Pixel {
+    fn mean(&self) -> Rgb {
+        ((self.halves[0] + self.halves[1]) / f64::from(2 * self.count)).as_vec3().to_array()
     }
 
-    /// Radiance from `dir`, if the chain may go on.
-    fn follow(&mut self, surface: &Surface<'_>, dir: Vec3, depth: u32, weight: Vec3) -> Vec3 {
-        if depth >= MAX_SPECULAR || weight.max_element() < MIN_WEIGHT {
-            return Vec3::ZERO;
+    /// What is shown of each half.
+    fn shown(&self, display: &Display) -> [f32; 2] {
+        self.halves.map(|sum| display.luma((sum / f64::from(self.count)).as_vec3().to_array()))
+    }
+}
+
+/// A block of pixels.
+struct Block<'a> {
+    lens: &'a Lens,
+    key: Key,
+    display: &'a Display,
+    /// Its corner in the image.
+    at: [usize; 2],
+    size: [usize; 2],
+    /// Number of its first pixel, for random numbers.
+    first: u64,
+    /// Row-major.
+    pixels: Vec<Pixel>,
+}
+
+impl Block<'_> {
+    /// Renders the block, and estimates the root mean square of its pixels' errors.
+    fn render<'s>(&mut self, tracer: &mut Tracer<'s>, parts: &'s Parts<'s>) -> f32 {
+        if parts.len() > 1 {
+            self.learn(tracer, parts);
         }
-        let ray = Ray { origin: self.scene.leave(surface, dir), dir };
-        self.radiance(&ray, depth + 1, weight, None)
-    }
-
-    /// Point `i` of n×n strata of the unit square.
-    fn stratum(&self, i: u32, n: u32) -> [f32; 2] {
-        let cell = [(i % n) as f32, (i / n) as f32];
-        std::array::from_fn(|k| ((cell[k] + self.shift[k]) / n as f32).min(1.0 - f32::EPSILON))
-    }
-
-    /// Sums `scattered` · radiance / density over the points of all lights that the surface sees.
-    fn lights(&mut self, surface: &Surface<'_>, n: u32, scattered: impl Fn(Vec3, f32) -> Vec3) -> Vec3 {
-        let scene = self.scene;
-        let origin = scene.leave(surface, surface.flat);
-        let mut sum = Vec3::ZERO;
-        let shining = scene.lights.all.iter().skip(self.turn).step_by(self.stride).filter(|l| l.chance > 0.0);
-        for light in shining {
-            // One point is all there is of a light without size
-            let n = if light.has_size() { n } else { 1 };
-            for i in 0..n * n {
-                let aim = if light.is_map() {
-                    // Of the points of all rays, every sixteenth is this one's; where fewer are looked at, every other
-                    let step = self.strata * self.strata / (n * n);
-                    self.map.get((i * step * RAYS + self.ray) as usize).map(|&(dir, pdf)| Aim::far(dir, pdf))
-                } else {
-                    let [u, v] = self.stratum(i, n);
-                    scene.aim::<true>(light, origin, [u, v, 0.0])
-                };
-                let Some(Aim { dir, distance, value, pdf, .. }) = aim else { continue };
-                if dir.dot(surface.flat) <= 0.0 {
-                    continue;
-                }
-                let share = scattered(dir, pdf) * value / (n * n) as f32;
-                // A share that is not finite is one whose density is beyond f32
-                let counts = share.max_element() > 0.0 && share.is_finite();
-                let shadow = Ray { origin, dir };
-                let holes = Holes::Shared(self.ray * n * n + i);
-                if counts && !scene.blocked::<true>(&shadow, distance * 0.9999, &mut self.stack, holes) {
-                    sum += share * scene.revealed(light, dir) * self.stride as f32;
+        let mut todo: Vec<usize> = (0..self.pixels.len()).collect();
+        loop {
+            for p in todo {
+                let range = self.pixels[p].count..(2 * self.pixels[p].count).max(FEWEST);
+                self.pixels[p].count = range.end;
+                for half in 0..2 {
+                    let sum = self.sum(tracer, p, half as u64, range.clone());
+                    self.pixels[p].halves[half] += sum;
                 }
             }
-        }
-        sum
-    }
-
-    /// Sums `scattered` · radiance / density over directions of a smooth sky that the surface sees. An image is a light.
-    fn dome(&mut self, surface: &Surface<'_>, n: u32, scattered: impl Fn(Vec3) -> Vec3) -> Vec3 {
-        let Some(Sky::Dome(dome)) = &self.scene.sky else { return Vec3::ZERO };
-        let mut sum = Vec3::ZERO;
-        let (n, frame) = (2 * n, Frame::new(surface.normal));
-        for i in 0..n * n {
-            let local = math::cosine_hemisphere(self.stratum(i, n));
-            let dir = frame.to_world(local);
-            if dir.dot(surface.flat) > 0.0 {
-                let ray = Ray { origin: self.scene.leave(surface, dir), dir };
-                let holes = Holes::Shared(self.ray * n * n + i);
-                if !self.scene.blocked::<true>(&ray, f32::INFINITY, &mut self.stack, holes) {
-                    let pdf = local.z.max(1e-6) * FRAC_1_PI;
-                    sum += scattered(dir) * dome.radiance(dir) / (pdf * (n * n) as f32);
-                }
+            let errors = self.errors();
+            let total: f32 = errors.iter().sum();
+            let error = (total / errors.len() as f32).sqrt();
+            // Those whose next sample does most: as many as would leave half of what is allowed, were they exact
+            let gain = |p: usize| errors[p] / self.pixels[p].count as f32;
+            let mut order: Vec<usize> = (0..errors.len()).filter(|p| self.pixels[*p].count < MOST).collect();
+            if error <= BOUND || order.is_empty() {
+                return error;
             }
-        }
-        sum
-    }
-
-    /// Microfacets and coats: what the facets mirror, and direct light on the base.
-    fn glossy(
-        &mut self,
-        ray: &Ray,
-        surface: &Surface<'_>,
-        depth: u32,
-        weight: Vec3,
-        seen_blurred: bool,
-    ) -> Vec3 {
-        let frame = Frame::new(surface.normal);
-        let wo = frame.to_local(-ray.dir);
-        let Some(glossy) = surface.glossy::<true>(wo.z) else { return Vec3::ZERO };
-        let (n, points) =
-            (if depth == 1 { self.strata.max(2) } else { 1 }, (self.strata * self.strata) as f32);
-        let directions = (n * n) as f32;
-        let follows = depth < MAX_SPECULAR && weight.max_element() >= MIN_WEIGHT;
-
-        let mut sum = weight
-            * self.lights(surface, self.strata, |dir, pdf| {
-                let wi = frame.to_local(dir);
-                let (facets, chosen) = glossy.facets(wo, wi);
-                let rival = if follows && pdf < DELTA { chosen * directions / (pdf * points) } else { 0.0 };
-                glossy.base(wi) + facets / (1.0 + rival)
+            order.sort_by(|a, b| gain(*b).total_cmp(&gain(*a)));
+            let mut rest = total;
+            order.retain(|p| {
+                let needed = rest > 0.5 * BOUND * BOUND * errors.len() as f32;
+                rest -= errors[*p];
+                needed
             });
-        let n_base = if seen_blurred { self.strata.min(2) } else { self.strata };
-        sum += weight * self.dome(surface, n_base, |dir| glossy.base(frame.to_local(dir)));
-        for i in 0..if follows { n * n } else { 0 } {
-            let Some((wi, factor, pdf)) = glossy.reflect(wo, self.stratum(i, n)) else { continue };
-            let dir = frame.to_world(wi).normalize();
-            if dir.dot(surface.flat) <= 0.0 {
-                continue;
-            }
-            let ray = Ray { origin: self.scene.leave(surface, dir), dir };
-            if pdf == DELTA {
-                return sum + self.radiance(&ray, depth + 1, weight * factor, None);
-            }
-            sum += self.radiance(&ray, depth + 1, weight * factor / directions, Some((pdf, n * n)));
+            todo = order;
         }
-        sum
+    }
+
+    /// Learns which lights the block sees.
+    fn learn<'s>(&self, tracer: &mut Tracer<'s>, parts: &'s Parts<'s>) {
+        let mut found = Found::new(parts);
+        for lesson in 0..LESSONS {
+            tracer.found = Some(found);
+            for p in 0..self.pixels.len() {
+                self.sum(tracer, p, 2, lesson * LEARNING..(lesson + 1) * LEARNING);
+            }
+            found = tracer.found.take().unwrap_or_else(|| Found::new(parts));
+            tracer.guide = Guide::learned(parts, &found);
+        }
+    }
+
+    /// The sum of some samples of pixel `p`, from one of several sequences.
+    fn sum(&self, tracer: &mut Tracer<'_>, p: usize, sequence: u64, samples: Range<u32>) -> DVec3 {
+        let at = [self.at[0] + p % self.size[0], self.at[1] + p / self.size[0]];
+        // Samples of the path tracer count from the other end
+        let seed = Rng::new(self.key, self.first + p as u64, !sequence).next();
+        samples.map(|index| tracer.sample(self.lens, at, index, seed)).map(Vec3::as_dvec3).sum()
+    }
+
+    /// Estimates of the squared errors of all pixels. As two halves say little about one pixel, it shares with its neighbours: not
+    /// the error, but the error of a single sample, as they may have more or fewer.
+    fn errors(&self) -> Vec<f32> {
+        let shown: Vec<[f32; 2]> = self.pixels.iter().map(|p| p.shown(self.display)).collect();
+        let single = |p: usize| {
+            let count = self.pixels[p].count as f32;
+            let means = self.around(p).map(|q| 0.5 * (shown[q][0] + shown[q][1]));
+            let (low, high) = means.fold((f32::MAX, f32::MIN), |(low, high), x| (low.min(x), high.max(x)));
+            let edge = EDGE * (high - low) * count.powf(-0.75);
+            let error = 0.5 * (shown[p][0] - shown[p][1]);
+            error.abs().max(edge).powi(2) * count
+        };
+        let singles: Vec<f32> = (0..shown.len()).map(single).collect();
+        let shared = |p: usize| {
+            let (sum, n) = self.around(p).fold((0.0, 0.0), |(sum, n), q| (sum + singles[q], n + 1.0));
+            sum / (n * self.pixels[p].count as f32)
+        };
+        (0..shown.len()).map(shared).collect()
+    }
+
+    /// A pixel and its neighbours in the block.
+    fn around(&self, p: usize) -> impl Iterator<Item = usize> + use<> {
+        let [width, height] = self.size;
+        let near = |i: usize, n: usize| i.saturating_sub(1)..(i + 2).min(n);
+        near(p / width, height).flat_map(move |y| near(p % width, width).map(move |x| y * width + x))
     }
 }

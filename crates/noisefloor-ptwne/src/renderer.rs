@@ -5,11 +5,13 @@ use crate::error::{OutsideError, RenderError};
 use crate::filter::Filter;
 use crate::integrator::{Estimator, Sample, Settings, integrator};
 use crate::math::Vec3;
+use crate::reference::ReferenceNoise;
 use crate::rng::Key;
 use crate::sampler::{Sampler, Sampling};
 use crate::scene::{Needs, Scene};
 use noisefloor::{
-    Batch, ProgressiveSource, Reference, Repeats, Request, Rgb, SourceError, SourceInfo, Tile, Unit,
+    Batch, Display, ProgressiveSource, Reference, Repeats, Request, Rgb, SourceError, SourceInfo, Tile,
+    ToneMapping, Unit,
 };
 use rayon::prelude::*;
 use std::num::NonZeroUsize;
@@ -20,6 +22,9 @@ use std::sync::atomic::{AtomicU64, Ordering};
 pub const MAX_DEPTH: u32 = 10_000;
 /// Most threads that can be asked for.
 pub const MAX_THREADS: usize = 1024;
+
+/// Largest edge of the small picture from which the exposure of a reference is taken.
+const PREVIEW: usize = 64;
 
 /// How to render.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -75,6 +80,7 @@ pub struct Ptwne {
     integrator: Sample,
     pool: Option<rayon::ThreadPool>,
     tally: Tally,
+    reference_noise: Option<ReferenceNoise>,
 }
 
 /// What became of the samples so far.
@@ -127,7 +133,16 @@ impl Ptwne {
         };
         let scene = scene.into();
         let integrator = integrator(scene.needs);
-        Ok(Self { scene, width, height, options, integrator, pool, tally: Tally::default() })
+        Ok(Self {
+            scene,
+            width,
+            height,
+            options,
+            integrator,
+            pool,
+            tally: Tally::default(),
+            reference_noise: None,
+        })
     }
 
     /// Renders with code for more than the scene has. Images are the same; it shows what leaving that code out saves.
@@ -145,6 +160,11 @@ impl Ptwne {
             clamped: read(clamped),
             background: read(background),
         }
+    }
+
+    /// What noise the last reference has, once there is one.
+    pub fn reference_noise(&self) -> Option<&ReferenceNoise> {
+        self.reference_noise.as_ref()
     }
 
     /// The options.
@@ -210,6 +230,17 @@ impl Ptwne {
         let span = |from: usize, size: usize| [from as f32 - reach, (from + size) as f32 + reach];
         let (eye, planes) = lens.pyramid(span(tile.x, tile.width), span(tile.y, tile.height));
         !self.scene.accel.reaches_into(eye, &planes)
+    }
+
+    /// How the picture would be shown by Reinhard's operator, from a small one of few samples.
+    fn preview(&self) -> Result<Display, SourceError> {
+        let (width, height) = (self.width.min(PREVIEW), self.height.min(PREVIEW));
+        let options = Options { threads: None, ..self.options };
+        let mut small =
+            Self::new(self.scene.clone(), width, height, options).map_err(|e| self.fail(None, e))?;
+        let tile = Tile { index: 0, x: 0, y: 0, width, height };
+        let batches = self.on_threads(|| small.sample(&[Request { tile, first: 0, samples: 8 }]))?;
+        Ok(ToneMapping::default().settle(&batches[0].mean))
     }
 
     fn fail(
@@ -280,7 +311,10 @@ impl ProgressiveSource for Ptwne {
 
     fn reference(&mut self) -> Result<Option<Reference>, SourceError> {
         let key = Key::new(self.options.seed);
-        let pixels = self.on_threads(|| crate::reference::render(&self.scene, self.width, self.height, key));
-        Ok(Some(Reference { width: self.width, height: self.height, pixels }))
+        let display = self.preview()?;
+        let size = [self.width, self.height];
+        let picture = self.on_threads(|| crate::reference::render(&self.scene, size, key, &display));
+        self.reference_noise = Some(picture.noise);
+        Ok(Some(Reference { width: self.width, height: self.height, pixels: picture.pixels }))
     }
 }

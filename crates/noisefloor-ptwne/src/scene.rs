@@ -77,9 +77,9 @@ impl Needs {
 pub(crate) enum Holes {
     /// By chance, from a seed of its own.
     Drawn(u64),
-    /// As ray `i` of many that share the work: of each 2ᵏ that follow each other, each surface lets pass as many as it should,
-    /// to the nearest, and other ones than other surfaces do.
-    Shared(u32),
+    /// As ray `index` of many with one seed that share the work: of each 2ᵏ that follow each other, each surface lets pass as
+    /// many as it should, to the nearest, and other ones than other surfaces do.
+    Shared { index: u32, seed: u64 },
 }
 
 /// What surrounds a scene.
@@ -332,7 +332,9 @@ impl Scene {
                 let c = opacity.eval(u, v);
                 let number = match holes {
                     Holes::Drawn(seed) => rng::hash(seed, prim),
-                    Holes::Shared(i) => sobol_burley::sample(i, 0, rng::mix(u64::from(prim) + 1) as u32),
+                    Holes::Shared { index, seed } => {
+                        sobol_burley::sample(index, 0, rng::mix(seed ^ u64::from(prim)) as u32)
+                    }
                 };
                 number < (c.x + c.y + c.z) * (1.0 / 3.0)
             }

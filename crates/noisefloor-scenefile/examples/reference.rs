@@ -1,8 +1,8 @@
-//! What the quick ray-traced reference costs, and how free of noise it is: `reference SIZE SCENE…`, scenes by name or file; prints a
-//! table in Markdown.
+//! What the ray-traced reference costs, and how free of noise it is: `reference SIZE SCENE…`, scenes by name or file; prints a table
+//! in Markdown.
 //!
-//! Two references of different seeds are two quadratures of the same light. What they differ by, divided by √2, is the error of one;
-//! through tone mapping and the noise mask it is what the oracle would take for noise.
+//! Two references of different seeds share no random number. What they differ by, divided by √2, is the error of one; through tone
+//! mapping and the noise mask it is what the oracle would take for noise.
 
 #![expect(clippy::print_stdout, reason = "a table for people")]
 
@@ -21,8 +21,10 @@ fn main() -> Result<(), Box<dyn Error>> {
     let args: Vec<String> = std::env::args().skip(1).collect();
     let [size, names @ ..] = args.as_slice() else { return Err("reference SIZE SCENE…".into()) };
     let size: usize = size.parse()?;
-    println!("| scene | seconds | as many as … spp | mask deviation, /255 | of the worst tile |");
-    println!("|---|---|---|---|---|");
+    println!(
+        "| scene | seconds | as many as … spp | mask deviation, /255 | of the worst tile | its own estimate | blocks unsettled |"
+    );
+    println!("|---|---|---|---|---|---|---|");
     for name in names {
         let scene = match scenes::by_name(name) {
             Some(scene) => scene,
@@ -35,10 +37,14 @@ fn main() -> Result<(), Box<dyn Error>> {
 
 fn row(scene: &Arc<Scene>, size: usize) -> Result<String, Box<dyn Error>> {
     let source = |seed| Ptwne::new(scene.clone(), size, size, Options { seed, ..Options::default() });
-    let mut images = Vec::new();
+    let (mut images, mut own, mut unsettled) = (Vec::new(), 0.0, 0.0);
     let start = Instant::now();
     for seed in [1, 2] {
-        images.push(source(seed)?.reference()?.ok_or("no reference")?.pixels);
+        let mut source = source(seed)?;
+        images.push(source.reference()?.ok_or("no reference")?.pixels);
+        let noise = source.reference_noise().ok_or("no reference")?;
+        own += 0.5 * 255.0 * noise.deviation();
+        unsettled += 50.0 * noise.unsettled as f64 / noise.deviations.len() as f64;
     }
     let seconds = start.elapsed().as_secs_f64() / 2.0;
     let start = Instant::now();
@@ -63,5 +69,6 @@ fn row(scene: &Arc<Scene>, size: usize) -> Result<String, Box<dyn Error>> {
     let worst = tiles.iter().copied().fold(0.0, f64::max).sqrt();
     let all = (tiles.iter().sum::<f64>() / tiles.len() as f64).sqrt();
     let name = scene.name();
-    Ok(format!("| {name} | {seconds:.1} | {:.0} | {all:.2} | {worst:.2} |", seconds / one_sample))
+    let spp = seconds / one_sample;
+    Ok(format!("| {name} | {seconds:.0} | {spp:.0} | {all:.2} | {worst:.2} | {own:.2} | {unsettled:.0} % |"))
 }

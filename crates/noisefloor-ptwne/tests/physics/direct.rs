@@ -24,11 +24,14 @@ fn lit(light: impl FnOnce(&mut SceneBuilder, MaterialId)) -> Scene {
     })
 }
 
-/// Checks next events and the reference. The spot's size and f32 are good for 2e-3, the quadrature for 1e-2.
+/// Checks next events and the reference. The spot's size and f32 are good for 2e-3. The reference promises 0.36/255 as shown, which
+/// is at most 0.8 % of a radiance, as the slope of Reinhard's curve and sRGB over the logarithm is at most 0.19; that is 0.2 % for the
+/// mean of 16 pixels, which see the same.
 fn check(scene: &Scene, expected: f64) {
     check_samples(scene, expected);
     let mut source = Ptwne::new(scene.clone(), 4, 4, Options::default()).unwrap();
-    let reference = f64::from(source.reference().unwrap().unwrap().pixels[5][0]);
+    let pixels = source.reference().unwrap().unwrap().pixels;
+    let reference = pixels.iter().map(|p| f64::from(p[0])).sum::<f64>() / 16.0;
     assert!((reference - expected).abs() < 1e-2 * expected, "reference {reference}, expected {expected}");
 }
 
@@ -200,12 +203,8 @@ fn environment_maps_light_by_their_image() {
         let map = EnvironmentMap { width, height, pixels, to_world };
         let scene = lit(|b, _| b.environment_map(map).unwrap());
         let expected = 0.5 / std::f64::consts::PI * irradiance;
-        check_samples(&scene, expected);
+        check(&scene, expected);
         check_brute_force(&scene, expected);
-        // The reference looks at 256 points of the map, of which each stands for 1/256 of its light
-        let mut source = Ptwne::new(scene, 4, 4, Options::default()).unwrap();
-        let reference = f64::from(source.reference().unwrap().unwrap().pixels[5][0]);
-        assert!((reference - expected).abs() < 0.03 * expected, "reference {reference}, {expected}");
     }
 }
 

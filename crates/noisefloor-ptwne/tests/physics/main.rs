@@ -15,4 +15,5 @@ mod extremes; // nothing but finite numbers
 mod furnace; // energy neither made nor lost
 mod kit;
 mod mis; // next events, scattering, and both
+mod reference; // how free of noise the reference is
 mod stiff; // scenes with known trouble
