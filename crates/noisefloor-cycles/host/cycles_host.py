@@ -11,7 +11,6 @@ of those before, so that halves made of them differ by more than the error of th
 import hashlib
 import os
 import runpy
-import shutil
 import sys
 import tempfile
 
@@ -105,30 +104,26 @@ class Cycles:
 
     def sample(self, tiles):
         answers = [None] * len(tiles)
-        folder = tempfile.mkdtemp(prefix="noisefloor-", dir=self.memory)
-        try:
-            for region, (first, samples), members in host.rectangles(tiles, ["first", "samples"]):
-                mean = self._mean(region, first, samples, os.path.join(folder, "part.exr"))
-                for member in members:
-                    t = tiles[member]
-                    x, y = t["x"] - region[0], t["y"] - region[1]
-                    part = mean[y : y + t["height"], x : x + t["width"]]
-                    answers[member] = (samples, self.np.ascontiguousarray(part, self.np.float32))
-        finally:
-            shutil.rmtree(folder, ignore_errors=True)
+        for region, (first, samples), members in host.rectangles(tiles, ["first", "samples"]):
+            mean = self._mean(region, first, samples)
+            for member in members:
+                t = tiles[member]
+                x, y = t["x"] - region[0], t["y"] - region[1]
+                part = mean[y : y + t["height"], x : x + t["width"]]
+                answers[member] = (samples, self.np.ascontiguousarray(part, self.np.float32))
         return answers
 
     def reference(self):
         return None
 
-    def _mean(self, region, first, samples, path):
+    def _mean(self, region, first, samples):
         """Mean of samples first…first + samples of a region, block by block."""
         self._aim(*region)
         total, done = 0.0, 0
         while done < samples:
             block, offset = divmod(first + done, BLOCK)
             length = min(BLOCK - offset, samples - done)
-            total = total + self._render(block, offset, length, path) * length
+            total = total + self._render(block, offset, length) * length
             done += length
         return total / samples
 
@@ -142,24 +137,25 @@ class Cycles:
         render.border_min_y, render.border_max_y = (bottom + 0.25) / down, min(1.0, (bottom + height + 0.25) / down)
         self.shape = (height, width, 3)
 
-    def _render(self, block, offset, length, path):
+    def _render(self, block, offset, length):
         """Mean of some samples of a block, rows from the top, as float64."""
         cycles, images = self.scene.cycles, self.bpy.data.images
         digest = hashlib.blake2b(f"{self.seed} {block}".encode(), digest_size=4).digest()
         cycles.seed = int.from_bytes(digest, "little") >> 1
         cycles.sample_offset, cycles.sample_subset_length = offset, length
         self.bpy.ops.render.render()
-        # The pixels of a render result are out of a script's reach: only a file has them
-        images["Render Result"].save_render(path)
-        image = images.load(path, check_existing=False)
-        try:
+        # The pixels of a render result are out of a script's reach: only a file has them. It is there for milliseconds, because
+        # a process whose parent is gone ends at once and cleans nothing up
+        with tempfile.TemporaryDirectory(prefix="noisefloor-", dir=self.memory) as folder:
+            path = os.path.join(folder, "part.exr")
+            images["Render Result"].save_render(path)
+            image = images.load(path, check_existing=False)
             image.colorspace_settings.name = "Non-Color"
             pixels = self.np.empty(len(image.pixels), self.np.float32)
             image.pixels.foreach_get(pixels)
-            width, height = image.size
-            picture = pixels.reshape(height, width, image.channels)[::-1, :, :3]
-        finally:
-            images.remove(image)
+        width, height = image.size
+        picture = pixels.reshape(height, width, image.channels)[::-1, :, :3]
+        images.remove(image)
         if picture.shape != self.shape:
             raise RuntimeError(f"a region of {self.shape} came back as {picture.shape}")
         return picture.astype(self.np.float64)
