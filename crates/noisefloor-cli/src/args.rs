@@ -1,5 +1,6 @@
 //! What can be typed, and what it means once checked.
 
+use crate::sources::{ADAPTERS, Adapter};
 use anyhow::Context;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use noisefloor::{
@@ -32,6 +33,7 @@ pub enum Command {
     Audience(AudienceArgs),
     Reproduce(ReproduceArgs),
     Inspect(InspectArgs),
+    Doctor(DoctorArgs),
     /// List the built-in scenes.
     Scenes,
 }
@@ -47,20 +49,30 @@ pub enum Command {
   noisefloor render                                  the Cornell box, into out/cornell-box
   noisefloor render glass-spheres --size 800x600 --seed 7    another scene; `noisefloor scenes` lists them
   noisefloor render hall/scene.xml --out out/hall    a scene from a file: .gltf, .glb, or Mitsuba .xml
+  noisefloor render --source mitsuba hall/scene.xml  by another renderer; `noisefloor doctor` says which are there
   noisefloor render --criterion spp:1000             for comparison: a fixed number of samples
   noisefloor render --audience art-students          for people who look harder (more samples)
   noisefloor render --time 60 --against truth.exr    a minute at most; relMSE to a reference in timeline.csv")]
 pub struct RenderArgs {
-    /// Built-in scene (see `noisefloor scenes`), or a scene file: glTF 2.0 (.gltf, .glb) or Mitsuba XML (.xml).
-    #[arg(default_value = "cornell-box")]
-    pub scene: String,
+    /// Built-in scene (see `noisefloor scenes`), or a scene file: glTF 2.0 (.gltf, .glb) or Mitsuba XML (.xml); with --source, what
+    /// that source reads [default: cornell-box].
+    pub scene: Option<String>,
+    /// Who renders: `ptwne`, the built-in path tracer; `mitsuba`, `cycles`, `luxcore` (path tracing), `luxcore-sobol`,
+    /// `luxcore-metropolis` or `luxcore-bidir`, which `noisefloor doctor` sets up; `exr`, which plays a folder of pictures back; or `command: PROGRAM …`, any program that renders into an EXR or PFM file, with {scene} {seed} {spp} {out}, and {x0} {x1}
+    /// {y0} {y1} if it can render tiles (x1 and y1 are exclusive).
+    #[arg(long, default_value = "ptwne", value_name = "SOURCE", value_parser = parse_source)]
+    pub source: SourceChoice,
+    /// With another renderer: give it up if a call takes so many seconds.
+    #[arg(long, default_value = "1800", value_name = "SECONDS", value_parser = parse_seconds)]
+    pub timeout: std::time::Duration,
     /// Output folder [default: out/SCENE].
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
-    /// Image size in pixels [default: what the scene file says, else 384x384].
+    /// Image size in pixels [default: what the scene file says, else 384x384; what a command renders].
     #[arg(long, value_name = "WxH", value_parser = parse_size)]
     pub size: Option<(usize, usize)>,
-    /// Seed of the random numbers: same seed, same image and same stops, whatever the number of threads.
+    /// Seed of the random numbers: same seed, same image and same stops, whatever the number of threads (of the built-in path tracer; not
+    /// every renderer promises it).
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
     /// Threads [default: one a core].
@@ -69,17 +81,17 @@ pub struct RenderArgs {
     /// Longest path, in segments: 1 is light seen directly, 2 is direct light [default: what the scene file says, else 65].
     #[arg(long, value_name = "N")]
     pub max_depth: Option<u32>,
-    /// Without multiple importance sampling: the plain path tracing with next event estimation of the paper.
+    /// Built-in renderer: without multiple importance sampling, the plain path tracing with next event estimation of the paper.
     #[arg(long)]
     pub no_mis: bool,
-    /// How the samples of a pixel are spread. The model was trained on independent ones.
-    #[arg(long, value_enum, default_value_t = SamplerChoice::Independent)]
-    pub sampler: SamplerChoice,
-    /// How pixels weigh the light around them.
-    #[arg(long, value_enum, default_value_t = FilterChoice::Box)]
-    pub filter: FilterChoice,
-    /// Scale samples down whose largest channel is brighter than this. Takes away fireflies, and light; how often is in
-    /// report.json [default: never].
+    /// Built-in renderer: how the samples of a pixel are spread. The model was trained on independent ones [default: independent].
+    #[arg(long, value_enum)]
+    pub sampler: Option<SamplerChoice>,
+    /// Built-in renderer: how pixels weigh the light around them [default: box].
+    #[arg(long, value_enum)]
+    pub filter: Option<FilterChoice>,
+    /// Built-in renderer: scale samples down whose largest channel is brighter than this. Takes away fireflies, and light; how often
+    /// is in report.json [default: never].
     #[arg(long, value_name = "RADIANCE")]
     pub clamp: Option<f32>,
     /// What stops a tile: `oracle`, or `spp:N` for N samples per pixel everywhere.
@@ -317,6 +329,21 @@ pub struct InspectArgs {
     pub json: bool,
 }
 
+/// Say which other renderers can be used here and what is missing, or install one.
+///
+/// A renderer is used from the Python that NOISEFLOOR_NAME_PYTHON names (as NOISEFLOOR_MITSUBA_PYTHON), else from a private
+/// environment in the cache folder, which --install makes with pinned packages. The exit code is 1 if one that is there does not load;
+/// not to be installed is no fault.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  noisefloor doctor
+  noisefloor doctor --install mitsuba                 or luxcore, or cycles")]
+pub struct DoctorArgs {
+    /// Install this renderer, if it is not there yet.
+    #[arg(long, value_name = "RENDERER", value_parser = parse_adapter)]
+    pub install: Option<&'static Adapter>,
+}
+
 /// Where the human thresholds are.
 #[derive(Debug, Args)]
 #[group(required = true, multiple = false)]
@@ -426,10 +453,38 @@ pub enum ScheduleChoice {
     Spaced,
 }
 
+#[derive(Clone, Debug)]
+pub enum SourceChoice {
+    Ptwne,
+    Exr,
+    /// A template.
+    Command(String),
+    Adapter(&'static Adapter),
+}
+
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum CriterionChoice {
     Oracle,
     Fixed(u64),
+}
+
+fn parse_source(text: &str) -> Result<SourceChoice, String> {
+    match text {
+        "ptwne" => Ok(SourceChoice::Ptwne),
+        "exr" => Ok(SourceChoice::Exr),
+        _ => match text.strip_prefix("command:") {
+            Some(template) => Ok(SourceChoice::Command(template.trim().to_owned())),
+            None => parse_adapter(text)
+                .map(SourceChoice::Adapter)
+                .map_err(|known| format!("{known}; or `ptwne`, `exr`, or `command: PROGRAM …`")),
+        },
+    }
+}
+
+fn parse_adapter(text: &str) -> Result<&'static Adapter, String> {
+    let names = || ADAPTERS.iter().map(|adapter| adapter.name).collect::<Vec<_>>().join(", ");
+    let found = ADAPTERS.iter().find(|adapter| adapter.name == text);
+    found.ok_or_else(|| format!("the other renderers are: {}", names()))
 }
 
 fn parse_size(text: &str) -> Result<(usize, usize), String> {

@@ -4,6 +4,7 @@
 
 mod args;
 mod audience;
+mod doctor;
 mod evaluate;
 mod figures;
 mod heat_map;
@@ -12,6 +13,7 @@ mod judge;
 mod output;
 mod render;
 mod reproduce;
+mod sources;
 mod train;
 
 use args::{Cli, Command};
@@ -30,6 +32,7 @@ fn main() -> ExitCode {
         Command::Audience(args) => audience::run(&args.command).map(|()| ExitCode::SUCCESS),
         Command::Reproduce(args) => reproduce::run(&args),
         Command::Inspect(args) => inspect::run(&args).map(|()| ExitCode::SUCCESS),
+        Command::Doctor(args) => doctor::run(&args),
         Command::Scenes => {
             inspect::scenes();
             Ok(ExitCode::SUCCESS)

@@ -2,10 +2,10 @@
 
 use crate::args::RenderArgs;
 use crate::heat_map::{self, Mark, Scale};
+use crate::sources::Source;
 use anyhow::{Context, bail};
 use noisefloor::{Clock, Display, Params, Progress, Rgb, Session, Stop, StopReason, StoppingCriterion};
 use noisefloor_exr::{RenderLayers, check_writable, read_exr, write_atomic, write_exr, write_png};
-use noisefloor_ptwne::Ptwne;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -66,6 +66,8 @@ struct StopRow {
 struct Report<'a> {
     noisefloor: &'static str,
     scene: &'a str,
+    /// Who rendered.
+    source: &'a str,
     width: usize,
     height: usize,
     seed: u64,
@@ -115,6 +117,7 @@ pub struct ModelFacts {
 pub struct Output {
     folder: PathBuf,
     scene: String,
+    source: String,
     seed: u64,
     model: Option<ModelFacts>,
     rel_mse: Option<RelMse>,
@@ -126,6 +129,7 @@ impl Output {
     pub fn create(
         args: &RenderArgs,
         scene: String,
+        source: String,
         model: Option<ModelFacts>,
         rel_mse: Option<RelMse>,
     ) -> anyhow::Result<Self> {
@@ -134,7 +138,7 @@ impl Output {
             format!("{}: cannot make this folder; choose another with --out", folder.display())
         })?;
         check_writable(folder.join("image.exr"))?;
-        Ok(Self { folder, scene, seed: args.seed, model, rel_mse, timeline: Vec::new() })
+        Ok(Self { folder, scene, source, seed: args.seed, model, rel_mse, timeline: Vec::new() })
     }
 
     /// Notes one batch.
@@ -148,7 +152,7 @@ impl Output {
     pub fn write<C: StoppingCriterion>(
         &self,
         session: &Session<C>,
-        over: Option<(Clock, &Ptwne)>,
+        over: Option<(Clock, &dyn Source)>,
     ) -> anyhow::Result<()> {
         let film = session.film();
         let (width, height) = (film.grid().width(), film.grid().height());
@@ -224,11 +228,11 @@ impl Output {
         session: &Session<C>,
         tiles: &[(Stop, bool)],
         display: &Display,
-        over: Option<(Clock, &Ptwne)>,
+        over: Option<(Clock, &dyn Source)>,
     ) -> anyhow::Result<()> {
         let (clock, source) = over.unzip();
-        let counts = source.map(Ptwne::counts);
-        let noise = source.and_then(Ptwne::reference_noise);
+        let counts = source.and_then(|source| source.counts());
+        let noise = source.and_then(|source| source.reference_noise());
         let grid = session.film().grid();
         let mut stops = BTreeMap::new();
         for (stop, open) in tiles {
@@ -237,6 +241,7 @@ impl Output {
         let report = Report {
             noisefloor: env!("CARGO_PKG_VERSION"),
             scene: &self.scene,
+            source: &self.source,
             width: grid.width(),
             height: grid.height(),
             seed: self.seed,
@@ -266,7 +271,7 @@ impl Output {
     }
 
     /// A few lines for people.
-    pub fn summarise<C: StoppingCriterion>(&self, session: &Session<C>, clock: Clock, source: &Ptwne) {
+    pub fn summarise<C: StoppingCriterion>(&self, session: &Session<C>, clock: Clock, source: &dyn Source) {
         let counts = source.counts();
         let film = session.film();
         let spp: Vec<u64> = session.stops().map(|s| s.samples).collect();
@@ -296,8 +301,8 @@ impl Output {
         );
         for (count, what) in [
             (film.rejected(), "were not finite and were kept out"),
-            (counts.dropped, "were not finite and counted as black"),
-            (counts.clamped, "were brighter than --clamp and scaled down"),
+            (counts.map_or(0, |c| c.dropped), "were not finite and counted as black"),
+            (counts.map_or(0, |c| c.clamped), "were brighter than --clamp and scaled down"),
         ] {
             if count > 0 {
                 println!("{count} samples {what}");

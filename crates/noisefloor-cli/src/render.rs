@@ -1,89 +1,55 @@
 //! `noisefloor render`.
 
 use crate::INTERRUPTED;
-use crate::args::{CriterionChoice, FilterChoice, RenderArgs, SamplerChoice};
+use crate::args::{CriterionChoice, RenderArgs};
 use crate::output::{ModelFacts, Output, RelMse};
-use anyhow::{Context, bail};
+use crate::sources::{self, Opened, Source};
+use anyhow::Context;
 use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressStyle};
-use noisefloor::{Driver, Event, FixedSamples, Progress, Session, StopReason, StoppingCriterion};
-use noisefloor_ptwne::{Estimator, Filter, Options, Ptwne, Sampling, scenes};
-use noisefloor_scenefile::Loaded;
-use std::path::Path;
+use noisefloor::{
+    Driver, Event, FixedSamples, Progress, ProgressiveSource, Session, SourceInfo, StopReason,
+    StoppingCriterion,
+};
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-/// Where neither the command nor the scene says: a Cornell box takes half a minute.
-const DEFAULT_SIZE: (usize, usize) = (384, 384);
-const DEFAULT_DEPTH: u32 = 65;
-
 pub fn run(args: &RenderArgs) -> anyhow::Result<ExitCode> {
     // Whatever can be wrong is found before anything is rendered.
     let params = args.params()?;
-    let Loaded { scene, size, max_depth, warnings } = load(&args.scene)?;
-    if !args.quiet {
-        warnings.iter().for_each(|warning| eprintln!("warning: {warning}"));
-    }
-    let (width, height) = args.size.or(size).unwrap_or(DEFAULT_SIZE);
-    let rel_mse = args.against.as_deref().map(|path| RelMse::load(path, (width, height))).transpose()?;
     if let Some(threads) = args.threads {
         rayon::ThreadPoolBuilder::new().num_threads(threads.get()).build_global().context("--threads")?;
     }
-    let name = scene.name().to_owned();
-    let options = Options {
-        seed: args.seed,
-        max_depth: args.max_depth.or(max_depth).unwrap_or(DEFAULT_DEPTH),
-        estimator: if args.no_mis { Estimator::NextEvents } else { Estimator::Mis },
-        sampling: match args.sampler {
-            SamplerChoice::Independent => Sampling::Independent,
-            SamplerChoice::Sobol => Sampling::Sobol,
-        },
-        filter: match args.filter {
-            FilterChoice::Box => Filter::Box,
-            FilterChoice::Tent => Filter::Tent,
-            FilterChoice::Gaussian => Filter::Gaussian,
-        },
-        clamp: args.clamp,
-        ..Options::default()
-    };
-    let source = Ptwne::new(scene, width, height, options)?;
+    let Opened { source, scene, warnings } = sources::open(args)?;
+    if !args.quiet {
+        warnings.iter().for_each(|warning| eprintln!("warning: {warning}"));
+    }
+    let SourceInfo { width, height, .. } = source.info();
+    let rel_mse = args.against.as_deref().map(|path| RelMse::load(path, (width, height))).transpose()?;
     match args.criterion {
         CriterionChoice::Oracle => {
             let oracle = args.oracle.load()?;
             let facts = ModelFacts { digest: oracle.model().digest(), just_visible: oracle.just_visible() };
-            drive(Driver::new(source, oracle, params)?, args, name, Some(facts), rel_mse)
+            drive(Driver::new(source, oracle, params)?, args, scene, Some(facts), rel_mse)
         }
         CriterionChoice::Fixed(samples) => {
-            drive(Driver::new(source, FixedSamples(samples), params)?, args, name, None, rel_mse)
+            drive(Driver::new(source, FixedSamples(samples), params)?, args, scene, None, rel_mse)
         }
     }
-}
-
-/// A built-in scene of that name, or the scene in that file.
-fn load(scene: &str) -> anyhow::Result<Loaded> {
-    if let Some(scene) = scenes::by_name(scene) {
-        return Ok(Loaded { scene, size: None, max_depth: None, warnings: vec![] });
-    }
-    let path = Path::new(scene);
-    if path.extension().is_none() && !path.exists() {
-        bail!(
-            "there is no built-in scene {scene:?}, nor a file of that name; `noisefloor scenes` lists the built-in ones"
-        );
-    }
-    Ok(noisefloor_scenefile::load(path)?)
 }
 
 fn drive<C: StoppingCriterion>(
-    mut driver: Driver<Ptwne, C>,
+    mut driver: Driver<Box<dyn Source>, C>,
     args: &RenderArgs,
     scene: String,
     model: Option<ModelFacts>,
     rel_mse: Option<RelMse>,
 ) -> anyhow::Result<ExitCode> {
-    let mut output = Output::create(args, scene, model, rel_mse)?;
+    let mut output = Output::create(args, scene, driver.source().info().name, model, rel_mse)?;
     driver.set_time_limit(args.time);
-    cancel_on_signal(driver.cancel_flag())?;
+    let cancel = driver.cancel_flag();
+    cancel_on_signal(Arc::clone(&cancel))?;
     let bar = progress_bar(args.quiet);
     let autosave = args.autosave;
     let mut saved = Instant::now();
@@ -104,13 +70,22 @@ fn drive<C: StoppingCriterion>(
     bar.finish_and_clear();
 
     // Write what there is, also after a failure.
-    let written = output.write(driver.session(), Some((driver.clock(), driver.source())));
-    outcome?;
+    let source = driver.source();
+    let written = output.write(driver.session(), Some((driver.clock(), source.as_ref())));
+    source.notes().iter().for_each(|note| eprintln!("warning: {note}"));
+    let mut cancelled = driver.session().stops().any(|s| s.reason == StopReason::Cancelled);
+    match outcome {
+        // Ctrl-C in a terminal ends a command that renders, too.
+        Err(error) if cancel.load(Ordering::Relaxed) => {
+            eprintln!("warning: the last batch is lost: {}", crate::one_line(&error.into()));
+            cancelled = true;
+        }
+        outcome => outcome?,
+    }
     written?;
     if !args.quiet {
-        output.summarise(driver.session(), driver.clock(), driver.source());
+        output.summarise(driver.session(), driver.clock(), source.as_ref());
     }
-    let cancelled = driver.session().stops().any(|s| s.reason == StopReason::Cancelled);
     Ok(if cancelled { ExitCode::from(INTERRUPTED) } else { ExitCode::SUCCESS })
 }
 

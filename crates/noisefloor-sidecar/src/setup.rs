@@ -64,7 +64,7 @@ pub fn private_folder(renderer: &Renderer) -> Result<PathBuf, SetupError> {
     Ok(cache()?.join(format!("{}-{}", renderer.name, digest(&[renderer.requirements]))))
 }
 
-/// Makes the private environment of a renderer, if it is not there yet: a virtual environment with the pinned packages. It is made under
+/// Makes the private environment of a renderer, unless it is there and works: a virtual environment with the pinned packages. It is made under
 /// a temporary name and moved into place once the renderer loads in it; a second installation waits for the first. `progress` gets
 /// a line at a time, those of pip among them. Returns the interpreter.
 ///
@@ -80,8 +80,8 @@ pub fn install(renderer: &Renderer, mut progress: impl FnMut(&str)) -> Result<Pa
         progress("waiting for another installation to end");
     }
     let _alone = lock_file.write().map_err(io(&lock))?;
-    if python_in(&folder).is_file() {
-        progress("it is there already");
+    if let Ok(version) = probe(renderer, &python_in(&folder)) {
+        progress(&format!("{} is there already (it says {version})", renderer.title));
         return Ok(python_in(&folder));
     }
 

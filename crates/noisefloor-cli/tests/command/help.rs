@@ -2,7 +2,7 @@ use crate::kit::succeed;
 
 #[test]
 fn every_subcommand_explains_itself() {
-    let options: [(&str, &[&str]); 8] = [
+    let options: [(&str, &[&str]); 9] = [
         (
             "render",
             &[
@@ -16,6 +16,8 @@ fn every_subcommand_explains_itself() {
                 "--seed",
                 "--threads",
                 "--model",
+                "--source",
+                "--timeout",
             ],
         ),
         (
@@ -38,6 +40,7 @@ fn every_subcommand_explains_itself() {
         ("audience", &["fit"]),
         ("reproduce", &["--corpus", "--out", "--edge", "--levels", "--dump-subset"]),
         ("inspect", &["MODEL", "--json"]),
+        ("doctor", &["--install", "NOISEFLOOR_NAME_PYTHON"]),
         ("scenes", &["--help"]),
     ];
     let all = succeed(&["--help"]);

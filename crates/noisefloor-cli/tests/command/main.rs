@@ -27,3 +27,6 @@ mod reproduce;
 /// Ctrl-C, and worse.
 #[cfg(test)]
 mod signals;
+/// Other renderers than our own.
+#[cfg(test)]
+mod sources;
