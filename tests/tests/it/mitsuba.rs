@@ -220,7 +220,7 @@ fn a_killed_process_is_replaced_and_none_is_left() {
     }
     let mut source = open(CORNELL_BOX, SIZE, Variant::Llvm);
     let tile = TileGrid::new(SIZE.0, SIZE.1, 32).unwrap().tile(0);
-    let mut sample = |source: &mut Sidecar, first| -> Result<Vec<Rgb>, SourceError> {
+    let sample = |source: &mut Sidecar, first| -> Result<Vec<Rgb>, SourceError> {
         Ok(source.sample(&[Request { tile, first, samples: 4 }])?.remove(0).mean)
     };
     let before = sample(&mut source, 4).unwrap();
