@@ -42,13 +42,21 @@ def run(args):
     for source, scene in scenes.items():
         for seed in SEEDS:
             out = os.path.join(args.out, f"{source}-{seed}")
-            report = os.path.join(out, "report.json")
-            if os.path.exists(report) and json.load(open(report))["complete"]:
+            if complete(out):
                 continue
             command = [args.noisefloor, "render", scene, "--source", source, "--size", args.size, "--tile", str(TILE)]
             command += ["--seed", str(seed), "--max-spp", str(args.max_spp), "--out", out, "--quiet"]
             print(source, seed, flush=True)
             subprocess.run(command, check=True)
+
+
+def report(folder):
+    with open(os.path.join(folder, "report.json")) as file:
+        return json.load(file)
+
+
+def complete(folder):
+    return os.path.exists(os.path.join(folder, "report.json")) and report(folder)["complete"]
 
 
 def pixels(folder):
@@ -58,7 +66,7 @@ def pixels(folder):
     with OpenEXR.File(os.path.join(folder, "image.exr")) as file:
         channels = file.channels()
         rgb = channels["RGB"].pixels if "RGB" in channels else np.stack([channels[c].pixels for c in "RGB"], -1)
-    rgb = rgb.astype(float) * json.load(open(os.path.join(folder, "report.json")))["exposure"]
+    rgb = rgb.astype(float) * report(folder)["exposure"]
     weights = np.array([0.2126, 0.7152, 0.0722])
     shown = np.clip(rgb / (1 + rgb @ weights)[..., None], 0, 1)
     encoded = np.where(shown <= 0.0031308, 12.92 * shown, 1.055 * np.maximum(shown, 1e-9) ** (1 / 2.4) - 0.055)
@@ -81,7 +89,7 @@ def stops(folder):
 def show(args):
     from PIL import Image
 
-    names = [n for n in CORNELL_BOX if os.path.exists(os.path.join(args.out, f"{n}-{SEEDS[1]}", "report.json"))]
+    names = [n for n in CORNELL_BOX if all(complete(os.path.join(args.out, f"{n}-{seed}")) for seed in SEEDS)]
     print("| source | mean at the stop | worst tile | saved | noise left, median tile | worst | seconds | oracle's share |")
     print("|---|---|---|---|---|---|---|---|")
     columns = []
@@ -93,7 +101,7 @@ def show(args):
             noise[int(r["y"]) : int(r["y"]) + int(r["height"]), int(r["x"]) : int(r["x"]) + int(r["width"])].std()
             for r in stops(folders[0])
         ]
-        reports = [json.load(open(os.path.join(f, "report.json"))) for f in folders]
+        reports = [report(folder) for folder in folders]
         total = sum(r["seconds_total"] for r in reports)
         oracle = sum(r["seconds_oracle"] for r in reports)
         saved = 1 - counts.mean() / counts.max(axis=1).mean()
