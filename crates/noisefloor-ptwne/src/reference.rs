@@ -8,11 +8,12 @@
 //! the root mean square over the block is below [`BOUND`], or pixels have [`MOST`] samples in each half: [`ReferenceNoise`] says what
 //! noise was left.
 //!
-//! The pixels have scrambles of their own too. With one for all, the mask at full resolution has a third less noise, as neighbours err
-//! alike; but at the coarser scales that the oracle looks at it has up to two and a half times as much.
+//! The pixels have scrambles of their own too. With one for all, neighbours err alike: the mask has less noise at full resolution, and
+//! more at the coarser scales that the oracle looks at too (`docs/benchmarks/renderer.md` of the project).
 //!
 //! No block knows of another, and nothing depends on threads. What two halves cannot tell is what both miss: an edge that both see
-//! alike. So where neighbours differ, an error is assumed that the samples of a pixel would leave of such an edge.
+//! alike. So where neighbours differ, an error is assumed that the samples of a pixel would leave of such an edge. A highlight much
+//! smaller than a pixel, which no sample of either half met, is not told.
 
 use crate::camera::Lens;
 use crate::direct::Tracer;
@@ -46,7 +47,8 @@ pub(crate) struct Picture {
     pub(crate) noise: ReferenceNoise,
 }
 
-/// What a reference estimates of its own noise, from what its two halves differ by. Units are display values: 1/255 is a step of 8 bits.
+/// What a reference estimates of its own noise, from what its two halves differ by: what both miss, such as a highlight much smaller
+/// than a pixel, it does not know. Units are display values: 1/255 is a step of 8 bits.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ReferenceNoise {
     /// Samples of a pixel, both halves together, on average. Each costs a ray to a surface and up to eight from each surface on its way.

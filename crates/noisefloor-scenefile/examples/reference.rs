@@ -15,16 +15,16 @@ use std::sync::Arc;
 use std::time::Instant;
 
 /// Samples per pixel that the path tracer is timed with.
-const SAMPLES: u32 = 8;
+const SAMPLES: u32 = 32;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let args: Vec<String> = std::env::args().skip(1).collect();
     let [size, names @ ..] = args.as_slice() else { return Err("reference SIZE SCENE…".into()) };
     let size: usize = size.parse()?;
     println!(
-        "| scene | seconds | as many as … spp | mask deviation, /255 | of the worst tile | its own estimate | blocks unsettled |"
+        "| scene | samples | seconds | as many as … spp | mask deviation, /255 | of the worst tile | its own estimate | blocks unsettled |"
     );
-    println!("|---|---|---|---|---|---|---|");
+    println!("|---|---|---|---|---|---|---|---|");
     for name in names {
         let scene = match scenes::by_name(name) {
             Some(scene) => scene,
@@ -37,12 +37,13 @@ fn main() -> Result<(), Box<dyn Error>> {
 
 fn row(scene: &Arc<Scene>, size: usize) -> Result<String, Box<dyn Error>> {
     let source = |seed| Ptwne::new(scene.clone(), size, size, Options { seed, ..Options::default() });
-    let (mut images, mut own, mut unsettled) = (Vec::new(), 0.0, 0.0);
+    let (mut images, mut samples, mut own, mut unsettled) = (Vec::new(), 0.0, 0.0, 0.0);
     let start = Instant::now();
     for seed in [1, 2] {
         let mut source = source(seed)?;
         images.push(source.reference()?.ok_or("no reference")?.pixels);
         let noise = source.reference_noise().ok_or("no reference")?;
+        samples += 0.5 * noise.samples;
         own += 0.5 * 255.0 * noise.deviation();
         unsettled += 50.0 * noise.unsettled as f64 / noise.deviations.len() as f64;
     }
@@ -70,5 +71,7 @@ fn row(scene: &Arc<Scene>, size: usize) -> Result<String, Box<dyn Error>> {
     let all = (tiles.iter().sum::<f64>() / tiles.len() as f64).sqrt();
     let name = scene.name();
     let spp = seconds / one_sample;
-    Ok(format!("| {name} | {seconds:.0} | {spp:.0} | {all:.2} | {worst:.2} | {own:.2} | {unsettled:.0} % |"))
+    Ok(format!(
+        "| {name} | {samples:.0} | {seconds:.0} | {spp:.0} | {all:.2} | {worst:.2} | {own:.2} | {unsettled:.0} % |"
+    ))
 }

@@ -120,6 +120,27 @@ fn the_error_to_a_reference_falls() {
     assert!((reported - last).abs() < 1e-15 * last.abs().max(1.0), "{reported} {last}");
 }
 
+/// The command says how free of noise the reference is that tiles were held against; without one it says nothing.
+#[test]
+fn the_noise_of_the_reference_is_told() {
+    let folder = tempdir().unwrap();
+    let model = concat!(env!("CARGO_MANIFEST_DIR"), "/../noisefloor/models/human-reference.nfm");
+    let mut args = vec!["render", "cornell-box", "--size", "32x32", "--tile", "32", "--max-spp", "100"];
+    args.extend(["--out", text(folder.path())]);
+    let plain = succeed(&args);
+    assert!(!plain.contains("reference"), "{plain}");
+    assert!(json(&folder.path().join("report.json"))["reference_samples"].is_null());
+    args.extend(["--model", model]);
+    let told = succeed(&args);
+    assert!(told.contains("the reference took"), "{told}");
+    let report = json(&folder.path().join("report.json"));
+    let number = |name: &str| report[name].as_f64().unwrap();
+    assert!((32.0..=2048.0).contains(&number("reference_samples")), "{report}");
+    // Each block of 16×16 pixels, and so the whole, keeps within 0.305/255
+    assert!(number("reference_worst") < 0.306 / 255.0 && number("reference_deviation") > 0.0, "{report}");
+    assert!(number("reference_deviation") <= number("reference_worst"), "{report}");
+}
+
 #[test]
 fn time_is_kept() {
     let folder = tempdir().unwrap();
