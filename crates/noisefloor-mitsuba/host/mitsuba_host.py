@@ -6,6 +6,8 @@ import sys
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 import host
 
+# Samples that one lane of a wavefront takes one after the other: fewer results to add up, and still lanes for many threads.
+RUN = 8
 # Lanes of one wavefront: 12 bytes of results each.
 LANES = 1 << 22
 # Edge of the blocks of the scalar variant, which number its random streams. Fixed, so that they do not depend on threads.
@@ -173,8 +175,8 @@ def read_film(props, init, warnings):
 
 
 class Wavefront:
-    """All pixels of all tiles in one wavefront, a lane a sample. Every sample has a random stream of its own, which follows from
-    (seed, pixel, index of the sample)."""
+    """All pixels of all tiles in one wavefront. Every sample has a random stream of its own, which follows from (seed, pixel, index of
+    the sample)."""
 
     repeats = "samples"
 
@@ -219,13 +221,13 @@ class Wavefront:
         # Parts of samples and of pixels that fit a wavefront. Parts of samples depend on nothing but their number, so that
         # sums are the same in any company.
         part = min(samples, 1 << 12)
-        rows = max(LANES // part, 1)
+        rows = max(LANES * RUN // part, 1)
         sums = np.zeros((len(x), 3))
         for start in range(0, len(x), rows):
             some = slice(start, start + rows)
             for done in range(0, samples, part):
-                lanes = min(part, samples - done)
-                sums[some] += self.wavefront(x[some], y[some], first[some] + np.uint64(done), lanes)
+                number = min(part, samples - done)
+                sums[some] += self.wavefront(x[some], y[some], first[some] + np.uint64(done), number)
         means = (sums / samples).astype(np.float32)
         ends = np.cumsum([tile["width"] * tile["height"] for tile in tiles])
         return np.split(means, ends[:-1])
@@ -240,34 +242,51 @@ class Wavefront:
     def wavefront(self, x, y, first, samples):
         """Sums of so many samples of these pixels."""
         mi, dr, np = self.mi, self.dr, self.np
-        # Opaque: a number of samples that were part of the kernel would be compiled anew for every other.
-        each = dr.opaque(mi.UInt32, samples)
-        lane = dr.arange(mi.UInt32, len(x) * samples)
+        # Opaque: numbers that were part of the kernel would have it compiled anew for every other.
+        lanes = -(-samples // RUN)
+        each, total = dr.opaque(mi.UInt32, lanes), dr.opaque(mi.UInt32, samples)
+        lane = dr.arange(mi.UInt32, len(x) * lanes)
         row = lane // each
-        column_x, column_y = dr.gather(mi.UInt32, mi.UInt32(x), row), dr.gather(mi.UInt32, mi.UInt32(y), row)
+        begin = (lane - row * each) * RUN
+        count = dr.minimum(total - begin, RUN)
 
-        # A stream for (seed, pixel, index of the sample). The mix is a bijection: no two samples of a pixel share a stream, and
-        # those of different pixels do by chance alone, once in 2^127.
+        column_x, column_y = dr.gather(mi.UInt32, mi.UInt32(x), row), dr.gather(mi.UInt32, mi.UInt32(y), row)
         pixel = mix(y.astype(np.uint64) << np.uint64(32) | x.astype(np.uint64), np.uint64)
         key = dr.gather(mi.UInt64, mi.UInt64(mix(pixel ^ self.seed, np.uint64)), row)
-        index = dr.gather(mi.UInt64, mi.UInt64(first), row) + mi.UInt64(lane - row * each)
-        state = mix(key + index * mi.UInt64(GOLDEN), mi.UInt64)
-        self.sampler.rng = mi.PCG32(1, state, mix(state ^ mi.UInt64(SECOND), mi.UInt64))
+        index = dr.gather(mi.UInt64, mi.UInt64(first), row) + mi.UInt64(begin)
 
-        # A camera ray through a uniform place in the pixel: that is the box filter.
-        draw, sensor, film = self.sampler, self.sensor, self.film
+        def one_more(done, sum):
+            self.seed_streams(key, index + mi.UInt64(done))
+            return done + 1, sum + self.radiance(column_x, column_y)
+
+        start = (mi.UInt32(0), mi.Color3f(0))
+        _, sum = dr.while_loop(start, lambda done, sum: done < count, one_more)
+        # What was drawn in the loop has no meaning outside of it.
+        self.sampler.rng = mi.PCG32()
+        dr.eval(sum)
+        runs = [channel.numpy().reshape(len(x), lanes) for channel in sum]
+        return np.stack([run.sum(axis=1, dtype=np.float64) for run in runs], axis=-1)
+
+    def seed_streams(self, key, index):
+        """A stream for (seed, pixel, index of the sample). The mix is a bijection: no two samples of a pixel share a stream, and
+        those of different pixels do by chance alone, once in 2^127."""
+        mi = self.mi
+        state = mix(key + index * mi.UInt64(GOLDEN), mi.UInt64)
+        # Not by the constructor, which adds the number of the lane in a loop.
+        self.sampler.rng = mi.PCG32()
+        self.sampler.rng.seed(state, mix(state ^ mi.UInt64(SECOND), mi.UInt64))
+
+    def radiance(self, x, y):
+        """What comes through a uniform place in each pixel: that is the box filter."""
+        mi, draw, sensor = self.mi, self.sampler, self.sensor
         offset = draw.next_2d()
-        place = mi.Point2f((column_x + offset.x) / film["width"], (column_y + offset.y) / film["height"])
+        place = mi.Point2f((x + offset.x) / self.film["width"], (y + offset.y) / self.film["height"])
         lens = draw.next_2d() if sensor.needs_aperture_sample() else mi.Point2f(0.5)
         time = mi.Float(sensor.shutter_open())
         if sensor.shutter_open_time() > 0:
             time += draw.next_1d() * sensor.shutter_open_time()
         ray, weight = sensor.sample_ray_differential(time, 0.5, place, lens)
-
-        radiance = weight * self.integrator.sample(self.scene, draw, ray, sensor.get_medium())[0]
-        dr.eval(radiance)
-        each_lane = [channel.numpy().reshape(len(x), samples) for channel in radiance]
-        return np.stack([channel.sum(axis=1, dtype=np.float64) for channel in each_lane], axis=-1)
+        return weight * self.integrator.sample(self.scene, draw, ray, sensor.get_medium())[0]
 
 
 def mix(x, word):
