@@ -72,6 +72,11 @@ pub fn private_folder(renderer: &Renderer) -> Result<PathBuf, SetupError> {
 /// [`SetupError`]: no interpreter of a version that will do, no space, no network, a package that is not what was pinned.
 pub fn install(renderer: &Renderer, mut progress: impl FnMut(&str)) -> Result<PathBuf, SetupError> {
     let folder = private_folder(renderer)?;
+    if let Ok(version) = probe(renderer, &python_in(&folder)) {
+        progress(&format!("{} is there already (it says {version})", renderer.title));
+        return Ok(python_in(&folder));
+    }
+    let base = interpreter(renderer)?;
     let cache = cache()?;
     fs::create_dir_all(&cache).map_err(io(&cache))?;
     let lock = cache.join(format!("{}.lock", renderer.name));
@@ -80,8 +85,9 @@ pub fn install(renderer: &Renderer, mut progress: impl FnMut(&str)) -> Result<Pa
         progress("waiting for another installation to end");
     }
     let _alone = lock_file.write().map_err(io(&lock))?;
-    if let Ok(version) = probe(renderer, &python_in(&folder)) {
-        progress(&format!("{} is there already (it says {version})", renderer.title));
+    // Another one may have done it meanwhile, and its environment may be in use.
+    if python_in(&folder).is_file() && probe(renderer, &python_in(&folder)).is_ok() {
+        progress("another installation has done it");
         return Ok(python_in(&folder));
     }
 
@@ -92,7 +98,6 @@ pub fn install(renderer: &Renderer, mut progress: impl FnMut(&str)) -> Result<Pa
             fs::remove_dir_all(old).map_err(io(old))?;
         }
     }
-    let base = interpreter(renderer)?;
     let title = renderer.title;
     let mut step = |what: &'static str, command: Command| {
         let mut said = Said::default();
