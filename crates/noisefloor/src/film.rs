@@ -226,18 +226,27 @@ impl Film {
         rect.rows(self.grid.width()).flatten().filter(|&pixel| lacks(pixel)).count()
     }
 
-    /// The halves of one pixel of `tile`, each with its number of valid samples.
+    /// The mean linear radiance of either half, A and B, at one pixel of `tile`, each with the number of valid samples behind it;
+    /// black where there are none, as all of B is where no halves are kept. `pixel` is row-major over the image, and must lie in
+    /// `tile`: counts of samples are kept by tile.
+    ///
+    /// # Panics
+    /// If the tile or the pixel does not exist.
     #[inline]
-    pub(crate) fn pixel_halves(&self, tile: usize, pixel: usize) -> [(Rgb, u64); 2] {
+    pub fn pixel_halves(&self, tile: usize, pixel: usize) -> [(Rgb, u64); 2] {
         std::array::from_fn(|h| match self.halves.get(h) {
             Some(half) => (half.mean[pixel], self.counts[tile][h] - half.rejected(pixel)),
             None => ([0.0; 3], 0),
         })
     }
 
-    /// Mean of all valid samples of one pixel of `tile`; black where there are none.
+    /// Mean linear radiance of all valid samples of one pixel of `tile`; black where there are none. `pixel` is row-major over
+    /// the image, and must lie in `tile`.
+    ///
+    /// # Panics
+    /// If the tile or the pixel does not exist.
     #[inline]
-    fn pixel(&self, tile: usize, pixel: usize) -> Rgb {
+    pub fn pixel(&self, tile: usize, pixel: usize) -> Rgb {
         Self::mean(self.pixel_halves(tile, pixel))
     }
 
