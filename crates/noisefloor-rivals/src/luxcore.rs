@@ -1,0 +1,81 @@
+//! The halt condition of LuxCoreRender.
+
+use crate::pixels::{Seen, displayed, enough, verdict};
+use noisefloor::{CriterionError, Rgb, StoppingCriterion, Tile, Verdict, View};
+
+/// Default of [`LuxCoreHalt::share`].
+pub const DEFAULT_SHARE: f64 = 0.01;
+/// Default of [`LuxCoreHalt::threshold`]: one step of an 8-bit screen.
+pub const DEFAULT_THRESHOLD: f32 = 1.0 / 256.0;
+/// Default of [`LuxCoreHalt::step`] and [`LuxCoreHalt::warmup`] (`batch.haltthreshold.step` and `.warmup` of LuxCoreRender).
+pub const DEFAULT_STEP: f64 = 64.0;
+
+/// The convergence test of LuxCoreRender 2 (`film/convtest/filmconvtest.cpp`).
+///
+/// The picture as it is displayed is held against that of the last test; a pixel has changed if one of its channels has by more
+/// than `threshold`. The render is done when no more than a `share` of all pixels has changed. Tests begin after `warmup` samples
+/// per pixel and are `step` apart, both on average over the image.
+///
+/// It halts a whole picture, and so it does here: all tiles are done at once. The share of pixels is left open by LuxCoreRender.
+#[derive(Clone, Debug)]
+pub struct LuxCoreHalt {
+    /// Largest share of the pixels that may have changed, in [0, 1].
+    pub share: f64,
+    /// Samples per pixel between two tests, above 0.
+    pub step: f64,
+    /// Samples per pixel before the first test, at least 0.
+    pub warmup: f64,
+    /// Change of a displayed channel that counts, at least 0.
+    pub threshold: f32,
+    seen: Seen,
+    /// Picture and samples per pixel at the last test.
+    last: Option<(Vec<Rgb>, f64)>,
+    halted: bool,
+}
+
+impl LuxCoreHalt {
+    /// The condition with its own constant, and LuxCoreRender's defaults for the rest.
+    pub fn new(share: f64) -> Self {
+        Self {
+            share,
+            step: DEFAULT_STEP,
+            warmup: DEFAULT_STEP,
+            threshold: DEFAULT_THRESHOLD,
+            seen: Seen::default(),
+            last: None,
+            halted: false,
+        }
+    }
+}
+
+impl Default for LuxCoreHalt {
+    fn default() -> Self {
+        Self::new(DEFAULT_SHARE)
+    }
+}
+
+impl StoppingCriterion for LuxCoreHalt {
+    fn name(&self) -> String {
+        format!("LuxCore, {} of the pixels", self.share)
+    }
+
+    fn judge(&mut self, view: &View<'_>, tiles: &[Tile]) -> Result<Vec<Verdict>, CriterionError> {
+        let grid = view.film.grid();
+        if self.seen.renew(view.film) {
+            (self.last, self.halted) = (None, false);
+        }
+        let pixels = grid.width() * grid.height();
+        let samples = view.film.total_samples() as f64 / pixels as f64;
+        let due = self.last.as_ref().is_none_or(|(_, last)| samples - last >= self.step);
+        if !self.halted && samples > self.warmup && due {
+            let now = displayed(view);
+            if let Some((before, _)) = &self.last {
+                let same = |(a, b): &(&Rgb, &Rgb)| (0..3).all(|c| (a[c] - b[c]).abs() <= self.threshold);
+                let unchanged = now.iter().zip(before).filter(same).count();
+                self.halted = enough(unchanged, pixels, 1.0 - self.share);
+            }
+            self.last = Some((now, samples));
+        }
+        Ok(vec![verdict(self.halted, None); tiles.len()])
+    }
+}

@@ -1,0 +1,67 @@
+//! What conditions on pixels have in common.
+
+use noisefloor::{Film, Rgb, Verdict, View};
+use rayon::prelude::*;
+
+/// Share of a tile's pixels that have to meet a condition on pixels.
+pub(crate) const DEFAULT_SHARE: f64 = 0.95;
+
+/// A verdict without a probability.
+pub(crate) fn verdict(converged: bool, expected_samples: Option<u64>) -> Verdict {
+    Verdict { converged, probability: None, expected_samples, unfamiliar: false }
+}
+
+/// Whether `passed` of `pixels` are the share wanted.
+pub(crate) fn enough(passed: usize, pixels: usize, share: f64) -> bool {
+    passed as f64 >= share * pixels as f64
+}
+
+/// Σ|I − A| and ΣI over the channels of one pixel, both times `exposure`: I is the mean of all samples, A that of half A
+/// (Dammertz et al. 2010, §2.1). `None` where a half has no valid sample, so that nothing is known of the error.
+pub(crate) fn half_difference(
+    film: &Film,
+    tile: usize,
+    pixel: usize,
+    exposure: f64,
+) -> Option<(f64, f64)> {
+    let [(a, na), (b, nb)] = film.pixel_halves(tile, pixel);
+    if na == 0 || nb == 0 {
+        return None;
+    }
+    // I − A = (B − A)·n_B/n, without the rounding of I.
+    let weight = nb as f64 / (na + nb) as f64;
+    let step = |c: usize| (f64::from(b[c]) - f64::from(a[c])) * weight;
+    let difference: f64 = (0..3).map(|c| step(c).abs()).sum();
+    let sum: f64 = (0..3).map(|c| f64::from(a[c]) + step(c)).sum();
+    Some((difference * exposure, sum * exposure))
+}
+
+/// Whether a film is another one than that with as many tiles and samples before: of another size, or with fewer samples.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Seen {
+    size: (usize, usize, usize),
+    samples: u64,
+}
+
+impl Seen {
+    /// Takes note of a film; true if it is a new one.
+    pub(crate) fn renew(&mut self, film: &Film) -> bool {
+        let grid = film.grid();
+        let now = Self { size: (grid.width(), grid.height(), grid.edge()), samples: film.total_samples() };
+        let new = now.size != self.size || now.samples < self.samples;
+        *self = now;
+        new
+    }
+}
+
+/// The number of samples at which the share wanted of a tile's pixels has what it needs; `None` if some of those have no finite need.
+pub(crate) fn need_of_share(mut needs: Vec<f64>, share: f64) -> Option<u64> {
+    let place = ((share * needs.len() as f64).ceil() as usize).clamp(1, needs.len()) - 1;
+    let (_, &mut need, _) = needs.select_nth_unstable_by(place, f64::total_cmp);
+    need.is_finite().then(|| need.ceil() as u64)
+}
+
+/// The picture as it is displayed, row-major.
+pub(crate) fn displayed(view: &View<'_>) -> Vec<Rgb> {
+    view.film.image().into_par_iter().map(|pixel| view.display.encode(pixel)).collect()
+}

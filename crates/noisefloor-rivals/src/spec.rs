@@ -1,0 +1,195 @@
+//! Criteria by name.
+
+use crate::{
+    CyclesAdaptive, Dammertz, LuxCoreHalt, Myszkowski1998, RelativeError, Takouachet2007, TimeLimit, cycles, dammertz,
+    luxcore, relative_error, stages,
+};
+use noisefloor::{FixedSamples, StoppingCriterion};
+use thiserror::Error;
+
+/// Samples per pixel of `fixed` without a number.
+const DEFAULT_SAMPLES: f64 = 1000.0;
+/// Seconds of `time` without a number.
+const DEFAULT_SECONDS: f64 = 60.0;
+
+/// A criterion with one constant that its authors leave open or to the user.
+#[derive(Clone, Copy, Debug)]
+pub struct Rival {
+    /// The name in a spec: `"dammertz"`.
+    pub name: &'static str,
+    /// What it is called in a table or a legend: `"Dammertz et al. 2010"`.
+    pub title: &'static str,
+    /// The constant as published, or where nothing was, as documented.
+    pub default: f64,
+    /// Where to search for the constant, from strict (more samples) to lax (fewer), both above 0: to be searched in its logarithm.
+    pub range: (f64, f64),
+    /// The criterion with its constant.
+    pub make: fn(f64) -> Box<dyn StoppingCriterion + Send>,
+    /// Whether the constant is a number that the criterion can take.
+    valid: fn(f64) -> bool,
+    /// What it has to be, for error messages.
+    wanted: &'static str,
+}
+
+const SHARE: &str = "a share of the pixels above 0 and at most 1";
+const POSITIVE: &str = "a number above 0";
+const PROBABILITY: &str = "a probability above 0 and below 1";
+
+/// All rivals with one open constant.
+pub const RIVALS: &[Rival] = &[
+    Rival {
+        name: "fixed",
+        title: "Fixed samples per pixel",
+        default: DEFAULT_SAMPLES,
+        range: (100_000.0, 2.0),
+        make: |samples| Box::new(FixedSamples(samples.round() as u64)),
+        valid: |samples| (1.0..=1e15).contains(&samples),
+        wanted: "a number of samples per pixel, at least 1",
+    },
+    Rival {
+        name: "relative-error",
+        title: "Relative error (Mitsuba 0.6)",
+        default: relative_error::DEFAULT_ERROR,
+        range: (1e-3, 1.0),
+        make: |error| Box::new(RelativeError::new(error)),
+        valid: |error| error > 0.0,
+        wanted: POSITIVE,
+    },
+    Rival {
+        name: "dammertz",
+        title: "Dammertz et al. 2010",
+        default: dammertz::DEFAULT_STOP,
+        range: (1e-5, 0.1),
+        make: |stop| Box::new(Dammertz::new(stop)),
+        valid: |stop| stop > 0.0,
+        wanted: POSITIVE,
+    },
+    Rival {
+        name: "cycles",
+        title: "Cycles",
+        default: cycles::DEFAULT_THRESHOLD,
+        range: (1e-4, 1.0),
+        make: |threshold| Box::new(CyclesAdaptive::new(threshold)),
+        valid: |threshold| threshold > 0.0,
+        wanted: POSITIVE,
+    },
+    Rival {
+        name: "luxcore",
+        title: "LuxCoreRender",
+        default: luxcore::DEFAULT_SHARE,
+        range: (1e-4, 1.0),
+        make: |share| Box::new(LuxCoreHalt::new(share)),
+        valid: |share| share > 0.0 && share <= 1.0,
+        wanted: SHARE,
+    },
+    Rival {
+        name: "vdp-stages",
+        title: "Myszkowski 1998",
+        default: stages::DEFAULT_SEEN,
+        range: (1e-4, 0.999),
+        make: |probability| Box::new(Myszkowski1998::new(probability)),
+        valid: |probability| probability > 0.0 && probability < 1.0,
+        wanted: PROBABILITY,
+    },
+    Rival {
+        name: "vdp-first",
+        title: "Takouachet et al. 2007",
+        default: stages::DEFAULT_GROWTH,
+        range: (1e-4, 0.999),
+        make: |probability| Box::new(Takouachet2007::new(probability)),
+        valid: |probability| probability > 0.0 && probability < 1.0,
+        wanted: PROBABILITY,
+    },
+];
+
+/// A spec that names no criterion.
+#[derive(Debug, Error, Clone, PartialEq, Eq)]
+pub enum SpecError {
+    /// No criterion of that name.
+    #[error("there is no criterion {name:?}; there are {}", known())]
+    Unknown {
+        /// The name given.
+        name: String,
+    },
+    /// Not a number, or one that the criterion cannot take.
+    #[error("{spec:?}: {name} takes {wanted}, as in {name}:{example}")]
+    Number {
+        /// The spec.
+        spec: String,
+        /// The criterion.
+        name: &'static str,
+        /// What it takes.
+        wanted: &'static str,
+        /// Its default.
+        example: String,
+    },
+}
+
+fn known() -> String {
+    let names = RIVALS.iter().map(|r| r.name).chain(["time"]);
+    names.map(|name| format!("{name}:…")).collect::<Vec<_>>().join(", ")
+}
+
+/// Makes a criterion of a spec: a name, and after a colon its constant, or the default without one. `"fixed:256"`, `"time:30"`
+/// (seconds), `"relative-error:0.05"`, `"dammertz:0.0002"`, `"cycles:0.01"`, `"luxcore:0.01"`, `"vdp-stages:0.75"`,
+/// `"vdp-first:0.5"`.
+///
+/// # Errors
+/// [`SpecError`] if the name is unknown or the number is not one that the criterion can take.
+pub fn parse(spec: &str) -> Result<Box<dyn StoppingCriterion + Send>, SpecError> {
+    let (name, number) = spec.split_once(':').map_or((spec, None), |(name, number)| (name, Some(number)));
+    let constant = |name, default: f64, wanted, valid: fn(f64) -> bool| {
+        let Some(number) = number else { return Ok(default) };
+        let parsed = number.trim().parse::<f64>().ok().filter(|&x| x.is_finite() && valid(x));
+        parsed.ok_or_else(|| SpecError::Number { spec: spec.into(), name, wanted, example: default.to_string() })
+    };
+    if name == "time" {
+        let seconds = constant("time", DEFAULT_SECONDS, "a number of seconds, at least 0", |s| s >= 0.0)?;
+        return Ok(Box::new(TimeLimit::new(seconds)));
+    }
+    let rival = RIVALS.iter().find(|r| r.name == name).ok_or_else(|| SpecError::Unknown { name: name.into() })?;
+    Ok((rival.make)(constant(rival.name, rival.default, rival.wanted, rival.valid)?))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn specs_name_criteria() {
+        for (spec, name) in [
+            ("fixed:256", "256 samples per pixel"),
+            ("fixed", "1000 samples per pixel"),
+            ("time:1.5", "1.5 seconds"),
+            ("relative-error", "relative error 0.05 at 95 %"),
+            ("dammertz:0.002", "Dammertz et al. 2010, stop 0.002"),
+            ("cycles: 0.1", "Cycles, threshold 0.1"),
+            ("luxcore:1e-2", "LuxCore, 0.01 of the pixels"),
+            ("vdp-stages:0.6", "Myszkowski 1998, P 0.6"),
+            ("vdp-first", "Takouachet et al. 2007, P 0.5"),
+        ] {
+            assert_eq!(parse(spec).unwrap().name(), name, "{spec}");
+        }
+    }
+
+    #[test]
+    fn what_is_wrong_is_said() {
+        let error = |spec| parse(spec).err().unwrap().to_string();
+        assert!(error("fixd:3").contains("\"fixd\"") && error("fixd:3").contains("relative-error:…, dammertz:…"));
+        assert_eq!(error("cycles:-1"), "\"cycles:-1\": cycles takes a number above 0, as in cycles:0.01");
+        for spec in ["", ":", "fixed:0", "fixed:x", "fixed:1e99", "time:-1", "time:NaN", "luxcore:1.1", "vdp-first:1", "dammertz:inf", "dammertz:"] {
+            assert!(parse(spec).is_err(), "{spec}");
+        }
+    }
+
+    #[test]
+    fn defaults_lie_in_their_ranges() {
+        for rival in RIVALS {
+            let (strict, lax) = rival.range;
+            let (low, high) = (strict.min(lax), strict.max(lax));
+            assert!(low > 0.0 && (low..=high).contains(&rival.default), "{}", rival.name);
+            assert!([strict, lax].into_iter().all(rival.valid), "{}", rival.name);
+            assert_eq!((rival.make)(rival.default).name(), parse(rival.name).unwrap().name());
+        }
+    }
+}

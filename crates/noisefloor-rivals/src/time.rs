@@ -1,0 +1,61 @@
+//! So many seconds.
+
+use crate::pixels::verdict;
+use noisefloor::{CriterionError, StoppingCriterion, Tile, Verdict, View};
+use std::time::{Duration, Instant};
+
+/// Stops all tiles when so many seconds have passed since the first verdict.
+///
+/// The clock begins at the first verdict, and not when the criterion is made, since a criterion may be made long before its run;
+/// the first batch is therefore not counted, and a run takes that much longer. [`noisefloor::Driver::set_time_limit`] counts from
+/// the beginning, and ends between batches too. The only rival whose verdicts differ from run to run.
+#[derive(Clone, Debug)]
+pub struct TimeLimit {
+    /// Seconds, at least 0.
+    pub seconds: f64,
+    began: Option<Instant>,
+}
+
+impl TimeLimit {
+    /// A limit of `seconds`; a limit that is no positive number has passed already.
+    pub fn new(seconds: f64) -> Self {
+        Self { seconds, began: None }
+    }
+}
+
+impl StoppingCriterion for TimeLimit {
+    fn name(&self) -> String {
+        format!("{} seconds", self.seconds)
+    }
+
+    fn judge(&mut self, _: &View<'_>, tiles: &[Tile]) -> Result<Vec<Verdict>, CriterionError> {
+        let elapsed = self.began.get_or_insert_with(Instant::now).elapsed();
+        // What does not fit a duration, as infinity, is never over.
+        let limit = Duration::try_from_secs_f64(self.seconds.max(0.0)).unwrap_or(Duration::MAX);
+        Ok(vec![verdict(elapsed >= limit, None); tiles.len()])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{constant, view};
+
+    #[test]
+    fn the_clock_begins_with_the_first_verdict() {
+        let film = constant(0.5, 100);
+        let tiles: Vec<Tile> = film.grid().tiles().collect();
+        let judge = |limit: &mut TimeLimit| limit.judge(&view(&film), &tiles).unwrap()[0].converged;
+
+        let mut limit = TimeLimit::new(0.05);
+        std::thread::sleep(Duration::from_millis(60));
+        assert!(!judge(&mut limit));
+        std::thread::sleep(Duration::from_millis(60));
+        assert!(judge(&mut limit));
+
+        assert!(judge(&mut TimeLimit::new(0.0)));
+        assert!(judge(&mut TimeLimit::new(-1.0)));
+        assert!(judge(&mut TimeLimit::new(f64::NAN)));
+        assert!(!judge(&mut TimeLimit::new(f64::INFINITY)));
+    }
+}
