@@ -122,3 +122,90 @@ impl StoppingCriterion for CyclesAdaptive {
         Ok(tiles.iter().zip(tiles_errors).map(judge).collect())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{Bell, constant, empty, expose, view};
+    use noisefloor::Rgb;
+
+    fn all(film: &Film) -> Vec<Tile> {
+        film.grid().tiles().collect()
+    }
+
+    #[test]
+    fn the_error_of_known_halves() {
+        for (a, b, expected) in [(0.4f32, 0.6f32, 0.3 / (1e-4 + 1.5)), (0.04, 0.06, 0.03 / (1e-4 + 0.15f64.sqrt())), (0.0, 0.0, 0.0)] {
+            let mut film = empty();
+            for value in [a, b] {
+                film.add(0, 50, &[[value; 3]; 1024]).unwrap();
+            }
+            assert!((error(&film, 1.0, 0, 0) - expected).abs() < 1e-6);
+            assert_eq!(error(&film, 1.0, 1, 32), f64::INFINITY, "no samples, no evidence");
+        }
+    }
+
+    #[test]
+    fn automatic_numbers_are_those_of_cycles() {
+        let least = [0.1, 0.01, 0.001].map(|t| CyclesAdaptive::new(t).min_samples());
+        assert_eq!(least, [32, 64, 128]);
+        let automatic = [50, 1000, 100_000].map(|n| CyclesAdaptive::automatic(n).threshold);
+        assert_eq!(automatic, [0.02, 0.001, 0.001]);
+    }
+
+    /// A film of grey but for one pixel, at (32, 10), on the border of tiles 0 and 1.
+    fn speck(value: f32) -> Film {
+        let mut film = constant(0.2, 100);
+        for value in [0.0, value] {
+            let mut batch: Vec<Rgb> = vec![[0.2; 3]; 1024];
+            batch[10 * 32] = [value; 3];
+            film.add(1, 50, &batch).unwrap();
+        }
+        film
+    }
+
+    #[test]
+    fn an_active_pixel_keeps_its_neighbours() {
+        let film = speck(0.5);
+        let mut cycles = CyclesAdaptive { share: 1.0, ..CyclesAdaptive::default() };
+        let verdicts = cycles.judge(&view(&film), &all(&film)).unwrap();
+        let active: Vec<usize> = (0..64 * 64).filter(|&p| !cycles.converged[p]).collect();
+        let expected: Vec<usize> = (9..12).flat_map(|y| (31..34).map(move |x| y * 64 + x)).collect();
+        assert_eq!(active, expected);
+        assert_eq!(verdicts.iter().map(|v| v.converged).collect::<Vec<_>>(), [false, false, true, true]);
+
+        // Where its tile is not looked at, it keeps nobody.
+        let mut cycles = CyclesAdaptive { share: 1.0, ..CyclesAdaptive::default() };
+        assert!(cycles.judge(&view(&film), &[film.grid().tile(0)]).unwrap()[0].converged);
+    }
+
+    #[test]
+    fn what_has_converged_stays_so() {
+        let mut film = constant(0.2, 100);
+        let mut cycles = CyclesAdaptive { share: 1.0, ..CyclesAdaptive::default() };
+        assert!(cycles.judge(&view(&film), &all(&film)).unwrap().iter().all(|v| v.converged));
+        for value in [0.1, 0.9] {
+            film.add(0, 50, &[[value; 3]; 1024]).unwrap();
+        }
+        assert!(cycles.judge(&view(&film), &all(&film)).unwrap()[0].converged);
+        // And nothing does before its time.
+        let early = constant(0.2, 62);
+        assert!(!cycles.judge(&view(&early), &all(&early)).unwrap()[0].converged);
+    }
+
+    #[test]
+    fn as_many_pixels_converge_as_mathematics_says() {
+        // 3·|I − A| has a deviation of 3σ/√n: at 2.5 of them, p = 0.98758 of the pixels are below, and p⁹ stay so beside their
+        // neighbours. 51 ± 7 are above, and take 9 each: a share of 1.6 % is one deviation; three of those.
+        let (mean, sigma, n) = (0.1, 0.05, 100.0f64);
+        let threshold = 2.5 * 3.0 * sigma / n.sqrt() / (EPSILON + (3.0 * mean).sqrt());
+        let (mut film, mut bell) = (empty(), Bell(5));
+        for _ in 0..2 {
+            expose(&mut film, 50, mean, sigma, &mut bell);
+        }
+        let mut cycles = CyclesAdaptive::new(threshold);
+        cycles.judge(&view(&film), &all(&film)).unwrap();
+        let share = cycles.converged.iter().filter(|&&c| c).count() as f64 / 4096.0;
+        assert!((share - 0.987_58f64.powi(9)).abs() < 0.048, "{share}");
+    }
+}

@@ -151,3 +151,74 @@ impl StoppingCriterion for Dammertz {
         Ok(tiles.iter().map(judge).collect())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{Bell, empty, expose, view};
+
+    /// Samples at which each tile is done.
+    fn stops(mut criterion: Dammertz, mean: f64, sigma: f64) -> [u64; 4] {
+        let (mut film, mut bell) = (empty(), Bell(11));
+        let mut stops = [0; 4];
+        while stops.contains(&0) {
+            expose(&mut film, 10, mean, sigma, &mut bell);
+            expose(&mut film, 10, mean, sigma, &mut bell);
+            let open: Vec<Tile> = film.grid().tiles().filter(|t| stops[t.index] == 0).collect();
+            for (tile, verdict) in open.iter().zip(criterion.judge(&view(&film), &open).unwrap()) {
+                if verdict.converged {
+                    stops[tile.index] = film.samples(tile.index);
+                }
+            }
+        }
+        stops
+    }
+
+    /// Grey noise: I − A has a deviation of σ/√n for even halves, so that the mean error is 3·σ·√(2/(πn))/√(3m).
+    fn known(mean: f64, sigma: f64, stop: f64) -> f64 {
+        (3.0 * sigma * std::f64::consts::FRAC_2_PI.sqrt() / ((3.0 * mean).sqrt() * stop)).powi(2)
+    }
+
+    #[test]
+    fn an_uncut_image_stops_where_mathematics_says() {
+        let (mean, sigma, stop) = (0.5, 0.2, 0.01);
+        let whole = stops(Dammertz { split: 1.0, ..Dammertz::new(stop) }, mean, sigma);
+        // The mean of 4096 values of |N| errs by 0.756/64 = 1.2 %, n by 2.4 %: three of those, and a step of 20.
+        let expected = known(mean, sigma, stop);
+        assert!(whole.iter().all(|&n| n == whole[0]));
+        assert!((whole[0] as f64 - expected).abs() < 0.071 * expected + 20.0, "{whole:?} {expected}");
+    }
+
+    #[test]
+    fn tiles_weigh_by_the_root_of_their_area() {
+        let (mean, sigma, stop) = (0.5, 0.2, 0.01);
+        // A quarter of the area halves the error: a quarter of the samples. 1024 values: 2.4 %, n by 4.7 %; four of those for four tiles.
+        let expected = 0.25 * known(mean, sigma, stop);
+        for n in stops(Dammertz::new(stop), mean, sigma) {
+            assert!((n as f64 - expected).abs() < 0.19 * expected + 20.0, "{n} {expected}");
+        }
+    }
+
+    #[test]
+    fn cuts_are_across_the_longer_side_where_errors_are_even() {
+        let grid = TileGrid::new(128, 64, 32).unwrap();
+        let errors = [8.0, 1.0, 1.0, 6.0, 0.0, 0.0, 0.0, 0.0].map(|e| (e, 1));
+        let [a, b] = Block { columns: 0..4, rows: 0..2 }.cut(grid, &errors);
+        assert_eq!((a.columns, a.rows, b.columns), (0..1, 0..2, 1..4));
+        let [a, b] = Block { columns: 1..2, rows: 0..2 }.cut(grid, &errors);
+        assert_eq!((a.rows, b.rows, b.columns), (0..1, 1..2, 1..2));
+    }
+
+    #[test]
+    fn the_error_of_known_halves() {
+        // A = 0.4, I = 0.5: 3·0.1/√1.5.
+        let mut film = empty();
+        for value in [0.4, 0.6] {
+            film.add(0, 50, &[[value; 3]; 1024]).unwrap();
+        }
+        let (sum, count) = tile_errors(&film, 1.0, film.grid().tile(0));
+        assert!((sum / count as f64 - 0.3 / 1.5f64.sqrt()).abs() < 1e-6);
+        // A tile without samples gives no evidence, and keeps the image from stopping whole.
+        assert_eq!(tile_errors(&film, 1.0, film.grid().tile(1)).1, 0);
+    }
+}

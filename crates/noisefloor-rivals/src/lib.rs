@@ -62,6 +62,8 @@ mod spec;
 mod stages;
 #[cfg(test)]
 mod testing;
+#[cfg(test)]
+mod tests;
 mod time;
 mod vdp;
 

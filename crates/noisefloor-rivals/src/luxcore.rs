@@ -79,3 +79,55 @@ impl StoppingCriterion for LuxCoreHalt {
         Ok(vec![verdict(self.halted, None); tiles.len()])
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{Bell, empty, expose, view};
+    use noisefloor::{Display, Film};
+    use statrs::distribution::{ContinuousCDF, Normal};
+
+    fn judge(halt: &mut LuxCoreHalt, film: &Film) -> bool {
+        let tiles: Vec<Tile> = film.grid().tiles().collect();
+        let verdicts = halt.judge(&view(film), &tiles).unwrap();
+        assert!(verdicts.iter().all(|v| *v == verdicts[0]));
+        verdicts[0].converged
+    }
+
+    /// Share of the pixels that change between tests at 100 and 200 samples of grey noise: I₁₀₀ − I₂₀₀ has a variance of
+    /// σ²·(1/100 − 1/200), and the screen a slope there.
+    #[test]
+    fn as_many_pixels_change_as_mathematics_says() {
+        let (mean, sigma) = (0.3f64, 0.05);
+        let slope = f64::from(Display::SRGB.luma([0.301; 3]) - Display::SRGB.luma([0.299; 3])) / 0.002;
+        let deviation = slope * sigma * (1.0f64 / 100.0 - 1.0 / 200.0).sqrt();
+        let share = 2.0 * Normal::standard().cdf(-1.0 / 256.0 / deviation);
+        // Of 4096 pixels; four deviations to either side.
+        let margin = 4.0 * (share * (1.0 - share) / 4096.0).sqrt();
+        assert!(share - margin > 0.01);
+        for (limit, halts) in [(share - margin, false), (share + margin, true)] {
+            let (mut film, mut bell, mut halt) = (empty(), Bell(9), LuxCoreHalt::new(limit));
+            for expected in [false, halts, halts] {
+                expose(&mut film, 50, mean, sigma, &mut bell);
+                expose(&mut film, 50, mean, sigma, &mut bell);
+                if film.samples(0) < 300 {
+                    assert_eq!(judge(&mut halt, &film), expected, "{} {limit}", film.samples(0));
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn tests_begin_late_and_keep_their_distance() {
+        let (mut film, mut bell, mut halt) = (empty(), Bell(1), LuxCoreHalt::new(1.0));
+        let mut first = 0;
+        while first == 0 {
+            expose(&mut film, 16, 0.5, 0.1, &mut bell);
+            if judge(&mut halt, &film) {
+                first = film.samples(0);
+            }
+        }
+        // The first test comes after more than 64 samples, at 80; the second, which halts if everything may change, 64 later.
+        assert_eq!(first, 144);
+    }
+}

@@ -165,3 +165,94 @@ impl StoppingCriterion for RelativeError {
         Ok(verdicts)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{Bell, empty, expose, view};
+    use statrs::distribution::ChiSquared;
+
+    fn all(film: &Film) -> Vec<Tile> {
+        film.grid().tiles().collect()
+    }
+
+    #[test]
+    fn quantiles_are_those_of_the_tables() {
+        let table = quantiles(0.95, 30);
+        for (degrees, value) in [(1, 12.706), (2, 4.303), (5, 2.571), (30, 2.042)] {
+            assert!((table[degrees - 1] - value).abs() < 1e-3, "{degrees}: {}", table[degrees - 1]);
+        }
+        assert!((table[30] - 1.960).abs() < 1e-3);
+        assert!(quantiles(1.0, 1).iter().all(|q| q.is_finite()) && quantiles(f64::NAN, 0).len() == 1);
+    }
+
+    #[test]
+    fn the_variance_is_unbiased_for_uneven_batches() {
+        let (mut film, mut bell, mut criterion) = (empty(), Bell(21), RelativeError::default());
+        let (mean, sigma) = (0.5, 0.3);
+        let mut batches = 0;
+        for sizes in [&[10, 10][..], &[50, 7, 90], &[1], &[300, 20, 20, 20, 20], &[5, 900]] {
+            let before = film.half_counts(0);
+            sizes.iter().for_each(|&n| expose(&mut film, n, mean, sigma, &mut bell));
+            batches += (0..2).filter(|&h| film.half_counts(0)[h] > before[h]).count();
+            criterion.judge(&view(&film), &all(&film)).unwrap();
+        }
+        let pixels: Vec<&Batches> = criterion.pixels.iter().flatten().collect();
+        assert!(pixels.len() == 4096 && pixels.iter().all(|p| p.count as usize == batches && p.samples == 1453.0));
+        assert!(pixels.iter().all(|p| (p.mean - 0.5).abs() < 0.1));
+        // s²/σ² is χ² over its ν degrees of freedom, of variance 2/ν; four deviations of the mean of 4096.
+        let variance = pixels.iter().map(|p| p.variance().unwrap()).sum::<f64>() / 4096.0;
+        let tolerance = 4.0 * (2.0 / (batches - 1) as f64 / 4096.0).sqrt();
+        assert!((variance / (sigma * sigma) - 1.0).abs() < tolerance, "{variance} ± {tolerance} ({batches} batches)");
+    }
+
+    /// With ν degrees of freedom, t·s/√n ≤ e·m for a share P(χ²_ν ≤ ν·(e·m/σ)²·n/t²) of the pixels.
+    #[test]
+    fn stops_where_mathematics_says() {
+        let (mean, sigma, error) = (0.5, 0.2, 0.05);
+        let (mut film, mut bell) = (empty(), Bell(2));
+        let mut criterion = RelativeError::new(error);
+        let mut fired = [0usize; 4];
+        for step in 1..=20 {
+            expose(&mut film, 50, mean, sigma, &mut bell);
+            expose(&mut film, 50, mean, sigma, &mut bell);
+            for (tile, verdict) in all(&film).iter().zip(criterion.judge(&view(&film), &all(&film)).unwrap()) {
+                if verdict.converged && fired[tile.index] == 0 {
+                    fired[tile.index] = step;
+                }
+            }
+        }
+        let share = |step: usize| {
+            let (degrees, n) = (2 * step - 1, 100.0 * step as f64);
+            let t = quantiles(0.95, degrees)[degrees - 1];
+            let limit = degrees as f64 * (error * mean / sigma / t).powi(2) * n;
+            ChiSquared::new(degrees as f64).unwrap().cdf(limit)
+        };
+        // A share of 1024 pixels has a deviation of 0.7 %; three of those.
+        for step in fired {
+            assert!(step > 1 && share(step) > 0.93 && share(step - 1) < 0.97, "{fired:?} {}", share(step));
+        }
+    }
+
+    #[test]
+    fn dark_pixels_are_held_to_the_picture() {
+        // Three tiles are bright and one is nearly black, with noise that is large beside it and small beside 1 % of the average.
+        let mut film = empty();
+        let mut bell = Bell(4);
+        for _ in 0..20 {
+            for tile in 0..4 {
+                let (mean, sigma) = if tile == 0 { (1e-4, 1e-4) } else { (1.0, 0.0) };
+                let batch: Vec<Rgb> = (0..1024).map(|_| [(mean + sigma * bell.next()) as f32; 3]).collect();
+                film.add(tile, 50, &batch).unwrap();
+            }
+        }
+        let mut criterion = RelativeError::default();
+        criterion.judge(&view(&film), &all(&film)).unwrap();
+        for _ in 0..20 {
+            for tile in 0..4 {
+                film.add(tile, 50, &[[if tile == 0 { 1e-4 } else { 1.0 }; 3]; 1024]).unwrap();
+            }
+        }
+        assert!(criterion.judge(&view(&film), &all(&film)).unwrap()[0].converged);
+    }
+}

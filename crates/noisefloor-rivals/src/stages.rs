@@ -185,3 +185,64 @@ impl StoppingCriterion for Takouachet2007 {
         Ok(verdicts(change.as_deref(), view.film.grid().width(), tiles, self.probability, self.share))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{Bell, constant, empty, expose, view};
+
+    #[test]
+    fn stages_thin_out_and_go() {
+        let mut stages = Stages::new();
+        for n in 1..=400u64 {
+            if n > 1 {
+                let half = *stages.half_way(10 * n).unwrap();
+                assert!(2 * half <= 10 * n && 2.3 * half as f64 >= (10 * n) as f64 - 20.0, "{half} at {}", 10 * n);
+            }
+            stages.keep(10 * n, 10 * n);
+            assert!(stages.kept.len() <= 10, "{:?}", stages.kept);
+        }
+    }
+
+    /// Verdicts on the first tile at each number of samples.
+    fn run(criterion: &mut dyn StoppingCriterion, sigma: f64, counts: &[u64]) -> Vec<bool> {
+        let (mut film, mut bell) = (empty(), Bell(8));
+        let judge = |&samples: &u64| {
+            let half = ((samples - film.samples(0)) / 2) as u32;
+            (0..2).for_each(|_| expose(&mut film, half, 0.2, sigma, &mut bell));
+            let tiles: Vec<Tile> = film.grid().tiles().collect();
+            criterion.judge(&view(&film), &tiles).unwrap()[0].converged
+        };
+        counts.iter().map(judge).collect()
+    }
+
+    #[test]
+    fn a_clean_picture_is_done_once_it_can_be_told() {
+        let counts = [100, 200, 300, 400];
+        assert_eq!(run(&mut Myszkowski1998::default(), 0.0, &counts), [false, true, true, true]);
+        assert_eq!(run(&mut Takouachet2007::default(), 0.0, &counts), [false, false, false, true]);
+    }
+
+    #[test]
+    fn noise_keeps_on_until_it_is_gone() {
+        // σ/√n is 0.1 of a grey of 0.2 at 100 samples and 0.001 at 10⁶.
+        let counts = [100, 200, 400, 1_000_000, 2_000_000, 4_000_000];
+        let myszkowski = run(&mut Myszkowski1998::default(), 0.2, &counts);
+        assert_eq!(myszkowski, [false, false, false, false, true, true]);
+        let takouachet = run(&mut Takouachet2007::default(), 0.2, &counts);
+        assert_eq!(takouachet[..3], [false; 3]);
+        assert!(takouachet[5]);
+    }
+
+    #[test]
+    fn another_film_is_another_run() {
+        let mut criterion = Myszkowski1998::default();
+        let judge = |criterion: &mut Myszkowski1998, film: &Film| {
+            let tiles: Vec<Tile> = film.grid().tiles().collect();
+            criterion.judge(&view(film), &tiles).unwrap()[0].converged
+        };
+        assert!(!judge(&mut criterion, &constant(0.5, 200)));
+        assert!(judge(&mut criterion, &constant(0.5, 400)));
+        assert!(!judge(&mut criterion, &constant(0.5, 100)));
+    }
+}

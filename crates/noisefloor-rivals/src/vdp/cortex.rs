@@ -169,3 +169,65 @@ impl Cortex {
         band[y * self.fourier.width + x]
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::Bell;
+
+    #[test]
+    fn bands_add_up_to_the_picture() {
+        for (width, height) in [(50, 40), (31, 64)] {
+            let cortex = Cortex::new(&Viewing::default(), width, height);
+            let mut bell = Bell(7);
+            let plane: Vec<f32> = (0..width * height).map(|_| bell.next() as f32).collect();
+            let spectrum = cortex.spectrum(&plane);
+            let whole = cortex.fourier.inverse(spectrum.clone());
+            let mut sum = vec![0.0; whole.len()];
+            for band in cortex.bands() {
+                let filtered = cortex.filter(&spectrum, band);
+                sum.iter_mut().zip(filtered).for_each(|(sum, value)| *sum += value.re);
+            }
+            let largest = whole.iter().map(|v| v.re.abs()).fold(0.0, f32::max);
+            let worst = whole.iter().zip(&sum).map(|(v, s)| (v.re - s).abs()).fold(0.0, f32::max);
+            assert!(worst < 1e-4 * largest, "{width}×{height}: {worst} of {largest}");
+        }
+    }
+
+    #[test]
+    fn a_band_knows_the_local_amplitude() {
+        // A wave in the middle of a band: |band| is its amplitude times its sensitivity everywhere but near the edge.
+        let viewing = Viewing::default();
+        let cortex = Cortex::new(&viewing, 216, 216);
+        let wave = |i: usize| 0.5 * (std::f64::consts::TAU * (i % 216) as f64 / 6.0).cos() as f32;
+        let plane: Vec<f32> = (0..216 * 216).map(wave).collect();
+        let band = Band { dom: 2, fan: 3 };
+        let filtered = cortex.filter(&cortex.spectrum(&plane), band);
+        let per_degree = viewing.pixels_per_degree();
+        let expected = 0.5 * viewing.sensitivity(per_degree / 6.0, 0.0, (216.0 / per_degree).powi(2)) as f32;
+        for x in 90..120 {
+            let value = cortex.at(&filtered, x, 108);
+            assert!((value.norm() / expected - 1.0).abs() < 0.03, "{x}: {} of {expected}", value.norm());
+        }
+    }
+
+    #[test]
+    fn elevation_has_its_published_ends() {
+        for (dom, slope) in [(0, 1.0), (2, 1.0), (4, 0.8), (DOMS, 0.7)] {
+            let band = Band { dom, fan: 0 };
+            assert_eq!(band.elevation(0.0), 1.0);
+            let rise = (band.elevation(1e5) / band.elevation(1e4)).log10();
+            assert!((rise - slope).abs() < 1e-3, "{dom}: {rise}");
+        }
+        // k₁ = 6^(−7/3), k₂ = 6^(10/3): with the slope of 0.7, k₁(k₂m)^s is 1 at the threshold itself.
+        assert!((Band { dom: DOMS, fan: 0 }.elevation(1.0) - 2f32.powf(0.25)).abs() < 1e-3);
+    }
+
+    #[test]
+    fn mirrors_meet() {
+        // 4 pixels, a period of 9: 0 1 2 3 | 3 2 1 | 1 0
+        let places: Vec<usize> = (0..9).map(|i| mirrored(i, 4, 9)).collect();
+        assert_eq!(places, [0, 1, 2, 3, 3, 2, 1, 1, 0]);
+        assert!((0..40).all(|i| mirrored(i, 1, 40) == 0));
+    }
+}
