@@ -135,7 +135,11 @@ mod tests {
 
     #[test]
     fn the_error_of_known_halves() {
-        for (a, b, expected) in [(0.4f32, 0.6f32, 0.3 / (1e-4 + 1.5)), (0.04, 0.06, 0.03 / (1e-4 + 0.15f64.sqrt())), (0.0, 0.0, 0.0)] {
+        for (a, b, expected) in [
+            (0.4f32, 0.6f32, 0.3 / (1e-4 + 1.5)),
+            (0.04, 0.06, 0.03 / (1e-4 + 0.15f64.sqrt())),
+            (0.0, 0.0, 0.0),
+        ] {
             let mut film = empty();
             for value in [a, b] {
                 film.add(0, 50, &[[value; 3]; 1024]).unwrap();

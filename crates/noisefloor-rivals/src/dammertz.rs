@@ -79,15 +79,24 @@ impl Block {
 
     /// Cuts across the longer side (in pixels), where the errors on either side are most alike; at least two tiles.
     fn cut(&self, grid: TileGrid, errors: &[Errors]) -> [Self; 2] {
-        let pixels = |tiles: &Range<usize>, edge: usize| (tiles.end * grid.edge()).min(edge) - tiles.start * grid.edge();
+        let pixels = |tiles: &Range<usize>, edge: usize| {
+            (tiles.end * grid.edge()).min(edge) - tiles.start * grid.edge()
+        };
         let wide = self.rows.len() == 1
-            || self.columns.len() > 1 && pixels(&self.columns, grid.width()) >= pixels(&self.rows, grid.height());
+            || self.columns.len() > 1
+                && pixels(&self.columns, grid.width()) >= pixels(&self.rows, grid.height());
         let at = |place: usize| {
             let (columns, rows) = (self.columns.clone(), self.rows.clone());
             if wide {
-                [Self { columns: columns.start..place, rows: rows.clone() }, Self { columns: place..columns.end, rows }]
+                [
+                    Self { columns: columns.start..place, rows: rows.clone() },
+                    Self { columns: place..columns.end, rows },
+                ]
             } else {
-                [Self { columns: columns.clone(), rows: rows.start..place }, Self { columns, rows: place..rows.end }]
+                [
+                    Self { columns: columns.clone(), rows: rows.start..place },
+                    Self { columns, rows: place..rows.end },
+                ]
             }
         };
         let sum = |block: &Self| block.tiles(grid).map(|t| errors[t].0).sum::<f64>();
@@ -109,9 +118,12 @@ fn block_error(block: &Block, grid: TileGrid, errors: &[Errors], area: usize) ->
 
 fn tile_errors(film: &Film, exposure: f64, tile: Tile) -> Errors {
     let pixels = tile.rows(film.grid().width()).flatten();
-    pixels.filter_map(|p| half_difference(film, tile.index, p, exposure)).fold((0.0, 0), |(sum, n), (error, intensity)| {
-        (sum + if error > 0.0 { error / intensity.max(f64::MIN_POSITIVE).sqrt() } else { 0.0 }, n + 1)
-    })
+    pixels.filter_map(|p| half_difference(film, tile.index, p, exposure)).fold(
+        (0.0, 0),
+        |(sum, n), (error, intensity)| {
+            (sum + if error > 0.0 { error / intensity.max(f64::MIN_POSITIVE).sqrt() } else { 0.0 }, n + 1)
+        },
+    )
 }
 
 impl StoppingCriterion for Dammertz {

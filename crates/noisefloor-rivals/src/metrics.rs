@@ -85,12 +85,7 @@ pub fn flip(
 ///
 /// # Errors
 /// [`ImageError`] if sizes do not fit each other, or an edge is below 8 pixels.
-pub fn butteraugli(
-    reference: &[Rgb],
-    test: &[Rgb],
-    width: usize,
-    height: usize,
-) -> Result<Map, ImageError> {
+pub fn butteraugli(reference: &[Rgb], test: &[Rgb], width: usize, height: usize) -> Result<Map, ImageError> {
     let linear = |pixels| {
         let image = Image::new(width, height, pixels)?;
         let decode = |c: f32| srgb_decode(if c.is_nan() { 0.0 } else { c });
@@ -153,7 +148,9 @@ mod tests {
             let hash = (x * 2_654_435_761 + y * 40_503) % 65_536 / 256;
             let shift = [hash % 64, hash / 2 % 64, hash * 3 % 64];
             reference.push(ramp.map(|c| c as f32 / 255.0));
-            test.push(std::array::from_fn(|c| (ramp[c] as f32 + shift[c] as f32 - 32.0).clamp(0.0, 255.0) / 255.0));
+            test.push(std::array::from_fn(|c| {
+                (ramp[c] as f32 + shift[c] as f32 - 32.0).clamp(0.0, 255.0) / 255.0
+            }));
         }
         for (resolution, mean, largest, pixels) in [
             (67.0, 0.126_563_79, 0.452_112_14, [0.096_510_43, 0.095_037_535, 0.338_931_3]),
@@ -161,7 +158,12 @@ mod tests {
         ] {
             let map = flip(&reference, &test, width, height, resolution).unwrap();
             let got = [0, 16 * width + 24, 31 * width + 47].map(|i| map.values[i]);
-            assert!((map.mean() - mean).abs() < 1e-3 && (map.max() - largest).abs() < 1e-3, "{} {}", map.mean(), map.max());
+            assert!(
+                (map.mean() - mean).abs() < 1e-3 && (map.max() - largest).abs() < 1e-3,
+                "{} {}",
+                map.mean(),
+                map.max()
+            );
             assert!(got.iter().zip(pixels).all(|(a, b)| (a - b).abs() < 1e-3), "{got:?}");
         }
         let (black, white) = (vec![[0.0; 3]; 256], vec![[1.0; 3]; 256]);

@@ -18,12 +18,7 @@ pub(crate) fn enough(passed: usize, pixels: usize, share: f64) -> bool {
 
 /// Σ|I − A| and ΣI over the channels of one pixel, both times `exposure`: I is the mean of all samples, A that of half A
 /// (Dammertz et al. 2010, §2.1). `None` where a half has no valid sample, so that nothing is known of the error.
-pub(crate) fn half_difference(
-    film: &Film,
-    tile: usize,
-    pixel: usize,
-    exposure: f64,
-) -> Option<(f64, f64)> {
+pub(crate) fn half_difference(film: &Film, tile: usize, pixel: usize, exposure: f64) -> Option<(f64, f64)> {
     let [(a, na), (b, nb)] = film.pixel_halves(tile, pixel);
     if na == 0 || nb == 0 {
         return None;

@@ -1,9 +1,7 @@
 //! Relative standard error with confidence, as in Mitsuba 0.6.
 
 use crate::pixels::{DEFAULT_SHARE, Seen, enough, need_of_share, verdict};
-use noisefloor::{
-    CriterionError, Film, Needs, Rgb, StoppingCriterion, Tile, Verdict, View, luminance,
-};
+use noisefloor::{CriterionError, Film, Needs, Rgb, StoppingCriterion, Tile, Verdict, View, luminance};
 use rayon::prelude::*;
 use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
 
@@ -96,7 +94,8 @@ impl Batches {
 /// Two-sided quantiles of Student's t by degrees of freedom, beginning at 1; the normal one comes last, and stands for all above.
 fn quantiles(confidence: f64, degrees: usize) -> Vec<f64> {
     let tail = 0.5 + 0.5 * confidence.clamp(0.0, 1.0 - f64::EPSILON);
-    let student = |k: usize| StudentsT::new(0.0, 1.0, k as f64).map_or(f64::INFINITY, |t| t.inverse_cdf(tail));
+    let student =
+        |k: usize| StudentsT::new(0.0, 1.0, k as f64).map_or(f64::INFINITY, |t| t.inverse_cdf(tail));
     let mut all: Vec<f64> = (1..=degrees).into_par_iter().map(student).collect();
     all.push(Normal::standard().inverse_cdf(tail));
     all
@@ -198,12 +197,17 @@ mod tests {
             criterion.judge(&view(&film), &all(&film)).unwrap();
         }
         let pixels: Vec<&Batches> = criterion.pixels.iter().flatten().collect();
-        assert!(pixels.len() == 4096 && pixels.iter().all(|p| p.count as usize == batches && p.samples == 1453.0));
+        assert!(
+            pixels.len() == 4096 && pixels.iter().all(|p| p.count as usize == batches && p.samples == 1453.0)
+        );
         assert!(pixels.iter().all(|p| (p.mean - 0.5).abs() < 0.1));
         // s²/σ² is χ² over its ν degrees of freedom, of variance 2/ν; four deviations of the mean of 4096.
         let variance = pixels.iter().map(|p| p.variance().unwrap()).sum::<f64>() / 4096.0;
         let tolerance = 4.0 * (2.0 / (batches - 1) as f64 / 4096.0).sqrt();
-        assert!((variance / (sigma * sigma) - 1.0).abs() < tolerance, "{variance} ± {tolerance} ({batches} batches)");
+        assert!(
+            (variance / (sigma * sigma) - 1.0).abs() < tolerance,
+            "{variance} ± {tolerance} ({batches} batches)"
+        );
     }
 
     /// With ν degrees of freedom, t·s/√n ≤ e·m for a share P(χ²_ν ≤ ν·(e·m/σ)²·n/t²) of the pixels.
@@ -216,7 +220,8 @@ mod tests {
         for step in 1..=20 {
             expose(&mut film, 50, mean, sigma, &mut bell);
             expose(&mut film, 50, mean, sigma, &mut bell);
-            for (tile, verdict) in all(&film).iter().zip(criterion.judge(&view(&film), &all(&film)).unwrap()) {
+            for (tile, verdict) in all(&film).iter().zip(criterion.judge(&view(&film), &all(&film)).unwrap())
+            {
                 if verdict.converged && fired[tile.index] == 0 {
                     fired[tile.index] = step;
                 }

@@ -1,8 +1,8 @@
 //! Criteria by name.
 
 use crate::{
-    CyclesAdaptive, Dammertz, LuxCoreHalt, Myszkowski1998, RelativeError, Takouachet2007, TimeLimit, cycles, dammertz,
-    luxcore, relative_error, stages,
+    CyclesAdaptive, Dammertz, LuxCoreHalt, Myszkowski1998, RelativeError, Takouachet2007, TimeLimit, cycles,
+    dammertz, luxcore, relative_error, stages,
 };
 use noisefloor::{FixedSamples, StoppingCriterion};
 use thiserror::Error;
@@ -141,13 +141,19 @@ pub fn parse(spec: &str) -> Result<Box<dyn StoppingCriterion + Send>, SpecError>
     let constant = |name, default: f64, wanted, valid: fn(f64) -> bool| {
         let Some(number) = number else { return Ok(default) };
         let parsed = number.trim().parse::<f64>().ok().filter(|&x| x.is_finite() && valid(x));
-        parsed.ok_or_else(|| SpecError::Number { spec: spec.into(), name, wanted, example: default.to_string() })
+        parsed.ok_or_else(|| SpecError::Number {
+            spec: spec.into(),
+            name,
+            wanted,
+            example: default.to_string(),
+        })
     };
     if name == "time" {
         let seconds = constant("time", DEFAULT_SECONDS, "a number of seconds, at least 0", |s| s >= 0.0)?;
         return Ok(Box::new(TimeLimit::new(seconds)));
     }
-    let rival = RIVALS.iter().find(|r| r.name == name).ok_or_else(|| SpecError::Unknown { name: name.into() })?;
+    let rival =
+        RIVALS.iter().find(|r| r.name == name).ok_or_else(|| SpecError::Unknown { name: name.into() })?;
     Ok((rival.make)(constant(rival.name, rival.default, rival.wanted, rival.valid)?))
 }
 
@@ -175,9 +181,23 @@ mod tests {
     #[test]
     fn what_is_wrong_is_said() {
         let error = |spec| parse(spec).err().unwrap().to_string();
-        assert!(error("fixd:3").contains("\"fixd\"") && error("fixd:3").contains("relative-error:…, dammertz:…"));
+        assert!(
+            error("fixd:3").contains("\"fixd\"") && error("fixd:3").contains("relative-error:…, dammertz:…")
+        );
         assert_eq!(error("cycles:-1"), "\"cycles:-1\": cycles takes a number above 0, as in cycles:0.01");
-        for spec in ["", ":", "fixed:0", "fixed:x", "fixed:1e99", "time:-1", "time:NaN", "luxcore:1.1", "vdp-first:1", "dammertz:inf", "dammertz:"] {
+        for spec in [
+            "",
+            ":",
+            "fixed:0",
+            "fixed:x",
+            "fixed:1e99",
+            "time:-1",
+            "time:NaN",
+            "luxcore:1.1",
+            "vdp-first:1",
+            "dammertz:inf",
+            "dammertz:",
+        ] {
             assert!(parse(spec).is_err(), "{spec}");
         }
     }

@@ -197,7 +197,11 @@ mod tests {
         for n in 1..=400u64 {
             if n > 1 {
                 let half = *stages.half_way(10 * n).unwrap();
-                assert!(2 * half <= 10 * n && 2.3 * half as f64 >= (10 * n) as f64 - 20.0, "{half} at {}", 10 * n);
+                assert!(
+                    2 * half <= 10 * n && 2.3 * half as f64 >= (10 * n) as f64 - 20.0,
+                    "{half} at {}",
+                    10 * n
+                );
             }
             stages.keep(10 * n, 10 * n);
             assert!(stages.kept.len() <= 10, "{:?}", stages.kept);

@@ -1,7 +1,8 @@
 //! Films and sources of known noise, for tests.
 
 use noisefloor::{
-    Batch, Display, Film, ProgressiveSource, Repeats, Request, Rgb, SourceError, SourceInfo, TileGrid, Unit, View,
+    Batch, Display, Film, ProgressiveSource, Repeats, Request, Rgb, SourceError, SourceInfo, TileGrid, Unit,
+    View,
 };
 
 static SRGB: Display = Display::SRGB;
@@ -79,7 +80,8 @@ impl ProgressiveSource for Noise {
         let sample = |r: &Request| {
             let mut bell = Bell(r.first << 20 | r.tile.index as u64);
             let deviation = self.sigma / f64::from(r.samples).sqrt();
-            let pixels = (0..r.tile.pixels()).map(|i| (r.tile.x + i % r.tile.width, r.tile.y + i / r.tile.width));
+            let pixels =
+                (0..r.tile.pixels()).map(|i| (r.tile.x + i % r.tile.width, r.tile.y + i / r.tile.width));
             let value = |(x, y)| [((self.picture)(x, y) * (1.0 + deviation * bell.next())) as f32; 3];
             Batch { tile: r.tile, samples: r.samples, mean: pixels.map(value).collect() }
         };

@@ -30,7 +30,10 @@ fn each_drives_a_source_to_the_end() {
     assert_eq!(SPECS.len(), RIVALS.len() + 1);
     for spec in SPECS {
         let stops = drive(spec);
-        assert!(stops.len() == 4 && stops.iter().all(|s| s.reason == StopReason::Converged), "{spec}: {stops:?}");
+        assert!(
+            stops.len() == 4 && stops.iter().all(|s| s.reason == StopReason::Converged),
+            "{spec}: {stops:?}"
+        );
     }
 }
 

@@ -159,7 +159,12 @@ impl Cortex {
         let weighted: Vec<Complex32> = if band.dom == DOMS {
             spectrum.iter().zip(dom).map(|(value, d)| value * d).collect()
         } else {
-            spectrum.iter().zip(dom).zip(&self.fans[band.fan]).map(|((value, d), f)| value * (d * f)).collect()
+            spectrum
+                .iter()
+                .zip(dom)
+                .zip(&self.fans[band.fan])
+                .map(|((value, d), f)| value * (d * f))
+                .collect()
         };
         self.fourier.inverse(weighted)
     }

@@ -108,7 +108,10 @@ mod tests {
         assert!((2.0..5.0).contains(&peak) && (150.0..300.0).contains(&height), "{peak} {height}");
         assert!((35.0..60.0).contains(&cut), "{cut}");
         let (dark_peak, dark_height, dark_cut) = shape(adapted(0.1));
-        assert!(dark_peak < peak && dark_height < 0.6 * height && dark_cut < 0.7 * cut, "{dark_peak} {dark_height} {dark_cut}");
+        assert!(
+            dark_peak < peak && dark_height < 0.6 * height && dark_cut < 0.7 * cut,
+            "{dark_peak} {dark_height} {dark_cut}"
+        );
     }
 
     #[test]

@@ -23,12 +23,14 @@ impl fmt::Debug for Fourier {
 
 /// The smallest length from `least` on that has no prime factor above 5, and whose transform is quick therefore.
 pub(super) fn quick_length(least: usize) -> usize {
-    let rest = |n: usize| [2, 3, 5].into_iter().fold(n, |mut n, p| {
-        while n % p == 0 {
-            n /= p;
-        }
-        n
-    });
+    let rest = |n: usize| {
+        [2, 3, 5].into_iter().fold(n, |mut n, p| {
+            while n % p == 0 {
+                n /= p;
+            }
+            n
+        })
+    };
     (least.max(1)..).find(|&n| rest(n) == 1).unwrap_or(least)
 }
 
@@ -49,7 +51,9 @@ fn transpose(plane: &[Complex32], width: usize) -> Vec<Complex32> {
 
 fn each_row(plane: &mut [Complex32], fft: &dyn Fft<f32>) {
     let scratch = || vec![Complex32::default(); fft.get_inplace_scratch_len()];
-    plane.par_chunks_mut(fft.len()).for_each_init(scratch, |scratch, row| fft.process_with_scratch(row, scratch));
+    plane
+        .par_chunks_mut(fft.len())
+        .for_each_init(scratch, |scratch, row| fft.process_with_scratch(row, scratch));
 }
 
 impl Fourier {
@@ -96,7 +100,9 @@ mod tests {
     #[test]
     fn a_wave_is_one_frequency() {
         let fourier = Fourier::new(20, 12);
-        let wave = |i: usize| (std::f32::consts::TAU * (3.0 * (i % 20) as f32 / 20.0 + 2.0 * (i / 20) as f32 / 12.0)).cos();
+        let wave = |i: usize| {
+            (std::f32::consts::TAU * (3.0 * (i % 20) as f32 / 20.0 + 2.0 * (i / 20) as f32 / 12.0)).cos()
+        };
         let spectrum = fourier.forward((0..240).map(|i| Complex32::new(wave(i), 0.0)).collect());
         let loud: Vec<usize> = (0..240).filter(|&i| spectrum[i].norm() > 1.0).collect();
         assert_eq!(loud, [3 * 12 + 2, 17 * 12 + 10]);

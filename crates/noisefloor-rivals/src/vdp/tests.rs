@@ -54,7 +54,14 @@ fn gratings_are_detected_at_the_threshold_of_the_sensitivity_function() {
     // In the middle of a band, 1.6…13 cycles per degree, along both axes and in between.
     let vdp = Vdp::default();
     let third = std::f64::consts::FRAC_PI_3;
-    for (frequency, angle) in [(1.0 / 24.0, 0.0), (1.0 / 12.0, 0.0), (1.0 / 6.0, 0.0), (1.0 / 3.0, 0.0), (1.0 / 6.0, 1.5 * third), (1.0 / 6.0, third)] {
+    for (frequency, angle) in [
+        (1.0 / 24.0, 0.0),
+        (1.0 / 12.0, 0.0),
+        (1.0 / 6.0, 0.0),
+        (1.0 / 3.0, 0.0),
+        (1.0 / 6.0, 1.5 * third),
+        (1.0 / 6.0, third),
+    ] {
         let ratio = threshold(&vdp, frequency, angle, &[]) / published(frequency, angle);
         assert!((0.95..1.05).contains(&ratio), "{frequency} {angle}: {ratio}");
     }
@@ -88,7 +95,8 @@ fn a_mask_of_another_band_does_not() {
     let vdp = Vdp::default();
     let frequency = 1.0 / 6.0;
     let alone = threshold(&vdp, frequency, 0.0, &[]);
-    for mask in [(20.0 * alone, frequency, std::f64::consts::FRAC_PI_2), (20.0 * alone, frequency / 4.0, 0.0)] {
+    for mask in [(20.0 * alone, frequency, std::f64::consts::FRAC_PI_2), (20.0 * alone, frequency / 4.0, 0.0)]
+    {
         let raised = threshold(&vdp, frequency, 0.0, &[mask]) / alone;
         assert!((0.8..1.25).contains(&raised), "{mask:?}: {raised}");
     }
