@@ -5,7 +5,7 @@ use noisefloor::{CriterionError, Film, Needs, StoppingCriterion, Tile, TileGrid,
 use rayon::prelude::*;
 
 /// Default of [`CyclesAdaptive::threshold`]: Blender's.
-pub const DEFAULT_THRESHOLD: f64 = 0.01;
+pub(crate) const DEFAULT_THRESHOLD: f64 = 0.01;
 /// Smallest automatic threshold.
 const LEAST_AUTOMATIC: f64 = 0.001;
 /// Keeps black pixels from dividing by zero.
@@ -20,9 +20,9 @@ const EPSILON: f64 = 1e-4;
 /// A tile is done when a `share` of its pixels has converged. Tiles that are done count as converged for their neighbours.
 #[derive(Clone, Debug)]
 pub struct CyclesAdaptive {
-    /// Error below which a pixel has converged, above 0.
+    /// Error below which a pixel has converged, above 0; 0.01 by default.
     pub threshold: f64,
-    /// Share of a tile's pixels that have to converge, in (0, 1].
+    /// Share of a tile's pixels that have to converge, in (0, 1]; 0.95 by default.
     pub share: f64,
     seen: Seen,
     /// Whether each pixel of the image has converged.
@@ -201,7 +201,7 @@ mod tests {
     fn as_many_pixels_converge_as_mathematics_says() {
         // 3·|I − A| has a deviation of 3σ/√n: at 2.5 of them, p = 0.98758 of the pixels are below, and p⁹ stay so beside their
         // neighbours. 51 ± 7 are above, and take 9 each: a share of 1.6 % is one deviation; three of those.
-        let (mean, sigma, n) = (0.1, 0.05, 100.0f64);
+        let (mean, sigma, n) = (0.1f64, 0.05, 100.0f64);
         let threshold = 2.5 * 3.0 * sigma / n.sqrt() / (EPSILON + (3.0 * mean).sqrt());
         let (mut film, mut bell) = (empty(), Bell(5));
         for _ in 0..2 {

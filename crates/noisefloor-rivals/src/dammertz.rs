@@ -6,9 +6,9 @@ use rayon::prelude::*;
 use std::ops::Range;
 
 /// Default of [`Dammertz::stop`].
-pub const DEFAULT_STOP: f64 = 0.0002;
+pub(crate) const DEFAULT_STOP: f64 = 0.0002;
 /// Default of [`Dammertz::split`] (Dammertz et al. 2010, §2.2).
-pub const DEFAULT_SPLIT: f64 = 256.0;
+const DEFAULT_SPLIT: f64 = 256.0;
 
 /// Dammertz, Hanika, Keller, Lensch 2010, "A Hierarchical Automatic Stopping Condition for Monte Carlo Global Illumination".
 ///
@@ -22,9 +22,9 @@ pub const DEFAULT_SPLIT: f64 = 256.0;
 /// Done is done: as in the paper, a block is not looked at again.
 #[derive(Clone, Debug)]
 pub struct Dammertz {
-    /// Error below which a block is done, above 0.
+    /// Error below which a block is done, above 0; 0.0002 by default.
     pub stop: f64,
-    /// Error below which a block is cut in two, in units of `stop`, at least 1.
+    /// Error below which a block is cut in two, in units of `stop`, at least 1; 256 by default.
     pub split: f64,
     seen: Seen,
     blocks: Vec<Block>,

@@ -4,7 +4,7 @@ use noisefloor::{Rgb, TileError, check_image};
 use thiserror::Error;
 
 /// A picture whose size and pixels do not go together.
-#[derive(Debug, Error, Clone, PartialEq, Eq)]
+#[derive(Debug, Error, Clone, PartialEq)]
 pub enum ImageError {
     /// The size is out of range.
     #[error(transparent)]
@@ -23,7 +23,7 @@ pub enum ImageError {
     },
     /// Two pictures that are to be compared have different sizes.
     #[error(
-        "pictures of {}×{} and {}×{} pixels cannot be compared: give two of the same size", .0.0, .0.1, .1.0, .1.1
+        "pictures of {0:?} and {1:?} pixels (width, height) cannot be compared: give two of the same size"
     )]
     Differ((usize, usize), (usize, usize)),
     /// Too small for a metric.

@@ -4,11 +4,11 @@ use crate::pixels::{Seen, displayed, enough, verdict};
 use noisefloor::{CriterionError, Rgb, StoppingCriterion, Tile, Verdict, View};
 
 /// Default of [`LuxCoreHalt::share`].
-pub const DEFAULT_SHARE: f64 = 0.01;
+pub(crate) const DEFAULT_SHARE: f64 = 0.01;
 /// Default of [`LuxCoreHalt::threshold`]: one step of an 8-bit screen.
-pub const DEFAULT_THRESHOLD: f32 = 1.0 / 256.0;
+const DEFAULT_THRESHOLD: f32 = 1.0 / 256.0;
 /// Default of [`LuxCoreHalt::step`] and [`LuxCoreHalt::warmup`] (`batch.haltthreshold.step` and `.warmup` of LuxCoreRender).
-pub const DEFAULT_STEP: f64 = 64.0;
+const DEFAULT_STEP: f64 = 64.0;
 
 /// The convergence test of LuxCoreRender 2 (`film/convtest/filmconvtest.cpp`).
 ///
@@ -19,13 +19,13 @@ pub const DEFAULT_STEP: f64 = 64.0;
 /// It halts a whole picture, and so it does here: all tiles are done at once. The share of pixels is left open by LuxCoreRender.
 #[derive(Clone, Debug)]
 pub struct LuxCoreHalt {
-    /// Largest share of the pixels that may have changed, in [0, 1].
+    /// Largest share of the pixels that may have changed, in [0, 1]; 0.01 by default.
     pub share: f64,
-    /// Samples per pixel between two tests, above 0.
+    /// Samples per pixel between two tests, above 0; 64 by default.
     pub step: f64,
-    /// Samples per pixel before the first test, at least 0.
+    /// Samples per pixel before the first test, at least 0; 64 by default.
     pub warmup: f64,
-    /// Change of a displayed channel that counts, at least 0.
+    /// Change of a displayed channel that counts, at least 0; 1/256 by default, one step of an 8-bit screen.
     pub threshold: f32,
     seen: Seen,
     /// Picture and samples per pixel at the last test.

@@ -6,9 +6,9 @@ use rayon::prelude::*;
 use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
 
 /// Default of [`RelativeError::error`] (`maxError` of Mitsuba 0.6).
-pub const DEFAULT_ERROR: f64 = 0.05;
+pub(crate) const DEFAULT_ERROR: f64 = 0.05;
 /// Default of [`RelativeError::confidence`] (`pValue` 0.05 of Mitsuba 0.6).
-pub const DEFAULT_CONFIDENCE: f64 = 0.95;
+pub(crate) const DEFAULT_CONFIDENCE: f64 = 0.95;
 /// Pixels darker than this share of the average luminance are held to it.
 const DARK: f64 = 0.01;
 
@@ -26,11 +26,11 @@ const DARK: f64 = 0.01;
 /// Memory: 72 bytes a pixel beside the film.
 #[derive(Clone, Debug)]
 pub struct RelativeError {
-    /// Largest relative half-width of the confidence interval, above 0.
+    /// Largest relative half-width of the confidence interval, above 0; 0.05 by default.
     pub error: f64,
-    /// Confidence, in (0, 1).
+    /// Confidence, in (0, 1); 0.95 by default.
     pub confidence: f64,
-    /// Share of a tile's pixels that have to be done, in (0, 1].
+    /// Share of a tile's pixels that have to be done, in (0, 1]; 0.95 by default.
     pub share: f64,
     seen: Seen,
     /// Of each pixel of each tile; empty until the tile is judged first.
@@ -93,6 +93,7 @@ impl Batches {
 
 /// Two-sided quantiles of Student's t by degrees of freedom, beginning at 1; the normal one comes last, and stands for all above.
 fn quantiles(confidence: f64, degrees: usize) -> Vec<f64> {
+    let confidence = if confidence.is_nan() { 0.0 } else { confidence };
     let tail = 0.5 + 0.5 * confidence.clamp(0.0, 1.0 - f64::EPSILON);
     let student =
         |k: usize| StudentsT::new(0.0, 1.0, k as f64).map_or(f64::INFINITY, |t| t.inverse_cdf(tail));
