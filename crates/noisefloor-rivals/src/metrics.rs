@@ -5,7 +5,7 @@
 //! | [`relative_mse`] | linear radiance | |
 //! | [`psnr`] | display values | |
 //! | [`flip`] | display values, 8 bits | near 0; no published limit |
-//! | [`butteraugli`] | display values | largest below [`BUTTERAUGLI_SAME`] |
+//! | [`butteraugli()`] | display values | largest below [`BUTTERAUGLI_SAME`] |
 //!
 //! Pictures are row-major, `width`×`height` pixels.
 
@@ -17,7 +17,7 @@ use nv_flip::FlipImageRgb8;
 /// ε of [`relative_mse`], in the unit of its pictures squared.
 pub const RELATIVE_MSE_EPSILON: f64 = 0.01;
 
-/// Largest value of [`butteraugli`] below which two pictures look the same, by its authors' scale.
+/// Largest value of [`butteraugli()`] below which two pictures look the same, by its authors' scale.
 pub const BUTTERAUGLI_SAME: f64 = 1.0;
 
 /// Smallest edge of a picture that butteraugli takes.
