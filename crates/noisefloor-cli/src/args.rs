@@ -7,6 +7,7 @@ use noisefloor::{
     Audience, DEFAULT_KEY, DEFAULT_THRESHOLD, DEFAULT_TILE, Evidence, MAX_TILE, MIN_TILE, Model, Oracle,
     Params, Schedule, ToneMapping,
 };
+use noisefloor_rivals::{RIVALS, Rival};
 use std::fs::File;
 use std::io::BufReader;
 use std::num::NonZeroUsize;
@@ -27,6 +28,7 @@ pub struct Cli {
 #[derive(Debug, Subcommand)]
 pub enum Command {
     Render(Box<RenderArgs>),
+    Compare(CompareArgs),
     Judge(JudgeArgs),
     Train(TrainArgs),
     Evaluate(EvaluateArgs),
@@ -57,44 +59,12 @@ pub struct RenderArgs {
     /// Built-in scene (see `noisefloor scenes`), or a scene file: glTF 2.0 (.gltf, .glb) or Mitsuba XML (.xml); with --source, what
     /// that source reads [default: cornell-box].
     pub scene: Option<String>,
-    /// Who renders: `ptwne`, the built-in path tracer; `mitsuba`, `cycles`, `luxcore` (path tracing), `luxcore-sobol`,
-    /// `luxcore-metropolis` or `luxcore-bidir`, which `noisefloor doctor` sets up; `exr`, which plays a folder of pictures back; or `command: PROGRAM …`, any program that renders into an EXR or PFM file, with {scene} {seed} {spp} {out}, and {x0} {x1}
-    /// {y0} {y1} if it can render tiles (x1 and y1 are exclusive).
-    #[arg(long, default_value = "ptwne", value_name = "SOURCE", value_parser = parse_source)]
-    pub source: SourceChoice,
-    /// With another renderer: give it up if a call takes so many seconds.
-    #[arg(long, default_value = "1800", value_name = "SECONDS", value_parser = parse_seconds)]
-    pub timeout: std::time::Duration,
+    #[command(flatten)]
+    pub renderer: RendererArgs,
     /// Output folder [default: out/SCENE].
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
-    /// Image size in pixels [default: what the scene file says, else 384x384; what a command renders].
-    #[arg(long, value_name = "WxH", value_parser = parse_size)]
-    pub size: Option<(usize, usize)>,
-    /// Seed of the random numbers: same seed, same image and same stops, whatever the number of threads (of the built-in path tracer; not
-    /// every renderer promises it).
-    #[arg(long, default_value_t = 1)]
-    pub seed: u64,
-    /// Threads [default: one a core].
-    #[arg(long)]
-    pub threads: Option<NonZeroUsize>,
-    /// Longest path, in segments: 1 is light seen directly, 2 is direct light [default: what the scene file says, else 65].
-    #[arg(long, value_name = "N")]
-    pub max_depth: Option<u32>,
-    /// Built-in renderer: without multiple importance sampling, the plain path tracing with next event estimation of the paper.
-    #[arg(long)]
-    pub no_mis: bool,
-    /// Built-in renderer: how the samples of a pixel are spread. The model was trained on independent ones [default: independent].
-    #[arg(long, value_enum)]
-    pub sampler: Option<SamplerChoice>,
-    /// Built-in renderer: how pixels weigh the light around them [default: box].
-    #[arg(long, value_enum)]
-    pub filter: Option<FilterChoice>,
-    /// Built-in renderer: scale samples down whose largest channel is brighter than this. Takes away fireflies, and light; how often
-    /// is in report.json [default: never].
-    #[arg(long, value_name = "RADIANCE")]
-    pub clamp: Option<f32>,
-    /// What stops a tile: `oracle`, or `spp:N` for N samples per pixel everywhere.
+    /// What stops a tile: `oracle`, `spp:N` for N samples per pixel everywhere, or one of the criteria of `noisefloor compare --help`.
     #[arg(long, default_value = "oracle", value_parser = parse_criterion)]
     pub criterion: CriterionChoice,
     #[command(flatten)]
@@ -132,6 +102,70 @@ pub struct RenderArgs {
     #[arg(long, default_value = "30", value_name = "SECONDS", value_parser = parse_pause)]
     pub autosave: std::time::Duration,
     /// No progress bar and no summary.
+    #[arg(long, short)]
+    pub quiet: bool,
+}
+
+/// Let stopping criteria watch one render, and compare what each costs and what it leaves.
+///
+/// Each scene is rendered once, uniformly. Every criterion sees the same samples and takes those of a tile until it stops it: what it took,
+/// what that cost, and how far its picture is from the converged one (relMSE, PSNR, FLIP, butteraugli) is set beside uniform sampling.
+///
+/// Criteria: `oracle`; `spp:N`; `relative-error`, `dammertz`, `cycles`, `luxcore`, `vdp-stages`, `vdp-first`, each with a constant of its
+/// own (`cycles:0.01`) or with the one at which it agrees with people on average.
+///
+/// Writes into the output folder: index.html with all of it (one file, opens without a server), runs.csv, runs.json, and for each scene
+/// curve.csv, tiles.csv, plots (SVG and PNG), crops with error maps, every criterion's picture, and the reference, which the next
+/// comparison of the same scene uses again.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  noisefloor compare cornell-box glass-spheres --size 256x256 --tile 64
+  noisefloor compare hall/scene.xml --reference hall.exr --criteria oracle,cycles:0.01,dammertz
+  noisefloor compare cornell-box --criteria oracle,cycles,dammertz --sweep 6    the rivals at six strictnesses each
+  noisefloor compare hall/scene.xml --source mitsuba --max-spp 1000")]
+pub struct CompareArgs {
+    /// Scenes, as for `render`.
+    #[arg(required = true, value_name = "SCENE")]
+    pub scenes: Vec<String>,
+    #[command(flatten)]
+    pub renderer: RendererArgs,
+    /// Output folder.
+    #[arg(long, value_name = "DIR", default_value = "out/compare")]
+    pub out: PathBuf,
+    /// The criteria; plots have a colour for each.
+    #[arg(
+        long,
+        value_name = "NAME[:CONSTANT],…",
+        value_delimiter = ',',
+        default_value = "oracle,relative-error,dammertz,cycles,luxcore,vdp-stages,vdp-first"
+    )]
+    pub criteria: Vec<String>,
+    /// Each criterion that is given without a constant also at so many others, from strict to lax.
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=50))]
+    pub sweep: u32,
+    #[command(flatten)]
+    pub oracle: OracleArgs,
+    #[command(flatten)]
+    pub tone: ToneArgs,
+    /// Tile edge in pixels, 16…512.
+    #[arg(long, default_value_t = DEFAULT_TILE, value_name = "PIXELS")]
+    pub tile: usize,
+    /// Samples per pixel between two verdicts on a tile.
+    #[arg(long, default_value_t = 100, value_name = "SPP")]
+    pub batch: u32,
+    /// The run ends at so many samples per pixel, whoever is not satisfied.
+    #[arg(long, value_name = "SPP", default_value_t = 2000)]
+    pub max_spp: u64,
+    /// The converged picture, in linear light [default: rendered with --reference-spp].
+    #[arg(long, value_name = "FILE.exr")]
+    pub reference: Option<PathBuf>,
+    /// Samples per pixel of a reference that is rendered.
+    #[arg(long, value_name = "SPP", default_value_t = 8000)]
+    pub reference_spp: u64,
+    /// How far people are from the screen, for FLIP and the visible-differences predictor: pixels in a degree of their view.
+    #[arg(long, value_name = "N", default_value_t = 67.0)]
+    pub pixels_per_degree: f64,
+    /// No progress bar and no table.
     #[arg(long, short)]
     pub quiet: bool,
 }
@@ -249,6 +283,11 @@ pub struct EvaluateArgs {
     /// Leave numbers out of the descriptor, by their names in the table, to see what they are worth.
     #[arg(long, value_name = "NAME,…", value_delimiter = ',', requires = "leave_one_scene_out")]
     pub without: Vec<String>,
+    /// Also score what people use instead: other stopping criteria, by the names of `noisefloor compare --help`, the constant of each
+    /// fitted on the other scenes. Minutes each; the visible-differences predictors, an hour. With --figures, draws mean thresholds
+    /// scene by scene.
+    #[arg(long, value_name = "NAME,…", value_delimiter = ',', requires = "corpus", value_parser = parse_rival)]
+    pub rivals: Vec<&'static Rival>,
     #[command(flatten)]
     pub search: SearchArgs,
 }
@@ -373,6 +412,45 @@ pub struct SearchArgs {
     pub gamma: Vec<f64>,
 }
 
+/// Who renders, and how.
+#[derive(Clone, Debug, Args)]
+pub struct RendererArgs {
+    /// Who renders: `ptwne`, the built-in path tracer; `mitsuba`, `cycles`, `luxcore` (path tracing), `luxcore-sobol`,
+    /// `luxcore-metropolis` or `luxcore-bidir`, which `noisefloor doctor` sets up; `exr`, which plays a folder of pictures back; or `command: PROGRAM …`, any program that renders into an EXR or PFM file, with {scene} {seed} {spp} {out}, and {x0} {x1}
+    /// {y0} {y1} if it can render tiles (x1 and y1 are exclusive).
+    #[arg(long, default_value = "ptwne", value_name = "SOURCE", value_parser = parse_source)]
+    pub source: SourceChoice,
+    /// With another renderer: give it up if a call takes so many seconds.
+    #[arg(long, default_value = "1800", value_name = "SECONDS", value_parser = parse_seconds)]
+    pub timeout: std::time::Duration,
+    /// Image size in pixels [default: what the scene file says, else 384x384; what a command renders].
+    #[arg(long, value_name = "WxH", value_parser = parse_size)]
+    pub size: Option<(usize, usize)>,
+    /// Seed of the random numbers: same seed, same image and same stops, whatever the number of threads (of the built-in path tracer; not
+    /// every renderer promises it).
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+    /// Threads [default: one a core].
+    #[arg(long)]
+    pub threads: Option<NonZeroUsize>,
+    /// Longest path, in segments: 1 is light seen directly, 2 is direct light [default: what the scene file says, else 65].
+    #[arg(long, value_name = "N")]
+    pub max_depth: Option<u32>,
+    /// Built-in renderer: without multiple importance sampling, the plain path tracing with next event estimation of the paper.
+    #[arg(long)]
+    pub no_mis: bool,
+    /// Built-in renderer: how the samples of a pixel are spread. The model was trained on independent ones [default: independent].
+    #[arg(long, value_enum)]
+    pub sampler: Option<SamplerChoice>,
+    /// Built-in renderer: how pixels weigh the light around them [default: box].
+    #[arg(long, value_enum)]
+    pub filter: Option<FilterChoice>,
+    /// Built-in renderer: scale samples down whose largest channel is brighter than this. Takes away fireflies, and light; how often
+    /// is in report.json [default: never].
+    #[arg(long, value_name = "RADIANCE")]
+    pub clamp: Option<f32>,
+}
+
 /// Which oracle.
 #[derive(Debug, Args)]
 pub struct OracleArgs {
@@ -462,10 +540,12 @@ pub enum SourceChoice {
     Adapter(&'static Adapter),
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub enum CriterionChoice {
     Oracle,
     Fixed(u64),
+    /// A specification that is known to be right.
+    Rival(String),
 }
 
 fn parse_source(text: &str) -> Result<SourceChoice, String> {
@@ -485,6 +565,11 @@ fn parse_adapter(text: &str) -> Result<&'static Adapter, String> {
     let names = || ADAPTERS.iter().map(|adapter| adapter.name).collect::<Vec<_>>().join(", ");
     let found = ADAPTERS.iter().find(|adapter| adapter.name == text);
     found.ok_or_else(|| format!("the other renderers are: {}", names()))
+}
+
+fn parse_rival(text: &str) -> Result<&'static Rival, String> {
+    let names = || RIVALS.iter().map(|rival| rival.name).collect::<Vec<_>>().join(", ");
+    RIVALS.iter().find(|rival| rival.name == text).ok_or_else(|| format!("the rivals are: {}", names()))
 }
 
 fn parse_size(text: &str) -> Result<(usize, usize), String> {
@@ -519,7 +604,10 @@ fn parse_criterion(text: &str) -> Result<CriterionChoice, String> {
             Ok(n) if n > 0 => Ok(CriterionChoice::Fixed(n)),
             _ => Err(format!("spp:{n} needs a positive whole number of samples, such as spp:1000")),
         },
-        _ => Err("expected `oracle` or `spp:N`".into()),
+        _ => match noisefloor_rivals::parse(text) {
+            Ok(_) => Ok(CriterionChoice::Rival(text.to_owned())),
+            Err(error) => Err(format!("{error}; or `oracle`")),
+        },
     }
 }
 
@@ -576,6 +664,16 @@ pub fn load_model(path: Option<&Path>) -> anyhow::Result<Model> {
     Model::read(BufReader::new(file)).with_context(|| format!("{}", path.display()))
 }
 
+impl RendererArgs {
+    /// Makes the pool of threads that was asked for.
+    pub fn set_threads(&self) -> anyhow::Result<()> {
+        if let Some(threads) = self.threads {
+            rayon::ThreadPoolBuilder::new().num_threads(threads.get()).build_global().context("--threads")?;
+        }
+        Ok(())
+    }
+}
+
 impl RenderArgs {
     /// Session parameters, checked.
     pub fn params(&self) -> anyhow::Result<Params> {
@@ -583,10 +681,12 @@ impl RenderArgs {
             ScheduleChoice::Every => Schedule::Every { step: self.batch },
             ScheduleChoice::Spaced => Schedule::Spaced { step: self.batch },
         };
-        let max_samples = match self.criterion {
-            CriterionChoice::Oracle => self.max_spp.unwrap_or(Params::default().max_samples),
+        let max_samples = match &self.criterion {
+            CriterionChoice::Oracle | CriterionChoice::Rival(_) => {
+                self.max_spp.unwrap_or(Params::default().max_samples)
+            }
             // Exactly so many, not the next multiple of the batch.
-            CriterionChoice::Fixed(samples) => self.max_spp.map_or(samples, |most| most.min(samples)),
+            CriterionChoice::Fixed(samples) => self.max_spp.map_or(*samples, |most| most.min(*samples)),
         };
         let params = Params {
             tile: self.tile,

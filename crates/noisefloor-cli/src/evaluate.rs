@@ -3,6 +3,7 @@
 use crate::args::{EvaluateArgs, load_model};
 use crate::figures;
 use crate::output::{write_csv, write_json};
+use crate::rivals::{self, Rated};
 use crate::train::{descriptor, held_out, load_table, search};
 use anyhow::{anyhow, bail};
 use noisefloor::Model;
@@ -56,6 +57,9 @@ struct Report {
     unfamiliar_zones: usize,
     levels_real: usize,
     levels_synthesised: usize,
+    /// Other criteria on the same zones, if `--rivals` asked for them.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    rivals: Vec<Rated>,
 }
 
 pub fn run(args: &EvaluateArgs) -> anyhow::Result<()> {
@@ -89,7 +93,10 @@ pub fn run(args: &EvaluateArgs) -> anyhow::Result<()> {
             (model.digest(), table.zones.iter().map(|z| predict(model, args.threshold, z)).collect())
         }
     };
-    let report = Report::new(predicted_by, &table, &predictions, params.spread);
+    let mut report = Report::new(predicted_by, &table, &predictions, params.spread);
+    if !args.rivals.is_empty() {
+        report.rivals = rivals::rate(&args.data.corpus, &args.rivals)?;
+    }
     if let Some(path) = &args.json {
         write_json(path, &report)?;
     }
@@ -98,8 +105,14 @@ pub fn run(args: &EvaluateArgs) -> anyhow::Result<()> {
     }
     if let Some(dir) = &args.figures {
         figures::write(dir, &args.data.corpus, &predictions, &report.reliability)?;
+        if !args.rivals.is_empty() {
+            rivals::draw(&dir.join("rivals.svg"), &predictions, &report.rivals)?;
+        }
     }
     report.print();
+    if !args.rivals.is_empty() {
+        rivals::print(&predictions, &report.rivals);
+    }
 
     // What flatters a number stands beside it.
     let seen = |m: &Model| -> Vec<String> {
@@ -157,6 +170,7 @@ impl Report {
             unfamiliar_zones: predictions.iter().filter(|p| p.unfamiliar).count(),
             levels_real: real,
             levels_synthesised: levels().count() - real,
+            rivals: Vec::new(),
         }
     }
 

@@ -121,7 +121,7 @@ fn blank(zones: &[&Prediction]) -> (Picture, Places) {
 }
 
 /// Colours that people with colour-blindness can tell apart too (Okabe and Ito 2008), and a shape for each.
-const COLOURS: [RGBColor; 8] = [
+pub const COLOURS: [RGBColor; 8] = [
     RGBColor(0, 114, 178),
     RGBColor(213, 94, 0),
     RGBColor(0, 158, 115),
@@ -134,7 +134,7 @@ const COLOURS: [RGBColor; 8] = [
 const SIZE: (u32, u32) = (640, 560);
 const LETTERS: (&str, u32) = ("sans-serif", 15);
 
-fn failed(error: impl std::fmt::Display) -> anyhow::Error {
+pub fn failed(error: impl std::fmt::Display) -> anyhow::Error {
     anyhow::anyhow!("a plot cannot be drawn: {error}")
 }
 

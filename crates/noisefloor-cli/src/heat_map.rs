@@ -85,13 +85,22 @@ impl DrawTarget for Canvas {
 }
 
 impl Canvas {
-    fn new(width: usize, height: usize, colour: [u8; 3]) -> Self {
+    pub fn new(width: usize, height: usize, colour: [u8; 3]) -> Self {
         Self { width, height, bytes: colour.repeat(width * height) }
     }
 
-    fn set(&mut self, x: usize, y: usize, colour: [u8; 3]) {
+    pub fn set(&mut self, x: usize, y: usize, colour: [u8; 3]) {
         if x < self.width && y < self.height {
             self.bytes[(y * self.width + x) * 3..][..3].copy_from_slice(&colour);
+        }
+    }
+
+    /// Mixes a colour into a pixel; `alpha` is its share.
+    pub fn blend(&mut self, x: usize, y: usize, colour: [u8; 3], alpha: f64) {
+        if x < self.width && y < self.height {
+            for (old, new) in self.bytes[(y * self.width + x) * 3..][..3].iter_mut().zip(colour) {
+                *old = (f64::from(*old) * (1.0 - alpha) + f64::from(new) * alpha).round() as u8;
+            }
         }
     }
 
@@ -105,7 +114,8 @@ impl Canvas {
         }
     }
 
-    fn text(
+    /// Letters in `colour`, their middle line at the height given.
+    pub fn text(
         &mut self,
         text: &str,
         at: (usize, usize),

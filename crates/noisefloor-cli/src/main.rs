@@ -4,6 +4,7 @@
 
 mod args;
 mod audience;
+mod compare;
 mod doctor;
 mod evaluate;
 mod figures;
@@ -13,6 +14,7 @@ mod judge;
 mod output;
 mod render;
 mod reproduce;
+mod rivals;
 mod sources;
 mod train;
 
@@ -26,6 +28,7 @@ const INTERRUPTED: u8 = 130;
 fn main() -> ExitCode {
     let outcome = match Cli::parse().command {
         Command::Render(args) => render::run(&args),
+        Command::Compare(args) => compare::run(&args),
         Command::Judge(args) => judge::run(&args).map(|()| ExitCode::SUCCESS),
         Command::Train(args) => train::run(&args).map(|()| ExitCode::SUCCESS),
         Command::Evaluate(args) => evaluate::run(&args).map(|()| ExitCode::SUCCESS),

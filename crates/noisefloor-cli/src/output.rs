@@ -6,36 +6,22 @@ use crate::sources::Source;
 use anyhow::{Context, bail};
 use noisefloor::{Clock, Display, Params, Progress, Rgb, Session, Stop, StopReason, StoppingCriterion};
 use noisefloor_exr::{RenderLayers, check_writable, read_exr, write_atomic, write_exr, write_png};
+use noisefloor_rivals::metrics::relative_mse;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// Mean over pixels and channels of (x − r)²/(r² + ε), to a reference r.
-pub struct RelMse {
-    reference: Vec<Rgb>,
-}
-
-/// Keeps black pixels of the reference from dividing by zero; the value of Rousselle et al. 2011.
-const EPSILON: f64 = 0.01;
-
-impl RelMse {
-    pub fn load(path: &Path, (width, height): (usize, usize)) -> anyhow::Result<Self> {
-        let image = read_exr(path)?;
-        if (image.width, image.height) != (width, height) {
-            let (w, h) = (image.width, image.height);
-            bail!("{} has {w}×{h} pixels, the render {width}×{height}: set --size {w}x{h}", path.display());
-        }
-        if !image.pixels.iter().flatten().all(|c| c.is_finite()) {
-            bail!("{} has pixels that are not finite: it cannot be compared with", path.display());
-        }
-        Ok(Self { reference: image.pixels })
+/// A picture to compare a render of that size with: linear radiance, row-major, all of it finite.
+pub fn read_reference(path: &Path, (width, height): (usize, usize)) -> anyhow::Result<Vec<Rgb>> {
+    let image = read_exr(path)?;
+    if (image.width, image.height) != (width, height) {
+        let (w, h) = (image.width, image.height);
+        bail!("{} has {w}×{h} pixels, the render {width}×{height}: set --size {w}x{h}", path.display());
     }
-
-    fn of(&self, image: &[Rgb]) -> f64 {
-        let each = image.iter().flatten().zip(self.reference.iter().flatten());
-        let sum: f64 = each.map(|(&x, &r)| f64::from(x - r).powi(2) / (f64::from(r).powi(2) + EPSILON)).sum();
-        sum / (3 * image.len()) as f64
+    if !image.pixels.iter().flatten().all(|c| c.is_finite()) {
+        bail!("{} has pixels that are not finite: it cannot be compared with", path.display());
     }
+    Ok(image.pixels)
 }
 
 /// One line of timeline.csv.
@@ -120,7 +106,7 @@ pub struct Output {
     source: String,
     seed: u64,
     model: Option<ModelFacts>,
-    rel_mse: Option<RelMse>,
+    reference: Option<Vec<Rgb>>,
     timeline: Vec<TimelineRow>,
 }
 
@@ -131,19 +117,22 @@ impl Output {
         scene: String,
         source: String,
         model: Option<ModelFacts>,
-        rel_mse: Option<RelMse>,
+        reference: Option<Vec<Rgb>>,
     ) -> anyhow::Result<Self> {
         let folder = args.out.clone().unwrap_or_else(|| Path::new("out").join(&scene));
         std::fs::create_dir_all(&folder).with_context(|| {
             format!("{}: cannot make this folder; choose another with --out", folder.display())
         })?;
         check_writable(folder.join("image.exr"))?;
-        Ok(Self { folder, scene, source, seed: args.seed, model, rel_mse, timeline: Vec::new() })
+        Ok(Self { folder, scene, source, seed: args.renderer.seed, model, reference, timeline: Vec::new() })
     }
 
     /// Notes one batch.
     pub fn record<C: StoppingCriterion>(&mut self, session: &Session<C>, progress: &Progress) {
-        let rel_mse = self.rel_mse.as_ref().map(|r| r.of(&session.film().image()));
+        let rel_mse = self
+            .reference
+            .as_ref()
+            .and_then(|reference| relative_mse(&session.film().image(), reference).ok());
         let noisefloor::TimelinePoint { seconds, samples, active_tiles } = progress.now;
         self.timeline.push(TimelineRow { seconds, samples, active_tiles, rel_mse });
     }

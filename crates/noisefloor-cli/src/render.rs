@@ -2,12 +2,12 @@
 
 use crate::INTERRUPTED;
 use crate::args::{CriterionChoice, RenderArgs};
-use crate::output::{ModelFacts, Output, RelMse};
+use crate::output::{ModelFacts, Output, read_reference};
 use crate::sources::{self, Opened, Source};
 use anyhow::Context;
 use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressStyle};
 use noisefloor::{
-    Driver, Event, FixedSamples, Progress, ProgressiveSource, Session, SourceInfo, StopReason,
+    Driver, Event, FixedSamples, Progress, ProgressiveSource, Rgb, Session, SourceInfo, StopReason,
     StoppingCriterion,
 };
 use std::process::ExitCode;
@@ -18,23 +18,25 @@ use std::time::{Duration, Instant};
 pub fn run(args: &RenderArgs) -> anyhow::Result<ExitCode> {
     // Whatever can be wrong is found before anything is rendered.
     let params = args.params()?;
-    if let Some(threads) = args.threads {
-        rayon::ThreadPoolBuilder::new().num_threads(threads.get()).build_global().context("--threads")?;
-    }
-    let Opened { source, scene, warnings } = sources::open(args)?;
+    args.renderer.set_threads()?;
+    let Opened { source, scene, warnings } = sources::open(args.scene.as_deref(), &args.renderer)?;
     if !args.quiet {
         warnings.iter().for_each(|warning| eprintln!("warning: {warning}"));
     }
     let SourceInfo { width, height, .. } = source.info();
-    let rel_mse = args.against.as_deref().map(|path| RelMse::load(path, (width, height))).transpose()?;
-    match args.criterion {
+    let reference = args.against.as_deref().map(|path| read_reference(path, (width, height))).transpose()?;
+    match &args.criterion {
         CriterionChoice::Oracle => {
             let oracle = args.oracle.load()?;
             let facts = ModelFacts { digest: oracle.model().digest(), just_visible: oracle.just_visible() };
-            drive(Driver::new(source, oracle, params)?, args, scene, Some(facts), rel_mse)
+            drive(Driver::new(source, oracle, params)?, args, scene, Some(facts), reference)
         }
         CriterionChoice::Fixed(samples) => {
-            drive(Driver::new(source, FixedSamples(samples), params)?, args, scene, None, rel_mse)
+            drive(Driver::new(source, FixedSamples(*samples), params)?, args, scene, None, reference)
+        }
+        CriterionChoice::Rival(spec) => {
+            let criterion = noisefloor_rivals::parse(spec)?;
+            drive(Driver::new(source, criterion, params)?, args, scene, None, reference)
         }
     }
 }
@@ -44,9 +46,9 @@ fn drive<C: StoppingCriterion>(
     args: &RenderArgs,
     scene: String,
     model: Option<ModelFacts>,
-    rel_mse: Option<RelMse>,
+    reference: Option<Vec<Rgb>>,
 ) -> anyhow::Result<ExitCode> {
-    let mut output = Output::create(args, scene, driver.source().info().name, model, rel_mse)?;
+    let mut output = Output::create(args, scene, driver.source().info().name, model, reference)?;
     driver.set_time_limit(args.time);
     let cancel = driver.cancel_flag();
     cancel_on_signal(Arc::clone(&cancel))?;
@@ -90,7 +92,7 @@ fn drive<C: StoppingCriterion>(
 }
 
 /// The first signal asks the driver to end; a second one ends the process at once.
-fn cancel_on_signal(cancel: Arc<AtomicBool>) -> anyhow::Result<()> {
+pub fn cancel_on_signal(cancel: Arc<AtomicBool>) -> anyhow::Result<()> {
     ctrlc::set_handler(move || {
         if cancel.swap(true, Ordering::Relaxed) {
             std::process::exit(i32::from(INTERRUPTED));

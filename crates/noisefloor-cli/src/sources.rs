@@ -1,6 +1,6 @@
 //! Who renders: the built-in path tracer, a renderer in another process, a stack of pictures, or a command.
 
-use crate::args::{FilterChoice, RenderArgs, SamplerChoice, SourceChoice};
+use crate::args::{FilterChoice, RendererArgs, SamplerChoice, SourceChoice};
 use anyhow::{Context, bail};
 use noisefloor::ProgressiveSource;
 use noisefloor_exr::{CommandOptions, CommandSource, StackSource};
@@ -98,8 +98,7 @@ pub struct Opened {
 }
 
 /// Opens what `--source` and the scene say.
-pub fn open(args: &RenderArgs) -> anyhow::Result<Opened> {
-    let scene = args.scene.as_deref();
+pub fn open(scene: Option<&str>, args: &RendererArgs) -> anyhow::Result<Opened> {
     let (source, scene, warnings): (Box<dyn Source>, _, _) = match &args.source {
         SourceChoice::Ptwne => return ptwne(args, scene.unwrap_or(DEFAULT_SCENE)),
         SourceChoice::Adapter(adapter) => {
@@ -140,7 +139,7 @@ pub fn open(args: &RenderArgs) -> anyhow::Result<Opened> {
 }
 
 /// Refuses options that another source than the built-in renderer has not; `more` are others, and whether they are given.
-fn only_ptwne(args: &RenderArgs, source: &str, more: &[(&str, bool)]) -> anyhow::Result<()> {
+fn only_ptwne(args: &RendererArgs, source: &str, more: &[(&str, bool)]) -> anyhow::Result<()> {
     let given = [
         ("--no-mis", args.no_mis),
         ("--sampler", args.sampler.is_some()),
@@ -153,7 +152,7 @@ fn only_ptwne(args: &RenderArgs, source: &str, more: &[(&str, bool)]) -> anyhow:
     Ok(())
 }
 
-fn ptwne(args: &RenderArgs, scene: &str) -> anyhow::Result<Opened> {
+fn ptwne(args: &RendererArgs, scene: &str) -> anyhow::Result<Opened> {
     let Loaded { scene, size, max_depth, warnings } = load(scene)?;
     let (width, height) = args.size.or(size).unwrap_or(DEFAULT_SIZE);
     let name = scene.name().to_owned();

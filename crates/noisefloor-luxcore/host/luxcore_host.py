@@ -41,6 +41,8 @@ FORCED = {
 SIDES = ["x", "y", "width", "height"]
 # Most seconds between two looks at how far a session is
 POLL = 0.01
+# Sobol points of a session: batches of any size then have the noise of as many sessions, and no less for being large
+SOBOL_BLOCK = 8
 # Samples a pixel beyond those asked for that are waited for pixels that have none: LuxCore drops invalid samples
 PATIENCE = 4
 
@@ -62,7 +64,7 @@ class LuxCore:
         self.np, self.lux = numpy, pyluxcore
         pyluxcore.Init(lambda message: None)
         self.seed, self.drawn = init["seed"], 0
-        self.metropolis = sampler == "metropolis"
+        self.metropolis, self.sobol = sampler == "metropolis", sampler == "sobol"
 
         # Files that a scene names lie beside it
         folder, name = os.path.split(init["scene"])
@@ -81,7 +83,9 @@ class LuxCore:
         }
 
     def sample(self, tiles):
-        return self._continue_chains(tiles) if self.metropolis else self._fresh_sessions(tiles)
+        if self.metropolis:
+            return self._continue_chains(tiles)
+        return self._in_blocks(tiles) if self.sobol else self._fresh_sessions(tiles)
 
     def reference(self):
         return None
@@ -214,6 +218,19 @@ class LuxCore:
                 self.surplus[key] = drawn - given
                 answers[member] = (given, self.np.ascontiguousarray(picture[inside]))
         return answers
+
+    def _in_blocks(self, tiles):
+        """As many sessions of a block of points as the samples asked for take."""
+        left = [tile["samples"] for tile in tiles]
+        given, sums = [0] * len(tiles), [0.0] * len(tiles)
+        while any(left):
+            due = [i for i, samples in enumerate(left) if samples]
+            parts = [tiles[i] | {"samples": min(SOBOL_BLOCK, left[i])} for i in due]
+            for i, part, (samples, mean) in zip(due, parts, self._fresh_sessions(parts)):
+                sums[i] = sums[i] + mean.astype(self.np.float64) * samples
+                given[i] += samples
+                left[i] -= part["samples"]
+        return [(n, (total / n).astype(self.np.float32)) for n, total in zip(given, sums)]
 
     # Metropolis sampler
 

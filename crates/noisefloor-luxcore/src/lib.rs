@@ -20,8 +20,8 @@
 //!
 //! - [`Sampler::Random`], [`Sampler::Sobol`]: a fresh session of LuxCore, with a fresh seed, for every rectangle of tiles of a call. Batches
 //!   are independent. A session starts in some milliseconds, and then has to build the tree over the scene's triangles, about a
-//!   second for a million of them. Sobol samples have less noise in larger batches, which is not what a model has learned
-//!   from independent samples.
+//!   second for a million of them. Sobol points would have less noise in larger batches: sessions have eight of them, so
+//!   that a batch of any size has the noise of as many sessions.
 //! - [`Sampler::Metropolis`]: a Markov chain must not be cut. Two chains live in every tile, paused in between, and take turns; noisefloor
 //!   keeps one in each half of its film. The unit of work is mutations a pixel. Each chain holds a scene of its own: memory
 //!   grows with tiles × scene, beside 0.4 MB a chain. Perspective and orthographic cameras only. Of a chain, one batch knows of

@@ -337,6 +337,14 @@ impl<C: StoppingCriterion> Session<C> {
         (0..self.tiles.len()).filter_map(|tile| self.close(tile, reason)).collect()
     }
 
+    /// Whether a tile is not done.
+    ///
+    /// # Panics
+    /// If the tile does not exist.
+    pub fn is_open(&self, tile: usize) -> bool {
+        self.tiles[tile].stop.is_none()
+    }
+
     /// Whether every tile is done.
     pub fn is_done(&self) -> bool {
         self.open_tiles() == 0

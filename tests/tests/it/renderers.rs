@@ -27,11 +27,11 @@ fn cycles_keeps_the_contract() {
     }
 }
 
-/// Sobol samples are left out: 32 of them have less noise in one batch than in four, which is what they are for.
 #[test]
 fn luxcore_keeps_the_contract() {
     if usable(&noisefloor_luxcore::RENDERER) {
         check_source(|| luxcore(Engine::Path, Sampler::Random, 48, 40).unwrap());
+        check_source(|| luxcore(Engine::Path, Sampler::Sobol, 48, 40).unwrap());
         check_source(|| luxcore(Engine::Path, Sampler::Metropolis, 48, 40).unwrap());
         check_source(|| luxcore(Engine::Bidir, Sampler::Random, 48, 40).unwrap());
     }
@@ -129,6 +129,40 @@ fn memory_is_flat_over_a_thousand_calls() {
         flat(luxcore(Engine::Path, Sampler::Random, 48, 40).unwrap(), 1000);
         flat(luxcore(Engine::Path, Sampler::Metropolis, 48, 40).unwrap(), 200);
     }
+}
+
+/// A file that Blender saved, with an image inside, is the scene that the script made.
+#[test]
+fn a_blend_file_is_what_was_saved() {
+    if !usable(&noisefloor_cycles::RENDERER) {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let (script, saved) = (folder.path().join("scene.py"), folder.path().join("scene.blend"));
+    let box_script = cornell_box("py", 1, 1).scene;
+    let text = format!(
+        "import bpy, runpy
+runpy.run_path({box_script:?})
+image = bpy.data.images.new('checks', 2, 2)
+image.pixels.foreach_set([0.8, 0.6, 0.2, 1.0, 0.1, 0.1, 0.1, 1.0] * 2)
+image.pack()
+tree = bpy.data.materials['white'].node_tree
+texture, place = tree.nodes.new('ShaderNodeTexImage'), tree.nodes.new('ShaderNodeTexCoord')
+texture.image = image
+tree.links.new(place.outputs['Generated'], texture.inputs['Vector'])
+diffuse = next(node for node in tree.nodes if node.type == 'BSDF_DIFFUSE')
+tree.links.new(texture.outputs['Color'], diffuse.inputs['Color'])
+bpy.ops.wm.save_as_mainfile(filepath={saved:?})
+"
+    );
+    std::fs::write(&script, text).unwrap();
+    let open = |scene: &std::path::Path| {
+        noisefloor_cycles::open(&Job { size: Some(SIZE), seed: 3, ..Job::new(scene) }).unwrap()
+    };
+    let made = picture(open(&script), 16);
+    assert!(made == picture(open(&saved), 16), "the saved scene is another one");
+    let plain = picture(cycles(SIZE.0, SIZE.1).unwrap(), 16);
+    assert!(block_error(&plain, &made, 0) > 0.01, "the image is not on the walls");
 }
 
 #[test]

@@ -1,0 +1,103 @@
+//! How far a picture is from the converged one.
+
+use noisefloor::{Display, Rgb, TileGrid};
+use noisefloor_rivals::metrics;
+use serde::Serialize;
+
+/// Distances of a picture from the reference.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct Quality {
+    /// Of linear radiance.
+    pub rel_mse: f64,
+    /// Of display values, in dB.
+    pub psnr: f64,
+    /// Mean FLIP error of display values.
+    pub flip: f64,
+    /// Mean FLIP error of the worst tile.
+    pub flip_worst: f64,
+    /// Butteraugli, 3-norm.
+    pub butteraugli: f64,
+    /// Butteraugli, 3-norm, of the worst tile.
+    pub butteraugli_worst: f64,
+}
+
+/// The converged picture, and how it is looked at.
+pub struct Yardstick {
+    grid: TileGrid,
+    display: Display,
+    linear: Vec<Rgb>,
+    shown: Vec<Rgb>,
+    pixels_per_degree: f64,
+}
+
+/// The 3-norm of the values of an area: what the authors of butteraugli pool its map with.
+fn norm3(values: &mut dyn Iterator<Item = f32>) -> f64 {
+    let (sum, count) = values.fold((0.0, 0usize), |(s, n), v| (s + f64::from(v).powi(3), n + 1));
+    (sum / count.max(1) as f64).cbrt()
+}
+
+fn mean(values: &mut dyn Iterator<Item = f32>) -> f64 {
+    let (sum, count) = values.fold((0.0, 0usize), |(s, n), v| (s + f64::from(v), n + 1));
+    sum / count.max(1) as f64
+}
+
+impl Yardstick {
+    /// `reference` is linear radiance, row-major over the image of `grid`.
+    pub fn new(grid: TileGrid, display: Display, reference: Vec<Rgb>, pixels_per_degree: f64) -> Self {
+        let shown = reference.iter().map(|&p| display.encode(p)).collect();
+        Self { grid, display, linear: reference, shown, pixels_per_degree }
+    }
+
+    pub fn display(&self) -> &Display {
+        &self.display
+    }
+
+    pub fn grid(&self) -> TileGrid {
+        self.grid
+    }
+
+    /// The converged picture, display-encoded.
+    pub fn shown(&self) -> &[Rgb] {
+        &self.shown
+    }
+
+    /// A picture as it is displayed.
+    pub fn encode(&self, image: &[Rgb]) -> Vec<Rgb> {
+        image.iter().map(|&p| self.display.encode(p)).collect()
+    }
+
+    /// FLIP error of each pixel of a display-encoded picture.
+    pub fn flip(&self, shown: &[Rgb]) -> anyhow::Result<Vec<f32>> {
+        let (width, height) = (self.grid.width(), self.grid.height());
+        Ok(metrics::flip(&self.shown, shown, width, height, self.pixels_per_degree)?.values)
+    }
+
+    /// Mean over each tile of the FLIP errors of the pixels.
+    pub fn flip_of_tiles(&self, errors: &[f32]) -> Vec<f64> {
+        self.of_tiles(errors, mean)
+    }
+
+    /// All distances of a picture of linear radiance.
+    pub fn quality(&self, image: &[Rgb]) -> anyhow::Result<Quality> {
+        let shown = self.encode(image);
+        let (width, height) = (self.grid.width(), self.grid.height());
+        let (flip, butteraugli) =
+            rayon::join(|| self.flip(&shown), || metrics::butteraugli(&self.shown, &shown, width, height));
+        let (flip, butteraugli) = (flip?, butteraugli?.values);
+        let worst = |tiles: Vec<f64>| tiles.into_iter().fold(0.0, f64::max);
+        Ok(Quality {
+            rel_mse: metrics::relative_mse(image, &self.linear)?,
+            psnr: metrics::psnr(&shown, &self.shown)?,
+            flip: mean(&mut flip.iter().copied()),
+            flip_worst: worst(self.of_tiles(&flip, mean)),
+            butteraugli: norm3(&mut butteraugli.iter().copied()),
+            butteraugli_worst: worst(self.of_tiles(&butteraugli, norm3)),
+        })
+    }
+
+    fn of_tiles(&self, values: &[f32], pool: fn(&mut dyn Iterator<Item = f32>) -> f64) -> Vec<f64> {
+        let width = self.grid.width();
+        let of = |tile: noisefloor::Tile| pool(&mut tile.rows(width).flatten().map(|pixel| values[pixel]));
+        self.grid.tiles().map(of).collect()
+    }
+}
