@@ -37,7 +37,6 @@ pub struct Rated {
     /// Over zones without censored thresholds, samples per pixel.
     pub mean_spp: f64,
     pub scenes: Vec<SceneMean>,
-    #[serde(skip)]
     pub predictions: Vec<Prediction>,
 }
 
@@ -218,7 +217,8 @@ impl Stack {
         let params = Params {
             tile: self.edge,
             tone_mapping: ToneMapping::Srgb { exposure: 1.0 },
-            schedule: Schedule::Every { step: 1 },
+            // At every stage: each brings more than a step.
+            schedule: Schedule::Every { step: 2 },
             max_samples: u64::from(u32::MAX),
             ..Params::default()
         };

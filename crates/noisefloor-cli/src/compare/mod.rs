@@ -34,6 +34,8 @@ pub struct Run {
     pub scene: String,
     pub source: String,
     pub criterion: String,
+    /// What the criterion calls itself, with its constant.
+    pub name: String,
     pub family: String,
     /// Samples per pixel, on average and in the tile with most.
     pub spp_mean: f64,
@@ -136,10 +138,9 @@ fn params(args: &CompareArgs) -> anyhow::Result<Params> {
         max_samples: args.max_spp,
         ..Params::default()
     };
-    params.check()?;
-    if args.batch < 2 {
-        bail!("--batch must be at least 2, one sample for each half of the film");
-    }
+    params.check().with_context(|| {
+        format!("--tile {}, --batch {}, --max-spp {}", args.tile, args.batch, args.max_spp)
+    })?;
     Ok(params)
 }
 
@@ -220,6 +221,7 @@ fn runs(race: &Race, yardstick: &Yardstick, scene: &str, source: &str) -> anyhow
             scene: scene.into(),
             source: source.into(),
             criterion: entrant.spec.clone(),
+            name: entrant.name(),
             family: entrant.family.clone(),
             spp_mean,
             spp_most: (0..grid.len()).map(|t| film.samples(t)).max().unwrap_or(0),

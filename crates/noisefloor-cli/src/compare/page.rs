@@ -131,9 +131,10 @@ fn scene(html: &mut String, compared: &Compared) -> anyhow::Result<()> {
 fn row(html: &mut String, run: &Run) -> anyhow::Result<()> {
     write!(
         html,
-        "<tr{}><td>{}</td><td>{:.0}</td><td>{}</td><td>{} of {}</td><td>{}</td><td>{}</td><td>{}</td><td>{:.1}</td><td>{}</td><td>{}</td>\
+        "<tr{}><td title=\"{}\">{}</td><td>{:.0}</td><td>{}</td><td>{} of {}</td><td>{}</td><td>{}</td><td>{}</td><td>{:.1}</td><td>{}</td><td>{}</td>\
          <td>{}</td><td>{}</td><td>{}</td></tr>\n",
         mark(&run.family),
+        escape(&run.name),
         escape(&run.criterion),
         run.spp_mean,
         run.spp_most,

@@ -48,10 +48,6 @@ impl Yardstick {
         Self { grid, display, linear: reference, shown, pixels_per_degree }
     }
 
-    pub fn display(&self) -> &Display {
-        &self.display
-    }
-
     pub fn grid(&self) -> TileGrid {
         self.grid
     }

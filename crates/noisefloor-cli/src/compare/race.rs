@@ -35,7 +35,7 @@ impl Entrant {
         self.session.film()
     }
 
-    /// What it calls itself.
+    /// What it calls itself, with its constant.
     pub fn name(&self) -> String {
         self.session.criterion().name()
     }
@@ -58,8 +58,6 @@ pub struct Point {
 pub struct Race {
     pub entrants: Vec<Entrant>,
     pub curve: Vec<Point>,
-    /// The way to the screen that all criteria judged by.
-    pub display: Display,
     /// Seconds that one more sample of each pixel of a tile costs, tile by tile.
     tile_seconds: Vec<f64>,
     /// Whether somebody broke it off.
@@ -149,7 +147,7 @@ pub fn run(
         curve.push(Point { spp: done, quality: judge.quality(&film.image())? });
     }
     let tile_seconds = clock.tile_seconds(&grid.tiles().collect::<Vec<_>>());
-    Ok((Race { entrants, curve, display: *judge.display(), tile_seconds, cancelled }, judge))
+    Ok((Race { entrants, curve, tile_seconds, cancelled }, judge))
 }
 
 /// What sampling costs, tile by tile.

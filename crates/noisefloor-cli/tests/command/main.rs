@@ -6,6 +6,9 @@ mod audience;
 /// One line, no panic, nothing lost.
 #[cfg(test)]
 mod bad_input;
+/// Criteria side by side.
+#[cfg(test)]
+mod compare;
 /// Every subcommand explains itself.
 #[cfg(test)]
 mod help;
