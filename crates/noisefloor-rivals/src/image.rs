@@ -1,7 +1,11 @@
 //! Pictures in and maps out.
 
 use noisefloor::{Rgb, TileError, check_image};
+use std::ops::RangeInclusive;
 use thiserror::Error;
+
+/// Pixels per degree that make sense: the filters of a metric grow with them.
+pub(crate) const RESOLUTIONS: RangeInclusive<f64> = 1.0..=1000.0;
 
 /// A picture whose size and pixels do not go together.
 #[derive(Debug, Error, Clone, PartialEq)]
@@ -46,8 +50,12 @@ pub enum ImageError {
         /// What it said.
         why: String,
     },
-    /// The resolution of the viewing condition is not a positive number.
-    #[error("the resolution must be a positive number of pixels per degree of the visual field, not {0}")]
+    /// The resolution of the viewing condition is out of range.
+    #[error(
+        "the resolution must be {least} to {most} pixels per degree of the visual field, not {0}",
+        least = RESOLUTIONS.start(),
+        most = RESOLUTIONS.end()
+    )]
     Resolution(f64),
 }
 

@@ -9,7 +9,7 @@
 //!
 //! Pictures are row-major, `width`×`height` pixels.
 
-use crate::image::{Image, ImageError, Map};
+use crate::image::{Image, ImageError, Map, RESOLUTIONS};
 use butteraugli::{ButteraugliParams, Img, RGB};
 use noisefloor::{Rgb, srgb_decode};
 use nv_flip::FlipImageRgb8;
@@ -58,7 +58,7 @@ fn mean_of_channels(
 /// 67, [`crate::Viewing::pixels_per_degree`] that of the other metrics here. Display values are rounded to 8 bits, as on a screen.
 ///
 /// # Errors
-/// [`ImageError`] if sizes do not fit each other, or the resolution is no positive number.
+/// [`ImageError`] if sizes do not fit each other, or the resolution is outside 1…1000.
 pub fn flip(
     reference: &[Rgb],
     test: &[Rgb],
@@ -66,7 +66,7 @@ pub fn flip(
     height: usize,
     pixels_per_degree: f64,
 ) -> Result<Map, ImageError> {
-    if !(pixels_per_degree.is_finite() && pixels_per_degree > 0.0) {
+    if !RESOLUTIONS.contains(&pixels_per_degree) {
         return Err(ImageError::Resolution(pixels_per_degree));
     }
     let image = |pixels| {
@@ -192,6 +192,9 @@ mod tests {
 
     #[test]
     fn what_does_not_fit_is_an_error() {
+        assert!(
+            flip(&[[0.0; 3]], &[[0.0; 3]], 1, 1, 1e9).unwrap_err().to_string().contains("1 to 1000 pixels")
+        );
         let picture = vec![[0.5; 3]; 64];
         assert!(matches!(flip(&picture, &picture, 8, 9, 40.0), Err(ImageError::Pixels { .. })));
         assert!(matches!(flip(&picture, &picture, 8, 8, 0.0), Err(ImageError::Resolution(_))));

@@ -75,7 +75,7 @@ fn verdicts(map: Option<&[f32]>, width: usize, tiles: &[Tile], limit: f64, share
 /// Var(Iₙ − I₂ₙ) = σ²/2n = Var(I₂ₙ).
 ///
 /// The paper asks it of the whole picture. The whole picture is compared once by each call, and each tile takes its verdict from
-/// the map. Memory: 4 bytes a pixel for each of 8 or 9 stages.
+/// the map. Memory: 4 bytes a pixel for each of up to ten stages.
 #[derive(Clone, Debug)]
 pub struct Myszkowski1998 {
     /// Probability of detection above which a pixel differs visibly, in (0, 1); 0.75 by default.

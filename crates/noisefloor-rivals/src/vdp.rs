@@ -41,7 +41,7 @@ const PSYCHOMETRIC: f32 = 3.5;
 /// - local amplitude is that of a complex cortex transform (Lukin 2009), in place of a blur of |C|.
 ///
 /// Where a grating's frequency or orientation lies between bands, each of them sees half of it, and the predicted threshold is
-/// up to 1.65 times as high for either: Daly's bands and his summation are made so.
+/// up to 1.65 times as high for either, 2.7 times for both: Daly's bands and his summation are made so.
 ///
 /// With those k₁ and k₂, a mask at its own threshold elevates it by 2^¼ = 1.19 where s is 0.7, but sixfold where s is 1: noise masks
 /// noise.

@@ -68,6 +68,18 @@ fn gratings_are_detected_at_the_threshold_of_the_sensitivity_function() {
 }
 
 #[test]
+fn detection_rises_by_the_psychometric_function() {
+    let vdp = Vdp::default();
+    let frequency = 1.0 / 6.0;
+    let half = threshold(&vdp, frequency, 0.0, &[]);
+    for times in [0.6f64, 0.8, 1.25, 1.6] {
+        let seen = f64::from(seen(&vdp, &[], &[(times * half, frequency, 0.0)]));
+        let expected = 1.0 - (-times.powf(3.5)).exp2();
+        assert!((seen - expected).abs() < 0.03, "{times}: {seen}, not {expected}");
+    }
+}
+
+#[test]
 fn between_bands_two_of_them_see_half() {
     // Each has ½: 2·(½·c)^β = 1 at c = 2·2^(−1/β) = 1.641.
     let vdp = Vdp::default();
@@ -86,6 +98,8 @@ fn a_mask_of_the_same_band_raises_the_threshold() {
     let raised = |times: f64| threshold(&vdp, frequency, 0.0, &[(times * alone, frequency, 0.0)]) / alone;
     let (faint, low, high) = (raised(0.02), raised(0.5), raised(4.0));
     assert!((0.9..1.1).contains(&faint), "{faint}");
+    // (1 + (k₁k₂·½)⁴)^¼ for a slope of 1, with k₁k₂ = 6.
+    assert!((low / 82f64.powf(0.25) - 1.0).abs() < 0.05, "{low}");
     let slope = (high / low).ln() / 8f64.ln();
     assert!((0.7..1.05).contains(&slope), "{low} {high}: {slope}");
 }
