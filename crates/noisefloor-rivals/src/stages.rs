@@ -125,7 +125,7 @@ impl StoppingCriterion for Myszkowski1998 {
 /// for global illumination computations".
 ///
 /// The predictor compares the first picture that was judged with the present one (Takouachet et al. 2017, §2). While noise goes
-/// away, the two differ more and more visibly; once it has gone, no more. A tile is done when no more than a `share` of its pixels
+/// away, it masks the difference of the two less and less, and they differ more and more visibly; once it has gone, no more. A tile is done when no more than a `share` of its pixels
 /// has a probability of detection that differs by more than `probability` from that of the stage with half of the samples. How
 /// the end of the growth is told is not said in the later paper, and is our reading. The constant is ours to choose, by data.
 ///
