@@ -7,7 +7,7 @@ use crate::{
 use noisefloor::{FixedSamples, StoppingCriterion};
 use thiserror::Error;
 
-/// Samples per pixel of `fixed` without a number.
+/// Samples per pixel of `spp` without a number.
 const DEFAULT_SAMPLES: f64 = 1000.0;
 /// Seconds of `time` without a number.
 const DEFAULT_SECONDS: f64 = 60.0;
@@ -38,7 +38,7 @@ const PROBABILITY: &str = "a probability above 0 and below 1";
 /// All rivals with one open constant.
 pub const RIVALS: &[Rival] = &[
     Rival {
-        name: "fixed",
+        name: "spp",
         title: "Fixed samples per pixel",
         default: DEFAULT_SAMPLES,
         range: (100_000.0, 2.0),
@@ -130,7 +130,7 @@ fn known() -> String {
     names.map(|name| format!("{name}:…")).collect::<Vec<_>>().join(", ")
 }
 
-/// Makes a criterion of a spec: a name, and after a colon its constant, or the default without one. `"fixed:256"`, `"time:30"`
+/// Makes a criterion of a spec: a name, and after a colon its constant, or the default without one. `"spp:256"`, `"time:30"`
 /// (seconds), `"relative-error:0.05"`, `"dammertz:0.0002"`, `"cycles:0.01"`, `"luxcore:0.01"`, `"vdp-stages:0.75"`,
 /// `"vdp-first:0.5"`.
 ///
@@ -164,8 +164,8 @@ mod tests {
     #[test]
     fn specs_name_criteria() {
         for (spec, name) in [
-            ("fixed:256", "256 samples per pixel"),
-            ("fixed", "1000 samples per pixel"),
+            ("spp:256", "256 samples per pixel"),
+            ("spp", "1000 samples per pixel"),
             ("time:1.5", "1.5 seconds"),
             ("relative-error", "relative error 0.05 at 95 %"),
             ("dammertz:0.002", "Dammertz et al. 2010, stop 0.002"),
@@ -188,9 +188,9 @@ mod tests {
         for spec in [
             "",
             ":",
-            "fixed:0",
-            "fixed:x",
-            "fixed:1e99",
+            "spp:0",
+            "spp:x",
+            "spp:1e99",
             "time:-1",
             "time:NaN",
             "luxcore:1.1",

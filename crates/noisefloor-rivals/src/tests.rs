@@ -6,7 +6,7 @@ use noisefloor::{Driver, Film, Params, Rgb, Stop, StopReason, StoppingCriterion,
 
 /// Every criterion, lax enough to come to an end soon.
 const SPECS: [&str; 8] = [
-    "fixed:300",
+    "spp:300",
     "time:0",
     "relative-error:0.1",
     "dammertz:0.01",
