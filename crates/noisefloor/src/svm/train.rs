@@ -206,6 +206,82 @@ mod tests {
         }
     }
 
+    /// What training may be given: examples that repeat or contradict one another, two of them, numbers that say nothing, tiny or huge
+    /// ones, and classes of very different sizes.
+    fn extremes() -> Vec<(&'static str, Array2<f64>, Vec<bool>)> {
+        let (rows, labels) = clouds(60, 3);
+        let scaled = |factor: f64| rows.mapv(|v| v * factor);
+        let repeated = Array2::from_shape_fn((60, 3), |(i, j)| rows[(i % 4, j)]);
+        let mut dull = rows.clone();
+        dull.column_mut(1).fill(7.0);
+        let few: Vec<bool> = (0..1001).map(|i| i == 500).collect();
+        vec![
+            ("clouds", rows.clone(), labels.clone()),
+            ("repeated", repeated.clone(), labels.clone()),
+            ("contradictory", repeated, (0..60).map(|i| (i / 4) % 2 == 0).collect()),
+            ("two", Array2::from_shape_fn((2, 3), |(i, _)| i as f64), vec![true, false]),
+            ("all the same", Array2::zeros((60, 3)), labels.clone()),
+            ("a constant number", dull, labels.clone()),
+            ("tiny", scaled(1e-12), labels.clone()),
+            ("huge", scaled(1e12), labels),
+            ("one in a thousand", clouds(1001, 3).0, few),
+        ]
+    }
+
+    /// Whatever it is given, training ends in a machine that decides by finite numbers, the same in f32 as linfa's in f64.
+    #[test]
+    fn extremes_end_in_a_machine() {
+        for (name, rows, labels) in extremes() {
+            for c in [1e-6, 1.0, 1e6] {
+                for gamma in [1e-8, 1.0, 1e4] {
+                    let params = SvmParams { c, gamma };
+                    let ours = fit_svm(rows.view(), &labels, params).unwrap();
+                    let theirs = fit_linfa(rows.view(), &labels, params).unwrap();
+                    assert_eq!(ours.dimensions(), 3, "{name}, {params:?}: no support vectors");
+                    // Each term errs by the roundings of its coefficient and kernel, 2⁻²³ each; distances of numbers beyond 10⁹ by more,
+                    // but there the kernel is 0 off the diagonal. Exponents to 16 lose 2⁻²⁰ of the kernel.
+                    let weight: f64 = ours.coefficients.iter().map(|a| f64::from(a.abs())).sum();
+                    let bound = 2e-6 * (weight + f64::from(ours.rho.abs())) + 1e-9;
+                    for x in rows.axis_iter(Axis(0)) {
+                        let x32: Vec<f32> = x.iter().map(|&v| v as f32).collect();
+                        let decision = f64::from(ours.decision(&x32));
+                        let exact = theirs.weighted_sum(&x) - theirs.rho;
+                        assert!((decision - exact).abs() <= bound, "{name}, {params:?}: {decision} {exact} ± {bound}");
+                    }
+                    for far in [0.0, 1e-30, 1e6, -1e30, f32::MAX] {
+                        assert!(ours.decision(&[far; 3]).is_finite(), "{name}, {params:?}, {far}");
+                    }
+                }
+            }
+        }
+    }
+
+    /// A kernel that has underflowed to the identity knows nothing but its examples: these it tells apart, and far from them it says the
+    /// same of everything.
+    #[test]
+    fn a_kernel_that_is_the_identity_knows_its_examples_alone() {
+        let (rows, labels) = clouds(60, 3);
+        let svm = fit_svm(rows.view(), &labels, SvmParams { c: 10.0, gamma: 1e7 }).unwrap();
+        for (x, &label) in rows.axis_iter(Axis(0)).zip(&labels) {
+            let x: Vec<f32> = x.iter().map(|&v| v as f32).collect();
+            assert_eq!(svm.decision(&x) > 0.0, label);
+        }
+        assert_eq!(svm.decision(&[50.0; 3]), -svm.rho);
+    }
+
+    /// Classes that do not overlap have no finite slope of greatest likelihood; Platt's targets, short of 0 and 1, bound it.
+    #[test]
+    fn platt_on_classes_that_do_not_overlap_is_finite_and_right() {
+        for distance in [1e-3f32, 1.0, 1e3] {
+            let examples: Vec<(f32, f64)> =
+                (0..40).map(|i| if i % 2 == 0 { (distance, 39.0 / 40.0) } else { (-distance, 1.0 / 40.0) }).collect();
+            let platt = fit_platt(&examples).unwrap();
+            assert!(platt.a.is_finite() && platt.b.is_finite(), "{distance}: {platt:?}");
+            let (high, low) = (platt.probability(distance), platt.probability(-distance));
+            assert!((high - 0.975).abs() < 0.01 && (low - 0.025).abs() < 0.01, "{distance}: {high} {low}");
+        }
+    }
+
     #[test]
     fn learns_to_tell_the_clouds_apart() {
         let (rows, labels) = clouds(300, 20);
