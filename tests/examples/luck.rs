@@ -124,7 +124,9 @@ fn stop(source: Rare, params: Params) -> Result<(u64, bool, f64), Box<dyn Error>
 
 fn main() -> Result<(), Box<dyn Error>> {
     let seeds: u64 = std::env::args().nth(1).map_or(Ok(100), |n| n.parse())?;
-    println!("| light | chance | tile | guard | stops at, median | stopped without having found it | noise left, median | 95 % |");
+    println!(
+        "| light | chance | tile | guard | stops at, median | stopped without having found it | noise left, median | 95 % |"
+    );
     println!("|---|---|---|---|---|---|---|---|");
     let guards = [("none", 0, 1), ("--consecutive 3", 0, 3), ("--min-spp 1000", 1000, 1)];
     for (name, place) in
@@ -133,8 +135,13 @@ fn main() -> Result<(), Box<dyn Error>> {
         for chance in [1e-3, 1e-4, 1e-5, 1e-6] {
             for edge in [32, 128] {
                 for (guard, min_samples, consecutive) in guards {
-                    let params =
-                        Params { tile: edge, min_samples, consecutive, max_samples: MOST, ..Params::default() };
+                    let params = Params {
+                        tile: edge,
+                        min_samples,
+                        consecutive,
+                        max_samples: MOST,
+                        ..Params::default()
+                    };
                     let mut runs = Vec::new();
                     for seed in 0..seeds {
                         let source = Rare { edge, place, chance, seed: seed * 0x1_0000_0001 + 1, found: 0 };

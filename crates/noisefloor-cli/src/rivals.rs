@@ -20,8 +20,9 @@ use std::path::{Path, PathBuf};
 
 /// Samples of one stage over those of the stage before.
 const GROWTH: f64 = 1.15;
-/// Constants that are tried for each rival, evenly spread over its range in logarithms.
-const CONSTANTS: u32 = 16;
+/// Constants that are tried for a rival, evenly spread over its range in logarithms: of one that has to be run with each, and of one whose
+/// verdicts tell what constant would do.
+const CONSTANTS: (u32, u32) = (16, 400);
 /// The mean of some of the samples may amplify the rounding of 8-bit pictures by no more than this.
 const AMPLIFICATION: f64 = 8.0;
 
@@ -61,7 +62,8 @@ struct Stack {
 /// Scores rivals on the corpora, the constant of each fitted on the other groups of scenes.
 pub fn rate(folders: &[PathBuf], rivals: &[&'static Rival]) -> anyhow::Result<Vec<Rated>> {
     let mut zones = Vec::new();
-    let mut stops: Vec<Vec<Vec<f64>>> = vec![vec![Vec::new(); CONSTANTS as usize]; rivals.len()];
+    let mut stops: Vec<Vec<Vec<f64>>> =
+        rivals.iter().map(|rival| vec![Vec::new(); constants(rival).len()]).collect();
     let scenes: Vec<(Corpus, String)> = folders
         .iter()
         .map(|folder| {
@@ -78,10 +80,18 @@ pub fn rate(folders: &[PathBuf], rivals: &[&'static Rival]) -> anyhow::Result<Ve
         let stack = Stack::of(corpus, scene)?;
         for (rival, stops) in rivals.iter().zip(&mut stops) {
             progress.set_message(format!("{}, {scene}", rival.name));
-            let of_scene: Vec<Vec<f64>> = constants(rival)
-                .into_par_iter()
-                .map(|constant| stack.follow((rival.make)(constant)))
-                .collect::<anyhow::Result<_>>()?;
+            let of_scene: Vec<Vec<f64>> = if rival.tells {
+                let needed = stack.follow((rival.make)(rival.range.0), false)?;
+                constants(rival).into_iter().map(|constant| stack.stops(&needed, constant)).collect()
+            } else {
+                constants(rival)
+                    .into_par_iter()
+                    .map(|constant| {
+                        let needed = stack.follow((rival.make)(constant), true)?;
+                        Ok(stack.stops(&needed, constant))
+                    })
+                    .collect::<anyhow::Result<_>>()?
+            };
             stops.iter_mut().zip(of_scene).for_each(|(all, new)| all.extend(new));
             progress.inc(1);
         }
@@ -93,8 +103,9 @@ pub fn rate(folders: &[PathBuf], rivals: &[&'static Rival]) -> anyhow::Result<Ve
 
 fn constants(rival: &Rival) -> Vec<f64> {
     let (strict, lax) = rival.range;
-    let place = |i: u32| f64::from(i) / f64::from(CONSTANTS - 1);
-    (0..CONSTANTS).map(|i| strict * (lax / strict).powf(place(i))).collect()
+    let count = if rival.tells { CONSTANTS.1 } else { CONSTANTS.0 };
+    let place = |i: u32| f64::from(i) / f64::from(count - 1);
+    (0..count).map(|i| strict * (lax / strict).powf(place(i))).collect()
 }
 
 impl Rated {
@@ -210,9 +221,13 @@ impl Stack {
         Ok(Self { zones, edge, columns, stages })
     }
 
-    /// Samples at which a criterion stops each zone: between the stage at which it did and the one before, and within what observers
-    /// could choose.
-    fn follow(&self, criterion: Box<dyn StoppingCriterion + Send>) -> anyhow::Result<Vec<f64>> {
+    /// Has a criterion judge every stage. For each zone, the least constant that would have stopped it there, stage by stage: what its
+    /// verdicts tell, or 0 where it stops it, if it is one that stops.
+    fn follow(
+        &self,
+        criterion: Box<dyn StoppingCriterion + Send>,
+        stops: bool,
+    ) -> anyhow::Result<Vec<Vec<f64>>> {
         let size = (self.columns * self.edge, self.zones.len().div_ceil(self.columns) * self.edge);
         let params = Params {
             tile: self.edge,
@@ -220,32 +235,53 @@ impl Stack {
             // At every stage: each brings more than a step.
             schedule: Schedule::Every { step: 2 },
             max_samples: u64::from(u32::MAX),
+            // A criterion that tells is asked at every stage.
+            consecutive: if stops { 1 } else { u32::MAX },
             ..Params::default()
         };
         let mut session = Session::new(size.0, size.1, criterion, params)?;
-        let mut stopped = vec![None; self.zones.len()];
-        let mut now = 0u64;
+        // Places of the picture that no zone fills.
+        for tile in self.zones.len()..session.film().grid().len() {
+            session.close(tile, StopReason::Cancelled);
+        }
+        let mut needed = vec![Vec::new(); self.zones.len()];
         for (samples, batch) in &self.stages {
-            let before = now;
-            now += u64::from(*samples);
             for (tile, mean) in batch.iter().enumerate() {
                 if session.is_open(tile) {
                     session.push(tile, *samples, mean)?;
                 }
             }
-            // Places of the picture that no zone fills.
-            for tile in self.zones.len()..session.film().grid().len() {
-                session.close(tile, StopReason::Cancelled);
-            }
-            for stop in session.judge()? {
-                stopped[stop.tile.index] = Some(((before.max(1) * now) as f64).sqrt());
+            session.judge()?;
+            for (tile, needed) in needed.iter_mut().enumerate() {
+                let told = session.verdict(tile).and_then(|v| v.probability).map(|p| 1.0 - f64::from(p));
+                needed.push(match (stops, session.is_open(tile)) {
+                    (true, true) => f64::INFINITY,
+                    (true, false) => 0.0,
+                    (false, _) => told.unwrap_or(f64::INFINITY),
+                });
             }
         }
-        let within = |(zone, spp): (&Zone, Option<f64>)| {
+        Ok(needed)
+    }
+
+    /// Samples at which a constant stops each zone: between the first stage that it is enough for and the one before, and within what
+    /// observers could choose.
+    fn stops(&self, needed: &[Vec<f64>], constant: f64) -> Vec<f64> {
+        let totals: Vec<u64> = self
+            .stages
+            .iter()
+            .scan(0, |total, (samples, _)| {
+                *total += u64::from(*samples);
+                Some(*total)
+            })
+            .collect();
+        let stop = |(zone, needed): (&Zone, &Vec<f64>)| {
             let (first, last) = (zone.first_spp as f64, zone.last_spp as f64);
-            spp.unwrap_or(last).clamp(first, last)
+            let stage = needed.iter().position(|least| *least <= constant);
+            let between = |stage: usize| ((totals[stage.saturating_sub(1)] * totals[stage]) as f64).sqrt();
+            stage.map_or(last, between).clamp(first, last)
         };
-        Ok(self.zones.iter().zip(stopped).map(within).collect())
+        self.zones.iter().zip(needed).map(stop).collect()
     }
 }
 
@@ -444,7 +480,7 @@ mod tests {
         let rival = &noisefloor_rivals::RIVALS[1];
         let zones = [zone("A", 200.0), zone("B", 200.0 * 2f64.sqrt())];
         let mut stops = vec![vec![400.0; 2], vec![200.0; 2]];
-        stops.resize(CONSTANTS as usize, vec![100.0; 2]);
+        stops.resize(constants(rival).len(), vec![100.0; 2]);
         let rated = Rated::of(rival, &zones, &stops);
         // Each gets what the other one wants.
         let near = |a: f64, b: f64| (a / b).ln().abs() < 0.02;

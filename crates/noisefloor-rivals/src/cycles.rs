@@ -20,7 +20,8 @@ const EPSILON: f64 = 1e-4;
 /// A tile is done when a `share` of its pixels has converged. Tiles that are done count as converged for their neighbours.
 #[derive(Clone, Debug)]
 pub struct CyclesAdaptive {
-    /// Error below which a pixel has converged, above 0; 0.01 by default.
+    /// Error below which a pixel has converged, above 0; 0.01 by default, as in Blender. The
+    /// constant that agrees with people on average is 0.036 (`noisefloor evaluate --rivals`).
     pub threshold: f64,
     /// Share of a tile's pixels that have to converge, in (0, 1]; 0.95 by default.
     pub share: f64,

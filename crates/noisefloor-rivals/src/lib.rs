@@ -5,10 +5,10 @@
 //! |---|---|---|
 //! | [`FixedSamples`](noisefloor::FixedSamples) | `spp:256` | a tile has so many samples per pixel |
 //! | [`TimeLimit`] | `time:30` | so many seconds have passed |
-//! | [`RelativeError`] | `relative-error:0.05` | the confidence interval of a pixel is small beside its mean (Mitsuba 0.6) |
-//! | [`Dammertz`] | `dammertz:0.0002` | the error of a block, weighted by its area, is small; blocks split (Dammertz et al. 2010) |
+//! | [`RelativeError`] | `relative-error:0.19` | the confidence interval of a pixel is small beside its mean (Mitsuba 0.6) |
+//! | [`Dammertz`] | `dammertz:0.003` | the error of a block, weighted by its area, is small; blocks split (Dammertz et al. 2010) |
 //! | [`CyclesAdaptive`] | `cycles:0.01` | the error of a pixel is small beside its brightness (Blender Cycles) |
-//! | [`LuxCoreHalt`] | `luxcore:0.01` | few pixels of the picture have changed on the screen (LuxCoreRender) |
+//! | [`LuxCoreHalt`] | `luxcore:0.35` | few pixels of the picture have changed on the screen (LuxCoreRender) |
 //! | [`Myszkowski1998`] | `vdp-stages:0.75` | nobody sees a difference between successive stages |
 //! | [`Takouachet2007`] | `vdp-first:0.5` | the visible difference from the first, noisy picture grows no more |
 //!

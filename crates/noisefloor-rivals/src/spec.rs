@@ -25,6 +25,8 @@ pub struct Rival {
     pub range: (f64, f64),
     /// The criterion with its constant.
     pub make: fn(f64) -> Box<dyn StoppingCriterion + Send>,
+    /// Whether its verdicts tell one minus the least constant that would do, as their probability: one run then stands for all.
+    pub tells: bool,
     /// Whether the constant is a number that the criterion can take.
     valid: fn(f64) -> bool,
     /// What it has to be, for error messages.
@@ -43,6 +45,7 @@ pub const RIVALS: &[Rival] = &[
         default: DEFAULT_SAMPLES,
         range: (100_000.0, 2.0),
         make: |samples| Box::new(FixedSamples(samples.round() as u64)),
+        tells: false,
         valid: |samples| (1.0..=1e15).contains(&samples),
         wanted: "a number of samples per pixel, at least 1",
     },
@@ -52,6 +55,7 @@ pub const RIVALS: &[Rival] = &[
         default: relative_error::DEFAULT_ERROR,
         range: (1e-3, 1.0),
         make: |error| Box::new(RelativeError::new(error)),
+        tells: false,
         valid: |error| error > 0.0,
         wanted: POSITIVE,
     },
@@ -61,6 +65,7 @@ pub const RIVALS: &[Rival] = &[
         default: dammertz::DEFAULT_STOP,
         range: (1e-5, 0.1),
         make: |stop| Box::new(Dammertz::new(stop)),
+        tells: false,
         valid: |stop| stop > 0.0,
         wanted: POSITIVE,
     },
@@ -70,6 +75,7 @@ pub const RIVALS: &[Rival] = &[
         default: cycles::DEFAULT_THRESHOLD,
         range: (1e-4, 1.0),
         make: |threshold| Box::new(CyclesAdaptive::new(threshold)),
+        tells: false,
         valid: |threshold| threshold > 0.0,
         wanted: POSITIVE,
     },
@@ -79,6 +85,7 @@ pub const RIVALS: &[Rival] = &[
         default: luxcore::DEFAULT_SHARE,
         range: (1e-4, 1.0),
         make: |share| Box::new(LuxCoreHalt::new(share)),
+        tells: false,
         valid: |share| share > 0.0 && share <= 1.0,
         wanted: SHARE,
     },
@@ -88,6 +95,7 @@ pub const RIVALS: &[Rival] = &[
         default: stages::DEFAULT_SEEN,
         range: (1e-4, 0.999),
         make: |probability| Box::new(Myszkowski1998::new(probability)),
+        tells: true,
         valid: |probability| probability > 0.0 && probability < 1.0,
         wanted: PROBABILITY,
     },
@@ -97,6 +105,7 @@ pub const RIVALS: &[Rival] = &[
         default: stages::DEFAULT_GROWTH,
         range: (1e-4, 0.999),
         make: |probability| Box::new(Takouachet2007::new(probability)),
+        tells: true,
         valid: |probability| probability > 0.0 && probability < 1.0,
         wanted: PROBABILITY,
     },
@@ -131,7 +140,7 @@ fn known() -> String {
 }
 
 /// Makes a criterion of a spec: a name, and after a colon its constant, or the default without one. `"spp:256"`, `"time:30"`
-/// (seconds), `"relative-error:0.05"`, `"dammertz:0.0002"`, `"cycles:0.01"`, `"luxcore:0.01"`, `"vdp-stages:0.75"`,
+/// (seconds), `"relative-error:0.19"`, `"dammertz:0.003"`, `"cycles:0.01"`, `"luxcore:0.35"`, `"vdp-stages:0.75"`,
 /// `"vdp-first:0.5"`.
 ///
 /// # Errors
@@ -167,7 +176,7 @@ mod tests {
             ("spp:256", "256 samples per pixel"),
             ("spp", "1000 samples per pixel"),
             ("time:1.5", "1.5 seconds"),
-            ("relative-error", "relative error 0.05 at 95 %"),
+            ("relative-error", "relative error 0.19 at 95 %"),
             ("dammertz:0.002", "Dammertz et al. 2010, stop 0.002"),
             ("cycles: 0.1", "Cycles, threshold 0.1"),
             ("luxcore:1e-2", "LuxCore, 0.01 of the pixels"),

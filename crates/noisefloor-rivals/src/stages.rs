@@ -1,7 +1,7 @@
 //! Stopping conditions on visible differences between pictures of one rendering.
 
 use crate::image::Image;
-use crate::pixels::{Seen, displayed, enough, verdict};
+use crate::pixels::{Seen, displayed, verdict};
 use crate::vdp::{Response, Vdp};
 use noisefloor::{CriterionError, Film, StoppingCriterion, Tile, Verdict, View};
 
@@ -54,14 +54,16 @@ fn response(vdp: &Vdp, view: &View<'_>) -> Response {
     vdp.respond(&image)
 }
 
-/// Tiles of which no more than a share of the pixels lies above a limit are done; none if there is no map.
+/// Tiles of which no more than a share of the pixels lies above a limit are done; none if there is no map. The probability of a
+/// verdict is one minus the least limit at which the tile would be done.
 fn verdicts(map: Option<&[f32]>, width: usize, tiles: &[Tile], limit: f64, share: f64) -> Vec<Verdict> {
     let judge = |tile: &Tile| {
-        let done = map.is_some_and(|map| {
-            let few = tile.rows(width).flat_map(|row| &map[row]).filter(|&&p| f64::from(p) <= limit).count();
-            enough(few, tile.pixels(), 1.0 - share)
-        });
-        verdict(done, None)
+        let Some(map) = map else { return verdict(false, None) };
+        let mut values: Vec<f32> = tile.rows(width).flat_map(|row| &map[row]).copied().collect();
+        let within = ((1.0 - share) * values.len() as f64).ceil() as usize;
+        let place = within.clamp(1, values.len()) - 1;
+        let (_, &mut least, _) = values.select_nth_unstable_by(place, f32::total_cmp);
+        Verdict { probability: Some(1.0 - least), ..verdict(f64::from(least) <= limit, None) }
     };
     tiles.iter().map(judge).collect()
 }

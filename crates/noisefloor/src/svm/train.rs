@@ -246,7 +246,10 @@ mod tests {
                         let x32: Vec<f32> = x.iter().map(|&v| v as f32).collect();
                         let decision = f64::from(ours.decision(&x32));
                         let exact = theirs.weighted_sum(&x) - theirs.rho;
-                        assert!((decision - exact).abs() <= bound, "{name}, {params:?}: {decision} {exact} ± {bound}");
+                        assert!(
+                            (decision - exact).abs() <= bound,
+                            "{name}, {params:?}: {decision} {exact} ± {bound}"
+                        );
                     }
                     for far in [0.0, 1e-30, 1e6, -1e30, f32::MAX] {
                         assert!(ours.decision(&[far; 3]).is_finite(), "{name}, {params:?}, {far}");
@@ -273,8 +276,9 @@ mod tests {
     #[test]
     fn platt_on_classes_that_do_not_overlap_is_finite_and_right() {
         for distance in [1e-3f32, 1.0, 1e3] {
-            let examples: Vec<(f32, f64)> =
-                (0..40).map(|i| if i % 2 == 0 { (distance, 39.0 / 40.0) } else { (-distance, 1.0 / 40.0) }).collect();
+            let examples: Vec<(f32, f64)> = (0..40)
+                .map(|i| if i % 2 == 0 { (distance, 39.0 / 40.0) } else { (-distance, 1.0 / 40.0) })
+                .collect();
             let platt = fit_platt(&examples).unwrap();
             assert!(platt.a.is_finite() && platt.b.is_finite(), "{distance}: {platt:?}");
             let (high, low) = (platt.probability(distance), platt.probability(-distance));
