@@ -373,6 +373,9 @@ pub fn print(model: &[Prediction], rated: &[Rated]) {
     );
 }
 
+/// Where the legend of the plot begins, in pixels.
+const LEGEND: (i32, i32) = (758, 40);
+
 /// Draws mean thresholds, scene by scene: people, the model, and each rival.
 pub fn draw(path: &Path, model: &[Prediction], rated: &[Rated]) -> anyhow::Result<()> {
     let of_model = scene_means(model);
@@ -434,18 +437,18 @@ pub fn draw(path: &Path, model: &[Prediction], rated: &[Rated]) -> anyhow::Resul
                 }
                 _ => chart.draw_series(points.map(|at| Cross::new(at, 5, colour.stroke_width(2)).into_dyn())),
             };
-            drawn.map_err(failed)?.label((*name).to_owned()).legend(move |(x, y)| match i % 3 {
-                0 => Circle::new((x + 10, y), 5, colour.filled()).into_dyn(),
-                1 => TriangleMarker::new((x + 10, y), 6, colour.filled()).into_dyn(),
-                _ => Cross::new((x + 10, y), 5, colour.stroke_width(2)).into_dyn(),
-            });
-        }
-        chart
-            .configure_series_labels()
-            .position(SeriesLabelPosition::Coordinate(690, 20))
-            .label_font(letters)
-            .draw()
+            drawn.map_err(failed)?;
+            // The legend, outside: the library's own lies over the plot.
+            let at = (LEGEND.0 + 8, LEGEND.1 + 24 * i as i32);
+            match i % 3 {
+                0 => root.draw(&Circle::new(at, 5, colour.filled())),
+                1 => root.draw(&TriangleMarker::new(at, 6, colour.filled())),
+                _ => root.draw(&Cross::new(at, 5, colour.stroke_width(2))),
+            }
             .map_err(failed)?;
+            let text = Text::new((*name).to_owned(), (at.0 + 16, at.1 - 7), letters);
+            root.draw(&text).map_err(failed)?;
+        }
         root.present().map_err(failed)?;
     }
     write_atomic(path, |to| std::io::Write::write_all(to, text.as_bytes()))?;

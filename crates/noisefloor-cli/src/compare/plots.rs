@@ -104,7 +104,8 @@ fn draw_panel<B: DrawingBackend>(
     let drawable = |p: &&(f64, f64)| p.0 > 0.0 && p.1 > 0.0 && p.0.is_finite() && p.1.is_finite();
     let curve = panel.curve.iter().filter(drawable).copied();
     chart.draw_series(LineSeries::new(curve, BLACK.stroke_width(2))).map_err(failed)?;
-    for (i, (_, family)) in panel.markers.iter().enumerate() {
+    // The first family comes last, on top.
+    for (i, (_, family)) in panel.markers.iter().enumerate().rev() {
         let at = || family.iter().filter(drawable).copied();
         if at().count() > 1 {
             let colour = COLOURS[i % COLOURS.len()];
