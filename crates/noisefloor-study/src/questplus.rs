@@ -83,16 +83,21 @@ impl QuestPlus {
         Self { grid, posterior: vec![1.0 / n as f64; n] }
     }
 
-    /// The level whose answer is expected to leave the least entropy (Watson 2017, eqs. 2 to 5).
+    /// The level whose answer is expected to leave the least entropy about the threshold (Watson 2017, eqs. 2 to 5). The scale is summed out
+    /// first (Prins 2013, "The psi-marginal adaptive method", Journal of Vision 13(7):3): it is not asked for, and trials spent on it are lost.
     pub fn next_level(&self) -> u32 {
         let xlnx = |x: f64| if x > 0.0 { x * x.ln() } else { 0.0 };
         let expected_entropy = |&level: &u32| {
-            let (mut inner, mut right) = (0.0, 0.0);
-            for (p, r) in self.posterior.iter().zip(&self.grid.right[level as usize]) {
-                inner += xlnx(p * r) + xlnx(p * (1.0 - r));
-                right += p * r;
+            let predicted =
+                self.posterior.chunks(SCALES.len()).zip(self.grid.right[level as usize].chunks(SCALES.len()));
+            let (mut inner, mut all_right) = (0.0, 0.0);
+            for (posterior, right) in predicted {
+                let known: f64 = posterior.iter().sum();
+                let right: f64 = posterior.iter().zip(right).map(|(p, r)| p * r).sum();
+                inner += xlnx(right) + xlnx(known - right);
+                all_right += right;
             }
-            xlnx(right) + xlnx(1.0 - right) - inner
+            xlnx(all_right) + xlnx(1.0 - all_right) - inner
         };
         let entropies: Vec<f64> = self.grid.levels.iter().map(expected_entropy).collect();
         let least = (0..entropies.len()).min_by(|&a, &b| entropies[a].total_cmp(&entropies[b]));
@@ -154,7 +159,10 @@ mod tests {
         let mut quest = QuestPlus::new(stack());
         for answer in [true, false, true, true] {
             let chosen = quest.next_level();
-            let entropy = |q: &QuestPlus| -q.posterior.iter().map(|p| p * p.max(1e-300).ln()).sum::<f64>();
+            let of = |p: f64| -p * p.max(1e-300).ln();
+            let entropy = |q: &QuestPlus| -> f64 {
+                q.posterior.chunks(SCALES.len()).map(|of_one| of(of_one.iter().sum())).sum()
+            };
             let expected = |level: u32| {
                 let p: f64 =
                     quest.posterior.iter().zip(&quest.grid.right[level as usize]).map(|(p, r)| p * r).sum();

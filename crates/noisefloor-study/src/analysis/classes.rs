@@ -31,10 +31,14 @@ pub(super) fn rows(observers: &[&Observer], seed: u64) -> Vec<ClassRow> {
             let sum = |f: &dyn Fn(&(usize, usize)) -> usize| -> f64 {
                 counts.iter().zip(weights).map(|(c, w)| f(c) as f64 * w).sum()
             };
-            Some(sum(&|c| c.0) / sum(&|c| c.1))
+            Some([sum(&|c| c.0) / sum(&|c| c.1)])
         };
         let identical = Share::new(yes, of)?;
-        Some(ClassRow { class, identical, observers_interval: bootstrap(counts.len(), seed, share) })
+        Some(ClassRow {
+            class,
+            identical,
+            observers_interval: bootstrap(counts.len(), seed, share).map(|[i]| i),
+        })
     };
     [Class::Reference, Class::Test, Class::Noisy].into_iter().filter_map(row).collect()
 }

@@ -30,14 +30,20 @@ impl Share {
         let (n, p) = (of as f64, yes as f64 / of as f64);
         let (middle, width) = (p + Z * Z / (2.0 * n), Z * (p * (1.0 - p) / n + Z * Z / (4.0 * n * n)).sqrt());
         let end = |sign: f64| ((middle + sign * width) / (1.0 + Z * Z / n)).clamp(0.0, 1.0);
-        Some(Self { yes, of, share: p, wilson: [end(-1.0), end(1.0)] })
+        // Rounding must not leave the share outside its own interval
+        Some(Self { yes, of, share: p, wilson: [end(-1.0).min(p), end(1.0).max(p)] })
     }
 }
 
-/// The 95 % interval of a statistic over observers: observers are drawn anew, with replacement, [`RESAMPLES`] times, and `statistic` is given how
-/// often each was drawn. Seeded. Percentiles are those of Hesterberg 2015 ("What teachers should know about the bootstrap", §3.3): moved out
-/// by Student's t and n/(n−1), since plain percentiles of few observers are too narrow. `None` for fewer than two observers, or if no drawing has a value.
-pub fn bootstrap(observers: usize, seed: u64, statistic: impl Fn(&[f64]) -> Option<f64>) -> Option<[f64; 2]> {
+/// The 95 % intervals of some statistics over observers: observers are drawn anew, with replacement, [`RESAMPLES`] times, and `statistics` is told
+/// how often each was drawn. Seeded. Percentiles are those of Hesterberg 2015 ("What teachers should know about the bootstrap", §3.3): moved
+/// out by Student's t and n/(n−1), since plain percentiles of few observers are too narrow. `None` for fewer than two observers, or if no
+/// drawing has finite values.
+pub fn bootstrap<const N: usize>(
+    observers: usize,
+    seed: u64,
+    statistics: impl Fn(&[f64]) -> Option<[f64; N]>,
+) -> Option<[[f64; 2]; N]> {
     if observers < 2 {
         return None;
     }
@@ -48,16 +54,19 @@ pub fn bootstrap(observers: usize, seed: u64, statistic: impl Fn(&[f64]) -> Opti
         for _ in 0..observers {
             weights[random.usize(0..observers)] += 1.0;
         }
-        statistic(&weights).filter(|v| v.is_finite())
+        statistics(&weights).filter(|values| values.iter().all(|v| v.is_finite()))
     };
-    let mut values: Vec<f64> = (0..RESAMPLES).filter_map(draw).collect();
-    values.sort_by(f64::total_cmp);
-    let last = values.len().checked_sub(1)? as f64;
+    let drawn: Vec<[f64; N]> = (0..RESAMPLES).filter_map(draw).collect();
+    let last = drawn.len().checked_sub(1)? as f64;
 
     let n = observers as f64;
     let t = StudentsT::new(0.0, 1.0, n - 1.0).ok()?.inverse_cdf(0.975);
     let tail = Normal::standard().cdf(-t * (n / (n - 1.0)).sqrt());
-    Some([tail, 1.0 - tail].map(|p| values[(p * last).round() as usize]))
+    Some(std::array::from_fn(|i| {
+        let mut values: Vec<f64> = drawn.iter().map(|values| values[i]).collect();
+        values.sort_by(f64::total_cmp);
+        [tail, 1.0 - tail].map(|p| values[(p * last).round() as usize])
+    }))
 }
 
 #[cfg(test)]
@@ -71,7 +80,7 @@ mod tests {
         assert!(none.wilson[0] == 0.0 && (none.wilson[1] - Z * Z / (10.0 + Z * Z)).abs() < 1e-12);
         let half = Share::new(5, 10).unwrap().wilson;
         assert!((half[0] - 0.2366).abs() < 1e-4 && (half[1] - 0.7634).abs() < 1e-4, "{half:?}");
-        assert!((Share::new(10, 10).unwrap().wilson[1] - 1.0).abs() < 1e-12);
+        assert_eq!(Share::new(10, 10).unwrap().wilson[1], 1.0);
         assert!(Share::new(0, 0).is_none() && Share::new(2, 1).is_none());
     }
 
@@ -83,8 +92,8 @@ mod tests {
             let mut random = fastrand::Rng::with_seed(seed);
             let values: Vec<f64> =
                 (0..20).map(|_| (0..12).map(|_| random.f64()).sum::<f64>() - 6.0).collect();
-            let mean = |w: &[f64]| Some(values.iter().zip(w).map(|(v, w)| v * w).sum::<f64>() / 20.0);
-            let [low, high] = bootstrap(20, seed, mean).unwrap();
+            let mean = |w: &[f64]| Some([values.iter().zip(w).map(|(v, w)| v * w).sum::<f64>() / 20.0]);
+            let [[low, high]] = bootstrap(20, seed, mean).unwrap();
             low <= 0.0 && 0.0 <= high
         });
         let share = covered.count() as f64 / 400.0;
@@ -93,7 +102,7 @@ mod tests {
 
     #[test]
     fn one_observer_has_no_interval() {
-        assert_eq!(bootstrap(1, 0, |_| Some(1.0)), None);
-        assert_eq!(bootstrap(5, 0, |_| None), None);
+        assert_eq!(bootstrap(1, 0, |_| Some([1.0])), None);
+        assert_eq!(bootstrap::<1>(5, 0, |_| None), None);
     }
 }

@@ -62,21 +62,19 @@ fn row(study: &Study, observers: &[&Observer], place: Place, seed: u64) -> Optio
     };
     let mean = |weights: &[f64]| {
         let sum: f64 = said.iter().zip(weights).map(|((t, _), w)| t * w).sum();
-        Some(sum / weights.iter().sum::<f64>())
+        sum / weights.iter().sum::<f64>()
     };
     let fitted = fit(&once)?;
-
-    // One drawing of observers has one fit, whichever of its numbers is asked for
     let seed = seed ^ (u64::from(place.0) << 32 | u64::from(place.1));
-    let level95 = bootstrap(said.len(), seed, |w| fit(w).map(|f| f.level95().ln()));
-    let median = bootstrap(said.len(), seed, |w| fit(w).map(|f| f.centre));
+    let statistics = |w: &[f64]| fit(w).map(|f| [mean(w), f.centre, f.level95().ln()]);
+    let intervals = bootstrap(said.len(), seed, statistics);
     let reached = |o: &&Observation| matches!(o, Observation::Between { to: None, .. });
     let (all, open) = said.iter().fold((0, 0), |(all, open), (_, seen)| {
         (all + seen.len(), open + seen.iter().filter(reached).count())
     });
     let stack = &study.stacks[place.0 as usize];
     let tile = stack.grid().tile(place.1 as usize);
-    let exp = |interval: Option<[f64; 2]>| interval.map(|ends| ends.map(f64::exp));
+    let exp = |i: usize| intervals.map(|all| all[i].map(f64::exp));
     Some(TileRow {
         stack: stack.name().to_owned(),
         tile: tile.index,
@@ -85,13 +83,13 @@ fn row(study: &Study, observers: &[&Observer], place: Place, seed: u64) -> Optio
         width: tile.width,
         height: tile.height,
         observers: said.len(),
-        mean: mean(&once)?,
-        mean_interval: bootstrap(said.len(), seed, mean),
+        mean: mean(&once),
+        mean_interval: intervals.map(|all| all[0]),
         median: fitted.centre.exp(),
-        median_interval: exp(median),
+        median_interval: exp(1),
         scale: fitted.scale,
         level95: fitted.level95(),
-        level95_interval: exp(level95),
+        level95_interval: exp(2),
         beyond: 20 * open > all,
     })
 }

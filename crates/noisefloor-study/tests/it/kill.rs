@@ -31,8 +31,10 @@ pub(crate) fn process(folder: &Folder) -> (std::process::Child, String) {
         .stdout(Stdio::piped())
         .spawn()
         .unwrap();
-    let lines = BufReader::new(child.stdout.take().unwrap()).lines();
-    let url = lines.map_while(Result::ok).find_map(|line| line.strip_prefix("serving ").map(str::to_owned));
+    let mut lines = BufReader::new(child.stdout.take().unwrap()).lines().map_while(Result::ok);
+    let url = lines.find_map(|line| line.strip_prefix("serving ").map(str::to_owned));
+    // The test harness of the child says more after a minute, and ends if nobody listens
+    std::thread::spawn(move || lines.for_each(drop));
     (child, url.unwrap())
 }
 
@@ -45,7 +47,8 @@ fn a_killed_server_has_lost_nothing() {
     let mut acknowledged_in_all = 0;
     for round in 0..5 {
         let (mut child, url) = process(&folder);
-        let before: usize = store::read_all(&study.database, &study.design()).unwrap().iter().map(|r| r.events.len()).sum();
+        let before: usize =
+            store::read_all(&study.database, &study.design()).unwrap().iter().map(|r| r.events.len()).sum();
         let counts: Vec<AtomicU64> = (0..8).map(|_| AtomicU64::new(0)).collect();
         std::thread::scope(|scope| {
             for (i, count) in counts.iter().enumerate() {
@@ -66,7 +69,10 @@ fn a_killed_server_has_lost_nothing() {
         let acknowledged: u64 = counts.iter().map(|c| c.load(Ordering::SeqCst)).sum();
         let records = store::read_all(&study.database, &study.design()).unwrap();
         let kept = records.iter().map(|r| r.events.len()).sum::<usize>() - before;
-        assert!((acknowledged..=acknowledged + 8).contains(&(kept as u64)), "{acknowledged} acknowledged, {kept} kept");
+        assert!(
+            (acknowledged..=acknowledged + 8).contains(&(kept as u64)),
+            "{acknowledged} acknowledged, {kept} kept"
+        );
         for record in &records {
             assert!(record.events.iter().enumerate().all(|(i, e)| e.seq == i as u64), "{record:?}");
         }
