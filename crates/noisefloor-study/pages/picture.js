@@ -1,13 +1,20 @@
 // Pictures made of tiles, one image pixel on one device pixel.
 
 const MOST_TILES = 4000;
+const RETRY_MS = 1000;
 const tiles = new Map();
 
+/** Asks until the server is within reach: a click made without a connection shows once it is back. */
 async function load(path) {
-  const answer = await fetch(path);
-  if (!answer.ok) throw new Error(path);
-  // As the file has it: no profile of the screen may touch what observers are shown
-  return createImageBitmap(await answer.blob(), { colorSpaceConversion: "none", premultiplyAlpha: "none" });
+  for (;;) {
+    const answer = await fetch(path).catch(() => null);
+    if (answer?.ok) {
+      // As the file has it: no profile of the screen may touch what observers are shown
+      return createImageBitmap(await answer.blob(), { colorSpaceConversion: "none", premultiplyAlpha: "none" });
+    }
+    if (answer && answer.status < 500) throw new Error(path);
+    await new Promise((go) => setTimeout(go, RETRY_MS));
+  }
 }
 
 /** A tile of a level; kept, since observers go back and forth. */
@@ -35,6 +42,16 @@ export function crowded(stack, count) {
   return wide > innerWidth || high > innerHeight ? "crowded" : null;
 }
 
+/** Moves an element by part of a pixel, onto whole device pixels. By its place: a transform would be applied after the browser has rounded. */
+export function snap(element) {
+  const ratio = devicePixelRatio;
+  element.style.left = element.style.top = "0";
+  const { left, top } = element.getBoundingClientRect();
+  const off = (at) => (Math.round(at * ratio) - at * ratio) / ratio;
+  element.style.left = `${off(left)}px`;
+  element.style.top = `${off(top)}px`;
+}
+
 export class Picture {
   constructor(study, stack, label) {
     this.stack = stack;
@@ -58,10 +75,7 @@ export class Picture {
     const ratio = devicePixelRatio;
     this.canvas.style.width = `${this.shape.width / ratio}px`;
     this.canvas.style.height = `${this.shape.height / ratio}px`;
-    this.canvas.style.transform = "";
-    const { left, top } = this.canvas.getBoundingClientRect();
-    const off = (at) => (Math.round(at * ratio) - at * ratio) / ratio;
-    if (off(left) !== 0 || off(top) !== 0) this.canvas.style.transform = `translate(${off(left)}px, ${off(top)}px)`;
+    snap(this.canvas);
   }
 
   blank() {

@@ -63,6 +63,9 @@ class Room {
     this.pictures = [];
     this.refit = () => this.pictures.forEach((picture) => picture.fit());
     window.addEventListener("resize", this.refit);
+    // Longer words below move the pictures, by parts of a pixel too
+    this.moved = new ResizeObserver(this.refit);
+    this.moved.observe(this.stage);
   }
 
   show(...figures) {
@@ -80,6 +83,7 @@ class Room {
   close() {
     document.removeEventListener("keydown", this.listen);
     window.removeEventListener("resize", this.refit);
+    this.moved.disconnect();
   }
 }
 

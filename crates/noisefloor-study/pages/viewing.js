@@ -1,5 +1,7 @@
 // How the pictures are seen: size of the screen, distance, gamma, light.
 
+import { snap } from "./picture.js";
+
 /** Width of a bank card in millimetres (ISO/IEC 7810, ID-1); its height is 53.98. */
 const CARD_MM = 85.6;
 const CARD_SHAPE = 53.98 / 85.6;
@@ -107,4 +109,5 @@ export function ask(sheet, t, done) {
     });
   });
   sheet.append(form);
+  snap(chart);
 }

@@ -149,7 +149,7 @@ impl Study {
             file.repeats.unwrap_or(if file.protocol == Protocol::Acquisition { 2 } else { 1 }),
             MAX_REPEATS,
         )?;
-        let trials = within("trials", file.trials.unwrap_or(24), MAX_TRIALS)?;
+        let trials = within("trials", file.trials.unwrap_or(32), MAX_TRIALS)?;
         let interval_ms = within("interval-ms", file.interval_ms.unwrap_or(1000), 10_000)?;
 
         // Languages and groups

@@ -124,19 +124,20 @@ fn precision(study: &Arc<Study>, public: &Public, observers: u64) -> (f64, f64) 
     ((squares / (2.0 * observers as f64)).sqrt(), clicks as f64 / (2.0 * observers as f64))
 }
 
-/// What a click is worth. On the paper's linear stack, observers who vary by a scale of 0.1 from showing to showing: the forced choice errs
-/// less than pointing does, with fewer clicks. 60 observers with two tiles know the ratio of errors to 9 %.
+/// What a click is worth. On the paper's linear stack, observers whose threshold varies by a scale of 0.1 from showing to showing, and who slip in
+/// 2 % of their answers: the forced choice errs less than pointing does, with fewer clicks. Without slips the two are about equal: the table that
+/// `precision_of_both_protocols` prints. 100 observers with two tiles; seeded.
 #[test]
 fn forced_choice_needs_fewer_clicks_for_the_same_precision() {
-    let public = public(0.1, 0.0);
+    let public = public(0.1, 0.02);
     let (_folder, pointing) = papers("acquisition", "");
-    let (pointing_error, pointing_clicks) = precision(&pointing, &public, 60);
-    let (_folder, choosing) = papers("forced-choice", "trials = 24");
-    let (choosing_error, choosing_clicks) = precision(&choosing, &public, 60);
+    let (pointing_error, pointing_clicks) = precision(&pointing, &public, 100);
+    let (_folder, choosing) = papers("forced-choice", "");
+    let (choosing_error, choosing_clicks) = precision(&choosing, &public, 100);
     println!(
         "pointing: {pointing_error:.3} with {pointing_clicks:.1} clicks; choosing: {choosing_error:.3} with {choosing_clicks:.1}"
     );
-    assert!(choosing_clicks < pointing_clicks && choosing_error < 1.2 * pointing_error);
+    assert!(choosing_clicks < pointing_clicks && choosing_error < pointing_error);
 }
 
 /// The same for several slopes, lapses and stacks, for the guide.

@@ -3,6 +3,9 @@
 /// Requests that are refused, and what they leave behind: nothing.
 #[cfg(test)]
 mod api;
+/// The pages in a real browser.
+#[cfg(test)]
+mod browser;
 /// Page, server, database, analysis and corpus, end to end, by simulated observers.
 #[cfg(test)]
 mod chain;
