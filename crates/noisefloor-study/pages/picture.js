@@ -42,14 +42,13 @@ export function crowded(stack, count) {
   return wide > innerWidth || high > innerHeight ? "crowded" : null;
 }
 
-/** Moves an element by part of a pixel, onto whole device pixels. By its place: a transform would be applied after the browser has rounded. */
+/** Moves an element by part of a pixel, onto whole CSS pixels, which are whole device pixels. By its place: a transform would be applied after
+ * the browser has rounded. */
 export function snap(element) {
-  const ratio = devicePixelRatio;
   element.style.left = element.style.top = "0";
   const { left, top } = element.getBoundingClientRect();
-  const off = (at) => (Math.round(at * ratio) - at * ratio) / ratio;
-  element.style.left = `${off(left)}px`;
-  element.style.top = `${off(top)}px`;
+  element.style.left = `${Math.round(left) - left}px`;
+  element.style.top = `${Math.round(top) - top}px`;
 }
 
 export class Picture {

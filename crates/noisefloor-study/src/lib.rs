@@ -43,6 +43,7 @@ mod config;
 mod error;
 mod event;
 mod questplus;
+mod random;
 mod server;
 mod session;
 pub mod simulated;

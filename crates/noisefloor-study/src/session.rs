@@ -162,7 +162,7 @@ pub fn grids(study: &Study) -> Arc<Vec<Arc<Grid>>> {
 impl Session {
     /// A session at its beginning. The order of trials depends on the two seeds, that of the study and its own.
     pub fn new(study: Arc<Study>, grids: Arc<Vec<Arc<Grid>>>, seed: u64) -> Self {
-        let mut random = fastrand::Rng::with_seed(study.seed.rotate_left(32) ^ seed);
+        let mut random = crate::random::seeded(study.seed.rotate_left(32) ^ seed);
         let (practice, plan) = plan(&study, &mut random);
         let mut session = Self {
             study,

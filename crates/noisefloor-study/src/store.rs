@@ -22,7 +22,7 @@ const VERSION: i32 = 1;
 const TABLES: &str = "
 CREATE TABLE IF NOT EXISTS design (only INTEGER PRIMARY KEY CHECK (only = 1), text TEXT NOT NULL) STRICT;
 CREATE TABLE IF NOT EXISTS sessions (
-    code TEXT PRIMARY KEY, seed INTEGER NOT NULL, observers TEXT NOT NULL, begun_ms INTEGER NOT NULL
+    code TEXT PRIMARY KEY, seed INTEGER NOT NULL, observers TEXT NOT NULL, simulated INTEGER NOT NULL, begun_ms INTEGER NOT NULL
 ) STRICT, WITHOUT ROWID;
 CREATE TABLE IF NOT EXISTS events (
     code TEXT NOT NULL REFERENCES sessions (code), seq INTEGER NOT NULL, received_ms INTEGER NOT NULL, envelope TEXT NOT NULL,
@@ -36,8 +36,10 @@ pub struct Record {
     pub code: String,
     /// Seed of the order of trials.
     pub seed: u64,
-    /// Group of observers; empty if the study has none. Simulated observers say so here.
+    /// Group of observers; empty if the study has none.
     pub group: String,
+    /// Whether the observer is no person, but a [`SimulatedObserver`](crate::simulated::SimulatedObserver).
+    pub simulated: bool,
     /// When it began, in milliseconds since 1970.
     pub begun_ms: u64,
     /// Everything that happened, in order.
@@ -53,7 +55,7 @@ pub struct Store {
 type Reply<T> = oneshot::Sender<Result<T, StoreError>>;
 
 enum Command {
-    Begin { code: String, seed: u64, group: String, reply: Reply<()> },
+    Begin { code: String, seed: u64, group: String, simulated: bool, reply: Reply<()> },
     Append { code: String, envelope: Box<Envelope>, reply: Reply<()> },
     Load { code: String, reply: Reply<Record> },
     Event { code: String, seq: u64, reply: Reply<Option<Envelope>> },
@@ -78,9 +80,9 @@ impl Store {
     ///
     /// # Errors
     /// [`StoreError`] if it could not be kept.
-    pub async fn begin(&self, code: &str, seed: u64, group: &str) -> Result<(), StoreError> {
+    pub async fn begin(&self, code: &str, seed: u64, group: &str, simulated: bool) -> Result<(), StoreError> {
         let (code, group) = (code.to_owned(), group.to_owned());
-        self.ask(|reply| Command::Begin { code, seed, group, reply }).await
+        self.ask(|reply| Command::Begin { code, seed, group, simulated, reply }).await
     }
 
     /// Keeps an event; when this returns, it is on disk.
@@ -291,10 +293,10 @@ fn hold<T: Send + 'static>(path: &Path, reply: Reply<T>, result: Result<T, Store
 fn run(connection: &Connection, path: &Path, command: Command) -> Held {
     let failed = |source| StoreError::Database { path: path.to_owned(), source };
     match command {
-        Command::Begin { code, seed, group, reply } => {
+        Command::Begin { code, seed, group, simulated, reply } => {
             // SQLite's integers are signed: the bits are kept
-            let insert = "INSERT INTO sessions VALUES (?1, ?2, ?3, ?4)";
-            let done = connection.execute(insert, params![code, seed as i64, group, now_ms()]);
+            let insert = "INSERT INTO sessions VALUES (?1, ?2, ?3, ?4, ?5)";
+            let done = connection.execute(insert, params![code, seed as i64, group, simulated, now_ms()]);
             hold(path, reply, done.map(drop).map_err(failed))
         }
         Command::Append { code, envelope, reply } => {
@@ -341,14 +343,14 @@ fn parse(text: &str, code: &str, seq: u64) -> Result<Envelope, StoreError> {
 
 fn load(connection: &Connection, path: &Path, code: &str) -> Result<Record, StoreError> {
     let failed = |source| StoreError::Database { path: path.to_owned(), source };
-    let query = "SELECT seed, observers, begun_ms FROM sessions WHERE code = ?1";
+    let query = "SELECT seed, observers, simulated, begun_ms FROM sessions WHERE code = ?1";
     let found = connection
         .query_row(query, [code], |row| {
-            Ok((row.get::<_, i64>(0)?, row.get::<_, String>(1)?, row.get::<_, u64>(2)?))
+            Ok((row.get::<_, i64>(0)?, row.get::<_, String>(1)?, row.get(2)?, row.get::<_, u64>(3)?))
         })
         .optional()
         .map_err(failed)?;
-    let (seed, group, begun_ms) = found.ok_or_else(|| StoreError::Unknown(code.to_owned()))?;
+    let (seed, group, simulated, begun_ms) = found.ok_or_else(|| StoreError::Unknown(code.to_owned()))?;
     let query = "SELECT seq, envelope FROM events WHERE code = ?1 ORDER BY seq";
     let mut statement = connection.prepare_cached(query).map_err(failed)?;
     let rows = statement
@@ -356,7 +358,7 @@ fn load(connection: &Connection, path: &Path, code: &str) -> Result<Record, Stor
         .and_then(Iterator::collect::<rusqlite::Result<Vec<_>>>)
         .map_err(failed)?;
     let events = rows.iter().map(|(seq, text)| parse(text, code, *seq)).collect::<Result<_, _>>()?;
-    Ok(Record { code: code.to_owned(), seed: seed as u64, group, begun_ms, events })
+    Ok(Record { code: code.to_owned(), seed: seed as u64, group, simulated, begun_ms, events })
 }
 
 fn erase(connection: &Connection, path: &Path, code: &str) -> Result<(), StoreError> {

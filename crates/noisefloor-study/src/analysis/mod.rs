@@ -32,6 +32,8 @@ pub struct Options {
     pub keep_outliers: bool,
     /// Seed of the bootstrap.
     pub seed: u64,
+    /// Whether simulated observers are analysed, instead of people; never both.
+    pub simulated: bool,
 }
 
 /// Everything that an analysis finds.
@@ -41,6 +43,8 @@ pub struct Report {
     pub noisefloor: &'static str,
     /// What observers did.
     pub protocol: Protocol,
+    /// Whether the observers are simulated.
+    pub simulated: bool,
     /// Every session that has an answer.
     pub observers: Vec<ObserverRow>,
     /// Thresholds, of the observers who count; none for a validation.
@@ -60,10 +64,12 @@ pub struct Report {
 /// # Errors
 /// [`StudyError`] if the answers cannot be read, or there are none.
 pub fn analyse(study: &Arc<Study>, options: Options) -> Result<Report, StudyError> {
-    let records = read_all(&study.database, &study.design())?;
+    let mut records = read_all(&study.database, &study.design())?;
+    records.retain(|record| record.simulated == options.simulated);
     let observers = observers::replay_all(study, &records)?;
     if observers.is_empty() {
-        let what = format!("{}: no answers yet; nothing to analyse", study.database.display());
+        let who = if options.simulated { "simulated observers" } else { "people" };
+        let what = format!("{}: no answers of {who} yet; nothing to analyse", study.database.display());
         return Err(StudyError::Analysis(what));
     }
     Ok(report(study, &observers, options))
@@ -79,6 +85,7 @@ pub fn report(study: &Study, observers: &[Observer], options: Options) -> Report
     Report {
         noisefloor: env!("CARGO_PKG_VERSION"),
         protocol: study.protocol,
+        simulated: options.simulated,
         tiles: if thresholds { tiles::rows(study, &kept, options.seed) } else { Vec::new() },
         repeats: agreement::repeats(study, &kept),
         between: agreement::between(study, &kept),

@@ -119,11 +119,14 @@ pub(crate) async fn study(State(app): Shared) -> Response {
 pub struct Beginning {
     /// One of the study's groups; empty if it has none.
     pub group: String,
+    /// Whether this is a simulated observer, whose answers are kept apart.
+    #[serde(default)]
+    pub simulated: bool,
 }
 
 /// `POST /api/sessions`
 pub(crate) async fn begin(State(app): Shared, body: Body) -> Answer {
-    let Beginning { group } = read(body).await?;
+    let Beginning { group, simulated } = read(body).await?;
     let known =
         if app.study.groups.is_empty() { group.is_empty() } else { app.study.groups.contains(&group) };
     if !known {
@@ -131,7 +134,7 @@ pub(crate) async fn begin(State(app): Shared, body: Body) -> Answer {
         return Err(Refusal::new(StatusCode::UNPROCESSABLE_ENTITY, "no such group", "group", do_));
     }
     let (code, seed) = (code::draw()?, code::draw_seed()?);
-    app.store.begin(&code, seed, &group).await?;
+    app.store.begin(&code, seed, &group, simulated).await?;
     let view = app.with(&code, |session| SessionView::of(&code, session)).await?;
     Ok((StatusCode::CREATED, Json(view)).into_response())
 }

@@ -77,7 +77,7 @@ pub fn drive(
         .build()
         .new_agent();
     let study: StudyView = ask(&agent, &format!("{server}/api/study"), None)?;
-    let beginning = json(&Beginning { group: group.to_owned() });
+    let beginning = json(&Beginning { group: group.to_owned(), simulated: true });
     let mut view: SessionView = ask(&agent, &format!("{server}/api/sessions"), Some(&beginning))?;
     let code = view.code.clone();
     let url = format!("{server}/api/sessions/{code}/events");

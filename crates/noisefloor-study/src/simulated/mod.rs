@@ -8,9 +8,11 @@ mod drive;
 
 pub use drive::{DriveError, drive, run};
 
+use crate::config::Study;
 use crate::event::{Ambient, Choice, Conditions, Event};
 use crate::server::StackView;
 use crate::session::Trial;
+use crate::stack::Stack;
 
 /// What simulated observers are drawn from.
 #[derive(Clone, Debug)]
@@ -39,9 +41,21 @@ pub struct SimulatedObserver {
 }
 
 impl Public {
+    /// Observers for a rehearsal of a study: thresholds around the geometric middle of each stack, up to a factor of two from tile to tile,
+    /// spreads of 0.3 between and 0.1 within observers, 1 % lapses. The numbers are made up; nothing about people follows from them.
+    pub fn made_up(study: &Study) -> Self {
+        let threshold = |stack: &Stack, tile: usize| {
+            let (low, high) = (stack.levels()[0].max(1) as f64, stack.levels()[stack.last() as usize] as f64);
+            (low * high).sqrt() * 2f64.powf((tile * 7 % 9) as f64 / 4.0 - 1.0)
+        };
+        let of_stack = |s: &Stack| (0..s.grid().len()).map(|tile| threshold(s, tile)).collect();
+        let thresholds = study.stacks.iter().map(of_stack).collect();
+        Self { thresholds, between: 0.3, within: 0.1, lapse: 0.01, bias: 0.0 }
+    }
+
     /// Draws an observer. The same seed gives the same one.
     pub fn draw(&self, seed: u64) -> SimulatedObserver {
-        let mut random = fastrand::Rng::with_seed(seed);
+        let mut random = crate::random::seeded(seed);
         let own = logistic(&mut random, self.between);
         let ln = |tiles: &Vec<f64>| tiles.iter().map(|t| t.ln() + own).collect();
         SimulatedObserver {
@@ -56,7 +70,7 @@ impl Public {
     /// Samples per pixel at which a share of observers (0 to 1, exclusive) see no difference from the reference, over observers and showings; their
     /// criterion and lapses left out. Of two logistic spreads, found by drawing 400 001 values, known to about 0.4 % at 95 %.
     pub fn quantile(&self, stack: usize, tile: usize, share: f64) -> f64 {
-        let mut random = fastrand::Rng::with_seed(0);
+        let mut random = crate::random::seeded(0);
         let mut draw = |_| logistic(&mut random, self.between) + logistic(&mut random, self.within);
         let mut sums: Vec<f64> = (0..400_001).map(&mut draw).collect();
         sums.sort_by(f64::total_cmp);

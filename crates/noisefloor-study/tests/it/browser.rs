@@ -86,7 +86,7 @@ fn observers_use_the_pages_in_a_browser() {
 
     // What was clicked: two observers left the six tiles at levels 1 to 6 (by mouse) and at 2 (by keyboard).
     let study = &studies[0].1.1;
-    let report = analyse(study, Options { keep_outliers: true, seed: 1 }).unwrap();
+    let report = analyse(study, Options { keep_outliers: true, seed: 1, simulated: false }).unwrap();
     let finished: Vec<_> = report.observers.iter().filter(|o| o.finished).collect();
     assert_eq!(finished.len(), 2, "{:?}", report.observers);
     let records = store::read_all(&study.database, &study.design()).unwrap();

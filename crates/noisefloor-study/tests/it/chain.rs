@@ -5,7 +5,7 @@ use noisefloor_study::analysis::{Options, analyse};
 use noisefloor_study::simulated::drive;
 use noisefloor_study::{Class, store};
 
-const OPTIONS: Options = Options { keep_outliers: false, seed: 1 };
+const OPTIONS: Options = Options { keep_outliers: false, seed: 1, simulated: true };
 
 /// Twelve simulated observers, two groups of which the second needs twice the samples, click through the real server; the analysis finds
 /// what they were made of, and its corpus is one.
@@ -21,6 +21,10 @@ fn thresholds_come_back_from_the_server_as_a_corpus() {
         let mut observer = public(2, &truth.map(|t| factor * t)).draw(seed);
         drive(&server.url, group, &mut observer, |_| ()).unwrap();
     }
+    // Simulated observers are not taken for people.
+    assert!(
+        analyse(&study, Options { simulated: false, ..OPTIONS }).unwrap_err().to_string().contains("people")
+    );
     // Analysed while it is served.
     let report = analyse(&study, OPTIONS).unwrap();
     assert_eq!((report.observers.len(), report.tiles.len()), (12, 4));

@@ -14,7 +14,7 @@ fn simulated(study: &Arc<Study>, public: &Public, observers: u64, seed: u64) -> 
         Observer::of(&format!("simulated {i}"), "", &session)
     };
     let all: Vec<Observer> = (0..observers).map(observe).collect();
-    (report(study, &all, Options { keep_outliers: false, seed }), all)
+    (report(study, &all, Options { keep_outliers: false, seed, simulated: true }), all)
 }
 
 /// Shares of intervals that hold the truth: of the median, and of the level where 95 % see no difference; and the mean ratio of the latter to the
