@@ -34,11 +34,8 @@ pub(super) fn rows(observers: &[&Observer], seed: u64) -> Vec<ClassRow> {
             Some([sum(&|c| c.0) / sum(&|c| c.1)])
         };
         let identical = Share::new(yes, of)?;
-        Some(ClassRow {
-            class,
-            identical,
-            observers_interval: bootstrap(counts.len(), seed, share).map(|[i]| i),
-        })
+        let observers_interval = bootstrap(counts.len(), seed, [identical.share], share).map(|[i]| i);
+        Some(ClassRow { class, identical, observers_interval })
     };
     [Class::Reference, Class::Test, Class::Noisy].into_iter().filter_map(row).collect()
 }

@@ -5,9 +5,9 @@
 
 use std::f64::consts::PI;
 
-/// Share of stops that are taken to be slips, anywhere in the stack. Without it one slip would widen the curve of a whole tile (Wichmann and
-/// Hill 2001, "The psychometric function: I", §2).
-pub const SLIPS: f64 = 0.02;
+/// Shares of stops that may be slips, anywhere in the stack: the likeliest is taken. With none, one slip would widen the curve of a whole tile; with
+/// more than there are, the curve would be too narrow (Wichmann and Hill 2001, "The psychometric function: I", §2).
+const SLIPS: [f64; 4] = [1e-4, 0.01, 0.02, 0.05];
 /// ln(95 % / 5 %): where 95 % see no difference, in scales above the median.
 pub const LN_19: f64 = 2.944_438_979_166_440_3;
 /// Scales that are looked for, in ln(spp). A tile whose observers all stop at one level has the smallest.
@@ -43,12 +43,12 @@ impl Observation {
     }
 
     /// Its likelihood under a logistic distribution.
-    fn likelihood(&self, centre: f64, scale: f64) -> f64 {
+    fn likelihood(&self, centre: f64, scale: f64, slips: f64) -> f64 {
         let share = |x: f64| 1.0 / (1.0 + ((centre - x) / scale).exp());
         match *self {
             Self::Between { above, to, levels } => {
                 let inside = to.map_or(1.0, share) - above.map_or(0.0, share);
-                (1.0 - SLIPS) * inside + SLIPS / levels as f64
+                (1.0 - slips) * inside + slips / levels as f64
             }
             Self::Measured { mean, sd } => {
                 // Variances add; the sum of a logistic and a normal value is taken for logistic
@@ -79,11 +79,28 @@ pub struct Logistic {
     pub centre: f64,
     /// Scale s; the standard deviation is s·π/√3.
     pub scale: f64,
+    /// Share of stops taken for slips.
+    pub slips: f64,
 }
 
 impl Logistic {
     /// Fits observations, each with its weight, at least one of them above 0. `None` without any.
     pub fn fit(observations: &[(Observation, f64)]) -> Option<Self> {
+        let fits = SLIPS.into_iter().filter_map(|slips| Self::fit_with(observations, slips));
+        let likelihood = |fit: &Self| -> f64 {
+            let log = |(o, w): &(Observation, f64)| {
+                w * o.likelihood(fit.centre, fit.scale, fit.slips).max(1e-300).ln()
+            };
+            observations.iter().map(log).sum()
+        };
+        // The first of equals: measured thresholds know of no slips
+        fits.map(|fit| (likelihood(&fit), fit))
+            .reduce(|a, b| if b.0 > a.0 + 1e-9 { b } else { a })
+            .map(|(_, fit)| fit)
+    }
+
+    /// The same with a known share of slips.
+    pub fn fit_with(observations: &[(Observation, f64)], slips: f64) -> Option<Self> {
         let weight: f64 = observations.iter().map(|(_, w)| w).sum();
         if weight <= 0.0 || !weight.is_finite() {
             return None;
@@ -96,11 +113,11 @@ impl Logistic {
             let scale = ln_scale.exp();
             // Beyond the scales looked for the likelihood is flat or falls: the search is led back
             let outside = (SCALES[0] / scale).ln().max((scale / SCALES[1]).ln()).max(0.0);
-            let log = |(o, w): &(Observation, f64)| w * o.likelihood(centre, scale).max(1e-300).ln();
+            let log = |(o, w): &(Observation, f64)| w * o.likelihood(centre, scale, slips).max(1e-300).ln();
             1e3 * outside - observations.iter().map(log).sum::<f64>()
         };
         let [centre, ln_scale] = minimum(badness, [mean, start.ln()], [start, 0.5]);
-        Some(Self { centre, scale: ln_scale.exp().clamp(SCALES[0], SCALES[1]) })
+        Some(Self { centre, scale: ln_scale.exp().clamp(SCALES[0], SCALES[1]), slips })
     }
 
     /// Samples per pixel at which 95 % see no difference.

@@ -54,20 +54,21 @@ fn row(study: &Study, observers: &[&Observer], place: Place, seed: u64) -> Optio
         .filter_map(|o| Some((o.threshold(study, place)?, o.observations(study, place))))
         .collect();
     let once: Vec<f64> = vec![1.0; said.len()];
-    let fit = |weights: &[f64]| {
-        let weighted = said.iter().zip(weights).filter(|(_, w)| **w > 0.0);
-        let all: Vec<(Observation, f64)> =
-            weighted.flat_map(|((_, seen), w)| seen.iter().map(move |o| (*o, *w))).collect();
-        Logistic::fit(&pooled(all))
+    let weighted = |weights: &[f64]| {
+        let drawn = said.iter().zip(weights).filter(|(_, w)| **w > 0.0);
+        pooled(drawn.flat_map(|((_, seen), w)| seen.iter().map(move |o| (*o, *w))))
     };
     let mean = |weights: &[f64]| {
         let sum: f64 = said.iter().zip(weights).map(|((t, _), w)| t * w).sum();
         sum / weights.iter().sum::<f64>()
     };
-    let fitted = fit(&once)?;
+    let fitted = Logistic::fit(&weighted(&once))?;
     let seed = seed ^ (u64::from(place.0) << 32 | u64::from(place.1));
-    let statistics = |w: &[f64]| fit(w).map(|f| [mean(w), f.centre, f.level95().ln()]);
-    let intervals = bootstrap(said.len(), seed, statistics);
+    let statistics = |w: &[f64]| {
+        Logistic::fit_with(&weighted(w), fitted.slips).map(|f| [mean(w), f.centre, f.level95().ln()])
+    };
+    let found = [mean(&once), fitted.centre, fitted.level95().ln()];
+    let intervals = bootstrap(said.len(), seed, found, statistics);
     let reached = |o: &&Observation| matches!(o, Observation::Between { to: None, .. });
     let (all, open) = said.iter().fold((0, 0), |(all, open), (_, seen)| {
         (all + seen.len(), open + seen.iter().filter(reached).count())
@@ -95,8 +96,8 @@ fn row(study: &Study, observers: &[&Observer], place: Place, seed: u64) -> Optio
 }
 
 /// Equal observations counted together: a fit takes time by how many there are.
-fn pooled(all: Vec<(Observation, f64)>) -> Vec<(Observation, f64)> {
-    let mut pooled: Vec<(Observation, f64)> = Vec::with_capacity(all.len());
+fn pooled(all: impl Iterator<Item = (Observation, f64)>) -> Vec<(Observation, f64)> {
+    let mut pooled: Vec<(Observation, f64)> = Vec::new();
     for (observation, weight) in all {
         match pooled.iter_mut().find(|(o, _)| *o == observation) {
             Some((_, sum)) => *sum += weight,

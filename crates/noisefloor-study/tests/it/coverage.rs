@@ -76,7 +76,7 @@ fn coverage_over_many_studies() {
         (12, 0.1, 0.02),
         (100, 0.1, 0.02),
     ] {
-        let (median, level95, ratio) = coverage(&study, &public(within, lapse), observers, 400);
+        let (median, level95, ratio) = coverage(&study, &public(within, lapse), observers, 200);
         println!(
             "{observers} observers, within {within}, lapse {lapse}: median {:.1} %, 95 % level {:.1} %, ratio {ratio:.3}",
             100.0 * median,
