@@ -14,6 +14,7 @@ mod output;
 mod render;
 mod reproduce;
 mod sources;
+mod study;
 mod train;
 
 use args::{Cli, Command};
@@ -31,6 +32,7 @@ fn main() -> ExitCode {
         Command::Evaluate(args) => evaluate::run(&args).map(|()| ExitCode::SUCCESS),
         Command::Audience(args) => audience::run(&args.command).map(|()| ExitCode::SUCCESS),
         Command::Reproduce(args) => reproduce::run(&args),
+        Command::Study(args) => study::run(&args.command).map(|()| ExitCode::SUCCESS),
         Command::Inspect(args) => inspect::run(&args).map(|()| ExitCode::SUCCESS),
         Command::Doctor(args) => doctor::run(&args),
         Command::Scenes => {

@@ -11,8 +11,10 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// Modified z-scores beyond this are unlike the others (Iglewicz and Hoaglin 1993, "How to detect and handle outliers", §3.3).
-pub const OUTLYING: f64 = 3.5;
+/// Modified z-scores beyond this are unlike the others (Iglewicz and Hoaglin 1993, "How to detect and handle outliers", §3.3). They take 3.5, which one of
+/// 2100 normal values exceeds; observers are spread logistically, of whom it would set aside one in 150, and with them part of what is to be
+/// measured. One of 1700 logistic values exceeds 5.
+pub const OUTLYING: f64 = 5.0;
 /// Fewest observers of whom one can be unlike the others.
 const FEWEST: usize = 5;
 /// Deviations of the median observer are taken to be at least this, in ln(spp): where all agree to a level, half a level is no outlier.
