@@ -54,7 +54,7 @@ pub use code::parse as parse_code;
 pub use config::{LANGUAGES, MAX_STACKS, NOISY_SHARE, Protocol, Study, Texts};
 pub use error::{StoreError, StudyError};
 pub use event::{Ambient, Choice, Conditions, Envelope, Event};
-pub use questplus::{GUESS, Grid, LAPSE, QuestPlus, right, sees};
+pub use questplus::{GUESS, Grid, LAPSE, Posterior, QuestPlus, right, sees};
 pub use server::{Beginning, Server, SessionView, StackView, StudyView, replay};
 pub use session::{Class, Misfit, Outcome, Session, Stage, Trial, grids};
 pub use stack::{MAX_LEVELS, Stack};

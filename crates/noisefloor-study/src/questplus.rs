@@ -114,9 +114,39 @@ impl QuestPlus {
         self.posterior.iter_mut().for_each(|p| *p /= sum);
     }
 
-    /// Mean and standard deviation of ln(threshold), the threshold in samples per pixel.
-    pub fn estimate(&self) -> (f64, f64) {
-        let weighted = || self.posterior.iter().zip(&self.grid.thresholds);
+    /// What is known of the threshold, the scale summed out.
+    pub fn posterior(&self) -> Posterior {
+        let thresholds = &self.grid.thresholds;
+        let last = thresholds[thresholds.len() - 1];
+        Posterior {
+            low: thresholds[0],
+            step: (last - thresholds[0]) / (THRESHOLDS - 1) as f64,
+            weights: self.posterior.chunks(SCALES.len()).map(|of_one| of_one.iter().sum()).collect(),
+        }
+    }
+}
+
+/// What is known of one observer's ln(threshold), the threshold in samples per pixel: probabilities at evenly spaced values. Since all values were as
+/// likely before, they are also proportional to the likelihood of the answers.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Posterior {
+    /// The first value.
+    pub low: f64,
+    /// From one value to the next.
+    pub step: f64,
+    /// Probabilities; they sum to 1.
+    pub weights: Arc<[f64]>,
+}
+
+impl Posterior {
+    /// The values.
+    pub fn values(&self) -> impl Iterator<Item = f64> + '_ {
+        (0..self.weights.len()).map(|i| self.low + self.step * i as f64)
+    }
+
+    /// Mean and standard deviation.
+    pub fn moments(&self) -> (f64, f64) {
+        let weighted = || self.weights.iter().zip(self.values());
         let mean: f64 = weighted().map(|(p, t)| p * t).sum();
         let variance: f64 = weighted().map(|(p, t)| p * (t - mean).powi(2)).sum();
         (mean, variance.sqrt())
@@ -193,7 +223,7 @@ mod tests {
                 let ln_spp = f64::from(100 * (level + 1)).ln();
                 quest.learn(level, random.f64() < right(ln_spp, truth, scale));
             }
-            let (mean, sd) = quest.estimate();
+            let (mean, sd) = quest.posterior().moments();
             squares += ((mean - truth) / sd).powi(2) / 60.0;
         }
         assert!((0.4..1.9).contains(&squares), "{squares}");

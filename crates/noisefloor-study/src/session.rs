@@ -2,7 +2,7 @@
 
 use crate::config::{Protocol, Study};
 use crate::event::{Choice, Conditions, Event};
-use crate::questplus::{Grid, QuestPlus};
+use crate::questplus::{Grid, Posterior, QuestPlus};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -224,9 +224,9 @@ impl Session {
         &self.outcomes
     }
 
-    /// Forced choice: mean and standard deviation of ln(threshold) of a tile, and its trials; `None` before its first answer.
-    pub fn estimate(&self, stack: u32, tile: u32) -> Option<(f64, f64)> {
-        self.quests.get(&(stack, tile)).map(QuestPlus::estimate)
+    /// Forced choice: what is known of the threshold of a tile; `None` before its first trial.
+    pub fn posterior(&self, stack: u32, tile: u32) -> Option<Posterior> {
+        self.quests.get(&(stack, tile)).map(QuestPlus::posterior)
     }
 
     /// The trial to be shown; `None` unless the session is at its trials.

@@ -3,6 +3,7 @@
 //! The share of observers who see no difference at n samples per pixel is then F(ln n), the psychometric function of the public, and 95 % see
 //! none at ln n = μ + s·ln 19.
 
+use crate::questplus::Posterior;
 use std::f64::consts::PI;
 
 /// Shares of stops that may be slips, anywhere in the stack: the likeliest is taken. With none, one slip would widen the curve of a whole tile; with
@@ -13,7 +14,7 @@ pub const LN_19: f64 = 2.944_438_979_166_440_3;
 /// Scales that are looked for, in ln(spp). A tile whose observers all stop at one level has the smallest.
 const SCALES: [f64; 2] = [0.01, 2.0];
 /// What is known of one threshold, in ln(spp).
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum Observation {
     /// It lies between two levels: a difference is seen at `above`, none at `to`. `None` where the stack ends.
     Between {
@@ -24,13 +25,8 @@ pub enum Observation {
         /// Levels of the stack: where a slip may end.
         levels: usize,
     },
-    /// It was measured, with a normal error.
-    Measured {
-        /// Mean.
-        mean: f64,
-        /// Standard deviation.
-        sd: f64,
-    },
+    /// It was measured: the likelihood of each value is known.
+    Measured(Posterior),
 }
 
 impl Observation {
@@ -42,23 +38,6 @@ impl Observation {
         Self::Between { above, to: if level < last { ln(level) } else { None }, levels: spp.len() }
     }
 
-    /// Its likelihood under a logistic distribution.
-    fn likelihood(&self, centre: f64, scale: f64, slips: f64) -> f64 {
-        let share = |x: f64| 1.0 / (1.0 + ((centre - x) / scale).exp());
-        match *self {
-            Self::Between { above, to, levels } => {
-                let inside = to.map_or(1.0, share) - above.map_or(0.0, share);
-                (1.0 - slips) * inside + slips / levels as f64
-            }
-            Self::Measured { mean, sd } => {
-                // Variances add; the sum of a logistic and a normal value is taken for logistic
-                let scale = scale.hypot(sd * 3f64.sqrt() / PI);
-                let f = 1.0 / (1.0 + ((centre - mean) / scale).exp());
-                f * (1.0 - f) / scale
-            }
-        }
-    }
-
     /// Where it is, roughly: what the search begins with.
     fn middle(&self) -> f64 {
         match *self {
@@ -67,9 +46,36 @@ impl Observation {
                 (Some(x), None) | (None, Some(x)) => x,
                 (None, None) => 0.0,
             },
-            Self::Measured { mean, .. } => mean,
+            Self::Measured(ref known) => known.moments().0,
         }
     }
+}
+
+/// Logarithm of the likelihood of all observations under a logistic distribution.
+fn log_likelihood(observations: &[(Observation, f64)], centre: f64, scale: f64, slips: f64) -> f64 {
+    let share = |x: f64| 1.0 / (1.0 + ((centre - x) / scale).exp());
+    // Share of observers between the middles on both sides of each value of a measurement: right also for curves narrower than a step. Measurements
+    // of one tile have the same values
+    let mut bins: (f64, f64, Vec<f64>) = (0.0, 0.0, Vec::new());
+    let mut sum = 0.0;
+    for (observation, weight) in observations {
+        let likelihood = match observation {
+            &Observation::Between { above, to, levels } => {
+                let inside = to.map_or(1.0, share) - above.map_or(0.0, share);
+                (1.0 - slips) * inside + slips / levels as f64
+            }
+            Observation::Measured(known) => {
+                if (bins.0, bins.1, bins.2.len()) != (known.low, known.step, known.weights.len()) {
+                    let edge = |i: usize| share(known.low + known.step * (i as f64 - 0.5));
+                    let edges: Vec<f64> = (0..=known.weights.len()).map(edge).collect();
+                    bins = (known.low, known.step, edges.windows(2).map(|e| e[1] - e[0]).collect());
+                }
+                known.weights.iter().zip(&bins.2).map(|(w, b)| w * b).sum()
+            }
+        };
+        sum += weight * likelihood.max(1e-300).ln();
+    }
+    sum
 }
 
 /// A fitted distribution of thresholds, in ln(spp).
@@ -87,12 +93,7 @@ impl Logistic {
     /// Fits observations, each with its weight, at least one of them above 0. `None` without any.
     pub fn fit(observations: &[(Observation, f64)]) -> Option<Self> {
         let fits = SLIPS.into_iter().filter_map(|slips| Self::fit_with(observations, slips));
-        let likelihood = |fit: &Self| -> f64 {
-            let log = |(o, w): &(Observation, f64)| {
-                w * o.likelihood(fit.centre, fit.scale, fit.slips).max(1e-300).ln()
-            };
-            observations.iter().map(log).sum()
-        };
+        let likelihood = |fit: &Self| log_likelihood(observations, fit.centre, fit.scale, fit.slips);
         // The first of equals: measured thresholds know of no slips
         fits.map(|fit| (likelihood(&fit), fit))
             .reduce(|a, b| if b.0 > a.0 + 1e-9 { b } else { a })
@@ -113,8 +114,7 @@ impl Logistic {
             let scale = ln_scale.exp();
             // Beyond the scales looked for the likelihood is flat or falls: the search is led back
             let outside = (SCALES[0] / scale).ln().max((scale / SCALES[1]).ln()).max(0.0);
-            let log = |(o, w): &(Observation, f64)| w * o.likelihood(centre, scale, slips).max(1e-300).ln();
-            1e3 * outside - observations.iter().map(log).sum::<f64>()
+            1e3 * outside - log_likelihood(observations, centre, scale, slips)
         };
         let [centre, ln_scale] = minimum(badness, [mean, start.ln()], [start, 0.5]);
         Some(Self { centre, scale: ln_scale.exp().clamp(SCALES[0], SCALES[1]), slips })
@@ -192,12 +192,20 @@ mod tests {
         let stops: Vec<_> = (0..400).map(|i| (Observation::stop(stop(quantile(i)), &spp), 1.0)).collect();
         let fit = Logistic::fit(&stops).unwrap();
         assert!((fit.centre - centre).abs() < 0.02 && (fit.scale / scale - 1.0).abs() < 0.08, "{fit:?}");
-        let measured: Vec<_> =
-            (0..400).map(|i| (Observation::Measured { mean: quantile(i), sd: 1e-3 }, 1.0)).collect();
+        let measured: Vec<_> = (0..400).map(|i| (measured(quantile(i), 1e-3), 1.0)).collect();
         let fit = Logistic::fit(&measured).unwrap();
         assert!((fit.centre - centre).abs() < 0.005 && (fit.scale / scale - 1.0).abs() < 0.02, "{fit:?}");
         assert!((fit.level95() / (centre + scale * LN_19).exp() - 1.0).abs() < 0.02);
         assert!((fit.share(fit.level95()) - 0.95).abs() < 1e-9);
+    }
+
+    /// A measurement with a normal error, at steps of a hundredth.
+    fn measured(mean: f64, sd: f64) -> Observation {
+        let (low, step) = (4.0, 0.01);
+        let weight = |i: i32| (-0.5 * ((low + step * f64::from(i) - mean) / sd.max(0.005)).powi(2)).exp();
+        let weights: Vec<f64> = (0..700).map(weight).collect();
+        let sum: f64 = weights.iter().sum();
+        Observation::Measured(Posterior { low, step, weights: weights.iter().map(|w| w / sum).collect() })
     }
 
     /// A normal error that is known is taken out of the spread: observers of one threshold have the smallest scale.
@@ -205,8 +213,7 @@ mod tests {
     fn known_errors_do_not_count_as_spread() {
         let z = [-1.5, -1.0, -0.6, -0.3, -0.1, 0.1, 0.3, 0.6, 1.0, 1.5];
         let spread = |sd: f64| {
-            let points: Vec<_> =
-                z.iter().map(|z| (Observation::Measured { mean: 7.0 + 0.3 * z, sd }, 1.0)).collect();
+            let points: Vec<_> = z.iter().map(|z| (measured(7.0 + 0.3 * z, sd), 1.0)).collect();
             Logistic::fit(&points).unwrap().scale
         };
         assert!(spread(0.3) < 0.05 && spread(0.001) > 0.12, "{} {}", spread(0.3), spread(0.001));

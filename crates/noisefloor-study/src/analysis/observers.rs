@@ -4,6 +4,7 @@ use super::fit::Observation;
 use crate::config::Study;
 use crate::error::StudyError;
 use crate::event::Conditions;
+use crate::questplus::Posterior;
 use crate::server::replay;
 use crate::session::{Class, Outcome, Stage, grids};
 use crate::store::Record;
@@ -38,8 +39,8 @@ pub struct Observer {
     pub conditions: Option<Conditions>,
     /// Acquisition: levels of the stops of each tile, in the order of the showings.
     pub stops: BTreeMap<Place, Vec<u32>>,
-    /// Forced choice: mean and standard deviation of ln(threshold) of each tile.
-    pub measured: BTreeMap<Place, (f64, f64)>,
+    /// Forced choice: what is known of ln(threshold) of each tile.
+    pub measured: BTreeMap<Place, Posterior>,
     /// Validation: stack, class and whether it was called identical.
     pub judged: Vec<(u32, Class, bool)>,
     /// Clicks and answers that count.
@@ -73,8 +74,8 @@ impl Observer {
                 }
                 Outcome::Chosen { stack, tile, .. } => {
                     observer.clicks += 1;
-                    if let Some(estimate) = session.estimate(*stack, *tile) {
-                        observer.measured.insert((*stack, *tile), estimate);
+                    if let Some(known) = session.posterior(*stack, *tile) {
+                        observer.measured.insert((*stack, *tile), known);
                     }
                 }
             }
@@ -91,8 +92,7 @@ impl Observer {
     pub fn observations(&self, study: &Study, place: Place) -> Vec<Observation> {
         let spp = study.stacks[place.0 as usize].levels();
         let stops = self.stops.get(&place).into_iter().flatten().map(|&level| Observation::stop(level, spp));
-        let measured =
-            self.measured.get(&place).into_iter().map(|&(mean, sd)| Observation::Measured { mean, sd });
+        let measured = self.measured.get(&place).cloned().map(Observation::Measured);
         stops.chain(measured).collect()
     }
 
@@ -103,7 +103,7 @@ impl Observer {
             let sum: f64 = stops.iter().map(|&level| spp[level as usize] as f64).sum();
             return Some(sum / stops.len() as f64);
         }
-        self.measured.get(&place).map(|(mean, _)| mean.exp())
+        self.measured.get(&place).map(|known| known.moments().0.exp())
     }
 }
 

@@ -56,7 +56,7 @@ fn row(study: &Study, observers: &[&Observer], place: Place, seed: u64) -> Optio
     let once: Vec<f64> = vec![1.0; said.len()];
     let weighted = |weights: &[f64]| {
         let drawn = said.iter().zip(weights).filter(|(_, w)| **w > 0.0);
-        pooled(drawn.flat_map(|((_, seen), w)| seen.iter().map(move |o| (*o, *w))))
+        pooled(drawn.flat_map(|((_, seen), w)| seen.iter().map(move |o| (o, *w))))
     };
     let mean = |weights: &[f64]| {
         let sum: f64 = said.iter().zip(weights).map(|((t, _), w)| t * w).sum();
@@ -95,13 +95,15 @@ fn row(study: &Study, observers: &[&Observer], place: Place, seed: u64) -> Optio
     })
 }
 
-/// Equal observations counted together: a fit takes time by how many there are.
-fn pooled(all: impl Iterator<Item = (Observation, f64)>) -> Vec<(Observation, f64)> {
+/// Equal stops counted together: a fit takes time by how many there are.
+fn pooled<'a>(all: impl Iterator<Item = (&'a Observation, f64)>) -> Vec<(Observation, f64)> {
     let mut pooled: Vec<(Observation, f64)> = Vec::new();
     for (observation, weight) in all {
-        match pooled.iter_mut().find(|(o, _)| *o == observation) {
+        let is_stop = matches!(observation, Observation::Between { .. });
+        let same = if is_stop { pooled.iter_mut().find(|(o, _)| o == observation) } else { None };
+        match same {
             Some((_, sum)) => *sum += weight,
-            None => pooled.push((observation, weight)),
+            None => pooled.push((observation.clone(), weight)),
         }
     }
     pooled

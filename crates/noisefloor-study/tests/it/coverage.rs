@@ -83,14 +83,20 @@ fn coverage_over_many_studies() {
             100.0 * level95
         );
     }
-    let (_folder, study) = papers("forced-choice", "trials = 24");
+}
+
+/// And of forced choices, over 100 studies each.
+#[test]
+#[ignore = "takes minutes: coverage over many studies"]
+fn coverage_of_forced_choices() {
+    let (_folder, study) = papers("forced-choice", "");
     for within in [0.1, 0.25] {
         // Forced choices measure the observer's own threshold: his showings are not part of the spread
         let own = public(0.0, 0.02);
         let (median, level95, ratio) = {
             let truths: Vec<[f64; 2]> = (0..2).map(|t| [0.5, 0.95].map(|s| own.quantile(0, t, s))).collect();
             let (mut median, mut level95, mut ratio) = (0, 0, 0.0);
-            for seed in 0..200 {
+            for seed in 0..100 {
                 let (report, _) = simulated(&study, &public(within, 0.02), 33, seed);
                 for tile in &report.tiles {
                     let holds = |i: Option<[f64; 2]>, t: f64| i.is_some_and(|[l, h]| l <= t && t <= h);
@@ -99,12 +105,12 @@ fn coverage_over_many_studies() {
                     ratio += (tile.level95 / truths[tile.tile][1]).ln();
                 }
             }
-            (median, level95, (ratio / 400.0).exp())
+            (median, level95, (ratio / 200.0).exp())
         };
         println!(
             "forced choice, within {within}: median {:.1} %, 95 % level {:.1} %, ratio {ratio:.3}",
-            f64::from(median) / 4.0,
-            f64::from(level95) / 4.0
+            f64::from(median) / 2.0,
+            f64::from(level95) / 2.0
         );
     }
 }
