@@ -38,7 +38,7 @@ pub struct TileRow {
     pub level95: f64,
     /// Its 95 % interval.
     pub level95_interval: Option<[f64; 2]>,
-    /// Whether more than 5 % of showings went on to the reference: the level of 95 % is then a guess beyond what was offered.
+    /// Whether the level of 95 % lies above the last level before the reference: it is then a guess beyond what was offered.
     pub beyond: bool,
 }
 
@@ -69,10 +69,6 @@ fn row(study: &Study, observers: &[&Observer], place: Place, seed: u64) -> Optio
     };
     let found = [mean(&once), fitted.centre, fitted.level95().ln()];
     let intervals = bootstrap(said.len(), seed, found, statistics);
-    let reached = |o: &&Observation| matches!(o, Observation::Between { to: None, .. });
-    let (all, open) = said.iter().fold((0, 0), |(all, open), (_, seen)| {
-        (all + seen.len(), open + seen.iter().filter(reached).count())
-    });
     let stack = &study.stacks[place.0 as usize];
     let tile = stack.grid().tile(place.1 as usize);
     let exp = |i: usize| intervals.map(|all| all[i].map(f64::exp));
@@ -91,7 +87,7 @@ fn row(study: &Study, observers: &[&Observer], place: Place, seed: u64) -> Optio
         scale: fitted.scale,
         level95: fitted.level95(),
         level95_interval: exp(2),
-        beyond: 20 * open > all,
+        beyond: fitted.level95() > stack.levels()[stack.last() as usize - 1] as f64,
     })
 }
 
