@@ -34,6 +34,7 @@ pub enum Command {
     Evaluate(EvaluateArgs),
     Audience(AudienceArgs),
     Reproduce(ReproduceArgs),
+    Study(StudyArgs),
     Inspect(InspectArgs),
     Doctor(DoctorArgs),
     /// List the built-in scenes.
@@ -320,6 +321,110 @@ pub struct FitArgs {
     /// Print JSON.
     #[arg(long)]
     pub json: bool,
+}
+
+/// Ask people: collect thresholds in the browser, validate what a model says, and train on the answers.
+///
+/// STUDY.toml names stacks of pictures (folders of NNNNN.png or NNNNN.exr, by samples per pixel), the protocol, and what observers read
+/// and agree to; docs/study.md explains it.
+#[derive(Debug, Args)]
+#[command(after_help = "Example:
+  noisefloor study serve hall.toml
+  noisefloor study simulate hall.toml --observers 12      a rehearsal, kept apart from people's answers
+  noisefloor study analyse hall.toml --out out/hall
+  noisefloor train --corpus out/hall/corpus --corpus another-study --out my.nfm")]
+pub struct StudyArgs {
+    #[command(subcommand)]
+    pub command: StudyCommand,
+}
+
+#[derive(Debug, Subcommand)]
+pub enum StudyCommand {
+    Serve(ServeArgs),
+    Analyse(AnalyseArgs),
+    Simulate(SimulateArgs),
+    /// Print all that is kept of one observer, as JSON.
+    Export(ObserverArgs),
+    /// Erase all that is kept of one observer, for good.
+    Erase(ObserverArgs),
+}
+
+/// Serve the pages of a study until Ctrl-C.
+///
+/// For this machine alone unless --listen says otherwise. Every answer is on disk before it is acknowledged; the server may be killed
+/// and started again at any time.
+#[derive(Debug, Args)]
+pub struct ServeArgs {
+    /// Study file.
+    #[arg(value_name = "STUDY.toml")]
+    pub study: PathBuf,
+    /// Address to listen on. Answers travel unencrypted: only in a network that you trust.
+    #[arg(long, value_name = "IP", default_value = "127.0.0.1")]
+    pub listen: std::net::IpAddr,
+    /// Port; 0 takes a free one.
+    #[arg(long, default_value_t = 8437)]
+    pub port: u16,
+    /// Another name of this machine by which browsers ask for it. Repeat for more.
+    #[arg(long, value_name = "HOST")]
+    pub allow_host: Vec<String>,
+}
+
+/// Analyse the answers: thresholds of tiles, agreement, groups, Table 2 of the paper, plots, and a corpus for `train`.
+#[derive(Debug, Args)]
+pub struct AnalyseArgs {
+    /// Study file.
+    #[arg(value_name = "STUDY.toml")]
+    pub study: PathBuf,
+    /// Folder to write into.
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+    /// Threshold of a tile in the corpus and in the grid over the picture.
+    #[arg(long, value_enum, default_value_t = ThresholdChoice::Level95)]
+    pub threshold: ThresholdChoice,
+    /// Count observers who are unlike the others all the same.
+    #[arg(long)]
+    pub keep_outliers: bool,
+    /// Analyse simulated observers instead of people.
+    #[arg(long)]
+    pub simulated: bool,
+    /// Seed of the bootstrap.
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+}
+
+/// What the threshold of a tile is.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub enum ThresholdChoice {
+    /// Where 95 % of observers see no difference.
+    Level95,
+    /// The mean over observers.
+    Mean,
+}
+
+/// Rehearse a study: simulated observers, with made-up thresholds, answer it through a real server. Their answers are kept apart from
+/// people's.
+#[derive(Debug, Args)]
+pub struct SimulateArgs {
+    /// Study file.
+    #[arg(value_name = "STUDY.toml")]
+    pub study: PathBuf,
+    /// How many.
+    #[arg(long, default_value_t = 12, value_parser = clap::value_parser!(u16).range(1..=1000))]
+    pub observers: u16,
+    /// Seed: the same seed draws the same observers.
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+}
+
+/// One observer.
+#[derive(Debug, Args)]
+pub struct ObserverArgs {
+    /// Study file.
+    #[arg(value_name = "STUDY.toml")]
+    pub study: PathBuf,
+    /// The participant's code.
+    #[arg(value_name = "CODE")]
+    pub code: String,
 }
 
 /// Repeat the paper's own experiment on human corpora, at its scale, and report what comes out.

@@ -16,6 +16,7 @@ mod render;
 mod reproduce;
 mod rivals;
 mod sources;
+mod study;
 mod train;
 
 use args::{Cli, Command};
@@ -34,6 +35,7 @@ fn main() -> ExitCode {
         Command::Evaluate(args) => evaluate::run(&args).map(|()| ExitCode::SUCCESS),
         Command::Audience(args) => audience::run(&args.command).map(|()| ExitCode::SUCCESS),
         Command::Reproduce(args) => reproduce::run(&args),
+        Command::Study(args) => study::run(&args.command).map(|()| ExitCode::SUCCESS),
         Command::Inspect(args) => inspect::run(&args).map(|()| ExitCode::SUCCESS),
         Command::Doctor(args) => doctor::run(&args),
         Command::Scenes => {

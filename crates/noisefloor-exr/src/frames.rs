@@ -14,15 +14,21 @@ pub(crate) enum Layout {
 
 /// One image of a stack: it adds samples `first`+1…`last`.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) struct Frame {
-    pub(crate) first: u64,
-    pub(crate) last: u64,
-    pub(crate) path: PathBuf,
+pub struct Frame {
+    /// Samples per pixel before it.
+    pub first: u64,
+    /// Samples per pixel with it, above `first`.
+    pub last: u64,
+    /// The file.
+    pub path: PathBuf,
 }
 
 /// The running means of a folder, by ascending samples; each frame starts where the one before it ends. Other files are
 /// left alone.
-pub(crate) fn running_means(dir: &Path) -> Result<Vec<Frame>, StackError> {
+///
+/// # Errors
+/// [`StackError`] if the folder cannot be listed, has no running mean, or has two of the same samples.
+pub fn running_means(dir: &Path) -> Result<Vec<Frame>, StackError> {
     let mut frames = Vec::new();
     for path in files(dir)? {
         let Some(digits) = running_mean_name(&path) else { continue };

@@ -4,6 +4,7 @@
 //!   hostile until parsed: sizes are checked before pixels are allocated, and a broken file is a [`PictureError`].
 //! - [`write_exr`], [`write_png`], [`write_atomic`], [`check_writable`]: files that appear whole or not at all.
 //! - [`StackSource`]: a folder of images as a [`noisefloor::ProgressiveSource`].
+//! - [`running_means`]: which samples are in which file of a stack, told by names.
 //! - [`CommandSource`]: any program that renders into a file, as a source.
 //! - [`corpus`]: thresholds that observers gave, together with the images they judged.
 //! - [`table`]: descriptors of a corpus, computed from its images, and read and written as CSV.
@@ -46,6 +47,7 @@ pub use decode_exr::read_exr;
 pub use decode_pfm::read_pfm;
 pub use decode_png::read_png;
 pub use error::{CommandError, CorpusError, PictureError, StackError, WriteError};
+pub use frames::{Frame, running_means};
 pub use picture::{DisplayImage, LinearImage, MAX_FILE_BYTES, Picture, read_picture};
 pub use stack::StackSource;
 pub use write::{RenderLayers, check_writable, write_atomic, write_exr, write_png};

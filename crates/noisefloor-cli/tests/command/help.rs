@@ -2,7 +2,7 @@ use crate::kit::succeed;
 
 #[test]
 fn every_subcommand_explains_itself() {
-    let options: [(&str, &[&str]); 9] = [
+    let options: [(&str, &[&str]); 10] = [
         (
             "render",
             &[
@@ -39,6 +39,7 @@ fn every_subcommand_explains_itself() {
         ("evaluate", &["--corpus", "--model", "--leave-one-scene-out", "--json", "--csv"]),
         ("audience", &["fit"]),
         ("reproduce", &["--corpus", "--out", "--edge", "--levels", "--dump-subset"]),
+        ("study", &["serve", "analyse", "simulate", "export", "erase"]),
         ("inspect", &["MODEL", "--json"]),
         ("doctor", &["--install", "NOISEFLOOR_NAME_PYTHON"]),
         ("scenes", &["--help"]),

@@ -1,0 +1,116 @@
+// Pictures made of tiles, one image pixel on one device pixel.
+
+const MOST_TILES = 4000;
+const RETRY_MS = 1000;
+const tiles = new Map();
+
+/** Asks until the server is within reach: a click made without a connection shows once it is back. */
+async function load(path) {
+  for (;;) {
+    const answer = await fetch(path).catch(() => null);
+    if (answer?.ok) {
+      // As the file has it: no profile of the screen may touch what observers are shown
+      return createImageBitmap(await answer.blob(), { colorSpaceConversion: "none", premultiplyAlpha: "none" });
+    }
+    if (answer && answer.status < 500) throw new Error(path);
+    await new Promise((go) => setTimeout(go, RETRY_MS));
+  }
+}
+
+/** A tile of a level; kept, since observers go back and forth. */
+export function tile(stack, level, index) {
+  const path = `/api/tiles/${stack}/${level}/${index}.png`;
+  let found = tiles.get(path);
+  tiles.delete(path);
+  found ??= load(path).catch((error) => { tiles.delete(path); throw error; });
+  tiles.set(path, found);
+  if (tiles.size > MOST_TILES) tiles.delete(tiles.keys().next().value);
+  return found;
+}
+
+/** What keeps pictures from being shown unscaled, as the name of a message; null if nothing does. */
+export function scaled() {
+  if (!Number.isInteger(devicePixelRatio)) return "zoomed";
+  if (window.visualViewport && visualViewport.scale !== 1) return "pinched";
+  return null;
+}
+
+/** Whether `count` pictures side by side have room, as the name of a message; null if they have. */
+export function crowded(stack, count) {
+  const wide = (stack.width * count) / devicePixelRatio + 16 * (count + 1);
+  const high = stack.height / devicePixelRatio + 190;
+  return wide > innerWidth || high > innerHeight ? "crowded" : null;
+}
+
+/** Moves an element by part of a pixel, onto whole CSS pixels, which are whole device pixels. By its place: a transform would be applied after
+ * the browser has rounded. */
+export function snap(element) {
+  element.style.left = element.style.top = "0";
+  const { left, top } = element.getBoundingClientRect();
+  element.style.left = `${Math.round(left) - left}px`;
+  element.style.top = `${Math.round(top) - top}px`;
+}
+
+export class Picture {
+  constructor(study, stack, label) {
+    this.stack = stack;
+    this.shape = study.stacks[stack];
+    this.columns = Math.ceil(this.shape.width / this.shape.tile);
+    this.count = this.columns * Math.ceil(this.shape.height / this.shape.tile);
+    this.canvas = document.createElement("canvas");
+    this.canvas.className = "picture";
+    this.canvas.width = this.shape.width;
+    this.canvas.height = this.shape.height;
+    this.canvas.setAttribute("role", "img");
+    this.canvas.setAttribute("aria-label", label);
+    this.context = this.canvas.getContext("2d", { alpha: false });
+    this.context.imageSmoothingEnabled = false;
+    this.fit();
+    this.blank();
+  }
+
+  /** CSS size and place, so that image pixels are device pixels. */
+  fit() {
+    const ratio = devicePixelRatio;
+    this.canvas.style.width = `${this.shape.width / ratio}px`;
+    this.canvas.style.height = `${this.shape.height / ratio}px`;
+    snap(this.canvas);
+  }
+
+  blank() {
+    this.context.fillStyle = "rgb(119 119 119)";
+    this.context.fillRect(0, 0, this.shape.width, this.shape.height);
+  }
+
+  place(index) {
+    return [(index % this.columns) * this.shape.tile, Math.floor(index / this.columns) * this.shape.tile];
+  }
+
+  /** The tile at a place in image pixels. */
+  at(x, y) {
+    return Math.floor(y / this.shape.tile) * this.columns + Math.floor(x / this.shape.tile);
+  }
+
+  /** Shows all tiles at once, when all are there. */
+  async show(levels) {
+    const all = await Promise.all(levels.map((level, i) => tile(this.stack, level, i)));
+    all.forEach((bitmap, i) => this.context.drawImage(bitmap, ...this.place(i)));
+  }
+
+  async showTile(level, index) {
+    this.context.drawImage(await tile(this.stack, level, index), ...this.place(index));
+  }
+
+  /** Short marks at the corners of a tile, outside of it. */
+  mark(index) {
+    const [x, y] = this.place(index);
+    const { width, height, tile: edge } = this.shape;
+    const [right, bottom] = [Math.min(x + edge, width), Math.min(y + edge, height)];
+    this.context.fillStyle = "rgb(20 20 20)";
+    const reach = Math.round(edge / 8);
+    for (const [cx, cy, sx, sy] of [[x, y, 1, 1], [right - 1, y, -1, 1], [x, bottom - 1, 1, -1], [right - 1, bottom - 1, -1, -1]]) {
+      this.context.fillRect(Math.min(cx, cx + sx * reach), cy, reach, 1);
+      this.context.fillRect(cx, Math.min(cy, cy + sy * reach), 1, reach);
+    }
+  }
+}

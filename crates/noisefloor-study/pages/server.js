@@ -1,0 +1,99 @@
+// What is asked of the server and told to it. An event is kept in this browser until the server has acknowledged it.
+
+const RETRY_MS = [500, 1000, 2000, 4000];
+const CODE = "noisefloor.code";
+const box = (code) => `noisefloor.outbox.${code}`;
+
+export class Refused extends Error {
+  constructor(status, body) {
+    super(body.what ?? `status ${status}`);
+    this.status = status;
+    this.body = body;
+  }
+}
+
+async function ask(path, options = {}) {
+  const answer = await fetch(path, { cache: "no-store", ...options });
+  if (answer.status === 204) return null;
+  const body = await answer.json();
+  if (!answer.ok) throw new Refused(answer.status, body);
+  return body;
+}
+
+const json = (method, body) => ({ method, headers: { "content-type": "application/json" }, body: JSON.stringify(body) });
+
+export const study = () => ask("/api/study");
+export const begin = (group) => ask("/api/sessions", json("POST", { group }));
+export const view = (code) => ask(`/api/sessions/${code}`);
+export const erase = (code) => ask(`/api/sessions/${code}`, { method: "DELETE" });
+export const strings = (language) => ask(`/${language}.json`);
+export const exported = (code) => ask(`/api/sessions/${code}/export`);
+
+export const remembered = () => localStorage.getItem(CODE);
+export const remember = (code) => localStorage.setItem(CODE, code);
+export function forget(code) {
+  localStorage.removeItem(CODE);
+  localStorage.removeItem(box(code));
+}
+
+/** Sends the events of one session in order, each until it is acknowledged. */
+export class Outbox {
+  /** `onState(waiting)` hears whether the server is out of reach; `onRefused(error)` that an event did not fit. */
+  constructor(view, onState, onRefused) {
+    this.code = view.code;
+    this.onState = onState;
+    this.onRefused = onRefused;
+    const kept = JSON.parse(localStorage.getItem(box(this.code)) ?? "[]");
+    // What the server has already was acknowledged to a page that was closed before it heard so
+    this.events = kept.filter((e) => e.seq >= view.next_seq);
+    this.next = view.next_seq + this.events.length;
+    this.view = view;
+    this.sending = null;
+    this.save();
+  }
+
+  save() {
+    localStorage.setItem(box(this.code), JSON.stringify(this.events));
+  }
+
+  /** Queues an event. */
+  add(event) {
+    this.events.push({ seq: this.next, at: Date.now(), event });
+    this.next += 1;
+    this.save();
+    this.sending ??= this.send().finally(() => { this.sending = null; });
+    return this.sending;
+  }
+
+  /** Waits until everything is acknowledged; the state of the session then. */
+  async settled() {
+    while (this.events.length > 0) {
+      this.sending ??= this.send().finally(() => { this.sending = null; });
+      await this.sending;
+    }
+    return this.view;
+  }
+
+  async send() {
+    let failures = 0;
+    while (this.events.length > 0) {
+      try {
+        this.view = await ask(`/api/sessions/${this.code}/events`, json("POST", this.events[0]));
+        this.events.shift();
+        this.save();
+        if (failures > 0) this.onState(false);
+        failures = 0;
+      } catch (error) {
+        if (error instanceof Refused && error.status < 500 && error.status !== 408 && error.status !== 429) {
+          this.events = [];
+          this.save();
+          this.onRefused(error);
+          return;
+        }
+        this.onState(true);
+        await new Promise((go) => setTimeout(go, RETRY_MS[Math.min(failures, RETRY_MS.length - 1)]));
+        failures += 1;
+      }
+    }
+  }
+}

@@ -1,0 +1,225 @@
+//! Pictures of an analysis.
+
+use super::files::Threshold;
+use super::{ClassRow, TileRow};
+use crate::error::StudyError;
+use embedded_graphics::mono_font::MonoTextStyle;
+use embedded_graphics::mono_font::iso_8859_1::{FONT_6X10, FONT_7X13_BOLD, FONT_9X18_BOLD};
+use embedded_graphics::pixelcolor::Rgb888;
+use embedded_graphics::prelude::*;
+use embedded_graphics::text::{Alignment, Baseline, Text, TextStyleBuilder};
+use noisefloor::TileGrid;
+use plotters::prelude::{
+    ChartBuilder, Circle, IntoDrawingArea, IntoLogRange, LineSeries, PathElement, RGBColor, SVGBackend, WHITE,
+};
+use plotters::style::Color;
+use std::convert::Infallible;
+
+const SIZE: (u32, u32) = (720, 480);
+const LETTERS: (&str, u32) = ("sans-serif", 15);
+const INK: RGBColor = RGBColor(40, 40, 40);
+const BLUE: RGBColor = RGBColor(0, 114, 178);
+const VERMILION: RGBColor = RGBColor(213, 94, 0);
+/// Points of a curve.
+const POINTS: usize = 120;
+
+fn failed(error: impl std::fmt::Display) -> StudyError {
+    StudyError::Analysis(format!("a plot cannot be drawn: {error}"))
+}
+
+/// Mean and 95 % level of each tile, with intervals, in the order of the table.
+pub(super) fn thresholds(tiles: &[TileRow]) -> Result<String, StudyError> {
+    let all = tiles.iter().flat_map(|t| {
+        let ends = [t.mean_interval, t.level95_interval].into_iter().flatten().flatten();
+        ends.chain([t.mean, t.level95]).collect::<Vec<_>>()
+    });
+    let (low, high) = all.fold((f64::INFINITY, 1.0f64), |(l, h), v| (l.min(v.max(0.1)), h.max(v)));
+    let mut text = String::new();
+    {
+        let root = SVGBackend::with_string(&mut text, SIZE).into_drawing_area();
+        root.fill(&WHITE).map_err(failed)?;
+        let mut chart = ChartBuilder::on(&root)
+            .margin(12)
+            .x_label_area_size(44)
+            .y_label_area_size(64)
+            .build_cartesian_2d(-0.5..tiles.len() as f64 - 0.5, (low / 1.2..high * 1.2).log_scale())
+            .map_err(failed)?;
+        chart
+            .configure_mesh()
+            .disable_x_mesh()
+            .x_desc("tile, in the order of tiles.csv (blue: mean; red: 95 % see no difference)")
+            .y_desc("samples per pixel")
+            .x_label_formatter(&|x| format!("{x:.0}"))
+            .y_label_formatter(&|spp| format!("{spp:.0}"))
+            .label_style(LETTERS)
+            .axis_desc_style(LETTERS)
+            .light_line_style(WHITE)
+            .draw()
+            .map_err(failed)?;
+        for (i, tile) in tiles.iter().enumerate() {
+            for (shift, value, interval, colour) in [
+                (-0.12, tile.mean, tile.mean_interval, BLUE),
+                (0.12, tile.level95, tile.level95_interval, VERMILION),
+            ] {
+                let x = i as f64 + shift;
+                if let Some([low, high]) = interval {
+                    let line = PathElement::new([(x, low), (x, high)], colour.stroke_width(2));
+                    chart.draw_series([line]).map_err(failed)?;
+                }
+                chart.draw_series([Circle::new((x, value), 4, colour.filled())]).map_err(failed)?;
+            }
+        }
+        root.present().map_err(failed)?;
+    }
+    Ok(text)
+}
+
+/// The psychometric function of each tile of a stack.
+pub(super) fn curves(tiles: &[&TileRow], levels: &[u64]) -> Result<String, StudyError> {
+    let (low, high) = (levels[0].max(1) as f64, levels[levels.len() - 1] as f64);
+    let mut text = String::new();
+    {
+        let root = SVGBackend::with_string(&mut text, SIZE).into_drawing_area();
+        root.fill(&WHITE).map_err(failed)?;
+        let mut chart = ChartBuilder::on(&root)
+            .margin(12)
+            .x_label_area_size(44)
+            .y_label_area_size(64)
+            .build_cartesian_2d((low..high).log_scale(), 0.0..1.0)
+            .map_err(failed)?;
+        chart
+            .configure_mesh()
+            .x_desc("samples per pixel; a line a tile, a dot where 95 % see no difference")
+            .y_desc("share who see no difference")
+            .x_label_formatter(&|spp| format!("{spp:.0}"))
+            .label_style(LETTERS)
+            .axis_desc_style(LETTERS)
+            .light_line_style(WHITE)
+            .draw()
+            .map_err(failed)?;
+        for tile in tiles {
+            let fit = super::fit::Logistic { centre: tile.median.ln(), scale: tile.scale, slips: 0.0 };
+            let at = |i: usize| low * (high / low).powf(i as f64 / (POINTS - 1) as f64);
+            let curve = (0..POINTS).map(|i| (at(i), fit.share(at(i))));
+            chart.draw_series(LineSeries::new(curve, BLUE.mix(0.6))).map_err(failed)?;
+            if tile.level95 < high {
+                let dot = Circle::new((tile.level95, 0.95), 3, VERMILION.filled());
+                chart.draw_series([dot]).map_err(failed)?;
+            }
+        }
+        root.present().map_err(failed)?;
+    }
+    Ok(text)
+}
+
+/// The paper's Table 2 as points with Wilson's intervals.
+pub(super) fn classes(rows: &[ClassRow]) -> Result<String, StudyError> {
+    let mut text = String::new();
+    {
+        let root = SVGBackend::with_string(&mut text, SIZE).into_drawing_area();
+        root.fill(&WHITE).map_err(failed)?;
+        let mut chart = ChartBuilder::on(&root)
+            .margin(12)
+            .x_label_area_size(44)
+            .y_label_area_size(64)
+            .build_cartesian_2d(-0.5..rows.len() as f64 - 0.5, 0.0..1.0)
+            .map_err(failed)?;
+        let name = |x: &f64| {
+            let row = (x.round() - x).abs() < 1e-6;
+            let row = row.then(|| rows.get(x.round() as usize)).flatten();
+            row.map_or(String::new(), |r| format!("{:?}", r.class).to_lowercase())
+        };
+        chart
+            .configure_mesh()
+            .disable_x_mesh()
+            .x_labels(2 * rows.len() + 1)
+            .x_label_formatter(&name)
+            .y_desc("share called identical, 95 % intervals")
+            .label_style(LETTERS)
+            .axis_desc_style(LETTERS)
+            .light_line_style(WHITE)
+            .draw()
+            .map_err(failed)?;
+        for (i, row) in rows.iter().enumerate() {
+            let [low, high] = row.identical.wilson;
+            let line = PathElement::new([(i as f64, low), (i as f64, high)], INK.stroke_width(2));
+            chart.draw_series([line]).map_err(failed)?;
+            let dot = Circle::new((i as f64, row.identical.share), 5, BLUE.filled());
+            chart.draw_series([dot]).map_err(failed)?;
+        }
+        root.present().map_err(failed)?;
+    }
+    Ok(text)
+}
+
+/// The grid over the picture with a threshold in each tile (Takouachet et al. 2017, figure 3): RGB, three bytes a pixel.
+pub(super) fn grid(grid: TileGrid, picture: &[u8], tiles: &[&TileRow], threshold: Threshold) -> Vec<u8> {
+    let mut canvas = Canvas { width: grid.width(), height: grid.height(), bytes: picture.to_vec() };
+    for t in tiles {
+        for x in t.x..t.x + t.width {
+            canvas.set(x, t.y, [255; 3]);
+        }
+        for y in t.y..t.y + t.height {
+            canvas.set(t.x, y, [255; 3]);
+        }
+        let spp = match threshold {
+            Threshold::Level95 => t.level95,
+            Threshold::Mean => t.mean,
+        };
+        let label = format!("{}{spp:.0}", if t.beyond { ">" } else { "" });
+        let (font, advance) = match t.width {
+            100.. => (&FONT_9X18_BOLD, 9),
+            48.. => (&FONT_7X13_BOLD, 7),
+            _ => (&FONT_6X10, 6),
+        };
+        if label.len() * advance + 2 > t.width || t.height < 12 {
+            continue;
+        }
+        let centre = Point::new((t.x + t.width / 2) as i32, (t.y + t.height / 2) as i32);
+        let style = TextStyleBuilder::new().alignment(Alignment::Center).baseline(Baseline::Middle).build();
+        let mut write = |shift: Point, grey: u8| {
+            let letters = MonoTextStyle::new(font, Rgb888::new(grey, grey, grey));
+            let Ok(_) = Text::with_text_style(&label, centre + shift, letters, style).draw(&mut canvas);
+        };
+        // Ink around white letters: readable over any picture
+        for shift in [(-1, 0), (1, 0), (0, -1), (0, 1)] {
+            write(Point::new(shift.0, shift.1), 0);
+        }
+        write(Point::zero(), 255);
+    }
+    canvas.bytes
+}
+
+struct Canvas {
+    width: usize,
+    height: usize,
+    bytes: Vec<u8>,
+}
+
+impl Canvas {
+    fn set(&mut self, x: usize, y: usize, colour: [u8; 3]) {
+        if x < self.width && y < self.height {
+            self.bytes[(y * self.width + x) * 3..][..3].copy_from_slice(&colour);
+        }
+    }
+}
+
+impl OriginDimensions for Canvas {
+    fn size(&self) -> Size {
+        Size::new(self.width as u32, self.height as u32)
+    }
+}
+
+impl DrawTarget for Canvas {
+    type Color = Rgb888;
+    type Error = Infallible;
+
+    fn draw_iter<I: IntoIterator<Item = Pixel<Rgb888>>>(&mut self, pixels: I) -> Result<(), Infallible> {
+        for Pixel(at, colour) in pixels {
+            if let (Ok(x), Ok(y)) = (usize::try_from(at.x), usize::try_from(at.y)) {
+                self.set(x, y, [colour.r(), colour.g(), colour.b()]);
+            }
+        }
+        Ok(())
+    }
+}

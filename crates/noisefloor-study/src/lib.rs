@@ -1,0 +1,61 @@
+//! Experiments with people, in the browser: noise thresholds are collected, validated and analysed.
+//!
+//! - [`Study`] is a checked study file: stacks of pictures, a protocol, what observers read and agree to.
+//! - [`Server`] shows it to observers and keeps every [`Event`] before it acknowledges it; [`store`] is where.
+//! - [`Session`] is the state that events move on; replaying them rebuilds it, which is how it is resumed and analysed.
+//! - [`analysis`] makes thresholds, agreements and tables of the answers, and a corpus for `noisefloor train`.
+//! - [`simulated`] are observers made of numbers, who drive the same server: to test the whole chain, and to plan a study.
+//!
+//! ```
+//! use noisefloor_exr::write_png;
+//! use noisefloor_study::{Event, Session, Stage, Study, grids};
+//! use std::sync::Arc;
+//!
+//! // Three pictures, named by their samples per pixel, and a study file beside them.
+//! let folder = tempfile::tempdir()?;
+//! std::fs::create_dir(folder.path().join("wall"))?;
+//! for spp in [10, 100, 1000] {
+//!     write_png(folder.path().join(format!("wall/{spp:05}.png")), 32, 16, &vec![128; 3 * 32 * 16])?;
+//! }
+//! let file = folder.path().join("study.toml");
+//! std::fs::write(&file, r#"
+//!     protocol = "acquisition"
+//!     database = "answers.sqlite"
+//!     tile = 16
+//!     [text.en]
+//!     title = "A grey wall"
+//!     consent = "I take part."
+//!     [[stack]]
+//!     name = "wall"
+//!     folder = "wall"
+//! "#)?;
+//!
+//! let study = Arc::new(Study::open(&file)?);
+//! let mut session = Session::new(study.clone(), grids(&study), 1);
+//! session.apply(&Event::Consent { language: "en".into() })?;
+//! assert_eq!((session.stage(), session.progress()), (Stage::Conditions, (0, 3)));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+pub mod analysis;
+mod code;
+mod config;
+mod error;
+mod event;
+mod questplus;
+mod random;
+mod server;
+mod session;
+pub mod simulated;
+mod stack;
+pub mod store;
+
+pub use code::parse as parse_code;
+pub use config::{LANGUAGES, MAX_STACKS, NOISY_SHARE, Protocol, Study, Texts};
+pub use error::{StoreError, StudyError};
+pub use event::{Ambient, Choice, Conditions, Envelope, Event};
+pub use questplus::{GUESS, Grid, LAPSE, Posterior, QuestPlus, right, sees};
+pub use server::{Beginning, Server, SessionView, StackView, StudyView, replay};
+pub use session::{Class, Misfit, Outcome, Session, Stage, Trial, grids};
+pub use stack::{MAX_LEVELS, Stack};
+pub use store::{Record, Store};

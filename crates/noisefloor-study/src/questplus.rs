@@ -1,0 +1,231 @@
+//! QUEST+ (Watson 2017, "QUEST+: A general multidimensional Bayesian adaptive psychometric method", Journal of Vision 17(3):10) for
+//! one tile: which level to show next, and what is known of the threshold.
+//!
+//! Written here because the server has to decide trials, and no crate has it; jsQuestPlus, the library of jsPsych's users, runs in pages.
+
+use std::sync::Arc;
+
+/// Probability of being right without seeing anything: one of two intervals.
+pub const GUESS: f64 = 0.5;
+/// Probability of answering without looking, assumed.
+pub const LAPSE: f64 = 0.02;
+/// Scales of the psychometric function that are thought possible, in ln(spp).
+const SCALES: [f64; 4] = [0.08, 0.16, 0.32, 0.64];
+/// Thresholds that are thought possible: so many, evenly in ln(spp).
+const THRESHOLDS: usize = 81;
+/// They reach so far beyond the first and the last level, in ln(spp): threefold.
+const MARGIN: f64 = 1.1;
+/// Levels that are considered: more lie closer than an answer can tell apart.
+const MOST_STIMULI: usize = 48;
+
+/// Probability that an observer with threshold and scale given sees the noise of a picture, all in ln(spp). Logistic; ½ at the threshold.
+pub fn sees(ln_spp: f64, ln_threshold: f64, scale: f64) -> f64 {
+    1.0 / (1.0 + ((ln_spp - ln_threshold) / scale).exp())
+}
+
+/// Probability of a right answer in a two-interval forced choice.
+pub fn right(ln_spp: f64, ln_threshold: f64, scale: f64) -> f64 {
+    GUESS + (1.0 - GUESS - LAPSE) * sees(ln_spp, ln_threshold, scale)
+}
+
+/// What does not change from trial to trial: the levels of a stack, the hypotheses, and what each predicts.
+#[derive(Debug)]
+pub struct Grid {
+    /// Levels that may be shown.
+    levels: Vec<u32>,
+    /// ln(threshold) of each hypothesis.
+    thresholds: Vec<f64>,
+    /// Probability of a right answer: by level of the stack, then by hypothesis.
+    right: Vec<Vec<f64>>,
+}
+
+impl Grid {
+    /// For a stack with these samples per pixel, increasing, at least two; the last is the reference, and never shown against itself.
+    pub fn new(spp: &[u64]) -> Self {
+        let ln: Vec<f64> = spp.iter().map(|&n| (n.max(1) as f64).ln()).collect();
+        let (low, high) = (ln[0] - MARGIN, ln[ln.len() - 1] + MARGIN);
+        let hypothesis = |i: usize| {
+            let threshold = low + (high - low) * (i / SCALES.len()) as f64 / (THRESHOLDS - 1) as f64;
+            (threshold, SCALES[i % SCALES.len()])
+        };
+        let hypotheses: Vec<(f64, f64)> = (0..THRESHOLDS * SCALES.len()).map(hypothesis).collect();
+        let likelihood = |&x: &f64| hypotheses.iter().map(|&(t, s)| right(x, t, s)).collect();
+
+        // Levels evenly in ln(spp)
+        let (first, last) = (ln[0], ln[ln.len() - 2]);
+        let nearest = |i: usize| {
+            let goal = first + (last - first) * i as f64 / (MOST_STIMULI - 1) as f64;
+            let distance = |&l: &usize| (ln[l] - goal).abs();
+            (0..ln.len() - 1).min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap_or(0) as u32
+        };
+        let mut levels: Vec<u32> = (0..MOST_STIMULI).map(nearest).collect();
+        levels.dedup();
+        Self {
+            levels,
+            thresholds: hypotheses.iter().map(|h| h.0).collect(),
+            right: ln.iter().map(likelihood).collect(),
+        }
+    }
+}
+
+/// What is known of one tile's threshold.
+#[derive(Clone, Debug)]
+pub struct QuestPlus {
+    grid: Arc<Grid>,
+    /// Probability of each hypothesis; they sum to 1.
+    posterior: Vec<f64>,
+}
+
+impl QuestPlus {
+    /// Nothing is known: all hypotheses are as likely.
+    pub fn new(grid: Arc<Grid>) -> Self {
+        let n = grid.thresholds.len();
+        Self { grid, posterior: vec![1.0 / n as f64; n] }
+    }
+
+    /// The level whose answer is expected to leave the least entropy about the threshold (Watson 2017, eqs. 2 to 5). The scale is summed out
+    /// first (Prins 2013, "The psi-marginal adaptive method", Journal of Vision 13(7):3): it is not asked for, and trials spent on it are lost.
+    pub fn next_level(&self) -> u32 {
+        let xlnx = |x: f64| if x > 0.0 { x * x.ln() } else { 0.0 };
+        let expected_entropy = |&level: &u32| {
+            let predicted =
+                self.posterior.chunks(SCALES.len()).zip(self.grid.right[level as usize].chunks(SCALES.len()));
+            let (mut inner, mut all_right) = (0.0, 0.0);
+            for (posterior, right) in predicted {
+                let known: f64 = posterior.iter().sum();
+                let right: f64 = posterior.iter().zip(right).map(|(p, r)| p * r).sum();
+                inner += xlnx(right) + xlnx(known - right);
+                all_right += right;
+            }
+            xlnx(all_right) + xlnx(1.0 - all_right) - inner
+        };
+        let entropies: Vec<f64> = self.grid.levels.iter().map(expected_entropy).collect();
+        let least = (0..entropies.len()).min_by(|&a, &b| entropies[a].total_cmp(&entropies[b]));
+        self.grid.levels[least.unwrap_or(0)]
+    }
+
+    /// Learns from an answer (Bayes' rule). A level that is not in the stack teaches nothing.
+    pub fn learn(&mut self, level: u32, right: bool) {
+        let Some(likelihood) = self.grid.right.get(level as usize) else { return };
+        for (p, r) in self.posterior.iter_mut().zip(likelihood) {
+            *p *= if right { *r } else { 1.0 - r };
+        }
+        let sum: f64 = self.posterior.iter().sum();
+        self.posterior.iter_mut().for_each(|p| *p /= sum);
+    }
+
+    /// What is known of the threshold, the scale summed out.
+    pub fn posterior(&self) -> Posterior {
+        let thresholds = &self.grid.thresholds;
+        let last = thresholds[thresholds.len() - 1];
+        Posterior {
+            low: thresholds[0],
+            step: (last - thresholds[0]) / (THRESHOLDS - 1) as f64,
+            weights: self.posterior.chunks(SCALES.len()).map(|of_one| of_one.iter().sum()).collect(),
+        }
+    }
+}
+
+/// What is known of one observer's ln(threshold), the threshold in samples per pixel: probabilities at evenly spaced values. Since all values were as
+/// likely before, they are also proportional to the likelihood of the answers.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Posterior {
+    /// The first value.
+    pub low: f64,
+    /// From one value to the next.
+    pub step: f64,
+    /// Probabilities; they sum to 1.
+    pub weights: Arc<[f64]>,
+}
+
+impl Posterior {
+    /// The values.
+    pub fn values(&self) -> impl Iterator<Item = f64> + '_ {
+        (0..self.weights.len()).map(|i| self.low + self.step * i as f64)
+    }
+
+    /// Mean and standard deviation.
+    pub fn moments(&self) -> (f64, f64) {
+        let weighted = || self.weights.iter().zip(self.values());
+        let mean: f64 = weighted().map(|(p, t)| p * t).sum();
+        let variance: f64 = weighted().map(|(p, t)| p * (t - mean).powi(2)).sum();
+        (mean, variance.sqrt())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn stack() -> Arc<Grid> {
+        Arc::new(Grid::new(&(1..=100).map(|i| 100 * i).collect::<Vec<_>>()))
+    }
+
+    #[test]
+    fn known_values() {
+        assert!((sees(5.0, 5.0, 0.3) - 0.5).abs() < 1e-12);
+        // 95 % see nothing ln 19 scales above the threshold.
+        assert!((sees(5.0 + 0.3 * 19f64.ln(), 5.0, 0.3) - 0.05).abs() < 1e-12);
+        assert!((right(0.0, 20.0, 0.1) - 0.98).abs() < 1e-9 && (right(40.0, 20.0, 0.1) - 0.5).abs() < 1e-9);
+    }
+
+    #[test]
+    fn one_answer_is_bayes_rule() {
+        let grid = stack();
+        let mut quest = QuestPlus::new(grid.clone());
+        quest.learn(10, true);
+        let sum: f64 = grid.right[10].iter().sum();
+        for (p, r) in quest.posterior.iter().zip(&grid.right[10]) {
+            assert!((p - r / sum).abs() < 1e-15);
+        }
+        let before = quest.posterior.clone();
+        quest.learn(100_000, false);
+        assert_eq!(quest.posterior, before);
+    }
+
+    /// The first level is chosen by brute force too: entropy of each posterior, weighed by how likely it is.
+    #[test]
+    fn the_level_chosen_leaves_least_entropy() {
+        let mut quest = QuestPlus::new(stack());
+        for answer in [true, false, true, true] {
+            let chosen = quest.next_level();
+            let of = |p: f64| -p * p.max(1e-300).ln();
+            let entropy = |q: &QuestPlus| -> f64 {
+                q.posterior.chunks(SCALES.len()).map(|of_one| of(of_one.iter().sum())).sum()
+            };
+            let expected = |level: u32| {
+                let p: f64 =
+                    quest.posterior.iter().zip(&quest.grid.right[level as usize]).map(|(p, r)| p * r).sum();
+                let after = |right| {
+                    let mut q = quest.clone();
+                    q.learn(level, right);
+                    entropy(&q)
+                };
+                p * after(true) + (1.0 - p) * after(false)
+            };
+            let best = quest.grid.levels.iter().map(|&l| expected(l)).fold(f64::INFINITY, f64::min);
+            assert!((expected(chosen) - best).abs() < 1e-9);
+            quest.learn(chosen, answer);
+        }
+    }
+
+    /// 32 trials of a known observer, 60 times: the errors are as large as the posterior says. With errors z = (estimate − truth)/sd,
+    /// mean z² of 60 lies in 0.4…1.9 but for 1 in 1000 if z is standard normal (χ² of 60 degrees of freedom: 0.53…1.66).
+    #[test]
+    fn estimates_err_as_much_as_they_say() {
+        let (truth, scale) = (2500f64.ln(), 0.16);
+        let mut squares = 0.0;
+        for seed in 0..60 {
+            let mut random = fastrand::Rng::with_seed(seed);
+            let mut quest = QuestPlus::new(stack());
+            for _ in 0..32 {
+                let level = quest.next_level();
+                let ln_spp = f64::from(100 * (level + 1)).ln();
+                quest.learn(level, random.f64() < right(ln_spp, truth, scale));
+            }
+            let (mean, sd) = quest.posterior().moments();
+            squares += ((mean - truth) / sd).powi(2) / 60.0;
+        }
+        assert!((0.4..1.9).contains(&squares), "{squares}");
+    }
+}

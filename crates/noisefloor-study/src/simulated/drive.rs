@@ -1,0 +1,126 @@
+//! Simulated observers at the real server, or at a session without one.
+
+use super::SimulatedObserver;
+use crate::event::{Envelope, Event};
+use crate::server::{Beginning, SessionView, StackView, StudyView};
+use crate::session::{Misfit, Session, Stage};
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+use thiserror::Error;
+
+/// Why a simulated observer could not go on.
+#[derive(Debug, Error)]
+pub enum DriveError {
+    /// The server did not answer.
+    #[error("{url}: no answer: {source}; is `noisefloor study serve` running there?")]
+    Http {
+        /// What was asked for.
+        url: String,
+        /// What went wrong.
+        source: Box<ureq::Error>,
+    },
+    /// The server refused.
+    #[error("{url}: refused with status {status}: {body}")]
+    Refused {
+        /// What was asked for.
+        url: String,
+        /// HTTP status.
+        status: u16,
+        /// What the server said.
+        body: String,
+    },
+    /// The answer is not what the server of this version sends.
+    #[error("{url}: not the JSON expected: {source}; is the server of the same version?")]
+    Json {
+        /// What was asked for.
+        url: String,
+        /// What is wrong with it.
+        source: serde_json::Error,
+    },
+}
+
+/// Sends one request; `None` as body reads.
+fn ask<T: DeserializeOwned>(agent: &ureq::Agent, url: &str, body: Option<&str>) -> Result<T, DriveError> {
+    let failed = |source| DriveError::Http { url: url.to_owned(), source: Box::new(source) };
+    let mut response = match body {
+        Some(body) => agent.post(url).header("content-type", "application/json").send(body),
+        None => agent.get(url).call(),
+    }
+    .map_err(failed)?;
+    let status = response.status().as_u16();
+    let text = response.body_mut().read_to_string().map_err(failed)?;
+    if !(200..300).contains(&status) {
+        return Err(DriveError::Refused { url: url.to_owned(), status, body: text });
+    }
+    serde_json::from_str(&text).map_err(|source| DriveError::Json { url: url.to_owned(), source })
+}
+
+fn json(value: &impl Serialize) -> String {
+    serde_json::to_string(value).unwrap_or_default()
+}
+
+/// Takes a simulated observer through a whole session at a server, `http://host:port`, event by event. The group is one of the study's.
+/// `on_event` is told how long each event took to be acknowledged. Returns the code.
+///
+/// # Errors
+/// [`DriveError`] if the server does not answer, or refuses.
+pub fn drive(
+    server: &str,
+    group: &str,
+    observer: &mut SimulatedObserver,
+    mut on_event: impl FnMut(Duration),
+) -> Result<String, DriveError> {
+    let agent = ureq::Agent::config_builder()
+        .http_status_as_error(false)
+        .timeout_global(Some(Duration::from_secs(60)))
+        .build()
+        .new_agent();
+    let study: StudyView = ask(&agent, &format!("{server}/api/study"), None)?;
+    let beginning = json(&Beginning { group: group.to_owned(), simulated: true });
+    let mut view: SessionView = ask(&agent, &format!("{server}/api/sessions"), Some(&beginning))?;
+    let code = view.code.clone();
+    let url = format!("{server}/api/sessions/{code}/events");
+    let mut send = |view: &mut SessionView, event: Event| {
+        let at = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |d| d.as_millis() as u64);
+        let begun = Instant::now();
+        *view = ask(&agent, &url, Some(&json(&Envelope { seq: view.next_seq, at, event })))?;
+        on_event(begun.elapsed());
+        Ok(())
+    };
+    let language = study.text.keys().next().cloned().unwrap_or_default();
+    for event in observer.arrive(&language) {
+        send(&mut view, event)?;
+    }
+    while let Some(trial) = view.trial.take() {
+        for event in observer.respond(&trial, &study.stacks) {
+            send(&mut view, event)?;
+        }
+    }
+    Ok(code)
+}
+
+/// Takes a simulated observer through a session without a server, to its end.
+///
+/// # Errors
+/// [`Misfit`] if an answer does not fit, which would be a mistake of the observer.
+pub fn run(session: &mut Session, observer: &mut SimulatedObserver) -> Result<(), Misfit> {
+    let stack = |s: &crate::stack::Stack| StackView {
+        width: s.grid().width(),
+        height: s.grid().height(),
+        tile: s.grid().edge(),
+        levels: s.levels().to_vec(),
+    };
+    let stacks: Vec<StackView> = session.study().stacks.iter().map(stack).collect();
+    let language = session.study().text.keys().next().cloned().unwrap_or_default();
+    for event in observer.arrive(&language) {
+        session.apply(&event)?;
+    }
+    while session.stage() == Stage::Trials {
+        let Some(trial) = session.trial() else { break };
+        for event in observer.respond(&trial, &stacks) {
+            session.apply(&event)?;
+        }
+    }
+    Ok(())
+}

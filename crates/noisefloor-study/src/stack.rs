@@ -1,0 +1,225 @@
+//! A stack of pictures of one view, from noisy to converged, as observers are shown it: 8-bit tiles.
+
+use crate::config::NOISY_SHARE;
+use crate::error::StudyError;
+use image::codecs::png::{CompressionType, FilterType, PngEncoder};
+use image::{ExtendedColorType, ImageEncoder};
+use noisefloor::{Display, Rgb, Tile, TileGrid, ToneMapping};
+use noisefloor_exr::{Frame, Picture, read_picture, running_means};
+use rayon::prelude::*;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// Most pictures of a stack.
+pub const MAX_LEVELS: usize = 2000;
+/// Most tiles of a picture.
+const MAX_TILES: usize = 1024;
+/// Most pixels of a picture: more do not fit a screen unscaled.
+const MAX_PIXELS: usize = 16 << 20;
+/// Most lines of a table of stops.
+const MAX_STOPS: usize = 100_000;
+
+/// Where a stack comes from.
+pub(crate) struct Source {
+    pub(crate) name: String,
+    pub(crate) renderer: String,
+    pub(crate) folder: PathBuf,
+    pub(crate) stops: Option<PathBuf>,
+    pub(crate) tile: usize,
+}
+
+/// Pictures of one view by increasing samples per pixel. The last one is the reference.
+#[derive(Debug)]
+pub struct Stack {
+    name: String,
+    renderer: String,
+    folder: PathBuf,
+    grid: TileGrid,
+    levels: Vec<u64>,
+    paths: Vec<PathBuf>,
+    /// How linear pictures are shown: settled on the reference, the same for all. `None` if the pictures are PNGs.
+    display: Option<Display>,
+    /// Level at which each tile had stopped: the first with at least so many samples.
+    stops: Option<Vec<u32>>,
+    /// Level at 30 % of that.
+    noisy: Option<Vec<u32>>,
+}
+
+impl Stack {
+    pub(crate) fn open(source: Source) -> Result<Self, StudyError> {
+        let Source { name, renderer, folder, stops, tile } = source;
+        let frames = running_means(&folder)?;
+        if !(2..=MAX_LEVELS).contains(&frames.len()) {
+            return Err(StudyError::Levels { name, levels: frames.len(), max: MAX_LEVELS });
+        }
+        let (levels, paths): (Vec<u64>, Vec<PathBuf>) =
+            frames.into_iter().map(|Frame { last, path, .. }| (last, path)).unzip();
+
+        // The reference settles the size, and how linear pictures are shown
+        let reference = read_picture(&paths[paths.len() - 1])?;
+        let (width, height) = reference.size();
+        let grid = TileGrid::new(width, height, tile)
+            .map_err(|source| StudyError::Tile { name: name.clone(), source })?;
+        if grid.len() > MAX_TILES || width * height > MAX_PIXELS {
+            let what = format!(
+                "stack {name}: {width}×{height} pixels in {} tiles; at most {MAX_PIXELS} pixels in {MAX_TILES} tiles are shown, take larger tiles or a crop",
+                grid.len()
+            );
+            return Err(StudyError::File { path: folder, what });
+        }
+        let display = match &reference {
+            Picture::Linear(image) => Some(ToneMapping::default().settle(&image.pixels)),
+            Picture::Display(_) => None,
+        };
+
+        // Where the tiles stopped, as levels
+        let spp = stops.map(|path| read_stops(&path, grid)).transpose()?;
+        let level_of =
+            |spp: f64| levels.iter().position(|&l| l as f64 >= spp).unwrap_or(levels.len() - 1) as u32;
+        let share = |share: f64| -> Option<Vec<u32>> {
+            Some(spp.as_ref()?.iter().map(|spp| level_of(share * spp)).collect())
+        };
+        let (stops, noisy) = (share(1.0), share(NOISY_SHARE));
+        Ok(Self { name, renderer, folder, grid, levels, paths, display, stops, noisy })
+    }
+
+    /// Its name, which is a plain folder name.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Who rendered it, as the study file says.
+    pub fn renderer(&self) -> &str {
+        &self.renderer
+    }
+
+    /// The folder of its pictures.
+    pub fn folder(&self) -> &Path {
+        &self.folder
+    }
+
+    /// The tiles.
+    pub fn grid(&self) -> TileGrid {
+        self.grid
+    }
+
+    /// Samples per pixel of each level, increasing; at least two. The last is the reference.
+    pub fn levels(&self) -> &[u64] {
+        &self.levels
+    }
+
+    /// The level of the reference.
+    pub fn last(&self) -> u32 {
+        (self.levels.len() - 1) as u32
+    }
+
+    /// Level at which each tile had stopped, where the study file says.
+    pub fn stops(&self) -> Option<&[u32]> {
+        self.stops.as_deref()
+    }
+
+    /// Level with 30 % of the samples at which each tile had stopped, where the study file says.
+    pub fn noisy(&self) -> Option<&[u32]> {
+        self.noisy.as_deref()
+    }
+
+    /// Whether the pictures were tone mapped to be shown.
+    pub fn is_tone_mapped(&self) -> bool {
+        self.display.is_some()
+    }
+
+    /// A level as it is shown: sRGB-encoded, three bytes a pixel, row-major.
+    ///
+    /// # Errors
+    /// [`StudyError`] if the file is broken, or its size or kind is not that of the reference.
+    ///
+    /// # Panics
+    /// If there is no such level.
+    pub fn shown(&self, level: u32) -> Result<Vec<u8>, StudyError> {
+        let path = &self.paths[level as usize];
+        let picture = read_picture(path)?;
+        let want = (self.grid.width(), self.grid.height());
+        if picture.size() != want {
+            return Err(StudyError::Size { path: path.clone(), got: picture.size(), want });
+        }
+        let byte = |c: f32| (c.clamp(0.0, 1.0) * 255.0).round() as u8;
+        let bytes = |pixels: &mut dyn Iterator<Item = Rgb>| pixels.flatten().map(byte).collect();
+        match (&picture, &self.display) {
+            (Picture::Display(image), None) => Ok(bytes(&mut image.pixels.iter().copied())),
+            (Picture::Linear(image), Some(display)) => {
+                if !image.pixels.iter().flatten().all(|c| c.is_finite()) {
+                    return Err(StudyError::NotFinite { path: path.clone() });
+                }
+                Ok(bytes(&mut image.pixels.iter().map(|&p| display.encode(p))))
+            }
+            _ => {
+                let what = "a stack holds either PNGs or EXRs, not both".to_owned();
+                Err(StudyError::File { path: path.clone(), what })
+            }
+        }
+    }
+
+    /// The tiles of a level as PNG files, row-major.
+    ///
+    /// # Errors
+    /// Those of [`Stack::shown`].
+    pub fn tile_pngs(&self, level: u32) -> Result<Vec<Vec<u8>>, StudyError> {
+        let pixels = self.shown(level)?;
+        self.grid.tiles().map(|tile| self.png(level, &pixels, tile)).collect()
+    }
+
+    fn png(&self, level: u32, pixels: &[u8], tile: Tile) -> Result<Vec<u8>, StudyError> {
+        let rows = tile.rows(self.grid.width());
+        let cut: Vec<u8> = rows.flat_map(|row| &pixels[3 * row.start..3 * row.end]).copied().collect();
+        let mut png = Vec::new();
+        PngEncoder::new_with_quality(&mut png, CompressionType::Fast, FilterType::Sub)
+            .write_image(&cut, tile.width as u32, tile.height as u32, ExtendedColorType::Rgb8)
+            .map_err(|e| StudyError::File {
+                path: self.paths[level as usize].clone(),
+                what: e.to_string(),
+            })?;
+        Ok(png)
+    }
+
+    pub(crate) fn check_pictures(&self) -> Result<(), StudyError> {
+        (0..self.levels.len()).into_par_iter().try_for_each(|level| self.shown(level as u32).map(drop))
+    }
+}
+
+/// Samples at which each tile stopped, from a table with the columns `tile` and `spp`.
+fn read_stops(path: &Path, grid: TileGrid) -> Result<Vec<f64>, StudyError> {
+    let bad = |what: String| StudyError::File { path: path.to_owned(), what };
+    let mut csv = csv::ReaderBuilder::new()
+        .trim(csv::Trim::All)
+        .from_path(path)
+        .map_err(|e| bad(format!("cannot be read: {e}")))?;
+    let header = csv.headers().map_err(|e| bad(e.to_string()))?.clone();
+    let column = |name: &str| {
+        header.iter().position(|h| h == name).ok_or_else(|| bad(format!("line 1: no column {name:?}")))
+    };
+    let (tile, spp) = (column("tile")?, column("spp")?);
+    let mut found = BTreeMap::new();
+    for record in csv.records().take(MAX_STOPS) {
+        let record = record.map_err(|e| bad(e.to_string()))?;
+        let line = record.position().map_or(0, csv::Position::line);
+        let text = |column: usize| record.get(column).unwrap_or_default();
+        let (index, samples) = (text(tile).parse::<usize>(), text(spp).parse::<f64>());
+        match (index, samples) {
+            (Ok(index), Ok(samples)) if index < grid.len() && samples.is_finite() && samples > 0.0 => {
+                found.insert(index, samples)
+            }
+            _ => {
+                return Err(bad(format!(
+                    "line {line}: tile {:?} and spp {:?} are not a tile below {} and its samples per pixel; is the tile size that of the study?",
+                    text(tile),
+                    text(spp),
+                    grid.len()
+                )));
+            }
+        };
+    }
+    if found.len() != grid.len() {
+        return Err(bad(format!("stops of {} tiles, but the grid has {}", found.len(), grid.len())));
+    }
+    Ok(found.into_values().collect())
+}
