@@ -26,7 +26,22 @@ use std::process::ExitCode;
 /// Ended by Ctrl-C or SIGTERM, with everything written: 128 + SIGINT.
 const INTERRUPTED: u8 = 130;
 
+/// Whoever reads our output may have had enough (`noisefloor scenes | head -1`): that ends the command, and is no fault of its own.
+/// `println!` panics then; the signal that would end it before is ignored, since it also comes when a renderer we talk to dies.
+fn end_quietly_when_nobody_reads() {
+    let otherwise = std::panic::take_hook();
+    std::panic::set_hook(Box::new(move |panic| {
+        let broken =
+            |message: &str| message.starts_with("failed printing to std") && message.contains("Broken pipe");
+        if panic.payload().downcast_ref::<String>().is_some_and(|message| broken(message)) {
+            std::process::exit(0);
+        }
+        otherwise(panic);
+    }));
+}
+
 fn main() -> ExitCode {
+    end_quietly_when_nobody_reads();
     let outcome = match Cli::parse().command {
         Command::Render(args) => render::run(&args),
         Command::Compare(args) => compare::run(&args),

@@ -9,8 +9,8 @@
 //! | [`Dammertz`] | `dammertz:0.003` | the error of a block, weighted by its area, is small; blocks split (Dammertz et al. 2010) |
 //! | [`CyclesAdaptive`] | `cycles:0.01` | the error of a pixel is small beside its brightness (Blender Cycles) |
 //! | [`LuxCoreHalt`] | `luxcore:0.35` | few pixels of the picture have changed on the screen (LuxCoreRender) |
-//! | [`Myszkowski1998`] | `vdp-stages:0.75` | nobody sees a difference between successive stages |
-//! | [`Takouachet2007`] | `vdp-first:0.5` | the visible difference from the first, noisy picture grows no more |
+//! | [`Myszkowski1998`] | `vdp-stages:0.55` | nobody sees a difference between successive stages |
+//! | [`Takouachet2007`] | `vdp-first:0.66` | the visible difference from the first, noisy picture grows no more |
 //!
 //! [`parse`] makes a criterion of such a spec, and [`RIVALS`] lists those with one open constant, to be fitted to data.
 //! [`Vdp`] is Daly's visible differences predictor; [`metrics`] has relMSE, PSNR, FLIP and butteraugli.

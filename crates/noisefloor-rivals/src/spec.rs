@@ -140,8 +140,8 @@ fn known() -> String {
 }
 
 /// Makes a criterion of a spec: a name, and after a colon its constant, or the default without one. `"spp:256"`, `"time:30"`
-/// (seconds), `"relative-error:0.19"`, `"dammertz:0.003"`, `"cycles:0.01"`, `"luxcore:0.35"`, `"vdp-stages:0.75"`,
-/// `"vdp-first:0.5"`.
+/// (seconds), `"relative-error:0.19"`, `"dammertz:0.003"`, `"cycles:0.01"`, `"luxcore:0.35"`, `"vdp-stages:0.55"`,
+/// `"vdp-first:0.66"`.
 ///
 /// # Errors
 /// [`SpecError`] if the name is unknown or the number is not one that the criterion can take.
@@ -181,7 +181,7 @@ mod tests {
             ("cycles: 0.1", "Cycles, threshold 0.1"),
             ("luxcore:1e-2", "LuxCore, 0.01 of the pixels"),
             ("vdp-stages:0.6", "Myszkowski 1998, P 0.6"),
-            ("vdp-first", "Takouachet et al. 2007, P 0.5"),
+            ("vdp-first", "Takouachet et al. 2007, P 0.66"),
         ] {
             assert_eq!(parse(spec).unwrap().name(), name, "{spec}");
         }

@@ -31,13 +31,13 @@ pub fn write(out: &Path, all: &[Compared]) -> anyhow::Result<()> {
 }
 
 fn page(html: &mut String, all: &[Compared]) -> anyhow::Result<()> {
-    write!(
+    writeln!(
         html,
         "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" content=\"width=device-width\">\n\
          <title>Stopping criteria compared</title><style>{STYLE}</style></head><body>\n<h1>Stopping criteria compared</h1>\n\
          <p class=\"note\">noisefloor {}. On each scene all criteria watched one run: each took the samples of a tile until it stopped it. \
          <b>Uniform / this</b> is what uniform sampling takes until its worst tile is as good as the worst one here, over what this \
-         criterion took: above 1 it saves. Source seconds are samples times what a sample of the tile cost in that run.</p>\n",
+         criterion took: above 1 it saves. Source seconds are samples times what a sample of the tile cost in that run.</p>",
         env!("CARGO_PKG_VERSION")
     )?;
     if all.len() > 1 {
@@ -78,11 +78,11 @@ fn summary(html: &mut String, all: &[Compared]) -> anyhow::Result<()> {
 
 fn scene(html: &mut String, compared: &Compared) -> anyhow::Result<()> {
     let (width, height) = compared.size;
-    write!(
+    writeln!(
         html,
         "<h2>{}</h2>\n<p class=\"note\">{}, {width}×{height} pixels, against {}.</p>\n<div class=\"wide\"><table><thead><tr><th>criterion</th>\
          <th>spp, mean</th><th>most</th><th>tiles satisfied</th><th>source, s</th><th>criterion, s</th><th>relMSE</th><th>PSNR, dB</th>\
-         <th>FLIP</th><th>worst tile</th><th>butter&shy;augli</th><th>worst tile</th><th>uniform / this</th></tr></thead><tbody>\n",
+         <th>FLIP</th><th>worst tile</th><th>butter&shy;augli</th><th>worst tile</th><th>uniform / this</th></tr></thead><tbody>",
         escape(&compared.scene),
         escape(&compared.source),
         escape(&compared.reference),
@@ -97,24 +97,24 @@ fn scene(html: &mut String, compared: &Compared) -> anyhow::Result<()> {
     ] {
         let path = compared.folder.join(name).with_extension("svg");
         let svg = std::fs::read_to_string(&path).with_context(|| path.display().to_string())?;
-        write!(html, "<figure>{svg}<figcaption>{caption}</figcaption></figure>\n")?;
+        writeln!(html, "<figure>{svg}<figcaption>{caption}</figcaption></figure>")?;
     }
     for (file, caption) in &compared.crops {
         let image = data_uri(&compared.folder.join(file))?;
         let caption = escape(caption);
-        write!(
+        writeln!(
             html,
             "<figure><div class=\"wide\"><img src=\"{image}\" alt=\"{caption}\"></div><figcaption>{caption} Below: FLIP error, black to yellow \
-             for 0 to {WORST_FLIP}.</figcaption></figure>\n"
+             for 0 to {WORST_FLIP}.</figcaption></figure>"
         )?;
     }
     html.push_str("<div class=\"pictures\">\n");
     let picture = |html: &mut String, file: &str, caption: &str| -> anyhow::Result<()> {
         let image = data_uri(&compared.folder.join(file))?;
         let caption = escape(caption);
-        write!(
+        writeln!(
             html,
-            "<figure><img src=\"{image}\" alt=\"{caption}\"><figcaption>{caption}</figcaption></figure>\n"
+            "<figure><img src=\"{image}\" alt=\"{caption}\"><figcaption>{caption}</figcaption></figure>"
         )?;
         Ok(())
     };
@@ -129,10 +129,10 @@ fn scene(html: &mut String, compared: &Compared) -> anyhow::Result<()> {
 }
 
 fn row(html: &mut String, run: &Run) -> anyhow::Result<()> {
-    write!(
+    writeln!(
         html,
         "<tr{}><td title=\"{}\">{}</td><td>{:.0}</td><td>{}</td><td>{} of {}</td><td>{}</td><td>{}</td><td>{}</td><td>{:.1}</td><td>{}</td><td>{}</td>\
-         <td>{}</td><td>{}</td><td>{}</td></tr>\n",
+         <td>{}</td><td>{}</td><td>{}</td></tr>",
         mark(&run.family),
         escape(&run.name),
         escape(&run.criterion),

@@ -192,7 +192,7 @@ mod tests {
         write(folder.path(), "plot", "samples", &[panel]).unwrap();
         let svg = std::fs::read_to_string(folder.path().join("plot.svg")).unwrap();
         assert!(svg.contains("oracle") && svg.contains("polyline") && svg.contains("<circle"));
-        let png = noisefloor_exr::read_picture(&folder.path().join("plot.png")).unwrap();
+        let png = noisefloor_exr::read_picture(folder.path().join("plot.png")).unwrap();
         let noisefloor_exr::Picture::Display(image) = png else { panic!("a PNG is a display picture") };
         assert_eq!((image.width, image.height), (SIZE.0 as usize, SIZE.1 as usize));
         let blue = |p: &&noisefloor::Rgb| p[2] > 0.6 && p[0] < 0.1;

@@ -26,7 +26,7 @@ impl Entrant {
         params: &Params,
     ) -> anyhow::Result<Self> {
         let family = spec.split(':').next().unwrap_or_default().to_owned();
-        let session = Session::new(width, height, criterion, params.clone())?;
+        let session = Session::new(width, height, criterion, *params)?;
         Ok(Self { spec, family, session, criterion_seconds: 0.0 })
     }
 

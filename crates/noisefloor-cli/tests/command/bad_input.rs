@@ -111,7 +111,7 @@ fn options() {
         (&["--min-spp", "300"], &["300"]),
         (&["--consecutive", "0"], &["at least one"]),
         (&["--criterion", "spp:0"], &["spp:0"]),
-        (&["--criterion", "psychic"], &["spp:N"]),
+        (&["--criterion", "psychic"], &["spp:"]),
         (&["--audience", "bats"], &["observers"]),
         (&["--audience", "nan,0"], &["finite"]),
         (&["--time", "0"], &["above 0"]),

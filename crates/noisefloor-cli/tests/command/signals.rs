@@ -118,3 +118,14 @@ fn what_is_reproduced_so_far_survives_an_interrupt() {
     assert_eq!(json(&first)["machines"][0]["examples"], 1200);
     assert!(!out.join("reproduce.json").exists());
 }
+
+/// `noisefloor scenes | head -1`: nobody reads on, and nothing is wrong.
+#[test]
+#[cfg(unix)]
+fn a_reader_who_has_had_enough_is_no_fault() {
+    let (reader, writer) = std::io::pipe().unwrap();
+    drop(reader);
+    let output = command(&["scenes"]).stdout(writer).output().unwrap();
+    assert!(output.status.success(), "{output:?}");
+    assert_eq!(String::from_utf8_lossy(&output.stderr), "");
+}
