@@ -113,7 +113,7 @@ pub struct RenderArgs {
 /// what that cost, and how far its picture is from the converged one (relMSE, PSNR, FLIP, butteraugli) is set beside uniform sampling.
 ///
 /// Criteria: `oracle`; `spp:N`; `relative-error`, `dammertz`, `cycles`, `luxcore`, `vdp-stages`, `vdp-first`, each with a constant of its
-/// own (`cycles:0.01`) or with the one at which it agrees with people on average.
+/// own (`cycles:0.02`) or with a default: Blender's 0.01 for `cycles`, and the one that agrees with people on average for the others.
 ///
 /// Writes into the output folder: index.html with all of it (one file, opens without a server), runs.csv, runs.json, and for each scene
 /// curve.csv, tiles.csv, plots (SVG and PNG), crops with error maps, every criterion's picture, and the reference, which the next
@@ -163,7 +163,7 @@ pub struct CompareArgs {
     /// Samples per pixel of a reference that is rendered.
     #[arg(long, value_name = "SPP", default_value_t = 8000)]
     pub reference_spp: u64,
-    /// How far people are from the screen, for FLIP and the visible-differences predictor: pixels in a degree of their view.
+    /// How far people are from the screen, for FLIP: pixels in a degree of their view.
     #[arg(long, value_name = "N", default_value_t = 67.0)]
     pub pixels_per_degree: f64,
     /// No progress bar and no table.

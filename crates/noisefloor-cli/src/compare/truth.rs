@@ -30,6 +30,9 @@ struct Facts {
     height: usize,
     seed: u64,
     max_depth: Option<u32>,
+    /// What changes the picture that it converges to.
+    filter: String,
+    clamp: Option<f32>,
     /// Samples per pixel so far.
     spp: u64,
 }
@@ -63,6 +66,8 @@ pub fn get(
         height,
         seed: renderer.seed,
         max_depth: renderer.max_depth,
+        filter: format!("{:?}", renderer.filter),
+        clamp: renderer.clamp,
         spp: 0,
     };
     let (image, json) = (folder.join("reference.exr"), folder.join("reference.json"));
