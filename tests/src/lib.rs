@@ -1,6 +1,9 @@
 //! Tests that cross crates, and [`check_source`]: the contract of a source of samples, to be run on every one, and on yours.
 
-use noisefloor::{Batch, ProgressiveSource, Repeats, Request, SourceInfo, Tile, TileGrid, Unit, check_image};
+use noisefloor::{
+    Batch, Oracle, ProgressiveSource, Reference, Rendering, Repeats, Request, Samples, SourceInfo, Tile,
+    TileGrid, TilePlanes, ToneMapping, Unit, check_image,
+};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 use std::cmp::Ordering;
 
@@ -45,7 +48,8 @@ const MOST_BATCHES: [usize; 2] = [1000, 8];
 ///   once), and tiles asked for alone, or at other depths than their neighbours, get what they get when all are asked for.
 /// - However requests are cut, the distribution is the same: 12 batches of 32 samples against 12 of 8 + 8 + 8 + 8.
 /// - Batches of new samples are independent of those before, in the same tile and in others.
-/// - The reference, if there is one, has the image's size and is finite; rendering it changes no sample.
+/// - The reference, if there is one, has the image's size and is finite; rendering it changes no sample. Whether it is free of
+///   noise takes two seeds: [`check_reference_is_free_of_noise`].
 /// - At its end a source gives empty batches, again and again.
 ///
 /// A playback is not cut, nor asked for single tiles at other depths.
@@ -416,15 +420,43 @@ fn z(terms: &[f64]) -> f64 {
     if squares > 0.0 { sum / f64::sqrt(squares) } else { 0.0 }
 }
 
-fn check_reference(source: &mut impl ProgressiveSource, info: &SourceInfo) {
-    let Some(reference) = source.reference().unwrap_or_else(|e| panic!("the reference failed: {e} ({e:?})"))
-    else {
-        return;
-    };
+/// Checks that the oracle sees no noise in the reference of a source: held against the reference of another seed, each of its tiles
+/// has converged (bundled model, P ≥ 0.9, tiles of 32×32 pixels). `make` makes sources of one scene, seeded as it is told. Noise
+/// that does not depend on the seed is not found.
+///
+/// # Panics
+/// If a tile has not converged, or there is no reference, or it is none that [`check_source`] takes.
+pub fn check_reference_is_free_of_noise<S: ProgressiveSource>(make: impl Fn(u64) -> S) {
+    let [one, other] = [1, 2].map(|seed| {
+        let mut source = make(seed);
+        let info = source.info();
+        check_reference(&mut source, &info).expect("the source has no reference")
+    });
+    let (size, oracle) = ((one.width, one.height), Oracle::bundled());
+    let display = ToneMapping::default().settle(&one.pixels);
+    // Each counts as one sample of a pixel.
+    let pair = [&one, &other].map(|r| Rendering { pixels: &r.pixels, spp: 1.0, rounding: 0.0 }).into();
+    let tiles: Vec<Tile> = TileGrid::new(size.0, size.1, EDGE).expect("an image in range").tiles().collect();
+    let described: Vec<_> = tiles
+        .iter()
+        .map(|&tile| {
+            let planes = TilePlanes::from_pair(size, tile, &display, pair, Samples::Independent);
+            oracle.describe(&planes.expect("samples"), 1.0).expect("any tile")
+        })
+        .collect();
+    for (tile, verdict) in tiles.iter().zip(oracle.judge_described(&described)) {
+        let (index, p) = (tile.index, verdict.probability);
+        assert!(verdict.converged, "tile {index} of the reference has noise that the oracle sees: P = {p:?}");
+    }
+}
+
+fn check_reference(source: &mut impl ProgressiveSource, info: &SourceInfo) -> Option<Reference> {
+    let reference = source.reference().unwrap_or_else(|e| panic!("the reference failed: {e} ({e:?})"))?;
     let size = (reference.width, reference.height);
     assert_eq!(size, (info.width, info.height), "the reference has not the image's size");
     assert_eq!(reference.pixels.len(), info.width * info.height, "pixels of the reference");
     assert!(reference.pixels.iter().flatten().all(|c| c.is_finite()), "the reference is not finite");
+    Some(reference)
 }
 
 #[cfg(test)]

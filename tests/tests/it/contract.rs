@@ -4,7 +4,7 @@ use noisefloor::{
 };
 use noisefloor_exr::{RenderLayers, StackSource, write_exr};
 use noisefloor_ptwne::{Options, Ptwne, scenes};
-use noisefloor_tests::check_source;
+use noisefloor_tests::{check_reference_is_free_of_noise, check_source};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 const SIZE: (usize, usize) = (48, 40);
@@ -21,6 +21,36 @@ fn the_path_tracer_keeps_it() {
             Ptwne::new(scenes::by_name(name).unwrap(), SIZE.0, SIZE.1, options).unwrap()
         });
     }
+}
+
+#[test]
+fn its_reference_is_free_of_noise_to_the_oracle() {
+    for name in ["cornell-box", "courtyard", "glass-spheres"] {
+        check_reference_is_free_of_noise(|seed| {
+            let options = Options { seed, ..Options::default() };
+            Ptwne::new(scenes::by_name(name).unwrap(), 2 * SIZE.0, 2 * SIZE.1, options).unwrap()
+        });
+    }
+}
+
+/// Noise of a deviation of 10 %, which is 4.3/255 on the screen, is noticed; a twentieth of it is not.
+#[test]
+fn noise_in_a_reference_is_noticed() {
+    let said = |deviation: f64| {
+        outcome(|| {
+            check_reference_is_free_of_noise(|seed| {
+                let uniform = move |i: u64| hash(seed << 32 | i) as f64 / 2f64.powi(64);
+                let value = move |i: u64| 0.5 + 0.5 * deviation * 12f64.sqrt() * (uniform(i) - 0.5);
+                let image = move || {
+                    let pixels = (0..(SIZE.0 * SIZE.1) as u64).map(|i| [value(i) as f32; 3]).collect();
+                    Reference { width: SIZE.0, height: SIZE.1, pixels }
+                };
+                Altered::reference(synthetic(), move || Some(image()))
+            });
+        })
+    };
+    assert!(said(0.1).contains("noise that the oracle sees"));
+    assert_eq!(said(0.005), "kept");
 }
 
 #[test]
@@ -59,7 +89,12 @@ fn stacks_on_disk_keep_it() {
 
 /// What `check_source` says of a source.
 fn verdict<S: ProgressiveSource>(make: impl Fn() -> S) -> String {
-    let Err(panic) = catch_unwind(AssertUnwindSafe(|| check_source(make))) else { return "kept".into() };
+    outcome(|| check_source(make))
+}
+
+/// What a check says that panics if it has something to say.
+fn outcome(check: impl FnOnce()) -> String {
+    let Err(panic) = catch_unwind(AssertUnwindSafe(check)) else { return "kept".into() };
     let text = panic.downcast_ref::<String>().cloned();
     text.or_else(|| panic.downcast_ref::<&str>().map(|s| (*s).to_owned())).unwrap_or_default()
 }
