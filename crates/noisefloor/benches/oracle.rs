@@ -1,19 +1,19 @@
-//! What a verdict on one tile of 128×128 pixels costs, and its parts.
+//! What a verdict on one tile of 128×128 pixels costs, and its parts; and verdicts on whole pictures, by their size.
 #![allow(missing_docs, reason = "a benchmark")]
 
-use criterion::{Criterion, criterion_group, criterion_main};
+use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use noisefloor::{Display, Film, NoiseMask, Oracle, Rgb, StoppingCriterion, TileGrid, TilePlanes, View};
 use std::hint::black_box;
 
-fn film() -> Film {
-    let mut film = Film::new(TileGrid::new(384, 384, 128).expect("a valid grid"));
+fn film(edge: usize) -> Film {
+    let mut film = Film::new(TileGrid::new(edge, edge, 128).expect("a valid grid"));
     let mut state = 1u64;
     let mut uniform = || {
         state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (state >> 40) as f32 / (1 << 24) as f32
     };
     for _ in 0..2 {
-        for tile in 0..9 {
+        for tile in 0..film.grid().len() {
             let batch: Vec<Rgb> =
                 (0..128 * 128).map(|_| [0.2 + 0.1 * uniform(), 0.3, 0.1 * uniform()]).collect();
             film.add(tile, 50, &batch).expect("it fits");
@@ -23,7 +23,7 @@ fn film() -> Film {
 }
 
 fn verdict(c: &mut Criterion) {
-    let (film, display) = (film(), Display::SRGB);
+    let (film, display) = (film(384), Display::SRGB);
     let tile = film.grid().tile(4);
     let mut oracle = Oracle::bundled();
     let planes = TilePlanes::from_halves(&film, &display, tile);
@@ -48,5 +48,20 @@ fn verdict(c: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, verdict);
+/// Time for each pixel of a picture of which all tiles are judged, on all cores.
+fn pictures(c: &mut Criterion) {
+    let mut group = c.benchmark_group("picture");
+    group.sample_size(10);
+    for edge in [512, 1024, 2048, 5760] {
+        let (film, display) = (film(edge), Display::SRGB);
+        let tiles: Vec<_> = film.grid().tiles().collect();
+        let mut oracle = Oracle::bundled();
+        let view = View { film: &film, display: &display, reference: None };
+        group.throughput(Throughput::Elements((edge * edge) as u64));
+        group.bench_function(format!("{edge}x{edge}"), |b| b.iter(|| oracle.judge(&view, black_box(&tiles))));
+    }
+    group.finish();
+}
+
+criterion_group!(benches, verdict, pictures);
 criterion_main!(benches);

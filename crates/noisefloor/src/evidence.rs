@@ -49,18 +49,61 @@ impl TilePlanes {
         tile: Tile,
         pixel: impl Fn(usize, usize) -> (Rgb, Rgb),
     ) -> Self {
+        Self::fill((width, height), tile, |y, columns, image, residual| {
+            for &x in columns {
+                let (shown, noise) = pixel(x, y);
+                image.push(luminance(shown));
+                residual.push(luminance(noise));
+            }
+        })
+    }
+
+    /// As [`TilePlanes::gather`] of `N` linear pictures, of which the first is what is shown. `pixel(x, y)` gives them, and one number
+    /// more; `residual` what is noise, from the display luminances and that number. A verdict spends most of its time here: rows are
+    /// tone mapped channel by channel, so that the compiler can use vector instructions.
+    fn gather_linear<const N: usize>(
+        size: (usize, usize),
+        tile: Tile,
+        display: &Display,
+        mut pixel: impl FnMut(usize, usize) -> ([Rgb; N], f32),
+        residual: impl Fn([f32; N], f32) -> f32,
+    ) -> Self {
+        let mut linear: [[Vec<f32>; 3]; N] = std::array::from_fn(|_| Default::default());
+        let mut shown: [Vec<f32>; N] = std::array::from_fn(|_| Vec::new());
+        let mut others = Vec::new();
+        Self::fill(size, tile, |y, columns, image, residuals| {
+            linear.iter_mut().flatten().chain(&mut shown).for_each(|row| row.resize(columns.len(), 0.0));
+            others.resize(columns.len(), 0.0);
+            for (i, &x) in columns.iter().enumerate() {
+                let (pixels, other) = pixel(x, y);
+                for (channels, value) in linear.iter_mut().zip(pixels) {
+                    channels.iter_mut().zip(value).for_each(|(channel, value)| channel[i] = value);
+                }
+                others[i] = other;
+            }
+            for (shown, channels) in shown.iter_mut().zip(&linear) {
+                display.luma_row(channels.each_ref().map(|channel| &channel[..]), shown);
+            }
+            image.extend_from_slice(&shown[0]);
+            let at = |(i, &other): (usize, &f32)| residual(std::array::from_fn(|n| shown[n][i]), other);
+            residuals.extend(others.iter().enumerate().map(at));
+        })
+    }
+
+    /// Fills both planes row by row: `row(y, columns, image, residual)` appends a row to each, of the pixels of the image that lie in
+    /// row `y` and these columns.
+    fn fill(
+        (width, height): (usize, usize),
+        tile: Tile,
+        mut row: impl FnMut(usize, &[usize], &mut Vec<f32>, &mut Vec<f32>),
+    ) -> Self {
         let padded = |edge: usize| edge.next_multiple_of(APRON) + 2 * APRON;
         let shape = (padded(tile.height), padded(tile.width));
         let columns: Vec<usize> = (0..shape.1).map(|place| mirror(tile.x + place, width)).collect();
         let plane = || Vec::with_capacity(shape.0 * shape.1);
         let (mut image, mut residual) = (plane(), plane());
-        for row in 0..shape.0 {
-            let y = mirror(tile.y + row, height);
-            for &x in &columns {
-                let (shown, noise) = pixel(x, y);
-                image.push(luminance(shown));
-                residual.push(luminance(noise));
-            }
+        for place in 0..shape.0 {
+            row(mirror(tile.y + place, height), &columns, &mut image, &mut residual);
         }
         let [image, residual] =
             [image, residual].map(|values| Array2::from_shape_vec(shape, values).expect("one value a pixel"));
@@ -77,15 +120,20 @@ impl TilePlanes {
     /// A pixel of which one half has no valid sample gives no evidence: its residual is 0.
     pub fn from_halves(film: &Film, display: &Display, tile: Tile) -> Self {
         let grid = film.grid();
-        Self::gather((grid.width(), grid.height()), tile, |x, y| {
-            let (owner, pixel) = (tile.owner(grid, x, y), y * grid.width() + x);
-            let halves = film.pixel_halves(owner, pixel);
-            let [(a, na), (b, nb)] = halves;
-            let (na, nb) = (na as f32, nb as f32);
-            let scale = if na > 0.0 && nb > 0.0 { (na / (na + nb) * (nb / (na + nb))).sqrt() } else { 0.0 };
-            let noise = difference(display.encode(a), display.encode(b), scale);
-            (display.encode(Film::mean(halves)), noise)
-        })
+        // The numbers of samples seldom change from pixel to pixel.
+        let (mut counts, mut weight, mut scale) = ([0; 2], Film::weight([0; 2]), 0.0);
+        let pixel = |x, y| {
+            let [(a, na), (b, nb)] = film.pixel_halves(tile.owner(grid, x, y), y * grid.width() + x);
+            if counts != [na, nb] {
+                counts = [na, nb];
+                weight = Film::weight(counts);
+                let (na, nb) = (na as f32, nb as f32);
+                scale = if na > 0.0 && nb > 0.0 { (na / (na + nb) * (nb / (na + nb))).sqrt() } else { 0.0 };
+            }
+            ([Film::blend(a, b, weight), a, b], scale)
+        };
+        let residual = |[_, a, b]: [f32; 3], scale| (a - b) * scale;
+        Self::gather_linear((grid.width(), grid.height()), tile, display, pixel, residual)
     }
 
     /// Evidence on `image` from another rendering of the same view, both `width`×`height` pixels. `None` if the two say nothing
@@ -101,10 +149,9 @@ impl TilePlanes {
         samples: Samples,
     ) -> Option<Self> {
         let scale = residual_scale(image.spp, other.spp, samples)?;
-        let planes = Self::gather((width, height), tile, |x, y| {
-            let [a, b] = [image, other].map(|rendering| display.encode(rendering.pixels[y * width + x]));
-            (a, difference(a, b, scale))
-        });
+        let pixel = |x, y| ([image, other].map(|rendering| rendering.pixels[y * width + x]), scale);
+        let residual = |[a, b]: [f32; 2], scale| (a - b) * scale;
+        let planes = Self::gather_linear((width, height), tile, display, pixel, residual);
         Some(Self { rounding: (image.rounding + other.rounding) * scale * scale, ..planes })
     }
 
@@ -114,21 +161,19 @@ impl TilePlanes {
     /// If `reference` has fewer pixels than the film.
     pub fn from_reference(film: &Film, display: &Display, reference: &[Rgb], tile: Tile) -> Self {
         let grid = film.grid();
-        Self::gather((grid.width(), grid.height()), tile, |x, y| {
+        let pixel = |x, y| {
             let pixel = y * grid.width() + x;
-            let shown = display.encode(Film::mean(film.pixel_halves(tile.owner(grid, x, y), pixel)));
-            (shown, difference(shown, reference[pixel], 1.0))
-        })
+            ([film.pixel(tile.owner(grid, x, y), pixel)], luminance(reference[pixel]))
+        };
+        let residual = |[shown]: [f32; 1], reference| shown - reference;
+        Self::gather_linear((grid.width(), grid.height()), tile, display, pixel, residual)
     }
 
     /// No evidence but the picture itself: its residual is the picture.
     pub fn from_picture(film: &Film, display: &Display, tile: Tile) -> Self {
         let grid = film.grid();
-        Self::gather((grid.width(), grid.height()), tile, |x, y| {
-            let halves = film.pixel_halves(tile.owner(grid, x, y), y * grid.width() + x);
-            let shown = display.encode(Film::mean(halves));
-            (shown, shown)
-        })
+        let pixel = |x, y| ([film.pixel(tile.owner(grid, x, y), y * grid.width() + x)], 0.0);
+        Self::gather_linear((grid.width(), grid.height()), tile, display, pixel, |[shown]: [f32; 1], _| shown)
     }
 }
 
@@ -149,11 +194,6 @@ pub struct Rendering<'a> {
     pub spp: f64,
     /// Variance of the rounding of its display values; 0 for pictures in floating point.
     pub rounding: f32,
-}
-
-/// (a − b)·scale, channel by channel.
-fn difference(a: Rgb, b: Rgb, scale: f32) -> Rgb {
-    std::array::from_fn(|c| (a[c] - b[c]) * scale)
 }
 
 /// How two pictures of one scene were made from samples, for [`residual_scale`].

@@ -220,6 +220,10 @@ impl Film {
     /// If the tile does not exist.
     pub fn unsampled_pixels(&self, tile: usize) -> usize {
         let rect = self.grid.tile(tile);
+        let kept_out = self.halves.iter().any(|half| !half.rejected.is_empty());
+        if !kept_out && self.halves.iter().zip(self.counts[tile]).all(|(_, count)| count > 0) {
+            return 0; // as nearly always
+        }
         let lacks = |pixel: usize| {
             self.halves.iter().zip(self.counts[tile]).any(|(half, count)| half.rejected(pixel) >= count)
         };
@@ -247,13 +251,18 @@ impl Film {
     /// If the tile or the pixel does not exist.
     #[inline]
     pub fn pixel(&self, tile: usize, pixel: usize) -> Rgb {
-        Self::mean(self.pixel_halves(tile, pixel))
+        let [(a, na), (b, nb)] = self.pixel_halves(tile, pixel);
+        Self::blend(a, b, Self::weight([na, nb]))
     }
 
-    /// The mean that halves and their numbers of samples make together.
+    /// Weight of half A in the mean of all samples, by the numbers of samples of both.
+    pub(crate) fn weight([a, b]: [u64; 2]) -> f32 {
+        (a as f64 / ((a + b).max(1)) as f64) as f32
+    }
+
+    /// The mean of halves A and B, by the weight of A.
     #[inline]
-    pub(crate) fn mean([(a, na), (b, nb)]: [(Rgb, u64); 2]) -> Rgb {
-        let weight = (na as f64 / ((na + nb).max(1)) as f64) as f32;
+    pub(crate) fn blend(a: Rgb, b: Rgb, weight: f32) -> Rgb {
         std::array::from_fn(|c| b[c] + (a[c] - b[c]) * weight)
     }
 
