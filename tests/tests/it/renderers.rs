@@ -27,14 +27,23 @@ fn cycles_keeps_the_contract() {
     }
 }
 
-#[test]
-fn luxcore_keeps_the_contract() {
-    if usable(&noisefloor_luxcore::RENDERER) {
-        check_source(|| luxcore(Engine::Path, Sampler::Random, 48, 40).unwrap());
-        check_source(|| luxcore(Engine::Path, Sampler::Sobol, 48, 40).unwrap());
-        check_source(|| luxcore(Engine::Path, Sampler::Metropolis, 48, 40).unwrap());
-        check_source(|| luxcore(Engine::Bidir, Sampler::Random, 48, 40).unwrap());
-    }
+/// LuxCore waits more than it computes: tests of their own run side by side.
+macro_rules! luxcore_keeps_the_contract {
+    ($($name:ident: $engine:ident, $sampler:ident;)*) => {$(
+        #[test]
+        fn $name() {
+            if usable(&noisefloor_luxcore::RENDERER) {
+                check_source(|| luxcore(Engine::$engine, Sampler::$sampler, 48, 40).unwrap());
+            }
+        }
+    )*};
+}
+
+luxcore_keeps_the_contract! {
+    luxcore_keeps_the_contract: Path, Random;
+    luxcore_with_sobol_points_keeps_the_contract: Path, Sobol;
+    metropolis_keeps_the_contract: Path, Metropolis;
+    luxcore_from_both_ends_keeps_the_contract: Bidir, Random;
 }
 
 /// Width and height. LuxCore's angle of view is that of the longer side, and ours of the height.
