@@ -6,9 +6,10 @@ import sys
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 import host
 
-# Samples that one lane of a wavefront takes one after the other: fewer results to add up, and still lanes for many threads.
-RUN = 8
-# Lanes of one wavefront: 12 bytes of results each.
+# Numbers of samples that one lane of a wavefront may take one after the other: fewer results to add up, and still lanes for many
+# threads. The one that comes out even is chosen, since lanes run as long as the longest beside them.
+RUNS = range(8, 17)
+# Most lanes of one wavefront: 12 bytes of results each.
 LANES = 1 << 22
 # Edge of the blocks of the scalar variant, which number its random streams. Fixed, so that they do not depend on threads.
 BLOCK = 16
@@ -221,7 +222,7 @@ class Wavefront:
         # Parts of samples and of pixels that fit a wavefront. Parts of samples depend on nothing but their number, so that
         # sums are the same in any company.
         part = min(samples, 1 << 12)
-        rows = max(LANES * RUN // part, 1)
+        rows = max(LANES * RUNS[0] // part, 1)
         sums = np.zeros((len(x), 3))
         for start in range(0, len(x), rows):
             some = slice(start, start + rows)
@@ -243,12 +244,13 @@ class Wavefront:
         """Sums of so many samples of these pixels."""
         mi, dr, np = self.mi, self.dr, self.np
         # Opaque: numbers that were part of the kernel would have it compiled anew for every other.
-        lanes = -(-samples // RUN)
-        each, total = dr.opaque(mi.UInt32, lanes), dr.opaque(mi.UInt32, samples)
+        longest = min(RUNS, key=lambda run: -samples % run)
+        lanes = -(-samples // longest)
+        each, total, run = (dr.opaque(mi.UInt32, number) for number in (lanes, samples, longest))
         lane = dr.arange(mi.UInt32, len(x) * lanes)
         row = lane // each
-        begin = (lane - row * each) * RUN
-        count = dr.minimum(total - begin, RUN)
+        begin = (lane - row * each) * run
+        count = dr.minimum(total - begin, run)
 
         column_x, column_y = dr.gather(mi.UInt32, mi.UInt32(x), row), dr.gather(mi.UInt32, mi.UInt32(y), row)
         pixel = mix(y.astype(np.uint64) << np.uint64(32) | x.astype(np.uint64), np.uint64)
