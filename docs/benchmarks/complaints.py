@@ -22,17 +22,18 @@ from renderers import mask, pixels, report, stops
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 TILE = 64
+SMALL = 32
 EXPOSURES = ("0.1", "1", "10")
 # The camera of the Cornell box moves to the right, by about two pixels a frame.
 FRAMES = [f"{0.015 * i:.3f}" for i in range(6)]
 REFERENCE_SPP = 4000
 
 
-def render(noisefloor, scene, out, *options):
+def render(noisefloor, scene, out, *options, tile=TILE):
     if os.path.exists(os.path.join(out, "report.json")) and report(out)["complete"]:
         return
     print(os.path.basename(out), flush=True)
-    command = [noisefloor, "render", scene, "--tile", str(TILE), "--quiet", "--out", out, *options]
+    command = [noisefloor, "render", scene, "--tile", str(tile), "--quiet", "--out", out, *options]
     subprocess.run(command, check=True)
 
 
@@ -41,15 +42,16 @@ def run(args):
     for exposure in EXPOSURES:
         display = ["--tone-mapping", "srgb", "--exposure", exposure]
         render(args.noisefloor, "softbox", folder("exposure", exposure), "--size", "256x256", "--max-spp", "4000", *display)
-    render(args.noisefloor, "glass-spheres", folder("glass"), "--size", "192x192", "--max-spp", "6000")
-    render(args.noisefloor, "glass-spheres", folder("glass", "reference"), "--size", "192x192", "--criterion", "spp:15000", "--seed", "9")
+    size = ["--size", "128x128"]
+    render(args.noisefloor, "glass-spheres", folder("glass"), "--max-spp", "4000", *size, tile=SMALL)
+    render(args.noisefloor, "glass-spheres", folder("glass", "reference"), "--criterion", "spp:12000", "--seed", "9", *size)
     with open(os.path.join(HERE, "../../fixtures/cornell-box.xml")) as file:
         box = file.read()
+    size = ["--size", "192x192"]
     for i, x in enumerate(FRAMES):
         scene = folder("frame", f"{i}.xml")
         with open(scene, "w") as file:
             file.write(box.replace('origin="0, 1, 3.82" target="0, 1, 0"', f'origin="{x}, 1, 3.82" target="{x}, 1, 0"'))
-        size = ["--size", "192x192"]
         render(args.noisefloor, scene, folder("frame", str(i), "same"), "--seed", "1", *size)
         render(args.noisefloor, scene, folder("frame", str(i), "other"), "--seed", str(100 + i), *size)
         fixed = str(round(np.mean([int(r["spp"]) for r in stops(folder("frame", "0", "other"))])))
@@ -191,10 +193,10 @@ def seams(args, scenes):
 
 
 def caustics(args):
-    """The tile of glass-spheres with the brightest caustic."""
+    """Tiles of glass-spheres, by the noise that is left."""
     folder, truth = os.path.join(args.out, "glass"), os.path.join(args.out, "glass-reference")
     error = 255 * (pixels(folder) - pixels(truth))
-    noise = {row["tile"]: mask(of_tile(error, row)).std() for row in stops(folder)}
+    noise = {row["tile"]: mask(of_tile(error, row, SMALL, SMALL)).std() for row in stops(folder)}
     order = sorted(stops(folder), key=lambda row: -noise[row["tile"]])
     print("\n## caustics (glass-spheres)\n\n| tile | spp | reason | noise left |\n|---|---|---|---|")
     for row in order[:4] + order[-2:]:
@@ -202,8 +204,8 @@ def caustics(args):
     image, reference = (picture(os.path.join(f, "image.png")) for f in (folder, truth))
     columns = []
     for row in order[:3]:
-        parts = [of_tile(p, row) for p in (reference, image)]
-        columns.append([larger(parts[0], 3), larger(parts[1], 3), larger(difference(parts[1], parts[0], 8), 3)])
+        parts = [of_tile(p, row, SMALL, SMALL) for p in (reference, image)]
+        columns.append([larger(parts[0], 6), larger(parts[1], 6), larger(difference(parts[1], parts[0], 8), 6)])
     print("Picture: the three tiles with the most noise left: reference, at the stop, difference 8 times enlarged")
     save_grid(os.path.join(args.out, "complaints-caustics.png"), columns)
 

@@ -137,7 +137,8 @@ impl Curve {
     fn terms(self) -> (f32, f32) {
         match self {
             Self::Clamp => (0.0, 0.0),
-            Self::Reinhard { white } => (white.map_or(0.0, |w| 1.0 / (w * w)), 1.0),
+            // A white point near 0 makes all white but black.
+            Self::Reinhard { white } => (white.map_or(0.0, |w| (1.0 / (w * w)).min(f32::MAX)), 1.0),
         }
     }
 }
@@ -244,6 +245,20 @@ mod tests {
             .fold(0.0, f64::max);
         assert!(worst < 1e-6, "{worst}");
         assert_eq!((srgb_encode(-1.0), srgb_encode(f32::NAN).is_nan()), (0.0, true));
+    }
+
+    #[test]
+    fn every_number_has_a_place_on_the_screen() {
+        let curves = [None, Some(3.0), Some(1e-30), Some(1e30)].map(|white| Curve::Reinhard { white });
+        for curve in curves.into_iter().chain([Curve::Clamp]) {
+            for exposure in [1e-30, 1.0, 1e30] {
+                for value in [-0.0, 1e-45, f32::MIN_POSITIVE, f32::MAX, -f32::MAX, -1.0] {
+                    let shown = Display { exposure, curve }.luma([value; 3]);
+                    assert!((0.0..=1.0 + 1e-6).contains(&shown), "{curve:?}, {exposure}, {value}: {shown}");
+                    assert!(value > 0.0 || shown == 0.0, "{curve:?}, {exposure}, {value}: {shown}");
+                }
+            }
+        }
     }
 
     proptest! {

@@ -362,6 +362,39 @@ mod tests {
         assert!(error(plain) > 2.4e-6, "a plain mean errs by {}", error(plain));
     }
 
+    #[test]
+    fn a_film_that_was_kept_goes_on_to_the_bit() {
+        let batch = |n: u32| (0..64).map(|i| [0.1 * n as f32, (i as f32).sin(), 1e-3]).collect::<Vec<_>>();
+        let config = bincode::config::standard();
+        let mut film = small();
+        for n in 1..=9 {
+            film.add(1, 10 * n, &batch(n)).unwrap();
+        }
+        film.add(1, 5, &[[f32::NAN; 3]; 64]).unwrap();
+        let kept = bincode::serde::encode_to_vec(&film, config).unwrap();
+        let (mut other, _): (Film, usize) = bincode::serde::decode_from_slice(&kept, config).unwrap();
+        for film in [&mut film, &mut other] {
+            (10..=20).for_each(|n| film.add(1, n, &batch(n)).unwrap());
+        }
+        assert_eq!(film.half_counts(1), other.half_counts(1));
+        let bytes = |film: &Film| bincode::serde::encode_to_vec(film, config).unwrap();
+        assert!(bytes(&film) == bytes(&other));
+    }
+
+    /// −0, the smallest numbers there are, the largest ones, and negative radiance: the mean is that of f64, to the last bits.
+    #[test]
+    fn both_ends_of_f32_are_averaged() {
+        for values in [[-0.0, 0.0], [1e-45, 3e-45], [1e-38, 2e-39], [f32::MAX, f32::MAX], [-3.0, 1.0]] {
+            let mut film = small();
+            for value in values.repeat(4) {
+                film.add(0, 7, &[[value; 3]; 16 * 16]).unwrap();
+            }
+            let mean = 0.5 * (f64::from(values[0]) + f64::from(values[1]));
+            let error = (f64::from(film.image()[0][0]) - mean).abs();
+            assert!(error <= 1e-6 * mean.abs() + 1.5e-45, "{values:?}: {}", film.image()[0][0]);
+        }
+    }
+
     proptest! {
         #[test]
         fn image_is_the_weighted_mean(batches in prop::collection::vec((1u32..1000, -10.0f32..1000.0), 1..20)) {
