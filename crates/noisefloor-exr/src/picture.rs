@@ -1,7 +1,7 @@
 //! Pictures: linear or display-encoded, told apart by content.
 
 use crate::error::PictureError;
-use noisefloor::{Rgb, check_image, srgb_decode};
+use noisefloor::{Rgb, Still, check_image, srgb_decode};
 use std::fs::File;
 use std::io::{BufReader, Read, Seek};
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -75,6 +75,15 @@ impl Picture {
             Picture::Linear(image) => image,
             Picture::Display(image) => image.to_linear(),
         }
+    }
+}
+
+impl Picture {
+    /// The picture, made of `spp` samples per pixel, to be held against others; see [`noisefloor::Held`].
+    pub fn into_still(self, spp: f64) -> Still {
+        let (size, rounding) = (self.size(), self.rounding());
+        let display_referred = matches!(self, Picture::Display(_));
+        Still { size, pixels: self.into_linear().pixels, spp, display_referred, rounding }
     }
 }
 
