@@ -68,7 +68,7 @@ test("pictures are dropped, judged and disagreed with by mouse, in a small windo
   // The levels of the stack: noisy first, converged last
   const summary = () => page.locator("#summary").textContent();
   assert.match(await summary(), /^0 of 6 tiles have converged at 50 spp/);
-  await page.locator("#level").fill(String(stack.length - 1));
+  await page.locator("#level").fill(String(stack.length - 2));
   await page.getByText(`6 of 6 tiles have converged at`).waitFor();
   await page.locator("#level").fill("0");
   await page.getByText("0 of 6").waitFor();
@@ -140,7 +140,9 @@ test("everything goes by keyboard alone, in a large window", async (t) => {
   await focus(/Samples per pixel of last\.png/);
   await page.keyboard.type("1600");
   await page.keyboard.press("Tab");
-  await until("there is one more level", async () => (await page.locator("#level").getAttribute("max")) === String(stack.length));
+  await until("there is one more level", async () => (await page.locator("#level").getAttribute("max")) === String(stack.length - 1));
+  await focus(/Scene, relation, tiles$/);
+  await page.keyboard.press("Enter");
   await focus(/^scene/);
   await page.keyboard.press("Control+A");
   await page.keyboard.type("hall");
