@@ -281,7 +281,7 @@ pub struct TrainArgs {
     /// Also write the table of descriptors, from which `--table` trains without the pictures.
     #[arg(long, value_name = "FILE.csv")]
     pub save_table: Option<PathBuf>,
-    /// Learn from disagreements too, which `explore` has kept in this database: each counts as much as a zone. Scores before and after are
+    /// Learn from disagreements too, which `explore` has kept in this database: each counts as much as the levels of a zone within a doubling of samples. Scores before and after are
     /// printed.
     #[arg(long, value_name = "FILE.sqlite", conflicts_with = "no_scores")]
     pub disagreements: Option<PathBuf>,

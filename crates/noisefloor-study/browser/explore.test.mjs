@@ -83,7 +83,7 @@ test("pictures are dropped, judged and disagreed with by mouse, in a small windo
   await page.locator("#audience").selectOption("observers");
   await until("the observers need as much as before", async () => (await need()) === before);
   await page.locator("#level").fill("1");
-  await page.getByText("at 200 spp").waitFor();
+  await page.getByText("at 1200 spp").waitFor();
   const p = await probability();
   assert.ok(p > 0.05 && p < 0.99, `P ${p}`);
   await page.locator("#threshold").fill((Math.max(p - 0.02, 0.05)).toFixed(2));
@@ -138,7 +138,7 @@ test("everything goes by keyboard alone, in a large window", async (t) => {
   await page.getByText("tiles have converged at").waitFor();
   // A name that says nothing: the samples are typed
   await focus(/Samples per pixel of last\.png/);
-  await page.keyboard.type("1600");
+  await page.keyboard.type("12800");
   await page.keyboard.press("Tab");
   await until("there is one more level", async () => (await page.locator("#level").getAttribute("max")) === String(stack.length - 1));
   await focus(/Scene, relation, tiles$/);
@@ -150,10 +150,10 @@ test("everything goes by keyboard alone, in a large window", async (t) => {
   await until("the scene has a name", async () => (await state(page)).scene === "hall");
   await focus(/^level/);
   await page.keyboard.press("End");
-  await page.getByText("at 1600 spp").waitFor();
+  await page.getByText("at 12800 spp").waitFor();
   await page.keyboard.press("Home");
   await page.keyboard.press("ArrowRight");
-  await page.getByText("at 200 spp").waitFor();
+  await page.getByText("at 1200 spp").waitFor();
   await focus(/^show-noise/);
   await page.keyboard.press("Space");
   assert.ok(await page.locator("#noise").isVisible());
@@ -167,7 +167,7 @@ test("everything goes by keyboard alone, in a large window", async (t) => {
   await page.keyboard.press("Enter");
   await page.getByText("in tile 5.").waitFor();
   assert.equal(await kept(page), 1);
-  assert.match(await page.evaluate(() => document.activeElement.getAttribute("aria-label")), /^Tile 5.*you (still )?see/);
+  assert.match(await page.evaluate(() => document.activeElement.getAttribute("aria-label")), /^Tile 5.*, you: none/);
   await page.keyboard.press("Home");
   await page.keyboard.press("Enter");
   await page.getByText("in tile 4.").waitFor();

@@ -9,6 +9,7 @@ use crate::params::Audience;
 use crate::svm::{Platt, Scaler, Svm, SvmParams, SvmTrainError, fit_platt, fit_svm};
 use ndarray::Array2;
 use rayon::prelude::*;
+use std::collections::BTreeSet;
 use thiserror::Error;
 
 /// Share of observers who see no difference at the recorded threshold, as it is read here (Takouachet et al. 2017, §4.2.2:
@@ -100,8 +101,7 @@ impl Machine {
         let mut examples: Vec<(&[f32], bool)> =
             zones.iter().flat_map(|z| examples(z, range)).map(|e| (e.descriptor, e.converged)).collect();
         let scaler = Scaler::fit(examples.iter().map(|e| e.0), least_deviation);
-        // An answer weighs as much as a zone: it is as many examples.
-        let weight = (examples.len() / zones.len().max(1)).max(1);
+        let weight = answer_weight(examples.len(), zones.len(), range);
         let answer = |a: &&'a Answer| std::iter::repeat_n((&a.descriptor[..], !a.sees_noise), weight);
         examples.extend(answers.iter().flat_map(answer));
         let dimensions = examples.first().map_or(0, |e| e.0.len());
@@ -161,6 +161,13 @@ impl Machine {
     }
 }
 
+/// An answer is about one number of samples. It weighs as much as what a zone, whose examples spread over range² in samples, has within a
+/// doubling of them.
+fn answer_weight(examples: usize, zones: usize, range: f64) -> usize {
+    let doublings = 2.0 * range.log2();
+    (examples as f64 / zones.max(1) as f64 / doublings).round().max(1.0) as usize
+}
+
 struct Example<'a> {
     spp: f64,
     descriptor: &'a [f32],
@@ -187,31 +194,34 @@ fn fit_groups(
     let of = |wanted: &dyn Fn(&str) -> bool| -> Vec<&Zone> {
         table.zones.iter().filter(|z| groups.contains(&z.group.as_str()) && wanted(&z.group)).collect()
     };
-    // An answer is an example and counts for the sigmoid, as a zone does, but chooses neither C nor γ: it is no threshold.
     let all = table.groups();
-    let known = |group: &str| groups.contains(&group) || !all.contains(&group);
-    let answers_of = |wanted: &dyn Fn(&str) -> bool| -> Vec<&Answer> {
-        table.answers.iter().filter(|a| known(&a.group) && wanted(&a.group)).collect()
+    let known = |a: &&Answer| groups.contains(&a.group.as_str()) || !all.contains(&a.group.as_str());
+    let answers: Vec<&Answer> = table.answers.iter().filter(known).collect();
+    let fit = |wanted: &dyn Fn(&str) -> bool, answers: &[&Answer], svm: SvmParams| {
+        let told: Vec<&Answer> = answers.iter().copied().filter(|a| wanted(&a.group)).collect();
+        Machine::fit((&of(wanted), &told), svm, params.range, table.descriptor.least_deviation())
     };
-    let fit = |wanted: &dyn Fn(&str) -> bool, svm: SvmParams| {
-        let least_deviation = table.descriptor.least_deviation();
-        Machine::fit((&of(wanted), &answers_of(wanted)), svm, params.range, least_deviation)
-    };
-    let others = table.answer_groups().into_iter().filter(|group| !all.contains(group));
-    let everyone: Vec<&str> = groups.iter().copied().chain(others).collect();
 
-    // For each candidate: machines that have not seen one group judge that group; one sigmoid over all of it.
-    let held_out = |&candidate: &SvmParams| -> Result<(f64, Platt), TrainError> {
+    // Machines that have not seen one group judge that group; one sigmoid over all of it.
+    let folds = |svm: SvmParams, answers: &[&Answer]| -> Result<_, TrainError> {
         let mut folds = Vec::new();
         let mut decisions = Vec::new();
-        for &group in &everyone {
-            let machine = fit(&|g| g != group, candidate)?;
+        let everyone: BTreeSet<&str> =
+            groups.iter().copied().chain(answers.iter().map(|a| a.group.as_str())).collect();
+        for group in everyone {
+            let machine = fit(&|g| g != group, answers, svm)?;
             let zones = of(&|g| g == group);
             zones.iter().for_each(|z| decisions.extend(machine.decisions(z, params)));
-            answers_of(&|g| g == group).into_iter().for_each(|a| decisions.extend(machine.answered(a)));
+            let asked = answers.iter().filter(|a| a.group == group);
+            asked.for_each(|a| decisions.extend(machine.answered(a)));
             folds.push((machine, zones));
         }
-        let platt = fit_platt(&decisions)?;
+        Ok((folds, fit_platt(&decisions)?))
+    };
+
+    // Thresholds choose C and γ. Answers are none.
+    let held_out = |&candidate: &SvmParams| -> Result<(f64, Platt), TrainError> {
+        let (folds, platt) = folds(candidate, &[])?;
         let record = TrainingRecord::default();
         let predictions: Vec<Prediction> = folds
             .into_iter()
@@ -229,7 +239,8 @@ fn fit_groups(
 
     // All groups train the machine; the sigmoid stays that of held-out decision values.
     let chosen = params.candidates[best];
-    Ok((fit(&|_| true, chosen)?, outcomes[best].1, chosen))
+    let platt = if answers.is_empty() { outcomes[best].1 } else { folds(chosen, &answers)?.1 };
+    Ok((fit(&|_| true, &answers, chosen)?, platt, chosen))
 }
 
 /// Share of the zones of left-out scenes that are familiar to the others.

@@ -23,7 +23,8 @@ let turn = 0;
 const undoable = [];
 
 function problem(error) {
-  const text = error?.body ? `${error.body.what}. ${error.body.what_to_do}.` : error instanceof TypeError ? t.unreachable : error ? String(error.message ?? error) : "";
+  const sentence = (part) => `${part[0].toUpperCase()}${part.slice(1)}.`;
+  const text = error?.body ? `${sentence(error.body.what)} ${sentence(error.body.what_to_do)}` : error instanceof TypeError ? t.unreachable : error ? String(error.message ?? error) : "";
   get("problem").textContent = text;
   get("problem").hidden = !text;
 }

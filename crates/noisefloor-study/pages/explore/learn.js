@@ -32,7 +32,7 @@ function report(t, learned, onUse) {
   if (before && after) {
     const factor = (value) => `×${value.toFixed(3)}`;
     const share = (value) => `${(100 * value).toFixed(1)} %`;
-    parts.push(table(["", t.before, t.after], [
+    parts.push(table([t.score, t.before, t.after], [
       [t.error, factor(before.error_factor), factor(after.error_factor)],
       [t.early, share(before.early_share), share(after.early_share)],
       [t.bias, factor(before.bias_factor), factor(after.bias_factor)],
