@@ -20,7 +20,9 @@ let view = null;
 let retrained = false;
 let shown = "";
 let turn = 0;
+/** What Undo takes back, the last answer last; and the number that each answer has by now, by picture and tile. */
 const undoable = [];
+const ids = new Map();
 
 function problem(error) {
   const sentence = (part) => `${part[0].toUpperCase()}${part.slice(1)}.`;
@@ -69,6 +71,8 @@ function row(picture) {
 /** Shows the pictures there are, and judges the one that is looked at. */
 async function arrange(next) {
   const looked = levels[level]?.id;
+  // Other tiles have other numbers
+  if (next.tile !== state?.tile) undoable.length = 0;
   state = next;
   shown = "";
   const focused = document.activeElement?.getAttribute("aria-label");
@@ -202,7 +206,8 @@ const answer = does(async (tile) => {
     counted(state.disagreements - 1);
   } else {
     const kept = await server.disagree(asked, tile.tile, tile.converged);
-    undoable.push({ asked, tile: tile.tile, back: kept.before, id: kept.id });
+    undoable.push({ asked, tile: tile.tile, back: kept.before });
+    ids.set(`${asked.picture} ${tile.tile}`, kept.id);
     say(fill(tile.converged ? t.kept_noise : t.kept_none, { n: tile.tile + 1 }));
     counted(kept.disagreements);
   }
@@ -212,11 +217,14 @@ const answer = does(async (tile) => {
 const undo = does(async () => {
   const last = undoable.pop();
   if (!last) return;
+  const key = `${last.asked.picture} ${last.tile}`;
   if (last.back === null) {
-    await server.takeBack(last.id);
+    await server.takeBack(ids.get(key));
     counted(state.disagreements - 1);
   } else {
-    counted((await server.disagree(last.asked, last.tile, last.back)).disagreements);
+    const kept = await server.disagree(last.asked, last.tile, last.back);
+    ids.set(key, kept.id);
+    counted(kept.disagreements);
   }
   say(t.taken_back);
   await look();
@@ -263,7 +271,9 @@ function listen() {
 }
 
 async function start() {
-  t = await server.strings("en");
+  const language = navigator.language.startsWith("fr") ? "fr" : "en";
+  t = await server.strings(language);
+  document.documentElement.lang = language;
   speak();
   legend();
   grid = new Grid(get("tiles"), t, answer, undo);

@@ -55,7 +55,9 @@ export class Grid {
     if (!small) words.push(`P ${p}`);
     const chips = [chip("top", words.join("  "))];
     if (!tile.converged) chips.push(chip("need", tile.expected_spp === null ? "→ ∞" : `→ ${short(tile.expected_spp)}`));
-    if (tile.said) chips.push(chip("said", small ? (said ? "✗!" : "✓!") : said ? t.you_noise : t.you_none));
+    // Drawn by the style: the label says it in its own words
+    if (tile.said) button.dataset.said = small ? (said ? "✗!" : "✓!") : said ? t.you_noise : t.you_none;
+    else delete button.dataset.said;
     button.replaceChildren(...chips);
   }
 

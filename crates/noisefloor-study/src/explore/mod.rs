@@ -5,6 +5,7 @@
 
 mod answers;
 mod api;
+mod ask;
 mod gallery;
 mod images;
 mod job;
@@ -150,11 +151,11 @@ fn router(app: Arc<App>, guard: Arc<Guard>) -> Router {
         .route("/api/pictures/{name}", post(api::add).put(api::change).delete(api::remove))
         .route("/api/pictures/{name}/shown.png", get(api::shown))
         .route("/api/pictures/{name}/noise.png", get(api::noise))
-        .route("/api/verdicts", post(api::verdicts))
-        .route("/api/disagreements", post(api::disagree))
-        .route("/api/disagreements/{id}", delete(api::take_back))
-        .route("/api/retrain", get(api::progress).post(api::retrain))
-        .route("/api/retrained.nfm", get(api::retrained))
+        .route("/api/verdicts", post(ask::verdicts))
+        .route("/api/disagreements", post(ask::disagree))
+        .route("/api/disagreements/{id}", delete(ask::take_back))
+        .route("/api/retrain", get(ask::progress).post(ask::retrain))
+        .route("/api/retrained.nfm", get(ask::retrained))
         .fallback(crate::server::api::nothing_here)
         .method_not_allowed_fallback(crate::server::api::wrong_method)
         .layer(from_fn_with_state(guard, guard::check))

@@ -9,7 +9,7 @@ use axum::response::{IntoResponse, Response};
 const HTML: &str = include_str!("../../pages/explore/index.html");
 const SCRIPT: &str = "text/javascript; charset=utf-8";
 /// Name, type and text of each file.
-const FILES: [(&str, &str, &str); 7] = [
+const FILES: [(&str, &str, &str); 8] = [
     ("explore.js", SCRIPT, include_str!("../../pages/explore/explore.js")),
     ("grid.js", SCRIPT, include_str!("../../pages/explore/grid.js")),
     ("learn.js", SCRIPT, include_str!("../../pages/explore/learn.js")),
@@ -17,6 +17,7 @@ const FILES: [(&str, &str, &str); 7] = [
     ("style.css", "text/css; charset=utf-8", include_str!("../../pages/style.css")),
     ("explore.css", "text/css; charset=utf-8", include_str!("../../pages/explore/explore.css")),
     ("en.json", "application/json", include_str!("../../pages/explore/en.json")),
+    ("fr.json", "application/json", include_str!("../../pages/explore/fr.json")),
 ];
 
 /// The one page.

@@ -82,6 +82,43 @@ fn verdicts_and_descriptors_are_those_of_judge() {
     }
 }
 
+/// Both languages have the same texts with the same gaps to fill, and all that the pages name.
+#[test]
+fn texts_are_complete_in_both_languages() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("pages/explore");
+    let read = |name: &str| std::fs::read_to_string(folder.join(name)).unwrap();
+    let texts = |name: &str| -> std::collections::BTreeMap<String, String> {
+        serde_json::from_str(&read(name)).unwrap()
+    };
+    let (english, french) = (texts("en.json"), texts("fr.json"));
+    let gaps = |text: &str| {
+        let mut gaps: Vec<String> =
+            text.split('{').skip(1).filter_map(|t| Some(t.split_once('}')?.0.to_owned())).collect();
+        gaps.sort();
+        gaps
+    };
+    assert!(english.keys().eq(french.keys()));
+    assert!(english.iter().zip(&french).all(|(e, f)| gaps(e.1) == gaps(f.1)));
+    for page in ["index.html", "explore.js", "grid.js", "learn.js"] {
+        let text = read(page);
+        let after = |mark: &'static str, end: &'static [char]| {
+            let names = text.split(mark).skip(1).map(|t| t.split(end).next().unwrap().to_owned());
+            names.filter(|n| !n.is_empty()).collect::<Vec<_>>()
+        };
+        let ends: &[char] = &[' ', ',', ')', ';', '.', '`', '}', ']', ':', '"', '\n'];
+        let used = [
+            after("data-t=\"", &['"']),
+            after("data-t-label=\"", &['"']),
+            after(" t.", ends),
+            after("(t.", ends),
+        ];
+        assert!(used.concat().len() > 5, "{page}");
+        for name in used.concat() {
+            assert!(english.contains_key(&name), "{page}: {name:?}");
+        }
+    }
+}
+
 /// Threshold and audience act on what is described: a higher P, or people who look harder, leave no more tiles converged.
 #[test]
 fn threshold_and_audience_move_verdicts() {
