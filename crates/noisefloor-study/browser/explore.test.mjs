@@ -45,7 +45,7 @@ async function empty(page) {
 }
 
 test("pictures are dropped, judged and disagreed with by mouse, in a small window", async (t) => {
-  const { page } = await open(t, EXPLORER, SMALL);
+  const { page } = await open(t, EXPLORER, SMALL, { refusals: true });
   await empty(page);
   await accessible(page, "empty");
   await shot(page, "explore-empty");

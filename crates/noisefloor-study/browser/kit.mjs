@@ -29,8 +29,9 @@ after(async () => {
   rmSync(profile, { recursive: true, force: true });
 });
 
-/** A window of its own. Requests to any other machine, and anything written to the console as an error, fail the test. */
-export async function open(t, url, viewport, options = {}) {
+/** A window of its own. Requests to any other machine, and anything written to the console as an error, fail the test;
+ * `refusals` are expected where a test asks for them. */
+export async function open(t, url, viewport, { refusals = false, ...options } = {}) {
   const context = await browser.newContext({ viewport, locale: "en-GB", ...options });
   const problems = [];
   context.on("request", (request) => {
@@ -38,7 +39,7 @@ export async function open(t, url, viewport, options = {}) {
     if (to.protocol !== "blob:" && to.origin !== new URL(url).origin) problems.push(`left the machine: ${to}`);
   });
   const page = await context.newPage();
-  watch(page, problems);
+  watch(page, problems, refusals);
   page.setDefaultTimeout(8000);
   t.after(async () => {
     await context.close();
@@ -48,10 +49,10 @@ export async function open(t, url, viewport, options = {}) {
   return { context, page, problems };
 }
 
-export function watch(page, problems) {
+export function watch(page, problems, refusals = false) {
   page.on("pageerror", (error) => problems.push(String(error)));
   page.on("console", (said) => {
-    const expected = /ERR_INTERNET_DISCONNECTED|404/.test(said.text());
+    const expected = /ERR_INTERNET_DISCONNECTED|404/.test(said.text()) || (refusals && /status of 422/.test(said.text()));
     if (said.type() === "error" && !expected) problems.push(said.text());
   });
 }
