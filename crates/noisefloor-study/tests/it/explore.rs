@@ -181,10 +181,14 @@ fn what_does_not_fit_is_refused() {
     refused(file("..%2fa.png", &whole), 422);
     refused(file("a%00.png", &whole), 422);
     refused(file(&"a".repeat(300), &whole), 422);
-    // A header that announces 60000×60000 pixels
+    // A header, whole but for its size, that announces 8000×8000 pixels: refused before any is allocated
     let mut large = whole.clone();
-    large[16..24].copy_from_slice(&[0, 0, 0xea, 0x60, 0, 0, 0xea, 0x60]);
-    refused(file("large.png", &large), 422);
+    large[16..24].copy_from_slice(&[0, 0, 0x1f, 0x40, 0, 0, 0x1f, 0x40]);
+    let sum = crc32(&large[12..29]);
+    large[29..33].copy_from_slice(&sum.to_be_bytes());
+    let answer = file("large.png", &large);
+    assert!(answer.1["what"].as_str().unwrap().contains("8000×8000 pixels are more than"), "{}", answer.1);
+    refused(answer, 422);
     let long = format!("content-type: application/octet-stream\r\ncontent-length: {}\r\n", 1u64 << 40);
     let (status, _, body) = server.raw("POST", "/api/pictures/a.png", &long, b"x");
     refused((status, serde_json::from_slice(&body).unwrap()), 413);
@@ -257,6 +261,12 @@ fn what_does_not_fit_is_refused() {
         assert!(head.contains("content-security-policy: default-src 'none'"), "{head}");
     }
     assert_eq!(server.get("/api/state")["disagreements"], 0);
+}
+
+/// The checksum of a PNG's chunk.
+fn crc32(bytes: &[u8]) -> u32 {
+    let bit = |crc: u32| if crc & 1 == 1 { 0xedb8_8320 ^ (crc >> 1) } else { crc >> 1 };
+    !bytes.iter().fold(!0u32, |crc, &byte| (0..8).fold(crc ^ u32::from(byte), |crc, _| bit(crc)))
 }
 
 /// A single picture has nothing to be held against, and is told what is missing; a model that looks at pictures alone judges it.
