@@ -189,7 +189,7 @@ test("everything goes by keyboard alone, in a large window", async (t) => {
   const asked = await label(page, 4);
   await focus(/^use/);
   await page.keyboard.press("Space");
-  await page.getByText("Retrained model").waitFor();
+  await page.locator("#model", { hasText: "Retrained model" }).waitFor();
   await until("the new model says something else", async () => (await label(page, 4)) !== asked);
   await page.locator("#outcome").scrollIntoViewIfNeeded();
   await shot(page, "explore-learned");
