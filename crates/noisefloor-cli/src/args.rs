@@ -17,7 +17,7 @@ use std::path::{Path, PathBuf};
 ///
 /// The oracle has learned from people: real observers said at how many samples per pixel they could no longer tell parts of real
 /// renders from the converged picture. `render` stops each tile of the built-in path tracer by it, `judge` applies it to pictures
-/// rendered elsewhere, `train` and `evaluate` make and score models.
+/// rendered elsewhere, and `explore` does in the browser, `train` and `evaluate` make and score models.
 #[derive(Debug, Parser)]
 #[command(name = "noisefloor", version, max_term_width = 110, propagate_version = true)]
 pub struct Cli {
@@ -30,6 +30,7 @@ pub enum Command {
     Render(Box<RenderArgs>),
     Compare(CompareArgs),
     Judge(JudgeArgs),
+    Explore(ExploreArgs),
     Train(TrainArgs),
     Evaluate(EvaluateArgs),
     Audience(AudienceArgs),
@@ -222,6 +223,45 @@ pub struct JudgeArgs {
     pub exr: Option<PathBuf>,
 }
 
+/// Judge pictures of your own in the browser, disagree, and retrain.
+///
+/// Drop renderings of one view on the page, or name them here: two with different seeds, stages of one rendering, or a picture and its
+/// converged reference (PNG, EXR or PFM). It shows what `judge` says of each tile, a map of visible noise and the samples predicted; threshold and
+/// audience move under the slider. A click on a tile says that the verdict is wrong, and is kept in the database before it is acknowledged;
+/// `train --disagreements`, or the page itself with --table, learns from that. For this machine alone: nothing leaves it.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  noisefloor explore                                         then drop pictures on http://127.0.0.1:8438
+  noisefloor explore 00100.png 00400.png 01600.png           a stack, named by its samples per pixel
+  noisefloor explore a_256spp.exr b_256spp.exr --table fixtures/human-table.csv      and retrain on the page
+  noisefloor train --table fixtures/human-table.csv --disagreements explore.sqlite --out mine.nfm")]
+pub struct ExploreArgs {
+    /// Pictures to begin with. Names like 00100.png or hall_64spp.exr say how many samples per pixel they have; the page asks for others.
+    #[arg(value_name = "IMAGE")]
+    pub images: Vec<PathBuf>,
+    #[command(flatten)]
+    pub oracle: OracleArgs,
+    /// Whose eyes: `observers`, `art-students`, or a,b for T' = a T + b.
+    #[arg(long, default_value = "observers", value_name = "WHO", value_parser = parse_audience)]
+    pub audience: Audience,
+    /// Tile edge in pixels, 16…512.
+    #[arg(long, default_value_t = DEFAULT_TILE, value_name = "PIXELS", value_parser = parse_edge)]
+    pub tile: usize,
+    /// Where disagreements are kept; made if it is not there.
+    #[arg(long, default_value = "explore.sqlite", value_name = "FILE")]
+    pub database: PathBuf,
+    /// Table of human thresholds that the page retrains on, such as the project's fixtures/human-table.csv, or one that `train --save-table`
+    /// wrote. Without, the page cannot retrain.
+    #[arg(long, value_name = "FILE.csv")]
+    pub table: Option<PathBuf>,
+    /// Address and port to listen on; port 0 takes a free one. Pictures travel unencrypted: only in a network that you trust.
+    #[arg(long, default_value = "127.0.0.1:8438", value_name = "IP:PORT")]
+    pub listen: std::net::SocketAddr,
+    /// Another name of this machine by which browsers ask for it. Repeat for more.
+    #[arg(long, value_name = "HOST")]
+    pub allow_host: Vec<String>,
+}
+
 /// Train a model on human thresholds.
 ///
 /// A corpus is a folder with thresholds.csv (scene, renderer, zone, x, y, width, height, human_spp, first_spp, last_spp) and the
@@ -230,7 +270,8 @@ pub struct JudgeArgs {
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   noisefloor train --corpus study/lisic9 --corpus study/staircase --out my.nfm
-  noisefloor train --table fixtures/human-table.csv --out my.nfm    from the table that ships, without any picture")]
+  noisefloor train --table fixtures/human-table.csv --out my.nfm    from the table that ships, without any picture
+  noisefloor train --table fixtures/human-table.csv --disagreements explore.sqlite --out my.nfm")]
 pub struct TrainArgs {
     #[command(flatten)]
     pub data: DataArgs,
@@ -240,6 +281,10 @@ pub struct TrainArgs {
     /// Also write the table of descriptors, from which `--table` trains without the pictures.
     #[arg(long, value_name = "FILE.csv")]
     pub save_table: Option<PathBuf>,
+    /// Learn from disagreements too, which `explore` has kept in this database: each counts as much as the levels of a zone within a doubling of samples. Scores before and after are
+    /// printed.
+    #[arg(long, value_name = "FILE.sqlite", conflicts_with = "no_scores")]
+    pub disagreements: Option<PathBuf>,
     /// Do not score on left-out scenes (the scores are then missing from the model's record).
     #[arg(long)]
     pub no_scores: bool,

@@ -7,6 +7,7 @@ mod audience;
 mod compare;
 mod doctor;
 mod evaluate;
+mod explore;
 mod figures;
 mod heat_map;
 mod inspect;
@@ -48,6 +49,7 @@ fn main() -> ExitCode {
         Command::Judge(args) => judge::run(&args).map(|()| ExitCode::SUCCESS),
         Command::Train(args) => train::run(&args).map(|()| ExitCode::SUCCESS),
         Command::Evaluate(args) => evaluate::run(&args).map(|()| ExitCode::SUCCESS),
+        Command::Explore(args) => explore::run(&args).map(|()| ExitCode::SUCCESS),
         Command::Audience(args) => audience::run(&args.command).map(|()| ExitCode::SUCCESS),
         Command::Reproduce(args) => reproduce::run(&args),
         Command::Study(args) => study::run(&args.command).map(|()| ExitCode::SUCCESS),

@@ -5,11 +5,13 @@ use anyhow::{Context, bail};
 use indicatif::{ProgressBar, ProgressStyle};
 use noisefloor::evaluation::{Prediction, Table, score};
 use noisefloor::training::{TrainParams, leave_one_scene_out, train};
-use noisefloor::{Descriptor, Evidence, NoiseMask, SvmParams};
+use noisefloor::{Descriptor, Evidence, Model, NoiseMask, SvmParams};
 use noisefloor_exr::table::{describe_corpora, read_table, write_table};
 use noisefloor_exr::{check_writable, write_atomic};
+use noisefloor_study::explore::{Agreement, Step, read_answers, retrain};
 use std::fs::File;
 use std::io::BufReader;
+use std::path::Path;
 
 pub fn run(args: &TrainArgs) -> anyhow::Result<()> {
     let params = search(&args.search)?;
@@ -22,6 +24,14 @@ pub fn run(args: &TrainArgs) -> anyhow::Result<()> {
         eprintln!("table of {} zones written to {}", table.zones.len(), path.display());
     }
 
+    let corpus = match &args.data.table {
+        Some(path) => path.display().to_string(),
+        None => args.data.corpus.iter().map(|p| p.display().to_string()).collect::<Vec<_>>().join(", "),
+    };
+    if let Some(database) = &args.disagreements {
+        return with_disagreements(args, &table, &params, database, &corpus);
+    }
+
     // Scores on scenes left out, where there are enough to leave one out and still choose among the others.
     let scores = if args.no_scores || table.groups().len() < 3 {
         None
@@ -29,22 +39,11 @@ pub fn run(args: &TrainArgs) -> anyhow::Result<()> {
         let predictions = held_out(&table, &params, noisefloor::DEFAULT_THRESHOLD)?;
         Some(score(predictions.iter()))
     };
-    let corpus = match &args.data.table {
-        Some(path) => path.display().to_string(),
-        None => args.data.corpus.iter().map(|p| p.display().to_string()).collect::<Vec<_>>().join(", "),
-    };
     eprintln!("training on all scenes");
     let model = train(&table, &params, corpus, scores)?;
     write_atomic(&args.out, |to| model.write(to))?;
 
-    println!(
-        "{} support vectors of {} examples, C = {}, γ = {}; written to {}",
-        model.svm.coefficients.len(),
-        model.record.examples,
-        model.record.c,
-        model.record.gamma,
-        args.out.display()
-    );
+    print_model(&model, &args.out);
     if let Some(s) = scores {
         println!(
             "on left-out scenes: error factor {:.3}, bias factor {:.3}, {:.1} % of {} zones stopped below half",
@@ -53,6 +52,74 @@ pub fn run(args: &TrainArgs) -> anyhow::Result<()> {
             100.0 * s.early_share,
             s.zones
         );
+    }
+    Ok(())
+}
+
+fn print_model(model: &Model, out: &Path) {
+    println!(
+        "{} support vectors of {} examples, C = {}, γ = {}; written to {}",
+        model.svm.coefficients.len(),
+        model.record.examples,
+        model.record.c,
+        model.record.gamma,
+        out.display()
+    );
+}
+
+/// Trains on a table and on what people said against verdicts, and says what that has changed.
+fn with_disagreements(
+    args: &TrainArgs,
+    table: &Table,
+    params: &TrainParams,
+    database: &Path,
+    corpus: &str,
+) -> anyhow::Result<()> {
+    let all = read_answers(database)?;
+    let fitting = all.iter().filter(|d| d.said.fits(table.descriptor, table.evidence));
+    let answers: Vec<_> = fitting.map(|d| d.said.answer()).collect();
+    if answers.is_empty() {
+        bail!(
+            "{}: none of {} disagreements was described as the table is; disagree with a verdict in `noisefloor explore`, or train without --disagreements",
+            database.display(),
+            all.len()
+        );
+    }
+    if answers.len() < all.len() {
+        eprintln!(
+            "note: {} of {} disagreements were described in another way than the table, and are left out",
+            all.len() - answers.len(),
+            all.len()
+        );
+    }
+    let bar = bar(0, "parts");
+    let on_step = |step: Step| {
+        bar.set_length(step.of as u64);
+        bar.set_position(step.done as u64);
+        bar.set_message(step.doing);
+    };
+    let base = (&Model::bundled(), noisefloor::DEFAULT_THRESHOLD);
+    let (model, learned) = retrain(table, answers, params, base, corpus, on_step)?;
+    bar.finish_and_clear();
+    write_atomic(&args.out, |to| model.write(to))?;
+    print_model(&model, &args.out);
+    if let (Some(before), Some(after)) = (learned.before, learned.after) {
+        for (name, s) in [("before", before), ("after", after)] {
+            println!(
+                "{name:6} on left-out scenes: error factor {:.3}, bias factor {:.3}, {:.1} % of {} zones stopped below half",
+                s.error_factor,
+                s.bias_factor,
+                100.0 * s.early_share,
+                s.zones
+            );
+        }
+    }
+    let Agreement { of, before, fitted, left_out } = learned.agreement;
+    println!(
+        "of {of} disagreements, the verdict is right for {before} before, {fitted} after, and {left_out} after with their scene left out"
+    );
+    if !learned.worse.is_empty() {
+        println!("people's thresholds are predicted worse now: {}", learned.worse.join("; "));
     }
     Ok(())
 }
@@ -83,8 +150,7 @@ pub fn bar(len: u64, what: &'static str) -> ProgressBar {
 /// The table that was asked for: read, or computed from pictures.
 pub fn load_table(data: &DataArgs, descriptor: Descriptor, evidence: Evidence) -> anyhow::Result<Table> {
     if let Some(path) = &data.table {
-        let file = File::open(path).with_context(|| format!("{}: cannot be opened", path.display()))?;
-        return read_table(BufReader::new(file)).with_context(|| format!("{}", path.display()));
+        return read_table_file(path);
     }
     let bar = bar(0, "zones described");
     let table = describe_corpora(&data.corpus, descriptor, evidence, |done, all| {
@@ -93,6 +159,12 @@ pub fn load_table(data: &DataArgs, descriptor: Descriptor, evidence: Evidence) -
     })?;
     bar.finish_and_clear();
     Ok(table)
+}
+
+/// A table that `train --save-table` wrote.
+pub fn read_table_file(path: &Path) -> anyhow::Result<Table> {
+    let file = File::open(path).with_context(|| format!("{}: cannot be opened", path.display()))?;
+    read_table(BufReader::new(file)).with_context(|| format!("{}", path.display()))
 }
 
 /// The descriptor to train with, checked.

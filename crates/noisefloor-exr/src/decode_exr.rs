@@ -48,15 +48,16 @@ fn decode_unguarded(path: &Path, opened: Opened) -> Result<LinearImage, PictureE
     let broken = |reason: String| PictureError::Broken { path: path.to_owned(), format: "EXR", reason };
 
     // Headers: which part, which channels, how large
+    let most = opened.most_pixels;
     let reader = exr::block::read(opened.reader, false).map_err(|e| broken(e.to_string()))?;
     let choice = choose(path, reader.headers())?;
     let part = reader.headers()[choice.part].clone();
-    check_part(path, &part)?;
+    check_part(path, &part, most)?;
     let blocks = reader.headers().iter().try_fold(0usize, |sum, h| sum.checked_add(h.chunk_count));
     if blocks.and_then(|n| n.checked_mul(8)).is_none_or(|table| table as u64 > opened.bytes) {
         return Err(broken(format!("{} bytes cannot hold as many blocks as the header says", opened.bytes)));
     }
-    let window = Window::of(path, &part)?;
+    let window = Window::of(path, &part, most)?;
 
     // Pixels start black, where memory for them is to be had
     let refused =
@@ -138,7 +139,7 @@ fn layers(names: &[String]) -> Vec<&str> {
     layers
 }
 
-fn check_part(path: &Path, part: &Header) -> Result<(), PictureError> {
+fn check_part(path: &Path, part: &Header, most: usize) -> Result<(), PictureError> {
     let unsupported = |what, advice| Err(PictureError::Unsupported { path: path.to_owned(), what, advice });
     if part.deep {
         return unsupported("deep pixels are not read", "flatten the image");
@@ -146,7 +147,7 @@ fn check_part(path: &Path, part: &Header) -> Result<(), PictureError> {
     if part.channels.list.iter().any(|channel| channel.sampling.0 != 1 || channel.sampling.1 != 1) {
         return unsupported("subsampled channels are not read", "save every channel at full resolution");
     }
-    check_size(path, part.layer_size.width(), part.layer_size.height())?;
+    check_size(path, (part.layer_size.width(), part.layer_size.height()), most)?;
     let block = part.max_block_pixel_size();
     let pixels = block.width().min(part.layer_size.width()) * block.height().min(part.layer_size.height());
     match pixels.checked_mul(part.channels.bytes_per_pixel) {
@@ -167,10 +168,10 @@ struct Window {
 }
 
 impl Window {
-    fn of(path: &Path, part: &Header) -> Result<Self, PictureError> {
+    fn of(path: &Path, part: &Header, most: usize) -> Result<Self, PictureError> {
         let display = part.shared_attributes.display_window;
         let (width, height) = (display.size.width(), display.size.height());
-        check_size(path, width, height)?;
+        check_size(path, (width, height), most)?;
         let at = part.own_attributes.layer_position;
         let (x, y) = (
             i64::from(at.0) - i64::from(display.position.0),

@@ -53,7 +53,7 @@ pub(crate) fn decode(path: &Path, mut opened: Opened) -> Result<LinearImage, Pic
     if scale == 0.0 || scale.is_nan() {
         return Err(broken("its third line tells no byte order"));
     }
-    check_size(path, width, height)?;
+    check_size(path, (width, height), opened.most_pixels)?;
 
     // Pixels, which the file has to be long enough for
     let bytes = width * height * channels * 4;

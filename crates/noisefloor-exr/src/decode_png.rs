@@ -36,7 +36,7 @@ pub(crate) fn decode(path: &Path, opened: Opened) -> Result<DisplayImage, Pictur
         let decoder = PngDecoder::with_limits(opened.reader, limits).map_err(|e| broken(e.to_string()))?;
         let (width, height) = decoder.dimensions();
         let (width, height) = (width as usize, height as usize);
-        check_size(path, width, height)?;
+        check_size(path, (width, height), opened.most_pixels)?;
         if (width * height) as u64 > opened.bytes.saturating_mul(PIXELS_A_BYTE) {
             return Err(broken(format!("{} bytes cannot hold {width}×{height} pixels", opened.bytes)));
         }

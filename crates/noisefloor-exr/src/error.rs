@@ -44,6 +44,18 @@ pub enum PictureError {
         /// The size, and the limits.
         source: TileError,
     },
+    /// More pixels than the reader takes; none was allocated.
+    #[error("{}: {width}×{height} pixels are more than the {most} that are taken here; crop the image", path.display())]
+    Large {
+        /// The file.
+        path: PathBuf,
+        /// Width in pixels.
+        width: usize,
+        /// Height in pixels.
+        height: usize,
+        /// Most pixels.
+        most: usize,
+    },
     /// The image is within the limits but memory for it was refused.
     #[error("{}: no memory for {width}×{height} pixels; close other programs or use a smaller image", path.display())]
     Memory {

@@ -48,6 +48,6 @@ pub use decode_pfm::read_pfm;
 pub use decode_png::read_png;
 pub use error::{CommandError, CorpusError, PictureError, StackError, WriteError};
 pub use frames::{Frame, running_means};
-pub use picture::{DisplayImage, LinearImage, MAX_FILE_BYTES, Picture, read_picture};
+pub use picture::{DisplayImage, LinearImage, MAX_FILE_BYTES, Picture, read_picture, read_picture_within};
 pub use stack::StackSource;
 pub use write::{RenderLayers, check_writable, write_atomic, write_exr, write_png};

@@ -1,7 +1,7 @@
 //! Pictures: linear or display-encoded, told apart by content.
 
 use crate::error::PictureError;
-use noisefloor::{Rgb, check_image, srgb_decode};
+use noisefloor::{Rgb, Still, check_image, srgb_decode};
 use std::fs::File;
 use std::io::{BufReader, Read, Seek};
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -78,14 +78,31 @@ impl Picture {
     }
 }
 
+impl Picture {
+    /// The picture, made of `spp` samples per pixel, to be held against others; see [`noisefloor::Held`].
+    pub fn into_still(self, spp: f64) -> Still {
+        let (size, rounding) = (self.size(), self.rounding());
+        let display_referred = matches!(self, Picture::Display(_));
+        Still { size, pixels: self.into_linear().pixels, spp, display_referred, rounding }
+    }
+}
+
 /// Reads an EXR, a PFM or a PNG, whichever the first bytes say it is; the name does not matter.
 ///
 /// # Errors
 /// [`PictureError`]: those of [`read_exr`](crate::read_exr), [`read_pfm`](crate::read_pfm) and [`read_png`](crate::read_png),
 /// and [`PictureError::Foreign`] if it is none of them.
 pub fn read_picture(path: impl AsRef<Path>) -> Result<Picture, PictureError> {
+    read_picture_within(path, noisefloor::MAX_PIXELS)
+}
+
+/// [`read_picture`] of at most `most` pixels: more are refused before any is allocated.
+///
+/// # Errors
+/// Those of [`read_picture`], and [`PictureError::Large`].
+pub fn read_picture_within(path: impl AsRef<Path>, most: usize) -> Result<Picture, PictureError> {
     let path = path.as_ref();
-    let opened = Opened::open(path)?;
+    let opened = Opened { most_pixels: most, ..Opened::open(path)? };
     match opened.format {
         Format::Exr => crate::decode_exr::decode(path, opened).map(Picture::Linear),
         Format::Pfm => crate::decode_pfm::decode(path, opened).map(Picture::Linear),
@@ -109,6 +126,8 @@ pub(crate) struct Opened {
     pub(crate) reader: BufReader<File>,
     pub(crate) bytes: u64,
     pub(crate) format: Format,
+    /// Most pixels that are decoded.
+    pub(crate) most_pixels: usize,
 }
 
 impl Opened {
@@ -137,7 +156,7 @@ impl Opened {
             [0x89, b'P', b'N', b'G', b'\r', b'\n', 0x1a, b'\n'] => Format::Png,
             _ => Format::Other,
         };
-        Ok(Self { reader, bytes, format })
+        Ok(Self { reader, bytes, format, most_pixels: noisefloor::MAX_PIXELS })
     }
 
     pub(crate) fn foreign(&self, path: &Path, wanted: &'static str) -> PictureError {
@@ -153,8 +172,16 @@ impl Opened {
 }
 
 /// Checks a size from a header, before anything of that size is allocated.
-pub(crate) fn check_size(path: &Path, width: usize, height: usize) -> Result<(), PictureError> {
-    check_image(width, height).map_err(|source| PictureError::Size { path: path.to_owned(), source })
+pub(crate) fn check_size(
+    path: &Path,
+    (width, height): (usize, usize),
+    most: usize,
+) -> Result<(), PictureError> {
+    check_image(width, height).map_err(|source| PictureError::Size { path: path.to_owned(), source })?;
+    if width * height > most {
+        return Err(PictureError::Large { path: path.to_owned(), width, height, most });
+    }
+    Ok(())
 }
 
 /// Runs a decoder. The decoders are other people's code over hostile bytes: where one of them panics, the file is broken, and

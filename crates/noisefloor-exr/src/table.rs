@@ -144,7 +144,7 @@ fn describe(
     }
     on_zone(all, all);
     let tone_mapping = ToneMapping::Srgb { exposure: 1.0 };
-    Ok(Table { descriptor, evidence, tone_mapping, zones })
+    Ok(Table { descriptor, evidence, tone_mapping, zones, answers: Vec::new() })
 }
 
 /// The levels that are synthesised for each zone of a scene, in samples per pixel.

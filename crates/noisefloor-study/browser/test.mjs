@@ -1,92 +1,12 @@
 // The pages in Chromium, against real servers that the Rust test `browser` starts and names in the environment.
 
-import { test, before, after } from "node:test";
+import { test } from "node:test";
 import assert from "node:assert/strict";
-import { createRequire } from "node:module";
-import { readFileSync, mkdirSync, mkdtempSync, rmSync } from "node:fs";
-import { tmpdir } from "node:os";
-import { join } from "node:path";
-import { chromium } from "playwright-core";
+import { readFileSync } from "node:fs";
+import { LARGE, SMALL, accessible, arrive, heading, open, shot, test_picture, watch } from "./kit.mjs";
 
-const { ACQUISITION, VALIDATION, FORCED, NOISEFLOOR_SCREENSHOTS: shots } = process.env;
-const axe = readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8");
-const SMALL = { width: 1024, height: 640 };
-const LARGE = { width: 1920, height: 1080 };
+const { ACQUISITION, VALIDATION, FORCED } = process.env;
 
-let browser;
-const profile = mkdtempSync(join(tmpdir(), "noisefloor-browser-"));
-
-before(async () => {
-  browser = await chromium.launch({
-    executablePath: "/usr/bin/chromium",
-    args: ["--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking", "--disable-component-update", "--disable-sync"],
-    env: { ...process.env, HOME: profile },
-  });
-  if (shots) mkdirSync(shots, { recursive: true });
-});
-after(async () => {
-  await browser.close();
-  rmSync(profile, { recursive: true, force: true });
-});
-
-/** A window of its own. Requests to any other machine, and anything written to the console as an error, fail the test. */
-async function open(t, url, viewport, options = {}) {
-  const context = await browser.newContext({ viewport, locale: "en-GB", ...options });
-  const problems = [];
-  context.on("request", (request) => {
-    const to = new URL(request.url());
-    if (to.protocol !== "blob:" && to.origin !== new URL(url).origin) problems.push(`left the machine: ${to}`);
-  });
-  const page = await context.newPage();
-  watch(page, problems);
-  page.setDefaultTimeout(8000);
-  t.after(async () => {
-    await context.close();
-    assert.deepEqual(problems, []);
-  });
-  await page.goto(url);
-  return { context, page, problems };
-}
-
-function watch(page, problems) {
-  page.on("pageerror", (error) => problems.push(String(error)));
-  page.on("console", (said) => {
-    const expected = /ERR_INTERNET_DISCONNECTED|404/.test(said.text());
-    if (said.type() === "error" && !expected) problems.push(said.text());
-  });
-}
-
-async function accessible(page, name) {
-  // The policy of the pages forbids scripts from elsewhere: axe is evaluated by the debugger
-  await page.evaluate(axe);
-  const { violations } = await page.evaluate(() => globalThis.axe.run(document, { resultTypes: ["violations"] }));
-  const found = violations.map((v) => `${v.id}: ${v.help} (${v.nodes.map((n) => n.target).join(", ")})`);
-  assert.deepEqual(found, [], name);
-}
-
-async function shot(page, name) {
-  if (shots) await page.screenshot({ path: join(shots, `${name}.png`) });
-}
-
-const heading = (page, text) => page.getByRole("heading", { name: text }).waitFor();
-
-/** From the first page to the first trial, by mouse. */
-async function arrive(page, check) {
-  await page.getByRole("button", { name: "Begin" }).waitFor();
-  if (check) { await accessible(page, "welcome"); await shot(page, `${check}-welcome`); }
-  await page.getByRole("button", { name: "Begin" }).click();
-  await heading(page, "Before you begin");
-  if (check) { await accessible(page, "consent"); await shot(page, `${check}-consent`); }
-  assert.ok(await page.getByRole("button", { name: "Go on" }).isDisabled());
-  await page.getByLabel("I have read this").check();
-  await page.getByRole("button", { name: "Go on" }).click();
-  await heading(page, "How you see the pictures");
-  if (check) { await accessible(page, "conditions"); await shot(page, `${check}-conditions`); }
-  await page.getByLabel("dim").check();
-  await page.getByRole("button", { name: "Go on" }).click();
-}
-
-const test_picture = (page) => page.locator("canvas.picture").nth(1);
 const ready = async (page, number) => {
   await heading(page, number === 0 ? "Practice" : `Trial ${number + 1}`);
   await page.getByText(number === 0 ? "This one does not count" : "Click where you see").waitFor();
@@ -107,7 +27,7 @@ const levels = (page) => page.evaluate(async () => {
 
 test("a session by mouse, in a small window", async (t) => {
   const { page } = await open(t, ACQUISITION, SMALL);
-  await arrive(page, "small");
+  await arrive(page, async (at, name) => { await accessible(at, name); await shot(at, `small-${name}`); });
   await ready(page, 0);
   await accessible(page, "practice");
   await shot(page, "small-acquisition");

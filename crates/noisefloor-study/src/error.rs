@@ -79,6 +79,9 @@ pub enum StudyError {
         /// What the system said.
         source: io::Error,
     },
+    /// Pictures that cannot be explored.
+    #[error("{0}")]
+    Explore(String),
     /// Nothing to analyse.
     #[error("{0}")]
     Analysis(String),
@@ -98,6 +101,12 @@ pub enum StoreError {
     /// The database holds the answers to another study.
     #[error("{}: holds answers to another study, or to an earlier design of this one; name another `database` in the study file", path.display())]
     OtherStudy {
+        /// The database.
+        path: PathBuf,
+    },
+    /// The database holds something else than disagreements.
+    #[error("{}: is not a database of `noisefloor explore`; name another with --database", path.display())]
+    NotDisagreements {
         /// The database.
         path: PathBuf,
     },

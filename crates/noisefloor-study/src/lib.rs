@@ -4,6 +4,7 @@
 //! - [`Server`] shows it to observers and keeps every [`Event`] before it acknowledges it; [`store`] is where.
 //! - [`Session`] is the state that events move on; replaying them rebuilds it, which is how it is resumed and analysed.
 //! - [`analysis`] makes thresholds, agreements and tables of the answers, and a corpus for `noisefloor train`.
+//! - [`explore`] judges one's own pictures in the browser, keeps disagreements, and learns from them.
 //! - [`simulated`] are observers made of numbers, who drive the same server: to test the whole chain, and to plan a study.
 //!
 //! ```
@@ -42,6 +43,7 @@ mod code;
 mod config;
 mod error;
 mod event;
+pub mod explore;
 mod questplus;
 mod random;
 mod server;

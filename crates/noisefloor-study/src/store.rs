@@ -200,7 +200,7 @@ fn open(path: &Path, design: &str) -> Result<Connection, StoreError> {
 }
 
 /// How the connection works: a log that outlives kills, and nothing of erased rows left in the file.
-fn settle(connection: &Connection) -> rusqlite::Result<()> {
+pub(crate) fn settle(connection: &Connection) -> rusqlite::Result<()> {
     connection.busy_timeout(Duration::from_secs(10))?;
     connection.pragma_update(None, "journal_mode", "WAL")?;
     connection.pragma_update(None, "synchronous", "FULL")?;
@@ -220,7 +220,7 @@ fn check_design(connection: &Connection, path: &Path, design: &str) -> Result<()
     }
 }
 
-fn now_ms() -> u64 {
+pub(crate) fn now_ms() -> u64 {
     SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |d| d.as_millis() as u64)
 }
 

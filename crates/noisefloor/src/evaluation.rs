@@ -3,6 +3,7 @@
 //! Scores are those of the rules of evidence in `docs/guide.md`: whole scenes left out, predictions clipped to the levels that
 //! observers could choose, real pictures scored apart from synthesised levels.
 
+use crate::answer::Answer;
 use crate::descriptor::Descriptor;
 use crate::display::ToneMapping;
 use crate::evidence::{Evidence, ROUNDING_LUMINANCE, TilePlanes};
@@ -78,6 +79,9 @@ pub struct Table {
     pub tone_mapping: ToneMapping,
     /// The zones.
     pub zones: Vec<Zone>,
+    /// What single people said of tiles of other pictures: examples to train on, never scored as thresholds.
+    #[serde(default)]
+    pub answers: Vec<Answer>,
 }
 
 impl Zone {
@@ -119,6 +123,9 @@ impl Table {
             self.zones.iter_mut().flat_map(|z| &mut z.levels).for_each(|l| {
                 l.descriptor.remove(at);
             });
+            self.answers.iter_mut().for_each(|a| {
+                a.descriptor.remove(at);
+            });
         }
         Ok(self)
     }
@@ -137,6 +144,14 @@ impl Table {
                     hash.update(&v.to_le_bytes());
                 });
             }
+        }
+        for answer in &self.answers {
+            hash.update(answer.group.as_bytes())
+                .update(&answer.spp.to_le_bytes())
+                .update(&[u8::from(answer.sees_noise)]);
+            answer.descriptor.iter().for_each(|v| {
+                hash.update(&v.to_le_bytes());
+            });
         }
         hash.finalize().to_hex().to_string()
     }
@@ -427,6 +442,7 @@ mod tests {
             evidence: Evidence::Halves,
             tone_mapping: ToneMapping::Srgb { exposure: 1.0 },
             zones,
+            answers: Vec::new(),
         };
         let scores = score(constant_noise_baseline(&table).iter());
         assert!((scores.error_factor - 1.0).abs() < 1e-3, "{scores:?}");
@@ -462,6 +478,7 @@ mod tests {
             evidence: Evidence::Halves,
             tone_mapping: ToneMapping::Srgb { exposure: 1.0 },
             zones: vec![zone],
+            answers: Vec::new(),
         };
         let less = table.clone().without(&["picture_noise".into(), "textured_area".into()]).unwrap();
         assert!(less.zones[0].levels.iter().all(|l| l.descriptor == [0.0, 2.0, 4.0, 5.0]));

@@ -28,6 +28,7 @@
 //! # Ok::<(), noisefloor::SessionError>(())
 //! ```
 
+mod answer;
 mod audience;
 mod criterion;
 mod descriptor;
@@ -43,11 +44,13 @@ mod oracle;
 mod params;
 mod session;
 mod source;
+mod stills;
 mod svm;
 mod tile;
 #[cfg(feature = "train")]
 pub mod training;
 
+pub use answer::Answer;
 pub use audience::{AudienceFit, AudienceFitError, MAX_PAIRS, MIN_PAIRS};
 pub use criterion::{CriterionError, FixedSamples, Needs, StoppingCriterion, Verdict, View};
 pub use descriptor::{Described, Descriptor, DescriptorError};
@@ -64,6 +67,7 @@ pub use oracle::{DEFAULT_THRESHOLD, Oracle, ThresholdError};
 pub use params::{Audience, Params, ParamsError, Schedule};
 pub use session::{Session, SessionError, Stop, StopReason};
 pub use source::{Batch, ProgressiveSource, Reference, Repeats, Request, Rgb, SourceError, SourceInfo, Unit};
+pub use stills::{Held, Still, StillError};
 pub use svm::{Platt, Scaler, Svm};
 #[cfg(feature = "train")]
 pub use svm::{SvmParams, SvmTrainError, Weights, fit_platt, fit_svm, fit_weights, squared_distances};

@@ -74,6 +74,36 @@ impl Oracle {
         tiles.iter().zip(numbers).map(|(tile, raw)| self.verdict(&raw, tile.samples.round() as u64)).collect()
     }
 
+    /// Judges tiles as [`Oracle::judge_described`] does, for other eyes than those of the training data: P is the share of *them*, who see of
+    /// n samples what trained observers see of [`Audience::seen_as`] n. `None` if that cannot be told, since the descriptor does not tell noise from
+    /// picture, and the audience is not [`Audience::TRAINED`].
+    pub fn judge_described_for(&self, tiles: &[Described], audience: Audience) -> Option<Vec<Verdict>> {
+        if audience == Audience::TRAINED {
+            return Some(self.judge_described(tiles));
+        }
+        let numbers = self.model.descriptor.in_picture(tiles);
+        tiles.iter().zip(numbers).map(|(tile, raw)| self.verdict_for(raw, tile.samples, audience)).collect()
+    }
+
+    fn verdict_for(&self, mut raw: Vec<f32>, samples: f64, audience: Audience) -> Option<Verdict> {
+        let seen_as = audience.seen_as(samples);
+        // Someone who is never satisfied with so few: the need of the trained is found from a sample on.
+        let from = seen_as.max(1.0).min(samples);
+        if !self.model.descriptor.project(&mut raw, (from / samples) as f32) {
+            return None;
+        }
+        let trained = self.verdict(&raw, from.round().max(1.0) as u64);
+        let satisfied = seen_as > 0.0;
+        let converged = satisfied && trained.converged;
+        let expected_samples = if converged {
+            Some(samples.round() as u64)
+        } else {
+            trained.expected_samples.map(|needed| audience.samples(needed))
+        };
+        let probability = if satisfied { trained.probability } else { Some(0.0) };
+        Some(Verdict { converged, probability, expected_samples, unfamiliar: trained.unfamiliar })
+    }
+
     /// A verdict by a whole, raw descriptor.
     fn verdict(&self, raw: &[f32], samples: u64) -> Verdict {
         let unfamiliar = !self.model.is_familiar(raw);
@@ -373,6 +403,36 @@ mod tests {
         let ratio = expected(Model::bundled()) / expected(careless);
         // The expected need is found to a fiftieth of a doubling, each time.
         assert!((ratio.log2() - 1.0).abs() < 0.04, "{ratio}");
+    }
+
+    /// People who need twice the samples see at 2n what the trained see at n, and expect twice the samples; who need no more see the same.
+    #[cfg(feature = "bundled-model")]
+    #[test]
+    fn another_audience_sees_the_noise_of_fewer_samples() {
+        let oracle = Oracle::bundled();
+        let describe = |samples: u32| {
+            let film = film(samples, 1.5);
+            let planes = TilePlanes::from_halves(&film, &Display::SRGB, film.grid().tile(0));
+            vec![oracle.describe(&planes, f64::from(samples)).unwrap()]
+        };
+        let at = describe(400);
+        let own = oracle.judge_described(&at)[0];
+        assert_eq!(oracle.judge_described_for(&at, Audience::TRAINED).unwrap()[0], own);
+        let for_line =
+            |slope, offset| oracle.judge_described_for(&at, Audience { slope, offset }).unwrap()[0];
+        // Half the demands are no reason to stop sooner than the session would.
+        assert_eq!(for_line(0.5, 0.0), own);
+        let half = describe(200);
+        let twice = for_line(2.0, 0.0);
+        // Another film has other noise: its amplitude over 4096 pixels is known to 1 %.
+        let half = oracle.judge_described(&half)[0];
+        assert!((twice.probability.unwrap() - half.probability.unwrap()).abs() < 0.03, "{twice:?} {half:?}");
+        let (own, twice) = (own.expected_samples.unwrap() as f64, twice.expected_samples.unwrap() as f64);
+        assert!((twice / own - 2.0).abs() < 0.06, "{own} {twice}");
+        let never = for_line(1.0, 1000.0);
+        assert!(!never.converged && never.probability == Some(0.0) && never.expected_samples > Some(1000));
+        assert_eq!(Audience { slope: 0.0, offset: 100.0 }.seen_as(100.0), 100.0);
+        assert_eq!(Audience { slope: 0.0, offset: 101.0 }.seen_as(100.0), 0.0);
     }
 
     /// A film of two tiles, the second much noisier, with `samples` samples.

@@ -67,6 +67,17 @@ impl Audience {
         Self { slope: other.slope * self.slope, offset: other.slope * self.offset + other.offset }
     }
 
+    /// What this audience sees of a picture of `samples` samples, as the samples per pixel at which the trained one sees as much: the inverse
+    /// of [`Audience::samples`], never more than `samples`; 0 if no noise is little enough for them.
+    pub fn seen_as(&self, samples: f64) -> f64 {
+        let seen = (samples - self.offset) / self.slope;
+        match seen.is_nan() || seen <= 0.0 {
+            true if self.slope == 0.0 && self.offset <= samples => samples,
+            true => 0.0,
+            false => seen.min(samples),
+        }
+    }
+
     /// Samples per pixel for this audience where the trained one needs `samples`; never fewer, since they are taken already.
     pub fn samples(&self, samples: u64) -> u64 {
         samples.max((self.slope * samples as f64 + self.offset).ceil().clamp(0.0, 1e15) as u64)

@@ -1,5 +1,6 @@
 //! Learning a model from a table of human thresholds, and scoring it on scenes it has not seen.
 
+use crate::answer::Answer;
 use crate::evaluation::{Prediction, Scores, Table, Zone, predict, score};
 use crate::familiarity::{Familiarity, nearest};
 use crate::model::{Model, TrainingRecord};
@@ -8,6 +9,7 @@ use crate::params::Audience;
 use crate::svm::{Platt, Scaler, Svm, SvmParams, SvmTrainError, fit_platt, fit_svm};
 use ndarray::Array2;
 use rayon::prelude::*;
+use std::collections::BTreeSet;
 use thiserror::Error;
 
 /// Share of observers who see no difference at the recorded threshold, as it is read here (Takouachet et al. 2017, §4.2.2:
@@ -54,6 +56,14 @@ pub enum TrainError {
     /// A parameter out of range.
     #[error("training needs candidates for C and γ, a range above 1 and a spread above 0")]
     Params,
+    /// Answers that are not described as the zones are.
+    #[error("an answer has {found} numbers, and the zones have {expected}: it is of another descriptor")]
+    Answer {
+        /// Numbers of a zone.
+        expected: usize,
+        /// Numbers of the answer.
+        found: usize,
+    },
     /// Leaving groups out needs groups.
     #[error("leaving scenes out needs at least {needed} groups of scenes; the corpus has {found}: {names}")]
     Groups {
@@ -77,13 +87,23 @@ pub fn observers_agreeing(spp: f64, human: f64, spread: f64) -> f64 {
 struct Machine {
     scaler: Scaler,
     svm: Svm,
+    /// Examples that an answer counts as.
+    weight: usize,
 }
 
 impl Machine {
-    fn fit(zones: &[&Zone], svm: SvmParams, range: f64, least_deviation: f64) -> Result<Self, TrainError> {
-        let examples: Vec<(&[f32], bool)> =
+    fn fit<'a>(
+        (zones, answers): (&[&'a Zone], &[&'a Answer]),
+        svm: SvmParams,
+        range: f64,
+        least_deviation: f64,
+    ) -> Result<Self, TrainError> {
+        let mut examples: Vec<(&[f32], bool)> =
             zones.iter().flat_map(|z| examples(z, range)).map(|e| (e.descriptor, e.converged)).collect();
         let scaler = Scaler::fit(examples.iter().map(|e| e.0), least_deviation);
+        let weight = answer_weight(examples.len(), zones.len(), range);
+        let answer = |a: &&'a Answer| std::iter::repeat_n((&a.descriptor[..], !a.sees_noise), weight);
+        examples.extend(answers.iter().flat_map(answer));
         let dimensions = examples.first().map_or(0, |e| e.0.len());
         let mut rows = Array2::zeros((examples.len(), dimensions));
         let mut scaled = Vec::new();
@@ -94,7 +114,19 @@ impl Machine {
             row.iter_mut().zip(&scaled).for_each(|(to, &from)| *to = f64::from(from));
         }
         let labels: Vec<bool> = examples.iter().map(|e| e.1).collect();
-        Ok(Self { scaler, svm: fit_svm(rows.view(), &labels, svm)? })
+        Ok(Self { scaler, weight, svm: fit_svm(rows.view(), &labels, svm)? })
+    }
+
+    fn decide(&self, descriptor: &[f32]) -> f32 {
+        let mut scaled = descriptor.to_vec();
+        self.scaler.apply(&mut scaled);
+        self.svm.decision(&scaled)
+    }
+
+    /// (decision value, 0 or 1) of an answer, as often as it weighs.
+    fn answered(&self, answer: &Answer) -> impl Iterator<Item = (f32, f64)> {
+        let agreeing = f64::from(u8::from(!answer.sees_noise));
+        std::iter::repeat_n((self.decide(&answer.descriptor), agreeing), self.weight)
     }
 
     /// (decision value, share of observers that agree) of a zone's examples.
@@ -103,11 +135,8 @@ impl Machine {
         zone: &'a Zone,
         params: &'a TrainParams,
     ) -> impl Iterator<Item = (f32, f64)> + 'a {
-        examples(zone, params.range).map(|e| {
-            let mut scaled = e.descriptor.to_vec();
-            self.scaler.apply(&mut scaled);
-            (self.svm.decision(&scaled), observers_agreeing(e.spp, zone.human_spp, params.spread))
-        })
+        examples(zone, params.range)
+            .map(|e| (self.decide(e.descriptor), observers_agreeing(e.spp, zone.human_spp, params.spread)))
     }
 
     fn into_model(
@@ -130,6 +159,13 @@ impl Machine {
             record,
         }
     }
+}
+
+/// An answer is about one number of samples. It weighs as much as what a zone, whose examples spread over range² in samples, has within a
+/// doubling of them.
+fn answer_weight(examples: usize, zones: usize, range: f64) -> usize {
+    let doublings = 2.0 * range.log2();
+    (examples as f64 / zones.max(1) as f64 / doublings).round().max(1.0) as usize
 }
 
 struct Example<'a> {
@@ -158,20 +194,34 @@ fn fit_groups(
     let of = |wanted: &dyn Fn(&str) -> bool| -> Vec<&Zone> {
         table.zones.iter().filter(|z| groups.contains(&z.group.as_str()) && wanted(&z.group)).collect()
     };
+    let all = table.groups();
+    let known = |a: &&Answer| groups.contains(&a.group.as_str()) || !all.contains(&a.group.as_str());
+    let answers: Vec<&Answer> = table.answers.iter().filter(known).collect();
+    let fit = |wanted: &dyn Fn(&str) -> bool, answers: &[&Answer], svm: SvmParams| {
+        let told: Vec<&Answer> = answers.iter().copied().filter(|a| wanted(&a.group)).collect();
+        Machine::fit((&of(wanted), &told), svm, params.range, table.descriptor.least_deviation())
+    };
 
-    let least_deviation = table.descriptor.least_deviation();
-
-    // For each candidate: machines that have not seen one group judge that group; one sigmoid over all of it.
-    let held_out = |&candidate: &SvmParams| -> Result<(f64, Platt), TrainError> {
+    // Machines that have not seen one group judge that group; one sigmoid over all of it.
+    let folds = |svm: SvmParams, answers: &[&Answer]| -> Result<_, TrainError> {
         let mut folds = Vec::new();
         let mut decisions = Vec::new();
-        for &group in groups {
-            let machine = Machine::fit(&of(&|g| g != group), candidate, params.range, least_deviation)?;
+        let everyone: BTreeSet<&str> =
+            groups.iter().copied().chain(answers.iter().map(|a| a.group.as_str())).collect();
+        for group in everyone {
+            let machine = fit(&|g| g != group, answers, svm)?;
             let zones = of(&|g| g == group);
             zones.iter().for_each(|z| decisions.extend(machine.decisions(z, params)));
+            let asked = answers.iter().filter(|a| a.group == group);
+            asked.for_each(|a| decisions.extend(machine.answered(a)));
             folds.push((machine, zones));
         }
-        let platt = fit_platt(&decisions)?;
+        Ok((folds, fit_platt(&decisions)?))
+    };
+
+    // Thresholds choose C and γ. Answers are none.
+    let held_out = |&candidate: &SvmParams| -> Result<(f64, Platt), TrainError> {
+        let (folds, platt) = folds(candidate, &[])?;
         let record = TrainingRecord::default();
         let predictions: Vec<Prediction> = folds
             .into_iter()
@@ -189,7 +239,8 @@ fn fit_groups(
 
     // All groups train the machine; the sigmoid stays that of held-out decision values.
     let chosen = params.candidates[best];
-    Ok((Machine::fit(&of(&|_| true), chosen, params.range, least_deviation)?, outcomes[best].1, chosen))
+    let platt = if answers.is_empty() { outcomes[best].1 } else { folds(chosen, &answers)?.1 };
+    Ok((fit(&|_| true, &answers, chosen)?, platt, chosen))
 }
 
 /// Share of the zones of left-out scenes that are familiar to the others.
@@ -233,7 +284,11 @@ fn check(table: &Table, params: &TrainParams, needed: usize) -> Result<(), Train
     if groups.len() < needed {
         return Err(TrainError::Groups { needed, found: groups.len(), names: groups.join(", ") });
     }
-    Ok(())
+    let expected = table.zones.iter().flat_map(|z| &z.levels).map(|l| l.descriptor.len()).next().unwrap_or(0);
+    match table.answers.iter().map(|a| a.descriptor.len()).find(|&found| found != expected) {
+        Some(found) => Err(TrainError::Answer { expected, found }),
+        None => Ok(()),
+    }
 }
 
 /// Predicts every zone, at P = `threshold`, by a model that has seen nothing of its group, not even to choose C, γ or the
@@ -262,6 +317,32 @@ pub fn leave_one_scene_out(
     Ok(predictions)
 }
 
+/// P of each of the table's answers, in their order, by a model that has learned nothing of its group, neither answers nor zones. `on_fold` is
+/// called before each group of answers with its name.
+///
+/// # Errors
+/// [`TrainError`] if fewer than two groups of zones are left, or training fails.
+pub fn leave_answers_out(
+    table: &Table,
+    params: &TrainParams,
+    mut on_fold: impl FnMut(&str),
+) -> Result<Vec<f32>, TrainError> {
+    let mut probabilities = vec![0.0; table.answers.len()];
+    for group in table.answer_groups() {
+        on_fold(group);
+        let mut rest = table.clone();
+        rest.zones.retain(|z| z.group != group);
+        rest.answers.retain(|a| a.group != group);
+        let model = train(&rest, params, String::new(), None)?;
+        for (p, answer) in probabilities.iter_mut().zip(&table.answers) {
+            if answer.group == group {
+                *p = answer.probability(&model);
+            }
+        }
+    }
+    Ok(probabilities)
+}
+
 /// Trains a model on all of a table. `corpus` says in words where it comes from; `leave_one_scene_out` are the scores of
 /// [`leave_one_scene_out`], where they were computed.
 ///
@@ -280,7 +361,8 @@ pub fn train(
         corpus,
         table_digest: table.digest(),
         scenes: table.scenes().into_iter().map(str::to_owned).collect(),
-        examples: table.zones.iter().map(|z| examples(z, params.range).count()).sum(),
+        examples: table.zones.iter().map(|z| examples(z, params.range).count()).sum::<usize>()
+            + table.answers.len(),
         c,
         gamma,
         leave_one_scene_out,
@@ -332,7 +414,13 @@ mod tests {
             }
         }
         let tone_mapping = ToneMapping::Srgb { exposure: 1.0 };
-        Table { descriptor: Descriptor::default(), evidence: Evidence::Halves, tone_mapping, zones }
+        Table {
+            descriptor: Descriptor::default(),
+            evidence: Evidence::Halves,
+            tone_mapping,
+            zones,
+            answers: Vec::new(),
+        }
     }
 
     #[test]
@@ -347,6 +435,47 @@ mod tests {
         let errors = predictions.iter().map(|p| (p.predicted_spp / p.human_spp / nine_in_ten).ln().abs());
         let error_factor = (errors.sum::<f64>() / 24.0).exp();
         assert!(error_factor < 1.2, "{error_factor}");
+    }
+
+    /// The rule is noise 0.01: who still sees noise at half of that, in a picture of a group of its own, lowers P there, and who sees none at
+    /// twice as much raises it there; a model that has left that picture out is as if nothing had been said.
+    #[test]
+    fn answers_move_p_their_way_and_are_left_out_with_their_picture() {
+        let plain = table(4);
+        let params = TrainParams::default();
+        let before = train(&plain, &params, String::new(), None).unwrap();
+        for (noise, sees_noise) in [(0.005f32, true), (0.02, false)] {
+            let mut descriptor = vec![0.5; Descriptor::default().len()];
+            descriptor[0] = noise.ln();
+            let answer = Answer { group: "mine".into(), spp: 100.0, descriptor, sees_noise };
+            let told = Table { answers: vec![answer.clone(); 3], ..plain.clone() };
+            assert_ne!(told.digest(), plain.digest());
+            let after = train(&told, &params, String::new(), None).unwrap();
+            let (p, q) = (answer.probability(&before), answer.probability(&after));
+            assert!(
+                if sees_noise { q < p - 0.01 } else { q > p + 0.01 },
+                "{sees_noise}: {p} before, {q} after"
+            );
+            let mut asked = Vec::new();
+            let left_out = leave_answers_out(&told, &params, |group| asked.push(group.to_owned())).unwrap();
+            assert_eq!((left_out, asked), (vec![p; 3], vec!["mine".to_owned()]));
+
+            // Of a group of zones, answers are left out with them.
+            let same = Table {
+                answers: vec![Answer { group: "scene0".into(), ..answer.clone() }; 3],
+                ..plain.clone()
+            };
+            let of = |table: &Table| {
+                let all = leave_one_scene_out(table, &params, DEFAULT_THRESHOLD, |_| ()).unwrap();
+                all.into_iter().filter(|p| p.scene == "scene0").collect::<Vec<_>>()
+            };
+            assert_eq!(of(&same), of(&plain));
+            assert_ne!(of(&told), of(&plain));
+        }
+        let short = Answer { group: "mine".into(), spp: 1.0, descriptor: vec![0.0], sees_noise: true };
+        let error =
+            train(&Table { answers: vec![short], ..plain }, &params, String::new(), None).unwrap_err();
+        assert!(matches!(error, TrainError::Answer { expected: 6, found: 1 }), "{error}");
     }
 
     /// Zones at 0, 1, 2, … in one number of texture, each of a group of its own: all are 1 from the next.

@@ -233,3 +233,24 @@ fn scene_files() {
     fail(&["render", "cornell-bx"], &["cornell-bx", "noisefloor scenes"]);
     fail(&["render", "--clamp", "0", "--out", text(&case.path("out"))], &["clamp"]);
 }
+
+#[test]
+fn explore_begins_with_pictures_it_can_read_or_not_at_all() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    std::fs::write(at("text.png"), "text").unwrap();
+    std::fs::write(at("text.sqlite"), "a text that is no database, and longer than its header would be")
+        .unwrap();
+    let database = at("new.sqlite");
+    let explore = |more: &[&str], words: &[&str]| {
+        fail(&[&["explore", "--listen", "127.0.0.1:0", "--database", text(&database)], more].concat(), words);
+    };
+    explore(&[text(&at("absent.png"))], &["absent.png"]);
+    explore(&[text(&at("text.png"))], &["text.png", "PNG"]);
+    explore(&["--table", text(&at("text.png"))], &["text.png", "table"]);
+    explore(&["--model", text(&at("text.png"))], &["text.png", "model"]);
+    explore(&["--threshold", "1"], &["threshold"]);
+    assert!(!database.exists());
+    let other = at("text.sqlite");
+    fail(&["explore", "--listen", "127.0.0.1:0", "--database", text(&other)], &["text.sqlite", "database"]);
+}

@@ -2,7 +2,7 @@ use crate::kit::succeed;
 
 #[test]
 fn every_subcommand_explains_itself() {
-    let options: [(&str, &[&str]); 10] = [
+    let options: [(&str, &[&str]); 11] = [
         (
             "render",
             &[
@@ -35,7 +35,8 @@ fn every_subcommand_explains_itself() {
                 "--tone-mapping",
             ],
         ),
-        ("train", &["--corpus", "--table", "--out", "--save-table", "--sigma"]),
+        ("explore", &["IMAGE", "--model", "--threshold", "--audience", "--database", "--table", "--listen"]),
+        ("train", &["--corpus", "--table", "--out", "--save-table", "--sigma", "--disagreements"]),
         ("evaluate", &["--corpus", "--model", "--leave-one-scene-out", "--json", "--csv"]),
         ("audience", &["fit"]),
         ("reproduce", &["--corpus", "--out", "--edge", "--levels", "--dump-subset"]),

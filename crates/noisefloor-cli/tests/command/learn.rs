@@ -1,5 +1,8 @@
-use crate::kit::{column, json, random, run, succeed, text};
+use crate::kit::{column, fail, json, random, run, succeed, text};
+use noisefloor::Evidence;
+use noisefloor_exr::table::read_table;
 use noisefloor_exr::{RenderLayers, write_exr, write_png};
+use noisefloor_study::explore::{Disagreements, Said};
 use serde_json::Value;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -196,6 +199,57 @@ fn train_inspect_evaluate() {
     let difference =
         json(&scores)["error_factor"].as_f64().unwrap() - left_out["error_factor"].as_f64().unwrap();
     assert!(difference.abs() < 1e-4, "{difference}");
+}
+
+/// What `explore` has kept is learned beside the table: the model differs, and what it costs is said.
+#[test]
+fn disagreements_are_learned_beside_the_table() {
+    let corpora = Corpora::new();
+    let [model, saved, database] =
+        ["my.nfm", "table.csv", "explore.sqlite"].map(|name| corpora.folder.path().join(name));
+    let mut args = corpora.args("train");
+    args.extend(["--out", text(&model), "--save-table", text(&saved), "--no-scores"]);
+    succeed(&args);
+    let plain = std::fs::read(&model).unwrap();
+
+    let kept = Disagreements::open(&database).unwrap();
+    let learn = ["train", "--table", text(&saved), "--c", "1", "--gamma", "0.01,0.03", "--out", text(&model)];
+    let learn = [&learn[..], &["--disagreements", text(&database)]].concat();
+    fail(&learn, &["explore.sqlite", "none of 0 disagreements"]);
+    let table = read_table(std::fs::File::open(&saved).unwrap()).unwrap();
+    // Noise is seen where the table's people were far beyond their threshold.
+    let clean = table.zones[0].levels.last().unwrap();
+    for x in 0..2 {
+        let said = Said {
+            picture: "a picture".into(),
+            name: "a.png".into(),
+            scene: "mine".into(),
+            spp: clean.spp,
+            tile: [64 * x, 0, 64, 64],
+            sees_noise: true,
+            probability: 0.99,
+            threshold: 0.9,
+            audience: [1.0, 0.0],
+            model: "another".into(),
+            descriptor: table.descriptor,
+            descriptor_version: table.descriptor.version(),
+            evidence: if x == 0 { table.evidence } else { Evidence::Alone },
+            numbers: clean.descriptor.clone(),
+        };
+        kept.keep(&said).unwrap();
+    }
+    let said = succeed(&learn);
+    for words in [
+        "before on left-out scenes",
+        "after  on left-out scenes",
+        "of 1 disagreements, the verdict is right for 0 before",
+    ] {
+        assert!(said.contains(words), "{words:?} is not in\n{said}");
+    }
+    assert_ne!(std::fs::read(&model).unwrap(), plain);
+    assert!(succeed(&["inspect", text(&model)]).contains("1 answers about tiles of mine"));
+    fail(&[&learn[..9], &["--disagreements", text(&saved)]].concat(), &["table.csv", "database"]);
+    assert_eq!(run(&[&learn[..], &["--no-scores"]].concat()).status.code(), Some(2));
 }
 
 #[test]

@@ -112,7 +112,7 @@ pub fn read_table(from: impl Read) -> Result<Table, TableError> {
     if zones.is_empty() {
         return Err(bad(3, "the table has no zones"));
     }
-    Ok(Table { descriptor, evidence, tone_mapping, zones })
+    Ok(Table { descriptor, evidence, tone_mapping, zones, answers: Vec::new() })
 }
 
 fn parse(record: &StringRecord) -> Result<(Zone, Level), String> {

@@ -7,7 +7,7 @@ use crate::config::{Protocol, Texts};
 use crate::event::Envelope;
 use crate::session::{Session, Stage, Trial};
 use axum::Json;
-use axum::body::{Body, to_bytes};
+use axum::body::{Body, Bytes, to_bytes};
 use axum::extract::rejection::PathRejection;
 use axum::extract::{ConnectInfo, Path, State};
 use axum::http::header::{CACHE_CONTROL, CONTENT_DISPOSITION, CONTENT_TYPE};
@@ -41,7 +41,7 @@ pub struct StudyView {
 }
 
 /// The shape of a stack.
-#[derive(Debug, Serialize, Deserialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct StackView {
     /// Width in pixels.
     pub width: usize,
@@ -254,20 +254,28 @@ fn counted<T>(app: &App, peer: SocketAddr, result: Result<T, Refusal>) -> Result
 }
 
 /// Reads a body of bearable length as JSON.
-async fn read<T: DeserializeOwned>(body: Body) -> Result<T, Refusal> {
-    let refuse = |status, what: String, do_: &str| Err(Refusal::new(status, what, "body", do_));
-    let bytes = match tokio::time::timeout(BODY_TIME, to_bytes(body, MAX_BODY)).await {
-        Err(_) => {
-            return refuse(StatusCode::REQUEST_TIMEOUT, "the body did not come".into(), "send it at once");
-        }
-        Ok(Err(_)) => {
-            let what = format!("the body is cut short, or longer than {MAX_BODY} bytes");
-            return refuse(StatusCode::PAYLOAD_TOO_LARGE, what, "send one event at a time");
-        }
-        Ok(Ok(bytes)) => bytes,
-    };
-    serde_json::from_slice(&bytes).or_else(|error| {
+pub(crate) async fn read<T: DeserializeOwned>(body: Body) -> Result<T, Refusal> {
+    let bytes = read_bytes(body, MAX_BODY, BODY_TIME, "send one event at a time").await?;
+    serde_json::from_slice(&bytes).map_err(|error| {
         let what = format!("not the JSON expected: {error}");
-        refuse(StatusCode::BAD_REQUEST, what, "docs/study.md lists what is sent")
+        Refusal::new(StatusCode::BAD_REQUEST, what, "body", "docs/study.md lists what is sent")
     })
+}
+
+/// Reads a body of at most `most` bytes; `instead` is what to do if it is longer.
+pub(crate) async fn read_bytes(
+    body: Body,
+    most: usize,
+    time: Duration,
+    instead: &str,
+) -> Result<Bytes, Refusal> {
+    let refuse = |status, what: String, do_: &str| Err(Refusal::new(status, what, "body", do_));
+    match tokio::time::timeout(time, to_bytes(body, most)).await {
+        Err(_) => refuse(StatusCode::REQUEST_TIMEOUT, "the body did not come".into(), "send it at once"),
+        Ok(Err(_)) => {
+            let what = format!("the body is cut short, or longer than {most} bytes");
+            refuse(StatusCode::PAYLOAD_TOO_LARGE, what, instead)
+        }
+        Ok(Ok(bytes)) => Ok(bytes),
+    }
 }

@@ -1,6 +1,5 @@
 //! What every request is checked for before anything looks at it: that it means this server, and comes from its own pages.
 
-use super::App;
 use super::reply::Refusal;
 use axum::extract::{ConnectInfo, Request, State};
 use axum::http::header::{CONTENT_TYPE, HOST, HeaderName, HeaderValue, ORIGIN};
@@ -74,12 +73,12 @@ impl Guard {
 
 /// Refuses requests that mean another host, or come from another page.
 pub(crate) async fn check(
-    State(app): State<Arc<App>>,
+    State(guard): State<Arc<Guard>>,
     ConnectInfo(peer): ConnectInfo<SocketAddr>,
     request: Request,
     next: Next,
 ) -> Response {
-    match foreign(&app.guard, peer.ip(), &request) {
+    match foreign(&guard, peer.ip(), &request) {
         Some(refusal) => refusal.into_response(),
         None => next.run(request).await,
     }
@@ -88,8 +87,7 @@ pub(crate) async fn check(
 fn foreign(guard: &Guard, peer: IpAddr, request: &Request) -> Option<Refusal> {
     let headers = request.headers();
     let Some(host) = guard.knows(headers.get(HOST)) else {
-        let do_ =
-            "open the address that `noisefloor study serve` printed, or name this host with --allow-host";
+        let do_ = "open the address that `noisefloor` printed, or name this host with --allow-host";
         return Some(Refusal::new(
             StatusCode::MISDIRECTED_REQUEST,
             "this server does not go by that name",
@@ -111,13 +109,16 @@ fn foreign(guard: &Guard, peer: IpAddr, request: &Request) -> Option<Refusal> {
         ));
     }
     let writes = !matches!(*request.method(), Method::GET | Method::HEAD);
-    let json = headers.get(CONTENT_TYPE).is_some_and(|t| t.as_bytes().starts_with(b"application/json"));
-    if writes && request.method() != Method::DELETE && !json {
-        // Forms of other sites cannot send this type without being asked first
+    // Forms of other sites cannot send these types without being asked first
+    let safe = ["application/json", "application/octet-stream"];
+    let typed = headers
+        .get(CONTENT_TYPE)
+        .is_some_and(|t| safe.iter().any(|s| t.as_bytes().starts_with(s.as_bytes())));
+    if writes && request.method() != Method::DELETE && !typed {
         let do_ = "send JSON, with Content-Type: application/json";
         return Some(Refusal::new(
             StatusCode::UNSUPPORTED_MEDIA_TYPE,
-            "the body is not declared as JSON",
+            "the body is declared neither as JSON nor as a picture",
             "Content-Type",
             do_,
         ));

@@ -1,9 +1,9 @@
 //! The server: pages, pictures and events over HTTP, for this machine alone unless it is told otherwise.
 
-mod api;
-mod guard;
+pub(crate) mod api;
+pub(crate) mod guard;
 mod pages;
-mod reply;
+pub(crate) mod reply;
 mod tiles;
 
 pub use api::{Beginning, SessionView, StackView, StudyView};
@@ -38,7 +38,7 @@ pub(crate) struct App {
     store: Store,
     live: Mutex<HashMap<String, Live>>,
     tiles: TileCache,
-    guard: guard::Guard,
+    guard: Arc<guard::Guard>,
 }
 
 /// A server that listens, and is yet to be run.
@@ -63,7 +63,7 @@ impl Server {
         let app = Arc::new(App {
             grids: session::grids(&study),
             tiles: TileCache::new(study.clone()),
-            guard: guard::Guard::new(address, names),
+            guard: Arc::new(guard::Guard::new(address, names)),
             live: Mutex::default(),
             store,
             study,
@@ -100,7 +100,7 @@ fn router(app: Arc<App>) -> Router {
         .route("/api/tiles/{stack}/{level}/{tile}", get(api::tile))
         .fallback(api::nothing_here)
         .method_not_allowed_fallback(api::wrong_method)
-        .layer(from_fn_with_state(app.clone(), guard::check))
+        .layer(from_fn_with_state(app.guard.clone(), guard::check))
         .layer(from_fn(guard::head))
         .with_state(app)
 }

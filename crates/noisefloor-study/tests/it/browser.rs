@@ -1,9 +1,17 @@
-use crate::kit::{Running, levels, stack};
+use crate::explore::table;
+use crate::kit::{Running, Served, levels, stack};
+use noisefloor::evaluation::{predict, score};
+use noisefloor::training::{TrainParams, train};
+use noisefloor::{DEFAULT_THRESHOLD, Descriptor, Evidence};
+use noisefloor_exr::table::describe_corpora;
+use noisefloor_study::analysis::files::{Threshold, write};
 use noisefloor_study::analysis::{Options, analyse};
-use noisefloor_study::{Study, store};
-use std::path::Path;
+use noisefloor_study::explore::Setup;
+use noisefloor_study::simulated::{Public, SimulatedObserver};
+use noisefloor_study::{Event, StackView, Study, Trial, store};
+use std::path::{Path, PathBuf};
 use std::process::Command;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 use tempfile::TempDir;
 
 /// Levels of the stacks that the browser is shown.
@@ -60,8 +68,20 @@ fn browser() -> Option<()> {
     None
 }
 
-/// Whole sessions by mouse and by keyboard alone, in two sizes and languages: browser/test.mjs. Simulated observers look at the real pages; what
-/// they clicked is what the analysis finds.
+/// Runs a file of the browser's tests, which must pass; one at a time, since each has a Chromium of its own.
+fn run(file: &str, environment: &[(&str, &str)]) {
+    static TURN: Mutex<()> = Mutex::new(());
+    let _turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("browser");
+    let mut node = Command::new("node");
+    node.args(["--test", "--test-reporter=spec", file]).current_dir(folder).envs(environment.iter().copied());
+    let output = node.output().unwrap();
+    let said = String::from_utf8_lossy(&output.stdout).into_owned();
+    println!("{said}{}", String::from_utf8_lossy(&output.stderr));
+    assert!(output.status.success(), "the browser's tests failed; what they said is above");
+}
+
+/// Whole sessions by mouse and by keyboard alone, in two sizes and languages: browser/test.mjs. What was clicked is what the analysis finds.
 #[test]
 fn observers_use_the_pages_in_a_browser() {
     if browser().is_none() {
@@ -73,16 +93,9 @@ fn observers_use_the_pages_in_a_browser() {
         ("FORCED", study("forced-choice", "")),
     ];
     let servers: Vec<Running> = studies.iter().map(|(_, (_, study))| Running::start(study.clone())).collect();
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("browser");
-    let mut node = Command::new("node");
-    node.args(["--test", "--test-reporter=spec", "test.mjs"]).current_dir(folder);
-    for ((name, _), server) in studies.iter().zip(&servers) {
-        node.env(name, &server.url);
-    }
-    let output = node.output().unwrap();
-    let said = String::from_utf8_lossy(&output.stdout).into_owned();
-    println!("{said}{}", String::from_utf8_lossy(&output.stderr));
-    assert!(output.status.success(), "the browser's tests failed; what they said is above");
+    let urls: Vec<(&str, &str)> =
+        studies.iter().zip(&servers).map(|((name, _), server)| (*name, server.url.as_str())).collect();
+    run("test.mjs", &urls);
 
     // What was clicked: two observers left the six tiles at levels 1 to 6 (by mouse) and at 2 (by keyboard).
     let study = &studies[0].1.1;
@@ -100,4 +113,108 @@ fn observers_use_the_pages_in_a_browser() {
     assert_eq!(stops, [vec![1, 2, 3, 4, 5, 6], vec![2; 6]]);
     let conditions = replayed[0].conditions.unwrap();
     assert!((conditions.pixels_per_mm - 324.0 / 85.6).abs() < 1e-9 && conditions.distance_mm == 600.0);
+}
+
+/// A stack whose last picture's name says nothing, and a picture of another size, on the page of `explore`: browser/explore.test.mjs.
+#[test]
+fn pictures_are_explored_in_a_browser() {
+    if browser().is_none() {
+        return;
+    }
+    let dir = tempfile::tempdir().unwrap();
+    let folder = dir.path().join("hall");
+    stack(&folder, (384, 256), &[50, 1200, 6400, 12800]);
+    std::fs::rename(folder.join("12800.png"), folder.join("last.png")).unwrap();
+    stack(&dir.path().join("other"), (64, 64), &[50]);
+    let files: Vec<PathBuf> =
+        ["00050.png", "01200.png", "06400.png", "last.png"].iter().map(|name| folder.join(name)).collect();
+    let files =
+        serde_json::json!({ "stack": files, "other": dir.path().join("other/00050.png") }).to_string();
+    let server =
+        Served::explorer(Setup { table: Some(table()), ..Setup::new(dir.path().join("explore.sqlite")) });
+    run("explore.test.mjs", &[("EXPLORER", &format!("http://{}", server.address)), ("STACK", &files)]);
+}
+
+/// Tiles that an observer clicks, in order, at one showing of a stack.
+fn clicks(observer: &mut SimulatedObserver, stack: u32, stacks: &[StackView]) -> Vec<u32> {
+    let tiles = (stacks[0].width / stacks[0].tile) * (stacks[0].height / stacks[0].tile);
+    let trial = Trial::Acquisition { number: 1, practice: false, stack, levels: vec![0; tiles] };
+    let events = observer.respond(&trial, stacks);
+    let tile = |event: &Event| match event {
+        Event::Step { tile, .. } => Some(*tile),
+        _ => None,
+    };
+    events.iter().filter_map(tile).collect()
+}
+
+/// Simulated observers, with thresholds, a slope, lapses and a bias, click through the real pages in Chromium; what the server kept, the analysis
+/// takes apart: the known thresholds lie within its intervals; and of its corpus a model is trained that predicts them.
+#[test]
+fn simulated_observers_drive_the_pages_and_a_model_learns_from_them() {
+    const OBSERVERS: u64 = 8;
+    if browser().is_none() {
+        return;
+    }
+    let dir = tempfile::tempdir().unwrap();
+    let levels = levels(14, 1.45);
+    let mut text = "protocol = \"acquisition\"\ndatabase = \"answers.sqlite\"\ntile = 64\n\
+        [text.en]\ntitle = \"Walls\"\nconsent = \"I take part.\"\n"
+        .to_owned();
+    for name in ["wall", "door"] {
+        stack(&dir.path().join(name), (128, 128), &levels);
+        text += &format!("[[stack]]\nname = \"{name}\"\nfolder = \"{name}\"\n");
+    }
+    std::fs::write(dir.path().join("study.toml"), text).unwrap();
+    let study = Arc::new(Study::open(dir.path().join("study.toml")).unwrap());
+
+    // What each observer does at each of the two showings of each stack, by src/simulated.
+    let thresholds = vec![vec![100.0, 140.0, 200.0, 280.0], vec![120.0, 160.0, 220.0, 260.0]];
+    let public = Public { thresholds, between: 0.25, within: 0.1, lapse: 0.01, bias: 0.1 };
+    let view = StackView { width: 128, height: 128, tile: 64, levels: levels.clone() };
+    let views = [view.clone(), view];
+    let decisions: Vec<Vec<Vec<Vec<u32>>>> = (0..OBSERVERS)
+        .map(|seed| {
+            let mut observer = public.draw(100 + seed);
+            let mut showings = |stack| (0..2).map(|_| clicks(&mut observer, stack, &views)).collect();
+            vec![showings(0), showings(1)]
+        })
+        .collect();
+    let file = dir.path().join("decisions.json");
+    std::fs::write(&file, serde_json::to_string(&decisions).unwrap()).unwrap();
+    let server = Running::start(study.clone());
+    run("simulated.test.mjs", &[("SIMULATED", &server.url), ("DECISIONS", file.to_str().unwrap())]);
+
+    // Everything that was decided was clicked, and is what was kept.
+    let records = store::read_all(&study.database, &study.design()).unwrap();
+    let steps = |event: &&noisefloor_study::Envelope| matches!(event.event, Event::Step { .. });
+    let kept: usize = records.iter().map(|r| r.events.iter().filter(steps).count()).sum();
+    assert_eq!(kept, decisions.iter().flatten().flatten().flatten().count());
+
+    // The thresholds that the observers were made of, bias included, lie within the intervals.
+    let report = analyse(&study, Options { keep_outliers: true, seed: 1, simulated: false }).unwrap();
+    assert_eq!((report.observers.len() as u64, report.tiles.len()), (OBSERVERS, 8));
+    let (mut level95, mut means) = (0, 0.0);
+    for (i, tile) in report.tiles.iter().enumerate() {
+        let truth = public.quantile(i / 4, i % 4, 0.95) * public.bias.exp();
+        let [low, high] = tile.level95_interval.unwrap();
+        level95 += usize::from((low..=high).contains(&truth));
+        means += (tile.median / (public.thresholds[i / 4][i % 4] * public.bias.exp())).ln() / 8.0;
+        println!("tile {i}: {truth:.0} in {low:.0} to {high:.0}? median {:.0}", tile.median);
+    }
+    // Of 8 intervals that hold the truth in 92 of 100 cases at least, three or more miss it 2 times in 100; the draw is seeded.
+    assert!(level95 >= 6, "{level95} of 8");
+    // Eight observers of scale 0.27: their median is known to 0.27·2/√8 = 0.19, times 3.
+    assert!(f64::abs(means) < 0.57, "{means}");
+
+    // Of the corpus, a model.
+    let out = dir.path().join("out");
+    write(&out, &study, &report, Threshold::Level95).unwrap();
+    let table =
+        describe_corpora(&[out.join("corpus")], Descriptor::default(), Evidence::Halves, |_, _| ()).unwrap();
+    assert_eq!((table.groups().len(), table.zones.len()), (2, 8));
+    let model = train(&table, &TrainParams::default(), "simulated".into(), None).unwrap();
+    let learned: Vec<_> = table.zones.iter().map(|z| predict(&model, DEFAULT_THRESHOLD, z)).collect();
+    let scores = score(learned.iter());
+    println!("{scores:?}");
+    assert!(scores.error_factor < 1.6, "{scores:?}");
 }

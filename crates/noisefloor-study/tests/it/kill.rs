@@ -1,4 +1,5 @@
 use crate::kit::{Folder, levels, public};
+use noisefloor_study::explore::{Explorer, Setup};
 use noisefloor_study::simulated::drive;
 use noisefloor_study::{Server, Study, store};
 use std::io::{BufRead, BufReader};
@@ -23,11 +24,30 @@ fn serve_for_another_process() {
     });
 }
 
+/// Not a test: an explorer, likewise.
+#[test]
+fn explore_for_another_process() {
+    let Some(dir) = std::env::var_os(STUDY).map(std::path::PathBuf::from) else { return };
+    let pictures = [100, 400, 1600].map(|spp| dir.join(format!("wall/{spp:05}.png"))).to_vec();
+    let setup = Setup { pictures, tile: 64, ..Setup::new(dir.join("explore.sqlite")) };
+    let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build().unwrap();
+    runtime.block_on(async {
+        let server = Explorer::bind(setup, ([127, 0, 0, 1], 0).into(), &[]).await.unwrap();
+        println!("\nserving http://{}", server.address());
+        server.run(std::future::pending()).await.unwrap();
+    });
+}
+
 /// The server in a process of its own, and its address.
 pub(crate) fn process(folder: &Folder) -> (std::process::Child, String) {
+    start("kill::serve_for_another_process", &folder.file)
+}
+
+/// This program again, as one of the servers above, and its address.
+pub(crate) fn start(what: &str, of: &std::path::Path) -> (std::process::Child, String) {
     let mut child = Command::new(std::env::current_exe().unwrap())
-        .args(["--exact", "kill::serve_for_another_process", "--nocapture"])
-        .env(STUDY, &folder.file)
+        .args(["--exact", what, "--nocapture"])
+        .env(STUDY, of)
         .stdout(Stdio::piped())
         .spawn()
         .unwrap();

@@ -1,7 +1,10 @@
 use noisefloor_exr::write_png;
+use noisefloor_study::explore::{Explorer, Setup};
 use noisefloor_study::simulated::Public;
 use noisefloor_study::{Server, Study};
-use std::net::SocketAddr;
+use serde_json::Value;
+use std::io::{Read, Write};
+use std::net::{SocketAddr, TcpStream};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::thread::JoinHandle;
@@ -117,5 +120,96 @@ pub(crate) fn public(stacks: usize, thresholds: &[f64]) -> Public {
         within: 0.1,
         lapse: 0.01,
         bias: 0.0,
+    }
+}
+
+/// An explorer in a thread of its own, or wherever it listens.
+pub(crate) struct Served {
+    pub(crate) address: SocketAddr,
+    stop: Option<oneshot::Sender<()>>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Served {
+    pub(crate) fn explorer(setup: Setup) -> Self {
+        let (stop, stopped) = oneshot::channel::<()>();
+        let (tell, told) = std::sync::mpsc::channel();
+        let thread = std::thread::spawn(move || {
+            let runtime =
+                tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build().unwrap();
+            runtime.block_on(async {
+                let server = Explorer::bind(setup, ([127, 0, 0, 1], 0).into(), &[]).await.unwrap();
+                tell.send(server.address()).unwrap();
+                server.run(async { drop(stopped.await) }).await.unwrap();
+            });
+        });
+        Self { address: told.recv().unwrap(), stop: Some(stop), thread: Some(thread) }
+    }
+
+    /// Sends bytes with these headers; status, headers in lower case, body.
+    pub(crate) fn raw(&self, method: &str, path: &str, headers: &str, body: &[u8]) -> (u16, String, Vec<u8>) {
+        let host =
+            if headers.contains("host:") { String::new() } else { format!("host: {}\r\n", self.address) };
+        let length = if headers.contains("content-length") {
+            String::new()
+        } else {
+            format!("content-length: {}\r\n", body.len())
+        };
+        let head = format!("{method} {path} HTTP/1.1\r\n{host}connection: close\r\n{length}{headers}\r\n");
+        let mut stream = TcpStream::connect(self.address).unwrap();
+        stream.set_read_timeout(Some(std::time::Duration::from_secs(60))).unwrap();
+        // The server may answer and close before it has read everything
+        drop(stream.write_all(&[head.as_bytes(), body].concat()));
+        let mut bytes = Vec::new();
+        drop(stream.read_to_end(&mut bytes));
+        let end = bytes.windows(4).position(|w| w == b"\r\n\r\n").unwrap_or(bytes.len());
+        let head = String::from_utf8_lossy(&bytes[..end]).to_lowercase();
+        let status = head.split(' ').nth(1).and_then(|s| s.parse().ok()).unwrap_or(0);
+        let body = bytes.get(end + 4..).unwrap_or_default().to_vec();
+        (status, head, body)
+    }
+
+    fn json(&self, method: &str, path: &str, body: &str) -> (u16, Value) {
+        let (status, _, body) = self.raw(method, path, "content-type: application/json\r\n", body.as_bytes());
+        (status, serde_json::from_slice(&body).unwrap_or(Value::Null))
+    }
+
+    pub(crate) fn get(&self, path: &str) -> Value {
+        let (status, value) = self.json("GET", path, "");
+        assert_eq!(status, 200, "{path}: {value}");
+        value
+    }
+
+    pub(crate) fn post(&self, path: &str, body: &Value) -> (u16, Value) {
+        self.json("POST", path, &body.to_string())
+    }
+
+    pub(crate) fn put(&self, path: &str, body: &Value) -> (u16, Value) {
+        self.json("PUT", path, &body.to_string())
+    }
+
+    pub(crate) fn delete(&self, path: &str) -> (u16, Value) {
+        self.json("DELETE", path, "")
+    }
+}
+
+impl Drop for Served {
+    fn drop(&mut self) {
+        drop(self.stop.take());
+        if let Some(thread) = self.thread.take() {
+            drop(thread.join());
+        }
+    }
+}
+
+/// An explorer in a process of its own, to be killed.
+pub(crate) struct Picturing;
+
+impl Picturing {
+    /// Of the pictures in `dir`/wall, with `dir`/explore.sqlite.
+    pub(crate) fn process(dir: &Path) -> (std::process::Child, Served) {
+        let (child, url) = crate::kill::start("kill::explore_for_another_process", dir);
+        let address = url.strip_prefix("http://").unwrap().parse().unwrap();
+        (child, Served { address, stop: None, thread: None })
     }
 }

@@ -12,6 +12,9 @@ mod chain;
 /// How often the analysis' intervals hold the truth.
 #[cfg(test)]
 mod coverage;
+/// One's own pictures: verdicts, disagreements, and learning from them.
+#[cfg(test)]
+mod explore;
 /// A server that is killed has lost nothing that it acknowledged.
 #[cfg(test)]
 mod kill;

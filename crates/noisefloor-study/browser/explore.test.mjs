@@ -1,0 +1,206 @@
+// One's own pictures in Chromium, at an explorer that the Rust test `browser` starts.
+
+import { test } from "node:test";
+import assert from "node:assert/strict";
+import { readFileSync } from "node:fs";
+import { basename } from "node:path";
+import { LARGE, SMALL, accessible, open, shot } from "./kit.mjs";
+
+const { EXPLORER, STACK } = process.env;
+/** Files of a stack, and one of another size. */
+const { stack, other } = JSON.parse(STACK);
+
+/** Drops files on the page, as the file manager does. */
+async function drop(page, paths) {
+  const files = paths.map((path) => ({ name: basename(path), base64: readFileSync(path).toString("base64") }));
+  const transfer = await page.evaluateHandle((files) => {
+    const made = new DataTransfer();
+    for (const { name, base64 } of files) made.items.add(new File([Uint8Array.from(atob(base64), (c) => c.charCodeAt(0))], name));
+    return made;
+  }, files);
+  await page.dispatchEvent("#drop", "dragover", { dataTransfer: transfer });
+  await page.dispatchEvent("#drop", "drop", { dataTransfer: transfer });
+}
+
+const tile = (page, n) => page.locator("#tiles button").nth(n);
+const label = (page, n) => tile(page, n).getAttribute("aria-label");
+const state = (page) => page.evaluate(async () => (await fetch("/api/state")).json());
+const kept = async (page) => (await state(page)).disagreements;
+const until = async (what, condition) => {
+  for (let i = 0; i < 400; i += 1) {
+    if (await condition()) return;
+    await new Promise((go) => setTimeout(go, 25));
+  }
+  assert.fail(what);
+};
+
+/** Nothing of the tests before. */
+async function empty(page) {
+  await page.evaluate(async () => {
+    await fetch("/api/pictures", { method: "DELETE" });
+    for (let id = 1; id < 60; id += 1) await fetch(`/api/disagreements/${id}`, { method: "DELETE" });
+  });
+  await page.reload();
+  await page.getByText("Judge pictures of your own").waitFor();
+}
+
+test("pictures are dropped, judged and disagreed with by mouse, in a small window", async (t) => {
+  const { page } = await open(t, EXPLORER, SMALL, { refusals: true });
+  await empty(page);
+  await accessible(page, "empty");
+  await shot(page, "explore-empty");
+
+  // One alone says what is missing; another size is refused; then the stack
+  await drop(page, [stack[0]]);
+  await page.getByRole("alert").getByText("nothing to hold the picture against").waitFor();
+  await accessible(page, "one picture");
+  await shot(page, "explore-alone");
+  await drop(page, [other]);
+  await page.getByRole("alert").getByText("different sizes").waitFor();
+  await drop(page, stack.slice(1));
+  await page.getByText("tiles have converged at").waitFor();
+  assert.ok(await page.getByRole("alert").isHidden());
+  const tiles = await page.locator("#tiles button").count();
+  assert.equal(tiles, 6);
+  await accessible(page, "judged");
+  await shot(page, "explore-small");
+
+  // The levels of the stack: noisy first, converged last
+  const summary = () => page.locator("#summary").textContent();
+  assert.match(await summary(), /^0 of 6 tiles have converged at 50 spp/);
+  await page.locator("#level").fill(String(stack.length - 2));
+  await page.getByText(`6 of 6 tiles have converged at`).waitFor();
+  await page.locator("#level").fill("0");
+  await page.getByText("0 of 6").waitFor();
+
+  // The threshold changes verdicts at once, and the audience what is needed
+  const probability = async () => Number(/P (\d\.\d+)/.exec(await label(page, 0))[1]);
+  const need = async () => Number(/, (\d+) spp predicted/.exec(await label(page, 0))?.[1]);
+  const before = await need();
+  await page.locator("#audience").selectOption("line");
+  await page.locator("#slope").fill("2");
+  await until("a harder audience needs more", async () => (await need()) > 1.8 * before);
+  await page.locator("#audience").selectOption("observers");
+  await until("the observers need as much as before", async () => (await need()) === before);
+  await page.locator("#level").fill("1");
+  await page.getByText("at 1200 spp").waitFor();
+  const p = await probability();
+  assert.ok(p > 0.05 && p < 0.99, `P ${p}`);
+  await page.locator("#threshold").fill((Math.max(p - 0.02, 0.05)).toFixed(2));
+  await until("a lower threshold converges", async () => (await label(page, 0)).includes(": converged"));
+  await page.locator("#threshold").fill((Math.min(p + 0.02, 0.99)).toFixed(2));
+  await until("a higher one does not", async () => (await label(page, 0)).includes(": noise seen"));
+  await page.locator("#threshold").fill("0.9");
+
+  // Disagree, take back by clicking again, and by undoing
+  await until("noise at P = 0.9", async () => (await label(page, 0)).includes(": noise seen"));
+  await tile(page, 0).click();
+  await page.getByText("Kept: none is seen in tile 1.").waitFor();
+  assert.equal(await kept(page), 1);
+  await tile(page, 4).click();
+  await page.getByText("in tile 5.").waitFor();
+  await shot(page, "explore-disagreed");
+  await accessible(page, "disagreed");
+  await tile(page, 4).click();
+  await page.getByText("Taken back.").waitFor();
+  assert.equal(await kept(page), 1);
+  await page.getByRole("button", { name: "Undo" }).click();
+  await until("the answer is back", async () => (await kept(page)) === 2);
+  await page.getByRole("button", { name: "Undo" }).click();
+  await page.getByRole("button", { name: "Undo" }).click();
+  await until("nothing is kept", async () => (await kept(page)) === 0);
+  assert.ok(await page.getByRole("button", { name: "Undo" }).isDisabled());
+
+  // Layers
+  await page.getByLabel("Visible noise (key N)").check();
+  assert.ok(await page.locator("#noise").isVisible());
+  await accessible(page, "noise");
+  await shot(page, "explore-noise");
+  await page.getByLabel("Verdicts (key V)").uncheck();
+  assert.ok(await page.locator(".chip.top").first().isHidden());
+});
+
+test("everything goes by keyboard alone, in a large window", async (t) => {
+  const { page } = await open(t, EXPLORER, LARGE);
+  await empty(page);
+  const focus = async (matches) => {
+    for (let i = 0; i < 60; i += 1) {
+      const at = await page.evaluate(() => [document.activeElement?.id, document.activeElement?.getAttribute("aria-label"), document.activeElement?.textContent].join("|"));
+      if (matches.test(at)) return;
+      await page.keyboard.press("Tab");
+    }
+    assert.fail(`${matches} cannot be reached by Tab`);
+  };
+  await focus(/^files/);
+  const chooser = page.waitForEvent("filechooser");
+  await page.keyboard.press("Enter");
+  await (await chooser).setFiles(stack);
+  await page.getByText("tiles have converged at").waitFor();
+  // A name that says nothing: the samples are typed
+  await focus(/Samples per pixel of last\.png/);
+  await page.keyboard.type("12800");
+  await page.keyboard.press("Tab");
+  await until("there is one more level", async () => (await page.locator("#level").getAttribute("max")) === String(stack.length - 1));
+  await focus(/Scene, relation, tiles$/);
+  await page.keyboard.press("Enter");
+  await focus(/^scene/);
+  await page.keyboard.press("Control+A");
+  await page.keyboard.type("hall");
+  await page.keyboard.press("Tab");
+  await until("the scene has a name", async () => (await state(page)).scene === "hall");
+  await focus(/^level/);
+  await page.keyboard.press("End");
+  await page.getByText("at 12800 spp").waitFor();
+  await page.keyboard.press("Home");
+  await page.keyboard.press("ArrowRight");
+  await page.getByText("at 1200 spp").waitFor();
+  await focus(/^show-noise/);
+  await page.keyboard.press("Space");
+  assert.ok(await page.locator("#noise").isVisible());
+  await page.keyboard.press("n");
+  assert.ok(await page.locator("#noise").isHidden());
+  await focus(/\|Tile 1,/);
+  await page.keyboard.press("ArrowRight");
+  await page.keyboard.press("ArrowDown");
+  await page.keyboard.press("ArrowDown");
+  assert.match(await page.evaluate(() => document.activeElement.getAttribute("aria-label")), /^Tile 5, row 2, column 2/);
+  await page.keyboard.press("Enter");
+  await page.getByText("in tile 5.").waitFor();
+  assert.equal(await kept(page), 1);
+  assert.match(await page.evaluate(() => document.activeElement.getAttribute("aria-label")), /^Tile 5.*, you: none/);
+  await page.keyboard.press("Home");
+  await page.keyboard.press("Enter");
+  await page.getByText("in tile 4.").waitFor();
+  await page.keyboard.press("Backspace");
+  await until("one is undone", async () => (await kept(page)) === 1);
+  await shot(page, "explore-large");
+
+  // Retrain, with progress, scores before and after, and the new model in use
+  await focus(/^retrain/);
+  await page.keyboard.press("Enter");
+  await page.locator("#progress").waitFor();
+  await shot(page, "explore-working");
+  await page.getByText("People of the table").waitFor({ timeout: 120000 });
+  await accessible(page, "learned");
+  const outcome = await page.locator("#outcome").innerText();
+  assert.match(outcome, /error factor\s+×\d\.\d{3}\s+×\d\.\d{3}/);
+  assert.match(outcome, /after, having learned them\s+[01] \/ 1/);
+  assert.match(outcome, /predicted (worse now|no worse)/);
+  const asked = await label(page, 4);
+  await focus(/^use/);
+  await page.keyboard.press("Space");
+  await page.locator("#model", { hasText: "Retrained model" }).waitFor();
+  await until("the new model says something else", async () => (await label(page, 4)) !== asked);
+  await page.locator("#outcome").scrollIntoViewIfNeeded();
+  await shot(page, "explore-learned");
+  const download = page.waitForEvent("download");
+  await focus(/Save the model/);
+  await page.keyboard.press("Enter");
+  const saved = readFileSync(await (await download).path());
+  assert.equal(saved.subarray(0, 7).toString(), "NFMODEL");
+
+  // What was said is there when the page comes back, and the last outcome too
+  await page.reload();
+  await page.getByText("1 kept in explore.sqlite").waitFor();
+  await page.getByText("People of the table").waitFor();
+});

@@ -1,0 +1,90 @@
+// What the browser's tests share: one Chromium, windows that may ask nobody else, axe, screenshots.
+
+import { before, after } from "node:test";
+import assert from "node:assert/strict";
+import { createRequire } from "node:module";
+import { readFileSync, mkdirSync, mkdtempSync, rmSync } from "node:fs";
+import { tmpdir } from "node:os";
+import { join } from "node:path";
+import { chromium } from "playwright-core";
+
+const shots = process.env.NOISEFLOOR_SCREENSHOTS;
+const axe = readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8");
+export const SMALL = { width: 1024, height: 640 };
+export const LARGE = { width: 1920, height: 1080 };
+
+let browser;
+const profile = mkdtempSync(join(tmpdir(), "noisefloor-browser-"));
+
+before(async () => {
+  browser = await chromium.launch({
+    executablePath: "/usr/bin/chromium",
+    args: ["--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking", "--disable-component-update", "--disable-sync"],
+    env: { ...process.env, HOME: profile },
+  });
+  if (shots) mkdirSync(shots, { recursive: true });
+});
+after(async () => {
+  await browser.close();
+  rmSync(profile, { recursive: true, force: true });
+});
+
+/** A window of its own. Requests to any other machine, and anything written to the console as an error, fail the test;
+ * `refusals` are expected where a test asks for them. */
+export async function open(t, url, viewport, { refusals = false, ...options } = {}) {
+  const context = await browser.newContext({ viewport, locale: "en-GB", ...options });
+  const problems = [];
+  context.on("request", (request) => {
+    const to = new URL(request.url());
+    if (to.protocol !== "blob:" && to.origin !== new URL(url).origin) problems.push(`left the machine: ${to}`);
+  });
+  const page = await context.newPage();
+  watch(page, problems, refusals);
+  page.setDefaultTimeout(8000);
+  t.after(async () => {
+    await context.close();
+    assert.deepEqual(problems, []);
+  });
+  await page.goto(url);
+  return { context, page, problems };
+}
+
+export function watch(page, problems, refusals = false) {
+  page.on("pageerror", (error) => problems.push(String(error)));
+  page.on("console", (said) => {
+    const expected = /ERR_INTERNET_DISCONNECTED|404/.test(said.text()) || (refusals && /status of 422/.test(said.text()));
+    if (said.type() === "error" && !expected) problems.push(said.text());
+  });
+}
+
+export async function accessible(page, name) {
+  // The policy of the pages forbids scripts from elsewhere: axe is evaluated by the debugger
+  await page.evaluate(axe);
+  const { violations } = await page.evaluate(() => globalThis.axe.run(document, { resultTypes: ["violations"] }));
+  const found = violations.map((v) => `${v.id}: ${v.help} (${v.nodes.map((n) => n.target).join(", ")})`);
+  assert.deepEqual(found, [], name);
+}
+
+export async function shot(page, name) {
+  if (shots) await page.screenshot({ path: join(shots, `${name}.png`) });
+}
+
+export const heading = (page, text) => page.getByRole("heading", { name: text }).waitFor();
+
+/** Consent and conditions, from the first page to the first trial. `each(page, name)` looks at every page. */
+export async function arrive(page, each = async () => {}) {
+  await page.getByRole("button", { name: "Begin" }).waitFor();
+  await each(page, "welcome");
+  await page.getByRole("button", { name: "Begin" }).click();
+  await heading(page, "Before you begin");
+  await each(page, "consent");
+  assert.ok(await page.getByRole("button", { name: "Go on" }).isDisabled());
+  await page.getByLabel("I have read this").check();
+  await page.getByRole("button", { name: "Go on" }).click();
+  await heading(page, "How you see the pictures");
+  await each(page, "conditions");
+  await page.getByLabel("dim").check();
+  await page.getByRole("button", { name: "Go on" }).click();
+}
+
+export const test_picture = (page) => page.locator("canvas.picture").nth(1);

@@ -1,0 +1,256 @@
+//! Disagreements on disk. One is acknowledged after its transaction is committed with `synchronous = FULL` in a write-ahead log.
+
+use crate::error::StoreError;
+use crate::store::{now_ms, settle};
+use noisefloor::{Answer, Descriptor, Evidence};
+use rusqlite::{Connection, OpenFlags, OptionalExtension, Row, params};
+use serde::Serialize;
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+/// `PRAGMA application_id`: "nfex".
+const APPLICATION: i32 = 0x6e66_6578;
+/// `PRAGMA user_version`: of the table below.
+const VERSION: i32 = 1;
+const TABLES: &str = "
+CREATE TABLE IF NOT EXISTS disagreements (
+    id INTEGER PRIMARY KEY AUTOINCREMENT, picture TEXT NOT NULL, name TEXT NOT NULL, scene TEXT NOT NULL, spp REAL NOT NULL,
+    x INTEGER NOT NULL, y INTEGER NOT NULL, width INTEGER NOT NULL, height INTEGER NOT NULL,
+    sees_noise INTEGER NOT NULL, at_ms INTEGER NOT NULL,
+    probability REAL NOT NULL, threshold REAL NOT NULL, slope REAL NOT NULL, offset REAL NOT NULL, model TEXT NOT NULL,
+    descriptor TEXT NOT NULL, descriptor_version INTEGER NOT NULL, evidence TEXT NOT NULL, numbers TEXT NOT NULL,
+    UNIQUE (picture, x, y, width, height)
+) STRICT;";
+const COLUMNS: &str = "id, picture, name, scene, spp, x, y, width, height, sees_noise, at_ms, probability, threshold, slope, \
+    offset, model, descriptor, descriptor_version, evidence, numbers";
+
+/// What somebody said of a tile, and what the model had said.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Said {
+    /// Content of the picture, hexadecimal.
+    pub picture: String,
+    /// Its file name.
+    pub name: String,
+    /// What it shows: pictures of one scene are left out together.
+    pub scene: String,
+    /// Samples per pixel.
+    pub spp: f64,
+    /// The tile: x, y, width and height in pixels.
+    pub tile: [usize; 4],
+    /// Whether noise is seen, which the model denied; else none is.
+    pub sees_noise: bool,
+    /// P as it was shown, in [0, 1].
+    pub probability: f32,
+    /// P from which the tile would have counted as converged.
+    pub threshold: f32,
+    /// Slope and offset of the audience that P was for.
+    pub audience: [f64; 2],
+    /// Digest of the model.
+    pub model: String,
+    /// What was computed of the tile.
+    pub descriptor: Descriptor,
+    /// Version of that.
+    pub descriptor_version: u16,
+    /// What the tile was held against.
+    pub evidence: Evidence,
+    /// The raw descriptor.
+    pub numbers: Vec<f32>,
+}
+
+/// [`Said`], as it is kept.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Disagreement {
+    /// Number in the database.
+    pub id: i64,
+    /// When it was kept, in milliseconds since 1970.
+    pub at_ms: u64,
+    /// What was said.
+    #[serde(flatten)]
+    pub said: Said,
+}
+
+impl Said {
+    /// As an example to train on.
+    pub fn answer(&self) -> Answer {
+        let (group, spp) = (self.scene.clone(), self.spp);
+        Answer { group, spp, descriptor: self.numbers.clone(), sees_noise: self.sees_noise }
+    }
+
+    /// Whether tables of this kind can be trained on together with it.
+    pub fn fits(&self, descriptor: Descriptor, evidence: Evidence) -> bool {
+        (self.descriptor, self.descriptor_version, self.evidence)
+            == (descriptor, descriptor.version(), evidence)
+    }
+}
+
+/// The database, open for writing.
+#[derive(Debug)]
+pub struct Disagreements {
+    path: PathBuf,
+    connection: Mutex<Connection>,
+}
+
+impl Disagreements {
+    /// Opens the database, or makes it.
+    ///
+    /// # Errors
+    /// [`StoreError::Database`] if it cannot be opened, [`StoreError::NotDisagreements`] if it holds something else.
+    pub fn open(path: impl AsRef<Path>) -> Result<Self, StoreError> {
+        let path = path.as_ref().to_owned();
+        let failed = |source| StoreError::Database { path: path.clone(), source };
+        let connection = Connection::open(&path).map_err(failed)?;
+        let tables: i64 = connection
+            .query_row("SELECT count(*) FROM sqlite_schema", [], |row| row.get(0))
+            .map_err(failed)?;
+        if tables > 0 {
+            check(&connection, &path)?;
+        }
+        settle(&connection).map_err(failed)?;
+        connection.pragma_update(None, "application_id", APPLICATION).map_err(failed)?;
+        connection.pragma_update(None, "user_version", VERSION).map_err(failed)?;
+        connection.execute_batch(TABLES).map_err(failed)?;
+        Ok(Self { path, connection: Mutex::new(connection) })
+    }
+
+    /// Keeps what was said; when this returns, it is on disk. What was said of the tile before is replaced. Returns the number of the
+    /// disagreement, and what had been said before, if anything.
+    ///
+    /// # Errors
+    /// [`StoreError::Database`].
+    pub fn keep(&self, said: &Said) -> Result<(i64, Option<bool>), StoreError> {
+        let text = |value: serde_json::Result<String>| value.unwrap_or_default();
+        let [x, y, width, height] = said.tile;
+        let tile = params![said.picture, x, y, width, height];
+        let connection = self.connection();
+        let failed = |source| self.failed(source);
+        let transaction = connection.unchecked_transaction().map_err(failed)?;
+        let before = "SELECT sees_noise FROM disagreements \
+            WHERE picture = ?1 AND x = ?2 AND y = ?3 AND width = ?4 AND height = ?5";
+        let before = transaction.query_row(before, tile, |row| row.get(0)).optional().map_err(failed)?;
+        let insert = "INSERT OR REPLACE INTO disagreements VALUES (NULL, ?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, \
+            ?12, ?13, ?14, ?15, ?16, ?17, ?18, ?19)";
+        let row = params![
+            said.picture,
+            said.name,
+            said.scene,
+            said.spp,
+            x,
+            y,
+            width,
+            height,
+            said.sees_noise,
+            now_ms(),
+            said.probability,
+            said.threshold,
+            said.audience[0],
+            said.audience[1],
+            said.model,
+            text(serde_json::to_string(&said.descriptor)),
+            said.descriptor_version,
+            text(serde_json::to_string(&said.evidence)),
+            text(serde_json::to_string(&said.numbers)),
+        ];
+        transaction.execute(insert, row).map_err(failed)?;
+        let id = transaction.last_insert_rowid();
+        transaction.commit().map_err(failed)?;
+        Ok((id, before))
+    }
+
+    /// Names the scene of what was said of some pictures: all that show one scene are left out together, whatever it was called when they were
+    /// looked at.
+    ///
+    /// # Errors
+    /// [`StoreError::Database`].
+    pub fn name_scene(&self, pictures: &[String], scene: &str) -> Result<(), StoreError> {
+        let connection = self.connection();
+        let failed = |source| self.failed(source);
+        let transaction = connection.unchecked_transaction().map_err(failed)?;
+        for picture in pictures {
+            let update = "UPDATE disagreements SET scene = ?2 WHERE picture = ?1 AND scene <> ?2";
+            transaction.execute(update, [picture.as_str(), scene]).map_err(failed)?;
+        }
+        transaction.commit().map_err(failed)
+    }
+
+    /// Takes one back; false if it is not there.
+    ///
+    /// # Errors
+    /// [`StoreError::Database`].
+    pub fn take_back(&self, id: i64) -> Result<bool, StoreError> {
+        let deleted = self.connection().execute("DELETE FROM disagreements WHERE id = ?1", [id]);
+        deleted.map(|n| n > 0).map_err(|source| self.failed(source))
+    }
+
+    /// All of them, the oldest first.
+    ///
+    /// # Errors
+    /// [`StoreError`] if the database cannot be read.
+    pub fn all(&self) -> Result<Vec<Disagreement>, StoreError> {
+        read(&self.connection(), &self.path)
+    }
+
+    fn connection(&self) -> MutexGuard<'_, Connection> {
+        self.connection.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn failed(&self, source: rusqlite::Error) -> StoreError {
+        StoreError::Database { path: self.path.clone(), source }
+    }
+}
+
+/// All disagreements of a database, the oldest first; it may be in use meanwhile.
+///
+/// # Errors
+/// [`StoreError`] if it is not there, or holds something else.
+pub fn read_answers(path: impl AsRef<Path>) -> Result<Vec<Disagreement>, StoreError> {
+    let path = path.as_ref();
+    let flags = OpenFlags::SQLITE_OPEN_READ_WRITE | OpenFlags::SQLITE_OPEN_NO_MUTEX;
+    let opened = Connection::open_with_flags(path, flags);
+    let connection = opened.map_err(|source| StoreError::Database { path: path.to_owned(), source })?;
+    check(&connection, path)?;
+    read(&connection, path)
+}
+
+fn check(connection: &Connection, path: &Path) -> Result<(), StoreError> {
+    let pragma = |name: &str| connection.pragma_query_value(None, name, |row| row.get::<_, i32>(0));
+    let failed = |source| StoreError::Database { path: path.to_owned(), source };
+    let found = (pragma("application_id").map_err(failed)?, pragma("user_version").map_err(failed)?);
+    if found == (APPLICATION, VERSION) {
+        Ok(())
+    } else {
+        Err(StoreError::NotDisagreements { path: path.to_owned() })
+    }
+}
+
+fn read(connection: &Connection, path: &Path) -> Result<Vec<Disagreement>, StoreError> {
+    let failed = |source| StoreError::Database { path: path.to_owned(), source };
+    let query = format!("SELECT {COLUMNS} FROM disagreements ORDER BY id");
+    let mut statement = connection.prepare(&query).map_err(failed)?;
+    let rows = statement.query_map([], row).map_err(failed)?;
+    rows.collect::<rusqlite::Result<_>>().map_err(failed)
+}
+
+fn row(row: &Row<'_>) -> rusqlite::Result<Disagreement> {
+    fn json<T: serde::de::DeserializeOwned>(row: &Row<'_>, at: usize) -> rusqlite::Result<T> {
+        let text: String = row.get(at)?;
+        let bad = |e| rusqlite::Error::FromSqlConversionFailure(at, rusqlite::types::Type::Text, Box::new(e));
+        serde_json::from_str(&text).map_err(bad)
+    }
+    let said = Said {
+        picture: row.get(1)?,
+        name: row.get(2)?,
+        scene: row.get(3)?,
+        spp: row.get(4)?,
+        tile: [row.get(5)?, row.get(6)?, row.get(7)?, row.get(8)?],
+        sees_noise: row.get(9)?,
+        probability: row.get(11)?,
+        threshold: row.get(12)?,
+        audience: [row.get(13)?, row.get(14)?],
+        model: row.get(15)?,
+        descriptor: json(row, 16)?,
+        descriptor_version: row.get(17)?,
+        evidence: json(row, 18)?,
+        numbers: json(row, 19)?,
+    };
+    Ok(Disagreement { id: row.get(0)?, at_ms: row.get(10)?, said })
+}

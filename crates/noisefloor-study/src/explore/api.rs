@@ -1,0 +1,280 @@
+//! What the page begins with, and the pictures that come and go. Every answer is JSON, but for pictures and models.
+
+use super::gallery::{GalleryError, Picture, PictureView};
+use super::verdicts::Tiles;
+use super::{App, Disagreements, images};
+use crate::error::{StoreError, StudyError};
+use crate::server::api::{read, read_bytes};
+use crate::server::reply::Refusal;
+use axum::Json;
+use axum::body::Body;
+use axum::extract::rejection::PathRejection;
+use axum::extract::{Path, State};
+use axum::http::header::{CONTENT_LENGTH, CONTENT_TYPE};
+use axum::http::{HeaderMap, StatusCode};
+use axum::response::{IntoResponse, Response};
+use noisefloor::{Audience, Evidence, Samples};
+use serde::{Deserialize, Serialize};
+use std::sync::Arc;
+use std::time::Duration;
+
+/// Longest file, in bytes: a picture of the most pixels in 16-bit floats, or most of one in 32-bit ones.
+const MAX_FILE: usize = 384 << 20;
+/// Time for a file to come in.
+const FILE_TIME: Duration = Duration::from_secs(120);
+/// Longest name of a file or a scene, in bytes.
+const MAX_NAME: usize = 200;
+
+pub(crate) type Answer = Result<Response, Refusal>;
+pub(crate) type Shared = State<Arc<App>>;
+pub(crate) type Named = Result<Path<String>, PathRejection>;
+
+impl From<GalleryError> for Refusal {
+    fn from(error: GalleryError) -> Self {
+        let status = match &error {
+            GalleryError::Gone => StatusCode::NOT_FOUND,
+            _ => StatusCode::UNPROCESSABLE_ENTITY,
+        };
+        let do_ = match &error {
+            GalleryError::Gone => "load the page again",
+            GalleryError::NoSamples(_) => "type the number beside its name",
+            GalleryError::Still(noisefloor::StillError::Nothing) => {
+                "drop another rendering of the same view beside it; or start with --model and a model that was trained with `--evidence alone`"
+            }
+            GalleryError::Many | GalleryError::Large => "take some away",
+            _ => "see `noisefloor judge --help` for what pictures can be held against each other",
+        };
+        Self::new(status, error.to_string(), "pictures", do_)
+    }
+}
+
+pub(crate) fn refuse(what: impl Into<String>, place: &str, do_: &str) -> Refusal {
+    Refusal::new(StatusCode::UNPROCESSABLE_ENTITY, what, place, do_)
+}
+
+pub(crate) fn gone(place: &str) -> Refusal {
+    Refusal::new(StatusCode::NOT_FOUND, "there is no such thing", place, "load the page again")
+}
+
+/// Everything that the page begins with.
+#[derive(Serialize)]
+struct StateView {
+    pictures: Vec<PictureView>,
+    scene: String,
+    /// As it was named, if it was.
+    named: Option<String>,
+    tile: usize,
+    /// `nested`, `independent`, or null to tell it from the pictures.
+    samples: Option<&'static str>,
+    threshold: f32,
+    audience: [f64; 2],
+    art_students: [f64; 2],
+    model: ModelView,
+    retrained: bool,
+    /// Disagreements kept.
+    disagreements: usize,
+    database: String,
+    /// Whether there is a table to retrain on.
+    table: bool,
+}
+
+#[derive(Serialize)]
+struct ModelView {
+    digest: String,
+    corpus: String,
+    evidence: Evidence,
+}
+
+/// `GET /api/state`
+pub(crate) async fn state(State(app): Shared) -> Answer {
+    let disagreements = kept(&app, |kept| kept.all().map(|all| all.len())).await?;
+    let (gallery, setup) = (app.gallery().clone(), &app.setup);
+    let Audience { slope, offset } = setup.audience;
+    let students = Audience::ART_STUDENTS;
+    Ok(Json(StateView {
+        pictures: gallery.pictures.iter().map(Picture::view).collect(),
+        scene: gallery.scene(),
+        named: gallery.named.clone(),
+        tile: gallery.tile,
+        samples: gallery.samples.map(|s| if s == Samples::Nested { "nested" } else { "independent" }),
+        threshold: setup.threshold,
+        audience: [slope, offset],
+        art_students: [students.slope, students.offset],
+        model: ModelView {
+            digest: setup.model.digest(),
+            corpus: setup.model.record.corpus.clone(),
+            evidence: setup.model.evidence,
+        },
+        retrained: app.job().model().is_some(),
+        disagreements,
+        database: setup.database.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned()),
+        table: setup.table.is_some(),
+    })
+    .into_response())
+}
+
+/// `POST /api/pictures/{name}`: the file as it is.
+pub(crate) async fn add(State(app): Shared, name: Named, headers: HeaderMap, body: Body) -> Answer {
+    let name = name.map(|Path(name)| name).unwrap_or_default();
+    if name.is_empty() || name.len() > MAX_NAME || name.chars().any(|c| c.is_control() || c == '/') {
+        return Err(refuse(
+            format!("a file name of 1 to {MAX_NAME} bytes is needed"),
+            "path",
+            "rename the file",
+        ));
+    }
+    let announced = headers.get(CONTENT_LENGTH).and_then(|n| n.to_str().ok()?.parse::<u64>().ok());
+    if announced.is_some_and(|n| n > MAX_FILE as u64) {
+        let what = format!("{name} is longer than {MAX_FILE} bytes");
+        return Err(Refusal::new(StatusCode::PAYLOAD_TOO_LARGE, what, "body", "crop the picture"));
+    }
+    // Memory for one file, however many are sent at once
+    let _turn = app.incoming.lock().await;
+    let bytes = read_bytes(body, MAX_FILE, FILE_TIME, "crop the picture").await?;
+    let (worker, of) = (app.clone(), name.clone());
+    let work = move || -> Result<String, Refusal> {
+        let unreadable = |error: &dyn std::fmt::Display, folder: &std::path::Path| {
+            // Where it lay meanwhile is of no use to anyone
+            let said = error.to_string().replace(&format!("{}/", folder.display()), "");
+            refuse(said, "body", "PNG, EXR and PFM files can be read")
+        };
+        let folder = tempfile::tempdir()
+            .map_err(|e| refuse(e.to_string(), "disk", "make room for temporary files"))?;
+        let path = folder.path().join(&of);
+        std::fs::write(&path, &bytes).map_err(|e| unreadable(&e, folder.path()))?;
+        drop(bytes);
+        let picture = Picture::read(&path).map_err(|e| unreadable(&e, folder.path()))?;
+        let id = picture.id.clone();
+        worker.gallery().add(picture)?;
+        Ok(id)
+    };
+    let id = blocking(work).await??;
+    let gallery = app.gallery();
+    let view = gallery.pictures.iter().find(|p| p.id == id).map(Picture::view);
+    Ok((StatusCode::CREATED, Json(view.ok_or_else(|| gone("pictures"))?)).into_response())
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Change {
+    spp: f64,
+}
+
+/// `PUT /api/pictures/{id}`: how many samples per pixel it was made of.
+pub(crate) async fn change(State(app): Shared, id: Named, body: Body) -> Answer {
+    let Path(id) = id.map_err(|_| gone("pictures"))?;
+    let Change { spp } = read(body).await?;
+    app.gallery().set_spp(&id, spp)?;
+    state(State(app)).await
+}
+
+/// `DELETE /api/pictures/{id}`
+pub(crate) async fn remove(State(app): Shared, id: Named) -> Answer {
+    let Path(id) = id.map_err(|_| gone("pictures"))?;
+    app.gallery().remove(&id)?;
+    state(State(app)).await
+}
+
+/// `DELETE /api/pictures`
+pub(crate) async fn clear(State(app): Shared) -> Answer {
+    app.gallery().clear();
+    state(State(app)).await
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Arrangement {
+    tile: usize,
+    samples: Option<String>,
+    scene: Option<String>,
+}
+
+/// `PUT /api/arrangement`
+pub(crate) async fn arrange(State(app): Shared, body: Body) -> Answer {
+    let Arrangement { tile, samples, scene } = read(body).await?;
+    let samples = match samples.as_deref() {
+        None => None,
+        Some("nested") => Some(Samples::Nested),
+        Some("independent") => Some(Samples::Independent),
+        Some(_) => {
+            return Err(refuse("samples are nested, independent, or null", "samples", "choose one of them"));
+        }
+    };
+    let scene = scene.map(|s| s.trim().to_owned()).filter(|s| !s.is_empty());
+    if scene.as_ref().is_some_and(|s| s.len() > MAX_NAME || s.chars().any(char::is_control)) {
+        return Err(refuse(format!("a name of at most {MAX_NAME} bytes is needed"), "scene", "shorten it"));
+    }
+    app.gallery().arrange(tile, samples, scene)?;
+    state(State(app)).await
+}
+
+/// `GET /api/pictures/{id}/shown.png`
+pub(crate) async fn shown(State(app): Shared, id: Named) -> Answer {
+    let tiles = tiles(&app, id).await?;
+    png(move || images::shown(&tiles)).await
+}
+
+/// `GET /api/pictures/{id}/noise.png`
+pub(crate) async fn noise(State(app): Shared, id: Named) -> Answer {
+    let tiles = tiles(&app, id).await?;
+    if tiles.noise.is_none() {
+        return Err(Refusal::new(
+            StatusCode::NOT_FOUND,
+            "this model has no map of visible noise",
+            "model",
+            "use one with the compact descriptor",
+        ));
+    }
+    png(move || images::noise(&tiles).unwrap_or_else(|| Ok(Vec::new()))).await
+}
+
+async fn png(make: impl FnOnce() -> Result<Vec<u8>, image::ImageError> + Send + 'static) -> Answer {
+    let broken = |e: image::ImageError| refuse(e.to_string(), "pictures", "load the page again");
+    let bytes = blocking(make).await?.map_err(broken)?;
+    Ok(([(CONTENT_TYPE, "image/png")], bytes).into_response())
+}
+
+async fn tiles(app: &Arc<App>, id: Named) -> Result<Arc<Tiles>, Refusal> {
+    let Path(id) = id.map_err(|_| gone("pictures"))?;
+    describe(app, &id).await
+}
+
+/// The tiles of a picture; whoever asks while they are described waits.
+pub(crate) async fn describe(app: &Arc<App>, id: &str) -> Result<Arc<Tiles>, Refusal> {
+    let (worker, id) = (app.clone(), id.to_owned());
+    let work = move || {
+        let gallery = worker.gallery().clone();
+        worker.judged.blocking_lock().tiles(&gallery, &id, &worker.setup.model)
+    };
+    Ok(blocking(work).await??)
+}
+
+/// Runs work on the database, where it may wait for the disk.
+pub(crate) async fn kept<T: Send + 'static>(
+    app: &Arc<App>,
+    work: impl FnOnce(&Disagreements) -> Result<T, StoreError> + Send + 'static,
+) -> Result<T, Refusal> {
+    let kept = app.kept.clone();
+    Ok(blocking(move || work(&kept)).await??)
+}
+
+pub(crate) async fn blocking<T: Send + 'static>(
+    work: impl FnOnce() -> T + Send + 'static,
+) -> Result<T, Refusal> {
+    let ended = |_| {
+        let what = "the work ended early";
+        Refusal::new(
+            StatusCode::INTERNAL_SERVER_ERROR,
+            what,
+            "server",
+            "look at what `noisefloor explore` printed",
+        )
+    };
+    tokio::task::spawn_blocking(work).await.map_err(ended)
+}
+
+impl From<StudyError> for Refusal {
+    fn from(error: StudyError) -> Self {
+        refuse(error.to_string(), "pictures", "see docs/explore.md")
+    }
+}

@@ -1,0 +1,192 @@
+//! Verdicts, what people say against them, and retraining.
+
+use super::App;
+use super::answers::Said;
+use super::api::{Answer, Named, Shared, describe, gone, kept, refuse};
+use super::gallery::{GalleryError, Picture};
+use super::job::{self, Job};
+use super::learn::Step;
+use super::verdicts::{Answered, Judge, Question};
+use crate::server::api::read;
+use crate::server::reply::Refusal;
+use axum::Json;
+use axum::body::Body;
+use axum::extract::{Path, State};
+use axum::http::StatusCode;
+use axum::http::header::{CONTENT_DISPOSITION, CONTENT_TYPE};
+use axum::response::{IntoResponse, Response};
+use noisefloor::Model;
+use serde::{Deserialize, Serialize};
+use std::collections::HashMap;
+
+/// The model in use: the given one, or the retrained one.
+fn model(app: &App, retrained: bool) -> Result<Model, Refusal> {
+    if !retrained {
+        return Ok(app.setup.model.clone());
+    }
+    let model = app.job().model().cloned().ok_or_else(|| gone("retrained"))?;
+    let given = &app.setup.model;
+    if (model.descriptor, model.evidence) != (given.descriptor, given.evidence) {
+        let what =
+            "the retrained model goes by another descriptor or evidence than the one this was started with";
+        return Err(refuse(what, "retrained", "save it, and start again with --model"));
+    }
+    Ok(model)
+}
+
+fn judge(app: &App, question: &Question) -> Result<Judge, Refusal> {
+    let model = model(app, question.retrained)?;
+    let made = Judge::new(model, question.threshold, question.audience);
+    made.map_err(|what| refuse(what, "threshold", "P lies between 0 and 1, an audience line rises"))
+}
+
+/// `POST /api/verdicts`
+pub(crate) async fn verdicts(State(app): Shared, body: Body) -> Answer {
+    let question: Question = read(body).await?;
+    let judge = judge(&app, &question)?;
+    let tiles = describe(&app, &question.picture).await?;
+    let id = question.picture.clone();
+    let all = kept(&app, |kept| kept.all()).await?;
+    let here = all.into_iter().filter(|d| d.said.picture == id);
+    let said: HashMap<[usize; 4], Answered> =
+        here.map(|d| (d.said.tile, Answered { id: d.id, sees_noise: d.said.sees_noise })).collect();
+    let picture = picture(&app, &id)?;
+    let view = judge.view(&picture, &tiles, &said);
+    Ok(Json(view.map_err(|what| refuse(what, "audience", "choose the observers of the training data"))?)
+        .into_response())
+}
+
+fn picture(app: &App, id: &str) -> Result<Picture, Refusal> {
+    app.gallery().pictures.iter().find(|p| p.id == id).cloned().ok_or_else(|| GalleryError::Gone.into())
+}
+
+/// What somebody says of a tile, on a verdict that was shown.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Disagreeing {
+    question: Question,
+    tile: usize,
+    sees_noise: bool,
+}
+
+#[derive(Serialize)]
+struct Kept {
+    id: i64,
+    /// What had been said of the tile before.
+    before: Option<bool>,
+    disagreements: usize,
+}
+
+/// `POST /api/disagreements`: what the model said is computed here, not believed.
+pub(crate) async fn disagree(State(app): Shared, body: Body) -> Answer {
+    let Disagreeing { question, tile, sees_noise } = read(body).await?;
+    let judge = judge(&app, &question)?;
+    let tiles = describe(&app, &question.picture).await?;
+    let picture = picture(&app, &question.picture)?;
+    let scene = app.gallery().scene();
+    let verdicts = judge.verdicts(&tiles).map_err(|what| refuse(what, "audience", "choose another"))?;
+    let (Some(verdict), Some(numbers)) = (verdicts.get(tile), judge.numbers(&tiles, tile)) else {
+        return Err(gone("tile"));
+    };
+    let (descriptor, evidence) = judge.kind();
+    let at = tiles.grid.tile(tile);
+    let said = Said {
+        picture: picture.id,
+        name: picture.name,
+        scene,
+        spp: tiles.spp,
+        tile: [at.x, at.y, at.width, at.height],
+        sees_noise,
+        probability: verdict.probability.unwrap_or(0.0),
+        threshold: question.threshold,
+        audience: question.audience,
+        model: judge.oracle.model().digest(),
+        descriptor,
+        descriptor_version: descriptor.version(),
+        evidence,
+        numbers,
+    };
+    let here = here(&app);
+    let done = kept(&app, move |kept| {
+        kept.name_scene(&here.0, &here.1)?;
+        let (id, before) = kept.keep(&said)?;
+        Ok(Kept { id, before, disagreements: kept.all()?.len() })
+    });
+    Ok((StatusCode::CREATED, Json(done.await?)).into_response())
+}
+
+/// `DELETE /api/disagreements/{id}`
+pub(crate) async fn take_back(State(app): Shared, id: Named) -> Answer {
+    let id = id.ok().and_then(|Path(id)| id.parse::<i64>().ok()).ok_or_else(|| gone("disagreement"))?;
+    if kept(&app, move |kept| kept.take_back(id)).await? {
+        Ok(StatusCode::NO_CONTENT.into_response())
+    } else {
+        Err(gone("disagreement"))
+    }
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Retraining {
+    threshold: f32,
+}
+
+/// `POST /api/retrain`
+pub(crate) async fn retrain(State(app): Shared, body: Body) -> Answer {
+    let Retraining { threshold } = read(body).await?;
+    if !(threshold > 0.0 && threshold < 1.0) {
+        return Err(refuse("P lies between 0 and 1", "threshold", "move the slider"));
+    }
+    let Some(table) = app.setup.table.clone() else {
+        let do_ = "start `noisefloor explore --table FILE`, with fixtures/human-table.csv of the project or what `train --save-table` wrote";
+        return Err(refuse("there is no table of human thresholds to train on", "table", do_));
+    };
+    let here = here(&app);
+    let all = kept(&app, move |kept| {
+        kept.name_scene(&here.0, &here.1)?;
+        kept.all()
+    });
+    let all = all.await?;
+    let fitting = all.iter().filter(|d| d.said.fits(table.descriptor, table.evidence));
+    let answers: Vec<_> = fitting.map(|d| d.said.answer()).collect();
+    if answers.is_empty() {
+        return Err(refuse(
+            "there is nothing to learn yet",
+            "disagreements",
+            "disagree with a verdict first",
+        ));
+    }
+    {
+        let mut job = app.job();
+        if job.is_running() {
+            let what = "the model is being retrained already";
+            return Err(Refusal::new(StatusCode::CONFLICT, what, "retrain", "wait until it is done"));
+        }
+        *job = Job::Running(Step { done: 0, of: 1, doing: "beginning".into() });
+    }
+    job::begin(app.job.clone(), table, answers, app.setup.model.clone(), threshold);
+    Ok((StatusCode::ACCEPTED, Json(app.job().view())).into_response())
+}
+
+/// `GET /api/retrain`
+pub(crate) async fn progress(State(app): Shared) -> Response {
+    Json(app.job().view()).into_response()
+}
+
+/// `GET /api/retrained.nfm`
+pub(crate) async fn retrained(State(app): Shared) -> Answer {
+    let model = app.job().model().cloned().ok_or_else(|| gone("retrained"))?;
+    let mut file = Vec::new();
+    model.write(&mut file).map_err(|e| refuse(e.to_string(), "model", "train it again"))?;
+    let head = [
+        (CONTENT_TYPE, "application/octet-stream"),
+        (CONTENT_DISPOSITION, "attachment; filename=\"retrained.nfm\""),
+    ];
+    Ok((head, file).into_response())
+}
+
+/// The pictures that are looked at, and the scene they show as it is named by now.
+fn here(app: &App) -> (Vec<String>, String) {
+    let gallery = app.gallery();
+    (gallery.pictures.iter().map(|p| p.id.clone()).collect(), gallery.scene())
+}

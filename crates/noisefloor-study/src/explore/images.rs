@@ -1,0 +1,36 @@
+//! Pictures and maps as PNG files.
+
+use super::verdicts::Tiles;
+use image::codecs::png::{CompressionType, FilterType, PngEncoder};
+use image::{ExtendedColorType, ImageEncoder, ImageError};
+
+/// The scale of `noisefloor judge --noise-map`: visible noise from 1 to 16 steps, logarithmic.
+const SCALE: [f32; 2] = [1.0, 16.0];
+
+/// The picture as it is displayed.
+pub(crate) fn shown(tiles: &Tiles) -> Result<Vec<u8>, ImageError> {
+    let byte = |c: &f32| (c.clamp(0.0, 1.0) * 255.0).round() as u8;
+    encode(tiles, tiles.shown.iter().flatten().map(byte).collect())
+}
+
+/// The map of visible noise; `None` if the descriptor has none.
+pub(crate) fn noise(tiles: &Tiles) -> Option<Result<Vec<u8>, ImageError>> {
+    let span = (SCALE[1] / SCALE[0]).ln();
+    let colour = |value: &f32| {
+        let place = ((value.max(f32::MIN_POSITIVE) / SCALE[0]).ln() / span).clamp(0.0, 1.0);
+        colorous::INFERNO.eval_continuous(f64::from(place)).as_array()
+    };
+    Some(encode(tiles, tiles.noise.as_ref()?.iter().flat_map(colour).collect()))
+}
+
+fn encode(tiles: &Tiles, rgb: Vec<u8>) -> Result<Vec<u8>, ImageError> {
+    let (width, height) = (tiles.grid.width() as u32, tiles.grid.height() as u32);
+    let mut png = Vec::new();
+    PngEncoder::new_with_quality(&mut png, CompressionType::Fast, FilterType::Sub).write_image(
+        &rgb,
+        width,
+        height,
+        ExtendedColorType::Rgb8,
+    )?;
+    Ok(png)
+}

@@ -1,0 +1,75 @@
+//! Retraining in the background: one at a time.
+
+use super::learn::{Learned, Step, retrain};
+use noisefloor::evaluation::Table;
+use noisefloor::training::TrainParams;
+use noisefloor::{Answer, Model};
+use serde::Serialize;
+use std::sync::{Arc, Mutex, PoisonError};
+
+#[derive(Debug, Default)]
+pub(crate) enum Job {
+    #[default]
+    Idle,
+    Running(Step),
+    Failed(String),
+    Done(Box<(Model, Learned)>),
+}
+
+/// What the page knows of it.
+#[derive(Debug, Serialize)]
+#[serde(tag = "state", rename_all = "kebab-case")]
+pub(crate) enum JobView {
+    Idle,
+    Running(Step),
+    Failed { what: String },
+    Done(Box<Learned>),
+}
+
+impl Job {
+    pub(crate) fn view(&self) -> JobView {
+        match self {
+            Self::Idle => JobView::Idle,
+            Self::Running(step) => JobView::Running(step.clone()),
+            Self::Failed(what) => JobView::Failed { what: what.clone() },
+            Self::Done(done) => JobView::Done(Box::new(done.1.clone())),
+        }
+    }
+
+    pub(crate) fn is_running(&self) -> bool {
+        matches!(self, Self::Running(_))
+    }
+
+    pub(crate) fn model(&self) -> Option<&Model> {
+        match self {
+            Self::Done(done) => Some(&done.0),
+            _ => None,
+        }
+    }
+}
+
+/// Begins; the job says how far it is. It is to be marked as running before.
+pub(crate) fn begin(job: Arc<Mutex<Job>>, table: Table, answers: Vec<Answer>, model: Model, threshold: f32) {
+    let set = move |to: Job| *job.lock().unwrap_or_else(PoisonError::into_inner) = to;
+    // Not a task: who ends the server does not wait for it.
+    std::thread::spawn(move || {
+        let work = || {
+            let on_step = |step| set(Job::Running(step));
+            retrain(
+                &table,
+                answers,
+                &TrainParams::default(),
+                (&model, threshold),
+                &model.record.corpus,
+                on_step,
+            )
+        };
+        // A panic in a solver must not leave the page waiting.
+        let outcome = std::panic::catch_unwind(std::panic::AssertUnwindSafe(work));
+        set(match outcome {
+            Ok(Ok(done)) => Job::Done(Box::new(done)),
+            Ok(Err(error)) => Job::Failed(error.to_string()),
+            Err(_) => Job::Failed("the training met a contradiction and gave up".into()),
+        });
+    });
+}

@@ -1,0 +1,140 @@
+//! Learning from disagreements, and what that costs and gains.
+
+use noisefloor::evaluation::{Table, score};
+use noisefloor::training::{TrainError, TrainParams, leave_answers_out, leave_one_scene_out, train};
+use noisefloor::{Answer, DEFAULT_THRESHOLD, Model, Scores};
+use serde::Serialize;
+
+/// How many answers a model agrees with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub struct Agreement {
+    /// All answers.
+    pub of: usize,
+    /// By the model that was trained on the table alone.
+    pub before: usize,
+    /// By the model that has learned them: how well they are fitted, not how well others would be.
+    pub fitted: usize,
+    /// By models that have learned the others, but nothing of the same scene.
+    pub left_out: usize,
+}
+
+/// What retraining has changed.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Learned {
+    /// On the people of the table, each scene left out: trained on the table alone. `None` if it has too few groups of scenes.
+    pub before: Option<Scores>,
+    /// The same, with the disagreements learned as well.
+    pub after: Option<Scores>,
+    /// With the disagreements.
+    pub agreement: Agreement,
+    /// Scenes that disagreements are of.
+    pub scenes: Vec<String>,
+    /// What people's thresholds are predicted worse by now, in words; empty if nothing is.
+    pub worse: Vec<String>,
+    /// Digest of the new model.
+    pub model: String,
+}
+
+/// A part of the work.
+#[derive(Clone, Debug, Serialize)]
+pub struct Step {
+    /// Parts done.
+    pub done: usize,
+    /// Parts in all.
+    pub of: usize,
+    /// The part that begins.
+    pub doing: String,
+}
+
+/// Trains on a table together with answers, and scores both. `model` spares the half of the work if it was trained on this very table, and
+/// scored. An answer agrees if the verdict at P ≥ `threshold` is the same. Deterministic.
+///
+/// # Errors
+/// [`TrainError`] if training fails.
+pub fn retrain(
+    table: &Table,
+    answers: Vec<Answer>,
+    params: &TrainParams,
+    (model, threshold): (&Model, f32),
+    corpus: &str,
+    mut on_step: impl FnMut(Step),
+) -> Result<(Model, Learned), TrainError> {
+    let plain = Table { answers: Vec::new(), ..table.clone() };
+    let told = Table { answers, ..plain.clone() };
+    let (groups, scenes) = (plain.groups().len(), told.answer_groups().len());
+    let known =
+        Some(model).filter(|m| m.record.table_digest == plain.digest() && *params == TrainParams::default());
+    let scored = groups >= 3;
+    let known_scores = known.and_then(|m| m.record.leave_one_scene_out);
+    let folds = if scored { groups } else { 0 };
+    let of = folds * (1 + usize::from(known_scores.is_none())) + usize::from(known.is_none()) + scenes + 1;
+    let mut done = 0;
+    let mut step = |doing: String| {
+        on_step(Step { done, of, doing });
+        done += 1;
+    };
+
+    let mut people = |table: &Table, what: &str| -> Result<Option<Scores>, TrainError> {
+        if !scored {
+            return Ok(None);
+        }
+        let on_fold = |group: &str| step(format!("{what}: {group} left out"));
+        let predictions = leave_one_scene_out(table, params, DEFAULT_THRESHOLD, on_fold)?;
+        Ok(Some(score(predictions.iter())))
+    };
+    let before = match known_scores {
+        Some(scores) => Some(scores),
+        None => people(&plain, "before")?,
+    };
+    let after = people(&told, "after")?;
+    let base = match known {
+        Some(model) => model.clone(),
+        None => {
+            step("the table alone".into());
+            train(&plain, params, String::new(), None)?
+        }
+    };
+    let left_out = leave_answers_out(&told, params, |scene| step(format!("your answers: {scene} left out")))?;
+    step("the new model".into());
+    let corpus = format!(
+        "{corpus}, and {} answers about tiles of {}",
+        told.answers.len(),
+        told.answer_groups().join(", ")
+    );
+    let new = train(&told, params, corpus, after)?;
+
+    let agree = |p: &dyn Fn(usize, &Answer) -> f32| {
+        told.answers.iter().enumerate().filter(|(i, a)| a.agrees(p(*i, a), threshold)).count()
+    };
+    let agreement = Agreement {
+        of: told.answers.len(),
+        before: agree(&|_, a| a.probability(&base)),
+        fitted: agree(&|_, a| a.probability(&new)),
+        left_out: agree(&|i, _| left_out[i]),
+    };
+    let scenes = told.answer_groups().into_iter().map(str::to_owned).collect();
+    let worse = worse(before, after);
+    let learned = Learned { before, after, agreement, scenes, worse, model: new.digest() };
+    Ok((new, learned))
+}
+
+/// What has become worse by more than rounding.
+fn worse(before: Option<Scores>, after: Option<Scores>) -> Vec<String> {
+    let (Some(before), Some(after)) = (before, after) else { return Vec::new() };
+    let mut worse = Vec::new();
+    if after.error_factor > before.error_factor + 0.0005 {
+        worse.push(format!(
+            "the error factor rises from ×{:.3} to ×{:.3}",
+            before.error_factor, after.error_factor
+        ));
+    }
+    if after.early_share > before.early_share + 0.0005 {
+        let [from, to] = [before, after].map(|s| 100.0 * s.early_share);
+        worse.push(format!("{to:.1} % of zones are stopped too early, and were {from:.1} %"));
+    }
+    let off = |s: Scores| s.bias_factor.ln().abs();
+    if off(after) > off(before) + 0.005 {
+        worse.push(format!("the bias goes from ×{:.2} to ×{:.2}", before.bias_factor, after.bias_factor));
+    }
+    worse
+}

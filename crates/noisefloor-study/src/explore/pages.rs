@@ -1,0 +1,36 @@
+//! The page, inside the program.
+
+use crate::server::reply::Refusal;
+use axum::extract::Path;
+use axum::http::StatusCode;
+use axum::http::header::CONTENT_TYPE;
+use axum::response::{IntoResponse, Response};
+
+const HTML: &str = include_str!("../../pages/explore/index.html");
+const SCRIPT: &str = "text/javascript; charset=utf-8";
+/// Name, type and text of each file.
+const FILES: [(&str, &str, &str); 8] = [
+    ("explore.js", SCRIPT, include_str!("../../pages/explore/explore.js")),
+    ("grid.js", SCRIPT, include_str!("../../pages/explore/grid.js")),
+    ("learn.js", SCRIPT, include_str!("../../pages/explore/learn.js")),
+    ("server.js", SCRIPT, include_str!("../../pages/explore/server.js")),
+    ("style.css", "text/css; charset=utf-8", include_str!("../../pages/style.css")),
+    ("explore.css", "text/css; charset=utf-8", include_str!("../../pages/explore/explore.css")),
+    ("en.json", "application/json", include_str!("../../pages/explore/en.json")),
+    ("fr.json", "application/json", include_str!("../../pages/explore/fr.json")),
+];
+
+/// The one page.
+pub(crate) async fn page() -> Response {
+    ([(CONTENT_TYPE, "text/html; charset=utf-8")], HTML).into_response()
+}
+
+/// What it is made of.
+pub(crate) async fn file(Path(name): Path<String>) -> Response {
+    match FILES.iter().find(|(known, ..)| *known == name) {
+        Some((_, kind, text)) => ([(CONTENT_TYPE, *kind)], *text).into_response(),
+        None => {
+            Refusal::new(StatusCode::NOT_FOUND, "there is no such page", "path", "go to /").into_response()
+        }
+    }
+}

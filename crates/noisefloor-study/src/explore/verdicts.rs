@@ -1,0 +1,184 @@
+//! What the model says of a picture: described once, judged as often as threshold and audience change.
+
+use super::gallery::{Gallery, GalleryError, Picture};
+use noisefloor::{
+    Audience, Described, Descriptor, Evidence, Held, Model, Oracle, Rgb, Samples, Still, TileGrid,
+    ToneMapping, Verdict,
+};
+use serde::{Deserialize, Serialize};
+use std::collections::HashMap;
+use std::sync::Arc;
+
+/// A picture described.
+#[derive(Debug)]
+pub(crate) struct Tiles {
+    pub(crate) grid: TileGrid,
+    pub(crate) spp: f64,
+    pub(crate) samples: Samples,
+    pub(crate) described: Vec<Described>,
+    /// As it is displayed, row-major.
+    pub(crate) shown: Vec<Rgb>,
+    /// Visible noise in 8-bit steps, row-major; `None` if the descriptor has no map of it.
+    pub(crate) noise: Option<Vec<f32>>,
+}
+
+/// Tiles of pictures, until something changes. Described once for each kind of descriptor and evidence, which all models in use share.
+#[derive(Debug, Default)]
+pub(crate) struct Judged {
+    revision: u64,
+    tiles: HashMap<String, Arc<Tiles>>,
+}
+
+impl Judged {
+    /// The tiles of a picture of the gallery, as `model` describes them.
+    pub(crate) fn tiles(
+        &mut self,
+        gallery: &Gallery,
+        id: &str,
+        model: &Model,
+    ) -> Result<Arc<Tiles>, GalleryError> {
+        if self.revision != gallery.revision {
+            *self = Self { revision: gallery.revision, tiles: HashMap::new() };
+        }
+        if let Some(tiles) = self.tiles.get(id) {
+            return Ok(tiles.clone());
+        }
+        let tiles = Arc::new(describe(gallery, id, model)?);
+        self.tiles.insert(id.to_owned(), tiles.clone());
+        Ok(tiles)
+    }
+}
+
+fn describe(gallery: &Gallery, id: &str, model: &Model) -> Result<Tiles, GalleryError> {
+    let picture = gallery.pictures.iter().find(|p| p.id == id).ok_or(GalleryError::Gone)?;
+    let spp = picture.spp().ok_or_else(|| GalleryError::NoSamples(picture.name.clone()))?;
+    let others: Vec<&Still> =
+        gallery.pictures.iter().filter(|p| p.id != id && p.counted).map(|p| &*p.still).collect();
+    let held = Held::new(model.evidence, &picture.still, &others, ToneMapping::default(), gallery.samples)?;
+    let (width, height) = picture.still.size;
+    let grid = TileGrid::new(width, height, gallery.tile)?;
+    // The threshold counts for verdicts alone.
+    let oracle = Oracle::new(model.clone(), noisefloor::DEFAULT_THRESHOLD).map_err(|_| GalleryError::Gone)?;
+    let described = held.describe(&oracle, grid)?;
+    let noise = oracle.map_visible_noise(grid, |tile| held.planes(tile).map(Some))?;
+    Ok(Tiles { grid, spp, samples: held.samples(), described, shown: held.shown(), noise })
+}
+
+/// What is asked about a picture.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct Question {
+    pub(crate) picture: String,
+    /// P from which a tile counts as converged.
+    pub(crate) threshold: f32,
+    /// Slope and offset.
+    pub(crate) audience: [f64; 2],
+    /// Whether the retrained model is asked.
+    pub(crate) retrained: bool,
+}
+
+/// The verdict on a tile.
+#[derive(Clone, Debug, Serialize)]
+pub(crate) struct TileView {
+    pub(crate) tile: usize,
+    pub(crate) x: usize,
+    pub(crate) y: usize,
+    pub(crate) width: usize,
+    pub(crate) height: usize,
+    pub(crate) probability: f32,
+    pub(crate) converged: bool,
+    pub(crate) expected_spp: Option<u64>,
+    pub(crate) unfamiliar: bool,
+    /// What was said of it, and the number that takes it back.
+    pub(crate) said: Option<Answered>,
+}
+
+#[derive(Clone, Debug, Serialize)]
+pub(crate) struct Answered {
+    pub(crate) id: i64,
+    pub(crate) sees_noise: bool,
+}
+
+/// The verdict on a picture.
+#[derive(Debug, Serialize)]
+pub(crate) struct VerdictView {
+    pub(crate) picture: String,
+    pub(crate) spp: f64,
+    pub(crate) nested: bool,
+    pub(crate) model: String,
+    pub(crate) columns: usize,
+    pub(crate) tiles: Vec<TileView>,
+    /// Visible noise, in 8-bit steps, from which it is seen.
+    pub(crate) just_visible: Option<f32>,
+    pub(crate) has_noise_map: bool,
+}
+
+/// The model with its threshold and audience.
+#[derive(Debug)]
+pub(crate) struct Judge {
+    pub(crate) oracle: Oracle,
+    pub(crate) audience: Audience,
+}
+
+impl Judge {
+    /// `Err` says what is out of range.
+    pub(crate) fn new(model: Model, threshold: f32, [slope, offset]: [f64; 2]) -> Result<Self, String> {
+        let sound = (0.0..=100.0).contains(&slope) && (-1e9..=1e9).contains(&offset);
+        if !sound {
+            return Err(format!("the audience line T' = {slope} T + {offset} needs a slope of 0 to 100"));
+        }
+        let audience = model.audience.then(Audience { slope, offset });
+        Ok(Self { oracle: Oracle::new(model, threshold).map_err(|e| e.to_string())?, audience })
+    }
+
+    pub(crate) fn verdicts(&self, tiles: &Tiles) -> Result<Vec<Verdict>, String> {
+        let verdicts = self.oracle.judge_described_for(&tiles.described, self.audience);
+        verdicts.ok_or_else(|| {
+            let name = self.oracle.model().descriptor.name();
+            format!("a model with the {name} descriptor cannot follow an audience; use one with the compact descriptor")
+        })
+    }
+
+    /// The raw descriptor of a tile in its picture.
+    pub(crate) fn numbers(&self, tiles: &Tiles, tile: usize) -> Option<Vec<f32>> {
+        self.oracle.model().descriptor.in_picture(&tiles.described).into_iter().nth(tile)
+    }
+
+    pub(crate) fn kind(&self) -> (Descriptor, Evidence) {
+        let model = self.oracle.model();
+        (model.descriptor, model.evidence)
+    }
+
+    pub(crate) fn view(
+        &self,
+        picture: &Picture,
+        tiles: &Tiles,
+        said: &HashMap<[usize; 4], Answered>,
+    ) -> Result<VerdictView, String> {
+        let view = |(tile, verdict): (noisefloor::Tile, Verdict)| {
+            let noisefloor::Tile { index, x, y, width, height } = tile;
+            TileView {
+                tile: index,
+                x,
+                y,
+                width,
+                height,
+                probability: verdict.probability.unwrap_or(0.0),
+                converged: verdict.converged,
+                expected_spp: verdict.expected_samples,
+                unfamiliar: verdict.unfamiliar,
+                said: said.get(&[x, y, width, height]).cloned(),
+            }
+        };
+        Ok(VerdictView {
+            picture: picture.id.clone(),
+            spp: tiles.spp,
+            nested: tiles.samples == Samples::Nested,
+            model: self.oracle.model().digest(),
+            columns: tiles.grid.width().div_ceil(tiles.grid.edge()),
+            tiles: tiles.grid.tiles().zip(self.verdicts(tiles)?).map(view).collect(),
+            just_visible: self.oracle.just_visible(),
+            has_noise_map: tiles.noise.is_some(),
+        })
+    }
+}

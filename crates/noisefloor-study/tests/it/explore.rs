@@ -1,0 +1,459 @@
+use crate::kit::{Picturing, Served, stack};
+use noisefloor::evaluation::{Level, Origin, Table, Zone};
+use noisefloor::{Descriptor, Evidence, Held, Model, Oracle, Samples, Still, TileGrid, ToneMapping};
+use noisefloor_exr::read_picture;
+use noisefloor_study::explore::{Disagreements, Setup, read_answers, retrain};
+use serde_json::{Value, json};
+use std::path::Path;
+
+/// A folder with two stages and a reference of one rendering, 128×64 pixels.
+fn pictures(dir: &Path) -> Vec<std::path::PathBuf> {
+    stack(&dir.join("wall"), (128, 64), &[100, 400, 1600]);
+    [100, 400, 1600].map(|spp| dir.join(format!("wall/{spp:05}.png"))).to_vec()
+}
+
+fn setup(dir: &Path) -> Setup {
+    Setup { pictures: pictures(dir), tile: 64, ..Setup::new(dir.join("explore.sqlite")) }
+}
+
+fn question(picture: &Value) -> Value {
+    json!({ "picture": picture["id"], "threshold": 0.9, "audience": [1.0, 0.0], "retrained": false })
+}
+
+/// What `judge` computes: the picture held against the others, all tiles described and judged in their picture.
+fn judged(
+    paths: &[std::path::PathBuf],
+    spp: &[f64],
+    at: usize,
+) -> (Vec<Vec<f32>>, Vec<noisefloor::Verdict>, Samples) {
+    let still = |i: usize| read_picture(&paths[i]).unwrap().into_still(spp[i]);
+    let stills: Vec<Still> = (0..paths.len()).map(still).collect();
+    let others: Vec<&Still> = (0..paths.len()).filter(|&i| i != at).map(|i| &stills[i]).collect();
+    let held = Held::new(Evidence::Halves, &stills[at], &others, ToneMapping::default(), None).unwrap();
+    let oracle = Oracle::bundled();
+    let described = held.describe(&oracle, TileGrid::new(128, 64, 64).unwrap()).unwrap();
+    let numbers = oracle.model().descriptor.in_picture(&described);
+    (numbers, oracle.judge_described(&described), held.samples())
+}
+
+/// What the page is told of each level, and what is kept of a disagreement, is what the library says of the same files.
+#[test]
+fn verdicts_and_descriptors_are_those_of_judge() {
+    let dir = tempfile::tempdir().unwrap();
+    let server = Served::explorer(setup(dir.path()));
+    let state = server.get("/api/state");
+    let shown = state["pictures"].as_array().unwrap();
+    assert_eq!(shown.iter().map(|p| p["spp"].as_f64().unwrap()).collect::<Vec<_>>(), [100.0, 400.0, 1600.0]);
+    let paths = [100, 400, 1600].map(|spp| dir.path().join(format!("wall/{spp:05}.png")));
+    for (at, picture) in shown.iter().enumerate() {
+        let (numbers, verdicts, samples) = judged(&paths, &[100.0, 400.0, 1600.0], at);
+        let (status, said) = server.post("/api/verdicts", &question(picture));
+        assert_eq!(status, 200, "{said}");
+        assert_eq!(said["nested"], samples == Samples::Nested);
+        for (tile, verdict) in said["tiles"].as_array().unwrap().iter().zip(&verdicts) {
+            assert_eq!(tile["probability"].as_f64().unwrap() as f32, verdict.probability.unwrap());
+            assert_eq!(tile["converged"], verdict.converged);
+            assert_eq!(tile["expected_spp"].as_u64(), verdict.expected_samples);
+        }
+        let (status, kept) = server.post(
+            "/api/disagreements",
+            &json!({ "question": question(picture), "tile": 1, "sees_noise": verdicts[1].converged }),
+        );
+        assert_eq!((status, &kept["before"]), (201, &Value::Null), "{kept}");
+        let all = read_answers(dir.path().join("explore.sqlite")).unwrap();
+        let last = &all.last().unwrap().said;
+        assert_eq!(last.numbers, numbers[1]);
+        assert_eq!(last.probability, verdicts[1].probability.unwrap());
+        assert_eq!((last.tile, last.sees_noise), ([64, 0, 64, 64], verdicts[1].converged));
+        assert_eq!((last.model.clone(), last.evidence), (Model::bundled().digest(), Evidence::Halves));
+        assert!(
+            last.fits(Descriptor::default(), Evidence::Halves)
+                && !last.fits(Descriptor::default(), Evidence::Alone)
+        );
+    }
+    // Pictures are those of the files, and maps are there.
+    let id = shown[0]["id"].as_str().unwrap();
+    for which in ["shown", "noise"] {
+        let (status, head, body) = server.raw("GET", &format!("/api/pictures/{id}/{which}.png"), "", b"");
+        assert!(status == 200 && head.contains("image/png") && body.starts_with(b"\x89PNG"), "{head}");
+        std::fs::write(dir.path().join("back.png"), body).unwrap();
+        let back = read_picture(dir.path().join("back.png")).unwrap();
+        assert_eq!(back == read_picture(&paths[0]).unwrap(), which == "shown");
+    }
+}
+
+/// Both languages have the same texts with the same gaps to fill, and all that the pages name.
+#[test]
+fn texts_are_complete_in_both_languages() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("pages/explore");
+    let read = |name: &str| std::fs::read_to_string(folder.join(name)).unwrap();
+    let texts = |name: &str| -> std::collections::BTreeMap<String, String> {
+        serde_json::from_str(&read(name)).unwrap()
+    };
+    let (english, french) = (texts("en.json"), texts("fr.json"));
+    let gaps = |text: &str| {
+        let mut gaps: Vec<String> =
+            text.split('{').skip(1).filter_map(|t| Some(t.split_once('}')?.0.to_owned())).collect();
+        gaps.sort();
+        gaps
+    };
+    assert!(english.keys().eq(french.keys()));
+    assert!(english.iter().zip(&french).all(|(e, f)| gaps(e.1) == gaps(f.1)));
+    for page in ["index.html", "explore.js", "grid.js", "learn.js"] {
+        let text = read(page);
+        let after = |mark: &'static str, end: &'static [char]| {
+            let names = text.split(mark).skip(1).map(|t| t.split(end).next().unwrap().to_owned());
+            names.filter(|n| !n.is_empty()).collect::<Vec<_>>()
+        };
+        let ends: &[char] = &[' ', ',', ')', ';', '.', '`', '}', ']', ':', '"', '\n'];
+        let used = [
+            after("data-t=\"", &['"']),
+            after("data-t-label=\"", &['"']),
+            after(" t.", ends),
+            after("(t.", ends),
+        ];
+        assert!(used.concat().len() > 5, "{page}");
+        for name in used.concat() {
+            assert!(english.contains_key(&name), "{page}: {name:?}");
+        }
+    }
+}
+
+/// Threshold and audience act on what is described: a higher P, or people who look harder, leave no more tiles converged.
+#[test]
+fn threshold_and_audience_move_verdicts() {
+    let dir = tempfile::tempdir().unwrap();
+    let server = Served::explorer(setup(dir.path()));
+    let picture = server.get("/api/state")["pictures"][1].clone();
+    let ask = |threshold: f64, audience: [f64; 2]| {
+        let mut asked = question(&picture);
+        asked["threshold"] = json!(threshold);
+        asked["audience"] = json!(audience);
+        server.post("/api/verdicts", &asked)
+    };
+    let p = |said: &Value| said["tiles"][0]["probability"].as_f64().unwrap();
+    let (_, own) = ask(0.9, [1.0, 0.0]);
+    let (_, lower) = ask(p(&own) * 0.99, [1.0, 0.0]);
+    assert!(lower["tiles"][0]["converged"] == true && p(&lower) == p(&own));
+    let (_, higher) = ask((p(&own) + 1e-3).min(0.9999), [1.0, 0.0]);
+    assert_eq!(higher["tiles"][0]["converged"], false);
+    let (_, harder) = ask(0.9, [2.0, 0.0]);
+    assert!(p(&harder) < p(&own), "{harder}");
+    assert!(
+        harder["tiles"][0]["expected_spp"].as_u64().unwrap()
+            > own["tiles"][0]["expected_spp"].as_u64().unwrap()
+    );
+    for (threshold, audience) in
+        [(0.0, [1.0, 0.0]), (1.0, [1.0, 0.0]), (0.9, [-1.0, 0.0]), (0.9, [1.0, 1e300])]
+    {
+        assert_eq!(ask(threshold, audience).0, 422, "{threshold} {audience:?}");
+    }
+}
+
+/// Malformed, oversized, repeated and forged requests are refused with what, where and what to do, and leave nothing behind.
+#[test]
+fn what_does_not_fit_is_refused() {
+    let dir = tempfile::tempdir().unwrap();
+    let server = Served::explorer(setup(dir.path()));
+    let picture = server.get("/api/state")["pictures"][0].clone();
+    let refused = |answer: (u16, Value), status: u16| {
+        assert_eq!(answer.0, status, "{}", answer.1);
+        for part in ["what", "where", "what_to_do"] {
+            assert!(answer.1[part].as_str().is_some_and(|s| s.len() > 1), "{part}: {}", answer.1);
+        }
+        assert!(!answer.1.to_string().contains("/tmp"), "paths of the machine: {}", answer.1);
+    };
+    let file = |name: &str, bytes: &[u8]| {
+        let (status, _, body) = server.raw(
+            "POST",
+            &format!("/api/pictures/{name}"),
+            "content-type: application/octet-stream\r\n",
+            bytes,
+        );
+        (status, serde_json::from_slice(&body).unwrap_or(Value::Null))
+    };
+
+    // Pictures
+    refused(file("a.png", b"no picture"), 422);
+    refused(file("a.png", b""), 422);
+    let whole = std::fs::read(dir.path().join("wall/00100.png")).unwrap();
+    refused(file("a.png", &whole[..whole.len() / 2]), 422);
+    refused(file("..%2fa.png", &whole), 422);
+    refused(file("a%00.png", &whole), 422);
+    refused(file(&"a".repeat(300), &whole), 422);
+    // A header, whole but for its size, that announces 8000×8000 pixels: refused before any is allocated
+    let mut large = whole.clone();
+    large[16..24].copy_from_slice(&[0, 0, 0x1f, 0x40, 0, 0, 0x1f, 0x40]);
+    let sum = crc32(&large[12..29]);
+    large[29..33].copy_from_slice(&sum.to_be_bytes());
+    let answer = file("large.png", &large);
+    assert!(answer.1["what"].as_str().unwrap().contains("8000×8000 pixels are more than"), "{}", answer.1);
+    refused(answer, 422);
+    let long = format!("content-type: application/octet-stream\r\ncontent-length: {}\r\n", 1u64 << 40);
+    let (status, _, body) = server.raw("POST", "/api/pictures/a.png", &long, b"x");
+    refused((status, serde_json::from_slice(&body).unwrap()), 413);
+    stack(&dir.path().join("other"), (64, 64), &[50]);
+    refused(file("00050.png", &std::fs::read(dir.path().join("other/00050.png")).unwrap()), 422);
+    // The same once more is the same
+    assert_eq!(file("again.png", &whole).0, 201);
+    assert_eq!(server.get("/api/state")["pictures"].as_array().unwrap().len(), 3);
+
+    // Samples, arrangement, questions
+    let id = picture["id"].as_str().unwrap();
+    for spp in [json!(0), json!(-1), json!(1e300), json!("many"), Value::Null] {
+        let answer = server.put(&format!("/api/pictures/{id}"), &json!({ "spp": spp }));
+        assert!(answer.0 == 422 || answer.0 == 400, "{spp}: {}", answer.1);
+    }
+    refused(server.put("/api/pictures/absent", &json!({ "spp": 5 })), 404);
+    refused(server.put("/api/arrangement", &json!({ "tile": 8, "samples": null, "scene": null })), 422);
+    refused(server.put("/api/arrangement", &json!({ "tile": 64, "samples": "twice", "scene": null })), 422);
+    refused(
+        server.put("/api/arrangement", &json!({ "tile": 64, "samples": null, "scene": "x".repeat(500) })),
+        422,
+    );
+    refused(server.post("/api/verdicts", &json!({ "picture": id })), 400);
+    refused(server.post("/api/verdicts", &question(&json!({ "id": "absent" }))), 404);
+    let mut unknown = question(&picture);
+    unknown["retrained"] = json!(true);
+    refused(server.post("/api/verdicts", &unknown), 404);
+    refused(server.post("/api/verdicts", &json!("x".repeat(20_000))), 413);
+
+    // Disagreements: what the model said cannot be sent along, and tiles have to be there
+    let said = json!({ "question": question(&picture), "tile": 2, "sees_noise": true });
+    refused(server.post("/api/disagreements", &said), 404);
+    let forged = json!({ "question": question(&picture), "tile": 0, "sees_noise": true, "probability": 1.0, "numbers": [0.0] });
+    refused(server.post("/api/disagreements", &forged), 400);
+    refused(server.delete("/api/disagreements/1"), 404);
+    refused(server.delete("/api/disagreements/one"), 404);
+    assert_eq!(server.get("/api/state")["disagreements"], 0);
+    // Said twice, it is one; the other way round, it is changed; and taken back once
+    let yes = json!({ "question": question(&picture), "tile": 0, "sees_noise": true });
+    let no = json!({ "question": question(&picture), "tile": 0, "sees_noise": false });
+    let (_, first) = server.post("/api/disagreements", &yes);
+    let (_, second) = server.post("/api/disagreements", &yes);
+    let (_, third) = server.post("/api/disagreements", &no);
+    let before = [&first["before"], &second["before"], &third["before"]];
+    assert_eq!(before, [&Value::Null, &json!(true), &json!(true)]);
+    assert_eq!(
+        (&third["disagreements"], server.get("/api/state")["disagreements"].clone()),
+        (&json!(1), json!(1))
+    );
+    refused(server.delete(&format!("/api/disagreements/{}", first["id"])), 404);
+    assert_eq!(server.delete(&format!("/api/disagreements/{}", third["id"])).0, 204);
+    refused(server.delete(&format!("/api/disagreements/{}", third["id"])), 404);
+
+    // Retraining without a table, without answers; models that are not there
+    refused(server.post("/api/retrain", &json!({ "threshold": 0.9 })), 422);
+    refused(server.post("/api/retrain", &json!({ "threshold": 2 })), 422);
+    let (status, _, body) = server.raw("GET", "/api/retrained.nfm", "", b"");
+    refused((status, serde_json::from_slice(&body).unwrap()), 404);
+
+    // Other sites and hosts
+    for (headers, status) in [
+        ("content-type: application/json\r\norigin: http://evil.example\r\n", 403),
+        ("content-type: application/json\r\nsec-fetch-site: cross-site\r\n", 403),
+        ("content-type: application/json\r\nhost: evil.example\r\n", 421),
+        ("content-type: text/plain\r\n", 415),
+        ("", 415),
+    ] {
+        let (got, head, body) = server.raw("POST", "/api/disagreements", headers, yes.to_string().as_bytes());
+        refused((got, serde_json::from_slice(&body).unwrap()), status);
+        assert!(head.contains("content-security-policy: default-src 'none'"), "{head}");
+    }
+    assert_eq!(server.get("/api/state")["disagreements"], 0);
+}
+
+/// The checksum of a PNG's chunk.
+fn crc32(bytes: &[u8]) -> u32 {
+    let bit = |crc: u32| if crc & 1 == 1 { 0xedb8_8320 ^ (crc >> 1) } else { crc >> 1 };
+    !bytes.iter().fold(!0u32, |crc, &byte| (0..8).fold(crc ^ u32::from(byte), |crc, _| bit(crc)))
+}
+
+/// A single picture has nothing to be held against, and is told what is missing; a model that looks at pictures alone judges it.
+#[test]
+fn a_single_picture_is_told_what_is_missing() {
+    let dir = tempfile::tempdir().unwrap();
+    let one = || vec![pictures(dir.path())[0].clone()];
+    let server = Served::explorer(Setup { pictures: one(), ..setup(dir.path()) });
+    let picture = server.get("/api/state")["pictures"][0].clone();
+    let (status, said) = server.post("/api/verdicts", &question(&picture));
+    assert_eq!(status, 422);
+    assert!(said["what"].as_str().unwrap().contains("converged reference"), "{said}");
+    assert!(said["what_to_do"].as_str().unwrap().contains("--evidence alone"), "{said}");
+
+    let model = Model { evidence: Evidence::Alone, ..Model::bundled() };
+    let server = Served::explorer(Setup { pictures: one(), model, ..setup(dir.path()) });
+    let (status, said) = server.post("/api/verdicts", &question(&picture));
+    assert_eq!(status, 200, "{said}");
+    assert_eq!(said["tiles"].as_array().unwrap().len(), 2);
+}
+
+/// Renaming the scene renames what was said of its pictures: it is left out as one.
+#[test]
+fn answers_follow_the_name_of_their_scene() {
+    let dir = tempfile::tempdir().unwrap();
+    let server = Served::explorer(setup(dir.path()));
+    let pictures = server.get("/api/state")["pictures"].clone();
+    let disagree = |at: usize| {
+        let said = json!({ "question": question(&pictures[at]), "tile": 0, "sees_noise": true });
+        assert_eq!(server.post("/api/disagreements", &said).0, 201);
+    };
+    disagree(0);
+    let scenes = || {
+        let all = read_answers(dir.path().join("explore.sqlite")).unwrap();
+        all.into_iter().map(|d| d.said.scene).collect::<Vec<_>>()
+    };
+    assert!(scenes()[0].starts_with("picture-"), "{:?}", scenes());
+    let named = server.put("/api/arrangement", &json!({ "tile": 64, "samples": null, "scene": "hall" }));
+    assert_eq!((named.0, &named.1["scene"]), (200, &json!("hall")));
+    disagree(1);
+    assert_eq!(scenes(), ["hall", "hall"]);
+}
+
+/// Killed (SIGKILL) right after the acknowledgement: the disagreement is there.
+#[test]
+fn a_killed_explorer_has_lost_nothing() {
+    let dir = tempfile::tempdir().unwrap();
+    pictures(dir.path());
+    let mut kept = 0;
+    for round in 0..3u64 {
+        let (mut child, server) = Picturing::process(dir.path());
+        let picture = server.get("/api/state")["pictures"][round as usize].clone();
+        for tile in 0..2 {
+            let said = json!({ "question": question(&picture), "tile": tile, "sees_noise": tile == 0 });
+            let (status, answer) = server.post("/api/disagreements", &said);
+            assert_eq!(status, 201, "{answer}");
+            kept += 1;
+        }
+        child.kill().unwrap();
+        child.wait().unwrap();
+        let all = read_answers(dir.path().join("explore.sqlite")).unwrap();
+        assert_eq!(all.len(), kept);
+        assert_eq!((all[kept - 2].said.sees_noise, all[kept - 1].said.sees_noise), (true, false));
+    }
+}
+
+/// Other databases are not touched.
+#[test]
+fn a_database_of_something_else_is_refused() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("other.sqlite");
+    let other = rusqlite::Connection::open(&path).unwrap();
+    other.execute_batch("CREATE TABLE mine (n INTEGER); PRAGMA user_version = 7;").unwrap();
+    for error in
+        [Disagreements::open(&path).map(drop).unwrap_err(), read_answers(&path).map(drop).unwrap_err()]
+    {
+        assert!(error.to_string().contains("--database"), "{error}");
+    }
+    std::fs::write(&path, "text").unwrap();
+    assert!(Disagreements::open(&path).is_err());
+    assert!(read_answers(dir.path().join("absent.sqlite")).is_err());
+    assert!(!dir.path().join("absent.sqlite").exists(), "reading makes no database");
+}
+
+/// Four scenes where people stop at an even noise of 2 steps.
+pub(crate) fn table() -> Table {
+    let descriptor = Descriptor::default();
+    let mut random = fastrand::Rng::with_seed(5);
+    let mut zone = |scene: usize, zone: u32| {
+        let texture = 1.0 + random.f32();
+        let human_spp = 100.0 * (1.0 + 9.0 * f64::from(random.f32()));
+        let level = |i: i32| {
+            let spp = 20.0 * 1.4f64.powi(i);
+            let noise = 2.0 * (human_spp / spp).sqrt() as f32;
+            let descriptor = vec![noise.ln(), texture, 2.0 * texture, noise.ln(), texture, 2.0 * texture];
+            Level { spp, origin: Origin::Real, noise, descriptor }
+        };
+        let (name, levels) = (format!("Scene{scene}"), (0..18).map(level).collect());
+        Zone {
+            scene: name.clone(),
+            group: name,
+            zone,
+            human_spp,
+            censored: false,
+            first_spp: 20.0,
+            last_spp: 6000.0,
+            levels,
+        }
+    };
+    let zones = (0..4).flat_map(|s| (0..5).map(move |z| (s, z))).map(|(s, z)| zone(s, z)).collect();
+    let tone_mapping = ToneMapping::Srgb { exposure: 1.0 };
+    Table { descriptor, evidence: Evidence::Halves, tone_mapping, zones, answers: Vec::new() }
+}
+
+/// Learned in the background, on the server: P of the tile that was disagreed with moves the way that was said, scores come with it, and
+/// are the same as those of the library and of another time.
+#[test]
+fn retraining_moves_p_and_says_what_it_costs() {
+    let dir = tempfile::tempdir().unwrap();
+    let server = Served::explorer(Setup { table: Some(table()), ..setup(dir.path()) });
+    let (status, said) = server.post("/api/retrain", &json!({ "threshold": 0.9 }));
+    assert!(status == 422 && said["where"] == "disagreements", "{said}");
+    let state = server.get("/api/state");
+    let picture = &state["pictures"][0];
+    let disagree = |tile: usize, sees_noise: bool| {
+        let said = json!({ "question": question(picture), "tile": tile, "sees_noise": sees_noise });
+        assert_eq!(server.post("/api/disagreements", &said).0, 201);
+    };
+    let learn = || {
+        let (status, begun) = server.post("/api/retrain", &json!({ "threshold": 0.9 }));
+        assert!(status == 202 && begun["state"] == "running", "{begun}");
+        let begun = std::time::Instant::now();
+        loop {
+            let now = server.get("/api/retrain");
+            match now["state"].as_str() {
+                Some("done") => return now,
+                Some("running") => {
+                    assert!(now["done"].as_u64() <= now["of"].as_u64(), "{now}");
+                    assert!(begun.elapsed().as_secs() < 300);
+                    std::thread::sleep(std::time::Duration::from_millis(20));
+                }
+                _ => panic!("{now}"),
+            }
+        }
+    };
+    let p = |tile: usize| {
+        let mut asked = question(picture);
+        asked["retrained"] = json!(true);
+        server.post("/api/verdicts", &asked).1["tiles"][tile]["probability"].as_f64().unwrap()
+    };
+    disagree(0, true);
+    disagree(1, true);
+    let noisy = learn();
+    let seen = p(0);
+    disagree(0, false);
+    disagree(1, false);
+    let clean = learn();
+    let unseen = p(0);
+    // P is far below the threshold at 100 samples: odds, not differences
+    let odds = |p: f64| p / (1.0 - p);
+    assert!(odds(unseen) > 1.5 * odds(seen), "{seen} if noise is seen, {unseen} if none is");
+
+    // Of one scene alone: left out, nothing was learned.
+    for learned in [&noisy, &clean] {
+        let a = &learned["agreement"];
+        assert_eq!((&a["of"], &a["left_out"]), (&json!(2), &a["before"]), "{learned}");
+        assert!(a["fitted"].as_u64() >= a["before"].as_u64(), "{learned}");
+        assert!(
+            learned["before"]["error_factor"].as_f64().unwrap() >= 1.0 && learned["before"]["zones"] == 20
+        );
+        let worse = learned["after"]["error_factor"].as_f64()
+            > learned["before"]["error_factor"].as_f64().map(|e| e + 0.0005);
+        let said =
+            learned["worse"].as_array().unwrap().iter().any(|w| w.as_str().unwrap().contains("error factor"));
+        assert_eq!(worse, said, "{learned}");
+    }
+    assert_eq!(noisy["before"], clean["before"]);
+    assert_eq!(clean, learn());
+
+    // The model that can be saved is the one that judged, and the library's.
+    let (status, head, file) = server.raw("GET", "/api/retrained.nfm", "", b"");
+    assert!(status == 200 && head.contains("retrained.nfm"), "{head}");
+    let model = Model::read(&file[..]).unwrap();
+    assert_eq!(model.digest(), clean["model"].as_str().unwrap());
+    let answers = read_answers(dir.path().join("explore.sqlite")).unwrap();
+    let answers = answers.iter().map(|d| d.said.answer()).collect();
+    let (bundled, params) = (Model::bundled(), Default::default());
+    let again = retrain(&table(), answers, &params, (&bundled, 0.9), &bundled.record.corpus, |_| ()).unwrap();
+    assert_eq!(again.0.digest(), model.digest());
+}

@@ -1,0 +1,252 @@
+//! Pictures rendered elsewhere: held against each other, described and judged.
+
+use crate::criterion::CriterionError;
+use crate::descriptor::Described;
+use crate::display::{Display, ToneMapping};
+use crate::evidence::{Evidence, Rendering, Samples, TilePlanes};
+use crate::mask::NoiseMask;
+use crate::oracle::Oracle;
+use crate::source::Rgb;
+use crate::tile::{Tile, TileGrid};
+use ndarray::Array2;
+use rayon::prelude::*;
+use std::borrow::Cow;
+use thiserror::Error;
+
+/// A picture, and how many samples per pixel it was made of.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Still {
+    /// Width and height in pixels.
+    pub size: (usize, usize),
+    /// Linear radiance, row-major, width × height values, all finite.
+    pub pixels: Vec<Rgb>,
+    /// Samples per pixel, above 0.
+    pub spp: f64,
+    /// Shown as it is, not tone mapped: a PNG.
+    pub display_referred: bool,
+    /// Variance of the rounding of its display values; 0 for pictures in floating point.
+    pub rounding: f32,
+}
+
+/// Why pictures cannot be held against each other.
+#[derive(Debug, Error)]
+pub enum StillError {
+    /// The number of samples is none.
+    #[error("a positive number of samples per pixel is needed, not {0}")]
+    Spp(f64),
+    /// A pixel is no number.
+    #[error("pixel ({x}, {y}) is not finite; mend the render, or paint over it, before it is judged")]
+    NotFinite {
+        /// Its column.
+        x: usize,
+        /// Its row.
+        y: usize,
+    },
+    /// Two views, or two resolutions.
+    #[error("the pictures have different sizes, {}×{} and {}×{}", image.0, image.1, other.0, other.1)]
+    Sizes {
+        /// Of the one.
+        image: (usize, usize),
+        /// Of the other.
+        other: (usize, usize),
+    },
+    /// Shown in two ways.
+    #[error("one is a PNG and one an EXR; compare pictures of one kind")]
+    Kinds,
+    /// Two copies.
+    #[error(
+        "the pictures are the same to the last bit, so that nothing shows their noise; render one with another seed"
+    )]
+    Same,
+    /// A single picture, and a model that wants two.
+    #[error(
+        "nothing to hold the picture against: noise shows where two renderings of one view differ; give another rendering, with another seed or more samples, or a converged reference"
+    )]
+    Nothing,
+    /// Nested pictures of as many samples.
+    #[error("nested pictures of the same {0} samples per pixel are the same picture: nothing to judge by")]
+    Nested(f64),
+    /// The model does not fit the tiles.
+    #[error(transparent)]
+    Criterion(#[from] CriterionError),
+}
+
+impl Still {
+    /// Checks that samples are positive and all pixels finite.
+    ///
+    /// # Errors
+    /// [`StillError::Spp`], [`StillError::NotFinite`].
+    pub fn check(&self) -> Result<(), StillError> {
+        if !(self.spp.is_finite() && self.spp > 0.0) {
+            return Err(StillError::Spp(self.spp));
+        }
+        match self.pixels.iter().position(|p| !p.iter().all(|c| c.is_finite())) {
+            Some(bad) => Err(StillError::NotFinite { x: bad % self.size.0, y: bad / self.size.0 }),
+            None => Ok(()),
+        }
+    }
+
+    /// Checks that another picture can be held against this one.
+    ///
+    /// # Errors
+    /// [`StillError`] if size or kind differ, or nothing does.
+    pub fn fits(&self, other: &Still) -> Result<(), StillError> {
+        if self.size != other.size {
+            return Err(StillError::Sizes { image: self.size, other: other.size });
+        }
+        if self.display_referred != other.display_referred {
+            return Err(StillError::Kinds);
+        }
+        if self.pixels == other.pixels { Err(StillError::Same) } else { Ok(()) }
+    }
+
+    fn rendering(&self) -> Rendering<'_> {
+        Rendering { pixels: &self.pixels, spp: self.spp, rounding: self.rounding }
+    }
+}
+
+/// A picture and what it is held against.
+#[derive(Debug)]
+pub struct Held<'a> {
+    image: &'a Still,
+    other: Option<Cow<'a, Still>>,
+    evidence: Evidence,
+    samples: Samples,
+    display: Display,
+}
+
+impl<'a> Held<'a> {
+    /// Holds a picture against others of the same view, as a model with that evidence wants it. Independent renderings are pooled; of stages
+    /// of one rendering, and of references, the one that says most is taken. `samples` says how they were made; `None` tells it from the
+    /// pictures.
+    ///
+    /// # Errors
+    /// [`StillError`] if they do not fit, or there is nothing to hold the picture against.
+    pub fn new(
+        evidence: Evidence,
+        image: &'a Still,
+        others: &[&'a Still],
+        tone: ToneMapping,
+        samples: Option<Samples>,
+    ) -> Result<Self, StillError> {
+        others.iter().try_for_each(|other| image.fits(other))?;
+        let display = if image.display_referred { Display::SRGB } else { tone.settle(&image.pixels) };
+        let samples = samples.unwrap_or_else(|| {
+            let nested = others.iter().any(|other| shares_samples(image, other, &display));
+            if nested { Samples::Nested } else { Samples::Independent }
+        });
+        let other = match evidence {
+            Evidence::Alone => None,
+            Evidence::Halves => Some(pool(others, image.spp, samples).ok_or(StillError::Nothing)?),
+            Evidence::Reference => {
+                let cleanest = others.iter().max_by(|a, b| a.spp.total_cmp(&b.spp));
+                Some(Cow::Borrowed(*cleanest.ok_or(StillError::Nothing)?))
+            }
+        };
+        Ok(Self { image, other, evidence, samples, display })
+    }
+
+    /// Whether the pictures share samples.
+    pub fn samples(&self) -> Samples {
+        self.samples
+    }
+
+    /// How the picture is shown.
+    pub fn display(&self) -> &Display {
+        &self.display
+    }
+
+    /// The picture as displayed: sRGB-encoded, row-major.
+    pub fn shown(&self) -> Vec<Rgb> {
+        self.image.pixels.iter().map(|&p| self.display.encode(p)).collect()
+    }
+
+    /// What a tile is judged by.
+    ///
+    /// # Errors
+    /// [`StillError::Nested`] if nested pictures have as many samples.
+    pub fn planes(&self, tile: Tile) -> Result<TilePlanes, StillError> {
+        let (image, size) = (self.image, self.image.size);
+        let at = |x: usize, y: usize| y * size.0 + x;
+        let shown = |still: &Still, x, y| self.display.encode(still.pixels[at(x, y)]);
+        match (&self.other, self.evidence) {
+            (Some(other), Evidence::Halves) => {
+                let pair = (image.rendering(), other.rendering());
+                let planes = TilePlanes::from_pair(size, tile, &self.display, pair, self.samples);
+                planes.ok_or(StillError::Nested(image.spp))
+            }
+            (Some(other), _) => {
+                let planes = TilePlanes::gather(size, tile, |x, y| {
+                    let (a, b) = (shown(image, x, y), shown(other, x, y));
+                    (a, std::array::from_fn(|c| a[c] - b[c]))
+                });
+                Ok(TilePlanes { rounding: image.rounding + other.rounding, ..planes })
+            }
+            (None, _) => {
+                let planes = TilePlanes::gather(size, tile, |x, y| {
+                    let a = shown(image, x, y);
+                    (a, a)
+                });
+                Ok(TilePlanes { rounding: image.rounding, ..planes })
+            }
+        }
+    }
+
+    /// Describes all tiles, in their order, for [`Oracle::judge_described`].
+    ///
+    /// # Errors
+    /// [`StillError`] if there is nothing to judge by, or the model is for tiles of another size.
+    pub fn describe(&self, oracle: &Oracle, grid: TileGrid) -> Result<Vec<Described>, StillError> {
+        let tiles: Vec<Tile> = grid.tiles().collect();
+        let describe = |&tile: &Tile| Ok(oracle.describe(&self.planes(tile)?, self.image.spp.max(1.0))?);
+        tiles.par_iter().map(describe).collect()
+    }
+}
+
+/// Independent renderings make one of all their samples. Of nested ones, the one that differs most in its samples says most.
+fn pool<'a>(others: &[&'a Still], image_spp: f64, samples: Samples) -> Option<Cow<'a, Still>> {
+    let distance = |r: &Still| (1.0 / r.spp - 1.0 / image_spp).abs();
+    let (first, rest) = others.split_first()?;
+    if samples == Samples::Nested {
+        return others.iter().max_by(|a, b| distance(a).total_cmp(&distance(b))).map(|&o| Cow::Borrowed(o));
+    }
+    let mut all = Cow::Borrowed(*first);
+    for one in rest {
+        let all = all.to_mut();
+        let weight = (one.spp / (all.spp + one.spp)) as f32;
+        for (a, b) in all.pixels.iter_mut().flatten().zip(one.pixels.iter().flatten()) {
+            *a += (b - *a) * weight;
+        }
+        all.rounding = all.rounding * (1.0 - weight).powi(2) + one.rounding * weight * weight;
+        all.spp += one.spp;
+    }
+    Some(all)
+}
+
+/// Whether two pictures look like stages of one rendering, in the noise masks of their green channels.
+///
+/// With d = A − B and s = A + B, Σd·s is N·(Var A − Var B) = Nσ²·(1/a − 1/b) either way, since texture does not correlate with d. Σd² is
+/// Nσ²·(1/a + 1/b) for independent samples, and Nσ²·|1/a − 1/b| for nested ones. Between the two expected ratios, the nearer one in the
+/// logarithm decides; where they differ by less than threefold it cannot be told, and matters little. As many samples are not nested.
+fn shares_samples(image: &Still, other: &Still, display: &Display) -> bool {
+    let (a, b) = (1.0 / image.spp, 1.0 / other.spp);
+    let independent = (a + b) / (a - b).abs();
+    if !independent.is_finite() || independent < 3.0 {
+        return false;
+    }
+    let mask = NoiseMask::default();
+    let green = |still: &Still| {
+        let encoded = still.pixels.iter().map(|p| display.encode(*p)[1]).collect();
+        Array2::from_shape_vec((still.size.1, still.size.0), encoded).map(|plane| mask.apply(&plane))
+    };
+    let (Ok(image_mask), Ok(other_mask)) = (green(image), green(other)) else { return false };
+    let (mut difference, mut product) = (0.0f64, 0.0f64);
+    for (&x, &y) in image_mask.iter().zip(&other_mask) {
+        let (d, s) = (f64::from(x - y), f64::from(x + y));
+        difference += d * d;
+        product += d * s * (a - b).signum();
+    }
+    let rounding = f64::from(mask.white_noise_gain() * (image.rounding + other.rounding));
+    difference -= rounding * image.pixels.len() as f64;
+    difference > 0.0 && product > difference / independent.sqrt()
+}
