@@ -25,7 +25,7 @@ TILE = 64
 SMALL = 32
 EXPOSURES = ("0.1", "1", "10")
 # The camera of the Cornell box moves to the right, by about two pixels a frame.
-FRAMES = [f"{0.015 * i:.3f}" for i in range(6)]
+FRAMES = [f"{0.015 * i:.3f}" for i in range(4)]
 REFERENCE_SPP = 4000
 
 

@@ -1,0 +1,84 @@
+//! How often the oracle stops a tile of a stiff scene too early: `false_stops [SEEDS]` renders scenes whose light is hard to find with
+//! many seeds, holds each stopped tile against a converged picture, and prints a Markdown table, with and without the guards there are.
+#![allow(clippy::print_stdout, reason = "an example prints")]
+
+use noisefloor::{Display, Driver, FixedSamples, NoiseMask, Oracle, Params, Rgb, Schedule, StopReason, Tile};
+use noisefloor_ptwne::{Options, Ptwne, scenes};
+use std::error::Error;
+
+const EDGE: usize = 64;
+const TILE: usize = 32;
+const MOST: u64 = 3000;
+const CONVERGED: u64 = 16_000;
+/// Deviation of the noise mask of a tile's error that nobody overlooked, in 8-bit steps: the human thresholds are 1.0 to 2.8.
+const SEEN: f64 = 2.8;
+/// Error of a tile's mean that is seen as another brightness, in 8-bit steps.
+const DARKER: f64 = 2.0;
+const SCENES: [&str; 6] = ["caustic", "keyhole", "pinpoint", "glass-spheres", "door-ajar", "decades"];
+
+fn source(scene: &str, seed: u64) -> Result<Ptwne, Box<dyn Error>> {
+    let built_in = scenes::by_name(scene).ok_or("no such scene")?;
+    Ok(Ptwne::new(built_in, EDGE, EDGE, Options { seed, ..Options::default() })?)
+}
+
+/// Deviation of the noise mask of the error of a tile, and the error of its mean, in 8-bit steps.
+fn error(image: &[Rgb], truth: &[Rgb], display: &Display, tile: Tile) -> (f64, f64) {
+    let error = ndarray::Array2::from_shape_fn((tile.height, tile.width), |(y, x)| {
+        let pixel = (tile.y + y) * EDGE + tile.x + x;
+        255.0 * (display.luma(image[pixel]) - display.luma(truth[pixel]))
+    });
+    let mask = NoiseMask::default().apply(&error);
+    let count = error.len() as f64;
+    let noise = mask.iter().map(|v| f64::from(v * v)).sum::<f64>() / count;
+    (noise.sqrt(), error.iter().map(|&v| f64::from(v)).sum::<f64>() / count)
+}
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let seeds: u64 = std::env::args().nth(1).map_or(Ok(20), |n| n.parse())?;
+    println!(
+        "| scene | guard | tiles | stopped | mean spp | noise still seen | of another brightness | worst noise |"
+    );
+    println!("|---|---|---|---|---|---|---|---|");
+    for scene in SCENES {
+        let mut truth = Driver::new(
+            source(scene, u64::MAX)?,
+            FixedSamples(CONVERGED),
+            Params { schedule: Schedule::Every { step: 4000 }, max_samples: CONVERGED, ..Params::default() },
+        )?;
+        truth.run(|_, _| ())?;
+        let truth = truth.session().film().image();
+        for (guard, min_samples, consecutive) in
+            [("none", 0, 1), ("--consecutive 3", 0, 3), ("--min-spp 1000", 1000, 1)]
+        {
+            let params =
+                Params { tile: TILE, min_samples, consecutive, max_samples: MOST, ..Params::default() };
+            let (mut tiles, mut samples, mut stopped) = (0, 0, Vec::new());
+            for seed in 0..seeds {
+                let mut driver = Driver::new(source(scene, seed)?, Oracle::bundled(), params)?;
+                driver.run(|_, _| ())?;
+                let session = driver.session();
+                let (image, display) = (session.film().image(), session.display().ok_or("no display")?);
+                for stop in session.stops() {
+                    tiles += 1;
+                    samples += stop.samples;
+                    if stop.reason == StopReason::Converged {
+                        stopped.push(error(&image, &truth, display, stop.tile));
+                    }
+                }
+            }
+            let share = |seen: &dyn Fn(&(f64, f64)) -> bool| {
+                100.0 * stopped.iter().filter(|error| seen(error)).count() as f64
+                    / stopped.len().max(1) as f64
+            };
+            println!(
+                "| {scene} | {guard} | {tiles} | {} | {:.0} | {:.1} % | {:.1} % | {:.1} |",
+                stopped.len(),
+                samples as f64 / f64::from(tiles),
+                share(&|e| e.0 > SEEN),
+                share(&|e| e.1.abs() > DARKER),
+                stopped.iter().map(|e| e.0).fold(0.0, f64::max),
+            );
+        }
+    }
+    Ok(())
+}
