@@ -94,7 +94,8 @@ def save_grid(path, columns, gap=6):
         height = line[0].shape[0]
         parts = [part for image in line for part in (image, np.full((height, gap, 3), 255, np.uint8))][:-1]
         rows += [np.concatenate(parts, 1), np.full((gap, sum(p.shape[1] for p in parts), 3), 255, np.uint8)]
-    Image.fromarray(np.concatenate(rows[:-1], 0)).save(path)
+    # 256 colours: small enough to be committed.
+    Image.fromarray(np.concatenate(rows[:-1], 0)).quantize(256, dither=Image.Dither.NONE).save(path, optimize=True)
 
 
 def difference(image, reference, times):
