@@ -15,7 +15,7 @@ const CONVERGED: u64 = 6000;
 const SEEN: f64 = 2.8;
 /// Error of a tile's mean that is seen as another brightness, in 8-bit steps.
 const DARKER: f64 = 2.0;
-const SCENES: [&str; 4] = ["caustic", "keyhole", "glass-spheres", "door-ajar"];
+const SCENES: [&str; 3] = ["caustic", "keyhole", "glass-spheres"];
 
 fn source(scene: &str, seed: u64) -> Result<Ptwne, Box<dyn Error>> {
     let built_in = scenes::by_name(scene).ok_or("no such scene")?;
