@@ -95,6 +95,8 @@ pub fn write(dir: &Path, study: &Study, report: &Report, threshold: Threshold) -
     }
     table(&dir.join("tiles.csv"), report.tiles.iter().map(tile_line))?;
     svg(&dir.join("thresholds.svg"), plots::thresholds(&report.tiles)?)?;
+    // A model keeps the name of the corpus it is trained on.
+    let corpus_dir = dir.join(if report.simulated { "corpus-simulated" } else { "corpus" });
     for (number, stack) in study.stacks.iter().enumerate() {
         let tiles: Vec<&TileRow> = report.tiles.iter().filter(|t| t.stack == stack.name()).collect();
         if tiles.is_empty() {
@@ -105,9 +107,9 @@ pub fn write(dir: &Path, study: &Study, report: &Report, threshold: Threshold) -
         let grid = plots::grid(stack.grid(), &picture, &tiles, threshold);
         let (width, height) = (stack.grid().width(), stack.grid().height());
         write_png(dir.join(format!("grid-{}.png", stack.name())), width, height, &grid)?;
-        pictures(&dir.join("corpus"), study, number)?;
+        pictures(&corpus_dir, study, number)?;
     }
-    corpus(&dir.join("corpus"), study, report, threshold)
+    corpus(&corpus_dir, study, report, threshold)
 }
 
 fn folder(dir: &Path) -> Result<(), StudyError> {

@@ -51,7 +51,7 @@ fn thresholds_come_back_from_the_server_as_a_corpus() {
     for _ in 0..2 {
         write(&out, &study, &report, Threshold::Level95).unwrap();
     }
-    let corpus = Corpus::open(out.join("corpus")).unwrap();
+    let corpus = Corpus::open(out.join("corpus-simulated")).unwrap();
     assert_eq!((corpus.scenes(), corpus.zones().len()), (vec!["wall", "door"], 4));
     for (zone, tile) in corpus.zones().iter().zip(&report.tiles) {
         assert!((zone.human_spp - tile.level95.min(levels[23] as f64)).abs() < 1e-6);
