@@ -59,7 +59,7 @@ test("pictures are dropped, judged and disagreed with by mouse, in a small windo
   await page.getByRole("alert").getByText("different sizes").waitFor();
   await drop(page, stack.slice(1));
   await page.getByText("tiles have converged at").waitFor();
-  assert.ok(await page.getByRole("alert").isHidden());
+  await until("nothing is wrong any more", () => page.getByRole("alert").isHidden());
   const tiles = await page.locator("#tiles button").count();
   assert.equal(tiles, 6);
   await accessible(page, "judged");
@@ -109,15 +109,15 @@ test("pictures are dropped, judged and disagreed with by mouse, in a small windo
   await page.getByRole("button", { name: "Undo" }).click();
   await page.getByRole("button", { name: "Undo" }).click();
   await until("nothing is kept", async () => (await kept(page)) === 0);
-  assert.ok(await page.getByRole("button", { name: "Undo" }).isDisabled());
+  await until("nothing is left to undo", () => page.getByRole("button", { name: "Undo" }).isDisabled());
 
   // Layers
   await page.getByLabel("Visible noise (key N)").check();
-  assert.ok(await page.locator("#noise").isVisible());
+  await until("the noise is shown", () => page.locator("#noise").isVisible());
   await accessible(page, "noise");
   await shot(page, "explore-noise");
   await page.getByLabel("Verdicts (key V)").uncheck();
-  assert.ok(await page.locator(".chip.top").first().isHidden());
+  await until("verdicts are hidden", () => page.locator(".chip.top").first().isHidden());
 });
 
 test("everything goes by keyboard alone, in a large window", async (t) => {
@@ -156,9 +156,9 @@ test("everything goes by keyboard alone, in a large window", async (t) => {
   await page.getByText("at 1200 spp").waitFor();
   await focus(/^show-noise/);
   await page.keyboard.press("Space");
-  assert.ok(await page.locator("#noise").isVisible());
+  await until("the noise is shown", () => page.locator("#noise").isVisible());
   await page.keyboard.press("n");
-  assert.ok(await page.locator("#noise").isHidden());
+  await until("the noise is hidden", () => page.locator("#noise").isHidden());
   await focus(/\|Tile 1,/);
   await page.keyboard.press("ArrowRight");
   await page.keyboard.press("ArrowDown");
