@@ -51,18 +51,17 @@ impl Job {
 /// Begins; the job says how far it is. It is to be marked as running before.
 pub(crate) fn begin(job: Arc<Mutex<Job>>, table: Table, answers: Vec<Answer>, model: Model, threshold: f32) {
     let set = move |to: Job| *job.lock().unwrap_or_else(PoisonError::into_inner) = to;
+    // What the model was trained on is what the table holds only if it is that table.
+    let corpus = if model.record.table_digest == table.digest() {
+        model.record.corpus.clone()
+    } else {
+        format!("a table of {}", table.scenes().join(", "))
+    };
     // Not a task: who ends the server does not wait for it.
     std::thread::spawn(move || {
         let work = || {
             let on_step = |step| set(Job::Running(step));
-            retrain(
-                &table,
-                answers,
-                &TrainParams::default(),
-                (&model, threshold),
-                &model.record.corpus,
-                on_step,
-            )
+            retrain(&table, answers, &TrainParams::default(), (&model, threshold), &corpus, on_step)
         };
         // A panic in a solver must not leave the page waiting.
         let outcome = std::panic::catch_unwind(std::panic::AssertUnwindSafe(work));
