@@ -145,7 +145,9 @@ def dark(args, scenes):
             print(f"| {name} | {criterion} | {counts[0]:.0f} | {counts[1]:.0f} | {noise[0]:.2f} | {noise[1]:.2f} |")
         row = tiles[0]
         spread = np.ptp([noise_in(folder, criterion, reference, row) for criterion in CRITERIA])
-        if most is None or spread > most[0]:
+        # The picture is of a tile without bright places.
+        dark_all_over = np.percentile(of_tile(luma(reference), row), 95) < 128
+        if dark_all_over and (most is None or spread > most[0]):
             most = spread, name, row
     _, name, row = most
     folder, _ = scenes[name]
