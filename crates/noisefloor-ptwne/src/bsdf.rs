@@ -346,7 +346,8 @@ impl<'a> Glossy<'a> {
         cos: f32,
     ) -> Self {
         let through = coat.transmittance(alpha, cos);
-        let (reflected, inside) = ((1.0 - through) * specular.max_element(), through * diffuse.max_element());
+        let (reflected, inside) =
+            ((1.0 - through) * math::luminance(specular), through * math::luminance(diffuse));
         Self {
             ggx: Ggx { alpha },
             fresnel: &Fresnel::None,
@@ -363,14 +364,14 @@ impl<'a> Glossy<'a> {
     pub(crate) fn blend(coat: &'a Coat, base: Vec3, alpha: f32, metallic: f32, cos: f32) -> Self {
         let plastic = Self::plastic(coat, base, Vec3::ONE, alpha, true, cos);
         let through = coat.transmittance(alpha, cos);
-        let reflected = metallic * schlick(base, cos).max_element() + (1.0 - metallic) * (1.0 - through);
+        let reflected = metallic * math::luminance(schlick(base, cos)) + (1.0 - metallic) * (1.0 - through);
         Self {
             fresnel: &Fresnel::Schlick,
             metal: base,
             metal_share: metallic,
             specular: Vec3::splat(1.0 - metallic),
             base: plastic.base * (1.0 - metallic),
-            facet: share(reflected, (1.0 - metallic) * through * base.max_element()),
+            facet: share(reflected, (1.0 - metallic) * through * math::luminance(base)),
             ..plastic
         }
     }
