@@ -28,6 +28,7 @@ pub struct Cli {
 #[derive(Debug, Subcommand)]
 pub enum Command {
     Render(Box<RenderArgs>),
+    Reference(ReferenceArgs),
     Compare(CompareArgs),
     Judge(JudgeArgs),
     Explore(ExploreArgs),
@@ -103,6 +104,31 @@ pub struct RenderArgs {
     /// Refresh the files in the output folder every so many seconds while rendering; 0 for never.
     #[arg(long, default_value = "30", value_name = "SECONDS", value_parser = parse_pause)]
     pub autosave: std::time::Duration,
+    /// No progress bar and no summary.
+    #[arg(long, short)]
+    pub quiet: bool,
+}
+
+/// Render the quick noise-free reference of a scene: direct light, and what mirrors and glass show of it.
+///
+/// This is the ray-traced picture that Takouachet et al. hold a noisy one against. Each part takes samples until its own noise is far
+/// below what people see. What was scattered on its way by a diffuse surface is missing, so it is no converged picture.
+///
+/// A corpus that has one as reference.exr beside its pictures can be learned and scored with `--evidence reference`.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  noisefloor reference glass-spheres --size 512x512
+  noisefloor reference hall/scene.xml --out corpus/hall/reference.exr
+  noisefloor evaluate --corpus corpus --evidence reference")]
+pub struct ReferenceArgs {
+    /// Scene, as for `render`.
+    #[arg(value_name = "SCENE")]
+    pub scene: String,
+    #[command(flatten)]
+    pub renderer: RendererArgs,
+    /// The picture, in linear light; what it looks like is written beside it, as PNG [default: out/SCENE-reference.exr].
+    #[arg(long, value_name = "FILE.exr")]
+    pub out: Option<PathBuf>,
     /// No progress bar and no summary.
     #[arg(long, short)]
     pub quiet: bool,

@@ -13,6 +13,7 @@ mod heat_map;
 mod inspect;
 mod judge;
 mod output;
+mod reference;
 mod render;
 mod reproduce;
 mod rivals;
@@ -45,6 +46,7 @@ fn main() -> ExitCode {
     end_quietly_when_nobody_reads();
     let outcome = match Cli::parse().command {
         Command::Render(args) => render::run(&args),
+        Command::Reference(args) => reference::run(&args),
         Command::Compare(args) => compare::run(&args),
         Command::Judge(args) => judge::run(&args).map(|()| ExitCode::SUCCESS),
         Command::Train(args) => train::run(&args).map(|()| ExitCode::SUCCESS),

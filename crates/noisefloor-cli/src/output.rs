@@ -6,6 +6,7 @@ use crate::sources::Source;
 use anyhow::{Context, bail};
 use noisefloor::{Clock, Display, Params, Progress, Rgb, Session, Stop, StopReason, StoppingCriterion};
 use noisefloor_exr::{RenderLayers, check_writable, read_exr, write_atomic, write_exr, write_png};
+use noisefloor_ptwne::ReferenceNoise;
 use noisefloor_rivals::metrics::relative_mse;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -298,22 +299,27 @@ impl Output {
             }
         }
         if let Some(noise) = source.reference_noise() {
-            println!(
-                "the reference took {:.0} samples a pixel; deviation of its noise mask {:.2}/255, {:.2}/255 in its worst block",
-                noise.samples,
-                255.0 * noise.deviation(),
-                255.0 * noise.worst(),
-            );
-            if noise.unsettled > 0 {
-                println!(
-                    "warning: {} of {} blocks of the reference are noisier than it promises: tiles there may be stopped too late; \
-                     a model trained on half buffers needs no reference",
-                    noise.unsettled,
-                    noise.deviations.len()
-                );
-            }
+            say_noise(noise);
         }
         println!("written to {}", self.folder.display());
+    }
+}
+
+/// What a reference is like, for people.
+pub fn say_noise(noise: &ReferenceNoise) {
+    println!(
+        "the reference took {:.0} samples a pixel; deviation of its noise mask {:.2}/255, {:.2}/255 in its worst block",
+        noise.samples,
+        255.0 * noise.deviation(),
+        255.0 * noise.worst(),
+    );
+    if noise.unsettled > 0 {
+        println!(
+            "warning: {} of {} blocks of the reference are noisier than it promises: tiles there may be stopped too late; \
+             a model trained on half buffers needs no reference",
+            noise.unsettled,
+            noise.deviations.len()
+        );
     }
 }
 

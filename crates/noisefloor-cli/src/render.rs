@@ -4,6 +4,7 @@ use crate::INTERRUPTED;
 use crate::args::{CriterionChoice, RenderArgs};
 use crate::output::{ModelFacts, Output, read_reference};
 use crate::sources::{self, Opened, Source};
+use crate::train::bar;
 use anyhow::Context;
 use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressStyle};
 use noisefloor::{
@@ -51,7 +52,8 @@ fn drive<C: StoppingCriterion>(
     let mut output = Output::create(args, scene, driver.source().info().name, model, reference)?;
     driver.set_time_limit(args.time);
     let cancel = driver.cancel_flag();
-    cancel_on_signal(Arc::clone(&cancel))?;
+    cancel_on_signal(Arc::clone(&cancel), AFTER_THIS_BATCH)?;
+    driver.source_mut().watch_reference(reference_bar(args.quiet), Arc::clone(&cancel));
     let bar = progress_bar(args.quiet);
     let autosave = args.autosave;
     let mut saved = Instant::now();
@@ -79,7 +81,7 @@ fn drive<C: StoppingCriterion>(
     match outcome {
         // Ctrl-C in a terminal ends a command that renders, too.
         Err(error) if cancel.load(Ordering::Relaxed) => {
-            eprintln!("warning: the last batch is lost: {}", crate::one_line(&error.into()));
+            eprintln!("warning: what was under way is lost: {}", crate::one_line(&error.into()));
             cancelled = true;
         }
         outcome => outcome?,
@@ -91,15 +93,22 @@ fn drive<C: StoppingCriterion>(
     Ok(if cancelled { ExitCode::from(INTERRUPTED) } else { ExitCode::SUCCESS })
 }
 
-/// The first signal asks the driver to end; a second one ends the process at once.
-pub fn cancel_on_signal(cancel: Arc<AtomicBool>) -> anyhow::Result<()> {
+/// What Ctrl-C does to samples.
+pub const AFTER_THIS_BATCH: &str = "stopping after this batch; what is there will be written";
+
+/// The first signal asks the work to end, which `says` how; a second one ends the process at once.
+pub fn cancel_on_signal(cancel: Arc<AtomicBool>, says: &'static str) -> anyhow::Result<()> {
     ctrlc::set_handler(move || {
         if cancel.swap(true, Ordering::Relaxed) {
             std::process::exit(i32::from(INTERRUPTED));
         }
-        eprintln!("\nstopping after this batch; what is there will be written (again to quit at once)");
+        eprintln!("\n{says} (again to quit at once)");
     })
     .context("the handler for Ctrl-C could not be set")
+}
+
+pub fn reference_bar(quiet: bool) -> ProgressBar {
+    if quiet { ProgressBar::hidden() } else { bar(0, "blocks of the reference") }
 }
 
 fn progress_bar(quiet: bool) -> ProgressBar {

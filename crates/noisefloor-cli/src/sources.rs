@@ -2,13 +2,17 @@
 
 use crate::args::{FilterChoice, RendererArgs, SamplerChoice, SourceChoice};
 use anyhow::{Context, bail};
+use indicatif::ProgressBar;
 use noisefloor::ProgressiveSource;
 use noisefloor_exr::{CommandOptions, CommandSource, StackSource};
 use noisefloor_luxcore::{Engine, Sampler};
 use noisefloor_ptwne::{Counts, Estimator, Filter, Options, Ptwne, ReferenceNoise, Sampling, scenes};
 use noisefloor_scenefile::Loaded;
 use noisefloor_sidecar::{Job, Renderer, Sidecar, SidecarError};
+use std::ops::ControlFlow;
 use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// A renderer in another process, as its crate offers it.
 #[derive(Debug)]
@@ -57,6 +61,9 @@ pub trait Source: ProgressiveSource {
         None
     }
 
+    /// Shows how far a reference is, where it takes long, and gives it up once `cancel` is set.
+    fn watch_reference(&mut self, _bar: ProgressBar, _cancel: Arc<AtomicBool>) {}
+
     /// What noise its reference was left with, where it has rendered one and can tell.
     fn reference_noise(&self) -> Option<&ReferenceNoise> {
         None
@@ -71,6 +78,17 @@ pub trait Source: ProgressiveSource {
 impl Source for Ptwne {
     fn counts(&self) -> Option<Counts> {
         Some(Ptwne::counts(self))
+    }
+
+    fn watch_reference(&mut self, bar: ProgressBar, cancel: Arc<AtomicBool>) {
+        Ptwne::watch_reference(self, move |done, all| {
+            bar.set_length(all as u64);
+            bar.set_position(done as u64);
+            if done == all {
+                bar.finish_and_clear();
+            }
+            if cancel.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        });
     }
 
     fn reference_noise(&self) -> Option<&ReferenceNoise> {

@@ -97,6 +97,9 @@ pub enum RenderError {
     /// Threads could not be started.
     #[error("threads could not be started")]
     Threads(#[from] rayon::ThreadPoolBuildError),
+    /// Whoever watched it gave the reference up.
+    #[error("the reference was given up")]
+    GivenUp,
 }
 
 /// What can go wrong in a call of [`ProgressiveSource::sample`](noisefloor::ProgressiveSource::sample).

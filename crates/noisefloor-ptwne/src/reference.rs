@@ -24,16 +24,18 @@ use crate::scene::Scene;
 use glam::DVec3;
 use noisefloor::{Display, NoiseMask, Rgb};
 use rayon::prelude::*;
-use std::ops::Range;
+use std::ops::{ControlFlow, Range};
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Side of a block: small enough that its pixels see much the same lights.
 const BLOCK: usize = 16;
 /// Root mean square of the errors of a block's pixels, in display values. The noise mask (σ = 1) lets 0.85 of it through: 0.3/255,
 /// less than a tenth of the energy that the keenest observers see.
 const BOUND: f32 = 0.36 / 255.0;
-/// Fewest and most samples of each half of a pixel.
-const FEWEST: u32 = 16;
-const MOST: u32 = 1024;
+/// Fewest and most samples of each half of a pixel. With half as many, highlights smaller than a pixel were missed; its points
+/// have twice as many.
+const FEWEST: u32 = 32;
+const MOST: u32 = 8_192;
 /// Samples of each pixel from which its block learns about the lights, and how often: each time it looks where it saw some before.
 const LEARNING: u32 = 8;
 const LESSONS: u32 = 2;
@@ -57,7 +59,7 @@ pub struct ReferenceNoise {
     pub columns: usize,
     /// Deviation of the noise mask (σ = 1) of each block, row-major, at least 0.
     pub deviations: Vec<f32>,
-    /// Blocks that have more noise than the reference promises, 0.305/255, after 2,048 samples of pixels that needed them.
+    /// Blocks that have more noise than the reference promises, 0.305/255, after 16,384 samples of pixels that needed them.
     pub unsettled: usize,
 }
 
@@ -74,13 +76,23 @@ impl ReferenceNoise {
     }
 }
 
-/// Renders the reference. `display` is how the path-traced picture would be shown.
-pub(crate) fn render(scene: &Scene, [width, height]: [usize; 2], key: Key, display: &Display) -> Picture {
+/// Told after each block how many of how many are there; breaks off the work.
+pub(crate) type Watch = dyn Fn(usize, usize) -> ControlFlow<()> + Send + Sync;
+
+/// Renders the reference, or nothing if it is broken off. `display` is how the path-traced picture would be shown.
+pub(crate) fn render(
+    scene: &Scene,
+    [width, height]: [usize; 2],
+    key: Key,
+    display: &Display,
+    watch: &Watch,
+) -> Option<Picture> {
     let lens = scene.lens(width, height);
     let parts = Parts::new(scene);
     let columns = width.div_ceil(BLOCK);
     let count = columns * height.div_ceil(BLOCK);
-    let blocks: Vec<(Block<'_>, f32)> = (0..count)
+    let done = AtomicUsize::new(0);
+    let blocks: Option<Vec<(Block<'_>, f32)>> = (0..count)
         .into_par_iter()
         .with_max_len(1)
         .map(|i| {
@@ -90,7 +102,10 @@ pub(crate) fn render(scene: &Scene, [width, height]: [usize; 2], key: Key, displ
             let pixels = vec![Pixel::default(); size[0] * size[1]];
             let mut block = Block { lens: &lens, key, display, at, size, first, pixels };
             let error = block.render(&mut Tracer::new(scene, Guide::by_power(&parts)), &parts);
-            (block, error)
+            match watch(done.fetch_add(1, Ordering::Relaxed) + 1, count) {
+                ControlFlow::Continue(()) => Some((block, error)),
+                ControlFlow::Break(()) => None,
+            }
         })
         .collect();
 
@@ -98,7 +113,7 @@ pub(crate) fn render(scene: &Scene, [width, height]: [usize; 2], key: Key, displ
     let mut noise = ReferenceNoise { samples: 0.0, columns, deviations: vec![], unsettled: 0 };
     let mut pixels = vec![[0.0; 3]; width * height];
     let mut samples = 0;
-    for (block, error) in blocks {
+    for (block, error) in blocks? {
         for (row, from) in block.pixels.chunks(block.size[0]).enumerate() {
             let start = (block.at[1] + row) * width + block.at[0];
             for (to, pixel) in pixels[start..].iter_mut().zip(from) {
@@ -110,7 +125,7 @@ pub(crate) fn render(scene: &Scene, [width, height]: [usize; 2], key: Key, displ
         noise.unsettled += usize::from(error > BOUND);
     }
     noise.samples = samples as f64 / pixels.len() as f64;
-    Picture { pixels, noise }
+    Some(Picture { pixels, noise })
 }
 
 /// Sums of samples, of two halves that have the same number.

@@ -5,7 +5,7 @@ use crate::error::{OutsideError, RenderError};
 use crate::filter::Filter;
 use crate::integrator::{Estimator, Sample, Settings, integrator};
 use crate::math::Vec3;
-use crate::reference::ReferenceNoise;
+use crate::reference::{self, ReferenceNoise, Watch};
 use crate::rng::Key;
 use crate::sampler::{Sampler, Sampling};
 use crate::scene::{Needs, Scene};
@@ -14,7 +14,9 @@ use noisefloor::{
     ToneMapping, Unit,
 };
 use rayon::prelude::*;
+use std::fmt;
 use std::num::NonZeroUsize;
+use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -71,7 +73,6 @@ impl Default for Options {
 /// All random numbers follow from (seed, pixel, sample index), and the mean of a batch is summed in f64: images are the same
 /// to the bit whatever the threads, and means are the same to the rounding of f32 however requests are cut. A sample counts
 /// for one pixel alone, whatever the filter, so that noise is independent from pixel to pixel.
-#[derive(Debug)]
 pub struct Ptwne {
     pub(crate) scene: Arc<Scene>,
     pub(crate) width: usize,
@@ -80,6 +81,7 @@ pub struct Ptwne {
     integrator: Sample,
     pool: Option<rayon::ThreadPool>,
     tally: Tally,
+    watch: Box<Watch>,
     reference_noise: Option<ReferenceNoise>,
 }
 
@@ -141,6 +143,7 @@ impl Ptwne {
             integrator,
             pool,
             tally: Tally::default(),
+            watch: Box::new(|_, _| ControlFlow::Continue(())),
             reference_noise: None,
         })
     }
@@ -160,6 +163,15 @@ impl Ptwne {
             clamped: read(clamped),
             background: read(background),
         }
+    }
+
+    /// Has `watch` told, while a reference is rendered, how many of how many blocks of it are there; on [`ControlFlow::Break`] it is given
+    /// up. Comes from any thread.
+    pub fn watch_reference(
+        &mut self,
+        watch: impl Fn(usize, usize) -> ControlFlow<()> + Send + Sync + 'static,
+    ) {
+        self.watch = Box::new(watch);
     }
 
     /// What noise the last reference has, once there is one.
@@ -252,6 +264,17 @@ impl Ptwne {
     }
 }
 
+impl fmt::Debug for Ptwne {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { scene, width, height, options, .. } = self;
+        f.debug_struct("Ptwne")
+            .field("scene", &scene.name())
+            .field("size", &(width, height))
+            .field("options", options)
+            .finish_non_exhaustive()
+    }
+}
+
 /// A row of a tile.
 struct Job<'a> {
     request: &'a Request,
@@ -309,11 +332,15 @@ impl ProgressiveSource for Ptwne {
         Ok(batches)
     }
 
+    /// # Errors
+    /// [`SourceError::Failed`] if it was given up, see [`Ptwne::watch_reference`].
     fn reference(&mut self) -> Result<Option<Reference>, SourceError> {
         let key = Key::new(self.options.seed);
         let display = self.preview()?;
         let size = [self.width, self.height];
-        let picture = self.on_threads(|| crate::reference::render(&self.scene, size, key, &display));
+        let picture =
+            self.on_threads(|| reference::render(&self.scene, size, key, &display, self.watch.as_ref()));
+        let picture = picture.ok_or_else(|| self.fail(None, RenderError::GivenUp))?;
         self.reference_noise = Some(picture.noise);
         Ok(Some(Reference { width: self.width, height: self.height, pixels: picture.pixels }))
     }

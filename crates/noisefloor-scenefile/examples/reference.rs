@@ -7,25 +7,26 @@
 #![expect(clippy::print_stdout, reason = "a table for people")]
 
 use ndarray::Array2;
-use noisefloor::{NoiseMask, ProgressiveSource, Request, Tile, TileGrid, ToneMapping};
+use noisefloor::{NoiseMask, ProgressiveSource, Request, Rgb, Tile, TileGrid, ToneMapping};
 use noisefloor_ptwne::{Options, Ptwne, Scene, scenes};
 use std::error::Error;
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 
-/// Samples per pixel that the path tracer is timed with. They settle the exposure too, and so the deviation: from more samples it
-/// comes out darker in scenes where most pixels are still black after a few.
-const SAMPLES: u32 = 8;
+/// Samples per pixel of the small picture that the reference takes its exposure from; the path tracer is timed with them.
+const PREVIEW: u32 = 8;
+/// Samples per pixel at the first verdict of a render. In scenes where most pixels are black after a few, the picture is darker by then.
+const FIRST: u32 = 100;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let args: Vec<String> = std::env::args().skip(1).collect();
     let [size, names @ ..] = args.as_slice() else { return Err("reference SIZE SCENE…".into()) };
     let size: usize = size.parse()?;
     println!(
-        "| scene | samples | seconds | as many as … spp | mask deviation, /255 | of the worst tile | its own estimate | blocks unsettled |"
+        "| scene | samples | seconds | as many as … spp | mask deviation, /255, at the exposure of {PREVIEW} samples | of {FIRST} | worst tile | its own estimate | blocks unsettled |"
     );
-    println!("|---|---|---|---|---|---|---|---|");
+    println!("|---|---|---|---|---|---|---|---|---|");
     for name in names {
         let scene = match scenes::by_name(name) {
             Some(scene) => scene,
@@ -49,15 +50,27 @@ fn row(scene: &Arc<Scene>, size: usize) -> Result<String, Box<dyn Error>> {
         unsettled += 50.0 * noise.unsettled as f64 / noise.deviations.len() as f64;
     }
     let seconds = start.elapsed().as_secs_f64() / 2.0;
-    let start = Instant::now();
     let tile = Tile { index: 0, x: 0, y: 0, width: size, height: size };
-    let rendered = source(1)?.sample(&[Request { tile, first: 0, samples: SAMPLES }])?;
-    let one_sample = start.elapsed().as_secs_f64() / f64::from(SAMPLES);
+    let rendered = |samples| {
+        source(1)?.sample(&[Request { tile, first: 0, samples }]).map_err(Into::<Box<dyn Error>>::into)
+    };
+    let start = Instant::now();
+    let preview = rendered(PREVIEW)?;
+    let spp = seconds / start.elapsed().as_secs_f64() * f64::from(PREVIEW);
+    let first = rendered(FIRST)?;
+    let [at_preview, at_first] = [preview, first].map(|batches| deviations(&images, &batches[0].mean, size));
+    let ([early, _], [all, worst]) = (at_preview?, at_first?);
+    let name = scene.name();
+    Ok(format!(
+        "| {name} | {samples:.0} | {seconds:.0} | {spp:.0} | {early:.2} | {all:.2} | {worst:.2} | {own:.2} | {unsettled:.0} % |"
+    ))
+}
 
-    // The exposure is that of the picture that the reference is held against
-    let display = ToneMapping::default().settle(&rendered[0].mean);
+/// Deviations of the noise mask of one of two references, of all and of the worst tile, in 1/255, shown as `picture` is.
+fn deviations(references: &[Vec<Rgb>], picture: &[Rgb], size: usize) -> Result<[f64; 2], Box<dyn Error>> {
+    let display = ToneMapping::default().settle(picture);
     let error = |y: usize, x: usize| {
-        let luma = |image: usize| display.luma(images[image][y * size + x]);
+        let luma = |image: usize| display.luma(references[image][y * size + x]);
         (luma(0) - luma(1)) * std::f32::consts::FRAC_1_SQRT_2 * 255.0
     };
     let mask = NoiseMask::default().apply(&Array2::from_shape_fn((size, size), |(y, x)| error(y, x)));
@@ -69,10 +82,5 @@ fn row(scene: &Arc<Scene>, size: usize) -> Result<String, Box<dyn Error>> {
         })
         .collect();
     let worst = tiles.iter().copied().fold(0.0, f64::max).sqrt();
-    let all = (tiles.iter().sum::<f64>() / tiles.len() as f64).sqrt();
-    let name = scene.name();
-    let spp = seconds / one_sample;
-    Ok(format!(
-        "| {name} | {samples:.0} | {seconds:.0} | {spp:.0} | {all:.2} | {worst:.2} | {own:.2} | {unsettled:.0} % |"
-    ))
+    Ok([(tiles.iter().sum::<f64>() / tiles.len() as f64).sqrt(), worst])
 }

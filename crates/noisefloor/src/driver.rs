@@ -144,6 +144,11 @@ impl<S: ProgressiveSource, C: StoppingCriterion> Driver<S, C> {
         &self.source
     }
 
+    /// The source, to set it up before a run.
+    pub fn source_mut(&mut self) -> &mut S {
+        &mut self.source
+    }
+
     /// Takes the driver apart: the source as the run left it, and the session.
     pub fn into_parts(self) -> (S, Session<C>) {
         (self.source, self.session)

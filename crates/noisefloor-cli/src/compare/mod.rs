@@ -11,7 +11,7 @@ mod truth;
 use crate::INTERRUPTED;
 use crate::args::CompareArgs;
 use crate::output::{write_csv, write_json};
-use crate::render::cancel_on_signal;
+use crate::render::{AFTER_THIS_BATCH, cancel_on_signal};
 use crate::sources::{self, Opened};
 use crate::train::bar;
 use anyhow::{Context, bail};
@@ -107,7 +107,7 @@ pub fn run(args: &CompareArgs) -> anyhow::Result<ExitCode> {
         format!("{}: cannot make this folder; choose another with --out", args.out.display())
     })?;
     let cancel = Arc::new(AtomicBool::new(false));
-    cancel_on_signal(Arc::clone(&cancel))?;
+    cancel_on_signal(Arc::clone(&cancel), AFTER_THIS_BATCH)?;
 
     let mut all = Vec::new();
     for scene in &args.scenes {

@@ -2,7 +2,8 @@ use crate::kit::succeed;
 
 #[test]
 fn every_subcommand_explains_itself() {
-    let options: [(&str, &[&str]); 11] = [
+    let options: [(&str, &[&str]); 12] = [
+        ("reference", &["--out", "--size", "--seed", "--quiet"]),
         (
             "render",
             &[

@@ -21,6 +21,9 @@ mod kit;
 /// Train, inspect, evaluate.
 #[cfg(test)]
 mod learn;
+/// The quick reference alone.
+#[cfg(test)]
+mod reference;
 /// What is written, and that it is the same again.
 #[cfg(test)]
 mod render;
