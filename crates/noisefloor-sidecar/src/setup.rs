@@ -4,7 +4,6 @@ use crate::error::SetupError;
 use crate::renderer::Renderer;
 use crate::run::run;
 use etcetera::BaseStrategy;
-use fd_lock::RwLock;
 use std::collections::VecDeque;
 use std::fs::{self, File};
 use std::io::Write;
@@ -80,11 +79,12 @@ pub fn install(renderer: &Renderer, mut progress: impl FnMut(&str)) -> Result<Pa
     let cache = cache()?;
     fs::create_dir_all(&cache).map_err(io(&cache))?;
     let lock = cache.join(format!("{}.lock", renderer.name));
-    let mut lock_file = RwLock::new(File::create(&lock).map_err(io(&lock))?);
-    if lock_file.try_write().is_err() {
+    // Unlocked when it is closed
+    let alone = File::create(&lock).map_err(io(&lock))?;
+    if alone.try_lock().is_err() {
         progress("waiting for another installation to end");
+        alone.lock().map_err(io(&lock))?;
     }
-    let _alone = lock_file.write().map_err(io(&lock))?;
     // Another one may have done it meanwhile, and its environment may be in use.
     if python_in(&folder).is_file() && probe(renderer, &python_in(&folder)).is_ok() {
         progress("another installation has done it");
