@@ -553,48 +553,62 @@ impl Accel {
         solid: impl Fn(u32, [f32; 2]) -> bool,
     ) -> bool {
         let wide = Wide::new(ray);
-        let mut top = 1;
-        stack.0[0].0 = 0;
-        while top > 0 {
-            top -= 1;
-            let node = stack.0[top].0;
+        let mut top = 0;
+        let mut node = 0u32;
+        loop {
             if node & LEAF == 0 {
                 let n = &self.nodes[node as usize];
                 let (_, mut mask) = n.meet(&wide, t_max);
-                while mask != 0 {
-                    stack.0[top].0 = n.child[mask.trailing_zeros() as usize & 3];
-                    top += 1;
+                if mask != 0 {
+                    // Go on with one child, leave the others behind
+                    let child = |mask: u32| n.child[mask.trailing_zeros() as usize & 3];
+                    node = child(mask);
                     mask &= mask - 1;
+                    while mask != 0 {
+                        stack.0[top].0 = child(mask);
+                        top += 1;
+                        mask &= mask - 1;
+                    }
+                    continue;
                 }
-                continue;
+            } else if self.blocked_in_leaf::<ROUNDS, HOLES>(node, ray, &wide, t_max, &solid) {
+                return true;
             }
-            let leaf = self.leaf_of::<ROUNDS>(node);
-            if leaf.pack != NONE {
-                let pack = &self.packs[leaf.pack as usize];
-                let (_, u, v, mut mask) = pack.meet(&wide, t_max);
-                if !HOLES && mask != 0 {
+            if top == 0 {
+                return false;
+            }
+            top -= 1;
+            node = stack.0[top].0;
+        }
+    }
+
+    #[inline]
+    fn blocked_in_leaf<const ROUNDS: bool, const HOLES: bool>(
+        &self,
+        node: u32,
+        ray: &Ray,
+        wide: &Wide,
+        t_max: f32,
+        solid: &impl Fn(u32, [f32; 2]) -> bool,
+    ) -> bool {
+        let leaf = self.leaf_of::<ROUNDS>(node);
+        if leaf.pack != NONE {
+            let pack = &self.packs[leaf.pack as usize];
+            let (_, u, v, mut mask) = pack.meet(wide, t_max);
+            if !HOLES && mask != 0 {
+                return true;
+            }
+            while mask != 0 {
+                let lane = mask.trailing_zeros() as usize & 3;
+                mask &= mask - 1;
+                if solid(pack.prim[lane], [u[lane], v[lane]]) {
                     return true;
-                }
-                while mask != 0 {
-                    let lane = mask.trailing_zeros() as usize & 3;
-                    mask &= mask - 1;
-                    if solid(pack.prim[lane], [u[lane], v[lane]]) {
-                        return true;
-                    }
-                }
-            }
-            if ROUNDS {
-                let first = leaf.first_round as usize;
-                for round in &self.rounds[first..first + leaf.rounds as usize] {
-                    if let Some((_, uv)) = round.meet(ray, t_max)
-                        && solid(round.prim, uv)
-                    {
-                        return true;
-                    }
                 }
             }
         }
-        false
+        let first = leaf.first_round as usize;
+        let meets = |round: &Round| round.meet(ray, t_max).is_some_and(|(_, uv)| solid(round.prim, uv));
+        ROUNDS && self.rounds[first..first + leaf.rounds as usize].iter().any(meets)
     }
 
     /// Whether any box of the hierarchy reaches into the pyramid of rays from `apex` between planes through it, whose normals

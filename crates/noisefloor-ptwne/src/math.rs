@@ -44,6 +44,17 @@ impl Frame {
     }
 }
 
+/// The largest whole number that is not above `x`. Without SSE4.1 the library's is a call.
+#[inline]
+pub(crate) fn floor(x: f32) -> f32 {
+    // From 2²³ on all numbers are whole
+    if !(x.abs() < 8_388_608.0) {
+        return x;
+    }
+    let towards_zero = x as i32 as f32;
+    if towards_zero > x { towards_zero - 1.0 } else { towards_zero }
+}
+
 /// Sine and cosine of 2π·u for u in [0, 1]: polynomials after a fold to an eighth of a turn, absolute error below 1e-6.
 /// The library's are exact to the last bit, and three times slower.
 #[inline]

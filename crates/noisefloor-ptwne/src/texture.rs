@@ -1,7 +1,7 @@
 //! Colours that vary over a surface.
 
 use crate::error::SceneError;
-use crate::math::Vec3;
+use crate::math::{self, Vec3};
 use noisefloor::Rgb;
 use std::sync::{Arc, LazyLock};
 
@@ -91,18 +91,19 @@ impl Pixels {
         }
     }
 
-    #[inline]
     fn at(&self, index: usize) -> Vec3 {
-        let eight = |p: &[[u8; 3]], table: &[f32; 256]| {
-            let [r, g, b] = p[index];
-            Vec3::new(table[usize::from(r)], table[usize::from(g)], table[usize::from(b)])
-        };
         match self {
-            Pixels::Srgb8(p) => eight(p, &TABLES.0),
-            Pixels::Linear8(p) => eight(p, &TABLES.1),
+            Pixels::Srgb8(p) => eight(p[index], &TABLES.0),
+            Pixels::Linear8(p) => eight(p[index], &TABLES.1),
             Pixels::Float(p) => Vec3::from_array(p[index]),
         }
     }
+}
+
+/// A pixel of eight bits a channel.
+#[inline]
+fn eight([r, g, b]: [u8; 3], table: &[f32; 256]) -> Vec3 {
+    Vec3::new(table[usize::from(r)], table[usize::from(g)], table[usize::from(b)])
 }
 
 /// The 256 values of a channel that is encoded as sRGB, and of a linear one.
@@ -122,19 +123,21 @@ impl Wrap {
         let period = if self == Wrap::Mirror { 2.0 * n } else { n };
         let x = match self {
             Wrap::Clamp => x.clamp(-1.0, n),
-            Wrap::Repeat | Wrap::Mirror => x - (x / period).floor() * period,
+            Wrap::Repeat | Wrap::Mirror => x - math::floor(x / period) * period,
         };
-        let x0 = x.floor();
+        let x0 = math::floor(x);
         let first = x0 as i32;
         let pixel = |i: i32| {
             let n = size as i32;
+            // Less than two periods: no division
+            let inside = |period: i32| if i < period { i } else { i - period };
             match self {
-                Wrap::Repeat => i % n,
+                Wrap::Repeat => inside(n),
                 Wrap::Mirror => {
-                    let i = i % (2 * n);
+                    let i = inside(2 * n);
                     if i < n { i } else { 2 * n - 1 - i }
                 }
-                Wrap::Clamp => i.clamp(0, n - 1),
+                Wrap::Clamp => i,
             }
             .clamp(0, n - 1) as usize
         };
@@ -259,13 +262,26 @@ impl ImageTexture {
         let (u, v) = (place(self.to_uv[0]), place(self.to_uv[1]));
         let (x0, x1, fx) = self.wrap[0].around(u * self.width as f32 - 0.5, self.width);
         let (y0, y1, fy) = self.wrap[1].around((1.0 - v) * self.height as f32 - 0.5, self.height);
-        let at = |x: usize, y: usize| self.pixels.at(y * self.width + x);
         let factor = Vec3::from_array(self.factor);
+        let (above, below) = (y0 * self.width, y1 * self.width);
         if self.nearest {
-            let (x, y) = (if fx < 0.5 { x0 } else { x1 }, if fy < 0.5 { y0 } else { y1 });
-            return at(x, y) * factor;
+            let (x, row) = (if fx < 0.5 { x0 } else { x1 }, if fy < 0.5 { above } else { below });
+            return self.pixels.at(row + x) * factor;
         }
-        at(x0, y0).lerp(at(x1, y0), fx).lerp(at(x0, y1).lerp(at(x1, y1), fx), fy) * factor
+        let four = [above + x0, above + x1, below + x0, below + x1];
+        // What the pixels are is asked once for all four
+        let [a, b, c, d] = match &self.pixels {
+            Pixels::Srgb8(p) => {
+                let table = &TABLES.0;
+                four.map(|i| eight(p[i], table))
+            }
+            Pixels::Linear8(p) => {
+                let table = &TABLES.1;
+                four.map(|i| eight(p[i], table))
+            }
+            Pixels::Float(p) => four.map(|i| Vec3::from_array(p[i])),
+        };
+        a.lerp(b, fx).lerp(c.lerp(d, fx), fy) * factor
     }
 }
 
