@@ -1,6 +1,7 @@
 //! From linear radiance to what a screen shows: exposure, tone mapping, sRGB encoding, luminance.
 
 use crate::source::Rgb;
+use multiversion::multiversion;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
@@ -12,7 +13,7 @@ pub const DEFAULT_KEY: f32 = 0.18;
 pub const DELTA: f64 = 1e-4;
 
 /// Rec.709 luminance of a linear RGB triple, in the unit of its input.
-#[inline]
+#[inline(always)]
 pub fn luminance([r, g, b]: Rgb) -> f32 {
     0.2126 * r + 0.7152 * g + 0.0722 * b
 }
@@ -21,7 +22,7 @@ pub fn luminance([r, g, b]: Rgb) -> f32 {
 ///
 /// The curve is a polynomial of the fourth root, within 10⁻⁶ of the formula: without a table or a power, the compiler can encode
 /// many channels at once. Every verdict encodes each pixel nine times.
-#[inline]
+#[inline(always)]
 pub fn srgb_encode(linear: f32) -> f32 {
     let linear = linear.clamp(0.0, 1.0);
     let root = linear.sqrt().sqrt();
@@ -133,7 +134,7 @@ enum Curve {
 
 impl Curve {
     /// b and c of L_d = L·(1 + b·L)/(1 + c·L), the same for every pixel.
-    #[inline]
+    #[inline(always)]
     fn terms(self) -> (f32, f32) {
         match self {
             Self::Clamp => (0.0, 0.0),
@@ -169,7 +170,7 @@ impl Display {
     }
 
     /// Linear radiance → linear display values in [0, 1]. Negative radiance shows as black.
-    #[inline]
+    #[inline(always)]
     pub fn map(&self, pixel: Rgb) -> Rgb {
         let exposed = pixel.map(|c| (c * self.exposure).max(0.0));
         let l = luminance(exposed).min(1e30);
@@ -180,21 +181,32 @@ impl Display {
     }
 
     /// Linear radiance → display-encoded sRGB in [0, 1].
-    #[inline]
+    #[inline(always)]
     pub fn encode(&self, pixel: Rgb) -> Rgb {
         self.map(pixel).map(srgb_encode)
     }
 
     /// Linear radiance → display-encoded Rec.709 luminance in [0, 1]: the plane that observers are modelled on.
-    #[inline]
+    #[inline(always)]
     pub fn luma(&self, pixel: Rgb) -> f32 {
         luminance(self.encode(pixel))
     }
+}
 
-    /// [`Display::luma`] of many pixels, given channel by channel; all slices have one length.
-    pub(crate) fn luma_row(self, [r, g, b]: [&[f32]; 3], out: &mut [f32]) {
-        let (r, g, b) = (&r[..out.len()], &g[..out.len()], &b[..out.len()]);
-        (0..out.len()).for_each(|i| out[i] = self.luma([r[i], g[i], b[i]]));
+/// [`Display::luma`] of many pixels. The arithmetic is that of IEEE 754 with any instructions: all processors agree to the bit.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx2", "x86_64+avx2"))]
+pub(crate) fn luma_row(display: &Display, linear: &[Rgb], shown: &mut [f32]) {
+    // Channel by channel, as vector instructions want it; few enough to stay in the nearest cache
+    const PIXELS: usize = 128;
+    let mut channels = [[0.0; PIXELS]; 3];
+    for (linear, shown) in linear.chunks(PIXELS).zip(shown.chunks_mut(PIXELS)) {
+        let [r, g, b] = channels.each_mut().map(|channel| &mut channel[..shown.len()]);
+        for (((pixel, r), g), b) in linear.iter().zip(&mut *r).zip(&mut *g).zip(&mut *b) {
+            [*r, *g, *b] = *pixel;
+        }
+        for (((shown, r), g), b) in shown.iter_mut().zip(r).zip(g).zip(b) {
+            *shown = display.luma([*r, *g, *b]);
+        }
     }
 }
 
@@ -245,6 +257,22 @@ mod tests {
             .fold(0.0, f64::max);
         assert!(worst < 1e-6, "{worst}");
         assert_eq!((srgb_encode(-1.0), srgb_encode(f32::NAN).is_nan()), (0.0, true));
+    }
+
+    /// With whatever instructions this processor has.
+    #[test]
+    fn rows_of_pixels_are_pixels_to_the_bit() {
+        let radiance = |i: usize| (i as f32 * 0.618).fract().powi(5) * 8.0 - 0.01;
+        for width in [1, 7, 8, 127, 128, 129, 300] {
+            let row: Vec<Rgb> =
+                (0..width).map(|i| [radiance(i), radiance(2 * i + 1), radiance(3 * i + 5)]).collect();
+            for tone in [ToneMapping::default(), ToneMapping::Srgb { exposure: 2.0 }] {
+                let (display, mut shown) = (tone.settle(&row), vec![0.0; width]);
+                luma_row(&display, &row, &mut shown);
+                let one_by_one: Vec<f32> = row.iter().map(|&pixel| display.luma(pixel)).collect();
+                assert_eq!(shown, one_by_one, "{width} pixels");
+            }
+        }
     }
 
     #[test]

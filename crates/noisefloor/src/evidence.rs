@@ -1,11 +1,13 @@
 //! What a tile is judged by: its display luminance, and what of it is noise.
 
-use crate::display::{Display, luminance};
+use crate::display::{Display, luma_row, luminance};
 use crate::film::Film;
 use crate::source::Rgb;
 use crate::tile::Tile;
 use ndarray::Array2;
 use serde::{Deserialize, Serialize};
+use std::cell::RefCell;
+use std::ops::Range;
 
 /// How far filters read beyond a tile, in pixels, and the block that tiles are cut into.
 pub const APRON: usize = 8;
@@ -23,6 +25,45 @@ pub enum Evidence {
     Reference,
     /// Nothing: all that the masks let through of the picture counts as noise. For comparison, and no good on texture.
     Alone,
+}
+
+/// What a thread keeps for its next tile.
+#[derive(Default)]
+struct Room {
+    planes: [Vec<f32>; 2],
+    columns: Columns,
+    scratch: Scratch,
+}
+
+/// Which columns of the image a row of the planes shows.
+#[derive(Default)]
+struct Columns {
+    all: Vec<usize>,
+    /// Those that are not mirrored: they follow one another.
+    inside: Range<usize>,
+}
+
+impl Columns {
+    /// Takes a row of the planes from one of the image.
+    fn read(&self, image: &[Rgb], row: &mut [Rgb]) {
+        let Range { start, end } = self.inside;
+        let first = self.all[start];
+        row[start..end].copy_from_slice(&image[first..first + (end - start)]);
+        for i in (0..start).chain(end..row.len()) {
+            row[i] = image[self.all[i]];
+        }
+    }
+}
+
+/// A row of each of several pictures, one after the other.
+#[derive(Default)]
+struct Scratch {
+    linear: Vec<Rgb>,
+    shown: Vec<f32>,
+}
+
+thread_local! {
+    static ROOM: RefCell<Room> = RefCell::default();
 }
 
 /// What is on the screen of a tile, and what of it is noise. All planes are display-encoded and have the same shape (rows,
@@ -49,66 +90,71 @@ impl TilePlanes {
         tile: Tile,
         pixel: impl Fn(usize, usize) -> (Rgb, Rgb),
     ) -> Self {
-        Self::fill((width, height), tile, |y, columns, image, residual| {
-            for &x in columns {
+        Self::fill((width, height), tile, |y, columns, _, image, residual| {
+            for (&x, (image, residual)) in columns.all.iter().zip(image.iter_mut().zip(residual)) {
                 let (shown, noise) = pixel(x, y);
-                image.push(luminance(shown));
-                residual.push(luminance(noise));
+                (*image, *residual) = (luminance(shown), luminance(noise));
             }
         })
     }
 
-    /// As [`TilePlanes::gather`] of `N` linear pictures, of which the first is what is shown. `pixel(x, y)` gives them, and one number
-    /// more; `residual` what is noise, from the display luminances and that number. A verdict spends most of its time here: rows are
-    /// tone mapped channel by channel, so that the compiler can use vector instructions.
+    /// As [`TilePlanes::gather`] of `N` linear pictures, of which the first is what is shown. `read(y, columns, pictures, numbers)` reads
+    /// the pixels of them in row `y` and these columns, and one number more for each; `residual` says what is noise, from the display
+    /// luminances and that number. A verdict spends most of its time here: rows are read and tone mapped channel by channel, in vector
+    /// instructions.
     fn gather_linear<const N: usize>(
         size: (usize, usize),
         tile: Tile,
         display: &Display,
-        mut pixel: impl FnMut(usize, usize) -> ([Rgb; N], f32),
+        mut read: impl FnMut(usize, &Columns, [&mut [Rgb]; N], &mut [f32]),
         residual: impl Fn([f32; N], f32) -> f32,
     ) -> Self {
-        let mut linear: [[Vec<f32>; 3]; N] = std::array::from_fn(|_| Default::default());
-        let mut shown: [Vec<f32>; N] = std::array::from_fn(|_| Vec::new());
-        let mut others = Vec::new();
-        Self::fill(size, tile, |y, columns, image, residuals| {
-            linear.iter_mut().flatten().chain(&mut shown).for_each(|row| row.resize(columns.len(), 0.0));
-            others.resize(columns.len(), 0.0);
-            for (i, &x) in columns.iter().enumerate() {
-                let (pixels, other) = pixel(x, y);
-                for (channels, value) in linear.iter_mut().zip(pixels) {
-                    channels.iter_mut().zip(value).for_each(|(channel, value)| channel[i] = value);
-                }
-                others[i] = other;
+        Self::fill(size, tile, |y, columns, scratch, image, residuals| {
+            let width = columns.all.len();
+            let Scratch { linear, shown } = scratch;
+            linear.resize(N * width, [0.0; 3]);
+            shown.resize(N * width, 0.0);
+            let mut pictures = linear.chunks_exact_mut(width);
+            let pictures = std::array::from_fn(|_| pictures.next().expect("one for each picture"));
+            read(y, columns, pictures, residuals);
+            luma_row(display, linear, shown);
+            image.copy_from_slice(&shown[..width]);
+            for (i, value) in residuals.iter_mut().enumerate() {
+                *value = residual(std::array::from_fn(|n| shown[n * width + i]), *value);
             }
-            for (shown, channels) in shown.iter_mut().zip(&linear) {
-                display.luma_row(channels.each_ref().map(|channel| &channel[..]), shown);
-            }
-            image.extend_from_slice(&shown[0]);
-            let at = |(i, &other): (usize, &f32)| residual(std::array::from_fn(|n| shown[n][i]), other);
-            residuals.extend(others.iter().enumerate().map(at));
         })
     }
 
-    /// Fills both planes row by row: `row(y, columns, image, residual)` appends a row to each, of the pixels of the image that lie in
-    /// row `y` and these columns.
+    /// Fills both planes row by row: `row(y, columns, scratch, image, residual)` fills a row of each, with the pixels of the image
+    /// that lie in row `y` and these columns.
     fn fill(
         (width, height): (usize, usize),
         tile: Tile,
-        mut row: impl FnMut(usize, &[usize], &mut Vec<f32>, &mut Vec<f32>),
+        mut row: impl FnMut(usize, &Columns, &mut Scratch, &mut [f32], &mut [f32]),
     ) -> Self {
         let padded = |edge: usize| edge.next_multiple_of(APRON) + 2 * APRON;
         let shape = (padded(tile.height), padded(tile.width));
-        let columns: Vec<usize> = (0..shape.1).map(|place| mirror(tile.x + place, width)).collect();
-        let plane = || Vec::with_capacity(shape.0 * shape.1);
-        let (mut image, mut residual) = (plane(), plane());
-        for place in 0..shape.0 {
-            row(mirror(tile.y + place, height), &columns, &mut image, &mut residual);
+        let Room { planes: [mut image, mut residual], mut columns, mut scratch } = ROOM.take();
+        image.resize(shape.0 * shape.1, 0.0);
+        residual.resize(shape.0 * shape.1, 0.0);
+        columns.all.clear();
+        columns.all.extend((0..shape.1).map(|place| mirror(tile.x + place, width)));
+        columns.inside = APRON.saturating_sub(tile.x)..(width + APRON - tile.x).min(shape.1);
+        let rows = image.chunks_exact_mut(shape.1).zip(residual.chunks_exact_mut(shape.1));
+        for (place, (image, residual)) in rows.enumerate() {
+            row(mirror(tile.y + place, height), &columns, &mut scratch, image, residual);
         }
+        ROOM.set(Room { planes: Default::default(), columns, scratch });
         let [image, residual] =
             [image, residual].map(|values| Array2::from_shape_vec(shape, values).expect("one value a pixel"));
         let inner = Tile { x: APRON, y: APRON, ..tile };
         Self { image, residual, rounding: 0.0, inner }
+    }
+
+    /// Leaves its memory to the next planes that this thread makes, so that verdicts need not allocate any.
+    pub(crate) fn recycle(self) {
+        let planes = [self.image, self.residual].map(|plane| plane.into_raw_vec_and_offset().0);
+        ROOM.with_borrow_mut(|room| room.planes = planes);
     }
 
     /// Evidence from the film's two halves.
@@ -120,20 +166,34 @@ impl TilePlanes {
     /// A pixel of which one half has no valid sample gives no evidence: its residual is 0.
     pub fn from_halves(film: &Film, display: &Display, tile: Tile) -> Self {
         let grid = film.grid();
-        // The numbers of samples seldom change from pixel to pixel.
-        let (mut counts, mut weight, mut scale) = ([0; 2], Film::weight([0; 2]), 0.0);
-        let pixel = |x, y| {
-            let [(a, na), (b, nb)] = film.pixel_halves(tile.owner(grid, x, y), y * grid.width() + x);
-            if counts != [na, nb] {
-                counts = [na, nb];
-                weight = Film::weight(counts);
-                let (na, nb) = (na as f32, nb as f32);
-                scale = if na > 0.0 && nb > 0.0 { (na / (na + nb) * (nb / (na + nb))).sqrt() } else { 0.0 };
+        let read = |y, columns: &Columns, [mean, a, b]: [&mut [Rgb]; 3], scales: &mut [f32]| {
+            for (half, row) in [&mut *a, &mut *b].into_iter().enumerate() {
+                match film.half_row(half, y) {
+                    Some(of_half) => columns.read(of_half, row),
+                    None => row.fill([0.0; 3]),
+                }
             }
-            ([Film::blend(a, b, weight), a, b], scale)
+            // The numbers of samples change from tile to tile, and from pixel to pixel where some were kept out.
+            let owner = |i: usize| tile.owner(grid, columns.all[i], y);
+            let mut from = 0;
+            while from < mean.len() {
+                let alike = |&i: &usize| film.rejected() == 0 && owner(i) == owner(from);
+                let to = from + 1 + (from + 1..mean.len()).take_while(alike).count();
+                let counts = film.pixel_counts(owner(from), y * grid.width() + columns.all[from]);
+                let [na, nb] = counts.map(|n| n as f32);
+                let both = na > 0.0 && nb > 0.0;
+                scales[from..to].fill(if both { (na / (na + nb) * (nb / (na + nb))).sqrt() } else { 0.0 });
+                let halves = a[from..to].iter().zip(&b[from..to]);
+                let weight = Film::weight(counts);
+                mean[from..to]
+                    .iter_mut()
+                    .zip(halves)
+                    .for_each(|(mean, (&a, &b))| *mean = Film::blend(a, b, weight));
+                from = to;
+            }
         };
         let residual = |[_, a, b]: [f32; 3], scale| (a - b) * scale;
-        Self::gather_linear((grid.width(), grid.height()), tile, display, pixel, residual)
+        Self::gather_linear((grid.width(), grid.height()), tile, display, read, residual)
     }
 
     /// Evidence on `image` from another rendering of the same view, both `width`×`height` pixels. `None` if the two say nothing
@@ -149,9 +209,13 @@ impl TilePlanes {
         samples: Samples,
     ) -> Option<Self> {
         let scale = residual_scale(image.spp, other.spp, samples)?;
-        let pixel = |x, y| ([image, other].map(|rendering| rendering.pixels[y * width + x]), scale);
-        let residual = |[a, b]: [f32; 2], scale| (a - b) * scale;
-        let planes = Self::gather_linear((width, height), tile, display, pixel, residual);
+        let read = |y, columns: &Columns, pictures: [&mut [Rgb]; 2], _: &mut [f32]| {
+            for (picture, rendering) in pictures.into_iter().zip([image, other]) {
+                columns.read(&rendering.pixels[y * width..(y + 1) * width], picture);
+            }
+        };
+        let residual = |[a, b]: [f32; 2], _| (a - b) * scale;
+        let planes = Self::gather_linear((width, height), tile, display, read, residual);
         Some(Self { rounding: (image.rounding + other.rounding) * scale * scale, ..planes })
     }
 
@@ -161,19 +225,27 @@ impl TilePlanes {
     /// If `reference` has fewer pixels than the film.
     pub fn from_reference(film: &Film, display: &Display, reference: &[Rgb], tile: Tile) -> Self {
         let grid = film.grid();
-        let pixel = |x, y| {
-            let pixel = y * grid.width() + x;
-            ([film.pixel(tile.owner(grid, x, y), pixel)], luminance(reference[pixel]))
+        let read = |y, columns: &Columns, [picture]: [&mut [Rgb]; 1], references: &mut [f32]| {
+            for (pixel, &x) in picture.iter_mut().zip(&columns.all) {
+                *pixel = film.pixel(tile.owner(grid, x, y), y * grid.width() + x);
+            }
+            for (number, &x) in references.iter_mut().zip(&columns.all) {
+                *number = luminance(reference[y * grid.width() + x]);
+            }
         };
         let residual = |[shown]: [f32; 1], reference| shown - reference;
-        Self::gather_linear((grid.width(), grid.height()), tile, display, pixel, residual)
+        Self::gather_linear((grid.width(), grid.height()), tile, display, read, residual)
     }
 
     /// No evidence but the picture itself: its residual is the picture.
     pub fn from_picture(film: &Film, display: &Display, tile: Tile) -> Self {
         let grid = film.grid();
-        let pixel = |x, y| ([film.pixel(tile.owner(grid, x, y), y * grid.width() + x)], 0.0);
-        Self::gather_linear((grid.width(), grid.height()), tile, display, pixel, |[shown]: [f32; 1], _| shown)
+        let read = |y, columns: &Columns, [picture]: [&mut [Rgb]; 1], _: &mut [f32]| {
+            for (pixel, &x) in picture.iter_mut().zip(&columns.all) {
+                *pixel = film.pixel(tile.owner(grid, x, y), y * grid.width() + x);
+            }
+        };
+        Self::gather_linear((grid.width(), grid.height()), tile, display, read, |[shown]: [f32; 1], _| shown)
     }
 }
 

@@ -74,7 +74,8 @@ impl Half {
             *mean = new as f32;
             let step = ulp(*mean);
             let rest = if step > 0.0 { (new - f64::from(*mean)) / step * CARRY } else { 0.0 };
-            *carry = rest.round() as i16; // within ±2¹⁵; `as` saturates at the upper end
+            // Rounds, without the call that `round` is; within ±2¹⁵, and `as` saturates at the upper end
+            *carry = (rest + 0.5f64.copysign(rest)) as i16;
         }
     }
 
@@ -238,9 +239,21 @@ impl Film {
     /// If the tile or the pixel does not exist.
     #[inline]
     pub fn pixel_halves(&self, tile: usize, pixel: usize) -> [(Rgb, u64); 2] {
-        std::array::from_fn(|h| match self.halves.get(h) {
-            Some(half) => (half.mean[pixel], self.counts[tile][h] - half.rejected(pixel)),
-            None => ([0.0; 3], 0),
+        let counts = self.pixel_counts(tile, pixel);
+        std::array::from_fn(|h| (self.halves.get(h).map_or([0.0; 3], |half| half.mean[pixel]), counts[h]))
+    }
+
+    /// The means of half A, 0, or B, 1, in a row of the image; none if the half is not kept.
+    pub(crate) fn half_row(&self, half: usize, y: usize) -> Option<&[Rgb]> {
+        let width = self.grid.width();
+        Some(&self.halves.get(half)?.mean[y * width..(y + 1) * width])
+    }
+
+    /// The numbers of samples of [`Film::pixel_halves`].
+    #[inline]
+    pub(crate) fn pixel_counts(&self, tile: usize, pixel: usize) -> [u64; 2] {
+        std::array::from_fn(|h| {
+            self.halves.get(h).map_or(0, |half| self.counts[tile][h] - half.rejected(pixel))
         })
     }
 

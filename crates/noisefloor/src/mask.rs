@@ -1,5 +1,6 @@
 //! The noise mask: an image minus its 3×3 Gaussian blur (Takouachet et al. 2017, §5.1).
 
+use multiversion::multiversion;
 use ndarray::Array2;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
@@ -65,23 +66,46 @@ impl NoiseMask {
         if width == 0 || height == 0 {
             return out;
         }
-        let (n, c) = self.weights();
-        // Blur along columns into one row, then along that row.
-        let mut row = vec![0.0f32; width];
-        for y in 0..height {
-            let (above, here, below) =
-                (plane.row(y.saturating_sub(1)), plane.row(y), plane.row((y + 1).min(height - 1)));
-            for (x, sum) in row.iter_mut().enumerate() {
-                *sum = n * (above[x] + below[x]) + c * here[x];
-            }
-            let mut target = out.row_mut(y);
-            for x in 0..width {
-                let blurred = n * (row[x.saturating_sub(1)] + row[(x + 1).min(width - 1)]) + c * row[x];
-                target[x] = here[x] - blurred;
-            }
+        let mut column = vec![0.0; width];
+        let plane = plane.as_standard_layout();
+        let row = |y: usize| plane.row(y).to_slice().expect("standard layout");
+        for (y, mut target) in out.rows_mut().into_iter().enumerate() {
+            let target = target.as_slice_mut().expect("standard layout");
+            let around = [row(y.saturating_sub(1)), row(y), row((y + 1).min(height - 1))];
+            self.apply_to_row(around, &mut column, target);
         }
         out
     }
+
+    /// The mask of one row of a plane, `here`, which is not empty, into `out`; `column` is room for as many numbers.
+    pub(crate) fn apply_to_row(self, [above, here, below]: [&[f32]; 3], column: &mut [f32], out: &mut [f32]) {
+        mask_row(self.weights(), above, here, below, column, out);
+    }
+}
+
+/// Blurs along columns into one row, then along that row, and takes the blur off.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx2", "x86_64+avx2"))]
+fn mask_row(
+    (n, c): (f32, f32),
+    above: &[f32],
+    here: &[f32],
+    below: &[f32],
+    column: &mut [f32],
+    out: &mut [f32],
+) {
+    let width = out.len();
+    let (above, here, below, column) =
+        (&above[..width], &here[..width], &below[..width], &mut column[..width]);
+    for x in 0..width {
+        column[x] = n * (above[x] + below[x]) + c * here[x];
+    }
+    let masked = |before: f32, middle: f32, after: f32, here: f32| here - (n * (before + after) + c * middle);
+    for x in 1..width.max(1) - 1 {
+        out[x] = masked(column[x - 1], column[x], column[x + 1], here[x]);
+    }
+    let last = width - 1;
+    out[0] = masked(column[0], column[0], column[last.min(1)], here[0]);
+    out[last] = masked(column[last.saturating_sub(1)], column[last], column[last], here[last]);
 }
 
 #[cfg(test)]

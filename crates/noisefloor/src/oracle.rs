@@ -143,7 +143,13 @@ impl Oracle {
         planes: impl Fn(Tile) -> Result<Option<TilePlanes>, E> + Sync,
     ) -> Result<Option<Vec<f32>>, E> {
         let tiles: Vec<Tile> = grid.tiles().collect();
-        let map_of = |&tile: &Tile| Ok(planes(tile)?.map(|p| self.model.descriptor.visible_noise(&p)));
+        let map_of = |&tile: &Tile| {
+            Ok(planes(tile)?.map(|planes| {
+                let map = self.model.descriptor.visible_noise(&planes);
+                planes.recycle();
+                map
+            }))
+        };
         let maps: Vec<_> = tiles.par_iter().map(map_of).collect::<Result<_, _>>()?;
         let mut image = vec![f32::NAN; grid.width() * grid.height()];
         for (tile, map) in tiles.iter().zip(maps) {
@@ -248,7 +254,10 @@ impl StoppingCriterion for Oracle {
             if known.is_some() {
                 return Ok(known.cloned());
             }
-            this.planes(view, tile)?.map(|planes| this.describe(&planes, samples)).transpose()
+            let Some(planes) = this.planes(view, tile)? else { return Ok(None) };
+            let described = this.describe(&planes, samples);
+            planes.recycle();
+            described.map(Some)
         };
         let all: Vec<Tile> = grid.tiles().collect();
         self.described = all.into_par_iter().map(describe).collect::<Result<_, _>>()?;

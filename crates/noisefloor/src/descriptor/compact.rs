@@ -11,7 +11,8 @@
 use super::Described;
 use crate::evidence::{APRON, ROUNDING_LUMINANCE, TilePlanes};
 use crate::mask::NoiseMask;
-use ndarray::{Array2, s};
+use ndarray::Array2;
+use std::cell::RefCell;
 
 /// What the numbers are.
 pub(super) const NAMES: [&str; 6] = [
@@ -46,63 +47,96 @@ const MASKING_KNEE: f32 = 100.0;
 const BRIGHTNESS_OFFSET: f32 = 0.05;
 const BRIGHTNESS_EXPONENT: f32 = 0.6;
 /// Pooling exponent over the blocks of a tile, on amplitudes.
-const POOLING: f32 = 12.0;
+const POOLING: i32 = 12;
 /// Floors in squared 8-bit steps, under logarithms.
 const NOISE_FLOOR: f32 = 1e-3;
 const TEXTURE_FLOOR: f32 = 4.0;
 /// Energies are in squared steps of 8-bit display values.
 const STEP: f32 = 1.0 / 255.0;
 
-/// What the numbers are pooled from, on the grid of 8×8-pixel blocks; energies in squared 8-bit steps.
+/// What the numbers are pooled from, on the grid of 8×8-pixel blocks, row-major, energies in squared 8-bit steps; and room for what
+/// they are made from. Each thread keeps its own, so that a verdict allocates nothing.
+#[derive(Default)]
 struct Blocks {
-    visible: Array2<f32>,
-    texture: Array2<f32>,
+    visible: Vec<f32>,
+    texture: Vec<f32>,
+    noise: [Vec<f32>; SCALES.len()],
+    picture: [Vec<f32>; SCALES.len()],
+    brightness: Vec<f32>,
+    room: Room,
 }
 
-fn blocks(planes: &TilePlanes, mask: NoiseMask) -> Blocks {
-    // Mask energies on blocks: noise, and the picture itself.
-    let noise = energies(&planes.residual, mask, planes.rounding * ROUNDING_LUMINANCE);
-    let picture = energies(&planes.image, mask, 0.0);
-    let brightness = block_means(&planes.image, BLOCK);
+thread_local! {
+    static BLOCKS: RefCell<Blocks> = RefCell::default();
+}
 
-    // Texture is what the picture has more than noise; it masks noise of its own scale.
-    let mut visible = Array2::<f32>::zeros(brightness.dim());
-    let mut texture = Array2::<f32>::zeros(brightness.dim());
-    for scale in 0..SCALES.len() {
-        for (at, sum) in visible.indexed_iter_mut() {
-            let masking = (picture[scale][at] - CERTAIN * noise[scale][at]).max(0.0);
-            *sum += SCALES[scale] * noise[scale][at] / (1.0 + masking / MASKING_KNEE).sqrt();
-            texture[at] += masking;
-        }
+impl Blocks {
+    /// What `use_them` makes of those of a tile.
+    fn with<T>(planes: &TilePlanes, mask: NoiseMask, use_them: impl FnOnce(&Self) -> T) -> T {
+        BLOCKS.with_borrow_mut(|blocks| {
+            blocks.fill(planes, mask);
+            use_them(blocks)
+        })
     }
 
-    visible
-        .zip_mut_with(&brightness, |v, &l| *v *= (l.max(0.0) + BRIGHTNESS_OFFSET).powf(BRIGHTNESS_EXPONENT));
-    Blocks { visible, texture }
+    fn fill(&mut self, planes: &TilePlanes, mask: NoiseMask) {
+        let Self { visible, texture, noise, picture, brightness, room } = self;
+        let (width, residual) = level(&planes.residual);
+        let (_, image) = level(&planes.image);
+        // Mask energies on blocks: noise, and the picture itself.
+        energies(width, residual, mask, planes.rounding * ROUNDING_LUMINANCE, noise, room);
+        energies(width, image, mask, 0.0, picture, room);
+        let rows = image.len() / width;
+        block_means([width, rows], BLOCK, &mut room.sums, brightness, |y, sums| {
+            let row = &image[y * width..(y + 1) * width];
+            sums.iter_mut().zip(row).for_each(|(sum, &value)| *sum += value);
+        });
+
+        // Texture is what the picture has more than noise; it masks noise of its own scale.
+        for sums in [&mut *visible, &mut *texture] {
+            sums.clear();
+            sums.resize(brightness.len(), 0.0);
+        }
+        for ((weight, noise), picture) in SCALES.iter().zip(noise).zip(picture) {
+            for (at, (&mut noise, &mut picture)) in noise.iter_mut().zip(picture).enumerate() {
+                let masking = (picture - CERTAIN * noise).max(0.0);
+                visible[at] += weight * noise / (1.0 + masking / MASKING_KNEE).sqrt();
+                texture[at] += masking;
+            }
+        }
+        for (visible, luma) in visible.iter_mut().zip(brightness) {
+            *visible *= (luma.max(0.0) + BRIGHTNESS_OFFSET).powf(BRIGHTNESS_EXPONENT);
+        }
+    }
 }
 
 /// The tile's own numbers.
 pub(super) fn describe(planes: &TilePlanes, mask: NoiseMask) -> [f32; OWN] {
-    let Blocks { visible, texture } = blocks(planes, mask);
-    // Pool over the blocks. Sums run over ratios to the largest energy, so that no power overflows.
+    Blocks::with(planes, mask, pool)
+}
+
+/// Pools over the blocks. Sums run over ratios to the largest energy, so that no power overflows.
+fn pool(Blocks { visible, texture, .. }: &Blocks) -> [f32; OWN] {
     let blocks = visible.len() as f32;
     let largest = visible.iter().copied().fold(f32::MIN_POSITIVE, f32::max);
-    let pooled = visible.iter().map(|v| (v / largest).powf(0.5 * POOLING)).sum::<f32>() / blocks;
-    let energy = largest * pooled.powf(2.0 / POOLING);
+    let pooled = visible.iter().map(|v| (v / largest).powi(POOLING / 2)).sum::<f32>() / blocks;
+    let energy = largest * pooled.powf(2.0 / POOLING as f32);
     let log_amplitude = |energy: f32| 0.5 * energy.ln();
     [
         log_amplitude(energy + NOISE_FLOOR),
         texture.iter().map(|t| log_amplitude(t + TEXTURE_FLOOR)).sum::<f32>() / blocks,
-        log_amplitude(texture.sum() / blocks + TEXTURE_FLOOR),
+        log_amplitude(texture.iter().sum::<f32>() / blocks + TEXTURE_FLOOR),
     ]
 }
 
 /// The amplitude of visible noise at each pixel of the tile, that of its block, in 8-bit steps. Its mean of order [`POOLING`] over
 /// the blocks is what the first number is the logarithm of.
 pub(super) fn visible_noise(planes: &TilePlanes, mask: NoiseMask) -> Array2<f32> {
-    let Blocks { visible, .. } = blocks(planes, mask);
-    let shape = (planes.inner.height, planes.inner.width);
-    Array2::from_shape_fn(shape, |(y, x)| visible[(y / BLOCK, x / BLOCK)].sqrt())
+    let (height, width) = (planes.inner.height, planes.inner.width);
+    Blocks::with(planes, mask, |Blocks { visible, .. }| {
+        let columns = width.div_ceil(BLOCK);
+        Array2::from_shape_fn((height, width), |(y, x)| visible[y / BLOCK * columns + x / BLOCK].sqrt())
+    })
 }
 
 /// The amplitude behind the first number, in 8-bit steps.
@@ -142,55 +176,94 @@ pub(super) fn project(descriptor: &mut [f32], factor: f32) {
     }
 }
 
-/// Mask energy of a plane with apron at full, half, quarter and eighth resolution, each on the grid of 8×8-pixel blocks, in
+/// Room for the rows and levels on the way to energies on blocks.
+#[derive(Default)]
+struct Room {
+    levels: [Vec<f32>; SCALES.len() - 1],
+    column: Vec<f32>,
+    row: Vec<f32>,
+    sums: Vec<f32>,
+    rough: Vec<f32>,
+}
+
+/// The width of a plane, and its pixels, row-major.
+fn level(plane: &Array2<f32>) -> (usize, &[f32]) {
+    (plane.ncols(), plane.as_slice().expect("planes are in standard layout"))
+}
+
+/// Mask energies of a plane with apron at full, half, quarter and eighth resolution, each on the grid of 8×8-pixel blocks, in
 /// squared 8-bit steps; `rounding` is the known variance of white rounding noise in the plane, which is taken off.
-fn energies(plane: &Array2<f32>, mask: NoiseMask, rounding: f32) -> [Array2<f32>; 4] {
-    let mut level = plane.clone();
-    std::array::from_fn(|scale| {
-        if scale > 0 {
-            level = halve(&level);
-        }
-        let edge = BLOCK >> scale;
-        let squares = mask.apply(&level).mapv_into(|v| v * v);
+fn energies(
+    width: usize,
+    plane: &[f32],
+    mask: NoiseMask,
+    rounding: f32,
+    out: &mut [Vec<f32>; SCALES.len()],
+    room: &mut Room,
+) {
+    let Room { levels, column, row, sums, rough } = room;
+    let [half, quarter, eighth] = levels;
+    halve(width, plane, half);
+    halve(width / 2, half, quarter);
+    halve(width / 4, quarter, eighth);
+    column.resize(width, 0.0);
+    row.resize(width, 0.0);
+    for (scale, (level, out)) in [plane, half, quarter, eighth].into_iter().zip(out).enumerate() {
+        let (width, edge) = (width >> scale, BLOCK >> scale);
+        let row = &mut row[..width];
+        block_means([width, level.len() / width], edge, sums, rough, |y, sums| {
+            // The apron is not summed: there are rows above and below
+            let around = [y - 1, y, y + 1].map(|y| &level[y * width..(y + 1) * width]);
+            mask.apply_to_row(around, column, row);
+            sums.iter_mut().zip(&*row).for_each(|(sum, &value)| *sum += value * value);
+        });
         let known = mask.white_noise_gain() * rounding / (1 << (2 * scale)) as f32;
-        let energy = block_means(&squares, edge);
-        smooth(&energy.mapv_into(|e| (e - known).max(0.0) / (STEP * STEP)))
-    })
+        rough.iter_mut().for_each(|e| *e = (*e - known).max(0.0) / (STEP * STEP));
+        smooth(width / edge - 2, rough, out);
+    }
 }
 
 /// Means of 2×2 pixels.
-fn halve(plane: &Array2<f32>) -> Array2<f32> {
-    let quarter = |dy: usize, dx: usize| plane.slice(s![dy..;2, dx..;2]);
-    let mut sum = &quarter(0, 0) + &quarter(0, 1);
-    sum += &quarter(1, 0);
-    sum += &quarter(1, 1);
-    sum.mapv_into(|v| 0.25 * v)
+fn halve(width: usize, plane: &[f32], out: &mut Vec<f32>) {
+    out.clear();
+    for rows in plane.chunks_exact(2 * width) {
+        let (above, below) = rows.split_at(width);
+        let pairs = above.as_chunks().0.iter().zip(below.as_chunks().0);
+        out.extend(pairs.map(|([a, b], [c, d])| 0.25 * (a + b + c + d)));
+    }
 }
 
-/// Means over blocks of `edge`×`edge` pixels, without the apron, which is one block wide.
-fn block_means(plane: &Array2<f32>, edge: usize) -> Array2<f32> {
-    let (rows, columns) = (plane.nrows() / edge - 2, plane.ncols() / edge - 2);
-    let mut sums = Array2::zeros((rows, columns));
-    for (y, row) in plane.rows().into_iter().enumerate().skip(edge).take(rows * edge) {
-        for (sum, pixels) in
-            sums.row_mut(y / edge - 1).iter_mut().zip(row.exact_chunks(edge).into_iter().skip(1))
-        {
-            *sum += pixels.iter().sum::<f32>();
-        }
+/// Means over blocks of `edge`×`edge` pixels of a plane of [width, height], without the apron, which is one block wide; `add(y, sums)`
+/// adds row `y` to sums along columns.
+fn block_means(
+    [width, height]: [usize; 2],
+    edge: usize,
+    sums: &mut Vec<f32>,
+    out: &mut Vec<f32>,
+    mut add: impl FnMut(usize, &mut [f32]),
+) {
+    out.clear();
+    for block in 1..height / edge - 1 {
+        sums.clear();
+        sums.resize(width, 0.0);
+        (block * edge..(block + 1) * edge).for_each(|y| add(y, sums));
+        let blocks = sums.chunks_exact(edge).skip(1).take(width / edge - 2);
+        out.extend(blocks.map(|block| block.iter().sum::<f32>() / (edge * edge) as f32));
     }
-    sums.mapv_into(|s| s / (edge * edge) as f32)
 }
 
 /// Binomial smoothing 1-2-1 over the grid of blocks, both ways; the edge repeats.
-fn smooth(blocks: &Array2<f32>) -> Array2<f32> {
-    let (rows, columns) = blocks.dim();
+fn smooth(columns: usize, blocks: &[f32], out: &mut Vec<f32>) {
+    let rows = blocks.len() / columns;
     let along = |before: f32, here: f32, after: f32| 0.25 * (before + 2.0 * here + after);
-    let down = Array2::from_shape_fn((rows, columns), |(y, x)| {
-        along(blocks[(y.saturating_sub(1), x)], blocks[(y, x)], blocks[((y + 1).min(rows - 1), x)])
-    });
-    Array2::from_shape_fn((rows, columns), |(y, x)| {
-        along(down[(y, x.saturating_sub(1))], down[(y, x)], down[(y, (x + 1).min(columns - 1))])
-    })
+    out.clear();
+    for y in 0..rows {
+        let [above, here, below] = [y.saturating_sub(1), y, (y + 1).min(rows - 1)].map(|y| y * columns);
+        let down = |x: usize| along(blocks[above + x], blocks[here + x], blocks[below + x]);
+        out.extend(
+            (0..columns).map(|x| along(down(x.saturating_sub(1)), down(x), down((x + 1).min(columns - 1)))),
+        );
+    }
 }
 
 #[cfg(test)]
@@ -241,6 +314,17 @@ mod tests {
         describe(planes, NoiseMask::default()).to_vec()
     }
 
+    fn energies_of(plane: &Array2<f32>, mask: NoiseMask) -> [Vec<f32>; 4] {
+        let mut out = Default::default();
+        let (width, plane) = level(plane);
+        energies(width, plane, mask, 0.0, &mut out, &mut Room::default());
+        out
+    }
+
+    fn mean(values: &[f32]) -> f32 {
+        values.iter().sum::<f32>() / values.len() as f32
+    }
+
     /// Answers of an independent implementation in numpy, in f64.
     #[test]
     fn equals_the_reference_implementation() {
@@ -272,11 +356,11 @@ mod tests {
         });
         let mask = NoiseMask::default();
         let variance = 0.01 * 0.01 * 4.0 / 12.0 / (STEP * STEP);
-        for (scale, energy) in energies(&planes.residual, mask, 0.0).iter().enumerate() {
+        for (scale, energy) in energies_of(&planes.residual, mask).iter().enumerate() {
             let expected = variance * mask.white_noise_gain() / (1 << (2 * scale)) as f32;
             // 4096/4ˢ pixels, neighbours correlated by the mask: a standard error below 2.5 %·2ˢ; 4 σ.
             let tolerance = 0.1 * (1 << scale) as f32;
-            assert!((energy.mean().unwrap() / expected - 1.0).abs() < tolerance, "scale {scale}");
+            assert!((mean(energy) / expected - 1.0).abs() < tolerance, "scale {scale}");
         }
     }
 
@@ -310,7 +394,7 @@ mod tests {
             let recipe = Recipe { seed, base: 0.3, ramp: (0.4, 0.1), checker: (0.1, 5), noise: 0.02 };
             let planes = tile(recipe);
             let map = visible_noise(&planes, NoiseMask::default()).mapv(f64::from);
-            let mean = map.mapv(|v| v.powf(POOLING.into())).mean().unwrap().powf(1.0 / f64::from(POOLING));
+            let mean = map.mapv(|v| v.powi(POOLING)).mean().unwrap().powf(1.0 / f64::from(POOLING));
             let descriptor = describe_tile(&planes);
             let number = 0.5 * (mean * mean + f64::from(NOISE_FLOOR)).ln();
             assert!(
@@ -340,9 +424,9 @@ mod tests {
         let mask = NoiseMask::default();
         // In squared steps: two roundings, 1/12 each.
         let known = mask.white_noise_gain() * ROUNDING_LUMINANCE * 2.0 / 12.0;
-        let [energy, ..] = energies(&planes.residual, mask, 0.0);
+        let [energy, ..] = energies_of(&planes.residual, mask);
         // 4096 pixels: a standard error below 3 %; 4 σ.
-        assert!((energy.mean().unwrap() / known - 1.0).abs() < 0.12, "{energy:?} against {known}");
+        assert!((mean(&energy) / known - 1.0).abs() < 0.12, "{energy:?} against {known}");
     }
 
     fn described(own: [f32; OWN], samples: f64, area: f64) -> Described {

@@ -1,0 +1,35 @@
+//! What a verdict allocates. A program of its own, since counting takes an allocator of its own.
+
+use allocation_counter::{AllocationInfo, measure};
+use noisefloor::{Display, Film, Oracle, StoppingCriterion, TileGrid, View};
+
+/// What the second verdict on all tiles of a picture allocates, on one thread.
+fn of_a_second_verdict(edge: usize, tiles: usize) -> AllocationInfo {
+    let mut film = Film::new(TileGrid::new(edge * tiles, edge, edge).expect("a valid grid"));
+    let tiles: Vec<_> = film.grid().tiles().collect();
+    for value in [0.2, 0.3] {
+        for tile in &tiles {
+            film.add(tile.index, 50, &vec![[value; 3]; tile.pixels()]).expect("it fits");
+        }
+    }
+    let view = View { film: &film, display: &Display::SRGB, reference: None };
+    let mut oracle = Oracle::bundled();
+    let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread");
+    let mut judge = || drop(oracle.judge(&view, &tiles).expect("verdicts"));
+    one.install(|| {
+        judge();
+        measure(judge)
+    })
+}
+
+#[test]
+fn verdicts_allocate_numbers_and_no_pixels() {
+    // A tile of 256×256 pixels has 256 KiB of luminance alone.
+    let (small, large) = (of_a_second_verdict(64, 4), of_a_second_verdict(256, 4));
+    println!("{small:?} {large:?}");
+    assert_eq!((small.count_total, small.bytes_total), (large.count_total, large.bytes_total));
+    let more = of_a_second_verdict(64, 8);
+    let a_tile = (more.bytes_total - small.bytes_total) / 4;
+    println!("{a_tile} bytes a tile");
+    assert!(a_tile < 1024, "{a_tile} bytes a tile");
+}
