@@ -177,18 +177,14 @@ impl TilePlanes {
             let owner = |i: usize| tile.owner(grid, columns.all[i], y);
             let mut from = 0;
             while from < mean.len() {
-                let alike = |&i: &usize| film.rejected() == 0 && owner(i) == owner(from);
+                let of = owner(from);
+                let alike = |&i: &usize| film.rejected() == 0 && owner(i) == of;
                 let to = from + 1 + (from + 1..mean.len()).take_while(alike).count();
-                let counts = film.pixel_counts(owner(from), y * grid.width() + columns.all[from]);
+                let counts = film.pixel_counts(of, y * grid.width() + columns.all[from]);
                 let [na, nb] = counts.map(|n| n as f32);
                 let both = na > 0.0 && nb > 0.0;
                 scales[from..to].fill(if both { (na / (na + nb) * (nb / (na + nb))).sqrt() } else { 0.0 });
-                let halves = a[from..to].iter().zip(&b[from..to]);
-                let weight = Film::weight(counts);
-                mean[from..to]
-                    .iter_mut()
-                    .zip(halves)
-                    .for_each(|(mean, (&a, &b))| *mean = Film::blend(a, b, weight));
+                Film::blend_row(&a[from..to], &b[from..to], Film::weight(counts), &mut mean[from..to]);
                 from = to;
             }
         };

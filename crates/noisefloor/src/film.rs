@@ -275,8 +275,20 @@ impl Film {
 
     /// The mean of halves A and B, by the weight of A.
     #[inline]
-    pub(crate) fn blend(a: Rgb, b: Rgb, weight: f32) -> Rgb {
-        std::array::from_fn(|c| b[c] + (a[c] - b[c]) * weight)
+    fn blend(a: Rgb, b: Rgb, weight: f32) -> Rgb {
+        let mut mean = [[0.0; 3]];
+        Self::blend_row(&[a], &[b], weight, &mut mean);
+        mean[0]
+    }
+
+    /// The means of pixels of halves A and B, by the weight of A.
+    #[inline]
+    pub(crate) fn blend_row(a: &[Rgb], b: &[Rgb], weight: f32, mean: &mut [Rgb]) {
+        let halves = a.as_flattened().iter().zip(b.as_flattened());
+        mean.as_flattened_mut()
+            .iter_mut()
+            .zip(halves)
+            .for_each(|(mean, (a, b))| *mean = b + (a - b) * weight);
     }
 
     /// The picture so far: mean linear radiance, row-major.
