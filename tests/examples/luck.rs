@@ -1,4 +1,4 @@
-//! How often the oracle stops a tile on luck: `luck [SEEDS]` renders pictures of four tiles, one of which holds light that is seldom
+//! How often the oracle stops a tile on luck: `luck [SEEDS [LIGHT]]` renders pictures of four tiles, one of which holds light that is seldom
 //! found, and prints a Markdown table of where that tile stops and what it misses, with and without the guards there are.
 #![allow(clippy::print_stdout, reason = "an example prints")]
 
@@ -124,6 +124,7 @@ fn stop(source: Rare, params: Params) -> Result<(u64, bool, f64), Box<dyn Error>
 
 fn main() -> Result<(), Box<dyn Error>> {
     let seeds: u64 = std::env::args().nth(1).map_or(Ok(100), |n| n.parse())?;
+    let only = std::env::args().nth(2).unwrap_or_default();
     println!(
         "| light | chance | tile | guard | stops at, median | stopped without having found it | noise left, median | 95 % |"
     );
@@ -132,6 +133,9 @@ fn main() -> Result<(), Box<dyn Error>> {
     for (name, place) in
         [("in a black tile", Place::Black), ("caustic", Place::Caustic), ("firefly of 10⁶", Place::Firefly)]
     {
+        if !name.contains(&only) {
+            continue;
+        }
         for chance in [1e-3, 1e-4, 1e-5, 1e-6] {
             for edge in [32, 128] {
                 for (guard, min_samples, consecutive) in guards {

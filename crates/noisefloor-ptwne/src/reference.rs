@@ -4,6 +4,7 @@
 //! # How free of noise
 //! Blocks of [`BLOCK`]² pixels are worked on each on its own. A block first learns which lights it sees. Then its pixels take samples
 //! in two halves, with scrambles of their own, so that half of what the halves differ by is an estimate of the error of their mean.
+//! The block goes on learning from them.
 //! Pixels are shown as the path-traced picture would be, and those whose samples do most against the error take twice as many, until
 //! the root mean square over the block is below [`BOUND`], or pixels have [`MOST`] samples in each half: [`ReferenceNoise`] says what
 //! noise was left.
@@ -163,11 +164,11 @@ struct Block<'a> {
 impl Block<'_> {
     /// Renders the block, and estimates the root mean square of its pixels' errors.
     fn render<'s>(&mut self, tracer: &mut Tracer<'s>, parts: &'s Parts<'s>) -> f32 {
-        if parts.len() > 1 {
-            self.learn(tracer, parts);
-        }
+        let choosy = parts.len() > 1;
+        let mut found = choosy.then(|| self.learn(tracer, parts));
         let mut todo: Vec<usize> = (0..self.pixels.len()).collect();
         loop {
+            tracer.found = found;
             for p in todo {
                 let range = self.pixels[p].count..(2 * self.pixels[p].count).max(FEWEST);
                 self.pixels[p].count = range.end;
@@ -175,6 +176,11 @@ impl Block<'_> {
                     let sum = self.sum(tracer, p, half as u64, range.clone());
                     self.pixels[p].halves[half] += sum;
                 }
+            }
+            // For the next: a light that was missed so far is found seldom, and weighs much
+            found = tracer.found.take();
+            if let Some(found) = &found {
+                tracer.guide = Guide::learned(parts, found);
             }
             let errors = self.errors();
             let total: f32 = errors.iter().sum();
@@ -197,7 +203,7 @@ impl Block<'_> {
     }
 
     /// Learns which lights the block sees.
-    fn learn<'s>(&self, tracer: &mut Tracer<'s>, parts: &'s Parts<'s>) {
+    fn learn<'s>(&self, tracer: &mut Tracer<'s>, parts: &'s Parts<'s>) -> Found {
         let mut found = Found::new(parts);
         for lesson in 0..LESSONS {
             tracer.found = Some(found);
@@ -207,6 +213,7 @@ impl Block<'_> {
             found = tracer.found.take().unwrap_or_else(|| Found::new(parts));
             tracer.guide = Guide::learned(parts, &found);
         }
+        found
     }
 
     /// The sum of some samples of pixel `p`, from one of several sequences.
