@@ -48,11 +48,12 @@ impl Frame {
 #[inline]
 pub(crate) fn floor(x: f32) -> f32 {
     // From 2²³ on all numbers are whole
-    if !(x.abs() < 8_388_608.0) {
-        return x;
+    if x.abs() < 8_388_608.0 {
+        let towards_zero = x as i32 as f32;
+        if towards_zero > x { towards_zero - 1.0 } else { towards_zero }
+    } else {
+        x
     }
-    let towards_zero = x as i32 as f32;
-    if towards_zero > x { towards_zero - 1.0 } else { towards_zero }
 }
 
 /// Sine and cosine of 2π·u for u in [0, 1]: polynomials after a fold to an eighth of a turn, absolute error below 1e-6.
@@ -142,6 +143,29 @@ pub(crate) fn power_heuristic(a: f32, b: f32) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_floor_is_that_of_the_library() {
+        let numbers = [
+            0.0,
+            -0.0,
+            0.5,
+            -0.5,
+            1.0,
+            -1.0,
+            8_388_607.5,
+            -8_388_607.5,
+            8_388_608.0,
+            1e30,
+            -1e30,
+            1e-40,
+            -1e-40,
+        ];
+        for x in numbers.into_iter().chain((0..1000).map(|i| (i as f32 - 500.0) * 0.37)) {
+            assert_eq!(floor(x), x.floor(), "{x}");
+        }
+        assert!(floor(f32::NAN).is_nan() && floor(f32::INFINITY).is_infinite());
+    }
 
     #[test]
     fn turn_is_sine_and_cosine() {
