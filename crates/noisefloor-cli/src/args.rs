@@ -48,7 +48,7 @@ pub enum Command {
 /// Writes into the output folder: image.exr (linear radiance, with samples, probability, stop and visible noise as channels),
 /// image.png, stops.csv (a line a tile), stops.png (heat map over the picture), noise.png (where noise is still seen, and how
 /// strongly), timeline.csv and report.json. Files appear whole or not at all and are refreshed while rendering (--autosave).
-/// Ctrl-C stops all tiles and writes what is there (exit code 130).
+/// Ctrl-C stops all tiles and writes what is there (exit code 130); what was broken off, so or by a kill, goes on with --resume.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   noisefloor render                                  the Cornell box, into out/cornell-box
@@ -57,7 +57,8 @@ pub enum Command {
   noisefloor render --source mitsuba hall/scene.xml  by another renderer; `noisefloor doctor` says which are there
   noisefloor render --criterion spp:1000             for comparison: a fixed number of samples
   noisefloor render --audience art-students          for people who look harder (more samples)
-  noisefloor render --time 60 --against truth.exr    a minute at most; relMSE to a reference in timeline.csv")]
+  noisefloor render --time 60 --against truth.exr    a minute at most; relMSE to a reference in timeline.csv
+  noisefloor render --time 60 --resume               another minute of what the output folder holds")]
 pub struct RenderArgs {
     /// Built-in scene (see `noisefloor scenes`), or a scene file: glTF 2.0 (.gltf, .glb) or Mitsuba XML (.xml); with --source, what
     /// that source reads [default: cornell-box].
@@ -104,6 +105,10 @@ pub struct RenderArgs {
     /// Refresh the files in the output folder every so many seconds while rendering; 0 for never.
     #[arg(long, default_value = "30", value_name = "SECONDS", value_parser = parse_pause)]
     pub autosave: std::time::Duration,
+    /// Go on with the render that the output folder holds, if it was broken off by Ctrl-C, --time or a kill: the picture and its stops are then
+    /// those of a render that was not. Scene and options must be the same. With the built-in renderer, and the oracle or `spp:N`.
+    #[arg(long)]
+    pub resume: bool,
     /// No progress bar and no summary.
     #[arg(long, short)]
     pub quiet: bool,

@@ -4,12 +4,16 @@ use crate::args::RenderArgs;
 use crate::heat_map::{self, Mark, Scale};
 use crate::sources::Source;
 use anyhow::{Context, bail};
-use noisefloor::{Clock, Display, Params, Progress, Rgb, Session, Stop, StopReason, StoppingCriterion};
+use noisefloor::{
+    Checkpoint, Clock, Display, Params, Progress, Rgb, Session, Stop, StopReason, StoppingCriterion,
+};
 use noisefloor_exr::{RenderLayers, check_writable, read_exr, write_atomic, write_exr, write_png};
 use noisefloor_ptwne::ReferenceNoise;
 use noisefloor_rivals::metrics::relative_mse;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::{self, BufReader};
 use std::path::{Path, PathBuf};
 
 /// A picture to compare a render of that size with: linear radiance, row-major, all of it finite.
@@ -26,7 +30,7 @@ pub fn read_reference(path: &Path, (width, height): (usize, usize)) -> anyhow::R
 }
 
 /// One line of timeline.csv.
-#[derive(Clone, Copy, Serialize)]
+#[derive(Clone, Copy, Serialize, Deserialize)]
 struct TimelineRow {
     seconds: f64,
     samples: u64,
@@ -86,6 +90,8 @@ struct Report<'a> {
     reference_samples: Option<f64>,
     reference_deviation: Option<f32>,
     reference_worst: Option<f32>,
+    /// Of the runs that this one goes on with (`--resume`); the others are this run's.
+    seconds_before: f64,
     seconds_source: Option<f64>,
     seconds_oracle: Option<f64>,
     seconds_total: Option<f64>,
@@ -109,7 +115,13 @@ pub struct Output {
     model: Option<ModelFacts>,
     reference: Option<Vec<Rgb>>,
     timeline: Vec<TimelineRow>,
+    /// What checkpoints are of; none if there are none.
+    job: Option<String>,
+    seconds_before: f64,
 }
+
+/// What a render that was broken off goes on from, in its output folder.
+const CHECKPOINT: &str = "checkpoint.nfc";
 
 impl Output {
     /// Makes the folder, and makes sure that files can be written before hours are spent.
@@ -119,13 +131,63 @@ impl Output {
         source: String,
         model: Option<ModelFacts>,
         reference: Option<Vec<Rgb>>,
+        job: Option<String>,
     ) -> anyhow::Result<Self> {
         let folder = args.out.clone().unwrap_or_else(|| Path::new("out").join(&scene));
         std::fs::create_dir_all(&folder).with_context(|| {
             format!("{}: cannot make this folder; choose another with --out", folder.display())
         })?;
         check_writable(folder.join("image.exr"))?;
-        Ok(Self { folder, scene, source, seed: args.renderer.seed, model, reference, timeline: Vec::new() })
+        let (seed, timeline) = (args.renderer.seed, Vec::new());
+        Ok(Self { folder, scene, source, seed, model, reference, timeline, job, seconds_before: 0.0 })
+    }
+
+    /// The output folder, for people.
+    pub fn folder(&self) -> impl std::fmt::Display + '_ {
+        self.folder.display()
+    }
+
+    /// The file of the checkpoint, for people.
+    pub fn checkpoint_file(&self) -> String {
+        self.folder.join(CHECKPOINT).display().to_string()
+    }
+
+    /// The checkpoint in the folder, if there is one.
+    pub fn checkpoint(&self) -> anyhow::Result<Option<Checkpoint<'static>>> {
+        let file = match File::open(self.folder.join(CHECKPOINT)) {
+            Ok(file) => file,
+            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
+            Err(error) => return Err(error).with_context(|| self.checkpoint_file()),
+        };
+        let checkpoint = Checkpoint::read(BufReader::new(file))
+            .with_context(|| format!("{}: remove it to begin anew", self.checkpoint_file()))?;
+        Ok(Some(checkpoint))
+    }
+
+    /// Takes up the history of the render that is gone on with, up to so many samples. If it cannot be read, that is no reason to throw
+    /// samples away.
+    pub fn take_up(&mut self, samples: u64) {
+        let rows =
+            csv::Reader::from_path(self.folder.join("timeline.csv")).map(csv::Reader::into_deserialize);
+        let rows = rows.into_iter().flatten().map_while(Result::ok);
+        self.timeline = rows.take_while(|row: &TimelineRow| row.samples <= samples).collect();
+        self.seconds_before = self.timeline.last().map_or(0.0, |row| row.seconds);
+    }
+
+    /// Writes the checkpoint of a render that is not done, and removes that of one that is.
+    fn write_checkpoint<C: StoppingCriterion>(&self, session: &Session<C>) -> anyhow::Result<()> {
+        let Some(job) = &self.job else { return Ok(()) };
+        let path = self.folder.join(CHECKPOINT);
+        let done = |stop: Stop| matches!(stop.reason, StopReason::Converged | StopReason::MaxSamples);
+        if !session.is_done() || !session.stops().all(done) {
+            return Ok(write_atomic(path, |to| session.checkpoint(job).write(to))?);
+        }
+        match std::fs::remove_file(&path) {
+            Err(error) if error.kind() != io::ErrorKind::NotFound => {
+                Err(error).with_context(|| self.checkpoint_file())
+            }
+            _ => Ok(()),
+        }
     }
 
     /// Notes one batch.
@@ -135,6 +197,7 @@ impl Output {
             .as_ref()
             .and_then(|reference| relative_mse(&session.film().image(), reference).ok());
         let noisefloor::TimelinePoint { seconds, samples, active_tiles } = progress.now;
+        let seconds = self.seconds_before + seconds;
         self.timeline.push(TimelineRow { seconds, samples, active_tiles, rel_mse });
     }
 
@@ -185,6 +248,7 @@ impl Output {
 
         self.write_stops(&tiles)?;
         self.write_timeline()?;
+        self.write_checkpoint(session)?;
         self.write_report(session, &tiles, &display, over)
     }
 
@@ -252,6 +316,7 @@ impl Output {
             reference_samples: noise.map(|n| n.samples),
             reference_deviation: noise.map(|n| n.deviation()),
             reference_worst: noise.map(|n| n.worst()),
+            seconds_before: self.seconds_before,
             seconds_source: clock.map(|c| c.source_seconds),
             seconds_oracle: clock.map(|c| c.criterion_seconds),
             seconds_total: clock.map(|c| c.total_seconds),
@@ -302,6 +367,9 @@ impl Output {
             say_noise(noise);
         }
         println!("written to {}", self.folder.display());
+        if self.folder.join(CHECKPOINT).exists() {
+            println!("the same command with --resume goes on from there");
+        }
     }
 }
 

@@ -1,14 +1,14 @@
 //! `noisefloor render`.
 
 use crate::INTERRUPTED;
-use crate::args::{CriterionChoice, RenderArgs};
+use crate::args::{CriterionChoice, RenderArgs, RendererArgs};
 use crate::output::{ModelFacts, Output, read_reference};
 use crate::sources::{self, Opened, Source};
 use crate::train::bar;
-use anyhow::Context;
+use anyhow::{Context, bail};
 use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressStyle};
 use noisefloor::{
-    Driver, Event, FixedSamples, Progress, ProgressiveSource, Rgb, Session, SourceInfo, StopReason,
+    Driver, Event, FixedSamples, Progress, ProgressiveSource, Repeats, Rgb, Session, SourceInfo, StopReason,
     StoppingCriterion,
 };
 use std::process::ExitCode;
@@ -35,6 +35,11 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<ExitCode> {
         CriterionChoice::Fixed(samples) => {
             drive(Driver::new(source, FixedSamples(*samples), params)?, args, scene, None, reference)
         }
+        CriterionChoice::Rival(spec) if args.resume => {
+            bail!(
+                "--resume does not go with --criterion {spec}, which keeps a state of its own; leave it out"
+            )
+        }
         CriterionChoice::Rival(spec) => {
             let criterion = noisefloor_rivals::parse(spec)?;
             drive(Driver::new(source, criterion, params)?, args, scene, None, reference)
@@ -49,7 +54,21 @@ fn drive<C: StoppingCriterion>(
     model: Option<ModelFacts>,
     reference: Option<Vec<Rgb>>,
 ) -> anyhow::Result<ExitCode> {
-    let mut output = Output::create(args, scene, driver.source().info().name, model, reference)?;
+    let info = driver.source().info();
+    // A rival's state is not kept
+    let keeps = info.repeats == Repeats::Samples && !matches!(args.criterion, CriterionChoice::Rival(_));
+    let job = job(args, &info.name, model.as_ref());
+    let mut output = Output::create(args, scene, info.name, model, reference, keeps.then(|| job.clone()))?;
+    if args.resume {
+        match output.checkpoint()? {
+            Some(checkpoint) => {
+                driver = driver.resume(&job, checkpoint).with_context(|| output.checkpoint_file())?;
+                output.take_up(driver.session().film().total_samples());
+            }
+            None if args.quiet => {}
+            None => eprintln!("there is nothing to go on with in {}: beginning", output.folder()),
+        }
+    }
     driver.set_time_limit(args.time);
     let cancel = driver.cancel_flag();
     cancel_on_signal(Arc::clone(&cancel), AFTER_THIS_BATCH)?;
@@ -91,6 +110,17 @@ fn drive<C: StoppingCriterion>(
         output.summarise(driver.session(), driver.clock(), source.as_ref());
     }
     Ok(if cancelled { ExitCode::from(INTERRUPTED) } else { ExitCode::SUCCESS })
+}
+
+/// What must be the same for a render to be gone on with, beside parameters, criterion and size.
+fn job(args: &RenderArgs, source: &str, model: Option<&ModelFacts>) -> String {
+    let RendererArgs { seed, max_depth, no_mis, sampler, filter, clamp, .. } = &args.renderer;
+    let (scene, threshold) = (args.scene.as_deref().unwrap_or("the default scene"), args.oracle.threshold);
+    let model = model.map_or("no model", |m| &m.digest);
+    format!(
+        "{source}, {scene}, seed {seed}, depth {max_depth:?}, no-mis {no_mis}, sampler {sampler:?}, filter {filter:?}, clamp {clamp:?}, \
+         {model}, threshold {threshold}"
+    )
 }
 
 /// What Ctrl-C does to samples.

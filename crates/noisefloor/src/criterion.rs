@@ -4,7 +4,8 @@ use crate::display::Display;
 use crate::film::Film;
 use crate::params::Audience;
 use crate::source::Rgb;
-use crate::tile::Tile;
+use crate::tile::{Tile, TileGrid};
+use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 /// What a criterion looks at.
@@ -28,7 +29,7 @@ pub struct Needs {
 }
 
 /// What a criterion says of one tile.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Verdict {
     /// Whether the tile needs no more samples.
     pub converged: bool,
@@ -93,6 +94,16 @@ pub trait StoppingCriterion {
         None
     }
 
+    /// What the criterion keeps between verdicts and cannot make again from the film, for a [`crate::Checkpoint`]: nothing, by default.
+    fn state(&self) -> Vec<u8> {
+        Vec::new()
+    }
+
+    /// Takes up what [`StoppingCriterion::state`] gave of a film of such a grid. The bytes may come from anywhere: false if they are not that.
+    fn restore(&mut self, _grid: TileGrid, state: &[u8]) -> bool {
+        state.is_empty()
+    }
+
     /// Judges the tiles named, all of which have samples.
     ///
     /// # Errors
@@ -115,6 +126,14 @@ impl<C: StoppingCriterion + ?Sized> StoppingCriterion for Box<C> {
 
     fn visible_noise(&self, view: &View<'_>) -> Option<Vec<f32>> {
         (**self).visible_noise(view)
+    }
+
+    fn state(&self) -> Vec<u8> {
+        (**self).state()
+    }
+
+    fn restore(&mut self, grid: TileGrid, state: &[u8]) -> bool {
+        (**self).restore(grid, state)
     }
 
     fn judge(&mut self, view: &View<'_>, tiles: &[Tile]) -> Result<Vec<Verdict>, CriterionError> {

@@ -1,10 +1,11 @@
 //! The loop, pulled: a session that asks a source for samples until the criterion is satisfied or a limit says stop.
 
+use crate::checkpoint::{Checkpoint, CheckpointError};
 use crate::criterion::{CriterionError, StoppingCriterion};
 use crate::film::FilmError;
 use crate::params::Params;
 use crate::session::{Session, SessionError, Stop, StopReason};
-use crate::source::{Batch, ProgressiveSource, Request, SourceError};
+use crate::source::{Batch, ProgressiveSource, Repeats, Request, SourceError};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -105,6 +106,8 @@ pub struct Driver<S, C> {
     cancel: Arc<AtomicBool>,
     timeline: Vec<TimelinePoint>,
     clock: Clock,
+    /// Samples that were there before the run.
+    samples_before: u64,
 }
 
 impl<S: ProgressiveSource, C: StoppingCriterion> Driver<S, C> {
@@ -116,7 +119,23 @@ impl<S: ProgressiveSource, C: StoppingCriterion> Driver<S, C> {
         let info = source.info();
         let session = Session::new(info.width, info.height, criterion, params)?;
         let cancel = Arc::new(AtomicBool::new(false));
-        Ok(Self { source, session, time_limit: None, cancel, timeline: Vec::new(), clock: Clock::default() })
+        let (timeline, clock) = (Vec::new(), Clock::default());
+        Ok(Self { source, session, time_limit: None, cancel, timeline, clock, samples_before: 0 })
+    }
+
+    /// Goes on with a run of the same job that was broken off; see [`Session::resume`]. The picture and every decision are then those of a
+    /// run that was not, to the bit.
+    ///
+    /// # Errors
+    /// [`CheckpointError`] as of [`Session::resume`], and if the source does not promise to repeat its samples ([`Repeats::Samples`]):
+    /// what it takes for new could be what the film has already.
+    pub fn resume(mut self, job: &str, checkpoint: Checkpoint<'_>) -> Result<Self, CheckpointError> {
+        let info = self.source.info();
+        if info.repeats != Repeats::Samples {
+            return Err(CheckpointError::Source(info.name));
+        }
+        self.session = self.session.resume(job, checkpoint)?;
+        Ok(self)
     }
 
     /// Stops all tiles once a run has taken so long. A call to the source that has begun is finished first.
@@ -178,6 +197,7 @@ impl<S: ProgressiveSource, C: StoppingCriterion> Driver<S, C> {
 
     fn run_until_done(&mut self, on_event: &mut impl FnMut(&Session<C>, &Event)) -> Result<(), DriverError> {
         let start = Instant::now();
+        self.samples_before = self.session.film().total_samples();
         if self.session.criterion().needs().reference {
             self.fetch_reference(on_event)?;
         }
@@ -279,7 +299,7 @@ impl<S: ProgressiveSource, C: StoppingCriterion> Driver<S, C> {
             active_tiles: self.session.open_tiles(),
         };
         self.timeline.push(now);
-        let seconds_a_sample = now.seconds / now.samples.max(1) as f64;
+        let seconds_a_sample = now.seconds / (now.samples - self.samples_before).max(1) as f64;
         let eta_seconds = self.session.expected_samples_to_go().map(|n| n as f64 * seconds_a_sample);
         let tiles = self.session.film().grid().len();
         on_event(&self.session, &Event::BatchDone(Progress { now, tiles, eta_seconds }));

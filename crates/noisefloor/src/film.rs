@@ -215,6 +215,38 @@ impl Film {
         Ok(tile)
     }
 
+    /// Says what is wrong with a film that was read from somewhere, beside an empty one of the same job.
+    pub(crate) fn check_like(&self, fresh: &Self) -> Result<(), &'static str> {
+        if self.grid != fresh.grid || self.halves.len() != fresh.halves.len() {
+            return Err("its film is not of this job");
+        }
+        let pixels = self.grid.width() * self.grid.height();
+        let complete = |half: &Half| {
+            half.mean.len() == pixels
+                && half.carry.len() == pixels
+                && [0, pixels].contains(&half.rejected.len())
+        };
+        if !self.halves.iter().all(complete) || self.counts.len() != self.grid.len() {
+            return Err("its film has too few or too many pixels");
+        }
+        if !self.halves.iter().flat_map(|half| &half.mean).flatten().all(|c| c.is_finite()) {
+            return Err("a pixel of its film is not finite");
+        }
+        let possible = |tile: Tile| {
+            let halves = || self.halves.iter().zip(self.counts[tile.index]);
+            // Far from where sums overflow
+            self.counts[tile.index].iter().all(|&count| count < 1 << 53)
+                && tile
+                    .rows(self.grid.width())
+                    .flatten()
+                    .all(|pixel| halves().all(|(half, count)| half.rejected(pixel) <= count))
+        };
+        if !self.grid.tiles().all(possible) {
+            return Err("its film counts samples that there cannot be");
+        }
+        Ok(())
+    }
+
     /// Pixels of a tile of which a half that is kept has no valid sample.
     ///
     /// # Panics
@@ -300,6 +332,19 @@ impl Film {
             }
         }
         out
+    }
+}
+
+#[cfg(test)]
+impl Film {
+    /// Makes one of several things wrong.
+    pub(crate) fn corrupt(&mut self, what: usize) {
+        match what {
+            0 => self.halves[0].mean.truncate(3),
+            1 => self.halves[0].mean[0][0] = f32::NAN,
+            2 => self.counts[0][0] = u64::MAX,
+            _ => self.halves[0].rejected = vec![u32::MAX; self.halves[0].mean.len()],
+        }
     }
 }
 

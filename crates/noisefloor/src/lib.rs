@@ -6,6 +6,7 @@
 //!
 //! - A renderer that owns its loop pushes samples into a [`Session`].
 //! - A renderer behind [`ProgressiveSource`] is driven by a [`Driver`].
+//! - A [`Checkpoint`] keeps what either has come to, to go on with in another process.
 //! - [`Oracle`] is the [`StoppingCriterion`] made of a trained [`Model`]; [`FixedSamples`] is the simplest one.
 //! - [`Film`], [`Display`], [`TilePlanes`], [`NoiseMask`], [`Descriptor`] and [`Svm`] are the way from samples to a verdict.
 //! - [`Familiarity`] is what a model has been tried on; elsewhere it asks for twice the samples.
@@ -30,6 +31,8 @@
 
 mod answer;
 mod audience;
+mod checkpoint;
+mod container;
 mod criterion;
 mod descriptor;
 mod display;
@@ -52,6 +55,7 @@ pub mod training;
 
 pub use answer::Answer;
 pub use audience::{AudienceFit, AudienceFitError, MAX_PAIRS, MIN_PAIRS};
+pub use checkpoint::{Checkpoint, CheckpointError};
 pub use criterion::{CriterionError, FixedSamples, Needs, StoppingCriterion, Verdict, View};
 pub use descriptor::{Described, Descriptor, DescriptorError};
 pub use display::{

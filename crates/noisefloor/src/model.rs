@@ -1,8 +1,6 @@
-//! The model file: everything a verdict depends on.
-//!
-//! Layout: magic `NFMODEL` + 0, version (u32), length of the payload (u64), BLAKE3 of the payload (32 bytes), payload
-//! (bincode 2, standard configuration); numbers little-endian. All use of bincode is in this module.
+//! The model file: everything a verdict depends on. Its layout is that of [`container`].
 
+use crate::container::{self, Fault, Format, MAX_PAYLOAD};
 use crate::descriptor::Descriptor;
 use crate::display::ToneMapping;
 use crate::evidence::Evidence;
@@ -13,12 +11,10 @@ use serde::{Deserialize, Serialize};
 use std::io::{self, Read, Write};
 use thiserror::Error;
 
-const MAGIC: [u8; 8] = *b"NFMODEL\0";
+const FORMAT: Format = Format { magic: *b"NFMODEL\0", version: VERSION };
 const VERSION: u32 = 2;
 #[cfg(feature = "bundled-model")]
 static BUNDLED: &[u8] = include_bytes!("../models/human.nfm");
-/// Largest payload that is read: the paper's own model, 9,600 pairs of 2·128² numbers, would have 1.26 GB.
-const MAX_PAYLOAD: u64 = 2 << 30;
 
 /// Why a model cannot be used.
 #[derive(Debug, Error)]
@@ -66,6 +62,19 @@ pub enum ModelError {
         /// Version of this release.
         here: u16,
     },
+}
+
+impl From<Fault> for ModelError {
+    fn from(fault: Fault) -> Self {
+        match fault {
+            Fault::Io(error) => Self::Io(error),
+            Fault::Foreign => Self::Foreign,
+            Fault::Version(found) if found > VERSION => Self::Newer { found },
+            Fault::Version(found) => Self::Older { found },
+            Fault::Damaged(what) => Self::Damaged(what),
+            Fault::Oversized(bytes) => Self::Oversized(bytes),
+        }
+    }
 }
 
 /// Scores of predicted thresholds against human ones, over a set of zones.
@@ -138,47 +147,8 @@ impl Model {
     ///
     /// # Errors
     /// [`ModelError`] if it is foreign, damaged, oversized, newer, older, contradicts itself, or needs another descriptor version.
-    pub fn read(mut from: impl Read) -> Result<Self, ModelError> {
-        // Read the header. A file too short to have one is foreign.
-        let mut magic = [0; 8];
-        let whole = read_up_to(&mut from, &mut magic)?;
-        if !whole || magic != MAGIC {
-            return Err(ModelError::Foreign);
-        }
-        let mut header = [0; 4 + 8 + 32];
-        if !read_up_to(&mut from, &mut header)? {
-            return Err(ModelError::Damaged("it ends within its header".into()));
-        }
-        let (version, rest) = header.split_at(4);
-        let (length, checksum) = rest.split_at(8);
-        let version = u32::from_le_bytes(version.try_into().unwrap_or_default());
-        if version > VERSION {
-            return Err(ModelError::Newer { found: version });
-        }
-        if version < VERSION {
-            return Err(ModelError::Older { found: version });
-        }
-        let length = u64::from_le_bytes(length.try_into().unwrap_or_default());
-        if length > MAX_PAYLOAD {
-            return Err(ModelError::Oversized(length));
-        }
-
-        // Read the payload as far as there is one: memory grows with what arrives, not with what is announced.
-        let mut payload = Vec::new();
-        from.take(length + 1).read_to_end(&mut payload)?;
-        if payload.len() as u64 != length {
-            let relation = if (payload.len() as u64) < length { "ends before" } else { "goes on after" };
-            return Err(ModelError::Damaged(format!("it {relation} the {length} bytes it announces")));
-        }
-        if blake3::hash(&payload).as_bytes() != checksum {
-            return Err(ModelError::Damaged("its checksum differs".into()));
-        }
-        let config = bincode::config::standard().with_limit::<{ MAX_PAYLOAD as usize }>();
-        let (model, used) = bincode::serde::decode_from_slice::<Self, _>(&payload, config)
-            .map_err(|e| ModelError::Damaged(e.to_string()))?;
-        if used != payload.len() {
-            return Err(ModelError::Damaged("it has bytes left over".into()));
-        }
+    pub fn read(from: impl Read) -> Result<Self, ModelError> {
+        let model: Self = FORMAT.read(from)?;
         model.check()?;
         Ok(model)
     }
@@ -187,25 +157,14 @@ impl Model {
     ///
     /// # Errors
     /// [`ModelError::Io`] if it cannot be written, [`ModelError::Invalid`] if it could not be read again.
-    pub fn write(&self, mut to: impl Write) -> Result<(), ModelError> {
+    pub fn write(&self, to: impl Write) -> Result<(), ModelError> {
         self.check()?;
-        let payload = self.payload()?;
-        to.write_all(&MAGIC)?;
-        to.write_all(&VERSION.to_le_bytes())?;
-        to.write_all(&(payload.len() as u64).to_le_bytes())?;
-        to.write_all(blake3::hash(&payload).as_bytes())?;
-        to.write_all(&payload)?;
-        Ok(())
+        Ok(FORMAT.write(self, to)?)
     }
 
     /// BLAKE3 of the content, hexadecimal: names the model in reports.
     pub fn digest(&self) -> String {
-        self.payload().map(|p| blake3::hash(&p).to_hex().to_string()).unwrap_or_default()
-    }
-
-    fn payload(&self) -> Result<Vec<u8>, ModelError> {
-        bincode::serde::encode_to_vec(self, bincode::config::standard())
-            .map_err(|e| ModelError::Invalid(e.to_string()))
+        container::payload(self).map(|p| blake3::hash(&p).to_hex().to_string()).unwrap_or_default()
     }
 
     /// Whether a tile shows texture such as the training zones had, by its raw descriptor; see [`Familiarity`]. Always so if the
@@ -265,15 +224,6 @@ impl Model {
             return invalid("the tone mapping is out of range");
         }
         Ok(())
-    }
-}
-
-/// Fills the buffer; false if the input ends before.
-fn read_up_to(from: &mut impl Read, buffer: &mut [u8]) -> Result<bool, io::Error> {
-    match from.read_exact(buffer) {
-        Ok(()) => Ok(true),
-        Err(e) if e.kind() == io::ErrorKind::UnexpectedEof => Ok(false),
-        Err(e) => Err(e),
     }
 }
 
@@ -422,7 +372,7 @@ pub(crate) mod tests {
 
         #[test]
         fn noise_is_never_a_model(bytes in prop::collection::vec(any::<u8>(), 0..300)) {
-            let framed = [&MAGIC[..], &bytes].concat();
+            let framed = [&FORMAT.magic[..], &bytes].concat();
             prop_assert!(Model::read(&framed[..]).is_err());
             prop_assert!(Model::read(&bytes[..]).is_err());
         }

@@ -1,5 +1,6 @@
 //! The oracle: a trained model as a stopping criterion.
 
+use crate::container;
 use crate::criterion::{CriterionError, Needs, StoppingCriterion, Verdict, View};
 use crate::descriptor::{Described, DescriptorError};
 use crate::evidence::{Evidence, TilePlanes};
@@ -230,6 +231,26 @@ impl StoppingCriterion for Oracle {
 
     fn visible_noise(&self, view: &View<'_>) -> Option<Vec<f32>> {
         self.map_visible_noise(view.film.grid(), |tile| self.planes(view, tile)).ok()?
+    }
+
+    /// What each tile was like when last described: tiles that have stopped count so for the picture, whatever their neighbours, whose
+    /// edges were looked at too, have become.
+    fn state(&self) -> Vec<u8> {
+        container::payload(&self.described).unwrap_or_default()
+    }
+
+    fn restore(&mut self, grid: TileGrid, state: &[u8]) -> bool {
+        let Ok(described) = container::unpack::<Vec<Option<Described>>>(state) else { return false };
+        let sound = |d: &Described| {
+            d.own.len() == self.model.descriptor.own_len()
+                && d.own.iter().all(|v| v.is_finite())
+                && [d.samples, d.area].iter().all(|v| v.is_finite() && *v > 0.0)
+        };
+        let fits = [0, grid.len()].contains(&described.len()) && described.iter().flatten().all(sound);
+        if fits {
+            self.described = described;
+        }
+        fits
     }
 
     /// Tiles that are not named count for the picture as they were when last described: they are looked at again if their

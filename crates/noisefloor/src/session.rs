@@ -1,5 +1,6 @@
 //! The loop, pushed: for a renderer that owns its own.
 
+use crate::checkpoint::{Checkpoint, CheckpointError};
 use crate::criterion::{CriterionError, StoppingCriterion, Verdict, View};
 use crate::display::{Display, ToneMapping};
 use crate::film::{Film, FilmError};
@@ -7,6 +8,7 @@ use crate::params::{Audience, Params, ParamsError};
 use crate::source::{Reference, Request, Rgb};
 use crate::tile::{Tile, TileError, TileGrid};
 use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
 use std::fmt;
 use thiserror::Error;
 
@@ -81,16 +83,16 @@ pub enum SessionError {
     },
 }
 
-#[derive(Clone, Copy, Debug)]
-struct TileState {
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+pub(crate) struct TileState {
     /// Judge at this many samples.
     next: u64,
     /// Verdicts in a row that said "converged".
-    streak: u32,
+    pub(crate) streak: u32,
     verdict: Option<Verdict>,
     /// Converged for the trained audience; this audience wants so many.
     target: Option<u64>,
-    stop: Option<Stop>,
+    pub(crate) stop: Option<Stop>,
 }
 
 /// Film, criterion and limits, for a renderer that owns its loop: it pushes batches, asks which tiles are open and how much
@@ -391,6 +393,41 @@ impl<C: StoppingCriterion> Session<C> {
                 Some(sum + goal.saturating_sub(self.film.samples(index)) * pixels)
             },
         )
+    }
+
+    /// All that the session has come to, to go on with later. `job` is what the caller knows the job by: scene, seed, options.
+    pub fn checkpoint<'a>(&'a self, job: &'a str) -> Checkpoint<'a> {
+        Checkpoint {
+            job: job.into(),
+            criterion: self.criterion.name(),
+            state: self.criterion.state(),
+            params: self.params,
+            display: self.display,
+            film: Cow::Borrowed(&self.film),
+            tiles: Cow::Borrowed(&self.tiles),
+        }
+    }
+
+    /// Goes on where another session of the same job stood, instead of where this one does. Tiles that a limit or a failure had ended are
+    /// open again; those that have converged, or have as many samples as are allowed, are not.
+    ///
+    /// The session goes on to the bit, if what is pushed is the same, and the criterion keeps no state of its own but what
+    /// [`StoppingCriterion::state`] gives, as [`crate::Oracle`] and [`crate::FixedSamples`] do.
+    ///
+    /// # Errors
+    /// [`CheckpointError`] if job, criterion, parameters or image size are not those of the checkpoint, or it does not hold together.
+    pub fn resume(mut self, job: &str, checkpoint: Checkpoint<'_>) -> Result<Self, CheckpointError> {
+        checkpoint.check(job, &self.criterion.name(), &self.params, &self.film)?;
+        if !self.criterion.restore(self.film.grid(), &checkpoint.state) {
+            return Err(CheckpointError::Invalid("what its criterion kept is not that"));
+        }
+        let mut tiles = checkpoint.tiles.into_owned();
+        for state in &mut tiles {
+            let done = |stop: &Stop| matches!(stop.reason, StopReason::Converged | StopReason::MaxSamples);
+            state.stop = state.stop.filter(done);
+        }
+        let film = checkpoint.film.into_owned();
+        Ok(Self { film, tiles, display: checkpoint.display, displayed_reference: None, ..self })
     }
 
     /// Takes the session apart: film, and the display if it has settled.

@@ -1,4 +1,4 @@
-use crate::kit::{FILES, command, json, succeed, table, text};
+use crate::kit::{FILES, command, fail, json, succeed, table, text};
 use crate::learn::Corpora;
 use noisefloor_exr::{read_exr, read_picture};
 use std::fs::File;
@@ -128,4 +128,63 @@ fn a_reader_who_has_had_enough_is_no_fault() {
     let output = command(&["scenes"]).stdout(writer).output().unwrap();
     assert!(output.status.success(), "{output:?}");
     assert_eq!(String::from_utf8_lossy(&output.stderr), "");
+}
+
+/// A render of a few seconds, of which each call of the renderer is a small part.
+fn short<'a>(out: &'a str, more: &[&'a str]) -> Vec<&'a str> {
+    let args = ["render", "--size", "64x64", "--tile", "32", "--criterion", "spp:1500", "--threads", "1"];
+    [&args[..], &["--quiet", "--autosave", "0.1", "--out", out], more].concat()
+}
+
+#[test]
+fn what_was_killed_goes_on_to_the_bit() {
+    let (whole, broken) = (tempdir().unwrap(), tempdir().unwrap());
+    succeed(&short(text(whole.path()), &[]));
+    let out = broken.path();
+    let mut child = command(&short(text(out), &[])).spawn().unwrap();
+    // The report is written last
+    wait_for("the first save", || out.join("report.json").exists().then_some(()));
+    signal(&child, "-KILL");
+    child.wait().unwrap();
+    let samples = |out: &Path| json(&out.join("report.json"))["samples"].as_u64().unwrap();
+
+    // In small steps, then to the end
+    for _ in 0..2 {
+        let before = samples(out);
+        succeed(&short(text(out), &["--resume", "--time", "0.1"]));
+        assert!(before < samples(out) && samples(out) < samples(whole.path()));
+    }
+    succeed(&short(text(out), &["--resume"]));
+    let pixels = |out: &Path| read_exr(out.join("image.exr")).unwrap().pixels;
+    assert!(pixels(out) == pixels(whole.path()));
+    let stops = |out: &Path| std::fs::read(out.join("stops.csv")).unwrap();
+    assert_eq!(stops(out), stops(whole.path()));
+    let report = json(&out.join("report.json"));
+    assert_eq!(report["complete"], true);
+    assert!(report["seconds_before"].as_f64().unwrap() > 0.0);
+    assert!(!out.join("checkpoint.nfc").exists());
+    let (_, rows) = table(&out.join("timeline.csv"));
+    let samples: Vec<u64> = rows.iter().map(|row| row[1].parse().unwrap()).collect();
+    assert!(
+        samples.is_sorted()
+            && samples.last() == Some(&json(&whole.path().join("report.json"))["samples"].as_u64().unwrap())
+    );
+}
+
+#[test]
+fn a_checkpoint_of_another_render_is_refused() {
+    let folder = tempdir().unwrap();
+    let out = text(folder.path());
+    succeed(&short(out, &["--time", "0.01"]));
+    let refused = |more: &[&str], says: &str| fail(&short(out, more), &[says]);
+    refused(&["--resume", "--seed", "2"], "of another job");
+    refused(&["--resume", "--batch", "50"], "set of parameters");
+    let rival = ["render", "--size", "64x64", "--resume", "--out", out, "--criterion", "cycles:0.01"];
+    fail(&rival, &["leave it out"]);
+    let file = folder.path().join("checkpoint.nfc");
+    let bytes = std::fs::read(&file).unwrap();
+    std::fs::write(&file, &bytes[..bytes.len() / 2]).unwrap();
+    refused(&["--resume"], "remove it to begin anew");
+    std::fs::remove_file(&file).unwrap();
+    succeed(&short(out, &["--resume", "--time", "0.01"]));
 }

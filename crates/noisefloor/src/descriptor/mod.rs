@@ -57,7 +57,7 @@ pub enum DescriptorError {
 }
 
 /// A tile's own numbers, and what it takes to see them beside those of the rest of its picture.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Described {
     /// What [`Descriptor::describe`] found.
     pub own: Vec<f32>,
@@ -91,6 +91,14 @@ impl Descriptor {
         match self {
             Self::Compact { .. } => compact::NAMES.len(),
             Self::MaskPair { edge, .. } | Self::LuminancePair { edge } => 2 * edge * edge,
+        }
+    }
+
+    /// Number of a tile's own numbers.
+    pub(crate) fn own_len(&self) -> usize {
+        match self {
+            Self::Compact { .. } => compact::OWN,
+            Self::MaskPair { .. } | Self::LuminancePair { .. } => self.len(),
         }
     }
 

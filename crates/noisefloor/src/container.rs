@@ -1,0 +1,113 @@
+//! Files of this library.
+//!
+//! Layout: magic (8 bytes), version (u32), length of the payload (u64), BLAKE3 of the payload (32 bytes), payload
+//! (bincode 2, standard configuration); numbers little-endian. All use of bincode is in this module.
+
+use serde::{Serialize, de::DeserializeOwned};
+use std::io::{self, Read, Write};
+
+/// Largest payload that is read or written: the paper's own model, 9,600 pairs of 2·128² numbers, would have 1.26 GB.
+pub(crate) const MAX_PAYLOAD: u64 = 2 << 30;
+
+/// A kind of file.
+pub(crate) struct Format {
+    pub(crate) magic: [u8; 8],
+    pub(crate) version: u32,
+}
+
+/// What is wrong with a file.
+#[derive(Debug)]
+pub(crate) enum Fault {
+    Io(io::Error),
+    /// It does not begin with the magic.
+    Foreign,
+    /// It has this version.
+    Version(u32),
+    Damaged(String),
+    /// It has, or announces, a payload of so many bytes.
+    Oversized(u64),
+}
+
+impl From<io::Error> for Fault {
+    fn from(error: io::Error) -> Self {
+        Self::Io(error)
+    }
+}
+
+impl Format {
+    /// Reads what [`Format::write`] wrote.
+    pub(crate) fn read<T: DeserializeOwned>(&self, mut from: impl Read) -> Result<T, Fault> {
+        // Read the header. A file too short to have one is foreign.
+        let mut magic = [0; 8];
+        let whole = read_up_to(&mut from, &mut magic)?;
+        if !whole || magic != self.magic {
+            return Err(Fault::Foreign);
+        }
+        let mut header = [0; 4 + 8 + 32];
+        if !read_up_to(&mut from, &mut header)? {
+            return Err(Fault::Damaged("it ends within its header".into()));
+        }
+        let (version, rest) = header.split_at(4);
+        let (length, checksum) = rest.split_at(8);
+        let version = u32::from_le_bytes(version.try_into().unwrap_or_default());
+        if version != self.version {
+            return Err(Fault::Version(version));
+        }
+        let length = u64::from_le_bytes(length.try_into().unwrap_or_default());
+        if length > MAX_PAYLOAD {
+            return Err(Fault::Oversized(length));
+        }
+
+        // Read the payload as far as there is one: memory grows with what arrives, not with what is announced.
+        let mut payload = Vec::new();
+        from.take(length + 1).read_to_end(&mut payload)?;
+        if payload.len() as u64 != length {
+            let relation = if (payload.len() as u64) < length { "ends before" } else { "goes on after" };
+            return Err(Fault::Damaged(format!("it {relation} the {length} bytes it announces")));
+        }
+        if blake3::hash(&payload).as_bytes() != checksum {
+            return Err(Fault::Damaged("its checksum differs".into()));
+        }
+        unpack(&payload)
+    }
+
+    /// Writes a file.
+    pub(crate) fn write(&self, content: &impl Serialize, mut to: impl Write) -> Result<(), Fault> {
+        let payload = payload(content)?;
+        if payload.len() as u64 > MAX_PAYLOAD {
+            return Err(Fault::Oversized(payload.len() as u64));
+        }
+        to.write_all(&self.magic)?;
+        to.write_all(&self.version.to_le_bytes())?;
+        to.write_all(&(payload.len() as u64).to_le_bytes())?;
+        to.write_all(blake3::hash(&payload).as_bytes())?;
+        to.write_all(&payload)?;
+        Ok(())
+    }
+}
+
+/// The content of bytes that [`payload`] gave.
+pub(crate) fn unpack<T: DeserializeOwned>(payload: &[u8]) -> Result<T, Fault> {
+    let config = bincode::config::standard().with_limit::<{ MAX_PAYLOAD as usize }>();
+    let (content, used) =
+        bincode::serde::decode_from_slice(payload, config).map_err(|e| Fault::Damaged(e.to_string()))?;
+    if used != payload.len() {
+        return Err(Fault::Damaged("it has bytes left over".into()));
+    }
+    Ok(content)
+}
+
+/// The bytes of the content alone.
+pub(crate) fn payload(content: &impl Serialize) -> Result<Vec<u8>, Fault> {
+    bincode::serde::encode_to_vec(content, bincode::config::standard())
+        .map_err(|e| Fault::Damaged(e.to_string()))
+}
+
+/// Fills the buffer; false if the input ends before.
+fn read_up_to(from: &mut impl Read, buffer: &mut [u8]) -> Result<bool, io::Error> {
+    match from.read_exact(buffer) {
+        Ok(()) => Ok(true),
+        Err(e) if e.kind() == io::ErrorKind::UnexpectedEof => Ok(false),
+        Err(e) => Err(e),
+    }
+}
