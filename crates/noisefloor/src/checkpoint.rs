@@ -13,9 +13,9 @@ use thiserror::Error;
 const FORMAT: Format = Format { magic: *b"NFCHECK\0", version: VERSION };
 const VERSION: u32 = 1;
 
-/// All that a session has come to: samples, verdicts and the display; made by [`Session::checkpoint`](crate::Session::checkpoint), gone on
-/// with by [`Session::resume`](crate::Session::resume) and [`Driver::resume`](crate::Driver::resume). A file of it has 18 bytes a pixel for each half that
-/// is kept, or somewhat fewer.
+/// All that a session has come to: samples, verdicts and the display; made by [`Session::checkpoint`](crate::Session::checkpoint), gone
+/// on with by [`Session::resume`](crate::Session::resume) and [`Driver::resume`](crate::Driver::resume). Its file has up to 21 bytes a pixel for
+/// each half that is kept, and writing it takes as much memory again.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Checkpoint<'a> {
     pub(crate) job: Cow<'a, str>,
@@ -88,7 +88,7 @@ impl Checkpoint<'_> {
     /// Writes the checkpoint.
     ///
     /// # Errors
-    /// [`CheckpointError::Io`] if it cannot be written, [`CheckpointError::Oversized`] if it has more than 2 GiB: some 60 million pixels.
+    /// [`CheckpointError::Io`] if it cannot be written, [`CheckpointError::Oversized`] if it has more than 2 GiB: some 50 million pixels.
     pub fn write(&self, to: impl Write) -> Result<(), CheckpointError> {
         Ok(FORMAT.write(self, to)?)
     }
