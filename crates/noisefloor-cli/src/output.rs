@@ -367,7 +367,8 @@ impl Output {
             say_noise(noise);
         }
         println!("written to {}", self.folder.display());
-        if self.folder.join(CHECKPOINT).exists() {
+        // One that is not of this render may lie there too
+        if self.job.is_some() && self.folder.join(CHECKPOINT).exists() {
             println!("the same command with --resume goes on from there");
         }
     }

@@ -57,6 +57,12 @@ fn drive<C: StoppingCriterion>(
     let info = driver.source().info();
     // A rival's state is not kept
     let keeps = info.repeats == Repeats::Samples && !matches!(args.criterion, CriterionChoice::Rival(_));
+    if args.resume && !keeps {
+        bail!(
+            "--resume does not go with {}, which does not promise to go on where it stood; leave it out",
+            info.name
+        )
+    }
     let job = job(args, &info.name, model.as_ref());
     let mut output = Output::create(args, scene, info.name, model, reference, keeps.then(|| job.clone()))?;
     if args.resume {

@@ -141,7 +141,7 @@ impl Wrap {
             }
             .clamp(0, n - 1) as usize
         };
-        (pixel(first), pixel(first + 1), x - x0)
+        (pixel(first), pixel(first.saturating_add(1)), x - x0)
     }
 }
 

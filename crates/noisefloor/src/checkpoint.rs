@@ -116,7 +116,11 @@ impl Checkpoint<'_> {
         }
         let grid = fresh.grid();
         let fits = |(index, state): (usize, &TileState)| {
-            state.streak <= params.consecutive && state.stop.is_none_or(|stop| stop.tile == grid.tile(index))
+            let most = params.max_samples.max(self.film.samples(index) + 1);
+            state.streak <= params.consecutive
+                && state.next <= most
+                && state.target.is_none_or(|target| target <= most)
+                && state.stop.is_none_or(|stop| stop.tile == grid.tile(index))
         };
         if self.tiles.len() != grid.len() || !self.tiles.iter().enumerate().all(fits) {
             return Err(CheckpointError::Invalid("its tiles are not those of its picture"));
@@ -273,6 +277,8 @@ mod tests {
         assert!(!refused(&|_| ()));
         assert!(refused(&|c| c.tiles.to_mut().truncate(3)));
         assert!(refused(&|c| c.tiles.to_mut()[0].streak = u32::MAX));
+        assert!(refused(&|c| c.tiles.to_mut()[0].next = u64::MAX));
+        assert!(refused(&|c| c.tiles.to_mut()[0].target = Some(u64::MAX)));
         assert!(refused(&|c| c.tiles.to_mut().swap(0, 1)));
         assert!(refused(&|c| c.display = Some(crate::ToneMapping::Srgb { exposure: f32::NAN }.settle(&[]))));
         assert!(refused(&|c| c.state = vec![1, 2, 3]));
@@ -280,6 +286,7 @@ mod tests {
         assert!(refused(&|c| c.film.to_mut().corrupt(1)));
         assert!(refused(&|c| c.film.to_mut().corrupt(2)));
         assert!(refused(&|c| c.film.to_mut().corrupt(3)));
+        assert!(refused(&|c| c.film.to_mut().corrupt(4)));
     }
 
     proptest! {

@@ -234,14 +234,14 @@ impl Film {
         }
         let possible = |tile: Tile| {
             let halves = || self.halves.iter().zip(self.counts[tile.index]);
-            // Far from where sums overflow
-            self.counts[tile.index].iter().all(|&count| count < 1 << 53)
+            // Sums over the largest picture, of 2²⁸ pixels, stay within 64 bits
+            self.counts[tile.index].iter().all(|&count| count < 1 << 34)
                 && tile
                     .rows(self.grid.width())
                     .flatten()
                     .all(|pixel| halves().all(|(half, count)| half.rejected(pixel) <= count))
         };
-        if !self.grid.tiles().all(possible) {
+        if !self.grid.tiles().all(possible) || self.rejected > self.total_samples() {
             return Err("its film counts samples that there cannot be");
         }
         Ok(())
@@ -342,7 +342,8 @@ impl Film {
         match what {
             0 => self.halves[0].mean.truncate(3),
             1 => self.halves[0].mean[0][0] = f32::NAN,
-            2 => self.counts[0][0] = u64::MAX,
+            2 => self.counts[0][0] = 1 << 34,
+            3 => self.rejected = u64::MAX,
             _ => self.halves[0].rejected = vec![u32::MAX; self.halves[0].mean.len()],
         }
     }

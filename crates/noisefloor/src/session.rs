@@ -86,12 +86,12 @@ pub enum SessionError {
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub(crate) struct TileState {
     /// Judge at this many samples.
-    next: u64,
+    pub(crate) next: u64,
     /// Verdicts in a row that said "converged".
     pub(crate) streak: u32,
     verdict: Option<Verdict>,
     /// Converged for the trained audience; this audience wants so many.
-    target: Option<u64>,
+    pub(crate) target: Option<u64>,
     pub(crate) stop: Option<Stop>,
 }
 

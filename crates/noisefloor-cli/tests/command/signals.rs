@@ -181,6 +181,17 @@ fn a_checkpoint_of_another_render_is_refused() {
     refused(&["--resume", "--batch", "50"], "set of parameters");
     let rival = ["render", "--size", "64x64", "--resume", "--out", out, "--criterion", "cycles:0.01"];
     fail(&rival, &["leave it out"]);
+    let source = [
+        "render",
+        "--source",
+        "command: render {seed} {spp} {out}",
+        "--size",
+        "64x64",
+        "--out",
+        out,
+        "--resume",
+    ];
+    fail(&source, &["does not promise", "leave it out"]);
     let file = folder.path().join("checkpoint.nfc");
     let bytes = std::fs::read(&file).unwrap();
     std::fs::write(&file, &bytes[..bytes.len() / 2]).unwrap();
