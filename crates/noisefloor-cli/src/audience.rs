@@ -3,7 +3,8 @@
 use crate::args::{AudienceCommand, FitArgs};
 use anyhow::{Context, bail};
 use csv::{ReaderBuilder, Trim};
-use noisefloor::{Audience, AudienceFit, MAX_PAIRS};
+use noisefloor::Audience;
+use noisefloor_learn::{AudienceFit, MAX_PAIRS};
 use serde::Serialize;
 use std::path::Path;
 

@@ -7,12 +7,13 @@ use crate::rivals::{self, Rated};
 use crate::train::{descriptor, held_out, load_table, search};
 use anyhow::{anyhow, bail};
 use noisefloor::Model;
-use noisefloor::evaluation::{
-    Prediction, ReliabilityBin, Scores, Table, calibration_error, constant_noise_baseline, image_accuracy,
-    predict, reliability, scene_median_baseline, score,
+use noisefloor::Scores;
+use noisefloor_image::check_writable;
+use noisefloor_learn::observers_agreeing;
+use noisefloor_learn::{
+    Prediction, ReliabilityBin, Table, calibration_error, constant_noise_baseline, image_accuracy, predict,
+    reliability, scene_median_baseline, score,
 };
-use noisefloor::training::observers_agreeing;
-use noisefloor_exr::check_writable;
 use serde::Serialize;
 
 /// Scores of one way to predict.
@@ -154,7 +155,7 @@ impl Report {
             }
         };
         let levels = || table.zones.iter().flat_map(|z| &z.levels);
-        let real = levels().filter(|l| l.origin == noisefloor::evaluation::Origin::Real).count();
+        let real = levels().filter(|l| l.origin == noisefloor_learn::Origin::Real).count();
         let agreeing = |spp: f64, human: f64| observers_agreeing(spp, human, spread);
         let step = |spp: f64, human: f64| f64::from(u8::from(spp >= human));
         let curve = reliability(predictions.iter(), agreeing);

@@ -3,10 +3,10 @@
 
 use crate::heat_map::{self, Mark, Scale};
 use anyhow::Context;
-use noisefloor::evaluation::{Prediction, ReliabilityBin};
 use noisefloor::{Display, Rgb, Tile};
-use noisefloor_exr::corpus::{Corpus, Encoding};
-use noisefloor_exr::{write_atomic, write_png};
+use noisefloor_image::{write_atomic, write_png};
+use noisefloor_learn::{Corpus, Encoding};
+use noisefloor_learn::{Prediction, ReliabilityBin};
 use plotters::prelude::*;
 use std::collections::BTreeMap;
 use std::fs::create_dir_all;
@@ -99,7 +99,7 @@ fn pictures_of(folder: &Path) -> anyhow::Result<BTreeMap<String, (Picture, Place
                 pixels[(zone.y + i / zone.width) * width + zone.x + i % zone.width] = shown;
             }
         }
-        let place = |z: &noisefloor_exr::corpus::Zone| {
+        let place = |z: &noisefloor_learn::JudgedZone| {
             let tile = Tile { index: z.zone as usize, x: z.x, y: z.y, width: z.width, height: z.height };
             ((z.scene.clone(), z.zone), tile)
         };

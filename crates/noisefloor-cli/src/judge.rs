@@ -4,7 +4,7 @@ use crate::args::JudgeArgs;
 use crate::heat_map::{self, Mark, Scale};
 use anyhow::{Context, bail};
 use noisefloor::{Evidence, Held, Oracle, Samples, Still, Tile, TileGrid, Verdict};
-use noisefloor_exr::{RenderLayers, check_writable, read_picture, write_exr, write_png};
+use noisefloor_image::{RenderLayers, check_writable, read_picture, write_exr, write_png};
 use serde::Serialize;
 use std::path::Path;
 

@@ -7,7 +7,7 @@ use anyhow::{Context, bail};
 use noisefloor::{
     Checkpoint, Clock, Display, Params, Progress, Rgb, Session, Stop, StopReason, StoppingCriterion,
 };
-use noisefloor_exr::{RenderLayers, check_writable, read_exr, write_atomic, write_exr, write_png};
+use noisefloor_image::{RenderLayers, check_writable, read_exr, write_atomic, write_exr, write_png};
 use noisefloor_ptwne::ReferenceNoise;
 use noisefloor_rivals::metrics::relative_mse;
 use serde::{Deserialize, Serialize};

@@ -8,7 +8,7 @@ use crate::render::{cancel_on_signal, reference_bar};
 use crate::sources::{self, Opened};
 use anyhow::{Context, bail};
 use noisefloor::{Reference, ToneMapping};
-use noisefloor_exr::{RenderLayers, check_writable, write_exr, write_png};
+use noisefloor_image::{RenderLayers, check_writable, write_exr, write_png};
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::Arc;

@@ -8,10 +8,11 @@
 use crate::figures::{COLOURS, failed};
 use crate::train::bar;
 use anyhow::{Context, bail};
-use noisefloor::evaluation::{Prediction, Scores, group_of_scene, score};
+use noisefloor::Scores;
 use noisefloor::{Params, Rgb, Schedule, Session, StopReason, StoppingCriterion, ToneMapping, srgb_decode};
-use noisefloor_exr::corpus::{Corpus, Encoding, Level, Zone};
-use noisefloor_exr::write_atomic;
+use noisefloor_image::write_atomic;
+use noisefloor_learn::{Corpus, Encoding, JudgedImage, JudgedZone};
+use noisefloor_learn::{Prediction, group_of_scene, score};
 use noisefloor_rivals::Rival;
 use plotters::prelude::*;
 use rayon::prelude::*;
@@ -51,7 +52,7 @@ pub struct SceneMean {
 
 /// A scene as a rendering that can be followed.
 struct Stack {
-    zones: Vec<Zone>,
+    zones: Vec<JudgedZone>,
     /// Edge of a zone in pixels, and zones in a row.
     edge: usize,
     columns: usize,
@@ -110,10 +111,10 @@ fn constants(rival: &Rival) -> Vec<f64> {
 
 impl Rated {
     /// `stops` are samples per pixel: a row for each constant, a column for each zone.
-    fn of(rival: &'static Rival, zones: &[Zone], stops: &[Vec<f64>]) -> Self {
+    fn of(rival: &'static Rival, zones: &[JudgedZone], stops: &[Vec<f64>]) -> Self {
         let constants = constants(rival);
-        let group = |zone: &Zone| group_of_scene(&zone.scene).to_owned();
-        let predict = |(i, zone): (usize, &Zone)| {
+        let group = |zone: &JudgedZone| group_of_scene(&zone.scene).to_owned();
+        let predict = |(i, zone): (usize, &JudgedZone)| {
             let others = |j: usize| group(&zones[j]) != group(zone);
             let place = unbiased(stops, zones, &others);
             Prediction {
@@ -174,7 +175,7 @@ fn at(stops: &[Vec<f64>], zone: usize, place: f64) -> f64 {
 
 /// The place between constants where the mean of ln(stop/human) over the zones that count is nearest to 0: where a rival agrees with
 /// people on average.
-fn unbiased(stops: &[Vec<f64>], zones: &[Zone], counts: &dyn Fn(usize) -> bool) -> f64 {
+fn unbiased(stops: &[Vec<f64>], zones: &[JudgedZone], counts: &dyn Fn(usize) -> bool) -> f64 {
     let bias = |place: f64| {
         mean(
             zones
@@ -192,12 +193,12 @@ fn unbiased(stops: &[Vec<f64>], zones: &[Zone], counts: &dyn Fn(usize) -> bool) 
 
 impl Stack {
     fn of(corpus: &Corpus, scene: &str) -> anyhow::Result<Self> {
-        let zones: Vec<Zone> = corpus.zones().iter().filter(|z| z.scene == scene).cloned().collect();
+        let zones: Vec<JudgedZone> = corpus.zones().iter().filter(|z| z.scene == scene).cloned().collect();
         let edge = zones[0].width;
         if zones.iter().any(|z| z.width != edge || z.height != edge) {
             bail!("{scene}: rivals need square zones of one size");
         }
-        let mut levels: Vec<Vec<Level>> = zones.iter().map(|_| Vec::new()).collect();
+        let mut levels: Vec<Vec<JudgedImage>> = zones.iter().map(|_| Vec::new()).collect();
         for level in corpus.scene_levels(scene)? {
             let level = level?;
             if let Some(i) = zones.iter().position(|z| z.zone == level.zone) {
@@ -275,7 +276,7 @@ impl Stack {
                 Some(*total)
             })
             .collect();
-        let stop = |(zone, needed): (&Zone, &Vec<f64>)| {
+        let stop = |(zone, needed): (&JudgedZone, &Vec<f64>)| {
             let (first, last) = (zone.first_spp as f64, zone.last_spp as f64);
             let stage = needed.iter().position(|least| *least <= constant);
             let between = |stage: usize| ((totals[stage.saturating_sub(1)] * totals[stage]) as f64).sqrt();
@@ -294,8 +295,8 @@ struct Noise {
 
 impl Noise {
     /// From images by increasing samples.
-    fn of(levels: &[Level]) -> Option<Self> {
-        let linear = |level: &Level| -> Vec<Rgb> {
+    fn of(levels: &[JudgedImage]) -> Option<Self> {
+        let linear = |level: &JudgedImage| -> Vec<Rgb> {
             let decode = |pixel: Rgb| match level.encoding {
                 Encoding::Display => pixel.map(srgb_decode),
                 Encoding::Linear => pixel,
@@ -459,9 +460,9 @@ pub fn draw(path: &Path, model: &[Prediction], rated: &[Rated]) -> anyhow::Resul
 mod tests {
     use super::*;
 
-    fn zone(scene: &str, human_spp: f64) -> Zone {
-        let stack = noisefloor_exr::corpus::ZoneImages::Batches(PathBuf::new());
-        Zone {
+    fn zone(scene: &str, human_spp: f64) -> JudgedZone {
+        let stack = noisefloor_learn::ZoneImages::Batches(PathBuf::new());
+        JudgedZone {
             scene: scene.into(),
             renderer: String::new(),
             zone: 0,
@@ -516,15 +517,15 @@ mod tests {
             sum.iter_mut().for_each(|s| *s += 0.5 * new + 0.4 * new.sqrt() * noise());
             count = last;
             let pixels = sum.iter().map(|s| [s / count as f32; 3]).collect();
-            let inner = noisefloor_exr::corpus::Inner { x: 0, y: 0, width: 64, height: 64 };
-            levels.push(Level {
+            let inner = noisefloor_learn::Inner { x: 0, y: 0, width: 64, height: 64 };
+            levels.push(JudgedImage {
                 scene: "s".into(),
                 zone: 0,
                 first: 0,
                 last,
                 encoding: Encoding::Linear,
                 rounding: 0.0,
-                patch: noisefloor_exr::corpus::Patch { width: 64, height: 64, pixels, inner },
+                patch: noisefloor_learn::Patch { width: 64, height: 64, pixels, inner },
             });
         }
         let noise = Noise::of(&levels).unwrap();

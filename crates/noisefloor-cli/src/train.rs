@@ -3,11 +3,11 @@
 use crate::args::{DataArgs, SearchArgs, TrainArgs};
 use anyhow::{Context, bail};
 use indicatif::{ProgressBar, ProgressStyle};
-use noisefloor::evaluation::{Prediction, Table, score};
-use noisefloor::training::{TrainParams, leave_one_scene_out, train};
 use noisefloor::{Descriptor, Evidence, Model, NoiseMask, SvmParams};
-use noisefloor_exr::table::{describe_corpora, read_table, write_table};
-use noisefloor_exr::{check_writable, write_atomic};
+use noisefloor_image::{check_writable, write_atomic};
+use noisefloor_learn::{Prediction, Table, score};
+use noisefloor_learn::{TrainParams, leave_one_scene_out, train};
+use noisefloor_learn::{describe_corpora, read_table, write_table};
 use noisefloor_study::explore::{Agreement, Step, read_answers, retrain};
 use std::fs::File;
 use std::io::BufReader;

@@ -51,7 +51,7 @@ pub(crate) fn read(path: &Path, place: &Place) -> Result<Picture, LoadError> {
     if !bytes.starts_with(&[0x76, 0x2f, 0x31, 0x01]) {
         return decode(&bytes, &here);
     }
-    let image = noisefloor_exr::read_exr(path).map_err(|e| here.clone().bad(e))?;
+    let image = noisefloor_image::read_exr(path).map_err(|e| here.clone().bad(e))?;
     check_size(image.width as u64, image.height as u64, &here)?;
     Ok(Picture { width: image.width, height: image.height, samples: Samples::Linear(image.pixels) })
 }

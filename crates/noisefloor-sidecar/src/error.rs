@@ -1,6 +1,7 @@
 //! What can go wrong with a renderer in another process. Every message says what, where, and what to do.
 
 use crate::renderer::Renderer;
+use noisefloor_image::PictureError;
 use std::io;
 use std::path::PathBuf;
 use std::process::ExitStatus;
@@ -150,4 +151,83 @@ fn quote(said: &str) -> String {
     let lines: Vec<&str> = said.lines().map(str::trim_end).filter(|line| !line.is_empty()).collect();
     let last = &lines[lines.len().saturating_sub(LINES)..];
     if last.is_empty() { String::new() } else { format!("; its last words: {}", last.join("\n")) }
+}
+
+/// Why a command gave no samples.
+#[derive(Debug, Error)]
+pub enum CommandError {
+    /// The template is not a command.
+    #[error("the command {template:?}: {why}")]
+    Template {
+        /// The command with its placeholders.
+        template: String,
+        /// What is wrong with it, and what to do.
+        why: String,
+    },
+    /// The size of the picture is not known.
+    #[error("the size of the picture is not known: {0}; say it with --size")]
+    Size(String),
+    /// No scratch folder.
+    #[error("{}: no folder for its pictures: {source}; set TMPDIR to a folder that you may write to", folder.display())]
+    Folder {
+        /// The folder for temporary files.
+        folder: PathBuf,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// The program could not be started.
+    #[error("{program}: cannot be started: {source}; check its name and the path")]
+    Start {
+        /// The program.
+        program: String,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// The program ended with an error, or took too long and was killed.
+    #[error("{command}: {how}; its last words: {said}")]
+    Failed {
+        /// The whole command.
+        command: String,
+        /// How it ended.
+        how: String,
+        /// The last lines of its output.
+        said: String,
+    },
+    /// The program left no picture, or several.
+    #[error(
+        "{command}: it left {found} where one picture is expected; write to {{out}}.exr or {{out}}.pfm; its last words: {said}"
+    )]
+    Output {
+        /// The whole command.
+        command: String,
+        /// `no file`, or names of several.
+        found: String,
+        /// The last lines of its output.
+        said: String,
+    },
+    /// The picture has neither the size of the tile nor that of the whole.
+    #[error(
+        "{command}: its picture has {got_width}×{got_height} pixels, neither {width}×{height} as asked for nor those of the whole image"
+    )]
+    Picture {
+        /// The whole command.
+        command: String,
+        /// Width asked for, in pixels.
+        width: usize,
+        /// Height asked for, in pixels.
+        height: usize,
+        /// The picture's width in pixels.
+        got_width: usize,
+        /// The picture's height in pixels.
+        got_height: usize,
+    },
+    /// The picture is display-encoded.
+    #[error("{command}: its picture is a PNG, whose values are clipped and encoded; write EXR or PFM")]
+    Display {
+        /// The whole command.
+        command: String,
+    },
+    /// The picture could not be read.
+    #[error(transparent)]
+    Read(#[from] PictureError),
 }

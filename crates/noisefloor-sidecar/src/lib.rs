@@ -39,6 +39,7 @@
 //! The process ends when its standard input does, and on Linux also with the thread that started it, so that nothing is left behind
 //! even if the parent is killed.
 
+mod command;
 mod error;
 mod frame;
 mod process;
@@ -47,7 +48,8 @@ mod run;
 mod setup;
 mod sidecar;
 
-pub use error::{SetupError, SidecarCause, SidecarError};
+pub use command::{CommandOptions, CommandSource};
+pub use error::{CommandError, SetupError, SidecarCause, SidecarError};
 pub use renderer::{DEFAULT_TIMEOUT, Job, Renderer};
 pub use setup::{HOST, find, install, private_folder, probe};
 pub use sidecar::{Adapter, Sidecar};

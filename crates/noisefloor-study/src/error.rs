@@ -1,7 +1,7 @@
 //! What can go wrong. Every message says what, where, and what to do.
 
 use noisefloor::TileError;
-use noisefloor_exr::{PictureError, StackError, WriteError};
+use noisefloor_image::{PictureError, StackError, WriteError};
 use std::io;
 use std::path::PathBuf;
 use thiserror::Error;

@@ -8,7 +8,7 @@
 //! - [`simulated`] are observers made of numbers, who drive the same server: to test the whole chain, and to plan a study.
 //!
 //! ```
-//! use noisefloor_exr::write_png;
+//! use noisefloor_image::write_png;
 //! use noisefloor_study::{Event, Session, Stage, Study, grids};
 //! use std::sync::Arc;
 //!

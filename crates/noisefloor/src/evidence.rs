@@ -13,7 +13,7 @@ use std::ops::Range;
 pub const APRON: usize = 8;
 
 /// Luminance weights, squared and summed: variance of Y′ for unit variance of R′, G′ and B′.
-pub(crate) const ROUNDING_LUMINANCE: f32 = 0.2126 * 0.2126 + 0.7152 * 0.7152 + 0.0722 * 0.0722;
+pub const ROUNDING_LUMINANCE: f32 = 0.2126 * 0.2126 + 0.7152 * 0.7152 + 0.0722 * 0.0722;
 
 /// What the noisy tile is held against.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]

@@ -27,7 +27,7 @@ impl Familiarity {
 }
 
 /// Distance of `point` to the nearest of `others`, which have its length; infinite if there are none.
-pub(crate) fn nearest<'a>(others: impl IntoIterator<Item = &'a Vec<f32>>, point: &[f32]) -> f32 {
+pub fn nearest<'a>(others: impl IntoIterator<Item = &'a Vec<f32>>, point: &[f32]) -> f32 {
     let distance =
         |other: &Vec<f32>| other.iter().zip(point).map(|(a, b)| (a - b) * (a - b)).sum::<f32>().sqrt();
     others.into_iter().map(distance).fold(f32::INFINITY, f32::min)

@@ -10,8 +10,6 @@
 //! - [`Oracle`] is the [`StoppingCriterion`] made of a trained [`Model`]; [`FixedSamples`] is the simplest one.
 //! - [`Film`], [`Display`], [`TilePlanes`], [`NoiseMask`], [`Descriptor`] and [`Svm`] are the way from samples to a verdict.
 //! - [`Familiarity`] is what a model has been tried on; elsewhere it asks for twice the samples.
-//! - [`AudienceFit`] is the line from the thresholds of one public to those of another.
-//! - [`evaluation`] scores predicted thresholds against human ones; `training`, behind the feature `train`, makes models.
 //!
 //! ```
 //! use noisefloor::{Oracle, Params, Session, StopReason};
@@ -29,15 +27,12 @@
 //! # Ok::<(), noisefloor::SessionError>(())
 //! ```
 
-mod answer;
-mod audience;
 mod checkpoint;
 mod container;
 mod criterion;
 mod descriptor;
 mod display;
 mod driver;
-pub mod evaluation;
 mod evidence;
 mod familiarity;
 mod film;
@@ -50,11 +45,7 @@ mod source;
 mod stills;
 mod svm;
 mod tile;
-#[cfg(feature = "train")]
-pub mod training;
 
-pub use answer::Answer;
-pub use audience::{AudienceFit, AudienceFitError, MAX_PAIRS, MIN_PAIRS};
 pub use checkpoint::{Checkpoint, CheckpointError};
 pub use criterion::{CriterionError, FixedSamples, Needs, StoppingCriterion, Verdict, View};
 pub use descriptor::{Described, Descriptor, DescriptorError};
@@ -62,8 +53,8 @@ pub use display::{
     DEFAULT_KEY, DELTA, Display, ToneMapping, ToneMappingError, luminance, srgb_decode, srgb_encode,
 };
 pub use driver::{Clock, Driver, DriverError, Event, Progress, TimelinePoint};
-pub use evidence::{APRON, Evidence, Rendering, Samples, TilePlanes, residual_scale};
-pub use familiarity::Familiarity;
+pub use evidence::{APRON, Evidence, ROUNDING_LUMINANCE, Rendering, Samples, TilePlanes, residual_scale};
+pub use familiarity::{Familiarity, nearest};
 pub use film::{Film, FilmError};
 pub use mask::{NoiseMask, SigmaError};
 pub use model::{Model, ModelError, Scores, TrainingRecord};

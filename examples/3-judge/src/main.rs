@@ -2,7 +2,7 @@
 #![allow(clippy::print_stdout, reason = "an example prints")]
 
 use noisefloor::{DEFAULT_TILE, Oracle, Rendering, Samples, TileGrid, TilePlanes, ToneMapping};
-use noisefloor_exr::{LinearImage, read_exr};
+use noisefloor_image::{LinearImage, read_exr};
 use std::error::Error;
 use std::process::ExitCode;
 

@@ -1,11 +1,11 @@
 //! Train: learns a model from human thresholds, and scores it on scenes it has not seen.
 #![allow(clippy::print_stdout, reason = "an example prints")]
 
-use noisefloor::evaluation::{Prediction, Table, constant_noise_baseline, score};
-use noisefloor::training::{TrainParams, leave_one_scene_out, train};
 use noisefloor::{DEFAULT_THRESHOLD, Descriptor, Evidence, Model};
-use noisefloor_exr::table::{describe_corpora, read_table};
-use noisefloor_exr::write_atomic;
+use noisefloor_image::write_atomic;
+use noisefloor_learn::{Prediction, Table, constant_noise_baseline, score};
+use noisefloor_learn::{TrainParams, leave_one_scene_out, train};
+use noisefloor_learn::{describe_corpora, read_table};
 use std::error::Error;
 use std::fs::{self, File};
 use std::io::{self, BufReader};

@@ -7,7 +7,7 @@ mod source;
 
 use cornell::cornell_box;
 use noisefloor::{Driver, Event, Oracle, Params};
-use noisefloor_exr::{RenderLayers, write_exr};
+use noisefloor_image::{RenderLayers, write_exr};
 use source::Pbrt;
 use std::error::Error;
 use std::path::Path;
@@ -56,7 +56,7 @@ fn run() -> Result<(), Box<dyn Error>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use noisefloor_tests::check_source;
+    use noisefloor_testkit::check_source;
 
     #[test]
     fn both_integrators_keep_the_contract_of_a_source() {

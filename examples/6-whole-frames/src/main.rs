@@ -71,6 +71,6 @@ mod tests {
 
     #[test]
     fn it_keeps_the_contract_of_a_source() {
-        noisefloor_tests::check_source(|| WholeFrames::new(48, 40));
+        noisefloor_testkit::check_source(|| WholeFrames::new(48, 40));
     }
 }

@@ -1,10 +1,10 @@
-use noisefloor::evaluation::{Table, constant_noise_baseline, scene_median_baseline, score};
-use noisefloor::training::{TrainParams, leave_one_scene_out, train};
 use noisefloor::{DEFAULT_THRESHOLD, Model, SvmParams};
+use noisefloor_learn::{Table, constant_noise_baseline, scene_median_baseline, score};
+use noisefloor_learn::{TrainParams, leave_one_scene_out, train};
 
 fn table() -> Table {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../fixtures/human-table.csv");
-    noisefloor_exr::table::read_table(std::fs::File::open(path).unwrap()).unwrap()
+    noisefloor_learn::read_table(std::fs::File::open(path).unwrap()).unwrap()
 }
 
 /// What the bundled model was trained with; the search among candidates takes minutes and is not repeated here.

@@ -2,9 +2,9 @@ use crate::kit::{Altered, Synthetic, hash};
 use noisefloor::{
     Batch, ProgressiveSource, Reference, Repeats, Request, SourceError, SourceInfo, Tile, Unit,
 };
-use noisefloor_exr::{RenderLayers, StackSource, write_exr};
+use noisefloor_image::{RenderLayers, StackSource, write_exr};
 use noisefloor_ptwne::{Options, Ptwne, scenes};
-use noisefloor_tests::{check_reference_is_free_of_noise, check_source};
+use noisefloor_testkit::{check_reference_is_free_of_noise, check_source};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 const SIZE: (usize, usize) = (48, 40);

@@ -1,10 +1,10 @@
 use crate::kit::{alive, resident, usable};
 use noisefloor::{ProgressiveSource, Repeats, Request, Rgb, SourceError, Tile, TileGrid};
-use noisefloor_exr::{RenderLayers, write_exr};
+use noisefloor_image::{RenderLayers, write_exr};
 use noisefloor_mitsuba::{RENDERER, Variant, open_as};
 use noisefloor_ptwne::{Options, Ptwne, scenes};
 use noisefloor_sidecar::{Job, Sidecar};
-use noisefloor_tests::check_source;
+use noisefloor_testkit::check_source;
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 

@@ -1,6 +1,6 @@
 use noisefloor::{Oracle, Samples, Tile, TilePlanes, residual_scale};
-use noisefloor_exr::corpus::{Corpus, Zone, ZoneImages};
-use noisefloor_exr::{DisplayImage, Picture, read_picture};
+use noisefloor_image::{DisplayImage, Picture, read_picture};
+use noisefloor_learn::{Corpus, JudgedZone, ZoneImages};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
@@ -64,7 +64,7 @@ fn early_pictures_are_noisy_and_last_ones_are_not() {
         // The last picture is held against the early one with most samples: the first has too few to say much
         let most_early = *spp.iter().rfind(|&&n| 2 * n <= spp[spp.len() - 1]).unwrap();
         let [first, middle, last] = [spp[0], most_early, spp[spp.len() - 1]].map(|n| shown(folder, n));
-        let tile = |z: &Zone| Tile { index: 0, x: z.x, y: z.y, width: z.width, height: z.height };
+        let tile = |z: &JudgedZone| Tile { index: 0, x: z.x, y: z.y, width: z.width, height: z.height };
         let tiles: Vec<Tile> = of_scene().map(tile).collect();
         zones += tiles.len();
         early += converged(&oracle, &first, &last, &tiles);

@@ -3,7 +3,7 @@ use noisefloor::{Batch, ProgressiveSource, Request, Rgb, Tile, TileGrid};
 use noisefloor_luxcore::{Engine, Sampler};
 use noisefloor_ptwne::{Options, Ptwne, scenes};
 use noisefloor_sidecar::{Job, Sidecar, SidecarError};
-use noisefloor_tests::check_source;
+use noisefloor_testkit::check_source;
 use std::path::PathBuf;
 
 /// The Cornell box in another renderer's format.

@@ -6,7 +6,7 @@ use crate::heat_map::{Canvas, to_bytes};
 use embedded_graphics::mono_font::iso_8859_1::FONT_7X13;
 use embedded_graphics::text::Alignment;
 use noisefloor::{Rgb, Tile};
-use noisefloor_exr::write_png;
+use noisefloor_image::write_png;
 use std::path::Path;
 
 /// Edge of a crop on the sheet, about, in pixels: small tiles are enlarged by a whole number.

@@ -17,7 +17,7 @@ use crate::train::bar;
 use anyhow::{Context, bail};
 use indicatif::ProgressBar;
 use noisefloor::{Params, Schedule, SourceInfo, StoppingCriterion, TileGrid};
-use noisefloor_exr::write_png;
+use noisefloor_image::write_png;
 use noisefloor_rivals::RIVALS;
 use plots::Panel;
 use quality::{Quality, Yardstick};

@@ -5,7 +5,7 @@ use super::plots::short;
 use super::{Compared, Run, families};
 use anyhow::Context;
 use base64::Engine;
-use noisefloor_exr::write_atomic;
+use noisefloor_image::write_atomic;
 use std::fmt::Write;
 use std::path::Path;
 

@@ -3,7 +3,7 @@
 use super::canvas::Paper;
 use crate::figures::{COLOURS, failed};
 use anyhow::Context;
-use noisefloor_exr::{write_atomic, write_png};
+use noisefloor_image::{write_atomic, write_png};
 use plotters::coord::Shift;
 use plotters::coord::ranged1d::{DefaultFormatting, KeyPointHint};
 use plotters::prelude::*;
@@ -192,8 +192,8 @@ mod tests {
         write(folder.path(), "plot", "samples", &[panel]).unwrap();
         let svg = std::fs::read_to_string(folder.path().join("plot.svg")).unwrap();
         assert!(svg.contains("oracle") && svg.contains("polyline") && svg.contains("<circle"));
-        let png = noisefloor_exr::read_picture(folder.path().join("plot.png")).unwrap();
-        let noisefloor_exr::Picture::Display(image) = png else { panic!("a PNG is a display picture") };
+        let png = noisefloor_image::read_picture(folder.path().join("plot.png")).unwrap();
+        let noisefloor_image::Picture::Display(image) = png else { panic!("a PNG is a display picture") };
         assert_eq!((image.width, image.height), (SIZE.0 as usize, SIZE.1 as usize));
         let blue = |p: &&noisefloor::Rgb| p[2] > 0.6 && p[0] < 0.1;
         assert!(image.pixels.iter().filter(blue).count() > 100, "two circles of the first colour");

@@ -7,7 +7,7 @@ use crate::train::bar;
 use anyhow::{Context, bail};
 use indicatif::ProgressBar;
 use noisefloor::{Film, Repeats, Request, Rgb, TileGrid};
-use noisefloor_exr::{RenderLayers, write_exr};
+use noisefloor_image::{RenderLayers, write_exr};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};

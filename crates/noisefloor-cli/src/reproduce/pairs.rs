@@ -2,8 +2,8 @@
 
 use anyhow::bail;
 use ndarray::Array2;
-use noisefloor::evaluation::{Level, Origin, Table};
 use noisefloor::{Scaler, squared_distances};
+use noisefloor_learn::{Level, Origin, Table};
 use serde::{Deserialize, Serialize};
 
 /// What is written into the rows. The paper does not say.

@@ -5,7 +5,7 @@ use crate::output::write_json;
 use anyhow::bail;
 use ndarray::{Array2, ArrayView2};
 use noisefloor::{SvmParams, fit_svm};
-use noisefloor_exr::write_atomic;
+use noisefloor_image::write_atomic;
 use serde::Serialize;
 use std::io::Write;
 use std::path::Path;

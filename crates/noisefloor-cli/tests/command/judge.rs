@@ -1,5 +1,5 @@
 use crate::kit::{grey_exr, run, stderr, succeed, text, tiny};
-use noisefloor_exr::{Picture, read_exr, read_picture};
+use noisefloor_image::{Picture, read_exr, read_picture};
 use serde_json::Value;
 use std::path::PathBuf;
 use tempfile::tempdir;

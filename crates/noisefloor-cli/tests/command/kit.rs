@@ -1,4 +1,4 @@
-use noisefloor_exr::{RenderLayers, write_exr};
+use noisefloor_image::{RenderLayers, write_exr};
 use serde_json::Value;
 use std::path::Path;
 use std::process::{Command, Output};

@@ -1,7 +1,7 @@
 use crate::kit::{column, fail, json, random, run, succeed, text};
 use noisefloor::Evidence;
-use noisefloor_exr::table::read_table;
-use noisefloor_exr::{RenderLayers, write_exr, write_png};
+use noisefloor_image::{RenderLayers, write_exr, write_png};
+use noisefloor_learn::read_table;
 use noisefloor_study::explore::{Disagreements, Said};
 use serde_json::Value;
 use std::fmt::Write;

@@ -1,5 +1,5 @@
 use crate::kit::{command, fail, succeed, text};
-use noisefloor_exr::{read_exr, read_picture};
+use noisefloor_image::{read_exr, read_picture};
 use std::process::Stdio;
 use std::time::{Duration, Instant};
 use tempfile::tempdir;

@@ -1,5 +1,5 @@
 use crate::kit::{FILES, column, json, succeed, table, text, tiny};
-use noisefloor_exr::{Picture, read_exr, read_picture};
+use noisefloor_image::{Picture, read_exr, read_picture};
 use tempfile::tempdir;
 
 const STOPS: &str = "tile,x,y,width,height,spp,probability,reason,unfamiliar";

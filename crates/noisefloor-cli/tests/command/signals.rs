@@ -1,6 +1,6 @@
 use crate::kit::{FILES, command, fail, json, succeed, table, text};
 use crate::learn::Corpora;
-use noisefloor_exr::{read_exr, read_picture};
+use noisefloor_image::{read_exr, read_picture};
 use std::fs::File;
 use std::path::Path;
 use std::process::{Child, Command, ExitStatus, Stdio};

@@ -1,5 +1,5 @@
 use crate::kit::{column, command, fail, grey_exr, json, succeed, text};
-use noisefloor_exr::read_exr;
+use noisefloor_image::read_exr;
 use std::path::Path;
 use std::process::Command;
 use tempfile::tempdir;

@@ -36,8 +36,8 @@ impl Folder {
 
     /// Adds an EXR.
     pub(crate) fn with_exr(self, name: &str, width: usize, pixels: &[Rgb]) -> Self {
-        let layers = noisefloor_exr::RenderLayers::rgb(width, pixels.len() / width, pixels);
-        noisefloor_exr::write_exr(self.path().join(name), &layers).unwrap();
+        let layers = noisefloor_image::RenderLayers::rgb(width, pixels.len() / width, pixels);
+        noisefloor_image::write_exr(self.path().join(name), &layers).unwrap();
         self
     }
 

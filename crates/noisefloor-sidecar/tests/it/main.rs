@@ -1,6 +1,7 @@
 //! A renderer written in Python over `host.py` that can be told to misbehave. Without Python these tests are skipped, aloud.
 #![allow(clippy::unwrap_used, reason = "a panic in a test is how a test fails")]
 
+mod command;
 mod failures;
 mod kit;
 mod life;

@@ -4,7 +4,7 @@ use super::observers::ObserverRow;
 use super::{Report, TileRow, plots};
 use crate::config::Study;
 use crate::error::StudyError;
-use noisefloor_exr::{write_atomic, write_png};
+use noisefloor_image::{write_atomic, write_png};
 use serde::Serialize;
 use std::fs::{create_dir_all, read_link, remove_file};
 use std::io::Write;
@@ -155,7 +155,7 @@ fn tile_line(t: &TileRow) -> TileLine<'_> {
     }
 }
 
-/// `thresholds.csv` as `noisefloor_exr::corpus` reads it. Thresholds lie within what was offered: one beyond is then taken for a lower bound.
+/// `thresholds.csv` as `noisefloor_image::corpus` reads it. Thresholds lie within what was offered: one beyond is then taken for a lower bound.
 fn corpus(dir: &Path, study: &Study, report: &Report, threshold: Threshold) -> Result<(), StudyError> {
     folder(dir)?;
     let row = |t: &TileRow| {

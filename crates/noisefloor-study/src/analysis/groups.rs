@@ -2,7 +2,8 @@
 
 use super::observers::{Observer, places};
 use crate::config::Study;
-use noisefloor::{Audience, AudienceFit};
+use noisefloor::Audience;
+use noisefloor_learn::AudienceFit;
 use serde::Serialize;
 
 /// The line from the thresholds of the first group to those of another.

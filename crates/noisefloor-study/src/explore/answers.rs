@@ -2,7 +2,8 @@
 
 use crate::error::StoreError;
 use crate::store::{now_ms, settle};
-use noisefloor::{Answer, Descriptor, Evidence};
+use noisefloor::{Descriptor, Evidence};
+use noisefloor_learn::Answer;
 use rusqlite::{Connection, OpenFlags, OptionalExtension, Row, params};
 use serde::Serialize;
 use std::path::{Path, PathBuf};

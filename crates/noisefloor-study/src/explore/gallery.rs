@@ -2,7 +2,7 @@
 
 use crate::error::StudyError;
 use noisefloor::{Samples, Still, StillError, TileError, TileGrid};
-use noisefloor_exr::read_picture_within;
+use noisefloor_image::read_picture_within;
 use serde::Serialize;
 use std::path::Path;
 use std::sync::Arc;

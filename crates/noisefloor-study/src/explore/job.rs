@@ -1,9 +1,10 @@
 //! Retraining in the background: one at a time.
 
 use super::learn::{Learned, Step, retrain};
-use noisefloor::evaluation::Table;
-use noisefloor::training::TrainParams;
-use noisefloor::{Answer, Model};
+use noisefloor::Model;
+use noisefloor_learn::Answer;
+use noisefloor_learn::Table;
+use noisefloor_learn::TrainParams;
 use serde::Serialize;
 use std::sync::{Arc, Mutex, PoisonError};
 

@@ -1,8 +1,8 @@
 //! Learning from disagreements, and what that costs and gains.
 
-use noisefloor::evaluation::{Table, score};
-use noisefloor::training::{TrainError, TrainParams, leave_answers_out, leave_one_scene_out, train};
-use noisefloor::{Answer, DEFAULT_THRESHOLD, Model, Scores};
+use noisefloor::{DEFAULT_THRESHOLD, Model, Scores};
+use noisefloor_learn::{Answer, TrainError, TrainParams, leave_answers_out, leave_one_scene_out, train};
+use noisefloor_learn::{Table, score};
 use serde::Serialize;
 
 /// How many answers a model agrees with.

@@ -1,5 +1,5 @@
 use crate::kit::{Folder, Running, levels, public};
-use noisefloor_exr::corpus::Corpus;
+use noisefloor_learn::Corpus;
 use noisefloor_study::analysis::files::{Threshold, write};
 use noisefloor_study::analysis::{Options, analyse};
 use noisefloor_study::simulated::drive;

@@ -1,4 +1,4 @@
-use noisefloor_exr::write_png;
+use noisefloor_image::write_png;
 use noisefloor_study::explore::{Explorer, Setup};
 use noisefloor_study::simulated::Public;
 use noisefloor_study::{Server, Study};

@@ -1,5 +1,5 @@
 use crate::kit::{Folder, levels, stack};
-use noisefloor_exr::{RenderLayers, write_exr, write_png};
+use noisefloor_image::{RenderLayers, write_exr, write_png};
 use noisefloor_study::{Study, StudyError};
 use std::fs;
 
@@ -80,7 +80,7 @@ fn tiles_hold_the_picture_unchanged() {
     for (tile, png) in wall.grid().tiles().zip(wall.tile_pngs(2).unwrap()) {
         let path = folder.dir.path().join("tile.png");
         fs::write(&path, &png).unwrap();
-        let read = noisefloor_exr::read_png(&path).unwrap();
+        let read = noisefloor_image::read_png(&path).unwrap();
         assert_eq!((read.width, read.height), (tile.width, tile.height));
         let want = tile.rows(70).flatten().map(|i| whole[3 * i]);
         assert!(read.pixels.iter().map(|p| (p[0] * 255.0).round() as u8).eq(want));

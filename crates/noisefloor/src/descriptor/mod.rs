@@ -177,7 +177,7 @@ impl Descriptor {
 
     /// Those of the numbers that are the tile's own texture, and stay as they are when noise falls; empty if the descriptor does not
     /// tell noise from picture.
-    pub(crate) fn texture_of(&self, numbers: &[f32]) -> Vec<f32> {
+    pub fn texture_of(&self, numbers: &[f32]) -> Vec<f32> {
         match self {
             Self::Compact { .. } => compact::TEXTURE.map(|i| numbers[i]).to_vec(),
             Self::MaskPair { .. } | Self::LuminancePair { .. } => Vec::new(),
@@ -185,8 +185,7 @@ impl Descriptor {
     }
 
     /// Standard deviation over the training data that is taken for granted, in the unit of the numbers.
-    #[cfg(feature = "train")]
-    pub(crate) fn least_deviation(&self) -> f64 {
+    pub fn least_deviation(&self) -> f64 {
         match self {
             Self::Compact { .. } => compact::LEAST_DEVIATION,
             Self::MaskPair { .. } | Self::LuminancePair { .. } => 0.0,
@@ -194,7 +193,7 @@ impl Descriptor {
     }
 
     /// How many of the numbers are texture.
-    pub(crate) fn texture_numbers(&self) -> usize {
+    pub fn texture_numbers(&self) -> usize {
         match self {
             Self::Compact { .. } => compact::TEXTURE.len(),
             Self::MaskPair { .. } | Self::LuminancePair { .. } => 0,

@@ -1,0 +1,258 @@
+//! What can go wrong with files. Every message says what, where, and what to do.
+
+use noisefloor::TileError;
+use std::io;
+use std::path::PathBuf;
+use thiserror::Error;
+
+/// Why a picture could not be read.
+#[derive(Debug, Error)]
+pub enum PictureError {
+    /// The operating system gave no bytes.
+    #[error("{}: cannot be read: {source}; check the path and its permissions", path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// The content is not of the format wanted.
+    #[error("{}: is {found}, not {wanted}; formats are told by content, not by name", path.display())]
+    Foreign {
+        /// The file.
+        path: PathBuf,
+        /// What it looks like.
+        found: &'static str,
+        /// What it should be.
+        wanted: &'static str,
+    },
+    /// The file is longer than [`MAX_FILE_BYTES`](crate::MAX_FILE_BYTES).
+    #[error("{}: {bytes} bytes are more than the {limit} that are read; save fewer layers or a smaller image", path.display())]
+    Long {
+        /// The file.
+        path: PathBuf,
+        /// Its length in bytes.
+        bytes: u64,
+        /// The limit in bytes.
+        limit: u64,
+    },
+    /// The header names a size outside the limits of [`noisefloor::check_image`]; no pixel was allocated.
+    #[error("{}: {source}; crop or scale the image", path.display())]
+    Size {
+        /// The file.
+        path: PathBuf,
+        /// The size, and the limits.
+        source: TileError,
+    },
+    /// More pixels than the reader takes; none was allocated.
+    #[error("{}: {width}×{height} pixels are more than the {most} that are taken here; crop the image", path.display())]
+    Large {
+        /// The file.
+        path: PathBuf,
+        /// Width in pixels.
+        width: usize,
+        /// Height in pixels.
+        height: usize,
+        /// Most pixels.
+        most: usize,
+    },
+    /// The image is within the limits but memory for it was refused.
+    #[error("{}: no memory for {width}×{height} pixels; close other programs or use a smaller image", path.display())]
+    Memory {
+        /// The file.
+        path: PathBuf,
+        /// Width in pixels.
+        width: usize,
+        /// Height in pixels.
+        height: usize,
+    },
+    /// The file is cut short or corrupt.
+    #[error("{}: broken {format} file: {reason}; write it again", path.display())]
+    Broken {
+        /// The file.
+        path: PathBuf,
+        /// `"EXR"`, `"PFM"` or `"PNG"`.
+        format: &'static str,
+        /// What the decoder met.
+        reason: String,
+    },
+    /// The EXR has no part with R, G and B, nor a luminance channel Y.
+    #[error("{}: no colour: channel {missing} is missing (it has {found}); save R, G and B, or Y alone for grey", path.display())]
+    Channels {
+        /// The file.
+        path: PathBuf,
+        /// Names of the missing channels, comma-separated.
+        missing: String,
+        /// Names of the channels there are, comma-separated, at most twenty.
+        found: String,
+    },
+    /// A valid file that uses a feature this crate does not read.
+    #[error("{}: {what}; {advice}", path.display())]
+    Unsupported {
+        /// The file.
+        path: PathBuf,
+        /// The feature.
+        what: &'static str,
+        /// What to do about it.
+        advice: &'static str,
+    },
+}
+
+/// Why a file could not be written. What was there before is untouched.
+#[derive(Debug, Error)]
+pub enum WriteError {
+    /// The folder does not exist or is not writable.
+    #[error("{}: cannot write into folder {}: {source}; choose a folder that exists and that you may write to", path.display(), folder.display())]
+    Folder {
+        /// The file wanted.
+        path: PathBuf,
+        /// Its folder.
+        folder: PathBuf,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// The path names something that a file must not replace.
+    #[error("{}: is not the name of a regular file; give a file name that is free or a file's", path.display())]
+    NotAFile {
+        /// The path wanted.
+        path: PathBuf,
+    },
+    /// Pixels and size do not agree, or the size is outside the limits.
+    #[error("{}: {what} holds {got} values, {width}×{height} pixels need {want}; pass one value a pixel", path.display())]
+    Size {
+        /// The file wanted.
+        path: PathBuf,
+        /// Which of the arguments.
+        what: &'static str,
+        /// Width in pixels.
+        width: usize,
+        /// Height in pixels.
+        height: usize,
+        /// Values passed.
+        got: usize,
+        /// Values needed.
+        want: usize,
+    },
+    /// The image is empty or larger than [`noisefloor::check_image`] allows.
+    #[error("{}: {source}; write a smaller image", path.display())]
+    Image {
+        /// The file wanted.
+        path: PathBuf,
+        /// The size, and the limits.
+        source: TileError,
+    },
+    /// Writing failed part of the way.
+    #[error("{}: not written: {source}; check the space on the disk", path.display())]
+    Failed {
+        /// The file wanted.
+        path: PathBuf,
+        /// What went wrong.
+        source: Box<dyn std::error::Error + Send + Sync>,
+    },
+}
+
+/// Why a folder is not a stack, or could not be played back.
+#[derive(Debug, Error)]
+pub enum StackError {
+    /// The folder cannot be listed.
+    #[error("{}: cannot list the folder: {source}; check the path and its permissions", dir.display())]
+    Folder {
+        /// The folder.
+        dir: PathBuf,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// No image in the folder is named as one of a stack.
+    #[error("{}: no stack here; name images by their samples per pixel (00100.png, 00100.exr) or batch_<first>_<last>.exr", dir.display())]
+    Nothing {
+        /// The folder.
+        dir: PathBuf,
+    },
+    /// The folder holds images of both layouts.
+    #[error("{}: holds both running means and batch_*.exr; keep them in folders of their own", dir.display())]
+    Ambiguous {
+        /// The folder.
+        dir: PathBuf,
+    },
+    /// A name that does not say which samples are in the image.
+    #[error("{}: {why}; expected NNNNN.png or NNNNN.exr with at least 1 sample, or batch_<first>_<last>.exr with first < last", path.display())]
+    Name {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with its name.
+        why: &'static str,
+    },
+    /// The first batch does not start at sample 0.
+    #[error("{}: the first batch starts at sample {first}, not 0; add the batches before it", path.display())]
+    Start {
+        /// The first batch.
+        path: PathBuf,
+        /// Where it starts.
+        first: u64,
+    },
+    /// Samples are missing between two batches.
+    #[error("samples {from} to {to} are missing between {} and {}; add the batch or remove all after it", before.display(), after.display())]
+    Gap {
+        /// The batch before the gap.
+        before: PathBuf,
+        /// The batch after it.
+        after: PathBuf,
+        /// Samples before the gap.
+        from: u64,
+        /// Samples before the next batch.
+        to: u64,
+    },
+    /// Two images hold the same samples.
+    #[error("{} and {} hold the same samples; remove one", one.display(), other.display())]
+    Overlap {
+        /// One image.
+        one: PathBuf,
+        /// The other.
+        other: PathBuf,
+    },
+    /// An image differs in size from the rest of its stack.
+    #[error("{}: {got_width}×{got_height} pixels, but its stack has {width}×{height}; render it again at that size", path.display())]
+    Size {
+        /// The image.
+        path: PathBuf,
+        /// The stack's width in pixels.
+        width: usize,
+        /// The stack's height in pixels.
+        height: usize,
+        /// The image's width in pixels.
+        got_width: usize,
+        /// The image's height in pixels.
+        got_height: usize,
+    },
+    /// A request for samples from the middle of a stored batch.
+    #[error(
+        "no stored batch starts at sample {first}; a stack is played back from 0, batch by batch: {near} is the nearest start"
+    )]
+    Boundary {
+        /// The first sample asked for.
+        first: u64,
+        /// The nearest start of a batch, or the end of the stack.
+        near: u64,
+    },
+    /// A request for a tile that is not inside the image.
+    #[error(
+        "a tile of {tile_width}×{tile_height} pixels at {x}, {y} is not inside the {width}×{height} image; cut tiles with a TileGrid of that size"
+    )]
+    Tile {
+        /// Left edge in pixels.
+        x: usize,
+        /// Top edge in pixels.
+        y: usize,
+        /// The tile's width in pixels.
+        tile_width: usize,
+        /// The tile's height in pixels.
+        tile_height: usize,
+        /// The image's width in pixels.
+        width: usize,
+        /// The image's height in pixels.
+        height: usize,
+    },
+    /// An image could not be read.
+    #[error(transparent)]
+    Picture(#[from] PictureError),
+}

@@ -1,0 +1,102 @@
+use crate::util::{f32s, make_exr};
+use exr::prelude::{Compression, FlatSamples, f16};
+use noisefloor_image::{RenderLayers, read_picture, write_exr, write_png};
+use proptest::prelude::*;
+use std::path::Path;
+use std::sync::OnceLock;
+
+/// Small valid files: an EXR a compression, and a PNG.
+fn originals() -> &'static [Vec<u8>] {
+    static FILES: OnceLock<Vec<Vec<u8>>> = OnceLock::new();
+    FILES.get_or_init(|| {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a");
+        let mut files = Vec::new();
+        let values: Vec<f32> = (0..20 * 18).map(|i| ((i * 37) % 101) as f32 / 7.0).collect();
+        for compression in [
+            Compression::Uncompressed,
+            Compression::RLE,
+            Compression::PIZ,
+            Compression::PXR24,
+            Compression::B44,
+        ] {
+            let half = || FlatSamples::F16(values.iter().map(|v| f16::from_f32(*v)).collect());
+            let channels = vec![("R", half()), ("G", half()), ("B", f32s(&values))];
+            make_exr(&path, (20, 18), channels, compression, (0, 0), None);
+            files.push(std::fs::read(&path).unwrap());
+        }
+        let rgb: Vec<[f32; 3]> = values.iter().map(|v| [*v; 3]).collect();
+        write_exr(&path, &RenderLayers::rgb(20, 18, &rgb)).unwrap();
+        files.push(std::fs::read(&path).unwrap());
+        let bytes: Vec<u8> = (0..20 * 18 * 3).map(|i| (i * 7 % 256) as u8).collect();
+        write_png(&path, 20, 18, &bytes).unwrap();
+        files.push(std::fs::read(&path).unwrap());
+        files
+    })
+}
+
+/// Reads the bytes as a file: a picture whose pixels fit its size, or an error that names the file.
+fn check(path: &Path, bytes: &[u8]) -> bool {
+    std::fs::write(path, bytes).unwrap();
+    match read_picture(path) {
+        Ok(picture) => {
+            let (width, height) = picture.size();
+            assert_eq!(picture.into_linear().pixels.len(), width * height);
+            true
+        }
+        Err(error) => {
+            assert!(error.to_string().contains("hostile"), "{error}");
+            false
+        }
+    }
+}
+
+#[test]
+fn every_cut_is_an_error() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("hostile");
+    for (file, bytes) in originals().iter().enumerate() {
+        assert!(check(&path, bytes));
+        // The last chunk of a PNG (12 bytes) holds nothing
+        let needed = if bytes.starts_with(b"\x89PNG") { bytes.len() - 12 } else { bytes.len() };
+        for length in (0..needed).step_by(if bytes.len() > 2000 { 13 } else { 1 }) {
+            assert!(!check(&path, &bytes[..length]), "file {file} cut to {length} bytes");
+        }
+    }
+}
+
+#[test]
+fn every_byte_of_a_header_may_be_wrong() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("hostile");
+    for bytes in originals() {
+        for at in 0..bytes.len().min(450) {
+            for value in [0x00, 0x01, 0x7f, 0x80, 0xff] {
+                let mut bytes = bytes.clone();
+                bytes[at] = value;
+                check(&path, &bytes);
+            }
+        }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(1500))]
+    #[test]
+    fn flipped_bytes_never_panic(
+        file in 0usize..7,
+        flips in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..8),
+        length in prop::option::weighted(0.2, any::<prop::sample::Index>()),
+    ) {
+        let folder = tempfile::tempdir().unwrap();
+        let mut bytes = originals()[file].clone();
+        for (at, value) in flips {
+            let at = at.index(bytes.len());
+            bytes[at] = value;
+        }
+        if let Some(length) = length {
+            bytes.truncate(length.index(bytes.len()));
+        }
+        check(&folder.path().join("hostile"), &bytes);
+    }
+}

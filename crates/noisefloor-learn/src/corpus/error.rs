@@ -1,0 +1,78 @@
+//! Why a corpus could not be read. Every message says what, where, and what to do.
+
+use noisefloor_image::StackError;
+use std::io;
+use std::path::PathBuf;
+use thiserror::Error;
+
+/// Why a corpus could not be read.
+#[derive(Debug, Error)]
+pub enum CorpusError {
+    /// `thresholds.csv` cannot be read.
+    #[error("{}: cannot be read: {source}; a corpus is a folder with thresholds.csv and its stacks", path.display())]
+    Io {
+        /// The table.
+        path: PathBuf,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// A line of `thresholds.csv` is malformed.
+    #[error("{}, line {line}: {what}; the columns are scene,renderer,zone,x,y,width,height,human_spp,first_spp,last_spp", path.display())]
+    Row {
+        /// The table.
+        path: PathBuf,
+        /// Line, from 1.
+        line: u64,
+        /// What is wrong with it.
+        what: String,
+    },
+    /// No images for a zone.
+    #[error("{}: zone {zone} of {scene} has no images: neither folder {} nor {} is there; add one of them", dir.display(), of_scene.display(), of_zone.display())]
+    NoImages {
+        /// The corpus.
+        dir: PathBuf,
+        /// The scene.
+        scene: String,
+        /// The zone.
+        zone: u32,
+        /// Where running means of the scene would be.
+        of_scene: PathBuf,
+        /// Where batches of the zone would be.
+        of_zone: PathBuf,
+    },
+    /// Several scenes share one set of zone folders.
+    #[error("{}: zone folders hold one scene, but thresholds.csv names {one} and {other}; give each a folder of its own", dir.display())]
+    Scenes {
+        /// The corpus.
+        dir: PathBuf,
+        /// One scene.
+        one: String,
+        /// Another.
+        other: String,
+    },
+    /// The corpus has no such scene.
+    #[error("no scene {scene} in this corpus; it has {known}")]
+    Unknown {
+        /// The scene asked for.
+        scene: String,
+        /// The scenes there are, comma-separated.
+        known: String,
+    },
+    /// A zone is not inside its image.
+    #[error("{}: zone {zone} of {scene} is not inside the {width}×{height} image; correct thresholds.csv", path.display())]
+    Zone {
+        /// The image.
+        path: PathBuf,
+        /// The scene.
+        scene: String,
+        /// The zone.
+        zone: u32,
+        /// The image's width in pixels.
+        width: usize,
+        /// The image's height in pixels.
+        height: usize,
+    },
+    /// The stack of a scene or zone is not sound.
+    #[error(transparent)]
+    Stack(#[from] StackError),
+}

@@ -1,0 +1,223 @@
+//! The images of zones, cut out with an apron.
+
+use super::error::CorpusError;
+use super::zone::{JudgedZone, ZoneImages};
+use noisefloor::{APRON, Rgb};
+use noisefloor_image::{Frame, Picture, StackError, batches, read_exr, read_picture, running_means};
+use std::collections::VecDeque;
+
+/// Name of a scene's noise-free reference.
+const REFERENCE: &str = "reference.exr";
+
+/// What the numbers of a patch mean.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Encoding {
+    /// sRGB-encoded, 0…1: what the observer's display got.
+    Display,
+    /// Linear radiance, Rec.709.
+    Linear,
+}
+
+/// The zone inside a patch, in pixels of the patch.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Inner {
+    /// Left edge.
+    pub x: usize,
+    /// Top edge.
+    pub y: usize,
+    /// Width.
+    pub width: usize,
+    /// Height.
+    pub height: usize,
+}
+
+/// A zone's pixels, and up to [`APRON`] pixels around them where the image has any.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Patch {
+    /// Width with apron, in pixels.
+    pub width: usize,
+    /// Height with apron, in pixels.
+    pub height: usize,
+    /// Row-major, `width * height` values.
+    pub pixels: Vec<Rgb>,
+    /// The zone itself.
+    pub inner: Inner,
+}
+
+impl Patch {
+    /// The zone's own pixels, row-major, without the apron.
+    pub fn inner_pixels(&self) -> impl Iterator<Item = Rgb> {
+        let Inner { x, y, width, height } = self.inner;
+        (y..y + height).flat_map(move |row| self.pixels[row * self.width + x..][..width].iter().copied())
+    }
+}
+
+/// One real image of one zone: the mean of its samples `first`+1…`last`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct JudgedImage {
+    /// Scene name.
+    pub scene: String,
+    /// The zone's number in the scene.
+    pub zone: u32,
+    /// Samples per pixel before the first one in this image: 0 for a running mean.
+    pub first: u64,
+    /// Cumulative samples per pixel with this image.
+    pub last: u64,
+    /// What the numbers mean: display values for a PNG, linear for an EXR.
+    pub encoding: Encoding,
+    /// Variance of the rounding of each value; see [`Picture::rounding`].
+    pub rounding: f32,
+    /// The pixels.
+    pub patch: Patch,
+}
+
+/// An iterator over images of zones that decodes each image once, when it is needed. Ends after the first error.
+#[derive(Debug)]
+pub struct JudgedImages<'a> {
+    jobs: VecDeque<Job<'a>>,
+    ready: VecDeque<JudgedImage>,
+    /// Size of the images of the stack being read; each stack starts with a job that forgets it.
+    size: Option<(usize, usize)>,
+}
+
+/// An image, and the zones it shows.
+#[derive(Debug)]
+struct Job<'a> {
+    starts_stack: bool,
+    batch: bool,
+    frame: Frame,
+    zones: Vec<&'a JudgedZone>,
+}
+
+/// Every real image of one zone, samples ascending. For all zones of a scene,
+/// [`Corpus::scene_levels`](crate::Corpus::scene_levels) decodes each shared image once instead of once a zone.
+///
+/// # Errors
+/// [`CorpusError::Stack`] if the zone's folder cannot be listed.
+pub fn zone_levels(zone: &JudgedZone) -> Result<JudgedImages<'_>, CorpusError> {
+    JudgedImages::of(&[zone])
+}
+
+impl<'a> JudgedImages<'a> {
+    pub(super) fn of(zones: &[&'a JudgedZone]) -> Result<Self, CorpusError> {
+        let mut jobs = VecDeque::new();
+        let mut left = zones.to_vec();
+        while let Some(stack) = left.first().map(|zone| &zone.stack) {
+            // All zones that share a stack, together
+            let (sharing, rest): (Vec<&JudgedZone>, Vec<&JudgedZone>) =
+                left.iter().partition(|zone| zone.stack == *stack);
+            let (batch, frames) = match stack {
+                ZoneImages::RunningMeans(dir) => (false, running_means(dir)?),
+                ZoneImages::Batches(dir) => (true, batches(dir)?),
+            };
+            jobs.extend(frames.into_iter().enumerate().map(|(i, frame)| Job {
+                starts_stack: i == 0,
+                batch,
+                frame,
+                zones: sharing.clone(),
+            }));
+            left = rest;
+        }
+        Ok(Self { jobs, ready: VecDeque::new(), size: None })
+    }
+
+    fn run(&mut self, job: &Job<'a>) -> Result<(), CorpusError> {
+        let path = &job.frame.path;
+        let picture = if job.batch { read_exr(path).map(Picture::Linear) } else { read_picture(path) }
+            .map_err(StackError::from)?;
+
+        // All images of a stack have one size
+        let (width, height) = picture.size();
+        if job.starts_stack {
+            self.size = None;
+        }
+        let (w, h) = *self.size.get_or_insert((width, height));
+        if (w, h) != (width, height) {
+            let (path, got_width, got_height) = (path.clone(), width, height);
+            return Err(StackError::Size { path, width: w, height: h, got_width, got_height }.into());
+        }
+
+        let (encoding, pixels) = match &picture {
+            Picture::Linear(image) => (Encoding::Linear, &image.pixels),
+            Picture::Display(image) => (Encoding::Display, &image.pixels),
+        };
+        for zone in &job.zones {
+            // A batch is the zone alone
+            let (x, y) = if job.batch { (0, 0) } else { (zone.x, zone.y) };
+            let (exact, inside) = (
+                (zone.width, zone.height) == (w, h),
+                x.saturating_add(zone.width) <= w && y.saturating_add(zone.height) <= h,
+            );
+            if !inside || job.batch && !exact {
+                let (path, scene) = (path.clone(), zone.scene.clone());
+                return Err(CorpusError::Zone { path, scene, zone: zone.zone, width, height });
+            }
+            self.ready.push_back(JudgedImage {
+                scene: zone.scene.clone(),
+                zone: zone.zone,
+                first: if job.batch { job.frame.first } else { 0 },
+                last: job.frame.last,
+                encoding,
+                rounding: picture.rounding(),
+                patch: cut(pixels, (w, h), Inner { x, y, width: zone.width, height: zone.height }, APRON),
+            });
+        }
+        Ok(())
+    }
+}
+
+/// The reference of a scene cut into patches of the same shape as its images', zone by zone; `None` if there is none.
+pub(super) fn reference(zones: &[&JudgedZone]) -> Result<Option<Vec<Patch>>, CorpusError> {
+    let Some(first) = zones.first() else { return Ok(None) };
+    let folder = match &first.stack {
+        ZoneImages::RunningMeans(dir) => Some(dir.as_path()),
+        ZoneImages::Batches(dir) => dir.parent(),
+    };
+    let Some(path) = folder.map(|dir| dir.join(REFERENCE)).filter(|path| path.is_file()) else {
+        return Ok(None);
+    };
+    let image = read_exr(&path).map_err(StackError::from)?;
+    let (width, height) = (image.width, image.height);
+    let cut_out = |zone: &&JudgedZone| {
+        let JudgedZone { x, y, width: w, height: h, .. } = **zone;
+        if x.saturating_add(w) > width || y.saturating_add(h) > height {
+            let (path, scene) = (path.clone(), zone.scene.clone());
+            return Err(CorpusError::Zone { path, scene, zone: zone.zone, width, height });
+        }
+        // A batch is the zone alone
+        let apron = if matches!(zone.stack, ZoneImages::Batches(_)) { 0 } else { APRON };
+        Ok(cut(&image.pixels, (width, height), Inner { x, y, width: w, height: h }, apron))
+    };
+    zones.iter().map(cut_out).collect::<Result<_, _>>().map(Some)
+}
+
+impl Iterator for JudgedImages<'_> {
+    type Item = Result<JudgedImage, CorpusError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        while self.ready.is_empty() {
+            let job = self.jobs.pop_front()?;
+            if let Err(e) = self.run(&job) {
+                self.jobs.clear();
+                self.ready.clear();
+                return Some(Err(e));
+            }
+        }
+        self.ready.pop_front().map(Ok)
+    }
+}
+
+/// The rectangle and its apron, clipped to an image of the size given.
+fn cut(pixels: &[Rgb], (width, height): (usize, usize), zone: Inner, apron: usize) -> Patch {
+    let (left, top) = (zone.x.saturating_sub(apron), zone.y.saturating_sub(apron));
+    let right = (zone.x + zone.width + apron).min(width);
+    let bottom = (zone.y + zone.height + apron).min(height);
+    Patch {
+        width: right - left,
+        height: bottom - top,
+        pixels: (top..bottom)
+            .flat_map(|y| pixels[y * width + left..y * width + right].iter().copied())
+            .collect(),
+        inner: Inner { x: zone.x - left, y: zone.y - top, ..zone },
+    }
+}

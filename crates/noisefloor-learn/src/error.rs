@@ -1,0 +1,53 @@
+//! Why a table could not be computed, read or written.
+
+use crate::corpus::CorpusError;
+use thiserror::Error;
+
+/// Why a table could not be computed, read or written.
+#[derive(Debug, Error)]
+pub enum TableError {
+    /// The corpus.
+    #[error(transparent)]
+    Corpus(#[from] CorpusError),
+    /// A zone has too few images.
+    #[error(
+        "{scene}, zone {zone}: {images} images are too few; two independent sets of samples and a converged picture are needed"
+    )]
+    TooFew {
+        /// The scene.
+        scene: String,
+        /// The zone.
+        zone: u32,
+        /// Its images.
+        images: usize,
+    },
+    /// The reference has another size than the images.
+    #[error("{scene}, zone {zone}: reference.exr has not the size of the full picture")]
+    Reference {
+        /// The scene.
+        scene: String,
+        /// The zone.
+        zone: u32,
+    },
+    /// The descriptor is for tiles of another size.
+    #[error("{scene}, zone {zone}: {source}")]
+    Descriptor {
+        /// The scene.
+        scene: String,
+        /// The zone.
+        zone: u32,
+        /// What does not fit.
+        source: noisefloor::DescriptorError,
+    },
+    /// The CSV is malformed.
+    #[error("line {line}: {what}")]
+    Row {
+        /// Line, from 1.
+        line: u64,
+        /// What is wrong with it.
+        what: String,
+    },
+    /// The CSV cannot be read or written.
+    #[error("the table cannot be read or written: {0}")]
+    Csv(#[from] csv::Error),
+}

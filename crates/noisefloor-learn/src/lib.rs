@@ -1,0 +1,40 @@
+//! From what people said of pictures to models of [`noisefloor`] and their scores.
+//!
+//! - [`Corpus`]: thresholds that observers gave, with the images they judged.
+//! - [`describe_corpora`], [`describe_pairs`]: a corpus as a [`Table`] of descriptors; [`read_table`] and [`write_table`] keep it as CSV.
+//! - [`train`]: a [`noisefloor::Model`] from a table; [`leave_one_scene_out`]: predictions for scenes that the model has not seen.
+//! - [`score`], [`reliability`], [`constant_noise_baseline`], [`scene_median_baseline`]: how close predictions come to people.
+//! - [`AudienceFit`]: the line from the thresholds of one audience to those of another.
+
+mod answer;
+mod audience;
+mod baselines;
+mod corpus;
+mod describe;
+mod error;
+mod fit;
+mod machine;
+mod observers;
+mod params;
+mod predict;
+mod score;
+mod table;
+mod table_csv;
+mod train;
+
+pub use answer::Answer;
+pub use audience::{AudienceFit, AudienceFitError, MAX_PAIRS, MIN_PAIRS};
+pub use baselines::{constant_noise_baseline, scene_median_baseline};
+pub use corpus::{
+    CENSORED_SPP, Corpus, CorpusError, Encoding, Inner, JudgedImage, JudgedImages, JudgedZone, Patch,
+    ZoneImages, zone_levels,
+};
+pub use describe::{describe_corpora, describe_pairs, noise_level};
+pub use error::TableError;
+pub use observers::{OBSERVERS_AT_THRESHOLD, observers_agreeing};
+pub use params::{TrainError, TrainParams};
+pub use predict::{Prediction, predict};
+pub use score::{ReliabilityBin, calibration_error, image_accuracy, reliability, score};
+pub use table::{Level, Origin, Table, Zone, group_of_scene};
+pub use table_csv::{read_table, write_table};
+pub use train::{leave_answers_out, leave_one_scene_out, train};

@@ -1,0 +1,110 @@
+//! A support vector machine trained on the examples of some zones and answers.
+
+use crate::answer::Answer;
+use crate::observers::observers_agreeing;
+use crate::params::{TrainError, TrainParams};
+use crate::table::{Table, Zone};
+use ndarray::Array2;
+use noisefloor::{Audience, Familiarity, Model, Platt, Scaler, Svm, SvmParams, TrainingRecord, fit_svm};
+
+/// Machine and scaler, before calibration.
+pub(crate) struct Machine {
+    pub(crate) scaler: Scaler,
+    svm: Svm,
+    /// Examples that an answer counts as.
+    weight: usize,
+}
+
+impl Machine {
+    pub(crate) fn fit<'a>(
+        (zones, answers): (&[&'a Zone], &[&'a Answer]),
+        svm: SvmParams,
+        range: f64,
+        least_deviation: f64,
+    ) -> Result<Self, TrainError> {
+        let mut examples: Vec<(&[f32], bool)> =
+            zones.iter().flat_map(|z| examples(z, range)).map(|e| (e.descriptor, e.converged)).collect();
+        let scaler = Scaler::fit(examples.iter().map(|e| e.0), least_deviation);
+        let weight = answer_weight(examples.len(), zones.len(), range);
+        let answer = |a: &&'a Answer| std::iter::repeat_n((&a.descriptor[..], !a.sees_noise), weight);
+        examples.extend(answers.iter().flat_map(answer));
+        let dimensions = examples.first().map_or(0, |e| e.0.len());
+        let mut rows = Array2::zeros((examples.len(), dimensions));
+        let mut scaled = Vec::new();
+        for (mut row, (descriptor, _)) in rows.rows_mut().into_iter().zip(&examples) {
+            scaled.clear();
+            scaled.extend_from_slice(descriptor);
+            scaler.apply(&mut scaled);
+            row.iter_mut().zip(&scaled).for_each(|(to, &from)| *to = f64::from(from));
+        }
+        let labels: Vec<bool> = examples.iter().map(|e| e.1).collect();
+        Ok(Self { scaler, weight, svm: fit_svm(rows.view(), &labels, svm)? })
+    }
+
+    fn decide(&self, descriptor: &[f32]) -> f32 {
+        let mut scaled = descriptor.to_vec();
+        self.scaler.apply(&mut scaled);
+        self.svm.decision(&scaled)
+    }
+
+    /// (decision value, 0 or 1) of an answer, as often as it weighs.
+    pub(crate) fn answered(&self, answer: &Answer) -> impl Iterator<Item = (f32, f64)> {
+        let agreeing = f64::from(u8::from(!answer.sees_noise));
+        std::iter::repeat_n((self.decide(&answer.descriptor), agreeing), self.weight)
+    }
+
+    /// (decision value, share of observers that agree) of a zone's examples.
+    pub(crate) fn decisions<'a>(
+        &'a self,
+        zone: &'a Zone,
+        params: &'a TrainParams,
+    ) -> impl Iterator<Item = (f32, f64)> + 'a {
+        examples(zone, params.range)
+            .map(|e| (self.decide(e.descriptor), observers_agreeing(e.spp, zone.human_spp, params.spread)))
+    }
+
+    pub(crate) fn into_model(
+        self,
+        table: &Table,
+        platt: Platt,
+        familiarity: Option<Familiarity>,
+        record: TrainingRecord,
+    ) -> Model {
+        Model {
+            descriptor: table.descriptor,
+            descriptor_version: table.descriptor.version(),
+            evidence: table.evidence,
+            tone_mapping: table.tone_mapping,
+            scaler: self.scaler,
+            svm: self.svm,
+            platt,
+            familiarity,
+            audience: Audience::TRAINED,
+            record,
+        }
+    }
+}
+
+/// An answer is about one number of samples. It weighs as much as what a zone, whose examples spread over range² in samples, has within a
+/// doubling of them.
+fn answer_weight(examples: usize, zones: usize, range: f64) -> usize {
+    let doublings = 2.0 * range.log2();
+    (examples as f64 / zones.max(1) as f64 / doublings).round().max(1.0) as usize
+}
+
+pub(crate) struct Example<'a> {
+    spp: f64,
+    descriptor: &'a [f32],
+    converged: bool,
+}
+
+/// A zone's levels near its threshold. Of a censored zone only what is certain: the levels below.
+pub(crate) fn examples(zone: &Zone, range: f64) -> impl Iterator<Item = Example<'_>> {
+    let near = move |spp: f64| (spp / zone.human_spp).ln().abs() <= range.ln() * (1.0 + 1e-9);
+    let certain = move |spp: f64| !zone.censored || spp < zone.human_spp;
+    zone.levels.iter().filter(move |l| near(l.spp) && certain(l.spp)).map(|l| Example {
+        spp: l.spp,
+        descriptor: &l.descriptor,
+        converged: l.spp >= zone.human_spp,
+    })
+}

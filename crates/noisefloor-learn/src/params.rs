@@ -1,0 +1,62 @@
+//! How a model is trained, and why it cannot be.
+
+use noisefloor::{SvmParams, SvmTrainError};
+use thiserror::Error;
+
+/// How a model is to be trained.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TrainParams {
+    /// Pairs of C and γ to choose from, by leave-one-group-out.
+    pub candidates: Vec<SvmParams>,
+    /// Levels within this factor of the human threshold are examples; those beyond are clear anyway. Above 1.
+    pub range: f64,
+    /// Spread of the observers of one zone: scale of the logistic distribution of their thresholds in ln(samples), above 0. The
+    /// human data give means alone; the default is where thresholds predicted on left-out scenes are neither early nor late,
+    /// and amounts to a standard deviation of 0.29 in ln(contrast).
+    pub spread: f64,
+}
+
+impl Default for TrainParams {
+    /// For the compact descriptor.
+    fn default() -> Self {
+        let candidates =
+            [0.1, 0.3, 1.0].iter().flat_map(|&c| [0.003, 0.01].map(|gamma| SvmParams { c, gamma })).collect();
+        Self { candidates, range: 8.0, spread: 0.32 }
+    }
+}
+
+impl TrainParams {
+    /// For the paper's descriptor: its C and γ, [`SvmParams::PAPER`].
+    pub fn paper() -> Self {
+        Self { candidates: vec![SvmParams::PAPER], ..Self::default() }
+    }
+}
+
+/// Why a model could not be trained.
+#[derive(Debug, Error)]
+pub enum TrainError {
+    /// The machine.
+    #[error(transparent)]
+    Svm(#[from] SvmTrainError),
+    /// A parameter out of range.
+    #[error("training needs candidates for C and γ, a range above 1 and a spread above 0")]
+    Params,
+    /// Answers that are not described as the zones are.
+    #[error("an answer has {found} numbers, and the zones have {expected}: it is of another descriptor")]
+    Answer {
+        /// Numbers of a zone.
+        expected: usize,
+        /// Numbers of the answer.
+        found: usize,
+    },
+    /// Leaving groups out needs groups.
+    #[error("leaving scenes out needs at least {needed} groups of scenes; the corpus has {found}: {names}")]
+    Groups {
+        /// Groups needed.
+        needed: usize,
+        /// Groups found.
+        found: usize,
+        /// Their names.
+        names: String,
+    },
+}

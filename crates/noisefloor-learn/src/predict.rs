@@ -1,0 +1,114 @@
+//! The threshold that a model predicts for a zone.
+
+use crate::table::{Level, Origin, Zone};
+use noisefloor::Model;
+use serde::{Deserialize, Serialize};
+
+/// Samples at which a quantity, known at increasing levels, first reaches `goal`, interpolated in ln(spp); the first or last
+/// level if it has there or not yet. `None` without levels.
+pub(crate) fn crossing(levels: &[(f64, f64)], goal: f64) -> Option<f64> {
+    let at = levels.iter().position(|&(_, v)| v >= goal);
+    match at {
+        None => levels.last().map(|&(spp, _)| spp),
+        Some(0) => Some(levels[0].0),
+        Some(i) => {
+            let ((n0, v0), (n1, v1)) = (levels[i - 1], levels[i]);
+            let t = (goal - v0) / (v1 - v0);
+            Some((n0.ln() + t * (n1.ln() - n0.ln())).exp())
+        }
+    }
+}
+
+/// What a model says of a zone at each of its levels: decision values and probabilities.
+fn probabilities(model: &Model, zone: &Zone) -> Vec<f32> {
+    let mut scratch = Vec::new();
+    let probability = |level: &Level| {
+        scratch.clone_from(&level.descriptor);
+        model.probability(&mut scratch)
+    };
+    zone.levels.iter().map(probability).collect()
+}
+
+/// Log-odds: a scale on which the probability of a level is nearly linear in ln(spp).
+fn log_odds(p: f64) -> f64 {
+    let p = p.clamp(1e-9, 1.0 - 1e-9);
+    (p / (1.0 - p)).ln()
+}
+
+/// One zone's prediction.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Prediction {
+    /// Scene.
+    pub scene: String,
+    /// Zone.
+    pub zone: u32,
+    /// Human threshold, in samples per pixel.
+    pub human_spp: f64,
+    /// Predicted threshold, within what observers could choose.
+    pub predicted_spp: f64,
+    /// Whether the human threshold is only a lower bound.
+    pub censored: bool,
+    /// Whether the zone, at its human threshold, is unfamiliar to the model that predicts.
+    pub unfamiliar: bool,
+    /// Real pictures of the zone that the prediction classifies as people did.
+    #[serde(skip)]
+    pub images_right: usize,
+    /// Real pictures of the zone.
+    #[serde(skip)]
+    pub images: usize,
+    /// Samples per pixel of each level and the probability there, where the predictor has one.
+    #[serde(skip)]
+    pub probabilities: Vec<(f64, f32)>,
+}
+
+impl Prediction {
+    /// A prediction whose real pictures are classified by `converged`.
+    fn new(zone: &Zone, spp: f64, converged: impl Fn(usize) -> bool) -> Self {
+        let real = || zone.levels.iter().enumerate().filter(|(_, l)| l.origin == Origin::Real);
+        let right = real().filter(|(i, l)| converged(*i) == (l.spp >= zone.human_spp));
+        Self {
+            scene: zone.scene.clone(),
+            zone: zone.zone,
+            human_spp: zone.human_spp,
+            censored: zone.censored,
+            unfamiliar: false,
+            predicted_spp: spp.clamp(zone.first_spp, zone.last_spp),
+            images_right: right.count(),
+            images: real().count(),
+            probabilities: Vec::new(),
+        }
+    }
+
+    /// By a threshold alone, without looking at pictures.
+    pub(crate) fn by_threshold(zone: &Zone, spp: f64) -> Self {
+        Self::new(zone, spp, |i| zone.levels[i].spp >= spp)
+    }
+
+    pub(crate) fn log_ratio(&self) -> f64 {
+        (self.predicted_spp / self.human_spp).ln()
+    }
+}
+
+/// Predicts a zone's threshold: the samples at which P first reaches `threshold`.
+pub fn predict(model: &Model, threshold: f32, zone: &Zone) -> Prediction {
+    let p = probabilities(model, zone);
+    let odds = zone.path(|i| log_odds(f64::from(p[i])));
+    let spp = crossing(&odds, log_odds(f64::from(threshold))).unwrap_or(zone.last_spp);
+    let probabilities = zone.levels.iter().map(|l| l.spp).zip(p.iter().copied()).collect();
+    let unfamiliar = zone.at_threshold().is_some_and(|level| !model.is_familiar(&level.descriptor));
+    Prediction { probabilities, unfamiliar, ..Prediction::new(zone, spp, |i| p[i] >= threshold) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn crossings_are_interpolated_in_the_logarithm() {
+        let levels = [(100.0, 0.0), (400.0, 2.0), (800.0, 1.0)];
+        assert!((crossing(&levels, 1.0).unwrap() - 200.0).abs() < 1e-9);
+        assert_eq!(crossing(&levels, -1.0), Some(100.0));
+        assert_eq!(crossing(&levels, 3.0), Some(800.0));
+        assert_eq!(crossing(&[], 1.0), None);
+    }
+}

@@ -1,0 +1,112 @@
+//! Predicted thresholds against human ones.
+//!
+//! Scores are those of the rules of evidence in `docs/guide.md`: whole scenes left out, predictions clipped to the levels that
+//! observers could choose, real pictures scored apart from synthesised levels.
+
+use crate::predict::Prediction;
+use noisefloor::Scores;
+use serde::{Deserialize, Serialize};
+
+/// Scores predictions. Censored thresholds stay out.
+pub fn score<'a>(predictions: impl Iterator<Item = &'a Prediction> + Clone) -> Scores {
+    let ratios = || predictions.clone().filter(|p| !p.censored).map(Prediction::log_ratio);
+    let zones = ratios().count();
+    let mean = |f: fn(f64) -> f64| ratios().map(f).sum::<f64>() / zones as f64;
+    Scores {
+        zones,
+        error_factor: mean(f64::abs).exp(),
+        bias_factor: mean(|r| r).exp(),
+        early_share: mean(|r| if r < -std::f64::consts::LN_2 { 1.0 } else { 0.0 }),
+    }
+}
+
+/// Levels within this factor of the human threshold say how well probabilities are calibrated: further ones are easy, and would
+/// flatter.
+const CALIBRATION_RANGE: f64 = 8.0;
+
+/// Levels whose probabilities lie in one tenth of the scale.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ReliabilityBin {
+    /// Mean of the predicted probabilities.
+    pub predicted: f64,
+    /// Mean of what was observed.
+    pub observed: f64,
+    /// Levels.
+    pub levels: usize,
+}
+
+/// The reliability curve, in ten bins of equal width, of which empty ones are left out. `observed(spp, human_spp)` is the
+/// probability that was observed, or 0 or 1. Levels further than eightfold from the threshold, and censored zones, stay out.
+pub fn reliability<'a>(
+    predictions: impl Iterator<Item = &'a Prediction>,
+    observed: impl Fn(f64, f64) -> f64,
+) -> Vec<ReliabilityBin> {
+    let mut bins = [(0.0, 0.0, 0usize); 10];
+    for p in predictions.filter(|p| !p.censored) {
+        for &(spp, probability) in &p.probabilities {
+            if (spp / p.human_spp).ln().abs() <= CALIBRATION_RANGE.ln() {
+                let bin = &mut bins[((probability * 10.0) as usize).min(9)];
+                *bin = (bin.0 + f64::from(probability), bin.1 + observed(spp, p.human_spp), bin.2 + 1);
+            }
+        }
+    }
+    let mean = |(predicted, observed, levels): (f64, f64, usize)| ReliabilityBin {
+        predicted: predicted / levels as f64,
+        observed: observed / levels as f64,
+        levels,
+    };
+    bins.into_iter().filter(|b| b.2 > 0).map(mean).collect()
+}
+
+/// Expected calibration error: the mean distance of a reliability curve from the diagonal, by levels.
+pub fn calibration_error(bins: &[ReliabilityBin]) -> f64 {
+    let levels: usize = bins.iter().map(|b| b.levels).sum();
+    bins.iter().map(|b| (b.predicted - b.observed).abs() * b.levels as f64).sum::<f64>() / levels as f64
+}
+
+/// Share of real pictures that are classified as people did; `None` without any.
+pub fn image_accuracy<'a>(predictions: impl Iterator<Item = &'a Prediction> + Clone) -> Option<f64> {
+    let images: usize = predictions.clone().map(|p| p.images).sum();
+    let right: usize = predictions.map(|p| p.images_right).sum();
+    (images > 0).then(|| right as f64 / images as f64)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::table::tests::zone;
+
+    /// Probabilities of 0.25 and 0.75 that come true in a quarter and in half of the cases.
+    #[test]
+    fn calibration_is_the_distance_from_the_diagonal() {
+        let levels = |p: f32, n: usize| (0..n).map(move |_| (100.0, p));
+        let mut prediction = Prediction::by_threshold(&zone("A", 0, 100.0, 1.0), 100.0);
+        prediction.probabilities = levels(0.25, 40).chain(levels(0.75, 20)).collect();
+        // Ninefold away: stays out.
+        prediction.probabilities.push((900.0, 0.5));
+        let turn = std::cell::Cell::new(0);
+        let observed = |_, _| {
+            turn.set(turn.get() + 1);
+            let every = if turn.get() <= 40 { 4 } else { 2 };
+            if turn.get() % every == 0 { 1.0 } else { 0.0 }
+        };
+        let bins = reliability([&prediction].into_iter(), observed);
+        assert_eq!(bins.len(), 2);
+        assert_eq!((bins[0].observed, bins[1].observed, bins[1].levels), (0.25, 0.5, 20));
+        assert!((calibration_error(&bins) - 0.25 / 3.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn scores_are_the_geometric_ones() {
+        let predictions: Vec<Prediction> = [200.0, 50.0, 40.0, 100.0]
+            .map(|spp| Prediction::by_threshold(&zone("A", 0, 100.0, 1.0), spp))
+            .to_vec();
+        let scores = score(predictions.iter());
+        assert_eq!(scores.zones, 4);
+        assert!((scores.error_factor - (2.0f64 * 2.0 * 2.5).powf(0.25)).abs() < 1e-9);
+        assert!((scores.bias_factor - (2.0f64 / 2.0 / 2.5).powf(0.25)).abs() < 1e-9);
+        assert_eq!(scores.early_share, 0.25); // exactly half is not below half
+        let accuracy = image_accuracy(predictions.iter()).unwrap();
+        assert!(accuracy > 0.8 && accuracy < 1.0);
+    }
+}

@@ -1,0 +1,221 @@
+//! Descriptors of a corpus, from noisy to converged, and what people said: all that training and scoring need.
+
+use crate::answer::Answer;
+use noisefloor::{Descriptor, Evidence, ToneMapping};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeSet;
+
+/// Where the picture of a level comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Origin {
+    /// Rendered with so many samples.
+    Real,
+    /// Made from a real picture and a converged one, with noise ∝ 1/√n.
+    Synthesised,
+}
+
+/// One zone at one number of samples. Several levels may have the same number: other realisations of the noise.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Level {
+    /// Samples per pixel.
+    pub spp: f64,
+    /// Rendered or synthesised.
+    pub origin: Origin,
+    /// Standard deviation of the noise mask (σ = 1) of the residual over the zone, in display luminance: what the constant-noise
+    /// baseline goes by.
+    pub noise: f32,
+    /// The raw descriptor.
+    pub descriptor: Vec<f32>,
+}
+
+/// One zone of one scene: what people said of it, and its descriptor from noisy to converged.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Zone {
+    /// Scene.
+    pub scene: String,
+    /// Scenes of one group show the same room, and are left out together.
+    pub group: String,
+    /// Number within the scene.
+    pub zone: u32,
+    /// Samples per pixel at which people stopped seeing a difference.
+    pub human_spp: f64,
+    /// Whether `human_spp` is only known to lie at or above its value.
+    pub censored: bool,
+    /// Fewest samples that observers could choose.
+    pub first_spp: f64,
+    /// Most samples that observers could choose.
+    pub last_spp: f64,
+    /// By increasing `spp`.
+    pub levels: Vec<Level>,
+}
+
+/// Descriptors of a corpus: all that training and evaluation need of it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Table {
+    /// Which descriptor.
+    pub descriptor: Descriptor,
+    /// What the zones were held against.
+    pub evidence: Evidence,
+    /// How the pictures were shown.
+    pub tone_mapping: ToneMapping,
+    /// The zones.
+    pub zones: Vec<Zone>,
+    /// What single people said of tiles of other pictures: examples to train on, never scored as thresholds.
+    #[serde(default)]
+    pub answers: Vec<Answer>,
+}
+
+impl Zone {
+    /// The level nearest to the human threshold; `None` without levels.
+    pub(crate) fn at_threshold(&self) -> Option<&Level> {
+        let distance = |level: &Level| (level.spp / self.human_spp).ln().abs();
+        self.levels.iter().min_by(|a, b| distance(a).total_cmp(&distance(b)))
+    }
+
+    /// A quantity of the levels that observers could choose, by increasing samples; realisations of one level are averaged.
+    pub(crate) fn path(&self, quantity: impl Fn(usize) -> f64) -> Vec<(f64, f64)> {
+        let mut path: Vec<(f64, f64, f64)> = Vec::new();
+        for (i, level) in self.levels.iter().enumerate() {
+            if !(self.first_spp..=self.last_spp).contains(&level.spp) {
+                continue;
+            }
+            match path.last_mut() {
+                Some((spp, sum, count)) if *spp == level.spp => {
+                    (*sum, *count) = (*sum + quantity(i), *count + 1.0)
+                }
+                _ => path.push((level.spp, quantity(i), 1.0)),
+            }
+        }
+        path.into_iter().map(|(spp, sum, count)| (spp, sum / count)).collect()
+    }
+}
+
+impl Table {
+    /// Takes away numbers of the descriptor, named as in its columns: to see what each is worth. A machine that is trained on what
+    /// is left can be scored, but is not a model.
+    ///
+    /// # Errors
+    /// The name that is not a column.
+    pub fn without(mut self, names: &[String]) -> Result<Self, String> {
+        let mut columns = self.descriptor.number_names();
+        for name in names {
+            let at = columns.iter().position(|c| c == name).ok_or_else(|| name.clone())?;
+            columns.remove(at);
+            self.zones.iter_mut().flat_map(|z| &mut z.levels).for_each(|l| {
+                l.descriptor.remove(at);
+            });
+            self.answers.iter_mut().for_each(|a| {
+                a.descriptor.remove(at);
+            });
+        }
+        Ok(self)
+    }
+
+    /// BLAKE3 of the table's numbers, hexadecimal: names the table in a model's record.
+    pub fn digest(&self) -> String {
+        let mut hash = blake3::Hasher::new();
+        for z in &self.zones {
+            hash.update(z.scene.as_bytes()).update(z.group.as_bytes()).update(&z.zone.to_le_bytes());
+            for spp in [z.human_spp, z.first_spp, z.last_spp] {
+                hash.update(&spp.to_le_bytes());
+            }
+            for level in &z.levels {
+                hash.update(&level.spp.to_le_bytes());
+                level.descriptor.iter().for_each(|v| {
+                    hash.update(&v.to_le_bytes());
+                });
+            }
+        }
+        for answer in &self.answers {
+            hash.update(answer.group.as_bytes())
+                .update(&answer.spp.to_le_bytes())
+                .update(&[u8::from(answer.sees_noise)]);
+            answer.descriptor.iter().for_each(|v| {
+                hash.update(&v.to_le_bytes());
+            });
+        }
+        hash.finalize().to_hex().to_string()
+    }
+
+    /// The groups of the answers, in alphabetical order.
+    pub fn answer_groups(&self) -> Vec<&str> {
+        let mut groups: Vec<&str> = self.answers.iter().map(|a| a.group.as_str()).collect();
+        groups.sort_unstable();
+        groups.dedup();
+        groups
+    }
+
+    /// The groups, in alphabetical order.
+    pub fn groups(&self) -> Vec<&str> {
+        self.zones.iter().map(|z| z.group.as_str()).collect::<BTreeSet<_>>().into_iter().collect()
+    }
+
+    /// The scenes, in alphabetical order.
+    pub fn scenes(&self) -> Vec<&str> {
+        self.zones.iter().map(|z| z.scene.as_str()).collect::<BTreeSet<_>>().into_iter().collect()
+    }
+}
+
+/// The name of the group a scene belongs to by its name alone: its first word, which ends before a capital letter that follows
+/// a small one, or at `-` or `_`. `SdbCentre` and `SdbDroite` are two cameras in one room.
+pub fn group_of_scene(scene: &str) -> &str {
+    let mut previous = ' ';
+    for (at, c) in scene.char_indices() {
+        if at > 0 && (c == '-' || c == '_' || (c.is_uppercase() && previous.is_lowercase())) {
+            return &scene[..at];
+        }
+        previous = c;
+    }
+    scene
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::*;
+
+    pub(crate) fn zone(scene: &str, number: u32, human_spp: f64, scale: f64) -> Zone {
+        let level = |i: i32| {
+            let spp = 20.0 * 1.5f64.powi(i);
+            Level { spp, origin: Origin::Real, noise: (scale / spp.sqrt()) as f32, descriptor: vec![] }
+        };
+        let group = group_of_scene(scene).to_owned();
+        let levels: Vec<Level> = (0..14).map(level).collect();
+        let last_spp = levels[13].spp;
+        Zone {
+            scene: scene.into(),
+            group,
+            zone: number,
+            human_spp,
+            censored: false,
+            first_spp: 20.0,
+            last_spp,
+            levels,
+        }
+    }
+
+    #[test]
+    fn groups_are_first_words() {
+        let groups = ["SdbCentre", "SdbDroite", "Appart1opt02", "staircase2-view0", "Bureau1", "a_b", ""];
+        assert_eq!(
+            groups.map(group_of_scene),
+            ["Sdb", "Sdb", "Appart1opt02", "staircase2", "Bureau1", "a", ""]
+        );
+    }
+
+    #[test]
+    fn columns_are_taken_away_by_name() {
+        let mut zone = zone("A", 0, 100.0, 1.0);
+        zone.levels.iter_mut().for_each(|l| l.descriptor = vec![0.0, 1.0, 2.0, 3.0, 4.0, 5.0]);
+        let table = Table {
+            descriptor: Descriptor::default(),
+            evidence: Evidence::Halves,
+            tone_mapping: ToneMapping::Srgb { exposure: 1.0 },
+            zones: vec![zone],
+            answers: Vec::new(),
+        };
+        let less = table.clone().without(&["picture_noise".into(), "textured_area".into()]).unwrap();
+        assert!(less.zones[0].levels.iter().all(|l| l.descriptor == [0.0, 2.0, 4.0, 5.0]));
+        assert_eq!(table.without(&["colour".into()]), Err("colour".into()));
+    }
+}

@@ -1,0 +1,151 @@
+//! The table as CSV: a comment line that says what it holds, a header, a line a level.
+
+use crate::error::TableError;
+use crate::table::{Level, Origin, Table, Zone};
+use csv::{ReaderBuilder, StringRecord, Writer};
+use noisefloor::{Descriptor, Evidence, ToneMapping};
+use serde::{Deserialize, Serialize};
+use std::io::{Read, Write};
+
+/// Longest table that is read, in bytes.
+const MAX_BYTES: u64 = 1 << 30;
+const COLUMNS: [&str; 10] =
+    ["scene", "group", "zone", "human_spp", "censored", "first_spp", "last_spp", "spp", "origin", "noise"];
+const MARK: &str = "# noisefloor table ";
+
+#[derive(Serialize, Deserialize)]
+struct Head {
+    descriptor: Descriptor,
+    descriptor_version: u16,
+    evidence: Evidence,
+    tone_mapping: ToneMapping,
+}
+
+/// Writes a table as CSV.
+///
+/// # Errors
+/// [`TableError::Csv`] if it cannot be written.
+pub fn write_table(table: &Table, mut to: impl Write) -> Result<(), TableError> {
+    let head = Head {
+        descriptor: table.descriptor,
+        descriptor_version: table.descriptor.version(),
+        evidence: table.evidence,
+        tone_mapping: table.tone_mapping,
+    };
+    let head = serde_json::to_string(&head).map_err(std::io::Error::from).map_err(csv::Error::from)?;
+    writeln!(to, "{MARK}{head}").map_err(csv::Error::from)?;
+    let mut csv = Writer::from_writer(to);
+    csv.write_record(COLUMNS.map(str::to_owned).into_iter().chain(table.descriptor.number_names()))?;
+    for zone in &table.zones {
+        for level in &zone.levels {
+            let origin = match level.origin {
+                Origin::Real => "real",
+                Origin::Synthesised => "synthesised",
+            };
+            let fixed = [
+                zone.scene.clone(),
+                zone.group.clone(),
+                zone.zone.to_string(),
+                zone.human_spp.to_string(),
+                zone.censored.to_string(),
+                zone.first_spp.to_string(),
+                zone.last_spp.to_string(),
+                level.spp.to_string(),
+                origin.to_owned(),
+                level.noise.to_string(),
+            ];
+            // `to_string` of a float is the shortest text that reads back to the same bits.
+            csv.write_record(fixed.into_iter().chain(level.descriptor.iter().map(f32::to_string)))?;
+        }
+    }
+    csv.flush().map_err(csv::Error::from)?;
+    Ok(())
+}
+
+/// Reads a table that [`write_table`] wrote.
+///
+/// # Errors
+/// [`TableError`] naming the first line that is not as it should be.
+pub fn read_table(from: impl Read) -> Result<Table, TableError> {
+    // What it holds.
+    let mut text = String::new();
+    from.take(MAX_BYTES).read_to_string(&mut text).map_err(csv::Error::from)?;
+    let bad = |line: u64, what: &str| TableError::Row { line, what: what.to_owned() };
+    let head = text.lines().next().and_then(|l| l.strip_prefix(MARK));
+    let head = head.ok_or_else(|| {
+        bad(1, "this is not a table of descriptors: it does not begin with \"# noisefloor table\"")
+    })?;
+    let head: Head = serde_json::from_str(head).map_err(|e| bad(1, &e.to_string()))?;
+    let Head { descriptor, descriptor_version, evidence, tone_mapping } = head;
+    if descriptor_version != descriptor.version() {
+        let here = descriptor.version();
+        return Err(bad(
+            1,
+            &format!(
+                "descriptor version {descriptor_version}, and this release computes {here}: make the table again"
+            ),
+        ));
+    }
+
+    // Levels, zone by zone.
+    let mut csv = ReaderBuilder::new().comment(Some(b'#')).from_reader(text.as_bytes());
+    let expected: Vec<String> =
+        COLUMNS.map(str::to_owned).into_iter().chain(descriptor.number_names()).collect();
+    if !csv.headers()?.iter().eq(expected.iter().map(String::as_str)) {
+        return Err(bad(2, &format!("the columns should be {}", expected.join(","))));
+    }
+    let mut zones: Vec<Zone> = Vec::new();
+    for record in csv.records() {
+        let record = record?;
+        let line = record.position().map_or(0, csv::Position::line) + 1;
+        let (zone, level) = parse(&record).map_err(|what| bad(line, &what))?;
+        match zones.last_mut() {
+            Some(last) if last.scene == zone.scene && last.zone == zone.zone => {
+                if last.levels.last().is_some_and(|l| l.spp > level.spp) {
+                    return Err(bad(line, "levels of a zone must come by increasing spp"));
+                }
+                last.levels.push(level);
+            }
+            _ => zones.push(Zone { levels: vec![level], ..zone }),
+        }
+    }
+    if zones.is_empty() {
+        return Err(bad(3, "the table has no zones"));
+    }
+    Ok(Table { descriptor, evidence, tone_mapping, zones, answers: Vec::new() })
+}
+
+fn parse(record: &StringRecord) -> Result<(Zone, Level), String> {
+    let text = |i: usize| record.get(i).unwrap_or_default();
+    let positive = |i: usize| match text(i).parse::<f64>() {
+        Ok(v) if v.is_finite() && v > 0.0 => Ok(v),
+        _ => Err(format!("{} is {:?}, not a positive number", COLUMNS[i], text(i))),
+    };
+    let finite = |i: usize| match text(i).parse::<f32>() {
+        Ok(v) if v.is_finite() => Ok(v),
+        _ => Err(format!("column {} is {:?}, not a finite number", i + 1, text(i))),
+    };
+    let origin = match text(8) {
+        "real" => Origin::Real,
+        "synthesised" => Origin::Synthesised,
+        other => return Err(format!("origin is {other:?}, neither real nor synthesised")),
+    };
+    let descriptor = (COLUMNS.len()..record.len()).map(finite).collect::<Result<_, _>>()?;
+    let level = Level { spp: positive(7)?, origin, noise: finite(9)?, descriptor };
+    let zone = Zone {
+        scene: text(0).to_owned(),
+        group: text(1).to_owned(),
+        zone: text(2).parse().map_err(|_| format!("zone is {:?}, not a number", text(2)))?,
+        human_spp: positive(3)?,
+        censored: text(4)
+            .parse()
+            .map_err(|_| format!("censored is {:?}, neither true nor false", text(4)))?,
+        first_spp: positive(5)?,
+        last_spp: positive(6)?,
+        levels: Vec::new(),
+    };
+    if zone.first_spp > zone.last_spp {
+        return Err("first_spp is above last_spp".into());
+    }
+    Ok((zone, level))
+}

@@ -1,0 +1,134 @@
+use noisefloor::{ProgressiveSource, Request, SourceError, Tile, TileGrid};
+use noisefloor_sidecar::{CommandError, CommandOptions, CommandSource};
+use std::collections::HashSet;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::time::Duration;
+use tempfile::TempDir;
+
+const SCRIPT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/it/renderer.py");
+/// What renderer.py renders.
+const SIZE: (usize, usize) = (20, 12);
+
+fn python() -> Option<&'static str> {
+    let python = if cfg!(windows) { "python" } else { "python3" };
+    let runs = Command::new(python).arg("-V").output().is_ok_and(|o| o.status.success());
+    if !runs {
+        eprintln!("SKIPPED: no {python} on the path, commands are not tested");
+    }
+    runs.then_some(python)
+}
+
+fn options(scene: Option<&str>) -> CommandOptions {
+    CommandOptions { scene: scene.map(PathBuf::from), seed: 1, size: None, timeout: Duration::from_secs(60) }
+}
+
+/// A command with all it needs, and the log of its runs.
+fn template(python: &str, folder: &Path, more: &str) -> String {
+    let log = folder.join("log");
+    format!("{python} '{SCRIPT}' 'log={}' seed={{seed}} spp={{spp}} out={{out}}.pfm {more}", log.display())
+}
+
+fn log(folder: &TempDir) -> Vec<String> {
+    let text = std::fs::read_to_string(folder.path().join("log")).unwrap_or_default();
+    text.lines().map(str::to_owned).collect()
+}
+
+fn tile(index: usize, x: usize, y: usize, width: usize, height: usize) -> Tile {
+    Tile { index, x, y, width, height }
+}
+
+fn expected(tile: &Tile, samples: u32) -> Vec<[f32; 3]> {
+    let rows = tile.y..tile.y + tile.height;
+    let pixel = |x: usize, y: usize| [x as f32, y as f32, samples as f32];
+    rows.flat_map(|y| (tile.x..tile.x + tile.width).map(move |x| pixel(x, y))).collect()
+}
+
+/// Tile by tile, whether the command leaves the tile or the whole; the size is found out where the whole tells it.
+#[test]
+fn a_command_that_aims_renders_tiles() {
+    let Some(python) = python() else { return };
+    for how in ["tile", "whole"] {
+        let folder = tempfile::tempdir().unwrap();
+        let more = format!("x0={{x0}} x1={{x1}} y0={{y0}} y1={{y1}} how={how}");
+        let size = (how == "tile").then_some(SIZE);
+        let command = template(python, folder.path(), &more);
+        let mut source = CommandSource::new(&command, CommandOptions { size, ..options(None) }).unwrap();
+        let info = source.info();
+        assert_eq!((info.width, info.height, info.aims), (SIZE.0, SIZE.1, true));
+        let requests = [(tile(4, 3, 5, 7, 6), 9), (tile(0, 0, 0, 20, 12), 2), (tile(4, 3, 5, 7, 6), 9)]
+            .map(|(tile, samples)| Request { tile, first: 0, samples });
+        for (request, batch) in requests.iter().zip(source.sample(&requests).unwrap()) {
+            assert_eq!((batch.tile, batch.samples), (request.tile, request.samples));
+            assert_eq!(batch.mean, expected(&request.tile, request.samples), "{how}");
+        }
+        // Every run has a seed of its own, also for the same tile
+        let seeds: HashSet<_> =
+            log(&folder).iter().map(|line| line.split(' ').next().unwrap().to_owned()).collect();
+        assert_eq!(seeds.len(), log(&folder).len());
+    }
+}
+
+#[test]
+fn a_command_that_cannot_aim_renders_all_tiles_at_once() {
+    let Some(python) = python() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let mut source = CommandSource::new(&template(python, folder.path(), ""), options(None)).unwrap();
+    let info = source.info();
+    assert_eq!((info.width, info.height, info.aims), (SIZE.0, SIZE.1, false));
+    let tiles: Vec<_> = TileGrid::new(SIZE.0, SIZE.1, 16).unwrap().tiles().collect();
+    let requests: Vec<_> = tiles.iter().map(|&tile| Request { tile, first: 0, samples: 5 }).collect();
+    for batch in source.sample(&requests).unwrap() {
+        assert_eq!((batch.samples, batch.mean), (5, expected(&batch.tile, 5)));
+    }
+    // One run for the size, one for all tiles
+    let samples: Vec<_> =
+        log(&folder).iter().map(|line| line.split(' ').nth(1).unwrap().to_owned()).collect();
+    assert_eq!(samples, ["1", "5"]);
+}
+
+#[test]
+fn templates_that_cannot_work_are_refused() {
+    for (template, words) in [
+        ("", "it is empty"),
+        ("render 'scene", "a quote is not closed"),
+        ("render {seed} {spp}", "{out} is missing"),
+        ("render {spp} {out}", "{seed} is missing"),
+        ("render {seed} {out}", "{spp} is missing"),
+        ("render {seed} {spp} {out} {x0} {y0} {y1}", "{x1} is missing"),
+        ("render {seed} {spp} {out} {threads}", "{threads} is no placeholder"),
+        ("render {seed} {spp} {out} {scene}", "no scene is given"),
+        ("render {seed} {spp} {out} {width}", "--size"),
+        ("render {seed} {spp} {out} {x0} {x1} {y0} {y1} {height}", "--size"),
+    ] {
+        let error = CommandSource::new(template, options(None)).unwrap_err().to_string();
+        assert!(error.contains(words), "{template}: {error}");
+    }
+    let error = CommandSource::new("render {seed} {spp} {out}", options(Some("a.scene"))).unwrap_err();
+    assert!(error.to_string().contains("{scene} is not in it"), "{error}");
+    let error = CommandSource::new("/no/such/program {seed} {spp} {out}", options(None)).unwrap_err();
+    assert!(matches!(&error, CommandError::Start { program, .. } if program == "/no/such/program"));
+}
+
+#[test]
+fn failures_are_told_with_the_last_words() {
+    let Some(python) = python() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    for (how, words) in [
+        ("fail", "exit status: 3; its last words: no lamp in hall scene.xml"),
+        ("hang", "no end after 1 s"),
+        ("nothing", "it left no file"),
+        ("two", "picture.pfm.bak"),
+        ("larger", "its picture has 5×4 pixels, neither 4×4 as asked for"),
+        ("garbage", "is something else"),
+    ] {
+        let more = format!("x0={{x0}} x1={{x1}} y0={{y0}} y1={{y1}} scene={{scene}} how={how}");
+        let timeout = Duration::from_secs(if how == "hang" { 1 } else { 60 });
+        let options = CommandOptions { size: Some(SIZE), timeout, ..options(Some("hall scene.xml")) };
+        let mut source = CommandSource::new(&template(python, folder.path(), &more), options).unwrap();
+        let tile = tile(2, 4, 4, 4, 4);
+        let error = source.sample(&[Request { tile, first: 0, samples: 1 }]).unwrap_err();
+        let SourceError::Failed { tile: Some(2), cause, .. } = &error else { panic!("{error:?}") };
+        assert!(cause.to_string().contains(words), "{how}: {cause}");
+    }
+}
