@@ -75,7 +75,7 @@ pub use relative_error::RelativeError;
 pub use spec::{RIVALS, Rival, SpecError, parse};
 pub use stages::{Myszkowski1998, Takouachet2007};
 pub use time::TimeLimit;
-pub use vdp::{Vdp, Viewing, ViewingError};
+pub use vdp::{Vdp, VdpViewing, VdpViewingError};
 
 #[cfg(doc)]
 use noisefloor::StoppingCriterion;

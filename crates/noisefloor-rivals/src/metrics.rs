@@ -55,7 +55,7 @@ fn mean_of_channels(
 
 /// FLIP (Andersson et al. 2020) by NVIDIA's own library: how different two pictures look when one flips between them, in [0, 1]
 /// at each pixel. The mean is its authors' single number. `pixels_per_degree` says how finely somebody sees; FLIP's own default is
-/// 67, [`crate::Viewing::pixels_per_degree`] that of the other metrics here. Display values are rounded to 8 bits, as on a screen.
+/// 67, [`crate::VdpViewing::pixels_per_degree`] that of the other metrics here. Display values are rounded to 8 bits, as on a screen.
 ///
 /// # Errors
 /// [`ImageError`] if sizes do not fit each other, or the resolution is outside 1…1000.

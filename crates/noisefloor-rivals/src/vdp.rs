@@ -4,7 +4,7 @@ mod cortex;
 mod csf;
 mod fourier;
 
-pub use csf::{Viewing, ViewingError};
+pub use csf::{VdpViewing, VdpViewingError};
 
 use crate::image::{Image, ImageError, Map};
 use cortex::Cortex;
@@ -22,10 +22,10 @@ const PSYCHOMETRIC: f32 = 3.5;
 ///
 /// | stage | formula | parameters |
 /// |---|---|---|
-/// | display | L = peak·Y, Y of decoded sRGB | [`Viewing::peak`] |
+/// | display | L = peak·Y, Y of decoded sRGB | [`VdpViewing::peak`] |
 /// | amplitude nonlinearity | R = L/(L + (c₁L)^b) | c₁ = 12.6, b = 0.63 |
-/// | contrast | C = (R/R_a − 1)/(d ln R/d ln L)_a, at the adaptation level a | [`Viewing::adaptation`] |
-/// | contrast sensitivity | S = P·min(S₁(ρ/(r_a·r_θ)), S₁(ρ)), see [`Viewing::sensitivity`] | P = 250, ε = 0.9, ob = 0.78 |
+/// | contrast | C = (R/R_a − 1)/(d ln R/d ln L)_a, at the adaptation level a | [`VdpViewing::adaptation`] |
+/// | contrast sensitivity | S = P·min(S₁(ρ/(r_a·r_θ)), S₁(ρ)), see [`VdpViewing::sensitivity`] | P = 250, ε = 0.9, ob = 0.78 |
 /// | cortex transform | dom filters: differences of mesa filters at ρ½ = 1, ½ … 1/16 of a cycle per pixel, of transition width ⅔ρ½, a Gaussian base band cut at 4/3·ρ½, σ = that/3; fan filters of ±30°, 6 orientations | 5 × 6 + 1 bands |
 /// | masking | T = (1 + (k₁(k₂m)^s)^b)^(1/b), m in threshold units | k₁ = 6^(−7/3), k₂ = 6^(10/3), b = 4; s = 0.7 for the base band, 0.8 for the lowest two dom bands, 1 for the others |
 /// | mutual masking | the lesser m of the two pictures | |
@@ -63,7 +63,7 @@ const PSYCHOMETRIC: f32 = 3.5;
 /// ```
 #[derive(Clone, Debug, Default)]
 pub struct Vdp {
-    viewing: Viewing,
+    viewing: VdpViewing,
     cortex: Arc<Mutex<Option<Arc<Cortex>>>>,
 }
 
@@ -79,14 +79,14 @@ impl Vdp {
     /// A predictor for a viewing condition.
     ///
     /// # Errors
-    /// [`ViewingError`] if a number of the condition is out of range.
-    pub fn new(viewing: Viewing) -> Result<Self, ViewingError> {
+    /// [`VdpViewingError`] if a number of the condition is out of range.
+    pub fn new(viewing: VdpViewing) -> Result<Self, VdpViewingError> {
         viewing.check()?;
         Ok(Self { viewing, cortex: Arc::default() })
     }
 
     /// The viewing condition.
-    pub fn viewing(&self) -> &Viewing {
+    pub fn viewing(&self) -> &VdpViewing {
         &self.viewing
     }
 
@@ -101,7 +101,7 @@ impl Vdp {
     }
 
     pub(crate) fn respond(&self, image: &Image<'_>) -> Response {
-        let Viewing { peak, adaptation, .. } = self.viewing;
+        let VdpViewing { peak, adaptation, .. } = self.viewing;
         let (c, b) = AMPLITUDE;
         let amplitude = |l: f64| if l > 0.0 { l / (l + (c * l).powf(b)) } else { 0.0 };
         // d ln R/d ln L = (1 − b)·(cL)^b/(L + (cL)^b)

@@ -1,6 +1,6 @@
 //! The cortex transform (Watson 1987; Daly 1993), with complex bands (Lukin 2009).
 
-use super::csf::Viewing;
+use super::csf::VdpViewing;
 use super::fourier::{Fourier, quick_length};
 use rayon::prelude::*;
 use rustfft::num_complex::Complex32;
@@ -100,7 +100,7 @@ fn mirrored(i: usize, n: usize, period: usize) -> usize {
 }
 
 impl Cortex {
-    pub(super) fn new(viewing: &Viewing, width: usize, height: usize) -> Self {
+    pub(super) fn new(viewing: &VdpViewing, width: usize, height: usize) -> Self {
         let fourier = Fourier::new(quick_length(width + MARGIN), quick_length(height + MARGIN));
         let per_degree = viewing.pixels_per_degree();
         let area = width as f64 * height as f64 / (per_degree * per_degree);
@@ -183,7 +183,7 @@ mod tests {
     #[test]
     fn bands_add_up_to_the_picture() {
         for (width, height) in [(50, 40), (31, 64)] {
-            let cortex = Cortex::new(&Viewing::default(), width, height);
+            let cortex = Cortex::new(&VdpViewing::default(), width, height);
             let mut bell = Bell(7);
             let plane: Vec<f32> = (0..width * height).map(|_| bell.next() as f32).collect();
             let spectrum = cortex.spectrum(&plane);
@@ -202,7 +202,7 @@ mod tests {
     #[test]
     fn a_band_knows_the_local_amplitude() {
         // A wave in the middle of a band: |band| is its amplitude times its sensitivity everywhere but near the edge.
-        let viewing = Viewing::default();
+        let viewing = VdpViewing::default();
         let cortex = Cortex::new(&viewing, 216, 216);
         let wave = |i: usize| 0.5 * (std::f64::consts::TAU * (i % 216) as f64 / 6.0).cos() as f32;
         let plane: Vec<f32> = (0..216 * 216).map(wave).collect();

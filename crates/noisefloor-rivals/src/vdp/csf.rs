@@ -11,7 +11,7 @@ const OBLIQUE: f64 = 0.78;
 
 /// A viewing condition.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Viewing {
+pub struct VdpViewing {
     /// Distance of the eye from the screen, in metres, above 0.
     pub distance: f64,
     /// Pixels of the screen per inch, above 0.
@@ -23,7 +23,7 @@ pub struct Viewing {
     pub adaptation: f64,
 }
 
-impl Default for Viewing {
+impl Default for VdpViewing {
     /// An office: 0.6 m from a screen of 96 dpi (40 pixels per degree) whose white has 100 cd/m², adapted to a middle grey of 18 %.
     fn default() -> Self {
         Self { distance: 0.6, dpi: 96.0, peak: 100.0, adaptation: 18.0 }
@@ -33,12 +33,12 @@ impl Default for Viewing {
 /// A number of a viewing condition that is out of range.
 #[derive(Debug, Error, Clone, Copy, PartialEq)]
 #[error("the {name} of a viewing condition must be a positive finite number, not {value}")]
-pub struct ViewingError {
+pub struct VdpViewingError {
     name: &'static str,
     value: f64,
 }
 
-impl Viewing {
+impl VdpViewing {
     /// Pixels of the screen per degree of the visual field.
     pub fn pixels_per_degree(&self) -> f64 {
         self.distance * 1f64.to_radians().tan() * self.dpi / 0.0254
@@ -47,8 +47,8 @@ impl Viewing {
     /// Checks the numbers.
     ///
     /// # Errors
-    /// [`ViewingError`] naming the first one that is not positive and finite.
-    pub fn check(&self) -> Result<(), ViewingError> {
+    /// [`VdpViewingError`] naming the first one that is not positive and finite.
+    pub fn check(&self) -> Result<(), VdpViewingError> {
         let numbers = [
             ("distance", self.distance),
             ("resolution", self.dpi),
@@ -56,7 +56,7 @@ impl Viewing {
             ("adaptation luminance", self.adaptation),
         ];
         match numbers.into_iter().find(|(_, value)| !(value.is_finite() && *value > 0.0)) {
-            Some((name, value)) => Err(ViewingError { name, value }),
+            Some((name, value)) => Err(VdpViewingError { name, value }),
             None => Ok(()),
         }
     }
@@ -87,12 +87,12 @@ impl Viewing {
 mod tests {
     use super::*;
 
-    fn adapted(l: f64) -> Viewing {
-        Viewing { adaptation: l, ..Viewing::default() }
+    fn adapted(l: f64) -> VdpViewing {
+        VdpViewing { adaptation: l, ..VdpViewing::default() }
     }
 
     /// Peak frequency, peak sensitivity and cut-off, where the sensitivity is 1, by a fine search.
-    fn shape(viewing: Viewing) -> (f64, f64, f64) {
+    fn shape(viewing: VdpViewing) -> (f64, f64, f64) {
         let at = |f: f64| viewing.sensitivity(f, 0.0, 100.0);
         let scan: Vec<f64> = (1..=10_000).map(|i| f64::from(i) * 0.01).collect();
         let peak = scan.iter().copied().max_by(|a, b| at(*a).total_cmp(&at(*b))).unwrap();
@@ -133,7 +133,7 @@ mod tests {
 
     #[test]
     fn degrees_and_limits() {
-        assert!((Viewing::default().pixels_per_degree() - 39.58).abs() < 0.01);
+        assert!((VdpViewing::default().pixels_per_degree() - 39.58).abs() < 0.01);
         for bad in [0.0, -1.0, f64::NAN, f64::INFINITY] {
             assert!(adapted(bad).check().unwrap_err().to_string().contains("adaptation"), "{bad}");
         }

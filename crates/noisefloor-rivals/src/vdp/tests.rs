@@ -9,7 +9,7 @@ type Grating = (f64, f64, f64);
 
 /// Gratings on a screen of the adaptation luminance.
 fn screen(gratings: &[Grating]) -> Vec<Rgb> {
-    let viewing = Viewing::default();
+    let viewing = VdpViewing::default();
     let middle = (EDGE / 2) as f64;
     let value = |i: usize| {
         let (x, y) = ((i % EDGE) as f64 - middle, (i / EDGE) as f64 - middle);
@@ -44,7 +44,7 @@ fn threshold(vdp: &Vdp, frequency: f64, angle: f64, mask: &[Grating]) -> f64 {
 
 /// What the sensitivity function says.
 fn published(frequency: f64, angle: f64) -> f64 {
-    let viewing = Viewing::default();
+    let viewing = VdpViewing::default();
     let per_degree = viewing.pixels_per_degree();
     1.0 / viewing.sensitivity(frequency * per_degree, angle, (EDGE as f64 / per_degree).powi(2))
 }

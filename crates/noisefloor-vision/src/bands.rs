@@ -1,0 +1,83 @@
+//! Bands of spatial frequency, and what is worked out once for a display.
+
+use crate::csf::{KNOTS, by_luminance};
+use crate::masking::{CHANNEL_GAINS, SENSITIVITY_DB};
+use crate::math::exp2;
+use crate::photometry::CHANNELS;
+use crate::pyramid::Size;
+use std::f64::consts::LOG2_10;
+
+/// Centre of the second band beside the highest frequency that pixels can show; further bands halve it.
+const SECOND: f64 = 0.3228;
+/// Bands end with the first one below this, in cycles per degree.
+const LOWEST: f64 = 0.2;
+/// Frequency that the coarsest band is taken to have, in cycles per degree.
+const BASEBAND: f64 = 0.1;
+
+/// log₂ of the sensitivity of one channel at each luminance of the table, and the step to the next.
+pub(crate) type Curve = [[f32; 2]; KNOTS];
+
+/// A display's bands.
+#[derive(Clone, Debug)]
+pub(crate) struct Bands {
+    /// From the finest on; those that a picture is too small for go unused.
+    pub(crate) frequencies: Vec<f64>,
+    pub(crate) curves: Vec<[Curve; CHANNELS]>,
+    pub(crate) baseband: [Curve; CHANNELS],
+}
+
+impl Bands {
+    pub(crate) fn new(pixels_per_degree: f64) -> Self {
+        let nyquist = pixels_per_degree / 2.0;
+        let centre = |band: i32| if band == 0 { nyquist } else { SECOND * nyquist / 2f64.powi(band - 1) };
+        let last = (0..).find(|&band| centre(band) <= LOWEST).expect("they halve");
+        let frequencies: Vec<f64> = (0..=last).map(centre).collect();
+        let curves = frequencies
+            .iter()
+            // Between the finest and the coarsest band, the pyramid halves contrasts
+            .enumerate()
+            .map(|(band, &frequency)| curves(frequency, if band == 0 { 1.0 } else { 2.0 }))
+            .collect();
+        Self { frequencies, curves, baseband: curves_of_baseband() }
+    }
+
+    /// Levels of the Gaussian pyramid of a picture, the coarsest of which is the baseband.
+    pub(crate) fn levels(&self, size: Size) -> usize {
+        let most = size.width.min(size.height).max(2).ilog2() as usize - 1;
+        self.frequencies.len().min(most) + 1
+    }
+}
+
+fn curves_of_baseband() -> [Curve; CHANNELS] {
+    let mut curves = curves(BASEBAND, 1.0);
+    // Its difference is not masked, and has no gain by channel
+    for (curve, gain) in curves.iter_mut().zip(CHANNEL_GAINS) {
+        curve.iter_mut().for_each(|knot| knot[0] -= gain.log2() as f32);
+    }
+    curves
+}
+
+fn curves(frequency: f64, contrast: f64) -> [Curve; CHANNELS] {
+    std::array::from_fn(|channel| {
+        let shift = SENSITIVITY_DB / 20.0 * LOG2_10 + (CHANNEL_GAINS[channel] * contrast).log2();
+        let knots = by_luminance(channel, frequency).map(|log10| (log10 * LOG2_10 + shift) as f32);
+        std::array::from_fn(|i| [knots[i], knots[(i + 1).min(KNOTS - 1)] - knots[i]])
+    })
+}
+
+/// log₂ of the sensitivities at places between the knots.
+pub(crate) fn sensitivity_row(curve: &Curve, places: &[f32], out: &mut [f32]) {
+    for (out, &place) in out.iter_mut().zip(places) {
+        // Places lie within 0…KNOTS − 1; the remainder says so to the compiler
+        let low = place as usize % KNOTS;
+        let [value, step] = curve[low];
+        *out = value + step * (place - low as f32);
+    }
+}
+
+/// Sensitivity at one place between the knots.
+pub(crate) fn sensitivity(curve: &Curve, place: f32) -> f32 {
+    let mut log = [0.0];
+    sensitivity_row(curve, &[place], &mut log);
+    exp2(log[0])
+}

@@ -1,0 +1,207 @@
+//! Code values → light of the display → opponent channels, in cd/m².
+
+use crate::math::{exp2, pow};
+use crate::viewing::{Eotf, Primaries, Viewing};
+use multiversion::multiversion;
+use std::f32::consts::LOG2_E;
+
+/// The opponent channels: achromatic, red–green, yellow–violet.
+pub(crate) const CHANNELS: usize = 3;
+
+/// Linear RGB → CIE XYZ, white at D65: IEC 61966-2-1 and ITU-R BT.2020, with the digits that ColorVideoVDP
+/// 0.5.7 uses.
+const REC709_TO_XYZ: [[f64; 3]; 3] = [
+    [0.412_456_4, 0.357_576_1, 0.180_437_5],
+    [0.212_672_9, 0.715_152_2, 0.072_175_0],
+    [0.019_333_9, 0.119_192_0, 0.950_304_1],
+];
+const REC2020_TO_XYZ: [[f64; 3]; 3] =
+    [[0.6370, 0.1446, 0.1689], [0.2627, 0.6780, 0.0593], [0.0000, 0.0281, 1.0610]];
+
+/// CIE XYZ → responses of the cones, from the fundamentals of CIE 170-1:2006, as in ColorVideoVDP (Mantiuk et
+/// al. 2024, §3.2).
+const XYZ_TO_LMS: [[f64; 3]; 3] = [
+    [0.187_596_268_556_126, 0.585_168_649_077_728, -0.026_384_263_306_304],
+    [-0.133_397_430_663_221, 0.405_505_777_260_049, 0.034_502_127_690_364],
+    [0.000_244_379_021_663, -0.000_542_995_890_619, 0.019_406_849_066_323],
+];
+
+/// Responses of the cones → opponent channels of Derrington, Krauskopf and Lennie, grey at D65 (Mantiuk et
+/// al. 2024, §3.2).
+const LMS_TO_DKL: [[f64; 3]; 3] =
+    [[1.0, 1.0, 0.0], [1.0, -2.311_130_179_947_035, 0.0], [-1.0, -1.0, 50.977_571_328_718_78]];
+
+/// The lowest luminance that displays of linear or PQ values show, in cd/m².
+const DARKEST: f32 = 0.005;
+
+fn product(a: [[f64; 3]; 3], b: [[f64; 3]; 3]) -> [[f64; 3]; 3] {
+    a.map(|row| std::array::from_fn(|column| (0..3).map(|i| row[i] * b[i][column]).sum()))
+}
+
+/// A display as a function of code values.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Photometry {
+    curve: Curve,
+    peak: f32,
+    black: f32,
+    reflected: f32,
+    to_opponent: [[f32; 3]; CHANNELS],
+}
+
+/// [`Eotf`] with what it needs to know of the display.
+#[derive(Clone, Copy, Debug)]
+enum Curve {
+    Srgb,
+    Gamma(f32),
+    Pq,
+    /// The system gamma less one.
+    Hlg(f32),
+    Linear,
+}
+
+impl Photometry {
+    pub(crate) fn new(viewing: &Viewing) -> Self {
+        let params = viewing.params();
+        let curve = match params.eotf {
+            Eotf::Srgb => Curve::Srgb,
+            Eotf::Gamma(gamma) => Curve::Gamma(gamma as f32),
+            Eotf::Pq => Curve::Pq,
+            Eotf::Hlg => Curve::Hlg(hlg_gamma(params.peak, params.ambient) as f32 - 1.0),
+            Eotf::Linear => Curve::Linear,
+        };
+        let to_xyz = match params.primaries {
+            Primaries::Rec709 => REC709_TO_XYZ,
+            Primaries::Rec2020 => REC2020_TO_XYZ,
+        };
+        let to_opponent =
+            product(LMS_TO_DKL, product(XYZ_TO_LMS, to_xyz)).map(|row| row.map(|value| value as f32));
+        Self {
+            curve,
+            peak: params.peak as f32,
+            black: params.black as f32,
+            reflected: viewing.reflected() as f32,
+            to_opponent,
+        }
+    }
+
+    /// Light of the three primaries for a code value, each in units in which their sum is white, in cd/m².
+    pub(crate) fn light(&self, code: [f32; 3]) -> [f32; 3] {
+        let [mut r, mut g, mut b] = code.map(|value| [value]);
+        self.shine([&mut r, &mut g, &mut b]);
+        [r[0], g[0], b[0]]
+    }
+
+    /// Replaces code values by light, channel by channel.
+    #[inline(always)]
+    fn shine(&self, [r, g, b]: [&mut [f32]; 3]) {
+        match self.curve {
+            Curve::Srgb => [r, g, b].map(|plane| self.emit(plane, srgb)),
+            Curve::Gamma(gamma) => {
+                [r, g, b].map(|plane| self.emit(plane, |v| if v > 0.0 { pow(v, gamma) } else { 0.0 }))
+            }
+            Curve::Pq => {
+                [r, g, b].map(|plane| self.emit_absolute(plane, DARKEST, self.black, |v| pq(unit(v))))
+            }
+            Curve::Linear => {
+                [r, g, b].map(|plane| self.emit_absolute(plane, DARKEST.max(self.black), 0.0, |v| v))
+            }
+            Curve::Hlg(gamma) => {
+                for ((r, g), b) in r.iter_mut().zip(&mut *g).zip(&mut *b) {
+                    let scene = [*r, *g, *b].map(|v| hlg(unit(v)));
+                    let y = 0.2627 * scene[0] + 0.6780 * scene[1] + 0.0593 * scene[2];
+                    let gain = if y > 0.0 { pow(y, gamma) } else { 0.0 };
+                    [*r, *g, *b] =
+                        scene.map(|v| (self.peak - self.black) * (gain * v) + self.black + self.reflected);
+                }
+                [(); 3]
+            }
+        };
+    }
+
+    /// For curves onto [0, 1] between black and the peak.
+    #[inline(always)]
+    fn emit(&self, plane: &mut [f32], curve: impl Fn(f32) -> f32) {
+        let (range, floor) = (self.peak - self.black, self.black + self.reflected);
+        plane.iter_mut().for_each(|v| *v = range * curve(unit(*v)) + floor);
+    }
+
+    /// For curves onto cd/m², cut off at `least` and at the peak.
+    #[inline(always)]
+    fn emit_absolute(&self, plane: &mut [f32], least: f32, black: f32, curve: impl Fn(f32) -> f32) {
+        let floor = black + self.reflected;
+        for v in plane {
+            let light = curve(*v);
+            let light = if light > least { light } else { least };
+            *v = if light < self.peak { light } else { self.peak } + floor;
+        }
+    }
+}
+
+impl Viewing {
+    /// Luminance of a grey of this code value, in cd/m², with the light of the room that the display
+    /// reflects.
+    pub fn luminance(&self, code: f32) -> f64 {
+        f64::from(Photometry::new(self).light([code; 3])[1])
+    }
+}
+
+/// Holds code values within [0, 1]; NaN becomes 0.
+#[inline(always)]
+fn unit(v: f32) -> f32 {
+    let v = if v > 0.0 { v } else { 0.0 };
+    if v < 1.0 { v } else { 1.0 }
+}
+
+/// IEC 61966-2-1.
+#[inline(always)]
+fn srgb(v: f32) -> f32 {
+    let bent = pow((v + 0.055) * (1.0 / 1.055), 2.4);
+    if v > 0.04045 { bent } else { v * (1.0 / 12.92) }
+}
+
+/// SMPTE ST 2084, onto cd/m².
+#[inline(always)]
+fn pq(v: f32) -> f32 {
+    const N: f32 = 0.159_301_76;
+    const M: f32 = 78.843_75;
+    const C: [f32; 3] = [0.835_937_5, 18.851_563, 18.687_5];
+    let root = if v > 0.0 { pow(v, 1.0 / M) } else { 0.0 };
+    let above = root - C[0];
+    if above > 0.0 { 10_000.0 * pow(above / (C[1] - C[2] * root), 1.0 / N) } else { 0.0 }
+}
+
+/// Light of the scene for a code value of hybrid log-gamma (ITU-R BT.2100, table 5).
+#[inline(always)]
+fn hlg(v: f32) -> f32 {
+    const A: f32 = 0.178_832_77;
+    const B: f32 = 1.0 - 4.0 * A;
+    const C: f32 = 0.559_910_7; // ½ − A·ln 4A
+    let high = (exp2((v - C) * (LOG2_E / A)) + B) * (1.0 / 12.0);
+    if v <= 0.5 { v * v * (1.0 / 3.0) } else { high }
+}
+
+/// System gamma of hybrid log-gamma: ITU-R BT.2100, and BBC White Paper 369 for the light of the room.
+fn hlg_gamma(peak: f64, ambient: f64) -> f64 {
+    if peak > 1000.0 { 1.2 + 0.42 * (peak / 1000.0).log10() - 0.07623 * (ambient / 5.0).log10() } else { 1.2 }
+}
+
+/// Converts a row of code values to opponent channels; as many channels as there are planes.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx2", "x86_64+avx2"))]
+pub(crate) fn opponent_row(photometry: &Photometry, codes: &[[f32; 3]], planes: &mut [&mut [f32]]) {
+    // Channel by channel, as vector instructions want it; few enough to stay in the nearest cache
+    const PIXELS: usize = 128;
+    let mut light = [[0.0; PIXELS]; 3];
+    for (place, codes) in codes.chunks(PIXELS).enumerate() {
+        let [r, g, b] = light.each_mut().map(|channel| &mut channel[..codes.len()]);
+        for (((code, r), g), b) in codes.iter().zip(&mut *r).zip(&mut *g).zip(&mut *b) {
+            [*r, *g, *b] = *code;
+        }
+        photometry.shine([r, g, b]);
+        for (plane, weights) in planes.iter_mut().zip(&photometry.to_opponent) {
+            let plane = &mut plane[place * PIXELS..][..codes.len()];
+            for (((out, r), g), b) in plane.iter_mut().zip(&*r).zip(&*g).zip(&*b) {
+                *out = weights[0] * r + weights[1] * g + weights[2] * b;
+            }
+        }
+    }
+}

@@ -1,0 +1,163 @@
+//! What a picture is seen on, and from where: the display's light and its pixels per degree.
+
+use serde::{Deserialize, Serialize};
+use std::f64::consts::PI;
+use thiserror::Error;
+
+/// How code values become light.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Eotf {
+    /// IEC 61966-2-1; code values in [0, 1].
+    #[default]
+    Srgb,
+    /// A power of this exponent, within 1…4; code values in [0, 1].
+    Gamma(f64),
+    /// SMPTE ST 2084 (PQ); code values in [0, 1].
+    Pq,
+    /// ITU-R BT.2100 hybrid log-gamma; code values in [0, 1].
+    Hlg,
+    /// Values are light already, in cd/m².
+    Linear,
+}
+
+/// The primaries of code values; the white point is D65.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Primaries {
+    /// ITU-R BT.709, those of sRGB.
+    #[default]
+    Rec709,
+    /// ITU-R BT.2020.
+    Rec2020,
+}
+
+/// Unchecked viewing conditions. [`ViewingParams::check`] makes them a [`Viewing`].
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ViewingParams {
+    /// Pixels per degree of visual angle in the centre of the picture, within 1…2000.
+    pub pixels_per_degree: f64,
+    /// Luminance of white, in cd/m², within 1…20000.
+    pub peak: f64,
+    /// Luminance of black in a dark room, in cd/m²; below the peak.
+    pub black: f64,
+    /// Light of the room that falls on the display, in lux, at most 100,000.
+    pub ambient: f64,
+    /// Share of that light that the display reflects, within 0…1.
+    pub reflectivity: f64,
+    /// How code values become light.
+    pub eotf: Eotf,
+    /// Their primaries.
+    pub primaries: Primaries,
+}
+
+/// Viewing conditions that no display has.
+#[derive(Clone, Copy, Debug, Error, PartialEq)]
+pub enum ViewingError {
+    /// Pixels per degree out of range.
+    #[error("pixels per degree must lie within 1…2000, not {0}: check resolution, diagonal and distance")]
+    PixelsPerDegree(f64),
+    /// The peak is out of range.
+    #[error("the peak luminance must lie within 1…20000 cd/m², not {0}")]
+    Peak(f64),
+    /// Black is no luminance, or not below white.
+    #[error("black must lie between 0 and the peak of {peak} cd/m², not {black}")]
+    Black {
+        /// Luminance of black, in cd/m².
+        black: f64,
+        /// Luminance of white, in cd/m².
+        peak: f64,
+    },
+    /// The ambient light is out of range.
+    #[error("ambient light must lie within 0…100000 lux, not {0}")]
+    Ambient(f64),
+    /// The reflectivity is out of range.
+    #[error("reflectivity must lie within 0…1, not {0}")]
+    Reflectivity(f64),
+    /// The exponent is out of range.
+    #[error("the exponent of a gamma display must lie within 1…4, not {0}")]
+    Gamma(f64),
+    /// The system gamma of HLG is undefined.
+    #[error(
+        "the gamma of HLG displays above 1000 cd/m² depends on the ambient light, which must be at least 0.01 lux"
+    )]
+    DarkHlg,
+}
+
+impl ViewingParams {
+    /// Checks every value.
+    ///
+    /// # Errors
+    /// The first value that is out of its range.
+    pub fn check(self) -> Result<Viewing, ViewingError> {
+        let Self { pixels_per_degree, peak, black, ambient, reflectivity, eotf, .. } = self;
+        if !(1.0..=2000.0).contains(&pixels_per_degree) {
+            return Err(ViewingError::PixelsPerDegree(pixels_per_degree));
+        }
+        if !(1.0..=20_000.0).contains(&peak) {
+            return Err(ViewingError::Peak(peak));
+        }
+        if !(0.0..peak).contains(&black) {
+            return Err(ViewingError::Black { black, peak });
+        }
+        if !(0.0..=100_000.0).contains(&ambient) {
+            return Err(ViewingError::Ambient(ambient));
+        }
+        if !(0.0..=1.0).contains(&reflectivity) {
+            return Err(ViewingError::Reflectivity(reflectivity));
+        }
+        match eotf {
+            Eotf::Gamma(gamma) if !(1.0..=4.0).contains(&gamma) => Err(ViewingError::Gamma(gamma)),
+            Eotf::Hlg if peak > 1000.0 && ambient < 0.01 => Err(ViewingError::DarkHlg),
+            _ => Ok(Viewing(self)),
+        }
+    }
+}
+
+/// Checked viewing conditions: a display, the light in the room, and how far away the display is.
+///
+/// As text, they are a preset (`desk`, `standard_4k`), numbers (`ppd=60,peak=300,black=0.3,ambient=100`), or
+/// a preset with changes (`desk,distance=1.2`).
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "ViewingParams", into = "ViewingParams")]
+pub struct Viewing(ViewingParams);
+
+impl TryFrom<ViewingParams> for Viewing {
+    type Error = ViewingError;
+
+    fn try_from(params: ViewingParams) -> Result<Self, ViewingError> {
+        params.check()
+    }
+}
+
+impl From<Viewing> for ViewingParams {
+    fn from(viewing: Viewing) -> Self {
+        viewing.0
+    }
+}
+
+impl Viewing {
+    /// The numbers, to change some of them and check again.
+    pub fn params(&self) -> ViewingParams {
+        self.0
+    }
+
+    /// Pixels per degree of visual angle.
+    pub fn pixels_per_degree(&self) -> f64 {
+        self.0.pixels_per_degree
+    }
+
+    /// The same display at `factor` times the distance. Exact for pixels that are small against the distance.
+    ///
+    /// # Errors
+    /// If the pixels per degree leave their range.
+    pub fn at_distance(&self, factor: f64) -> Result<Self, ViewingError> {
+        let pixels_per_degree = self.0.pixels_per_degree * factor;
+        ViewingParams { pixels_per_degree, ..self.0 }.check()
+    }
+
+    /// Light of the room that the display reflects, in cd/m²: that of a diffuse reflector (Mantiuk 2016, §3).
+    pub fn reflected(&self) -> f64 {
+        self.0.ambient / PI * self.0.reflectivity
+    }
+}

@@ -1,0 +1,176 @@
+"""Records what ColorVideoVDP says of pairs of pictures that tests/cvvdp.rs computes again, into tests/cvvdp.json.
+
+    pip install cvvdp==0.5.7
+    python crates/noisefloor-vision/tests/record_cvvdp.py
+
+The pictures are integers out of integers, so that both languages see the same ones.
+"""
+
+import json
+import platform
+from importlib.metadata import version
+from pathlib import Path
+
+import numpy as np
+import torch
+from pycvvdp import cvvdp
+from pycvvdp.display_model import vvdp_display_geometry, vvdp_display_photo_eotf
+
+U = np.uint32
+
+
+def hashed(x, y, channel, seed):
+    """32 random bits of a place."""
+    with np.errstate(over="ignore"):
+        h = x * U(0x9E3779B1) ^ y * U(0x85EBCA77) ^ U(channel * 0xC2B2AE3D & 0xFFFFFFFF) ^ U(seed * 0x27D4EB2F & 0xFFFFFFFF)
+        for shift, factor in ((15, 0x2C1B3C6D), (12, 0x297A2D39)):
+            h = (h ^ h >> U(shift)) * U(factor)
+        return h ^ h >> U(15)
+
+
+def pattern(case, x, y):
+    """0 to 255 in each pixel."""
+    width, height = case["width"], case["height"]
+    x, y = x.astype(np.int64), y.astype(np.int64)
+    match case["pattern"]:
+        case "flat":
+            return np.full_like(x, 128)
+        case "ramp":
+            return (255 * (x + y)) // (width + height)
+        case "bars":
+            return ((x // 5 + y // 9) % 2) * 255
+        case "disc":
+            distance = (2 * x - width) ** 2 * height * height + (2 * y - height) ** 2 * width * width
+            return np.where(2 * distance < (width * height) ** 2, 230, 40)
+        case "bowl":
+            distance = (2 * x - width) ** 2 * height * height + (2 * y - height) ** 2 * width * width
+            return np.minimum(255, 255 * distance // (2 * (width * height) ** 2))
+        case "mosaic":
+            return (hashed((x // 3).astype(U), (y // 3).astype(U), 7, 1) >> U(24)).astype(np.int64)
+
+
+def picture(case, noisy):
+    """Code values, rows × columns × 3."""
+    y, x = np.mgrid[0 : case["height"], 0 : case["width"]].astype(U)
+    shape = pattern(case, x, y)
+    channels = []
+    for channel in range(3):
+        low, high = case["low"][channel], case["high"][channel]
+        code = low + (high - low) * shape // 255
+        if noisy:
+            amount = case["amount"][channel]
+            of = 0 if case["grey"] else channel
+            h = hashed(x // U(case["grain"]), y // U(case["grain"]), of, case["seed"])
+            code = code + ((h & U(0xFFFF)).astype(np.int64) + (h >> U(16))) * (2 * amount + 1) // 131071 - amount
+        channels.append(np.clip(code, 0, 255).astype(np.float32) / np.float32(255) * np.float32(case["scale"]))
+    return np.stack(channels, axis=-1)
+
+
+class Recorder(cvvdp):
+    """Keeps the map before it is rounded to half precision."""
+
+    def process_block_of_frames(self, *arguments):
+        quality, self.raw = super().process_block_of_frames(*arguments)
+        return quality, self.raw
+
+
+def metric(viewing):
+    """The metric for a display of cvvdp, or for numbers."""
+    if "=" not in viewing:
+        return Recorder(display_name=viewing, heatmap="raw", device=torch.device("cpu"), quiet=True)
+    of = dict(part.split("=") for part in viewing.split(","))
+    photometry = vvdp_display_photo_eotf(
+        float(of["peak"]),
+        contrast=float(of["contrast"]),
+        source_colorspace={"rec709": "sRGB", "rec2020": "BT.2020-linear"}[of.get("primaries", "rec709")],
+        EOTF={"srgb": "sRGB"}.get(of["eotf"], of["eotf"].removeprefix("gamma")),
+        E_ambient=float(of["ambient"]),
+        k_refl=float(of["reflectivity"]),
+    )
+    geometry = vvdp_display_geometry((1920, 1080), ppd=float(of["ppd"]))
+    return Recorder(
+        display_photometry=photometry, display_geometry=geometry, heatmap="raw", device=torch.device("cpu"), quiet=True
+    )
+
+
+def cases():
+    """All pairs, as keyword arguments of `picture`."""
+    base = dict(
+        width=128, height=128, pattern="bowl", low=[20, 20, 20], high=[220, 220, 220], amount=[12, 12, 12],
+        grain=1, grey=False, scale=1, seed=1, viewing="standard_fhd",
+    )  # fmt: skip
+
+    def vary(**changes):
+        seed = len(listed) + 1
+        listed.append({**base, "seed": seed, **changes})
+
+    listed = []
+    # Noise levels, grey and in colour, fine and coarse
+    for amount in (0, 1, 3, 8, 20, 60, 200):
+        vary(amount=[amount] * 3, grey=True)
+        vary(amount=[amount] * 3)
+    for grain in (2, 4, 8):
+        vary(grain=grain)
+    # Sizes: small, odd, even beside odd
+    for width, height in ((2, 2), (3, 5), (4, 4), (7, 7), (8, 13), (13, 8), (15, 16), (16, 15), (33, 31), (65, 64), (64, 65),
+                          (127, 129), (128, 200), (160, 160), (192, 192), (255, 130), (301, 201)):  # fmt: skip
+        vary(width=width, height=height, amount=[20] * 3)
+    # Contents
+    for pattern in ("flat", "ramp", "bars", "disc", "mosaic"):
+        vary(pattern=pattern)
+        vary(pattern=pattern, low=[60] * 3, high=[90] * 3, amount=[6] * 3)
+    vary(low=[0, 0, 0], high=[6, 6, 6], amount=[3] * 3)
+    vary(low=[240, 240, 240], high=[255, 255, 255], amount=[8] * 3)
+    # Chroma
+    vary(low=[10, 60, 20], high=[200, 90, 40])
+    vary(low=[10, 10, 90], high=[40, 60, 240], amount=[0, 0, 30])
+    vary(low=[128] * 3, high=[128] * 3, amount=[15, 5, 0])
+    vary(pattern="disc", low=[200, 40, 40], high=[40, 200, 40], amount=[10] * 3)
+    # Displays
+    for viewing in ("standard_4k", "standard_phone", "standard_hmd", "sdr_4k_30", "iphone_12_pro", "macbook_pro_16", "lg_oled_2017_sdr",
+                    "eizo_CG3146", "standard_hdr_pq", "65inch_hdr_pq_2Knit", "standard_hdr_hlg", "iphone_14_pro_hdr"):  # fmt: skip
+        vary(viewing=viewing, width=160, height=144)
+        vary(viewing=viewing, pattern="mosaic", high=[220, 180, 140], amount=[25] * 3)
+    for viewing in ("standard_hdr_linear", "standard_hdr_linear_dark", "standard_hdr_linear_zoom"):
+        for scale in (100, 3000):
+            vary(viewing=viewing, scale=scale)
+    for viewing in (
+        "ppd=10,peak=100,contrast=500,ambient=0,reflectivity=0.005,eotf=gamma2.2",
+        "ppd=30,peak=48,contrast=2000,ambient=0,reflectivity=0.01,eotf=gamma2.6",
+        "ppd=60,peak=300,contrast=1000,ambient=100,reflectivity=0.01,eotf=srgb",
+        "ppd=60,peak=400,contrast=1000,ambient=5000,reflectivity=0.02,eotf=srgb,primaries=rec2020",
+        "ppd=200,peak=1000,contrast=100000,ambient=10,reflectivity=0.005,eotf=srgb",
+    ):
+        vary(viewing=viewing, width=150, height=150, amount=[25] * 3)
+    return listed
+
+
+def record(case):
+    """The case with what the metric says of it: JOD; mean and root mean square of the map, and an 8×8 sample, in JOD."""
+    of = metric(case["viewing"])
+    test, reference = (torch.tensor(picture(case, noisy)) for noisy in (True, False))
+    jod, _ = of.predict(test, reference, dim_order="HWC")
+    lost = 10 * of.raw[0, 0, 0].double().numpy()
+    places = [[(2 * i + 1) * n // 16 for i in range(8)] for n in lost.shape]
+    sample = lost[np.ix_(*places)].flatten()
+    rounded = lambda value: float(f"{value:.6g}")
+    return {
+        **case,
+        "jod": round(float(jod), 5),
+        "mean": rounded(lost.mean()),
+        "rms": rounded(np.sqrt((lost**2).mean())),
+        "sample": [rounded(value) for value in sample],
+    }
+
+
+def main():
+    torch.set_num_threads(1)
+    recorded = [record(case) for case in cases()]
+    versions = {name: version(name) for name in ("cvvdp", "torch", "torchvision", "numpy")}
+    head = json.dumps({"python": platform.python_version(), **versions})
+    lines = ",\n".join(json.dumps(case, separators=(",", ":")) for case in recorded)
+    Path(__file__).with_name("cvvdp.json").write_text(f'{{"versions": {head}, "pairs": [\n{lines}\n]}}\n')
+    print(f"{len(recorded)} pairs")
+
+
+main()
