@@ -3,12 +3,13 @@
 use crate::args::ExploreArgs;
 use crate::train::read_table_file;
 use anyhow::Context;
-use noisefloor_study::explore::{Explorer, Setup};
+use noisefloor_study::explore::{ExploreServer, ExploreSetup};
+use noisefloor_study::interrupted;
 use tokio::runtime::Builder;
 
 pub fn run(args: &ExploreArgs) -> anyhow::Result<()> {
     let oracle = args.oracle.load()?;
-    let setup = Setup {
+    let setup = ExploreSetup {
         model: oracle.model().clone(),
         threshold: oracle.threshold(),
         audience: args.audience,
@@ -19,10 +20,10 @@ pub fn run(args: &ExploreArgs) -> anyhow::Result<()> {
     };
     let runtime = Builder::new_multi_thread().enable_all().build().context("no threads for the server")?;
     runtime.block_on(async {
-        let explorer = Explorer::bind(setup, args.listen, &args.allow_host).await?;
+        let explorer = ExploreServer::bind(setup, args.listen, &args.allow_host).await?;
         println!("look at http://{}; Ctrl-C ends", explorer.address());
         println!("disagreements are kept in {}", args.database.display());
-        explorer.run(async { drop(tokio::signal::ctrl_c().await) }).await?;
+        explorer.run(interrupted()).await?;
         Ok(())
     })
 }

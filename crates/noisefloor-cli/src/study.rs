@@ -2,10 +2,11 @@
 
 use crate::args::{AnalyseArgs, ObserverArgs, ServeArgs, SimulateArgs, StudyCommand, ThresholdChoice};
 use anyhow::Context;
-use noisefloor_study::analysis::files::{Threshold, write};
-use noisefloor_study::analysis::{Options, Report, analyse};
+use noisefloor_study::analysis::CorpusThreshold;
+use noisefloor_study::analysis::files::write;
+use noisefloor_study::analysis::{AnalysisOptions, StudyReport, analyse};
 use noisefloor_study::simulated::{Public, drive};
-use noisefloor_study::{Server, Study, parse_code, store};
+use noisefloor_study::{Study, StudyServer, interrupted, parse_code, store};
 use std::net::{Ipv4Addr, SocketAddr};
 use std::path::Path;
 use std::sync::Arc;
@@ -47,10 +48,10 @@ fn serve(args: &ServeArgs) -> anyhow::Result<()> {
     let study = open(&args.study)?;
     runtime()?.block_on(async {
         let address = SocketAddr::new(args.listen, args.port);
-        let server = Server::bind(study.clone(), address, &args.allow_host).await?;
+        let server = StudyServer::bind(study.clone(), address, &args.allow_host).await?;
         println!("observers begin at http://{}; Ctrl-C ends", server.address());
         println!("answers are kept in {}", study.database.display());
-        server.run(async { drop(tokio::signal::ctrl_c().await) }).await?;
+        server.run(interrupted()).await?;
         Ok(())
     })
 }
@@ -58,10 +59,10 @@ fn serve(args: &ServeArgs) -> anyhow::Result<()> {
 fn analysis(args: &AnalyseArgs) -> anyhow::Result<()> {
     let study = Arc::new(Study::open(&args.study)?);
     let (keep_outliers, seed, simulated) = (args.keep_outliers, args.seed, args.simulated);
-    let report = analyse(&study, Options { keep_outliers, seed, simulated })?;
+    let report = analyse(&study, AnalysisOptions { keep_outliers, seed, simulated })?;
     let threshold = match args.threshold {
-        ThresholdChoice::Level95 => Threshold::Level95,
-        ThresholdChoice::Mean => Threshold::Mean,
+        ThresholdChoice::Level95 => CorpusThreshold::Level95,
+        ThresholdChoice::Mean => CorpusThreshold::Mean,
     };
     write(&args.out, &study, &report, threshold)?;
     print(&report);
@@ -69,7 +70,7 @@ fn analysis(args: &AnalyseArgs) -> anyhow::Result<()> {
     Ok(())
 }
 
-fn print(report: &Report) {
+fn print(report: &StudyReport) {
     let who = if report.simulated { "simulated observers" } else { "observers" };
     let finished = report.observers.iter().filter(|o| o.finished).count();
     println!("{} {who}, of whom {finished} answered everything", report.observers.len());
@@ -139,7 +140,7 @@ fn simulate(args: &SimulateArgs) -> anyhow::Result<()> {
     let runtime = runtime()?;
     let (stop, stopped) = oneshot::channel::<()>();
     let address = SocketAddr::new(Ipv4Addr::LOCALHOST.into(), 0);
-    let server = runtime.block_on(Server::bind(study.clone(), address, &[]))?;
+    let server = runtime.block_on(StudyServer::bind(study.clone(), address, &[]))?;
     let url = format!("http://{}", server.address());
     let served = runtime.spawn(server.run(async { drop(stopped.await) }));
     let mut events = 0u64;

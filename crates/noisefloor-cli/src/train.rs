@@ -8,7 +8,7 @@ use noisefloor_image::{check_writable, write_atomic};
 use noisefloor_learn::{Prediction, Table, score};
 use noisefloor_learn::{TrainParams, leave_one_scene_out, train};
 use noisefloor_learn::{describe_corpora, read_table, write_table};
-use noisefloor_study::explore::{Agreement, Step, read_answers, retrain};
+use noisefloor_study::explore::{AnswerAgreement, LearnStep, read_answers, retrain};
 use std::fs::File;
 use std::io::BufReader;
 use std::path::Path;
@@ -93,7 +93,7 @@ fn with_disagreements(
         );
     }
     let bar = bar(0, "parts");
-    let on_step = |step: Step| {
+    let on_step = |step: LearnStep| {
         bar.set_length(step.of as u64);
         bar.set_position(step.done as u64);
         bar.set_message(step.doing);
@@ -114,7 +114,7 @@ fn with_disagreements(
             );
         }
     }
-    let Agreement { of, before, fitted, left_out } = learned.agreement;
+    let AnswerAgreement { of, before, fitted, left_out } = learned.agreement;
     println!(
         "of {of} disagreements, the verdict is right for {before} before, {fitted} after, and {left_out} after with their scene left out"
     );

@@ -1,4 +1,4 @@
-//! Participants' codes: random, and nothing else.
+//! Participant codes: random, and carrying no other information.
 
 use crate::error::StoreError;
 
@@ -7,7 +7,7 @@ const ALPHABET: &[u8; 32] = b"0123456789ABCDEFGHJKMNPQRSTVWXYZ";
 /// 60 bits: a guess at a rate of one a second, against a thousand codes, succeeds once in 36 million years.
 const LENGTH: usize = 12;
 
-/// A new code, from the random numbers of the operating system.
+/// Draws a code from the operating system's random numbers.
 ///
 /// # Errors
 /// [`StoreError::Closed`] if the system has none to give.
@@ -17,7 +17,7 @@ pub(crate) fn draw() -> Result<String, StoreError> {
     Ok(bytes.iter().map(|b| char::from(ALPHABET[usize::from(b % 32)])).collect())
 }
 
-/// A seed for the order of trials, from the same.
+/// Draws a seed for the order of trials from the operating system's random numbers.
 ///
 /// # Errors
 /// [`StoreError::Closed`] if the system has none to give.
@@ -27,8 +27,8 @@ pub(crate) fn draw_seed() -> Result<u64, StoreError> {
     Ok(u64::from_le_bytes(bytes))
 }
 
-/// A code as it was typed, put right: spaces and hyphens left out, capitals, and what looks alike taken for what is in the alphabet. `None` if
-/// it cannot be a code.
+/// Normalises a code as typed: drops spaces and hyphens, converts to capitals, and maps look-alike letters
+/// to the alphabet. Returns `None` if the result cannot be a code.
 pub fn parse(typed: &str) -> Option<String> {
     if typed.len() > 64 {
         return None;

@@ -1,7 +1,7 @@
 //! The study file: what was written, and what it means once checked.
 
 use crate::error::StudyError;
-use crate::stack::{Source, Stack};
+use crate::stack::{Source, StudyStack};
 use noisefloor::DEFAULT_TILE;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
@@ -21,13 +21,11 @@ const MAX_REPEATS: u32 = 10;
 const MAX_TRIALS: u32 = 200;
 /// Languages that pages are written in.
 pub const LANGUAGES: [&str; 2] = ["en", "fr"];
-/// The share of the threshold that makes the noisy class (Takouachet et al. 2017, §7.2).
-pub const NOISY_SHARE: f64 = 0.3;
 
 /// What observers are asked to do.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Protocol {
+pub enum StudyProtocol {
     /// Point at differences from the reference until there are none (Takouachet et al. 2017, §4.2.2).
     Acquisition,
     /// Say of pairs whether they are identical (§7.2).
@@ -52,7 +50,7 @@ pub struct Texts {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 struct StudyFile {
-    protocol: Protocol,
+    protocol: StudyProtocol,
     database: PathBuf,
     tile: Option<usize>,
     repeats: Option<u32>,
@@ -72,7 +70,8 @@ struct FileStack {
     folder: PathBuf,
     #[serde(default)]
     renderer: String,
-    /// Where each tile stopped: `stops.csv` of `noisefloor render`, or any table with the columns `tile` and `spp`.
+    /// Where each tile stopped: `stops.csv` of `noisefloor render`, or any table with the columns `tile`
+    /// and `spp`.
     stops: Option<PathBuf>,
 }
 
@@ -80,7 +79,7 @@ struct FileStack {
 #[derive(Debug)]
 pub struct Study {
     /// What observers do.
-    pub protocol: Protocol,
+    pub protocol: StudyProtocol,
     /// File of the answers.
     pub database: PathBuf,
     /// Times that each pair is shown to each observer (acquisition, validation).
@@ -96,13 +95,13 @@ pub struct Study {
     /// By language; those of [`LANGUAGES`] alone, at least one.
     pub text: BTreeMap<String, Texts>,
     /// The pictures, at least one stack.
-    pub stacks: Vec<Stack>,
+    pub stacks: Vec<StudyStack>,
 }
 
 /// The part of a study that answers depend on: a database keeps it, and goes with no other.
 #[derive(Serialize)]
 struct Design {
-    protocol: Protocol,
+    protocol: StudyProtocol,
     repeats: u32,
     trials: u32,
     seed: u64,
@@ -119,8 +118,8 @@ struct DesignStack {
 }
 
 impl Study {
-    /// Reads a study file, and lists its stacks; relative paths are those beside the file. Opens the most converged picture of each
-    /// stack; [`Study::check_pictures`] opens the others.
+    /// Reads a study file, and lists its stacks; relative paths are those beside the file. Opens the most
+    /// converged picture of each stack; [`Study::check_pictures`] opens the others.
     ///
     /// # Errors
     /// [`StudyError`] if the file is malformed or a stack is not sound.
@@ -146,7 +145,7 @@ impl Study {
         };
         let repeats = within(
             "repeats",
-            file.repeats.unwrap_or(if file.protocol == Protocol::Acquisition { 2 } else { 1 }),
+            file.repeats.unwrap_or(if file.protocol == StudyProtocol::Acquisition { 2 } else { 1 }),
             MAX_REPEATS,
         )?;
         let trials = within("trials", file.trials.unwrap_or(32), MAX_TRIALS)?;
@@ -189,12 +188,12 @@ impl Study {
             if !names.insert(name.clone()) {
                 return Err(bad(format!("two stacks are called {name:?}")));
             }
-            if file.protocol == Protocol::Validation && entry.stops.is_none() {
+            if file.protocol == StudyProtocol::Validation && entry.stops.is_none() {
                 return Err(bad(format!(
-                    "stack {name:?} has no `stops`: validation shows pictures put together from where tiles stopped"
+                    "stack {name:?} has no `stops`: a validation shows pictures assembled from where tiles stopped"
                 )));
             }
-            stacks.push(Stack::open(Source {
+            stacks.push(StudyStack::open(Source {
                 name: entry.name,
                 renderer: entry.renderer,
                 folder: beside.join(entry.folder),
@@ -220,12 +219,12 @@ impl Study {
     /// # Errors
     /// [`StudyError`] of the first stack that has a broken picture, or one of another size.
     pub fn check_pictures(&self) -> Result<(), StudyError> {
-        self.stacks.iter().try_for_each(Stack::check_pictures)
+        self.stacks.iter().try_for_each(StudyStack::check_pictures)
     }
 
     /// What answers depend on, as text; equal texts mean that answers to one fit the other.
     pub fn design(&self) -> String {
-        let stack = |s: &Stack| DesignStack {
+        let stack = |s: &StudyStack| DesignStack {
             name: s.name().to_owned(),
             size: [s.grid().width(), s.grid().height()],
             tile: s.grid().edge(),

@@ -1,4 +1,4 @@
-//! What can go wrong. Every message says what, where, and what to do.
+//! Errors. Every message says what happened, where, and what to do.
 
 use noisefloor::TileError;
 use noisefloor_image::{PictureError, StackError, WriteError};
@@ -17,12 +17,12 @@ pub enum StudyError {
         /// What the system said.
         source: io::Error,
     },
-    /// The study file is not what it should be.
+    /// The study file is invalid.
     #[error("{}: {what}; docs/study.md lists what a study file holds", path.display())]
     File {
         /// The file.
         path: PathBuf,
-        /// What is wrong with it, with the line where it is known.
+        /// What is wrong, with the line number if known.
         what: String,
     },
     /// A stack has too few or too many pictures.
@@ -36,7 +36,11 @@ pub enum StudyError {
         max: usize,
     },
     /// A picture differs in size from its stack.
-    #[error("{}: {got:?} pixels, but the most converged picture of the stack has {want:?}; render it again at that size", path.display())]
+    #[error(
+        "{}: {got:?} pixels, but the most converged picture of the stack has {want:?}; render it again at \
+         that size",
+        path.display()
+    )]
     Size {
         /// The picture.
         path: PathBuf,
@@ -45,21 +49,21 @@ pub enum StudyError {
         /// Those of its stack.
         want: (usize, usize),
     },
-    /// A picture has pixels that are no numbers.
-    #[error("{}: has pixels that are not finite; mend the render, since they would be shown", path.display())]
+    /// A picture has pixels that are not finite.
+    #[error("{}: has pixels that are not finite; fix the render", path.display())]
     NotFinite {
         /// The picture.
         path: PathBuf,
     },
-    /// Pictures cannot be cut into tiles.
+    /// A picture cannot be cut into tiles.
     #[error("stack {name}: {source}")]
     Tile {
         /// The stack.
         name: String,
-        /// The limits.
+        /// Which limit was exceeded.
         source: TileError,
     },
-    /// A folder is no stack.
+    /// A folder does not hold a stack.
     #[error(transparent)]
     Stack(#[from] StackError),
     /// A picture cannot be read.
@@ -68,30 +72,33 @@ pub enum StudyError {
     /// A result cannot be written.
     #[error(transparent)]
     Write(#[from] WriteError),
-    /// The answers cannot be read or kept.
+    /// The answers cannot be read or stored.
     #[error(transparent)]
     Store(#[from] StoreError),
-    /// A server address cannot be listened on.
-    #[error("{address}: cannot be listened on: {source}; choose another with --port")]
+    /// The server cannot listen on an address.
+    #[error("cannot listen on {address}: {source}; choose another port with --port")]
     Listen {
         /// The address.
         address: String,
         /// What the system said.
         source: io::Error,
     },
-    /// Pictures that cannot be explored.
+    /// Pictures cannot be explored.
     #[error("{0}")]
     Explore(String),
-    /// Nothing to analyse.
+    /// The analysis is impossible, for example because there are no answers.
     #[error("{0}")]
     Analysis(String),
 }
 
-/// Why answers could not be kept or found. Nothing that was acknowledged before is lost.
+/// Why answers could not be stored or found. Acknowledged answers are never lost.
 #[derive(Debug, Error)]
 pub enum StoreError {
-    /// The database said no.
-    #[error("{}: {source}; check the space on the disk and that the file is a database of `noisefloor study`", path.display())]
+    /// SQLite refused.
+    #[error(
+        "{}: {source}; check the free space and that the file is a database of `noisefloor study`",
+        path.display()
+    )]
     Database {
         /// The database.
         path: PathBuf,
@@ -99,30 +106,34 @@ pub enum StoreError {
         source: rusqlite::Error,
     },
     /// The database holds the answers to another study.
-    #[error("{}: holds answers to another study, or to an earlier design of this one; name another `database` in the study file", path.display())]
+    #[error(
+        "{}: holds answers to another study, or to an earlier design of this one; name another `database` \
+         in the study file",
+        path.display()
+    )]
     OtherStudy {
         /// The database.
         path: PathBuf,
     },
-    /// The database holds something else than disagreements.
+    /// The database does not hold disagreements.
     #[error("{}: is not a database of `noisefloor explore`; name another with --database", path.display())]
     NotDisagreements {
         /// The database.
         path: PathBuf,
     },
-    /// There is no session of that code.
+    /// No session has this code.
     #[error("no session has the code {0}; check it, or begin a new session")]
     Unknown(String),
-    /// Another event has that number already.
-    #[error("event {seq} of session {code} is there already, and is another one; load the session again")]
+    /// A different event already has this number.
+    #[error("event {seq} of session {code} already exists with other content; reload the session")]
     Conflict {
         /// The session.
         code: String,
         /// The number.
         seq: u64,
     },
-    /// The writer has stopped.
-    #[error("answers are no longer kept, since the database's thread has ended; start the server again")]
+    /// The writer thread has ended.
+    #[error("answers can no longer be stored because the database thread has ended; restart the server")]
     Closed,
     /// An event in the database does not fit the study.
     #[error("event {seq} of session {code} does not fit the study: {what}; was the database edited by hand?")]

@@ -8,7 +8,7 @@ const MAX_CLOCK: u64 = 9_000_000_000_000;
 /// One thing that an observer did.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
-pub enum Event {
+pub enum StudyEvent {
     /// Agreed to take part. Nothing is shown before.
     Consent {
         /// Language of the text that was agreed to.
@@ -133,7 +133,7 @@ pub struct Envelope {
     /// Clock of the page when it happened, in milliseconds since 1970.
     pub at: u64,
     /// What happened.
-    pub event: Event,
+    pub event: StudyEvent,
 }
 
 impl Envelope {

@@ -1,15 +1,19 @@
 //! Experiments with people, in the browser: noise thresholds are collected, validated and analysed.
 //!
 //! - [`Study`] is a checked study file: stacks of pictures, a protocol, what observers read and agree to.
-//! - [`Server`] shows it to observers and keeps every [`Event`] before it acknowledges it; [`store`] is where.
-//! - [`Session`] is the state that events move on; replaying them rebuilds it, which is how it is resumed and analysed.
-//! - [`analysis`] makes thresholds, agreements and tables of the answers, and a corpus for `noisefloor train`.
+//! - [`StudyServer`] shows it to observers and keeps every [`StudyEvent`] before it acknowledges it;
+//!   [`store`] is where.
+//! - [`ParticipantSession`] is the state that events move on; replaying them rebuilds it, which is how it
+//!   is resumed and analysed.
+//! - [`analysis`] makes thresholds, agreements and tables of the answers, and a corpus for `noisefloor
+//!   train`.
 //! - [`explore`] judges one's own pictures in the browser, keeps disagreements, and learns from them.
-//! - [`simulated`] are observers made of numbers, who drive the same server: to test the whole chain, and to plan a study.
+//! - [`simulated`] are observers made of numbers, who drive the same server: to test the whole chain, and
+//!   to plan a study.
 //!
 //! ```
 //! use noisefloor_image::write_png;
-//! use noisefloor_study::{Event, Session, Stage, Study, grids};
+//! use noisefloor_study::{StudyEvent, ParticipantSession, Stage, Study, grids};
 //! use std::sync::Arc;
 //!
 //! // Three pictures, named by their samples per pixel, and a study file beside them.
@@ -32,8 +36,8 @@
 //! "#)?;
 //!
 //! let study = Arc::new(Study::open(&file)?);
-//! let mut session = Session::new(study.clone(), grids(&study), 1);
-//! session.apply(&Event::Consent { language: "en".into() })?;
+//! let mut session = ParticipantSession::new(study.clone(), grids(&study), 1);
+//! session.apply(&StudyEvent::Consent { language: "en".into() })?;
 //! assert_eq!((session.stage(), session.progress()), (Stage::Conditions, (0, 3)));
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
@@ -44,6 +48,7 @@ mod config;
 mod error;
 mod event;
 pub mod explore;
+mod http;
 mod questplus;
 mod random;
 mod server;
@@ -53,11 +58,12 @@ mod stack;
 pub mod store;
 
 pub use code::parse as parse_code;
-pub use config::{LANGUAGES, MAX_STACKS, NOISY_SHARE, Protocol, Study, Texts};
+pub use config::{LANGUAGES, MAX_STACKS, Study, StudyProtocol, Texts};
 pub use error::{StoreError, StudyError};
-pub use event::{Ambient, Choice, Conditions, Envelope, Event};
-pub use questplus::{GUESS, Grid, LAPSE, Posterior, QuestPlus, right, sees};
-pub use server::{Beginning, Server, SessionView, StackView, StudyView, replay};
-pub use session::{Class, Misfit, Outcome, Session, Stage, Trial, grids};
-pub use stack::{MAX_LEVELS, Stack};
-pub use store::{Record, Store};
+pub use event::{Ambient, Choice, Conditions, Envelope, StudyEvent};
+pub use http::interrupted;
+pub use questplus::{GUESS, LAPSE, Posterior, QuestGrid, QuestPlus, right, sees};
+pub use server::{Beginning, SessionView, StackView, StudyServer, StudyView};
+pub use session::{Class, EventMisfit, ParticipantSession, Stage, Trial, TrialOutcome, grids, replay};
+pub use stack::{MAX_LEVELS, NOISY_SHARE, StudyStack};
+pub use store::{AnswerStore, SessionRecord};

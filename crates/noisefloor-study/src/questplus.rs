@@ -1,46 +1,50 @@
-//! QUEST+ (Watson 2017, "QUEST+: A general multidimensional Bayesian adaptive psychometric method", Journal of Vision 17(3):10) for
-//! one tile: which level to show next, and what is known of the threshold.
+//! QUEST+ for one tile: which level to show next, and what is known about the threshold (Watson 2017,
+//! "QUEST+: A general multidimensional Bayesian adaptive psychometric method", Journal of Vision 17(3):10).
 //!
-//! Written here because the server has to decide trials, and no crate has it; jsQuestPlus, the library of jsPsych's users, runs in pages.
+//! Implemented here because the server chooses the trials and no crate offers it. jsQuestPlus, which
+//! jsPsych users rely on, runs in the page.
 
 use std::sync::Arc;
 
-/// Probability of being right without seeing anything: one of two intervals.
+/// Probability of a correct answer by pure guessing between two intervals.
 pub const GUESS: f64 = 0.5;
-/// Probability of answering without looking, assumed.
+/// Assumed probability of an answer given without looking.
 pub const LAPSE: f64 = 0.02;
-/// Scales of the psychometric function that are thought possible, in ln(spp).
+/// Candidate scales of the psychometric function, in ln(spp).
 const SCALES: [f64; 4] = [0.08, 0.16, 0.32, 0.64];
-/// Thresholds that are thought possible: so many, evenly in ln(spp).
+/// Number of candidate thresholds, evenly spaced in ln(spp).
 const THRESHOLDS: usize = 81;
-/// They reach so far beyond the first and the last level, in ln(spp): threefold.
+/// Candidate thresholds extend beyond the first and last level by this much, in ln(spp): a factor of three.
 const MARGIN: f64 = 1.1;
-/// Levels that are considered: more lie closer than an answer can tell apart.
+/// Most levels considered as stimuli; closer ones could not be told apart by an answer.
 const MOST_STIMULI: usize = 48;
 
-/// Probability that an observer with threshold and scale given sees the noise of a picture, all in ln(spp). Logistic; ½ at the threshold.
+/// Probability that an observer sees the noise of a picture, given threshold and scale, all in ln(spp).
+/// Logistic, ½ at the threshold.
 pub fn sees(ln_spp: f64, ln_threshold: f64, scale: f64) -> f64 {
     1.0 / (1.0 + ((ln_spp - ln_threshold) / scale).exp())
 }
 
-/// Probability of a right answer in a two-interval forced choice.
+/// Probability of a correct answer in a two-interval forced choice.
 pub fn right(ln_spp: f64, ln_threshold: f64, scale: f64) -> f64 {
     GUESS + (1.0 - GUESS - LAPSE) * sees(ln_spp, ln_threshold, scale)
 }
 
-/// What does not change from trial to trial: the levels of a stack, the hypotheses, and what each predicts.
+/// The part that does not change from trial to trial: the levels of a stack, the hypotheses, and the
+/// predictions of each.
 #[derive(Debug)]
-pub struct Grid {
-    /// Levels that may be shown.
+pub struct QuestGrid {
+    /// Levels considered as stimuli.
     levels: Vec<u32>,
     /// ln(threshold) of each hypothesis.
     thresholds: Vec<f64>,
-    /// Probability of a right answer: by level of the stack, then by hypothesis.
+    /// Probability of a correct answer, by level of the stack, then by hypothesis.
     right: Vec<Vec<f64>>,
 }
 
-impl Grid {
-    /// For a stack with these samples per pixel, increasing, at least two; the last is the reference, and never shown against itself.
+impl QuestGrid {
+    /// Builds the tables for a stack with these samples per pixel: increasing, at least two. The last level
+    /// is the reference, which is never shown against itself.
     pub fn new(spp: &[u64]) -> Self {
         let ln: Vec<f64> = spp.iter().map(|&n| (n.max(1) as f64).ln()).collect();
         let (low, high) = (ln[0] - MARGIN, ln[ln.len() - 1] + MARGIN);
@@ -71,20 +75,21 @@ impl Grid {
 /// What is known of one tile's threshold.
 #[derive(Clone, Debug)]
 pub struct QuestPlus {
-    grid: Arc<Grid>,
+    grid: Arc<QuestGrid>,
     /// Probability of each hypothesis; they sum to 1.
     posterior: Vec<f64>,
 }
 
 impl QuestPlus {
-    /// Nothing is known: all hypotheses are as likely.
-    pub fn new(grid: Arc<Grid>) -> Self {
+    /// Starts with all hypotheses equally likely.
+    pub fn new(grid: Arc<QuestGrid>) -> Self {
         let n = grid.thresholds.len();
         Self { grid, posterior: vec![1.0 / n as f64; n] }
     }
 
-    /// The level whose answer is expected to leave the least entropy about the threshold (Watson 2017, eqs. 2 to 5). The scale is summed out
-    /// first (Prins 2013, "The psi-marginal adaptive method", Journal of Vision 13(7):3): it is not asked for, and trials spent on it are lost.
+    /// The level whose answer is expected to leave the least entropy about the threshold (Watson 2017, eqs.
+    /// 2 to 5). The scale is marginalised first (Prins 2013, "The psi-marginal adaptive method", Journal of
+    /// Vision 13(7):3), because trials spent on learning it would be wasted here.
     pub fn next_level(&self) -> u32 {
         let xlnx = |x: f64| if x > 0.0 { x * x.ln() } else { 0.0 };
         let expected_entropy = |&level: &u32| {
@@ -104,7 +109,7 @@ impl QuestPlus {
         self.grid.levels[least.unwrap_or(0)]
     }
 
-    /// Learns from an answer (Bayes' rule). A level that is not in the stack teaches nothing.
+    /// Updates the posterior with an answer (Bayes' rule). A level outside the stack is ignored.
     pub fn learn(&mut self, level: u32, right: bool) {
         let Some(likelihood) = self.grid.right.get(level as usize) else { return };
         for (p, r) in self.posterior.iter_mut().zip(likelihood) {
@@ -114,7 +119,7 @@ impl QuestPlus {
         self.posterior.iter_mut().for_each(|p| *p /= sum);
     }
 
-    /// What is known of the threshold, the scale summed out.
+    /// The posterior of the threshold, with the scale marginalised.
     pub fn posterior(&self) -> Posterior {
         let thresholds = &self.grid.thresholds;
         let last = thresholds[thresholds.len() - 1];
@@ -126,13 +131,13 @@ impl QuestPlus {
     }
 }
 
-/// What is known of one observer's ln(threshold), the threshold in samples per pixel: probabilities at evenly spaced values. Since all values were as
-/// likely before, they are also proportional to the likelihood of the answers.
+/// Posterior of one observer's ln(threshold), with the threshold in samples per pixel, on evenly spaced
+/// values. The prior is flat, so it is also proportional to the likelihood of the answers.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Posterior {
     /// The first value.
     pub low: f64,
-    /// From one value to the next.
+    /// Spacing of the values.
     pub step: f64,
     /// Probabilities; they sum to 1.
     pub weights: Arc<[f64]>,
@@ -157,8 +162,8 @@ impl Posterior {
 mod tests {
     use super::*;
 
-    fn stack() -> Arc<Grid> {
-        Arc::new(Grid::new(&(1..=100).map(|i| 100 * i).collect::<Vec<_>>()))
+    fn stack() -> Arc<QuestGrid> {
+        Arc::new(QuestGrid::new(&(1..=100).map(|i| 100 * i).collect::<Vec<_>>()))
     }
 
     #[test]
@@ -183,7 +188,8 @@ mod tests {
         assert_eq!(quest.posterior, before);
     }
 
-    /// The first level is chosen by brute force too: entropy of each posterior, weighed by how likely it is.
+    /// The chosen level is also found by brute force: the entropy of each posterior, weighted by its
+    /// probability.
     #[test]
     fn the_level_chosen_leaves_least_entropy() {
         let mut quest = QuestPlus::new(stack());
@@ -209,8 +215,9 @@ mod tests {
         }
     }
 
-    /// 32 trials of a known observer, 60 times: the errors are as large as the posterior says. With errors z = (estimate − truth)/sd,
-    /// mean z² of 60 lies in 0.4…1.9 but for 1 in 1000 if z is standard normal (χ² of 60 degrees of freedom: 0.53…1.66).
+    /// After 32 trials of a known observer, repeated 60 times, errors are as large as the posterior says.
+    /// For errors z = (estimate − truth)/sd that are standard normal, the mean of 60 z² lies in 0.4…1.9
+    /// except once in 1000 (χ² with 60 degrees of freedom: 0.53…1.66).
     #[test]
     fn estimates_err_as_much_as_they_say() {
         let (truth, scale) = (2500f64.ln(), 0.16);

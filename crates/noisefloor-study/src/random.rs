@@ -1,7 +1,8 @@
 //! Seeded random numbers.
 
-/// A generator of `fastrand`. Seeds that follow each other are scattered first (SplitMix64, Steele, Lea and Flood 2014): wyrand's first numbers of
-/// seeds 1, 2, 3 … are not independent, and observers drawn with them would be spread more evenly than by chance.
+/// A `fastrand` generator whose seed is scrambled first (SplitMix64; Steele, Lea and Flood 2014). The first
+/// numbers that wyrand draws from seeds 1, 2, 3 … are correlated, so observers drawn from consecutive seeds
+/// would be spread more evenly than chance.
 pub(crate) fn seeded(seed: u64) -> fastrand::Rng {
     let mut z = seed.wrapping_add(0x9e37_79b9_7f4a_7c15);
     z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -13,8 +14,9 @@ pub(crate) fn seeded(seed: u64) -> fastrand::Rng {
 mod tests {
     use super::*;
 
-    /// The first numbers of 33 seeds in a row have a mean that varies as that of independent ones: over 300 rows, by 1/√(12·33) = 0.0503, known to 4 %
-    /// (standard error of a standard deviation, 1/√600); four of these.
+    /// The mean of the first numbers of 33 consecutive seeds varies as it would for independent numbers:
+    /// its standard deviation over 300 rows is 1/√(12·33) = 0.0503. The standard error of that is 4 %
+    /// (1/√600); the tolerance is four of them.
     #[test]
     fn neighbouring_seeds_are_independent() {
         let mean = |row: u64| (0..33).map(|i| seeded(1000 * row + i).f64()).sum::<f64>() / 33.0 - 0.5;

@@ -1,6 +1,5 @@
-//! A stack of pictures of one view, from noisy to converged, as observers are shown it: 8-bit tiles.
+//! A stack of pictures of one view, from noisy to converged, cut into the 8-bit tiles that observers see.
 
-use crate::config::NOISY_SHARE;
 use crate::error::StudyError;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, ImageEncoder};
@@ -12,9 +11,11 @@ use std::path::{Path, PathBuf};
 
 /// Most pictures of a stack.
 pub const MAX_LEVELS: usize = 2000;
+/// The share of the threshold that makes the noisy class (Takouachet et al. 2017, §7.2).
+pub const NOISY_SHARE: f64 = 0.3;
 /// Most tiles of a picture.
 const MAX_TILES: usize = 1024;
-/// Most pixels of a picture: more do not fit a screen unscaled.
+/// Most pixels of a picture; a larger one would not fit on a screen unscaled.
 const MAX_PIXELS: usize = 16 << 20;
 /// Most lines of a table of stops.
 const MAX_STOPS: usize = 100_000;
@@ -28,24 +29,24 @@ pub(crate) struct Source {
     pub(crate) tile: usize,
 }
 
-/// Pictures of one view by increasing samples per pixel. The last one is the reference.
+/// Pictures of one view, ordered by samples per pixel. The last one is the reference.
 #[derive(Debug)]
-pub struct Stack {
+pub struct StudyStack {
     name: String,
     renderer: String,
     folder: PathBuf,
     grid: TileGrid,
     levels: Vec<u64>,
     paths: Vec<PathBuf>,
-    /// How linear pictures are shown: settled on the reference, the same for all. `None` if the pictures are PNGs.
+    /// Tone mapping of linear pictures, fitted to the reference and shared by all levels. `None` for PNGs.
     display: Option<Display>,
-    /// Level at which each tile had stopped: the first with at least so many samples.
+    /// Level at which each tile had stopped: the first with at least that many samples.
     stops: Option<Vec<u32>>,
-    /// Level at 30 % of that.
+    /// Level at 30 % of those samples.
     noisy: Option<Vec<u32>>,
 }
 
-impl Stack {
+impl StudyStack {
     pub(crate) fn open(source: Source) -> Result<Self, StudyError> {
         let Source { name, renderer, folder, stops, tile } = source;
         let frames = running_means(&folder)?;
@@ -55,14 +56,15 @@ impl Stack {
         let (levels, paths): (Vec<u64>, Vec<PathBuf>) =
             frames.into_iter().map(|Frame { last, path, .. }| (last, path)).unzip();
 
-        // The reference settles the size, and how linear pictures are shown
+        // The reference determines the size and the tone mapping
         let reference = read_picture(&paths[paths.len() - 1])?;
         let (width, height) = reference.size();
         let grid = TileGrid::new(width, height, tile)
             .map_err(|source| StudyError::Tile { name: name.clone(), source })?;
         if grid.len() > MAX_TILES || width * height > MAX_PIXELS {
             let what = format!(
-                "stack {name}: {width}×{height} pixels in {} tiles; at most {MAX_PIXELS} pixels in {MAX_TILES} tiles are shown, take larger tiles or a crop",
+                "stack {name}: {width}×{height} pixels in {} tiles; the limits are {MAX_PIXELS} pixels and \
+                 {MAX_TILES} tiles, so use larger tiles or a crop",
                 grid.len()
             );
             return Err(StudyError::File { path: folder, what });
@@ -83,12 +85,12 @@ impl Stack {
         Ok(Self { name, renderer, folder, grid, levels, paths, display, stops, noisy })
     }
 
-    /// Its name, which is a plain folder name.
+    /// Name of the stack; a plain folder name.
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// Who rendered it, as the study file says.
+    /// Renderer, as the study file names it.
     pub fn renderer(&self) -> &str {
         &self.renderer
     }
@@ -98,12 +100,12 @@ impl Stack {
         &self.folder
     }
 
-    /// The tiles.
+    /// The tile grid.
     pub fn grid(&self) -> TileGrid {
         self.grid
     }
 
-    /// Samples per pixel of each level, increasing; at least two. The last is the reference.
+    /// Samples per pixel of each level: increasing, at least two. The last level is the reference.
     pub fn levels(&self) -> &[u64] {
         &self.levels
     }
@@ -113,25 +115,26 @@ impl Stack {
         (self.levels.len() - 1) as u32
     }
 
-    /// Level at which each tile had stopped, where the study file says.
+    /// Level at which each tile had stopped, if the study file names a table of stops.
     pub fn stops(&self) -> Option<&[u32]> {
         self.stops.as_deref()
     }
 
-    /// Level with 30 % of the samples at which each tile had stopped, where the study file says.
+    /// Level with 30 % of the samples at which each tile had stopped, if the study file names a table of
+    /// stops.
     pub fn noisy(&self) -> Option<&[u32]> {
         self.noisy.as_deref()
     }
 
-    /// Whether the pictures were tone mapped to be shown.
+    /// Whether the pictures are tone mapped for display.
     pub fn is_tone_mapped(&self) -> bool {
         self.display.is_some()
     }
 
-    /// A level as it is shown: sRGB-encoded, three bytes a pixel, row-major.
+    /// A level as displayed: sRGB-encoded, three bytes a pixel, row-major.
     ///
     /// # Errors
-    /// [`StudyError`] if the file is broken, or its size or kind is not that of the reference.
+    /// [`StudyError`] if the file is broken, or differs from the reference in size or kind.
     ///
     /// # Panics
     /// If there is no such level.
@@ -162,7 +165,7 @@ impl Stack {
     /// The tiles of a level as PNG files, row-major.
     ///
     /// # Errors
-    /// Those of [`Stack::shown`].
+    /// Those of [`StudyStack::shown`].
     pub fn tile_pngs(&self, level: u32) -> Result<Vec<Vec<u8>>, StudyError> {
         let pixels = self.shown(level)?;
         self.grid.tiles().map(|tile| self.png(level, &pixels, tile)).collect()
@@ -186,7 +189,7 @@ impl Stack {
     }
 }
 
-/// Samples at which each tile stopped, from a table with the columns `tile` and `spp`.
+/// Reads the samples at which each tile stopped from a table with the columns `tile` and `spp`.
 fn read_stops(path: &Path, grid: TileGrid) -> Result<Vec<f64>, StudyError> {
     let bad = |what: String| StudyError::File { path: path.to_owned(), what };
     let mut csv = csv::ReaderBuilder::new()
@@ -210,7 +213,8 @@ fn read_stops(path: &Path, grid: TileGrid) -> Result<Vec<f64>, StudyError> {
             }
             _ => {
                 return Err(bad(format!(
-                    "line {line}: tile {:?} and spp {:?} are not a tile below {} and its samples per pixel; is the tile size that of the study?",
+                    "line {line}: tile {:?} and spp {:?} are not a tile below {} and its samples per pixel; \
+                     is the tile size that of the study?",
                     text(tile),
                     text(spp),
                     grid.len()

@@ -1,8 +1,9 @@
 //! Answers on disk: SQLite, written by one thread.
 //!
-//! An event is acknowledged after its transaction has been committed with `synchronous = FULL` in a write-ahead log: it outlives a kill of
-//! the process and, if the disk keeps its word, a loss of power. Events that arrive while a commit is under way share the next one, so that fifty
-//! observers cost hardly more than one.
+//! An event is acknowledged only after its transaction has been committed with `synchronous = FULL` in a
+//! write-ahead log. It survives a kill of the process and, if the disk honours its write barriers, a power
+//! failure. Events that arrive during a commit share the next one, so fifty observers cost hardly more than
+//! one.
 
 use crate::error::StoreError;
 use crate::event::Envelope;
@@ -13,11 +14,11 @@ use std::sync::mpsc;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 use tokio::sync::oneshot;
 
-/// Commands that share a commit, at most: bounds what a crash of the disk could take at once.
+/// Most commands that share a commit; bounds what a failing disk can take with it.
 const MOST_AT_ONCE: usize = 512;
 /// `PRAGMA application_id`: "nfst".
 const APPLICATION: i32 = 0x6e66_7374;
-/// `PRAGMA user_version`: of the tables below.
+/// `PRAGMA user_version`: version of the tables below.
 const VERSION: i32 = 1;
 const TABLES: &str = "
 CREATE TABLE IF NOT EXISTS design (only INTEGER PRIMARY KEY CHECK (only = 1), text TEXT NOT NULL) STRICT;
@@ -29,26 +30,26 @@ CREATE TABLE IF NOT EXISTS events (
     PRIMARY KEY (code, seq)
 ) STRICT, WITHOUT ROWID;";
 
-/// One session as it is kept.
+/// One stored session.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Record {
+pub struct SessionRecord {
     /// The participant's code.
     pub code: String,
     /// Seed of the order of trials.
     pub seed: u64,
-    /// Group of observers; empty if the study has none.
+    /// Group of observers; empty if the study defines none.
     pub group: String,
-    /// Whether the observer is no person, but a [`SimulatedObserver`](crate::simulated::SimulatedObserver).
+    /// Whether the observer is a [`SimulatedObserver`](crate::simulated::SimulatedObserver), not a person.
     pub simulated: bool,
-    /// When it began, in milliseconds since 1970.
+    /// Start of the session, in milliseconds since 1970.
     pub begun_ms: u64,
-    /// Everything that happened, in order.
+    /// All events, in order.
     pub events: Vec<Envelope>,
 }
 
-/// The answers of a study, open for writing. Clones share the thread that writes.
+/// The answers of a study, open for writing. Clones share one writer thread.
 #[derive(Clone, Debug)]
-pub struct Store {
+pub struct AnswerStore {
     commands: mpsc::Sender<Command>,
 }
 
@@ -57,13 +58,14 @@ type Reply<T> = oneshot::Sender<Result<T, StoreError>>;
 enum Command {
     Begin { code: String, seed: u64, group: String, simulated: bool, reply: Reply<()> },
     Append { code: String, envelope: Box<Envelope>, reply: Reply<()> },
-    Load { code: String, reply: Reply<Record> },
+    Load { code: String, reply: Reply<SessionRecord> },
     Event { code: String, seq: u64, reply: Reply<Option<Envelope>> },
     Erase { code: String, reply: Reply<()> },
 }
 
-impl Store {
-    /// Opens the database of a study, or makes it. `design` is what answers depend on ([`crate::Study::design`]).
+impl AnswerStore {
+    /// Opens the database of a study, creating it if needed. `design` identifies what the answers depend on
+    /// ([`crate::Study::design`]).
     ///
     /// # Errors
     /// [`StoreError::Database`] if it cannot be opened, [`StoreError::OtherStudy`] if it belongs to another design.
@@ -79,31 +81,32 @@ impl Store {
     /// Begins a session.
     ///
     /// # Errors
-    /// [`StoreError`] if it could not be kept.
+    /// [`StoreError`] if it could not be stored.
     pub async fn begin(&self, code: &str, seed: u64, group: &str, simulated: bool) -> Result<(), StoreError> {
         let (code, group) = (code.to_owned(), group.to_owned());
         self.ask(|reply| Command::Begin { code, seed, group, simulated, reply }).await
     }
 
-    /// Keeps an event; when this returns, it is on disk.
+    /// Stores an event. It is on disk when this returns.
     ///
     /// # Errors
-    /// [`StoreError::Unknown`] if the session is not there or has been erased, [`StoreError::Conflict`] if the number is taken.
+    /// [`StoreError::Unknown`] if the session does not exist or was erased, [`StoreError::Conflict`] if the
+    /// number is taken.
     pub async fn append(&self, code: &str, envelope: Envelope) -> Result<(), StoreError> {
         let (code, envelope) = (code.to_owned(), Box::new(envelope));
         self.ask(|reply| Command::Append { code, envelope, reply }).await
     }
 
-    /// A session with all its events.
+    /// Loads a session with all its events.
     ///
     /// # Errors
     /// [`StoreError::Unknown`] if it is not there.
-    pub async fn load(&self, code: &str) -> Result<Record, StoreError> {
+    pub async fn load(&self, code: &str) -> Result<SessionRecord, StoreError> {
         let code = code.to_owned();
         self.ask(|reply| Command::Load { code, reply }).await
     }
 
-    /// One event of a session, if it is there.
+    /// Loads one event of a session, if it exists.
     ///
     /// # Errors
     /// [`StoreError`] if the database cannot be read.
@@ -112,7 +115,7 @@ impl Store {
         self.ask(|reply| Command::Event { code, seq, reply }).await
     }
 
-    /// Erases a session and all its events, also from the file's free pages and its log.
+    /// Erases a session and all its events, including their traces in free pages and the log.
     ///
     /// # Errors
     /// [`StoreError::Unknown`] if it is not there.
@@ -128,11 +131,11 @@ impl Store {
     }
 }
 
-/// All sessions of a database, by code; it may be served meanwhile.
+/// Reads all sessions, in the order they began. The database may be in use by a server.
 ///
 /// # Errors
 /// [`StoreError`] if it is not there or belongs to another study.
-pub fn read_all(path: impl AsRef<Path>, design: &str) -> Result<Vec<Record>, StoreError> {
+pub fn read_all(path: impl AsRef<Path>, design: &str) -> Result<Vec<SessionRecord>, StoreError> {
     let path = path.as_ref();
     let connection = open_existing(path, design)?;
     let failed = |source| StoreError::Database { path: path.to_owned(), source };
@@ -143,16 +146,16 @@ pub fn read_all(path: impl AsRef<Path>, design: &str) -> Result<Vec<Record>, Sto
     codes.iter().map(|code| load(&connection, path, code)).collect()
 }
 
-/// One session of a database; it may be served meanwhile.
+/// Reads one session. The database may be in use by a server.
 ///
 /// # Errors
 /// [`StoreError`] if it is not there or the database belongs to another study.
-pub fn read_one(path: impl AsRef<Path>, design: &str, code: &str) -> Result<Record, StoreError> {
+pub fn read_one(path: impl AsRef<Path>, design: &str, code: &str) -> Result<SessionRecord, StoreError> {
     let path = path.as_ref();
     load(&open_existing(path, design)?, path, code)
 }
 
-/// Erases one session of a database; it may be served meanwhile.
+/// Erases one session. The database may be in use by a server.
 ///
 /// # Errors
 /// [`StoreError`] if it is not there or the database belongs to another study.
@@ -168,7 +171,7 @@ pub fn erase_one(path: impl AsRef<Path>, design: &str, code: &str) -> Result<(),
 }
 
 fn open_existing(path: &Path, design: &str) -> Result<Connection, StoreError> {
-    // Without the flag to make one, a missing file is an error
+    // Without the CREATE flag, a missing file is an error
     let flags = OpenFlags::SQLITE_OPEN_READ_WRITE | OpenFlags::SQLITE_OPEN_NO_MUTEX;
     let made = Connection::open_with_flags(path, flags);
     made.and_then(|c| settle(&c).map(|()| c))
@@ -199,7 +202,7 @@ fn open(path: &Path, design: &str) -> Result<Connection, StoreError> {
     Ok(connection)
 }
 
-/// How the connection works: a log that outlives kills, and nothing of erased rows left in the file.
+/// Connection settings: a log that survives kills, and erased rows overwritten with zeros.
 pub(crate) fn settle(connection: &Connection) -> rusqlite::Result<()> {
     connection.busy_timeout(Duration::from_secs(10))?;
     connection.pragma_update(None, "journal_mode", "WAL")?;
@@ -224,17 +227,17 @@ pub(crate) fn now_ms() -> u64 {
     SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |d| d.as_millis() as u64)
 }
 
-/// Work done and its answer, which is held back until the commit.
+/// A pending reply, sent after the commit.
 type Held = Box<dyn FnOnce(Option<rusqlite::Error>) + Send>;
 
-/// The writer's life: until every [`Store`] is gone.
+/// The writer thread; ends when every [`AnswerStore`] has been dropped.
 fn write(connection: &mut Connection, path: &Path, commands: &mpsc::Receiver<Command>) {
     while let Ok(first) = commands.recv() {
         let mut erased = false;
         let mut batch = vec![first];
         batch.extend(commands.try_iter().take(MOST_AT_ONCE - 1));
 
-        // All in one transaction; answers are held until it is on disk
+        // One transaction for the batch; replies wait until it is on disk
         let mut held: Vec<Held> = Vec::with_capacity(batch.len());
         let transaction = match connection.transaction_with_behavior(TransactionBehavior::Immediate) {
             Ok(transaction) => transaction,
@@ -257,7 +260,7 @@ fn write(connection: &mut Connection, path: &Path, commands: &mpsc::Receiver<Com
     }
 }
 
-/// SQLite's errors cannot be cloned; each that waits is told the same.
+/// SQLite errors cannot be cloned, and every waiting caller needs one.
 fn copy(error: &rusqlite::Error) -> rusqlite::Error {
     match error {
         rusqlite::Error::SqliteFailure(code, text) => rusqlite::Error::SqliteFailure(*code, text.clone()),
@@ -268,7 +271,7 @@ fn copy(error: &rusqlite::Error) -> rusqlite::Error {
 fn refuse(batch: Vec<Command>, path: &Path, error: &rusqlite::Error) {
     let failed = || StoreError::Database { path: path.to_owned(), source: copy(error) };
     for command in batch {
-        // Whoever no longer waits needs no answer
+        // A dropped receiver needs no reply
         match command {
             Command::Begin { reply, .. } | Command::Append { reply, .. } | Command::Erase { reply, .. } => {
                 drop(reply.send(Err(failed())));
@@ -294,7 +297,7 @@ fn run(connection: &Connection, path: &Path, command: Command) -> Held {
     let failed = |source| StoreError::Database { path: path.to_owned(), source };
     match command {
         Command::Begin { code, seed, group, simulated, reply } => {
-            // SQLite's integers are signed: the bits are kept
+            // SQLite integers are signed; the bit pattern is stored
             let insert = "INSERT INTO sessions VALUES (?1, ?2, ?3, ?4, ?5)";
             let done = connection.execute(insert, params![code, seed as i64, group, simulated, now_ms()]);
             hold(path, reply, done.map(drop).map_err(failed))
@@ -341,7 +344,7 @@ fn parse(text: &str, code: &str, seq: u64) -> Result<Envelope, StoreError> {
     serde_json::from_str(text).map_err(|e| bad(e.to_string()))
 }
 
-fn load(connection: &Connection, path: &Path, code: &str) -> Result<Record, StoreError> {
+fn load(connection: &Connection, path: &Path, code: &str) -> Result<SessionRecord, StoreError> {
     let failed = |source| StoreError::Database { path: path.to_owned(), source };
     let query = "SELECT seed, observers, simulated, begun_ms FROM sessions WHERE code = ?1";
     let found = connection
@@ -358,7 +361,7 @@ fn load(connection: &Connection, path: &Path, code: &str) -> Result<Record, Stor
         .and_then(Iterator::collect::<rusqlite::Result<Vec<_>>>)
         .map_err(failed)?;
     let events = rows.iter().map(|(seq, text)| parse(text, code, *seq)).collect::<Result<_, _>>()?;
-    Ok(Record { code: code.to_owned(), seed: seed as u64, group, simulated, begun_ms, events })
+    Ok(SessionRecord { code: code.to_owned(), seed: seed as u64, group, simulated, begun_ms, events })
 }
 
 fn erase(connection: &Connection, path: &Path, code: &str) -> Result<(), StoreError> {
@@ -370,8 +373,8 @@ fn erase(connection: &Connection, path: &Path, code: &str) -> Result<(), StoreEr
     }
 }
 
-/// Writes the log back and empties it, so that erased rows are not left there. If someone reads, the next erasure or the end of the
-/// server does it.
+/// Writes the log back and truncates it, so that no erased rows remain there. If a reader prevents this,
+/// the next erasure or the end of the server does it.
 fn truncate_log(connection: &Connection) {
     let done = connection.query_row("PRAGMA wal_checkpoint(TRUNCATE)", [], |_| Ok(()));
     drop(done);

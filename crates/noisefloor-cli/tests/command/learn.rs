@@ -2,7 +2,7 @@ use crate::kit::{column, fail, json, random, run, succeed, text};
 use noisefloor::Evidence;
 use noisefloor_image::{RenderLayers, write_exr, write_png};
 use noisefloor_learn::read_table;
-use noisefloor_study::explore::{Disagreements, Said};
+use noisefloor_study::explore::{Disagreements, TileAnswer};
 use serde_json::Value;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -220,7 +220,7 @@ fn disagreements_are_learned_beside_the_table() {
     // Noise is seen where the table's people were far beyond their threshold.
     let clean = table.zones[0].levels.last().unwrap();
     for x in 0..2 {
-        let said = Said {
+        let said = TileAnswer {
             picture: "a picture".into(),
             name: "a.png".into(),
             scene: "mine".into(),

@@ -1,37 +1,39 @@
-//! How well observers agree with themselves and with each other.
+//! Agreement of observers with themselves and with each other.
 
-use super::observers::{Observer, median, places};
+use super::observers::{Observer, places};
+use super::summary::{median, pearson};
 use crate::config::Study;
 use serde::Serialize;
 
-/// Agreement of observers with themselves: the first two showings of each tile.
+/// Agreement of observers with themselves, over the first two showings of each tile.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Repeats {
+pub struct RepeatAgreement {
     /// Pairs of showings.
     pub pairs: usize,
     /// exp(median |ln ratio|) of the two thresholds: 1 if they are equal.
     pub factor: f64,
     /// Share of pairs that stop at most one level apart.
     pub within_one_level: f64,
-    /// Pearson correlation of ln(threshold); `None` if all are the same.
+    /// Pearson correlation of ln(threshold); `None` if one side is constant.
     pub correlation: Option<f64>,
 }
 
 /// Agreement of observers with each other.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct BetweenObservers {
-    /// Observers who gave a threshold for every tile.
+    /// Observers with a threshold for every tile.
     pub observers: usize,
     /// Tiles.
     pub tiles: usize,
-    /// Intraclass correlation ICC(2,1) of ln(threshold) (Shrout and Fleiss 1979): how much of the variance is of the tiles, for one observer.
+    /// Intraclass correlation ICC(2,1) of ln(threshold) (Shrout and Fleiss 1979): the share of variance due
+    /// to tiles, for one observer.
     pub icc_single: f64,
-    /// ICC(2,k): the same for the mean of all these observers.
+    /// ICC(2,k): the same for the mean of all observers.
     pub icc_mean: f64,
 }
 
-/// Repeats of all observers; `None` without any.
-pub(super) fn repeats(study: &Study, observers: &[&Observer]) -> Option<Repeats> {
+/// Repeatability of all observers; `None` without repeats.
+pub(super) fn repeats(study: &Study, observers: &[&Observer]) -> Option<RepeatAgreement> {
     let mut pairs = Vec::new();
     let mut near = 0;
     for observer in observers {
@@ -44,20 +46,11 @@ pub(super) fn repeats(study: &Study, observers: &[&Observer]) -> Option<Repeats>
     }
     let factor = median(pairs.iter().map(|(a, b)| (a - b).abs()).collect())?.exp();
     let within_one_level = near as f64 / pairs.len() as f64;
-    Some(Repeats { pairs: pairs.len(), factor, within_one_level, correlation: pearson(&pairs) })
+    Some(RepeatAgreement { pairs: pairs.len(), factor, within_one_level, correlation: pearson(&pairs) })
 }
 
-/// Pearson correlation; `None` if a side is constant.
-pub(super) fn pearson(pairs: &[(f64, f64)]) -> Option<f64> {
-    let n = pairs.len() as f64;
-    let mean = |f: &dyn Fn(&(f64, f64)) -> f64| pairs.iter().map(f).sum::<f64>() / n;
-    let (x, y) = (mean(&|p| p.0), mean(&|p| p.1));
-    let covariance = mean(&|p| (p.0 - x) * (p.1 - y));
-    let r = covariance / (mean(&|p| (p.0 - x).powi(2)) * mean(&|p| (p.1 - y).powi(2))).sqrt();
-    r.is_finite().then(|| r.clamp(-1.0, 1.0))
-}
-
-/// Agreement of those observers who gave a threshold for every tile; `None` for fewer than two of them, or two tiles.
+/// Agreement of the observers with a threshold for every tile; `None` for fewer than two of them, or of
+/// tiles.
 pub(super) fn between(study: &Study, observers: &[&Observer]) -> Option<BetweenObservers> {
     let places = places(study);
     let whole = |o: &&Observer| -> Option<Vec<f64>> {
@@ -67,7 +60,8 @@ pub(super) fn between(study: &Study, observers: &[&Observer]) -> Option<BetweenO
     icc(&table)
 }
 
-/// ICC(2,1) and ICC(2,k) of ratings by rater, then target (Shrout and Fleiss 1979, table 1 and the two formulas for case 2).
+/// ICC(2,1) and ICC(2,k) of ratings indexed by rater, then target (Shrout and Fleiss 1979, table 1 and the
+/// two formulas of case 2).
 fn icc(table: &[Vec<f64>]) -> Option<BetweenObservers> {
     let (raters, targets) = (table.len(), table.first()?.len());
     if raters < 2 || targets < 2 {
@@ -92,7 +86,8 @@ fn icc(table: &[Vec<f64>]) -> Option<BetweenObservers> {
 mod tests {
     use super::*;
 
-    /// The example of Shrout and Fleiss 1979, table 2: six targets, four judges; ICC(2,1) = 0.29, ICC(2,4) = 0.62.
+    /// The example in Shrout and Fleiss 1979, table 2: six targets, four judges; ICC(2,1) = 0.29, ICC(2,4)
+    /// = 0.62.
     #[test]
     fn the_published_example_is_met() {
         let targets = [[9, 2, 5, 8], [6, 1, 3, 2], [8, 4, 6, 8], [7, 1, 2, 6], [10, 5, 6, 9], [6, 2, 4, 7]];

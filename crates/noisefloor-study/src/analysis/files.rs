@@ -1,7 +1,10 @@
 //! An analysis as files: tables, a corpus for `train`, plots, and the grid over the picture.
 
+use super::classes::ClassRow;
 use super::observers::ObserverRow;
-use super::{Report, TileRow, plots};
+use super::plots;
+use super::report::StudyReport;
+use super::tiles::{CorpusThreshold, TileRow};
 use crate::config::Study;
 use crate::error::StudyError;
 use noisefloor_image::{write_atomic, write_png};
@@ -9,15 +12,6 @@ use serde::Serialize;
 use std::fs::{create_dir_all, read_link, remove_file};
 use std::io::Write;
 use std::path::Path;
-
-/// Which threshold of a tile goes into the corpus.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Threshold {
-    /// Where 95 % of observers see no difference: what `train` takes a threshold for (Takouachet et al. 2017, §4.2.2).
-    Level95,
-    /// The mean over observers.
-    Mean,
-}
 
 #[derive(Serialize)]
 struct CorpusRow {
@@ -67,17 +61,23 @@ struct ClassLine {
     observers_high: Option<f64>,
 }
 
-/// Writes `report.json`, `observers.csv` and, as the protocol has them, `tiles.csv`, `classes.csv`, plots, `grid-STACK.png` and the folder
-/// `corpus`, which `noisefloor train --corpus` takes. What was there is replaced.
+/// Writes `report.json`, `observers.csv` and, as the protocol has them, `tiles.csv`, `classes.csv`, plots,
+/// `grid-STACK.png` and the folder `corpus`, which `noisefloor train --corpus` takes. What was there is
+/// replaced.
 ///
 /// # Errors
 /// [`StudyError`] if a file cannot be written, or a picture not be read.
-pub fn write(dir: &Path, study: &Study, report: &Report, threshold: Threshold) -> Result<(), StudyError> {
+pub fn write(
+    dir: &Path,
+    study: &Study,
+    report: &StudyReport,
+    threshold: CorpusThreshold,
+) -> Result<(), StudyError> {
     folder(dir)?;
     write_atomic(dir.join("report.json"), |to| serde_json::to_writer_pretty(to, report))?;
     table::<ObserverRow>(&dir.join("observers.csv"), report.observers.iter().cloned())?;
     if !report.classes.is_empty() {
-        let line = |row: &super::ClassRow| ClassLine {
+        let line = |row: &ClassRow| ClassLine {
             class: format!("{:?}", row.class).to_lowercase(),
             identical: row.identical.yes,
             answers: row.identical.of,
@@ -155,15 +155,21 @@ fn tile_line(t: &TileRow) -> TileLine<'_> {
     }
 }
 
-/// `thresholds.csv` as `noisefloor_image::corpus` reads it. Thresholds lie within what was offered: one beyond is then taken for a lower bound.
-fn corpus(dir: &Path, study: &Study, report: &Report, threshold: Threshold) -> Result<(), StudyError> {
+/// `thresholds.csv` as `noisefloor_image::corpus` reads it. Thresholds lie within what was offered: one
+/// beyond is then taken for a lower bound.
+fn corpus(
+    dir: &Path,
+    study: &Study,
+    report: &StudyReport,
+    threshold: CorpusThreshold,
+) -> Result<(), StudyError> {
     folder(dir)?;
     let row = |t: &TileRow| {
         let stack = study.stacks.iter().find(|s| s.name() == t.stack)?;
         let (first_spp, last_spp) = (stack.levels()[0], stack.levels()[stack.last() as usize]);
         let spp = match threshold {
-            Threshold::Level95 => t.level95,
-            Threshold::Mean => t.mean,
+            CorpusThreshold::Level95 => t.level95,
+            CorpusThreshold::Mean => t.mean,
         };
         let (scene, renderer) = (t.stack.clone(), stack.renderer().to_owned());
         let TileRow { tile: zone, x, y, width, height, .. } = *t;
@@ -173,7 +179,8 @@ fn corpus(dir: &Path, study: &Study, report: &Report, threshold: Threshold) -> R
     table(&dir.join("thresholds.csv"), report.tiles.iter().filter_map(row))
 }
 
-/// The pictures of a stack in the corpus, as they were shown: a link to its folder, or PNGs where it is tone mapped.
+/// The pictures of a stack in the corpus, as they were shown: a link to its folder, or PNGs where it is
+/// tone mapped.
 fn pictures(corpus: &Path, study: &Study, number: usize) -> Result<(), StudyError> {
     folder(corpus)?;
     let stack = &study.stacks[number];

@@ -1,13 +1,15 @@
-//! How thresholds of a tile are spread over observers: a logistic distribution in ln(spp), fitted by maximum likelihood.
+//! How thresholds of a tile are spread over observers: a logistic distribution in ln(spp), fitted by
+//! maximum likelihood.
 //!
-//! The share of observers who see no difference at n samples per pixel is then F(ln n), the psychometric function of the public, and 95 % see
-//! none at ln n = μ + s·ln 19.
+//! The share of observers who see no difference at n samples per pixel is then F(ln n), the psychometric
+//! function of the public, and 95 % see none at ln n = μ + s·ln 19.
 
 use crate::questplus::Posterior;
 use std::f64::consts::PI;
 
-/// Shares of stops that may be slips, anywhere in the stack: the likeliest is taken. With none, one slip would widen the curve of a whole tile; with
-/// more than there are, the curve would be too narrow (Wichmann and Hill 2001, "The psychometric function: I", §2).
+/// Shares of stops that may be slips, anywhere in the stack: the likeliest is taken. With none, one slip
+/// would widen the curve of a whole tile; with more than there are, the curve would be too narrow (Wichmann
+/// and Hill 2001, "The psychometric function: I", §2).
 const SLIPS: [f64; 4] = [1e-4, 0.01, 0.02, 0.05];
 /// ln(95 % / 5 %): where 95 % see no difference, in scales above the median.
 pub const LN_19: f64 = 2.944_438_979_166_440_3;
@@ -16,7 +18,8 @@ const SCALES: [f64; 2] = [0.01, 2.0];
 /// What is known of one threshold, in ln(spp).
 #[derive(Clone, Debug, PartialEq)]
 pub enum Observation {
-    /// It lies between two levels: a difference is seen at `above`, none at `to`. `None` where the stack ends.
+    /// It lies between two levels: a difference is seen at `above`, none at `to`. `None` where the stack
+    /// ends.
     Between {
         /// Last level at which a difference is seen.
         above: Option<f64>,
@@ -54,8 +57,8 @@ impl Observation {
 /// Logarithm of the likelihood of all observations under a logistic distribution.
 fn log_likelihood(observations: &[(Observation, f64)], centre: f64, scale: f64, slips: f64) -> f64 {
     let share = |x: f64| 1.0 / (1.0 + ((centre - x) / scale).exp());
-    // Share of observers between the middles on both sides of each value of a measurement: right also for curves narrower than a step. Measurements
-    // of one tile have the same values
+    // Share of observers between the middles on both sides of each value of a measurement: right also for
+    // curves narrower than a step. Measurements of one tile have the same values
     let mut bins: (f64, f64, Vec<f64>) = (0.0, 0.0, Vec::new());
     let mut sum = 0.0;
     for (observation, weight) in observations {
@@ -131,7 +134,8 @@ impl Logistic {
     }
 }
 
-/// The minimum of a function of two variables by the downhill simplex (Nelder and Mead 1965), from `start` with steps `step`.
+/// The minimum of a function of two variables by the downhill simplex (Nelder and Mead 1965), from `start`
+/// with steps `step`.
 fn minimum(f: impl Fn([f64; 2]) -> f64, start: [f64; 2], step: [f64; 2]) -> [f64; 2] {
     let at = |x: [f64; 2]| (f(x), x);
     let mut simplex = [at(start), at([start[0] + step[0], start[1]]), at([start[0], start[1] + step[1]])];
@@ -208,7 +212,8 @@ mod tests {
         Observation::Measured(Posterior { low, step, weights: weights.iter().map(|w| w / sum).collect() })
     }
 
-    /// A normal error that is known is taken out of the spread: observers of one threshold have the smallest scale.
+    /// A normal error that is known is taken out of the spread: observers of one threshold have the
+    /// smallest scale.
     #[test]
     fn known_errors_do_not_count_as_spread() {
         let z = [-1.5, -1.0, -0.6, -0.3, -0.1, 0.1, 0.3, 0.6, 1.0, 1.5];

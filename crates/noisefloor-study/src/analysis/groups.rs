@@ -19,13 +19,14 @@ pub struct GroupLine {
     pub tiles: usize,
     /// Simple regression by least squares, as in the paper; `None` if all T are the same.
     pub least_squares: Option<Audience>,
-    /// The line that bears wrong pairs, with intervals and r: what `render --audience` is to be given. `None` where there is none.
+    /// Robust line with intervals and r: the one to pass to `render --audience`. `None` if it cannot be
+    /// fitted.
     pub robust: Option<AudienceFit>,
-    /// Why there is none.
+    /// Why there is no robust line.
     pub problem: Option<String>,
 }
 
-/// Lines from the first group of the study to each other one that has observers.
+/// Lines from the first group of the study to every other group with observers.
 pub(super) fn lines(study: &Study, observers: &[&Observer]) -> Vec<GroupLine> {
     let of =
         |group: &str| -> Vec<&Observer> { observers.iter().copied().filter(|o| o.group == group).collect() };

@@ -5,24 +5,24 @@ use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
 
 /// Two-sided normal quantile of a 95 % interval.
 const Z: f64 = 1.959_963_984_540_054;
-/// Drawings of a bootstrap.
+/// Number of bootstrap resamples.
 pub const RESAMPLES: usize = 1000;
 
-/// A share of answers and its 95 % interval (Wilson 1927, as in Brown, Cai and DasGupta 2001, eq. 4).
+/// A share of answers with its 95 % interval (Wilson 1927; Brown, Cai and DasGupta 2001, eq. 4).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Share {
-    /// Answers that were so.
+    /// Positive answers.
     pub yes: usize,
-    /// Answers.
+    /// All answers.
     pub of: usize,
     /// `yes / of`.
     pub share: f64,
-    /// Wilson's interval: right if answers are independent of each other.
+    /// Wilson's interval, valid for independent answers.
     pub wilson: [f64; 2],
 }
 
 impl Share {
-    /// `yes` of `of` answers; `None` of no answer.
+    /// Share of `yes` among `of` answers; `None` if there are none.
     pub fn new(yes: usize, of: usize) -> Option<Self> {
         if of == 0 || yes > of {
             return None;
@@ -35,10 +35,12 @@ impl Share {
     }
 }
 
-/// The 95 % intervals of some statistics over observers: observers are drawn anew, with replacement, [`RESAMPLES`] times, and `statistics` is told
-/// how often each was drawn; `found` are their values for all observers once. Seeded. Percentiles are bias-corrected (Efron and Tibshirani 1993, "An
-/// introduction to the bootstrap", §14.3, without acceleration) and moved out by Student's t and n/(n−1), since those of few observers are too narrow
-/// (Hesterberg 2015, "What teachers should know about the bootstrap", §3.3). `None` for fewer than two observers, or if no drawing has finite values.
+/// The 95 % intervals of some statistics over observers: observers are drawn anew, with replacement,
+/// [`RESAMPLES`] times, and `statistics` is told how often each was drawn; `found` are their values for all
+/// observers once. Seeded. Percentiles are bias-corrected (Efron and Tibshirani 1993, "An introduction to
+/// the bootstrap", §14.3, without acceleration) and moved out by Student's t and n/(n−1), since those of
+/// few observers are too narrow (Hesterberg 2015, "What teachers should know about the bootstrap", §3.3).
+/// `None` for fewer than two observers, or if no drawing has finite values.
 pub fn bootstrap<const N: usize>(
     observers: usize,
     seed: u64,
@@ -79,7 +81,8 @@ pub fn bootstrap<const N: usize>(
 mod tests {
     use super::*;
 
-    /// Known values of Wilson's interval: 0 of 10 ends at z²/(10 + z²); 5 of 10 lies around a half.
+    /// Known values of Wilson's interval: for 0 of 10 it ends at z²/(10 + z²); for 5 of 10 it is centred on
+    /// one half.
     #[test]
     fn wilson_has_known_values() {
         let none = Share::new(0, 10).unwrap();
@@ -90,8 +93,8 @@ mod tests {
         assert!(Share::new(0, 0).is_none() && Share::new(2, 1).is_none());
     }
 
-    /// The interval of a mean of 20 normal values covers the truth in 95 % of 400 seeded studies, within 3.5 standard errors of a share of
-    /// 400 (±3.8 %): wrong by chance once in 2000.
+    /// The interval of a mean of 20 normal values covers the truth in 95 % of 400 seeded studies, within
+    /// 3.5 standard errors of a share of 400 (±3.8 %): wrong by chance once in 2000.
     #[test]
     fn the_bootstrap_covers_a_mean_as_often_as_it_says() {
         let covered = (0..400).filter(|&seed| {

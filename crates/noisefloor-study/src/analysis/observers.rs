@@ -1,32 +1,34 @@
-//! What each observer said, and who is unlike the others.
+//! What each observer answered, and who is unlike the others.
 
 use super::fit::Observation;
+use super::summary::median;
 use crate::config::Study;
 use crate::error::StudyError;
 use crate::event::Conditions;
 use crate::questplus::Posterior;
-use crate::server::replay;
-use crate::session::{Class, Outcome, Stage, grids};
-use crate::store::Record;
+use crate::session::{Class, Stage, TrialOutcome, grids, replay};
+use crate::store::SessionRecord;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// Modified z-scores beyond this are unlike the others (Iglewicz and Hoaglin 1993, "How to detect and handle outliers", §3.3). They take 3.5, which one of
-/// 2100 normal values exceeds; observers are spread logistically, of whom it would set aside one in 150, and with them part of what is to be
-/// measured. One of 1700 logistic values exceeds 5.
+/// Modified z-score above which an observer is an outlier (Iglewicz and Hoaglin 1993, "How to detect and
+/// handle outliers", §3.3). They propose 3.5, which one normal value in 2100 exceeds. Observers are spread
+/// logistically, and 3.5 would exclude one in 150 of them, along with part of the spread to be measured.
+/// One logistic value in 1700 exceeds 5.
 pub const OUTLYING: f64 = 5.0;
-/// Fewest observers of whom one can be unlike the others.
+/// Fewest observers among whom outliers are looked for.
 const FEWEST: usize = 5;
-/// Deviations of the median observer are taken to be at least this, in ln(spp): where all agree to a level, half a level is no outlier.
+/// Smallest median deviation assumed, in ln(spp): where all agree to within a level, half a level is no
+/// outlier.
 const LEAST_DEVIATION: f64 = 0.05;
 /// Standard deviation of a normal distribution in units of its median absolute deviation.
 const MAD_TO_SD: f64 = 1.4826;
 
-/// A tile: stack, and row-major place in it.
-pub type Place = (u32, u32);
+/// A tile: index of the stack, and row-major index in it.
+pub type TileKey = (u32, u32);
 
-/// What one observer said.
+/// The answers of one observer.
 #[derive(Clone, Debug)]
 pub struct Observer {
     /// The participant's code.
@@ -35,12 +37,12 @@ pub struct Observer {
     pub group: String,
     /// Whether all trials were answered.
     pub finished: bool,
-    /// How the pictures were seen.
+    /// Viewing conditions.
     pub conditions: Option<Conditions>,
-    /// Acquisition: levels of the stops of each tile, in the order of the showings.
-    pub stops: BTreeMap<Place, Vec<u32>>,
-    /// Forced choice: what is known of ln(threshold) of each tile.
-    pub measured: BTreeMap<Place, Posterior>,
+    /// Acquisition: the levels at which the observer left each tile, in order of showing.
+    pub stops: BTreeMap<TileKey, Vec<u32>>,
+    /// Forced choice: the posterior of ln(threshold) of each tile.
+    pub measured: BTreeMap<TileKey, Posterior>,
     /// Validation: stack, class and whether it was called identical.
     pub judged: Vec<(u32, Class, bool)>,
     /// Clicks and answers that count.
@@ -48,8 +50,8 @@ pub struct Observer {
 }
 
 impl Observer {
-    /// What a session says, replayed.
-    pub fn of(code: &str, group: &str, session: &crate::session::Session) -> Self {
+    /// Collects the answers of a replayed session.
+    pub fn of(code: &str, group: &str, session: &crate::session::ParticipantSession) -> Self {
         let mut observer = Self {
             code: code.to_owned(),
             group: group.to_owned(),
@@ -62,17 +64,17 @@ impl Observer {
         };
         for outcome in session.outcomes() {
             match outcome {
-                Outcome::Stops { stack, levels, clicks, .. } => {
+                TrialOutcome::Stops { stack, levels, clicks, .. } => {
                     observer.clicks += clicks;
                     for (tile, &level) in levels.iter().enumerate() {
                         observer.stops.entry((*stack, tile as u32)).or_default().push(level);
                     }
                 }
-                Outcome::Judged { stack, class, identical } => {
+                TrialOutcome::Judged { stack, class, identical } => {
                     observer.clicks += 1;
                     observer.judged.push((*stack, *class, *identical));
                 }
-                Outcome::Chosen { stack, tile, .. } => {
+                TrialOutcome::Chosen { stack, tile, .. } => {
                     observer.clicks += 1;
                     if let Some(known) = session.posterior(*stack, *tile) {
                         observer.measured.insert((*stack, *tile), known);
@@ -83,21 +85,22 @@ impl Observer {
         observer
     }
 
-    /// Whether anything that counts was answered.
+    /// Whether the observer answered anything that counts.
     pub fn has_answers(&self) -> bool {
         self.clicks > 0 || !self.stops.is_empty()
     }
 
-    /// What is known of this observer's threshold of a tile, showing by showing.
-    pub fn observations(&self, study: &Study, place: Place) -> Vec<Observation> {
+    /// Observations of this observer's threshold of a tile, one per showing.
+    pub fn observations(&self, study: &Study, place: TileKey) -> Vec<Observation> {
         let spp = study.stacks[place.0 as usize].levels();
         let stops = self.stops.get(&place).into_iter().flatten().map(|&level| Observation::stop(level, spp));
         let measured = self.measured.get(&place).cloned().map(Observation::Measured);
         stops.chain(measured).collect()
     }
 
-    /// This observer's threshold of a tile in samples per pixel: the mean of the stops, or the measured one.
-    pub fn threshold(&self, study: &Study, place: Place) -> Option<f64> {
+    /// This observer's threshold of a tile in samples per pixel: the mean of the stops, or of the
+    /// posterior.
+    pub fn threshold(&self, study: &Study, place: TileKey) -> Option<f64> {
         if let Some(stops) = self.stops.get(&place).filter(|s| !s.is_empty()) {
             let spp = study.stacks[place.0 as usize].levels();
             let sum: f64 = stops.iter().map(|&level| spp[level as usize] as f64).sum();
@@ -108,18 +111,18 @@ impl Observer {
 }
 
 /// All tiles of a study.
-pub fn places(study: &Study) -> Vec<Place> {
-    let tiles = |(s, stack): (usize, &crate::stack::Stack)| {
+pub fn places(study: &Study) -> Vec<TileKey> {
+    let tiles = |(s, stack): (usize, &crate::stack::StudyStack)| {
         (0..stack.grid().len()).map(move |tile| (s as u32, tile as u32)).collect::<Vec<_>>()
     };
     study.stacks.iter().enumerate().flat_map(tiles).collect()
 }
 
-/// Replays records; sessions without an answer that counts are left out.
+/// Replays stored sessions, skipping those without an answer that counts.
 ///
 /// # Errors
 /// [`StudyError::Store`] if an event does not fit the study.
-pub fn replay_all(study: &Arc<Study>, records: &[Record]) -> Result<Vec<Observer>, StudyError> {
+pub fn replay_all(study: &Arc<Study>, records: &[SessionRecord]) -> Result<Vec<Observer>, StudyError> {
     let grids = grids(study);
     let mut observers = Vec::with_capacity(records.len());
     for record in records {
@@ -132,7 +135,7 @@ pub fn replay_all(study: &Arc<Study>, records: &[Record]) -> Result<Vec<Observer
     Ok(observers)
 }
 
-/// One line about an observer.
+/// One row per observer.
 #[derive(Clone, Debug, Serialize)]
 pub struct ObserverRow {
     /// The participant's code.
@@ -145,19 +148,20 @@ pub struct ObserverRow {
     pub clicks: u64,
     /// Tiles with a threshold.
     pub tiles: usize,
-    /// Factor between this observer's thresholds and the others' medians of the same tiles (median over tiles).
+    /// Ratio of this observer's thresholds to the median of the others' (median over tiles).
     pub sensitivity: Option<f64>,
-    /// Pixels in a degree of visual angle.
+    /// Pixels per degree of visual angle.
     pub pixels_per_degree: Option<f64>,
-    /// Gamma of the screen as matched.
+    /// Gamma of the screen, as matched by the observer.
     pub gamma: Option<f64>,
-    /// Why this observer is unlike the others, if so.
+    /// Why this observer is an outlier, if so.
     pub outlier: Option<String>,
 }
 
-/// Lines about all observers, with the outliers among them. The rule: an observer's sensitivity is the median over tiles of ln(own threshold
-/// / median of the others'); the inconsistency the median over tiles of |ln| between the showings. Whoever has a modified z-score beyond
-/// [`OUTLYING`] in the first, or above it in the second, is unlike the others. In a validation, whoever calls as many noisy pairs identical as
+/// Lines about all observers, with the outliers among them. The rule: an observer's sensitivity is the
+/// median over tiles of ln(own threshold / median of the others'); the inconsistency the median over tiles
+/// of |ln| between the showings. Whoever has a modified z-score beyond [`OUTLYING`] in the first, or above
+/// it in the second, is unlike the others. In a validation, whoever calls as many noisy pairs identical as
 /// reference pairs, or more, has not told them apart.
 pub fn rows(study: &Study, observers: &[Observer]) -> Vec<ObserverRow> {
     let places = places(study);
@@ -207,7 +211,7 @@ pub fn rows(study: &Study, observers: &[Observer]) -> Vec<ObserverRow> {
     observers.iter().enumerate().map(row).collect()
 }
 
-/// Why a validation's answers do not depend on what was shown.
+/// Why the answers of a validation do not depend on the stimulus.
 fn blind(observer: &Observer) -> Option<String> {
     let share = |class: Class| {
         let of = || observer.judged.iter().filter(|(_, c, _)| *c == class);
@@ -224,7 +228,7 @@ fn blind(observer: &Observer) -> Option<String> {
     })
 }
 
-/// How far a value lies from the median of all, in deviations of the median one.
+/// Modified z-score of a value.
 fn z_score(values: &[Option<f64>], of: usize) -> Option<f64> {
     let all: Vec<f64> = values.iter().flatten().copied().collect();
     if all.len() < FEWEST {
@@ -233,11 +237,4 @@ fn z_score(values: &[Option<f64>], of: usize) -> Option<f64> {
     let middle = median(all.clone())?;
     let deviation = median(all.iter().map(|v| (v - middle).abs()).collect())?.max(LEAST_DEVIATION);
     Some((values[of]? - middle) / (MAD_TO_SD * deviation))
-}
-
-/// The middle value, or the mean of the two middle ones.
-pub(super) fn median(mut values: Vec<f64>) -> Option<f64> {
-    values.sort_by(f64::total_cmp);
-    let n = values.len();
-    (n > 0).then(|| 0.5 * (values[(n - 1) / 2] + values[n / 2]))
 }

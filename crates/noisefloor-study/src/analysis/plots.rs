@@ -1,7 +1,7 @@
-//! Pictures of an analysis.
+//! Plots of an analysis.
 
-use super::files::Threshold;
-use super::{ClassRow, TileRow};
+use super::classes::ClassRow;
+use super::tiles::{CorpusThreshold, TileRow};
 use crate::error::StudyError;
 use embedded_graphics::mono_font::MonoTextStyle;
 use embedded_graphics::mono_font::iso_8859_1::{FONT_6X10, FONT_7X13_BOLD, FONT_9X18_BOLD};
@@ -27,7 +27,7 @@ fn failed(error: impl std::fmt::Display) -> StudyError {
     StudyError::Analysis(format!("a plot cannot be drawn: {error}"))
 }
 
-/// Mean and 95 % level of each tile, with intervals, in the order of the table.
+/// Mean and 95 % level of each tile with intervals, in table order.
 pub(super) fn thresholds(tiles: &[TileRow]) -> Result<String, StudyError> {
     let all = tiles.iter().flat_map(|t| {
         let ends = [t.mean_interval, t.level95_interval].into_iter().flatten().flatten();
@@ -74,7 +74,7 @@ pub(super) fn thresholds(tiles: &[TileRow]) -> Result<String, StudyError> {
     Ok(text)
 }
 
-/// The psychometric function of each tile of a stack.
+/// Psychometric function of each tile of a stack.
 pub(super) fn curves(tiles: &[&TileRow], levels: &[u64]) -> Result<String, StudyError> {
     let (low, high) = (levels[0].max(1) as f64, levels[levels.len() - 1] as f64);
     let mut text = String::new();
@@ -152,8 +152,14 @@ pub(super) fn classes(rows: &[ClassRow]) -> Result<String, StudyError> {
     Ok(text)
 }
 
-/// The grid over the picture with a threshold in each tile (Takouachet et al. 2017, figure 3): RGB, three bytes a pixel.
-pub(super) fn grid(grid: TileGrid, picture: &[u8], tiles: &[&TileRow], threshold: Threshold) -> Vec<u8> {
+/// The picture with the tile grid and a threshold in each tile (Takouachet et al. 2017, figure 3): RGB,
+/// three bytes a pixel.
+pub(super) fn grid(
+    grid: TileGrid,
+    picture: &[u8],
+    tiles: &[&TileRow],
+    threshold: CorpusThreshold,
+) -> Vec<u8> {
     let mut canvas = Canvas { width: grid.width(), height: grid.height(), bytes: picture.to_vec() };
     for t in tiles {
         for x in t.x..t.x + t.width {
@@ -163,8 +169,8 @@ pub(super) fn grid(grid: TileGrid, picture: &[u8], tiles: &[&TileRow], threshold
             canvas.set(t.x, y, [255; 3]);
         }
         let spp = match threshold {
-            Threshold::Level95 => t.level95,
-            Threshold::Mean => t.mean,
+            CorpusThreshold::Level95 => t.level95,
+            CorpusThreshold::Mean => t.mean,
         };
         let label = format!("{}{spp:.0}", if t.beyond { ">" } else { "" });
         let (font, advance) = match t.width {
@@ -181,7 +187,7 @@ pub(super) fn grid(grid: TileGrid, picture: &[u8], tiles: &[&TileRow], threshold
             let letters = MonoTextStyle::new(font, Rgb888::new(grey, grey, grey));
             let Ok(_) = Text::with_text_style(&label, centre + shift, letters, style).draw(&mut canvas);
         };
-        // Ink around white letters: readable over any picture
+        // Dark outlines keep white letters readable on any picture
         for shift in [(-1, 0), (1, 0), (0, -1), (0, 1)] {
             write(Point::new(shift.0, shift.1), 0);
         }

@@ -2,17 +2,27 @@
 
 use super::fit::{Logistic, Observation};
 use super::interval::bootstrap;
-use super::observers::{Observer, Place, places};
+use super::observers::{Observer, TileKey, places};
 use crate::config::Study;
 use rayon::prelude::*;
 use serde::Serialize;
 
+/// Which threshold of a tile goes into the corpus.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum CorpusThreshold {
+    /// Where 95 % of observers see no difference: what `train` takes as the threshold (Takouachet et al.
+    /// 2017, §4.2.2).
+    Level95,
+    /// The mean over observers.
+    Mean,
+}
+
 /// The threshold of one tile.
 #[derive(Clone, Debug, Serialize)]
 pub struct TileRow {
-    /// Stack.
+    /// Name of the stack.
     pub stack: String,
-    /// Row-major place of the tile.
+    /// Row-major index of the tile.
     pub tile: usize,
     /// Left edge in pixels.
     pub x: usize,
@@ -22,7 +32,7 @@ pub struct TileRow {
     pub width: usize,
     /// Height in pixels.
     pub height: usize,
-    /// Observers who gave a threshold.
+    /// Observers with a threshold for this tile.
     pub observers: usize,
     /// Mean over observers, in samples per pixel.
     pub mean: f64,
@@ -38,17 +48,18 @@ pub struct TileRow {
     pub level95: f64,
     /// Its 95 % interval.
     pub level95_interval: Option<[f64; 2]>,
-    /// Whether the level of 95 % lies above the last level before the reference: it is then a guess beyond what was offered.
+    /// Whether the 95 % level lies above the last level before the reference, and is therefore
+    /// extrapolated.
     pub beyond: bool,
 }
 
-/// Thresholds of all tiles that anyone gave one for.
+/// Thresholds of all tiles that have answers.
 pub fn rows(study: &Study, observers: &[&Observer], seed: u64) -> Vec<TileRow> {
     places(study).into_par_iter().filter_map(|place| row(study, observers, place, seed)).collect()
 }
 
-fn row(study: &Study, observers: &[&Observer], place: Place, seed: u64) -> Option<TileRow> {
-    // What each observer says of the tile
+fn row(study: &Study, observers: &[&Observer], place: TileKey, seed: u64) -> Option<TileRow> {
+    // Threshold and observations of each observer
     let said: Vec<(f64, Vec<Observation>)> = observers
         .iter()
         .filter_map(|o| Some((o.threshold(study, place)?, o.observations(study, place))))
@@ -91,7 +102,7 @@ fn row(study: &Study, observers: &[&Observer], place: Place, seed: u64) -> Optio
     })
 }
 
-/// Equal stops counted together: a fit takes time by how many there are.
+/// Merges equal stops, because the time of a fit grows with their number.
 fn pooled<'a>(all: impl Iterator<Item = (&'a Observation, f64)>) -> Vec<(Observation, f64)> {
     let mut pooled: Vec<(Observation, f64)> = Vec::new();
     for (observation, weight) in all {

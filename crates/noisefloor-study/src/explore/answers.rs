@@ -1,4 +1,5 @@
-//! Disagreements on disk. One is acknowledged after its transaction is committed with `synchronous = FULL` in a write-ahead log.
+//! Disagreements on disk. One is acknowledged only after its transaction has been committed with
+//! `synchronous = FULL` in a write-ahead log.
 
 use crate::error::StoreError;
 use crate::store::{now_ms, settle};
@@ -15,69 +16,72 @@ const APPLICATION: i32 = 0x6e66_6578;
 const VERSION: i32 = 1;
 const TABLES: &str = "
 CREATE TABLE IF NOT EXISTS disagreements (
-    id INTEGER PRIMARY KEY AUTOINCREMENT, picture TEXT NOT NULL, name TEXT NOT NULL, scene TEXT NOT NULL, spp REAL NOT NULL,
+    id INTEGER PRIMARY KEY AUTOINCREMENT,
+    picture TEXT NOT NULL, name TEXT NOT NULL, scene TEXT NOT NULL, spp REAL NOT NULL,
     x INTEGER NOT NULL, y INTEGER NOT NULL, width INTEGER NOT NULL, height INTEGER NOT NULL,
     sees_noise INTEGER NOT NULL, at_ms INTEGER NOT NULL,
-    probability REAL NOT NULL, threshold REAL NOT NULL, slope REAL NOT NULL, offset REAL NOT NULL, model TEXT NOT NULL,
-    descriptor TEXT NOT NULL, descriptor_version INTEGER NOT NULL, evidence TEXT NOT NULL, numbers TEXT NOT NULL,
+    probability REAL NOT NULL, threshold REAL NOT NULL, slope REAL NOT NULL, offset REAL NOT NULL,
+    model TEXT NOT NULL,
+    descriptor TEXT NOT NULL, descriptor_version INTEGER NOT NULL, evidence TEXT NOT NULL,
+    numbers TEXT NOT NULL,
     UNIQUE (picture, x, y, width, height)
 ) STRICT;";
-const COLUMNS: &str = "id, picture, name, scene, spp, x, y, width, height, sees_noise, at_ms, probability, threshold, slope, \
-    offset, model, descriptor, descriptor_version, evidence, numbers";
+const COLUMNS: &str = "id, picture, name, scene, spp, x, y, width, height, sees_noise, at_ms, probability, \
+    threshold, slope, offset, model, descriptor, descriptor_version, evidence, numbers";
 
-/// What somebody said of a tile, and what the model had said.
+/// What somebody said about a tile, and what the model had said.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Said {
-    /// Content of the picture, hexadecimal.
+pub struct TileAnswer {
+    /// Digest of the picture file, hexadecimal.
     pub picture: String,
-    /// Its file name.
+    /// File name of the picture.
     pub name: String,
-    /// What it shows: pictures of one scene are left out together.
+    /// Name of the scene. Pictures of one scene are held out together.
     pub scene: String,
     /// Samples per pixel.
     pub spp: f64,
     /// The tile: x, y, width and height in pixels.
     pub tile: [usize; 4],
-    /// Whether noise is seen, which the model denied; else none is.
+    /// Whether the person sees noise.
     pub sees_noise: bool,
-    /// P as it was shown, in [0, 1].
+    /// P as displayed, in [0, 1].
     pub probability: f32,
-    /// P from which the tile would have counted as converged.
+    /// P from which the tile counted as converged.
     pub threshold: f32,
-    /// Slope and offset of the audience that P was for.
+    /// Slope and offset of the audience that P was computed for.
     pub audience: [f64; 2],
     /// Digest of the model.
     pub model: String,
-    /// What was computed of the tile.
+    /// The descriptor computed for the tile.
     pub descriptor: Descriptor,
-    /// Version of that.
+    /// Version of the descriptor.
     pub descriptor_version: u16,
-    /// What the tile was held against.
+    /// What the tile was compared with.
     pub evidence: Evidence,
     /// The raw descriptor.
     pub numbers: Vec<f32>,
 }
 
-/// [`Said`], as it is kept.
+/// A stored [`TileAnswer`].
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Disagreement {
-    /// Number in the database.
+    /// Row number in the database.
     pub id: i64,
-    /// When it was kept, in milliseconds since 1970.
+    /// Time of storage, in milliseconds since 1970.
     pub at_ms: u64,
     /// What was said.
     #[serde(flatten)]
-    pub said: Said,
+    pub said: TileAnswer,
 }
 
-impl Said {
-    /// As an example to train on.
+impl TileAnswer {
+    /// Converts the answer to a training example.
     pub fn answer(&self) -> Answer {
         let (group, spp) = (self.scene.clone(), self.spp);
         Answer { group, spp, descriptor: self.numbers.clone(), sees_noise: self.sees_noise }
     }
 
-    /// Whether tables of this kind can be trained on together with it.
+    /// Whether the answer can be trained on together with a table of this kind.
     pub fn fits(&self, descriptor: Descriptor, evidence: Evidence) -> bool {
         (self.descriptor, self.descriptor_version, self.evidence)
             == (descriptor, descriptor.version(), evidence)
@@ -92,7 +96,7 @@ pub struct Disagreements {
 }
 
 impl Disagreements {
-    /// Opens the database, or makes it.
+    /// Opens the database, creating it if needed.
     ///
     /// # Errors
     /// [`StoreError::Database`] if it cannot be opened, [`StoreError::NotDisagreements`] if it holds something else.
@@ -113,12 +117,12 @@ impl Disagreements {
         Ok(Self { path, connection: Mutex::new(connection) })
     }
 
-    /// Keeps what was said; when this returns, it is on disk. What was said of the tile before is replaced. Returns the number of the
-    /// disagreement, and what had been said before, if anything.
+    /// Stores an answer, replacing an earlier one about the same tile. It is on disk when this returns.
+    /// Returns the row number, and the earlier answer, if any.
     ///
     /// # Errors
     /// [`StoreError::Database`].
-    pub fn keep(&self, said: &Said) -> Result<(i64, Option<bool>), StoreError> {
+    pub fn keep(&self, said: &TileAnswer) -> Result<(i64, Option<bool>), StoreError> {
         let text = |value: serde_json::Result<String>| value.unwrap_or_default();
         let [x, y, width, height] = said.tile;
         let tile = params![said.picture, x, y, width, height];
@@ -128,8 +132,8 @@ impl Disagreements {
         let before = "SELECT sees_noise FROM disagreements \
             WHERE picture = ?1 AND x = ?2 AND y = ?3 AND width = ?4 AND height = ?5";
         let before = transaction.query_row(before, tile, |row| row.get(0)).optional().map_err(failed)?;
-        let insert = "INSERT OR REPLACE INTO disagreements VALUES (NULL, ?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, \
-            ?12, ?13, ?14, ?15, ?16, ?17, ?18, ?19)";
+        let insert = "INSERT OR REPLACE INTO disagreements VALUES (NULL, ?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, \
+            ?10, ?11, ?12, ?13, ?14, ?15, ?16, ?17, ?18, ?19)";
         let row = params![
             said.picture,
             said.name,
@@ -157,8 +161,7 @@ impl Disagreements {
         Ok((id, before))
     }
 
-    /// Names the scene of what was said of some pictures: all that show one scene are left out together, whatever it was called when they were
-    /// looked at.
+    /// Sets the scene of all answers about these pictures, whatever it was called when they were given.
     ///
     /// # Errors
     /// [`StoreError::Database`].
@@ -173,7 +176,7 @@ impl Disagreements {
         transaction.commit().map_err(failed)
     }
 
-    /// Takes one back; false if it is not there.
+    /// Deletes an answer; returns false if it does not exist.
     ///
     /// # Errors
     /// [`StoreError::Database`].
@@ -182,7 +185,7 @@ impl Disagreements {
         deleted.map(|n| n > 0).map_err(|source| self.failed(source))
     }
 
-    /// All of them, the oldest first.
+    /// All answers, oldest first.
     ///
     /// # Errors
     /// [`StoreError`] if the database cannot be read.
@@ -199,7 +202,7 @@ impl Disagreements {
     }
 }
 
-/// All disagreements of a database, the oldest first; it may be in use meanwhile.
+/// All disagreements of a database, oldest first. The database may be in use.
 ///
 /// # Errors
 /// [`StoreError`] if it is not there, or holds something else.
@@ -237,7 +240,7 @@ fn row(row: &Row<'_>) -> rusqlite::Result<Disagreement> {
         let bad = |e| rusqlite::Error::FromSqlConversionFailure(at, rusqlite::types::Type::Text, Box::new(e));
         serde_json::from_str(&text).map_err(bad)
     }
-    let said = Said {
+    let said = TileAnswer {
         picture: row.get(1)?,
         name: row.get(2)?,
         scene: row.get(3)?,

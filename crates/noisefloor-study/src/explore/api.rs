@@ -1,11 +1,12 @@
-//! What the page begins with, and the pictures that come and go. Every answer is JSON, but for pictures and models.
+//! Requests about the initial state and the pictures. Replies are JSON, except pictures and models.
 
-use super::gallery::{GalleryError, Picture, PictureView};
+use super::answers::Disagreements;
+use super::app::App;
+use super::gallery::{GalleryError, GalleryPicture, PictureView};
+use super::images;
 use super::verdicts::Tiles;
-use super::{App, Disagreements, images};
 use crate::error::{StoreError, StudyError};
-use crate::server::api::{read, read_bytes};
-use crate::server::reply::Refusal;
+use crate::http::{Refusal, read_bytes, read_json};
 use axum::Json;
 use axum::body::Body;
 use axum::extract::rejection::PathRejection;
@@ -18,9 +19,9 @@ use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 use std::time::Duration;
 
-/// Longest file, in bytes: a picture of the most pixels in 16-bit floats, or most of one in 32-bit ones.
+/// Longest file, in bytes: enough for a picture of the most pixels in 16-bit floats.
 const MAX_FILE: usize = 384 << 20;
-/// Time for a file to come in.
+/// Time allowed for an upload.
 const FILE_TIME: Duration = Duration::from_secs(120);
 /// Longest name of a file or a scene, in bytes.
 const MAX_NAME: usize = 200;
@@ -39,7 +40,8 @@ impl From<GalleryError> for Refusal {
             GalleryError::Gone => "load the page again",
             GalleryError::NoSamples(_) => "type the number beside its name",
             GalleryError::Still(noisefloor::StillError::Nothing) => {
-                "drop another rendering of the same view beside it; or start with --model and a model that was trained with `--evidence alone`"
+                "drop another rendering of the same view beside it, or start with --model and a model trained with \
+                 `--evidence alone`"
             }
             GalleryError::Many | GalleryError::Large => "take some away",
             _ => "see `noisefloor judge --help` for what pictures can be held against each other",
@@ -56,22 +58,22 @@ pub(crate) fn gone(place: &str) -> Refusal {
     Refusal::new(StatusCode::NOT_FOUND, "there is no such thing", place, "load the page again")
 }
 
-/// Everything that the page begins with.
+/// The state the page starts from.
 #[derive(Serialize)]
 struct StateView {
     pictures: Vec<PictureView>,
     scene: String,
-    /// As it was named, if it was.
+    /// The name given to the scene, if any.
     named: Option<String>,
     tile: usize,
-    /// `nested`, `independent`, or null to tell it from the pictures.
+    /// `nested`, `independent`, or null to detect it from the pictures.
     samples: Option<&'static str>,
     threshold: f32,
     audience: [f64; 2],
     art_students: [f64; 2],
     model: ModelView,
     retrained: bool,
-    /// Disagreements kept.
+    /// Number of stored disagreements.
     disagreements: usize,
     database: String,
     /// Whether there is a table to retrain on.
@@ -92,7 +94,7 @@ pub(crate) async fn state(State(app): Shared) -> Answer {
     let Audience { slope, offset } = setup.audience;
     let students = Audience::ART_STUDENTS;
     Ok(Json(StateView {
-        pictures: gallery.pictures.iter().map(Picture::view).collect(),
+        pictures: gallery.pictures.iter().map(GalleryPicture::view).collect(),
         scene: gallery.scene(),
         named: gallery.named.clone(),
         tile: gallery.tile,
@@ -128,13 +130,13 @@ pub(crate) async fn add(State(app): Shared, name: Named, headers: HeaderMap, bod
         let what = format!("{name} is longer than {MAX_FILE} bytes");
         return Err(Refusal::new(StatusCode::PAYLOAD_TOO_LARGE, what, "body", "crop the picture"));
     }
-    // Memory for one file, however many are sent at once
+    // One upload at a time bounds the memory
     let _turn = app.incoming.lock().await;
     let bytes = read_bytes(body, MAX_FILE, FILE_TIME, "crop the picture").await?;
     let (worker, of) = (app.clone(), name.clone());
     let work = move || -> Result<String, Refusal> {
         let unreadable = |error: &dyn std::fmt::Display, folder: &std::path::Path| {
-            // Where it lay meanwhile is of no use to anyone
+            // The temporary path means nothing to the person who uploaded the file
             let said = error.to_string().replace(&format!("{}/", folder.display()), "");
             refuse(said, "body", "PNG, EXR and PFM files can be read")
         };
@@ -143,14 +145,14 @@ pub(crate) async fn add(State(app): Shared, name: Named, headers: HeaderMap, bod
         let path = folder.path().join(&of);
         std::fs::write(&path, &bytes).map_err(|e| unreadable(&e, folder.path()))?;
         drop(bytes);
-        let picture = Picture::read(&path).map_err(|e| unreadable(&e, folder.path()))?;
+        let picture = GalleryPicture::read(&path).map_err(|e| unreadable(&e, folder.path()))?;
         let id = picture.id.clone();
         worker.gallery().add(picture)?;
         Ok(id)
     };
     let id = blocking(work).await??;
     let gallery = app.gallery();
-    let view = gallery.pictures.iter().find(|p| p.id == id).map(Picture::view);
+    let view = gallery.pictures.iter().find(|p| p.id == id).map(GalleryPicture::view);
     Ok((StatusCode::CREATED, Json(view.ok_or_else(|| gone("pictures"))?)).into_response())
 }
 
@@ -160,10 +162,10 @@ struct Change {
     spp: f64,
 }
 
-/// `PUT /api/pictures/{id}`: how many samples per pixel it was made of.
+/// `PUT /api/pictures/{id}`: sets its samples per pixel.
 pub(crate) async fn change(State(app): Shared, id: Named, body: Body) -> Answer {
     let Path(id) = id.map_err(|_| gone("pictures"))?;
-    let Change { spp } = read(body).await?;
+    let Change { spp } = read_json(body).await?;
     app.gallery().set_spp(&id, spp)?;
     state(State(app)).await
 }
@@ -191,7 +193,7 @@ struct Arrangement {
 
 /// `PUT /api/arrangement`
 pub(crate) async fn arrange(State(app): Shared, body: Body) -> Answer {
-    let Arrangement { tile, samples, scene } = read(body).await?;
+    let Arrangement { tile, samples, scene } = read_json(body).await?;
     let samples = match samples.as_deref() {
         None => None,
         Some("nested") => Some(Samples::Nested),
@@ -239,7 +241,7 @@ async fn tiles(app: &Arc<App>, id: Named) -> Result<Arc<Tiles>, Refusal> {
     describe(app, &id).await
 }
 
-/// The tiles of a picture; whoever asks while they are described waits.
+/// The tiles of a picture, described once and cached.
 pub(crate) async fn describe(app: &Arc<App>, id: &str) -> Result<Arc<Tiles>, Refusal> {
     let (worker, id) = (app.clone(), id.to_owned());
     let work = move || {
@@ -249,7 +251,7 @@ pub(crate) async fn describe(app: &Arc<App>, id: &str) -> Result<Arc<Tiles>, Ref
     Ok(blocking(work).await??)
 }
 
-/// Runs work on the database, where it may wait for the disk.
+/// Runs database work on a thread that may block.
 pub(crate) async fn kept<T: Send + 'static>(
     app: &Arc<App>,
     work: impl FnOnce(&Disagreements) -> Result<T, StoreError> + Send + 'static,

@@ -1,14 +1,13 @@
-//! Verdicts, what people say against them, and retraining.
+//! Requests about verdicts, disagreements and retraining.
 
-use super::App;
-use super::answers::Said;
+use super::answers::TileAnswer;
 use super::api::{Answer, Named, Shared, describe, gone, kept, refuse};
-use super::gallery::{GalleryError, Picture};
+use super::app::App;
+use super::gallery::{GalleryError, GalleryPicture};
 use super::job::{self, Job};
-use super::learn::Step;
+use super::learn::LearnStep;
 use super::verdicts::{Answered, Judge, Question};
-use crate::server::api::read;
-use crate::server::reply::Refusal;
+use crate::http::{Refusal, read_json};
 use axum::Json;
 use axum::body::Body;
 use axum::extract::{Path, State};
@@ -19,7 +18,7 @@ use noisefloor::Model;
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
 
-/// The model in use: the given one, or the retrained one.
+/// The model in use: the one given, or the retrained one.
 fn model(app: &App, retrained: bool) -> Result<Model, Refusal> {
     if !retrained {
         return Ok(app.setup.model.clone());
@@ -42,7 +41,7 @@ fn judge(app: &App, question: &Question) -> Result<Judge, Refusal> {
 
 /// `POST /api/verdicts`
 pub(crate) async fn verdicts(State(app): Shared, body: Body) -> Answer {
-    let question: Question = read(body).await?;
+    let question: Question = read_json(body).await?;
     let judge = judge(&app, &question)?;
     let tiles = describe(&app, &question.picture).await?;
     let id = question.picture.clone();
@@ -56,11 +55,11 @@ pub(crate) async fn verdicts(State(app): Shared, body: Body) -> Answer {
         .into_response())
 }
 
-fn picture(app: &App, id: &str) -> Result<Picture, Refusal> {
+fn picture(app: &App, id: &str) -> Result<GalleryPicture, Refusal> {
     app.gallery().pictures.iter().find(|p| p.id == id).cloned().ok_or_else(|| GalleryError::Gone.into())
 }
 
-/// What somebody says of a tile, on a verdict that was shown.
+/// An answer about a tile whose verdict was shown.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Disagreeing {
@@ -72,14 +71,14 @@ struct Disagreeing {
 #[derive(Serialize)]
 struct Kept {
     id: i64,
-    /// What had been said of the tile before.
+    /// The earlier answer about the tile.
     before: Option<bool>,
     disagreements: usize,
 }
 
-/// `POST /api/disagreements`: what the model said is computed here, not believed.
+/// `POST /api/disagreements`. The verdict is recomputed here, not taken from the request.
 pub(crate) async fn disagree(State(app): Shared, body: Body) -> Answer {
-    let Disagreeing { question, tile, sees_noise } = read(body).await?;
+    let Disagreeing { question, tile, sees_noise } = read_json(body).await?;
     let judge = judge(&app, &question)?;
     let tiles = describe(&app, &question.picture).await?;
     let picture = picture(&app, &question.picture)?;
@@ -90,7 +89,7 @@ pub(crate) async fn disagree(State(app): Shared, body: Body) -> Answer {
     };
     let (descriptor, evidence) = judge.kind();
     let at = tiles.grid.tile(tile);
-    let said = Said {
+    let said = TileAnswer {
         picture: picture.id,
         name: picture.name,
         scene,
@@ -133,12 +132,13 @@ struct Retraining {
 
 /// `POST /api/retrain`
 pub(crate) async fn retrain(State(app): Shared, body: Body) -> Answer {
-    let Retraining { threshold } = read(body).await?;
+    let Retraining { threshold } = read_json(body).await?;
     if !(threshold > 0.0 && threshold < 1.0) {
         return Err(refuse("P lies between 0 and 1", "threshold", "move the slider"));
     }
     let Some(table) = app.setup.table.clone() else {
-        let do_ = "start `noisefloor explore --table FILE`, with fixtures/human-table.csv of the project or what `train --save-table` wrote";
+        let do_ = "start `noisefloor explore --table FILE`, with the project's fixtures/human-table.csv or a table \
+            written by `train --save-table`";
         return Err(refuse("there is no table of human thresholds to train on", "table", do_));
     };
     let here = here(&app);
@@ -162,7 +162,7 @@ pub(crate) async fn retrain(State(app): Shared, body: Body) -> Answer {
             let what = "the model is being retrained already";
             return Err(Refusal::new(StatusCode::CONFLICT, what, "retrain", "wait until it is done"));
         }
-        *job = Job::Running(Step { done: 0, of: 1, doing: "beginning".into() });
+        *job = Job::Running(LearnStep { done: 0, of: 1, doing: "beginning".into() });
     }
     job::begin(app.job.clone(), table, answers, app.setup.model.clone(), threshold);
     Ok((StatusCode::ACCEPTED, Json(app.job().view())).into_response())
@@ -185,7 +185,7 @@ pub(crate) async fn retrained(State(app): Shared) -> Answer {
     Ok((head, file).into_response())
 }
 
-/// The pictures that are looked at, and the scene they show as it is named by now.
+/// The pictures in the gallery, and the current name of their scene.
 fn here(app: &App) -> (Vec<String>, String) {
     let gallery = app.gallery();
     (gallery.pictures.iter().map(|p| p.id.clone()).collect(), gallery.scene())

@@ -1,4 +1,4 @@
-//! The pictures that are looked at: several of one view.
+//! The gallery: several pictures of one view.
 
 use crate::error::StudyError;
 use noisefloor::{Samples, Still, StillError, TileError, TileGrid};
@@ -10,17 +10,19 @@ use thiserror::Error;
 
 /// Most pictures at once.
 pub const MAX_PICTURES: usize = 64;
-/// Most pixels of all pictures together: 12 bytes each.
-pub const MAX_PIXELS: usize = 48 << 20;
+/// Most pixels of all pictures together; each takes 12 bytes.
+pub const MAX_GALLERY_PIXELS: usize = 48 << 20;
 /// Most tiles of a picture.
 const MAX_TILES: usize = 1024;
 
-/// Why a picture is not taken, or not judged.
+/// Why a picture is refused.
 #[derive(Debug, Error)]
 pub(crate) enum GalleryError {
     #[error("there are {MAX_PICTURES} pictures already; take some away")]
     Many,
-    #[error("all pictures together would have more than {MAX_PIXELS} pixels; take some away, or crop them")]
+    #[error(
+        "all pictures together would have more than {MAX_GALLERY_PIXELS} pixels; take some away, or crop them"
+    )]
     Large,
     #[error("{name} does not fit the pictures that are there: {source}; begin anew for another view")]
     Misfit { name: String, source: StillError },
@@ -36,20 +38,20 @@ pub(crate) enum GalleryError {
     Tiles(usize),
 }
 
-/// A picture of one's own.
+/// One picture of the gallery.
 #[derive(Clone, Debug)]
-pub struct Picture {
-    /// BLAKE3 of the file, hexadecimal: the same file is the same picture, whatever its name.
+pub struct GalleryPicture {
+    /// BLAKE3 digest of the file, hexadecimal: equal files are the same picture, whatever their names.
     pub id: String,
     /// Name of the file.
     pub name: String,
-    /// Whether the number of samples is known.
+    /// Whether the samples per pixel are known.
     pub(crate) counted: bool,
-    /// The pixels. Its samples mean nothing while they are not known.
+    /// The pixels. The sample count is a placeholder while unknown.
     pub(crate) still: Arc<Still>,
 }
 
-/// What the page knows of a picture.
+/// A picture as the page sees it.
 #[derive(Debug, Serialize)]
 pub(crate) struct PictureView {
     id: String,
@@ -59,15 +61,17 @@ pub(crate) struct PictureView {
     spp: Option<f64>,
 }
 
-impl Picture {
-    /// Reads a PNG, an EXR or a PFM. Its name may say how many samples per pixel it was made of: `00100.png`, `kitchen-64spp.exr`.
+impl GalleryPicture {
+    /// Reads a PNG, EXR or PFM file. Its name may state the samples per pixel: `00100.png`,
+    /// `kitchen-64spp.exr`.
     ///
     /// # Errors
-    /// [`StudyError::Picture`] if it is none, broken or too large; [`StudyError::NotFinite`] if it has pixels that are no numbers.
+    /// [`StudyError::Picture`] if the file is not a picture, broken or too large; [`StudyError::NotFinite`]
+    /// if a pixel is not finite.
     pub fn read(path: impl AsRef<Path>) -> Result<Self, StudyError> {
         let path = path.as_ref();
         let name = path.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
-        let picture = read_picture_within(path, MAX_PIXELS)?;
+        let picture = read_picture_within(path, MAX_GALLERY_PIXELS)?;
         let spp = samples_in(&name);
         let still = picture.into_still(spp.unwrap_or(1.0));
         still.check().map_err(|_| StudyError::NotFinite { path: path.to_owned() })?;
@@ -80,7 +84,7 @@ impl Picture {
         Ok(Self { id, name, counted: spp.is_some(), still: Arc::new(still) })
     }
 
-    /// Samples per pixel, where they are known.
+    /// Samples per pixel, if known.
     pub fn spp(&self) -> Option<f64> {
         self.counted.then_some(self.still.spp)
     }
@@ -91,7 +95,7 @@ impl Picture {
     }
 }
 
-/// Samples per pixel that a name tells: `00100.png`, `100spp.exr`, `kitchen_100spp.png`, `spp100.png`.
+/// Samples per pixel stated by a file name: `00100.png`, `100spp.exr`, `kitchen_100spp.png`, `spp100.png`.
 fn samples_in(name: &str) -> Option<f64> {
     let stem = name.rsplit_once('.').map_or(name, |(stem, _)| stem).to_lowercase();
     let whole = stem.parse::<u32>().ok();
@@ -109,17 +113,17 @@ fn samples_of_word(word: &str) -> Option<u32> {
     digits?.parse().ok()
 }
 
-/// The pictures that are there, and how they belong together.
+/// The pictures and their relation.
 #[derive(Clone, Debug)]
 pub(crate) struct Gallery {
-    /// By increasing samples; those of which they are not known come last.
-    pub(crate) pictures: Vec<Picture>,
-    /// Group of disagreements, as it was named.
+    /// Ordered by samples per pixel; unknown counts come last.
+    pub(crate) pictures: Vec<GalleryPicture>,
+    /// The name given to the scene, if any.
     pub(crate) named: Option<String>,
     pub(crate) tile: usize,
-    /// How they were made, if it was said.
+    /// The relation of their samples, if stated.
     pub(crate) samples: Option<Samples>,
-    /// Counts changes: what was judged before is out of date.
+    /// Incremented by every change; older descriptions are stale.
     pub(crate) revision: u64,
 }
 
@@ -128,8 +132,8 @@ impl Gallery {
         Self { pictures: Vec::new(), named: None, tile, samples: None, revision: 0 }
     }
 
-    /// Takes a picture; one that is there already is left as it is.
-    pub(crate) fn add(&mut self, picture: Picture) -> Result<(), GalleryError> {
+    /// Adds a picture, unless it is there already.
+    pub(crate) fn add(&mut self, picture: GalleryPicture) -> Result<(), GalleryError> {
         if self.pictures.iter().any(|p| p.id == picture.id) {
             return Ok(());
         }
@@ -137,7 +141,7 @@ impl Gallery {
             return Err(GalleryError::Many);
         }
         let all = self.pictures.iter().chain([&picture]).map(|p| p.still.pixels.len()).sum::<usize>();
-        if all > MAX_PIXELS {
+        if all > MAX_GALLERY_PIXELS {
             return Err(GalleryError::Large);
         }
         if let Some(first) = self.pictures.first() {
@@ -190,8 +194,7 @@ impl Gallery {
         Ok(())
     }
 
-    /// What disagreements are left out together by: the name given, else that of the picture with most samples if it has one, else its
-    /// content.
+    /// Name of the scene: the one given, else that of the picture with most samples, else its digest.
     pub(crate) fn scene(&self) -> String {
         let last = self.pictures.iter().rev().find(|p| p.counted).or(self.pictures.last());
         let of_file = || {
@@ -206,7 +209,7 @@ impl Gallery {
 
     fn changed(&mut self) {
         self.revision += 1;
-        let samples = |p: &Picture| p.spp().unwrap_or(f64::INFINITY);
+        let samples = |p: &GalleryPicture| p.spp().unwrap_or(f64::INFINITY);
         self.pictures.sort_by(|a, b| samples(a).total_cmp(&samples(b)));
     }
 }

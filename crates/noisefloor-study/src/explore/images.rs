@@ -1,13 +1,13 @@
-//! Pictures and maps as PNG files.
+//! Encodes pictures and noise maps as PNG.
 
 use super::verdicts::Tiles;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, ImageEncoder, ImageError};
 
-/// The scale of `noisefloor judge --noise-map`: visible noise from 1 to 16 steps, logarithmic.
+/// Range of the noise map, as in `noisefloor judge --noise-map`: 1 to 16 display steps, logarithmic.
 const SCALE: [f32; 2] = [1.0, 16.0];
 
-/// The picture as it is displayed.
+/// The picture as displayed.
 pub(crate) fn shown(tiles: &Tiles) -> Result<Vec<u8>, ImageError> {
     let byte = |c: &f32| (c.clamp(0.0, 1.0) * 255.0).round() as u8;
     encode(tiles, tiles.shown.iter().flatten().map(byte).collect())

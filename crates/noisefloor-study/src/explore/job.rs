@@ -1,10 +1,10 @@
-//! Retraining in the background: one at a time.
+//! Retraining in the background, one job at a time.
 
-use super::learn::{Learned, Step, retrain};
-use noisefloor::Model;
-use noisefloor_learn::Answer;
+use super::learn::{LearnStep, Learned, retrain};
 use noisefloor_learn::Table;
 use noisefloor_learn::TrainParams;
+use noisefloor::Model;
+use noisefloor_learn::Answer;
 use serde::Serialize;
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -12,17 +12,17 @@ use std::sync::{Arc, Mutex, PoisonError};
 pub(crate) enum Job {
     #[default]
     Idle,
-    Running(Step),
+    Running(LearnStep),
     Failed(String),
     Done(Box<(Model, Learned)>),
 }
 
-/// What the page knows of it.
+/// The job as the page sees it.
 #[derive(Debug, Serialize)]
 #[serde(tag = "state", rename_all = "kebab-case")]
 pub(crate) enum JobView {
     Idle,
-    Running(Step),
+    Running(LearnStep),
     Failed { what: String },
     Done(Box<Learned>),
 }
@@ -49,22 +49,22 @@ impl Job {
     }
 }
 
-/// Begins; the job says how far it is. It is to be marked as running before.
+/// Starts retraining. The caller marks the job as running first.
 pub(crate) fn begin(job: Arc<Mutex<Job>>, table: Table, answers: Vec<Answer>, model: Model, threshold: f32) {
     let set = move |to: Job| *job.lock().unwrap_or_else(PoisonError::into_inner) = to;
-    // What the model was trained on is what the table holds only if it is that table.
+    // The model's corpus names this table only if their digests agree
     let corpus = if model.record.table_digest == table.digest() {
         model.record.corpus.clone()
     } else {
         format!("a table of {}", table.scenes().join(", "))
     };
-    // Not a task: who ends the server does not wait for it.
+    // A thread, not a task: stopping the server does not wait for it
     std::thread::spawn(move || {
         let work = || {
             let on_step = |step| set(Job::Running(step));
             retrain(&table, answers, &TrainParams::default(), (&model, threshold), &corpus, on_step)
         };
-        // A panic in a solver must not leave the page waiting.
+        // A panic in the solver must not leave the page waiting
         let outcome = std::panic::catch_unwind(std::panic::AssertUnwindSafe(work));
         set(match outcome {
             Ok(Ok(done)) => Job::Done(Box::new(done)),

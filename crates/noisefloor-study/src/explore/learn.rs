@@ -1,53 +1,56 @@
-//! Learning from disagreements, and what that costs and gains.
+//! Retraining on disagreements, and what that costs and gains.
 
 use noisefloor::{DEFAULT_THRESHOLD, Model, Scores};
 use noisefloor_learn::{Answer, TrainError, TrainParams, leave_answers_out, leave_one_scene_out, train};
 use noisefloor_learn::{Table, score};
 use serde::Serialize;
 
-/// How many answers a model agrees with.
+/// Number of answers that models agree with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-pub struct Agreement {
-    /// All answers.
+pub struct AnswerAgreement {
+    /// Number of answers.
     pub of: usize,
-    /// By the model that was trained on the table alone.
+    /// Agreements of the model trained on the table alone.
     pub before: usize,
-    /// By the model that has learned them: how well they are fitted, not how well others would be.
+    /// Agreements of the model trained on these answers as well: how well they are fitted, not how well it
+    /// generalises.
     pub fitted: usize,
-    /// By models that have learned the others, but nothing of the same scene.
+    /// Agreements of models trained without the answers about the same scene.
     pub left_out: usize,
 }
 
-/// What retraining has changed.
+/// The effect of retraining.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Learned {
-    /// On the people of the table, each scene left out: trained on the table alone. `None` if it has too few groups of scenes.
+    /// Leave-one-scene-out scores on the table, trained on the table alone. `None` if it has too few groups
+    /// of scenes.
     pub before: Option<Scores>,
-    /// The same, with the disagreements learned as well.
+    /// The same, trained on the disagreements as well.
     pub after: Option<Scores>,
-    /// With the disagreements.
-    pub agreement: Agreement,
-    /// Scenes that disagreements are of.
+    /// Agreement with the disagreements.
+    pub agreement: AnswerAgreement,
+    /// Scenes that the disagreements are about.
     pub scenes: Vec<String>,
-    /// What people's thresholds are predicted worse by now, in words; empty if nothing is.
+    /// Which scores got worse, in words; empty if none did.
     pub worse: Vec<String>,
     /// Digest of the new model.
     pub model: String,
 }
 
-/// A part of the work.
+/// Progress of the work.
 #[derive(Clone, Debug, Serialize)]
-pub struct Step {
-    /// Parts done.
+pub struct LearnStep {
+    /// Steps done.
     pub done: usize,
-    /// Parts in all.
+    /// Steps in total.
     pub of: usize,
-    /// The part that begins.
+    /// The step that starts now.
     pub doing: String,
 }
 
-/// Trains on a table together with answers, and scores both. `model` spares the half of the work if it was trained on this very table, and
-/// scored. An answer agrees if the verdict at P ≥ `threshold` is the same. Deterministic.
+/// Trains on a table together with answers, and scores both. Half of the work is skipped if `model` was
+/// trained on this table and holds its scores. An answer agrees if the verdict at P ≥ `threshold` is the
+/// same. Deterministic.
 ///
 /// # Errors
 /// [`TrainError`] if training fails.
@@ -57,7 +60,7 @@ pub fn retrain(
     params: &TrainParams,
     (model, threshold): (&Model, f32),
     corpus: &str,
-    mut on_step: impl FnMut(Step),
+    mut on_step: impl FnMut(LearnStep),
 ) -> Result<(Model, Learned), TrainError> {
     let plain = Table { answers: Vec::new(), ..table.clone() };
     let told = Table { answers, ..plain.clone() };
@@ -70,7 +73,7 @@ pub fn retrain(
     let of = folds * (1 + usize::from(known_scores.is_none())) + usize::from(known.is_none()) + scenes + 1;
     let mut done = 0;
     let mut step = |doing: String| {
-        on_step(Step { done, of, doing });
+        on_step(LearnStep { done, of, doing });
         done += 1;
     };
 
@@ -106,7 +109,7 @@ pub fn retrain(
     let agree = |p: &dyn Fn(usize, &Answer) -> f32| {
         told.answers.iter().enumerate().filter(|(i, a)| a.agrees(p(*i, a), threshold)).count()
     };
-    let agreement = Agreement {
+    let agreement = AnswerAgreement {
         of: told.answers.len(),
         before: agree(&|_, a| a.probability(&base)),
         fitted: agree(&|_, a| a.probability(&new)),
@@ -118,7 +121,7 @@ pub fn retrain(
     Ok((new, learned))
 }
 
-/// What has become worse by more than rounding.
+/// Scores that got worse by more than rounding.
 fn worse(before: Option<Scores>, after: Option<Scores>) -> Vec<String> {
     let (Some(before), Some(after)) = (before, after) else { return Vec::new() };
     let mut worse = Vec::new();

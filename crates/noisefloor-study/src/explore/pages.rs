@@ -1,6 +1,6 @@
-//! The page, inside the program.
+//! The page, embedded in the program.
 
-use crate::server::reply::Refusal;
+use crate::http::Refusal;
 use axum::extract::Path;
 use axum::http::StatusCode;
 use axum::http::header::CONTENT_TYPE;
@@ -20,12 +20,12 @@ const FILES: [(&str, &str, &str); 8] = [
     ("fr.json", "application/json", include_str!("../../pages/explore/fr.json")),
 ];
 
-/// The one page.
+/// The page.
 pub(crate) async fn page() -> Response {
     ([(CONTENT_TYPE, "text/html; charset=utf-8")], HTML).into_response()
 }
 
-/// What it is made of.
+/// A file of the page.
 pub(crate) async fn file(Path(name): Path<String>) -> Response {
     match FILES.iter().find(|(known, ..)| *known == name) {
         Some((_, kind, text)) => ([(CONTENT_TYPE, *kind)], *text).into_response(),

@@ -1,6 +1,6 @@
-//! What the model says of a picture: described once, judged as often as threshold and audience change.
+//! Verdicts on a picture. It is described once, and judged again whenever threshold or audience change.
 
-use super::gallery::{Gallery, GalleryError, Picture};
+use super::gallery::{Gallery, GalleryError, GalleryPicture};
 use noisefloor::{
     Audience, Described, Descriptor, Evidence, Held, Model, Oracle, Rgb, Samples, Still, TileGrid,
     ToneMapping, Verdict,
@@ -9,20 +9,21 @@ use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
 use std::sync::Arc;
 
-/// A picture described.
+/// A described picture.
 #[derive(Debug)]
 pub(crate) struct Tiles {
     pub(crate) grid: TileGrid,
     pub(crate) spp: f64,
     pub(crate) samples: Samples,
     pub(crate) described: Vec<Described>,
-    /// As it is displayed, row-major.
+    /// Pixels as displayed, row-major.
     pub(crate) shown: Vec<Rgb>,
-    /// Visible noise in 8-bit steps, row-major; `None` if the descriptor has no map of it.
+    /// Visible noise in 8-bit steps, row-major; `None` if the descriptor has no such map.
     pub(crate) noise: Option<Vec<f32>>,
 }
 
-/// Tiles of pictures, until something changes. Described once for each kind of descriptor and evidence, which all models in use share.
+/// Cache of described pictures, valid for one revision of the gallery. All models in use share descriptor
+/// and evidence, so one description serves them all.
 #[derive(Debug, Default)]
 pub(crate) struct Judged {
     revision: u64,
@@ -30,7 +31,7 @@ pub(crate) struct Judged {
 }
 
 impl Judged {
-    /// The tiles of a picture of the gallery, as `model` describes them.
+    /// The tiles of a picture, as `model` describes them.
     pub(crate) fn tiles(
         &mut self,
         gallery: &Gallery,
@@ -57,23 +58,23 @@ fn describe(gallery: &Gallery, id: &str, model: &Model) -> Result<Tiles, Gallery
     let held = Held::new(model.evidence, &picture.still, &others, ToneMapping::default(), gallery.samples)?;
     let (width, height) = picture.still.size;
     let grid = TileGrid::new(width, height, gallery.tile)?;
-    // The threshold counts for verdicts alone.
+    // The threshold affects verdicts only
     let oracle = Oracle::new(model.clone(), noisefloor::DEFAULT_THRESHOLD).map_err(|_| GalleryError::Gone)?;
     let described = held.describe(&oracle, grid)?;
     let noise = oracle.map_visible_noise(grid, |tile| held.planes(tile).map(Some))?;
     Ok(Tiles { grid, spp, samples: held.samples(), described, shown: held.shown(), noise })
 }
 
-/// What is asked about a picture.
+/// A question about a picture.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Question {
     pub(crate) picture: String,
-    /// P from which a tile counts as converged.
+    /// Probability from which a tile counts as converged.
     pub(crate) threshold: f32,
-    /// Slope and offset.
+    /// Slope and offset of the audience.
     pub(crate) audience: [f64; 2],
-    /// Whether the retrained model is asked.
+    /// Whether to ask the retrained model.
     pub(crate) retrained: bool,
 }
 
@@ -89,7 +90,7 @@ pub(crate) struct TileView {
     pub(crate) converged: bool,
     pub(crate) expected_spp: Option<u64>,
     pub(crate) unfamiliar: bool,
-    /// What was said of it, and the number that takes it back.
+    /// The answer about this tile, with its row number.
     pub(crate) said: Option<Answered>,
 }
 
@@ -108,12 +109,12 @@ pub(crate) struct VerdictView {
     pub(crate) model: String,
     pub(crate) columns: usize,
     pub(crate) tiles: Vec<TileView>,
-    /// Visible noise, in 8-bit steps, from which it is seen.
+    /// Visible noise, in 8-bit steps, that is just seen.
     pub(crate) just_visible: Option<f32>,
     pub(crate) has_noise_map: bool,
 }
 
-/// The model with its threshold and audience.
+/// A model with threshold and audience.
 #[derive(Debug)]
 pub(crate) struct Judge {
     pub(crate) oracle: Oracle,
@@ -121,7 +122,7 @@ pub(crate) struct Judge {
 }
 
 impl Judge {
-    /// `Err` says what is out of range.
+    /// Errors name the value out of range.
     pub(crate) fn new(model: Model, threshold: f32, [slope, offset]: [f64; 2]) -> Result<Self, String> {
         let sound = (0.0..=100.0).contains(&slope) && (-1e9..=1e9).contains(&offset);
         if !sound {
@@ -135,7 +136,9 @@ impl Judge {
         let verdicts = self.oracle.judge_described_for(&tiles.described, self.audience);
         verdicts.ok_or_else(|| {
             let name = self.oracle.model().descriptor.name();
-            format!("a model with the {name} descriptor cannot follow an audience; use one with the compact descriptor")
+            format!(
+                "a model with the {name} descriptor cannot follow an audience; use the compact descriptor"
+            )
         })
     }
 
@@ -151,7 +154,7 @@ impl Judge {
 
     pub(crate) fn view(
         &self,
-        picture: &Picture,
+        picture: &GalleryPicture,
         tiles: &Tiles,
         said: &HashMap<[usize; 4], Answered>,
     ) -> Result<VerdictView, String> {

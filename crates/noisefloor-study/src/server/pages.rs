@@ -1,6 +1,6 @@
 //! The pages, inside the program.
 
-use super::reply::Refusal;
+use crate::http::Refusal;
 use axum::extract::Path;
 use axum::http::StatusCode;
 use axum::http::header::CONTENT_TYPE;

@@ -1,21 +1,21 @@
-//! Simulated observers at the real server, or at a session without one.
+//! Drives simulated observers through a server, or through a session without one.
 
-use super::SimulatedObserver;
-use crate::event::{Envelope, Event};
+use super::observer::SimulatedObserver;
+use crate::event::{Envelope, StudyEvent};
 use crate::server::{Beginning, SessionView, StackView, StudyView};
-use crate::session::{Misfit, Session, Stage};
+use crate::session::{EventMisfit, ParticipantSession, Stage};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 use thiserror::Error;
 
-/// Why a simulated observer could not go on.
+/// Why a simulated observer could not continue.
 #[derive(Debug, Error)]
 pub enum DriveError {
     /// The server did not answer.
     #[error("{url}: no answer: {source}; is `noisefloor study serve` running there?")]
     Http {
-        /// What was asked for.
+        /// The address requested.
         url: String,
         /// What went wrong.
         source: Box<ureq::Error>,
@@ -30,7 +30,7 @@ pub enum DriveError {
         /// What the server said.
         body: String,
     },
-    /// The answer is not what the server of this version sends.
+    /// The reply is not valid for this version.
     #[error("{url}: not the JSON expected: {source}; is the server of the same version?")]
     Json {
         /// What was asked for.
@@ -40,7 +40,7 @@ pub enum DriveError {
     },
 }
 
-/// Sends one request; `None` as body reads.
+/// Sends one request: GET without a body, POST with one.
 fn ask<T: DeserializeOwned>(agent: &ureq::Agent, url: &str, body: Option<&str>) -> Result<T, DriveError> {
     let failed = |source| DriveError::Http { url: url.to_owned(), source: Box::new(source) };
     let mut response = match body {
@@ -60,11 +60,11 @@ fn json(value: &impl Serialize) -> String {
     serde_json::to_string(value).unwrap_or_default()
 }
 
-/// Takes a simulated observer through a whole session at a server, `http://host:port`, event by event. The group is one of the study's.
-/// `on_event` is told how long each event took to be acknowledged. Returns the code.
+/// Takes a simulated observer through a whole session on a server, `http://host:port`. The group must be
+/// one of the study's. `on_event` receives the time each event took to be acknowledged. Returns the code.
 ///
 /// # Errors
-/// [`DriveError`] if the server does not answer, or refuses.
+/// [`DriveError`] if the server does not answer or refuses.
 pub fn drive(
     server: &str,
     group: &str,
@@ -81,7 +81,7 @@ pub fn drive(
     let mut view: SessionView = ask(&agent, &format!("{server}/api/sessions"), Some(&beginning))?;
     let code = view.code.clone();
     let url = format!("{server}/api/sessions/{code}/events");
-    let mut send = |view: &mut SessionView, event: Event| {
+    let mut send = |view: &mut SessionView, event: StudyEvent| {
         let at = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |d| d.as_millis() as u64);
         let begun = Instant::now();
         *view = ask(&agent, &url, Some(&json(&Envelope { seq: view.next_seq, at, event })))?;
@@ -100,12 +100,12 @@ pub fn drive(
     Ok(code)
 }
 
-/// Takes a simulated observer through a session without a server, to its end.
+/// Takes a simulated observer through a whole session without a server.
 ///
 /// # Errors
-/// [`Misfit`] if an answer does not fit, which would be a mistake of the observer.
-pub fn run(session: &mut Session, observer: &mut SimulatedObserver) -> Result<(), Misfit> {
-    let stack = |s: &crate::stack::Stack| StackView {
+/// [`EventMisfit`] if an answer does not fit, which would be a mistake of the observer.
+pub fn run(session: &mut ParticipantSession, observer: &mut SimulatedObserver) -> Result<(), EventMisfit> {
+    let stack = |s: &crate::stack::StudyStack| StackView {
         width: s.grid().width(),
         height: s.grid().height(),
         tile: s.grid().edge(),

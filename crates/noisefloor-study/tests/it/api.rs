@@ -30,7 +30,8 @@ fn request(server: &Running, method: &str, path: &str, headers: &str, body: &str
         if headers.contains("host:") { String::new() } else { format!("host: {}\r\n", server.address) };
     let length = body.len();
     let text = format!(
-        "{method} {path} HTTP/1.1\r\n{host}connection: close\r\ncontent-length: {length}\r\n{headers}\r\n{body}"
+        "{method} {path} HTTP/1.1\r\n{host}connection: close\r\n\
+         content-length: {length}\r\n{headers}\r\n{body}"
     );
     raw(server, text.as_bytes())
 }
@@ -249,9 +250,10 @@ fn a_database_goes_with_one_study() {
     let text = std::fs::read_to_string(&folder.file).unwrap();
     std::fs::write(&folder.file, text.replace("tile = 32", "tile = 16")).unwrap();
     let study = folder.study();
-    let error = noisefloor_study::Store::open(&study.database, &study.design()).unwrap_err().to_string();
+    let error =
+        noisefloor_study::AnswerStore::open(&study.database, &study.design()).unwrap_err().to_string();
     assert!(error.contains("another study"), "{error}");
     // Nor is any other file written to.
     let other = folder.dir.path().join("study.toml");
-    assert!(noisefloor_study::Store::open(&other, &study.design()).is_err());
+    assert!(noisefloor_study::AnswerStore::open(&other, &study.design()).is_err());
 }

@@ -1,14 +1,15 @@
 use crate::explore::table;
 use crate::kit::{Running, Served, levels, stack};
+use noisefloor_learn::{predict, score};
+use noisefloor_learn::{TrainParams, train};
 use noisefloor::{DEFAULT_THRESHOLD, Descriptor, Evidence};
 use noisefloor_learn::describe_corpora;
-use noisefloor_learn::{TrainParams, train};
-use noisefloor_learn::{predict, score};
-use noisefloor_study::analysis::files::{Threshold, write};
-use noisefloor_study::analysis::{Options, analyse};
-use noisefloor_study::explore::Setup;
+use noisefloor_study::analysis::CorpusThreshold;
+use noisefloor_study::analysis::files::write;
+use noisefloor_study::analysis::{AnalysisOptions, analyse};
+use noisefloor_study::explore::ExploreSetup;
 use noisefloor_study::simulated::{Public, SimulatedObserver};
-use noisefloor_study::{Event, StackView, Study, Trial, store};
+use noisefloor_study::{StackView, Study, StudyEvent, Trial, store};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -23,7 +24,8 @@ fn study(protocol: &str, extra: &str) -> (TempDir, Arc<Study>) {
     let size = if protocol == "forced-choice" { (256, 128) } else { (384, 256) };
     stack(&dir.path().join("wall"), size, &levels(LEVELS, 2.0));
     let mut text = format!(
-        "protocol = \"{protocol}\"\ndatabase = \"answers.sqlite\"\ntile = 128\ntrials = 1\ninterval-ms = 60\n{extra}\n"
+        "protocol = \"{protocol}\"\ndatabase = \"answers.sqlite\"\ntile = 128\ntrials = 1\n\
+         interval-ms = 60\n{extra}\n"
     );
     for (code, title, consent) in [
         ("en", "Noise in rendered pictures", "You take part of your own will, and may stop at any time."),
@@ -46,7 +48,8 @@ fn study(protocol: &str, extra: &str) -> (TempDir, Arc<Study>) {
     (dir, study)
 }
 
-/// What the pages need to be tested; `None`, said aloud, where it is missing. With NOISEFLOOR_REQUIRE_BROWSER=1 that is a failure.
+/// What the pages need to be tested; `None`, said aloud, where it is missing. With
+/// NOISEFLOOR_REQUIRE_BROWSER=1 that is a failure.
 fn browser() -> Option<()> {
     let there =
         |program: &str| Command::new(program).arg("--version").output().is_ok_and(|o| o.status.success());
@@ -81,7 +84,8 @@ fn run(file: &str, environment: &[(&str, &str)]) {
     assert!(output.status.success(), "the browser's tests failed; what they said is above");
 }
 
-/// Whole sessions by mouse and by keyboard alone, in two sizes and languages: browser/test.mjs. What was clicked is what the analysis finds.
+/// Whole sessions by mouse and by keyboard alone, in two sizes and languages: browser/test.mjs. What was
+/// clicked is what the analysis finds.
 #[test]
 fn observers_use_the_pages_in_a_browser() {
     if browser().is_none() {
@@ -99,7 +103,7 @@ fn observers_use_the_pages_in_a_browser() {
 
     // What was clicked: two observers left the six tiles at levels 1 to 6 (by mouse) and at 2 (by keyboard).
     let study = &studies[0].1.1;
-    let report = analyse(study, Options { keep_outliers: true, seed: 1, simulated: false }).unwrap();
+    let report = analyse(study, AnalysisOptions { keep_outliers: true, seed: 1, simulated: false }).unwrap();
     let finished: Vec<_> = report.observers.iter().filter(|o| o.finished).collect();
     assert_eq!(finished.len(), 2, "{:?}", report.observers);
     let records = store::read_all(&study.database, &study.design()).unwrap();
@@ -115,7 +119,8 @@ fn observers_use_the_pages_in_a_browser() {
     assert!((conditions.pixels_per_mm - 324.0 / 85.6).abs() < 1e-9 && conditions.distance_mm == 600.0);
 }
 
-/// A stack whose last picture's name says nothing, and a picture of another size, on the page of `explore`: browser/explore.test.mjs.
+/// A stack whose last picture's name says nothing, and a picture of another size, on the page of `explore`:
+/// browser/explore.test.mjs.
 #[test]
 fn pictures_are_explored_in_a_browser() {
     if browser().is_none() {
@@ -130,8 +135,10 @@ fn pictures_are_explored_in_a_browser() {
         ["00050.png", "01200.png", "06400.png", "last.png"].iter().map(|name| folder.join(name)).collect();
     let files =
         serde_json::json!({ "stack": files, "other": dir.path().join("other/00050.png") }).to_string();
-    let server =
-        Served::explorer(Setup { table: Some(table()), ..Setup::new(dir.path().join("explore.sqlite")) });
+    let server = Served::explorer(ExploreSetup {
+        table: Some(table()),
+        ..ExploreSetup::new(dir.path().join("explore.sqlite"))
+    });
     run("explore.test.mjs", &[("EXPLORER", &format!("http://{}", server.address)), ("STACK", &files)]);
 }
 
@@ -140,15 +147,16 @@ fn clicks(observer: &mut SimulatedObserver, stack: u32, stacks: &[StackView]) ->
     let tiles = (stacks[0].width / stacks[0].tile) * (stacks[0].height / stacks[0].tile);
     let trial = Trial::Acquisition { number: 1, practice: false, stack, levels: vec![0; tiles] };
     let events = observer.respond(&trial, stacks);
-    let tile = |event: &Event| match event {
-        Event::Step { tile, .. } => Some(*tile),
+    let tile = |event: &StudyEvent| match event {
+        StudyEvent::Step { tile, .. } => Some(*tile),
         _ => None,
     };
     events.iter().filter_map(tile).collect()
 }
 
-/// Simulated observers, with thresholds, a slope, lapses and a bias, click through the real pages in Chromium; what the server kept, the analysis
-/// takes apart: the known thresholds lie within its intervals; and of its corpus a model is trained that predicts them.
+/// Simulated observers, with thresholds, a slope, lapses and a bias, click through the real pages in
+/// Chromium; what the server kept, the analysis takes apart: the known thresholds lie within its intervals;
+/// and of its corpus a model is trained that predicts them.
 #[test]
 fn simulated_observers_drive_the_pages_and_a_model_learns_from_them() {
     const OBSERVERS: u64 = 8;
@@ -186,12 +194,12 @@ fn simulated_observers_drive_the_pages_and_a_model_learns_from_them() {
 
     // Everything that was decided was clicked, and is what was kept.
     let records = store::read_all(&study.database, &study.design()).unwrap();
-    let steps = |event: &&noisefloor_study::Envelope| matches!(event.event, Event::Step { .. });
+    let steps = |event: &&noisefloor_study::Envelope| matches!(event.event, StudyEvent::Step { .. });
     let kept: usize = records.iter().map(|r| r.events.iter().filter(steps).count()).sum();
     assert_eq!(kept, decisions.iter().flatten().flatten().flatten().count());
 
     // The thresholds that the observers were made of, bias included, lie within the intervals.
-    let report = analyse(&study, Options { keep_outliers: true, seed: 1, simulated: false }).unwrap();
+    let report = analyse(&study, AnalysisOptions { keep_outliers: true, seed: 1, simulated: false }).unwrap();
     assert_eq!((report.observers.len() as u64, report.tiles.len()), (OBSERVERS, 8));
     let (mut level95, mut means) = (0, 0.0);
     for (i, tile) in report.tiles.iter().enumerate() {
@@ -201,14 +209,15 @@ fn simulated_observers_drive_the_pages_and_a_model_learns_from_them() {
         means += (tile.median / (public.thresholds[i / 4][i % 4] * public.bias.exp())).ln() / 8.0;
         println!("tile {i}: {truth:.0} in {low:.0} to {high:.0}? median {:.0}", tile.median);
     }
-    // Of 8 intervals that hold the truth in 92 of 100 cases at least, three or more miss it 2 times in 100; the draw is seeded.
+    // Of 8 intervals that hold the truth in 92 of 100 cases at least, three or more miss it 2 times in 100;
+    // the draw is seeded.
     assert!(level95 >= 6, "{level95} of 8");
     // Eight observers of scale 0.27: their median is known to 0.27·2/√8 = 0.19, times 3.
     assert!(f64::abs(means) < 0.57, "{means}");
 
     // Of the corpus, a model.
     let out = dir.path().join("out");
-    write(&out, &study, &report, Threshold::Level95).unwrap();
+    write(&out, &study, &report, CorpusThreshold::Level95).unwrap();
     let table =
         describe_corpora(&[out.join("corpus")], Descriptor::default(), Evidence::Halves, |_, _| ()).unwrap();
     assert_eq!((table.groups().len(), table.zones.len()), (2, 8));

@@ -1,14 +1,15 @@
 use crate::kit::{Folder, Running, levels, public};
 use noisefloor_learn::Corpus;
-use noisefloor_study::analysis::files::{Threshold, write};
-use noisefloor_study::analysis::{Options, analyse};
+use noisefloor_study::analysis::CorpusThreshold;
+use noisefloor_study::analysis::files::write;
+use noisefloor_study::analysis::{AnalysisOptions, analyse};
 use noisefloor_study::simulated::drive;
 use noisefloor_study::{Class, store};
 
-const OPTIONS: Options = Options { keep_outliers: false, seed: 1, simulated: true };
+const OPTIONS: AnalysisOptions = AnalysisOptions { keep_outliers: false, seed: 1, simulated: true };
 
-/// Twelve simulated observers, two groups of which the second needs twice the samples, click through the real server; the analysis finds
-/// what they were made of, and its corpus is one.
+/// Twelve simulated observers, two groups of which the second needs twice the samples, click through the
+/// real server; the analysis finds what they were made of, and its corpus is one.
 #[test]
 fn thresholds_come_back_from_the_server_as_a_corpus() {
     let levels = levels(24, 1.3);
@@ -23,15 +24,18 @@ fn thresholds_come_back_from_the_server_as_a_corpus() {
     }
     // Simulated observers are not taken for people.
     assert!(
-        analyse(&study, Options { simulated: false, ..OPTIONS }).unwrap_err().to_string().contains("people")
+        analyse(&study, AnalysisOptions { simulated: false, ..OPTIONS })
+            .unwrap_err()
+            .to_string()
+            .contains("people")
     );
     // Analysed while it is served.
     let report = analyse(&study, OPTIONS).unwrap();
     assert_eq!((report.observers.len(), report.tiles.len()), (12, 4));
     assert!(report.observers.iter().all(|o| o.finished && o.tiles == 4));
     for tile in &report.tiles {
-        // Two groups, at t and 2t: the median lies at √2·t. Twelve observers of scale 0.3 have a median within 4 standard errors of
-        // 0.3·2/√12 = 0.17 in ln(spp).
+        // Two groups, at t and 2t: the median lies at √2·t. Twelve observers of scale 0.3 have a median
+        // within 4 standard errors of 0.3·2/√12 = 0.17 in ln(spp).
         let expected = truth[tile.tile] * 2f64.sqrt();
         assert!((tile.median / expected).ln().abs() < 0.7, "{tile:?}");
         let [low, high] = tile.level95_interval.unwrap();
@@ -49,7 +53,7 @@ fn thresholds_come_back_from_the_server_as_a_corpus() {
     // Files, and the corpus among them, twice: what is there is replaced.
     let out = folder.dir.path().join("out");
     for _ in 0..2 {
-        write(&out, &study, &report, Threshold::Level95).unwrap();
+        write(&out, &study, &report, CorpusThreshold::Level95).unwrap();
     }
     let corpus = Corpus::open(out.join("corpus-simulated")).unwrap();
     assert_eq!((corpus.scenes(), corpus.zones().len()), (vec!["wall", "door"], 4));
@@ -76,16 +80,17 @@ fn the_table_of_the_paper_comes_back() {
         drive(&server.url, "", &mut observer, |_| ()).unwrap();
     }
     // All ten: one who calls noisy pairs identical as often as others, by chance, would be set aside.
-    let report = analyse(&study, Options { keep_outliers: true, ..OPTIONS }).unwrap();
+    let report = analyse(&study, AnalysisOptions { keep_outliers: true, ..OPTIONS }).unwrap();
     let share = |class: Class| report.classes.iter().find(|c| c.class == class).unwrap();
     assert!(report.tiles.is_empty() && share(Class::Reference).identical.of == 40);
-    // Reference pairs are called different by lapses alone: 0.5 % of 40 answers, 4 or more of them once in 100 000.
+    // Reference pairs are called different by lapses alone: 0.5 % of 40 answers, 4 or more of them once in
+    // 100 000.
     assert!(share(Class::Reference).identical.share > 0.9);
     assert!(share(Class::Noisy).identical.share < share(Class::Test).identical.share);
     let [low, high] = share(Class::Test).identical.wilson;
     assert!(low < high && (low..=high).contains(&share(Class::Test).identical.share));
     let out = folder.dir.path().join("out");
-    write(&out, &study, &report, Threshold::Mean).unwrap();
+    write(&out, &study, &report, CorpusThreshold::Mean).unwrap();
     assert!(out.join("classes.csv").is_file() && out.join("classes.svg").is_file());
 }
 

@@ -1,24 +1,24 @@
-use crate::kit::{Folder, levels};
-use noisefloor_study::analysis::{Observer, Options, Report, report};
+use crate::kit::Folder;
+use noisefloor_study::analysis::{AnalysisOptions, Observer, StudyReport, report};
 use noisefloor_study::simulated::{Public, run};
-use noisefloor_study::{Session, Study, grids};
+use noisefloor_study::{ParticipantSession, Study, grids};
 use std::sync::Arc;
 
 /// A study of so many simulated observers, without a server.
-fn simulated(study: &Arc<Study>, public: &Public, observers: u64, seed: u64) -> (Report, Vec<Observer>) {
+fn simulated(study: &Arc<Study>, public: &Public, observers: u64, seed: u64) -> (StudyReport, Vec<Observer>) {
     let grids = grids(study);
     let observe = |i: u64| {
         let seed = 1000 * seed + i;
-        let mut session = Session::new(study.clone(), grids.clone(), seed);
+        let mut session = ParticipantSession::new(study.clone(), grids.clone(), seed);
         run(&mut session, &mut public.draw(seed)).unwrap();
         Observer::of(&format!("simulated {i}"), "", &session)
     };
     let all: Vec<Observer> = (0..observers).map(observe).collect();
-    (report(study, &all, Options { keep_outliers: false, seed, simulated: true }), all)
+    (report(study, &all, AnalysisOptions { keep_outliers: false, seed, simulated: true }), all)
 }
 
-/// Shares of intervals that hold the truth: of the median, and of the level where 95 % see no difference; and the mean ratio of the latter to the
-/// truth.
+/// Shares of intervals that hold the truth: of the median, and of the level where 95 % see no difference;
+/// and the mean ratio of the latter to the truth.
 fn coverage(study: &Arc<Study>, public: &Public, observers: u64, studies: u64) -> (f64, f64, f64) {
     let truth = |tile: usize, share: f64| public.quantile(0, tile, share);
     let truths: Vec<[f64; 2]> = (0..2).map(|tile| [truth(tile, 0.5), truth(tile, 0.95)]).collect();
@@ -50,9 +50,10 @@ fn public(within: f64, lapse: f64) -> Public {
     Public { thresholds: vec![vec![1000.0, 2500.0]], between: 0.25, within, lapse, bias: 0.0 }
 }
 
-/// 33 observers, as in the paper. Of 40 studies with two tiles, 95 % of intervals should hold the truth. Both tiles share their observers, so
-/// that there are between 40 and 80 independent chances: with 40, a share below 0.83 comes by chance once in 300 if 95 % is true, and once in 50 if the
-/// intervals hold in 93 %. Seeded: it does so never or always.
+/// 33 observers, as in the paper. Of 40 studies with two tiles, 95 % of intervals should hold the truth.
+/// Both tiles share their observers, so that there are between 40 and 80 independent chances: with 40, a
+/// share below 0.83 comes by chance once in 300 if 95 % is true, and once in 50 if the intervals hold in 93
+/// %. Seeded: it does so never or always.
 #[test]
 fn intervals_hold_the_truth_about_as_often_as_they_say() {
     let (_folder, study) = papers("acquisition", "");
@@ -60,59 +61,6 @@ fn intervals_hold_the_truth_about_as_often_as_they_say() {
     println!("coverage: median {median:.3}, level of 95 % {level95:.3}, ratio {ratio:.3}");
     assert!(median >= 0.83 && level95 >= 0.83, "{median} {level95}");
     assert!((ratio - 1.0).abs() < 0.1, "{ratio}");
-}
-
-/// The same over 400 studies each, for the guide.
-#[test]
-#[ignore = "takes minutes: coverage over many studies"]
-fn coverage_over_many_studies() {
-    let (_folder, study) = papers("acquisition", "");
-    for (observers, within, lapse) in [
-        (33, 0.0, 0.0),
-        (33, 0.1, 0.0),
-        (33, 0.1, 0.02),
-        (33, 0.1, 0.05),
-        (33, 0.25, 0.02),
-        (12, 0.1, 0.02),
-        (100, 0.1, 0.02),
-    ] {
-        let (median, level95, ratio) = coverage(&study, &public(within, lapse), observers, 200);
-        println!(
-            "{observers} observers, within {within}, lapse {lapse}: median {:.1} %, 95 % level {:.1} %, ratio {ratio:.3}",
-            100.0 * median,
-            100.0 * level95
-        );
-    }
-}
-
-/// And of forced choices, over 100 studies each.
-#[test]
-#[ignore = "takes minutes: coverage over many studies"]
-fn coverage_of_forced_choices() {
-    let (_folder, study) = papers("forced-choice", "");
-    for within in [0.1, 0.25] {
-        // Forced choices measure the observer's own threshold: his showings are not part of the spread
-        let own = public(0.0, 0.02);
-        let (median, level95, ratio) = {
-            let truths: Vec<[f64; 2]> = (0..2).map(|t| [0.5, 0.95].map(|s| own.quantile(0, t, s))).collect();
-            let (mut median, mut level95, mut ratio) = (0, 0, 0.0);
-            for seed in 0..100 {
-                let (report, _) = simulated(&study, &public(within, 0.02), 33, seed);
-                for tile in &report.tiles {
-                    let holds = |i: Option<[f64; 2]>, t: f64| i.is_some_and(|[l, h]| l <= t && t <= h);
-                    median += i32::from(holds(tile.median_interval, truths[tile.tile][0]));
-                    level95 += i32::from(holds(tile.level95_interval, truths[tile.tile][1]));
-                    ratio += (tile.level95 / truths[tile.tile][1]).ln();
-                }
-            }
-            (median, level95, (ratio / 200.0).exp())
-        };
-        println!(
-            "forced choice, within {within}: median {:.1} %, 95 % level {:.1} %, ratio {ratio:.3}",
-            f64::from(median) / 2.0,
-            f64::from(level95) / 2.0
-        );
-    }
 }
 
 /// Root mean square error of single observers' ln(threshold), and clicks a tile.
@@ -130,9 +78,10 @@ fn precision(study: &Arc<Study>, public: &Public, observers: u64) -> (f64, f64) 
     ((squares / (2.0 * observers as f64)).sqrt(), clicks as f64 / (2.0 * observers as f64))
 }
 
-/// What a click is worth. On the paper's linear stack, observers whose threshold varies by a scale of 0.1 from showing to showing, and who slip in
-/// 2 % of their answers: the forced choice errs less than pointing does, with fewer clicks. Without slips the two are about equal: the table that
-/// `precision_of_both_protocols` prints. 100 observers with two tiles; seeded.
+/// What a click is worth. On the paper's linear stack, observers whose threshold varies by a scale of 0.1
+/// from showing to showing, and who slip in 2 % of their answers: the forced choice errs less than pointing
+/// does, with fewer clicks. Without slips the two are about equal: see `examples/precision.rs`. 100
+/// observers with two tiles; seeded.
 #[test]
 fn forced_choice_needs_fewer_clicks_for_the_same_precision() {
     let public = public(0.1, 0.02);
@@ -141,32 +90,8 @@ fn forced_choice_needs_fewer_clicks_for_the_same_precision() {
     let (_folder, choosing) = papers("forced-choice", "");
     let (choosing_error, choosing_clicks) = precision(&choosing, &public, 100);
     println!(
-        "pointing: {pointing_error:.3} with {pointing_clicks:.1} clicks; choosing: {choosing_error:.3} with {choosing_clicks:.1}"
+        "pointing: {pointing_error:.3} with {pointing_clicks:.1} clicks; \
+         choosing: {choosing_error:.3} with {choosing_clicks:.1}"
     );
     assert!(choosing_clicks < pointing_clicks && choosing_error < pointing_error);
-}
-
-/// The same for several slopes, lapses and stacks, for the guide.
-#[test]
-#[ignore = "prints a table for the guide"]
-fn precision_of_both_protocols() {
-    let geometric = levels(24, 1.35);
-    for (name, levels) in
-        [("linear, 100 levels", (1..=100).map(|i| 100 * i).collect()), ("geometric, 24 levels", geometric)]
-    {
-        for (within, lapse, bias) in [(0.1, 0.0, 0.0), (0.1, 0.02, 0.0), (0.25, 0.02, 0.0), (0.1, 0.02, 0.2)]
-        {
-            let public = Public { bias, ..public(within, lapse) };
-            let folder = Folder::new("acquisition", &["wall"], &levels, "");
-            let (error, clicks) = precision(&folder.study(), &public, 200);
-            println!(
-                "{name}, within {within}, lapse {lapse}, bias {bias}: pointing twice {error:.3} with {clicks:.1} clicks a tile"
-            );
-            for trials in [8, 12, 16, 24, 32, 48] {
-                let folder = Folder::new("forced-choice", &["wall"], &levels, &format!("trials = {trials}"));
-                let (error, clicks) = precision(&folder.study(), &public, 200);
-                println!("    forced choice {error:.3} with {clicks:.1}");
-            }
-        }
-    }
 }

@@ -1,7 +1,7 @@
 use crate::kit::{Folder, levels, public};
-use noisefloor_study::explore::{Explorer, Setup};
+use noisefloor_study::explore::{ExploreServer, ExploreSetup};
 use noisefloor_study::simulated::drive;
-use noisefloor_study::{Server, Study, store};
+use noisefloor_study::{Study, StudyServer, store};
 use std::io::{BufRead, BufReader};
 use std::process::{Command, Stdio};
 use std::sync::Arc;
@@ -11,14 +11,15 @@ use std::time::Duration;
 /// Names the study for [`serve_for_another_process`].
 pub(crate) const STUDY: &str = "NOISEFLOOR_TEST_STUDY";
 
-/// Not a test: the server, when another test starts this program again with a study. It prints its address, and runs until it is killed.
+/// Not a test: the server, when another test starts this program again with a study. It prints its address,
+/// and runs until it is killed.
 #[test]
 fn serve_for_another_process() {
     let Some(file) = std::env::var_os(STUDY) else { return };
     let study = Arc::new(Study::open(file).unwrap());
     let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build().unwrap();
     runtime.block_on(async {
-        let server = Server::bind(study, ([127, 0, 0, 1], 0).into(), &[]).await.unwrap();
+        let server = StudyServer::bind(study, ([127, 0, 0, 1], 0).into(), &[]).await.unwrap();
         println!("\nserving http://{}", server.address());
         server.run(std::future::pending()).await.unwrap();
     });
@@ -29,10 +30,10 @@ fn serve_for_another_process() {
 fn explore_for_another_process() {
     let Some(dir) = std::env::var_os(STUDY).map(std::path::PathBuf::from) else { return };
     let pictures = [100, 400, 1600].map(|spp| dir.join(format!("wall/{spp:05}.png"))).to_vec();
-    let setup = Setup { pictures, tile: 64, ..Setup::new(dir.join("explore.sqlite")) };
+    let setup = ExploreSetup { pictures, tile: 64, ..ExploreSetup::new(dir.join("explore.sqlite")) };
     let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build().unwrap();
     runtime.block_on(async {
-        let server = Explorer::bind(setup, ([127, 0, 0, 1], 0).into(), &[]).await.unwrap();
+        let server = ExploreServer::bind(setup, ([127, 0, 0, 1], 0).into(), &[]).await.unwrap();
         println!("\nserving http://{}", server.address());
         server.run(std::future::pending()).await.unwrap();
     });
@@ -58,8 +59,8 @@ pub(crate) fn start(what: &str, of: &std::path::Path) -> (std::process::Child, S
     (child, url.unwrap())
 }
 
-/// Killed (SIGKILL) while eight observers click, five times over: every event that was acknowledged is there afterwards, each once and in
-/// order, and at most one more a session, which was on its way.
+/// Killed (SIGKILL) while eight observers click, five times over: every event that was acknowledged is
+/// there afterwards, each once and in order, and at most one more a session, which was on its way.
 #[test]
 fn a_killed_server_has_lost_nothing() {
     let folder = Folder::new("acquisition", &["wall", "door"], &levels(40, 1.15), "");

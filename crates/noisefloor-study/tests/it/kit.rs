@@ -1,7 +1,7 @@
 use noisefloor_image::write_png;
-use noisefloor_study::explore::{Explorer, Setup};
+use noisefloor_study::explore::{ExploreServer, ExploreSetup};
 use noisefloor_study::simulated::Public;
-use noisefloor_study::{Server, Study};
+use noisefloor_study::{Study, StudyServer};
 use serde_json::Value;
 use std::io::{Read, Write};
 use std::net::{SocketAddr, TcpStream};
@@ -11,7 +11,8 @@ use std::thread::JoinHandle;
 use tempfile::TempDir;
 use tokio::sync::oneshot;
 
-/// A running mean of `spp` samples of a picture with texture: noise of variance 0.1/spp, uniform, from fixed seeds.
+/// A running mean of `spp` samples of a picture with texture: noise of variance 0.1/spp, uniform, from
+/// fixed seeds.
 pub(crate) fn picture(width: usize, height: usize, spp: u64) -> Vec<u8> {
     let mut random = fastrand::Rng::with_seed(spp);
     let amplitude = (3.0f64 * 0.1 / spp as f64).sqrt();
@@ -93,7 +94,7 @@ impl Running {
             let runtime =
                 tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build().unwrap();
             runtime.block_on(async {
-                let server = Server::bind(study, ([127, 0, 0, 1], 0).into(), &[]).await.unwrap();
+                let server = StudyServer::bind(study, ([127, 0, 0, 1], 0).into(), &[]).await.unwrap();
                 tell.send(server.address()).unwrap();
                 server.run(async { drop(stopped.await) }).await.unwrap();
             });
@@ -131,14 +132,14 @@ pub(crate) struct Served {
 }
 
 impl Served {
-    pub(crate) fn explorer(setup: Setup) -> Self {
+    pub(crate) fn explorer(setup: ExploreSetup) -> Self {
         let (stop, stopped) = oneshot::channel::<()>();
         let (tell, told) = std::sync::mpsc::channel();
         let thread = std::thread::spawn(move || {
             let runtime =
                 tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build().unwrap();
             runtime.block_on(async {
-                let server = Explorer::bind(setup, ([127, 0, 0, 1], 0).into(), &[]).await.unwrap();
+                let server = ExploreServer::bind(setup, ([127, 0, 0, 1], 0).into(), &[]).await.unwrap();
                 tell.send(server.address()).unwrap();
                 server.run(async { drop(stopped.await) }).await.unwrap();
             });

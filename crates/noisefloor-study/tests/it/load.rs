@@ -5,9 +5,9 @@ use noisefloor_study::store;
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
-/// Fifty observers who click as fast as they are answered, far faster than people do; a server in its own process. Measured, not
-/// checked against the clock, since other work on the machine would decide; `cargo test --release -- --ignored fifty --nocapture` prints
-/// the percentiles. What is checked: nothing is lost.
+/// Fifty observers who click as fast as they are answered, far faster than people do; a server in its own
+/// process. Measured, not checked against the clock, since other work on the machine would decide; `cargo
+/// test --release -- --ignored fifty --nocapture` prints the percentiles. What is checked: nothing is lost.
 #[test]
 #[ignore = "measures time: run it alone"]
 fn fifty_observers_at_once() {
@@ -41,7 +41,8 @@ fn fifty_observers_at_once() {
         let after: usize =
             store::read_all(&study.database, &study.design()).unwrap().iter().map(|r| r.events.len()).sum();
         println!(
-            "50 observers, {} ms between clicks: {} events in {seconds:.1} s ({:.0}/s), p50 {:.1} ms, p99 {:.1} ms, most {:.1} ms",
+            "50 observers, {} ms between clicks: {} events in {seconds:.1} s ({:.0}/s), \
+             p50 {:.1} ms, p99 {:.1} ms, most {:.1} ms",
             pause.as_millis(),
             times.len(),
             times.len() as f64 / seconds,

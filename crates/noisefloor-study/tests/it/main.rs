@@ -15,6 +15,9 @@ mod coverage;
 /// One's own pictures: verdicts, disagreements, and learning from them.
 #[cfg(test)]
 mod explore;
+/// Requests to the explorer that are refused.
+#[cfg(test)]
+mod explore_refusals;
 /// A server that is killed has lost nothing that it acknowledged.
 #[cfg(test)]
 mod kill;

@@ -1,10 +1,12 @@
 use crate::kit::{Folder, levels, public};
 use noisefloor_study::simulated::run;
-use noisefloor_study::{Choice, Conditions, Event, Outcome, Session, Stage, Trial, grids};
+use noisefloor_study::{
+    Choice, Conditions, ParticipantSession, Stage, StudyEvent, Trial, TrialOutcome, grids,
+};
 
 fn conditions() -> Conditions {
     let mut observer = public(1, &[1.0, 1.0]).draw(0);
-    let [_, Event::Conditions(conditions)] = ({
+    let [_, StudyEvent::Conditions(conditions)] = ({
         let _ = &mut observer;
         observer.arrive("en")
     }) else {
@@ -13,12 +15,12 @@ fn conditions() -> Conditions {
     conditions
 }
 
-fn begun(protocol: &str) -> (Folder, Session) {
+fn begun(protocol: &str) -> (Folder, ParticipantSession) {
     let folder = Folder::new(protocol, &["wall", "door"], &levels(6, 2.0), "");
     let study = folder.study();
-    let mut session = Session::new(study.clone(), grids(&study), 5);
-    session.apply(&Event::Consent { language: "en".into() }).unwrap();
-    session.apply(&Event::Conditions(conditions())).unwrap();
+    let mut session = ParticipantSession::new(study.clone(), grids(&study), 5);
+    session.apply(&StudyEvent::Consent { language: "en".into() }).unwrap();
+    session.apply(&StudyEvent::Conditions(conditions())).unwrap();
     (folder, session)
 }
 
@@ -31,8 +33,8 @@ fn each_pair_is_shown_twice_and_practice_does_not_count() {
         if !practice {
             shown.push(stack);
         }
-        session.apply(&Event::Step { trial: number, tile: 1, level: 1 }).unwrap();
-        session.apply(&Event::Done { trial: number }).unwrap();
+        session.apply(&StudyEvent::Step { trial: number, tile: 1, level: 1 }).unwrap();
+        session.apply(&StudyEvent::Done { trial: number }).unwrap();
     }
     shown.sort_unstable();
     assert_eq!(shown, [0, 0, 1, 1]);
@@ -41,12 +43,12 @@ fn each_pair_is_shown_twice_and_practice_does_not_count() {
         session
             .outcomes()
             .iter()
-            .all(|o| matches!(o, Outcome::Stops { levels, clicks: 1, .. } if levels == &[0, 1]))
+            .all(|o| matches!(o, TrialOutcome::Stops { levels, clicks: 1, .. } if levels == &[0, 1]))
     );
     let repeats: Vec<u32> = session
         .outcomes()
         .iter()
-        .map(|o| if let Outcome::Stops { repeat, .. } = o { *repeat } else { 9 })
+        .map(|o| if let TrialOutcome::Stops { repeat, .. } = o { *repeat } else { 9 })
         .collect();
     assert_eq!((repeats.iter().filter(|r| **r == 0).count(), repeats.iter().max()), (2, Some(&1)));
 }
@@ -54,17 +56,21 @@ fn each_pair_is_shown_twice_and_practice_does_not_count() {
 #[test]
 fn steps_are_reversible_and_one_at_a_time() {
     let (_folder, mut session) = begun("acquisition");
-    let step = |tile, level| Event::Step { trial: 0, tile, level };
+    let step = |tile, level| StudyEvent::Step { trial: 0, tile, level };
     for level in [1, 2, 1, 0, 1] {
         session.apply(&step(0, level)).unwrap();
     }
     let events = session.events();
-    for wrong in
-        [step(0, 3), step(0, 1), step(2, 1), step(0, u32::MAX), Event::Step { trial: 1, tile: 0, level: 2 }]
-    {
+    for wrong in [
+        step(0, 3),
+        step(0, 1),
+        step(2, 1),
+        step(0, u32::MAX),
+        StudyEvent::Step { trial: 1, tile: 0, level: 2 },
+    ] {
         assert!(session.apply(&wrong).is_err(), "{wrong:?}");
     }
-    assert!(session.apply(&Event::Answer { trial: 0, choice: Choice::First }).is_err());
+    assert!(session.apply(&StudyEvent::Answer { trial: 0, choice: Choice::First }).is_err());
     assert!(matches!(session.trial(), Some(Trial::Acquisition { levels, .. }) if levels == [1, 0]));
     assert_eq!(session.events(), events);
     // To the end of the stack and no further.
@@ -78,28 +84,31 @@ fn steps_are_reversible_and_one_at_a_time() {
 fn nothing_is_shown_before_consent_or_while_paused() {
     let folder = Folder::new("acquisition", &["wall"], &levels(4, 2.0), "");
     let study = folder.study();
-    let mut session = Session::new(study.clone(), grids(&study), 5);
+    let mut session = ParticipantSession::new(study.clone(), grids(&study), 5);
     assert_eq!(session.trial(), None);
-    assert!(session.apply(&Event::Conditions(conditions())).is_err());
-    assert!(session.apply(&Event::Step { trial: 0, tile: 0, level: 1 }).is_err());
-    assert!(session.apply(&Event::Consent { language: "fr".into() }).is_err(), "the study has no French");
-    session.apply(&Event::Consent { language: "en".into() }).unwrap();
-    assert!(session.apply(&Event::Consent { language: "en".into() }).is_err());
+    assert!(session.apply(&StudyEvent::Conditions(conditions())).is_err());
+    assert!(session.apply(&StudyEvent::Step { trial: 0, tile: 0, level: 1 }).is_err());
+    assert!(
+        session.apply(&StudyEvent::Consent { language: "fr".into() }).is_err(),
+        "the study has no French"
+    );
+    session.apply(&StudyEvent::Consent { language: "en".into() }).unwrap();
+    assert!(session.apply(&StudyEvent::Consent { language: "en".into() }).is_err());
     for (name, bad) in [
         ("zoomed", Conditions { zoom: 1.5, ..conditions() }),
         ("ratio", Conditions { pixel_ratio: 1.25, ..conditions() }),
         ("NaN", Conditions { distance_mm: f64::NAN, ..conditions() }),
         ("depth", Conditions { colour_depth: 16, ..conditions() }),
     ] {
-        assert!(session.apply(&Event::Conditions(bad)).is_err(), "{name}");
+        assert!(session.apply(&StudyEvent::Conditions(bad)).is_err(), "{name}");
     }
-    session.apply(&Event::Conditions(conditions())).unwrap();
-    assert!(session.apply(&Event::Resume).is_err());
-    session.apply(&Event::Pause).unwrap();
-    assert!(session.apply(&Event::Pause).is_err());
-    assert!(session.apply(&Event::Step { trial: 0, tile: 0, level: 1 }).is_err());
-    session.apply(&Event::Resume).unwrap();
-    session.apply(&Event::Step { trial: 0, tile: 0, level: 1 }).unwrap();
+    session.apply(&StudyEvent::Conditions(conditions())).unwrap();
+    assert!(session.apply(&StudyEvent::Resume).is_err());
+    session.apply(&StudyEvent::Pause).unwrap();
+    assert!(session.apply(&StudyEvent::Pause).is_err());
+    assert!(session.apply(&StudyEvent::Step { trial: 0, tile: 0, level: 1 }).is_err());
+    session.apply(&StudyEvent::Resume).unwrap();
+    session.apply(&StudyEvent::Step { trial: 0, tile: 0, level: 1 }).unwrap();
 }
 
 /// The same seed gives the same trials, another seed others; references are at the left as often as not.
@@ -108,7 +117,7 @@ fn order_depends_on_the_seed_alone() {
     let folder = Folder::new("validation", &["wall", "door"], &levels(6, 2.0), "repeats = 10");
     let study = folder.study();
     let answered = |seed| {
-        let mut session = Session::new(study.clone(), grids(&study), seed);
+        let mut session = ParticipantSession::new(study.clone(), grids(&study), seed);
         run(&mut session, &mut public(2, &[40.0, 40.0]).draw(1)).unwrap();
         format!("{:?}", session.outcomes())
     };

@@ -46,7 +46,8 @@ fn broken_pictures_are_found_before_anyone_looks() {
     assert!(folder.study().check_pictures().is_err(), "an EXR among PNGs");
 }
 
-/// Linear pictures are tone mapped by the exposure of the reference: twice the radiance everywhere is shown brighter, and not settled away.
+/// Linear pictures are tone mapped by the exposure of the reference: twice the radiance everywhere is shown
+/// brighter, and not settled away.
 #[test]
 fn linear_stacks_share_one_exposure() {
     let folder = Folder::new("acquisition", &["wall"], &levels(4, 2.0), "");

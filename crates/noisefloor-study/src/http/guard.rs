@@ -1,4 +1,5 @@
-//! What every request is checked for before anything looks at it: that it means this server, and comes from its own pages.
+//! What every request is checked for before anything looks at it: that it means this server, and comes from
+//! its own pages.
 
 use super::reply::Refusal;
 use axum::extract::{ConnectInfo, Request, State};
@@ -12,8 +13,8 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 /// Nothing but what the server itself sends may run, be shown or be asked.
-const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob:; connect-src 'self'; \
-    base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
+const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob:; \
+    connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 /// Wrong codes that one address may try in [`WINDOW`].
 const WRONG_CODES: u32 = 30;
 const WINDOW: Duration = Duration::from_secs(60);
@@ -45,7 +46,8 @@ impl Guard {
         Self { hosts, wrong: Mutex::default() }
     }
 
-    /// The Host header names this server. (A page elsewhere whose name was made to resolve to this machine sends its own.)
+    /// The Host header names this server. (A page elsewhere whose name was made to resolve to this machine
+    /// sends its own.)
     fn knows(&self, host: Option<&HeaderValue>) -> Option<String> {
         let host = host?.to_str().ok()?.to_lowercase();
         self.hosts.contains(&host).then_some(host)
@@ -136,7 +138,7 @@ fn foreign(guard: &Guard, peer: IpAddr, request: &Request) -> Option<Refusal> {
 }
 
 /// Headers of every answer.
-pub(crate) async fn head(request: Request, next: Next) -> Response {
+pub(crate) async fn security_headers(request: Request, next: Next) -> Response {
     let mut response = next.run(request).await;
     let headers = response.headers_mut();
     for (name, value) in [

@@ -1,7 +1,7 @@
 //! What is answered when a request is refused: JSON that says what, where, and what to do.
 
 use crate::error::StoreError;
-use crate::session::Misfit;
+use crate::session::EventMisfit;
 use axum::Json;
 use axum::http::StatusCode;
 use axum::response::{IntoResponse, Response};
@@ -53,7 +53,7 @@ impl Refusal {
     }
 
     /// An event that cannot have happened.
-    pub(crate) fn misfit(misfit: &Misfit, next: u64) -> Self {
+    pub(crate) fn misfit(misfit: &EventMisfit, next: u64) -> Self {
         let status = StatusCode::UNPROCESSABLE_ENTITY;
         let mut refusal =
             Self::new(status, misfit.to_string(), "event", "load the session again, and show what it says");

@@ -1,0 +1,14 @@
+//! What both servers share: connections within limits, checks of every request, and how refusals are worded.
+
+mod body;
+mod fallback;
+mod guard;
+mod listen;
+mod reply;
+
+pub(crate) use body::{read_bytes, read_json};
+pub(crate) use fallback::{nothing_here, wrong_method};
+pub(crate) use guard::{Guard, check, security_headers};
+pub(crate) use listen::Listening;
+pub use listen::interrupted;
+pub(crate) use reply::Refusal;

@@ -1,0 +1,10 @@
+//! One observer's way through a study: a state that events move on, and the trials it shows.
+
+mod plan;
+mod replay;
+mod state;
+mod trial;
+
+pub use replay::replay;
+pub use state::{EventMisfit, ParticipantSession, Stage, grids};
+pub use trial::{Class, Trial, TrialOutcome};
