@@ -4,8 +4,8 @@ use super::answers::Disagreements;
 use super::gallery::Gallery;
 use super::job::Job;
 use super::verdicts::Judged;
-use noisefloor_learn::Table;
 use noisefloor::{Audience, DEFAULT_TILE, Model};
+use noisefloor_learn::Table;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 

@@ -1,10 +1,10 @@
 //! Retraining in the background, one job at a time.
 
 use super::learn::{LearnStep, Learned, retrain};
-use noisefloor_learn::Table;
-use noisefloor_learn::TrainParams;
 use noisefloor::Model;
 use noisefloor_learn::Answer;
+use noisefloor_learn::Table;
+use noisefloor_learn::TrainParams;
 use serde::Serialize;
 use std::sync::{Arc, Mutex, PoisonError};
 

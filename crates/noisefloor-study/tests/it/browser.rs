@@ -1,9 +1,9 @@
 use crate::explore::table;
 use crate::kit::{Running, Served, levels, stack};
-use noisefloor_learn::{predict, score};
-use noisefloor_learn::{TrainParams, train};
 use noisefloor::{DEFAULT_THRESHOLD, Descriptor, Evidence};
 use noisefloor_learn::describe_corpora;
+use noisefloor_learn::{TrainParams, train};
+use noisefloor_learn::{predict, score};
 use noisefloor_study::analysis::CorpusThreshold;
 use noisefloor_study::analysis::files::write;
 use noisefloor_study::analysis::{AnalysisOptions, analyse};

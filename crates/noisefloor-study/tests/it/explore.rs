@@ -1,7 +1,7 @@
 use crate::kit::{Picturing, Served, stack};
-use noisefloor_learn::{Level, Origin, Table, Zone};
 use noisefloor::{Descriptor, Evidence, Held, Model, Oracle, Samples, Still, TileGrid, ToneMapping};
 use noisefloor_image::read_picture;
+use noisefloor_learn::{Level, Origin, Table, Zone};
 use noisefloor_study::explore::{Disagreements, ExploreSetup, read_answers, retrain};
 use serde_json::{Value, json};
 use std::path::Path;
