@@ -1,10 +1,12 @@
 //! EXR to linear RGB.
 //!
-//! Built on the block layer of the `exr` crate rather than on its image layer: so the size of every part is checked between
-//! header and pixels, only blocks of the part wanted are decoded, and the data window can be placed in the display window.
+//! Built on the block layer of the `exr` crate rather than on its image layer. This way sizes are checked
+//! after the header and before the pixels, only the blocks of one part are decoded, and the data window can
+//! be placed in the display window.
 
 use crate::error::PictureError;
-use crate::picture::{Format, LinearImage, Opened, check_size, guarded};
+use crate::open::{Format, Opened, check_size, guarded};
+use crate::picture::LinearImage;
 use exr::block::UncompressedBlock;
 use exr::block::reader::ChunksReader;
 use exr::meta::attribute::SampleType;
@@ -14,23 +16,31 @@ use noisefloor::Rgb;
 use std::collections::HashSet;
 use std::path::Path;
 
+/// Bytes of pixels that a byte of a file can stand for, in any compression: deflate reaches 1032:1, and PXR24
+/// leaves out every fourth byte besides. More is a lie, however the rest of the file looks.
+const MAX_EXPANSION: u64 = 1376;
+/// Pixels of black around a data window that every file may have; longer files may have more.
+const FREE_PIXELS: u64 = 1 << 24;
 /// Largest block (tile or group of scan lines, all channels) that is decompressed, in bytes.
 const MAX_BLOCK_BYTES: usize = 1 << 30;
 /// Most channels named in an error message.
 const NAMES_SHOWN: usize = 20;
 
-/// Reads the colours of an EXR: 16- or 32-bit floats, or unsigned integers, in any compression the `exr` crate reads.
+/// Reads the colours of an EXR: 16- or 32-bit floats, or unsigned integers, in any compression the `exr`
+/// crate supports.
 ///
-/// Of several parts and layers, the first that has R, G and B is read: in each part the unnamed one, then one named
-/// `Combined` (as in `ViewLayer.Combined.R`), then the first in alphabetical order. Without any, an unnamed Y alone is read as
-/// grey. Other channels, alpha among them, are left out; colour is as stored, that is premultiplied.
+/// Of several parts and layers, the first with R, G and B is read: in each part the unnamed one, then one
+/// named `Combined` (as in `ViewLayer.Combined.R`), then the first in alphabetical order. If there is none, a
+/// lone unnamed Y is read as grey. Other channels are ignored, alpha among them; colour is as stored, that
+/// is, premultiplied.
 ///
-/// The picture is the display window. Where the data window is smaller, pixels are black; where it is larger (overscan), it is
-/// cropped. Of mip maps, the full resolution is read. Non-finite values are kept. Chromaticities are taken for Rec.709.
+/// The picture is the display window. Where the data window is smaller, pixels are black; where it is larger
+/// (overscan), it is cropped. Of mip maps, the full resolution is read. Non-finite values are kept.
+/// Chromaticities are assumed to be Rec.709.
 ///
 /// # Errors
-/// [`PictureError`] if the file is not an EXR, too long, too large (known from the header), broken, has no colour channels, or
-/// holds deep or subsampled pixels.
+/// [`PictureError`] if the file is not an EXR, is too long, too large (by its header) or broken, has no
+/// colour channels, or holds deep or subsampled pixels.
 pub fn read_exr(path: impl AsRef<Path>) -> Result<LinearImage, PictureError> {
     let path = path.as_ref();
     let opened = Opened::open(path)?;
@@ -47,7 +57,7 @@ pub(crate) fn decode(path: &Path, opened: Opened) -> Result<LinearImage, Picture
 fn decode_unguarded(path: &Path, opened: Opened) -> Result<LinearImage, PictureError> {
     let broken = |reason: String| PictureError::Broken { path: path.to_owned(), format: "EXR", reason };
 
-    // Headers: which part, which channels, how large
+    // Headers: which part, which channels, how large; nothing that the file is too short for
     let most = opened.most_pixels;
     let reader = exr::block::read(opened.reader, false).map_err(|e| broken(e.to_string()))?;
     let choice = choose(path, reader.headers())?;
@@ -58,14 +68,21 @@ fn decode_unguarded(path: &Path, opened: Opened) -> Result<LinearImage, PictureE
         return Err(broken(format!("{} bytes cannot hold as many blocks as the header says", opened.bytes)));
     }
     let window = Window::of(path, &part, most)?;
+    let decoded = (part.layer_size.area() as u64).saturating_mul(part.channels.bytes_per_pixel.max(1) as u64);
+    let shown = (window.width * window.height) as u64;
+    let budget = opened.bytes.saturating_mul(MAX_EXPANSION);
+    if decoded > budget || shown > FREE_PIXELS.saturating_add(budget) {
+        let (width, height) = (window.width, window.height);
+        return Err(broken(format!("{} bytes cannot hold {width}×{height} pixels", opened.bytes)));
+    }
 
-    // Pixels start black, where memory for them is to be had
+    // Pixels start black, if there is memory for them
     let refused =
         |_| PictureError::Memory { path: path.to_owned(), width: window.width, height: window.height };
     Vec::<Rgb>::new().try_reserve_exact(window.width * window.height).map_err(refused)?;
     let mut pixels = vec![[0.0; 3]; window.width * window.height];
 
-    // Blocks, one after another in this thread: a panic of a decoder in a thread pool would end the process
+    // Blocks, one after another in this thread: a decoder that panics in a thread pool would end the process
     let wanted =
         move |block: exr::block::BlockIndex| block.layer == choice.part && block.level.0 + block.level.1 == 0;
     let chunks =
@@ -80,12 +97,12 @@ fn decode_unguarded(path: &Path, opened: Opened) -> Result<LinearImage, PictureE
         }
     }
     if area != part.layer_size.area() {
-        return Err(broken(format!("{area} of {} pixels are there", part.layer_size.area())));
+        return Err(broken(format!("it holds {area} of {} pixels", part.layer_size.area())));
     }
     Ok(LinearImage { width: window.width, height: window.height, pixels })
 }
 
-/// A part of the file, and the places of R, G and B in its list of channels.
+/// A part of the file, and the indices of R, G and B in its list of channels.
 #[derive(Clone, Copy)]
 struct Choice {
     part: usize,
@@ -106,7 +123,7 @@ fn choose(path: &Path, parts: &[Header]) -> Result<Choice, PictureError> {
     });
     let grey = || {
         names.iter().enumerate().find_map(|(part, names)| {
-            // With chroma or as one of three coordinates, Y alone is not the picture
+            // Beside chroma, or as one of three coordinates, Y is not the picture
             let alone = !names.iter().any(|name| ["RY", "BY", "X", "Z"].contains(&name.as_str()));
             let y = names.iter().position(|name| name == "Y").filter(|_| alone)?;
             Some(Choice { part, channels: [y; 3] })
@@ -126,7 +143,8 @@ fn choose(path: &Path, parts: &[Header]) -> Result<Choice, PictureError> {
     })
 }
 
-/// Prefixes of layers with a red channel, the likeliest picture first; the unnamed layer is the empty prefix.
+/// Prefixes of layers with a red channel, the most likely picture first; the unnamed layer has the empty
+/// prefix.
 fn layers(names: &[String]) -> Vec<&str> {
     let mut layers: Vec<&str> = names
         .iter()
@@ -190,7 +208,7 @@ impl Window {
     }
 }
 
-/// Copies the colours of one block to where the display window shows them.
+/// Copies the colours of one block to their place in the display window.
 fn place(
     block: &UncompressedBlock,
     part: &Header,
@@ -226,7 +244,7 @@ fn place(
             }
         }
 
-        // The part of the line inside the window
+        // The part of the line that is inside the window
         let row = &mut pixels[y as usize * window.width..][..window.width];
         let x = line.location.position.0 as i64 + window.x;
         let skip = usize::try_from(-x).unwrap_or(0);

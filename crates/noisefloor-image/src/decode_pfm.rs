@@ -1,7 +1,8 @@
 //! PFM to linear RGB.
 
 use crate::error::PictureError;
-use crate::picture::{Format, LinearImage, Opened, check_size};
+use crate::open::{Format, Opened, check_size};
+use crate::picture::LinearImage;
 use noisefloor::Rgb;
 use std::io::{BufRead, Read};
 use std::path::Path;
@@ -9,14 +10,14 @@ use std::path::Path;
 /// Longest header line in bytes.
 const MAX_LINE: u64 = 256;
 
-/// Reads a PFM: 32-bit floats, three a pixel (`PF`) or one (`Pf`, read as grey), of either byte order.
+/// Reads a PFM: 32-bit floats, three per pixel (`PF`) or one (`Pf`, read as grey), in either byte order.
 ///
-/// The header is three lines: the kind, width and height, and a number whose sign tells the byte order (negative is little-endian); its
-/// size, a scale that programs disagree on, is not applied. Rows are stored bottom first and turned over. Non-finite values are
-/// kept. Bytes after the last pixel are ignored.
+/// The header has three lines: the kind, width and height, and a number whose sign gives the byte order
+/// (negative is little-endian). Its magnitude, a scale that programs disagree on, is ignored. Rows are stored
+/// bottom first and returned top first. Non-finite values are kept. Bytes after the last pixel are ignored.
 ///
 /// # Errors
-/// [`PictureError`] if the file is not a PFM, too long, too large (known from the header) or broken.
+/// [`PictureError`] if the file is not a PFM, is too long, too large (by its header) or broken.
 pub fn read_pfm(path: impl AsRef<Path>) -> Result<LinearImage, PictureError> {
     let path = path.as_ref();
     let opened = Opened::open(path)?;
@@ -41,7 +42,7 @@ pub(crate) fn decode(path: &Path, mut opened: Opened) -> Result<LinearImage, Pic
         if bytes.pop() != Some(b'\n') {
             return Err(broken("a line of its header does not end"));
         }
-        String::from_utf8(bytes).map_err(|_| broken("its header is no text"))
+        String::from_utf8(bytes).map_err(|_| broken("its header is not text"))
     };
     let channels = if line()?.trim_end() == "PF" { 3 } else { 1 };
     let size = line()?;
@@ -51,11 +52,11 @@ pub(crate) fn decode(path: &Path, mut opened: Opened) -> Result<LinearImage, Pic
     };
     let scale: f64 = line()?.trim().parse().map_err(|_| broken("its third line is not a number"))?;
     if scale == 0.0 || scale.is_nan() {
-        return Err(broken("its third line tells no byte order"));
+        return Err(broken("its third line gives no byte order"));
     }
     check_size(path, (width, height), opened.most_pixels)?;
 
-    // Pixels, which the file has to be long enough for
+    // Pixels, if the file is long enough for them
     let bytes = width * height * channels * 4;
     if opened.bytes.saturating_sub(header as u64) < bytes as u64 {
         return Err(broken("it is too short for its size"));
@@ -67,7 +68,7 @@ pub(crate) fn decode(path: &Path, mut opened: Opened) -> Result<LinearImage, Pic
         if scale < 0.0 { f32::from_le_bytes(bytes) } else { f32::from_be_bytes(bytes) }
     };
     if data.len() < bytes {
-        return Err(broken("it became shorter while it was read"));
+        return Err(broken("it was shortened while it was read"));
     }
     let pixel = |at: usize| -> Rgb {
         if channels == 3 { [0, 1, 2].map(|c| value(3 * at + c)) } else { [value(at); 3] }

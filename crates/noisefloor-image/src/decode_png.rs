@@ -1,23 +1,25 @@
 //! PNG to display values.
 
 use crate::error::PictureError;
-use crate::picture::{DisplayImage, Format, Opened, check_size, guarded};
+use crate::open::{Format, Opened, check_size, guarded};
+use crate::picture::DisplayImage;
 use image::codecs::png::PngDecoder;
 use image::{DynamicImage, ImageDecoder, Limits};
 use std::path::Path;
 
 /// Memory for everything in a PNG that is not pixels: rows, profiles, text.
 const MAX_PNG_EXTRA: u64 = 256 << 20;
-/// Most pixels that a byte of a PNG can stand for: deflate packs at best 1032:1, and a pixel has at least one bit.
+/// Most pixels that a byte of a PNG can stand for: deflate reaches 1032:1, and a pixel has at least one bit.
 const PIXELS_A_BYTE: u64 = 1032 * 8;
 
 /// Reads a PNG as display values: sRGB-encoded RGB in 0…1, 8- or 16-bit codes divided by 255 or 65535.
 ///
-/// Grey becomes three equal values, a palette its colours. Alpha is dropped, not composited. Gamma, chromaticity and colour
-/// profile chunks are ignored: values are taken for sRGB. Of an animation, the first picture is read.
+/// Grey becomes three equal values; a palette is resolved. Alpha is dropped, not composited. Gamma,
+/// chromaticity and colour profile chunks are ignored: values are assumed to be sRGB. Of an animation, the
+/// first picture is read.
 ///
 /// # Errors
-/// [`PictureError`] if the file is not a PNG, too long, too large (known from the header) or broken.
+/// [`PictureError`] if the file is not a PNG, is too long, too large (by its header) or broken.
 pub fn read_png(path: impl AsRef<Path>) -> Result<DisplayImage, PictureError> {
     let path = path.as_ref();
     let opened = Opened::open(path)?;
@@ -30,7 +32,7 @@ pub fn read_png(path: impl AsRef<Path>) -> Result<DisplayImage, PictureError> {
 pub(crate) fn decode(path: &Path, opened: Opened) -> Result<DisplayImage, PictureError> {
     let broken = |reason: String| PictureError::Broken { path: path.to_owned(), format: "PNG", reason };
     guarded(path, "PNG", || {
-        // Header: size, and whether the file is long enough to hold so many pixels
+        // Header: the size, and whether the file is long enough to hold that many pixels
         let mut limits = Limits::no_limits();
         limits.max_alloc = Some(MAX_PNG_EXTRA);
         let decoder = PngDecoder::with_limits(opened.reader, limits).map_err(|e| broken(e.to_string()))?;

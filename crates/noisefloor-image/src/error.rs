@@ -1,4 +1,4 @@
-//! What can go wrong with files. Every message says what, where, and what to do.
+//! What can go wrong with picture files. Every message says what, where, and what to do.
 
 use noisefloor::TileError;
 use std::io;
@@ -7,8 +7,9 @@ use thiserror::Error;
 
 /// Why a picture could not be read.
 #[derive(Debug, Error)]
+#[non_exhaustive]
 pub enum PictureError {
-    /// The operating system gave no bytes.
+    /// The operating system could not read it.
     #[error("{}: cannot be read: {source}; check the path and its permissions", path.display())]
     Io {
         /// The file.
@@ -16,8 +17,8 @@ pub enum PictureError {
         /// What the system said.
         source: io::Error,
     },
-    /// The content is not of the format wanted.
-    #[error("{}: is {found}, not {wanted}; formats are told by content, not by name", path.display())]
+    /// Not the expected format.
+    #[error("{}: is {found}, not {wanted}; the content tells the format, not the name", path.display())]
     Foreign {
         /// The file.
         path: PathBuf,
@@ -27,7 +28,10 @@ pub enum PictureError {
         wanted: &'static str,
     },
     /// The file is longer than [`MAX_FILE_BYTES`](crate::MAX_FILE_BYTES).
-    #[error("{}: {bytes} bytes are more than the {limit} that are read; save fewer layers or a smaller image", path.display())]
+    #[error(
+        "{}: {bytes} bytes exceed the limit of {limit}; save fewer layers or a smaller image",
+        path.display()
+    )]
     Long {
         /// The file.
         path: PathBuf,
@@ -44,8 +48,11 @@ pub enum PictureError {
         /// The size, and the limits.
         source: TileError,
     },
-    /// More pixels than the reader takes; none was allocated.
-    #[error("{}: {width}×{height} pixels are more than the {most} that are taken here; crop the image", path.display())]
+    /// More pixels than the caller accepts; none was allocated.
+    #[error(
+        "{}: {width}×{height} pixels exceed the limit of {most} pixels here; crop the image",
+        path.display()
+    )]
     Large {
         /// The file.
         path: PathBuf,
@@ -56,8 +63,11 @@ pub enum PictureError {
         /// Most pixels.
         most: usize,
     },
-    /// The image is within the limits but memory for it was refused.
-    #[error("{}: no memory for {width}×{height} pixels; close other programs or use a smaller image", path.display())]
+    /// The image is within the limits, but its memory could not be allocated.
+    #[error(
+        "{}: no memory for {width}×{height} pixels; close other programs or use a smaller image",
+        path.display()
+    )]
     Memory {
         /// The file.
         path: PathBuf,
@@ -73,17 +83,20 @@ pub enum PictureError {
         path: PathBuf,
         /// `"EXR"`, `"PFM"` or `"PNG"`.
         format: &'static str,
-        /// What the decoder met.
+        /// What the decoder found.
         reason: String,
     },
     /// The EXR has no part with R, G and B, nor a luminance channel Y.
-    #[error("{}: no colour: channel {missing} is missing (it has {found}); save R, G and B, or Y alone for grey", path.display())]
+    #[error(
+        "{}: no colour: channel {missing} is missing (it has {found}); save R, G and B, or only Y for grey",
+        path.display()
+    )]
     Channels {
         /// The file.
         path: PathBuf,
         /// Names of the missing channels, comma-separated.
         missing: String,
-        /// Names of the channels there are, comma-separated, at most twenty.
+        /// Names of the existing channels, comma-separated, at most twenty.
         found: String,
     },
     /// A valid file that uses a feature this crate does not read.
@@ -98,11 +111,16 @@ pub enum PictureError {
     },
 }
 
-/// Why a file could not be written. What was there before is untouched.
+/// Why a file could not be written. An existing file is unchanged.
 #[derive(Debug, Error)]
+#[non_exhaustive]
 pub enum WriteError {
     /// The folder does not exist or is not writable.
-    #[error("{}: cannot write into folder {}: {source}; choose a folder that exists and that you may write to", path.display(), folder.display())]
+    #[error(
+        "{}: cannot write into folder {}: {source}; choose a folder that exists and is writable",
+        path.display(),
+        folder.display()
+    )]
     Folder {
         /// The file wanted.
         path: PathBuf,
@@ -112,13 +130,16 @@ pub enum WriteError {
         source: io::Error,
     },
     /// The path names something that a file must not replace.
-    #[error("{}: is not the name of a regular file; give a file name that is free or a file's", path.display())]
+    #[error("{}: is a folder or a device; choose another name", path.display())]
     NotAFile {
         /// The path wanted.
         path: PathBuf,
     },
-    /// Pixels and size do not agree, or the size is outside the limits.
-    #[error("{}: {what} holds {got} values, {width}×{height} pixels need {want}; pass one value a pixel", path.display())]
+    /// The number of values does not match the size.
+    #[error(
+        "{}: {what} holds {got} values, {width}×{height} pixels need {want}; pass one value per pixel",
+        path.display()
+    )]
     Size {
         /// The file wanted.
         path: PathBuf,
@@ -141,7 +162,17 @@ pub enum WriteError {
         /// The size, and the limits.
         source: TileError,
     },
-    /// Writing failed part of the way.
+    /// The image is empty, or larger than a PNG can be.
+    #[error("{}: a PNG cannot hold {width}×{height} pixels; each edge must be 1…2147483647", path.display())]
+    Png {
+        /// The file wanted.
+        path: PathBuf,
+        /// Width in pixels.
+        width: usize,
+        /// Height in pixels.
+        height: usize,
+    },
+    /// Writing failed half-way.
     #[error("{}: not written: {source}; check the space on the disk", path.display())]
     Failed {
         /// The file wanted.
@@ -151,8 +182,9 @@ pub enum WriteError {
     },
 }
 
-/// Why a folder is not a stack, or could not be played back.
+/// Why a folder is not a stack, or cannot be played back.
 #[derive(Debug, Error)]
+#[non_exhaustive]
 pub enum StackError {
     /// The folder cannot be listed.
     #[error("{}: cannot list the folder: {source}; check the path and its permissions", dir.display())]
@@ -163,19 +195,27 @@ pub enum StackError {
         source: io::Error,
     },
     /// No image in the folder is named as one of a stack.
-    #[error("{}: no stack here; name images by their samples per pixel (00100.png, 00100.exr) or batch_<first>_<last>.exr", dir.display())]
+    #[error(
+        "{}: no stack here; name images by their samples per pixel (00100.png, 00100.exr) \
+         or batch_<first>_<last>.exr",
+        dir.display()
+    )]
     Nothing {
         /// The folder.
         dir: PathBuf,
     },
     /// The folder holds images of both layouts.
-    #[error("{}: holds both running means and batch_*.exr; keep them in folders of their own", dir.display())]
+    #[error("{}: holds both running means and batch_*.exr; keep them in separate folders", dir.display())]
     Ambiguous {
         /// The folder.
         dir: PathBuf,
     },
     /// A name that does not say which samples are in the image.
-    #[error("{}: {why}; expected NNNNN.png or NNNNN.exr with at least 1 sample, or batch_<first>_<last>.exr with first < last", path.display())]
+    #[error(
+        "{}: {why}; expected NNNNN.png or NNNNN.exr with at least 1 sample, \
+         or batch_<first>_<last>.exr with first < last",
+        path.display()
+    )]
     Name {
         /// The file.
         path: PathBuf,
@@ -191,7 +231,11 @@ pub enum StackError {
         first: u64,
     },
     /// Samples are missing between two batches.
-    #[error("samples {from} to {to} are missing between {} and {}; add the batch or remove all after it", before.display(), after.display())]
+    #[error(
+        "samples {from} to {to} are missing between {} and {}; add the batch or remove all after it",
+        before.display(),
+        after.display()
+    )]
     Gap {
         /// The batch before the gap.
         before: PathBuf,
@@ -211,7 +255,11 @@ pub enum StackError {
         other: PathBuf,
     },
     /// An image differs in size from the rest of its stack.
-    #[error("{}: {got_width}×{got_height} pixels, but its stack has {width}×{height}; render it again at that size", path.display())]
+    #[error(
+        "{}: {got_width}×{got_height} pixels, but its stack has {width}×{height}; \
+         render it again at that size",
+        path.display()
+    )]
     Size {
         /// The image.
         path: PathBuf,
@@ -226,7 +274,8 @@ pub enum StackError {
     },
     /// A request for samples from the middle of a stored batch.
     #[error(
-        "no stored batch starts at sample {first}; a stack is played back from 0, batch by batch: {near} is the nearest start"
+        "no stored batch starts at sample {first}; a stack is played back batch by batch from 0: \
+         {near} is the nearest start"
     )]
     Boundary {
         /// The first sample asked for.
@@ -236,7 +285,8 @@ pub enum StackError {
     },
     /// A request for a tile that is not inside the image.
     #[error(
-        "a tile of {tile_width}×{tile_height} pixels at {x}, {y} is not inside the {width}×{height} image; cut tiles with a TileGrid of that size"
+        "a tile of {tile_width}×{tile_height} pixels at {x}, {y} is not inside the {width}×{height} image; \
+         cut tiles with a TileGrid of that size"
     )]
     Tile {
         /// Left edge in pixels.

@@ -1,4 +1,4 @@
-//! Which samples are in which file, told by names.
+//! Which samples are in which file, by file names.
 
 use crate::error::StackError;
 use std::path::{Path, PathBuf};
@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 pub(crate) enum Layout {
     /// `00100.png`: the mean of all samples so far.
     RunningMeans,
-    /// `batch_00060_00100.exr`: the mean of samples 61…100 alone.
+    /// `batch_00060_00100.exr`: the mean of samples 61…100 only.
     Batches,
 }
 
@@ -23,11 +23,11 @@ pub struct Frame {
     pub path: PathBuf,
 }
 
-/// The running means of a folder, by ascending samples; each frame starts where the one before it ends. Other files are
-/// left alone.
+/// The running means of a folder, by ascending samples; each frame starts where the previous one ends. Other
+/// files are ignored.
 ///
 /// # Errors
-/// [`StackError`] if the folder cannot be listed, has no running mean, or has two of the same samples.
+/// [`StackError`] if the folder cannot be listed, has no running mean, or has two of the same sample count.
 pub fn running_means(dir: &Path) -> Result<Vec<Frame>, StackError> {
     let mut frames = Vec::new();
     for path in files(dir)? {
@@ -52,10 +52,11 @@ pub fn running_means(dir: &Path) -> Result<Vec<Frame>, StackError> {
     if frames.is_empty() { Err(StackError::Nothing { dir: dir.to_owned() }) } else { Ok(frames) }
 }
 
-/// The batches of a folder, by ascending samples: from 0 on, without gap or overlap. Other files are left alone.
+/// The batches of a folder, by ascending samples: from 0, without gaps or overlaps. Other files are ignored.
 ///
 /// # Errors
-/// [`StackError`] if the folder cannot be listed, or a name does not say which samples are in the image, or samples are missing or doubled.
+/// [`StackError`] if the folder cannot be listed, a name does not say which samples are in the image, or
+/// samples are missing or overlap.
 pub fn batches(dir: &Path) -> Result<Vec<Frame>, StackError> {
     let mut frames = Vec::new();
     for path in files(dir)? {
@@ -88,7 +89,7 @@ pub fn batches(dir: &Path) -> Result<Vec<Frame>, StackError> {
     Ok(frames)
 }
 
-/// Which layout the names in a folder follow.
+/// Which layout the file names in a folder follow.
 pub(crate) fn detect(dir: &Path) -> Result<Layout, StackError> {
     let files = files(dir)?;
     let running = files.iter().any(|path| running_mean_name(path).is_some());

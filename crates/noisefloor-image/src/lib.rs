@@ -1,10 +1,12 @@
-//! Pictures in and out, and stacks of pictures on disk played back as a source of samples.
+//! Pictures on disk, and stacks of them played back as a source of samples.
 //!
-//! - [`read_picture`], [`read_exr`], [`read_pfm`], [`read_png`]: linear EXR and PFM and display-encoded PNG, told apart by content. Files are
-//!   hostile until parsed: sizes are checked before pixels are allocated, and a broken file is a [`PictureError`].
-//! - [`write_exr`], [`write_png`], [`write_atomic`], [`check_writable`]: files that appear whole or not at all.
+//! - [`read_picture`], [`read_exr`], [`read_pfm`], [`read_png`]: linear EXR and PFM, display-encoded PNG. The
+//!   content tells the format. Files may be hostile: sizes are checked before pixels are allocated, and a
+//!   broken file is a [`PictureError`].
+//! - [`write_exr`], [`write_png`], [`write_atomic`], [`check_writable`]: files that appear complete or not at
+//!   all.
 //! - [`StackSource`]: a folder of images as a [`noisefloor::ProgressiveSource`].
-//! - [`running_means`]: which samples are in which file of a stack, told by names.
+//! - [`running_means`], [`batches`]: which samples are in which file of a stack.
 //!
 //! Nothing here accumulates, tone maps or judges.
 //!
@@ -12,7 +14,7 @@
 //! use noisefloor::{ProgressiveSource, Request, TileGrid};
 //! use noisefloor_image::{RenderLayers, StackSource, write_exr};
 //!
-//! // Two running means of the same render: of the first 10 and of the first 40 samples.
+//! // Two running means of one render: of its first 10 and of its first 40 samples.
 //! let folder = tempfile::tempdir()?;
 //! for (spp, radiance) in [(10, 1.0), (40, 1.75)] {
 //!     let rgb = vec![[radiance; 3]; 16 * 16];
@@ -27,20 +29,26 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod atomic;
 mod decode_exr;
 mod decode_pfm;
 mod decode_png;
 mod error;
 mod frames;
+mod open;
 mod picture;
+mod read;
 mod stack;
 mod write;
 
+pub use atomic::{check_writable, write_atomic};
 pub use decode_exr::read_exr;
 pub use decode_pfm::read_pfm;
 pub use decode_png::read_png;
 pub use error::{PictureError, StackError, WriteError};
 pub use frames::{Frame, batches, running_means};
-pub use picture::{DisplayImage, LinearImage, MAX_FILE_BYTES, Picture, read_picture, read_picture_within};
+pub use open::MAX_FILE_BYTES;
+pub use picture::{DisplayImage, LinearImage, Picture};
+pub use read::{read_picture, read_picture_within};
 pub use stack::StackSource;
-pub use write::{RenderLayers, check_writable, write_atomic, write_exr, write_png};
+pub use write::{RenderLayers, write_exr, write_png};

@@ -3,7 +3,8 @@
 use crate::decode_exr::read_exr;
 use crate::error::StackError;
 use crate::frames::{self, Frame, Layout};
-use crate::picture::{LinearImage, read_picture};
+use crate::picture::LinearImage;
+use crate::read::read_picture;
 use noisefloor::{Batch, ProgressiveSource, Repeats, Request, Rgb, SourceError, SourceInfo, Tile, Unit};
 use std::collections::VecDeque;
 use std::path::Path;
@@ -12,20 +13,23 @@ use std::sync::Arc;
 /// Images kept in memory: a running mean and the one before it.
 const CACHED: usize = 2;
 
-/// A folder of images of one render, played back batch by batch. It samples nothing: it hands out what is stored.
+/// A folder of images of one render, played back batch by batch. Nothing is rendered: stored images are
+/// handed out.
 ///
 /// # Layouts
-/// - **Running means** ([`StackSource::open_running_means`]): `00050.png`, `00100.exr`, … named by their samples per pixel,
-///   nested, so that the mean of the new samples alone is (n₂·I₂ − n₁·I₁)/(n₂ − n₁) in linear light. PNGs are linearised
-///   first. The difference amplifies their quantisation by n₂/(n₂ − n₁): between 9,900 and 9,950 spp by about 200, so that
-///   such a batch says little by itself and may be negative. It is not clamped: summed up again, the batches give the stored
-///   images. A value that the PNG clipped at 1 comes out as 1, so noise on highlights is lost.
-/// - **Batches** ([`StackSource::open_batches`]): `batch_<first>_<last>.exr`, each the mean of samples `first`+1…`last` alone.
+/// - **Running means** ([`StackSource::open_running_means`]): `00050.png`, `00100.exr`, … named by their
+///   samples per pixel. They are nested, so the mean of the new samples is (n₂·I₂ − n₁·I₁)/(n₂ − n₁) in
+///   linear light; PNGs are linearised first. The difference amplifies their quantisation by n₂/(n₂ − n₁),
+///   about 200 between 9,900 and 9,950 spp: such a batch says little by itself and may be negative. It is not
+///   clamped, so that the sum of all batches is the stored image. A value that the PNG clipped at 1 comes out
+///   as 1: noise on highlights is lost.
+/// - **Batches** ([`StackSource::open_batches`]): `batch_<first>_<last>.exr`, each the mean of samples
+///   `first`+1…`last` only.
 ///
-/// # What a request gets
-/// The one stored batch that starts at [`Request::first`], with as many samples as it holds, whatever was asked for; an empty
-/// batch at the end of the stack; an error if no batch starts there. Single tiles can be asked for. Each image is decoded
-/// when it is first needed, and the last two are kept.
+/// # What a request returns
+/// The stored batch that starts at [`Request::first`], with all its samples, however many were requested; an
+/// empty batch at the end of the stack; an error if no batch starts there. Single tiles can be requested.
+/// Each image is decoded when first needed, and the last two are kept.
 #[derive(Debug)]
 pub struct StackSource {
     name: String,
@@ -37,10 +41,10 @@ pub struct StackSource {
 }
 
 impl StackSource {
-    /// Opens a folder of either layout, whichever its file names follow.
+    /// Opens a folder of either layout; its file names tell which.
     ///
     /// # Errors
-    /// [`StackError`] if they follow neither or both, or as of the two other constructors.
+    /// [`StackError`] if they follow neither or both, or as for the two other constructors.
     pub fn open(dir: impl AsRef<Path>) -> Result<Self, StackError> {
         match frames::detect(dir.as_ref())? {
             Layout::RunningMeans => Self::open_running_means(dir),
@@ -48,7 +52,8 @@ impl StackSource {
         }
     }
 
-    /// Opens a folder of running means, PNG or EXR, named by their samples per pixel. Reads the first of them.
+    /// Opens a folder of running means, PNG or EXR, named by their samples per pixel. Reads the first of
+    /// them.
     ///
     /// # Errors
     /// [`StackError`] if the folder has none, two claim the same count, or the first cannot be read.
@@ -60,8 +65,8 @@ impl StackSource {
     /// Opens a folder of `batch_<first>_<last>.exr`. Reads the first of them.
     ///
     /// # Errors
-    /// [`StackError`] if the folder has none, they leave a gap or overlap (both files are named), they do not start at sample
-    /// 0, or the first cannot be read.
+    /// [`StackError`] if the folder has none, they leave a gap or overlap (the error names both files), do
+    /// not start at sample 0, or the first cannot be read.
     pub fn open_batches(dir: impl AsRef<Path>) -> Result<Self, StackError> {
         let frames = frames::batches(dir.as_ref())?;
         Self::with(dir.as_ref(), Layout::Batches, frames)
@@ -80,12 +85,12 @@ impl StackSource {
         })
     }
 
-    /// Samples per pixel after each stored batch, ascending; the last is what the stack holds in all.
+    /// Samples per pixel after each stored batch, ascending; the last is the total of the stack.
     pub fn boundaries(&self) -> impl ExactSizeIterator<Item = u64> {
         self.frames.iter().map(|frame| frame.last)
     }
 
-    /// The image at a place of the stack, from memory or disk.
+    /// An image of the stack by its index, from memory or disk.
     fn image(&mut self, index: usize) -> Result<Arc<LinearImage>, StackError> {
         if let Some((_, image)) = self.cache.iter().find(|(cached, _)| *cached == index) {
             return Ok(Arc::clone(image));
@@ -121,7 +126,7 @@ impl StackSource {
             return Err(StackError::Boundary { first: request.first, near });
         };
 
-        // The first running mean, and every batch, holds the new samples alone
+        // The first running mean, and every batch, holds only new samples
         let (first, last) = (self.frames[index].first, self.frames[index].last);
         let old = match self.layout {
             Layout::RunningMeans if index > 0 => Some(self.image(index - 1)?),
@@ -169,7 +174,7 @@ impl ProgressiveSource for StackSource {
     }
 
     fn sample(&mut self, requests: &[Request]) -> Result<Vec<Batch>, SourceError> {
-        // In the order of the samples, so that tiles at different depths do not decode an image twice
+        // By sample order, so that tiles at different depths do not decode an image twice
         let mut order: Vec<usize> = (0..requests.len()).collect();
         order.sort_by_key(|&i| requests[i].first);
         let mut batches = Vec::with_capacity(requests.len());
@@ -186,7 +191,7 @@ impl ProgressiveSource for StackSource {
     }
 }
 
-/// A batch is linear by definition; a running mean may be what an observer's display got.
+/// Batches are linear by definition; running means may be display-encoded.
 fn read(layout: Layout, path: &Path) -> Result<LinearImage, StackError> {
     Ok(match layout {
         Layout::RunningMeans => read_picture(path)?.into_linear(),

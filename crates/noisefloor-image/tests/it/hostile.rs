@@ -1,5 +1,5 @@
-use crate::util::{f32s, make_exr};
-use exr::prelude::{Compression, FlatSamples, f16};
+use crate::util::{exr_claiming, f32s, make_exr};
+use exr::prelude::{Compression, FlatSamples, IntegerBounds, f16};
 use noisefloor_image::{RenderLayers, read_picture, write_exr, write_png};
 use proptest::prelude::*;
 use std::path::Path;
@@ -78,6 +78,28 @@ fn every_byte_of_a_header_may_be_wrong() {
             }
         }
     }
+}
+
+/// A short file does not make anybody allocate much: neither by many pixels of its own, nor by a wide black
+/// border.
+#[test]
+fn a_few_bytes_cannot_be_many_pixels() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("hostile.exr");
+    // One block of 65,536×16 pixels, whose offset is there
+    std::fs::write(&path, [exr_claiming(65_536, 16), vec![0; 8]].concat()).unwrap();
+    let error = read_picture(&path).unwrap_err().to_string();
+    assert!(error.contains("bytes cannot hold 65536×16 pixels"), "{error}");
+
+    let display = Some(IntegerBounds::new((0, 0), (16_384, 4096)));
+    let black = || vec![("R", f32s(&[1.0])), ("G", f32s(&[1.0])), ("B", f32s(&[1.0]))];
+    make_exr(&path, (1, 1), black(), Compression::Uncompressed, (0, 0), display);
+    let error = read_picture(&path).unwrap_err().to_string();
+    assert!(error.contains("bytes cannot hold 16384×4096 pixels"), "{error}");
+    // A border that many a cropped render has
+    let display = Some(IntegerBounds::new((0, 0), (3840, 2160)));
+    make_exr(&path, (1, 1), black(), Compression::Uncompressed, (0, 0), display);
+    assert_eq!(read_picture(&path).unwrap().size(), (3840, 2160));
 }
 
 proptest! {

@@ -51,7 +51,8 @@ fn running_means_give_the_batches_back() {
             assert_eq!((got.tile, u64::from(got.samples)), (tile, last - first));
             let want = tile.rows(SIZE.0).flat_map(|row| mean[row].to_vec());
             for (got, want) in got.mean.iter().flatten().zip(want.flatten()) {
-                // Running means are stored in f32: half an ulp of values up to 1600, times at most 100/70 + 30/70
+                // Running means are stored in f32: half an ulp of values up to 1600, times at most 100/70 +
+                // 30/70
                 assert!((got - want).abs() < 2e-3, "{got} {want}");
             }
         }

@@ -8,7 +8,8 @@ pub(crate) fn encoding(compression: Compression) -> Encoding {
     Encoding { compression, ..Encoding::UNCOMPRESSED }
 }
 
-/// Writes a one-part EXR with any channels; `at` is where the data window starts, `display` the display window if another.
+/// Writes a one-part EXR with any channels; `at` is where the data window starts, `display` the display
+/// window if another.
 pub(crate) fn make_exr(
     path: &Path,
     size: (usize, usize),

@@ -47,6 +47,17 @@ fn png_there_and_back() {
     assert_eq!(bytes, rgb);
 }
 
+/// A map of the widest image that can be judged has a margin around it.
+#[test]
+fn a_png_may_be_wider_than_an_image() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("stops.png");
+    let width = noisefloor::MAX_EDGE + 104;
+    write_png(&path, width, 2, &vec![7; width * 2 * 3]).unwrap();
+    let decoder = image::ImageReader::open(&path).unwrap();
+    assert_eq!(decoder.into_dimensions().unwrap(), (width as u32, 2));
+}
+
 #[test]
 fn wrong_lengths_are_errors() {
     let folder = tempfile::tempdir().unwrap();
@@ -60,6 +71,8 @@ fn wrong_lengths_are_errors() {
     let layers = RenderLayers { spp: Some(&[1]), ..RenderLayers::rgb(2, 2, &rgb) };
     assert!(matches!(write_exr(&path, &layers), Err(WriteError::Size { what: "spp", .. })));
     assert!(matches!(write_png(&path, 2, 2, &[0; 4]), Err(WriteError::Size { want: 12, .. })));
+    assert!(matches!(write_png(&path, 0, 2, &[]), Err(WriteError::Png { .. })));
+    assert!(matches!(write_png(&path, 1 << 31, 1, &[]), Err(WriteError::Png { .. })));
     assert_eq!(entries(folder.path()), 0);
 }
 

@@ -1,0 +1,100 @@
+//! Opening files that may be hostile: what the decoders share.
+
+use crate::error::PictureError;
+use noisefloor::check_image;
+use std::fs::File;
+use std::io::{BufReader, Read, Seek};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::Path;
+
+/// Longest file that is read, in bytes: enough for an EXR of [`noisefloor::MAX_PIXELS`] pixels in 32-bit
+/// floats.
+pub const MAX_FILE_BYTES: u64 = 1 << 32;
+
+/// The format that the first bytes announce.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Format {
+    Exr,
+    Pfm,
+    Png,
+    Empty,
+    Other,
+}
+
+/// A regular file of acceptable length and known format, positioned at its first byte.
+pub(crate) struct Opened {
+    pub(crate) reader: BufReader<File>,
+    pub(crate) bytes: u64,
+    pub(crate) format: Format,
+    /// Most pixels that are decoded.
+    pub(crate) most_pixels: usize,
+}
+
+impl Opened {
+    pub(crate) fn open(path: &Path) -> Result<Self, PictureError> {
+        let io = |source| PictureError::Io { path: path.to_owned(), source };
+
+        // Only regular files: a pipe or a device might block, or never end
+        let meta = std::fs::metadata(path).map_err(io)?;
+        if !meta.is_file() {
+            let (found, wanted) = ("a folder or a device", "a regular file");
+            return Err(PictureError::Foreign { path: path.to_owned(), found, wanted });
+        }
+        let bytes = meta.len();
+        if bytes > MAX_FILE_BYTES {
+            return Err(PictureError::Long { path: path.to_owned(), bytes, limit: MAX_FILE_BYTES });
+        }
+
+        let mut reader = BufReader::new(File::open(path).map_err(io)?);
+        let mut magic = Vec::with_capacity(8);
+        reader.by_ref().take(8).read_to_end(&mut magic).map_err(io)?;
+        reader.rewind().map_err(io)?;
+        let format = match magic.as_slice() {
+            [] => Format::Empty,
+            [0x76, 0x2f, 0x31, 0x01, ..] => Format::Exr,
+            [b'P', b'F' | b'f', b'\n' | b'\r', ..] => Format::Pfm,
+            [0x89, b'P', b'N', b'G', b'\r', b'\n', 0x1a, b'\n'] => Format::Png,
+            _ => Format::Other,
+        };
+        Ok(Self { reader, bytes, format, most_pixels: noisefloor::MAX_PIXELS })
+    }
+
+    pub(crate) fn foreign(&self, path: &Path, wanted: &'static str) -> PictureError {
+        let found = match self.format {
+            Format::Exr => "an OpenEXR file",
+            Format::Pfm => "a PFM file",
+            Format::Png => "a PNG file",
+            Format::Empty => "an empty file",
+            Format::Other => "something else",
+        };
+        PictureError::Foreign { path: path.to_owned(), found, wanted }
+    }
+}
+
+/// Checks a size from a header, before anything of that size is allocated.
+pub(crate) fn check_size(
+    path: &Path,
+    (width, height): (usize, usize),
+    most: usize,
+) -> Result<(), PictureError> {
+    check_image(width, height).map_err(|source| PictureError::Size { path: path.to_owned(), source })?;
+    if width * height > most {
+        return Err(PictureError::Large { path: path.to_owned(), width, height, most });
+    }
+    Ok(())
+}
+
+/// Runs a decoder of a library over bytes that may be hostile. If the decoder panics, the file counts as
+/// broken, and the program continues. (Known: exr 1.74 shifts and subtracts with overflow in corrupt B44
+/// blocks, in builds that check it.) No state outlives the call. The panic hook still runs, so a line appears
+/// on standard error. A program built with `panic = "abort"` loses this protection.
+pub(crate) fn guarded<T>(
+    path: &Path,
+    format: &'static str,
+    decode: impl FnOnce() -> Result<T, PictureError>,
+) -> Result<T, PictureError> {
+    catch_unwind(AssertUnwindSafe(decode)).unwrap_or_else(|_| {
+        let reason = "its decoder found a contradiction".to_owned();
+        Err(PictureError::Broken { path: path.to_owned(), format, reason })
+    })
+}

@@ -1,0 +1,31 @@
+//! Reading a picture in whichever format its first bytes announce.
+
+use crate::error::PictureError;
+use crate::open::{Format, Opened};
+use crate::picture::Picture;
+use crate::{decode_exr, decode_pfm, decode_png};
+use std::path::Path;
+
+/// Reads an EXR, PFM or PNG file. Its first bytes tell the format; its name does not matter.
+///
+/// # Errors
+/// Those of [`read_exr`](crate::read_exr), [`read_pfm`](crate::read_pfm) and [`read_png`](crate::read_png);
+/// [`PictureError::Foreign`] for any other format.
+pub fn read_picture(path: impl AsRef<Path>) -> Result<Picture, PictureError> {
+    read_picture_within(path, noisefloor::MAX_PIXELS)
+}
+
+/// [`read_picture`], limited to `most` pixels: a larger picture is refused before any pixel is allocated.
+///
+/// # Errors
+/// Those of [`read_picture`], and [`PictureError::Large`].
+pub fn read_picture_within(path: impl AsRef<Path>, most: usize) -> Result<Picture, PictureError> {
+    let path = path.as_ref();
+    let opened = Opened { most_pixels: most, ..Opened::open(path)? };
+    match opened.format {
+        Format::Exr => decode_exr::decode(path, opened).map(Picture::Linear),
+        Format::Pfm => decode_pfm::decode(path, opened).map(Picture::Linear),
+        Format::Png => decode_png::decode(path, opened).map(Picture::Display),
+        _ => Err(opened.foreign(path, "an OpenEXR, PFM or PNG file")),
+    }
+}
