@@ -3,7 +3,7 @@
 #![allow(clippy::print_stdout, reason = "an example prints")]
 
 use noisefloor::{Display, Driver, FixedSamples, NoiseMask, Oracle, Params, Rgb, Schedule, StopReason, Tile};
-use noisefloor_ptwne::{Options, Ptwne, scenes};
+use noisefloor_ptwne::{Ptwne, RenderOptions, scenes};
 use std::error::Error;
 
 const EDGE: usize = 64;
@@ -19,7 +19,7 @@ const SCENES: [&str; 3] = ["caustic", "keyhole", "glass-spheres"];
 
 fn source(scene: &str, seed: u64) -> Result<Ptwne, Box<dyn Error>> {
     let built_in = scenes::by_name(scene).ok_or("no such scene")?;
-    Ok(Ptwne::new(built_in, EDGE, EDGE, Options { seed, ..Options::default() })?)
+    Ok(Ptwne::new(built_in, EDGE, EDGE, RenderOptions { seed, ..RenderOptions::default() })?)
 }
 
 /// Deviation of the noise mask of the error of a tile, and the error of its mean, in 8-bit steps.

@@ -4,7 +4,7 @@
 #![allow(clippy::print_stdout, reason = "an example prints")]
 
 use noisefloor::{Driver, Oracle, Params, ProgressiveSource};
-use noisefloor_ptwne::{Options, Ptwne, scenes};
+use noisefloor_ptwne::{Ptwne, RenderOptions, scenes};
 use std::error::Error;
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::process::Command;
@@ -46,7 +46,7 @@ impl<S: ProgressiveSource> ProgressiveSource for Borrowed<'_, S> {
 
 fn source(scene: &str) -> Result<Ptwne, Box<dyn Error>> {
     let built_in = scenes::by_name(scene).ok_or("no such scene")?;
-    Ok(Ptwne::new(built_in, SIZE, SIZE, Options::default())?)
+    Ok(Ptwne::new(built_in, SIZE, SIZE, RenderOptions::default())?)
 }
 
 /// Bytes of memory the process holds.

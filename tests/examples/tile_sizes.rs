@@ -7,7 +7,7 @@ use noisefloor::{
     DEFAULT_TILE, Display, Driver, FixedSamples, NoiseMask, Oracle, Params, Rgb, Session, StoppingCriterion,
     luminance,
 };
-use noisefloor_ptwne::{Options, Ptwne, scenes};
+use noisefloor_ptwne::{Ptwne, RenderOptions, scenes};
 use std::error::Error;
 
 const EDGE: usize = 256;
@@ -85,7 +85,7 @@ fn render<C: StoppingCriterion>(
     max_samples: u64,
 ) -> Result<Session<C>, Box<dyn Error>> {
     let scene = scenes::by_name(name).ok_or_else(|| format!("no built-in scene {name:?}"))?;
-    let source = Ptwne::new(scene, EDGE, EDGE, Options { seed, ..Options::default() })?;
+    let source = Ptwne::new(scene, EDGE, EDGE, RenderOptions { seed, ..RenderOptions::default() })?;
     let mut driver = Driver::new(source, criterion, Params { tile, max_samples, ..Params::default() })?;
     driver.run(|_, _| ())?;
     Ok(driver.into_parts().1)

@@ -6,7 +6,9 @@ use indicatif::ProgressBar;
 use noisefloor::ProgressiveSource;
 use noisefloor_image::StackSource;
 use noisefloor_luxcore::{Engine, Sampler};
-use noisefloor_ptwne::{Counts, Estimator, Filter, Options, Ptwne, ReferenceNoise, Sampling, scenes};
+use noisefloor_ptwne::{
+    Estimator, Filter, Ptwne, ReferenceNoise, RenderOptions, SampleCounts, Sampling, scenes,
+};
 use noisefloor_scenefile::Loaded;
 use noisefloor_sidecar::{CommandOptions, CommandSource, Job, Renderer, Sidecar, SidecarError};
 use std::ops::ControlFlow;
@@ -57,7 +59,7 @@ const DEFAULT_DEPTH: u32 = 65;
 /// What the command asks of a source beside samples.
 pub trait Source: ProgressiveSource {
     /// What became of the samples, where the source counts it.
-    fn counts(&self) -> Option<Counts> {
+    fn counts(&self) -> Option<SampleCounts> {
         None
     }
 
@@ -76,7 +78,7 @@ pub trait Source: ProgressiveSource {
 }
 
 impl Source for Ptwne {
-    fn counts(&self) -> Option<Counts> {
+    fn counts(&self) -> Option<SampleCounts> {
         Some(Ptwne::counts(self))
     }
 
@@ -174,7 +176,7 @@ fn ptwne(args: &RendererArgs, scene: &str) -> anyhow::Result<Opened> {
     let Loaded { scene, size, max_depth, warnings } = load(scene)?;
     let (width, height) = args.size.or(size).unwrap_or(DEFAULT_SIZE);
     let name = scene.name().to_owned();
-    let options = Options {
+    let options = RenderOptions {
         seed: args.seed,
         max_depth: args.max_depth.or(max_depth).unwrap_or(DEFAULT_DEPTH),
         estimator: if args.no_mis { Estimator::NextEvents } else { Estimator::Mis },
@@ -188,7 +190,7 @@ fn ptwne(args: &RendererArgs, scene: &str) -> anyhow::Result<Opened> {
             Some(FilterChoice::Gaussian) => Filter::Gaussian,
         },
         clamp: args.clamp,
-        ..Options::default()
+        ..RenderOptions::default()
     };
     let source = Box::new(Ptwne::new(scene, width, height, options)?);
     let warnings = warnings.iter().map(ToString::to_string).collect();

@@ -3,7 +3,7 @@
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use noisefloor::{ProgressiveSource, Request, TileGrid};
-use noisefloor_ptwne::{Options, Ptwne, scenes};
+use noisefloor_ptwne::{Ptwne, RenderOptions, scenes};
 
 const SIZE: usize = 64;
 const SAMPLES: u32 = 4;
@@ -14,7 +14,7 @@ fn render(c: &mut Criterion) {
     for entry in scenes::list() {
         let Some(scene) = scenes::by_name(entry.name) else { continue };
         let (Ok(mut source), Ok(grid)) =
-            (Ptwne::new(scene, SIZE, SIZE, Options::default()), TileGrid::new(SIZE, SIZE, 32))
+            (Ptwne::new(scene, SIZE, SIZE, RenderOptions::default()), TileGrid::new(SIZE, SIZE, 32))
         else {
             continue;
         };
@@ -35,7 +35,7 @@ fn reference(c: &mut Criterion) {
     let mut group = c.benchmark_group("reference");
     group.sample_size(10).throughput(Throughput::Elements((SIZE * SIZE) as u64));
     let scene = scenes::by_name("cornell-box");
-    if let Some(Ok(mut source)) = scene.map(|s| Ptwne::new(s, SIZE, SIZE, Options::default())) {
+    if let Some(Ok(mut source)) = scene.map(|s| Ptwne::new(s, SIZE, SIZE, RenderOptions::default())) {
         group.bench_function("cornell-box", |b| b.iter(|| source.reference()));
     }
     group.finish();

@@ -2,7 +2,7 @@
 //! command of the project does this properly.
 
 use noisefloor::{ProgressiveSource, Request, Rgb, TileGrid};
-use noisefloor_ptwne::{Estimator, Options, Ptwne, scenes};
+use noisefloor_ptwne::{Estimator, Ptwne, RenderOptions, scenes};
 use std::error::Error;
 use std::time::Instant;
 
@@ -16,7 +16,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     eprint!("{name}: {} surfaces, {} lights", scene.surfaces(), scene.lights());
     let plain = rest.iter().any(|a| a == "plain");
     let estimator = if plain { Estimator::NextEvents } else { Estimator::Mis };
-    let mut source = Ptwne::new(scene, size, size, Options { estimator, ..Options::default() })?;
+    let mut source = Ptwne::new(scene, size, size, RenderOptions { estimator, ..RenderOptions::default() })?;
     let start = Instant::now();
     let mut image = vec![[0.0; 3]; size * size];
     if rest.iter().any(|a| a == "reference") {

@@ -1,11 +1,11 @@
-//! Choosing among many with given probabilities.
+//! Choosing one of many with given probabilities.
 
-/// Walker's alias table (Vose 1991): keep the column's own index below the threshold, else take its alias.
+/// Walker's alias table (Vose 1991): a column stands for itself below its threshold, else for its alias.
 #[derive(Clone, Debug)]
-pub(crate) struct Alias(Vec<(f32, u32)>);
+pub(crate) struct AliasTable(Vec<(f32, u32)>);
 
-impl Alias {
-    /// A table for weights ≥ 0; evenly if all are zero.
+impl AliasTable {
+    /// A table for weights ≥ 0; uniform if all are zero.
     pub(crate) fn new(weights: &[f64]) -> Self {
         let n = weights.len();
         let total: f64 = weights.iter().sum();
@@ -24,8 +24,8 @@ impl Alias {
         Self(table)
     }
 
-    /// An index, and what is left of the first number, uniform again. Both numbers are uniform in [0, 1); the second only
-    /// continues the first, whose 24 bits are too few for large tables. The table must not be empty.
+    /// An index, and the rest of the first number, which is uniform again. Both numbers are uniform in [0, 1); the
+    /// second only extends the first, whose 24 bits are too few for large tables. The table must not be empty.
     #[inline]
     pub(crate) fn choose(&self, u: f32, more: f32) -> (usize, f32) {
         let x = (f64::from(u) + f64::from(more) * 2f64.powi(-24)) * self.0.len() as f64;
@@ -37,7 +37,7 @@ impl Alias {
         } else {
             (alias as usize, (rest - threshold) / (1.0 - threshold))
         };
-        // Also false for NaN: nothing is above a threshold of one
+        // Also false for NaN, from a threshold of one
         (index, if rest < 1.0 { rest } else { 1.0 - f32::EPSILON })
     }
 }

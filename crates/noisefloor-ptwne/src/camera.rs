@@ -8,9 +8,9 @@ use crate::math::{Ray, Vec3};
 pub struct Camera {
     /// Position, in scene units.
     pub eye: [f32; 3],
-    /// The point that is seen in the middle of the image.
+    /// The point seen at the centre of the image.
     pub target: [f32; 3],
-    /// A direction that is upward in the image. Need not be perpendicular to the view, nor of length 1.
+    /// A direction that points up in the image. It need not be perpendicular to the view, or have length 1.
     pub up: [f32; 3],
     /// Vertical field of view in degrees, above 0 and below 180.
     pub vertical_fov: f32,
@@ -31,7 +31,7 @@ impl Camera {
         if across.length_squared() < 1e-10 { Err(SceneError::Camera) } else { Ok(()) }
     }
 
-    /// The camera at work on an image of `width`×`height` pixels, in coordinates that begin at `origin`.
+    /// The camera, prepared for an image of `width`×`height` pixels, in coordinates relative to `origin`.
     pub(crate) fn lens(&self, width: usize, height: usize, origin: Vec3) -> Lens {
         let eye = Vec3::from_array(self.eye);
         let view = (Vec3::from_array(self.target) - eye).normalize();
@@ -70,7 +70,7 @@ impl Lens {
         (self.eye, normals)
     }
 
-    /// The ray through (x, y) in pixels from the top left corner.
+    /// The ray through (x, y), in pixels from the top left corner.
     #[inline]
     pub(crate) fn ray(&self, x: f32, y: f32) -> Ray {
         Ray { origin: self.eye, dir: (self.corner + self.right * x + self.down * y).normalize() }

@@ -1,9 +1,11 @@
-//! What can be wrong with a scene or with a render's options.
+//! Errors of scenes and of render options.
 
+use std::error::Error as StdError;
 use thiserror::Error;
 
 /// Why a scene cannot be built.
 #[derive(Debug, Error, Clone, PartialEq)]
+#[non_exhaustive]
 pub enum SceneError {
     /// A number is not finite.
     #[error("{what} is not finite; every coordinate, colour and size must be")]
@@ -18,35 +20,35 @@ pub enum SceneError {
         what: &'static str,
         /// Its value.
         value: f32,
-        /// The range it must lie in, for people.
+        /// The range it must lie in, as text.
         range: &'static str,
     },
-    /// An index of a mesh points past the end of its vertices.
-    #[error("index {index} of a mesh with {vertices} vertices")]
+    /// An index of a mesh points past its last vertex.
+    #[error("a mesh with {vertices} vertices has the index {index}")]
     Index {
         /// The index.
         index: u32,
         /// Number of vertices.
         vertices: usize,
     },
-    /// Normals or texture coordinates do not go with the positions.
-    #[error("a mesh with {positions} positions has {found} {what}; give none, or one a position")]
+    /// The number of normals or texture coordinates differs from that of positions.
+    #[error("a mesh with {positions} positions has {found} {what}; give none, or one per position")]
     Lengths {
-        /// What there is too much or too little of.
+        /// What there are too many or too few of.
         what: &'static str,
         /// Number of positions.
         positions: usize,
         /// Number found.
         found: usize,
     },
-    /// An emitter has no area, so that its power is not defined.
+    /// An emitter has no area, and thus no power.
     #[error("an emitter has no area")]
     EmptyEmitter,
-    /// A material was made by another builder.
+    /// A material is of another builder.
     #[error("material {0} does not exist in this builder")]
     Material(u32),
-    /// An image texture has another number of pixels than its size says.
-    #[error("an image texture of {width}×{height} pixels has {found} values")]
+    /// The number of pixels of an image does not match its size, or is zero or too large.
+    #[error("an image of {width}×{height} pixels has {found} values")]
     Image {
         /// Width in pixels.
         width: usize,
@@ -55,18 +57,16 @@ pub enum SceneError {
         /// Number of values found.
         found: usize,
     },
-    /// The camera looks nowhere: eye and target coincide, or its up vector is parallel to the view.
-    #[error("the camera looks nowhere: eye and target coincide, or up is parallel to the view")]
+    /// The camera has no orientation: eye and target coincide, or its up vector is parallel to the view.
+    #[error("the camera has no orientation: eye and target coincide, or up is parallel to the view")]
     Camera,
-    /// Three rows are not those of a rotation.
-    #[error(
-        "the axes of an environment map are no rotation: each must have length 1, and stand upright on the others"
-    )]
+    /// The axes of an environment map are not those of a rotation.
+    #[error("the axes of an environment map must have length 1 and be perpendicular to each other")]
     Rotation,
     /// The scene has more of something than the limit allows.
     #[error("the scene has {found} {what}, more than {limit}")]
     TooLarge {
-        /// What there is too much of.
+        /// What there are too many of.
         what: &'static str,
         /// Number found.
         found: usize,
@@ -77,6 +77,7 @@ pub enum SceneError {
 
 /// Why a renderer cannot be made.
 #[derive(Debug, Error)]
+#[non_exhaustive]
 pub enum RenderError {
     /// The image is empty or too large.
     #[error(transparent)]
@@ -88,7 +89,7 @@ pub enum RenderError {
         name: &'static str,
         /// Its value.
         value: usize,
-        /// The range it must lie in, for people.
+        /// The range it must lie in, as text.
         range: &'static str,
     },
     /// The clamp is not a positive, finite radiance.
@@ -96,13 +97,13 @@ pub enum RenderError {
     Clamp(f32),
     /// Threads could not be started.
     #[error("threads could not be started")]
-    Threads(#[from] rayon::ThreadPoolBuildError),
-    /// Whoever watched it gave the reference up.
-    #[error("the reference was given up")]
-    GivenUp,
+    Threads(#[source] Box<dyn StdError + Send + Sync>),
+    /// The watcher of the reference cancelled it.
+    #[error("the reference was cancelled")]
+    Cancelled,
 }
 
-/// What can go wrong in a call of [`ProgressiveSource::sample`](noisefloor::ProgressiveSource::sample).
+/// A request outside the image.
 #[derive(Debug, Error)]
 #[error("tile {index} reaches to pixel ({right}, {bottom}) of an image of {width}×{height}")]
 pub(crate) struct OutsideError {

@@ -1,19 +1,20 @@
-//! How a pixel weighs the light around it.
+//! Reconstruction filters.
 
 use crate::math;
 
-/// A reconstruction filter. Positions of samples are drawn from it (Ernst, Stamminger, Greiner 2006, "Filter Importance
-/// Sampling"), so that each sample counts for one pixel, with the same weight as all others, and noise stays independent from
-/// pixel to pixel: the oracle judges it as it does that of a box. Neighbouring pixels see partly the same light; the picture is
-/// softer than with a box.
+/// A reconstruction filter. Sample positions are drawn from it (Ernst, Stamminger, Greiner 2006, "Filter Importance
+/// Sampling"). Each sample therefore counts for one pixel, with the same weight as all others, and noise stays independent
+/// from pixel to pixel: the oracle judges it as with a box. Neighbouring pixels partly see the same light, so that the
+/// picture is softer than with a box.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Filter {
-    /// The pixel itself, evenly.
+    /// Uniform over the pixel.
     #[default]
     Box,
-    /// A tent over two pixels in each direction.
+    /// A tent, two pixels wide.
     Tent,
-    /// A Gaussian with a standard deviation of half a pixel, cut off at two pixels from the middle.
+    /// A Gaussian with a standard deviation of half a pixel, cut off two pixels from the centre.
     Gaussian,
 }
 
@@ -22,7 +23,7 @@ const SIGMA: f32 = 0.5;
 const RADIUS: f32 = 2.0;
 
 impl Filter {
-    /// Where in units of pixels from the corner of the pixel a sample lies, for `u` uniform in the unit square.
+    /// The position of a sample relative to the corner of its pixel, in pixels, for `u` uniform in the unit square.
     #[inline]
     pub(crate) fn offset(self, u: [f32; 2]) -> [f32; 2] {
         match self {
@@ -41,7 +42,7 @@ impl Filter {
         }
     }
 
-    /// How far samples lie outside their pixel, at most.
+    /// The farthest that samples lie outside their pixel.
     pub(crate) fn reach(self) -> f32 {
         match self {
             Self::Box => 0.0,
@@ -55,7 +56,7 @@ impl Filter {
 mod tests {
     use super::*;
 
-    /// Mean and variance of the offsets, by midpoint rule: 1/12 of a pixel² for the box, 1/6 for the tent, 1/4 for the
+    /// Mean and variance of the offsets, by the midpoint rule: 1/12 pixel² for the box, 1/6 for the tent, 1/4 for the
     /// Gaussian, of which less than 1e-3 is cut off.
     #[test]
     fn offsets_have_the_filters_moments() {

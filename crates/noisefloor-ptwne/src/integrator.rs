@@ -1,106 +1,69 @@
 //! Path tracing with next event estimation.
 
 use crate::accel::{Hit, Stack};
-use crate::bsdf::{self, DELTA};
-use crate::material::{Kind, Paint};
-use crate::math::{self, Frame, Ray, Vec3, power_heuristic};
+use crate::bsdf;
+use crate::intersection::{Intersection, OpacityTest};
+use crate::light::LightSample;
+use crate::material::Bsdf;
+use crate::math::{self, DELTA, Frame, Ray, Vec3, power_heuristic};
 use crate::sampler::Sampler;
-use crate::scene::{Holes, Needs, Scene, Surface};
+use crate::scene::Scene;
 use std::f32::consts::FRAC_1_PI;
 
-/// What the integrator must know besides the scene.
+/// What the integrator needs to know besides the scene.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Settings {
-    /// Longest path, in segments: 1 is light seen directly, 2 is direct light.
+    /// Longest path, in segments: 1 is emitted light seen directly, 2 is direct light.
     pub(crate) max_depth: u32,
-    /// Number of segments from which on paths end by Russian roulette.
+    /// Number of segments from which Russian roulette may end paths.
     pub(crate) roulette: u32,
     pub(crate) estimator: Estimator,
 }
 
-/// How light finds its way into paths. All converge to the same picture.
+/// How paths find light. All estimators converge to the same picture.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Estimator {
-    /// By next events and by scattering, which share it by multiple importance sampling.
+    /// By next event estimation and by scattering, combined by multiple importance sampling.
     #[default]
     Mis,
-    /// By next events alone, as in Takouachet et al. 2017, §4.2: lights met by scattering count only after the camera, mirrors
-    /// and glass.
+    /// By next event estimation only (Takouachet et al. 2017, §4.2). Light that scattered rays hit counts only after
+    /// the camera, mirrors and glass.
     NextEvents,
-    /// By scattering alone. A check of the other two: lights without size, which cannot be met, are black, and small ones noise.
+    /// By scattering only. A check of the other two: lights without size, which no ray can hit, are black, and small
+    /// lights are noisy.
     BruteForce,
 }
 
-/// The radiance along a camera ray, sampled.
-pub(crate) type Sample = fn(&Scene, Settings, Ray, &mut Sampler, &mut Stack) -> Vec3;
+/// Samples the radiance along a camera ray.
+pub(crate) type SampleRadiance = fn(&Scene, Settings, Ray, &mut Sampler, &mut Stack) -> Vec3;
 
-// Needs as bits of a constant
-const TEXTURES: u8 = 1;
-const GLOSSY: u8 = 2;
-const SPECULAR: u8 = 4;
-const SKY: u8 = 8;
-const HOLES: u8 = 16;
-
-/// The integrator for scenes that have no more than this.
-pub(crate) fn integrator(needs: Needs) -> Sample {
-    const ALL: [Sample; 32] = [
-        radiance::<0>,
-        radiance::<1>,
-        radiance::<2>,
-        radiance::<3>,
-        radiance::<4>,
-        radiance::<5>,
-        radiance::<6>,
-        radiance::<7>,
-        radiance::<8>,
-        radiance::<9>,
-        radiance::<10>,
-        radiance::<11>,
-        radiance::<12>,
-        radiance::<13>,
-        radiance::<14>,
-        radiance::<15>,
-        radiance::<16>,
-        radiance::<17>,
-        radiance::<18>,
-        radiance::<19>,
-        radiance::<20>,
-        radiance::<21>,
-        radiance::<22>,
-        radiance::<23>,
-        radiance::<24>,
-        radiance::<25>,
-        radiance::<26>,
-        radiance::<27>,
-        radiance::<28>,
-        radiance::<29>,
-        radiance::<30>,
-        radiance::<31>,
-    ];
-    let Needs { textures, glossy, specular, sky, holes } = needs;
-    let bits = [(textures, TEXTURES), (glossy, GLOSSY), (specular, SPECULAR), (sky, SKY), (holes, HOLES)];
-    ALL[bits.iter().map(|(has, bit)| u8::from(*has) * bit).sum::<u8>() as usize]
+/// The integrator for scenes with or without partly transparent surfaces. It is compiled for both, since the test costs
+/// up to 8 %; code for textures, microfacets, mirrors and skies costs other scenes 0 to 4 %, and is always there
+/// (docs/benchmarks/renderer.md).
+pub(crate) fn integrator(opacity: bool) -> SampleRadiance {
+    if opacity { radiance::<true> } else { radiance::<false> }
 }
 
 /// One sample of the radiance along `ray` (Kajiya 1986; next event estimation: Shirley et al. 1996).
-fn radiance<const NEEDS: u8>(
+fn radiance<const OPACITY: bool>(
     scene: &Scene,
     settings: Settings,
     ray: Ray,
     sampler: &mut Sampler,
     stack: &mut Stack,
 ) -> Vec3 {
-    let seed = if NEEDS & HOLES != 0 { sampler.seed() } else { 0 };
-    Walk::<NEEDS> { scene, settings, sampler, stack, seed }.radiance(ray)
+    let seed = if OPACITY { sampler.seed() } else { 0 };
+    Path::<OPACITY> { scene, settings, sampler, stack, seed }.radiance(ray)
 }
 
 /// One path.
-struct Walk<'a, const NEEDS: u8> {
+struct Path<'a, const OPACITY: bool> {
     scene: &'a Scene,
     settings: Settings,
     sampler: &'a mut Sampler,
     stack: &'a mut Stack,
-    /// Of decisions about holes; another for each ray.
+    /// Seed of opacity tests; another one for each ray.
     seed: u64,
 }
 
@@ -112,46 +75,40 @@ struct Scattered {
     roulette: f32,
 }
 
-impl<'a, const NEEDS: u8> Walk<'a, NEEDS> {
+impl<'a, const OPACITY: bool> Path<'a, OPACITY> {
     #[inline(always)]
     fn radiance(&mut self, mut ray: Ray) -> Vec3 {
         let scene = self.scene;
         let mut sum = Vec3::ZERO;
         let mut throughput = Vec3::ONE;
-        // Density with which the ray's direction was chosen
-        let mut density = DELTA;
+        // Density with which the ray's direction was sampled
+        let mut pdf = DELTA;
         let mut depth = 0;
         loop {
             depth += 1;
             let hit = self.closest(&ray);
             if hit.is_miss() {
-                if NEEDS & SKY != 0 {
-                    sum += throughput
-                        * scene.beyond(ray.dir, |pdf, chance| self.met_weight(density, pdf * chance));
-                }
-                return sum;
+                return sum
+                    + throughput
+                        * scene.background(ray.dir, |light_pdf, pmf| self.hit_weight(pdf, light_pdf * pmf));
             }
-            let surface = self.surface(&ray, &hit);
+            let surface = scene.surface(&ray, &hit);
 
-            // Light met by scattering
-            let emitted = if NEEDS & TEXTURES != 0 {
-                scene.emitted::<true>(&surface, &hit, ray.dir)
-            } else {
-                scene.emitted::<false>(&surface, &hit, ray.dir)
-            };
-            if let Some((radiance, light, cos)) = emitted {
-                let aimed =
-                    if density == DELTA { 0.0 } else { light.pdf(ray.origin, hit.t, cos) * light.chance };
-                sum += throughput * radiance * self.met_weight(density, aimed);
+            // Light that the ray hit
+            if let Some(emitted) = scene.emitted(&surface, &hit, ray.dir) {
+                let light = emitted.light;
+                let light_pdf =
+                    if pdf == DELTA { 0.0 } else { light.pdf(ray.origin, hit.t, emitted.cos) * light.pmf };
+                sum += throughput * emitted.radiance * self.hit_weight(pdf, light_pdf);
             }
-            if depth >= self.settings.max_depth || surface.looks.one_sided && !surface.front {
+            if depth >= self.settings.max_depth || surface.material.one_sided && !surface.front {
                 return sum;
             }
 
             // Scatter: next event estimation, then a new direction
             let Some(next) = self.scatter(&ray, &surface, throughput, &mut sum) else { return sum };
             throughput *= next.weight;
-            density = next.pdf;
+            pdf = next.pdf;
 
             // Russian roulette (Arvo, Kirk 1990)
             if depth >= self.settings.roulette {
@@ -170,72 +127,59 @@ impl<'a, const NEEDS: u8> Walk<'a, NEEDS> {
 
     #[inline(always)]
     fn closest(&mut self, ray: &Ray) -> Hit {
-        if NEEDS & HOLES != 0 {
-            self.seed = self.seed.wrapping_add(1);
-            self.scene.closest::<true>(ray, self.stack, Holes::Drawn(self.seed))
-        } else {
-            self.scene.closest::<false>(ray, self.stack, Holes::Drawn(0))
-        }
+        let test = self.opacity_test();
+        self.scene.closest::<OPACITY>(ray, self.stack, test)
     }
 
     #[inline(always)]
     fn blocked(&mut self, ray: &Ray, distance: f32) -> bool {
-        if NEEDS & HOLES != 0 {
+        let test = self.opacity_test();
+        self.scene.blocked::<OPACITY>(ray, distance, self.stack, test)
+    }
+
+    #[inline(always)]
+    fn opacity_test(&mut self) -> OpacityTest {
+        if OPACITY {
             self.seed = self.seed.wrapping_add(1);
-            self.scene.blocked::<true>(ray, distance, self.stack, Holes::Drawn(self.seed))
-        } else {
-            self.scene.blocked::<false>(ray, distance, self.stack, Holes::Drawn(0))
         }
+        OpacityTest::Random(self.seed)
     }
 
+    /// The weight of light that a ray sampled with density `pdf` hit; next event estimation has density `light_pdf`
+    /// there.
     #[inline(always)]
-    fn surface(&self, ray: &Ray, hit: &Hit) -> Surface<'a> {
-        let scene = self.scene;
-        if NEEDS & TEXTURES != 0 { scene.surface::<true>(ray, hit) } else { scene.surface::<false>(ray, hit) }
-    }
-
-    /// Share of light met by scattering with `density` that counts; `aimed` is the density of next event estimation there.
-    #[inline(always)]
-    fn met_weight(&self, density: f32, aimed: f32) -> f32 {
+    fn hit_weight(&self, pdf: f32, light_pdf: f32) -> f32 {
         match self.settings.estimator {
-            _ if density == DELTA => 1.0,
-            Estimator::Mis => power_heuristic(density, aimed),
+            _ if pdf == DELTA => 1.0,
+            Estimator::Mis => power_heuristic(pdf, light_pdf),
             Estimator::NextEvents => 0.0,
             Estimator::BruteForce => 1.0,
         }
-    }
-
-    /// A colour of the surface.
-    #[inline(always)]
-    fn colour(&self, paint: &Paint, surface: &Surface<'_>) -> Vec3 {
-        if NEEDS & TEXTURES != 0 { paint.at::<true>(surface.uv) } else { paint.at::<false>(surface.uv) }
     }
 
     #[inline(always)]
     fn scatter(
         &mut self,
         ray: &Ray,
-        surface: &Surface<'a>,
+        surface: &Intersection<'a>,
         throughput: Vec3,
         sum: &mut Vec3,
     ) -> Option<Scattered> {
-        match &surface.looks.kind {
-            Kind::Diffuse { albedo } => {
-                let albedo = self.colour(albedo, surface);
-                self.diffuse(albedo, surface, throughput, sum)
-            }
-            Kind::Metal { .. } | Kind::Plastic { .. } | Kind::Blend { .. } if NEEDS & GLOSSY != 0 => {
+        match &surface.material.bsdf {
+            Bsdf::Diffuse { albedo } => self.diffuse(albedo.at(surface.uv), surface, throughput, sum),
+            Bsdf::Metal { .. } | Bsdf::Plastic { .. } | Bsdf::Blend { .. } => {
                 self.glossy(ray, surface, throughput, sum)
             }
-            _ if NEEDS & SPECULAR != 0 => Some(self.specular(ray, surface)),
-            _ => None,
+            Bsdf::Mirror { .. } | Bsdf::Glass { .. } | Bsdf::ThinGlass { .. } => {
+                Some(self.specular(ray, surface))
+            }
         }
     }
 
-    /// Light from a point of a light that the surface sees: radiance over density, times what `weigh` says for the direction and
-    /// its density; zero if nothing is scattered there. The ray is then not traced.
+    /// Next event estimation: radiance over density from a point on a light, times what `scattered` returns for the
+    /// direction and its density. No shadow ray is traced if that is zero.
     #[inline(always)]
-    fn next_event(&mut self, surface: &Surface<'_>, weigh: impl FnOnce(Vec3, f32) -> Vec3) -> Vec3 {
+    fn next_event(&mut self, surface: &Intersection<'_>, scattered: impl FnOnce(Vec3, f32) -> Vec3) -> Vec3 {
         let scene = self.scene;
         if scene.lights.all.is_empty() || self.settings.estimator == Estimator::BruteForce {
             return Vec3::ZERO;
@@ -243,26 +187,21 @@ impl<'a, const NEEDS: u8> Walk<'a, NEEDS> {
         let [pick, u, v, more] = self.sampler.four();
         let Some(light) = scene.lights.choose(pick, more) else { return Vec3::ZERO };
         let origin = scene.leave(surface, surface.flat);
-        let point = [u, v, more];
-        let aim = if NEEDS & TEXTURES != 0 {
-            scene.aim::<true>(light, origin, point)
-        } else {
-            scene.aim::<false>(light, origin, point)
+        let sample = scene.sample_light(light, origin, [u, v, more]);
+        let Some(LightSample { dir, distance, value, pdf, .. }) =
+            sample.filter(|sample| sample.dir.dot(surface.flat) > 0.0)
+        else {
+            return Vec3::ZERO;
         };
-        let Some(aim) = aim.filter(|aim| aim.dir.dot(surface.flat) > 0.0) else { return Vec3::ZERO };
-        let mut share = weigh(aim.dir, aim.pdf * light.chance) * aim.value / light.chance;
-        // Also false for NaN: a density beyond the range of f32 is no light
-        if !(share.max_element() > 0.0 && share.max_element() < f32::MAX) {
+        let light_sum = scattered(dir, pdf * light.pmf) * value / light.pmf;
+        // Also false for NaN: a density beyond the range of f32 carries no light
+        if !(light_sum.max_element() > 0.0 && light_sum.max_element() < f32::MAX) {
             return Vec3::ZERO;
         }
-        let shadow = Ray { origin, dir: aim.dir };
-        if self.blocked(&shadow, aim.distance * 0.9999) {
+        if self.blocked(&Ray { origin, dir }, distance * 0.9999) {
             return Vec3::ZERO;
         }
-        if NEEDS & SKY != 0 {
-            share *= scene.revealed(light, aim.dir);
-        }
-        share
+        light_sum * scene.deferred_radiance(light, dir)
     }
 
     /// Lambertian reflection.
@@ -270,22 +209,22 @@ impl<'a, const NEEDS: u8> Walk<'a, NEEDS> {
     fn diffuse(
         &mut self,
         albedo: Vec3,
-        surface: &Surface<'a>,
+        surface: &Intersection<'a>,
         throughput: Vec3,
         sum: &mut Vec3,
     ) -> Option<Scattered> {
         let mis = self.settings.estimator == Estimator::Mis;
         *sum += throughput
             * self.next_event(surface, |dir, pdf| {
-                let scattering = dir.dot(surface.normal).max(0.0) * FRAC_1_PI;
-                let weight = if mis { power_heuristic(pdf, scattering) } else { 1.0 };
-                albedo * (scattering * weight)
+                let lambert = dir.dot(surface.normal).max(0.0) * FRAC_1_PI;
+                let weight = if mis { power_heuristic(pdf, lambert) } else { 1.0 };
+                albedo * (lambert * weight)
             });
         let [u, v, roulette, _] = self.sampler.four();
         let local = math::cosine_hemisphere([u, v]);
         let dir = Frame::new(surface.normal).to_world(local);
-        // A shading normal can send the ray below the surface: no light from there
-        if NEEDS & TEXTURES != 0 && dir.dot(surface.flat) <= 0.0 {
+        // A shading normal can send the ray below the surface, where no light comes from
+        if dir.dot(surface.flat) <= 0.0 {
             return None;
         }
         Some(Scattered { dir, weight: albedo, pdf: local.z * FRAC_1_PI, roulette })
@@ -296,19 +235,18 @@ impl<'a, const NEEDS: u8> Walk<'a, NEEDS> {
     fn glossy(
         &mut self,
         ray: &Ray,
-        surface: &Surface<'a>,
+        surface: &Intersection<'a>,
         throughput: Vec3,
         sum: &mut Vec3,
     ) -> Option<Scattered> {
         let frame = Frame::new(surface.normal);
         let wo = frame.to_local(-ray.dir);
-        let glossy =
-            if NEEDS & TEXTURES != 0 { surface.glossy::<true>(wo.z) } else { surface.glossy::<false>(wo.z) }?;
+        let glossy = surface.glossy(wo.z)?;
         let mis = self.settings.estimator == Estimator::Mis;
         *sum += throughput
             * self.next_event(surface, |dir, pdf| {
-                let (f_cos, scattering) = glossy.eval(wo, frame.to_local(dir));
-                f_cos * if mis { power_heuristic(pdf, scattering) } else { 1.0 }
+                let (f_cos, bsdf_pdf) = glossy.eval(wo, frame.to_local(dir));
+                f_cos * if mis { power_heuristic(pdf, bsdf_pdf) } else { 1.0 }
             });
         let [pick, u, v, roulette] = self.sampler.four();
         let (wi, weight, pdf) = glossy.sample(wo, [pick, u, v])?;
@@ -319,14 +257,14 @@ impl<'a, const NEEDS: u8> Walk<'a, NEEDS> {
         Some(Scattered { dir: dir.normalize(), weight, pdf, roulette })
     }
 
-    /// Mirror and glass. Glass chooses reflection with the probability of its Fresnel term.
+    /// Mirrors and glass. Glass reflects with the probability of its Fresnel term.
     #[inline(never)]
-    fn specular(&mut self, ray: &Ray, surface: &Surface<'a>) -> Scattered {
+    fn specular(&mut self, ray: &Ray, surface: &Intersection<'a>) -> Scattered {
         let n = surface.normal;
         let cos = (-ray.dir.dot(n)).clamp(0.0, 1.0);
         let [pick, roulette, ..] = self.sampler.four();
-        let (dir, weight) = match &surface.looks.kind {
-            Kind::Glass { ior, tint } => {
+        let (dir, weight) = match &surface.material.bsdf {
+            Bsdf::Glass { ior, tint } => {
                 let eta = if surface.front { *ior } else { 1.0 / ior };
                 let (reflectance, cos_t) = bsdf::fresnel(cos, eta);
                 if pick < reflectance {
@@ -335,15 +273,15 @@ impl<'a, const NEEDS: u8> Walk<'a, NEEDS> {
                     (bsdf::refract(ray.dir, n, cos, cos_t, eta), *tint)
                 }
             }
-            Kind::ThinGlass { ior, tint } => {
+            Bsdf::ThinGlass { ior, tint } => {
                 if pick < bsdf::pane(cos, *ior) {
                     (math::reflect(ray.dir, n), Vec3::ONE)
                 } else {
                     (ray.dir, *tint)
                 }
             }
-            Kind::Mirror { fresnel, colour } => {
-                (math::reflect(ray.dir, n), fresnel.at(self.colour(colour, surface), cos))
+            Bsdf::Mirror { fresnel, colour } => {
+                (math::reflect(ray.dir, n), fresnel.at(colour.at(surface.uv), cos))
             }
             _ => (ray.dir, Vec3::ZERO),
         };

@@ -1,19 +1,19 @@
-//! The reference renderer of `noisefloor`: path tracing with next event estimation (Shirley et al. 1996; Takouachet et al.
-//! 2017, §4.2), and the quick ray-traced reference (§4.3). It opens no files.
+//! The reference renderer of `noisefloor`: path tracing with next event estimation (Shirley et al. 1996; Takouachet et
+//! al. 2017, §4.2), and the ray-traced reference of the paper (§4.3). It opens no files.
 //!
-//! - [`Ptwne`] renders a [`Scene`] as a [`ProgressiveSource`](noisefloor::ProgressiveSource); [`Options`] say how
-//! - [`scenes`] has scenes ready to render; [`SceneBuilder`] makes others from a [`Mesh`], a [`Material`], an [`Emission`], an
-//!   [`Environment`], a [`Camera`]
-//! - [`SceneError`] and [`RenderError`] say what was wrong: no input panics
+//! - [`Ptwne`] renders a [`Scene`] as a [`ProgressiveSource`](noisefloor::ProgressiveSource), as [`RenderOptions`] says.
+//! - [`scenes`] has scenes ready to render. [`SceneBuilder`] makes others of [`Mesh`], [`Material`], [`Emission`],
+//!   [`Environment`] and [`Camera`].
+//! - [`SceneError`] and [`RenderError`] report invalid input. No input panics.
 //!
-//! Units: scene units are the caller's own, +y is up for skies, colours are linear Rec.709 RGB, angles are in degrees.
+//! Scene units are the caller's, skies have +y up, colours are linear Rec.709 RGB, and angles are in degrees.
 //!
 //! ```
 //! use noisefloor::{ProgressiveSource, Request, TileGrid};
-//! use noisefloor_ptwne::{Options, Ptwne, scenes};
+//! use noisefloor_ptwne::{Ptwne, RenderOptions, scenes};
 //!
 //! let scene = scenes::by_name("cornell-box").ok_or("no such scene")?;
-//! let mut source = Ptwne::new(scene, 64, 64, Options { seed: 7, ..Options::default() })?;
+//! let mut source = Ptwne::new(scene, 64, 64, RenderOptions { seed: 7, ..RenderOptions::default() })?;
 //! let requests: Vec<_> =
 //!     TileGrid::new(64, 64, 32)?.tiles().map(|tile| Request { tile, first: 0, samples: 4 }).collect();
 //! let batches = source.sample(&requests)?;
@@ -22,24 +22,30 @@
 //! ```
 //!
 //! # Where things are
-//! Light transport is in `integrator`, scattering in `bsdf`, emitters in `light`, rays meeting surfaces in `accel`, random
-//! numbers in `rng`, the reference in `reference`, its samples in `direct`, its choice of lights in `guide`. What is absent: state between samples, allocation along paths, and any
-//! number that depends on threads.
+//! `integrator` traces paths, `bsdf` scatters light, `light` samples emitters, `illumination` and `intersection` are what
+//! a scene answers them, and `accel` is its hierarchy. The reference is in `reference`, its samples in `direct`, and its
+//! choice of lights in `guide`. `builder` fills `parts`, of which `scene` is made. Absent on purpose: state between
+//! samples, allocation along paths, and any number that depends on threads.
 
 mod accel;
 mod alias;
 mod bsdf;
 mod builder;
 mod camera;
+mod checks;
 mod direct;
 mod environment;
 mod error;
 mod filter;
+mod geometry;
 mod guide;
+mod illumination;
 mod integrator;
+mod intersection;
 mod light;
 mod material;
 mod math;
+mod parts;
 mod reference;
 mod renderer;
 mod rng;
@@ -48,18 +54,20 @@ mod scene;
 pub mod scenes;
 mod texture;
 
-pub use builder::{Emission, MAX_COORDINATE, MAX_SURFACES, MIN_AREA, MaterialId, Mesh, SceneBuilder};
+pub use bsdf::MIN_ROUGHNESS;
+pub use builder::{Emission, MAX_SURFACES, MIN_AREA, MaterialId, Mesh, SceneBuilder};
 pub use camera::Camera;
+pub use checks::MAX_COORDINATE;
 pub use environment::{Environment, EnvironmentMap, Sun};
 pub use error::{RenderError, SceneError};
 pub use filter::Filter;
 pub use integrator::Estimator;
 pub use light::Punctual;
-pub use material::{Cover, MIN_ROUGHNESS, Material};
+pub use material::{Material, MaterialOptions};
 pub use reference::ReferenceNoise;
-pub use renderer::{Counts, MAX_DEPTH, MAX_THREADS, Options, Ptwne};
+pub use renderer::{MAX_DEPTH, MAX_THREADS, Ptwne, RenderOptions, SampleCounts};
 pub use sampler::Sampling;
-pub use scene::{Needs, Scene};
+pub use scene::Scene;
 pub use texture::{ImageTexture, MAX_TEXTURE_PIXELS, Pixels, Texture, Wrap};
 
 #[cfg(doctest)]

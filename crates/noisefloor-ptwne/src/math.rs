@@ -1,9 +1,12 @@
-//! Vectors and the classic mappings of the unit square. Units: directions are of length 1, angles in radians.
+//! Vectors, and the classic mappings of the unit square. Directions have length 1; angles are in radians.
 
 use std::f32::consts::{FRAC_1_PI, PI};
 
-/// The vector of the renderer: positions, directions and RGB.
+/// Positions, directions and RGB.
 pub(crate) type Vec3 = glam::Vec3A;
+
+/// Stands for the density of a direction that no other technique can sample: mirrors, glass, camera rays.
+pub(crate) const DELTA: f32 = f32::INFINITY;
 
 /// A ray; `dir` has length 1.
 #[derive(Clone, Copy, Debug)]
@@ -44,10 +47,10 @@ impl Frame {
     }
 }
 
-/// The largest whole number that is not above `x`. Without SSE4.1 the library's is a call.
+/// The largest integer not above `x`. The library's is a function call without SSE4.1.
 #[inline]
 pub(crate) fn floor(x: f32) -> f32 {
-    // From 2²³ on all numbers are whole
+    // All numbers from 2²³ on are integers
     if x.abs() < 8_388_608.0 {
         let towards_zero = x as i32 as f32;
         if towards_zero > x { towards_zero - 1.0 } else { towards_zero }
@@ -56,8 +59,8 @@ pub(crate) fn floor(x: f32) -> f32 {
     }
 }
 
-/// Sine and cosine of 2π·u for u in [0, 1]: polynomials after a fold to an eighth of a turn, absolute error below 1e-6.
-/// The library's are exact to the last bit, and three times slower.
+/// Sine and cosine of 2π·u for u in [0, 1]: polynomials after folding to an eighth of a turn, with an absolute error
+/// below 1e-6. The library's are accurate to the last bit and three times slower.
 #[inline]
 pub(crate) fn turn(u: f32) -> (f32, f32) {
     // Fold to x ∈ [−1/8, 1/8] of a turn and a quadrant
@@ -100,8 +103,8 @@ pub(crate) fn sphere(u: [f32; 2]) -> Vec3 {
     Vec3::new(r * cos, r * sin, z)
 }
 
-/// A direction of the cone around +z whose half angle θ has 1 − cos θ = `one_minus_cos`, uniform in solid angle: density
-/// 1 / (2π·`one_minus_cos`). Written with 1 − cos θ because cos θ of a small cone rounds to 1.
+/// A direction of the cone around +z with 1 − cos θ = `one_minus_cos` for its half angle θ, uniform in solid angle.
+/// Written with 1 − cos θ since cos θ of a narrow cone rounds to 1.
 #[inline]
 pub(crate) fn cone(one_minus_cos: f32, u: [f32; 2]) -> Vec3 {
     let m = u[0] * one_minus_cos;
@@ -116,7 +119,7 @@ pub(crate) fn cone_pdf(one_minus_cos: f32) -> f32 {
     0.5 * FRAC_1_PI / one_minus_cos
 }
 
-/// Mirror direction of `dir` (towards the surface) at normal `n`.
+/// `dir`, mirrored by a surface with normal `n`.
 #[inline]
 pub(crate) fn reflect(dir: Vec3, n: Vec3) -> Vec3 {
     dir - n * (2.0 * dir.dot(n))
@@ -128,7 +131,8 @@ pub(crate) fn luminance(c: Vec3) -> f32 {
     c.dot(Vec3::new(0.2126, 0.7152, 0.0722))
 }
 
-/// Power heuristic with exponent 2 (Veach 1997, §9.2.4), written so that no square overflows.
+/// Power heuristic with exponent 2 (Veach 1997, §9.2.4): the weight of a sample of density `a` that another technique
+/// takes with density `b`. Written so that no square overflows.
 #[inline]
 pub(crate) fn power_heuristic(a: f32, b: f32) -> f32 {
     if a >= b {

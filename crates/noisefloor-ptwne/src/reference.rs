@@ -1,24 +1,26 @@
-//! The ray-traced reference: direct light, and what mirrors and glass show of it (Takouachet et al. 2017, §4.3). Light that was
-//! scattered by a diffuse surface on its way is missing, as in the paper. Samples of it are in [`direct`](crate::direct).
+//! The ray-traced reference: direct light, also as seen in mirrors and glass (Takouachet et al. 2017, §4.3). As in the
+//! paper, light that a diffuse surface scattered on its way is missing. [`direct`](crate::direct) takes the samples.
 //!
 //! # How free of noise
-//! Blocks of [`BLOCK`]² pixels are worked on each on its own. A block first learns which lights it sees. Then its pixels take samples
-//! in two halves, with scrambles of their own, so that half of what the halves differ by is an estimate of the error of their mean.
-//! The block goes on learning from them.
-//! Pixels are shown as the path-traced picture would be, and those whose samples do most against the error take twice as many, until
-//! the root mean square over the block is below [`BOUND`], or pixels have [`MOST`] samples in each half: [`ReferenceNoise`] says what
-//! noise was left.
+//! Blocks of [`BLOCK`]² pixels are rendered independently. A block first learns which lights it sees. Its pixels then
+//! take samples in two halves, each with its own scrambling, so that half the difference of the halves estimates the
+//! error of their mean. The block keeps learning from these samples.
 //!
-//! The pixels have scrambles of their own too. With one for all, neighbours err alike: the mask has less noise at full resolution, and
-//! more at the coarser scales that the oracle looks at too (`docs/benchmarks/renderer.md` of the project).
+//! Pixels are displayed as the path-traced picture would be. Those whose samples reduce the error most take twice as
+//! many, until the root mean square error of the block is below [`BOUND`], or pixels have [`MAX_SAMPLES`] samples in
+//! each half. [`ReferenceNoise`] reports the noise that was left.
 //!
-//! No block knows of another, and nothing depends on threads. What two halves cannot tell is what both miss: an edge that both see
-//! alike. So where neighbours differ, an error is assumed that the samples of a pixel would leave of such an edge. A highlight much
-//! smaller than a pixel, which no sample of either half met, is not told.
+//! Each pixel has its own scrambling too. If all shared one, neighbours would err alike: the noise mask would have less
+//! energy at full resolution, and more at the coarser scales that the oracle looks at too
+//! (`docs/benchmarks/renderer.md`).
+//!
+//! Blocks do not depend on each other, nor on threads. Two halves cannot detect what both miss, such as an edge that both
+//! see alike. Where neighbours differ, a pixel is therefore assumed to have the error that its samples would leave of
+//! such an edge. A highlight much smaller than a pixel that no sample hit goes undetected.
 
 use crate::camera::Lens;
 use crate::direct::Tracer;
-use crate::guide::{Found, Guide, Parts};
+use crate::guide::{Contributions, Guide, LightStrata};
 use crate::math::Vec3;
 use crate::rng::{Key, Rng};
 use crate::scene::Scene;
@@ -28,19 +30,20 @@ use rayon::prelude::*;
 use std::ops::{ControlFlow, Range};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// Side of a block: small enough that its pixels see much the same lights.
+/// Edge of a block: small enough for its pixels to see much the same lights.
 const BLOCK: usize = 16;
-/// Root mean square of the errors of a block's pixels, in display values. The noise mask (σ = 1) lets 0.85 of it through: 0.3/255,
-/// less than a tenth of the energy that the keenest observers see.
+/// Root mean square error of a block's pixels, in display values. The noise mask (σ = 1) passes 0.85 of it: 0.3/255, less
+/// than a tenth of the energy that the most demanding observers see.
 const BOUND: f32 = 0.36 / 255.0;
-/// Fewest and most samples of each half of a pixel. With half as many, highlights smaller than a pixel were missed; its points
-/// have twice as many.
-const FEWEST: u32 = 32;
-const MOST: u32 = 8_192;
-/// Samples of each pixel from which its block learns about the lights, and how often: each time it looks where it saw some before.
+/// Fewest and most samples of each half of a pixel. With half as many at least, highlights smaller than a pixel were
+/// missed; a Sobol sequence has twice as many points as the most.
+const MIN_SAMPLES: u32 = 32;
+const MAX_SAMPLES: u32 = 8_192;
+/// Samples of each pixel from which its block learns about the lights, and how often: each time, it looks where it has
+/// found light before.
 const LEARNING: u32 = 8;
 const LESSONS: u32 = 2;
-/// What n points of a pixel leave of the contrast of an edge through it: about this times n^−¾ (measured).
+/// n samples of a pixel leave about this times n^−¾ of the contrast of an edge through it (measured).
 const EDGE: f32 = 0.25;
 
 /// A reference.
@@ -50,22 +53,25 @@ pub(crate) struct Picture {
     pub(crate) noise: ReferenceNoise,
 }
 
-/// What a reference estimates of its own noise, from what its two halves differ by: what both miss, such as a highlight much smaller
-/// than a pixel, it does not know. Units are display values: 1/255 is a step of 8 bits.
+/// A reference's estimate of its own noise, from the difference of its halves. What both halves miss, such as a highlight
+/// much smaller than a pixel, is not included. Units are display values: 1/255 is one step of 8 bits.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct ReferenceNoise {
-    /// Samples of a pixel, both halves together, on average. Each costs a ray to a surface and up to eight from each surface on its way.
+    /// Mean number of samples per pixel, in both halves together. Each costs one camera ray, and up to eight rays from
+    /// each surface on its path.
     pub samples: f64,
-    /// Blocks of 16×16 pixels in a row; those at the right and bottom edges may be smaller.
+    /// Number of blocks of 16×16 pixels in a row. Those at the right and bottom edges may be smaller.
     pub columns: usize,
-    /// Deviation of the noise mask (σ = 1) of each block, row-major, at least 0.
+    /// Standard deviation of the noise mask (σ = 1) of each block, row-major, at least 0.
     pub deviations: Vec<f32>,
-    /// Blocks that have more noise than the reference promises, 0.305/255, after 16,384 samples of pixels that needed them.
+    /// Number of blocks with more noise than the reference promises, 0.305/255, although pixels that needed them took
+    /// 16,384 samples.
     pub unsettled: usize,
 }
 
 impl ReferenceNoise {
-    /// Root mean square over all blocks.
+    /// Root mean square of the deviations of all blocks.
     pub fn deviation(&self) -> f32 {
         let sum: f32 = self.deviations.iter().map(|d| d * d).sum();
         (sum / self.deviations.len().max(1) as f32).sqrt()
@@ -77,10 +83,10 @@ impl ReferenceNoise {
     }
 }
 
-/// Told after each block how many of how many are there; breaks off the work.
+/// Called after each block with the number of finished blocks and that of all; can cancel the rest.
 pub(crate) type Watch = dyn Fn(usize, usize) -> ControlFlow<()> + Send + Sync;
 
-/// Renders the reference, or nothing if it is broken off. `display` is how the path-traced picture would be shown.
+/// Renders the reference; `None` if it was cancelled. `display` shows it as the path-traced picture would be shown.
 pub(crate) fn render(
     scene: &Scene,
     [width, height]: [usize; 2],
@@ -89,7 +95,7 @@ pub(crate) fn render(
     watch: &Watch,
 ) -> Option<Picture> {
     let lens = scene.lens(width, height);
-    let parts = Parts::new(scene);
+    let strata = LightStrata::new(scene);
     let columns = width.div_ceil(BLOCK);
     let count = columns * height.div_ceil(BLOCK);
     let done = AtomicUsize::new(0);
@@ -102,7 +108,7 @@ pub(crate) fn render(
             let first = (at[1] * width + at[0]) as u64;
             let pixels = vec![Pixel::default(); size[0] * size[1]];
             let mut block = Block { lens: &lens, key, display, at, size, first, pixels };
-            let error = block.render(&mut Tracer::new(scene, Guide::by_power(&parts)), &parts);
+            let error = block.render(&mut Tracer::new(scene, Guide::by_power(&strata)), &strata);
             match watch(done.fetch_add(1, Ordering::Relaxed) + 1, count) {
                 ControlFlow::Continue(()) => Some((block, error)),
                 ControlFlow::Break(()) => None,
@@ -110,7 +116,7 @@ pub(crate) fn render(
         })
         .collect();
 
-    let through = NoiseMask::default().white_noise_gain().sqrt();
+    let gain = NoiseMask::default().white_noise_gain().sqrt();
     let mut noise = ReferenceNoise { samples: 0.0, columns, deviations: vec![], unsettled: 0 };
     let mut pixels = vec![[0.0; 3]; width * height];
     let mut samples = 0;
@@ -122,14 +128,14 @@ pub(crate) fn render(
                 samples += 2 * u64::from(pixel.count);
             }
         }
-        noise.deviations.push(error * through);
+        noise.deviations.push(error * gain);
         noise.unsettled += usize::from(error > BOUND);
     }
     noise.samples = samples as f64 / pixels.len() as f64;
     Some(Picture { pixels, noise })
 }
 
-/// Sums of samples, of two halves that have the same number.
+/// Sums of samples, in two halves with the same number of samples.
 #[derive(Clone, Copy, Debug, Default)]
 struct Pixel {
     halves: [DVec3; 2],
@@ -141,7 +147,7 @@ impl Pixel {
         ((self.halves[0] + self.halves[1]) / f64::from(2 * self.count)).as_vec3().to_array()
     }
 
-    /// What is shown of each half.
+    /// The display value of each half.
     fn shown(&self, display: &Display) -> [f32; 2] {
         self.halves.map(|sum| display.luma((sum / f64::from(self.count)).as_vec3().to_array()))
     }
@@ -155,39 +161,40 @@ struct Block<'a> {
     /// Its corner in the image.
     at: [usize; 2],
     size: [usize; 2],
-    /// Number of its first pixel, for random numbers.
+    /// Index of its first pixel, for random numbers.
     first: u64,
     /// Row-major.
     pixels: Vec<Pixel>,
 }
 
 impl Block<'_> {
-    /// Renders the block, and estimates the root mean square of its pixels' errors.
-    fn render<'s>(&mut self, tracer: &mut Tracer<'s>, parts: &'s Parts<'s>) -> f32 {
-        let choosy = parts.len() > 1;
-        let mut found = choosy.then(|| self.learn(tracer, parts));
+    /// Renders the block, and estimates the root mean square error of its pixels.
+    fn render<'s>(&mut self, tracer: &mut Tracer<'s>, strata: &'s LightStrata<'s>) -> f32 {
+        let mut found = (strata.len() > 1).then(|| self.learn(tracer, strata));
         let mut todo: Vec<usize> = (0..self.pixels.len()).collect();
         loop {
             tracer.found = found;
             for p in todo {
-                let range = self.pixels[p].count..(2 * self.pixels[p].count).max(FEWEST);
+                let range = self.pixels[p].count..(2 * self.pixels[p].count).max(MIN_SAMPLES);
                 self.pixels[p].count = range.end;
                 for half in 0..2 {
                     let sum = self.sum(tracer, p, half as u64, range.clone());
                     self.pixels[p].halves[half] += sum;
                 }
             }
-            // For the next: a light that was missed so far is found seldom, and weighs much
+            // For the next samples: a light that was missed so far is found rarely, and weighs much
             found = tracer.found.take();
             if let Some(found) = &found {
-                tracer.guide = Guide::learned(parts, found);
+                tracer.guide = Guide::learned(strata, found);
             }
             let errors = self.errors();
             let total: f32 = errors.iter().sum();
             let error = (total / errors.len() as f32).sqrt();
-            // Those whose next sample does most: as many as would leave half of what is allowed, were they exact
+            // Choose the pixels whose next sample reduces the error most: as many as would leave half of what is
+            // allowed if they were exact
             let gain = |p: usize| errors[p] / self.pixels[p].count as f32;
-            let mut order: Vec<usize> = (0..errors.len()).filter(|p| self.pixels[*p].count < MOST).collect();
+            let mut order: Vec<usize> =
+                (0..errors.len()).filter(|p| self.pixels[*p].count < MAX_SAMPLES).collect();
             if error <= BOUND || order.is_empty() {
                 return error;
             }
@@ -203,15 +210,15 @@ impl Block<'_> {
     }
 
     /// Learns which lights the block sees.
-    fn learn<'s>(&self, tracer: &mut Tracer<'s>, parts: &'s Parts<'s>) -> Found {
-        let mut found = Found::new(parts);
+    fn learn<'s>(&self, tracer: &mut Tracer<'s>, strata: &'s LightStrata<'s>) -> Contributions {
+        let mut found = Contributions::new(strata);
         for lesson in 0..LESSONS {
             tracer.found = Some(found);
             for p in 0..self.pixels.len() {
                 self.sum(tracer, p, 2, lesson * LEARNING..(lesson + 1) * LEARNING);
             }
-            found = tracer.found.take().unwrap_or_else(|| Found::new(parts));
-            tracer.guide = Guide::learned(parts, &found);
+            found = tracer.found.take().unwrap_or_else(|| Contributions::new(strata));
+            tracer.guide = Guide::learned(strata, &found);
         }
         found
     }
@@ -219,13 +226,13 @@ impl Block<'_> {
     /// The sum of some samples of pixel `p`, from one of several sequences.
     fn sum(&self, tracer: &mut Tracer<'_>, p: usize, sequence: u64, samples: Range<u32>) -> DVec3 {
         let at = [self.at[0] + p % self.size[0], self.at[1] + p / self.size[0]];
-        // Samples of the path tracer count from the other end
+        // The path tracer counts its samples from the other end
         let seed = Rng::new(self.key, self.first + p as u64, !sequence).next();
         samples.map(|index| tracer.sample(self.lens, at, index, seed)).map(Vec3::as_dvec3).sum()
     }
 
-    /// Estimates of the squared errors of all pixels. As two halves say little about one pixel, it shares with its neighbours: not
-    /// the error, but the error of a single sample, as they may have more or fewer.
+    /// Estimates of the squared errors of all pixels. Since two halves say little about one pixel, it averages with its
+    /// neighbours; not the error, but the error of a single sample, since they may have more or fewer samples.
     fn errors(&self) -> Vec<f32> {
         let shown: Vec<[f32; 2]> = self.pixels.iter().map(|p| p.shown(self.display)).collect();
         let single = |p: usize| {

@@ -3,12 +3,12 @@
 use crate::camera::Lens;
 use crate::error::{OutsideError, RenderError};
 use crate::filter::Filter;
-use crate::integrator::{Estimator, Sample, Settings, integrator};
+use crate::integrator::{Estimator, SampleRadiance, Settings, integrator};
 use crate::math::Vec3;
 use crate::reference::{self, ReferenceNoise, Watch};
 use crate::rng::Key;
 use crate::sampler::{Sampler, Sampling};
-use crate::scene::{Needs, Scene};
+use crate::scene::Scene;
 use noisefloor::{
     Batch, Display, ProgressiveSource, Reference, Repeats, Request, Rgb, SourceError, SourceInfo, Tile,
     ToneMapping, Unit,
@@ -20,40 +20,40 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// Deepest path that can be asked for, in segments.
+/// Longest path that can be requested, in segments.
 pub const MAX_DEPTH: u32 = 10_000;
-/// Most threads that can be asked for.
+/// Largest number of threads that can be requested.
 pub const MAX_THREADS: usize = 1024;
 
-/// Largest edge of the small picture from which the exposure of a reference is taken.
+/// Largest edge of the small picture that the exposure of a reference is taken from.
 const PREVIEW: usize = 64;
 
-/// How to render.
+/// How to render. Build it with [`RenderOptions::default`] and `..`, since fields may be added.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Options {
+pub struct RenderOptions {
     /// Seed of all random numbers.
     pub seed: u64,
-    /// Longest path in segments, 1…[`MAX_DEPTH`]: 1 is light seen directly, 2 is direct light.
+    /// Longest path in segments, 1…[`MAX_DEPTH`]: 1 is emitted light seen directly, 2 is direct light.
     pub max_depth: u32,
-    /// Number of segments from which on Russian roulette ends paths, at least 1.
+    /// Number of segments from which Russian roulette may end paths, at least 1.
     pub roulette: u32,
-    /// How light finds its way into paths.
+    /// How paths find light.
     pub estimator: Estimator,
-    /// How the samples of a pixel are spread.
+    /// How the samples of a pixel are distributed.
     pub sampling: Sampling,
-    /// How pixels weigh the light around them.
+    /// Reconstruction filter of the pixels.
     pub filter: Filter,
-    /// Largest channel of a sample, above 0; brighter samples are scaled down to it, and counted. That loses light: `None`, the
-    /// default, keeps all.
+    /// Largest channel of a sample, above 0. Brighter samples are scaled down to it and counted, which loses light.
+    /// `None`, the default, keeps all light.
     pub clamp: Option<f32>,
-    /// Threads of a pool of its own, at most [`MAX_THREADS`]; `None`: the rayon pool that the caller is in. Images do not
-    /// depend on it.
+    /// Number of threads of the renderer's own pool, at most [`MAX_THREADS`]; `None`: the caller's rayon pool. Pictures
+    /// do not depend on it.
     pub threads: Option<NonZeroUsize>,
 }
 
-impl Default for Options {
-    /// Seed 0, paths of up to 65 segments, roulette from the fifth on, multiple importance sampling, independent samples, a box
-    /// filter, no clamping, the caller's threads.
+impl Default for RenderOptions {
+    /// Seed 0, paths of up to 65 segments, Russian roulette from the fifth, multiple importance sampling, independent
+    /// samples, a box filter, no clamping, the caller's threads.
     fn default() -> Self {
         Self {
             seed: 0,
@@ -68,33 +68,35 @@ impl Default for Options {
     }
 }
 
-/// Path tracing with next event estimation, of a scene, at a resolution.
+/// The path tracer: renders a scene at a resolution, by path tracing with next event estimation.
 ///
-/// All random numbers follow from (seed, pixel, sample index), and the mean of a batch is summed in f64: images are the same
-/// to the bit whatever the threads, and means are the same to the rounding of f32 however requests are cut. A sample counts
-/// for one pixel alone, whatever the filter, so that noise is independent from pixel to pixel.
+/// All random numbers follow from (seed, pixel, sample index), and the mean of a batch is summed in `f64`. Pictures are
+/// therefore identical to the bit for any number of threads, and means are identical up to the rounding of `f32` however
+/// requests are divided. With every filter, a sample counts for one pixel only, so that noise is independent from pixel
+/// to pixel.
 pub struct Ptwne {
     pub(crate) scene: Arc<Scene>,
     pub(crate) width: usize,
     pub(crate) height: usize,
-    options: Options,
-    integrator: Sample,
+    options: RenderOptions,
+    sample_radiance: SampleRadiance,
     pool: Option<rayon::ThreadPool>,
     tally: Tally,
     watch: Box<Watch>,
     reference_noise: Option<ReferenceNoise>,
 }
 
-/// What became of the samples so far.
+/// Counts of the samples taken so far.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Counts {
-    /// Samples taken.
+#[non_exhaustive]
+pub struct SampleCounts {
+    /// All samples.
     pub samples: u64,
-    /// Those that were not finite, or negative, and counted as black.
+    /// Those that were negative or not finite, and were replaced by black.
     pub dropped: u64,
-    /// Those that were scaled down to [`Options::clamp`].
+    /// Those that were scaled down to [`RenderOptions::clamp`].
     pub clamped: u64,
-    /// Those of tiles that see nothing but the background, for which no ray was traced.
+    /// Those in tiles that see only the background, for which no ray was traced.
     pub background: u64,
 }
 
@@ -115,7 +117,7 @@ impl Ptwne {
         scene: impl Into<Arc<Scene>>,
         width: usize,
         height: usize,
-        options: Options,
+        options: RenderOptions,
     ) -> Result<Self, RenderError> {
         noisefloor::check_image(width, height)?;
         let bad = |name, value, range| Err(RenderError::Option { name, value, range });
@@ -130,17 +132,22 @@ impl Ptwne {
         }
         let pool = match options.threads.map(NonZeroUsize::get) {
             Some(threads) if threads > MAX_THREADS => return bad("threads", threads, "1…1024"),
-            Some(threads) => Some(rayon::ThreadPoolBuilder::new().num_threads(threads).build()?),
+            Some(threads) => Some(
+                rayon::ThreadPoolBuilder::new()
+                    .num_threads(threads)
+                    .build()
+                    .map_err(|e| RenderError::Threads(Box::new(e)))?,
+            ),
             None => None,
         };
         let scene = scene.into();
-        let integrator = integrator(scene.needs);
+        let sample_radiance = integrator(scene.has_opacity);
         Ok(Self {
             scene,
             width,
             height,
             options,
-            integrator,
+            sample_radiance,
             pool,
             tally: Tally::default(),
             watch: Box::new(|_, _| ControlFlow::Continue(())),
@@ -148,16 +155,17 @@ impl Ptwne {
         })
     }
 
-    /// Renders with code for more than the scene has. Images are the same; it shows what leaving that code out saves.
-    pub fn burden(&mut self, more: Needs) {
-        self.integrator = integrator(self.scene.needs.with(more));
+    /// Renders with opacity tests even if the scene has no partly transparent surfaces. Pictures are the same; it is
+    /// for measuring what leaving the tests out saves.
+    pub fn force_opacity_tests(&mut self) {
+        self.sample_radiance = integrator(true);
     }
 
-    /// What became of the samples so far.
-    pub fn counts(&self) -> Counts {
+    /// Counts of the samples taken so far.
+    pub fn counts(&self) -> SampleCounts {
         let read = |a: &AtomicU64| a.load(Ordering::Relaxed);
         let Tally { samples, dropped, clamped, background } = &self.tally;
-        Counts {
+        SampleCounts {
             samples: read(samples),
             dropped: read(dropped),
             clamped: read(clamped),
@@ -165,8 +173,8 @@ impl Ptwne {
         }
     }
 
-    /// Has `watch` told, while a reference is rendered, how many of how many blocks of it are there; on [`ControlFlow::Break`] it is given
-    /// up. Comes from any thread.
+    /// Has `watch` called while a reference is rendered, with the number of finished blocks and that of all blocks.
+    /// [`ControlFlow::Break`] cancels the reference. Calls come from any thread.
     pub fn watch_reference(
         &mut self,
         watch: impl Fn(usize, usize) -> ControlFlow<()> + Send + Sync + 'static,
@@ -174,17 +182,17 @@ impl Ptwne {
         self.watch = Box::new(watch);
     }
 
-    /// What noise the last reference has, once there is one.
+    /// The noise of the last reference; `None` before the first one.
     pub fn reference_noise(&self) -> Option<&ReferenceNoise> {
         self.reference_noise.as_ref()
     }
 
     /// The options.
-    pub fn options(&self) -> Options {
+    pub fn options(&self) -> RenderOptions {
         self.options
     }
 
-    /// Runs `work` on this renderer's threads.
+    /// Runs `work` on the renderer's threads.
     pub(crate) fn on_threads<T: Send>(&self, work: impl FnOnce() -> T + Send) -> T {
         match &self.pool {
             Some(pool) => pool.install(work),
@@ -192,13 +200,13 @@ impl Ptwne {
         }
     }
 
-    /// The mean of the samples of each pixel of one row of a tile.
-    fn row(&self, lens: &Lens, job: Job<'_>) {
+    /// Renders one row of a tile: the mean of the samples of each pixel.
+    fn render_row(&self, lens: &Lens, job: Job<'_>) {
         let Job { request, y, empty, out } = job;
         let key = Key::new(self.options.seed);
-        let Options { max_depth, roulette, estimator, sampling, filter, clamp, .. } = self.options;
+        let RenderOptions { max_depth, roulette, estimator, sampling, filter, clamp, .. } = self.options;
         let settings = Settings { max_depth, roulette, estimator };
-        let mut stack = self.scene.accel.stack();
+        let mut stack = self.scene.bvh.stack();
         let (mut dropped, mut clamped) = (0, 0);
         for (i, mean) in out.iter_mut().enumerate() {
             let x = request.tile.x + i;
@@ -210,9 +218,9 @@ impl Ptwne {
                 let [dx, dy] = filter.offset([u, v]);
                 let ray = lens.ray(x as f32 + dx, y as f32 + dy);
                 let mut sample = if empty {
-                    self.scene.beyond(ray.dir, |_, _| 1.0)
+                    self.scene.background(ray.dir, |_, _| 1.0)
                 } else {
-                    (self.integrator)(&self.scene, settings, ray, &mut sampler, &mut stack)
+                    (self.sample_radiance)(&self.scene, settings, ray, &mut sampler, &mut stack)
                 };
                 // Also true for NaN
                 if !(sample.min_element() >= 0.0 && sample.max_element() < f32::INFINITY) {
@@ -237,17 +245,17 @@ impl Ptwne {
 
     /// Whether no ray through the tile can meet a surface.
     fn is_empty(&self, lens: &Lens, tile: &Tile) -> bool {
-        // Samples of neighbouring pixels' light reach as far as the filter
+        // Samples lie outside their pixels as far as the filter reaches
         let reach = self.options.filter.reach();
         let span = |from: usize, size: usize| [from as f32 - reach, (from + size) as f32 + reach];
         let (eye, planes) = lens.pyramid(span(tile.x, tile.width), span(tile.y, tile.height));
-        !self.scene.accel.reaches_into(eye, &planes)
+        !self.scene.bvh.reaches_into(eye, &planes)
     }
 
-    /// How the picture would be shown by Reinhard's operator, from a small one of few samples.
+    /// How Reinhard's operator would show the picture, from a small picture with few samples.
     fn preview(&self) -> Result<Display, SourceError> {
         let (width, height) = (self.width.min(PREVIEW), self.height.min(PREVIEW));
-        let options = Options { threads: None, ..self.options };
+        let options = RenderOptions { threads: None, ..self.options };
         let mut small =
             Self::new(self.scene.clone(), width, height, options).map_err(|e| self.fail(None, e))?;
         let tile = Tile { index: 0, x: 0, y: 0, width, height };
@@ -255,6 +263,7 @@ impl Ptwne {
         Ok(ToneMapping::default().settle(&batches[0].mean))
     }
 
+    /// An error of this source.
     fn fail(
         &self,
         tile: Option<usize>,
@@ -275,11 +284,11 @@ impl fmt::Debug for Ptwne {
     }
 }
 
-/// A row of a tile.
+/// A row of a tile to render.
 struct Job<'a> {
     request: &'a Request,
     y: usize,
-    /// Whether the tile sees nothing but the background.
+    /// Whether the tile sees only the background.
     empty: bool,
     out: &'a mut [Rgb],
 }
@@ -297,7 +306,7 @@ impl ProgressiveSource for Ptwne {
     }
 
     /// # Errors
-    /// [`SourceError::Failed`] if a tile reaches out of the image.
+    /// [`SourceError::Failed`] if a tile is partly outside the image.
     fn sample(&mut self, requests: &[Request]) -> Result<Vec<Batch>, SourceError> {
         let this = &*self;
         let (width, height) = (this.width, this.height);
@@ -317,7 +326,7 @@ impl ProgressiveSource for Ptwne {
                 Batch { tile: r.tile, samples: r.samples, mean: vec![[0.0; 3]; pixels] }
             })
             .collect();
-        // Rows of all tiles are the jobs: small enough that no thread waits long for the last one
+        // Rows of tiles are the jobs: so small that no thread waits long for the last one
         let lens = this.scene.lens(width, height);
         let jobs: Vec<Job<'_>> = requests
             .iter()
@@ -328,19 +337,19 @@ impl ProgressiveSource for Ptwne {
                 rows.map(move |(row, out)| Job { request, y: request.tile.y + row, empty, out })
             })
             .collect();
-        this.on_threads(|| jobs.into_par_iter().with_max_len(1).for_each(|job| this.row(&lens, job)));
+        this.on_threads(|| jobs.into_par_iter().with_max_len(1).for_each(|job| this.render_row(&lens, job)));
         Ok(batches)
     }
 
     /// # Errors
-    /// [`SourceError::Failed`] if it was given up, see [`Ptwne::watch_reference`].
+    /// [`SourceError::Failed`] if it was cancelled, see [`Ptwne::watch_reference`].
     fn reference(&mut self) -> Result<Option<Reference>, SourceError> {
         let key = Key::new(self.options.seed);
         let display = self.preview()?;
         let size = [self.width, self.height];
         let picture =
             self.on_threads(|| reference::render(&self.scene, size, key, &display, self.watch.as_ref()));
-        let picture = picture.ok_or_else(|| self.fail(None, RenderError::GivenUp))?;
+        let picture = picture.ok_or_else(|| self.fail(None, RenderError::Cancelled))?;
         self.reference_noise = Some(picture.noise);
         Ok(Some(Reference { width: self.width, height: self.height, pixels: picture.pixels }))
     }

@@ -2,15 +2,16 @@
 
 use crate::rng::{GOLDEN, Key, Rng, mix};
 
-/// How the samples of a pixel are spread.
+/// How the samples of a pixel are distributed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Sampling {
-    /// Independent samples: noise as people saw it in the training data.
+    /// Independent samples. Their noise is that which people saw in the training data.
     #[default]
     Independent,
-    /// Owen-scrambled Sobol points (Burley 2020, "Practical Hash-based Owen Scrambling"), four dimensions at a time, each four
-    /// shuffled and scrambled for each pixel anew. Less noise, but the halves of a pixel are no longer independent, and the
-    /// bundled model has not seen such noise: `docs/benchmarks/renderer.md` of the project says what follows.
+    /// Owen-scrambled Sobol points (Burley 2020, "Practical Hash-based Owen Scrambling"), four dimensions at a time,
+    /// scrambled and shuffled differently for each pixel. They have less noise, but the halves of a pixel are no longer
+    /// independent, and the bundled model has not seen such noise: see `docs/benchmarks/renderer.md` of the project.
     Sobol,
 }
 
@@ -18,14 +19,14 @@ pub enum Sampling {
 #[derive(Clone, Debug)]
 pub(crate) enum Sampler {
     Independent(Rng),
-    /// Point `index` of the sequence of `seed`, which changes from one four to the next.
+    /// Point `index` of the sequence of `seed`, which changes every four numbers.
     Sobol {
         index: u32,
         seed: u64,
     },
 }
 
-/// Length of a Sobol sequence; after it the next one begins, scrambled on its own.
+/// Length of a Sobol sequence. After it another one begins, with its own scrambling.
 const POINTS: u64 = 1 << 16;
 
 impl Sampler {
@@ -52,8 +53,8 @@ impl Sampler {
         }
     }
 
-    /// A seed that no other path has, for decisions that are hashed rather than drawn in order. It takes no number: paths that
-    /// do not need it go on alike.
+    /// A seed that no other path has, for decisions that are hashed instead of drawn in order. It uses up no number, so
+    /// that paths are the same with and without it.
     #[inline]
     pub(crate) fn seed(&self) -> u64 {
         match self {
@@ -63,7 +64,7 @@ impl Sampler {
     }
 }
 
-/// Padding after Burley: the same four dimensions again and again, with another seed for each four.
+/// Padding (Burley 2020): the same four dimensions repeatedly, each time with another seed.
 #[inline(never)]
 fn sobol(index: u32, seed: &mut u64) -> [f32; 4] {
     *seed = mix(seed.wrapping_add(GOLDEN));
@@ -74,7 +75,7 @@ fn sobol(index: u32, seed: &mut u64) -> [f32; 4] {
 mod tests {
     use super::*;
 
-    /// The first 4ᵏ points have one in each of 2ᵏ×2ᵏ cells, in the planes of the first and of the last two dimensions.
+    /// Of the first 4ᵏ points, one lies in each of 2ᵏ×2ᵏ cells, in the planes of the first and the last two dimensions.
     #[test]
     fn sobol_points_are_stratified() {
         let key = Key::new(3);
@@ -94,7 +95,8 @@ mod tests {
         }
     }
 
-    /// Pixels and fours have scrambles of their own: the correlation of 2¹⁶ pairs is standard normal over √n; 5σ.
+    /// Pixels, and groups of four numbers, are scrambled independently: the correlation of 2¹⁶ pairs is standard normal
+    /// over √n; 5σ.
     #[test]
     fn sobol_scrambles_are_unrelated() {
         let (key, n) = (Key::new(4), 1u64 << 16);

@@ -1,5 +1,6 @@
 //! Colours that vary over a surface.
 
+use crate::checks::check_reflectance;
 use crate::error::SceneError;
 use crate::math::{self, Vec3};
 use noisefloor::Rgb;
@@ -8,9 +9,10 @@ use std::sync::{Arc, LazyLock};
 /// Largest number of pixels of an image texture.
 pub const MAX_TEXTURE_PIXELS: usize = 1 << 26;
 
-/// A colour as a function of the texture coordinates (u, v). All colours are reflectances: linear Rec.709, each channel in
-/// 0…1. Patterns repeat for ever; `scale` counts repeats for each unit of u and v.
+/// A colour as a function of the texture coordinates (u, v). All colours are reflectances: linear Rec.709, each channel
+/// in 0…1. Patterns repeat without end; `scale` is the number of repeats per unit of u and v.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum Texture {
     /// One colour everywhere.
     Colour(Rgb),
@@ -18,23 +20,23 @@ pub enum Texture {
     Checker {
         /// The two colours.
         colours: [Rgb; 2],
-        /// Squares for each unit of u and v.
+        /// Squares per unit of u and v.
         scale: [f32; 2],
     },
-    /// Running bond: bricks twice as wide as high, each of its own shade, in mortar.
+    /// Bricks in running bond, each with its own shade, in mortar.
     Brick {
-        /// Colour of the bricks, of which each is up to 35 % darker.
+        /// Colour of the brightest bricks; others are up to 35 % darker.
         brick: Rgb,
         /// Colour of the mortar.
         mortar: Rgb,
-        /// Bricks for each unit of u, courses for each unit of v.
+        /// Bricks per unit of u, and courses per unit of v.
         scale: [f32; 2],
     },
-    /// A mix of two colours by fractal value noise of four octaves.
+    /// A mix of two colours by fractal value noise with four octaves.
     Noise {
         /// The two colours.
         colours: [Rgb; 2],
-        /// Cells of the first octave for each unit of u and v.
+        /// Cells of the first octave per unit of u and v.
         scale: [f32; 2],
     },
     /// An image.
@@ -50,36 +52,37 @@ pub struct ImageTexture {
     pub height: usize,
     /// `width`·`height` pixels, row-major from the top left.
     pub pixels: Pixels,
-    /// Two rows of an affine map from (u, v, 1) to where in the image to look; usually [`ImageTexture::IDENTITY`].
+    /// Two rows of the affine map from (u, v, 1) to image coordinates; usually [`ImageTexture::IDENTITY`].
     pub to_uv: [[f32; 3]; 2],
-    /// Multiplies the image.
+    /// Factor on the image, each channel in 0…1.
     pub factor: Rgb,
-    /// What is beyond the unit square, in u and in v.
+    /// How the image continues outside the unit square, in u and in v.
     pub wrap: [Wrap; 2],
-    /// Whether a pixel has one colour, or colours are interpolated between pixels.
+    /// Whether each pixel has one colour, instead of interpolating between pixels.
     pub nearest: bool,
 }
 
-/// Pixels of an image, shared by all textures that are made of it.
+/// Pixels of an image, shared by all textures that use it.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Pixels {
-    /// Eight bits a channel, encoded as sRGB (IEC 61966-2-1).
+    /// Eight bits per channel, sRGB encoded (IEC 61966-2-1).
     Srgb8(Arc<[[u8; 3]]>),
-    /// Eight bits a channel, linear: 255 is 1.
+    /// Eight bits per channel, linear: 255 is 1.
     Linear8(Arc<[[u8; 3]]>),
     /// Linear.
     Float(Arc<[Rgb]>),
 }
 
-/// What an image shows beyond the unit square.
+/// How an image continues outside the unit square.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Wrap {
-    /// Itself again.
+    /// It repeats.
     #[default]
     Repeat,
-    /// Itself, every other time mirrored.
+    /// It repeats, mirrored every other time.
     Mirror,
-    /// Its border.
+    /// Its border pixels continue.
     Clamp,
 }
 
@@ -100,13 +103,13 @@ impl Pixels {
     }
 }
 
-/// A pixel of eight bits a channel.
+/// Decodes a pixel with eight bits per channel.
 #[inline]
 fn eight([r, g, b]: [u8; 3], table: &[f32; 256]) -> Vec3 {
     Vec3::new(table[usize::from(r)], table[usize::from(g)], table[usize::from(b)])
 }
 
-/// The 256 values of a channel that is encoded as sRGB, and of a linear one.
+/// The 256 values of an sRGB encoded channel, and of a linear one.
 static TABLES: LazyLock<([f32; 256], [f32; 256])> = LazyLock::new(|| {
     let linear = |i: usize| i as f64 / 255.0;
     let decode = |x: f64| if x <= 0.04045 { x / 12.92 } else { ((x + 0.055) / 1.055).powf(2.4) };
@@ -114,11 +117,11 @@ static TABLES: LazyLock<([f32; 256], [f32; 256])> = LazyLock::new(|| {
 });
 
 impl Wrap {
-    /// The two pixels of `0..size` that stand around `x`, counted from the middle of the first pixel, and how far `x` is from
-    /// the first to the second.
+    /// The two pixels of `0..size` around `x`, measured from the centre of the first pixel, and the position of `x`
+    /// between them.
     #[inline]
     fn around(self, x: f32, size: usize) -> (usize, usize, f32) {
-        // Into one or two periods; where f32 cannot tell pixels apart any more, anything will do
+        // Reduce to one or two periods; where f32 no longer resolves pixels, any will do
         let n = size as f32;
         let period = if self == Wrap::Mirror { 2.0 * n } else { n };
         let x = match self {
@@ -129,7 +132,7 @@ impl Wrap {
         let first = x0 as i32;
         let pixel = |i: i32| {
             let n = size as i32;
-            // Less than two periods: no division
+            // Less than two periods: no division needed
             let inside = |period: i32| if i < period { i } else { i - period };
             match self {
                 Wrap::Repeat => inside(n),
@@ -149,19 +152,6 @@ impl From<Rgb> for Texture {
     fn from(colour: Rgb) -> Self {
         Texture::Colour(colour)
     }
-}
-
-/// Checks that a reflectance is in 0…1.
-pub(crate) fn check_reflectance(colour: Rgb) -> Result<(), SceneError> {
-    for value in colour {
-        if !value.is_finite() {
-            return Err(SceneError::NotFinite { what: "a reflectance" });
-        }
-        if !(0.0..=1.0).contains(&value) {
-            return Err(SceneError::Range { what: "a reflectance", value, range: "0…1" });
-        }
-    }
-    Ok(())
 }
 
 impl Texture {
@@ -187,7 +177,7 @@ impl Texture {
         }
     }
 
-    /// The mean colour: of an image, of its pixels; of a pattern, of a grid over the unit square.
+    /// The mean colour of an image's pixels, or of a pattern over the unit square.
     pub(crate) fn mean(&self) -> Vec3 {
         if let Texture::Image(image) = self {
             let sum: glam::DVec3 = (0..image.pixels.len()).map(|i| image.pixels.at(i).as_dvec3()).sum();
@@ -232,10 +222,10 @@ impl Texture {
 }
 
 impl ImageTexture {
-    /// The map that leaves (u, v) as they are.
+    /// The identity map of (u, v).
     pub const IDENTITY: [[f32; 3]; 2] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
 
-    /// An image that covers the unit square of u and v and repeats beyond.
+    /// An image that covers the unit square and repeats outside of it.
     pub fn new(width: usize, height: usize, pixels: Pixels) -> Self {
         let (factor, wrap) = ([1.0; 3], [Wrap::Repeat; 2]);
         Self { width, height, pixels, to_uv: Self::IDENTITY, factor, wrap, nearest: false }
@@ -269,7 +259,7 @@ impl ImageTexture {
             return self.pixels.at(row + x) * factor;
         }
         let four = [above + x0, above + x1, below + x0, below + x1];
-        // What the pixels are is asked once for all four
+        // Match on the kind of pixels once for all four
         let [a, b, c, d] = match &self.pixels {
             Pixels::Srgb8(p) => {
                 let table = &TABLES.0;

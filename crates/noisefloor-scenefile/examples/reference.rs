@@ -8,7 +8,7 @@
 
 use ndarray::Array2;
 use noisefloor::{NoiseMask, ProgressiveSource, Request, Rgb, Tile, TileGrid, ToneMapping};
-use noisefloor_ptwne::{Options, Ptwne, Scene, scenes};
+use noisefloor_ptwne::{Ptwne, RenderOptions, Scene, scenes};
 use std::error::Error;
 use std::path::Path;
 use std::sync::Arc;
@@ -38,7 +38,8 @@ fn main() -> Result<(), Box<dyn Error>> {
 }
 
 fn row(scene: &Arc<Scene>, size: usize) -> Result<String, Box<dyn Error>> {
-    let source = |seed| Ptwne::new(scene.clone(), size, size, Options { seed, ..Options::default() });
+    let source =
+        |seed| Ptwne::new(scene.clone(), size, size, RenderOptions { seed, ..RenderOptions::default() });
     let (mut images, mut samples, mut own, mut unsettled) = (Vec::new(), 0.0, 0.0, 0.0);
     let start = Instant::now();
     for seed in [1, 2] {

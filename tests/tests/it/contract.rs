@@ -3,7 +3,7 @@ use noisefloor::{
     Batch, ProgressiveSource, Reference, Repeats, Request, SourceError, SourceInfo, Tile, Unit,
 };
 use noisefloor_image::{RenderLayers, StackSource, write_exr};
-use noisefloor_ptwne::{Options, Ptwne, scenes};
+use noisefloor_ptwne::{Ptwne, RenderOptions, scenes};
 use noisefloor_testkit::{check_reference_is_free_of_noise, check_source};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
@@ -17,7 +17,7 @@ fn synthetic() -> Synthetic {
 fn the_path_tracer_keeps_it() {
     for name in ["cornell-box", "courtyard", "glass-spheres"] {
         check_source(|| {
-            let options = Options { seed: 5, ..Options::default() };
+            let options = RenderOptions { seed: 5, ..RenderOptions::default() };
             Ptwne::new(scenes::by_name(name).unwrap(), SIZE.0, SIZE.1, options).unwrap()
         });
     }
@@ -27,7 +27,7 @@ fn the_path_tracer_keeps_it() {
 fn its_reference_is_free_of_noise_to_the_oracle() {
     for name in ["cornell-box", "courtyard", "glass-spheres"] {
         check_reference_is_free_of_noise(|seed| {
-            let options = Options { seed, ..Options::default() };
+            let options = RenderOptions { seed, ..RenderOptions::default() };
             Ptwne::new(scenes::by_name(name).unwrap(), 2 * SIZE.0, 2 * SIZE.1, options).unwrap()
         });
     }

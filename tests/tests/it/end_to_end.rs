@@ -3,7 +3,7 @@ use noisefloor::{
     Batch, Driver, Event, Evidence, FixedSamples, Model, Oracle, Params, ProgressiveSource, Reference, Rgb,
     Schedule, Session, Stop, StopReason, StoppingCriterion,
 };
-use noisefloor_ptwne::{Options, Ptwne, scenes};
+use noisefloor_ptwne::{Ptwne, RenderOptions, scenes};
 use std::cell::RefCell;
 use std::rc::Rc;
 use std::sync::atomic::Ordering;
@@ -19,7 +19,7 @@ const TILE: Params = Params {
 };
 
 fn cornell() -> Ptwne {
-    let options = Options { seed: 1, ..Options::default() };
+    let options = RenderOptions { seed: 1, ..RenderOptions::default() };
     Ptwne::new(scenes::by_name("cornell-box").unwrap(), 96, 96, options).unwrap()
 }
 

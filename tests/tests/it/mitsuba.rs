@@ -2,7 +2,7 @@ use crate::kit::{alive, resident, usable};
 use noisefloor::{ProgressiveSource, Repeats, Request, Rgb, SourceError, Tile, TileGrid};
 use noisefloor_image::{RenderLayers, write_exr};
 use noisefloor_mitsuba::{RENDERER, Variant, open_as};
-use noisefloor_ptwne::{Options, Ptwne, scenes};
+use noisefloor_ptwne::{Ptwne, RenderOptions, scenes};
 use noisefloor_sidecar::{Job, Sidecar};
 use noisefloor_testkit::check_source;
 use std::collections::HashSet;
@@ -44,7 +44,7 @@ fn it_renders_what_our_renderer_does() {
     if !usable(&RENDERER) {
         return;
     }
-    let options = Options { seed: 3, max_depth: 65, ..Options::default() };
+    let options = RenderOptions { seed: 3, max_depth: 65, ..RenderOptions::default() };
     let ours = Ptwne::new(scenes::by_name("cornell-box").unwrap(), SIZE.0, SIZE.1, options).unwrap();
     let expected = moments(ours);
     for variant in [Variant::Llvm, Variant::Scalar] {

@@ -1,7 +1,7 @@
 use crate::kit::{resident, usable};
 use noisefloor::{Batch, ProgressiveSource, Request, Rgb, Tile, TileGrid};
 use noisefloor_luxcore::{Engine, Sampler};
-use noisefloor_ptwne::{Options, Ptwne, scenes};
+use noisefloor_ptwne::{Ptwne, RenderOptions, scenes};
 use noisefloor_sidecar::{Job, Sidecar, SidecarError};
 use noisefloor_testkit::check_source;
 use std::path::PathBuf;
@@ -83,7 +83,10 @@ fn block_error(reference: &[Rgb], other: &[Rgb], lower: usize) -> f64 {
 
 fn built_in() -> Vec<Rgb> {
     let scene = scenes::by_name("cornell-box").unwrap();
-    picture(Ptwne::new(scene, SIZE.0, SIZE.1, Options { seed: 5, ..Options::default() }).unwrap(), 256)
+    picture(
+        Ptwne::new(scene, SIZE.0, SIZE.1, RenderOptions { seed: 5, ..RenderOptions::default() }).unwrap(),
+        256,
+    )
 }
 
 /// Right ones have 2e-4 to 1.7e-3, most of it from the few blocks with an edge of the lamp in them. LuxCore's bidir with Russian

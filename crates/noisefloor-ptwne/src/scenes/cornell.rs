@@ -1,6 +1,6 @@
 //! The Cornell box (Goral et al. 1984), 2 units wide.
 
-use super::kit::{Kit, glow, look};
+use super::kit::{Kit, emission, look};
 use crate::{Scene, SceneError};
 
 pub(super) fn cornell_box(name: &str) -> Result<Scene, SceneError> {
@@ -17,6 +17,6 @@ pub(super) fn cornell_box(name: &str) -> Result<Scene, SceneError> {
     k.wall([1.0, -1.0], [1.0, 1.0], [0.0, 2.0], green);
     k.turned([-0.34, 0.0, -0.32], [0.6, 1.2, 0.6], 18.0, white);
     k.turned([0.36, 0.0, 0.34], [0.6, 0.6, 0.6], -17.0, white);
-    k.floor(1.995, [-0.24, 0.24], [-0.22, 0.18], false, white, glow([22.0, 18.0, 12.5]));
+    k.floor(1.995, [-0.24, 0.24], [-0.22, 0.18], false, white, emission([22.0, 18.0, 12.5]));
     k.build()
 }

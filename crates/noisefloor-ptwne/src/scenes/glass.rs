@@ -1,6 +1,6 @@
 //! Mirrors, glass and caustics.
 
-use super::kit::{Kit, glow, look};
+use super::kit::{Kit, emission, look};
 use crate::{Material, Scene, SceneError, Texture};
 
 /// Balls of glass and mirror in a box, with caustics.
@@ -26,7 +26,7 @@ pub(super) fn caustics(name: &str) -> Result<Scene, SceneError> {
     k.ball([-0.28, 0.22, 0.62], 0.22, amber, None);
     k.turned([0.78, 0.0, -0.72], [0.5, 1.1, 0.5], -20.0, white);
     k.ball([0.78, 1.38, -0.72], 0.28, glass, None);
-    k.floor(2.195, [-0.3, 0.3], [-0.25, 0.25], false, white, glow([19.0, 17.5, 15.0]));
+    k.floor(2.195, [-0.3, 0.3], [-0.25, 0.25], false, white, emission([19.0, 17.5, 15.0]));
     k.build()
 }
 
@@ -63,8 +63,8 @@ pub(super) fn plates(name: &str) -> Result<Scene, SceneError> {
         (1.85, 0.42, [0.95, 0.7, 1.0]),
     ] {
         let strength = 0.42 / (radius * radius);
-        k.ball([x, lights[0], lights[1]], radius, black, glow(colour.map(|c: f32| c * strength)));
+        k.ball([x, lights[0], lights[1]], radius, black, emission(colour.map(|c: f32| c * strength)));
     }
-    k.floor(6.5, [-3.0, 3.0], [3.0, 6.0], false, black, glow([1.1; 3]));
+    k.floor(6.5, [-3.0, 3.0], [3.0, 6.0], false, black, emission([1.1; 3]));
     k.build()
 }

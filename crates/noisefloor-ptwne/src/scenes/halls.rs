@@ -1,9 +1,10 @@
 //! Halls: an arcade of brick and checkers, and a market under many lanterns.
 
-use super::kit::{Kit, glow, look};
+use super::kit::{Kit, emission, look};
 use crate::{Environment, Scene, SceneError, Sun, Texture};
 
-/// A vaultless hall of two arcades: sun falls in from above.
+/// A hall with two arcades and an open roof: the sun falls in from above.
+// Longer than 60 lines: one list of what stands where.
 pub(super) fn arcade(name: &str) -> Result<Scene, SceneError> {
     let mut k = Kit::new(name, look([0.35, 1.7, 8.6], [-0.25, 2.1, 0.0], 55.0))?;
     let floor = Texture::Checker { colours: [[0.58, 0.54, 0.47], [0.24, 0.20, 0.18]], scale: [1.0, 1.0] };
@@ -85,7 +86,8 @@ pub(super) fn arcade(name: &str) -> Result<Scene, SceneError> {
     k.build()
 }
 
-/// A market street at night: a hundred and more lanterns of many colours.
+/// A market street at night, under more than a hundred lanterns of many colours.
+// Longer than 60 lines: one list of what stands where.
 pub(super) fn lanterns(name: &str) -> Result<Scene, SceneError> {
     let mut k = Kit::new(name, look([0.1, 1.8, 7.0], [0.0, 1.55, 0.0], 46.0))?;
     let cobbles = Texture::Brick { brick: [0.42, 0.40, 0.39], mortar: [0.20, 0.19, 0.18], scale: [2.6, 4.0] };
@@ -153,7 +155,7 @@ pub(super) fn lanterns(name: &str) -> Result<Scene, SceneError> {
             let t = (i as f32 + 0.5) / 10.0;
             let y = 3.35 - 2.2 * t * (1.0 - t) + 0.25 * ((string * 7 % 5) as f32 / 5.0 - 0.4);
             let colour = colours[(i * 3 + string * 2) % 5].map(|c: f32| c * 9.0);
-            k.ball([-3.1 + 6.2 * t, y, z + 0.3 * (t - 0.5)], 0.1, dark, glow(colour));
+            k.ball([-3.1 + 6.2 * t, y, z + 0.3 * (t - 0.5)], 0.1, dark, emission(colour));
         }
     }
     k.build()

@@ -19,7 +19,7 @@ pub(super) fn look(eye: P, target: P, vertical_fov: f32) -> Camera {
     Camera { eye, target, up: [0.0, 1.0, 0.0], vertical_fov }
 }
 
-pub(super) fn glow(radiance: Rgb) -> Option<Emission> {
+pub(super) fn emission(radiance: Rgb) -> Option<Emission> {
     Some(Emission::front(radiance))
 }
 

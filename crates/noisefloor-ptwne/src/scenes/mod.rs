@@ -23,48 +23,63 @@ type Make = fn(&str) -> Result<Scene, SceneError>;
 
 /// A built-in scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Entry {
+pub struct BuiltInScene {
     /// Its name, for [`by_name`].
     pub name: &'static str,
     /// What it shows, in a line.
     pub description: &'static str,
 }
 
-const ORDINARY: &[(Entry, Make)] = &[
+const ORDINARY: &[(BuiltInScene, Make)] = &[
     (
-        Entry { name: "cornell-box", description: "two boxes in a box: one area light, colour bleeding" },
+        BuiltInScene {
+            name: "cornell-box",
+            description: "two boxes in a box: one area light, colour bleeding",
+        },
         cornell::cornell_box,
     ),
     (
-        Entry { name: "bulb", description: "a desk in a dim room under one very small light: hard shadows" },
+        BuiltInScene {
+            name: "bulb",
+            description: "a desk in a dim room under one very small light: hard shadows",
+        },
         rooms::bulb,
     ),
     (
-        Entry { name: "softbox", description: "metals of three roughnesses under a large soft light" },
+        BuiltInScene { name: "softbox", description: "metals of three roughnesses under a large soft light" },
         rooms::softbox,
     ),
     (
-        Entry { name: "courtyard", description: "outdoors in sun and sky: brick, plaster, clipped trees" },
+        BuiltInScene {
+            name: "courtyard",
+            description: "outdoors in sun and sky: brick, plaster, clipped trees",
+        },
         outdoors::courtyard,
     ),
     (
-        Entry {
+        BuiltInScene {
             name: "door-ajar",
             description: "a room lit through a door that stands ajar: mostly indirect light",
         },
         rooms::door,
     ),
     (
-        Entry { name: "glass-spheres", description: "glass and mirror balls in a box: caustics" },
+        BuiltInScene { name: "glass-spheres", description: "glass and mirror balls in a box: caustics" },
         glass::caustics,
     ),
     (
-        Entry { name: "arcade", description: "a hall of columns, brick and checkers under an open roof" },
+        BuiltInScene {
+            name: "arcade",
+            description: "a hall of columns, brick and checkers under an open roof",
+        },
         halls::arcade,
     ),
-    (Entry { name: "lanterns", description: "a market street at night: 120 small lights" }, halls::lanterns),
     (
-        Entry {
+        BuiltInScene { name: "lanterns", description: "a market street at night: 120 small lights" },
+        halls::lanterns,
+    ),
+    (
+        BuiltInScene {
             name: "plates",
             description: "metal plates of four roughnesses that mirror lights of four sizes",
         },
@@ -72,44 +87,56 @@ const ORDINARY: &[(Entry, Make)] = &[
     ),
 ];
 
-const STIFF: &[(Entry, Make)] = &[
+const STIFF: &[(BuiltInScene, Make)] = &[
     (
-        Entry { name: "caustic", description: "light of a small lamp through glass, found by chance alone" },
+        BuiltInScene {
+            name: "caustic",
+            description: "light of a small lamp through glass, found by chance alone",
+        },
         stiff::caustic,
     ),
     (
-        Entry { name: "keyhole", description: "a dark room, lit through the keyhole of its door" },
+        BuiltInScene { name: "keyhole", description: "a dark room, lit through the keyhole of its door" },
         stiff::keyhole,
     ),
-    (Entry { name: "pinpoint", description: "one lamp of radius 1e-4" }, stiff::pinpoint),
+    (BuiltInScene { name: "pinpoint", description: "one lamp of radius 1e-4" }, stiff::pinpoint),
     (
-        Entry { name: "decades", description: "nine niches under lamps of radiance 1e-8 to 1e8" },
+        BuiltInScene { name: "decades", description: "nine niches under lamps of radiance 1e-8 to 1e8" },
         stiff::decades,
     ),
     (
-        Entry {
+        BuiltInScene {
             name: "needles",
             description: "needle triangles around a bright lamp, and sheets that nearly touch",
         },
         stiff::needles,
     ),
-    (Entry { name: "far-away", description: "columns a million units from the origin" }, stiff::far_away),
-    (Entry { name: "million", description: "hills of a million triangles" }, stiff::million),
     (
-        Entry { name: "grazing", description: "camera and lamps just above plates of many roughnesses" },
+        BuiltInScene { name: "far-away", description: "columns a million units from the origin" },
+        stiff::far_away,
+    ),
+    (BuiltInScene { name: "million", description: "hills of a million triangles" }, stiff::million),
+    (
+        BuiltInScene {
+            name: "grazing",
+            description: "camera and lamps just above plates of many roughnesses",
+        },
         stiff::grazing,
     ),
-    (Entry { name: "black", description: "black things under a lamp: nothing to see" }, stiff::black),
-    (Entry { name: "unlit", description: "a still life without any light: nothing to see" }, stiff::unlit),
+    (BuiltInScene { name: "black", description: "black things under a lamp: nothing to see" }, stiff::black),
+    (
+        BuiltInScene { name: "unlit", description: "a still life without any light: nothing to see" },
+        stiff::unlit,
+    ),
 ];
 
 /// The ordinary built-in scenes, in a fixed order.
-pub fn list() -> impl ExactSizeIterator<Item = Entry> {
+pub fn list() -> impl ExactSizeIterator<Item = BuiltInScene> {
     ORDINARY.iter().map(|(entry, _)| *entry)
 }
 
 /// Scenes that are hard on a renderer, each for one reason: for tests, and for looking at known trouble.
-pub fn stiff() -> impl ExactSizeIterator<Item = Entry> {
+pub fn stiff() -> impl ExactSizeIterator<Item = BuiltInScene> {
     STIFF.iter().map(|(entry, _)| *entry)
 }
 

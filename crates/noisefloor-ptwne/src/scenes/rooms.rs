@@ -1,6 +1,6 @@
 //! Rooms: a small light, a large light, and light from behind a door.
 
-use super::kit::{Kit, glow, look};
+use super::kit::{Kit, emission, look};
 use crate::{Material, Scene, SceneError, Texture};
 
 /// A desk in a dim corner, under a bulb.
@@ -52,7 +52,7 @@ pub(super) fn bulb(name: &str) -> Result<Scene, SceneError> {
 
     // A bulb on a wire: a small sphere
     k.cuboid([0.045, 1.96, -0.205], [0.055, 3.2, -0.195], black);
-    k.ball([0.05, 1.9, -0.2], 0.035, black, glow([1500.0, 1220.0, 840.0]));
+    k.ball([0.05, 1.9, -0.2], 0.035, black, emission([1500.0, 1220.0, 840.0]));
     k.build()
 }
 
@@ -92,8 +92,8 @@ pub(super) fn softbox(name: &str) -> Result<Scene, SceneError> {
     k.lathe([0.02, 0.18, 0.55], &cone, 40, false, red);
 
     // The soft box above, a strip from the left
-    k.floor(3.6, [-2.2, 2.2], [-1.2, 2.2], false, white, glow([2.8, 2.8, 2.7]));
-    k.quad([-4.2, 0.4, 2.6], [0.0, 2.2, 0.0], [0.6, 0.0, 0.8], white, glow([2.2, 2.6, 3.4]));
+    k.floor(3.6, [-2.2, 2.2], [-1.2, 2.2], false, white, emission([2.8, 2.8, 2.7]));
+    k.quad([-4.2, 0.4, 2.6], [0.0, 2.2, 0.0], [0.6, 0.0, 0.8], white, emission([2.2, 2.6, 3.4]));
     k.build()
 }
 
@@ -122,7 +122,7 @@ pub(super) fn door(name: &str) -> Result<Scene, SceneError> {
     k.cuboid([-2.5, 0.0, -0.1], [-2.4, 2.6, 4.0], wall);
     k.cuboid([-2.5, 2.1, -1.1], [-2.4, 2.6, -0.1], wall);
     k.turned([-2.1, 0.02, -0.35], [0.98, 2.06, 0.05], 35.0, wood);
-    k.floor(2.58, [-4.9, -2.9], [-1.9, 1.2], false, hall, glow([44.0, 40.0, 33.0]));
+    k.floor(2.58, [-4.9, -2.9], [-1.9, 1.2], false, hall, emission([44.0, 40.0, 33.0]));
 
     // Table with a still life
     k.cuboid([-0.75, 0.68, -1.2], [1.15, 0.75, -0.1], wood);

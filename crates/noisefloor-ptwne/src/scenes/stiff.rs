@@ -1,7 +1,7 @@
 //! Scenes that are hard on a renderer, each for one reason: what cannot be found by sampling lights, what f32 cannot hold, and
 //! what divides by nothing.
 
-use super::kit::{Kit, P, glow, look};
+use super::kit::{Kit, P, emission, look};
 use crate::{Environment, Material, Mesh, Scene, SceneError, Sun, Texture};
 use std::f32::consts::PI;
 
@@ -17,7 +17,7 @@ pub(super) fn caustic(name: &str) -> Result<Scene, SceneError> {
     k.wall([-4.0, -1.6], [4.0, -1.6], [0.0, 4.0], slate);
     k.ball([-0.25, 0.75, 0.0], 0.45, glass, None);
     k.turned([0.95, 0.3, 0.3], [0.4, 0.5, 0.4], 30.0, green);
-    k.ball([-2.0, 3.0, 0.6], 0.03, black, glow([9000.0, 8400.0, 7500.0]));
+    k.ball([-2.0, 3.0, 0.6], 0.03, black, emission([9000.0, 8400.0, 7500.0]));
     k.build()
 }
 
@@ -46,7 +46,7 @@ pub(super) fn keyhole(name: &str) -> Result<Scene, SceneError> {
     k.wall([0.28, -1.0], [0.34, -1.0], [0.0, 1.0], door);
     k.wall([0.28, -1.0], [0.34, -1.0], [1.12, 2.0], door);
     // The lamp: a panel in the next room
-    let lamp = glow([1600.0, 1450.0, 1200.0]);
+    let lamp = emission([1600.0, 1450.0, 1200.0]);
     k.quad([-0.19, 0.56, -1.4], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], black, lamp);
 
     k.turned([-0.9, 0.0, 0.4], [0.6, 0.6, 0.6], 25.0, blue);
@@ -70,7 +70,7 @@ pub(super) fn pinpoint(name: &str) -> Result<Scene, SceneError> {
     k.ball([0.05, 0.4, 0.3], 0.4, orange, None);
     k.ball([0.95, 0.45, -0.2], 0.45, brass, None);
     // An intensity of about 17: that of a ball is πr² times its radiance
-    k.ball([-0.4, 2.6, 1.4], 1e-4, black, glow([6e8, 5.6e8, 5e8]));
+    k.ball([-0.4, 2.6, 1.4], 1e-4, black, emission([6e8, 5.6e8, 5e8]));
     k.build()
 }
 
@@ -88,7 +88,7 @@ pub(super) fn decades(name: &str) -> Result<Scene, SceneError> {
         k.wall([high[0], -0.6], [high[0], 0.0], [low[1], high[1]], grey);
         k.floor(low[1], [low[0], high[0]], [-0.6, 0.0], true, grey, None);
         k.floor(high[1], [low[0], high[0]], [-0.6, 0.0], false, grey, None);
-        let light = glow([10f32.powi(2 * i - 8); 3]);
+        let light = emission([10f32.powi(2 * i - 8); 3]);
         k.quad([x - 0.15, y - 0.15, -0.55], [0.3, 0.0, 0.0], [0.0, 0.3, 0.0], black, light);
     }
     k.build()
@@ -108,7 +108,7 @@ pub(super) fn needles(name: &str) -> Result<Scene, SceneError> {
     // A drum of 8000 upright needles, 1 long and 1e-3 wide, between lids, and a cone of 500 slanted ones
     k.lathe([-0.75, 0.0, 0.0], &[[0.6, 0.0], [0.6, 1.0]], 4000, false, teal);
     k.floor(1.0, [-1.4, -0.1], [-0.65, 0.65], false, paper, None);
-    k.ball([-0.75, 0.5, 0.0], 0.2, black, glow([1000.0; 3]));
+    k.ball([-0.75, 0.5, 0.0], 0.2, black, emission([1000.0; 3]));
     k.lathe([-0.75, 1.0, 0.0], &[[0.5, 0.0], [0.0, 0.5]], 500, false, ink);
     // Each sheet is 1e-4 above the last at one edge, and 1e-6 at the other
     for i in 0..24 {
@@ -118,7 +118,7 @@ pub(super) fn needles(name: &str) -> Result<Scene, SceneError> {
         k.quad([0.4 + inset, low, 0.7], [1.0, high - low, 0.0], [0.0, 0.0, -1.0], sheet, None);
     }
     k.turned([0.9, 0.0, 0.2], [0.8, 0.29, 0.8], 0.0, ink);
-    k.quad([-1.5, 3.5, 2.5], [3.0, 0.0, 0.0], [0.0, 0.0, 1.5], black, glow([9.0, 8.6, 8.0]));
+    k.quad([-1.5, 3.5, 2.5], [3.0, 0.0, 0.0], [0.0, 0.0, 1.5], black, emission([9.0, 8.6, 8.0]));
     k.build()
 }
 
@@ -147,7 +147,7 @@ pub(super) fn far_away(name: &str) -> Result<Scene, SceneError> {
     }
     k.ball(at([-170.0, 110.0, 60.0]), 110.0, bronze, None);
     k.ball(at([140.0, 100.0, 190.0]), 100.0, glass, None);
-    let lamp = glow([60.0, 48.0, 30.0]);
+    let lamp = emission([60.0, 48.0, 30.0]);
     k.quad(at([-400.0, 430.0, -250.0]), [0.0, 0.0, 40.0], [800.0, 0.0, 0.0], black, lamp);
     k.build()
 }
@@ -213,7 +213,7 @@ pub(super) fn grazing(name: &str) -> Result<Scene, SceneError> {
             let x = -0.78 + 0.26 * (2 * i + j) as f32;
             k.floor(1e-3, [x, x + 0.24], [-2.0, 5.6], true, material, None);
             // A lamp at the end of each strip, and a bollard that casts a long shadow
-            k.ball([x + 0.12, 0.07, -2.5], 0.05, black, glow([40.0, 30.0, 20.0]));
+            k.ball([x + 0.12, 0.07, -2.5], 0.05, black, emission([40.0, 30.0, 20.0]));
             k.ball([x + 0.02, 0.02, 3.4 - 0.3 * i as f32], 0.02, ground, None);
         }
     }
@@ -240,7 +240,7 @@ fn still_life(name: &str, albedo: f32, lamp: bool) -> Result<Scene, SceneError> 
     k.ball([0.6, 0.45, 0.2], 0.45, mirror, None);
     if lamp {
         let radiance = 10.0 / (PI * 0.25);
-        k.ball([0.0, 3.5, 5.0], 0.5, matt, glow([radiance; 3]));
+        k.ball([0.0, 3.5, 5.0], 0.5, matt, emission([radiance; 3]));
     }
     k.build()
 }

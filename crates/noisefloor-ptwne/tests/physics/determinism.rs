@@ -2,17 +2,17 @@
 
 use crate::kit::batch;
 use noisefloor::{ProgressiveSource, Request, TileGrid};
-use noisefloor_ptwne::{Filter, Needs, Options, Ptwne, RenderError, Sampling, scenes};
+use noisefloor_ptwne::{Filter, Ptwne, RenderError, RenderOptions, Sampling, scenes};
 use std::num::NonZeroUsize;
 
-fn cornell(options: Options) -> Ptwne {
+fn cornell(options: RenderOptions) -> Ptwne {
     Ptwne::new(scenes::by_name("cornell-box").unwrap(), 40, 40, options).unwrap()
 }
 
 #[test]
 fn threads_change_nothing() {
     let run = |threads| {
-        let options = Options { threads: NonZeroUsize::new(threads), ..Options::default() };
+        let options = RenderOptions { threads: NonZeroUsize::new(threads), ..RenderOptions::default() };
         let mut source = cornell(options);
         (batch(&mut source, 5, 7), source.reference().unwrap())
     };
@@ -27,7 +27,7 @@ fn tiles_and_batches_change_nothing_but_rounding() {
         (Sampling::Sobol, Filter::Box),
         (Sampling::Sobol, Filter::Tent),
     ] {
-        let mut source = cornell(Options { sampling, filter, ..Options::default() });
+        let mut source = cornell(RenderOptions { sampling, filter, ..RenderOptions::default() });
         let (all, a, b) = (batch(&mut source, 0, 32), batch(&mut source, 0, 8), batch(&mut source, 8, 24));
         for ((all, a), b) in all.iter().zip(&a).zip(&b) {
             for c in 0..3 {
@@ -52,7 +52,7 @@ fn tiles_and_batches_change_nothing_but_rounding() {
 #[test]
 fn samples_are_the_same_wherever_batches_begin() {
     for sampling in [Sampling::Independent, Sampling::Sobol] {
-        let mut source = cornell(Options { sampling, ..Options::default() });
+        let mut source = cornell(RenderOptions { sampling, ..RenderOptions::default() });
         // Across the end of a Sobol sequence, too
         for first in [0, 65_534] {
             let together = batch(&mut source, first, 4);
@@ -65,17 +65,19 @@ fn samples_are_the_same_wherever_batches_begin() {
     }
 }
 
-/// Code that a scene does not need changes no bit of its picture.
+/// Opacity tests change no bit of the picture of a scene that does not need them.
 #[test]
-fn needs_change_nothing() {
+fn opacity_tests_change_nothing() {
     for name in ["cornell-box", "softbox", "courtyard", "glass-spheres", "plates", "grazing"] {
-        let run = |more: Option<Needs>| {
+        let run = |forced: bool| {
             let scene = scenes::by_name(name).unwrap();
-            let mut source = Ptwne::new(scene, 24, 24, Options::default()).unwrap();
-            more.into_iter().for_each(|more| source.burden(more));
+            let mut source = Ptwne::new(scene, 24, 24, RenderOptions::default()).unwrap();
+            if forced {
+                source.force_opacity_tests();
+            }
             batch(&mut source, 0, 8)
         };
-        assert_eq!(run(None), run(Some(Needs::ALL)), "{name}");
+        assert_eq!(run(false), run(true), "{name}");
     }
 }
 
@@ -84,7 +86,7 @@ fn needs_change_nothing() {
 #[test]
 fn sobol_points_have_the_same_mean_and_less_noise() {
     let run = |sampling| {
-        let options = Options { sampling, max_depth: 2, ..Options::default() };
+        let options = RenderOptions { sampling, max_depth: 2, ..RenderOptions::default() };
         let mut source = Ptwne::new(scenes::by_name("softbox").unwrap(), 24, 24, options).unwrap();
         let batches: Vec<_> = (0..16).map(|i| batch(&mut source, 64 * i, 64)).collect();
         let at = |b: &Vec<[f32; 3]>, i: usize| f64::from(b[i][1]);
@@ -105,7 +107,7 @@ fn sobol_points_have_the_same_mean_and_less_noise() {
 
 #[test]
 fn seeds_are_images() {
-    let run = |seed| batch(&mut cornell(Options { seed, ..Options::default() }), 0, 2);
+    let run = |seed| batch(&mut cornell(RenderOptions { seed, ..RenderOptions::default() }), 0, 2);
     assert_eq!(run(1), run(1));
     assert_ne!(run(1), run(2));
 }
@@ -114,7 +116,7 @@ fn seeds_are_images() {
 /// the noise of two pairs of batches at the same pixel, and of one pair at neighbouring pixels.
 #[test]
 fn disjoint_samples_are_uncorrelated() {
-    let mut source = cornell(Options::default());
+    let mut source = cornell(RenderOptions::default());
     let parts: Vec<_> = (0..4).map(|i| batch(&mut source, i * 16, 16)).collect();
     let noise = |a: usize, b: usize| -> Vec<f64> {
         parts[a].iter().zip(&parts[b]).map(|(a, b)| f64::from(a[1]) - f64::from(b[1])).collect()
@@ -132,18 +134,18 @@ fn disjoint_samples_are_uncorrelated() {
 #[test]
 fn bad_options_and_tiles_are_errors() {
     let scene = || scenes::by_name("cornell-box").unwrap();
-    assert!(matches!(Ptwne::new(scene(), 0, 10, Options::default()), Err(RenderError::Size(_))));
-    let options = Options { max_depth: 0, ..Options::default() };
+    assert!(matches!(Ptwne::new(scene(), 0, 10, RenderOptions::default()), Err(RenderError::Size(_))));
+    let options = RenderOptions { max_depth: 0, ..RenderOptions::default() };
     assert!(matches!(
         Ptwne::new(scene(), 10, 10, options),
         Err(RenderError::Option { name: "max_depth", .. })
     ));
-    let options = Options { threads: NonZeroUsize::new(1 << 20), ..Options::default() };
+    let options = RenderOptions { threads: NonZeroUsize::new(1 << 20), ..RenderOptions::default() };
     assert!(matches!(Ptwne::new(scene(), 10, 10, options), Err(RenderError::Option { name: "threads", .. })));
     let tile = TileGrid::new(64, 64, 32).unwrap().tile(3);
-    assert!(cornell(Options::default()).sample(&[Request { tile, first: 0, samples: 1 }]).is_err());
+    assert!(cornell(RenderOptions::default()).sample(&[Request { tile, first: 0, samples: 1 }]).is_err());
     let tile = TileGrid::new(40, 40, 32).unwrap().tile(3);
-    let none = cornell(Options::default()).sample(&[Request { tile, first: 0, samples: 0 }]).unwrap();
+    let none = cornell(RenderOptions::default()).sample(&[Request { tile, first: 0, samples: 0 }]).unwrap();
     assert!(none[0].samples == 0 && none[0].mean.is_empty());
 }
 
@@ -159,7 +161,7 @@ fn background_tiles_trace_no_rays() {
         };
         b.environment(sky).unwrap();
     });
-    let mut source = Ptwne::new(scene, 96, 96, Options::default()).unwrap();
+    let mut source = Ptwne::new(scene, 96, 96, RenderOptions::default()).unwrap();
     let whole = batch(&mut source, 0, 4);
     assert_eq!(source.counts().background, 0);
     let tiles = TileGrid::new(96, 96, 32).unwrap().tiles();

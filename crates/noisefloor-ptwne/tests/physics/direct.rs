@@ -3,8 +3,8 @@
 use crate::kit::{agrees, batch, look, mean, scene};
 use noisefloor::ProgressiveSource;
 use noisefloor_ptwne::{
-    Camera, Cover, Emission, Environment, EnvironmentMap, Estimator, ImageTexture, Material, MaterialId,
-    Mesh, Options, Pixels, Ptwne, Punctual, Scene, SceneBuilder, Sun, Texture, scenes,
+    Camera, Emission, Environment, EnvironmentMap, Estimator, ImageTexture, Material, MaterialId,
+    MaterialOptions, Mesh, Pixels, Ptwne, Punctual, RenderOptions, Scene, SceneBuilder, Sun, Texture, scenes,
 };
 
 const DIRECT: u32 = 2;
@@ -29,7 +29,7 @@ fn lit(light: impl FnOnce(&mut SceneBuilder, MaterialId)) -> Scene {
 /// mean of 16 pixels, which see the same.
 fn check(scene: &Scene, expected: f64) {
     check_samples(scene, expected);
-    let mut source = Ptwne::new(scene.clone(), 4, 4, Options::default()).unwrap();
+    let mut source = Ptwne::new(scene.clone(), 4, 4, RenderOptions::default()).unwrap();
     let pixels = source.reference().unwrap().unwrap().pixels;
     let reference = pixels.iter().map(|p| f64::from(p[0])).sum::<f64>() / 16.0;
     assert!((reference - expected).abs() < 1e-2 * expected, "reference {reference}, expected {expected}");
@@ -38,14 +38,15 @@ fn check(scene: &Scene, expected: f64) {
 /// Checks next events, shared with scattering and alone.
 fn check_samples(scene: &Scene, expected: f64) {
     for estimator in [Estimator::Mis, Estimator::NextEvents] {
-        let options = Options { estimator, max_depth: DIRECT, ..Options::default() };
+        let options = RenderOptions { estimator, max_depth: DIRECT, ..RenderOptions::default() };
         agrees(mean(scene.clone(), 4, 64, 100, 0, options), expected, 2e-3);
     }
 }
 
 /// Checks scattering alone, for lights that fill a good share of the sky: one path in ten or more meets them.
 fn check_brute_force(scene: &Scene, expected: f64) {
-    let options = Options { estimator: Estimator::BruteForce, max_depth: DIRECT, ..Options::default() };
+    let options =
+        RenderOptions { estimator: Estimator::BruteForce, max_depth: DIRECT, ..RenderOptions::default() };
     agrees(mean(scene.clone(), 4, 64, 200, 0, options), expected, 2e-3);
 }
 
@@ -163,8 +164,8 @@ fn punctual_lights_have_no_noise() {
     check(&spot(20.0, 50.0), point * fade * fade);
     check(&spot(40.0, 50.0), point);
     // Out of the cone there is no light; and by scattering, no point is ever met
-    let by_chance = Options { estimator: Estimator::BruteForce, ..Options::default() };
-    for (scene, options) in [(spot(10.0, 35.0), Options::default()), (spot(40.0, 50.0), by_chance)] {
+    let by_chance = RenderOptions { estimator: Estimator::BruteForce, ..RenderOptions::default() };
+    for (scene, options) in [(spot(10.0, 35.0), RenderOptions::default()), (spot(40.0, 50.0), by_chance)] {
         let mut dark = Ptwne::new(scene, 4, 4, options).unwrap();
         assert_eq!(batch(&mut dark, 0, 16), vec![[0.0; 3]; 16]);
     }
@@ -237,8 +238,8 @@ fn textured_lights_shine_by_their_image() {
 fn holes_let_light_through() {
     let with = |opacity: Texture, light: &dyn Fn(&mut SceneBuilder, MaterialId)| {
         lit(|b, m| {
-            let cover = Cover { opacity: Some(opacity), one_sided: false };
-            let plate = b.material_with(Material::diffuse([0.0; 3]), cover).unwrap();
+            let options = MaterialOptions { opacity: Some(opacity), one_sided: false };
+            let plate = b.material_with(Material::diffuse([0.0; 3]), options).unwrap();
             b.parallelogram([-2.0, 1.5, -2.0], [4.0, 0.0, 0.0], [0.0, 0.0, 4.0], plate, None).unwrap();
             light(b, m);
         })
@@ -267,25 +268,25 @@ fn holes_are_looked_through() {
     let camera = look([0.0, 0.0, 4.0], [0.0; 3], [0.0, 1.0, 0.0], 20.0);
     let scene = scene(camera, |b| {
         for (z, opacity) in [(0.0, 1.0 / 3.0), (-1.0, 0.5)] {
-            let cover = Cover { opacity: Some([opacity; 3].into()), one_sided: false };
-            let m = b.material_with(Material::diffuse([0.0; 3]), cover).unwrap();
+            let options = MaterialOptions { opacity: Some([opacity; 3].into()), one_sided: false };
+            let m = b.material_with(Material::diffuse([0.0; 3]), options).unwrap();
             b.parallelogram([-9.0, -9.0, z], [18.0, 0.0, 0.0], [0.0, 18.0, 0.0], m, None).unwrap();
         }
         b.environment(Environment::constant([1.0; 3])).unwrap();
     });
-    agrees(mean(scene, 16, 64, 16, 0, Options::default()), 1.0 / 3.0, 1e-6);
+    agrees(mean(scene, 16, 64, 16, 0, RenderOptions::default()), 1.0 / 3.0, 1e-6);
 }
 
 #[test]
 fn backs_of_one_sided_surfaces_are_black() {
     for (z, expected) in [(4.0, 0.5), (-4.0, 0.0)] {
         let scene = scene(look([0.0, 0.0, z], [0.0; 3], [0.0, 1.0, 0.0], 20.0), |b| {
-            let cover = Cover { opacity: None, one_sided: true };
-            let m = b.material_with(Material::diffuse([0.5; 3]), cover).unwrap();
+            let options = MaterialOptions { opacity: None, one_sided: true };
+            let m = b.material_with(Material::diffuse([0.5; 3]), options).unwrap();
             b.parallelogram([-9.0, -9.0, 0.0], [18.0, 0.0, 0.0], [0.0, 18.0, 0.0], m, None).unwrap();
             b.environment(Environment::constant([1.0; 3])).unwrap();
         });
-        let mut source = Ptwne::new(scene, 4, 4, Options::default()).unwrap();
+        let mut source = Ptwne::new(scene, 4, 4, RenderOptions::default()).unwrap();
         let mut all = batch(&mut source, 0, 4);
         all.extend(source.reference().unwrap().unwrap().pixels);
         assert!(all.iter().flatten().all(|x| (x - expected).abs() < 1e-5), "{all:?}");
@@ -295,7 +296,7 @@ fn backs_of_one_sided_surfaces_are_black() {
 /// In the Cornell box, cut to direct light, the reference is what the path tracer converges to.
 #[test]
 fn the_reference_is_converged_direct_light() {
-    let options = Options { max_depth: DIRECT, ..Options::default() };
+    let options = RenderOptions { max_depth: DIRECT, ..RenderOptions::default() };
     let mut source = Ptwne::new(scenes::by_name("cornell-box").unwrap(), 48, 48, options).unwrap();
     let reference = source.reference().unwrap().unwrap().pixels;
     assert_eq!(reference, source.reference().unwrap().unwrap().pixels);

@@ -2,17 +2,17 @@
 
 use crate::kit::{batch, look, scene};
 use noisefloor::ProgressiveSource;
-use noisefloor_ptwne::{Emission, Environment, Material, Mesh, Options, Ptwne, Scene, Sun, scenes};
+use noisefloor_ptwne::{Emission, Environment, Material, Mesh, Ptwne, RenderOptions, Scene, Sun, scenes};
 use std::sync::Arc;
 
 fn check(scene: Scene, samples: u32) {
     let scene = Arc::new(scene);
-    let mut source = Ptwne::new(scene.clone(), 32, 32, Options::default()).unwrap();
+    let mut source = Ptwne::new(scene.clone(), 32, 32, RenderOptions::default()).unwrap();
     let mut all = batch(&mut source, 0, samples);
     let counts = source.counts();
     assert_eq!((counts.samples, counts.dropped, counts.clamped), (32 * 32 * u64::from(samples), 0, 0));
     // Where it is hard to find the light, references take thousands of samples a pixel
-    let mut small = Ptwne::new(scene, 16, 16, Options::default()).unwrap();
+    let mut small = Ptwne::new(scene, 16, 16, RenderOptions::default()).unwrap();
     all.extend(small.reference().unwrap().unwrap().pixels);
     let good = |v: &f32| v.is_finite() && *v >= 0.0;
     assert!(all.iter().flatten().all(good), "{:?}", all.iter().find(|p| !p.iter().all(good)));
@@ -67,7 +67,7 @@ fn an_empty_scene_is_its_sky() {
     let empty = scene(look([0.0; 3], [0.0, 0.0, 1.0], [0.0, 1.0, 0.0], 40.0), |b| {
         b.environment(Environment::constant([0.25, 0.5, 1.0])).unwrap();
     });
-    let mut source = Ptwne::new(empty, 8, 8, Options::default()).unwrap();
+    let mut source = Ptwne::new(empty, 8, 8, RenderOptions::default()).unwrap();
     assert!(batch(&mut source, 0, 3).iter().all(|p| *p == [0.25, 0.5, 1.0]));
     assert!(source.reference().unwrap().unwrap().pixels.iter().all(|p| *p == [0.25, 0.5, 1.0]));
 }
@@ -77,10 +77,11 @@ fn an_empty_scene_is_its_sky() {
 fn clamps_bound_samples_and_are_counted() {
     let run = |clamp| {
         let scene = scenes::by_name("glass-spheres").unwrap();
-        let mut source = Ptwne::new(scene, 32, 32, Options { clamp, ..Options::default() }).unwrap();
+        let mut source =
+            Ptwne::new(scene, 32, 32, RenderOptions { clamp, ..RenderOptions::default() }).unwrap();
         (batch(&mut source, 0, 1), source.counts().clamped)
     };
-    assert_eq!(Options::default().clamp, None);
+    assert_eq!(RenderOptions::default().clamp, None);
     let ((free, none), (bound, clamped)) = (run(None), run(Some(2.0)));
     let mut above = 0;
     for (free, bound) in free.iter().zip(&bound) {

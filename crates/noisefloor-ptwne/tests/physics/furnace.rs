@@ -1,7 +1,7 @@
 //! Furnaces: closed rooms and uniform surroundings, where radiance is known.
 
 use crate::kit::{agrees, look, mean, scene};
-use noisefloor_ptwne::{Emission, Environment, Estimator, Material, Options, SceneBuilder, Texture};
+use noisefloor_ptwne::{Emission, Environment, Estimator, Material, RenderOptions, SceneBuilder, Texture};
 
 const UP: [f32; 3] = [0.0, 1.0, 0.0];
 
@@ -24,7 +24,7 @@ fn closed_rooms_have_the_radiance_of_the_geometric_series() {
         }
     };
     for estimator in [Estimator::Mis, Estimator::NextEvents, Estimator::BruteForce] {
-        let options = Options { estimator, seed: 3, ..Options::default() };
+        let options = RenderOptions { estimator, seed: 3, ..RenderOptions::default() };
         for (channel, albedo) in [(0, 0.6), (1, 0.3)] {
             // The offset of ray origins and 0.9999 of shadow rays: less than 1e-3 of the light is lost in corners
             agrees(mean(scene(camera, sphere), 8, 64, 40, channel, options), 0.5 / (1.0 - albedo), 1e-3);
@@ -47,7 +47,7 @@ fn lossless_balls_cannot_be_seen() {
             b.environment(Environment::constant([1.0; 3])).unwrap();
         });
         // Without roulette every sample is exactly 1, up to rounding and light still inside the glass after 65 segments
-        let options = Options { roulette: 1000, ..Options::default() };
+        let options = RenderOptions { roulette: 1000, ..RenderOptions::default() };
         let (radiance, _) = mean(scene, 24, 2, 16, 1, options);
         assert!((radiance - 1.0).abs() < 1e-5, "{material:?}: {radiance}");
     }
@@ -63,7 +63,7 @@ fn albedo(material: Material, degrees: f32, samples: u32) -> (f64, f64) {
         b.parallelogram([-9.0, 0.0, -9.0], [0.0, 0.0, 18.0], [18.0, 0.0, 0.0], m, None).unwrap();
         b.environment(Environment::constant([1.0; 3])).unwrap();
     });
-    mean(scene, 4, 64, samples, 0, Options::default())
+    mean(scene, 4, 64, samples, 0, RenderOptions::default())
 }
 
 /// Reflectance of a boundary with the index of refraction η + ik, from Fresnel's equations with complex numbers.

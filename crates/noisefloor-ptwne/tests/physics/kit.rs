@@ -1,7 +1,7 @@
 //! Scenes of one surface, and means with their standard errors.
 
 use noisefloor::{ProgressiveSource, Request, Rgb, Tile};
-use noisefloor_ptwne::{Camera, Options, Ptwne, Scene, SceneBuilder};
+use noisefloor_ptwne::{Camera, Ptwne, RenderOptions, Scene, SceneBuilder};
 
 pub(crate) fn look(eye: [f32; 3], target: [f32; 3], up: [f32; 3], vertical_fov: f32) -> Camera {
     Camera { eye, target, up, vertical_fov }
@@ -29,7 +29,7 @@ pub(crate) fn mean(
     batches: u64,
     samples: u32,
     channel: usize,
-    options: Options,
+    options: RenderOptions,
 ) -> (f64, f64) {
     let mut source = Ptwne::new(scene, size, size, options).unwrap();
     let means: Vec<f64> = (0..batches)

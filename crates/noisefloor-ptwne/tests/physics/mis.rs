@@ -1,7 +1,7 @@
 //! Next events, scattering, and both together: they change noise, not the mean.
 
 use crate::kit::batch;
-use noisefloor_ptwne::{Estimator, Options, Ptwne, scenes};
+use noisefloor_ptwne::{Estimator, Ptwne, RenderOptions, scenes};
 
 /// Edge of the picture, and of its parts that are compared, in pixels.
 const SIZE: usize = 24;
@@ -15,7 +15,8 @@ fn parts(name: &str, estimator: Estimator, samples: u32) -> [(f64, f64); PARTS] 
     let mut means = vec![];
     for seed in 0..SEEDS {
         // No two renders share random numbers
-        let options = Options { estimator, seed: 3 * seed + estimator as u64, ..Options::default() };
+        let options =
+            RenderOptions { estimator, seed: 3 * seed + estimator as u64, ..RenderOptions::default() };
         let mut source = Ptwne::new(scenes::by_name(name).unwrap(), SIZE, SIZE, options).unwrap();
         means.extend((0..BATCHES).map(|i| {
             let pixels = batch(&mut source, i * u64::from(samples), samples);

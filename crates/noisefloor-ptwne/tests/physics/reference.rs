@@ -2,7 +2,7 @@
 
 use crate::kit::{batch, look, scene};
 use noisefloor::{NoiseMask, ProgressiveSource, ToneMapping};
-use noisefloor_ptwne::{Emission, Material, Options, Ptwne, Scene, scenes};
+use noisefloor_ptwne::{Emission, Material, Ptwne, RenderOptions, Scene, scenes};
 use std::error::Error;
 use std::ops::ControlFlow;
 use std::sync::{Arc, Mutex};
@@ -14,8 +14,9 @@ const PROMISE: f64 = 0.32 / 255.0;
 /// it says of that itself; and how many blocks have more than was promised.
 fn deviation(scene: Scene, size: usize) -> (f64, f64, usize) {
     let scene = Arc::new(scene);
-    let source =
-        |seed| Ptwne::new(scene.clone(), size, size, Options { seed, ..Options::default() }).unwrap();
+    let source = |seed| {
+        Ptwne::new(scene.clone(), size, size, RenderOptions { seed, ..RenderOptions::default() }).unwrap()
+    };
     let display = ToneMapping::default().settle(&batch(&mut source(3), 0, 16));
     let (mut own, mut unsettled) = (0.0, 0);
     let shown = [1, 2].map(|seed| {
@@ -62,7 +63,8 @@ fn lamps_close_to_walls_leave_no_noise() {
 /// Whoever watches is told of every block once, and can end it.
 #[test]
 fn it_is_watched_and_given_up() {
-    let mut source = Ptwne::new(scenes::by_name("cornell-box").unwrap(), 40, 24, Options::default()).unwrap();
+    let mut source =
+        Ptwne::new(scenes::by_name("cornell-box").unwrap(), 40, 24, RenderOptions::default()).unwrap();
     let told = Arc::new(Mutex::new(Vec::new()));
     let list = Arc::clone(&told);
     source.watch_reference(move |done, all| {
@@ -77,7 +79,7 @@ fn it_is_watched_and_given_up() {
     source
         .watch_reference(|done, _| if done < 3 { ControlFlow::Continue(()) } else { ControlFlow::Break(()) });
     let error = source.reference().unwrap_err();
-    assert!(error.source().unwrap().to_string().contains("given up"), "{error:?}");
+    assert!(error.source().unwrap().to_string().contains("cancelled"), "{error:?}");
     // And no harm is done
     source.watch_reference(|_, _| ControlFlow::Continue(()));
     assert!(source.reference().unwrap().is_some());

@@ -3,7 +3,7 @@
 use crate::kit::{agrees, batch, look, mean, scene};
 use noisefloor::{ProgressiveSource, Rgb};
 use noisefloor_ptwne::{
-    Camera, Emission, Environment, Estimator, Material, Mesh, Options, Ptwne, Punctual, Scene, scenes,
+    Camera, Emission, Environment, Estimator, Material, Mesh, Ptwne, Punctual, RenderOptions, Scene, scenes,
 };
 
 const UP: [f32; 3] = [0.0, 1.0, 0.0];
@@ -19,7 +19,7 @@ fn leaks(positions: &[[f32; 3]], indices: &[[u32; 3]], eye: [f32; 3]) -> f64 {
     });
     let seen = |target| {
         let shell = shell.clone().with_camera(towards(target)).unwrap();
-        mean(shell, 128, 2, 8, 1, Options::default()).0
+        mean(shell, 128, 2, 8, 1, RenderOptions::default()).0
     };
     targets.map(seen).iter().sum::<f64>() / 4.0
 }
@@ -63,7 +63,7 @@ fn stiff(name: &str, camera: Option<Camera>) -> Scene {
 #[test]
 fn without_light_or_reflection_there_is_nothing() {
     for name in ["black", "unlit"] {
-        let mut source = Ptwne::new(stiff(name, None), 32, 32, Options::default()).unwrap();
+        let mut source = Ptwne::new(stiff(name, None), 32, 32, RenderOptions::default()).unwrap();
         assert!(batch(&mut source, 0, 16).iter().all(|p| *p == [0.0; 3]));
         assert!(source.reference().unwrap().unwrap().pixels.iter().all(|p| *p == [0.0; 3]));
     }
@@ -76,10 +76,10 @@ fn a_pinpoint_lights_as_a_point() {
     let d2 = 1.6 * 1.6 + 2.9 * 2.9;
     let expected = 0.75 * 1e-8 * 6e8 * 2.9 / f64::powf(d2, 1.5);
     for estimator in [Estimator::Mis, Estimator::NextEvents] {
-        let options = Options { estimator, max_depth: 2, ..Options::default() };
+        let options = RenderOptions { estimator, max_depth: 2, ..RenderOptions::default() };
         agrees(mean(stiff("pinpoint", Some(camera)), 4, 64, 20, 0, options), expected, 1e-3);
     }
-    let mut source = Ptwne::new(stiff("pinpoint", Some(camera)), 4, 4, Options::default()).unwrap();
+    let mut source = Ptwne::new(stiff("pinpoint", Some(camera)), 4, 4, RenderOptions::default()).unwrap();
     let reference = f64::from(source.reference().unwrap().unwrap().pixels[5][0]);
     assert!((reference - expected).abs() < 1e-3 * expected, "{reference} {expected}");
 }
@@ -90,7 +90,7 @@ fn a_pinpoint_lights_as_a_point() {
 fn a_keyhole_lights_as_a_small_lamp() {
     let camera = look([0.31, 1.06, 0.0], [0.31, 1.06, 4.0], UP, 0.05);
     let expected = 0.75 * 1600.0 * 0.06 * 0.12 / (std::f64::consts::PI * 25.0);
-    let options = Options { max_depth: 2, ..Options::default() };
+    let options = RenderOptions { max_depth: 2, ..RenderOptions::default() };
     agrees(mean(stiff("keyhole", Some(camera)), 4, 64, 800, 0, options), expected, 2e-3);
 }
 
@@ -99,7 +99,7 @@ fn a_keyhole_lights_as_a_small_lamp() {
 #[test]
 fn decades_keep_to_themselves() {
     const SIZE: usize = 96;
-    let mut source = Ptwne::new(stiff("decades", None), SIZE, SIZE, Options::default()).unwrap();
+    let mut source = Ptwne::new(stiff("decades", None), SIZE, SIZE, RenderOptions::default()).unwrap();
     let batches: Vec<Vec<Rgb>> = (0..64).map(|i| batch(&mut source, 4 * i, 4)).collect();
     assert_eq!(source.counts().dropped, 0);
     let radiance = |i: usize| 10f64.powi(2 * i as i32 - 8);
@@ -157,7 +157,7 @@ fn far_away_is_as_near() {
         })
     };
     let render = |scene| {
-        let mut source = Ptwne::new(scene, 32, 32, Options::default()).unwrap();
+        let mut source = Ptwne::new(scene, 32, 32, RenderOptions::default()).unwrap();
         (batch(&mut source, 0, 8), source.reference().unwrap().unwrap().pixels)
     };
     let (here, there) = ([0.0; 3], [998_000.0, -999_000.0, 997_000.0]);

@@ -9,7 +9,9 @@ use gltf::json::texture::Info;
 use gltf::json::validation::Checked;
 use gltf::json::{Index, extensions};
 use noisefloor::Rgb;
-use noisefloor_ptwne::{Cover, Emission, ImageTexture, Material, MaterialId, SceneBuilder, Texture};
+use noisefloor_ptwne::{
+    Emission, ImageTexture, Material, MaterialId, MaterialOptions, SceneBuilder, Texture,
+};
 use std::collections::HashMap;
 
 /// Indices of refraction that the renderer takes for a material that is not transparent.
@@ -79,7 +81,7 @@ struct Reader<'m, 'a> {
 }
 
 impl<'m> Reader<'m, '_> {
-    fn read(&mut self) -> Result<(Material, Cover, Option<Emission>), LoadError> {
+    fn read(&mut self) -> Result<(Material, MaterialOptions, Option<Emission>), LoadError> {
         let source = self.source;
         let pbr = &source.pbr_metallic_roughness;
         let ignored = [
@@ -104,7 +106,10 @@ impl<'m> Reader<'m, '_> {
         };
         // The inside of glass is part of it, and a pane has no inside
         let glass = matches!(material, Material::Glass { .. } | Material::ThinGlass { .. });
-        let cover = Cover { opacity: self.opacity(base_texture)?, one_sided: !source.double_sided && !glass };
+        let cover = MaterialOptions {
+            opacity: self.opacity(base_texture)?,
+            one_sided: !source.double_sided && !glass,
+        };
         Ok((material, cover, self.emission(emissive_texture)?))
     }
 

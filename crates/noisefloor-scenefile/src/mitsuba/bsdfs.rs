@@ -5,7 +5,7 @@ use super::values::Use;
 use super::xml::Element;
 use crate::error::LoadError;
 use noisefloor::Rgb;
-use noisefloor_ptwne::{Cover, Material, Texture};
+use noisefloor_ptwne::{Material, MaterialOptions, Texture};
 
 /// How deep surfaces may nest.
 const MAX_NESTED: u64 = 16;
@@ -42,18 +42,18 @@ const METALS: [(&str, Rgb, Rgb); 6] = [
 #[derive(Clone, Debug)]
 pub(super) struct Surface {
     pub(super) material: Material,
-    pub(super) cover: Cover,
+    pub(super) cover: MaterialOptions,
 }
 
 impl Surface {
     /// What reflects, and is black from behind.
     fn one_sided(material: Material) -> Self {
-        Self { material, cover: Cover { opacity: None, one_sided: true } }
+        Self { material, cover: MaterialOptions { opacity: None, one_sided: true } }
     }
 
     /// What is seen from both sides.
     fn two_sided(material: Material) -> Self {
-        Self { material, cover: Cover::default() }
+        Self { material, cover: MaterialOptions::default() }
     }
 
     /// What Mitsuba gives shapes without a surface: grey, or, if they shine, black.
@@ -123,7 +123,7 @@ impl<'d> Context<'d> {
                     return Err(self.unsupported(element, "a mask in a mask"));
                 }
                 let opacity = self.luminance(element, self.factor(element, "opacity", 0.5)?)?;
-                Ok(Surface { cover: Cover { opacity: Some(opacity), ..surface.cover }, ..surface })
+                Ok(Surface { cover: MaterialOptions { opacity: Some(opacity), ..surface.cover }, ..surface })
             }
             kind @ ("bumpmap" | "normalmap") => {
                 self.warn(element, format!("the relief of <bsdf type=\"{kind}\"> is left out: it is smooth"));

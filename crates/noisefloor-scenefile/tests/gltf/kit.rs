@@ -2,7 +2,7 @@
 
 use gltf::json::{Value, deserialize, serialize};
 use noisefloor::{ProgressiveSource, Request, Rgb, Tile};
-use noisefloor_ptwne::{Options, Ptwne};
+use noisefloor_ptwne::{Ptwne, RenderOptions};
 use noisefloor_scenefile::{LoadError, Loaded};
 use std::fmt::Write;
 use std::io::Cursor;
@@ -174,7 +174,7 @@ pub(crate) fn assert_warns(loaded: &Loaded, parts: &[&str]) {
 
 /// Means of `samples` samples a pixel of paths of up to `max_depth` segments, row-major from the top left.
 pub(crate) fn render(loaded: Loaded, size: usize, samples: u32, max_depth: u32) -> Vec<Rgb> {
-    let options = Options { max_depth, seed: 5, ..Options::default() };
+    let options = RenderOptions { max_depth, seed: 5, ..RenderOptions::default() };
     let mut source = Ptwne::new(loaded.scene, size, size, options).unwrap();
     let tile = Tile { index: 0, x: 0, y: 0, width: size, height: size };
     source.sample(&[Request { tile, first: 0, samples }]).unwrap().remove(0).mean

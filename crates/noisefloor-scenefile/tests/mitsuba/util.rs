@@ -1,5 +1,5 @@
 use noisefloor::{ProgressiveSource, Request, Rgb, TileGrid};
-use noisefloor_ptwne::{Options, Ptwne};
+use noisefloor_ptwne::{Ptwne, RenderOptions};
 use noisefloor_scenefile::{Loaded, load};
 use std::error::Error;
 use std::path::Path;
@@ -68,7 +68,8 @@ impl Folder {
 
 /// What the camera of a scene sees, in the mean over a pixel.
 pub(crate) fn look(loaded: Loaded) -> Rgb {
-    let mut source = Ptwne::new(loaded.scene, 1, 1, Options { seed: 1, ..Options::default() }).unwrap();
+    let mut source =
+        Ptwne::new(loaded.scene, 1, 1, RenderOptions { seed: 1, ..RenderOptions::default() }).unwrap();
     let tile = TileGrid::new(1, 1, 16).unwrap().tile(0);
     source.sample(&[Request { tile, first: 0, samples: 4096 }]).unwrap()[0].mean[0]
 }

@@ -1,0 +1,47 @@
+//! The hierarchy against a loop over all surfaces.
+
+use super::{Bvh, Shape};
+use crate::math::{self, Ray, Vec3};
+use crate::rng::{Key, Rng};
+
+/// The hierarchy finds the same surfaces as a loop over all of them.
+#[test]
+fn traversal_agrees_with_a_loop() {
+    let mut rng = Rng::new(Key::new(7), 0, 0);
+    let mut point =
+        |scale: f32| glam::Vec3::from_array([rng.one(), rng.one(), rng.one()]) * scale - 0.5 * scale;
+    let shapes: Vec<Shape> = (0..300)
+        .map(|i| match i % 3 {
+            0 => Shape::Sphere { centre: point(4.0), radius: 0.1 },
+            1 if i % 2 == 0 => Shape::Disk { centre: point(4.0), e1: point(1.0), e2: point(1.0) },
+            k => Shape::Planar { corner: point(4.0), e1: point(1.0), e2: point(1.0), whole: k == 1 },
+        })
+        .collect();
+    let bvh = Bvh::new(&shapes);
+    let alone: Vec<Bvh> = shapes.iter().map(|s| Bvh::new(&[*s])).collect();
+    let mut stack = bvh.stack();
+    let mut hits = 0;
+    for i in 0..5000 {
+        let mut rng = Rng::new(Key::new(8), i, 0);
+        let ray = Ray { origin: point(4.0).into(), dir: math::sphere(rng.two()).normalize() };
+        let hit = bvh.closest(&ray, &mut stack, |_, _| true);
+        let all = alone.iter().map(|a| a.closest(&ray, &mut stack, |_, _| true).t);
+        let best = all.fold(f32::INFINITY, f32::min);
+        // A surface alone is widened less
+        assert!(hit.t == best || (hit.t - best).abs() < 1e-5 * best, "{} {best}", hit.t);
+        assert_eq!(bvh.blocked::<true>(&ray, f32::INFINITY, &mut stack, |_, _| true), best.is_finite());
+        if best.is_finite() {
+            hits += 1;
+            assert!(!bvh.blocked::<true>(&ray, hit.t, &mut stack, |_, _| true));
+        }
+    }
+    assert!(hits > 500, "{hits}");
+}
+
+#[test]
+fn no_ray_hits_an_empty_hierarchy() {
+    let bvh = Bvh::new(&[]);
+    let ray = Ray { origin: Vec3::ZERO, dir: Vec3::new(0.0, 0.6, -0.8) };
+    assert!(bvh.closest(&ray, &mut bvh.stack(), |_, _| true).t.is_infinite());
+    assert!(!bvh.blocked::<false>(&ray, 1.0, &mut bvh.stack(), |_, _| true));
+}

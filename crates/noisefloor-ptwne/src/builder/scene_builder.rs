@@ -1,0 +1,306 @@
+//! The builder.
+
+use super::input::{Emission, MAX_SURFACES, MIN_AREA, MaterialId, Mesh};
+use crate::accel::Shape;
+use crate::bsdf::Coat;
+use crate::camera::Camera;
+use crate::checks::{MAX_COORDINATE, check_radiance, check_range, position};
+use crate::environment::{Environment, EnvironmentMap};
+use crate::error::SceneError;
+use crate::geometry::{Group, NO};
+use crate::light::{Light, Punctual};
+use crate::material::{CompiledMaterial, Material, MaterialOptions};
+use crate::parts::{Parts, Surroundings};
+use crate::scene::Scene;
+use glam::Vec3;
+use noisefloor::Rgb;
+use std::sync::Arc;
+
+/// Collects the parts of a scene, and checks each one as it is added.
+///
+/// ```
+/// use noisefloor_ptwne::{Camera, Emission, Environment, Material, SceneBuilder};
+/// let camera = Camera { eye: [0.0, 1.0, 4.0], target: [0.0, 1.0, 0.0], up: [0.0, 1.0, 0.0], vertical_fov: 40.0 };
+/// let mut builder = SceneBuilder::new("ball", camera)?;
+/// let grey = builder.material(Material::diffuse([0.5; 3]))?;
+/// builder.parallelogram([-5.0, 0.0, 5.0], [10.0, 0.0, 0.0], [0.0, 0.0, -10.0], grey, None)?;
+/// builder.sphere([0.0, 1.0, 0.0], 1.0, grey, None)?;
+/// builder.sphere([2.0, 3.0, 2.0], 0.2, grey, Some(Emission::front([50.0; 3])))?;
+/// builder.environment(Environment::constant([0.1, 0.2, 0.4]))?;
+/// assert_eq!(builder.build()?.surfaces(), 3);
+/// # Ok::<(), noisefloor_ptwne::SceneError>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct SceneBuilder {
+    name: String,
+    camera: Camera,
+    parts: Parts,
+    coats: Vec<Arc<Coat>>,
+}
+
+impl SceneBuilder {
+    /// An empty scene. The name appears in reports.
+    ///
+    /// # Errors
+    /// [`SceneError`] if the camera has no view direction, or a number is out of range.
+    pub fn new(name: impl Into<String>, camera: Camera) -> Result<Self, SceneError> {
+        camera.check()?;
+        Ok(Self { name: name.into(), camera, parts: Parts::default(), coats: vec![] })
+    }
+
+    /// Adds a material that is opaque and two-sided.
+    ///
+    /// # Errors
+    /// As [`SceneBuilder::material_with`].
+    pub fn material(&mut self, material: Material) -> Result<MaterialId, SceneError> {
+        self.material_with(material, MaterialOptions::default())
+    }
+
+    /// Adds a material that may be transparent in parts, or one-sided.
+    ///
+    /// # Errors
+    /// [`SceneError`] if a reflectance, index of refraction or roughness is out of range, or an image has the wrong
+    /// number of pixels.
+    pub fn material_with(
+        &mut self,
+        material: Material,
+        options: MaterialOptions,
+    ) -> Result<MaterialId, SceneError> {
+        self.parts.materials.push(CompiledMaterial::new(material, options, &mut self.coats)?);
+        Ok(MaterialId(self.parts.materials.len() as u32 - 1))
+    }
+
+    /// Surrounds the scene with a sky, which replaces earlier surroundings. By default, they are black.
+    ///
+    /// # Errors
+    /// [`SceneError`] if a radiance is negative or not finite, or the sun's size is out of range.
+    pub fn environment(&mut self, environment: Environment) -> Result<(), SceneError> {
+        environment.check()?;
+        self.parts.surroundings = Some(Surroundings::Sky(environment));
+        Ok(())
+    }
+
+    /// Surrounds the scene with an image, which replaces earlier surroundings.
+    ///
+    /// # Errors
+    /// [`SceneError`] if the image has the wrong number of pixels, a radiance is negative or not finite, or the matrix
+    /// is no rotation.
+    pub fn environment_map(&mut self, map: EnvironmentMap) -> Result<(), SceneError> {
+        map.check()?;
+        self.parts.surroundings = Some(Surroundings::Map(map));
+        Ok(())
+    }
+
+    /// Adds a light without size.
+    ///
+    /// # Errors
+    /// [`SceneError`] if a number is not finite or out of range, or a direction is zero.
+    pub fn punctual(&mut self, light: Punctual) -> Result<(), SceneError> {
+        self.parts.lights.push(Light::punctual(light)?);
+        Ok(())
+    }
+
+    /// Adds the points `corner` + u·`e1` + v·`e2` for u, v in 0…1. Texture coordinates run along the edges in scene
+    /// units, so that patterns have the same size on all parallelograms.
+    ///
+    /// # Errors
+    /// [`SceneError`] if a number is not finite or too large, the material is of another builder, or an emitter has no
+    /// area.
+    pub fn parallelogram(
+        &mut self,
+        corner: [f32; 3],
+        e1: [f32; 3],
+        e2: [f32; 3],
+        material: MaterialId,
+        emission: Option<Emission>,
+    ) -> Result<(), SceneError> {
+        let [corner, e1, e2] = [position(corner)?, position(e1)?, position(e2)?];
+        let uvs = [[0.0, 0.0], [e1.length(), 0.0], [0.0, e2.length()]];
+        self.single(Shape::Planar { corner, e1, e2, whole: true }, Some(uvs), material, emission)
+    }
+
+    /// Adds an ellipse: `centre` + u·`e1` + v·`e2` for u² + v² ≤ 1. Texture coordinates are (u + 1, v + 1)/2.
+    ///
+    /// # Errors
+    /// As [`SceneBuilder::parallelogram`].
+    pub fn disk(
+        &mut self,
+        centre: [f32; 3],
+        e1: [f32; 3],
+        e2: [f32; 3],
+        material: MaterialId,
+        emission: Option<Emission>,
+    ) -> Result<(), SceneError> {
+        let [centre, e1, e2] = [position(centre)?, position(e1)?, position(e2)?];
+        let uvs = [[0.5, 0.5], [1.0, 0.5], [0.5, 1.0]];
+        self.single(Shape::Disk { centre, e1, e2 }, Some(uvs), material, emission)
+    }
+
+    /// Adds a sphere. Texture coordinates are azimuth and polar angle in 0…1; v = 1 is the top.
+    ///
+    /// # Errors
+    /// [`SceneError`] if a number is not finite or too large, the radius is not in 1e-9…1e6, or the material is of
+    /// another builder.
+    pub fn sphere(
+        &mut self,
+        centre: [f32; 3],
+        radius: f32,
+        material: MaterialId,
+        emission: Option<Emission>,
+    ) -> Result<(), SceneError> {
+        let centre = position(centre)?;
+        check_range("the radius of a sphere", radius, [1e-9, MAX_COORDINATE], "1e-9…1e6")?;
+        self.single(Shape::Sphere { centre, radius }, None, material, emission)
+    }
+
+    /// Adds the triangles of a mesh that have an area, and returns the number of those that have none.
+    ///
+    /// # Errors
+    /// [`SceneError`] if a number is not finite or too large, an index or a length does not fit, the material is of
+    /// another builder, or the mesh is an emitter and has no area at all.
+    pub fn mesh(
+        &mut self,
+        mesh: &Mesh<'_>,
+        material: MaterialId,
+        emission: Option<Emission>,
+    ) -> Result<usize, SceneError> {
+        mesh.check()?;
+        let with_vertices = !mesh.normals.is_empty() || !mesh.uvs.is_empty();
+        let (mut group, group_emission) = self.group(material, emission.as_ref())?;
+        if with_vertices {
+            let vertices = &mut self.parts.geometry.vertices;
+            group.corners = index(vertices.corners.len())?;
+            if !mesh.normals.is_empty() {
+                group.normals = index(vertices.normals.len())?;
+                let unit = |n: &[f32; 3]| Vec3::from(*n).as_dvec3().normalize_or_zero().as_vec3().to_array();
+                vertices.normals.extend(mesh.normals.iter().map(unit));
+            }
+            if !mesh.uvs.is_empty() {
+                group.uvs = index(vertices.uvs.len())?;
+                vertices.uvs.extend(mesh.uvs);
+            }
+        }
+        let mut left_out = 0;
+        for triangle in mesh.indices {
+            let [a, b, c] = triangle.map(|i| Vec3::from(mesh.positions[i as usize]));
+            let shape = Shape::Planar { corner: a, e1: b - a, e2: c - a, whole: false };
+            if self.push(shape, group_emission)? {
+                if with_vertices {
+                    self.parts.geometry.vertices.corners.push(*triangle);
+                }
+            } else {
+                left_out += 1;
+            }
+        }
+        if left_out == mesh.indices.len() && emission.is_some() {
+            return Err(SceneError::EmptyEmitter);
+        }
+        self.close(group);
+        Ok(left_out)
+    }
+
+    /// Builds the scene.
+    ///
+    /// # Errors
+    /// None today, since every part was checked when it was added.
+    pub fn build(self) -> Result<Scene, SceneError> {
+        Ok(Scene::new(self.name, self.camera, self.parts))
+    }
+
+    /// A group for the surfaces to be added next, and what they emit.
+    fn group(
+        &mut self,
+        material: MaterialId,
+        emission: Option<&Emission>,
+    ) -> Result<(Group, Option<GroupEmission>), SceneError> {
+        if material.0 as usize >= self.parts.materials.len() {
+            return Err(SceneError::Material(material.0));
+        }
+        if let Some(emission) = emission {
+            check_radiance(emission.radiance)?;
+            if let Some(texture) = &emission.texture {
+                texture.check()?;
+            }
+        }
+        let group_emission = emission.filter(|e| e.radiance != [0.0; 3]).map(|e| GroupEmission {
+            radiance: e.radiance,
+            two_sided: e.two_sided,
+            texture: e.texture.as_ref().map_or(NO, |texture| {
+                self.parts.emission_textures.push(texture.clone());
+                self.parts.emission_textures.len() as u32 - 1
+            }),
+        });
+        let light = if group_emission.is_some() { index(self.parts.lights.len())? } else { NO };
+        let first = index(self.parts.shapes.len())?;
+        Ok((Group { first, material: material.0, light, corners: NO, normals: NO, uvs: NO }, group_emission))
+    }
+
+    /// Adds the group, if it has got any surfaces.
+    fn close(&mut self, group: Group) {
+        if self.parts.shapes.len() > group.first as usize {
+            let number = self.parts.geometry.groups.len() as u32;
+            self.parts.geometry.groups.push(group);
+            self.parts.geometry.group_of.resize(self.parts.shapes.len(), number);
+        }
+    }
+
+    /// Adds a surface that is a group by itself, with texture coordinates at the ends of its edges.
+    fn single(
+        &mut self,
+        shape: Shape,
+        uvs: Option<[[f32; 2]; 3]>,
+        material: MaterialId,
+        emission: Option<Emission>,
+    ) -> Result<(), SceneError> {
+        let (mut group, group_emission) = self.group(material, emission.as_ref())?;
+        let material = &self.parts.materials[material.0 as usize];
+        let textured = material.is_textured() || group_emission.is_some_and(|e| e.texture != NO);
+        if !self.push(shape, group_emission)? {
+            return if emission.is_some() { Err(SceneError::EmptyEmitter) } else { Ok(()) };
+        }
+        if let Some(uvs) = uvs.filter(|_| textured) {
+            group.corners = index(self.parts.geometry.vertices.corners.len())?;
+            group.uvs = index(self.parts.geometry.vertices.uvs.len())?;
+            self.parts.geometry.vertices.corners.push([0, 1, 2]);
+            self.parts.geometry.vertices.uvs.extend(uvs);
+        }
+        self.close(group);
+        Ok(())
+    }
+
+    /// Adds a surface, and its light if it is an emitter. Returns whether it has an area; otherwise nothing is added.
+    fn push(&mut self, shape: Shape, group_emission: Option<GroupEmission>) -> Result<bool, SceneError> {
+        if let Shape::Planar { e1, e2, .. } | Shape::Disk { e1, e2, .. } = shape {
+            // In f64, since the squares of short edges vanish in f32
+            let area = 0.5 * e1.as_dvec3().cross(e2.as_dvec3()).length();
+            if area < f64::from(MIN_AREA) {
+                return Ok(false);
+            }
+        }
+        let parts = &mut self.parts;
+        let prim = parts.shapes.len();
+        if prim >= MAX_SURFACES {
+            return Err(SceneError::TooLarge { what: "surfaces", found: prim + 1, limit: MAX_SURFACES });
+        }
+        if let Some(GroupEmission { radiance, two_sided, texture }) = group_emission {
+            let light = Light::surface(&shape, radiance.into(), two_sided, prim as u32);
+            parts.lights.push(Light { texture, ..light });
+        }
+        parts.shapes.push(shape);
+        Ok(true)
+    }
+}
+
+/// What the surfaces of a group emit; the texture is an index of the scene's emission textures.
+#[derive(Clone, Copy, Debug)]
+struct GroupEmission {
+    radiance: Rgb,
+    two_sided: bool,
+    texture: u32,
+}
+
+/// A count as an index.
+fn index(count: usize) -> Result<u32, SceneError> {
+    let found = u32::try_from(count).ok().filter(|i| *i < 1 << 31);
+    found.ok_or(SceneError::TooLarge { what: "corners", found: count, limit: 1 << 31 })
+}

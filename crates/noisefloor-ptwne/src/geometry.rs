@@ -1,0 +1,75 @@
+//! Surfaces in groups, and what they have at their corners.
+
+use crate::math::Vec3;
+
+/// "None" among indices.
+pub(crate) const NO: u32 = u32::MAX;
+
+/// Surfaces that were added together: they share a material, and are numbered from `first`.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Group {
+    pub(crate) first: u32,
+    pub(crate) material: u32,
+    /// The light of the first surface; those of the others follow. [`NO`] if they do not shine.
+    pub(crate) light: u32,
+    /// Index of the first surface's corners; [`NO`] if the group is flat and has no texture coordinates.
+    pub(crate) corners: u32,
+    /// Where the group's normals and texture coordinates begin in [`Vertices`]; [`NO`] if there are none.
+    pub(crate) normals: u32,
+    pub(crate) uvs: u32,
+}
+
+/// What smooth or textured surfaces have at their corners.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Vertices {
+    pub(crate) corners: Vec<[u32; 3]>,
+    pub(crate) normals: Vec<[f32; 3]>,
+    pub(crate) uvs: Vec<[f32; 2]>,
+}
+
+/// All surfaces of a scene, apart from their shapes.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Geometry {
+    /// The group of each surface.
+    pub(crate) group_of: Vec<u32>,
+    pub(crate) groups: Vec<Group>,
+    pub(crate) vertices: Vertices,
+}
+
+impl Geometry {
+    /// The group of a surface.
+    #[inline]
+    pub(crate) fn group(&self, prim: u32) -> &Group {
+        &self.groups[self.group_of[prim as usize] as usize]
+    }
+
+    /// Texture coordinates of a planar surface of `group`, at `uv` along its edges.
+    #[inline]
+    pub(crate) fn texture_coordinates(&self, group: &Group, prim: u32, [u, v]: [f32; 2]) -> [f32; 2] {
+        if group.uvs == NO {
+            return [u, v];
+        }
+        let corners = self.vertices.corners[(group.corners + prim - group.first) as usize];
+        let [a, b, c] = corners.map(|i| self.vertices.uvs[(group.uvs + i) as usize]);
+        std::array::from_fn(|i| a[i] + (b[i] - a[i]) * u + (c[i] - a[i]) * v)
+    }
+
+    /// The shading normal of a planar surface of `group`, which has normals; none if they cancel.
+    #[inline]
+    pub(crate) fn shading_normal(&self, group: &Group, prim: u32, [u, v]: [f32; 2]) -> Option<Vec3> {
+        let corners = self.vertices.corners[(group.corners + prim - group.first) as usize];
+        let [a, b, c] =
+            corners.map(|i| Vec3::from_array(self.vertices.normals[(group.normals + i) as usize]));
+        (a * (1.0 - u - v) + b * u + c * v).try_normalize()
+    }
+
+    /// Memory that it takes, in bytes.
+    pub(crate) fn bytes(&self) -> usize {
+        let Vertices { corners, normals, uvs } = &self.vertices;
+        size_of_val(self.group_of.as_slice())
+            + size_of_val(self.groups.as_slice())
+            + size_of_val(corners.as_slice())
+            + size_of_val(normals.as_slice())
+            + size_of_val(uvs.as_slice())
+    }
+}

@@ -1,0 +1,160 @@
+//! Rays through a scene, and the surfaces they hit.
+
+use crate::accel::{Hit, HitShape, Stack};
+use crate::bsdf::{Glossy, MIN_ROUGHNESS};
+use crate::geometry::NO;
+use crate::material::{Bsdf, CompiledMaterial};
+use crate::math::{Ray, Vec3};
+use crate::rng;
+use crate::scene::Scene;
+
+/// How it is decided whether a ray passes a partly transparent surface.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum OpacityTest {
+    /// At random, by the seed of the ray.
+    Random(u64),
+    /// As ray `index` of a sequence: of every 2ᵏ consecutive rays, each surface stops its share to the nearest ray,
+    /// and different surfaces stop different rays.
+    Stratified { index: u32, seed: u64 },
+}
+
+/// Where a ray hit a surface.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Intersection<'a> {
+    pub(crate) position: Vec3,
+    /// The geometric normal, on the side of the ray's origin.
+    pub(crate) flat: Vec3,
+    /// The shading normal, on the same side.
+    pub(crate) normal: Vec3,
+    /// Whether the ray hit the front.
+    pub(crate) front: bool,
+    pub(crate) uv: [f32; 2],
+    pub(crate) material: &'a CompiledMaterial,
+    /// The index of its light; [`NO`] if it does not shine.
+    pub(crate) light: u32,
+}
+
+impl Scene {
+    /// The nearest surface along the ray.
+    #[inline]
+    pub(crate) fn closest<const OPACITY: bool>(
+        &self,
+        ray: &Ray,
+        stack: &mut Stack,
+        test: OpacityTest,
+    ) -> Hit {
+        if OPACITY {
+            self.bvh.closest(ray, stack, |prim, uv| self.is_solid(prim, uv, test))
+        } else {
+            self.bvh.closest(ray, stack, |_, _| true)
+        }
+    }
+
+    /// Whether any surface lies on the ray before `t_max`.
+    #[inline]
+    pub(crate) fn blocked<const OPACITY: bool>(
+        &self,
+        ray: &Ray,
+        t_max: f32,
+        stack: &mut Stack,
+        test: OpacityTest,
+    ) -> bool {
+        if OPACITY {
+            self.bvh.blocked::<true>(ray, t_max, stack, |prim, uv| self.is_solid(prim, uv, test))
+        } else {
+            self.bvh.blocked::<false>(ray, t_max, stack, |_, _| true)
+        }
+    }
+
+    fn is_solid(&self, prim: u32, uv: [f32; 2], test: OpacityTest) -> bool {
+        let group = self.geometry.group(prim);
+        match &self.materials[group.material as usize].opacity {
+            None => true,
+            Some(opacity) => {
+                let [u, v] = self.geometry.texture_coordinates(group, prim, uv);
+                let c = opacity.eval(u, v);
+                let number = match test {
+                    OpacityTest::Random(seed) => rng::hash(seed, prim),
+                    OpacityTest::Stratified { index, seed } => {
+                        sobol_burley::sample(index, 0, rng::mix(seed ^ u64::from(prim)) as u32)
+                    }
+                };
+                number < (c.x + c.y + c.z) * (1.0 / 3.0)
+            }
+        }
+    }
+
+    /// The surface that the ray hit.
+    #[inline]
+    pub(crate) fn surface(&self, ray: &Ray, hit: &Hit) -> Intersection<'_> {
+        let (prim, shape) = self.bvh.shape_at(hit);
+        let group = self.geometry.group(prim);
+        let material = &self.materials[group.material as usize];
+        let along = ray.origin + ray.dir * hit.t;
+        // Back onto the surface: an error along it does no harm, one across it would
+        let (position, mut flat) = match shape {
+            HitShape::Plane { point, normal } => (along - normal * normal.dot(along - point), normal),
+            HitShape::Sphere { centre, radius } => {
+                let n = (along - centre).normalize();
+                (centre + n * radius, n)
+            }
+        };
+        let uv = match shape {
+            HitShape::Sphere { .. } => sphere_coordinates(flat),
+            HitShape::Plane { .. } => self.geometry.texture_coordinates(group, prim, hit.uv),
+        };
+        let mut normal = flat;
+        if group.normals != NO {
+            normal = self.geometry.shading_normal(group, prim, hit.uv).unwrap_or(flat);
+        }
+        // Turn both normals towards the ray's origin
+        let front = ray.dir.dot(flat) < 0.0;
+        if !front {
+            (flat, normal) = (-flat, -normal);
+        }
+        if normal.dot(ray.dir) >= 0.0 {
+            normal = flat;
+        }
+        let light = if group.light == NO { NO } else { group.light + prim - group.first };
+        Intersection { position, flat, normal, front, uv, material, light }
+    }
+
+    /// The origin of a ray that leaves `surface` on the side that `dir` points to.
+    #[inline]
+    pub(crate) fn leave(&self, surface: &Intersection<'_>, dir: Vec3) -> Vec3 {
+        // A few hundred roundings of the largest coordinate
+        let distance = (surface.position.abs().max_element() * 1e-5).max(self.offset);
+        let side = if dir.dot(surface.flat) < 0.0 { -distance } else { distance };
+        surface.position + surface.flat * side
+    }
+}
+
+/// Azimuth and polar angle of a sphere's normal, each in 0…1.
+#[inline]
+fn sphere_coordinates(n: Vec3) -> [f32; 2] {
+    use std::f32::consts::{FRAC_1_PI, PI};
+    let polar = n.y.clamp(-1.0, 1.0).acos() * FRAC_1_PI;
+    [(n.z.atan2(n.x) + PI) * 0.5 * FRAC_1_PI, 1.0 - polar]
+}
+
+impl<'a> Intersection<'a> {
+    /// Its microfacets and coat, seen at a cosine with the shading normal; `None` if it has none.
+    #[inline]
+    pub(crate) fn glossy(&self, cos: f32) -> Option<Glossy<'a>> {
+        match &self.material.bsdf {
+            Bsdf::Metal { fresnel, colour, alpha } => {
+                Some(Glossy::metal(fresnel, colour.at(self.uv), *alpha))
+            }
+            Bsdf::Plastic { diffuse, specular, alpha, nonlinear, coat } => {
+                let diffuse = diffuse.at(self.uv);
+                Some(Glossy::plastic(coat, diffuse, *specular, *alpha, *nonlinear, cos))
+            }
+            Bsdf::Blend { base, metallic_roughness, coat } => {
+                let values = metallic_roughness.at(self.uv);
+                let alpha = (values.y * values.y).max(MIN_ROUGHNESS);
+                Some(Glossy::blend(coat, base.at(self.uv), alpha, values.z, cos))
+            }
+            _ => None,
+        }
+    }
+}
