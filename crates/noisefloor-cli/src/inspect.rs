@@ -92,7 +92,7 @@ pub fn run(args: &InspectArgs) -> anyhow::Result<()> {
 }
 
 pub fn scenes() {
-    let show = |heading, scenes: &mut dyn Iterator<Item = scenes::Entry>| {
+    let show = |heading, scenes: &mut dyn Iterator<Item = scenes::BuiltInScene>| {
         println!("{heading}");
         for scene in scenes {
             println!("  {:16} {}", scene.name, scene.description);
