@@ -1,2 +1,93 @@
-#![allow(missing_docs)]
-fn main() {}
+//! What a tile of 128×128 pixels costs with a halo of 16, by how much of the model is computed; and whole
+//! pictures.
+#![allow(missing_docs, reason = "a benchmark")]
+
+use criterion::{Criterion, Throughput, criterion_group, criterion_main};
+use noisefloor_vision::{ResidualPatch, ResidualPixels, Viewing, VisionDetail, VisionModel, VisionWorkspace};
+use std::hint::black_box;
+
+const TILE: usize = 128;
+const HALO: usize = 16;
+
+/// A picture with edges, and its noise.
+fn pictures(edge: usize) -> (Vec<[f32; 3]>, Vec<[f32; 3]>) {
+    let mut state = 1u64;
+    let mut noise = || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        ((state >> 40) as f32 / (1 << 24) as f32 - 0.5) * 0.05
+    };
+    let picture = (0..edge * edge).map(|i| {
+        let (x, y) = (i % edge, i / edge);
+        let wall = 0.3 + 0.3 * ((x * y) as f32 / 900.0).sin();
+        [wall, wall * 0.8, if (x / 20 + y / 30) % 2 == 0 { 0.2 } else { 0.5 }]
+    });
+    (picture.collect(), (0..edge * edge).map(|_| [noise(), noise(), noise()]).collect())
+}
+
+fn tile(c: &mut Criterion) {
+    let edge = TILE + 2 * HALO;
+    let (picture, residual) = pictures(edge);
+    let grey = |pixels: &[[f32; 3]]| -> Vec<f32> {
+        pixels.iter().map(|p| 0.2126 * p[0] + 0.7152 * p[1] + 0.0722 * p[2]).collect()
+    };
+    let (grey_picture, grey_residual) = (grey(&picture), grey(&residual));
+    let rgb = ResidualPixels::Rgb { picture: &picture, residual: &residual };
+    let grey = ResidualPixels::Grey { picture: &grey_picture, residual: &grey_residual };
+    let model = VisionModel::new(&Viewing::default());
+    let mut workspace = VisionWorkspace::default();
+    let below = |colour, highest| VisionDetail { colour, frequencies: (1.0, highest) };
+
+    let mut group = c.benchmark_group("tile of 128x128");
+    group.throughput(Throughput::Elements((TILE * TILE) as u64));
+    for (name, pixels, detail) in [
+        ("colour, all bands", rgb, VisionDetail::FULL),
+        ("colour, from 1 cpd", rgb, below(true, 100.0)),
+        ("colour, 1 to 15 cpd", rgb, below(true, 15.0)),
+        ("achromatic of colour, from 1 cpd", rgb, below(false, 100.0)),
+        ("achromatic of colour, 1 to 15 cpd", rgb, below(false, 15.0)),
+        ("grey, all bands", grey, VisionDetail::FULL),
+        ("grey, from 1 cpd", grey, below(false, 100.0)),
+        ("grey, 1 to 15 cpd", grey, VisionDetail::FAST),
+    ] {
+        let inner = HALO..HALO + TILE;
+        let patch = ResidualPatch { pixels, size: (edge, edge), columns: inner.clone(), rows: inner };
+        group.bench_function(name, |b| {
+            b.iter(|| model.residual(black_box(&patch), detail, &mut workspace).expect("a patch").map().step);
+        });
+    }
+    group.finish();
+}
+
+fn whole(c: &mut Criterion) {
+    let mut group = c.benchmark_group("two pictures");
+    let model = VisionModel::new(&Viewing::default());
+    let mut workspace = VisionWorkspace::default();
+    for edge in [256, 1024] {
+        let (picture, residual) = pictures(edge);
+        group.throughput(Throughput::Elements((edge * edge) as u64));
+        group.bench_function(format!("JOD of {edge}x{edge}"), |b| {
+            b.iter(|| {
+                model
+                    .compare(black_box(&residual), &picture, (edge, edge), &mut workspace)
+                    .expect("two")
+                    .jod()
+            });
+        });
+        group.bench_function(format!("JOD and map of {edge}x{edge}"), |b| {
+            b.iter(|| {
+                let mut found =
+                    model.compare(black_box(&residual), &picture, (edge, edge), &mut workspace).expect("two");
+                found.map()[0]
+            });
+        });
+    }
+    group.finish();
+}
+
+criterion_group! {
+    name = benches;
+    config = Criterion::default().sample_size(20).warm_up_time(std::time::Duration::from_millis(500))
+        .measurement_time(std::time::Duration::from_secs(1));
+    targets = tile, whole
+}
+criterion_main!(benches);

@@ -6,6 +6,7 @@ use crate::math::exp2;
 use crate::photometry::CHANNELS;
 use crate::pyramid::Size;
 use std::f64::consts::LOG2_10;
+use std::ops::Range;
 
 /// Centre of the second band beside the highest frequency that pixels can show; further bands halve it.
 const SECOND: f64 = 0.3228;
@@ -45,6 +46,16 @@ impl Bands {
     pub(crate) fn levels(&self, size: Size) -> usize {
         let most = size.width.min(size.height).max(2).ilog2() as usize - 1;
         self.frequencies.len().min(most) + 1
+    }
+
+    /// Bands of a picture of at least 4×4 pixels whose centres lie between two frequencies; if none does, the
+    /// nearest one.
+    pub(crate) fn within(&self, size: Size, (lowest, highest): (f64, f64)) -> Range<usize> {
+        let bands = &self.frequencies[..self.levels(size) - 1];
+        let start = bands.iter().take_while(|&&frequency| frequency > highest).count();
+        let end = bands.iter().take_while(|&&frequency| frequency >= lowest).count();
+        let start = start.min(bands.len() - 1);
+        start..end.max(start + 1)
     }
 }
 

@@ -62,6 +62,7 @@ pub(crate) fn place(luminance: f32) -> f32 {
 
 #[cfg(test)]
 mod tests {
+    use super::OpponentChannel::{Achromatic, RedGreen, YellowViolet};
     use super::*;
     use proptest::prelude::*;
 
@@ -93,11 +94,11 @@ mod tests {
 
     proptest! {
         #[test]
-        fn luminances_beyond_the_table_are_those_at_its_ends(frequency in 0.05f64..200.0, beyond in 1.0f64..1e6) {
-            for channel in [OpponentChannel::Achromatic, OpponentChannel::RedGreen, OpponentChannel::YellowViolet] {
+        fn luminances_beyond_the_table_are_those_at_its_ends(frequency in 0.05f64..200.0, by in 1.0f64..1e6) {
+            for channel in [Achromatic, RedGreen, YellowViolet] {
                 let of = |luminance| contrast_sensitivity(channel, frequency, luminance);
-                prop_assert!((of(10_000.0 * beyond) / of(10_000.0) - 1.0).abs() < 1e-4);
-                prop_assert!((of(0.005 / beyond) / of(0.005) - 1.0).abs() < 1e-4);
+                prop_assert!((of(10_000.0 * by) / of(10_000.0) - 1.0).abs() < 1e-4);
+                prop_assert!((of(0.005 / by) / of(0.005) - 1.0).abs() < 1e-4);
             }
         }
     }

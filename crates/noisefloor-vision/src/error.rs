@@ -7,7 +7,7 @@ use thiserror::Error;
 pub enum VisionError {
     /// Too small or too large.
     #[error(
-        "pictures of {width}×{height} pixels cannot be compared: each side needs 2 pixels, and all at most 2²⁸"
+        "cannot compare pictures of {width}×{height} pixels: each side needs 2 or more, and all at most 2²⁸"
     )]
     Size {
         /// Pixels in a row.

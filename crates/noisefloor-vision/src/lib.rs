@@ -7,22 +7,25 @@
 //!
 //! | item | |
 //! |---|---|
-//! | [`Viewing`] | a display, the light in the room, and the distance; as text `desk`, `standard_4k`, `ppd=60,peak=300` |
-//! | [`PRESETS`], [`ViewingPreset`], [`Screen`] | viewing conditions by name, and pixels per degree of a screen |
-//! | [`VisionModel`] | what is constant for a display; [`compare`](VisionModel::compare) gives JODs and a map of two pictures |
+//! | [`Viewing`] | a display, the room's light, the distance; as text `desk` or `ppd=60,peak=300` |
+//! | [`PRESETS`], [`Screen`] | viewing conditions by name; pixels per degree of a screen |
+//! | [`VisionModel::compare`] | JODs and a map of two pictures |
+//! | [`VisionModel::residual`] | visible differences by band and channel in a tile, fast: for stopping rules |
+//! | [`rescaled`] | the same for noise of another contrast, without computing it again |
 //! | [`VisionWorkspace`] | memory, used again from picture to picture |
 //! | [`contrast_sensitivity`] | castleCSF by channel, frequency and luminance |
 //!
 //! The steps, in the order of the data: `photometry.rs` (code values → cd/m² → opponent channels),
 //! `pyramid.rs`, `bands.rs` and `csf.rs` (contrast in units of its threshold), `masking.rs`, `pooling.rs`;
-//! `model.rs` puts them together.
+//! `engine.rs` puts them together.
 //!
 //! ```
 //! use noisefloor_vision::{Viewing, VisionModel, VisionWorkspace};
 //!
 //! // A grey wall, and the same with noise
 //! let wall = vec![[0.5; 3]; 64 * 64];
-//! let noisy: Vec<[f32; 3]> = (0..64 * 64).map(|i| [0.5 + 0.02 * ((i * 7919 % 13) as f32 - 6.0) / 6.0; 3]).collect();
+//! let grain = |i: usize| 0.02 * ((i * 7919 % 13) as f32 - 6.0) / 6.0;
+//! let noisy: Vec<[f32; 3]> = (0..64 * 64).map(|i| [0.5 + grain(i); 3]).collect();
 //!
 //! let mut workspace = VisionWorkspace::default();
 //! let mut jod = |viewing: &str| -> Result<f64, Box<dyn std::error::Error>> {
@@ -36,15 +39,19 @@
 //! ```
 
 mod bands;
+mod check;
 mod csf;
+mod engine;
 mod error;
 mod masking;
 mod math;
 mod model;
+mod part;
 mod photometry;
 mod pooling;
 mod presets;
 mod pyramid;
+mod residual;
 mod screen;
 mod text;
 mod viewing;
@@ -54,6 +61,9 @@ pub use csf::{OpponentChannel, contrast_sensitivity};
 pub use error::VisionError;
 pub use model::{VisionComparison, VisionModel};
 pub use presets::{PRESETS, ViewingPreset};
+pub use residual::{
+    DifferenceBand, ResidualPatch, ResidualPixels, VisibleDifference, VisionDetail, rescaled,
+};
 pub use screen::Screen;
 pub use text::ViewingTextError;
 pub use viewing::{Eotf, Primaries, Viewing, ViewingError, ViewingParams};

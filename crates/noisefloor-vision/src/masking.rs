@@ -86,19 +86,24 @@ pub(crate) fn contrast_row(
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx2", "x86_64+avx2"))]
 pub(crate) fn blur_row(blur: &Blur, padded: &[f32], out: &mut [f32]) {
     let n = out.len();
-    let at: [&[f32]; 2 * BLUR_RADIUS + 1] = std::array::from_fn(|i| &padded[i..][..n]);
-    for x in 0..n {
-        out[x] = blurred(blur, |i| at[i][x]);
-    }
+    blend(blur, std::array::from_fn(|i| &padded[i..][..n]), out);
 }
 
+/// Blurs across thirteen rows as long as `out`.
 #[inline(always)]
-fn blurred(blur: &Blur, at: impl Fn(usize) -> f32) -> f32 {
-    let mut sum = blur[0] * at(BLUR_RADIUS);
-    for (i, weight) in blur.iter().enumerate().skip(1) {
-        sum += weight * (at(BLUR_RADIUS - i) + at(BLUR_RADIUS + i));
+fn blend(blur: &Blur, rows: [&[f32]; 2 * BLUR_RADIUS + 1], out: &mut [f32]) {
+    let n = out.len();
+    // Written out, so that it compiles to vector instructions
+    let [f, e, d, c, b, a, centre, g, h, i, j, k, l] = rows.map(|row| &row[..n]);
+    for x in 0..n {
+        out[x] = blur[0] * centre[x]
+            + blur[1] * (a[x] + g[x])
+            + blur[2] * (b[x] + h[x])
+            + blur[3] * (c[x] + i[x])
+            + blur[4] * (d[x] + j[x])
+            + blur[5] * (e[x] + k[x])
+            + blur[6] * (f[x] + l[x]);
     }
-    sum
 }
 
 /// x^p, bent so that it is smooth at 0.
@@ -141,29 +146,28 @@ pub(crate) fn mask_row<const N: usize>(
 ) {
     let width = differences[0].len();
     let mut powers = [[0.0; PIXELS]; N];
+    let mut mask = [0.0; PIXELS];
     for from in (0..width).step_by(PIXELS) {
         let n = PIXELS.min(width - from);
-        for channel in 0..N {
-            let at = smaller[channel].map(|row| &row[from..][..n]);
-            let (out, exponent, offset) =
-                (&mut powers[channel][..n], MASK_EXPONENTS[channel], masking.offsets[channel]);
-            for x in 0..n {
-                let mask = match blur {
-                    Some(blur) => blurred(blur, |i| at[i][x]),
-                    None => at[BLUR_RADIUS][x],
-                };
-                out[x] = safe_pow(mask * MASK_GAIN, exponent, offset);
+        for (channel, power) in powers.iter_mut().enumerate() {
+            let (power, rows) = (&mut power[..n], smaller[channel].map(|row| &row[from..][..n]));
+            match blur {
+                Some(blur) => blend(blur, rows, power),
+                None => power.copy_from_slice(rows[BLUR_RADIUS]),
             }
+            let (exponent, offset) = (MASK_EXPONENTS[channel], masking.offsets[channel]);
+            power.iter_mut().for_each(|value| *value = safe_pow(*value * MASK_GAIN, exponent, offset));
         }
         for (channel, out) in differences.iter_mut().enumerate() {
-            let out = &mut out[from..][..n];
-            for x in 0..n {
-                let mut mask = 1.0;
-                for (power, weights) in powers.iter().zip(&masking.weights) {
-                    mask += power[x] * weights[channel];
-                }
-                let d = safe_pow(out[x], EXPONENT, masking.offset) / mask;
-                out[x] = LARGEST * d / (LARGEST + d);
+            let mask = &mut mask[..n];
+            mask.fill(1.0);
+            for (power, weights) in powers.iter().zip(&masking.weights) {
+                let weight = weights[channel];
+                mask.iter_mut().zip(power).for_each(|(mask, power)| *mask += weight * power);
+            }
+            for (out, mask) in out[from..][..n].iter_mut().zip(&*mask) {
+                let difference = safe_pow(*out, EXPONENT, masking.offset) / mask;
+                *out = LARGEST * difference / (LARGEST + difference);
             }
         }
     }

@@ -94,28 +94,32 @@ impl Photometry {
     /// Replaces code values by light, channel by channel.
     #[inline(always)]
     fn shine(&self, [r, g, b]: [&mut [f32]; 3]) {
-        match self.curve {
-            Curve::Srgb => [r, g, b].map(|plane| self.emit(plane, srgb)),
-            Curve::Gamma(gamma) => {
-                [r, g, b].map(|plane| self.emit(plane, |v| if v > 0.0 { pow(v, gamma) } else { 0.0 }))
-            }
-            Curve::Pq => {
-                [r, g, b].map(|plane| self.emit_absolute(plane, DARKEST, self.black, |v| pq(unit(v))))
-            }
-            Curve::Linear => {
-                [r, g, b].map(|plane| self.emit_absolute(plane, DARKEST.max(self.black), 0.0, |v| v))
-            }
-            Curve::Hlg(gamma) => {
-                for ((r, g), b) in r.iter_mut().zip(&mut *g).zip(&mut *b) {
-                    let scene = [*r, *g, *b].map(|v| hlg(unit(v)));
-                    let y = 0.2627 * scene[0] + 0.6780 * scene[1] + 0.0593 * scene[2];
-                    let gain = if y > 0.0 { pow(y, gamma) } else { 0.0 };
-                    [*r, *g, *b] =
-                        scene.map(|v| (self.peak - self.black) * (gain * v) + self.black + self.reflected);
+        if let Curve::Hlg(gamma) = self.curve {
+            return self.shine_hlg(gamma, [r, g, b]);
+        }
+        // A loop, where `map` would not be compiled for the processor's vector instructions
+        for plane in [r, g, b] {
+            match self.curve {
+                Curve::Srgb => self.emit(plane, srgb),
+                Curve::Gamma(gamma) => self.emit(plane, |v| if v > 0.0 { pow(v, gamma) } else { 0.0 }),
+                Curve::Pq => self.emit_absolute(plane, DARKEST, self.black, |v| pq(unit(v))),
+                Curve::Linear | Curve::Hlg(_) => {
+                    self.emit_absolute(plane, DARKEST.max(self.black), 0.0, |v| v);
                 }
-                [(); 3]
             }
-        };
+        }
+    }
+
+    /// Hybrid log-gamma has a gain that depends on all channels.
+    #[inline(always)]
+    fn shine_hlg(&self, gamma: f32, [r, g, b]: [&mut [f32]; 3]) {
+        let (range, floor) = (self.peak - self.black, self.black + self.reflected);
+        for ((r, g), b) in r.iter_mut().zip(g).zip(b) {
+            let [x, y, z] = [hlg(unit(*r)), hlg(unit(*g)), hlg(unit(*b))];
+            let luminance = 0.2627 * x + 0.6780 * y + 0.0593 * z;
+            let gain = if luminance > 0.0 { range * pow(luminance, gamma) } else { 0.0 };
+            [*r, *g, *b] = [gain * x + floor, gain * y + floor, gain * z + floor];
+        }
     }
 
     /// For curves onto [0, 1] between black and the peak.
@@ -202,6 +206,90 @@ pub(crate) fn opponent_row(photometry: &Photometry, codes: &[[f32; 3]], planes: 
             for (((out, r), g), b) in plane.iter_mut().zip(&*r).zip(&*g).zip(&*b) {
                 *out = weights[0] * r + weights[1] * g + weights[2] * b;
             }
+        }
+    }
+}
+
+/// Converts a row of grey code values to the achromatic channel.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx2", "x86_64+avx2"))]
+pub(crate) fn grey_row(photometry: &Photometry, codes: &mut [f32]) {
+    let [r, g, b] = photometry.to_opponent[0];
+    let white = r + g + b;
+    match photometry.curve {
+        Curve::Srgb => photometry.emit(codes, srgb),
+        // Curves that hardly anybody asks for
+        _ => codes.iter_mut().for_each(|code| *code = photometry.light([*code; 3])[1]),
+    }
+    codes.iter_mut().for_each(|light| *light *= white);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::viewing::ViewingParams;
+    use proptest::prelude::*;
+
+    fn viewing(text: &str) -> Viewing {
+        text.parse().expect("conditions")
+    }
+
+    #[test]
+    fn luminances_that_can_be_computed_by_hand() {
+        let desk = viewing("desk"); // 200 cd/m², 1000:1, 250 lux on 0.5 %
+        let reflected = 250.0 / std::f64::consts::PI * 0.005;
+        for (code, luminance) in
+            [(0.0, 0.2), (1.0, 200.0), (0.5, 0.2 + 199.8 * 0.214_041_14), (-3.0, 0.2), (7.0, 200.0)]
+        {
+            assert!(
+                (desk.luminance(code) - luminance - reflected).abs() < 2e-4,
+                "{code}: {}",
+                desk.luminance(code)
+            );
+        }
+        let gamma = viewing("peak=100,black=0,ambient=0,eotf=gamma2");
+        assert!((gamma.luminance(0.5) - 25.0).abs() < 1e-3);
+        // ST 2084: a code of 0.508 is 100 cd/m²; values above the peak are cut off
+        let pq = viewing("peak=1000,black=0,ambient=0,eotf=pq,primaries=rec2020");
+        assert!((pq.luminance(0.508_078) - 100.0).abs() < 0.05, "{}", pq.luminance(0.508_078));
+        assert!((pq.luminance(1.0) - 1000.0).abs() < 1e-3);
+        // BT.2100: half the signal is a twelfth of the scene's light, to the power of 1.2
+        let hlg = viewing("peak=1000,black=0,ambient=0,eotf=hlg,primaries=rec2020");
+        assert!(
+            (hlg.luminance(0.5) - 1000.0 * (1f64 / 12.0).powf(1.2)).abs() < 0.01,
+            "{}",
+            hlg.luminance(0.5)
+        );
+        assert!((hlg.luminance(1.0) - 1000.0).abs() < 0.05);
+        let linear = viewing("peak=1000,black=0,ambient=0,eotf=linear");
+        assert!((linear.luminance(123.0) - 123.0).abs() < 1e-4);
+    }
+
+    #[test]
+    fn greys_have_hardly_any_colour_and_about_their_luminance() {
+        let photometry = Photometry::new(&viewing("desk"));
+        let mut planes = [[0.0; 1]; CHANNELS];
+        let [a, b, c] = planes.each_mut();
+        opponent_row(&photometry, &[[0.6; 3]], &mut [a, b, c]);
+        let [[achromatic], [red], [violet]] = planes;
+        let luminance = viewing("desk").luminance(0.6) as f32;
+        assert!((achromatic / luminance - 1.0).abs() < 0.1, "{achromatic} for {luminance}");
+        assert!(red.abs() < 0.02 * luminance && violet.abs() < 0.02 * luminance, "{red}, {violet}");
+        let mut grey = [0.6];
+        grey_row(&photometry, &mut grey);
+        assert!((grey[0] / achromatic - 1.0).abs() < 1e-6);
+    }
+
+    proptest! {
+        #[test]
+        fn more_code_is_more_light(
+            eotf in prop_oneof![
+                Just(Eotf::Srgb), Just(Eotf::Pq), Just(Eotf::Hlg), (1.0f64..4.0).prop_map(Eotf::Gamma)
+            ],
+            code in 0.0f32..1.0, step in 0.0f32..0.5,
+        ) {
+            let params = ViewingParams { eotf, ..viewing("desk").params() };
+            let viewing = params.check().unwrap();
+            prop_assert!(viewing.luminance(code + step) >= viewing.luminance(code) * (1.0 - 1e-4));
         }
     }
 }

@@ -3,6 +3,7 @@
 
 use crate::masking::EPSILON;
 use crate::photometry::CHANNELS;
+use multiversion::multiversion;
 
 /// Weight of a still picture against a film of one second.
 pub(crate) const STILL: f64 = 0.577_918_291_091_919; // image_int
@@ -56,6 +57,25 @@ pub(crate) fn quality(bands: &[[f64; CHANNELS]]) -> f64 {
 pub(crate) fn across_channels(values: [f32; CHANNELS], weights: [f64; CHANNELS]) -> f32 {
     let sum: f64 = (0..CHANNELS).map(|i| bent(f64::from(values[i]) * weights[i] * STILL, 4.0)).sum();
     bent(sum, 0.25) as f32
+}
+
+/// The map without that bend: the mean of fourth order over channels, times `weight`.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx2", "x86_64+avx2"))]
+pub(crate) fn across_row<const N: usize>(planes: [&[f32]; N], weight: f32, out: &mut [f32]) {
+    let n = out.len();
+    let planes = planes.map(|plane| &plane[..n]);
+    if N == 1 {
+        out.iter_mut().zip(planes[0]).for_each(|(out, d)| *out = weight * d);
+        return;
+    }
+    for (x, out) in out.iter_mut().enumerate() {
+        let mut sum = 0.0;
+        for plane in planes {
+            let square = plane[x] * plane[x];
+            sum += square * square;
+        }
+        *out = weight * sum.sqrt().sqrt();
+    }
 }
 
 #[cfg(test)]

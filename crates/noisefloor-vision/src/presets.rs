@@ -93,13 +93,13 @@ const SPAN_110: f64 = 0.350_103_769_104_854_9;
 /// its names.
 #[rustfmt::skip]
 pub const PRESETS: &[ViewingPreset] = &[
-    preset("desk", "24-inch Full HD monitor in an office, from 60 cm", (1920, 1080, 24.0, 0.6), (200.0, 0.2, 250.0)),
+    preset("desk", "24-inch monitor in an office, from 60 cm", (1920, 1080, 24.0, 0.6), (200.0, 0.2, 250.0)),
     preset("laptop", "14-inch laptop indoors, from 50 cm", (1920, 1200, 14.0, 0.5), (300.0, 0.3, 250.0)),
-    preset("tv", "55-inch 4K television in a dim living room, from 3 m", (3840, 2160, 55.0, 3.0), (350.0, 0.1, 50.0)),
+    preset("tv", "55-inch television in a dim room, from 3 m", (3840, 2160, 55.0, 3.0), (350.0, 0.1, 50.0)),
     preset("phone", "6-inch phone indoors, from 40 cm", (2400, 1080, 6.0, 0.4), (500.0, 0.05, 250.0)),
     // 48 cd/m² and 2000:1: SMPTE ST 431-1, RP 431-2. The picture is 5 m high, which makes a diagonal of 422
     // inches.
-    preset("cinema", "4K projection in the dark, from two picture heights", (4096, 2160, 422.0, 10.0), (48.0, 0.024, 0.0)),
+    preset("cinema", "4K cinema, from two picture heights", (4096, 2160, 422.0, 10.0), (48.0, 0.024, 0.0)),
     cvvdp("standard_4k", (3840, 2160, 30.0, 0.7472), (200.0, 0.2, 250.0), SDR),
     cvvdp("standard_hdr_pq", (3840, 2160, 30.0, 0.7472), (1500.0, 0.0015, 10.0), PQ),
     cvvdp("standard_hdr_hlg", (3840, 2160, 30.0, 0.7472), (1500.0, 0.0015, 10.0), HLG),

@@ -126,3 +126,68 @@ fn double_row(row: &[f32], out: &mut [f32]) {
         out[2 * pairs] = 2.0 * KERNEL[0] * (row[pairs] + row[pairs + 2]) + 2.0 * KERNEL[2] * row[pairs + 1];
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn reduced(plane: &[f32], size: Size) -> Vec<f32> {
+        let mut coarse = vec![0.0; size.half().area()];
+        reduce(plane, size, &mut vec![0.0; size.width + 4], &mut coarse);
+        coarse
+    }
+
+    fn expanded(coarse: &[f32], size: Size) -> Vec<f32> {
+        let mut fine = vec![0.0; size.area()];
+        for (y, row) in fine.chunks_exact_mut(size.width).enumerate() {
+            expand_row(coarse, size, y, &mut vec![0.0; size.width + 4], row);
+        }
+        fine
+    }
+
+    #[test]
+    fn an_impulse_gives_the_kernel() {
+        let size = Size { width: 9, height: 9 };
+        let mut plane = vec![0.0; 81];
+        plane[4 * 9 + 4] = 1.0;
+        let coarse = reduced(&plane, size);
+        for (place, weight) in
+            [(2 * 5 + 2, 0.4 * 0.4), (2 * 5 + 1, 0.4 * 0.05), (5 + 1, 0.05 * 0.05), (0, 0.0)]
+        {
+            assert!((coarse[place] - weight).abs() < 1e-7, "{place}");
+        }
+        let mut coarse = vec![0.0; 25];
+        coarse[2 * 5 + 2] = 1.0;
+        let fine = expanded(&coarse, size);
+        for (place, weight) in [(4 * 9 + 4, 0.64), (4 * 9 + 5, 0.4), (5 * 9 + 5, 0.25), (4 * 9 + 6, 0.08)] {
+            assert!((fine[place] - weight).abs() < 1e-6, "{place}");
+        }
+    }
+
+    proptest! {
+        // Sides are both odd or both even: with mixed ones, the right border is as ColorVideoVDP has it
+        #[test]
+        fn uniform_planes_stay_uniform(
+            (width, height) in (1usize..40, 1usize..40), odd in 0usize..2, value in -5.0f32..5.0,
+        ) {
+            let size = Size { width: 2 * width + odd, height: 2 * height + odd };
+            let coarse = reduced(&vec![value; size.area()], size);
+            prop_assert!(coarse.iter().all(|v| (v - value).abs() < 1e-5));
+            prop_assert!(expanded(&coarse, size).iter().all(|v| (v - value).abs() < 1e-5));
+        }
+
+        #[test]
+        fn what_is_taken_off_is_put_back(width in 2usize..40, height in 2usize..40, seed in any::<u32>()) {
+            let size = Size { width, height };
+            let plane: Vec<f32> = (0..size.area() as u32)
+                .map(|i| ((i ^ seed).wrapping_mul(0x9E37_79B1) >> 8) as f32 / (1 << 24) as f32)
+                .collect();
+            let coarse = expanded(&reduced(&plane, size), size);
+            let details: Vec<f32> = plane.iter().zip(&coarse).map(|(fine, coarse)| fine - coarse).collect();
+            for ((detail, coarse), value) in details.iter().zip(&coarse).zip(&plane) {
+                prop_assert!((detail + coarse - value).abs() < 1e-6);
+            }
+        }
+    }
+}

@@ -17,7 +17,7 @@ const KEYS: &str =
 pub enum ViewingTextError {
     /// No such preset.
     #[error(
-        "no viewing conditions are called {0:?}; try desk, laptop, tv, phone, cinema, standard_4k, or numbers such as ppd=60,peak=300"
+        "no viewing conditions are called {0:?}; try desk, laptop, tv, phone, cinema, or ppd=60,peak=300"
     )]
     Preset(String),
     /// No such key.
@@ -249,14 +249,17 @@ mod tests {
     proptest! {
         #[test]
         fn all_conditions_read_back(
-            ppd in 1.0f64..2000.0, peak in 1.0f64..20_000.0, black in 0.0f64..1.0, ambient in 0.01f64..1e5, share in 0.0f64..1.0,
+            (ppd, peak, black) in (1.0f64..2000.0, 1.0f64..20_000.0, 0.0f64..0.99),
+            (ambient, share) in (0.01f64..1e5, 0.0f64..1.0),
             eotf in prop_oneof![
-                Just(Eotf::Srgb), Just(Eotf::Pq), Just(Eotf::Hlg), Just(Eotf::Linear), (1.0f64..4.0).prop_map(Eotf::Gamma)
+                Just(Eotf::Srgb), Just(Eotf::Pq), Just(Eotf::Hlg), Just(Eotf::Linear),
+                (1.0f64..4.0).prop_map(Eotf::Gamma),
             ],
             primaries in prop_oneof![Just(Primaries::Rec709), Just(Primaries::Rec2020)],
         ) {
             let params = ViewingParams {
-                pixels_per_degree: ppd, peak, black: black * peak * 0.99, ambient, reflectivity: share, eotf, primaries,
+                pixels_per_degree: ppd, peak, black: black * peak, ambient, reflectivity: share, eotf,
+                primaries,
             };
             let viewing = params.check().unwrap();
             prop_assert_eq!(viewing.to_string().parse(), Ok(viewing));

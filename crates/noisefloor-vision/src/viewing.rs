@@ -79,7 +79,7 @@ pub enum ViewingError {
     Gamma(f64),
     /// The system gamma of HLG is undefined.
     #[error(
-        "the gamma of HLG displays above 1000 cd/m² depends on the ambient light, which must be at least 0.01 lux"
+        "HLG displays above 1000 cd/m² need ambient light of at least 0.01 lux, on which their gamma depends"
     )]
     DarkHlg,
 }

@@ -3,6 +3,7 @@
 use crate::masking::BLUR_RADIUS;
 use crate::photometry::CHANNELS;
 use crate::pyramid::Size;
+use std::ops::Deref;
 
 /// Memory that a comparison needs. It grows to the largest picture it was used for: about 90 bytes a pixel in
 /// colour, 40 without. One for each thread.
@@ -17,6 +18,34 @@ pub struct VisionWorkspace {
     /// The map: by band.
     pub(crate) map: Vec<Vec<f32>>,
     pub(crate) rows: Rows,
+}
+
+/// Sizes of the levels of a pyramid, finest first.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Sizes {
+    all: [Size; MOST_LEVELS],
+    levels: usize,
+}
+
+/// More than the largest pictures have.
+const MOST_LEVELS: usize = 32;
+
+impl Sizes {
+    pub(crate) fn new(size: Size, levels: usize) -> Self {
+        let mut all = [size; MOST_LEVELS];
+        for level in 1..levels {
+            all[level] = all[level - 1].half();
+        }
+        Self { all, levels }
+    }
+}
+
+impl Deref for Sizes {
+    type Target = [Size];
+
+    fn deref(&self) -> &[Size] {
+        &self.all[..self.levels]
+    }
 }
 
 /// Rows of the finest level.
@@ -38,17 +67,18 @@ pub(crate) fn reserve(plane: &mut Vec<f32>, length: usize) {
 }
 
 impl VisionWorkspace {
-    /// Makes room for two pictures: `channels` of them, by levels.
-    pub(crate) fn fit(&mut self, sizes: &[Size], channels: usize) {
+    /// Makes room for two pictures of `size` in so many channels and levels; returns the sizes of these.
+    pub(crate) fn fit(&mut self, size: Size, levels: usize, channels: usize) -> Sizes {
+        let sizes = Sizes::new(size, levels);
         let levels = |planes: &mut Vec<Vec<f32>>| {
             planes.resize_with(sizes.len().max(planes.len()), Vec::new);
-            planes.iter_mut().zip(sizes).for_each(|(plane, size)| reserve(plane, size.area()));
+            planes.iter_mut().zip(&*sizes).for_each(|(plane, size): (_, &Size)| reserve(plane, size.area()));
         };
         self.gauss.iter_mut().flat_map(|channel| &mut channel[..channels]).for_each(levels);
         self.differences[..channels].iter_mut().for_each(levels);
         levels(&mut self.map);
-        self.smaller[..channels].iter_mut().for_each(|plane| reserve(plane, sizes[0].area()));
-        let width = sizes[0].width;
+        self.smaller[..channels].iter_mut().for_each(|plane| reserve(plane, size.area()));
+        let width = size.width;
         let Rows { codes, narrow, coarse, places, sensitivity, padded } = &mut self.rows;
         if codes.len() < width {
             codes.resize(width, [0.0; 3]);
@@ -56,5 +86,6 @@ impl VisionWorkspace {
         coarse.iter_mut().flatten().chain([places, sensitivity]).for_each(|row| reserve(row, width));
         reserve(narrow, width + 4);
         reserve(padded, width + 2 * BLUR_RADIUS);
+        sizes
     }
 }

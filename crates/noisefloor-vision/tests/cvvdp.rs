@@ -111,8 +111,8 @@ fn jod_and_map_are_those_of_cvvdp() {
         let map_off = error.max(off(mean, pair.mean)).max(off(rms, pair.rms));
         if (jod - pair.jod).abs() > 0.001 || map_off > 0.002 {
             wrong.push(format!(
-                "pair {number} ({}×{} {} on {}): {jod:.5} JOD for {:.5}, map off by {error:.4}, its mean {mean:.6} for {:.6}, \
-                 its root mean square {rms:.6} for {:.6}",
+                "pair {number} ({}×{} {} on {}): {jod:.5} JOD for {:.5}, map off by {error:.4}, \
+                 its mean {mean:.6} for {:.6}, its root mean square {rms:.6} for {:.6}",
                 pair.width, pair.height, pair.pattern, pair.viewing, pair.jod, pair.mean, pair.rms
             ));
         }

@@ -1,4 +1,4 @@
-"""Records what ColorVideoVDP says of pairs of pictures that tests/cvvdp.rs computes again, into tests/cvvdp.json.
+"""Records what ColorVideoVDP says of the pairs of pictures in tests/cvvdp.rs, into tests/cvvdp.json.
 
     pip install cvvdp==0.5.7
     python crates/noisefloor-vision/tests/record_cvvdp.py
@@ -22,7 +22,8 @@ U = np.uint32
 def hashed(x, y, channel, seed):
     """32 random bits of a place."""
     with np.errstate(over="ignore"):
-        h = x * U(0x9E3779B1) ^ y * U(0x85EBCA77) ^ U(channel * 0xC2B2AE3D & 0xFFFFFFFF) ^ U(seed * 0x27D4EB2F & 0xFFFFFFFF)
+        of_pair = (channel * 0xC2B2AE3D ^ seed * 0x27D4EB2F) & 0xFFFFFFFF
+        h = x * U(0x9E3779B1) ^ y * U(0x85EBCA77) ^ U(of_pair)
         for shift, factor in ((15, 0x2C1B3C6D), (12, 0x297A2D39)):
             h = (h ^ h >> U(shift)) * U(factor)
         return h ^ h >> U(15)
@@ -61,8 +62,10 @@ def picture(case, noisy):
             amount = case["amount"][channel]
             of = 0 if case["grey"] else channel
             h = hashed(x // U(case["grain"]), y // U(case["grain"]), of, case["seed"])
-            code = code + ((h & U(0xFFFF)).astype(np.int64) + (h >> U(16))) * (2 * amount + 1) // 131071 - amount
-        channels.append(np.clip(code, 0, 255).astype(np.float32) / np.float32(255) * np.float32(case["scale"]))
+            both_halves = (h & U(0xFFFF)).astype(np.int64) + (h >> U(16))
+            code = code + both_halves * (2 * amount + 1) // 131071 - amount
+        value = np.clip(code, 0, 255).astype(np.float32) / np.float32(255)
+        channels.append(value * np.float32(case["scale"]))
     return np.stack(channels, axis=-1)
 
 
@@ -88,9 +91,8 @@ def metric(viewing):
         k_refl=float(of["reflectivity"]),
     )
     geometry = vvdp_display_geometry((1920, 1080), ppd=float(of["ppd"]))
-    return Recorder(
-        display_photometry=photometry, display_geometry=geometry, heatmap="raw", device=torch.device("cpu"), quiet=True
-    )
+    display = dict(display_photometry=photometry, display_geometry=geometry)
+    return Recorder(**display, heatmap="raw", device=torch.device("cpu"), quiet=True)
 
 
 def cases():
@@ -112,8 +114,9 @@ def cases():
     for grain in (2, 4, 8):
         vary(grain=grain)
     # Sizes: small, odd, even beside odd
-    for width, height in ((2, 2), (3, 5), (4, 4), (7, 7), (8, 13), (13, 8), (15, 16), (16, 15), (33, 31), (65, 64), (64, 65),
-                          (127, 129), (128, 200), (160, 160), (192, 192), (255, 130), (301, 201)):  # fmt: skip
+    small = ((2, 2), (3, 5), (4, 4), (7, 7), (8, 13), (13, 8), (15, 16), (16, 15), (33, 31), (65, 64), (64, 65))
+    large = ((127, 129), (128, 200), (160, 160), (192, 192), (255, 130), (301, 201))
+    for width, height in small + large:
         vary(width=width, height=height, amount=[20] * 3)
     # Contents
     for pattern in ("flat", "ramp", "bars", "disc", "mosaic"):
@@ -127,8 +130,11 @@ def cases():
     vary(low=[128] * 3, high=[128] * 3, amount=[15, 5, 0])
     vary(pattern="disc", low=[200, 40, 40], high=[40, 200, 40], amount=[10] * 3)
     # Displays
-    for viewing in ("standard_4k", "standard_phone", "standard_hmd", "sdr_4k_30", "iphone_12_pro", "macbook_pro_16", "lg_oled_2017_sdr",
-                    "eizo_CG3146", "standard_hdr_pq", "65inch_hdr_pq_2Knit", "standard_hdr_hlg", "iphone_14_pro_hdr"):  # fmt: skip
+    sdr = (
+        "standard_4k standard_phone standard_hmd sdr_4k_30 iphone_12_pro macbook_pro_16 lg_oled_2017_sdr eizo_CG3146"
+    )
+    hdr = "standard_hdr_pq 65inch_hdr_pq_2Knit standard_hdr_hlg iphone_14_pro_hdr"
+    for viewing in sdr.split() + hdr.split():
         vary(viewing=viewing, width=160, height=144)
         vary(viewing=viewing, pattern="mosaic", high=[220, 180, 140], amount=[25] * 3)
     for viewing in ("standard_hdr_linear", "standard_hdr_linear_dark", "standard_hdr_linear_zoom"):
@@ -146,7 +152,7 @@ def cases():
 
 
 def record(case):
-    """The case with what the metric says of it: JOD; mean and root mean square of the map, and an 8×8 sample, in JOD."""
+    """The case with its JOD, and of the map its mean, root mean square and an 8×8 sample, in JODs lost."""
     of = metric(case["viewing"])
     test, reference = (torch.tensor(picture(case, noisy)) for noisy in (True, False))
     jod, _ = of.predict(test, reference, dim_order="HWC")

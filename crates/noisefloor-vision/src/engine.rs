@@ -1,0 +1,218 @@
+//! The steps from code values to visible differences by band and channel, on a workspace.
+
+use crate::bands::{Bands, sensitivity, sensitivity_row};
+use crate::csf::{KNOTS, place};
+use crate::masking::{BLUR_RADIUS, Blur, Masking, Row, blur, blur_row, contrast_row, mask_row};
+use crate::part::Part;
+use crate::photometry::{Photometry, grey_row, opponent_row};
+use crate::pyramid::{Size, expand_row, reduce};
+use crate::viewing::Viewing;
+use crate::workspace::VisionWorkspace;
+use multiversion::multiversion;
+use std::ops::Range;
+
+/// What is constant for a display.
+#[derive(Clone, Debug)]
+pub(crate) struct Engine {
+    photometry: Photometry,
+    pub(crate) bands: Bands,
+    masking: Masking,
+    blur: Blur,
+}
+
+impl Engine {
+    pub(crate) fn new(viewing: &Viewing) -> Self {
+        Self {
+            photometry: Photometry::new(viewing),
+            bands: Bands::new(viewing.pixels_per_degree()),
+            masking: Masking::new(),
+            blur: blur(),
+        }
+    }
+
+    /// Converts a picture into the finest level of picture `of`; `read(y, row)` gives its rows.
+    pub(crate) fn load<const N: usize>(
+        &self,
+        of: usize,
+        size: Size,
+        workspace: &mut VisionWorkspace,
+        mut read: impl FnMut(usize, &mut [[f32; 3]]),
+    ) {
+        let VisionWorkspace { gauss, rows, .. } = workspace;
+        let codes = &mut rows.codes[..size.width];
+        let [a, b, c] = &mut gauss[of];
+        for y in 0..size.height {
+            read(y, codes);
+            let from = y * size.width;
+            let mut planes = [&mut *a, &mut *b, &mut *c].into_iter().take(N);
+            let mut row = || planes.next().map(|levels| &mut levels[0][from..][..size.width]);
+            let mut planes: [&mut [f32]; N] = std::array::from_fn(|_| row().expect("at most three channels"));
+            opponent_row(&self.photometry, codes, &mut planes);
+        }
+    }
+
+    /// Converts greys into the finest level of picture `of`, its achromatic channel alone.
+    pub(crate) fn load_grey(
+        &self,
+        of: usize,
+        size: Size,
+        workspace: &mut VisionWorkspace,
+        code: impl Fn(usize) -> f32,
+    ) {
+        let plane = &mut workspace.gauss[of][0][0];
+        for from in (0..size.area()).step_by(size.width) {
+            let row = &mut plane[from..from + size.width];
+            row.iter_mut().enumerate().for_each(|(x, out)| *out = code(from + x));
+            grey_row(&self.photometry, row);
+        }
+    }
+
+    /// Visible differences of a band, of `N` channels. Contrasts are worked out in the first part of it,
+    /// which has to have [`BLUR_RADIUS`] more pixels around, where there are any, than the second, in which
+    /// differences are.
+    pub(crate) fn band<const N: usize>(
+        &self,
+        band: usize,
+        size: Size,
+        (contrasts, differences): (Part, Part),
+        workspace: &mut VisionWorkspace,
+    ) {
+        let blurs = size.width > BLUR_RADIUS && size.height > BLUR_RADIUS;
+        for y in contrasts.rows() {
+            self.contrasts::<N>(band, size, y, contrasts.columns(), blurs, workspace);
+        }
+        let VisionWorkspace { smaller, differences: planes, .. } = workspace;
+        let columns = differences.columns();
+        for y in differences.rows() {
+            let around: [usize; 2 * BLUR_RADIUS + 1] =
+                std::array::from_fn(|i| if blurs { reflected(y + i, size.height) } else { y });
+            let smaller: [_; N] =
+                std::array::from_fn(|c| around.map(|y| &smaller[c][y * size.width..][columns.clone()]));
+            let mut rows = planes.iter_mut().map(|bands| &mut bands[band][y * size.width..][columns.clone()]);
+            let rows: [&mut [f32]; N] = std::array::from_fn(|_| rows.next().expect("at most three channels"));
+            mask_row(&self.masking, blurs.then_some(&self.blur), smaller, rows);
+        }
+    }
+
+    /// Differences of contrasts and masking contrasts in row `y` of a band.
+    fn contrasts<const N: usize>(
+        &self,
+        band: usize,
+        size: Size,
+        y: usize,
+        columns: Range<usize>,
+        blurs: bool,
+        workspace: &mut VisionWorkspace,
+    ) {
+        let VisionWorkspace { gauss, differences, smaller, rows, .. } = workspace;
+        for (channels, coarse) in gauss.iter().zip(&mut rows.coarse) {
+            for (levels, coarse) in channels.iter().zip(coarse).take(N) {
+                expand_row(&levels[band + 1], size, y, &mut rows.narrow, coarse);
+            }
+        }
+        let coarse = &rows.coarse;
+        let places = &mut rows.places[columns.clone()];
+        place_row(&coarse[1][0][columns.clone()], places);
+        let here = y * size.width + columns.start..y * size.width + columns.end;
+        for channel in 0..N {
+            let sensitivity = &mut rows.sensitivity[..columns.len()];
+            sensitivity_row(&self.bands.curves[band][channel], places, sensitivity);
+            let [test, reference] = std::array::from_fn(|of| Row {
+                fine: &gauss[of][channel][band][here.clone()],
+                coarse: &coarse[of][channel][columns.clone()],
+                background: &coarse[of][0][columns.clone()],
+            });
+            let padded = &mut rows.padded[..columns.len() + 2 * BLUR_RADIUS];
+            let difference = &mut differences[channel][band][here.clone()];
+            let smaller = &mut smaller[channel][here.clone()];
+            if blurs {
+                contrast_row(
+                    test,
+                    reference,
+                    sensitivity,
+                    difference,
+                    &mut padded[BLUR_RADIUS..][..columns.len()],
+                );
+                pad(padded);
+                blur_row(&self.blur, padded, smaller);
+            } else {
+                contrast_row(test, reference, sensitivity, difference, smaller);
+            }
+        }
+    }
+
+    /// Visible differences of the coarsest level, beside its mean luminance.
+    pub(crate) fn baseband(&self, band: usize, size: Size, workspace: &mut VisionWorkspace) {
+        let VisionWorkspace { gauss, differences, .. } = workspace;
+        let planes = |of: usize, channel: usize| &gauss[of][channel][band][..size.area()];
+        let [test, reference] = [0, 1].map(|of| {
+            let sum: f64 = planes(of, 0).iter().map(|&v| f64::from(v.max(0.01))).sum();
+            (sum / size.area() as f64) as f32
+        });
+        let place = place(reference).clamp(0.0, (KNOTS - 1) as f32);
+        for (channel, out) in differences.iter_mut().enumerate() {
+            let s = sensitivity(&self.bands.baseband[channel], place);
+            let pairs = planes(0, channel).iter().zip(planes(1, channel));
+            for (out, (t, r)) in out[band].iter_mut().zip(pairs) {
+                *out = ((t / test).min(1000.0) - (r / reference).min(1000.0)).abs() * s;
+            }
+        }
+    }
+}
+
+/// Builds the coarser levels of both pictures.
+pub(crate) fn build<const N: usize>(sizes: &[Size], workspace: &mut VisionWorkspace) {
+    let VisionWorkspace { gauss, rows, .. } = workspace;
+    for levels in gauss.iter_mut().flat_map(|channels| &mut channels[..N]) {
+        for (level, &size) in sizes[..sizes.len() - 1].iter().enumerate() {
+            let (fine, coarse) = levels.split_at_mut(level + 1);
+            reduce(&fine[level], size, &mut rows.narrow, &mut coarse[0]);
+        }
+    }
+}
+
+/// Adds these bands of a map onto the finest of them, in the rows that `rows` gives for each.
+pub(crate) fn collapse(
+    map: &mut [Vec<f32>],
+    bands: Range<usize>,
+    sizes: &[Size],
+    rows: impl Fn(usize) -> Range<usize>,
+    narrow: &mut [f32],
+    row: &mut [f32],
+) {
+    for band in (bands.start..bands.end - 1).rev() {
+        let (fine, coarse) = map.split_at_mut(band + 1);
+        let size = sizes[band];
+        let row = &mut row[..size.width];
+        for y in rows(band) {
+            expand_row(&coarse[0], size, y, narrow, row);
+            let out = &mut fine[band][y * size.width..][..size.width];
+            out.iter_mut().zip(&*row).for_each(|(out, coarse)| *out += *coarse);
+        }
+    }
+}
+
+/// Places of luminances among the knots of the table.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx2", "x86_64+avx2"))]
+fn place_row(luminances: &[f32], places: &mut [f32]) {
+    const LAST: f32 = (KNOTS - 1) as f32;
+    for (out, &luminance) in places.iter_mut().zip(luminances) {
+        let at = place(if luminance > 0.01 { luminance } else { 0.01 });
+        *out = if at < LAST { at } else { LAST };
+    }
+}
+
+/// Row `padded` − [`BLUR_RADIUS`] of `height`, reflected at the border, which is not repeated.
+fn reflected(padded: usize, height: usize) -> usize {
+    let y = padded.abs_diff(BLUR_RADIUS);
+    if y < height { y } else { 2 * (height - 1) - y }
+}
+
+/// Reflects both ends of a row, which are not repeated.
+fn pad(row: &mut [f32]) {
+    let last = row.len() - 1;
+    for i in 0..BLUR_RADIUS {
+        row[i] = row[2 * BLUR_RADIUS - i];
+        row[last - i] = row[last - 2 * BLUR_RADIUS + i];
+    }
+}

@@ -1,0 +1,261 @@
+//! How visible a residual is on its picture, in a part of that picture: what a stopping rule asks of every
+//! tile.
+
+use crate::check::{check_pixels, check_values, checked};
+use crate::engine::{Engine, build, collapse};
+use crate::error::VisionError;
+use crate::masking::{BLUR_RADIUS, EXPONENT, LARGEST};
+use crate::model::VisionModel;
+use crate::part::Part;
+use crate::photometry::CHANNELS;
+use crate::pooling::{STILL, across_row};
+use crate::pyramid::Size;
+use crate::workspace::{Sizes, VisionWorkspace};
+use std::ops::Range;
+
+/// A picture and what is wrong with it, as code values of the display, row by row.
+#[derive(Clone, Copy, Debug)]
+pub enum ResidualPixels<'a> {
+    /// In colour.
+    Rgb {
+        /// The picture.
+        picture: &'a [[f32; 3]],
+        /// Added to the picture, it makes the one that is judged.
+        residual: &'a [[f32; 3]],
+    },
+    /// As greys: half the time of colour without its chromatic channels, and blind to noise in colour alone.
+    Grey {
+        /// The picture.
+        picture: &'a [f32],
+        /// Added to the picture, it makes the one that is judged.
+        residual: &'a [f32],
+    },
+}
+
+/// A part of a picture with what surrounds it.
+#[derive(Clone, Debug)]
+pub struct ResidualPatch<'a> {
+    /// Its pixels, with a halo. Filters see the border of the patch mirrored; a halo of 16 pixels changes the
+    /// mean difference of a tile of 128×128 by less than 1 %.
+    pub pixels: ResidualPixels<'a>,
+    /// Pixels in a row, and rows; at least 4.
+    pub size: (usize, usize),
+    /// Columns of which differences are wanted.
+    pub columns: Range<usize>,
+    /// Rows of which differences are wanted.
+    pub rows: Range<usize>,
+}
+
+/// How much of the model is computed for a residual: less is faster. `docs/` of the crate's README has a
+/// table.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct VisionDetail {
+    /// Whether the chromatic channels are computed.
+    pub colour: bool,
+    /// Bands of the pyramid are computed if their centre lies between these, in cycles per degree; at least
+    /// one is.
+    pub frequencies: (f64, f64),
+}
+
+impl VisionDetail {
+    /// All channels and bands.
+    pub const FULL: Self = Self { colour: true, frequencies: (0.0, f64::INFINITY) };
+    /// Light and dark only, 1.5 to 15 cycles per degree: the frequencies at which people see noise of single
+    /// pixels best.
+    pub const FAST: Self = Self { colour: false, frequencies: (1.0, 15.0) };
+}
+
+/// Visible differences in a part of a picture; 1 is about the threshold of seeing a difference. It borrows
+/// the workspace.
+#[derive(Debug)]
+pub struct VisibleDifference<'a> {
+    workspace: &'a VisionWorkspace,
+    sizes: Sizes,
+    bands: Range<usize>,
+    channels: usize,
+    part: Part,
+    frequencies: &'a [f64],
+}
+
+/// Visible differences of one band and channel.
+#[derive(Clone, Copy, Debug)]
+pub struct DifferenceBand<'a> {
+    /// Centre of the band, in cycles per degree.
+    pub frequency: f64,
+    /// Pixels of the picture from one value to the next.
+    pub step: usize,
+    plane: &'a [f32],
+    stride: usize,
+    part: Part,
+}
+
+impl<'a> DifferenceBand<'a> {
+    /// The values, row by row. The first value of the first row lies on the first pixel asked for, or up to
+    /// `step` − 1 before.
+    pub fn rows(self) -> impl Iterator<Item = &'a [f32]> {
+        let columns = self.part.columns();
+        self.part.rows().map(move |y| &self.plane[y * self.stride..][columns.clone()])
+    }
+
+    /// Values in a row, and rows.
+    pub fn size(&self) -> (usize, usize) {
+        (self.part.columns().len(), self.part.rows().len())
+    }
+
+    /// Mean of this order over the values: the first is the mean, the second the root mean square; high
+    /// orders approach the largest.
+    pub fn pooled(&self, order: f64) -> f64 {
+        let (columns, rows) = self.size();
+        let sum: f64 = self.rows().flatten().map(|&d| f64::from(d).powf(order)).sum();
+        (sum / (columns * rows) as f64).powf(1.0 / order)
+    }
+}
+
+impl VisionModel {
+    /// How visible a residual is on its picture, where it is asked for. Allocates nothing once the workspace
+    /// has grown to the patch.
+    ///
+    /// Differences are those of [`VisionModel::compare`] before they are pooled, without its coarsest band,
+    /// and without the constant 10⁻⁵ that makes its pooling over channels differentiable; so they follow
+    /// [`rescaled`].
+    ///
+    /// # Errors
+    /// If a side has fewer than four pixels, or the pictures are too large, of another size, or not finite,
+    /// or if nothing is asked for.
+    pub fn residual<'a>(
+        &'a self,
+        patch: &ResidualPatch<'_>,
+        detail: VisionDetail,
+        workspace: &'a mut VisionWorkspace,
+    ) -> Result<VisibleDifference<'a>, VisionError> {
+        let (width, height) = patch.size;
+        let size = checked(width, height)?;
+        if width < 4 || height < 4 {
+            return Err(VisionError::Size { width, height });
+        }
+        let part =
+            Part { x: (patch.columns.start, patch.columns.end), y: (patch.rows.start, patch.rows.end) };
+        if part.columns().is_empty() || part.rows().is_empty() || part.x.1 > width || part.y.1 > height {
+            return Err(VisionError::Region);
+        }
+        let bands = self.engine.bands.within(size, detail.frequencies);
+        let colour = detail.colour && matches!(patch.pixels, ResidualPixels::Rgb { .. });
+        let channels = if colour { CHANNELS } else { 1 };
+        let sizes = workspace.fit(size, bands.end + 1, channels);
+        load(&self.engine, patch, size, channels, workspace)?;
+        if colour {
+            differ::<CHANNELS>(&self.engine, &sizes, bands.clone(), part, workspace);
+        } else {
+            differ::<1>(&self.engine, &sizes, bands.clone(), part, workspace);
+        }
+        let frequencies = &self.engine.bands.frequencies[bands.clone()];
+        Ok(VisibleDifference { workspace, sizes, bands, channels, part, frequencies })
+    }
+}
+
+impl VisibleDifference<'_> {
+    /// One number a place: bands and channels together, as in the map of ColorVideoVDP before it turns into
+    /// JODs. Its step is that of the finest band that was computed.
+    pub fn map(&self) -> DifferenceBand<'_> {
+        self.plane(self.bands.start, &self.workspace.map[self.bands.start])
+    }
+
+    /// The bands of a channel, finest first; none for chromatic channels that were not computed.
+    pub fn bands(&self, channel: crate::OpponentChannel) -> impl Iterator<Item = DifferenceBand<'_>> {
+        let planes = &self.workspace.differences[channel as usize];
+        let bands = if (channel as usize) < self.channels { self.bands.clone() } else { 0..0 };
+        bands.map(|band| self.plane(band, &planes[band]))
+    }
+
+    fn plane<'a>(&self, band: usize, plane: &'a [f32]) -> DifferenceBand<'a> {
+        let frequency = self.frequencies[band - self.bands.start];
+        DifferenceBand {
+            frequency,
+            step: 1 << band,
+            plane,
+            stride: self.sizes[band].width,
+            part: self.part.at(band),
+        }
+    }
+}
+
+/// A visible difference after the residual has been multiplied by `contrast`: it grows as contrast^2.26, up
+/// to a limit. Noise of n times as many samples has a contrast of 1/√n.
+///
+/// Exact if the picture masks as before. That of a noisy picture masks less once its noise falls, so the
+/// difference falls more slowly.
+pub fn rescaled(difference: f32, contrast: f32) -> f32 {
+    // The inverse of the limit, the power, and the limit again
+    let unlimited = LARGEST * difference / (LARGEST - difference).max(1e-3);
+    let scaled = unlimited * contrast.max(0.0).powf(EXPONENT);
+    LARGEST / (LARGEST / scaled + 1.0)
+}
+
+/// Converts both pictures into opponent channels.
+fn load(
+    engine: &Engine,
+    patch: &ResidualPatch<'_>,
+    size: Size,
+    channels: usize,
+    workspace: &mut VisionWorkspace,
+) -> Result<(), VisionError> {
+    let width = size.width;
+    match patch.pixels {
+        ResidualPixels::Rgb { picture, residual } => {
+            for pixels in [picture, residual] {
+                check_pixels(pixels, size)?;
+            }
+            let row = |y: usize, row: &mut [[f32; 3]]| row.copy_from_slice(&picture[y * width..][..width]);
+            let noisy = |y: usize, row: &mut [[f32; 3]]| {
+                let [picture, residual] = [picture, residual].map(|pixels| &pixels[y * width..][..width]);
+                let sums = picture.as_flattened().iter().zip(residual.as_flattened());
+                row.as_flattened_mut().iter_mut().zip(sums).for_each(|(out, (a, b))| *out = a + b);
+            };
+            if channels == 1 {
+                engine.load::<1>(0, size, workspace, noisy);
+                engine.load::<1>(1, size, workspace, row);
+            } else {
+                engine.load::<CHANNELS>(0, size, workspace, noisy);
+                engine.load::<CHANNELS>(1, size, workspace, row);
+            }
+        }
+        ResidualPixels::Grey { picture, residual } => {
+            for values in [picture, residual] {
+                check_values(values, size)?;
+            }
+            engine.load_grey(0, size, workspace, |i| picture[i] + residual[i]);
+            engine.load_grey(1, size, workspace, |i| picture[i]);
+        }
+    }
+    Ok(())
+}
+
+/// Computes the bands of `N` channels in a part of the picture, and their map.
+fn differ<const N: usize>(
+    engine: &Engine,
+    sizes: &Sizes,
+    bands: Range<usize>,
+    part: Part,
+    workspace: &mut VisionWorkspace,
+) {
+    /// Interpolation of a band reads so far beyond what is wanted of the next finer one.
+    const MARGIN: usize = 2;
+    build::<N>(sizes, workspace);
+    for band in bands.clone() {
+        let size = sizes[band];
+        let wanted = part.at(band).wider(MARGIN, size);
+        engine.band::<N>(band, size, (wanted.wider(BLUR_RADIUS, size), wanted), workspace);
+        let VisionWorkspace { differences, map, .. } = workspace;
+        // The pyramid halves contrasts between its finest and its coarsest band
+        let weight = STILL as f32 * if band == 0 { 1.0 } else { 0.5 };
+        for y in wanted.rows() {
+            let here = y * size.width + wanted.x.0..y * size.width + wanted.x.1;
+            let planes: [&[f32]; N] =
+                std::array::from_fn(|channel| &differences[channel][band][here.clone()]);
+            across_row(planes, weight, &mut map[band][here]);
+        }
+    }
+    let VisionWorkspace { map, rows, .. } = workspace;
+    let parts = |band: usize| part.at(band).wider(MARGIN, sizes[band]).rows();
+    collapse(map, bands, sizes, parts, &mut rows.narrow, &mut rows.places);
+}
