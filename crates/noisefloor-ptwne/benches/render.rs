@@ -1,5 +1,5 @@
-//! Samples a second of every built-in scene at 64×64, four samples a pixel, on the threads of the global rayon pool
-//! (`RAYON_NUM_THREADS` sets how many), and of the quick reference of the Cornell box.
+//! Samples per second of every built-in scene at 64×64 and four samples per pixel, on the threads of the
+//! global rayon pool (`RAYON_NUM_THREADS`), and of the ray-traced reference of the Cornell box.
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use noisefloor::{ProgressiveSource, Request, TileGrid};

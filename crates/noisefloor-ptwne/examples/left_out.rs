@@ -1,5 +1,5 @@
-//! What is left out for a scene that does not need it: `left_out ROUNDS SCENE…`. Renders built-in scenes with and without
-//! opacity tests, in turns, and prints a table in Markdown with the ratios of median times.
+//! What is left out for a scene that does not need it: `left_out ROUNDS SCENE…`. Renders built-in scenes with
+//! and without opacity tests, in turns, and prints a table in Markdown with the ratios of median times.
 
 #![expect(clippy::print_stdout, reason = "a table for people")]
 

@@ -1,5 +1,5 @@
-//! Renders a built-in scene to a PNG: `picture SCENE SPP SIZE OUT.png [reference|reinhard]…`. For looking at scenes; the
-//! command of the project does this properly.
+//! Renders a built-in scene to a PNG: `picture SCENE SPP SIZE OUT.png [reference|reinhard]…`. For a quick
+//! look at a scene; the `noisefloor` command does this properly.
 
 use noisefloor::{ProgressiveSource, Request, Rgb, TileGrid};
 use noisefloor_ptwne::{Estimator, Ptwne, RenderOptions, scenes};

@@ -24,8 +24,9 @@ impl AliasTable {
         Self(table)
     }
 
-    /// An index, and the rest of the first number, which is uniform again. Both numbers are uniform in [0, 1); the
-    /// second only extends the first, whose 24 bits are too few for large tables. The table must not be empty.
+    /// An index, and the rest of the first number, which is uniform again. Both numbers are uniform in [0,
+    /// 1); the second only extends the first, whose 24 bits are too few for large tables. The table must not
+    /// be empty.
     #[inline]
     pub(crate) fn choose(&self, u: f32, more: f32) -> (usize, f32) {
         let x = (f64::from(u) + f64::from(more) * 2f64.powi(-24)) * self.0.len() as f64;

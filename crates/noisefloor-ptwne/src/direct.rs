@@ -12,7 +12,8 @@ use crate::rng::{GOLDEN, mix};
 use crate::scene::{Scene, Sky};
 use std::f32::consts::FRAC_1_PI;
 
-/// Light samples at each surface. Most of the error is there, and a ray to the next surface costs as much as one.
+/// Light samples at each surface. Most of the error is there, and a ray to the next surface costs as much as
+/// one.
 const LIGHT_SAMPLES: u32 = 4;
 /// Longest chain of mirrors and glass.
 const MAX_SPECULAR: u32 = 10;
@@ -28,7 +29,8 @@ enum Use {
     Facets,
 }
 
-/// Takes samples. Each decision along a path uses two dimensions of Owen-scrambled Sobol points (Burley 2020).
+/// Takes samples. Each decision along a path uses two dimensions of Owen-scrambled Sobol points (Burley
+/// 2020).
 pub(crate) struct Tracer<'a> {
     scene: &'a Scene,
     /// Chooses lights.
@@ -48,8 +50,8 @@ struct Branch {
     density: f32,
     /// Factor on its light.
     weight: Vec3,
-    /// One at the camera, doubled at each surface, plus one for light that glass transmits: unique among the rays of a
-    /// sample.
+    /// One at the camera, doubled at each surface, plus one for light that glass transmits: unique among the
+    /// rays of a sample.
     code: u64,
 }
 
@@ -66,7 +68,8 @@ impl<'a> Tracer<'a> {
         self.radiance(Branch { ray, density: DELTA, weight: Vec3::ONE, code: 1 })
     }
 
-    /// Number of directions that each surface samples in [`Tracer::hemisphere`], the only way to find a smooth sky.
+    /// Number of directions that each surface samples in [`Tracer::hemisphere`], the only way to find a
+    /// smooth sky.
     fn directions(&self) -> u32 {
         if matches!(self.scene.sky, Some(Sky::Dome(_))) { LIGHT_SAMPLES } else { 1 }
     }
@@ -176,8 +179,8 @@ impl<'a> Tracer<'a> {
         sum
     }
 
-    /// Direct light by light samples, times the weight. `scattered` is f·cos θ in a direction, times the weight that a
-    /// light sample of that density has.
+    /// Direct light by light samples, times the weight. `scattered` is f·cos θ in a direction, times the
+    /// weight that a light sample of that density has.
     fn lights(
         &mut self,
         surface: &Intersection<'_>,
@@ -212,8 +215,8 @@ impl<'a> Tracer<'a> {
         sum
     }
 
-    /// Direct light by directions sampled by their cosine, times the weight: from the sky, and from lights so near
-    /// that light samples are a poor choice. `scattered` is f·cos θ.
+    /// Direct light by directions sampled by their cosine, times the weight: from the sky, and from lights so
+    /// near that light samples are a poor choice. `scattered` is f·cos θ.
     fn hemisphere(
         &mut self,
         surface: &Intersection<'_>,
@@ -243,7 +246,8 @@ impl<'a> Tracer<'a> {
         sum
     }
 
-    /// The weighted light that a ray hits, whose direction was sampled with that density, and the stratum of its light.
+    /// The weighted light that a ray hits, whose direction was sampled with that density, and the stratum of
+    /// its light.
     fn emitted_along(&mut self, ray: &Ray, test: OpacityTest, density: f32) -> (Vec3, Option<usize>) {
         let scene = self.scene;
         let hit = scene.closest::<true>(ray, &mut self.stack, test);
@@ -259,7 +263,8 @@ impl<'a> Tracer<'a> {
         (emitted.radiance * self.share(density, stratum, own), Some(stratum))
     }
 
-    /// The weighted radiance from infinitely far away for a direction of that density, and the stratum of its light.
+    /// The weighted radiance from infinitely far away for a direction of that density, and the stratum of its
+    /// light.
     fn background(&self, dir: Vec3, density: f32) -> (Vec3, Option<usize>) {
         let mut stratum = None;
         let radiance = self.scene.background(dir, |own, _| {
@@ -270,7 +275,8 @@ impl<'a> Tracer<'a> {
         (radiance, stratum)
     }
 
-    /// The weight of a direction of that density beside light samples. `own` is the density of the light's own samples.
+    /// The weight of a direction of that density beside light samples. `own` is the density of the light's
+    /// own samples.
     fn share(&self, density: f32, stratum: usize, own: f32) -> f32 {
         balance(density, self.guide.density(stratum, own) * LIGHT_SAMPLES as f32)
     }
@@ -288,7 +294,8 @@ fn pair(index: u32, seed: u64) -> [f32; 2] {
     [u, v]
 }
 
-/// Balance heuristic (Veach 1997, §9.2.2): the weight of a sample that another technique takes with density `rival`.
+/// Balance heuristic (Veach 1997, §9.2.2): the weight of a sample that another technique takes with density
+/// `rival`.
 fn balance(density: f32, rival: f32) -> f32 {
     if density == DELTA { 1.0 } else { density / (density + rival) }
 }

@@ -2,10 +2,10 @@
 
 use crate::math;
 
-/// A reconstruction filter. Sample positions are drawn from it (Ernst, Stamminger, Greiner 2006, "Filter Importance
-/// Sampling"). Each sample therefore counts for one pixel, with the same weight as all others, and noise stays independent
-/// from pixel to pixel: the oracle judges it as with a box. Neighbouring pixels partly see the same light, so that the
-/// picture is softer than with a box.
+/// A reconstruction filter. Sample positions are drawn from it (Ernst, Stamminger, Greiner 2006, "Filter
+/// Importance Sampling"). Each sample therefore counts for one pixel, with the same weight as all others, and
+/// noise stays independent from pixel to pixel: the oracle judges it as with a box. Neighbouring pixels
+/// partly see the same light, so that the picture is softer than with a box.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Filter {
@@ -23,7 +23,8 @@ const SIGMA: f32 = 0.5;
 const RADIUS: f32 = 2.0;
 
 impl Filter {
-    /// The position of a sample relative to the corner of its pixel, in pixels, for `u` uniform in the unit square.
+    /// The position of a sample relative to the corner of its pixel, in pixels, for `u` uniform in the unit
+    /// square.
     #[inline]
     pub(crate) fn offset(self, u: [f32; 2]) -> [f32; 2] {
         match self {
@@ -56,8 +57,8 @@ impl Filter {
 mod tests {
     use super::*;
 
-    /// Mean and variance of the offsets, by the midpoint rule: 1/12 pixel² for the box, 1/6 for the tent, 1/4 for the
-    /// Gaussian, of which less than 1e-3 is cut off.
+    /// Mean and variance of the offsets, by the midpoint rule: 1/12 pixel² for the box, 1/6 for the tent, 1/4
+    /// for the Gaussian, of which less than 1e-3 is cut off.
     #[test]
     fn offsets_have_the_filters_moments() {
         let n = 1000;

@@ -5,7 +5,8 @@ use crate::light::{Light, LightSample};
 use crate::math::Vec3;
 use crate::scene::Scene;
 
-/// Share of the light samples that goes by power, whatever was learned: lights that no sample found may be visible.
+/// Share of the light samples that goes by power, whatever was learned: lights that no sample found may be
+/// visible.
 const DEFENSIVE_SHARE: f64 = 0.1;
 
 /// The strata of all lights: each light is one, but the environment map, which comes last, is many.
@@ -37,7 +38,8 @@ impl<'a> LightStrata<'a> {
         self.by_power.len() - self.cells.as_ref().map_or(0, |c| c.pmf.len())
     }
 
-    /// The stratum infinitely far away in direction `dir`: of the map, or the sun, which is then the last light.
+    /// The stratum infinitely far away in direction `dir`: of the map, or the sun, which is then the last
+    /// light.
     pub(crate) fn far(&self, dir: Vec3) -> usize {
         match &self.cells {
             Some(cells) => self.first_cell() + cells.cell(dir),
@@ -130,7 +132,8 @@ impl<'a> Guide<'a> {
         Some((self.sums.get(stratum)? - below) as f32).filter(|pmf| *pmf > 0.0)
     }
 
-    /// Density of [`Guide::sample`] at a point of a stratum, where the light's own samples have density `own`.
+    /// Density of [`Guide::sample`] at a point of a stratum, where the light's own samples have density
+    /// `own`.
     pub(crate) fn density(&self, stratum: usize, own: f32) -> f32 {
         let Some(pmf) = self.pmf(stratum) else { return 0.0 };
         match (&self.strata.cells, stratum.checked_sub(self.strata.first_cell())) {

@@ -17,8 +17,8 @@ pub(crate) struct Emitted<'a> {
 }
 
 impl Scene {
-    /// Radiance from `dir` of what is infinitely far away. `weight` is the weight of light that is also sampled, by
-    /// the density of the sample given the light, and the probability of the light.
+    /// Radiance from `dir` of what is infinitely far away. `weight` is the weight of light that is also
+    /// sampled, by the density of the sample given the light, and the probability of the light.
     #[inline]
     pub(crate) fn background(&self, dir: Vec3, weight: impl FnOnce(f32, f32) -> f32) -> Vec3 {
         match &self.sky {
@@ -37,7 +37,8 @@ impl Scene {
         }
     }
 
-    /// The light of a surface towards the origin of the ray along `dir` that hit it; none if it does not shine there.
+    /// The light of a surface towards the origin of the ray along `dir` that hit it; none if it does not
+    /// shine there.
     #[inline]
     pub(crate) fn emitted(&self, surface: &Intersection<'_>, hit: &Hit, dir: Vec3) -> Option<Emitted<'_>> {
         if surface.light == NO {

@@ -27,20 +27,20 @@ pub enum Estimator {
     /// By next event estimation and by scattering, combined by multiple importance sampling.
     #[default]
     Mis,
-    /// By next event estimation only (Takouachet et al. 2017, §4.2). Light that scattered rays hit counts only after
-    /// the camera, mirrors and glass.
+    /// By next event estimation only (Takouachet et al. 2017, §4.2). Light that scattered rays hit counts
+    /// only after the camera, mirrors and glass.
     NextEvents,
-    /// By scattering only. A check of the other two: lights without size, which no ray can hit, are black, and small
-    /// lights are noisy.
+    /// By scattering only. A check of the other two: lights without size, which no ray can hit, are black,
+    /// and small lights are noisy.
     BruteForce,
 }
 
 /// Samples the radiance along a camera ray.
 pub(crate) type SampleRadiance = fn(&Scene, Settings, Ray, &mut Sampler, &mut Stack) -> Vec3;
 
-/// The integrator for scenes with or without partly transparent surfaces. It is compiled for both, since the test costs
-/// up to 8 %; code for textures, microfacets, mirrors and skies costs other scenes 0 to 4 %, and is always there
-/// (docs/benchmarks/renderer.md).
+/// The integrator for scenes with or without partly transparent surfaces. It is compiled for both, since the
+/// test costs up to 8 %; code for textures, microfacets, mirrors and skies costs other scenes 0 to 4 %, and
+/// is always there (docs/benchmarks/renderer.md).
 pub(crate) fn integrator(opacity: bool) -> SampleRadiance {
     if opacity { radiance::<true> } else { radiance::<false> }
 }
@@ -145,8 +145,8 @@ impl<'a, const OPACITY: bool> Path<'a, OPACITY> {
         OpacityTest::Random(self.seed)
     }
 
-    /// The weight of light that a ray sampled with density `pdf` hit; next event estimation has density `light_pdf`
-    /// there.
+    /// The weight of light that a ray sampled with density `pdf` hit; next event estimation has density
+    /// `light_pdf` there.
     #[inline(always)]
     fn hit_weight(&self, pdf: f32, light_pdf: f32) -> f32 {
         match self.settings.estimator {
@@ -176,8 +176,8 @@ impl<'a, const OPACITY: bool> Path<'a, OPACITY> {
         }
     }
 
-    /// Next event estimation: radiance over density from a point on a light, times what `scattered` returns for the
-    /// direction and its density. No shadow ray is traced if that is zero.
+    /// Next event estimation: radiance over density from a point on a light, times what `scattered` returns
+    /// for the direction and its density. No shadow ray is traced if that is zero.
     #[inline(always)]
     fn next_event(&mut self, surface: &Intersection<'_>, scattered: impl FnOnce(Vec3, f32) -> Vec3) -> Vec3 {
         let scene = self.scene;

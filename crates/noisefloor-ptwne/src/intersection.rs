@@ -13,8 +13,8 @@ use crate::scene::Scene;
 pub(crate) enum OpacityTest {
     /// At random, by the seed of the ray.
     Random(u64),
-    /// As ray `index` of a sequence: of every 2ᵏ consecutive rays, each surface stops its share to the nearest ray,
-    /// and different surfaces stop different rays.
+    /// As ray `index` of a sequence: of every 2ᵏ consecutive rays, each surface stops its share to the
+    /// nearest ray, and different surfaces stop different rays.
     Stratified { index: u32, seed: u64 },
 }
 

@@ -1,9 +1,10 @@
-//! The reference renderer of `noisefloor`: path tracing with next event estimation (Shirley et al. 1996; Takouachet et
-//! al. 2017, §4.2), and the ray-traced reference of the paper (§4.3). It opens no files.
+//! The reference renderer of `noisefloor`: path tracing with next event estimation (Shirley et al. 1996;
+//! Takouachet et al. 2017, §4.2), and the ray-traced reference of the paper (§4.3). It opens no files.
 //!
-//! - [`Ptwne`] renders a [`Scene`] as a [`ProgressiveSource`](noisefloor::ProgressiveSource), as [`RenderOptions`] says.
-//! - [`scenes`] has scenes ready to render. [`SceneBuilder`] makes others of [`Mesh`], [`Material`], [`Emission`],
-//!   [`Environment`] and [`Camera`].
+//! - [`Ptwne`] renders a [`Scene`] as a [`ProgressiveSource`](noisefloor::ProgressiveSource), as
+//!   [`RenderOptions`] says.
+//! - [`scenes`] has scenes ready to render. [`SceneBuilder`] makes others of [`Mesh`], [`Material`],
+//!   [`Emission`], [`Environment`] and [`Camera`].
 //! - [`SceneError`] and [`RenderError`] report invalid input. No input panics.
 //!
 //! Scene units are the caller's, skies have +y up, colours are linear Rec.709 RGB, and angles are in degrees.
@@ -22,10 +23,11 @@
 //! ```
 //!
 //! # Where things are
-//! `integrator` traces paths, `bsdf` scatters light, `light` samples emitters, `illumination` and `intersection` are what
-//! a scene answers them, and `accel` is its hierarchy. The reference is in `reference`, its samples in `direct`, and its
-//! choice of lights in `guide`. `builder` fills `parts`, of which `scene` is made. Absent on purpose: state between
-//! samples, allocation along paths, and any number that depends on threads.
+//! `integrator` traces paths, `bsdf` scatters light, `light` samples emitters, `illumination` and
+//! `intersection` are what a scene answers them, and `accel` is its hierarchy. The reference is in
+//! `reference`, its samples in `direct`, and its choice of lights in `guide`. `builder` fills `parts`, of
+//! which `scene` is made. Absent on purpose: state between samples, allocation along paths, and any number
+//! that depends on threads.
 
 mod accel;
 mod alias;

@@ -8,9 +8,11 @@ use crate::texture::Texture;
 use noisefloor::Rgb;
 use std::sync::Arc;
 
-/// What a surface is made of. Except for glass, both sides look the same, unless [`MaterialOptions`] says otherwise.
+/// What a surface is made of. Except for glass, both sides look the same, unless [`MaterialOptions`] says
+/// otherwise.
 ///
-/// Microfacets are GGX with Smith's height-correlated masking, single scattering (Walter et al. 2007; Heitz 2014, 2018).
+/// Microfacets are GGX with Smith's height-correlated masking, single scattering (Walter et al. 2007; Heitz
+/// 2014, 2018).
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Material {
@@ -26,15 +28,16 @@ pub enum Material {
     },
     /// A smooth dielectric boundary: unpolarised Fresnel reflection and refraction.
     ///
-    /// Paths carry basic radiance L/η², which is exact as long as the camera and all emitters lie outside the glass.
+    /// Paths carry basic radiance L/η², which is exact as long as the camera and all emitters lie outside the
+    /// glass.
     Glass {
         /// Index of refraction on the back (where the normal does not point), over that on the front: 0.25…4.
         ior: f32,
         /// Factor on light each time it crosses the surface, 0…1.
         tint: Rgb,
     },
-    /// A thin pane: one surface for both boundaries, including all reflections between them. Light passes straight
-    /// through.
+    /// A thin pane: one surface for both boundaries, including all reflections between them. Light passes
+    /// straight through.
     ThinGlass {
         /// Index of refraction of the pane over that of its surroundings: 0.25…4.
         ior: f32,
@@ -59,9 +62,10 @@ pub enum Material {
         /// GGX α, 0…1; below [`MIN_ROUGHNESS`] the surface is a mirror.
         roughness: f32,
     },
-    /// A dielectric coat on a Lambertian base, as Mitsuba's `plastic` and `roughplastic` (Jakob 2010): light enters
-    /// the coat, is reflected between base and coat any number of times, and leaves. As in Mitsuba, a rough coat loses
-    /// the light that its facets mask on the inside: a white base under α = 0.2 returns four fifths.
+    /// A dielectric coat on a Lambertian base, as Mitsuba's `plastic` and `roughplastic` (Jakob 2010): light
+    /// enters the coat, is reflected between base and coat any number of times, and leaves. As in Mitsuba, a
+    /// rough coat loses the light that its facets mask on the inside: a white base under α = 0.2 returns four
+    /// fifths.
     Plastic {
         /// Albedo of the base, 0…1.
         diffuse: Texture,
@@ -89,8 +93,8 @@ pub enum Material {
 /// Opacity and sidedness of a surface, besides its [`Material`].
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct MaterialOptions {
-    /// The mean of the channels is the probability that the surface stops a ray; other rays pass straight through.
-    /// `None`: opaque everywhere.
+    /// The mean of the channels is the probability that the surface stops a ray; other rays pass straight
+    /// through. `None`: opaque everywhere.
     pub opacity: Option<Texture>,
     /// Whether the back absorbs all light.
     pub one_sided: bool,
@@ -189,8 +193,8 @@ impl Material {
 }
 
 impl CompiledMaterial {
-    /// Checks a material and its options, and prepares them for the inner loop. Equal coats are shared, since they
-    /// are tables.
+    /// Checks a material and its options, and prepares them for the inner loop. Equal coats are shared, since
+    /// they are tables.
     pub(crate) fn new(
         material: Material,
         options: MaterialOptions,

@@ -59,8 +59,8 @@ pub(crate) fn floor(x: f32) -> f32 {
     }
 }
 
-/// Sine and cosine of 2π·u for u in [0, 1]: polynomials after folding to an eighth of a turn, with an absolute error
-/// below 1e-6. The library's are accurate to the last bit and three times slower.
+/// Sine and cosine of 2π·u for u in [0, 1]: polynomials after folding to an eighth of a turn, with an
+/// absolute error below 1e-6. The library's are accurate to the last bit and three times slower.
 #[inline]
 pub(crate) fn turn(u: f32) -> (f32, f32) {
     // Fold to x ∈ [−1/8, 1/8] of a turn and a quadrant
@@ -103,8 +103,8 @@ pub(crate) fn sphere(u: [f32; 2]) -> Vec3 {
     Vec3::new(r * cos, r * sin, z)
 }
 
-/// A direction of the cone around +z with 1 − cos θ = `one_minus_cos` for its half angle θ, uniform in solid angle.
-/// Written with 1 − cos θ since cos θ of a narrow cone rounds to 1.
+/// A direction of the cone around +z with 1 − cos θ = `one_minus_cos` for its half angle θ, uniform in solid
+/// angle. Written with 1 − cos θ since cos θ of a narrow cone rounds to 1.
 #[inline]
 pub(crate) fn cone(one_minus_cos: f32, u: [f32; 2]) -> Vec3 {
     let m = u[0] * one_minus_cos;
@@ -131,8 +131,8 @@ pub(crate) fn luminance(c: Vec3) -> f32 {
     c.dot(Vec3::new(0.2126, 0.7152, 0.0722))
 }
 
-/// Power heuristic with exponent 2 (Veach 1997, §9.2.4): the weight of a sample of density `a` that another technique
-/// takes with density `b`. Written so that no square overflows.
+/// Power heuristic with exponent 2 (Veach 1997, §9.2.4): the weight of a sample of density `a` that another
+/// technique takes with density `b`. Written so that no square overflows.
 #[inline]
 pub(crate) fn power_heuristic(a: f32, b: f32) -> f32 {
     if a >= b {

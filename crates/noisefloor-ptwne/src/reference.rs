@@ -1,22 +1,24 @@
-//! The ray-traced reference: direct light, also as seen in mirrors and glass (Takouachet et al. 2017, §4.3). As in the
-//! paper, light that a diffuse surface scattered on its way is missing. [`direct`](crate::direct) takes the samples.
+//! The ray-traced reference: direct light, also as seen in mirrors and glass (Takouachet et al. 2017, §4.3).
+//! As in the paper, light that a diffuse surface scattered on its way is missing. [`direct`](crate::direct)
+//! takes the samples.
 //!
 //! # How free of noise
-//! Blocks of [`BLOCK`]² pixels are rendered independently. A block first learns which lights it sees. Its pixels then
-//! take samples in two halves, each with its own scrambling, so that half the difference of the halves estimates the
-//! error of their mean. The block keeps learning from these samples.
+//! Blocks of [`BLOCK`]² pixels are rendered independently. A block first learns which lights it sees. Its
+//! pixels then take samples in two halves, each with its own scrambling, so that half the difference of the
+//! halves estimates the error of their mean. The block keeps learning from these samples.
 //!
-//! Pixels are displayed as the path-traced picture would be. Those whose samples reduce the error most take twice as
-//! many, until the root mean square error of the block is below [`BOUND`], or pixels have [`MAX_SAMPLES`] samples in
-//! each half. [`ReferenceNoise`] reports the noise that was left.
+//! Pixels are displayed as the path-traced picture would be. Those whose samples reduce the error most take
+//! twice as many, until the root mean square error of the block is below [`BOUND`], or pixels have
+//! [`MAX_SAMPLES`] samples in each half. [`ReferenceNoise`] reports the noise that was left.
 //!
-//! Each pixel has its own scrambling too. If all shared one, neighbours would err alike: the noise mask would have less
-//! energy at full resolution, and more at the coarser scales that the oracle looks at too
+//! Each pixel has its own scrambling too. If all shared one, neighbours would err alike: the noise mask would
+//! have less energy at full resolution, and more at the coarser scales that the oracle looks at too
 //! (`docs/benchmarks/renderer.md`).
 //!
-//! Blocks do not depend on each other, nor on threads. Two halves cannot detect what both miss, such as an edge that both
-//! see alike. Where neighbours differ, a pixel is therefore assumed to have the error that its samples would leave of
-//! such an edge. A highlight much smaller than a pixel that no sample hit goes undetected.
+//! Blocks do not depend on each other, nor on threads. Two halves cannot detect what both miss, such as an
+//! edge that both see alike. Where neighbours differ, a pixel is therefore assumed to have the error that its
+//! samples would leave of such an edge. A highlight much smaller than a pixel that no sample hit goes
+//! undetected.
 
 use crate::camera::Lens;
 use crate::direct::Tracer;
@@ -32,15 +34,15 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Edge of a block: small enough for its pixels to see much the same lights.
 const BLOCK: usize = 16;
-/// Root mean square error of a block's pixels, in display values. The noise mask (σ = 1) passes 0.85 of it: 0.3/255, less
-/// than a tenth of the energy that the most demanding observers see.
+/// Root mean square error of a block's pixels, in display values. The noise mask (σ = 1) passes 0.85 of it:
+/// 0.3/255, less than a tenth of the energy that the most demanding observers see.
 const BOUND: f32 = 0.36 / 255.0;
-/// Fewest and most samples of each half of a pixel. With half as many at least, highlights smaller than a pixel were
-/// missed; a Sobol sequence has twice as many points as the most.
+/// Fewest and most samples of each half of a pixel. With half as many at least, highlights smaller than a
+/// pixel were missed; a Sobol sequence has twice as many points as the most.
 const MIN_SAMPLES: u32 = 32;
 const MAX_SAMPLES: u32 = 8_192;
-/// Samples of each pixel from which its block learns about the lights, and how often: each time, it looks where it has
-/// found light before.
+/// Samples of each pixel from which its block learns about the lights, and how often: each time, it looks
+/// where it has found light before.
 const LEARNING: u32 = 8;
 const LESSONS: u32 = 2;
 /// n samples of a pixel leave about this times n^−¾ of the contrast of an edge through it (measured).
@@ -53,20 +55,21 @@ pub(crate) struct Picture {
     pub(crate) noise: ReferenceNoise,
 }
 
-/// A reference's estimate of its own noise, from the difference of its halves. What both halves miss, such as a highlight
-/// much smaller than a pixel, is not included. Units are display values: 1/255 is one step of 8 bits.
+/// A reference's estimate of its own noise, from the difference of its halves. What both halves miss, such as
+/// a highlight much smaller than a pixel, is not included. Units are display values: 1/255 is one step of 8
+/// bits.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct ReferenceNoise {
-    /// Mean number of samples per pixel, in both halves together. Each costs one camera ray, and up to eight rays from
-    /// each surface on its path.
+    /// Mean number of samples per pixel, in both halves together. Each costs one camera ray, and up to eight
+    /// rays from each surface on its path.
     pub samples: f64,
     /// Number of blocks of 16×16 pixels in a row. Those at the right and bottom edges may be smaller.
     pub columns: usize,
     /// Standard deviation of the noise mask (σ = 1) of each block, row-major, at least 0.
     pub deviations: Vec<f32>,
-    /// Number of blocks with more noise than the reference promises, 0.305/255, although pixels that needed them took
-    /// 16,384 samples.
+    /// Number of blocks with more noise than the reference promises, 0.305/255, although pixels that needed
+    /// them took 16,384 samples.
     pub unsettled: usize,
 }
 
@@ -86,7 +89,8 @@ impl ReferenceNoise {
 /// Called after each block with the number of finished blocks and that of all; can cancel the rest.
 pub(crate) type Watch = dyn Fn(usize, usize) -> ControlFlow<()> + Send + Sync;
 
-/// Renders the reference; `None` if it was cancelled. `display` shows it as the path-traced picture would be shown.
+/// Renders the reference; `None` if it was cancelled. `display` shows it as the path-traced picture would be
+/// shown.
 pub(crate) fn render(
     scene: &Scene,
     [width, height]: [usize; 2],
@@ -190,8 +194,8 @@ impl Block<'_> {
             let errors = self.errors();
             let total: f32 = errors.iter().sum();
             let error = (total / errors.len() as f32).sqrt();
-            // Choose the pixels whose next sample reduces the error most: as many as would leave half of what is
-            // allowed if they were exact
+            // Choose the pixels whose next sample reduces the error most: as many as would leave half of what
+            // is allowed if they were exact
             let gain = |p: usize| errors[p] / self.pixels[p].count as f32;
             let mut order: Vec<usize> =
                 (0..errors.len()).filter(|p| self.pixels[*p].count < MAX_SAMPLES).collect();
@@ -231,8 +235,9 @@ impl Block<'_> {
         samples.map(|index| tracer.sample(self.lens, at, index, seed)).map(Vec3::as_dvec3).sum()
     }
 
-    /// Estimates of the squared errors of all pixels. Since two halves say little about one pixel, it averages with its
-    /// neighbours; not the error, but the error of a single sample, since they may have more or fewer samples.
+    /// Estimates of the squared errors of all pixels. Since two halves say little about one pixel, it
+    /// averages with its neighbours; not the error, but the error of a single sample, since they may have
+    /// more or fewer samples.
     fn errors(&self) -> Vec<f32> {
         let shown: Vec<[f32; 2]> = self.pixels.iter().map(|p| p.shown(self.display)).collect();
         let single = |p: usize| {

@@ -43,17 +43,17 @@ pub struct RenderOptions {
     pub sampling: Sampling,
     /// Reconstruction filter of the pixels.
     pub filter: Filter,
-    /// Largest channel of a sample, above 0. Brighter samples are scaled down to it and counted, which loses light.
-    /// `None`, the default, keeps all light.
+    /// Largest channel of a sample, above 0. Brighter samples are scaled down to it and counted, which loses
+    /// light. `None`, the default, keeps all light.
     pub clamp: Option<f32>,
-    /// Number of threads of the renderer's own pool, at most [`MAX_THREADS`]; `None`: the caller's rayon pool. Pictures
-    /// do not depend on it.
+    /// Number of threads of the renderer's own pool, at most [`MAX_THREADS`]; `None`: the caller's rayon
+    /// pool. Pictures do not depend on it.
     pub threads: Option<NonZeroUsize>,
 }
 
 impl Default for RenderOptions {
-    /// Seed 0, paths of up to 65 segments, Russian roulette from the fifth, multiple importance sampling, independent
-    /// samples, a box filter, no clamping, the caller's threads.
+    /// Seed 0, paths of up to 65 segments, Russian roulette from the fifth, multiple importance sampling,
+    /// independent samples, a box filter, no clamping, the caller's threads.
     fn default() -> Self {
         Self {
             seed: 0,
@@ -70,10 +70,10 @@ impl Default for RenderOptions {
 
 /// The path tracer: renders a scene at a resolution, by path tracing with next event estimation.
 ///
-/// All random numbers follow from (seed, pixel, sample index), and the mean of a batch is summed in `f64`. Pictures are
-/// therefore identical to the bit for any number of threads, and means are identical up to the rounding of `f32` however
-/// requests are divided. With every filter, a sample counts for one pixel only, so that noise is independent from pixel
-/// to pixel.
+/// All random numbers follow from (seed, pixel, sample index), and the mean of a batch is summed in `f64`.
+/// Pictures are therefore identical to the bit for any number of threads, and means are identical up to the
+/// rounding of `f32` however requests are divided. With every filter, a sample counts for one pixel only, so
+/// that noise is independent from pixel to pixel.
 pub struct Ptwne {
     pub(crate) scene: Arc<Scene>,
     pub(crate) width: usize,
@@ -155,8 +155,8 @@ impl Ptwne {
         })
     }
 
-    /// Renders with opacity tests even if the scene has no partly transparent surfaces. Pictures are the same; it is
-    /// for measuring what leaving the tests out saves.
+    /// Renders with opacity tests even if the scene has no partly transparent surfaces. Pictures are the
+    /// same; it is for measuring what leaving the tests out saves.
     pub fn force_opacity_tests(&mut self) {
         self.sample_radiance = integrator(true);
     }
@@ -173,8 +173,8 @@ impl Ptwne {
         }
     }
 
-    /// Has `watch` called while a reference is rendered, with the number of finished blocks and that of all blocks.
-    /// [`ControlFlow::Break`] cancels the reference. Calls come from any thread.
+    /// Has `watch` called while a reference is rendered, with the number of finished blocks and that of all
+    /// blocks. [`ControlFlow::Break`] cancels the reference. Calls come from any thread.
     pub fn watch_reference(
         &mut self,
         watch: impl Fn(usize, usize) -> ControlFlow<()> + Send + Sync + 'static,

@@ -14,7 +14,8 @@ impl Key {
 /// Increment of SplitMix64: 2⁶⁴ over the golden ratio, made odd.
 pub(crate) const GOLDEN: u64 = 0x9e37_79b9_7f4a_7c15;
 
-/// The finaliser of SplitMix64, a bijection on 64 bits (Steele, Lea, Flood 2014; constants of Stafford's variant 13).
+/// The finaliser of SplitMix64, a bijection on 64 bits (Steele, Lea, Flood 2014; constants of Stafford's
+/// variant 13).
 #[inline]
 pub(crate) fn mix(mut z: u64) -> u64 {
     z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -28,14 +29,14 @@ pub(crate) fn hash(seed: u64, index: u32) -> f32 {
     unit((mix(seed ^ u64::from(index).wrapping_mul(GOLDEN)) >> 40) as u32)
 }
 
-/// xoroshiro128++ (Blackman, Vigna 2021), seeded with a hash of (seed, pixel, sample index): one short stream per path,
-/// so that pictures do not depend on threads or batches.
+/// xoroshiro128++ (Blackman, Vigna 2021), seeded with a hash of (seed, pixel, sample index): one short stream
+/// per path, so that pictures do not depend on threads or batches.
 #[derive(Clone, Debug)]
 pub(crate) struct Rng(u64, u64);
 
 impl Rng {
-    /// The stream of one path. `pixel` is below 2²⁸ (`noisefloor::MAX_PIXELS`), so that the packed word and thus the
-    /// state differ between any two paths of a render, for the first 2³⁶ samples of a pixel.
+    /// The stream of one path. `pixel` is below 2²⁸ (`noisefloor::MAX_PIXELS`), so that the packed word and
+    /// thus the state differ between any two paths of a render, for the first 2³⁶ samples of a pixel.
     #[inline]
     pub(crate) fn new(key: Key, pixel: u64, sample: u64) -> Self {
         let first = mix(key.0 ^ (pixel | (sample << 28)));
@@ -77,8 +78,8 @@ fn unit(bits: u32) -> f32 {
 mod tests {
     use super::*;
 
-    /// Mean and neighbour correlation of the first numbers of 2²⁰ neighbouring paths. Each z is standard normal; |z| < 5
-    /// fails by chance with p = 6e-7.
+    /// Mean and neighbour correlation of the first numbers of 2²⁰ neighbouring paths. Each z is standard
+    /// normal; |z| < 5 fails by chance with p = 6e-7.
     #[test]
     fn neighbouring_paths_are_uncorrelated() {
         let key = Key::new(1);

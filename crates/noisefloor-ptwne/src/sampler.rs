@@ -9,9 +9,10 @@ pub enum Sampling {
     /// Independent samples. Their noise is that which people saw in the training data.
     #[default]
     Independent,
-    /// Owen-scrambled Sobol points (Burley 2020, "Practical Hash-based Owen Scrambling"), four dimensions at a time,
-    /// scrambled and shuffled differently for each pixel. They have less noise, but the halves of a pixel are no longer
-    /// independent, and the bundled model has not seen such noise: see `docs/benchmarks/renderer.md` of the project.
+    /// Owen-scrambled Sobol points (Burley 2020, "Practical Hash-based Owen Scrambling"), four dimensions at
+    /// a time, scrambled and shuffled differently for each pixel. They have less noise, but the halves of a
+    /// pixel are no longer independent, and the bundled model has not seen such noise: see
+    /// `docs/benchmarks/renderer.md` of the project.
     Sobol,
 }
 
@@ -53,8 +54,8 @@ impl Sampler {
         }
     }
 
-    /// A seed that no other path has, for decisions that are hashed instead of drawn in order. It uses up no number, so
-    /// that paths are the same with and without it.
+    /// A seed that no other path has, for decisions that are hashed instead of drawn in order. It uses up no
+    /// number, so that paths are the same with and without it.
     #[inline]
     pub(crate) fn seed(&self) -> u64 {
         match self {
@@ -75,7 +76,8 @@ fn sobol(index: u32, seed: &mut u64) -> [f32; 4] {
 mod tests {
     use super::*;
 
-    /// Of the first 4ᵏ points, one lies in each of 2ᵏ×2ᵏ cells, in the planes of the first and the last two dimensions.
+    /// Of the first 4ᵏ points, one lies in each of 2ᵏ×2ᵏ cells, in the planes of the first and the last two
+    /// dimensions.
     #[test]
     fn sobol_points_are_stratified() {
         let key = Key::new(3);
@@ -95,8 +97,8 @@ mod tests {
         }
     }
 
-    /// Pixels, and groups of four numbers, are scrambled independently: the correlation of 2¹⁶ pairs is standard normal
-    /// over √n; 5σ.
+    /// Pixels, and groups of four numbers, are scrambled independently: the correlation of 2¹⁶ pairs is
+    /// standard normal over √n; 5σ.
     #[test]
     fn sobol_scrambles_are_unrelated() {
         let (key, n) = (Key::new(4), 1u64 << 16);

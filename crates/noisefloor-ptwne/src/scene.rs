@@ -11,8 +11,8 @@ use crate::math::Vec3;
 use crate::parts::{Parts, Surroundings};
 use crate::texture::Texture;
 
-/// A scene whose centre is farther from the origin than this many of its radii is moved there: `f32` keeps 24 bits
-/// of each coordinate, and those that only say where the scene is are lost to its detail.
+/// A scene whose centre is farther from the origin than this many of its radii is moved there: `f32` keeps 24
+/// bits of each coordinate, and those that only say where the scene is are lost to its detail.
 const FAR: f32 = 16.0;
 
 /// What surrounds a scene, prepared for lookup.
@@ -22,8 +22,8 @@ pub(crate) enum Sky {
     Map(Box<Map>),
 }
 
-/// A scene: surfaces, lights, environment and camera. Made by [`SceneBuilder`](crate::SceneBuilder) or taken from
-/// [`scenes`](crate::scenes). Immutable, and cheap to share behind an [`Arc`](std::sync::Arc).
+/// A scene: surfaces, lights, environment and camera. Made by [`SceneBuilder`](crate::SceneBuilder) or taken
+/// from [`scenes`](crate::scenes). Immutable, and cheap to share behind an [`Arc`](std::sync::Arc).
 #[derive(Clone, Debug)]
 pub struct Scene {
     name: String,
@@ -140,14 +140,15 @@ impl Scene {
         self.lights.all.iter().filter(|l| l.pmf <= 0.0).count()
     }
 
-    /// Whether any surface is partly transparent ([`MaterialOptions::opacity`](crate::MaterialOptions::opacity)), so
-    /// that rays must test it. Other scenes are rendered by code without that test.
+    /// Whether any surface is partly transparent
+    /// ([`MaterialOptions::opacity`](crate::MaterialOptions::opacity)), so that rays must test it. Other
+    /// scenes are rendered by code without that test.
     pub fn has_opacity(&self) -> bool {
         self.has_opacity
     }
 
-    /// Memory that the surfaces take, in bytes: the hierarchy, shading normals, texture coordinates and lights, but
-    /// not the pixels of textures.
+    /// Memory that the surfaces take, in bytes: the hierarchy, shading normals, texture coordinates and
+    /// lights, but not the pixels of textures.
     pub fn geometry_bytes(&self) -> usize {
         self.bvh.bytes() + self.geometry.bytes() + size_of_val(self.lights.all.as_slice())
     }

@@ -9,8 +9,8 @@ use std::sync::{Arc, LazyLock};
 /// Largest number of pixels of an image texture.
 pub const MAX_TEXTURE_PIXELS: usize = 1 << 26;
 
-/// A colour as a function of the texture coordinates (u, v). All colours are reflectances: linear Rec.709, each channel
-/// in 0…1. Patterns repeat without end; `scale` is the number of repeats per unit of u and v.
+/// A colour as a function of the texture coordinates (u, v). All colours are reflectances: linear Rec.709,
+/// each channel in 0…1. Patterns repeat without end; `scale` is the number of repeats per unit of u and v.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Texture {
@@ -117,8 +117,8 @@ static TABLES: LazyLock<([f32; 256], [f32; 256])> = LazyLock::new(|| {
 });
 
 impl Wrap {
-    /// The two pixels of `0..size` around `x`, measured from the centre of the first pixel, and the position of `x`
-    /// between them.
+    /// The two pixels of `0..size` around `x`, measured from the centre of the first pixel, and the position
+    /// of `x` between them.
     #[inline]
     fn around(self, x: f32, size: usize) -> (usize, usize, f32) {
         // Reduce to one or two periods; where f32 no longer resolves pixels, any will do

@@ -7,8 +7,8 @@ use super::shape::{Shape, dual};
 use crate::math::Vec3;
 use obvhs::{BvhBuildParams, aabb::Aabb, bvh2::Bvh2, bvh2::builder::build_bvh2};
 
-/// The least by which an edge is widened, relative to the scene's largest coordinate: four roundings. It exceeds
-/// [`EDGE`] for narrow surfaces: needles, and small triangles far from the origin.
+/// The least by which an edge is widened, relative to the scene's largest coordinate: four roundings. It
+/// exceeds [`EDGE`] for narrow surfaces: needles, and small triangles far from the origin.
 const MIN_WIDENING: f64 = 2.4e-7;
 /// The most by which that widens a surface, in units of its edges.
 const MAX_WIDENING: f64 = 0.01;
@@ -102,7 +102,8 @@ impl Bvh {
     }
 }
 
-/// Corner and edges of a planar surface whose edges are moved outward by `by`, where that is more than [`EDGE`].
+/// Corner and edges of a planar surface whose edges are moved outward by `by`, where that is more than
+/// [`EDGE`].
 fn widened(
     corner: glam::Vec3,
     e1: glam::Vec3,

@@ -39,7 +39,8 @@ pub(crate) struct Bvh {
     pub(super) bounds: [Vec3; 2],
 }
 
-/// Nodes still to visit, with the distance at which each begins. Allocated once per job, so that no path allocates.
+/// Nodes still to visit, with the distance at which each begins. Allocated once per job, so that no path
+/// allocates.
 #[derive(Clone, Debug)]
 pub(crate) struct Stack(pub(super) Vec<(u32, f32)>);
 

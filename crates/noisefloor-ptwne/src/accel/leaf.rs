@@ -8,9 +8,9 @@ use glam::Vec4;
 /// By how much a planar surface is widened, in units of its edges, so that no ray slips between neighbours.
 pub(super) const EDGE: f32 = 2e-6;
 
-/// Up to four planar surfaces, one per lane. With corner c and unit normal n, a ray o + t·d meets the plane at
-/// t = n·(c − o) / n·d, where u and v are dot products with the dual basis of the edges. Lanes without a surface
-/// are all zero: t is then NaN, and no comparison holds.
+/// Up to four planar surfaces, one per lane. With corner c and unit normal n, a ray o + t·d meets the plane
+/// at t = n·(c − o) / n·d, where u and v are dot products with the dual basis of the edges. Lanes without a
+/// surface are all zero: t is then NaN, and no comparison holds.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Pack {
     pub(super) corner: [Vec4; 3],
@@ -121,9 +121,9 @@ impl Round {
     }
 }
 
-/// Where a ray from the origin first meets a sphere around `to`, in front. The discriminant is taken at the point
-/// nearest to the centre instead of as b² − c (Haines et al. 2019, "Precision Improvements for Ray/Sphere
-/// Intersection").
+/// Where a ray from the origin first meets a sphere around `to`, in front. The discriminant is taken at the
+/// point nearest to the centre instead of as b² − c (Haines et al. 2019, "Precision Improvements for
+/// Ray/Sphere Intersection").
 #[inline]
 fn sphere(to: Vec3, dir: Vec3, radius: f32) -> Option<f32> {
     let b = to.dot(dir);

@@ -6,8 +6,8 @@ use super::node::{LEAF, WideRay};
 use crate::math::{Ray, Vec3};
 
 impl Bvh {
-    /// The nearest surface along the ray. `solid` decides whether the surface of an index stops the ray at (u, v)
-    /// or is transparent there.
+    /// The nearest surface along the ray. `solid` decides whether the surface of an index stops the ray at
+    /// (u, v) or is transparent there.
     #[inline]
     pub(crate) fn closest(&self, ray: &Ray, stack: &mut Stack, solid: impl Fn(u32, [f32; 2]) -> bool) -> Hit {
         if self.rounds.is_empty() {
@@ -196,8 +196,8 @@ impl Bvh {
         ROUNDS && self.rounds[first..first + leaf.rounds as usize].iter().any(meets)
     }
 
-    /// Whether any box of the hierarchy overlaps the pyramid of rays from `apex` between planes through it with
-    /// these inward normals. Conservative: never false if a surface overlaps it.
+    /// Whether any box of the hierarchy overlaps the pyramid of rays from `apex` between planes through it
+    /// with these inward normals. Conservative: never false if a surface overlaps it.
     pub(crate) fn reaches_into(&self, apex: Vec3, inward: &[Vec3; 4]) -> bool {
         let mut todo = vec![0u32];
         while let Some(index) = todo.pop() {

@@ -18,8 +18,8 @@ pub(crate) struct Coat {
 /// What happens to light that a rough coat reflects back onto its base.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Interior {
-    /// All light that does not get out returns to the base. By reciprocity that is 1 − T̄/η² of diffuse light, with
-    /// T̄ = 2∫T(μ)μ dμ. A white base loses no energy.
+    /// All light that does not get out returns to the base. By reciprocity that is 1 − T̄/η² of diffuse
+    /// light, with T̄ = 2∫T(μ)μ dμ. A white base loses no energy.
     Conserving,
     /// Facets transmit or reflect it once, and what they mask is lost.
     SingleScattering,
@@ -34,9 +34,9 @@ struct Row {
     inside: f32,
 }
 
-/// Steps of the tables in the cosine, and in α where it varies. Squares of even steps are dense where T bends: at
-/// grazing angles, and where a smooth coat becomes rough. Linear interpolation is then accurate to 1e-3 in the
-/// cosine, and to 2e-3 in α up to 85°.
+/// Steps of the tables in the cosine, and in α where it varies. Squares of even steps are dense where T
+/// bends: at grazing angles, and where a smooth coat becomes rough. Linear interpolation is then accurate to
+/// 1e-3 in the cosine, and to 2e-3 in α up to 85°.
 const STEPS: usize = 64;
 const ALPHAS: usize = 24;
 
@@ -79,8 +79,8 @@ impl Coat {
         self.blend(alpha, |row| row.at[i] + (row.at[i + 1] - row.at[i]) * (x - i as f32))
     }
 
-    /// The factor of f·cos θᵢ that both transmittances and the cosine of the incoming direction do not give: the
-    /// base's albedo/π, refraction, and all reflections between base and coat.
+    /// The factor of f·cos θᵢ that both transmittances and the cosine of the incoming direction do not give:
+    /// the base's albedo/π, refraction, and all reflections between base and coat.
     #[inline]
     pub(crate) fn base(&self, alpha: f32, albedo: Vec3, nonlinear: bool) -> Vec3 {
         let inside = self.blend(alpha, |row| row.inside);
@@ -133,9 +133,9 @@ fn reflectance(eta: f32, alpha: f32, cos: f32) -> f32 {
     reflected
 }
 
-/// Shares of the light from a direction that a rough boundary reflects and transmits in a single scattering event,
-/// masked by [`Ggx::lambda`] of the new direction only (Walter et al. 2007, §5): the means of F·G₁ and (1 − F)·G₁
-/// over visible normals.
+/// Shares of the light from a direction that a rough boundary reflects and transmits in a single scattering
+/// event, masked by [`Ggx::lambda`] of the new direction only (Walter et al. 2007, §5): the means of F·G₁ and
+/// (1 − F)·G₁ over visible normals.
 fn single_scattering(eta: f32, alpha: f32, cos: f32) -> [f32; 2] {
     over_facets(alpha, cos, |ggx, wo, u| {
         let h = ggx.visible_normal(wo, u);

@@ -10,8 +10,9 @@ pub(crate) fn schlick(f0: Vec3, cos: f32) -> Vec3 {
     f0 + (Vec3::ONE - f0) * (m2 * m2 * m)
 }
 
-/// Unpolarised Fresnel reflectance of a dielectric at `cos_i` ≥ 0, and the cosine of the refracted direction. `eta`
-/// is the index of refraction on the far side over that on the near side. (1, 0) is total internal reflection.
+/// Unpolarised Fresnel reflectance of a dielectric at `cos_i` ≥ 0, and the cosine of the refracted direction.
+/// `eta` is the index of refraction on the far side over that on the near side. (1, 0) is total internal
+/// reflection.
 #[inline]
 pub(crate) fn fresnel(cos_i: f32, eta: f32) -> (f32, f32) {
     let sin2_t = (1.0 - cos_i * cos_i).max(0.0) / (eta * eta);
@@ -24,8 +25,8 @@ pub(crate) fn fresnel(cos_i: f32, eta: f32) -> (f32, f32) {
     (0.5 * (parallel * parallel + perpendicular * perpendicular), cos_t)
 }
 
-/// Unpolarised reflectance of a conductor with index of refraction η + ik at `cos` ≥ 0 (Born, Wolf 1999, §14.2,
-/// written without complex numbers).
+/// Unpolarised reflectance of a conductor with index of refraction η + ik at `cos` ≥ 0 (Born, Wolf 1999,
+/// §14.2, written without complex numbers).
 #[inline]
 pub(crate) fn fresnel_complex(eta: Vec3, k: Vec3, cos: f32) -> Vec3 {
     let (cos2, sin2) = (cos * cos, (1.0 - cos * cos).max(0.0));

@@ -13,7 +13,8 @@ pub(crate) struct Ggx {
 }
 
 impl Ggx {
-    /// Density of microfacet normals (Walter et al. 2007, eq. 33), written with sin² to stay precise at h = n.
+    /// Density of microfacet normals (Walter et al. 2007, eq. 33), written with sin² to stay precise at h =
+    /// n.
     #[inline]
     fn d(self, h: Vec3) -> f32 {
         let a2 = self.alpha * self.alpha;
@@ -29,8 +30,8 @@ impl Ggx {
         0.5 * ((1.0 + self.alpha * self.alpha * tan2).sqrt() - 1.0)
     }
 
-    /// f·cos θᵢ without the Fresnel term, the density of [`Ggx::sample`], and the half vector's cosine with the
-    /// directions. Zero if either direction lies below the surface.
+    /// f·cos θᵢ without the Fresnel term, the density of [`Ggx::sample`], and the half vector's cosine with
+    /// the directions. Zero if either direction lies below the surface.
     #[inline]
     pub(crate) fn eval(self, wo: Vec3, wi: Vec3) -> (f32, f32, f32) {
         if wo.z <= 0.0 || wi.z <= 0.0 {
@@ -54,8 +55,8 @@ impl Ggx {
         Vec3::new(c.x * self.alpha, c.y * self.alpha, c.z.max(1e-7)).normalize()
     }
 
-    /// A direction, reflected by a visible normal; its weight f·cos θᵢ / density = G₂/G₁ without the Fresnel term;
-    /// and the half vector's cosine. Weight 0: nothing is reflected.
+    /// A direction, reflected by a visible normal; its weight f·cos θᵢ / density = G₂/G₁ without the Fresnel
+    /// term; and the half vector's cosine. Weight 0: nothing is reflected.
     #[inline]
     pub(crate) fn sample(self, wo: Vec3, u: [f32; 2]) -> (Vec3, f32, f32) {
         let h = self.visible_normal(wo, u);

@@ -125,7 +125,8 @@ impl<'a> Glossy<'a> {
         (f + self.base(wi), self.facet * density + (1.0 - self.facet) * FRAC_1_PI * wi.z.max(0.0))
     }
 
-    /// A direction of reflection by microfacets or a smooth coat, its weight f·cos θᵢ / density, and its density.
+    /// A direction of reflection by microfacets or a smooth coat, its weight f·cos θᵢ / density, and its
+    /// density.
     #[inline]
     pub(crate) fn reflect(&self, wo: Vec3, u: [f32; 2]) -> Option<(Vec3, Vec3, f32)> {
         if self.smooth {

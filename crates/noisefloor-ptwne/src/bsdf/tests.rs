@@ -10,7 +10,8 @@ use crate::math::{self, DELTA, Vec3};
 use crate::rng::{Key, Rng};
 use std::f32::consts::PI;
 
-/// ∫ density over the hemisphere and ∫ f·cos agree with the sampled weights: both by midpoint rule over (θ, φ).
+/// ∫ density over the hemisphere and ∫ f·cos agree with the sampled weights: both by midpoint rule over (θ,
+/// φ).
 #[test]
 fn ggx_samples_what_it_evaluates() {
     for (alpha, cos) in [(0.15f32, 0.9f32), (0.5, 0.7), (1.0, 0.3)] {
@@ -153,8 +154,8 @@ fn chi_square(found: &[f64], expected: &[f64]) -> (f64, f64) {
     (square + f64::powi(rare[0] - pooled, 2) / pooled, freedom)
 }
 
-/// Samples are distributed by their density: a chi-square test over the parts. Where they fall, density and f·cos are
-/// those of `eval`. Chi-square with n degrees of freedom exceeds n + 6√2n with p < 1e-5.
+/// Samples are distributed by their density: a chi-square test over the parts. Where they fall, density and
+/// f·cos are those of `eval`. Chi-square with n degrees of freedom exceeds n + 6√2n with p < 1e-5.
 #[test]
 fn samples_have_the_density_they_report() {
     const SAMPLES: usize = 30_000;
@@ -177,7 +178,8 @@ fn samples_have_the_density_they_report() {
 
 #[test]
 fn fresnel_at_known_angles() {
-    // Normal incidence: ((n−1)/(n+1))²; Brewster's angle: the parallel part vanishes; beyond the critical angle: 1
+    // Normal incidence: ((n−1)/(n+1))²; Brewster's angle: the parallel part vanishes; beyond the critical
+    // angle: 1
     assert!((fresnel(1.0, 1.5).0 - 0.04).abs() < 1e-6);
     let brewster = 1.5f32.atan();
     let expected = 0.5 * ((1.0 - 2.25f32) / (1.0 + 2.25)).powi(2);

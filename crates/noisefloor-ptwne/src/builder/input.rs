@@ -21,8 +21,8 @@ pub struct Emission {
     pub radiance: Rgb,
     /// A factor on the radiance, by the texture coordinates of the surface. Not for spheres.
     pub texture: Option<Texture>,
-    /// Whether the back emits too. The front of a triangle is where its corners run counter-clockwise, that of a
-    /// parallelogram or ellipse is where `e1`×`e2` points, that of a sphere is its outside.
+    /// Whether the back emits too. The front of a triangle is where its corners run counter-clockwise, that
+    /// of a parallelogram or ellipse is where `e1`×`e2` points, that of a sphere is its outside.
     pub two_sided: bool,
 }
 
@@ -43,8 +43,8 @@ impl Emission {
 pub struct Mesh<'a> {
     /// Corners, in scene units.
     pub positions: &'a [[f32; 3]],
-    /// One shading normal per position, or none for flat faces. They need not have length 1; triangles with a normal
-    /// of length 0 are flat.
+    /// One shading normal per position, or none for flat faces. They need not have length 1; triangles with a
+    /// normal of length 0 are flat.
     pub normals: &'a [[f32; 3]],
     /// One pair of texture coordinates per position, or none: then (0, 0), (1, 0), (0, 1) on each triangle.
     pub uvs: &'a [[f32; 2]],

@@ -20,7 +20,8 @@ use std::sync::Arc;
 ///
 /// ```
 /// use noisefloor_ptwne::{Camera, Emission, Environment, Material, SceneBuilder};
-/// let camera = Camera { eye: [0.0, 1.0, 4.0], target: [0.0, 1.0, 0.0], up: [0.0, 1.0, 0.0], vertical_fov: 40.0 };
+/// let (eye, target, up) = ([0.0, 1.0, 4.0], [0.0, 1.0, 0.0], [0.0, 1.0, 0.0]);
+/// let camera = Camera { eye, target, up, vertical_fov: 40.0 };
 /// let mut builder = SceneBuilder::new("ball", camera)?;
 /// let grey = builder.material(Material::diffuse([0.5; 3]))?;
 /// builder.parallelogram([-5.0, 0.0, 5.0], [10.0, 0.0, 0.0], [0.0, 0.0, -10.0], grey, None)?;
@@ -59,8 +60,8 @@ impl SceneBuilder {
     /// Adds a material that may be transparent in parts, or one-sided.
     ///
     /// # Errors
-    /// [`SceneError`] if a reflectance, index of refraction or roughness is out of range, or an image has the wrong
-    /// number of pixels.
+    /// [`SceneError`] if a reflectance, index of refraction or roughness is out of range, or an image has the
+    /// wrong number of pixels.
     pub fn material_with(
         &mut self,
         material: Material,
@@ -83,8 +84,8 @@ impl SceneBuilder {
     /// Surrounds the scene with an image, which replaces earlier surroundings.
     ///
     /// # Errors
-    /// [`SceneError`] if the image has the wrong number of pixels, a radiance is negative or not finite, or the matrix
-    /// is no rotation.
+    /// [`SceneError`] if the image has the wrong number of pixels, a radiance is negative or not finite, or
+    /// the matrix is no rotation.
     pub fn environment_map(&mut self, map: EnvironmentMap) -> Result<(), SceneError> {
         map.check()?;
         self.parts.surroundings = Some(Surroundings::Map(map));
@@ -100,12 +101,12 @@ impl SceneBuilder {
         Ok(())
     }
 
-    /// Adds the points `corner` + u·`e1` + v·`e2` for u, v in 0…1. Texture coordinates run along the edges in scene
-    /// units, so that patterns have the same size on all parallelograms.
+    /// Adds the points `corner` + u·`e1` + v·`e2` for u, v in 0…1. Texture coordinates run along the edges in
+    /// scene units, so that patterns have the same size on all parallelograms.
     ///
     /// # Errors
-    /// [`SceneError`] if a number is not finite or too large, the material is of another builder, or an emitter has no
-    /// area.
+    /// [`SceneError`] if a number is not finite or too large, the material is of another builder, or an
+    /// emitter has no area.
     pub fn parallelogram(
         &mut self,
         corner: [f32; 3],
@@ -139,8 +140,8 @@ impl SceneBuilder {
     /// Adds a sphere. Texture coordinates are azimuth and polar angle in 0…1; v = 1 is the top.
     ///
     /// # Errors
-    /// [`SceneError`] if a number is not finite or too large, the radius is not in 1e-9…1e6, or the material is of
-    /// another builder.
+    /// [`SceneError`] if a number is not finite or too large, the radius is not in 1e-9…1e6, or the material
+    /// is of another builder.
     pub fn sphere(
         &mut self,
         centre: [f32; 3],
@@ -156,8 +157,8 @@ impl SceneBuilder {
     /// Adds the triangles of a mesh that have an area, and returns the number of those that have none.
     ///
     /// # Errors
-    /// [`SceneError`] if a number is not finite or too large, an index or a length does not fit, the material is of
-    /// another builder, or the mesh is an emitter and has no area at all.
+    /// [`SceneError`] if a number is not finite or too large, an index or a length does not fit, the material
+    /// is of another builder, or the mesh is an emitter and has no area at all.
     pub fn mesh(
         &mut self,
         mesh: &Mesh<'_>,
@@ -268,7 +269,8 @@ impl SceneBuilder {
         Ok(())
     }
 
-    /// Adds a surface, and its light if it is an emitter. Returns whether it has an area; otherwise nothing is added.
+    /// Adds a surface, and its light if it is an emitter. Returns whether it has an area; otherwise nothing
+    /// is added.
     fn push(&mut self, shape: Shape, group_emission: Option<GroupEmission>) -> Result<bool, SceneError> {
         if let Shape::Planar { e1, e2, .. } | Shape::Disk { e1, e2, .. } = shape {
             // In f64, since the squares of short edges vanish in f32

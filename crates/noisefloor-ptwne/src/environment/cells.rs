@@ -6,9 +6,9 @@ use crate::math::Vec3;
 /// Most columns and rows of [`Cells`].
 const MAX_COARSE: [usize; 2] = [32, 16];
 
-/// The environment map in coarse cells, which can be chosen with other probabilities than their brightness. Within
-/// one, directions are sampled by brightness: one number chooses the row and the other the column, so that
-/// stratified numbers give stratified directions.
+/// The environment map in coarse cells, which can be chosen with other probabilities than their brightness.
+/// Within one, directions are sampled by brightness: one number chooses the row and the other the column, so
+/// that stratified numbers give stratified directions.
 #[derive(Debug)]
 pub(crate) struct Cells<'a> {
     map: &'a Map,
@@ -62,8 +62,8 @@ impl<'a> Cells<'a> {
     }
 }
 
-/// Inverts the sum of probabilities over `range`: the first index at which it exceeds `u`, and where `u` lies within
-/// that index's own probability, 0…1.
+/// Inverts the sum of probabilities over `range`: the first index at which it exceeds `u`, and where `u` lies
+/// within that index's own probability, 0…1.
 fn pick(range: std::ops::Range<usize>, mut u: f32, pmf: impl Fn(usize) -> f32) -> Option<(usize, f32)> {
     let mut last = None;
     for (i, p) in range.map(|i| (i, pmf(i))).filter(|(_, p)| *p > 0.0) {

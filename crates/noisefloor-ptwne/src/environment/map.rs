@@ -15,9 +15,9 @@ pub struct EnvironmentMap {
     pub width: usize,
     /// Height in pixels, from +y at the top to −y at the bottom in equal angles.
     pub height: usize,
-    /// Linear radiance, row-major, `width`·`height` pixels, each channel 0…1e12, interpolated between pixels. The
-    /// direction (x, y, z) in the map's own axes is at u = atan2(x, −z)/2π of the width and v = acos(y)/π of the
-    /// height.
+    /// Linear radiance, row-major, `width`·`height` pixels, each channel 0…1e12, interpolated between pixels.
+    /// The direction (x, y, z) in the map's own axes is at u = atan2(x, −z)/2π of the width and v = acos(y)/π
+    /// of the height.
     pub pixels: Vec<Rgb>,
     /// Rows of the rotation from the map's axes to the scene's.
     pub to_world: [[f32; 3]; 3],
@@ -57,16 +57,16 @@ pub(crate) struct Map {
     pub(crate) mean: Vec3,
 }
 
-/// Most columns and rows of the sampling grid. A cell is 0.7° wide, a little more than the sun. Finer grids do not
-/// fit into a processor's cache and cost more time than they save noise.
+/// Most columns and rows of the sampling grid. A cell is 0.7° wide, a little more than the sun. Finer grids
+/// do not fit into a processor's cache and cost more time than they save noise.
 const MAX_CELLS: [usize; 2] = [512, 256];
 
 impl Map {
     pub(crate) fn new(map: EnvironmentMap) -> Self {
         let EnvironmentMap { width, height, pixels, to_world } = map;
         let cells = [width.min(MAX_CELLS[0]), height.min(MAX_CELLS[1])];
-        // A pixel's weight is its solid angle times its mean luminance. The mean of the interpolated image over a
-        // pixel is that of nine pixels with weights 1/8, 3/4, 1/8 in each direction
+        // A pixel's weight is its solid angle times its mean luminance. The mean of the interpolated image
+        // over a pixel is that of nine pixels with weights 1/8, 3/4, 1/8 in each direction
         let at = |x: usize, y: usize| Vec3::from_array(pixels[y * width + x]);
         let across = |x: usize, y: usize| {
             0.75 * at(x, y) + 0.125 * (at((x + 1) % width, y) + at((x + width - 1) % width, y))

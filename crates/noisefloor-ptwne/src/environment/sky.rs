@@ -7,7 +7,8 @@ use noisefloor::Rgb;
 
 /// A sky: a smooth dome and an optional sun. Up is +y. Linear radiance, at any non-negative scale.
 ///
-/// The dome is found by scattered rays only, since it is too smooth for light sampling to help. The sun is a light.
+/// The dome is found by scattered rays only, since it is too smooth for light sampling to help. The sun is a
+/// light.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Environment {
     /// Radiance straight up.

@@ -80,7 +80,8 @@ fn large_maps_are_sampled_by_cells() {
     assert!((mean - exact).abs() < 5.0 * error + 1e-3 * exact, "{mean} ± {error}, {exact}");
 }
 
-/// Cells partition the map, and the density within a cell times the cell's probability is the map's own density.
+/// Cells partition the map, and the density within a cell times the cell's probability is the map's own
+/// density.
 #[test]
 fn cells_partition_their_map() {
     let (small, mut rng) = (uneven(), Rng::new(Key::new(4), 0, 0));

@@ -12,8 +12,9 @@ pub(crate) struct Lights {
 }
 
 impl Lights {
-    /// The lights of a scene whose bounding box has these corners; `textures` are the means of its emission textures.
-    /// Lights that cannot matter, which are black or face away from the whole scene, are never chosen.
+    /// The lights of a scene whose bounding box has these corners; `textures` are the means of its emission
+    /// textures. Lights that cannot matter, which are black or face away from the whole scene, are never
+    /// chosen.
     pub(crate) fn new(mut all: Vec<Light>, [low, high]: [Vec3; 2], textures: &[Vec3]) -> Self {
         let extent = 0.5 * (high - low).length();
         let power = |l: &Light| {

@@ -55,7 +55,8 @@ pub(crate) struct Light {
     pub(crate) shape: LightShape,
     pub(crate) radiance: Vec3,
     pub(crate) two_sided: bool,
-    /// The texture that multiplies its radiance, among the scene's emission textures; [`NO`] if there is none.
+    /// The texture that multiplies its radiance, among the scene's emission textures; [`NO`] if there is
+    /// none.
     pub(crate) texture: u32,
     /// The surface that shines.
     pub(crate) prim: u32,
@@ -69,8 +70,8 @@ pub(crate) struct LightSample {
     pub(crate) dir: Vec3,
     /// Infinite for what is far away.
     pub(crate) distance: f32,
-    /// Radiance over density per solid angle, given the light. For the environment map, one over the density: its
-    /// radiance is looked up only if nothing blocks it, since the lookup costs more than the shadow ray.
+    /// Radiance over density per solid angle, given the light. For the environment map, one over the density:
+    /// its radiance is looked up only if nothing blocks it, since the lookup costs more than the shadow ray.
     pub(crate) value: Vec3,
     /// That density; [`DELTA`] if scattered rays cannot hit the light.
     pub(crate) pdf: f32,
@@ -118,8 +119,8 @@ impl Light {
         Self::new(LightShape::Map, mean)
     }
 
-    /// Power, up to a factor common to all lights. Distant lights shine on a scene of radius `extent`; `texture` is
-    /// the mean of the emission texture.
+    /// Power, up to a factor common to all lights. Distant lights shine on a scene of radius `extent`;
+    /// `texture` is the mean of the emission texture.
     pub(super) fn power(&self, extent: f32, texture: Vec3) -> f32 {
         let sides = if self.two_sided { 2.0 } else { 1.0 };
         let cross = PI * extent * extent;
@@ -134,8 +135,8 @@ impl Light {
         math::luminance(self.radiance * texture) * area
     }
 
-    /// A point, sampled by `u` uniform in the unit cube, as seen from `from`; none if the dark side is seen. Only large
-    /// environment maps use the third number.
+    /// A point, sampled by `u` uniform in the unit cube, as seen from `from`; none if the dark side is seen.
+    /// Only large environment maps use the third number.
     #[inline]
     pub(crate) fn sample(
         &self,
@@ -238,8 +239,8 @@ impl Light {
         cos > 0.0 || self.two_sided
     }
 
-    /// Density with which [`Light::sample`] from `from` samples the point that a ray hit at `distance` with cosine
-    /// `cos`. That of the environment map is [`Map::pdf`].
+    /// Density with which [`Light::sample`] from `from` samples the point that a ray hit at `distance` with
+    /// cosine `cos`. That of the environment map is [`Map::pdf`].
     #[inline]
     pub(crate) fn pdf(&self, from: Vec3, distance: f32, cos: f32) -> f32 {
         match self.shape {
@@ -280,7 +281,8 @@ impl Light {
         }
     }
 
-    /// Whether the light can shine on anything in a box with these corners: one-sided planes do not shine backward.
+    /// Whether the light can shine on anything in a box with these corners: one-sided planes do not shine
+    /// backward.
     pub(super) fn reaches(&self, low: Vec3, high: Vec3) -> bool {
         match self.shape {
             LightShape::Planar { corner, normal, .. } if !self.two_sided => {

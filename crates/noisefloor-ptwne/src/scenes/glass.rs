@@ -30,7 +30,7 @@ pub(super) fn caustics(name: &str) -> Result<Scene, SceneError> {
     k.build()
 }
 
-/// Plates of growing roughness that mirror lights of growing size (after Veach, Guibas 1995).
+/// Plates of increasing roughness that reflect lights of increasing size (after Veach, Guibas 1995).
 pub(super) fn plates(name: &str) -> Result<Scene, SceneError> {
     let mut k = Kit::new(name, look([0.0, 2.6, 8.6], [0.0, 1.35, 0.0], 32.0))?;
     let wall = k.diffuse([0.42, 0.42, 0.44])?;

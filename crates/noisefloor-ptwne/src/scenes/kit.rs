@@ -1,4 +1,4 @@
-//! What the built-in scenes are made with.
+//! Shapes for the built-in scenes.
 
 use crate::{
     Camera, Emission, Environment, Material, MaterialId, Mesh, Scene, SceneBuilder, SceneError, Texture,
@@ -8,7 +8,8 @@ use std::f32::consts::PI;
 
 pub(super) type P = [f32; 3];
 
-/// A builder with the shapes that rooms and still lifes need. Remembers the first error, so that scenes read as lists.
+/// A builder with the shapes of rooms and still lifes. It keeps the first error, so that scenes read as
+/// lists.
 pub(super) struct Kit {
     builder: SceneBuilder,
     error: Option<SceneError>,
@@ -105,7 +106,8 @@ impl Kit {
         self.turned(centre, size, 0.0, m);
     }
 
-    /// A box of a size, standing on the middle `base` of its lower face, turned around the vertical by `angle` degrees.
+    /// A box that stands on `base`, the centre of its lower face, turned around the vertical by `angle`
+    /// degrees.
     pub(super) fn turned(&mut self, base: P, size: P, angle: f32, m: MaterialId) {
         let (sin, cos) = angle.to_radians().sin_cos();
         let x = [cos * size[0], 0.0, -sin * size[0]];
@@ -123,8 +125,8 @@ impl Kit {
         self.quad(add(add(low, x), z), minus(z), y, m, None);
     }
 
-    /// A surface of revolution around the vertical through `base`: `profile` is a list of (radius, height), from the bottom
-    /// up. Smooth around, and along the profile if `smooth`.
+    /// A surface of revolution around the vertical through `base`: `profile` is a list of (radius, height),
+    /// from the bottom up. Smooth around, and along the profile if `smooth`.
     pub(super) fn lathe(&mut self, base: P, profile: &[[f32; 2]], sides: u32, smooth: bool, m: MaterialId) {
         let (mut positions, mut normals, mut uvs, mut indices) = (vec![], vec![], vec![], vec![]);
         let slope = |i: usize, j: usize| {
@@ -134,7 +136,7 @@ impl Kit {
             [dy / length, -dr / length]
         };
         for k in 1..profile.len() {
-            // Each band has its own vertices, so that its ends can have normals of their own
+            // Each band has its own vertices, so that its ends can have their own normals
             let mut ends = [slope(k - 1, k); 2];
             if smooth {
                 let before = if k > 1 { slope(k - 2, k - 1) } else { ends[0] };

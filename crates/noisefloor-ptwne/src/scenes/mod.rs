@@ -1,5 +1,5 @@
-//! Built-in scenes, all procedural: they differ in light, shapes and textures, and are framed for square images. Exposed so
-//! that both plain sRGB and Reinhard's operator show them well; but for the stiff ones, where that is not possible.
+//! Built-in procedural scenes. They differ in light, shapes and textures, and are framed for square pictures.
+//! Except for the stiff ones, both plain sRGB and Reinhard's operator show them well.
 //!
 //! ```
 //! use noisefloor_ptwne::scenes;
@@ -26,7 +26,7 @@ type Make = fn(&str) -> Result<Scene, SceneError>;
 pub struct BuiltInScene {
     /// Its name, for [`by_name`].
     pub name: &'static str,
-    /// What it shows, in a line.
+    /// What it shows, in one line.
     pub description: &'static str,
 }
 
@@ -135,7 +135,7 @@ pub fn list() -> impl ExactSizeIterator<Item = BuiltInScene> {
     ORDINARY.iter().map(|(entry, _)| *entry)
 }
 
-/// Scenes that are hard on a renderer, each for one reason: for tests, and for looking at known trouble.
+/// Scenes that are hard for a renderer, each for one reason. For tests, and for looking at known problems.
 pub fn stiff() -> impl ExactSizeIterator<Item = BuiltInScene> {
     STIFF.iter().map(|(entry, _)| *entry)
 }
@@ -143,7 +143,7 @@ pub fn stiff() -> impl ExactSizeIterator<Item = BuiltInScene> {
 /// The scene of this name, ordinary or stiff, if there is one.
 pub fn by_name(name: &str) -> Option<Scene> {
     let (entry, make) = ORDINARY.iter().chain(STIFF).find(|(entry, _)| entry.name == name)?;
-    // Tests build all of them
+    // A test builds all of them
     make(entry.name).ok()
 }
 

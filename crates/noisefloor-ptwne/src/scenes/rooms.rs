@@ -56,7 +56,7 @@ pub(super) fn bulb(name: &str) -> Result<Scene, SceneError> {
     k.build()
 }
 
-/// A photographer's studio: metals of growing roughness and a draped still life under a soft box.
+/// A photographer's studio: metals of increasing roughness and a draped still life under a soft box.
 pub(super) fn softbox(name: &str) -> Result<Scene, SceneError> {
     let mut k = Kit::new(name, look([0.0, 1.5, 5.4], [0.0, 0.72, 0.0], 37.0))?;
     let paper = k.diffuse([0.55, 0.55, 0.57])?;

@@ -1,11 +1,12 @@
-//! Scenes that are hard on a renderer, each for one reason: what cannot be found by sampling lights, what f32 cannot hold, and
-//! what divides by nothing.
+//! Scenes that are hard for a renderer, each for one reason: light that light sampling cannot find, numbers
+//! that f32 cannot hold, and divisions by zero.
 
 use super::kit::{Kit, P, emission, look};
 use crate::{Environment, Material, Mesh, Scene, SceneError, Sun, Texture};
 use std::f32::consts::PI;
 
-/// A glass ball and a glass block between a small lamp and the floor. Only scattered rays find the lamp through glass.
+/// A glass ball and a glass block between a small lamp and the floor. Only scattered rays find the lamp
+/// through glass.
 pub(super) fn caustic(name: &str) -> Result<Scene, SceneError> {
     let mut k = Kit::new(name, look([0.3, 1.9, 4.2], [0.1, 0.45, 0.0], 36.0))?;
     let paper = k.diffuse([0.7, 0.68, 0.64])?;
@@ -21,7 +22,8 @@ pub(super) fn caustic(name: &str) -> Result<Scene, SceneError> {
     k.build()
 }
 
-/// A dark room beside a bright one, joined by a keyhole of 6×12 cm. Nearly all that is aimed at the lamp is blocked.
+/// A dark room beside a bright one, joined by a keyhole of 6×12 cm. Nearly all shadow rays to the lamp are
+/// blocked.
 pub(super) fn keyhole(name: &str) -> Result<Scene, SceneError> {
     let mut k = Kit::new(name, look([1.5, 1.3, 3.4], [-0.35, 0.8, 0.0], 48.0))?;
     let wall = k.diffuse([0.75, 0.73, 0.70])?;
@@ -55,7 +57,7 @@ pub(super) fn keyhole(name: &str) -> Result<Scene, SceneError> {
     k.build()
 }
 
-/// Still life under a lamp of radius 1e-4.
+/// A still life under a lamp of radius 1e-4.
 pub(super) fn pinpoint(name: &str) -> Result<Scene, SceneError> {
     let mut k = Kit::new(name, look([0.0, 1.6, 4.2], [0.0, 0.6, 0.0], 38.0))?;
     let floor = Texture::Checker { colours: [[0.62, 0.60, 0.55], [0.34, 0.32, 0.30]], scale: [2.0, 2.0] };
@@ -74,13 +76,14 @@ pub(super) fn pinpoint(name: &str) -> Result<Scene, SceneError> {
     k.build()
 }
 
-/// Nine niches in a wall, each lit by a panel of its own. The radiance of the panels goes from 1e-8 to 1e8, by hundreds.
+/// Nine niches in a wall, each lit by a panel of its own. The radiance of the panels goes from 1e-8 to 1e8 in
+/// steps of 100.
 pub(super) fn decades(name: &str) -> Result<Scene, SceneError> {
     let mut k = Kit::new(name, look([0.0, 0.0, 7.0], [0.0, 0.0, 0.0], 28.0))?;
     let grey = k.diffuse([0.6; 3])?;
     let black = k.diffuse([0.0; 3])?;
     for i in 0..9 {
-        // A niche of 1×1 and 0.6 deep, from the top left on, with a black frame that keeps its light to itself
+        // A niche of 1×1 and 0.6 deep, from the top left; its light reaches no other niche
         let (x, y) = (1.1 * ((i % 3) as f32 - 1.0), 1.1 * (1.0 - (i / 3) as f32));
         let (low, high) = ([x - 0.5, y - 0.5], [x + 0.5, y + 0.5]);
         k.quad([low[0], low[1], -0.6], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], grey, None);
@@ -94,8 +97,8 @@ pub(super) fn decades(name: &str) -> Result<Scene, SceneError> {
     k.build()
 }
 
-/// Needles a thousand times as long as wide, as a drum around a bright lamp that must not shine through, and sheets of paper
-/// that nearly touch, nearly parallel.
+/// Needles a thousand times as long as wide, as a drum around a bright lamp that must not shine through, and
+/// sheets of paper that are nearly parallel and nearly touch.
 pub(super) fn needles(name: &str) -> Result<Scene, SceneError> {
     let mut k = Kit::new(name, look([0.2, 1.5, 4.4], [0.0, 0.55, 0.0], 36.0))?;
     let floor = k.diffuse([0.45, 0.43, 0.40])?;
@@ -122,10 +125,11 @@ pub(super) fn needles(name: &str) -> Result<Scene, SceneError> {
     k.build()
 }
 
-/// Where [`far_away`] is.
+/// The position of [`far_away`].
 const FAR: P = [998_000.0, -999_000.0, 997_000.0];
 
-/// Columns and a ball, hundreds of units large, a million units from the origin: f32 tells positions there to 1/16.
+/// Columns and a ball, hundreds of units large and a million units from the origin, where f32 resolves
+/// positions to 1/16.
 pub(super) fn far_away(name: &str) -> Result<Scene, SceneError> {
     let at = |p: P| [FAR[0] + p[0], FAR[1] + p[1], FAR[2] + p[2]];
     let mut k = Kit::new(name, look(at([250.0, 420.0, 1150.0]), at([0.0, 150.0, 0.0]), 38.0))?;
@@ -188,7 +192,8 @@ pub(super) fn million(name: &str) -> Result<Scene, SceneError> {
     k.build()
 }
 
-/// A landing strip at dusk, seen from just above the ground: strips of metal and varnish, and lamps as low as the eye.
+/// A landing strip at dusk, seen from just above the ground: strips of metal and varnish, and lamps as low as
+/// the eye.
 pub(super) fn grazing(name: &str) -> Result<Scene, SceneError> {
     let mut k = Kit::new(name, look([0.0, 0.1, 6.0], [0.0, 0.02, 4.0], 28.0))?;
     let ground = k.diffuse([0.3, 0.3, 0.32])?;
@@ -220,7 +225,7 @@ pub(super) fn grazing(name: &str) -> Result<Scene, SceneError> {
     k.build()
 }
 
-/// A lamp, out of view, on things that scatter nothing: the picture is 0.
+/// Objects that reflect nothing, under a lamp out of view: the picture is 0.
 pub(super) fn black(name: &str) -> Result<Scene, SceneError> {
     still_life(name, 0.0, true)
 }

@@ -48,7 +48,7 @@ fn tiles_and_batches_change_nothing_but_rounding() {
     }
 }
 
-/// A sample is the same alone as within a batch.
+/// A sample is the same on its own as within a batch.
 #[test]
 fn samples_are_the_same_wherever_batches_begin() {
     for sampling in [Sampling::Independent, Sampling::Sobol] {
@@ -81,8 +81,8 @@ fn opacity_tests_change_nothing() {
     }
 }
 
-/// Sobol points have the mean of independent ones, and on smooth light a smaller error: here a wall below a softbox, 64 samples
-/// a pixel, against the mean of all.
+/// Sobol points have the mean of independent ones and, in smooth light, a smaller error: here a wall under a
+/// softbox, 64 samples per pixel, against the mean of all.
 #[test]
 fn sobol_points_have_the_same_mean_and_less_noise() {
     let run = |sampling| {
@@ -94,13 +94,15 @@ fn sobol_points_have_the_same_mean_and_less_noise() {
             (0..576).map(|i| batches.iter().map(|b| at(b, i)).sum::<f64>() / 16.0).collect();
         let variance = |i: usize| batches.iter().map(|b| (at(b, i) - means[i]).powi(2)).sum::<f64>() / 15.0;
         let all: Vec<f64> = (0..576).map(variance).collect();
-        // Over the whole picture, the standard error of the mean of 16 batches; and the noise of the upper quarter, the wall
+        // Over the whole picture, the standard error of the mean of 16 batches; and the noise of the upper
+        // quarter, the wall
         let error = (all.iter().sum::<f64>() / 16.0).sqrt() / 576.0;
         let noise = all[..144].iter().sum::<f64>() / 144.0;
         (means.iter().sum::<f64>() / 576.0, error, noise)
     };
     let (independent, sobol) = (run(Sampling::Independent), run(Sampling::Sobol));
-    // Batches of one sequence are not independent: the error of the first alone counts, at five standard errors
+    // Batches of one sequence are not independent, so only the error of the independent samples counts, at
+    // five standard errors
     assert!((independent.0 - sobol.0).abs() < 5.0 * independent.1, "{independent:?} {sobol:?}");
     assert!(sobol.2 < 0.5 * independent.2, "{independent:?} {sobol:?}");
 }
@@ -112,8 +114,9 @@ fn seeds_are_images() {
     assert_ne!(run(1), run(2));
 }
 
-/// Σxy / √Σx²y² of independent x, y, symmetric around 0, is close to standard normal: |z| < 5 fails with p = 6e-7. Compared:
-/// the noise of two pairs of batches at the same pixel, and of one pair at neighbouring pixels.
+/// Σxy / √Σx²y² of independent x, y, symmetric around 0, is close to standard normal: |z| < 5 fails with p =
+/// 6e-7. Compared: the noise of two pairs of batches at the same pixel, and of one pair at neighbouring
+/// pixels.
 #[test]
 fn disjoint_samples_are_uncorrelated() {
     let mut source = cornell(RenderOptions::default());
@@ -149,7 +152,8 @@ fn bad_options_and_tiles_are_errors() {
     assert!(none[0].samples == 0 && none[0].mean.is_empty());
 }
 
-/// Tiles that see nothing but the sky trace no rays, and look the same: as parts of an image they do or do not.
+/// Tiles that see only the sky trace no rays and look the same as when they are part of a larger tile, which
+/// does.
 #[test]
 fn background_tiles_trace_no_rays() {
     let scene = crate::kit::scene(crate::kit::look([0.0, 0.0, 9.0], [0.0; 3], [0.0, 1.0, 0.0], 40.0), |b| {
@@ -170,6 +174,6 @@ fn background_tiles_trace_no_rays() {
         let part: Vec<_> = batch.tile.rows(96).flat_map(|row| whole[row].to_vec()).collect();
         assert_eq!(batch.mean, part);
     }
-    // The ball is in the middle tile alone, give or take its box
+    // The ball, with its bounding box, is only in the middle tile
     assert_eq!(source.counts().background, 8 * 32 * 32 * 4);
 }

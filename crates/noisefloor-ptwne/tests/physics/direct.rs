@@ -24,9 +24,9 @@ fn lit(light: impl FnOnce(&mut SceneBuilder, MaterialId)) -> Scene {
     })
 }
 
-/// Checks next events and the reference. The spot's size and f32 are good for 2e-3. The reference promises 0.36/255 as shown, which
-/// is at most 0.8 % of a radiance, as the slope of Reinhard's curve and sRGB over the logarithm is at most 0.19; that is 0.2 % for the
-/// mean of 16 pixels, which see the same.
+/// Checks next event estimation and the reference. 2e-3 allows for the spot's size and f32. The reference
+/// promises 0.36/255 as displayed, which is at most 0.8 % of a radiance, since the slope of Reinhard's curve
+/// and sRGB over the logarithm is at most 0.19. That is 0.2 % for the mean of 16 pixels that see the same.
 fn check(scene: &Scene, expected: f64) {
     check_samples(scene, expected);
     let mut source = Ptwne::new(scene.clone(), 4, 4, RenderOptions::default()).unwrap();
@@ -35,7 +35,7 @@ fn check(scene: &Scene, expected: f64) {
     assert!((reference - expected).abs() < 1e-2 * expected, "reference {reference}, expected {expected}");
 }
 
-/// Checks next events, shared with scattering and alone.
+/// Checks next event estimation, with and without scattered rays that hit lights.
 fn check_samples(scene: &Scene, expected: f64) {
     for estimator in [Estimator::Mis, Estimator::NextEvents] {
         let options = RenderOptions { estimator, max_depth: DIRECT, ..RenderOptions::default() };
@@ -43,15 +43,15 @@ fn check_samples(scene: &Scene, expected: f64) {
     }
 }
 
-/// Checks scattering alone, for lights that fill a good share of the sky: one path in ten or more meets them.
+/// Checks brute force, for lights so large that at least one path in ten hits them.
 fn check_brute_force(scene: &Scene, expected: f64) {
     let options =
         RenderOptions { estimator: Estimator::BruteForce, max_depth: DIRECT, ..RenderOptions::default() };
     agrees(mean(scene.clone(), 4, 64, 200, 0, options), expected, 2e-3);
 }
 
-/// Form factor of a parallel rectangle with a corner straight above (Howell's catalogue, C-11): a, b are its edges over the
-/// distance.
+/// Form factor of a parallel rectangle with a corner straight above (Howell's catalogue, C-11); a and b are
+/// its edges divided by the distance.
 fn corner(a: f64, b: f64) -> f64 {
     let (p, q) = ((1.0 + a * a).sqrt(), (1.0 + b * b).sqrt());
     (a / p * (b / p).atan() + b / q * (a / q).atan()) / (2.0 * std::f64::consts::PI)
@@ -128,7 +128,8 @@ fn ellipse(centre: [f64; 3], e1: [f64; 3], e2: [f64; 3], normal: [f64; 3]) -> f6
     sum * area / f64::from(n * n)
 }
 
-/// A disc straight above: F = r²/(h² + r²). Ellipses elsewhere, by quadrature, which that checks too.
+/// A disc straight above: F = r²/(h² + r²), which also checks the quadrature that ellipses elsewhere are
+/// compared with.
 #[test]
 fn discs_light_by_their_form_factor() {
     let light = || Some(Emission::front([3.0; 3]));
@@ -163,7 +164,7 @@ fn punctual_lights_have_no_noise() {
     let fade = (2.0 / 6f64.sqrt() - cos(50.0)) / (cos(20.0) - cos(50.0));
     check(&spot(20.0, 50.0), point * fade * fade);
     check(&spot(40.0, 50.0), point);
-    // Out of the cone there is no light; and by scattering, no point is ever met
+    // Outside the cone there is no light, and scattered rays never hit a point
     let by_chance = RenderOptions { estimator: Estimator::BruteForce, ..RenderOptions::default() };
     for (scene, options) in [(spot(10.0, 35.0), RenderOptions::default()), (spot(40.0, 50.0), by_chance)] {
         let mut dark = Ptwne::new(scene, 4, 4, options).unwrap();
@@ -174,8 +175,8 @@ fn punctual_lights_have_no_noise() {
     check(&lit(|b, _| b.punctual(distant).unwrap()), expected);
 }
 
-/// An image of all directions: one bright pixel on grey, and light from one half, against a quadrature of the interpolated
-/// image in f64.
+/// An image of all directions: one bright pixel on grey, and light from one half, against a quadrature of the
+/// interpolated image in f64.
 #[test]
 fn environment_maps_light_by_their_image() {
     let (width, height) = (16usize, 8usize);
@@ -233,9 +234,9 @@ fn textured_lights_shine_by_their_image() {
     check_brute_force(&scene, 0.5 * f);
 }
 
-/// A plate between floor and light, and half of it or each second ray's worth is not there.
+/// A plate between floor and light that stops half of all rays, or is half transparent.
 #[test]
-fn holes_let_light_through() {
+fn transparent_surfaces_let_light_through() {
     let with = |opacity: Texture, light: &dyn Fn(&mut SceneBuilder, MaterialId)| {
         lit(|b, m| {
             let options = MaterialOptions { opacity: Some(opacity), one_sided: false };
@@ -255,16 +256,16 @@ fn holes_let_light_through() {
     check_samples(&with([0.3, 0.4, 0.5].into(), &point), 0.6 * whole.0);
     check(&with([0.5; 3].into(), &point), 0.5 * whole.0);
     check(&with([0.5; 3].into(), &panel), 0.5 * whole.1);
-    // Texture coordinates run in scene units: the left half of four is there
+    // Texture coordinates run in scene units: the left half of four is opaque
     let mut image = ImageTexture::new(2, 1, Pixels::Linear8([[255; 3], [0; 3]].into()));
     (image.nearest, image.to_uv) = (true, [[0.25, 0.0, 0.0], [0.0, 0.25, 0.0]]);
     check(&with(Texture::Image(image.clone()), &panel), 0.5 * whole.1);
     check(&with(Texture::Image(image), &point), whole.0);
 }
 
-/// Straight through two plates of which a third and a half is there, to a sky of radiance 1, besides what they reflect.
+/// Through two black plates with opacities of 1/3 and 1/2, to a sky of radiance 1.
 #[test]
-fn holes_are_looked_through() {
+fn transparent_surfaces_are_seen_through() {
     let camera = look([0.0, 0.0, 4.0], [0.0; 3], [0.0, 1.0, 0.0], 20.0);
     let scene = scene(camera, |b| {
         for (z, opacity) in [(0.0, 1.0 / 3.0), (-1.0, 0.5)] {
@@ -293,7 +294,7 @@ fn backs_of_one_sided_surfaces_are_black() {
     }
 }
 
-/// In the Cornell box, cut to direct light, the reference is what the path tracer converges to.
+/// In the Cornell box with direct light only, the path tracer converges to the reference.
 #[test]
 fn the_reference_is_converged_direct_light() {
     let options = RenderOptions { max_depth: DIRECT, ..RenderOptions::default() };
@@ -301,26 +302,27 @@ fn the_reference_is_converged_direct_light() {
     let reference = source.reference().unwrap().unwrap().pixels;
     assert_eq!(reference, source.reference().unwrap().unwrap().pixels);
     let halves = [batch(&mut source, 0, 512), batch(&mut source, 512, 512)];
-    // Leave out the rows of the light itself: it is thirty times brighter than what it lights, and its edges come in steps
-    // of 1/16 of a pixel
+    // Leave out the rows of the light itself: it is thirty times brighter than what it lights, and its edges
+    // are accurate to 1/16 of a pixel
     let bright: Vec<usize> = (0..48 * 48).filter(|&i| reference[i][1] > 2.0).map(|i| i / 48).collect();
     let (first, last) = (bright[0] - 1, bright[bright.len() - 1] + 1);
     let (mut bias, mut noise, mut total) = (0.0, 0.0, 0.0);
     let (mut signed, mut sum) = (0.0, 0.0);
     for (i, r) in reference.iter().enumerate().filter(|(i, _)| !(first..=last).contains(&(i / 48))) {
         let [a, b] = [&halves[0], &halves[1]].map(|h| f64::from(h[i][1]));
-        // E[(a − r)(b − r)] is the squared bias alone, as the halves are independent
+        // E[(a − r)(b − r)] is the squared bias, since the halves are independent
         bias += (a - f64::from(r[1])) * (b - f64::from(r[1]));
         noise += (a - b).powi(2) / 2.0;
         signed += 0.5 * (a + b) - f64::from(r[1]);
         sum += f64::from(r[1]);
         total += f64::from(r[1]).powi(2);
     }
-    // An edge goes through one pixel in six at this size; sixteen rays find its share of the pixel to about 1/16, and the
-    // contrast is at most the picture's: bias² up to 1/6·1/256 = 6.5e-4 of the total. The noise of the product's mean is
-    // noise²/√2000 pixels, below 1e-5 of the total
+    // At this size, an edge crosses one pixel in six. Sixteen rays find its share of the pixel to about 1/16,
+    // and its contrast is at most the picture's: bias² up to 1/6·1/256 = 6.5e-4 of the total. The noise of
+    // the product's mean is noise²/√2000 pixels, below 1e-5 of the total
     assert!(bias < 6.5e-4 * total, "bias² {}, noise² {}", bias / total, noise / total);
     assert!(noise / 45.0 < 1e-5 * total);
-    // Errors at edges have both signs: the mean must agree much better. Its standard error is below 1e-3·√noise²/total
+    // Errors at edges have both signs, so the mean must agree much better. Its standard error is below
+    // 1e-3·√noise²/total
     assert!(signed.abs() < 3e-3 * sum, "{signed} of {sum}");
 }

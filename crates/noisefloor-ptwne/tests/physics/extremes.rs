@@ -1,4 +1,4 @@
-//! Nothing but finite, non-negative numbers, whatever the scene.
+//! All samples are finite and non-negative, in any scene.
 
 use crate::kit::{batch, look, scene};
 use noisefloor::ProgressiveSource;
@@ -11,7 +11,7 @@ fn check(scene: Scene, samples: u32) {
     let mut all = batch(&mut source, 0, samples);
     let counts = source.counts();
     assert_eq!((counts.samples, counts.dropped, counts.clamped), (32 * 32 * u64::from(samples), 0, 0));
-    // Where it is hard to find the light, references take thousands of samples a pixel
+    // References take thousands of samples per pixel where light is hard to find
     let mut small = Ptwne::new(scene, 16, 16, RenderOptions::default()).unwrap();
     all.extend(small.reference().unwrap().unwrap().pixels);
     let good = |v: &f32| v.is_finite() && *v >= 0.0;
@@ -72,7 +72,7 @@ fn an_empty_scene_is_its_sky() {
     assert!(source.reference().unwrap().unwrap().pixels.iter().all(|p| *p == [0.25, 0.5, 1.0]));
 }
 
-/// Bright samples are scaled down to the clamp, and counted; without one, none are.
+/// Bright samples are scaled down to the clamp and counted; without a clamp, none are.
 #[test]
 fn clamps_bound_samples_and_are_counted() {
     let run = |clamp| {

@@ -1,11 +1,11 @@
-//! Furnaces: closed rooms and uniform surroundings, where radiance is known.
+//! Furnaces: closed rooms and uniform surroundings, in which the radiance is known.
 
 use crate::kit::{agrees, look, mean, scene};
 use noisefloor_ptwne::{Emission, Environment, Estimator, Material, RenderOptions, SceneBuilder, Texture};
 
 const UP: [f32; 3] = [0.0, 1.0, 0.0];
 
-/// Inside a closed room of albedo ρ that gives off L everywhere, radiance is L + ρL + ρ²L + … = L/(1 − ρ).
+/// Inside a closed room of albedo ρ that emits L everywhere, the radiance is L + ρL + ρ²L + … = L/(1 − ρ).
 #[test]
 fn closed_rooms_have_the_radiance_of_the_geometric_series() {
     let camera = look([0.1, 0.05, 0.2], [0.0, 0.0, -1.0], UP, 60.0);
@@ -26,14 +26,15 @@ fn closed_rooms_have_the_radiance_of_the_geometric_series() {
     for estimator in [Estimator::Mis, Estimator::NextEvents, Estimator::BruteForce] {
         let options = RenderOptions { estimator, seed: 3, ..RenderOptions::default() };
         for (channel, albedo) in [(0, 0.6), (1, 0.3)] {
-            // The offset of ray origins and 0.9999 of shadow rays: less than 1e-3 of the light is lost in corners
+            // Corners lose less than 1e-3 of the light, by the offset of ray origins and since shadow rays
+            // end at 0.9999
             agrees(mean(scene(camera, sphere), 8, 64, 40, channel, options), 0.5 / (1.0 - albedo), 1e-3);
             agrees(mean(scene(camera, cube), 8, 64, 40, channel, options), 0.5 / (1.0 - albedo), 1e-3);
         }
     }
 }
 
-/// A lossless convex body in surroundings of radiance 1 has radiance 1 everywhere: it cannot be seen.
+/// A lossless convex body in surroundings of radiance 1 has radiance 1 everywhere, so that it cannot be seen.
 #[test]
 fn lossless_balls_cannot_be_seen() {
     let mirror = Material::Mirror { reflectance: [1.0; 3] };
@@ -46,15 +47,15 @@ fn lossless_balls_cannot_be_seen() {
             b.sphere([0.0; 3], 1.0, m, None).unwrap();
             b.environment(Environment::constant([1.0; 3])).unwrap();
         });
-        // Without roulette every sample is exactly 1, up to rounding and light still inside the glass after 65 segments
+        // Without roulette every sample is exactly 1, up to rounding and light still inside the glass after
+        // 65 segments
         let options = RenderOptions { roulette: 1000, ..RenderOptions::default() };
         let (radiance, _) = mean(scene, 24, 2, 16, 1, options);
         assert!((radiance - 1.0).abs() < 1e-5, "{material:?}: {radiance}");
     }
 }
 
-/// The share of light from all around that a plane sends to a camera at an angle from its normal: its directional albedo, and
-/// the standard error.
+/// The directional albedo of a plane, seen at an angle from its normal, and its standard error.
 fn albedo(material: Material, degrees: f32, samples: u32) -> (f64, f64) {
     let (sin, cos) = degrees.to_radians().sin_cos();
     let camera = look([4.0 * sin, 4.0 * cos, 0.0], [0.0; 3], [0.0, 0.1, 1.0], 0.5);
@@ -66,7 +67,8 @@ fn albedo(material: Material, degrees: f32, samples: u32) -> (f64, f64) {
     mean(scene, 4, 64, samples, 0, RenderOptions::default())
 }
 
-/// Reflectance of a boundary with the index of refraction η + ik, from Fresnel's equations with complex numbers.
+/// Reflectance of a boundary with the index of refraction η + ik, from Fresnel's equations with complex
+/// numbers.
 fn reflectance(cos: f64, eta: f64, k: f64) -> f64 {
     type C = [f64; 2];
     let mul = |a: C, b: C| [a[0] * b[0] - a[1] * b[1], a[0] * b[1] + a[1] * b[0]];
@@ -90,8 +92,8 @@ fn schlick(f0: f64, cos: f64) -> f64 {
     f0 + (1.0 - f0) * (1.0 - cos).powi(5)
 }
 
-/// Directional albedo of single-scattering GGX with a Fresnel term, by midpoint rule over the hemisphere, in f64, written from
-/// Walter et al. 2007 and Heitz 2014 independently of the renderer.
+/// Directional albedo of single-scattering GGX with a Fresnel term, by midpoint rule over the hemisphere, in
+/// f64, written from Walter et al. 2007 and Heitz 2014 independently of the renderer.
 fn directional_albedo(alpha: f64, cos_o: f64, n: u32, fresnel: impl Fn(f64) -> f64) -> f64 {
     masked_albedo(alpha, cos_o, n, fresnel, |o, i| 1.0 / (1.0 + o + i))
 }
@@ -123,7 +125,7 @@ fn masked_albedo(
     sum * 2.0 * half_pi * 2.0 * half_pi / f64::from(n * n)
 }
 
-/// A rough conductor with F = 1 loses what its microfacets mask, and no more.
+/// A rough conductor with F = 1 loses only what its microfacets mask.
 #[test]
 fn rough_conductors_lose_what_is_masked() {
     for (roughness, degrees) in [(0.2f32, 20.0f32), (0.5, 50.0), (1.0, 0.1), (1.0, 75.0), (0.1, 85.0)] {
@@ -136,7 +138,7 @@ fn rough_conductors_lose_what_is_masked() {
     }
 }
 
-/// Smooth boundaries reflect and let through what Fresnel says; what is diffuse, its albedo.
+/// Smooth boundaries reflect and transmit by Fresnel's equations, and diffuse surfaces by their albedo.
 #[test]
 fn smooth_surfaces_are_fresnels() {
     for degrees in [0.1f32, 40.0, 80.0] {
@@ -164,7 +166,8 @@ fn smooth_surfaces_are_fresnels() {
     }
 }
 
-/// Rough conductors of a colour reflect their Fresnel term over the visible microfacets, and never more than they meet.
+/// Coloured rough conductors reflect the mean of the Fresnel term over visible microfacets, and never more
+/// than they receive.
 #[test]
 fn rough_conductors_are_fresnels_over_facets() {
     for (roughness, degrees) in [(0.15f32, 30.0f32), (0.5, 70.0), (1.0, 10.0)] {
@@ -184,8 +187,8 @@ fn plastic(albedo: f32, roughness: f32, nonlinear: bool) -> Material {
     Material::Plastic { diffuse: [albedo; 3].into(), specular: [1.0; 3], ior: 1.5, roughness, nonlinear }
 }
 
-/// What a coat reflects of one direction, and a base of albedo ρ lets out again: light that got in is reflected by the base
-/// and by the coat from below in turn, until it gets out.
+/// What a coat reflects of light from one direction, and what comes out of a base of albedo ρ: light that
+/// entered is reflected by the base and the inside of the coat in turn until it leaves.
 fn coated(reflected: f64, albedo: f64, inner: f64) -> f64 {
     reflected + (1.0 - reflected) * albedo * (1.0 - inner) / (1.0 - albedo * inner)
 }
@@ -198,7 +201,7 @@ fn smooth_coats_keep_the_light_of_their_base() {
         .map(|i| {
             let cos = (f64::from(i) + 0.5) / f64::from(n);
             let sin2 = 2.25 * (1.0 - cos * cos);
-            // By reciprocity as from outside, at the refracted angle
+            // By reciprocity, as from outside at the refracted angle
             let r = if sin2 >= 1.0 { 1.0 } else { reflectance((1.0 - sin2).sqrt(), 1.5, 0.0) };
             2.0 * r * cos / f64::from(n)
         })
@@ -207,16 +210,17 @@ fn smooth_coats_keep_the_light_of_their_base() {
         let r = reflectance(f64::from(degrees.to_radians().cos()), 1.5, 0.0);
         for rho in [1.0f32, 0.5] {
             let albedo_of = |nonlinear| albedo(plastic(rho, 0.0, nonlinear), degrees, 200);
-            // The table of the coat is good to 1e-3, and the view is 0.5° wide
+            // The coat's table is accurate to 1e-3, and the view is 0.5° wide
             agrees(albedo_of(true), coated(r, f64::from(rho), inner), 3e-3);
             agrees(albedo_of(false), r + (1.0 - r) * f64::from(rho), 3e-3);
         }
     }
 }
 
-/// What Mitsuba 3.9.1's `roughplastic` (GGX, nonlinear, index 1.5) reflects of a white sky: the mean weight of 2²⁰ of its own
-/// samples, good to 1e-3. Its facets mask by the product of two terms, ours by the height-correlated one: the difference is by
-/// quadrature. Tables of 64 steps on either side, and a bright base that multiplies what they differ by, leave a percent.
+/// What Mitsuba 3.9.1's `roughplastic` (GGX, nonlinear, index 1.5) reflects of a white sky: the mean weight
+/// of 2²⁰ of its own samples, accurate to 1e-3. Its facets mask by a product of two terms, ours by the
+/// height-correlated one; the difference is found by quadrature. Tables of 64 steps in both renderers, and a
+/// bright base that amplifies their difference, leave one percent.
 #[test]
 fn rough_coats_reflect_what_mitsubas_do() {
     for (base, alpha, mitsuba) in [
@@ -237,7 +241,7 @@ fn rough_coats_reflect_what_mitsubas_do() {
     }
 }
 
-/// White metal loses what its facets mask, a white dielectric nothing, and no blend makes light.
+/// White metal loses what its facets mask, a white dielectric loses nothing, and no blend creates light.
 #[test]
 fn blends_of_metal_and_dielectric_make_no_light() {
     for (g, degrees) in [(0.0f32, 80.0f32), (0.3, 85.0), (0.6, 60.0), (1.0, 20.0), (1.0, 80.0)] {
@@ -252,7 +256,7 @@ fn blends_of_metal_and_dielectric_make_no_light() {
             agrees(albedo(material, degrees, 400), expected, 4e-3);
         }
     }
-    // Of a roughness that varies, as far as the renderer knows: it then reads the coat between two rows of a table
+    // As a texture, so that the renderer interpolates between two rows of the coat's table
     for g in [0.02f32, 0.1, 0.146, 0.19, 0.31, 0.55, 0.97] {
         for degrees in [10.0f32, 60.0, 80.0, 85.0] {
             let metallic_roughness = Texture::Checker { colours: [[0.0, g, 0.0]; 2], scale: [1.0; 2] };

@@ -44,7 +44,7 @@ pub(crate) fn mean(
     (mean, (variance / n).sqrt())
 }
 
-/// Asserts that a mean is `expected` within five standard errors and a relative `bias` that arithmetic in f32 may have.
+/// Asserts that a mean is `expected` within five standard errors and a relative `bias` that f32 may cause.
 pub(crate) fn agrees((mean, error): (f64, f64), expected: f64, bias: f64) {
     let tolerance = 5.0 * error + bias * expected.abs();
     assert!((mean - expected).abs() <= tolerance, "{mean} ± {error}, expected {expected}");

@@ -1,8 +1,8 @@
-//! The renderer against answers known by mathematics.
+//! The renderer against mathematically known answers.
 //!
-//! Every statistical test is seeded and compares a mean over independent batches with an exact value, at five standard
-//! errors, estimated from at least 64 batches. By Student's t with 63 degrees of freedom a right renderer fails one such
-//! comparison by chance with p = 5e-6; the whole suite makes about a hundred: 5e-4.
+//! Every statistical test is seeded and compares a mean over independent batches with an exact value, at five
+//! standard errors, estimated from at least 64 batches. By Student's t with 63 degrees of freedom, a correct
+//! renderer fails one such comparison by chance with p = 5e-6. The whole suite makes about a hundred: 5e-4.
 
 #![expect(
     clippy::unwrap_used,

@@ -1,9 +1,9 @@
-//! Next events, scattering, and both together: they change noise, not the mean.
+//! Next event estimation, scattering, and both together: they change the noise, not the mean.
 
 use crate::kit::batch;
 use noisefloor_ptwne::{Estimator, Ptwne, RenderOptions, scenes};
 
-/// Edge of the picture, and of its parts that are compared, in pixels.
+/// Edges of the picture and of the parts that are compared, in pixels.
 const SIZE: usize = 24;
 const PART: usize = 8;
 const PARTS: usize = (SIZE / PART) * (SIZE / PART);
@@ -36,9 +36,9 @@ fn parts(name: &str, estimator: Estimator, samples: u32) -> [(f64, f64); PARTS] 
     })
 }
 
-/// In scenes whose lights are large enough to be met by chance, all three agree in every part of the picture. Of 108 comparisons
-/// (four scenes, nine parts, three pairs) one is off by 5 standard errors with p < 108 · 5.7e-7 = 6e-5, and means of 24,000
-/// samples and more, in 192 batches, are normal enough for that.
+/// In scenes whose lights are large enough to be hit by chance, all three agree in every part of the picture.
+/// Of 108 comparisons (four scenes, nine parts, three pairs) one is off by 5 standard errors with p < 108 ·
+/// 5.7e-7 = 6e-5, and means of 24,000 samples and more, in 192 batches, are normal enough for that.
 #[test]
 fn all_estimators_agree_on_scenes_with_large_lights() {
     for name in ["cornell-box", "softbox", "glass-spheres", "lanterns"] {
@@ -59,7 +59,8 @@ fn all_estimators_agree_on_scenes_with_large_lights() {
     }
 }
 
-/// Suns are too small to be met, but next events find them with and without scattering.
+/// Suns are too small to be hit by chance, but next event estimation finds them with and without scattered
+/// rays.
 #[test]
 fn next_events_alone_are_enough_under_a_sun() {
     for name in ["courtyard", "arcade"] {

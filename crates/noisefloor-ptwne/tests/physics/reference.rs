@@ -1,4 +1,4 @@
-//! The reference keeps what it promises about its own noise.
+//! The reference keeps its promises about its own noise.
 
 use crate::kit::{batch, look, scene};
 use noisefloor::{NoiseMask, ProgressiveSource, ToneMapping};
@@ -7,11 +7,12 @@ use std::error::Error;
 use std::ops::ControlFlow;
 use std::sync::{Arc, Mutex};
 
-/// A tenth of the mask energy that the keenest observers see, 1.0/255, as a deviation.
+/// A tenth of the noise mask energy that the most demanding observers see, 1.0/255, as a standard deviation.
 const PROMISE: f64 = 0.32 / 255.0;
 
-/// Of one reference: the deviation of its noise mask, from two of different seeds, each with the exposure of a picture of all light; what
-/// it says of that itself; and how many blocks have more than was promised.
+/// The standard deviation of a reference's noise mask, measured from two seeds at the exposure of the
+/// path-traced picture; the reference's own estimate of it; and the number of blocks with more noise than
+/// promised.
 fn deviation(scene: Scene, size: usize) -> (f64, f64, usize) {
     let scene = Arc::new(scene);
     let source = |seed| {
@@ -35,8 +36,9 @@ fn deviation(scene: Scene, size: usize) -> (f64, f64, usize) {
     (energy.sqrt(), own, unsettled)
 }
 
-/// Edges, penumbrae, hard shadows, textures, sun and sky. Each block stops when its own estimate is at 0.36/255, of which the mask lets 0.85
-/// through, 0.305. The estimate is good to 1/√(2·256) = 4 % in one block, and better in the mean of 16.
+/// Edges, penumbrae, hard shadows, textures, sun and sky. Each block stops when its own estimate is 0.36/255,
+/// of which the mask passes 0.85: 0.305. The estimate is accurate to 1/√(2·256) = 4 % in one block, and more
+/// so in the mean of 16.
 #[test]
 fn its_noise_is_a_tenth_of_what_is_seen() {
     for name in ["cornell-box", "bulb", "courtyard"] {
@@ -46,7 +48,7 @@ fn its_noise_is_a_tenth_of_what_is_seen() {
     }
 }
 
-/// A lamp that nearly touches the wall it lights: points on it alone would have no variance that is finite.
+/// A lamp that nearly touches the wall it lights: light samples by themselves would have infinite variance.
 #[test]
 fn lamps_close_to_walls_leave_no_noise() {
     let scene = scene(look([0.0, 0.0, 4.0], [0.0; 3], [0.0, 1.0, 0.0], 30.0), |b| {
@@ -60,7 +62,7 @@ fn lamps_close_to_walls_leave_no_noise() {
     assert_eq!(unsettled, 0);
 }
 
-/// Whoever watches is told of every block once, and can end it.
+/// The watcher is called once per block, and can cancel the reference.
 #[test]
 fn it_is_watched_and_given_up() {
     let mut source =
@@ -80,13 +82,14 @@ fn it_is_watched_and_given_up() {
         .watch_reference(|done, _| if done < 3 { ControlFlow::Continue(()) } else { ControlFlow::Break(()) });
     let error = source.reference().unwrap_err();
     assert!(error.source().unwrap().to_string().contains("cancelled"), "{error:?}");
-    // And no harm is done
+    // The next reference is complete
     source.watch_reference(|_, _| ControlFlow::Continue(()));
     assert!(source.reference().unwrap().is_some());
 }
 
-/// Dim lamps beside bright ones, of which points by power find none: the reference stops at its cap, and says what is left. A few pixels
-/// have most of the error, so that its own estimate is good to a factor of two; seeds are fixed.
+/// Dim lamps beside bright ones, which light samples by power do not find: the reference stops at its cap and
+/// reports the noise that is left. A few pixels have most of the error, so that its estimate is accurate to a
+/// factor of two; seeds are fixed.
 #[test]
 fn what_is_left_at_the_cap_is_told() {
     let (deviation, own, unsettled) = deviation(scenes::by_name("decades").unwrap(), 16);

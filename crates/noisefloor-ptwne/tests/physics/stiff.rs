@@ -1,4 +1,4 @@
-//! The stiff scenes: what mathematics says of them, and nothing lost.
+//! The stiff scenes, against mathematically known answers.
 
 use crate::kit::{agrees, batch, look, mean, scene};
 use noisefloor::{ProgressiveSource, Rgb};
@@ -8,7 +8,7 @@ use noisefloor_ptwne::{
 
 const UP: [f32; 3] = [0.0, 1.0, 0.0];
 
-/// A black shell in surroundings of radiance 1, seen from within: any light came through a crack.
+/// A black shell in surroundings of radiance 1, seen from inside: any light leaked through a crack.
 fn leaks(positions: &[[f32; 3]], indices: &[[u32; 3]], eye: [f32; 3]) -> f64 {
     let towards = |target: [f32; 3]| look(eye, std::array::from_fn(|i| eye[i] + target[i]), UP, 100.0);
     let targets = [[1.0, 0.01, 0.0], [-1.0, 0.0, 0.2], [0.0, 0.3, 1.0], [0.1, 0.0, -1.0]];
@@ -24,7 +24,7 @@ fn leaks(positions: &[[f32; 3]], indices: &[[u32; 3]], eye: [f32; 3]) -> f64 {
     targets.map(seen).iter().sum::<f64>() / 4.0
 }
 
-/// A drum of triangles between lids: needles, and small ones, around the origin and away from it.
+/// A closed drum of needle triangles around the origin, and one of small triangles away from it.
 #[test]
 fn nothing_shines_through_closed_shells() {
     for (sides, rows, at) in [(8000u32, 1u32, 0.0f32), (400, 200, 20.0)] {
@@ -49,7 +49,7 @@ fn nothing_shines_through_closed_shells() {
         for b in [base, base + 4] {
             indices.extend([[b, b + 1, b + 2], [b + 1, b + 3, b + 2]]);
         }
-        // Off its middle, where rays graze; without widened edges about five of a million rays slip through
+        // From off the axis, where rays graze; without widened edges, about five of a million rays leak
         let leaks = leaks(&positions, &indices, [at + 0.7, at + 0.03, at - 0.02]);
         assert_eq!(leaks, 0.0, "{sides}×{rows} at {at}");
     }
@@ -69,7 +69,8 @@ fn without_light_or_reflection_there_is_nothing() {
     }
 }
 
-/// A ball of 1e-4 lights as a point of intensity πr²L does: at a spot of the wall, albedo/π · πr²L cos θ / d².
+/// A ball of radius 1e-4 lights like a point of intensity πr²L: at a spot of the wall, albedo/π · πr²L cos θ
+/// / d².
 #[test]
 fn a_pinpoint_lights_as_a_point() {
     let camera = look([-2.0, 2.6, 1.0], [-2.0, 2.6, -1.5], UP, 0.05);
@@ -84,8 +85,8 @@ fn a_pinpoint_lights_as_a_point() {
     assert!((reference - expected).abs() < 1e-3 * expected, "{reference} {expected}");
 }
 
-/// A keyhole through which nothing but the lamp is seen lights as if it shone itself: opposite, at distance d, a hole of a×b
-/// has the form factor ab/πd², but for (a² + b²)/d², 7e-4 here.
+/// A keyhole through which only the lamp is seen lights as if it emitted light itself: a hole of a×b at
+/// distance d has the form factor ab/πd², up to (a² + b²)/d², 7e-4 here.
 #[test]
 fn a_keyhole_lights_as_a_small_lamp() {
     let camera = look([0.31, 1.06, 0.0], [0.31, 1.06, 4.0], UP, 0.05);
@@ -94,8 +95,9 @@ fn a_keyhole_lights_as_a_small_lamp() {
     agrees(mean(stiff("keyhole", Some(camera)), 4, 64, 800, 0, options), expected, 2e-3);
 }
 
-/// Sixteen decades in one picture. Each panel has its own radiance exactly; and as niches at the corners, and those at the
-/// edges, are mirror images, so are their pictures, but for their panels' radiance.
+/// Sixteen decades in one picture. Each panel shows exactly its own radiance. Niches at the corners are
+/// mirror images of each other, as are those at the edges, so their pictures are too, up to their panels'
+/// radiance.
 #[test]
 fn decades_keep_to_themselves() {
     const SIZE: usize = 96;
@@ -103,7 +105,7 @@ fn decades_keep_to_themselves() {
     let batches: Vec<Vec<Rgb>> = (0..64).map(|i| batch(&mut source, 4 * i, 4)).collect();
     assert_eq!(source.counts().dropped, 0);
     let radiance = |i: usize| 10f64.powi(2 * i as i32 - 8);
-    // Middles of niches are 28 pixels apart
+    // Centres of niches are 28 pixels apart
     let middle = |i: usize| [20 + 28 * (i % 3), 20 + 28 * (i / 3)];
     let mut niches = vec![];
     for i in 0..9 {
@@ -130,7 +132,8 @@ fn decades_keep_to_themselves() {
     }
 }
 
-/// A scene far away is the same scene: its numbers are multiples of 1/16, which f32 still holds there.
+/// A scene far from the origin has the same picture. Its numbers are multiples of 1/16, which f32 can hold
+/// there.
 #[test]
 fn far_away_is_as_near() {
     let at = |to: [f32; 3], p: [f32; 3]| -> [f32; 3] { std::array::from_fn(|i| to[i] + p[i]) };
