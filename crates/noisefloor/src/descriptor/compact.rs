@@ -32,7 +32,6 @@ pub(super) const TEXTURE: [usize; 2] = [1, 2];
 
 /// All numbers are logarithms of amplitudes, and differ by 0.4 to 0.8 over the human data. Where scenes are few and alike, the
 /// picture's numbers hardly differ, and a machine would make much of it.
-#[cfg(feature = "train")]
 pub(super) const LEAST_DEVIATION: f64 = 0.3;
 
 /// Edge of a block at full resolution, in pixels; the apron is one block.
