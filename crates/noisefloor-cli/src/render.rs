@@ -136,6 +136,7 @@ pub const AFTER_THIS_BATCH: &str = "stopping after this batch; what is there wil
 pub fn cancel_on_signal(cancel: Arc<AtomicBool>, says: &'static str) -> anyhow::Result<()> {
     ctrlc::set_handler(move || {
         if cancel.swap(true, Ordering::Relaxed) {
+            noisefloor_sidecar::end_all();
             std::process::exit(i32::from(INTERRUPTED));
         }
         eprintln!("\n{says} (again to quit at once)");

@@ -125,14 +125,9 @@ pub fn open(scene: Option<&str>, args: &RendererArgs) -> anyhow::Result<Opened> 
             let name = adapter.name;
             only_ptwne(args, name, &[])?;
             let scene = scene.with_context(|| format!("--source {name} needs a scene file"))?;
-            let job = Job {
-                seed: args.seed,
-                size: args.size,
-                max_depth: args.max_depth,
-                threads: args.threads,
-                timeout: args.timeout,
-                ..Job::new(scene)
-            };
+            let mut job = Job::new(scene);
+            (job.seed, job.size, job.max_depth) = (args.seed, args.size, args.max_depth);
+            (job.threads, job.timeout) = (args.threads, args.timeout);
             let sidecar = (adapter.open)(&job)?;
             let warnings = sidecar.warnings().to_vec();
             (Box::new(sidecar), stem(scene), warnings)
@@ -145,12 +140,9 @@ pub fn open(scene: Option<&str>, args: &RendererArgs) -> anyhow::Result<Opened> 
         }
         SourceChoice::Command(template) => {
             only_ptwne(args, "command", &[("--max-depth", args.max_depth.is_some())])?;
-            let options = CommandOptions {
-                scene: scene.map(Into::into),
-                seed: args.seed,
-                size: args.size,
-                timeout: args.timeout,
-            };
+            let mut options = CommandOptions::default();
+            (options.scene, options.seed) = (scene.map(Into::into), args.seed);
+            (options.size, options.timeout) = (args.size, args.timeout);
             let source = CommandSource::new(template, options)?;
             (Box::new(source), scene.map_or_else(|| "command".to_owned(), stem), Vec::new())
         }

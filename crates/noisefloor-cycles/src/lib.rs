@@ -7,25 +7,28 @@
 //! ```
 //!
 //! # What is rendered
-//! The scene as its `.blend` file says, with the camera, frame and view layers that were active when it was saved, but for: a box
-//! filter of one pixel; no clamping of samples, no light threshold, no adaptive sampling, denoising, path guiding, compositing or
-//! sequence; and size and depth where the [`Job`] has them. Scripts in the file are not run. Radiance is linear, exposure included,
-//! view transform not.
+//! The scene as its `.blend` file describes it, with the camera, frame and view layers that were active when
+//! it was saved; with a box filter of one pixel; without clamping of samples, light threshold, adaptive
+//! sampling, denoising, path guiding, compositing and sequencer; and with size and depth from the [`Job`] if
+//! given. Scripts in the file are not run. Radiance is linear; exposure is applied, the view transform is
+//! not.
 //!
-//! A scene may also be a `.py` file, which is run in Blender and builds it. Run those of people you trust alone.
+//! A scene can also be a `.py` file, which is run in Blender and builds it. Only run files of people you
+//! trust.
 //!
 //! # Samples
-//! The source repeats samples, however requests are cut. They come in blocks of 16 points of Cycles' own Sobol table, each with a
-//! seed of its own: batches of whole blocks are independent. Of batches that are not multiples of 16, each shares a block with
-//! the one before, whose parts fill each other's gaps: halves made of them differ a little more than they should, and at edges of
-//! lamps much more. Cycles renders a block of a rectangle of tiles at a time, which costs some 5 ms beside the samples.
+//! The source repeats samples, however requests are cut. They come in blocks of 16 points of Cycles' own
+//! Sobol table, each block with its own seed: batches of whole blocks are independent. Batches that are not
+//! multiples of 16 share a block with the previous one, whose parts fill each other's gaps: halves made of
+//! them differ a little more than they should, and much more at edges of lamps. Cycles renders one block of
+//! one rectangle of tiles at a time, at a cost of 5 ms beside the samples.
 //!
-//! In nearly all pixels noise falls with the number of samples as that of independent ones does. At edges of lamps it falls
-//! faster inside a block.
+//! In nearly all pixels noise decreases with the number of samples as that of independent ones does. At edges
+//! of lamps it decreases faster inside a block.
 
-use noisefloor_sidecar::{Adapter, Job, Renderer, Sidecar, SidecarError};
+use noisefloor_sidecar::{HostOptions, Job, Renderer, Sidecar, SidecarError};
 
-/// How Cycles is set up and found.
+/// How Cycles is installed and found.
 pub const RENDERER: Renderer = Renderer {
     name: "cycles",
     title: "Cycles 5.0.1",
@@ -40,5 +43,5 @@ pub const RENDERER: Renderer = Renderer {
 /// # Errors
 /// [`SidecarError`] if Cycles is not installed, or cannot load the scene.
 pub fn open(job: &Job) -> Result<Sidecar, SidecarError> {
-    Sidecar::start(&RENDERER, job, Adapter::default())
+    Sidecar::start(&RENDERER, job, HostOptions::default())
 }

@@ -10,28 +10,32 @@
 //! ```
 //!
 //! # What is rendered
-//! The scene as its configuration (`.cfg`) says, or a scene (`.scn`) with LuxCore's own settings, but for: no filter, no clamping, no
-//! adaptive sampling, no photon caches, nothing that stops early; and size and depth where the [`Job`] has them. Files that a scene
-//! names are relative to it. Pictures lie one row of pixels lower than those of other renderers, as LuxCore's do.
+//! The scene as its configuration (`.cfg`) describes it, or a scene (`.scn`) with LuxCore's own settings; in
+//! either case without filter, clamping, adaptive sampling, photon caches and early stops, and with size and
+//! depth from the [`Job`] if given. Files that a scene names are relative to it. Pictures lie one row of
+//! pixels lower than those of other renderers: that is LuxCore's way.
 //!
 //! # Samples
-//! Nothing repeats: LuxCore's threads race for pixels. They also stop a little late; what is drawn beyond the number asked for is
-//! taken off the tile's next batch, so that counts are as asked, and right in the long run.
+//! Nothing repeats: LuxCore's threads race for pixels. They also stop a little late. Samples beyond the
+//! requested number are deducted from the tile's next batch, so that counts are as requested, and right in
+//! the long run.
 //!
-//! - [`Sampler::Random`], [`Sampler::Sobol`]: a fresh session of LuxCore, with a fresh seed, for every rectangle of tiles of a call. Batches
-//!   are independent. A session starts in some milliseconds, and then has to build the tree over the scene's triangles, about a
-//!   second for a million of them. Sobol points would have less noise in larger batches: sessions have eight of them, so
-//!   that a batch of any size has the noise of as many sessions.
-//! - [`Sampler::Metropolis`]: a Markov chain must not be cut. Two chains live in every tile, paused in between, and take turns; noisefloor
-//!   keeps one in each half of its film. The unit of work is mutations a pixel. Each chain holds a scene of its own: memory
-//!   grows with tiles × scene, beside 0.4 MB a chain. Perspective and orthographic cameras only. Of a chain, one batch knows of
-//!   the one before; between chains nothing is shared. Noise is correlated between neighbouring pixels.
-//! - [`Engine::Bidir`] without Russian roulette, which LuxCore's weights leave out: with it, pictures are several per cent too bright.
-//!   Depth limits the two ends of a path, and not its length.
+//! - [`Sampler::Random`], [`Sampler::Sobol`]: a fresh session of LuxCore, with a fresh seed, for every
+//!   rectangle of tiles of a call. Batches are independent. A session starts within milliseconds, and then
+//!   has to build the tree over the scene's triangles, about a second for a million. Sobol points would have
+//!   less noise in larger batches; sessions therefore have eight of them, so that a batch of any size has the
+//!   noise of several sessions.
+//! - [`Sampler::Metropolis`]: a Markov chain must not be cut. Two chains live in every tile, paused between
+//!   batches, and take turns; noisefloor keeps one in each half of its film. The unit of work is mutations
+//!   per pixel. Each chain holds its own scene: memory grows with tiles × scene, plus 0.4 MB per chain. Only
+//!   perspective and orthographic cameras. Successive batches of a chain are correlated; the two chains share
+//!   nothing. Noise is correlated between neighbouring pixels.
+//! - [`Engine::Bidir`] runs without Russian roulette, which LuxCore's weights do not account for: with it,
+//!   pictures are several per cent too bright. Depth limits both ends of a path, not its length.
 
-use noisefloor_sidecar::{Adapter, Job, Renderer, Sidecar, SidecarError};
+use noisefloor_sidecar::{HostOptions, Job, Renderer, Sidecar, SidecarError};
 
-/// How LuxCore is set up and found.
+/// How LuxCore is installed and found.
 pub const RENDERER: Renderer = Renderer {
     name: "luxcore",
     title: "LuxCore 2.11.2",
@@ -39,11 +43,13 @@ pub const RENDERER: Renderer = Renderer {
     requirements: include_str!("../requirements.txt"),
     pythons: &[12, 11, 13, 14],
     // Ends at once: tearing LuxCore down may abort Python
-    probe: "import os, numpy, pyluxcore; pyluxcore.Init(); print(pyluxcore.Version(), flush=True); os._exit(0)",
+    probe: "import os, numpy, pyluxcore; pyluxcore.Init(); \
+            print(pyluxcore.Version(), flush=True); os._exit(0)",
 };
 
 /// What traces paths.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Engine {
     /// From the camera, with next event estimation: LuxCore's `PATHCPU`.
     Path,
@@ -62,8 +68,9 @@ impl Engine {
 
 /// What chooses paths.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Sampler {
-    /// Each sample on its own.
+    /// Independent samples.
     Random,
     /// Scrambled Sobol points.
     Sobol,
@@ -86,8 +93,8 @@ impl Sampler {
 /// # Errors
 /// [`SidecarError`] if LuxCore is not installed, or cannot load the scene.
 pub fn open(job: &Job, engine: Engine, sampler: Sampler) -> Result<Sidecar, SidecarError> {
-    let mut adapter = Adapter::default();
-    adapter.options.insert("engine".to_owned(), engine.name().into());
-    adapter.options.insert("sampler".to_owned(), sampler.name().into());
-    Sidecar::start(&RENDERER, job, adapter)
+    let mut options = HostOptions::default();
+    options.options.insert("engine".to_owned(), engine.name().into());
+    options.options.insert("sampler".to_owned(), sampler.name().into());
+    Sidecar::start(&RENDERER, job, options)
 }

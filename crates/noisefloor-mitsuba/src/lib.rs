@@ -7,24 +7,27 @@
 //! ```
 //!
 //! # What is rendered
-//! The scene as its XML file says, but for a box filter, independent samples, and size and depth where the [`Job`] has them.
-//! Integrators that sample single rays are used as they are (`path`, `volpath`, `volpathmis`, `direct`, and `aov` and the like around
-//! them); others make way for `path`, with a warning. The first sensor is used.
+//! The scene as its XML file describes it, with a box filter, independent samples, and size and depth from
+//! the [`Job`] if given. Integrators that sample single rays are used as they are (`path`, `volpath`,
+//! `volpathmis`, `direct`, also inside `aov` and the like); others are replaced by `path`, with a warning.
+//! The first sensor is used.
 //!
 //! # Variants
-//! - [`Variant::Llvm`]: one wavefront over the pixels of all tiles of a call. Each sample has a random stream of its own, which follows
-//!   from (seed, pixel, index), so that the source repeats samples however requests are cut. Needs libLLVM 17 or newer:
-//!   that of `DRJIT_LIBLLVM_PATH`, else the newest in the usual places. Mitsuba refuses version 14, and 15 and 16 abort it; where
-//!   there is no better one, the scalar variant has to do, with a warning.
-//! - [`Variant::Scalar`]: tile by tile, as crop windows. The source repeats calls. Mitsuba numbers streams with 32 bits here, a
-//!   stream a pixel and call: after 2³² of them (16,384 batches of a picture of 512×512 pixels) streams come again, in other places.
+//! - [`Variant::Llvm`]: one wavefront over the pixels of all tiles of a call. Each sample has its own random
+//!   stream, which depends only on (seed, pixel, index): samples repeat however requests are cut. Needs
+//!   libLLVM 17 or newer, from `DRJIT_LIBLLVM_PATH` or else the newest in the usual places. Mitsuba refuses
+//!   version 14, and versions 15 and 16 crash it; without a newer one the scalar variant is used, with a
+//!   warning.
+//! - [`Variant::Scalar`]: tile by tile, as crop windows. The source repeats calls. Mitsuba numbers streams
+//!   with 32 bits here, one per pixel and call: after 2³² of them (16,384 batches of a picture of 512×512
+//!   pixels) streams recur, in other places.
 
 mod llvm;
 
 use llvm::Llvm;
-use noisefloor_sidecar::{Adapter, Job, Renderer, Sidecar, SidecarError};
+use noisefloor_sidecar::{HostOptions, Job, Renderer, Sidecar, SidecarError};
 
-/// How Mitsuba is set up and found.
+/// How Mitsuba is installed and found.
 pub const RENDERER: Renderer = Renderer {
     name: "mitsuba",
     title: "Mitsuba 3.9.1",
@@ -34,8 +37,9 @@ pub const RENDERER: Renderer = Renderer {
     probe: "import mitsuba; print(mitsuba.__version__)",
 };
 
-/// A way in which Mitsuba computes.
+/// How Mitsuba computes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Variant {
     /// `llvm_ad_rgb`: vectorised, compiled for the scene.
     Llvm,
@@ -52,7 +56,7 @@ impl Variant {
     }
 }
 
-/// Opens a scene (Mitsuba XML) in the fastest variant that works.
+/// Opens a scene (Mitsuba XML) in the fastest available variant.
 ///
 /// # Errors
 /// [`SidecarError`] if Mitsuba is not installed, or cannot load the scene.
@@ -60,28 +64,28 @@ pub fn open(job: &Job) -> Result<Sidecar, SidecarError> {
     open_as(job, Variant::Llvm)
 }
 
-/// Opens a scene in a variant; [`Variant::Llvm`] falls back to [`Variant::Scalar`] where it does not work.
+/// Opens a scene in a variant; [`Variant::Llvm`] falls back to [`Variant::Scalar`], with a warning.
 ///
 /// # Errors
 /// As [`open`].
 pub fn open_as(job: &Job, variant: Variant) -> Result<Sidecar, SidecarError> {
-    let mut adapter = Adapter::default();
+    let mut options = HostOptions::default();
     let variant = match (variant, llvm::find()) {
         (Variant::Llvm, Llvm::Usable(path)) => {
-            adapter.env.push((llvm::VARIABLE.to_owned(), path.into()));
+            options.env.push((llvm::VARIABLE.to_owned(), path.into()));
             Variant::Llvm
         }
         (Variant::Llvm, missing) => {
-            adapter.warnings.extend(missing.note());
+            options.warnings.extend(missing.note());
             Variant::Scalar
         }
         (Variant::Scalar, _) => Variant::Scalar,
     };
-    adapter.options.insert("variant".to_owned(), variant.name().into());
-    Sidecar::start(&RENDERER, job, adapter)
+    options.options.insert("variant".to_owned(), variant.name().into());
+    Sidecar::start(&RENDERER, job, options)
 }
 
-/// What keeps Mitsuba from being fast here, and what mends it; nothing if all is well.
+/// What keeps Mitsuba from being fast on this machine, and how to fix it; empty if nothing does.
 pub fn notes() -> Vec<String> {
     llvm::find().note().into_iter().collect()
 }

@@ -1,8 +1,8 @@
-//! Where libLLVM is, and which version.
+//! Finds libLLVM and its version.
 
 use std::path::{Path, PathBuf};
 
-/// The variable by which Dr.Jit finds it.
+/// The environment variable by which Dr.Jit finds it.
 pub(crate) const VARIABLE: &str = "DRJIT_LIBLLVM_PATH";
 /// The oldest version that works: 14 is refused, 15 and 16 abort the process.
 const OLDEST: u32 = 17;
@@ -16,16 +16,16 @@ pub(crate) enum Llvm {
 }
 
 impl Llvm {
-    /// What is wrong, and what mends it.
+    /// What is wrong, and how to fix it.
     pub(crate) fn note(&self) -> Option<String> {
         let found = match self {
             Self::Usable(_) => return None,
             Self::TooOld(path, version) => format!("{} is version {version}", path.display()),
-            Self::Missing => "there is none".to_owned(),
+            Self::Missing => "none was found".to_owned(),
         };
         Some(format!(
-            "the fast variant llvm_ad_rgb needs libLLVM {OLDEST} or newer, and {found}; scalar_rgb has to do. {}, or set \
-             {VARIABLE} to one",
+            "the fast variant llvm_ad_rgb needs libLLVM {OLDEST} or newer, but {found}; using scalar_rgb. \
+             {}, or set {VARIABLE} to the path of one",
             if cfg!(target_os = "macos") {
                 "Run `brew install llvm`"
             } else if cfg!(windows) {
@@ -37,7 +37,7 @@ impl Llvm {
     }
 }
 
-/// The library that the variable names, else the newest in the usual places.
+/// The library that the variable names, or the newest in the usual places.
 pub(crate) fn find() -> Llvm {
     match std::env::var_os(VARIABLE).filter(|path| !path.is_empty()) {
         Some(path) => judge(PathBuf::from(path)),
@@ -45,7 +45,7 @@ pub(crate) fn find() -> Llvm {
     }
 }
 
-/// A library that somebody names: trusted if nothing tells its version.
+/// A library that the user names: trusted if its version is unknown.
 fn judge(path: PathBuf) -> Llvm {
     match version(&path) {
         _ if !path.is_file() => Llvm::Missing,
@@ -57,7 +57,7 @@ fn judge(path: PathBuf) -> Llvm {
 fn search(places: &[PathBuf]) -> Llvm {
     let files = places.iter().filter_map(|place| std::fs::read_dir(place).ok()).flatten().flatten();
     let libraries = files.map(|file| file.path()).filter(|path| is_library(path));
-    // The newest; of links to one library, the same every time.
+    // The newest; among links to one library, always the same
     let known = libraries.filter_map(|path| Some((version(&path)?, path)));
     match known.max_by(|(a, one), (b, other)| a.cmp(b).then_with(|| other.cmp(one))) {
         Some((new, path)) if new >= OLDEST => Llvm::Usable(path),
@@ -76,7 +76,8 @@ fn usual_places() -> Vec<PathBuf> {
         "C:\\Program Files\\LLVM\\bin",
     ];
     let mut places: Vec<PathBuf> = fixed.iter().map(PathBuf::from).collect();
-    // Folders of one version each: /usr/lib/llvm-19/lib, /usr/lib64/llvm19/lib64, /opt/homebrew/opt/llvm@19/lib
+    // Folders of one version each: /usr/lib/llvm-19/lib, /usr/lib64/llvm19/lib64,
+    // /opt/homebrew/opt/llvm@19/lib
     for parent in ["/usr/lib", "/usr/lib64", "/opt/homebrew/opt", "/usr/local/opt"] {
         for entry in std::fs::read_dir(parent).into_iter().flatten().flatten() {
             if entry.file_name().to_string_lossy().starts_with("llvm") {
@@ -94,7 +95,8 @@ fn is_library(path: &Path) -> bool {
     name == "LLVM-C.dll" || rest.is_some_and(|rest| rest.contains(".so") || rest.ends_with(".dylib"))
 }
 
-/// The major version: the first number in the file's name, else in the name of what it links to, else in that of its folders.
+/// The major version: the first number in the file's name, else in the name of what it links to, else in that
+/// of its folders.
 fn version(path: &Path) -> Option<u32> {
     let target = path.canonicalize();
     let target = target.as_deref().unwrap_or(path);
@@ -102,7 +104,7 @@ fn version(path: &Path) -> Option<u32> {
     let folders = target.components().rev().skip(1).map(|component| component.as_os_str());
     names.chain(folders).find_map(|name| {
         let name = name.to_str()?;
-        // Of folders only those that a version is the point of: llvm-19, llvm@19, 19.1.7
+        // Only folders that are named for a version: llvm-19, llvm@19, 19.1.7
         let telling =
             name.to_ascii_lowercase().contains("llvm") || name.starts_with(|c: char| c.is_ascii_digit());
         let digits = name.find(|c: char| c.is_ascii_digit()).filter(|_| telling)?;
@@ -133,7 +135,7 @@ mod tests {
     }
 
     #[test]
-    fn the_newest_is_found_and_old_ones_are_told() {
+    fn the_newest_is_found_and_old_ones_are_reported() {
         let folder = tempfile::tempdir().unwrap();
         let places = [folder.path().join("not there"), folder.path().to_owned()];
         let file = |name: &str| {

@@ -49,6 +49,8 @@ def serve(Host):
     # Ctrl-C in a terminal reaches every process of the group; when to stop is for the parent to say.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
+    _watch()
+
     # The protocol gets descriptors of its own. Whatever prints to standard output from now on, Python or not, prints to
     # standard error; whatever reads standard input reads nothing.
     requests_from = os.fdopen(os.dup(0), "rb")
@@ -58,13 +60,7 @@ def serve(Host):
     os.close(nothing)
     os.dup2(2, 1)
 
-    # On Linux the kernel ends this process with the thread that started it, whatever the renderer is busy with.
-    if sys.platform == "linux":
-        import ctypes
-
-        ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, int(signal.SIGKILL))
-
-    # The end of standard input is noticed while the renderer is busy, too: a renderer whose parent is gone must not go on.
+    # The end of standard input is noticed while the renderer is busy, too: a renderer whose parent is gone must end.
     requests = queue.SimpleQueue()
     threading.Thread(target=_receive, args=(requests_from, requests), daemon=True).start()
 
@@ -82,6 +78,28 @@ def serve(Host):
         _send(replies_to, reply, payload)
         if request.get("op") == "quit":
             _end()
+
+
+def _watch():
+    """Kills what the renderer has started once this process has ended, however it ends.
+
+    A child waits for that (Linux only). It is in the process group that the parent has put this process at the head of; by hand,
+    in a shell's group, nothing is killed."""
+    if sys.platform != "linux" or os.getpgrp() != os.getpid():
+        return
+    import ctypes
+
+    head = os.getpid()
+    signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGTERM})
+    if os.fork() > 0:
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGTERM})
+        return
+    # The streams of this process must end with it
+    os.closerange(0, 3)
+    ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, int(signal.SIGTERM))
+    if os.getppid() == head:
+        signal.sigwait({signal.SIGTERM})
+    os.killpg(head, signal.SIGKILL)
 
 
 def rectangles(tiles, alike):

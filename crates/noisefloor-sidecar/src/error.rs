@@ -1,5 +1,7 @@
-//! What can go wrong with a renderer in another process. Every message says what, where, and what to do.
+//! What can go wrong with a renderer in another process. Every message says what, where, and what to do. What
+//! others wrote is safe to print.
 
+use crate::light::ImpossibleLight;
 use crate::renderer::Renderer;
 use noisefloor_image::PictureError;
 use std::io;
@@ -14,13 +16,14 @@ use thiserror::Error;
 pub struct SidecarError {
     /// The renderer.
     pub renderer: String,
-    /// What it was at, tiles named: `"sampling tile 3"`.
+    /// What it was doing: `"sampling tile 3"`.
     pub doing: String,
-    /// The tile to blame: the only one asked for, or the one that the renderer names.
+    /// The tile to blame: the only one requested, or the one that the renderer names.
     pub tile: Option<usize>,
     /// What went wrong.
     pub cause: Box<SidecarCause>,
-    /// The end of what it said on standard error, at most 4 KiB; may be empty.
+    /// The end of its output on standard error, at most 4 KiB before control characters are escaped; may be
+    /// empty.
     pub last_words: String,
 }
 
@@ -34,8 +37,9 @@ impl SidecarError {
 
 /// What went wrong with a renderer in another process.
 #[derive(Debug, Error)]
+#[non_exhaustive]
 pub enum SidecarCause {
-    /// The scene, or the way to it, cannot be given to a renderer.
+    /// The scene cannot be passed to a renderer.
     #[error("{}: {why}", path.display())]
     Scene {
         /// The scene.
@@ -43,56 +47,64 @@ pub enum SidecarCause {
         /// What is wrong with it, and what to do.
         why: String,
     },
-    /// The scripts of the host could not be put into the cache folder.
+    /// The host scripts could not be written into the cache folder.
     #[error(transparent)]
     Setup(#[from] SetupError),
     /// The interpreter could not be started.
-    #[error("{} could not be started: {source}; `noisefloor doctor` says what is there", python.display())]
+    #[error(
+        "{} could not be started: {source}; run `noisefloor doctor` to see what is installed",
+        python.display()
+    )]
     Start {
         /// The Python interpreter.
         python: PathBuf,
         /// What the system said.
         source: io::Error,
     },
-    /// The process ended, or closed its stream, where a reply was due.
+    /// The process ended, or closed its stream, before it replied.
     #[error("its process ended{}", .status.map(|s| format!(" ({s})")).unwrap_or_default())]
     Died {
         /// How, if it is known.
         status: Option<ExitStatus>,
     },
     /// No reply in time. The process was killed.
-    #[error("no answer in {} s; allow more time with --timeout if it is slow and not stuck", limit.as_secs_f64())]
+    #[error(
+        "no answer in {} s; if it is slow but not stuck, allow more time with --timeout",
+        limit.as_secs_f64()
+    )]
     Silent {
         /// The time allowed.
         limit: Duration,
     },
-    /// A reply that is not what was asked for. The process was killed.
+    /// A reply that does not match the request. The process was killed.
     #[error("its answer is wrong: {what}")]
     Wrong {
         /// What is wrong with it.
         what: String,
     },
-    /// The renderer said that it cannot.
+    /// The renderer refused.
     #[error("{0}")]
     Refused(String),
-    /// No value of a tile is a finite number.
-    #[error("no value of the tile is a finite number; look for a broken material, texture or light there")]
-    NotFinite,
+    /// A batch cannot be the light of a scene.
+    #[error(transparent)]
+    Light(#[from] ImpossibleLight),
 }
 
 impl SidecarCause {
-    /// Whether a new process may do better: where the old one is gone or not to be trusted.
+    /// Whether a new process may succeed: the old one is gone or cannot be trusted.
     pub(crate) fn deserves_a_restart(&self) -> bool {
         matches!(self, Self::Died { .. } | Self::Silent { .. } | Self::Wrong { .. })
     }
 }
 
-/// Why a renderer could not be set up, or found.
+/// Why a renderer could not be installed or found.
 #[derive(Debug, Error)]
+#[non_exhaustive]
 pub enum SetupError {
-    /// Nobody has installed it.
+    /// It is not installed.
     #[error(
-        "{title} is not installed; `noisefloor doctor --install {name}` does it, or set {variable} to a Python that has it"
+        "{title} is not installed; run `noisefloor doctor --install {name}`, \
+         or set {variable} to a Python that has it"
     )]
     Missing {
         /// The renderer, for people.
@@ -102,7 +114,7 @@ pub enum SetupError {
         /// The environment variable that names another interpreter.
         variable: String,
     },
-    /// The interpreter is there and the renderer does not load in it.
+    /// The interpreter exists, but the renderer does not load in it.
     #[error("{title} does not load in {}: {why}", python.display())]
     Broken {
         /// The renderer, for people.
@@ -112,23 +124,26 @@ pub enum SetupError {
         /// What it said.
         why: String,
     },
-    /// There is no home, and so no cache folder.
-    #[error("there is no folder for caches: {0}; set HOME, or XDG_CACHE_HOME, to a folder")]
+    /// There is no home folder, and so no cache folder.
+    #[error("there is no cache folder: {0}; set HOME or XDG_CACHE_HOME to a folder")]
     NoCache(String),
     /// A file or folder could not be made.
-    #[error("{}: {source}; check permissions and free space, or set XDG_CACHE_HOME to another folder", path.display())]
+    #[error(
+        "{}: {source}; check permissions and free space, or set XDG_CACHE_HOME to another folder",
+        path.display()
+    )]
     Io {
         /// The file or folder.
         path: PathBuf,
         /// What the system said.
         source: io::Error,
     },
-    /// No interpreter of a version that the renderer has packages for.
-    #[error("{title} needs CPython {wanted}, found {found}; install one of them so that it is on the path")]
+    /// No interpreter of a version for which the renderer has packages.
+    #[error("{title} needs CPython {wanted}, found {found}; install one of these and put it on the path")]
     NoPython {
         /// The renderer, for people.
         title: &'static str,
-        /// Versions that will do: `3.11, 3.12`.
+        /// Suitable versions: `3.11 or 3.12`.
         wanted: String,
         /// What is on the path: `3.9.2`, or `none`.
         found: String,
@@ -145,7 +160,7 @@ pub enum SetupError {
     },
 }
 
-/// The last lines of what somebody said, as the end of a message.
+/// The last lines of a program's output, as the end of a message.
 fn quote(said: &str) -> String {
     const LINES: usize = 8;
     let lines: Vec<&str> = said.lines().map(str::trim_end).filter(|line| !line.is_empty()).collect();
@@ -153,8 +168,9 @@ fn quote(said: &str) -> String {
     if last.is_empty() { String::new() } else { format!("; its last words: {}", last.join("\n")) }
 }
 
-/// Why a command gave no samples.
+/// Why a command produced no samples.
 #[derive(Debug, Error)]
+#[non_exhaustive]
 pub enum CommandError {
     /// The template is not a command.
     #[error("the command {template:?}: {why}")]
@@ -164,11 +180,11 @@ pub enum CommandError {
         /// What is wrong with it, and what to do.
         why: String,
     },
-    /// The size of the picture is not known.
-    #[error("the size of the picture is not known: {0}; say it with --size")]
+    /// The size of the picture is unknown.
+    #[error("the size of the picture is unknown: {0}; give it with --size")]
     Size(String),
     /// No scratch folder.
-    #[error("{}: no folder for its pictures: {source}; set TMPDIR to a folder that you may write to", folder.display())]
+    #[error("{}: no folder for its pictures: {source}; set TMPDIR to a writable folder", folder.display())]
     Folder {
         /// The folder for temporary files.
         folder: PathBuf,
@@ -176,7 +192,7 @@ pub enum CommandError {
         source: io::Error,
     },
     /// The program could not be started.
-    #[error("{program}: cannot be started: {source}; check its name and the path")]
+    #[error("{program}: cannot be started: {source}; check its name and PATH")]
     Start {
         /// The program.
         program: String,
@@ -193,9 +209,10 @@ pub enum CommandError {
         /// The last lines of its output.
         said: String,
     },
-    /// The program left no picture, or several.
+    /// The program wrote no picture, or several.
     #[error(
-        "{command}: it left {found} where one picture is expected; write to {{out}}.exr or {{out}}.pfm; its last words: {said}"
+        "{command}: it wrote {found} where one picture is expected; write to {{out}}.exr or {{out}}.pfm; \
+         its last words: {said}"
     )]
     Output {
         /// The whole command.
@@ -205,16 +222,17 @@ pub enum CommandError {
         /// The last lines of its output.
         said: String,
     },
-    /// The picture has neither the size of the tile nor that of the whole.
+    /// The picture has neither the size of the tile nor that of the whole image.
     #[error(
-        "{command}: its picture has {got_width}×{got_height} pixels, neither {width}×{height} as asked for nor those of the whole image"
+        "{command}: its picture has {got_width}×{got_height} pixels, \
+         neither {width}×{height} as requested nor those of the whole image"
     )]
     Picture {
         /// The whole command.
         command: String,
-        /// Width asked for, in pixels.
+        /// Width requested, in pixels.
         width: usize,
-        /// Height asked for, in pixels.
+        /// Height requested, in pixels.
         height: usize,
         /// The picture's width in pixels.
         got_width: usize,
@@ -230,4 +248,7 @@ pub enum CommandError {
     /// The picture could not be read.
     #[error(transparent)]
     Read(#[from] PictureError),
+    /// The picture cannot be the light of a scene.
+    #[error(transparent)]
+    Light(#[from] ImpossibleLight),
 }

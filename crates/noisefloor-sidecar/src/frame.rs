@@ -24,7 +24,7 @@ pub(crate) enum FrameError {
     #[error(transparent)]
     Io(io::Error),
     /// A length is over its limit; nothing was allocated.
-    #[error("it announced a {part} of {bytes} bytes where at most {most} are right")]
+    #[error("it announced a {part} of {bytes} bytes where at most {most} are allowed")]
     Long { part: &'static str, bytes: usize, most: usize },
 }
 
@@ -37,7 +37,8 @@ pub(crate) fn write(to: &mut impl Write, header: &[u8]) -> io::Result<()> {
     to.flush()
 }
 
-/// Reads a frame with at most so many bytes of payload. Memory grows with what arrives, never with what is announced.
+/// Reads a frame with at most `most_payload` bytes of payload. Memory grows with what arrives, not with what
+/// is announced.
 pub(crate) fn read(from: &mut impl Read, most_payload: usize) -> Result<Frame, FrameError> {
     let prefix = exactly(from, 8)?;
     let length = |at: usize| {

@@ -1,55 +1,73 @@
 //! Renderers in processes of their own, as sources of samples.
 //!
-//! - [`Renderer`]: what an adapter crate says of its renderer: a host script, pinned packages, the Pythons it needs.
+//! - [`Renderer`]: what an adapter crate declares: a host script, pinned packages, supported Pythons.
 //! - [`install`], [`find`], [`probe`]: a private environment in the user's cache folder, in one step.
-//! - [`Sidecar`]: a running renderer as a [`noisefloor::ProgressiveSource`], with time-outs, one restart for a failure, and
-//!   errors that carry its last words.
+//! - [`Sidecar`]: a running renderer as a [`noisefloor::ProgressiveSource`], with time limits, one restart
+//!   per failure, and errors that carry its last words.
+//! - [`CommandSource`]: any program that renders into a file, run once per batch.
 //! - `host/host.py` ([`HOST`]): the other end, which host scripts import.
 //!
 //! Nothing here accumulates or judges, and nothing knows a renderer by name.
 //!
 //! ```no_run
-//! use noisefloor_sidecar::{Adapter, Job, Renderer, Sidecar, find};
+//! use noisefloor_sidecar::{HostOptions, Job, Renderer, Sidecar, find};
 //!
 //! const MINE: Renderer = Renderer {
 //!     name: "mine",
 //!     title: "My Renderer 1.0",
-//!     script: "import os, sys\nsys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))\nimport host\n…",
+//!     script: "…",
 //!     requirements: "mine==1.0 --hash=sha256:…",
 //!     pythons: &[12, 11],
 //!     probe: "import mine; print(mine.__version__)",
 //! };
 //! let python = find(&MINE)?;
-//! let source = Sidecar::open(&MINE, &python, &Job::new("hall.mine"), Adapter::default())?;
+//! let source = Sidecar::open(&MINE, &python, &Job::new("hall.mine"), HostOptions::default())?;
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
 //! # The wire
-//! The process is `python -I -u NAME_host.py`. A frame is two little-endian u32, the lengths of header and payload, then the header,
-//! a JSON object of at most 1 MiB, then the payload, little-endian f32 RGB, top row first. Requests have no payload; there is one
-//! reply to each, in order, `{"ok": false, "error": …, "tile": …}` where the renderer cannot.
+//! The process is `python -I -u NAME_host.py`. A frame is two little-endian u32, the lengths of header and
+//! payload; then the header, a JSON object of at most 1 MiB; then the payload, little-endian f32 RGB, top row
+//! first. Requests have no payload. There is one reply to each, in order; `{"ok": false, "error": …, "tile":
+//! …}` if the renderer refuses.
 //!
 //! | request | reply |
 //! |---|---|
-//! | `init`: `protocol` (1), `scene`, `seed`, `width`, `height`, `max_depth`, `threads` (or null), `options` | `name`, `width`, `height`, `unit`, `repeats`, `warnings` |
-//! | `sample`: `tiles`, each `index`, `x`, `y`, `width`, `height`, `first`, `samples` | `samples`, a number a tile; payload: the means of the new samples of each tile with any |
+//! | `init` | `name`, `width`, `height`, `unit`, `repeats`, `warnings` |
+//! | `sample` | `samples`; payload: the means of the new samples of each tile that has any |
 //! | `reference` | `reference` (true or false); payload: the whole image if true |
-//! | `quit` | and then the end |
+//! | `quit` | the process ends after its reply |
 //!
-//! The process ends when its standard input does, and on Linux also with the thread that started it, so that nothing is left behind
-//! even if the parent is killed.
+//! `init` has `protocol` (1), `scene`, `seed`, `width`, `height`, `max_depth`, `threads` (or null) and
+//! `options`. `sample` has `tiles`, each with `index`, `x`, `y`, `width`, `height`, `first` and `samples`;
+//! the reply's `samples` has a count for each, at most as many as requested.
+//!
+//! # What is left behind
+//! Nothing. A renderer leads a process group of its own, and the whole group is killed with it. It ends when
+//! its standard input does; on Linux also with the thread that started it, so that even killing the parent
+//! leaves nothing running. A program that calls [`std::process::exit`] calls [`end_all`] first.
 
+mod call;
 mod command;
 mod error;
 mod frame;
+mod group;
+mod launch;
+mod leftovers;
+mod light;
+mod message;
 mod process;
 mod renderer;
 mod run;
+mod scratch;
 mod setup;
 mod sidecar;
+mod template;
 
 pub use command::{CommandOptions, CommandSource};
 pub use error::{CommandError, SetupError, SidecarCause, SidecarError};
-pub use renderer::{DEFAULT_TIMEOUT, Job, Renderer};
+pub use leftovers::end_all;
+pub use light::ImpossibleLight;
+pub use renderer::{DEFAULT_TIMEOUT, HostOptions, Job, Renderer};
 pub use setup::{HOST, find, install, private_folder, probe};
-pub use sidecar::{Adapter, Sidecar};
+pub use sidecar::Sidecar;

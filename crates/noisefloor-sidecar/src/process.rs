@@ -1,11 +1,13 @@
-//! The process of a renderer: started, called with a time-out, and ended whatever it does.
+//! The process of a renderer: started, called with a time limit, and ended whatever it does.
 
 use crate::frame::{self, Frame, FrameError};
+use crate::group::Group;
+use noisefloor::printable;
 use std::collections::VecDeque;
 use std::ffi::OsString;
 use std::io::{self, BufReader, Read};
 use std::path::Path;
-use std::process::{Child, ChildStderr, Command, ExitStatus, Stdio};
+use std::process::{ChildStderr, Command, ExitStatus, Stdio};
 use std::sync::mpsc::{self, Receiver, RecvTimeoutError, Sender};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread;
@@ -13,17 +15,17 @@ use std::time::{Duration, Instant};
 
 /// How much of standard error is kept, in bytes.
 const TAIL: usize = 4096;
-/// How long a process that has ended its stream, or was told to quit, may take to be gone.
+/// How long a process that has closed its stream, or was told to quit, may take to exit.
 const GRACE: Duration = Duration::from_secs(2);
 
-/// Why a call gave no frame. The process is of no use any more.
+/// Why a call returned no frame. The process is of no further use.
 #[derive(Debug)]
 pub(crate) enum Failure {
     /// It ended, or closed its stream.
     Ended(Option<ExitStatus>),
     /// It did not answer in time.
     Silent,
-    /// What it sent is no frame.
+    /// What it sent is not a frame.
     Garbled(FrameError),
 }
 
@@ -36,8 +38,8 @@ struct Order {
 /// A running process that answers frames with frames.
 #[derive(Debug)]
 pub(crate) struct Process {
-    child: Child,
-    /// Closed before the process is reaped: that ends its standard input.
+    group: Group,
+    /// Closed before the process is reaped, which closes its standard input.
     orders: Option<Sender<Order>>,
     replies: Receiver<Result<Frame, FrameError>>,
     tail: Tail,
@@ -53,20 +55,20 @@ impl Process {
         command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
         let (orders, receive_orders) = mpsc::channel();
         let (send_replies, replies) = mpsc::channel();
-        let (send_child, child) = mpsc::channel();
-        // One thread starts the process, writes and reads. Linux ends the process with the thread that started it (host.py asks
-        // for that), and neither a full nor an empty pipe can hold up the caller.
+        let (send_group, group) = mpsc::channel();
+        // One thread starts the process, writes and reads. Linux ends the process with the thread that
+        // started it, and neither a full nor an empty pipe can block the caller.
         thread::Builder::new()
             .name("sidecar".into())
-            .spawn(move || converse(command, &send_child, &receive_orders, &send_replies))?;
+            .spawn(move || converse(command, &send_group, &receive_orders, &send_replies))?;
         let gone = || io::Error::other("the thread that was to start it ended");
-        let mut child: Child = child.recv().map_err(|_| gone())??;
-        let tail = child.stderr.take().map(Tail::follow).unwrap_or_default();
-        Ok(Self { child, orders: Some(orders), replies, tail, broken: false })
+        let mut group: Group = group.recv().map_err(|_| gone())??;
+        let tail = group.child().stderr.take().map(Tail::follow).unwrap_or_default();
+        Ok(Self { group, orders: Some(orders), replies, tail, broken: false })
     }
 
     pub(crate) fn id(&self) -> u32 {
-        self.child.id()
+        self.group.id()
     }
 
     /// Sends a request and waits for its reply.
@@ -90,7 +92,7 @@ impl Process {
         Err(failure)
     }
 
-    /// The last words on standard error; all of them once the process has ended.
+    /// Its last output on standard error, safe to print; complete once the process has ended.
     pub(crate) fn last_words(&mut self) -> String {
         if self.broken {
             self.end();
@@ -99,11 +101,11 @@ impl Process {
         self.tail.text()
     }
 
-    /// How it ended, if it does within the time.
+    /// How it ended, if it does so in time.
     fn wait(&mut self, limit: Duration) -> Option<ExitStatus> {
         let begun = Instant::now();
         loop {
-            match self.child.try_wait() {
+            match self.group.ended() {
                 Ok(Some(status)) => return Some(status),
                 Ok(None) if begun.elapsed() < limit => thread::sleep(Duration::from_millis(5)),
                 _ => return None,
@@ -111,18 +113,17 @@ impl Process {
         }
     }
 
-    /// Kills and reaps. Of a process that is gone already, both are no-ops.
+    /// Kills it, and all that it has started.
     fn end(&mut self) {
         self.orders = None;
-        // Only a process that is gone, or that the system does not let us kill, fails here.
-        let _ = self.child.kill();
-        let _ = self.child.wait();
+        self.group.end();
     }
 }
 
 impl Drop for Process {
     fn drop(&mut self) {
-        // A renderer that works is asked, so that it may clean up; one that does not listen is killed.
+        // A renderer that works is asked to quit, so that it can clean up; one that does not respond is
+        // killed
         if !self.broken && self.call(br#"{"op":"quit"}"#.to_vec(), 0, GRACE).is_ok() {
             self.wait(GRACE);
         }
@@ -132,20 +133,20 @@ impl Drop for Process {
 
 fn converse(
     mut command: Command,
-    send_child: &Sender<io::Result<Child>>,
+    send_group: &Sender<io::Result<Group>>,
     orders: &Receiver<Order>,
     replies: &Sender<Result<Frame, FrameError>>,
 ) {
-    let mut child = match command.spawn() {
-        Ok(child) => child,
+    let mut group = match Group::spawn(&mut command) {
+        Ok(group) => group,
         Err(error) => {
-            // Nobody waits for it if the caller is gone.
-            let _ = send_child.send(Err(error));
+            // If the caller is gone, nobody waits for it
+            let _ = send_group.send(Err(error));
             return;
         }
     };
-    let pipes = child.stdin.take().zip(child.stdout.take());
-    if send_child.send(Ok(child)).is_err() {
+    let pipes = group.child().stdin.take().zip(group.child().stdout.take());
+    if send_group.send(Ok(group)).is_err() {
         return;
     }
     let Some((mut stdin, stdout)) = pipes else { return };
@@ -161,7 +162,7 @@ fn converse(
     }
 }
 
-/// The end of what a process said on standard error.
+/// The end of a process's output on standard error.
 #[derive(Debug, Default)]
 struct Tail {
     bytes: Arc<Mutex<VecDeque<u8>>>,
@@ -189,20 +190,20 @@ impl Tail {
                 kept.drain(..old);
             }
         };
-        // Without a thread there are no last words, and nothing else is missing.
+        // Without a thread there are no last words; nothing else is lost
         let started = thread::Builder::new().name("sidecar stderr".into()).spawn(follow);
         Self { bytes, following: started.is_ok().then_some(following) }
     }
 
     fn wait(&self, limit: Duration) {
         if let Some(following) = &self.following {
-            // The sender never sends: this returns at the end of the stream, or when the time is over.
+            // The sender never sends: this returns at the end of the stream, or when time is up
             let _ = following.recv_timeout(limit);
         }
     }
 
     fn text(&self) -> String {
         let mut bytes = self.bytes.lock().unwrap_or_else(PoisonError::into_inner);
-        String::from_utf8_lossy(bytes.make_contiguous()).trim().to_owned()
+        printable(String::from_utf8_lossy(bytes.make_contiguous()).trim()).into_owned()
     }
 }

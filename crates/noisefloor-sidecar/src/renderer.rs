@@ -1,57 +1,75 @@
-//! What an adapter says of its renderer, and what a caller wants of it.
+//! What an adapter declares about its renderer, and what a caller asks of it.
 
+use std::collections::BTreeMap;
+use std::ffi::OsString;
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 use std::time::Duration;
 
-/// Time for one call, if the caller has no other wish: half an hour. Renderers are slow; processes that hang are rare.
+/// Default time limit for one call: half an hour. Renderers are slow; processes that hang are rare.
 pub const DEFAULT_TIMEOUT: Duration = Duration::from_secs(1800);
 
-/// What an adapter crate says of its renderer, as a constant.
+/// A renderer, as its adapter crate declares it in a constant.
 #[derive(Clone, Copy, Debug)]
 pub struct Renderer {
-    /// Short name, of files and options: `"mitsuba"`. Lower-case ASCII letters.
+    /// Short name for files and options, lower-case ASCII letters: `"mitsuba"`.
     pub name: &'static str,
-    /// Name for people, with the version that is installed: `"Mitsuba 3.9.1"`.
+    /// Display name with the installed version: `"Mitsuba 3.9.1"`.
     pub title: &'static str,
     /// The host script (see `host/host.py`); its file is called `NAME_host.py`.
     pub script: &'static str,
     /// Pinned packages with hashes, as `pip install --require-hashes` takes them.
     pub requirements: &'static str,
-    /// Minor versions of CPython 3 that those packages exist for, the best first: `&[12, 11]`.
+    /// Minor versions of CPython 3 that those packages support, best first: `&[12, 11]`.
     pub pythons: &'static [u8],
     /// Python statements that load the renderer and print its version.
     pub probe: &'static str,
 }
 
 impl Renderer {
-    /// The environment variable that names an interpreter to use instead of the private one: `NOISEFLOOR_MITSUBA_PYTHON`.
+    /// The environment variable for an interpreter to use instead of the private one:
+    /// `NOISEFLOOR_MITSUBA_PYTHON`.
     pub fn variable(&self) -> String {
         format!("NOISEFLOOR_{}_PYTHON", self.name.to_ascii_uppercase())
     }
 }
 
-/// What to render, and how: the same for every renderer.
+/// What to render and how, for any renderer. Made by [`Job::new`]; all fields can then be changed.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct Job {
-    /// The scene, in the renderer's own format.
+    /// The scene, in a format of the renderer. Its path must be Unicode.
     pub scene: PathBuf,
     /// Seed of the random numbers.
     pub seed: u64,
     /// Width and height in pixels; the scene's own if `None`.
     pub size: Option<(usize, usize)>,
-    /// Longest path, in segments: 1 is light seen directly, 2 is direct light; the scene's own if `None`.
+    /// Longest path, in segments: 1 is directly visible light, 2 is direct lighting; the scene's own if
+    /// `None`.
     pub max_depth: Option<u32>,
-    /// Threads; what the renderer thinks best if `None`.
+    /// Number of threads; the renderer's choice if `None`.
     pub threads: Option<NonZeroUsize>,
-    /// Time for one call, loading the scene included.
+    /// Time limit for one call, including the one that loads the scene.
     pub timeout: Duration,
 }
 
 impl Job {
-    /// A scene as it is, with seed 1 and [`DEFAULT_TIMEOUT`].
+    /// A scene with its own size and depth, seed 1 and [`DEFAULT_TIMEOUT`].
     pub fn new(scene: impl Into<PathBuf>) -> Self {
         let scene = scene.into();
         Self { scene, seed: 1, size: None, max_depth: None, threads: None, timeout: DEFAULT_TIMEOUT }
     }
+}
+
+/// What an adapter adds to a [`Job`].
+#[derive(Clone, Debug, Default)]
+#[non_exhaustive]
+pub struct HostOptions {
+    /// The `options` of the `init` request; their meaning is between the adapter and its host script.
+    pub options: BTreeMap<String, String>,
+    /// Environment variables of the process.
+    pub env: Vec<(String, OsString)>,
+    /// Warnings of the adapter, which precede the renderer's own in
+    /// [`Sidecar::warnings`](crate::Sidecar::warnings).
+    pub warnings: Vec<String>,
 }

@@ -1,22 +1,23 @@
-//! Short runs of a program whose output is wanted.
+//! Short runs of a program for its output.
 
+use noisefloor::printable;
 use std::io::{self, BufRead, BufReader, Read};
 use std::process::{Command, ExitStatus, Stdio};
 use std::sync::mpsc::{self, RecvTimeoutError, Sender};
 use std::thread;
 use std::time::{Duration, Instant};
 
-/// Longest line that is taken, in bytes; a longer one is cut into several.
+/// Longest line in bytes; a longer one is cut into several.
 const LINE: u64 = 4096;
-/// How often a silent program is looked at.
+/// How often a silent program is checked.
 const LOOK: Duration = Duration::from_millis(20);
 /// How long the streams of a program that has ended may stay open.
 const GRACE: Duration = Duration::from_secs(2);
 
-/// Runs a program to its end and hands over what it says, line by line, both streams together.
+/// Runs a program to its end and passes on its output, line by line and safe to print, both streams together.
 ///
 /// # Errors
-/// If it cannot be started, or takes longer than the limit (it is killed then).
+/// If it cannot be started, or takes longer than the limit; it is then killed.
 pub(crate) fn run(
     mut command: Command,
     limit: Duration,
@@ -32,7 +33,7 @@ pub(crate) fn run(
     }
     let begun = Instant::now();
     loop {
-        // What it said before it ended is in the channel, or about to be. A grandchild may hold the streams for ever.
+        // Its output is in the channel, or about to be. A grandchild may keep the streams open for ever
         let ended = child.try_wait()?;
         let silence = if ended.is_some() { GRACE } else { LOOK };
         let over = || begun.elapsed() > limit;
@@ -54,7 +55,7 @@ pub(crate) fn run(
         if over() {
             child.kill()?;
             child.wait()?;
-            let what = format!("no end after {} s", limit.as_secs());
+            let what = format!("not finished after {} s", limit.as_secs());
             return Err(io::Error::new(io::ErrorKind::TimedOut, what));
         }
     }
@@ -65,7 +66,7 @@ fn forward(stream: impl Read + Send + 'static, to: Sender<String>) {
         let mut stream = BufReader::new(stream);
         let mut line = Vec::new();
         while stream.by_ref().take(LINE).read_until(b'\n', &mut line).is_ok_and(|n| n > 0) {
-            let text = String::from_utf8_lossy(&line).trim_end().to_owned();
+            let text = printable(String::from_utf8_lossy(&line).trim_end()).into_owned();
             if to.send(text).is_err() {
                 return;
             }

@@ -1,4 +1,4 @@
-//! Setting renderers up: private environments in the user's cache folder, and the scripts of the hosts.
+//! Installing renderers: private environments in the user's cache folder, and the host scripts.
 
 use crate::error::SetupError;
 use crate::renderer::Renderer;
@@ -14,17 +14,17 @@ use std::time::Duration;
 /// The Python module that host scripts import, as `host.py` beside them.
 pub const HOST: &str = include_str!("../host/host.py");
 
-/// Time for the question which version an interpreter is.
+/// Time limit for asking an interpreter for its version.
 const VERSION_TIME: Duration = Duration::from_secs(30);
-/// Time for loading a renderer: Blender from a cold disk takes a minute.
+/// Time limit for loading a renderer: Blender from a cold disk takes a minute.
 const PROBE_TIME: Duration = Duration::from_secs(300);
-/// Time for one step of an installation: hundreds of megabytes over a slow line.
+/// Time limit for one step of an installation: hundreds of megabytes over a slow line.
 const STEP_TIME: Duration = Duration::from_secs(2 * 3600);
 /// Lines of a failed step that are shown.
 const SHOWN: usize = 20;
 
-/// The interpreter that has a renderer: the one that its variable names ([`Renderer::variable`]), else that of the private environment.
-/// Whether the renderer loads in it, [`probe`] says.
+/// The interpreter that has a renderer: the one that its variable names ([`Renderer::variable`]), otherwise
+/// that of the private environment. [`probe`] checks whether the renderer loads in it.
 ///
 /// # Errors
 /// [`SetupError::Missing`] if there is neither; [`SetupError::NoCache`].
@@ -40,10 +40,10 @@ pub fn find(renderer: &Renderer) -> Result<PathBuf, SetupError> {
     Err(SetupError::Missing { title, name, variable: renderer.variable() })
 }
 
-/// The version of a renderer as the interpreter has it. Loads the renderer, which takes seconds.
+/// The version of the renderer in an interpreter. Loads the renderer, which takes seconds.
 ///
 /// # Errors
-/// [`SetupError::Broken`] with what the interpreter said.
+/// [`SetupError::Broken`] with the interpreter's output.
 pub fn probe(renderer: &Renderer, python: &Path) -> Result<String, SetupError> {
     let mut said = Said::default();
     let outcome = run(isolated(python, ["-c", renderer.probe]), PROBE_TIME, |line| said.push(line));
@@ -55,7 +55,7 @@ pub fn probe(renderer: &Renderer, python: &Path) -> Result<String, SetupError> {
     Err(SetupError::Broken { title: renderer.title, python: python.to_owned(), why })
 }
 
-/// The folder of a renderer's private environment, whether it is there or not. Other requirements, another folder.
+/// The folder of a renderer's private environment, whether it exists or not. It depends on the requirements.
 ///
 /// # Errors
 /// [`SetupError::NoCache`].
@@ -63,16 +63,17 @@ pub fn private_folder(renderer: &Renderer) -> Result<PathBuf, SetupError> {
     Ok(cache()?.join(format!("{}-{}", renderer.name, digest(&[renderer.requirements]))))
 }
 
-/// Makes the private environment of a renderer, unless it is there and works: a virtual environment with the pinned packages. It is made under
-/// a temporary name and moved into place once the renderer loads in it; a second installation waits for the first. `progress` gets
-/// a line at a time, those of pip among them. Returns the interpreter.
+/// Installs a renderer into its private environment, unless it is there and works: a virtual environment with
+/// the pinned packages. The environment is made under a temporary name and moved into place once the renderer
+/// loads in it. A second installation waits for the first. `progress` receives lines of text, including those
+/// of pip. Returns the interpreter.
 ///
 /// # Errors
-/// [`SetupError`]: no interpreter of a version that will do, no space, no network, a package that is not what was pinned.
+/// [`SetupError`]: no suitable interpreter, no space, no network, a package that does not match its hash.
 pub fn install(renderer: &Renderer, mut progress: impl FnMut(&str)) -> Result<PathBuf, SetupError> {
     let folder = private_folder(renderer)?;
     if let Ok(version) = probe(renderer, &python_in(&folder)) {
-        progress(&format!("{} is there already (it says {version})", renderer.title));
+        progress(&format!("{} is already installed (version {version})", renderer.title));
         return Ok(python_in(&folder));
     }
     let base = interpreter(renderer)?;
@@ -82,51 +83,59 @@ pub fn install(renderer: &Renderer, mut progress: impl FnMut(&str)) -> Result<Pa
     // Unlocked when it is closed
     let alone = File::create(&lock).map_err(io(&lock))?;
     if alone.try_lock().is_err() {
-        progress("waiting for another installation to end");
+        progress("waiting for another installation to finish");
         alone.lock().map_err(io(&lock))?;
     }
-    // Another one may have done it meanwhile, and its environment may be in use.
+    // Another one may have finished it meanwhile, and its environment may be in use
     if python_in(&folder).is_file() && probe(renderer, &python_in(&folder)).is_ok() {
-        progress("another installation has done it");
+        progress("another installation has finished it");
         return Ok(python_in(&folder));
     }
 
-    // Whoever holds the lock may clear away what an installation that was killed has left.
+    // Whoever holds the lock may remove what a killed installation has left
     let partial = cache.join(format!("{}.partial", renderer.name));
     for old in [&partial, &folder] {
         if old.exists() {
             fs::remove_dir_all(old).map_err(io(old))?;
         }
     }
+    make_environment(renderer, &base, &partial, &mut progress)?;
+    let version = probe(renderer, &python_in(&partial))?;
+    fs::rename(&partial, &folder).map_err(io(&folder))?;
+    progress(&format!("{} {version} is installed in {}", renderer.title, folder.display()));
+    Ok(python_in(&folder))
+}
+
+/// A virtual environment with the pinned packages.
+fn make_environment(
+    renderer: &Renderer,
+    base: &Path,
+    folder: &Path,
+    progress: &mut impl FnMut(&str),
+) -> Result<(), SetupError> {
     let title = renderer.title;
-    let mut step = |what: &'static str, command: Command| {
+    let mut step = |step: &'static str, command: Command| {
         let mut said = Said::default();
         let outcome = run(command, STEP_TIME, |line| {
             said.push(line);
             progress(line);
         });
-        match outcome {
-            Ok(status) if status.success() => Ok(()),
-            Ok(status) => {
-                Err(SetupError::Step { title, step: what, said: format!("{}\n{status}", said.text()) })
-            }
-            Err(error) => Err(SetupError::Step { title, step: what, said: error.to_string() }),
-        }
+        let said = match outcome {
+            Ok(status) if status.success() => return Ok(()),
+            Ok(status) => format!("{}\n{status}", said.text()),
+            Err(error) => error.to_string(),
+        };
+        Err(SetupError::Step { title, step, said })
     };
-    let mut venv = isolated(&base, ["-m", "venv"]);
-    venv.arg(&partial);
+    let mut venv = isolated(base, ["-m", "venv"]);
+    venv.arg(folder);
     step("making a virtual environment (python -m venv)", venv)?;
-    let requirements = partial.join("requirements.txt");
+    let requirements = folder.join("requirements.txt");
     fs::write(&requirements, renderer.requirements).map_err(io(&requirements))?;
     let quiet = ["--disable-pip-version-check", "--no-input", "--progress-bar", "off"];
-    let mut pip = isolated(&python_in(&partial), ["-m", "pip", "install", "--require-hashes"]);
+    let mut pip = isolated(&python_in(folder), ["-m", "pip", "install", "--require-hashes"]);
     pip.args(["--only-binary", ":all:"]).args(quiet).arg("-r").arg(&requirements);
-    step("installing the packages (pip install)", pip)?;
-
-    let version = probe(renderer, &python_in(&partial))?;
-    fs::rename(&partial, &folder).map_err(io(&folder))?;
-    progress(&format!("{title} is there (it says {version}), in {}", folder.display()));
-    Ok(python_in(&folder))
+    step("installing the packages (pip install)", pip)
 }
 
 /// Puts the host script and `host.py` into the cache folder; the path of the script.
@@ -138,7 +147,7 @@ pub(crate) fn host_script(renderer: &Renderer) -> Result<PathBuf, SetupError> {
         if fs::read(path).is_ok_and(|there| there == text.as_bytes()) {
             continue;
         }
-        // Another process may be reading it: it appears whole.
+        // Another process may be reading it: it appears complete
         let mut new = tempfile::NamedTempFile::new_in(&folder).map_err(io(&folder))?;
         new.write_all(text.as_bytes()).map_err(io(path))?;
         new.persist(path).map_err(|e| io(path)(e.error))?;
@@ -146,7 +155,7 @@ pub(crate) fn host_script(renderer: &Renderer) -> Result<PathBuf, SetupError> {
     Ok(script)
 }
 
-/// An interpreter on the path of a version that will do, the best first.
+/// The first interpreter on the path with a suitable version, best versions first.
 fn interpreter(renderer: &Renderer) -> Result<PathBuf, SetupError> {
     let named = renderer.pythons.iter().map(|minor| format!("python3.{minor}"));
     let mut found = Vec::new();
@@ -163,7 +172,7 @@ fn interpreter(renderer: &Renderer) -> Result<PathBuf, SetupError> {
     Err(SetupError::NoPython { title: renderer.title, wanted: wanted.join(" or "), found })
 }
 
-/// `3.11.7`, if that is an interpreter that runs.
+/// `3.11.7`, if it is an interpreter that runs.
 fn version(python: &str) -> Option<String> {
     let mut said = Said::default();
     let question = "import platform; print(platform.python_version())";
@@ -190,7 +199,7 @@ fn cache() -> Result<PathBuf, SetupError> {
     Ok(strategy.cache_dir().join("noisefloor"))
 }
 
-/// A short name for these texts and no others.
+/// A short name that is unique to these texts.
 fn digest(texts: &[&str]) -> String {
     let mut hasher = blake3::Hasher::new();
     for text in texts {
@@ -205,7 +214,7 @@ fn io(path: &Path) -> impl FnOnce(std::io::Error) -> SetupError {
     move |source| SetupError::Io { path, source }
 }
 
-/// The last lines that a program said.
+/// The last lines of a program's output.
 #[derive(Default)]
 struct Said(VecDeque<String>);
 

@@ -1,46 +1,29 @@
 //! A renderer in another process as a source.
 
+use crate::call::{Blame, Reply, ask, batches, exactly, rgb};
 use crate::error::{SidecarCause, SidecarError};
-use crate::frame::MAX_HEADER;
-use crate::process::{Failure, Process};
-use crate::renderer::{Job, Renderer};
+use crate::launch::Launch;
+use crate::light::LightCheck;
+use crate::message::{Referenced, Sample, TileRequest};
+use crate::process::Process;
+use crate::renderer::{HostOptions, Job, Renderer};
 use crate::setup;
-use noisefloor::{
-    Batch, ProgressiveSource, Reference, Repeats, Request, Rgb, SourceError, SourceInfo, Unit, check_image,
-};
+use noisefloor::{Batch, ProgressiveSource, Reference, Request, SourceError, SourceInfo};
+use serde::Serialize;
 use serde::de::DeserializeOwned;
-use serde::{Deserialize, Serialize};
-use std::ffi::OsString;
-use std::path::{Path, PathBuf};
-use std::time::Duration;
+use std::path::Path;
 
-/// Version of the protocol.
-const PROTOCOL: u32 = 1;
 /// Most tiles named in one call: their names stay below the longest header.
 const CALL_TILES: usize = 4096;
-/// Most pixels in one call: a reply of 3 GiB, where lengths have 32 bits. One image at most has as many.
+/// Most pixels in one call: a reply of 3 GiB, where lengths have 32 bits. An image has no more.
 const CALL_PIXELS: usize = noisefloor::MAX_PIXELS;
-/// Bytes of a pixel on the wire.
-const PIXEL: usize = 12;
-/// Longest name that a renderer may give itself, in characters.
-const NAME: usize = 200;
-
-/// What an adapter adds to a [`Job`].
-#[derive(Clone, Debug, Default)]
-pub struct Adapter {
-    /// The `options` of `init`, a JSON object; what is in it is between the adapter and its host script.
-    pub options: serde_json::Map<String, serde_json::Value>,
-    /// Environment variables of the process.
-    pub env: Vec<(String, OsString)>,
-    /// Notes for people, said before the renderer's own [`Sidecar::warnings`].
-    pub warnings: Vec<String>,
-}
 
 /// A renderer in another process. Dropping it ends the process.
 ///
-/// A call that fails because the process ended, did not answer in time, or sent what was not asked for, is repeated once in a
-/// new process; all earlier batches stay valid. If it fails again, or if the renderer itself says that it cannot, the call is an
-/// error, and the next call tries again.
+/// A call that fails because the process ended, did not answer in time, or sent something else than requested
+/// is repeated once in a new process; all earlier batches stay valid. If it fails again, or if the renderer
+/// itself refuses, the call is an error, and the next call tries again. Batches of impossible light
+/// ([`ImpossibleLight`](crate::ImpossibleLight)) are errors, too.
 #[derive(Debug)]
 pub struct Sidecar {
     launch: Launch,
@@ -48,132 +31,57 @@ pub struct Sidecar {
     info: SourceInfo,
     warnings: Vec<String>,
     restarts: Vec<SidecarError>,
-}
-
-/// All that it takes to start the process, once more if need be.
-#[derive(Debug)]
-struct Launch {
-    title: String,
-    python: PathBuf,
-    script: PathBuf,
-    env: Vec<(String, OsString)>,
-    init: Vec<u8>,
-    loading: String,
-    timeout: Duration,
-}
-
-#[derive(Serialize)]
-struct Init<'a> {
-    op: &'static str,
-    protocol: u32,
-    scene: &'a str,
-    seed: u64,
-    width: Option<usize>,
-    height: Option<usize>,
-    max_depth: Option<u32>,
-    threads: Option<usize>,
-    options: &'a serde_json::Map<String, serde_json::Value>,
-}
-
-#[derive(Serialize)]
-struct Sample {
-    op: &'static str,
-    tiles: Vec<TileRequest>,
-}
-
-#[derive(Serialize)]
-struct TileRequest {
-    index: usize,
-    x: usize,
-    y: usize,
-    width: usize,
-    height: usize,
-    first: u64,
-    samples: u32,
-}
-
-/// What every reply says.
-#[derive(Deserialize)]
-struct Status {
-    ok: bool,
-    error: Option<String>,
-    tile: Option<usize>,
-}
-
-#[derive(Deserialize)]
-struct Hello {
-    name: String,
-    width: usize,
-    height: usize,
-    unit: Unit,
-    repeats: Repeats,
-    #[serde(default)]
-    warnings: Vec<String>,
-}
-
-#[derive(Deserialize)]
-struct Sampled {
-    samples: Vec<u32>,
-}
-
-#[derive(Deserialize)]
-struct Referenced {
-    reference: bool,
-}
-
-/// The tile to blame, where one is, and the cause.
-type Blame = (Option<usize>, SidecarCause);
-
-/// A reply whose header was read, and whose payload is not longer than it may be.
-struct Reply<T> {
-    header: T,
-    payload: Vec<u8>,
+    light: LightCheck,
 }
 
 impl Sidecar {
-    /// Starts a renderer with an interpreter that has it ([`find`](crate::find)), and has it load the scene.
+    /// Starts a renderer and loads the scene. `python` is an interpreter that has the renderer, see
+    /// [`find`](crate::find).
     ///
     /// # Errors
-    /// [`SidecarError`] if there is no such scene, the process does not start, or the renderer cannot load it.
+    /// [`SidecarError`] if the scene does not exist, the process does not start, or the renderer cannot load
+    /// the scene.
     pub fn open(
         renderer: &Renderer,
         python: &Path,
         job: &Job,
-        adapter: Adapter,
+        options: HostOptions,
     ) -> Result<Self, SidecarError> {
-        let launch = Launch::new(renderer, python, job, &adapter)
+        let launch = Launch::new(renderer, python, job, &options)
             .map_err(|cause| SidecarError::at_the_start(renderer, cause))?;
         let (process, info, said) = launch.start()?;
-        let warnings = adapter.warnings.into_iter().chain(said).collect();
-        Ok(Self { launch, process: Some(process), info, warnings, restarts: Vec::new() })
+        let warnings = options.warnings.into_iter().chain(said).collect();
+        let (process, restarts, light) = (Some(process), Vec::new(), LightCheck::default());
+        Ok(Self { launch, process, info, warnings, restarts, light })
     }
 
-    /// The same with the interpreter that [`find`](crate::find) finds.
+    /// As [`Sidecar::open`], with the interpreter that [`find`](crate::find) returns.
     ///
     /// # Errors
-    /// [`SidecarError`] if there is none, too.
-    pub fn start(renderer: &Renderer, job: &Job, adapter: Adapter) -> Result<Self, SidecarError> {
+    /// As [`Sidecar::open`], and if there is no interpreter.
+    pub fn start(renderer: &Renderer, job: &Job, options: HostOptions) -> Result<Self, SidecarError> {
         let python =
             setup::find(renderer).map_err(|error| SidecarError::at_the_start(renderer, error.into()))?;
-        Self::open(renderer, &python, job, adapter)
+        Self::open(renderer, &python, job, options)
     }
 
-    /// What the user should know: features of the scene that are ignored, a slower variant that had to do.
+    /// What the user should know, for example features of the scene that are ignored, or that a slower
+    /// variant is used.
     pub fn warnings(&self) -> &[String] {
         &self.warnings
     }
 
-    /// The failures that were mended by a new process, in order.
+    /// The failures that a new process overcame, in order.
     pub fn restarts(&self) -> &[SidecarError] {
         &self.restarts
     }
 
-    /// The number of its process, for whoever watches it; `None` between a failure and the next call.
+    /// Its process id, for monitoring; `None` between a failure and the next call.
     pub fn process_id(&self) -> Option<u32> {
         self.process.as_ref().map(Process::id)
     }
 
-    /// Does one call, and once more in a new process where that may help.
+    /// One call, repeated in a new process if that may help.
     fn call<T: DeserializeOwned, R>(
         &mut self,
         doing: &str,
@@ -232,7 +140,7 @@ impl Sidecar {
         }
     }
 
-    /// A new process that describes itself as the first one did.
+    /// A new process that describes itself exactly as the first one did.
     fn restart(&self) -> Result<Process, SidecarError> {
         let (mut process, info, _) = self.launch.start()?;
         if info == self.info {
@@ -256,7 +164,19 @@ impl Sidecar {
             [] => return Ok(Vec::new()),
         };
         let pixels = requests.iter().map(|r| r.tile.pixels()).sum();
-        self.call(&doing, requests, &request, pixels, |reply| batches(requests, reply))
+        let batches = self.call(&doing, requests, &request, pixels, |reply| batches(requests, reply))?;
+        for batch in &batches {
+            if let Err(cause) = self.light.check(batch) {
+                return Err(SidecarError {
+                    renderer: self.info.name.clone(),
+                    doing,
+                    tile: Some(batch.tile.index),
+                    cause: Box::new(cause.into()),
+                    last_words: self.process.as_mut().map(Process::last_words).unwrap_or_default(),
+                });
+            }
+        }
+        Ok(batches)
     }
 
     fn failed(&self, error: SidecarError) -> SourceError {
@@ -270,7 +190,7 @@ impl ProgressiveSource for Sidecar {
     }
 
     fn sample(&mut self, requests: &[Request]) -> Result<Vec<Batch>, SourceError> {
-        // As few calls as headers and payloads may be long.
+        // As few calls as the limits on headers and payloads allow
         let mut batches = Vec::with_capacity(requests.len());
         let mut rest = requests;
         while !rest.is_empty() {
@@ -297,125 +217,4 @@ impl ProgressiveSource for Sidecar {
         self.call("rendering the reference", &[], &request, width * height, read)
             .map_err(|error| self.failed(error))
     }
-}
-
-impl Launch {
-    fn new(renderer: &Renderer, python: &Path, job: &Job, adapter: &Adapter) -> Result<Self, SidecarCause> {
-        let scene = |why: String| SidecarCause::Scene { path: job.scene.clone(), why };
-        let path = std::path::absolute(&job.scene).map_err(|e| scene(e.to_string()))?;
-        if let Err(error) = std::fs::metadata(&path) {
-            return Err(scene(format!("cannot be read: {error}; check the path")));
-        }
-        let text = path.to_str().ok_or_else(|| scene("its name is not Unicode; rename it".to_owned()))?;
-        let init = Init {
-            op: "init",
-            protocol: PROTOCOL,
-            scene: text,
-            seed: job.seed,
-            width: job.size.map(|(width, _)| width),
-            height: job.size.map(|(_, height)| height),
-            max_depth: job.max_depth,
-            threads: job.threads.map(|n| n.get()),
-            options: &adapter.options,
-        };
-        let init = serde_json::to_vec(&init).map_err(|e| scene(e.to_string()))?;
-        if init.len() > MAX_HEADER {
-            return Err(scene("its path and the options are longer than 1 MiB; shorten them".to_owned()));
-        }
-        Ok(Self {
-            title: renderer.title.to_owned(),
-            python: python.to_owned(),
-            script: setup::host_script(renderer)?,
-            env: adapter.env.clone(),
-            init,
-            loading: format!("loading {}", job.scene.display()),
-            timeout: job.timeout,
-        })
-    }
-
-    /// A process that has loaded the scene, what it is, and what it warns of.
-    fn start(&self) -> Result<(Process, SourceInfo, Vec<String>), SidecarError> {
-        let start = |source| SidecarCause::Start { python: self.python.clone(), source };
-        let mut process = Process::start(&self.python, &self.script, &self.env)
-            .map_err(|error| self.error(start(error), String::new()))?;
-        let hello =
-            ask(&mut process, self.init.clone(), 0, self.timeout).and_then(|reply| describe(reply.header));
-        match hello {
-            Ok((info, warnings)) => Ok((process, info, warnings)),
-            Err((_, cause)) => Err(self.error(cause, process.last_words())),
-        }
-    }
-
-    fn error(&self, cause: SidecarCause, last_words: String) -> SidecarError {
-        let (renderer, doing) = (self.title.clone(), self.loading.clone());
-        SidecarError { renderer, doing, tile: None, cause: Box::new(cause), last_words }
-    }
-}
-
-/// A request and its reply, whose payload is at most so many pixels long.
-fn ask<T: DeserializeOwned>(
-    process: &mut Process,
-    header: Vec<u8>,
-    most_pixels: usize,
-    timeout: Duration,
-) -> Result<Reply<T>, Blame> {
-    let wrong = |what: String| (None, SidecarCause::Wrong { what });
-    let frame = process.call(header, most_pixels * PIXEL, timeout).map_err(|failure| match failure {
-        Failure::Ended(status) => (None, SidecarCause::Died { status }),
-        Failure::Silent => (None, SidecarCause::Silent { limit: timeout }),
-        Failure::Garbled(error) => wrong(error.to_string()),
-    })?;
-    let status: Status = serde_json::from_slice(&frame.header).map_err(|e| wrong(e.to_string()))?;
-    if !status.ok {
-        let said = status.error.unwrap_or_else(|| "it cannot, and does not say why".to_owned());
-        return Err((status.tile, SidecarCause::Refused(said)));
-    }
-    let header = serde_json::from_slice(&frame.header).map_err(|e| wrong(e.to_string()))?;
-    Ok(Reply { header, payload: frame.payload })
-}
-
-fn describe(hello: Hello) -> Result<(SourceInfo, Vec<String>), Blame> {
-    let Hello { name, width, height, unit, repeats, warnings } = hello;
-    let wrong = |what: String| (None, SidecarCause::Wrong { what });
-    check_image(width, height).map_err(|e| wrong(e.to_string()))?;
-    let name: String = name.chars().filter(|c| !c.is_control()).take(NAME).collect();
-    if name.trim().is_empty() {
-        return Err(wrong("it has no name".to_owned()));
-    }
-    Ok((SourceInfo { name, width, height, unit, aims: true, repeats }, warnings))
-}
-
-fn batches(
-    requests: &[Request],
-    Reply { header: Sampled { samples }, payload }: Reply<Sampled>,
-) -> Result<Vec<Batch>, Blame> {
-    if samples.len() != requests.len() {
-        let what = format!("{} numbers of samples for {} tiles", samples.len(), requests.len());
-        return Err((None, SidecarCause::Wrong { what }));
-    }
-    let given = || requests.iter().zip(samples.iter().copied());
-    exactly(&payload, given().map(|(r, n)| if n > 0 { r.tile.pixels() } else { 0 }).sum())?;
-    let mut pixels = rgb(&payload);
-    given()
-        .map(|(Request { tile, .. }, samples)| {
-            let mean: Vec<Rgb> = pixels.by_ref().take(if samples > 0 { tile.pixels() } else { 0 }).collect();
-            if samples > 0 && !mean.iter().flatten().any(|c| c.is_finite()) {
-                return Err((Some(tile.index), SidecarCause::NotFinite));
-            }
-            Ok(Batch { tile: *tile, samples, mean })
-        })
-        .collect()
-}
-
-fn exactly(payload: &[u8], pixels: usize) -> Result<(), Blame> {
-    if payload.len() == pixels * PIXEL {
-        return Ok(());
-    }
-    let what = format!("a payload of {} bytes where {} are right", payload.len(), pixels * PIXEL);
-    Err((None, SidecarCause::Wrong { what }))
-}
-
-fn rgb(payload: &[u8]) -> impl Iterator<Item = Rgb> {
-    let value = |bytes: &[u8]| f32::from_le_bytes(bytes.try_into().unwrap_or_default());
-    payload.chunks_exact(PIXEL).map(move |p| [value(&p[..4]), value(&p[4..8]), value(&p[8..])])
 }

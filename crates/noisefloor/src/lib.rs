@@ -44,6 +44,7 @@ mod session;
 mod source;
 mod stills;
 mod svm;
+mod text;
 mod tile;
 
 pub use checkpoint::{Checkpoint, CheckpointError};
@@ -66,6 +67,7 @@ pub use stills::{Held, Still, StillError};
 pub use svm::{Platt, Scaler, Svm};
 #[cfg(feature = "train")]
 pub use svm::{SvmParams, SvmTrainError, Weights, fit_platt, fit_svm, fit_weights, squared_distances};
+pub use text::printable;
 pub use tile::{
     DEFAULT_TILE, MAX_EDGE, MAX_PIXELS, MAX_TILE, MIN_TILE, Tile, TileError, TileGrid, check_image,
 };

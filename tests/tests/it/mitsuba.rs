@@ -12,7 +12,8 @@ const CORNELL_BOX: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../fixtures/corn
 const SIZE: (usize, usize) = (48, 40);
 
 fn open(scene: impl Into<PathBuf>, size: (usize, usize), variant: Variant) -> Sidecar {
-    let job = Job { seed: 7, size: Some(size), ..Job::new(scene) };
+    let mut job = Job::new(scene);
+    (job.seed, job.size) = (7, Some(size));
     open_as(&job, variant).unwrap_or_else(|e| panic!("{e}"))
 }
 
@@ -84,7 +85,8 @@ fn depth_and_size_are_those_asked_for() {
         return;
     }
     for variant in [Variant::Llvm, Variant::Scalar] {
-        let job = Job { size: Some((33, 31)), max_depth: Some(1), ..Job::new(CORNELL_BOX) };
+        let mut job = Job::new(CORNELL_BOX);
+        (job.size, job.max_depth) = (Some((33, 31)), Some(1));
         let mut source = open_as(&job, variant).unwrap();
         assert_eq!((source.info().width, source.info().height), (33, 31));
         let half = |index, y, height| Request {

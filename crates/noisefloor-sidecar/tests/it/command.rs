@@ -1,6 +1,7 @@
 use noisefloor::{ProgressiveSource, Request, SourceError, Tile, TileGrid};
 use noisefloor_sidecar::{CommandError, CommandOptions, CommandSource};
 use std::collections::HashSet;
+use std::error::Error;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Duration;
@@ -20,7 +21,9 @@ fn python() -> Option<&'static str> {
 }
 
 fn options(scene: Option<&str>) -> CommandOptions {
-    CommandOptions { scene: scene.map(PathBuf::from), seed: 1, size: None, timeout: Duration::from_secs(60) }
+    let mut options = CommandOptions::default();
+    (options.scene, options.timeout) = (scene.map(PathBuf::from), Duration::from_secs(60));
+    options
 }
 
 /// A command with all it needs, and the log of its runs.
@@ -44,7 +47,8 @@ fn expected(tile: &Tile, samples: u32) -> Vec<[f32; 3]> {
     rows.flat_map(|y| (tile.x..tile.x + tile.width).map(move |x| pixel(x, y))).collect()
 }
 
-/// Tile by tile, whether the command leaves the tile or the whole; the size is found out where the whole tells it.
+/// Tile by tile, whether the command leaves the tile or the whole; the size is found out where the whole
+/// tells it.
 #[test]
 fn a_command_that_aims_renders_tiles() {
     let Some(python) = python() else { return };
@@ -53,7 +57,9 @@ fn a_command_that_aims_renders_tiles() {
         let more = format!("x0={{x0}} x1={{x1}} y0={{y0}} y1={{y1}} how={how}");
         let size = (how == "tile").then_some(SIZE);
         let command = template(python, folder.path(), &more);
-        let mut source = CommandSource::new(&command, CommandOptions { size, ..options(None) }).unwrap();
+        let mut options = options(None);
+        options.size = size;
+        let mut source = CommandSource::new(&command, options).unwrap();
         let info = source.info();
         assert_eq!((info.width, info.height, info.aims), (SIZE.0, SIZE.1, true));
         let requests = [(tile(4, 3, 5, 7, 6), 9), (tile(0, 0, 0, 20, 12), 2), (tile(4, 3, 5, 7, 6), 9)]
@@ -96,7 +102,7 @@ fn templates_that_cannot_work_are_refused() {
         ("render {spp} {out}", "{seed} is missing"),
         ("render {seed} {out}", "{spp} is missing"),
         ("render {seed} {spp} {out} {x0} {y0} {y1}", "{x1} is missing"),
-        ("render {seed} {spp} {out} {threads}", "{threads} is no placeholder"),
+        ("render {seed} {spp} {out} {threads}", "{threads} is not a placeholder"),
         ("render {seed} {spp} {out} {scene}", "no scene is given"),
         ("render {seed} {spp} {out} {width}", "--size"),
         ("render {seed} {spp} {out} {x0} {x1} {y0} {y1} {height}", "--size"),
@@ -105,7 +111,7 @@ fn templates_that_cannot_work_are_refused() {
         assert!(error.contains(words), "{template}: {error}");
     }
     let error = CommandSource::new("render {seed} {spp} {out}", options(Some("a.scene"))).unwrap_err();
-    assert!(error.to_string().contains("{scene} is not in it"), "{error}");
+    assert!(error.to_string().contains("it does not contain {scene}"), "{error}");
     let error = CommandSource::new("/no/such/program {seed} {spp} {out}", options(None)).unwrap_err();
     assert!(matches!(&error, CommandError::Start { program, .. } if program == "/no/such/program"));
 }
@@ -116,19 +122,45 @@ fn failures_are_told_with_the_last_words() {
     let folder = tempfile::tempdir().unwrap();
     for (how, words) in [
         ("fail", "exit status: 3; its last words: no lamp in hall scene.xml"),
-        ("hang", "no end after 1 s"),
-        ("nothing", "it left no file"),
+        ("hang", "not finished after 1 s"),
+        ("nothing", "it wrote no file"),
         ("two", "picture.pfm.bak"),
-        ("larger", "its picture has 5×4 pixels, neither 4×4 as asked for"),
+        ("larger", "its picture has 5×4 pixels, neither 4×4 as requested"),
         ("garbage", "is something else"),
     ] {
         let more = format!("x0={{x0}} x1={{x1}} y0={{y0}} y1={{y1}} scene={{scene}} how={how}");
         let timeout = Duration::from_secs(if how == "hang" { 1 } else { 60 });
-        let options = CommandOptions { size: Some(SIZE), timeout, ..options(Some("hall scene.xml")) };
+        let mut options = options(Some("hall scene.xml"));
+        (options.size, options.timeout) = (Some(SIZE), timeout);
         let mut source = CommandSource::new(&template(python, folder.path(), &more), options).unwrap();
         let tile = tile(2, 4, 4, 4, 4);
         let error = source.sample(&[Request { tile, first: 0, samples: 1 }]).unwrap_err();
         let SourceError::Failed { tile: Some(2), cause, .. } = &error else { panic!("{error:?}") };
         assert!(cause.to_string().contains(words), "{how}: {cause}");
     }
+}
+
+/// What a command starts ends with it; a scene may have any file name; what it prints is made safe.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_command_leaves_nothing_and_takes_any_name() {
+    use std::os::unix::ffi::OsStrExt;
+    let Some(python) = python() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let scene = folder.path().join(std::ffi::OsStr::from_bytes(b"hall\xff.xml"));
+    std::fs::write(&scene, "a scene").unwrap();
+    let more = "x0={x0} x1={x1} y0={y0} y1={y1} exists={scene} how=fork";
+    let mut options = options(None);
+    (options.scene, options.size) = (Some(scene), Some(SIZE));
+    let mut source = CommandSource::new(&template(python, folder.path(), more), options.clone()).unwrap();
+    source.sample(&[Request { tile: tile(0, 0, 0, 4, 4), first: 0, samples: 1 }]).unwrap();
+    let pid = std::fs::read_to_string(folder.path().join("log.fork")).unwrap();
+    let pid = pid.parse().unwrap();
+    assert!(crate::life::gone_within(pid, Duration::from_secs(10)), "process {pid} is left behind");
+
+    let more = "x0={x0} x1={x1} y0={y0} y1={y1} exists={scene} how=paint";
+    let mut source = CommandSource::new(&template(python, folder.path(), more), options).unwrap();
+    let error = source.sample(&[Request { tile: tile(0, 0, 0, 4, 4), first: 0, samples: 1 }]).unwrap_err();
+    let said = error.source().unwrap().to_string();
+    assert!(said.contains("\\u{1b}]0;owned\\u{7}") && !said.contains('\x1b'), "{said:?}");
 }

@@ -1,6 +1,6 @@
 use crate::kit::{Fake, expected, requests, tiles};
 use noisefloor::{ProgressiveSource, Request, SourceError};
-use noisefloor_sidecar::{SidecarCause, SidecarError};
+use noisefloor_sidecar::{ImpossibleLight, SidecarCause, SidecarError};
 use std::error::Error;
 use std::time::{Duration, Instant};
 
@@ -16,8 +16,8 @@ fn cause(error: &SourceError) -> &SidecarError {
     error.source().unwrap().downcast_ref().unwrap()
 }
 
-/// Every way to break a process or its stream ends in an error within the time, names the renderer and what it was at, and a new
-/// process has been tried.
+/// Every way to break a process or its stream ends in an error within the time, names the renderer and what
+/// it was at, and a new process has been tried.
 #[test]
 fn a_process_that_fails_again_and_again_is_an_error() {
     let wrong = [
@@ -28,8 +28,9 @@ fn a_process_that_fails_again_and_again_is_an_error() {
         ("send a list", "invalid"),
         ("nest deeply", "EOF while parsing"),
         ("send strange counts", "expected u32"),
-        ("send too few counts", "1 numbers of samples for 4 tiles"),
+        ("send too few counts", "1 sample counts for 4 tiles"),
         ("send no counts", "missing field `samples`"),
+        ("claim many samples", "4294967295 samples where 1 were requested"),
     ];
     for (how, words) in wrong {
         let Some(fake) = Fake::new(how) else { return };
@@ -74,7 +75,8 @@ fn a_hanging_process_costs_the_time_allowed_twice() {
     assert!(begun.elapsed() < Duration::from_secs(30), "{:?}", begun.elapsed());
 }
 
-/// One restart costs the batch in flight, and not its samples: they are those that the first process would have sent.
+/// One restart costs the batch in flight, and not its samples: they are those that the first process would
+/// have sent.
 #[test]
 fn one_failure_is_mended_by_a_new_process() {
     let ways = ["die", "crash", "send no JSON", "announce a long payload", "close standard output"];
@@ -140,7 +142,9 @@ fn a_tile_of_nothing_finite_is_an_error_a_pixel_is_not() {
     let Some(fake) = Fake::new("send NaN") else { return };
     let fake = fake.once();
     let (error, mut source) = failure(&fake);
-    assert!(matches!(*cause(&error).cause, SidecarCause::NotFinite) && cause(&error).tile == Some(1));
+    let light = ImpossibleLight::NotFinite { percent: 100.0 };
+    assert!(matches!(*cause(&error).cause, SidecarCause::Light(said) if said == light));
+    assert_eq!(cause(&error).tile, Some(1));
     assert!(source.sample(&requests(2, 1)).is_ok());
 
     let Some(fake) = Fake::new("send some NaN") else { return };
@@ -149,6 +153,39 @@ fn a_tile_of_nothing_finite_is_an_error_a_pixel_is_not() {
     let mean = source.sample(&requests(1, 1)).unwrap().remove(1).mean;
     assert_eq!(mean.iter().flatten().filter(|c| c.is_nan()).count(), 1);
     assert!(mean[1][2].is_nan());
+}
+
+/// Well-formed batches that cannot be light are errors of their tile, with no restart: a new process would
+/// send the same.
+#[test]
+fn impossible_light_is_an_error() {
+    for (how, words) in [
+        ("send mostly NaN", "83 % of the tile's pixels are not finite"),
+        ("send negative light", "mean luminance is negative (-1.4"),
+    ] {
+        let Some(fake) = Fake::new(how) else { return };
+        let (error, source) = failure(&fake);
+        let cause = cause(&error);
+        assert!(matches!(*cause.cause, SidecarCause::Light(_)) && cause.tile == Some(1), "{how}: {cause:?}");
+        assert!(cause.to_string().contains(words), "{how}: {cause}");
+        assert!(source.restarts().is_empty() && fake.pids().len() == 1, "{how}");
+    }
+}
+
+/// What a renderer writes reaches terminals: names, warnings, refusals and last words carry no escapes.
+#[test]
+fn nothing_from_outside_moves_the_cursor() {
+    let Some(fake) = Fake::new("paint") else { return };
+    let (error, source) = failure(&fake);
+    let cause = cause(&error);
+    let said = format!("{error} {cause} {} {}", cause.last_words, source.info().name);
+    assert!(said.contains("no memory\\u{1b}[2J for") && said.contains("\\u{1b}]0;owned"), "{said}");
+    assert!(!said.contains(|c: char| c.is_control() && c != '\n'), "{said:?}");
+    assert!(source.warnings()[0].contains("\\u{202e}"), "{:?}", source.warnings());
+
+    let Some(fake) = Fake::new("paint the unit") else { return };
+    let said = fake.open().unwrap_err().to_string();
+    assert!(said.contains("unknown variant") && !said.contains('\x1b'), "{said:?}");
 }
 
 /// Whatever a renderer prints, and whoever reads standard input, the stream of frames is not theirs.

@@ -56,6 +56,18 @@ class Fake:
                 file.write("%d\n" % os.getpid())
                 file.seek(0)
                 starts = len(file.readlines())
+        if self.options.get("how") == "paint":
+            self.info["name"] = "Fake\x1b[31m 1"
+            self.info["warnings"] = ["right to left: \u202e"]
+        if self.told("paint the unit"):
+            self.info["unit"] = "\x1b[2J"
+        if self.options.get("fork") == "yes":
+            if os.fork() == 0:
+                with open(self.options["pids"], "a") as file:
+                    file.write("%d\n" % os.getpid())
+                for descriptor in range(3):
+                    os.close(descriptor)
+                time.sleep(1000)
         if self.told("refuse the scene"):
             raise ValueError("no such lamp")
         if self.told("die at once"):
@@ -98,6 +110,13 @@ class Fake:
                     mean = array.array("f", [float("nan"), float("inf"), float("-inf")] * (len(mean) // 3))
                 if self.told("send some NaN"):
                     mean[5] = float("nan")
+                if self.told("send mostly NaN"):
+                    for pixel in range(len(mean) // 3):
+                        if pixel % 6 != 0:
+                            mean[3 * pixel] = float("nan")
+                if self.told("send negative light"):
+                    for at in range(0, len(mean), 7):
+                        mean[at] = -1e6
                 if self.told("send too little"):
                     mean = mean[3:]
                 if self.told("be exhausted"):
@@ -123,6 +142,9 @@ class Fake:
             os.abort()
         if self.told("hang"):
             time.sleep(1000)
+        if self.told("paint"):
+            sys.stderr.write("\x1b]0;owned\x07")
+            raise host.TileError(2, "no memory\x1b[2J for textures")
         if self.told("refuse"):
             raise host.TileError(2, "no memory for textures")
         if self.told("close standard output"):
@@ -144,6 +166,8 @@ class Fake:
             send(json.dumps({"ok": True, "samples": [-1, 1e99, 3, 4]}).encode())
         if self.told("send too few counts"):
             send(json.dumps({"ok": True, "samples": [0]}).encode())
+        if self.told("claim many samples"):
+            send(json.dumps({"ok": True, "samples": [1, 1, 1, 0xFFFFFFFF]}).encode())
         if self.told("send no counts"):
             send(json.dumps({"ok": True}).encode())
         if self.told("stop in the middle"):

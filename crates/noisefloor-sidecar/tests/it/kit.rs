@@ -1,6 +1,6 @@
 use noisefloor::{Request, Rgb, Tile, TileGrid};
-use noisefloor_sidecar::{Adapter, Job, Renderer, Sidecar, SidecarError};
-use serde_json::{Map, Value, json};
+use noisefloor_sidecar::{HostOptions, Job, Renderer, Sidecar, SidecarError};
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Duration;
@@ -32,7 +32,7 @@ pub(crate) fn python() -> Option<PathBuf> {
 pub(crate) struct Fake {
     python: PathBuf,
     pub(crate) folder: TempDir,
-    pub(crate) options: Map<String, Value>,
+    pub(crate) options: BTreeMap<String, String>,
     pub(crate) job: Job,
 }
 
@@ -43,22 +43,23 @@ impl Fake {
         let folder = tempfile::tempdir().unwrap();
         let scene = folder.path().join("scene π.fake");
         std::fs::write(&scene, "lamps").unwrap();
-        let mut options = Map::new();
-        options.insert("how".into(), json!(how));
-        options.insert("pids".into(), json!(folder.path().join("pids")));
-        let job = Job { timeout: Duration::from_secs(60), seed: 5, ..Job::new(scene) };
+        let pids = folder.path().join("pids").display().to_string();
+        let options = BTreeMap::from([("how".to_owned(), how.to_owned()), ("pids".to_owned(), pids)]);
+        let mut job = Job::new(scene);
+        (job.timeout, job.seed) = (Duration::from_secs(60), 5);
         Some(Self { python, folder, options, job })
     }
 
     /// It misbehaves in one process, and in no other.
     pub(crate) fn once(mut self) -> Self {
-        self.options.insert("once".into(), json!(self.folder.path().join("once")));
+        self.options.insert("once".to_owned(), self.folder.path().join("once").display().to_string());
         self
     }
 
     pub(crate) fn open(&self) -> Result<Sidecar, SidecarError> {
-        let adapter = Adapter { options: self.options.clone(), ..Adapter::default() };
-        Sidecar::open(&FAKE, &self.python, &self.job, adapter)
+        let mut options = HostOptions::default();
+        options.options = self.options.clone();
+        Sidecar::open(&FAKE, &self.python, &self.job, options)
     }
 
     /// Process numbers of all processes so far.

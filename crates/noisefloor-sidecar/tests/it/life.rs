@@ -3,8 +3,8 @@
 
 use crate::kit::{Fake, pids, requests};
 use noisefloor::ProgressiveSource;
-use serde_json::json;
-use std::process::{Command, Stdio};
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
 fn alive(pid: u32) -> bool {
@@ -13,7 +13,7 @@ fn alive(pid: u32) -> bool {
     stat.rsplit_once(')').is_some_and(|(_, rest)| !rest.trim_start().starts_with(['Z', 'X']))
 }
 
-fn gone_within(pid: u32, limit: Duration) -> bool {
+pub(crate) fn gone_within(pid: u32, limit: Duration) -> bool {
     let begun = Instant::now();
     while alive(pid) && begun.elapsed() < limit {
         std::thread::sleep(Duration::from_millis(10));
@@ -37,45 +37,96 @@ fn no_process_outlives_its_source() {
     }
 }
 
+/// A renderer that forks: its children end with it, whichever way it ends.
+#[test]
+fn no_child_of_a_renderer_outlives_its_source() {
+    for how in ["work", "hang", "die", "ignore the end"] {
+        let Some(mut fake) = Fake::new(how) else { return };
+        fake.options.insert("fork".to_owned(), "yes".to_owned());
+        fake.job.timeout = Duration::from_secs(2);
+        let mut source = fake.open().unwrap();
+        let _ = source.sample(&requests(1, 1));
+        let pids = two_pids(&fake.folder.path().join("pids"));
+        drop(source);
+        assert!(pids.len() >= 2, "{how}: {pids:?}");
+        assert!(pids.into_iter().all(|pid| gone_within(pid, Duration::from_secs(5))), "{how}");
+    }
+}
+
+/// The renderer's number and that of its child, which comes a little later.
+fn two_pids(file: &Path) -> Vec<u32> {
+    let begun = Instant::now();
+    while pids(file).len() < 2 && begun.elapsed() < Duration::from_secs(30) {
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    pids(file)
+}
+
 /// Run by the test below in a process of its own, which is killed.
 #[test]
 fn the_parent_that_is_killed() {
     let Ok(how) = std::env::var("SIDECAR_TEST_PARENT") else { return };
     let Some(mut fake) = Fake::new(&how) else { return };
     let pids = std::env::var("SIDECAR_TEST_PIDS").unwrap();
-    fake.options.insert("pids".into(), json!(pids));
+    fake.options.insert("pids".to_owned(), pids.clone());
+    fake.options.insert("fork".to_owned(), "yes".to_owned());
     let mut source = fake.open().unwrap();
     source.sample(&requests(0, 1)).unwrap();
+    two_pids(Path::new(&pids));
     std::fs::write(format!("{pids}.ready"), "").unwrap();
+    if std::env::var_os("SIDECAR_TEST_EXIT").is_some() {
+        noisefloor_sidecar::end_all();
+        std::process::exit(1);
+    }
     // Busy for a long time, or idle for one
     let _ = source.sample(&requests(1, 1));
     std::thread::sleep(Duration::from_secs(1000));
+}
+
+/// The parent in a process of its own, once its renderer and the renderer's child run.
+fn parent(how: &str, folder: &Path, exits: bool) -> (Child, Vec<u32>) {
+    let file = folder.join("child pids");
+    let mut command = Command::new(std::env::current_exe().unwrap());
+    command.args(["--exact", "life::the_parent_that_is_killed"]).stdout(Stdio::null());
+    command.env("SIDECAR_TEST_PARENT", how).env("SIDECAR_TEST_PIDS", &file);
+    if exits {
+        command.env("SIDECAR_TEST_EXIT", "1");
+    }
+    let parent = command.spawn().unwrap();
+    let ready = folder.join("child pids.ready");
+    let begun = Instant::now();
+    while !ready.exists() && begun.elapsed() < Duration::from_secs(60) {
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    let pids = pids(&file);
+    assert!(pids.len() == 2, "{how}: {pids:?}");
+    (parent, pids)
 }
 
 #[test]
 fn no_process_outlives_a_killed_parent() {
     for how in ["work", "hang", "ignore the end"] {
         let Some(fake) = Fake::new("work") else { return };
-        let file = fake.folder.path().join("child pids");
-        let mut parent = Command::new(std::env::current_exe().unwrap())
-            .args(["--exact", "life::the_parent_that_is_killed"])
-            .env("SIDECAR_TEST_PARENT", how)
-            .env("SIDECAR_TEST_PIDS", &file)
-            .stdout(Stdio::null())
-            .spawn()
-            .unwrap();
-        let ready = fake.folder.path().join("child pids.ready");
-        let begun = Instant::now();
-        while !ready.exists() && begun.elapsed() < Duration::from_secs(60) {
-            std::thread::sleep(Duration::from_millis(10));
-        }
+        let (mut parent, pids) = parent(how, fake.folder.path(), false);
         std::thread::sleep(Duration::from_millis(200));
-        let pid = pids(&file)[0];
-        assert!(alive(pid), "{how}");
+        assert!(pids.iter().all(|&pid| alive(pid)), "{how}");
         // SIGKILL
         parent.kill().unwrap();
         parent.wait().unwrap();
-        assert!(gone_within(pid, Duration::from_secs(10)), "{how}: process {pid} is left behind");
+        for pid in pids {
+            assert!(gone_within(pid, Duration::from_secs(10)), "{how}: process {pid} is left behind");
+        }
+    }
+}
+
+/// `exit` runs no destructor, as after a second Ctrl-C.
+#[test]
+fn no_process_outlives_an_exit_after_end_all() {
+    let Some(fake) = Fake::new("work") else { return };
+    let (mut parent, pids) = parent("ignore the end", fake.folder.path(), true);
+    assert_eq!(parent.wait().unwrap().code(), Some(1));
+    for pid in pids {
+        assert!(gone_within(pid, Duration::from_secs(10)), "process {pid} is left behind");
     }
 }
 

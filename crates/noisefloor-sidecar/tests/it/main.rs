@@ -1,4 +1,5 @@
-//! A renderer written in Python over `host.py` that can be told to misbehave. Without Python these tests are skipped, aloud.
+//! A renderer written in Python over `host.py` that can be told to misbehave. Without Python these tests are
+//! skipped, aloud.
 #![allow(clippy::unwrap_used, reason = "a panic in a test is how a test fails")]
 
 mod command;

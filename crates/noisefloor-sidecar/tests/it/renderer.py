@@ -16,6 +16,16 @@ if keys.get("how") == "larger":
 if keys.get("how") == "fail":
     print("no lamp in", keys["scene"])
     sys.exit(3)
+if "exists" in keys:
+    open(keys["exists"]).close()
+if keys.get("how") == "paint":
+    sys.exit("\x1b]0;owned\x07")
+if keys.get("how") == "fork":
+    child = os.fork()
+    if child == 0:
+        time.sleep(1000)
+    with open(keys["log"] + ".fork", "w") as file:
+        file.write(str(child))
 if keys.get("how") == "hang":
     time.sleep(1000)
 with open(keys["log"], "a") as log:

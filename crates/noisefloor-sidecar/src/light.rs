@@ -1,0 +1,104 @@
+//! Light that cannot be: what a broken renderer sends in a well-formed batch.
+
+use noisefloor::{Batch, luminance};
+use thiserror::Error;
+
+/// Share of a tile's pixels that may be non-finite. The film keeps single ones out, and the report counts
+/// them.
+const MOST_NON_FINITE: f64 = 0.5;
+/// How far below zero the mean luminance of a tile may be by rounding, relative to the brightest pixel so
+/// far.
+const ROUNDING: f64 = 1e-3;
+
+/// Why a batch cannot be the light of a scene.
+#[derive(Clone, Copy, Debug, Error, PartialEq)]
+#[non_exhaustive]
+pub enum ImpossibleLight {
+    /// Most pixels of a tile have a channel that is infinite or not a number.
+    #[error(
+        "{percent:.0} % of the tile's pixels are not finite; \
+         look for a broken material, texture or light there"
+    )]
+    NotFinite {
+        /// Share of the tile's pixels, in per cent.
+        percent: f64,
+    },
+    /// The mean luminance of a tile is negative.
+    #[error(
+        "the tile's mean luminance is negative ({mean:.3e}); look for a broken material or light there, \
+         or a filter with negative lobes"
+    )]
+    Negative {
+        /// Mean luminance of the tile's finite pixels.
+        mean: f64,
+    },
+}
+
+/// Looks at all batches of one source.
+///
+/// Single channels may be negative: colours outside Rec.709 are. Luminance is not, but for rounding, whose
+/// scale is that of the brightest pixel seen.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct LightCheck {
+    brightest: f64,
+}
+
+impl LightCheck {
+    pub(crate) fn check(&mut self, batch: &Batch) -> Result<(), ImpossibleLight> {
+        let (mut sum, mut finite) = (0.0, 0usize);
+        for pixel in &batch.mean {
+            if pixel.iter().all(|channel| channel.is_finite()) {
+                let light = f64::from(luminance(*pixel));
+                (sum, finite) = (sum + light, finite + 1);
+                self.brightest = self.brightest.max(light);
+            }
+        }
+        let lost = (batch.mean.len() - finite) as f64 / batch.mean.len().max(1) as f64;
+        if lost > MOST_NON_FINITE {
+            return Err(ImpossibleLight::NotFinite { percent: 100.0 * lost });
+        }
+        let mean = sum / finite.max(1) as f64;
+        if mean < -ROUNDING * self.brightest - f64::from(f32::EPSILON) {
+            return Err(ImpossibleLight::Negative { mean });
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use noisefloor::{Rgb, Tile};
+
+    fn check(before: f32, value: impl Fn(usize) -> Rgb) -> Result<(), ImpossibleLight> {
+        let tile = Tile { index: 0, x: 0, y: 0, width: 10, height: 10 };
+        let batch = |mean: Vec<Rgb>| Batch { tile, samples: 1, mean };
+        let mut light = LightCheck::default();
+        light.check(&batch(vec![[before; 3]; 100])).unwrap();
+        light.check(&batch((0..100).map(value).collect()))
+    }
+
+    #[test]
+    fn most_pixels_are_finite() {
+        let nan = |share: usize| move |i: usize| [0.5, if i < share { f32::NAN } else { 0.5 }, 0.5];
+        assert_eq!(check(0.5, nan(83)), Err(ImpossibleLight::NotFinite { percent: 83.0 }));
+        assert_eq!(check(0.5, |_| [f32::INFINITY; 3]), Err(ImpossibleLight::NotFinite { percent: 100.0 }));
+        assert_eq!(check(0.5, nan(50)), Ok(()));
+    }
+
+    #[test]
+    fn light_is_not_negative() {
+        let seventh = |i: usize| [if i.is_multiple_of(7) { -1e6 } else { 0.5 }; 3];
+        assert!(matches!(check(0.5, seventh), Err(ImpossibleLight::Negative { mean }) if mean < -1e5));
+        assert!(matches!(check(0.0, |_| [-1.0; 3]), Err(ImpossibleLight::Negative { .. })));
+        // A saturated green has negative red; a black tile may have been rounded below zero
+        assert_eq!(check(0.5, |_| [-0.5, 0.9, -0.1]), Ok(()));
+        assert_eq!(check(100.0, |_| [-1e-3; 3]), Ok(()));
+        assert_eq!(check(0.0, |_| [-1e-9; 3]), Ok(()));
+        assert_eq!(LightCheck::default().check(&Batch { samples: 0, mean: Vec::new(), ..one() }), Ok(()));
+    }
+
+    fn one() -> Batch {
+        Batch { tile: Tile { index: 0, x: 0, y: 0, width: 1, height: 1 }, samples: 1, mean: vec![[0.0; 3]] }
+    }
+}

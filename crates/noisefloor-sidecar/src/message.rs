@@ -1,0 +1,67 @@
+//! The headers of requests and replies.
+
+use noisefloor::{Repeats, Unit};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// Version of the protocol.
+pub(crate) const PROTOCOL: u32 = 1;
+
+#[derive(Serialize)]
+pub(crate) struct Init<'a> {
+    pub(crate) op: &'static str,
+    pub(crate) protocol: u32,
+    pub(crate) scene: &'a str,
+    pub(crate) seed: u64,
+    pub(crate) width: Option<usize>,
+    pub(crate) height: Option<usize>,
+    pub(crate) max_depth: Option<u32>,
+    pub(crate) threads: Option<usize>,
+    pub(crate) options: &'a BTreeMap<String, String>,
+}
+
+#[derive(Serialize)]
+pub(crate) struct Sample {
+    pub(crate) op: &'static str,
+    pub(crate) tiles: Vec<TileRequest>,
+}
+
+#[derive(Serialize)]
+pub(crate) struct TileRequest {
+    pub(crate) index: usize,
+    pub(crate) x: usize,
+    pub(crate) y: usize,
+    pub(crate) width: usize,
+    pub(crate) height: usize,
+    pub(crate) first: u64,
+    pub(crate) samples: u32,
+}
+
+/// In every reply.
+#[derive(Deserialize)]
+pub(crate) struct Status {
+    pub(crate) ok: bool,
+    pub(crate) error: Option<String>,
+    pub(crate) tile: Option<usize>,
+}
+
+#[derive(Deserialize)]
+pub(crate) struct Hello {
+    pub(crate) name: String,
+    pub(crate) width: usize,
+    pub(crate) height: usize,
+    pub(crate) unit: Unit,
+    pub(crate) repeats: Repeats,
+    #[serde(default)]
+    pub(crate) warnings: Vec<String>,
+}
+
+#[derive(Deserialize)]
+pub(crate) struct Sampled {
+    pub(crate) samples: Vec<u32>,
+}
+
+#[derive(Deserialize)]
+pub(crate) struct Referenced {
+    pub(crate) reference: bool,
+}
