@@ -1,20 +1,22 @@
 //! `noisefloor evaluate`.
 
 use crate::args::{EvaluateArgs, load_model};
-use crate::figures;
+use crate::bars::Bars;
 use crate::output::{write_csv, write_json};
-use crate::rivals::{self, Rated};
 use crate::train::{descriptor, held_out, load_table, search};
 use anyhow::{anyhow, bail};
 use noisefloor::Model;
 use noisefloor::Scores;
-use noisefloor_image::check_writable;
+use noisefloor_image::{check_writable, write_atomic};
+use noisefloor_lab::rivals::{self, RatedRival};
+use noisefloor_lab::{Advance, figures};
 use noisefloor_learn::observers_agreeing;
 use noisefloor_learn::{
     Prediction, ReliabilityBin, Table, calibration_error, constant_noise_baseline, image_accuracy, predict,
     reliability, scene_median_baseline, score,
 };
 use serde::Serialize;
+use std::io::Write;
 
 /// Scores of one way to predict.
 #[derive(Serialize)]
@@ -60,7 +62,7 @@ struct Report {
     levels_synthesised: usize,
     /// Other criteria on the same zones, if `--rivals` asked for them.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    rivals: Vec<Rated>,
+    rivals: Vec<RatedRival>,
 }
 
 pub fn run(args: &EvaluateArgs) -> anyhow::Result<()> {
@@ -96,7 +98,10 @@ pub fn run(args: &EvaluateArgs) -> anyhow::Result<()> {
     };
     let mut report = Report::new(predicted_by, &table, &predictions, params.spread);
     if !args.rivals.is_empty() {
-        report.rivals = rivals::rate(&args.data.corpus, &args.rivals)?;
+        let bars = Bars::new(false);
+        report.rivals =
+            rivals::rate(&args.data.corpus, &args.rivals, &|advance: Advance<'_>| bars.show(advance))?;
+        bars.finish();
     }
     if let Some(path) = &args.json {
         write_json(path, &report)?;
@@ -105,14 +110,15 @@ pub fn run(args: &EvaluateArgs) -> anyhow::Result<()> {
         write_csv(path, predictions.iter())?;
     }
     if let Some(dir) = &args.figures {
-        figures::write(dir, &args.data.corpus, &predictions, &report.reliability)?;
+        figures::write_figures(dir, &args.data.corpus, &predictions, &report.reliability)?;
         if !args.rivals.is_empty() {
-            rivals::draw(&dir.join("rivals.svg"), &predictions, &report.rivals)?;
+            let plot = rivals::plot_scene_means(&predictions, &report.rivals)?;
+            write_atomic(dir.join("rivals.svg"), |to| to.write_all(plot.as_bytes()))?;
         }
     }
     report.print();
     if !args.rivals.is_empty() {
-        rivals::print(&predictions, &report.rivals);
+        print_rivals(&predictions, &report.rivals);
     }
 
     // What flatters a number stands beside it.
@@ -211,4 +217,30 @@ impl Report {
             self.levels_real, self.levels_synthesised, self.censored_zones, self.unfamiliar_zones
         );
     }
+}
+
+/// Says what came out, the model's own predictions first.
+fn print_rivals(model: &[Prediction], rated: &[RatedRival]) {
+    let known = || model.iter().filter(|p| !p.censored);
+    println!(
+        "\n{:44} {:>9} {:>9} {:>7} {:>7} {:>7}",
+        "who stops", "constant", "mean spp", "error", "bias", "early"
+    );
+    println!("{:44} {:>9} {:9.0}", "people", "", rivals::mean(known().map(|p| p.human_spp)));
+    let line = |name: &str, constant: String, spp: f64, s: &Scores| {
+        println!(
+            "{name:44} {constant:>9} {spp:9.0} {:>7} {:>7} {:5.0} %",
+            format!("×{:.2}", s.error_factor),
+            format!("×{:.2}", s.bias_factor),
+            100.0 * s.early_share
+        );
+    };
+    line("the model", String::new(), rivals::mean(known().map(|p| p.predicted_spp)), &score(model.iter()));
+    for r in rated {
+        line(r.title, format!("{:.2e}", r.constant), r.mean_spp, &r.scores);
+    }
+    println!(
+        "Constants are those that agree with people on average; scores are with the constant of the other scenes. Rivals follow a rendering \
+         that is synthesised from the pictures (noise ∝ 1/√n)."
+    );
 }

@@ -1,10 +1,10 @@
 //! `noisefloor judge`.
 
 use crate::args::JudgeArgs;
-use crate::heat_map::{self, Mark, Scale};
 use anyhow::{Context, bail};
 use noisefloor::{Evidence, Held, Oracle, Samples, Still, Tile, TileGrid, Verdict};
-use noisefloor_image::{RenderLayers, check_writable, read_picture, write_exr, write_png};
+use noisefloor_image::maps::{ColourScale, TileMark, draw_field, draw_tiles, noise_scale};
+use noisefloor_image::{RenderLayers, check_writable, read_picture, write_exr};
 use serde::Serialize;
 use std::path::Path;
 
@@ -95,8 +95,8 @@ pub fn run(args: &JudgeArgs) -> anyhow::Result<()> {
     let noise =
         if wants_noise { oracle.map_visible_noise(grid, |t| held.planes(t).map(Some))? } else { None };
     if let (Some(path), Some(noise)) = (&args.noise_map, &noise) {
-        let map = heat_map::draw_field(width, &held.shown(), noise, &heat_map::noise_scale(just_visible));
-        write_png(path, map.width, map.height, &map.bytes)?;
+        let map = draw_field(width, &held.shown(), noise, &noise_scale(just_visible));
+        map.save(path)?;
     }
     if let Some(path) = &args.exr {
         let mut probability = vec![f32::NAN; image.pixels.len()];
@@ -111,18 +111,24 @@ pub fn run(args: &JudgeArgs) -> anyhow::Result<()> {
         write_exr(path, &layers)?;
     }
     if let Some(path) = &args.heat_map {
-        let mark = |row: &Row| Mark {
+        let mark = |row: &Row| TileMark {
             tile: grid.tile(row.tile),
             value: f64::from(row.probability),
             label: format!("{:.2}", row.probability),
             unfamiliar: row.unfamiliar,
         };
-        let marks: Vec<Mark> = rows.iter().map(mark).collect();
+        let marks: Vec<TileMark> = rows.iter().map(mark).collect();
         let title = "P(no noise\nis seen)";
-        let scale =
-            Scale { title, low: 0.0, high: 1.0, log: false, colours: colorous::CIVIDIS, landmark: None };
-        let map = heat_map::draw(width, &held.shown(), &marks, &scale);
-        write_png(path, map.width, map.height, &map.bytes)?;
+        let scale = ColourScale {
+            title,
+            low: 0.0,
+            high: 1.0,
+            log: false,
+            colours: colorous::CIVIDIS,
+            landmark: None,
+        };
+        let map = draw_tiles(width, &held.shown(), &marks, &scale);
+        map.save(path)?;
     }
     Ok(())
 }

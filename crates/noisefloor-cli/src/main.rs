@@ -4,19 +4,17 @@
 
 mod args;
 mod audience;
+mod bars;
 mod compare;
 mod doctor;
 mod evaluate;
 mod explore;
-mod figures;
-mod heat_map;
 mod inspect;
 mod judge;
 mod output;
 mod reference;
 mod render;
 mod reproduce;
-mod rivals;
 mod sources;
 mod study;
 mod train;

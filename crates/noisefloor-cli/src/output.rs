@@ -1,12 +1,12 @@
 //! The files that `render` writes.
 
 use crate::args::RenderArgs;
-use crate::heat_map::{self, Mark, Scale};
 use crate::sources::Source;
 use anyhow::{Context, bail};
 use noisefloor::{
     Checkpoint, Clock, Display, Params, Progress, Rgb, Session, Stop, StopReason, StoppingCriterion,
 };
+use noisefloor_image::maps::{self, ColourScale, TileMark};
 use noisefloor_image::{RenderLayers, check_writable, read_exr, write_atomic, write_exr, write_png};
 use noisefloor_ptwne::ReferenceNoise;
 use noisefloor_rivals::metrics::relative_mse;
@@ -237,13 +237,13 @@ impl Output {
         let display =
             session.display().copied().unwrap_or_else(|| session.params().tone_mapping.settle(&image));
         let encoded: Vec<Rgb> = image.iter().map(|&p| display.encode(p)).collect();
-        write_png(self.folder.join("image.png"), width, height, &heat_map::to_bytes(&encoded))?;
-        let map = heat_map::draw(width, &encoded, &marks(&tiles), &scale(&tiles));
-        write_png(self.folder.join("stops.png"), map.width, map.height, &map.bytes)?;
+        write_png(self.folder.join("image.png"), width, height, &maps::display_bytes(&encoded))?;
+        let map = maps::draw_tiles(width, &encoded, &marks(&tiles), &scale(&tiles));
+        map.save(self.folder.join("stops.png"))?;
         if let Some(noise) = &noise {
-            let scale = heat_map::noise_scale(self.model.as_ref().and_then(|m| m.just_visible));
-            let map = heat_map::draw_field(width, &encoded, noise, &scale);
-            write_png(self.folder.join("noise.png"), map.width, map.height, &map.bytes)?;
+            let scale = maps::noise_scale(self.model.as_ref().and_then(|m| m.just_visible));
+            let map = maps::draw_field(width, &encoded, noise, &scale);
+            map.save(self.folder.join("noise.png"))?;
         }
 
         self.write_stops(&tiles)?;
@@ -418,9 +418,9 @@ fn tile_states<C: StoppingCriterion>(session: &Session<C>) -> Vec<(Stop, bool)> 
     session.film().grid().tiles().map(state).collect()
 }
 
-fn marks(tiles: &[(Stop, bool)]) -> Vec<Mark> {
+fn marks(tiles: &[(Stop, bool)]) -> Vec<TileMark> {
     let label = |stop: &Stop, open: bool| format!("{}{}", stop.samples, if open { "+" } else { "" });
-    let mark = |(stop, open): &(Stop, bool)| Mark {
+    let mark = |(stop, open): &(Stop, bool)| TileMark {
         tile: stop.tile,
         value: stop.samples as f64,
         label: label(stop, *open),
@@ -429,10 +429,17 @@ fn marks(tiles: &[(Stop, bool)]) -> Vec<Mark> {
     tiles.iter().map(mark).collect()
 }
 
-fn scale(tiles: &[(Stop, bool)]) -> Scale {
+fn scale(tiles: &[(Stop, bool)]) -> ColourScale {
     let spp = || tiles.iter().map(|(stop, _)| stop.samples.max(1) as f64);
     let (low, high) = (spp().fold(f64::INFINITY, f64::min), spp().fold(1.0, f64::max));
-    Scale { title: "samples\nper pixel", low, high, log: true, colours: colorous::VIRIDIS, landmark: None }
+    ColourScale {
+        title: "samples\nper pixel",
+        low,
+        high,
+        log: true,
+        colours: colorous::VIRIDIS,
+        landmark: None,
+    }
 }
 
 /// Writes rows as CSV, atomically.

@@ -2,12 +2,12 @@
 
 use crate::INTERRUPTED;
 use crate::args::ReferenceArgs;
-use crate::heat_map::to_bytes;
 use crate::output::say_noise;
 use crate::render::{cancel_on_signal, reference_bar};
 use crate::sources::{self, Opened};
 use anyhow::{Context, bail};
 use noisefloor::{Reference, ToneMapping};
+use noisefloor_image::maps::display_bytes;
 use noisefloor_image::{RenderLayers, check_writable, write_exr, write_png};
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -49,7 +49,7 @@ pub fn run(args: &ReferenceArgs) -> anyhow::Result<ExitCode> {
     write_exr(&out, &RenderLayers::rgb(width, height, &pixels))?;
     let display = ToneMapping::default().settle(&pixels);
     let shown: Vec<_> = pixels.iter().map(|&pixel| display.encode(pixel)).collect();
-    write_png(out.with_extension("png"), width, height, &to_bytes(&shown))?;
+    write_png(out.with_extension("png"), width, height, &display_bytes(&shown))?;
 
     if !args.quiet {
         source.reference_noise().into_iter().for_each(say_noise);

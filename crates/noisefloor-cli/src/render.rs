@@ -2,9 +2,9 @@
 
 use crate::INTERRUPTED;
 use crate::args::{CriterionChoice, RenderArgs, RendererArgs};
+use crate::bars::bar;
 use crate::output::{ModelFacts, Output, read_reference};
 use crate::sources::{self, Opened, Source};
-use crate::train::bar;
 use anyhow::{Context, bail};
 use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressStyle};
 use noisefloor::{

@@ -1,8 +1,8 @@
 //! `noisefloor train`, and what it shares with `evaluate`.
 
 use crate::args::{DataArgs, SearchArgs, TrainArgs};
+use crate::bars::bar;
 use anyhow::{Context, bail};
-use indicatif::{ProgressBar, ProgressStyle};
 use noisefloor::{Descriptor, Evidence, Model, NoiseMask, SvmParams};
 use noisefloor_image::{check_writable, write_atomic};
 use noisefloor_learn::{Prediction, Table, score};
@@ -137,14 +137,6 @@ pub fn held_out(table: &Table, params: &TrainParams, threshold: f32) -> anyhow::
     })?;
     bar.finish_and_clear();
     Ok(predictions)
-}
-
-/// A bar with an estimate of the time left.
-pub fn bar(len: u64, what: &'static str) -> ProgressBar {
-    let style =
-        ProgressStyle::with_template("{bar:32} {pos}/{len} {prefix}  {elapsed_precise}, {eta} to go  {msg}");
-    let bar = ProgressBar::new(len).with_prefix(what);
-    style.map(|style| bar.clone().with_style(style)).unwrap_or(bar)
 }
 
 /// The table that was asked for: read, or computed from pictures.

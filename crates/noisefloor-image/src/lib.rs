@@ -5,6 +5,7 @@
 //!   broken file is a [`PictureError`].
 //! - [`write_exr`], [`write_png`], [`write_atomic`], [`check_writable`]: files that appear complete or not at
 //!   all.
+//! - `maps`, behind the feature of that name: numbers drawn over a picture, in colours, with a legend.
 //! - [`StackSource`]: a folder of images as a [`noisefloor::ProgressiveSource`].
 //! - [`running_means`], [`batches`]: which samples are in which file of a stack.
 //!
@@ -35,6 +36,8 @@ mod decode_pfm;
 mod decode_png;
 mod error;
 mod frames;
+#[cfg(feature = "maps")]
+pub mod maps;
 mod open;
 mod picture;
 mod read;

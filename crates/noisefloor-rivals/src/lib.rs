@@ -13,7 +13,7 @@
 //! | [`Takouachet2007`] | `vdp-first:0.66` | the visible difference from the first, noisy picture grows no more |
 //!
 //! [`parse`] makes a criterion of such a spec, and [`RIVALS`] lists those with one open constant, to be fitted to data.
-//! [`Vdp`] is Daly's visible differences predictor; [`metrics`] has relMSE, PSNR, FLIP and butteraugli.
+//! [`Vdp`] is Daly's visible differences predictor; [`metrics`] has relMSE and PSNR, and behind features of their names FLIP and butteraugli.
 //!
 //! # Pixels and tiles
 //! Renderers that judge pixels sample pixels; here a tile is sampled as a whole until it is done, as it is for noisefloor. A

@@ -1,32 +1,15 @@
 //! Plots as pixels: lines by the plotting library, letters from a font that is always there.
 
-use crate::heat_map::Canvas;
 use embedded_graphics::mono_font::MonoFont;
 use embedded_graphics::mono_font::iso_8859_1::{FONT_7X13, FONT_8X13_BOLD};
 use embedded_graphics::text::Alignment;
+use noisefloor_image::maps::Canvas;
 use plotters::prelude::*;
 use plotters_backend::{BackendColor, BackendCoord, BackendTextStyle, DrawingErrorKind};
 use std::convert::Infallible;
 
-/// A white sheet.
-pub struct Paper(Canvas);
-
-impl Paper {
-    pub fn new((width, height): (u32, u32)) -> Self {
-        Self(Canvas::new(width as usize, height as usize, [255; 3]))
-    }
-
-    pub fn backend(&mut self) -> Pen<'_> {
-        Pen(&mut self.0)
-    }
-
-    pub fn into_canvas(self) -> Canvas {
-        self.0
-    }
-}
-
-/// Draws on a sheet.
-pub struct Pen<'a>(&'a mut Canvas);
+/// Draws plots on a canvas.
+pub(crate) struct Pen<'a>(pub(crate) &'a mut Canvas);
 
 fn font(style: &impl BackendTextStyle) -> MonoFont<'static> {
     if style.size() > 15.5 { FONT_8X13_BOLD } else { FONT_7X13 }
@@ -41,7 +24,7 @@ impl DrawingBackend for Pen<'_> {
     type ErrorType = Infallible;
 
     fn get_size(&self) -> (u32, u32) {
-        (self.0.width as u32, self.0.height as u32)
+        (self.0.width() as u32, self.0.height() as u32)
     }
 
     fn ensure_prepared(&mut self) -> Result<(), DrawingErrorKind<Infallible>> {

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 /// The paper does not say which pairs its 97.98 % are of: these are the ways to read it, and leaving scenes out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Protocol {
+pub enum PairProtocol {
     /// All pairs are learned, and asked about.
     Learned,
     /// A fifth of the pairs, drawn at random, is held out: other levels of the same tiles are learned.
@@ -22,16 +22,18 @@ pub enum Protocol {
 const FIFTH: usize = 5;
 
 /// One machine: rows to learn and to ask about.
-pub struct Split {
+pub(super) struct Split {
     /// What it is asked about, in words.
-    pub asked: String,
-    pub learn: Vec<usize>,
-    pub ask: Vec<usize>,
+    pub(super) asked: String,
+    pub(super) learn: Vec<usize>,
+    pub(super) ask: Vec<usize>,
 }
 
-impl Protocol {
-    pub const ALL: [Self; 4] = [Self::Learned, Self::PairsHeldOut, Self::HalfTheScenes, Self::SceneLeftOut];
+impl PairProtocol {
+    pub(super) const ALL: [Self; 4] =
+        [Self::Learned, Self::PairsHeldOut, Self::HalfTheScenes, Self::SceneLeftOut];
 
+    /// For files and tables.
     pub fn name(self) -> &'static str {
         match self {
             Self::Learned => "learned",
@@ -42,7 +44,7 @@ impl Protocol {
     }
 
     /// Only synthesised pairs are learned; real ones are asked about with the synthesised ones of their scene.
-    pub fn splits(self, pairs: &Pairs) -> Vec<Split> {
+    pub(super) fn splits(self, pairs: &Pairs) -> Vec<Split> {
         let (synthesised, all) = (0..pairs.synthesised, 0..pairs.known.len());
         let by_group = |asked: &[&str]| {
             let is_asked = |i: &usize| asked.contains(&pairs.known[*i].group.as_str());

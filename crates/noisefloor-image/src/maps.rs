@@ -1,37 +1,50 @@
-//! A number a tile, or one a pixel, drawn over the picture, with a legend.
+//! Numbers drawn over a picture: one a tile or one a pixel, in colours, with a legend.
 
+use crate::error::WriteError;
+use crate::write::write_atomic;
 use colorous::INFERNO;
 use embedded_graphics::mono_font::iso_8859_1::{FONT_6X10, FONT_7X13, FONT_7X13_BOLD};
 use embedded_graphics::mono_font::{MonoFont, MonoTextStyle};
 use embedded_graphics::pixelcolor::Rgb888;
 use embedded_graphics::prelude::*;
 use embedded_graphics::text::{Alignment, Baseline, Text, TextStyleBuilder};
+use image::RgbImage;
+use image::codecs::png::PngEncoder;
 use noisefloor::{Rgb, Tile};
 use std::convert::Infallible;
+use std::path::Path;
 
-/// One tile and what is to be seen of it.
-pub struct Mark {
+/// One tile and the number to draw over it.
+#[derive(Clone, Debug)]
+pub struct TileMark {
+    /// The tile.
     pub tile: Tile,
+    /// Becomes the colour of the tile.
     pub value: f64,
     /// Written into the tile where there is room.
     pub label: String,
-    /// The tile is unfamiliar to the model: marked in its corner.
+    /// Whether the tile is unfamiliar to the model: marked in its corner.
     pub unfamiliar: bool,
 }
 
 /// How values become colours.
-pub struct Scale {
+#[derive(Clone, Copy, Debug)]
+pub struct ColourScale {
+    /// Heading of the legend, one or two short lines.
     pub title: &'static str,
+    /// Value of the first colour.
     pub low: f64,
+    /// Value of the last colour.
     pub high: f64,
     /// Logarithmic; `low` must then be positive.
     pub log: bool,
+    /// The colours.
     pub colours: colorous::Gradient,
-    /// A value to be marked in the legend, and its name.
+    /// A value to mark in the legend, and its name.
     pub landmark: Option<(f64, &'static str)>,
 }
 
-impl Scale {
+impl ColourScale {
     fn place(&self, value: f64) -> f64 {
         let f = |v: f64| if self.log { v.max(f64::MIN_POSITIVE).ln() } else { v };
         let span = f(self.high) - f(self.low);
@@ -51,22 +64,21 @@ impl Scale {
     }
 }
 
-/// Visible noise, always on one scale, so that maps of different pictures and stages compare; `just_visible` is marked as seen.
-pub fn noise_scale(just_visible: Option<f32>) -> Scale {
+/// The scale of visible noise: always the same, so that maps of different pictures and stages compare. `just_visible` is
+/// marked as "seen".
+pub fn noise_scale(just_visible: Option<f32>) -> ColourScale {
+    let title = "visible noise\n8-bit steps";
     let landmark = just_visible.map(|v| (f64::from(v), "seen"));
-    Scale { title: "visible noise\n8-bit steps", low: 1.0, high: 16.0, log: true, colours: INFERNO, landmark }
+    ColourScale { title, low: 1.0, high: 16.0, log: true, colours: INFERNO, landmark }
 }
 
-/// An RGB picture, row-major, 3 bytes a pixel.
-pub struct Canvas {
-    pub width: usize,
-    pub height: usize,
-    pub bytes: Vec<u8>,
-}
+/// An RGB picture to draw on, also with `embedded_graphics`. Whatever lies outside is left out.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Canvas(RgbImage);
 
 impl OriginDimensions for Canvas {
     fn size(&self) -> Size {
-        Size::new(self.width as u32, self.height as u32)
+        Size::new(self.0.width(), self.0.height())
     }
 }
 
@@ -85,23 +97,66 @@ impl DrawTarget for Canvas {
 }
 
 impl Canvas {
+    /// A canvas of one colour, at most [`noisefloor::MAX_EDGE`] pixels and a legend wide.
     pub fn new(width: usize, height: usize, colour: [u8; 3]) -> Self {
-        Self { width, height, bytes: colour.repeat(width * height) }
+        let edge = |pixels: usize| u32::try_from(pixels).unwrap_or(u32::MAX);
+        Self(RgbImage::from_pixel(edge(width), edge(height), image::Rgb(colour)))
     }
 
+    /// A display-encoded picture `width` pixels wide, in [0, 1]; an incomplete last row is left out.
+    pub fn of_picture(width: usize, encoded: &[Rgb]) -> Self {
+        let mut canvas = Self::new(width, encoded.len() / width.max(1), PAPER);
+        for (to, from) in canvas.0.pixels_mut().zip(encoded) {
+            to.0 = from.map(|c| (c.clamp(0.0, 1.0) * 255.0).round() as u8);
+        }
+        canvas
+    }
+
+    /// Width in pixels.
+    pub fn width(&self) -> usize {
+        self.0.width() as usize
+    }
+
+    /// Height in pixels.
+    pub fn height(&self) -> usize {
+        self.0.height() as usize
+    }
+
+    /// sRGB-encoded, row-major, three bytes a pixel.
+    pub fn bytes(&self) -> &[u8] {
+        self.0.as_raw()
+    }
+
+    /// Colours one pixel.
     pub fn set(&mut self, x: usize, y: usize, colour: [u8; 3]) {
-        if x < self.width && y < self.height {
-            self.bytes[(y * self.width + x) * 3..][..3].copy_from_slice(&colour);
+        self.blend(x, y, colour, 1.0);
+    }
+
+    /// Mixes a colour into a pixel; `alpha` is its share, in [0, 1].
+    pub fn blend(&mut self, x: usize, y: usize, colour: [u8; 3], alpha: f64) {
+        let (Ok(x), Ok(y)) = (u32::try_from(x), u32::try_from(y)) else { return };
+        let Some(pixel) = self.0.get_pixel_mut_checked(x, y) else { return };
+        for (old, new) in pixel.0.iter_mut().zip(colour) {
+            *old = (f64::from(*old) * (1.0 - alpha) + f64::from(new) * alpha).round() as u8;
         }
     }
 
-    /// Mixes a colour into a pixel; `alpha` is its share.
-    pub fn blend(&mut self, x: usize, y: usize, colour: [u8; 3], alpha: f64) {
-        if x < self.width && y < self.height {
-            for (old, new) in self.bytes[(y * self.width + x) * 3..][..3].iter_mut().zip(colour) {
-                *old = (f64::from(*old) * (1.0 - alpha) + f64::from(new) * alpha).round() as u8;
-            }
-        }
+    /// The canvas as a PNG file in memory.
+    ///
+    /// # Errors
+    /// What the encoder says, if the canvas has no pixels.
+    pub fn to_png(&self) -> Result<Vec<u8>, image::ImageError> {
+        let mut bytes = Vec::new();
+        self.0.write_with_encoder(PngEncoder::new(&mut bytes))?;
+        Ok(bytes)
+    }
+
+    /// Writes the canvas as PNG, atomically.
+    ///
+    /// # Errors
+    /// Those of [`write_atomic`].
+    pub fn save(&self, path: impl AsRef<Path>) -> Result<(), WriteError> {
+        write_atomic(path, |to| self.0.write_with_encoder(PngEncoder::new(to)))
     }
 
     /// A white triangle with an edge of ink, its right angle at (x, y).
@@ -139,46 +194,20 @@ const PAPER: [u8; 3] = [250, 250, 250];
 const INK: [u8; 3] = [20, 20, 20];
 
 /// Display-encoded pixels in [0, 1] as bytes.
-pub fn to_bytes(encoded: &[Rgb]) -> Vec<u8> {
+pub fn display_bytes(encoded: &[Rgb]) -> Vec<u8> {
     encoded.iter().flatten().map(|c| (c.clamp(0.0, 1.0) * 255.0).round() as u8).collect()
 }
 
 /// Draws `marks` over a display-encoded picture `width` pixels wide, legend at the right.
-pub fn draw(width: usize, encoded: &[Rgb], marks: &[Mark], scale: &Scale) -> Canvas {
+pub fn draw_tiles(width: usize, encoded: &[Rgb], marks: &[TileMark], scale: &ColourScale) -> Canvas {
     let height = encoded.len() / width;
     let mut canvas = Canvas::new(width + LEGEND, height.max(LEAST_HEIGHT), PAPER);
 
-    // The picture in grey below the colours, so that colour means the value alone.
     for mark in marks {
-        let colour = scale.colour(mark.value);
-        for row in mark.tile.rows(width) {
-            for pixel in row {
-                let grey = 255.0 * noisefloor::luminance(encoded[pixel]);
-                let blend = colour.map(|c| (0.55 * f32::from(c) + 0.45 * grey).round() as u8);
-                canvas.set(pixel % width, pixel / width, blend);
-            }
-        }
+        tint(&mut canvas, width, encoded, mark.tile, scale.colour(mark.value));
     }
-
-    // Borders and labels.
-    for Mark { tile, label, unfamiliar, .. } in marks {
-        for x in tile.x..tile.x + tile.width {
-            canvas.set(x, tile.y, INK);
-        }
-        for y in tile.y..tile.y + tile.height {
-            canvas.set(tile.x, y, INK);
-        }
-        let (font, advance) = if tile.width >= 100 { (&FONT_7X13_BOLD, 7) } else { (&FONT_6X10, 6) };
-        if label.len() * advance + 4 <= tile.width && tile.height >= 14 {
-            let (x, y) = (tile.x + tile.width / 2, tile.y + tile.height / 2);
-            for (dx, dy) in [(0, 1), (2, 1), (1, 0), (1, 2)] {
-                canvas.text(label, (x + dx - 1, y + dy - 1), font, INK, Alignment::Center);
-            }
-            canvas.text(label, (x, y), font, [255; 3], Alignment::Center);
-        }
-        if *unfamiliar {
-            canvas.corner(tile.x + 1, tile.y + 1);
-        }
+    for mark in marks {
+        frame(&mut canvas, mark);
     }
 
     let lowest = height.max(LEAST_HEIGHT) - 16;
@@ -192,9 +221,39 @@ pub fn draw(width: usize, encoded: &[Rgb], marks: &[Mark], scale: &Scale) -> Can
     canvas
 }
 
+/// The picture in grey below a colour, so that colour means the value alone.
+fn tint(canvas: &mut Canvas, width: usize, encoded: &[Rgb], tile: Tile, colour: [u8; 3]) {
+    for pixel in tile.rows(width).flatten() {
+        let grey = 255.0 * noisefloor::luminance(encoded[pixel]);
+        let blend = colour.map(|c| (0.55 * f32::from(c) + 0.45 * grey).round() as u8);
+        canvas.set(pixel % width, pixel / width, blend);
+    }
+}
+
+/// Borders at the left and the top, the label, and the corner of an unfamiliar tile.
+fn frame(canvas: &mut Canvas, TileMark { tile, label, unfamiliar, .. }: &TileMark) {
+    for x in tile.x..tile.x + tile.width {
+        canvas.set(x, tile.y, INK);
+    }
+    for y in tile.y..tile.y + tile.height {
+        canvas.set(tile.x, y, INK);
+    }
+    let (font, advance) = if tile.width >= 100 { (&FONT_7X13_BOLD, 7) } else { (&FONT_6X10, 6) };
+    if label.len() * advance + 4 <= tile.width && tile.height >= 14 {
+        let (x, y) = (tile.x + tile.width / 2, tile.y + tile.height / 2);
+        for (dx, dy) in [(0, 1), (2, 1), (1, 0), (1, 2)] {
+            canvas.text(label, (x + dx - 1, y + dy - 1), font, INK, Alignment::Center);
+        }
+        canvas.text(label, (x, y), font, [255; 3], Alignment::Center);
+    }
+    if *unfamiliar {
+        canvas.corner(tile.x + 1, tile.y + 1);
+    }
+}
+
 /// Draws one value a pixel over a display-encoded picture `width` pixels wide, legend at the right. The picture is dark and grey
 /// below the colours; it stays bare where a value is NaN.
-pub fn draw_field(width: usize, encoded: &[Rgb], values: &[f32], scale: &Scale) -> Canvas {
+pub fn draw_field(width: usize, encoded: &[Rgb], values: &[f32], scale: &ColourScale) -> Canvas {
     let height = encoded.len() / width;
     let mut canvas = Canvas::new(width + LEGEND, height.max(LEAST_HEIGHT), PAPER);
     for (pixel, (&rgb, &value)) in encoded.iter().zip(values).enumerate() {
@@ -207,7 +266,7 @@ pub fn draw_field(width: usize, encoded: &[Rgb], values: &[f32], scale: &Scale) 
     canvas
 }
 
-fn draw_legend(canvas: &mut Canvas, width: usize, bottom: usize, scale: &Scale) {
+fn draw_legend(canvas: &mut Canvas, width: usize, bottom: usize, scale: &ColourScale) {
     let left = width + 12;
     for (line, text) in scale.title.split('\n').enumerate() {
         canvas.text(text, (left, 14 + 15 * line), &FONT_7X13_BOLD, INK, Alignment::Left);
@@ -249,7 +308,7 @@ mod tests {
 
     #[test]
     fn values_map_to_the_ends_of_the_scale() {
-        let scale = Scale {
+        let scale = ColourScale {
             title: "",
             low: 100.0,
             high: 10_000.0,
@@ -259,19 +318,29 @@ mod tests {
         };
         assert_eq!((scale.place(100.0), scale.place(10_000.0), scale.place(5.0)), (0.0, 1.0, 0.0));
         assert!((scale.place(1000.0) - 0.5).abs() < 1e-9 && (scale.value_at(0.5) - 1000.0).abs() < 1e-6);
-        let flat = Scale { low: 7.0, high: 7.0, log: false, ..scale };
+        let flat = ColourScale { low: 7.0, high: 7.0, log: false, ..scale };
         assert_eq!(flat.place(7.0), 0.5);
     }
 
     #[test]
     fn colours_lie_over_their_tiles() {
         let grid = noisefloor::TileGrid::new(64, 32, 32).unwrap();
-        let mark =
-            |i: usize| Mark { tile: grid.tile(i), value: i as f64, label: String::new(), unfamiliar: i == 1 };
-        let scale =
-            Scale { title: "t", low: 0.0, high: 1.0, log: false, colours: colorous::VIRIDIS, landmark: None };
-        let canvas = draw(64, &vec![[0.0; 3]; 64 * 32], &[mark(0), mark(1)], &scale);
-        let at = |x: usize, y: usize| &canvas.bytes[(y * canvas.width + x) * 3..][..3];
+        let mark = |i: usize| TileMark {
+            tile: grid.tile(i),
+            value: i as f64,
+            label: String::new(),
+            unfamiliar: i == 1,
+        };
+        let scale = ColourScale {
+            title: "t",
+            low: 0.0,
+            high: 1.0,
+            log: false,
+            colours: colorous::VIRIDIS,
+            landmark: None,
+        };
+        let canvas = draw_tiles(64, &vec![[0.0; 3]; 64 * 32], &[mark(0), mark(1)], &scale);
+        let at = |x: usize, y: usize| &canvas.bytes()[(y * canvas.width() + x) * 3..][..3];
         // Over black: 55 % of viridis' first and last colour.
         assert_eq!(at(16, 16), [68.0, 1.0, 84.0].map(|c: f32| (0.55 * c).round() as u8));
         assert_eq!(at(48, 16), [253.0, 231.0, 37.0].map(|c: f32| (0.55 * c).round() as u8));
@@ -282,7 +351,7 @@ mod tests {
 
     #[test]
     fn fields_lie_over_a_dark_picture() {
-        let scale = Scale {
+        let scale = ColourScale {
             title: "t",
             low: 1.0,
             high: 16.0,
@@ -292,7 +361,7 @@ mod tests {
         };
         let canvas =
             draw_field(4, &[[0.0; 3], [1.0; 3], [0.0; 3], [1.0; 3]], &[0.0, 16.0, 100.0, f32::NAN], &scale);
-        let at = |x: usize| &canvas.bytes[x * 3..][..3];
+        let at = |x: usize| &canvas.bytes()[x * 3..][..3];
         let over = |colour: [f32; 3], grey: f32| colour.map(|c| (0.7 * c + 0.3 * 255.0 * grey).round() as u8);
         // The first colour of the gradient, its last one twice, and none.
         let last = [252.0, 255.0, 164.0];
@@ -303,6 +372,6 @@ mod tests {
         );
         // The landmark lies across the middle of the bar.
         let y = LEAST_HEIGHT - 16 - (LEAST_HEIGHT - 16 - 50) / 2;
-        assert_eq!(&canvas.bytes[(y * canvas.width + 4 + 12) * 3..][..3], PAPER);
+        assert_eq!(&canvas.bytes()[(y * canvas.width() + 4 + 12) * 3..][..3], PAPER);
     }
 }

@@ -1,17 +1,19 @@
 //! One protocol, carried out.
 
 use super::Geometry;
-use super::pairs::{Pairs, Scaling};
-use super::protocol::{Protocol, Split};
-use crate::train::bar;
-use anyhow::Context;
+use super::pairs::{PairScaling, Pairs};
+use super::protocol::{PairProtocol, Split};
+use crate::advance::{Advance, Watch};
+use crate::error::LabError;
 use ndarray::Axis;
-use noisefloor::{Descriptor, Svm, SvmParams, Weights, fit_weights};
+use noisefloor::{Descriptor, Svm, SvmParams, SvmTrainError, Weights, fit_weights};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
+use statrs::statistics::{Data, Median};
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 
 /// Machines that train at once: the solver runs in one thread, and each holds two matrices of up to 0.7 GB.
@@ -26,23 +28,30 @@ const MAX_BYTES: u64 = 1 << 20;
 pub struct Fingerprint {
     /// Of all pairs and their labels.
     pub table_digest: String,
+    /// How a pair is described.
     pub pairs: Descriptor,
-    pub scaling: Scaling,
-    pub protocol: Protocol,
+    /// What is written into the rows.
+    pub scaling: PairScaling,
+    /// Which pairs are asked about.
+    pub protocol: PairProtocol,
+    /// C and γ.
     pub params: SvmParams,
+    /// Of this crate.
     pub version: String,
 }
 
 impl Fingerprint {
-    pub fn new(digest: &str, pairs: Descriptor, scaling: Scaling, protocol: Protocol) -> Self {
+    pub(super) fn new(digest: &str, pairs: Descriptor, scaling: PairScaling, protocol: PairProtocol) -> Self {
         let (params, version) = (SvmParams::PAPER, env!("CARGO_PKG_VERSION").to_owned());
         Self { table_digest: digest.to_owned(), pairs, scaling, protocol, params, version }
     }
 
+    /// What the result is called.
     pub fn name(&self) -> String {
         format!("{}-{}-{}", self.pairs.name(), self.scaling.name(), self.protocol.name())
     }
 
+    /// The file that it is kept in.
     pub fn file_name(&self) -> String {
         self.name() + ".json"
     }
@@ -51,9 +60,13 @@ impl Fingerprint {
 /// Pairs that were asked about, and those told right, by class.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Count {
+    /// Pairs in which people see noise.
     pub noisy: usize,
+    /// Of them, told right.
     pub noisy_right: usize,
+    /// Pairs that people take for identical.
     pub identical: usize,
+    /// Of them, told right.
     pub identical_right: usize,
 }
 
@@ -68,6 +81,8 @@ impl Count {
         *of_them += usize::from(right);
     }
 
+    /// Both together.
+    #[must_use]
     pub fn add(self, other: Self) -> Self {
         Self {
             noisy: self.noisy + other.noisy,
@@ -80,19 +95,24 @@ impl Count {
 
 /// One machine of a protocol.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Machine {
+pub struct MachineResult {
+    /// What it is asked about, in words.
     pub asked: String,
+    /// Pairs learned.
     pub examples: usize,
+    /// Of them, support vectors.
     pub support_vectors: usize,
     /// From distances.
     pub seconds_training: f64,
+    /// Synthesised pairs asked about.
     pub synthesised: Count,
+    /// Pairs with a real image asked about.
     pub real: Count,
 }
 
 /// What it costs to ask a machine.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Query {
+pub struct QueryCost {
     /// Median, one thread.
     pub seconds: f64,
     /// Support vectors and coefficients as `f32`.
@@ -102,42 +122,55 @@ pub struct Query {
     pub largest_difference: f64,
 }
 
+/// What came of one protocol.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Outcome {
+pub struct ProtocolOutcome {
+    /// What it depends on.
     #[serde(flatten)]
     pub of: Fingerprint,
     /// For the matrix product of all rows, which all protocols share.
     pub seconds_distances: f64,
-    pub machines: Vec<Machine>,
-    pub query: Option<Query>,
+    /// One for each part that is left out.
+    pub machines: Vec<MachineResult>,
+    /// Of the machine that has learned all; none otherwise.
+    pub query: Option<QueryCost>,
 }
 
-impl Outcome {
+impl ProtocolOutcome {
     /// The result if it is there, whole, and `of` just that; otherwise `of` again.
-    pub fn read(path: &Path, of: Fingerprint) -> Result<Self, Fingerprint> {
+    pub(super) fn read(path: &Path, of: Fingerprint) -> Result<Self, Fingerprint> {
         let mut text = Vec::new();
         let read = File::open(path).and_then(|file| file.take(MAX_BYTES).read_to_end(&mut text));
         let outcome = read.ok().and_then(|_| serde_json::from_slice::<Self>(&text).ok());
         outcome.filter(|outcome| outcome.of == of).ok_or(of)
     }
 
-    pub fn compute(of: Fingerprint, pairs: &Pairs, geometry: &Geometry) -> anyhow::Result<Self> {
+    pub(super) fn compute(
+        of: Fingerprint,
+        pairs: &Pairs,
+        geometry: &Geometry,
+        watch: Watch<'_>,
+    ) -> Result<Self, LabError> {
         let splits = of.protocol.splits(pairs);
-        let bar = bar(splits.len() as u64, "machines trained").with_message(of.name());
+        let (name, all) = (of.name(), splits.len() as u64);
+        let done = AtomicU64::new(0);
+        let tell = |done| watch(Advance { what: "machines trained", done, of: all, detail: &name });
+        tell(0);
+        let train = |split: &Split| -> Result<(MachineResult, Weights), LabError> {
+            let trained = train(split, pairs, geometry, of.params).map_err(|source| {
+                let machine = format!("{name}: the machine to be asked about {}", split.asked);
+                LabError::Train { machine, source }
+            });
+            tell(1 + done.fetch_add(1, Ordering::Relaxed));
+            trained
+        };
         let mut trained = Vec::new();
         for splits in splits.chunks(AT_ONCE) {
-            let train = |split: &Split| -> anyhow::Result<(Machine, Weights)> {
-                let trained = train(split, pairs, geometry, of.params)
-                    .with_context(|| format!("the machine to be asked about {}", split.asked));
-                bar.inc(1);
-                trained
-            };
             trained.extend(splits.par_iter().map(train).collect::<Result<Vec<_>, _>>()?);
         }
-        bar.finish_and_clear();
 
         // The machine that has learned all is the one to be used, so it is the one to be timed.
-        let query = (of.protocol == Protocol::Learned)
+        let query = (of.protocol == PairProtocol::Learned)
             .then(|| ask(&splits[0], &trained[0].1, pairs, geometry, of.params));
         Ok(Self {
             of,
@@ -153,7 +186,7 @@ fn train(
     pairs: &Pairs,
     geometry: &Geometry,
     params: SvmParams,
-) -> anyhow::Result<(Machine, Weights)> {
+) -> Result<(MachineResult, Weights), SvmTrainError> {
     let begun = Instant::now();
     let labels: Vec<bool> = split.learn.iter().map(|&i| pairs.known[i].converged).collect();
     let learn = split.learn.as_slice();
@@ -169,7 +202,7 @@ fn train(
         let count = if i < pairs.synthesised { &mut synthesised } else { &mut real };
         count.note(converged, (decision > 0.0) == converged);
     }
-    let machine = Machine {
+    let machine = MachineResult {
         asked: split.asked.clone(),
         examples: split.learn.len(),
         support_vectors: weights.alpha.iter().filter(|&&a| a != 0.0).count(),
@@ -187,7 +220,7 @@ fn decision(row: usize, split: &Split, weights: &Weights, geometry: &Geometry, p
     terms.map(|(&i, alpha)| alpha * (-params.gamma * squared[i]).exp()).sum::<f64>() - weights.rho
 }
 
-fn ask(split: &Split, weights: &Weights, pairs: &Pairs, geometry: &Geometry, params: SvmParams) -> Query {
+fn ask(split: &Split, weights: &Weights, pairs: &Pairs, geometry: &Geometry, params: SvmParams) -> QueryCost {
     let kept = || split.learn.iter().zip(&weights.alpha).filter(|(_, alpha)| **alpha != 0.0);
     let svm = Svm {
         gamma: params.gamma as f32,
@@ -204,9 +237,8 @@ fn ask(split: &Split, weights: &Weights, pairs: &Pairs, geometry: &Geometry, par
         let difference = f64::from(answer) - decision(row, split, weights, geometry, params);
         largest_difference = largest_difference.max(difference.abs());
     }
-    seconds.sort_by(f64::total_cmp);
-    Query {
-        seconds: seconds[seconds.len() / 2],
+    QueryCost {
+        seconds: Data::new(seconds).median(),
         model_bytes: size_of::<f32>() * (svm.vectors.len() + svm.coefficients.len()),
         largest_difference,
     }

@@ -1,11 +1,12 @@
 //! How far a picture is from the converged one.
 
+use crate::error::LabError;
 use noisefloor::{Display, Rgb, TileGrid};
 use noisefloor_rivals::metrics;
 use serde::Serialize;
 
 /// Distances of a picture from the reference.
-#[derive(Clone, Copy, Debug, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Quality {
     /// Of linear radiance.
     pub rel_mse: f64,
@@ -22,7 +23,7 @@ pub struct Quality {
 }
 
 /// The converged picture, and how it is looked at.
-pub struct Yardstick {
+pub(super) struct Yardstick {
     grid: TileGrid,
     display: Display,
     linear: Vec<Rgb>,
@@ -43,38 +44,38 @@ fn mean(values: &mut dyn Iterator<Item = f32>) -> f64 {
 
 impl Yardstick {
     /// `reference` is linear radiance, row-major over the image of `grid`.
-    pub fn new(grid: TileGrid, display: Display, reference: Vec<Rgb>, pixels_per_degree: f64) -> Self {
+    pub(super) fn new(grid: TileGrid, display: Display, reference: Vec<Rgb>, pixels_per_degree: f64) -> Self {
         let shown = reference.iter().map(|&p| display.encode(p)).collect();
         Self { grid, display, linear: reference, shown, pixels_per_degree }
     }
 
-    pub fn grid(&self) -> TileGrid {
+    pub(super) fn grid(&self) -> TileGrid {
         self.grid
     }
 
     /// The converged picture, display-encoded.
-    pub fn shown(&self) -> &[Rgb] {
+    pub(super) fn shown(&self) -> &[Rgb] {
         &self.shown
     }
 
     /// A picture as it is displayed.
-    pub fn encode(&self, image: &[Rgb]) -> Vec<Rgb> {
+    pub(super) fn encode(&self, image: &[Rgb]) -> Vec<Rgb> {
         image.iter().map(|&p| self.display.encode(p)).collect()
     }
 
     /// FLIP error of each pixel of a display-encoded picture.
-    pub fn flip(&self, shown: &[Rgb]) -> anyhow::Result<Vec<f32>> {
+    pub(super) fn flip(&self, shown: &[Rgb]) -> Result<Vec<f32>, LabError> {
         let (width, height) = (self.grid.width(), self.grid.height());
         Ok(metrics::flip(&self.shown, shown, width, height, self.pixels_per_degree)?.values)
     }
 
     /// Mean over each tile of the FLIP errors of the pixels.
-    pub fn flip_of_tiles(&self, errors: &[f32]) -> Vec<f64> {
+    pub(super) fn flip_of_tiles(&self, errors: &[f32]) -> Vec<f64> {
         self.of_tiles(errors, mean)
     }
 
     /// All distances of a picture of linear radiance.
-    pub fn quality(&self, image: &[Rgb]) -> anyhow::Result<Quality> {
+    pub(super) fn quality(&self, image: &[Rgb]) -> Result<Quality, LabError> {
         let shown = self.encode(image);
         let (width, height) = (self.grid.width(), self.grid.height());
         let (flip, butteraugli) =

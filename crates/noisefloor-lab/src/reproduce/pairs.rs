@@ -1,6 +1,6 @@
 //! The pairs as rows, and what is known of each.
 
-use anyhow::bail;
+use crate::error::LabError;
 use ndarray::Array2;
 use noisefloor::{Scaler, squared_distances};
 use noisefloor_learn::{Level, Origin, Table};
@@ -9,17 +9,18 @@ use serde::{Deserialize, Serialize};
 /// What is written into the rows. The paper does not say.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Scaling {
+pub enum PairScaling {
     /// Display values, white at 1.
     Display,
     /// Each number with mean 0 and standard deviation 1 over all synthesised pairs.
     Standardised,
 }
 
-impl Scaling {
+impl PairScaling {
     /// In the order in which [`Pairs::scale`] can get from one to the next.
-    pub const ALL: [Self; 2] = [Self::Display, Self::Standardised];
+    pub(super) const ALL: [Self; 2] = [Self::Display, Self::Standardised];
 
+    /// For files and tables.
     pub fn name(self) -> &'static str {
         match self {
             Self::Display => "display",
@@ -29,37 +30,37 @@ impl Scaling {
 }
 
 /// What is known of a pair.
-pub struct Pair {
+pub(super) struct Pair {
     /// Row of its reference.
-    pub zone: usize,
-    pub group: String,
-    pub converged: bool,
+    pub(super) zone: usize,
+    pub(super) group: String,
+    pub(super) converged: bool,
 }
 
 /// Pairs as they come from the corpora.
-pub struct Loaded {
-    pub digest: String,
-    pub table: Table,
+pub(super) struct Loaded {
+    pub(super) digest: String,
+    pub(super) table: Table,
 }
 
 /// Pairs as rows of matrices: synthesised ones first, then real ones. A row of numbers is that of the tile, then that of its reference,
 /// which all pairs of a zone share.
-pub struct Pairs {
-    pub tiles: Array2<f32>,
-    pub references: Array2<f32>,
-    pub known: Vec<Pair>,
+pub(super) struct Pairs {
+    pub(super) tiles: Array2<f32>,
+    pub(super) references: Array2<f32>,
+    pub(super) known: Vec<Pair>,
     /// How many are synthesised.
-    pub synthesised: usize,
-    scaling: Scaling,
+    pub(super) synthesised: usize,
+    scaling: PairScaling,
 }
 
 impl Loaded {
     /// Of a censored zone only the levels below its threshold are certain.
-    pub fn into_pairs(mut self) -> anyhow::Result<Pairs> {
+    pub(super) fn into_pairs(mut self) -> Result<Pairs, LabError> {
         let groups = self.table.groups();
         if groups.len() < 3 {
             let (found, names) = (groups.len(), groups.join(", "));
-            bail!("leaving scenes out needs at least 3 groups of scenes; the corpus has {found}: {names}");
+            return Err(LabError::TooFewGroups { found, names });
         }
         let half = self.table.descriptor.len() / 2;
         let (mut tiles, mut known, mut synthesised) = (Vec::new(), Vec::new(), 0);
@@ -84,15 +85,15 @@ impl Loaded {
                 synthesised = known.len();
             }
         }
-        let tiles = Array2::from_shape_vec((known.len(), half), tiles)?;
-        Ok(Pairs { tiles, references, known, synthesised, scaling: Scaling::Display })
+        let tiles = matrix((known.len(), half), tiles);
+        Ok(Pairs { tiles, references, known, synthesised, scaling: PairScaling::Display })
     }
 }
 
 impl Pairs {
     /// Brings the numbers from display values to `scaling`, if they are not there yet.
-    pub fn scale(&mut self, scaling: Scaling) {
-        if (self.scaling, scaling) == (Scaling::Display, Scaling::Standardised) {
+    pub(super) fn scale(&mut self, scaling: PairScaling) {
+        if (self.scaling, scaling) == (PairScaling::Display, PairScaling::Standardised) {
             let learned = self.known[..self.synthesised].iter().map(|p| p.zone);
             standardise(&mut self.tiles, 0..self.synthesised);
             standardise(&mut self.references, learned);
@@ -101,12 +102,12 @@ impl Pairs {
     }
 
     /// All numbers of a pair.
-    pub fn row(&self, i: usize) -> Vec<f32> {
+    pub(super) fn row(&self, i: usize) -> Vec<f32> {
         self.tiles.row(i).iter().chain(self.references.row(self.known[i].zone)).copied().collect()
     }
 
     /// ‖x − y‖² of all pairs: that of the tiles and that of the references.
-    pub fn squared_distances(&self, on_block: impl Fn(usize, usize) + Sync) -> Array2<f64> {
+    pub(super) fn squared_distances(&self, on_block: impl Fn(usize, usize) + Sync) -> Array2<f64> {
         let mut squared = squared_distances(self.tiles.view(), on_block);
         let references = squared_distances(self.references.view(), |_, _| ());
         for (mut row, one) in squared.rows_mut().into_iter().zip(&self.known) {
@@ -117,12 +118,18 @@ impl Pairs {
     }
 
     /// Names of the groups, sorted, each once.
-    pub fn groups(&self) -> Vec<&str> {
+    pub(super) fn groups(&self) -> Vec<&str> {
         let mut groups: Vec<&str> = self.known.iter().map(|p| p.group.as_str()).collect();
         groups.sort_unstable();
         groups.dedup();
         groups
     }
+}
+
+/// Rows of numbers as a matrix; `numbers` has as many as the shape says.
+fn matrix((rows, columns): (usize, usize), numbers: Vec<f32>) -> Array2<f32> {
+    debug_assert_eq!(numbers.len(), rows * columns);
+    Array2::from_shape_vec((rows, columns), numbers).unwrap_or_default()
 }
 
 /// Each column with mean 0 and standard deviation 1 over the rows named.

@@ -1,39 +1,116 @@
 //! Curves of error against cost, with a marker where each criterion stops.
 
-use super::canvas::Paper;
-use crate::figures::{COLOURS, failed};
-use anyhow::Context;
-use noisefloor_image::{write_atomic, write_png};
+use super::outcome::{Comparison, CriterionRun, CurvePoint, families};
+use super::quality::Quality;
+use crate::drawing::{Pen, colour, failed, sign, svg};
+use crate::error::LabError;
+use noisefloor_image::maps::Canvas;
 use plotters::coord::Shift;
 use plotters::coord::ranged1d::{DefaultFormatting, KeyPointHint};
 use plotters::prelude::*;
-use std::path::Path;
+
+/// What a plot counts on its horizontal axis.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Cost {
+    /// Samples per pixel.
+    Samples,
+    /// Seconds, of the source and the criterion together.
+    Seconds,
+}
+
+impl Cost {
+    /// Both.
+    pub const ALL: [Self; 2] = [Self::Samples, Self::Seconds];
+
+    /// For file names.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Samples => "by-samples",
+            Self::Seconds => "by-seconds",
+        }
+    }
+
+    fn label(self) -> &'static str {
+        match self {
+            Self::Samples => "samples per pixel",
+            Self::Seconds => "seconds, source and criterion",
+        }
+    }
+
+    fn of_run(self, run: &CriterionRun) -> f64 {
+        match self {
+            Self::Samples => run.spp_mean,
+            Self::Seconds => run.source_seconds + run.criterion_seconds,
+        }
+    }
+
+    fn of_point(self, point: &CurvePoint) -> f64 {
+        match self {
+            Self::Samples => point.spp as f64,
+            Self::Seconds => point.source_seconds,
+        }
+    }
+}
+
+/// A plot in two formats.
+#[derive(Clone, Debug)]
+pub struct Plot {
+    /// As SVG.
+    pub svg: String,
+    /// As pixels.
+    pub canvas: Canvas,
+}
+
+/// Plots error against cost: uniform sampling as a curve, each criterion as a sign where it stopped.
+///
+/// # Errors
+/// [`LabError::Plot`] if nothing can be drawn.
+pub fn plot(comparison: &Comparison, cost: Cost) -> Result<Plot, LabError> {
+    let panels = MEASURES.map(|measure| Panel::new(comparison, cost, measure));
+    let svg = svg(SIZE, |root| draw(root, cost.label(), &panels))?;
+    let mut canvas = Canvas::new(SIZE.0 as usize, SIZE.1 as usize, [255; 3]);
+    draw(&Pen(&mut canvas).into_drawing_area(), cost.label(), &panels)?;
+    Ok(Plot { svg, canvas })
+}
+
+/// What is plotted: its name, and its value of a picture and of a criterion's picture.
+type Measure = (&'static str, fn(&Quality) -> f64, fn(&CriterionRun) -> f64);
+
+const MEASURES: [Measure; 4] = [
+    ("relMSE", |q| q.rel_mse, |r| r.rel_mse),
+    ("FLIP, worst tile", |q| q.flip_worst, |r| r.flip_worst),
+    ("FLIP, mean", |q| q.flip, |r| r.flip),
+    ("butteraugli, worst tile", |q| q.butteraugli_worst, |r| r.butteraugli_worst),
+];
 
 /// What is drawn into one panel: a measure of error against a cost.
-pub struct Panel {
-    pub title: &'static str,
+struct Panel {
+    title: &'static str,
     /// Uniform sampling: (cost, error), ascending.
-    pub curve: Vec<(f64, f64)>,
-    /// Each family: its name, and (cost, error) of each of its entrants.
-    pub markers: Vec<(String, Vec<(f64, f64)>)>,
+    curve: Vec<(f64, f64)>,
+    /// Each family: its name, and (cost, error) of each of its runs.
+    markers: Vec<(String, Vec<(f64, f64)>)>,
+}
+
+impl Panel {
+    fn new(comparison: &Comparison, cost: Cost, (title, of_point, of_run): Measure) -> Self {
+        let point = |point: &CurvePoint| (cost.of_point(point), of_point(&point.quality));
+        let family = |family: &str| {
+            let of = comparison.runs.iter().filter(|run| run.family == family);
+            let mut points: Vec<(f64, f64)> = of.map(|run| (cost.of_run(run), of_run(run))).collect();
+            points.sort_by(|a, b| a.0.total_cmp(&b.0));
+            (family.to_owned(), points)
+        };
+        Self {
+            title,
+            curve: comparison.curve.iter().map(point).collect(),
+            markers: families(&comparison.runs).into_iter().map(family).collect(),
+        }
+    }
 }
 
 const SIZE: (u32, u32) = (1040, 760);
 const LEGEND: u32 = 176;
-
-/// Writes `NAME.svg` and `NAME.png` with four panels or fewer, and one legend.
-pub fn write(folder: &Path, name: &str, cost: &str, panels: &[Panel]) -> anyhow::Result<()> {
-    let mut text = String::new();
-    draw(&SVGBackend::with_string(&mut text, SIZE).into_drawing_area(), cost, panels)?;
-    write_atomic(folder.join(name).with_extension("svg"), |to| {
-        std::io::Write::write_all(to, text.as_bytes())
-    })?;
-    let mut paper = Paper::new(SIZE);
-    draw(&paper.backend().into_drawing_area(), cost, panels)?;
-    let canvas = paper.into_canvas();
-    let path = folder.join(name).with_extension("png");
-    write_png(&path, canvas.width, canvas.height, &canvas.bytes).with_context(|| path.display().to_string())
-}
 
 /// Positive values of both axes, with a little room.
 fn range(values: impl Iterator<Item = f64>) -> (f64, f64) {
@@ -43,7 +120,11 @@ fn range(values: impl Iterator<Item = f64>) -> (f64, f64) {
     if low > high { (0.1, 1.0) } else { (low / 1.25, high * 1.25) }
 }
 
-fn draw<B: DrawingBackend>(root: &DrawingArea<B, Shift>, cost: &str, panels: &[Panel]) -> anyhow::Result<()> {
+fn draw<B: DrawingBackend>(
+    root: &DrawingArea<B, Shift>,
+    cost: &str,
+    panels: &[Panel],
+) -> Result<(), LabError> {
     root.fill(&WHITE).map_err(failed)?;
     let (plots, legend) = root.split_horizontally(SIZE.0 - LEGEND);
     for (panel, area) in panels.iter().zip(plots.split_evenly((panels.len().div_ceil(2), 2))) {
@@ -57,28 +138,17 @@ fn draw<B: DrawingBackend>(root: &DrawingArea<B, Shift>, cost: &str, panels: &[P
     legend.draw(&PathElement::new([(8, line(0)), (32, line(0))], BLACK.stroke_width(2))).map_err(failed)?;
     legend.draw(&Text::new("uniform", (42, line(0) - 8), style.clone())).map_err(failed)?;
     for (i, name) in names.enumerate() {
-        marker(&legend, i, (20, line(i + 1)))?;
+        legend.draw(&sign(i, (20, line(i + 1)), 6, colour(i))).map_err(failed)?;
         legend.draw(&Text::new(name.to_owned(), (42, line(i + 1) - 8), style.clone())).map_err(failed)?;
     }
     root.present().map_err(failed)
-}
-
-/// The sign of the family number `i`: a colour and a shape.
-fn marker<B: DrawingBackend>(area: &DrawingArea<B, Shift>, i: usize, at: (i32, i32)) -> anyhow::Result<()> {
-    let colour = COLOURS[i % COLOURS.len()];
-    match i % 3 {
-        0 => area.draw(&Circle::new(at, 6, colour.filled())),
-        1 => area.draw(&TriangleMarker::new(at, 7, colour.filled())),
-        _ => area.draw(&Cross::new(at, 6, colour.stroke_width(3))),
-    }
-    .map_err(failed)
 }
 
 fn draw_panel<B: DrawingBackend>(
     area: &DrawingArea<B, Shift>,
     cost: &str,
     panel: &Panel,
-) -> anyhow::Result<()> {
+) -> Result<(), LabError> {
     let points = || panel.curve.iter().chain(panel.markers.iter().flat_map(|m| &m.1));
     let (x0, x1) = range(points().map(|p| p.0));
     let (y0, y1) = range(points().map(|p| p.1));
@@ -108,14 +178,13 @@ fn draw_panel<B: DrawingBackend>(
     for (i, (_, family)) in panel.markers.iter().enumerate().rev() {
         let at = || family.iter().filter(drawable).copied();
         if at().count() > 1 {
-            let colour = COLOURS[i % COLOURS.len()];
-            chart.draw_series(LineSeries::new(at(), colour.mix(0.6))).map_err(failed)?;
+            chart.draw_series(LineSeries::new(at(), colour(i).mix(0.6))).map_err(failed)?;
         }
         let plotting = chart.plotting_area();
         for point in at() {
             let (x, y) = plotting.map_coordinate(&point);
             let (left, top) = area.get_base_pixel();
-            marker(area, i, (x - left, y - top))?;
+            area.draw(&sign(i, (x - left, y - top), 6, colour(i))).map_err(failed)?;
         }
     }
     Ok(())
@@ -156,7 +225,7 @@ fn ticks(low: f64, high: f64) -> Vec<f64> {
 }
 
 /// A number with no more digits than a label has room for.
-pub fn short(value: f64) -> String {
+pub(super) fn short(value: f64) -> String {
     let digits = if value <= 0.0 { 0 } else { (1 - value.abs().log10().floor() as i32).clamp(0, 5) as usize };
     let text = format!("{value:.digits$}");
     if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
@@ -180,24 +249,20 @@ mod tests {
         assert!((-3..9).all(|d| (2..=7).contains(&ticks(10f64.powi(d), 10f64.powi(d) * 2.1).len())));
     }
 
-    /// Both files are written, and what is drawn is there: ink of the curve, and of a marker.
+    /// What is drawn is there in both formats: ink of the curve, and of a sign.
     #[test]
     fn panels_are_drawn_in_both_formats() {
-        let folder = tempfile::tempdir().unwrap();
         let panel = Panel {
             title: "FLIP",
             curve: vec![(1.0, 0.5), (10.0, 0.2), (100.0, 0.05)],
             markers: vec![("oracle".into(), vec![(20.0, 0.1)]), ("none".into(), vec![(0.0, 0.0)])],
         };
-        write(folder.path(), "plot", "samples", &[panel]).unwrap();
-        let svg = std::fs::read_to_string(folder.path().join("plot.svg")).unwrap();
-        assert!(svg.contains("oracle") && svg.contains("polyline") && svg.contains("<circle"));
-        let png = noisefloor_image::read_picture(folder.path().join("plot.png")).unwrap();
-        let noisefloor_image::Picture::Display(image) = png else { panic!("a PNG is a display picture") };
-        assert_eq!((image.width, image.height), (SIZE.0 as usize, SIZE.1 as usize));
-        let blue = |p: &&noisefloor::Rgb| p[2] > 0.6 && p[0] < 0.1;
-        assert!(image.pixels.iter().filter(blue).count() > 100, "two circles of the first colour");
-        let black = |p: &&noisefloor::Rgb| p.iter().all(|c| *c < 0.05);
-        assert!(image.pixels.iter().filter(black).count() > 300, "the curve and the letters");
+        let text = svg(SIZE, |root| draw(root, "samples", std::slice::from_ref(&panel))).unwrap();
+        assert!(text.contains("oracle") && text.contains("polyline") && text.contains("<circle"));
+        let mut canvas = Canvas::new(SIZE.0 as usize, SIZE.1 as usize, [255; 3]);
+        draw(&Pen(&mut canvas).into_drawing_area(), "samples", &[panel]).unwrap();
+        let count = |ink: &dyn Fn(&[u8]) -> bool| canvas.bytes().chunks(3).filter(|p| ink(p)).count();
+        assert!(count(&|p| p[2] > 150 && p[0] < 25) > 100, "two circles of the first colour");
+        assert!(count(&|p| p.iter().all(|c| *c < 13)) > 300, "the curve and the letters");
     }
 }

@@ -1,15 +1,15 @@
 //! Pictures of an evaluation: thresholds of people and of the model over each scene, one against the other, and the reliability
 //! curve.
 
-use crate::heat_map::{self, Mark, Scale};
-use anyhow::Context;
+use crate::drawing::{colour, failed, sign, svg};
+use crate::error::LabError;
+use crate::files::{make_folder, write_text};
 use noisefloor::{Display, Rgb, Tile};
-use noisefloor_image::{write_atomic, write_png};
-use noisefloor_learn::{Corpus, Encoding};
-use noisefloor_learn::{Prediction, ReliabilityBin};
+use noisefloor_image::maps::{Canvas, ColourScale, TileMark, draw_tiles};
+use noisefloor_learn::{Corpus, CorpusError, Encoding, JudgedZone, Prediction, ReliabilityBin};
+use plotters::coord::Shift;
 use plotters::prelude::*;
 use std::collections::BTreeMap;
-use std::fs::create_dir_all;
 use std::path::{Path, PathBuf};
 
 /// Where a zone lies in its picture.
@@ -27,59 +27,69 @@ const GREY: Rgb = [0.85; 3];
 /// Of the ratio of predicted and human thresholds: beyond, colours are at their end.
 const WIDEST_RATIO: f64 = 3.0;
 
-/// Writes `zones-SCENE.png`, `thresholds.svg` and `reliability.svg` into the folder. `corpus` are the folders that the zones come
-/// from, where they are at hand: zones are then drawn over their pictures. `bins` is the reliability curve.
-pub fn write(
-    dir: &Path,
-    corpus: &[PathBuf],
-    predictions: &[Prediction],
-    bins: &[ReliabilityBin],
-) -> anyhow::Result<()> {
-    create_dir_all(dir).with_context(|| format!("{}: cannot be made", dir.display()))?;
+/// Draws thresholds of people and of the model over each scene, with their ratio as colour: (scene, map). `corpus` are the
+/// folders that the zones come from, where they are at hand: zones are then drawn over their pictures.
+///
+/// # Errors
+/// [`LabError::Corpus`] if a corpus cannot be read.
+pub fn map_zones(corpus: &[PathBuf], predictions: &[Prediction]) -> Result<Vec<(String, Canvas)>, LabError> {
     let mut scenes: Vec<&str> = predictions.iter().map(|p| p.scene.as_str()).collect();
     scenes.dedup();
     let mut pictures = BTreeMap::new();
     for folder in corpus {
         pictures.extend(pictures_of(folder)?);
     }
+    let mut maps = Vec::new();
     for scene in scenes {
         let zones: Vec<&Prediction> = predictions.iter().filter(|p| p.scene == scene).collect();
-        let (picture, places) = match pictures.remove(scene) {
-            Some(found) => found,
-            None => blank(&zones),
-        };
-        let mark = |p: &&Prediction| {
-            Some(Mark {
-                tile: *places.get(&(p.scene.clone(), p.zone))?,
-                value: p.predicted_spp / p.human_spp,
-                label: format!("{:.0} | {:.0}", p.human_spp, p.predicted_spp),
-                unfamiliar: p.unfamiliar,
-            })
-        };
-        let marks: Vec<Mark> = zones.iter().filter_map(mark).collect();
-        let scale = Scale {
-            title: "people|model\nand ratio",
-            low: 1.0 / WIDEST_RATIO,
-            high: WIDEST_RATIO,
-            log: true,
-            colours: colorous::PURPLE_ORANGE,
-            landmark: None,
-        };
-        let map = heat_map::draw(picture.width, &picture.pixels, &marks, &scale);
-        write_png(dir.join(format!("zones-{scene}.png")), map.width, map.height, &map.bytes)?;
+        let (picture, places) = pictures.remove(scene).unwrap_or_else(|| blank(&zones));
+        let marks: Vec<TileMark> = zones.iter().filter_map(|zone| mark(zone, &places)).collect();
+        maps.push((scene.to_owned(), draw_tiles(picture.width, &picture.pixels, &marks, &RATIO)));
     }
-    let svg = |name: &str, draw: &dyn Fn(&mut String) -> anyhow::Result<()>| {
-        let mut text = String::new();
-        draw(&mut text)?;
-        write_atomic(dir.join(name), |to| std::io::Write::write_all(to, text.as_bytes()))?;
-        anyhow::Ok(())
-    };
-    svg("thresholds.svg", &|to| thresholds(to, predictions))?;
-    svg("reliability.svg", &|to| reliability(to, bins))
+    Ok(maps)
+}
+
+/// Of predicted and human thresholds.
+const RATIO: ColourScale = ColourScale {
+    title: "people|model\nand ratio",
+    low: 1.0 / WIDEST_RATIO,
+    high: WIDEST_RATIO,
+    log: true,
+    colours: colorous::PURPLE_ORANGE,
+    landmark: None,
+};
+
+fn mark(zone: &Prediction, places: &Places) -> Option<TileMark> {
+    Some(TileMark {
+        tile: *places.get(&(zone.scene.clone(), zone.zone))?,
+        value: zone.predicted_spp / zone.human_spp,
+        label: format!("{:.0} | {:.0}", zone.human_spp, zone.predicted_spp),
+        unfamiliar: zone.unfamiliar,
+    })
+}
+
+/// Writes `zones-SCENE.png` of [`map_zones`], `thresholds.svg` and `reliability.svg` into the folder, which is made. `bins` is the
+/// reliability curve.
+///
+/// # Errors
+/// [`LabError`] if a corpus cannot be read or a file cannot be written.
+pub fn write_figures(
+    folder: &Path,
+    corpus: &[PathBuf],
+    predictions: &[Prediction],
+    bins: &[ReliabilityBin],
+) -> Result<(), LabError> {
+    make_folder(folder)?;
+    for (scene, map) in map_zones(corpus, predictions)? {
+        map.save(folder.join(format!("zones-{scene}.png")))?;
+    }
+    write_text(&folder.join("thresholds.svg"), &plot_thresholds(predictions)?)?;
+    write_text(&folder.join("reliability.svg"), &plot_reliability(bins)?)?;
+    Ok(())
 }
 
 /// The most converged picture of each scene of a corpus, put together from its zones, and where these lie.
-fn pictures_of(folder: &Path) -> anyhow::Result<BTreeMap<String, (Picture, Places)>> {
+fn pictures_of(folder: &Path) -> Result<BTreeMap<String, (Picture, Places)>, CorpusError> {
     let corpus = Corpus::open(folder)?;
     let mut found = BTreeMap::new();
     for scene in corpus.scenes() {
@@ -99,7 +109,7 @@ fn pictures_of(folder: &Path) -> anyhow::Result<BTreeMap<String, (Picture, Place
                 pixels[(zone.y + i / zone.width) * width + zone.x + i % zone.width] = shown;
             }
         }
-        let place = |z: &noisefloor_learn::JudgedZone| {
+        let place = |z: &JudgedZone| {
             let tile = Tile { index: z.zone as usize, x: z.x, y: z.y, width: z.width, height: z.height };
             ((z.scene.clone(), z.zone), tile)
         };
@@ -120,32 +130,30 @@ fn blank(zones: &[&Prediction]) -> (Picture, Places) {
     (picture, zones.iter().enumerate().map(place).collect())
 }
 
-/// Colours that people with colour-blindness can tell apart too (Okabe and Ito 2008), and a shape for each.
-pub const COLOURS: [RGBColor; 8] = [
-    RGBColor(0, 114, 178),
-    RGBColor(213, 94, 0),
-    RGBColor(0, 158, 115),
-    RGBColor(204, 121, 167),
-    RGBColor(86, 180, 233),
-    RGBColor(230, 159, 0),
-    RGBColor(0, 0, 0),
-    RGBColor(120, 120, 120),
-];
 const SIZE: (u32, u32) = (640, 560);
 const LETTERS: (&str, u32) = ("sans-serif", 15);
 
-pub fn failed(error: impl std::fmt::Display) -> anyhow::Error {
-    anyhow::anyhow!("a plot cannot be drawn: {error}")
+/// Plots predicted against human thresholds as SVG, with lines at half, once and twice.
+///
+/// # Errors
+/// [`LabError::Plot`] if nothing can be drawn.
+pub fn plot_thresholds(predictions: &[Prediction]) -> Result<String, LabError> {
+    svg(SIZE, |root| thresholds(root, predictions))
 }
 
-/// Predicted against human thresholds, with lines at half, once and twice.
-fn thresholds(to: &mut String, predictions: &[Prediction]) -> anyhow::Result<()> {
+/// Plots observed against predicted probability as SVG; the area of a point is its share of the levels.
+///
+/// # Errors
+/// [`LabError::Plot`] if nothing can be drawn.
+pub fn plot_reliability(bins: &[ReliabilityBin]) -> Result<String, LabError> {
+    svg(SIZE, |root| reliability(root, bins))
+}
+
+fn thresholds(root: &DrawingArea<SVGBackend<'_>, Shift>, predictions: &[Prediction]) -> Result<(), LabError> {
     let all = predictions.iter().flat_map(|p| [p.human_spp, p.predicted_spp]);
     let (low, high) = all.fold((f64::INFINITY, 1.0f64), |(l, h), v| (l.min(v), h.max(v)));
     let (low, high) = (low.min(high) / 1.3, high * 1.3);
-    let root = SVGBackend::with_string(to, SIZE).into_drawing_area();
-    root.fill(&WHITE).map_err(failed)?;
-    let mut chart = ChartBuilder::on(&root)
+    let mut chart = ChartBuilder::on(root)
         .margin(12)
         .x_label_area_size(44)
         .y_label_area_size(64)
@@ -172,18 +180,10 @@ fn thresholds(to: &mut String, predictions: &[Prediction]) -> anyhow::Result<()>
     let mut scenes: Vec<&str> = predictions.iter().map(|p| p.scene.as_str()).collect();
     scenes.dedup();
     for (i, scene) in scenes.iter().enumerate() {
-        let colour = COLOURS[i % COLOURS.len()];
-        let points = predictions.iter().filter(|p| p.scene == *scene).map(|p| (p.human_spp, p.predicted_spp));
-        let series = match i % 3 {
-            0 => chart.draw_series(points.map(|at| Circle::new(at, 4, colour.filled()).into_dyn())),
-            1 => chart.draw_series(points.map(|at| TriangleMarker::new(at, 5, colour.filled()).into_dyn())),
-            _ => chart.draw_series(points.map(|at| Cross::new(at, 4, colour.stroke_width(2)).into_dyn())),
-        };
-        series.map_err(failed)?.label((*scene).to_owned()).legend(move |(x, y)| match i % 3 {
-            0 => Circle::new((x + 10, y), 4, colour.filled()).into_dyn(),
-            1 => TriangleMarker::new((x + 10, y), 5, colour.filled()).into_dyn(),
-            _ => Cross::new((x + 10, y), 4, colour.stroke_width(2)).into_dyn(),
-        });
+        let of_scene = predictions.iter().filter(|p| p.scene == *scene);
+        let signs = of_scene.map(|p| sign(i, (p.human_spp, p.predicted_spp), 4, colour(i)));
+        let legend = move |(x, y)| sign(i, (x + 10, y), 4, colour(i));
+        chart.draw_series(signs).map_err(failed)?.label((*scene).to_owned()).legend(legend);
     }
     chart
         .configure_series_labels()
@@ -193,14 +193,11 @@ fn thresholds(to: &mut String, predictions: &[Prediction]) -> anyhow::Result<()>
         .label_font(LETTERS)
         .draw()
         .map_err(failed)?;
-    root.present().map_err(failed)
+    Ok(())
 }
 
-/// Observed against predicted probability; the area of a point is its share of the levels.
-fn reliability(to: &mut String, bins: &[ReliabilityBin]) -> anyhow::Result<()> {
-    let root = SVGBackend::with_string(to, SIZE).into_drawing_area();
-    root.fill(&WHITE).map_err(failed)?;
-    let mut chart = ChartBuilder::on(&root)
+fn reliability(root: &DrawingArea<SVGBackend<'_>, Shift>, bins: &[ReliabilityBin]) -> Result<(), LabError> {
+    let mut chart = ChartBuilder::on(root)
         .margin(12)
         .x_label_area_size(44)
         .y_label_area_size(64)
@@ -218,12 +215,12 @@ fn reliability(to: &mut String, bins: &[ReliabilityBin]) -> anyhow::Result<()> {
     let diagonal = LineSeries::new([(0.0, 0.0), (1.0, 1.0)], RGBColor(150, 150, 150));
     chart.draw_series(diagonal).map_err(failed)?;
     let points = || bins.iter().map(|b| (b.predicted, b.observed));
-    chart.draw_series(LineSeries::new(points(), COLOURS[0])).map_err(failed)?;
+    chart.draw_series(LineSeries::new(points(), colour(0))).map_err(failed)?;
     let levels: usize = bins.iter().map(|b| b.levels).sum();
     let circle = |b: &ReliabilityBin| {
         let radius = 2.0 + 22.0 * (b.levels as f64 / levels as f64).sqrt();
-        Circle::new((b.predicted, b.observed), radius.round() as i32, COLOURS[0].mix(0.5).filled())
+        Circle::new((b.predicted, b.observed), radius.round() as i32, colour(0).mix(0.5).filled())
     };
     chart.draw_series(bins.iter().map(circle)).map_err(failed)?;
-    root.present().map_err(failed)
+    Ok(())
 }

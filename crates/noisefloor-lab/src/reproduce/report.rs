@@ -1,30 +1,32 @@
 //! All results together: reproduce.json, and the tables that are printed and written to reproduce.md.
 
-use super::outcome::{Count, Machine, Outcome, Query};
-use super::protocol::Protocol;
-use crate::args::ReproduceArgs;
+use super::Reproduction;
+use super::outcome::{Count, MachineResult, ProtocolOutcome, QueryCost};
+use super::protocol::PairProtocol;
 use serde::Serialize;
 
-#[derive(Serialize)]
-pub struct Report {
+/// All results together.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ReproductionReport {
     /// Zones' edge in pixels.
-    edge: usize,
+    pub edge: usize,
     /// Levels a zone.
-    levels: usize,
+    pub levels: usize,
     /// What to know before reading a number.
-    notes: Vec<String>,
-    outcomes: Vec<Outcome>,
+    pub notes: Vec<String>,
+    /// One for each representation, scaling and protocol.
+    pub outcomes: Vec<ProtocolOutcome>,
 }
 
-impl Report {
-    pub fn new(args: &ReproduceArgs, outcomes: Vec<Outcome>) -> Self {
+impl ReproductionReport {
+    pub(super) fn new(job: &Reproduction, outcomes: Vec<ProtocolOutcome>) -> Self {
         let real = outcomes.first().map(|o| total(o).1).unwrap_or_default();
         let notes = vec![
             format!(
                 "All levels that are learned are synthesised: {} a zone with equal steps up to its most converged image, noise ∝ 1/√n \
                  from two realisations in turn. Real images ({}) are asked about, never learned, and counted apart; but the noise that is laid over a scene is taken \
                  from them.",
-                args.levels,
+                job.levels,
                 real.noisy + real.identical,
             ),
             "Where a scene has no reference.exr, the most converged image stands in for the ray-traced reference. The paper's reference has \
@@ -38,9 +40,10 @@ impl Report {
                 .into(),
             "Two machines train at once, where there are several.".into(),
         ];
-        Self { edge: args.edge, levels: args.levels, notes, outcomes }
+        Self { edge: job.edge, levels: job.levels, notes, outcomes }
     }
 
+    /// Tables for reading.
     pub fn markdown(&self) -> String {
         let learned = self.outcomes.iter().flat_map(|o| &o.machines).map(|m| m.examples).max().unwrap_or(0);
         let mut text = format!("{learned} pairs of {e}×{e} pixels, C = 2, γ = 2.\n\n", e = self.edge);
@@ -83,7 +86,7 @@ impl Report {
             real_identical,
             real_always,
         ];
-        let left_out = self.outcomes.iter().filter(|o| o.of.protocol == Protocol::SceneLeftOut);
+        let left_out = self.outcomes.iter().filter(|o| o.of.protocol == PairProtocol::SceneLeftOut);
         text += &table(header, left_out.flat_map(scenes).collect());
         text += "\n";
         for note in &self.notes {
@@ -98,8 +101,9 @@ const SHARES_OF_REAL: [&str; 4] =
     ["real images right", "of them noisy", "of them identical", "real, always identical"];
 
 /// Synthesised and real pairs that were asked about, over all machines.
-fn total(outcome: &Outcome) -> (Count, Count) {
-    let sum = |of: fn(&Machine) -> Count| outcome.machines.iter().map(of).fold(Count::default(), Count::add);
+fn total(outcome: &ProtocolOutcome) -> (Count, Count) {
+    let sum =
+        |of: fn(&MachineResult) -> Count| outcome.machines.iter().map(of).fold(Count::default(), Count::add);
     (sum(|m| m.synthesised), sum(|m| m.real))
 }
 
@@ -117,17 +121,17 @@ fn shares(count: Count) -> [String; 4] {
     ]
 }
 
-fn what(outcome: &Outcome) -> [String; 2] {
+fn what(outcome: &ProtocolOutcome) -> [String; 2] {
     let pairs = outcome.of.pairs.name().trim_end_matches("-pair");
     [pairs.to_owned(), outcome.of.scaling.name().to_owned()]
 }
 
-fn scores(outcome: &Outcome) -> [String; 12] {
+fn scores(outcome: &ProtocolOutcome) -> [String; 12] {
     let asked = match outcome.of.protocol {
-        Protocol::Learned => "the pairs learned",
-        Protocol::PairsHeldOut => "a fifth of the pairs, held out",
-        Protocol::HalfTheScenes => "the other half of the scenes",
-        Protocol::SceneLeftOut => "each scene, left out",
+        PairProtocol::Learned => "the pairs learned",
+        PairProtocol::PairsHeldOut => "a fifth of the pairs, held out",
+        PairProtocol::HalfTheScenes => "the other half of the scenes",
+        PairProtocol::SceneLeftOut => "each scene, left out",
     };
     let vectors = |pick: fn(f64, f64) -> f64| {
         let shares = outcome.machines.iter().map(|m| m.support_vectors as f64 / m.examples as f64);
@@ -143,7 +147,7 @@ fn scores(outcome: &Outcome) -> [String; 12] {
     [pairs, values, asked.to_owned(), a, b, c, d, e, f, g, h, vectors]
 }
 
-fn cost(outcome: &Outcome, query: &Query) -> [String; 7] {
+fn cost(outcome: &ProtocolOutcome, query: &QueryCost) -> [String; 7] {
     let [pairs, values] = what(outcome);
     let training: f64 = outcome.machines.iter().map(|m| m.seconds_training).sum();
     [
@@ -157,8 +161,8 @@ fn cost(outcome: &Outcome, query: &Query) -> [String; 7] {
     ]
 }
 
-fn scenes(outcome: &Outcome) -> Vec<[String; 11]> {
-    let row = |machine: &Machine| {
+fn scenes(outcome: &ProtocolOutcome) -> Vec<[String; 11]> {
+    let row = |machine: &MachineResult| {
         let [pairs, values] = what(outcome);
         let ([a, b, c, d], [e, f, g, h]) = (shares(machine.synthesised), shares(machine.real));
         [pairs, values, machine.asked.clone(), a, b, c, d, e, f, g, h]

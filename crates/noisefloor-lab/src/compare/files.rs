@@ -1,0 +1,74 @@
+//! Comparisons on disk.
+
+use super::outcome::{Comparison, CriterionRun, CurvePoint};
+use super::page::page;
+use super::pictures::Pictures;
+use super::plots::{Cost, Plot};
+use super::quality::Quality;
+use crate::error::LabError;
+use crate::files::{make_folder, write_csv, write_json, write_text};
+use serde::Serialize;
+use std::path::Path;
+
+/// One line of curve.csv.
+#[derive(Serialize)]
+struct CurveRow<'a> {
+    scene: &'a str,
+    spp: u64,
+    source_seconds: f64,
+    rel_mse: f64,
+    psnr: f64,
+    flip: f64,
+    flip_worst: f64,
+    butteraugli: f64,
+    butteraugli_worst: f64,
+}
+
+impl<'a> CurveRow<'a> {
+    fn new(scene: &'a str, point: &CurvePoint) -> Self {
+        let CurvePoint { spp, source_seconds, quality } = *point;
+        let Quality { rel_mse, psnr, flip, flip_worst, butteraugli, butteraugli_worst } = quality;
+        Self { scene, spp, source_seconds, rel_mse, psnr, flip, flip_worst, butteraugli, butteraugli_worst }
+    }
+}
+
+/// Writes what there is of one scene into a folder, which is made: curve.csv, tiles.csv, plots (SVG and PNG), pictures and crops.
+///
+/// # Errors
+/// [`LabError`] if a file cannot be written.
+pub fn write_scene(
+    folder: &Path,
+    comparison: &Comparison,
+    pictures: &Pictures,
+    plots: &[(Cost, Plot)],
+) -> Result<(), LabError> {
+    make_folder(folder)?;
+    let scene = &comparison.scene;
+    write_csv(&folder.join("curve.csv"), comparison.curve.iter().map(|point| CurveRow::new(scene, point)))?;
+    write_csv(&folder.join("tiles.csv"), &comparison.tiles)?;
+    pictures.reference.save(folder.join("reference.png"))?;
+    for (spec, canvas) in &pictures.criteria {
+        canvas.save(folder.join(format!("{}.png", spec.replace(':', "-"))))?;
+    }
+    for crop in &pictures.crops {
+        crop.sheet.save(folder.join(format!("crop-{}.png", crop.name)))?;
+    }
+    for (cost, plot) in plots {
+        let path = folder.join(cost.name());
+        write_text(&path.with_extension("svg"), &plot.svg)?;
+        plot.canvas.save(path.with_extension("png"))?;
+    }
+    Ok(())
+}
+
+/// Writes index.html, runs.csv and runs.json of all scenes. `sections` are those of [`section`](super::section).
+///
+/// # Errors
+/// [`LabError::Write`] if a file cannot be written.
+pub fn write_page(folder: &Path, all: &[Comparison], sections: &[String]) -> Result<(), LabError> {
+    let runs: Vec<&CriterionRun> = all.iter().flat_map(|comparison| &comparison.runs).collect();
+    write_text(&folder.join("index.html"), &page(all, sections))?;
+    write_csv(&folder.join("runs.csv"), &runs)?;
+    write_json(&folder.join("runs.json"), &runs)?;
+    Ok(())
+}

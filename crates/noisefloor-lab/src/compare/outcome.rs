@@ -1,0 +1,233 @@
+//! What came of a comparison, as data.
+
+use super::quality::{Quality, Yardstick};
+use super::race::{Entrant, Race};
+use crate::error::LabError;
+use serde::Serialize;
+
+/// What a criterion took of a scene's run, and what it left: a line of runs.csv.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct CriterionRun {
+    /// The scene.
+    pub scene: String,
+    /// Who rendered.
+    pub source: String,
+    /// The criterion as it was asked for: `cycles:0.01`.
+    pub criterion: String,
+    /// What the criterion calls itself, with its constant.
+    pub name: String,
+    /// What it is one of: `cycles`. Runs of one family differ only in their constant.
+    pub family: String,
+    /// Samples per pixel, on average.
+    pub spp_mean: f64,
+    /// Samples per pixel of the tile with most.
+    pub spp_most: u64,
+    /// Tiles in the picture.
+    pub tiles: usize,
+    /// Tiles that the criterion was satisfied with before the limit.
+    pub tiles_converged: usize,
+    /// Seconds in the source for these samples.
+    pub source_seconds: f64,
+    /// Seconds in the criterion.
+    pub criterion_seconds: f64,
+    /// As in [`Quality`], and so are those that follow.
+    pub rel_mse: f64,
+    /// In dB.
+    pub psnr: f64,
+    /// Mean.
+    pub flip: f64,
+    /// Of the worst tile.
+    pub flip_worst: f64,
+    /// 3-norm.
+    pub butteraugli: f64,
+    /// Of the worst tile.
+    pub butteraugli_worst: f64,
+    /// Samples that uniform sampling takes until its worst tile is as good, by FLIP, over those of this criterion. `None` if it
+    /// does not get there.
+    pub uniform_over_this: Option<f64>,
+    /// The same by butteraugli.
+    pub uniform_over_this_butteraugli: Option<f64>,
+}
+
+/// Uniform sampling with that many samples: a line of curve.csv.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct CurvePoint {
+    /// Samples per pixel, everywhere.
+    pub spp: u64,
+    /// Seconds in the source.
+    pub source_seconds: f64,
+    /// How far the picture is from the converged one.
+    pub quality: Quality,
+}
+
+/// Where a criterion stopped a tile, and how that tile looks: a line of tiles.csv.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct TileStop {
+    /// The scene.
+    pub scene: String,
+    /// The criterion as it was asked for.
+    pub criterion: String,
+    /// Index of the tile.
+    pub tile: usize,
+    /// Left edge in pixels.
+    pub x: usize,
+    /// Top edge in pixels.
+    pub y: usize,
+    /// Samples per pixel.
+    pub spp: u64,
+    /// Mean FLIP error.
+    pub flip: f64,
+}
+
+/// What came of the criteria on one scene.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Comparison {
+    /// The scene.
+    pub scene: String,
+    /// Who rendered.
+    pub source: String,
+    /// Width and height in pixels.
+    pub size: (usize, usize),
+    /// Where the converged picture comes from, for people.
+    pub reference: String,
+    /// Whether the run was cancelled: what is here is of the samples until then.
+    pub cancelled: bool,
+    /// The criteria, in the order in which they were given.
+    pub runs: Vec<CriterionRun>,
+    /// Uniform sampling, by increasing samples.
+    pub curve: Vec<CurvePoint>,
+    /// All tiles, criterion by criterion.
+    pub tiles: Vec<TileStop>,
+}
+
+/// What a comparison is called.
+#[derive(Clone, Debug)]
+pub struct Labels {
+    /// The scene.
+    pub scene: String,
+    /// Where the converged picture comes from, for people.
+    pub reference: String,
+}
+
+impl Comparison {
+    /// `flips` are the FLIP errors of each entrant's picture, tile by tile.
+    pub(super) fn new(
+        labels: Labels,
+        source: String,
+        race: &Race,
+        yardstick: &Yardstick,
+        flips: &[Vec<f64>],
+    ) -> Result<Self, LabError> {
+        let Labels { scene, reference } = labels;
+        let grid = yardstick.grid();
+        let run = |entrant: &Entrant| criterion_run(entrant, race, yardstick, &scene, &source);
+        let runs = race.entrants.iter().map(run).collect::<Result<_, _>>()?;
+        let point = |&(spp, quality): &(u64, Quality)| CurvePoint {
+            spp,
+            source_seconds: race.uniform_seconds(spp as f64),
+            quality,
+        };
+        let mut tiles = Vec::new();
+        for (entrant, flips) in race.entrants.iter().zip(flips) {
+            tiles.extend(grid.tiles().zip(flips).map(|(tile, &flip)| TileStop {
+                scene: scene.clone(),
+                criterion: entrant.spec.clone(),
+                tile: tile.index,
+                x: tile.x,
+                y: tile.y,
+                spp: entrant.film().samples(tile.index),
+                flip,
+            }));
+        }
+        Ok(Self {
+            source: source.clone(),
+            size: (grid.width(), grid.height()),
+            reference,
+            cancelled: race.cancelled,
+            runs,
+            curve: race.curve.iter().map(point).collect(),
+            tiles,
+            scene: scene.clone(),
+        })
+    }
+}
+
+fn criterion_run(
+    entrant: &Entrant,
+    race: &Race,
+    yardstick: &Yardstick,
+    scene: &str,
+    source: &str,
+) -> Result<CriterionRun, LabError> {
+    let film = entrant.film();
+    let grid = film.grid();
+    let spp_mean = film.total_samples() as f64 / (grid.width() * grid.height()) as f64;
+    let quality = yardstick.quality(&film.image())?;
+    let over =
+        |error: fn(&Quality) -> f64| uniform_samples(race, error, error(&quality)).map(|spp| spp / spp_mean);
+    Ok(CriterionRun {
+        scene: scene.into(),
+        source: source.into(),
+        criterion: entrant.spec.clone(),
+        name: entrant.name(),
+        family: entrant.family.clone(),
+        spp_mean,
+        spp_most: (0..grid.len()).map(|t| film.samples(t)).max().unwrap_or(0),
+        tiles: grid.len(),
+        tiles_converged: entrant.converged(),
+        source_seconds: race.source_seconds(film),
+        criterion_seconds: entrant.criterion_seconds,
+        rel_mse: quality.rel_mse,
+        psnr: quality.psnr,
+        flip: quality.flip,
+        flip_worst: quality.flip_worst,
+        butteraugli: quality.butteraugli,
+        butteraugli_worst: quality.butteraugli_worst,
+        uniform_over_this: over(|q| q.flip_worst),
+        uniform_over_this_butteraugli: over(|q| q.butteraugli_worst),
+    })
+}
+
+/// Samples per pixel at which uniform sampling is as good, between points of its curve along a straight line in logarithms; `None`
+/// outside the curve.
+fn uniform_samples(race: &Race, error: fn(&Quality) -> f64, wanted: f64) -> Option<f64> {
+    let points: Vec<(f64, f64)> =
+        race.curve.iter().map(|(spp, quality)| (*spp as f64, error(quality))).collect();
+    crossing(&points, wanted)
+}
+
+/// Where a falling curve first comes down to a value.
+fn crossing(points: &[(f64, f64)], wanted: f64) -> Option<f64> {
+    points.windows(2).find_map(|pair| {
+        let [(x0, y0), (x1, y1)] = [pair[0], pair[1]];
+        (y0 >= wanted && wanted >= y1 && y1 > 0.0).then(|| {
+            let place = if y0 > y1 { (y0 / wanted).ln() / (y0 / y1).ln() } else { 0.0 };
+            x0 * (x1 / x0).powf(place)
+        })
+    })
+}
+
+/// Names of the families, each once, in the order of the entrants.
+pub(super) fn families(runs: &[CriterionRun]) -> Vec<&str> {
+    let mut names: Vec<&str> = Vec::new();
+    for run in runs {
+        if !names.contains(&run.family.as_str()) {
+            names.push(&run.family);
+        }
+    }
+    names
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_falling_curve_is_crossed_between_its_points() {
+        let curve = [(1.0, 1.0), (4.0, 0.5), (16.0, 0.25)];
+        assert_eq!(crossing(&curve, 0.5), Some(4.0));
+        let middle = crossing(&curve, 0.5 / 2f64.sqrt()).unwrap();
+        assert!((middle - 8.0).abs() < 1e-9, "half way in logarithms: {middle}");
+        assert_eq!((crossing(&curve, 2.0), crossing(&curve, 0.2)), (None, None), "outside the curve");
+    }
+}

@@ -1,0 +1,194 @@
+//! One run that all criteria watch: each sees the same samples, and takes those of a tile until it stops it.
+
+use super::costs::Costs;
+use super::quality::{Quality, Yardstick};
+use crate::advance::{Advance, Watch};
+use crate::error::LabError;
+use noisefloor::{
+    Batch, Film, Params, ProgressiveSource, Request, Rgb, Session, StopReason, StoppingCriterion, Tile,
+    TileGrid,
+};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
+
+/// A criterion that watches the run.
+pub struct Entrant {
+    /// As it was asked for: `cycles:0.01`.
+    pub spec: String,
+    /// What it is one of: `cycles`. Entrants of one family differ in their constant alone.
+    pub family: String,
+    session: Session<Box<dyn StoppingCriterion + Send>>,
+    /// Seconds in the criterion.
+    pub criterion_seconds: f64,
+}
+
+impl Entrant {
+    /// A criterion that is about to watch a run of that size. `spec` is how it was asked for.
+    ///
+    /// # Errors
+    /// [`LabError::Session`] if the parameters are out of range.
+    pub fn new(
+        spec: String,
+        criterion: Box<dyn StoppingCriterion + Send>,
+        (width, height): (usize, usize),
+        params: &Params,
+    ) -> Result<Self, LabError> {
+        let family = spec.split(':').next().unwrap_or_default().to_owned();
+        let session = Session::new(width, height, criterion, *params)?;
+        Ok(Self { spec, family, session, criterion_seconds: 0.0 })
+    }
+
+    /// Its picture: each tile as it was when it stopped.
+    pub fn film(&self) -> &Film {
+        self.session.film()
+    }
+
+    /// What it calls itself, with its constant.
+    pub fn name(&self) -> String {
+        self.session.criterion().name()
+    }
+
+    /// Tiles that it was satisfied with, before a limit came.
+    pub fn converged(&self) -> usize {
+        self.session.stops().filter(|s| s.reason == StopReason::Converged).count()
+    }
+}
+
+/// What came of a run.
+pub(super) struct Race {
+    pub(super) entrants: Vec<Entrant>,
+    /// Uniform sampling: samples per pixel, and how far the picture then is from the converged one.
+    pub(super) curve: Vec<(u64, Quality)>,
+    /// Seconds that one more sample of each pixel of a tile costs, tile by tile.
+    pub(super) tile_seconds: Vec<f64>,
+    /// Whether somebody cancelled it.
+    pub(super) cancelled: bool,
+}
+
+impl Race {
+    /// Seconds in the source for the samples of a film.
+    pub(super) fn source_seconds(&self, film: &Film) -> f64 {
+        self.tile_seconds.iter().enumerate().map(|(tile, seconds)| seconds * film.samples(tile) as f64).sum()
+    }
+
+    /// Seconds in the source for so many samples of every pixel.
+    pub(super) fn uniform_seconds(&self, spp: f64) -> f64 {
+        self.tile_seconds.iter().sum::<f64>() * spp
+    }
+}
+
+/// Curve points lie this far apart, as a factor on samples.
+const SPACING: f64 = std::f64::consts::SQRT_2;
+
+/// What a run is made of.
+pub(super) struct Course<'a> {
+    pub(super) params: &'a Params,
+    /// Samples per pixel of a step.
+    pub(super) step: u32,
+    /// The converged picture: linear radiance, row-major.
+    pub(super) truth: &'a [Rgb],
+    /// For FLIP.
+    pub(super) pixels_per_degree: f64,
+    pub(super) cancel: &'a AtomicBool,
+    pub(super) watch: Watch<'a>,
+}
+
+impl Course<'_> {
+    /// Runs until every entrant has stopped every tile, or at the largest number of samples.
+    ///
+    /// Each step is half a batch for every tile: sessions fill one half of their film after the other. What a tile costs is measured in
+    /// the second step, where each is sampled in a call of its own, as shares of what all of them cost together in the calls after the
+    /// first, which may have to start something up.
+    pub(super) fn run(
+        &self,
+        source: &mut dyn ProgressiveSource,
+        entrants: Vec<Entrant>,
+    ) -> Result<(Race, Yardstick), LabError> {
+        let info = source.info();
+        let grid = TileGrid::new(info.width, info.height, self.params.tile)?;
+        let mut field = Field { entrants, film: Film::without_halves(grid), costs: Costs::new(grid.len()) };
+        let mut yardstick: Option<Yardstick> = None;
+        let mut curve: Vec<(u64, Quality)> = Vec::new();
+        let (mut done, mut cancelled) = (0u64, false);
+        while done < self.params.max_samples && field.open() > 0 {
+            cancelled = self.cancel.load(Ordering::Relaxed);
+            let samples = u32::try_from(self.params.max_samples - done).unwrap_or(self.step).min(self.step);
+            // The end of a recording, or of somebody's patience
+            if cancelled || !field.step(source, done, samples)? {
+                break;
+            }
+            done = field.film.samples(0);
+            let yardstick = yardstick.get_or_insert_with(|| self.settle(&mut field));
+            field.judge()?;
+            let last = curve.last().map_or(0.0, |&(spp, _)| spp as f64);
+            if done as f64 >= SPACING * last {
+                curve.push((done, yardstick.quality(&field.film.image())?));
+            }
+            let detail = format!("{} criteria not satisfied yet", field.open());
+            let (what, of) = ("samples per pixel", self.params.max_samples);
+            (self.watch)(Advance { what, done, of, detail: &detail });
+        }
+        let Field { mut entrants, film, costs } = field;
+        for entrant in &mut entrants {
+            entrant.session.close_all(if cancelled { StopReason::Cancelled } else { StopReason::MaxSamples });
+        }
+        let yardstick = yardstick.ok_or(LabError::NoSamples)?;
+        if curve.last().is_none_or(|&(spp, _)| spp < done) {
+            curve.push((done, yardstick.quality(&film.image())?));
+        }
+        let tile_seconds = costs.tile_seconds(&grid.tiles().collect::<Vec<_>>());
+        Ok((Race { entrants, curve, tile_seconds, cancelled }, yardstick))
+    }
+
+    /// All judge by one way to the screen, settled as a session would.
+    fn settle(&self, field: &mut Field) -> Yardstick {
+        let display = self.params.tone_mapping.settle(&field.film.image());
+        field.entrants.iter_mut().for_each(|e| e.session.set_display(display));
+        Yardstick::new(field.film.grid(), display, self.truth.to_vec(), self.pixels_per_degree)
+    }
+}
+
+/// All entrants, and the uniform picture that they watch.
+struct Field {
+    entrants: Vec<Entrant>,
+    film: Film,
+    costs: Costs,
+}
+
+impl Field {
+    /// Entrants that are not satisfied yet.
+    fn open(&self) -> usize {
+        self.entrants.iter().filter(|e| !e.session.is_done()).count()
+    }
+
+    /// Gives everybody the next samples of every tile; `false` if the source has no more.
+    fn step(
+        &mut self,
+        source: &mut dyn ProgressiveSource,
+        first: u64,
+        samples: u32,
+    ) -> Result<bool, LabError> {
+        let request = |tile: Tile| Request { tile, first, samples };
+        let requests: Vec<Request> = self.film.grid().tiles().map(request).collect();
+        let batches = self.costs.sample(source, &requests)?;
+        if batches.len() < requests.len() || batches.iter().any(|b| b.samples == 0) {
+            return Ok(false);
+        }
+        for Batch { tile, samples, mean } in &batches {
+            self.film.add(tile.index, *samples, mean)?;
+            for entrant in self.entrants.iter_mut().filter(|e| e.session.is_open(tile.index)) {
+                entrant.session.push(tile.index, *samples, mean)?;
+            }
+        }
+        Ok(true)
+    }
+
+    fn judge(&mut self) -> Result<(), LabError> {
+        for entrant in &mut self.entrants {
+            let began = Instant::now();
+            entrant.session.judge()?;
+            entrant.criterion_seconds += began.elapsed().as_secs_f64();
+        }
+        Ok(())
+    }
+}

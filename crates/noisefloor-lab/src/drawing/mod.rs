@@ -1,0 +1,46 @@
+//! What all plots share: colours, signs, and the way onto pixels.
+
+mod pen;
+mod sign;
+
+pub(crate) use pen::Pen;
+pub(crate) use sign::sign;
+
+use crate::error::LabError;
+use plotters::coord::Shift;
+use plotters::prelude::*;
+
+/// Colours that people with colour-blindness can tell apart too (Okabe and Ito 2008), and a shape for each.
+pub(crate) const COLOURS: [RGBColor; 8] = [
+    RGBColor(0, 114, 178),
+    RGBColor(213, 94, 0),
+    RGBColor(0, 158, 115),
+    RGBColor(204, 121, 167),
+    RGBColor(86, 180, 233),
+    RGBColor(230, 159, 0),
+    RGBColor(0, 0, 0),
+    RGBColor(120, 120, 120),
+];
+
+pub(crate) fn failed(error: impl std::fmt::Display) -> LabError {
+    LabError::Plot(error.to_string())
+}
+
+/// The colour of series number `i`.
+pub(crate) fn colour(i: usize) -> RGBColor {
+    COLOURS[i % COLOURS.len()]
+}
+
+/// An SVG plot of that size.
+pub(crate) fn svg(
+    size: (u32, u32),
+    draw: impl FnOnce(&DrawingArea<SVGBackend<'_>, Shift>) -> Result<(), LabError>,
+) -> Result<String, LabError> {
+    let mut text = String::new();
+    let root = SVGBackend::with_string(&mut text, size).into_drawing_area();
+    root.fill(&WHITE).map_err(failed)?;
+    draw(&root)?;
+    root.present().map_err(failed)?;
+    drop(root);
+    Ok(text)
+}

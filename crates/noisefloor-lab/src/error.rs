@@ -1,0 +1,128 @@
+//! Why an experiment failed.
+
+use noisefloor::{
+    CriterionError, FilmError, ParamsError, SessionError, SourceError, SvmTrainError, TileError,
+};
+use noisefloor_image::{PictureError, WriteError};
+use noisefloor_learn::{CorpusError, TableError};
+use noisefloor_rivals::ImageError;
+use std::io;
+use std::path::PathBuf;
+use thiserror::Error;
+
+/// Why an experiment failed.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum LabError {
+    /// The source of samples failed.
+    #[error(transparent)]
+    Source(#[from] SourceError),
+    /// A session refused samples.
+    #[error(transparent)]
+    Session(#[from] SessionError),
+    /// A criterion failed.
+    #[error(transparent)]
+    Criterion(#[from] CriterionError),
+    /// Parameters out of range.
+    #[error(transparent)]
+    Params(#[from] ParamsError),
+    /// The picture or its tiles have a size out of range.
+    #[error(transparent)]
+    Tile(#[from] TileError),
+    /// The film refused samples.
+    #[error(transparent)]
+    Film(#[from] FilmError),
+    /// Pictures that a metric cannot compare.
+    #[error(transparent)]
+    Metric(#[from] ImageError),
+    /// A picture could not be read.
+    #[error(transparent)]
+    Picture(#[from] PictureError),
+    /// A file could not be written.
+    #[error(transparent)]
+    Write(#[from] WriteError),
+    /// A corpus of human thresholds could not be read.
+    #[error(transparent)]
+    Corpus(#[from] CorpusError),
+    /// A corpus could not be described.
+    #[error(transparent)]
+    Table(#[from] TableError),
+    /// A machine could not be trained.
+    #[error("{machine}: {source}")]
+    Train {
+        /// Which machine.
+        machine: String,
+        /// Why not.
+        source: SvmTrainError,
+    },
+    /// A folder could not be made.
+    #[error("{}: this folder cannot be made: {source}", path.display())]
+    Folder {
+        /// The folder.
+        path: PathBuf,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// A plot could not be drawn.
+    #[error("the plot cannot be drawn: {0}")]
+    Plot(String),
+    /// The source gave no samples at all.
+    #[error("the source gave no samples")]
+    NoSamples,
+    /// The source ran out of samples before the reference had enough.
+    #[error(
+        "the source has only {spp} samples per pixel: give a converged picture, or ask for fewer samples of the reference"
+    )]
+    ShortOfSamples {
+        /// Samples per pixel that there are.
+        spp: u64,
+    },
+    /// The reference was cancelled; what there is of it is kept.
+    #[error("the reference is not finished: what there is of it is kept in {}, and the next run resumes it", path.display())]
+    Cancelled {
+        /// Where it is kept.
+        path: PathBuf,
+    },
+    /// A kept reference is not what the file beside it says.
+    #[error("{}: is not the picture that the file beside it describes; remove both", path.display())]
+    KeptReference {
+        /// The picture.
+        path: PathBuf,
+    },
+    /// Zones that do not make one picture.
+    #[error("{scene}: its zones are not squares of one size, which rivals need")]
+    Zones {
+        /// The scene.
+        scene: String,
+    },
+    /// Too few images to know the noise of a scene.
+    #[error("{scene}: too few images to tell its noise from its picture")]
+    TooFewImages {
+        /// The scene.
+        scene: String,
+    },
+    /// Too few groups of scenes to leave some out.
+    #[error("leaving scenes out needs at least 3 groups of scenes; the corpus has {found}: {names}")]
+    TooFewGroups {
+        /// How many there are.
+        found: usize,
+        /// Their names.
+        names: String,
+    },
+    /// A subset of more pairs than there are.
+    #[error("a subset of {asked} pairs is too large: at most {most}, half of the {all} pairs that there are")]
+    Subset {
+        /// Pairs asked for.
+        asked: usize,
+        /// Largest subset.
+        most: usize,
+        /// Pairs that there are.
+        all: usize,
+    },
+    /// A result that was written reads back as another one.
+    #[error("{}: has been changed since it was written; run again", path.display())]
+    Changed {
+        /// The result.
+        path: PathBuf,
+    },
+}

@@ -1,0 +1,152 @@
+//! The protocols of Takouachet et al. 2017 (§4.3 to §5), at the scale of the paper, and what comes of them.
+//!
+//! The paper trains on pairs: a noisy tile and its reference, with C = 2 and γ = 2. [`run`] does so with luminances and with noise
+//! masks, with values as displayed and standardised, by four ways to choose the pairs that are asked about.
+
+mod outcome;
+mod pairs;
+mod protocol;
+mod report;
+mod subset;
+
+pub use outcome::{Count, Fingerprint, MachineResult, ProtocolOutcome, QueryCost};
+pub use pairs::PairScaling;
+pub use protocol::PairProtocol;
+pub use report::ReproductionReport;
+pub use subset::{PairSubset, subset, write_subset};
+
+use crate::advance::{Advance, Watch};
+use crate::error::LabError;
+use crate::files::{make_folder, write_json, write_text};
+use ndarray::Array2;
+use noisefloor::{Descriptor, NoiseMask};
+use noisefloor_learn::describe_pairs;
+use pairs::{Loaded, Pairs};
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+/// What is reproduced.
+#[derive(Clone, Debug)]
+pub struct Reproduction {
+    /// Corpus folders.
+    pub corpus: Vec<PathBuf>,
+    /// Edge of the tiles in pixels: each is the centre of its zone.
+    pub edge: usize,
+    /// Levels a zone, with equal steps up to its most converged image.
+    pub levels: usize,
+}
+
+/// The distances between all pairs of one representation, and what they cost.
+struct Geometry {
+    /// ‖x − y‖² of all rows: synthesised pairs, then real ones.
+    squared: Array2<f64>,
+    seconds: f64,
+}
+
+impl Geometry {
+    fn of(pairs: &Pairs, watch: Watch<'_>) -> Self {
+        let begun = Instant::now();
+        let squared = pairs.squared_distances(|done, all| {
+            let what = "blocks of the matrix product";
+            watch(Advance { what, done: done as u64, of: all as u64, detail: "" });
+        });
+        Self { squared, seconds: begun.elapsed().as_secs_f64() }
+    }
+}
+
+/// Whether a result was computed now.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ResultState {
+    /// It is new.
+    Computed,
+    /// It was there already.
+    Kept,
+}
+
+/// Carries out all protocols. Each result is written whole into the folder, which is made, as soon as it is there, and those that
+/// are there already are not computed again. `on_result` is told of each result, with its file.
+///
+/// # Errors
+/// [`LabError`] if a corpus cannot be read or has fewer than three groups of scenes, a machine cannot be trained, or a result
+/// cannot be written.
+pub fn run(
+    job: &Reproduction,
+    folder: &Path,
+    on_result: &mut dyn FnMut(&Path, ResultState),
+    watch: Watch<'_>,
+) -> Result<ReproductionReport, LabError> {
+    make_folder(folder)?;
+    let mut outcomes = Vec::new();
+    for descriptor in [Descriptor::LuminancePair { edge: job.edge }, job.masks()] {
+        let loaded = job.load(descriptor, watch)?;
+        outcomes.extend(run_protocols(loaded, descriptor, folder, on_result, watch)?);
+    }
+    Ok(ReproductionReport::new(job, outcomes))
+}
+
+/// Writes reproduce.json and reproduce.md.
+///
+/// # Errors
+/// [`LabError::Write`] if a file cannot be written.
+pub fn write_report(folder: &Path, report: &ReproductionReport) -> Result<(), LabError> {
+    write_json(&folder.join("reproduce.json"), report)?;
+    write_text(&folder.join("reproduce.md"), &report.markdown())?;
+    Ok(())
+}
+
+impl Reproduction {
+    /// Pairs of noise masks, as the paper ends with.
+    fn masks(&self) -> Descriptor {
+        Descriptor::MaskPair { mask: NoiseMask::default(), edge: self.edge }
+    }
+
+    fn load(&self, descriptor: Descriptor, watch: Watch<'_>) -> Result<Loaded, LabError> {
+        let table = describe_pairs(&self.corpus, descriptor, self.edge, self.levels, |done, all| {
+            watch(Advance { what: "zones cut into pairs", done: done as u64, of: all as u64, detail: "" });
+        })?;
+        Ok(Loaded { digest: table.digest(), table })
+    }
+}
+
+/// All protocols on one representation, as far as they are not there already.
+fn run_protocols(
+    loaded: Loaded,
+    descriptor: Descriptor,
+    folder: &Path,
+    on_result: &mut dyn FnMut(&Path, ResultState),
+    watch: Watch<'_>,
+) -> Result<Vec<ProtocolOutcome>, LabError> {
+    let path = |of: &Fingerprint| folder.join(of.file_name());
+    let wanted = PairScaling::ALL.into_iter().flat_map(|scaling| {
+        PairProtocol::ALL.map(|protocol| Fingerprint::new(&loaded.digest, descriptor, scaling, protocol))
+    });
+    let known: Vec<_> = wanted.map(|of| ProtocolOutcome::read(&path(&of), of)).collect();
+
+    // What all protocols of a scaling need costs most: computed once, and only if one of them is missing
+    let mut pairs = if known.iter().any(Result::is_err) { Some(loaded.into_pairs()?) } else { None };
+    let mut geometry: Option<(PairScaling, Geometry)> = None;
+    let mut outcomes = Vec::new();
+    for known in known {
+        let outcome = match (known, &mut pairs) {
+            (Ok(outcome), _) => {
+                on_result(&path(&outcome.of), ResultState::Kept);
+                outcome
+            }
+            (Err(of), Some(pairs)) => {
+                pairs.scale(of.scaling);
+                let scaling = of.scaling;
+                let kept = geometry.take().filter(|(scaling, _)| *scaling == of.scaling);
+                let kept = kept.map_or_else(|| Geometry::of(pairs, watch), |(_, geometry)| geometry);
+                let path = path(&of);
+                write_json(&path, &ProtocolOutcome::compute(of.clone(), pairs, &kept, watch)?)?;
+                geometry = Some((scaling, kept));
+                on_result(&path, ResultState::Computed);
+                // As the next run will read it: times may lose their last bit on the way
+                ProtocolOutcome::read(&path, of).map_err(|_| LabError::Changed { path })?
+            }
+            (Err(_), None) => continue, // there are pairs if a result is missing
+        };
+        outcomes.push(outcome);
+    }
+    Ok(outcomes)
+}

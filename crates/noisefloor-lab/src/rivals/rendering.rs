@@ -1,0 +1,114 @@
+//! A rendering that criteria can follow, synthesised from the few pictures of a corpus.
+
+use super::noise::Noise;
+use crate::error::LabError;
+use noisefloor::{Params, Rgb, Schedule, Session, StopReason, StoppingCriterion, ToneMapping};
+use noisefloor_learn::{Corpus, JudgedImage, JudgedZone};
+
+/// Samples of one stage over those of the stage before.
+const GROWTH: f64 = 1.15;
+
+/// A scene as a rendering that can be followed.
+pub(super) struct SynthesisedRendering {
+    pub(super) zones: Vec<JudgedZone>,
+    /// Edge of a zone in pixels, and zones in a row.
+    edge: usize,
+    columns: usize,
+    /// What comes stage by stage: samples, and the mean of these samples alone for each zone.
+    stages: Vec<(u32, Vec<Vec<Rgb>>)>,
+}
+
+impl SynthesisedRendering {
+    pub(super) fn of(corpus: &Corpus, scene: &str) -> Result<Self, LabError> {
+        let zones: Vec<JudgedZone> = corpus.zones().iter().filter(|z| z.scene == scene).cloned().collect();
+        let edge = zones[0].width;
+        if zones.iter().any(|z| z.width != edge || z.height != edge) {
+            return Err(LabError::Zones { scene: scene.to_owned() });
+        }
+        let mut levels: Vec<Vec<JudgedImage>> = zones.iter().map(|_| Vec::new()).collect();
+        for level in corpus.scene_levels(scene)? {
+            let level = level?;
+            if let Some(i) = zones.iter().position(|z| z.zone == level.zone) {
+                levels[i].push(level);
+            }
+        }
+        let first = zones.iter().map(|z| z.first_spp).min().unwrap_or(1) as f64;
+        let last = zones.iter().map(|z| z.last_spp).max().unwrap_or(1) as f64;
+        let noises = levels.iter().map(|of_zone| Noise::of(of_zone)).collect::<Option<Vec<_>>>();
+        let noises = noises.ok_or_else(|| LabError::TooFewImages { scene: scene.to_owned() })?;
+        let mut stages = Vec::new();
+        let (mut done, mut goal) = (0u64, first / GROWTH.powi(2));
+        while (done as f64) < last {
+            let samples = ((goal.round() as u64).max(done + 1) - done) as u32;
+            let batch = noises.iter().map(|noise| noise.batch(stages.len(), samples)).collect();
+            stages.push((samples, batch));
+            done += u64::from(samples);
+            goal *= GROWTH;
+        }
+        let columns = (zones.len() as f64).sqrt().ceil() as usize;
+        Ok(Self { zones, edge, columns, stages })
+    }
+
+    /// Has a criterion judge every stage. For each zone, the least constant that would have stopped it there, stage by stage: what its
+    /// verdicts tell, or 0 where it stops it, if it is one that stops.
+    pub(super) fn follow(
+        &self,
+        criterion: Box<dyn StoppingCriterion + Send>,
+        stops: bool,
+    ) -> Result<Vec<Vec<f64>>, LabError> {
+        let size = (self.columns * self.edge, self.zones.len().div_ceil(self.columns) * self.edge);
+        let params = Params {
+            tile: self.edge,
+            tone_mapping: ToneMapping::Srgb { exposure: 1.0 },
+            // At every stage: each brings more than a step.
+            schedule: Schedule::Every { step: 2 },
+            max_samples: u64::from(u32::MAX),
+            // A criterion that tells is asked at every stage.
+            consecutive: if stops { 1 } else { u32::MAX },
+            ..Params::default()
+        };
+        let mut session = Session::new(size.0, size.1, criterion, params)?;
+        // Places of the picture that no zone fills.
+        for tile in self.zones.len()..session.film().grid().len() {
+            session.close(tile, StopReason::Cancelled);
+        }
+        let mut needed = vec![Vec::new(); self.zones.len()];
+        for (samples, batch) in &self.stages {
+            for (tile, mean) in batch.iter().enumerate() {
+                if session.is_open(tile) {
+                    session.push(tile, *samples, mean)?;
+                }
+            }
+            session.judge()?;
+            for (tile, needed) in needed.iter_mut().enumerate() {
+                let told = session.verdict(tile).and_then(|v| v.probability).map(|p| 1.0 - f64::from(p));
+                needed.push(match (stops, session.is_open(tile)) {
+                    (true, true) => f64::INFINITY,
+                    (true, false) => 0.0,
+                    (false, _) => told.unwrap_or(f64::INFINITY),
+                });
+            }
+        }
+        Ok(needed)
+    }
+
+    /// Samples at which a constant stops each zone: between the first stage that it is enough for and the one before, and within what
+    /// observers could choose.
+    pub(super) fn stops(&self, needed: &[Vec<f64>], constant: f64) -> Vec<f64> {
+        let totals: Vec<u64> = self
+            .stages
+            .iter()
+            .scan(0, |total, (samples, _)| {
+                *total += u64::from(*samples);
+                Some(*total)
+            })
+            .collect();
+        let stop = |(zone, needed): (&JudgedZone, &Vec<f64>)| {
+            let (first, last) = (zone.first_spp as f64, zone.last_spp as f64);
+            let stage = needed.iter().position(|least| *least <= constant);
+            let between = |stage: usize| ((totals[stage.saturating_sub(1)] * totals[stage]) as f64).sqrt();
+            stage.map_or(last, between).clamp(first, last)
+        };
+        self.zones.iter().zip(needed).map(stop).collect()
+    }
+}
