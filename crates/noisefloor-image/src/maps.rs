@@ -1,7 +1,7 @@
 //! Numbers drawn over a picture: one a tile or one a pixel, in colours, with a legend.
 
+use crate::atomic::write_atomic;
 use crate::error::WriteError;
-use crate::write::write_atomic;
 use colorous::INFERNO;
 use embedded_graphics::mono_font::iso_8859_1::{FONT_6X10, FONT_7X13, FONT_7X13_BOLD};
 use embedded_graphics::mono_font::{MonoFont, MonoTextStyle};
