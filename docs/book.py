@@ -7,7 +7,7 @@
 Pages stay where a forge shows them: beside the code that they describe. So they are copied into target/book/src,
 together with all files that they link to, and mdBook runs there. Links are checked twice: in the pages, against the
 files of the repository and the anchors that a forge makes of headings; and in the book, against the files and anchors
-that mdBook made. Links to other sites are not followed.
+that mdBook made. Links to other sites are not followed. Of docs/paper.md, also the places in the code are checked.
 """
 
 import argparse
@@ -27,6 +27,7 @@ FENCE = re.compile(r"^(```|~~~).*?^\1", re.DOTALL | re.MULTILINE)
 CODE = re.compile(r"`[^`\n]*`")
 LINK = re.compile(r"\]\(<?([^()\s<>]+)>?(?:\s+\"[^\"]*\")?\)|(?:src|href)=\"([^\"]+)\"")
 HEADING = re.compile(r"^#+ +(.*?) *#*$", re.MULTILINE)
+PLACE = re.compile(r"`((?!crates/|fixtures/|examples/)([a-z]+)/([\w/.]*))`((?: `[A-Za-z_:]+`,?)*)")
 INDEX = re.compile(r"README\.md(?=$|[)#])")
 ID = re.compile(r"(?:id|name)=\"([^\"]+)\"")
 
@@ -75,6 +76,25 @@ def check_pages(pages):
         if page not in linked | {SUMMARY}:
             faults.append(f"{page}: {SUMMARY} does not list it, and no page links to it")
     return faults, linked & files
+
+
+def check_places(page):
+    """What is wrong with the places that a page names: `core/film.rs` `Film::image`, a file and names in it."""
+    faults = []
+    for place, folder, path, names in PLACE.findall((ROOT / page).read_text()):
+        crate = "noisefloor" if folder == "core" else f"noisefloor-{folder}"
+        where = ROOT / "crates" / crate / "src" / path
+        # A module may be a file, or a folder beside it.
+        files = [file for file in (where, where.with_suffix("")) if file.exists()]
+        files = [rust for file in files for rust in ([file] if file.is_file() else sorted(file.rglob("*.rs")))]
+        text = "".join(file.read_text() for file in files)
+        wanted = [name.split("::")[-1] for name in re.findall(r"`([^`]+)`", names)]
+        missing = [name for name in wanted if not re.search(rf"\b{name}\b", text)]
+        if not files:
+            faults.append(f"{page}: there is no {place}")
+        elif missing:
+            faults.append(f"{page}: {place} does not contain {', '.join(missing)}")
+    return faults
 
 
 def stage(pages, linked):
@@ -136,6 +156,7 @@ if __name__ == "__main__":
     args = parser.parse_args()
     pages = [file for file in tracked() if file.endswith(".md")]
     faults, linked = check_pages(pages)
+    faults += check_places("docs/paper.md")
     if not args.check:
         stage(pages, linked)
         subprocess.run([args.mdbook, "build", BOOK], check=True)
