@@ -2,7 +2,7 @@
 //! many seeds, holds each stopped tile against a converged picture, and prints a Markdown table, with and without the guards there are.
 #![allow(clippy::print_stdout, reason = "an example prints")]
 
-use noisefloor::{Display, Driver, FixedSamples, NoiseMask, Oracle, Params, Rgb, Schedule, StopReason, Tile};
+use noisefloor::{Display, Driver, FixedSpp, NoiseMask, Oracle, Params, Rgb, Schedule, StopReason, Tile};
 use noisefloor_ptwne::{Ptwne, RenderOptions, scenes};
 use std::error::Error;
 
@@ -42,18 +42,17 @@ fn main() -> Result<(), Box<dyn Error>> {
     println!("|---|---|---|---|---|---|---|---|");
     for scene in SCENES {
         let converged = |seed| -> Result<Vec<Rgb>, Box<dyn Error>> {
-            let schedule = Schedule::Every { step: CONVERGED as u32 };
-            let params = Params { schedule, max_samples: CONVERGED, ..Params::default() };
-            let mut driver = Driver::new(source(scene, seed)?, FixedSamples(CONVERGED), params)?;
+            let schedule = Schedule::Every { step: CONVERGED };
+            let params = Params { schedule, max_spp: CONVERGED, ..Params::default() };
+            let mut driver = Driver::new(source(scene, seed)?, FixedSpp(CONVERGED), params)?;
             driver.run(|_, _| ())?;
             Ok(driver.session().film().image())
         };
         let [one, other] = [converged(u64::MAX)?, converged(u64::MAX - 1)?];
         let truth: Vec<Rgb> =
             one.iter().zip(&other).map(|(a, b)| std::array::from_fn(|c| 0.5 * (a[c] + b[c]))).collect();
-        for (guard, min_samples, consecutive) in [("none", 0, 1), ("--consecutive 3", 0, 3)] {
-            let params =
-                Params { tile: TILE, min_samples, consecutive, max_samples: MOST, ..Params::default() };
+        for (guard, min_spp, consecutive) in [("none", 0, 1), ("--consecutive 3", 0, 3)] {
+            let params = Params { tile: TILE, min_spp, consecutive, max_spp: MOST, ..Params::default() };
             let (mut tiles, mut samples, mut stopped) = (0, 0, Vec::new());
             for seed in 0..seeds {
                 let mut driver = Driver::new(source(scene, seed)?, Oracle::bundled(), params)?;
@@ -62,7 +61,7 @@ fn main() -> Result<(), Box<dyn Error>> {
                 let (image, display) = (session.film().image(), session.display().ok_or("no display")?);
                 for stop in session.stops() {
                     tiles += 1;
-                    samples += stop.samples;
+                    samples += stop.spp;
                     if stop.reason == StopReason::Converged {
                         // Half of what the two differ by is the noise of their mean.
                         let own = error(&one, &other, display, stop.tile).0 / 2.0;

@@ -76,10 +76,10 @@ impl ProgressiveSource for Rare {
 
     fn sample(&mut self, requests: &[Request]) -> Result<Vec<Batch>, SourceError> {
         let mut batches = Vec::new();
-        for &Request { tile, first, samples } in requests {
+        for &Request { tile, first, spp: samples } in requests {
             let mut state = self.seed ^ (first << 20) ^ ((tile.index as u64) << 50);
             let mut mean = vec![[0.0; 3]; tile.pixels()];
-            let n = f64::from(samples);
+            let n = samples as f64;
             for (i, pixel) in mean.iter_mut().enumerate() {
                 let (x, y) = (i % tile.width, i / tile.width);
                 let rare = if tile.index == 0 { self.rare(x, y) } else { 0.0 };
@@ -98,7 +98,7 @@ impl ProgressiveSource for Rare {
                 }
                 *pixel = [value as f32; 3];
             }
-            batches.push(Batch { tile, samples, mean });
+            batches.push(Batch { tile, spp: samples, mean });
         }
         Ok(batches)
     }
@@ -110,7 +110,7 @@ fn stop(source: Rare, params: Params) -> Result<(u64, bool, f64), Box<dyn Error>
     let mut driver = Driver::new(source, Oracle::bundled(), params)?;
     driver.run(|_, _| ())?;
     let (source, session) = driver.into_parts();
-    let samples = session.stops().next().ok_or("no stop")?.samples;
+    let samples = session.stops().next().ok_or("no stop")?.spp;
     let display: Display = *session.display().ok_or("no display")?;
     let (image, edge) = (session.film().image(), source.edge);
     let error = ndarray::Array2::from_shape_fn((edge, edge), |(y, x)| {
@@ -138,14 +138,9 @@ fn main() -> Result<(), Box<dyn Error>> {
         }
         for chance in [1e-3, 1e-4, 1e-5, 1e-6] {
             for edge in [32, 128] {
-                for (guard, min_samples, consecutive) in guards {
-                    let params = Params {
-                        tile: edge,
-                        min_samples,
-                        consecutive,
-                        max_samples: MOST,
-                        ..Params::default()
-                    };
+                for (guard, min_spp, consecutive) in guards {
+                    let params =
+                        Params { tile: edge, min_spp, consecutive, max_spp: MOST, ..Params::default() };
                     let mut runs = Vec::new();
                     for seed in 0..seeds {
                         let source = Rare { edge, place, chance, seed: seed * 0x1_0000_0001 + 1, found: 0 };

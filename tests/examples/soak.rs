@@ -18,12 +18,12 @@ const WARM_UP: u64 = 5;
 
 /// Decisions and picture of one render, as one number.
 fn render(source: &mut impl ProgressiveSource, oracle: &Oracle) -> Result<u64, Box<dyn Error>> {
-    let params = Params { tile: 32, max_samples: 1500, ..Params::default() };
+    let params = Params { tile: 32, max_spp: 1500, ..Params::default() };
     let mut driver = Driver::new(Borrowed(source), oracle.clone(), params)?;
     driver.run(|_, _| ())?;
     let mut hasher = DefaultHasher::new();
     for stop in driver.session().stops() {
-        (stop.tile.index, stop.samples, stop.reason, stop.probability.map(f32::to_bits)).hash(&mut hasher);
+        (stop.tile.index, stop.spp, stop.reason, stop.probability.map(f32::to_bits)).hash(&mut hasher);
     }
     driver.session().film().image().iter().flatten().for_each(|c| c.to_bits().hash(&mut hasher));
     Ok(hasher.finish())

@@ -4,7 +4,7 @@
 
 use ndarray::Array2;
 use noisefloor::{
-    DEFAULT_TILE, Display, Driver, FixedSamples, NoiseMask, Oracle, Params, Rgb, Session, StoppingCriterion,
+    DEFAULT_TILE, Display, Driver, FixedSpp, NoiseMask, Oracle, Params, Rgb, Session, StoppingCriterion,
     luminance,
 };
 use noisefloor_ptwne::{Ptwne, RenderOptions, scenes};
@@ -37,8 +37,8 @@ fn main() -> Result<(), Box<dyn Error>> {
 }
 
 fn measure(name: &str) -> Result<(), Box<dyn Error>> {
-    let converged = render(name, 2, FixedSamples(CONVERGED), DEFAULT_TILE, CONVERGED)?;
-    let even = |seed| render(name, seed, FixedSamples(EVEN), DEFAULT_TILE, EVEN).map(|s| s.film().image());
+    let converged = render(name, 2, FixedSpp(CONVERGED), DEFAULT_TILE, CONVERGED)?;
+    let even = |seed| render(name, seed, FixedSpp(EVEN), DEFAULT_TILE, EVEN).map(|s| s.film().image());
     let (even, also_even) = (even(3)?, even(4)?);
     let converged = converged.film().image();
     let mut at_128: Vec<f64> = Vec::new();
@@ -47,7 +47,7 @@ fn measure(name: &str) -> Result<(), Box<dyn Error>> {
         let display = *session.display().ok_or("no verdict was given")?;
         let mut spp = vec![0.0; EDGE * EDGE];
         for stop in session.stops() {
-            stop.tile.rows(EDGE).flatten().for_each(|pixel| spp[pixel] = stop.samples as f64);
+            stop.tile.rows(EDGE).flatten().for_each(|pixel| spp[pixel] = stop.spp as f64);
         }
         if at_128.is_empty() {
             at_128.clone_from(&spp);
@@ -82,11 +82,11 @@ fn render<C: StoppingCriterion>(
     seed: u64,
     criterion: C,
     tile: usize,
-    max_samples: u64,
+    max_spp: u64,
 ) -> Result<Session<C>, Box<dyn Error>> {
     let scene = scenes::by_name(name).ok_or_else(|| format!("no built-in scene {name:?}"))?;
     let source = Ptwne::new(scene, EDGE, EDGE, RenderOptions { seed, ..RenderOptions::default() })?;
-    let mut driver = Driver::new(source, criterion, Params { tile, max_samples, ..Params::default() })?;
+    let mut driver = Driver::new(source, criterion, Params { tile, max_spp, ..Params::default() })?;
     driver.run(|_, _| ())?;
     Ok(driver.into_parts().1)
 }

@@ -119,7 +119,7 @@ impl StackSource {
         let Some(index) = self.frames.iter().position(|frame| frame.first == request.first) else {
             let end = self.frames.last().map_or(0, |frame| frame.last);
             if request.first == end {
-                return Ok(Batch { tile, samples: 0, mean: Vec::new() });
+                return Ok(Batch { tile, spp: 0, mean: Vec::new() });
             }
             let starts = self.frames.iter().map(|frame| frame.first).chain([end]);
             let near = starts.min_by_key(|start| start.abs_diff(request.first)).unwrap_or(0);
@@ -141,8 +141,7 @@ impl StackSource {
                 .map(|(old, new)| difference(old, first, new, last))
                 .collect(),
         };
-        // frames.rs: every count fits 32 bits
-        Ok(Batch { tile, samples: (last - first) as u32, mean })
+        Ok(Batch { tile, spp: last - first, mean })
     }
 
     fn check_tile(&self, tile: &Tile) -> Result<(), StackError> {

@@ -1,6 +1,6 @@
 //! What one person said of one tile.
 
-use noisefloor::Model;
+use noisefloor::{Model, Threshold};
 use serde::{Deserialize, Serialize};
 
 /// One person's answer about a tile at one number of samples. A threshold seen from one side: above `spp` if noise is seen, at or below it
@@ -21,13 +21,13 @@ impl Answer {
     /// P of the tile, in [0, 1].
     ///
     /// # Panics
-    /// If the descriptor has not the model's number of numbers.
+    /// If the descriptor does not have the model's dimensionality.
     pub fn probability(&self, model: &Model) -> f32 {
-        model.probability(&mut self.descriptor.clone())
+        model.judge(&self.descriptor).probability
     }
 
     /// Whether a verdict at P ≥ `threshold` says the same.
-    pub fn agrees(&self, probability: f32, threshold: f32) -> bool {
-        (probability < threshold) == self.sees_noise
+    pub fn agrees(&self, probability: f32, threshold: Threshold) -> bool {
+        threshold.is_reached_by(probability) != self.sees_noise
     }
 }

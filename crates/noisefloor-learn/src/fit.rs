@@ -7,92 +7,142 @@ use crate::predict::{Prediction, predict};
 use crate::score::score;
 use crate::table::{Table, Zone};
 use noisefloor::{
-    DEFAULT_THRESHOLD, Familiarity, Platt, Scaler, SvmParams, TrainingRecord, fit_platt, nearest,
+    Audience, Classifier, Familiarity, ModelParts, Platt, Scaler, SvmParams, Threshold, TrainingRecord,
+    fit_platt, nearest,
 };
 use rayon::prelude::*;
 use std::collections::BTreeSet;
+
+/// What may be learned from: the zones of some groups, and the answers of these and of all groups without zones.
+struct Material<'a> {
+    table: &'a Table,
+    params: &'a TrainParams,
+    zones: Vec<&'a Zone>,
+    answers: Vec<&'a Answer>,
+}
+
+/// A machine that has not seen one group, and the zones of that group.
+struct Fold<'a> {
+    machine: Machine,
+    zones: Vec<&'a Zone>,
+}
+
+impl<'a> Material<'a> {
+    fn of(table: &'a Table, groups: &[&str], params: &'a TrainParams) -> Self {
+        let all = table.groups();
+        let wanted = |z: &&Zone| groups.contains(&z.group.as_str());
+        let known = |a: &&Answer| groups.contains(&a.group.as_str()) || !all.contains(&a.group.as_str());
+        Self {
+            table,
+            params,
+            zones: table.zones.iter().filter(wanted).collect(),
+            answers: table.answers.iter().filter(known).collect(),
+        }
+    }
+
+    fn without_answers(&self) -> Self {
+        Self { answers: Vec::new(), zones: self.zones.clone(), ..*self }
+    }
+
+    /// A machine trained on everything but one group.
+    fn fit_without(&self, group: Option<&str>, svm: SvmParams) -> Result<Machine, TrainError> {
+        let zones: Vec<&Zone> = self.zones.iter().copied().filter(|z| Some(&*z.group) != group).collect();
+        let answers: Vec<&Answer> =
+            self.answers.iter().copied().filter(|a| Some(&*a.group) != group).collect();
+        Machine::fit(&zones, &answers, svm, self.params.range, self.table.descriptor.least_deviation())
+    }
+
+    /// Machines that have not seen one group judge that group; one sigmoid is fitted to all of that.
+    fn cross_validate(&self, svm: SvmParams) -> Result<(Vec<Fold<'a>>, Platt), TrainError> {
+        let (mut folds, mut decisions) = (Vec::new(), Vec::new());
+        let groups: BTreeSet<&str> =
+            self.zones.iter().map(|z| &*z.group).chain(self.answers.iter().map(|a| &*a.group)).collect();
+        for group in groups {
+            let machine = self.fit_without(Some(group), svm)?;
+            let zones: Vec<&Zone> = self.zones.iter().copied().filter(|z| z.group == group).collect();
+            for zone in &zones {
+                decisions.extend(machine.decisions(zone, self.params));
+            }
+            for answer in self.answers.iter().filter(|a| a.group == group) {
+                decisions.extend(machine.answered(answer));
+            }
+            folds.push(Fold { machine, zones });
+        }
+        Ok((folds, fit_platt(&decisions)?))
+    }
+
+    /// Error factor of a pair of C and γ on zones whose groups were left out, and the sigmoid of these.
+    fn held_out_error(&self, svm: SvmParams) -> Result<(f64, Platt), TrainError> {
+        let (folds, platt) = self.cross_validate(svm)?;
+        let mut predictions: Vec<Prediction> = Vec::new();
+        for Fold { machine, zones } in folds {
+            let fold = parts(self.table, machine.calibrated(platt), None, TrainingRecord::default());
+            predictions.extend(zones.iter().map(|z| predict(|raw| fold.judge(raw), Threshold::PAPER, z)));
+        }
+        Ok((score(predictions.iter()).error_factor, platt))
+    }
+}
 
 /// Trains on the zones of `groups`, at least two, with C and γ chosen, and P calibrated, by leaving each group out in turn.
 pub(crate) fn fit_groups(
     table: &Table,
     groups: &[&str],
     params: &TrainParams,
-) -> Result<(Machine, Platt, SvmParams), TrainError> {
-    let of = |wanted: &dyn Fn(&str) -> bool| -> Vec<&Zone> {
-        table.zones.iter().filter(|z| groups.contains(&z.group.as_str()) && wanted(&z.group)).collect()
-    };
-    let all = table.groups();
-    let known = |a: &&Answer| groups.contains(&a.group.as_str()) || !all.contains(&a.group.as_str());
-    let answers: Vec<&Answer> = table.answers.iter().filter(known).collect();
-    let fit = |wanted: &dyn Fn(&str) -> bool, answers: &[&Answer], svm: SvmParams| {
-        let told: Vec<&Answer> = answers.iter().copied().filter(|a| wanted(&a.group)).collect();
-        Machine::fit((&of(wanted), &told), svm, params.range, table.descriptor.least_deviation())
-    };
-
-    // Machines that have not seen one group judge that group; one sigmoid over all of it.
-    let folds = |svm: SvmParams, answers: &[&Answer]| -> Result<_, TrainError> {
-        let mut folds = Vec::new();
-        let mut decisions = Vec::new();
-        let everyone: BTreeSet<&str> =
-            groups.iter().copied().chain(answers.iter().map(|a| a.group.as_str())).collect();
-        for group in everyone {
-            let machine = fit(&|g| g != group, answers, svm)?;
-            let zones = of(&|g| g == group);
-            zones.iter().for_each(|z| decisions.extend(machine.decisions(z, params)));
-            let asked = answers.iter().filter(|a| a.group == group);
-            asked.for_each(|a| decisions.extend(machine.answered(a)));
-            folds.push((machine, zones));
-        }
-        Ok((folds, fit_platt(&decisions)?))
-    };
+) -> Result<(Classifier, SvmParams), TrainError> {
+    let material = Material::of(table, groups, params);
 
     // Thresholds choose C and γ. Answers are none.
-    let held_out = |&candidate: &SvmParams| -> Result<(f64, Platt), TrainError> {
-        let (folds, platt) = folds(candidate, &[])?;
-        let record = TrainingRecord::default();
-        let predictions: Vec<Prediction> = folds
-            .into_iter()
-            .flat_map(|(machine, zones)| {
-                let model = machine.into_model(table, platt, None, record.clone());
-                zones.into_iter().map(|z| predict(&model, DEFAULT_THRESHOLD, z)).collect::<Vec<_>>()
-            })
-            .collect();
-        Ok((score(predictions.iter()).error_factor, platt))
-    };
-    let outcomes: Vec<(f64, Platt)> = params.candidates.par_iter().map(held_out).collect::<Result<_, _>>()?;
+    let zones_only = material.without_answers();
+    let outcomes: Vec<(f64, Platt)> =
+        params.candidates.par_iter().map(|&svm| zones_only.held_out_error(svm)).collect::<Result<_, _>>()?;
     let best = (0..outcomes.len())
         .min_by(|&i, &j| outcomes[i].0.total_cmp(&outcomes[j].0))
         .ok_or(TrainError::Params)?;
+    let chosen = params.candidates[best];
 
     // All groups train the machine; the sigmoid stays that of held-out decision values.
-    let chosen = params.candidates[best];
-    let platt = if answers.is_empty() { outcomes[best].1 } else { folds(chosen, &answers)?.1 };
-    Ok((fit(&|_| true, &answers, chosen)?, platt, chosen))
+    let platt =
+        if material.answers.is_empty() { outcomes[best].1 } else { material.cross_validate(chosen)?.1 };
+    Ok((material.fit_without(None, chosen)?.calibrated(platt), chosen))
+}
+
+/// The parts of a model for tables like this one.
+pub(crate) fn parts(
+    table: &Table,
+    classifier: Classifier,
+    familiarity: Option<Familiarity>,
+    record: TrainingRecord,
+) -> ModelParts {
+    ModelParts {
+        descriptor: table.descriptor.clone(),
+        evidence: table.evidence,
+        tone_mapping: table.tone_mapping,
+        classifier,
+        familiarity,
+        audience: Audience::TRAINED,
+        record,
+    }
 }
 
 /// Share of the zones of left-out scenes that are familiar to the others.
 const FAMILIAR: f64 = 0.95;
 
-/// What pictures the zones of `groups` show, and how far from those of the others the zones of each group lie. `None` if the
-/// descriptor does not tell noise from picture.
+/// What textures the zones of `groups` show, and how far from those of the others the zones of each group lie. `None` if the
+/// descriptor does not separate noise from picture.
 pub(crate) fn familiarity(table: &Table, groups: &[&str], scaler: &Scaler) -> Option<Familiarity> {
-    let whole = table.descriptor.len();
-    if table.descriptor.texture_numbers() == 0 {
+    let texture = table.descriptor.texture();
+    if texture.is_empty() {
         return None;
     }
-    let known: Vec<(&str, Vec<f32>)> = table
-        .zones
-        .iter()
-        .filter(|zone| groups.contains(&zone.group.as_str()))
-        .filter_map(|zone| {
-            // A descriptor of which numbers were taken away does not say which are left.
-            let mut numbers = zone.at_threshold()?.descriptor.clone();
-            (numbers.len() == whole).then(|| {
-                scaler.apply(&mut numbers);
-                (zone.group.as_str(), table.descriptor.texture_of(&numbers))
-            })
-        })
-        .collect();
+    let mut known: Vec<(&str, Vec<f32>)> = Vec::new();
+    for zone in table.zones.iter().filter(|zone| groups.contains(&zone.group.as_str())) {
+        let Some(level) = zone.at_threshold() else { continue };
+        // A descriptor from which numbers were removed does not say which are left.
+        if level.descriptor.len() == table.descriptor.dimensions() {
+            let scaled = scaler.scaled(&level.descriptor);
+            known.push((&zone.group, texture.iter().map(|&i| scaled[i]).collect()));
+        }
+    }
     let others = |group| known.iter().filter(move |(of, _)| *of != group).map(|(_, numbers)| numbers);
     let mut distances: Vec<f32> =
         known.iter().map(|(group, numbers)| nearest(others(*group), numbers)).collect();

@@ -29,12 +29,12 @@ pub use corpus::{
     CENSORED_SPP, Corpus, CorpusError, Encoding, Inner, JudgedImage, JudgedImages, JudgedZone, Patch,
     ZoneImages, zone_levels,
 };
-pub use describe::{describe_corpora, describe_pairs, noise_level};
+pub use describe::{Corpora, describe_corpora, describe_pairs, noise_level};
 pub use error::TableError;
 pub use observers::{OBSERVERS_AT_THRESHOLD, observers_agreeing};
 pub use params::{TrainError, TrainParams};
 pub use predict::{Prediction, predict};
 pub use score::{ReliabilityBin, calibration_error, image_accuracy, reliability, score};
-pub use table::{Level, Origin, Table, Zone, group_of_scene};
-pub use table_csv::{read_table, write_table};
+pub use table::{Level, Origin, Table, Zone, first_word};
+pub use table_csv::{read_table, read_table_with, write_table};
 pub use train::{leave_answers_out, leave_one_scene_out, train};

@@ -3,21 +3,22 @@
 use crate::answer::Answer;
 use crate::observers::observers_agreeing;
 use crate::params::{TrainError, TrainParams};
-use crate::table::{Table, Zone};
+use crate::table::Zone;
 use ndarray::Array2;
-use noisefloor::{Audience, Familiarity, Model, Platt, Scaler, Svm, SvmParams, TrainingRecord, fit_svm};
+use noisefloor::{Classifier, Platt, Scaler, Svm, SvmParams, fit_svm};
 
 /// Machine and scaler, before calibration.
 pub(crate) struct Machine {
     pub(crate) scaler: Scaler,
     svm: Svm,
-    /// Examples that an answer counts as.
+    /// How many examples one answer counts as.
     weight: usize,
 }
 
 impl Machine {
-    pub(crate) fn fit<'a>(
-        (zones, answers): (&[&'a Zone], &[&'a Answer]),
+    pub(crate) fn fit(
+        zones: &[&Zone],
+        answers: &[&Answer],
         svm: SvmParams,
         range: f64,
         least_deviation: f64,
@@ -26,15 +27,14 @@ impl Machine {
             zones.iter().flat_map(|z| examples(z, range)).map(|e| (e.descriptor, e.converged)).collect();
         let scaler = Scaler::fit(examples.iter().map(|e| e.0), least_deviation);
         let weight = answer_weight(examples.len(), zones.len(), range);
-        let answer = |a: &&'a Answer| std::iter::repeat_n((&a.descriptor[..], !a.sees_noise), weight);
-        examples.extend(answers.iter().flat_map(answer));
+        for answer in answers {
+            examples.extend(std::iter::repeat_n((&answer.descriptor[..], !answer.sees_noise), weight));
+        }
+
         let dimensions = examples.first().map_or(0, |e| e.0.len());
         let mut rows = Array2::zeros((examples.len(), dimensions));
-        let mut scaled = Vec::new();
         for (mut row, (descriptor, _)) in rows.rows_mut().into_iter().zip(&examples) {
-            scaled.clear();
-            scaled.extend_from_slice(descriptor);
-            scaler.apply(&mut scaled);
+            let scaled = scaler.scaled(descriptor);
             row.iter_mut().zip(&scaled).for_each(|(to, &from)| *to = f64::from(from));
         }
         let labels: Vec<bool> = examples.iter().map(|e| e.1).collect();
@@ -42,12 +42,10 @@ impl Machine {
     }
 
     fn decide(&self, descriptor: &[f32]) -> f32 {
-        let mut scaled = descriptor.to_vec();
-        self.scaler.apply(&mut scaled);
-        self.svm.decision(&scaled)
+        self.svm.decision(&self.scaler.scaled(descriptor))
     }
 
-    /// (decision value, 0 or 1) of an answer, as often as it weighs.
+    /// (decision value, 0 or 1) of an answer, as often as it counts.
     pub(crate) fn answered(&self, answer: &Answer) -> impl Iterator<Item = (f32, f64)> {
         let agreeing = f64::from(u8::from(!answer.sees_noise));
         std::iter::repeat_n((self.decide(&answer.descriptor), agreeing), self.weight)
@@ -63,30 +61,13 @@ impl Machine {
             .map(|e| (self.decide(e.descriptor), observers_agreeing(e.spp, zone.human_spp, params.spread)))
     }
 
-    pub(crate) fn into_model(
-        self,
-        table: &Table,
-        platt: Platt,
-        familiarity: Option<Familiarity>,
-        record: TrainingRecord,
-    ) -> Model {
-        Model {
-            descriptor: table.descriptor,
-            descriptor_version: table.descriptor.version(),
-            evidence: table.evidence,
-            tone_mapping: table.tone_mapping,
-            scaler: self.scaler,
-            svm: self.svm,
-            platt,
-            familiarity,
-            audience: Audience::TRAINED,
-            record,
-        }
+    pub(crate) fn calibrated(self, platt: Platt) -> Classifier {
+        Classifier { scaler: self.scaler, svm: self.svm, platt }
     }
 }
 
-/// An answer is about one number of samples. It weighs as much as what a zone, whose examples spread over range² in samples, has within a
-/// doubling of them.
+/// An answer is about one number of samples. It counts as much as a zone, whose examples spread over range² in samples, has
+/// within a doubling of them.
 fn answer_weight(examples: usize, zones: usize, range: f64) -> usize {
     let doublings = 2.0 * range.log2();
     (examples as f64 / zones.max(1) as f64 / doublings).round().max(1.0) as usize
@@ -98,7 +79,7 @@ pub(crate) struct Example<'a> {
     converged: bool,
 }
 
-/// A zone's levels near its threshold. Of a censored zone only what is certain: the levels below.
+/// A zone's levels near its threshold. Of a censored zone, only what is certain: the levels below.
 pub(crate) fn examples(zone: &Zone, range: f64) -> impl Iterator<Item = Example<'_>> {
     let near = move |spp: f64| (spp / zone.human_spp).ln().abs() <= range.ln() * (1.0 + 1e-9);
     let certain = move |spp: f64| !zone.censored || spp < zone.human_spp;

@@ -1,6 +1,6 @@
 //! How a model is trained, and why it cannot be.
 
-use noisefloor::{SvmParams, SvmTrainError};
+use noisefloor::{ModelError, SvmParams, SvmTrainError};
 use thiserror::Error;
 
 /// How a model is to be trained.
@@ -34,6 +34,7 @@ impl TrainParams {
 
 /// Why a model could not be trained.
 #[derive(Debug, Error)]
+#[non_exhaustive]
 pub enum TrainError {
     /// The machine.
     #[error(transparent)]
@@ -59,4 +60,7 @@ pub enum TrainError {
         /// Their names.
         names: String,
     },
+    /// What was trained is not a model: numbers of the descriptor were removed.
+    #[error("the result can be scored, but is not a model: {0}")]
+    Model(#[from] ModelError),
 }

@@ -1,7 +1,7 @@
 //! The threshold that a model predicts for a zone.
 
-use crate::table::{Level, Origin, Zone};
-use noisefloor::Model;
+use crate::table::{Origin, Zone};
+use noisefloor::{Judgement, Threshold};
 use serde::{Deserialize, Serialize};
 
 /// Samples at which a quantity, known at increasing levels, first reaches `goal`, interpolated in ln(spp); the first or last
@@ -17,16 +17,6 @@ pub(crate) fn crossing(levels: &[(f64, f64)], goal: f64) -> Option<f64> {
             Some((n0.ln() + t * (n1.ln() - n0.ln())).exp())
         }
     }
-}
-
-/// What a model says of a zone at each of its levels: decision values and probabilities.
-fn probabilities(model: &Model, zone: &Zone) -> Vec<f32> {
-    let mut scratch = Vec::new();
-    let probability = |level: &Level| {
-        scratch.clone_from(&level.descriptor);
-        model.probability(&mut scratch)
-    };
-    zone.levels.iter().map(probability).collect()
 }
 
 /// Log-odds: a scale on which the probability of a level is nearly linear in ln(spp).
@@ -89,14 +79,16 @@ impl Prediction {
     }
 }
 
-/// Predicts a zone's threshold: the samples at which P first reaches `threshold`.
-pub fn predict(model: &Model, threshold: f32, zone: &Zone) -> Prediction {
-    let p = probabilities(model, zone);
+/// Predicts a zone's threshold: the samples at which P first reaches `threshold`. `judge` judges a raw descriptor, as
+/// [`noisefloor::Model::judge`] does.
+pub fn predict(judge: impl Fn(&[f32]) -> Judgement, threshold: Threshold, zone: &Zone) -> Prediction {
+    let p: Vec<f32> = zone.levels.iter().map(|level| judge(&level.descriptor).probability).collect();
     let odds = zone.path(|i| log_odds(f64::from(p[i])));
-    let spp = crossing(&odds, log_odds(f64::from(threshold))).unwrap_or(zone.last_spp);
+    let spp = crossing(&odds, log_odds(f64::from(threshold.get()))).unwrap_or(zone.last_spp);
     let probabilities = zone.levels.iter().map(|l| l.spp).zip(p.iter().copied()).collect();
-    let unfamiliar = zone.at_threshold().is_some_and(|level| !model.is_familiar(&level.descriptor));
-    Prediction { probabilities, unfamiliar, ..Prediction::new(zone, spp, |i| p[i] >= threshold) }
+    let unfamiliar = zone.at_threshold().is_some_and(|level| judge(&level.descriptor).unfamiliar);
+    let converged = |level: usize| threshold.is_reached_by(p[level]);
+    Prediction { probabilities, unfamiliar, ..Prediction::new(zone, spp, converged) }
 }
 
 #[cfg(test)]

@@ -51,18 +51,17 @@ pub struct Zone {
 }
 
 /// Descriptors of a corpus: all that training and evaluation need of it.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Table {
     /// Which descriptor.
     pub descriptor: Descriptor,
-    /// What the zones were held against.
+    /// What the zones were compared with.
     pub evidence: Evidence,
-    /// How the pictures were shown.
+    /// How the pictures were displayed.
     pub tone_mapping: ToneMapping,
     /// The zones.
     pub zones: Vec<Zone>,
     /// What single people said of tiles of other pictures: examples to train on, never scored as thresholds.
-    #[serde(default)]
     pub answers: Vec<Answer>,
 }
 
@@ -157,9 +156,9 @@ impl Table {
     }
 }
 
-/// The name of the group a scene belongs to by its name alone: its first word, which ends before a capital letter that follows
+/// The first word of a scene's name, as the group that the scene belongs to: a word which ends before a capital letter that follows
 /// a small one, or at `-` or `_`. `SdbCentre` and `SdbDroite` are two cameras in one room.
-pub fn group_of_scene(scene: &str) -> &str {
+pub fn first_word(scene: &str) -> &str {
     let mut previous = ' ';
     for (at, c) in scene.char_indices() {
         if at > 0 && (c == '-' || c == '_' || (c.is_uppercase() && previous.is_lowercase())) {
@@ -179,7 +178,7 @@ pub(crate) mod tests {
             let spp = 20.0 * 1.5f64.powi(i);
             Level { spp, origin: Origin::Real, noise: (scale / spp.sqrt()) as f32, descriptor: vec![] }
         };
-        let group = group_of_scene(scene).to_owned();
+        let group = first_word(scene).to_owned();
         let levels: Vec<Level> = (0..14).map(level).collect();
         let last_spp = levels[13].spp;
         Zone {
@@ -197,10 +196,7 @@ pub(crate) mod tests {
     #[test]
     fn groups_are_first_words() {
         let groups = ["SdbCentre", "SdbDroite", "Appart1opt02", "staircase2-view0", "Bureau1", "a_b", ""];
-        assert_eq!(
-            groups.map(group_of_scene),
-            ["Sdb", "Sdb", "Appart1opt02", "staircase2", "Bureau1", "a", ""]
-        );
+        assert_eq!(groups.map(first_word), ["Sdb", "Sdb", "Appart1opt02", "staircase2", "Bureau1", "a", ""]);
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use crate::error::TableError;
 use crate::table::{Level, Origin, Table, Zone};
 use csv::{ReaderBuilder, StringRecord, Writer};
-use noisefloor::{Descriptor, Evidence, ToneMapping};
+use noisefloor::{Descriptor, DescriptorKind, DescriptorSpec, Evidence, ToneMapping};
 use serde::{Deserialize, Serialize};
 use std::io::{Read, Write};
 
@@ -15,7 +15,7 @@ const MARK: &str = "# noisefloor table ";
 
 #[derive(Serialize, Deserialize)]
 struct Head {
-    descriptor: Descriptor,
+    descriptor: DescriptorSpec,
     descriptor_version: u16,
     evidence: Evidence,
     tone_mapping: ToneMapping,
@@ -27,7 +27,7 @@ struct Head {
 /// [`TableError::Csv`] if it cannot be written.
 pub fn write_table(table: &Table, mut to: impl Write) -> Result<(), TableError> {
     let head = Head {
-        descriptor: table.descriptor,
+        descriptor: table.descriptor.spec(),
         descriptor_version: table.descriptor.version(),
         evidence: table.evidence,
         tone_mapping: table.tone_mapping,
@@ -62,21 +62,30 @@ pub fn write_table(table: &Table, mut to: impl Write) -> Result<(), TableError> 
     Ok(())
 }
 
-/// Reads a table that [`write_table`] wrote.
+/// Reads a table that [`write_table`] wrote, with a built-in descriptor.
 ///
 /// # Errors
 /// [`TableError`] naming the first line that is not as it should be.
 pub fn read_table(from: impl Read) -> Result<Table, TableError> {
+    read_table_with(from, &[])
+}
+
+/// Reads a table whose descriptor is one of `kinds`, or built in.
+///
+/// # Errors
+/// [`TableError`] as in [`read_table`].
+pub fn read_table_with(from: impl Read, kinds: &[DescriptorKind]) -> Result<Table, TableError> {
     // What it holds.
     let mut text = String::new();
     from.take(MAX_BYTES).read_to_string(&mut text).map_err(csv::Error::from)?;
     let bad = |line: u64, what: &str| TableError::Row { line, what: what.to_owned() };
-    let head = text.lines().next().and_then(|l| l.strip_prefix(MARK));
-    let head = head.ok_or_else(|| {
+    let (head, rows) = text.split_once('\n').unwrap_or((&text, ""));
+    let head = head.strip_prefix(MARK).ok_or_else(|| {
         bad(1, "this is not a table of descriptors: it does not begin with \"# noisefloor table\"")
     })?;
     let head: Head = serde_json::from_str(head).map_err(|e| bad(1, &e.to_string()))?;
     let Head { descriptor, descriptor_version, evidence, tone_mapping } = head;
+    let descriptor = Descriptor::from_spec(&descriptor, kinds).map_err(|e| bad(1, &e.to_string()))?;
     if descriptor_version != descriptor.version() {
         let here = descriptor.version();
         return Err(bad(
@@ -88,7 +97,7 @@ pub fn read_table(from: impl Read) -> Result<Table, TableError> {
     }
 
     // Levels, zone by zone.
-    let mut csv = ReaderBuilder::new().comment(Some(b'#')).from_reader(text.as_bytes());
+    let mut csv = ReaderBuilder::new().from_reader(rows.as_bytes());
     let expected: Vec<String> =
         COLUMNS.map(str::to_owned).into_iter().chain(descriptor.number_names()).collect();
     if !csv.headers()?.iter().eq(expected.iter().map(String::as_str)) {

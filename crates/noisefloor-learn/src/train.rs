@@ -1,11 +1,11 @@
 //! Learning a model from a table of human thresholds, and scoring it on scenes it has not seen.
 
-use crate::fit::{familiarity, fit_groups};
+use crate::fit::{familiarity, fit_groups, parts};
 use crate::machine::examples;
 use crate::params::{TrainError, TrainParams};
 use crate::predict::{Prediction, predict};
 use crate::table::Table;
-use noisefloor::{Model, Scores, SvmParams, TrainingRecord};
+use noisefloor::{Model, Scores, SvmParams, Threshold, TrainingRecord};
 
 fn check(table: &Table, params: &TrainParams, needed: usize) -> Result<(), TrainError> {
     let sound = params.range > 1.0 && params.spread > 0.0 && !params.candidates.is_empty();
@@ -31,7 +31,7 @@ fn check(table: &Table, params: &TrainParams, needed: usize) -> Result<(), Train
 pub fn leave_one_scene_out(
     table: &Table,
     params: &TrainParams,
-    threshold: f32,
+    threshold: Threshold,
     mut on_fold: impl FnMut(&str),
 ) -> Result<Vec<Prediction>, TrainError> {
     check(table, params, 3)?;
@@ -40,11 +40,11 @@ pub fn leave_one_scene_out(
     for &left_out in &groups {
         on_fold(left_out);
         let others: Vec<&str> = groups.iter().copied().filter(|&g| g != left_out).collect();
-        let (machine, platt, _) = fit_groups(table, &others, params)?;
-        let known = familiarity(table, &others, &machine.scaler);
-        let model = machine.into_model(table, platt, known, TrainingRecord::default());
+        let (classifier, _) = fit_groups(table, &others, params)?;
+        let known = familiarity(table, &others, &classifier.scaler);
+        let model = parts(table, classifier, known, TrainingRecord::default());
         let zones = table.zones.iter().filter(|z| z.group == left_out);
-        predictions.extend(zones.map(|z| predict(&model, threshold, z)));
+        predictions.extend(zones.map(|z| predict(|raw| model.judge(raw), threshold, z)));
     }
     Ok(predictions)
 }
@@ -87,8 +87,8 @@ pub fn train(
     leave_one_scene_out: Option<Scores>,
 ) -> Result<Model, TrainError> {
     check(table, params, 2)?;
-    let (machine, platt, SvmParams { c, gamma }) = fit_groups(table, &table.groups(), params)?;
-    let known = familiarity(table, &table.groups(), &machine.scaler);
+    let (classifier, SvmParams { c, gamma }) = fit_groups(table, &table.groups(), params)?;
+    let known = familiarity(table, &table.groups(), &classifier.scaler);
     let record = TrainingRecord {
         corpus,
         table_digest: table.digest(),
@@ -99,7 +99,7 @@ pub fn train(
         gamma,
         leave_one_scene_out,
     };
-    Ok(machine.into_model(table, platt, known, record))
+    Ok(Model::new(parts(table, classifier, known, record))?)
 }
 
 #[cfg(test)]
@@ -108,11 +108,11 @@ mod tests {
     use crate::answer::Answer;
     use crate::observers::observers_agreeing;
     use crate::table::{Level, Origin, Zone};
-    use noisefloor::{DEFAULT_THRESHOLD, Descriptor, Evidence, ToneMapping};
+    use noisefloor::{Descriptor, Evidence, ToneMapping};
 
     /// Scenes where people stop at noise 0.01, whatever else: the first number is ln(noise), the others distract.
     fn table(scenes: usize) -> Table {
-        let dimensions = Descriptor::default().len();
+        let dimensions = Descriptor::default().dimensions();
         let mut state = 9u64;
         let mut uniform = move || {
             state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
@@ -158,7 +158,7 @@ mod tests {
     #[test]
     fn finds_the_rule_that_people_follow_on_scenes_it_has_not_seen() {
         let predictions =
-            leave_one_scene_out(&table(4), &TrainParams::default(), DEFAULT_THRESHOLD, |_| ()).unwrap();
+            leave_one_scene_out(&table(4), &TrainParams::default(), Threshold::PAPER, |_| ()).unwrap();
         assert_eq!(predictions.len(), 24);
         // P = 0.9 is where nine in ten agree: by the psychometric function, a little before the recorded threshold of 95 %.
         let params = TrainParams::default();
@@ -177,7 +177,7 @@ mod tests {
         let params = TrainParams::default();
         let before = train(&plain, &params, String::new(), None).unwrap();
         for (noise, sees_noise) in [(0.005f32, true), (0.02, false)] {
-            let mut descriptor = vec![0.5; Descriptor::default().len()];
+            let mut descriptor = vec![0.5; Descriptor::default().dimensions()];
             descriptor[0] = noise.ln();
             let answer = Answer { group: "mine".into(), spp: 100.0, descriptor, sees_noise };
             let told = Table { answers: vec![answer.clone(); 3], ..plain.clone() };
@@ -198,7 +198,7 @@ mod tests {
                 ..plain.clone()
             };
             let of = |table: &Table| {
-                let all = leave_one_scene_out(table, &params, DEFAULT_THRESHOLD, |_| ()).unwrap();
+                let all = leave_one_scene_out(table, &params, Threshold::PAPER, |_| ()).unwrap();
                 all.into_iter().filter(|p| p.scene == "scene0").collect::<Vec<_>>()
             };
             assert_eq!(of(&same), of(&plain));
@@ -224,11 +224,11 @@ mod tests {
         }
         // One lies apart: it is the one in twenty that is not familiar to the others.
         table.zones[19].levels.iter_mut().for_each(|level| level.descriptor[1] = 30.0);
-        let scaler = noisefloor::Scaler::identity(table.descriptor.len());
+        let scaler = noisefloor::Scaler::identity(table.descriptor.dimensions());
         let known = familiarity(&table, &table.groups(), &scaler).unwrap();
         assert_eq!(known.reach, 1.0);
         let includes = |texture: f32| {
-            let mut numbers = vec![0.0; table.descriptor.texture_numbers()];
+            let mut numbers = vec![0.0; table.descriptor.texture().len()];
             numbers[0] = texture;
             known.includes(&numbers)
         };
@@ -239,7 +239,7 @@ mod tests {
     #[test]
     fn too_few_groups_are_an_error() {
         assert!(matches!(
-            leave_one_scene_out(&table(2), &TrainParams::default(), DEFAULT_THRESHOLD, |_| ()),
+            leave_one_scene_out(&table(2), &TrainParams::default(), Threshold::PAPER, |_| ()),
             Err(TrainError::Groups { .. })
         ));
         assert!(matches!(

@@ -6,11 +6,11 @@ use noisefloor::{ProgressiveSource, Request, TileGrid};
 use noisefloor_ptwne::{Ptwne, RenderOptions, scenes};
 
 const SIZE: usize = 64;
-const SAMPLES: u32 = 4;
+const SAMPLES: u64 = 4;
 
 fn render(c: &mut Criterion) {
     let mut group = c.benchmark_group("samples");
-    group.sample_size(20).throughput(Throughput::Elements((SIZE * SIZE) as u64 * u64::from(SAMPLES)));
+    group.sample_size(20).throughput(Throughput::Elements((SIZE * SIZE) as u64 * SAMPLES));
     for entry in scenes::list() {
         let Some(scene) = scenes::by_name(entry.name) else { continue };
         let (Ok(mut source), Ok(grid)) =
@@ -22,8 +22,8 @@ fn render(c: &mut Criterion) {
         group.bench_function(entry.name, |b| {
             b.iter(|| {
                 let requests: Vec<Request> =
-                    grid.tiles().map(|tile| Request { tile, first, samples: SAMPLES }).collect();
-                first += u64::from(SAMPLES);
+                    grid.tiles().map(|tile| Request { tile, first, spp: SAMPLES }).collect();
+                first += SAMPLES;
                 source.sample(&requests)
             });
         });

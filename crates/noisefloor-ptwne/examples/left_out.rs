@@ -10,7 +10,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 const SIZE: usize = 256;
-const SAMPLES: u32 = 4;
+const SAMPLES: u64 = 4;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let args: Vec<String> = std::env::args().skip(1).collect();
@@ -42,7 +42,7 @@ fn row(scene: &Arc<Scene>, rounds: usize) -> Result<String, Box<dyn Error>> {
     let (own, with_tests) = (median(own), median(with_tests));
     let counts = plain.counts();
     let tests = if scene.has_opacity() { "needed".into() } else { format!("×{:.3}", with_tests / own) };
-    let rate = (SIZE * SIZE) as f64 * f64::from(SAMPLES) / own / 1e6;
+    let rate = (SIZE * SIZE) as f64 * SAMPLES as f64 / own / 1e6;
     let background = 100.0 * counts.background as f64 / counts.samples as f64;
     let bytes = scene.geometry_bytes() / scene.surfaces().max(1);
     let idle = format!("{} of {}", scene.idle_lights(), scene.lights());
@@ -51,9 +51,9 @@ fn row(scene: &Arc<Scene>, rounds: usize) -> Result<String, Box<dyn Error>> {
 
 /// Time of one round of samples.
 fn seconds(source: &mut Ptwne, round: usize) -> Result<f64, Box<dyn Error>> {
-    let first = round as u64 * u64::from(SAMPLES);
+    let first = round as u64 * SAMPLES;
     let tiles = TileGrid::new(SIZE, SIZE, 64)?.tiles();
-    let requests: Vec<Request> = tiles.map(|tile| Request { tile, first, samples: SAMPLES }).collect();
+    let requests: Vec<Request> = tiles.map(|tile| Request { tile, first, spp: SAMPLES }).collect();
     let start = Instant::now();
     source.sample(&requests)?;
     Ok(start.elapsed().as_secs_f64())

@@ -11,7 +11,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let [name, spp, size, out, rest @ ..] = args.as_slice() else {
         return Err("picture SCENE SPP SIZE OUT.png [reference|reinhard]…".into());
     };
-    let (spp, size): (u32, usize) = (spp.parse()?, size.parse()?);
+    let (spp, size): (u64, usize) = (spp.parse()?, size.parse()?);
     let scene = scenes::by_name(name).ok_or("no such scene")?;
     eprint!("{name}: {} surfaces, {} lights", scene.surfaces(), scene.lights());
     let plain = rest.iter().any(|a| a == "plain");
@@ -24,14 +24,14 @@ fn main() -> Result<(), Box<dyn Error>> {
         eprint!(", reference in {:.2} s", start.elapsed().as_secs_f64());
     } else {
         let tiles = TileGrid::new(size, size, 128)?.tiles();
-        let requests: Vec<Request> = tiles.map(|tile| Request { tile, first: 0, samples: spp }).collect();
+        let requests: Vec<Request> = tiles.map(|tile| Request { tile, first: 0, spp }).collect();
         for batch in source.sample(&requests)? {
             for (row, values) in batch.tile.rows(size).zip(batch.mean.chunks(batch.tile.width)) {
                 image[row].copy_from_slice(values);
             }
         }
         let seconds = start.elapsed().as_secs_f64();
-        eprint!(", {seconds:.2} s, {:.2} M samples/s", (size * size) as f64 * f64::from(spp) / seconds / 1e6);
+        eprint!(", {seconds:.2} s, {:.2} M samples/s", (size * size) as f64 * spp as f64 / seconds / 1e6);
     }
     let luminance = |c: &Rgb| f64::from(0.2126 * c[0] + 0.7152 * c[1] + 0.0722 * c[2]);
     let n = image.len() as f64;

@@ -212,7 +212,7 @@ impl Ptwne {
             let x = request.tile.x + i;
             let pixel = (y * self.width + x) as u64;
             let mut sum = glam::DVec3::ZERO;
-            for k in 0..u64::from(request.samples) {
+            for k in 0..request.spp {
                 let mut sampler = Sampler::new(sampling, key, pixel, request.first.wrapping_add(k));
                 let [u, v, ..] = sampler.four();
                 let [dx, dy] = filter.offset([u, v]);
@@ -233,10 +233,10 @@ impl Ptwne {
                 }
                 sum += sample.as_dvec3();
             }
-            *mean = (sum / f64::from(request.samples)).as_vec3().to_array();
+            *mean = (sum / request.spp as f64).as_vec3().to_array();
         }
         let add = |to: &AtomicU64, count: u64| to.fetch_add(count, Ordering::Relaxed);
-        let samples = out.len() as u64 * u64::from(request.samples);
+        let samples = out.len() as u64 * u64::from(request.spp);
         add(&self.tally.samples, samples);
         add(&self.tally.background, if empty { samples } else { 0 });
         add(&self.tally.dropped, dropped);
@@ -259,7 +259,7 @@ impl Ptwne {
         let mut small =
             Self::new(self.scene.clone(), width, height, options).map_err(|e| self.fail(None, e))?;
         let tile = Tile { index: 0, x: 0, y: 0, width, height };
-        let batches = self.on_threads(|| small.sample(&[Request { tile, first: 0, samples: 8 }]))?;
+        let batches = self.on_threads(|| small.sample(&[Request { tile, first: 0, spp: 8 }]))?;
         Ok(ToneMapping::default().settle(&batches[0].mean))
     }
 
@@ -322,8 +322,8 @@ impl ProgressiveSource for Ptwne {
         let mut batches: Vec<Batch> = requests
             .iter()
             .map(|r| {
-                let pixels = if r.samples == 0 { 0 } else { r.tile.pixels() };
-                Batch { tile: r.tile, samples: r.samples, mean: vec![[0.0; 3]; pixels] }
+                let pixels = if r.spp == 0 { 0 } else { r.tile.pixels() };
+                Batch { tile: r.tile, spp: r.spp, mean: vec![[0.0; 3]; pixels] }
             })
             .collect();
         // Rows of tiles are the jobs: so small that no thread waits long for the last one

@@ -1,6 +1,6 @@
 //! Adaptive sampling as in Blender Cycles.
 
-use crate::pixels::{DEFAULT_SHARE, Seen, enough, half_difference, need_of_share, verdict};
+use crate::pixels::{DEFAULT_SHARE, enough, half_difference, need_of_share, verdict};
 use noisefloor::{CriterionError, Film, Needs, StoppingCriterion, Tile, TileGrid, Verdict, View};
 use rayon::prelude::*;
 
@@ -15,7 +15,7 @@ const EPSILON: f64 = 1e-4;
 ///
 /// The error of a pixel is Σ|I − A|/(10⁻⁴ + n) over its channels, all exposed: I is the mean of all samples, A that of one half,
 /// and n is √ΣI where ΣI is below 1 and ΣI above. A pixel below `threshold` has converged and is not looked at again, unless one
-/// of its eight neighbours has not: that takes it back. None converges before [`CyclesAdaptive::min_samples`].
+/// of its eight neighbours has not: that takes it back. None converges before [`CyclesAdaptive::min_spp`].
 ///
 /// A tile is done when a `share` of its pixels has converged. Tiles that are done count as converged for their neighbours.
 #[derive(Clone, Debug)]
@@ -25,7 +25,6 @@ pub struct CyclesAdaptive {
     pub threshold: f64,
     /// Share of a tile's pixels that have to converge, in (0, 1]; 0.95 by default.
     pub share: f64,
-    seen: Seen,
     /// Whether each pixel of the image has converged.
     converged: Vec<bool>,
 }
@@ -33,17 +32,17 @@ pub struct CyclesAdaptive {
 impl CyclesAdaptive {
     /// The condition with its own constant, and 95 % of a tile's pixels.
     pub fn new(threshold: f64) -> Self {
-        Self { threshold, share: DEFAULT_SHARE, seen: Seen::default(), converged: Vec::new() }
+        Self { threshold, share: DEFAULT_SHARE, converged: Vec::new() }
     }
 
-    /// The threshold that Cycles chooses itself for renders of at most `max_samples`: 1/`max_samples`, at least 0.001.
-    pub fn automatic(max_samples: u64) -> Self {
-        Self::new((1.0 / max_samples.max(1) as f64).max(LEAST_AUTOMATIC))
+    /// The threshold that Cycles chooses itself for renders of at most `max_spp`: 1/`max_spp`, at least 0.001.
+    pub fn automatic(max_spp: u64) -> Self {
+        Self::new((1.0 / max_spp.max(1) as f64).max(LEAST_AUTOMATIC))
     }
 
     /// Samples per pixel before which no pixel converges, as Cycles chooses them itself: 16/threshold^0.3, rounded up, at least
     /// 4. That is 32 for a threshold of 0.1, 64 for 0.01 and 128 for 0.001.
-    pub fn min_samples(&self) -> u64 {
+    pub fn min_spp(&self) -> u64 {
         ((16.0 / self.threshold.powf(0.3)).ceil() as u64).max(4)
     }
 }
@@ -87,22 +86,30 @@ impl StoppingCriterion for CyclesAdaptive {
         format!("Cycles, threshold {}", self.threshold)
     }
 
+    fn fingerprint(&self) -> String {
+        format!("{}, share {}", self.name(), self.share)
+    }
+
+    fn begin(&mut self, grid: TileGrid) {
+        self.converged = vec![false; grid.width() * grid.height()];
+    }
+
     fn needs(&self) -> Needs {
         Needs { halves: true, reference: false }
     }
 
     fn judge(&mut self, view: &View<'_>, tiles: &[Tile]) -> Result<Vec<Verdict>, CriterionError> {
         let (film, grid) = (view.film, view.film.grid());
-        if self.seen.renew(film) {
-            self.converged = vec![false; grid.width() * grid.height()];
+        if self.converged.len() != grid.width() * grid.height() {
+            self.begin(grid);
         }
-        let (least, exposure) = (self.min_samples(), f64::from(view.display.exposure()));
+        let (least, exposure) = (self.min_spp(), f64::from(view.display.exposure()));
         let tiles_errors: Vec<Vec<f64>> = tiles
             .par_iter()
             .map(|t| t.rows(grid.width()).flatten().map(|p| error(film, exposure, t.index, p)).collect())
             .collect();
         for (tile, errors) in tiles.iter().zip(&tiles_errors) {
-            let ripe = film.samples(tile.index) >= least;
+            let ripe = film.spp(tile.index) >= least;
             for (pixel, &error) in tile.rows(grid.width()).flatten().zip(errors) {
                 self.converged[pixel] |= ripe && error < self.threshold;
             }
@@ -110,7 +117,7 @@ impl StoppingCriterion for CyclesAdaptive {
         dilate(&mut self.converged, grid, tiles);
 
         let judge = |(tile, errors): (&Tile, Vec<f64>)| {
-            let samples = film.samples(tile.index);
+            let samples = film.spp(tile.index);
             let passed = tile.rows(grid.width()).flatten().filter(|&p| self.converged[p]).count();
             if enough(passed, tile.pixels(), self.share) {
                 return verdict(true, Some(samples));
@@ -152,7 +159,7 @@ mod tests {
 
     #[test]
     fn automatic_numbers_are_those_of_cycles() {
-        let least = [0.1, 0.01, 0.001].map(|t| CyclesAdaptive::new(t).min_samples());
+        let least = [0.1, 0.01, 0.001].map(|t| CyclesAdaptive::new(t).min_spp());
         assert_eq!(least, [32, 64, 128]);
         let automatic = [50, 1000, 100_000].map(|n| CyclesAdaptive::automatic(n).threshold);
         assert_eq!(automatic, [0.02, 0.001, 0.001]);

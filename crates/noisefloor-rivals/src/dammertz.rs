@@ -1,6 +1,6 @@
 //! The hierarchical stopping condition of Dammertz et al. 2010.
 
-use crate::pixels::{Seen, half_difference, verdict};
+use crate::pixels::{half_difference, verdict};
 use noisefloor::{CriterionError, Film, Needs, StoppingCriterion, Tile, TileGrid, Verdict, View};
 use rayon::prelude::*;
 use std::ops::Range;
@@ -27,7 +27,6 @@ pub struct Dammertz {
     pub stop: f64,
     /// Error below which a block is cut in two, in units of `stop`, at least 1; 256 by default.
     pub split: f64,
-    seen: Seen,
     blocks: Vec<Block>,
     /// Whether each tile is done.
     done: Vec<bool>,
@@ -46,7 +45,7 @@ type Errors = (f64, usize);
 impl Dammertz {
     /// The condition with its own constant, and cuts below 256 times that.
     pub fn new(stop: f64) -> Self {
-        Self { stop, split: DEFAULT_SPLIT, seen: Seen::default(), blocks: Vec::new(), done: Vec::new() }
+        Self { stop, split: DEFAULT_SPLIT, blocks: Vec::new(), done: Vec::new() }
     }
 
     /// Judges a block and all that it is cut into; files what is not done, and returns the error of each tile that is named.
@@ -132,15 +131,23 @@ impl StoppingCriterion for Dammertz {
         format!("Dammertz et al. 2010, stop {}", self.stop)
     }
 
+    fn fingerprint(&self) -> String {
+        format!("{}, split {}", self.name(), self.split)
+    }
+
+    fn begin(&mut self, grid: TileGrid) {
+        self.blocks = vec![Block { columns: 0..grid.columns(), rows: 0..grid.rows() }];
+        self.done = vec![false; grid.len()];
+    }
+
     fn needs(&self) -> Needs {
         Needs { halves: true, reference: false }
     }
 
     fn judge(&mut self, view: &View<'_>, tiles: &[Tile]) -> Result<Vec<Verdict>, CriterionError> {
         let grid = view.film.grid();
-        if self.seen.renew(view.film) {
-            self.blocks = vec![Block { columns: 0..grid.columns(), rows: 0..grid.rows() }];
-            self.done = vec![false; grid.len()];
+        if self.done.len() != grid.len() {
+            self.begin(grid);
         }
         let exposure = f64::from(view.display.exposure());
         let done = &self.done;
@@ -153,7 +160,7 @@ impl StoppingCriterion for Dammertz {
             self.refine(block, grid, &errors, &mut expected);
         }
         let judge = |t: &Tile| {
-            let samples = view.film.samples(t.index);
+            let samples = view.film.spp(t.index);
             if self.done[t.index] {
                 return verdict(true, Some(samples));
             }
@@ -180,7 +187,7 @@ mod tests {
             let open: Vec<Tile> = film.grid().tiles().filter(|t| stops[t.index] == 0).collect();
             for (tile, verdict) in open.iter().zip(criterion.judge(&view(&film), &open).unwrap()) {
                 if verdict.converged {
-                    stops[tile.index] = film.samples(tile.index);
+                    stops[tile.index] = film.spp(tile.index);
                 }
             }
         }

@@ -3,7 +3,7 @@
 //!
 //! | criterion | spec | done when |
 //! |---|---|---|
-//! | [`FixedSamples`](noisefloor::FixedSamples) | `spp:256` | a tile has so many samples per pixel |
+//! | [`FixedSpp`](noisefloor::FixedSpp) | `spp:256` | a tile has so many samples per pixel |
 //! | [`TimeLimit`] | `time:30` | so many seconds have passed |
 //! | [`RelativeError`] | `relative-error:0.19` | the confidence interval of a pixel is small beside its mean (Mitsuba 0.6) |
 //! | [`Dammertz`] | `dammertz:0.003` | the error of a block, weighted by its area, is small; blocks split (Dammertz et al. 2010) |

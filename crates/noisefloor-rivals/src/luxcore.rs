@@ -1,7 +1,7 @@
 //! The halt condition of LuxCoreRender.
 
-use crate::pixels::{Seen, displayed, enough, verdict};
-use noisefloor::{CriterionError, Rgb, StoppingCriterion, Tile, Verdict, View};
+use crate::pixels::{displayed, enough, verdict};
+use noisefloor::{CriterionError, Rgb, StoppingCriterion, Tile, TileGrid, Verdict, View};
 
 /// Default of [`LuxCoreHalt::share`].
 pub(crate) const DEFAULT_SHARE: f64 = 0.35;
@@ -28,7 +28,6 @@ pub struct LuxCoreHalt {
     pub warmup: f64,
     /// Change of a displayed channel that counts, at least 0; 1/256 by default, one step of an 8-bit screen.
     pub threshold: f32,
-    seen: Seen,
     /// Picture and samples per pixel at the last test.
     last: Option<(Vec<Rgb>, f64)>,
     halted: bool,
@@ -42,7 +41,6 @@ impl LuxCoreHalt {
             step: DEFAULT_STEP,
             warmup: DEFAULT_STEP,
             threshold: DEFAULT_THRESHOLD,
-            seen: Seen::default(),
             last: None,
             halted: false,
         }
@@ -60,11 +58,17 @@ impl StoppingCriterion for LuxCoreHalt {
         format!("LuxCore, {} of the pixels", self.share)
     }
 
+    fn fingerprint(&self) -> String {
+        let Self { step, warmup, threshold, .. } = self;
+        format!("{}, step {step}, warmup {warmup}, threshold {threshold}", self.name())
+    }
+
+    fn begin(&mut self, _: TileGrid) {
+        (self.last, self.halted) = (None, false);
+    }
+
     fn judge(&mut self, view: &View<'_>, tiles: &[Tile]) -> Result<Vec<Verdict>, CriterionError> {
         let grid = view.film.grid();
-        if self.seen.renew(view.film) {
-            (self.last, self.halted) = (None, false);
-        }
         let pixels = grid.width() * grid.height();
         let samples = view.film.total_samples() as f64 / pixels as f64;
         let due = self.last.as_ref().is_none_or(|(_, last)| samples - last >= self.step);
@@ -111,8 +115,8 @@ mod tests {
             for expected in [false, halts, halts] {
                 expose(&mut film, 50, mean, sigma, &mut bell);
                 expose(&mut film, 50, mean, sigma, &mut bell);
-                if film.samples(0) < 300 {
-                    assert_eq!(judge(&mut halt, &film), expected, "{} {limit}", film.samples(0));
+                if film.spp(0) < 300 {
+                    assert_eq!(judge(&mut halt, &film), expected, "{} {limit}", film.spp(0));
                 }
             }
         }
@@ -125,7 +129,7 @@ mod tests {
         while first == 0 {
             expose(&mut film, 16, 0.5, 0.1, &mut bell);
             if judge(&mut halt, &film) {
-                first = film.samples(0);
+                first = film.spp(0);
             }
         }
         // The first test comes after more than 64 samples, at 80; the second, which halts if everything may change, 64 later.

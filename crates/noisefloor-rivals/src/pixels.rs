@@ -7,8 +7,8 @@ use rayon::prelude::*;
 pub(crate) const DEFAULT_SHARE: f64 = 0.95;
 
 /// A verdict without a probability.
-pub(crate) fn verdict(converged: bool, expected_samples: Option<u64>) -> Verdict {
-    Verdict { converged, probability: None, expected_samples, unfamiliar: false }
+pub(crate) fn verdict(converged: bool, expected_spp: Option<u64>) -> Verdict {
+    Verdict { converged, expected_spp, ..Verdict::default() }
 }
 
 /// Whether `passed` of `pixels` are the share wanted.
@@ -29,24 +29,6 @@ pub(crate) fn half_difference(film: &Film, tile: usize, pixel: usize, exposure: 
     let difference: f64 = (0..3).map(|c| step(c).abs()).sum();
     let sum: f64 = (0..3).map(|c| f64::from(a[c]) + step(c)).sum();
     Some((difference * exposure, sum * exposure))
-}
-
-/// Whether a film is another one than that with as many tiles and samples before: of another size, or with fewer samples.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct Seen {
-    size: (usize, usize, usize),
-    samples: u64,
-}
-
-impl Seen {
-    /// Takes note of a film; true if it is a new one.
-    pub(crate) fn renew(&mut self, film: &Film) -> bool {
-        let grid = film.grid();
-        let now = Self { size: (grid.width(), grid.height(), grid.edge()), samples: film.total_samples() };
-        let new = now.size != self.size || now.samples < self.samples;
-        *self = now;
-        new
-    }
 }
 
 /// The number of samples at which the share wanted of a tile's pixels has what it needs; `None` if some of those have no finite need.

@@ -1,7 +1,9 @@
 //! Relative standard error with confidence, as in Mitsuba 0.6.
 
-use crate::pixels::{DEFAULT_SHARE, Seen, enough, need_of_share, verdict};
-use noisefloor::{CriterionError, Film, Needs, Rgb, StoppingCriterion, Tile, Verdict, View, luminance};
+use crate::pixels::{DEFAULT_SHARE, enough, need_of_share, verdict};
+use noisefloor::{
+    CriterionError, Film, Needs, Rgb, StoppingCriterion, Tile, TileGrid, Verdict, View, luminance,
+};
 use rayon::prelude::*;
 use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
 
@@ -33,7 +35,6 @@ pub struct RelativeError {
     pub confidence: f64,
     /// Share of a tile's pixels that have to be done, in (0, 1]; 0.95 by default.
     pub share: f64,
-    seen: Seen,
     /// Of each pixel of each tile; empty until the tile is judged first.
     pixels: Vec<Vec<Batches>>,
 }
@@ -41,13 +42,7 @@ pub struct RelativeError {
 impl RelativeError {
     /// The condition with its own constant, a confidence of 95 %, and 95 % of a tile's pixels.
     pub fn new(error: f64) -> Self {
-        Self {
-            error,
-            confidence: DEFAULT_CONFIDENCE,
-            share: DEFAULT_SHARE,
-            seen: Seen::default(),
-            pixels: Vec::new(),
-        }
+        Self { error, confidence: DEFAULT_CONFIDENCE, share: DEFAULT_SHARE, pixels: Vec::new() }
     }
 }
 
@@ -117,14 +112,22 @@ impl StoppingCriterion for RelativeError {
         format!("relative error {} at {} %", self.error, 100.0 * self.confidence)
     }
 
+    fn fingerprint(&self) -> String {
+        format!("{}, share {}", self.name(), self.share)
+    }
+
+    fn begin(&mut self, grid: TileGrid) {
+        self.pixels = vec![Vec::new(); grid.len()];
+    }
+
     fn needs(&self) -> Needs {
         Needs { halves: true, reference: false }
     }
 
     fn judge(&mut self, view: &View<'_>, tiles: &[Tile]) -> Result<Vec<Verdict>, CriterionError> {
         let (film, grid) = (view.film, view.film.grid());
-        if self.seen.renew(film) {
-            self.pixels = vec![Vec::new(); grid.len()];
+        if self.pixels.len() != grid.len() {
+            self.begin(grid);
         }
         // Take in the new batches.
         let mut work: Vec<(Tile, Vec<Batches>)> =
@@ -142,7 +145,7 @@ impl StoppingCriterion for RelativeError {
         let normal = quantiles[quantiles.len() - 1];
         let dark = DARK * average_luminance(film);
         let judge = |(tile, pixels): &(Tile, Vec<Batches>)| {
-            let samples = film.samples(tile.index);
+            let samples = film.spp(tile.index);
             // Half-width of the confidence interval over that allowed, and samples needed for it to be 1 by the normal quantile.
             let ratio = |p: &Batches| {
                 let Some(variance) = p.variance() else { return (f64::INFINITY, f64::INFINITY) };

@@ -4,7 +4,7 @@ use crate::{
     CyclesAdaptive, Dammertz, LuxCoreHalt, Myszkowski1998, RelativeError, Takouachet2007, TimeLimit, cycles,
     dammertz, luxcore, relative_error, stages,
 };
-use noisefloor::{FixedSamples, StoppingCriterion};
+use noisefloor::{FixedSpp, StoppingCriterion};
 use thiserror::Error;
 
 /// Samples per pixel of `spp` without a number.
@@ -44,7 +44,7 @@ pub const RIVALS: &[Rival] = &[
         title: "Fixed samples per pixel",
         default: DEFAULT_SAMPLES,
         range: (100_000.0, 2.0),
-        make: |samples| Box::new(FixedSamples(samples.round() as u64)),
+        make: |samples| Box::new(FixedSpp(samples.round() as u64)),
         tells: false,
         valid: |samples| (1.0..=1e15).contains(&samples),
         wanted: "a number of samples per pixel, at least 1",

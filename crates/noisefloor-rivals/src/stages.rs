@@ -1,9 +1,9 @@
 //! Stopping conditions on visible differences between pictures of one rendering.
 
 use crate::image::Image;
-use crate::pixels::{Seen, displayed, verdict};
+use crate::pixels::{displayed, verdict};
 use crate::vdp::{Response, Vdp};
-use noisefloor::{CriterionError, Film, StoppingCriterion, Tile, Verdict, View};
+use noisefloor::{CriterionError, Film, StoppingCriterion, Tile, TileGrid, Verdict, View};
 
 /// Default of [`Myszkowski1998::probability`]: what agrees with people on average.
 pub(crate) const DEFAULT_SEEN: f64 = 0.55;
@@ -17,14 +17,13 @@ const SPACING: f64 = 1.1;
 /// Earlier stages of a rendering, spaced by samples.
 #[derive(Clone, Debug)]
 struct Stages<T> {
-    seen: Seen,
     /// Samples per pixel, and the stage.
     kept: Vec<(u64, T)>,
 }
 
 impl<T> Stages<T> {
     fn new() -> Self {
-        Self { seen: Seen::default(), kept: Vec::new() }
+        Self { kept: Vec::new() }
     }
 
     /// The latest stage with at most half of `samples`.
@@ -44,7 +43,7 @@ impl<T> Stages<T> {
 
 /// The stage of the computation: the most samples per pixel that a tile has.
 fn stage_of(film: &Film) -> u64 {
-    film.grid().tiles().map(|t| film.samples(t.index)).max().unwrap_or(0)
+    film.grid().tiles().map(|t| film.spp(t.index)).max().unwrap_or(0)
 }
 
 /// What the eye makes of the picture as it is displayed.
@@ -112,11 +111,16 @@ impl StoppingCriterion for Myszkowski1998 {
         format!("Myszkowski 1998, P {}", self.probability)
     }
 
+    fn fingerprint(&self) -> String {
+        format!("{}, share {}, {:?}", self.name(), self.share, self.vdp)
+    }
+
+    fn begin(&mut self, _: TileGrid) {
+        self.stages.kept.clear();
+    }
+
     fn judge(&mut self, view: &View<'_>, tiles: &[Tile]) -> Result<Vec<Verdict>, CriterionError> {
         let samples = stage_of(view.film);
-        if self.stages.seen.renew(view.film) {
-            self.stages.kept.clear();
-        }
         let now = response(&self.vdp, view);
         let map = self.stages.half_way(samples).map(|before| self.vdp.detect(before, &now));
         self.stages.keep(samples, now);
@@ -169,12 +173,17 @@ impl StoppingCriterion for Takouachet2007 {
         format!("Takouachet et al. 2007, P {}", self.probability)
     }
 
+    fn fingerprint(&self) -> String {
+        format!("{}, share {}, {:?}", self.name(), self.share, self.vdp)
+    }
+
+    fn begin(&mut self, _: TileGrid) {
+        self.stages.kept.clear();
+        self.first = None;
+    }
+
     fn judge(&mut self, view: &View<'_>, tiles: &[Tile]) -> Result<Vec<Verdict>, CriterionError> {
         let samples = stage_of(view.film);
-        if self.stages.seen.renew(view.film) {
-            self.stages.kept.clear();
-            self.first = None;
-        }
         let now = response(&self.vdp, view);
         let Some(first) = &self.first else {
             self.first = Some(now);
@@ -216,7 +225,7 @@ mod tests {
     fn run(criterion: &mut dyn StoppingCriterion, sigma: f64, counts: &[u64]) -> Vec<bool> {
         let (mut film, mut bell) = (empty(), Bell(8));
         let judge = |&samples: &u64| {
-            let half = ((samples - film.samples(0)) / 2) as u32;
+            let half = (samples - film.spp(0)) / 2;
             (0..2).for_each(|_| expose(&mut film, half, 0.2, sigma, &mut bell));
             let tiles: Vec<Tile> = film.grid().tiles().collect();
             criterion.judge(&view(&film), &tiles).unwrap()[0].converged

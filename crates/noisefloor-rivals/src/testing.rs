@@ -36,9 +36,9 @@ pub(crate) fn empty() -> Film {
 }
 
 /// Adds `samples` samples of grey noise to each tile: `mean` with a standard deviation of `sigma` a sample.
-pub(crate) fn expose(film: &mut Film, samples: u32, mean: f64, sigma: f64, bell: &mut Bell) {
+pub(crate) fn expose(film: &mut Film, samples: u64, mean: f64, sigma: f64, bell: &mut Bell) {
     for tile in film.grid().tiles() {
-        let deviation = sigma / f64::from(samples).sqrt();
+        let deviation = sigma / (samples as f64).sqrt();
         let batch: Vec<Rgb> =
             (0..tile.pixels()).map(|_| [(mean + deviation * bell.next()) as f32; 3]).collect();
         film.add(tile.index, samples, &batch).unwrap();
@@ -46,7 +46,7 @@ pub(crate) fn expose(film: &mut Film, samples: u32, mean: f64, sigma: f64, bell:
 }
 
 /// A film of one value everywhere, in both halves.
-pub(crate) fn constant(value: f32, samples: u32) -> Film {
+pub(crate) fn constant(value: f32, samples: u64) -> Film {
     let mut film = empty();
     for _ in 0..2 {
         for tile in film.grid().tiles() {
@@ -79,11 +79,11 @@ impl ProgressiveSource for Noise {
     fn sample(&mut self, requests: &[Request]) -> Result<Vec<Batch>, SourceError> {
         let sample = |r: &Request| {
             let mut bell = Bell(r.first << 20 | r.tile.index as u64);
-            let deviation = self.sigma / f64::from(r.samples).sqrt();
+            let deviation = self.sigma / (r.spp as f64).sqrt();
             let pixels =
                 (0..r.tile.pixels()).map(|i| (r.tile.x + i % r.tile.width, r.tile.y + i / r.tile.width));
             let value = |(x, y)| [((self.picture)(x, y) * (1.0 + deviation * bell.next())) as f32; 3];
-            Batch { tile: r.tile, samples: r.samples, mean: pixels.map(value).collect() }
+            Batch { tile: r.tile, spp: r.spp, mean: pixels.map(value).collect() }
         };
         Ok(requests.iter().map(sample).collect())
     }

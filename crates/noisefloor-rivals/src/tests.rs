@@ -20,7 +20,7 @@ const SPECS: [&str; 8] = [
 fn drive(spec: &str, sigma: f64) -> Vec<Stop> {
     let picture = |x: usize, y: usize| 0.05 + 0.01 * x as f64 + if y > 40 { 0.3 } else { 0.0 };
     let source = Noise { edge: 64, picture, sigma };
-    let params = Params { tile: 32, max_samples: 20_000, ..Params::default() };
+    let params = Params { tile: 32, max_spp: 20_000, ..Params::default() };
     let mut driver = Driver::new(source, parse(spec).unwrap(), params).unwrap();
     driver.run(|_, _| ()).unwrap();
     driver.session().stops().collect()
@@ -51,7 +51,7 @@ fn the_number_of_threads_does_not_matter() {
 
 #[test]
 fn stricter_takes_more() {
-    let samples = |spec: &str, sigma| drive(spec, sigma).iter().map(|s| s.samples).sum::<u64>();
+    let samples = |spec: &str, sigma| drive(spec, sigma).iter().map(|s| s.spp).sum::<u64>();
     for (strict, lax, sigma) in [
         ("relative-error:0.06", "relative-error:0.2", 0.5),
         ("dammertz:0.002", "dammertz:0.01", 0.5),
@@ -98,7 +98,7 @@ fn extremes_are_judged() {
     for spec in SPECS {
         for (name, film) in extremes() {
             let mut criterion = parse(spec).unwrap();
-            let tiles: Vec<Tile> = film.grid().tiles().filter(|t| film.samples(t.index) > 0).collect();
+            let tiles: Vec<Tile> = film.grid().tiles().filter(|t| film.spp(t.index) > 0).collect();
             for _ in 0..3 {
                 let verdicts: Vec<Verdict> = criterion.judge(&view(&film), &tiles).unwrap();
                 assert_eq!(verdicts.len(), tiles.len(), "{spec}, {name}");

@@ -1,7 +1,7 @@
 //! So many seconds.
 
 use crate::pixels::verdict;
-use noisefloor::{CriterionError, StoppingCriterion, Tile, Verdict, View};
+use noisefloor::{CriterionError, StoppingCriterion, Tile, TileGrid, Verdict, View};
 use std::time::{Duration, Instant};
 
 /// Stops all tiles when so many seconds have passed since the first verdict.
@@ -26,6 +26,14 @@ impl TimeLimit {
 impl StoppingCriterion for TimeLimit {
     fn name(&self) -> String {
         format!("{} seconds", self.seconds)
+    }
+
+    fn fingerprint(&self) -> String {
+        self.name()
+    }
+
+    fn begin(&mut self, _: TileGrid) {
+        self.began = None;
     }
 
     fn judge(&mut self, _: &View<'_>, tiles: &[Tile]) -> Result<Vec<Verdict>, CriterionError> {

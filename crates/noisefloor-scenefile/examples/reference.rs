@@ -15,9 +15,9 @@ use std::sync::Arc;
 use std::time::Instant;
 
 /// Samples per pixel of the small picture that the reference takes its exposure from; the path tracer is timed with them.
-const PREVIEW: u32 = 8;
+const PREVIEW: u64 = 8;
 /// Samples per pixel at the first verdict of a render. In scenes where most pixels are black after a few, the picture is darker by then.
-const FIRST: u32 = 100;
+const FIRST: u64 = 100;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let args: Vec<String> = std::env::args().skip(1).collect();
@@ -53,11 +53,11 @@ fn row(scene: &Arc<Scene>, size: usize) -> Result<String, Box<dyn Error>> {
     let seconds = start.elapsed().as_secs_f64() / 2.0;
     let tile = Tile { index: 0, x: 0, y: 0, width: size, height: size };
     let rendered = |samples| {
-        source(1)?.sample(&[Request { tile, first: 0, samples }]).map_err(Into::<Box<dyn Error>>::into)
+        source(1)?.sample(&[Request { tile, first: 0, spp: samples }]).map_err(Into::<Box<dyn Error>>::into)
     };
     let start = Instant::now();
     let preview = rendered(PREVIEW)?;
-    let spp = seconds / start.elapsed().as_secs_f64() * f64::from(PREVIEW);
+    let spp = seconds / start.elapsed().as_secs_f64() * PREVIEW as f64;
     let first = rendered(FIRST)?;
     let [at_preview, at_first] = [preview, first].map(|batches| deviations(&images, &batches[0].mean, size));
     let ([early, _], [all, worst]) = (at_preview?, at_first?);

@@ -32,7 +32,7 @@ const MOST_BATCHES: [usize; 2] = [1000, 8];
 /// #         SourceInfo { name: "wall".into(), width: 48, height: 40, unit: Unit::SamplesPerPixel, aims: true, repeats: Repeats::Samples }
 /// #     }
 /// #     fn sample(&mut self, requests: &[Request]) -> Result<Vec<Batch>, SourceError> {
-/// #         Ok(requests.iter().map(|r| Batch { tile: r.tile, samples: r.samples, mean: vec![[0.2; 3]; r.tile.pixels()] }).collect())
+/// #         Ok(requests.iter().map(|r| Batch { tile: r.tile, spp: r.spp, mean: vec![[0.2; 3]; r.tile.pixels()] }).collect())
 /// #     }
 /// # }
 /// noisefloor_testkit::check_source(|| Wall);
@@ -83,7 +83,7 @@ pub fn check_source<S: ProgressiveSource>(make: impl Fn() -> S) {
         assert_eq!(source.info(), info, "two sources of one construction describe themselves differently");
         Probe::new(source)
     };
-    let rounds = |samples: &[u32]| {
+    let rounds = |samples: &[u64]| {
         let mut probe = start();
         let rounds = samples.iter().map(|&n| probe.ask_all(n)).collect::<Vec<_>>();
         assert_eq!(probe.source.info(), info, "the description changed with use");
@@ -142,7 +142,7 @@ pub fn check_source<S: ProgressiveSource>(make: impl Fn() -> S) {
 
     // The end, where it is near
     let mut probe = start();
-    let over = |batches: &[Batch]| batches.iter().all(|b| b.samples == 0);
+    let over = |batches: &[Batch]| batches.iter().all(|b| b.spp == 0);
     let most = MOST_BATCHES[usize::from(!playback)];
     if (0..most).any(|_| over(&probe.ask_all(16))) {
         assert!(over(&probe.ask_all(16)), "after its end the source has samples again");
@@ -164,8 +164,8 @@ impl<S: ProgressiveSource> Probe<S> {
     }
 
     /// Asks for the next samples of some tiles, and checks the shape of the answer.
-    fn ask(&mut self, tiles: &[usize], samples: u32) -> Vec<Batch> {
-        let request = |&i: &usize| Request { tile: self.tiles[i], first: self.taken[i], samples };
+    fn ask(&mut self, tiles: &[usize], samples: u64) -> Vec<Batch> {
+        let request = |&i: &usize| Request { tile: self.tiles[i], first: self.taken[i], spp: samples };
         let requests: Vec<Request> = tiles.iter().map(request).collect();
         let batches =
             self.source.sample(&requests).unwrap_or_else(|e| panic!("sampling failed: {e} ({e:?})"));
@@ -173,20 +173,15 @@ impl<S: ProgressiveSource> Probe<S> {
         for (request, batch) in requests.iter().zip(&batches) {
             let place = request.tile.index;
             assert_eq!(batch.tile, request.tile, "batches are not in the order of the requests");
-            let pixels = if batch.samples == 0 { 0 } else { batch.tile.pixels() };
-            assert_eq!(
-                batch.mean.len(),
-                pixels,
-                "values in a batch of {} samples, tile {place}",
-                batch.samples
-            );
-            self.taken[place] += u64::from(batch.samples);
+            let pixels = if batch.spp == 0 { 0 } else { batch.tile.pixels() };
+            assert_eq!(batch.mean.len(), pixels, "values in a batch of {} samples, tile {place}", batch.spp);
+            self.taken[place] += batch.spp;
         }
         batches
     }
 
     /// Asks for all tiles, last first, and gives the batches in the order of the grid.
-    fn ask_all(&mut self, samples: u32) -> Vec<Batch> {
+    fn ask_all(&mut self, samples: u64) -> Vec<Batch> {
         let order: Vec<usize> = (0..self.tiles.len()).rev().collect();
         let mut batches = self.ask(&order, samples);
         batches.reverse();
@@ -199,23 +194,23 @@ fn check_info(info: &SourceInfo) {
     check_image(info.width, info.height).unwrap_or_else(|e| panic!("{e}"));
 }
 
-fn gives(batches: &[Batch], samples: u32) -> bool {
-    batches.iter().all(|b| b.samples == samples)
+fn gives(batches: &[Batch], samples: u64) -> bool {
+    batches.iter().all(|b| b.spp == samples)
 }
 
 /// Equal to the bit, NaN and −0 included.
 fn same(a: &[Vec<Batch>], b: &[Vec<Batch>]) -> bool {
     let bits = |batch: &Batch| -> Vec<u32> { batch.mean.iter().flatten().map(|c| c.to_bits()).collect() };
-    let equal = |(a, b): (&Batch, &Batch)| a.tile == b.tile && a.samples == b.samples && bits(a) == bits(b);
+    let equal = |(a, b): (&Batch, &Batch)| a.tile == b.tile && a.spp == b.spp && bits(a) == bits(b);
     a.len() == b.len() && a.iter().flatten().zip(b.iter().flatten()).all(equal)
 }
 
 /// As asked, until the end: then what was left, and nothing from then on.
-fn check_counts(rounds: &[Vec<Batch>], asked: &[u32]) {
+fn check_counts(rounds: &[Vec<Batch>], asked: &[u64]) {
     for tile in 0..rounds[0].len() {
         let mut ended = false;
         for (batches, &asked) in rounds.iter().zip(asked) {
-            let Batch { samples, .. } = batches[tile];
+            let samples = batches[tile].spp;
             let right = if ended { samples == 0 } else { samples <= asked };
             assert!(right, "tile {tile}: {samples} samples where {asked} were asked for");
             ended |= samples < asked;
@@ -352,7 +347,7 @@ fn check_aiming<S: ProgressiveSource>(start: impl Fn() -> Probe<S>, rounds: &[Ve
 
 /// Noise of two batches against noise of two others, in every way to pair four, and noise of a tile against the next one's.
 fn check_independence(rounds: &[Vec<Batch>], whole: Option<&Vec<Batch>>, unit: Unit) {
-    if rounds.iter().flatten().any(|b| b.samples == 0) {
+    if rounds.iter().flatten().any(|b| b.spp == 0) {
         return;
     }
     let noise = |a: &Vec<Batch>, b: &Vec<Batch>| -> Vec<Vec<f64>> {

@@ -29,7 +29,7 @@ fn verdict(c: &mut Criterion) {
     let mut oracle = Oracle::bundled();
     let planes = TilePlanes::from_halves(&film, &display, tile);
     let described = oracle.describe(&planes, 100.0).expect("any tile");
-    let numbers = oracle.model().descriptor.in_picture(&[described]).remove(0);
+    let numbers = oracle.model().descriptor().in_picture(&[described]).remove(0);
 
     let mut group = c.benchmark_group("tile of 128x128");
     group.bench_function("planes", |b| b.iter(|| TilePlanes::from_halves(black_box(&film), &display, tile)));
@@ -38,11 +38,7 @@ fn verdict(c: &mut Criterion) {
         b.iter(|| oracle.describe(black_box(&planes), 100.0));
     });
     group.bench_function("query", |b| {
-        let mut scratch = numbers.clone();
-        b.iter(|| {
-            scratch.copy_from_slice(black_box(&numbers));
-            oracle.model().probability(&mut scratch)
-        });
+        b.iter(|| oracle.model().judge(black_box(&numbers)));
     });
     let view = View { film: &film, display: &display, reference: None };
     // All on one core, as the rest

@@ -156,7 +156,7 @@ fn asked(oracle: &Oracle, kind: &Kind, clean: Picture, amplitude: f64) -> f64 {
             })
             .collect();
         for verdict in oracle.judge_described(&described) {
-            if let Some(expected) = verdict.expected_samples {
+            if let Some(expected) = verdict.expected_spp {
                 sum += (expected as f64 / SAMPLES).ln();
                 count += 1.0;
             }

@@ -1,10 +1,12 @@
 //! What decides that a tile is done.
 
+use crate::descriptor::DescriptorError;
 use crate::display::Display;
 use crate::film::Film;
 use crate::params::Audience;
-use crate::source::Rgb;
+use crate::rgb::Rgb;
 use crate::tile::{Tile, TileGrid};
+use auto_impl::auto_impl;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
@@ -13,13 +15,13 @@ use thiserror::Error;
 pub struct View<'a> {
     /// All samples so far.
     pub film: &'a Film,
-    /// The frozen way from radiance to the screen.
+    /// How radiance is displayed; settled before the first verdict.
     pub display: &'a Display,
-    /// The quick reference, display-encoded, row-major over the image; there if [`Needs::reference`] is.
+    /// The quick reference, display-encoded, row-major over the image; present if [`Needs::reference`] is set.
     pub reference: Option<&'a [Rgb]>,
 }
 
-/// What a criterion needs; nothing else is made.
+/// What a criterion reads besides the mean picture; nothing else is kept or rendered.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Needs {
     /// Two half buffers.
@@ -28,28 +30,34 @@ pub struct Needs {
     pub reference: bool,
 }
 
-/// What a criterion says of one tile.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+/// What a criterion says about one tile.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Verdict {
     /// Whether the tile needs no more samples.
     pub converged: bool,
-    /// Probability that an observer sees no difference from the converged picture, where the criterion has one.
+    /// Probability that an observer sees no difference from the converged picture, if the criterion computes one.
     pub probability: Option<f32>,
-    /// Samples per pixel at which the criterion expects to be satisfied, where it can tell.
-    pub expected_samples: Option<u64>,
-    /// Whether the tile is unlike anything that the criterion was made for, so that its word has to be taken with care.
+    /// Samples per pixel at which the criterion expects to be satisfied, if it can tell.
+    pub expected_spp: Option<u64>,
+    /// Whether the tile is unlike everything the criterion was made for: treat the verdict with care.
     pub unfamiliar: bool,
+    /// What `probability` would be without the penalty for an unfamiliar tile; equal to it where there is no penalty.
+    pub probability_without_penalty: Option<f32>,
 }
 
 /// Why a criterion could not judge.
 #[derive(Debug, Error, Clone, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum CriterionError {
-    /// The source has no reference, and the criterion needs one.
-    #[error("{0} needs a ray-traced reference, and this source has none: use a model trained on halves")]
+    /// The criterion needs a reference, and the source has none.
+    #[error(
+        "{0} needs a ray-traced reference, which this source does not have: use a model trained on half buffers"
+    )]
     NoReference(String),
     /// The criterion was trained for another tile size.
     #[error(
-        "{name} judges tiles of {expected}×{expected} pixels only, not {width}×{height}: set the tile size to {expected} and use an image that it divides"
+        "{name} judges only tiles of {expected}×{expected} pixels, not {width}×{height}: \
+         set the tile size to {expected} and choose an image size that it divides"
     )]
     TileSize {
         /// The criterion.
@@ -61,23 +69,36 @@ pub enum CriterionError {
         /// Height of the tile it was given.
         height: usize,
     },
+    /// The descriptor cannot describe the tile.
+    #[error(transparent)]
+    Descriptor(DescriptorError),
 }
 
-/// Judges tiles of a film.
+/// Judges the tiles of a film.
 ///
 /// # Why it is shaped so
-/// All tiles that are due come in one call, so that a criterion can spread them over threads, or look at the whole image
-/// once. A criterion may keep state between calls (a rival that compares with the previous picture does): hence `&mut`.
+/// All tiles that are due come in one call, so that a criterion can distribute them over threads or look at the whole
+/// image once. A criterion may keep state between calls (one that compares with the previous picture does): hence
+/// `&mut`. One that can save that state is also [`Resumable`].
 ///
 /// # For implementers
-/// - Return one verdict for each tile, in their order.
+/// - Return one verdict for each tile, in order.
 /// - Verdicts must not depend on the number of threads.
-/// - Say in [`StoppingCriterion::needs`] what you read; what you do not need is not rendered and not kept.
+/// - Declare in [`StoppingCriterion::needs`] what you read; what nobody needs is neither rendered nor kept.
+/// - Forget the previous film in [`StoppingCriterion::begin`]; a criterion without state has nothing to do there.
+#[auto_impl(&mut, Box)]
 pub trait StoppingCriterion {
-    /// A short name for reports: `"svm oracle"`.
+    /// A short name for reports, such as `"svm oracle"`.
     fn name(&self) -> String;
 
-    /// What the criterion reads beside the mean picture.
+    /// Everything its verdicts depend on besides the film and the display: model digest, threshold, constants. Two
+    /// criteria with the same fingerprint and state give the same verdicts.
+    fn fingerprint(&self) -> String;
+
+    /// A new film begins, with these tiles.
+    fn begin(&mut self, _grid: TileGrid) {}
+
+    /// What the criterion reads besides the mean picture.
     fn needs(&self) -> Needs {
         Needs::default()
     }
@@ -87,76 +108,55 @@ pub trait StoppingCriterion {
         Audience::TRAINED
     }
 
-    /// How visible the noise is at each pixel of the image, row-major, in 8-bit display steps; NaN where a tile gives no evidence.
-    /// `None` if the criterion cannot say, which is the default. Costs as much as a verdict on every tile, and is asked for where a
-    /// map is wanted, never for a verdict.
+    /// How visible the noise is at each pixel of the image, row-major, in 8-bit display steps; NaN where a tile gives no
+    /// evidence. `None`, the default, if the criterion cannot say. Costs as much as a verdict on every tile; called where
+    /// a map is wanted, never for a verdict.
     fn visible_noise(&self, _view: &View<'_>) -> Option<Vec<f32>> {
         None
     }
 
-    /// What the criterion keeps between verdicts and cannot make again from the film, for a [`crate::Checkpoint`]: nothing, by default.
-    fn state(&self) -> Vec<u8> {
-        Vec::new()
-    }
-
-    /// Takes up what [`StoppingCriterion::state`] gave of a film of such a grid. The bytes may come from anywhere: false if they are not that.
-    fn restore(&mut self, _grid: TileGrid, state: &[u8]) -> bool {
-        state.is_empty()
-    }
-
-    /// Judges the tiles named, all of which have samples.
+    /// Judges the given tiles, all of which have samples.
     ///
     /// # Errors
     /// [`CriterionError`] if the criterion does not fit the job.
     fn judge(&mut self, view: &View<'_>, tiles: &[Tile]) -> Result<Vec<Verdict>, CriterionError>;
 }
 
-impl<C: StoppingCriterion + ?Sized> StoppingCriterion for Box<C> {
-    fn name(&self) -> String {
-        (**self).name()
-    }
-
-    fn needs(&self) -> Needs {
-        (**self).needs()
-    }
-
-    fn audience(&self) -> Audience {
-        (**self).audience()
-    }
-
-    fn visible_noise(&self, view: &View<'_>) -> Option<Vec<f32>> {
-        (**self).visible_noise(view)
-    }
-
+/// A criterion whose session can be saved and resumed: see [`crate::Checkpoint`].
+pub trait Resumable: StoppingCriterion {
+    /// What the criterion keeps between verdicts and cannot derive from the film; empty, the default, if nothing.
     fn state(&self) -> Vec<u8> {
-        (**self).state()
+        Vec::new()
     }
 
-    fn restore(&mut self, grid: TileGrid, state: &[u8]) -> bool {
-        (**self).restore(grid, state)
-    }
-
-    fn judge(&mut self, view: &View<'_>, tiles: &[Tile]) -> Result<Vec<Verdict>, CriterionError> {
-        (**self).judge(view, tiles)
+    /// Restores what [`Resumable::state`] returned for a film with these tiles. The bytes may come from anywhere: returns
+    /// false, and changes nothing, if they are not such a state.
+    fn restore(&mut self, _grid: TileGrid, state: &[u8]) -> bool {
+        state.is_empty()
     }
 }
 
 /// The simplest criterion: a fixed number of samples per pixel everywhere.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct FixedSamples(pub u64);
+pub struct FixedSpp(pub u64);
 
-impl StoppingCriterion for FixedSamples {
+impl StoppingCriterion for FixedSpp {
     fn name(&self) -> String {
         format!("{} samples per pixel", self.0)
     }
 
+    fn fingerprint(&self) -> String {
+        self.name()
+    }
+
     fn judge(&mut self, view: &View<'_>, tiles: &[Tile]) -> Result<Vec<Verdict>, CriterionError> {
         let verdict = |t: &Tile| Verdict {
-            converged: view.film.samples(t.index) >= self.0,
-            probability: None,
-            expected_samples: Some(self.0),
-            unfamiliar: false,
+            converged: view.film.spp(t.index) >= self.0,
+            expected_spp: Some(self.0),
+            ..Verdict::default()
         };
         Ok(tiles.iter().map(verdict).collect())
     }
 }
+
+impl Resumable for FixedSpp {}

@@ -1,6 +1,6 @@
 //! From linear radiance to what a screen shows: exposure, tone mapping, sRGB encoding, luminance.
 
-use crate::source::Rgb;
+use crate::rgb::Rgb;
 use multiversion::multiversion;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;

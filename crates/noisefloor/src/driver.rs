@@ -1,11 +1,12 @@
 //! The loop, pulled: a session that asks a source for samples until the criterion is satisfied or a limit says stop.
 
 use crate::checkpoint::{Checkpoint, CheckpointError};
-use crate::criterion::{CriterionError, StoppingCriterion};
+use crate::criterion::{CriterionError, Resumable, StoppingCriterion};
 use crate::film::FilmError;
 use crate::params::Params;
-use crate::session::{Session, SessionError, Stop, StopReason};
+use crate::session::{Session, SessionError};
 use crate::source::{Batch, ProgressiveSource, Repeats, Request, SourceError};
+use crate::stop::{Stop, StopReason};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -18,6 +19,7 @@ const CALL_SAMPLES: u64 = 1 << 22;
 
 /// What can go wrong in a run. All samples up to then are in the session's film.
 #[derive(Debug, Error)]
+#[non_exhaustive]
 pub enum DriverError {
     /// The session could not start.
     #[error(transparent)]
@@ -89,12 +91,12 @@ pub struct Clock {
 ///         SourceInfo { name: "wall".into(), width: 64, height: 32, unit: Unit::SamplesPerPixel, aims: true, repeats: Repeats::Samples }
 ///     }
 ///     fn sample(&mut self, requests: &[Request]) -> Result<Vec<Batch>, SourceError> {
-///         Ok(requests.iter().map(|r| Batch { tile: r.tile, samples: r.samples, mean: vec![[0.2; 3]; r.tile.pixels()] }).collect())
+///         Ok(requests.iter().map(|r| Batch { tile: r.tile, samples: r.spp, mean: vec![[0.2; 3]; r.tile.pixels()] }).collect())
 ///     }
 /// }
 ///
 /// let params = Params { tile: 32, ..Params::default() };
-/// let mut driver = Driver::new(Wall, FixedSamples(300), params)?;
+/// let mut driver = Driver::new(Wall, FixedSpp(300), params)?;
 /// driver.run(|_session, event| if let Event::TileStopped(stop) = event { println!("{} {}", stop.tile.index, stop.samples) })?;
 /// assert!(driver.session().stops().all(|stop| stop.samples == 300 && stop.reason == StopReason::Converged));
 /// # Ok::<(), DriverError>(())
@@ -121,21 +123,6 @@ impl<S: ProgressiveSource, C: StoppingCriterion> Driver<S, C> {
         let cancel = Arc::new(AtomicBool::new(false));
         let (timeline, clock) = (Vec::new(), Clock::default());
         Ok(Self { source, session, time_limit: None, cancel, timeline, clock, samples_before: 0 })
-    }
-
-    /// Goes on with a run of the same job that was broken off; see [`Session::resume`]. The picture and every decision are then those of a
-    /// run that was not, to the bit.
-    ///
-    /// # Errors
-    /// [`CheckpointError`] as of [`Session::resume`], and if the source does not promise to repeat its samples ([`Repeats::Samples`]):
-    /// what it takes for new could be what the film has already.
-    pub fn resume(mut self, job: &str, checkpoint: Checkpoint<'_>) -> Result<Self, CheckpointError> {
-        let info = self.source.info();
-        if info.repeats != Repeats::Samples {
-            return Err(CheckpointError::Source(info.name));
-        }
-        self.session = self.session.resume(job, checkpoint)?;
-        Ok(self)
     }
 
     /// Stops all tiles once a run has taken so long. A call to the source that has begun is finished first.
@@ -252,17 +239,14 @@ impl<S: ProgressiveSource, C: StoppingCriterion> Driver<S, C> {
     fn plan(&self) -> Vec<Request> {
         let mut requests = self.session.requests();
         if !self.source.info().aims {
-            let samples = requests.iter().map(|r| r.samples).max().unwrap_or(1);
+            let spp = requests.iter().map(|r| r.spp).max().unwrap_or(1);
             let film = self.session.film();
-            requests = film
-                .grid()
-                .tiles()
-                .map(|tile| Request { tile, first: film.samples(tile.index), samples })
-                .collect();
+            requests =
+                film.grid().tiles().map(|tile| Request { tile, first: film.spp(tile.index), spp }).collect();
         }
         let pixels: u64 = requests.iter().map(|r| r.tile.pixels() as u64).sum();
-        let most = u32::try_from(CALL_SAMPLES / pixels.max(1)).unwrap_or(u32::MAX).max(1);
-        requests.iter_mut().for_each(|r| r.samples = r.samples.min(most));
+        let most = (CALL_SAMPLES / pixels.max(1)).max(1);
+        requests.iter_mut().for_each(|r| r.spp = r.spp.min(most));
         requests
     }
 
@@ -279,11 +263,11 @@ impl<S: ProgressiveSource, C: StoppingCriterion> Driver<S, C> {
                 let what = format!("a batch of tile {} for tile {}", batch.tile.index, request.tile.index);
                 return Err(broken(what).into());
             }
-            if batch.samples == 0 {
+            if batch.spp == 0 {
                 exhausted.push(batch.tile.index);
                 continue;
             }
-            match self.session.push(batch.tile.index, batch.samples, &batch.mean) {
+            match self.session.push(batch.tile.index, batch.spp, &batch.mean) {
                 Ok(()) => {}
                 Err(error @ FilmError::Pixels { .. }) => return Err(broken(error.to_string()).into()),
                 Err(error) => return Err(SessionError::from(error).into()),
@@ -315,177 +299,22 @@ impl<S: ProgressiveSource, C: StoppingCriterion> Driver<S, C> {
     }
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::criterion::{FixedSamples, Needs, Verdict, View};
-    use crate::source::{Repeats, SourceInfo, Unit};
-    use crate::tile::Tile;
-
-    /// A grey source that can be told to misbehave.
-    #[derive(Default)]
-    struct Grey {
-        cannot_aim: bool,
-        /// Samples per pixel it has in store; 0 for no end.
-        store: u64,
-        fail_after: Option<usize>,
-        lie: Option<fn(Vec<Batch>) -> Vec<Batch>>,
-        calls: Vec<Vec<Request>>,
-    }
-
-    impl ProgressiveSource for Grey {
-        fn info(&self) -> SourceInfo {
-            let unit = Unit::SamplesPerPixel;
-            SourceInfo {
-                name: "grey".into(),
-                width: 70,
-                height: 32,
-                unit,
-                aims: !self.cannot_aim,
-                repeats: Repeats::Samples,
-            }
+impl<S: ProgressiveSource, C: Resumable> Driver<S, C> {
+    /// Resumes an interrupted run of the same job; see [`Session::resume`]. The picture and every decision are then those
+    /// of a run that was not interrupted, to the bit.
+    ///
+    /// # Errors
+    /// [`CheckpointError`] as in [`Session::resume`], and [`CheckpointError::Source`] if the source does not promise to
+    /// repeat its samples ([`Repeats::Samples`]): it could return samples that the film already has.
+    pub fn resume(mut self, job: &str, checkpoint: Checkpoint<'_>) -> Result<Self, CheckpointError> {
+        let info = self.source.info();
+        if info.repeats != Repeats::Samples {
+            return Err(CheckpointError::Source(info.name));
         }
-
-        fn sample(&mut self, requests: &[Request]) -> Result<Vec<Batch>, SourceError> {
-            if self.fail_after.is_some_and(|calls| self.calls.len() >= calls) {
-                return Err(SourceError::Failed {
-                    name: "grey".into(),
-                    tile: Some(1),
-                    cause: "lamp broke".into(),
-                });
-            }
-            self.calls.push(requests.to_vec());
-            let batch = |r: &Request| {
-                let left = if self.store == 0 { u64::MAX } else { self.store.saturating_sub(r.first) };
-                let samples = u64::from(r.samples).min(left) as u32;
-                let mean = if samples == 0 { vec![] } else { vec![[0.5; 3]; r.tile.pixels()] };
-                Batch { tile: r.tile, samples, mean }
-            };
-            let batches = requests.iter().map(batch).collect();
-            Ok(self.lie.map_or_else(|| Vec::clone(&batches), |lie| lie(batches.clone())))
-        }
-    }
-
-    fn driver(source: Grey, samples: u64) -> Driver<Grey, FixedSamples> {
-        Driver::new(source, FixedSamples(samples), Params { tile: 32, ..Params::default() }).unwrap()
-    }
-
-    fn reasons<C: StoppingCriterion>(driver: &Driver<Grey, C>) -> Vec<(u64, StopReason)> {
-        driver.session().stops().map(|s| (s.samples, s.reason)).collect()
-    }
-
-    #[test]
-    fn events_and_timeline_tell_the_whole_run() {
-        let mut driver = driver(Grey::default(), 300);
-        let (mut stops, mut batches) = (0, 0);
-        driver
-            .run(|session, event| match event {
-                Event::TileStopped(stop) => {
-                    stops += 1;
-                    assert_eq!(stop.samples, session.film().samples(stop.tile.index));
-                }
-                Event::BatchDone(progress) => {
-                    batches += 1;
-                    assert!(
-                        progress.tiles == 3
-                            && (progress.now.active_tiles == 0 || progress.eta_seconds.is_some())
-                    );
-                }
-                Event::ReferenceReady { .. } => panic!("nobody needs one"),
-            })
-            .unwrap();
-        assert_eq!((stops, batches), (3, driver.timeline().len()));
-        assert_eq!(driver.timeline().last().unwrap().samples, 300 * 70 * 32);
-        assert!(driver.timeline().is_sorted_by_key(|p| p.samples));
-        let clock = driver.clock();
-        assert!(clock.source_seconds + clock.criterion_seconds <= clock.total_seconds);
-    }
-
-    #[test]
-    fn a_source_that_cannot_aim_is_asked_for_all_tiles() {
-        let mut driver = driver(Grey { cannot_aim: true, ..Grey::default() }, 200);
-        driver.run(|_, _| ()).unwrap();
-        assert!(driver.source.calls.iter().all(|c| c.len() == 3));
-    }
-
-    #[test]
-    fn the_end_of_a_playback_is_a_reason() {
-        let mut driver = driver(Grey { store: 250, ..Grey::default() }, 1000);
-        driver.run(|_, _| ()).unwrap();
-        assert_eq!(reasons(&driver), [(250, StopReason::SourceExhausted); 3]);
-    }
-
-    #[test]
-    fn limits_stop_and_keep_what_is_there() {
-        let mut limited = driver(Grey::default(), 10_000);
-        limited.set_time_limit(Some(Duration::ZERO));
-        limited.run(|_, _| ()).unwrap();
-        assert_eq!(reasons(&limited), [(0, StopReason::TimeLimit); 3]);
-
-        let mut cancelled = driver(Grey::default(), 10_000);
-        let flag = cancelled.cancel_flag();
-        cancelled
-            .run(|_, event| {
-                if matches!(event, Event::BatchDone(_)) {
-                    flag.store(true, Ordering::Relaxed)
-                }
-            })
-            .unwrap();
-        assert_eq!(reasons(&cancelled), [(100, StopReason::Cancelled); 3]);
-    }
-
-    #[test]
-    fn a_failure_keeps_what_is_there() {
-        let mut driver = driver(Grey { fail_after: Some(2), ..Grey::default() }, 10_000);
-        let error = driver.run(|_, _| ()).unwrap_err();
-        assert!(error.to_string().contains("grey: sampling failed in tile 1"), "{error}");
-        assert_eq!(reasons(&driver), [(200, StopReason::Failed); 3]);
-    }
-
-    #[test]
-    fn broken_promises_are_typed_errors() {
-        let lies: [fn(Vec<Batch>) -> Vec<Batch>; 3] = [
-            |mut b| {
-                b.pop();
-                b
-            },
-            |mut b| {
-                b.swap(0, 1);
-                b
-            },
-            |mut b| {
-                b[0].mean.pop();
-                b
-            },
-        ];
-        for lie in lies {
-            let error = driver(Grey { lie: Some(lie), ..Grey::default() }, 100).run(|_, _| ()).unwrap_err();
-            assert!(matches!(error, DriverError::Source(SourceError::Contract { .. })), "{error}");
-        }
-    }
-
-    struct Picky;
-
-    impl StoppingCriterion for Picky {
-        fn name(&self) -> String {
-            "picky".into()
-        }
-
-        fn needs(&self) -> Needs {
-            Needs { halves: false, reference: true }
-        }
-
-        fn judge(&mut self, _: &View<'_>, _: &[Tile]) -> Result<Vec<Verdict>, CriterionError> {
-            Ok(vec![])
-        }
-    }
-
-    #[test]
-    fn a_missing_reference_is_an_error_before_any_sample() {
-        let mut driver =
-            Driver::new(Grey::default(), Picky, Params { tile: 32, ..Params::default() }).unwrap();
-        let error = driver.run(|_, _| ()).unwrap_err();
-        assert!(matches!(error, DriverError::Criterion(CriterionError::NoReference(_))));
-        assert!(driver.source.calls.is_empty());
+        self.session = self.session.resume(job, checkpoint)?;
+        Ok(self)
     }
 }
+
+#[cfg(test)]
+mod tests;

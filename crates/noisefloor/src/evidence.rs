@@ -2,7 +2,7 @@
 
 use crate::display::{Display, luma_row, luminance};
 use crate::film::Film;
-use crate::source::Rgb;
+use crate::rgb::Rgb;
 use crate::tile::Tile;
 use ndarray::Array2;
 use serde::{Deserialize, Serialize};
@@ -10,7 +10,7 @@ use std::cell::RefCell;
 use std::ops::Range;
 
 /// How far filters read beyond a tile, in pixels, and the block that tiles are cut into.
-pub const APRON: usize = 8;
+pub const HALO: usize = 8;
 
 /// Luminance weights, squared and summed: variance of Y′ for unit variance of R′, G′ and B′.
 pub const ROUNDING_LUMINANCE: f32 = 0.2126 * 0.2126 + 0.7152 * 0.7152 + 0.0722 * 0.0722;
@@ -67,7 +67,7 @@ thread_local! {
 }
 
 /// What is on the screen of a tile, and what of it is noise. All planes are display-encoded and have the same shape (rows,
-/// columns): the tile, whose edges are rounded up to multiples of [`APRON`], with an apron of that width around it. Neighbours are
+/// columns): the tile, whose edges are rounded up to multiples of [`HALO`], with a halo of that width around it. Neighbours are
 /// read where they exist; beyond the image, it is mirrored.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TilePlanes {
@@ -132,14 +132,14 @@ impl TilePlanes {
         tile: Tile,
         mut row: impl FnMut(usize, &Columns, &mut Scratch, &mut [f32], &mut [f32]),
     ) -> Self {
-        let padded = |edge: usize| edge.next_multiple_of(APRON) + 2 * APRON;
+        let padded = |edge: usize| edge.next_multiple_of(HALO) + 2 * HALO;
         let shape = (padded(tile.height), padded(tile.width));
         let Room { planes: [mut image, mut residual], mut columns, mut scratch } = ROOM.take();
         image.resize(shape.0 * shape.1, 0.0);
         residual.resize(shape.0 * shape.1, 0.0);
         columns.all.clear();
         columns.all.extend((0..shape.1).map(|place| mirror(tile.x + place, width)));
-        columns.inside = APRON.saturating_sub(tile.x)..(width + APRON - tile.x).min(shape.1);
+        columns.inside = HALO.saturating_sub(tile.x)..(width + HALO - tile.x).min(shape.1);
         let rows = image.chunks_exact_mut(shape.1).zip(residual.chunks_exact_mut(shape.1));
         for (place, (image, residual)) in rows.enumerate() {
             row(mirror(tile.y + place, height), &columns, &mut scratch, image, residual);
@@ -147,7 +147,7 @@ impl TilePlanes {
         ROOM.set(Room { planes: Default::default(), columns, scratch });
         let [image, residual] =
             [image, residual].map(|values| Array2::from_shape_vec(shape, values).expect("one value a pixel"));
-        let inner = Tile { x: APRON, y: APRON, ..tile };
+        let inner = Tile { x: HALO, y: HALO, ..tile };
         Self { image, residual, rounding: 0.0, inner }
     }
 
@@ -245,11 +245,11 @@ impl TilePlanes {
     }
 }
 
-/// The image coordinate that shows at `place` of a plane that begins [`APRON`] before the image, mirrored at its first and last
+/// The image coordinate that shows at `place` of a plane that begins [`HALO`] before the image, mirrored at its first and last
 /// pixel.
 fn mirror(place: usize, edge: usize) -> usize {
     let period = (2 * (edge - 1)).max(1);
-    let distance = place.abs_diff(APRON) % period;
+    let distance = place.abs_diff(HALO) % period;
     distance.min(period - distance).min(edge - 1)
 }
 
@@ -305,7 +305,7 @@ mod tests {
     #[test]
     fn residual_has_the_noise_of_the_mean_also_when_halves_are_uneven() {
         let grid = TileGrid::new(64, 64, 64).unwrap();
-        for batches in [&[50u32, 50][..], &[10, 90], &[400, 100]] {
+        for batches in [&[50u64, 50][..], &[10, 90], &[400, 100]] {
             let (mut film, mut state) = (Film::new(grid), 7u64);
             for &n in batches {
                 // Mean of n samples of standard deviation 0.1 around 0.5.
@@ -358,7 +358,7 @@ mod tests {
     }
 
     #[test]
-    fn the_apron_reads_neighbours_and_mirrors_the_image_beyond_its_edge() {
+    fn the_halo_reads_neighbours_and_mirrors_the_image_beyond_its_edge() {
         let grid = TileGrid::new(100, 40, 32).unwrap();
         let plane =
             |i: usize| TilePlanes::gather((100, 40), grid.tile(i), |x, y| ([x as f32; 3], [y as f32; 3]));
@@ -377,7 +377,7 @@ mod tests {
             close(last.image[(8, 12)], 98.0) && close(last.residual[(16, 8)], 38.0),
             "mirrored at 99 and 39"
         );
-        // Images smaller than the apron are mirrored more than once.
+        // Images smaller than the halo are mirrored more than once.
         assert!((0..200).all(|place| mirror(place, 1) == 0 && mirror(place, 3) < 3));
     }
 }

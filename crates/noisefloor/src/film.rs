@@ -1,6 +1,6 @@
 //! The film: batches of every tile, in two independent halves.
 
-use crate::source::Rgb;
+use crate::rgb::Rgb;
 use crate::tile::{Tile, TileGrid};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
@@ -63,10 +63,10 @@ impl Half {
         self.rejected.get(pixel).map_or(0, |&r| u64::from(r))
     }
 
-    /// Adds the mean of `samples` new samples to a pixel that had `before` valid ones.
+    /// Adds the mean of `spp` new samples to a pixel that had `before` valid ones.
     #[inline]
-    fn add(&mut self, pixel: usize, value: Rgb, samples: u32, before: u64) {
-        let weight = f64::from(samples) / (before + u64::from(samples)) as f64;
+    fn add(&mut self, pixel: usize, value: Rgb, spp: u64, before: u64) {
+        let weight = spp as f64 / (before + spp) as f64;
         let stored = self.mean[pixel].iter_mut().zip(&mut self.carry[pixel]);
         for ((mean, carry), value) in stored.zip(value) {
             let old = f64::from(*mean) + f64::from(*carry) * ulp(*mean) / CARRY;
@@ -79,11 +79,12 @@ impl Half {
         }
     }
 
-    fn reject(&mut self, pixel: usize, samples: u32) {
+    fn reject(&mut self, pixel: usize, spp: u64) {
         if self.rejected.is_empty() {
             self.rejected = vec![0; self.mean.len()];
         }
-        self.rejected[pixel] = self.rejected[pixel].saturating_add(samples);
+        let spp = u32::try_from(spp).unwrap_or(u32::MAX);
+        self.rejected[pixel] = self.rejected[pixel].saturating_add(spp);
     }
 }
 
@@ -140,7 +141,7 @@ impl Film {
     ///
     /// # Panics
     /// If the tile does not exist.
-    pub fn samples(&self, tile: usize) -> u64 {
+    pub fn spp(&self, tile: usize) -> u64 {
         let [a, b] = self.counts[tile];
         a + b
     }
@@ -152,17 +153,17 @@ impl Film {
 
     /// All samples taken, over all pixels.
     pub fn total_samples(&self) -> u64 {
-        self.grid.tiles().map(|t| self.samples(t.index) * t.pixels() as u64).sum()
+        self.grid.tiles().map(|t| self.spp(t.index) * t.pixels() as u64).sum()
     }
 
-    /// Adds the mean of `samples` new samples; `mean` is row-major over the tile.
+    /// Adds the mean of `spp` new samples per pixel; `mean` is row-major over the tile.
     ///
     /// # Errors
-    /// [`FilmError`] if the tile does not exist, the size differs or `samples` is zero; the film is then unchanged.
-    pub fn add(&mut self, tile: usize, samples: u32, mean: &[Rgb]) -> Result<(), FilmError> {
+    /// [`FilmError`] if the tile does not exist, the size differs or `spp` is zero; the film is then unchanged.
+    pub fn add(&mut self, tile: usize, spp: u64, mean: &[Rgb]) -> Result<(), FilmError> {
         let tile = self.check(tile, mean.len())?;
         let [a, b] = self.counts[tile.index];
-        if samples == 0 {
+        if spp == 0 {
             return Err(FilmError::NothingNew { tile: tile.index, had: a + b, now: a + b });
         }
         let half = usize::from(self.has_halves() && b < a);
@@ -170,14 +171,14 @@ impl Film {
             for (pixel, &value) in row.zip(values) {
                 if value.iter().all(|c| c.is_finite()) {
                     let before = self.counts[tile.index][half] - self.halves[half].rejected(pixel);
-                    self.halves[half].add(pixel, value, samples, before);
+                    self.halves[half].add(pixel, value, spp, before);
                 } else {
-                    self.halves[half].reject(pixel, samples);
-                    self.rejected += u64::from(samples);
+                    self.halves[half].reject(pixel, spp);
+                    self.rejected += spp;
                 }
             }
         }
-        self.counts[tile.index][half] += u64::from(samples);
+        self.counts[tile.index][half] += spp;
         Ok(())
     }
 
@@ -188,10 +189,10 @@ impl Film {
     /// [`FilmError`] as [`Film::add`], and if `total` is not above the samples already here.
     pub fn add_running(&mut self, tile: usize, total: u64, mean: &[Rgb]) -> Result<(), FilmError> {
         let checked = self.check(tile, mean.len())?;
-        let had = self.samples(tile);
-        let new = total.checked_sub(had).and_then(|n| u32::try_from(n).ok()).filter(|&n| n > 0);
+        let had = self.spp(tile);
+        let new = total.checked_sub(had).filter(|&n| n > 0);
         let Some(new) = new else { return Err(FilmError::NothingNew { tile, had, now: total }) };
-        let (before, after) = (had as f64 / f64::from(new), total as f64 / f64::from(new));
+        let (before, after) = (had as f64 / new as f64, total as f64 / new as f64);
         let mut batch = Vec::with_capacity(mean.len());
         for (row, values) in checked.rows(self.grid.width()).zip(mean.chunks_exact(checked.width)) {
             for (pixel, value) in row.zip(values) {
@@ -350,132 +351,4 @@ impl Film {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use proptest::prelude::*;
-
-    fn small() -> Film {
-        Film::new(TileGrid::new(20, 16, 16).unwrap())
-    }
-
-    #[test]
-    fn batches_go_to_the_lighter_half() {
-        let mut film = small();
-        for n in [50, 50, 100, 30, 30] {
-            film.add(1, n, &[[1.0; 3]; 4 * 16]).unwrap();
-        }
-        // 50|0 → 50|50 → 150|50 → 150|80 → 150|110
-        assert_eq!(film.half_counts(1), [150, 110]);
-        assert_eq!(film.samples(0), 0);
-        assert_eq!(film.total_samples(), 260 * 64);
-    }
-
-    #[test]
-    fn non_finite_pixels_are_kept_out_and_counted() {
-        let mut film = small();
-        let mut first = [[1.0f32; 3]; 64];
-        first[3] = [f32::NAN, 1.0, 1.0];
-        film.add(1, 10, &first).unwrap();
-        film.add(1, 10, &[[2.0; 3]; 64]).unwrap();
-        film.add(1, 10, &[[3.0; 3]; 64]).unwrap(); // half A again
-        let image = film.image();
-        let pixel = |i: usize| image[(i / 4) * 20 + 16 + i % 4][0];
-        assert!((pixel(0) - 2.0).abs() < 1e-6);
-        assert!((pixel(3) - 2.5).abs() < 1e-6, "mean of the two that count: {}", pixel(3));
-        assert_eq!(film.rejected(), 10);
-        assert_eq!(film.unsampled_pixels(1), 0);
-        assert!(image.iter().flatten().all(|c| c.is_finite()));
-    }
-
-    #[test]
-    fn refuses_what_does_not_fit() {
-        let mut film = small();
-        assert_eq!(film.add(2, 1, &[]), Err(FilmError::Tile(2, 2)));
-        assert!(matches!(film.add(1, 1, &[[0.0; 3]; 3]), Err(FilmError::Pixels { .. })));
-        assert!(matches!(film.add(1, 0, &[[0.0; 3]; 64]), Err(FilmError::NothingNew { .. })));
-        assert!(matches!(film.add_running(1, 0, &[[0.0; 3]; 64]), Err(FilmError::NothingNew { .. })));
-    }
-
-    #[test]
-    fn running_means_equal_batches() {
-        let (mut batches, mut running) = (small(), small());
-        let (mut sum, mut total) = (0.0f64, 0u64);
-        for (n, v) in [(10u32, 1.0f32), (20, 4.0), (7, 0.5)] {
-            batches.add(1, n, &[[v; 3]; 64]).unwrap();
-            sum += f64::from(n) * f64::from(v);
-            total += u64::from(n);
-            running.add_running(1, total, &[[(sum / total as f64) as f32; 3]; 64]).unwrap();
-        }
-        assert_eq!(batches.half_counts(1), running.half_counts(1));
-        for (a, b) in batches.image().iter().zip(running.image()) {
-            assert!((a[0] - b[0]).abs() < 1e-5);
-        }
-    }
-
-    /// The bound that `Half` states: 10⁹ samples in batches of 100 stay within 2.4·10⁻⁶ of the exact mean. Where a plain f32
-    /// running mean goes by then is asserted too, so that the test would notice if the carry did nothing.
-    #[test]
-    fn stays_accurate_at_a_billion_samples() {
-        let mut half = Half::new(1);
-        let (mut plain, mut sum) = (0.0f32, 0.0f64);
-        let batches = 10_000_000u64;
-        for k in 0..batches {
-            // Drifts upward, so that late batches matter: 0.5 … 1.5 with a ripple.
-            let value =
-                0.5 + (k as f32) / (batches as f32) + ((k * 7919 % 1000) as f32 / 1000.0 - 0.4995) * 0.5;
-            half.add(0, [value; 3], 100, k * 100);
-            plain += (value - plain) * (1.0 / (k + 1) as f32);
-            sum += f64::from(value);
-        }
-        let exact = sum / batches as f64;
-        let error = |x: f32| (f64::from(x) / exact - 1.0).abs();
-        assert!(error(half.mean[0][0]) < 2.4e-6, "{}", error(half.mean[0][0]));
-        assert!(error(plain) > 2.4e-6, "a plain mean errs by {}", error(plain));
-    }
-
-    #[test]
-    fn a_film_that_was_kept_goes_on_to_the_bit() {
-        let batch = |n: u32| (0..64).map(|i| [0.1 * n as f32, (i as f32).sin(), 1e-3]).collect::<Vec<_>>();
-        let config = bincode::config::standard();
-        let mut film = small();
-        for n in 1..=9 {
-            film.add(1, 10 * n, &batch(n)).unwrap();
-        }
-        film.add(1, 5, &[[f32::NAN; 3]; 64]).unwrap();
-        let kept = bincode::serde::encode_to_vec(&film, config).unwrap();
-        let (mut other, _): (Film, usize) = bincode::serde::decode_from_slice(&kept, config).unwrap();
-        for film in [&mut film, &mut other] {
-            (10..=20).for_each(|n| film.add(1, n, &batch(n)).unwrap());
-        }
-        assert_eq!(film.half_counts(1), other.half_counts(1));
-        let bytes = |film: &Film| bincode::serde::encode_to_vec(film, config).unwrap();
-        assert!(bytes(&film) == bytes(&other));
-    }
-
-    /// −0, the smallest numbers there are, the largest ones, and negative radiance: the mean is that of f64, to the last bits.
-    #[test]
-    fn both_ends_of_f32_are_averaged() {
-        for values in [[-0.0, 0.0], [1e-45, 3e-45], [1e-38, 2e-39], [f32::MAX, f32::MAX], [-3.0, 1.0]] {
-            let mut film = small();
-            for value in values.repeat(4) {
-                film.add(0, 7, &[[value; 3]; 16 * 16]).unwrap();
-            }
-            let mean = 0.5 * (f64::from(values[0]) + f64::from(values[1]));
-            let error = (f64::from(film.image()[0][0]) - mean).abs();
-            assert!(error <= 1e-6 * mean.abs() + 1.5e-45, "{values:?}: {}", film.image()[0][0]);
-        }
-    }
-
-    proptest! {
-        #[test]
-        fn image_is_the_weighted_mean(batches in prop::collection::vec((1u32..1000, -10.0f32..1000.0), 1..20)) {
-            let mut film = small();
-            for &(n, v) in &batches {
-                film.add(1, n, &[[v; 3]; 64]).unwrap();
-            }
-            let total: f64 = batches.iter().map(|b| f64::from(b.0)).sum();
-            let exact = batches.iter().map(|b| f64::from(b.0) * f64::from(b.1)).sum::<f64>() / total;
-            prop_assert!((f64::from(film.image()[16][0]) - exact).abs() < 1e-6 * 1000.0);
-        }
-    }
-}
+mod tests;

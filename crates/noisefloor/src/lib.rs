@@ -7,7 +7,7 @@
 //! - A renderer that owns its loop pushes samples into a [`Session`].
 //! - A renderer behind [`ProgressiveSource`] is driven by a [`Driver`].
 //! - A [`Checkpoint`] keeps what either has come to, to go on with in another process.
-//! - [`Oracle`] is the [`StoppingCriterion`] made of a trained [`Model`]; [`FixedSamples`] is the simplest one.
+//! - [`Oracle`] is the [`StoppingCriterion`] made of a trained [`Model`]; [`FixedSpp`] is the simplest one.
 //! - [`Film`], [`Display`], [`TilePlanes`], [`NoiseMask`], [`Descriptor`] and [`Svm`] are the way from samples to a verdict.
 //! - [`Familiarity`] is what a model has been tried on; elsewhere it asks for twice the samples.
 //!
@@ -19,11 +19,11 @@
 //!     for request in session.requests() {
 //!         // A renderer of a grey wall, whose pixels differ by nothing: nobody sees noise.
 //!         let mean = vec![[0.5; 3]; request.tile.pixels()];
-//!         session.push(request.tile.index, request.samples, &mean)?;
+//!         session.push(request.tile.index, request.spp, &mean)?;
 //!     }
 //!     session.judge()?;
 //! }
-//! assert!(session.stops().all(|stop| stop.reason == StopReason::Converged && stop.samples == 100));
+//! assert!(session.stops().all(|stop| stop.reason == StopReason::Converged && stop.spp == 100));
 //! # Ok::<(), noisefloor::SessionError>(())
 //! ```
 
@@ -40,34 +40,42 @@ mod mask;
 mod model;
 mod oracle;
 mod params;
+mod rgb;
 mod session;
 mod source;
 mod stills;
+mod stop;
 mod svm;
 mod text;
+mod threshold;
 mod tile;
 
 pub use checkpoint::{Checkpoint, CheckpointError};
-pub use criterion::{CriterionError, FixedSamples, Needs, StoppingCriterion, Verdict, View};
-pub use descriptor::{Described, Descriptor, DescriptorError};
+pub use criterion::{CriterionError, FixedSpp, Needs, Resumable, StoppingCriterion, Verdict, View};
+pub use descriptor::{
+    Described, Descriptor, DescriptorError, DescriptorKind, DescriptorSpec, TileDescriptor,
+};
 pub use display::{
     DEFAULT_KEY, DELTA, Display, ToneMapping, ToneMappingError, luminance, srgb_decode, srgb_encode,
 };
 pub use driver::{Clock, Driver, DriverError, Event, Progress, TimelinePoint};
-pub use evidence::{APRON, Evidence, ROUNDING_LUMINANCE, Rendering, Samples, TilePlanes, residual_scale};
+pub use evidence::{Evidence, HALO, ROUNDING_LUMINANCE, Rendering, Samples, TilePlanes, residual_scale};
 pub use familiarity::{Familiarity, nearest};
 pub use film::{Film, FilmError};
 pub use mask::{NoiseMask, SigmaError};
-pub use model::{Model, ModelError, Scores, TrainingRecord};
-pub use oracle::{DEFAULT_THRESHOLD, Oracle, ThresholdError};
+pub use model::{Judgement, Model, ModelError, ModelParts, Scores, TrainingRecord};
+pub use oracle::Oracle;
 pub use params::{Audience, Params, ParamsError, Schedule};
-pub use session::{Session, SessionError, Stop, StopReason};
-pub use source::{Batch, ProgressiveSource, Reference, Repeats, Request, Rgb, SourceError, SourceInfo, Unit};
-pub use stills::{Held, Still, StillError};
-pub use svm::{Platt, Scaler, Svm};
+pub use rgb::Rgb;
+pub use session::{Session, SessionError};
+pub use source::{Batch, ProgressiveSource, Reference, Repeats, Request, SourceError, SourceInfo, Unit};
+pub use stills::{SnapshotPair, Still, StillError};
+pub use stop::{Stop, StopReason};
+pub use svm::{Classifier, Platt, Scaler, Svm};
 #[cfg(feature = "train")]
 pub use svm::{SvmParams, SvmTrainError, Weights, fit_platt, fit_svm, fit_weights, squared_distances};
 pub use text::printable;
+pub use threshold::{Threshold, ThresholdError};
 pub use tile::{
     DEFAULT_TILE, MAX_EDGE, MAX_PIXELS, MAX_TILE, MIN_TILE, Tile, TileError, TileGrid, check_image,
 };

@@ -1,23 +1,25 @@
-//! The model file: everything a verdict depends on. Its layout is that of [`container`].
+//! The model: everything a verdict depends on, and its file. The layout is that of [`container`].
 
 use crate::container::{self, Fault, Format, MAX_PAYLOAD};
-use crate::descriptor::Descriptor;
+use crate::descriptor::{Descriptor, DescriptorError, DescriptorKind, DescriptorSpec};
 use crate::display::ToneMapping;
 use crate::evidence::Evidence;
 use crate::familiarity::{CAUTION, Familiarity};
 use crate::params::Audience;
-use crate::svm::{Platt, Scaler, Svm};
+use crate::svm::Classifier;
 use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
 use std::io::{self, Read, Write};
 use thiserror::Error;
 
 const FORMAT: Format = Format { magic: *b"NFMODEL\0", version: VERSION };
-const VERSION: u32 = 2;
+const VERSION: u32 = 3;
 #[cfg(feature = "bundled-model")]
 static BUNDLED: &[u8] = include_bytes!("../models/human.nfm");
 
 /// Why a model cannot be used.
 #[derive(Debug, Error)]
+#[non_exhaustive]
 pub enum ModelError {
     /// The file cannot be read or written.
     #[error("the model cannot be read or written: {0}")]
@@ -62,6 +64,9 @@ pub enum ModelError {
         /// Version of this release.
         here: u16,
     },
+    /// The model names a descriptor that this program does not have.
+    #[error("the model cannot be used here: {0}")]
+    UnknownDescriptor(#[from] DescriptorError),
 }
 
 impl From<Fault> for ModelError {
@@ -109,30 +114,52 @@ pub struct TrainingRecord {
     pub leave_one_scene_out: Option<Scores>,
 }
 
-/// A trained oracle.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Model {
-    /// What is computed of a tile.
+/// Everything a model consists of, unchecked: [`Model::new`] checks that it fits together.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ModelParts {
+    /// What is computed from a tile.
     pub descriptor: Descriptor,
-    /// Version of that descriptor the model was trained with.
-    pub descriptor_version: u16,
-    /// What the tile is held against.
+    /// What the tile is compared with.
     pub evidence: Evidence,
-    /// How the training pictures were shown. For the record: descriptors are of display values, whatever led to them, and a
-    /// session may show its picture in another way.
+    /// How the training pictures were displayed. For the record: descriptors are computed from display values, however
+    /// these were made, and a session may display its picture in another way.
     pub tone_mapping: ToneMapping,
-    /// From raw to scaled descriptors.
-    pub scaler: Scaler,
-    /// The machine.
-    pub svm: Svm,
-    /// From decision values to probabilities.
-    pub platt: Platt,
-    /// What pictures it has been tried on; `None` if the descriptor does not tell noise from picture.
+    /// From raw descriptors to probabilities.
+    pub classifier: Classifier,
+    /// The texture that the model has been tried on; `None` if the descriptor does not separate noise from picture.
     pub familiarity: Option<Familiarity>,
     /// Whose thresholds it predicts, as a line from those of the training data.
     pub audience: Audience,
     /// Where it comes from.
     pub record: TrainingRecord,
+}
+
+/// A trained oracle: what a verdict depends on. Its parts fit together.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Model(ModelParts);
+
+/// A model as files hold it.
+#[derive(Serialize, Deserialize)]
+struct ModelFile<'a> {
+    descriptor: DescriptorSpec,
+    descriptor_version: u16,
+    evidence: Evidence,
+    tone_mapping: ToneMapping,
+    classifier: Cow<'a, Classifier>,
+    familiarity: Cow<'a, Option<Familiarity>>,
+    audience: Audience,
+    record: Cow<'a, TrainingRecord>,
+}
+
+/// What a model says about one tile.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Judgement {
+    /// Probability in [0, 1] that an observer sees no difference. For an unfamiliar tile, that with half of the samples.
+    pub probability: f32,
+    /// The same without the penalty for unfamiliar tiles.
+    pub probability_without_penalty: f32,
+    /// Whether the tile shows texture that the model has not been tried on.
+    pub unfamiliar: bool,
 }
 
 impl Model {
@@ -143,68 +170,157 @@ impl Model {
         Self::read(BUNDLED).expect("the bundled model is checked by a test")
     }
 
-    /// Reads a model.
+    /// A model made of these parts.
     ///
     /// # Errors
-    /// [`ModelError`] if it is foreign, damaged, oversized, newer, older, contradicts itself, or needs another descriptor version.
+    /// [`ModelError::Invalid`] if they contradict each other, or a number is not finite.
+    pub fn new(parts: ModelParts) -> Result<Self, ModelError> {
+        parts.check()?;
+        Ok(Self(parts))
+    }
+
+    /// Reads a model with a built-in descriptor.
+    ///
+    /// # Errors
+    /// [`ModelError`] if it is foreign, damaged, oversized, newer, older, contradicts itself, or needs another version of
+    /// the descriptor.
     pub fn read(from: impl Read) -> Result<Self, ModelError> {
-        let model: Self = FORMAT.read(from)?;
-        model.check()?;
-        Ok(model)
+        Self::read_with(from, &[])
+    }
+
+    /// Reads a model whose descriptor is one of `kinds`, or built in.
+    ///
+    /// # Errors
+    /// [`ModelError`] as in [`Model::read`].
+    pub fn read_with(from: impl Read, kinds: &[DescriptorKind]) -> Result<Self, ModelError> {
+        let file: ModelFile<'_> = FORMAT.read(from)?;
+        let descriptor = Descriptor::from_spec(&file.descriptor, kinds)?;
+        let (needed, here) = (file.descriptor_version, descriptor.version());
+        if needed != here {
+            return Err(ModelError::Descriptor { name: descriptor.name(), needed, here });
+        }
+        Self::new(ModelParts {
+            descriptor,
+            evidence: file.evidence,
+            tone_mapping: file.tone_mapping,
+            classifier: file.classifier.into_owned(),
+            familiarity: file.familiarity.into_owned(),
+            audience: file.audience,
+            record: file.record.into_owned(),
+        })
     }
 
     /// Writes the model.
     ///
     /// # Errors
-    /// [`ModelError::Io`] if it cannot be written, [`ModelError::Invalid`] if it could not be read again.
+    /// [`ModelError::Io`] if it cannot be written.
     pub fn write(&self, to: impl Write) -> Result<(), ModelError> {
-        self.check()?;
-        Ok(FORMAT.write(self, to)?)
+        Ok(FORMAT.write(&self.file(), to)?)
     }
 
-    /// BLAKE3 of the content, hexadecimal: names the model in reports.
+    fn file(&self) -> ModelFile<'_> {
+        let ModelParts { descriptor, evidence, tone_mapping, classifier, familiarity, audience, record } =
+            &self.0;
+        ModelFile {
+            descriptor: descriptor.spec(),
+            descriptor_version: descriptor.version(),
+            evidence: *evidence,
+            tone_mapping: *tone_mapping,
+            classifier: Cow::Borrowed(classifier),
+            familiarity: Cow::Borrowed(familiarity),
+            audience: *audience,
+            record: Cow::Borrowed(record),
+        }
+    }
+
+    /// BLAKE3 of the content, hexadecimal: identifies the model in reports.
     pub fn digest(&self) -> String {
-        container::payload(self).map(|p| blake3::hash(&p).to_hex().to_string()).unwrap_or_default()
+        container::payload(&self.file()).map(|p| blake3::hash(&p).to_hex().to_string()).unwrap_or_default()
     }
 
-    /// Whether a tile shows texture such as the training zones had, by its raw descriptor; see [`Familiarity`]. Always so if the
-    /// descriptor does not tell noise from picture.
-    pub fn is_familiar(&self, descriptor: &[f32]) -> bool {
-        let Some(known) = &self.familiarity else { return true };
-        let mut scaled = descriptor.to_vec();
-        self.scaler.apply(&mut scaled);
-        known.includes(&self.descriptor.texture_of(&scaled))
+    /// The parts, to make another model of them.
+    pub fn into_parts(self) -> ModelParts {
+        self.0
     }
 
-    /// Probability in [0, 1] that an observer sees no difference, of a raw descriptor, which is scaled in place. Of an unfamiliar
-    /// one it is what P would be with half of the samples.
+    /// What is computed from a tile.
+    pub fn descriptor(&self) -> &Descriptor {
+        &self.0.descriptor
+    }
+
+    /// What a tile is compared with.
+    pub fn evidence(&self) -> Evidence {
+        self.0.evidence
+    }
+
+    /// How the training pictures were displayed.
+    pub fn tone_mapping(&self) -> ToneMapping {
+        self.0.tone_mapping
+    }
+
+    /// From raw descriptors to probabilities.
+    pub fn classifier(&self) -> &Classifier {
+        &self.0.classifier
+    }
+
+    /// The texture that the model has been tried on.
+    pub fn familiarity(&self) -> Option<&Familiarity> {
+        self.0.familiarity.as_ref()
+    }
+
+    /// Whose thresholds it predicts, as a line from those of the training data.
+    pub fn audience(&self) -> Audience {
+        self.0.audience
+    }
+
+    /// Where it comes from.
+    pub fn record(&self) -> &TrainingRecord {
+        &self.0.record
+    }
+
+    /// Judges a tile by its raw descriptor.
     ///
     /// # Panics
-    /// If the descriptor has not the model's number of numbers.
-    pub fn probability(&self, descriptor: &mut [f32]) -> f32 {
-        if !self.is_familiar(descriptor) {
-            self.descriptor.project(descriptor, 1.0 / CAUTION);
-        }
-        self.scaler.apply(descriptor);
-        self.platt.probability(self.svm.decision(descriptor))
+    /// If the descriptor does not have the model's dimensionality.
+    pub fn judge(&self, raw: &[f32]) -> Judgement {
+        self.0.judge(raw)
+    }
+
+    pub(crate) fn curve<'a>(&'a self, raw: &'a [f32]) -> ProbabilityCurve<'a> {
+        self.0.curve(raw)
+    }
+}
+
+impl ModelParts {
+    /// Judges a tile by its raw descriptor, as [`Model::judge`] does: for scoring what is not a whole model, such as one
+    /// trained on some of a descriptor's numbers.
+    ///
+    /// # Panics
+    /// If the descriptor does not have the classifier's dimensionality.
+    pub fn judge(&self, raw: &[f32]) -> Judgement {
+        self.curve(raw).judgement()
+    }
+
+    /// P of a tile as a function of its samples.
+    fn curve<'a>(&'a self, raw: &'a [f32]) -> ProbabilityCurve<'a> {
+        let scaled = self.classifier.scaler.scaled(raw);
+        let texture = || self.descriptor.texture().iter().map(|&i| scaled[i]).collect::<Vec<f32>>();
+        let unfamiliar = self.familiarity.as_ref().is_some_and(|known| !known.includes(&texture()));
+        ProbabilityCurve { parts: self, raw, unfamiliar, projected: scaled }
     }
 
     fn check(&self) -> Result<(), ModelError> {
-        let here = self.descriptor.version();
-        if self.descriptor_version != here {
-            let (name, needed) = (self.descriptor.name(), self.descriptor_version);
-            return Err(ModelError::Descriptor { name, needed, here });
-        }
         let invalid = |what: &str| Err(ModelError::Invalid(what.into()));
-        let n = self.descriptor.len();
-        if self.scaler.mean.len() != n || self.scaler.scale.len() != n {
+        let n = self.descriptor.dimensions();
+        let Classifier { scaler, svm, platt } = &self.classifier;
+        if scaler.mean.len() != n || scaler.scale.len() != n {
             return invalid("scaler and descriptor differ in length");
         }
-        if self.svm.coefficients.is_empty() || self.svm.vectors.len() != self.svm.coefficients.len() * n {
+        if svm.coefficients.is_empty() || svm.vectors.len() != svm.coefficients.len() * n {
             return invalid("support vectors and descriptor differ in length");
         }
         if let Some(Familiarity { zones, reach }) = &self.familiarity {
-            let known = self.descriptor.texture_numbers();
+            let known = self.descriptor.texture().len();
             if known == 0 || zones.is_empty() || zones.iter().any(|zone| zone.len() != known) {
                 return invalid("familiar zones and descriptor differ in length");
             }
@@ -212,12 +328,12 @@ impl Model {
                 return invalid("what is familiar is not a finite number");
             }
         }
-        let numbers = [&self.scaler.mean, &self.scaler.scale, &self.svm.coefficients, &self.svm.vectors];
-        let scalars = [self.svm.rho, self.svm.gamma, self.platt.a, self.platt.b];
+        let numbers = [&scaler.mean, &scaler.scale, &svm.coefficients, &svm.vectors];
+        let scalars = [svm.rho, svm.gamma, platt.a, platt.b];
         if !numbers.into_iter().flatten().chain(&scalars).all(|v| v.is_finite()) {
             return invalid("a number is not finite");
         }
-        if self.svm.gamma <= 0.0 {
+        if svm.gamma <= 0.0 {
             return invalid("γ is not positive");
         }
         if self.tone_mapping.check().is_err() {
@@ -227,154 +343,32 @@ impl Model {
     }
 }
 
-#[cfg(test)]
-pub(crate) mod tests {
-    use super::*;
-    use proptest::prelude::*;
+/// P of one tile as a function of its samples: noise falls as 1/√n, nothing else changes. Texture decides once whether
+/// the tile is familiar.
+pub(crate) struct ProbabilityCurve<'a> {
+    parts: &'a ModelParts,
+    raw: &'a [f32],
+    unfamiliar: bool,
+    /// Room for the descriptor at another number of samples.
+    projected: Vec<f32>,
+}
 
-    /// A model that goes by the first number of the compact descriptor alone.
-    pub(crate) fn small() -> Model {
-        let descriptor = Descriptor::default();
-        let n = descriptor.len();
-        let mut vectors = vec![0.0; 2 * n];
-        (vectors[0], vectors[n]) = (-1.0, 1.0);
-        Model {
-            descriptor,
-            descriptor_version: descriptor.version(),
-            evidence: Evidence::Halves,
-            tone_mapping: ToneMapping::default(),
-            scaler: Scaler::identity(n),
-            svm: Svm { gamma: 0.1, rho: 0.0, coefficients: vec![1.0, -1.0], vectors },
-            platt: Platt { a: -2.0, b: 0.0 },
-            familiarity: None,
-            audience: Audience::TRAINED,
-            record: TrainingRecord::default(),
-        }
+impl ProbabilityCurve<'_> {
+    pub(crate) fn judgement(&mut self) -> Judgement {
+        self.projected.copy_from_slice(self.raw);
+        let free = self.parts.classifier.probability_in_place(&mut self.projected);
+        let probability = if self.unfamiliar { self.at(1.0).unwrap_or(free) } else { free };
+        Judgement { probability, probability_without_penalty: free, unfamiliar: self.unfamiliar }
     }
 
-    fn file() -> Vec<u8> {
-        let mut bytes = Vec::new();
-        small().write(&mut bytes).unwrap();
-        bytes
-    }
-
-    #[test]
-    fn survives_the_file() {
-        let model = Model::read(&file()[..]).unwrap();
-        assert_eq!(model, small());
-        assert_eq!(model.digest(), small().digest());
-    }
-
-    #[cfg(feature = "bundled-model")]
-    #[test]
-    fn the_bundled_model_is_whole_small_and_scored() {
-        let model = Model::bundled();
-        assert!(BUNDLED.len() < 1 << 20);
-        assert_eq!(model.evidence, Evidence::Halves);
-        assert!(model.record.leave_one_scene_out.is_some_and(|s| s.zones == 128));
-    }
-
-    /// An unfamiliar tile has the P that a familiar one of the same noise has with half of the samples.
-    #[test]
-    fn what_is_unfamiliar_is_judged_as_if_it_had_half_the_samples() {
-        let zones = vec![vec![0.5; small().descriptor.texture_numbers()]];
-        let cautious = Model { familiarity: Some(Familiarity { zones, reach: 0.1 }), ..small() };
-        let mut tile = vec![0.5; small().descriptor.len()];
-        assert!(cautious.is_familiar(&tile) && small().is_familiar(&tile));
-        assert_eq!(cautious.probability(&mut tile.clone()), small().probability(&mut tile.clone()));
-
-        tile[1] += 0.11;
-        assert!(!cautious.is_familiar(&tile) && small().is_familiar(&tile));
-        let mut halved = tile.clone();
-        small().descriptor.project(&mut halved, 0.5);
-        let p = cautious.probability(&mut tile.clone());
-        assert_eq!(p, small().probability(&mut halved));
-        assert!(p < small().probability(&mut tile));
-    }
-
-    #[test]
-    fn the_model_for_references_is_whole() {
-        let model = Model::read(&include_bytes!("../models/human-reference.nfm")[..]).unwrap();
-        assert_eq!((model.evidence, model.record.scenes.len()), (Evidence::Reference, 8));
-    }
-
-    #[cfg(feature = "bundled-model")]
-    #[test]
-    fn clean_tiles_are_converged_and_noisy_ones_are_not_whatever_the_texture() {
-        let model = Model::bundled();
-        for textured in 0..=17 {
-            // From no texture at all, ln 2, to a checkerboard of black and white, ln 128.
-            let texture = 0.693 + 0.25 * textured as f32;
-            let p = |noise: f32| {
-                let mut tile = vec![texture; model.descriptor.len()];
-                // Of the tile and of its picture.
-                (tile[0], tile[3]) = (noise, noise);
-                model.probability(&mut tile)
-            };
-            // From no noise, at the floor, to white noise from black to white: 128 steps, which the masks and the weights of the
-            // scales let through almost whole.
-            let path: Vec<f32> = (0..=83).map(|i| p(-3.45 + 0.1 * i as f32)).collect();
-            assert!(path[0] > 0.99 && path[83] < 0.6, "{texture}: {path:?}");
-            // Far from all training data a Gaussian kernel forgets, so that P ends a little above its least.
-            assert!(path.windows(2).all(|w| w[1] <= w[0] + 2e-3), "{texture}: {path:?}");
-        }
-    }
-
-    #[test]
-    fn each_fault_has_its_error() {
-        let read = |bytes: &[u8]| Model::read(bytes).unwrap_err();
-        assert!(matches!(read(b""), ModelError::Foreign));
-        assert!(matches!(read(b"\x89PNG\r\n\x1a\n and so on"), ModelError::Foreign));
-        let whole = file();
-        assert!(matches!(read(&whole[..20]), ModelError::Damaged(_)));
-        assert!(matches!(read(&whole[..whole.len() - 1]), ModelError::Damaged(_)));
-        assert!(matches!(read(&[&whole[..], b"x"].concat()), ModelError::Damaged(_)));
-        let mut newer = whole.clone();
-        newer[8] = 3;
-        assert!(matches!(read(&newer), ModelError::Newer { found: 3 }));
-        newer[8] = 1;
-        assert!(matches!(read(&newer), ModelError::Older { found: 1 }));
-        let mut oversized = whole.clone();
-        oversized[19] = 0xff;
-        assert!(matches!(read(&oversized), ModelError::Oversized(_)));
-    }
-
-    #[test]
-    fn contradictions_are_refused() {
-        let fails = |change: fn(&mut Model)| {
-            let mut model = small();
-            change(&mut model);
-            model.write(Vec::new()).unwrap_err()
-        };
-        assert!(matches!(fails(|m| m.svm.rho = f32::NAN), ModelError::Invalid(_)));
-        assert!(matches!(fails(|m| m.svm.gamma = 0.0), ModelError::Invalid(_)));
-        assert!(matches!(fails(|m| m.svm.vectors.truncate(3)), ModelError::Invalid(_)));
-        assert!(matches!(fails(|m| m.scaler.mean.clear()), ModelError::Invalid(_)));
-        let n = small().descriptor.texture_numbers();
-        let known = |zone: Vec<f32>, reach| Some(Familiarity { zones: vec![zone], reach });
-        let none = Some(Familiarity { zones: vec![], reach: 1.0 });
-        let short = known(vec![0.0; n - 1], 1.0);
-        for familiarity in [none, short, known(vec![0.0; n], -1.0), known(vec![f32::NAN; n], 1.0)] {
-            let model = Model { familiarity, ..small() };
-            assert!(matches!(model.write(Vec::new()).unwrap_err(), ModelError::Invalid(_)));
-        }
-        assert!(matches!(fails(|m| m.descriptor_version = 99), ModelError::Descriptor { needed: 99, .. }));
-    }
-
-    proptest! {
-        #[test]
-        fn no_damaged_byte_goes_unnoticed(at in 0usize..4000, flip in 1u8..) {
-            let mut bytes = file();
-            let at = at % bytes.len();
-            bytes[at] ^= flip;
-            prop_assert!(Model::read(&bytes[..]).is_err());
-        }
-
-        #[test]
-        fn noise_is_never_a_model(bytes in prop::collection::vec(any::<u8>(), 0..300)) {
-            let framed = [&FORMAT.magic[..], &bytes].concat();
-            prop_assert!(Model::read(&framed[..]).is_err());
-            prop_assert!(Model::read(&bytes[..]).is_err());
-        }
+    /// P with `factor` times the samples; `None` if the descriptor does not separate noise from picture.
+    pub(crate) fn at(&mut self, factor: f32) -> Option<f32> {
+        let penalty = if self.unfamiliar { CAUTION } else { 1.0 };
+        self.projected.copy_from_slice(self.raw);
+        let known = self.parts.descriptor.project(&mut self.projected, factor / penalty);
+        known.then(|| self.parts.classifier.probability_in_place(&mut self.projected))
     }
 }
+
+#[cfg(test)]
+pub(crate) mod tests;

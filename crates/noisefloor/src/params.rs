@@ -12,13 +12,13 @@ pub enum Schedule {
     /// After every `step` samples per pixel (Takouachet et al. 2017, §5.2: N = 100).
     Every {
         /// Samples per pixel between two verdicts, at least 2.
-        step: u32,
+        step: u64,
     },
     /// Spaced by the expected need: most of the way to where the criterion expects to be satisfied, at most doubling what the
     /// tile has, in multiples of `step`. Fewer verdicts and fewer, larger batches; stops on the same grid.
     Spaced {
         /// The finest spacing, in samples per pixel, at least 2.
-        step: u32,
+        step: u64,
     },
 }
 
@@ -29,7 +29,7 @@ impl Schedule {
 
     fn step(self) -> u64 {
         match self {
-            Self::Every { step } | Self::Spaced { step } => u64::from(step),
+            Self::Every { step } | Self::Spaced { step } => step,
         }
     }
 
@@ -94,9 +94,9 @@ pub struct Params {
     /// When tiles are judged.
     pub schedule: Schedule,
     /// No tile stops with fewer samples per pixel.
-    pub min_samples: u64,
+    pub min_spp: u64,
     /// Every tile stops at this many samples per pixel (Takouachet et al. 2017, §4.2.1: 10,000).
-    pub max_samples: u64,
+    pub max_spp: u64,
     /// Verdicts in a row that have to say "converged", at least 1.
     pub consecutive: u32,
     /// Whose eyes, relative to those that the criterion stands for ([`crate::StoppingCriterion::audience`]).
@@ -109,8 +109,8 @@ impl Default for Params {
             tile: DEFAULT_TILE,
             tone_mapping: ToneMapping::default(),
             schedule: Schedule::Every { step: 100 },
-            min_samples: 100,
-            max_samples: 10_000,
+            min_spp: 100,
+            max_spp: 10_000,
             consecutive: 1,
             audience: Audience::TRAINED,
         }
@@ -119,13 +119,14 @@ impl Default for Params {
 
 /// A parameter out of its range.
 #[derive(Debug, Error, Clone, PartialEq)]
+#[non_exhaustive]
 pub enum ParamsError {
     /// The step is too small for two halves.
     #[error("a step of {0} samples cannot be split into two halves: use at least 2")]
-    Step(u32),
+    Step(u64),
     /// The limits leave nothing.
     #[error("at most {max} samples per pixel are allowed, but at least {min} (and at least 2) are asked for")]
-    Samples {
+    Spp {
         /// The minimum asked for.
         min: u64,
         /// The maximum asked for.
@@ -153,8 +154,8 @@ impl Params {
         if step < 2 {
             return Err(ParamsError::Step(step));
         }
-        if self.max_samples < self.min_samples.max(2) {
-            return Err(ParamsError::Samples { min: self.min_samples, max: self.max_samples });
+        if self.max_spp < self.min_spp.max(2) {
+            return Err(ParamsError::Spp { min: self.min_spp, max: self.max_spp });
         }
         if self.consecutive == 0 {
             return Err(ParamsError::Consecutive);
@@ -194,8 +195,8 @@ mod tests {
         let ok = Params::default();
         assert_eq!(ok.check(), Ok(()));
         assert!(Params { schedule: Schedule::Every { step: 1 }, ..ok }.check().is_err());
-        assert!(Params { max_samples: 50, ..ok }.check().is_err());
-        assert!(Params { max_samples: 1, min_samples: 0, ..ok }.check().is_err());
+        assert!(Params { max_spp: 50, ..ok }.check().is_err());
+        assert!(Params { max_spp: 1, min_spp: 0, ..ok }.check().is_err());
         assert!(Params { consecutive: 0, ..ok }.check().is_err());
         assert!(Params { audience: Audience { slope: f64::NAN, offset: 0.0 }, ..ok }.check().is_err());
         assert!(Params { tone_mapping: ToneMapping::Srgb { exposure: 0.0 }, ..ok }.check().is_err());
@@ -203,12 +204,12 @@ mod tests {
 
     proptest! {
         #[test]
-        fn spacing_moves_on_but_never_more_than_doubles(n in 0u64..20_000, e in prop::option::of(0u64..50_000), step in 2u32..500) {
+        fn spacing_moves_on_but_never_more_than_doubles(n in 0u64..20_000, e in prop::option::of(0u64..50_000), step in 2u64..500) {
             let next = Schedule::Spaced { step }.next(n, e);
-            prop_assert!(next > n && next.is_multiple_of(u64::from(step)));
-            prop_assert!(next <= n + n.max(u64::from(step)) + u64::from(step));
-            if let Some(e) = e.filter(|&e| e > n + u64::from(step)) {
-                prop_assert!(next < e + u64::from(step), "beyond the expected need");
+            prop_assert!(next > n && next.is_multiple_of(step));
+            prop_assert!(next <= n + n.max(step) + step);
+            if let Some(e) = e.filter(|&e| e > n + step) {
+                prop_assert!(next < e + step, "beyond the expected need");
             }
         }
     }

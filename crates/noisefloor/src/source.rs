@@ -1,11 +1,10 @@
 //! What a renderer offers: samples on request.
 
+use crate::rgb::Rgb;
 use crate::tile::Tile;
+use auto_impl::auto_impl;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
-
-/// Linear RGB radiance of one pixel, Rec.709 primaries, arbitrary scale.
-pub type Rgb = [f32; 3];
 
 /// What a source counts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -48,16 +47,16 @@ pub struct SourceInfo {
     pub repeats: Repeats,
 }
 
-/// One tile's wish for samples.
+/// A request for samples of one tile.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Request {
     /// The tile to sample.
     pub tile: Tile,
-    /// Samples that this tile has been given before: the index of the first new one. A source that derives its random
-    /// numbers from (seed, pixel, sample index) is deterministic however the work is cut into batches.
+    /// Samples per pixel that this tile already has: the index of the first new one. A source that derives its random
+    /// numbers from (seed, pixel, sample index) is deterministic however the work is split into batches.
     pub first: u64,
-    /// New samples wanted for each pixel, at least one.
-    pub samples: u32,
+    /// New samples per pixel wanted, at least 1.
+    pub spp: u64,
 }
 
 /// New samples of one tile.
@@ -65,11 +64,11 @@ pub struct Request {
 pub struct Batch {
     /// The tile that was sampled.
     pub tile: Tile,
-    /// Exact number of new samples behind each pixel. Normally what was asked for; a playback of stored images hands out
-    /// what it has. Zero says that this tile's source is exhausted.
-    pub samples: u32,
-    /// Mean of the new samples alone, row-major over the tile, `tile.pixels()` values (none if `samples` is zero).
-    /// Non-finite values are allowed: the film keeps them out and counts them.
+    /// Exact number of new samples per pixel. Normally what was asked for; a playback of stored images hands out
+    /// what it has. Zero says that the source is exhausted in this tile.
+    pub spp: u64,
+    /// Mean of the new samples only, row-major over the tile, `tile.pixels()` values (none if `spp` is zero).
+    /// Non-finite values are allowed: the film rejects and counts them.
     pub mean: Vec<Rgb>,
 }
 
@@ -124,7 +123,8 @@ pub enum SourceError {
 /// - Use no reconstruction filter wider than a pixel unless you document it: shared samples correlate the noise of
 ///   neighbours, and the model has learned from independent noise.
 ///
-/// `tests/` has `check_source`, a contract that every source of this project passes; run it on yours.
+/// The crate `noisefloor-testkit` has `check_source`, the contract that every source of this project passes: run it on yours.
+#[auto_impl(&mut, Box)]
 pub trait ProgressiveSource {
     /// Describes the source. Must not change over its life.
     fn info(&self) -> SourceInfo;
@@ -142,19 +142,5 @@ pub trait ProgressiveSource {
     /// [`SourceError`] if the renderer failed.
     fn reference(&mut self) -> Result<Option<Reference>, SourceError> {
         Ok(None)
-    }
-}
-
-impl<S: ProgressiveSource + ?Sized> ProgressiveSource for Box<S> {
-    fn info(&self) -> SourceInfo {
-        (**self).info()
-    }
-
-    fn sample(&mut self, requests: &[Request]) -> Result<Vec<Batch>, SourceError> {
-        (**self).sample(requests)
-    }
-
-    fn reference(&mut self) -> Result<Option<Reference>, SourceError> {
-        (**self).reference()
     }
 }

@@ -6,7 +6,7 @@ use crate::display::{Display, ToneMapping};
 use crate::evidence::{Evidence, Rendering, Samples, TilePlanes};
 use crate::mask::NoiseMask;
 use crate::oracle::Oracle;
-use crate::source::Rgb;
+use crate::rgb::Rgb;
 use crate::tile::{Tile, TileGrid};
 use ndarray::Array2;
 use rayon::prelude::*;
@@ -107,7 +107,7 @@ impl Still {
 
 /// A picture and what it is held against.
 #[derive(Debug)]
-pub struct Held<'a> {
+pub struct SnapshotPair<'a> {
     image: &'a Still,
     other: Option<Cow<'a, Still>>,
     evidence: Evidence,
@@ -115,7 +115,7 @@ pub struct Held<'a> {
     display: Display,
 }
 
-impl<'a> Held<'a> {
+impl<'a> SnapshotPair<'a> {
     /// Holds a picture against others of the same view, as a model with that evidence wants it. Independent renderings are pooled; of stages
     /// of one rendering, and of references, the one that says most is taken. `samples` says how they were made; `None` tells it from the
     /// pictures.

@@ -13,20 +13,20 @@ fn main() -> Result<(), SessionError> {
     // The loop stays the renderer's. `requests` names the open tiles, and how many samples each deserves next.
     while !session.is_done() {
         for request in session.requests() {
-            session.push(request.tile.index, request.samples, &render(&request))?;
+            session.push(request.tile.index, request.spp, &render(&request))?;
         }
         for stop in session.judge()? {
-            println!("tile {:2}: {} at {} samples per pixel", stop.tile.index, stop.reason, stop.samples);
+            println!("tile {:2}: {} at {} samples per pixel", stop.tile.index, stop.reason, stop.spp);
         }
     }
-    let most = session.stops().map(|stop| stop.samples).max().unwrap_or(0);
+    let most = session.stops().map(|stop| stop.spp).max().unwrap_or(0);
     let mean = session.film().total_samples() as f64 / (WIDTH * HEIGHT) as f64;
     println!("{mean:.0} samples per pixel on average, where the worst tile needed {most}");
     Ok(()) // The picture is `session.film().image()`: linear RGB, row-major.
 }
 
 /// The renderer: the mean of the new samples of each pixel, row-major over the tile.
-fn render(Request { tile, first, samples }: &Request) -> Vec<Rgb> {
+fn render(Request { tile, first, spp: samples }: &Request) -> Vec<Rgb> {
     let pixel = |i: usize| {
         let (x, y) = (tile.x + i % tile.width, tile.y + i / tile.width);
         let sample = |n: u64| radiance(x as f32, y as f32, ((y * WIDTH + x) as u64) << 32 | (first + n));

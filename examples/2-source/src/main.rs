@@ -47,12 +47,12 @@ fn run() -> Result<(), Box<dyn Error>> {
     for stop in driver.session().stops() {
         let mark = if stop.reason == StopReason::TimeLimit { '*' } else { ' ' };
         let end = if (stop.tile.index + 1).is_multiple_of(grid.columns()) { "\n" } else { "" };
-        print!("{:6}{mark}{end}", stop.samples);
+        print!("{:6}{mark}{end}", stop.spp);
     }
 
     // What it took.
     let film = driver.session().film();
-    let most = driver.session().stops().map(|stop| stop.samples).max().unwrap_or(0);
+    let most = driver.session().stops().map(|stop| stop.spp).max().unwrap_or(0);
     let uniform = most as f64 * (grid.width() * grid.height()) as f64;
     let clock = driver.clock();
     println!(

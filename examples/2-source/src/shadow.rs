@@ -44,7 +44,7 @@ impl ProgressiveSource for Shadow {
 impl Shadow {
     /// What the driver wants: the mean of the *new* samples alone, and how many they are.
     fn batch(&self, request: &Request) -> Batch {
-        let &Request { tile, first, samples } = request;
+        let &Request { tile, first, spp: samples } = request;
         let pixel = |i: usize| {
             let (x, y) = (tile.x + i % tile.width, tile.y + i / tile.width);
             let mut sum = [0.0; 3];
@@ -54,7 +54,7 @@ impl Shadow {
             }
             sum.map(|sum| sum / samples as f32)
         };
-        Batch { tile, samples, mean: (0..tile.pixels()).map(pixel).collect() }
+        Batch { tile, spp: samples, mean: (0..tile.pixels()).map(pixel).collect() }
     }
 
     /// Sample `n` of a pixel. All random numbers follow from (seed, pixel, n): the same picture whatever the threads, and however

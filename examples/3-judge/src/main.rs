@@ -54,7 +54,7 @@ fn run() -> Result<(), Box<dyn Error>> {
     // A tile is judged in its picture, as people do.
     let mut converged = 0;
     for (tile, verdict) in grid.tiles().zip(oracle.judge_described(&described)) {
-        let says = match verdict.expected_samples {
+        let says = match verdict.expected_spp {
             _ if verdict.converged => "no noise seen".into(),
             Some(expected) => format!("noise seen; clean at about {expected} spp"),
             None => "noise seen".into(),

@@ -1,11 +1,11 @@
 //! Train: learns a model from human thresholds, and scores it on scenes it has not seen.
 #![allow(clippy::print_stdout, reason = "an example prints")]
 
-use noisefloor::{DEFAULT_THRESHOLD, Descriptor, Evidence, Model};
+use noisefloor::{Descriptor, Evidence, Model, Threshold};
 use noisefloor_image::write_atomic;
+use noisefloor_learn::{Corpora, describe_corpora, read_table};
 use noisefloor_learn::{Prediction, Table, constant_noise_baseline, score};
 use noisefloor_learn::{TrainParams, leave_one_scene_out, train};
-use noisefloor_learn::{describe_corpora, read_table};
 use std::error::Error;
 use std::fs::{self, File};
 use std::io::{self, BufReader};
@@ -42,15 +42,17 @@ fn run() -> Result<(), Box<dyn Error>> {
             }
             Err(error) => return Err(format!("{TABLE}: {error}").into()),
         },
-        folders => describe_corpora(folders, Descriptor::default(), Evidence::Halves, |done, all| {
-            eprintln!("{done} of {all} zones described");
-        })?,
+        folders => {
+            describe_corpora(Corpora::new(folders), &Descriptor::default(), Evidence::Halves, |done, all| {
+                eprintln!("{done} of {all} zones described");
+            })?
+        }
     };
     println!("{} zones of {} scenes", table.zones.len(), table.scenes().len());
 
     // How good is it where it matters: on scenes the model has never seen, beside a plain limit on the noise.
     let params = TrainParams::default();
-    let predictions = leave_one_scene_out(&table, &params, DEFAULT_THRESHOLD, |group| {
+    let predictions = leave_one_scene_out(&table, &params, Threshold::PAPER, |group| {
         eprintln!("training without {group} …");
     })?;
     report(&table, &predictions);
@@ -65,7 +67,11 @@ fn run() -> Result<(), Box<dyn Error>> {
 
     // Read it back, as `noisefloor render --model` and `Oracle::new(Model::read(…)?, …)` do.
     let read = Model::read(BufReader::new(File::open(OUT)?))?;
-    println!("{OUT}: {} support vectors, digest {}", read.svm.coefficients.len(), &read.digest()[..12]);
+    println!(
+        "{OUT}: {} support vectors, digest {}",
+        read.classifier().svm.coefficients.len(),
+        &read.digest()[..12]
+    );
     Ok(())
 }
 

@@ -37,7 +37,7 @@ fn run() -> Result<(), Box<dyn Error>> {
     let mut driver = Driver::new(source, Oracle::bundled(), params)?;
     driver.run(|_, event| {
         if let Event::TileStopped(stop) = event {
-            println!("tile {:2} is done after {:5} samples per pixel", stop.tile.index, stop.samples);
+            println!("tile {:2} is done after {:5} samples per pixel", stop.tile.index, stop.spp);
         }
     })?;
 

@@ -60,29 +60,29 @@ impl Pbrt {
             let at =
                 Point2i { x: (r.tile.x + i % r.tile.width) as i32, y: (r.tile.y + i / r.tile.width) as i32 };
             let mut sum = [0.0; 3];
-            for sample in r.first..r.first + u64::from(r.samples) {
+            for sample in r.first..r.first + u64::from(r.spp) {
                 self.start(&mut sampler, at, sample);
                 let mut ray = Ray::default();
                 let weight = self.camera.generate_ray_differential(&sampler.get_camera_sample(at), &mut ray);
                 let light = path.li(&mut ray, &self.scene, &mut sampler, 0);
                 add(&mut sum, &light, weight);
             }
-            sum.map(|c| (c / f64::from(r.samples)) as f32)
+            sum.map(|c| (c / r.spp as f64) as f32)
         };
         let mean = (0..r.tile.pixels()).into_par_iter().map(pixel).collect();
-        Batch { tile: r.tile, samples: r.samples, mean }
+        Batch { tile: r.tile, spp: r.spp, mean }
     }
 
     /// Bidirectional path tracing of the whole picture. Paths from the lights meet the camera in any pixel, so that tiles cannot
     /// be rendered alone.
-    fn trace_both(&self, both: &BDPTIntegrator, first: u64, samples: u32) -> Vec<Rgb> {
+    fn trace_both(&self, both: &BDPTIntegrator, first: u64, samples: u64) -> Vec<Rgb> {
         let (width, height) = self.size();
         let row = |y: usize| {
             let (mut own, mut splats) = (vec![[0.0; 3]; width], Vec::new());
             let mut sampler = self.sampler.clone_with_seed(0);
             for (x, sum) in own.iter_mut().enumerate() {
                 let at = Point2i { x: x as i32, y: y as i32 };
-                for sample in first..first + u64::from(samples) {
+                for sample in first..first + samples {
                     self.start(&mut sampler, at, sample);
                     self.connect(both, &mut sampler, at, sum, &mut splats);
                 }
@@ -96,7 +96,7 @@ impl Pbrt {
         for (place, light) in splats.into_iter().flatten() {
             add(&mut sums[place], &light, 1.0);
         }
-        sums.into_iter().map(|sum| sum.map(|c| (c / f64::from(samples)) as f32)).collect()
+        sums.into_iter().map(|sum| sum.map(|c| (c / samples as f64) as f32)).collect()
     }
 
     /// One path from the camera and one from a light, connected in every way.
@@ -167,11 +167,11 @@ impl ProgressiveSource for Pbrt {
     fn sample(&mut self, requests: &[Request]) -> Result<Vec<Batch>, SourceError> {
         match (&self.integrator, requests.first()) {
             (Integrator::Sampler(path), _) => Ok(requests.iter().map(|r| self.trace(path, r)).collect()),
-            (Integrator::BDPT(both), Some(&Request { first, samples, .. })) => {
+            (Integrator::BDPT(both), Some(&Request { first, spp: samples, .. })) => {
                 let picture = self.trace_both(both, first, samples);
                 let cut =
                     |tile: Tile| tile.rows(self.size().0).flat_map(|row| picture[row].to_vec()).collect();
-                Ok(requests.iter().map(|r| Batch { tile: r.tile, samples, mean: cut(r.tile) }).collect())
+                Ok(requests.iter().map(|r| Batch { tile: r.tile, spp: samples, mean: cut(r.tile) }).collect())
             }
             _ => Ok(Vec::new()),
         }

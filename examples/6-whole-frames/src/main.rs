@@ -38,12 +38,12 @@ impl ProgressiveSource for WholeFrames {
 
     fn sample(&mut self, requests: &[Request]) -> Result<Vec<Batch>, SourceError> {
         // All tiles are asked for, and for the same number: this source cannot aim
-        let samples = requests.first().map_or(0, |request| request.samples);
+        let samples = requests.first().map_or(0, |request| request.spp);
         let mut buffer = ColorBuffer::new(self.width, self.height); // a new one: the mean of new samples alone
         (0..samples).for_each(|_| self.tracer.render(&mut buffer));
         let at = |pixel: usize| std::array::from_fn(|channel| buffer.pixels[4 * pixel + channel]);
         let cut = |r: &Request| r.tile.rows(self.width).flatten().map(at).collect();
-        Ok(requests.iter().map(|r| Batch { tile: r.tile, samples, mean: cut(r) }).collect())
+        Ok(requests.iter().map(|r| Batch { tile: r.tile, spp: samples, mean: cut(r) }).collect())
     }
 }
 
@@ -52,7 +52,7 @@ fn main() -> Result<(), DriverError> {
     let mut driver = Driver::new(source, Oracle::bundled(), Params { tile: 64, ..Params::default() })?;
     driver.run(|_, event| {
         if let Event::TileStopped(stop) = event {
-            println!("tile {:2} is done after {:5} samples per pixel", stop.tile.index, stop.samples);
+            println!("tile {:2} is done after {:5} samples per pixel", stop.tile.index, stop.spp);
         }
     })?;
     let (film, clock) = (driver.session().film(), driver.clock());

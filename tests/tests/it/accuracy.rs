@@ -1,4 +1,4 @@
-use noisefloor::{DEFAULT_THRESHOLD, Model, SvmParams};
+use noisefloor::{Model, SvmParams, Threshold};
 use noisefloor_learn::{Table, constant_noise_baseline, scene_median_baseline, score};
 use noisefloor_learn::{TrainParams, leave_one_scene_out, train};
 
@@ -9,18 +9,18 @@ fn table() -> Table {
 
 /// What the bundled model was trained with; the search among candidates takes minutes and is not repeated here.
 fn params(model: &Model) -> TrainParams {
-    let candidates = vec![SvmParams { c: model.record.c, gamma: model.record.gamma }];
+    let candidates = vec![SvmParams { c: model.record().c, gamma: model.record().gamma }];
     TrainParams { candidates, ..TrainParams::default() }
 }
 
 #[test]
 fn the_bundled_model_is_what_the_table_trains() {
     let (table, bundled) = (table(), Model::bundled());
-    assert_eq!(bundled.record.table_digest, table.digest());
-    assert_eq!(bundled.record.scenes, table.scenes());
+    assert_eq!(bundled.record().table_digest, table.digest());
+    assert_eq!(bundled.record().scenes, table.scenes());
     let trained = train(&table, &params(&bundled), String::new(), None).unwrap();
     for level in table.zones.iter().flat_map(|z| &z.levels) {
-        let p = |model: &Model| model.probability(&mut level.descriptor.clone());
+        let p = |model: &Model| model.judge(&level.descriptor).probability;
         // The solver ends within 1e-3 of the optimum; on another machine, exp may round otherwise on the way there
         let (trained, bundled) = (p(&trained), p(&bundled));
         assert!((trained - bundled).abs() < 5e-3, "{trained} {bundled}");
@@ -33,7 +33,7 @@ fn left_out_scenes_are_predicted_better_than_by_one_noise_level() {
     let table = table();
     assert_eq!((table.zones.len(), table.scenes().len(), table.groups().len()), (128, 8, 7));
     let predictions =
-        leave_one_scene_out(&table, &params(&Model::bundled()), DEFAULT_THRESHOLD, |_| ()).unwrap();
+        leave_one_scene_out(&table, &params(&Model::bundled()), Threshold::PAPER, |_| ()).unwrap();
     let ours = score(predictions.iter());
     let constant = score(constant_noise_baseline(&table).iter());
     let median = score(scene_median_baseline(&table).iter());

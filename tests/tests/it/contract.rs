@@ -69,15 +69,15 @@ fn stacks_on_disk_keep_it() {
     let (width, height) = SIZE;
     let tile = Tile { index: 0, x: 0, y: 0, width, height };
     let (mut source, mut sum) = (synthetic(), vec![[0.0f64; 3]; width * height]);
-    let ends = [20u32, 60, 100, 140, 180];
+    let ends = [20u64, 60, 100, 140, 180];
     for (i, last) in ends.into_iter().enumerate() {
         let first = if i == 0 { 0 } else { ends[i - 1] };
-        let request = Request { tile, first: u64::from(first), samples: last - first };
+        let request = Request { tile, first, spp: last - first };
         let batch = source.sample(&[request]).unwrap().remove(0);
         for (sum, value) in sum.iter_mut().flatten().zip(batch.mean.iter().flatten()) {
-            *sum += f64::from(*value) * f64::from(last - first);
+            *sum += f64::from(*value) * (last - first) as f64;
         }
-        let mean: Vec<_> = sum.iter().map(|p| p.map(|c| (c / f64::from(last)) as f32)).collect();
+        let mean: Vec<_> = sum.iter().map(|p| p.map(|c| (c / last as f64) as f32)).collect();
         let name = format!("batch_{first:05}_{last:05}.exr");
         write_exr(batches.path().join(name), &RenderLayers::rgb(width, height, &batch.mean)).unwrap();
         let name = format!("{last:05}.exr");
@@ -111,8 +111,8 @@ fn broken_promises_are_noticed() {
     said(broken(|_, b| drop(b.pop())), "number of batches");
     said(broken(|_, b| b.reverse()), "order of the requests");
     said(broken(|_, b| b.iter_mut().for_each(|b| b.mean.truncate(7))), "values in a batch");
-    said(broken(|_, b| b.iter_mut().for_each(|b| b.samples = 0)), "values in a batch of 0");
-    said(broken(|_, b| b.iter_mut().for_each(|b| b.samples += 1)), "other batches because other numbers");
+    said(broken(|_, b| b.iter_mut().for_each(|b| b.spp = 0)), "values in a batch of 0");
+    said(broken(|_, b| b.iter_mut().for_each(|b| b.spp += 1)), "other batches because other numbers");
 
     // The first samples over and over
     let again = |r: &[Request], b: &mut Vec<Batch>| {
@@ -124,7 +124,7 @@ fn broken_promises_are_noticed() {
 
     // Random numbers that follow from the call, not from the sample: right but for cuts
     let by_call = |r: &[Request], b: &mut Vec<Batch>| {
-        let seed = 100 + r.first().map_or(0, |r| r.first * 1000 + u64::from(r.samples));
+        let seed = 100 + r.first().map_or(0, |r| r.first * 1000 + r.spp);
         *b = Synthetic { seed, ..synthetic() }.sample(r).unwrap();
     };
     said(broken(by_call), "how requests are cut");
@@ -160,19 +160,19 @@ fn who_promises_less_is_held_to_less_and_no_less() {
 
     // Small batches a little darker; half of the samples they claim; all the noise in a tenth of the pixels of a batch
     let dark = |r: &Request, b: &mut Batch| {
-        b.mean.iter_mut().flatten().for_each(|c| *c *= if r.samples == 8 { 0.97 } else { 1.0 })
+        b.mean.iter_mut().flatten().for_each(|c| *c *= if r.spp == 8 { 0.97 } else { 1.0 })
     };
     said(by_call(Repeats::Calls, dark), "the mean of 32 samples depends on how requests are cut");
     let few = |r: &Request, b: &mut Batch| {
-        if r.samples == 8 {
-            let fewer = Request { samples: 4, first: 10_000 + r.first, ..*r };
+        if r.spp == 8 {
+            let fewer = Request { spp: 4, first: 10_000 + r.first, ..*r };
             b.mean = synthetic().sample(&[fewer]).unwrap().remove(0).mean;
         }
     };
     said(by_call(Repeats::Nothing, few), "the noise of 32 samples depends on how requests are cut");
     // Every other batch is the one before, which a renderer does that forgets to change its seed
     let twice = |r: &Request, b: &mut Batch| {
-        let first = r.first / u64::from(2 * r.samples) * u64::from(2 * r.samples);
+        let first = r.first / u64::from(2 * r.spp) * u64::from(2 * r.spp);
         b.mean = synthetic().sample(&[Request { first, ..*r }]).unwrap().remove(0).mean;
     };
     said(by_call(Repeats::Calls, twice), "correlated");
@@ -186,10 +186,10 @@ fn noise_that_pixels_share_is_no_fault_of_a_markov_chain() {
             let source = Synthetic { repeats: Repeats::Calls, unit, ..synthetic() };
             Altered::batches(source, |requests, batches| {
                 for (r, batch) in requests.iter().zip(batches) {
-                    let key = hash(r.first) ^ hash(r.tile.index as u64 + 77) ^ hash(u64::from(r.samples));
+                    let key = hash(r.first) ^ hash(r.tile.index as u64 + 77) ^ hash(r.spp);
                     let noise =
                         |row: usize| (hash(key ^ row as u64) >> 11) as f64 / (1u64 << 53) as f64 - 0.5;
-                    let noise = |i: usize| noise(i / r.tile.width / 8) / f64::from(r.samples).sqrt();
+                    let noise = |i: usize| noise(i / r.tile.width / 8) / (r.spp as f64).sqrt();
                     batch.mean = (0..r.tile.pixels()).map(|i| [0.5 + noise(i) as f32; 3]).collect();
                 }
             })
@@ -209,9 +209,9 @@ impl ProgressiveSource for Running {
     }
 
     fn sample(&mut self, requests: &[Request]) -> Result<Vec<Batch>, SourceError> {
-        let all = |r: &Request| Request { first: 0, samples: r.first as u32 + 20, ..*r };
+        let all = |r: &Request| Request { first: 0, spp: r.first + 20, ..*r };
         let mut batches = self.source.sample(&requests.iter().map(all).collect::<Vec<_>>())?;
-        batches.iter_mut().for_each(|b| b.samples = 20);
+        batches.iter_mut().for_each(|b| b.spp = 20);
         Ok(batches)
     }
 }

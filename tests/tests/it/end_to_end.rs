@@ -1,7 +1,7 @@
 use crate::kit::{Altered, Synthetic};
 use noisefloor::{
-    Batch, Driver, Event, Evidence, FixedSamples, Model, Oracle, Params, ProgressiveSource, Reference, Rgb,
-    Schedule, Session, Stop, StopReason, StoppingCriterion,
+    Batch, Driver, Event, Evidence, FixedSpp, Model, ModelParts, Oracle, Params, ProgressiveSource,
+    Reference, Rgb, Schedule, Session, Stop, StopReason, StoppingCriterion, Threshold,
 };
 use noisefloor_ptwne::{Ptwne, RenderOptions, scenes};
 use std::cell::RefCell;
@@ -12,8 +12,8 @@ const TILE: Params = Params {
     tile: 32,
     tone_mapping: noisefloor::ToneMapping::Reinhard { key: noisefloor::DEFAULT_KEY, white: None },
     schedule: Schedule::Every { step: 100 },
-    min_samples: 100,
-    max_samples: 3000,
+    min_spp: 100,
+    max_spp: 3000,
     consecutive: 1,
     audience: noisefloor::Audience::TRAINED,
 };
@@ -39,7 +39,7 @@ impl Outcome {
     }
 
     fn samples(&self) -> Vec<u64> {
-        self.stops.iter().map(|s| s.samples).collect()
+        self.stops.iter().map(|s| s.spp).collect()
     }
 }
 
@@ -82,7 +82,7 @@ fn the_cornell_box_stops_by_itself_whatever_the_threads_and_whoever_owns_the_loo
     let mut session = Session::new(96, 96, Oracle::bundled(), TILE).unwrap();
     let mut batches = batches.into_iter().peekable();
     while let Some(batch) = batches.next() {
-        session.push(batch.tile.index, batch.samples, &batch.mean).unwrap();
+        session.push(batch.tile.index, batch.spp, &batch.mean).unwrap();
         // The driver judges once a round; a round ends where the tiles begin anew
         if batches.peek().is_none_or(|next| next.tile.index <= batch.tile.index) {
             session.judge().unwrap();
@@ -101,12 +101,12 @@ fn running_means_stop_where_batches_do() {
     let mut mean = vec![[0.0f64; 3]; 96 * 32];
     while !session.is_done() {
         for batch in source.sample(&session.requests()).unwrap() {
-            let before = session.film().samples(batch.tile.index);
-            let total = before + u64::from(batch.samples);
+            let before = session.film().spp(batch.tile.index);
+            let total = before + batch.spp;
             let pixels: Vec<usize> = batch.tile.rows(96).flatten().collect();
             for (&pixel, new) in pixels.iter().zip(&batch.mean) {
                 for (mean, &new) in mean[pixel].iter_mut().zip(new) {
-                    *mean += (f64::from(new) - *mean) * f64::from(batch.samples) / total as f64;
+                    *mean += (f64::from(new) - *mean) * batch.spp as f64 / total as f64;
                 }
             }
             let running: Vec<Rgb> = pixels.iter().map(|&p| mean[p].map(|c| c as f32)).collect();
@@ -119,13 +119,13 @@ fn running_means_stop_where_batches_do() {
 
 #[test]
 fn a_fixed_number_of_samples_is_that_everywhere() {
-    let fixed = run(cornell(), FixedSamples(200), TILE);
+    let fixed = run(cornell(), FixedSpp(200), TILE);
     assert_eq!(fixed.samples(), [200; 9]);
     assert!(fixed.stops.iter().all(|s| s.reason == StopReason::Converged && s.probability.is_none()));
 
     // Which is the picture that one call gives, but for rounding; no halves were kept
     let tile = noisefloor::Tile { index: 0, x: 0, y: 0, width: 96, height: 96 };
-    let whole = cornell().sample(&[noisefloor::Request { tile, first: 0, samples: 200 }]).unwrap().remove(0);
+    let whole = cornell().sample(&[noisefloor::Request { tile, first: 0, spp: 200 }]).unwrap().remove(0);
     assert!(fixed.halves.iter().all(|&h| h == [200, 0]));
     for (a, b) in fixed.image.iter().flatten().zip(whole.mean.iter().flatten()) {
         assert!((a - b).abs() <= 1e-6 * b.abs(), "{a} {b}");
@@ -137,7 +137,7 @@ fn a_fixed_number_of_samples_is_that_everywhere() {
 #[test]
 fn spaced_verdicts_stop_about_where_frequent_ones_do() {
     let count = |schedule: Schedule| {
-        let params = Params { schedule, max_samples: 10_000, ..TILE };
+        let params = Params { schedule, max_spp: 10_000, ..TILE };
         let mut driver = Driver::new(Synthetic::new(96, 64), Oracle::bundled(), params).unwrap();
         let mut rounds = 0;
         driver.run(|_, event| rounds += usize::from(matches!(event, Event::BatchDone(_)))).unwrap();
@@ -154,12 +154,12 @@ fn spaced_verdicts_stop_about_where_frequent_ones_do() {
 
 #[test]
 fn limits_have_their_reasons() {
-    let limited = run(cornell(), Oracle::bundled(), Params { max_samples: 150, ..TILE });
+    let limited = run(cornell(), Oracle::bundled(), Params { max_spp: 150, ..TILE });
     for stop in &limited.stops {
         match stop.reason {
             StopReason::Converged => assert!(stop.probability >= Some(0.9), "{stop:?}"),
-            StopReason::MaxSamples => {
-                assert!(stop.samples == 150 && stop.probability < Some(0.9), "{stop:?}")
+            StopReason::MaxSpp => {
+                assert!(stop.spp == 150 && stop.probability < Some(0.9), "{stop:?}")
             }
             _ => panic!("{stop:?}"),
         }
@@ -177,10 +177,7 @@ fn limits_have_their_reasons() {
         })
         .unwrap();
     let outcome = Outcome::of(driver.session());
-    assert!(
-        outcome.stops.iter().all(|s| s.reason == StopReason::Cancelled && s.samples == 50),
-        "{outcome:?}"
-    );
+    assert!(outcome.stops.iter().all(|s| s.reason == StopReason::Cancelled && s.spp == 50), "{outcome:?}");
     assert!(outcome.image.iter().flatten().any(|&c| c > 0.0));
 }
 
@@ -189,7 +186,7 @@ fn a_stack_that_ends_says_so() {
     let stops =
         run(Synthetic { store: 130, noise: |_, _| 1.0, ..Synthetic::new(96, 32) }, Oracle::bundled(), TILE);
     for stop in stops.stops {
-        assert_eq!((stop.samples, stop.reason), (130, StopReason::SourceExhausted));
+        assert_eq!((stop.spp, stop.reason), (130, StopReason::SourceExhausted));
     }
 }
 
@@ -197,17 +194,18 @@ fn a_stack_that_ends_says_so() {
 fn the_reference_is_rendered_once_where_it_is_needed_and_never_elsewhere() {
     // Halves are evidence enough
     run(Altered::reference(Synthetic::new(64, 32), || panic!("nobody needs it")), Oracle::bundled(), TILE);
-    run(Altered::reference(Synthetic::new(64, 32), || panic!("nobody needs it")), FixedSamples(100), TILE);
+    run(Altered::reference(Synthetic::new(64, 32), || panic!("nobody needs it")), FixedSpp(100), TILE);
 
     // The same machine, held against a reference: here, the converged picture itself
-    let model = Model { evidence: Evidence::Reference, ..Model::bundled() };
-    let oracle = || Oracle::new(model.clone(), 0.9).unwrap();
+    let parts = ModelParts { evidence: Evidence::Reference, ..Model::bundled().into_parts() };
+    let model = Model::new(parts).unwrap();
+    let oracle = || Oracle::new(model.clone(), Threshold::PAPER);
     let calls = Rc::new(RefCell::new(0));
     let count = Rc::clone(&calls);
     let converged = {
         let mut exact = Synthetic { noise: |_, _| 0.0, ..Synthetic::new(64, 32) };
         let tile = noisefloor::Tile { index: 0, x: 0, y: 0, width: 64, height: 32 };
-        exact.sample(&[noisefloor::Request { tile, first: 0, samples: 1 }]).unwrap().remove(0).mean
+        exact.sample(&[noisefloor::Request { tile, first: 0, spp: 1 }]).unwrap().remove(0).mean
     };
     let source = Altered::reference(Synthetic::new(64, 32), move || {
         *count.borrow_mut() += 1;
@@ -219,7 +217,7 @@ fn the_reference_is_rendered_once_where_it_is_needed_and_never_elsewhere() {
     assert!(outcome.halves.iter().all(|h| h[1] == 0), "halves were kept, and nobody reads them");
 
     // And the path tracer has one to give
-    let rendered = run(cornell(), oracle(), Params { max_samples: 100, ..TILE });
+    let rendered = run(cornell(), oracle(), Params { max_spp: 100, ..TILE });
     assert!(rendered.stops.iter().all(|s| s.probability.is_some()));
 }
 
@@ -231,13 +229,13 @@ fn a_tile_without_samples_does_not_hold_up_the_others() {
     let source = Altered::batches(Synthetic::new(64, 32), move |_, batches| {
         *count.borrow_mut() += 1;
         for batch in batches.iter_mut().filter(|b| b.tile.index == 0) {
-            (batch.samples, batch.mean) = (0, Vec::new());
+            (batch.spp, batch.mean) = (0, Vec::new());
         }
     });
     let mut driver = Driver::new(source, Oracle::bundled(), TILE).unwrap();
     let flag = driver.cancel_flag();
     driver.run(|_, _| flag.store(*calls.borrow() > 200, Ordering::Relaxed)).unwrap();
     let stops = Outcome::of(driver.session()).stops;
-    assert_eq!((stops[0].samples, stops[0].reason), (0, StopReason::SourceExhausted));
+    assert_eq!((stops[0].spp, stops[0].reason), (0, StopReason::SourceExhausted));
     assert_eq!(stops[1].reason, StopReason::Converged, "{:?}", stops[1]);
 }

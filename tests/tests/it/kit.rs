@@ -40,11 +40,11 @@ impl Synthetic {
         Self { radiance, noise: |_, _| 0.0, ..Self::new(width, height) }
     }
 
-    fn mean(&self, x: usize, y: usize, first: u64, samples: u32) -> Rgb {
+    fn mean(&self, x: usize, y: usize, first: u64, samples: u64) -> Rgb {
         let (radiance, noise) = ((self.radiance)(x, y) * self.brightness, f64::from((self.noise)(x, y)));
         let key = hash(self.seed ^ hash((y * self.size.0 + x) as u64));
-        let bright = (first..first + u64::from(samples)).filter(|i| hash(key ^ i) >> 63 == 1).count();
-        let factor = 1.0 + noise * (2.0 * bright as f64 / f64::from(samples) - 1.0);
+        let bright = (first..first + samples).filter(|i| hash(key ^ i) >> 63 == 1).count();
+        let factor = 1.0 + noise * (2.0 * bright as f64 / samples as f64 - 1.0);
         [1.0, 0.8, 0.5].map(|c| c * radiance * factor as f32)
     }
 }
@@ -72,11 +72,11 @@ impl ProgressiveSource for Synthetic {
 
     fn sample(&mut self, requests: &[Request]) -> Result<Vec<Batch>, SourceError> {
         let batch = |r: &Request| {
-            let samples = u64::from(r.samples).min(self.store.saturating_sub(r.first)) as u32;
+            let samples = r.spp.min(self.store.saturating_sub(r.first));
             let pixels = if samples == 0 { 0 } else { r.tile.pixels() };
             let at = |i: usize| (r.tile.x + i % r.tile.width, r.tile.y + i / r.tile.width);
             let mean = (0..pixels).map(at).map(|(x, y)| self.mean(x, y, r.first, samples)).collect();
-            Batch { tile: r.tile, samples, mean }
+            Batch { tile: r.tile, spp: samples, mean }
         };
         Ok(requests.iter().map(batch).collect())
     }

@@ -65,7 +65,7 @@ fn moments(mut source: impl ProgressiveSource) -> Vec<[(f64, f64); 3]> {
     for batch in 0..BATCHES {
         let tiles = TileGrid::new(SIZE.0, SIZE.1, 32).unwrap();
         let requests: Vec<_> =
-            tiles.tiles().map(|tile| Request { tile, first: 16 * batch, samples: 16 }).collect();
+            tiles.tiles().map(|tile| Request { tile, first: 16 * batch, spp: 16 }).collect();
         for (batch, sums) in source.sample(&requests).unwrap().iter().zip(&mut sums) {
             for (c, sum) in sums.iter_mut().enumerate() {
                 let mean = batch.mean.iter().map(|p| f64::from(p[c])).sum::<f64>() / batch.mean.len() as f64;
@@ -92,7 +92,7 @@ fn depth_and_size_are_those_asked_for() {
         let half = |index, y, height| Request {
             tile: Tile { index, x: 0, y, width: 33, height },
             first: 0,
-            samples: 16,
+            spp: 16,
         };
         let batches = source.sample(&[half(0, 0, 15), half(1, 15, 16)]).unwrap();
         let light = |i: usize| batches[i].mean.iter().flatten().filter(|&&c| c > 0.0).count();
@@ -127,7 +127,7 @@ fn plane(folder: &Path) -> PathBuf {
 }
 
 fn request(index: usize, (x, y): (usize, usize), (width, height): (usize, usize), first: u64) -> Request {
-    Request { tile: Tile { index, x, y, width, height }, first, samples: 1 }
+    Request { tile: Tile { index, x, y, width, height }, first, spp: 1 }
 }
 
 fn values(source: &mut Sidecar, request: Request) -> Vec<[u32; 3]> {
@@ -223,7 +223,7 @@ fn a_killed_process_is_replaced_and_none_is_left() {
     let mut source = open(CORNELL_BOX, SIZE, Variant::Llvm);
     let tile = TileGrid::new(SIZE.0, SIZE.1, 32).unwrap().tile(0);
     let sample = |source: &mut Sidecar, first| -> Result<Vec<Rgb>, SourceError> {
-        Ok(source.sample(&[Request { tile, first, samples: 4 }])?.remove(0).mean)
+        Ok(source.sample(&[Request { tile, first, spp: 4 }])?.remove(0).mean)
     };
     let before = sample(&mut source, 4).unwrap();
     let first = source.process_id().unwrap();
@@ -246,13 +246,13 @@ fn memory_is_flat_over_a_thousand_calls() {
     for variant in [Variant::Llvm, Variant::Scalar] {
         let mut source = open(CORNELL_BOX, SIZE, variant);
         let tile = TileGrid::new(SIZE.0, SIZE.1, 32).unwrap().tile(0);
-        let mut call = |first| source.sample(&[Request { tile, first, samples: 4 }]).map(|_| ()).unwrap();
+        let mut call = |first| source.sample(&[Request { tile, first, spp: 4 }]).map(|_| ()).unwrap();
         (0..100).for_each(&mut call);
         let process = source.process_id().unwrap();
         let Some(before) = resident(process) else {
             return eprintln!("SKIPPED: nothing tells the memory of a process");
         };
-        let mut call = |first| source.sample(&[Request { tile, first, samples: 4 }]).map(|_| ()).unwrap();
+        let mut call = |first| source.sample(&[Request { tile, first, spp: 4 }]).map(|_| ()).unwrap();
         (100..1100).for_each(&mut call);
         let after = resident(process).unwrap();
         assert!(

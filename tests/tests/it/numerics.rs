@@ -22,7 +22,7 @@ fn run(source: impl ProgressiveSource, params: Params) -> Run {
 }
 
 fn tiles_of(tile: usize) -> Params {
-    Params { tile, max_samples: 4000, ..Params::default() }
+    Params { tile, max_spp: 4000, ..Params::default() }
 }
 
 /// Radiance has no unit: whatever it is measured in, people see the same picture.
@@ -30,10 +30,10 @@ fn tiles_of(tile: usize) -> Params {
 fn the_unit_of_radiance_changes_nothing() {
     let at = |brightness: f32| run(Synthetic { brightness, ..Synthetic::new(96, 48) }, tiles_of(32)).stops;
     let usual = at(1.0);
-    assert!(usual.iter().any(|s| s.samples > 100), "no noise to judge: {usual:?}");
+    assert!(usual.iter().any(|s| s.spp > 100), "no noise to judge: {usual:?}");
     for unit in [1e-30, 1e-8, 1e-4, 1e4, 1e8, 1e30] {
         for (usual, stop) in usual.iter().zip(at(unit)) {
-            assert_eq!((usual.samples, usual.reason), (stop.samples, stop.reason), "unit {unit}");
+            assert_eq!((usual.spp, usual.reason), (stop.spp, stop.reason), "unit {unit}");
             // Display values differ by roundings of 1e-7 of each; noise of a step is 1/255, the machine's slope below 10 a unit of ln
             let difference = (usual.probability.unwrap() - stop.probability.unwrap()).abs();
             assert!(difference < 1e-3, "unit {unit}: {difference}");
@@ -47,7 +47,7 @@ fn what_is_constant_or_black_has_converged_at_once() {
     for source in [constant(|_, _| 0.4), constant(|_, _| 0.0), constant(|_, _| 1e8), constant(|_, _| 1e-20)] {
         let stops = run(source, tiles_of(32)).stops;
         for stop in stops {
-            assert_eq!((stop.samples, stop.reason), (100, StopReason::Converged));
+            assert_eq!((stop.spp, stop.reason), (100, StopReason::Converged));
             assert!(stop.probability.unwrap() > 0.99, "{stop:?}");
         }
     }
@@ -72,10 +72,10 @@ fn samples_that_are_not_finite_are_kept_out() {
         let dirty = run(source, tiles_of(32));
         assert!(dirty.image.iter().flatten().all(|c| c.is_finite()));
         assert_eq!(dirty.image[5], [0.0; 3]);
-        assert_eq!(dirty.rejected, dirty.stops[0].samples + 50);
+        assert_eq!(dirty.rejected, dirty.stops[0].spp + 50);
         for (clean, dirty) in clean.stops.iter().zip(&dirty.stops) {
             assert_eq!(dirty.reason, StopReason::Converged);
-            assert!(clean.samples.abs_diff(dirty.samples) <= 100, "{clean:?} {dirty:?}");
+            assert!(clean.spp.abs_diff(dirty.spp) <= 100, "{clean:?} {dirty:?}");
         }
     }
 }
@@ -89,8 +89,8 @@ fn every_size_is_judged() {
         let stops = run(Synthetic::new(width, height), tiles_of(tile)).stops;
         assert_eq!(stops.len(), tiles);
         for stop in stops {
-            let reasons = [StopReason::Converged, StopReason::MaxSamples];
-            assert!(reasons.contains(&stop.reason) && (100..=4000).contains(&stop.samples), "{stop:?}");
+            let reasons = [StopReason::Converged, StopReason::MaxSpp];
+            assert!(reasons.contains(&stop.reason) && (100..=4000).contains(&stop.spp), "{stop:?}");
         }
     }
 }
@@ -102,21 +102,21 @@ fn every_size_is_judged() {
 /// chance with p < 1e-6.
 #[test]
 fn uneven_halves_have_the_noise_of_their_mean() {
-    let residual = |batches: [u32; 2]| {
+    let residual = |batches: [u64; 2]| {
         let source = || Synthetic { radiance: |_, _| 0.4, noise: |_, _| 0.03, ..Synthetic::new(128, 128) };
-        let params = Params { schedule: Schedule::Every { step: 2 }, min_samples: 2, ..Params::default() };
+        let params = Params { schedule: Schedule::Every { step: 2 }, min_spp: 2, ..Params::default() };
         let mut session = Session::new(128, 128, Oracle::bundled(), params).unwrap();
         let tile = session.film().grid().tile(0);
         let mut first = 0;
         for samples in batches {
-            let request = noisefloor::Request { tile, first, samples };
+            let request = noisefloor::Request { tile, first, spp: samples };
             let batch = source().sample(&[request]).unwrap().remove(0);
             session.push(0, samples, &batch.mean).unwrap();
-            first += u64::from(samples);
+            first += samples;
         }
-        assert_eq!(session.film().half_counts(0), batches.map(u64::from));
+        assert_eq!(session.film().half_counts(0), batches);
         let stop = session.judge().unwrap()[0];
-        assert_eq!((stop.reason, stop.samples), (StopReason::Converged, 10_001));
+        assert_eq!((stop.reason, stop.spp), (StopReason::Converged, 10_001));
         let planes = TilePlanes::from_halves(session.film(), session.display().unwrap(), tile);
         let inner = planes.inner;
         let values = (0..inner.height * inner.width)
@@ -135,14 +135,14 @@ fn one_firefly_leaves_the_other_tiles_alone() {
     let source = Altered::batches(Synthetic::new(96, 64), |requests, batches| {
         for (request, batch) in requests.iter().zip(batches.iter_mut()) {
             if request.tile.index == 0 && request.first == 0 {
-                batch.mean[5 + 32 * 5] = [1e12 / batch.samples as f32; 3];
+                batch.mean[5 + 32 * 5] = [1e12 / batch.spp as f32; 3];
             }
         }
     });
     let dirty = run(source, tiles_of(32));
     assert!(dirty.image.iter().flatten().all(|c| c.is_finite()));
     for (clean, dirty) in clean.stops.iter().zip(&dirty.stops).filter(|(stop, _)| stop.tile.index != 0) {
-        assert!(clean.samples.abs_diff(dirty.samples) <= 100, "{clean:?}\n{dirty:?}");
+        assert!(clean.spp.abs_diff(dirty.spp) <= 100, "{clean:?}\n{dirty:?}");
     }
 }
 
@@ -154,5 +154,5 @@ fn a_tile_without_a_valid_sample_never_converges() {
     });
     let run = run(source, tiles_of(32));
     assert_eq!(run.stops[1].reason, StopReason::Converged);
-    assert_eq!(run.stops[0].reason, StopReason::MaxSamples, "{:?}", run.stops[0]);
+    assert_eq!(run.stops[0].reason, StopReason::MaxSpp, "{:?}", run.stops[0]);
 }

@@ -54,11 +54,11 @@ const SIZE: (usize, usize) = (46, 64);
 const BLOCK: usize = 9;
 
 /// The mean of two batches, tile by tile.
-fn picture(mut source: impl ProgressiveSource, samples: u32) -> Vec<Rgb> {
+fn picture(mut source: impl ProgressiveSource, samples: u64) -> Vec<Rgb> {
     let tiles: Vec<Tile> = TileGrid::new(SIZE.0, SIZE.1, 32).unwrap().tiles().collect();
     let mut picture = vec![[0.0; 3]; SIZE.0 * SIZE.1];
-    for first in [0, u64::from(samples)] {
-        let requests: Vec<_> = tiles.iter().map(|&tile| Request { tile, first, samples }).collect();
+    for first in [0, samples] {
+        let requests: Vec<_> = tiles.iter().map(|&tile| Request { tile, first, spp: samples }).collect();
         for Batch { tile, mean, .. } in source.sample(&requests).unwrap() {
             for (i, value) in mean.iter().enumerate() {
                 let pixel = &mut picture[(tile.y + i / tile.width) * SIZE.0 + tile.x + i % tile.width];
@@ -124,13 +124,13 @@ fn the_cornell_box_is_the_same_in_luxcore() {
 fn memory_is_flat_over_a_thousand_calls() {
     let flat = |mut source: Sidecar, calls: u64| {
         let tile = Tile { index: 0, x: 8, y: 8, width: 16, height: 16 };
-        let mut call = |first| drop(source.sample(&[Request { tile, first, samples: 1 }]).unwrap());
+        let mut call = |first| drop(source.sample(&[Request { tile, first, spp: 1 }]).unwrap());
         (0..calls / 10).for_each(&mut call);
         let process = source.process_id().unwrap();
         let Some(before) = resident(process) else {
             return eprintln!("SKIPPED: nothing tells the memory of a process");
         };
-        let mut call = |first| drop(source.sample(&[Request { tile, first, samples: 1 }]).unwrap());
+        let mut call = |first| drop(source.sample(&[Request { tile, first, spp: 1 }]).unwrap());
         (calls / 10..calls).for_each(&mut call);
         let after = resident(process).unwrap();
         let name = source.info().name;

@@ -2,7 +2,7 @@
 
 use super::error::CorpusError;
 use super::zone::{JudgedZone, ZoneImages};
-use noisefloor::{APRON, Rgb};
+use noisefloor::{HALO, Rgb};
 use noisefloor_image::{Frame, Picture, StackError, batches, read_exr, read_picture, running_means};
 use std::collections::VecDeque;
 
@@ -31,7 +31,7 @@ pub struct Inner {
     pub height: usize,
 }
 
-/// A zone's pixels, and up to [`APRON`] pixels around them where the image has any.
+/// A zone's pixels, and up to [`HALO`] pixels around them where the image has any.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Patch {
     /// Width with apron, in pixels.
@@ -159,7 +159,7 @@ impl<'a> JudgedImages<'a> {
                 last: job.frame.last,
                 encoding,
                 rounding: picture.rounding(),
-                patch: cut(pixels, (w, h), Inner { x, y, width: zone.width, height: zone.height }, APRON),
+                patch: cut(pixels, (w, h), Inner { x, y, width: zone.width, height: zone.height }, HALO),
             });
         }
         Ok(())
@@ -185,7 +185,7 @@ pub(super) fn reference(zones: &[&JudgedZone]) -> Result<Option<Vec<Patch>>, Cor
             return Err(CorpusError::Zone { path, scene, zone: zone.zone, width, height });
         }
         // A batch is the zone alone
-        let apron = if matches!(zone.stack, ZoneImages::Batches(_)) { 0 } else { APRON };
+        let apron = if matches!(zone.stack, ZoneImages::Batches(_)) { 0 } else { HALO };
         Ok(cut(&image.pixels, (width, height), Inner { x, y, width: w, height: h }, apron))
     };
     zones.iter().map(cut_out).collect::<Result<_, _>>().map(Some)

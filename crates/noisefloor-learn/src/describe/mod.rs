@@ -9,7 +9,7 @@ mod material;
 
 use crate::corpus::{Corpus, JudgedImage as Image, JudgedZone};
 use crate::error::TableError;
-use crate::table::{Level, Origin, Table, Zone, group_of_scene};
+use crate::table::{Level, Origin, Table, Zone, first_word};
 use material::{Material, Shown, does_not_fit};
 use noisefloor::{Described, Descriptor, Evidence, NoiseMask, ROUNDING_LUMINANCE, TilePlanes, ToneMapping};
 use rayon::prelude::*;
@@ -21,6 +21,22 @@ const GRID: std::ops::Range<i32> = -4..20;
 /// Levels are synthesised up to this factor below and above the human threshold, and wherever observers could choose.
 const REACH: f64 = 8.0;
 
+/// Folders with corpora, and which scenes belong together.
+#[derive(Clone, Copy, Debug)]
+pub struct Corpora<'a> {
+    /// A corpus each.
+    pub folders: &'a [PathBuf],
+    /// The group of a scene, by its name: scenes of one group show the same room, and are left out together.
+    pub group_of: fn(&str) -> &str,
+}
+
+impl<'a> Corpora<'a> {
+    /// Corpora whose scenes belong together if their names begin with the same word; see [`first_word`].
+    pub fn new(folders: &'a [PathBuf]) -> Self {
+        Self { folders, group_of: first_word }
+    }
+}
+
 /// Describes every zone of the corpora, by the evidence given. `on_zone(done, all)` is told of progress. The zones of a scene
 /// are its picture.
 ///
@@ -30,15 +46,15 @@ const REACH: f64 = 8.0;
 /// # Errors
 /// [`TableError`] if a corpus cannot be read, or a zone has too few images.
 pub fn describe_corpora(
-    folders: &[PathBuf],
-    descriptor: Descriptor,
+    corpora: Corpora<'_>,
+    descriptor: &Descriptor,
     evidence: Evidence,
     on_zone: impl FnMut(usize, usize),
 ) -> Result<Table, TableError> {
     let levels = |scene: &[&JudgedZone], _: &JudgedZone, material: &Material| {
         Ok(material.levels(&synthesised_levels(scene), evidence))
     };
-    describe(folders, descriptor, evidence, levels, on_zone)
+    describe(corpora, descriptor, evidence, levels, on_zone)
 }
 
 /// Describes every zone as the paper does (Takouachet et al. 2017, §4.3): the `edge`×`edge` pixels at its centre, at `levels` levels with
@@ -49,28 +65,28 @@ pub fn describe_corpora(
 /// # Errors
 /// [`TableError`] if a corpus cannot be read, or a zone has too few images or is smaller than `edge`×`edge` pixels.
 pub fn describe_pairs(
-    folders: &[PathBuf],
-    descriptor: Descriptor,
+    corpora: Corpora<'_>,
+    descriptor: &Descriptor,
     edge: usize,
     levels: usize,
     on_zone: impl FnMut(usize, usize),
 ) -> Result<Table, TableError> {
     let levels =
         |_: &[&JudgedZone], zone: &JudgedZone, material: &Material| material.pairs(zone, edge, levels);
-    describe(folders, descriptor, Evidence::Reference, levels, on_zone)
+    describe(corpora, descriptor, Evidence::Reference, levels, on_zone)
 }
 
 fn describe(
-    folders: &[PathBuf],
-    descriptor: Descriptor,
+    corpora: Corpora<'_>,
+    descriptor: &Descriptor,
     evidence: Evidence,
     levels: impl Fn(&[&JudgedZone], &JudgedZone, &Material) -> Result<Vec<Shown>, TableError> + Sync,
     mut on_zone: impl FnMut(usize, usize),
 ) -> Result<Table, TableError> {
-    let corpora: Vec<Corpus> = folders.iter().map(Corpus::open).collect::<Result<_, _>>()?;
-    let all: usize = corpora.iter().map(|c| c.zones().len()).sum();
+    let opened: Vec<Corpus> = corpora.folders.iter().map(Corpus::open).collect::<Result<_, _>>()?;
+    let all: usize = opened.iter().map(|c| c.zones().len()).sum();
     let mut zones = Vec::with_capacity(all);
-    for corpus in &corpora {
+    for corpus in &opened {
         for scene in corpus.scenes() {
             on_zone(zones.len(), all);
             let images: Vec<Image> = corpus.scene_levels(scene)?.collect::<Result<_, _>>()?;
@@ -80,7 +96,8 @@ fn describe(
             let describe = |(i, zone): (usize, &&JudgedZone)| {
                 let images: Vec<&Image> = images.iter().filter(|i| i.zone == zone.zone).collect();
                 let material = Material::of(zone, &images, references.as_ref().map(|r| &r[i]))?;
-                describe_zone(zone, levels(&of_scene, zone, &material)?, descriptor)
+                let group = (corpora.group_of)(&zone.scene);
+                describe_zone(zone, group, levels(&of_scene, zone, &material)?, descriptor)
             };
             let described = of_scene.par_iter().enumerate().map(describe).collect::<Result<Vec<_>, _>>()?;
             zones.extend(in_picture(described, descriptor));
@@ -88,7 +105,7 @@ fn describe(
     }
     on_zone(all, all);
     let tone_mapping = ToneMapping::Srgb { exposure: 1.0 };
-    Ok(Table { descriptor, evidence, tone_mapping, zones, answers: Vec::new() })
+    Ok(Table { descriptor: descriptor.clone(), evidence, tone_mapping, zones, answers: Vec::new() })
 }
 
 /// The levels that are synthesised for each zone of a scene, in samples per pixel.
@@ -112,18 +129,19 @@ struct Alone {
 /// A zone, of which the levels are still to come, and these.
 fn describe_zone(
     zone: &JudgedZone,
+    group: &str,
     shown: Vec<Shown>,
-    descriptor: Descriptor,
+    descriptor: &Descriptor,
 ) -> Result<(Zone, Vec<Alone>), TableError> {
     let mut levels = Vec::with_capacity(shown.len());
     for (spp, origin, planes) in shown {
-        let described = descriptor.describe(&planes, spp).map_err(|e| does_not_fit(zone, e))?;
+        let described = descriptor.describe_tile(&planes, spp).map_err(|e| does_not_fit(zone, e))?;
         levels.push(Alone { spp, origin, noise: noise_level(&planes), described });
     }
     levels.sort_by(|a, b| a.spp.total_cmp(&b.spp));
     let zone = Zone {
         scene: zone.scene.clone(),
-        group: group_of_scene(&zone.scene).to_owned(),
+        group: group.to_owned(),
         zone: zone.zone,
         human_spp: zone.human_spp,
         censored: zone.censored,
@@ -135,7 +153,7 @@ fn describe_zone(
 }
 
 /// Sees each level of each zone of one scene beside the same level of the other zones.
-fn in_picture(zones: Vec<(Zone, Vec<Alone>)>, descriptor: Descriptor) -> Vec<Zone> {
+fn in_picture(zones: Vec<(Zone, Vec<Alone>)>, descriptor: &Descriptor) -> Vec<Zone> {
     let (mut zones, levels): (Vec<Zone>, Vec<Vec<Alone>>) = zones.into_iter().unzip();
     // Of equal samples, the first belongs to the first of other zones: realisations of the noise come in one order.
     let mut pictures: BTreeMap<(u64, bool, usize), Vec<(usize, Alone)>> = BTreeMap::new();

@@ -38,12 +38,12 @@ fn lisic9_is_read() {
     let mut stack = StackSource::open(dir.join("Selles")).unwrap();
     let (tile, mut sum, mut first) = (TileGrid::new(800, 800, 128).unwrap().tile(10), 0.0, 0);
     loop {
-        let batch = stack.sample(&[Request { tile, first, samples: 100 }]).unwrap().remove(0);
-        if batch.samples == 0 {
+        let batch = stack.sample(&[Request { tile, first, spp: 100 }]).unwrap().remove(0);
+        if batch.spp == 0 {
             break;
         }
-        sum += f64::from(batch.samples) * f64::from(batch.mean[77][1]);
-        first += u64::from(batch.samples);
+        sum += batch.spp as f64 * f64::from(batch.mean[77][1]);
+        first += u64::from(batch.spp);
     }
     assert_eq!(first, 3100);
     let last = noisefloor_image::read_picture(dir.join("Selles/03100.png")).unwrap().into_linear();

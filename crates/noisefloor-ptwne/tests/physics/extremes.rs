@@ -5,12 +5,12 @@ use noisefloor::ProgressiveSource;
 use noisefloor_ptwne::{Emission, Environment, Material, Mesh, Ptwne, RenderOptions, Scene, Sun, scenes};
 use std::sync::Arc;
 
-fn check(scene: Scene, samples: u32) {
+fn check(scene: Scene, samples: u64) {
     let scene = Arc::new(scene);
     let mut source = Ptwne::new(scene.clone(), 32, 32, RenderOptions::default()).unwrap();
     let mut all = batch(&mut source, 0, samples);
     let counts = source.counts();
-    assert_eq!((counts.samples, counts.dropped, counts.clamped), (32 * 32 * u64::from(samples), 0, 0));
+    assert_eq!((counts.samples, counts.dropped, counts.clamped), (32 * 32 * samples, 0, 0));
     // References take thousands of samples per pixel where light is hard to find
     let mut small = Ptwne::new(scene, 16, 16, RenderOptions::default()).unwrap();
     all.extend(small.reference().unwrap().unwrap().pixels);

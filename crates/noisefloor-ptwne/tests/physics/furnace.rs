@@ -56,7 +56,7 @@ fn lossless_balls_cannot_be_seen() {
 }
 
 /// The directional albedo of a plane, seen at an angle from its normal, and its standard error.
-fn albedo(material: Material, degrees: f32, samples: u32) -> (f64, f64) {
+fn albedo(material: Material, degrees: f32, samples: u64) -> (f64, f64) {
     let (sin, cos) = degrees.to_radians().sin_cos();
     let camera = look([4.0 * sin, 4.0 * cos, 0.0], [0.0; 3], [0.0, 0.1, 1.0], 0.5);
     let scene = scene(camera, |b| {

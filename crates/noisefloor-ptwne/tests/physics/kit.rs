@@ -14,11 +14,11 @@ pub(crate) fn scene(camera: Camera, fill: impl FnOnce(&mut SceneBuilder)) -> Sce
 }
 
 /// One batch of the whole image.
-pub(crate) fn batch(source: &mut Ptwne, first: u64, samples: u32) -> Vec<Rgb> {
+pub(crate) fn batch(source: &mut Ptwne, first: u64, samples: u64) -> Vec<Rgb> {
     let (width, height) = (source.info().width, source.info().height);
     let tile = Tile { index: 0, x: 0, y: 0, width, height };
-    let mut batches = source.sample(&[Request { tile, first, samples }]).unwrap();
-    assert_eq!((batches.len(), batches[0].samples), (1, samples));
+    let mut batches = source.sample(&[Request { tile, first, spp: samples }]).unwrap();
+    assert_eq!((batches.len(), batches[0].spp), (1, samples));
     batches.remove(0).mean
 }
 
@@ -27,14 +27,14 @@ pub(crate) fn mean(
     scene: Scene,
     size: usize,
     batches: u64,
-    samples: u32,
+    samples: u64,
     channel: usize,
     options: RenderOptions,
 ) -> (f64, f64) {
     let mut source = Ptwne::new(scene, size, size, options).unwrap();
     let means: Vec<f64> = (0..batches)
         .map(|i| {
-            let pixels = batch(&mut source, i * u64::from(samples), samples);
+            let pixels = batch(&mut source, i * samples, samples);
             pixels.iter().map(|p| f64::from(p[channel])).sum::<f64>() / pixels.len() as f64
         })
         .collect();

@@ -11,7 +11,7 @@ const SEEDS: u64 = 3;
 const BATCHES: u64 = 64;
 
 /// Mean of green over each part, with its standard error, from batches of `SEEDS` seeds.
-fn parts(name: &str, estimator: Estimator, samples: u32) -> [(f64, f64); PARTS] {
+fn parts(name: &str, estimator: Estimator, samples: u64) -> [(f64, f64); PARTS] {
     let mut means = vec![];
     for seed in 0..SEEDS {
         // No two renders share random numbers
@@ -19,7 +19,7 @@ fn parts(name: &str, estimator: Estimator, samples: u32) -> [(f64, f64); PARTS] 
             RenderOptions { estimator, seed: 3 * seed + estimator as u64, ..RenderOptions::default() };
         let mut source = Ptwne::new(scenes::by_name(name).unwrap(), SIZE, SIZE, options).unwrap();
         means.extend((0..BATCHES).map(|i| {
-            let pixels = batch(&mut source, i * u64::from(samples), samples);
+            let pixels = batch(&mut source, i * samples, samples);
             let mut sums = [0.0; PARTS];
             for (i, pixel) in pixels.iter().enumerate() {
                 sums[i / SIZE / PART * (SIZE / PART) + i % SIZE / PART] += f64::from(pixel[1]);

@@ -21,7 +21,7 @@ fn near(mut maker: Maker) -> Maker {
     maker
 }
 
-fn mean(maker: &Maker, samples: u32, max_depth: u32) -> Rgb {
+fn mean(maker: &Maker, samples: u64, max_depth: u32) -> Rgb {
     let pixels = render(maker.load().unwrap(), 8, samples, max_depth);
     std::array::from_fn(|c| pixels.iter().map(|p| p[c]).sum::<f32>() / 64.0)
 }

@@ -41,7 +41,7 @@ fn tile(index: usize, x: usize, y: usize, width: usize, height: usize) -> Tile {
     Tile { index, x, y, width, height }
 }
 
-fn expected(tile: &Tile, samples: u32) -> Vec<[f32; 3]> {
+fn expected(tile: &Tile, samples: u64) -> Vec<[f32; 3]> {
     let rows = tile.y..tile.y + tile.height;
     let pixel = |x: usize, y: usize| [x as f32, y as f32, samples as f32];
     rows.flat_map(|y| (tile.x..tile.x + tile.width).map(move |x| pixel(x, y))).collect()
@@ -63,10 +63,10 @@ fn a_command_that_aims_renders_tiles() {
         let info = source.info();
         assert_eq!((info.width, info.height, info.aims), (SIZE.0, SIZE.1, true));
         let requests = [(tile(4, 3, 5, 7, 6), 9), (tile(0, 0, 0, 20, 12), 2), (tile(4, 3, 5, 7, 6), 9)]
-            .map(|(tile, samples)| Request { tile, first: 0, samples });
+            .map(|(tile, samples)| Request { tile, first: 0, spp: samples });
         for (request, batch) in requests.iter().zip(source.sample(&requests).unwrap()) {
-            assert_eq!((batch.tile, batch.samples), (request.tile, request.samples));
-            assert_eq!(batch.mean, expected(&request.tile, request.samples), "{how}");
+            assert_eq!((batch.tile, batch.spp), (request.tile, request.spp));
+            assert_eq!(batch.mean, expected(&request.tile, request.spp), "{how}");
         }
         // Every run has a seed of its own, also for the same tile
         let seeds: HashSet<_> =
@@ -83,9 +83,9 @@ fn a_command_that_cannot_aim_renders_all_tiles_at_once() {
     let info = source.info();
     assert_eq!((info.width, info.height, info.aims), (SIZE.0, SIZE.1, false));
     let tiles: Vec<_> = TileGrid::new(SIZE.0, SIZE.1, 16).unwrap().tiles().collect();
-    let requests: Vec<_> = tiles.iter().map(|&tile| Request { tile, first: 0, samples: 5 }).collect();
+    let requests: Vec<_> = tiles.iter().map(|&tile| Request { tile, first: 0, spp: 5 }).collect();
     for batch in source.sample(&requests).unwrap() {
-        assert_eq!((batch.samples, batch.mean), (5, expected(&batch.tile, 5)));
+        assert_eq!((batch.spp, batch.mean), (5, expected(&batch.tile, 5)));
     }
     // One run for the size, one for all tiles
     let samples: Vec<_> =
@@ -134,7 +134,7 @@ fn failures_are_told_with_the_last_words() {
         (options.size, options.timeout) = (Some(SIZE), timeout);
         let mut source = CommandSource::new(&template(python, folder.path(), &more), options).unwrap();
         let tile = tile(2, 4, 4, 4, 4);
-        let error = source.sample(&[Request { tile, first: 0, samples: 1 }]).unwrap_err();
+        let error = source.sample(&[Request { tile, first: 0, spp: 1 }]).unwrap_err();
         let SourceError::Failed { tile: Some(2), cause, .. } = &error else { panic!("{error:?}") };
         assert!(cause.to_string().contains(words), "{how}: {cause}");
     }

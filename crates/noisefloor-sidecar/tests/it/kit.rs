@@ -77,20 +77,20 @@ pub(crate) fn tiles() -> Vec<Tile> {
     TileGrid::new(SIZE.0, SIZE.1, 32).unwrap().tiles().collect()
 }
 
-pub(crate) fn requests(first: u64, samples: u32) -> Vec<Request> {
-    tiles().into_iter().map(|tile| Request { tile, first, samples }).collect()
+pub(crate) fn requests(first: u64, samples: u64) -> Vec<Request> {
+    tiles().into_iter().map(|tile| Request { tile, first, spp: samples }).collect()
 }
 
 /// What fake_host.py renders.
 pub(crate) fn expected(seed: u64, request: &Request) -> Vec<Rgb> {
-    let Request { tile, first, samples } = *request;
+    let Request { tile, first, spp: samples } = *request;
     let value = |x: usize, y: usize, s: u64, c: usize| {
         let mixed = (seed * 31 + x as u64 * 7 + y as u64 * 13 + s * 17 + c as u64 * 5) % 97;
         mixed as f64 / 97.0
     };
     let mean = |x, y, c| {
-        let sum: f64 = (first..first + u64::from(samples)).map(|s| value(x, y, s, c)).sum();
-        (sum / f64::from(samples)) as f32
+        let sum: f64 = (first..first + samples).map(|s| value(x, y, s, c)).sum();
+        (sum / samples as f64) as f32
     };
     let pixels =
         (tile.y..tile.y + tile.height).flat_map(|y| (tile.x..tile.x + tile.width).map(move |x| (x, y)));

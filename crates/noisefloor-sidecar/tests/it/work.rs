@@ -17,7 +17,7 @@ fn samples_come_as_they_were_rendered() {
         let batches = source.sample(&requests).unwrap();
         assert_eq!(batches.len(), requests.len());
         for (request, batch) in requests.iter().zip(&batches) {
-            assert_eq!((batch.tile, batch.samples), (request.tile, samples));
+            assert_eq!((batch.tile, batch.spp), (request.tile, samples));
             assert_eq!(batch.mean, expected(5, request));
         }
     }
@@ -38,7 +38,7 @@ fn what_is_asked_for_reaches_the_renderer() {
     assert_eq!(source.warnings(), ["max_depth 4, threads 2"]);
     assert_eq!((source.info().width, source.info().height), (33, 17));
     let tile = Tile { index: 0, x: 1, y: 2, width: 5, height: 3 };
-    let request = Request { tile, first: 0, samples: 1 };
+    let request = Request { tile, first: 0, spp: 1 };
     let mean = source.sample(&[request]).unwrap().remove(0).mean;
     // Seeds go through JSON whole: 64 bits, where a double has 53
     let seed = ((u128::from(u64::MAX / 31) * 31) % 97) as u64;
@@ -61,7 +61,7 @@ fn many_tiles_are_several_calls() {
     let Some(fake) = Fake::new("work") else { return };
     let tile = |i: usize| Tile { index: i, x: i % SIZE.0, y: i / SIZE.0 % SIZE.1, width: 1, height: 1 };
     let requests: Vec<Request> =
-        (0..10_000).map(|i| Request { tile: tile(i), first: i as u64, samples: 1 }).collect();
+        (0..10_000).map(|i| Request { tile: tile(i), first: i as u64, spp: 1 }).collect();
     let batches = fake.open().unwrap().sample(&requests).unwrap();
     assert!(batches.iter().zip(&requests).all(|(b, r)| b.mean == expected(5, r)));
     assert_eq!(batches.len(), requests.len());
@@ -73,7 +73,7 @@ fn an_exhausted_tile_has_no_samples() {
     let mut source = fake.open().unwrap();
     source.sample(&requests(0, 1)).unwrap();
     let batches = source.sample(&requests(1, 1)).unwrap();
-    assert_eq!(batches.iter().map(|b| (b.samples, b.mean.len())).collect::<Vec<_>>(), {
+    assert_eq!(batches.iter().map(|b| (b.spp, b.mean.len())).collect::<Vec<_>>(), {
         let pixels: Vec<_> = tiles().iter().map(Tile::pixels).collect();
         [(1, pixels[0]), (0, 0), (1, pixels[2]), (1, pixels[3])]
     });

@@ -3,7 +3,7 @@
 
 use crate::error::StoreError;
 use crate::store::{now_ms, settle};
-use noisefloor::{Descriptor, Evidence};
+use noisefloor::{Descriptor, DescriptorSpec, Evidence};
 use noisefloor_learn::Answer;
 use rusqlite::{Connection, OpenFlags, OptionalExtension, Row, params};
 use serde::Serialize;
@@ -53,7 +53,7 @@ pub struct TileAnswer {
     /// Digest of the model.
     pub model: String,
     /// The descriptor computed for the tile.
-    pub descriptor: Descriptor,
+    pub descriptor: DescriptorSpec,
     /// Version of the descriptor.
     pub descriptor_version: u16,
     /// What the tile was compared with.
@@ -82,9 +82,9 @@ impl TileAnswer {
     }
 
     /// Whether the answer can be trained on together with a table of this kind.
-    pub fn fits(&self, descriptor: Descriptor, evidence: Evidence) -> bool {
-        (self.descriptor, self.descriptor_version, self.evidence)
-            == (descriptor, descriptor.version(), evidence)
+    pub fn fits(&self, descriptor: &Descriptor, evidence: Evidence) -> bool {
+        (&self.descriptor, self.descriptor_version, self.evidence)
+            == (&descriptor.spec(), descriptor.version(), evidence)
     }
 }
 

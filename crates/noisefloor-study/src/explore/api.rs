@@ -14,7 +14,7 @@ use axum::extract::{Path, State};
 use axum::http::header::{CONTENT_LENGTH, CONTENT_TYPE};
 use axum::http::{HeaderMap, StatusCode};
 use axum::response::{IntoResponse, Response};
-use noisefloor::{Audience, Evidence, Samples};
+use noisefloor::{Audience, Evidence, Samples, Threshold};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 use std::time::Duration;
@@ -68,7 +68,7 @@ struct StateView {
     tile: usize,
     /// `nested`, `independent`, or null to detect it from the pictures.
     samples: Option<&'static str>,
-    threshold: f32,
+    threshold: Threshold,
     audience: [f64; 2],
     art_students: [f64; 2],
     model: ModelView,
@@ -104,8 +104,8 @@ pub(crate) async fn state(State(app): Shared) -> Answer {
         art_students: [students.slope, students.offset],
         model: ModelView {
             digest: setup.model.digest(),
-            corpus: setup.model.record.corpus.clone(),
-            evidence: setup.model.evidence,
+            corpus: setup.model.record().corpus.clone(),
+            evidence: setup.model.evidence(),
         },
         retrained: app.job().model().is_some(),
         disagreements,

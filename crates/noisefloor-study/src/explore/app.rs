@@ -15,7 +15,7 @@ pub struct ExploreSetup {
     /// The model that judges.
     pub model: Model,
     /// Initial probability from which a tile counts as converged.
-    pub threshold: f32,
+    pub threshold: noisefloor::Threshold,
     /// Initial audience.
     pub audience: Audience,
     /// Initial tile edge in pixels, 16…512.
@@ -33,7 +33,7 @@ impl ExploreSetup {
     pub fn new(database: impl AsRef<Path>) -> Self {
         Self {
             model: Model::bundled(),
-            threshold: noisefloor::DEFAULT_THRESHOLD,
+            threshold: noisefloor::Threshold::PAPER,
             audience: Audience::TRAINED,
             tile: DEFAULT_TILE,
             database: database.as_ref().to_owned(),

@@ -14,7 +14,7 @@ use axum::extract::{Path, State};
 use axum::http::StatusCode;
 use axum::http::header::{CONTENT_DISPOSITION, CONTENT_TYPE};
 use axum::response::{IntoResponse, Response};
-use noisefloor::Model;
+use noisefloor::{Model, Threshold};
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
 
@@ -25,7 +25,7 @@ fn model(app: &App, retrained: bool) -> Result<Model, Refusal> {
     }
     let model = app.job().model().cloned().ok_or_else(|| gone("retrained"))?;
     let given = &app.setup.model;
-    if (model.descriptor, model.evidence) != (given.descriptor, given.evidence) {
+    if (model.descriptor(), model.evidence()) != (given.descriptor(), given.evidence()) {
         let what =
             "the retrained model goes by another descriptor or evidence than the one this was started with";
         return Err(refuse(what, "retrained", "save it, and start again with --model"));
@@ -35,8 +35,12 @@ fn model(app: &App, retrained: bool) -> Result<Model, Refusal> {
 
 fn judge(app: &App, question: &Question) -> Result<Judge, Refusal> {
     let model = model(app, question.retrained)?;
-    let made = Judge::new(model, question.threshold, question.audience);
+    let made = Judge::new(model, threshold(question.threshold)?, question.audience);
     made.map_err(|what| refuse(what, "threshold", "P lies between 0 and 1, an audience line rises"))
+}
+
+fn threshold(p: f32) -> Result<Threshold, Refusal> {
+    Threshold::new(p).map_err(|_| refuse("P lies between 0 and 1", "threshold", "move the slider"))
 }
 
 /// `POST /api/verdicts`
@@ -100,7 +104,7 @@ pub(crate) async fn disagree(State(app): Shared, body: Body) -> Answer {
         threshold: question.threshold,
         audience: question.audience,
         model: judge.oracle.model().digest(),
-        descriptor,
+        descriptor: descriptor.spec(),
         descriptor_version: descriptor.version(),
         evidence,
         numbers,
@@ -132,10 +136,7 @@ struct Retraining {
 
 /// `POST /api/retrain`
 pub(crate) async fn retrain(State(app): Shared, body: Body) -> Answer {
-    let Retraining { threshold } = read_json(body).await?;
-    if !(threshold > 0.0 && threshold < 1.0) {
-        return Err(refuse("P lies between 0 and 1", "threshold", "move the slider"));
-    }
+    let at = threshold(read_json::<Retraining>(body).await?.threshold)?;
     let Some(table) = app.setup.table.clone() else {
         let do_ = "start `noisefloor explore --table FILE`, with the project's fixtures/human-table.csv or a table \
             written by `train --save-table`";
@@ -147,7 +148,7 @@ pub(crate) async fn retrain(State(app): Shared, body: Body) -> Answer {
         kept.all()
     });
     let all = all.await?;
-    let fitting = all.iter().filter(|d| d.said.fits(table.descriptor, table.evidence));
+    let fitting = all.iter().filter(|d| d.said.fits(&table.descriptor, table.evidence));
     let answers: Vec<_> = fitting.map(|d| d.said.answer()).collect();
     if answers.is_empty() {
         return Err(refuse(
@@ -164,7 +165,7 @@ pub(crate) async fn retrain(State(app): Shared, body: Body) -> Answer {
         }
         *job = Job::Running(LearnStep { done: 0, of: 1, doing: "beginning".into() });
     }
-    job::begin(app.job.clone(), table, answers, app.setup.model.clone(), threshold);
+    job::begin(app.job.clone(), table, answers, app.setup.model.clone(), at);
     Ok((StatusCode::ACCEPTED, Json(app.job().view())).into_response())
 }
 

@@ -1,7 +1,7 @@
 //! Retraining in the background, one job at a time.
 
 use super::learn::{LearnStep, Learned, retrain};
-use noisefloor::Model;
+use noisefloor::{Model, Threshold};
 use noisefloor_learn::Answer;
 use noisefloor_learn::Table;
 use noisefloor_learn::TrainParams;
@@ -50,11 +50,17 @@ impl Job {
 }
 
 /// Starts retraining. The caller marks the job as running first.
-pub(crate) fn begin(job: Arc<Mutex<Job>>, table: Table, answers: Vec<Answer>, model: Model, threshold: f32) {
+pub(crate) fn begin(
+    job: Arc<Mutex<Job>>,
+    table: Table,
+    answers: Vec<Answer>,
+    model: Model,
+    threshold: Threshold,
+) {
     let set = move |to: Job| *job.lock().unwrap_or_else(PoisonError::into_inner) = to;
     // The model's corpus names this table only if their digests agree
-    let corpus = if model.record.table_digest == table.digest() {
-        model.record.corpus.clone()
+    let corpus = if model.record().table_digest == table.digest() {
+        model.record().corpus.clone()
     } else {
         format!("a table of {}", table.scenes().join(", "))
     };

@@ -1,6 +1,6 @@
 //! Retraining on disagreements, and what that costs and gains.
 
-use noisefloor::{DEFAULT_THRESHOLD, Model, Scores};
+use noisefloor::{Model, Scores, Threshold};
 use noisefloor_learn::{Answer, TrainError, TrainParams, leave_answers_out, leave_one_scene_out, train};
 use noisefloor_learn::{Table, score};
 use serde::Serialize;
@@ -58,17 +58,17 @@ pub fn retrain(
     table: &Table,
     answers: Vec<Answer>,
     params: &TrainParams,
-    (model, threshold): (&Model, f32),
+    (model, threshold): (&Model, Threshold),
     corpus: &str,
     mut on_step: impl FnMut(LearnStep),
 ) -> Result<(Model, Learned), TrainError> {
     let plain = Table { answers: Vec::new(), ..table.clone() };
     let told = Table { answers, ..plain.clone() };
     let (groups, scenes) = (plain.groups().len(), told.answer_groups().len());
-    let known =
-        Some(model).filter(|m| m.record.table_digest == plain.digest() && *params == TrainParams::default());
+    let known = Some(model)
+        .filter(|m| m.record().table_digest == plain.digest() && *params == TrainParams::default());
     let scored = groups >= 3;
-    let known_scores = known.and_then(|m| m.record.leave_one_scene_out);
+    let known_scores = known.and_then(|m| m.record().leave_one_scene_out);
     let folds = if scored { groups } else { 0 };
     let of = folds * (1 + usize::from(known_scores.is_none())) + usize::from(known.is_none()) + scenes + 1;
     let mut done = 0;
@@ -82,7 +82,7 @@ pub fn retrain(
             return Ok(None);
         }
         let on_fold = |group: &str| step(format!("{what}: {group} left out"));
-        let predictions = leave_one_scene_out(table, params, DEFAULT_THRESHOLD, on_fold)?;
+        let predictions = leave_one_scene_out(table, params, Threshold::PAPER, on_fold)?;
         Ok(Some(score(predictions.iter())))
     };
     let before = match known_scores {

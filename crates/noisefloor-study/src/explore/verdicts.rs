@@ -2,8 +2,8 @@
 
 use super::gallery::{Gallery, GalleryError, GalleryPicture};
 use noisefloor::{
-    Audience, Described, Descriptor, Evidence, Held, Model, Oracle, Rgb, Samples, Still, TileGrid,
-    ToneMapping, Verdict,
+    Audience, Described, Descriptor, Evidence, Model, Oracle, Rgb, Samples, SnapshotPair, Still, Threshold,
+    TileGrid, ToneMapping, Verdict,
 };
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
@@ -55,11 +55,17 @@ fn describe(gallery: &Gallery, id: &str, model: &Model) -> Result<Tiles, Gallery
     let spp = picture.spp().ok_or_else(|| GalleryError::NoSamples(picture.name.clone()))?;
     let others: Vec<&Still> =
         gallery.pictures.iter().filter(|p| p.id != id && p.counted).map(|p| &*p.still).collect();
-    let held = Held::new(model.evidence, &picture.still, &others, ToneMapping::default(), gallery.samples)?;
+    let held = SnapshotPair::new(
+        model.evidence(),
+        &picture.still,
+        &others,
+        ToneMapping::default(),
+        gallery.samples,
+    )?;
     let (width, height) = picture.still.size;
     let grid = TileGrid::new(width, height, gallery.tile)?;
     // The threshold affects verdicts only
-    let oracle = Oracle::new(model.clone(), noisefloor::DEFAULT_THRESHOLD).map_err(|_| GalleryError::Gone)?;
+    let oracle = Oracle::new(model.clone(), Threshold::PAPER);
     let described = held.describe(&oracle, grid)?;
     let noise = oracle.map_visible_noise(grid, |tile| held.planes(tile).map(Some))?;
     Ok(Tiles { grid, spp, samples: held.samples(), described, shown: held.shown(), noise })
@@ -123,19 +129,19 @@ pub(crate) struct Judge {
 
 impl Judge {
     /// Errors name the value out of range.
-    pub(crate) fn new(model: Model, threshold: f32, [slope, offset]: [f64; 2]) -> Result<Self, String> {
+    pub(crate) fn new(model: Model, threshold: Threshold, [slope, offset]: [f64; 2]) -> Result<Self, String> {
         let sound = (0.0..=100.0).contains(&slope) && (-1e9..=1e9).contains(&offset);
         if !sound {
             return Err(format!("the audience line T' = {slope} T + {offset} needs a slope of 0 to 100"));
         }
-        let audience = model.audience.then(Audience { slope, offset });
-        Ok(Self { oracle: Oracle::new(model, threshold).map_err(|e| e.to_string())?, audience })
+        let audience = model.audience().then(Audience { slope, offset });
+        Ok(Self { oracle: Oracle::new(model, threshold), audience })
     }
 
     pub(crate) fn verdicts(&self, tiles: &Tiles) -> Result<Vec<Verdict>, String> {
         let verdicts = self.oracle.judge_described_for(&tiles.described, self.audience);
         verdicts.ok_or_else(|| {
-            let name = self.oracle.model().descriptor.name();
+            let name = self.oracle.model().descriptor().name();
             format!(
                 "a model with the {name} descriptor cannot follow an audience; use the compact descriptor"
             )
@@ -144,12 +150,12 @@ impl Judge {
 
     /// The raw descriptor of a tile in its picture.
     pub(crate) fn numbers(&self, tiles: &Tiles, tile: usize) -> Option<Vec<f32>> {
-        self.oracle.model().descriptor.in_picture(&tiles.described).into_iter().nth(tile)
+        self.oracle.model().descriptor().in_picture(&tiles.described).into_iter().nth(tile)
     }
 
-    pub(crate) fn kind(&self) -> (Descriptor, Evidence) {
+    pub(crate) fn kind(&self) -> (&Descriptor, Evidence) {
         let model = self.oracle.model();
-        (model.descriptor, model.evidence)
+        (model.descriptor(), model.evidence())
     }
 
     pub(crate) fn view(
@@ -168,7 +174,7 @@ impl Judge {
                 height,
                 probability: verdict.probability.unwrap_or(0.0),
                 converged: verdict.converged,
-                expected_spp: verdict.expected_samples,
+                expected_spp: verdict.expected_spp,
                 unfamiliar: verdict.unfamiliar,
                 said: said.get(&[x, y, width, height]).cloned(),
             }

@@ -1,7 +1,7 @@
 use crate::explore::table;
 use crate::kit::{Running, Served, levels, stack};
-use noisefloor::{DEFAULT_THRESHOLD, Descriptor, Evidence};
-use noisefloor_learn::describe_corpora;
+use noisefloor::{Descriptor, Evidence, Threshold};
+use noisefloor_learn::{Corpora, describe_corpora};
 use noisefloor_learn::{TrainParams, train};
 use noisefloor_learn::{predict, score};
 use noisefloor_study::analysis::CorpusThreshold;
@@ -218,11 +218,17 @@ fn simulated_observers_drive_the_pages_and_a_model_learns_from_them() {
     // Of the corpus, a model.
     let out = dir.path().join("out");
     write(&out, &study, &report, CorpusThreshold::Level95).unwrap();
-    let table =
-        describe_corpora(&[out.join("corpus")], Descriptor::default(), Evidence::Halves, |_, _| ()).unwrap();
+    let table = describe_corpora(
+        Corpora::new(&[out.join("corpus")]),
+        &Descriptor::default(),
+        Evidence::Halves,
+        |_, _| (),
+    )
+    .unwrap();
     assert_eq!((table.groups().len(), table.zones.len()), (2, 8));
     let model = train(&table, &TrainParams::default(), "simulated".into(), None).unwrap();
-    let learned: Vec<_> = table.zones.iter().map(|z| predict(&model, DEFAULT_THRESHOLD, z)).collect();
+    let learned: Vec<_> =
+        table.zones.iter().map(|z| predict(|raw| model.judge(raw), Threshold::PAPER, z)).collect();
     let scores = score(learned.iter());
     println!("{scores:?}");
     assert!(scores.error_factor < 1.6, "{scores:?}");

@@ -1,5 +1,8 @@
 use crate::kit::{Picturing, Served, stack};
-use noisefloor::{Descriptor, Evidence, Held, Model, Oracle, Samples, Still, TileGrid, ToneMapping};
+use noisefloor::{
+    Descriptor, Evidence, Model, ModelParts, Oracle, Samples, SnapshotPair, Still, Threshold, TileGrid,
+    ToneMapping,
+};
 use noisefloor_image::read_picture;
 use noisefloor_learn::{Level, Origin, Table, Zone};
 use noisefloor_study::explore::{Disagreements, ExploreSetup, read_answers, retrain};
@@ -30,10 +33,11 @@ fn judged(
     let still = |i: usize| read_picture(&paths[i]).unwrap().into_still(spp[i]);
     let stills: Vec<Still> = (0..paths.len()).map(still).collect();
     let others: Vec<&Still> = (0..paths.len()).filter(|&i| i != at).map(|i| &stills[i]).collect();
-    let held = Held::new(Evidence::Halves, &stills[at], &others, ToneMapping::default(), None).unwrap();
+    let held =
+        SnapshotPair::new(Evidence::Halves, &stills[at], &others, ToneMapping::default(), None).unwrap();
     let oracle = Oracle::bundled();
     let described = held.describe(&oracle, TileGrid::new(128, 64, 64).unwrap()).unwrap();
-    let numbers = oracle.model().descriptor.in_picture(&described);
+    let numbers = oracle.model().descriptor().in_picture(&described);
     (numbers, oracle.judge_described(&described), held.samples())
 }
 
@@ -55,7 +59,7 @@ fn verdicts_and_descriptors_are_those_of_judge() {
         for (tile, verdict) in said["tiles"].as_array().unwrap().iter().zip(&verdicts) {
             assert_eq!(tile["probability"].as_f64().unwrap() as f32, verdict.probability.unwrap());
             assert_eq!(tile["converged"], verdict.converged);
-            assert_eq!(tile["expected_spp"].as_u64(), verdict.expected_samples);
+            assert_eq!(tile["expected_spp"].as_u64(), verdict.expected_spp);
         }
         let (status, kept) = server.post(
             "/api/disagreements",
@@ -69,8 +73,8 @@ fn verdicts_and_descriptors_are_those_of_judge() {
         assert_eq!((last.tile, last.sees_noise), ([64, 0, 64, 64], verdicts[1].converged));
         assert_eq!((last.model.clone(), last.evidence), (Model::bundled().digest(), Evidence::Halves));
         assert!(
-            last.fits(Descriptor::default(), Evidence::Halves)
-                && !last.fits(Descriptor::default(), Evidence::Alone)
+            last.fits(&Descriptor::default(), Evidence::Halves)
+                && !last.fits(&Descriptor::default(), Evidence::Alone)
         );
     }
     // Pictures are those of the files, and maps are there.
@@ -166,7 +170,8 @@ fn a_single_picture_is_told_what_is_missing() {
     assert!(said["what"].as_str().unwrap().contains("converged reference"), "{said}");
     assert!(said["what_to_do"].as_str().unwrap().contains("--evidence alone"), "{said}");
 
-    let model = Model { evidence: Evidence::Alone, ..Model::bundled() };
+    let parts = ModelParts { evidence: Evidence::Alone, ..Model::bundled().into_parts() };
+    let model = Model::new(parts).unwrap();
     let server = Served::explorer(ExploreSetup { pictures: one(), model, ..setup(dir.path()) });
     let (status, said) = server.post("/api/verdicts", &question(&picture));
     assert_eq!(status, 200, "{said}");
@@ -341,7 +346,7 @@ fn retraining_moves_p_and_says_what_it_costs() {
     let (bundled, params) = (Model::bundled(), Default::default());
     // Another table than the bundled model's is not called by its name.
     let corpus = format!("a table of {}", table().scenes().join(", "));
-    assert!(model.record.corpus.starts_with(&corpus), "{}", model.record.corpus);
-    let again = retrain(&table(), answers, &params, (&bundled, 0.9), &corpus, |_| ()).unwrap();
+    assert!(model.record().corpus.starts_with(&corpus), "{}", model.record().corpus);
+    let again = retrain(&table(), answers, &params, (&bundled, Threshold::PAPER), &corpus, |_| ()).unwrap();
     assert_eq!(again.0.digest(), model.digest());
 }

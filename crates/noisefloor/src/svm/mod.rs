@@ -1,7 +1,10 @@
 //! Support vector machine: prediction here; training behind the feature `train`.
 
+mod classifier;
 #[cfg(feature = "train")]
 mod gram;
+#[cfg(feature = "train")]
+mod params;
 mod platt;
 mod predict;
 #[cfg(feature = "train")]
@@ -9,11 +12,13 @@ mod solver;
 #[cfg(feature = "train")]
 mod train;
 
+pub use classifier::Classifier;
 pub use platt::Platt;
 pub use predict::{Scaler, Svm};
 #[cfg(feature = "train")]
 pub use {
     gram::squared_distances,
+    params::{SvmParams, SvmTrainError},
     solver::{Weights, fit_weights},
-    train::{SvmParams, SvmTrainError, fit_platt, fit_svm},
+    train::{fit_platt, fit_svm},
 };

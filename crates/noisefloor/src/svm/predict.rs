@@ -34,6 +34,13 @@ impl Scaler {
         Self { mean, scale }
     }
 
+    /// A scaled copy of a descriptor.
+    pub fn scaled(&self, descriptor: &[f32]) -> Vec<f32> {
+        let mut scaled = descriptor.to_vec();
+        self.apply(&mut scaled);
+        scaled
+    }
+
     /// Scales a descriptor in place.
     pub fn apply(&self, descriptor: &mut [f32]) {
         for ((value, mean), scale) in descriptor.iter_mut().zip(&self.mean).zip(&self.scale) {

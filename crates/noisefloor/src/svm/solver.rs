@@ -3,7 +3,7 @@
 //! linfa-svm computes its kernel matrix from rows, one scalar after another in one thread, and takes no other: neither its kernel trait
 //! nor its fitting functions are public. For the paper's descriptor, 9,600 rows of 32,768 numbers, that would take hours a machine.
 
-use super::train::{LIGHTEST, SOLVER_EPS, SvmParams, SvmTrainError, check};
+use super::params::{LIGHTEST, SOLVER_EPS, SvmParams, SvmTrainError, check};
 use ndarray::{Array2, ArrayView2};
 use rayon::prelude::*;
 

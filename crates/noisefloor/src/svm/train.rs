@@ -1,61 +1,13 @@
 //! Training through linfa-svm, or from a matrix product where rows are long.
 
 use super::gram::squared_distances;
+use super::params::{LIGHTEST, SOLVER_EPS, SvmParams, SvmTrainError, check};
+use super::platt::Platt;
+use super::predict::Svm;
 use super::solver::{Weights, fit_weights};
-use super::{Platt, Svm};
 use linfa::composing::platt_scaling::{Platt as LinfaPlatt, platt_newton_method};
 use linfa::prelude::*;
 use ndarray::{Array1, ArrayView2};
-use thiserror::Error;
-
-/// Parameters of a C-SVC with RBF kernel.
-#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
-pub struct SvmParams {
-    /// Penalty C of a misclassified example of either class, above 0.
-    pub c: f64,
-    /// γ of the kernel exp(−γ‖x − y‖²), above 0.
-    pub gamma: f64,
-}
-
-impl SvmParams {
-    /// C = 2, γ = 2 (Takouachet et al. 2017, §4.3), for their descriptor.
-    pub const PAPER: Self = Self { c: 2.0, gamma: 2.0 };
-}
-
-/// Why a machine could not be trained.
-#[derive(Debug, Error)]
-pub enum SvmTrainError {
-    /// A parameter out of range.
-    #[error("C and γ must be positive finite numbers, not C = {c}, γ = {gamma}")]
-    Params {
-        /// C.
-        c: f64,
-        /// γ.
-        gamma: f64,
-    },
-    /// One of the two classes is missing.
-    #[error("training needs examples of both classes; of {examples} examples {converged} are converged")]
-    OneClass {
-        /// All examples.
-        examples: usize,
-        /// Those that are converged.
-        converged: usize,
-    },
-    /// Rows and labels differ in number, or a number is not finite.
-    #[error("training needs one label an example and finite numbers: {0}")]
-    Examples(String),
-    /// linfa-svm failed.
-    #[error("linfa-svm could not train the machine")]
-    Linfa(#[from] linfa_svm::SvmError),
-    /// Platt scaling failed.
-    #[error("Platt scaling of the decision values failed")]
-    Platt(#[from] linfa::composing::platt_scaling::PlattError),
-}
-
-/// Duality gap at which the solver ends; LIBSVM's default.
-pub(super) const SOLVER_EPS: f64 = 1e-3;
-/// linfa drops support vectors lighter than this from its decision function; the same are left out here.
-pub(super) const LIGHTEST: f64 = 100.0 * f64::EPSILON;
 
 /// Rows longer than this are trained on from a matrix product, by [`fit_weights`]; linfa's kernel would take longer than all the rest.
 const WIDE: usize = 256;
@@ -85,29 +37,6 @@ pub fn fit_svm(
         coefficients: kept().map(|i| alpha[i] as f32).collect(),
         vectors: kept().flat_map(|i| rows.row(i).to_vec()).map(|v| v as f32).collect(),
     })
-}
-
-/// Checks parameters, that every row has a label, that all numbers are finite and both classes there.
-pub(super) fn check(
-    rows: ArrayView2<'_, f64>,
-    converged: &[bool],
-    SvmParams { c, gamma }: SvmParams,
-) -> Result<(), SvmTrainError> {
-    if !(c.is_finite() && c > 0.0 && gamma.is_finite() && gamma > 0.0) {
-        return Err(SvmTrainError::Params { c, gamma });
-    }
-    if rows.nrows() != converged.len() || !rows.iter().all(|v| v.is_finite()) {
-        let what = format!("{} rows, {} labels", rows.nrows(), converged.len());
-        return Err(SvmTrainError::Examples(what));
-    }
-    if rows.ncols() == 0 {
-        return Err(SvmTrainError::Examples("rows without numbers".into()));
-    }
-    let positive = converged.iter().filter(|&&c| c).count();
-    if positive == 0 || positive == converged.len() {
-        return Err(SvmTrainError::OneClass { examples: converged.len(), converged: positive });
-    }
-    Ok(())
 }
 
 fn fit_linfa(

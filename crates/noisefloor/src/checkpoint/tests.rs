@@ -1,0 +1,172 @@
+use super::*;
+use crate::criterion::{FixedSpp, Resumable, StoppingCriterion};
+use crate::driver::{Driver, Event};
+use crate::oracle::Oracle;
+use crate::source::{Batch, ProgressiveSource, Repeats, Request, SourceError, SourceInfo, Unit};
+use proptest::prelude::*;
+use std::sync::atomic::Ordering;
+
+/// Noise that follows from pixel and sample alone, and more of it to the right.
+struct Noise(Repeats);
+
+impl ProgressiveSource for Noise {
+    fn info(&self) -> SourceInfo {
+        SourceInfo {
+            name: "noise".into(),
+            width: 96,
+            height: 48,
+            unit: Unit::SamplesPerPixel,
+            aims: true,
+            repeats: self.0,
+        }
+    }
+
+    fn sample(&mut self, requests: &[Request]) -> Result<Vec<Batch>, SourceError> {
+        let sample = |x: usize, y: usize, n: u64| {
+            let seed = (y * 96 + x) as u64 ^ n << 20;
+            let hash = seed.wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+            let hash = (hash ^ hash >> 29).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+            0.2 + 0.01 * x as f32 * ((hash >> 40) as f32 / (1 << 24) as f32 - 0.5)
+        };
+        let batch = |&Request { tile, first, spp: samples }: &Request| {
+            let pixel = |i: usize| {
+                let (x, y) = (tile.x + i % tile.width, tile.y + i / tile.width);
+                [(first..first + u64::from(samples)).map(|n| sample(x, y, n)).sum::<f32>() / samples as f32;
+                    3]
+            };
+            Batch { tile, spp: samples, mean: (0..tile.pixels()).map(pixel).collect() }
+        };
+        Ok(requests.iter().map(batch).collect())
+    }
+}
+
+fn params() -> Params {
+    Params {
+        tile: 16,
+        min_spp: 20,
+        max_spp: 2000,
+        schedule: crate::Schedule::Every { step: 20 },
+        ..Params::default()
+    }
+}
+
+/// A driver of the job, broken off after some batches.
+fn broken_off<C: StoppingCriterion>(criterion: C, batches: usize) -> Driver<Noise, C> {
+    let mut driver = Driver::new(Noise(Repeats::Samples), criterion, params()).unwrap();
+    let (cancel, mut left) = (driver.cancel_flag(), batches);
+    let mut count = |event: &Event| {
+        if matches!(event, Event::BatchDone(_)) {
+            left = left.saturating_sub(1);
+            cancel.store(left == 0, Ordering::Relaxed);
+        }
+    };
+    driver.run(|_, event| count(event)).unwrap();
+    driver
+}
+
+fn kept<C: Resumable>(driver: &Driver<Noise, C>) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    driver.session().checkpoint("noise").write(&mut bytes).unwrap();
+    bytes
+}
+
+#[cfg(feature = "bundled-model")]
+#[test]
+fn a_run_that_was_broken_off_goes_on_to_the_bit() {
+    let whole = broken_off(Oracle::bundled(), usize::MAX);
+    let reasons: Vec<_> = whole.session().stops().map(|s| s.spp).collect();
+    assert!(reasons.iter().any(|&n| n != reasons[0]), "tiles stop at different times: {reasons:?}");
+    let n = whole.timeline().len();
+    assert!(n > 8, "{n} batches");
+    for batches in [1, 2, n / 2, n - 1] {
+        let bytes = kept(&broken_off(Oracle::bundled(), batches));
+        let checkpoint = Checkpoint::read(&bytes[..]).unwrap();
+        let driver = Driver::new(Noise(Repeats::Samples), Oracle::bundled(), params()).unwrap();
+        let mut driver = driver.resume("noise", checkpoint).unwrap();
+        assert!(!driver.session().is_done(), "{batches}");
+        driver.run(|_, _| ()).unwrap();
+        assert!(kept(&driver) == kept(&whole), "{batches} batches");
+    }
+}
+
+#[cfg(feature = "bundled-model")]
+#[test]
+fn an_oracle_takes_up_no_nonsense() {
+    let driver = broken_off(Oracle::bundled(), 3);
+    let grid = driver.session().film().grid();
+    let state = driver.session().criterion().state();
+    let mut oracle = Oracle::bundled();
+    assert!(oracle.restore(grid, &state) && oracle.state() == state);
+    assert!(!oracle.restore(crate::TileGrid::new(16, 16, 16).unwrap(), &state));
+    assert!(!oracle.restore(grid, &state[..state.len() - 1]) && !oracle.restore(grid, &[0xff; 64]));
+    assert!(oracle.state() == state);
+}
+
+#[test]
+fn what_is_done_stays_done() {
+    let bytes = kept(&broken_off(FixedSpp(40), usize::MAX));
+    let driver = Driver::new(Noise(Repeats::Samples), FixedSpp(40), params()).unwrap();
+    let driver = driver.resume("noise", Checkpoint::read(&bytes[..]).unwrap()).unwrap();
+    assert!(driver.session().is_done());
+}
+
+#[test]
+fn another_job_is_refused() {
+    let bytes = kept(&broken_off(FixedSpp(40), 1));
+    let refused = |repeats, samples, params, job| {
+        let driver = Driver::new(Noise(repeats), FixedSpp(samples), params).unwrap();
+        driver.resume(job, Checkpoint::read(&bytes[..]).unwrap()).err().map(|e| e.to_string())
+    };
+    let other = |what: &str| format!("the checkpoint is of another job: its {what} is");
+    let begins = |error: Option<String>, with: &str| {
+        let error = error.unwrap();
+        assert!(error.starts_with(with), "{error}");
+    };
+    assert_eq!(refused(Repeats::Samples, 40, params(), "noise"), None);
+    begins(refused(Repeats::Samples, 40, params(), "silence"), &other("job"));
+    begins(refused(Repeats::Samples, 50, params(), "noise"), &other("criterion"));
+    begins(
+        refused(Repeats::Samples, 40, Params { consecutive: 2, ..params() }, "noise"),
+        &other("set of parameters"),
+    );
+    begins(refused(Repeats::Calls, 40, params(), "noise"), "noise does not promise");
+}
+
+#[test]
+fn what_does_not_hold_together_is_refused() {
+    let driver = broken_off(FixedSpp(40), 1);
+    let refused = |change: &dyn Fn(&mut Checkpoint<'_>)| {
+        let mut checkpoint = driver.session().checkpoint("noise");
+        change(&mut checkpoint);
+        let driver = Driver::new(Noise(Repeats::Samples), FixedSpp(40), params()).unwrap();
+        matches!(driver.resume("noise", checkpoint), Err(CheckpointError::Invalid(_)))
+    };
+    assert!(!refused(&|_| ()));
+    assert!(refused(&|c| c.tiles.to_mut().truncate(3)));
+    assert!(refused(&|c| c.tiles.to_mut()[0].streak = u32::MAX));
+    assert!(refused(&|c| c.tiles.to_mut()[0].next = u64::MAX));
+    assert!(refused(&|c| c.tiles.to_mut()[0].target = Some(u64::MAX)));
+    assert!(refused(&|c| c.tiles.to_mut().swap(0, 1)));
+    assert!(refused(&|c| c.display = Some(crate::ToneMapping::Srgb { exposure: f32::NAN }.settle(&[]))));
+    assert!(refused(&|c| c.state = vec![1, 2, 3]));
+    assert!(refused(&|c| c.film.to_mut().corrupt(0)));
+    assert!(refused(&|c| c.film.to_mut().corrupt(1)));
+    assert!(refused(&|c| c.film.to_mut().corrupt(2)));
+    assert!(refused(&|c| c.film.to_mut().corrupt(3)));
+    assert!(refused(&|c| c.film.to_mut().corrupt(4)));
+}
+
+proptest! {
+    /// Damage is found by the checksum; what a checksum was made for that is nonsense, by what reads it.
+    #[test]
+    fn damage_and_nonsense_are_errors(at in 0usize..10_000, bit in 0u8..8, nonsense in prop::collection::vec(any::<u8>(), 0..200)) {
+        let mut bytes = kept(&broken_off(FixedSpp(40), 1));
+        let at = at % bytes.len();
+        bytes[at] ^= 1 << bit;
+        prop_assert!(Checkpoint::read(&bytes[..]).is_err());
+        prop_assert!(Checkpoint::read(&bytes[..at]).is_err());
+        let mut file = Vec::new();
+        FORMAT.write(&nonsense, &mut file).unwrap_or_default();
+        prop_assert!(Checkpoint::read(&file[..]).is_err());
+    }
+}

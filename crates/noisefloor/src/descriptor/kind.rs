@@ -1,0 +1,226 @@
+//! What a descriptor is, and how one is named in files.
+
+use crate::evidence::TilePlanes;
+use crate::mask::NoiseMask;
+use crate::tile::MAX_TILE;
+use ndarray::Array2;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::fmt;
+use std::ops::Deref;
+use std::sync::Arc;
+use thiserror::Error;
+
+/// Computes numbers from a tile.
+///
+/// # For implementers
+/// The default methods suit a descriptor that looks at one tile and does not separate noise from picture. One that does
+/// separate them overrides [`TileDescriptor::project`], from which the expected need and the audience follow, and
+/// [`TileDescriptor::texture`], by which unfamiliar tiles are recognised.
+pub trait TileDescriptor: fmt::Debug + Send + Sync {
+    /// The name in model files and tables, such as `"compact"`.
+    fn name(&self) -> &'static str;
+
+    /// Version of the formulas. Raise it whenever a number changes: models trained with another version are refused.
+    fn version(&self) -> u16;
+
+    /// What [`DescriptorKind::make`] needs to make it again.
+    fn parameters(&self) -> BTreeMap<String, f64>;
+
+    /// What each number is, for the columns of tables; as many as the whole descriptor has, the picture's included.
+    fn number_names(&self) -> Vec<String>;
+
+    /// How many of the numbers are the tile's own: what [`TileDescriptor::describe`] returns.
+    fn own_len(&self) -> usize {
+        self.number_names().len()
+    }
+
+    /// The tile's own numbers.
+    ///
+    /// # Errors
+    /// [`DescriptorError`] if the descriptor is not for tiles of that size.
+    fn describe(&self, planes: &TilePlanes) -> Result<Vec<f32>, DescriptorError>;
+
+    /// The whole descriptor of each of the tiles that make up a picture, or of those that are available.
+    fn in_picture(&self, tiles: &[Described]) -> Vec<Vec<f32>> {
+        tiles.iter().map(|t| t.own.clone()).collect()
+    }
+
+    /// How visible the noise is at each pixel of the tile (rows × columns), as an amplitude in 8-bit display steps; `None`
+    /// if the descriptor does not separate noise from picture.
+    fn visible_noise(&self, _planes: &TilePlanes) -> Option<Array2<f32>> {
+        None
+    }
+
+    /// The amplitude of [`TileDescriptor::visible_noise`] that a raw descriptor has pooled.
+    fn pooled_visible_noise(&self, _raw: &[f32]) -> Option<f32> {
+        None
+    }
+
+    /// Which of the numbers are the tile's own texture and do not change as noise falls; none if the descriptor does not
+    /// separate noise from picture.
+    fn texture(&self) -> &[usize] {
+        &[]
+    }
+
+    /// Smallest standard deviation over training data that is believed, in the unit of the numbers.
+    fn least_deviation(&self) -> f64 {
+        0.0
+    }
+
+    /// Changes a raw descriptor into that of `factor` times the samples, if only noise changes, as 1/√n. Returns false if
+    /// the descriptor does not separate noise from picture.
+    fn project(&self, _raw: &mut [f32], _factor: f32) -> bool {
+        false
+    }
+}
+
+/// How a descriptor is made from what a file says about it.
+#[derive(Clone, Copy, Debug)]
+pub struct DescriptorKind {
+    /// [`TileDescriptor::name`].
+    pub name: &'static str,
+    /// Makes the descriptor from its parameters; the error says what is wrong with them.
+    pub make: fn(&BTreeMap<String, f64>) -> Result<Descriptor, String>,
+}
+
+/// A descriptor, shared: what is computed from a tile.
+///
+/// ```
+/// use noisefloor::{Descriptor, TileGrid, TilePlanes};
+/// let tile = TileGrid::new(32, 16, 32)?.tile(0);
+/// let checker = |x: usize, y: usize| if (x + y) % 2 == 0 { [0.01; 3] } else { [-0.01; 3] };
+/// let noise_at_the_left = |x, y| ([0.5; 3], if x < 16 { checker(x, y) } else { [0.0; 3] });
+/// let planes = TilePlanes::gather((32, 16), tile, noise_at_the_left);
+/// let map = Descriptor::default().visible_noise(&planes).unwrap();
+/// assert_eq!(map.dim(), (16, 32));
+/// assert!(map[(8, 0)] > 1.0 && map[(8, 31)] < 0.01);
+/// # Ok::<(), noisefloor::TileError>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct Descriptor(Arc<dyn TileDescriptor>);
+
+/// A descriptor as files name it: `{"compact": {"mask": 1.0}}` in JSON.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "Named", into = "Named")]
+pub struct DescriptorSpec {
+    /// [`TileDescriptor::name`].
+    pub name: String,
+    /// [`TileDescriptor::parameters`].
+    pub parameters: BTreeMap<String, f64>,
+}
+
+type Named = BTreeMap<String, BTreeMap<String, f64>>;
+
+/// Why there is no such descriptor, or why it cannot describe a tile.
+#[derive(Debug, Error, Clone, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum DescriptorError {
+    /// The descriptor is for one tile size.
+    #[error("this descriptor is for tiles of {expected}×{expected} pixels, not {width}×{height}")]
+    TileSize {
+        /// Edge it is for.
+        expected: usize,
+        /// Width of the tile.
+        width: usize,
+        /// Height of the tile.
+        height: usize,
+    },
+    /// No kind has that name.
+    #[error("there is no descriptor {name:?}; known are {known}")]
+    Unknown {
+        /// The name.
+        name: String,
+        /// The names of all kinds.
+        known: String,
+    },
+    /// Its parameters are wrong.
+    #[error("descriptor {name:?}: {what}")]
+    Parameters {
+        /// The name.
+        name: String,
+        /// What is wrong.
+        what: String,
+    },
+}
+
+/// A tile's own numbers, and what it takes to place them beside those of the rest of its picture.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Described {
+    /// What [`TileDescriptor::describe`] returned.
+    pub own: Vec<f32>,
+    /// Samples per pixel of the tile, above 0; not an integer where a level is synthesised.
+    pub spp: f64,
+    /// Pixels of the tile: its weight in the picture.
+    pub area: f64,
+}
+
+impl Descriptor {
+    /// Wraps a descriptor.
+    pub fn new(descriptor: impl TileDescriptor + 'static) -> Self {
+        Self(Arc::new(descriptor))
+    }
+
+    /// How files name it.
+    pub fn spec(&self) -> DescriptorSpec {
+        DescriptorSpec { name: self.name().to_owned(), parameters: self.parameters() }
+    }
+
+    /// Dimensionality of the whole descriptor, the picture's numbers included.
+    pub fn dimensions(&self) -> usize {
+        self.number_names().len()
+    }
+
+    /// Describes a tile, which has `spp` samples per pixel, on its own.
+    ///
+    /// # Errors
+    /// [`DescriptorError::TileSize`] if the descriptor is not for tiles of that size.
+    pub fn describe_tile(&self, planes: &TilePlanes, spp: f64) -> Result<Described, DescriptorError> {
+        Ok(Described { own: self.describe(planes)?, spp, area: planes.inner.pixels() as f64 })
+    }
+}
+
+impl Deref for Descriptor {
+    type Target = dyn TileDescriptor;
+
+    fn deref(&self) -> &Self::Target {
+        &*self.0
+    }
+}
+
+impl PartialEq for Descriptor {
+    fn eq(&self, other: &Self) -> bool {
+        self.spec() == other.spec() && self.version() == other.version()
+    }
+}
+
+impl TryFrom<Named> for DescriptorSpec {
+    type Error = &'static str;
+
+    fn try_from(named: Named) -> Result<Self, Self::Error> {
+        let mut all = named.into_iter();
+        match (all.next(), all.next()) {
+            (Some((name, parameters)), None) => Ok(Self { name, parameters }),
+            _ => Err("a descriptor has one name"),
+        }
+    }
+}
+
+impl From<DescriptorSpec> for Named {
+    fn from(spec: DescriptorSpec) -> Self {
+        Self::from([(spec.name, spec.parameters)])
+    }
+}
+
+/// The parameter `mask`: σ of the noise mask.
+pub(super) fn mask(parameters: &BTreeMap<String, f64>) -> Result<NoiseMask, String> {
+    let sigma = parameters.get("mask").ok_or("its mask is missing")?;
+    NoiseMask::try_from(*sigma as f32).map_err(|e| e.to_string())
+}
+
+/// The parameter `edge`: of the tiles in pixels.
+pub(super) fn edge(parameters: &BTreeMap<String, f64>) -> Result<usize, String> {
+    let edge = *parameters.get("edge").ok_or("its edge is missing")?;
+    let whole = edge.fract() == 0.0 && (1.0..=MAX_TILE as f64).contains(&edge);
+    if whole { Ok(edge as usize) } else { Err(format!("an edge of {edge} pixels is out of range")) }
+}

@@ -1,0 +1,173 @@
+use super::*;
+use crate::criterion::{FixedSpp, Needs, Verdict, View};
+use crate::source::{Repeats, SourceInfo, Unit};
+use crate::tile::Tile;
+
+/// A grey source that can be told to misbehave.
+#[derive(Default)]
+struct Grey {
+    cannot_aim: bool,
+    /// Samples per pixel it has in store; 0 for no end.
+    store: u64,
+    fail_after: Option<usize>,
+    lie: Option<fn(Vec<Batch>) -> Vec<Batch>>,
+    calls: Vec<Vec<Request>>,
+}
+
+impl ProgressiveSource for Grey {
+    fn info(&self) -> SourceInfo {
+        let unit = Unit::SamplesPerPixel;
+        SourceInfo {
+            name: "grey".into(),
+            width: 70,
+            height: 32,
+            unit,
+            aims: !self.cannot_aim,
+            repeats: Repeats::Samples,
+        }
+    }
+
+    fn sample(&mut self, requests: &[Request]) -> Result<Vec<Batch>, SourceError> {
+        if self.fail_after.is_some_and(|calls| self.calls.len() >= calls) {
+            return Err(SourceError::Failed {
+                name: "grey".into(),
+                tile: Some(1),
+                cause: "lamp broke".into(),
+            });
+        }
+        self.calls.push(requests.to_vec());
+        let batch = |r: &Request| {
+            let left = if self.store == 0 { u64::MAX } else { self.store.saturating_sub(r.first) };
+            let spp = r.spp.min(left);
+            let mean = if spp == 0 { vec![] } else { vec![[0.5; 3]; r.tile.pixels()] };
+            Batch { tile: r.tile, spp, mean }
+        };
+        let batches = requests.iter().map(batch).collect();
+        Ok(self.lie.map_or_else(|| Vec::clone(&batches), |lie| lie(batches.clone())))
+    }
+}
+
+fn driver(source: Grey, samples: u64) -> Driver<Grey, FixedSpp> {
+    Driver::new(source, FixedSpp(samples), Params { tile: 32, ..Params::default() }).unwrap()
+}
+
+fn reasons<C: StoppingCriterion>(driver: &Driver<Grey, C>) -> Vec<(u64, StopReason)> {
+    driver.session().stops().map(|s| (s.spp, s.reason)).collect()
+}
+
+#[test]
+fn events_and_timeline_tell_the_whole_run() {
+    let mut driver = driver(Grey::default(), 300);
+    let (mut stops, mut batches) = (0, 0);
+    driver
+        .run(|session, event| match event {
+            Event::TileStopped(stop) => {
+                stops += 1;
+                assert_eq!(stop.spp, session.film().spp(stop.tile.index));
+            }
+            Event::BatchDone(progress) => {
+                batches += 1;
+                assert!(
+                    progress.tiles == 3 && (progress.now.active_tiles == 0 || progress.eta_seconds.is_some())
+                );
+            }
+            Event::ReferenceReady { .. } => panic!("nobody needs one"),
+        })
+        .unwrap();
+    assert_eq!((stops, batches), (3, driver.timeline().len()));
+    assert_eq!(driver.timeline().last().unwrap().samples, 300 * 70 * 32);
+    assert!(driver.timeline().is_sorted_by_key(|p| p.samples));
+    let clock = driver.clock();
+    assert!(clock.source_seconds + clock.criterion_seconds <= clock.total_seconds);
+}
+
+#[test]
+fn a_source_that_cannot_aim_is_asked_for_all_tiles() {
+    let mut driver = driver(Grey { cannot_aim: true, ..Grey::default() }, 200);
+    driver.run(|_, _| ()).unwrap();
+    assert!(driver.source.calls.iter().all(|c| c.len() == 3));
+}
+
+#[test]
+fn the_end_of_a_playback_is_a_reason() {
+    let mut driver = driver(Grey { store: 250, ..Grey::default() }, 1000);
+    driver.run(|_, _| ()).unwrap();
+    assert_eq!(reasons(&driver), [(250, StopReason::SourceExhausted); 3]);
+}
+
+#[test]
+fn limits_stop_and_keep_what_is_there() {
+    let mut limited = driver(Grey::default(), 10_000);
+    limited.set_time_limit(Some(Duration::ZERO));
+    limited.run(|_, _| ()).unwrap();
+    assert_eq!(reasons(&limited), [(0, StopReason::TimeLimit); 3]);
+
+    let mut cancelled = driver(Grey::default(), 10_000);
+    let flag = cancelled.cancel_flag();
+    cancelled
+        .run(|_, event| {
+            if matches!(event, Event::BatchDone(_)) {
+                flag.store(true, Ordering::Relaxed)
+            }
+        })
+        .unwrap();
+    assert_eq!(reasons(&cancelled), [(100, StopReason::Cancelled); 3]);
+}
+
+#[test]
+fn a_failure_keeps_what_is_there() {
+    let mut driver = driver(Grey { fail_after: Some(2), ..Grey::default() }, 10_000);
+    let error = driver.run(|_, _| ()).unwrap_err();
+    assert!(error.to_string().contains("grey: sampling failed in tile 1"), "{error}");
+    assert_eq!(reasons(&driver), [(200, StopReason::Failed); 3]);
+}
+
+#[test]
+fn broken_promises_are_typed_errors() {
+    let lies: [fn(Vec<Batch>) -> Vec<Batch>; 3] = [
+        |mut b| {
+            b.pop();
+            b
+        },
+        |mut b| {
+            b.swap(0, 1);
+            b
+        },
+        |mut b| {
+            b[0].mean.pop();
+            b
+        },
+    ];
+    for lie in lies {
+        let error = driver(Grey { lie: Some(lie), ..Grey::default() }, 100).run(|_, _| ()).unwrap_err();
+        assert!(matches!(error, DriverError::Source(SourceError::Contract { .. })), "{error}");
+    }
+}
+
+struct Picky;
+
+impl StoppingCriterion for Picky {
+    fn name(&self) -> String {
+        "picky".into()
+    }
+
+    fn fingerprint(&self) -> String {
+        self.name()
+    }
+
+    fn needs(&self) -> Needs {
+        Needs { halves: false, reference: true }
+    }
+
+    fn judge(&mut self, _: &View<'_>, _: &[Tile]) -> Result<Vec<Verdict>, CriterionError> {
+        Ok(vec![])
+    }
+}
+
+#[test]
+fn a_missing_reference_is_an_error_before_any_sample() {
+    let mut driver = Driver::new(Grey::default(), Picky, Params { tile: 32, ..Params::default() }).unwrap();
+    let error = driver.run(|_, _| ()).unwrap_err();
+    assert!(matches!(error, DriverError::Criterion(CriterionError::NoReference(_))));
+    assert!(driver.source.calls.is_empty());
+}

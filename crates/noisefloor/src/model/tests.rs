@@ -1,0 +1,177 @@
+use super::*;
+use crate::svm::{Platt, Scaler, Svm};
+use proptest::prelude::*;
+
+/// A model that goes by the first number of the compact descriptor alone.
+pub(crate) fn small() -> Model {
+    let descriptor = Descriptor::default();
+    let n = descriptor.dimensions();
+    let mut vectors = vec![0.0; 2 * n];
+    (vectors[0], vectors[n]) = (-1.0, 1.0);
+    let classifier = Classifier {
+        scaler: Scaler::identity(n),
+        svm: Svm { gamma: 0.1, rho: 0.0, coefficients: vec![1.0, -1.0], vectors },
+        platt: Platt { a: -2.0, b: 0.0 },
+    };
+    let parts = ModelParts {
+        descriptor,
+        evidence: Evidence::Halves,
+        tone_mapping: ToneMapping::default(),
+        classifier,
+        familiarity: None,
+        audience: Audience::TRAINED,
+        record: TrainingRecord::default(),
+    };
+    Model::new(parts).unwrap()
+}
+
+/// The same with some parts changed.
+pub(crate) fn changed(model: Model, change: impl FnOnce(&mut ModelParts)) -> Result<Model, ModelError> {
+    let mut parts = model.into_parts();
+    change(&mut parts);
+    Model::new(parts)
+}
+
+fn file() -> Vec<u8> {
+    let mut bytes = Vec::new();
+    small().write(&mut bytes).unwrap();
+    bytes
+}
+
+#[test]
+fn survives_the_file() {
+    let model = Model::read(&file()[..]).unwrap();
+    assert_eq!(model, small());
+    assert_eq!(model.digest(), small().digest());
+}
+
+#[cfg(feature = "bundled-model")]
+#[test]
+fn the_bundled_model_is_whole_small_and_scored() {
+    let model = Model::bundled();
+    assert!(BUNDLED.len() < 1 << 20);
+    assert_eq!(model.evidence(), Evidence::Halves);
+    assert!(model.record().leave_one_scene_out.is_some_and(|s| s.zones == 128));
+}
+
+/// An unfamiliar tile has the P that a familiar one of the same noise has with half of the samples.
+#[test]
+fn what_is_unfamiliar_is_judged_as_if_it_had_half_the_samples() {
+    let zones = vec![vec![0.5; small().descriptor().texture().len()]];
+    let familiarity = Familiarity { zones, reach: 0.1 };
+    let cautious = changed(small(), |m| m.familiarity = Some(familiarity)).unwrap();
+    let mut tile = vec![0.5; small().descriptor().dimensions()];
+    assert!(!cautious.judge(&tile).unfamiliar && !small().judge(&tile).unfamiliar);
+    assert_eq!(cautious.judge(&tile), small().judge(&tile));
+
+    tile[1] += 0.11;
+    let (careful, careless) = (cautious.judge(&tile), small().judge(&tile));
+    assert!(careful.unfamiliar && !careless.unfamiliar);
+    let mut halved = tile.clone();
+    small().descriptor().project(&mut halved, 0.5);
+    assert_eq!(careful.probability, small().judge(&halved).probability);
+    assert!(careful.probability < careless.probability);
+    assert_eq!(careful.probability_without_penalty, careless.probability);
+}
+
+#[test]
+fn the_model_for_references_is_whole() {
+    let model = Model::read(&include_bytes!("../../models/human-reference.nfm")[..]).unwrap();
+    assert_eq!((model.evidence(), model.record().scenes.len()), (Evidence::Reference, 8));
+}
+
+#[cfg(feature = "bundled-model")]
+#[test]
+fn clean_tiles_are_converged_and_noisy_ones_are_not_whatever_the_texture() {
+    let model = Model::bundled();
+    for textured in 0..=17 {
+        // From no texture at all, ln 2, to a checkerboard of black and white, ln 128.
+        let texture = 0.693 + 0.25 * textured as f32;
+        let p = |noise: f32| {
+            let mut tile = vec![texture; model.descriptor().dimensions()];
+            // Of the tile and of its picture.
+            (tile[0], tile[3]) = (noise, noise);
+            model.judge(&tile).probability
+        };
+        // From no noise, at the floor, to white noise from black to white: 128 steps, which the masks and the weights of the
+        // scales let through almost whole.
+        let path: Vec<f32> = (0..=83).map(|i| p(-3.45 + 0.1 * i as f32)).collect();
+        assert!(path[0] > 0.99 && path[83] < 0.6, "{texture}: {path:?}");
+        // Far from all training data a Gaussian kernel forgets, so that P ends a little above its least.
+        assert!(path.windows(2).all(|w| w[1] <= w[0] + 2e-3), "{texture}: {path:?}");
+    }
+}
+
+#[test]
+fn each_fault_has_its_error() {
+    let read = |bytes: &[u8]| Model::read(bytes).unwrap_err();
+    assert!(matches!(read(b""), ModelError::Foreign));
+    assert!(matches!(read(b"\x89PNG\r\n\x1a\n and so on"), ModelError::Foreign));
+    let whole = file();
+    assert!(matches!(read(&whole[..20]), ModelError::Damaged(_)));
+    assert!(matches!(read(&whole[..whole.len() - 1]), ModelError::Damaged(_)));
+    assert!(matches!(read(&[&whole[..], b"x"].concat()), ModelError::Damaged(_)));
+    let mut newer = whole.clone();
+    newer[8] = 4;
+    assert!(matches!(read(&newer), ModelError::Newer { found: 4 }));
+    newer[8] = 2;
+    assert!(matches!(read(&newer), ModelError::Older { found: 2 }));
+    let mut oversized = whole.clone();
+    oversized[19] = 0xff;
+    assert!(matches!(read(&oversized), ModelError::Oversized(_)));
+}
+
+#[test]
+fn contradictions_are_refused() {
+    let fails = |change: fn(&mut ModelParts)| changed(small(), change).unwrap_err();
+    assert!(matches!(fails(|m| m.classifier.svm.rho = f32::NAN), ModelError::Invalid(_)));
+    assert!(matches!(fails(|m| m.classifier.svm.gamma = 0.0), ModelError::Invalid(_)));
+    assert!(matches!(fails(|m| m.classifier.svm.vectors.truncate(3)), ModelError::Invalid(_)));
+    assert!(matches!(fails(|m| m.classifier.scaler.mean.clear()), ModelError::Invalid(_)));
+    let n = small().descriptor().texture().len();
+    let known = |zone: Vec<f32>, reach| Some(Familiarity { zones: vec![zone], reach });
+    let none = Some(Familiarity { zones: vec![], reach: 1.0 });
+    let short = known(vec![0.0; n - 1], 1.0);
+    for familiarity in [none, short, known(vec![0.0; n], -1.0), known(vec![f32::NAN; n], 1.0)] {
+        let error = changed(small(), |m| m.familiarity = familiarity).unwrap_err();
+        assert!(matches!(error, ModelError::Invalid(_)));
+    }
+}
+
+/// What a file says about its descriptor is not taken on trust.
+#[test]
+fn a_descriptor_that_is_not_here_is_refused() {
+    let small = small();
+    let read = |change: fn(&mut ModelFile<'_>)| {
+        let mut file = small.file();
+        change(&mut file);
+        let mut bytes = Vec::new();
+        FORMAT.write(&file, &mut bytes).unwrap();
+        Model::read(&bytes[..]).unwrap_err()
+    };
+    assert!(matches!(read(|f| f.descriptor_version = 99), ModelError::Descriptor { needed: 99, .. }));
+    let unknown = read(|f| f.descriptor.name = "tea-leaves".into());
+    assert!(
+        unknown.to_string().contains("tea-leaves") && unknown.to_string().contains("compact"),
+        "{unknown}"
+    );
+    let empty = read(|f| f.descriptor.parameters.clear());
+    assert!(empty.to_string().contains("mask"), "{empty}");
+}
+
+proptest! {
+    #[test]
+    fn no_damaged_byte_goes_unnoticed(at in 0usize..4000, flip in 1u8..) {
+        let mut bytes = file();
+        let at = at % bytes.len();
+        bytes[at] ^= flip;
+        prop_assert!(Model::read(&bytes[..]).is_err());
+    }
+
+    #[test]
+    fn noise_is_never_a_model(bytes in prop::collection::vec(any::<u8>(), 0..300)) {
+        let framed = [&FORMAT.magic[..], &bytes].concat();
+        prop_assert!(Model::read(&framed[..]).is_err());
+        prop_assert!(Model::read(&bytes[..]).is_err());
+    }
+}

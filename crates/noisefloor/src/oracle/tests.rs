@@ -1,0 +1,212 @@
+use super::*;
+use crate::NoiseMask;
+use crate::descriptor::Descriptor;
+use crate::display::Display;
+use crate::film::Film;
+use crate::model::tests::{changed, small};
+use crate::rgb::Rgb;
+use crate::svm::{Scaler, Svm};
+
+/// A film of 64×64 pixels with `samples` samples of standard deviation `sigma` around grey.
+fn film(samples: u64, sigma: f32) -> Film {
+    film_of(|_| 0.2, samples, sigma)
+}
+
+/// The same around a picture that is given by the number of the pixel.
+fn film_of(picture: fn(usize) -> f32, samples: u64, sigma: f32) -> Film {
+    let mut film = Film::new(TileGrid::new(64, 64, 64).unwrap());
+    let mut state = 5u64;
+    let mut bell = || {
+        let mut uniform = || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 40) as f32 / (1 << 24) as f32
+        };
+        (uniform() + uniform() + uniform() + uniform() - 2.0) * 3f32.sqrt()
+    };
+    for _ in 0..2 {
+        let half = samples / 2;
+        let batch: Vec<Rgb> =
+            (0..64 * 64).map(|i| [picture(i) + sigma * bell() / (half as f32).sqrt(); 3]).collect();
+        film.add(0, half, &batch).unwrap();
+    }
+    film
+}
+
+fn judge(oracle: &mut Oracle, film: &Film, reference: Option<&[Rgb]>) -> Result<Verdict, CriterionError> {
+    let view = View { film, display: &Display::SRGB, reference };
+    Ok(oracle.judge(&view, &[film.grid().tile(0)])?[0])
+}
+
+#[cfg(feature = "bundled-model")]
+#[test]
+fn more_samples_are_less_visible_and_the_expected_need_is_near() {
+    let mut oracle = Oracle::bundled();
+    let few = judge(&mut oracle, &film(100, 0.5), None).unwrap();
+    let many = judge(&mut oracle, &film(100_000, 0.5), None).unwrap();
+    assert!(!few.converged && many.converged, "{few:?} {many:?}");
+    // At the samples that were expected, another realisation of the noise is about at the threshold.
+    let expected = few.expected_spp.unwrap();
+    let there = judge(&mut oracle, &film(expected, 0.5), None).unwrap().probability.unwrap();
+    assert!((0.8..0.97).contains(&there), "{expected}: {there}");
+    assert_eq!(many.expected_spp, Some(100_000));
+}
+
+#[cfg(feature = "bundled-model")]
+#[test]
+fn a_reference_is_evidence_as_good_as_halves() {
+    let model = changed(Model::bundled(), |m| m.evidence = Evidence::Reference).unwrap();
+    let mut oracle = Oracle::new(model, Threshold::PAPER);
+    assert_eq!(oracle.needs(), Needs { halves: false, reference: true });
+    let (noisy, grey) = (film(200, 0.5), vec![Display::SRGB.encode([0.2; 3]); 64 * 64]);
+    assert!(matches!(judge(&mut oracle, &noisy, None), Err(CriterionError::NoReference(_))));
+    let by_reference = judge(&mut oracle, &noisy, Some(&grey)).unwrap().probability.unwrap();
+    let by_halves = judge(&mut Oracle::bundled(), &noisy, None).unwrap().probability.unwrap();
+    // The converged picture is known here: both residuals have the same noise, in other realisations.
+    assert!((by_reference - by_halves).abs() < 0.1, "{by_reference} {by_halves}");
+}
+
+#[cfg(feature = "bundled-model")]
+#[test]
+fn noise_that_is_just_visible_is_where_p_crosses() {
+    let oracle = Oracle::bundled();
+    let just = oracle.just_visible().unwrap();
+    let descriptor = |amplitude: f32| {
+        let mut raw = oracle.model().classifier().scaler.mean.clone();
+        let here = oracle.model().descriptor().pooled_visible_noise(&raw).unwrap();
+        oracle.model().descriptor().project(&mut raw, (here / amplitude).powi(2));
+        oracle.model().judge(&raw).probability
+    };
+    assert!(descriptor(0.99 * just) > 0.9 && descriptor(1.01 * just) < 0.9);
+}
+
+/// Single pixels of black and white: more contrast than any zone of the training data has.
+#[cfg(feature = "bundled-model")]
+fn checker(pixel: usize) -> f32 {
+    if (pixel + pixel / 64).is_multiple_of(2) { 0.0 } else { 1.0 }
+}
+
+#[cfg(feature = "bundled-model")]
+#[test]
+fn what_nobody_was_asked_about_is_told_from_what_is_only_noisy_or_clean() {
+    let verdict = |film: &Film| judge(&mut Oracle::bundled(), film, None).unwrap();
+    // Black, next to black, and flat: nothing unheard of, and nothing to see.
+    for picture in [|_| 0.0, |_| 1e-9, |_| 0.2] {
+        let flat = verdict(&film_of(picture, 100, 0.0));
+        assert!(!flat.unfamiliar && flat.converged, "{flat:?}");
+    }
+    // Noise alone, however much, is no texture: it is not converged, and is expected to be.
+    for sigma in [1.0, 10.0] {
+        let noisy = verdict(&film_of(|_| 0.2, 100, sigma));
+        assert!(!noisy.unfamiliar && !noisy.converged && noisy.expected_spp > Some(1000), "{noisy:?}");
+    }
+    // More contrast than any zone had: said, and done all the same when it is clean.
+    let contrast = verdict(&film_of(checker, 100, 0.0));
+    assert!(contrast.unfamiliar && contrast.converged, "{contrast:?}");
+}
+
+#[cfg(feature = "bundled-model")]
+#[test]
+fn an_unfamiliar_tile_gets_twice_the_samples() {
+    let careless = changed(Model::bundled(), |m| m.familiarity = None).unwrap();
+    let film = film_of(checker, 100, 2.0);
+    let expected = |model: Model| {
+        let verdict = judge(&mut Oracle::new(model, Threshold::PAPER), &film, None).unwrap();
+        assert!(!verdict.converged, "{verdict:?}");
+        verdict.expected_spp.unwrap() as f64
+    };
+    let ratio = expected(Model::bundled()) / expected(careless);
+    // The expected need is found to a fiftieth of a doubling, each time.
+    assert!((ratio.log2() - 1.0).abs() < 0.04, "{ratio}");
+}
+
+/// People who need twice the samples see at 2n what the trained see at n, and expect twice the samples; who need no more see the same.
+#[cfg(feature = "bundled-model")]
+#[test]
+fn another_audience_sees_the_noise_of_fewer_samples() {
+    let oracle = Oracle::bundled();
+    let describe = |samples: u64| {
+        let film = film(samples, 1.5);
+        let planes = TilePlanes::from_halves(&film, &Display::SRGB, film.grid().tile(0));
+        vec![oracle.describe(&planes, samples as f64).unwrap()]
+    };
+    let at = describe(400);
+    let own = oracle.judge_described(&at)[0];
+    assert_eq!(oracle.judge_described_for(&at, Audience::TRAINED).unwrap()[0], own);
+    let for_line = |slope, offset| oracle.judge_described_for(&at, Audience { slope, offset }).unwrap()[0];
+    // Half the demands are no reason to stop sooner than the session would.
+    assert_eq!(for_line(0.5, 0.0), own);
+    let half = describe(200);
+    let twice = for_line(2.0, 0.0);
+    // Another film has other noise: its amplitude over 4096 pixels is known to 1 %.
+    let half = oracle.judge_described(&half)[0];
+    assert!((twice.probability.unwrap() - half.probability.unwrap()).abs() < 0.03, "{twice:?} {half:?}");
+    let (own, twice) = (own.expected_spp.unwrap() as f64, twice.expected_spp.unwrap() as f64);
+    assert!((twice / own - 2.0).abs() < 0.06, "{own} {twice}");
+    let never = for_line(1.0, 1000.0);
+    assert!(!never.converged && never.probability == Some(0.0) && never.expected_spp > Some(1000));
+    assert_eq!(Audience { slope: 0.0, offset: 100.0 }.seen_as(100.0), 100.0);
+    assert_eq!(Audience { slope: 0.0, offset: 101.0 }.seen_as(100.0), 0.0);
+}
+
+/// A film of two tiles, the second much noisier, with `samples` samples.
+fn two_tiles(samples: u64) -> Film {
+    let mut film = Film::new(TileGrid::new(128, 64, 64).unwrap());
+    for tile in 0..2 {
+        let half = |seed: usize| -> Vec<Rgb> {
+            let sign =
+                |i: usize| if ((i * 7919 + seed * 104_729) / 31).is_multiple_of(2) { 1.0 } else { -1.0 };
+            let sigma = if tile == 0 { 0.01 } else { 0.1 };
+            (0..64 * 64).map(|i| [0.2 + sigma * sign(i); 3]).collect()
+        };
+        (1..=2).for_each(|seed| film.add(tile, samples / 2, &half(seed)).unwrap());
+    }
+    film
+}
+
+#[test]
+fn tiles_are_judged_in_their_picture_whoever_is_asked_about() {
+    let (film, fresh) = (two_tiles(100), || Oracle::new(small(), Threshold::PAPER));
+    let ask = |oracle: &mut Oracle, film: &Film, tiles: &[usize]| {
+        let tiles: Vec<Tile> = tiles.iter().map(|&t| film.grid().tile(t)).collect();
+        oracle.judge(&View { film, display: &Display::SRGB, reference: None }, &tiles).unwrap()
+    };
+    let both = ask(&mut fresh(), &film, &[0, 1]);
+    assert_eq!(ask(&mut fresh(), &film, &[1, 0, 1]), [both[1], both[0], both[1]]);
+    // What was found in another film is forgotten when this one begins.
+    let mut used = fresh();
+    ask(&mut used, &two_tiles(400), &[0, 1]);
+    used.begin(film.grid());
+    assert_eq!(ask(&mut used, &film, &[0])[0], both[0]);
+    assert_eq!(used.described, {
+        let mut o = fresh();
+        ask(&mut o, &film, &[0]);
+        o.described
+    });
+}
+
+#[test]
+fn the_paper_s_descriptor_judges_tiles_of_its_size_only() {
+    let descriptor = Descriptor::mask_pair(NoiseMask::default(), 64);
+    let n = descriptor.dimensions();
+    assert_eq!(n, 2 * 64 * 64);
+    let svm = Svm { gamma: 2.0, rho: 0.5, coefficients: vec![1.0], vectors: vec![0.0; n] };
+    let model = changed(small(), |m| {
+        m.descriptor = descriptor;
+        (m.classifier.scaler, m.classifier.svm) = (Scaler::identity(n), svm);
+    });
+    let model = model.unwrap();
+    let mut oracle = Oracle::new(model, Threshold::PAPER);
+    // No noise, no mask: the support vector itself, f = 1 − ρ.
+    let verdict = judge(&mut oracle, &film(100, 0.0), None).unwrap();
+    assert!((verdict.probability.unwrap() - 1.0 / (1.0 + (-1f32).exp())).abs() < 1e-5);
+    assert_eq!(verdict.expected_spp, None, "masks do not tell noise from picture");
+    assert_eq!(oracle.just_visible(), None);
+    let film = film(100, 0.0);
+    let view = View { film: &film, display: &Display::SRGB, reference: None };
+    assert_eq!(oracle.visible_noise(&view), None);
+
+    let mut ragged = Film::new(TileGrid::new(40, 64, 64).unwrap());
+    (0..2).for_each(|_| ragged.add(0, 1, &[[0.0; 3]; 40 * 64]).unwrap());
+    let error = judge(&mut oracle, &ragged, None).unwrap_err();
+    assert!(matches!(error, CriterionError::TileSize { expected: 64, width: 40, .. }), "{error}");
+}

@@ -1,0 +1,44 @@
+//! Snapshots of sessions.
+
+use super::Session;
+use crate::checkpoint::{Checkpoint, CheckpointError};
+use crate::criterion::Resumable;
+use crate::stop::{Stop, StopReason};
+use std::borrow::Cow;
+
+impl<C: Resumable> Session<C> {
+    /// A snapshot, for resuming the session later. `job` is how the caller identifies the job: scene, seed, options.
+    pub fn checkpoint<'a>(&'a self, job: &'a str) -> Checkpoint<'a> {
+        Checkpoint {
+            job: job.into(),
+            criterion: self.criterion.fingerprint(),
+            state: self.criterion.state(),
+            params: self.params,
+            display: self.display,
+            film: Cow::Borrowed(&self.film),
+            tiles: Cow::Borrowed(&self.tiles),
+        }
+    }
+
+    /// Resumes another session of the same job where it stood. Tiles that were ended by a limit or a failure are open
+    /// again; those that have converged, or have as many samples as are allowed, are not.
+    ///
+    /// If the same samples are pushed, everything that follows equals the session that was not interrupted, to the bit.
+    ///
+    /// # Errors
+    /// [`CheckpointError`] if job, criterion (its [fingerprint](crate::StoppingCriterion::fingerprint): model, threshold,
+    /// constants), parameters or image size are not those of the checkpoint, or if it contradicts itself.
+    pub fn resume(mut self, job: &str, checkpoint: Checkpoint<'_>) -> Result<Self, CheckpointError> {
+        checkpoint.check(job, &self.criterion.fingerprint(), &self.params, &self.film)?;
+        if !self.criterion.restore(self.film.grid(), &checkpoint.state) {
+            return Err(CheckpointError::Invalid("the state of its criterion is not valid"));
+        }
+        let mut tiles = checkpoint.tiles.into_owned();
+        for state in &mut tiles {
+            let done = |stop: &Stop| matches!(stop.reason, StopReason::Converged | StopReason::MaxSpp);
+            state.stop = state.stop.filter(done);
+        }
+        let film = checkpoint.film.into_owned();
+        Ok(Self { film, tiles, display: checkpoint.display, displayed_reference: None, ..self })
+    }
+}

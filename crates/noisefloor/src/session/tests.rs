@@ -1,0 +1,161 @@
+use super::*;
+use crate::criterion::Needs;
+use crate::params::Schedule;
+
+/// Says "converged" from given samples on, with halves or without.
+struct From {
+    samples: u64,
+    halves: bool,
+    asked: Vec<(usize, u64)>,
+}
+
+impl StoppingCriterion for From {
+    fn name(&self) -> String {
+        "from".into()
+    }
+
+    fn fingerprint(&self) -> String {
+        self.name()
+    }
+
+    fn needs(&self) -> Needs {
+        Needs { halves: self.halves, reference: false }
+    }
+
+    fn judge(&mut self, view: &View<'_>, tiles: &[Tile]) -> Result<Vec<Verdict>, CriterionError> {
+        let verdict = |tile: &Tile| {
+            let samples = view.film.spp(tile.index);
+            self.asked.push((tile.index, samples));
+            // Tiles further on need more.
+            let enough = self.samples * (tile.index as u64 + 1);
+            Verdict {
+                converged: samples >= enough,
+                probability: Some(0.5),
+                expected_spp: Some(enough),
+                unfamiliar: tile.index == 1,
+                ..Verdict::default()
+            }
+        };
+        Ok(tiles.iter().map(verdict).collect())
+    }
+}
+
+fn session(samples: u64, halves: bool, params: Params) -> Session<From> {
+    Session::new(70, 32, From { samples, halves, asked: vec![] }, Params { tile: 32, ..params }).unwrap()
+}
+
+fn run(session: &mut Session<From>) -> Vec<(u64, StopReason)> {
+    while !session.is_done() {
+        for r in session.requests() {
+            assert_eq!(r.first, session.film().spp(r.tile.index));
+            session.push(r.tile.index, r.spp, &vec![[0.3; 3]; r.tile.pixels()]).unwrap();
+        }
+        session.judge().unwrap();
+    }
+    session.stops().map(|s| (s.spp, s.reason)).collect()
+}
+
+#[test]
+fn each_tile_stops_when_it_has_enough() {
+    use StopReason::Converged;
+    let expected = [(300, Converged), (600, Converged), (900, Converged)];
+    let mut s = session(300, true, Params::default());
+    assert_eq!(run(&mut s), expected);
+    assert!(s.stops().map(|stop| stop.unfamiliar).eq([false, true, false]));
+    assert_eq!(s.film().half_counts(1), [300, 300]);
+    assert_eq!(run(&mut session(300, false, Params::default())), expected);
+}
+
+#[test]
+fn spaced_verdicts_stop_at_the_same_samples_with_fewer_looks() {
+    let params = Params { schedule: Schedule::Spaced { step: 100 }, ..Params::default() };
+    let (mut every, mut spaced) = (session(2000, true, Params::default()), session(2000, true, params));
+    assert_eq!(run(&mut every), run(&mut spaced));
+    assert!(spaced.criterion.asked.len() * 2 < every.criterion.asked.len());
+}
+
+#[test]
+fn limits_hold() {
+    use StopReason::{Converged, MaxSpp};
+    let params = Params { min_spp: 400, max_spp: 750, ..Params::default() };
+    assert_eq!(run(&mut session(300, true, params)), [(400, Converged), (600, Converged), (750, MaxSpp)]);
+}
+
+#[test]
+fn one_verdict_is_not_a_streak() {
+    let params = Params { consecutive: 3, ..Params::default() };
+    assert_eq!(run(&mut session(300, true, params)).map_samples(), [500, 800, 1100]);
+}
+
+#[test]
+fn a_demanding_audience_gets_more() {
+    let params = Params { audience: Audience::ART_STUDENTS, max_spp: 1200, ..Params::default() };
+    // 1.94·300 − 346 = 236 → 300; 1.94·600 − 346 = 818; 1.94·900 − 346 = 1400 → the limit.
+    let mut s = session(300, true, params);
+    let stops = run(&mut s);
+    assert_eq!(stops.map_samples(), [300, 818, 1200]);
+    assert_eq!(stops[2].1, StopReason::MaxSpp);
+    assert!(s.criterion.asked.iter().all(|&(_, n)| n <= 900), "no more verdicts once converged");
+}
+
+#[test]
+fn nothing_is_judged_before_every_tile_has_samples() {
+    let mut s = session(100, true, Params::default());
+    for _ in 0..2 {
+        s.push(0, 50, &[[0.3; 3]; 32 * 32]).unwrap();
+    }
+    assert_eq!(s.judge().unwrap(), []);
+    assert!(s.display().is_none());
+    s.set_display(Display::SRGB);
+    assert_eq!(s.judge().unwrap().len(), 1);
+}
+
+#[test]
+fn the_exposure_is_frozen_at_the_first_verdict() {
+    let mut s = session(500, false, Params::default());
+    for (n, value) in [(100, 0.3), (100, 3.0)] {
+        for tile in 0..3 {
+            let pixels = s.film().grid().tile(tile).pixels();
+            s.push(tile, n, &vec![[value; 3]; pixels]).unwrap();
+        }
+        s.judge().unwrap();
+        assert!((s.display().unwrap().exposure() - 0.18 / 0.3).abs() < 1e-4);
+    }
+}
+
+#[test]
+fn closing_keeps_what_is_done() {
+    let mut s = session(100, true, Params::default());
+    for _ in 0..2 {
+        for r in s.requests() {
+            s.push(r.tile.index, r.spp, &vec![[0.3; 3]; r.tile.pixels()]).unwrap();
+        }
+    }
+    assert_eq!(s.judge().unwrap().len(), 1);
+    assert_eq!(s.close_all(StopReason::TimeLimit).len(), 2);
+    let reasons: Vec<_> = s.stops().map(|s| s.reason).collect();
+    assert_eq!(reasons, [StopReason::Converged, StopReason::TimeLimit, StopReason::TimeLimit]);
+    assert!(s.requests().is_empty());
+}
+
+#[test]
+fn bad_input_is_an_error() {
+    let new =
+        |w, h, tile| Session::new(w, h, crate::FixedSpp(1), Params { tile, ..Params::default() }).map(|_| ());
+    assert!(matches!(new(0, 10, 32), Err(SessionError::Tile(_))));
+    assert!(matches!(new(10, 10, 0), Err(SessionError::Tile(_))));
+    let mut s = session(100, true, Params::default());
+    let reference = Reference { width: 70, height: 32, pixels: vec![] };
+    assert!(matches!(s.set_reference(reference), Err(SessionError::Reference { .. })));
+    assert!(s.push(9, 1, &[]).is_err());
+}
+
+trait MapSamples {
+    fn map_samples(&self) -> Vec<u64>;
+}
+
+impl MapSamples for Vec<(u64, StopReason)> {
+    fn map_samples(&self) -> Vec<u64> {
+        self.iter().map(|s| s.0).collect()
+    }
+}

@@ -1,0 +1,66 @@
+//! How tiles end.
+
+use crate::criterion::Verdict;
+use crate::tile::Tile;
+use serde::{Deserialize, Serialize};
+use std::fmt;
+
+/// Why a tile gets no more samples.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
+pub enum StopReason {
+    /// The criterion is satisfied.
+    Converged,
+    /// The largest number of samples was reached first.
+    MaxSpp,
+    /// The time limit was reached.
+    TimeLimit,
+    /// The run was cancelled.
+    Cancelled,
+    /// The source has no more samples (a playback came to its end).
+    SourceExhausted,
+    /// The source or the criterion failed.
+    Failed,
+}
+
+impl fmt::Display for StopReason {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Converged => "converged",
+            Self::MaxSpp => "max-spp",
+            Self::TimeLimit => "time-limit",
+            Self::Cancelled => "cancelled",
+            Self::SourceExhausted => "source-exhausted",
+            Self::Failed => "failed",
+        })
+    }
+}
+
+/// A tile that is done.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Stop {
+    /// The tile.
+    pub tile: Tile,
+    /// Samples per pixel when it stopped.
+    pub spp: u64,
+    /// Probability, at the last verdict, that an observer sees no difference; `None` if never judged or not offered.
+    pub probability: Option<f32>,
+    /// Why.
+    pub reason: StopReason,
+    /// Whether the last verdict said that the tile is unlike anything the criterion was made for.
+    pub unfamiliar: bool,
+}
+
+/// Where a tile stands.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+pub(crate) struct TileState {
+    /// Judge at this many samples.
+    pub(crate) next: u64,
+    /// Verdicts in a row that said "converged".
+    pub(crate) streak: u32,
+    pub(crate) verdict: Option<Verdict>,
+    /// Converged for the trained audience; this audience wants so many.
+    pub(crate) target: Option<u64>,
+    pub(crate) stop: Option<Stop>,
+}
