@@ -4,8 +4,8 @@ use crate::sources::{ADAPTERS, Adapter};
 use anyhow::Context;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use noisefloor::{
-    Audience, DEFAULT_KEY, DEFAULT_THRESHOLD, DEFAULT_TILE, Evidence, MAX_TILE, MIN_TILE, Model, Oracle,
-    Params, Schedule, ToneMapping,
+    Audience, DEFAULT_KEY, DEFAULT_TILE, Evidence, MAX_TILE, MIN_TILE, Model, Oracle, Params, Schedule,
+    Threshold, ToneMapping,
 };
 use noisefloor_rivals::{RIVALS, Rival};
 use std::fs::File;
@@ -80,7 +80,7 @@ pub struct RenderArgs {
     pub tile: usize,
     /// Samples per pixel between two verdicts on a tile.
     #[arg(long, default_value_t = 100, value_name = "SPP")]
-    pub batch: u32,
+    pub batch: u64,
     /// When tiles are judged: after `every` batch, or `spaced` by the expected need, in multiples of the batch.
     #[arg(long, value_enum, default_value_t = ScheduleChoice::Every)]
     pub schedule: ScheduleChoice,
@@ -185,7 +185,7 @@ pub struct CompareArgs {
     pub tile: usize,
     /// Samples per pixel between two verdicts on a tile.
     #[arg(long, default_value_t = 100, value_name = "SPP")]
-    pub batch: u32,
+    pub batch: u64,
     /// The run ends at so many samples per pixel, whoever is not satisfied.
     #[arg(long, value_name = "SPP", default_value_t = 2000)]
     pub max_spp: u64,
@@ -345,8 +345,8 @@ pub struct EvaluateArgs {
     #[arg(long)]
     pub leave_one_scene_out: bool,
     /// Probability from which a tile counts as converged.
-    #[arg(long, default_value_t = DEFAULT_THRESHOLD, value_name = "P")]
-    pub threshold: f32,
+    #[arg(long, default_value_t = Threshold::PAPER, value_name = "P")]
+    pub threshold: Threshold,
     /// Write scores as JSON.
     #[arg(long, value_name = "FILE")]
     pub json: Option<PathBuf>,
@@ -639,8 +639,8 @@ pub struct OracleArgs {
     #[arg(long, value_name = "FILE")]
     pub model: Option<PathBuf>,
     /// Probability, that an observer sees no difference, from which a tile counts as converged.
-    #[arg(long, default_value_t = DEFAULT_THRESHOLD, value_name = "P")]
-    pub threshold: f32,
+    #[arg(long, default_value_t = Threshold::PAPER, value_name = "P")]
+    pub threshold: Threshold,
 }
 
 /// The way from radiance to the screen.
@@ -834,7 +834,7 @@ impl ToneArgs {
 impl OracleArgs {
     /// The oracle, loaded and checked.
     pub fn load(&self) -> anyhow::Result<Oracle> {
-        Ok(Oracle::new(load_model(self.model.as_deref())?, self.threshold)?)
+        Ok(Oracle::new(load_model(self.model.as_deref())?, self.threshold))
     }
 }
 
@@ -862,9 +862,9 @@ impl RenderArgs {
             ScheduleChoice::Every => Schedule::Every { step: self.batch },
             ScheduleChoice::Spaced => Schedule::Spaced { step: self.batch },
         };
-        let max_samples = match &self.criterion {
+        let max_spp = match &self.criterion {
             CriterionChoice::Oracle | CriterionChoice::Rival(_) => {
-                self.max_spp.unwrap_or(Params::default().max_samples)
+                self.max_spp.unwrap_or(Params::default().max_spp)
             }
             // Exactly so many, not the next multiple of the batch.
             CriterionChoice::Fixed(samples) => self.max_spp.map_or(*samples, |most| most.min(*samples)),
@@ -873,8 +873,8 @@ impl RenderArgs {
             tile: self.tile,
             tone_mapping: self.tone.check()?,
             schedule,
-            min_samples: self.min_spp.unwrap_or(0),
-            max_samples,
+            min_spp: self.min_spp.unwrap_or(0),
+            max_spp,
             consecutive: self.consecutive,
             audience: self.audience,
         };

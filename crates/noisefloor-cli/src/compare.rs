@@ -55,7 +55,7 @@ fn params(args: &CompareArgs) -> anyhow::Result<Params> {
         tile: args.tile,
         tone_mapping: args.tone.check()?,
         schedule: Schedule::Every { step: args.batch },
-        max_samples: args.max_spp,
+        max_spp: args.max_spp,
         ..Params::default()
     };
     params.check().with_context(|| {

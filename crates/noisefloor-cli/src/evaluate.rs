@@ -66,9 +66,6 @@ struct Report {
 }
 
 pub fn run(args: &EvaluateArgs) -> anyhow::Result<()> {
-    if !(args.threshold > 0.0 && args.threshold < 1.0) {
-        bail!("--threshold must lie between 0 and 1, not {}", args.threshold);
-    }
     let params = search(&args.search)?;
     for path in args.json.iter().chain(&args.csv) {
         check_writable(path)?;
@@ -76,24 +73,28 @@ pub fn run(args: &EvaluateArgs) -> anyhow::Result<()> {
     let model = if args.leave_one_scene_out { None } else { Some(load_model(args.model.as_deref())?) };
     // A model is scored by its own descriptor and evidence.
     let trained_with = (descriptor(&args.search)?, args.search.evidence.into());
-    let (descriptor, evidence) = model.as_ref().map_or(trained_with, |m| (m.descriptor, m.evidence));
-    let table = load_table(&args.data, descriptor, evidence)?.without(&args.without).map_err(|name| {
+    let (descriptor, evidence) =
+        model.as_ref().map_or(trained_with, |m| (m.descriptor().clone(), m.evidence()));
+    let table = load_table(&args.data, &descriptor, evidence)?.without(&args.without).map_err(|name| {
         anyhow!("--without {name}: the numbers of the table are {}", descriptor.number_names().join(", "))
     })?;
     let (predicted_by, predictions) = match &model {
         None => ("leave-one-scene-out".to_owned(), held_out(&table, &params, args.threshold)?),
         Some(model) => {
-            if (model.descriptor, model.evidence) != (table.descriptor, table.evidence) {
+            if (model.descriptor(), model.evidence()) != (&table.descriptor, table.evidence) {
                 bail!(
                     "the model goes by the {} descriptor {:?} and {:?} as evidence, the table by {:?} and {:?}",
-                    model.descriptor.name(),
-                    model.descriptor,
-                    model.evidence,
+                    model.descriptor().name(),
+                    model.descriptor(),
+                    model.evidence(),
                     table.descriptor,
                     table.evidence
                 );
             }
-            (model.digest(), table.zones.iter().map(|z| predict(model, args.threshold, z)).collect())
+            (
+                model.digest(),
+                table.zones.iter().map(|z| predict(|raw| model.judge(raw), args.threshold, z)).collect(),
+            )
         }
     };
     let mut report = Report::new(predicted_by, &table, &predictions, params.spread);
@@ -123,7 +124,7 @@ pub fn run(args: &EvaluateArgs) -> anyhow::Result<()> {
 
     // What flatters a number stands beside it.
     let seen = |m: &Model| -> Vec<String> {
-        m.record.scenes.iter().filter(|s| table.scenes().contains(&s.as_str())).cloned().collect()
+        m.record().scenes.iter().filter(|s| table.scenes().contains(&s.as_str())).cloned().collect()
     };
     let seen = model.as_ref().map(seen).unwrap_or_default();
     if !seen.is_empty() {

@@ -1,7 +1,7 @@
 //! `noisefloor inspect` and `noisefloor scenes`.
 
 use crate::args::{InspectArgs, load_model};
-use noisefloor::{Audience, Descriptor, Evidence, Model, Scores, ToneMapping, TrainingRecord};
+use noisefloor::{Audience, DescriptorSpec, Evidence, Scores, ToneMapping, TrainingRecord};
 use noisefloor_ptwne::scenes;
 use serde::Serialize;
 
@@ -9,7 +9,7 @@ use serde::Serialize;
 #[derive(Serialize)]
 struct Summary<'a> {
     digest: String,
-    descriptor: &'a Descriptor,
+    descriptor: DescriptorSpec,
     descriptor_version: u16,
     numbers: usize,
     evidence: Evidence,
@@ -25,19 +25,19 @@ struct Summary<'a> {
 
 pub fn run(args: &InspectArgs) -> anyhow::Result<()> {
     let model = load_model(args.model.as_deref())?;
-    let Model { descriptor, svm, familiarity, record, .. } = &model;
+    let (descriptor, svm, record) = (model.descriptor(), &model.classifier().svm, model.record());
     let summary = Summary {
         digest: model.digest(),
-        descriptor,
-        descriptor_version: model.descriptor_version,
-        numbers: descriptor.len(),
-        evidence: model.evidence,
-        tone_mapping: model.tone_mapping,
+        descriptor: descriptor.spec(),
+        descriptor_version: descriptor.version(),
+        numbers: descriptor.dimensions(),
+        evidence: model.evidence(),
+        tone_mapping: model.tone_mapping(),
         support_vectors: svm.coefficients.len(),
         gamma: svm.gamma,
-        familiar_zones: familiarity.as_ref().map(|f| f.zones.len()),
-        familiar_reach: familiarity.as_ref().map(|f| f.reach),
-        audience: model.audience,
+        familiar_zones: model.familiarity().map(|f| f.zones.len()),
+        familiar_reach: model.familiarity().map(|f| f.reach),
+        audience: model.audience(),
         record,
     };
     if args.json {
@@ -53,7 +53,7 @@ pub fn run(args: &InspectArgs) -> anyhow::Result<()> {
     );
     println!(
         "evidence         {}",
-        match model.evidence {
+        match model.evidence() {
             Evidence::Halves => "the other half buffer",
             Evidence::Alone => "none: the picture alone",
             Evidence::Reference => "a ray-traced reference",
@@ -61,7 +61,7 @@ pub fn run(args: &InspectArgs) -> anyhow::Result<()> {
     );
     println!(
         "trained through  {}",
-        match model.tone_mapping {
+        match model.tone_mapping() {
             ToneMapping::Srgb { exposure } => format!("plain sRGB, exposure {exposure}"),
             ToneMapping::Reinhard { key, white: None } => format!("Reinhard, key {key}"),
             ToneMapping::Reinhard { key, white: Some(white) } =>
@@ -77,7 +77,7 @@ pub fn run(args: &InspectArgs) -> anyhow::Result<()> {
             "familiar         {zones} zones, and textures within {reach:.3} standard deviations of them"
         );
     }
-    println!("audience         T' = {} T + {}", model.audience.slope, model.audience.offset);
+    println!("audience         T' = {} T + {}", model.audience().slope, model.audience().offset);
     println!("trained on       {}", record.corpus);
     println!("scenes           {}", record.scenes.join(", "));
     println!("table            {}", record.table_digest);

@@ -2,7 +2,7 @@
 
 use crate::args::JudgeArgs;
 use anyhow::{Context, bail};
-use noisefloor::{Evidence, Held, Oracle, Samples, Still, Tile, TileGrid, Verdict};
+use noisefloor::{Evidence, Oracle, Samples, SnapshotPair, Still, Threshold, Tile, TileGrid, Verdict};
 use noisefloor_image::maps::{ColourScale, TileMark, draw_field, draw_tiles, noise_scale};
 use noisefloor_image::{RenderLayers, check_writable, read_picture, write_exr};
 use serde::Serialize;
@@ -29,7 +29,7 @@ struct Report<'a> {
     image: &'a Path,
     spp: f64,
     model: String,
-    threshold: f32,
+    threshold: Threshold,
     converged_tiles: usize,
     unfamiliar_tiles: usize,
     tiles: &'a [Row],
@@ -39,7 +39,7 @@ pub fn run(args: &JudgeArgs) -> anyhow::Result<()> {
     // Read and check everything that was typed.
     let tone = args.tone.check()?;
     let oracle = args.oracle.load()?;
-    if oracle.model().evidence != Evidence::Halves {
+    if oracle.model().evidence() != Evidence::Halves {
         bail!(
             "this model does not hold tiles against other samples, as `judge` does: use one that was trained on half buffers"
         );
@@ -56,7 +56,7 @@ pub fn run(args: &JudgeArgs) -> anyhow::Result<()> {
     }
     let just_visible = oracle.just_visible();
     if args.noise_map.is_some() && just_visible.is_none() {
-        let name = oracle.model().descriptor.name();
+        let name = oracle.model().descriptor().name();
         bail!(
             "--noise-map: a model with the {name} descriptor has no map of visible noise; use one with the compact descriptor"
         );
@@ -81,7 +81,7 @@ pub fn run(args: &JudgeArgs) -> anyhow::Result<()> {
         _ => None,
     };
     let others: Vec<&Still> = others.iter().collect();
-    let held = Held::new(Evidence::Halves, &image, &others, tone, samples)?;
+    let held = SnapshotPair::new(Evidence::Halves, &image, &others, tone, samples)?;
     if samples.is_none() && held.samples() == Samples::Nested {
         eprintln!(
             "note: the pictures share samples, as stages of one rendering do, and are judged as --nested; --independent overrules"
@@ -140,11 +140,11 @@ fn read(path: &Path, spp: f64) -> anyhow::Result<Still> {
     Ok(still)
 }
 
-fn judge(oracle: &Oracle, grid: TileGrid, held: &Held<'_>) -> anyhow::Result<Vec<Row>> {
+fn judge(oracle: &Oracle, grid: TileGrid, held: &SnapshotPair<'_>) -> anyhow::Result<Vec<Row>> {
     let row = |(tile, verdict): (Tile, Verdict)| {
-        let Verdict { converged, probability, expected_samples, unfamiliar } = verdict;
+        let Verdict { converged, probability, expected_spp, unfamiliar, .. } = verdict;
         let Tile { index, x, y, width, height } = tile;
-        let (probability, expected_spp) = (probability.unwrap_or(0.0), expected_samples);
+        let (probability, expected_spp) = (probability.unwrap_or(0.0), expected_spp);
         Row { tile: index, x, y, width, height, probability, converged, expected_spp, unfamiliar }
     };
     let described = held.describe(oracle, grid)?;

@@ -115,8 +115,8 @@ pub struct Output {
     model: Option<ModelFacts>,
     reference: Option<Vec<Rgb>>,
     timeline: Vec<TimelineRow>,
-    /// What checkpoints are of; none if there are none.
-    job: Option<String>,
+    /// Whether there are checkpoints to resume from.
+    resumable: bool,
     seconds_before: f64,
 }
 
@@ -131,7 +131,7 @@ impl Output {
         source: String,
         model: Option<ModelFacts>,
         reference: Option<Vec<Rgb>>,
-        job: Option<String>,
+        resumable: bool,
     ) -> anyhow::Result<Self> {
         let folder = args.out.clone().unwrap_or_else(|| Path::new("out").join(&scene));
         std::fs::create_dir_all(&folder).with_context(|| {
@@ -139,7 +139,7 @@ impl Output {
         })?;
         check_writable(folder.join("image.exr"))?;
         let (seed, timeline) = (args.renderer.seed, Vec::new());
-        Ok(Self { folder, scene, source, seed, model, reference, timeline, job, seconds_before: 0.0 })
+        Ok(Self { folder, scene, source, seed, model, reference, timeline, resumable, seconds_before: 0.0 })
     }
 
     /// The output folder, for people.
@@ -175,12 +175,19 @@ impl Output {
     }
 
     /// Writes the checkpoint of a render that is not done, and removes that of one that is.
-    fn write_checkpoint<C: StoppingCriterion>(&self, session: &Session<C>) -> anyhow::Result<()> {
-        let Some(job) = &self.job else { return Ok(()) };
+    fn write_checkpoint<C>(
+        &self,
+        session: &Session<C>,
+        checkpoint: Option<Checkpoint<'_>>,
+    ) -> anyhow::Result<()>
+    where
+        C: StoppingCriterion,
+    {
+        let Some(checkpoint) = checkpoint else { return Ok(()) };
         let path = self.folder.join(CHECKPOINT);
-        let done = |stop: Stop| matches!(stop.reason, StopReason::Converged | StopReason::MaxSamples);
+        let done = |stop: Stop| matches!(stop.reason, StopReason::Converged | StopReason::MaxSpp);
         if !session.is_done() || !session.stops().all(done) {
-            return Ok(write_atomic(path, |to| session.checkpoint(job).write(to))?);
+            return Ok(write_atomic(path, |to| checkpoint.write(to))?);
         }
         match std::fs::remove_file(&path) {
             Err(error) if error.kind() != io::ErrorKind::NotFound => {
@@ -205,6 +212,7 @@ impl Output {
     pub fn write<C: StoppingCriterion>(
         &self,
         session: &Session<C>,
+        checkpoint: Option<Checkpoint<'_>>,
         over: Option<(Clock, &dyn Source)>,
     ) -> anyhow::Result<()> {
         let film = session.film();
@@ -218,7 +226,7 @@ impl Output {
         let mut stopped = vec![false; image.len()];
         for (stop, open) in &tiles {
             for pixel in stop.tile.rows(width).flatten() {
-                spp[pixel] = u32::try_from(stop.samples).unwrap_or(u32::MAX);
+                spp[pixel] = u32::try_from(stop.spp).unwrap_or(u32::MAX);
                 probability[pixel] = stop.probability.unwrap_or(f32::NAN);
                 stopped[pixel] = !open;
             }
@@ -248,7 +256,7 @@ impl Output {
 
         self.write_stops(&tiles)?;
         self.write_timeline()?;
-        self.write_checkpoint(session)?;
+        self.write_checkpoint(session, checkpoint)?;
         self.write_report(session, &tiles, &display, over)
     }
 
@@ -264,7 +272,7 @@ impl Output {
                     y,
                     width,
                     height,
-                    spp: stop.samples,
+                    spp: stop.spp,
                     probability: stop.probability,
                     reason,
                     unfamiliar: stop.unfamiliar,
@@ -329,7 +337,7 @@ impl Output {
     pub fn summarise<C: StoppingCriterion>(&self, session: &Session<C>, clock: Clock, source: &dyn Source) {
         let counts = source.counts();
         let film = session.film();
-        let spp: Vec<u64> = session.stops().map(|s| s.samples).collect();
+        let spp: Vec<u64> = session.stops().map(|s| s.spp).collect();
         let converged = session.stops().filter(|s| s.reason == StopReason::Converged).count();
         let (least, most) = (spp.iter().min().unwrap_or(&0), spp.iter().max().unwrap_or(&0));
         let pixels = (film.grid().width() * film.grid().height()) as f64;
@@ -368,7 +376,7 @@ impl Output {
         }
         println!("written to {}", self.folder.display());
         // One that is not of this render may lie there too
-        if self.job.is_some() && self.folder.join(CHECKPOINT).exists() {
+        if self.resumable && self.folder.join(CHECKPOINT).exists() {
             println!("the same command with --resume goes on from there");
         }
     }
@@ -394,7 +402,7 @@ pub fn say_noise(noise: &ReferenceNoise) {
 
 fn uniform_samples<C: StoppingCriterion>(session: &Session<C>) -> u64 {
     let grid = session.film().grid();
-    let most = (0..grid.len()).map(|t| session.film().samples(t)).max().unwrap_or(0);
+    let most = (0..grid.len()).map(|t| session.film().spp(t)).max().unwrap_or(0);
     most * (grid.width() * grid.height()) as u64
 }
 
@@ -407,7 +415,7 @@ fn tile_states<C: StoppingCriterion>(session: &Session<C>) -> Vec<(Stop, bool)> 
             let verdict = session.verdict(tile.index);
             let stop = Stop {
                 tile,
-                samples: session.film().samples(tile.index),
+                spp: session.film().spp(tile.index),
                 probability: verdict.and_then(|v| v.probability),
                 reason: StopReason::Cancelled,
                 unfamiliar: verdict.is_some_and(|v| v.unfamiliar),
@@ -419,10 +427,10 @@ fn tile_states<C: StoppingCriterion>(session: &Session<C>) -> Vec<(Stop, bool)> 
 }
 
 fn marks(tiles: &[(Stop, bool)]) -> Vec<TileMark> {
-    let label = |stop: &Stop, open: bool| format!("{}{}", stop.samples, if open { "+" } else { "" });
+    let label = |stop: &Stop, open: bool| format!("{}{}", stop.spp, if open { "+" } else { "" });
     let mark = |(stop, open): &(Stop, bool)| TileMark {
         tile: stop.tile,
-        value: stop.samples as f64,
+        value: stop.spp as f64,
         label: label(stop, *open),
         unfamiliar: stop.unfamiliar,
     };
@@ -430,7 +438,7 @@ fn marks(tiles: &[(Stop, bool)]) -> Vec<TileMark> {
 }
 
 fn scale(tiles: &[(Stop, bool)]) -> ColourScale {
-    let spp = || tiles.iter().map(|(stop, _)| stop.samples.max(1) as f64);
+    let spp = || tiles.iter().map(|(stop, _)| stop.spp.max(1) as f64);
     let (low, high) = (spp().fold(f64::INFINITY, f64::min), spp().fold(1.0, f64::max));
     ColourScale {
         title: "samples\nper pixel",

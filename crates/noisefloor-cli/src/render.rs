@@ -8,8 +8,8 @@ use crate::sources::{self, Opened, Source};
 use anyhow::{Context, bail};
 use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressStyle};
 use noisefloor::{
-    Driver, Event, FixedSamples, Progress, ProgressiveSource, Repeats, Rgb, Session, SourceInfo, StopReason,
-    StoppingCriterion,
+    Checkpoint, CheckpointError, Driver, Event, FixedSpp, Progress, ProgressiveSource, Repeats, Resumable,
+    Rgb, Session, SourceInfo, StopReason, StoppingCriterion,
 };
 use std::process::ExitCode;
 use std::sync::Arc;
@@ -30,10 +30,10 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<ExitCode> {
         CriterionChoice::Oracle => {
             let oracle = args.oracle.load()?;
             let facts = ModelFacts { digest: oracle.model().digest(), just_visible: oracle.just_visible() };
-            drive(Driver::new(source, oracle, params)?, args, scene, Some(facts), reference)
+            drive(Driver::new(source, oracle, params)?, args, scene, Some(facts), reference, snapshots())
         }
         CriterionChoice::Fixed(samples) => {
-            drive(Driver::new(source, FixedSamples(*samples), params)?, args, scene, None, reference)
+            drive(Driver::new(source, FixedSpp(*samples), params)?, args, scene, None, reference, snapshots())
         }
         CriterionChoice::Rival(spec) if args.resume => {
             bail!(
@@ -42,33 +42,53 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<ExitCode> {
         }
         CriterionChoice::Rival(spec) => {
             let criterion = noisefloor_rivals::parse(spec)?;
-            drive(Driver::new(source, criterion, params)?, args, scene, None, reference)
+            drive(Driver::new(source, criterion, params)?, args, scene, None, reference, None)
         }
     }
 }
 
+type Rendering<C> = Driver<Box<dyn Source>, C>;
+
+/// How a render is saved and resumed.
+struct Snapshots<C> {
+    save: for<'a> fn(&'a Session<C>, &'a str) -> Checkpoint<'a>,
+    resume: fn(Rendering<C>, &str, Checkpoint<'_>) -> Result<Rendering<C>, CheckpointError>,
+}
+
+fn snapshots<C: Resumable>() -> Option<Snapshots<C>> {
+    Some(Snapshots { save: Session::checkpoint, resume: Driver::resume })
+}
+
+fn checkpoint<'a, C>(
+    snapshots: &Option<Snapshots<C>>,
+    session: &'a Session<C>,
+    job: &'a str,
+) -> Option<Checkpoint<'a>> {
+    snapshots.as_ref().map(|s| (s.save)(session, job))
+}
+
 fn drive<C: StoppingCriterion>(
-    mut driver: Driver<Box<dyn Source>, C>,
+    mut driver: Rendering<C>,
     args: &RenderArgs,
     scene: String,
     model: Option<ModelFacts>,
     reference: Option<Vec<Rgb>>,
+    snapshots: Option<Snapshots<C>>,
 ) -> anyhow::Result<ExitCode> {
     let info = driver.source().info();
-    // A rival's state is not kept
-    let keeps = info.repeats == Repeats::Samples && !matches!(args.criterion, CriterionChoice::Rival(_));
-    if args.resume && !keeps {
+    let snapshots = snapshots.filter(|_| info.repeats == Repeats::Samples);
+    if args.resume && snapshots.is_none() {
         bail!(
-            "--resume does not go with {}, which does not promise to go on where it stood; leave it out",
+            "--resume: {} cannot be resumed, since it may repeat samples after a restart; leave it out",
             info.name
         )
     }
     let job = job(args, &info.name, model.as_ref());
-    let mut output = Output::create(args, scene, info.name, model, reference, keeps.then(|| job.clone()))?;
-    if args.resume {
+    let mut output = Output::create(args, scene, info.name, model, reference, snapshots.is_some())?;
+    if let Some(Snapshots { resume, .. }) = snapshots.as_ref().filter(|_| args.resume) {
         match output.checkpoint()? {
             Some(checkpoint) => {
-                driver = driver.resume(&job, checkpoint).with_context(|| output.checkpoint_file())?;
+                driver = resume(driver, &job, checkpoint).with_context(|| output.checkpoint_file())?;
                 output.take_up(driver.session().film().total_samples());
             }
             None if args.quiet => {}
@@ -89,7 +109,7 @@ fn drive<C: StoppingCriterion>(
             output.record(session, progress);
             show(&bar, session, progress);
             if !autosave.is_zero() && saved.elapsed() >= autosave {
-                if let Err(error) = output.write(session, None) {
+                if let Err(error) = output.write(session, checkpoint(&snapshots, session, &job), None) {
                     bar.suspend(|| eprintln!("warning: not saved: {}", crate::one_line(&error)));
                 }
                 saved = Instant::now();
@@ -100,7 +120,11 @@ fn drive<C: StoppingCriterion>(
 
     // Write what there is, also after a failure.
     let source = driver.source();
-    let written = output.write(driver.session(), Some((driver.clock(), source.as_ref())));
+    let written = output.write(
+        driver.session(),
+        checkpoint(&snapshots, driver.session(), &job),
+        Some((driver.clock(), source.as_ref())),
+    );
     source.notes().iter().for_each(|note| eprintln!("warning: {note}"));
     let mut cancelled = driver.session().stops().any(|s| s.reason == StopReason::Cancelled);
     match outcome {

@@ -5,9 +5,9 @@ use crate::bars::bar;
 use anyhow::{Context, bail};
 use noisefloor::{Descriptor, Evidence, Model, NoiseMask, SvmParams};
 use noisefloor_image::{check_writable, write_atomic};
+use noisefloor_learn::{Corpora, describe_corpora, read_table, write_table};
 use noisefloor_learn::{Prediction, Table, score};
 use noisefloor_learn::{TrainParams, leave_one_scene_out, train};
-use noisefloor_learn::{describe_corpora, read_table, write_table};
 use noisefloor_study::explore::{AnswerAgreement, LearnStep, read_answers, retrain};
 use std::fs::File;
 use std::io::BufReader;
@@ -18,7 +18,7 @@ pub fn run(args: &TrainArgs) -> anyhow::Result<()> {
     for path in args.save_table.iter().chain([&args.out]) {
         check_writable(path)?;
     }
-    let table = load_table(&args.data, descriptor(&args.search)?, args.search.evidence.into())?;
+    let table = load_table(&args.data, &descriptor(&args.search)?, args.search.evidence.into())?;
     if let Some(path) = &args.save_table {
         write_atomic(path, |to| write_table(&table, to))?;
         eprintln!("table of {} zones written to {}", table.zones.len(), path.display());
@@ -36,7 +36,7 @@ pub fn run(args: &TrainArgs) -> anyhow::Result<()> {
     let scores = if args.no_scores || table.groups().len() < 3 {
         None
     } else {
-        let predictions = held_out(&table, &params, noisefloor::DEFAULT_THRESHOLD)?;
+        let predictions = held_out(&table, &params, noisefloor::Threshold::PAPER)?;
         Some(score(predictions.iter()))
     };
     eprintln!("training on all scenes");
@@ -59,10 +59,10 @@ pub fn run(args: &TrainArgs) -> anyhow::Result<()> {
 fn print_model(model: &Model, out: &Path) {
     println!(
         "{} support vectors of {} examples, C = {}, γ = {}; written to {}",
-        model.svm.coefficients.len(),
-        model.record.examples,
-        model.record.c,
-        model.record.gamma,
+        model.classifier().svm.coefficients.len(),
+        model.record().examples,
+        model.record().c,
+        model.record().gamma,
         out.display()
     );
 }
@@ -76,7 +76,7 @@ fn with_disagreements(
     corpus: &str,
 ) -> anyhow::Result<()> {
     let all = read_answers(database)?;
-    let fitting = all.iter().filter(|d| d.said.fits(table.descriptor, table.evidence));
+    let fitting = all.iter().filter(|d| d.said.fits(&table.descriptor, table.evidence));
     let answers: Vec<_> = fitting.map(|d| d.said.answer()).collect();
     if answers.is_empty() {
         bail!(
@@ -98,7 +98,7 @@ fn with_disagreements(
         bar.set_position(step.done as u64);
         bar.set_message(step.doing);
     };
-    let base = (&Model::bundled(), noisefloor::DEFAULT_THRESHOLD);
+    let base = (&Model::bundled(), noisefloor::Threshold::PAPER);
     let (model, learned) = retrain(table, answers, params, base, corpus, on_step)?;
     bar.finish_and_clear();
     write_atomic(&args.out, |to| model.write(to))?;
@@ -125,7 +125,11 @@ fn with_disagreements(
 }
 
 /// Predictions on left-out scenes, with a bar.
-pub fn held_out(table: &Table, params: &TrainParams, threshold: f32) -> anyhow::Result<Vec<Prediction>> {
+pub fn held_out(
+    table: &Table,
+    params: &TrainParams,
+    threshold: noisefloor::Threshold,
+) -> anyhow::Result<Vec<Prediction>> {
     let bar = bar(table.groups().len() as u64, "scenes left out");
     let mut begun = false;
     let predictions = leave_one_scene_out(table, params, threshold, |group| {
@@ -140,12 +144,12 @@ pub fn held_out(table: &Table, params: &TrainParams, threshold: f32) -> anyhow::
 }
 
 /// The table that was asked for: read, or computed from pictures.
-pub fn load_table(data: &DataArgs, descriptor: Descriptor, evidence: Evidence) -> anyhow::Result<Table> {
+pub fn load_table(data: &DataArgs, descriptor: &Descriptor, evidence: Evidence) -> anyhow::Result<Table> {
     if let Some(path) = &data.table {
         return read_table_file(path);
     }
     let bar = bar(0, "zones described");
-    let table = describe_corpora(&data.corpus, descriptor, evidence, |done, all| {
+    let table = describe_corpora(Corpora::new(&data.corpus), descriptor, evidence, |done, all| {
         bar.set_length(all as u64);
         bar.set_position(done as u64);
     })?;
@@ -161,7 +165,7 @@ pub fn read_table_file(path: &Path) -> anyhow::Result<Table> {
 
 /// The descriptor to train with, checked.
 pub fn descriptor(args: &SearchArgs) -> anyhow::Result<Descriptor> {
-    Ok(Descriptor::Compact { mask: NoiseMask::try_from(args.sigma).context("--sigma")? })
+    Ok(Descriptor::compact(NoiseMask::try_from(args.sigma).context("--sigma")?))
 }
 
 /// How to train, checked.

@@ -231,7 +231,7 @@ fn disagreements_are_learned_beside_the_table() {
             threshold: 0.9,
             audience: [1.0, 0.0],
             model: "another".into(),
-            descriptor: table.descriptor,
+            descriptor: table.descriptor.spec(),
             descriptor_version: table.descriptor.version(),
             evidence: if x == 0 { table.evidence } else { Evidence::Alone },
             numbers: clean.descriptor.clone(),

@@ -38,7 +38,7 @@ impl Costs {
         let began = Instant::now();
         let batches = source.sample(requests)?;
         let seconds = began.elapsed().as_secs_f64();
-        let samples: f64 = batches.iter().map(|b| f64::from(b.samples) * b.tile.pixels() as f64).sum();
+        let samples: f64 = batches.iter().map(|b| b.spp as f64 * b.tile.pixels() as f64).sum();
         if self.calls == 1 {
             self.first = (seconds, samples.max(1.0));
         } else {

@@ -56,7 +56,7 @@ struct Facts {
 }
 
 /// Samples per pixel between two looks at the clock.
-const STEP: u32 = 64;
+const STEP: u64 = 64;
 /// What a kill may cost.
 const SAVE_EVERY: Duration = Duration::from_secs(30);
 
@@ -78,13 +78,13 @@ pub fn render_reference(
     let mut saved = Instant::now();
     while kept.spp() < job.spp {
         let (first, tiles) = (kept.spp(), kept.film.grid().tiles());
-        let samples = u32::try_from(job.spp - first).unwrap_or(STEP).min(STEP);
-        let requests: Vec<Request> = tiles.map(|tile| Request { tile, first, samples }).collect();
+        let spp = (job.spp - first).min(STEP);
+        let requests: Vec<Request> = tiles.map(|tile| Request { tile, first, spp }).collect();
         for batch in source.sample(&requests)? {
-            if batch.samples == 0 {
+            if batch.spp == 0 {
                 return Err(LabError::ShortOfSamples { spp: first });
             }
-            kept.film.add(batch.tile.index, batch.samples, &batch.mean)?;
+            kept.film.add(batch.tile.index, batch.spp, &batch.mean)?;
         }
         watch(Advance { what: "samples of the reference", done: kept.spp(), of: job.spp, detail: "" });
         let cancelled = cancel.load(Ordering::Relaxed);
@@ -128,7 +128,7 @@ impl Kept {
 
     /// Samples per pixel so far.
     fn spp(&self) -> u64 {
-        self.film.samples(0)
+        self.film.spp(0)
     }
 
     /// Takes up what the folder has, if it is of the same picture, and enough or of samples that can be told from new ones.
@@ -144,16 +144,13 @@ impl Kept {
         let path = job.folder.join(PICTURE);
         let image = read_exr(&path)?;
         let finite = image.pixels.iter().flatten().all(|c| c.is_finite());
-        let Some(samples) = u32::try_from(kept.spp).ok().filter(|&n| n > 0 && finite) else {
-            return Err(LabError::KeptReference { path });
-        };
-        if (image.width, image.height) != (kept.width, kept.height) {
+        if kept.spp == 0 || !finite || (image.width, image.height) != (kept.width, kept.height) {
             return Err(LabError::KeptReference { path });
         }
         for tile in self.film.grid().tiles() {
             let of_tile: Vec<Rgb> =
                 tile.rows(image.width).flatten().map(|pixel| image.pixels[pixel]).collect();
-            self.film.add(tile.index, samples, &of_tile)?;
+            self.film.add(tile.index, kept.spp, &of_tile)?;
         }
         Ok(())
     }

@@ -34,7 +34,7 @@ pub struct Setting<'a> {
     /// Tiles, tone mapping and the largest number of samples.
     pub params: &'a Params,
     /// Samples per pixel between two verdicts.
-    pub batch: u32,
+    pub batch: u64,
     /// The converged picture: linear radiance, row-major, as many pixels as the source renders.
     pub reference: &'a [Rgb],
     /// How far people are from the screen, for FLIP: pixels in a degree of their view.

@@ -135,7 +135,7 @@ impl Comparison {
                 tile: tile.index,
                 x: tile.x,
                 y: tile.y,
-                spp: entrant.film().samples(tile.index),
+                spp: entrant.film().spp(tile.index),
                 flip,
             }));
         }
@@ -172,7 +172,7 @@ fn criterion_run(
         name: entrant.name(),
         family: entrant.family.clone(),
         spp_mean,
-        spp_most: (0..grid.len()).map(|t| film.samples(t)).max().unwrap_or(0),
+        spp_most: (0..grid.len()).map(|t| film.spp(t)).max().unwrap_or(0),
         tiles: grid.len(),
         tiles_converged: entrant.converged(),
         source_seconds: race.source_seconds(film),

@@ -88,7 +88,7 @@ fn choose(seen: &[&Seen<'_>], yardstick: &Yardstick) -> Vec<(&'static str, Tile,
         best.map(|(i, _)| grid.tile(i))
     };
     let disagreement = |tile: usize| {
-        let spp = || seen.iter().map(|one| one.entrant.film().samples(tile).max(1) as f64);
+        let spp = || seen.iter().map(|one| one.entrant.film().spp(tile).max(1) as f64);
         spp().fold(0.0, f64::max) / spp().fold(f64::INFINITY, f64::min)
     };
     let worst = largest(yardstick.flip_of_tiles(&first.errors))
@@ -128,7 +128,7 @@ fn draw(tile: Tile, seen: &[&Seen<'_>], yardstick: &Yardstick) -> Canvas {
     label(0, 0, "reference");
     for (i, one) in seen.iter().enumerate() {
         label(i + 1, 0, &one.entrant.spec);
-        label(i + 1, 1, &format!("{} spp", one.entrant.film().samples(tile.index)));
+        label(i + 1, 1, &format!("{} spp", one.entrant.film().spp(tile.index)));
     }
     sheet
 }

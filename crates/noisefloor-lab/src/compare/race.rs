@@ -68,7 +68,7 @@ pub(super) struct Race {
 impl Race {
     /// Seconds in the source for the samples of a film.
     pub(super) fn source_seconds(&self, film: &Film) -> f64 {
-        self.tile_seconds.iter().enumerate().map(|(tile, seconds)| seconds * film.samples(tile) as f64).sum()
+        self.tile_seconds.iter().enumerate().map(|(tile, seconds)| seconds * film.spp(tile) as f64).sum()
     }
 
     /// Seconds in the source for so many samples of every pixel.
@@ -84,7 +84,7 @@ const SPACING: f64 = std::f64::consts::SQRT_2;
 pub(super) struct Course<'a> {
     pub(super) params: &'a Params,
     /// Samples per pixel of a step.
-    pub(super) step: u32,
+    pub(super) step: u64,
     /// The converged picture: linear radiance, row-major.
     pub(super) truth: &'a [Rgb],
     /// For FLIP.
@@ -110,14 +110,14 @@ impl Course<'_> {
         let mut yardstick: Option<Yardstick> = None;
         let mut curve: Vec<(u64, Quality)> = Vec::new();
         let (mut done, mut cancelled) = (0u64, false);
-        while done < self.params.max_samples && field.open() > 0 {
+        while done < self.params.max_spp && field.open() > 0 {
             cancelled = self.cancel.load(Ordering::Relaxed);
-            let samples = u32::try_from(self.params.max_samples - done).unwrap_or(self.step).min(self.step);
+            let samples = (self.params.max_spp - done).min(self.step);
             // The end of a recording, or of somebody's patience
             if cancelled || !field.step(source, done, samples)? {
                 break;
             }
-            done = field.film.samples(0);
+            done = field.film.spp(0);
             let yardstick = yardstick.get_or_insert_with(|| self.settle(&mut field));
             field.judge()?;
             let last = curve.last().map_or(0.0, |&(spp, _)| spp as f64);
@@ -125,12 +125,12 @@ impl Course<'_> {
                 curve.push((done, yardstick.quality(&field.film.image())?));
             }
             let detail = format!("{} criteria not satisfied yet", field.open());
-            let (what, of) = ("samples per pixel", self.params.max_samples);
+            let (what, of) = ("samples per pixel", self.params.max_spp);
             (self.watch)(Advance { what, done, of, detail: &detail });
         }
         let Field { mut entrants, film, costs } = field;
         for entrant in &mut entrants {
-            entrant.session.close_all(if cancelled { StopReason::Cancelled } else { StopReason::MaxSamples });
+            entrant.session.close_all(if cancelled { StopReason::Cancelled } else { StopReason::MaxSpp });
         }
         let yardstick = yardstick.ok_or(LabError::NoSamples)?;
         if curve.last().is_none_or(|&(spp, _)| spp < done) {
@@ -166,15 +166,15 @@ impl Field {
         &mut self,
         source: &mut dyn ProgressiveSource,
         first: u64,
-        samples: u32,
+        samples: u64,
     ) -> Result<bool, LabError> {
-        let request = |tile: Tile| Request { tile, first, samples };
+        let request = |tile: Tile| Request { tile, first, spp: samples };
         let requests: Vec<Request> = self.film.grid().tiles().map(request).collect();
         let batches = self.costs.sample(source, &requests)?;
-        if batches.len() < requests.len() || batches.iter().any(|b| b.samples == 0) {
+        if batches.len() < requests.len() || batches.iter().any(|b| b.spp == 0) {
             return Ok(false);
         }
-        for Batch { tile, samples, mean } in &batches {
+        for Batch { tile, spp: samples, mean } in &batches {
             self.film.add(tile.index, *samples, mean)?;
             for entrant in self.entrants.iter_mut().filter(|e| e.session.is_open(tile.index)) {
                 entrant.session.push(tile.index, *samples, mean)?;

@@ -20,7 +20,7 @@ use crate::error::LabError;
 use crate::files::{make_folder, write_json, write_text};
 use ndarray::Array2;
 use noisefloor::{Descriptor, NoiseMask};
-use noisefloor_learn::describe_pairs;
+use noisefloor_learn::{Corpora, describe_pairs};
 use pairs::{Loaded, Pairs};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -77,9 +77,9 @@ pub fn run(
 ) -> Result<ReproductionReport, LabError> {
     make_folder(folder)?;
     let mut outcomes = Vec::new();
-    for descriptor in [Descriptor::LuminancePair { edge: job.edge }, job.masks()] {
-        let loaded = job.load(descriptor, watch)?;
-        outcomes.extend(run_protocols(loaded, descriptor, folder, on_result, watch)?);
+    for descriptor in [Descriptor::luminance_pair(job.edge), job.masks()] {
+        let loaded = job.load(&descriptor, watch)?;
+        outcomes.extend(run_protocols(loaded, &descriptor, folder, on_result, watch)?);
     }
     Ok(ReproductionReport::new(job, outcomes))
 }
@@ -97,13 +97,19 @@ pub fn write_report(folder: &Path, report: &ReproductionReport) -> Result<(), La
 impl Reproduction {
     /// Pairs of noise masks, as the paper ends with.
     fn masks(&self) -> Descriptor {
-        Descriptor::MaskPair { mask: NoiseMask::default(), edge: self.edge }
+        Descriptor::mask_pair(NoiseMask::default(), self.edge)
     }
 
-    fn load(&self, descriptor: Descriptor, watch: Watch<'_>) -> Result<Loaded, LabError> {
-        let table = describe_pairs(&self.corpus, descriptor, self.edge, self.levels, |done, all| {
-            watch(Advance { what: "zones cut into pairs", done: done as u64, of: all as u64, detail: "" });
-        })?;
+    fn load(&self, descriptor: &Descriptor, watch: Watch<'_>) -> Result<Loaded, LabError> {
+        let table =
+            describe_pairs(Corpora::new(&self.corpus), descriptor, self.edge, self.levels, |done, all| {
+                watch(Advance {
+                    what: "zones cut into pairs",
+                    done: done as u64,
+                    of: all as u64,
+                    detail: "",
+                });
+            })?;
         Ok(Loaded { digest: table.digest(), table })
     }
 }
@@ -111,7 +117,7 @@ impl Reproduction {
 /// All protocols on one representation, as far as they are not there already.
 fn run_protocols(
     loaded: Loaded,
-    descriptor: Descriptor,
+    descriptor: &Descriptor,
     folder: &Path,
     on_result: &mut dyn FnMut(&Path, ResultState),
     watch: Watch<'_>,

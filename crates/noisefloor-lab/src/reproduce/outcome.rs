@@ -6,7 +6,7 @@ use super::protocol::{PairProtocol, Split};
 use crate::advance::{Advance, Watch};
 use crate::error::LabError;
 use ndarray::Axis;
-use noisefloor::{Descriptor, Svm, SvmParams, SvmTrainError, Weights, fit_weights};
+use noisefloor::{Descriptor, DescriptorSpec, Svm, SvmParams, SvmTrainError, Weights, fit_weights};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use statrs::statistics::{Data, Median};
@@ -29,7 +29,7 @@ pub struct Fingerprint {
     /// Of all pairs and their labels.
     pub table_digest: String,
     /// How a pair is described.
-    pub pairs: Descriptor,
+    pub pairs: DescriptorSpec,
     /// What is written into the rows.
     pub scaling: PairScaling,
     /// Which pairs are asked about.
@@ -41,14 +41,19 @@ pub struct Fingerprint {
 }
 
 impl Fingerprint {
-    pub(super) fn new(digest: &str, pairs: Descriptor, scaling: PairScaling, protocol: PairProtocol) -> Self {
+    pub(super) fn new(
+        digest: &str,
+        pairs: &Descriptor,
+        scaling: PairScaling,
+        protocol: PairProtocol,
+    ) -> Self {
         let (params, version) = (SvmParams::PAPER, env!("CARGO_PKG_VERSION").to_owned());
-        Self { table_digest: digest.to_owned(), pairs, scaling, protocol, params, version }
+        Self { table_digest: digest.to_owned(), pairs: pairs.spec(), scaling, protocol, params, version }
     }
 
     /// What the result is called.
     pub fn name(&self) -> String {
-        format!("{}-{}-{}", self.pairs.name(), self.scaling.name(), self.protocol.name())
+        format!("{}-{}-{}", self.pairs.name, self.scaling.name(), self.protocol.name())
     }
 
     /// The file that it is kept in.

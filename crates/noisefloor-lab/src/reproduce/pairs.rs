@@ -62,7 +62,7 @@ impl Loaded {
             let (found, names) = (groups.len(), groups.join(", "));
             return Err(LabError::TooFewGroups { found, names });
         }
-        let half = self.table.descriptor.len() / 2;
+        let half = self.table.descriptor.dimensions() / 2;
         let (mut tiles, mut known, mut synthesised) = (Vec::new(), Vec::new(), 0);
         let mut references = Array2::zeros((self.table.zones.len(), half));
         for origin in [Origin::Synthesised, Origin::Real] {

@@ -122,7 +122,7 @@ fn shares(count: Count) -> [String; 4] {
 }
 
 fn what(outcome: &ProtocolOutcome) -> [String; 2] {
-    let pairs = outcome.of.pairs.name().trim_end_matches("-pair");
+    let pairs = outcome.of.pairs.name.trim_end_matches("-pair");
     [pairs.to_owned(), outcome.of.scaling.name().to_owned()]
 }
 

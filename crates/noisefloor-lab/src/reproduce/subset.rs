@@ -42,7 +42,7 @@ pub struct PairSubset {
 /// # Errors
 /// [`LabError`] if a corpus cannot be read, or has too few pairs or groups of scenes.
 pub fn subset(job: &Reproduction, count: usize, watch: Watch<'_>) -> Result<PairSubset, LabError> {
-    learn(&job.load(job.masks(), watch)?.into_pairs()?, count)
+    learn(&job.load(&job.masks(), watch)?.into_pairs()?, count)
 }
 
 fn learn(pairs: &Pairs, count: usize) -> Result<PairSubset, LabError> {

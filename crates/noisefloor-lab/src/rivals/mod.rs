@@ -14,7 +14,7 @@ pub use plot::plot_scene_means;
 use crate::advance::{Advance, Watch};
 use crate::error::LabError;
 use noisefloor::Scores;
-use noisefloor_learn::{Corpus, JudgedZone, Prediction, group_of_scene, score};
+use noisefloor_learn::{Corpus, JudgedZone, Prediction, first_word, score};
 use noisefloor_rivals::Rival;
 use rayon::prelude::*;
 use rendering::SynthesisedRendering;
@@ -111,7 +111,7 @@ impl RatedRival {
     /// `stops` are samples per pixel: a row for each constant, a column for each zone.
     fn of(rival: &'static Rival, zones: &[JudgedZone], stops: &[Vec<f64>]) -> Self {
         let constants = constants(rival);
-        let group = |zone: &JudgedZone| group_of_scene(&zone.scene).to_owned();
+        let group = |zone: &JudgedZone| first_word(&zone.scene).to_owned();
         let predict = |(i, zone): (usize, &JudgedZone)| {
             let others = |j: usize| group(&zones[j]) != group(zone);
             let place = unbiased(stops, zones, &others);

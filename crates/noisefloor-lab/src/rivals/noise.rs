@@ -55,10 +55,10 @@ impl Noise {
     }
 
     /// The mean of so many new samples; `turn` says which realisation it takes.
-    pub(super) fn batch(&self, turn: usize, samples: u32) -> Vec<Rgb> {
+    pub(super) fn batch(&self, turn: usize, samples: u64) -> Vec<Rgb> {
         let count = self.realisations.len();
         let sign = if (turn / count).is_multiple_of(2) { 1.0 } else { -1.0 };
-        mix(&self.converged, 1.0, &self.realisations[turn % count], sign / f64::from(samples).sqrt())
+        mix(&self.converged, 1.0, &self.realisations[turn % count], sign / (samples as f64).sqrt())
     }
 }
 

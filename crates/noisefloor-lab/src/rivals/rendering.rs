@@ -15,7 +15,7 @@ pub(super) struct SynthesisedRendering {
     edge: usize,
     columns: usize,
     /// What comes stage by stage: samples, and the mean of these samples alone for each zone.
-    stages: Vec<(u32, Vec<Vec<Rgb>>)>,
+    stages: Vec<(u64, Vec<Vec<Rgb>>)>,
 }
 
 impl SynthesisedRendering {
@@ -39,10 +39,10 @@ impl SynthesisedRendering {
         let mut stages = Vec::new();
         let (mut done, mut goal) = (0u64, first / GROWTH.powi(2));
         while (done as f64) < last {
-            let samples = ((goal.round() as u64).max(done + 1) - done) as u32;
+            let samples = (goal.round() as u64).max(done + 1) - done;
             let batch = noises.iter().map(|noise| noise.batch(stages.len(), samples)).collect();
             stages.push((samples, batch));
-            done += u64::from(samples);
+            done += samples;
             goal *= GROWTH;
         }
         let columns = (zones.len() as f64).sqrt().ceil() as usize;
@@ -62,7 +62,7 @@ impl SynthesisedRendering {
             tone_mapping: ToneMapping::Srgb { exposure: 1.0 },
             // At every stage: each brings more than a step.
             schedule: Schedule::Every { step: 2 },
-            max_samples: u64::from(u32::MAX),
+            max_spp: u64::from(u32::MAX),
             // A criterion that tells is asked at every stage.
             consecutive: if stops { 1 } else { u32::MAX },
             ..Params::default()
@@ -99,7 +99,7 @@ impl SynthesisedRendering {
             .stages
             .iter()
             .scan(0, |total, (samples, _)| {
-                *total += u64::from(*samples);
+                *total += *samples;
                 Some(*total)
             })
             .collect();
