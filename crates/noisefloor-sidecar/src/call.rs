@@ -67,15 +67,15 @@ pub(crate) fn batches(
         return Err((None, SidecarCause::Wrong { what }));
     }
     let given = || requests.iter().zip(samples.iter().copied());
-    if let Some((request, samples)) = given().find(|(request, samples)| *samples > request.samples) {
-        let what = format!("{samples} samples where {} were requested", request.samples);
+    if let Some((request, samples)) = given().find(|(request, samples)| *samples > request.spp) {
+        let what = format!("{samples} samples where {} were requested", request.spp);
         return Err((Some(request.tile.index), SidecarCause::Wrong { what }));
     }
     exactly(&payload, given().map(|(r, n)| if n > 0 { r.tile.pixels() } else { 0 }).sum())?;
     let mut pixels = rgb(&payload);
     let batches = given().map(|(request, samples)| {
         let pixels = pixels.by_ref().take(if samples > 0 { request.tile.pixels() } else { 0 });
-        Batch { tile: request.tile, samples, mean: pixels.collect() }
+        Batch { tile: request.tile, spp: samples, mean: pixels.collect() }
     });
     Ok(batches.collect())
 }

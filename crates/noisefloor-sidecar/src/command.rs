@@ -115,7 +115,7 @@ impl CommandSource {
 
     /// Renders samples of a tile, or of the whole image if the command cannot aim. Returns the command that
     /// was run, too.
-    fn run(&mut self, tile: &Tile, samples: u32) -> Result<(LinearImage, String), CommandError> {
+    fn run(&mut self, tile: &Tile, samples: u64) -> Result<(LinearImage, String), CommandError> {
         let folder = |source| CommandError::Folder { folder: std::env::temp_dir(), source };
         let scratch = Scratch::new().map_err(folder)?;
         let pictures = scratch.path().join("out");
@@ -157,12 +157,12 @@ impl CommandSource {
     }
 
     /// The words of the command for a run.
-    fn fill(&self, tile: &Tile, samples: u32, out: &Path) -> Vec<OsString> {
+    fn fill(&self, tile: &Tile, samples: u64, out: &Path) -> Vec<OsString> {
         let number = |number: u64| OsString::from(number.to_string());
         self.template.fill(|name| match name {
             "scene" => self.options.scene.clone().unwrap_or_default().into_os_string(),
             "seed" => number(scatter(self.options.seed, self.runs)),
-            "spp" => number(samples.into()),
+            "spp" => number(samples),
             "x0" => number(tile.x as u64),
             "x1" => number((tile.x + tile.width) as u64),
             "y0" => number(tile.y as u64),
@@ -175,7 +175,7 @@ impl CommandSource {
 
     /// One tile.
     fn aimed(&mut self, request: &Request) -> Result<Batch, CommandError> {
-        let Request { tile, samples, .. } = *request;
+        let Request { tile, spp: samples, .. } = *request;
         let (image, command) = self.run(&tile, samples)?;
         let mean = if (image.width, image.height) == (tile.width, tile.height) {
             image.pixels
@@ -183,21 +183,21 @@ impl CommandSource {
             self.check_whole(&image, &tile, command)?;
             cut(&image, &tile)
         };
-        let batch = Batch { tile, samples, mean };
+        let batch = Batch { tile, spp: samples, mean };
         self.light.check(&batch)?;
         Ok(batch)
     }
 
     /// All tiles from one picture.
     fn whole(&mut self, requests: &[Request]) -> Result<Vec<Batch>, CommandError> {
-        let Some(samples) = requests.iter().map(|r| r.samples).max() else { return Ok(Vec::new()) };
+        let Some(samples) = requests.iter().map(|r| r.spp).max() else { return Ok(Vec::new()) };
         let SourceInfo { width, height, .. } = self.info;
         let all = Tile { index: 0, x: 0, y: 0, width, height };
         let (image, command) = self.run(&all, samples)?;
         self.check_whole(&image, &all, command)?;
         let mut batches = Vec::with_capacity(requests.len());
         for Request { tile, .. } in requests {
-            let batch = Batch { tile: *tile, samples, mean: cut(&image, tile) };
+            let batch = Batch { tile: *tile, spp: samples, mean: cut(&image, tile) };
             self.light.check(&batch)?;
             batches.push(batch);
         }

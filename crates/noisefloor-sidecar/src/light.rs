@@ -72,7 +72,7 @@ mod tests {
 
     fn check(before: f32, value: impl Fn(usize) -> Rgb) -> Result<(), ImpossibleLight> {
         let tile = Tile { index: 0, x: 0, y: 0, width: 10, height: 10 };
-        let batch = |mean: Vec<Rgb>| Batch { tile, samples: 1, mean };
+        let batch = |mean: Vec<Rgb>| Batch { tile, spp: 1, mean };
         let mut light = LightCheck::default();
         light.check(&batch(vec![[before; 3]; 100])).unwrap();
         light.check(&batch((0..100).map(value).collect()))
@@ -95,10 +95,10 @@ mod tests {
         assert_eq!(check(0.5, |_| [-0.5, 0.9, -0.1]), Ok(()));
         assert_eq!(check(100.0, |_| [-1e-3; 3]), Ok(()));
         assert_eq!(check(0.0, |_| [-1e-9; 3]), Ok(()));
-        assert_eq!(LightCheck::default().check(&Batch { samples: 0, mean: Vec::new(), ..one() }), Ok(()));
+        assert_eq!(LightCheck::default().check(&Batch { spp: 0, mean: Vec::new(), ..one() }), Ok(()));
     }
 
     fn one() -> Batch {
-        Batch { tile: Tile { index: 0, x: 0, y: 0, width: 1, height: 1 }, samples: 1, mean: vec![[0.0; 3]] }
+        Batch { tile: Tile { index: 0, x: 0, y: 0, width: 1, height: 1 }, spp: 1, mean: vec![[0.0; 3]] }
     }
 }

@@ -34,7 +34,7 @@ pub(crate) struct TileRequest {
     pub(crate) width: usize,
     pub(crate) height: usize,
     pub(crate) first: u64,
-    pub(crate) samples: u32,
+    pub(crate) samples: u64,
 }
 
 /// In every reply.
@@ -58,7 +58,7 @@ pub(crate) struct Hello {
 
 #[derive(Deserialize)]
 pub(crate) struct Sampled {
-    pub(crate) samples: Vec<u32>,
+    pub(crate) samples: Vec<u64>,
 }
 
 #[derive(Deserialize)]

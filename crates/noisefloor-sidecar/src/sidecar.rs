@@ -153,7 +153,7 @@ impl Sidecar {
     fn sample_some(&mut self, requests: &[Request]) -> Result<Vec<Batch>, SidecarError> {
         let tile = |r: &Request| {
             let noisefloor::Tile { index, x, y, width, height } = r.tile;
-            TileRequest { index, x, y, width, height, first: r.first, samples: r.samples }
+            TileRequest { index, x, y, width, height, first: r.first, samples: r.spp }
         };
         let request = Sample { op: "sample", tiles: requests.iter().map(tile).collect() };
         let doing = match requests {

@@ -153,14 +153,14 @@ fn a_command_leaves_nothing_and_takes_any_name() {
     let mut options = options(None);
     (options.scene, options.size) = (Some(scene), Some(SIZE));
     let mut source = CommandSource::new(&template(python, folder.path(), more), options.clone()).unwrap();
-    source.sample(&[Request { tile: tile(0, 0, 0, 4, 4), first: 0, samples: 1 }]).unwrap();
+    source.sample(&[Request { tile: tile(0, 0, 0, 4, 4), first: 0, spp: 1 }]).unwrap();
     let pid = std::fs::read_to_string(folder.path().join("log.fork")).unwrap();
     let pid = pid.parse().unwrap();
     assert!(crate::life::gone_within(pid, Duration::from_secs(10)), "process {pid} is left behind");
 
     let more = "x0={x0} x1={x1} y0={y0} y1={y1} exists={scene} how=paint";
     let mut source = CommandSource::new(&template(python, folder.path(), more), options).unwrap();
-    let error = source.sample(&[Request { tile: tile(0, 0, 0, 4, 4), first: 0, samples: 1 }]).unwrap_err();
+    let error = source.sample(&[Request { tile: tile(0, 0, 0, 4, 4), first: 0, spp: 1 }]).unwrap_err();
     let said = error.source().unwrap().to_string();
     assert!(said.contains("\\u{1b}]0;owned\\u{7}") && !said.contains('\x1b'), "{said:?}");
 }
