@@ -162,6 +162,7 @@ VALUES = {
     "table.real": lambda: f"{unseen()['levels_real']:,}",
     "table.synthesised": lambda: f"{unseen()['levels_synthesised']:,}",
     "alone.error": lambda: factor(ablated(dict(ABLATIONS)["only the tile"])["error_factor"]),
+    "inspect.error": lambda: factor(inspect()["record"]["leave_one_scene_out"]["error_factor"]),
     "inspect.familiar": lambda: f"{inspect()['familiar_reach']:.2f}",
     "tables.scenes": scene_table,
     "tables.ablation": ablation_table,
