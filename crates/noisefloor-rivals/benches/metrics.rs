@@ -5,7 +5,7 @@ use criterion::{Criterion, criterion_group, criterion_main};
 use linfa_linalg::svd::SVD;
 use ndarray::Array2;
 use noisefloor::{Rgb, luminance};
-use noisefloor_rivals::{Image, Vdp, metrics};
+use noisefloor_rivals::{DisplayPixels, Vdp, metrics};
 use std::hint::black_box;
 
 const EDGE: usize = 128;
@@ -29,8 +29,8 @@ fn looks(c: &mut Criterion) {
     group.bench_function("butteraugli", |b| {
         b.iter(|| metrics::butteraugli(black_box(&clean), &noisy, EDGE, EDGE))
     });
-    let [a, b] =
-        [&clean, &noisy].map(|pixels| Image::new(EDGE, EDGE, pixels).expect("as many pixels as it says"));
+    let [a, b] = [&clean, &noisy]
+        .map(|pixels| DisplayPixels::new(EDGE, EDGE, pixels).expect("as many pixels as it says"));
     let vdp = Vdp::default();
     group.bench_function("vdp", |bench| bench.iter(|| vdp.visible(black_box(&a), &b)));
     // The descriptor of recurrent networks: singular values of the luminance, of which they take the entropy.
@@ -41,8 +41,8 @@ fn looks(c: &mut Criterion) {
     const LARGE: usize = 512;
     let large: Vec<Rgb> = (0..LARGE * LARGE).map(|i| noisy[i % noisy.len()]).collect();
     let small: Vec<Rgb> = (0..LARGE * LARGE).map(|i| clean[i % clean.len()]).collect();
-    let [a, b] =
-        [&small, &large].map(|pixels| Image::new(LARGE, LARGE, pixels).expect("as many pixels as it says"));
+    let [a, b] = [&small, &large]
+        .map(|pixels| DisplayPixels::new(LARGE, LARGE, pixels).expect("as many pixels as it says"));
     let mut group = c.benchmark_group("image of 512x512");
     group.sample_size(10);
     group.bench_function("vdp", |bench| bench.iter(|| vdp.visible(black_box(&a), &b)));

@@ -11,36 +11,40 @@ const LEAST_AUTOMATIC: f64 = 0.001;
 /// Keeps black pixels from dividing by zero.
 const EPSILON: f64 = 1e-4;
 
-/// The condition of Blender Cycles (`film/adaptive_sampling.h` and `scene/integrator.cpp` of Blender 4).
+/// The criterion of Blender Cycles (`film/adaptive_sampling.h` and `scene/integrator.cpp` of Blender 4).
 ///
-/// The error of a pixel is Σ|I − A|/(10⁻⁴ + n) over its channels, all exposed: I is the mean of all samples, A that of one half,
-/// and n is √ΣI where ΣI is below 1 and ΣI above. A pixel below `threshold` has converged and is not looked at again, unless one
-/// of its eight neighbours has not: that takes it back. None converges before [`CyclesAdaptive::min_spp`].
+/// The error of a pixel is Σ|I − A|/(10⁻⁴ + n) over its channels, with exposure applied: I is the mean of all
+/// samples, A that of one half; n is √ΣI if ΣI < 1, otherwise ΣI. A pixel with an error below `threshold` has
+/// converged for good, unless one of its eight neighbours has not. No pixel converges before
+/// [`CyclesAdaptive::min_spp`].
 ///
-/// A tile is done when a `share` of its pixels has converged. Tiles that are done count as converged for their neighbours.
+/// A tile is done when a `share` of its pixels has converged. Finished tiles count as converged for their
+/// neighbours.
 #[derive(Clone, Debug)]
 pub struct CyclesAdaptive {
-    /// Error below which a pixel has converged, above 0; 0.01 by default, as in Blender. The
-    /// constant that agrees with people on average is 0.036 (`noisefloor evaluate --rivals`).
+    /// Error below which a pixel has converged, above 0; 0.01 by default, as in Blender. 0.036 agrees with
+    /// people on average (`noisefloor evaluate --rivals`).
     pub threshold: f64,
-    /// Share of a tile's pixels that have to converge, in (0, 1]; 0.95 by default.
+    /// Share of a tile's pixels that must converge, in (0, 1]; 0.95 by default.
     pub share: f64,
     /// Whether each pixel of the image has converged.
     converged: Vec<bool>,
 }
 
 impl CyclesAdaptive {
-    /// The condition with its own constant, and 95 % of a tile's pixels.
+    /// The criterion with this constant, and 95 % of a tile's pixels.
     pub fn new(threshold: f64) -> Self {
         Self { threshold, share: DEFAULT_SHARE, converged: Vec::new() }
     }
 
-    /// The threshold that Cycles chooses itself for renders of at most `max_spp`: 1/`max_spp`, at least 0.001.
+    /// The threshold that Cycles chooses by itself for renders of at most `max_spp`: 1/`max_spp`, at least
+    /// 0.001.
     pub fn automatic(max_spp: u64) -> Self {
         Self::new((1.0 / max_spp.max(1) as f64).max(LEAST_AUTOMATIC))
     }
 
-    /// Samples per pixel before which no pixel converges, as Cycles chooses them itself: 16/threshold^0.3, rounded up, at least
+    /// Samples per pixel before which no pixel converges, as Cycles chooses them: 16/threshold^0.3, rounded
+    /// up, at least
     /// 4. That is 32 for a threshold of 0.1, 64 for 0.01 and 128 for 0.001.
     pub fn min_spp(&self) -> u64 {
         ((16.0 / self.threshold.powf(0.3)).ceil() as u64).max(4)
@@ -61,7 +65,7 @@ fn error(film: &Film, exposure: f64, tile: usize, pixel: usize) -> f64 {
     })
 }
 
-/// Takes the neighbours of active pixels back, within the tiles named.
+/// Marks the neighbours of active pixels as active again, within these tiles.
 fn dilate(converged: &mut [bool], grid: TileGrid, tiles: &[Tile]) {
     let mut named = vec![false; grid.len()];
     tiles.iter().for_each(|t| named[t.index] = true);
@@ -207,8 +211,9 @@ mod tests {
 
     #[test]
     fn as_many_pixels_converge_as_mathematics_says() {
-        // 3·|I − A| has a deviation of 3σ/√n: at 2.5 of them, p = 0.98758 of the pixels are below, and p⁹ stay so beside their
-        // neighbours. 51 ± 7 are above, and take 9 each: a share of 1.6 % is one deviation; three of those.
+        // 3·|I − A| has a deviation of 3σ/√n: at 2.5 of them, p = 0.98758 of the pixels are below, and p⁹
+        // stay so beside their neighbours. 51 ± 7 are above, and take 9 each: a share of 1.6 % is one
+        // deviation; three of those.
         let (mean, sigma, n) = (0.1f64, 0.05, 100.0f64);
         let threshold = 2.5 * 3.0 * sigma / n.sqrt() / (EPSILON + (3.0 * mean).sqrt());
         let (mut film, mut bell) = (empty(), Bell(5));

@@ -10,20 +10,23 @@ pub(crate) const DEFAULT_STOP: f64 = 0.003;
 /// Default of [`Dammertz::split`] (Dammertz et al. 2010, §2.2).
 const DEFAULT_SPLIT: f64 = 256.0;
 
-/// Dammertz, Hanika, Keller, Lensch 2010, "A Hierarchical Automatic Stopping Condition for Monte Carlo Global Illumination".
+/// Dammertz, Hanika, Keller, Lensch 2010, "A Hierarchical Automatic Stopping Condition for Monte Carlo Global
+/// Illumination".
 ///
-/// The error of a pixel is Σ|I − A|/√ΣI over its channels, where I is the mean of all samples and A that of one half. The error
-/// of a block is √(block area/image area) times the mean over its pixels. A block, at first the image, is done below `stop`, and
-/// is cut in two below `split`·`stop`, across its longer side, where the errors on either side are most alike.
+/// The error of a pixel is Σ|I − A|/√ΣI over its channels, where I is the mean of all samples and A that of
+/// one half. The error of a block is √(block area/image area) times the mean over its pixels. A block,
+/// initially the image, is done if its error is below `stop`. Below `split`·`stop` it is cut in two, across
+/// its longer side, where the errors on both sides are most alike. As in the paper, a finished block is never
+/// judged again.
 ///
-/// What differs from the paper: blocks are cut along the borders of tiles and not below a tile, since tiles are what is sampled;
-/// the halves of a cut are judged at once, and not after the next pass, since there are many passes between two verdicts here;
-/// radiance is exposed as it is displayed, so that the unit of radiance does not matter; a black pixel has no error.
-/// Done is done: as in the paper, a block is not looked at again.
+/// Differences from the paper: blocks are cut along the borders of tiles, since tiles are sampled as a whole;
+/// the halves of a cut are judged at once instead of after the next pass, since many passes lie between two
+/// verdicts here; radiance is multiplied by the exposure of the display, so that its unit does not matter; a
+/// black pixel has no error.
 #[derive(Clone, Debug)]
 pub struct Dammertz {
-    /// Error below which a block is done, above 0; 0.003 by default,
-    /// the constant that agrees with people on average (`noisefloor evaluate --rivals`).
+    /// Error below which a block is done, above 0. The default of 0.003 agrees with people on average
+    /// (`noisefloor evaluate --rivals`).
     pub stop: f64,
     /// Error below which a block is cut in two, in units of `stop`, at least 1; 256 by default.
     pub split: f64,
@@ -43,12 +46,13 @@ struct Block {
 type Errors = (f64, usize);
 
 impl Dammertz {
-    /// The condition with its own constant, and cuts below 256 times that.
+    /// The criterion with this constant, and cuts below 256 times that.
     pub fn new(stop: f64) -> Self {
         Self { stop, split: DEFAULT_SPLIT, blocks: Vec::new(), done: Vec::new() }
     }
 
-    /// Judges a block and all that it is cut into; files what is not done, and returns the error of each tile that is named.
+    /// Judges a block and all its parts: records unfinished blocks, and in `expected` the error of the block
+    /// of each of their tiles.
     fn refine(&mut self, block: Block, grid: TileGrid, errors: &[Errors], expected: &mut [f64]) {
         let area: usize = block.tiles(grid).map(|t| grid.tile(t).pixels()).sum();
         let error = block_error(&block, grid, errors, area);
@@ -77,7 +81,8 @@ impl Block {
         self.rows.clone().flat_map(move |y| columns.clone().map(move |x| y * grid.columns() + x))
     }
 
-    /// Cuts across the longer side (in pixels), where the errors on either side are most alike; at least two tiles.
+    /// Cuts across the longer side (in pixels), where the errors on either side are most alike; at least two
+    /// tiles.
     fn cut(&self, grid: TileGrid, errors: &[Errors]) -> [Self; 2] {
         let pixels = |tiles: &Range<usize>, edge: usize| {
             (tiles.end * grid.edge()).min(edge) - tiles.start * grid.edge()
@@ -107,7 +112,7 @@ impl Block {
     }
 }
 
-/// √(block area/image area)·mean error; infinite if no pixel has an error to go by.
+/// √(block area/image area)·mean error; infinite if no pixel has a known error.
 fn block_error(block: &Block, grid: TileGrid, errors: &[Errors], area: usize) -> f64 {
     let (sum, count) = block.tiles(grid).map(|t| errors[t]).fold((0.0, 0), |(s, n), (e, k)| (s + e, n + k));
     if count == 0 {
@@ -194,7 +199,8 @@ mod tests {
         stops
     }
 
-    /// Grey noise: I − A has a deviation of σ/√n for even halves, so that the mean error is 3·σ·√(2/(πn))/√(3m).
+    /// Grey noise: I − A has a deviation of σ/√n for even halves, so that the mean error is
+    /// 3·σ·√(2/(πn))/√(3m).
     fn known(mean: f64, sigma: f64, stop: f64) -> f64 {
         (3.0 * sigma * std::f64::consts::FRAC_2_PI.sqrt() / ((3.0 * mean).sqrt() * stop)).powi(2)
     }
@@ -203,7 +209,8 @@ mod tests {
     fn an_uncut_image_stops_where_mathematics_says() {
         let (mean, sigma, stop) = (0.5, 0.2, 0.01);
         let whole = stops(Dammertz { split: 1.0, ..Dammertz::new(stop) }, mean, sigma);
-        // The mean of 4096 values of |N| errs by 0.756/64 = 1.2 %, n by 2.4 %: three of those, and a step of 20.
+        // The mean of 4096 values of |N| errs by 0.756/64 = 1.2 %, n by 2.4 %: three of those, and a step of
+        // 20.
         let expected = known(mean, sigma, stop);
         assert!(whole.iter().all(|&n| n == whole[0]));
         assert!((whole[0] as f64 - expected).abs() < 0.071 * expected + 20.0, "{whole:?} {expected}");
@@ -212,7 +219,8 @@ mod tests {
     #[test]
     fn tiles_weigh_by_the_root_of_their_area() {
         let (mean, sigma, stop) = (0.5, 0.2, 0.01);
-        // A quarter of the area halves the error: a quarter of the samples. 1024 values: 2.4 %, n by 4.7 %; four of those for four tiles.
+        // A quarter of the area halves the error: a quarter of the samples. 1024 values: 2.4 %, n by 4.7 %;
+        // four of those for four tiles.
         let expected = 0.25 * known(mean, sigma, stop);
         for n in stops(Dammertz::new(stop), mean, sigma) {
             assert!((n as f64 - expected).abs() < 0.19 * expected + 20.0, "{n} {expected}");

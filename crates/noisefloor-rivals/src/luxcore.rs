@@ -1,4 +1,4 @@
-//! The halt condition of LuxCoreRender.
+//! The halt criterion of LuxCoreRender.
 
 use crate::pixels::{displayed, enough, verdict};
 use noisefloor::{CriterionError, Rgb, StoppingCriterion, Tile, TileGrid, Verdict, View};
@@ -7,26 +7,30 @@ use noisefloor::{CriterionError, Rgb, StoppingCriterion, Tile, TileGrid, Verdict
 pub(crate) const DEFAULT_SHARE: f64 = 0.35;
 /// Default of [`LuxCoreHalt::threshold`]: one step of an 8-bit screen.
 const DEFAULT_THRESHOLD: f32 = 1.0 / 256.0;
-/// Default of [`LuxCoreHalt::step`] and [`LuxCoreHalt::warmup`] (`batch.haltthreshold.step` and `.warmup` of LuxCoreRender).
+/// Default of [`LuxCoreHalt::step`] and [`LuxCoreHalt::warmup`] (`batch.haltthreshold.step` and `.warmup` of
+/// LuxCoreRender).
 const DEFAULT_STEP: f64 = 64.0;
 
 /// The convergence test of LuxCoreRender 2 (`film/convtest/filmconvtest.cpp`).
 ///
-/// The picture as it is displayed is held against that of the last test; a pixel has changed if one of its channels has by more
-/// than `threshold`. The render is done when no more than a `share` of all pixels has changed. Tests begin after `warmup` samples
-/// per pixel and are `step` apart, both on average over the image.
+/// The displayed picture is compared with that of the previous test. A pixel has changed if one of its
+/// channels has changed by more than `threshold`. The render is done when at most a `share` of all pixels has
+/// changed. Tests begin after `warmup` samples per pixel and are `step` apart, both on average over the
+/// image.
 ///
-/// It halts a whole picture, and so it does here: all tiles are done at once. The share of pixels is left open by LuxCoreRender.
+/// It halts the whole picture, as LuxCoreRender does: all tiles are done at once. LuxCoreRender leaves the
+/// share to the user.
 #[derive(Clone, Debug)]
 pub struct LuxCoreHalt {
-    /// Largest share of the pixels that may have changed, in [0, 1]; 0.35 by default,
-    /// the constant that agrees with people on average (`noisefloor evaluate --rivals`).
+    /// Largest share of the pixels that may have changed, in [0, 1]. The default of 0.35 agrees with people
+    /// on average (`noisefloor evaluate --rivals`).
     pub share: f64,
     /// Samples per pixel between two tests, above 0; 64 by default.
     pub step: f64,
     /// Samples per pixel before the first test, at least 0; 64 by default.
     pub warmup: f64,
-    /// Change of a displayed channel that counts, at least 0; 1/256 by default, one step of an 8-bit screen.
+    /// Change of a displayed channel above which it counts, at least 0; 1/256 by default, one step of an
+    /// 8-bit screen.
     pub threshold: f32,
     /// Picture and samples per pixel at the last test.
     last: Option<(Vec<Rgb>, f64)>,
@@ -34,7 +38,7 @@ pub struct LuxCoreHalt {
 }
 
 impl LuxCoreHalt {
-    /// The condition with its own constant, and LuxCoreRender's defaults for the rest.
+    /// The criterion with this constant, and LuxCoreRender's defaults for the rest.
     pub fn new(share: f64) -> Self {
         Self {
             share,
@@ -99,8 +103,8 @@ mod tests {
         verdicts[0].converged
     }
 
-    /// Share of the pixels that change between tests at 100 and 200 samples of grey noise: I₁₀₀ − I₂₀₀ has a variance of
-    /// σ²·(1/100 − 1/200), and the screen a slope there.
+    /// Share of the pixels that change between tests at 100 and 200 samples of grey noise: I₁₀₀ − I₂₀₀ has a
+    /// variance of σ²·(1/100 − 1/200), and the screen a slope there.
     #[test]
     fn as_many_pixels_change_as_mathematics_says() {
         let (mean, sigma) = (0.3f64, 0.05);
@@ -132,7 +136,8 @@ mod tests {
                 first = film.spp(0);
             }
         }
-        // The first test comes after more than 64 samples, at 80; the second, which halts if everything may change, 64 later.
+        // The first test comes after more than 64 samples, at 80; the second, which halts if everything may
+        // change, 64 later.
         assert_eq!(first, 144);
     }
 }

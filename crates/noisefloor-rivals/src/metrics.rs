@@ -1,11 +1,12 @@
-//! What is wrong with a picture, against a converged one. None of it can be had while rendering; it judges what criteria leave.
+//! Metrics of a final picture against a converged one. Not available while rendering: they judge the results
+//! of criteria.
 //!
-//! | metric | feature | takes | nobody sees a difference |
+//! | metric | feature | compares | threshold of visibility |
 //! |---|---|---|---|
 //! | [`relative_mse`] | | linear radiance | |
 //! | [`psnr`] | | display values | |
-//! | `flip` | `flip` | display values, 8 bits | near 0; no published limit |
-//! | `butteraugli` | `butteraugli` | display values | largest below `BUTTERAUGLI_SAME` |
+//! | `flip` | `flip` | display values, 8 bits | near 0; none published |
+//! | `butteraugli` | `butteraugli` | display values | maximum below `BUTTERAUGLI_SAME` |
 //!
 //! Pictures are row-major, `width`×`height` pixels.
 
@@ -19,26 +20,28 @@ pub use self::butteraugli::{BUTTERAUGLI_SAME, butteraugli};
 #[cfg(feature = "flip")]
 pub use flip::flip;
 
-use crate::image::ImageError;
+use crate::picture::MetricError;
 use noisefloor::Rgb;
 
-/// ε of [`relative_mse`], in the unit of its pictures squared.
+/// ε of [`relative_mse`], in the squared unit of its pictures.
 pub const RELATIVE_MSE_EPSILON: f64 = 0.01;
 
-/// Mean over pixels and channels of (I − R)²/(R² + ε), ε = 0.01, of linear radiance (Rousselle, Knaus, Zwicker 2011, §5). Nothing
-/// is trimmed: one firefly can make all of it. Expose both pictures alike first, so that the unit of radiance does not matter.
+/// Mean over pixels and channels of (I − R)²/(R² + ε), ε = 0.01, of linear radiance (Rousselle, Knaus,
+/// Zwicker 2011, §5). Nothing is trimmed: a single firefly can dominate. Expose both pictures alike first, so
+/// that the unit of radiance does not matter.
 ///
 /// # Errors
-/// [`ImageError`] if the pictures have different numbers of pixels, or none.
-pub fn relative_mse(image: &[Rgb], reference: &[Rgb]) -> Result<f64, ImageError> {
+/// [`MetricError`] if the pictures have different numbers of pixels, or none.
+pub fn relative_mse(image: &[Rgb], reference: &[Rgb]) -> Result<f64, MetricError> {
     mean_of_channels(image, reference, |i, r| (i - r).powi(2) / (r * r + RELATIVE_MSE_EPSILON))
 }
 
-/// Peak signal-to-noise ratio in dB, 10·log₁₀(1/MSE), of display values in [0, 1] over all channels; infinite for equal pictures.
+/// Peak signal-to-noise ratio in dB, 10·log₁₀(1/MSE), of display values in [0, 1] over all channels; infinite
+/// for equal pictures.
 ///
 /// # Errors
-/// [`ImageError`] if the pictures have different numbers of pixels, or none.
-pub fn psnr(image: &[Rgb], reference: &[Rgb]) -> Result<f64, ImageError> {
+/// [`MetricError`] if the pictures have different numbers of pixels, or none.
+pub fn psnr(image: &[Rgb], reference: &[Rgb]) -> Result<f64, MetricError> {
     Ok(-10.0 * mean_of_channels(image, reference, |i, r| (i - r).powi(2))?.log10())
 }
 
@@ -46,9 +49,9 @@ fn mean_of_channels(
     image: &[Rgb],
     reference: &[Rgb],
     error: impl Fn(f64, f64) -> f64,
-) -> Result<f64, ImageError> {
+) -> Result<f64, MetricError> {
     if image.len() != reference.len() || image.is_empty() {
-        return Err(ImageError::Differ((image.len(), 1), (reference.len(), 1)));
+        return Err(MetricError::Differ((image.len(), 1), (reference.len(), 1)));
     }
     let channels = image.as_flattened().iter().zip(reference.as_flattened());
     let sum: f64 = channels.map(|(&i, &r)| error(f64::from(i), f64::from(r))).sum();
@@ -78,7 +81,8 @@ mod tests {
         let twenty = psnr(&[[0.6; 3]; 4], &[[0.5; 3]; 4]).unwrap();
         assert!((twenty - 20.0).abs() < 1e-4, "{twenty}");
         assert_eq!(psnr(&[[0.3; 3]], &[[0.3; 3]]).unwrap(), f64::INFINITY);
-        // Noise of σ = 0.01 is 40 dB; the mean square of 3·10⁴ values errs by √(2/3·10⁴) = 0.8 %, 0.035 dB: four of those.
+        // Noise of σ = 0.01 is 40 dB; the mean square of 3·10⁴ values errs by √(2/3·10⁴) = 0.8 %, 0.035 dB:
+        // four of those.
         let mut bell = Bell(3);
         let noisy: Vec<Rgb> = (0..10_000).map(|_| [0; 3].map(|_| 0.5 + 0.01 * bell.next() as f32)).collect();
         let forty = psnr(&noisy, &vec![[0.5; 3]; 10_000]).unwrap();

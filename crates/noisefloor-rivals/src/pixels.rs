@@ -1,9 +1,9 @@
-//! What conditions on pixels have in common.
+//! What criteria by pixel have in common.
 
 use noisefloor::{Film, Rgb, Verdict, View};
 use rayon::prelude::*;
 
-/// Share of a tile's pixels that have to meet a condition on pixels.
+/// Share of a tile's pixels that must meet a condition.
 pub(crate) const DEFAULT_SHARE: f64 = 0.95;
 
 /// A verdict without a probability.
@@ -11,13 +11,13 @@ pub(crate) fn verdict(converged: bool, expected_spp: Option<u64>) -> Verdict {
     Verdict { converged, expected_spp, ..Verdict::default() }
 }
 
-/// Whether `passed` of `pixels` are the share wanted.
+/// Whether `passed` of `pixels` are at least the share.
 pub(crate) fn enough(passed: usize, pixels: usize, share: f64) -> bool {
     passed as f64 >= share * pixels as f64
 }
 
-/// Σ|I − A| and ΣI over the channels of one pixel, both times `exposure`: I is the mean of all samples, A that of half A
-/// (Dammertz et al. 2010, §2.1). `None` where a half has no valid sample, so that nothing is known of the error.
+/// Σ|I − A| and ΣI over the channels of one pixel, both times `exposure`: I is the mean of all samples, A
+/// that of half A (Dammertz et al. 2010, §2.1). `None` if a half has no valid sample: the error is unknown.
 pub(crate) fn half_difference(film: &Film, tile: usize, pixel: usize, exposure: f64) -> Option<(f64, f64)> {
     let [(a, na), (b, nb)] = film.pixel_halves(tile, pixel);
     if na == 0 || nb == 0 {
@@ -31,7 +31,8 @@ pub(crate) fn half_difference(film: &Film, tile: usize, pixel: usize, exposure: 
     Some((difference * exposure, sum * exposure))
 }
 
-/// The number of samples at which the share wanted of a tile's pixels has what it needs; `None` if some of those have no finite need.
+/// The number of samples that is enough for a share of a tile's pixels; `None` if some of these need
+/// infinitely many.
 pub(crate) fn need_of_share(mut needs: Vec<f64>, share: f64) -> Option<u64> {
     let place = ((share * needs.len() as f64).ceil() as usize).clamp(1, needs.len()) - 1;
     let (_, &mut need, _) = needs.select_nth_unstable_by(place, f64::total_cmp);

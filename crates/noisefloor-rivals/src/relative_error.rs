@@ -11,36 +11,37 @@ use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
 pub(crate) const DEFAULT_ERROR: f64 = 0.19;
 /// Default of [`RelativeError::confidence`] (`pValue` 0.05 of Mitsuba 0.6).
 pub(crate) const DEFAULT_CONFIDENCE: f64 = 0.95;
-/// Pixels darker than this share of the average luminance are held to it.
+/// Darker pixels are compared with this share of the average luminance.
 const DARK: f64 = 0.01;
 
-/// The condition of Mitsuba 0.6's adaptive integrator (`integrators/misc/adaptive.cpp`), on luminance.
+/// The criterion of Mitsuba 0.6's adaptive integrator (`integrators/misc/adaptive.cpp`), on luminance.
 ///
-/// A pixel is done when t·√(s²/n) ≤ `error`·max(mean, 1 % of the average luminance of the picture), where s² estimates the
-/// variance of one sample, and t is the two-sided quantile for `confidence`. A tile is done when a `share` of its pixels is.
+/// A pixel is done when t·√(s²/n) ≤ `error`·max(mean, 1 % of the average luminance of the picture), where s²
+/// estimates the variance of one sample and t is the two-sided quantile for `confidence`. A tile is done when
+/// a `share` of its pixels is.
 ///
-/// Mitsuba sees each sample; here a verdict sees the means of the batches since the last one, one of each half. For k batches of
+/// Mitsuba sees each sample; here a verdict sees the mean of the new samples of each half. For k batches of
 /// n₁ … n_k samples with means b₁ … b_k and weighted mean M = Σnᵢbᵢ/Σnᵢ, E Σnᵢ(bᵢ − M)² = Σnᵢ(Var bᵢ − Var M)
-/// = Σnᵢ(σ²/nᵢ − σ²/Σnᵢ) = (k − 1)·σ², so that s² = Σnᵢ(bᵢ − M)²/(k − 1) is unbiased however uneven the batches. It has k − 1
-/// degrees of freedom and not n − 1, wherefore t is Student's, which holds the confidence that is asked for, in place of the
-/// normal distribution that Mitsuba's hundreds of samples warrant. A pixel is judged anew by each verdict.
+/// = Σnᵢ(σ²/nᵢ − σ²/Σnᵢ) = (k − 1)·σ². So s² = Σnᵢ(bᵢ − M)²/(k − 1) is unbiased however uneven the batches
+/// are. It has k − 1 degrees of freedom instead of n − 1; therefore t is Student's, while Mitsuba, with
+/// hundreds of samples, can use the normal distribution. Each verdict judges all pixels anew.
 ///
-/// Memory: 64 bytes a pixel beside the film.
+/// Memory: 64 bytes per pixel in addition to the film.
 #[derive(Clone, Debug)]
 pub struct RelativeError {
-    /// Largest relative half-width of the confidence interval, above 0; 0.19 by
-    /// default, the constant that agrees with people on average (`noisefloor evaluate --rivals`).
+    /// Largest relative half-width of the confidence interval, above 0. The default of 0.19 agrees with
+    /// people on average (`noisefloor evaluate --rivals`).
     pub error: f64,
     /// Confidence, in (0, 1); 0.95 by default.
     pub confidence: f64,
-    /// Share of a tile's pixels that have to be done, in (0, 1]; 0.95 by default.
+    /// Share of a tile's pixels that must be done, in (0, 1]; 0.95 by default.
     pub share: f64,
-    /// Of each pixel of each tile; empty until the tile is judged first.
+    /// For each pixel of each tile; empty until the tile is first judged.
     pixels: Vec<Vec<Batches>>,
 }
 
 impl RelativeError {
-    /// The condition with its own constant, a confidence of 95 %, and 95 % of a tile's pixels.
+    /// The criterion with this constant, a confidence of 95 %, and 95 % of a tile's pixels.
     pub fn new(error: f64) -> Self {
         Self { error, confidence: DEFAULT_CONFIDENCE, share: DEFAULT_SHARE, pixels: Vec::new() }
     }
@@ -55,7 +56,7 @@ impl Default for RelativeError {
 /// Batches of one pixel so far (West 1979: weighted mean and sum of squares, updated).
 #[derive(Clone, Copy, Debug, Default)]
 struct Batches {
-    /// Mean and samples of each half when last looked at.
+    /// Mean and samples of each half at the last verdict.
     halves: [(f64, u64); 2],
     count: u32,
     samples: f64,
@@ -87,7 +88,8 @@ impl Batches {
     }
 }
 
-/// Two-sided quantiles of Student's t by degrees of freedom, beginning at 1; the normal one comes last, and stands for all above.
+/// Two-sided quantiles of Student's t by degrees of freedom, from 1; the last one is normal, for all larger
+/// numbers.
 fn quantiles(confidence: f64, degrees: usize) -> Vec<f64> {
     let confidence = if confidence.is_nan() { 0.0 } else { confidence };
     let tail = 0.5 + 0.5 * confidence.clamp(0.0, 1.0 - f64::EPSILON);
@@ -98,7 +100,8 @@ fn quantiles(confidence: f64, degrees: usize) -> Vec<f64> {
     all
 }
 
-/// Degrees of freedom from which Student's t is taken for normal: its quantiles are then within 1 % for any confidence to 99.9 %.
+/// Degrees of freedom above which the normal distribution is used: its quantiles are within 1 % of Student's
+/// for any confidence up to 99.9 %.
 const NORMAL: usize = 300;
 
 /// Mean luminance of the picture.
@@ -146,7 +149,8 @@ impl StoppingCriterion for RelativeError {
         let dark = DARK * average_luminance(film);
         let judge = |(tile, pixels): &(Tile, Vec<Batches>)| {
             let samples = film.spp(tile.index);
-            // Half-width of the confidence interval over that allowed, and samples needed for it to be 1 by the normal quantile.
+            // Half-width of the confidence interval over that allowed, and samples needed for it to be 1 by
+            // the normal quantile.
             let ratio = |p: &Batches| {
                 let Some(variance) = p.variance() else { return (f64::INFINITY, f64::INFINITY) };
                 let deviation = (variance / p.samples).sqrt();
@@ -251,7 +255,8 @@ mod tests {
 
     #[test]
     fn dark_pixels_are_held_to_the_picture() {
-        // Three tiles are bright and one is nearly black, with noise that is large beside it and small beside 1 % of the average.
+        // Three tiles are bright and one is nearly black, with noise that is large beside it and small beside
+        // 1 % of the average.
         let mut film = empty();
         let mut bell = Bell(4);
         for _ in 0..20 {

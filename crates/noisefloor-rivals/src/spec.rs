@@ -14,22 +14,25 @@ const DEFAULT_SECONDS: f64 = 60.0;
 
 /// A criterion with one constant that its authors leave open or to the user.
 #[derive(Clone, Copy, Debug)]
+#[non_exhaustive]
 pub struct Rival {
     /// The name in a spec: `"dammertz"`.
     pub name: &'static str,
-    /// What it is called in a table or a legend: `"Dammertz et al. 2010"`.
+    /// The name in a table or legend: `"Dammertz et al. 2010"`.
     pub title: &'static str,
-    /// The constant as published, or where nothing was, as documented.
+    /// The published constant, or the documented one if none was published.
     pub default: f64,
-    /// Where to search for the constant, from strict (more samples) to lax (fewer), both above 0: to be searched in its logarithm.
+    /// Search range of the constant, from strict (more samples) to lax (fewer), both above 0, to be searched
+    /// logarithmically.
     pub range: (f64, f64),
     /// The criterion with its constant.
     pub make: fn(f64) -> Box<dyn StoppingCriterion + Send>,
-    /// Whether its verdicts tell one minus the least constant that would do, as their probability: one run then stands for all.
+    /// Whether the probability of its verdicts is one minus the smallest constant at which the tile would be
+    /// done: one run then covers all constants.
     pub tells: bool,
-    /// Whether the constant is a number that the criterion can take.
+    /// Whether the criterion accepts the constant.
     valid: fn(f64) -> bool,
-    /// What it has to be, for error messages.
+    /// What the constant must be, for error messages.
     wanted: &'static str,
 }
 
@@ -113,6 +116,7 @@ pub const RIVALS: &[Rival] = &[
 
 /// A spec that names no criterion.
 #[derive(Debug, Error, Clone, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum SpecError {
     /// No criterion of that name.
     #[error("there is no criterion {name:?}; there are {}", known())]
@@ -139,12 +143,12 @@ fn known() -> String {
     names.map(|name| format!("{name}:…")).collect::<Vec<_>>().join(", ")
 }
 
-/// Makes a criterion of a spec: a name, and after a colon its constant, or the default without one. `"spp:256"`, `"time:30"`
-/// (seconds), `"relative-error:0.19"`, `"dammertz:0.003"`, `"cycles:0.01"`, `"luxcore:0.35"`, `"vdp-stages:0.55"`,
-/// `"vdp-first:0.66"`.
+/// Makes a criterion of a spec: a name, and after a colon its constant, or the default without one.
+/// `"spp:256"`, `"time:30"` (seconds), `"relative-error:0.19"`, `"dammertz:0.003"`, `"cycles:0.01"`,
+/// `"luxcore:0.35"`, `"vdp-stages:0.55"`, `"vdp-first:0.66"`.
 ///
 /// # Errors
-/// [`SpecError`] if the name is unknown or the number is not one that the criterion can take.
+/// [`SpecError`] if the name is unknown or the criterion does not accept the number.
 pub fn parse(spec: &str) -> Result<Box<dyn StoppingCriterion + Send>, SpecError> {
     let (name, number) = spec.split_once(':').map_or((spec, None), |(name, number)| (name, Some(number)));
     let constant = |name, default: f64, wanted, valid: fn(f64) -> bool| {

@@ -1,17 +1,17 @@
-//! Stopping conditions on visible differences between pictures of one rendering.
+//! Criteria by visible differences between stages of one rendering.
 
-use crate::image::Image;
+use crate::picture::DisplayPixels;
 use crate::pixels::{displayed, verdict};
 use crate::vdp::{Response, Vdp};
 use noisefloor::{CriterionError, Film, StoppingCriterion, Tile, TileGrid, Verdict, View};
 
-/// Default of [`Myszkowski1998::probability`]: what agrees with people on average.
+/// Default of [`Myszkowski1998::probability`]: agrees with people on average.
 pub(crate) const DEFAULT_SEEN: f64 = 0.55;
-/// Default of [`Takouachet2007::probability`]: what agrees with people on average.
+/// Default of [`Takouachet2007::probability`]: agrees with people on average.
 pub(crate) const DEFAULT_GROWTH: f64 = 0.66;
 /// Default share of a tile's pixels that may differ.
 const DEFAULT_SHARE: f64 = 0.01;
-/// How much later than the last one a stage is kept, by samples.
+/// Ratio of samples between stages that are kept.
 const SPACING: f64 = 1.1;
 
 /// Earlier stages of a rendering, spaced by samples.
@@ -31,7 +31,7 @@ impl<T> Stages<T> {
         self.kept.iter().rev().find(|(n, _)| 2 * n <= samples).map(|(_, stage)| stage)
     }
 
-    /// Keeps a stage if it is late enough, and lets those go that are not needed any more.
+    /// Keeps a stage if it is late enough, and drops those no longer needed.
     fn keep(&mut self, samples: u64, stage: T) {
         if self.kept.last().is_none_or(|(n, _)| samples as f64 >= SPACING * *n as f64) {
             self.kept.push((samples, stage));
@@ -41,20 +41,20 @@ impl<T> Stages<T> {
     }
 }
 
-/// The stage of the computation: the most samples per pixel that a tile has.
+/// The stage of the computation: the largest number of samples per pixel of any tile.
 fn stage_of(film: &Film) -> u64 {
     film.grid().tiles().map(|t| film.spp(t.index)).max().unwrap_or(0)
 }
 
-/// What the eye makes of the picture as it is displayed.
+/// The response of the eye to the displayed picture.
 fn response(vdp: &Vdp, view: &View<'_>) -> Response {
     let (grid, pixels) = (view.film.grid(), displayed(view));
-    let image = Image::new(grid.width(), grid.height(), &pixels).expect("a film's size is in range");
+    let image = DisplayPixels::new(grid.width(), grid.height(), &pixels).expect("a film's size is in range");
     vdp.respond(&image)
 }
 
-/// Tiles of which no more than a share of the pixels lies above a limit are done; none if there is no map. The probability of a
-/// verdict is one minus the least limit at which the tile would be done.
+/// A tile is done if at most a share of its pixels lies above a limit; no tile is if there is no map. The
+/// probability of a verdict is one minus the smallest limit at which the tile would be done.
 fn verdicts(map: Option<&[f32]>, width: usize, tiles: &[Tile], limit: f64, share: f64) -> Vec<Verdict> {
     let judge = |tile: &Tile| {
         let Some(map) = map else { return verdict(false, None) };
@@ -67,34 +67,35 @@ fn verdicts(map: Option<&[f32]>, width: usize, tiles: &[Tile], limit: f64, share
     tiles.iter().map(judge).collect()
 }
 
-/// Visible differences between successive stages, after Myszkowski 1998, "The Visible Differences Predictor: applications to
-/// global illumination problems".
+/// Visible differences between successive stages, after Myszkowski 1998, "The Visible Differences Predictor:
+/// applications to global illumination problems".
 ///
-/// A tile is done when no more than a `share` of its pixels differs visibly, with more than `probability` by [`Vdp`], from the
-/// stage that had half of the samples, or somewhat less: a stage is kept every 10 % of samples. What the stages are is left to the
-/// algorithm in the paper; half the samples make the difference as large as the noise that is left: with independent samples,
-/// Var(Iₙ − I₂ₙ) = σ²/2n = Var(I₂ₙ).
+/// A tile is done when at most a `share` of its pixels differs visibly from the stage with half of the
+/// samples, or slightly fewer: with more than `probability`, by [`Vdp`]. A stage is kept every 10 % of
+/// samples. The paper leaves the choice of stages to the rendering algorithm. Here, half of the samples make
+/// the difference as large as the remaining noise: with independent samples, Var(Iₙ − I₂ₙ) = σ²/2n =
+/// Var(I₂ₙ).
 ///
-/// The paper asks it of the whole picture. The whole picture is compared once by each call, and each tile takes its verdict from
-/// the map. Memory: 4 bytes a pixel for each of up to ten stages.
+/// The paper judges the whole picture. Here each call compares the whole picture once, and each tile takes
+/// its verdict from the map. Memory: 4 bytes per pixel for each of up to ten stages.
 #[derive(Clone, Debug)]
 pub struct Myszkowski1998 {
-    /// Probability of detection above which a pixel differs visibly, in (0, 1); 0.55 by default, the constant
-    /// that agrees with people on average (`noisefloor evaluate --rivals`).
+    /// Probability of detection above which a pixel differs visibly, in (0, 1). The default of 0.55 agrees
+    /// with people on average (`noisefloor evaluate --rivals`).
     pub probability: f64,
-    /// Share of a tile's pixels that may, in [0, 1]; 0.01 by default.
+    /// Share of a tile's pixels that may do so, in [0, 1]; 0.01 by default.
     pub share: f64,
     vdp: Vdp,
     stages: Stages<Response>,
 }
 
 impl Myszkowski1998 {
-    /// The condition with its own constant, 1 % of a tile's pixels, and the default viewing condition.
+    /// The criterion with this constant, 1 % of a tile's pixels, and the default viewing condition.
     pub fn new(probability: f64) -> Self {
         Self::with(probability, Vdp::default())
     }
 
-    /// The condition by a predictor of one's own.
+    /// The criterion with this constant and predictor.
     pub fn with(probability: f64, vdp: Vdp) -> Self {
         Self { probability, share: DEFAULT_SHARE, vdp, stages: Stages::new() }
     }
@@ -128,22 +129,24 @@ impl StoppingCriterion for Myszkowski1998 {
     }
 }
 
-/// Visible differences from the first, noisy picture, after Takouachet, Delepoulle, Renaud 2007, "A perceptual stopping condition
-/// for global illumination computations".
+/// Visible differences from the first, noisy picture, after Takouachet, Delepoulle, Renaud 2007, "A
+/// perceptual stopping condition for global illumination computations".
 ///
-/// The predictor compares the first picture that was judged with the present one (Takouachet et al. 2017, §2). While noise goes
-/// away, it masks the difference of the two less and less, and they differ more and more visibly; once it has gone, no more. A tile is done when no more than a `share` of its pixels
-/// has a probability of detection that differs by more than `probability` from that of the stage with half of the samples. How
-/// the end of the growth is told is not said in the later paper, and is our reading. The constant is ours to choose, by data.
+/// The predictor compares the first judged picture with the current one (Takouachet et al. 2017, §2). As
+/// noise decreases, it masks their difference less and less, and they differ more and more visibly, until the
+/// noise is gone. A tile is done when at most a `share` of its pixels has a probability of detection that
+/// differs by more than `probability` from that of the stage with half of the samples. The later paper does
+/// not say how it detects the end of this growth; this is our reading, with a constant fitted to data.
 ///
-/// As with [`Myszkowski1998`], the whole picture is compared once by each call, and each tile takes its verdict from the map. A
-/// first picture that shows no noise never comes to differ: such a tile is done at the first look that it can be.
+/// As with [`Myszkowski1998`], each call compares the whole picture once, and each tile takes its verdict
+/// from the map. If the first picture shows no noise, it never differs: such a tile is done at the first
+/// opportunity.
 #[derive(Clone, Debug)]
 pub struct Takouachet2007 {
-    /// Change of the probability of detection above which a pixel has changed, in (0, 1); 0.66 by default, the
-    /// constant that agrees with people on average (`noisefloor evaluate --rivals`).
+    /// Change of the probability of detection above which a pixel has changed, in (0, 1). The default of 0.66
+    /// agrees with people on average (`noisefloor evaluate --rivals`).
     pub probability: f64,
-    /// Share of a tile's pixels that may, in [0, 1]; 0.01 by default.
+    /// Share of a tile's pixels that may do so, in [0, 1]; 0.01 by default.
     pub share: f64,
     vdp: Vdp,
     first: Option<Response>,
@@ -151,12 +154,12 @@ pub struct Takouachet2007 {
 }
 
 impl Takouachet2007 {
-    /// The condition with its own constant, 1 % of a tile's pixels, and the default viewing condition.
+    /// The criterion with this constant, 1 % of a tile's pixels, and the default viewing condition.
     pub fn new(probability: f64) -> Self {
         Self::with(probability, Vdp::default())
     }
 
-    /// The condition by a predictor of one's own.
+    /// The criterion with this constant and predictor.
     pub fn with(probability: f64, vdp: Vdp) -> Self {
         Self { probability, share: DEFAULT_SHARE, vdp, first: None, stages: Stages::new() }
     }

@@ -56,7 +56,8 @@ pub(crate) fn constant(value: f32, samples: u64) -> Film {
     film
 }
 
-/// A picture with noise that is normally distributed, of a standard deviation of `sigma` times the picture; deterministic.
+/// A picture with noise that is normally distributed, of a standard deviation of `sigma` times the picture;
+/// deterministic.
 #[derive(Clone)]
 pub(crate) struct Noise {
     pub(crate) edge: usize,

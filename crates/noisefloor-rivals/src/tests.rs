@@ -110,7 +110,8 @@ fn extremes_are_judged() {
 
 #[test]
 fn what_is_constant_is_done_soon() {
-    // Two looks at a constant picture, and for the growth of differences a third one, with twice the samples each.
+    // Two looks at a constant picture, and for the growth of differences a third one, with twice the samples
+    // each.
     for spec in SPECS {
         let mut criterion = parse(spec).unwrap();
         let mut done = false;

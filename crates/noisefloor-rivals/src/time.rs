@@ -1,14 +1,14 @@
-//! So many seconds.
+//! A time limit.
 
 use crate::pixels::verdict;
 use noisefloor::{CriterionError, StoppingCriterion, Tile, TileGrid, Verdict, View};
 use std::time::{Duration, Instant};
 
-/// Stops all tiles when so many seconds have passed since the first verdict.
+/// Stops all tiles a number of seconds after the first verdict.
 ///
-/// The clock begins at the first verdict, and not when the criterion is made, since a criterion may be made long before its run;
-/// the first batch is therefore not counted, and a run takes that much longer. [`noisefloor::Driver::set_time_limit`] counts from
-/// the beginning, and ends between batches too. The only rival whose verdicts differ from run to run.
+/// The clock starts at the first verdict, since a criterion may be made long before its run; the first batch
+/// is therefore not counted. [`noisefloor::Driver::set_time_limit`] counts from the beginning, and stops
+/// between verdicts, too. This is the only rival whose verdicts differ from run to run.
 #[derive(Clone, Debug)]
 pub struct TimeLimit {
     /// Seconds, at least 0.
@@ -17,7 +17,7 @@ pub struct TimeLimit {
 }
 
 impl TimeLimit {
-    /// A limit of `seconds`; a limit that is no positive number has passed already.
+    /// A limit of `seconds`; one that is not a positive number has already passed.
     pub fn new(seconds: f64) -> Self {
         Self { seconds, began: None }
     }
@@ -38,7 +38,7 @@ impl StoppingCriterion for TimeLimit {
 
     fn judge(&mut self, _: &View<'_>, tiles: &[Tile]) -> Result<Vec<Verdict>, CriterionError> {
         let elapsed = self.began.get_or_insert_with(Instant::now).elapsed();
-        // What does not fit a duration, as infinity, is never over.
+        // A limit too long for a duration, such as infinity, is never reached
         let limit = Duration::try_from_secs_f64(self.seconds.max(0.0)).unwrap_or(Duration::MAX);
         Ok(vec![verdict(elapsed >= limit, None); tiles.len()])
     }

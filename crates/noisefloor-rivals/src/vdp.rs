@@ -6,7 +6,7 @@ mod fourier;
 
 pub use csf::{VdpViewing, VdpViewingError};
 
-use crate::image::{Image, ImageError, Map};
+use crate::picture::{DifferenceMap, DisplayPixels, MetricError};
 use cortex::Cortex;
 use noisefloor::{luminance, srgb_decode};
 use rayon::prelude::*;
@@ -17,49 +17,59 @@ const AMPLITUDE: (f64, f64) = (12.6, 0.63);
 /// Slope β of the psychometric function.
 const PSYCHOMETRIC: f32 = 3.5;
 
-/// Daly 1993, "The Visible Differences Predictor: An Algorithm for the Assessment of Image Fidelity": where, and with which
-/// probability, an observer sees a difference between two pictures.
+/// Daly 1993, "The Visible Differences Predictor: An Algorithm for the Assessment of Image Fidelity": where,
+/// and with what probability, an observer sees a difference between two pictures.
 ///
 /// | stage | formula | parameters |
 /// |---|---|---|
 /// | display | L = peak·Y, Y of decoded sRGB | [`VdpViewing::peak`] |
 /// | amplitude nonlinearity | R = L/(L + (c₁L)^b) | c₁ = 12.6, b = 0.63 |
 /// | contrast | C = (R/R_a − 1)/(d ln R/d ln L)_a, at the adaptation level a | [`VdpViewing::adaptation`] |
-/// | contrast sensitivity | S = P·min(S₁(ρ/(r_a·r_θ)), S₁(ρ)), see [`VdpViewing::sensitivity`] | P = 250, ε = 0.9, ob = 0.78 |
-/// | cortex transform | dom filters: differences of mesa filters at ρ½ = 1, ½ … 1/16 of a cycle per pixel, of transition width ⅔ρ½, a Gaussian base band cut at 4/3·ρ½, σ = that/3; fan filters of ±30°, 6 orientations | 5 × 6 + 1 bands |
-/// | masking | T = (1 + (k₁(k₂m)^s)^b)^(1/b), m in threshold units | k₁ = 6^(−7/3), k₂ = 6^(10/3), b = 4; s = 0.7 for the base band, 0.8 for the lowest two dom bands, 1 for the others |
+/// | contrast sensitivity | [`VdpViewing::sensitivity`] | P = 250, ε = 0.9, ob = 0.78 |
+/// | cortex transform | dom and fan filters, see below | 5 × 6 + 1 bands |
+/// | masking | T = (1 + (k₁(k₂m)^s)^b)^(1/b), m in threshold units | k₁ = 6^(−7/3), k₂ = 6^(10/3), b = 4 |
 /// | mutual masking | the lesser m of the two pictures | |
 /// | phase uncertainty | m is the local amplitude of the band | |
 /// | psychometric function | 1 − 2^−(ΔC·S/T)^β | β = 3.5 |
 /// | probability summation | 1 − ∏(1 − P) over the bands | |
 ///
-/// The parameters are Daly's as secondary sources give them: Mantiuk's HDR-VDP 1 for the cortex transform and the slopes s, which it
-/// has from Daly's patent; Ashraf et al. 2024 for the sensitivity. Three things are ours to choose, where sources differ or leave
-/// them open:
-/// - contrast is scaled so that a faint grating around the adaptation level has just its own contrast after the amplitude
-///   nonlinearity: without that, thresholds would not be those of the contrast sensitivity function;
-/// - the psychometric function is ½ at the threshold, and not 1 − 1/e, since that is what a threshold is called here;
-/// - local amplitude is that of a complex cortex transform (Lukin 2009), in place of a blur of |C|.
+/// Dom filters are differences of mesa filters at ρ½ = 1, ½ … 1/16 of a cycle per pixel, of transition width
+/// ⅔ρ½; the base band is a Gaussian cut at 4/3·ρ½, with σ a third of that. Fan filters span ±30°, in 6
+/// orientations. The slope s of masking is 0.7 for the base band, 0.8 for the lowest two dom bands and 1 for
+/// the others.
 ///
-/// Where a grating's frequency or orientation lies between bands, each of them sees half of it, and the predicted threshold is
-/// up to 1.65 times as high for either, 2.7 times for both: Daly's bands and his summation are made so.
+/// The parameters are Daly's, from secondary sources: Mantiuk's HDR-VDP 1 for the cortex transform and the
+/// slopes s, which it has from Daly's patent; Ashraf et al. 2024 for the sensitivity. Sources differ on three
+/// points or leave them open; our choices:
+/// - Contrast is scaled so that the amplitude nonlinearity does not change the contrast of a faint grating
+///   around the adaptation level. Otherwise, thresholds would not be those of the contrast sensitivity
+///   function.
+/// - The psychometric function is ½ at the threshold instead of 1 − 1/e, consistent with the thresholds of
+///   this project.
+/// - Local amplitude is that of a complex cortex transform (Lukin 2009) instead of a blur of |C|.
 ///
-/// With those k₁ and k₂, a mask at its own threshold elevates it by 2^¼ = 1.19 where s is 0.7, but sixfold where s is 1: noise hides
-/// noise, and what is compared with a noisy picture is seen the better the less noise it has itself. Yee 2004 has 0.7 in all bands.
+/// If a grating's frequency or orientation lies between two bands, each band sees half of it, and the
+/// predicted threshold is up to 1.65 times as high (2.7 times for both). This is a property of Daly's bands
+/// and summation.
 ///
-/// Luminance only. Pictures are continued by mirroring. Transforms are cached for one size. A comparison of 512×512
-/// pixels takes 0.5 s on two cores (`benches/metrics.rs`, on a machine that was not idle). Memory while it runs: some 100 bytes a pixel.
+/// With these k₁ and k₂, a mask at its own threshold raises the threshold by 2^¼ = 1.19 if s is 0.7, but
+/// sixfold if s is 1: noise hides noise, and of two pictures compared with a noisy one, the cleaner one
+/// differs more visibly. Yee 2004 uses 0.7 in all bands.
+///
+/// Luminance only. Pictures are extended by mirroring. Transforms are cached for one size. A comparison of
+/// 512×512 pixels takes 0.5 s on two cores (`benches/metrics.rs`, on a machine that was not idle), and about
+/// 100 bytes of memory per pixel.
 ///
 /// ```
-/// use noisefloor_rivals::{Image, Vdp};
+/// use noisefloor_rivals::{DisplayPixels, Vdp};
 ///
 /// let (grey, mut lines) = (vec![[0.5_f32; 3]; 64 * 64], vec![[0.5_f32; 3]; 64 * 64]);
 /// lines.iter_mut().step_by(8).for_each(|pixel| *pixel = [0.6; 3]);
-/// let [grey, lines] = [&grey, &lines].map(|pixels| Image::new(64, 64, pixels).expect("as many pixels as it says"));
+/// let (grey, lines) = (DisplayPixels::new(64, 64, &grey)?, DisplayPixels::new(64, 64, &lines)?);
 /// let vdp = Vdp::default();
 /// assert_eq!(vdp.visible(&grey, &grey)?.max(), 0.0);
 /// assert!(vdp.visible(&grey, &lines)?.max() > 0.99);
-/// # Ok::<(), noisefloor_rivals::ImageError>(())
+/// # Ok::<(), noisefloor_rivals::MetricError>(())
 /// ```
 #[derive(Clone, Debug, Default)]
 pub struct Vdp {
@@ -67,7 +77,7 @@ pub struct Vdp {
     cortex: Arc<Mutex<Option<Arc<Cortex>>>>,
 }
 
-/// What the eye makes of a picture: contrast after the amplitude nonlinearity.
+/// The response of the eye to a picture: contrast after the amplitude nonlinearity.
 #[derive(Clone, Debug)]
 pub(crate) struct Response {
     width: usize,
@@ -79,7 +89,7 @@ impl Vdp {
     /// A predictor for a viewing condition.
     ///
     /// # Errors
-    /// [`VdpViewingError`] if a number of the condition is out of range.
+    /// [`VdpViewingError`] if a value of the condition is out of range.
     pub fn new(viewing: VdpViewing) -> Result<Self, VdpViewingError> {
         viewing.check()?;
         Ok(Self { viewing, cortex: Arc::default() })
@@ -90,17 +100,22 @@ impl Vdp {
         &self.viewing
     }
 
-    /// The probability, in [0, 1], that an observer sees a difference at each pixel of two pictures. Symmetric.
+    /// The probability, in [0, 1], that an observer sees a difference at each pixel of two pictures.
+    /// Symmetric.
     ///
     /// # Errors
-    /// [`ImageError::Differ`] if the pictures have different sizes.
-    pub fn visible(&self, a: &Image<'_>, b: &Image<'_>) -> Result<Map, ImageError> {
+    /// [`MetricError::Differ`] if the pictures have different sizes.
+    pub fn visible(
+        &self,
+        a: &DisplayPixels<'_>,
+        b: &DisplayPixels<'_>,
+    ) -> Result<DifferenceMap, MetricError> {
         a.check_pair(b)?;
         let values = self.detect(&self.respond(a), &self.respond(b));
-        Ok(Map { width: a.width(), height: a.height(), values })
+        Ok(DifferenceMap { width: a.width(), height: a.height(), values })
     }
 
-    pub(crate) fn respond(&self, image: &Image<'_>) -> Response {
+    pub(crate) fn respond(&self, image: &DisplayPixels<'_>) -> Response {
         let VdpViewing { peak, adaptation, .. } = self.viewing;
         let (c, b) = AMPLITUDE;
         let amplitude = |l: f64| if l > 0.0 { l / (l + (c * l).powf(b)) } else { 0.0 };

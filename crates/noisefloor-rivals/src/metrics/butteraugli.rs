@@ -1,36 +1,42 @@
 //! Butteraugli of libjxl, in its port to Rust.
 
-use crate::image::{Image, ImageError, Map};
+use crate::picture::{DifferenceMap, DisplayPixels, MetricError};
 use ::butteraugli::{ButteraugliParams, Img, RGB};
 use noisefloor::{Rgb, srgb_decode};
 
 /// Largest value of [`butteraugli()`] below which two pictures look the same, by its authors' scale.
 pub const BUTTERAUGLI_SAME: f64 = 1.0;
 
-/// Smallest edge of a picture that butteraugli takes.
+/// Smallest edge of a picture for butteraugli.
 const BUTTERAUGLI_EDGE: usize = 8;
 
-/// Butteraugli of libjxl, in its port to Rust: a distance at each pixel, at 80 cd/m². [`Map::max`] is its authors' score, below
-/// [`BUTTERAUGLI_SAME`] of which pictures look the same; the 3-norm ([`Map::norm`]) is what they recommend for an average.
+/// Butteraugli of libjxl, in its port to Rust: a distance at each pixel, at 80 cd/m². Its authors' score is
+/// [`DifferenceMap::max`]; below [`BUTTERAUGLI_SAME`] pictures look the same. As an average they recommend
+/// the 3-norm ([`DifferenceMap::norm`]).
 ///
 /// # Errors
-/// [`ImageError`] if sizes do not fit each other, or an edge is below 8 pixels.
-pub fn butteraugli(reference: &[Rgb], test: &[Rgb], width: usize, height: usize) -> Result<Map, ImageError> {
+/// [`MetricError`] if sizes do not match, or an edge is below 8 pixels.
+pub fn butteraugli(
+    reference: &[Rgb],
+    test: &[Rgb],
+    width: usize,
+    height: usize,
+) -> Result<DifferenceMap, MetricError> {
     let linear = |pixels| {
-        let image = Image::new(width, height, pixels)?;
+        let image = DisplayPixels::new(width, height, pixels)?;
         let decode = |c: f32| srgb_decode(if c.is_nan() { 0.0 } else { c });
         let pixels = image.pixels().iter().map(|&[r, g, b]| RGB::new(decode(r), decode(g), decode(b)));
-        Ok::<_, ImageError>(Img::new(pixels.collect::<Vec<_>>(), width, height))
+        Ok::<_, MetricError>(Img::new(pixels.collect::<Vec<_>>(), width, height))
     };
     let (reference, test) = (linear(reference)?, linear(test)?);
     if width.min(height) < BUTTERAUGLI_EDGE {
-        return Err(ImageError::Small { metric: "butteraugli", least: BUTTERAUGLI_EDGE, width, height });
+        return Err(MetricError::Small { metric: "butteraugli", least: BUTTERAUGLI_EDGE, width, height });
     }
     let params = ButteraugliParams::new().with_compute_diffmap(true);
     let result = ::butteraugli::butteraugli_linear(reference.as_ref(), test.as_ref(), &params);
-    let refused = |why: String| ImageError::Refused { metric: "butteraugli", why };
+    let refused = |why: String| MetricError::Refused { metric: "butteraugli", why };
     let map = result.map_err(|e| refused(e.to_string()))?.diffmap.ok_or_else(|| refused("no map".into()))?;
-    Ok(Map { width, height, values: map.pixels().collect() })
+    Ok(DifferenceMap { width, height, values: map.pixels().collect() })
 }
 
 #[cfg(test)]
@@ -63,8 +69,8 @@ mod tests {
     #[test]
     fn what_does_not_fit_is_an_error() {
         let picture = vec![[0.5; 3]; 64];
-        assert!(matches!(butteraugli(&picture, &picture[1..], 8, 8), Err(ImageError::Pixels { .. })));
-        assert!(matches!(butteraugli(&picture, &picture, 4, 16), Err(ImageError::Small { .. })));
+        assert!(matches!(butteraugli(&picture, &picture[1..], 8, 8), Err(MetricError::Pixels { .. })));
+        assert!(matches!(butteraugli(&picture, &picture, 4, 16), Err(MetricError::Small { .. })));
         let odd = vec![[f32::NAN, -1.0, f32::INFINITY]; 64];
         assert!(butteraugli(&picture, &odd, 8, 8).unwrap().values.iter().all(|v| v.is_finite()));
     }

@@ -1,42 +1,43 @@
 //! FLIP, by NVIDIA's own library.
 
-use crate::image::{Image, ImageError, Map, RESOLUTIONS};
+use crate::picture::{DifferenceMap, DisplayPixels, MetricError, RESOLUTIONS};
 use noisefloor::Rgb;
 use nv_flip::FlipImageRgb8;
 
-/// FLIP (Andersson et al. 2020) by NVIDIA's own library: how different two pictures look when one flips between them, in [0, 1]
-/// at each pixel. The mean is its authors' single number. `pixels_per_degree` says how finely somebody sees; FLIP's own default is
-/// 67, [`crate::VdpViewing::pixels_per_degree`] that of the other metrics here. Display values are rounded to 8 bits, as on a screen.
+/// FLIP (Andersson et al. 2020) by NVIDIA's own library: how different two pictures look when flipping
+/// between them, in [0, 1] at each pixel. Its authors report the mean. FLIP's default of `pixels_per_degree`
+/// is 67; the other metrics here use [`crate::VdpViewing::pixels_per_degree`]. Display values are rounded to
+/// 8 bits, as on a screen.
 ///
 /// # Errors
-/// [`ImageError`] if sizes do not fit each other, or the resolution is outside 1…1000.
+/// [`MetricError`] if sizes do not match, or the resolution is outside 1…1000.
 pub fn flip(
     reference: &[Rgb],
     test: &[Rgb],
     width: usize,
     height: usize,
     pixels_per_degree: f64,
-) -> Result<Map, ImageError> {
+) -> Result<DifferenceMap, MetricError> {
     if !RESOLUTIONS.contains(&pixels_per_degree) {
-        return Err(ImageError::Resolution(pixels_per_degree));
+        return Err(MetricError::Resolution(pixels_per_degree));
     }
     let image = |pixels| {
-        let image = Image::new(width, height, pixels)?;
+        let image = DisplayPixels::new(width, height, pixels)?;
         let byte = |c: &f32| (c.clamp(0.0, 1.0) * 255.0).round() as u8; // NaN becomes 0
         let bytes: Vec<u8> = image.pixels().as_flattened().iter().map(byte).collect();
-        // Edges and area are limited by `Image`, and fit.
-        Ok::<_, ImageError>(FlipImageRgb8::with_data(width as u32, height as u32, &bytes))
+        // `DisplayPixels` limits the edges: they fit into 32 bits
+        Ok::<_, MetricError>(FlipImageRgb8::with_data(width as u32, height as u32, &bytes))
     };
     let values = nv_flip::flip(image(reference)?, image(test)?, pixels_per_degree as f32).to_vec();
-    Ok(Map { width, height, values })
+    Ok(DifferenceMap { width, height, values })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    /// Values of flip-evaluator 1.7, NVIDIA's own package for Python: `flip_evaluator.evaluate(ref, test, "LDR", applyMagma=False,
-    /// parameters={"ppd": …})` on the same pictures.
+    /// Values of flip-evaluator 1.7, NVIDIA's own package for Python: `flip_evaluator.evaluate(ref, test,
+    /// "LDR", applyMagma=False, parameters={"ppd": …})` on the same pictures.
     #[test]
     fn flip_is_that_of_its_authors() {
         let (width, height) = (48usize, 32usize);
@@ -75,9 +76,9 @@ mod tests {
             flip(&[[0.0; 3]], &[[0.0; 3]], 1, 1, 1e9).unwrap_err().to_string().contains("1 to 1000 pixels")
         );
         let picture = vec![[0.5; 3]; 64];
-        assert!(matches!(flip(&picture, &picture, 8, 9, 40.0), Err(ImageError::Pixels { .. })));
-        assert!(matches!(flip(&picture, &picture, 8, 8, 0.0), Err(ImageError::Resolution(_))));
-        assert!(matches!(flip(&picture, &picture, 8, 8, f64::NAN), Err(ImageError::Resolution(_))));
+        assert!(matches!(flip(&picture, &picture, 8, 9, 40.0), Err(MetricError::Pixels { .. })));
+        assert!(matches!(flip(&picture, &picture, 8, 8, 0.0), Err(MetricError::Resolution(_))));
+        assert!(matches!(flip(&picture, &picture, 8, 8, f64::NAN), Err(MetricError::Resolution(_))));
         let odd = vec![[f32::NAN, -1.0, f32::INFINITY]; 64];
         assert!(flip(&picture, &odd, 8, 8, 40.0).unwrap().values.iter().all(|v| v.is_finite()));
     }

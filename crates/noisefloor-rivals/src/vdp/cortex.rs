@@ -10,7 +10,7 @@ use std::f64::consts::{FRAC_PI_2, FRAC_PI_6, PI};
 const DOMS: usize = 5;
 /// Orientations of each.
 const FANS: usize = 6;
-/// Pixels that the picture is mirrored by between its end and its beginning.
+/// Pixels of mirrored picture between its end and its beginning.
 const MARGIN: usize = 32;
 
 /// One band of frequencies and orientations.
@@ -22,7 +22,8 @@ pub(super) struct Band {
 }
 
 impl Band {
-    /// Threshold elevation by a mask whose local amplitude is `mask` times its own threshold: T = (1 + (k₁(k₂m)^s)^b)^(1/b).
+    /// Threshold elevation by a mask whose local amplitude is `mask` times its own threshold: T = (1 +
+    /// (k₁(k₂m)^s)^b)^(1/b).
     pub(super) fn elevation(self, mask: f32) -> f32 {
         let slope = match self.dom {
             DOMS => 0.7,
@@ -44,7 +45,7 @@ pub(super) struct Cortex {
     fourier: Fourier,
     /// Contrast sensitivity at each frequency of a spectrum, over the number of its values.
     sensitivity: Vec<f32>,
-    /// Weights of the bands of frequency, and of the orientations; signs say which half of the plane a frequency lies in.
+    /// Weights of the frequency bands and of the orientations.
     doms: Vec<Vec<f32>>,
     fans: Vec<Vec<f32>>,
 }
@@ -75,8 +76,8 @@ fn dom_weight(dom: usize, rho: f64) -> f64 {
     }
 }
 
-/// Weight of orientation `fan` at `angle` radians: twice that in the half plane around its centre, for complex bands, and
-/// 0 in the other; all orientations together are 1 on average over the two.
+/// Weight of orientation `fan` at `angle` radians: twice that in the half plane around its centre, for
+/// complex bands, and 0 in the other; all orientations together are 1 on average over the two.
 fn fan_weight(fan: usize, angle: f64) -> f64 {
     let center = fan as f64 * FRAC_PI_6 - FRAC_PI_2;
     let distance = (angle - center + PI).rem_euclid(2.0 * PI) - PI;
@@ -89,7 +90,7 @@ fn frequency(i: usize, n: usize) -> f64 {
     signed / n as f64
 }
 
-/// The pixel that shows at place `i` of a row of `n` pixels that is continued by mirroring, to a period of `period`.
+/// The pixel at place `i` of a row of `n` pixels that is extended by mirroring to a period of `period`.
 fn mirrored(i: usize, n: usize, period: usize) -> usize {
     let beyond = i.saturating_sub(n);
     match i {
@@ -201,7 +202,8 @@ mod tests {
 
     #[test]
     fn a_band_knows_the_local_amplitude() {
-        // A wave in the middle of a band: |band| is its amplitude times its sensitivity everywhere but near the edge.
+        // A wave in the middle of a band: |band| is its amplitude times its sensitivity everywhere but near
+        // the edge.
         let viewing = VdpViewing::default();
         let cortex = Cortex::new(&viewing, 216, 216);
         let wave = |i: usize| 0.5 * (std::f64::consts::TAU * (i % 216) as f64 / 6.0).cos() as f32;

@@ -1,4 +1,4 @@
-//! How and how well somebody sees.
+//! VdpViewing conditions and contrast sensitivity.
 
 use thiserror::Error;
 
@@ -9,7 +9,7 @@ const EPSILON: f64 = 0.9;
 /// ob: resolution along the diagonals, relative to that along the axes.
 const OBLIQUE: f64 = 0.78;
 
-/// A viewing condition.
+/// The viewing condition of [`Vdp`](crate::Vdp).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VdpViewing {
     /// Distance of the eye from the screen, in metres, above 0.
@@ -18,19 +18,20 @@ pub struct VdpViewing {
     pub dpi: f64,
     /// Luminance of white, in cd/m², above 0; black is 0.
     pub peak: f64,
-    /// Luminance that the eye is adapted to, in cd/m², above 0. A constant of the condition, and not taken from the picture, so
-    /// that all stages of a rendering are seen alike.
+    /// Luminance to which the eye is adapted, in cd/m², above 0. A constant of the condition rather than of
+    /// the picture, so that all stages of a rendering are seen alike.
     pub adaptation: f64,
 }
 
 impl Default for VdpViewing {
-    /// An office: 0.6 m from a screen of 96 dpi (40 pixels per degree) whose white has 100 cd/m², adapted to a middle grey of 18 %.
+    /// An office: 0.6 m from a screen of 96 dpi (40 pixels per degree) with a white of 100 cd/m², adapted to
+    /// a middle grey of 18 %.
     fn default() -> Self {
         Self { distance: 0.6, dpi: 96.0, peak: 100.0, adaptation: 18.0 }
     }
 }
 
-/// A number of a viewing condition that is out of range.
+/// A value of a viewing condition is out of range.
 #[derive(Debug, Error, Clone, Copy, PartialEq)]
 #[error("the {name} of a viewing condition must be a positive finite number, not {value}")]
 pub struct VdpViewingError {
@@ -44,10 +45,10 @@ impl VdpViewing {
         self.distance * 1f64.to_radians().tan() * self.dpi / 0.0254
     }
 
-    /// Checks the numbers.
+    /// Checks the values.
     ///
     /// # Errors
-    /// [`VdpViewingError`] naming the first one that is not positive and finite.
+    /// [`VdpViewingError`] names the first one that is not positive and finite.
     pub fn check(&self) -> Result<(), VdpViewingError> {
         let numbers = [
             ("distance", self.distance),
@@ -61,13 +62,14 @@ impl VdpViewing {
         }
     }
 
-    /// Contrast sensitivity, the inverse of the threshold contrast of a grating: of `frequency` cycles per degree, above 0, at
-    /// `angle` radians from the horizontal, on a picture of `area` square degrees, above 0 (Daly 1993).
+    /// Contrast sensitivity, the inverse of the threshold contrast of a grating: of `frequency` cycles per
+    /// degree, above 0, at `angle` radians from the horizontal, on a picture of `area` square degrees, above
+    /// 0 (Daly 1993).
     ///
-    /// S = P·min(S₁(ρ/(r_a·r_θ)), S₁(ρ)) with r_a = 0.856·d^0.14 for the accommodation to distance d and
-    /// r_θ = ((1 − ob)·cos 4θ + 1 + ob)/2 for the oblique effect, ob = 0.78; eccentricity is 0, as if the eye looked everywhere.
-    /// S₁(ρ) = ((3.23·(ρ²i²)^−0.3)⁵ + 1)^−⅕ · A·ερ·e^−Bερ·√(1 + 0.06·e^Bερ), A = 0.801·(1 + 0.7/l)^−0.2, B = 0.3·(1 + 100/l)^0.15,
-    /// i² the area, l the adaptation luminance, ε = 0.9, P = 250.
+    /// S = P·min(S₁(ρ/(r_a·r_θ)), S₁(ρ)) with r_a = 0.856·d^0.14 for the accommodation to distance d and r_θ
+    /// = ((1 − ob)·cos 4θ + 1 + ob)/2 for the oblique effect, ob = 0.78; eccentricity is 0, as if the eye
+    /// looked everywhere. S₁(ρ) = ((3.23·(ρ²i²)^−0.3)⁵ + 1)^−⅕ · A·ερ·e^−Bερ·√(1 + 0.06·e^Bερ), A = 0.801·(1
+    /// + 0.7/l)^−0.2, B = 0.3·(1 + 100/l)^0.15, i² the area, l the adaptation luminance, ε = 0.9, P = 250.
     pub fn sensitivity(&self, frequency: f64, angle: f64, area: f64) -> f64 {
         let l = self.adaptation;
         let (a, b) = (0.801 * (1.0 + 0.7 / l).powf(-0.2), 0.3 * (1.0 + 100.0 / l).powf(0.15));
@@ -102,8 +104,9 @@ mod tests {
 
     #[test]
     fn peak_and_cut_off_are_those_of_people() {
-        // At photopic levels people see gratings of 2…5 cycles per degree best, at contrasts of about 0.5 %, and none of more than
-        // 40…60 (Campbell & Robson 1968; van Nes & Bouman 1967). In the dark all of that falls.
+        // At photopic levels people see gratings of 2…5 cycles per degree best, at contrasts of about 0.5 %,
+        // and none of more than 40…60 (Campbell & Robson 1968; van Nes & Bouman 1967). In the dark all of
+        // that falls.
         let (peak, height, cut) = shape(adapted(100.0));
         assert!((2.0..5.0).contains(&peak) && (150.0..300.0).contains(&height), "{peak} {height}");
         assert!((35.0..60.0).contains(&cut), "{cut}");
@@ -125,8 +128,8 @@ mod tests {
 
     #[test]
     fn a_worked_example() {
-        // In double precision elsewhere, for l = 100, ρ = 4, i² = 100, θ = 0, d = 0.6: r_a = 0.79692, ρ/r_a = 5.01932, A = 0.79988,
-        // B = 0.33287, S₁(4) = 0.95019, S₁(5.01932) = 0.90470.
+        // In double precision elsewhere, for l = 100, ρ = 4, i² = 100, θ = 0, d = 0.6: r_a = 0.79692, ρ/r_a =
+        // 5.01932, A = 0.79988, B = 0.33287, S₁(4) = 0.95019, S₁(5.01932) = 0.90470.
         let s = adapted(100.0).sensitivity(4.0, 0.0, 100.0);
         assert!((s - 250.0 * 0.904_703).abs() < 0.001, "{s}");
     }

@@ -21,7 +21,7 @@ impl fmt::Debug for Fourier {
     }
 }
 
-/// The smallest length from `least` on that has no prime factor above 5, and whose transform is quick therefore.
+/// The smallest length, at least `least`, without prime factors above 5: its transform is fast.
 pub(super) fn quick_length(least: usize) -> usize {
     let rest = |n: usize| {
         [2, 3, 5].into_iter().fold(n, |mut n, p| {
@@ -37,7 +37,7 @@ pub(super) fn quick_length(least: usize) -> usize {
 fn transpose(plane: &[Complex32], width: usize) -> Vec<Complex32> {
     let height = plane.len() / width;
     let mut out = vec![Complex32::default(); plane.len()];
-    // Columns in bundles, so that each cache line is read once for a bundle.
+    // Columns in bundles, so that each cache line is read once per bundle
     const BUNDLE: usize = 8;
     out.par_chunks_mut(BUNDLE * height).enumerate().for_each(|(bundle, columns)| {
         for y in 0..height {
@@ -71,7 +71,8 @@ impl Fourier {
         spectrum
     }
 
-    /// A transposed spectrum → its row-major plane, width × height times as large as what [`Fourier::forward`] was given.
+    /// A transposed spectrum → its row-major plane, width × height times as large as what
+    /// [`Fourier::forward`] was given.
     pub(super) fn inverse(&self, mut spectrum: Vec<Complex32>) -> Vec<Complex32> {
         each_row(&mut spectrum, &*self.columns[1]);
         let mut plane = transpose(&spectrum, self.height);

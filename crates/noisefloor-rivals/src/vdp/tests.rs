@@ -4,7 +4,8 @@ use noisefloor::{Rgb, srgb_encode};
 
 const EDGE: usize = 240;
 
-/// Contrast, frequency in cycles per pixel, and angle in radians of a grating whose crest is in the middle of the picture.
+/// Contrast, frequency in cycles per pixel, and angle in radians of a grating whose crest is in the middle of
+/// the picture.
 type Grating = (f64, f64, f64);
 
 /// Gratings on a screen of the adaptation luminance.
@@ -25,7 +26,7 @@ fn screen(gratings: &[Grating]) -> Vec<Rgb> {
 /// Largest probability around the middle.
 fn seen(vdp: &Vdp, a: &[Grating], b: &[Grating]) -> f32 {
     let (a, b) = (screen(a), screen(b));
-    let [a, b] = [&a, &b].map(|pixels| Image::new(EDGE, EDGE, pixels).unwrap());
+    let [a, b] = [&a, &b].map(|pixels| DisplayPixels::new(EDGE, EDGE, pixels).unwrap());
     let map = vdp.visible(&a, &b).unwrap();
     let rows = EDGE / 2 - 12..EDGE / 2 + 12;
     rows.flat_map(|y| &map.values[y * EDGE + EDGE / 2 - 12..][..24]).copied().fold(0.0, f32::max)
@@ -125,8 +126,8 @@ fn noisy(width: usize, height: usize, sigma: f64, seed: u64) -> Vec<Rgb> {
 fn noise_is_seen_the_more_the_stronger_it_is() {
     let vdp = Vdp::default();
     let clean = noisy(64, 48, 0.0, 1);
-    fn image(pixels: &[Rgb]) -> Image<'_> {
-        Image::new(64, 48, pixels).unwrap()
+    fn image(pixels: &[Rgb]) -> DisplayPixels<'_> {
+        DisplayPixels::new(64, 48, pixels).unwrap()
     }
     let means = [0.0, 0.002, 0.01, 0.05, 0.2].map(|sigma| {
         let noise = noisy(64, 48, sigma, 1);
@@ -144,20 +145,20 @@ fn any_size_and_any_pixel_will_do() {
     for (width, height) in [(1, 1), (1, 70), (5, 3), (33, 17)] {
         let pixels: Vec<Rgb> = (0..width * height).map(|i| odd[i % odd.len()]).collect();
         let black = vec![[0.0; 3]; width * height];
-        let [a, b] = [&pixels, &black].map(|pixels| Image::new(width, height, pixels).unwrap());
+        let [a, b] = [&pixels, &black].map(|pixels| DisplayPixels::new(width, height, pixels).unwrap());
         let map = vdp.visible(&a, &b).unwrap();
         assert!(map.values.iter().all(|p| (0.0..=1.0).contains(p)), "{width}×{height}");
         assert_eq!(vdp.visible(&a, &a).unwrap().max(), 0.0);
     }
     let (a, b) = (vec![[0.0; 3]; 6], vec![[0.0; 3]; 6]);
-    let differ = vdp.visible(&Image::new(2, 3, &a).unwrap(), &Image::new(3, 2, &b).unwrap());
-    assert_eq!(differ.unwrap_err(), ImageError::Differ((2, 3), (3, 2)));
+    let differ = vdp.visible(&DisplayPixels::new(2, 3, &a).unwrap(), &DisplayPixels::new(3, 2, &b).unwrap());
+    assert_eq!(differ.unwrap_err(), MetricError::Differ((2, 3), (3, 2)));
 }
 
 #[test]
 fn the_number_of_threads_does_not_matter() {
     let (a, b) = (noisy(100, 60, 0.02, 1), noisy(100, 60, 0.02, 2));
-    let [a, b] = [&a, &b].map(|pixels| Image::new(100, 60, pixels).unwrap());
+    let [a, b] = [&a, &b].map(|pixels| DisplayPixels::new(100, 60, pixels).unwrap());
     let run = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| Vdp::default().visible(&a, &b).unwrap())

@@ -1,20 +1,21 @@
-//! Pictures in and maps out.
+//! Pictures in, maps of differences out.
 
 use noisefloor::{Rgb, TileError, check_image};
 use std::ops::RangeInclusive;
 use thiserror::Error;
 
-/// Pixels per degree that make sense: the filters of a metric grow with them.
+/// Sensible pixels per degree: the filters of a metric grow with them.
 pub(crate) const RESOLUTIONS: RangeInclusive<f64> = 1.0..=1000.0;
 
-/// A picture whose size and pixels do not go together.
+/// Why pictures cannot be compared.
 #[derive(Debug, Error, Clone, PartialEq)]
-pub enum ImageError {
+#[non_exhaustive]
+pub enum MetricError {
     /// The size is out of range.
     #[error(transparent)]
     Size(#[from] TileError),
-    /// Another number of pixels than the size says.
-    #[error("a picture of {width}×{height} pixels has {expected} of them, not {got}")]
+    /// The number of pixels does not match the size.
+    #[error("a picture of {width}×{height} pixels needs {expected} values, not {got}")]
     Pixels {
         /// Width in pixels.
         width: usize,
@@ -25,12 +26,10 @@ pub enum ImageError {
         /// Pixels given.
         got: usize,
     },
-    /// Two pictures that are to be compared have different sizes.
-    #[error(
-        "pictures of {0:?} and {1:?} pixels (width, height) cannot be compared: give two of the same size"
-    )]
+    /// The pictures have different sizes.
+    #[error("pictures of {0:?} and {1:?} pixels (width, height) cannot be compared; use the same size")]
     Differ((usize, usize), (usize, usize)),
-    /// Too small for a metric.
+    /// The pictures are too small for a metric.
     #[error("{metric} needs pictures of at least {least}×{least} pixels, not {width}×{height}")]
     Small {
         /// The metric.
@@ -42,12 +41,12 @@ pub enum ImageError {
         /// Height in pixels.
         height: usize,
     },
-    /// A metric would not have the pictures.
+    /// A metric refused the pictures.
     #[error("{metric} refused the pictures: {why}")]
     Refused {
         /// The metric.
         metric: &'static str,
-        /// What it said.
+        /// Its reason.
         why: String,
     },
     /// The resolution of the viewing condition is out of range.
@@ -59,24 +58,25 @@ pub enum ImageError {
     Resolution(f64),
 }
 
-/// A display-encoded picture: sRGB values in [0, 1], row-major. Values outside are clamped by those who look, and NaN is black.
+/// The pixels of a display-encoded picture, borrowed: sRGB values in [0, 1], row-major. Metrics clamp values
+/// outside, and take NaN for black.
 #[derive(Clone, Copy, Debug)]
-pub struct Image<'a> {
+pub struct DisplayPixels<'a> {
     width: usize,
     height: usize,
     pixels: &'a [Rgb],
 }
 
-impl<'a> Image<'a> {
+impl<'a> DisplayPixels<'a> {
     /// A picture of `width`×`height` pixels.
     ///
     /// # Errors
-    /// [`ImageError`] if the size is out of range, or the number of pixels another.
-    pub fn new(width: usize, height: usize, pixels: &'a [Rgb]) -> Result<Self, ImageError> {
+    /// [`MetricError`] if the size is out of range or does not match the number of pixels.
+    pub fn new(width: usize, height: usize, pixels: &'a [Rgb]) -> Result<Self, MetricError> {
         check_image(width, height)?;
         let expected = width * height;
         if pixels.len() != expected {
-            return Err(ImageError::Pixels { width, height, expected, got: pixels.len() });
+            return Err(MetricError::Pixels { width, height, expected, got: pixels.len() });
         }
         Ok(Self { width, height, pixels })
     }
@@ -96,30 +96,30 @@ impl<'a> Image<'a> {
         self.pixels
     }
 
-    pub(crate) fn check_pair(&self, other: &Self) -> Result<(), ImageError> {
+    pub(crate) fn check_pair(&self, other: &Self) -> Result<(), MetricError> {
         let (a, b) = ((self.width, self.height), (other.width, other.height));
-        if a == b { Ok(()) } else { Err(ImageError::Differ(a, b)) }
+        if a == b { Ok(()) } else { Err(MetricError::Differ(a, b)) }
     }
 }
 
-/// One number a pixel, row-major.
+/// How visible a difference is at each pixel.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Map {
+pub struct DifferenceMap {
     /// Width in pixels.
     pub width: usize,
     /// Height in pixels.
     pub height: usize,
-    /// The numbers, at least one; what they mean is said by what made them.
+    /// Row-major, `width * height` values, at least one; their meaning is that of the metric.
     pub values: Vec<f32>,
 }
 
-impl Map {
-    /// Mean of all numbers.
+impl DifferenceMap {
+    /// Mean of all values.
     pub fn mean(&self) -> f64 {
         self.values.iter().map(|&v| f64::from(v)).sum::<f64>() / self.values.len() as f64
     }
 
-    /// The largest number.
+    /// The largest value.
     pub fn max(&self) -> f64 {
         self.values.iter().copied().fold(f32::NEG_INFINITY, f32::max).into()
     }
@@ -130,7 +130,7 @@ impl Map {
         (sum / self.values.len() as f64).powf(1.0 / p)
     }
 
-    /// Share of the numbers that lie above `limit`, in [0, 1].
+    /// Share of the values above `limit`, in [0, 1].
     pub fn share_above(&self, limit: f32) -> f64 {
         self.values.iter().filter(|&&v| v > limit).count() as f64 / self.values.len() as f64
     }
