@@ -5,7 +5,7 @@ use noisefloor::{
 };
 use noisefloor_image::{PictureError, WriteError};
 use noisefloor_learn::{CorpusError, TableError};
-use noisefloor_rivals::ImageError;
+use noisefloor_rivals::MetricError;
 use std::io;
 use std::path::PathBuf;
 use thiserror::Error;
@@ -34,7 +34,7 @@ pub enum LabError {
     Film(#[from] FilmError),
     /// Pictures that a metric cannot compare.
     #[error(transparent)]
-    Metric(#[from] ImageError),
+    Metric(#[from] MetricError),
     /// A picture could not be read.
     #[error(transparent)]
     Picture(#[from] PictureError),
