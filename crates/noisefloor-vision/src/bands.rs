@@ -5,6 +5,7 @@ use crate::masking::{CHANNEL_GAINS, SENSITIVITY_DB};
 use crate::math::exp2;
 use crate::photometry::CHANNELS;
 use crate::pyramid::Size;
+use multiversion::multiversion;
 use std::f64::consts::LOG2_10;
 use std::ops::Range;
 
@@ -16,7 +17,11 @@ const LOWEST: f64 = 0.2;
 const BASEBAND: f64 = 0.1;
 
 /// log₂ of the sensitivity of one channel at each luminance of the table, and the step to the next.
-pub(crate) type Curve = [[f32; 2]; KNOTS];
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Curve {
+    values: [f32; KNOTS],
+    steps: [f32; KNOTS],
+}
 
 /// A display's bands.
 #[derive(Clone, Debug)]
@@ -63,7 +68,7 @@ fn curves_of_baseband() -> [Curve; CHANNELS] {
     let mut curves = curves(BASEBAND, 1.0);
     // Its difference is not masked, and has no gain by channel
     for (curve, gain) in curves.iter_mut().zip(CHANNEL_GAINS) {
-        curve.iter_mut().for_each(|knot| knot[0] -= gain.log2() as f32);
+        curve.values.iter_mut().for_each(|value| *value -= gain.log2() as f32);
     }
     curves
 }
@@ -71,18 +76,19 @@ fn curves_of_baseband() -> [Curve; CHANNELS] {
 fn curves(frequency: f64, contrast: f64) -> [Curve; CHANNELS] {
     std::array::from_fn(|channel| {
         let shift = SENSITIVITY_DB / 20.0 * LOG2_10 + (CHANNEL_GAINS[channel] * contrast).log2();
-        let knots = by_luminance(channel, frequency).map(|log10| (log10 * LOG2_10 + shift) as f32);
-        std::array::from_fn(|i| [knots[i], knots[(i + 1).min(KNOTS - 1)] - knots[i]])
+        let values = by_luminance(channel, frequency).map(|log10| (log10 * LOG2_10 + shift) as f32);
+        Curve { values, steps: std::array::from_fn(|i| values[(i + 1).min(KNOTS - 1)] - values[i]) }
     })
 }
 
 /// log₂ of the sensitivities at places between the knots.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx2", "x86_64+avx2"))]
 pub(crate) fn sensitivity_row(curve: &Curve, places: &[f32], out: &mut [f32]) {
     for (out, &place) in out.iter_mut().zip(places) {
         // Places lie within 0…KNOTS − 1; the remainder says so to the compiler
-        let low = place as usize % KNOTS;
-        let [value, step] = curve[low];
-        *out = value + step * (place - low as f32);
+        let low = place as i32;
+        let knot = low as usize % KNOTS;
+        *out = curve.values[knot] + curve.steps[knot] * (place - low as f32);
     }
 }
 

@@ -2,7 +2,7 @@
 //! distance.
 //!
 //! The image path of ColorVideoVDP (Mantiuk et al. 2024) in Rust, with the constants of the PyPI package
-//! `cvvdp` 0.5.7 and its results: JODs and difference maps agree to five digits on 85 recorded pairs. Reads
+//! `cvvdp` 0.5.7 and its results: JODs and difference maps agree to five digits on 87 recorded pairs. Reads
 //! no files, starts no threads, knows no renderer.
 //!
 //! | item | |
@@ -10,7 +10,7 @@
 //! | [`Viewing`] | a display, the room's light, the distance; as text `desk` or `ppd=60,peak=300` |
 //! | [`PRESETS`], [`Screen`] | viewing conditions by name; pixels per degree of a screen |
 //! | [`VisionModel::compare`] | JODs and a map of two pictures |
-//! | [`VisionModel::residual`] | visible differences by band and channel in a tile, fast: for stopping rules |
+//! | [`VisionModel::residual`] | visible differences by band and channel in a tile, for stopping rules |
 //! | [`rescaled`] | the same for noise of another contrast, without computing it again |
 //! | [`VisionWorkspace`] | memory, used again from picture to picture |
 //! | [`contrast_sensitivity`] | castleCSF by channel, frequency and luminance |

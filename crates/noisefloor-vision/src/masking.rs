@@ -106,6 +106,12 @@ fn blend(blur: &Blur, rows: [&[f32]; 2 * BLUR_RADIUS + 1], out: &mut [f32]) {
     }
 }
 
+/// A limited difference d = L·u/(L + u) after the unlimited u has been multiplied by `growth`.
+#[inline(always)]
+pub(crate) fn grown(difference: f32, growth: f32) -> f32 {
+    LARGEST * growth * difference / (LARGEST - difference + growth * difference)
+}
+
 /// x^p, bent so that it is smooth at 0.
 #[inline(always)]
 pub(crate) fn safe_pow(x: f32, p: f32, offset: f32) -> f32 {

@@ -92,10 +92,13 @@ impl VisionComparison<'_> {
         for (band, (size, map)) in self.sizes.iter().zip(&mut *map).enumerate() {
             let weights = if band == last { pooling::BASEBAND } else { [1.0; CHANNELS] };
             let share = if band == 0 || band == last { 1.0 } else { 0.5 };
-            for (i, out) in map[..size.area()].iter_mut().enumerate() {
-                let values = differences.each_ref().map(|bands| bands[band][i]);
-                *out = pooling::across_channels(values, weights) * share;
-            }
+            let planes = differences.each_ref().map(|bands| &bands[band][..size.area()]);
+            pooling::across_channels(
+                planes,
+                weights.map(|w| (w * pooling::STILL) as f32),
+                share,
+                &mut map[..size.area()],
+            );
         }
         let sizes = &self.sizes;
         let whole = |band: usize| 0..sizes[band].height;

@@ -156,11 +156,16 @@ fn unit(v: f32) -> f32 {
     if v < 1.0 { v } else { 1.0 }
 }
 
-/// IEC 61966-2-1.
+/// IEC 61966-2-1, within 3·10⁻⁶ of it: most of the time of a tile would go into powers of 2.4.
 #[inline(always)]
 fn srgb(v: f32) -> f32 {
-    let bent = pow((v + 0.055) * (1.0 / 1.055), 2.4);
-    if v > 0.04045 { bent } else { v * (1.0 / 12.92) }
+    // y^2.4 = y²·u^0.8 with u = √y, and u^0.8 is nearly a polynomial (minimax of the relative error) where
+    // the curve is a power
+    let y = (v + 0.055) * (1.0 / 1.055);
+    let u = y.sqrt();
+    let high = 1.321_410_7 + u * (-1.154_611_3 + u * (0.579_627_75 + u * -0.125_126_02));
+    let power = 0.031_182_42 + u * (1.388_462_9 + u * (-1.040_948_8 + u * high));
+    if v > 0.04045 { y * y * power } else { v * (1.0 / 12.92) }
 }
 
 /// SMPTE ST 2084, onto cd/m².
@@ -241,7 +246,7 @@ mod tests {
             [(0.0, 0.2), (1.0, 200.0), (0.5, 0.2 + 199.8 * 0.214_041_14), (-3.0, 0.2), (7.0, 200.0)]
         {
             assert!(
-                (desk.luminance(code) - luminance - reflected).abs() < 2e-4,
+                (desk.luminance(code) - luminance - reflected).abs() < 1e-3,
                 "{code}: {}",
                 desk.luminance(code)
             );
@@ -280,6 +285,13 @@ mod tests {
     }
 
     proptest! {
+        #[test]
+        fn srgb_is_that_of_the_standard(code in 0.0f32..1.0) {
+            let v = f64::from(code);
+            let exact = if v > 0.04045 { ((v + 0.055) / 1.055).powf(2.4) } else { v / 12.92 };
+            prop_assert!((f64::from(srgb(code)) - exact).abs() <= 3e-6 * exact, "{code}");
+        }
+
         #[test]
         fn more_code_is_more_light(
             eotf in prop_oneof![

@@ -1,7 +1,8 @@
 //! From visible differences to just-objectionable differences (Mantiuk et al. 2024, §3.7), with the constants
 //! of `cvvdp_parameters.json` 0.5.7.
 
-use crate::masking::EPSILON;
+use crate::masking::{EPSILON, grown};
+use crate::math::pow;
 use crate::photometry::CHANNELS;
 use multiversion::multiversion;
 
@@ -31,8 +32,13 @@ pub(crate) fn lost(difference: f64) -> f64 {
 }
 
 /// [`lost`] in every pixel of a map.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx2", "x86_64+avx2"))]
 pub(crate) fn lost_in(map: &mut [f32]) {
-    map.iter_mut().for_each(|value| *value = lost(f64::from(*value)) as f32);
+    let slope = (JOD_GAIN * LINEAR.powf(JOD_EXPONENT - 1.0)) as f32;
+    for value in map {
+        let (linear, bent) = (slope * *value, JOD_GAIN as f32 * pow(*value, JOD_EXPONENT as f32));
+        *value = if *value > LINEAR as f32 { bent } else { linear };
+    }
 }
 
 /// Root mean square over the pixels of a band from the sum of [`bent`] squares.
@@ -54,28 +60,42 @@ pub(crate) fn quality(bands: &[[f64; CHANNELS]]) -> f64 {
 }
 
 /// One difference from those of all channels, for the map; as many weights as channels.
-pub(crate) fn across_channels(values: [f32; CHANNELS], weights: [f64; CHANNELS]) -> f32 {
-    let sum: f64 = (0..CHANNELS).map(|i| bent(f64::from(values[i]) * weights[i] * STILL, 4.0)).sum();
-    bent(sum, 0.25) as f32
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx2", "x86_64+avx2"))]
+pub(crate) fn across_channels(
+    planes: [&[f32]; CHANNELS],
+    weights: [f32; CHANNELS],
+    share: f32,
+    out: &mut [f32],
+) {
+    // [`bent`] with the powers of 4 and 1/4
+    const FOURTH: f32 = EPSILON * EPSILON * EPSILON * EPSILON;
+    let root = EPSILON.sqrt().sqrt();
+    out.fill(EPSILON - CHANNELS as f32 * FOURTH);
+    for (plane, weight) in planes.into_iter().zip(weights) {
+        for (out, value) in out.iter_mut().zip(plane) {
+            let square = (value * weight + EPSILON) * (value * weight + EPSILON);
+            *out += square * square;
+        }
+    }
+    out.iter_mut().for_each(|out| *out = (out.sqrt().sqrt() - root) * share);
 }
 
-/// The map without that bend: the mean of fourth order over channels, times `weight`.
+/// The map without that bend, of a residual whose contrast has changed by `growth` to the power of
+/// 1/[`EXPONENT`]: the mean of fourth order over channels, times `weight`.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx2", "x86_64+avx2"))]
-pub(crate) fn across_row<const N: usize>(planes: [&[f32]; N], weight: f32, out: &mut [f32]) {
-    let n = out.len();
-    let planes = planes.map(|plane| &plane[..n]);
+pub(crate) fn across_row<const N: usize>(planes: [&[f32]; N], growth: f32, weight: f32, out: &mut [f32]) {
     if N == 1 {
-        out.iter_mut().zip(planes[0]).for_each(|(out, d)| *out = weight * d);
+        out.iter_mut().zip(planes[0]).for_each(|(out, &d)| *out = weight * grown(d, growth));
         return;
     }
-    for (x, out) in out.iter_mut().enumerate() {
-        let mut sum = 0.0;
-        for plane in planes {
-            let square = plane[x] * plane[x];
-            sum += square * square;
+    out.fill(0.0);
+    for plane in planes {
+        for (out, &d) in out.iter_mut().zip(plane) {
+            let square = grown(d, growth) * grown(d, growth);
+            *out += square * square;
         }
-        *out = weight * sum.sqrt().sqrt();
     }
+    out.iter_mut().for_each(|out| *out = weight * out.sqrt().sqrt());
 }
 
 #[cfg(test)]

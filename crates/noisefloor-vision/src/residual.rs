@@ -4,7 +4,7 @@
 use crate::check::{check_pixels, check_values, checked};
 use crate::engine::{Engine, build, collapse};
 use crate::error::VisionError;
-use crate::masking::{BLUR_RADIUS, EXPONENT, LARGEST};
+use crate::masking::{BLUR_RADIUS, EXPONENT, LARGEST, grown};
 use crate::model::VisionModel;
 use crate::part::Part;
 use crate::photometry::CHANNELS;
@@ -23,7 +23,8 @@ pub enum ResidualPixels<'a> {
         /// Added to the picture, it makes the one that is judged.
         residual: &'a [[f32; 3]],
     },
-    /// As greys: half the time of colour without its chromatic channels, and blind to noise in colour alone.
+    /// As greys: two thirds of the time of the achromatic channel of colours, and blind to noise in colour
+    /// alone.
     Grey {
         /// The picture.
         picture: &'a [f32],
@@ -35,8 +36,8 @@ pub enum ResidualPixels<'a> {
 /// A part of a picture with what surrounds it.
 #[derive(Clone, Debug)]
 pub struct ResidualPatch<'a> {
-    /// Its pixels, with a halo. Filters see the border of the patch mirrored; a halo of 16 pixels changes the
-    /// mean difference of a tile of 128×128 by less than 1 %.
+    /// Its pixels, with a halo. Filters see the border of the patch mirrored; with a halo of 16 pixels,
+    /// a tile of 128×128 differs from the whole picture by 0.2 % (root mean square).
     pub pixels: ResidualPixels<'a>,
     /// Pixels in a row, and rows; at least 4.
     pub size: (usize, usize),
@@ -46,8 +47,7 @@ pub struct ResidualPatch<'a> {
     pub rows: Range<usize>,
 }
 
-/// How much of the model is computed for a residual: less is faster. `docs/` of the crate's README has a
-/// table.
+/// How much of the model is computed for a residual: less is faster. `docs/benchmarks/vision.md` has a table.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VisionDetail {
     /// Whether the chromatic channels are computed.
@@ -60,16 +60,15 @@ pub struct VisionDetail {
 impl VisionDetail {
     /// All channels and bands.
     pub const FULL: Self = Self { colour: true, frequencies: (0.0, f64::INFINITY) };
-    /// Light and dark only, 1.5 to 15 cycles per degree: the frequencies at which people see noise of single
-    /// pixels best.
-    pub const FAST: Self = Self { colour: false, frequencies: (1.0, 15.0) };
+    /// Light and dark only, from one cycle per degree on.
+    pub const FAST: Self = Self { colour: false, frequencies: (1.0, 100.0) };
 }
 
 /// Visible differences in a part of a picture; 1 is about the threshold of seeing a difference. It borrows
 /// the workspace.
 #[derive(Debug)]
 pub struct VisibleDifference<'a> {
-    workspace: &'a VisionWorkspace,
+    workspace: &'a mut VisionWorkspace,
     sizes: Sizes,
     bands: Range<usize>,
     channels: usize,
@@ -156,7 +155,24 @@ impl VisionModel {
 impl VisibleDifference<'_> {
     /// One number a place: bands and channels together, as in the map of ColorVideoVDP before it turns into
     /// JODs. Its step is that of the finest band that was computed.
-    pub fn map(&self) -> DifferenceBand<'_> {
+    pub fn map(&mut self) -> DifferenceBand<'_> {
+        self.map_at(1.0)
+    }
+
+    /// [`VisibleDifference::map`] for a residual of `contrast` times the strength, from the same bands: noise
+    /// of n times as many samples has 1/√n. It takes a twentieth of the time of a tile.
+    ///
+    /// Exact if the picture masks as before. A weaker residual hides less of what masks it, so that mean
+    /// differences are up to 5 % lower at half the contrast, 11 % with colour; a noisy picture that has lost
+    /// noise masks less, so that they are higher.
+    pub fn map_at(&mut self, contrast: f32) -> DifferenceBand<'_> {
+        let growth = contrast.clamp(1e-6, 1e6).powf(EXPONENT);
+        let bands = self.bands.clone();
+        if self.channels == 1 {
+            draw::<1>(&self.sizes, bands, self.part, growth, self.workspace);
+        } else {
+            draw::<CHANNELS>(&self.sizes, bands, self.part, growth, self.workspace);
+        }
         self.plane(self.bands.start, &self.workspace.map[self.bands.start])
     }
 
@@ -179,16 +195,11 @@ impl VisibleDifference<'_> {
     }
 }
 
-/// A visible difference after the residual has been multiplied by `contrast`: it grows as contrast^2.26, up
-/// to a limit. Noise of n times as many samples has a contrast of 1/√n.
-///
-/// Exact if the picture masks as before. That of a noisy picture masks less once its noise falls, so the
-/// difference falls more slowly.
+/// A visible difference of one band and channel after the residual has been multiplied by `contrast`: it
+/// grows as contrast^2.26, up to a limit. Noise of n times as many samples has a contrast of 1/√n.
 pub fn rescaled(difference: f32, contrast: f32) -> f32 {
-    // The inverse of the limit, the power, and the limit again
-    let unlimited = LARGEST * difference / (LARGEST - difference).max(1e-3);
-    let scaled = unlimited * contrast.max(0.0).powf(EXPONENT);
-    LARGEST / (LARGEST / scaled + 1.0)
+    let difference = difference.clamp(0.0, 0.999_9 * LARGEST);
+    grown(difference, contrast.clamp(1e-6, 1e6).powf(EXPONENT))
 }
 
 /// Converts both pictures into opponent channels.
@@ -230,7 +241,10 @@ fn load(
     Ok(())
 }
 
-/// Computes the bands of `N` channels in a part of the picture, and their map.
+/// Interpolation of a band reads so far beyond what is wanted of the next finer one.
+const MARGIN: usize = 2;
+
+/// Computes the bands of `N` channels in a part of the picture.
 fn differ<const N: usize>(
     engine: &Engine,
     sizes: &Sizes,
@@ -238,24 +252,34 @@ fn differ<const N: usize>(
     part: Part,
     workspace: &mut VisionWorkspace,
 ) {
-    /// Interpolation of a band reads so far beyond what is wanted of the next finer one.
-    const MARGIN: usize = 2;
     build::<N>(sizes, workspace);
+    for band in bands {
+        let wanted = part.at(band).wider(MARGIN, sizes[band]);
+        let around = wanted.wider(BLUR_RADIUS, sizes[band]);
+        engine.band::<N>(band, sizes[band], (around, wanted), workspace);
+    }
+}
+
+/// Puts bands and channels together.
+fn draw<const N: usize>(
+    sizes: &Sizes,
+    bands: Range<usize>,
+    part: Part,
+    growth: f32,
+    workspace: &mut VisionWorkspace,
+) {
+    let VisionWorkspace { differences, map, rows, .. } = workspace;
+    let parts = |band: usize| part.at(band).wider(MARGIN, sizes[band]);
     for band in bands.clone() {
-        let size = sizes[band];
-        let wanted = part.at(band).wider(MARGIN, size);
-        engine.band::<N>(band, size, (wanted.wider(BLUR_RADIUS, size), wanted), workspace);
-        let VisionWorkspace { differences, map, .. } = workspace;
         // The pyramid halves contrasts between its finest and its coarsest band
         let weight = STILL as f32 * if band == 0 { 1.0 } else { 0.5 };
-        for y in wanted.rows() {
-            let here = y * size.width + wanted.x.0..y * size.width + wanted.x.1;
+        for y in parts(band).rows() {
+            let Range { start, end } = parts(band).columns();
+            let here = y * sizes[band].width + start..y * sizes[band].width + end;
             let planes: [&[f32]; N] =
                 std::array::from_fn(|channel| &differences[channel][band][here.clone()]);
-            across_row(planes, weight, &mut map[band][here]);
+            across_row(planes, growth, weight, &mut map[band][here]);
         }
     }
-    let VisionWorkspace { map, rows, .. } = workspace;
-    let parts = |band: usize| part.at(band).wider(MARGIN, sizes[band]).rows();
-    collapse(map, bands, sizes, parts, &mut rows.narrow, &mut rows.places);
+    collapse(map, bands, sizes, |band| parts(band).rows(), &mut rows.narrow, &mut rows.places);
 }

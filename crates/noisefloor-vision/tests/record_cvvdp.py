@@ -114,10 +114,14 @@ def cases():
     for grain in (2, 4, 8):
         vary(grain=grain)
     # Sizes: small, odd, even beside odd
-    small = ((2, 2), (3, 5), (4, 4), (7, 7), (8, 13), (13, 8), (15, 16), (16, 15), (33, 31), (65, 64), (64, 65))
-    large = ((127, 129), (128, 200), (160, 160), (192, 192), (255, 130), (301, 201))
+    small = ((2, 2), (3, 5), (4, 4), (7, 7), (8, 13), (13, 8), (15, 16), (16, 15), (33, 31), (65, 64))
+    large = ((64, 65), (127, 129), (128, 200), (160, 160), (192, 192), (255, 130), (301, 201))
     for width, height in small + large:
         vary(width=width, height=height, amount=[20] * 3)
+    # Bands that end with the lowest frequency instead of the size
+    vary(width=640, height=360, amount=[20] * 3)
+    near = "ppd=5,peak=200,contrast=1000,ambient=100,reflectivity=0.005,eotf=srgb"
+    vary(viewing=near, amount=[60] * 3, grain=3)
     # Contents
     for pattern in ("flat", "ramp", "bars", "disc", "mosaic"):
         vary(pattern=pattern)
@@ -130,10 +134,8 @@ def cases():
     vary(low=[128] * 3, high=[128] * 3, amount=[15, 5, 0])
     vary(pattern="disc", low=[200, 40, 40], high=[40, 200, 40], amount=[10] * 3)
     # Displays
-    sdr = (
-        "standard_4k standard_phone standard_hmd sdr_4k_30 iphone_12_pro macbook_pro_16 lg_oled_2017_sdr eizo_CG3146"
-    )
-    hdr = "standard_hdr_pq 65inch_hdr_pq_2Knit standard_hdr_hlg iphone_14_pro_hdr"
+    sdr = "standard_4k standard_phone standard_hmd sdr_4k_30 iphone_12_pro macbook_pro_16 lg_oled_2017_sdr"
+    hdr = "eizo_CG3146 standard_hdr_pq 65inch_hdr_pq_2Knit standard_hdr_hlg iphone_14_pro_hdr"
     for viewing in sdr.split() + hdr.split():
         vary(viewing=viewing, width=160, height=144)
         vary(viewing=viewing, pattern="mosaic", high=[220, 180, 140], amount=[25] * 3)
