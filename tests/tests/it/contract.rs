@@ -108,10 +108,10 @@ fn broken(change: impl FnMut(&[Request], &mut Vec<Batch>) + Copy + 'static) -> S
 fn broken_promises_are_noticed() {
     let said = |said: String, expected: &str| assert!(said.contains(expected), "{said:?}, not {expected:?}");
     said(broken(|_, _| ()), "kept");
-    said(broken(|_, b| drop(b.pop())), "number of batches");
+    said(broken(|_, b| drop(b.pop())), "the number of batches");
     said(broken(|_, b| b.reverse()), "order of the requests");
-    said(broken(|_, b| b.iter_mut().for_each(|b| b.mean.truncate(7))), "values in a batch");
-    said(broken(|_, b| b.iter_mut().for_each(|b| b.spp = 0)), "values in a batch of 0");
+    said(broken(|_, b| b.iter_mut().for_each(|b| b.mean.truncate(7))), "number of values in a batch");
+    said(broken(|_, b| b.iter_mut().for_each(|b| b.spp = 0)), "number of values in a batch of 0");
     said(broken(|_, b| b.iter_mut().for_each(|b| b.spp += 1)), "other batches because other numbers");
 
     // The first samples over and over
