@@ -19,7 +19,10 @@ const profile = mkdtempSync(join(tmpdir(), "noisefloor-browser-"));
 before(async () => {
   browser = await chromium.launch({
     executablePath: "/usr/bin/chromium",
-    args: ["--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking", "--disable-component-update", "--disable-sync"],
+    args: [
+      "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run",
+      "--disable-background-networking", "--disable-component-update", "--disable-sync",
+    ],
     env: { ...process.env, HOME: profile },
   });
   if (shots) mkdirSync(shots, { recursive: true });
@@ -29,8 +32,8 @@ after(async () => {
   rmSync(profile, { recursive: true, force: true });
 });
 
-/** A window of its own. Requests to any other machine, and anything written to the console as an error, fail the test;
- * `refusals` are expected where a test asks for them. */
+/** A window of its own. Requests to any other machine, and anything written to the console as an error, fail the
+ * test; `refusals` are expected where a test asks for them. */
 export async function open(t, url, viewport, { refusals = false, ...options } = {}) {
   const context = await browser.newContext({ viewport, locale: "en-GB", ...options });
   const problems = [];
@@ -52,7 +55,8 @@ export async function open(t, url, viewport, { refusals = false, ...options } = 
 export function watch(page, problems, refusals = false) {
   page.on("pageerror", (error) => problems.push(String(error)));
   page.on("console", (said) => {
-    const expected = /ERR_INTERNET_DISCONNECTED|404/.test(said.text()) || (refusals && /status of 422/.test(said.text()));
+    const text = said.text();
+    const expected = /ERR_INTERNET_DISCONNECTED|404/.test(text) || (refusals && /status of 4(22|03)/.test(text));
     if (said.type() === "error" && !expected) problems.push(said.text());
   });
 }
@@ -71,11 +75,30 @@ export async function shot(page, name) {
 
 export const heading = (page, text) => page.getByRole("heading", { name: text }).waitFor();
 
+/** Measures the screen: nothing is filled in beforehand, and nothing can be left out. */
+export async function measure(page) {
+  await heading(page, "How you see the pictures");
+  const go = page.getByRole("button", { name: "Go on" });
+  assert.ok(await go.isDisabled());
+  await page.getByText("Still missing: size of the screen, distance").waitFor();
+  await page.locator("#card-width").fill("324");
+  await page.locator("#distance").fill("60");
+  await page.locator("#gamma").fill("186");
+  assert.ok(await go.isDisabled());
+  await page.getByLabel("dim").check();
+  await go.click();
+}
+
 /** Consent and conditions, from the first page to the first trial. `each(page, name)` looks at every page. */
 export async function arrive(page, each = async () => {}) {
-  await page.getByRole("button", { name: "Begin" }).waitFor();
+  const begin = page.getByRole("button", { name: "Begin" });
+  await begin.waitFor();
   await each(page, "welcome");
-  await page.getByRole("button", { name: "Begin" }).click();
+  if (await page.locator("#group").count() > 0) {
+    assert.ok(await begin.isDisabled(), "a group has to be chosen");
+    await page.locator("#group").selectOption({ index: 1 });
+  }
+  await begin.click();
   await heading(page, "Before you begin");
   await each(page, "consent");
   assert.ok(await page.getByRole("button", { name: "Go on" }).isDisabled());
@@ -83,8 +106,23 @@ export async function arrive(page, each = async () => {}) {
   await page.getByRole("button", { name: "Go on" }).click();
   await heading(page, "How you see the pictures");
   await each(page, "conditions");
-  await page.getByLabel("dim").check();
-  await page.getByRole("button", { name: "Go on" }).click();
+  await measure(page);
 }
+
+/** Code of the session in this window. */
+export const code = (page) => page.evaluate(() => localStorage.getItem(`noisefloor.code.${location.pathname}`));
+
+/** The session as the server has it, once nothing is under way. */
+export const settled = (page) => page.evaluate(async () => {
+  const of = localStorage.getItem(`noisefloor.code.${location.pathname}`);
+  for (let i = 0; i < 500; i += 1) {
+    if (JSON.parse(localStorage.getItem(`noisefloor.outbox.${of}`)).length === 0) break;
+    await new Promise((go) => setTimeout(go, 10));
+  }
+  return (await fetch(`api/sessions/${of}`)).json();
+});
+
+/** Time before which no answer is taken, and a little. */
+export const look = (page) => page.waitForTimeout(350);
 
 export const test_picture = (page) => page.locator("canvas.picture").nth(1);

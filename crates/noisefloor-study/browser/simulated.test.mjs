@@ -3,21 +3,11 @@
 import { test } from "node:test";
 import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
-import { LARGE, arrive, heading, open, test_picture } from "./kit.mjs";
+import { LARGE, arrive, heading, look, open, settled, test_picture } from "./kit.mjs";
 
 const { SIMULATED, DECISIONS } = process.env;
 /** By observer, stack and showing: the tiles that are clicked, in order. */
 const observers = JSON.parse(readFileSync(DECISIONS, "utf8"));
-
-/** The session as the server has it, once nothing is under way. */
-const settled = (page) => page.evaluate(async () => {
-  const code = localStorage.getItem("noisefloor.code");
-  for (let i = 0; i < 500; i += 1) {
-    if (JSON.parse(localStorage.getItem(`noisefloor.outbox.${code}`)).length === 0) break;
-    await new Promise((go) => setTimeout(go, 10));
-  }
-  return (await fetch(`/api/sessions/${code}`)).json();
-});
 
 observers.forEach((showings, number) => {
   test(`simulated observer ${number + 1}`, async (t) => {
@@ -25,13 +15,24 @@ observers.forEach((showings, number) => {
     const study = await (await fetch(`${SIMULATED}/api/study`)).json();
     const shown = showings.map(() => 0);
     await arrive(page);
-    await heading(page, "Practice");
-    await page.getByText("This one does not count").waitFor();
-    await page.getByRole("button", { name: "I see no difference" }).click();
+    for (const n of [1, 2]) {
+      await heading(page, `Practice ${n} of 2`);
+      await page.getByText("This one does not count").waitFor();
+      await look(page);
+      const { trial } = await settled(page);
+      const box = await test_picture(page).boundingBox();
+      const { width, tile } = study.stacks[trial.stack];
+      for (let at = 0; !trial.identical && at < trial.levels.length; at += 1) {
+        const columns = Math.ceil(width / tile);
+        await page.mouse.click(box.x + ((at % columns) + 0.5) * tile, box.y + (Math.floor(at / columns) + 0.5) * tile);
+      }
+      await page.getByRole("button", { name: "I see no difference" }).click();
+    }
     const trials = showings.flat().length;
     for (let i = 0; i < trials; i += 1) {
-      await heading(page, `Trial ${i + 2}`);
+      await heading(page, `Trial ${i + 1} of ${trials}`);
       await page.getByText("Click where you see").waitFor();
+      await look(page);
       const { trial } = await settled(page);
       const { width, tile } = study.stacks[trial.stack];
       const clicks = showings[trial.stack][shown[trial.stack]];

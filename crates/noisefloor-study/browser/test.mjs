@@ -3,37 +3,44 @@
 import { test } from "node:test";
 import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
-import { LARGE, SMALL, accessible, arrive, heading, open, shot, test_picture, watch } from "./kit.mjs";
+import {
+  LARGE, SMALL, accessible, arrive, heading, look, measure, open, settled, shot, test_picture, watch,
+} from "./kit.mjs";
 
-const { ACQUISITION, VALIDATION, FORCED } = process.env;
+const { ACQUISITION, VALIDATION, FORCED, INVITED } = process.env;
 
-const ready = async (page, number) => {
-  await heading(page, number === 0 ? "Practice" : `Trial ${number + 1}`);
-  await page.getByText(number === 0 ? "This one does not count" : "Click where you see").waitFor();
+/** An acquisition of this study: two trials of practice, then the data with no catch trials. */
+const ready = async (page, name, words = name.startsWith("Practice") ? "This one does not count" : "Click where you see") => {
+  await heading(page, name);
+  await page.getByText(words).waitFor();
+  await look(page);
 };
 
 /** Middle of a tile of the 3×2 grid of 128 pixels. */
 const middle = (tile, ratio = 1) => ({ x: ((tile % 3) * 128 + 64) / ratio, y: (Math.floor(tile / 3) * 128 + 64) / ratio });
 
 /** Levels that the server has for the session under way. */
-const levels = (page) => page.evaluate(async () => {
-  const code = localStorage.getItem("noisefloor.code");
-  for (let i = 0; i < 100; i += 1) {
-    if (JSON.parse(localStorage.getItem(`noisefloor.outbox.${code}`)).length === 0) break;
-    await new Promise((go) => setTimeout(go, 20));
-  }
-  return (await (await fetch(`/api/sessions/${code}`)).json()).trial.levels;
-});
+const levels = async (page) => (await settled(page)).trial.levels;
+
+const none = (page) => page.getByRole("button", { name: "I see no difference" });
+
+/** Passes the practice: noise is clicked, identical pictures are left alone. */
+async function practise(page) {
+  await ready(page, "Practice 1 of 2");
+  for (let tile = 0; tile < 6; tile += 1) await test_picture(page).click({ position: middle(tile) });
+  await none(page).click();
+  await ready(page, "Practice 2 of 2");
+  await none(page).click();
+}
 
 test("a session by mouse, in a small window", async (t) => {
   const { page } = await open(t, ACQUISITION, SMALL);
   await arrive(page, async (at, name) => { await accessible(at, name); await shot(at, `small-${name}`); });
-  await ready(page, 0);
+  await ready(page, "Practice 1 of 2");
   await accessible(page, "practice");
   await shot(page, "small-acquisition");
-  await test_picture(page).click({ position: middle(0) });
-  await page.getByRole("button", { name: "I see no difference" }).click();
-  await ready(page, 1);
+  await practise(page);
+  await ready(page, "Trial 1 of 1");
   for (let tile = 0; tile < 6; tile += 1) {
     for (let level = 0; level <= tile; level += 1) await test_picture(page).click({ position: middle(tile) });
   }
@@ -43,22 +50,44 @@ test("a session by mouse, in a small window", async (t) => {
   await test_picture(page).click({ position: middle(5) });
   await page.getByRole("button", { name: "Undo" }).click();
   assert.deepEqual(await levels(page), [1, 2, 3, 4, 5, 6]);
-  await page.getByRole("button", { name: "I see no difference" }).click();
+  await none(page).click();
   await heading(page, "Thank you");
   await accessible(page, "farewell");
   await shot(page, "small-farewell");
   const download = page.waitForEvent("download");
   await page.getByRole("button", { name: "Save my answers" }).click();
-  const saved = JSON.parse(readFileSync(await (await download).path(), "utf8"));
-  assert.equal(saved.events.filter((e) => e.event.kind === "step").length, 1 + 21 + 4);
+  const text = readFileSync(await (await download).path(), "utf8");
+  const saved = JSON.parse(text);
+  assert.match(text, /"seed": ?"\d+"/, "the seed is exact, as text");
+  const steps = saved.events.map((e) => e.event).filter((e) => e.kind === "step");
+  assert.equal(steps.length, 6 + 21 + 4);
+  assert.ok(steps.every((s) => s.ms >= 300) && steps.slice(0, 6).every((s, tile) => Math.abs(s.at[0] - middle(tile).x) <= 1));
+});
+
+test("the practice is asked for again, and a double click answers nothing", async (t) => {
+  const { page } = await open(t, ACQUISITION, SMALL);
+  await arrive(page);
+  await heading(page, "Practice 1 of 2");
+  await page.getByText("This one does not count").waitFor();
+  await look(page);
+  await none(page).dblclick();
+  await ready(page, "Practice 2 of 2");
+  await none(page).click();
+  await heading(page, "Once more for practice");
+  await accessible(page, "practice again");
+  await shot(page, "small-practice-again");
+  await page.getByRole("button", { name: "Go on" }).click();
+  await practise(page);
+  await ready(page, "Trial 1 of 1");
 });
 
 test("a session by keyboard alone, in a large window, in French", async (t) => {
   const { page } = await open(t, ACQUISITION, LARGE, { locale: "fr-FR" });
   const focus = async (name) => {
     for (let i = 0; i < 40; i += 1) {
-      const at = await page.evaluate(() => document.activeElement?.textContent || document.activeElement?.id || document.activeElement?.value || "");
-      if (at.startsWith(name)) return;
+      const at = await page.evaluate(() => document.activeElement?.textContent || document.activeElement?.id || "");
+      const id = await page.evaluate(() => document.activeElement?.id ?? "");
+      if (at.startsWith(name) || id === name) return;
       await page.keyboard.press("Tab");
     }
     assert.fail(`${name} cannot be reached by Tab`);
@@ -67,6 +96,8 @@ test("a session by keyboard alone, in a large window, in French", async (t) => {
   assert.equal(await page.evaluate(() => document.documentElement.lang), "fr");
   await accessible(page, "bienvenue");
   await shot(page, "large-welcome-fr");
+  await focus("group");
+  await page.keyboard.press("ArrowDown");
   await focus("Commencer");
   await page.keyboard.press("Enter");
   await heading(page, "Avant de commencer");
@@ -76,34 +107,44 @@ test("a session by keyboard alone, in a large window, in French", async (t) => {
   await page.keyboard.press("Enter");
   await heading(page, "Comment vous voyez les images");
   await focus("card-width");
-  await page.keyboard.press("ArrowRight");
-  await page.keyboard.press("ArrowLeft");
+  for (let i = 0; i < 20; i += 1) await page.keyboard.press("PageUp");
+  await page.keyboard.press("Home");
+  await page.locator("#card-width").press("End");
+  await page.locator("#card-width").fill("324");
+  await focus("distance");
+  await page.keyboard.type("60");
   await focus("gamma");
-  await page.keyboard.press("ArrowRight");
+  await page.keyboard.press("PageDown");
+  await page.locator("#gamma").fill("186");
   await page.keyboard.press("Tab");
-  await page.keyboard.press("Space");
+  await page.keyboard.press("ArrowDown");
   await shot(page, "large-conditions-fr");
   await focus("Continuer");
   await page.keyboard.press("Enter");
-  await heading(page, "Entraînement");
-  await page.getByText("Celui-ci ne compte pas").waitFor();
-  await page.keyboard.press("d");
-  await heading(page, "Essai 2");
-  await page.getByText("Cliquez où vous voyez").waitFor();
   // The cross begins in the middle of 384×256 and moves by 22 pixels: to each tile in turn
+  const walk = async (key, times) => { for (let i = 0; i < times; i += 1) await page.keyboard.press(key); };
+  const tour = async (mark) => {
+    await walk("ArrowLeft", 6);
+    await walk("ArrowUp", 3);
+    await mark();
+    for (let i = 0; i < 2; i += 1) { await walk("ArrowRight", 6); await mark(); }
+    await walk("ArrowDown", 6);
+    await mark();
+    for (let i = 0; i < 2; i += 1) { await walk("ArrowLeft", 6); await mark(); }
+  };
+  await ready(page, "Entraînement 1 sur 2", "Celui-ci ne compte pas");
   const canvas = test_picture(page);
   assert.ok(await canvas.evaluate((c) => c === document.activeElement), "the picture has the focus");
-  const walk = async (key, times) => { for (let i = 0; i < times; i += 1) await page.keyboard.press(key); };
-  const mark = async () => { await page.keyboard.press("Enter"); await page.keyboard.press("Enter"); await page.keyboard.press("Enter"); await page.keyboard.press("Backspace"); };
-  await walk("ArrowLeft", 6);
-  await walk("ArrowUp", 3);
-  await mark();
+  await page.keyboard.press("Enter");
+  assert.deepEqual(await levels(page), [0, 0, 0, 0, 0, 0], "the first key shows the cross, and answers nothing");
+  await tour(() => page.keyboard.press("Enter"));
+  await page.keyboard.press("d");
+  await ready(page, "Entraînement 2 sur 2", "Celui-ci ne compte pas");
+  await page.keyboard.press("d");
+  await ready(page, "Essai 1 sur 1", "Cliquez où vous voyez");
+  await tour(async () => { await walk("Enter", 3); await page.keyboard.press("Backspace"); });
   await shot(page, "large-acquisition-fr");
   await accessible(page, "essai");
-  for (let i = 0; i < 2; i += 1) { await walk("ArrowRight", 6); await mark(); }
-  await walk("ArrowDown", 6);
-  await mark();
-  for (let i = 0; i < 2; i += 1) { await walk("ArrowLeft", 6); await mark(); }
   assert.deepEqual(await levels(page), [2, 2, 2, 2, 2, 2]);
   await page.keyboard.press("d");
   await heading(page, "Merci");
@@ -113,36 +154,39 @@ test("a session by keyboard alone, in a large window, in French", async (t) => {
 test("a session goes on after the browser was closed, and elsewhere by its code", async (t) => {
   const { context, page, problems } = await open(t, ACQUISITION, SMALL);
   await arrive(page);
-  await ready(page, 0);
+  await ready(page, "Practice 1 of 2");
   for (let i = 0; i < 3; i += 1) await test_picture(page).click({ position: middle(4) });
   assert.deepEqual(await levels(page), [0, 0, 0, 0, 3, 0]);
   await page.close();
   const again = await context.newPage();
   watch(again, problems);
   await again.goto(ACQUISITION);
-  await ready(again, 0);
+  await ready(again, "Practice 1 of 2");
   assert.deepEqual(await levels(again), [0, 0, 0, 0, 3, 0]);
   await again.getByRole("button", { name: "Pause" }).click();
   await heading(again, "Paused");
   await accessible(again, "paused");
   const code = (await again.locator("#code").textContent()).toLowerCase();
 
-  const other = await open(t, ACQUISITION, LARGE);
-  await other.page.getByLabel("Your code").fill("0000-0000-0000");
+  // Elsewhere the screen is another one: it is measured again
+  const other = await open(t, ACQUISITION, LARGE, { screen: { width: 2560, height: 1440 } });
+  await other.page.getByLabel("Your return code").fill("0000-0000-0000");
   await other.page.getByRole("button", { name: "Go on where you stopped" }).click();
   await other.page.getByText("No session has this code").waitFor();
-  await other.page.getByLabel("Your code").fill(code);
+  await other.page.getByLabel("Your return code").fill(code);
   await other.page.getByRole("button", { name: "Go on where you stopped" }).click();
   await heading(other.page, "Paused");
   await other.page.getByRole("button", { name: "Go on where you stopped" }).click();
-  await ready(other.page, 0);
+  await other.page.getByText("The screen or the zoom of the page has changed").waitFor();
+  await measure(other.page);
+  await ready(other.page, "Practice 1 of 2");
   assert.deepEqual(await levels(other.page), [0, 0, 0, 0, 3, 0]);
 });
 
 test("clicks made without a connection arrive later, in order", async (t) => {
   const { context, page } = await open(t, ACQUISITION, SMALL);
   await arrive(page);
-  await ready(page, 0);
+  await ready(page, "Practice 1 of 2");
   await context.setOffline(true);
   for (let i = 0; i < 4; i += 1) await test_picture(page).click({ position: middle(i % 2) });
   await page.getByText("The server cannot be reached").waitFor();
@@ -151,11 +195,77 @@ test("clicks made without a connection arrive later, in order", async (t) => {
   assert.deepEqual(await levels(page), [2, 2, 0, 0, 0, 0]);
 });
 
+test("by a personal link, questions, a break, and a completion code at the end alone", async (t) => {
+  const { url, link, experimenter } = JSON.parse(INVITED);
+  const alone = await open(t, url, LARGE);
+  await alone.page.getByText("open to invited participants").waitFor();
+  assert.equal(await alone.page.getByRole("button", { name: "Begin" }).count(), 0);
+
+  const { page } = await open(t, `${url}/?link=${link}&PROLIFIC_PID=5f00&other=1`, LARGE);
+  await page.getByText("about 7 minutes").waitFor();
+  await page.getByRole("button", { name: "Begin" }).click();
+  await heading(page, "Before you begin");
+  assert.equal(new URL(page.url()).search, "", "the link is not left in the address");
+  assert.equal(await page.getByText("COMPLETE-77").count(), 0);
+  await page.getByLabel("I have read this").check();
+  await page.getByRole("button", { name: "Go on" }).click();
+  await heading(page, "A few questions");
+  await accessible(page, "questions");
+  await shot(page, "large-questions");
+  await page.getByLabel("Your age").fill("17");
+  await page.getByRole("button", { name: "Go on" }).click();
+  await heading(page, "A few questions");
+  await page.getByLabel("Your age").fill("41");
+  await page.getByLabel("Do you wear glasses").selectOption("yes");
+  await page.getByRole("button", { name: "Go on" }).click();
+  await measure(page);
+  // Practice: the obvious pair, and the identical one, which the server tells apart by its levels
+  let breaks = 0;
+  for (let trial = 0; trial < 5; trial += 1) {
+    const { trial: shown, break_due: due } = await settled(page);
+    if (due) {
+      await heading(page, "Time for a short break");
+      await shot(page, "large-break");
+      breaks += 1;
+      await page.getByRole("button", { name: "Go on" }).click();
+    }
+    await page.getByText("Are these two pictures identical?").waitFor();
+    await look(page);
+    assert.ok(await page.evaluate(() => document.activeElement?.tagName !== "BUTTON"), "no answer has the focus");
+    const same = JSON.stringify(shown.left) === JSON.stringify(shown.right);
+    await page.keyboard.press(same ? "1" : "2");
+    await page.waitForFunction((n) => (document.querySelector("progress")?.value ?? 99) > n, trial);
+  }
+  assert.equal(breaks, 1);
+  await heading(page, "Thank you");
+  await page.getByText("COMPLETE-77").waitFor();
+  await page.getByText("This was about noise.").waitFor();
+  assert.equal(await page.getByRole("link", { name: "Finish and return" }).getAttribute("href"), "https://example.org/done");
+  await accessible(page, "completion");
+  await shot(page, "large-completion");
+
+  // The same link, somewhere else: the same session, and no second one
+  const again = await open(t, `${url}/?link=${link}`, LARGE);
+  await again.page.getByRole("button", { name: "Begin" }).click();
+  await heading(again.page, "Thank you");
+
+  // The experimenter sees it
+  const watching = await open(t, `${url}${experimenter}`, LARGE, { refusals: true });
+  await watching.page.getByText("1 sessions").waitFor();
+  await watching.page.getByText("PROLIFIC_PID 5f00").waitFor();
+  await watching.page.getByText("finished", { exact: true }).waitFor();
+  assert.equal(new URL(watching.page.url()).hash, "", "the key is not left in the address");
+  await accessible(watching.page, "experimenter");
+  await shot(watching.page, "large-experimenter");
+  await watching.page.goto(`${url}/experimenter.html#WRONG`);
+  await watching.page.getByText("this page is for the experimenter").waitFor();
+});
+
 /** Pixels of the screen where the picture is, against the pixels of the picture. */
 async function unscaled(page, ratio) {
   const canvas = page.locator("canvas.picture").first();
   const box = await canvas.boundingBox();
-  for (const at of [box.x, box.y]) assert.equal(at * ratio, Math.round(at * ratio), JSON.stringify(box));
+  for (const at of [box.x, box.y]) assert.ok(Math.abs(at * ratio - Math.round(at * ratio)) < 0.02, JSON.stringify(box));
   // The whole window: clips are rounded to CSS pixels
   const png = await page.screenshot({ scale: "device" });
   return canvas.evaluate(async (picture, [base64, x, y]) => {
@@ -166,10 +276,10 @@ async function unscaled(page, ratio) {
     const a = screen.getImageData(x, y, width, height).data;
     const b = picture.getContext("2d").getImageData(0, 0, width, height).data;
     return a.reduce((count, v, i) => count + (v === b[i] ? 0 : 1), 0);
-  }, [png.toString("base64"), box.x * ratio, box.y * ratio]);
+  }, [png.toString("base64"), Math.round(box.x * ratio), Math.round(box.y * ratio)]);
 }
 
-for (const ratio of [1, 2]) {
+for (const ratio of [1, 1.25, 1.5, 2]) {
   test(`one image pixel is one device pixel at ratio ${ratio}`, async (t) => {
     const { page } = await open(t, VALIDATION, LARGE, { deviceScaleFactor: ratio });
     await arrive(page);
@@ -178,45 +288,61 @@ for (const ratio of [1, 2]) {
   });
 }
 
-test("scaled or cut off pictures are not shown", async (t) => {
-  const zoomed = await open(t, VALIDATION, LARGE, { deviceScaleFactor: 1.25 });
-  await zoomed.page.getByRole("button", { name: "Begin" }).click();
-  await zoomed.page.getByText("The page is zoomed").waitFor();
-  await shot(zoomed.page, "large-zoomed");
-  await accessible(zoomed.page, "zoomed");
+test("pictures that would be cut off or recoloured are not shown", async (t) => {
   const { page } = await open(t, VALIDATION, { width: 700, height: 500 });
   await page.getByRole("button", { name: "Begin" }).click();
   await page.getByText("The window is too small").waitFor();
   await page.setViewportSize(LARGE);
   await heading(page, "Before you begin");
+  await page.emulateMedia({ forcedColors: "active" });
+  await page.getByText("high contrast").waitFor();
+  await shot(page, "large-high-contrast");
+  await page.emulateMedia({ forcedColors: "none" });
   await page.getByLabel("I have read this").check();
+  const phone = await open(t, VALIDATION, { width: 390, height: 844 }, { hasTouch: true, isMobile: true, deviceScaleFactor: 3 });
+  await phone.page.getByRole("button", { name: "Begin" }).click();
+  await phone.page.locator("#cover").waitFor();
+  await shot(phone.page, "phone");
 });
+
+/** Answers the trials with keys, the practice rightly; `each(trial)` looks at them. */
+async function keys(page, trials, right, words, each = async () => {}) {
+  for (let trial = 0; trial < trials; trial += 1) {
+    await page.getByText(words).waitFor();
+    await look(page);
+    await each(trial);
+    const { trial: shown } = await settled(page);
+    await page.keyboard.press(shown.practice ? right(shown) : trial % 2 ? "1" : "2");
+    await page.waitForFunction((n) => (document.querySelector("progress")?.value ?? 99) > n, trial);
+  }
+}
 
 test("validation, by keys", async (t) => {
   const { page } = await open(t, VALIDATION, SMALL);
   await arrive(page);
-  await page.getByText("Are these two pictures identical?").waitFor();
-  await accessible(page, "validation");
-  for (let trial = 0; trial < 5; trial += 1) {
-    await heading(page, trial < 2 ? "Practice" : `Trial ${trial + 1}`);
-    await page.getByText("Are these two pictures identical?").waitFor();
-    if (trial === 2) await shot(page, "small-validation");
-    await page.locator("progress").evaluate((p, n) => { if (p.value !== n) throw new Error(`at ${p.value}`); }, trial);
-    await page.keyboard.press(trial % 2 ? "1" : "2");
-    await page.waitForFunction((n) => (document.querySelector("progress")?.value ?? 99) > n, trial);
-  }
+  const right = (shown) => (JSON.stringify(shown.left) === JSON.stringify(shown.right) ? "1" : "2");
+  await keys(page, 5, right, "Are these two pictures identical?", async (trial) => {
+    if (trial === 0) await accessible(page, "validation");
+    if (trial === 2) { await heading(page, "Trial 1 of 3"); await shot(page, "small-validation"); }
+  });
   await heading(page, "Thank you");
 });
 
 test("forced choice, and erasure", async (t) => {
   const { page } = await open(t, FORCED, SMALL);
   await arrive(page);
-  for (let trial = 0; trial < 6; trial += 1) {
-    await page.getByRole("button", { name: "First" }).waitFor();
+  const right = (shown) => (shown.first < shown.second ? "1" : "2");
+  await keys(page, 6, right, /(Which one was noisy)/, async (trial) => {
     if (trial === 4) { await accessible(page, "forced choice"); await shot(page, "small-forced-choice"); }
-    await page.keyboard.press(trial % 2 ? "1" : "2");
-    await page.waitForFunction((n) => (document.querySelector("progress")?.value ?? 99) > n, trial);
-  }
+  });
+  const text = await page.evaluate(async () => {
+    const of = localStorage.getItem(`noisefloor.code.${location.pathname}`);
+    return (await fetch(`api/sessions/${of}/export`)).text();
+  });
+  const shown = JSON.parse(text).events.filter((e) => e.event.kind === "answer").flatMap((e) => e.event.timing.intervals);
+  console.log(`intervals of 60 ms were shown for ${shown.map((ms) => ms.toFixed(0)).join(", ")} ms`);
+  assert.equal(shown.length, 12);
+  assert.ok(shown.every((ms) => ms > 30 && ms < 500));
   await heading(page, "Thank you");
   await page.getByRole("button", { name: "Erase my answers" }).click();
   await page.getByRole("button", { name: "Erase them for good?" }).click();

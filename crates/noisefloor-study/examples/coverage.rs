@@ -10,11 +10,18 @@ mod kit;
 
 use kit::{papers_levels, simulate, study};
 use noisefloor_study::Study;
-use noisefloor_study::simulated::Public;
+use noisefloor_study::simulated::{Public, SpreadShape};
 use std::sync::Arc;
 
 fn public(within: f64, lapse: f64) -> Public {
-    Public { thresholds: vec![vec![1000.0, 2500.0]], between: 0.25, within, lapse, bias: 0.0 }
+    Public {
+        thresholds: vec![vec![1000.0, 2500.0]],
+        shape: SpreadShape::Logistic,
+        between: 0.25,
+        within,
+        lapse,
+        bias: 0.0,
+    }
 }
 
 /// Shares of intervals that hold the median and the 95 % level of `truth`, and the mean ratio of the latter

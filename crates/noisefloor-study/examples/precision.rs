@@ -10,7 +10,7 @@ mod kit;
 
 use kit::{papers_levels, simulate, study};
 use noisefloor_study::Study;
-use noisefloor_study::simulated::Public;
+use noisefloor_study::simulated::{Public, SpreadShape};
 use std::sync::Arc;
 
 const OBSERVERS: u64 = 200;
@@ -43,7 +43,8 @@ fn main() {
         for (within, lapse, bias) in [(0.1, 0.0, 0.0), (0.1, 0.02, 0.0), (0.25, 0.02, 0.0), (0.1, 0.02, 0.2)]
         {
             let thresholds = vec![vec![1000.0, 2500.0]];
-            let public = Public { thresholds, between: 0.25, within, lapse, bias };
+            let public =
+                Public { thresholds, shape: SpreadShape::Logistic, between: 0.25, within, lapse, bias };
             let (_dir, pointing) = study("acquisition", &levels, "");
             let (error, clicks) = precision(&pointing, &public);
             println!("{name}, within {within}, slips {lapse}, bias {bias}");

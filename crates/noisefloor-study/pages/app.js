@@ -1,244 +1,187 @@
-// One observer's way through the pages: language, consent, conditions, trials, farewell.
+// One observer's way through the pages.
 
 import * as server from "./server.js";
-import { crowded, scaled } from "./picture.js";
+import { crowded, unfit } from "./picture.js";
+import { actions, element, fill, paragraphs, sheet, wayOut } from "./sheet.js";
 import * as trials from "./trials.js";
 import * as viewing from "./viewing.js";
+import { arrival, consent, questions, welcome } from "./welcome.js";
 
 const main = document.getElementById("main");
-const bar = { title: document.getElementById("title"), status: document.getElementById("status"), code: document.getElementById("code") };
+const bar = Object.fromEntries(["title", "status", "code"].map((id) => [id, document.getElementById(id)]));
 const cover = document.getElementById("cover");
 
 let study;
 let language;
 let t;
 let outbox = null;
+/** Trials before which a break, or the practice, was announced already. */
+const announced = new Set();
+/** Counts pages: what was shown before must not answer any more. */
+let turn = 0;
 
 const spoken = (code) => code.replace(/(....)(?=.)/g, "$1-");
-
-function sheet(title, ...inside) {
-  const element = document.createElement("section");
-  element.className = "sheet";
-  const heading = document.createElement("h1");
-  heading.textContent = title;
-  element.append(heading, ...inside);
-  main.replaceChildren(element);
-  window.scrollTo(0, 0);
-  main.focus({ preventScroll: true });
-  return element;
-}
-
-function paragraphs(text) {
-  return text.split(/\n\s*\n/).filter((part) => part.trim()).map((part) => {
-    const p = document.createElement("p");
-    p.textContent = part.trim();
-    return p;
-  });
-}
-
-function actions(...buttons) {
-  const row = document.createElement("div");
-  row.className = "actions";
-  for (const [text, action, first] of buttons) {
-    const element = document.createElement("button");
-    element.type = "button";
-    element.textContent = text;
-    if (first) element.className = "main";
-    element.addEventListener("click", () => action(element));
-    row.append(element);
-  }
-  return row;
-}
+const send = (event) => { outbox.add(event); go().catch(failed); };
 
 async function speak(wanted) {
   const known = Object.keys(study.text);
   language = known.includes(wanted) ? wanted : known[0];
-  t = await server.strings(language);
-  document.documentElement.lang = language;
+  t = await server.texts(language);
+  Object.assign(document.documentElement, { lang: language, dir: study.languages[language].direction });
   document.title = study.text[language].title;
   bar.title.textContent = study.text[language].title;
 }
 
-/** Covers everything while pictures would be scaled or cut off. */
+/** Covers everything while pictures would not be shown as they are, and says why. */
 function watch() {
   const count = study.protocol === "forced-choice" ? 1 : 2;
-  const problem = outbox && (scaled() ?? study.stacks.map((stack) => crowded(stack, count)).find(Boolean));
+  const small = () => study.stacks.map((stack) => crowded(stack, count)).find(Boolean);
+  const problem = outbox && (unfit() ?? small());
   cover.hidden = !problem;
   main.inert = Boolean(problem);
   if (problem) document.getElementById("cover-text").textContent = t[problem];
+  const trial = !problem && outbox?.view.stage === "trials" && !document.getElementById("card-width");
+  if (trial && viewing.changed(outbox.view.conditions)) go().catch(failed);
 }
 
 function progress(view) {
   bar.code.textContent = spoken(view.code);
   const bits = [];
   if (view.stage === "trials") {
-    const element = document.createElement("progress");
-    element.className = "done-so-far";
-    Object.assign(element, { max: view.total, value: view.done });
-    element.setAttribute("aria-label", t.progress);
-    bits.push(element, ` ${view.done} / ${view.total}`);
+    const done = element("progress");
+    done.className = "done-so-far";
+    Object.assign(done, { max: view.total, value: view.done });
+    done.setAttribute("aria-label", t.progress);
+    bits.push(done, ` ${view.done} / ${view.total}`);
   }
   bar.status.replaceChildren(...bits);
 }
 
 function failed(error) {
   const said = error.body ? `${error.body.what}. ${error.body.what_to_do}` : String(error.message ?? error);
-  sheet(t?.problem ?? "Problem", ...paragraphs(said), actions([t?.again ?? "Try again", () => location.reload(), true]));
+  const again = [t?.again ?? "Try again", () => location.reload(), true];
+  sheet(t?.problem ?? "Problem", ...paragraphs(said), actions(again));
 }
 
 function join(view) {
-  outbox = new server.Outbox(
-    view,
-    (waiting) => { bar.status.textContent = waiting ? t.waiting : ""; },
-    () => go().catch(failed),
-  );
+  const state = (waiting) => { bar.status.textContent = waiting ? t.waiting : ""; };
+  outbox = new server.Outbox(view, state, () => go().catch(failed));
   server.remember(view.code);
 }
 
 /** Shows what the session is at, as the server has it. */
 async function go() {
+  const mine = ++turn;
   const code = outbox.code;
   await outbox.settled();
   join(await server.view(code));
   const view = await outbox.settled();
+  if (mine !== turn) return undefined;
   if (view.language && view.language !== language) await speak(view.language);
   progress(view);
-  watch();
   if (view.paused) return paused(view);
-  const stages = { consent, conditions, trials: trial, finished };
-  return stages[view.stage](view);
+  // A study in the middle of a session is not announced again
+  const pages = { consent: agree, questions: asked, conditions, trials: trial, finished, "screened-out": out };
+  pages[view.stage](view);
+  return watch();
 }
 
-function welcome() {
+function begin() {
   outbox = null;
+  turn += 1;
   bar.code.textContent = "";
   bar.status.textContent = "";
-  const page = sheet(study.text[language].title, ...paragraphs(study.text[language].instructions), ...paragraphs(t[`about_${study.protocol}`]));
-
-  const known = Object.keys(study.text);
-  if (known.length > 1) {
-    const label = document.createElement("label");
-    const select = document.createElement("select");
-    for (const code of known) select.add(new Option({ en: "English", fr: "Français" }[code], code, false, code === language));
-    select.addEventListener("change", async () => { await speak(select.value); welcome(); });
-    label.append(`${t.language} `, select);
-    label.querySelector("select").id = "language";
-    page.append(label);
-  }
-  let group = "";
-  if (study.groups.length > 0) {
-    const label = document.createElement("label");
-    const select = document.createElement("select");
-    select.id = "group";
-    for (const name of study.groups) select.add(new Option(name, name));
-    group = study.groups[0];
-    select.addEventListener("change", () => { group = select.value; });
-    label.append(`${t.group} `, select);
-    page.append(label);
-  }
-  page.append(actions([t.begin, async (pressed) => {
-    pressed.disabled = true;
-    try { join(await server.begin(group)); await go(); } catch (error) { failed(error); }
-  }, true]));
-
-  const form = document.createElement("form");
-  const set = document.createElement("fieldset");
-  const title = document.createElement("legend");
-  const label = document.createElement("label");
-  const input = document.createElement("input");
-  title.textContent = t.resume_title;
-  Object.assign(input, { type: "text", id: "resume-code", autocomplete: "off", required: true, maxLength: 40 });
-  label.append(`${t.code} `, input);
-  const row = document.createElement("div");
-  row.className = "actions";
-  const resume = document.createElement("button");
-  resume.textContent = t.resume;
-  row.append(resume);
-  const wrong = document.createElement("p");
-  wrong.setAttribute("role", "alert");
-  set.append(title, label, wrong, row);
-  form.className = "resume";
-  form.append(set);
-  form.addEventListener("submit", async (submitted) => {
-    submitted.preventDefault();
-    try {
-      join(await server.view(encodeURIComponent(input.value.trim())));
-      await go();
-    } catch (error) {
-      wrong.textContent = error.status === 404 ? t.wrong_code : error.message;
-    }
-  });
-  page.append(form);
+  const begun = (view) => { join(view); go().catch(failed); };
+  welcome({ study, language, t, begun, failed, speak: async (wanted) => { await speak(wanted); begin(); } });
 }
 
-function consent(view) {
-  const box = document.createElement("input");
-  Object.assign(box, { type: "checkbox", id: "agree" });
-  const label = document.createElement("label");
-  label.className = "line";
-  label.append(box, t.agree);
-  const note = document.createElement("p");
-  note.className = "note";
-  note.textContent = t.code_note.replace("{code}", spoken(view.code));
-  const page = sheet(t.consent, ...paragraphs(study.text[language].consent), ...paragraphs(t.stored), note, label);
-  const row = actions([t.go_on, () => { outbox.add({ kind: "consent", language }); go().catch(failed); }, true]);
-  const next = row.querySelector("button");
-  next.disabled = true;
-  box.addEventListener("change", () => { next.disabled = !box.checked; });
-  page.append(row);
+const agree = (view) => consent({ study, language, t, code: spoken(view.code), send });
+const asked = () => questions({ study, language, t, send });
+
+function conditions(view) {
+  const why = [t.conditions_why];
+  if (view.viewing_problem) why.unshift(t[`viewing_${view.viewing_problem.replaceAll("-", "_")}`]);
+  else if (view.conditions) why.unshift(t.conditions_again);
+  const page = sheet(t.conditions, ...why.map((text) => element("p", text)));
+  if (why.length > 1) page.querySelector("p").setAttribute("role", "alert");
+  viewing.ask(page, t, send);
 }
 
-function conditions() {
-  const page = sheet(t.conditions, ...paragraphs(t.conditions_why));
-  viewing.ask(page, t, (event) => { outbox.add(event); go().catch(failed); });
+/** A page before a trial, once. */
+function announce(name, title, text, view) {
+  const key = `${name} ${view.trial.number}`;
+  if (announced.has(key)) return false;
+  announced.add(key);
+  sheet(title, ...paragraphs(text), actions([t.go_on, () => go().catch(failed), true]));
+  return true;
 }
 
 async function trial(view) {
-  const how = await trials.run(main, study, view.trial, t, (event) => { outbox.add(event); });
+  if (viewing.changed(view.conditions)) return conditions(view);
+  const { practice } = view.trial;
+  const [n, of] = view.ordinal;
+  if (practice && view.practice_round > 1 && n === 1) {
+    if (announce("practice", t.practice_again, t.practice_again_text, view)) return undefined;
+  }
+  if (view.break_due && announce("break", t.break_title, t.break_text, view)) return undefined;
+  const heading = fill(practice ? t.practice : t.trial, { n, of });
+  const how = await trials.run({ main, study, trial: view.trial, heading, t, send: (event) => outbox.add(event) });
   if (how === "pause") outbox.add({ kind: "pause" });
-  await go().catch(failed);
+  return go().catch(failed);
 }
 
 function paused(view) {
-  sheet(t.paused, ...paragraphs(t.paused_how.replace("{code}", spoken(view.code))),
-    actions([t.resume, () => { outbox.add({ kind: "resume" }); go().catch(failed); }, true], [t.leave, () => { server.forget(view.code); welcome(); }]));
+  const leave = [t.leave, () => { server.forget(view.code); begin(); }];
+  const resume = [t.resume, () => send({ kind: "resume" }), true];
+  sheet(t.paused, ...paragraphs(fill(t.paused_how, { code: spoken(view.code) })), actions(resume, leave));
 }
 
 async function save(code) {
-  const text = JSON.stringify(await server.exported(code), null, 2);
-  const link = document.createElement("a");
-  link.href = URL.createObjectURL(new Blob([text], { type: "application/json" }));
+  const link = element("a");
+  link.href = URL.createObjectURL(new Blob([await server.exported(code)], { type: "application/json" }));
   link.download = `noisefloor-${code}.json`;
   link.click();
   setTimeout(() => URL.revokeObjectURL(link.href), 10000);
 }
 
-function finished(view) {
-  const { code } = view;
-  const said = document.createElement("p");
-  said.setAttribute("role", "status");
+function farewell(view, title, text) {
+  const { code, completion } = view;
   let sure = false;
-  sheet(t.thanks, ...paragraphs(t.thanks_text.replace("{code}", spoken(code))), said,
-    actions([t.next_observer, () => { server.forget(code); welcome(); }, true],
-      [t.save, () => save(code).catch(failed)],
-      [t.erase, async (pressed) => {
-        if (!sure) { sure = true; pressed.textContent = t.erase_sure; return; }
-        try {
-          await server.erase(code);
-          server.forget(code);
-          bar.code.textContent = "";
-          sheet(t.erased, ...paragraphs(t.erased_text), actions([t.next_observer, welcome, true]));
-        } catch (error) { failed(error); }
-      }]));
+  const erase = async (pressed) => {
+    if (!sure) { sure = true; pressed.textContent = t.erase_sure; return; }
+    try {
+      await server.erase(code);
+      server.forget(code);
+      bar.code.textContent = "";
+      sheet(t.erased, ...paragraphs(t.erased_text), actions([t.next_observer, begin, true]));
+    } catch (error) { failed(error); }
+  };
+  const parts = paragraphs(fill(text, { code: spoken(code) }));
+  if (completion.code) {
+    const proof = element("p", fill(t.completion, { code: completion.code }));
+    proof.className = "proof";
+    parts.unshift(proof);
+  }
+  parts.push(...paragraphs(completion.debriefing));
+  const next = [t.next_observer, () => { server.forget(code); begin(); }, !completion.url];
+  const row = actions(next, [t.save, () => save(code).catch(failed)], [t.erase, erase]);
+  if (completion.url) row.firstChild.replaceWith(wayOut(t.completion_return, completion.url));
+  sheet(title, ...parts, row);
 }
+
+const finished = (view) => farewell(view, t.thanks, t.thanks_text);
+const out = (view) => farewell(view, t.screened_out, t.screened_out_text);
 
 async function start() {
   study = await server.study();
   await speak(navigator.language.slice(0, 2));
   window.addEventListener("resize", watch);
   window.visualViewport?.addEventListener("resize", watch);
+  matchMedia("(forced-colors: active)").addEventListener("change", watch);
   const code = server.remembered();
-  if (code) {
+  const { link, ids } = arrival(study);
+  // A personal link leads to its own session, also where somebody else took part before
+  if (code && !link && Object.keys(ids).length === 0) {
     try {
       join(await server.view(code));
       return await go();
@@ -247,7 +190,7 @@ async function start() {
       server.forget(code);
     }
   }
-  return welcome();
+  return begin();
 }
 
 start().catch(failed);

@@ -2,7 +2,11 @@
 
 const MOST_TILES = 4000;
 const RETRY_MS = 1000;
+/** A window narrower than this, without a precise pointer, is a telephone. */
+const PHONE_WIDTH = 900;
 const tiles = new Map();
+/** Canvases whose pixels were found not to be those of the screen. */
+const misfits = new Set();
 
 /** Asks until the server is within reach: a click made without a connection shows once it is back. */
 async function load(path) {
@@ -10,7 +14,8 @@ async function load(path) {
     const answer = await fetch(path).catch(() => null);
     if (answer?.ok) {
       // As the file has it: no profile of the screen may touch what observers are shown
-      return createImageBitmap(await answer.blob(), { colorSpaceConversion: "none", premultiplyAlpha: "none" });
+      const as = { colorSpaceConversion: "none", premultiplyAlpha: "none" };
+      return createImageBitmap(await answer.blob(), as);
     }
     if (answer && answer.status < 500) throw new Error(path);
     await new Promise((go) => setTimeout(go, RETRY_MS));
@@ -19,7 +24,7 @@ async function load(path) {
 
 /** A tile of a level; kept, since observers go back and forth. */
 export function tile(stack, level, index) {
-  const path = `/api/tiles/${stack}/${level}/${index}.png`;
+  const path = `api/tiles/${stack}/${level}/${index}.png`;
   let found = tiles.get(path);
   tiles.delete(path);
   found ??= load(path).catch((error) => { tiles.delete(path); throw error; });
@@ -28,11 +33,12 @@ export function tile(stack, level, index) {
   return found;
 }
 
-/** What keeps pictures from being shown unscaled, as the name of a message; null if nothing does. */
-export function scaled() {
-  if (!Number.isInteger(devicePixelRatio)) return "zoomed";
+/** What keeps pictures from being shown as they are, as the name of a message; null if nothing does. */
+export function unfit() {
+  if (matchMedia("(forced-colors: active)").matches) return "high_contrast";
+  if (!matchMedia("(any-pointer: fine)").matches && innerWidth < PHONE_WIDTH) return "phone";
   if (window.visualViewport && visualViewport.scale !== 1) return "pinched";
-  return null;
+  return misfits.size > 0 ? "scaled" : null;
 }
 
 /** Whether `count` pictures side by side have room, as the name of a message; null if they have. */
@@ -42,17 +48,19 @@ export function crowded(stack, count) {
   return wide > innerWidth || high > innerHeight ? "crowded" : null;
 }
 
-/** Moves an element by part of a pixel, onto whole CSS pixels, which are whole device pixels. By its place: a transform would be applied after
+/** Moves an element by part of a pixel, onto whole device pixels. By its place: a transform would be applied after
  * the browser has rounded. */
 export function snap(element) {
   element.style.left = element.style.top = "0";
   const { left, top } = element.getBoundingClientRect();
-  element.style.left = `${Math.round(left) - left}px`;
-  element.style.top = `${Math.round(top) - top}px`;
+  const shift = (at) => `${Math.round(at * devicePixelRatio) / devicePixelRatio - at}px`;
+  element.style.left = shift(left);
+  element.style.top = shift(top);
 }
 
 export class Picture {
-  constructor(study, stack, label) {
+  /** `onMisfit` hears that the browser would scale the picture, or no longer does. */
+  constructor(study, stack, label, onMisfit = () => {}) {
     this.stack = stack;
     this.shape = study.stacks[stack];
     this.columns = Math.ceil(this.shape.width / this.shape.tile);
@@ -65,8 +73,20 @@ export class Picture {
     this.canvas.setAttribute("aria-label", label);
     this.context = this.canvas.getContext("2d", { alpha: false });
     this.context.imageSmoothingEnabled = false;
+    this.observer = new ResizeObserver(([entry]) => {
+      const box = entry.devicePixelContentBoxSize?.[0];
+      const fits = !box || (box.inlineSize === this.shape.width && box.blockSize === this.shape.height);
+      if (fits ? misfits.delete(this) : !misfits.has(this) && misfits.add(this)) onMisfit();
+    });
+    // Browsers without the device's pixels are believed
+    try { this.observer.observe(this.canvas, { box: "device-pixel-content-box" }); } catch { /* Safari */ }
     this.fit();
     this.blank();
+  }
+
+  close() {
+    this.observer.disconnect();
+    misfits.delete(this);
   }
 
   /** CSS size and place, so that image pixels are device pixels. */
@@ -83,7 +103,8 @@ export class Picture {
   }
 
   place(index) {
-    return [(index % this.columns) * this.shape.tile, Math.floor(index / this.columns) * this.shape.tile];
+    const { tile: edge } = this.shape;
+    return [(index % this.columns) * edge, Math.floor(index / this.columns) * edge];
   }
 
   /** The tile at a place in image pixels. */
@@ -108,7 +129,8 @@ export class Picture {
     const [right, bottom] = [Math.min(x + edge, width), Math.min(y + edge, height)];
     this.context.fillStyle = "rgb(20 20 20)";
     const reach = Math.round(edge / 8);
-    for (const [cx, cy, sx, sy] of [[x, y, 1, 1], [right - 1, y, -1, 1], [x, bottom - 1, 1, -1], [right - 1, bottom - 1, -1, -1]]) {
+    const corners = [[x, y, 1, 1], [right - 1, y, -1, 1], [x, bottom - 1, 1, -1], [right - 1, bottom - 1, -1, -1]];
+    for (const [cx, cy, sx, sy] of corners) {
       this.context.fillRect(Math.min(cx, cx + sx * reach), cy, reach, 1);
       this.context.fillRect(cx, Math.min(cy, cy + sy * reach), 1, reach);
     }

@@ -1,7 +1,9 @@
-// What is asked of the server and told to it. An event is kept in this browser until the server has acknowledged it.
+// Requests to the server. An event is kept in this browser until the server has acknowledged it.
 
 const RETRY_MS = [500, 1000, 2000, 4000];
-const CODE = "noisefloor.code";
+// Servers behind one name have one storage: the path keeps them apart
+const HERE = location.pathname;
+const CODE = `noisefloor.code.${HERE}`;
 const box = (code) => `noisefloor.outbox.${code}`;
 
 export class Refused extends Error {
@@ -20,14 +22,22 @@ async function ask(path, options = {}) {
   return body;
 }
 
-const json = (method, body) => ({ method, headers: { "content-type": "application/json" }, body: JSON.stringify(body) });
+const json = (method, body) => ({
+  method, headers: { "content-type": "application/json" }, body: JSON.stringify(body),
+});
 
-export const study = () => ask("/api/study");
-export const begin = (group) => ask("/api/sessions", json("POST", { group }));
-export const view = (code) => ask(`/api/sessions/${code}`);
-export const erase = (code) => ask(`/api/sessions/${code}`, { method: "DELETE" });
-export const strings = (language) => ask(`/${language}.json`);
-export const exported = (code) => ask(`/api/sessions/${code}/export`);
+// Paths are relative, so that the study may lie under any path of a proxy
+export const study = () => ask("api/study");
+export const begin = (beginning) => ask("api/sessions", json("POST", beginning));
+export const view = (code) => ask(`api/sessions/${code}`);
+export const erase = (code) => ask(`api/sessions/${code}`, { method: "DELETE" });
+export const texts = (language) => ask(`api/texts/${language}`);
+/** The answers as the server wrote them: parsed and written again, large numbers would be rounded. */
+export async function exported(code) {
+  const answer = await fetch(`api/sessions/${code}/export`, { cache: "no-store" });
+  if (!answer.ok) throw new Refused(answer.status, await answer.json());
+  return answer.text();
+}
 
 export const remembered = () => localStorage.getItem(CODE);
 export const remember = (code) => localStorage.setItem(CODE, code);
@@ -44,7 +54,7 @@ export class Outbox {
     this.onState = onState;
     this.onRefused = onRefused;
     const kept = JSON.parse(localStorage.getItem(box(this.code)) ?? "[]");
-    // What the server has already was acknowledged to a page that was closed before it heard so
+    // Events that the server has were acknowledged to a page that was closed before it heard so
     this.events = kept.filter((e) => e.seq >= view.next_seq);
     this.next = view.next_seq + this.events.length;
     this.view = view;
@@ -78,13 +88,14 @@ export class Outbox {
     let failures = 0;
     while (this.events.length > 0) {
       try {
-        this.view = await ask(`/api/sessions/${this.code}/events`, json("POST", this.events[0]));
+        this.view = await ask(`api/sessions/${this.code}/events`, json("POST", this.events[0]));
         this.events.shift();
         this.save();
         if (failures > 0) this.onState(false);
         failures = 0;
       } catch (error) {
-        if (error instanceof Refused && error.status < 500 && error.status !== 408 && error.status !== 429) {
+        const final = error instanceof Refused && error.status < 500 && ![408, 429].includes(error.status);
+        if (final) {
           this.events = [];
           this.save();
           this.onRefused(error);

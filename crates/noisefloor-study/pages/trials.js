@@ -1,6 +1,7 @@
 // The three protocols. The server says what to show; what the observer does becomes events.
 
 import { Picture, tile } from "./picture.js";
+import { element } from "./sheet.js";
 
 /** Steps of the cross by arrow keys, in image pixels: no multiple of any tile, so that the grid does not show. */
 const CROSS_STEP = 22;
@@ -8,64 +9,78 @@ const CROSS_STEP = 22;
 const GAP_MS = 500;
 const CUE_MS = 700;
 
-const wait = (ms) => new Promise((go) => setTimeout(go, ms));
-const painted = () => new Promise((go) => requestAnimationFrame(() => requestAnimationFrame(go)));
+const frame = () => new Promise((go) => requestAnimationFrame(go));
+/** The time when what was drawn is on screen: the frame after next begins. */
+const painted = async () => { await frame(); return frame(); };
+
+/** Waits until a frame from `since` on for which `ms` have passed, to half a frame; the time of that frame. */
+async function until(since, ms) {
+  let last = await frame();
+  for (;;) {
+    const now = await frame();
+    const step = now - last;
+    if (now - since >= ms - step / 2) return now;
+    last = now;
+  }
+}
 
 function button(text, key, action, main = false) {
-  const element = document.createElement("button");
-  element.type = "button";
-  element.textContent = text;
-  if (main) element.className = "main";
+  const made = element("button", text);
+  made.type = "button";
+  if (main) made.className = "main";
   if (key) {
-    const cap = document.createElement("kbd");
-    cap.textContent = key;
-    element.append(cap);
-    element.setAttribute("aria-keyshortcuts", key);
+    made.append(element("kbd", key));
+    made.setAttribute("aria-keyshortcuts", key);
   }
-  element.addEventListener("click", action);
-  return element;
+  made.addEventListener("click", action);
+  return made;
 }
 
 function figure(picture, caption) {
-  const frame = document.createElement("div");
-  const element = document.createElement("figure");
-  const text = document.createElement("figcaption");
-  frame.className = "frame";
-  element.className = "view";
-  text.textContent = caption;
-  frame.append(picture.canvas);
-  element.append(text, frame);
-  return element;
+  const room = element("div", "", picture.canvas);
+  room.className = "frame";
+  const made = element("figure", "", element("figcaption", caption), room);
+  made.className = "view";
+  return made;
 }
 
 /** The room of a trial: pictures above, what to do below. Keys are bound until the next trial. */
 class Room {
-  constructor(main, trial, t, leave) {
-    this.stage = document.createElement("div");
+  constructor({ main, study, trial, heading, t, send, finish }) {
+    Object.assign(this, { study, trial, t, send });
+    this.stage = element("div");
     this.stage.className = "stage";
-    this.foot = document.createElement("div");
-    this.foot.className = "foot";
-    this.say = document.createElement("p");
-    this.actions = document.createElement("div");
+    this.say = element("p");
+    this.actions = element("div");
     this.actions.className = "actions";
-    const heading = document.createElement("h1");
-    heading.textContent = trial.practice ? t.practice : `${t.trial} ${trial.number + 1}`;
-    this.foot.append(heading, this.say, this.actions);
+    this.foot = element("div", "", element("h1", heading), this.say, this.actions);
+    this.foot.className = "foot";
     main.replaceChildren(this.stage, this.foot);
+    // To the page, not to an answer: a key held down over the end of a trial must not answer the next one
+    main.focus({ preventScroll: true });
     this.keys = new Map();
     this.listen = (pressed) => {
       if (pressed.ctrlKey || pressed.metaKey || pressed.altKey || pressed.repeat) return;
       const action = this.keys.get(pressed.key.toLowerCase());
-      if (action && !document.getElementById("cover").checkVisibility?.()) { pressed.preventDefault(); action(); }
+      if (action && !main.inert) { pressed.preventDefault(); action(); }
     };
     document.addEventListener("keydown", this.listen);
-    this.leave = leave;
     this.pictures = [];
     this.refit = () => this.pictures.forEach((picture) => picture.fit());
     window.addEventListener("resize", this.refit);
     // Longer words below move the pictures, by parts of a pixel too
     this.moved = new ResizeObserver(this.refit);
     this.moved.observe(this.stage);
+    this.onset = Infinity;
+    this.intervals = [];
+    this.finish = (how) => { if (!this.closed) { this.close(); finish(how); } };
+  }
+
+  picture(label) {
+    const misfit = () => window.dispatchEvent(new Event("resize"));
+    const made = new Picture(this.study, this.trial.stack, label, misfit);
+    this.pictures.push(made);
+    return made;
   }
 
   show(...figures) {
@@ -73,159 +88,195 @@ class Room {
     this.refit();
   }
 
+  /** From now on answers are possible. */
+  async open() {
+    this.onset = await painted();
+    this.shown = Date.now();
+  }
+
+  /** Time since answers are possible; a negative one, while they are not. */
+  elapsed() {
+    return performance.now() - this.onset;
+  }
+
+  /** Whether something comes too soon to be meant for this trial. */
+  early() {
+    return !(this.elapsed() >= this.study.minimum_ms);
+  }
+
+  answer(event) {
+    if (this.early() || this.closed) return;
+    const timing = { onset: this.shown, ms: this.elapsed(), intervals: this.intervals };
+    this.send({ ...event, trial: this.trial.number, timing });
+    this.finish("answered");
+  }
+
   bind(key, text, action, main = false) {
-    const element = button(text, key, action, main);
-    if (key) this.keys.set(key.toLowerCase(), () => element.isConnected && !element.disabled && element.click());
-    this.actions.append(element);
-    return element;
+    const made = button(text, key, action, main);
+    if (key) this.keys.set(key.toLowerCase(), () => made.isConnected && !made.disabled && made.click());
+    this.actions.append(made);
+    return made;
   }
 
   close() {
+    this.closed = true;
     document.removeEventListener("keydown", this.listen);
     window.removeEventListener("resize", this.refit);
     this.moved.disconnect();
+    this.pictures.forEach((picture) => picture.close());
   }
 }
 
-/** Runs the trial in `main`; `send` takes events; resolves when it is answered or left by pausing ("pause"). */
-export function run(main, study, trial, t, send) {
+let open = null;
+
+/** Runs a trial; `send` takes events; resolves when it is answered or left by pausing ("pause"). A trial that was
+ * replaced by another page never resolves. */
+export function run(given) {
   const kinds = { acquisition, validation, "forced-choice": forcedChoice };
-  return new Promise((answered) => {
-    const room = new Room(main, trial, t);
-    const finish = (how) => { room.close(); answered(how); };
-    kinds[trial.kind](room, study, trial, t, send, finish);
+  open?.close();
+  return new Promise((finish) => {
+    open = new Room({ ...given, finish });
+    kinds[given.trial.kind](open);
   });
 }
 
-async function acquisition(room, study, trial, t, send, finish) {
-  const reference = new Picture(study, trial.stack, t.reference);
-  const test = new Picture(study, trial.stack, t.test_keys);
-  const shape = study.stacks[trial.stack];
-  const last = shape.levels.length - 1;
+async function acquisition(room) {
+  const { study, trial, t } = room;
+  const reference = room.picture(t.reference);
+  const test = room.picture(t.test_keys);
+  const last = study.stacks[trial.stack].levels.length - 1;
   const levels = [...trial.levels];
+  const shown = (level) => (trial.identical ? last : level);
   const history = [];
-  room.pictures = [reference, test];
   room.show(figure(reference, t.reference), figure(test, t.test));
   room.say.textContent = t.loading;
-  await Promise.all([reference.show(levels.map(() => last)), test.show(levels)]);
+  await Promise.all([reference.show(levels.map(() => last)), test.show(levels.map(shown))]);
   room.say.textContent = trial.practice ? t.acquisition_practice : t.acquisition_how;
 
-  const step = (index, by) => {
+  let undo = null;
+  const step = (index, by, at) => {
     const level = levels[index] + by;
-    if (level < 0 || level > last) return;
+    if (level < 0 || level > last || room.early() || room.closed) return;
     levels[index] = level;
-    send({ kind: "step", trial: trial.number, tile: index, level });
+    room.send({ kind: "step", trial: trial.number, tile: index, level, at, ms: room.elapsed() });
     // A tile that came late must not cover a later one
-    tile(trial.stack, level, index).then(() => levels[index] === level && test.showTile(level, index));
-    if (level < last) tile(trial.stack, level + 1, index);
+    tile(trial.stack, shown(level), index)
+      .then(() => levels[index] === level && test.showTile(shown(level), index));
+    if (level < last) tile(trial.stack, shown(level + 1), index);
     undo.disabled = history.length === 0;
   };
   const point = (x, y, by) => {
-    const index = test.at(Math.min(Math.max(x, 0), shape.width - 1), Math.min(Math.max(y, 0), shape.height - 1));
-    if (by > 0 && levels[index] < last) history.push(index);
-    step(index, by);
+    const { width, height } = test.shape;
+    const at = [Math.min(Math.max(x, 0), width - 1), Math.min(Math.max(y, 0), height - 1)];
+    const index = test.at(...at);
+    if (by > 0 && levels[index] < last && !room.early()) history.push(index);
+    step(index, by, at);
   };
+  pointing(test, point);
+  undo = room.bind("U", t.undo, () => {
+    const index = history.pop();
+    if (index !== undefined) step(index, -1, null);
+    undo.disabled = history.length === 0;
+  });
+  undo.disabled = true;
+  room.bind("D", t.no_difference, () => room.answer({ kind: "done" }), true);
+  room.bind("P", t.pause, () => room.finish("pause"));
+  test.canvas.focus({ preventScroll: true });
+  await room.open();
+}
 
+/** Mouse and keyboard on the picture to compare: `point(x, y, by)` in image pixels. */
+function pointing(test, point) {
+  const { canvas, shape } = test;
   // Mouse: anywhere in the picture; the right button, or Shift, goes back
-  const canvas = test.canvas;
   const place = (pressed) => {
     const box = canvas.getBoundingClientRect();
-    return [Math.floor((pressed.clientX - box.left) * devicePixelRatio), Math.floor((pressed.clientY - box.top) * devicePixelRatio)];
+    return [pressed.clientX - box.left, pressed.clientY - box.top].map((at) => Math.floor(at * devicePixelRatio));
   };
   canvas.addEventListener("click", (pressed) => point(...place(pressed), pressed.shiftKey ? -1 : 1));
   canvas.addEventListener("contextmenu", (pressed) => { pressed.preventDefault(); point(...place(pressed), -1); });
 
-  // Keyboard: a cross that arrow keys move
+  // Keyboard: a cross that arrow keys move. The first key only shows it
   canvas.tabIndex = 0;
   canvas.setAttribute("role", "application");
-  const cross = document.createElement("div");
+  const cross = element("div");
   cross.className = "cross";
   cross.hidden = true;
   canvas.parentElement.append(cross);
   let at = [Math.floor(shape.width / 2), Math.floor(shape.height / 2)];
   const move = (dx, dy) => {
-    at = [Math.min(Math.max(at[0] + dx, 0), shape.width - 1), Math.min(Math.max(at[1] + dy, 0), shape.height - 1)];
+    const within = (value, most) => Math.min(Math.max(value, 0), most - 1);
+    at = [within(at[0] + dx, shape.width), within(at[1] + dy, shape.height)];
     cross.hidden = false;
     cross.style.left = `${at[0] / devicePixelRatio}px`;
     cross.style.top = `${at[1] / devicePixelRatio}px`;
   };
   const arrows = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
+  const marks = { Enter: 1, " ": 1, Backspace: -1, "-": -1 };
   canvas.addEventListener("keydown", (pressed) => {
-    if (pressed.key in arrows) {
-      const [dx, dy] = arrows[pressed.key];
-      move(dx * CROSS_STEP, dy * CROSS_STEP);
-    } else if (pressed.key === "Enter" || pressed.key === " ") {
-      move(0, 0);
-      point(...at, 1);
-    } else if (pressed.key === "Backspace" || pressed.key === "-") {
-      move(0, 0);
-      point(...at, -1);
-    } else return;
+    const { key } = pressed;
+    if (!(key in arrows) && !(key in marks)) return;
     pressed.preventDefault();
     pressed.stopPropagation();
+    const [dx, dy] = arrows[key] ?? [0, 0];
+    const hidden = cross.hidden;
+    move(dx * CROSS_STEP, dy * CROSS_STEP);
+    if (key in marks && !hidden && !pressed.repeat) point(...at, marks[key]);
   });
   canvas.addEventListener("pointermove", () => { cross.hidden = true; });
-
-  const undo = room.bind("U", t.undo, () => {
-    const index = history.pop();
-    if (index !== undefined) step(index, -1);
-    undo.disabled = history.length === 0;
-  });
-  undo.disabled = true;
-  room.bind("D", t.no_difference, () => { send({ kind: "done", trial: trial.number }); finish("answered"); }, true);
-  room.bind("P", t.pause, () => finish("pause"));
-  canvas.focus({ preventScroll: true });
 }
 
-async function validation(room, study, trial, t, send, finish) {
-  const left = new Picture(study, trial.stack, t.left);
-  const right = new Picture(study, trial.stack, t.right);
-  room.pictures = [left, right];
+async function validation(room) {
+  const { trial, t } = room;
+  const left = room.picture(t.left);
+  const right = room.picture(t.right);
   room.show(figure(left, ""), figure(right, ""));
   room.say.textContent = t.loading;
   // Both appear at once: what comes first would tell them apart
-  await Promise.all([...trial.left, ...trial.right].map((level, i) => tile(trial.stack, level, i % trial.left.length)));
+  const all = [...trial.left, ...trial.right];
+  await Promise.all(all.map((level, i) => tile(trial.stack, level, i % trial.left.length)));
   await Promise.all([left.show(trial.left), right.show(trial.right)]);
   room.say.textContent = t.validation_how;
-  const answer = (choice) => () => { send({ kind: "answer", trial: trial.number, choice }); finish("answered"); };
-  const first = room.bind("1", t.identical, answer("identical"), true);
+  const answer = (choice) => () => room.answer({ kind: "answer", choice });
+  room.bind("1", t.identical, answer("identical"), true);
   room.bind("2", t.different, answer("different"), true);
-  room.bind("P", t.pause, () => finish("pause"));
-  first.focus({ preventScroll: true });
+  room.bind("P", t.pause, () => room.finish("pause"));
+  await room.open();
 }
 
-async function forcedChoice(room, study, trial, t, send, finish) {
-  const picture = new Picture(study, trial.stack, t.interval_picture);
-  const shape = study.stacks[trial.stack];
-  const last = shape.levels.length - 1;
-  room.pictures = [picture];
+async function forcedChoice(room) {
+  const { study, trial, t } = room;
+  const picture = room.picture(t.interval_picture);
+  const last = study.stacks[trial.stack].levels.length - 1;
   room.show(figure(picture, ""));
   room.say.textContent = t.loading;
   const levels = (level) => Array.from({ length: picture.count }, (_, i) => (i === trial.tile ? level : last));
-  await Promise.all([...levels(last), trial.first, trial.second].map((level, i) => tile(trial.stack, level, i < picture.count ? i : trial.tile)));
-  let left = false;
-  const pause = room.bind("P", t.pause, () => { left = true; finish("pause"); });
+  const all = levels(last).map((level, i) => tile(trial.stack, level, i));
+  await Promise.all([...all, ...[trial.first, trial.second].map((l) => tile(trial.stack, l, trial.tile))]);
+  const pause = room.bind("P", t.pause, () => room.finish("pause"));
 
-  const blank = async (ms, cue) => {
+  const blank = (cue) => {
     picture.blank();
     if (cue) picture.mark(trial.tile);
-    await wait(ms);
+    return painted();
   };
   room.say.textContent = t.look_here;
-  await blank(CUE_MS, true);
+  await until(await blank(true), CUE_MS);
   for (const [level, name] of [[trial.first, t.first], [trial.second, t.second]]) {
     room.say.textContent = name;
     await picture.show(levels(level));
-    await painted();
-    await wait(study.interval_ms);
-    await blank(GAP_MS, false);
+    const from = await painted();
+    await until(from, study.interval_ms);
+    const to = await blank(false);
+    room.intervals.push(to - from);
+    await until(to, GAP_MS);
+    if (room.closed) return;
   }
-  if (left) return;
   room.say.textContent = trial.practice ? t.forced_practice : t.forced_how;
-  const answer = (choice) => () => { send({ kind: "answer", trial: trial.number, choice }); finish("answered"); };
+  const answer = (choice) => () => room.answer({ kind: "answer", choice });
   room.actions.replaceChildren();
-  const first = room.bind("1", t.first, answer("first"), true);
+  room.bind("1", t.first, answer("first"), true);
   room.bind("2", t.second, answer("second"), true);
   room.actions.append(pause);
-  first.focus({ preventScroll: true });
+  await room.open();
 }

@@ -1,39 +1,47 @@
-// How the pictures are seen: size of the screen, distance, gamma, light.
+// Viewing conditions: size of the screen, distance, gamma, light. Nothing is filled in beforehand.
 
 import { snap } from "./picture.js";
+import { element, fill } from "./sheet.js";
 
 /** Width of a bank card in millimetres (ISO/IEC 7810, ID-1); its height is 53.98. */
 const CARD_MM = 85.6;
 const CARD_SHAPE = 53.98 / 85.6;
-/** CSS pixels: what the slider reaches, from a projector to a telephone. */
+/** What the card slider reaches, in CSS pixels: from a projector to a dense small screen. */
 const CARD_RANGE = [120, 900];
+/** What the patch of the chart reaches; it begins at either end, where it clearly differs from the lines. */
+const GREYS = [130, 235];
+
+/** What tells one screen from another, and one zoom from another. */
+const screenNow = () => ({
+  "pixel-ratio": devicePixelRatio,
+  "screen-width": screen.width,
+  "screen-height": screen.height,
+  "colour-depth": screen.colorDepth,
+});
+
+/** Whether the window has moved to another screen, or was zoomed, since the conditions were reported. */
+export function changed(conditions) {
+  return Object.entries(screenNow()).some(([name, value]) => conditions?.[name] !== value);
+}
 
 function field(form, legend, ...inside) {
-  const set = document.createElement("fieldset");
-  const title = document.createElement("legend");
-  title.textContent = legend;
-  set.append(title, ...inside);
-  form.append(set);
+  form.append(element("fieldset", "", element("legend", legend), ...inside));
 }
 
 function note(text) {
-  const p = document.createElement("p");
+  const p = element("p", text);
   p.className = "note";
-  p.textContent = text;
   return p;
 }
 
 function slider(id, text, [min, max], value, onInput) {
-  const label = document.createElement("label");
-  const input = document.createElement("input");
-  label.textContent = text;
+  const input = element("input");
   Object.assign(input, { type: "range", id, min, max, step: 1, value });
   input.addEventListener("input", () => onInput(Number(input.value)));
-  label.append(input);
-  return [label, input];
+  return [element("label", text, input), input];
 }
 
-/** Lines one device pixel high, black and white in turn: half of white's light. A uniform patch in their middle is to look the same. */
+/** Lines one device pixel high, alternately black and white: half of the light of white. The patch is to match. */
 function drawChart(canvas, grey) {
   const context = canvas.getContext("2d", { alpha: false });
   const { width, height } = canvas;
@@ -45,69 +53,87 @@ function drawChart(canvas, grey) {
   context.fillRect(Math.round(width / 3), 0, Math.round(width / 3), height);
 }
 
-/** Asks for the conditions in `sheet`; calls `done` with them. */
-export function ask(sheet, t, done) {
-  const form = document.createElement("form");
-  form.noValidate = false;
+function chart(t, onChange) {
+  const canvas = element("canvas");
+  canvas.id = "chart";
+  canvas.setAttribute("role", "img");
+  canvas.setAttribute("aria-label", t.gamma_chart);
+  [canvas.width, canvas.height] = [360, 120];
+  canvas.style.width = `${canvas.width / devicePixelRatio}px`;
+  canvas.style.height = `${canvas.height / devicePixelRatio}px`;
+  const begin = GREYS[Math.random() < 0.5 ? 0 : 1];
+  drawChart(canvas, begin);
+  const moved = (grey) => { drawChart(canvas, grey); onChange(); };
+  return [canvas, ...slider("gamma", t.gamma_slider, GREYS, begin, moved)];
+}
 
-  const card = document.createElement("div");
-  card.id = "card";
-  card.setAttribute("aria-hidden", "true");
-  const size = (width) => { card.style.width = `${width}px`; card.style.height = `${width * CARD_SHAPE}px`; };
-  const [cardLabel, cardInput] = slider("card-width", t.card_slider, CARD_RANGE, 324, size);
-  size(324);
-  field(form, t.card, note(t.card_how), cardLabel, card);
-
-  const distanceLabel = document.createElement("label");
-  const distance = document.createElement("input");
-  distanceLabel.textContent = `${t.distance_how} `;
-  Object.assign(distance, { type: "number", id: "distance", min: 20, max: 500, step: 1, value: 60, required: true });
-  distanceLabel.append(distance);
-  field(form, t.distance, distanceLabel);
-
-  const chart = document.createElement("canvas");
-  chart.id = "chart";
-  chart.setAttribute("role", "img");
-  chart.setAttribute("aria-label", t.gamma_chart);
-  [chart.width, chart.height] = [360, 120];
-  chart.style.width = `${chart.width / devicePixelRatio}px`;
-  chart.style.height = `${chart.height / devicePixelRatio}px`;
-  const [gammaLabel, gammaInput] = slider("gamma", t.gamma_slider, [130, 235], 160, (grey) => drawChart(chart, grey));
-  drawChart(chart, 160);
-  field(form, t.gamma, note(t.gamma_how), chart, gammaLabel);
-
-  const lights = ["dark", "dim", "bright", "glare"].map((light) => {
-    const label = document.createElement("label");
-    const input = document.createElement("input");
+function lights(t, onChange) {
+  return ["dark", "dim", "bright", "glare"].map((light) => {
+    const input = element("input");
+    Object.assign(input, { type: "radio", name: "ambient", value: light });
+    input.addEventListener("change", onChange);
+    const label = element("label", "", input, t[`ambient_${light}`]);
     label.className = "line";
-    Object.assign(input, { type: "radio", name: "ambient", value: light, required: true });
-    label.append(input, t[`ambient_${light}`]);
     return label;
   });
-  field(form, t.ambient, ...lights);
+}
 
-  const actions = document.createElement("div");
-  const go = document.createElement("button");
-  actions.className = "actions";
-  Object.assign(go, { type: "submit", className: "main", textContent: t.go_on });
-  actions.append(go);
-  form.append(actions);
+/** Asks for the conditions in `sheet`; calls `done` with the event. */
+export function ask(sheet, t, done) {
+  const form = element("form");
+  const set = new Set();
+  const missing = element("p");
+  missing.className = "note";
+  missing.setAttribute("role", "status");
+  const go = element("button", t.go_on);
+  go.className = "main";
+  const check = (name) => {
+    if (name) set.add(name);
+    const left = ["card", "distance", "gamma", "ambient"].filter((part) => !set.has(part));
+    missing.textContent = left.length ? fill(t.missing, { what: left.map((p) => t[`${p}_missing`]).join(", ") }) : "";
+    go.disabled = left.length > 0;
+  };
+
+  const card = element("div");
+  card.id = "card";
+  card.setAttribute("aria-hidden", "true");
+  const size = (width) => {
+    card.style.width = `${width}px`;
+    card.style.height = `${width * CARD_SHAPE}px`;
+    check("card");
+  };
+  const [cardLabel, cardInput] = slider("card-width", t.card_slider, CARD_RANGE, CARD_RANGE[0], size);
+  field(form, t.card, note(t.card_how), cardLabel, card);
+
+  const distance = element("input");
+  Object.assign(distance, { type: "number", id: "distance", min: 10, max: 1000, step: 1, required: true });
+  distance.addEventListener("input", () => {
+    if (distance.value && distance.checkValidity()) check("distance");
+    else { set.delete("distance"); check(); }
+  });
+  field(form, t.distance, element("label", "", `${t.distance_how} `, distance));
+
+  const [canvas, gammaLabel, gamma] = chart(t, () => check("gamma"));
+  field(form, t.gamma, note(t.gamma_how), canvas, gammaLabel);
+  field(form, t.ambient, ...lights(t, () => check("ambient")));
+
+  const row = element("div", "", go);
+  row.className = "actions";
+  form.append(missing, row);
   form.addEventListener("submit", (submitted) => {
     submitted.preventDefault();
     done({
       kind: "conditions",
       "pixels-per-mm": (Number(cardInput.value) * devicePixelRatio) / CARD_MM,
       "distance-mm": Number(distance.value) * 10,
-      "pixel-ratio": devicePixelRatio,
       zoom: window.visualViewport?.scale ?? 1,
-      "colour-depth": screen.colorDepth,
-      "screen-width": screen.width,
-      "screen-height": screen.height,
       // Half of the light at this code: (code/255)^gamma = 1/2
-      gamma: Math.min(4, Math.max(1, Math.log(0.5) / Math.log(Number(gammaInput.value) / 255))),
+      gamma: Math.min(4, Math.max(1, Math.log(0.5) / Math.log(Number(gamma.value) / 255))),
       ambient: form.elements.ambient.value,
+      ...screenNow(),
     });
   });
+  check();
   sheet.append(form);
-  snap(chart);
+  snap(canvas);
 }

@@ -124,6 +124,9 @@ pub enum StoreError {
     /// No session has this code.
     #[error("no session has the code {0}; check it, or begin a new session")]
     Unknown(String),
+    /// The one-time link does not exist.
+    #[error("no participant was invited by this link; check that it was copied in full")]
+    NoLink,
     /// A different event already has this number.
     #[error("event {seq} of session {code} already exists with other content; reload the session")]
     Conflict {

@@ -49,6 +49,7 @@ mod error;
 mod event;
 pub mod explore;
 mod http;
+mod languages;
 mod questplus;
 mod random;
 mod server;
@@ -56,14 +57,24 @@ mod session;
 pub mod simulated;
 mod stack;
 pub mod store;
+mod viewing;
 
 pub use code::parse as parse_code;
-pub use config::{LANGUAGES, MAX_STACKS, Study, StudyProtocol, Texts};
+pub use config::{
+    AnswerOption, MAX_STACKS, Participants, Question, QuestionKind, Screening, Study, StudyProtocol, Texts,
+};
 pub use error::{StoreError, StudyError};
-pub use event::{Ambient, Choice, Conditions, Envelope, StudyEvent};
-pub use http::interrupted;
+pub use event::{Choice, Envelope, StudyEvent, TrialTiming};
+pub use http::{Exposure, interrupted};
+pub use languages::{Direction, Language, read_languages};
 pub use questplus::{GUESS, LAPSE, Posterior, QuestGrid, QuestPlus, right, sees};
-pub use server::{Beginning, SessionView, StackView, StudyServer, StudyView};
-pub use session::{Class, EventMisfit, ParticipantSession, Stage, Trial, TrialOutcome, grids, replay};
+pub use server::{
+    Beginning, CompletionView, LanguageView, Overview, OverviewRow, SessionView, StackView, StudyServer,
+    StudyView,
+};
+pub use session::{
+    CatchKind, Class, EventMisfit, ParticipantSession, Stage, Trial, TrialOutcome, TrialRole, grids, replay,
+};
 pub use stack::{MAX_LEVELS, NOISY_SHARE, StudyStack};
-pub use store::{AnswerStore, SessionRecord};
+pub use store::{AnswerStore, NewSession, SessionRecord};
+pub use viewing::{Ambient, Conditions, ViewingLimits, ViewingProblem};

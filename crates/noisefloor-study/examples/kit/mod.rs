@@ -46,5 +46,5 @@ pub(crate) fn simulate(
         Observer::of(&format!("simulated {i}"), "", &session)
     };
     let all: Vec<Observer> = (0..observers).map(observe).collect();
-    (report(study, &all, AnalysisOptions { keep_outliers: false, seed, simulated: true }), all)
+    (report(study, &all, AnalysisOptions { keep_excluded: false, seed, simulated: true }), all)
 }

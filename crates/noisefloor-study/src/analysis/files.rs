@@ -1,7 +1,7 @@
 //! An analysis as files: tables, a corpus for `train`, plots, and the grid over the picture.
 
 use super::classes::ClassRow;
-use super::observers::ObserverRow;
+use super::listing::ObserverRow;
 use super::plots;
 use super::report::StudyReport;
 use super::tiles::{CorpusThreshold, TileRow};
@@ -42,11 +42,12 @@ struct TileLine<'a> {
     median: f64,
     median_low: Option<f64>,
     median_high: Option<f64>,
-    scale: f64,
+    quartiles: f64,
     level95: f64,
     level95_low: Option<f64>,
     level95_high: Option<f64>,
     beyond: bool,
+    fit_probability: Option<f64>,
 }
 
 #[derive(Serialize)]
@@ -147,11 +148,12 @@ fn tile_line(t: &TileRow) -> TileLine<'_> {
         median: t.median,
         median_low: end(t.median_interval, 0),
         median_high: end(t.median_interval, 1),
-        scale: t.scale,
+        quartiles: t.quartiles,
         level95: t.level95,
         level95_low: end(t.level95_interval, 0),
         level95_high: end(t.level95_interval, 1),
         beyond: t.beyond,
+        fit_probability: t.fit_probability,
     }
 }
 

@@ -1,6 +1,6 @@
 //! From answers to thresholds, agreement and tables.
 //!
-//! Sessions are replayed ([`Observer`]), observers are screened by stated rules ([`observers`]), tiles get
+//! Sessions are replayed ([`Observer`]), observers are screened by stated rules ([`screening`]), tiles get
 //! their thresholds ([`tiles`]), and agreement says how far to trust them. [`StudyReport`] holds the
 //! results; [`files`] writes them.
 
@@ -10,15 +10,19 @@ pub mod files;
 pub mod fit;
 mod groups;
 pub mod interval;
+mod listing;
 pub mod observers;
 mod plots;
 mod report;
+pub mod screening;
+mod shapes;
 mod summary;
 pub mod tiles;
 
 pub use agreement::{BetweenObservers, RepeatAgreement};
 pub use classes::ClassRow;
 pub use groups::GroupLine;
-pub use observers::{Observer, ObserverRow};
+pub use listing::ObserverRow;
+pub use observers::Observer;
 pub use report::{AnalysisOptions, StudyReport, analyse, report};
 pub use tiles::{CorpusThreshold, TileRow};

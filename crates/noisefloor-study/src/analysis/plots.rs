@@ -98,9 +98,8 @@ pub(super) fn curves(tiles: &[&TileRow], levels: &[u64]) -> Result<String, Study
             .draw()
             .map_err(failed)?;
         for tile in tiles {
-            let fit = super::fit::Logistic { centre: tile.median.ln(), scale: tile.scale, slips: 0.0 };
             let at = |i: usize| low * (high / low).powf(i as f64 / (POINTS - 1) as f64);
-            let curve = (0..POINTS).map(|i| (at(i), fit.share(at(i))));
+            let curve = (0..POINTS).map(|i| (at(i), tile.fit.share(at(i))));
             chart.draw_series(LineSeries::new(curve, BLUE.mix(0.6))).map_err(failed)?;
             if tile.level95 < high {
                 let dot = Circle::new((tile.level95, 0.95), 3, VERMILION.filled());

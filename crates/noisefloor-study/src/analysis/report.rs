@@ -3,7 +3,8 @@
 use super::agreement::{self, BetweenObservers, RepeatAgreement};
 use super::classes::{self, ClassRow};
 use super::groups::{self, GroupLine};
-use super::observers::{self, Observer, ObserverRow};
+use super::listing::{self, ObserverRow};
+use super::observers::{self, Observer};
 use super::tiles::{self, TileRow};
 use crate::config::{Study, StudyProtocol};
 use crate::error::StudyError;
@@ -14,8 +15,8 @@ use std::sync::Arc;
 /// Parameters of an analysis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct AnalysisOptions {
-    /// Whether to keep outlying observers.
-    pub keep_outliers: bool,
+    /// Whether to keep observers whom the rules of the study exclude.
+    pub keep_excluded: bool,
     /// Seed of the bootstrap.
     pub seed: u64,
     /// Whether to analyse simulated observers instead of people; they are never mixed.
@@ -63,8 +64,8 @@ pub fn analyse(study: &Arc<Study>, options: AnalysisOptions) -> Result<StudyRepo
 
 /// Analyses observers already in memory.
 pub fn report(study: &Study, observers: &[Observer], options: AnalysisOptions) -> StudyReport {
-    let rows = observers::rows(study, observers);
-    let counts = |row: &ObserverRow| options.keep_outliers || row.outlier.is_none();
+    let rows = listing::rows(study, observers);
+    let counts = |row: &ObserverRow| options.keep_excluded || row.excluded.is_none();
     let kept: Vec<&Observer> =
         observers.iter().zip(&rows).filter(|(_, row)| counts(row)).map(|(o, _)| o).collect();
     let thresholds = study.protocol != StudyProtocol::Validation;

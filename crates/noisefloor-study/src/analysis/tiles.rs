@@ -1,23 +1,29 @@
 //! Thresholds of tiles.
 
-use super::fit::{Logistic, Observation};
+use super::fit::{Observation, ThresholdFit};
 use super::interval::bootstrap;
 use super::observers::{Observer, TileKey, places};
+use super::summary::median;
 use crate::config::Study;
 use rayon::prelude::*;
 use serde::Serialize;
 
+/// Fewest observers whose intervals are given: with fewer the simulations do not support them.
+pub const LEAST_OBSERVERS: usize = 8;
+/// Standard deviation of a normal distribution in units of its median absolute deviation.
+const MAD_TO_SD: f64 = 1.4826;
+
 /// Which threshold of a tile goes into the corpus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum CorpusThreshold {
-    /// Where 95 % of observers see no difference: what `train` takes as the threshold (Takouachet et al.
-    /// 2017, §4.2.2).
+    /// Where 95 % of observers see no difference: what `train` takes as the threshold (Takouachet et al. 2017,
+    /// §4.2.2).
     Level95,
     /// The mean over observers.
     Mean,
 }
 
-/// The threshold of one tile.
+/// The threshold of one tile. Intervals are `None` for fewer than [`LEAST_OBSERVERS`].
 #[derive(Clone, Debug, Serialize)]
 pub struct TileRow {
     /// Name of the stack.
@@ -38,51 +44,56 @@ pub struct TileRow {
     pub mean: f64,
     /// Its 95 % interval.
     pub mean_interval: Option<[f64; 2]>,
-    /// Median of the fitted psychometric function, in samples per pixel.
+    /// Samples per pixel at which half of the observers see no difference.
     pub median: f64,
     /// Its 95 % interval.
     pub median_interval: Option<[f64; 2]>,
-    /// Scale of the fitted psychometric function, in ln(spp).
-    pub scale: f64,
+    /// Distance between the quartiles of the observers, in ln(spp).
+    pub quartiles: f64,
     /// Samples per pixel at which 95 % of observers see no difference.
     pub level95: f64,
     /// Its 95 % interval.
     pub level95_interval: Option<[f64; 2]>,
-    /// Whether the 95 % level lies above the last level before the reference, and is therefore
-    /// extrapolated.
+    /// Whether the 95 % level lies above the last level before the reference, and is therefore extrapolated.
     pub beyond: bool,
+    /// Acquisition: probability of stops at least as unlike the fitted spread, if it were true. Below 0.01 the
+    /// estimates of the tile are doubtful.
+    pub fit_probability: Option<f64>,
+    #[serde(skip)]
+    pub(super) fit: ThresholdFit,
 }
 
 /// Thresholds of all tiles that have answers.
 pub fn rows(study: &Study, observers: &[&Observer], seed: u64) -> Vec<TileRow> {
-    places(study).into_par_iter().filter_map(|place| row(study, observers, place, seed)).collect()
+    let alike = repeat_correlation(study, observers);
+    places(study).into_par_iter().filter_map(|place| row(study, observers, place, alike, seed)).collect()
 }
 
-fn row(study: &Study, observers: &[&Observer], place: TileKey, seed: u64) -> Option<TileRow> {
-    // Threshold and observations of each observer
-    let said: Vec<(f64, Vec<Observation>)> = observers
-        .iter()
-        .filter_map(|o| Some((o.threshold(study, place)?, o.observations(study, place))))
-        .collect();
-    let once: Vec<f64> = vec![1.0; said.len()];
-    let weighted = |weights: &[f64]| {
-        let drawn = said.iter().zip(weights).filter(|(_, w)| **w > 0.0);
-        pooled(drawn.flat_map(|((_, seen), w)| seen.iter().map(move |o| (o, *w))))
-    };
-    let mean = |weights: &[f64]| {
-        let sum: f64 = said.iter().zip(weights).map(|((t, _), w)| t * w).sum();
-        sum / weights.iter().sum::<f64>()
-    };
-    let fitted = Logistic::fit(&weighted(&once))?;
-    let seed = seed ^ (u64::from(place.0) << 32 | u64::from(place.1));
-    let statistics = |w: &[f64]| {
-        Logistic::fit_with(&weighted(w), fitted.slips).map(|f| [mean(w), f.centre, f.level95().ln()])
-    };
-    let found = [mean(&once), fitted.centre, fitted.level95().ln()];
-    let intervals = bootstrap(said.len(), seed, found, statistics);
+fn row(study: &Study, observers: &[&Observer], place: TileKey, alike: f64, seed: u64) -> Option<TileRow> {
     let stack = &study.stacks[place.0 as usize];
+    // Showings to one observer repeat each other: k of them weigh as much as k/(1 + (k−1)ρ) observers
+    let mut observations: Vec<(Observation, f64)> = Vec::new();
+    let (mut thresholds, mut stops) = (Vec::new(), Vec::new());
+    for observer in observers {
+        let Some(threshold) = observer.threshold(study, place) else { continue };
+        thresholds.push(threshold);
+        stops.extend(observer.stops.get(&place).into_iter().flatten().copied());
+        let seen = observer.observations(study, place);
+        let weight = 1.0 / (1.0 + (seen.len() as f64 - 1.0) * alike);
+        seen.into_iter().for_each(|o| add(&mut observations, o, weight));
+    }
+    let n = thresholds.len();
+    let fit = ThresholdFit::new(&observations)?;
+    let mean = |weights: &[f64]| {
+        let sum: f64 = thresholds.iter().zip(weights).map(|(t, w)| t * w).sum();
+        Some([sum / weights.iter().sum::<f64>()])
+    };
+    let enough = n >= LEAST_OBSERVERS;
+    let found = mean(&vec![1.0; n])?;
+    let seed = seed ^ (u64::from(place.0) << 32 | u64::from(place.1));
+    let mean_interval = bootstrap(n, seed, found, mean).map(|[i]| i).filter(|_| enough);
     let tile = stack.grid().tile(place.1 as usize);
-    let exp = |i: usize| intervals.map(|all| all[i].map(f64::exp));
+    let design = stops.len() as f64 / observations.iter().map(|(_, w)| w).sum::<f64>();
     Some(TileRow {
         stack: stack.name().to_owned(),
         tile: tile.index,
@@ -90,28 +101,43 @@ fn row(study: &Study, observers: &[&Observer], place: TileKey, seed: u64) -> Opt
         y: tile.y,
         width: tile.width,
         height: tile.height,
-        observers: said.len(),
-        mean: mean(&once),
-        mean_interval: intervals.map(|all| all[0]),
-        median: fitted.centre.exp(),
-        median_interval: exp(1),
-        scale: fitted.scale,
-        level95: fitted.level95(),
-        level95_interval: exp(2),
-        beyond: fitted.level95() > stack.levels()[stack.last() as usize - 1] as f64,
+        observers: n,
+        mean: found[0],
+        mean_interval,
+        median: fit.median.value.exp(),
+        median_interval: enough.then_some(fit.median.interval.map(f64::exp)),
+        quartiles: fit.width,
+        level95: fit.level95.value.exp(),
+        level95_interval: enough.then_some(fit.level95.interval.map(f64::exp)),
+        beyond: fit.level95.value.exp() > stack.levels()[stack.last() as usize - 1] as f64,
+        fit_probability: fit.fit_probability(&stops, stack.levels(), design),
+        fit,
     })
 }
 
 /// Merges equal stops, because the time of a fit grows with their number.
-fn pooled<'a>(all: impl Iterator<Item = (&'a Observation, f64)>) -> Vec<(Observation, f64)> {
-    let mut pooled: Vec<(Observation, f64)> = Vec::new();
-    for (observation, weight) in all {
-        let is_stop = matches!(observation, Observation::Between { .. });
-        let same = if is_stop { pooled.iter_mut().find(|(o, _)| o == observation) } else { None };
-        match same {
-            Some((_, sum)) => *sum += weight,
-            None => pooled.push((observation.clone(), weight)),
+fn add(all: &mut Vec<(Observation, f64)>, observation: Observation, weight: f64) {
+    let is_stop = matches!(observation, Observation::Between { .. });
+    match all.iter_mut().find(|(o, _)| is_stop && *o == observation) {
+        Some((_, sum)) => *sum += weight,
+        None => all.push((observation, weight)),
+    }
+}
+
+/// Correlation between two showings of a tile to one observer, from medians, so that slips hardly matter. Where levels
+/// are too coarse to tell, it is 1, which makes intervals wider.
+fn repeat_correlation(study: &Study, observers: &[&Observer]) -> f64 {
+    let (mut within, mut deviations) = (Vec::new(), Vec::new());
+    for place in places(study) {
+        let spp = study.stacks[place.0 as usize].levels();
+        let ln = |level: &u32| (spp[*level as usize].max(1) as f64).ln();
+        let stops = || observers.iter().filter_map(|o| o.stops.get(&place));
+        within.extend(stops().filter(|s| s.len() > 1).map(|s| (ln(&s[0]) - ln(&s[1])).abs()));
+        if let Some(middle) = median(stops().flatten().map(ln).collect()) {
+            deviations.extend(stops().flatten().map(|level| (ln(level) - middle).abs()));
         }
     }
-    pooled
+    let (Some(within), Some(total)) = (median(within), median(deviations)) else { return 1.0 };
+    let variance = |deviation: f64| (MAD_TO_SD * deviation).powi(2);
+    if total <= 0.0 { 1.0 } else { (1.0 - 0.5 * variance(within) / variance(total)).clamp(0.0, 1.0) }
 }

@@ -21,7 +21,7 @@ pub use gallery::{GalleryPicture, MAX_GALLERY_PIXELS, MAX_PICTURES};
 pub use learn::{AnswerAgreement, LearnStep, Learned, retrain};
 
 use crate::error::StudyError;
-use crate::http::{self, Guard, Listening};
+use crate::http::{self, Exposure, Guard, Listening};
 use app::App;
 use axum::Router;
 use axum::middleware::{from_fn, from_fn_with_state};
@@ -39,15 +39,15 @@ pub struct ExploreServer {
 }
 
 impl ExploreServer {
-    /// Reads the pictures, opens the database and binds the address. Port 0 picks a free port. `names` are
-    /// further host names under which the server may be addressed.
+    /// Reads the pictures, opens the database and binds the address. Port 0 picks a free port. `exposure` says
+    /// under which other names and behind which proxies it may be reached; a base path is ignored.
     ///
     /// # Errors
     /// [`StudyError`] if a picture or the database cannot be read, or the address is in use.
     pub async fn bind(
         setup: ExploreSetup,
         address: SocketAddr,
-        names: &[String],
+        exposure: &Exposure,
     ) -> Result<Self, StudyError> {
         let mut gallery = Gallery::new(setup.tile);
         for path in &setup.pictures {
@@ -65,7 +65,7 @@ impl ExploreServer {
             incoming: tokio::sync::Mutex::default(),
             job: Arc::default(),
         });
-        let guard = Arc::new(Guard::new(listening.address(), names));
+        let guard = Arc::new(Guard::new(listening.address(), exposure));
         Ok(Self { listening, router: router(app, guard) })
     }
 

@@ -1,75 +1,81 @@
-//! What every request is checked for before anything looks at it: that it means this server, and comes from
-//! its own pages.
+//! Checks of every request: that it means this server, and comes from its own pages.
 
+use super::exposure::Exposure;
 use super::reply::Refusal;
 use axum::extract::{ConnectInfo, Request, State};
-use axum::http::header::{CONTENT_TYPE, HOST, HeaderName, HeaderValue, ORIGIN};
+use axum::http::header::{CONTENT_TYPE, HOST, HeaderMap, HeaderName, HeaderValue, ORIGIN};
 use axum::http::{Method, StatusCode};
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::net::{IpAddr, SocketAddr};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-/// Nothing but what the server itself sends may run, be shown or be asked.
+/// Only what the server itself sends may run, be shown, or be requested.
 const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob:; \
     connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
-/// Wrong codes that one address may try in [`WINDOW`].
-const WRONG_CODES: u32 = 30;
+/// Different wrong codes that one address may try in [`WINDOW`].
+const WRONG_CODES: usize = 30;
 const WINDOW: Duration = Duration::from_secs(60);
-/// Addresses whose errors are counted.
+/// Most addresses whose wrong codes are counted.
 const MOST_ADDRESSES: usize = 10_000;
 
-/// Names that the server goes by, and errors by address.
+/// Names of the server, and wrong codes by address.
 pub(crate) struct Guard {
-    /// Lower case, with port.
     hosts: Vec<String>,
-    wrong: Mutex<HashMap<IpAddr, (Instant, u32)>>,
+    exposure: Exposure,
+    wrong: Mutex<HashMap<IpAddr, (Instant, HashSet<String>)>>,
 }
 
+/// The address a request comes from: of the participant, if a trusted proxy passed it on.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Client(pub(crate) IpAddr);
+
 impl Guard {
-    pub(crate) fn new(address: SocketAddr, names: &[String]) -> Self {
-        let port = address.port();
-        let mut hosts = vec![address.to_string()];
-        if address.ip().is_loopback() || address.ip().is_unspecified() {
-            hosts.extend(["127.0.0.1", "localhost", "[::1]"].map(|name| format!("{name}:{port}")));
-        }
-        for name in names {
-            let has_port = name.rsplit_once(':').is_some_and(|(_, port)| port.parse::<u16>().is_ok());
-            hosts.push(if has_port {
-                name.to_lowercase()
-            } else {
-                format!("{}:{port}", name.to_lowercase())
-            });
-        }
-        Self { hosts, wrong: Mutex::default() }
+    pub(crate) fn new(address: SocketAddr, exposure: &Exposure) -> Self {
+        Self { hosts: exposure.hosts(address), exposure: exposure.clone(), wrong: Mutex::default() }
     }
 
-    /// The Host header names this server. (A page elsewhere whose name was made to resolve to this machine
-    /// sends its own.)
-    fn knows(&self, host: Option<&HeaderValue>) -> Option<String> {
-        let host = host?.to_str().ok()?.to_lowercase();
-        self.hosts.contains(&host).then_some(host)
+    /// The Host header, if it names this server, with or without a port.
+    fn known_host(&self, headers: &HeaderMap) -> Option<String> {
+        let host = headers.get(HOST)?.to_str().ok()?.to_lowercase();
+        let without_port = host.rsplit_once(':').filter(|(_, port)| port.parse::<u16>().is_ok());
+        let name = without_port.map_or(&host[..], |(name, _)| name);
+        self.hosts.iter().any(|h| *h == host || h == name).then_some(host)
     }
 
-    /// Counts a wrong code.
-    pub(crate) fn count(&self, address: IpAddr) {
+    /// Where a request comes from, and the scheme of the page: a proxy that is trusted says both.
+    fn origin_of(&self, peer: IpAddr, headers: &HeaderMap) -> (IpAddr, &'static str) {
+        if !self.exposure.proxies.contains(&peer) {
+            return (peer, "http");
+        }
+        let text = |name: &str| headers.get_all(name).iter().filter_map(|v| v.to_str().ok());
+        // The last address that is no trusted proxy: those before it may be made up
+        let hops: Vec<&str> = text("x-forwarded-for").flat_map(|v| v.split(',')).map(str::trim).collect();
+        let hops = hops.iter().rev().filter_map(|hop| hop.parse::<IpAddr>().ok());
+        let client = hops.into_iter().find(|hop| !self.exposure.proxies.contains(hop)).unwrap_or(peer);
+        let secure = text("x-forwarded-proto").next_back().is_some_and(|v| v.trim() == "https");
+        (client, if secure { "https" } else { "http" })
+    }
+
+    /// Counts a wrong code. After [`WRONG_CODES`] different ones from an address, its guesses are refused for a
+    /// while; requests with a valid code never get here.
+    pub(crate) fn wrong_code(&self, client: Client, code: &str) -> Refusal {
         let mut wrong = self.wrong.lock().unwrap_or_else(PoisonError::into_inner);
         if wrong.len() >= MOST_ADDRESSES {
             wrong.retain(|_, (since, _)| since.elapsed() < WINDOW);
         }
-        let entry = wrong.entry(address).or_insert((Instant::now(), 0));
-        if entry.0.elapsed() >= WINDOW {
-            *entry = (Instant::now(), 0);
+        let (since, codes) = wrong.entry(client.0).or_insert_with(|| (Instant::now(), HashSet::new()));
+        if since.elapsed() >= WINDOW {
+            (*since, *codes) = (Instant::now(), HashSet::new());
         }
-        entry.1 += 1;
-    }
-
-    /// Whether an address has to wait.
-    pub(crate) fn is_tired_of(&self, address: IpAddr) -> bool {
-        let wrong = self.wrong.lock().unwrap_or_else(PoisonError::into_inner);
-        wrong.get(&address).is_some_and(|(since, n)| since.elapsed() < WINDOW && *n >= WRONG_CODES)
+        if codes.len() < WRONG_CODES {
+            codes.insert(code.chars().take(16).collect());
+            return Refusal::unknown_code();
+        }
+        let what = format!("{WRONG_CODES} different wrong codes came from this address within a minute");
+        Refusal::new(StatusCode::TOO_MANY_REQUESTS, what, "code", "wait a minute, and check the code")
     }
 }
 
@@ -77,67 +83,50 @@ impl Guard {
 pub(crate) async fn check(
     State(guard): State<Arc<Guard>>,
     ConnectInfo(peer): ConnectInfo<SocketAddr>,
-    request: Request,
+    mut request: Request,
     next: Next,
 ) -> Response {
-    match foreign(&guard, peer.ip(), &request) {
-        Some(refusal) => refusal.into_response(),
-        None => next.run(request).await,
+    let (client, scheme) = guard.origin_of(peer.ip(), request.headers());
+    if let Some(refusal) = foreign(&guard, scheme, &request) {
+        return refusal.into_response();
     }
+    request.extensions_mut().insert(Client(client));
+    next.run(request).await
 }
 
-fn foreign(guard: &Guard, peer: IpAddr, request: &Request) -> Option<Refusal> {
+fn foreign(guard: &Guard, scheme: &str, request: &Request) -> Option<Refusal> {
     let headers = request.headers();
-    let Some(host) = guard.knows(headers.get(HOST)) else {
+    let refuse = |status, what: &str, place: &str, do_: &str| Some(Refusal::new(status, what, place, do_));
+    let Some(host) = guard.known_host(headers) else {
         let do_ = "open the address that `noisefloor` printed, or name this host with --allow-host";
-        return Some(Refusal::new(
-            StatusCode::MISDIRECTED_REQUEST,
-            "this server does not go by that name",
-            "Host",
-            do_,
-        ));
+        let what = "this server does not go by that name";
+        return refuse(StatusCode::MISDIRECTED_REQUEST, what, "Host", do_);
     };
     let origin = headers.get(ORIGIN).map(|o| o.to_str().unwrap_or_default().to_lowercase());
     let site = headers.get("sec-fetch-site").map(|s| s.to_str().unwrap_or_default());
-    let own = origin.is_none_or(|o| o == format!("http://{host}"));
-    let navigation = request.method() == Method::GET && request.uri().path() == "/";
+    let own = origin.is_none_or(|o| o == format!("{scheme}://{host}"));
+    let page = format!("{}/", guard.exposure.base_path);
+    let navigation = request.method() == Method::GET && page.starts_with(request.uri().path());
     if !own || (matches!(site, Some("cross-site" | "same-site")) && !navigation) {
         let what = "the request comes from a page of another site";
-        return Some(Refusal::new(
-            StatusCode::FORBIDDEN,
-            what,
-            "Origin",
-            "use the pages that this server sends",
-        ));
+        let do_ = "use the pages that this server sends; behind a proxy, start it with --trust-proxy";
+        return refuse(StatusCode::FORBIDDEN, what, "Origin", do_);
     }
-    let writes = !matches!(*request.method(), Method::GET | Method::HEAD);
-    // Forms of other sites cannot send these types without being asked first
+    let writes = !matches!(*request.method(), Method::GET | Method::HEAD | Method::DELETE);
+    // Forms of other sites cannot send these types unasked
     let safe = ["application/json", "application/octet-stream"];
     let typed = headers
         .get(CONTENT_TYPE)
         .is_some_and(|t| safe.iter().any(|s| t.as_bytes().starts_with(s.as_bytes())));
-    if writes && request.method() != Method::DELETE && !typed {
+    if writes && !typed {
+        let what = "the body is declared neither as JSON nor as a picture";
         let do_ = "send JSON, with Content-Type: application/json";
-        return Some(Refusal::new(
-            StatusCode::UNSUPPORTED_MEDIA_TYPE,
-            "the body is declared neither as JSON nor as a picture",
-            "Content-Type",
-            do_,
-        ));
-    }
-    if guard.is_tired_of(peer) && request.uri().path().starts_with("/api/sessions/") {
-        let what = format!("more than {WRONG_CODES} wrong codes in a minute came from this address");
-        return Some(Refusal::new(
-            StatusCode::TOO_MANY_REQUESTS,
-            what,
-            "code",
-            "wait a minute, and check the code",
-        ));
+        return refuse(StatusCode::UNSUPPORTED_MEDIA_TYPE, what, "Content-Type", do_);
     }
     None
 }
 
-/// Headers of every answer.
+/// Headers of every reply.
 pub(crate) async fn security_headers(request: Request, next: Next) -> Response {
     let mut response = next.run(request).await;
     let headers = response.headers_mut();
@@ -153,4 +142,48 @@ pub(crate) async fn security_headers(request: Request, next: Next) -> Response {
     }
     headers.entry("cache-control").or_insert(HeaderValue::from_static("no-store"));
     response
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn headers(pairs: &[(&'static str, &'static str)]) -> HeaderMap {
+        pairs.iter().map(|(n, v)| (HeaderName::from_static(n), HeaderValue::from_static(v))).collect()
+    }
+
+    #[test]
+    fn only_trusted_proxies_are_believed() {
+        let proxy: IpAddr = [127, 0, 0, 1].into();
+        let exposure = Exposure::named(&["Study.Example".into()]).trusting(&[proxy]);
+        let guard = Guard::new(([127, 0, 0, 1], 8437).into(), &exposure);
+        let forwarded = headers(&[
+            ("x-forwarded-for", "1.1.1.1, 203.0.113.9, 127.0.0.1"),
+            ("x-forwarded-proto", "https"),
+        ]);
+        assert_eq!(guard.origin_of(proxy, &forwarded), ([203, 0, 113, 9].into(), "https"));
+        let stranger: IpAddr = [198, 51, 100, 7].into();
+        assert_eq!(guard.origin_of(stranger, &forwarded), (stranger, "http"));
+        assert_eq!(guard.origin_of(proxy, &headers(&[("x-forwarded-for", "nonsense")])), (proxy, "http"));
+        for (host, known) in [
+            ("study.example", true),
+            ("study.example:8443", true),
+            ("localhost:8437", true),
+            ("localhost:80", false),
+            ("evil.example", false),
+        ] {
+            assert_eq!(guard.known_host(&headers(&[("host", host)])).is_some(), known, "{host}");
+        }
+    }
+
+    #[test]
+    fn repeating_one_wrong_code_locks_nobody_out() {
+        let guard = Guard::new(([127, 0, 0, 1], 1).into(), &Exposure::default());
+        let client = Client([203, 0, 113, 9].into());
+        let refused = |code: &str| !guard.wrong_code(client, code).is_unknown_code();
+        assert!(!(0..100).any(|_| refused("000000000000")));
+        assert!(!(1..30).any(|i| refused(&format!("{i:012}"))));
+        assert!(refused("ABCDEFGHJKMN"));
+        assert!(guard.wrong_code(Client([203, 0, 113, 10].into()), "0").is_unknown_code());
+    }
 }

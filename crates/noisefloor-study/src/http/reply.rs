@@ -75,6 +75,10 @@ impl From<StoreError> for Refusal {
     fn from(error: StoreError) -> Self {
         match error {
             StoreError::Unknown(_) => Self::unknown_code(),
+            StoreError::NoLink => {
+                let do_ = "copy the whole link, or ask who invited you";
+                Self::new(StatusCode::NOT_FOUND, "nobody was invited by this link", "link", do_)
+            }
             StoreError::Conflict { seq, .. } => Self::conflict(seq, seq + 1),
             error => {
                 // Paths of the machine are for who runs the server, not for who answers

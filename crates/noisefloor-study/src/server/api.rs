@@ -1,56 +1,66 @@
 //! Requests of the pages. Replies are JSON, except tiles, which are PNG files.
 
 use super::app::App;
-use super::views::{Beginning, SessionView, StackView, StudyView};
+use super::views::{Beginning, SessionView, StudyView};
 use crate::code;
 use crate::error::StoreError;
 use crate::event::Envelope;
-use crate::http::{Refusal, read_json};
-use crate::stack::StudyStack;
+use crate::http::{Client, Refusal, read_json};
+use crate::store::NewSession;
 use axum::Json;
 use axum::body::Body;
 use axum::extract::rejection::PathRejection;
-use axum::extract::{ConnectInfo, Path, State};
+use axum::extract::{Extension, Path, State};
 use axum::http::StatusCode;
 use axum::http::header::{CACHE_CONTROL, CONTENT_DISPOSITION, CONTENT_TYPE};
 use axum::response::{IntoResponse, Response};
-use std::net::SocketAddr;
 use std::sync::Arc;
 
 type Answer = Result<Response, Refusal>;
 type Shared = State<Arc<App>>;
-type Peer = ConnectInfo<SocketAddr>;
+type Peer = Extension<Client>;
+/// Longest identifier from an address, in bytes.
+const MAX_ID: usize = 200;
 
 /// `GET /api/study`
 pub(crate) async fn study(State(app): Shared) -> Response {
-    let stack = |s: &StudyStack| StackView {
-        width: s.grid().width(),
-        height: s.grid().height(),
-        tile: s.grid().edge(),
-        levels: s.levels().to_vec(),
-    };
-    let study = &app.study;
-    Json(StudyView {
-        protocol: study.protocol,
-        groups: study.groups.clone(),
-        text: study.text.clone(),
-        interval_ms: study.interval_ms,
-        stacks: study.stacks.iter().map(stack).collect(),
-    })
-    .into_response()
+    Json(StudyView::of(&app.study)).into_response()
+}
+
+/// `GET /api/texts/{language}`
+pub(crate) async fn texts(State(app): Shared, code: Result<Path<String>, PathRejection>) -> Answer {
+    let found = code.ok().and_then(|Path(code)| app.study.languages.get(&code).cloned());
+    let do_ = "ask for a language of the study";
+    let none = || Refusal::new(StatusCode::NOT_FOUND, "the study is not in that language", "language", do_);
+    Ok(Json(found.ok_or_else(none)?.text).into_response())
 }
 
 /// `POST /api/sessions`
 pub(crate) async fn begin(State(app): Shared, body: Body) -> Answer {
-    let Beginning { group, simulated } = read_json(body).await?;
-    let known =
-        if app.study.groups.is_empty() { group.is_empty() } else { app.study.groups.contains(&group) };
-    if !known {
-        let do_ = format!("choose one of {:?}", app.study.groups);
-        return Err(Refusal::new(StatusCode::UNPROCESSABLE_ENTITY, "no such group", "group", do_));
+    let Beginning { group, simulated, link, ids } = read_json(body).await?;
+    let refuse = |what: &str, place: &str, do_: String| {
+        Err(Refusal::new(StatusCode::UNPROCESSABLE_ENTITY, what, place, do_))
+    };
+    let groups = &app.study.groups;
+    if if groups.is_empty() { !group.is_empty() } else { !groups.contains(&group) } {
+        return refuse("no such group", "group", format!("choose one of {groups:?}"));
     }
-    let (code, seed) = (code::draw()?, code::draw_seed()?);
-    app.store.begin(&code, seed, &group, simulated).await?;
+    let participants = &app.study.participants;
+    let sound = |(name, value): (&String, &String)| {
+        participants.id_parameters.contains(name)
+            && value.len() <= MAX_ID
+            && !value.contains(char::is_control)
+    };
+    if !ids.iter().all(sound) {
+        let do_ = format!("send {:?} of at most {MAX_ID} bytes", participants.id_parameters);
+        return refuse("an identifier of the address is unknown or too long", "ids", do_);
+    }
+    if participants.links_only && link.is_none() && !simulated {
+        return refuse("this study is open to invited participants", "link", "use your personal link".into());
+    }
+    let link = link.map(|typed| code::parse(&typed).ok_or(StoreError::NoLink)).transpose()?;
+    let session = NewSession { code: code::draw()?, seed: code::draw_seed()?, group, simulated, ids, link };
+    let code = app.store.begin(session).await?;
     let view = app.with(&code, |session| SessionView::of(&code, session)).await?;
     Ok((StatusCode::CREATED, Json(view)).into_response())
 }
@@ -58,22 +68,22 @@ pub(crate) async fn begin(State(app): Shared, body: Body) -> Answer {
 /// `GET /api/sessions/{code}`
 pub(crate) async fn view(
     State(app): Shared,
-    ConnectInfo(peer): Peer,
+    Extension(client): Peer,
     typed: Result<Path<String>, PathRejection>,
 ) -> Answer {
-    let code = known_code(&app, peer, typed)?;
+    let code = known_code(&app, client, typed)?;
     let view = app.with(&code, |session| SessionView::of(&code, session)).await;
-    Ok(Json(counted(&app, peer, view)?).into_response())
+    Ok(Json(counted(&app, client, &code, view)?).into_response())
 }
 
 /// `POST /api/sessions/{code}/events`
 pub(crate) async fn event(
     State(app): Shared,
-    ConnectInfo(peer): Peer,
+    Extension(client): Peer,
     typed: Result<Path<String>, PathRejection>,
     body: Body,
 ) -> Answer {
-    let code = known_code(&app, peer, typed)?;
+    let code = known_code(&app, client, typed)?;
     let envelope: Envelope = read_json(body).await?;
     if !envelope.has_sane_clock() {
         let do_ = "send milliseconds since 1970";
@@ -83,18 +93,18 @@ pub(crate) async fn event(
     let (worker, of) = (app.clone(), code.clone());
     let work = tokio::spawn(async move { worker.record(&of, envelope).await });
     let done = work.await.map_err(|_| Refusal::from(StoreError::Closed))?;
-    let session = counted(&app, peer, done)?;
+    let session = counted(&app, client, &code, done)?;
     Ok(Json(SessionView::of(&code, &session)).into_response())
 }
 
 /// `GET /api/sessions/{code}/export`
 pub(crate) async fn export(
     State(app): Shared,
-    ConnectInfo(peer): Peer,
+    Extension(client): Peer,
     typed: Result<Path<String>, PathRejection>,
 ) -> Answer {
-    let code = known_code(&app, peer, typed)?;
-    let record = counted(&app, peer, app.store.load(&code).await.map_err(Refusal::from))?;
+    let code = known_code(&app, client, typed)?;
+    let record = counted(&app, client, &code, app.store.load(&code).await.map_err(Refusal::from))?;
     let name = format!("attachment; filename=\"noisefloor-{code}.json\"");
     Ok(([(CONTENT_DISPOSITION, name)], Json(record)).into_response())
 }
@@ -102,16 +112,16 @@ pub(crate) async fn export(
 /// `DELETE /api/sessions/{code}`
 pub(crate) async fn erase(
     State(app): Shared,
-    ConnectInfo(peer): Peer,
+    Extension(client): Peer,
     typed: Result<Path<String>, PathRejection>,
 ) -> Answer {
-    let code = known_code(&app, peer, typed)?;
+    let code = known_code(&app, client, typed)?;
     let place = app.place(&code);
     let mut live = place.lock().await;
     let erased = app.store.erase(&code).await.map_err(Refusal::from);
     *live = None;
     app.forget(&code);
-    counted(&app, peer, erased)?;
+    counted(&app, client, &code, erased)?;
     Ok(StatusCode::NO_CONTENT.into_response())
 }
 
@@ -142,17 +152,14 @@ pub(crate) async fn tile(
 
 fn known_code(
     app: &App,
-    peer: SocketAddr,
+    client: Client,
     typed: Result<Path<String>, PathRejection>,
 ) -> Result<String, Refusal> {
-    let code = typed.ok().and_then(|Path(typed)| code::parse(&typed));
-    counted(app, peer, code.ok_or_else(Refusal::unknown_code))
+    let typed = typed.map(|Path(typed)| typed).unwrap_or_default();
+    code::parse(&typed).ok_or_else(|| app.guard.wrong_code(client, &typed))
 }
 
 /// Counts wrong codes of an address.
-fn counted<T>(app: &App, peer: SocketAddr, result: Result<T, Refusal>) -> Result<T, Refusal> {
-    if result.as_ref().is_err_and(Refusal::is_unknown_code) {
-        app.guard.count(peer.ip());
-    }
-    result
+fn counted<T>(app: &App, client: Client, code: &str, result: Result<T, Refusal>) -> Result<T, Refusal> {
+    result.map_err(|r| if r.is_unknown_code() { app.guard.wrong_code(client, code) } else { r })
 }

@@ -1,24 +1,23 @@
-//! What all requests share: the study, its answers, and the sessions in memory.
+//! State shared by all requests: the study, its answers, and the sessions in memory.
 
 use super::tiles::TileCache;
 use crate::config::Study;
 use crate::error::StoreError;
 use crate::event::Envelope;
-use crate::http::Guard;
-use crate::http::Refusal;
+use crate::http::{Guard, Refusal};
 use crate::questplus::QuestGrid;
 use crate::session::{ParticipantSession, replay};
 use crate::store::AnswerStore;
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// Sessions that are kept in memory; others are read again from the database when they go on.
+/// Most sessions kept in memory; others are read from the database when they continue.
 const MOST_LIVE: usize = 1000;
 
 /// A session in memory; `None` until it has been read from the database.
 type Live = Arc<tokio::sync::Mutex<Option<ParticipantSession>>>;
 
-/// Everything that requests share.
+/// State shared by all requests.
 pub(crate) struct App {
     pub(super) study: Arc<Study>,
     pub(super) grids: Arc<Vec<Arc<QuestGrid>>>,
@@ -26,15 +25,16 @@ pub(crate) struct App {
     pub(super) live: Mutex<HashMap<String, Live>>,
     pub(super) tiles: TileCache,
     pub(super) guard: Arc<Guard>,
+    /// Opens the experimenter's page.
+    pub(super) key: String,
 }
 
 impl App {
-    /// The place of a session in memory, which is empty at first. A code that is in no database is not
-    /// remembered.
+    /// The slot of a session in memory, empty at first. Unknown codes are not remembered.
     pub(super) fn place(&self, code: &str) -> Live {
         let mut live = self.live.lock().unwrap_or_else(PoisonError::into_inner);
         if live.len() >= MOST_LIVE {
-            // Nobody holds those that only the map knows
+            // Only the map refers to sessions with one reference
             live.retain(|_, session| Arc::strong_count(session) > 1);
         }
         live.entry(code.to_owned()).or_default().clone()
@@ -44,16 +44,16 @@ impl App {
         self.live.lock().unwrap_or_else(PoisonError::into_inner).remove(code);
     }
 
-    /// A session as its events left it.
+    /// Rebuilds a session from its events.
     pub(super) async fn load(&self, code: &str) -> Result<ParticipantSession, StoreError> {
         let record = self.store.load(code).await?;
-        // Replaying forced choices takes a tenth of a second
+        // Replaying a forced choice takes a tenth of a second
         let (study, grids) = (self.study.clone(), self.grids.clone());
         let replayed = tokio::task::spawn_blocking(move || replay(study, grids, &record)).await;
         replayed.map_err(|_| StoreError::Closed)?
     }
 
-    /// Runs `with` on a session, which nobody else changes meanwhile.
+    /// Runs `with` on a session while nobody else can change it.
     pub(super) async fn with<T>(
         &self,
         code: &str,
@@ -73,8 +73,7 @@ impl App {
         live.as_ref().map(with).ok_or_else(|| StoreError::Closed.into())
     }
 
-    /// Takes an event: checks it, keeps it, and only then lets it count. An event that is there already is
-    /// acknowledged again.
+    /// Checks an event, stores it, and only then lets it count. A stored event is acknowledged again.
     pub(super) async fn record(&self, code: &str, envelope: Envelope) -> Result<ParticipantSession, Refusal> {
         let place = self.place(code);
         let mut live = place.lock().await;
@@ -112,7 +111,7 @@ impl App {
             return Err(Refusal::misfit(&misfit, next));
         }
         if let Err(error) = self.store.append(code, envelope).await {
-            // What is on disk is not known: it is read again next time
+            // Whether it is on disk is unknown: the session is read again next time
             self.forget(code);
             return Err(error.into());
         }

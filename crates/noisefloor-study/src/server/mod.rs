@@ -1,80 +1,105 @@
-//! The server: pages, pictures and events over HTTP, for this machine alone unless it is told otherwise.
+//! The server: pages, pictures and events over HTTP.
 
 mod api;
 mod app;
+mod overview;
 mod pages;
 mod tiles;
 mod views;
 
-pub use views::{Beginning, SessionView, StackView, StudyView};
+pub use overview::{Overview, OverviewRow};
+pub use views::{Beginning, CompletionView, LanguageView, SessionView, StackView, StudyView};
 
+use crate::code;
 use crate::config::Study;
 use crate::error::StudyError;
-use crate::http::{self, Guard, Listening};
+use crate::http::{self, Exposure, Guard, Listening};
 use crate::session;
 use crate::store::AnswerStore;
 use app::App;
 use axum::Router;
 use axum::middleware::{from_fn, from_fn_with_state};
+use axum::response::Redirect;
 use axum::routing::{get, post};
 use std::future::Future;
 use std::net::SocketAddr;
 use std::sync::{Arc, Mutex};
 use tiles::TileCache;
 
-/// A server that listens, and is yet to be run.
+/// A bound server, ready to run.
 #[derive(Debug)]
 pub struct StudyServer {
     listening: Listening,
     router: Router,
+    base_path: String,
+    key: String,
 }
 
 impl StudyServer {
-    /// Opens the answers of a study and listens. `address` with port 0 takes a free port. Requests have to
-    /// name the server as `address`, as `localhost`, or as one of `names` (host or host:port): a page
-    /// elsewhere that has its own name resolve to this machine is turned away.
+    /// Opens the answers of a study and binds the address. Port 0 picks a free port. `exposure` says under which
+    /// other names, behind which proxies and under which path the server may be reached.
     ///
     /// # Errors
-    /// [`StudyError`] if the answers cannot be opened, or the address is taken.
-    pub async fn bind(study: Arc<Study>, address: SocketAddr, names: &[String]) -> Result<Self, StudyError> {
+    /// [`StudyError`] if the answers cannot be opened, or the address is in use.
+    pub async fn bind(
+        study: Arc<Study>,
+        address: SocketAddr,
+        exposure: &Exposure,
+    ) -> Result<Self, StudyError> {
         let store = AnswerStore::open(&study.database, &study.design())?;
         let listening = Listening::bind(address).await?;
+        let key = code::draw()?;
         let app = Arc::new(App {
             grids: session::grids(&study),
             tiles: TileCache::new(study.clone()),
-            guard: Arc::new(Guard::new(listening.address(), names)),
+            guard: Arc::new(Guard::new(listening.address(), exposure)),
             live: Mutex::default(),
+            key: key.clone(),
             store,
             study,
         });
-        Ok(Self { listening, router: router(app) })
+        let base_path = exposure.base_path.clone();
+        Ok(Self { listening, router: router(app, &base_path), base_path, key })
     }
 
-    /// Where it listens.
+    /// The bound address.
     pub fn address(&self) -> SocketAddr {
         self.listening.address()
     }
 
-    /// Serves until `stop` is ready, and answers what has come until then.
+    /// Path of the experimenter's page with its key, to be put after the address that browsers use.
+    pub fn experimenter_path(&self) -> String {
+        format!("{}/experimenter.html#{}", self.base_path, self.key)
+    }
+
+    /// Serves until `stop` resolves, and answers the requests that arrived until then.
     ///
     /// # Errors
-    /// [`StudyError::Listen`] if the system takes the socket away.
+    /// None at present.
     pub async fn run(self, stop: impl Future<Output = ()> + Send + 'static) -> Result<(), StudyError> {
         self.listening.serve(self.router, stop).await;
         Ok(())
     }
 }
 
-fn router(app: Arc<App>) -> Router {
-    Router::new()
-        .route("/", get(pages::page))
-        .route("/{file}", get(pages::file))
-        .route("/api/study", get(api::study))
-        .route("/api/sessions", post(api::begin))
-        .route("/api/sessions/{code}", get(api::view).delete(api::erase))
-        .route("/api/sessions/{code}/events", post(api::event))
-        .route("/api/sessions/{code}/export", get(api::export))
-        .route("/api/tiles/{stack}/{level}/{tile}", get(api::tile))
+fn router(app: Arc<App>, base: &str) -> Router {
+    let at = |path: &str| format!("{base}{path}");
+    let mut router = Router::new()
+        .route(&at("/"), get(pages::page))
+        .route(&at("/{file}"), get(pages::file))
+        .route(&at("/api/study"), get(api::study))
+        .route(&at("/api/texts/{language}"), get(api::texts))
+        .route(&at("/api/overview"), get(overview::overview))
+        .route(&at("/api/sessions"), post(api::begin))
+        .route(&at("/api/sessions/{code}"), get(api::view).delete(api::erase))
+        .route(&at("/api/sessions/{code}/events"), post(api::event))
+        .route(&at("/api/sessions/{code}/export"), get(api::export))
+        .route(&at("/api/tiles/{stack}/{level}/{tile}"), get(api::tile));
+    if !base.is_empty() {
+        let page = at("/");
+        router = router.route(base, get(move || async move { Redirect::permanent(&page) }));
+    }
+    router
         .fallback(http::nothing_here)
         .method_not_allowed_fallback(http::wrong_method)
         .layer(from_fn_with_state(app.guard.clone(), http::check))

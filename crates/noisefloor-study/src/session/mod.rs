@@ -4,7 +4,8 @@ mod plan;
 mod replay;
 mod state;
 mod trial;
+mod view;
 
 pub use replay::replay;
 pub use state::{EventMisfit, ParticipantSession, Stage, grids};
-pub use trial::{Class, Trial, TrialOutcome};
+pub use trial::{CatchKind, Class, Trial, TrialOutcome, TrialRole};

@@ -1,20 +1,22 @@
-//! One observer's way through a study: a state that events move on. It is rebuilt by replaying them, and
-//! nothing else is kept.
+//! The state of a session. Events move it on; replaying them rebuilds it, and nothing else is stored.
 
-use super::plan::{PlannedTrial, draw_trials};
-use super::trial::{Class, Trial, TrialOutcome};
+use super::plan::{Pair, PlannedTrial, Task, draw_trials};
+use super::trial::{Class, TrialOutcome, TrialRole};
 use crate::config::Study;
-use crate::event::{Choice, Conditions, StudyEvent};
-use crate::questplus::{Posterior, QuestGrid, QuestPlus};
+use crate::event::{Choice, StudyEvent, TrialTiming};
+use crate::questplus::{QuestGrid, QuestPlus};
+use crate::viewing::{Conditions, ViewingProblem};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use thiserror::Error;
 
-/// Steps in one acquisition trial are limited: so many times all levels of all tiles.
+/// Most steps of one acquisition trial, in multiples of all levels of all tiles.
 const MAX_ROUNDS: u64 = 20;
+/// Largest share of tiles that may be clicked in an identical pair, and smallest in a noisy practice.
+const CLICKED_SHARES: [f64; 2] = [0.25, 0.5];
 
-/// Why an event does not fit the state of its session. The state has not changed.
+/// Why an event does not fit the state of its session, which is unchanged.
 #[derive(Debug, Error, Clone, PartialEq)]
 #[error("{0}")]
 pub struct EventMisfit(pub String);
@@ -22,62 +24,83 @@ pub struct EventMisfit(pub String);
 /// How far an observer has come.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
 pub enum Stage {
-    /// Has not agreed yet.
+    /// Consent is missing.
     Consent,
-    /// Has not said how the pictures are seen.
+    /// The questions of the study are open.
+    Questions,
+    /// The viewing conditions are missing, or outside the limits of the study.
     Conditions,
-    /// At the trials, of which the first are practice.
+    /// Trials, of which the first are practice.
     Trials,
     /// All trials are answered.
     Finished,
+    /// The practice was not passed.
+    ScreenedOut,
 }
 
 /// The state of a session.
 #[derive(Clone, Debug)]
 pub struct ParticipantSession {
-    study: Arc<Study>,
-    grids: Arc<Vec<Arc<QuestGrid>>>,
-    plan: Arc<Vec<PlannedTrial>>,
-    practice: u32,
-    stage: Stage,
-    paused: bool,
-    events: u64,
-    conditions: Option<Conditions>,
-    language: Option<String>,
+    pub(super) study: Arc<Study>,
+    pub(super) grids: Arc<Vec<Arc<QuestGrid>>>,
+    /// All trials, the rounds of practice first.
+    pub(super) plan: Arc<Vec<PlannedTrial>>,
+    /// Where the current round of practice begins, and where the data begin.
+    pub(super) practice: [u32; 2],
+    /// Rounds of practice begun, and trials passed in the current one.
+    pub(super) attempts: [u32; 2],
+    pub(super) stage: Stage,
+    pub(super) paused: bool,
+    pub(super) events: u64,
+    pub(super) conditions: Option<Conditions>,
+    pub(super) problem: Option<ViewingProblem>,
+    pub(super) language: Option<String>,
+    pub(super) answers: BTreeMap<String, String>,
     /// Trials answered.
-    at: u32,
-    /// Acquisition: levels and clicks of the trial under way. Forced choice: the level shown.
-    levels: Vec<u32>,
-    clicks: u64,
-    quests: BTreeMap<(u32, u32), QuestPlus>,
-    outcomes: Vec<TrialOutcome>,
+    pub(super) at: u32,
+    /// Acquisition: levels and clicks of the current trial. Forced choice: the level shown.
+    pub(super) levels: Vec<u32>,
+    pub(super) clicks: u64,
+    /// Trials after the practice, and those answered hastily.
+    pub(super) hasty: [u32; 2],
+    pub(super) quests: BTreeMap<(u32, u32), QuestPlus>,
+    pub(super) outcomes: Vec<TrialOutcome>,
 }
 
-/// QUEST+ tables of each stack: shared by all sessions of a study.
+/// QUEST+ tables of each stack, shared by all sessions of a study.
 pub fn grids(study: &Study) -> Arc<Vec<Arc<QuestGrid>>> {
     Arc::new(study.stacks.iter().map(|s| Arc::new(QuestGrid::new(s.levels()))).collect())
 }
 
+fn misfit<T>(what: &str) -> Result<T, EventMisfit> {
+    Err(EventMisfit(what.to_owned()))
+}
+
 impl ParticipantSession {
-    /// A session at its beginning. The order of trials depends on the two seeds, that of the study and its
-    /// own.
+    /// Starts a session. The order of trials depends on the seed of the study and this one.
     pub fn new(study: Arc<Study>, grids: Arc<Vec<Arc<QuestGrid>>>, seed: u64) -> Self {
         let mut random = crate::random::seeded(study.seed.rotate_left(32) ^ seed);
-        let (practice, plan) = draw_trials(&study, &mut random);
+        let [practice, data] = draw_trials(&study, &mut random);
+        let begin = practice.len() as u32;
         let mut session = Self {
             study,
             grids,
-            plan: Arc::new(plan),
-            practice,
+            plan: Arc::new([practice, data].concat()),
+            practice: [0, begin],
+            attempts: [1, 0],
             stage: Stage::Consent,
             paused: false,
             events: 0,
             conditions: None,
+            problem: None,
             language: None,
+            answers: BTreeMap::new(),
             at: 0,
             levels: Vec::new(),
             clicks: 0,
+            hasty: [0, 0],
             quests: BTreeMap::new(),
             outcomes: Vec::new(),
         };
@@ -85,195 +108,213 @@ impl ParticipantSession {
         session
     }
 
-    /// The study it is a session of.
-    pub fn study(&self) -> &Arc<Study> {
-        &self.study
-    }
-
-    /// How far the observer has come.
-    pub fn stage(&self) -> Stage {
-        self.stage
-    }
-
-    /// Whether the observer has paused.
-    pub fn is_paused(&self) -> bool {
-        self.paused
-    }
-
-    /// Events so far: the number that the next one has to have.
-    pub fn events(&self) -> u64 {
-        self.events
-    }
-
-    /// Trials answered and trials in all, practice included.
-    pub fn progress(&self) -> (u32, u32) {
-        (self.at, self.plan.len() as u32)
-    }
-
-    /// How the pictures are seen, as last said.
-    pub fn conditions(&self) -> Option<&Conditions> {
-        self.conditions.as_ref()
-    }
-
-    /// Language of the consent.
-    pub fn language(&self) -> Option<&str> {
-        self.language.as_deref()
-    }
-
-    /// What came of the trials that count, in the order they were shown.
-    pub fn outcomes(&self) -> &[TrialOutcome] {
-        &self.outcomes
-    }
-
-    /// Forced choice: what is known of the threshold of a tile; `None` before its first trial.
-    pub fn posterior(&self, stack: u32, tile: u32) -> Option<Posterior> {
-        self.quests.get(&(stack, tile)).map(QuestPlus::posterior)
-    }
-
-    /// The trial to be shown; `None` unless the session is at its trials.
-    pub fn trial(&self) -> Option<Trial> {
-        if self.stage != Stage::Trials {
-            return None;
-        }
-        let (number, practice) = (self.at, self.at < self.practice);
-        let trial = match *self.plan.get(self.at as usize)? {
-            PlannedTrial::Acquisition { stack } => {
-                Trial::Acquisition { number, practice, stack, levels: self.levels.clone() }
-            }
-            PlannedTrial::Validation { stack, class, reference_left } => {
-                let shown = &self.study.stacks[stack as usize];
-                let reference = vec![shown.last(); shown.grid().len()];
-                let other = match class {
-                    Class::Reference => reference.clone(),
-                    Class::Test => shown.stops().map_or(reference.clone(), <[u32]>::to_vec),
-                    Class::Noisy => shown.noisy().map_or(reference.clone(), <[u32]>::to_vec),
-                };
-                let (left, right) = if reference_left { (reference, other) } else { (other, reference) };
-                Trial::Validation { number, practice, stack, left, right }
-            }
-            PlannedTrial::ForcedChoice { stack, tile, noise_first } => {
-                let (noise, last) = (self.levels[0], self.study.stacks[stack as usize].last());
-                let (first, second) = if noise_first { (noise, last) } else { (last, noise) };
-                Trial::ForcedChoice { number, practice, stack, tile, first, second }
-            }
-        };
-        Some(trial)
-    }
-
-    /// Moves the state on by an event that happened.
+    /// Applies an event.
     ///
     /// # Errors
-    /// [`EventMisfit`] if the event cannot have happened in this state, which is then as it was.
+    /// [`EventMisfit`] if the event is impossible in this state, which is then unchanged.
     pub fn apply(&mut self, event: &StudyEvent) -> Result<(), EventMisfit> {
-        let misfit = |what: &str| Err(EventMisfit(what.to_owned()));
         match event {
             StudyEvent::Pause if self.paused => return misfit("the session is paused already"),
             StudyEvent::Pause => self.paused = true,
             StudyEvent::Resume if !self.paused => return misfit("the session is not paused"),
             StudyEvent::Resume => self.paused = false,
             _ if self.paused => return misfit("the session is paused: resume it first"),
-            StudyEvent::Consent { language } => {
-                if self.stage != Stage::Consent {
-                    return misfit("consent was given already");
-                }
-                if !self.study.text.contains_key(language) {
-                    return misfit("the study has no text in that language");
-                }
-                (self.stage, self.language) = (Stage::Conditions, Some(language.clone()));
-            }
-            StudyEvent::Conditions(conditions) => {
-                conditions.check().map_err(EventMisfit)?;
-                match self.stage {
-                    Stage::Consent => return misfit("consent comes first"),
-                    Stage::Finished => return misfit("all trials are answered"),
-                    Stage::Conditions => self.stage = Stage::Trials,
-                    Stage::Trials => {}
-                }
-                self.conditions = Some(*conditions);
-            }
+            StudyEvent::Consent { language } => self.consent(language)?,
+            StudyEvent::Questions { answers } => self.take_answers(answers)?,
+            StudyEvent::Conditions(conditions) => self.take_conditions(*conditions)?,
             StudyEvent::Step { trial, .. }
-            | StudyEvent::Done { trial }
-            | StudyEvent::Answer { trial, .. } => {
-                if self.stage != Stage::Trials {
-                    return misfit("no trial is being shown");
-                }
-                if *trial != self.at {
-                    return Err(EventMisfit(format!(
-                        "trial {trial} is not being shown: the next one is {}",
-                        self.at
-                    )));
-                }
-                self.answer(event)?;
-            }
+            | StudyEvent::Done { trial, .. }
+            | StudyEvent::Answer { trial, .. } => self.take_response(*trial, event)?,
         }
         self.events += 1;
         Ok(())
     }
 
-    fn answer(&mut self, event: &StudyEvent) -> Result<(), EventMisfit> {
-        let misfit = |what: &str| Err(EventMisfit(what.to_owned()));
-        let outcome = match (self.plan[self.at as usize], event) {
-            (PlannedTrial::Acquisition { stack }, &StudyEvent::Step { tile, level, .. }) => {
-                let last = self.study.stacks[stack as usize].last();
-                let limit = MAX_ROUNDS * u64::from(last) * self.levels.len() as u64;
-                let Some(now) = self.levels.get_mut(tile as usize) else {
-                    return misfit("there is no such tile");
-                };
-                if level > last || now.abs_diff(level) != 1 {
-                    return Err(EventMisfit(format!(
-                        "tile {tile} is at level {now}: a step leads to an adjacent level, 0 to {last}, not to {level}"
-                    )));
-                }
-                if self.clicks >= limit {
-                    return misfit("more clicks than any observer needs: finish this trial");
-                }
-                (*now, self.clicks) = (level, self.clicks + 1);
-                return Ok(());
-            }
-            (PlannedTrial::Acquisition { stack }, StudyEvent::Done { .. }) => {
-                let same =
-                    |o: &&TrialOutcome| matches!(o, TrialOutcome::Stops { stack: s, .. } if *s == stack);
-                let repeat = self.outcomes.iter().filter(same).count() as u32;
-                TrialOutcome::Stops {
-                    stack,
-                    repeat,
-                    levels: std::mem::take(&mut self.levels),
-                    clicks: self.clicks,
-                }
-            }
-            (PlannedTrial::Validation { stack, class, .. }, StudyEvent::Answer { choice, .. }) => {
-                match choice {
-                    Choice::Identical | Choice::Different => {
-                        TrialOutcome::Judged { stack, class, identical: *choice == Choice::Identical }
-                    }
-                    _ => return misfit("this trial is answered by identical or different"),
-                }
-            }
-            (PlannedTrial::ForcedChoice { stack, tile, noise_first }, StudyEvent::Answer { choice, .. }) => {
-                match choice {
-                    Choice::First | Choice::Second => {
-                        let right = noise_first == (*choice == Choice::First);
-                        TrialOutcome::Chosen { stack, tile, level: self.levels[0], right }
-                    }
-                    _ => return misfit("this trial is answered by first or second"),
-                }
-            }
-            _ => return misfit("this kind of answer does not belong to the protocol of the study"),
-        };
+    fn consent(&mut self, language: &str) -> Result<(), EventMisfit> {
+        if self.stage != Stage::Consent {
+            return misfit("consent was given already");
+        }
+        if !self.study.text.contains_key(language) {
+            return misfit("the study has no text in that language");
+        }
+        let asks = !self.study.questions.is_empty();
+        self.stage = if asks { Stage::Questions } else { Stage::Conditions };
+        self.language = Some(language.to_owned());
+        Ok(())
+    }
 
-        // What counts is kept; what is learned chooses the levels of later trials
-        if self.at >= self.practice {
-            if let TrialOutcome::Chosen { stack, tile, level, right } = outcome {
-                self.quest(stack, tile).learn(level, right);
+    fn take_answers(&mut self, answers: &BTreeMap<String, String>) -> Result<(), EventMisfit> {
+        if self.stage != Stage::Questions {
+            return misfit("the questions are not being asked");
+        }
+        for question in &self.study.questions {
+            if !question.accepts(answers.get(&question.id).map_or("", String::as_str)) {
+                return Err(EventMisfit(format!("question {:?} does not accept that answer", question.id)));
             }
-            self.outcomes.push(outcome);
+        }
+        let asked = |id: &String| self.study.questions.iter().any(|q| q.id == *id);
+        if !answers.keys().all(asked) {
+            return misfit("an answer belongs to no question of the study");
+        }
+        (self.stage, self.answers) = (Stage::Conditions, answers.clone());
+        Ok(())
+    }
+
+    fn take_conditions(&mut self, conditions: Conditions) -> Result<(), EventMisfit> {
+        conditions.check().map_err(EventMisfit)?;
+        match self.stage {
+            Stage::Conditions | Stage::Trials => {}
+            Stage::Consent => return misfit("consent comes first"),
+            Stage::Questions => return misfit("the questions come first"),
+            Stage::Finished | Stage::ScreenedOut => return misfit("the session has ended"),
+        }
+        self.problem = conditions.outside(&self.study.viewing);
+        self.stage = if self.problem.is_some() { Stage::Conditions } else { Stage::Trials };
+        self.conditions = Some(conditions);
+        Ok(())
+    }
+
+    fn take_response(&mut self, trial: u32, event: &StudyEvent) -> Result<(), EventMisfit> {
+        if self.stage != Stage::Trials {
+            return misfit("no trial is being shown");
+        }
+        if trial != self.at {
+            return Err(EventMisfit(format!(
+                "trial {trial} is not being shown: the current one is {}",
+                self.at
+            )));
+        }
+        let PlannedTrial { task, role } = self.plan[self.at as usize];
+        match (task, event) {
+            (Task::Acquisition { stack, .. }, &StudyEvent::Step { tile, level, ms, .. }) => {
+                self.step(stack, tile, level, ms)
+            }
+            (Task::Acquisition { stack, identical }, StudyEvent::Done { timing, .. }) => {
+                self.check_time(timing)?;
+                let outcome = self.stops(stack);
+                let moved = self.levels.iter().filter(|level| **level > 0).count() as f64;
+                let share = moved / self.levels.len() as f64;
+                let [most, least] = CLICKED_SHARES;
+                let passed = if identical { share <= most } else { share >= least };
+                self.finish_trial(role, outcome, passed, timing)
+            }
+            (Task::Validation { stack, pair, .. }, StudyEvent::Answer { choice, timing, .. }) => {
+                self.check_time(timing)?;
+                let identical = match choice {
+                    Choice::Identical => true,
+                    Choice::Different => false,
+                    _ => return misfit("this trial is answered by identical or different"),
+                };
+                // A pair of references is identical; of others only the obvious ones have a known answer
+                let passed = identical == (pair == Pair::Class(Class::Reference));
+                let class = if let Pair::Class(class) = pair { class } else { Class::Noisy };
+                self.finish_trial(role, TrialOutcome::Judged { stack, class, identical }, passed, timing)
+            }
+            (
+                Task::ForcedChoice { stack, tile, noise_first, .. },
+                StudyEvent::Answer { choice, timing, .. },
+            ) => {
+                self.check_time(timing)?;
+                let right = match choice {
+                    Choice::First => noise_first,
+                    Choice::Second => !noise_first,
+                    _ => return misfit("this trial is answered by first or second"),
+                };
+                let outcome = TrialOutcome::Chosen { stack, tile, level: self.levels[0], right };
+                self.finish_trial(role, outcome, right, timing)
+            }
+            _ => misfit("this kind of answer does not belong to the protocol of the study"),
+        }
+    }
+
+    /// An answer needs time to look: what comes sooner was meant for the trial before.
+    fn check_time(&self, timing: &TrialTiming) -> Result<(), EventMisfit> {
+        let least = f64::from(self.study.screening.minimum_ms);
+        if !timing.is_sane() {
+            return misfit("the times of the trial are impossible");
+        }
+        if timing.ms < least {
+            return Err(EventMisfit(format!(
+                "answered {:.0} ms after onset; {least} is the least",
+                timing.ms
+            )));
+        }
+        Ok(())
+    }
+
+    fn step(&mut self, stack: u32, tile: u32, level: u32, ms: f64) -> Result<(), EventMisfit> {
+        let last = self.study.stacks[stack as usize].last();
+        let limit = MAX_ROUNDS * u64::from(last) * self.levels.len() as u64;
+        self.check_time(&TrialTiming { onset: 0, ms, intervals: Vec::new() })?;
+        let Some(now) = self.levels.get_mut(tile as usize) else {
+            return misfit("there is no such tile");
+        };
+        if level > last || now.abs_diff(level) != 1 {
+            return Err(EventMisfit(format!(
+                "tile {tile} is at level {now}: a step leads to an adjacent level, 0 to {last}, not to {level}"
+            )));
+        }
+        if self.clicks >= limit {
+            return misfit("more clicks than any observer needs: finish this trial");
+        }
+        (*now, self.clicks) = (level, self.clicks + 1);
+        Ok(())
+    }
+
+    fn stops(&self, stack: u32) -> TrialOutcome {
+        let same = |o: &&TrialOutcome| matches!(o, TrialOutcome::Stops { stack: s, .. } if *s == stack);
+        let repeat = self.outcomes.iter().filter(same).count() as u32;
+        TrialOutcome::Stops { stack, repeat, levels: self.levels.clone(), clicks: self.clicks }
+    }
+
+    /// Stores the result of a trial and goes on to the next one.
+    fn finish_trial(
+        &mut self,
+        role: TrialRole,
+        outcome: TrialOutcome,
+        passed: bool,
+        timing: &TrialTiming,
+    ) -> Result<(), EventMisfit> {
+        match role {
+            TrialRole::Practice => self.attempts[1] += u32::from(passed),
+            TrialRole::Catch(kind) => self.outcomes.push(TrialOutcome::Caught { kind, passed }),
+            TrialRole::Data => {
+                if let TrialOutcome::Chosen { stack, tile, level, right } = outcome {
+                    self.quest(stack, tile).learn(level, right);
+                }
+                self.outcomes.push(outcome);
+            }
+        }
+        if role != TrialRole::Practice {
+            let hasty = timing.ms < f64::from(self.study.screening.hasty_ms);
+            self.hasty = [self.hasty[0] + 1, self.hasty[1] + u32::from(hasty)];
         }
         self.at += 1;
+        if self.at == self.practice[1] && role == TrialRole::Practice {
+            self.end_practice();
+        }
         if self.at as usize == self.plan.len() {
             self.stage = Stage::Finished;
         }
         self.begin_trial();
         Ok(())
+    }
+
+    /// After a round of practice: on to the data if all of it was passed, else another round, if there is one.
+    fn end_practice(&mut self) {
+        let [from, to] = self.practice;
+        let most = self.study.screening.practice_attempts;
+        if self.attempts[1] == to - from || most == 0 {
+            return;
+        }
+        if self.attempts[0] >= most {
+            self.stage = Stage::ScreenedOut;
+            return;
+        }
+        let round = self.plan[from as usize..to as usize].to_vec();
+        Arc::make_mut(&mut self.plan).splice(to as usize..to as usize, round);
+        self.practice = [to, to + (to - from)];
+        self.attempts = [self.attempts[0] + 1, 0];
     }
 
     fn quest(&mut self, stack: u32, tile: u32) -> &mut QuestPlus {
@@ -283,15 +324,14 @@ impl ParticipantSession {
 
     fn begin_trial(&mut self) {
         self.clicks = 0;
-        self.levels = match self.plan.get(self.at as usize) {
-            Some(PlannedTrial::Acquisition { stack }) => {
-                vec![0; self.study.stacks[*stack as usize].grid().len()]
+        let task = self.plan.get(self.at as usize).map(|planned| planned.task);
+        self.levels = match task {
+            Some(Task::Acquisition { stack, .. }) => {
+                vec![0; self.study.stacks[stack as usize].grid().len()]
             }
-            Some(PlannedTrial::ForcedChoice { .. }) if self.at < self.practice => vec![0],
-            Some(&PlannedTrial::ForcedChoice { stack, tile, .. }) => {
-                vec![self.quest(stack, tile).next_level()]
-            }
-            Some(PlannedTrial::Validation { .. }) | None => Vec::new(),
+            Some(Task::ForcedChoice { obvious: true, .. }) => vec![0],
+            Some(Task::ForcedChoice { stack, tile, .. }) => vec![self.quest(stack, tile).next_level()],
+            Some(Task::Validation { .. }) | None => Vec::new(),
         };
     }
 }

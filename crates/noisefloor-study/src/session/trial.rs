@@ -8,10 +8,32 @@ use serde::{Deserialize, Serialize};
 pub enum Class {
     /// Two references.
     Reference,
-    /// A reference, and the picture put together from where tiles stopped.
+    /// A reference, and the picture assembled from where tiles stopped.
     Test,
-    /// A reference, and the picture put together from 30 % of that.
+    /// A reference, and the picture assembled from 30 % of that.
     Noisy,
+}
+
+/// Kind of a catch trial: its correct answer is known.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum CatchKind {
+    /// The reference beside itself.
+    Identical,
+    /// The noisiest level, seen by everybody who looks.
+    Obvious,
+}
+
+/// What a trial is for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum TrialRole {
+    /// Practice, which has to be passed.
+    Practice,
+    /// Data.
+    Data,
+    /// A catch trial.
+    Catch(CatchKind),
 }
 
 /// A trial as the page shows it.
@@ -22,31 +44,33 @@ pub enum Trial {
     Acquisition {
         /// Number of the trial, from 0.
         number: u32,
-        /// Whether it does not count.
+        /// Whether it is practice.
         practice: bool,
         /// The stack.
         stack: u32,
         /// Level of each tile.
         levels: Vec<u32>,
+        /// Whether the reference is shown on both sides, whatever the levels.
+        identical: bool,
     },
     /// Two pictures side by side.
     Validation {
         /// Number of the trial, from 0.
         number: u32,
-        /// Whether it does not count.
+        /// Whether it is practice.
         practice: bool,
         /// The stack.
         stack: u32,
-        /// Level of each tile of the picture at the left.
+        /// Level of each tile of the left picture.
         left: Vec<u32>,
-        /// And of that at the right.
+        /// Level of each tile of the right picture.
         right: Vec<u32>,
     },
-    /// Two pictures one after the other, which differ in one tile.
+    /// Two pictures in succession that differ in one tile.
     ForcedChoice {
         /// Number of the trial, from 0.
         number: u32,
-        /// Whether it does not count.
+        /// Whether it is practice.
         practice: bool,
         /// The stack.
         stack: u32,
@@ -54,12 +78,12 @@ pub enum Trial {
         tile: u32,
         /// Its level in the first interval. All other tiles are those of the reference.
         first: u32,
-        /// And in the second.
+        /// Its level in the second interval.
         second: u32,
     },
 }
 
-/// What came of a trial.
+/// The result of a trial that counts.
 #[derive(Clone, Debug, PartialEq)]
 pub enum TrialOutcome {
     /// Acquisition: where the observer left each tile.
@@ -70,7 +94,7 @@ pub enum TrialOutcome {
         repeat: u32,
         /// Level of each tile.
         levels: Vec<u32>,
-        /// Clicks on the way.
+        /// Clicks.
         clicks: u64,
     },
     /// Validation.
@@ -79,7 +103,7 @@ pub enum TrialOutcome {
         stack: u32,
         /// What was shown.
         class: Class,
-        /// What was said.
+        /// Whether it was called identical.
         identical: bool,
     },
     /// Forced choice.
@@ -92,5 +116,12 @@ pub enum TrialOutcome {
         level: u32,
         /// Whether the noise was found.
         right: bool,
+    },
+    /// A catch trial.
+    Caught {
+        /// Its kind.
+        kind: CatchKind,
+        /// Whether it was answered correctly.
+        passed: bool,
     },
 }

@@ -30,6 +30,11 @@ pub enum DriveError {
         /// What the server said.
         body: String,
     },
+    /// The study does not accept the viewing conditions of simulated observers.
+    #[error(
+        "simulated observers sit 600 mm from a screen of 96 dpi in a dim room; [viewing] does not allow it"
+    )]
+    Outside,
     /// The reply is not valid for this version.
     #[error("{url}: not the JSON expected: {source}; is the server of the same version?")]
     Json {
@@ -77,7 +82,7 @@ pub fn drive(
         .build()
         .new_agent();
     let study: StudyView = ask(&agent, &format!("{server}/api/study"), None)?;
-    let beginning = json(&Beginning { group: group.to_owned(), simulated: true });
+    let beginning = json(&Beginning { group: group.to_owned(), simulated: true, ..Beginning::default() });
     let mut view: SessionView = ask(&agent, &format!("{server}/api/sessions"), Some(&beginning))?;
     let code = view.code.clone();
     let url = format!("{server}/api/sessions/{code}/events");
@@ -89,8 +94,11 @@ pub fn drive(
         Ok(())
     };
     let language = study.text.keys().next().cloned().unwrap_or_default();
-    for event in observer.arrive(&language) {
+    for event in observer.arrive(&language, &study.questions) {
         send(&mut view, event)?;
+    }
+    if view.stage == Stage::Conditions {
+        return Err(DriveError::Outside);
     }
     while let Some(trial) = view.trial.take() {
         for event in observer.respond(&trial, &study.stacks) {
@@ -105,15 +113,10 @@ pub fn drive(
 /// # Errors
 /// [`EventMisfit`] if an answer does not fit, which would be a mistake of the observer.
 pub fn run(session: &mut ParticipantSession, observer: &mut SimulatedObserver) -> Result<(), EventMisfit> {
-    let stack = |s: &crate::stack::StudyStack| StackView {
-        width: s.grid().width(),
-        height: s.grid().height(),
-        tile: s.grid().edge(),
-        levels: s.levels().to_vec(),
-    };
-    let stacks: Vec<StackView> = session.study().stacks.iter().map(stack).collect();
+    let stacks: Vec<StackView> = session.study().stacks.iter().map(StackView::of).collect();
     let language = session.study().text.keys().next().cloned().unwrap_or_default();
-    for event in observer.arrive(&language) {
+    let questions = session.study().questions.clone();
+    for event in observer.arrive(&language, &questions) {
         session.apply(&event)?;
     }
     while session.stage() == Stage::Trials {

@@ -9,4 +9,4 @@ mod drive;
 mod observer;
 
 pub use drive::{DriveError, drive, run};
-pub use observer::{Public, SimulatedObserver};
+pub use observer::{Behaviour, Public, SimulatedObserver, SpreadShape};

@@ -1,26 +1,79 @@
 //! Simulated observers and the population they are drawn from.
 
-use crate::config::Study;
-use crate::event::{Ambient, Choice, Conditions, StudyEvent};
+use crate::config::{Question, QuestionKind, Study};
+use crate::event::{Choice, StudyEvent, TrialTiming};
 use crate::server::StackView;
 use crate::session::Trial;
 use crate::stack::StudyStack;
+use crate::viewing::{Ambient, Conditions};
+use statrs::distribution::{ContinuousCDF, Normal};
+use std::f64::consts::PI;
 
 /// The population that simulated observers are drawn from.
 #[derive(Clone, Debug)]
 pub struct Public {
     /// Threshold of the median observer in samples per pixel, by stack and tile; positive.
     pub thresholds: Vec<Vec<f64>>,
-    /// Scale of the logistic spread between observers, in ln(spp), at least 0.
+    /// How observers are spread around the median one.
+    pub shape: SpreadShape,
+    /// Scale of the spread between observers, in ln(spp), at least 0. All shapes have the standard deviation of a
+    /// logistic distribution of this scale.
     pub between: f64,
-    /// Scale of the logistic spread of one observer from showing to showing (the inverse slope of the
-    /// psychometric function), in ln(spp), at least 0.
+    /// Scale of the logistic spread of one observer from showing to showing (the inverse slope of the psychometric
+    /// function), in ln(spp), at least 0.
     pub within: f64,
     /// Share of answers given without looking, 0 to 1.
     pub lapse: f64,
-    /// Bias of all observers, in ln(spp): above 0 they report noise they do not see. Forced choices are
-    /// unaffected.
+    /// Bias of all observers, in ln(spp): above 0 they report noise they do not see. Forced choices are unaffected.
     pub bias: f64,
+}
+
+/// Shape of the spread between observers, in ln(spp), with median 0.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum SpreadShape {
+    /// Logistic.
+    #[default]
+    Logistic,
+    /// Normal.
+    Normal,
+    /// Lognormal with σ = ½: skewness 1.75, a long tail of demanding observers.
+    Lognormal,
+    /// Gamma with shape 2: skewness 1.41.
+    Gamma,
+}
+
+impl SpreadShape {
+    /// Draws a deviation from the median observer, with the standard deviation of a logistic one of scale 1.
+    fn draw(self, random: &mut fastrand::Rng) -> f64 {
+        let sd = PI / 3f64.sqrt();
+        let p = random.f64().clamp(1e-12, 1.0 - 1e-12);
+        let normal = || Normal::standard().inverse_cdf(p);
+        match self {
+            Self::Logistic => (p / (1.0 - p)).ln(),
+            Self::Normal => sd * normal(),
+            Self::Lognormal => {
+                let variance = (0.25f64.exp() - 1.0) * 0.25f64.exp();
+                sd * ((0.5 * normal()).exp() - 1.0) / variance.sqrt()
+            }
+            Self::Gamma => {
+                // The sum of two exponential values; 1.6783 is its median, √2 its standard deviation
+                let q = random.f64().clamp(1e-12, 1.0);
+                sd * (-p.ln() - q.ln() - 1.678_346_990_016_661) / 2f64.sqrt()
+            }
+        }
+    }
+}
+
+/// What a simulated observer does with the trials.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Behaviour {
+    /// Answers what they see.
+    #[default]
+    Attentive,
+    /// Passes the practice, and then gives the first answer to everything without looking.
+    StraightLiner,
+    /// Passes the practice, and then answers at random.
+    RandomClicker,
 }
 
 /// One simulated observer.
@@ -28,6 +81,7 @@ pub struct Public {
 pub struct SimulatedObserver {
     /// This observer's ln(threshold), by stack and tile.
     ln_thresholds: Vec<Vec<f64>>,
+    behaviour: Behaviour,
     within: f64,
     lapse: f64,
     bias: f64,
@@ -45,16 +99,22 @@ impl Public {
         };
         let of_stack = |s: &StudyStack| (0..s.grid().len()).map(|tile| threshold(s, tile)).collect();
         let thresholds = study.stacks.iter().map(of_stack).collect();
-        Self { thresholds, between: 0.3, within: 0.1, lapse: 0.01, bias: 0.0 }
+        Self { thresholds, shape: SpreadShape::Logistic, between: 0.3, within: 0.1, lapse: 0.01, bias: 0.0 }
     }
 
     /// Draws an observer; the same seed gives the same one.
     pub fn draw(&self, seed: u64) -> SimulatedObserver {
+        self.draw_as(seed, Behaviour::Attentive)
+    }
+
+    /// Draws an observer who behaves in this way.
+    pub fn draw_as(&self, seed: u64, behaviour: Behaviour) -> SimulatedObserver {
         let mut random = crate::random::seeded(seed);
-        let own = logistic(&mut random, self.between);
+        let own = self.between * self.shape.draw(&mut random);
         let ln = |tiles: &Vec<f64>| tiles.iter().map(|t| t.ln() + own).collect();
         SimulatedObserver {
             ln_thresholds: self.thresholds.iter().map(ln).collect(),
+            behaviour,
             within: self.within,
             lapse: self.lapse,
             bias: self.bias,
@@ -67,7 +127,7 @@ impl Public {
     /// to about 0.4 % at 95 %.
     pub fn quantile(&self, stack: usize, tile: usize, share: f64) -> f64 {
         let mut random = crate::random::seeded(0);
-        let mut draw = |_| logistic(&mut random, self.between) + logistic(&mut random, self.within);
+        let mut draw = |_| self.between * self.shape.draw(&mut random) + logistic(&mut random, self.within);
         let mut sums: Vec<f64> = (0..400_001).map(&mut draw).collect();
         sums.sort_by(f64::total_cmp);
         self.thresholds[stack][tile] * sums[(share * 400_000.0).round() as usize].exp()
@@ -81,61 +141,93 @@ fn logistic(random: &mut fastrand::Rng, scale: f64) -> f64 {
 }
 
 impl SimulatedObserver {
-    /// The events before the trials.
-    pub fn arrive(&self, language: &str) -> [StudyEvent; 2] {
-        [StudyEvent::Consent { language: language.to_owned() }, StudyEvent::Conditions(CONDITIONS)]
+    /// The events before the trials: consent, an answer to every question, viewing conditions.
+    pub fn arrive(&self, language: &str, questions: &[Question]) -> Vec<StudyEvent> {
+        let mut events = vec![StudyEvent::Consent { language: language.to_owned() }];
+        if !questions.is_empty() {
+            let answers = questions.iter().map(|q| (q.id.clone(), answer(q))).collect();
+            events.push(StudyEvent::Questions { answers });
+        }
+        events.push(StudyEvent::Conditions(CONDITIONS));
+        events
     }
 
     /// The events that answer a trial.
     pub fn respond(&mut self, trial: &Trial, stacks: &[StackView]) -> Vec<StudyEvent> {
         match trial {
-            Trial::Acquisition { number, stack, levels, .. } => {
+            Trial::Acquisition { number, practice, stack, levels, identical } => {
                 let spp = &stacks[*stack as usize].levels;
                 let mut order: Vec<usize> = (0..levels.len()).collect();
                 self.random.shuffle(&mut order);
                 let mut events = Vec::new();
                 for tile in order {
-                    let goal = self.stop(*stack as usize, tile, spp);
+                    let goal = self.goal(*practice, *identical, *stack as usize, tile, spp);
                     let steps: Vec<u32> = if goal >= levels[tile] {
                         (levels[tile] + 1..=goal).collect()
                     } else {
                         (goal..levels[tile]).rev().collect()
                     };
-                    let step = |level| StudyEvent::Step { trial: *number, tile: tile as u32, level };
+                    let (trial, tile) = (*number, tile as u32);
+                    let step = |level| StudyEvent::Step { trial, tile, level, at: None, ms: TIMING.ms };
                     events.extend(steps.into_iter().map(step));
                 }
-                events.push(StudyEvent::Done { trial: *number });
+                events.push(StudyEvent::Done { trial: *number, timing: TIMING });
                 events
             }
-            Trial::Validation { number, stack, left, right, .. } => {
-                let different = if self.random.f64() < self.lapse {
-                    self.random.bool()
-                } else {
-                    let spp = &stacks[*stack as usize].levels;
-                    let last = spp.len() - 1;
-                    let noisier: Vec<u32> = left.iter().zip(right).map(|(a, b)| *a.min(b)).collect();
-                    // One look at the whole picture: all tiles share the deviation of this showing
-                    let deviation = logistic(&mut self.random, self.within) + self.bias;
-                    let mut tiles = noisier.iter().enumerate();
-                    tiles.any(|(tile, &level)| {
-                        (level as usize) < last
-                            && self.ln_thresholds[*stack as usize][tile] + deviation > ln(spp, level)
-                    })
+            Trial::Validation { number, practice, stack, left, right } => {
+                let different = match self.behaviour {
+                    _ if *practice => left != right,
+                    Behaviour::StraightLiner => false,
+                    Behaviour::RandomClicker => self.random.bool(),
+                    Behaviour::Attentive => self.differ(*stack as usize, left, right, stacks),
                 };
                 let choice = if different { Choice::Different } else { Choice::Identical };
-                vec![StudyEvent::Answer { trial: *number, choice }]
+                vec![StudyEvent::Answer { trial: *number, choice, timing: TIMING }]
             }
-            Trial::ForcedChoice { number, stack, tile, first, second, .. } => {
-                let spp = &stacks[*stack as usize].levels;
-                let threshold = self.ln_thresholds[*stack as usize][*tile as usize];
-                let looks = self.random.f64() >= self.lapse;
+            Trial::ForcedChoice { number, practice, stack, tile, first, second } => {
                 let noisy_first = first < second;
-                let seen = looks
-                    && threshold + logistic(&mut self.random, self.within) > ln(spp, *first.min(second));
-                let first = if seen { noisy_first } else { self.random.bool() };
+                let spp = ln(&stacks[*stack as usize].levels, *first.min(second));
+                let first = match self.behaviour {
+                    _ if *practice => noisy_first,
+                    Behaviour::StraightLiner => true,
+                    Behaviour::RandomClicker => self.random.bool(),
+                    Behaviour::Attentive => {
+                        let threshold = self.ln_thresholds[*stack as usize][*tile as usize];
+                        let looks = self.random.f64() >= self.lapse;
+                        let seen = looks && threshold + logistic(&mut self.random, self.within) > spp;
+                        if seen { noisy_first } else { self.random.bool() }
+                    }
+                };
                 let choice = if first { Choice::First } else { Choice::Second };
-                vec![StudyEvent::Answer { trial: *number, choice }]
+                vec![StudyEvent::Answer { trial: *number, choice, timing: TIMING }]
             }
+        }
+    }
+
+    /// Whether two pictures look different. One look at the whole picture: all tiles share the deviation of this
+    /// showing.
+    fn differ(&mut self, stack: usize, left: &[u32], right: &[u32], stacks: &[StackView]) -> bool {
+        if self.random.f64() < self.lapse {
+            return self.random.bool();
+        }
+        let spp = &stacks[stack].levels;
+        let last = spp.len() as u32 - 1;
+        let deviation = logistic(&mut self.random, self.within) + self.bias;
+        let mut noisier = left.iter().zip(right).map(|(a, b)| *a.min(b)).enumerate();
+        noisier
+            .any(|(tile, level)| level < last && self.ln_thresholds[stack][tile] + deviation > ln(spp, level))
+    }
+
+    /// The level to which this observer takes a tile. Nobody fails the practice here.
+    fn goal(&mut self, practice: bool, identical: bool, stack: usize, tile: usize, spp: &[u64]) -> u32 {
+        let last = spp.len() as u32 - 1;
+        match self.behaviour {
+            _ if practice => u32::from(!identical),
+            Behaviour::StraightLiner => 0,
+            Behaviour::RandomClicker => self.random.u32(0..=last),
+            Behaviour::Attentive if identical && self.random.f64() >= self.lapse => 0,
+            Behaviour::Attentive if identical => self.random.u32(0..=last),
+            Behaviour::Attentive => self.stop(stack, tile, spp),
         }
     }
 
@@ -155,9 +247,21 @@ impl SimulatedObserver {
     }
 }
 
+/// An answer that the question accepts.
+fn answer(question: &Question) -> String {
+    match question.kind {
+        QuestionKind::Number => question.range.map_or(30.0, |[low, _]| low).to_string(),
+        QuestionKind::Choice => question.option.first().map_or_else(String::new, |o| o.id.clone()),
+        QuestionKind::Text => "simulated".to_owned(),
+    }
+}
+
 fn ln(spp: &[u64], level: u32) -> f64 {
     (spp[level as usize].max(1) as f64).ln()
 }
+
+/// A second and a half for everything.
+const TIMING: TrialTiming = TrialTiming { onset: 0, ms: 1500.0, intervals: Vec::new() };
 
 /// A screen with 96 pixels per inch at 600 mm, in a dim room.
 const CONDITIONS: Conditions = Conditions {
@@ -180,13 +284,23 @@ mod tests {
     /// choice they find all noise below it, and guess above.
     #[test]
     fn an_observer_without_spread_is_a_threshold() {
-        let public =
-            Public { thresholds: vec![vec![250.0]], between: 0.0, within: 0.0, lapse: 0.0, bias: 0.0 };
+        let public = Public {
+            thresholds: vec![vec![250.0]],
+            shape: SpreadShape::Logistic,
+            between: 0.0,
+            within: 0.0,
+            lapse: 0.0,
+            bias: 0.0,
+        };
         let stacks = [StackView { width: 16, height: 16, tile: 16, levels: vec![100, 200, 300, 400] }];
         let mut observer = public.draw(1);
-        let trial = Trial::Acquisition { number: 7, practice: false, stack: 0, levels: vec![0] };
-        let step = |level| StudyEvent::Step { trial: 7, tile: 0, level };
-        assert_eq!(observer.respond(&trial, &stacks), [step(1), step(2), StudyEvent::Done { trial: 7 }]);
+        let trial =
+            Trial::Acquisition { number: 7, practice: false, stack: 0, levels: vec![0], identical: false };
+        let step = |level| StudyEvent::Step { trial: 7, tile: 0, level, at: None, ms: TIMING.ms };
+        assert_eq!(
+            observer.respond(&trial, &stacks),
+            [step(1), step(2), StudyEvent::Done { trial: 7, timing: TIMING }]
+        );
         let mut choose = |first| {
             let trial =
                 Trial::ForcedChoice { number: 0, practice: false, stack: 0, tile: 0, first, second: 3 };
@@ -206,8 +320,14 @@ mod tests {
     /// The quantile of one logistic spread is known: ln 19 scales above the median at 95 %.
     #[test]
     fn quantiles_are_those_of_the_spread() {
-        let public =
-            Public { thresholds: vec![vec![1000.0]], between: 0.3, within: 0.0, lapse: 0.0, bias: 0.0 };
+        let public = Public {
+            thresholds: vec![vec![1000.0]],
+            shape: SpreadShape::Logistic,
+            between: 0.3,
+            within: 0.0,
+            lapse: 0.0,
+            bias: 0.0,
+        };
         let expected = 1000.0 * (0.3 * 19f64.ln()).exp();
         assert!((public.quantile(0, 0, 0.95) / expected - 1.0).abs() < 0.01);
         assert!((public.quantile(0, 0, 0.5) / 1000.0 - 1.0).abs() < 0.01);

@@ -8,7 +8,7 @@ use noisefloor_study::analysis::CorpusThreshold;
 use noisefloor_study::analysis::files::write;
 use noisefloor_study::analysis::{AnalysisOptions, analyse};
 use noisefloor_study::explore::ExploreSetup;
-use noisefloor_study::simulated::{Public, SimulatedObserver};
+use noisefloor_study::simulated::{Public, SimulatedObserver, SpreadShape};
 use noisefloor_study::{StackView, Study, StudyEvent, Trial, store};
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -18,7 +18,7 @@ use tempfile::TempDir;
 /// Levels of the stacks that the browser is shown.
 const LEVELS: usize = 8;
 
-fn study(protocol: &str, extra: &str) -> (TempDir, Arc<Study>) {
+fn study(protocol: &str, extra: &str, tables: &str) -> (TempDir, Arc<Study>) {
     let dir = tempfile::tempdir().unwrap();
     // A forced choice takes two seconds: few tiles
     let size = if protocol == "forced-choice" { (256, 128) } else { (384, 256) };
@@ -36,6 +36,7 @@ fn study(protocol: &str, extra: &str) -> (TempDir, Arc<Study>) {
         ),
     ] {
         text += &format!("[text.{code}]\ntitle = \"{title}\"\nconsent = \"{consent}\"\n");
+        text += "debriefing = \"This was about noise.\"\n";
     }
     text += "[[stack]]\nname = \"wall\"\nfolder = \"wall\"\n";
     if protocol == "validation" {
@@ -43,10 +44,37 @@ fn study(protocol: &str, extra: &str) -> (TempDir, Arc<Study>) {
         let rows: String = (0..6).map(|tile| format!("{tile},300\n")).collect();
         std::fs::write(dir.path().join("stops.csv"), format!("tile,spp\n{rows}")).unwrap();
     }
+    text += "[screening]\ncatch = 0\n";
+    text += tables;
     std::fs::write(dir.path().join("study.toml"), text).unwrap();
     let study = Arc::new(Study::open(dir.path().join("study.toml")).unwrap());
     (dir, study)
 }
+
+/// Tables of a study that people come to by links.
+const INVITED: &str = r#"
+[participants]
+links-only = true
+id-parameters = ["PROLIFIC_PID"]
+completion-code = "COMPLETE-77"
+completion-url = "https://example.org/done"
+
+[[question]]
+id = "age"
+kind = "number"
+range = [18, 120]
+text = { en = "Your age", fr = "Votre âge" }
+
+[[question]]
+id = "glasses"
+kind = "choice"
+optional = true
+text = { en = "Do you wear glasses?", fr = "Portez-vous des lunettes ?" }
+option = [
+    { id = "yes", text = { en = "yes", fr = "oui" } },
+    { id = "no", text = { en = "no", fr = "non" } },
+]
+"#;
 
 /// What the pages need to be tested; `None`, said aloud, where it is missing. With
 /// NOISEFLOOR_REQUIRE_BROWSER=1 that is a failure.
@@ -92,25 +120,32 @@ fn observers_use_the_pages_in_a_browser() {
         return;
     }
     let studies = [
-        ("ACQUISITION", study("acquisition", "repeats = 1\ngroups = [\"painters\", \"programmers\"]")),
-        ("VALIDATION", study("validation", "")),
-        ("FORCED", study("forced-choice", "")),
+        ("ACQUISITION", study("acquisition", "repeats = 1\ngroups = [\"painters\", \"programmers\"]", "")),
+        ("VALIDATION", study("validation", "", "")),
+        ("FORCED", study("forced-choice", "", "")),
+        ("INVITED", study("validation", "minutes = 7\nbreak-every = 2", INVITED)),
     ];
     let servers: Vec<Running> = studies.iter().map(|(_, (_, study))| Running::start(study.clone())).collect();
-    let urls: Vec<(&str, &str)> =
+    let invited = &studies[3].1.1;
+    let links = store::make_links(&invited.database, &invited.design(), 1).unwrap();
+    let (url, experimenter) = (&servers[3].url, &servers[3].experimenter);
+    let invited =
+        serde_json::json!({ "url": url, "link": links[0], "experimenter": experimenter }).to_string();
+    let mut urls: Vec<(&str, &str)> =
         studies.iter().zip(&servers).map(|((name, _), server)| (*name, server.url.as_str())).collect();
+    urls[3].1 = &invited;
     run("test.mjs", &urls);
 
     // What was clicked: two observers left the six tiles at levels 1 to 6 (by mouse) and at 2 (by keyboard).
     let study = &studies[0].1.1;
-    let report = analyse(study, AnalysisOptions { keep_outliers: true, seed: 1, simulated: false }).unwrap();
+    let report = analyse(study, AnalysisOptions { keep_excluded: true, seed: 1, simulated: false }).unwrap();
     let finished: Vec<_> = report.observers.iter().filter(|o| o.finished).collect();
     assert_eq!(finished.len(), 2, "{:?}", report.observers);
     let records = store::read_all(&study.database, &study.design()).unwrap();
     let replayed = noisefloor_study::analysis::observers::replay_all(study, &records).unwrap();
     let mut stops: Vec<Vec<u32>> = replayed
         .iter()
-        .filter(|o| o.finished)
+        .filter(|o| o.stage == noisefloor_study::Stage::Finished)
         .map(|o| (0..6).map(|t| o.stops[&(0, t)][0]).collect())
         .collect();
     stops.sort();
@@ -145,7 +180,8 @@ fn pictures_are_explored_in_a_browser() {
 /// Tiles that an observer clicks, in order, at one showing of a stack.
 fn clicks(observer: &mut SimulatedObserver, stack: u32, stacks: &[StackView]) -> Vec<u32> {
     let tiles = (stacks[0].width / stacks[0].tile) * (stacks[0].height / stacks[0].tile);
-    let trial = Trial::Acquisition { number: 1, practice: false, stack, levels: vec![0; tiles] };
+    let trial =
+        Trial::Acquisition { number: 1, practice: false, stack, levels: vec![0; tiles], identical: false };
     let events = observer.respond(&trial, stacks);
     let tile = |event: &StudyEvent| match event {
         StudyEvent::Step { tile, .. } => Some(*tile),
@@ -172,12 +208,20 @@ fn simulated_observers_drive_the_pages_and_a_model_learns_from_them() {
         stack(&dir.path().join(name), (128, 128), &levels);
         text += &format!("[[stack]]\nname = \"{name}\"\nfolder = \"{name}\"\n");
     }
+    text += "[screening]\ncatch = 0\n";
     std::fs::write(dir.path().join("study.toml"), text).unwrap();
     let study = Arc::new(Study::open(dir.path().join("study.toml")).unwrap());
 
     // What each observer does at each of the two showings of each stack, by src/simulated.
     let thresholds = vec![vec![100.0, 140.0, 200.0, 280.0], vec![120.0, 160.0, 220.0, 260.0]];
-    let public = Public { thresholds, between: 0.25, within: 0.1, lapse: 0.01, bias: 0.1 };
+    let public = Public {
+        thresholds,
+        shape: SpreadShape::Logistic,
+        between: 0.25,
+        within: 0.1,
+        lapse: 0.01,
+        bias: 0.1,
+    };
     let view = StackView { width: 128, height: 128, tile: 64, levels: levels.clone() };
     let views = [view.clone(), view];
     let decisions: Vec<Vec<Vec<Vec<u32>>>> = (0..OBSERVERS)
@@ -196,10 +240,12 @@ fn simulated_observers_drive_the_pages_and_a_model_learns_from_them() {
     let records = store::read_all(&study.database, &study.design()).unwrap();
     let steps = |event: &&noisefloor_study::Envelope| matches!(event.event, StudyEvent::Step { .. });
     let kept: usize = records.iter().map(|r| r.events.iter().filter(steps).count()).sum();
-    assert_eq!(kept, decisions.iter().flatten().flatten().flatten().count());
+    // And the four tiles of the noisy practice
+    let practice = 4 * OBSERVERS as usize;
+    assert_eq!(kept, practice + decisions.iter().flatten().flatten().flatten().count());
 
     // The thresholds that the observers were made of, bias included, lie within the intervals.
-    let report = analyse(&study, AnalysisOptions { keep_outliers: true, seed: 1, simulated: false }).unwrap();
+    let report = analyse(&study, AnalysisOptions { keep_excluded: true, seed: 1, simulated: false }).unwrap();
     assert_eq!((report.observers.len() as u64, report.tiles.len()), (OBSERVERS, 8));
     let (mut level95, mut means) = (0, 0.0);
     for (i, tile) in report.tiles.iter().enumerate() {

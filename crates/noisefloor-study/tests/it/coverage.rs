@@ -1,6 +1,6 @@
 use crate::kit::Folder;
 use noisefloor_study::analysis::{AnalysisOptions, Observer, StudyReport, report};
-use noisefloor_study::simulated::{Public, run};
+use noisefloor_study::simulated::{Public, SpreadShape, run};
 use noisefloor_study::{ParticipantSession, Study, grids};
 use std::sync::Arc;
 
@@ -14,7 +14,7 @@ fn simulated(study: &Arc<Study>, public: &Public, observers: u64, seed: u64) -> 
         Observer::of(&format!("simulated {i}"), "", &session)
     };
     let all: Vec<Observer> = (0..observers).map(observe).collect();
-    (report(study, &all, AnalysisOptions { keep_outliers: false, seed, simulated: true }), all)
+    (report(study, &all, AnalysisOptions { keep_excluded: false, seed, simulated: true }), all)
 }
 
 /// Shares of intervals that hold the truth: of the median, and of the level where 95 % see no difference;
@@ -47,7 +47,14 @@ fn papers(protocol: &str, extra: &str) -> (Folder, Arc<Study>) {
 }
 
 fn public(within: f64, lapse: f64) -> Public {
-    Public { thresholds: vec![vec![1000.0, 2500.0]], between: 0.25, within, lapse, bias: 0.0 }
+    Public {
+        thresholds: vec![vec![1000.0, 2500.0]],
+        shape: SpreadShape::Logistic,
+        between: 0.25,
+        within,
+        lapse,
+        bias: 0.0,
+    }
 }
 
 /// 33 observers, as in the paper. Of 40 studies with two tiles, 95 % of intervals should hold the truth.

@@ -1,7 +1,7 @@
 use crate::kit::{Folder, levels, public};
 use noisefloor_study::explore::{ExploreServer, ExploreSetup};
 use noisefloor_study::simulated::drive;
-use noisefloor_study::{Study, StudyServer, store};
+use noisefloor_study::{Exposure, Study, StudyServer, store};
 use std::io::{BufRead, BufReader};
 use std::process::{Command, Stdio};
 use std::sync::Arc;
@@ -19,7 +19,8 @@ fn serve_for_another_process() {
     let study = Arc::new(Study::open(file).unwrap());
     let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build().unwrap();
     runtime.block_on(async {
-        let server = StudyServer::bind(study, ([127, 0, 0, 1], 0).into(), &[]).await.unwrap();
+        let server =
+            StudyServer::bind(study, ([127, 0, 0, 1], 0).into(), &Exposure::default()).await.unwrap();
         println!("\nserving http://{}", server.address());
         server.run(std::future::pending()).await.unwrap();
     });
@@ -33,7 +34,8 @@ fn explore_for_another_process() {
     let setup = ExploreSetup { pictures, tile: 64, ..ExploreSetup::new(dir.join("explore.sqlite")) };
     let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build().unwrap();
     runtime.block_on(async {
-        let server = ExploreServer::bind(setup, ([127, 0, 0, 1], 0).into(), &[]).await.unwrap();
+        let server =
+            ExploreServer::bind(setup, ([127, 0, 0, 1], 0).into(), &Exposure::default()).await.unwrap();
         println!("\nserving http://{}", server.address());
         server.run(std::future::pending()).await.unwrap();
     });

@@ -1,7 +1,7 @@
 use noisefloor_image::write_png;
 use noisefloor_study::explore::{ExploreServer, ExploreSetup};
-use noisefloor_study::simulated::Public;
-use noisefloor_study::{Study, StudyServer};
+use noisefloor_study::simulated::{Public, SpreadShape};
+use noisefloor_study::{Exposure, Study, StudyServer};
 use serde_json::Value;
 use std::io::{Read, Write};
 use std::net::{SocketAddr, TcpStream};
@@ -82,25 +82,32 @@ impl Folder {
 pub(crate) struct Running {
     pub(crate) address: SocketAddr,
     pub(crate) url: String,
+    /// Path of the experimenter's page, with its key.
+    pub(crate) experimenter: String,
     stop: Option<oneshot::Sender<()>>,
     thread: Option<JoinHandle<()>>,
 }
 
 impl Running {
     pub(crate) fn start(study: Arc<Study>) -> Self {
+        Self::exposed(study, Exposure::default())
+    }
+
+    pub(crate) fn exposed(study: Arc<Study>, exposure: Exposure) -> Self {
         let (stop, stopped) = oneshot::channel::<()>();
         let (tell, told) = std::sync::mpsc::channel();
         let thread = std::thread::spawn(move || {
             let runtime =
                 tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build().unwrap();
             runtime.block_on(async {
-                let server = StudyServer::bind(study, ([127, 0, 0, 1], 0).into(), &[]).await.unwrap();
-                tell.send(server.address()).unwrap();
+                let server = StudyServer::bind(study, ([127, 0, 0, 1], 0).into(), &exposure).await.unwrap();
+                tell.send((server.address(), server.experimenter_path())).unwrap();
                 server.run(async { drop(stopped.await) }).await.unwrap();
             });
         });
-        let address = told.recv().unwrap();
-        Self { address, url: format!("http://{address}"), stop: Some(stop), thread: Some(thread) }
+        let (address, experimenter) = told.recv().unwrap();
+        let url = format!("http://{address}");
+        Self { address, url, experimenter, stop: Some(stop), thread: Some(thread) }
     }
 }
 
@@ -117,6 +124,7 @@ impl Drop for Running {
 pub(crate) fn public(stacks: usize, thresholds: &[f64]) -> Public {
     Public {
         thresholds: vec![thresholds.to_vec(); stacks],
+        shape: SpreadShape::Logistic,
         between: 0.3,
         within: 0.1,
         lapse: 0.01,
@@ -139,7 +147,9 @@ impl Served {
             let runtime =
                 tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build().unwrap();
             runtime.block_on(async {
-                let server = ExploreServer::bind(setup, ([127, 0, 0, 1], 0).into(), &[]).await.unwrap();
+                let server = ExploreServer::bind(setup, ([127, 0, 0, 1], 0).into(), &Exposure::default())
+                    .await
+                    .unwrap();
                 tell.send(server.address()).unwrap();
                 server.run(async { drop(stopped.await) }).await.unwrap();
             });

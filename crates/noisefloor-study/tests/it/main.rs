@@ -21,6 +21,9 @@ mod explore_refusals;
 /// A server that is killed has lost nothing that it acknowledged.
 #[cfg(test)]
 mod kill;
+/// Connections that are held open.
+#[cfg(test)]
+mod hold;
 /// Studies, stacks and servers for the tests.
 #[cfg(test)]
 mod kit;

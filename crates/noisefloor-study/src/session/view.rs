@@ -1,0 +1,124 @@
+//! What can be read from the state of a session.
+
+use super::plan::{Pair, PlannedTrial, Task};
+use super::state::{ParticipantSession, Stage};
+use super::trial::{Class, Trial, TrialOutcome, TrialRole};
+use crate::config::Study;
+use crate::questplus::{Posterior, QuestPlus};
+use crate::viewing::{Conditions, ViewingProblem};
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+impl ParticipantSession {
+    /// The study.
+    pub fn study(&self) -> &Arc<Study> {
+        &self.study
+    }
+
+    /// How far the observer has come.
+    pub fn stage(&self) -> Stage {
+        self.stage
+    }
+
+    /// Whether the observer has paused.
+    pub fn is_paused(&self) -> bool {
+        self.paused
+    }
+
+    /// Number of events so far, which is the number of the next one.
+    pub fn events(&self) -> u64 {
+        self.events
+    }
+
+    /// Trials answered and trials in total, practice included.
+    pub fn progress(&self) -> (u32, u32) {
+        (self.at, self.plan.len() as u32)
+    }
+
+    /// Number of the current trial among those of practice or of data, from 1, and how many there are.
+    pub fn ordinal(&self) -> (u32, u32) {
+        let [from, to] = self.practice;
+        if self.at < to {
+            (self.at - from + 1, to - from)
+        } else {
+            (self.at - to + 1, self.plan.len() as u32 - to)
+        }
+    }
+
+    /// Rounds of practice begun.
+    pub fn practice_rounds(&self) -> u32 {
+        self.attempts[0]
+    }
+
+    /// What the current trial is for; `None` after the last one.
+    pub fn role(&self) -> Option<TrialRole> {
+        self.plan.get(self.at as usize).map(|planned| planned.role)
+    }
+
+    /// Viewing conditions, as last reported.
+    pub fn conditions(&self) -> Option<&Conditions> {
+        self.conditions.as_ref()
+    }
+
+    /// Which of them the study does not accept.
+    pub fn viewing_problem(&self) -> Option<ViewingProblem> {
+        self.problem
+    }
+
+    /// Language of the consent.
+    pub fn language(&self) -> Option<&str> {
+        self.language.as_deref()
+    }
+
+    /// Answers to the questions of the study.
+    pub fn answers(&self) -> &BTreeMap<String, String> {
+        &self.answers
+    }
+
+    /// Trials after the practice, and how many of them were answered hastily.
+    pub fn hasty(&self) -> [u32; 2] {
+        self.hasty
+    }
+
+    /// Results of all trials after the practice, in order.
+    pub fn outcomes(&self) -> &[TrialOutcome] {
+        &self.outcomes
+    }
+
+    /// Forced choice: the posterior of the threshold of a tile; `None` before its first trial.
+    pub fn posterior(&self, stack: u32, tile: u32) -> Option<Posterior> {
+        self.quests.get(&(stack, tile)).map(QuestPlus::posterior)
+    }
+
+    /// The trial to show; `None` unless the session is at its trials.
+    pub fn trial(&self) -> Option<Trial> {
+        if self.stage != Stage::Trials {
+            return None;
+        }
+        let PlannedTrial { task, role } = *self.plan.get(self.at as usize)?;
+        let (number, practice) = (self.at, role == TrialRole::Practice);
+        Some(match task {
+            Task::Acquisition { stack, identical } => {
+                Trial::Acquisition { number, practice, stack, levels: self.levels.clone(), identical }
+            }
+            Task::Validation { stack, pair, reference_left } => {
+                let shown = &self.study.stacks[stack as usize];
+                let reference = vec![shown.last(); shown.grid().len()];
+                let other = match pair {
+                    Pair::Class(Class::Test) => shown.stops().map(<[u32]>::to_vec),
+                    Pair::Class(Class::Noisy) => shown.noisy().map(<[u32]>::to_vec),
+                    Pair::Class(Class::Reference) => None,
+                    Pair::Obvious => Some(vec![0; reference.len()]),
+                };
+                let other = other.unwrap_or_else(|| reference.clone());
+                let (left, right) = if reference_left { (reference, other) } else { (other, reference) };
+                Trial::Validation { number, practice, stack, left, right }
+            }
+            Task::ForcedChoice { stack, tile, noise_first, .. } => {
+                let (noise, last) = (self.levels[0], self.study.stacks[stack as usize].last());
+                let (first, second) = if noise_first { (noise, last) } else { (last, noise) };
+                Trial::ForcedChoice { number, practice, stack, tile, first, second }
+            }
+        })
+    }
+}

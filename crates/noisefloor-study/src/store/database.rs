@@ -1,0 +1,81 @@
+//! The database file: its tables, and how it is opened.
+
+use crate::error::StoreError;
+use rusqlite::{Connection, OpenFlags, OptionalExtension};
+use std::path::Path;
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
+
+/// `PRAGMA application_id`: "nfst".
+const APPLICATION: i32 = 0x6e66_7374;
+/// `PRAGMA user_version`: version of the tables below.
+const VERSION: i32 = 2;
+const TABLES: &str = "
+CREATE TABLE IF NOT EXISTS design (only INTEGER PRIMARY KEY CHECK (only = 1), text TEXT NOT NULL) STRICT;
+CREATE TABLE IF NOT EXISTS sessions (
+    code TEXT PRIMARY KEY, seed INTEGER NOT NULL, observers TEXT NOT NULL, simulated INTEGER NOT NULL,
+    begun_ms INTEGER NOT NULL, ids TEXT NOT NULL
+) STRICT, WITHOUT ROWID;
+CREATE TABLE IF NOT EXISTS links (
+    token TEXT PRIMARY KEY, code TEXT REFERENCES sessions (code) ON DELETE SET NULL
+) STRICT, WITHOUT ROWID;
+CREATE TABLE IF NOT EXISTS events (
+    code TEXT NOT NULL REFERENCES sessions (code), seq INTEGER NOT NULL, received_ms INTEGER NOT NULL,
+    envelope TEXT NOT NULL, PRIMARY KEY (code, seq)
+) STRICT, WITHOUT ROWID;";
+
+pub(super) fn open_existing(path: &Path, design: &str) -> Result<Connection, StoreError> {
+    // Without the CREATE flag, a missing file is an error
+    let flags = OpenFlags::SQLITE_OPEN_READ_WRITE | OpenFlags::SQLITE_OPEN_NO_MUTEX;
+    let made = Connection::open_with_flags(path, flags);
+    made.and_then(|c| settle(&c).map(|()| c))
+        .map_err(|source| StoreError::Database { path: path.to_owned(), source })
+        .and_then(|connection| check_design(&connection, path, design).map(|()| connection))
+}
+
+pub(super) fn open(path: &Path, design: &str) -> Result<Connection, StoreError> {
+    let failed = |source| StoreError::Database { path: path.to_owned(), source };
+    let connection = Connection::open(path).map_err(failed)?;
+    settle(&connection).map_err(failed)?;
+    let pragma = |name: &str| connection.pragma_query_value(None, name, |row| row.get::<_, i32>(0));
+    let (application, version) =
+        (pragma("application_id").map_err(failed)?, pragma("user_version").map_err(failed)?);
+    if (application, version) != (APPLICATION, VERSION) {
+        let tables: i64 = connection
+            .query_row("SELECT count(*) FROM sqlite_schema", [], |row| row.get(0))
+            .map_err(failed)?;
+        if tables > 0 {
+            return Err(StoreError::OtherStudy { path: path.to_owned() });
+        }
+        connection.pragma_update(None, "application_id", APPLICATION).map_err(failed)?;
+        connection.pragma_update(None, "user_version", VERSION).map_err(failed)?;
+    }
+    connection.execute_batch(TABLES).map_err(failed)?;
+    connection.execute("INSERT OR IGNORE INTO design VALUES (1, ?1)", [design]).map_err(failed)?;
+    check_design(&connection, path, design)?;
+    Ok(connection)
+}
+
+/// Connection settings: a log that survives kills, and erased rows overwritten with zeros.
+pub(crate) fn settle(connection: &Connection) -> rusqlite::Result<()> {
+    connection.busy_timeout(Duration::from_secs(10))?;
+    connection.pragma_update(None, "journal_mode", "WAL")?;
+    connection.pragma_update(None, "synchronous", "FULL")?;
+    connection.pragma_update(None, "secure_delete", true)?;
+    connection.pragma_update(None, "foreign_keys", true)
+}
+
+pub(super) fn check_design(connection: &Connection, path: &Path, design: &str) -> Result<(), StoreError> {
+    let kept: Option<String> = connection
+        .query_row("SELECT text FROM design", [], |row| row.get(0))
+        .optional()
+        .map_err(|source| StoreError::Database { path: path.to_owned(), source })?;
+    if kept.as_deref() == Some(design) {
+        Ok(())
+    } else {
+        Err(StoreError::OtherStudy { path: path.to_owned() })
+    }
+}
+
+pub(crate) fn now_ms() -> u64 {
+    SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |d| d.as_millis() as u64)
+}

@@ -1,0 +1,188 @@
+//! The thread that writes.
+
+use super::database::open;
+use super::record::{NewSession, SessionRecord};
+use super::rows::{all_codes, append, begin, erase, event, load, truncate_log};
+use crate::error::StoreError;
+use crate::event::Envelope;
+use rusqlite::{Connection, TransactionBehavior};
+use std::path::{Path, PathBuf};
+use std::sync::mpsc;
+use tokio::sync::oneshot;
+
+/// Most commands that share a commit; bounds what a failing disk can take with it.
+const MOST_AT_ONCE: usize = 512;
+/// The answers of a study, open for writing. Clones share one writer thread.
+#[derive(Clone, Debug)]
+pub struct AnswerStore {
+    commands: mpsc::Sender<Command>,
+}
+
+type Reply<T> = oneshot::Sender<Result<T, StoreError>>;
+
+enum Command {
+    Begin { session: Box<NewSession>, reply: Reply<String> },
+    Append { code: String, envelope: Box<Envelope>, reply: Reply<()> },
+    Load { code: String, reply: Reply<SessionRecord> },
+    Codes { reply: Reply<Vec<String>> },
+    Event { code: String, seq: u64, reply: Reply<Option<Envelope>> },
+    Erase { code: String, reply: Reply<()> },
+}
+
+impl AnswerStore {
+    /// Opens the database of a study, creating it if needed. `design` identifies what the answers depend on
+    /// ([`crate::Study::design`]).
+    ///
+    /// # Errors
+    /// [`StoreError::Database`] if it cannot be opened, [`StoreError::OtherStudy`] if it belongs to another design.
+    pub fn open(path: impl AsRef<Path>, design: &str) -> Result<Self, StoreError> {
+        let path = path.as_ref().to_owned();
+        let mut connection = open(&path, design)?;
+        let (commands, received) = mpsc::channel();
+        let work = move || write(&mut connection, &path, &received);
+        std::thread::Builder::new().name("answers".into()).spawn(work).map_err(|_| StoreError::Closed)?;
+        Ok(Self { commands })
+    }
+
+    /// Begins a session and returns its code. A link that was used before leads to the session it began.
+    ///
+    /// # Errors
+    /// [`StoreError::NoLink`] if the link does not exist, [`StoreError`] if the session could not be stored.
+    pub async fn begin(&self, session: NewSession) -> Result<String, StoreError> {
+        let session = Box::new(session);
+        self.ask(|reply| Command::Begin { session, reply }).await
+    }
+
+    /// The codes of all sessions, in the order they began.
+    ///
+    /// # Errors
+    /// [`StoreError`] if the database cannot be read.
+    pub async fn codes(&self) -> Result<Vec<String>, StoreError> {
+        self.ask(|reply| Command::Codes { reply }).await
+    }
+
+    /// Stores an event. It is on disk when this returns.
+    ///
+    /// # Errors
+    /// [`StoreError::Unknown`] if the session does not exist or was erased, [`StoreError::Conflict`] if the
+    /// number is taken.
+    pub async fn append(&self, code: &str, envelope: Envelope) -> Result<(), StoreError> {
+        let (code, envelope) = (code.to_owned(), Box::new(envelope));
+        self.ask(|reply| Command::Append { code, envelope, reply }).await
+    }
+
+    /// Loads a session with all its events.
+    ///
+    /// # Errors
+    /// [`StoreError::Unknown`] if it is not there.
+    pub async fn load(&self, code: &str) -> Result<SessionRecord, StoreError> {
+        let code = code.to_owned();
+        self.ask(|reply| Command::Load { code, reply }).await
+    }
+
+    /// Loads one event of a session, if it exists.
+    ///
+    /// # Errors
+    /// [`StoreError`] if the database cannot be read.
+    pub async fn event(&self, code: &str, seq: u64) -> Result<Option<Envelope>, StoreError> {
+        let code = code.to_owned();
+        self.ask(|reply| Command::Event { code, seq, reply }).await
+    }
+
+    /// Erases a session and all its events, including their traces in free pages and the log.
+    ///
+    /// # Errors
+    /// [`StoreError::Unknown`] if it is not there.
+    pub async fn erase(&self, code: &str) -> Result<(), StoreError> {
+        let code = code.to_owned();
+        self.ask(|reply| Command::Erase { code, reply }).await
+    }
+
+    async fn ask<T>(&self, command: impl FnOnce(Reply<T>) -> Command) -> Result<T, StoreError> {
+        let (reply, answer) = oneshot::channel();
+        self.commands.send(command(reply)).map_err(|_| StoreError::Closed)?;
+        answer.await.map_err(|_| StoreError::Closed)?
+    }
+}
+
+/// A pending reply, sent after the commit.
+type Held = Box<dyn FnOnce(Option<rusqlite::Error>) + Send>;
+
+/// The writer thread; ends when every [`AnswerStore`] has been dropped.
+fn write(connection: &mut Connection, path: &Path, commands: &mpsc::Receiver<Command>) {
+    while let Ok(first) = commands.recv() {
+        let mut erased = false;
+        let mut batch = vec![first];
+        batch.extend(commands.try_iter().take(MOST_AT_ONCE - 1));
+
+        // One transaction for the batch; replies wait until it is on disk
+        let mut held: Vec<Held> = Vec::with_capacity(batch.len());
+        let transaction = match connection.transaction_with_behavior(TransactionBehavior::Immediate) {
+            Ok(transaction) => transaction,
+            Err(error) => {
+                refuse(batch, path, &error);
+                continue;
+            }
+        };
+        for command in batch {
+            erased |= matches!(command, Command::Erase { .. });
+            held.push(run(&transaction, path, command));
+        }
+        let mut failure = transaction.commit().err();
+        for answer in held {
+            answer(failure.as_ref().map(copy));
+        }
+        if erased && failure.take().is_none() {
+            truncate_log(connection);
+        }
+    }
+}
+
+/// SQLite errors cannot be cloned, and every waiting caller needs one.
+fn copy(error: &rusqlite::Error) -> rusqlite::Error {
+    match error {
+        rusqlite::Error::SqliteFailure(code, text) => rusqlite::Error::SqliteFailure(*code, text.clone()),
+        _ => rusqlite::Error::SqliteFailure(rusqlite::ffi::Error::new(1), Some(error.to_string())),
+    }
+}
+
+fn refuse(batch: Vec<Command>, path: &Path, error: &rusqlite::Error) {
+    let failed = || StoreError::Database { path: path.to_owned(), source: copy(error) };
+    for command in batch {
+        // A dropped receiver needs no reply
+        match command {
+            Command::Append { reply, .. } | Command::Erase { reply, .. } => {
+                drop(reply.send(Err(failed())));
+            }
+            Command::Begin { reply, .. } => drop(reply.send(Err(failed()))),
+            Command::Codes { reply } => drop(reply.send(Err(failed()))),
+            Command::Load { reply, .. } => drop(reply.send(Err(failed()))),
+            Command::Event { reply, .. } => drop(reply.send(Err(failed()))),
+        }
+    }
+}
+
+fn hold<T: Send + 'static>(path: &Path, reply: Reply<T>, result: Result<T, StoreError>) -> Held {
+    let path: PathBuf = path.to_owned();
+    Box::new(move |failure| {
+        let result = match failure {
+            Some(source) => Err(StoreError::Database { path, source }),
+            None => result,
+        };
+        drop(reply.send(result));
+    })
+}
+
+fn run(connection: &Connection, path: &Path, command: Command) -> Held {
+    let failed = |source| StoreError::Database { path: path.to_owned(), source };
+    match command {
+        Command::Begin { session, reply } => hold(path, reply, begin(connection, path, &session)),
+        Command::Codes { reply } => hold(path, reply, all_codes(connection).map_err(failed)),
+        Command::Append { code, envelope, reply } => {
+            hold(path, reply, append(connection, path, &code, &envelope))
+        }
+        Command::Load { code, reply } => hold(path, reply, load(connection, path, &code)),
+        Command::Event { code, seq, reply } => hold(path, reply, event(connection, path, &code, seq)),
+        Command::Erase { code, reply } => hold(path, reply, erase(connection, path, &code)),
+    }
+}
