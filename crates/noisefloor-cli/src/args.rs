@@ -419,6 +419,9 @@ pub enum StudyCommand {
     Serve(ServeArgs),
     Analyse(AnalyseArgs),
     Simulate(SimulateArgs),
+    Links(LinksArgs),
+    Data(DataFolderArgs),
+    Backup(BackupArgs),
     /// Print all that is kept of one observer, as JSON.
     Export(ObserverArgs),
     /// Erase all that is kept of one observer, for good.
@@ -440,9 +443,54 @@ pub struct ServeArgs {
     /// Port; 0 takes a free one.
     #[arg(long, default_value_t = 8437)]
     pub port: u16,
-    /// Another name of this machine by which browsers ask for it. Repeat for more.
+    /// Another name by which browsers ask for this server. Repeat for more.
     #[arg(long, value_name = "HOST")]
     pub allow_host: Vec<String>,
+    /// Believe X-Forwarded-For and X-Forwarded-Proto of a proxy at this address. Repeat for more.
+    #[arg(long, value_name = "IP")]
+    pub trust_proxy: Vec<std::net::IpAddr>,
+    /// Path that the proxy passes on, for example /noise.
+    #[arg(long, value_name = "PATH", default_value = "")]
+    pub base_path: String,
+}
+
+/// Make one-time links, each for one participant.
+#[derive(Debug, Args)]
+pub struct LinksArgs {
+    /// Study file.
+    #[arg(value_name = "STUDY.toml")]
+    pub study: PathBuf,
+    /// How many.
+    #[arg(long, default_value_t = 10, value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    pub count: u32,
+    /// Address of the study as participants open it.
+    #[arg(long, value_name = "URL", default_value = "http://127.0.0.1:8437/")]
+    pub url: String,
+}
+
+/// Write every response as data for others: one long table, and a BIDS-like folder with a data dictionary.
+#[derive(Debug, Args)]
+pub struct DataFolderArgs {
+    /// Study file.
+    #[arg(value_name = "STUDY.toml")]
+    pub study: PathBuf,
+    /// Folder to write into.
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+    /// Write the responses of simulated observers instead of people.
+    #[arg(long)]
+    pub simulated: bool,
+}
+
+/// Copy the database of a study, also while it is being served. To restore it, put the copy in its place.
+#[derive(Debug, Args)]
+pub struct BackupArgs {
+    /// Study file.
+    #[arg(value_name = "STUDY.toml")]
+    pub study: PathBuf,
+    /// The copy, which must not exist yet.
+    #[arg(value_name = "FILE")]
+    pub to: PathBuf,
 }
 
 /// Analyse the answers: thresholds of tiles, agreement, groups, Table 2 of the paper, plots, and a corpus for `train`.
@@ -457,9 +505,9 @@ pub struct AnalyseArgs {
     /// Threshold of a tile in the corpus and in the grid over the picture.
     #[arg(long, value_enum, default_value_t = ThresholdChoice::Level95)]
     pub threshold: ThresholdChoice,
-    /// Count observers who are unlike the others all the same.
+    /// Keep observers whom the rules of the study exclude.
     #[arg(long)]
-    pub keep_outliers: bool,
+    pub keep_excluded: bool,
     /// Analyse simulated observers instead of people.
     #[arg(long)]
     pub simulated: bool,

@@ -4,7 +4,7 @@ use crate::args::ExploreArgs;
 use crate::train::read_table_file;
 use anyhow::Context;
 use noisefloor_study::explore::{ExploreServer, ExploreSetup};
-use noisefloor_study::interrupted;
+use noisefloor_study::{Exposure, interrupted};
 use tokio::runtime::Builder;
 
 pub fn run(args: &ExploreArgs) -> anyhow::Result<()> {
@@ -20,7 +20,7 @@ pub fn run(args: &ExploreArgs) -> anyhow::Result<()> {
     };
     let runtime = Builder::new_multi_thread().enable_all().build().context("no threads for the server")?;
     runtime.block_on(async {
-        let explorer = ExploreServer::bind(setup, args.listen, &args.allow_host).await?;
+        let explorer = ExploreServer::bind(setup, args.listen, &Exposure::named(&args.allow_host)).await?;
         println!("look at http://{}; Ctrl-C ends", explorer.address());
         println!("disagreements are kept in {}", args.database.display());
         explorer.run(interrupted()).await?;

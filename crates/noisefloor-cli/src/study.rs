@@ -1,12 +1,17 @@
 //! `noisefloor study`.
 
-use crate::args::{AnalyseArgs, ObserverArgs, ServeArgs, SimulateArgs, StudyCommand, ThresholdChoice};
+use crate::args::{
+    AnalyseArgs, BackupArgs, DataFolderArgs, LinksArgs, ObserverArgs, ServeArgs, SimulateArgs, StudyCommand,
+    ThresholdChoice,
+};
 use anyhow::Context;
 use noisefloor_study::analysis::CorpusThreshold;
 use noisefloor_study::analysis::files::write;
+use noisefloor_study::analysis::raw::write_raw;
+use noisefloor_study::analysis::tiles::LEAST_OBSERVERS;
 use noisefloor_study::analysis::{AnalysisOptions, StudyReport, analyse};
 use noisefloor_study::simulated::{Public, drive};
-use noisefloor_study::{Study, StudyServer, interrupted, parse_code, store};
+use noisefloor_study::{Exposure, Study, StudyServer, interrupted, parse_code, store};
 use std::net::{Ipv4Addr, SocketAddr};
 use std::path::Path;
 use std::sync::Arc;
@@ -18,6 +23,9 @@ pub fn run(command: &StudyCommand) -> anyhow::Result<()> {
         StudyCommand::Serve(args) => serve(args),
         StudyCommand::Analyse(args) => analysis(args),
         StudyCommand::Simulate(args) => simulate(args),
+        StudyCommand::Links(args) => links(args),
+        StudyCommand::Data(args) => data(args),
+        StudyCommand::Backup(args) => backup(args),
         StudyCommand::Export(args) => {
             let (study, code) = observer(args)?;
             let record = store::read_one(&study.database, &study.design(), &code)?;
@@ -48,8 +56,10 @@ fn serve(args: &ServeArgs) -> anyhow::Result<()> {
     let study = open(&args.study)?;
     runtime()?.block_on(async {
         let address = SocketAddr::new(args.listen, args.port);
-        let server = StudyServer::bind(study.clone(), address, &args.allow_host).await?;
-        println!("observers begin at http://{}; Ctrl-C ends", server.address());
+        let exposure = Exposure::named(&args.allow_host).trusting(&args.trust_proxy).under(&args.base_path);
+        let server = StudyServer::bind(study.clone(), address, &exposure).await?;
+        println!("observers begin at http://{}{}; Ctrl-C ends", server.address(), exposure.base_path);
+        println!("experimenter's page: http://{}{}", server.address(), server.experimenter_path());
         println!("answers are kept in {}", study.database.display());
         server.run(interrupted()).await?;
         Ok(())
@@ -58,8 +68,8 @@ fn serve(args: &ServeArgs) -> anyhow::Result<()> {
 
 fn analysis(args: &AnalyseArgs) -> anyhow::Result<()> {
     let study = Arc::new(Study::open(&args.study)?);
-    let (keep_outliers, seed, simulated) = (args.keep_outliers, args.seed, args.simulated);
-    let report = analyse(&study, AnalysisOptions { keep_outliers, seed, simulated })?;
+    let (keep_excluded, seed, simulated) = (args.keep_excluded, args.seed, args.simulated);
+    let report = analyse(&study, AnalysisOptions { keep_excluded, seed, simulated })?;
     let threshold = match args.threshold {
         ThresholdChoice::Level95 => CorpusThreshold::Level95,
         ThresholdChoice::Mean => CorpusThreshold::Mean,
@@ -75,20 +85,22 @@ fn print(report: &StudyReport) {
     let finished = report.observers.iter().filter(|o| o.finished).count();
     println!("{} {who}, of whom {finished} answered everything", report.observers.len());
     for row in &report.observers {
-        if let Some(why) = &row.outlier {
-            println!("  {} is unlike the others: {why}", row.code);
+        if let Some(why) = &row.excluded {
+            println!("  {} is excluded: {why}", row.code);
         }
     }
     if !report.tiles.is_empty() {
         println!("stack                tile      mean  95 % see none   95 % interval");
     }
     for t in &report.tiles {
-        let [low, high] = t.level95_interval.unwrap_or([f64::NAN; 2]);
+        let interval = match t.level95_interval {
+            Some([low, high]) => format!("{low:.0} to {high:.0}"),
+            None => format!("none: {} observers, fewer than {LEAST_OBSERVERS}", t.observers),
+        };
         let beyond = if t.beyond { "  beyond the stack" } else { "" };
-        println!(
-            "{:20} {:4} {:9.0} {:14.0}   {low:.0} to {high:.0}{beyond}",
-            t.stack, t.tile, t.mean, t.level95
-        );
+        let doubt =
+            if t.fit_probability.is_some_and(|p| p < 0.01) { "  the spread does not fit" } else { "" };
+        println!("{:20} {:4} {:9.0} {:14.0}   {interval}{beyond}{doubt}", t.stack, t.tile, t.mean, t.level95);
     }
     if let Some(r) = report.repeats {
         println!(
@@ -140,7 +152,7 @@ fn simulate(args: &SimulateArgs) -> anyhow::Result<()> {
     let runtime = runtime()?;
     let (stop, stopped) = oneshot::channel::<()>();
     let address = SocketAddr::new(Ipv4Addr::LOCALHOST.into(), 0);
-    let server = runtime.block_on(StudyServer::bind(study.clone(), address, &[]))?;
+    let server = runtime.block_on(StudyServer::bind(study.clone(), address, &Exposure::default()))?;
     let url = format!("http://{}", server.address());
     let served = runtime.spawn(server.run(async { drop(stopped.await) }));
     let mut events = 0u64;
@@ -152,7 +164,40 @@ fn simulate(args: &SimulateArgs) -> anyhow::Result<()> {
     }
     drop(stop);
     runtime.block_on(served).context("the server ended early")??;
-    println!("{events} events acknowledged; analyse them with --simulated");
+    println!("{events} events acknowledged; analyse them with --simulated, which should find:");
+    println!("stack                tile    median  95 % see none");
+    for (number, stack) in study.stacks.iter().enumerate() {
+        for tile in 0..stack.grid().len() {
+            let [median, level95] = [0.5, 0.95].map(|share| public.quantile(number, tile, share));
+            println!("{:20} {tile:4} {median:9.0} {level95:14.0}", stack.name());
+        }
+    }
+    Ok(())
+}
+
+fn links(args: &LinksArgs) -> anyhow::Result<()> {
+    let study = Study::open(&args.study)?;
+    for token in store::make_links(&study.database, &study.design(), args.count)? {
+        println!("{}?link={token}", args.url);
+    }
+    Ok(())
+}
+
+fn data(args: &DataFolderArgs) -> anyhow::Result<()> {
+    let study = Arc::new(Study::open(&args.study)?);
+    let options = AnalysisOptions { keep_excluded: false, seed: 1, simulated: args.simulated };
+    let report = analyse(&study, options)?;
+    let mut records = store::read_all(&study.database, &study.design())?;
+    records.retain(|record| record.simulated == args.simulated);
+    write_raw(&args.out, &study, &records, &report)?;
+    println!("{} sessions written to {}", records.len(), args.out.display());
+    Ok(())
+}
+
+fn backup(args: &BackupArgs) -> anyhow::Result<()> {
+    let study = Study::open(&args.study)?;
+    store::back_up(&study.database, &study.design(), &args.to)?;
+    println!("copied to {}", args.to.display());
     Ok(())
 }
 

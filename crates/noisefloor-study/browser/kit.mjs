@@ -16,21 +16,34 @@ export const LARGE = { width: 1920, height: 1080 };
 let browser;
 const profile = mkdtempSync(join(tmpdir(), "noisefloor-browser-"));
 
+const launch = (...more) => chromium.launch({
+  executablePath: "/usr/bin/chromium",
+  args: [
+    "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run",
+    "--disable-background-networking", "--disable-component-update", "--disable-sync", ...more,
+  ],
+  env: { ...process.env, HOME: profile },
+});
+
 before(async () => {
-  browser = await chromium.launch({
-    executablePath: "/usr/bin/chromium",
-    args: [
-      "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run",
-      "--disable-background-networking", "--disable-component-update", "--disable-sync",
-    ],
-    env: { ...process.env, HOME: profile },
-  });
+  browser = await launch();
   if (shots) mkdirSync(shots, { recursive: true });
 });
 after(async () => {
   await browser.close();
   rmSync(profile, { recursive: true, force: true });
 });
+
+/** A window of a system whose scaling is not 100 %. */
+export async function openScaled(t, url, ratio) {
+  const scaled = await launch(`--force-device-scale-factor=${ratio}`, "--window-size=2400,1500");
+  const context = await scaled.newContext({ viewport: null, locale: "en-GB" });
+  t.after(() => scaled.close());
+  const page = await context.newPage();
+  page.setDefaultTimeout(8000);
+  await page.goto(url);
+  return { page };
+}
 
 /** A window of its own. Requests to any other machine, and anything written to the console as an error, fail the
  * test; `refusals` are expected where a test asks for them. */

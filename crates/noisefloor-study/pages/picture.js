@@ -48,12 +48,13 @@ export function crowded(stack, count) {
   return wide > innerWidth || high > innerHeight ? "crowded" : null;
 }
 
-/** Moves an element by part of a pixel, onto whole device pixels. By its place: a transform would be applied after
- * the browser has rounded. */
+/** Moves an element by part of a pixel, onto whole CSS pixels, or, where these are no whole device pixels, onto
+ * device pixels. By its place: a transform would be applied after the browser has rounded. */
 export function snap(element) {
   element.style.left = element.style.top = "0";
   const { left, top } = element.getBoundingClientRect();
-  const shift = (at) => `${Math.round(at * devicePixelRatio) / devicePixelRatio - at}px`;
+  const unit = Number.isInteger(devicePixelRatio) ? 1 : devicePixelRatio;
+  const shift = (at) => `${Math.round(at * unit) / unit - at}px`;
   element.style.left = shift(left);
   element.style.top = shift(top);
 }
@@ -75,7 +76,9 @@ export class Picture {
     this.context.imageSmoothingEnabled = false;
     this.observer = new ResizeObserver(([entry]) => {
       const box = entry.devicePixelContentBoxSize?.[0];
-      const fits = !box || (box.inlineSize === this.shape.width && box.blockSize === this.shape.height);
+      // Emulated ratios, as those of developers' tools, are reported in CSS pixels
+      const is = (size, pixels) => size === pixels || size === Math.round(pixels / devicePixelRatio);
+      const fits = !box || (is(box.inlineSize, this.shape.width) && is(box.blockSize, this.shape.height));
       if (fits ? misfits.delete(this) : !misfits.has(this) && misfits.add(this)) onMisfit();
     });
     // Browsers without the device's pixels are believed

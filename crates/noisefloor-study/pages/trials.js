@@ -13,13 +13,13 @@ const frame = () => new Promise((go) => requestAnimationFrame(go));
 /** The time when what was drawn is on screen: the frame after next begins. */
 const painted = async () => { await frame(); return frame(); };
 
-/** Waits until a frame from `since` on for which `ms` have passed, to half a frame; the time of that frame. */
+/** Waits for the frame, at least one on, at which `ms` have passed since the frame `since`, to half a frame. What is
+ * drawn before anything else is awaited is on screen with that frame. */
 async function until(since, ms) {
   let last = await frame();
   for (;;) {
     const now = await frame();
-    const step = now - last;
-    if (now - since >= ms - step / 2) return now;
+    if (now - since >= ms - (now - last) / 2) return now;
     last = now;
   }
 }
@@ -255,21 +255,19 @@ async function forcedChoice(room) {
   await Promise.all([...all, ...[trial.first, trial.second].map((l) => tile(trial.stack, l, trial.tile))]);
   const pause = room.bind("P", t.pause, () => room.finish("pause"));
 
-  const blank = (cue) => {
-    picture.blank();
-    if (cue) picture.mark(trial.tile);
-    return painted();
-  };
   room.say.textContent = t.look_here;
-  await until(await blank(true), CUE_MS);
+  let at = await frame();
+  picture.blank();
+  picture.mark(trial.tile);
+  at = await until(at, CUE_MS);
   for (const [level, name] of [[trial.first, t.first], [trial.second, t.second]]) {
+    // All tiles are there: they are drawn within this frame
     room.say.textContent = name;
     await picture.show(levels(level));
-    const from = await painted();
-    await until(from, study.interval_ms);
-    const to = await blank(false);
-    room.intervals.push(to - from);
-    await until(to, GAP_MS);
+    const to = await until(at, study.interval_ms);
+    picture.blank();
+    room.intervals.push(to - at);
+    at = await until(to, GAP_MS);
     if (room.closed) return;
   }
   room.say.textContent = trial.practice ? t.forced_practice : t.forced_how;

@@ -96,8 +96,10 @@ export function ask(sheet, t, done) {
 
   const card = element("div");
   card.id = "card";
+  card.hidden = true;
   card.setAttribute("aria-hidden", "true");
   const size = (width) => {
+    card.hidden = false;
     card.style.width = `${width}px`;
     card.style.height = `${width * CARD_SHAPE}px`;
     check("card");

@@ -13,6 +13,7 @@ pub mod interval;
 mod listing;
 pub mod observers;
 mod plots;
+pub mod raw;
 mod report;
 pub mod screening;
 mod shapes;

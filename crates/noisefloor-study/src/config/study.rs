@@ -208,7 +208,7 @@ fn check_rules(file: &StudyFile) -> Result<(), String> {
             return Err(format!("[screening] {name} is {share}, not 0 to 1"));
         }
     }
-    if catch.is_some_and(|n| n > 100) || !(outlying > 0.0) || minimum_ms > 10_000 {
+    if catch.is_some_and(|n| n > 100) || outlying.is_nan() || outlying <= 0.0 || minimum_ms > 10_000 {
         return Err("[screening] catch is at most 100, outlying above 0, minimum-ms at most 10000".into());
     }
     let limits = &file.viewing;
@@ -217,7 +217,7 @@ fn check_rules(file: &StudyFile) -> Result<(), String> {
         ("distance-mm", limits.distance_mm),
         ("gamma", limits.gamma),
     ] {
-        if !(low <= high) {
+        if (low..=high).is_empty() {
             return Err(format!("[viewing] {name} goes from {low} to {high}: the range is empty"));
         }
     }

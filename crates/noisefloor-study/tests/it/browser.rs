@@ -18,7 +18,7 @@ use tempfile::TempDir;
 /// Levels of the stacks that the browser is shown.
 const LEVELS: usize = 8;
 
-fn study(protocol: &str, extra: &str, tables: &str) -> (TempDir, Arc<Study>) {
+pub(crate) fn study(protocol: &str, extra: &str, tables: &str) -> (TempDir, Arc<Study>) {
     let dir = tempfile::tempdir().unwrap();
     // A forced choice takes two seconds: few tiles
     let size = if protocol == "forced-choice" { (256, 128) } else { (384, 256) };
@@ -76,18 +76,23 @@ option = [
 ]
 "#;
 
-/// What the pages need to be tested; `None`, said aloud, where it is missing. With
+/// Whether the pages can be tested, with further programs; `None`, said aloud, where something is missing. With
 /// NOISEFLOOR_REQUIRE_BROWSER=1 that is a failure.
-fn browser() -> Option<()> {
-    let there =
-        |program: &str| Command::new(program).arg("--version").output().is_ok_and(|o| o.status.success());
+pub(crate) fn browser(programs: &[&str]) -> Option<()> {
+    // nginx knows -v alone, and openssl a word
+    let installed = |program: &str| {
+        ["--version", "-v", "version"]
+            .iter()
+            .any(|how| Command::new(program).arg(how).output().is_ok_and(|output| output.status.success()))
+    };
     let modules = Path::new(env!("CARGO_MANIFEST_DIR")).join("browser/node_modules/playwright-core");
     let missing: Vec<&str> = [
-        (there("node"), "node"),
+        (installed("node"), "node"),
         (Path::new("/usr/bin/chromium").exists(), "/usr/bin/chromium (apt-get install chromium)"),
         (modules.exists(), "playwright-core (npm ci --ignore-scripts in crates/noisefloor-study/browser)"),
     ]
     .into_iter()
+    .chain(programs.iter().map(|program| (installed(program), *program)))
     .filter(|(there, _)| !there)
     .map(|(_, name)| name)
     .collect();
@@ -100,7 +105,7 @@ fn browser() -> Option<()> {
 }
 
 /// Runs a file of the browser's tests, which must pass; one at a time, since each has a Chromium of its own.
-fn run(file: &str, environment: &[(&str, &str)]) {
+pub(crate) fn run(file: &str, environment: &[(&str, &str)]) {
     static TURN: Mutex<()> = Mutex::new(());
     let _turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("browser");
@@ -116,7 +121,7 @@ fn run(file: &str, environment: &[(&str, &str)]) {
 /// clicked is what the analysis finds.
 #[test]
 fn observers_use_the_pages_in_a_browser() {
-    if browser().is_none() {
+    if browser(&[]).is_none() {
         return;
     }
     let studies = [
@@ -158,7 +163,7 @@ fn observers_use_the_pages_in_a_browser() {
 /// browser/explore.test.mjs.
 #[test]
 fn pictures_are_explored_in_a_browser() {
-    if browser().is_none() {
+    if browser(&[]).is_none() {
         return;
     }
     let dir = tempfile::tempdir().unwrap();
@@ -196,7 +201,7 @@ fn clicks(observer: &mut SimulatedObserver, stack: u32, stacks: &[StackView]) ->
 #[test]
 fn simulated_observers_drive_the_pages_and_a_model_learns_from_them() {
     const OBSERVERS: u64 = 8;
-    if browser().is_none() {
+    if browser(&[]).is_none() {
         return;
     }
     let dir = tempfile::tempdir().unwrap();

@@ -18,18 +18,24 @@ mod explore;
 /// Requests to the explorer that are refused.
 #[cfg(test)]
 mod explore_refusals;
-/// A server that is killed has lost nothing that it acknowledged.
-#[cfg(test)]
-mod kill;
 /// Connections that are held open.
 #[cfg(test)]
 mod hold;
+/// A server that is killed has lost nothing that it acknowledged.
+#[cfg(test)]
+mod kill;
 /// Studies, stacks and servers for the tests.
 #[cfg(test)]
 mod kit;
 /// Fifty observers at once.
 #[cfg(test)]
 mod load;
+/// Raw data, languages and copies of the database.
+#[cfg(test)]
+mod outputs;
+/// A study behind a real proxy.
+#[cfg(test)]
+mod proxy;
 /// The state of a session, without a server.
 #[cfg(test)]
 mod session;
