@@ -10,6 +10,7 @@ use noisefloor_study::analysis::{AnalysisOptions, analyse};
 use noisefloor_study::explore::ExploreSetup;
 use noisefloor_study::simulated::{Public, SimulatedObserver, SpreadShape};
 use noisefloor_study::{StackView, Study, StudyEvent, Trial, store};
+use noisefloor_testkit::{Requirement, require};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -76,8 +77,7 @@ option = [
 ]
 "#;
 
-/// Whether the pages can be tested, with further programs; `None`, said aloud, where something is missing. With
-/// NOISEFLOOR_REQUIRE_BROWSER=1 that is a failure.
+/// Whether the pages can be tested, with further programs.
 pub(crate) fn browser(programs: &[&str]) -> Option<()> {
     // nginx knows -v alone, and openssl a word
     let installed = |program: &str| {
@@ -96,12 +96,8 @@ pub(crate) fn browser(programs: &[&str]) -> Option<()> {
     .filter(|(there, _)| !there)
     .map(|(_, name)| name)
     .collect();
-    if missing.is_empty() {
-        return Some(());
-    }
-    assert!(std::env::var_os("NOISEFLOOR_REQUIRE_BROWSER").is_none(), "no browser to test with: {missing:?}");
-    println!("\n*** SKIPPED: the study's pages are NOT tested, since these are missing: {missing:?} ***\n");
-    None
+    let found = if missing.is_empty() { Ok(()) } else { Err(format!("missing: {}", missing.join(", "))) };
+    require(Requirement::Browser, found)
 }
 
 /// Runs a file of the browser's tests, which must pass; one at a time, since each has a Chromium of its own.
