@@ -86,12 +86,24 @@ impl Format {
     }
 }
 
-/// The content of bytes that [`payload`] gave.
-pub(crate) fn unpack<T: DeserializeOwned>(payload: &[u8]) -> Result<T, Fault> {
-    let config = bincode::config::standard().with_limit::<{ MAX_PAYLOAD as usize }>();
+/// The content of bytes that [`payload`] returned.
+pub(crate) fn unpack<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, Fault> {
+    // A length inside the payload is believed up to bincode's limit, which is part of a type. The smallest limit that the
+    // payload fits keeps what a short, crafted payload can reserve within sixteen times its length.
+    match bytes.len() {
+        0..=0x1_0000 => unpack_within::<T, 0x1_0000>(bytes),
+        0x1_0001..=0x10_0000 => unpack_within::<T, 0x10_0000>(bytes),
+        0x10_0001..=0x100_0000 => unpack_within::<T, 0x100_0000>(bytes),
+        0x100_0001..=0x1000_0000 => unpack_within::<T, 0x1000_0000>(bytes),
+        _ => unpack_within::<T, { MAX_PAYLOAD as usize }>(bytes),
+    }
+}
+
+fn unpack_within<T: DeserializeOwned, const LIMIT: usize>(bytes: &[u8]) -> Result<T, Fault> {
+    let config = bincode::config::standard().with_limit::<LIMIT>();
     let (content, used) =
-        bincode::serde::decode_from_slice(payload, config).map_err(|e| Fault::Damaged(e.to_string()))?;
-    if used != payload.len() {
+        bincode::serde::decode_from_slice(bytes, config).map_err(|e| Fault::Damaged(e.to_string()))?;
+    if used != bytes.len() {
         return Err(Fault::Damaged("it has bytes left over".into()));
     }
     Ok(content)
@@ -109,5 +121,24 @@ fn read_up_to(from: &mut impl Read, buffer: &mut [u8]) -> Result<bool, io::Error
         Ok(()) => Ok(true),
         Err(e) if e.kind() == io::ErrorKind::UnexpectedEof => Ok(false),
         Err(e) => Err(e),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A string that claims more bytes than the payload has is refused before memory for it is reserved.
+    #[test]
+    fn a_crafted_length_reserves_nothing() {
+        for length in [100, 0x8000, 0x2_0000] {
+            // A length as bincode writes it: 252 for four bytes to follow
+            let mut crafted = vec![0u8; length];
+            crafted[..5].copy_from_slice(&[252, 0, 0, 0, 0x60]);
+            let Err(Fault::Damaged(what)) = unpack::<String>(&crafted) else { panic!("{length}") };
+            assert!(what.contains("LimitExceeded"), "{length}: {what}");
+        }
+        let whole = payload(&vec![7u64; 0x1_0000]).unwrap_or_default();
+        assert_eq!(unpack::<Vec<u64>>(&whole).ok(), Some(vec![7; 0x1_0000]));
     }
 }

@@ -6,6 +6,9 @@ mod accuracy;
 /// What every source promises, and that broken promises are noticed.
 #[cfg(test)]
 mod contract;
+/// A descriptor of one's own, by the recipe.
+#[cfg(test)]
+mod descriptor;
 /// Driver, oracle and renderer together.
 #[cfg(test)]
 mod end_to_end;

@@ -1,0 +1,145 @@
+//! Whether one picture contains the samples of another.
+
+use crate::display::{Display, luminance};
+use crate::evidence::Samples;
+use crate::mask::NoiseMask;
+use crate::rgb::Rgb;
+use ndarray::Array2;
+
+/// Edge of the blocks that count as independent observations, in pixels: wider than any pixel filter.
+const BLOCK: usize = 16;
+/// Standard errors that the two hypotheses must lie apart: the one in the middle between them is then reached by chance
+/// once in 740.
+const APART: f64 = 6.0;
+
+/// A picture, with what is known about its noise.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Snapshot<'a> {
+    pub(crate) size: (usize, usize),
+    pub(crate) pixels: &'a [Rgb],
+    pub(crate) spp: f64,
+    pub(crate) rounding: f32,
+}
+
+/// Whether two pictures of one view share samples, as far as they show it.
+///
+/// Let x be the mean of n samples and y that of m > n, both masked, so that little of the picture is left beside the noise.
+/// If y contains the samples of x, y has nothing in common with their difference; if it does not, the noise of y is part
+/// of the difference: the regression of y on x − y has the slope 0 or −n/(n + m). The slope is averaged over blocks,
+/// weighted so that textured ones, where y says little about its noise, count less; the scatter of the blocks gives its
+/// standard error. `None` if that is too large to tell the slopes apart, as with equal counts, where there is no nesting.
+pub(crate) fn shared_samples(one: Snapshot<'_>, other: Snapshot<'_>, display: &Display) -> Option<Samples> {
+    let (fewer, more) = if one.spp <= other.spp { (one, other) } else { (other, one) };
+    let independent_slope = -fewer.spp / (fewer.spp + more.spp);
+    let (x, y) = (masked(fewer, display)?, masked(more, display)?);
+    let rounding = NoiseMask::default().white_noise_gain() * crate::evidence::ROUNDING_LUMINANCE;
+    let known = [fewer.rounding, more.rounding].map(|variance| f64::from(rounding * variance));
+    let blocks = blocks(&x, &y, known);
+
+    // Slope of the weighted regression, and its standard error from the residuals of the blocks.
+    let weighted = |f: &dyn Fn(&Block) -> f64| blocks.iter().map(|b| b.weight * f(b)).sum::<f64>();
+    let variance = weighted(&|b| b.variance);
+    if variance <= 0.0 || blocks.len() < 8 {
+        return None;
+    }
+    let slope = weighted(&|b| b.covariance) / variance;
+    let scatter: f64 =
+        blocks.iter().map(|b| (b.weight * (b.covariance - slope * b.variance)).powi(2)).sum();
+    let error = scatter.sqrt() / variance;
+    if !(independent_slope.abs() > APART * error) {
+        return None;
+    }
+    let nested = slope > 0.5 * independent_slope;
+    Some(if nested { Samples::Nested } else { Samples::Independent })
+}
+
+/// Sums over one block.
+struct Block {
+    /// Of (x − y)·y, less what the rounding of y adds.
+    covariance: f64,
+    /// Of (x − y)², less what rounding adds.
+    variance: f64,
+    weight: f64,
+}
+
+fn blocks(x: &Array2<f32>, y: &Array2<f32>, [of_x, of_y]: [f64; 2]) -> Vec<Block> {
+    let (rows, columns) = x.dim();
+    let mut blocks = Vec::new();
+    for top in (0..rows).step_by(BLOCK) {
+        for left in (0..columns).step_by(BLOCK) {
+            let here = ndarray::s![top..(top + BLOCK).min(rows), left..(left + BLOCK).min(columns)];
+            let (mut covariance, mut variance, mut energy, mut pixels) = (0.0, 0.0, 0.0, 0.0);
+            for (&x, &y) in x.slice(here).iter().zip(y.slice(here)) {
+                let (difference, y) = (f64::from(x) - f64::from(y), f64::from(y));
+                covariance += difference * y;
+                variance += difference * difference;
+                energy += y * y;
+                pixels += 1.0;
+            }
+            let variance = variance - pixels * (of_x + of_y);
+            // Blocks that rounding fills, or in which nothing differs, say nothing
+            if energy > 0.0 && variance > 0.0 {
+                let covariance = covariance + pixels * of_y;
+                blocks.push(Block { covariance, variance, weight: pixels / energy });
+            }
+        }
+    }
+    blocks
+}
+
+/// Masked luminance as displayed.
+fn masked(picture: Snapshot<'_>, display: &Display) -> Option<Array2<f32>> {
+    let encoded = picture.pixels.iter().map(|&p| luminance(display.encode(p))).collect();
+    let plane = Array2::from_shape_vec((picture.size.1, picture.size.0), encoded).ok()?;
+    Some(NoiseMask::default().apply(&plane))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const EDGE: usize = 128;
+
+    /// Sums of `spp` samples of a picture with texture in one half, and noise of standard deviation 0.5 a sample.
+    fn sums(seed: u64, spp: u32) -> Vec<f32> {
+        let mut random = fastrand::Rng::with_seed(seed);
+        let mut pixel = |i: usize| {
+            let (x, y) = (i % EDGE, i / EDGE);
+            let texture = if x < EDGE / 2 && (x / 3 + y / 5).is_multiple_of(2) { 0.2 } else { 0.0 };
+            let uniform: f32 = (0..12).map(|_| random.f32()).sum::<f32>() - 6.0;
+            spp as f32 * (0.4 + texture) + 0.5 * (spp as f32).sqrt() * uniform
+        };
+        (0..EDGE * EDGE).map(&mut pixel).collect()
+    }
+
+    fn told(one: &[f32], n: f64, other: &[f32], m: f64) -> Option<Samples> {
+        let mean = |sums: &[f32], spp: f64| sums.iter().map(|s| [s / spp as f32; 3]).collect::<Vec<Rgb>>();
+        let (one, other) = (mean(one, n), mean(other, m));
+        let snapshot = |pixels, spp| Snapshot { size: (EDGE, EDGE), pixels, spp, rounding: 0.0 };
+        let forward = shared_samples(snapshot(&one, n), snapshot(&other, m), &Display::SRGB);
+        assert_eq!(forward, shared_samples(snapshot(&other, m), snapshot(&one, n), &Display::SRGB));
+        forward
+    }
+
+    #[test]
+    fn nested_pictures_are_recognised_at_every_ratio_that_noise_allows() {
+        for (seed, m) in [(1, 110u32), (2, 150), (3, 200), (4, 400), (5, 800)] {
+            let few = sums(2 * seed, 100);
+            let rest = sums(2 * seed + 1, m - 100);
+            let nested: Vec<f32> = few.iter().zip(&rest).map(|(a, b)| a + b).collect();
+            assert_eq!(told(&few, 100.0, &nested, f64::from(m)), Some(Samples::Nested), "100 in {m}");
+            let independent = sums(1000 + seed, m);
+            let apart = told(&few, 100.0, &independent, f64::from(m));
+            assert_eq!(apart, Some(Samples::Independent), "100 beside {m}");
+        }
+    }
+
+    /// A thousandth of the samples, or no noise at all: the pictures do not show it, and that is what is said.
+    #[test]
+    fn what_cannot_be_told_is_not_guessed() {
+        let (few, many) = (sums(1, 10), sums(2, 100_000));
+        assert_eq!(told(&few, 10.0, &many, 100_000.0), None);
+        let still = vec![40.0; EDGE * EDGE];
+        assert_eq!(told(&still, 100.0, &still, 100.0), None);
+    }
+}
