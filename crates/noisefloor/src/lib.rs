@@ -38,6 +38,7 @@ mod familiarity;
 mod film;
 mod mask;
 mod model;
+mod nested;
 mod oracle;
 mod params;
 mod rgb;

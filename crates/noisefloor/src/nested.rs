@@ -12,6 +12,11 @@ const BLOCK: usize = 16;
 /// once in 740.
 const APART: f64 = 6.0;
 
+/// Error of the slope that the curvature of the display adds, which blocks do not scatter by: below this at noise up to a
+/// tenth of the radiance (the test has 0.0087 where two standard errors are 0.0105). Ratios of counts above 40 are therefore
+/// never decided.
+const CURVATURE: f64 = 0.004;
+
 /// A picture, with what is known about its noise.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Snapshot<'a> {
@@ -43,9 +48,8 @@ pub(crate) fn shared_samples(one: Snapshot<'_>, other: Snapshot<'_>, display: &D
         return None;
     }
     let slope = weighted(&|b| b.covariance) / variance;
-    let scatter: f64 =
-        blocks.iter().map(|b| (b.weight * (b.covariance - slope * b.variance)).powi(2)).sum();
-    let error = scatter.sqrt() / variance;
+    let scatter: f64 = blocks.iter().map(|b| (b.weight * (b.covariance - slope * b.variance)).powi(2)).sum();
+    let error = (scatter.sqrt() / variance).hypot(CURVATURE);
     if !(independent_slope.abs() > APART * error) {
         return None;
     }
@@ -125,7 +129,8 @@ mod tests {
     fn nested_pictures_are_recognised_at_every_ratio_that_noise_allows() {
         for (seed, m) in [(1, 110u32), (2, 150), (3, 200), (4, 400), (5, 800)] {
             let few = sums(2 * seed, 100);
-            let rest = sums(2 * seed + 1, m - 100);
+            // Seeds far apart: neighbouring ones are correlated
+            let rest = sums(500 + seed, m - 100);
             let nested: Vec<f32> = few.iter().zip(&rest).map(|(a, b)| a + b).collect();
             assert_eq!(told(&few, 100.0, &nested, f64::from(m)), Some(Samples::Nested), "100 in {m}");
             let independent = sums(1000 + seed, m);
@@ -134,11 +139,12 @@ mod tests {
         }
     }
 
-    /// A thousandth of the samples, or no noise at all: the pictures do not show it, and that is what is said.
+    /// Ten thousand times the samples, a hundred times, or no noise at all: the pictures do not show it, and that is what is said.
     #[test]
     fn what_cannot_be_told_is_not_guessed() {
         let (few, many) = (sums(1, 10), sums(2, 100_000));
         assert_eq!(told(&few, 10.0, &many, 100_000.0), None);
+        assert_eq!(told(&few, 10.0, &sums(503, 1000), 1000.0), None);
         let still = vec![40.0; EDGE * EDGE];
         assert_eq!(told(&still, 100.0, &still, 100.0), None);
     }

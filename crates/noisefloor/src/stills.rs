@@ -4,11 +4,10 @@ use crate::criterion::CriterionError;
 use crate::descriptor::Described;
 use crate::display::{Display, ToneMapping};
 use crate::evidence::{Evidence, Rendering, Samples, TilePlanes};
-use crate::mask::NoiseMask;
+use crate::nested::{Snapshot, shared_samples};
 use crate::oracle::Oracle;
 use crate::rgb::Rgb;
 use crate::tile::{Tile, TileGrid};
-use ndarray::Array2;
 use rayon::prelude::*;
 use std::borrow::Cow;
 use thiserror::Error;
@@ -66,6 +65,17 @@ pub enum StillError {
     /// Nested pictures of as many samples.
     #[error("nested pictures of the same {0} samples per pixel are the same picture: nothing to judge by")]
     Nested(f64),
+    /// The pictures do not show whether they share samples.
+    #[error(
+        "the pictures of {image} and {other} samples per pixel do not show whether one contains the samples of the other; \
+         say whether they are nested (stages of one rendering) or independent (rendered with different seeds)"
+    )]
+    Undecided {
+        /// Samples per pixel of the picture.
+        image: f64,
+        /// Samples per pixel of the one it is compared with.
+        other: f64,
+    },
     /// The model does not fit the tiles.
     #[error(transparent)]
     Criterion(#[from] CriterionError),
@@ -100,6 +110,10 @@ impl Still {
         if self.pixels == other.pixels { Err(StillError::Same) } else { Ok(()) }
     }
 
+    fn snapshot(&self) -> Snapshot<'_> {
+        Snapshot { size: self.size, pixels: &self.pixels, spp: self.spp, rounding: self.rounding }
+    }
+
     fn rendering(&self) -> Rendering<'_> {
         Rendering { pixels: &self.pixels, spp: self.spp, rounding: self.rounding }
     }
@@ -131,10 +145,11 @@ impl<'a> SnapshotPair<'a> {
     ) -> Result<Self, StillError> {
         others.iter().try_for_each(|other| image.fits(other))?;
         let display = if image.display_referred { Display::SRGB } else { tone.settle(&image.pixels) };
-        let samples = samples.unwrap_or_else(|| {
-            let nested = others.iter().any(|other| shares_samples(image, other, &display));
-            if nested { Samples::Nested } else { Samples::Independent }
-        });
+        let samples = match samples {
+            Some(samples) => samples,
+            None if evidence == Evidence::Halves => recognise(image, others, &display)?,
+            None => Samples::Independent,
+        };
         let other = match evidence {
             Evidence::Alone => None,
             Evidence::Halves => Some(pool(others, image.spp, samples).ok_or(StillError::Nothing)?),
@@ -203,6 +218,19 @@ impl<'a> SnapshotPair<'a> {
     }
 }
 
+/// Whether the pictures share samples, as far as they show it: one that does not show it must not be guessed.
+fn recognise(image: &Still, others: &[&Still], display: &Display) -> Result<Samples, StillError> {
+    let told: Vec<Option<Samples>> =
+        others.iter().map(|other| shared_samples(image.snapshot(), other.snapshot(), display)).collect();
+    if told.contains(&Some(Samples::Nested)) {
+        return Ok(Samples::Nested);
+    }
+    match told.iter().position(Option::is_none) {
+        Some(at) => Err(StillError::Undecided { image: image.spp, other: others[at].spp }),
+        None => Ok(Samples::Independent),
+    }
+}
+
 /// Independent renderings make one of all their samples. Of nested ones, the one that differs most in its samples says most.
 fn pool<'a>(others: &[&'a Still], image_spp: f64, samples: Samples) -> Option<Cow<'a, Still>> {
     let distance = |r: &Still| (1.0 / r.spp - 1.0 / image_spp).abs();
@@ -221,32 +249,4 @@ fn pool<'a>(others: &[&'a Still], image_spp: f64, samples: Samples) -> Option<Co
         all.spp += one.spp;
     }
     Some(all)
-}
-
-/// Whether two pictures look like stages of one rendering, in the noise masks of their green channels.
-///
-/// With d = A − B and s = A + B, Σd·s is N·(Var A − Var B) = Nσ²·(1/a − 1/b) either way, since texture does not correlate with d. Σd² is
-/// Nσ²·(1/a + 1/b) for independent samples, and Nσ²·|1/a − 1/b| for nested ones. Between the two expected ratios, the nearer one in the
-/// logarithm decides; where they differ by less than threefold it cannot be told, and matters little. As many samples are not nested.
-fn shares_samples(image: &Still, other: &Still, display: &Display) -> bool {
-    let (a, b) = (1.0 / image.spp, 1.0 / other.spp);
-    let independent = (a + b) / (a - b).abs();
-    if !independent.is_finite() || independent < 3.0 {
-        return false;
-    }
-    let mask = NoiseMask::default();
-    let green = |still: &Still| {
-        let encoded = still.pixels.iter().map(|p| display.encode(*p)[1]).collect();
-        Array2::from_shape_vec((still.size.1, still.size.0), encoded).map(|plane| mask.apply(&plane))
-    };
-    let (Ok(image_mask), Ok(other_mask)) = (green(image), green(other)) else { return false };
-    let (mut difference, mut product) = (0.0f64, 0.0f64);
-    for (&x, &y) in image_mask.iter().zip(&other_mask) {
-        let (d, s) = (f64::from(x - y), f64::from(x + y));
-        difference += d * d;
-        product += d * s * (a - b).signum();
-    }
-    let rounding = f64::from(mask.white_noise_gain() * (image.rounding + other.rounding));
-    difference -= rounding * image.pixels.len() as f64;
-    difference > 0.0 && product > difference / independent.sqrt()
 }

@@ -1,6 +1,6 @@
 use noisefloor::{
-    Described, Descriptor, DescriptorError, DescriptorKind, Evidence, Model, ModelError, SvmParams, TileDescriptor,
-    TileGrid, TilePlanes, ToneMapping,
+    Described, Descriptor, DescriptorError, DescriptorKind, Evidence, Model, ModelError, SvmParams,
+    TileDescriptor, TileGrid, TilePlanes, ToneMapping,
 };
 use noisefloor_learn::{Level, Origin, Table, TrainParams, Zone, read_table_with, train, write_table};
 use std::collections::BTreeMap;
@@ -104,5 +104,8 @@ fn one_more_descriptor_is_added_in_one_place() {
     model.write(&mut file).unwrap();
     assert_eq!(Model::read_with(&file[..], &[KIND]).unwrap(), model);
     let error = Model::read(&file[..]).unwrap_err();
-    assert!(matches!(error, ModelError::UnknownDescriptor(_)) && error.to_string().contains("plain-noise"), "{error}");
+    assert!(
+        matches!(error, ModelError::UnknownDescriptor(_)) && error.to_string().contains("plain-noise"),
+        "{error}"
+    );
 }

@@ -110,6 +110,7 @@ fn what_is_done_stays_done() {
     assert!(driver.session().is_done());
 }
 
+#[cfg(feature = "bundled-model")]
 #[test]
 fn another_job_is_refused() {
     let bytes = kept(&broken_off(FixedSpp(40), 1));
@@ -117,7 +118,7 @@ fn another_job_is_refused() {
         let driver = Driver::new(Noise(repeats), FixedSpp(samples), params).unwrap();
         driver.resume(job, Checkpoint::read(&bytes[..]).unwrap()).err().map(|e| e.to_string())
     };
-    let other = |what: &str| format!("the checkpoint is of another job: its {what} is");
+    let other = |what: &str| format!("the checkpoint belongs to another job: its {what} is");
     let begins = |error: Option<String>, with: &str| {
         let error = error.unwrap();
         assert!(error.starts_with(with), "{error}");
@@ -129,7 +130,15 @@ fn another_job_is_refused() {
         refused(Repeats::Samples, 40, Params { consecutive: 2, ..params() }, "noise"),
         &other("set of parameters"),
     );
-    begins(refused(Repeats::Calls, 40, params(), "noise"), "noise does not promise");
+    let other_model = {
+        let driver = broken_off(Oracle::bundled(), 1);
+        let checkpoint = Checkpoint::read(&kept(&driver)[..]).unwrap();
+        let stricter = Oracle::new(crate::Model::bundled(), crate::Threshold::new(0.95).unwrap());
+        let driver = Driver::new(Noise(Repeats::Samples), stricter, params()).unwrap();
+        driver.resume("noise", checkpoint).err().map(|e| e.to_string())
+    };
+    begins(other_model, &other("criterion"));
+    begins(refused(Repeats::Calls, 40, params(), "noise"), "noise cannot be resumed");
 }
 
 #[test]
