@@ -1,4 +1,8 @@
 use noisefloor::{Batch, ProgressiveSource, Reference, Repeats, Request, Rgb, SourceError, SourceInfo, Unit};
+use noisefloor_sidecar::{Renderer, find, probe};
+use noisefloor_testkit::{Requirement, require};
+use std::collections::BTreeMap;
+use std::sync::Mutex;
 
 /// Noise without a renderer. A sample of a pixel is `radiance`·(1 ± `noise`), one as likely as the other. All follows from (seed,
 /// pixel, sample).
@@ -118,27 +122,11 @@ impl<S: ProgressiveSource> ProgressiveSource for Altered<S> {
     }
 }
 
-/// Whether a renderer in another process can be used here. If not, its test is skipped, aloud; where
-/// NOISEFLOOR_REQUIRE_RENDERERS is set, it fails.
-pub(crate) fn usable(renderer: &noisefloor_sidecar::Renderer) -> bool {
-    let probed =
-        noisefloor_sidecar::find(renderer).and_then(|python| noisefloor_sidecar::probe(renderer, &python));
-    if let Err(error) = &probed {
-        assert!(std::env::var_os("NOISEFLOOR_REQUIRE_RENDERERS").is_none(), "{error}");
-        eprintln!("SKIPPED: {error}");
-    }
-    probed.is_ok()
-}
-
-/// Resident memory of a process in KiB, where the system tells it.
-pub(crate) fn resident(process: u32) -> Option<u64> {
-    let status = std::fs::read_to_string(format!("/proc/{process}/status")).ok()?;
-    let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:"))?;
-    line.trim().trim_end_matches(" kB").parse().ok()
-}
-
-/// Whether a process runs, where the system tells it; one that is dead and not yet reaped does not.
-pub(crate) fn alive(process: u32) -> bool {
-    let stat = std::fs::read_to_string(format!("/proc/{process}/stat")).unwrap_or_default();
-    stat.rsplit_once(')').is_some_and(|(_, rest)| !rest.trim_start().starts_with(['Z', 'X']))
+/// Whether a renderer in another process can be used here; `require` says so if not.
+pub(crate) fn usable(renderer: &Renderer) -> bool {
+    // Loading one takes seconds, and many tests ask
+    static PROBED: Mutex<BTreeMap<&str, Result<String, String>>> = Mutex::new(BTreeMap::new());
+    let probe = || find(renderer).and_then(|python| probe(renderer, &python)).map_err(|e| e.to_string());
+    let probed = PROBED.lock().unwrap().entry(renderer.name).or_insert_with(probe).clone();
+    require(Requirement::Renderers, probed).is_some()
 }

@@ -1,23 +1,8 @@
 use noisefloor::{Oracle, Samples, Tile, TilePlanes, residual_scale};
 use noisefloor_image::{DisplayImage, Picture, read_picture};
 use noisefloor_learn::{Corpus, JudgedZone, ZoneImages};
-use std::io::Write;
+use noisefloor_testkit::require_shared;
 use std::path::{Path, PathBuf};
-
-/// `human/<name>` in `NOISEFLOOR_SHARED`, or else in `../shared` beside the repository.
-fn human(name: &str) -> Option<PathBuf> {
-    let beside = || PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared"));
-    let root = std::env::var_os("NOISEFLOOR_SHARED").map_or_else(beside, PathBuf::from);
-    let path = root.join("human").join(name);
-    if path.is_dir() {
-        return Some(path);
-    }
-    // Past the capture of the test harness, which keeps what passing tests print to itself
-    let stderr = &mut std::io::stderr();
-    writeln!(stderr, "SKIPPED: no {}; set NOISEFLOOR_SHARED to the folder of shared data", path.display())
-        .unwrap();
-    None
-}
 
 /// A picture as observers saw it, and its samples per pixel.
 fn shown(folder: &Path, spp: u64) -> (DisplayImage, f64) {
@@ -50,7 +35,7 @@ fn converged(
 /// Of what production renderers made: most zones of the first pictures are noisy, most of the last ones are not.
 #[test]
 fn early_pictures_are_noisy_and_last_ones_are_not() {
-    let Some(dir) = human("lisic9") else { return };
+    let Some(dir) = require_shared("human/lisic9") else { return };
     let corpus = Corpus::open(&dir).unwrap();
     let oracle = Oracle::bundled();
     let (mut zones, mut early, mut late) = (0, 0, 0);

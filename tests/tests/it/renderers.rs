@@ -1,9 +1,11 @@
-use crate::kit::{resident, usable};
+use crate::kit::usable;
 use noisefloor::{Batch, ProgressiveSource, Request, Rgb, Tile, TileGrid};
 use noisefloor_luxcore::{Engine, Sampler};
 use noisefloor_ptwne::{Ptwne, RenderOptions, scenes};
 use noisefloor_sidecar::{Job, Sidecar, SidecarError};
 use noisefloor_testkit::check_source;
+#[cfg(target_os = "linux")]
+use noisefloor_testkit::resident_kib;
 use std::path::PathBuf;
 
 /// The Cornell box in another renderer's format.
@@ -120,6 +122,7 @@ fn the_cornell_box_is_the_same_in_luxcore() {
 }
 
 /// A leak of 16 KB a call would show. Metropolis waits some tenths of a second in each, and gets fewer.
+#[cfg(target_os = "linux")]
 #[test]
 fn memory_is_flat_over_a_thousand_calls() {
     let flat = |mut source: Sidecar, calls: u64| {
@@ -127,12 +130,10 @@ fn memory_is_flat_over_a_thousand_calls() {
         let mut call = |first| drop(source.sample(&[Request { tile, first, spp: 1 }]).unwrap());
         (0..calls / 10).for_each(&mut call);
         let process = source.process_id().unwrap();
-        let Some(before) = resident(process) else {
-            return eprintln!("SKIPPED: nothing tells the memory of a process");
-        };
+        let before = resident_kib(process);
         let mut call = |first| drop(source.sample(&[Request { tile, first, spp: 1 }]).unwrap());
         (calls / 10..calls).for_each(&mut call);
-        let after = resident(process).unwrap();
+        let after = resident_kib(process);
         let name = source.info().name;
         assert!(after < before + 16 * calls, "{name}: {before} KiB before, {after} KiB after {calls} calls");
     };

@@ -1,7 +1,7 @@
 use crate::kit::{column, command, fail, grey_exr, json, succeed, text};
 use noisefloor_image::read_exr;
+use noisefloor_testkit::{Requirement, require, require_python};
 use std::path::Path;
-use std::process::Command;
 use tempfile::tempdir;
 
 const CORNELL_BOX: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../fixtures/cornell-box.xml");
@@ -34,10 +34,8 @@ fn a_folder_of_pictures_is_played_back() {
 /// A program that writes PFM, here in Python, in whole images: until the oracle is satisfied or the samples are used up.
 #[test]
 fn a_command_renders() {
-    let python = if cfg!(windows) { "python" } else { "python3" };
-    if !Command::new(python).arg("-V").output().is_ok_and(|o| o.status.success()) {
-        return eprintln!("SKIPPED: no {python} on the path, commands are not tested");
-    }
+    let Some(python) = require_python() else { return };
+    let python = text(&python);
     let folder = tempdir().unwrap();
     let script = folder.path().join("render it.py");
     let program = "import array, random, sys\n\
@@ -115,10 +113,8 @@ fn the_doctor_says_what_is_missing() {
 fn mitsuba_renders_until_the_oracle_is_satisfied() {
     let doctor = command(&["doctor"]).output().unwrap();
     let said = String::from_utf8(doctor.stdout).unwrap();
-    if !said.lines().any(|line| line.starts_with("mitsuba    yes")) {
-        assert!(std::env::var_os("NOISEFLOOR_REQUIRE_RENDERERS").is_none(), "{said}");
-        return eprintln!("SKIPPED: {said}");
-    }
+    let usable = said.lines().any(|line| line.starts_with("mitsuba    yes"));
+    let Some(()) = require(Requirement::Renderers, if usable { Ok(()) } else { Err(said) }) else { return };
     let folder = tempdir().unwrap();
     let out = folder.path().join("out");
     let more = ["--size", "64x48", "--max-spp", "200", "--max-depth", "5", "--threads", "2", "--seed", "9"];

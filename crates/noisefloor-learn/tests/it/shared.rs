@@ -1,29 +1,11 @@
 use noisefloor::{ProgressiveSource, Request, TileGrid};
 use noisefloor_image::StackSource;
 use noisefloor_learn::{Corpus, Encoding};
-use std::io::Write;
-use std::path::PathBuf;
-
-/// `human/<name>` in `NOISEFLOOR_SHARED`, or else in `../shared` beside the repository.
-fn human(name: &str) -> Option<PathBuf> {
-    let root = std::env::var_os("NOISEFLOOR_SHARED").map_or_else(
-        || PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared")),
-        PathBuf::from,
-    );
-    let path = root.join("human").join(name);
-    if path.is_dir() {
-        return Some(path);
-    }
-    // Past the capture of the test harness, which keeps what passing tests print to itself
-    let stderr = &mut std::io::stderr();
-    writeln!(stderr, "SKIPPED: no {}; set NOISEFLOOR_SHARED to the folder of shared data", path.display())
-        .unwrap();
-    None
-}
+use noisefloor_testkit::require_shared;
 
 #[test]
 fn lisic9_is_read() {
-    let Some(dir) = human("lisic9") else { return };
+    let Some(dir) = require_shared("human/lisic9") else { return };
     let corpus = Corpus::open(&dir).unwrap();
     assert_eq!((corpus.scenes().len(), corpus.zones().len()), (7, 112));
     let levels: Vec<_> = corpus.scene_levels("Selles").unwrap().map(Result::unwrap).collect();
@@ -55,7 +37,7 @@ fn lisic9_is_read() {
 
 #[test]
 fn staircase_is_read() {
-    let Some(dir) = human("sin3d-rerendered/staircase2-view0") else { return };
+    let Some(dir) = require_shared("human/sin3d-rerendered/staircase2-view0") else { return };
     let corpus = Corpus::open(&dir).unwrap();
     assert_eq!((corpus.scenes(), corpus.zones().len()), (vec!["staircase2-view0"], 16));
     let mut count = 0;

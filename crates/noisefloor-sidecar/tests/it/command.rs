@@ -1,24 +1,15 @@
 use noisefloor::{ProgressiveSource, Request, SourceError, Tile, TileGrid};
 use noisefloor_sidecar::{CommandError, CommandOptions, CommandSource};
+use noisefloor_testkit::require_python;
 use std::collections::HashSet;
 use std::error::Error;
 use std::path::{Path, PathBuf};
-use std::process::Command;
 use std::time::Duration;
 use tempfile::TempDir;
 
 const SCRIPT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/it/renderer.py");
 /// What renderer.py renders.
 const SIZE: (usize, usize) = (20, 12);
-
-fn python() -> Option<&'static str> {
-    let python = if cfg!(windows) { "python" } else { "python3" };
-    let runs = Command::new(python).arg("-V").output().is_ok_and(|o| o.status.success());
-    if !runs {
-        eprintln!("SKIPPED: no {python} on the path, commands are not tested");
-    }
-    runs.then_some(python)
-}
 
 fn options(scene: Option<&str>) -> CommandOptions {
     let mut options = CommandOptions::default();
@@ -27,8 +18,9 @@ fn options(scene: Option<&str>) -> CommandOptions {
 }
 
 /// A command with all it needs, and the log of its runs.
-fn template(python: &str, folder: &Path, more: &str) -> String {
+fn template(python: &Path, folder: &Path, more: &str) -> String {
     let log = folder.join("log");
+    let python = python.display();
     format!("{python} '{SCRIPT}' 'log={}' seed={{seed}} spp={{spp}} out={{out}}.pfm {more}", log.display())
 }
 
@@ -51,12 +43,12 @@ fn expected(tile: &Tile, samples: u64) -> Vec<[f32; 3]> {
 /// tells it.
 #[test]
 fn a_command_that_aims_renders_tiles() {
-    let Some(python) = python() else { return };
+    let Some(python) = require_python() else { return };
     for how in ["tile", "whole"] {
         let folder = tempfile::tempdir().unwrap();
         let more = format!("x0={{x0}} x1={{x1}} y0={{y0}} y1={{y1}} how={how}");
         let size = (how == "tile").then_some(SIZE);
-        let command = template(python, folder.path(), &more);
+        let command = template(&python, folder.path(), &more);
         let mut options = options(None);
         options.size = size;
         let mut source = CommandSource::new(&command, options).unwrap();
@@ -77,9 +69,9 @@ fn a_command_that_aims_renders_tiles() {
 
 #[test]
 fn a_command_that_cannot_aim_renders_all_tiles_at_once() {
-    let Some(python) = python() else { return };
+    let Some(python) = require_python() else { return };
     let folder = tempfile::tempdir().unwrap();
-    let mut source = CommandSource::new(&template(python, folder.path(), ""), options(None)).unwrap();
+    let mut source = CommandSource::new(&template(&python, folder.path(), ""), options(None)).unwrap();
     let info = source.info();
     assert_eq!((info.width, info.height, info.aims), (SIZE.0, SIZE.1, false));
     let tiles: Vec<_> = TileGrid::new(SIZE.0, SIZE.1, 16).unwrap().tiles().collect();
@@ -118,7 +110,7 @@ fn templates_that_cannot_work_are_refused() {
 
 #[test]
 fn failures_are_told_with_the_last_words() {
-    let Some(python) = python() else { return };
+    let Some(python) = require_python() else { return };
     let folder = tempfile::tempdir().unwrap();
     for (how, words) in [
         ("fail", "exit status: 3; its last words: no lamp in hall scene.xml"),
@@ -132,7 +124,7 @@ fn failures_are_told_with_the_last_words() {
         let timeout = Duration::from_secs(if how == "hang" { 1 } else { 60 });
         let mut options = options(Some("hall scene.xml"));
         (options.size, options.timeout) = (Some(SIZE), timeout);
-        let mut source = CommandSource::new(&template(python, folder.path(), &more), options).unwrap();
+        let mut source = CommandSource::new(&template(&python, folder.path(), &more), options).unwrap();
         let tile = tile(2, 4, 4, 4, 4);
         let error = source.sample(&[Request { tile, first: 0, spp: 1 }]).unwrap_err();
         let SourceError::Failed { tile: Some(2), cause, .. } = &error else { panic!("{error:?}") };
@@ -145,21 +137,21 @@ fn failures_are_told_with_the_last_words() {
 #[test]
 fn a_command_leaves_nothing_and_takes_any_name() {
     use std::os::unix::ffi::OsStrExt;
-    let Some(python) = python() else { return };
+    let Some(python) = require_python() else { return };
     let folder = tempfile::tempdir().unwrap();
     let scene = folder.path().join(std::ffi::OsStr::from_bytes(b"hall\xff.xml"));
     std::fs::write(&scene, "a scene").unwrap();
     let more = "x0={x0} x1={x1} y0={y0} y1={y1} exists={scene} how=fork";
     let mut options = options(None);
     (options.scene, options.size) = (Some(scene), Some(SIZE));
-    let mut source = CommandSource::new(&template(python, folder.path(), more), options.clone()).unwrap();
+    let mut source = CommandSource::new(&template(&python, folder.path(), more), options.clone()).unwrap();
     source.sample(&[Request { tile: tile(0, 0, 0, 4, 4), first: 0, spp: 1 }]).unwrap();
     let pid = std::fs::read_to_string(folder.path().join("log.fork")).unwrap();
     let pid = pid.parse().unwrap();
     assert!(crate::life::gone_within(pid, Duration::from_secs(10)), "process {pid} is left behind");
 
     let more = "x0={x0} x1={x1} y0={y0} y1={y1} exists={scene} how=paint";
-    let mut source = CommandSource::new(&template(python, folder.path(), more), options).unwrap();
+    let mut source = CommandSource::new(&template(&python, folder.path(), more), options).unwrap();
     let error = source.sample(&[Request { tile: tile(0, 0, 0, 4, 4), first: 0, spp: 1 }]).unwrap_err();
     let said = error.source().unwrap().to_string();
     assert!(said.contains("\\u{1b}]0;owned\\u{7}") && !said.contains('\x1b'), "{said:?}");

@@ -1,8 +1,8 @@
 use noisefloor::{Request, Rgb, Tile, TileGrid};
 use noisefloor_sidecar::{HostOptions, Job, Renderer, Sidecar, SidecarError};
+use noisefloor_testkit::require_python;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::process::Command;
 use std::time::Duration;
 use tempfile::TempDir;
 
@@ -18,16 +18,6 @@ pub(crate) const FAKE: Renderer = Renderer {
 /// The image of the fake renderer: 4 tiles of 32 pixels, all but the first ragged.
 pub(crate) const SIZE: (usize, usize) = (48, 40);
 
-/// An interpreter, or `None` with a word about it.
-pub(crate) fn python() -> Option<PathBuf> {
-    let python = if cfg!(windows) { "python" } else { "python3" };
-    let runs = Command::new(python).arg("-V").output().is_ok_and(|o| o.status.success());
-    if !runs {
-        eprintln!("SKIPPED: no {python} on the path, the sidecar is not tested");
-    }
-    runs.then(|| python.into())
-}
-
 /// Calls of the fake renderer, with a folder for its files.
 pub(crate) struct Fake {
     python: PathBuf,
@@ -37,9 +27,9 @@ pub(crate) struct Fake {
 }
 
 impl Fake {
-    /// `None`, aloud, without Python.
+    /// `None` without Python, as `require_python` says it.
     pub(crate) fn new(how: &str) -> Option<Self> {
-        let python = python()?;
+        let python = require_python()?;
         let folder = tempfile::tempdir().unwrap();
         let scene = folder.path().join("scene π.fake");
         std::fs::write(&scene, "lamps").unwrap();

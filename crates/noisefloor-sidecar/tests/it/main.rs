@@ -1,5 +1,4 @@
-//! A renderer written in Python over `host.py` that can be told to misbehave. Without Python these tests are
-//! skipped, aloud.
+//! A renderer written in Python over `host.py` that can be told to misbehave. They need Python.
 #![allow(clippy::unwrap_used, reason = "a panic in a test is how a test fails")]
 
 mod command;

@@ -1,10 +1,11 @@
-use crate::kit::{FAKE, python};
+use crate::kit::FAKE;
 use noisefloor_sidecar::{Renderer, SetupError, find, install, private_folder, probe};
+use noisefloor_testkit::require_python;
 use std::path::Path;
 
 #[test]
 fn a_probe_tells_the_version_or_why_not() {
-    let Some(python) = python() else { return };
+    let Some(python) = require_python() else { return };
     assert_eq!(probe(&FAKE, &python).unwrap(), "1.0");
     let broken = Renderer { probe: "import no_such_renderer", ..FAKE };
     let said = probe(&broken, &python).unwrap_err().to_string();
@@ -31,7 +32,7 @@ fn what_is_missing_is_said_with_its_cure() {
         said.contains("noisefloor doctor --install nowhere") && said.contains("NOISEFLOOR_NOWHERE_PYTHON")
     );
     let old = Renderer { name: "old", pythons: &[2], ..FAKE };
-    if python().is_some() {
+    if require_python().is_some() {
         let error = install(&old, |_| ()).unwrap_err();
         assert!(matches!(&error, SetupError::NoPython { wanted, .. } if wanted == "3.2"), "{error}");
     }

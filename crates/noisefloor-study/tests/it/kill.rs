@@ -14,6 +14,7 @@ pub(crate) const STUDY: &str = "NOISEFLOOR_TEST_STUDY";
 /// Not a test: the server, when another test starts this program again with a study. It prints its address,
 /// and runs until it is killed.
 #[test]
+#[ignore = "a part of other tests"]
 fn serve_for_another_process() {
     let Some(file) = std::env::var_os(STUDY) else { return };
     let study = Arc::new(Study::open(file).unwrap());
@@ -28,6 +29,7 @@ fn serve_for_another_process() {
 
 /// Not a test: an explorer, likewise.
 #[test]
+#[ignore = "a part of other tests"]
 fn explore_for_another_process() {
     let Some(dir) = std::env::var_os(STUDY).map(std::path::PathBuf::from) else { return };
     let pictures = [100, 400, 1600].map(|spp| dir.join(format!("wall/{spp:05}.png"))).to_vec();
@@ -49,7 +51,7 @@ pub(crate) fn process(folder: &Folder) -> (std::process::Child, String) {
 /// This program again, as one of the servers above, and its address.
 pub(crate) fn start(what: &str, of: &std::path::Path) -> (std::process::Child, String) {
     let mut child = Command::new(std::env::current_exe().unwrap())
-        .args(["--exact", what, "--nocapture"])
+        .args(["--exact", what, "--ignored", "--nocapture"])
         .env(STUDY, of)
         .stdout(Stdio::piped())
         .spawn()
