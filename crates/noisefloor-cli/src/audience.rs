@@ -1,12 +1,12 @@
 //! `noisefloor audience`.
 
-use crate::args::{AudienceCommand, FitArgs};
+use crate::say::say;
 use anyhow::{Context, bail};
 use csv::{ReaderBuilder, Trim};
 use noisefloor::Audience;
 use noisefloor_learn::{AudienceFit, MAX_PAIRS};
 use serde::Serialize;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Columns of the pairs.
 const COLUMNS: [&str; 2] = ["observers", "audience"];
@@ -21,32 +21,33 @@ struct Report {
     argument: String,
 }
 
-pub fn run(command: &AudienceCommand) -> anyhow::Result<()> {
-    let AudienceCommand::Fit(args) = command;
-    fit(args)
+/// A table of pairs to fit a line to.
+pub struct FitJob {
+    pub file: PathBuf,
+    pub json: bool,
 }
 
-fn fit(args: &FitArgs) -> anyhow::Result<()> {
-    let fit = AudienceFit::new(&read(&args.file)?).with_context(|| args.file.display().to_string())?;
+pub fn fit(job: &FitJob) -> anyhow::Result<()> {
+    let fit = AudienceFit::new(&read(&job.file)?).with_context(|| job.file.display().to_string())?;
     let Audience { slope, offset } = fit.line;
     let argument = format!("{slope:.4},{offset:.2}");
-    if args.json {
-        println!("{}", serde_json::to_string_pretty(&Report { fit, argument })?);
+    if job.json {
+        say!("{}", serde_json::to_string_pretty(&Report { fit, argument })?)?;
         return Ok(());
     }
     let sign = if offset < 0.0 { '-' } else { '+' };
     let r = fit.correlation.map_or("undefined".into(), |r| format!("{r:.3}"));
-    println!("T' = {slope:.3} T {sign} {:.1}, from {} pairs, r = {r}", offset.abs(), fit.pairs);
+    say!("T' = {slope:.3} T {sign} {:.1}, from {} pairs, r = {r}", offset.abs(), fit.pairs)?;
     let [[a, b], [c, d]] = [fit.slope_interval, fit.offset_interval];
-    println!("95 % intervals: slope {a:.3} to {b:.3}, offset {c:.1} to {d:.1}");
+    say!("95 % intervals: slope {a:.3} to {b:.3}, offset {c:.1} to {d:.1}")?;
     if fit.pairs < FEW_PAIRS {
-        println!("with fewer than {FEW_PAIRS} pairs, the intervals are too narrow: gather more");
+        say!("with fewer than {FEW_PAIRS} pairs the intervals are too narrow: gather more")?;
     }
-    println!("use it with: noisefloor render --audience {argument}");
+    say!("use it with: noisefloor render --audience {argument}")?;
     Ok(())
 }
 
-/// Reads the pairs (T, T′); columns beside the two are passed over.
+/// Reads the pairs (T, T′); other columns are ignored.
 fn read(path: &Path) -> anyhow::Result<Vec<(f64, f64)>> {
     let name = path.display();
     let open = || format!("{name}: cannot be read");

@@ -1,9 +1,14 @@
 //! `noisefloor doctor`.
 
-use crate::args::DoctorArgs;
+use crate::say::{note, say};
 use crate::sources::{ADAPTERS, Adapter};
 use noisefloor_sidecar::{SetupError, find, install, probe};
 use std::process::ExitCode;
+
+/// What to look at, or to install.
+pub struct DoctorJob {
+    pub install: Option<&'static Adapter>,
+}
 
 /// One line of the table, and what is to be said below it.
 struct Row {
@@ -12,11 +17,13 @@ struct Row {
     broken: bool,
 }
 
-pub fn run(args: &DoctorArgs) -> anyhow::Result<ExitCode> {
-    if let Some(adapter) = args.install {
-        let python = install(adapter.renderer, |line| eprintln!("{line}"))?;
-        println!("{} is installed: {}", adapter.renderer.title, python.display());
-        (adapter.notes)().iter().for_each(|note| println!("note: {note}"));
+pub fn run(job: &DoctorJob) -> anyhow::Result<ExitCode> {
+    if let Some(adapter) = job.install {
+        let python = install(adapter.renderer, |line| note!("{line}"))?;
+        say!("{} is installed: {}", adapter.renderer.title, python.display())?;
+        for text in (adapter.notes)() {
+            say!("note: {text}")?;
+        }
         return Ok(ExitCode::SUCCESS);
     }
     let own = [env!("CARGO_PKG_VERSION"), "built in"].map(str::to_owned);
@@ -25,11 +32,13 @@ pub fn run(args: &DoctorArgs) -> anyhow::Result<ExitCode> {
     // Several sources may be one renderer's
     let renderers = ADAPTERS.iter().filter(|adapter| adapter.name == adapter.renderer.name);
     let rows: Vec<Row> = std::iter::once(ptwne).chain(renderers.map(examine)).collect();
-    let line = |cells: [&str; 4]| println!("{:10} {:7} {:10} {}", cells[0], cells[1], cells[2], cells[3]);
-    line(["renderer", "usable", "version", "where"]);
+    let line = |cells: [&str; 4]| say!("{:10} {:7} {:10} {}", cells[0], cells[1], cells[2], cells[3]);
+    line(["renderer", "usable", "version", "where"])?;
     for row in &rows {
-        line(row.cells.each_ref().map(String::as_str));
-        row.notes.iter().for_each(|note| println!("{:10} {note}", ""));
+        line(row.cells.each_ref().map(String::as_str))?;
+        for text in &row.notes {
+            say!("{:10} {text}", "")?;
+        }
     }
     Ok(if rows.iter().any(|row| row.broken) { ExitCode::FAILURE } else { ExitCode::SUCCESS })
 }

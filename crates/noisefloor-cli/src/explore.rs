@@ -1,28 +1,26 @@
 //! `noisefloor explore`.
 
-use crate::args::ExploreArgs;
-use crate::train::read_table_file;
+use crate::say::say;
 use anyhow::Context;
 use noisefloor_study::explore::{ExploreServer, ExploreSetup};
 use noisefloor_study::{Exposure, interrupted};
+use std::net::SocketAddr;
 use tokio::runtime::Builder;
 
-pub fn run(args: &ExploreArgs) -> anyhow::Result<()> {
-    let oracle = args.oracle.load()?;
-    let setup = ExploreSetup {
-        model: oracle.model().clone(),
-        threshold: oracle.threshold(),
-        audience: args.audience,
-        tile: args.tile,
-        database: args.database.clone(),
-        table: args.table.as_deref().map(read_table_file).transpose()?,
-        pictures: args.images.clone(),
-    };
+/// What to serve, and where: checked.
+pub struct ExploreJob {
+    pub setup: ExploreSetup,
+    pub listen: SocketAddr,
+    pub allow_host: Vec<String>,
+}
+
+pub fn run(job: ExploreJob) -> anyhow::Result<()> {
+    let database = job.setup.database.clone();
     let runtime = Builder::new_multi_thread().enable_all().build().context("no threads for the server")?;
     runtime.block_on(async {
-        let explorer = ExploreServer::bind(setup, args.listen, &Exposure::named(&args.allow_host)).await?;
-        println!("look at http://{}; Ctrl-C ends", explorer.address());
-        println!("disagreements are kept in {}", args.database.display());
+        let explorer = ExploreServer::bind(job.setup, job.listen, &Exposure::named(&job.allow_host)).await?;
+        say!("open http://{} in a browser; Ctrl-C ends the server", explorer.address())?;
+        say!("disagreements are stored in {}", database.display())?;
         explorer.run(interrupted()).await?;
         Ok(())
     })

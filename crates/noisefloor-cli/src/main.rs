@@ -1,81 +1,112 @@
-//! The `noisefloor` command. What can be typed is in [`args`]; each other module runs one command.
+//! The `noisefloor` command, in three steps: what was typed ([`args`]) becomes a checked job, and the job is run by the module of its
+//! command. Libraries do the work; nothing here computes.
 #![allow(missing_docs, unreachable_pub, reason = "a command has no public items")]
-#![allow(clippy::print_stdout, reason = "a command prints")]
 
 mod args;
+#[cfg(feature = "train")]
 mod audience;
 mod bars;
+#[cfg(feature = "lab")]
 mod compare;
+#[cfg(feature = "adapters")]
 mod doctor;
+#[cfg(feature = "train")]
 mod evaluate;
+#[cfg(feature = "study")]
 mod explore;
+mod files;
 mod inspect;
 mod judge;
+#[cfg(feature = "train")]
+mod learning;
+mod left_out;
 mod output;
 mod reference;
 mod render;
+#[cfg(feature = "lab")]
 mod reproduce;
+mod say;
+mod signals;
 mod sources;
+#[cfg(feature = "study")]
 mod study;
+#[cfg(feature = "train")]
 mod train;
 
 use args::{Cli, Command};
 use clap::Parser;
+use left_out::LeftOut;
+use say::{NotSaid, note, one_line};
 use std::process::ExitCode;
 
-/// Ended by Ctrl-C or SIGTERM, with everything written: 128 + SIGINT.
-const INTERRUPTED: u8 = 130;
-
-/// Whoever reads our output may have had enough (`noisefloor scenes | head -1`): that ends the command, and is no fault of its own.
-/// `println!` panics then; the signal that would end it before is ignored, since it also comes when a renderer we talk to dies.
-fn end_quietly_when_nobody_reads() {
-    let otherwise = std::panic::take_hook();
-    std::panic::set_hook(Box::new(move |panic| {
-        let broken =
-            |message: &str| message.starts_with("failed printing to std") && message.contains("Broken pipe");
-        if panic.payload().downcast_ref::<String>().is_some_and(|message| broken(message)) {
-            std::process::exit(0);
-        }
-        otherwise(panic);
-    }));
-}
-
 fn main() -> ExitCode {
-    end_quietly_when_nobody_reads();
-    let outcome = match Cli::parse().command {
-        Command::Render(args) => render::run(&args),
-        Command::Reference(args) => reference::run(&args),
-        Command::Compare(args) => compare::run(&args),
-        Command::Judge(args) => judge::run(&args).map(|()| ExitCode::SUCCESS),
-        Command::Train(args) => train::run(&args).map(|()| ExitCode::SUCCESS),
-        Command::Evaluate(args) => evaluate::run(&args).map(|()| ExitCode::SUCCESS),
-        Command::Explore(args) => explore::run(&args).map(|()| ExitCode::SUCCESS),
-        Command::Audience(args) => audience::run(&args.command).map(|()| ExitCode::SUCCESS),
-        Command::Reproduce(args) => reproduce::run(&args),
-        Command::Study(args) => study::run(&args.command).map(|()| ExitCode::SUCCESS),
-        Command::Inspect(args) => inspect::run(&args).map(|()| ExitCode::SUCCESS),
-        Command::Doctor(args) => doctor::run(&args),
-        Command::Scenes => {
-            inspect::scenes();
-            Ok(ExitCode::SUCCESS)
+    let outcome = match Cli::try_parse() {
+        Ok(cli) => run(cli.command),
+        // Help and version are no errors; what was typed wrong has exit code 2
+        Err(said) => {
+            let code = u8::try_from(said.exit_code()).unwrap_or(2);
+            said.print().map(|()| ExitCode::from(code)).map_err(|error| NotSaid::from(error).into())
         }
     };
-    outcome.unwrap_or_else(|error| {
-        eprintln!("error: {}", one_line(&error));
-        ExitCode::FAILURE
-    })
+    let outcome = outcome.and_then(|code| say::flush().map(|()| code).map_err(Into::into));
+    outcome.unwrap_or_else(|error| end(&error))
 }
 
-/// An error and its causes in one line; a cause that its parent already quotes is not said twice.
-fn one_line(error: &anyhow::Error) -> String {
-    let mut line = String::new();
-    for cause in error.chain().map(ToString::to_string) {
-        if !line.contains(&cause) {
-            if !line.is_empty() {
-                line.push_str(": ");
-            }
-            line.push_str(&cause);
-        }
+fn run(command: Command) -> anyhow::Result<ExitCode> {
+    match command {
+        Command::Render(args) => render::run(args.check()?),
+        Command::Reference(args) => reference::run(args.check()?),
+        Command::Judge(args) => judge::run(&args.check()?).map(done),
+        Command::Inspect(args) => inspect::run(&args.check()?).map(done),
+        Command::Scenes => Ok(inspect::scenes().map(done)?),
+        #[cfg(feature = "adapters")]
+        Command::Doctor(args) => doctor::run(&args.check()),
+        #[cfg(feature = "lab")]
+        Command::Compare(args) => compare::run(&args.check()?),
+        #[cfg(feature = "lab")]
+        Command::Reproduce(args) => reproduce::run(&args.check()).map(done),
+        #[cfg(feature = "train")]
+        Command::Train(args) => train::run(&args.check()?).map(done),
+        #[cfg(feature = "train")]
+        Command::Evaluate(args) => evaluate::run(&args.check()?).map(done),
+        #[cfg(feature = "train")]
+        Command::Audience(args) => audience::fit(&args.check()).map(done),
+        #[cfg(feature = "study")]
+        Command::Explore(args) => explore::run(args.check()?).map(done),
+        #[cfg(feature = "study")]
+        Command::Study(args) => study::run(args.check()?).map(done),
+        #[cfg(not(feature = "full"))]
+        command => Err(left_out(&command).into()),
     }
-    line.replace('\n', " ")
+}
+
+fn done((): ()) -> ExitCode {
+    ExitCode::SUCCESS
+}
+
+/// What to type for a command that is not in this build.
+#[cfg(not(feature = "full"))]
+fn left_out(command: &Command) -> LeftOut {
+    let (what, feature, again) = match command {
+        Command::Doctor(_) => ("doctor", "adapters", "doctor …"),
+        Command::Compare(_) => ("compare", "lab", "compare …"),
+        Command::Reproduce(_) => ("reproduce", "lab", "reproduce …"),
+        Command::Train(_) => ("train", "train", "train …"),
+        Command::Evaluate(_) => ("evaluate", "train", "evaluate …"),
+        Command::Audience(_) => ("audience", "train", "audience …"),
+        Command::Explore(_) => ("explore", "study", "explore …"),
+        Command::Study(_) => ("study", "study", "study …"),
+        _ => ("this command", "full", "…"),
+    };
+    LeftOut { what, feature, again }
+}
+
+/// Says what went wrong, in one line. Nothing is wrong if only nobody reads our output any more.
+fn end(error: &anyhow::Error) -> ExitCode {
+    let unsaid = error.chain().find_map(|cause| cause.downcast_ref::<NotSaid>());
+    if unsaid.is_some_and(NotSaid::nobody_reads) {
+        return ExitCode::SUCCESS;
+    }
+    note!("error: {}", one_line(error));
+    if error.is::<LeftOut>() { ExitCode::from(2) } else { ExitCode::FAILURE }
 }

@@ -4,6 +4,7 @@
 //! - [`describe_corpora`], [`describe_pairs`]: a corpus as a [`Table`] of descriptors; [`read_table`] and [`write_table`] keep it as CSV.
 //! - [`train`]: a [`noisefloor::Model`] from a table; [`leave_one_scene_out`]: predictions for scenes that the model has not seen.
 //! - [`score`], [`reliability`], [`constant_noise_baseline`], [`scene_median_baseline`]: how close predictions come to people.
+//! - [`Evaluation`]: all of these scores together.
 //! - [`AudienceFit`]: the line from the thresholds of one audience to those of another.
 
 mod answer;
@@ -12,6 +13,7 @@ mod baselines;
 mod corpus;
 mod describe;
 mod error;
+mod evaluation;
 mod fit;
 mod machine;
 mod observers;
@@ -31,6 +33,7 @@ pub use corpus::{
 };
 pub use describe::{Corpora, describe_corpora, describe_pairs, noise_level};
 pub use error::TableError;
+pub use evaluation::{Baselines, Evaluation, PredictionScores, SceneScores};
 pub use observers::{OBSERVERS_AT_THRESHOLD, observers_agreeing};
 pub use params::{TrainError, TrainParams};
 pub use predict::{Prediction, predict};

@@ -1,0 +1,151 @@
+//! `noisefloor compare`.
+
+use super::oracle::{OracleArgs, ToneArgs};
+use super::renderer::RendererArgs;
+use clap::Args;
+use noisefloor::DEFAULT_TILE;
+use std::path::PathBuf;
+
+/// Let stopping criteria watch one render, and compare what each one costs and what it leaves.
+///
+/// Each scene is rendered once, uniformly. Every criterion sees the same samples and takes those of a tile until it stops it. The report
+/// sets beside uniform sampling what each criterion took, what that cost, and how far its picture is from the converged one (relMSE,
+/// PSNR, FLIP, butteraugli).
+///
+/// Criteria: `oracle`; `spp:N`; `relative-error`, `dammertz`, `cycles`, `luxcore`, `vdp-stages`, `vdp-first`, each with a constant of its
+/// own (`cycles:0.02`) or with a default: Blender's 0.01 for `cycles`, and for the others the one that agrees with people on average.
+///
+/// Writes into the output folder: index.html with everything (one file that opens without a server), runs.csv, runs.json, and for each
+/// scene curve.csv, tiles.csv, plots (SVG and PNG), crops with error maps, the picture of every criterion, and the reference, which the
+/// next comparison of the same scene uses again.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  noisefloor compare cornell-box glass-spheres --size 256x256 --tile 64
+  noisefloor compare hall/scene.xml --reference hall.exr --criteria oracle,cycles:0.01,dammertz
+  noisefloor compare cornell-box --criteria oracle,cycles,dammertz --sweep 6    the rivals at six more constants each
+  noisefloor compare hall/scene.xml --source mitsuba --max-spp 1000")]
+pub struct CompareArgs {
+    /// Scenes, as for `render`.
+    #[arg(required = true, value_name = "SCENE")]
+    scenes: Vec<String>,
+    #[command(flatten)]
+    renderer: RendererArgs,
+    /// Output folder.
+    #[arg(long, value_name = "DIR", default_value = "out/compare")]
+    out: PathBuf,
+    /// The criteria.
+    #[arg(
+        long,
+        value_name = "NAME[:CONSTANT],…",
+        value_delimiter = ',',
+        default_value = "oracle,relative-error,dammertz,cycles,luxcore,vdp-stages,vdp-first"
+    )]
+    criteria: Vec<String>,
+    /// Also run each criterion that is given without a constant at N other constants, from strict to lax.
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=50))]
+    sweep: u32,
+    #[command(flatten)]
+    oracle: OracleArgs,
+    #[command(flatten)]
+    tone: ToneArgs,
+    /// Tile edge in pixels, 16…512.
+    #[arg(long, default_value_t = DEFAULT_TILE, value_name = "PIXELS")]
+    tile: usize,
+    /// Samples per pixel between two verdicts on a tile.
+    #[arg(long, default_value_t = 100, value_name = "SPP")]
+    batch: u64,
+    /// End the run at this many samples per pixel, even if criteria ask for more.
+    #[arg(long, value_name = "SPP", default_value_t = 2000)]
+    max_spp: u64,
+    /// The converged picture, in linear light [default: rendered with --reference-spp].
+    #[arg(long, value_name = "FILE.exr")]
+    reference: Option<PathBuf>,
+    /// Samples per pixel of a reference that is rendered.
+    #[arg(long, value_name = "SPP", default_value_t = 8000)]
+    reference_spp: u64,
+    /// Viewing distance, for FLIP: pixels per degree of the field of view.
+    #[arg(long, value_name = "N", default_value_t = 67.0)]
+    pixels_per_degree: f64,
+    /// No progress bar and no table.
+    #[arg(long, short)]
+    quiet: bool,
+}
+
+#[cfg(feature = "lab")]
+mod check {
+    use super::CompareArgs;
+    use crate::compare::{CompareJob, Named};
+    use anyhow::{Context, bail};
+    use noisefloor::{Oracle, Params, Schedule};
+    use noisefloor_rivals::RIVALS;
+
+    impl CompareArgs {
+        /// A comparison that can begin.
+        pub fn check(self) -> anyhow::Result<CompareJob> {
+            let params = self.params()?;
+            if self.reference.is_some() && self.scenes.len() > 1 {
+                bail!("--reference is of one scene, but {} are given", self.scenes.len());
+            }
+            // What is wrong with a criterion is found before the reference is rendered.
+            let oracle = self.oracle.check()?;
+            let specs = self.specs();
+            for spec in &specs {
+                criterion(spec, &oracle)?;
+            }
+            let source = self.renderer.check(None)?;
+            Ok(CompareJob {
+                scenes: self.scenes,
+                source,
+                out: self.out,
+                criteria: Box::new(move || specs.iter().map(|spec| criterion(spec, &oracle)).collect()),
+                params,
+                batch: self.batch,
+                reference: self.reference,
+                reference_spp: self.reference_spp,
+                pixels_per_degree: self.pixels_per_degree,
+                quiet: self.quiet,
+            })
+        }
+
+        /// Session parameters, checked.
+        fn params(&self) -> anyhow::Result<Params> {
+            let params = Params {
+                tile: self.tile,
+                tone_mapping: self.tone.check()?,
+                schedule: Schedule::Every { step: self.batch },
+                max_spp: self.max_spp,
+                ..Params::default()
+            };
+            params.check().with_context(|| {
+                format!("--tile {}, --batch {}, --max-spp {}", self.tile, self.batch, self.max_spp)
+            })?;
+            Ok(params)
+        }
+
+        /// Every criterion that was asked for, and the same ones at other constants if a sweep was.
+        fn specs(&self) -> Vec<String> {
+            let mut all = Vec::new();
+            for spec in &self.criteria {
+                all.push(spec.clone());
+                let Some(rival) = RIVALS.iter().find(|rival| rival.name == spec) else { continue };
+                let (strict, lax) = rival.range;
+                for i in 0..self.sweep {
+                    let place = (f64::from(i) + 0.5) / f64::from(self.sweep);
+                    let constant = strict * (lax / strict).powf(place);
+                    // Rounded, so that what is said is what was used
+                    all.push(format!("{}:{constant:.2e}", rival.name));
+                }
+            }
+            all
+        }
+    }
+
+    /// The criterion of a specification.
+    fn criterion(spec: &str, oracle: &Oracle) -> anyhow::Result<Named> {
+        let criterion = match spec {
+            "oracle" => Box::new(oracle.clone()),
+            _ => noisefloor_rivals::parse(spec)?,
+        };
+        Ok((spec.to_owned(), criterion))
+    }
+}

@@ -1,0 +1,85 @@
+//! `noisefloor evaluate`.
+
+use super::data::{DataArgs, SearchArgs};
+use super::values;
+use clap::Args;
+use noisefloor::Threshold;
+use noisefloor_rivals::Rival;
+use std::path::PathBuf;
+
+/// Score predicted thresholds against human ones.
+///
+/// Predicts for each zone the samples per pixel at which P crosses the threshold, and compares that with what people said: error
+/// factor exp(mean |ln ratio|), bias factor, and the share of zones that stop below half the human threshold. Two baselines stand
+/// beside it: one noise level for all scenes, and the median of the same scene's other zones. Levels between the given pictures are
+/// synthesised (noise ∝ 1/√n); the accuracy on images counts only real ones.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  noisefloor evaluate --table fixtures/human-table.csv --leave-one-scene-out
+  noisefloor evaluate --corpus study/mine --model my.nfm --json scores.json --csv zones.csv
+  noisefloor evaluate --corpus study/mine --leave-one-scene-out --figures out/scores
+  noisefloor evaluate --table fixtures/human-table.csv --leave-one-scene-out --without picture_noise")]
+pub struct EvaluateArgs {
+    #[command(flatten)]
+    data: DataArgs,
+    /// Model to score [default: the bundled one, which has seen the zones it was trained on].
+    #[arg(long, value_name = "FILE", conflicts_with = "leave_one_scene_out")]
+    model: Option<PathBuf>,
+    /// Predict each scene with a model that has seen neither the scene nor another view of its room.
+    #[arg(long)]
+    leave_one_scene_out: bool,
+    /// A tile has converged when P reaches this.
+    #[arg(long, default_value_t = Threshold::PAPER, value_name = "P")]
+    threshold: Threshold,
+    /// Write the scores as JSON.
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+    /// Write the thresholds of each zone as CSV: scene,zone,human_spp,predicted_spp,censored,unfamiliar.
+    #[arg(long, value_name = "FILE")]
+    csv: Option<PathBuf>,
+    /// Draw into this folder: both thresholds of each zone (over the pictures, with --corpus), predicted against human thresholds, and
+    /// the reliability of P.
+    #[arg(long, value_name = "DIR")]
+    figures: Option<PathBuf>,
+    /// Leave these numbers out of the descriptor, by their names in the table, to see what they are worth.
+    #[arg(long, value_name = "NAME,…", value_delimiter = ',', requires = "leave_one_scene_out")]
+    without: Vec<String>,
+    /// Also score what people use instead: other stopping criteria, by the names in `noisefloor compare --help`, each with a constant
+    /// fitted on the other scenes. Takes minutes each; the visible-differences predictors take an hour. With --figures, also plots
+    /// mean thresholds scene by scene. (Needs a build with the feature `lab`, and so does --figures.)
+    #[arg(long, value_name = "NAME,…", value_delimiter = ',', requires = "corpus", value_parser = values::rival)]
+    rivals: Vec<&'static Rival>,
+    #[command(flatten)]
+    search: SearchArgs,
+}
+
+#[cfg(feature = "train")]
+impl EvaluateArgs {
+    pub fn check(self) -> anyhow::Result<crate::evaluate::EvaluateJob> {
+        #[cfg(not(feature = "lab"))]
+        if self.figures.is_some() || !self.rivals.is_empty() {
+            let what = if self.rivals.is_empty() { "evaluate --figures" } else { "evaluate --rivals" };
+            return crate::left_out::left_out(what, "lab", "evaluate …");
+        }
+        let (mut data, params) = super::data::check_data(self.data, &self.search)?;
+        let model = match self.leave_one_scene_out {
+            true => None,
+            false => Some(super::oracle::load_model(self.model.as_deref())?),
+        };
+        // A model is scored by its own descriptor and evidence
+        if let Some(model) = &model {
+            (data.descriptor, data.evidence) = (model.descriptor().clone(), model.evidence());
+        }
+        Ok(crate::evaluate::EvaluateJob {
+            data,
+            params,
+            model,
+            threshold: self.threshold,
+            json: self.json,
+            csv: self.csv,
+            figures: self.figures,
+            without: self.without,
+            rivals: self.rivals,
+        })
+    }
+}

@@ -1,0 +1,99 @@
+//! `noisefloor judge`.
+
+use super::oracle::{OracleArgs, ToneArgs};
+use crate::judge::JudgeJob;
+use anyhow::bail;
+use clap::Args;
+use noisefloor::{DEFAULT_TILE, Evidence, Samples};
+use std::path::PathBuf;
+
+/// Say for each tile of a picture whether people would see noise in it.
+///
+/// Noise shows where two renderings of one scene differ, so a second picture is needed: the same view with other samples. Several are
+/// pooled. The verdict is on IMAGE only: its noise follows from the difference and the sample counts. PNGs are judged as they are; EXRs
+/// are tone mapped first.
+///
+/// Two snapshots of one progressive rendering share samples. If the pictures show it, the verdict takes it into account, and a note
+/// says so; --nested and --independent override this.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  noisefloor judge a.exr --spp 256 --against b.exr --spp 256       two independent renderings
+  noisefloor judge 00100.png --spp 100 --against 00900.png --spp 900 --nested --heat-map verdict.png
+  noisefloor judge a.exr --spp 64 --against b.exr --spp 64 --noise-map noise.png
+  noisefloor judge a.exr --spp 64 --against b.exr --spp 64 --json > verdicts.json")]
+pub struct JudgeArgs {
+    /// Picture to judge, PNG or EXR.
+    #[arg(value_name = "IMAGE")]
+    image: PathBuf,
+    /// Samples per pixel: first of IMAGE, then of each --against, in their order.
+    #[arg(long, required = true, value_name = "N")]
+    spp: Vec<f64>,
+    /// Another rendering of the same view. Repeat for more.
+    #[arg(long, required = true, value_name = "IMAGE")]
+    against: Vec<PathBuf>,
+    /// The pictures are snapshots of one progressive rendering: the later one contains the samples of the earlier one.
+    #[arg(long)]
+    nested: bool,
+    /// The pictures share no samples, whatever they look like.
+    #[arg(long, conflicts_with = "nested")]
+    independent: bool,
+    #[command(flatten)]
+    oracle: OracleArgs,
+    #[command(flatten)]
+    tone: ToneArgs,
+    /// Tile edge in pixels, 16…512.
+    #[arg(long, default_value_t = DEFAULT_TILE, value_name = "PIXELS")]
+    tile: usize,
+    /// Print JSON instead of a table.
+    #[arg(long)]
+    json: bool,
+    /// Write the probabilities as a heat map over the picture.
+    #[arg(long, value_name = "FILE.png")]
+    heat_map: Option<PathBuf>,
+    /// Write a map of the visible noise over the picture, in blocks of 8x8 pixels.
+    #[arg(long, value_name = "FILE.png")]
+    noise_map: Option<PathBuf>,
+    /// Write the picture as linear EXR, with probability and visible noise (in 8-bit steps) as channels.
+    #[arg(long, value_name = "FILE.exr")]
+    exr: Option<PathBuf>,
+}
+
+impl JudgeArgs {
+    pub fn check(self) -> anyhow::Result<JudgeJob> {
+        let tone = self.tone.check()?;
+        let oracle = self.oracle.check()?;
+        if oracle.model().evidence() != Evidence::Halves {
+            bail!(
+                "this model does not compare tiles with other samples, as `judge` does: use one that was trained on half buffers"
+            );
+        }
+        let pictures = 1 + self.against.len();
+        if self.spp.len() != pictures {
+            bail!("--spp is needed once for each picture: {} given for {pictures} pictures", self.spp.len());
+        }
+        if self.noise_map.is_some() && oracle.just_visible().is_none() {
+            bail!(
+                "--noise-map: a model with the {} descriptor has no map of visible noise; use one with the compact descriptor",
+                oracle.model().descriptor().name()
+            );
+        }
+        let samples = match (self.nested, self.independent) {
+            (true, _) => Some(Samples::Nested),
+            (_, true) => Some(Samples::Independent),
+            _ => None,
+        };
+        let against = self.against.into_iter().zip(self.spp[1..].iter().copied()).collect();
+        Ok(JudgeJob {
+            image: (self.image, self.spp[0]),
+            against,
+            samples,
+            oracle,
+            tone,
+            tile: self.tile,
+            json: self.json,
+            heat_map: self.heat_map,
+            noise_map: self.noise_map,
+            exr: self.exr,
+        })
+    }
+}

@@ -1,0 +1,44 @@
+//! `noisefloor reference`.
+
+use super::renderer::RendererArgs;
+use crate::reference::ReferenceJob;
+use anyhow::bail;
+use clap::Args;
+use std::path::PathBuf;
+
+/// Render the quick noise-free reference of a scene: direct light, and its reflections in mirrors and glass.
+///
+/// This is the ray-traced picture that Takouachet et al. compare noisy tiles with. Each part takes samples until its own noise is far
+/// below what people see. Light that diffuse surfaces scattered on its way is missing, so this is not the converged picture.
+///
+/// If a corpus has one as reference.exr beside its pictures, `train` and `evaluate` can use it with `--evidence reference`.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  noisefloor reference glass-spheres --size 512x512
+  noisefloor reference hall/scene.xml --out corpus/hall/reference.exr
+  noisefloor evaluate --corpus corpus --evidence reference")]
+pub struct ReferenceArgs {
+    /// Scene, as for `render`.
+    #[arg(value_name = "SCENE")]
+    scene: String,
+    #[command(flatten)]
+    renderer: RendererArgs,
+    /// The picture in linear light; a PNG of what it looks like is written beside it [default: out/SCENE-reference.exr].
+    #[arg(long, value_name = "FILE.exr")]
+    out: Option<PathBuf>,
+    /// No progress bar and no summary.
+    #[arg(long, short)]
+    quiet: bool,
+}
+
+impl ReferenceArgs {
+    pub fn check(self) -> anyhow::Result<ReferenceJob> {
+        if let Some(out) = &self.out
+            && out.extension().is_none_or(|ending| !ending.eq_ignore_ascii_case("exr"))
+        {
+            bail!("{}: the reference is written as EXR, so its name must end in .exr", out.display());
+        }
+        let source = self.renderer.check(Some(&self.scene))?;
+        Ok(ReferenceJob { source, out: self.out, quiet: self.quiet })
+    }
+}

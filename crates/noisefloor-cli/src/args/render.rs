@@ -1,0 +1,165 @@
+//! `noisefloor render`.
+
+use super::oracle::{OracleArgs, ToneArgs};
+use super::renderer::RendererArgs;
+use super::values;
+use crate::render::{Judge, RenderJob};
+use anyhow::bail;
+use clap::{Args, ValueEnum};
+use noisefloor::{Audience, DEFAULT_TILE, Params, Schedule};
+use std::path::PathBuf;
+use std::time::Duration;
+
+/// Render a scene, and stop each tile when nobody sees noise in it any more.
+///
+/// Writes into the output folder: image.exr (linear radiance; samples, probability, stop and visible noise as channels), image.png,
+/// stops.csv (one line a tile), stops.png (heat map of the samples), noise.png (the noise that is left, and how visible it is),
+/// timeline.csv and report.json. Files appear complete or not at all, and are refreshed while rendering (--autosave).
+///
+/// Ctrl-C stops all tiles and writes what there is (exit code 130). An interrupted or killed render continues with --resume.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  noisefloor render                                  the Cornell box, into out/cornell-box
+  noisefloor render glass-spheres --size 800x600 --seed 7    another scene; `noisefloor scenes` lists them
+  noisefloor render hall/scene.xml --out out/hall    a scene file: .gltf, .glb, or Mitsuba .xml
+  noisefloor render --source mitsuba hall/scene.xml  another renderer; `noisefloor doctor` lists them
+  noisefloor render --criterion spp:1000             for comparison: a fixed number of samples
+  noisefloor render --audience art-students          for more demanding viewers (more samples)
+  noisefloor render --time 60 --against truth.exr    at most a minute; relMSE to a reference in timeline.csv
+  noisefloor render --time 60 --resume               another minute of the render in the output folder")]
+pub struct RenderArgs {
+    /// Built-in scene (`noisefloor scenes` lists them) or scene file: glTF 2.0 (.gltf, .glb) or Mitsuba XML (.xml). With --source,
+    /// whatever that source reads [default: cornell-box].
+    scene: Option<String>,
+    #[command(flatten)]
+    renderer: RendererArgs,
+    /// Output folder [default: out/SCENE].
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// What stops a tile: `oracle`, `spp:N` for N samples per pixel everywhere, or a criterion of `noisefloor compare --help`.
+    #[arg(long, default_value = "oracle", value_parser = criterion)]
+    criterion: CriterionChoice,
+    #[arg(long, hide = true, value_parser = values::no_spp)]
+    spp: Option<String>,
+    #[command(flatten)]
+    oracle: OracleArgs,
+    #[command(flatten)]
+    tone: ToneArgs,
+    /// Tile edge in pixels, 16…512.
+    #[arg(long, default_value_t = DEFAULT_TILE, value_name = "PIXELS")]
+    tile: usize,
+    /// Samples per pixel between two verdicts on a tile.
+    #[arg(long, default_value_t = 100, value_name = "SPP")]
+    batch: u64,
+    /// When tiles are judged: after `every` batch, or `spaced` by the samples that a tile is expected to need.
+    #[arg(long, value_enum, default_value_t = ScheduleChoice::Every)]
+    schedule: ScheduleChoice,
+    /// No tile stops before this many samples per pixel [default: one batch].
+    #[arg(long, value_name = "SPP")]
+    min_spp: Option<u64>,
+    /// Every tile stops at this many samples per pixel [default: 10000; N with --criterion spp:N].
+    #[arg(long, value_name = "SPP")]
+    max_spp: Option<u64>,
+    /// Stop all tiles after this many seconds of sampling.
+    #[arg(long, value_name = "SECONDS", value_parser = values::seconds)]
+    time: Option<Duration>,
+    /// Stop a tile only after K verdicts of "converged" in a row.
+    #[arg(long, default_value_t = 1, value_name = "K")]
+    consecutive: u32,
+    /// For whom: `observers` (those of the training data), `art-students` (T' = 1.94 T - 346), or a,b for T' = a T + b.
+    #[arg(long, default_value = "observers", value_name = "WHO", value_parser = values::audience)]
+    audience: Audience,
+    /// Converged picture of the same size to compare with: relMSE in timeline.csv and report.json.
+    #[arg(long, value_name = "FILE.exr")]
+    against: Option<PathBuf>,
+    /// Seconds between two refreshes of the files in the output folder while rendering; 0 for none.
+    #[arg(long, default_value = "30", value_name = "SECONDS", value_parser = values::pause)]
+    autosave: Duration,
+    /// Continue the render that Ctrl-C, --time or a kill interrupted in this output folder. Picture and stops are those of an
+    /// uninterrupted render. Scene and options must be the same. Works with the built-in renderer, and the oracle or `spp:N`.
+    #[arg(long)]
+    resume: bool,
+    /// No progress bar and no summary.
+    #[arg(long, short)]
+    quiet: bool,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum ScheduleChoice {
+    Every,
+    Spaced,
+}
+
+#[derive(Clone, Debug, PartialEq, Eq)]
+enum CriterionChoice {
+    Oracle,
+    Fixed(u64),
+    /// A specification that is known to be right.
+    Rival(String),
+}
+
+fn criterion(text: &str) -> Result<CriterionChoice, String> {
+    match text.split_once(':') {
+        None if text == "oracle" => Ok(CriterionChoice::Oracle),
+        None if text == "spp" => Err("spp needs its number of samples, as in spp:1000".into()),
+        Some(("spp", n)) => match n.parse() {
+            Ok(n) if n > 0 => Ok(CriterionChoice::Fixed(n)),
+            _ => Err(format!("spp:{n} needs a positive whole number of samples, as in spp:1000")),
+        },
+        _ => match noisefloor_rivals::parse(text) {
+            Ok(_) => Ok(CriterionChoice::Rival(text.to_owned())),
+            Err(error) => Err(format!("{error}; or `oracle`")),
+        },
+    }
+}
+
+impl RenderArgs {
+    /// A render that can begin.
+    pub fn check(self) -> anyhow::Result<RenderJob> {
+        let params = self.params()?;
+        let judge = match self.criterion {
+            CriterionChoice::Rival(spec) if self.resume => {
+                bail!("--resume does not work with --criterion {spec}, whose state is not kept; leave it out")
+            }
+            CriterionChoice::Oracle => Judge::Oracle(Box::new(self.oracle.check()?)),
+            CriterionChoice::Fixed(samples) => Judge::Fixed(samples),
+            CriterionChoice::Rival(spec) => Judge::Rival(spec),
+        };
+        Ok(RenderJob {
+            source: self.renderer.check(self.scene.as_deref())?,
+            judge,
+            params,
+            out: self.out,
+            time: self.time,
+            against: self.against,
+            autosave: self.autosave,
+            resume: self.resume,
+            quiet: self.quiet,
+        })
+    }
+
+    fn params(&self) -> anyhow::Result<Params> {
+        let schedule = match self.schedule {
+            ScheduleChoice::Every => Schedule::Every { step: self.batch },
+            ScheduleChoice::Spaced => Schedule::Spaced { step: self.batch },
+        };
+        let max_spp = match &self.criterion {
+            CriterionChoice::Oracle | CriterionChoice::Rival(_) => {
+                self.max_spp.unwrap_or(Params::default().max_spp)
+            }
+            // Exactly this many, not the next multiple of the batch
+            CriterionChoice::Fixed(samples) => self.max_spp.map_or(*samples, |most| most.min(*samples)),
+        };
+        let params = Params {
+            tile: self.tile,
+            tone_mapping: self.tone.check()?,
+            schedule,
+            min_spp: self.min_spp.unwrap_or(0),
+            max_spp,
+            consecutive: self.consecutive,
+            audience: self.audience,
+        };
+        params.check()?;
+        Ok(params)
+    }
+}

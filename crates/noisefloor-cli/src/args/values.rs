@@ -1,0 +1,78 @@
+//! Values as they are typed.
+
+use noisefloor::{Audience, MAX_TILE, MIN_TILE};
+use noisefloor_rivals::{RIVALS, Rival};
+use std::num::NonZeroUsize;
+use std::time::Duration;
+
+/// More threads than any machine has cores would only cost memory.
+const MAX_THREADS: usize = 1024;
+
+pub(super) fn rival(text: &str) -> Result<&'static Rival, String> {
+    let names = || RIVALS.iter().map(|rival| rival.name).collect::<Vec<_>>().join(", ");
+    RIVALS.iter().find(|rival| rival.name == text).ok_or_else(|| format!("expected one of {}", names()))
+}
+
+pub(super) fn size(text: &str) -> Result<(usize, usize), String> {
+    let parts = text.split_once(['x', 'X', '×']).and_then(|(w, h)| Some((w.parse().ok()?, h.parse().ok()?)));
+    let (width, height) = parts.ok_or("expected WIDTHxHEIGHT in pixels, such as 512x512")?;
+    noisefloor::check_image(width, height).map_err(|e| e.to_string())?;
+    Ok((width, height))
+}
+
+/// A whole number within a range, or what it should have been.
+fn within(text: &str, range: std::ops::RangeInclusive<usize>) -> Result<usize, String> {
+    let number = text.parse().ok().filter(|n| range.contains(n));
+    number.ok_or_else(|| format!("expected a whole number within {}…{}", range.start(), range.end()))
+}
+
+pub(super) fn edge(text: &str) -> Result<usize, String> {
+    within(text, MIN_TILE..=MAX_TILE)
+}
+
+pub(super) fn levels(text: &str) -> Result<usize, String> {
+    within(text, 10..=1000)
+}
+
+pub(super) fn count(text: &str) -> Result<usize, String> {
+    within(text, 2..=100_000)
+}
+
+pub(super) fn threads(text: &str) -> Result<NonZeroUsize, String> {
+    within(text, 1..=MAX_THREADS).map(|n| NonZeroUsize::new(n).unwrap_or(NonZeroUsize::MIN))
+}
+
+pub(super) fn audience(text: &str) -> Result<Audience, String> {
+    match text {
+        "observers" => Ok(Audience::TRAINED),
+        "art-students" => Ok(Audience::ART_STUDENTS),
+        line => {
+            let parts = line
+                .split_once(',')
+                .and_then(|(a, b)| Some((a.trim().parse().ok()?, b.trim().parse().ok()?)));
+            let (slope, offset) =
+                parts.ok_or("expected `observers`, `art-students`, or a,b for T' = a T + b")?;
+            Ok(Audience { slope, offset })
+        }
+    }
+}
+
+pub(super) fn seconds(text: &str) -> Result<Duration, String> {
+    let seconds: f64 = text.parse().map_err(|_| "expected seconds, such as 60 or 0.5")?;
+    if seconds.is_nan() || seconds <= 0.0 {
+        return Err("expected a time above 0 seconds".into());
+    }
+    Duration::try_from_secs_f64(seconds).map_err(|e| e.to_string())
+}
+
+/// As [`seconds`], or 0 for never.
+pub(super) fn pause(text: &str) -> Result<Duration, String> {
+    if text.parse() == Ok(0.0) { Ok(Duration::ZERO) } else { seconds(text) }
+}
+
+/// `render --spp 100` is what people try first.
+pub(super) fn no_spp(text: &str) -> Result<String, String> {
+    Err(format!(
+        "`render` stops each tile when nobody sees noise in it; for {text} samples everywhere, use --criterion spp:{text}"
+    ))
+}

@@ -1,0 +1,107 @@
+//! `noisefloor evaluate`.
+
+#[cfg(feature = "lab")]
+mod rivals;
+mod tables;
+
+use crate::files::{write_csv, write_json};
+use crate::learning::{DataJob, held_out};
+use crate::say::say;
+use anyhow::{anyhow, bail};
+use noisefloor::{Model, Threshold};
+use noisefloor_image::check_writable;
+#[cfg(feature = "lab")]
+use noisefloor_lab::rivals::RatedRival;
+use noisefloor_learn::{Evaluation, Prediction, Table, TrainParams, predict};
+use noisefloor_rivals::Rival;
+use serde::Serialize;
+use std::path::PathBuf;
+
+/// What to score: checked.
+pub struct EvaluateJob {
+    pub data: DataJob,
+    pub params: TrainParams,
+    /// None to leave out one scene after the other.
+    pub model: Option<Model>,
+    pub threshold: Threshold,
+    pub json: Option<PathBuf>,
+    pub csv: Option<PathBuf>,
+    /// Only in a build with `lab`, as are rivals.
+    pub figures: Option<PathBuf>,
+    pub without: Vec<String>,
+    pub rivals: Vec<&'static Rival>,
+}
+
+/// What `--json` writes.
+#[derive(Serialize)]
+struct Report {
+    #[serde(flatten)]
+    evaluation: Evaluation,
+    /// Other criteria on the same zones, if `--rivals` asked for them.
+    #[cfg(feature = "lab")]
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    rivals: Vec<RatedRival>,
+}
+
+pub fn run(job: &EvaluateJob) -> anyhow::Result<()> {
+    for path in job.json.iter().chain(&job.csv) {
+        check_writable(path)?;
+    }
+    let table = job.data.load()?.without(&job.without).map_err(|name| {
+        let names = job.data.descriptor.number_names().join(", ");
+        anyhow!("--without {name}: the numbers of the table are {names}")
+    })?;
+    let (predicted_by, predictions) = predictions(job, &table)?;
+    let report = Report {
+        evaluation: Evaluation::new(predicted_by, &table, &predictions, job.params.spread),
+        #[cfg(feature = "lab")]
+        rivals: rivals::rate(job)?,
+    };
+    if let Some(path) = &job.json {
+        write_json(path, &report)?;
+    }
+    if let Some(path) = &job.csv {
+        write_csv(path, predictions.iter())?;
+    }
+    #[cfg(feature = "lab")]
+    rivals::draw(job, &predictions, &report)?;
+    tables::say_scores(&report.evaluation)?;
+    #[cfg(feature = "lab")]
+    if !report.rivals.is_empty() {
+        rivals::say_rated(&predictions, &report.rivals)?;
+    }
+    say_caveats(job, &table)
+}
+
+/// Who predicts, and what.
+fn predictions(job: &EvaluateJob, table: &Table) -> anyhow::Result<(String, Vec<Prediction>)> {
+    let Some(model) = &job.model else {
+        return Ok(("leave-one-scene-out".to_owned(), held_out(table, &job.params, job.threshold)?));
+    };
+    if (model.descriptor(), model.evidence()) != (&table.descriptor, table.evidence) {
+        bail!(
+            "the model uses the {} descriptor {:?} with {:?} as evidence, the table {:?} with {:?}",
+            model.descriptor().name(),
+            model.descriptor(),
+            model.evidence(),
+            table.descriptor,
+            table.evidence
+        );
+    }
+    let predictions = table.zones.iter().map(|z| predict(|raw| model.judge(raw), job.threshold, z)).collect();
+    Ok((model.digest(), predictions))
+}
+
+/// What flatters a number stands beside it.
+fn say_caveats(job: &EvaluateJob, table: &Table) -> anyhow::Result<()> {
+    let scenes = table.scenes();
+    let trained_on = job.model.iter().flat_map(|model| &model.record().scenes);
+    let seen: Vec<&str> = trained_on.map(String::as_str).filter(|scene| scenes.contains(scene)).collect();
+    if !seen.is_empty() {
+        say!("Note: the model was trained on these scenes: {}.", seen.join(", "))?;
+    }
+    if table.groups().len() == 1 {
+        say!("Note: with one group of scenes, the constant is fitted to the very zones it predicts.")?;
+    }
+    Ok(())
+}

@@ -1,0 +1,44 @@
+//! Scores as a table.
+
+use crate::say::{NotSaid, say};
+use noisefloor_learn::{Baselines, Evaluation, PredictionScores};
+
+pub(super) fn say_scores(evaluation: &Evaluation) -> Result<(), NotSaid> {
+    say!("{:22} zones  error  bias   early  images right    constant noise    scene median", "scene")?;
+    for scene in &evaluation.scenes {
+        say_line(&scene.scene, &scene.summary, &scene.baselines)?;
+    }
+    say_line("all", &evaluation.summary, &evaluation.baselines)?;
+    say!(
+        "calibration error of P: {:.3} against the share of observers (assumed: logistic around the recorded threshold), {:.3} against \
+         the recorded threshold as a step",
+        evaluation.calibration_error,
+        evaluation.calibration_error_of_step
+    )?;
+    say!(
+        "error = exp(mean |ln(predicted/human)|); bias = exp(mean ln(predicted/human)); early = stopped below half the human threshold.\n\
+         Thresholds are searched on {} real and {} synthesised levels; \"images right\" counts only real pictures. The factors leave out \
+         {} censored zones; {} zones are unfamiliar to the model that predicts them.\nThe scene median knows the scene's other zones, which \
+         no predictor of unseen scenes can.",
+        evaluation.levels_real,
+        evaluation.levels_synthesised,
+        evaluation.censored_zones,
+        evaluation.unfamiliar_zones
+    )
+}
+
+fn say_line(name: &str, s: &PredictionScores, b: &Baselines) -> Result<(), NotSaid> {
+    // A scene of one zone has no median of others.
+    let factor = |f: f64| if f.is_finite() { format!("×{f:.2}") } else { "–".into() };
+    let constant = b.constant.scores;
+    say!(
+        "{name:22} {:5}  {:6} {:6} {:3.0} %  {:>12}    {:>14}    {:>12}",
+        s.scores.zones,
+        factor(s.scores.error_factor),
+        factor(s.scores.bias_factor),
+        100.0 * s.scores.early_share,
+        s.image_accuracy.map_or("–".into(), |a| format!("{:.1} %", 100.0 * a)),
+        format!("{}, {:.0} % early", factor(constant.error_factor), 100.0 * constant.early_share),
+        factor(b.scene_median.scores.error_factor),
+    )
+}

@@ -1,0 +1,38 @@
+//! Tables and JSON, each file complete or not there at all; and pictures to compare with.
+
+use anyhow::bail;
+use noisefloor::Rgb;
+use noisefloor_image::{read_exr, write_atomic};
+use serde::Serialize;
+use std::path::Path;
+
+/// Writes rows as CSV.
+pub fn write_csv<T: Serialize>(path: &Path, rows: impl Iterator<Item = T>) -> anyhow::Result<()> {
+    write_atomic(path, |to| {
+        let mut csv = csv::Writer::from_writer(to);
+        for row in rows {
+            csv.serialize(row)?;
+        }
+        csv.flush().map_err(csv::Error::from)
+    })?;
+    Ok(())
+}
+
+/// Writes JSON.
+pub fn write_json(path: &Path, value: &impl Serialize) -> anyhow::Result<()> {
+    write_atomic(path, |to| serde_json::to_writer_pretty(to, value))?;
+    Ok(())
+}
+
+/// A picture to compare a render of that size with: linear radiance, row-major, all of it finite.
+pub fn read_reference(path: &Path, (width, height): (usize, usize)) -> anyhow::Result<Vec<Rgb>> {
+    let image = read_exr(path)?;
+    if (image.width, image.height) != (width, height) {
+        let (w, h) = (image.width, image.height);
+        bail!("{} has {w}×{h} pixels, the render {width}×{height}: set --size {w}x{h}", path.display());
+    }
+    if !image.pixels.iter().flatten().all(|c| c.is_finite()) {
+        bail!("{} has pixels that are not finite, so nothing can be compared with it", path.display());
+    }
+    Ok(image.pixels)
+}

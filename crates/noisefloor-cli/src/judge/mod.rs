@@ -1,0 +1,121 @@
+//! `noisefloor judge`.
+
+mod report;
+
+use crate::say::note;
+use anyhow::Context;
+use noisefloor::{Evidence, Oracle, Samples, SnapshotPair, Still, Tile, TileGrid, ToneMapping, Verdict};
+use noisefloor_image::maps::{ColourScale, TileMark, draw_field, draw_tiles, noise_scale};
+use noisefloor_image::{RenderLayers, check_writable, read_picture, write_exr};
+use report::Row;
+use std::path::{Path, PathBuf};
+
+/// Pictures to judge: checked.
+pub struct JudgeJob {
+    /// With its samples per pixel.
+    pub image: (PathBuf, f64),
+    /// At least one, with their samples per pixel.
+    pub against: Vec<(PathBuf, f64)>,
+    /// If the user says so.
+    pub samples: Option<Samples>,
+    /// Of a model that goes by halves; with a map of visible noise if one is to be drawn.
+    pub oracle: Oracle,
+    pub tone: ToneMapping,
+    pub tile: usize,
+    pub json: bool,
+    pub heat_map: Option<PathBuf>,
+    pub noise_map: Option<PathBuf>,
+    pub exr: Option<PathBuf>,
+}
+
+pub fn run(job: &JudgeJob) -> anyhow::Result<()> {
+    for path in [&job.heat_map, &job.noise_map, &job.exr].into_iter().flatten() {
+        check_writable(path)?;
+    }
+    let image = read(&job.image)?;
+    let others: Vec<Still> = job.against.iter().map(read).collect::<anyhow::Result<_>>()?;
+    for (other, (path, _)) in others.iter().zip(&job.against) {
+        let names = || format!("{} against {}", job.image.0.display(), path.display());
+        image.fits(other).with_context(names)?;
+    }
+    let (width, height) = image.size;
+    let grid = TileGrid::new(width, height, job.tile)?;
+
+    // Compare the picture with the others, and judge.
+    let others: Vec<&Still> = others.iter().collect();
+    let held = SnapshotPair::new(Evidence::Halves, &image, &others, job.tone, job.samples)?;
+    if job.samples.is_none() && held.samples() == Samples::Nested {
+        note!(
+            "note: the pictures share samples, as snapshots of one rendering do, and are judged as --nested; --independent overrides this"
+        );
+    }
+    let rows = judge(&job.oracle, grid, &held)?;
+    report::say_all(job, &rows)?;
+    draw(job, &image, grid, &held, &rows)
+}
+
+/// A picture that can be judged; errors name it.
+fn read((path, spp): &(PathBuf, f64)) -> anyhow::Result<Still> {
+    let still = read_picture(path)?.into_still(*spp);
+    still.check().with_context(|| format!("{}", path.display()))?;
+    Ok(still)
+}
+
+fn judge(oracle: &Oracle, grid: TileGrid, held: &SnapshotPair<'_>) -> anyhow::Result<Vec<Row>> {
+    let row = |(tile, verdict): (Tile, Verdict)| {
+        let Verdict { converged, probability, expected_spp, unfamiliar, .. } = verdict;
+        let Tile { index, x, y, width, height } = tile;
+        let probability = probability.unwrap_or(0.0);
+        Row { tile: index, x, y, width, height, probability, converged, expected_spp, unfamiliar }
+    };
+    let described = held.describe(oracle, grid)?;
+    Ok(grid.tiles().zip(oracle.judge_described(&described)).map(row).collect())
+}
+
+/// Draws what was asked for.
+fn draw(job: &JudgeJob, image: &Still, grid: TileGrid, held: &SnapshotPair<'_>, rows: &[Row]) -> anyhow::Result<()> {
+    let width = grid.width();
+    let wants_noise = job.noise_map.is_some() || job.exr.is_some();
+    let noise =
+        if wants_noise { job.oracle.map_visible_noise(grid, |t| held.planes(t).map(Some))? } else { None };
+    if let (Some(path), Some(noise)) = (&job.noise_map, &noise) {
+        let scale = noise_scale(job.oracle.just_visible());
+        draw_field(width, &held.shown(), noise, &scale).save(path)?;
+    }
+    if let Some(path) = &job.exr {
+        write_channels(path, image, grid, rows, noise.as_deref())?;
+    }
+    if let Some(path) = &job.heat_map {
+        let mark = |row: &Row| TileMark {
+            tile: grid.tile(row.tile),
+            value: f64::from(row.probability),
+            label: format!("{:.2}", row.probability),
+            unfamiliar: row.unfamiliar,
+        };
+        let marks: Vec<TileMark> = rows.iter().map(mark).collect();
+        let (title, colours) = ("P(no noise\nis seen)", colorous::CIVIDIS);
+        let scale = ColourScale { title, low: 0.0, high: 1.0, log: false, colours, landmark: None };
+        draw_tiles(width, &held.shown(), &marks, &scale).save(path)?;
+    }
+    Ok(())
+}
+
+fn write_channels(
+    path: &Path,
+    image: &Still,
+    grid: TileGrid,
+    rows: &[Row],
+    noise: Option<&[f32]>,
+) -> anyhow::Result<()> {
+    let (width, height) = image.size;
+    let mut probability = vec![f32::NAN; image.pixels.len()];
+    for row in rows {
+        grid.tile(row.tile).rows(width).flatten().for_each(|pixel| probability[pixel] = row.probability);
+    }
+    let layers = RenderLayers {
+        probability: Some(&probability),
+        visible_noise: noise,
+        ..RenderLayers::rgb(width, height, &image.pixels)
+    };
+    Ok(write_exr(path, &layers)?)
+}

@@ -1,0 +1,83 @@
+//! Verdicts as a table or as JSON.
+
+use super::JudgeJob;
+use crate::say::{NotSaid, say};
+use noisefloor::Threshold;
+use serde::Serialize;
+use std::path::Path;
+
+/// One line of the verdict.
+#[derive(Serialize)]
+pub(super) struct Row {
+    pub(super) tile: usize,
+    pub(super) x: usize,
+    pub(super) y: usize,
+    pub(super) width: usize,
+    pub(super) height: usize,
+    pub(super) probability: f32,
+    pub(super) converged: bool,
+    /// Samples per pixel at which the tile should be converged; null if that is out of sight.
+    pub(super) expected_spp: Option<u64>,
+    /// Whether its texture is unlike any that the model has been tested on; P is then that of half the samples.
+    pub(super) unfamiliar: bool,
+}
+
+#[derive(Serialize)]
+struct Report<'a> {
+    image: &'a Path,
+    spp: f64,
+    model: String,
+    threshold: Threshold,
+    converged_tiles: usize,
+    unfamiliar_tiles: usize,
+    tiles: &'a [Row],
+}
+
+pub(super) fn say_all(job: &JudgeJob, rows: &[Row]) -> anyhow::Result<()> {
+    let report = Report {
+        image: &job.image.0,
+        spp: job.image.1,
+        model: job.oracle.model().digest(),
+        threshold: job.oracle.threshold(),
+        converged_tiles: rows.iter().filter(|r| r.converged).count(),
+        unfamiliar_tiles: rows.iter().filter(|r| r.unfamiliar).count(),
+        tiles: rows,
+    };
+    if job.json {
+        say!("{}", serde_json::to_string_pretty(&report)?)?
+    } else {
+        say_table(&report)?
+    }
+    Ok(())
+}
+
+fn say_table(report: &Report<'_>) -> Result<(), NotSaid> {
+    say!("tile     x     y   size       P  verdict      expected spp")?;
+    for row in report.tiles {
+        let verdict = if row.converged { "converged" } else { "noise seen" };
+        let expected = row.expected_spp.filter(|_| !row.converged).map_or(String::new(), |n| n.to_string());
+        let size = format!("{}×{}", row.width, row.height);
+        say!(
+            "{:4} {:5} {:5} {size:>8} {:6.3}  {verdict:10} {expected:>14}{}",
+            row.tile,
+            row.x,
+            row.y,
+            row.probability,
+            if row.unfamiliar { "  unfamiliar" } else { "" }
+        )?;
+    }
+    say!(
+        "{} of {} tiles converged at {} spp (P ≥ {})",
+        report.converged_tiles,
+        report.tiles.len(),
+        report.spp,
+        report.threshold
+    )?;
+    if report.unfamiliar_tiles > 0 {
+        say!(
+            "{} tiles have texture unlike any that the model was tested on: their P is that of half the samples, and less certain",
+            report.unfamiliar_tiles
+        )?;
+    }
+    Ok(())
+}

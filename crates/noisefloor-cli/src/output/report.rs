@@ -1,0 +1,102 @@
+//! report.json.
+
+use super::tiles::TileState;
+use super::{Output, uniform_samples};
+use crate::sources::Source;
+use noisefloor::{Clock, Params, Session, StoppingCriterion};
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+#[derive(Serialize)]
+pub(super) struct Report<'a> {
+    noisefloor: &'static str,
+    scene: &'a str,
+    /// Who rendered.
+    source: &'a str,
+    width: usize,
+    height: usize,
+    seed: u64,
+    criterion: String,
+    /// BLAKE3 of the model.
+    model: Option<&'a str>,
+    params: &'a Params,
+    /// Display exposure that was settled.
+    exposure: Option<f32>,
+    complete: bool,
+    tiles: usize,
+    stops: BTreeMap<String, usize>,
+    /// Tiles with texture unlike any that the model has been tried on.
+    unfamiliar_tiles: usize,
+    /// Over all pixels.
+    samples: u64,
+    /// What uniform rendering at the largest stop would take.
+    samples_uniform: u64,
+    /// Samples kept out by the film because they were not finite.
+    samples_rejected: u64,
+    /// Samples that the renderer counted as black because they were not finite.
+    samples_dropped: Option<u64>,
+    /// Samples that were scaled down to `--clamp`.
+    samples_clamped: Option<u64>,
+    /// Samples of tiles that see nothing but the background: no ray was traced for them.
+    samples_background: Option<u64>,
+    /// Of the ray-traced reference, if the criterion asked for one: samples of a pixel, and the deviation of its noise mask as it
+    /// estimates it, over all blocks and in the worst.
+    reference_samples: Option<f64>,
+    reference_deviation: Option<f32>,
+    reference_worst: Option<f32>,
+    /// Of the runs that this one resumes (`--resume`); the others are this run's.
+    seconds_before: f64,
+    seconds_source: Option<f64>,
+    seconds_oracle: Option<f64>,
+    seconds_total: Option<f64>,
+    rel_mse: Option<f64>,
+}
+
+impl<'a> Report<'a> {
+    /// What is known now; with the time it took and what became of the samples when the run is over.
+    pub(super) fn new<C: StoppingCriterion>(
+        output: &'a Output,
+        session: &'a Session<C>,
+        tiles: &[TileState],
+        over: Option<(Clock, &dyn Source)>,
+    ) -> Self {
+        let (clock, source) = over.unzip();
+        let counts = source.and_then(|source| source.counts());
+        let noise = source.and_then(|source| source.reference_noise());
+        let grid = session.film().grid();
+        let mut stops = BTreeMap::new();
+        for tile in tiles {
+            *stops.entry(tile.reason()).or_insert(0) += 1;
+        }
+        Self {
+            noisefloor: env!("CARGO_PKG_VERSION"),
+            scene: &output.scene,
+            source: &output.source,
+            width: grid.width(),
+            height: grid.height(),
+            seed: output.seed,
+            criterion: session.criterion().name(),
+            model: output.model.as_ref().map(|m| m.digest.as_str()),
+            params: session.params(),
+            exposure: session.display().map(noisefloor::Display::exposure),
+            complete: clock.is_some() && tiles.iter().all(|tile| !tile.open),
+            tiles: tiles.len(),
+            stops,
+            unfamiliar_tiles: tiles.iter().filter(|tile| tile.stop.unfamiliar).count(),
+            samples: session.film().total_samples(),
+            samples_uniform: uniform_samples(session),
+            samples_rejected: session.film().rejected(),
+            samples_dropped: counts.map(|c| c.dropped),
+            samples_clamped: counts.map(|c| c.clamped),
+            samples_background: counts.map(|c| c.background),
+            reference_samples: noise.map(|n| n.samples),
+            reference_deviation: noise.map(|n| n.deviation()),
+            reference_worst: noise.map(|n| n.worst()),
+            seconds_before: output.seconds_before,
+            seconds_source: clock.map(|c| c.source_seconds),
+            seconds_oracle: clock.map(|c| c.criterion_seconds),
+            seconds_total: clock.map(|c| c.total_seconds),
+            rel_mse: output.timeline.last().and_then(|row| row.rel_mse),
+        }
+    }
+}

@@ -1,0 +1,87 @@
+//! A render in a few lines, for people.
+
+use super::{CHECKPOINT, Output, uniform_samples};
+use crate::say::{NotSaid, say};
+use crate::sources::Source;
+use noisefloor::{Clock, Session, StopReason, StoppingCriterion};
+use noisefloor_ptwne::ReferenceNoise;
+
+impl Output {
+    /// Says what came of the render.
+    pub fn summarise<C: StoppingCriterion>(
+        &self,
+        session: &Session<C>,
+        clock: Clock,
+        source: &dyn Source,
+        resumable: bool,
+    ) -> Result<(), NotSaid> {
+        self.say_stops(session)?;
+        say!(
+            "{:.1} s, of which {:.2} s ({:.2} %) in the oracle",
+            clock.total_seconds,
+            clock.criterion_seconds,
+            100.0 * clock.criterion_seconds / clock.total_seconds.max(1e-9),
+        )?;
+        let counts = source.counts();
+        for (count, what) in [
+            (session.film().rejected(), "were not finite and were left out"),
+            (counts.map_or(0, |c| c.dropped), "were not finite and counted as black"),
+            (counts.map_or(0, |c| c.clamped), "were brighter than --clamp and scaled down"),
+        ] {
+            if count > 0 {
+                say!("{count} samples {what}")?;
+            }
+        }
+        if let Some(noise) = source.reference_noise() {
+            say_noise(noise)?;
+        }
+        say!("written to {}", self.folder.display())?;
+        // One that is not of this render may lie there too
+        if resumable && self.folder.join(CHECKPOINT).exists() {
+            say!("to continue, repeat the command with --resume")?;
+        }
+        Ok(())
+    }
+
+    fn say_stops<C: StoppingCriterion>(&self, session: &Session<C>) -> Result<(), NotSaid> {
+        let grid = session.film().grid();
+        let samples = session.film().total_samples() as f64;
+        let spp: Vec<u64> = session.stops().map(|s| s.spp).collect();
+        let converged = session.stops().filter(|s| s.reason == StopReason::Converged).count();
+        let (least, most) = (spp.iter().min().unwrap_or(&0), spp.iter().max().unwrap_or(&0));
+        say!(
+            "{converged} of {} tiles converged, after {least} to {most} samples per pixel ({:.0} on average: {:.0} % of uniform \
+             rendering at {most})",
+            spp.len(),
+            samples / (grid.width() * grid.height()) as f64,
+            100.0 * samples / uniform_samples(session).max(1) as f64,
+        )?;
+        let unfamiliar = session.stops().filter(|s| s.unfamiliar).count();
+        if unfamiliar > 0 {
+            say!(
+                "{unfamiliar} tiles have texture unlike any that the model was tested on: they got twice the samples it asks for, and \
+                 their verdicts are less certain"
+            )?;
+        }
+        Ok(())
+    }
+}
+
+/// What a reference is like.
+pub fn say_noise(noise: &ReferenceNoise) -> Result<(), NotSaid> {
+    say!(
+        "the reference took {:.0} samples a pixel; deviation of its noise mask {:.2}/255, {:.2}/255 in its worst block",
+        noise.samples,
+        255.0 * noise.deviation(),
+        255.0 * noise.worst(),
+    )?;
+    if noise.unsettled > 0 {
+        say!(
+            "warning: {} of {} blocks of the reference are noisier than it promises, so tiles there may stop too late; \
+             a model trained on half buffers needs no reference",
+            noise.unsettled,
+            noise.deviations.len()
+        )?;
+    }
+    Ok(())
+}

@@ -1,0 +1,172 @@
+//! `noisefloor render`.
+
+mod progress;
+mod snapshots;
+
+use crate::files::read_reference;
+use crate::output::{ModelFacts, Output};
+use crate::say::{note, one_line};
+use crate::signals::{AFTER_THIS_BATCH, INTERRUPTED, cancel_on_signal};
+use crate::sources::{Opened, Source, SourceJob};
+use anyhow::bail;
+use noisefloor::{
+    Driver, DriverError, Event, FixedSpp, Oracle, Params, Repeats, Rgb, SourceInfo, StopReason,
+    StoppingCriterion,
+};
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+pub use progress::reference_bar;
+use snapshots::Snapshots;
+
+/// What is rendered, and until when: checked.
+pub struct RenderJob {
+    pub source: SourceJob,
+    pub judge: Judge,
+    pub params: Params,
+    pub out: Option<PathBuf>,
+    pub time: Option<Duration>,
+    pub against: Option<PathBuf>,
+    /// Zero for never.
+    pub autosave: Duration,
+    pub resume: bool,
+    pub quiet: bool,
+}
+
+/// Who stops the tiles.
+pub enum Judge {
+    Oracle(Box<Oracle>),
+    Fixed(u64),
+    /// A specification that is known to be right.
+    Rival(String),
+}
+
+pub fn run(job: RenderJob) -> anyhow::Result<ExitCode> {
+    // Whatever can be wrong is found before anything is rendered.
+    let RenderJob { source, judge, params, .. } = &job;
+    source.start_threads()?;
+    let opened = source.open()?;
+    opened.warn(job.quiet);
+    let Opened { source, scene, .. } = opened;
+    let SourceInfo { width, height, .. } = source.info();
+    let against = job.against.as_deref();
+    let reference = against.map(|path| read_reference(path, (width, height))).transpose()?;
+    let what = identity(&job, &source.info().name);
+    let rest = Rest { job: &job, scene, reference, model: None };
+    match judge {
+        Judge::Oracle(oracle) => {
+            let (digest, just_visible) = (oracle.model().digest(), oracle.just_visible());
+            let rest = Rest { model: Some(ModelFacts { digest, just_visible }), ..rest };
+            let driver = Driver::new(source, oracle.as_ref().clone(), *params)?;
+            rest.drive(driver, Some(Snapshots::new(what)))
+        }
+        Judge::Fixed(spp) => {
+            let driver = Driver::new(source, FixedSpp(*spp), *params)?;
+            rest.drive(driver, Some(Snapshots::new(what)))
+        }
+        // A rival's state is not kept
+        Judge::Rival(spec) => rest.drive(Driver::new(source, noisefloor_rivals::parse(spec)?, *params)?, None),
+    }
+}
+
+/// What must be the same for a render to be resumed, beside parameters, criterion and size.
+fn identity(job: &RenderJob, source: &str) -> String {
+    let SourceJob { kind, scene, seed, max_depth, .. } = &job.source;
+    let scene = scene.as_deref().unwrap_or("the default scene");
+    format!("{source}, {scene}, seed {seed}, depth {max_depth:?}, {kind:?}")
+}
+
+type Rendering<C> = Driver<Box<dyn Source>, C>;
+
+/// What a render is made of beside its driver.
+struct Rest<'a> {
+    job: &'a RenderJob,
+    scene: String,
+    reference: Option<Vec<Rgb>>,
+    model: Option<ModelFacts>,
+}
+
+impl Rest<'_> {
+    fn drive<C: StoppingCriterion>(
+        self,
+        mut driver: Rendering<C>,
+        snapshots: Option<Snapshots<C>>,
+    ) -> anyhow::Result<ExitCode> {
+        let Rest { job, scene, reference, model } = self;
+        let info = driver.source().info();
+        let snapshots = snapshots.filter(|_| info.repeats == Repeats::Samples);
+        if job.resume && snapshots.is_none() {
+            bail!(
+                "--resume: {} cannot be resumed, since it may repeat samples after a restart; leave it out",
+                info.name
+            )
+        }
+        let folder = job.out.clone().unwrap_or_else(|| PathBuf::from("out").join(&scene));
+        let mut output = Output::create(folder, scene, info.name, job.source.seed)?;
+        (output.model, output.reference) = (model, reference);
+        if let Some(snapshots) = snapshots.as_ref().filter(|_| job.resume) {
+            driver = snapshots.resume(driver, &mut output, job.quiet)?;
+        }
+        driver.set_time_limit(job.time);
+        let cancel = driver.cancel_flag();
+        cancel_on_signal(Arc::clone(&cancel), AFTER_THIS_BATCH)?;
+        driver.source_mut().watch_reference(reference_bar(job.quiet), Arc::clone(&cancel));
+        let outcome = sample(&mut driver, &mut output, snapshots.as_ref(), job);
+
+        // Write what there is, also after a failure.
+        let checkpoint = snapshots.as_ref().map(|snapshots| snapshots.of(driver.session()));
+        let over = Some((driver.clock(), driver.source().as_ref()));
+        let written = output.write(driver.session(), checkpoint, over);
+        finish(&driver, outcome, &cancel)?;
+        written?;
+        if !job.quiet {
+            output.summarise(driver.session(), driver.clock(), driver.source().as_ref(), snapshots.is_some())?;
+        }
+        let stopped = driver.session().stops().any(|s| s.reason == StopReason::Cancelled);
+        Ok(if stopped { ExitCode::from(INTERRUPTED) } else { ExitCode::SUCCESS })
+    }
+}
+
+/// Renders. A failure to save along the way is reported at once, and rendering goes on: the disk may have room again.
+fn sample<C: StoppingCriterion>(
+    driver: &mut Rendering<C>,
+    output: &mut Output,
+    snapshots: Option<&Snapshots<C>>,
+    job: &RenderJob,
+) -> Result<(), DriverError> {
+    let bar = progress::bar(job.quiet);
+    let mut saved = Instant::now();
+    let outcome = driver.run(|session, event| {
+        let Event::BatchDone(progress) = event else { return };
+        output.record(session, progress);
+        progress::show(&bar, session, progress);
+        if !job.autosave.is_zero() && saved.elapsed() >= job.autosave {
+            let checkpoint = snapshots.map(|snapshots| snapshots.of(session));
+            if let Err(error) = output.write(session, checkpoint, None) {
+                bar.suspend(|| note!("warning: not saved: {}", one_line(&error)));
+            }
+            saved = Instant::now();
+        }
+    });
+    bar.finish_and_clear();
+    outcome
+}
+
+/// Says what the user should know after the run. Ctrl-C in a terminal ends a command that renders, too: that is no failure.
+fn finish<C: StoppingCriterion>(
+    driver: &Rendering<C>,
+    outcome: Result<(), DriverError>,
+    cancel: &AtomicBool,
+) -> anyhow::Result<()> {
+    driver.source().notes().iter().for_each(|text| note!("warning: {text}"));
+    match outcome {
+        Err(error) if cancel.load(Ordering::Relaxed) => {
+            note!("warning: the batch under way is lost: {}", one_line(&error.into()));
+            Ok(())
+        }
+        outcome => Ok(outcome?),
+    }
+}

@@ -1,0 +1,46 @@
+//! How a render is saved and resumed: known where the criterion is, used where it is not.
+
+use super::Rendering;
+use crate::output::Output;
+use crate::say::note;
+use anyhow::Context;
+use noisefloor::{Checkpoint, CheckpointError, Driver, Resumable, Session, StoppingCriterion};
+
+/// Of a criterion that is [`Resumable`], on a source that repeats its samples.
+pub(super) struct Snapshots<C> {
+    /// What must be the same for a render to be resumed, beside what the library checks.
+    pub(super) job: String,
+    save: for<'a> fn(&'a Session<C>, &'a str) -> Checkpoint<'a>,
+    resume: fn(Rendering<C>, &str, Checkpoint<'_>) -> Result<Rendering<C>, CheckpointError>,
+}
+
+impl<C: Resumable> Snapshots<C> {
+    pub(super) fn new(job: String) -> Self {
+        Self { job, save: Session::checkpoint, resume: Driver::resume }
+    }
+}
+
+impl<C: StoppingCriterion> Snapshots<C> {
+    /// Everything that has to be known to continue.
+    pub(super) fn of<'a>(&'a self, session: &'a Session<C>) -> Checkpoint<'a> {
+        (self.save)(session, &self.job)
+    }
+
+    /// The driver of the render that the output folder holds; as it is if there is none.
+    pub(super) fn resume(
+        &self,
+        driver: Rendering<C>,
+        output: &mut Output,
+        quiet: bool,
+    ) -> anyhow::Result<Rendering<C>> {
+        let Some(checkpoint) = output.checkpoint()? else {
+            if !quiet {
+                note!("nothing to resume in {}: starting from the beginning", output.folder());
+            }
+            return Ok(driver);
+        };
+        let driver = (self.resume)(driver, &self.job, checkpoint).with_context(|| output.checkpoint_file())?;
+        output.take_up(driver.session().film().total_samples());
+        Ok(driver)
+    }
+}

@@ -1,0 +1,41 @@
+//! Ctrl-C and SIGTERM.
+
+use crate::say::note;
+use anyhow::Context;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Ended by Ctrl-C or SIGTERM, with everything written: 128 + SIGINT.
+pub const INTERRUPTED: u8 = 130;
+
+/// What Ctrl-C does to samples.
+pub const AFTER_THIS_BATCH: &str = "stopping after this batch, and writing what there is";
+
+/// Sets the flag on the first signal, and says how the work ends; a second signal ends the process at once.
+pub fn cancel_on_signal(cancel: Arc<AtomicBool>, says: &'static str) -> anyhow::Result<()> {
+    on_signal(move || {
+        if cancel.swap(true, Ordering::Relaxed) {
+            end();
+        }
+        note!("\n{says} (Ctrl-C again to quit at once)");
+    })
+}
+
+/// Ends the process on the first signal: for work of which every result is on disk as soon as it is there.
+#[cfg(feature = "lab")]
+pub fn end_on_signal(says: &'static str) -> anyhow::Result<()> {
+    on_signal(move || {
+        note!("\n{says}");
+        end();
+    })
+}
+
+fn on_signal(handler: impl FnMut() + Send + 'static) -> anyhow::Result<()> {
+    ctrlc::set_handler(handler).context("the handler for Ctrl-C could not be set")
+}
+
+fn end() -> ! {
+    #[cfg(feature = "adapters")]
+    noisefloor_sidecar::end_all();
+    std::process::exit(i32::from(INTERRUPTED));
+}

@@ -1,0 +1,70 @@
+//! Renderers in another process.
+
+use super::{Opened, Source, SourceJob, stem};
+use anyhow::Context;
+use noisefloor_luxcore::{Engine, Sampler};
+use noisefloor_sidecar::{CommandOptions, CommandSource, Job, Renderer, Sidecar, SidecarError};
+
+/// A renderer in another process, as its crate offers it.
+#[derive(Debug)]
+pub struct Adapter {
+    /// What `--source` calls it.
+    pub name: &'static str,
+    pub renderer: &'static Renderer,
+    open: fn(&Job) -> Result<Sidecar, SidecarError>,
+    /// What keeps it from being all it could be here, and what mends that.
+    pub notes: fn() -> Vec<String>,
+}
+
+/// All of them. One more is one entry here.
+pub const ADAPTERS: &[Adapter] = &[
+    Adapter {
+        name: "mitsuba",
+        renderer: &noisefloor_mitsuba::RENDERER,
+        open: noisefloor_mitsuba::open,
+        notes: noisefloor_mitsuba::notes,
+    },
+    luxcore("luxcore", |job| noisefloor_luxcore::open(job, Engine::Path, Sampler::Random)),
+    luxcore("luxcore-sobol", |job| noisefloor_luxcore::open(job, Engine::Path, Sampler::Sobol)),
+    luxcore("luxcore-metropolis", |job| noisefloor_luxcore::open(job, Engine::Path, Sampler::Metropolis)),
+    luxcore("luxcore-bidir", |job| noisefloor_luxcore::open(job, Engine::Bidir, Sampler::Random)),
+    Adapter {
+        name: "cycles",
+        renderer: &noisefloor_cycles::RENDERER,
+        open: noisefloor_cycles::open,
+        notes: Vec::new,
+    },
+];
+
+const fn luxcore(name: &'static str, open: fn(&Job) -> Result<Sidecar, SidecarError>) -> Adapter {
+    Adapter { name, renderer: &noisefloor_luxcore::RENDERER, open, notes: Vec::new }
+}
+
+impl Source for Sidecar {
+    fn notes(&self) -> Vec<String> {
+        let note = |error| format!("the renderer was started again: {error}").replace('\n', " ");
+        self.restarts().iter().map(note).collect()
+    }
+}
+
+impl Source for CommandSource {}
+
+pub(super) fn open_adapter(adapter: &Adapter, job: &SourceJob) -> anyhow::Result<Opened> {
+    let scene = job.scene.as_deref();
+    let scene = scene.with_context(|| format!("--source {} needs a scene file", adapter.name))?;
+    let mut sidecar = Job::new(scene);
+    (sidecar.seed, sidecar.size, sidecar.max_depth) = (job.seed, job.size, job.max_depth);
+    (sidecar.threads, sidecar.timeout) = (job.threads, job.timeout);
+    let source = (adapter.open)(&sidecar)?;
+    let warnings = source.warnings().to_vec();
+    Ok(Opened { source: Box::new(source), scene: stem(scene), warnings })
+}
+
+pub(super) fn open_command(template: &str, job: &SourceJob) -> anyhow::Result<Opened> {
+    let mut options = CommandOptions::default();
+    (options.scene, options.seed) = (job.scene.as_deref().map(Into::into), job.seed);
+    (options.size, options.timeout) = (job.size, job.timeout);
+    let source = Box::new(CommandSource::new(template, options)?);
+    let scene = job.scene.as_deref().map_or_else(|| "command".to_owned(), stem);
+    Ok(Opened { source, scene, warnings: Vec::new() })
+}

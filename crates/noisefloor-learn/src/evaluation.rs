@@ -1,0 +1,109 @@
+//! Everything that predictions are scored by, as data.
+
+use crate::baselines::{constant_noise_baseline, scene_median_baseline};
+use crate::observers::observers_agreeing;
+use crate::predict::Prediction;
+use crate::score::{ReliabilityBin, calibration_error, image_accuracy, reliability, score};
+use crate::table::{Origin, Table};
+use noisefloor::Scores;
+use serde::Serialize;
+
+/// Scores of one way to predict.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct PredictionScores {
+    /// Of thresholds.
+    #[serde(flatten)]
+    pub scores: Scores,
+    /// Share of real pictures that are classified as people did; `None` without any.
+    pub image_accuracy: Option<f64>,
+}
+
+/// What a predictor has to beat.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Baselines {
+    /// One noise level for all scenes.
+    pub constant: PredictionScores,
+    /// The median of the same scene's other zones.
+    pub scene_median: PredictionScores,
+}
+
+/// Scores of one scene.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct SceneScores {
+    /// The scene.
+    pub scene: String,
+    /// Of its zones.
+    #[serde(flatten)]
+    pub summary: PredictionScores,
+    /// Of the same zones.
+    pub baselines: Baselines,
+}
+
+/// How close predictions come to people.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Evaluation {
+    /// `leave-one-scene-out`, or the digest of the model scored.
+    pub predicted_by: String,
+    /// Over all zones.
+    #[serde(flatten)]
+    pub summary: PredictionScores,
+    /// Over all zones.
+    pub baselines: Baselines,
+    /// Scene by scene.
+    pub scenes: Vec<SceneScores>,
+    /// P against the share of observers who see no difference, as [`observers_agreeing`] has it.
+    pub reliability: Vec<ReliabilityBin>,
+    /// Of that curve.
+    pub calibration_error: f64,
+    /// P against the recorded mean threshold as a step from 0 to 1, which P does not stand for.
+    pub calibration_error_of_step: f64,
+    /// Zones whose human threshold is only a lower bound: not in the factors.
+    pub censored_zones: usize,
+    /// Zones unlike any that the model which predicts them was tested on.
+    pub unfamiliar_zones: usize,
+    /// Levels with a real picture.
+    pub levels_real: usize,
+    /// Levels between and beyond them.
+    pub levels_synthesised: usize,
+}
+
+impl PredictionScores {
+    fn of(predictions: &[Prediction], keep: &dyn Fn(&Prediction) -> bool) -> Self {
+        let kept = || predictions.iter().filter(|p| keep(p));
+        Self { scores: score(kept()), image_accuracy: image_accuracy(kept()) }
+    }
+}
+
+impl Evaluation {
+    /// Scores the predictions of the zones of `table`. `spread` is that of observers, as in [`TrainParams`](crate::TrainParams).
+    pub fn new(predicted_by: String, table: &Table, predictions: &[Prediction], spread: f64) -> Self {
+        let (constant, median) = (constant_noise_baseline(table), scene_median_baseline(table));
+        let baselines = |keep: &dyn Fn(&Prediction) -> bool| Baselines {
+            constant: PredictionScores::of(&constant, keep),
+            scene_median: PredictionScores::of(&median, keep),
+        };
+        let scene = |scene: &str| {
+            let keep = |p: &Prediction| p.scene == scene;
+            let summary = PredictionScores::of(predictions, &keep);
+            SceneScores { scene: scene.into(), summary, baselines: baselines(&keep) }
+        };
+        let levels = || table.zones.iter().flat_map(|z| &z.levels);
+        let real = levels().filter(|l| l.origin == Origin::Real).count();
+        let agreeing = |spp: f64, human: f64| observers_agreeing(spp, human, spread);
+        let step = |spp: f64, human: f64| f64::from(u8::from(spp >= human));
+        let curve = reliability(predictions.iter(), agreeing);
+        Self {
+            predicted_by,
+            summary: PredictionScores::of(predictions, &|_| true),
+            baselines: baselines(&|_| true),
+            scenes: table.scenes().into_iter().map(scene).collect(),
+            calibration_error: calibration_error(&curve),
+            calibration_error_of_step: calibration_error(&reliability(predictions.iter(), step)),
+            reliability: curve,
+            censored_zones: table.zones.iter().filter(|z| z.censored).count(),
+            unfamiliar_zones: predictions.iter().filter(|p| p.unfamiliar).count(),
+            levels_real: real,
+            levels_synthesised: levels().count() - real,
+        }
+    }
+}
