@@ -64,7 +64,7 @@ fn say_all(summary: &Summary<'_>) -> Result<(), NotSaid> {
     say!("digest           {}", summary.digest)?;
     say!(
         "descriptor       {} (version {}), {} numbers",
-        descriptor.name(),
+        descriptor.name,
         summary.descriptor_version,
         summary.numbers
     )?;

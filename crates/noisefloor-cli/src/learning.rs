@@ -3,7 +3,9 @@
 use crate::bars::bar;
 use anyhow::Context;
 use noisefloor::{Descriptor, Evidence, Threshold};
-use noisefloor_learn::{Corpora, Prediction, Table, TrainParams, describe_corpora, leave_one_scene_out, read_table};
+use noisefloor_learn::{
+    Corpora, Prediction, Table, TrainParams, describe_corpora, leave_one_scene_out, read_table,
+};
 use std::fs::File;
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
@@ -62,7 +64,11 @@ pub fn read_table_file(path: &Path) -> anyhow::Result<Table> {
 }
 
 /// Predictions on left-out scenes, with a bar.
-pub fn held_out(table: &Table, params: &TrainParams, threshold: Threshold) -> anyhow::Result<Vec<Prediction>> {
+pub fn held_out(
+    table: &Table,
+    params: &TrainParams,
+    threshold: Threshold,
+) -> anyhow::Result<Vec<Prediction>> {
     let bar = bar(table.groups().len() as u64, "scenes left out");
     let mut begun = false;
     let predictions = leave_one_scene_out(table, params, threshold, |group| {

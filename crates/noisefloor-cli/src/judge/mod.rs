@@ -73,7 +73,13 @@ fn judge(oracle: &Oracle, grid: TileGrid, held: &SnapshotPair<'_>) -> anyhow::Re
 }
 
 /// Draws what was asked for.
-fn draw(job: &JudgeJob, image: &Still, grid: TileGrid, held: &SnapshotPair<'_>, rows: &[Row]) -> anyhow::Result<()> {
+fn draw(
+    job: &JudgeJob,
+    image: &Still,
+    grid: TileGrid,
+    held: &SnapshotPair<'_>,
+    rows: &[Row],
+) -> anyhow::Result<()> {
     let width = grid.width();
     let wants_noise = job.noise_map.is_some() || job.exr.is_some();
     let noise =

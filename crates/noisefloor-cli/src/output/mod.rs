@@ -55,12 +55,7 @@ const CHECKPOINT: &str = "checkpoint.nfc";
 
 impl Output {
     /// Makes the folder, and makes sure that files can be written before hours are spent.
-    pub fn create(
-        folder: PathBuf,
-        scene: String,
-        source: String,
-        seed: u64,
-    ) -> anyhow::Result<Self> {
+    pub fn create(folder: PathBuf, scene: String, source: String, seed: u64) -> anyhow::Result<Self> {
         std::fs::create_dir_all(&folder).with_context(|| {
             format!("{}: this folder cannot be made; choose another with --out", folder.display())
         })?;

@@ -52,8 +52,7 @@ impl TileState {
     }
 
     pub(super) fn row(&self) -> StopRow {
-        let Stop { tile: Tile { index, x, y, width, height }, spp, probability, unfamiliar, .. } =
-            self.stop;
+        let Stop { tile: Tile { index, x, y, width, height }, spp, probability, unfamiliar, .. } = self.stop;
         let (tile, reason) = (index, self.reason());
         StopRow { tile, x, y, width, height, spp, probability, reason, unfamiliar }
     }

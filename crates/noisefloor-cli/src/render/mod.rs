@@ -68,7 +68,9 @@ pub fn run(job: RenderJob) -> anyhow::Result<ExitCode> {
             rest.drive(driver, Some(Snapshots::new(what)))
         }
         // A rival's state is not kept
-        Judge::Rival(spec) => rest.drive(Driver::new(source, noisefloor_rivals::parse(spec)?, *params)?, None),
+        Judge::Rival(spec) => {
+            rest.drive(Driver::new(source, noisefloor_rivals::parse(spec)?, *params)?, None)
+        }
     }
 }
 
@@ -123,7 +125,12 @@ impl Rest<'_> {
         finish(&driver, outcome, &cancel)?;
         written?;
         if !job.quiet {
-            output.summarise(driver.session(), driver.clock(), driver.source().as_ref(), snapshots.is_some())?;
+            output.summarise(
+                driver.session(),
+                driver.clock(),
+                driver.source().as_ref(),
+                snapshots.is_some(),
+            )?;
         }
         let stopped = driver.session().stops().any(|s| s.reason == StopReason::Cancelled);
         Ok(if stopped { ExitCode::from(INTERRUPTED) } else { ExitCode::SUCCESS })

@@ -39,7 +39,8 @@ impl<C: StoppingCriterion> Snapshots<C> {
             }
             return Ok(driver);
         };
-        let driver = (self.resume)(driver, &self.job, checkpoint).with_context(|| output.checkpoint_file())?;
+        let driver =
+            (self.resume)(driver, &self.job, checkpoint).with_context(|| output.checkpoint_file())?;
         output.take_up(driver.session().film().total_samples());
         Ok(driver)
     }

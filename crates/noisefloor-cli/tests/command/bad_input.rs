@@ -97,7 +97,7 @@ fn models() {
 fn options() {
     let case = Case::new();
     let (out, truth) = (case.path("out"), case.path("small.exr"));
-    let bad: [(&[&str], &[&str]); 22] = [
+    let bad: [(&[&str], &[&str]); 29] = [
         (&["no-such-scene"], &["no-such-scene", "noisefloor scenes"]),
         (&["--tile", "0"], &["tile", "16…512"]),
         (&["--tile", "513"], &["513", "16…512"]),
@@ -111,7 +111,14 @@ fn options() {
         (&["--min-spp", "300"], &["300"]),
         (&["--consecutive", "0"], &["at least one"]),
         (&["--criterion", "spp:0"], &["spp:0"]),
+        (&["--criterion", "spp"], &["spp:1000"]),
         (&["--criterion", "psychic"], &["spp:"]),
+        (&["--spp", "100"], &["--criterion spp:100"]),
+        (&["--threads", "100000"], &["--threads", "1…1024"]),
+        (&["--exposure", "2"], &["--exposure", "--tone-mapping srgb"]),
+        (&["--tone-mapping", "srgb", "--key", "0.2"], &["--key", "--tone-mapping reinhard"]),
+        (&["--tone-mapping", "srgb", "--white", "2"], &["--white", "--tone-mapping reinhard"]),
+        (&["--size", "64x64", "--no-mis", "--source", "exr"], &["--no-mis", "--source exr"]),
         (&["--audience", "bats"], &["observers"]),
         (&["--audience", "nan,0"], &["finite"]),
         (&["--time", "0"], &["above 0"]),
@@ -148,6 +155,7 @@ fn folders_that_cannot_be_written() {
 }
 
 #[test]
+#[cfg(feature = "train")]
 fn corpora() {
     let case = Case::new();
     let (folder, model) = (case.folder.path(), case.path("model.nfm"));
@@ -205,6 +213,7 @@ fn earlier_files_stay_when_the_last_check_fails() {
 
 /// Before the work, and not after it.
 #[test]
+#[cfg(feature = "train")]
 fn a_model_that_cannot_be_written_is_not_trained() {
     let corpora = crate::learn::Corpora::new();
     let out = corpora.paths[0].join("thresholds.csv/my.nfm");
@@ -235,6 +244,7 @@ fn scene_files() {
 }
 
 #[test]
+#[cfg(feature = "study")]
 fn explore_begins_with_pictures_it_can_read_or_not_at_all() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);

@@ -1,13 +1,14 @@
-//! Tests of the `noisefloor` command as it is run: exit codes, files, and one line an error. One module a subject.
+//! Tests of the `noisefloor` command as it is run: exit codes, files, and one line an error. One module a subject;
+//! commands that a build leaves out are tested with `--all-features`.
 
 /// Lines from one public to another.
-#[cfg(test)]
+#[cfg(all(test, feature = "train"))]
 mod audience;
 /// One line, no panic, nothing lost.
 #[cfg(test)]
 mod bad_input;
 /// Criteria side by side.
-#[cfg(test)]
+#[cfg(all(test, feature = "lab"))]
 mod compare;
 /// Every subcommand explains itself.
 #[cfg(test)]
@@ -19,8 +20,11 @@ mod judge;
 #[cfg(test)]
 mod kit;
 /// Train, inspect, evaluate.
-#[cfg(test)]
+#[cfg(all(test, feature = "train"))]
 mod learn;
+/// What a build leaves out.
+#[cfg(test)]
+mod left_out;
 /// The quick reference alone.
 #[cfg(test)]
 mod reference;
@@ -28,11 +32,14 @@ mod reference;
 #[cfg(test)]
 mod render;
 /// The paper's protocols: run, resumed, refused.
-#[cfg(test)]
+#[cfg(all(test, feature = "lab"))]
 mod reproduce;
+/// Where results cannot go, and where nobody reads them.
+#[cfg(all(test, target_os = "linux"))]
+mod say;
 /// Ctrl-C, and worse.
 #[cfg(test)]
 mod signals;
 /// Other renderers than our own.
-#[cfg(test)]
+#[cfg(all(test, feature = "adapters"))]
 mod sources;

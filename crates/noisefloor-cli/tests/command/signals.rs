@@ -1,4 +1,5 @@
 use crate::kit::{FILES, command, fail, json, succeed, table, text};
+#[cfg(feature = "lab")]
 use crate::learn::Corpora;
 use noisefloor_image::{read_exr, read_picture};
 use std::fs::File;
@@ -105,6 +106,7 @@ fn a_save_that_fails_is_told() {
 
 /// Sixteen results, of which the first is there: it is whole, and no report claims to have all.
 #[test]
+#[cfg(feature = "lab")]
 fn what_is_reproduced_so_far_survives_an_interrupt() {
     let (corpora, folder) = (Corpora::new(), tempdir().unwrap());
     let out = folder.path();
@@ -117,17 +119,6 @@ fn what_is_reproduced_so_far_survives_an_interrupt() {
     assert_eq!(end(child).code(), Some(130));
     assert_eq!(json(&first)["machines"][0]["examples"], 1200);
     assert!(!out.join("reproduce.json").exists());
-}
-
-/// `noisefloor scenes | head -1`: nobody reads on, and nothing is wrong.
-#[test]
-#[cfg(unix)]
-fn a_reader_who_has_had_enough_is_no_fault() {
-    let (reader, writer) = std::io::pipe().unwrap();
-    drop(reader);
-    let output = command(&["scenes"]).stdout(writer).output().unwrap();
-    assert!(output.status.success(), "{output:?}");
-    assert_eq!(String::from_utf8_lossy(&output.stderr), "");
 }
 
 /// A render of a few seconds, of which each call of the renderer is a small part.
