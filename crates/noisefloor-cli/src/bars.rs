@@ -1,7 +1,9 @@
 //! Progress bars.
 
 use indicatif::{ProgressBar, ProgressStyle};
+#[cfg(feature = "lab")]
 use noisefloor_lab::Advance;
+#[cfg(feature = "lab")]
 use std::sync::Mutex;
 
 /// A bar with an estimate of the time left.
@@ -13,11 +15,13 @@ pub fn bar(len: u64, what: &'static str) -> ProgressBar {
 }
 
 /// One bar after another, as work advances.
+#[cfg(feature = "lab")]
 pub struct Bars {
     quiet: bool,
     now: Mutex<Option<(&'static str, ProgressBar)>>,
 }
 
+#[cfg(feature = "lab")]
 impl Bars {
     pub fn new(quiet: bool) -> Self {
         Self { quiet, now: Mutex::new(None) }

@@ -39,6 +39,7 @@ impl DataJob {
     }
 
     /// The corpora; none if there is a table.
+    #[cfg(feature = "lab")]
     pub fn corpora(&self) -> &[PathBuf] {
         match &self.source {
             DataSource::Corpora(folders) => folders,

@@ -7,7 +7,7 @@ use crate::{
 use noisefloor::{FixedSpp, StoppingCriterion};
 use thiserror::Error;
 
-/// Samples per pixel of `spp` without a number.
+/// Samples per pixel of the example.
 const DEFAULT_SAMPLES: f64 = 1000.0;
 /// Seconds of `time` without a number.
 const DEFAULT_SECONDS: f64 = 60.0;
@@ -143,7 +143,8 @@ fn known() -> String {
     names.map(|name| format!("{name}:…")).collect::<Vec<_>>().join(", ")
 }
 
-/// Makes a criterion of a spec: a name, and after a colon its constant, or the default without one.
+/// Makes a criterion of a spec: a name, and after a colon its constant, or the default without one;
+/// `spp` needs its number.
 /// `"spp:256"`, `"time:30"` (seconds), `"relative-error:0.19"`, `"dammertz:0.003"`, `"cycles:0.01"`,
 /// `"luxcore:0.35"`, `"vdp-stages:0.55"`, `"vdp-first:0.66"`.
 ///
@@ -152,7 +153,8 @@ fn known() -> String {
 pub fn parse(spec: &str) -> Result<Box<dyn StoppingCriterion + Send>, SpecError> {
     let (name, number) = spec.split_once(':').map_or((spec, None), |(name, number)| (name, Some(number)));
     let constant = |name, default: f64, wanted, valid: fn(f64) -> bool| {
-        let Some(number) = number else { return Ok(default) };
+        // Any default number of samples would be wrong for somebody
+        let Some(number) = number.or((name == "spp").then_some("")) else { return Ok(default) };
         let parsed = number.trim().parse::<f64>().ok().filter(|&x| x.is_finite() && valid(x));
         parsed.ok_or_else(|| SpecError::Number {
             spec: spec.into(),
@@ -178,7 +180,6 @@ mod tests {
     fn specs_name_criteria() {
         for (spec, name) in [
             ("spp:256", "256 samples per pixel"),
-            ("spp", "1000 samples per pixel"),
             ("time:1.5", "1.5 seconds"),
             ("relative-error", "relative error 0.19 at 95 %"),
             ("dammertz:0.002", "Dammertz et al. 2010, stop 0.002"),
@@ -201,6 +202,7 @@ mod tests {
         for spec in [
             "",
             ":",
+            "spp",
             "spp:0",
             "spp:x",
             "spp:1e99",
@@ -222,7 +224,8 @@ mod tests {
             let (low, high) = (strict.min(lax), strict.max(lax));
             assert!(low > 0.0 && (low..=high).contains(&rival.default), "{}", rival.name);
             assert!([strict, lax].into_iter().all(rival.valid), "{}", rival.name);
-            assert_eq!((rival.make)(rival.default).name(), parse(rival.name).unwrap().name());
+            let spec = format!("{}:{}", rival.name, rival.default);
+            assert_eq!((rival.make)(rival.default).name(), parse(&spec).unwrap().name());
         }
     }
 }

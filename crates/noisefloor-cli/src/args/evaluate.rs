@@ -77,8 +77,10 @@ impl EvaluateArgs {
             threshold: self.threshold,
             json: self.json,
             csv: self.csv,
+            #[cfg(feature = "lab")]
             figures: self.figures,
             without: self.without,
+            #[cfg(feature = "lab")]
             rivals: self.rivals,
         })
     }

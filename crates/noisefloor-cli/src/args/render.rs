@@ -101,7 +101,6 @@ enum CriterionChoice {
 fn criterion(text: &str) -> Result<CriterionChoice, String> {
     match text.split_once(':') {
         None if text == "oracle" => Ok(CriterionChoice::Oracle),
-        None if text == "spp" => Err("spp needs its number of samples, as in spp:1000".into()),
         Some(("spp", n)) => match n.parse() {
             Ok(n) if n > 0 => Ok(CriterionChoice::Fixed(n)),
             _ => Err(format!("spp:{n} needs a positive whole number of samples, as in spp:1000")),

@@ -47,6 +47,7 @@ impl TrainArgs {
             params,
             out: self.out,
             save_table: self.save_table,
+            #[cfg(feature = "study")]
             disagreements: self.disagreements,
             scores: !self.no_scores,
         })

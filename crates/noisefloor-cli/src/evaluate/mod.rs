@@ -13,6 +13,7 @@ use noisefloor_image::check_writable;
 #[cfg(feature = "lab")]
 use noisefloor_lab::rivals::RatedRival;
 use noisefloor_learn::{Evaluation, Prediction, Table, TrainParams, predict};
+#[cfg(feature = "lab")]
 use noisefloor_rivals::Rival;
 use serde::Serialize;
 use std::path::PathBuf;
@@ -26,9 +27,10 @@ pub struct EvaluateJob {
     pub threshold: Threshold,
     pub json: Option<PathBuf>,
     pub csv: Option<PathBuf>,
-    /// Only in a build with `lab`, as are rivals.
+    #[cfg(feature = "lab")]
     pub figures: Option<PathBuf>,
     pub without: Vec<String>,
+    #[cfg(feature = "lab")]
     pub rivals: Vec<&'static Rival>,
 }
 

@@ -6,12 +6,14 @@ use crate::say::note;
 use anyhow::Context;
 use noisefloor::{Checkpoint, CheckpointError, Driver, Resumable, Session, StoppingCriterion};
 
+type Resume<C> = fn(Rendering<C>, &str, Checkpoint<'_>) -> Result<Rendering<C>, CheckpointError>;
+
 /// Of a criterion that is [`Resumable`], on a source that repeats its samples.
 pub(super) struct Snapshots<C> {
     /// What must be the same for a render to be resumed, beside what the library checks.
     pub(super) job: String,
     save: for<'a> fn(&'a Session<C>, &'a str) -> Checkpoint<'a>,
-    resume: fn(Rendering<C>, &str, Checkpoint<'_>) -> Result<Rendering<C>, CheckpointError>,
+    resume: Resume<C>,
 }
 
 impl<C: Resumable> Snapshots<C> {

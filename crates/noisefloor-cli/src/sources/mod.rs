@@ -38,6 +38,7 @@ pub struct SourceJob {
     pub max_depth: Option<u32>,
     pub threads: Option<NonZeroUsize>,
     /// Of one call to another renderer.
+    #[cfg_attr(not(feature = "adapters"), expect(dead_code, reason = "no other renderer is in this build"))]
     pub timeout: Duration,
 }
 

@@ -16,7 +16,7 @@ pub struct TrainJob {
     pub params: TrainParams,
     pub out: PathBuf,
     pub save_table: Option<PathBuf>,
-    /// Only in a build with `study`.
+    #[cfg(feature = "study")]
     pub disagreements: Option<PathBuf>,
     pub scores: bool,
 }

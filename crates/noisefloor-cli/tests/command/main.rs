@@ -2,13 +2,15 @@
 //! commands that a build leaves out are tested with `--all-features`.
 
 /// Lines from one public to another.
-#[cfg(all(test, feature = "train"))]
+#[cfg(test)]
+#[cfg(feature = "train")]
 mod audience;
 /// One line, no panic, nothing lost.
 #[cfg(test)]
 mod bad_input;
 /// Criteria side by side.
-#[cfg(all(test, feature = "lab"))]
+#[cfg(test)]
+#[cfg(feature = "lab")]
 mod compare;
 /// Every subcommand explains itself.
 #[cfg(test)]
@@ -20,7 +22,8 @@ mod judge;
 #[cfg(test)]
 mod kit;
 /// Train, inspect, evaluate.
-#[cfg(all(test, feature = "train"))]
+#[cfg(test)]
+#[cfg(feature = "train")]
 mod learn;
 /// What a build leaves out.
 #[cfg(test)]
@@ -32,14 +35,17 @@ mod reference;
 #[cfg(test)]
 mod render;
 /// The paper's protocols: run, resumed, refused.
-#[cfg(all(test, feature = "lab"))]
+#[cfg(test)]
+#[cfg(feature = "lab")]
 mod reproduce;
 /// Where results cannot go, and where nobody reads them.
-#[cfg(all(test, target_os = "linux"))]
+#[cfg(test)]
+#[cfg(target_os = "linux")]
 mod say;
 /// Ctrl-C, and worse.
 #[cfg(test)]
 mod signals;
 /// Other renderers than our own.
-#[cfg(all(test, feature = "adapters"))]
+#[cfg(test)]
+#[cfg(feature = "adapters")]
 mod sources;

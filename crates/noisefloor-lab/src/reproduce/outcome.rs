@@ -12,6 +12,7 @@ use serde::{Deserialize, Serialize};
 use statrs::statistics::{Data, Median};
 use std::fs::File;
 use std::io::Read;
+use std::iter::Sum;
 use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
@@ -85,16 +86,16 @@ impl Count {
         *all += 1;
         *of_them += usize::from(right);
     }
+}
 
-    /// Both together.
-    #[must_use]
-    pub fn add(self, other: Self) -> Self {
-        Self {
-            noisy: self.noisy + other.noisy,
-            noisy_right: self.noisy_right + other.noisy_right,
-            identical: self.identical + other.identical,
-            identical_right: self.identical_right + other.identical_right,
-        }
+impl Sum for Count {
+    fn sum<I: Iterator<Item = Self>>(counts: I) -> Self {
+        counts.fold(Self::default(), |sum, count| Self {
+            noisy: sum.noisy + count.noisy,
+            noisy_right: sum.noisy_right + count.noisy_right,
+            identical: sum.identical + count.identical,
+            identical_right: sum.identical_right + count.identical_right,
+        })
     }
 }
 

@@ -102,8 +102,7 @@ const SHARES_OF_REAL: [&str; 4] =
 
 /// Synthesised and real pairs that were asked about, over all machines.
 fn total(outcome: &ProtocolOutcome) -> (Count, Count) {
-    let sum =
-        |of: fn(&MachineResult) -> Count| outcome.machines.iter().map(of).fold(Count::default(), Count::add);
+    let sum = |of: fn(&MachineResult) -> Count| outcome.machines.iter().map(of).sum();
     (sum(|m| m.synthesised), sum(|m| m.real))
 }
 
