@@ -56,13 +56,7 @@ fn say_tiles(report: &StudyReport) -> Result<(), NotSaid> {
         let beyond = if t.beyond { "  beyond the stack" } else { "" };
         let doubt =
             if t.fit_probability.is_some_and(|p| p < 0.01) { "  the spread does not fit" } else { "" };
-        say!(
-            "{:20} {:4} {:9.0} {:14.0}   {interval}{beyond}{doubt}",
-            t.stack,
-            t.tile,
-            t.mean,
-            t.level95
-        )?;
+        say!("{:20} {:4} {:9.0} {:14.0}   {interval}{beyond}{doubt}", t.stack, t.tile, t.mean, t.level95)?;
     }
     Ok(())
 }
