@@ -2,6 +2,7 @@
 //! tile.
 
 use crate::check::{check_pixels, check_values, checked};
+use crate::csf::OpponentChannel;
 use crate::engine::{Engine, build, collapse};
 use crate::error::VisionError;
 use crate::masking::{BLUR_RADIUS, EXPONENT, LARGEST, grown};
@@ -177,7 +178,7 @@ impl VisibleDifference<'_> {
     }
 
     /// The bands of a channel, finest first; none for chromatic channels that were not computed.
-    pub fn bands(&self, channel: crate::OpponentChannel) -> impl Iterator<Item = DifferenceBand<'_>> {
+    pub fn bands(&self, channel: OpponentChannel) -> impl Iterator<Item = DifferenceBand<'_>> {
         let planes = &self.workspace.differences[channel as usize];
         let bands = if (channel as usize) < self.channels { self.bands.clone() } else { 0..0 };
         bands.map(|band| self.plane(band, &planes[band]))
