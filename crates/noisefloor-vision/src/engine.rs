@@ -216,3 +216,39 @@ fn pad(row: &mut [f32]) {
         row[last - i] = row[last - 2 * BLUR_RADIUS + i];
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::workspace::Sizes;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn the_bands_of_a_pyramid_add_up_to_its_picture(
+            (width, height) in (8usize..70, 8usize..70), levels in 1usize..4, seed in any::<u32>(),
+        ) {
+            let sizes = Sizes::new(Size { width, height }, levels);
+            let random = |i: u32| ((i ^ seed).wrapping_mul(0x9E37_79B1) >> 8) as f32 / (1 << 24) as f32;
+            let picture: Vec<f32> = (0..(width * height) as u32).map(random).collect();
+            let (mut narrow, mut row) = (vec![0.0; width + 4], vec![0.0; width]);
+            // Levels, then what the next coarser one lacks of each
+            let mut bands = vec![picture.clone()];
+            for level in 1..levels {
+                let mut coarse = vec![0.0; sizes[level].area()];
+                reduce(&bands[level - 1], sizes[level - 1], &mut narrow, &mut coarse);
+                bands.push(coarse);
+            }
+            for level in 0..levels - 1 {
+                let coarse = bands[level + 1].clone();
+                for (y, fine) in bands[level].chunks_exact_mut(sizes[level].width).enumerate() {
+                    expand_row(&coarse, sizes[level], y, &mut narrow, &mut row);
+                    fine.iter_mut().zip(&row).for_each(|(fine, coarse)| *fine -= coarse);
+                }
+            }
+            let whole = |band: usize| 0..sizes[band].height;
+            collapse(&mut bands, 0..levels, &sizes, whole, &mut narrow, &mut row);
+            prop_assert!(bands[0].iter().zip(&picture).all(|(a, b)| (a - b).abs() < 1e-5));
+        }
+    }
+}
