@@ -267,7 +267,7 @@ impl<'a> Tracer<'a> {
     /// light.
     fn background(&self, dir: Vec3, density: f32) -> (Vec3, Option<usize>) {
         let mut stratum = None;
-        let radiance = self.scene.background(dir, |own, _| {
+        let radiance = self.scene.background(dir, |_, own| {
             let seen = self.guide.strata.far(dir);
             stratum = Some(seen);
             self.share(density, seen, own)

@@ -21,7 +21,7 @@ pub(crate) struct LightStrata<'a> {
 impl<'a> LightStrata<'a> {
     pub(crate) fn new(scene: &'a Scene) -> Self {
         let cells = scene.map().map(Cells::new);
-        let mut by_power: Vec<f64> = scene.lights.all.iter().map(|l| f64::from(l.pmf)).collect();
+        let mut by_power: Vec<f64> = scene.lights.all.iter().map(|l| f64::from(l.power_pmf)).collect();
         if let Some(cells) = &cells {
             let map = by_power.pop().unwrap_or(0.0);
             by_power.extend(cells.pmf.iter().map(|c| f64::from(*c) * map));

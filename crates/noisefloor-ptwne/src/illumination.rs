@@ -18,19 +18,20 @@ pub(crate) struct Emitted<'a> {
 
 impl Scene {
     /// Radiance from `dir` of what is infinitely far away. `weight` is the weight of light that is also
-    /// sampled, by the density of the sample given the light, and the probability of the light.
+    /// sampled, by the index of its light and the density of the sample given the light.
     #[inline]
-    pub(crate) fn background(&self, dir: Vec3, weight: impl FnOnce(f32, f32) -> f32) -> Vec3 {
+    pub(crate) fn background(&self, dir: Vec3, weight: impl FnOnce(usize, f32) -> f32) -> Vec3 {
         match &self.sky {
             None => Vec3::ZERO,
-            Some(Sky::Map(map)) => {
-                // The map is the last light
-                map.radiance(dir) * weight(map.pdf(dir), self.lights.all[self.lights.all.len() - 1].pmf)
-            }
+            // The map is the last light
+            Some(Sky::Map(map)) => map.radiance(dir) * weight(self.lights.all.len() - 1, map.pdf(dir)),
             Some(Sky::Dome(dome)) => {
                 let mut sum = dome.radiance(dir);
-                if let Some(sun) = self.sun.map(|i| &self.lights.all[i]).filter(|sun| sun.covers(dir)) {
-                    sum += sun.radiance * weight(sun.pdf(Vec3::ZERO, 0.0, 1.0), sun.pmf);
+                if let Some(index) = self.sun
+                    && self.lights.all[index].covers(dir)
+                {
+                    let sun = &self.lights.all[index];
+                    sum += sun.radiance * weight(index, sun.pdf(Vec3::ZERO, 0.0, 1.0));
                 }
                 sum
             }

@@ -3,7 +3,7 @@
 use crate::accel::{Hit, Stack};
 use crate::bsdf;
 use crate::intersection::{Intersection, OpacityTest};
-use crate::light::LightSample;
+use crate::light::{LightSample, Receiver};
 use crate::material::Bsdf;
 use crate::math::{self, DELTA, Frame, Ray, Vec3, power_heuristic};
 use crate::sampler::Sampler;
@@ -54,7 +54,8 @@ fn radiance<const OPACITY: bool>(
     stack: &mut Stack,
 ) -> Vec3 {
     let seed = if OPACITY { sampler.seed() } else { 0 };
-    Path::<OPACITY> { scene, settings, sampler, stack, seed }.radiance(ray)
+    let receiver = Receiver::diffuse(ray.origin, ray.dir);
+    Path::<OPACITY> { scene, settings, sampler, stack, seed, receiver }.radiance(ray)
 }
 
 /// One path.
@@ -65,6 +66,8 @@ struct Path<'a, const OPACITY: bool> {
     stack: &'a mut Stack,
     /// Seed of opacity tests; another one for each ray.
     seed: u64,
+    /// The last surface that sampled a light.
+    receiver: Receiver,
 }
 
 /// A new direction, its weight f·cos θ / density, its density, and a number left over for Russian roulette.
@@ -90,16 +93,16 @@ impl<'a, const OPACITY: bool> Path<'a, OPACITY> {
             if hit.is_miss() {
                 return sum
                     + throughput
-                        * scene.background(ray.dir, |light_pdf, pmf| self.hit_weight(pdf, light_pdf * pmf));
+                        * scene
+                            .background(ray.dir, |light, light_pdf| self.hit_weight(pdf, light, light_pdf));
             }
             let surface = scene.surface(&ray, &hit);
 
             // Light that the ray hit
             if let Some(emitted) = scene.emitted(&surface, &hit, ray.dir) {
-                let light = emitted.light;
-                let light_pdf =
-                    if pdf == DELTA { 0.0 } else { light.pdf(ray.origin, hit.t, emitted.cos) * light.pmf };
-                sum += throughput * emitted.radiance * self.hit_weight(pdf, light_pdf);
+                let light_pdf = emitted.light.pdf(ray.origin, hit.t, emitted.cos);
+                sum +=
+                    throughput * emitted.radiance * self.hit_weight(pdf, surface.light as usize, light_pdf);
             }
             if depth >= self.settings.max_depth || surface.material.one_sided && !surface.front {
                 return sum;
@@ -145,13 +148,13 @@ impl<'a, const OPACITY: bool> Path<'a, OPACITY> {
         OpacityTest::Random(self.seed)
     }
 
-    /// The weight of light that a ray sampled with density `pdf` hit; next event estimation has density
+    /// The weight of light that a ray sampled with density `pdf` hit. Samples of that light have density
     /// `light_pdf` there.
     #[inline(always)]
-    fn hit_weight(&self, pdf: f32, light_pdf: f32) -> f32 {
+    fn hit_weight(&self, pdf: f32, light: usize, light_pdf: f32) -> f32 {
         match self.settings.estimator {
             _ if pdf == DELTA => 1.0,
-            Estimator::Mis => power_heuristic(pdf, light_pdf),
+            Estimator::Mis => power_heuristic(pdf, light_pdf * self.scene.lights.pmf(&self.receiver, light)),
             Estimator::NextEvents => 0.0,
             Estimator::BruteForce => 1.0,
         }
@@ -179,21 +182,27 @@ impl<'a, const OPACITY: bool> Path<'a, OPACITY> {
     /// Next event estimation: radiance over density from a point on a light, times what `scattered` returns
     /// for the direction and its density. No shadow ray is traced if that is zero.
     #[inline(always)]
-    fn next_event(&mut self, surface: &Intersection<'_>, scattered: impl FnOnce(Vec3, f32) -> Vec3) -> Vec3 {
+    fn next_event(
+        &mut self,
+        surface: &Intersection<'_>,
+        receiver: Receiver,
+        scattered: impl FnOnce(Vec3, f32) -> Vec3,
+    ) -> Vec3 {
         let scene = self.scene;
         if scene.lights.all.is_empty() || self.settings.estimator == Estimator::BruteForce {
             return Vec3::ZERO;
         }
         let [pick, u, v, more] = self.sampler.four();
-        let Some(light) = scene.lights.choose(pick, more) else { return Vec3::ZERO };
-        let origin = scene.leave(surface, surface.flat);
+        self.receiver = receiver;
+        let Some((light, pmf)) = scene.lights.choose(&receiver, pick, more) else { return Vec3::ZERO };
+        let (light, origin) = (&scene.lights.all[light], receiver.position);
         let sample = scene.sample_light(light, origin, [u, v, more]);
         let Some(LightSample { dir, distance, value, pdf, .. }) =
             sample.filter(|sample| sample.dir.dot(surface.flat) > 0.0)
         else {
             return Vec3::ZERO;
         };
-        let light_sum = scattered(dir, pdf * light.pmf) * value / light.pmf;
+        let light_sum = scattered(dir, pdf * pmf) * value / pmf;
         // Also false for NaN: a density beyond the range of f32 carries no light
         if !(light_sum.max_element() > 0.0 && light_sum.max_element() < f32::MAX) {
             return Vec3::ZERO;
@@ -214,8 +223,9 @@ impl<'a, const OPACITY: bool> Path<'a, OPACITY> {
         sum: &mut Vec3,
     ) -> Option<Scattered> {
         let mis = self.settings.estimator == Estimator::Mis;
+        let receiver = Receiver::diffuse(self.scene.leave(surface, surface.flat), surface.normal);
         *sum += throughput
-            * self.next_event(surface, |dir, pdf| {
+            * self.next_event(surface, receiver, |dir, pdf| {
                 let lambert = dir.dot(surface.normal).max(0.0) * FRAC_1_PI;
                 let weight = if mis { power_heuristic(pdf, lambert) } else { 1.0 };
                 albedo * (lambert * weight)
@@ -243,8 +253,10 @@ impl<'a, const OPACITY: bool> Path<'a, OPACITY> {
         let wo = frame.to_local(-ray.dir);
         let glossy = surface.glossy(wo.z)?;
         let mis = self.settings.estimator == Estimator::Mis;
+        let origin = self.scene.leave(surface, surface.flat);
+        let receiver = glossy.receiver(origin, surface.normal, wo, frame);
         *sum += throughput
-            * self.next_event(surface, |dir, pdf| {
+            * self.next_event(surface, receiver, |dir, pdf| {
                 let (f_cos, bsdf_pdf) = glossy.eval(wo, frame.to_local(dir));
                 f_cos * if mis { power_heuristic(pdf, bsdf_pdf) } else { 1.0 }
             });

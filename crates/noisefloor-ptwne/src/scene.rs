@@ -137,7 +137,7 @@ impl Scene {
 
     /// Number of lights that are never sampled, since they are black or face away from the whole scene.
     pub fn idle_lights(&self) -> usize {
-        self.lights.all.iter().filter(|l| l.pmf <= 0.0).count()
+        self.lights.all.iter().filter(|l| l.power_pmf <= 0.0).count()
     }
 
     /// Whether any surface is partly transparent
@@ -150,7 +150,7 @@ impl Scene {
     /// Memory that the surfaces take, in bytes: the hierarchy, shading normals, texture coordinates and
     /// lights, but not the pixels of textures.
     pub fn geometry_bytes(&self) -> usize {
-        self.bvh.bytes() + self.geometry.bytes() + size_of_val(self.lights.all.as_slice())
+        self.bvh.bytes() + self.geometry.bytes() + self.lights.bytes()
     }
 
     /// The environment map, if there is one.

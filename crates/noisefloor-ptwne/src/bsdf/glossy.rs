@@ -3,7 +3,8 @@
 use super::coat::Coat;
 use super::fresnel::{Fresnel, fresnel, schlick};
 use super::ggx::{Ggx, MIN_ROUGHNESS};
-use crate::math::{self, DELTA, Vec3};
+use crate::light::Receiver;
+use crate::math::{self, DELTA, Frame, Vec3};
 use std::f32::consts::FRAC_1_PI;
 
 /// Microfacets of a metal or a coat, and the diffuse base below the coat, seen from one direction.
@@ -116,6 +117,19 @@ impl<'a> Glossy<'a> {
             Some(coat) if wi.z > 0.0 => self.base * (coat.transmittance(self.ggx.alpha, wi.z) * wi.z),
             _ => Vec3::ZERO,
         }
+    }
+
+    /// How a light's choice sees it, with the direction `wo` to where it is seen from.
+    #[inline]
+    pub(crate) fn receiver(&self, position: Vec3, normal: Vec3, wo: Vec3, frame: Frame) -> Receiver {
+        // Transmittance hardly depends on the direction, but close to the horizon
+        let diffuse = match self.coat {
+            Some(coat) => math::luminance(self.base) * coat.transmittance(self.ggx.alpha, 0.7),
+            None => 0.0,
+        };
+        let glossy = if self.smooth { 0.0 } else { math::luminance(self.reflectance(wo.z)) / wo.z.max(0.1) };
+        let mirror = frame.to_world(Vec3::new(-wo.x, -wo.y, wo.z));
+        Receiver { position, normal, diffuse, glossy, mirror, alpha2: self.ggx.alpha * self.ggx.alpha }
     }
 
     /// f·cos θᵢ, and the density of [`Glossy::sample`].

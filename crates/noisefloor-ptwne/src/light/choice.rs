@@ -1,14 +1,37 @@
-//! Choosing one of many lights.
+//! Choosing one of many lights, by what a receiver is likely to scatter of each.
 
-use super::emitter::Light;
-use crate::alias::AliasTable;
-use crate::math::Vec3;
+use super::cluster::Cluster;
+use super::emitter::{Light, LightShape};
+use super::receiver::Receiver;
+use super::tree::{LightTree, Pmf};
+use crate::math::{self, Vec3};
+use std::f32::consts::PI;
 
-/// All lights of a scene, chosen with probability proportional to power.
+/// Share of the choices that goes by position and direction only. It bounds the noise where lights that look
+/// strong are hidden, or where the estimate of what a glossy receiver scatters is poor.
+const GEOMETRIC_SHARE: f32 = 0.2;
+
+/// All lights of a scene: those that have a position in a tree, and those that are infinitely far away in a
+/// list.
 #[derive(Clone, Debug)]
 pub(crate) struct Lights {
     pub(crate) all: Vec<Light>,
-    table: AliasTable,
+    /// The only light that matters, if there is just one.
+    only: Option<usize>,
+    tree: LightTree,
+    far: Vec<FarLight>,
+}
+
+/// A light that is infinitely far away.
+#[derive(Clone, Copy, Debug)]
+struct FarLight {
+    light: usize,
+    /// Irradiance of a surface that faces it, relative as in the tree.
+    irradiance: f32,
+    /// Direction towards it; none for the environment map.
+    dir: Option<Vec3>,
+    /// Sine of its half angle.
+    sin: f32,
 }
 
 impl Lights {
@@ -17,26 +40,151 @@ impl Lights {
     /// chosen.
     pub(crate) fn new(mut all: Vec<Light>, [low, high]: [Vec3; 2], textures: &[Vec3]) -> Self {
         let extent = 0.5 * (high - low).length();
+        let texture = |l: &Light| textures.get(l.texture as usize).copied().unwrap_or(Vec3::ONE);
         let power = |l: &Light| {
-            let texture = textures.get(l.texture as usize).copied().unwrap_or(Vec3::ONE);
-            if l.reaches(low, high) { f64::from(l.power(extent, texture)) } else { 0.0 }
+            if l.reaches(low, high) { f64::from(l.power(extent, texture(l))) } else { 0.0 }
         };
         let powers: Vec<f64> = all.iter().map(power).collect();
         let total: f64 = powers.iter().sum();
         for (light, power) in all.iter_mut().zip(&powers) {
-            light.pmf = if total > 0.0 { (power / total) as f32 } else { 0.0 };
+            light.power_pmf = if total > 0.0 { (power / total) as f32 } else { 0.0 };
         }
-        Self { table: AliasTable::new(&powers), all }
+
+        let active = || all.iter().enumerate().filter(|(i, _)| powers[*i] > 0.0);
+        let clusters = active().filter_map(|(i, l)| Some((i as u32, Cluster::of(l, texture(l))?)));
+        let clusters: Vec<_> = clusters.collect();
+        let intensity: f64 = clusters.iter().map(|(_, cluster)| cluster.intensity).sum();
+        let scale = if intensity > 0.0 { 1.0 / intensity } else { 1.0 };
+        let far = active().filter_map(|(i, l)| FarLight::of(i, l, scale)).collect();
+        let mut indices = active().map(|(i, _)| i);
+        let only = indices.next().filter(|_| indices.next().is_none());
+        Self { only, tree: LightTree::new(clusters, all.len(), scale, extent), far, all }
     }
 
-    /// Chooses a light by two numbers uniform in [0, 1), as in [`AliasTable::choose`]; none if none shines.
+    /// Chooses a light for a receiver by two numbers uniform in [0, 1), of which the second only extends the
+    /// first. Returns its index and the probability of the choice; none if no light was found that can
+    /// matter.
     #[inline]
-    pub(crate) fn choose(&self, u: f32, more: f32) -> Option<&Light> {
-        let light = match self.all.as_slice() {
-            [] => return None,
-            [only] => only,
-            all => &all[self.table.choose(u, more).0],
+    pub(crate) fn choose(&self, receiver: &Receiver, u: f32, more: f32) -> Option<(usize, f32)> {
+        if let Some(only) = self.only {
+            return Some((only, 1.0));
+        }
+        let u = f64::from(u) + f64::from(more) * 2f64.powi(-24);
+        let share = f64::from(GEOMETRIC_SHARE);
+        let geometric = u < share;
+        let u = if geometric { u / share } else { (u - share) / (1.0 - share) };
+
+        // Far lights first, then the tree
+        let shares = self.shares(receiver);
+        let of_tree = if geometric { shares.geometric } else { shares.scattered };
+        let mut rest = u * f64::from(self.far_weight(receiver, geometric) + of_tree);
+        for far in &self.far {
+            let weight = f64::from(far.weight(receiver, geometric));
+            if rest < weight {
+                return Some((far.light, self.pmf(receiver, far.light)));
+            }
+            rest -= weight;
+        }
+        if of_tree <= 0.0 {
+            return None;
+        }
+        let u = (rest / f64::from(of_tree)).clamp(0.0, 1.0 - f64::EPSILON);
+        let (light, pmf) = self.tree.choose(receiver, u, geometric)?;
+        Some((light, self.combined(receiver, &shares, pmf)))
+    }
+
+    /// The probability with which [`Lights::choose`] chooses a light for a receiver.
+    #[inline]
+    pub(crate) fn pmf(&self, receiver: &Receiver, light: usize) -> f32 {
+        if let Some(only) = self.only {
+            return if only == light { 1.0 } else { 0.0 };
+        }
+        let shares = self.shares(receiver);
+        if self.tree.contains(light) {
+            return self.combined(receiver, &shares, self.tree.pmf(receiver, light));
+        }
+        let Some(far) = self.far.iter().find(|far| far.light == light) else { return 0.0 };
+        let pmf = Pmf { scattered: far.weight(receiver, false), geometric: far.weight(receiver, true) };
+        self.mixed(receiver, &shares, pmf)
+    }
+
+    /// Memory that it takes, in bytes.
+    pub(crate) fn bytes(&self) -> usize {
+        size_of_val(self.all.as_slice()) + self.tree.bytes()
+    }
+
+    /// The weights of the tree beside those of [`FarLight::weight`].
+    #[inline]
+    fn shares(&self, receiver: &Receiver) -> Pmf {
+        match (self.tree.is_empty(), self.far.is_empty()) {
+            (true, _) => Pmf { scattered: 0.0, geometric: 0.0 },
+            (false, true) => Pmf { scattered: 1.0, geometric: 1.0 },
+            // By geometry, half of the choices go to far lights
+            (false, false) => {
+                let geometric = self.far_weight(receiver, true);
+                let geometric = if geometric > 0.0 { geometric } else { 1.0 };
+                Pmf { scattered: self.tree.scattered(receiver), geometric }
+            }
+        }
+    }
+
+    #[inline]
+    fn far_weight(&self, receiver: &Receiver, geometric: bool) -> f32 {
+        self.far.iter().map(|far| far.weight(receiver, geometric)).sum()
+    }
+
+    /// The probability of a light of the tree, given that the tree was chosen with the probability `pmf`.
+    #[inline]
+    fn combined(&self, receiver: &Receiver, shares: &Pmf, pmf: Pmf) -> f32 {
+        if self.far.is_empty() {
+            return (1.0 - GEOMETRIC_SHARE) * pmf.scattered + GEOMETRIC_SHARE * pmf.geometric;
+        }
+        let (scattered, geometric) = (pmf.scattered * shares.scattered, pmf.geometric * shares.geometric);
+        self.mixed(receiver, shares, Pmf { scattered, geometric })
+    }
+
+    /// The probability of what has these weights beside all other lights.
+    #[inline]
+    fn mixed(&self, receiver: &Receiver, shares: &Pmf, weights: Pmf) -> f32 {
+        let of = |weight: f32, all: f32| if all > 0.0 { weight / all } else { 0.0 };
+        let scattered = of(weights.scattered, self.far_weight(receiver, false) + shares.scattered);
+        let geometric = of(weights.geometric, self.far_weight(receiver, true) + shares.geometric);
+        (1.0 - GEOMETRIC_SHARE) * scattered + GEOMETRIC_SHARE * geometric
+    }
+}
+
+impl FarLight {
+    fn of(light: usize, emitter: &Light, scale: f64) -> Option<Self> {
+        let (solid_angle, dir, sin) = match emitter.shape {
+            LightShape::Sun { frame, one_minus_cos: m } => {
+                (2.0 * PI * m, Some(frame.z), (m * (2.0 - m)).max(0.0).sqrt())
+            }
+            LightShape::Map => (PI, None, 1.0),
+            LightShape::Distant { towards } => (1.0, Some(towards), 0.0),
+            LightShape::Planar { .. } | LightShape::Sphere { .. } | LightShape::Point { .. } => return None,
         };
-        (light.pmf > 0.0).then_some(light)
+        let irradiance = f64::from(math::luminance(emitter.radiance)) * f64::from(solid_angle) * scale;
+        Some(Self { light, irradiance: irradiance as f32, dir, sin })
+    }
+
+    /// Its weight for a receiver: an estimate of the light that the receiver scatters, or one, by geometry.
+    /// Zero only if it sends no light to the receiver.
+    #[inline]
+    fn weight(&self, receiver: &Receiver, geometric: bool) -> f32 {
+        let Some(dir) = self.dir else {
+            // A lobe reflects all that it receives from a uniform map
+            let scattered = self.irradiance * (receiver.diffuse + receiver.glossy / PI);
+            return if geometric { 1.0 } else { scattered };
+        };
+        // The sine of the greatest height above the horizon is at most the sum of both sines
+        let cos = dir.dot(receiver.normal) + self.sin;
+        if cos <= -1e-4 {
+            return 0.0;
+        }
+        if geometric {
+            return 1.0;
+        }
+        self.irradiance
+            * (receiver.diffuse * cos.clamp(0.0, 1.0) + receiver.glossy * receiver.lobe(dir, self.sin))
     }
 }

@@ -60,8 +60,8 @@ pub(crate) struct Light {
     pub(crate) texture: u32,
     /// The surface that shines.
     pub(crate) prim: u32,
-    /// Probability that next event estimation chooses this light.
-    pub(crate) pmf: f32,
+    /// Its share of the power of all lights; 0 if it is never sampled.
+    pub(crate) power_pmf: f32,
 }
 
 /// A point on a light, as seen from a point of the scene.
@@ -89,7 +89,7 @@ impl LightSample {
 
 impl Light {
     pub(super) fn new(shape: LightShape, radiance: Vec3) -> Self {
-        Self { shape, radiance, two_sided: false, texture: NO, prim: NO, pmf: 0.0 }
+        Self { shape, radiance, two_sided: false, texture: NO, prim: NO, power_pmf: 0.0 }
     }
 
     pub(crate) fn surface(shape: &Shape, radiance: Vec3, two_sided: bool, prim: u32) -> Self {

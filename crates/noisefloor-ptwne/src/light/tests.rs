@@ -2,27 +2,171 @@
 
 use super::choice::Lights;
 use super::emitter::Light;
+use super::punctual::Punctual;
+use super::receiver::Receiver;
 use crate::accel::Shape;
-use crate::math::Vec3;
+use crate::math::{self, Vec3};
+use crate::rng::{Key, Rng};
 use std::f32::consts::PI;
 
-#[test]
-fn lights_are_chosen_by_power() {
-    let light = |power| {
-        let (corner, e1, e2) = (glam::Vec3::ZERO, glam::Vec3::X, glam::Vec3::Y);
-        Light::surface(&Shape::Planar { corner, e1, e2, whole: true }, Vec3::splat(power), false, 0)
-    };
-    let powers = [1.0, 0.0, 5.0, 2.0, 0.5];
-    let lights = Lights::new(powers.map(light).to_vec(), [Vec3::NEG_ONE, Vec3::ONE], &[]);
-    let n = 1 << 16;
-    let mut counts = [0u32; 5];
-    for i in 0..n {
-        let chosen = lights.choose((i as f32 + 0.5) / n as f32, 0.0).unwrap().radiance.x;
-        counts[powers.iter().position(|p| *p == chosen).unwrap()] += 1;
+/// A one-sided square with corner (x, y, z) that faces down.
+fn ceiling([x, y, z]: [f32; 3], radiance: f32) -> Light {
+    let (corner, e1, e2) = (glam::Vec3::new(x, y, z), glam::Vec3::X, glam::Vec3::Z);
+    Light::surface(&Shape::Planar { corner, e1, e2, whole: true }, Vec3::splat(radiance), false, 0)
+}
+
+/// Numbers for a scene.
+struct Draw(Rng);
+
+impl Draw {
+    fn new(seed: u64) -> Self {
+        Self(Rng::new(Key::new(seed), 0, 0))
     }
-    for (power, count) in powers.iter().zip(counts) {
-        // A grid of 2¹⁶ points over ten intervals: off by at most ten points
-        assert!((f64::from(count) / f64::from(n) - f64::from(*power) / 8.5).abs() < 10.0 / f64::from(n));
+
+    fn point(&mut self, size: f32) -> glam::Vec3 {
+        glam::Vec3::from_array([self.0.one(), self.0.one(), self.0.one()]) * size - 0.5 * size
+    }
+
+    fn direction(&mut self) -> Vec3 {
+        math::sphere(self.0.two()).normalize()
+    }
+
+    /// A light of any kind that has a position, within a cube of size 4; strengths vary by six decades.
+    fn light(&mut self, i: usize) -> Light {
+        let radiance = Vec3::splat(10f32.powf(6.0 * self.0.one() - 3.0));
+        let (corner, e1, e2) = (self.point(4.0), self.point(0.6), self.point(0.6));
+        let (position, intensity) = (corner.to_array(), radiance.to_array());
+        let shape = match i % 6 {
+            0 => Shape::Sphere { centre: corner, radius: 0.05 + 0.2 * self.0.one() },
+            1 => Shape::Planar { corner, e1, e2, whole: true },
+            2 => Shape::Planar { corner, e1, e2, whole: false },
+            3 => Shape::Disk { centre: corner, e1, e2 },
+            4 => return Light::punctual(Punctual::Point { position, intensity }).unwrap(),
+            _ => {
+                let direction = self.direction().to_array();
+                let (inner, outer) = (10.0, 10.0 + 80.0 * self.0.one());
+                let spot = Punctual::Spot { position, direction, intensity, inner, outer };
+                return Light::punctual(spot).unwrap();
+            }
+        };
+        Light::surface(&shape, radiance, i.is_multiple_of(4), 0)
+    }
+
+    /// A diffuse or glossy receiver.
+    fn receiver(&mut self) -> Receiver {
+        let mut receiver = Receiver::diffuse(self.point(5.0).into(), self.direction());
+        if self.0.one() < 0.5 {
+            let alpha = 0.01 + self.0.one();
+            receiver.diffuse = self.0.one() - 0.5;
+            receiver.diffuse = receiver.diffuse.max(0.0);
+            (receiver.glossy, receiver.alpha2, receiver.mirror) = (1.0, alpha * alpha, self.direction());
+        }
+        receiver
+    }
+}
+
+/// Scenes of 1 to 300 lights, also with a distant light, a sun or an environment map.
+fn scenes() -> Vec<Lights> {
+    let mut draw = Draw::new(3);
+    let mut all = vec![];
+    for (seed, count) in [2, 3, 4, 5, 17, 300].into_iter().enumerate() {
+        for far in 0..4 {
+            let mut lights: Vec<Light> = (0..count).map(|i| draw.light(i + seed)).collect();
+            let direction = draw.direction();
+            if far == 1 || far == 2 {
+                let (direction, irradiance) = (direction.to_array(), [0.1; 3]);
+                lights.push(Light::punctual(Punctual::Distant { direction, irradiance }).unwrap());
+            }
+            if far == 2 {
+                lights.push(Light::sun(direction, 0.1, Vec3::splat(30.0)));
+            }
+            if far == 3 {
+                lights.push(Light::map(Vec3::splat(0.5)));
+            }
+            all.push(Lights::new(lights, [Vec3::splat(-2.5), Vec3::splat(2.5)], &[]));
+        }
+    }
+    all
+}
+
+/// Evenly spaced numbers choose each light as often as its probability says: choices by geometry and by
+/// scattered light each give it one interval, which holds one number more or less than its length.
+#[test]
+fn lights_are_chosen_with_their_probabilities() {
+    const N: usize = 1 << 13;
+    let mut draw = Draw::new(4);
+    for lights in scenes() {
+        for _ in 0..10 {
+            let receiver = draw.receiver();
+            let mut counts = vec![0; lights.all.len()];
+            for i in 0..N {
+                if let Some((light, pmf)) = lights.choose(&receiver, (i as f32 + 0.5) / N as f32, 0.0) {
+                    let again = lights.pmf(&receiver, light);
+                    assert!((again - pmf).abs() <= 1e-5 * pmf, "{again} {pmf}");
+                    counts[light] += 1;
+                }
+            }
+            let mut sum = 0.0;
+            for (light, count) in counts.iter().enumerate() {
+                let pmf = f64::from(lights.pmf(&receiver, light));
+                assert!((pmf * N as f64 - f64::from(*count)).abs() < 2.1, "{light}: {count}, {pmf}");
+                sum += pmf;
+            }
+            assert!(sum < 1.0 + 1e-5, "{sum}");
+        }
+    }
+}
+
+/// A light that is never chosen for a receiver sends none of its samples above the receiver's horizon.
+#[test]
+fn only_lights_without_effect_have_no_probability() {
+    let mut draw = Draw::new(5);
+    let mut idle = 0;
+    for lights in scenes() {
+        for _ in 0..20 {
+            let receiver = draw.receiver();
+            for (i, light) in lights.all.iter().enumerate() {
+                // Maps have no samples without their image, and all have a probability
+                if lights.pmf(&receiver, i) > 0.0 || light.power_pmf == 0.0 {
+                    continue;
+                }
+                idle += 1;
+                for _ in 0..32 {
+                    let [a, b] = draw.0.two();
+                    let sample = light.sample(receiver.position, [a, b, 0.0], None);
+                    let cos = sample.map_or(-1.0, |s| s.dir.dot(receiver.normal));
+                    assert!(cos < 1e-3, "{light:?}: {cos}");
+                }
+            }
+        }
+    }
+    assert!(idle > 1000, "{idle}");
+}
+
+/// Of lamps in a row the nearest is chosen most often, and of two equally near ones that which faces the
+/// receiver.
+#[test]
+fn near_lights_that_face_the_receiver_are_preferred() {
+    let bounds = [Vec3::splat(-8.0), Vec3::splat(8.0)];
+    let lights = Lights::new((-5..=5).map(|i| ceiling([i as f32, 2.0, -0.5], 1.0)).collect(), bounds, &[]);
+    let receiver = Receiver::diffuse(Vec3::new(2.5, 0.0, 0.0), Vec3::Y);
+    let pmf: Vec<f32> = (0..11).map(|i| lights.pmf(&receiver, i)).collect();
+    assert!((0..11).all(|i| pmf[i] <= pmf[7]), "{pmf:?}");
+    assert!(pmf[7] > 4.0 * pmf[0], "{pmf:?}");
+    // Half of a metal's lobe points at the last lamp
+    let mirror = Vec3::new(3.0, 2.0, 0.0).normalize();
+    let metal = Receiver { diffuse: 0.0, glossy: 1.0, mirror, alpha2: 0.01, ..receiver };
+    assert!(lights.pmf(&metal, 10) > 3.0 * lights.pmf(&receiver, 10));
+}
+
+/// Power decides what the reference's guide begins with.
+#[test]
+fn power_shares_are_those_of_the_power() {
+    let powers = [1.0, 0.0, 5.0, 2.0, 0.5];
+    let lights = powers.map(|power| ceiling([0.0; 3], power)).to_vec();
+    let lights = Lights::new(lights, [Vec3::NEG_ONE, Vec3::ONE], &[]);
+    for (light, power) in lights.all.iter().zip(powers) {
+        assert!((light.power_pmf - power / 8.5).abs() < 1e-6);
     }
 }
 
@@ -47,12 +191,11 @@ fn spheres_and_suns_subtend_their_solid_angle() {
 
 #[test]
 fn lights_that_face_away_from_everything_are_not_chosen() {
-    let light = |y: f32| {
-        let (corner, e1, e2) = (glam::Vec3::new(-1.0, y, -1.0), glam::Vec3::X, glam::Vec3::Z);
-        // e1×e2 points down
-        Light::surface(&Shape::Planar { corner, e1, e2, whole: true }, Vec3::ONE, false, 0)
-    };
-    let lights = Lights::new(vec![light(-1.0), light(1.0)], [Vec3::NEG_ONE, Vec3::ONE], &[]);
-    assert_eq!((lights.all[0].pmf, lights.all[1].pmf), (0.0, 1.0));
-    assert!(Lights::new(vec![light(-1.0)], [Vec3::NEG_ONE, Vec3::ONE], &[]).choose(0.5, 0.0).is_none());
+    let below = || ceiling([-1.0, -1.0, -1.0], 1.0);
+    let bounds = [Vec3::NEG_ONE, Vec3::ONE];
+    let receiver = Receiver::diffuse(Vec3::ZERO, Vec3::Y);
+    let lights = Lights::new(vec![below(), ceiling([-1.0, 1.0, -1.0], 1.0)], bounds, &[]);
+    assert_eq!((lights.pmf(&receiver, 0), lights.pmf(&receiver, 1)), (0.0, 1.0));
+    assert_eq!(lights.all[0].power_pmf, 0.0);
+    assert!(Lights::new(vec![below()], bounds, &[]).choose(&receiver, 0.5, 0.0).is_none());
 }

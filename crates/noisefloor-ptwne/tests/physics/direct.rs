@@ -175,6 +175,36 @@ fn punctual_lights_have_no_noise() {
     check(&lit(|b, _| b.punctual(distant).unwrap()), expected);
 }
 
+/// A thousand points and spots, strong and weak, above and below the floor, and parallel light: the sum of
+/// each by itself.
+#[test]
+fn many_lights_add_up() {
+    // A spiral of golden angles in a cube around the origin
+    let at = |i: usize, step: f64| (i as f64 * step).fract();
+    let (mut expected, mut lights) = (0.0, vec![]);
+    for i in 0..1000 {
+        let position = [0.618_034, 0.754_878, 0.569_840].map(|step| 6.0 * at(i, step) - 3.0);
+        let intensity = 10f64.powf(2.0 * at(i, 0.414_214) - 2.0);
+        let d2 = position.iter().map(|x| x * x).sum::<f64>();
+        let [x, y, z] = position.map(|x| x as f32);
+        // Every third is a spot of 60° that shines down
+        let spot = i % 3 == 0;
+        let down = position[1] / d2.sqrt();
+        let fade = if spot { ((down - 0.5) / 0.5).clamp(0.0, 1.0).powi(2) } else { 1.0 };
+        expected += intensity * fade * position[1].max(0.0) / d2.powf(1.5);
+        let (position, intensity) = ([x, y, z], [intensity as f32; 3]);
+        let direction = [0.0, -1.0, 0.0];
+        lights.push(match spot {
+            true => Punctual::Spot { position, direction, intensity, inner: 0.0, outer: 60.0 },
+            false => Punctual::Point { position, intensity },
+        });
+    }
+    lights.push(Punctual::Distant { direction: [0.5, -1.0, 0.5], irradiance: [2.0; 3] });
+    expected += 2.0 / 1.5f64.sqrt();
+    let scene = lit(|b, _| lights.iter().for_each(|light| b.punctual(*light).unwrap()));
+    check_samples(&scene, 0.5 / std::f64::consts::PI * expected);
+}
+
 /// An image of all directions: one bright pixel on grey, and light from one half, against a quadrature of the
 /// interpolated image in f64.
 #[test]

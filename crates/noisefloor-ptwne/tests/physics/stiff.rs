@@ -97,39 +97,54 @@ fn a_keyhole_lights_as_a_small_lamp() {
 
 /// Sixteen decades in one picture. Each panel shows exactly its own radiance. Niches at the corners are
 /// mirror images of each other, as are those at the edges, so their pictures are too, up to their panels'
-/// radiance.
+/// radiance. Next event estimation by itself finds the dim panels beside the bright ones, too, though with
+/// more noise.
 #[test]
 fn decades_keep_to_themselves() {
-    const SIZE: usize = 96;
-    let mut source = Ptwne::new(stiff("decades", None), SIZE, SIZE, RenderOptions::default()).unwrap();
-    let batches: Vec<Vec<Rgb>> = (0..64).map(|i| batch(&mut source, 4 * i, 4)).collect();
-    assert_eq!(source.counts().dropped, 0);
-    let radiance = |i: usize| 10f64.powi(2 * i as i32 - 8);
-    // Centres of niches are 28 pixels apart
-    let middle = |i: usize| [20 + 28 * (i % 3), 20 + 28 * (i / 3)];
-    let mut niches = vec![];
+    let mis = decades(Estimator::Mis, 4);
+    let next = decades(Estimator::NextEvents, 16);
+    for (a, b) in [(0, 2), (2, 6), (6, 8), (1, 3), (3, 5), (5, 7)] {
+        agree(mis[a], mis[b], 0.05);
+    }
     for i in 0..9 {
-        let [x, y] = middle(i);
+        agree(mis[i], next[i], 0.1);
+    }
+}
+
+/// Asserts that two means agree within five standard errors, which must be small enough to prove something.
+fn agree((x, e): (f64, f64), (y, f): (f64, f64), most: f64) {
+    assert!((x - y).abs() < 5.0 * e.hypot(f), "{x} ± {e}, {y} ± {f}");
+    assert!(e.hypot(f) < most * x, "{x} ± {e}, {y} ± {f}");
+}
+
+/// The mean of each niche of `decades` without its panel, over its panel's radiance, and the standard error,
+/// from 64 batches.
+fn decades(estimator: Estimator, samples: u32) -> Vec<(f64, f64)> {
+    const SIZE: usize = 96;
+    let options = RenderOptions { estimator, ..RenderOptions::default() };
+    let mut source = Ptwne::new(stiff("decades", None), SIZE, SIZE, options).unwrap();
+    let batches: Vec<Vec<Rgb>> =
+        (0..64).map(|i| batch(&mut source, i * u64::from(samples), samples)).collect();
+    assert_eq!(source.counts().dropped, 0);
+    let niche = |i: usize| {
+        let radiance = 10f64.powi(2 * i as i32 - 8);
+        // Centres of niches are 28 pixels apart
+        let [x, y] = [20 + 28 * (i % 3), 20 + 28 * (i / 3)];
         let panel = f64::from(batches[0][y * SIZE + x][0]);
-        assert!((panel - radiance(i)).abs() < 1e-6 * radiance(i), "{panel} {}", radiance(i));
-        // The niche without its panel, and its standard error
-        let within = |range: usize| {
-            move |p: &usize| (p % SIZE).abs_diff(x) <= range && (p / SIZE).abs_diff(y) <= range
-        };
+        assert!((panel - radiance).abs() < 1e-6 * radiance, "{panel} {radiance}");
+        // From centre to centre of pixels, in halves of pixels, so that all masks are mirror images too
+        let near = |p: usize, centre: usize, range: usize| (2 * p + 1).abs_diff(2 * centre) <= 2 * range;
+        let within = |range: usize| move |p: &usize| near(p % SIZE, x, range) && near(p / SIZE, y, range);
         let wall: Vec<usize> = (0..SIZE * SIZE).filter(within(12)).filter(|p| !within(6)(p)).collect();
         let means: Vec<f64> = batches
             .iter()
-            .map(|b| wall.iter().map(|p| f64::from(b[*p][0]) / radiance(i)).sum::<f64>() / wall.len() as f64)
+            .map(|b| wall.iter().map(|p| f64::from(b[*p][0]) / radiance).sum::<f64>() / wall.len() as f64)
             .collect();
         let mean = means.iter().sum::<f64>() / 64.0;
         let variance = means.iter().map(|m| (m - mean).powi(2)).sum::<f64>() / 63.0;
-        niches.push((mean, (variance / 64.0).sqrt()));
-    }
-    for (a, b) in [(0, 2), (2, 6), (6, 8), (1, 3), (3, 5), (5, 7)] {
-        let ((x, e), (y, f)) = (niches[a], niches[b]);
-        assert!((x - y).abs() < 5.0 * e.hypot(f), "niches {a}, {b}: {niches:?}");
-        assert!(e.hypot(f) < 0.05 * x, "{niches:?}");
-    }
+        (mean, (variance / 64.0).sqrt())
+    };
+    (0..9).map(niche).collect()
 }
 
 /// A scene far from the origin has the same picture. Its numbers are multiples of 1/16, which f32 can hold

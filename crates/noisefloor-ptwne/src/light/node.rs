@@ -1,0 +1,169 @@
+//! Four clusters of lights side by side, and their importance for a receiver.
+
+use super::cluster::Cluster;
+use super::receiver::Receiver;
+use crate::math::Vec3;
+use glam::Vec4;
+use std::f32::consts::PI;
+
+/// "No node" and "no slot".
+pub(super) const NONE: u32 = u32::MAX;
+/// Flags a child that is a light; the other bits are its index.
+pub(super) const LIGHT: u32 = 1 << 31;
+/// Cosines below this count as this in the geometric importance, which must not starve lights at grazing
+/// angles.
+const LEAST_COSINE: f32 = 0.1;
+/// Lights that bounds place this little below a horizon may still be above it, by rounding.
+const SLACK: f32 = 1e-4;
+
+/// Up to four clusters, one per lane. Empty lanes have no intensity and no count.
+#[derive(Clone, Debug)]
+pub(super) struct Node {
+    centre: [Vec4; 3],
+    radius: Vec4,
+    /// The largest reciprocal of a distance: no closer than the radius.
+    most_inverse: Vec4,
+    axis: [Vec4; 3],
+    cos_spread: Vec4,
+    sin_spread: Vec4,
+    cos_emission: Vec4,
+    /// One or zero.
+    two_sided: Vec4,
+    /// Whether all lights shine in all directions, so that cones do not matter.
+    all_round: bool,
+    /// Relative to that of all lights.
+    intensity: Vec4,
+    count: Vec4,
+    pub(super) child: [u32; 4],
+    /// Four times the parent's index, plus its lane; [`NONE`] for the root.
+    pub(super) parent: u32,
+}
+
+/// The importance of four clusters.
+pub(super) struct Importance {
+    /// An estimate of the light that the receiver scatters to where it is seen from, were nothing in between.
+    pub(super) scattered: Vec4,
+    /// By position and direction only, regardless of intensity.
+    pub(super) geometric: Vec4,
+}
+
+impl Node {
+    pub(super) fn new(parent: u32) -> Self {
+        let zero = [Vec4::ZERO; 3];
+        Self {
+            centre: zero,
+            radius: Vec4::ZERO,
+            most_inverse: Vec4::ZERO,
+            axis: zero,
+            cos_spread: Vec4::ONE,
+            sin_spread: Vec4::ZERO,
+            cos_emission: Vec4::ZERO,
+            two_sided: Vec4::ZERO,
+            all_round: true,
+            intensity: Vec4::ZERO,
+            count: Vec4::ZERO,
+            child: [NONE; 4],
+            parent,
+        }
+    }
+
+    /// Puts a cluster into a lane. `scale` makes intensities relative; no distance counts as less than
+    /// `least`.
+    pub(super) fn set(&mut self, lane: usize, cluster: &Cluster, scale: f64, least: f32, child: u32) {
+        for axis in 0..3 {
+            self.centre[axis][lane] = cluster.centre[axis];
+            self.axis[axis][lane] = cluster.axis[axis];
+        }
+        // Rounding must not lose a light
+        self.radius[lane] = cluster.radius * 1.001;
+        self.most_inverse[lane] = 1.0 / self.radius[lane].max(least);
+        (self.sin_spread[lane], self.cos_spread[lane]) = cluster.spread.sin_cos();
+        self.cos_emission[lane] = cluster.emission.cos();
+        self.two_sided[lane] = if cluster.two_sided { 1.0 } else { 0.0 };
+        self.intensity[lane] = (cluster.intensity * scale) as f32;
+        self.all_round &= cluster.spread >= PI;
+        self.count[lane] = cluster.count as f32;
+        self.child[lane] = child;
+    }
+
+    /// The importance of the four clusters (Conty Estevez, Kulla 2018, eq. 3, with a lobe for glossy
+    /// receivers). Zero only for clusters that send no light to the receiver.
+    #[inline]
+    pub(super) fn importance(&self, receiver: &Receiver) -> Importance {
+        let dot = |a: &[Vec4; 3], b: Vec3| a[0] * b.x + a[1] * b.y + a[2] * b.z;
+        let p = receiver.position;
+        let to = [self.centre[0] - p.x, self.centre[1] - p.y, self.centre[2] - p.z];
+        let d2 = to[0] * to[0] + to[1] * to[1] + to[2] * to[2];
+        let inverse = d2.max(Vec4::splat(f32::MIN_POSITIVE)).sqrt().recip();
+
+        // The angle that the bounding sphere subtends; from inside, all directions
+        let sin = self.radius * inverse;
+        let inside = sin.cmpge(Vec4::ONE);
+        let sphere = Angle {
+            cos: Vec4::select(inside, Vec4::NEG_ONE, (Vec4::ONE - sin * sin).sqrt()),
+            sin: Vec4::select(inside, Vec4::ZERO, sin),
+        };
+
+        // The smallest angle at the receiver, and the smallest at the lights
+        let horizon = Angle::new(dot(&to, receiver.normal) * inverse).minus(&sphere).cos;
+        let mut visible = horizon.cmpge(Vec4::splat(-SLACK));
+        let mut facing = Vec4::ONE;
+        if !self.all_round {
+            let along = self.axis[0] * to[0] + self.axis[1] * to[1] + self.axis[2] * to[2];
+            let cos = along * -inverse;
+            let cos = Vec4::select(self.two_sided.cmpgt(Vec4::ZERO), cos.abs(), cos);
+            let spread = Angle { cos: self.cos_spread, sin: self.sin_spread };
+            facing = Angle::new(cos).minus(&spread).minus(&sphere).cos;
+            visible &= facing.cmpge(self.cos_emission - SLACK);
+        }
+
+        let near = inverse.min(self.most_inverse);
+        let squared = near * near;
+        let mut scattering = receiver.diffuse * horizon.max(Vec4::ZERO);
+        if receiver.glossy > 0.0 {
+            let mirror = Angle::new(dot(&to, receiver.mirror) * inverse).minus(&sphere).cos;
+            scattering +=
+                receiver.glossy * lobe(mirror, receiver.alpha2, self.radius * self.radius * squared);
+        }
+        let keep = |x: Vec4| Vec4::select(visible, x, Vec4::ZERO);
+        let least = |x: Vec4| x.max(Vec4::splat(LEAST_COSINE));
+        Importance {
+            scattered: keep(self.intensity * facing.max(Vec4::ZERO) * scattering * squared),
+            geometric: keep(self.count * least(facing) * least(horizon) * squared),
+        }
+    }
+}
+
+/// A normalised lobe of GGX at an angle from the mirrored direction, for a light that subtends π·`size`. No
+/// more than the whole lobe falls into a light.
+#[inline]
+fn lobe(cos: Vec4, alpha2: f32, size: Vec4) -> Vec4 {
+    // The half vector turns half as far as the direction
+    let cos2 = (0.5 + 0.5 * cos).clamp(Vec4::ZERO, Vec4::ONE);
+    let k = cos2 * alpha2 + (Vec4::ONE - cos2);
+    // D/4 = a/πk², over 1 + D/4·π·size
+    let a = 0.25 * alpha2;
+    Vec4::splat(a / PI) / (k * k + a * size)
+}
+
+/// Cosines and sines of four angles of 0 to π.
+struct Angle {
+    cos: Vec4,
+    sin: Vec4,
+}
+
+impl Angle {
+    #[inline]
+    fn new(cos: Vec4) -> Self {
+        Self { cos, sin: (Vec4::ONE - cos * cos).max(Vec4::ZERO).sqrt() }
+    }
+
+    /// The difference, at least 0.
+    #[inline]
+    fn minus(&self, other: &Self) -> Self {
+        let below = self.cos.cmpgt(other.cos);
+        let cos = self.cos * other.cos + self.sin * other.sin;
+        let sin = self.sin * other.cos - self.cos * other.sin;
+        Self { cos: Vec4::select(below, Vec4::ONE, cos), sin: Vec4::select(below, Vec4::ZERO, sin) }
+    }
+}

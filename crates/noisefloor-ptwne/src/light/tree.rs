@@ -1,0 +1,222 @@
+//! A hierarchy of lights (Conty Estevez, Kulla 2018), four children to a node.
+
+use super::cluster::Cluster;
+use super::node::{Importance, LIGHT, NONE, Node};
+use super::receiver::Receiver;
+use glam::Vec4;
+
+/// Buckets along each axis in which splits are tried.
+const BUCKETS: usize = 12;
+
+/// The hierarchy over all lights that have a position.
+#[derive(Clone, Debug, Default)]
+pub(super) struct LightTree {
+    nodes: Vec<Node>,
+    /// Four times the node of each light, plus its lane; [`NONE`] if it is not in the tree.
+    slot: Vec<u32>,
+}
+
+/// Two probabilities: by scattered light and by geometry.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Pmf {
+    pub(super) scattered: f32,
+    pub(super) geometric: f32,
+}
+
+/// A light with its bounds.
+type Item = (u32, Cluster);
+
+impl LightTree {
+    /// The tree over lights, given by index; there are `lights` in all. `scale` makes intensities relative,
+    /// and `extent` is the radius of the scene.
+    pub(super) fn new(mut items: Vec<Item>, lights: usize, scale: f64, extent: f32) -> Self {
+        // So that no importance overflows
+        let least = (1e-6 * extent).max(f32::MIN_POSITIVE.sqrt());
+        let mut tree = Self { nodes: vec![], slot: vec![NONE; lights] };
+        if items.is_empty() {
+            return tree;
+        }
+        tree.nodes.push(Node::new(NONE));
+        let mut todo = vec![(0usize, items.as_mut_slice())];
+        while let Some((at, items)) = todo.pop() {
+            for (lane, group) in four_groups(items).into_iter().enumerate() {
+                let slot = 4 * at as u32 + lane as u32;
+                let child = match group {
+                    [(light, _)] => {
+                        tree.slot[*light as usize] = slot;
+                        LIGHT | *light
+                    }
+                    _ => tree.nodes.len() as u32,
+                };
+                tree.nodes[at].set(lane, &bounds(group), scale, least, child);
+                if child & LIGHT == 0 {
+                    tree.nodes.push(Node::new(slot));
+                    todo.push((child as usize, group));
+                }
+            }
+        }
+        tree
+    }
+
+    /// Whether it has no lights.
+    pub(super) fn is_empty(&self) -> bool {
+        self.nodes.is_empty()
+    }
+
+    /// Whether the light is in the tree.
+    pub(super) fn contains(&self, light: usize) -> bool {
+        self.slot[light] != NONE
+    }
+
+    /// An estimate of the light that the receiver scatters, from all lights.
+    #[inline]
+    pub(super) fn scattered(&self, receiver: &Receiver) -> f32 {
+        self.nodes[0].importance(receiver).scattered.element_sum()
+    }
+
+    /// Chooses a light by `u`, uniform in [0, 1): by geometry, or by scattered light. Returns its index and
+    /// both probabilities; none if the number leads to lights that send no light to the receiver.
+    #[inline(never)]
+    pub(super) fn choose(&self, receiver: &Receiver, mut u: f64, geometric: bool) -> Option<(usize, Pmf)> {
+        let mut pmf = Pmf { scattered: 1.0, geometric: 1.0 };
+        let mut node = &self.nodes[0];
+        loop {
+            let importance = node.importance(receiver);
+            let weights = if geometric { importance.geometric } else { importance.scattered };
+            let (lane, rest) = pick(weights.to_array(), u)?;
+            u = rest;
+            pmf.times(&importance, lane);
+            let child = node.child[lane];
+            if child & LIGHT != 0 {
+                return Some(((child & !LIGHT) as usize, pmf));
+            }
+            node = &self.nodes[child as usize];
+        }
+    }
+
+    /// The probabilities with which [`LightTree::choose`] chooses a light.
+    #[inline(never)]
+    pub(super) fn pmf(&self, receiver: &Receiver, light: usize) -> Pmf {
+        let mut pmf = Pmf { scattered: 1.0, geometric: 1.0 };
+        let mut slot = self.slot[light];
+        while slot != NONE {
+            let node = &self.nodes[(slot >> 2) as usize];
+            pmf.times(&node.importance(receiver), (slot & 3) as usize);
+            slot = node.parent;
+        }
+        pmf
+    }
+
+    /// Memory that it takes, in bytes.
+    pub(super) fn bytes(&self) -> usize {
+        size_of_val(self.nodes.as_slice()) + size_of_val(self.slot.as_slice())
+    }
+}
+
+impl Pmf {
+    /// Multiplies by the shares of a lane.
+    #[inline]
+    fn times(&mut self, importance: &Importance, lane: usize) {
+        let share = |weights: Vec4| {
+            let sum = weights.element_sum();
+            if sum > 0.0 { weights[lane] / sum } else { 0.0 }
+        };
+        self.scattered *= share(importance.scattered);
+        self.geometric *= share(importance.geometric);
+    }
+}
+
+/// Inverts the sum of four weights at `u` of it: the lane, and where `u` lies within its weight, 0…1. None if
+/// all weights are zero.
+#[inline]
+fn pick(weights: [f32; 4], u: f64) -> Option<(usize, f64)> {
+    let mut rest = u * weights.iter().map(|w| f64::from(*w)).sum::<f64>();
+    let mut last = None;
+    for (lane, weight) in weights.into_iter().enumerate().filter(|(_, weight)| *weight > 0.0) {
+        let weight = f64::from(weight);
+        if rest < weight {
+            return Some((lane, rest / weight));
+        }
+        rest -= weight;
+        // Rounding may exceed the sum
+        last = Some((lane, 1.0 - f64::EPSILON));
+    }
+    last
+}
+
+/// The bounds of a group, which must not be empty.
+fn bounds(items: &[Item]) -> Cluster {
+    let rest = items[1..].iter();
+    rest.fold(items[0].1, |all, (_, cluster)| all.union(cluster))
+}
+
+/// Splits lights into up to four groups: always the one of the highest cost in two.
+fn four_groups(items: &mut [Item]) -> Vec<&mut [Item]> {
+    let mut groups = vec![items];
+    while groups.len() < 4 {
+        let cost = |i: &usize| bounds(groups[*i]).cost();
+        let large = (0..groups.len()).filter(|i| groups[*i].len() > 1);
+        let Some(open) = large.max_by(|a, b| cost(a).total_cmp(&cost(b))) else { break };
+        let group = groups.swap_remove(open);
+        let middle = split(group);
+        let (a, b) = group.split_at_mut(middle);
+        groups.extend([a, b]);
+    }
+    groups
+}
+
+/// Orders a group of at least two lights so that the first `split` and the others have the least cost, by the
+/// surface area orientation heuristic (§4.4).
+fn split(items: &mut [Item]) -> usize {
+    let centres = || items.iter().map(|(_, cluster)| cluster.centre);
+    let low = centres().fold(items[0].1.centre, |a, b| a.min(b));
+    let high = centres().fold(items[0].1.centre, |a, b| a.max(b));
+    let (extent, size) = (high - low, bounds(items).size());
+    let longest = size.max_element();
+    let bucket = |cluster: &Cluster, axis: usize| {
+        let at = (cluster.centre[axis] - low[axis]) / extent[axis] * BUCKETS as f32;
+        (at as usize).min(BUCKETS - 1)
+    };
+    let mut best: Option<(f64, usize, usize)> = None;
+    for axis in (0..3).filter(|axis| extent[*axis] > 0.0) {
+        let mut buckets: [Option<Cluster>; BUCKETS] = [None; BUCKETS];
+        for (_, cluster) in items.iter() {
+            let to = &mut buckets[bucket(cluster, axis)];
+            *to = merged(*to, Some(*cluster));
+        }
+        // Costs of all that comes before an edge, and of all that comes after it
+        let mut before = [None; BUCKETS];
+        let mut all = None;
+        for (to, cluster) in before.iter_mut().zip(buckets) {
+            *to = all;
+            all = merged(all, cluster);
+        }
+        let mut after = None;
+        for edge in (1..BUCKETS).rev() {
+            after = merged(after, buckets[edge]);
+            if let (Some(a), Some(b)) = (before[edge], after) {
+                // Thin boxes are split along their length
+                let cost = f64::from(longest / size[axis]) * (a.cost() + b.cost());
+                if best.is_none_or(|(least, ..)| cost < least) {
+                    best = Some((cost, axis, edge));
+                }
+            }
+        }
+    }
+    let Some((_, axis, edge)) = best else { return items.len() / 2 };
+    let mut middle = 0;
+    for i in 0..items.len() {
+        if bucket(&items[i].1, axis) < edge {
+            items.swap(i, middle);
+            middle += 1;
+        }
+    }
+    middle
+}
+
+fn merged(a: Option<Cluster>, b: Option<Cluster>) -> Option<Cluster> {
+    match (a, b) {
+        (Some(a), Some(b)) => Some(a.union(&b)),
+        (a, b) => a.or(b),
+    }
+}
