@@ -119,12 +119,11 @@ fn agree((x, e): (f64, f64), (y, f): (f64, f64), most: f64) {
 
 /// The mean of each niche of `decades` without its panel, over its panel's radiance, and the standard error,
 /// from 64 batches.
-fn decades(estimator: Estimator, samples: u32) -> Vec<(f64, f64)> {
+fn decades(estimator: Estimator, samples: u64) -> Vec<(f64, f64)> {
     const SIZE: usize = 96;
     let options = RenderOptions { estimator, ..RenderOptions::default() };
     let mut source = Ptwne::new(stiff("decades", None), SIZE, SIZE, options).unwrap();
-    let batches: Vec<Vec<Rgb>> =
-        (0..64).map(|i| batch(&mut source, i * u64::from(samples), samples)).collect();
+    let batches: Vec<Vec<Rgb>> = (0..64).map(|i| batch(&mut source, i * samples, samples)).collect();
     assert_eq!(source.counts().dropped, 0);
     let niche = |i: usize| {
         let radiance = 10f64.powi(2 * i as i32 - 8);
