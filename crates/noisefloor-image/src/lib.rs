@@ -25,8 +25,8 @@
 //! // Played back, they are two batches: samples 1…10, and the 30 samples after them.
 //! let mut stack = StackSource::open(folder.path())?;
 //! let tile = TileGrid::new(16, 16, 16)?.tile(0);
-//! let batch = stack.sample(&[Request { tile, first: 10, samples: 100 }])?.remove(0);
-//! assert_eq!((batch.samples, batch.mean[0]), (30, [2.0; 3]));
+//! let batch = stack.sample(&[Request { tile, first: 10, spp: 100 }])?.remove(0);
+//! assert_eq!((batch.spp, batch.mean[0]), (30, [2.0; 3]));
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 

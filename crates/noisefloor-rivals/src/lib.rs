@@ -36,14 +36,14 @@
 //!         SourceInfo { name, width: 32, height: 32, unit, aims: true, repeats }
 //!     }
 //!     fn sample(&mut self, requests: &[Request]) -> Result<Vec<Batch>, SourceError> {
-//!         let mut flicker = |samples: u32| {
+//!         let mut flicker = |samples: u64| {
 //!             self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005);
 //!             self.0 = self.0.wrapping_add(1_442_695_040_888_963_407);
 //!             0.2 + ((self.0 >> 40) as f32 / (1 << 24) as f32 - 0.5) / (samples as f32).sqrt()
 //!         };
 //!         let batch = |r: &Request| {
-//!             let mean = (0..r.tile.pixels()).map(|_| [flicker(r.samples); 3]).collect();
-//!             Batch { tile: r.tile, samples: r.samples, mean }
+//!             let mean = (0..r.tile.pixels()).map(|_| [flicker(r.spp); 3]).collect();
+//!             Batch { tile: r.tile, spp: r.spp, mean }
 //!         };
 //!         Ok(requests.iter().map(batch).collect())
 //!     }
@@ -54,7 +54,7 @@
 //! driver.run(|_, _| ())?;
 //! // 1.96·σ/√n ≤ 10 % of 0.2 for σ² = 1/12 at n = 800 if σ is known; 95 % of pixels take some more.
 //! let stop = driver.session().stops().next().ok_or("one tile")?;
-//! assert!(stop.reason == StopReason::Converged && (800..=3000).contains(&stop.samples), "{stop:?}");
+//! assert!(stop.reason == StopReason::Converged && (800..=3000).contains(&stop.spp), "{stop:?}");
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 

@@ -24,7 +24,7 @@ pub(crate) enum Fault {
     /// It has this version.
     Version(u32),
     Damaged(String),
-    /// It has, or announces, a payload of so many bytes.
+    /// Its payload has, or announces, this many bytes.
     Oversized(u64),
 }
 
@@ -109,7 +109,7 @@ fn unpack_within<T: DeserializeOwned, const LIMIT: usize>(bytes: &[u8]) -> Resul
     Ok(content)
 }
 
-/// The bytes of the content alone.
+/// The content as bytes, without a header.
 pub(crate) fn payload(content: &impl Serialize) -> Result<Vec<u8>, Fault> {
     bincode::serde::encode_to_vec(content, bincode::config::standard())
         .map_err(|e| Fault::Damaged(e.to_string()))

@@ -9,7 +9,7 @@ use thiserror::Error;
 pub const DEFAULT_KEY: f32 = 0.18;
 
 /// δ of the log-average (Reinhard et al. 2002, eq. 1), as a share of the geometric mean of the luminances above zero. The paper
-/// leaves δ absolute; a relative one makes the unit of radiance irrelevant, and a geometric mean no prey to fireflies.
+/// leaves δ absolute; a relative one makes the unit of radiance irrelevant, and a geometric mean withstands fireflies.
 pub const DELTA: f64 = 1e-4;
 
 /// Rec.709 luminance of a linear RGB triple, in the unit of its input.
@@ -50,7 +50,7 @@ pub fn srgb_decode(encoded: f32) -> f32 {
     if x <= 0.040_45 { x / 12.92 } else { ((x + 0.055) / 1.055).powf(2.4) }
 }
 
-/// How a scene is to be shown, before its exposure is known.
+/// How a picture is to be displayed, before its exposure is known.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum ToneMapping {
@@ -100,8 +100,8 @@ impl ToneMapping {
         }
     }
 
-    /// Settles the exposure for a picture, once; the result is frozen, and is to be used for this picture, its halves and
-    /// its reference alike: a drifting log-average would read as noise. `pixels` are linear radiance; non-finite ones are
+    /// Settles the exposure for a picture. Use the result for this picture, its halves and its reference alike: if the
+    /// log-average drifted, the drift would look like noise. `pixels` are linear radiance; non-finite ones are
     /// skipped. A black picture gets exposure 1.
     pub fn settle(&self, pixels: &[Rgb]) -> Display {
         match *self {
@@ -161,7 +161,7 @@ pub struct Display {
 }
 
 impl Display {
-    /// A picture that is shown as it is: exposure 1, clamped, sRGB.
+    /// Displays a picture unchanged: exposure 1, clamped, sRGB.
     pub const SRGB: Self = Self { exposure: 1.0, curve: Curve::Clamp };
 
     /// The factor that linear radiance is multiplied by.

@@ -1,4 +1,4 @@
-//! The loop, pulled: a session that asks a source for samples until the criterion is satisfied or a limit says stop.
+//! The pull loop: requests samples from a source until the criterion is satisfied or a limit is reached.
 
 use crate::checkpoint::{Checkpoint, CheckpointError};
 use crate::criterion::{CriterionError, Resumable, StoppingCriterion};
@@ -13,15 +13,15 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 use thiserror::Error;
 
-/// Most pixel samples asked for in one call: a second or so of a fast renderer, so that cancelling, the time limit and progress
-/// are prompt. A constant, and not a time: the same batches on every machine.
+/// Most pixel samples requested in one call. A fast renderer takes about a second for it, so that cancelling, the time
+/// limit and progress are prompt. A constant rather than a time, so that batches are the same on every machine.
 const CALL_SAMPLES: u64 = 1 << 22;
 
-/// What can go wrong in a run. All samples up to then are in the session's film.
+/// Why a run failed. All samples taken before are in the session's film.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum DriverError {
-    /// The session could not start.
+    /// The session could not be started.
     #[error(transparent)]
     Session(#[from] SessionError),
     /// The source failed.
@@ -46,36 +46,36 @@ pub struct TimelinePoint {
 /// What happens in a run.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Event {
-    /// The quick reference is there.
+    /// The quick reference has been rendered.
     ReferenceReady {
         /// Seconds it took.
         seconds: f64,
     },
-    /// A batch is in the film.
+    /// The film has a new batch.
     BatchDone(Progress),
     /// A tile is done.
     TileStopped(Stop),
 }
 
-/// How far a run is.
+/// Progress of a run.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Progress {
     /// Time, samples and open tiles.
     pub now: TimelinePoint,
     /// All tiles.
     pub tiles: usize,
-    /// Seconds to go, as the criterion expects it; `None` while it cannot tell.
+    /// Seconds left, estimated from the criterion's expectations; `None` while it has none.
     pub eta_seconds: Option<f64>,
 }
 
-/// Where the time of a run went.
+/// How the time of a run was spent.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Clock {
-    /// Seconds in the source, its reference included.
+    /// Seconds in the source, including its reference.
     pub source_seconds: f64,
-    /// Seconds in the criterion, with all it needs: tone mapping, masks, descriptors.
+    /// Seconds in the criterion, including tone mapping, masks and descriptors.
     pub criterion_seconds: f64,
-    /// Seconds in all.
+    /// Seconds in total.
     pub total_seconds: f64,
 }
 
@@ -91,14 +91,14 @@ pub struct Clock {
 ///         SourceInfo { name: "wall".into(), width: 64, height: 32, unit: Unit::SamplesPerPixel, aims: true, repeats: Repeats::Samples }
 ///     }
 ///     fn sample(&mut self, requests: &[Request]) -> Result<Vec<Batch>, SourceError> {
-///         Ok(requests.iter().map(|r| Batch { tile: r.tile, samples: r.spp, mean: vec![[0.2; 3]; r.tile.pixels()] }).collect())
+///         Ok(requests.iter().map(|r| Batch { tile: r.tile, spp: r.spp, mean: vec![[0.2; 3]; r.tile.pixels()] }).collect())
 ///     }
 /// }
 ///
 /// let params = Params { tile: 32, ..Params::default() };
 /// let mut driver = Driver::new(Wall, FixedSpp(300), params)?;
-/// driver.run(|_session, event| if let Event::TileStopped(stop) = event { println!("{} {}", stop.tile.index, stop.samples) })?;
-/// assert!(driver.session().stops().all(|stop| stop.samples == 300 && stop.reason == StopReason::Converged));
+/// driver.run(|_session, event| if let Event::TileStopped(stop) = event { println!("{} {}", stop.tile.index, stop.spp) })?;
+/// assert!(driver.session().stops().all(|stop| stop.spp == 300 && stop.reason == StopReason::Converged));
 /// # Ok::<(), DriverError>(())
 /// ```
 pub struct Driver<S, C> {
@@ -108,12 +108,12 @@ pub struct Driver<S, C> {
     cancel: Arc<AtomicBool>,
     timeline: Vec<TimelinePoint>,
     clock: Clock,
-    /// Samples that were there before the run.
+    /// Samples in the film before the run.
     samples_before: u64,
 }
 
 impl<S: ProgressiveSource, C: StoppingCriterion> Driver<S, C> {
-    /// Puts a source and a criterion together.
+    /// Combines a source and a criterion.
     ///
     /// # Errors
     /// [`DriverError::Session`] if a parameter or the source's image size is out of range.
@@ -125,12 +125,12 @@ impl<S: ProgressiveSource, C: StoppingCriterion> Driver<S, C> {
         Ok(Self { source, session, time_limit: None, cancel, timeline, clock, samples_before: 0 })
     }
 
-    /// Stops all tiles once a run has taken so long. A call to the source that has begun is finished first.
+    /// Stops all tiles once a run has taken this long. A call to the source that is under way is finished first.
     pub fn set_time_limit(&mut self, limit: Option<Duration>) {
         self.time_limit = limit;
     }
 
-    /// Setting this flag, from another thread or a signal handler, stops all tiles after the call that has begun.
+    /// Setting this flag, from another thread or a signal handler, stops all tiles after the call under way.
     pub fn cancel_flag(&self) -> Arc<AtomicBool> {
         Arc::clone(&self.cancel)
     }

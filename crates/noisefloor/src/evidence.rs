@@ -1,4 +1,4 @@
-//! What a tile is judged by: its display luminance, and what of it is noise.
+//! What a tile is judged by: its display luminance, and its noise.
 
 use crate::display::{Display, luma_row, luminance};
 use crate::film::Film;
@@ -9,13 +9,13 @@ use serde::{Deserialize, Serialize};
 use std::cell::RefCell;
 use std::ops::Range;
 
-/// How far filters read beyond a tile, in pixels, and the block that tiles are cut into.
+/// How far filters read beyond a tile, in pixels, and the edge of the blocks that a tile is divided into.
 pub const HALO: usize = 8;
 
 /// Luminance weights, squared and summed: variance of Y′ for unit variance of R′, G′ and B′.
 pub const ROUNDING_LUMINANCE: f32 = 0.2126 * 0.2126 + 0.7152 * 0.7152 + 0.0722 * 0.0722;
 
-/// What the noisy tile is held against.
+/// What a noisy tile is compared with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Evidence {
@@ -23,11 +23,11 @@ pub enum Evidence {
     Halves,
     /// A noise-free reference: in the paper a quick ray-traced one (Takouachet et al. 2017, §4.3).
     Reference,
-    /// Nothing: all that the masks let through of the picture counts as noise. For comparison, and no good on texture.
+    /// Nothing: everything in the picture that passes the mask counts as noise. For comparison only; useless on texture.
     Alone,
 }
 
-/// What a thread keeps for its next tile.
+/// Buffers that a thread keeps for its next tile.
 #[derive(Default)]
 struct Room {
     planes: [Vec<f32>; 2],
@@ -66,14 +66,14 @@ thread_local! {
     static ROOM: RefCell<Room> = RefCell::default();
 }
 
-/// What is on the screen of a tile, and what of it is noise. All planes are display-encoded and have the same shape (rows,
+/// A tile as displayed, and its noise. All planes are display-encoded and have the same shape (rows,
 /// columns): the tile, whose edges are rounded up to multiples of [`HALO`], with a halo of that width around it. Neighbours are
 /// read where they exist; beyond the image, it is mirrored.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TilePlanes {
     /// Luminance Y′ in [0, 1].
     pub image: Array2<f32>,
-    /// Residual of the luminance Y′: the picture minus what it is held against, scaled so that its standard deviation is that
+    /// Residual of the luminance Y′: the picture minus what it is compared with, scaled so that its standard deviation is that
     /// of the noise in the picture.
     pub residual: Array2<f32>,
     /// Variance of known white rounding noise in each of the residuals of R′, G′ and B′; 0 for pictures in floating point.
@@ -151,7 +151,7 @@ impl TilePlanes {
         Self { image, residual, rounding: 0.0, inner }
     }
 
-    /// Leaves its memory to the next planes that this thread makes, so that verdicts need not allocate any.
+    /// Returns its memory to this thread's buffers, so that the next verdict does not allocate.
     pub(crate) fn recycle(self) {
         let planes = [self.image, self.residual].map(|plane| plane.into_raw_vec_and_offset().0);
         ROOM.with_borrow_mut(|room| room.planes = planes);
@@ -163,7 +163,7 @@ impl TilePlanes {
     /// σ²/(n_A + n_B); so (A − B)·√(n_A·n_B)/(n_A + n_B) has exactly the noise of the mean, also for uneven halves. The
     /// halves are tone mapped first, since people see display values.
     ///
-    /// A pixel of which one half has no valid sample gives no evidence: its residual is 0.
+    /// A pixel without valid samples in one half gives no evidence: its residual is 0.
     pub fn from_halves(film: &Film, display: &Display, tile: Tile) -> Self {
         let grid = film.grid();
         let read = |y, columns: &Columns, [mean, a, b]: [&mut [Rgb]; 3], scales: &mut [f32]| {
@@ -192,8 +192,8 @@ impl TilePlanes {
         Self::gather_linear((grid.width(), grid.height()), tile, display, read, residual)
     }
 
-    /// Evidence on `image` from another rendering of the same view, both `width`×`height` pixels. `None` if the two say nothing
-    /// of the noise: see [`residual_scale`].
+    /// Evidence on `image` from another rendering of the same view, both `width`×`height` pixels. `None` if their difference says nothing
+    /// about the noise: see [`residual_scale`].
     ///
     /// # Panics
     /// If a rendering has fewer pixels than that.
@@ -253,7 +253,7 @@ fn mirror(place: usize, edge: usize) -> usize {
     distance.min(period - distance).min(edge - 1)
 }
 
-/// A picture of linear radiance, row-major, and the samples per pixel it was made of.
+/// A picture of linear radiance, row-major, with its samples per pixel.
 #[derive(Clone, Copy, Debug)]
 pub struct Rendering<'a> {
     /// Linear radiance, width × height pixels.
@@ -267,7 +267,7 @@ pub struct Rendering<'a> {
 /// How two pictures of one scene were made from samples, for [`residual_scale`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Samples {
-    /// No sample is in both.
+    /// They share no samples.
     Independent,
     /// The smaller set of samples is part of the larger one: two stages of one progressive rendering.
     Nested,
@@ -277,7 +277,7 @@ pub enum Samples {
 /// samples per pixel; the other has `other`.
 ///
 /// Independent samples: Var(difference) = σ²(1/image + 1/other); nested ones: σ²·|1/image − 1/other|. The noise of the first
-/// picture is σ²/image. `None` if one has no samples or nested ones have the same number: the difference then says nothing.
+/// picture is σ²/image. `None` if one has no samples or nested ones have the same number: the difference then says nothing about the noise.
 pub fn residual_scale(image: f64, other: f64, samples: Samples) -> Option<f32> {
     let variance = match samples {
         Samples::Independent => 1.0 / image + 1.0 / other,

@@ -35,7 +35,7 @@ pub enum FilmError {
 
 /// One half: a mean for each pixel, with the rounding error of its last bits kept beside it.
 ///
-/// A plain f32 running mean stops moving once a batch weighs less than 2⁻²⁴ of what is there. `mean + carry·ulp/2¹⁶` is a
+/// A plain f32 running mean stops changing once a batch weighs less than 2⁻²⁴ of it. `mean + carry·ulp/2¹⁶` is a
 /// 40-bit number in 6 bytes: each update then errs by at most 2⁻¹⁷ ulp, and since update j is averaged with weight j/K, K
 /// updates err by at most K·2⁻¹⁸ ulp; 10⁹ samples in batches of 100 (K = 10⁷) stay within 39 ulp, 2.4·10⁻⁶ relative, in the
 /// worst case, and within 0.02 ulp if roundings are independent.
@@ -43,7 +43,7 @@ pub enum FilmError {
 struct Half {
     mean: Vec<Rgb>,
     carry: Vec<[i16; 3]>,
-    /// Samples kept out, per pixel; empty until the first one is.
+    /// Rejected samples per pixel; empty until there are any.
     rejected: Vec<u32>,
 }
 
@@ -91,9 +91,9 @@ impl Half {
 /// Accumulates batches of each tile into two independent halves, A and B.
 ///
 /// Each batch goes to whichever half of its tile has fewer samples, so that the two stay as even as the batches allow.
-/// Non-finite pixels of a batch are kept out and counted.
+/// Non-finite pixels of a batch are rejected and counted.
 ///
-/// Memory: 36 bytes a pixel, 18 without halves.
+/// Memory: 36 bytes per pixel, 18 without halves.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Film {
     grid: TileGrid,
@@ -109,7 +109,7 @@ impl Film {
         Self::with_halves(grid, 2)
     }
 
-    /// An empty film that keeps the mean alone, for criteria that need no halves.
+    /// An empty film that keeps only the mean, for criteria that need no halves.
     pub fn without_halves(grid: TileGrid) -> Self {
         Self::with_halves(grid, 1)
     }
@@ -146,7 +146,7 @@ impl Film {
         a + b
     }
 
-    /// Samples kept out so far because the batch they came in was not finite, over all pixels.
+    /// Samples rejected so far, over all pixels, because their batch was not finite.
     pub fn rejected(&self) -> u64 {
         self.rejected
     }
@@ -182,11 +182,12 @@ impl Film {
         Ok(())
     }
 
-    /// Adds what is new in a running mean of `total` samples, for renderers that keep one of their own. The difference is
-    /// taken in f64, and amplifies the rounding of the running mean by total/(new samples): push batches where you can.
+    /// Adds the new samples in a running mean of `total` samples per pixel, for renderers that keep one of their own. The
+    /// difference is computed in f64 and amplifies the rounding of the running mean by total/(new samples): push batches
+    /// where you can.
     ///
     /// # Errors
-    /// [`FilmError`] as [`Film::add`], and if `total` is not above the samples already here.
+    /// [`FilmError`] as [`Film::add`], and if `total` is not above the samples that the film has.
     pub fn add_running(&mut self, tile: usize, total: u64, mean: &[Rgb]) -> Result<(), FilmError> {
         let checked = self.check(tile, mean.len())?;
         let had = self.spp(tile);
@@ -216,7 +217,7 @@ impl Film {
         Ok(tile)
     }
 
-    /// Says what is wrong with a film that was read from somewhere, beside an empty one of the same job.
+    /// Validates a film that was read, against an empty one of the same job.
     pub(crate) fn check_like(&self, fresh: &Self) -> Result<(), &'static str> {
         if self.grid != fresh.grid || self.halves.len() != fresh.halves.len() {
             return Err("its film is not of this job");
@@ -248,7 +249,7 @@ impl Film {
         Ok(())
     }
 
-    /// Pixels of a tile of which a half that is kept has no valid sample.
+    /// Number of pixels of a tile that lack a valid sample in one of the halves kept.
     ///
     /// # Panics
     /// If the tile does not exist.
@@ -264,8 +265,8 @@ impl Film {
         rect.rows(self.grid.width()).flatten().filter(|&pixel| lacks(pixel)).count()
     }
 
-    /// The mean linear radiance of either half, A and B, at one pixel of `tile`, each with the number of valid samples behind it;
-    /// black where there are none, as all of B is where no halves are kept. `pixel` is row-major over the image, and must lie in
+    /// The mean linear radiance of either half, A and B, at one pixel of `tile`, each with its number of valid samples;
+    /// black where there are none, as in all of B where no halves are kept. `pixel` is row-major over the image, and must lie in
     /// `tile`: counts of samples are kept by tile.
     ///
     /// # Panics

@@ -1,15 +1,15 @@
 //! Tells progressive Monte Carlo renderers, tile by tile, when people stop seeing noise.
 //!
-//! An oracle trained on human thresholds looks at each tile of a progressive rendering and says with which probability an
-//! observer sees no difference from the converged picture; after Takouachet et al. 2017, "Perception of noise and Global
+//! An oracle trained on human thresholds estimates, for each tile of a progressive rendering, the probability that an
+//! observer sees no difference from the converged picture, after Takouachet et al. 2017, "Perception of noise and Global
 //! Illumination: toward an automatic stopping criterion based on SVM".
 //!
 //! - A renderer that owns its loop pushes samples into a [`Session`].
 //! - A renderer behind [`ProgressiveSource`] is driven by a [`Driver`].
-//! - A [`Checkpoint`] keeps what either has come to, to go on with in another process.
-//! - [`Oracle`] is the [`StoppingCriterion`] made of a trained [`Model`]; [`FixedSpp`] is the simplest one.
-//! - [`Film`], [`Display`], [`TilePlanes`], [`NoiseMask`], [`Descriptor`] and [`Svm`] are the way from samples to a verdict.
-//! - [`Familiarity`] is what a model has been tried on; elsewhere it asks for twice the samples.
+//! - A [`Checkpoint`] is a snapshot of either, for resuming it in another process.
+//! - [`Oracle`] is the [`StoppingCriterion`] that judges by a trained [`Model`]; [`FixedSpp`] is the simplest one.
+//! - [`Film`], [`Display`], [`TilePlanes`], [`NoiseMask`], [`Descriptor`] and [`Svm`] lead from samples to a verdict.
+//! - [`Familiarity`] describes the textures a model has been tried on; elsewhere it asks for twice the samples.
 //!
 //! ```
 //! use noisefloor::{Oracle, Params, Session, StopReason};
@@ -65,6 +65,8 @@ pub use familiarity::{Familiarity, nearest};
 pub use film::{Film, FilmError};
 pub use mask::{NoiseMask, SigmaError};
 pub use model::{Judgement, Model, ModelError, ModelParts, Scores, TrainingRecord};
+/// Planes, maps and training rows are its arrays.
+pub use ndarray;
 pub use oracle::Oracle;
 pub use params::{Audience, Params, ParamsError, Schedule};
 pub use rgb::Rgb;
@@ -77,6 +79,10 @@ pub use svm::{Classifier, Platt, Scaler, Svm};
 pub use svm::{SvmParams, SvmTrainError, Weights, fit_platt, fit_svm, fit_weights, squared_distances};
 pub use text::printable;
 pub use threshold::{Threshold, ThresholdError};
+#[cfg(feature = "train")]
+/// Their errors are causes of [`SvmTrainError`].
+pub use {linfa, linfa_svm};
+
 pub use tile::{
     DEFAULT_TILE, MAX_EDGE, MAX_PIXELS, MAX_TILE, MIN_TILE, Tile, TileError, TileGrid, check_image,
 };

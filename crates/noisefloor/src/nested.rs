@@ -1,9 +1,8 @@
 //! Whether one picture contains the samples of another.
 
 use crate::display::{Display, luminance};
-use crate::evidence::Samples;
+use crate::evidence::{ROUNDING_LUMINANCE, Rendering, Samples};
 use crate::mask::NoiseMask;
-use crate::rgb::Rgb;
 use ndarray::Array2;
 
 /// Edge of the blocks that count as independent observations, in pixels: wider than any pixel filter.
@@ -17,15 +16,6 @@ const APART: f64 = 6.0;
 /// never decided.
 const CURVATURE: f64 = 0.004;
 
-/// A picture, with what is known about its noise.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Snapshot<'a> {
-    pub(crate) size: (usize, usize),
-    pub(crate) pixels: &'a [Rgb],
-    pub(crate) spp: f64,
-    pub(crate) rounding: f32,
-}
-
 /// Whether two pictures of one view share samples, as far as they show it.
 ///
 /// Let x be the mean of n samples and y that of m > n, both masked, so that little of the picture is left beside the noise.
@@ -33,11 +23,16 @@ pub(crate) struct Snapshot<'a> {
 /// of the difference: the regression of y on x − y has the slope 0 or −n/(n + m). The slope is averaged over blocks,
 /// weighted so that textured ones, where y says little about its noise, count less; the scatter of the blocks gives its
 /// standard error. `None` if that is too large to tell the slopes apart, as with equal counts, where there is no nesting.
-pub(crate) fn shared_samples(one: Snapshot<'_>, other: Snapshot<'_>, display: &Display) -> Option<Samples> {
+pub(crate) fn shared_samples(
+    size: (usize, usize),
+    one: Rendering<'_>,
+    other: Rendering<'_>,
+    display: &Display,
+) -> Option<Samples> {
     let (fewer, more) = if one.spp <= other.spp { (one, other) } else { (other, one) };
     let independent_slope = -fewer.spp / (fewer.spp + more.spp);
-    let (x, y) = (masked(fewer, display)?, masked(more, display)?);
-    let rounding = NoiseMask::default().white_noise_gain() * crate::evidence::ROUNDING_LUMINANCE;
+    let (x, y) = (masked(size, fewer, display)?, masked(size, more, display)?);
+    let rounding = NoiseMask::default().white_noise_gain() * ROUNDING_LUMINANCE;
     let known = [fewer.rounding, more.rounding].map(|variance| f64::from(rounding * variance));
     let blocks = blocks(&x, &y, known);
 
@@ -92,15 +87,16 @@ fn blocks(x: &Array2<f32>, y: &Array2<f32>, [of_x, of_y]: [f64; 2]) -> Vec<Block
 }
 
 /// Masked luminance as displayed.
-fn masked(picture: Snapshot<'_>, display: &Display) -> Option<Array2<f32>> {
+fn masked((width, height): (usize, usize), picture: Rendering<'_>, display: &Display) -> Option<Array2<f32>> {
     let encoded = picture.pixels.iter().map(|&p| luminance(display.encode(p))).collect();
-    let plane = Array2::from_shape_vec((picture.size.1, picture.size.0), encoded).ok()?;
+    let plane = Array2::from_shape_vec((height, width), encoded).ok()?;
     Some(NoiseMask::default().apply(&plane))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::rgb::Rgb;
 
     const EDGE: usize = 128;
 
@@ -119,9 +115,11 @@ mod tests {
     fn told(one: &[f32], n: f64, other: &[f32], m: f64) -> Option<Samples> {
         let mean = |sums: &[f32], spp: f64| sums.iter().map(|s| [s / spp as f32; 3]).collect::<Vec<Rgb>>();
         let (one, other) = (mean(one, n), mean(other, m));
-        let snapshot = |pixels, spp| Snapshot { size: (EDGE, EDGE), pixels, spp, rounding: 0.0 };
-        let forward = shared_samples(snapshot(&one, n), snapshot(&other, m), &Display::SRGB);
-        assert_eq!(forward, shared_samples(snapshot(&other, m), snapshot(&one, n), &Display::SRGB));
+        let (one, other) =
+            [(&one, n), (&other, m)].map(|(pixels, spp)| Rendering { pixels, spp, rounding: 0.0 }).into();
+        let told = |a, b| shared_samples((EDGE, EDGE), a, b, &Display::SRGB);
+        let forward = told(one, other);
+        assert_eq!(forward, told(other, one));
         forward
     }
 

@@ -10,7 +10,7 @@ use crate::threshold::Threshold;
 use crate::tile::{Tile, TileGrid};
 use rayon::prelude::*;
 
-/// A tile of which more than one in so many pixels has no valid sample is not called converged: it gives no evidence.
+/// A tile with more than one in this many pixels without valid samples gives no evidence, and is not called converged.
 const NO_EVIDENCE: usize = 16;
 
 /// Judges tiles by a trained model.

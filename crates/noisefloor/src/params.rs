@@ -1,4 +1,4 @@
-//! When tiles are judged, and what ends them apart from the criterion.
+//! When tiles are judged, and the limits that end them.
 
 use crate::display::{ToneMapping, ToneMappingError};
 use crate::tile::DEFAULT_TILE;
@@ -23,8 +23,8 @@ pub enum Schedule {
 }
 
 impl Schedule {
-    /// Share of the way to the expected need that is sampled before the next look: expectations err, and an early look is
-    /// cheap while late samples are not.
+    /// Share of the way to the expected need that is sampled before the next verdict. Expectations err; an early verdict is
+    /// cheap, late samples are not.
     const APPROACH: f64 = 0.75;
 
     fn step(self) -> u64 {
@@ -33,7 +33,7 @@ impl Schedule {
         }
     }
 
-    /// The number of samples at which to look again.
+    /// Samples per pixel at the next verdict.
     pub(crate) fn next(self, samples: u64, expected: Option<u64>) -> u64 {
         let step = self.step();
         let on_grid = |n: u64| (n / step).max(samples / step + 1) * step;
@@ -62,13 +62,13 @@ impl Audience {
     /// Students of computer art: T′ = 1.94·T − 346, r = 0.78 (Takouachet et al. 2017, §7.3).
     pub const ART_STUDENTS: Self = Self { slope: 1.94, offset: -346.0 };
 
-    /// The line of an audience that is given relative to this one.
+    /// Combines this line with one that is relative to it.
     pub fn then(&self, other: Self) -> Self {
         Self { slope: other.slope * self.slope, offset: other.slope * self.offset + other.offset }
     }
 
-    /// What this audience sees of a picture of `samples` samples, as the samples per pixel at which the trained one sees as much: the inverse
-    /// of [`Audience::samples`], never more than `samples`; 0 if no noise is little enough for them.
+    /// The samples per pixel at which the trained audience sees as much noise as this one sees in a picture of `samples`
+    /// samples per pixel: the inverse of [`Audience::samples`], never more than `samples`; 0 if no picture satisfies them.
     pub fn seen_as(&self, samples: f64) -> f64 {
         let seen = (samples - self.offset) / self.slope;
         match seen.is_nan() || seen <= 0.0 {
@@ -78,7 +78,8 @@ impl Audience {
         }
     }
 
-    /// Samples per pixel for this audience where the trained one needs `samples`; never fewer, since they are taken already.
+    /// Samples per pixel that satisfy this audience where `samples` satisfy the trained one; never fewer, since these have
+    /// been taken.
     pub fn samples(&self, samples: u64) -> u64 {
         samples.max((self.slope * samples as f64 + self.offset).ceil().clamp(0.0, 1e15) as u64)
     }
@@ -89,17 +90,17 @@ impl Audience {
 pub struct Params {
     /// Tile edge in pixels, 16…512.
     pub tile: usize,
-    /// The way to the screen.
+    /// How radiance is displayed.
     pub tone_mapping: ToneMapping,
     /// When tiles are judged.
     pub schedule: Schedule,
-    /// No tile stops with fewer samples per pixel.
+    /// Fewest samples per pixel at which a tile may stop.
     pub min_spp: u64,
-    /// Every tile stops at this many samples per pixel (Takouachet et al. 2017, §4.2.1: 10,000).
+    /// Samples per pixel at which every tile stops (Takouachet et al. 2017, §4.2.1: 10,000).
     pub max_spp: u64,
-    /// Verdicts in a row that have to say "converged", at least 1.
+    /// Consecutive "converged" verdicts that stop a tile, at least 1.
     pub consecutive: u32,
-    /// Whose eyes, relative to those that the criterion stands for ([`crate::StoppingCriterion::audience`]).
+    /// Whose thresholds, relative to those that the criterion stands for ([`crate::StoppingCriterion::audience`]).
     pub audience: Audience,
 }
 
@@ -117,7 +118,7 @@ impl Default for Params {
     }
 }
 
-/// A parameter out of its range.
+/// A parameter out of range.
 #[derive(Debug, Error, Clone, PartialEq)]
 #[non_exhaustive]
 pub enum ParamsError {
@@ -132,10 +133,10 @@ pub enum ParamsError {
         /// The maximum asked for.
         max: u64,
     },
-    /// No verdict is needed.
+    /// No verdict would be needed.
     #[error("at least one verdict must say that a tile has converged, not 0")]
     Consecutive,
-    /// The line of the audience is not a rising line.
+    /// The line of the audience falls.
     #[error("the audience line T′ = {0}·T + {1} needs finite numbers and a slope of at least 0")]
     Audience(f64, f64),
     /// The tone mapping.

@@ -1,4 +1,4 @@
-//! The loop, pushed: for a renderer that owns its own.
+//! The push loop: for a renderer that owns its main loop.
 
 use crate::criterion::{CriterionError, StoppingCriterion, Verdict, View};
 use crate::display::{Display, ToneMapping};
@@ -10,7 +10,7 @@ use crate::stop::{Stop, StopReason, TileState};
 use crate::tile::{Tile, TileError, TileGrid};
 use thiserror::Error;
 
-/// What can go wrong in a session.
+/// Why a session failed.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum SessionError {
@@ -36,8 +36,8 @@ pub enum SessionError {
     },
 }
 
-/// Film, criterion and limits, for a renderer that owns its loop: it pushes batches, asks which tiles are open and how much
-/// each deserves, and stops when none is.
+/// Film, criterion and limits, for a renderer that owns its main loop: it pushes batches, asks which tiles are open and how
+/// many samples each needs, and ends when none is open.
 ///
 /// ```
 /// use noisefloor::{FixedSpp, Params, Session};
@@ -60,7 +60,7 @@ pub struct Session<C> {
     params: Params,
     display: Option<Display>,
     reference: Option<Reference>,
-    /// The reference as it is displayed, once the display is settled.
+    /// The reference as displayed, once the display is settled.
     displayed_reference: Option<Vec<Rgb>>,
     tiles: Vec<TileState>,
 }
@@ -101,19 +101,19 @@ impl<C: StoppingCriterion> Session<C> {
         &self.params
     }
 
-    /// The frozen way to the screen; `None` until it has settled.
+    /// How radiance is displayed; `None` until it is settled.
     pub fn display(&self) -> Option<&Display> {
         self.display.as_ref()
     }
 
-    /// Fixes the way to the screen before it settles by itself, for renderers that have an exposure of their own or finish one
-    /// tile before they start the next.
+    /// Fixes how radiance is displayed before that is settled automatically: for renderers with an exposure of their own, or
+    /// that finish one tile before they start the next.
     pub fn set_display(&mut self, display: Display) {
         self.display = Some(display);
         self.displayed_reference = None;
     }
 
-    /// Hands over the quick noise-free reference, for criteria that need one.
+    /// Provides the quick noise-free reference, for criteria that need one.
     ///
     /// # Errors
     /// [`SessionError::Reference`] if its size is not the image's.
@@ -129,7 +129,7 @@ impl<C: StoppingCriterion> Session<C> {
         Ok(())
     }
 
-    /// What the open tiles deserve now. Empty when all are done. Where halves are kept, requests fill one half at a time, so
+    /// What the open tiles need next; empty when all are done. Where halves are kept, requests fill one half at a time, so
     /// that the two stay even.
     pub fn requests(&self) -> Vec<Request> {
         let wish = |(index, state): (usize, &TileState)| {
@@ -149,8 +149,8 @@ impl<C: StoppingCriterion> Session<C> {
         self.tiles.iter().enumerate().filter_map(wish).collect()
     }
 
-    /// Adds the mean of `spp` new samples per pixel of a tile, row-major over the tile. Tiles that are done take samples too: they
-    /// get better, and keep their stop.
+    /// Adds the mean of `spp` new samples per pixel of a tile, row-major over the tile. Finished tiles accept samples,
+    /// too: they improve, and keep their stop.
     ///
     /// # Errors
     /// [`FilmError`] if it does not fit; nothing is changed then.
@@ -158,7 +158,7 @@ impl<C: StoppingCriterion> Session<C> {
         self.film.add(tile, spp, mean)
     }
 
-    /// Adds what is new in a running mean of `total` samples of a tile; see [`Film::add_running`].
+    /// Adds the new samples in a running mean of a tile; see [`Film::add_running`].
     ///
     /// # Errors
     /// [`FilmError`] if it does not fit; nothing is changed then.
@@ -166,7 +166,7 @@ impl<C: StoppingCriterion> Session<C> {
         self.film.add_running(tile, total, mean)
     }
 
-    /// Judges the tiles that are due, and returns those that are done by it.
+    /// Judges the tiles that are due, and returns those that are now done.
     ///
     /// The first verdicts wait until every open tile has samples: the exposure is settled then, once and for all, unless the tone
     /// mapping is plain sRGB or [`Session::set_display`] was called.
@@ -267,7 +267,7 @@ impl<C: StoppingCriterion> Session<C> {
         *state.stop.insert(stop)
     }
 
-    /// Ends one tile for a reason of the caller's. Does nothing if it is done already.
+    /// Ends one tile for the caller's reason. Does nothing if it is already done.
     ///
     /// # Panics
     /// If the tile does not exist.
@@ -275,12 +275,12 @@ impl<C: StoppingCriterion> Session<C> {
         self.tiles[tile].stop.is_none().then(|| self.stop(tile, reason))
     }
 
-    /// Ends every open tile for a reason of the caller's, and returns them.
+    /// Ends every open tile for the caller's reason, and returns these tiles.
     pub fn close_all(&mut self, reason: StopReason) -> Vec<Stop> {
         (0..self.tiles.len()).filter_map(|tile| self.close(tile, reason)).collect()
     }
 
-    /// Whether a tile is not done.
+    /// Whether a tile is still open.
     ///
     /// # Panics
     /// If the tile does not exist.
@@ -293,7 +293,7 @@ impl<C: StoppingCriterion> Session<C> {
         self.open_tiles() == 0
     }
 
-    /// Number of tiles that are not done.
+    /// Number of open tiles.
     pub fn open_tiles(&self) -> usize {
         self.tiles.iter().filter(|t| t.stop.is_none()).count()
     }
@@ -312,14 +312,14 @@ impl<C: StoppingCriterion> Session<C> {
     }
 
     /// How visible the noise is at each pixel of the image, row-major, in 8-bit display steps (see [`crate::Descriptor::visible_noise`]);
-    /// NaN where there is no evidence. Computed at each call. `None` before the display has settled, and if the criterion cannot say.
+    /// NaN where there is no evidence. Computed at each call. `None` before the display is settled, or if the criterion cannot
+    /// say.
     pub fn visible_noise(&self) -> Option<Vec<f32>> {
         let reference = self.displayed_reference.as_deref();
         self.criterion.visible_noise(&View { film: &self.film, display: self.display.as_ref()?, reference })
     }
 
-    /// Samples still to be taken, over all pixels, as the criterion expects it; `None` while any open tile is without an
-    /// expectation.
+    /// Samples still to be taken, over all pixels, by the criterion's expectations; `None` while it has none for an open tile.
     pub fn expected_samples_to_go(&self) -> Option<u64> {
         let (max, audience) = (self.params.max_spp, self.audience());
         self.tiles.iter().enumerate().filter(|(_, state)| state.stop.is_none()).try_fold(

@@ -111,15 +111,15 @@ pub enum SourceError {
 ///
 /// # Why it is shaped so
 /// All tiles that are still open come in one call, so that a source can spread them over its threads (or over one
-/// wavefront of a GPU). Batches are means of *new* samples alone, so that the film can keep two independent halves of any
+/// wavefront of a GPU). Batches are means of *new* samples only, so that the film can keep two independent halves of any
 /// source, and no renderer has to know what a half buffer is.
 ///
 /// # For implementers
 /// - Return one batch for each request, in the order of the requests. A source that cannot aim ([`SourceInfo::aims`] is
 ///   false) is always asked for all tiles.
 /// - Samples must be independent of all samples handed out before, in this tile and in others.
-/// - The same seed should give the same samples, whatever the number of threads and however requests are cut into batches.
-///   What of that is kept is said by [`SourceInfo::repeats`]: a run is as reproducible as its source.
+/// - The same seed should give the same samples, whatever the number of threads and however requests are split into
+///   batches. [`SourceInfo::repeats`] says how much of this holds: a run is as reproducible as its source.
 /// - Use no reconstruction filter wider than a pixel unless you document it: shared samples correlate the noise of
 ///   neighbours, and the model has learned from independent noise.
 ///

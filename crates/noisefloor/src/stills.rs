@@ -1,10 +1,10 @@
-//! Pictures rendered elsewhere: held against each other, described and judged.
+//! Pictures rendered elsewhere: compared, described and judged.
 
 use crate::criterion::CriterionError;
 use crate::descriptor::Described;
 use crate::display::{Display, ToneMapping};
 use crate::evidence::{Evidence, Rendering, Samples, TilePlanes};
-use crate::nested::{Snapshot, shared_samples};
+use crate::nested::shared_samples;
 use crate::oracle::Oracle;
 use crate::rgb::Rgb;
 use crate::tile::{Tile, TileGrid};
@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use std::borrow::Cow;
 use thiserror::Error;
 
-/// A picture, and how many samples per pixel it was made of.
+/// A picture with its samples per pixel.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Still {
     /// Width and height in pixels.
@@ -21,20 +21,20 @@ pub struct Still {
     pub pixels: Vec<Rgb>,
     /// Samples per pixel, above 0.
     pub spp: f64,
-    /// Shown as it is, not tone mapped: a PNG.
+    /// Whether it is displayed unchanged instead of tone mapped: a PNG.
     pub display_referred: bool,
     /// Variance of the rounding of its display values; 0 for pictures in floating point.
     pub rounding: f32,
 }
 
-/// Why pictures cannot be held against each other.
+/// Why pictures cannot be compared.
 #[derive(Debug, Error)]
 pub enum StillError {
-    /// The number of samples is none.
+    /// The samples per pixel are not a positive number.
     #[error("a positive number of samples per pixel is needed, not {0}")]
     Spp(f64),
-    /// A pixel is no number.
-    #[error("pixel ({x}, {y}) is not finite; mend the render, or paint over it, before it is judged")]
+    /// A pixel is not finite.
+    #[error("pixel ({x}, {y}) is not finite; repair the render or paint over the pixel first")]
     NotFinite {
         /// Its column.
         x: usize,
@@ -44,7 +44,7 @@ pub enum StillError {
     /// Two views, or two resolutions.
     #[error("the pictures have different sizes, {}×{} and {}×{}", image.0, image.1, other.0, other.1)]
     Sizes {
-        /// Of the one.
+        /// Of one.
         image: (usize, usize),
         /// Of the other.
         other: (usize, usize),
@@ -52,17 +52,16 @@ pub enum StillError {
     /// Shown in two ways.
     #[error("one is a PNG and one an EXR; compare pictures of one kind")]
     Kinds,
-    /// Two copies.
-    #[error(
-        "the pictures are the same to the last bit, so that nothing shows their noise; render one with another seed"
-    )]
+    /// Two copies of one picture.
+    #[error("the pictures are identical, so that nothing shows their noise; render one with another seed")]
     Same,
-    /// A single picture, and a model that wants two.
+    /// One picture only, and a model that needs two.
     #[error(
-        "nothing to hold the picture against: noise shows where two renderings of one view differ; give another rendering, with another seed or more samples, or a converged reference"
+        "nothing to compare the picture with: noise shows where two renderings of one view differ; give another rendering, \
+         with another seed or more samples, or a converged reference"
     )]
     Nothing,
-    /// Nested pictures of as many samples.
+    /// Nested pictures with equal samples.
     #[error("nested pictures of the same {0} samples per pixel are the same picture: nothing to judge by")]
     Nested(f64),
     /// The pictures do not show whether they share samples.
@@ -96,7 +95,7 @@ impl Still {
         }
     }
 
-    /// Checks that another picture can be held against this one.
+    /// Checks that this picture can be compared with another.
     ///
     /// # Errors
     /// [`StillError`] if size or kind differ, or nothing does.
@@ -110,16 +109,12 @@ impl Still {
         if self.pixels == other.pixels { Err(StillError::Same) } else { Ok(()) }
     }
 
-    fn snapshot(&self) -> Snapshot<'_> {
-        Snapshot { size: self.size, pixels: &self.pixels, spp: self.spp, rounding: self.rounding }
-    }
-
     fn rendering(&self) -> Rendering<'_> {
         Rendering { pixels: &self.pixels, spp: self.spp, rounding: self.rounding }
     }
 }
 
-/// A picture and what it is held against.
+/// A picture and what it is compared with.
 #[derive(Debug)]
 pub struct SnapshotPair<'a> {
     image: &'a Still,
@@ -130,9 +125,9 @@ pub struct SnapshotPair<'a> {
 }
 
 impl<'a> SnapshotPair<'a> {
-    /// Holds a picture against others of the same view, as a model with that evidence wants it. Independent renderings are pooled; of stages
-    /// of one rendering, and of references, the one that says most is taken. `samples` says how they were made; `None` tells it from the
-    /// pictures.
+    /// Compares a picture with others of the same view, as models with this evidence need it. Independent renderings are
+    /// pooled; of nested ones and of references, the most informative is used. `samples` says how the pictures were made;
+    /// with `None` this is recognised from the pictures, where they show it.
     ///
     /// # Errors
     /// [`StillError`] if they do not fit, or there is nothing to hold the picture against.
@@ -220,8 +215,10 @@ impl<'a> SnapshotPair<'a> {
 
 /// Whether the pictures share samples, as far as they show it: one that does not show it must not be guessed.
 fn recognise(image: &Still, others: &[&Still], display: &Display) -> Result<Samples, StillError> {
-    let told: Vec<Option<Samples>> =
-        others.iter().map(|other| shared_samples(image.snapshot(), other.snapshot(), display)).collect();
+    let told: Vec<Option<Samples>> = others
+        .iter()
+        .map(|other| shared_samples(image.size, image.rendering(), other.rendering(), display))
+        .collect();
     if told.contains(&Some(Samples::Nested)) {
         return Ok(Samples::Nested);
     }

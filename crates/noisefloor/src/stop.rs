@@ -60,7 +60,7 @@ pub(crate) struct TileState {
     /// Verdicts in a row that said "converged".
     pub(crate) streak: u32,
     pub(crate) verdict: Option<Verdict>,
-    /// Converged for the trained audience; this audience wants so many.
+    /// Samples per pixel that this audience needs, once the tile has converged for the trained one.
     pub(crate) target: Option<u64>,
     pub(crate) stop: Option<Stop>,
 }

@@ -1,4 +1,4 @@
-//! The image cut into tiles.
+//! The image as a grid of tiles.
 
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
@@ -51,7 +51,7 @@ impl Tile {
     }
 }
 
-/// Why an image cannot be cut as asked.
+/// Why an image cannot be divided into such tiles.
 #[derive(Debug, Error, Clone, PartialEq, Eq)]
 pub enum TileError {
     /// The tile edge is outside [`MIN_TILE`]…[`MAX_TILE`].
@@ -80,7 +80,7 @@ pub struct TileGrid {
 }
 
 impl TileGrid {
-    /// Cuts an image of `width`×`height` pixels into tiles of `edge` pixels.
+    /// Divides an image of `width`×`height` pixels into tiles of `edge` pixels.
     ///
     /// # Errors
     /// [`TileError`] if `edge` is outside [`MIN_TILE`]…[`MAX_TILE`] or the image is empty or too large.
