@@ -27,8 +27,8 @@ impl Folder {
     /// The file called `name` at `place`.
     ///
     /// # Errors
-    /// [`LoadError::Outside`] if the name, or a link on the way, leads out of the folder; [`LoadError::Read`] if there is no
-    /// such file.
+    /// [`LoadError::Outside`] if the name, or a link on the way, leads out of the folder; [`LoadError::Read`]
+    /// if there is no such file.
     pub(crate) fn find(&self, name: &str, place: &Place) -> Result<PathBuf, LoadError> {
         let outside = || LoadError::Outside { place: place.clone(), name: name.to_owned() };
         let read = |cause| LoadError::Read { place: place.clone(), cause };

@@ -1,12 +1,13 @@
-//! Reads scenes from files for [`noisefloor_ptwne`]: glTF 2.0 (`.gltf`, `.glb`) and the subset of Mitsuba's XML (versions 0.5
-//! to 3) that research scenes use.
+//! Reads scenes from files for [`noisefloor_ptwne`]: glTF 2.0 (`.gltf`, `.glb`) and the subset of Mitsuba's
+//! XML (versions 0.5 to 3) that research scenes use.
 //!
-//! Files are hostile until parsed: every length is checked before anything is allocated, every error says which file and where,
-//! and what is not supported is named, with whether it was ignored or is fatal.
+//! Files are hostile until parsed: every length is checked before anything is allocated, every error says
+//! which file and where, and what is not supported is named, with whether it was ignored or is fatal.
 
 mod error;
 mod files;
 mod gltf;
+mod mesh;
 mod mitsuba;
 mod picture;
 

@@ -14,8 +14,8 @@ use std::path::Path;
 
 /// Memory for what a decoder keeps besides the pixels: rows, profiles, text.
 const MAX_EXTRA: u64 = 64 << 20;
-/// Most pixels that a byte of a file can stand for: deflate packs at best 1032:1, and a pixel has at least one bit. The other
-/// formats pack less.
+/// Most pixels that a byte of a file can stand for: deflate packs at best 1032:1, and a pixel has at least
+/// one bit. The other formats pack less.
 const PIXELS_A_BYTE: u64 = 1032 * 8;
 
 /// A picture as its file has it.
@@ -40,11 +40,12 @@ pub(crate) enum Samples {
     Linear(Vec<Rgb>),
 }
 
-/// Reads the EXR, Radiance, PNG or JPEG file in `path`, named at `place`. Its content says which it is, not its name.
+/// Reads the EXR, Radiance, PNG or JPEG file in `path`, named at `place`. Its content says which it is, not
+/// its name.
 ///
 /// # Errors
-/// [`LoadError`] if the file cannot be read, is of another format, broken, or has more than [`MAX_TEXTURE_PIXELS`] pixels
-/// (known from its header).
+/// [`LoadError`] if the file cannot be read, is of another format, broken, or has more than
+/// [`MAX_TEXTURE_PIXELS`] pixels (known from its header).
 pub(crate) fn read(path: &Path, place: &Place) -> Result<Picture, LoadError> {
     let bytes = files::read(path, MAX_FILE_BYTES, place)?;
     let here = Place::file(path);
@@ -62,8 +63,8 @@ pub(crate) fn read(path: &Path, place: &Place) -> Result<Picture, LoadError> {
 /// As [`read`].
 pub(crate) fn decode(bytes: &[u8], place: &Place) -> Result<Picture, LoadError> {
     let broken = |e: image::ImageError| place.clone().bad(format!("the picture is broken: {e}"));
-    // The decoders are other people's code over hostile bytes: where one of them panics, the file is broken, and the
-    // program that reads it goes on. No state outlives the call.
+    // The decoders are other people's code over hostile bytes: where one of them panics, the file is broken,
+    // and the program that reads it goes on. No state outlives the call.
     let decoded = catch_unwind(AssertUnwindSafe(|| match image::guess_format(bytes) {
         Ok(ImageFormat::Png) => {
             let mut limits = Limits::no_limits();

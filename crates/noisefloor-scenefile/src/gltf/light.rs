@@ -9,8 +9,8 @@ use gltf::json::extensions::scene::khr_lights_punctual::{Light, Type};
 use gltf::json::validation::Checked;
 use noisefloor_ptwne::{Punctual, SceneBuilder};
 
-/// Adds the light of a node. Candela become units of radiant intensity, and lux of irradiance, by their numbers, as nits of
-/// emissive materials become units of radiance.
+/// Adds the light of a node. Candela become units of radiant intensity, and lux of irradiance, by their
+/// numbers, as nits of emissive materials become units of radiance.
 pub(super) fn add(
     asset: &Asset<'_>,
     placed: &Placed<'_>,

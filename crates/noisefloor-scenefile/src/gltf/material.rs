@@ -152,8 +152,8 @@ impl<'m> Reader<'m, '_> {
         Ok(Material::MetallicRoughness { base, metallic_roughness, ior })
     }
 
-    /// `KHR_materials_transmission`: all or nothing, and smooth. A pane, unless `KHR_materials_volume` says that the surface
-    /// bounds a volume.
+    /// `KHR_materials_transmission`: all or nothing, and smooth. A pane, unless `KHR_materials_volume` says
+    /// that the surface bounds a volume.
     fn transmission(&mut self, base: Option<&Info>) -> Result<Option<Material>, LoadError> {
         let Some(transmission) = self.extensions().and_then(|e| e.transmission.as_ref()) else {
             return Ok(None);
@@ -187,7 +187,8 @@ impl<'m> Reader<'m, '_> {
         }))
     }
 
-    /// Whether the surface bounds a volume, whose extent is that of the mesh: the thickness serves renderers that do not trace it.
+    /// Whether the surface bounds a volume, whose extent is that of the mesh: the thickness serves renderers
+    /// that do not trace it.
     fn is_solid(&mut self) -> bool {
         let volume = self.extensions().and_then(|e| e.volume.as_ref());
         let Some(volume) = volume.filter(|volume| volume.thickness_factor.0 > 0.0) else { return false };

@@ -101,8 +101,8 @@ impl Triangles {
         for p in &mut self.positions {
             *p = moved(*p, to_world);
         }
-        // Normals go by the inverse transpose. That is the matrix of cofactors over the determinant, of which a normal needs
-        // the sign only; the cofactors exist even of a scale by zero.
+        // Normals go by the inverse transpose. That is the matrix of cofactors over the determinant, of which
+        // a normal needs the sign only; the cofactors exist even of a scale by zero.
         let [x, y, z] = [to_world.matrix3.x_axis, to_world.matrix3.y_axis, to_world.matrix3.z_axis];
         let mirrored = to_world.matrix3.determinant() < 0.0;
         let sign = if mirrored { -1.0 } else { 1.0 };

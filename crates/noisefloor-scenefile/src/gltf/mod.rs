@@ -1,7 +1,7 @@
 //! glTF 2.0, as JSON or GLB.
 //!
-//! The crate `gltf` gives the types of the JSON. Its own checks and readers are not used: they index and unwrap what a file
-//! says. Here each index is looked up, and each length checked, where it is used.
+//! The crate `gltf` gives the types of the JSON. Its own checks and readers are not used: they index and
+//! unwrap what a file says. Here each index is looked up, and each length checked, where it is used.
 
 mod accessor;
 mod asset;
@@ -195,7 +195,8 @@ fn each_primitive<'a>(
     Ok(())
 }
 
-/// Checks what the scene would come to, by the counts that its accessors have: a small file can show a mesh many times.
+/// Checks what the scene would come to, by the counts that its accessors have: a small file can show a mesh
+/// many times.
 fn check_size(asset: &Asset<'_>, placed: &[Placed<'_>]) -> Result<(), LoadError> {
     let (mut vertices, mut triangles) = (0u64, 0u64);
     each_primitive(asset, placed, |_, primitive, place| {

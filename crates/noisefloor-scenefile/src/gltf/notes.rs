@@ -5,8 +5,8 @@ use crate::{LoadError, Place, Warning};
 use std::collections::BTreeSet;
 use std::fmt;
 
-/// Extensions that a file may require. Of `KHR_materials_unlit` the specification gives a lit fallback, which is used;
-/// `KHR_mesh_quantization` is but a wider choice of accessors, all of which are read.
+/// Extensions that a file may require. Of `KHR_materials_unlit` the specification gives a lit fallback, which
+/// is used; `KHR_mesh_quantization` is but a wider choice of accessors, all of which are read.
 const KNOWN: [&str; 8] = [
     "KHR_lights_punctual",
     "KHR_materials_emissive_strength",

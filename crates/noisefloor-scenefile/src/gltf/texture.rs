@@ -67,7 +67,8 @@ impl<'a> Textures<'a> {
         Ok(texture)
     }
 
-    /// Alpha of a texture, if it is not opaque all over. With a threshold, 1 where alpha reaches it, and 0 elsewhere.
+    /// Alpha of a texture, if it is not opaque all over. With a threshold, 1 where alpha reaches it, and 0
+    /// elsewhere.
     pub(super) fn opacity(
         &mut self,
         info: &Info,

@@ -1,11 +1,12 @@
 //! Surfaces: Mitsuba's `bsdf` elements.
 
 use super::context::Context;
+use super::surface::Surface;
 use super::values::Use;
 use super::xml::Element;
 use crate::error::LoadError;
 use noisefloor::Rgb;
-use noisefloor_ptwne::{Material, MaterialOptions, Texture};
+use noisefloor_ptwne::{Cover, Material, Texture};
 
 /// How deep surfaces may nest.
 const MAX_NESTED: u64 = 16;
@@ -28,7 +29,8 @@ const INDICES: [(&str, f64); 14] = [
     ("diamond", 2.419),
 ];
 
-/// Complex indices of refraction of metals, as Rec.709 has them: η and k, as Mitsuba 3.9 averages them over its spectra.
+/// Complex indices of refraction of metals, as Rec.709 has them: η and k, as Mitsuba 3.9 averages them over
+/// its spectra.
 const METALS: [(&str, Rgb, Rgb); 6] = [
     ("Ag", [0.155_276, 0.116_728, 0.138_388], [4.828_35, 3.122_22, 2.146_9]),
     ("Al", [1.657_5, 0.880_405, 0.521_244], [9.223_81, 6.269_5, 4.837]),
@@ -37,43 +39,6 @@ const METALS: [(&str, Rgb, Rgb); 6] = [
     ("Cu", [0.201_005, 0.923_75, 1.102_22], [3.913_26, 2.453_05, 2.142_09]),
     ("W", [4.370_82, 3.300_25, 2.998_41], [3.500_64, 2.604_87, 2.273_23]),
 ];
-
-/// A material and what covers it.
-#[derive(Clone, Debug)]
-pub(super) struct Surface {
-    pub(super) material: Material,
-    pub(super) cover: MaterialOptions,
-}
-
-impl Surface {
-    /// What reflects, and is black from behind.
-    fn one_sided(material: Material) -> Self {
-        Self { material, cover: MaterialOptions { opacity: None, one_sided: true } }
-    }
-
-    /// What is seen from both sides.
-    fn two_sided(material: Material) -> Self {
-        Self { material, cover: MaterialOptions::default() }
-    }
-
-    /// What Mitsuba gives shapes without a surface: grey, or, if they shine, black.
-    pub(super) fn missing(shines: bool) -> Self {
-        Self::one_sided(Material::diffuse([if shines { 0.0 } else { 0.5 }; 3]))
-    }
-
-    /// Whether it has a texture.
-    pub(super) fn is_textured(&self) -> bool {
-        let varies = |texture: &Texture| !matches!(texture, Texture::Colour(_));
-        self.cover.opacity.as_ref().is_some_and(varies)
-            || match &self.material {
-                Material::Diffuse { albedo: texture }
-                | Material::Plastic { diffuse: texture, .. }
-                | Material::RoughConductor { reflectance: texture, .. }
-                | Material::Conductor { reflectance: texture, .. } => varies(texture),
-                _ => false,
-            }
-    }
-}
 
 impl<'d> Context<'d> {
     /// A `bsdf`.
@@ -123,7 +88,7 @@ impl<'d> Context<'d> {
                     return Err(self.unsupported(element, "a mask in a mask"));
                 }
                 let opacity = self.luminance(element, self.factor(element, "opacity", 0.5)?)?;
-                Ok(Surface { cover: MaterialOptions { opacity: Some(opacity), ..surface.cover }, ..surface })
+                Ok(Surface { cover: Cover { opacity: Some(opacity), ..surface.cover }, ..surface })
             }
             kind @ ("bumpmap" | "normalmap") => {
                 self.warn(element, format!("the relief of <bsdf type=\"{kind}\"> is left out: it is smooth"));

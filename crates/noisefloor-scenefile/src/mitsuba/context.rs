@@ -1,7 +1,7 @@
 //! What the readers of all parts of a scene share.
 
-use super::bsdfs::Surface;
-use super::textures::Raster;
+use super::raster::Raster;
+use super::surface::Surface;
 use super::xml::{Document, Element};
 use crate::error::{LoadError, Place, Warning};
 use crate::files::Folder;
@@ -13,7 +13,8 @@ use std::path::PathBuf;
 
 /// Most warnings that are kept.
 const MAX_WARNINGS: usize = 1000;
-/// Most pixels that the pictures of a scene have together, where they are kept more than once counted as often.
+/// Most pixels that the pictures of a scene have together, where they are kept more than once counted as
+/// often.
 const MAX_PIXELS: u64 = 1 << 27;
 
 /// A scene file that is being read.

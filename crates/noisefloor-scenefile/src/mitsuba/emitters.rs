@@ -76,7 +76,8 @@ impl<'d> Context<'d> {
         }
     }
 
-    /// Where an emitter stands and where it shines to: by `to_world` from 0 along +z, or by `position` and `direction`.
+    /// Where an emitter stands and where it shines to: by `to_world` from 0 along +z, or by `position` and
+    /// `direction`.
     fn position_and_direction(&self, element: &'d Element) -> Result<([f32; 3], [f32; 3]), LoadError> {
         let to_world = self.transform(element, "to_world")?;
         let position = self.point(element, "position")?.unwrap_or(to_world.w_axis.truncate());

@@ -1,23 +1,23 @@
 //! Mitsuba XML, versions 0.5 to 3.
 //!
-//! What is read: shapes `obj`, `ply`, `serialized`, `rectangle`, `cube`, `sphere`, `disk`; surfaces `diffuse`, `plastic`,
-//! `roughplastic`, `conductor`, `roughconductor`, `dielectric`, `thindielectric`, `twosided`, `mask`, and what is under a
-//! `bumpmap` or `normalmap`; textures `bitmap` and `checkerboard`; emitters `area`, `constant`, `envmap`, `point`, `spot`,
-//! `directional`; the first sensor, if it is `perspective` or `thinlens`; `default`, `ref`. Other shapes, surfaces, textures
-//! and emitters are errors, as is `include`; all else that is not read is warned of.
+//! What is read: shapes `obj`, `ply`, `serialized`, `rectangle`, `cube`, `sphere`, `disk`; surfaces
+//! `diffuse`, `plastic`, `roughplastic`, `conductor`, `roughconductor`, `dielectric`, `thindielectric`,
+//! `twosided`, `mask`, and what is under a `bumpmap` or `normalmap`; textures `bitmap` and `checkerboard`;
+//! emitters `area`, `constant`, `envmap`, `point`, `spot`, `directional`; the first sensor, if it is
+//! `perspective` or `thinlens`; `default`, `ref`. Other shapes, surfaces, textures and emitters are errors,
+//! as is `include`; all else that is not read is warned of.
 //!
-//! `xml` makes a tree of the file, `values` reads numbers, colours and transforms from it, and `context` follows references,
-//! and notes what nobody has read: that is warned of. The rest is a module for each part of a scene.
+//! `xml` makes a tree of the file, `values` reads numbers, colours and transforms from it, and `context`
+//! follows references, and notes what nobody has read: that is warned of. The rest is a module for each part
+//! of a scene.
 
 mod bsdfs;
 mod context;
 mod emitters;
-mod mesh;
-mod obj;
-mod ply;
+mod raster;
 mod sensor;
-mod serialized;
 mod shapes;
+mod surface;
 mod textures;
 mod values;
 mod xml;

@@ -1,12 +1,11 @@
 //! Shapes.
 
-use super::bsdfs::Surface;
 use super::context::Context;
-use super::mesh::{Triangles, normal_matrix};
+use super::surface::Surface;
 use super::xml::Element;
-use super::{obj, ply, serialized};
 use crate::error::{LoadError, Place};
 use crate::files::{self, MAX_FILE_BYTES};
+use crate::mesh::{Triangles, normal_matrix, obj, ply, serialized};
 use glam::{DMat3, DVec3, Vec3};
 use noisefloor_ptwne::{Emission, Material, MaterialId, Mesh, SceneBuilder};
 use std::collections::HashMap;

@@ -1,6 +1,7 @@
 //! Textures.
 
 use super::context::Context;
+use super::raster::{Raster, linear};
 use super::values::Use;
 use super::xml::Element;
 use crate::error::LoadError;
@@ -8,14 +9,6 @@ use crate::picture::{self, Picture, Samples};
 use noisefloor::{Rgb, srgb_decode};
 use noisefloor_ptwne::{ImageTexture, Pixels, Texture, Wrap};
 use std::sync::Arc;
-
-/// A picture, ready for textures.
-#[derive(Clone, Debug)]
-pub(super) struct Raster {
-    width: usize,
-    height: usize,
-    pixels: Pixels,
-}
 
 impl<'d> Context<'d> {
     /// The factor called `name`, constant or not, each channel in 0…1, or else `default`.
@@ -186,22 +179,5 @@ impl<'d> Context<'d> {
         let raster = Raster { width, height, pixels };
         self.rasters.borrow_mut().insert(key, raster.clone());
         Ok(raster)
-    }
-}
-
-impl Raster {
-    /// Width, height, and linear values.
-    pub(super) fn linear(&self) -> (usize, usize, Vec<Rgb>) {
-        (self.width, self.height, linear(&self.pixels))
-    }
-}
-
-/// Linear values of pixels.
-fn linear(pixels: &Pixels) -> Vec<Rgb> {
-    let linear = |code: u8| f32::from(code) / 255.0;
-    match pixels {
-        Pixels::Srgb8(codes) => codes.iter().map(|p| p.map(|code| srgb_decode(linear(code)))).collect(),
-        Pixels::Linear8(codes) => codes.iter().map(|p| p.map(linear)).collect(),
-        Pixels::Float(values) => values.to_vec(),
     }
 }

@@ -6,7 +6,8 @@ use crate::error::LoadError;
 use glam::{DMat3, DMat4, DVec3};
 use noisefloor::{Rgb, srgb_decode};
 
-/// Linear Rec.709 colour of a spectrum that is 1 at all wavelengths: what Mitsuba 2 and 3 take an emitter's `spectrum` for.
+/// Linear Rec.709 colour of a spectrum that is 1 at all wavelengths: what Mitsuba 2 and 3 take an emitter's
+/// `spectrum` for.
 const EQUAL_ENERGY: Rgb = [1.2048, 0.9483, 0.9089];
 
 /// What a colour is for.
@@ -187,7 +188,8 @@ impl Context<'_> {
         Ok(DMat4::from_cols(left.extend(0.0), up.extend(0.0), view.extend(0.0), origin.extend(1.0)))
     }
 
-    /// Attributes `x`, `y` and `z`, of which those that are missing are `missing`, or one or three numbers in `value`.
+    /// Attributes `x`, `y` and `z`, of which those that are missing are `missing`, or one or three numbers in
+    /// `value`.
     fn triple(&self, element: &Element, missing: f64) -> Result<DVec3, LoadError> {
         if let Some(value) = element.attribute("value") {
             return match self.numbers(element, value)?.as_slice() {

@@ -1,5 +1,5 @@
-//! The tree of a scene file: names in the style of Mitsuba 3, `$parameters` put in, every element with its line, and whether
-//! anything has read it.
+//! The tree of a scene file: names in the style of Mitsuba 3, `$parameters` put in, every element with its
+//! line, and whether anything has read it.
 
 use crate::error::{LoadError, Place};
 use roxmltree::{Node, ParsingOptions};
@@ -94,7 +94,8 @@ impl Element {
         self.children.iter().filter(ignored).for_each(Element::irrelevant);
     }
 
-    /// The elements below this that nobody has read. Of an element that is not read, what is in it is not reported.
+    /// The elements below this that nobody has read. Of an element that is not read, what is in it is not
+    /// reported.
     pub(super) fn unread<'a>(&'a self, found: &mut Vec<&'a Element>) {
         for child in &self.children {
             match child.seen.get() {
@@ -258,7 +259,8 @@ impl Builder<'_> {
     }
 }
 
-/// The name that Mitsuba 2 and 3 have for one of older versions: `toWorld` is `to_world`, `intIOR` is `int_ior`.
+/// The name that Mitsuba 2 and 3 have for one of older versions: `toWorld` is `to_world`, `intIOR` is
+/// `int_ior`.
 fn snake_case(name: &str) -> String {
     let mut result = String::with_capacity(name.len() + 4);
     let mut after_small = false;

@@ -1,4 +1,5 @@
-//! Bad files: what is said of them names the place, and nothing is allocated for what they only claim to have.
+//! Bad files: what is said of them names the place, and nothing is allocated for what they only claim to
+//! have.
 
 use crate::kit::{Maker, base64, json, load};
 use gltf::json::Value;

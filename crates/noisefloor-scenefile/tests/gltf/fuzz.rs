@@ -3,22 +3,6 @@
 use crate::kit::{Maker, json};
 use std::path::Path;
 
-/// SplitMix64 (Steele et al. 2014).
-struct Random(u64);
-
-impl Random {
-    fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    }
-
-    fn below(&mut self, n: usize) -> usize {
-        (self.next() % n as u64) as usize
-    }
-}
-
 /// A little of everything.
 fn everything() -> Maker {
     let mut maker = Maker::new();
@@ -54,28 +38,28 @@ fn everything() -> Maker {
 }
 
 /// Damages some bytes: flips bits, writes digits, copies or removes a stretch, cuts the end.
-fn damaged(file: &[u8], random: &mut Random) -> Vec<u8> {
+fn damaged(file: &[u8], random: &mut fastrand::Rng) -> Vec<u8> {
     let mut file = file.to_vec();
-    for _ in 0..=random.below(3) {
-        let at = random.below(file.len());
-        let length = random.below(12).min(file.len() - at);
-        match random.below(8) {
-            0 => file[at] ^= 1 << random.below(8),
-            1 => file[at] = random.next() as u8,
+    for _ in 0..=random.usize(..3) {
+        let at = random.usize(..file.len());
+        let length = random.usize(..12).min(file.len() - at);
+        match random.usize(..8) {
+            0 => file[at] ^= 1 << random.usize(..8),
+            1 => file[at] = random.u8(..),
             // Another number: what damages most
             2..=4 => match (0..file.len()).map(|i| (at + i) % file.len()).find(|i| file[*i].is_ascii_digit())
             {
-                Some(digit) => file[digit] = b'0' + random.below(10) as u8,
+                Some(digit) => file[digit] = random.u8(b'0'..=b'9'),
                 None => file[at] = 0xff,
             },
             5 => {
                 let stretch = file[at..at + length].to_vec();
-                let to = random.below(file.len());
+                let to = random.usize(..file.len());
                 file.splice(to..to, stretch);
             }
             6 => drop(file.drain(at..at + length)),
             _ => {
-                if random.below(8) == 0 {
+                if random.usize(..8) == 0 {
                     file.truncate(at.max(1));
                 }
             }
@@ -86,7 +70,7 @@ fn damaged(file: &[u8], random: &mut Random) -> Vec<u8> {
 
 /// Returns how many of `count` damaged files could be loaded.
 fn loaded(file: &[u8], path: &Path, count: u32, seed: u64) -> u32 {
-    let mut random = Random(seed);
+    let mut random = fastrand::Rng::with_seed(seed);
     let mut loaded = 0;
     for _ in 0..count {
         std::fs::write(path, damaged(file, &mut random)).unwrap();

@@ -1,4 +1,5 @@
-//! Where triangles and cameras are. A lamp is drawn as it is seen directly: its place in the image says where it is.
+//! Where triangles and cameras are. A lamp is drawn as it is seen directly: its place in the image says where
+//! it is.
 
 use crate::kit::{Maker, assert_warns, drawing, json, load};
 
@@ -109,7 +110,8 @@ fn nodes_move_meshes() {
     };
     assert_eq!(quad(&[r#"{"mesh": 0, "translation": [1, 0, 0]}"#]), MIRRORED);
     assert_eq!(quad(&[r#"{"mesh": 0, "translation": [0, -0.5, 0]}"#]), "....\n##..\n....\n....\n");
-    // A quarter turn about z, counter-clockwise from the front, with a quaternion that is not quite of length 1
+    // A quarter turn about z, counter-clockwise from the front, with a quaternion that is not quite of length
+    // 1
     let turn = r#"{"mesh": 0, "rotation": [0, 0, 0.70711, 0.70711]}"#;
     assert_eq!(quad(&[turn]), "....\n....\n#...\n#...\n");
     // The same by a matrix, whose columns come one after the other

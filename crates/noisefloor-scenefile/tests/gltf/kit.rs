@@ -19,7 +19,8 @@ pub(crate) struct Maker {
 }
 
 impl Maker {
-    /// A scene seen from the origin along −z through a field of view of 90°: 8×8 pixels at z = −1 are 0.25 wide.
+    /// A scene seen from the origin along −z through a field of view of 90°: 8×8 pixels at z = −1 are 0.25
+    /// wide.
     pub(crate) fn new() -> Self {
         let mut maker = Self::empty();
         maker.push("cameras", r#"{"type": "perspective", "perspective": {"yfov": 1.5707963, "znear": 0.1}}"#);
@@ -87,8 +88,8 @@ impl Maker {
         self.accessor(5123, "SCALAR", indices.len(), &bytes, "")
     }
 
-    /// Adds a mesh of the rectangle `[x0, x1]`×`[y0, y1]` at z that faces +z, with texture coordinates (0, 0) at its top left
-    /// and (1, 1) at its bottom right.
+    /// Adds a mesh of the rectangle `[x0, x1]`×`[y0, y1]` at z that faces +z, with texture coordinates (0, 0)
+    /// at its top left and (1, 1) at its bottom right.
     pub(crate) fn rectangle(&mut self, x: [f32; 2], y: [f32; 2], z: f32, material: &str) -> usize {
         let material = self.push("materials", material);
         let positions = self.floats(&[[x[0], y[0], z], [x[1], y[0], z], [x[1], y[1], z], [x[0], y[1], z]]);

@@ -62,9 +62,9 @@ fn colours_are_texture_times_factor() {
     let expected = [0.8 * linear(188), 0.5, 0.1 * linear(100)];
     assert_close(mean(&textured, 16, 9), expected, 1e-4);
 
-    // Metal is blue and roughness green, both linear: red changes nothing. Half metal is half a metal, half a polished coat
-    // on the colour: head on, that reflects ((1.5 − 1)/(1.5 + 1))² = 0.04, and nothing comes from a black base. A standard
-    // error of √(0.02·0.98/64/4096) = 2.7e-4
+    // Metal is blue and roughness green, both linear: red changes nothing. Half metal is half a metal, half a
+    // polished coat on the colour: head on, that reflects ((1.5 − 1)/(1.5 + 1))² = 0.04, and nothing comes
+    // from a black base. A standard error of √(0.02·0.98/64/4096) = 2.7e-4
     let black = r#"{"pbrMetallicRoughness": {"baseColorFactor": [0, 0, 0, 1], "metallicFactor": 0.5}}"#;
     let mut half = near(wall(black));
     let texture = half.texture(1, &[[255, 0, 255, 255]], "{}");
@@ -122,8 +122,8 @@ fn textures_are_the_right_way_up() {
     // The top left quarter of the image alone
     assert_eq!(four(2, NEAREST, transform(r#"{"scale": [0.5, 0.5]}"#)), ["rr", "rr"]);
     assert_eq!(four(2, NEAREST, transform(r#"{"scale": [0.5, 0.5], "offset": [0.5, 0]}"#)), ["gg", "gg"]);
-    // Coordinates turn counter-clockwise about the top left, the image clockwise: what was at its bottom left is at its top
-    // left, but one image further up
+    // Coordinates turn counter-clockwise about the top left, the image clockwise: what was at its bottom left
+    // is at its top left, but one image further up
     assert_eq!(four(2, NEAREST, transform(r#"{"rotation": 1.5707963}"#)), ["br", "wg"]);
 }
 
@@ -211,7 +211,8 @@ fn blended_surfaces_cover_by_alpha() {
                 "pbrMetallicRoughness": {{"baseColorFactor": [0, 0, 0, {alpha}]}}}}"#
         )
     };
-    // A standard error of 2·√(0.25·0.75/64/4096) = 1.7e-3; direct light alone, so that a ray that goes on is of length 2
+    // A standard error of 2·√(0.25·0.75/64/4096) = 1.7e-3; direct light alone, so that a ray that goes on is
+    // of length 2
     for (alpha, mode, expected) in [
         (0.25, "OPAQUE", 1.0),
         (0.25, "BLEND", 2.5),
@@ -274,8 +275,8 @@ fn turned(mut maker: Maker) -> Maker {
 
 #[test]
 fn transmission_without_a_volume_is_a_pane() {
-    // Head on, R = ((2 − 1)/(2 + 1))² is reflected at each side, 2R/(1 + R) by both together, and the rest tinted once; a
-    // standard error of √(0.2·0.8/64/4096) = 8e-4
+    // Head on, R = ((2 − 1)/(2 + 1))² is reflected at each side, 2R/(1 + R) by both together, and the rest
+    // tinted once; a standard error of √(0.2·0.8/64/4096) = 8e-4
     let r = 0.2;
     let expected = [r + 0.5 * (1.0 - r), 1.0, r];
     let thin = ["", r#", "KHR_materials_volume": {"thicknessFactor": 0, "attenuationDistance": 1}"#];

@@ -15,35 +15,54 @@ fn folder() -> Folder {
         .with_png("good.png", 1, &[[1, 2, 3, 4]])
 }
 
-/// Errors, each with its file and, in the scene file, its line.
-#[test]
-fn errors_say_where_and_what() {
+/// Loads each body, which must fail with a message that contains the text.
+#[track_caller]
+fn all_fail(bodies: &[(String, &str)]) {
     let folder = folder();
+    for (body, want) in bodies {
+        let error = folder.body(body).err().unwrap_or_else(|| panic!("{body} is accepted"));
+        assert!(error.contains(want), "{body}\n{error}\nwant: {want}");
+    }
+}
+
+fn mesh(kind: &str, name: &str) -> String {
+    format!("\n<shape type=\"{kind}\"><string name=\"filename\" value=\"{name}\"/></shape>")
+}
+
+fn bitmap(name: &str) -> String {
+    bsdf(&format!(
+        "<bsdf type=\"diffuse\"><texture type=\"bitmap\" name=\"reflectance\">\
+         <string name=\"filename\" value=\"{name}\"/></texture></bsdf>"
+    ))
+}
+
+fn bsdf(inside: &str) -> String {
+    format!("<shape type=\"rectangle\">\n{inside}</shape>")
+}
+
+fn light(inside: &str) -> String {
+    format!("<shape type=\"rectangle\"><emitter type=\"area\">\n{inside}</emitter></shape>")
+}
+
+fn move_by(inside: &str) -> String {
+    format!("<shape type=\"rectangle\"><transform name=\"to_world\">\n{inside}</transform></shape>")
+}
+
+#[test]
+fn missing_and_broken_files_are_named() {
     let outside = if cfg!(windows) { "C:\\x.png" } else { "/etc/hostname" };
-    let bitmap = |name: &str| {
-        format!(
-            "<shape type=\"rectangle\">\n<bsdf type=\"diffuse\"><texture type=\"bitmap\" name=\"reflectance\"><string name=\"filename\" value=\"{name}\"/></texture></bsdf></shape>"
-        )
-    };
-    let mesh = |kind: &str, name: &str| {
-        format!("\n<shape type=\"{kind}\"><string name=\"filename\" value=\"{name}\"/></shape>")
-    };
-    let bsdf = |inside: &str| format!("<shape type=\"rectangle\">\n{inside}</shape>");
-    let light = |inside: &str| {
-        format!("<shape type=\"rectangle\"><emitter type=\"area\">\n{inside}</emitter></shape>")
-    };
-    let move_by = |inside: &str| {
-        format!("<shape type=\"rectangle\"><transform name=\"to_world\">\n{inside}</transform></shape>")
-    };
-    for (body, want) in [
-        // Files
+    all_fail(&[
         (bitmap("missing.png"), "scene.xml: line 3 cannot be read: `"),
         (bitmap("../good.png"), "scene.xml: line 3: `../good.png` lies outside the folder of the scene"),
         (bitmap("a/../../good.png"), "lies outside the folder of the scene"),
         (bitmap(outside), "lies outside the folder of the scene"),
         (bitmap("."), "line 3 cannot be read: `"),
         (bitmap("broken.png"), "broken.png: the picture is broken"),
-        (bitmap("text.png"), "text.png: a picture that is neither PNG, JPEG, OpenEXR nor Radiance is not supported"),
+        (
+            bitmap("text.png"),
+            "text.png: a picture that is neither PNG, JPEG, OpenEXR nor Radiance is not \
+            supported",
+        ),
         (bitmap("nan.exr"), "line 3: the picture has values that are not finite"),
         (mesh("obj", "bad.obj"), "bad.obj: line 2: `2`: there is no position 2"),
         (mesh("ply", "short.ply"), "short.ply: the header asks for more elements than the file holds"),
@@ -51,56 +70,178 @@ fn errors_say_where_and_what() {
         (mesh("obj", "missing.obj"), "line 3 cannot be read"),
         ("<shape type=\"obj\"/>".to_owned(), "line 2: <shape type=\"obj\"> needs a `filename`"),
         (format!("<include filename=\"b.xml\"/>{RECTANGLE}"), "line 2: <include> is not supported"),
-        // Kinds
+    ]);
+}
+
+#[test]
+fn unsupported_kinds_are_named() {
+    all_fail(&[
         ("\n<shape type=\"hair\"/>".to_owned(), "line 3: <shape type=\"hair\"> is not supported"),
         (bsdf("<bsdf type=\"hair\"/>"), "line 3: <bsdf type=\"hair\"> is not supported"),
         (bsdf("<bsdf type=\"twosided\"/>"), "line 3: <bsdf type=\"twosided\"> needs a <bsdf> in it"),
-        (bsdf("<bsdf type=\"twosided\"><bsdf type=\"diffuse\"/><bsdf type=\"diffuse\"/></bsdf>"), "with more than one <bsdf> in it is not supported"),
-        (bsdf("<bsdf type=\"mask\"><bsdf type=\"mask\"><bsdf type=\"diffuse\"/></bsdf></bsdf>"), "line 3: a mask in a mask is not supported"),
+        (
+            bsdf("<bsdf type=\"twosided\"><bsdf type=\"diffuse\"/><bsdf type=\"diffuse\"/></bsdf>"),
+            "with more than one <bsdf> in it is not supported",
+        ),
+        (
+            bsdf("<bsdf type=\"mask\"><bsdf type=\"mask\"><bsdf type=\"diffuse\"/></bsdf></bsdf>"),
+            "line 3: \
+            a mask in a mask is not supported",
+        ),
         (bsdf("<bsdf type=\"diffuse\"/><bsdf type=\"diffuse\"/>"), "line 3: a shape has at most one bsdf"),
         (bsdf("<emitter type=\"area\"/><emitter type=\"area\"/>"), "line 3: a shape has at most one emitter"),
         (bsdf("<emitter type=\"point\"/>"), "line 3: <emitter type=\"point\"> in a shape is not supported"),
         ("<emitter type=\"sunsky\"/>".to_owned(), "line 2: <emitter type=\"sunsky\"> is not supported"),
-        // Values
-        (bsdf("<bsdf type=\"diffuse\"><rgb name=\"reflectance\" value=\"1 2\"/></bsdf>"), "line 3: 2 numbers; a colour has 1 or 3"),
-        (bsdf("<bsdf type=\"diffuse\"><rgb name=\"reflectance\" value=\"-1\"/></bsdf>"), "is negative or too large"),
-        (bsdf("<bsdf type=\"diffuse\"><rgb name=\"reflectance\" value=\"inf\"/></bsdf>"), "line 3: `inf` is not a finite number"),
-        (bsdf("<bsdf type=\"diffuse\"><rgb name=\"reflectance\"/></bsdf>"), "line 3: `reflectance` has no value"),
-        (bsdf("<bsdf type=\"diffuse\"><string name=\"reflectance\" value=\"red\"/></bsdf>"), "line 3: `reflectance` is a <string>; expected <rgb>, <srgb>"),
-        (bsdf("<bsdf type=\"diffuse\"><srgb name=\"reflectance\" value=\"#12345\"/></bsdf>"), "line 3: `#12345` is not a finite number"),
-        (bsdf("<bsdf type=\"diffuse\"><srgb name=\"reflectance\" value=\"#12345é\"/></bsdf>"), "is not a finite number"),
-        (bsdf("<bsdf type=\"diffuse\"><srgb name=\"reflectance\" value=\"#12345g\"/></bsdf>"), "line 3: `#12345g` is neither #rrggbb nor three numbers"),
-        (bsdf("<bsdf type=\"diffuse\"><spectrum name=\"reflectance\" value=\"400:0.1, 500:0.2\"/></bsdf>"), "line 3: a spectrum that is not the same at all wavelengths is not supported"),
-        (bsdf("<bsdf type=\"diffuse\"><texture type=\"wood\" name=\"reflectance\"/></bsdf>"), "line 3: <texture type=\"wood\" name=\"reflectance\"> is not supported"),
-        (bsdf("<bsdf type=\"plastic\"><float name=\"int_ior\" value=\"1\"/><float name=\"ext_ior\" value=\"2\"/></bsdf>"), "line 2: an index of refraction is 0.5, outside 1…4"),
-        (bsdf("<bsdf type=\"dielectric\"><float name=\"int_ior\" value=\"0\"/></bsdf>"), "line 3: `int_ior` must be above 0"),
-        (bsdf("<bsdf type=\"dielectric\"><string name=\"int_ior\" value=\"jelly\"/></bsdf>"), "line 3: the material `jelly` (known: vacuum, air"),
-        (bsdf("<bsdf type=\"conductor\"><rgb name=\"eta\" value=\"1\"/></bsdf>"), "line 3: give both `eta` and `k`, or `material`"),
-        (bsdf("<bsdf type=\"roughconductor\"><float name=\"alpha_u\" value=\"0.1\"/><float name=\"alpha_v\" value=\"0.2\"/></bsdf>"), "line 3: roughness that depends on direction is not supported"),
-        (bsdf("<bsdf type=\"roughconductor\"><texture name=\"alpha\" type=\"checkerboard\"/></bsdf>"), "line 3: a texture as `alpha` is not supported"),
+    ]);
+}
+
+#[test]
+fn bad_values_are_named() {
+    all_fail(&[
+        (
+            bsdf("<bsdf type=\"diffuse\"><rgb name=\"reflectance\" value=\"1 2\"/></bsdf>"),
+            "line 3: 2 \
+            numbers; a colour has 1 or 3",
+        ),
+        (
+            bsdf("<bsdf type=\"diffuse\"><rgb name=\"reflectance\" value=\"-1\"/></bsdf>"),
+            "is negative or \
+            too large",
+        ),
+        (
+            bsdf("<bsdf type=\"diffuse\"><rgb name=\"reflectance\" value=\"inf\"/></bsdf>"),
+            "line 3: `inf` \
+            is not a finite number",
+        ),
+        (
+            bsdf("<bsdf type=\"diffuse\"><rgb name=\"reflectance\"/></bsdf>"),
+            "line 3: `reflectance` has no \
+            value",
+        ),
+        (
+            bsdf("<bsdf type=\"diffuse\"><string name=\"reflectance\" value=\"red\"/></bsdf>"),
+            "line 3: \
+            `reflectance` is a <string>; expected <rgb>, <srgb>",
+        ),
+        (
+            bsdf("<bsdf type=\"diffuse\"><srgb name=\"reflectance\" value=\"#12345\"/></bsdf>"),
+            "line 3: \
+            `#12345` is not a finite number",
+        ),
+        (
+            bsdf("<bsdf type=\"diffuse\"><srgb name=\"reflectance\" value=\"#12345é\"/></bsdf>"),
+            "is not a \
+            finite number",
+        ),
+        (
+            bsdf("<bsdf type=\"diffuse\"><srgb name=\"reflectance\" value=\"#12345g\"/></bsdf>"),
+            "line 3: \
+            `#12345g` is neither #rrggbb nor three numbers",
+        ),
+        (
+            bsdf("<bsdf type=\"diffuse\"><spectrum name=\"reflectance\" value=\"400:0.1, 500:0.2\"/></bsdf>"),
+            "line 3: a spectrum that is not the same at all wavelengths is not supported",
+        ),
+        (
+            bsdf("<bsdf type=\"diffuse\"><texture type=\"wood\" name=\"reflectance\"/></bsdf>"),
+            "line 3: \
+            <texture type=\"wood\" name=\"reflectance\"> is not supported",
+        ),
+        (
+            bsdf(
+                "<bsdf type=\"plastic\"><float name=\"int_ior\" value=\"1\"/>\
+            <float name=\"ext_ior\" value=\"2\"/>\
+            </bsdf>",
+            ),
+            "line 2: an index of refraction is 0.5, outside 1…4",
+        ),
+        (
+            bsdf("<bsdf type=\"dielectric\"><float name=\"int_ior\" value=\"0\"/></bsdf>"),
+            "line 3: \
+            `int_ior` must be above 0",
+        ),
+        (
+            bsdf("<bsdf type=\"dielectric\"><string name=\"int_ior\" value=\"jelly\"/></bsdf>"),
+            "line 3: \
+            the material `jelly` (known: vacuum, air",
+        ),
+        (
+            bsdf("<bsdf type=\"conductor\"><rgb name=\"eta\" value=\"1\"/></bsdf>"),
+            "line 3: give both \
+            `eta` and `k`, or `material`",
+        ),
+        (
+            bsdf(
+                "<bsdf type=\"roughconductor\"><float name=\"alpha_u\" value=\"0.1\"/>\
+            <float name=\"alpha_v\" value=\"0.2\"/>\
+            </bsdf>",
+            ),
+            "line 3: roughness that depends on direction is not supported",
+        ),
+        (
+            bsdf("<bsdf type=\"roughconductor\"><texture name=\"alpha\" type=\"checkerboard\"/></bsdf>"),
+            "line 3: a texture as `alpha` is not supported",
+        ),
         (light("<string name=\"radiance\" value=\"1\"/>"), "line 3: `radiance` is a <string>"),
         (light("<rgb name=\"radiance\" value=\"1e13\"/>"), "scene.xml: line 2: "),
-        (light("<ref name=\"radiance\" id=\"x\"/></emitter></shape><bsdf type=\"diffuse\" id=\"x\"/><shape type=\"cube\"><emitter type=\"area\">"), "expected a texture"),
-        ("<shape type=\"rectangle\"><boolean name=\"flip_normals\" value=\"maybe\"/></shape>".to_owned(), "line 2: `maybe` is neither true nor false"),
-        ("<shape type=\"sphere\"><float name=\"radius\" value=\"one\"/></shape>".to_owned(), "line 2: `one` is not a finite number"),
-        ("<shape type=\"sphere\"><float name=\"radius\" value=\"0\"/></shape>".to_owned(), "line 2: the radius of a sphere is 0"),
-        ("<shape type=\"sphere\"><float name=\"center\" value=\"0\"/></shape>".to_owned(), "line 2: `center` is a <float>; expected a point or vector"),
-        ("<shape type=\"serialized\"><string name=\"filename\" value=\"bad.serialized\"/><integer name=\"shape_index\" value=\"-1\"/></shape>".to_owned(), "line 2: `shape_index` is negative"),
-        ("<shape type=\"rectangle\"><float name=\"to_world\" value=\"1\"/></shape>".to_owned(), "line 2: `to_world` is a <float>; expected a transform"),
-        // Transforms
+        (
+            light(
+                "<ref name=\"radiance\" id=\"x\"/></emitter></shape><bsdf type=\"diffuse\" id=\"x\"/>\
+            <shape type=\"cube\"><emitter type=\"area\">",
+            ),
+            "expected a texture",
+        ),
+        (
+            "<shape type=\"rectangle\"><boolean name=\"flip_normals\" value=\"maybe\"/></shape>".to_owned(),
+            "line 2: `maybe` is neither true nor false",
+        ),
+        (
+            "<shape type=\"sphere\"><float name=\"radius\" value=\"one\"/></shape>".to_owned(),
+            "line 2: \
+            `one` is not a finite number",
+        ),
+        (
+            "<shape type=\"sphere\"><float name=\"radius\" value=\"0\"/></shape>".to_owned(),
+            "line 2: the \
+            radius of a sphere is 0",
+        ),
+        (
+            "<shape type=\"sphere\"><float name=\"center\" value=\"0\"/></shape>".to_owned(),
+            "line 2: \
+            `center` is a <float>; expected a point or vector",
+        ),
+        (
+            "<shape type=\"serialized\"><string name=\"filename\" value=\"bad.serialized\"/>\
+            <integer name=\"shape_index\" value=\"-1\"/>\
+            </shape>"
+                .to_owned(),
+            "line 2: `shape_index` is negative",
+        ),
+        (
+            "<shape type=\"rectangle\"><float name=\"to_world\" value=\"1\"/></shape>".to_owned(),
+            "line 2: \
+            `to_world` is a <float>; expected a transform",
+        ),
+    ]);
+}
+
+#[test]
+fn bad_transforms_are_named() {
+    all_fail(&[
         (move_by("<twist x=\"1\"/>"), "line 3: <twist> in a transform is not supported"),
         (move_by("<rotate y=\"1\"/>"), "line 3: a rotation needs an angle"),
         (move_by("<rotate angle=\"1\"/>"), "line 3: a rotation needs an axis that is not 0"),
         (move_by("<matrix value=\"1 2 3\"/>"), "line 3: 3 numbers; a matrix has 9 or 16"),
-        (move_by("<matrix value=\"1 0 0 0 0 1 0 0 0 0 1 0 0 0 1 1\"/>"), "line 3: a matrix whose last row is not 0 0 0 1 is not supported"),
+        (
+            move_by("<matrix value=\"1 0 0 0 0 1 0 0 0 0 1 0 0 0 1 1\"/>"),
+            "line 3: a matrix whose last row \
+            is not 0 0 0 1 is not supported",
+        ),
         (move_by("<lookat origin=\"1,2,3\" target=\"1,2,3\"/>"), "line 3: origin and target are the same"),
         (move_by("<lookat origin=\"1,2,3\"/>"), "line 3: `target` is missing"),
         (move_by("<translate x=\"1e300\"/><scale value=\"1e300\"/>"), "line 2: the transform is too large"),
         (move_by("<translate x=\"1e7\"/>"), "line 2: "),
-    ] {
-        let error = folder.body(&body).err().unwrap_or_else(|| panic!("{body} is taken"));
-        assert!(error.contains(want), "{body}\n{error}\nwant: {want}");
-    }
+    ]);
 }
 
 #[cfg(unix)]
@@ -131,24 +272,29 @@ fn warnings_say_what_is_left_out() {
             "line 3: <float name=\"unheard_of\"> is ignored",
         ),
         (
-            "<shape type=\"cube\">\n<medium name=\"interior\" type=\"homogeneous\"><float name=\"x\" value=\"1\"/></medium></shape>",
+            "<shape type=\"cube\">\n<medium name=\"interior\" type=\"homogeneous\">\
+                <float name=\"x\" value=\"1\"/></medium></shape>",
             "line 3: <medium type=\"homogeneous\" name=\"interior\"> is ignored",
         ),
         ("\n<volume type=\"grid\"/>", "line 3: <volume type=\"grid\"> is ignored"),
         (
-            "<shape type=\"cube\"><bsdf type=\"roughplastic\"><float name=\"alpha\" value=\"0.2\"/></bsdf></shape>",
+            "<shape type=\"cube\"><bsdf type=\"roughplastic\"><float name=\"alpha\" value=\"0.2\"/></bsdf>\
+                </shape>",
             "line 2: the distribution `beckmann` is replaced by `ggx` of the same alpha",
         ),
         (
-            "<shape type=\"cube\"><bsdf type=\"dielectric\"><float name=\"specular_reflectance\" value=\"0.5\"/></bsdf></shape>",
+            "<shape type=\"cube\"><bsdf type=\"dielectric\">\
+                <float name=\"specular_reflectance\" value=\"0.5\"/></bsdf></shape>",
             "line 2: `specular_reflectance` [0.5, 0.5, 0.5] is ignored: it is 1",
         ),
         (
-            "<shape type=\"disk\"><bsdf type=\"diffuse\"><texture name=\"reflectance\" type=\"checkerboard\"/></bsdf></shape>",
+            "<shape type=\"disk\"><bsdf type=\"diffuse\">\
+                <texture name=\"reflectance\" type=\"checkerboard\"/></bsdf></shape>",
             "line 2: the texture is not laid on the disk in rings",
         ),
         (
-            "<shape type=\"sphere\"><bsdf type=\"diffuse\"><texture name=\"reflectance\" type=\"checkerboard\"/></bsdf></shape>",
+            "<shape type=\"sphere\"><bsdf type=\"diffuse\">\
+                <texture name=\"reflectance\" type=\"checkerboard\"/></bsdf></shape>",
             "line 2: the texture is laid on the sphere with its top towards +y of the scene",
         ),
     ] {

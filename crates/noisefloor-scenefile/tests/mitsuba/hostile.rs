@@ -2,9 +2,11 @@ use crate::util::Folder;
 use noisefloor_scenefile::load;
 use std::path::Path;
 
-/// A scene with every kind of file, all small. `mesh.serialized` holds no names, so that every byte of it matters.
+/// A scene with every kind of file, all small. `mesh.serialized` holds no names, so that every byte of it
+/// matters.
 fn folder() -> Folder {
-    let quad = "v -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvn 0 0 1\nf 1/1/1 2/2/1 3/3/1 4//1\n";
+    let quad = "v -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvn 0 0 1\nf 1/1/1 2/2/1 \
+        3/3/1 4//1\n";
     let ascii = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
         property float u\nproperty float v\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n\
         0 0 0 0 0\n1 0 0 1 0\n1 1 0 1 1\n3 0 1 2\n";
@@ -72,26 +74,14 @@ fn jpeg() -> Vec<u8> {
     bytes
 }
 
-/// SplitMix64: the same on every machine.
-struct Random(u64);
-
-impl Random {
-    fn below(&mut self, limit: usize) -> usize {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) % limit as u64) as usize
-    }
-}
-
 /// Writes a file anew. To cut one short first makes some file systems wait for the disk.
 fn replace(path: &Path, bytes: &[u8]) {
     std::fs::remove_file(path).unwrap();
     std::fs::write(path, bytes).unwrap();
 }
 
-/// Changed files are scenes or errors that name a file of the folder. That they never panic is seen by this ending.
+/// Changed files are scenes or errors that name a file of the folder. That they never panic is seen by this
+/// ending.
 #[test]
 fn changed_bytes_never_panic() {
     let folder = folder();
@@ -107,22 +97,22 @@ fn changed_bytes_never_panic() {
         "picture.jpg",
         "picture.hdr",
     ];
-    let mut random = Random(20);
+    let mut random = fastrand::Rng::with_seed(20);
     let mut broken = 0;
     for round in 0..4000 {
         let path = folder.path().join(files[round % files.len()]);
         let original = std::fs::read(&path).unwrap();
         let mut bytes = original.clone();
-        for _ in 0..1 + random.below(4) {
-            let at = random.below(bytes.len());
-            match random.below(5) {
-                0 => bytes[at] ^= 1 << random.below(8),
+        for _ in 0..1 + random.usize(..4) {
+            let at = random.usize(..bytes.len());
+            match random.usize(..5) {
+                0 => bytes[at] ^= 1 << random.usize(..8),
                 // What numbers and brackets are made of
-                1 => bytes[at] = b"0123456789-+.eE<>/\"'= \n$#&x"[random.below(27)],
-                2 => bytes[at] = [0x00, 0x01, 0x7f, 0x80, 0xff][random.below(5)],
+                1 => bytes[at] = b"0123456789-+.eE<>/\"'= \n$#&x"[random.usize(..27)],
+                2 => bytes[at] = [0x00, 0x01, 0x7f, 0x80, 0xff][random.usize(..5)],
                 3 => bytes.truncate(at.max(1)),
                 _ => {
-                    let end = (at + 1 + random.below(40)).min(bytes.len());
+                    let end = (at + 1 + random.usize(..40)).min(bytes.len());
                     let piece = bytes[at..end].to_vec();
                     bytes.splice(at..at, piece);
                 }

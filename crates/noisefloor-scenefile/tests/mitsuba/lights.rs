@@ -1,35 +1,44 @@
 use crate::util::{Folder, close};
 use std::f32::consts::FRAC_1_PI;
 
-const FLOOR: &str = r#"<shape type="rectangle"><transform name="to_world"><scale value="100"/></transform><bsdf type="diffuse"><float name="reflectance" value="0.8"/></bsdf></shape>"#;
+const FLOOR: &str = r#"<shape type="rectangle"><transform name="to_world"><scale value="100"/></transform>
+    <bsdf type="diffuse"><float name="reflectance" value="0.8"/></bsdf></shape>"#;
 
 #[test]
 fn lights_without_size_light_a_floor() {
     let folder = Folder::new();
     for (light, irradiance) in [
         (
-            r#"<emitter type="point"><point name="position" x="0" y="0" z="2"/><rgb name="intensity" value="4, 8, 0"/></emitter>"#,
+            r#"<emitter type="point"><point name="position" x="0" y="0" z="2"/>
+                <rgb name="intensity" value="4, 8, 0"/></emitter>"#,
             [1.0, 2.0, 0.0],
         ),
         (
-            r#"<emitter type="point"><transform name="to_world"><translate z="4"/></transform><rgb name="intensity" value="16"/></emitter>"#,
+            r#"<emitter type="point"><transform name="to_world"><translate z="4"/></transform>
+                <rgb name="intensity" value="16"/></emitter>"#,
             [1.0; 3],
         ),
         (
-            r#"<emitter type="directional"><vector name="direction" x="0" y="3" z="-4"/><rgb name="irradiance" value="5, 0, 0"/></emitter>"#,
+            r#"<emitter type="directional"><vector name="direction" x="0" y="3" z="-4"/>
+                <rgb name="irradiance" value="5, 0, 0"/></emitter>"#,
             [4.0, 0.0, 0.0],
         ),
         (
-            r#"<emitter type="directional"><transform name="to_world"><rotate x="1" angle="180"/></transform><rgb name="irradiance" value="5"/></emitter>"#,
+            r#"<emitter type="directional"><transform name="to_world"><rotate x="1" angle="180"/>
+                </transform><rgb name="irradiance" value="5"/></emitter>"#,
             [5.0; 3],
         ),
         (r#"<emitter type="directional"><rgb name="irradiance" value="5"/></emitter>"#, [0.0; 3]),
         (
-            r#"<emitter type="spot"><transform name="to_world"><lookat origin="0,0,2" target="0,0,0" up="0,1,0"/></transform><rgb name="intensity" value="4"/></emitter>"#,
+            r#"<emitter type="spot"><transform name="to_world">
+                <lookat origin="0,0,2" target="0,0,0" up="0,1,0"/></transform>
+                <rgb name="intensity" value="4"/></emitter>"#,
             [1.0; 3],
         ),
         (
-            r#"<emitter type="spot"><transform name="to_world"><lookat origin="0,0,2" target="2,0,0" up="0,1,0"/></transform><rgb name="intensity" value="4"/></emitter>"#,
+            r#"<emitter type="spot"><transform name="to_world">
+                <lookat origin="0,0,2" target="2,0,0" up="0,1,0"/></transform>
+                <rgb name="intensity" value="4"/></emitter>"#,
             [0.0; 3],
         ),
     ] {
@@ -49,8 +58,8 @@ fn surroundings_are_seen() {
     assert!(two.contains("line 3: a second emitter surrounds the scene"), "{two}");
 }
 
-/// The camera looks along −z of the scene, so sees the map where u is 0 between the last column and the first; turned by +90°
-/// about y, the map's +x comes to be there, at u = ¼.
+/// The camera looks along −z of the scene, so sees the map where u is 0 between the last column and the
+/// first; turned by +90° about y, the map's +x comes to be there, at u = ¼.
 #[test]
 fn maps_lie_as_in_mitsuba() {
     let columns: Vec<[f32; 3]> = (0..2 * 8).map(|i| [(i % 8) as f32, 0.0, 1.0]).collect();

@@ -9,11 +9,12 @@ fn folder() -> Folder {
         .with_exr("bright.exr", 1, &[[4.0, 2.0, -1.0]])
 }
 
-/// The rectangle from −1 to 1 shines with a texture, and the camera sees the middle of it, which is moved to (u, v) of 0…1
-/// from the lower left.
+/// The rectangle from −1 to 1 shines with a texture, and the camera sees the middle of it, which is moved to
+/// (u, v) of 0…1 from the lower left.
 fn shine(folder: &Folder, texture: &str, u: f32, v: f32) -> [f32; 3] {
     folder.see(&format!(
-        r#"<shape type="rectangle"><transform name="to_world"><translate x="{}" y="{}"/></transform><emitter type="area"><texture name="radiance" {texture}</texture></emitter></shape>"#,
+        r#"<shape type="rectangle"><transform name="to_world"><translate x="{}" y="{}"/></transform>
+            <emitter type="area"><texture name="radiance" {texture}</texture></emitter></shape>"#,
         1.0 - 2.0 * u,
         1.0 - 2.0 * v
     ))
@@ -38,15 +39,18 @@ fn bitmaps_lie_as_in_mitsuba() {
         (r#"<transform name="to_uv"><translate y="0.5"/></transform>"#, [GREY, WHITE, RED, GREEN]),
         (r#"<transform name="to_uv"><scale x="0.5"/></transform>"#, [RED, RED, GREY, GREY]),
         (
-            r#"<transform name="to_uv"><translate x="1"/></transform><string name="wrap_mode" value="clamp"/>"#,
+            r#"<transform name="to_uv"><translate x="1"/></transform>
+                <string name="wrap_mode" value="clamp"/>"#,
             [GREEN, GREEN, WHITE, WHITE],
         ),
         (
-            r#"<transform name="to_uv"><translate x="1"/></transform><string name="wrap_mode" value="mirror"/>"#,
+            r#"<transform name="to_uv"><translate x="1"/></transform>
+                <string name="wrap_mode" value="mirror"/>"#,
             [GREEN, RED, WHITE, GREY],
         ),
         (
-            r#"<transform name="to_uv"><rotate z="1" angle="90"/></transform><string name="wrap_mode" value="repeat"/>"#,
+            r#"<transform name="to_uv"><rotate z="1" angle="90"/></transform>
+                <string name="wrap_mode" value="repeat"/>"#,
             [GREEN, WHITE, RED, GREY],
         ),
     ] {
@@ -68,7 +72,8 @@ fn checkerboards_lie_as_in_mitsuba() {
     for ((u, v), want) in QUARTERS.into_iter().zip([0.4, 0.2, 0.2, 0.4]) {
         close(shine(&folder(), r#"type="checkerboard">"#, u, v), [want; 3], 1e-4, "checkerboard");
     }
-    let twice = r#"type="checkerboard"><rgb name="color0" value="1, 0, 0"/><transform name="to_uv"><scale x="2" y="2"/></transform>"#;
+    let twice = r#"type="checkerboard"><rgb name="color0" value="1, 0, 0"/><transform name="to_uv">
+        <scale x="2" y="2"/></transform>"#;
     close(shine(&folder(), twice, 0.125, 0.125), [1.0, 0.0, 0.0], 1e-4, "checkerboard");
     close(shine(&folder(), twice, 0.375, 0.125), [0.2; 3], 1e-4, "checkerboard");
     close(shine(&folder(), twice, 0.625, 0.125), [1.0, 0.0, 0.0], 1e-4, "checkerboard");
@@ -92,7 +97,10 @@ fn mesh_files_have_their_own_ways_up() {
         for ((u, v), want) in QUARTERS.into_iter().zip(want) {
             let (x, y) = (1.0 - 2.0 * u, 1.0 - 2.0 * v);
             let got = folder.see(&format!(
-                r#"<shape type="{file}"><string name="filename" value="a.{file}"/>{more}<transform name="to_world"><translate x="{x}" y="{y}"/></transform><emitter type="area"><texture name="radiance" {BITMAP}</texture></emitter></shape>"#
+                r#"<shape type="{file}">
+                    <string name="filename" value="a.{file}"/>{more}<transform name="to_world">
+                    <translate x="{x}" y="{y}"/></transform><emitter type="area">
+                    <texture name="radiance" {BITMAP}</texture></emitter></shape>"#
             ));
             close(got, want, 1e-3, &format!("{file} {more} {u} {v}"));
         }
@@ -101,7 +109,8 @@ fn mesh_files_have_their_own_ways_up() {
     for ((u, v), want) in QUARTERS.into_iter().zip([RED, GREEN, GREY, WHITE]) {
         let (y, x) = (1.0 - 2.0 * u, 1.0 - 2.0 * v);
         let got = folder.see(&format!(
-            r#"<shape type="cube"><transform name="to_world"><translate x="{x}" y="{y}"/></transform><emitter type="area"><texture name="radiance" {BITMAP}</texture></emitter></shape>"#
+            r#"<shape type="cube"><transform name="to_world"><translate x="{x}" y="{y}"/></transform>
+                <emitter type="area"><texture name="radiance" {BITMAP}</texture></emitter></shape>"#
         ));
         close(got, want, 1e-3, "cube");
     }
@@ -113,7 +122,8 @@ fn bright_pictures_shine_and_factors_are_clamped() {
     let bright = BITMAP.replace("a.png", "bright.exr");
     close(shine(&folder, &bright, 0.5, 0.5), [4.0, 2.0, 0.0], 1e-3, "light");
     let body = format!(
-        r#"<shape type="rectangle"><bsdf type="diffuse"><texture name="reflectance" {bright}</texture></bsdf></shape>{SKY}"#
+        r#"<shape type="rectangle"><bsdf type="diffuse"><texture name="reflectance" {bright}</texture>
+            </bsdf></shape>{SKY}"#
     );
     let loaded = folder.body(&body).unwrap();
     assert!(
@@ -121,7 +131,8 @@ fn bright_pictures_shine_and_factors_are_clamped() {
         "{:?}",
         loaded.warnings
     );
-    let body = r#"<shape type="rectangle"><bsdf type="conductor"><rgb name="specular_reflectance" value="1.5, 1, 0.5"/></bsdf></shape>"#;
+    let body = r#"<shape type="rectangle"><bsdf type="conductor">
+        <rgb name="specular_reflectance" value="1.5, 1, 0.5"/></bsdf></shape>"#;
     let loaded = folder.body(body).unwrap();
     assert!(loaded.warnings[0].to_string().contains("values above 1 become 1"));
     close(folder.see(&format!("{body}{SKY}")), [1.0, 1.0, 0.5], 1e-4, body);
@@ -131,7 +142,8 @@ fn bright_pictures_shine_and_factors_are_clamped() {
 fn in_the_sky(folder: &Folder, bsdf: &str) -> [[f32; 3]; 2] {
     ["0", "180"].map(|angle| {
         folder.see(&format!(
-            r#"<shape type="rectangle"><transform name="to_world"><rotate y="1" angle="{angle}"/></transform>{bsdf}</shape>{SKY}"#
+            r#"<shape type="rectangle"><transform name="to_world"><rotate y="1" angle="{angle}"/>
+                </transform>{bsdf}</shape>{SKY}"#
         ))
     })
 }
@@ -149,33 +161,59 @@ fn surfaces_reflect_a_white_sky_as_they_should() {
         (String::new(), [0.5; 3], black),
         (r#"<bsdf type="diffuse"/>"#.to_owned(), [0.5; 3], black),
         (format!(r#"<bsdf type="diffuse">{half}</bsdf>"#), [0.5, 0.25, 0.0], black),
-        (format!(r#"<bsdf type="twosided"><bsdf type="diffuse">{half}</bsdf></bsdf>"#), [0.5, 0.25, 0.0], [0.5, 0.25, 0.0]),
-        (r##"<bsdf type="diffuse"><srgb name="reflectance" value="#ffff00"/></bsdf>"##.to_owned(), [1.0, 1.0, 0.0], black),
+        (
+            format!(r#"<bsdf type="twosided"><bsdf type="diffuse">{half}</bsdf></bsdf>"#),
+            [0.5, 0.25, 0.0],
+            [0.5, 0.25, 0.0],
+        ),
+        (
+            r##"<bsdf type="diffuse"><srgb name="reflectance" value="#ffff00"/></bsdf>"##.to_owned(),
+            [1.0, 1.0, 0.0],
+            black,
+        ),
         (r#"<bsdf type="conductor"/>"#.to_owned(), white, black),
         (r#"<bsdf type="conductor"><string name="material" value="none"/></bsdf>"#.to_owned(), white, black),
         (format!(r#"<bsdf type="conductor">{metal}</bsdf>"#), copper, black),
         (format!(r#"<bsdf type="twosided"><bsdf type="conductor">{metal}</bsdf></bsdf>"#), copper, copper),
         (r#"<bsdf type="dielectric"/>"#.to_owned(), white, white),
-        (r#"<bsdf type="thindielectric"><string name="int_ior" value="diamond"/></bsdf>"#.to_owned(), white, white),
-        (r#"<bsdf type="mask"><float name="opacity" value="0.25"/><bsdf type="diffuse"><float name="reflectance" value="0"/></bsdf></bsdf>"#.to_owned(), [0.75; 3], [0.75; 3]),
-        (r#"<bsdf type="bumpmap"><texture type="bitmap"><string name="filename" value="no.png"/></texture><bsdf type="diffuse"/></bsdf>"#.to_owned(), [0.5; 3], black),
+        (
+            r#"<bsdf type="thindielectric"><string name="int_ior" value="diamond"/></bsdf>"#.to_owned(),
+            white,
+            white,
+        ),
+        (
+            r#"<bsdf type="mask"><float name="opacity" value="0.25"/><bsdf type="diffuse">
+            <float name="reflectance" value="0"/></bsdf></bsdf>"#
+                .to_owned(),
+            [0.75; 3],
+            [0.75; 3],
+        ),
+        (
+            r#"<bsdf type="bumpmap"><texture type="bitmap"><string name="filename" value="no.png"/></texture>
+            <bsdf type="diffuse"/></bsdf>"#
+                .to_owned(),
+            [0.5; 3],
+            black,
+        ),
     ] {
         let [seen, seen_behind] = in_the_sky(&folder, &bsdf);
         // 4096 samples of values in 0…1 are within 0.03 of their mean but once in 10⁴
         close(seen, front, 0.06, &bsdf);
         close(seen_behind, behind, 0.06, &bsdf);
     }
-    // What a white coat or a rough mirror reflects of a white sky, in Mitsuba 3.9.1; how far the renderer's rough coat is
-    // from that is a matter of its own tests
+    // What a white coat or a rough mirror reflects of a white sky, in Mitsuba 3.9.1; how far the renderer's
+    // rough coat is from that is a matter of its own tests
     for (bsdf, want, tolerance) in [
         (r#"<bsdf type="plastic"><rgb name="diffuse_reflectance" value="1"/></bsdf>"#, 1.0, 0.05),
         (
-            r#"<bsdf type="roughplastic"><rgb name="diffuse_reflectance" value="1"/><string name="distribution" value="ggx"/><boolean name="nonlinear" value="true"/></bsdf>"#,
+            r#"<bsdf type="roughplastic"><rgb name="diffuse_reflectance" value="1"/>
+                <string name="distribution" value="ggx"/><boolean name="nonlinear" value="true"/></bsdf>"#,
             0.910,
             0.1,
         ),
         (
-            r#"<bsdf type="roughconductor"><float name="alpha" value="0.05"/><string name="distribution" value="ggx"/></bsdf>"#,
+            r#"<bsdf type="roughconductor"><float name="alpha" value="0.05"/>
+                <string name="distribution" value="ggx"/></bsdf>"#,
             0.998,
             0.05,
         ),
@@ -206,7 +244,9 @@ fn masks_take_the_luminance_of_pictures() {
     for ((u, v), opacity) in QUARTERS.into_iter().zip([0.2126, 0.7152, 0.2159, 1.0]) {
         let (x, y) = (1.0 - 2.0 * u, 1.0 - 2.0 * v);
         let seen = folder.see(&format!(
-            r#"<shape type="rectangle"><transform name="to_world"><translate x="{x}" y="{y}"/></transform><bsdf type="mask"><texture name="opacity" {BITMAP}</texture><bsdf type="twosided"><bsdf type="diffuse"><float name="reflectance" value="0"/></bsdf></bsdf></bsdf></shape>{SKY}"#
+            r#"<shape type="rectangle"><transform name="to_world"><translate x="{x}" y="{y}"/></transform>
+                <bsdf type="mask"><texture name="opacity" {BITMAP}</texture><bsdf type="twosided">
+                <bsdf type="diffuse"><float name="reflectance" value="0"/></bsdf></bsdf></bsdf></shape>{SKY}"#
         ));
         // Four standard deviations of 4096 samples
         assert!((seen[0] - (1.0 - opacity)).abs() < 0.03, "{u} {v}: {seen:?}");

@@ -7,13 +7,16 @@ fn sensor(version: &str, inside: &str) -> Result<noisefloor_scenefile::Loaded, S
 
 #[test]
 fn fields_of_view_are_those_of_mitsuba() {
-    let film = r#"<film type="hdrfilm"><integer name="width" value="300"/><integer name="height" value="200"/><rfilter type="box"/></film>"#;
+    let film = r#"<film type="hdrfilm"><integer name="width" value="300"/>
+        <integer name="height" value="200"/><rfilter type="box"/></film>"#;
     // Horizontal ones, as Mitsuba 3.9.1 tells them
     for (axis, horizontal) in
         [("x", 40.0), ("y", 57.265_14), ("diagonal", 33.696_983), ("smaller", 57.265_14), ("larger", 40.0f32)]
     {
         let text = format!(
-            r#"<float name="fov" value="40"/><string name="fov_axis" value="{axis}"/>{film}<sampler type="independent"><integer name="sample_count" value="4"/></sampler><float name="near_clip" value="1"/>"#
+            r#"<float name="fov" value="40"/>
+                <string name="fov_axis" value="{axis}"/>{film}<sampler type="independent">
+                <integer name="sample_count" value="4"/></sampler><float name="near_clip" value="1"/>"#
         );
         let loaded = sensor("3.0.0", &text).unwrap();
         let vertical = 2.0 * ((0.5 * horizontal.to_radians()).tan() * 200.0 / 300.0).atan().to_degrees();
@@ -110,7 +113,10 @@ fn mirrored_and_unknown_cameras_are_refused() {
     assert!(
         folder.load(&two).unwrap().warnings[0].to_string().ends_with("line 2: only the first sensor is used")
     );
-    let lens = folder.load("<scene version=\"3.0.0\"><sensor type=\"thinlens\"><float name=\"aperture_radius\" value=\"1\"/></sensor></scene>");
+    let lens = folder.load(
+        "<scene version=\"3.0.0\"><sensor type=\"thinlens\">\
+        <float name=\"aperture_radius\" value=\"1\"/></sensor></scene>",
+    );
     assert_eq!(lens.unwrap().warnings.len(), 1);
 }
 
@@ -121,14 +127,16 @@ fn path_lengths_are_read() {
         ("", None),
         (r#"<integrator type="path"/>"#, None),
         (
-            r#"<integrator type="path"><integer name="max_depth" value="-1"/><integer name="rr_depth" value="3"/></integrator>"#,
+            r#"<integrator type="path"><integer name="max_depth" value="-1"/>
+                <integer name="rr_depth" value="3"/></integrator>"#,
             None,
         ),
         (r#"<integrator type="path"><integer name="max_depth" value="7"/></integrator>"#, Some(7)),
         (r#"<integrator type="volpath"><integer name="max_depth" value="1"/></integrator>"#, Some(1)),
         (r#"<integrator type="direct"/>"#, Some(2)),
         (
-            r#"<integrator type="aov"><string name="aovs" value="dd.y:depth"/><integrator type="path"><integer name="max_depth" value="4"/></integrator></integrator>"#,
+            r#"<integrator type="aov"><string name="aovs" value="dd.y:depth"/><integrator type="path">
+                <integer name="max_depth" value="4"/></integrator></integrator>"#,
             Some(4),
         ),
     ] {
@@ -169,7 +177,8 @@ fn references_may_come_first_and_must_not_go_round() {
     let body = &body[..body.find("<emitter type=\"area\" id").unwrap()];
     close(folder.see(body), [0.5; 3], 1e-5, body);
 
-    let round = r#"<bsdf type="twosided" id="a"><ref id="b"/></bsdf><bsdf type="mask" id="b"><ref id="a"/></bsdf><shape type="cube"><ref id="a"/></shape>"#;
+    let round = r#"<bsdf type="twosided" id="a"><ref id="b"/></bsdf><bsdf type="mask" id="b"><ref id="a"/>
+        </bsdf><shape type="cube"><ref id="a"/></shape>"#;
     assert!(folder.body(round).unwrap_err().contains("<bsdf type=\"twosided\" id=\"a\"> refers to itself"));
     assert!(
         folder
@@ -191,7 +200,8 @@ fn references_may_come_first_and_must_not_go_round() {
     ));
     assert!(error.unwrap_err().contains("17 nested surfaces, more than 16"));
     // In a texture that is referred to, what is not read is warned of
-    let texture = r#"<texture type="checkerboard" id="t"><float name="x" value="1"/></texture><shape type="cube"><bsdf type="diffuse"><ref name="reflectance" id="t"/></bsdf></shape>"#;
+    let texture = r#"<texture type="checkerboard" id="t"><float name="x" value="1"/></texture>
+        <shape type="cube"><bsdf type="diffuse"><ref name="reflectance" id="t"/></bsdf></shape>"#;
     assert!(folder.body(texture).unwrap().warnings[0].to_string().ends_with("<float name=\"x\"> is ignored"));
     // What nobody refers to is neither read nor warned of
     assert_eq!(folder.body(r#"<bsdf type="unheard-of" id="a"/>"#).unwrap().warnings, []);
@@ -201,7 +211,9 @@ fn references_may_come_first_and_must_not_go_round() {
 fn old_names_are_read_in_old_files() {
     let scene = |version: &str, to_world: &str, unit: &str| {
         format!(
-            r#"<scene version="{version}">{}<shape type="rectangle"><transform name="{to_world}"><scale value="3"/></transform><boolean name="{unit}" value="true"/><bsdf type="diffuse"/><emitter type="area"><spectrum name="radiance" value="2"/></emitter></shape></scene>"#,
+            r#"<scene version="{version}">{}<shape type="rectangle"><transform name="{to_world}">
+                <scale value="3"/></transform><boolean name="{unit}" value="true"/><bsdf type="diffuse"/>
+                <emitter type="area"><spectrum name="radiance" value="2"/></emitter></shape></scene>"#,
             CAMERA.replace("to_world", to_world)
         )
     };

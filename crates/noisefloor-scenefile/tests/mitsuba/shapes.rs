@@ -13,7 +13,8 @@ fn folder() -> Folder {
         .with("bare.ply", ply)
 }
 
-/// Which side shines, as Mitsuba 3.9.1 has it: from shading normals where there are any, from the corners where not.
+/// Which side shines, as Mitsuba 3.9.1 has it: from shading normals where there are any, from the corners
+/// where not.
 #[test]
 fn fronts_are_those_of_mitsuba() {
     let folder = folder();
@@ -79,7 +80,8 @@ fn shapes_have_the_sizes_of_mitsuba() {
     let folder = Folder::new();
     let moved = |shape: &str, x: f32, y: f32| {
         let body = format!(
-            r#"<shape type="{shape}"><transform name="to_world"><translate x="{x}" y="{y}"/></transform>{LIGHT}</shape>"#
+            r#"<shape type="{shape}"><transform name="to_world"><translate x="{x}" y="{y}"/>
+                </transform>{LIGHT}</shape>"#
         );
         folder.see(&body) == [1.0, 2.0, 3.0]
     };
@@ -97,7 +99,9 @@ fn shapes_have_the_sizes_of_mitsuba() {
     }
     let ball = |to_world: &str| {
         let body = format!(
-            r#"<shape type="sphere"><point name="center" x="1" y="2" z="3"/><float name="radius" value="0.5"/><transform name="to_world">{to_world}</transform>{LIGHT}</shape>"#
+            r#"<shape type="sphere"><point name="center" x="1" y="2" z="3"/>
+                <float name="radius" value="0.5"/>
+                <transform name="to_world">{to_world}</transform>{LIGHT}</shape>"#
         );
         folder.see(&body) == [1.0, 2.0, 3.0]
     };
@@ -123,7 +127,10 @@ fn spheres_inside_out_are_glass_of_the_reciprocal_index_or_refused() {
     // Reflection alone, 53° from the normal: total in a bubble, past asin(1/1.5) = 42°, and little on a ball
     let reflected = |flip: &str| {
         folder.see(&format!(
-            r#"<shape type="sphere">{flip}<transform name="to_world"><translate x="0.8"/></transform><bsdf type="dielectric"><float name="int_ior" value="1.5"/><float name="ext_ior" value="1"/><float name="specular_transmittance" value="0"/></bsdf></shape><emitter type="constant"/>"#
+            r#"<shape type="sphere">{flip}<transform name="to_world"><translate x="0.8"/></transform>
+                <bsdf type="dielectric"><float name="int_ior" value="1.5"/>
+                <float name="ext_ior" value="1"/><float name="specular_transmittance" value="0"/></bsdf>
+                </shape><emitter type="constant"/>"#
         ))
     };
     close(reflected(flip), [1.0; 3], 1e-3, "bubble");

@@ -1,6 +1,6 @@
 //! PLY, text and binary: positions, normals, texture coordinates and faces; all else is left out.
 
-use super::mesh::Triangles;
+use super::Triangles;
 use crate::error::{LoadError, Place};
 use ply_rs_bw::parser::{Parser, Reader};
 use ply_rs_bw::ply::{
@@ -15,7 +15,7 @@ const MAX_MESSAGE: usize = 200;
 ///
 /// # Errors
 /// [`LoadError::Bad`] if the file is cut short or corrupt, or its header asks for more than the file holds.
-pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<Triangles, LoadError> {
+pub(crate) fn parse(bytes: &[u8], path: &Path) -> Result<Triangles, LoadError> {
     let place = Place::file(path);
     // Its messages repeat whole lines, however long
     let bad = |e: ply_rs_bw::parser::ParseError| {
@@ -41,33 +41,11 @@ pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<Triangles, LoadError> {
             "vertex" => {
                 let vertices =
                     Parser::<Vertex>::new().read_payload_for_element(&mut reader, element, &header);
-                let has = |names: [&str; 2]| names.iter().all(|name| element.properties.contains_key(*name));
-                let uvs = has(["u", "v"]) || has(["s", "t"]);
-                let normals = has(["nx", "ny"]) && has(["ny", "nz"]);
-                if !(has(["x", "y"]) && has(["y", "z"])) {
-                    return Err(place.clone().bad("its vertices have no x, y and z"));
-                }
-                for vertex in vertices.map_err(bad)? {
-                    mesh.positions.push(vertex.position);
-                    if normals {
-                        mesh.normals.push(vertex.normal);
-                    }
-                    if uvs {
-                        mesh.uvs.push(vertex.uv);
-                    }
-                }
+                add_vertices(&mut mesh, element, &vertices.map_err(bad)?, &place)?;
             }
             "face" => {
                 let faces = Parser::<Face>::new().read_payload_for_element(&mut reader, element, &header);
-                for (index, face) in faces.map_err(bad)?.iter().enumerate() {
-                    let Some(corners) = face.corners.as_deref().filter(|corners| corners.len() >= 3) else {
-                        let what = format!("face {index} has no `vertex_indices`, or fewer than 3");
-                        return Err(place.clone().bad(what));
-                    };
-                    for pair in corners[1..].windows(2) {
-                        mesh.indices.push([corners[0], pair[0], pair[1]]);
-                    }
-                }
+                add_faces(&mut mesh, &faces.map_err(bad)?, &place)?;
             }
             _ => {
                 let skipped =
@@ -77,6 +55,39 @@ pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<Triangles, LoadError> {
         }
     }
     Ok(mesh)
+}
+
+fn add_vertices(
+    mesh: &mut Triangles,
+    element: &ElementDef,
+    vertices: &[Vertex],
+    place: &Place,
+) -> Result<(), LoadError> {
+    let has = |names: &[&str]| names.iter().all(|name| element.properties.contains_key(*name));
+    if !has(&["x", "y", "z"]) {
+        return Err(place.clone().bad("its vertices have no x, y and z"));
+    }
+    mesh.positions.extend(vertices.iter().map(|v| v.position));
+    if has(&["nx", "ny", "nz"]) {
+        mesh.normals.extend(vertices.iter().map(|v| v.normal));
+    }
+    if has(&["u", "v"]) || has(&["s", "t"]) {
+        mesh.uvs.extend(vertices.iter().map(|v| v.uv));
+    }
+    Ok(())
+}
+
+fn add_faces(mesh: &mut Triangles, faces: &[Face], place: &Place) -> Result<(), LoadError> {
+    for (index, face) in faces.iter().enumerate() {
+        let Some(corners) = face.corners.as_deref().filter(|corners| corners.len() >= 3) else {
+            let what = format!("face {index} has no `vertex_indices`, or fewer than 3");
+            return Err(place.clone().bad(what));
+        };
+        for pair in corners[1..].windows(2) {
+            mesh.indices.push([corners[0], pair[0], pair[1]]);
+        }
+    }
+    Ok(())
 }
 
 /// The fewest bytes that an element takes.

@@ -1,19 +1,23 @@
-//! Triangles between a mesh file and the renderer.
+//! Triangle meshes, from their files to the renderer.
+
+pub(crate) mod obj;
+pub(crate) mod ply;
+pub(crate) mod serialized;
 
 use crate::error::{LoadError, Place};
 use glam::{DMat3, DMat4, DVec3, Vec3};
 
 /// Indexed triangles. Normals and texture coordinates are one a position, or none.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Triangles {
+pub(crate) struct Triangles {
     /// Corners.
-    pub(super) positions: Vec<[f32; 3]>,
+    pub(crate) positions: Vec<[f32; 3]>,
     /// Shading normals, of any length; 0 where there is none.
-    pub(super) normals: Vec<[f32; 3]>,
+    pub(crate) normals: Vec<[f32; 3]>,
     /// Texture coordinates.
-    pub(super) uvs: Vec<[f32; 2]>,
+    pub(crate) uvs: Vec<[f32; 2]>,
     /// Corners of each triangle; the front is where they run counter-clockwise.
-    pub(super) indices: Vec<[u32; 3]>,
+    pub(crate) indices: Vec<[u32; 3]>,
 }
 
 impl Triangles {
@@ -21,7 +25,7 @@ impl Triangles {
     ///
     /// # Errors
     /// [`LoadError::Bad`] at `place`.
-    pub(super) fn check(&self, place: &Place) -> Result<(), LoadError> {
+    pub(crate) fn check(&self, place: &Place) -> Result<(), LoadError> {
         let count = self.positions.len();
         if let Some(face) = self.indices.iter().position(|t| t.iter().any(|i| *i as usize >= count)) {
             let triangle = self.indices[face];
@@ -39,7 +43,7 @@ impl Triangles {
     }
 
     /// Moves positions and normals.
-    pub(super) fn transform(&mut self, to_world: DMat4) {
+    pub(crate) fn transform(&mut self, to_world: DMat4) {
         for position in &mut self.positions {
             *position =
                 to_world.transform_point3(Vec3::from_array(*position).as_dvec3()).as_vec3().to_array();
@@ -51,9 +55,9 @@ impl Triangles {
         }
     }
 
-    /// Gives each vertex the mean of the normals of its triangles, weighted by their angles there (Thürmer and Wüthrich
-    /// 1998), as Mitsuba does for meshes without normals.
-    pub(super) fn smooth(&mut self) {
+    /// Gives each vertex the mean of the normals of its triangles, weighted by their angles there (Thürmer
+    /// and Wüthrich 1998), as Mitsuba does for meshes without normals.
+    pub(crate) fn smooth(&mut self) {
         let mut sums = vec![Vec3::ZERO; self.positions.len()];
         for triangle in &self.indices {
             let corners = triangle.map(|i| Vec3::from_array(self.positions[i as usize]));
@@ -69,9 +73,9 @@ impl Triangles {
         self.normals = sums.iter().map(|sum| sum.normalize_or_zero().to_array()).collect();
     }
 
-    /// Turns the triangles whose corners run the other way than their normals point: what is the front, for reflection and
-    /// for emission, Mitsuba tells by the shading normals.
-    pub(super) fn face_normals_outwards(&mut self) {
+    /// Turns the triangles whose corners run the other way than their normals point: what is the front, for
+    /// reflection and for emission, Mitsuba tells by the shading normals.
+    pub(crate) fn face_normals_outwards(&mut self) {
         for triangle in &mut self.indices {
             let at = |rows: &[[f32; 3]]| triangle.map(|i| Vec3::from_array(rows[i as usize]));
             let [a, b, c] = at(&self.positions);
@@ -83,7 +87,7 @@ impl Triangles {
     }
 
     /// Exchanges front and back.
-    pub(super) fn flip(&mut self) {
+    pub(crate) fn flip(&mut self) {
         for normal in &mut self.normals {
             *normal = normal.map(|x| -x);
         }
@@ -93,9 +97,9 @@ impl Triangles {
     }
 }
 
-/// The matrix that takes normals along: the inverse transpose of the upper left 3×3, but for a positive factor. It is had from
-/// cofactors, so that it exists where a transform flattens, too.
-pub(super) fn normal_matrix(to_world: DMat4) -> DMat3 {
+/// The matrix that takes normals along: the inverse transpose of the upper left 3×3, but for a positive
+/// factor. It is had from cofactors, so that it exists where a transform flattens, too.
+pub(crate) fn normal_matrix(to_world: DMat4) -> DMat3 {
     let [x, y, z] = [to_world.x_axis, to_world.y_axis, to_world.z_axis].map(|axis| axis.truncate());
     let sign = if x.cross(y).dot(z) < 0.0 { -1.0 } else { 1.0 };
     let column = |a: DVec3, b: DVec3| a.cross(b) * sign;

@@ -1,6 +1,6 @@
 //! Mitsuba's own mesh files: deflated meshes one after another, and a table of where each starts.
 
-use super::mesh::Triangles;
+use super::Triangles;
 use crate::error::{LoadError, Place};
 use flate2::read::ZlibDecoder;
 use std::io::Read;
@@ -22,12 +22,13 @@ const FACE_NORMALS: u32 = 0x10;
 const SINGLE: u32 = 0x1000;
 const DOUBLE: u32 = 0x2000;
 
-/// Reads mesh number `index`, from 0, of the file `bytes`, which came from `path`. The second result is whether the mesh asks
-/// for flat faces.
+/// Reads mesh number `index`, from 0, of the file `bytes`, which came from `path`. The second result is
+/// whether the mesh asks for flat faces.
 ///
 /// # Errors
-/// [`LoadError`] if there is no such mesh, or the file is cut short, corrupt, of another version than 3 and 4, or too large.
-pub(super) fn parse(bytes: &[u8], index: usize, path: &Path) -> Result<(Triangles, bool), LoadError> {
+/// [`LoadError`] if there is no such mesh, or the file is cut short, corrupt, of another version than 3 and
+/// 4, or too large.
+pub(crate) fn parse(bytes: &[u8], index: usize, path: &Path) -> Result<(Triangles, bool), LoadError> {
     let place = Place::part(path, format_args!("mesh {index}"));
     let bad = |what: &str| place.clone().bad(what);
     let version = version(bytes, &place)?;

@@ -1,10 +1,11 @@
 //! Wavefront OBJ: positions, normals, texture coordinates and faces; all else is left out.
 //!
-//! Read here and not by a crate: tobj 4.0.5 panics where a texture coordinate or normal is out of range (in builds that check
-//! for overflow; in others it takes the wrong one), gives vertices the normals of others where some corners have none, and
-//! does not say on which line an error is. To check a file before tobj sees it takes as much code as to read it.
+//! Read here and not by a crate: tobj 4.0.5 panics where a texture coordinate or normal is out of range (in
+//! builds that check for overflow; in others it takes the wrong one), gives vertices the normals of others
+//! where some corners have none, and does not say on which line an error is. To check a file before tobj sees
+//! it takes as much code as to read it.
 
-use super::mesh::Triangles;
+use super::Triangles;
 use crate::error::{LoadError, Place};
 use std::collections::HashMap;
 use std::path::Path;
@@ -12,12 +13,12 @@ use std::path::Path;
 /// Position, texture coordinates and normal of a corner, as indices.
 type Corner = (u32, Option<u32>, Option<u32>);
 
-/// Reads the OBJ file `bytes`, which came from `path`. Polygons become fans. Corners that agree in all their indices become
-/// one vertex. Where some corners have no normal or texture coordinates, these are 0.
+/// Reads the OBJ file `bytes`, which came from `path`. Polygons become fans. Corners that agree in all their
+/// indices become one vertex. Where some corners have no normal or texture coordinates, these are 0.
 ///
 /// # Errors
 /// [`LoadError::Bad`] if a number or an index is.
-pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<Triangles, LoadError> {
+pub(crate) fn parse(bytes: &[u8], path: &Path) -> Result<Triangles, LoadError> {
     // Names and comments may be in any encoding
     let text = String::from_utf8_lossy(bytes);
     let mut reader = Reader {
