@@ -1,37 +1,38 @@
-//! Loads every scene file under some folders: `survey FOLDER…`. Prints one line a file, its outcome first, and a
-//! count by outcome at the end.
+//! Loads every scene file under some folders: `survey FOLDER…`. Prints a line for each file, and a count at the end. A
+//! scene may name files anywhere in its folder of the command line; volumes are left out.
 
 #![expect(clippy::print_stdout, reason = "a table for people")]
 
+use noisefloor_scenefile::{LoadOptions, group_warnings, load_with};
 use std::error::Error;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let mut files = Vec::new();
-    for folder in std::env::args().skip(1) {
-        collect(Path::new(&folder), &mut files)?;
-    }
-    files.sort();
     let (mut loaded, mut refused) = (0, 0);
-    for file in &files {
-        let start = Instant::now();
-        let outcome = match noisefloor_scenefile::load(file) {
-            Ok(scene) => {
-                loaded += 1;
-                format!("loaded\t{} surfaces, {} warnings", scene.scene.surfaces(), scene.warnings.len())
-            }
-            Err(error) => {
-                refused += 1;
-                format!("refused\t{}", with_causes(&error))
-            }
-        };
-        println!(
-            "{}\t{:.1} s\t{}",
-            file.display(),
-            start.elapsed().as_secs_f64(),
-            outcome.replace('\n', " | ")
-        );
+    for folder in std::env::args().skip(1) {
+        let mut files = Vec::new();
+        collect(Path::new(&folder), &mut files)?;
+        files.sort();
+        let mut options = LoadOptions::default();
+        options.ignore_volumes = true;
+        options.root = Path::new(&folder).is_dir().then(|| folder.clone().into());
+        for file in &files {
+            let start = Instant::now();
+            let (outcome, findings) = match load_with(file, &options) {
+                Ok(scene) => {
+                    loaded += 1;
+                    ("loaded", group_warnings(&scene.warnings))
+                }
+                Err(error) => {
+                    refused += 1;
+                    ("refused", error.findings())
+                }
+            };
+            let findings: Vec<String> = findings.into_iter().map(|f| f.what).collect();
+            let seconds = start.elapsed().as_secs_f64();
+            println!("{}\t{seconds:.1} s\t{outcome}\t{}", file.display(), findings.join(" | "));
+        }
     }
     println!("{loaded} loaded, {refused} refused");
     Ok(())
@@ -58,15 +59,4 @@ fn collect(folder: &Path, files: &mut Vec<PathBuf>) -> std::io::Result<()> {
         }
     }
     Ok(())
-}
-
-/// An error and its causes.
-fn with_causes(error: &dyn Error) -> String {
-    let mut message = error.to_string();
-    let mut cause = error.source();
-    while let Some(error) = cause {
-        message += &format!(": {error}");
-        cause = error.source();
-    }
-    message
 }

@@ -1,9 +1,10 @@
 //! What can be wrong with a scene file.
 
 use noisefloor_ptwne::SceneError;
+use std::collections::{HashMap, HashSet};
+use std::error::Error;
 use std::fmt;
 use std::path::{Path, PathBuf};
-use thiserror::Error;
 
 /// Where in a file something is.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -52,13 +53,40 @@ impl Place {
     }
 }
 
-/// Something in a file that the renderer does without.
+/// What becomes of something in a file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[non_exhaustive]
+pub enum Treatment {
+    /// It stops the load.
+    Refused,
+    /// It is replaced by something that looks much the same.
+    Approximated,
+    /// It is left out.
+    Ignored,
+}
+
+/// Something in a file that the renderer leaves out or replaces.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Warning {
     /// Where.
     pub place: Place,
-    /// What was ignored, or by what it was replaced.
+    /// Whether it is left out or replaced.
+    pub treatment: Treatment,
+    /// What is left out, or by what it is replaced.
     pub what: String,
+}
+
+impl Warning {
+    /// Something at `place` is left out.
+    pub(crate) fn ignored(place: Place, what: impl fmt::Display) -> Self {
+        Self { place, treatment: Treatment::Ignored, what: what.to_string() }
+    }
+
+    /// Something at `place` is replaced.
+    pub(crate) fn approximated(place: Place, what: impl fmt::Display) -> Self {
+        Self { place, treatment: Treatment::Approximated, what: what.to_string() }
+    }
 }
 
 impl fmt::Display for Warning {
@@ -67,11 +95,65 @@ impl fmt::Display for Warning {
     }
 }
 
+/// The same thing in one or more places.
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct Finding {
+    /// What becomes of it.
+    pub treatment: Treatment,
+    /// What it is.
+    pub what: String,
+    /// Where it is, in the order of the file.
+    pub places: Vec<Place>,
+}
+
+/// Most places that the text of a finding lists.
+const LISTED_PLACES: usize = 5;
+
+impl fmt::Display for Finding {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.places.as_slice() {
+            [] => write!(f, "{}", self.what),
+            [place] => write!(f, "{place}: {}", self.what),
+            places => {
+                write!(f, "{} ({} times: {}", self.what, places.len(), places[0])?;
+                for (before, place) in places.iter().zip(&places[1..]).take(LISTED_PLACES - 1) {
+                    match &place.part {
+                        Some(part) if place.path == before.path => write!(f, ", {part}")?,
+                        _ => write!(f, ", {place}")?,
+                    }
+                }
+                f.write_str(if places.len() > LISTED_PLACES { ", …)" } else { ")" })
+            }
+        }
+    }
+}
+
+/// Groups warnings that say the same: most important first, then in the order in which they came up.
+pub fn group_warnings(warnings: &[Warning]) -> Vec<Finding> {
+    group(warnings.iter().map(|w| (w.treatment, w.what.clone(), Some(w.place.clone()))))
+}
+
+fn group(all: impl Iterator<Item = (Treatment, String, Option<Place>)>) -> Vec<Finding> {
+    let mut findings: Vec<Finding> = Vec::new();
+    let mut known: HashMap<(Treatment, String), usize> = HashMap::new();
+    for (treatment, what, place) in all {
+        let index = *known.entry((treatment, what.clone())).or_insert_with(|| {
+            findings.push(Finding { treatment, what, places: vec![] });
+            findings.len() - 1
+        });
+        findings[index].places.extend(place);
+    }
+    findings.sort_by_key(|finding| finding.treatment);
+    findings
+}
+
 /// Why a scene file cannot be loaded.
-#[derive(Debug, Error)]
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum LoadError {
     /// The extension is not one of a scene file.
-    #[error("{} is not a scene file: its name must end in .gltf, .glb or .xml", path.display())]
+    #[error("{} is not a scene file: its name must end in .gltf, .glb, .pbrt or .xml", path.display())]
     Format {
         /// The file.
         path: PathBuf,
@@ -130,4 +212,94 @@ pub enum LoadError {
         #[source]
         cause: SceneError,
     },
+    /// More than one thing is wrong.
+    #[error("{}", several(.0))]
+    Several(Vec<LoadError>),
+}
+
+impl LoadError {
+    /// All that is wrong: errors that say the same are one finding.
+    pub fn findings(&self) -> Vec<Finding> {
+        match self {
+            Self::Several(errors) => group(errors.iter().map(LoadError::finding)),
+            one => group(std::iter::once(one.finding())),
+        }
+    }
+
+    fn finding(&self) -> (Treatment, String, Option<Place>) {
+        let (place, what) = match self {
+            Self::Format { .. } | Self::Several(_) => (None, self.to_string()),
+            Self::Bad { place, what } => (Some(place), what.clone()),
+            Self::Unsupported { place, what } => (Some(place), format!("{what} is not supported")),
+            Self::Outside { place, name } => {
+                (Some(place), format!("`{name}` lies outside the folder of the scene"))
+            }
+            Self::TooLarge { place, what, found, limit } => {
+                (Some(place), format!("{found} {what}, more than {limit}"))
+            }
+            Self::Read { place, cause } => (Some(place), format!("cannot be read: {cause}")),
+            Self::Scene { place, cause } => (Some(place), with_causes(cause)),
+        };
+        (Treatment::Refused, what, place.cloned())
+    }
+}
+
+/// The message of an error and those of its causes.
+fn with_causes(error: &dyn Error) -> String {
+    let mut message = error.to_string();
+    let mut cause = error.source();
+    while let Some(error) = cause {
+        message += &format!(": {error}");
+        cause = error.source();
+    }
+    message
+}
+
+/// A line for each group of errors.
+fn several(errors: &[LoadError]) -> String {
+    let findings = group(errors.iter().map(LoadError::finding));
+    let lines: Vec<String> = findings.iter().map(ToString::to_string).collect();
+    lines.join("\n")
+}
+
+/// Collects errors, so that one load says all that is wrong.
+#[derive(Debug, Default)]
+pub(crate) struct Errors {
+    errors: Vec<LoadError>,
+    seen: HashSet<String>,
+}
+
+/// Most errors that are collected.
+const MAX_ERRORS: usize = 1000;
+
+impl Errors {
+    /// Keeps the error, if it is one, and goes on.
+    ///
+    /// # Errors
+    /// All errors so far if something was too large, or if they are too many.
+    pub(crate) fn take<T>(&mut self, result: Result<T, LoadError>) -> Result<Option<T>, LoadError> {
+        match result {
+            Ok(value) => Ok(Some(value)),
+            Err(error) => {
+                let stop = matches!(error, LoadError::TooLarge { .. }) || self.errors.len() >= MAX_ERRORS;
+                // Many shapes can wear one broken material
+                if self.seen.insert(with_causes(&error)) {
+                    self.errors.push(error);
+                }
+                if stop { Err(std::mem::take(self).into_error()) } else { Ok(None) }
+            }
+        }
+    }
+
+    /// Whether all went well.
+    ///
+    /// # Errors
+    /// What was collected.
+    pub(crate) fn finish(self) -> Result<(), LoadError> {
+        if self.errors.is_empty() { Ok(()) } else { Err(self.into_error()) }
+    }
+
+    fn into_error(mut self) -> LoadError {
+        if self.errors.len() == 1 { self.errors.remove(0) } else { LoadError::Several(self.errors) }
+    }
 }

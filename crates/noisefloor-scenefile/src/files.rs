@@ -7,50 +7,93 @@ use std::path::{Component, Path, PathBuf};
 
 /// Longest mesh or picture that is read, in bytes.
 pub(crate) const MAX_FILE_BYTES: u64 = 1 << 28;
+/// Most folders that a scene may add to those where its files are looked for.
+const MAX_FOLDERS: u64 = 64;
 
-/// The folder of a scene file. Nothing outside it is read.
+/// Where the files are that a scene names. Nothing outside one folder is read.
 #[derive(Debug)]
 pub(crate) struct Folder {
-    path: PathBuf,
+    /// The folder that nothing may leave.
+    root: PathBuf,
+    /// The scene's own folder, and those that it adds.
+    searched: Vec<PathBuf>,
 }
 
 impl Folder {
-    /// The folder that holds `scene`.
-    pub(crate) fn of(scene: &Path) -> Self {
+    /// The folder that holds `scene`. Its files must lie in `root`, by default in that same folder.
+    pub(crate) fn of(scene: &Path, root: Option<&Path>) -> Self {
         let path = match scene.parent() {
             Some(parent) if parent != Path::new("") => parent.to_owned(),
             _ => PathBuf::from("."),
         };
-        Self { path }
+        Self { root: root.map_or_else(|| path.clone(), Path::to_owned), searched: vec![path] }
     }
 
-    /// The file called `name` at `place`.
+    /// Adds a folder, relative to the scene's own, in which to look for files.
     ///
     /// # Errors
-    /// [`LoadError::Outside`] if the name, or a link on the way, leads out of the folder; [`LoadError::Read`]
-    /// if there is no such file.
+    /// As [`Self::find`].
+    pub(crate) fn search(&mut self, name: &str, place: &Place) -> Result<(), LoadError> {
+        place.clone().at_most("search paths", self.searched.len() as u64, MAX_FOLDERS)?;
+        let path = self.find(name, place)?;
+        self.searched.push(path);
+        Ok(())
+    }
+
+    /// The file called `name` at `place`: the first there is, as seen from the scene's folder and those added to it.
+    /// Backslashes separate folders, too.
+    ///
+    /// # Errors
+    /// [`LoadError::Outside`] if the name, or a link on the way, leads out of the root; [`LoadError::Read`] if there is no
+    /// such file.
     pub(crate) fn find(&self, name: &str, place: &Place) -> Result<PathBuf, LoadError> {
         let outside = || LoadError::Outside { place: place.clone(), name: name.to_owned() };
-        let read = |cause| LoadError::Read { place: place.clone(), cause };
+        let failed = |cause| LoadError::Read { place: place.clone(), cause };
+        let name = name.trim().replace('\\', "/");
+        let relative = Path::new(&name);
 
         // Names, whether or not the files exist
-        let mut depth = 0u32;
-        for component in Path::new(name).components() {
+        let mut first_missing = None;
+        for folder in &self.searched {
+            if !self.stays_inside(folder, relative) {
+                continue;
+            }
+            // Links
+            let path = folder.join(relative);
+            match path.canonicalize() {
+                Ok(real) => {
+                    let root = self.root.canonicalize().map_err(failed)?;
+                    return if real.starts_with(root) { Ok(path) } else { Err(outside()) };
+                }
+                Err(cause) => first_missing = first_missing.or(Some((path, cause))),
+            }
+        }
+        match first_missing {
+            None => Err(outside()),
+            Some((path, cause)) => {
+                Err(failed(io::Error::new(cause.kind(), format!("`{}`: {cause}", path.display()))))
+            }
+        }
+    }
+
+    /// Whether `name`, seen from `folder`, stays below the root, judged by the names alone.
+    fn stays_inside(&self, folder: &Path, name: &Path) -> bool {
+        // How far the folder is below the root
+        let real = |path: &Path| path.canonicalize().unwrap_or_else(|_| path.to_owned());
+        let inside = real(folder).strip_prefix(real(&self.root)).ok().map(|path| path.components().count());
+        let mut depth = inside.unwrap_or(0);
+        for component in name.components() {
             match component {
                 Component::Normal(_) => depth += 1,
                 Component::CurDir => {}
-                Component::ParentDir => depth = depth.checked_sub(1).ok_or_else(outside)?,
-                Component::Prefix(_) | Component::RootDir => return Err(outside()),
+                Component::ParentDir => match depth.checked_sub(1) {
+                    Some(up) => depth = up,
+                    None => return false,
+                },
+                Component::Prefix(_) | Component::RootDir => return false,
             }
         }
-
-        // Links
-        let path = self.path.join(name);
-        let missing =
-            |cause: io::Error| read(io::Error::new(cause.kind(), format!("`{}`: {cause}", path.display())));
-        let real = path.canonicalize().map_err(missing)?;
-        let folder = self.path.canonicalize().map_err(missing)?;
-        if real.starts_with(folder) { Ok(path) } else { Err(outside()) }
+        true
     }
 }
 
@@ -68,7 +111,7 @@ pub(crate) fn read(path: &Path, limit: u64, place: &Place) -> Result<Vec<u8>, Lo
     }
     Place::file(path).at_most("bytes", meta.len(), limit)?;
 
-    // A file that grows meanwhile is cut
+    // A file that grows while it is read is cut off
     let mut bytes = Vec::new();
     File::open(path).and_then(|file| file.take(limit).read_to_end(&mut bytes)).map_err(failed)?;
     Ok(bytes)

@@ -4,14 +4,18 @@
 //! Files are hostile until parsed: every length is checked before anything is allocated, every error says
 //! which file and where, and what is not supported is named, with whether it was ignored or is fatal.
 
+mod colour;
 mod error;
 mod files;
 mod gltf;
 mod mesh;
 mod mitsuba;
+mod options;
 mod picture;
+mod sky;
 
-pub use error::{LoadError, Place, Warning};
+pub use error::{Finding, LoadError, Place, Treatment, Warning, group_warnings};
+pub use options::LoadOptions;
 
 use noisefloor_ptwne::Scene;
 use std::path::Path;
@@ -34,10 +38,18 @@ pub struct Loaded {
 /// # Errors
 /// [`LoadError`] if a file cannot be read or parsed, or asks for something that cannot be left out.
 pub fn load(path: &Path) -> Result<Loaded, LoadError> {
+    load_with(path, &LoadOptions::default())
+}
+
+/// As [`load`], with what the file leaves open.
+///
+/// # Errors
+/// As [`load`].
+pub fn load_with(path: &Path, options: &LoadOptions) -> Result<Loaded, LoadError> {
     let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
     match extension.as_str() {
         "gltf" | "glb" => gltf::load(path),
-        "xml" => mitsuba::load(path),
+        "xml" => mitsuba::load(path, options),
         _ => Err(LoadError::Format { path: path.to_owned() }),
     }
 }

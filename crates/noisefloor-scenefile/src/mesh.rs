@@ -3,6 +3,7 @@
 pub(crate) mod obj;
 pub(crate) mod ply;
 pub(crate) mod serialized;
+pub(crate) mod solids;
 
 use crate::error::{LoadError, Place};
 use glam::{DMat3, DMat4, DVec3, Vec3};
@@ -83,6 +84,16 @@ impl Triangles {
             if (b - a).cross(c - a).dot(front) < 0.0 {
                 triangle.swap(1, 2);
             }
+        }
+    }
+
+    /// Moves an instance: as [`Self::transform`], and the front stays on the same side.
+    pub(crate) fn place(&mut self, to_world: DMat4) {
+        self.transform(to_world);
+        if !self.normals.is_empty() {
+            self.face_normals_outwards();
+        } else if DMat3::from_mat4(to_world).determinant() < 0.0 {
+            self.indices.iter_mut().for_each(|triangle| triangle.swap(1, 2));
         }
     }
 

@@ -29,7 +29,7 @@ pub(super) struct Notes {
 impl Notes {
     /// Something is ignored or replaced.
     pub(super) fn warn(&mut self, place: &Place, what: impl fmt::Display) {
-        self.warnings.push(Warning { place: place.clone(), what: what.to_string() });
+        self.warnings.push(Warning::ignored(place.clone(), what));
     }
 
     /// An element has these extensions, which are ignored.

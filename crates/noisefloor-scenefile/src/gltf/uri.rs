@@ -21,7 +21,7 @@ pub(super) fn read(uri: &str, scene: &Path, place: &Place, limit: u64) -> Result
         return Err(place.clone().unsupported(format_args!("a URI of the scheme {scheme:?}")));
     }
     let name = percent_decoded(uri).ok_or_else(|| place.clone().bad(format_args!("{uri:?} is not a URI")))?;
-    files::read(&Folder::of(scene).find(&name, place)?, limit, place)
+    files::read(&Folder::of(scene, None).find(&name, place)?, limit, place)
 }
 
 /// The text with every `%20` and the like replaced by what it stands for (RFC 3986, §2.1).

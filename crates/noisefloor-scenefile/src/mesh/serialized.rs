@@ -82,9 +82,10 @@ impl Inflated<'_> {
     fn mesh(mut self, version: u16) -> Result<(Triangles, bool), LoadError> {
         let flags = number(&self.bytes(4)?) as u32;
         let width = match flags & (SINGLE | DOUBLE) {
-            SINGLE => 4,
+            // Early files do not say: they are single
+            SINGLE | 0 => 4,
             DOUBLE => 8,
-            _ => return Err(self.place.clone().bad("its numbers are neither single nor double")),
+            _ => return Err(self.place.clone().bad("its numbers are both single and double")),
         };
         if version == 4 {
             let mut length = 0;

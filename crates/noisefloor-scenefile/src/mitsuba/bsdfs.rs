@@ -1,44 +1,12 @@
 //! Surfaces: Mitsuba's `bsdf` elements.
 
 use super::context::Context;
-use super::surface::Surface;
-use super::values::Use;
+use super::surface::{Body, Surface};
+use super::textures::{mean, peak};
 use super::xml::Element;
 use crate::error::LoadError;
 use noisefloor::Rgb;
-use noisefloor_ptwne::{Cover, Material, Texture};
-
-/// How deep surfaces may nest.
-const MAX_NESTED: u64 = 16;
-
-/// Indices of refraction that have names: visible light, room temperature.
-const INDICES: [(&str, f64); 14] = [
-    ("vacuum", 1.0),
-    ("air", 1.000_277),
-    ("water ice", 1.31),
-    ("water", 1.333),
-    ("ethanol", 1.361),
-    ("fused quartz", 1.458),
-    ("pyrex", 1.47),
-    ("glycerol", 1.4729),
-    ("acrylic glass", 1.49),
-    ("polypropylene", 1.49),
-    ("bk7", 1.5046),
-    ("sodium chloride", 1.544),
-    ("pet", 1.575),
-    ("diamond", 2.419),
-];
-
-/// Complex indices of refraction of metals, as Rec.709 has them: η and k, as Mitsuba 3.9 averages them over
-/// its spectra.
-const METALS: [(&str, Rgb, Rgb); 6] = [
-    ("Ag", [0.155_276, 0.116_728, 0.138_388], [4.828_35, 3.122_22, 2.146_9]),
-    ("Al", [1.657_5, 0.880_405, 0.521_244], [9.223_81, 6.269_5, 4.837]),
-    ("Au", [0.143_036, 0.375_307, 1.442_05], [3.983, 2.385_56, 1.603_36]),
-    ("Cr", [4.369_67, 2.916_51, 1.654_9], [5.206_55, 4.231_31, 3.754_7]),
-    ("Cu", [0.201_005, 0.923_75, 1.102_22], [3.913_26, 2.453_05, 2.142_09]),
-    ("W", [4.370_82, 3.300_25, 2.998_41], [3.500_64, 2.604_87, 2.273_23]),
-];
+use noisefloor_ptwne::{Material, Texture};
 
 impl<'d> Context<'d> {
     /// A `bsdf`.
@@ -50,53 +18,35 @@ impl<'d> Context<'d> {
         if let Some(known) = self.surfaces.borrow().get(&serial) {
             return Ok(known.clone());
         }
-        if self.open.borrow().contains(&serial) {
-            return Err(self.bad(element, format!("{} refers to itself", element.label())));
-        }
-        // By reference, surfaces may nest deeper than elements do
-        self.open.borrow_mut().push(serial);
-        self.place(element).at_most("nested surfaces", self.open.borrow().len() as u64, MAX_NESTED)?;
-        let surface = self.surface_of_kind(element)?;
-        self.open.borrow_mut().pop();
+        let surface = self.nested_in(element, || self.of_kind(element))?;
         self.surfaces.borrow_mut().insert(serial, surface.clone());
         Ok(surface)
     }
 
-    fn surface_of_kind(&self, element: &'d Element) -> Result<Surface, LoadError> {
+    fn of_kind(&self, element: &'d Element) -> Result<Surface, LoadError> {
         match element.kind() {
-            "diffuse" => {
-                // Older versions have another name for it, too
-                let name = if element.get("diffuse_reflectance").is_some() {
-                    "diffuse_reflectance"
-                } else {
-                    "reflectance"
-                };
-                Ok(Surface::one_sided(Material::Diffuse { albedo: self.factor(element, name, 0.5)? }))
-            }
-            "plastic" | "roughplastic" => self.plastic(element).map(Surface::one_sided),
+            "diffuse" | "roughdiffuse" => self.diffuse(element),
+            "plastic" | "roughplastic" | "pplastic" => self.plastic(element).map(Surface::one_sided),
             "conductor" | "roughconductor" => self.conductor(element).map(Surface::one_sided),
-            "dielectric" => self.glass(element, "bk7", |ior, tint| Material::Glass { ior, tint }),
-            "thindielectric" => self.glass(element, "bk7", |ior, tint| Material::ThinGlass { ior, tint }),
-            "twosided" => {
-                let mut surface = self.surface(self.nested(element)?)?;
-                surface.cover.one_sided = false;
-                Ok(surface)
-            }
-            "mask" => {
-                let surface = self.surface(self.nested(element)?)?;
-                if surface.cover.opacity.is_some() {
-                    return Err(self.unsupported(element, "a mask in a mask"));
-                }
-                let opacity = self.luminance(element, self.factor(element, "opacity", 0.5)?)?;
-                Ok(Surface { cover: Cover { opacity: Some(opacity), ..surface.cover }, ..surface })
-            }
-            kind @ ("bumpmap" | "normalmap") => {
-                self.warn(element, format!("the relief of <bsdf type=\"{kind}\"> is left out: it is smooth"));
+            "dielectric" | "thindielectric" | "roughdielectric" => self.glass(element),
+            "phong" | "ward" => self.lobe_on_diffuse(element),
+            "principled" | "principledthin" => self.principled(element),
+            "null" => Ok(Surface::nothing()),
+            "twosided" => self.twosided(element),
+            "mask" => self.mask(element),
+            "blendbsdf" => self.blend(element),
+            "mixturebsdf" => self.mixture(element),
+            "coating" | "roughcoating" => self.coating(element),
+            kind @ ("bumpmap" | "normalmap" | "bump" | "normal") => {
+                self.ignored(
+                    element,
+                    format!("the relief of <bsdf type=\"{kind}\"> is left out: it is smooth"),
+                );
                 element.children.iter().filter(|c| c.tag == "texture").for_each(Element::irrelevant);
                 element.ignore(&["scale", "normalmap"]);
                 self.surface(self.nested(element)?)
             }
-            _ => Err(self.unsupported(element, element.label())),
+            _ => Err(self.unsupported(element, element.species())),
         }
     }
 
@@ -107,115 +57,199 @@ impl<'d> Context<'d> {
             [one] => Ok(one),
             [] => Err(self.bad(element, format!("{} needs a <bsdf> in it", element.label()))),
             _ => {
-                Err(self.unsupported(element, format!("{} with more than one <bsdf> in it", element.label())))
+                Err(self
+                    .unsupported(element, format!("{} with more than one <bsdf> in it", element.species())))
             }
         }
     }
 
-    fn plastic(&self, element: &'d Element) -> Result<Material, LoadError> {
-        Ok(Material::Plastic {
-            diffuse: self.factor(element, "diffuse_reflectance", 0.5)?,
-            specular: self.constant_factor(element, "specular_reflectance", 1.0)?,
-            ior: self.relative_ior(element, "polypropylene")?,
-            roughness: self.roughness(element, element.kind() == "roughplastic")?,
-            nonlinear: self.boolean(element, "nonlinear", false)?,
-        })
+    fn diffuse(&self, element: &'d Element) -> Result<Surface, LoadError> {
+        if element.kind() == "roughdiffuse" {
+            element.ignore(&["alpha", "use_fast_approx"]);
+            self.approximated(
+                element,
+                "the roughness of <bsdf type=\"roughdiffuse\"> is left out: it is Lambertian",
+            );
+        }
+        // Older versions have another name for it, too
+        let old = element.has("diffuse_reflectance");
+        let name = if old { "diffuse_reflectance" } else { "reflectance" };
+        Ok(Surface::one_sided(Material::Diffuse { albedo: self.factor(element, name, 0.5)? }))
     }
 
-    fn conductor(&self, element: &'d Element) -> Result<Material, LoadError> {
-        let rough = element.kind() == "roughconductor";
-        let reflectance = self.factor(element, "specular_reflectance", 1.0)?;
+    fn twosided(&self, element: &'d Element) -> Result<Surface, LoadError> {
+        let parts = self.parts(element, "bsdf")?;
+        let front = match parts.as_slice() {
+            [front, _] => {
+                self.approximated(element, "the back of <bsdf type=\"twosided\"> looks as its front does");
+                front
+            }
+            _ => self.nested(element)?,
+        };
+        Ok(self.surface(front)?.seen_from_both_sides())
+    }
+
+    fn mask(&self, element: &'d Element) -> Result<Surface, LoadError> {
+        let surface = self.surface(self.nested(element)?)?;
+        if surface.opacity.is_some() {
+            return Err(self.unsupported(element, "a mask in a mask"));
+        }
+        let opacity = self.luminance(element, self.factor(element, "opacity", 0.5)?)?;
+        Ok(Surface { opacity: Some(opacity), ..surface })
+    }
+
+    fn blend(&self, element: &'d Element) -> Result<Surface, LoadError> {
+        let parts = self.parts(element, "bsdf")?;
+        let [first, second] = parts.as_slice() else {
+            return Err(self.bad(element, format!("{} needs two <bsdf> in it", element.label())));
+        };
+        let share = self.luminance(element, self.factor(element, "weight", 0.5)?)?;
+        Ok(Surface::blend(self.surface(first)?, self.surface(second)?, share))
+    }
+
+    /// Any number of surfaces by their `weights`, of Mitsuba 0.6. What the weights lack to 1 is absorbed.
+    fn mixture(&self, element: &'d Element) -> Result<Surface, LoadError> {
+        let parts = self.parts(element, "bsdf")?;
+        let weights = self.numbers(element, self.string(element, "weights")?.unwrap_or_default())?;
+        if weights.len() != parts.len() || weights.iter().any(|w| *w < 0.0) {
+            return Err(self.bad(element, "a mixture needs a weight of at least 0 for each <bsdf> in it"));
+        }
+        // One after the other is blended in, so that each ends up with its share of the whole
+        let whole = weights.iter().sum::<f64>().max(1.0);
+        let mut taken = 1.0 - weights.iter().sum::<f64>() / whole;
+        let mut mixed = Surface::one_sided(Material::diffuse([0.0; 3]));
+        for (part, weight) in parts.iter().zip(&weights).filter(|(_, weight)| **weight > 0.0) {
+            let next = self.surface(part)?;
+            taken += weight / whole;
+            let share = (weight / whole / taken) as f32;
+            mixed =
+                if share > 0.9999 { next } else { Surface::blend(mixed, next, Texture::Colour([share; 3])) };
+        }
+        Ok(mixed)
+    }
+
+    /// A clear coat over a surface: exact over a diffuse base, left out over any other.
+    fn coating(&self, element: &'d Element) -> Result<Surface, LoadError> {
+        element.ignore(&["thickness", "sigma_a", "specular_sampling_weight"]);
+        let rough = element.kind() == "roughcoating";
+        let inside = self.surface(self.nested(element)?)?;
+        let ior = self.relative_ior(element, "bk7")?;
+        let specular = self.constant_factor(element, "specular_reflectance", 1.0)?;
         let roughness = self.roughness(element, rough)?;
-
-        // η and k, or the name of a metal
-        let given = [self.colour(element, "eta", Use::Factor)?, self.colour(element, "k", Use::Factor)?];
-        let (eta, k) = match (given, self.string(element, "material")?) {
-            ([Some(eta), Some(k)], None) => (eta, k),
-            ([None, None], Some("none") | None) => match reflectance {
-                Texture::Colour(reflectance) if !rough => return Ok(Material::Mirror { reflectance }),
-                // Reflects all light at all angles
-                _ => ([0.0; 3], [1.0; 3]),
-            },
-            ([None, None], Some(name)) => match METALS.iter().find(|metal| metal.0 == name) {
-                Some((_, eta, k)) => (*eta, *k),
-                None => {
-                    let known: Vec<&str> = METALS.iter().map(|metal| metal.0).collect();
-                    let what =
-                        format!("the metal `{name}` (known: none, {}; or give eta and k)", known.join(", "));
-                    return Err(self.unsupported(element, what));
-                }
-            },
-            _ => return Err(self.bad(element, "give both `eta` and `k`, or `material`")),
-        };
-        // Relative to what is outside
-        let outside = self.ior(element, "ext_eta", "vacuum")? as f32;
-        let relative = |index: Rgb| index.map(|n| n / outside);
-        Ok(Material::Conductor { eta: relative(eta), k: relative(k), reflectance, roughness })
+        match inside.body {
+            Body::Plain(Material::Diffuse { albedo }) if ior > 1.0 => {
+                let body = Body::Plain(Material::Plastic {
+                    diffuse: albedo,
+                    specular,
+                    ior,
+                    roughness,
+                    nonlinear: true,
+                });
+                Ok(Surface { body, ..inside })
+            }
+            _ => {
+                self.approximated(element, format!("the coat of {} is left out", element.species()));
+                Ok(inside)
+            }
+        }
     }
 
-    fn glass(
+    /// Phong's and Ward's lobes on a diffuse base, of Mitsuba 0.6: a blend with microfacets of the same width.
+    fn lobe_on_diffuse(&self, element: &'d Element) -> Result<Surface, LoadError> {
+        element.ignore(&["variant"]);
+        let roughness = if element.kind() == "phong" {
+            let exponent = self.mean_float(element, "exponent")?.unwrap_or(30.0).max(0.0);
+            // Where a lobe cosⁿ and Beckmann's distribution are alike (Walter et al. 2007, §5.2)
+            (2.0 / (exponent + 2.0)).sqrt()
+        } else {
+            let [u, v] = [self.mean_float(element, "alpha_u")?, self.mean_float(element, "alpha_v")?];
+            (u.unwrap_or(0.1) * v.unwrap_or(0.1)).sqrt()
+        };
+        self.approximated(
+            element,
+            format!("{} is replaced by GGX microfacets on a diffuse base", element.species()),
+        );
+        let diffuse = self.factor(element, "diffuse_reflectance", 0.5)?;
+        let specular = self.constant_factor(element, "specular_reflectance", 0.2)?;
+        self.sum(element, diffuse, specular, roughness.clamp(0.0, 1.0) as f32)
+    }
+
+    /// The sum of a diffuse reflection and a glossy one that is the same at all angles.
+    fn sum(
         &self,
-        element: &'d Element,
-        inside: &str,
-        material: fn(f32, Rgb) -> Material,
+        element: &Element,
+        diffuse: Texture,
+        specular: Rgb,
+        roughness: f32,
     ) -> Result<Surface, LoadError> {
-        let reflectance = self.constant_factor(element, "specular_reflectance", 1.0)?;
-        if reflectance != [1.0; 3] {
-            self.warn(element, format!("`specular_reflectance` {reflectance:?} is ignored: it is 1"));
+        let gloss = specular.into_iter().fold(0.0, f32::max);
+        let base = peak(&diffuse);
+        if gloss == 0.0 {
+            return Ok(Surface::one_sided(Material::Diffuse { albedo: diffuse }));
         }
-        let tint = self.constant_factor(element, "specular_transmittance", 1.0)?;
-        Ok(Surface::two_sided(material(self.relative_ior(element, inside)?, tint)))
+        // A blend takes a share of each, so each is scaled up. Together they reflect no more than there is
+        let scale = 1.0 / (gloss + base).max(1.0);
+        let share = gloss / (gloss + base);
+        let glossy = Material::Conductor {
+            eta: [0.0; 3],
+            k: [1.0; 3],
+            reflectance: Texture::Colour(specular.map(|c| (c * scale / share).min(1.0))),
+            roughness,
+        };
+        let albedo = self.scaled(element, diffuse, scale / (1.0 - share).max(1e-6))?;
+        let first = Surface::one_sided(Material::Diffuse { albedo });
+        Ok(Surface::blend(first, Surface::one_sided(glossy), Texture::Colour([share; 3])))
     }
 
-    /// GGX α.
-    fn roughness(&self, element: &'d Element, rough: bool) -> Result<f32, LoadError> {
-        if !rough {
-            return Ok(0.0);
-        }
-        element.ignore(&["sample_visible"]);
-        match self.string(element, "distribution")?.unwrap_or("beckmann") {
-            "ggx" => {}
-            other => self
-                .warn(element, format!("the distribution `{other}` is replaced by `ggx` of the same alpha")),
-        }
-        let number = |name: &str| match element.get(name) {
-            Some(texture) if texture.tag == "texture" || texture.tag == "ref" => {
-                Err(self.unsupported(texture, format!("a texture as `{name}`")))
+    /// Disney's principled surface (Burley 2012, 2015): its metal, gloss and glass.
+    fn principled(&self, element: &'d Element) -> Result<Surface, LoadError> {
+        let number =
+            |name: &str, missing: f64| Ok::<_, LoadError>(self.mean_float(element, name)?.unwrap_or(missing));
+        let [roughness, metallic] = [number("roughness", 0.5)?, number("metallic", 0.0)?];
+        let transmission = number("spec_trans", 0.0)?;
+        let ior = match self.float(element, "eta")? {
+            Some(eta) => eta,
+            // Burley 2012: 0.08·specular at normal incidence
+            None => {
+                let root = (0.08 * number("specular", 0.5)?).max(0.0).sqrt().min(0.9);
+                (1.0 + root) / (1.0 - root)
             }
-            _ => self.float(element, name),
         };
-        let alpha = match (number("alpha")?, number("alpha_u")?, number("alpha_v")?) {
-            (alpha, None, None) => alpha.unwrap_or(0.1),
-            (None, Some(u), Some(v)) if u == v => u,
-            _ => return Err(self.unsupported(element, "roughness that depends on direction")),
-        };
-        Ok(alpha as f32)
-    }
-
-    /// Index of refraction of the inside over that of the outside.
-    fn relative_ior(&self, element: &'d Element, inside: &str) -> Result<f32, LoadError> {
-        let (inside, outside) = (self.ior(element, "int_ior", inside)?, self.ior(element, "ext_ior", "air")?);
-        Ok((inside / outside) as f32)
-    }
-
-    /// An index of refraction above 0: a number or a name, or else that of `default`.
-    fn ior(&self, element: &'d Element, name: &str, default: &str) -> Result<f64, LoadError> {
-        let by_name = |name: &str| INDICES.iter().find(|index| index.0 == name).map(|index| index.1);
-        let found = match element.get(name) {
-            None => by_name(default),
-            Some(child) if child.tag == "string" => {
-                let material = child.attribute("value").unwrap_or_default();
-                Some(by_name(material).ok_or_else(|| {
-                    let known: Vec<&str> = INDICES.iter().map(|index| index.0).collect();
-                    self.unsupported(
-                        child,
-                        format!("the material `{material}` (known: {})", known.join(", ")),
-                    )
-                })?)
-            }
-            Some(_) => self.float(element, name)?,
-        };
-        let found = found.filter(|ior| *ior > 0.0);
-        found.ok_or_else(|| self.bad(element, format!("`{name}` must be above 0")))
+        self.approximated(
+            element,
+            format!(
+                "of {} its metal, gloss and transmission are kept, its sheen, clearcoat, tints and flatness left out",
+                element.species()
+            ),
+        );
+        element.ignore(&[
+            "anisotropic",
+            "spec_tint",
+            "sheen",
+            "sheen_tint",
+            "clearcoat",
+            "clearcoat_gloss",
+            "flatness",
+            "diff_trans",
+            "diffuse_reflectance_sampling_rate",
+            "specular_reflectance_sampling_rate",
+            "clearcoat_sampling_rate",
+            "main_specular_sampling_rate",
+        ]);
+        let base = self.factor(element, "base_color", 0.5)?;
+        if transmission > 0.5 {
+            let tint = mean(&base).map(f32::sqrt);
+            let ior = ior as f32;
+            let thin = element.kind() == "principledthin";
+            return Ok(Surface::two_sided(if thin {
+                Material::ThinGlass { ior, tint }
+            } else {
+                Material::Glass { ior, tint }
+            }));
+        }
+        let share = [1.0, roughness.clamp(0.0, 1.0) as f32, metallic.clamp(0.0, 1.0) as f32];
+        let metallic_roughness = Texture::Colour(share);
+        let ior = (ior as f32).clamp(1.001, 4.0);
+        Ok(Surface::one_sided(Material::MetallicRoughness { base, metallic_roughness, ior }))
     }
 }

@@ -1,18 +1,23 @@
 //! What the readers of all parts of a scene share.
 
+use super::document::{Document, unset};
 use super::raster::Raster;
 use super::surface::Surface;
-use super::xml::{Document, Element};
+use super::xml::Element;
 use crate::error::{LoadError, Place, Warning};
-use crate::files::Folder;
+use crate::options::LoadOptions;
 use noisefloor_ptwne::SceneError;
 use std::cell::{Cell, RefCell};
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::fmt;
 use std::path::PathBuf;
 
 /// Most warnings that are kept.
-const MAX_WARNINGS: usize = 1000;
+const MAX_WARNINGS: usize = 10_000;
+/// How deep surfaces and textures may nest by reference.
+const MAX_NESTED: u64 = 16;
+/// Most aliases in a row.
+const MAX_ALIASES: usize = 16;
 /// Most pixels that the pictures of a scene have together, where they are kept more than once counted as
 /// often.
 const MAX_PIXELS: u64 = 1 << 27;
@@ -21,30 +26,34 @@ const MAX_PIXELS: u64 = 1 << 27;
 #[derive(Debug)]
 pub(super) struct Context<'d> {
     pub(super) document: &'d Document,
-    /// Where the files are that it names.
-    pub(super) folder: Folder,
+    pub(super) options: &'d LoadOptions,
     /// Pictures that have been read, by file and whether their codes are linear.
     pub(super) rasters: RefCell<HashMap<(PathBuf, bool), Raster>>,
     /// Surfaces that have been read, by the serial number of their element.
     pub(super) surfaces: RefCell<HashMap<usize, Surface>>,
-    /// Serial numbers of the surfaces that are being read, one in another.
-    pub(super) open: RefCell<Vec<usize>>,
+    /// Serial numbers of the surfaces and textures that are being read, one in another.
+    open: RefCell<Vec<usize>>,
     pixels: Cell<u64>,
     identified: HashMap<&'d str, &'d Element>,
+    aliases: HashMap<&'d str, &'d str>,
     warnings: RefCell<Vec<Warning>>,
+    /// Warnings that there are already.
+    said: RefCell<HashSet<(usize, String)>>,
 }
 
 impl<'d> Context<'d> {
-    pub(super) fn new(document: &'d Document) -> Result<Self, LoadError> {
+    pub(super) fn new(document: &'d Document, options: &'d LoadOptions) -> Result<Self, LoadError> {
         let context = Self {
             document,
-            folder: Folder::of(&document.path),
+            options,
             rasters: RefCell::default(),
             surfaces: RefCell::default(),
             open: RefCell::default(),
             pixels: Cell::new(0),
             identified: HashMap::new(),
+            aliases: HashMap::new(),
             warnings: RefCell::default(),
+            said: RefCell::default(),
         };
         let (mut found, mut identified) = (Vec::new(), HashMap::new());
         document.root.identified(&mut found);
@@ -53,7 +62,10 @@ impl<'d> Context<'d> {
                 return Err(context.bad(element, format!("the id `{id}` is taken already")));
             }
         }
-        Ok(Self { identified, ..context })
+        let aliases =
+            document.root.all("alias").filter_map(|a| Some((a.attribute("as")?, a.attribute("id")?)));
+        let aliases = aliases.collect();
+        Ok(Self { identified, aliases, ..context })
     }
 
     /// Where `element` is.
@@ -61,31 +73,49 @@ impl<'d> Context<'d> {
         self.document.place(element)
     }
 
+    /// Something is wrong with `element`: above all, if a parameter in it has no value.
     pub(super) fn bad(&self, element: &Element, what: impl fmt::Display) -> LoadError {
-        self.place(element).bad(what)
+        match &element.unset {
+            Some(name) => self.place(element).bad(unset(name)),
+            None => self.place(element).bad(what),
+        }
     }
 
     pub(super) fn unsupported(&self, element: &Element, what: impl fmt::Display) -> LoadError {
-        self.place(element).unsupported(what)
+        match &element.unset {
+            Some(name) => self.place(element).bad(unset(name)),
+            None => self.place(element).unsupported(what),
+        }
     }
 
-    /// Says that the renderer does not take what `element` asks for.
+    /// The error that the renderer does not take what `element` asks for.
     pub(super) fn refused(&self, element: &Element) -> impl Fn(SceneError) -> LoadError {
         let place = self.place(element);
         move |cause| LoadError::Scene { place: place.clone(), cause }
     }
 
-    /// Warns, once.
-    pub(super) fn warn(&self, element: &Element, what: impl fmt::Display) {
-        let warning = Warning { place: self.place(element), what: what.to_string() };
+    /// Warns, once, that something is left out.
+    pub(super) fn ignored(&self, element: &Element, what: impl fmt::Display) {
+        self.warn(element, Warning::ignored(self.place(element), what));
+    }
+
+    /// Warns, once, that something is replaced by something that looks much the same.
+    pub(super) fn approximated(&self, element: &Element, what: impl fmt::Display) {
+        self.warn(element, Warning::approximated(self.place(element), what));
+    }
+
+    fn warn(&self, element: &Element, warning: Warning) {
         let mut warnings = self.warnings.borrow_mut();
-        if warnings.len() <= MAX_WARNINGS && !warnings.contains(&warning) {
-            if warnings.len() < MAX_WARNINGS {
-                warnings.push(warning);
-            } else {
-                let what = "further warnings are left out".to_owned();
-                warnings.push(Warning { place: Place::file(&self.document.path), what });
-            }
+        if warnings.len() > MAX_WARNINGS
+            || !self.said.borrow_mut().insert((element.serial, warning.what.clone()))
+        {
+            return;
+        }
+        if warnings.len() < MAX_WARNINGS {
+            warnings.push(warning);
+        } else {
+            let place = Place::file(self.document.path());
+            warnings.push(Warning::ignored(place, "further warnings are left out"));
         }
     }
 
@@ -106,7 +136,11 @@ impl<'d> Context<'d> {
             return Ok(element);
         }
         let id = element.attribute("id").ok_or_else(|| self.bad(element, "a <ref> needs an id"))?;
-        let found = self.identified.get(id).copied();
+        let mut name = id;
+        for _ in 0..MAX_ALIASES {
+            name = self.aliases.get(name).copied().unwrap_or(name);
+        }
+        let found = self.identified.get(name).copied();
         found.ok_or_else(|| self.bad(element, format!("nothing has the id `{id}`")))
     }
 
@@ -124,15 +158,59 @@ impl<'d> Context<'d> {
         Ok(parts)
     }
 
+    /// Runs `read` for `element`, which may hold others of its kind.
+    ///
+    /// # Errors
+    /// [`LoadError`] if the element holds itself, or if elements nest too deeply by reference.
+    pub(super) fn nested_in<T>(
+        &self,
+        element: &'d Element,
+        read: impl FnOnce() -> Result<T, LoadError>,
+    ) -> Result<T, LoadError> {
+        if self.open.borrow().contains(&element.serial) {
+            return Err(self.bad(element, format!("{} refers to itself", element.label())));
+        }
+        self.open.borrow_mut().push(element.serial);
+        let depth = self.open.borrow().len() as u64;
+        let result = self.place(element).at_most("nested surfaces", depth, MAX_NESTED).and_then(|()| read());
+        self.open.borrow_mut().pop();
+        result
+    }
+
+    /// Refuses the participating media in `object`, or warns that they are left out.
+    pub(super) fn no_media(&self, object: &'d Element) -> Result<(), LoadError> {
+        for child in &object.children {
+            // What is referred to, if it exists: other readers say if it does not
+            let medium = if child.tag == "ref" { self.resolve(child).ok() } else { Some(child) };
+            if medium.is_none_or(|medium| medium.tag != "medium") {
+                continue;
+            }
+            child.read();
+            if !self.options.ignore_volumes {
+                return Err(self.unsupported(child, "a participating medium"));
+            }
+            medium.into_iter().for_each(Element::irrelevant);
+            self.ignored(child, "the participating medium is ignored");
+        }
+        Ok(())
+    }
+
     /// Warns of everything that nobody has read.
-    pub(super) fn warn_of_unread(&self) {
+    ///
+    /// # Errors
+    /// [`LoadError::Bad`] if something was read that has a parameter without a value.
+    pub(super) fn finish(&self) -> Result<(), LoadError> {
+        if let Some(element) = self.document.root.read_unset() {
+            return Err(self.bad(element, "a parameter has no value"));
+        }
         let mut unread = Vec::new();
         self.document.root.unread(&mut unread);
         for element in unread {
             // Definitions that nothing refers to change nothing
             if element.attribute("id").is_none() {
-                self.warn(element, format!("{} is ignored", element.label()));
+                self.ignored(element, format!("{} is ignored", element.species()));
             }
         }
+        Ok(())
     }
 }

@@ -3,6 +3,7 @@
 use super::context::Context;
 use super::xml::Element;
 use crate::error::LoadError;
+use crate::sky::{ClearSky, SUN_DIAMETER, TURBIDITIES};
 use glam::{DMat3, DVec3};
 use noisefloor::Rgb;
 use noisefloor_ptwne::{Emission, Environment, EnvironmentMap, Punctual, SceneBuilder};
@@ -26,6 +27,10 @@ impl<'d> Context<'d> {
                 builder.environment_map(self.environment_map(element)?).map_err(refused)?;
                 return Ok(true);
             }
+            "sky" | "sun" | "sunsky" => {
+                builder.environment_map(self.clear_sky(element)?).map_err(refused)?;
+                return Ok(true);
+            }
             "point" => {
                 let (position, _) = self.position_and_direction(element)?;
                 let intensity = self.plain_light(element, "intensity")?;
@@ -36,7 +41,7 @@ impl<'d> Context<'d> {
                 let intensity = self.plain_light(element, "intensity")?;
                 let outer = self.float(element, "cutoff_angle")?.unwrap_or(20.0);
                 let inner = self.float(element, "beam_width")?.unwrap_or(0.75 * outer);
-                self.warn(element, "the spot fades towards its edge as those of glTF do");
+                self.approximated(element, "the spot fades towards its edge as those of glTF do");
                 let (inner, outer) = (inner as f32, outer as f32);
                 let spot = Punctual::Spot { position, direction, intensity, inner, outer };
                 builder.punctual(spot).map_err(refused)?;
@@ -47,7 +52,7 @@ impl<'d> Context<'d> {
                 builder.punctual(Punctual::Distant { direction, irradiance }).map_err(refused)?;
             }
             "area" => return Err(self.bad(element, "an area emitter belongs into a shape")),
-            _ => return Err(self.unsupported(element, element.label())),
+            _ => return Err(self.unsupported(element, element.species())),
         }
         Ok(false)
     }
@@ -85,6 +90,74 @@ impl<'d> Context<'d> {
         Ok((position.as_vec3().to_array(), direction.normalize_or_zero().as_vec3().to_array()))
     }
 
+    /// `sky`, `sun` or `sunsky`, of version 0.6, where +y is up, and of version 3, where +z is.
+    fn clear_sky(&self, element: &'d Element) -> Result<EnvironmentMap, LoadError> {
+        let number =
+            |name: &str, missing: f64| Ok::<_, LoadError>(self.float(element, name)?.unwrap_or(missing));
+        let scale = number("scale", 1.0)?;
+        let [sky, sun] = [number("sky_scale", 1.0)? * scale, number("sun_scale", 1.0)? * scale];
+        let scales = match element.kind() {
+            "sky" => [sky, 0.0],
+            "sun" => [0.0, sun],
+            _ => [sky, sun],
+        };
+        let aperture = number("sun_aperture", SUN_DIAMETER)?;
+        let sun_diameter = aperture * number("sun_radius_scale", 1.0)?;
+        if scales.iter().any(|scale| *scale < 0.0) || !(0.0..=60.0).contains(&sun_diameter) {
+            return Err(self.bad(element, "a scale is negative, or the sun is larger than 60 degrees"));
+        }
+        // Turned so that +z is up
+        let up = if self.document.old {
+            DMat3::from_cols(DVec3::X, DVec3::Z, DVec3::NEG_Y)
+        } else {
+            DMat3::IDENTITY
+        };
+        let sky = ClearSky {
+            sun: up * self.sun_direction(element)?,
+            turbidity: number("turbidity", 3.0)?.clamp(*TURBIDITIES.start(), *TURBIDITIES.end()),
+            albedo: self.constant_factor(element, "albedo", if self.document.old { 0.15 } else { 0.3 })?,
+            scales,
+            sun_diameter,
+        };
+        element.ignore(&["resolution", "sun_resolution", "complex_sun", "stretch", "extend"]);
+        if scales[1] > 0.0 {
+            self.approximated(element, "the sun is drawn into a map of the sky");
+        }
+        let matrix = DMat3::from_mat4(self.transform(element, "to_world")?);
+        let matrix = DMat3::from_cols_array_2d(
+            &matrix.to_cols_array_2d().map(|column| DVec3::from_array(column).normalize_or_zero().to_array()),
+        );
+        sky.map(matrix * up.transpose()).map_err(|what| self.bad(element, what))
+    }
+
+    /// Towards the sun: `sun_direction`, or where it stands at a place and time.
+    fn sun_direction(&self, element: &'d Element) -> Result<DVec3, LoadError> {
+        let places =
+            ["hour", "minute", "second", "day", "month", "year", "latitude", "longitude", "timezone"];
+        let direction = self.point(element, "sun_direction")?;
+        if let Some(direction) = direction {
+            element.ignore(&places);
+            return Ok(direction);
+        }
+        let number =
+            |name: &str, missing: f64| Ok::<_, LoadError>(self.float(element, name)?.unwrap_or(missing));
+        let day = number("day", 10.0)? + 30.6 * (number("month", 7.0)? - 1.0).max(0.0);
+        let hour = number("hour", 15.0)? + number("minute", 0.0)? / 60.0 + number("second", 0.0)? / 3600.0;
+        let [latitude, longitude] = [number("latitude", 35.6894)?, number("longitude", 139.6917)?];
+        let timezone = number("timezone", 9.0)?;
+        element.ignore(&["year"]);
+        self.approximated(element, "the sun's place is computed to a degree or so");
+        // Spencer's short formulas: declination, and the hour angle from the south westwards
+        let declination = -23.44f64.to_radians() * (std::f64::consts::TAU * (day + 10.0) / 365.0).cos();
+        let angle = (15.0 * (hour - 12.0 - timezone) + longitude).to_radians();
+        let latitude = latitude.to_radians();
+        let up = latitude.sin() * declination.sin() + latitude.cos() * declination.cos() * angle.cos();
+        let west = declination.cos() * angle.sin();
+        let south = latitude.sin() * declination.cos() * angle.cos() - latitude.cos() * declination.sin();
+        // Mitsuba's axes: +x is east of a scene whose +z (0.6) or −y (3) is south
+        Ok(if self.document.old { DVec3::new(-west, up, south) } else { DVec3::new(-west, -south, up) })
+    }
+
     fn environment_map(&self, element: &'d Element) -> Result<EnvironmentMap, LoadError> {
         let name = self.string(element, "filename")?;
         let name = name.ok_or_else(|| self.bad(element, "an envmap needs a `filename`"))?;
@@ -102,7 +175,7 @@ impl<'d> Context<'d> {
         }
         let negative = pixels.iter().flatten().filter(|v| **v < 0.0).count();
         if negative > 0 {
-            self.warn(element, format!("{negative} values of the picture are negative and become 0"));
+            self.ignored(element, format!("{negative} values of the picture are negative and become 0"));
         }
         for pixel in &mut pixels {
             *pixel = pixel.map(|v| v.max(0.0) * scale);

@@ -1,72 +1,73 @@
 //! Mitsuba XML, versions 0.5 to 3.
 //!
-//! What is read: shapes `obj`, `ply`, `serialized`, `rectangle`, `cube`, `sphere`, `disk`; surfaces
-//! `diffuse`, `plastic`, `roughplastic`, `conductor`, `roughconductor`, `dielectric`, `thindielectric`,
-//! `twosided`, `mask`, and what is under a `bumpmap` or `normalmap`; textures `bitmap` and `checkerboard`;
-//! emitters `area`, `constant`, `envmap`, `point`, `spot`, `directional`; the first sensor, if it is
-//! `perspective` or `thinlens`; `default`, `ref`. Other shapes, surfaces, textures and emitters are errors,
-//! as is `include`; all else that is not read is warned of.
-//!
-//! `xml` makes a tree of the file, `values` reads numbers, colours and transforms from it, and `context`
-//! follows references, and notes what nobody has read: that is warned of. The rest is a module for each part
-//! of a scene.
+//! `document` makes a tree of the files, with includes and parameters resolved; `context` follows references and notes
+//! what nobody has read, which becomes warnings; `values`, `colours` and `transforms` read the leaves. Each part of a
+//! scene has a module. The README lists what is read. Errors of shapes and emitters are collected, so that one load
+//! names all.
 
 mod bsdfs;
+mod colours;
 mod context;
+mod document;
 mod emitters;
+mod glossy;
+mod indices;
 mod raster;
 mod sensor;
 mod shapes;
 mod surface;
 mod textures;
+mod transforms;
 mod values;
 mod xml;
 
-use crate::error::{LoadError, Place};
-use crate::{Loaded, files};
+use crate::Loaded;
+use crate::error::{Errors, LoadError, Place};
+use crate::options::LoadOptions;
 use context::Context;
+use document::Document;
 use noisefloor_ptwne::SceneBuilder;
-use shapes::Materials;
+use shapes::Filling;
 use std::path::Path;
-use xml::Document;
 
 /// Loads the scene in `path`.
-pub(crate) fn load(path: &Path) -> Result<Loaded, LoadError> {
-    let bytes = files::read(path, xml::MAX_XML_BYTES, &Place::file(path))?;
-    let document = Document::parse(&bytes, path)?;
-    let context = Context::new(&document)?;
+pub(crate) fn load(path: &Path, options: &LoadOptions) -> Result<Loaded, LoadError> {
+    let document = Document::read(path, options)?;
+    let context = Context::new(&document, options)?;
     let root = &document.root;
     root.read();
-    if let Some(include) = root.all("include").next() {
-        return Err(context.unsupported(include, "<include>"));
-    }
 
     // What looks at the scene
     let sensors: Vec<_> = root.all("sensor").collect();
     let sensor = sensors.first().ok_or_else(|| Place::file(path).bad("the scene has no <sensor>"))?;
     for other in &sensors[1..] {
         other.irrelevant();
-        context.warn(other, "only the first sensor is used");
+        context.ignored(other, "only the first sensor is used");
     }
-    let (camera, size) = context.camera(sensor)?;
+    let mut errors = Errors::default();
+    let camera = errors.take(context.camera(sensor))?;
     let max_depth = root.all("integrator").next().map_or(Ok(None), |element| context.max_depth(element))?;
 
-    // What is in it
-    let name = crate::title(path);
-    let mut builder = SceneBuilder::new(name, camera).map_err(context.refused(sensor))?;
-    let mut materials = Materials::new();
+    // What is in it: without a camera, too, so that all errors are found
+    let (camera, size) = camera.unwrap_or_else(|| (sensor::anywhere(), None));
+    let builder = SceneBuilder::new(crate::title(path), camera).map_err(context.refused(sensor))?;
+    let mut filling = Filling::new(builder);
     for shape in root.all("shape") {
-        context.shape(shape, &mut builder, &mut materials)?;
+        errors.take(context.shape(shape, &mut filling))?;
     }
     let mut surroundings = 0;
     for emitter in root.all("emitter") {
-        surroundings += usize::from(context.emitter(emitter, &mut builder)?);
-        if surroundings > 1 {
-            return Err(context.bad(emitter, "a second emitter surrounds the scene; there can be only one"));
+        let surrounds = errors.take(context.emitter(emitter, &mut filling.builder))?.unwrap_or(false);
+        surroundings += usize::from(surrounds);
+        if surrounds && surroundings > 1 {
+            let what = "a second emitter surrounds the scene; there can be only one";
+            errors.take(Err::<(), _>(context.bad(emitter, what)))?;
         }
     }
+    errors.take(context.finish())?;
+    errors.finish()?;
 
-    let scene = builder.build().map_err(|cause| LoadError::Scene { place: Place::file(path), cause })?;
-    context.warn_of_unread();
+    let scene =
+        filling.builder.build().map_err(|cause| LoadError::Scene { place: Place::file(path), cause })?;
     Ok(Loaded { scene, size, max_depth, warnings: context.into_warnings() })
 }

@@ -11,18 +11,24 @@ const DEFAULT_SIZE: (usize, usize) = (768, 576);
 /// Largest width or height that is read, in pixels.
 const MAX_EDGE: i64 = 1 << 16;
 
+/// A camera for scenes that are only checked.
+pub(super) fn anywhere() -> Camera {
+    Camera { eye: [0.0; 3], target: [0.0, 0.0, 1.0], up: [0.0, 1.0, 0.0], vertical_fov: 45.0 }
+}
+
 impl<'d> Context<'d> {
     /// The camera, and the image size that the scene asks for.
     pub(super) fn camera(&self, sensor: &'d Element) -> Result<(Camera, Option<(usize, usize)>), LoadError> {
         match sensor.kind() {
             "perspective" => {}
             "thinlens" => {
-                self.warn(sensor, "the lens is replaced by a pinhole: everything is in focus");
+                self.approximated(sensor, "the lens is replaced by a pinhole: everything is in focus");
                 sensor.ignore(&["aperture_radius", "focus_distance"]);
             }
-            _ => return Err(self.unsupported(sensor, sensor.label())),
+            _ => return Err(self.unsupported(sensor, sensor.species())),
         }
-        sensor.ignore(&["near_clip", "far_clip"]);
+        self.no_media(sensor)?;
+        sensor.ignore(&["near_clip", "far_clip", "shutter_open", "shutter_close", "srf"]);
         sensor.children.iter().filter(|c| c.tag == "sampler").for_each(Element::irrelevant);
         let size = self.film_size(sensor)?;
         let (width, height) = size.unwrap_or(DEFAULT_SIZE);
@@ -102,7 +108,7 @@ impl<'d> Context<'d> {
     pub(super) fn max_depth(&self, integrator: &'d Element) -> Result<Option<u32>, LoadError> {
         integrator.ignore(&["rr_depth"]);
         if self.boolean(integrator, "hide_emitters", false)? {
-            self.warn(integrator, "`hide_emitters` is ignored: emitters are seen");
+            self.ignored(integrator, "`hide_emitters` is ignored: emitters are seen");
         }
         match integrator.kind() {
             "path" | "volpath" | "volpathmis" | "bdpt" => {}
@@ -118,7 +124,9 @@ impl<'d> Context<'d> {
                     None => Ok(None),
                 };
             }
-            other => self.warn(integrator, format!("the integrator `{other}` is replaced by path tracing")),
+            other => {
+                self.approximated(integrator, format!("the integrator `{other}` is replaced by path tracing"))
+            }
         }
         match self.integer(integrator, "max_depth")? {
             None | Some(-1) => Ok(None),

@@ -1,75 +1,164 @@
 //! Shapes.
 
 use super::context::Context;
-use super::surface::Surface;
+use super::surface::{Body, Surface};
 use super::xml::Element;
 use crate::error::{LoadError, Place};
 use crate::files::{self, MAX_FILE_BYTES};
-use crate::mesh::{Triangles, normal_matrix, obj, ply, serialized};
-use glam::{DMat3, DVec3, Vec3};
-use noisefloor_ptwne::{Emission, Material, MaterialId, Mesh, SceneBuilder};
+use crate::mesh::{Triangles, normal_matrix, obj, ply, serialized, solids};
+use glam::{DMat3, DMat4, DQuat, DVec3};
+use noisefloor_ptwne::{Cover, Emission, MaterialId, Mesh, SceneBuilder};
 use std::collections::HashMap;
+use std::rc::Rc;
 
-/// Materials in the scene, by the serial number of their element, and whether they are inside out.
-pub(super) type Materials = HashMap<(usize, bool), MaterialId>;
+/// The scene that is being filled.
+pub(super) struct Filling {
+    pub(super) builder: SceneBuilder,
+    /// Materials in it, by the serial number of their element, and whether they are inside out.
+    materials: HashMap<(usize, bool), MaterialId>,
+    /// Meshes of groups by the serial number of their element: their instances share them.
+    meshes: HashMap<usize, Rc<Triangles>>,
+}
+
+impl Filling {
+    pub(super) fn new(builder: SceneBuilder) -> Self {
+        Self { builder, materials: HashMap::new(), meshes: HashMap::new() }
+    }
+}
 
 impl<'d> Context<'d> {
     /// Adds a shape to the scene.
-    pub(super) fn shape(
+    pub(super) fn shape(&self, element: &'d Element, filling: &mut Filling) -> Result<(), LoadError> {
+        match element.kind() {
+            // Seen through its instances alone
+            "shapegroup" => Ok(()),
+            "instance" => self.instance(element, filling),
+            _ => self.simple(element, None, filling),
+        }
+    }
+
+    /// Adds the shapes of a group, moved.
+    fn instance(&self, element: &'d Element, filling: &mut Filling) -> Result<(), LoadError> {
+        let groups = self.parts(element, "shape")?;
+        let [group] = groups.as_slice() else {
+            return Err(self.bad(element, "an instance needs one <shape type=\"shapegroup\">, by reference"));
+        };
+        if group.kind() != "shapegroup" {
+            return Err(self.bad(element, format!("an instance of {}; expected a shapegroup", group.label())));
+        }
+        let to_world = self.transform(element, "to_world")?;
+        for shape in group.all("shape") {
+            if matches!(shape.kind(), "shapegroup" | "instance") {
+                return Err(self.unsupported(shape, "an instance in a group"));
+            }
+            self.simple(shape, Some(to_world), filling)?;
+        }
+        Ok(())
+    }
+
+    /// Adds a shape that is not a group; one of a group as `instance` moves it.
+    fn simple(
         &self,
         element: &'d Element,
-        builder: &mut SceneBuilder,
-        materials: &mut Materials,
+        instance: Option<DMat4>,
+        filling: &mut Filling,
     ) -> Result<(), LoadError> {
+        self.no_media(element)?;
+        element.ignore(&["silhouette_sampling_weight"]);
         let emission = self.emission(element)?;
+        let glows = emission.as_ref().is_some_and(|emission| emission.texture.is_some());
+        let round = match element.kind() {
+            // As triangles if stretched, or if light depends on where on it or comes from its inside
+            "sphere" => self
+                .sphere(element, instance)?
+                .filter(|sphere| emission.is_none() || !glows && !sphere.inside_out),
+            _ => None,
+        };
+        let inside_out = round.as_ref().is_some_and(|sphere| sphere.inside_out);
+        let (material, textured) = self.material(element, emission.is_some(), inside_out, filling)?;
+
+        match (element.kind(), round) {
+            ("sphere", Some(Sphere { centre, radius, .. })) => {
+                if textured {
+                    let what = "the texture is laid on the sphere with its top towards +y of the scene";
+                    self.approximated(element, what);
+                }
+                let added = filling.builder.sphere(centre, radius, material, emission);
+                added.map_err(self.refused(element))
+            }
+            ("disk", _) => {
+                if textured || glows {
+                    self.approximated(element, "the texture is not laid on the disk in rings");
+                }
+                let [centre, e1, e2] = self.disk(element, instance)?;
+                filling.builder.disk(centre, e1, e2, material, emission).map_err(self.refused(element))
+            }
+            ("obj" | "ply" | "serialized" | "rectangle" | "cube" | "sphere" | "cylinder", _) => {
+                match instance {
+                    None => self.add(element, &self.triangles(element)?, filling, material, emission),
+                    Some(to_world) => {
+                        let mesh = match filling.meshes.get(&element.serial) {
+                            Some(mesh) => mesh.clone(),
+                            None => Rc::new(self.triangles(element)?),
+                        };
+                        filling.meshes.insert(element.serial, mesh.clone());
+                        let mut mesh = (*mesh).clone();
+                        mesh.place(to_world);
+                        self.add(element, &mesh, filling, material, emission)
+                    }
+                }
+            }
+            _ => Err(self.unsupported(element, element.species())),
+        }
+    }
+
+    /// The material of a shape in the scene, and whether it has a texture.
+    fn material(
+        &self,
+        element: &'d Element,
+        shines: bool,
+        inside_out: bool,
+        filling: &mut Filling,
+    ) -> Result<(MaterialId, bool), LoadError> {
         let (serial, surface) = match self.parts(element, "bsdf")?.as_slice() {
-            [] => (None, Surface::missing(emission.is_some())),
+            [] => (None, Surface::missing(shines)),
             [one] => (Some(one.serial), self.surface(one)?),
             [_, second, ..] => return Err(self.bad(second, "a shape has at most one bsdf")),
         };
-        let inside_out = element.kind() == "sphere" && self.is_inside_out(element)?;
         let textured = surface.is_textured();
-        let material = match serial.and_then(|serial| materials.get(&(serial, inside_out))) {
-            Some(known) => *known,
-            None => {
-                let Surface { material, cover } =
-                    if inside_out { self.inside_out(element, surface) } else { surface };
-                let id = builder.material_with(material, cover).map_err(self.refused(element))?;
-                if let Some(serial) = serial {
-                    materials.insert((serial, inside_out), id);
-                }
-                id
+        if let Some(known) = serial.and_then(|serial| filling.materials.get(&(serial, inside_out))) {
+            return Ok((*known, textured));
+        }
+        let surface = if inside_out {
+            if surface.one_sided {
+                let what = "the sphere is seen from outside, too, though its surface is one-sided";
+                self.approximated(element, what);
             }
+            surface.inside_out().seen_from_both_sides()
+        } else {
+            surface
         };
-        let glows = emission.as_ref().is_some_and(|emission| emission.texture.is_some());
+        let id = self.add_surface(element, surface, &mut filling.builder)?;
+        if let Some(serial) = serial {
+            filling.materials.insert((serial, inside_out), id);
+        }
+        Ok((id, textured))
+    }
 
-        match element.kind() {
-            "obj" | "ply" | "serialized" | "rectangle" | "cube" => {
-                let mesh = self.triangles(element)?;
-                self.add(element, &mesh, builder, material, emission)
+    fn add_surface(
+        &self,
+        element: &Element,
+        surface: Surface,
+        builder: &mut SceneBuilder,
+    ) -> Result<MaterialId, LoadError> {
+        let cover = Cover { opacity: surface.opacity, one_sided: surface.one_sided };
+        match surface.body {
+            Body::Plain(material) => builder.material_with(material, cover).map_err(self.refused(element)),
+            Body::Blend(parts, _) => {
+                self.approximated(element, "of a blend of surfaces the first is used");
+                let [first, _] = *parts;
+                self.add_surface(element, first, builder)
             }
-            "disk" => {
-                if textured || glows {
-                    self.warn(element, "the texture is not laid on the disk in rings");
-                }
-                let [centre, e1, e2] = self.disk(element)?;
-                builder.disk(centre, e1, e2, material, emission).map_err(self.refused(element))
-            }
-            "sphere" if glows => Err(self.unsupported(element, "a sphere that shines with a texture")),
-            "sphere" if inside_out && emission.is_some() => {
-                Err(self.unsupported(element, "a sphere that shines inwards"))
-            }
-            "sphere" => {
-                if textured {
-                    self.warn(
-                        element,
-                        "the texture is laid on the sphere with its top towards +y of the scene",
-                    );
-                }
-                let (centre, radius) = self.sphere(element)?;
-                builder.sphere(centre, radius, material, emission).map_err(self.refused(element))
-            }
-            _ => Err(self.unsupported(element, element.label())),
         }
     }
 
@@ -77,8 +166,10 @@ impl<'d> Context<'d> {
     fn triangles(&self, element: &'d Element) -> Result<Triangles, LoadError> {
         let kind = element.kind();
         let (mut mesh, own_face_normals) = match kind {
-            "rectangle" => (rectangle(), false),
-            "cube" => (cube(), false),
+            "rectangle" => (solids::rectangle(), false),
+            "cube" => (solids::cube(), false),
+            "sphere" => (solids::sphere(), false),
+            "cylinder" => (solids::cylinder(), false),
             _ => self.mesh_file(element)?,
         };
 
@@ -91,10 +182,16 @@ impl<'d> Context<'d> {
         // Normals: those of the file, else smooth ones, else none
         let flat = self.boolean(element, "face_normals", own_face_normals)?;
         let polyhedron = matches!(kind, "rectangle" | "cube");
-        if flat && !polyhedron {
+        let built_in = polyhedron || matches!(kind, "sphere" | "cylinder");
+        if flat && !built_in {
             mesh.normals.clear();
         }
-        mesh.transform(self.transform(element, "to_world")?);
+        let own = match kind {
+            "sphere" => self.own_sphere(element)?,
+            "cylinder" => self.own_cylinder(element)?,
+            _ => DMat4::IDENTITY,
+        };
+        mesh.transform(self.transform(element, "to_world")? * own);
         if mesh.normals.is_empty() && !flat {
             mesh.smooth();
         }
@@ -115,8 +212,8 @@ impl<'d> Context<'d> {
         let place = self.place(element);
         let name = self.string(element, "filename")?;
         let name =
-            name.ok_or_else(|| self.bad(element, format!("{} needs a `filename`", element.label())))?;
-        let path = self.folder.find(name, &place)?;
+            name.ok_or_else(|| self.bad(element, format!("{} needs a `filename`", element.species())))?;
+        let path = self.document.folder.find(name, &place)?;
         let bytes = files::read(&path, MAX_FILE_BYTES, &place)?;
         let (mesh, flat) = match element.kind() {
             "obj" => (obj::parse(&bytes, &path)?, false),
@@ -129,6 +226,9 @@ impl<'d> Context<'d> {
             }
         };
         mesh.check(&Place::file(&path))?;
+        if let Some(angle) = self.float(element, "max_smooth_angle")? {
+            self.approximated(element, format!("edges sharper than {angle}° are smoothed, too"));
+        }
         Ok((mesh, flat))
     }
 
@@ -136,28 +236,27 @@ impl<'d> Context<'d> {
         &self,
         element: &'d Element,
         mesh: &Triangles,
-        builder: &mut SceneBuilder,
+        filling: &mut Filling,
         material: MaterialId,
         emission: Option<Emission>,
     ) -> Result<(), LoadError> {
         let Triangles { positions, normals, uvs, indices } = mesh;
         let mesh = Mesh { positions, normals, uvs, indices };
-        let left_out = builder.mesh(&mesh, material, emission).map_err(self.refused(element))?;
+        let left_out = filling.builder.mesh(&mesh, material, emission).map_err(self.refused(element))?;
         if indices.is_empty() {
-            self.warn(element, "the mesh has no faces");
+            self.ignored(element, "the mesh has no faces");
         }
-        if left_out > 0 {
-            self.warn(
-                element,
-                format!("{left_out} of {} faces have no area and are left out", indices.len()),
-            );
+        // The poles of our own spheres have none either
+        if left_out > 0 && element.kind() != "sphere" {
+            let what = format!("{left_out} of {} faces have no area and are left out", indices.len());
+            self.ignored(element, what);
         }
         Ok(())
     }
 
     /// Centre and axes of a disk, whose front is where their cross product points.
-    fn disk(&self, element: &'d Element) -> Result<[[f32; 3]; 3], LoadError> {
-        let to_world = self.transform(element, "to_world")?;
+    fn disk(&self, element: &'d Element, instance: Option<DMat4>) -> Result<[[f32; 3]; 3], LoadError> {
+        let to_world = instance.unwrap_or_default() * self.transform(element, "to_world")?;
         let [e1, mut e2] = [to_world.x_axis, to_world.y_axis].map(|axis| axis.truncate());
         let mut front = normal_matrix(to_world) * DVec3::Z;
         if self.boolean(element, "flip_normals", false)? {
@@ -169,11 +268,10 @@ impl<'d> Context<'d> {
         Ok([to_world.w_axis.truncate(), e1, e2].map(|v| v.as_vec3().to_array()))
     }
 
-    /// Centre and radius of a sphere.
-    fn sphere(&self, element: &'d Element) -> Result<([f32; 3], f32), LoadError> {
-        let to_world = self.transform(element, "to_world")?;
-        let centre = self.point(element, "center")?.unwrap_or(DVec3::ZERO);
-        let radius = self.float(element, "radius")?.unwrap_or(1.0);
+    /// A sphere; none if it is stretched or sheared.
+    fn sphere(&self, element: &'d Element, instance: Option<DMat4>) -> Result<Option<Sphere>, LoadError> {
+        let to_world = instance.unwrap_or_default() * self.transform(element, "to_world")?;
+        let own = self.own_sphere(element)?;
         let axes = [to_world.x_axis, to_world.y_axis, to_world.z_axis].map(|axis| axis.truncate());
         let scale = axes[0].length();
         // To what six digits in a file leave of a rotation
@@ -181,56 +279,40 @@ impl<'d> Context<'d> {
         let even = axes.iter().all(|axis| close(axis.length_squared(), scale * scale))
             && [(0, 1), (1, 2), (2, 0)].iter().all(|(a, b)| close(axes[*a].dot(axes[*b]), 0.0));
         if !even {
-            return Err(self.unsupported(element, "a sphere that is stretched or sheared"));
+            return Ok(None);
         }
-        let centre = to_world.transform_point3(centre).as_vec3().to_array();
-        Ok((centre, (radius * scale) as f32))
+        let centre = to_world.transform_point3(own.w_axis.truncate()).as_vec3().to_array();
+        // Mitsuba's mirrored spheres have their front inside
+        let mirrored = DMat3::from_mat4(to_world).determinant() < 0.0;
+        let inside_out = mirrored != self.boolean(element, "flip_normals", false)?;
+        Ok(Some(Sphere { centre, radius: (own.x_axis.x * scale) as f32, inside_out }))
     }
 
-    /// Whether the front of a sphere is its inside: Mitsuba's mirrored spheres are so.
-    fn is_inside_out(&self, element: &'d Element) -> Result<bool, LoadError> {
-        let mirrored = DMat3::from_mat4(self.transform(element, "to_world")?).determinant() < 0.0;
-        Ok(mirrored != self.boolean(element, "flip_normals", false)?)
+    /// The sphere of radius 1 around the origin to that of the element's `center` and `radius`.
+    fn own_sphere(&self, element: &'d Element) -> Result<DMat4, LoadError> {
+        let centre = self.point(element, "center")?.unwrap_or(DVec3::ZERO);
+        let radius = self.float(element, "radius")?.unwrap_or(1.0);
+        Ok(DMat4::from_scale_rotation_translation(DVec3::splat(radius), DQuat::IDENTITY, centre))
     }
 
-    /// The surface that looks from its front as `surface` does from its back.
-    fn inside_out(&self, element: &Element, mut surface: Surface) -> Surface {
-        if let Material::Glass { ior, .. } = &mut surface.material {
-            *ior = ior.recip();
-        }
-        if surface.cover.one_sided {
-            self.warn(element, "the sphere is seen from outside, too, though its surface is one-sided");
-            surface.cover.one_sided = false;
-        }
-        surface
+    /// The cylinder of radius 1 along z from 0 to 1 to that of the element's `p0`, `p1` and `radius`.
+    fn own_cylinder(&self, element: &'d Element) -> Result<DMat4, LoadError> {
+        let p0 = self.point(element, "p0")?.unwrap_or(DVec3::ZERO);
+        let p1 = self.point(element, "p1")?.unwrap_or(DVec3::Z);
+        let radius = self.float(element, "radius")?.unwrap_or(1.0);
+        let axis = (p1 - p0).try_normalize();
+        let axis = axis.filter(|_| radius > 0.0).ok_or_else(|| {
+            self.bad(element, "a cylinder needs a `radius` above 0 and two ends that differ")
+        })?;
+        let scale = DVec3::new(radius, radius, (p1 - p0).length());
+        Ok(DMat4::from_scale_rotation_translation(scale, DQuat::from_rotation_arc(DVec3::Z, axis), p0))
     }
 }
 
-/// The square from −1 to 1 in x and y; its front is +z.
-fn rectangle() -> Triangles {
-    let corners = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
-    Triangles {
-        positions: corners.map(|[x, y]| [x, y, 0.0]).to_vec(),
-        normals: vec![[0.0, 0.0, 1.0]; 4],
-        uvs: corners.map(|corner| corner.map(|x| 0.5 * x + 0.5)).to_vec(),
-        indices: vec![[0, 1, 2], [0, 2, 3]],
-    }
-}
-
-/// The cube from −1 to 1, with a whole texture on each side.
-fn cube() -> Triangles {
-    // Of each side: where u and v run to; the front is v × u
-    let [x, y, z] = [Vec3::X, Vec3::Y, Vec3::Z];
-    let mut mesh = Triangles::default();
-    for (u, v) in [(z, x), (-x, -z), (y, -z), (y, x), (y, z), (-y, x)] {
-        let first = mesh.positions.len() as u32;
-        let front = v.cross(u);
-        for [s, t] in [[0.0, 1.0], [1.0, 1.0], [1.0, 0.0], [0.0, 0.0]] {
-            mesh.positions.push((front + u * (2.0 * s - 1.0) + v * (2.0 * t - 1.0)).to_array());
-            mesh.normals.push(front.to_array());
-            mesh.uvs.push([s, t]);
-        }
-        mesh.indices.extend([[first, first + 1, first + 2], [first, first + 2, first + 3]]);
-    }
-    mesh
+/// A sphere in the scene.
+struct Sphere {
+    centre: [f32; 3],
+    radius: f32,
+    /// Whether its front is inside.
+    inside_out: bool,
 }

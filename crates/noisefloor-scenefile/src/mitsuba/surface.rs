@@ -1,23 +1,40 @@
-//! A material as a shape wears it.
+//! What a shape's surface is made of.
 
-use noisefloor_ptwne::{Cover, Material, Texture};
+use noisefloor_ptwne::{Material, Texture};
 
-/// A material and what covers it.
+/// A material, or a blend of two surfaces, and what it lets through.
 #[derive(Clone, Debug)]
 pub(super) struct Surface {
-    pub(super) material: Material,
-    pub(super) cover: Cover,
+    pub(super) body: Body,
+    /// Where the surface is; everywhere if there is none.
+    pub(super) opacity: Option<Texture>,
+    /// Whether it is black from behind.
+    pub(super) one_sided: bool,
+}
+
+/// What reflects.
+#[derive(Clone, Debug)]
+pub(super) enum Body {
+    Plain(Material),
+    /// The first of them, but for the share of the second.
+    Blend(Box<[Surface; 2]>, Texture),
 }
 
 impl Surface {
     /// What reflects, and is black from behind.
     pub(super) fn one_sided(material: Material) -> Self {
-        Self { material, cover: Cover { opacity: None, one_sided: true } }
+        Self { body: Body::Plain(material), opacity: None, one_sided: true }
     }
 
     /// What is seen from both sides.
     pub(super) fn two_sided(material: Material) -> Self {
-        Self { material, cover: Cover::default() }
+        Self { one_sided: false, ..Self::one_sided(material) }
+    }
+
+    /// `share` of the second surface, and the rest of the first.
+    pub(super) fn blend(first: Self, second: Self, share: Texture) -> Self {
+        let one_sided = first.one_sided && second.one_sided;
+        Self { body: Body::Blend(Box::new([first, second]), share), opacity: None, one_sided }
     }
 
     /// What Mitsuba gives shapes without a surface: grey, or, if they shine, black.
@@ -25,16 +42,47 @@ impl Surface {
         Self::one_sided(Material::diffuse([if shines { 0.0 } else { 0.5 }; 3]))
     }
 
+    /// What lets all light through.
+    pub(super) fn nothing() -> Self {
+        let opacity = Some(Texture::Colour([0.0; 3]));
+        Self { opacity, ..Self::two_sided(Material::diffuse([0.0; 3])) }
+    }
+
+    /// The same from both sides.
+    pub(super) fn seen_from_both_sides(mut self) -> Self {
+        self.one_sided = false;
+        if let Body::Blend(parts, _) = &mut self.body {
+            **parts = (**parts).clone().map(Self::seen_from_both_sides);
+        }
+        self
+    }
+
+    /// The surface that looks from its front as this one does from its back.
+    pub(super) fn inside_out(mut self) -> Self {
+        match &mut self.body {
+            Body::Plain(Material::Glass { ior, .. }) => *ior = ior.recip(),
+            Body::Plain(_) => {}
+            Body::Blend(parts, _) => **parts = (**parts).clone().map(Self::inside_out),
+        }
+        self
+    }
+
     /// Whether it has a texture.
     pub(super) fn is_textured(&self) -> bool {
         let varies = |texture: &Texture| !matches!(texture, Texture::Colour(_));
-        self.cover.opacity.as_ref().is_some_and(varies)
-            || match &self.material {
-                Material::Diffuse { albedo: texture }
-                | Material::Plastic { diffuse: texture, .. }
-                | Material::RoughConductor { reflectance: texture, .. }
-                | Material::Conductor { reflectance: texture, .. } => varies(texture),
-                _ => false,
+        self.opacity.as_ref().is_some_and(varies)
+            || match &self.body {
+                Body::Blend(parts, share) => varies(share) || parts.iter().any(Self::is_textured),
+                Body::Plain(material) => match material {
+                    Material::Diffuse { albedo: texture }
+                    | Material::Plastic { diffuse: texture, .. }
+                    | Material::RoughConductor { reflectance: texture, .. }
+                    | Material::Conductor { reflectance: texture, .. } => varies(texture),
+                    Material::MetallicRoughness { base, metallic_roughness, .. } => {
+                        varies(base) || varies(metallic_roughness)
+                    }
+                    _ => false,
+                },
             }
     }
 }

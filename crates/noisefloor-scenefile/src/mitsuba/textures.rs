@@ -2,8 +2,8 @@
 
 use super::context::Context;
 use super::raster::{Raster, linear};
-use super::values::Use;
 use super::xml::Element;
+use crate::colour::Quantity;
 use crate::error::LoadError;
 use crate::picture::{self, Picture, Samples};
 use noisefloor::{Rgb, srgb_decode};
@@ -14,12 +14,12 @@ impl<'d> Context<'d> {
     /// The factor called `name`, constant or not, each channel in 0…1, or else `default`.
     pub(super) fn factor(&self, object: &'d Element, name: &str, default: f32) -> Result<Texture, LoadError> {
         match self.texture(object, name)? {
-            Some(element) => Ok(self.image(element, Use::Factor)?.1),
+            Some(element) => Ok(self.image(element, Quantity::Factor)?.1),
             None => self.constant_factor(object, name, default).map(Texture::Colour),
         }
     }
 
-    /// As [`Self::factor`], but it must be constant.
+    /// As [`Self::factor`], but a texture is replaced by its mean.
     pub(super) fn constant_factor(
         &self,
         object: &'d Element,
@@ -27,11 +27,12 @@ impl<'d> Context<'d> {
         default: f32,
     ) -> Result<Rgb, LoadError> {
         if let Some(texture) = self.texture(object, name)? {
-            return Err(self.unsupported(texture, format!("a texture as `{name}`")));
+            self.approximated(texture, format!("the texture of `{name}` is replaced by its mean"));
+            return Ok(mean(&self.image(texture, Quantity::Factor)?.1));
         }
-        let colour = self.colour(object, name, Use::Factor)?.unwrap_or([default; 3]);
+        let colour = self.colour(object, name, Quantity::Factor)?.unwrap_or([default; 3]);
         if colour.iter().any(|c| *c > 1.0) {
-            self.warn(
+            self.approximated(
                 object.get(name).unwrap_or(object),
                 format!("`{name}` is {colour:?}; values above 1 become 1"),
             );
@@ -42,10 +43,10 @@ impl<'d> Context<'d> {
     /// The light called `name`, 1 if there is none, and what multiplies it over the surface.
     pub(super) fn light(&self, object: &'d Element, name: &str) -> Result<(Rgb, Option<Texture>), LoadError> {
         if let Some(element) = self.texture(object, name)? {
-            let (scale, texture) = self.image(element, Use::Light)?;
+            let (scale, texture) = self.image(element, Quantity::Light)?;
             return Ok(([scale; 3], Some(texture)));
         }
-        Ok((self.colour(object, name, Use::Light)?.unwrap_or([1.0; 3]), None))
+        Ok((self.colour(object, name, Quantity::Light)?.unwrap_or([1.0; 3]), None))
     }
 
     /// The texture called `name`, if what is called so is one.
@@ -64,21 +65,76 @@ impl<'d> Context<'d> {
     }
 
     /// A texture, and what it is to be multiplied with: 1, but for lights brighter than 1.
-    fn image(&self, element: &'d Element, usage: Use) -> Result<(f32, Texture), LoadError> {
+    fn image(&self, element: &'d Element, quantity: Quantity) -> Result<(f32, Texture), LoadError> {
         let (scale, image) = match element.kind() {
-            "bitmap" => self.bitmap(element, usage)?,
+            "bitmap" => self.bitmap(element, quantity)?,
             "checkerboard" => (1.0, self.checkerboard(element)?),
-            _ => return Err(self.unsupported(element, element.label())),
+            "scale" => return self.scale(element, quantity),
+            _ => return Err(self.unsupported(element, element.species())),
         };
         Ok((scale, Texture::Image(image)))
     }
 
-    fn bitmap(&self, element: &'d Element, usage: Use) -> Result<(f32, ImageTexture), LoadError> {
+    /// A texture times a number, of Mitsuba 0.6.
+    fn scale(&self, element: &'d Element, quantity: Quantity) -> Result<(f32, Texture), LoadError> {
+        let factor = match self.float(element, "scale")? {
+            Some(factor) => [factor as f32; 3],
+            None => self.colour(element, "scale", Quantity::Factor)?.unwrap_or([1.0; 3]),
+        };
+        let parts = self.parts(element, "texture")?;
+        let [inside] = parts.as_slice() else {
+            return Err(self.bad(element, "<texture type=\"scale\"> needs one <texture> in it"));
+        };
+        let (scale, texture) = self.nested_in(element, || self.image(inside, quantity))?;
+        let peak = factor.into_iter().fold(0.0, f32::max).max(f32::MIN_POSITIVE);
+        if quantity == Quantity::Factor && peak > 1.0 {
+            return Ok((scale, self.scaled(element, texture, peak)?));
+        }
+        let over = if quantity == Quantity::Light { peak.max(1.0) } else { 1.0 };
+        let tint = |colour: Rgb| std::array::from_fn(|i| colour[i] * (factor[i] / over).max(0.0));
+        let texture = match texture {
+            Texture::Colour(colour) => Texture::Colour(tint(colour)),
+            Texture::Image(image) => Texture::Image(ImageTexture { factor: tint(image.factor), ..image }),
+            // This reader makes no others
+            other => other,
+        };
+        Ok((scale * over, texture))
+    }
+
+    /// A factor that is `scale` times as large; what would exceed 1 is 1.
+    pub(super) fn scaled(
+        &self,
+        element: &Element,
+        texture: Texture,
+        scale: f32,
+    ) -> Result<Texture, LoadError> {
+        Ok(match texture {
+            Texture::Colour(colour) => Texture::Colour(colour.map(|c| (c * scale).min(1.0))),
+            Texture::Image(image) if scale <= 1.0 => {
+                Texture::Image(ImageTexture { factor: image.factor.map(|c| c * scale), ..image })
+            }
+            Texture::Image(image) => {
+                self.count_pixels(element, image.width * image.height)?;
+                let larger = |p: Rgb| std::array::from_fn(|i| (p[i] * image.factor[i] * scale).min(1.0));
+                let pixels = Pixels::Float(linear(&image.pixels).into_iter().map(larger).collect());
+                Texture::Image(ImageTexture { pixels, factor: [1.0; 3], ..image })
+            }
+            // This reader makes no others
+            other => other,
+        })
+    }
+
+    fn bitmap(&self, element: &'d Element, quantity: Quantity) -> Result<(f32, ImageTexture), LoadError> {
         let name = self.string(element, "filename")?;
         let name = name.ok_or_else(|| self.bad(element, "a bitmap needs a `filename`"))?;
-        let raw = self.boolean(element, "raw", false)?;
+        // A gamma of 1 is how older versions say it
+        let raw = match self.float(element, "gamma")? {
+            Some(gamma) => gamma == 1.0,
+            None => self.boolean(element, "raw", false)?,
+        };
+        element.ignore(&["max_anisotropy", "cache", "mipmap", "format"]);
         let Raster { width, height, pixels } = self.raster(element, name, raw)?;
-        let (scale, pixels) = self.fit(element, pixels, usage)?;
+        let (scale, pixels) = self.fit(element, pixels, quantity)?;
 
         let nearest = match self.string(element, "filter_type")?.unwrap_or("bilinear") {
             "nearest" => true,
@@ -90,7 +146,10 @@ impl<'d> Context<'d> {
             "repeat" => Wrap::Repeat,
             "mirror" => Wrap::Mirror,
             "clamp" => Wrap::Clamp,
-            other => return Err(self.unsupported(element, format!("the wrap mode `{other}`"))),
+            other => {
+                self.approximated(element, format!("the wrap mode `{other}` is replaced by `clamp`"));
+                Wrap::Clamp
+            }
         };
         let to_uv = self.to_uv(element)?;
         let image = ImageTexture::new(width, height, pixels);
@@ -98,17 +157,20 @@ impl<'d> Context<'d> {
     }
 
     /// Brings the pixels of a picture into 0…1: those of factors are clamped, lights are scaled.
-    fn fit(&self, element: &Element, pixels: Pixels, usage: Use) -> Result<(f32, Pixels), LoadError> {
+    fn fit(&self, element: &Element, pixels: Pixels, quantity: Quantity) -> Result<(f32, Pixels), LoadError> {
         let Pixels::Float(values) = &pixels else { return Ok((1.0, pixels)) };
         let flat = || values.iter().flatten();
         if !flat().all(|v| v.is_finite()) {
             return Err(self.bad(element, "the picture has values that are not finite"));
         }
         let peak = flat().fold(0.0, |peak: f32, v| peak.max(*v));
-        let scale = if usage == Use::Light { peak.max(1.0) } else { 1.0 };
+        let scale = if quantity == Quantity::Light { peak.max(1.0) } else { 1.0 };
         let outside = flat().filter(|v| !(0.0..=scale).contains(*v)).count();
         if outside > 0 {
-            self.warn(element, format!("{outside} values of the picture are outside 0…1 and are clamped"));
+            self.approximated(
+                element,
+                format!("{outside} values of the picture are outside 0…1 and are clamped"),
+            );
         }
         if outside == 0 && scale == 1.0 {
             return Ok((scale, pixels));
@@ -155,7 +217,7 @@ impl<'d> Context<'d> {
     /// The picture called `name`. Codes of 8 and 16 bits are sRGB-encoded unless `raw`.
     pub(super) fn raster(&self, element: &Element, name: &str, raw: bool) -> Result<Raster, LoadError> {
         let place = &self.place(element);
-        let path = self.folder.find(name, place)?;
+        let path = self.document.folder.find(name, place)?;
         let key = (path, raw);
         if let Some(found) = self.rasters.borrow().get(&key) {
             return Ok(found.clone());
@@ -179,5 +241,33 @@ impl<'d> Context<'d> {
         let raster = Raster { width, height, pixels };
         self.rasters.borrow_mut().insert(key, raster.clone());
         Ok(raster)
+    }
+}
+
+/// The mean colour of a texture.
+pub(super) fn mean(texture: &Texture) -> Rgb {
+    match texture {
+        Texture::Colour(colour) => *colour,
+        Texture::Image(image) => {
+            let pixels = linear(&image.pixels);
+            let sum = |i: usize| pixels.iter().map(|p| f64::from(p[i])).sum::<f64>();
+            std::array::from_fn(|i| image.factor[i] * (sum(i) / pixels.len().max(1) as f64) as f32)
+        }
+        // This reader makes no others
+        _ => [0.5; 3],
+    }
+}
+
+/// The largest value of a texture.
+pub(super) fn peak(texture: &Texture) -> f32 {
+    let largest = |colour: Rgb| colour.into_iter().fold(0.0, f32::max);
+    match texture {
+        Texture::Colour(colour) => largest(*colour),
+        Texture::Image(image) => {
+            let pixels = linear(&image.pixels).into_iter().map(largest).fold(0.0, f32::max);
+            pixels * largest(image.factor)
+        }
+        // This reader makes no others
+        _ => 1.0,
     }
 }

@@ -1,0 +1,229 @@
+//! Spectra as linear Rec.709 colours.
+
+use noisefloor::Rgb;
+
+/// First wavelength of [`CIE`] in nanometres, and the step between its rows.
+const FIRST: f64 = 360.0;
+const STEP: f64 = 5.0;
+/// Integral of the second column of [`CIE`], which is what turns a spectrum of 1 into a Y of 1.
+const Y_INTEGRAL: f64 = 106.857;
+/// Temperatures that black bodies may have, in kelvin.
+pub(crate) const TEMPERATURES: std::ops::RangeInclusive<f64> = 100.0..=1e6;
+
+/// Linear Rec.709 colour of a spectrum that is 1 at all wavelengths: an equal-energy white is a little redder than
+/// D65.
+pub(crate) const EQUAL_ENERGY: Rgb = [1.20479, 0.948_29, 0.908_92];
+
+/// What a spectrum describes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Quantity {
+    /// A factor on light, such as a reflectance: seen under D65, the white of Rec.709, so that 1 at all wavelengths is
+    /// white.
+    Factor,
+    /// Emitted light.
+    Light,
+}
+
+/// The colour of a spectrum given at rising wavelengths in nanometres: linear in between, zero beyond. Channels that
+/// would be negative, as colours outside Rec.709 have them, are zero.
+pub(crate) fn of_spectrum(samples: &[(f64, f64)], quantity: Quantity) -> Rgb {
+    let at = |wavelength: f64| {
+        let next = samples.partition_point(|(w, _)| *w <= wavelength);
+        match (next.checked_sub(1).map(|i| samples[i]), samples.get(next)) {
+            (Some((w0, v0)), Some((w1, v1))) => v0 + (v1 - v0) * (wavelength - w0) / (w1 - w0),
+            (Some((w0, v0)), None) if w0 == wavelength => v0,
+            _ => 0.0,
+        }
+    };
+    integrate(at, quantity)
+}
+
+/// The colour of light from a black body of that temperature in kelvin: Planck's radiance per nanometre, in
+/// W/(m²·sr·nm).
+pub(crate) fn of_black_body(temperature: f64) -> Rgb {
+    // CODATA 2018: h, c and Boltzmann's constant
+    let (h, c, k) = (6.626_070_15e-34, 299_792_458.0, 1.380_649e-23);
+    let planck = |nanometres: f64| {
+        let wavelength = nanometres * 1e-9;
+        2.0 * h * c * c / (wavelength.powi(5) * (h * c / (wavelength * k * temperature)).exp_m1()) * 1e-9
+    };
+    integrate(planck, Quantity::Light)
+}
+
+/// Integrates a spectrum against the colour matching functions in steps of a nanometre.
+fn integrate(at: impl Fn(f64) -> f64, quantity: Quantity) -> Rgb {
+    let last = (CIE.len() - 1) as f64 * STEP;
+    let (mut sums, mut white) = ([0.0; 3], [0.0; 3]);
+    for nanometre in 0..=last as u32 {
+        let x = f64::from(nanometre) / STEP;
+        let row = (x as usize).min(CIE.len() - 2);
+        let [r, g, b, d65] =
+            std::array::from_fn(|i| CIE[row][i] + (CIE[row + 1][i] - CIE[row][i]) * (x - row as f64));
+        let light = if quantity == Quantity::Factor { d65 } else { 1.0 };
+        let value = at(FIRST + f64::from(nanometre));
+        for (i, matching) in [r, g, b].into_iter().enumerate() {
+            sums[i] += value * matching * light;
+            white[i] += matching * light;
+        }
+    }
+    let linear = |xyz: [f64; 3]| RGB_OF_XYZ.map(|row| row[0] * xyz[0] + row[1] * xyz[1] + row[2] * xyz[2]);
+    match quantity {
+        Quantity::Light => linear(sums.map(|sum| sum / Y_INTEGRAL)).map(|c| c.max(0.0) as f32),
+        // The table's D65 is white to three digits: divide the rest away
+        Quantity::Factor => {
+            let (colour, white) = (linear(sums), linear(white));
+            std::array::from_fn(|i| (colour[i] / white[i]).max(0.0) as f32)
+        }
+    }
+}
+
+/// From XYZ to linear Rec.709 (IEC 61966-2-1).
+const RGB_OF_XYZ: [[f64; 3]; 3] = [
+    [3.240_479, -1.537_15, -0.498_535],
+    [-0.969_256, 1.875_991, 0.041_556],
+    [0.055_648, -0.204_043, 1.057_311],
+];
+
+/// The colour matching functions x̄, ȳ and z̄ of the CIE 1931 standard observer (CIE 018:2019), and the relative power of
+/// the illuminant D65 (ISO/CIE 11664-2), every 5 nm from 360 to 830.
+#[rustfmt::skip]
+const CIE: [[f64; 4]; 95] = [
+    [0.0001299, 3.917e-06, 0.0006061, 46.6383],
+    [0.0002321, 6.965e-06, 0.001086, 49.3637],
+    [0.0004149, 1.239e-05, 0.001946, 52.0891],
+    [0.0007416, 2.202e-05, 0.003486, 51.0323],
+    [0.001368, 3.9e-05, 0.00645, 49.9755],
+    [0.002236, 6.4e-05, 0.01055, 52.3118],
+    [0.004243, 0.00012, 0.02005, 54.6482],
+    [0.00765, 0.000217, 0.03621, 68.7015],
+    [0.01431, 0.000396, 0.06785, 82.7549],
+    [0.02319, 0.00064, 0.1102, 87.1204],
+    [0.04351, 0.00121, 0.2074, 91.486],
+    [0.07763, 0.00218, 0.3713, 92.4589],
+    [0.13438, 0.004, 0.6456, 93.4318],
+    [0.21477, 0.0073, 1.03905, 90.057],
+    [0.2839, 0.0116, 1.3856, 86.6823],
+    [0.3285, 0.01684, 1.62296, 95.7736],
+    [0.34828, 0.023, 1.74706, 104.865],
+    [0.34806, 0.0298, 1.7826, 110.936],
+    [0.3362, 0.038, 1.77211, 117.008],
+    [0.3187, 0.048, 1.7441, 117.41],
+    [0.2908, 0.06, 1.6692, 117.812],
+    [0.2511, 0.0739, 1.5281, 116.336],
+    [0.19536, 0.09098, 1.28764, 114.861],
+    [0.1421, 0.1126, 1.0419, 115.392],
+    [0.09564, 0.13902, 0.81295, 115.923],
+    [0.05795, 0.1693, 0.6162, 112.367],
+    [0.03201, 0.20802, 0.46518, 108.811],
+    [0.0147, 0.2586, 0.3533, 109.082],
+    [0.0049, 0.323, 0.272, 109.354],
+    [0.0024, 0.4073, 0.2123, 108.578],
+    [0.0093, 0.503, 0.1582, 107.802],
+    [0.0291, 0.6082, 0.1117, 106.296],
+    [0.06327, 0.71, 0.07825, 104.79],
+    [0.1096, 0.7932, 0.05725, 106.239],
+    [0.1655, 0.862, 0.04216, 107.689],
+    [0.22575, 0.91485, 0.02984, 106.047],
+    [0.2904, 0.954, 0.0203, 104.405],
+    [0.3597, 0.9803, 0.0134, 104.225],
+    [0.43345, 0.99495, 0.00875, 104.046],
+    [0.51205, 1.0, 0.00575, 102.023],
+    [0.5945, 0.995, 0.0039, 100.0],
+    [0.6784, 0.9786, 0.00275, 98.1671],
+    [0.7621, 0.952, 0.0021, 96.3342],
+    [0.8425, 0.9154, 0.0018, 96.0611],
+    [0.9163, 0.87, 0.00165, 95.788],
+    [0.9786, 0.8163, 0.0014, 92.2368],
+    [1.0263, 0.757, 0.0011, 88.6856],
+    [1.0567, 0.6949, 0.001, 89.3459],
+    [1.0622, 0.631, 0.0008, 90.0062],
+    [1.0456, 0.5668, 0.0006, 89.8026],
+    [1.0026, 0.503, 0.00034, 89.5991],
+    [0.9384, 0.4412, 0.00024, 88.6489],
+    [0.85445, 0.381, 0.00019, 87.6987],
+    [0.7514, 0.321, 0.0001, 85.4936],
+    [0.6424, 0.265, 5e-05, 83.2886],
+    [0.5419, 0.217, 3e-05, 83.4939],
+    [0.4479, 0.175, 2e-05, 83.6992],
+    [0.3608, 0.1382, 1e-05, 81.863],
+    [0.2835, 0.107, 0.0, 80.0268],
+    [0.2187, 0.0816, 0.0, 80.1207],
+    [0.1649, 0.061, 0.0, 80.2146],
+    [0.1212, 0.04458, 0.0, 81.2462],
+    [0.0874, 0.032, 0.0, 82.2778],
+    [0.0636, 0.0232, 0.0, 80.281],
+    [0.04677, 0.017, 0.0, 78.2842],
+    [0.0329, 0.01192, 0.0, 74.0027],
+    [0.0227, 0.00821, 0.0, 69.7213],
+    [0.01584, 0.005723, 0.0, 70.6652],
+    [0.0113592, 0.004102, 0.0, 71.6091],
+    [0.00811092, 0.002929, 0.0, 72.979],
+    [0.00579035, 0.002091, 0.0, 74.349],
+    [0.00410946, 0.001484, 0.0, 67.9765],
+    [0.00289933, 0.001047, 0.0, 61.604],
+    [0.00204919, 0.00074, 0.0, 65.7448],
+    [0.00143997, 0.00052, 0.0, 69.8856],
+    [0.000999949, 0.0003611, 0.0, 72.4863],
+    [0.000690079, 0.0002492, 0.0, 75.087],
+    [0.000476021, 0.0001719, 0.0, 69.3398],
+    [0.000332301, 0.00012, 0.0, 63.5927],
+    [0.000234826, 8.48e-05, 0.0, 55.0054],
+    [0.00016615, 6e-05, 0.0, 46.4182],
+    [0.000117413, 4.24e-05, 0.0, 56.6118],
+    [8.30753e-05, 3e-05, 0.0, 66.8054],
+    [5.87065e-05, 2.12e-05, 0.0, 65.0941],
+    [4.15099e-05, 1.499e-05, 0.0, 63.3828],
+    [2.93533e-05, 1.06e-05, 0.0, 63.8434],
+    [2.06738e-05, 7.4657e-06, 0.0, 64.304],
+    [1.45598e-05, 5.2578e-06, 0.0, 61.8779],
+    [1.0254e-05, 3.7029e-06, 0.0, 59.4519],
+    [7.22146e-06, 2.6078e-06, 0.0, 55.7054],
+    [5.08587e-06, 1.8366e-06, 0.0, 51.959],
+    [3.58165e-06, 1.2934e-06, 0.0, 54.6998],
+    [2.52252e-06, 9.1093e-07, 0.0, 57.4406],
+    [1.77651e-06, 6.4153e-07, 0.0, 58.8765],
+    [1.25114e-06, 4.5181e-07, 0.0, 60.3125],
+];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[track_caller]
+    fn close(got: Rgb, want: Rgb, tolerance: f32) {
+        let off =
+            got.iter().zip(want).any(|(got, want)| (got - want).abs() > tolerance * want.abs().max(0.01));
+        assert!(!off, "{got:?}, want {want:?}");
+    }
+
+    /// As Mitsuba 3.9.1 has them in its RGB mode.
+    #[test]
+    fn spectra_have_the_colours_of_mitsuba() {
+        let flat = [(300.0, 1.0), (900.0, 1.0)];
+        close(of_spectrum(&flat, Quantity::Light), EQUAL_ENERGY, 1e-3);
+        close(of_spectrum(&flat, Quantity::Factor), [1.0; 3], 1e-6);
+        let rising = [(400.0, 0.1), (500.0, 0.2), (600.0, 0.3), (700.0, 0.4)];
+        close(of_spectrum(&rising, Quantity::Light), [0.402_061, 0.231_368, 0.124_453], 2e-3);
+        close(of_spectrum(&rising, Quantity::Factor), [0.340_779, 0.242_912, 0.140_304], 4e-3);
+        let cut = [(400.0, 1.0), (500.0, 1.0), (600.0, 1.0)];
+        close(of_spectrum(&cut, Quantity::Light), [0.230_967, 0.994_374, 0.917_431], 1e-2);
+    }
+
+    /// 6500 K is nearly D65: white within a few per cent. And as Stefan and Boltzmann have it, hotter is brighter.
+    #[test]
+    fn black_bodies_are_red_white_and_blue() {
+        let [r, g, b] = of_black_body(6500.0);
+        assert!((r / g - 1.0).abs() < 0.06 && (b / g - 1.0).abs() < 0.06, "{r} {g} {b}");
+        let [r, g, b] = of_black_body(2000.0);
+        assert!(r > 2.0 * g && g > 2.0 * b);
+        let [r, g, b] = of_black_body(15_000.0);
+        assert!(b > g && g > r);
+        assert_eq!(of_black_body(*TEMPERATURES.start()), [0.0; 3]);
+    }
+
+    #[test]
+    fn one_wavelength_has_no_area() {
+        assert_eq!(of_spectrum(&[(555.0, 0.0)], Quantity::Light), [0.0; 3]);
+        assert_eq!(of_spectrum(&[], Quantity::Light), [0.0; 3]);
+    }
+}

@@ -1,0 +1,102 @@
+//! Curved and simple solids as triangles.
+
+use super::Triangles;
+use glam::Vec3;
+use std::f32::consts::{PI, TAU};
+
+/// Triangles around a circle, and from pole to pole of a sphere.
+const AROUND: u32 = 128;
+const ALONG: u32 = 64;
+
+/// The square from −1 to 1 in x and y; its front is +z.
+pub(crate) fn rectangle() -> Triangles {
+    let corners = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
+    Triangles {
+        positions: corners.map(|[x, y]| [x, y, 0.0]).to_vec(),
+        normals: vec![[0.0, 0.0, 1.0]; 4],
+        uvs: corners.map(|corner| corner.map(|x| 0.5 * x + 0.5)).to_vec(),
+        indices: vec![[0, 1, 2], [0, 2, 3]],
+    }
+}
+
+/// The cube from −1 to 1, with a whole texture on each side.
+pub(crate) fn cube() -> Triangles {
+    // Of each side: where u and v run to; the front is v × u
+    let [x, y, z] = [Vec3::X, Vec3::Y, Vec3::Z];
+    let mut mesh = Triangles::default();
+    for (u, v) in [(z, x), (-x, -z), (y, -z), (y, x), (y, z), (-y, x)] {
+        let first = mesh.positions.len() as u32;
+        let front = v.cross(u);
+        for [s, t] in [[0.0, 1.0], [1.0, 1.0], [1.0, 0.0], [0.0, 0.0]] {
+            mesh.positions.push((front + u * (2.0 * s - 1.0) + v * (2.0 * t - 1.0)).to_array());
+            mesh.normals.push(front.to_array());
+            mesh.uvs.push([s, t]);
+        }
+        mesh.indices.extend([[first, first + 1, first + 2], [first, first + 2, first + 3]]);
+    }
+    mesh
+}
+
+/// A sphere of radius 1 around the origin. u runs around z from +x over +y, v from +z at 0 to −z at 1.
+pub(crate) fn sphere() -> Triangles {
+    grid(ALONG, |u, v| {
+        let (sin, cos) = (PI * v).sin_cos();
+        let (y, x) = (TAU * u).sin_cos();
+        let normal = [sin * x, sin * y, cos];
+        (normal, normal)
+    })
+}
+
+/// The open cylinder of radius 1 around z, from z = 0 to z = 1. u runs around z from +x over +y, v along z.
+pub(crate) fn cylinder() -> Triangles {
+    let mut mesh = grid(1, |u, v| {
+        let (y, x) = (TAU * u).sin_cos();
+        ([x, y, v], [x, y, 0.0])
+    });
+    // v runs up: the other way round than on a sphere
+    mesh.indices.iter_mut().for_each(|triangle| triangle.swap(1, 2));
+    mesh
+}
+
+/// A grid of `AROUND` by `along` squares with positions and normals as functions of (u, v).
+fn grid(along: u32, at: impl Fn(f32, f32) -> ([f32; 3], [f32; 3])) -> Triangles {
+    let mut mesh = Triangles::default();
+    for j in 0..=along {
+        for i in 0..=AROUND {
+            let (u, v) = (i as f32 / AROUND as f32, j as f32 / along as f32);
+            let (position, normal) = at(u, v);
+            mesh.positions.push(position);
+            mesh.normals.push(normal);
+            mesh.uvs.push([u, v]);
+        }
+    }
+    let row = AROUND + 1;
+    for j in 0..along {
+        for i in 0..AROUND {
+            let a = j * row + i;
+            mesh.indices.extend([[a, a + row, a + row + 1], [a, a + row + 1, a + 1]]);
+        }
+    }
+    mesh
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Corners run counter-clockwise as seen from where the normals point, and all fits together.
+    #[test]
+    fn fronts_are_outside() {
+        for (mesh, area) in [(sphere(), 4.0 * PI), (cylinder(), TAU), (cube(), 24.0), (rectangle(), 4.0)] {
+            let mut sum = 0.0;
+            for triangle in &mesh.indices {
+                let [a, b, c] = triangle.map(|i| Vec3::from(mesh.positions[i as usize]));
+                let normal: Vec3 = triangle.iter().map(|i| Vec3::from(mesh.normals[*i as usize])).sum();
+                let cross = (b - a).cross(c - a);
+                assert!(cross.dot(normal) > -1e-6, "{triangle:?}");
+                sum += 0.5 * cross.length();
+            }
+            assert!((sum / area - 1.0).abs() < 2e-3, "{sum} {area}");
+        }
+    }
+}
