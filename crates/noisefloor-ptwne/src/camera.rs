@@ -1,9 +1,10 @@
-//! A pinhole camera.
+//! The camera.
 
+use crate::checks::{MAX_COORDINATE, check_range};
 use crate::error::SceneError;
-use crate::math::{Ray, Vec3};
+use crate::math::{self, Ray, Vec3};
 
-/// A pinhole camera. The aspect ratio follows from the resolution; pixels are square.
+/// A camera, by default a pinhole. The aspect ratio follows from the resolution; pixels are square.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
     /// Position, in scene units.
@@ -12,8 +13,56 @@ pub struct Camera {
     pub target: [f32; 3],
     /// A direction that points up in the image. It need not be perpendicular to the view, or have length 1.
     pub up: [f32; 3],
-    /// Vertical field of view in degrees, above 0 and below 180.
+    /// Field of view in degrees, above 0 and below 180: vertical, unless [`Optics::fov_axis`] says otherwise.
     pub vertical_fov: f32,
+}
+
+/// Which edge of the image the field of view spans.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum FovAxis {
+    /// From the bottom to the top.
+    #[default]
+    Vertical,
+    /// From the left to the right.
+    Horizontal,
+    /// The shorter edge.
+    Smaller,
+    /// The longer edge.
+    Larger,
+    /// From corner to corner.
+    Diagonal,
+}
+
+/// How a [`Camera`] projects, besides its field of view. The default is a pinhole.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Optics {
+    /// The edge that the field of view spans.
+    pub fov_axis: FovAxis,
+    /// Radius of the lens in scene units, 0…1e6; 0 has everything in focus.
+    pub aperture_radius: f32,
+    /// Distance of what is in focus, along the view, in scene units: above 0 if there is a lens.
+    pub focus_distance: f32,
+    /// For parallel projection: the height of what is seen, in scene units. The field of view and the lens do not
+    /// count then.
+    pub parallel_height: Option<f32>,
+    /// Whether left and right are exchanged.
+    pub mirrored: bool,
+}
+
+impl Optics {
+    pub(crate) fn check(&self) -> Result<(), SceneError> {
+        let all = [self.aperture_radius, self.focus_distance, self.parallel_height.unwrap_or(1.0)];
+        if !all.iter().all(|x| x.is_finite()) {
+            return Err(SceneError::NotFinite { what: "the optics of the camera" });
+        }
+        check_range("the radius of the lens", self.aperture_radius, [0.0, MAX_COORDINATE], "0…1e6")?;
+        if self.aperture_radius > 0.0 {
+            let (what, range) = ("the focus distance", "1e-6…1e9");
+            check_range(what, self.focus_distance, [1e-6, 1e9], range)?;
+        }
+        let height = self.parallel_height.unwrap_or(1.0);
+        check_range("the height of a parallel projection", height, [1e-6, MAX_COORDINATE], "1e-6…1e6")
+    }
 }
 
 impl Camera {
@@ -32,34 +81,70 @@ impl Camera {
     }
 
     /// The camera, prepared for an image of `width`×`height` pixels, in coordinates relative to `origin`.
-    pub(crate) fn lens(&self, width: usize, height: usize, origin: Vec3) -> Lens {
+    pub(crate) fn lens(&self, optics: &Optics, width: usize, height: usize, origin: Vec3) -> Lens {
         let eye = Vec3::from_array(self.eye);
         let view = (Vec3::from_array(self.target) - eye).normalize();
-        let right = view.cross(Vec3::from_array(self.up)).normalize();
-        let down = view.cross(right);
-        // Height of a pixel on the plane one unit away
-        let pixel = 2.0 * (0.5 * self.vertical_fov.to_radians()).tan() / height as f32;
-        Lens {
-            eye: eye - origin,
-            corner: view - right * (0.5 * width as f32 * pixel) - down * (0.5 * height as f32 * pixel),
-            right: right * pixel,
-            down: down * pixel,
-        }
+        let side = view.cross(Vec3::from_array(self.up)).normalize();
+        let down = view.cross(side);
+        let right = if optics.mirrored { -side } else { side };
+
+        // Height of a pixel: on the plane one unit away, or in scene units
+        let (w, h) = (width as f32, height as f32);
+        let span = match optics.fov_axis {
+            FovAxis::Vertical => h,
+            FovAxis::Horizontal => w,
+            FovAxis::Smaller => w.min(h),
+            FovAxis::Larger => w.max(h),
+            FovAxis::Diagonal => w.hypot(h),
+        };
+        let pixel = match optics.parallel_height {
+            Some(seen) => seen / h,
+            None => 2.0 * (0.5 * self.vertical_fov.to_radians()).tan() / span,
+        };
+        let corner = -right * (0.5 * w * pixel) - down * (0.5 * h * pixel);
+        let projection = match optics.parallel_height {
+            Some(_) => Projection::Parallel { view },
+            None if optics.aperture_radius > 0.0 => Projection::Thin {
+                across: [side * optics.aperture_radius, down * optics.aperture_radius],
+                focus: optics.focus_distance,
+            },
+            None => Projection::Pinhole,
+        };
+        let corner = if optics.parallel_height.is_some() { corner } else { corner + view };
+        Lens { eye: eye - origin, corner, right: right * pixel, down: down * pixel, projection }
     }
 }
 
-/// The image plane one unit in front of the eye.
+/// The image plane: one unit in front of the eye, or through it under parallel projection.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Lens {
     eye: Vec3,
     corner: Vec3,
     right: Vec3,
     down: Vec3,
+    projection: Projection,
+}
+
+/// Where rays begin.
+#[derive(Clone, Copy, Debug)]
+enum Projection {
+    Pinhole,
+    /// On a disk around the eye with these radii.
+    Thin {
+        across: [Vec3; 2],
+        focus: f32,
+    },
+    /// All along `view`.
+    Parallel {
+        view: Vec3,
+    },
 }
 
 impl Lens {
-    /// The eye, and the inward normals of the four planes through it and the sides of a rectangle of pixels.
-    pub(crate) fn pyramid(&self, x: [f32; 2], y: [f32; 2]) -> (Vec3, [Vec3; 4]) {
+    /// The eye, and the inward normals of the four planes through it and the sides of a rectangle of pixels; none
+    /// unless all rays begin at the eye.
+    pub(crate) fn pyramid(&self, x: [f32; 2], y: [f32; 2]) -> Option<(Vec3, [Vec3; 4])> {
+        let Projection::Pinhole = self.projection else { return None };
         let at = |x: f32, y: f32| self.corner + self.right * x + self.down * y;
         let corners = [at(x[0], y[0]), at(x[1], y[0]), at(x[1], y[1]), at(x[0], y[1])];
         let middle = at(0.5 * (x[0] + x[1]), 0.5 * (y[0] + y[1]));
@@ -67,13 +152,22 @@ impl Lens {
             let n = corners[i].cross(corners[(i + 1) % 4]).normalize_or_zero();
             if n.dot(middle) < 0.0 { -n } else { n }
         });
-        (self.eye, normals)
+        Some((self.eye, normals))
     }
 
-    /// The ray through (x, y), in pixels from the top left corner.
+    /// The ray through (x, y), in pixels from the top left corner. `u` chooses a point of the lens.
     #[inline]
-    pub(crate) fn ray(&self, x: f32, y: f32) -> Ray {
-        Ray { origin: self.eye, dir: (self.corner + self.right * x + self.down * y).normalize() }
+    pub(crate) fn ray(&self, x: f32, y: f32, u: [f32; 2]) -> Ray {
+        let at = self.corner + self.right * x + self.down * y;
+        match self.projection {
+            Projection::Pinhole => Ray { origin: self.eye, dir: at.normalize() },
+            Projection::Thin { across, focus } => {
+                let [a, b] = math::disk(u);
+                let offset = across[0] * a + across[1] * b;
+                Ray { origin: self.eye + offset, dir: (at * focus - offset).normalize() }
+            }
+            Projection::Parallel { view } => Ray { origin: self.eye + at, dir: view },
+        }
     }
 }
 
@@ -90,15 +184,15 @@ mod tests {
             vertical_fov: 40.0,
         };
         camera.check().unwrap();
-        let lens = camera.lens(320, 200, Vec3::ZERO);
+        let lens = camera.lens(&Optics::default(), 320, 200, Vec3::ZERO);
         let view = (Vec3::new(4.0, 2.5, -1.0) - Vec3::new(1.0, 2.0, 3.0)).normalize();
-        assert!((lens.ray(160.0, 100.0).dir - view).length() < 1e-6);
+        assert!((lens.ray(160.0, 100.0, [0.5; 2]).dir - view).length() < 1e-6);
         // The top and bottom middles are one field of view apart, and the top is up
-        let (top, bottom) = (lens.ray(160.0, 0.0).dir, lens.ray(160.0, 200.0).dir);
+        let (top, bottom) = (lens.ray(160.0, 0.0, [0.5; 2]).dir, lens.ray(160.0, 200.0, [0.5; 2]).dir);
         assert!((top.angle_between(bottom).to_degrees() - 40.0).abs() < 1e-2);
         assert!(top.y > bottom.y);
         // Right of the middle is to the right: view × up
-        assert!(lens.ray(320.0, 100.0).dir.dot(view.cross(Vec3::Y)) > 0.0);
+        assert!(lens.ray(320.0, 100.0, [0.5; 2]).dir.dot(view.cross(Vec3::Y)) > 0.0);
     }
 
     #[test]
@@ -109,5 +203,55 @@ mod tests {
         for vertical_fov in [0.0, -1.0, 180.0, f32::NAN] {
             assert!(Camera { vertical_fov, ..good }.check().is_err());
         }
+    }
+
+    fn straight() -> Camera {
+        Camera { eye: [0.0; 3], target: [0.0, 0.0, -1.0], up: [0.0, 1.0, 0.0], vertical_fov: 90.0 }
+    }
+
+    /// The slope of the ray through the right edge of an image of 300×200 pixels is 1 where the field of view spans
+    /// the width.
+    #[test]
+    fn fields_of_view_span_the_edge_they_name() {
+        for (fov_axis, slope) in [
+            (FovAxis::Vertical, 1.5),
+            (FovAxis::Horizontal, 1.0),
+            (FovAxis::Smaller, 1.5),
+            (FovAxis::Larger, 1.0),
+            (FovAxis::Diagonal, 1.5 / 1.5f32.hypot(1.0)),
+        ] {
+            for mirrored in [false, true] {
+                let optics = Optics { fov_axis, mirrored, ..Optics::default() };
+                let dir = straight().lens(&optics, 300, 200, Vec3::ZERO).ray(300.0, 100.0, [0.5; 2]).dir;
+                let want = if mirrored { -slope } else { slope };
+                assert!((dir.x / -dir.z - want).abs() < 1e-5, "{fov_axis:?} {dir}");
+            }
+        }
+    }
+
+    /// All rays of a pixel meet where it is in focus, from different points of the lens.
+    #[test]
+    fn lenses_focus() {
+        let optics = Optics { aperture_radius: 0.5, focus_distance: 4.0, ..Optics::default() };
+        let lens = straight().lens(&optics, 100, 100, Vec3::ZERO);
+        for u in [[0.1, 0.2], [0.9, 0.7], [0.99, 0.4]] {
+            let ray = lens.ray(75.0, 50.0, u);
+            assert!(ray.origin.length() <= 0.5 && ray.origin.z.abs() < 1e-6);
+            let at = ray.origin + ray.dir * ((-4.0 - ray.origin.z) / ray.dir.z);
+            assert!((at - Vec3::new(2.0, 0.0, -4.0)).length() < 1e-5, "{at}");
+        }
+        assert!(lens.pyramid([0.0, 1.0], [0.0, 1.0]).is_none());
+    }
+
+    #[test]
+    fn parallel_rays_are_parallel() {
+        let optics = Optics { parallel_height: Some(4.0), ..Optics::default() };
+        let lens = straight().lens(&optics, 200, 100, Vec3::ZERO);
+        let ray = lens.ray(200.0, 0.0, [0.5; 2]);
+        assert!((ray.origin - Vec3::new(4.0, 2.0, 0.0)).length() < 1e-5 && ray.dir == Vec3::NEG_Z);
+        for bad in [-1.0, f32::NAN, 0.0] {
+            assert!(Optics { parallel_height: Some(bad), ..optics }.check().is_err());
+        }
+        assert!(Optics { aperture_radius: 1.0, ..Optics::default() }.check().is_err());
     }
 }

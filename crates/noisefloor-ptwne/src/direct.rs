@@ -63,8 +63,8 @@ impl<'a> Tracer<'a> {
     /// Sample `index` of the pixel `at` in the sequence of `seed`, which has 2¹⁶/[`LIGHT_SAMPLES`].
     pub(crate) fn sample(&mut self, lens: &Lens, at: [usize; 2], index: u32, seed: u64) -> Vec3 {
         (self.index, self.seed) = (index, seed);
-        let [u, v] = pair(index, seed);
-        let ray = lens.ray(at[0] as f32 + u, at[1] as f32 + v);
+        let [u, v, lens_u, lens_v] = sobol_burley::sample_4d(index, 0, seed as u32);
+        let ray = lens.ray(at[0] as f32 + u, at[1] as f32 + v, [lens_u, lens_v]);
         self.radiance(Branch { ray, density: DELTA, weight: Vec3::ONE, code: 1 })
     }
 
@@ -130,6 +130,9 @@ impl<'a> Tracer<'a> {
                 split(reflectance, bsdf::refract(ray.dir, surface.normal, cos, cos_t, eta), *tint)
             }
             Bsdf::ThinGlass { ior, tint } => split(bsdf::pane(cos, *ior), ray.dir, *tint),
+            Bsdf::RoughGlass { .. } => self.rough_glass(&ray, &surface, weight, code),
+            // Intersections have one of its parts
+            Bsdf::Mix { .. } => Vec3::ZERO,
             Bsdf::Metal { .. } | Bsdf::Plastic { .. } | Bsdf::Blend { .. } => {
                 self.glossy(&ray, &surface, weight, code)
             }
@@ -150,6 +153,21 @@ impl<'a> Tracer<'a> {
         }
         let ray = Ray { origin: self.scene.leave(surface, dir), dir };
         self.radiance(Branch { ray, density, weight, code })
+    }
+
+    /// A rough boundary: one sampled direction, by which lights are found, too.
+    fn rough_glass(&mut self, ray: &Ray, surface: &Intersection<'_>, weight: Vec3, code: u64) -> Vec3 {
+        let frame = Frame::new(surface.normal);
+        let numbers = sobol_burley::sample_4d(self.index, 0, self.seed(code, Use::Facets) as u32);
+        let sampled = surface
+            .rough_glass()
+            .and_then(|glass| glass.sample(frame.to_local(-ray.dir), [numbers[2], numbers[0], numbers[1]]));
+        let Some((wi, factor, _)) = sampled else { return Vec3::ZERO };
+        let dir = frame.to_world(wi).normalize();
+        if (dir.dot(surface.flat) > 0.0) != (wi.z > 0.0) {
+            return Vec3::ZERO;
+        }
+        self.follow(surface, dir, DELTA, weight * factor, 2 * code)
     }
 
     /// Microfacets and coats: direct light, and what the facets reflect.

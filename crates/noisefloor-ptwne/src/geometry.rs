@@ -5,6 +5,10 @@ use crate::math::Vec3;
 /// "None" among indices.
 pub(crate) const NO: u32 = u32::MAX;
 
+/// In [`Group::frame`]: texture coordinates of a disk are its radius and its angle, counted down or up.
+pub(crate) const RINGS: u32 = u32::MAX - 1;
+pub(crate) const RINGS_REVERSED: u32 = u32::MAX - 2;
+
 /// Surfaces that were added together: they share a material, and are numbered from `first`.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Group {
@@ -17,6 +21,8 @@ pub(crate) struct Group {
     /// Where the group's normals and texture coordinates begin in [`Vertices`]; [`NO`] if there are none.
     pub(crate) normals: u32,
     pub(crate) uvs: u32,
+    /// The axes of a sphere's texture coordinates, or how those of a disk run; [`NO`] for the usual ones.
+    pub(crate) frame: u32,
 }
 
 /// What smooth or textured surfaces have at their corners.
@@ -34,6 +40,8 @@ pub(crate) struct Geometry {
     pub(crate) group_of: Vec<u32>,
     pub(crate) groups: Vec<Group>,
     pub(crate) vertices: Vertices,
+    /// Axes of texture coordinates of spheres.
+    pub(crate) frames: Vec<[Vec3; 3]>,
 }
 
 impl Geometry {
@@ -47,11 +55,23 @@ impl Geometry {
     #[inline]
     pub(crate) fn texture_coordinates(&self, group: &Group, prim: u32, [u, v]: [f32; 2]) -> [f32; 2] {
         if group.uvs == NO {
-            return [u, v];
+            return match group.frame {
+                RINGS | RINGS_REVERSED => rings(group.frame, u, v),
+                _ => [u, v],
+            };
         }
         let corners = self.vertices.corners[(group.corners + prim - group.first) as usize];
         let [a, b, c] = corners.map(|i| self.vertices.uvs[(group.uvs + i) as usize]);
         std::array::from_fn(|i| a[i] + (b[i] - a[i]) * u + (c[i] - a[i]) * v)
+    }
+
+    /// A sphere's normal along the axes of its texture coordinates, of which the second points up.
+    #[inline]
+    pub(crate) fn to_local(&self, group: &Group, normal: Vec3) -> Vec3 {
+        match self.frames.get(group.frame as usize) {
+            Some([x, y, z]) => Vec3::new(normal.dot(*x), normal.dot(*y), normal.dot(*z)),
+            None => normal,
+        }
     }
 
     /// The shading normal of a planar surface of `group`, which has normals; none if they cancel.
@@ -71,5 +91,13 @@ impl Geometry {
             + size_of_val(corners.as_slice())
             + size_of_val(normals.as_slice())
             + size_of_val(uvs.as_slice())
+            + size_of_val(self.frames.as_slice())
     }
+}
+
+/// Distance from the middle of a disk, and the angle there as a share of a turn.
+fn rings(direction: u32, u: f32, v: f32) -> [f32; 2] {
+    let turn = v.atan2(u) * (0.5 * std::f32::consts::FRAC_1_PI);
+    let turn = if turn < 0.0 { turn + 1.0 } else { turn };
+    [(u * u + v * v).sqrt(), if direction == RINGS { 1.0 - turn } else { turn }]
 }

@@ -173,16 +173,20 @@ impl<'a, const OPACITY: bool> Path<'a, OPACITY> {
             Bsdf::Metal { .. } | Bsdf::Plastic { .. } | Bsdf::Blend { .. } => {
                 self.glossy(ray, surface, throughput, sum)
             }
+            Bsdf::RoughGlass { .. } => self.rough_glass(ray, surface, throughput, sum),
             Bsdf::Mirror { .. } | Bsdf::Glass { .. } | Bsdf::ThinGlass { .. } => {
                 Some(self.specular(ray, surface))
             }
+            // Intersections have one of its parts
+            Bsdf::Mix { .. } => None,
         }
     }
 
     /// Next event estimation: radiance over density from a point on a light, times what `scattered` returns
-    /// for the direction and its density. No shadow ray is traced if that is zero.
+    /// for the direction and its density. No shadow ray is traced if that is zero. `THROUGH` also takes light
+    /// from behind the surface.
     #[inline(always)]
-    fn next_event(
+    fn next_event<const THROUGH: bool>(
         &mut self,
         surface: &Intersection<'_>,
         receiver: Receiver,
@@ -195,10 +199,10 @@ impl<'a, const OPACITY: bool> Path<'a, OPACITY> {
         let [pick, u, v, more] = self.sampler.four();
         self.receiver = receiver;
         let Some((light, pmf)) = scene.lights.choose(&receiver, pick, more) else { return Vec3::ZERO };
-        let (light, origin) = (&scene.lights.all[light], receiver.position);
+        let (light, mut origin) = (&scene.lights.all[light], receiver.position);
         let sample = scene.sample_light(light, origin, [u, v, more]);
         let Some(LightSample { dir, distance, value, pdf, .. }) =
-            sample.filter(|sample| sample.dir.dot(surface.flat) > 0.0)
+            sample.filter(|sample| THROUGH || sample.dir.dot(surface.flat) > 0.0)
         else {
             return Vec3::ZERO;
         };
@@ -206,6 +210,9 @@ impl<'a, const OPACITY: bool> Path<'a, OPACITY> {
         // Also false for NaN: a density beyond the range of f32 carries no light
         if !(light_sum.max_element() > 0.0 && light_sum.max_element() < f32::MAX) {
             return Vec3::ZERO;
+        }
+        if THROUGH {
+            origin = scene.leave(surface, dir);
         }
         if self.blocked(&Ray { origin, dir }, distance * 0.9999) {
             return Vec3::ZERO;
@@ -225,7 +232,7 @@ impl<'a, const OPACITY: bool> Path<'a, OPACITY> {
         let mis = self.settings.estimator == Estimator::Mis;
         let receiver = Receiver::diffuse(self.scene.leave(surface, surface.flat), surface.normal);
         *sum += throughput
-            * self.next_event(surface, receiver, |dir, pdf| {
+            * self.next_event::<false>(surface, receiver, |dir, pdf| {
                 let lambert = dir.dot(surface.normal).max(0.0) * FRAC_1_PI;
                 let weight = if mis { power_heuristic(pdf, lambert) } else { 1.0 };
                 albedo * (lambert * weight)
@@ -256,7 +263,7 @@ impl<'a, const OPACITY: bool> Path<'a, OPACITY> {
         let origin = self.scene.leave(surface, surface.flat);
         let receiver = glossy.receiver(origin, surface.normal, wo, frame);
         *sum += throughput
-            * self.next_event(surface, receiver, |dir, pdf| {
+            * self.next_event::<false>(surface, receiver, |dir, pdf| {
                 let (f_cos, bsdf_pdf) = glossy.eval(wo, frame.to_local(dir));
                 f_cos * if mis { power_heuristic(pdf, bsdf_pdf) } else { 1.0 }
             });
@@ -267,6 +274,37 @@ impl<'a, const OPACITY: bool> Path<'a, OPACITY> {
             return None;
         }
         Some(Scattered { dir: dir.normalize(), weight, pdf, roulette })
+    }
+
+    /// A rough dielectric boundary.
+    #[inline(never)]
+    fn rough_glass(
+        &mut self,
+        ray: &Ray,
+        surface: &Intersection<'a>,
+        throughput: Vec3,
+        sum: &mut Vec3,
+    ) -> Option<Scattered> {
+        let glass = surface.rough_glass()?;
+        let receiver = Receiver::all_round(surface.position);
+        let frame = Frame::new(surface.normal);
+        let wo = frame.to_local(-ray.dir);
+        // A shading normal must not carry light through the surface that it reflects, or the other way round
+        let consistent = |dir: Vec3, wi: Vec3| (dir.dot(surface.flat) > 0.0) == (wi.z > 0.0);
+        let mis = self.settings.estimator == Estimator::Mis;
+        *sum += throughput
+            * self.next_event::<true>(surface, receiver, |dir, pdf| {
+                let wi = frame.to_local(dir);
+                if !consistent(dir, wi) {
+                    return Vec3::ZERO;
+                }
+                let (f_cos, bsdf_pdf) = glass.eval(wo, wi);
+                f_cos * if mis { power_heuristic(pdf, bsdf_pdf) } else { 1.0 }
+            });
+        let [pick, u, v, roulette] = self.sampler.four();
+        let (wi, weight, pdf) = glass.sample(wo, [pick, u, v])?;
+        let dir = frame.to_world(wi).normalize();
+        consistent(dir, wi).then_some(Scattered { dir, weight, pdf, roulette })
     }
 
     /// Mirrors and glass. Glass reflects with the probability of its Fresnel term.

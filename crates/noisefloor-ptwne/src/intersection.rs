@@ -1,7 +1,7 @@
 //! Rays through a scene, and the surfaces they hit.
 
 use crate::accel::{Hit, HitShape, Stack};
-use crate::bsdf::{Glossy, MIN_ROUGHNESS};
+use crate::bsdf::{Glossy, MIN_ROUGHNESS, RoughGlass};
 use crate::geometry::NO;
 use crate::material::{Bsdf, CompiledMaterial};
 use crate::math::{Ray, Vec3};
@@ -100,7 +100,7 @@ impl Scene {
             }
         };
         let uv = match shape {
-            HitShape::Sphere { .. } => sphere_coordinates(flat),
+            HitShape::Sphere { .. } => sphere_coordinates(self.geometry.to_local(group, flat)),
             HitShape::Plane { .. } => self.geometry.texture_coordinates(group, prim, hit.uv),
         };
         let mut normal = flat;
@@ -114,6 +114,13 @@ impl Scene {
         }
         if normal.dot(ray.dir) >= 0.0 {
             normal = flat;
+        }
+        let mut material = material;
+        while let Bsdf::Mix { parts, share } = &material.bsdf {
+            let number = rng::hash(bits_of(ray, hit.t), parts[0]);
+            let share = share.at(uv);
+            let second = number < (share.x + share.y + share.z) * (1.0 / 3.0);
+            material = &self.materials[parts[usize::from(second)] as usize];
         }
         let light = if group.light == NO { NO } else { group.light + prim - group.first };
         Intersection { position, flat, normal, front, uv, material, light }
@@ -129,6 +136,13 @@ impl Scene {
     }
 }
 
+/// The bits of a ray and a distance: different ones for different samples, so that a hash of them is random.
+#[inline]
+fn bits_of(ray: &Ray, t: f32) -> u64 {
+    let word = |a: f32, b: f32| u64::from(a.to_bits()) << 32 | u64::from(b.to_bits());
+    rng::mix(word(ray.dir.x, ray.dir.y)) ^ word(ray.dir.z, t)
+}
+
 /// Azimuth and polar angle of a sphere's normal, each in 0…1.
 #[inline]
 fn sphere_coordinates(n: Vec3) -> [f32; 2] {
@@ -142,9 +156,7 @@ impl<'a> Intersection<'a> {
     #[inline]
     pub(crate) fn glossy(&self, cos: f32) -> Option<Glossy<'a>> {
         match &self.material.bsdf {
-            Bsdf::Metal { fresnel, colour, alpha } => {
-                Some(Glossy::metal(fresnel, colour.at(self.uv), *alpha))
-            }
+            Bsdf::Metal { fresnel, colour, ggx } => Some(Glossy::metal(fresnel, colour.at(self.uv), *ggx)),
             Bsdf::Plastic { diffuse, specular, alpha, nonlinear, coat } => {
                 let diffuse = diffuse.at(self.uv);
                 Some(Glossy::plastic(coat, diffuse, *specular, *alpha, *nonlinear, cos))
@@ -156,5 +168,13 @@ impl<'a> Intersection<'a> {
             }
             _ => None,
         }
+    }
+
+    /// Its rough boundary, seen from the ray's side; `None` if it is something else.
+    #[inline]
+    pub(crate) fn rough_glass(&self) -> Option<RoughGlass> {
+        let Bsdf::RoughGlass { ior, tint, alpha } = &self.material.bsdf else { return None };
+        let eta = if self.front { *ior } else { 1.0 / ior };
+        Some(RoughGlass::new(*alpha, eta, *tint))
     }
 }

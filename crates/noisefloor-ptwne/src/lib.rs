@@ -56,9 +56,9 @@ mod scene;
 pub mod scenes;
 mod texture;
 
-pub use bsdf::MIN_ROUGHNESS;
+pub use bsdf::{Facets, MIN_ROUGHNESS};
 pub use builder::{Emission, MAX_SURFACES, MIN_AREA, MaterialId, Mesh, SceneBuilder};
-pub use camera::Camera;
+pub use camera::{Camera, FovAxis, Optics};
 pub use checks::MAX_COORDINATE;
 pub use environment::{Environment, EnvironmentMap, Sun};
 pub use error::{RenderError, SceneError};

@@ -1,6 +1,6 @@
 //! Materials, as described by the caller and as used in the inner loop.
 
-use crate::bsdf::{Coat, Fresnel, Interior, MIN_ROUGHNESS};
+use crate::bsdf::{Coat, Facets, Fresnel, Ggx, Interior, MIN_ROUGHNESS};
 use crate::checks::{check_range, check_reflectance};
 use crate::error::SceneError;
 use crate::math::Vec3;
@@ -35,6 +35,16 @@ pub enum Material {
         ior: f32,
         /// Factor on light each time it crosses the surface, 0…1.
         tint: Rgb,
+    },
+    /// A rough dielectric boundary of GGX microfacets that hide each other independently (Walter et al. 2007).
+    /// Radiance as in [`Material::Glass`].
+    RoughGlass {
+        /// Index of refraction on the back (where the normal does not point), over that on the front: 0.25…4.
+        ior: f32,
+        /// Factor on light each time it crosses the surface, 0…1.
+        tint: Rgb,
+        /// GGX α, 0…1; below [`MIN_ROUGHNESS`] it is smooth.
+        roughness: f32,
     },
     /// A thin pane: one surface for both boundaries, including all reflections between them. Light passes
     /// straight through.
@@ -98,6 +108,8 @@ pub struct MaterialOptions {
     pub opacity: Option<Texture>,
     /// Whether the back absorbs all light.
     pub one_sided: bool,
+    /// The microfacets of rough conductors.
+    pub facets: Facets,
 }
 
 /// A material and its options, prepared for the inner loop.
@@ -118,17 +130,52 @@ pub(crate) enum Reflectance {
 /// How a surface scatters light.
 #[derive(Clone, Debug)]
 pub(crate) enum Bsdf {
-    Diffuse { albedo: Reflectance },
-    Mirror { fresnel: Fresnel, colour: Reflectance },
-    Glass { ior: f32, tint: Vec3 },
-    ThinGlass { ior: f32, tint: Vec3 },
-    Metal { fresnel: Fresnel, colour: Reflectance, alpha: f32 },
-    Plastic { diffuse: Reflectance, specular: Vec3, alpha: f32, nonlinear: bool, coat: Arc<Coat> },
-    Blend { base: Reflectance, metallic_roughness: Reflectance, coat: Arc<Coat> },
+    Diffuse {
+        albedo: Reflectance,
+    },
+    Mirror {
+        fresnel: Fresnel,
+        colour: Reflectance,
+    },
+    Glass {
+        ior: f32,
+        tint: Vec3,
+    },
+    ThinGlass {
+        ior: f32,
+        tint: Vec3,
+    },
+    RoughGlass {
+        ior: f32,
+        tint: Vec3,
+        alpha: f32,
+    },
+    Metal {
+        fresnel: Fresnel,
+        colour: Reflectance,
+        ggx: Ggx,
+    },
+    Plastic {
+        diffuse: Reflectance,
+        specular: Vec3,
+        alpha: f32,
+        nonlinear: bool,
+        coat: Arc<Coat>,
+    },
+    Blend {
+        base: Reflectance,
+        metallic_roughness: Reflectance,
+        coat: Arc<Coat>,
+    },
+    /// `share` of the second material, and the rest of the first, by their indices.
+    Mix {
+        parts: [u32; 2],
+        share: Reflectance,
+    },
 }
 
 impl Reflectance {
-    fn new(texture: Texture) -> Self {
+    pub(crate) fn new(texture: Texture) -> Self {
         match texture.constant() {
             Some(colour) => Self::Constant(colour),
             None => Self::Textured(Box::new(texture)),
@@ -164,6 +211,11 @@ impl Material {
             Material::Mirror { reflectance } => check_reflectance(*reflectance),
             Material::Glass { ior, tint } | Material::ThinGlass { ior, tint } => {
                 check_range("an index of refraction", *ior, [0.25, 4.0], "0.25…4")?;
+                check_reflectance(*tint)
+            }
+            Material::RoughGlass { ior, tint, roughness } => {
+                check_range("an index of refraction", *ior, [0.25, 4.0], "0.25…4")?;
+                rough(roughness)?;
                 check_reflectance(*tint)
             }
             Material::RoughConductor { reflectance, roughness } => {
@@ -206,7 +258,7 @@ impl CompiledMaterial {
             if alpha < MIN_ROUGHNESS {
                 Bsdf::Mirror { fresnel, colour }
             } else {
-                Bsdf::Metal { fresnel, colour, alpha }
+                Bsdf::Metal { fresnel, colour, ggx: Ggx::of(alpha, options.facets) }
             }
         };
         let mut coat = |ior, alpha, inside| match coats.iter().find(|c| c.is_for(ior, alpha, inside)) {
@@ -227,6 +279,12 @@ impl CompiledMaterial {
             }
             Material::Glass { ior, tint } => Bsdf::Glass { ior, tint: tint.into() },
             Material::ThinGlass { ior, tint } => Bsdf::ThinGlass { ior, tint: tint.into() },
+            Material::RoughGlass { ior, tint, roughness } if roughness < MIN_ROUGHNESS => {
+                Bsdf::Glass { ior, tint: tint.into() }
+            }
+            Material::RoughGlass { ior, tint, roughness } => {
+                Bsdf::RoughGlass { ior, tint: tint.into(), alpha: roughness }
+            }
             Material::RoughConductor { reflectance, roughness } => {
                 metal(Fresnel::Schlick, Reflectance::new(reflectance), roughness)
             }
@@ -250,9 +308,21 @@ impl CompiledMaterial {
                 }
             }
         };
+        Ok(Self::with(bsdf, options.opacity, options.one_sided))
+    }
+
+    /// A mix of two materials that exist already.
+    pub(crate) fn mix(parts: [u32; 2], share: Texture, options: MaterialOptions) -> Result<Self, SceneError> {
+        share.check()?;
+        options.opacity.as_ref().map_or(Ok(()), Texture::check)?;
+        let bsdf = Bsdf::Mix { parts, share: Reflectance::new(share) };
+        Ok(Self::with(bsdf, options.opacity, options.one_sided))
+    }
+
+    fn with(bsdf: Bsdf, opacity: Option<Texture>, one_sided: bool) -> Self {
         // An opacity of one everywhere is none
-        let opacity = options.opacity.filter(|o| o.constant() != Some(Vec3::ONE));
-        Ok(Self { bsdf, opacity, one_sided: options.one_sided })
+        let opacity = opacity.filter(|o| o.constant() != Some(Vec3::ONE));
+        Self { bsdf, opacity, one_sided }
     }
 
     /// Whether it has a texture.
@@ -263,7 +333,9 @@ impl CompiledMaterial {
             }
             Bsdf::Plastic { diffuse, .. } => diffuse.varies(),
             Bsdf::Blend { base, metallic_roughness, .. } => base.varies() || metallic_roughness.varies(),
-            Bsdf::Glass { .. } | Bsdf::ThinGlass { .. } => false,
+            Bsdf::Glass { .. } | Bsdf::ThinGlass { .. } | Bsdf::RoughGlass { .. } => false,
+            // Its parts may have one
+            Bsdf::Mix { .. } => true,
         };
         colours || self.opacity.as_ref().is_some_and(|o| o.constant().is_none())
     }

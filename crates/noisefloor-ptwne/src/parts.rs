@@ -1,6 +1,7 @@
 //! What a builder collects, and a scene is made of.
 
 use crate::accel::Shape;
+use crate::camera::Optics;
 use crate::environment::{Environment, EnvironmentMap};
 use crate::geometry::Geometry;
 use crate::light::Light;
@@ -18,6 +19,7 @@ pub(crate) enum Surroundings {
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Parts {
     pub(crate) surroundings: Option<Surroundings>,
+    pub(crate) optics: Optics,
     pub(crate) materials: Vec<CompiledMaterial>,
     pub(crate) shapes: Vec<Shape>,
     pub(crate) geometry: Geometry,

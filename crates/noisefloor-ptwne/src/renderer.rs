@@ -214,9 +214,9 @@ impl Ptwne {
             let mut sum = glam::DVec3::ZERO;
             for k in 0..request.spp {
                 let mut sampler = Sampler::new(sampling, key, pixel, request.first.wrapping_add(k));
-                let [u, v, ..] = sampler.four();
+                let [u, v, lens_u, lens_v] = sampler.four();
                 let [dx, dy] = filter.offset([u, v]);
-                let ray = lens.ray(x as f32 + dx, y as f32 + dy);
+                let ray = lens.ray(x as f32 + dx, y as f32 + dy, [lens_u, lens_v]);
                 let mut sample = if empty {
                     self.scene.background(ray.dir, |_, _| 1.0)
                 } else {
@@ -248,8 +248,8 @@ impl Ptwne {
         // Samples lie outside their pixels as far as the filter reaches
         let reach = self.options.filter.reach();
         let span = |from: usize, size: usize| [from as f32 - reach, (from + size) as f32 + reach];
-        let (eye, planes) = lens.pyramid(span(tile.x, tile.width), span(tile.y, tile.height));
-        !self.scene.bvh.reaches_into(eye, &planes)
+        let pyramid = lens.pyramid(span(tile.x, tile.width), span(tile.y, tile.height));
+        pyramid.is_some_and(|(eye, planes)| !self.scene.bvh.reaches_into(eye, &planes))
     }
 
     /// How Reinhard's operator would show the picture, from a small picture with few samples.

@@ -1,7 +1,7 @@
 //! A scene, ready to be rendered.
 
 use crate::accel::{self, Bvh};
-use crate::camera::{Camera, Lens};
+use crate::camera::{Camera, Lens, Optics};
 use crate::environment::{Dome, Environment, Map};
 use crate::error::SceneError;
 use crate::geometry::Geometry;
@@ -28,6 +28,7 @@ pub(crate) enum Sky {
 pub struct Scene {
     name: String,
     camera: Camera,
+    optics: Optics,
     /// The origin of the scene's coordinates, in the caller's.
     origin: Vec3,
     pub(crate) sky: Option<Sky>,
@@ -46,7 +47,8 @@ pub struct Scene {
 
 impl Scene {
     pub(crate) fn new(name: String, camera: Camera, parts: Parts) -> Self {
-        let Parts { surroundings, materials, mut shapes, geometry, mut lights, emission_textures } = parts;
+        let Parts { surroundings, optics, materials, mut shapes, geometry, mut lights, emission_textures } =
+            parts;
 
         // Move far-away scenes to the origin
         let mut origin = Vec3::ZERO;
@@ -87,6 +89,7 @@ impl Scene {
         Self {
             name,
             camera,
+            optics,
             origin,
             sky,
             materials,
@@ -110,6 +113,11 @@ impl Scene {
         self.camera
     }
 
+    /// How the camera projects.
+    pub fn optics(&self) -> Optics {
+        self.optics
+    }
+
     /// The same scene seen by another camera.
     ///
     /// # Errors
@@ -122,7 +130,7 @@ impl Scene {
 
     /// The camera, prepared for an image of `width`×`height` pixels.
     pub(crate) fn lens(&self, width: usize, height: usize) -> Lens {
-        self.camera.lens(width, height, self.origin)
+        self.camera.lens(&self.optics, width, height, self.origin)
     }
 
     /// Number of surfaces: triangles, parallelograms, spheres and ellipses.

@@ -8,9 +8,11 @@ mod colour;
 mod error;
 mod files;
 mod gltf;
+mod indices;
 mod mesh;
 mod mitsuba;
 mod options;
+mod pbrt;
 mod picture;
 mod sky;
 
@@ -49,6 +51,7 @@ pub fn load_with(path: &Path, options: &LoadOptions) -> Result<Loaded, LoadError
     let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
     match extension.as_str() {
         "gltf" | "glb" => gltf::load(path),
+        "pbrt" => pbrt::load(path, options),
         "xml" => mitsuba::load(path, options),
         _ => Err(LoadError::Format { path: path.to_owned() }),
     }

@@ -22,20 +22,21 @@ pub(crate) struct Triangles {
 }
 
 impl Triangles {
-    /// Checks that indices are in range and numbers finite.
+    /// Checks that indices are in range and positions finite. Normals and texture coordinates that are not finite become
+    /// 0.
     ///
     /// # Errors
     /// [`LoadError::Bad`] at `place`.
-    pub(crate) fn check(&self, place: &Place) -> Result<(), LoadError> {
+    pub(crate) fn check(&mut self, place: &Place) -> Result<(), LoadError> {
         let count = self.positions.len();
         if let Some(face) = self.indices.iter().position(|t| t.iter().any(|i| *i as usize >= count)) {
             let triangle = self.indices[face];
             let what = format!("face {face} has corners {triangle:?}, but there are {count} vertices");
             return Err(place.clone().bad(what));
         }
-        let finite = |rows: &[[f32; 3]]| rows.iter().position(|row| row.iter().any(|x| !x.is_finite()));
-        let uvs = self.uvs.iter().position(|row| row.iter().any(|x| !x.is_finite()));
-        match finite(&self.positions).or(finite(&self.normals)).or(uvs) {
+        let numbers = self.normals.as_flattened_mut().iter_mut().chain(self.uvs.as_flattened_mut());
+        numbers.filter(|x| !x.is_finite()).for_each(|x| *x = 0.0);
+        match self.positions.iter().position(|row| row.iter().any(|x| !x.is_finite())) {
             Some(vertex) => {
                 Err(place.clone().bad(format!("vertex {vertex} has a number that is not finite")))
             }
@@ -171,7 +172,10 @@ mod tests {
     #[test]
     fn what_does_not_fit_is_an_error() {
         let place = Place::file(Path::new("a.ply"));
-        bent().check(&place).unwrap();
+        let mut odd = bent();
+        odd.normals = vec![[f32::NAN, 0.0, 1.0]; 4];
+        odd.check(&place).unwrap();
+        assert_eq!(odd.normals[0], [0.0, 0.0, 1.0]);
         let mut mesh = bent();
         mesh.indices[1][2] = 4;
         let error = mesh.check(&place).unwrap_err().to_string();

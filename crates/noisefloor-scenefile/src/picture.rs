@@ -2,9 +2,11 @@
 
 use crate::error::{LoadError, Place};
 use crate::files::{self, MAX_FILE_BYTES};
+use image::codecs::bmp::BmpDecoder;
 use image::codecs::hdr::HdrDecoder;
 use image::codecs::jpeg::JpegDecoder;
 use image::codecs::png::PngDecoder;
+use image::codecs::tga::TgaDecoder;
 use image::{DynamicImage, ImageDecoder, ImageFormat, Limits};
 use noisefloor::Rgb;
 use noisefloor_ptwne::MAX_TEXTURE_PIXELS;
@@ -40,44 +42,57 @@ pub(crate) enum Samples {
     Linear(Vec<Rgb>),
 }
 
-/// Reads the EXR, Radiance, PNG or JPEG file in `path`, named at `place`. Its content says which it is, not
-/// its name.
+/// Reads the EXR, PFM, Radiance, PNG, JPEG, BMP or TGA file in `path`, named at `place`. Its content says which it is, not
+/// its name, but for TGA, which has no mark.
 ///
 /// # Errors
-/// [`LoadError`] if the file cannot be read, is of another format, broken, or has more than
-/// [`MAX_TEXTURE_PIXELS`] pixels (known from its header).
+/// [`LoadError`] if the file cannot be read, is of another format, broken, or has more than [`MAX_TEXTURE_PIXELS`] pixels
+/// (known from its header).
 pub(crate) fn read(path: &Path, place: &Place) -> Result<Picture, LoadError> {
     let bytes = files::read(path, MAX_FILE_BYTES, place)?;
     let here = Place::file(path);
-    if !bytes.starts_with(&[0x76, 0x2f, 0x31, 0x01]) {
-        return decode(&bytes, &here);
-    }
-    let image = noisefloor_image::read_exr(path).map_err(|e| here.clone().bad(e))?;
+    let linear = match bytes.as_slice() {
+        [0x76, 0x2f, 0x31, 0x01, ..] => noisefloor_image::read_exr(path),
+        [b'P', b'F' | b'f', b'\n' | b'\r', ..] => noisefloor_image::read_pfm(path),
+        _ => {
+            let tga = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("tga"));
+            return decode_as(&bytes, tga.then_some(ImageFormat::Tga), &here);
+        }
+    };
+    let image = linear.map_err(|e| here.clone().bad(e))?;
     check_size(image.width as u64, image.height as u64, &here)?;
     Ok(Picture { width: image.width, height: image.height, samples: Samples::Linear(image.pixels) })
 }
 
-/// Decodes the Radiance, PNG or JPEG file `bytes`, which are at `place`.
+/// Decodes the Radiance, PNG, JPEG or BMP file `bytes`, which are at `place`.
 ///
 /// # Errors
 /// As [`read`].
 pub(crate) fn decode(bytes: &[u8], place: &Place) -> Result<Picture, LoadError> {
+    decode_as(bytes, None, place)
+}
+
+/// As [`decode`], of a format that is known, or else has a mark.
+fn decode_as(bytes: &[u8], format: Option<ImageFormat>, place: &Place) -> Result<Picture, LoadError> {
     let broken = |e: image::ImageError| place.clone().bad(format!("the picture is broken: {e}"));
-    // The decoders are other people's code over hostile bytes: where one of them panics, the file is broken,
-    // and the program that reads it goes on. No state outlives the call.
-    let decoded = catch_unwind(AssertUnwindSafe(|| match image::guess_format(bytes) {
-        Ok(ImageFormat::Png) => {
+    let format = image::guess_format(bytes).ok().or(format);
+    let (reader, length) = (Cursor::new(bytes), bytes.len());
+    // The decoders are other people's code over hostile bytes: where one of them panics, the file is broken, and the
+    // program that reads it continues. No state outlives the call.
+    let decoded = catch_unwind(AssertUnwindSafe(|| match format {
+        Some(ImageFormat::Png) => {
             let mut limits = Limits::no_limits();
             limits.max_alloc = Some(MAX_EXTRA);
-            pixels(PngDecoder::with_limits(Cursor::new(bytes), limits).map_err(broken)?, bytes.len(), place)
+            pixels(PngDecoder::with_limits(reader, limits).map_err(broken)?, length, place)
         }
-        Ok(ImageFormat::Jpeg) => {
-            pixels(JpegDecoder::new(Cursor::new(bytes)).map_err(broken)?, bytes.len(), place)
+        Some(ImageFormat::Jpeg) => pixels(JpegDecoder::new(reader).map_err(broken)?, length, place),
+        Some(ImageFormat::Hdr) => pixels(HdrDecoder::new(reader).map_err(broken)?, length, place),
+        Some(ImageFormat::Bmp) => pixels(BmpDecoder::new(reader).map_err(broken)?, length, place),
+        Some(ImageFormat::Tga) => pixels(TgaDecoder::new(reader).map_err(broken)?, length, place),
+        _ => {
+            let what = "a picture that is neither PNG, JPEG, BMP, TGA, PFM, OpenEXR nor Radiance";
+            Err(place.clone().unsupported(what))
         }
-        Ok(ImageFormat::Hdr) => {
-            pixels(HdrDecoder::new(Cursor::new(bytes)).map_err(broken)?, bytes.len(), place)
-        }
-        _ => Err(place.clone().unsupported("a picture that is neither PNG, JPEG, OpenEXR nor Radiance")),
     }));
     decoded.unwrap_or_else(|_| Err(place.clone().bad("the picture is broken: its decoder gave up")))
 }

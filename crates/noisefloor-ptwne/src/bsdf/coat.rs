@@ -163,7 +163,7 @@ fn over_facets<const N: usize>(
     let point = |i: u32| (i as f32 + 0.5) / SIDE as f32;
     let mut sums = [0.0; N];
     for i in 0..SIDE * SIDE {
-        for (sum, value) in sums.iter_mut().zip(f(Ggx { alpha }, wo, [point(i % SIDE), point(i / SIDE)])) {
+        for (sum, value) in sums.iter_mut().zip(f(Ggx::new(alpha), wo, [point(i % SIDE), point(i / SIDE)])) {
             *sum += f64::from(value);
         }
     }

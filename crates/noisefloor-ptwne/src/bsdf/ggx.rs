@@ -1,4 +1,4 @@
-//! GGX microfacets.
+//! Microfacets: GGX and Beckmann.
 
 use crate::math::{self, Vec3};
 use std::f32::consts::FRAC_1_PI;
@@ -6,28 +6,97 @@ use std::f32::consts::FRAC_1_PI;
 /// Smallest roughness (GGX α) that is treated as rough; below it, a surface is smooth.
 pub const MIN_ROUGHNESS: f32 = 1e-3;
 
-/// Isotropic GGX microfacets with Smith's height-correlated masking-shadowing.
+/// How the normals of microfacets are distributed, and how they hide each other.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Facets {
+    /// GGX with Smith's height-correlated masking and shadowing (Heitz 2014, eq. 99).
+    #[default]
+    Ggx,
+    /// GGX with masking and shadowing independent of each other, as in Mitsuba and Walter et al. 2007: darker
+    /// at grazing angles.
+    GgxUncorrelated,
+    /// Beckmann's distribution, also with independent masking and shadowing.
+    BeckmannUncorrelated,
+}
+
+/// Isotropic microfacets.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Ggx {
     pub(crate) alpha: f32,
+    facets: Facets,
 }
 
 impl Ggx {
-    /// Density of microfacet normals (Walter et al. 2007, eq. 33), written with sin² to stay precise at h =
-    /// n.
+    /// GGX with correlated masking and shadowing.
     #[inline]
-    fn d(self, h: Vec3) -> f32 {
+    pub(crate) fn new(alpha: f32) -> Self {
+        Self::of(alpha, Facets::Ggx)
+    }
+
+    #[inline]
+    pub(crate) fn of(alpha: f32, facets: Facets) -> Self {
+        Self { alpha, facets }
+    }
+
+    /// Density of microfacet normals (Walter et al. 2007, eqs. 33 and 25), written with sin² to stay precise at
+    /// h = n.
+    #[inline]
+    pub(super) fn d(self, h: Vec3) -> f32 {
         let a2 = self.alpha * self.alpha;
+        if self.facets == Facets::BeckmannUncorrelated {
+            let z2 = (h.z * h.z).max(1e-12);
+            return (-(h.x * h.x + h.y * h.y) / (a2 * z2)).exp() * FRAC_1_PI / (a2 * z2 * z2);
+        }
         let k = h.z * h.z * a2 + h.x * h.x + h.y * h.y;
         a2 * FRAC_1_PI / (k * k)
     }
 
-    /// Smith's Λ (Heitz 2014, eq. 72).
+    /// Smith's Λ (Heitz 2014, eq. 72; for Beckmann the rational approximation of Walter et al. 2007).
     #[inline]
     pub(super) fn lambda(self, w: Vec3) -> f32 {
         let z2 = (w.z * w.z).max(1e-12);
         let tan2 = (1.0 - w.z * w.z).max(0.0) / z2;
+        if self.facets == Facets::BeckmannUncorrelated {
+            let a = 1.0 / (self.alpha * tan2.sqrt()).max(1e-6);
+            return if a < 1.6 {
+                (1.0 - 1.259 * a + 0.396 * a * a) / (3.535 * a + 2.181 * a * a)
+            } else {
+                0.0
+            };
+        }
         0.5 * ((1.0 + self.alpha * self.alpha * tan2).sqrt() - 1.0)
+    }
+
+    /// Share of the facets that both directions see, from their Λ.
+    #[inline]
+    pub(super) fn g2(self, lo: f32, li: f32) -> f32 {
+        match self.facets {
+            Facets::Ggx => 1.0 / (1.0 + lo + li),
+            Facets::GgxUncorrelated | Facets::BeckmannUncorrelated => 1.0 / ((1.0 + lo) * (1.0 + li)),
+        }
+    }
+
+    /// Density of the normals that [`Ggx::normal`] samples.
+    #[inline]
+    pub(super) fn normal_pdf(self, wo: Vec3, h: Vec3) -> f32 {
+        match self.facets {
+            Facets::BeckmannUncorrelated => self.d(h) * h.z,
+            _ => self.d(h) * wo.dot(h).max(0.0) / (wo.z * (1.0 + self.lambda(wo))),
+        }
+    }
+
+    /// A normal: one of GGX's that `wo` sees, or any of Beckmann's.
+    #[inline]
+    pub(super) fn normal(self, wo: Vec3, u: [f32; 2]) -> Vec3 {
+        if self.facets != Facets::BeckmannUncorrelated {
+            return self.visible_normal(wo, u);
+        }
+        let tan2 = -self.alpha * self.alpha * (1.0 - u[0]).max(1e-20).ln();
+        let z = (1.0 / (1.0 + tan2)).sqrt();
+        let r = (1.0 - z * z).max(0.0).sqrt();
+        let (sin, cos) = math::turn(u[1]);
+        Vec3::new(r * cos, r * sin, z)
     }
 
     /// f·cos θᵢ without the Fresnel term, the density of [`Ggx::sample`], and the half vector's cosine with
@@ -39,8 +108,12 @@ impl Ggx {
         }
         let h = (wo + wi).normalize();
         let (d, lo, li) = (self.d(h), self.lambda(wo), self.lambda(wi));
-        let base = d / (4.0 * wo.z);
-        (base / (1.0 + lo + li), base / (1.0 + lo), wo.dot(h).max(0.0))
+        let (base, cos_h) = (d / (4.0 * wo.z), wo.dot(h).max(0.0));
+        let density = match self.facets {
+            Facets::BeckmannUncorrelated => d * h.z / (4.0 * cos_h).max(1e-12),
+            _ => base / (1.0 + lo),
+        };
+        (base * self.g2(lo, li), density, cos_h)
     }
 
     /// A normal from the distribution of visible normals (Dupuy, Benyoub 2023).
@@ -55,17 +128,21 @@ impl Ggx {
         Vec3::new(c.x * self.alpha, c.y * self.alpha, c.z.max(1e-7)).normalize()
     }
 
-    /// A direction, reflected by a visible normal; its weight f·cos θᵢ / density = G₂/G₁ without the Fresnel
-    /// term; and the half vector's cosine. Weight 0: nothing is reflected.
+    /// A direction, reflected by a sampled normal; its weight f·cos θᵢ / density (of visible normals: G₂/G₁)
+    /// without the Fresnel term; and the half vector's cosine. Weight 0: nothing is reflected.
     #[inline]
     pub(crate) fn sample(self, wo: Vec3, u: [f32; 2]) -> (Vec3, f32, f32) {
-        let h = self.visible_normal(wo, u);
+        let h = self.normal(wo, u);
         let cos_h = wo.dot(h);
         let wi = h * (2.0 * cos_h) - wo;
         if wi.z <= 0.0 || cos_h <= 0.0 {
             return (wi, 0.0, 1.0);
         }
         let (lo, li) = (self.lambda(wo), self.lambda(wi));
-        (wi, (1.0 + lo) / (1.0 + lo + li), cos_h)
+        let weight = match self.facets {
+            Facets::BeckmannUncorrelated => self.g2(lo, li) * cos_h / (wo.z * h.z),
+            _ => (1.0 + lo) * self.g2(lo, li),
+        };
+        (wi, weight, cos_h)
     }
 }

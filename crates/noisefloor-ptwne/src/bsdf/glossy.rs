@@ -27,8 +27,7 @@ pub(crate) struct Glossy<'a> {
 }
 
 impl<'a> Glossy<'a> {
-    pub(crate) fn metal(fresnel: &'a Fresnel, colour: Vec3, alpha: f32) -> Self {
-        let ggx = Ggx { alpha };
+    pub(crate) fn metal(fresnel: &'a Fresnel, colour: Vec3, ggx: Ggx) -> Self {
         let (coat, zero) = (None, Vec3::ZERO);
         Self {
             ggx,
@@ -55,7 +54,7 @@ impl<'a> Glossy<'a> {
         let (reflected, inside) =
             ((1.0 - through) * math::luminance(specular), through * math::luminance(diffuse));
         Self {
-            ggx: Ggx { alpha },
+            ggx: Ggx::new(alpha),
             fresnel: &Fresnel::None,
             metal: Vec3::ZERO,
             metal_share: 0.0,

@@ -4,11 +4,14 @@ mod coat;
 mod fresnel;
 mod ggx;
 mod glossy;
+mod rough_glass;
 
 #[cfg(test)]
 mod tests;
 
 pub(crate) use coat::{Coat, Interior};
 pub(crate) use fresnel::{Fresnel, fresnel, pane, refract};
-pub use ggx::MIN_ROUGHNESS;
+pub(crate) use ggx::Ggx;
+pub use ggx::{Facets, MIN_ROUGHNESS};
 pub(crate) use glossy::Glossy;
+pub(crate) use rough_glass::RoughGlass;

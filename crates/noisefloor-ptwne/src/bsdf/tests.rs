@@ -15,7 +15,7 @@ use std::f32::consts::PI;
 #[test]
 fn ggx_samples_what_it_evaluates() {
     for (alpha, cos) in [(0.15f32, 0.9f32), (0.5, 0.7), (1.0, 0.3)] {
-        let ggx = Ggx { alpha };
+        let ggx = Ggx::new(alpha);
         let wo = Vec3::new((1.0 - cos * cos).sqrt(), 0.0, cos);
         let n = 1500;
         let (mut albedo, mut mass) = (0.0, 0.0);

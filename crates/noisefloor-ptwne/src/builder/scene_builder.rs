@@ -3,15 +3,16 @@
 use super::input::{Emission, MAX_SURFACES, MIN_AREA, MaterialId, Mesh};
 use crate::accel::Shape;
 use crate::bsdf::Coat;
-use crate::camera::Camera;
+use crate::camera::{Camera, Optics};
 use crate::checks::{MAX_COORDINATE, check_radiance, check_range, position};
 use crate::environment::{Environment, EnvironmentMap};
 use crate::error::SceneError;
-use crate::geometry::{Group, NO};
+use crate::geometry::{Group, NO, RINGS, RINGS_REVERSED};
 use crate::light::{Light, Punctual};
 use crate::material::{CompiledMaterial, Material, MaterialOptions};
 use crate::parts::{Parts, Surroundings};
 use crate::scene::Scene;
+use crate::texture::Texture;
 use glam::Vec3;
 use noisefloor::Rgb;
 use std::sync::Arc;
@@ -71,6 +72,37 @@ impl SceneBuilder {
         Ok(MaterialId(self.parts.materials.len() as u32 - 1))
     }
 
+    /// Adds a material that is `share` of the second one (the mean of the channels) and the rest of the first.
+    /// Their opacities do not count, only that of `options`.
+    ///
+    /// # Errors
+    /// [`SceneError`] if a material is of another builder, or a share is not in 0…1.
+    pub fn mixed_material(
+        &mut self,
+        first: MaterialId,
+        second: MaterialId,
+        share: Texture,
+        options: MaterialOptions,
+    ) -> Result<MaterialId, SceneError> {
+        for MaterialId(id) in [first, second] {
+            if id as usize >= self.parts.materials.len() {
+                return Err(SceneError::Material(id));
+            }
+        }
+        self.parts.materials.push(CompiledMaterial::mix([first.0, second.0], share, options)?);
+        Ok(MaterialId(self.parts.materials.len() as u32 - 1))
+    }
+
+    /// Sets how the camera projects, besides its field of view.
+    ///
+    /// # Errors
+    /// [`SceneError`] if a number is out of range.
+    pub fn optics(&mut self, optics: Optics) -> Result<(), SceneError> {
+        optics.check()?;
+        self.parts.optics = optics;
+        Ok(())
+    }
+
     /// Surrounds the scene with a sky, which replaces earlier surroundings. By default, they are black.
     ///
     /// # Errors
@@ -117,7 +149,7 @@ impl SceneBuilder {
     ) -> Result<(), SceneError> {
         let [corner, e1, e2] = [position(corner)?, position(e1)?, position(e2)?];
         let uvs = [[0.0, 0.0], [e1.length(), 0.0], [0.0, e2.length()]];
-        self.single(Shape::Planar { corner, e1, e2, whole: true }, Some(uvs), material, emission)
+        self.single(Shape::Planar { corner, e1, e2, whole: true }, Some(uvs), NO, material, emission)
     }
 
     /// Adds an ellipse: `centre` + u·`e1` + v·`e2` for u² + v² ≤ 1. Texture coordinates are (u + 1, v + 1)/2.
@@ -134,7 +166,25 @@ impl SceneBuilder {
     ) -> Result<(), SceneError> {
         let [centre, e1, e2] = [position(centre)?, position(e1)?, position(e2)?];
         let uvs = [[0.5, 0.5], [1.0, 0.5], [0.5, 1.0]];
-        self.single(Shape::Disk { centre, e1, e2 }, Some(uvs), material, emission)
+        self.single(Shape::Disk { centre, e1, e2 }, Some(uvs), NO, material, emission)
+    }
+
+    /// Adds an ellipse with texture coordinates in rings: u = √(a² + b²) at `centre` + a·`e1` + b·`e2`, and v = 1
+    /// − φ/2π, where φ is the angle of (a, b); φ/2π if `reversed`.
+    ///
+    /// # Errors
+    /// As [`SceneBuilder::parallelogram`].
+    pub fn ringed_disk(
+        &mut self,
+        centre: [f32; 3],
+        [e1, e2]: [[f32; 3]; 2],
+        reversed: bool,
+        material: MaterialId,
+        emission: Option<Emission>,
+    ) -> Result<(), SceneError> {
+        let [centre, e1, e2] = [position(centre)?, position(e1)?, position(e2)?];
+        let frame = if reversed { RINGS_REVERSED } else { RINGS };
+        self.single(Shape::Disk { centre, e1, e2 }, None, frame, material, emission)
     }
 
     /// Adds a sphere. Texture coordinates are azimuth and polar angle in 0…1; v = 1 is the top.
@@ -151,7 +201,30 @@ impl SceneBuilder {
     ) -> Result<(), SceneError> {
         let centre = position(centre)?;
         check_range("the radius of a sphere", radius, [1e-9, MAX_COORDINATE], "1e-9…1e6")?;
-        self.single(Shape::Sphere { centre, radius }, None, material, emission)
+        self.single(Shape::Sphere { centre, radius }, None, NO, material, emission)
+    }
+
+    /// As [`SceneBuilder::sphere`], with axes of length 1 for its texture coordinates: the second points to the
+    /// top, v = 1, and u runs from minus the first over minus the third.
+    ///
+    /// # Errors
+    /// As [`SceneBuilder::sphere`].
+    pub fn turned_sphere(
+        &mut self,
+        centre: [f32; 3],
+        radius: f32,
+        axes: [[f32; 3]; 3],
+        material: MaterialId,
+        emission: Option<Emission>,
+    ) -> Result<(), SceneError> {
+        for axis in axes {
+            position(axis)?;
+        }
+        let centre = position(centre)?;
+        check_range("the radius of a sphere", radius, [1e-9, MAX_COORDINATE], "1e-9…1e6")?;
+        let frame = index(self.parts.geometry.frames.len())?;
+        self.parts.geometry.frames.push(axes.map(|axis| glam::Vec3A::from_array(axis)));
+        self.single(Shape::Sphere { centre, radius }, None, frame, material, emission)
     }
 
     /// Adds the triangles of a mesh that have an area, and returns the number of those that have none.
@@ -233,7 +306,10 @@ impl SceneBuilder {
         });
         let light = if group_emission.is_some() { index(self.parts.lights.len())? } else { NO };
         let first = index(self.parts.shapes.len())?;
-        Ok((Group { first, material: material.0, light, corners: NO, normals: NO, uvs: NO }, group_emission))
+        Ok((
+            Group { first, material: material.0, light, corners: NO, normals: NO, uvs: NO, frame: NO },
+            group_emission,
+        ))
     }
 
     /// Adds the group, if it has got any surfaces.
@@ -250,10 +326,12 @@ impl SceneBuilder {
         &mut self,
         shape: Shape,
         uvs: Option<[[f32; 2]; 3]>,
+        frame: u32,
         material: MaterialId,
         emission: Option<Emission>,
     ) -> Result<(), SceneError> {
         let (mut group, group_emission) = self.group(material, emission.as_ref())?;
+        group.frame = frame;
         let material = &self.parts.materials[material.0 as usize];
         let textured = material.is_textured() || group_emission.is_some_and(|e| e.texture != NO);
         if !self.push(shape, group_emission)? {

@@ -25,6 +25,13 @@ impl Receiver {
     pub(crate) fn diffuse(position: Vec3, normal: Vec3) -> Self {
         Self { position, normal, diffuse: 1.0, glossy: 0.0, mirror: normal, alpha2: 1.0 }
     }
+
+    /// A surface that light from all around reaches, scattered alike: no side is below its horizon.
+    #[inline]
+    pub(crate) fn all_round(position: Vec3) -> Self {
+        let none = Vec3::ZERO;
+        Self { position, normal: none, diffuse: 0.0, glossy: 1.0, mirror: none, alpha2: 1.0 }
+    }
 }
 
 impl Receiver {

@@ -269,7 +269,7 @@ fn textured_lights_shine_by_their_image() {
 fn transparent_surfaces_let_light_through() {
     let with = |opacity: Texture, light: &dyn Fn(&mut SceneBuilder, MaterialId)| {
         lit(|b, m| {
-            let options = MaterialOptions { opacity: Some(opacity), one_sided: false };
+            let options = MaterialOptions { opacity: Some(opacity), ..MaterialOptions::default() };
             let plate = b.material_with(Material::diffuse([0.0; 3]), options).unwrap();
             b.parallelogram([-2.0, 1.5, -2.0], [4.0, 0.0, 0.0], [0.0, 0.0, 4.0], plate, None).unwrap();
             light(b, m);
@@ -299,7 +299,8 @@ fn transparent_surfaces_are_seen_through() {
     let camera = look([0.0, 0.0, 4.0], [0.0; 3], [0.0, 1.0, 0.0], 20.0);
     let scene = scene(camera, |b| {
         for (z, opacity) in [(0.0, 1.0 / 3.0), (-1.0, 0.5)] {
-            let options = MaterialOptions { opacity: Some([opacity; 3].into()), one_sided: false };
+            let options =
+                MaterialOptions { opacity: Some([opacity; 3].into()), ..MaterialOptions::default() };
             let m = b.material_with(Material::diffuse([0.0; 3]), options).unwrap();
             b.parallelogram([-9.0, -9.0, z], [18.0, 0.0, 0.0], [0.0, 18.0, 0.0], m, None).unwrap();
         }
@@ -312,7 +313,7 @@ fn transparent_surfaces_are_seen_through() {
 fn backs_of_one_sided_surfaces_are_black() {
     for (z, expected) in [(4.0, 0.5), (-4.0, 0.0)] {
         let scene = scene(look([0.0, 0.0, z], [0.0; 3], [0.0, 1.0, 0.0], 20.0), |b| {
-            let options = MaterialOptions { opacity: None, one_sided: true };
+            let options = MaterialOptions { one_sided: true, ..MaterialOptions::default() };
             let m = b.material_with(Material::diffuse([0.5; 3]), options).unwrap();
             b.parallelogram([-9.0, -9.0, 0.0], [18.0, 0.0, 0.0], [0.0, 18.0, 0.0], m, None).unwrap();
             b.environment(Environment::constant([1.0; 3])).unwrap();

@@ -109,6 +109,7 @@ impl<'m> Reader<'m, '_> {
         let cover = MaterialOptions {
             opacity: self.opacity(base_texture)?,
             one_sided: !source.double_sided && !glass,
+            ..MaterialOptions::default()
         };
         Ok((material, cover, self.emission(emissive_texture)?))
     }

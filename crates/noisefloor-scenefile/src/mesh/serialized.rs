@@ -271,7 +271,9 @@ mod tests {
         assert!(with(good.len() - 12, 0xff).contains("the table of meshes is corrupt"));
         assert!(with(good.len() - 1, 0xff).contains("no table"));
         let neither = file(4, &[inside(4, HAS_UVS, 0.5)]);
-        assert!(read(&neither, 0).unwrap_err().contains("neither single nor double"));
+        assert_eq!(read(&neither, 0).unwrap().0.positions[2], [0.5, 1.0, 0.0]);
+        let both = file(4, &[inside(4, SINGLE | DOUBLE, 0.5)]);
+        assert!(read(&both, 0).unwrap_err().contains("both single and double"));
         let long = file(4, &[[&SINGLE.to_le_bytes()[..], &[b'a'; 9000]].concat()]);
         assert!(read(&long, 0).unwrap_err().contains("bytes in a name, more than 4096"));
     }

@@ -58,6 +58,18 @@ pub(crate) fn cylinder() -> Triangles {
     mesh
 }
 
+/// The disk of radius 1 around the origin in the plane of x and y, from radius `inner` on; its front is +z. u runs around
+/// z from +x over +y, v from the outside to the inside.
+pub(crate) fn disk(inner: f32) -> Triangles {
+    let mut mesh = grid(1, |u, v| {
+        let (y, x) = (TAU * u).sin_cos();
+        let r = inner + (1.0 - inner) * (1.0 - v);
+        ([r * x, r * y, 0.0], [0.0, 0.0, 1.0])
+    });
+    mesh.indices.iter_mut().for_each(|triangle| triangle.swap(1, 2));
+    mesh
+}
+
 /// A grid of `AROUND` by `along` squares with positions and normals as functions of (u, v).
 fn grid(along: u32, at: impl Fn(f32, f32) -> ([f32; 3], [f32; 3])) -> Triangles {
     let mut mesh = Triangles::default();
@@ -87,7 +99,13 @@ mod tests {
     /// Corners run counter-clockwise as seen from where the normals point, and all fits together.
     #[test]
     fn fronts_are_outside() {
-        for (mesh, area) in [(sphere(), 4.0 * PI), (cylinder(), TAU), (cube(), 24.0), (rectangle(), 4.0)] {
+        for (mesh, area) in [
+            (sphere(), 4.0 * PI),
+            (cylinder(), TAU),
+            (cube(), 24.0),
+            (rectangle(), 4.0),
+            (disk(0.5), 0.75 * PI),
+        ] {
             let mut sum = 0.0;
             for triangle in &mesh.indices {
                 let [a, b, c] = triangle.map(|i| Vec3::from(mesh.positions[i as usize]));

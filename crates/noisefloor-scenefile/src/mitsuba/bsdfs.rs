@@ -27,7 +27,10 @@ impl<'d> Context<'d> {
         match element.kind() {
             "diffuse" | "roughdiffuse" => self.diffuse(element),
             "plastic" | "roughplastic" | "pplastic" => self.plastic(element).map(Surface::one_sided),
-            "conductor" | "roughconductor" => self.conductor(element).map(Surface::one_sided),
+            "conductor" | "roughconductor" => {
+                let facets = self.facets(element)?;
+                Ok(Surface { facets, ..Surface::one_sided(self.conductor(element)?) })
+            }
             "dielectric" | "thindielectric" | "roughdielectric" => self.glass(element),
             "phong" | "ward" => self.lobe_on_diffuse(element),
             "principled" | "principledthin" => self.principled(element),
@@ -135,6 +138,7 @@ impl<'d> Context<'d> {
         let inside = self.surface(self.nested(element)?)?;
         let ior = self.relative_ior(element, "bk7")?;
         let specular = self.constant_factor(element, "specular_reflectance", 1.0)?;
+        element.ignore(&["distribution"]);
         let roughness = self.roughness(element, rough)?;
         match inside.body {
             Body::Plain(Material::Diffuse { albedo }) if ior > 1.0 => {
@@ -241,10 +245,11 @@ impl<'d> Context<'d> {
             let tint = mean(&base).map(f32::sqrt);
             let ior = ior as f32;
             let thin = element.kind() == "principledthin";
+            let roughness = (roughness * roughness).clamp(0.0, 1.0) as f32;
             return Ok(Surface::two_sided(if thin {
                 Material::ThinGlass { ior, tint }
             } else {
-                Material::Glass { ior, tint }
+                Material::RoughGlass { ior, tint, roughness }
             }));
         }
         let share = [1.0, roughness.clamp(0.0, 1.0) as f32, metallic.clamp(0.0, 1.0) as f32];

@@ -51,6 +51,8 @@ impl<'d> Context<'d> {
                 let irradiance = self.plain_light(element, "irradiance")?;
                 builder.punctual(Punctual::Distant { direction, irradiance }).map_err(refused)?;
             }
+            // A definition for shapes that refer to it
+            "area" if element.attribute("id").is_some() => element.irrelevant(),
             "area" => return Err(self.bad(element, "an area emitter belongs into a shape")),
             _ => return Err(self.unsupported(element, element.species())),
         }

@@ -1,13 +1,13 @@
 //! Surfaces with indices of refraction: conductors, dielectrics and plastics.
 
 use super::context::Context;
-use super::indices;
 use super::surface::Surface;
 use super::xml::Element;
 use crate::colour::Quantity;
 use crate::error::LoadError;
+use crate::indices;
 use noisefloor::Rgb;
-use noisefloor_ptwne::{Material, Texture};
+use noisefloor_ptwne::{Facets, Material, Texture};
 
 impl<'d> Context<'d> {
     pub(super) fn plastic(&self, element: &'d Element) -> Result<Material, LoadError> {
@@ -15,6 +15,9 @@ impl<'d> Context<'d> {
             self.approximated(element, "the polarisation of <bsdf type=\"pplastic\"> is left out");
         }
         let rough = element.kind() == "roughplastic" || element.has("alpha");
+        if rough && self.facets(element)? != Facets::GgxUncorrelated {
+            self.approximated(element, "the distribution `beckmann` is replaced by `ggx` of the same alpha");
+        }
         Ok(Material::Plastic {
             diffuse: self.factor(element, "diffuse_reflectance", 0.5)?,
             specular: self.constant_factor(element, "specular_reflectance", 1.0)?,
@@ -77,27 +80,36 @@ impl<'d> Context<'d> {
             // Mitsuba lets light through unbent
             _ if (ior - 1.0).abs() < 1e-6 => Material::ThinGlass { ior, tint },
             "roughdielectric" => {
-                self.roughness(element, true)?;
-                self.approximated(element, "the rough surface of <bsdf type=\"roughdielectric\"> is smooth");
-                Material::Glass { ior, tint }
+                if self.facets(element)? != Facets::GgxUncorrelated {
+                    self.approximated(
+                        element,
+                        "Beckmann's facets of a rough dielectric are replaced by GGX's",
+                    );
+                }
+                Material::RoughGlass { ior, tint, roughness: self.roughness(element, true)? }
             }
             _ => Material::Glass { ior, tint },
         }))
     }
 
-    /// GGX α.
+    /// The distribution of microfacets. Phong's is one of lobes, which Beckmann's comes close to.
+    pub(super) fn facets(&self, element: &'d Element) -> Result<Facets, LoadError> {
+        match self.string(element, "distribution")?.unwrap_or("beckmann") {
+            "ggx" => Ok(Facets::GgxUncorrelated),
+            "beckmann" => Ok(Facets::BeckmannUncorrelated),
+            other => {
+                self.approximated(element, format!("the distribution `{other}` is replaced by `beckmann`"));
+                Ok(Facets::BeckmannUncorrelated)
+            }
+        }
+    }
+
+    /// α.
     pub(super) fn roughness(&self, element: &'d Element, rough: bool) -> Result<f32, LoadError> {
         if !rough {
             return Ok(0.0);
         }
         element.ignore(&["sample_visible"]);
-        match self.string(element, "distribution")?.unwrap_or("beckmann") {
-            "ggx" => {}
-            other => self.approximated(
-                element,
-                format!("the distribution `{other}` is replaced by `ggx` of the same alpha"),
-            ),
-        }
         let number = |name: &str| self.mean_float(element, name);
         let alpha = match (number("alpha")?, number("alpha_u")?, number("alpha_v")?) {
             (alpha, None, None) => alpha.unwrap_or(0.1),

@@ -11,7 +11,6 @@ mod context;
 mod document;
 mod emitters;
 mod glossy;
-mod indices;
 mod raster;
 mod sensor;
 mod shapes;
@@ -27,6 +26,7 @@ use crate::options::LoadOptions;
 use context::Context;
 use document::Document;
 use noisefloor_ptwne::SceneBuilder;
+use sensor::View;
 use shapes::Filling;
 use std::path::Path;
 
@@ -49,8 +49,9 @@ pub(crate) fn load(path: &Path, options: &LoadOptions) -> Result<Loaded, LoadErr
     let max_depth = root.all("integrator").next().map_or(Ok(None), |element| context.max_depth(element))?;
 
     // What is in it: without a camera, too, so that all errors are found
-    let (camera, size) = camera.unwrap_or_else(|| (sensor::anywhere(), None));
-    let builder = SceneBuilder::new(crate::title(path), camera).map_err(context.refused(sensor))?;
+    let View { camera, optics, size } = camera.unwrap_or_else(View::any);
+    let mut builder = SceneBuilder::new(crate::title(path), camera).map_err(context.refused(sensor))?;
+    builder.optics(optics).map_err(context.refused(sensor))?;
     let mut filling = Filling::new(builder);
     for shape in root.all("shape") {
         errors.take(context.shape(shape, &mut filling))?;

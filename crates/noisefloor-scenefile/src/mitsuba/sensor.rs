@@ -4,49 +4,76 @@ use super::context::Context;
 use super::xml::Element;
 use crate::error::LoadError;
 use glam::{DMat3, DVec3};
-use noisefloor_ptwne::Camera;
+use noisefloor_ptwne::{Camera, FovAxis, Optics};
 
 /// Mitsuba's image size where a scene gives none.
 const DEFAULT_SIZE: (usize, usize) = (768, 576);
 /// Largest width or height that is read, in pixels.
 const MAX_EDGE: i64 = 1 << 16;
 
-/// A camera for scenes that are only checked.
-pub(super) fn anywhere() -> Camera {
-    Camera { eye: [0.0; 3], target: [0.0, 0.0, 1.0], up: [0.0, 1.0, 0.0], vertical_fov: 45.0 }
+/// What looks at the scene.
+pub(super) struct View {
+    pub(super) camera: Camera,
+    pub(super) optics: Optics,
+    /// Image size in pixels.
+    pub(super) size: Option<(usize, usize)>,
+}
+
+impl View {
+    /// A view of scenes that are only checked.
+    pub(super) fn any() -> Self {
+        let camera =
+            Camera { eye: [0.0; 3], target: [0.0, 0.0, 1.0], up: [0.0, 1.0, 0.0], vertical_fov: 45.0 };
+        Self { camera, optics: Optics::default(), size: None }
+    }
 }
 
 impl<'d> Context<'d> {
     /// The camera, and the image size that the scene asks for.
-    pub(super) fn camera(&self, sensor: &'d Element) -> Result<(Camera, Option<(usize, usize)>), LoadError> {
-        match sensor.kind() {
-            "perspective" => {}
-            "thinlens" => {
-                self.approximated(sensor, "the lens is replaced by a pinhole: everything is in focus");
-                sensor.ignore(&["aperture_radius", "focus_distance"]);
-            }
-            _ => return Err(self.unsupported(sensor, sensor.species())),
+    pub(super) fn camera(&self, sensor: &'d Element) -> Result<View, LoadError> {
+        let kind = sensor.kind();
+        if !matches!(kind, "perspective" | "thinlens" | "orthographic") {
+            return Err(self.unsupported(sensor, sensor.species()));
         }
         self.no_media(sensor)?;
         sensor.ignore(&["near_clip", "far_clip", "shutter_open", "shutter_close", "srf"]);
         sensor.children.iter().filter(|c| c.tag == "sampler").for_each(Element::irrelevant);
+        for offset in ["principal_point_offset_x", "principal_point_offset_y"] {
+            if self.float(sensor, offset)?.is_some_and(|offset| offset != 0.0) {
+                return Err(self.unsupported(sensor, format!("`{offset}`")));
+            }
+        }
         let size = self.film_size(sensor)?;
-        let (width, height) = size.unwrap_or(DEFAULT_SIZE);
-        let vertical_fov = self.vertical_fov(sensor, width as f64, height as f64)? as f32;
-
         let to_world = self.transform(sensor, "to_world")?;
         let axes = DMat3::from_mat4(to_world);
-        if axes.determinant() < 0.0 {
-            return Err(
-                self.unsupported(sensor, "a mirrored camera (its `to_world` has a negative determinant)")
-            );
+        // Mitsuba's +x is to the left of the picture
+        let mut optics = Optics { mirrored: axes.determinant() < 0.0, ..Optics::default() };
+        let mut vertical_fov = 45.0;
+        if kind == "orthographic" {
+            // The picture is two units wide, scaled
+            let (width, height) = size.unwrap_or(DEFAULT_SIZE);
+            let wide = 2.0 * axes.x_axis.length();
+            optics.parallel_height = Some((wide * height as f64 / width as f64) as f32);
+            sensor.ignore(&["focus_distance"]);
+        } else {
+            let (fov, axis) = self.field_of_view(sensor)?;
+            (vertical_fov, optics.fov_axis) = (fov as f32, axis);
         }
+        if kind == "thinlens" {
+            let radius = self.float(sensor, "aperture_radius")?;
+            let radius = radius.ok_or_else(|| self.bad(sensor, "a thin lens needs an `aperture_radius`"))?;
+            optics.aperture_radius = radius as f32;
+            optics.focus_distance = self.float(sensor, "focus_distance")?.unwrap_or(1e4) as f32;
+        } else {
+            sensor.ignore(&["focus_distance"]);
+        }
+
         let (eye, view) = (to_world.w_axis.truncate(), axes.z_axis.normalize_or_zero());
         // Far from 0, a target close by would be rounded
         let target = eye + view * eye.abs().max_element().max(1.0);
         let array = |v: DVec3| v.as_vec3().to_array();
         let up = array(axes.y_axis.normalize_or_zero());
-        Ok((Camera { eye: array(eye), target: array(target), up, vertical_fov }, size))
+        Ok(View { camera: Camera { eye: array(eye), target: array(target), up, vertical_fov }, optics, size })
     }
 
     fn film_size(&self, sensor: &'d Element) -> Result<Option<(usize, usize)>, LoadError> {
@@ -70,8 +97,8 @@ impl<'d> Context<'d> {
         Ok(Some((edge("width", DEFAULT_SIZE.0)?, edge("height", DEFAULT_SIZE.1)?)))
     }
 
-    /// In degrees.
-    fn vertical_fov(&self, sensor: &'d Element, width: f64, height: f64) -> Result<f64, LoadError> {
+    /// The field of view in degrees, and the edge that it spans.
+    fn field_of_view(&self, sensor: &'d Element) -> Result<(f64, FovAxis), LoadError> {
         let axis = self.string(sensor, "fov_axis")?.unwrap_or("x");
         let (fov, axis) = match (self.float(sensor, "fov")?, self.string(sensor, "focal_length")?) {
             (Some(fov), _) => (fov, axis),
@@ -87,21 +114,18 @@ impl<'d> Context<'d> {
         if !(fov > 0.0 && fov < 180.0) {
             return Err(self.bad(sensor, format!("`fov` is {fov}; it must be above 0 and below 180 degrees")));
         }
-        let across = match axis {
-            "x" => width,
-            "y" => height,
-            "diagonal" => width.hypot(height),
-            "smaller" => width.min(height),
-            "larger" => width.max(height),
+        let axis = match axis {
+            "x" => FovAxis::Horizontal,
+            "y" => FovAxis::Vertical,
+            "diagonal" => FovAxis::Diagonal,
+            "smaller" => FovAxis::Smaller,
+            "larger" => FovAxis::Larger,
             other => {
-                return Err(self.bad(
-                    sensor,
-                    format!("`fov_axis` is `{other}`; expected x, y, diagonal, smaller or larger"),
-                ));
+                let what = format!("`fov_axis` is `{other}`; expected x, y, diagonal, smaller or larger");
+                return Err(self.bad(sensor, what));
             }
         };
-        let slope = (0.5 * fov.to_radians()).tan() * height / across;
-        Ok(2.0 * slope.atan().to_degrees())
+        Ok((fov, axis))
     }
 
     /// Longest path in segments, of what renders the scene in Mitsuba; none if it has no limit.

@@ -7,7 +7,7 @@ use crate::error::{LoadError, Place};
 use crate::files::{self, MAX_FILE_BYTES};
 use crate::mesh::{Triangles, normal_matrix, obj, ply, serialized, solids};
 use glam::{DMat3, DMat4, DQuat, DVec3};
-use noisefloor_ptwne::{Cover, Emission, MaterialId, Mesh, SceneBuilder};
+use noisefloor_ptwne::{Emission, MaterialId, MaterialOptions, Mesh, SceneBuilder};
 use std::collections::HashMap;
 use std::rc::Rc;
 
@@ -78,20 +78,18 @@ impl<'d> Context<'d> {
         let (material, textured) = self.material(element, emission.is_some(), inside_out, filling)?;
 
         match (element.kind(), round) {
-            ("sphere", Some(Sphere { centre, radius, .. })) => {
-                if textured {
-                    let what = "the texture is laid on the sphere with its top towards +y of the scene";
-                    self.approximated(element, what);
-                }
-                let added = filling.builder.sphere(centre, radius, material, emission);
+            ("sphere", Some(Sphere { centre, radius, axes, .. })) => {
+                let added = if textured {
+                    filling.builder.turned_sphere(centre, radius, axes, material, emission)
+                } else {
+                    filling.builder.sphere(centre, radius, material, emission)
+                };
                 added.map_err(self.refused(element))
             }
             ("disk", _) => {
-                if textured || glows {
-                    self.approximated(element, "the texture is not laid on the disk in rings");
-                }
-                let [centre, e1, e2] = self.disk(element, instance)?;
-                filling.builder.disk(centre, e1, e2, material, emission).map_err(self.refused(element))
+                let (centre, axes, reversed) = self.disk(element, instance)?;
+                let builder = &mut filling.builder;
+                builder.ringed_disk(centre, axes, reversed, material, emission).map_err(self.refused(element))
             }
             ("obj" | "ply" | "serialized" | "rectangle" | "cube" | "sphere" | "cylinder", _) => {
                 match instance {
@@ -151,13 +149,15 @@ impl<'d> Context<'d> {
         surface: Surface,
         builder: &mut SceneBuilder,
     ) -> Result<MaterialId, LoadError> {
-        let cover = Cover { opacity: surface.opacity, one_sided: surface.one_sided };
-        match surface.body {
-            Body::Plain(material) => builder.material_with(material, cover).map_err(self.refused(element)),
-            Body::Blend(parts, _) => {
-                self.approximated(element, "of a blend of surfaces the first is used");
-                let [first, _] = *parts;
-                self.add_surface(element, first, builder)
+        let Surface { body, opacity, one_sided, facets } = surface;
+        let options = MaterialOptions { opacity, one_sided, facets };
+        match body {
+            Body::Plain(material) => builder.material_with(material, options).map_err(self.refused(element)),
+            Body::Blend(parts, share) => {
+                let [first, second] = *parts;
+                let first = self.add_surface(element, first, builder)?;
+                let second = self.add_surface(element, second, builder)?;
+                builder.mixed_material(first, second, share, options).map_err(self.refused(element))
             }
         }
     }
@@ -215,7 +215,7 @@ impl<'d> Context<'d> {
             name.ok_or_else(|| self.bad(element, format!("{} needs a `filename`", element.species())))?;
         let path = self.document.folder.find(name, &place)?;
         let bytes = files::read(&path, MAX_FILE_BYTES, &place)?;
-        let (mesh, flat) = match element.kind() {
+        let (mut mesh, flat) = match element.kind() {
             "obj" => (obj::parse(&bytes, &path)?, false),
             "ply" => (ply::parse(&bytes, &path)?, false),
             _ => {
@@ -254,18 +254,25 @@ impl<'d> Context<'d> {
         Ok(())
     }
 
-    /// Centre and axes of a disk, whose front is where their cross product points.
-    fn disk(&self, element: &'d Element, instance: Option<DMat4>) -> Result<[[f32; 3]; 3], LoadError> {
+    /// Centre and axes of a disk, whose front is where their cross product points, and whether the angle of its
+    /// texture runs the other way.
+    fn disk(
+        &self,
+        element: &'d Element,
+        instance: Option<DMat4>,
+    ) -> Result<([f32; 3], [[f32; 3]; 2], bool), LoadError> {
         let to_world = instance.unwrap_or_default() * self.transform(element, "to_world")?;
         let [e1, mut e2] = [to_world.x_axis, to_world.y_axis].map(|axis| axis.truncate());
         let mut front = normal_matrix(to_world) * DVec3::Z;
         if self.boolean(element, "flip_normals", false)? {
             front = -front;
         }
-        if e1.cross(e2).dot(front) < 0.0 {
+        let reversed = e1.cross(e2).dot(front) < 0.0;
+        if reversed {
             e2 = -e2;
         }
-        Ok([to_world.w_axis.truncate(), e1, e2].map(|v| v.as_vec3().to_array()))
+        let array = |v: DVec3| v.as_vec3().to_array();
+        Ok((array(to_world.w_axis.truncate()), [array(e1), array(e2)], reversed))
     }
 
     /// A sphere; none if it is stretched or sheared.
@@ -285,7 +292,10 @@ impl<'d> Context<'d> {
         // Mitsuba's mirrored spheres have their front inside
         let mirrored = DMat3::from_mat4(to_world).determinant() < 0.0;
         let inside_out = mirrored != self.boolean(element, "flip_normals", false)?;
-        Ok(Some(Sphere { centre, radius: (own.x_axis.x * scale) as f32, inside_out }))
+        // Mitsuba's pole is +z, and u runs from +x over +y
+        let [x, y, z] = axes.map(|axis| (axis / scale).as_vec3());
+        let axes = [-x, z, -y].map(|axis| axis.to_array());
+        Ok(Some(Sphere { centre, radius: (own.x_axis.x * scale) as f32, axes, inside_out }))
     }
 
     /// The sphere of radius 1 around the origin to that of the element's `center` and `radius`.
@@ -313,6 +323,8 @@ impl<'d> Context<'d> {
 struct Sphere {
     centre: [f32; 3],
     radius: f32,
+    /// The axes of its texture coordinates.
+    axes: [[f32; 3]; 3],
     /// Whether its front is inside.
     inside_out: bool,
 }

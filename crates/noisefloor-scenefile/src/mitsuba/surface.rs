@@ -1,6 +1,6 @@
 //! What a shape's surface is made of.
 
-use noisefloor_ptwne::{Material, Texture};
+use noisefloor_ptwne::{Facets, Material, Texture};
 
 /// A material, or a blend of two surfaces, and what it lets through.
 #[derive(Clone, Debug)]
@@ -10,6 +10,8 @@ pub(super) struct Surface {
     pub(super) opacity: Option<Texture>,
     /// Whether it is black from behind.
     pub(super) one_sided: bool,
+    /// Its microfacets.
+    pub(super) facets: Facets,
 }
 
 /// What reflects.
@@ -23,7 +25,7 @@ pub(super) enum Body {
 impl Surface {
     /// What reflects, and is black from behind.
     pub(super) fn one_sided(material: Material) -> Self {
-        Self { body: Body::Plain(material), opacity: None, one_sided: true }
+        Self { body: Body::Plain(material), opacity: None, one_sided: true, facets: Facets::GgxUncorrelated }
     }
 
     /// What is seen from both sides.
@@ -34,7 +36,8 @@ impl Surface {
     /// `share` of the second surface, and the rest of the first.
     pub(super) fn blend(first: Self, second: Self, share: Texture) -> Self {
         let one_sided = first.one_sided && second.one_sided;
-        Self { body: Body::Blend(Box::new([first, second]), share), opacity: None, one_sided }
+        let body = Body::Blend(Box::new([first, second]), share);
+        Self { body, opacity: None, one_sided, facets: Facets::default() }
     }
 
     /// What Mitsuba gives shapes without a surface: grey, or, if they shine, black.
@@ -60,7 +63,7 @@ impl Surface {
     /// The surface that looks from its front as this one does from its back.
     pub(super) fn inside_out(mut self) -> Self {
         match &mut self.body {
-            Body::Plain(Material::Glass { ior, .. }) => *ior = ior.recip(),
+            Body::Plain(Material::Glass { ior, .. } | Material::RoughGlass { ior, .. }) => *ior = ior.recip(),
             Body::Plain(_) => {}
             Body::Blend(parts, _) => **parts = (**parts).clone().map(Self::inside_out),
         }

@@ -99,7 +99,7 @@ fn every_error_names_its_place() {
         // What the renderer does not take
         ("/nodes/1/translation", "[1e9, 0, 0]", table, "outside"),
         ("/nodes/1/scale", "[1e39, 0, 0]", table, "not finite"),
-        ("/nodes/0/scale", "[0, 0, 0]", "scene.gltf", "camera looks nowhere"),
+        ("/nodes/0/scale", "[0, 0, 0]", "scene.gltf", "camera has no orientation"),
         ("/cameras/0/perspective/yfov", "4", "scene.gltf", "field of view"),
         ("/extensions/KHR_lights_punctual/lights/0/intensity", "-1", "light 0", "outside"),
         // Images and buffers

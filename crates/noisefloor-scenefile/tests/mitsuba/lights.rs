@@ -88,3 +88,31 @@ fn maps_lie_as_in_mitsuba() {
     let body = r#"<emitter type="envmap"><string name="filename" value="sky.png"/></emitter>"#;
     close(folder.see(body), [1.0, 0.5029, 0.0], 1e-3, body);
 }
+
+/// What a rectangle shows that emits a spectrum, as Mitsuba 3.9.1 has it in its RGB mode; black bodies as its
+/// spectral mode.
+#[test]
+fn emitted_spectra_are_colours() {
+    let folder = Folder::new();
+    for (radiance, want) in [
+        (r#"<spectrum name="radiance" value="16"/>"#, [19.2767, 15.1727, 14.5427]),
+        (r#"<spectrum name="radiance" value="400:1, 500:2, 600:3, 700:4"/>"#, [4.020_61, 2.313_68, 1.244_53]),
+        (r#"<spectrum name="radiance" type="d65"><float name="scale" value="2"/></spectrum>"#, [2.0; 3]),
+        (r#"<spectrum name="radiance" type="uniform"><float name="value" value="2"/></spectrum>"#, [2.0; 3]),
+        (r##"<rgb name="radiance" value="#ff8000"/>"##, [1.0, 0.215_86, 0.0]),
+        (r#"<spectrum name="radiance" value="0.5, 0.25, 0"/>"#, [0.5, 0.25, 0.0]),
+    ] {
+        let body = format!(r#"<shape type="rectangle"><emitter type="area">{radiance}</emitter></shape>"#);
+        close(folder.see(&body), want, 3e-3, radiance);
+    }
+    let black_body = |temperature: &str| {
+        folder.see(&format!(
+            r#"<shape type="rectangle"><emitter type="area"><blackbody name="radiance"
+                temperature="{temperature}" scale="0.001"/></emitter></shape>"#
+        ))
+    };
+    // Planck's law at 555 nm: exp(hc/λkT) − 1 is 316.6 and 74.2
+    let (warm, cold) = (black_body("4500"), black_body("6000K"));
+    assert!(warm[0] > warm[1] && warm[1] > warm[2], "{warm:?}");
+    assert!((cold[1] / warm[1] - 316.6 / 74.2).abs() < 0.3, "{warm:?} {cold:?}");
+}

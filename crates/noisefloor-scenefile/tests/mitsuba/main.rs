@@ -3,6 +3,9 @@
 /// What is broken, unsupported or too large, and what is only warned of.
 #[cfg(test)]
 mod bad;
+/// Includes, parameters, search paths, volumes, and errors and warnings together.
+#[cfg(test)]
+mod files;
 /// Broken files: every flip and cut is an error or a scene, never a panic.
 #[cfg(test)]
 mod hostile;

@@ -111,16 +111,18 @@ fn shapes_have_the_sizes_of_mitsuba() {
 }
 
 #[test]
-fn spheres_inside_out_are_glass_of_the_reciprocal_index_or_refused() {
+fn spheres_inside_out_are_glass_of_the_reciprocal_index() {
     let folder = Folder::new();
     let flip = r#"<boolean name="flip_normals" value="true"/>"#;
-    let error = folder.body(&format!(r#"<shape type="sphere">{flip}{LIGHT}</shape>"#)).unwrap_err();
-    assert!(error.ends_with("line 2: a sphere that shines inwards is not supported"), "{error}");
+    // One that shines inwards is made of triangles
+    let inwards = folder.body(&format!(r#"<shape type="sphere">{flip}{LIGHT}</shape>"#)).unwrap();
+    assert!(inwards.scene.lights() > 10_000);
     let mirrored = r#"<transform name="to_world"><scale z="-2" x="2" y="2"/></transform>"#;
     let both = folder.body(&format!(r#"<shape type="sphere">{flip}{mirrored}{LIGHT}</shape>"#)).unwrap();
     assert_eq!((both.scene.lights(), both.warnings.len()), (1, 0));
     let stretched = r#"<shape type="sphere"><transform name="to_world"><scale x="2"/></transform></shape>"#;
-    assert!(folder.body(stretched).unwrap_err().contains("stretched or sheared"));
+    // Of triangles
+    assert!(folder.body(stretched).unwrap().scene.surfaces() > 10_000);
     let one_sided = folder.body(&format!(r#"<shape type="sphere">{flip}</shape>"#)).unwrap();
     assert!(one_sided.warnings[0].to_string().contains("line 2: the sphere is seen from outside, too"));
 
@@ -151,4 +153,54 @@ fn smooth_meshes_and_flat_ones_differ() {
     // The eastern side faces the light; smooth, the ridge is turned by 45° to it
     close(roof(r#"<boolean name="face_normals" value="true"/>"#), [inverse_pi; 3], 1e-2, "flat");
     close(roof(""), [inverse_pi * 0.5f32.sqrt(); 3], 1e-2, "smooth");
+}
+
+/// Where the camera sees light along the z axis when a shape is moved by x.
+fn seen_at(folder: &Folder, before: &str, shape: &str, x: f32) -> bool {
+    let moved = shape.replace("AT", &format!(r#"<translate x="{x}"/>"#));
+    folder.see(&format!("{before}{moved}")) == [1.0, 2.0, 3.0]
+}
+
+#[test]
+fn cylinders_have_the_size_of_mitsuba() {
+    let folder = Folder::new();
+    let cylinder = |more: &str| {
+        format!(r#"<shape type="cylinder">{more}<transform name="to_world">AT</transform>{LIGHT}</shape>"#)
+    };
+    // Along x, from 0 to 2, of radius 1: seen from +z where it is, and open at its ends
+    let lying = cylinder(r#"<point name="p0" x="0" y="0" z="0"/><point name="p1" x="2" y="0" z="0"/>"#);
+    for (x, seen) in [(-0.1, true), (-1.9, true), (0.1, false), (-2.1, false)] {
+        assert_eq!(seen_at(&folder, "", &lying, x), seen, "{x}");
+    }
+    // Along z one looks through it, and the inside is dark
+    assert!(!seen_at(&folder, "", &cylinder(""), 0.0));
+    let error = folder.body(r#"<shape type="cylinder"><float name="radius" value="0"/></shape>"#);
+    assert!(error.unwrap_err().contains("line 2: a cylinder needs a `radius` above 0"));
+}
+
+/// A group is seen where its instances are, and nowhere else.
+#[test]
+fn instances_are_where_they_are_put() {
+    let folder = folder();
+    let group = format!(
+        r#"<shape type="shapegroup" id="g"><shape type="rectangle">{LIGHT}</shape><shape type="ply"><string
+            name="filename" value="bare.ply"/><transform name="to_world"><translate z="-50"/></transform>
+            </shape></shape>"#
+    );
+    let instance = r#"<shape type="instance"><ref id="g"/><transform name="to_world">AT</transform></shape>"#;
+    assert_eq!(folder.body(&group).unwrap().scene.surfaces(), 0);
+    for (x, seen) in [(0.9, true), (1.1, false)] {
+        assert_eq!(seen_at(&folder, &group, instance, x), seen, "{x}");
+    }
+    let two = folder.body(&format!("{group}{}{}", instance.replace("AT", ""), instance.replace("AT", "")));
+    assert_eq!(two.unwrap().scene.surfaces(), 6);
+    // A mirrored instance has its front where its original has it
+    let mirrored = instance.replace("AT", r#"<scale x="-1"/>"#);
+    assert_eq!(folder.see(&format!("{group}{mirrored}")), [1.0, 2.0, 3.0]);
+
+    let lost = folder.body(r#"<shape type="instance"/>"#).unwrap_err();
+    assert!(lost.contains("line 2: an instance needs one <shape type=\"shapegroup\">"), "{lost}");
+    let nested = format!(r#"<shape type="shapegroup" id="h">{instance}</shape>"#).replace("AT", "");
+    let nested = format!("{group}{nested}{}", instance.replace("AT", "").replace("\"g\"", "\"h\""));
+    assert!(folder.body(&nested).unwrap_err().contains("an instance in a group is not supported"));
 }

@@ -6,8 +6,10 @@ use std::path::Path;
 use tempfile::TempDir;
 
 /// A camera 5 units up the z axis that looks down it.
-pub(crate) const CAMERA: &str = r#"<sensor type="perspective"><float name="fov" value="0.1"/>
-    <transform name="to_world"><lookat origin="0,0,5" target="0,0,0" up="0,1,0"/></transform></sensor>"#;
+pub(crate) const CAMERA: &str = concat!(
+    r#"<sensor type="perspective"><float name="fov" value="0.1"/><transform name="to_world">"#,
+    r#"<lookat origin="0,0,5" target="0,0,0" up="0,1,0"/></transform></sensor>"#
+);
 
 /// A folder for a scene and its files.
 pub(crate) struct Folder(TempDir);

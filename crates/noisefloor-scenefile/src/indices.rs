@@ -3,7 +3,7 @@
 use noisefloor::Rgb;
 
 /// Dielectrics in visible light at room temperature, as Mitsuba 3 names them.
-pub(super) const DIELECTRICS: [(&str, f64); 22] = [
+pub(crate) const DIELECTRICS: [(&str, f64); 22] = [
     ("vacuum", 1.0),
     ("helium", 1.000_036),
     ("hydrogen", 1.000_132),
@@ -30,7 +30,7 @@ pub(super) const DIELECTRICS: [(&str, f64); 22] = [
 
 /// Complex indices of refraction η + ik of metals and other solids: linear Rec.709 colours of the spectra that Mitsuba
 /// 3.9 ships, as it computes them in its RGB mode. A name with the suffix `_palik` means the same.
-pub(super) const CONDUCTORS: [(&str, Rgb, Rgb); 41] = [
+pub(crate) const CONDUCTORS: [(&str, Rgb, Rgb); 41] = [
     ("Ag", [0.1553, 0.1167, 0.1384], [4.8284, 3.1222, 2.1469]),
     ("Al", [1.6575, 0.8804, 0.5212], [9.2238, 6.2695, 4.8370]),
     ("AlAs", [3.6053, 3.2329, 2.2163], [0.0007, 0.0000, 0.0075]),
@@ -75,12 +75,12 @@ pub(super) const CONDUCTORS: [(&str, Rgb, Rgb); 41] = [
 ];
 
 /// The complex index of that name.
-pub(super) fn conductor(name: &str) -> Option<(Rgb, Rgb)> {
+pub(crate) fn conductor(name: &str) -> Option<(Rgb, Rgb)> {
     let find = |name: &str| CONDUCTORS.iter().find(|c| c.0 == name).map(|c| (c.1, c.2));
     find(name).or_else(|| find(name.strip_suffix("_palik")?))
 }
 
 /// The index of that name.
-pub(super) fn dielectric(name: &str) -> Option<f64> {
+pub(crate) fn dielectric(name: &str) -> Option<f64> {
     DIELECTRICS.iter().find(|index| index.0 == name).map(|index| index.1)
 }

@@ -1,0 +1,131 @@
+//! What looks at the scene.
+
+use super::params::Params;
+use crate::error::LoadError;
+use glam::{DMat3, DMat4, DVec3};
+use noisefloor_ptwne::{Camera, FovAxis, Optics};
+
+/// Largest width or height that is read, in pixels.
+const MAX_EDGE: u64 = 1 << 16;
+
+/// A camera and its film.
+#[derive(Clone, Debug)]
+pub(super) struct View {
+    /// From the camera, which looks along +z with +y up and +x to the right, to the world.
+    to_world: DMat4,
+    fov: f64,
+    lens_radius: f64,
+    focus: f64,
+    /// Half of the shorter edge of a parallel projection.
+    parallel: Option<f64>,
+    size: (usize, usize),
+    /// Factor on all light.
+    pub(super) exposure: f32,
+}
+
+impl Default for View {
+    fn default() -> Self {
+        Self {
+            to_world: DMat4::IDENTITY,
+            fov: 90.0,
+            lens_radius: 0.0,
+            focus: 1e6,
+            parallel: None,
+            size: (1280, 720),
+            exposure: 1.0,
+        }
+    }
+}
+
+impl View {
+    /// A camera for a builder that gets its own later.
+    pub(super) fn anywhere() -> Camera {
+        Camera { eye: [0.0; 3], target: [0.0, 0.0, 1.0], up: [0.0, 1.0, 0.0], vertical_fov: 45.0 }
+    }
+
+    /// Reads a `Camera`; `from_world` is the transform there.
+    pub(super) fn camera(&mut self, kind: &str, params: &Params, from_world: DMat4) -> Result<(), LoadError> {
+        params.ignore(&["shutteropen", "shutterclose"]);
+        match kind {
+            "perspective" => {
+                self.fov = params.float("fov")?.unwrap_or(90.0);
+                if let Some(half) = params.float("halffov")? {
+                    self.fov = 2.0 * half;
+                }
+                if !(self.fov > 0.0 && self.fov < 180.0) {
+                    return Err(params.bad(format!("`fov` is {}, not between 0 and 180 degrees", self.fov)));
+                }
+            }
+            "orthographic" => self.parallel = Some(1.0),
+            _ => return Err(params.place.clone().unsupported(format!("Camera \"{kind}\""))),
+        }
+        if let Some(window) = params.numbers("screenwindow")? {
+            match window {
+                // As wide on both sides: another angle
+                [left, right, bottom, top] if left + right == 0.0 && bottom + top == 0.0 && *top > 0.0 => {
+                    let half = right.min(*top);
+                    self.fov = 2.0 * ((0.5 * self.fov.to_radians()).tan() * half).atan().to_degrees();
+                    self.parallel = self.parallel.map(|_| half);
+                }
+                _ => return Err(params.place.clone().unsupported("a `screenwindow` aside of the middle")),
+            }
+        }
+        self.lens_radius = params.float("lensradius")?.unwrap_or(0.0);
+        self.focus = params.float("focaldistance")?.unwrap_or(1e6);
+        if from_world.determinant() == 0.0 {
+            return Err(params.bad("the transform of the camera cannot be inverted"));
+        }
+        self.to_world = from_world.inverse();
+        Ok(())
+    }
+
+    /// Reads a `Film`.
+    pub(super) fn film(&mut self, params: &Params) -> Result<(), LoadError> {
+        let edge = |name: &str, missing: usize| match params.count(name)? {
+            None => Ok(missing),
+            Some(edge @ 1..=MAX_EDGE) => Ok(edge as usize),
+            Some(_) => Err(params.bad(format!("`{name}` is not in 1…{MAX_EDGE}"))),
+        };
+        self.size = (edge("xresolution", self.size.0)?, edge("yresolution", self.size.1)?);
+        // pbrt 3 has a factor, pbrt 4 a sensor
+        let scale = params.float("scale")?.unwrap_or(1.0);
+        let exposure =
+            params.float("exposuretime")?.unwrap_or(1.0) * params.float("iso")?.unwrap_or(100.0) / 100.0;
+        self.exposure = (scale * exposure) as f32;
+        if !(self.exposure >= 0.0 && self.exposure.is_finite()) {
+            return Err(params.bad("the exposure of the film is negative or too large"));
+        }
+        Ok(())
+    }
+
+    /// Image size in pixels.
+    pub(super) fn size(&self) -> (usize, usize) {
+        self.size
+    }
+
+    pub(super) fn look(&self) -> Camera {
+        let axes = DMat3::from_mat4(self.to_world);
+        let (eye, view) = (self.to_world.w_axis.truncate(), axes.z_axis.normalize_or_zero());
+        // Far from 0, a target close by would be rounded
+        let target = eye + view * eye.abs().max_element().max(1.0);
+        let array = |v: DVec3| v.as_vec3().to_array();
+        let up = array(axes.y_axis.normalize_or_zero());
+        Camera { eye: array(eye), target: array(target), up, vertical_fov: self.fov as f32 }
+    }
+
+    pub(super) fn optics(&self) -> Optics {
+        let axes = DMat3::from_mat4(self.to_world);
+        let (width, height) = (self.size.0 as f64, self.size.1 as f64);
+        let scale = axes.y_axis.length();
+        Optics {
+            fov_axis: FovAxis::Smaller,
+            aperture_radius: (self.lens_radius * scale) as f32,
+            focus_distance: (self.focus * scale) as f32,
+            parallel_height: self
+                .parallel
+                .map(|half| (2.0 * half * scale * (height / width).max(1.0)) as f32),
+            // Its +x is to the right, where a camera of ours has view × up = −x
+            mirrored: axes.determinant() > 0.0,
+        }
+    }
+}

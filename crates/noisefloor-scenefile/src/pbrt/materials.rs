@@ -1,0 +1,285 @@
+//! Materials of pbrt 3 and 4.
+
+use super::reader::Reader;
+use super::state::{Definition, Look, plain};
+use super::textures::mean;
+use crate::error::{LoadError, Place};
+use noisefloor::Rgb;
+use noisefloor_ptwne::{Material, MaterialId, MaterialOptions, Texture};
+use std::rc::Rc;
+
+/// How deep materials may refer to others.
+const MAX_NESTED: u32 = 16;
+
+/// What a material becomes.
+enum Made {
+    Plain(Material),
+    /// Light passes as if there were nothing.
+    Nothing,
+    /// A share of the second.
+    Mix(MaterialId, MaterialId, Texture),
+}
+
+impl Reader<'_> {
+    /// The material of the shapes that come, where `alpha` is.
+    pub(super) fn current_material(
+        &mut self,
+        alpha: Option<(String, Texture)>,
+        place: &Place,
+    ) -> Result<MaterialId, LoadError> {
+        let definition = match self.state.material.clone() {
+            Look::Given(definition) => definition,
+            Look::Named(name, here) => self.named(&name, &here)?,
+        };
+        let key = (format!("{:p}", Rc::as_ptr(&definition)), alpha.as_ref().map(|alpha| alpha.0.clone()));
+        // What is given stays in `kept`, so that no address is used twice
+        if let Some(known) = self.materials.get(&key) {
+            return Ok(*known);
+        }
+        self.kept.push(definition.clone());
+        let id = self.material(&definition, alpha.map(|alpha| alpha.1), place, 0)?;
+        self.materials.insert(key, id);
+        Ok(id)
+    }
+
+    fn named(&self, name: &str, place: &Place) -> Result<Rc<Definition>, LoadError> {
+        let found = self.named_materials.get(name).cloned();
+        found.ok_or_else(|| place.clone().bad(format!("there is no material `{name}`")))
+    }
+
+    fn material(
+        &mut self,
+        definition: &Definition,
+        opacity: Option<Texture>,
+        place: &Place,
+        depth: u32,
+    ) -> Result<MaterialId, LoadError> {
+        place.clone().at_most("nested materials", u64::from(depth), u64::from(MAX_NESTED))?;
+        let options = MaterialOptions { opacity, ..MaterialOptions::default() };
+        let refused = Self::refused(&definition.params.place);
+        let made = self.made(definition, depth)?;
+        definition.params.ignore(&["type", "bumpmap", "displacement"]);
+        self.say_unused(&definition.params, &format!("the material `{}`", definition.kind));
+        match made {
+            Made::Plain(material) => self.builder.material_with(material, options).map_err(refused),
+            Made::Nothing => {
+                let options = MaterialOptions { opacity: Some([0.0; 3].into()), ..options };
+                self.builder.material_with(Material::diffuse([0.0; 3]), options).map_err(refused)
+            }
+            Made::Mix(first, second, share) => {
+                self.builder.mixed_material(first, second, share, options).map_err(refused)
+            }
+        }
+    }
+
+    fn made(&mut self, d: &Definition, depth: u32) -> Result<Made, LoadError> {
+        for relief in ["bumpmap", "displacement", "normalmap"] {
+            if d.params.get(relief).is_some() {
+                self.ignored(
+                    &d.params.place,
+                    format!("the relief `{relief}` is left out: the surface is smooth"),
+                );
+            }
+        }
+        let near = |what: &str| format!("the material `{}` is replaced by {what}", d.kind);
+        Ok(Made::Plain(match d.kind.as_str() {
+            "diffuse" => Material::Diffuse { albedo: self.colour(d, "reflectance", [0.5; 3])? },
+            "matte" => {
+                if self.number(d, "sigma", 0.0)? > 0.0 {
+                    self.approximated(&d.params.place, "the roughness of a `matte` surface is left out");
+                }
+                Material::Diffuse { albedo: self.colour(d, "Kd", [0.5; 3])? }
+            }
+            "coateddiffuse" => {
+                d.params.ignore(&["thickness", "g", "albedo", "maxdepth", "nsamples"]);
+                self.approximated(&d.params.place, near("a coat on a Lambertian base"));
+                let roughness = self.roughness(d, 0.0, true)?;
+                self.plastic(
+                    self.colour(d, "reflectance", [0.5; 3])?,
+                    [1.0; 3],
+                    self.index(d, 1.5)?,
+                    roughness,
+                )
+            }
+            "plastic" | "uber" | "substrate" | "translucent" => {
+                self.approximated(&d.params.place, near("a coat on a Lambertian base"));
+                d.params.ignore(&["Kr", "Kt", "opacity", "reflect", "transmit"]);
+                let (kd, ks) = if d.kind == "substrate" { (0.5, 0.5) } else { (0.25, 0.25) };
+                let roughness = self.roughness(d, 0.1, false)?;
+                let specular = mean(&self.colour(d, "Ks", [ks; 3])?);
+                self.plastic(self.colour(d, "Kd", [kd; 3])?, specular, self.index(d, 1.5)?, roughness)
+            }
+            "conductor" | "metal" | "coatedconductor" => self.conductor(d)?,
+            "mirror" => Material::Mirror { reflectance: mean(&self.colour(d, "Kr", [0.9; 3])?) },
+            "dielectric" | "glass" | "thindielectric" => {
+                let tint = mean(&self.colour(d, "Kt", [1.0; 3])?);
+                d.params.ignore(&["Kr"]);
+                let (ior, roughness) = (self.index(d, 1.5)?, self.roughness(d, 0.0, d.kind == "dielectric")?);
+                if d.kind == "thindielectric" {
+                    Material::ThinGlass { ior, tint }
+                } else {
+                    Material::RoughGlass { ior, tint, roughness }
+                }
+            }
+            "disney" => {
+                self.approximated(&d.params.place, near("metal and gloss of the same colour"));
+                let (metallic, roughness) =
+                    (self.number(d, "metallic", 0.0)?, self.number(d, "roughness", 0.5)?);
+                let share = [1.0, roughness.clamp(0.0, 1.0) as f32, metallic.clamp(0.0, 1.0) as f32];
+                Material::MetallicRoughness {
+                    base: self.colour(d, "color", [0.5; 3])?,
+                    metallic_roughness: Texture::Colour(share),
+                    ior: (self.number(d, "eta", 1.5)? as f32).clamp(1.001, 4.0),
+                }
+            }
+            "diffusetransmission" => {
+                self.approximated(&d.params.place, near("its diffuse reflection"));
+                d.params.ignore(&["transmittance", "scale"]);
+                Material::Diffuse { albedo: self.colour(d, "reflectance", [0.25; 3])? }
+            }
+            "subsurface" | "kdsubsurface" => {
+                self.approximated(&d.params.place, near("a coat on a Lambertian base"));
+                d.params.ignore(&["sigma_a", "sigma_s", "mfp", "scale", "g", "name"]);
+                let roughness = self.roughness(d, 0.0, true)?;
+                self.plastic(self.colour(d, "Kd", [0.5; 3])?, [1.0; 3], self.index(d, 1.33)?, roughness)
+            }
+            "interface" | "none" | "" => return Ok(Made::Nothing),
+            "mix" => return self.mix(d, depth),
+            other => {
+                return Err(d.params.place.clone().unsupported(format!("the material `{other}`")));
+            }
+        }))
+    }
+
+    fn plastic(&self, diffuse: Texture, specular: Rgb, ior: f32, roughness: f32) -> Material {
+        let ior = ior.clamp(1.001, 4.0);
+        Material::Plastic { diffuse, specular, ior, roughness, nonlinear: true }
+    }
+
+    fn conductor(&mut self, d: &Definition) -> Result<Material, LoadError> {
+        if d.kind == "coatedconductor" {
+            self.approximated(&d.params.place, "the coat of a conductor is left out");
+            d.params.ignore(&[
+                "interface.roughness",
+                "interface.uroughness",
+                "interface.vroughness",
+                "interface.eta",
+                "thickness",
+                "g",
+                "albedo",
+                "maxdepth",
+                "nsamples",
+            ]);
+        }
+        let prefix = if d.kind == "coatedconductor" { "conductor." } else { "" };
+        let name = |name: &str| format!("{prefix}{name}");
+        let missing = if d.kind == "metal" { 0.01 } else { 0.0 };
+        let roughness = self.roughness_of(d, prefix, missing, d.kind != "metal")?;
+        if let Some(reflectance) = self.texture_or_colour(d, &name("reflectance"))? {
+            return Ok(Material::RoughConductor { reflectance, roughness });
+        }
+        let copper = crate::indices::conductor("Cu").unwrap_or(([0.2, 0.9, 1.1], [3.9, 2.5, 2.1]));
+        let eta = self.factor(&d.params, &name("eta"))?.unwrap_or(copper.0).map(|x| x.clamp(0.0, 100.0));
+        let k = self.factor(&d.params, &name("k"))?.unwrap_or(copper.1).map(|x| x.clamp(0.0, 100.0));
+        Ok(Material::Conductor { eta, k, reflectance: [1.0; 3].into(), roughness })
+    }
+
+    fn mix(&mut self, d: &Definition, depth: u32) -> Result<Made, LoadError> {
+        use super::params::Values;
+        let names: Vec<String> = match d.params.get("materials").map(|p| &p.values) {
+            Some(Values::Texts(names)) => names.clone(),
+            _ => ["namedmaterial1", "namedmaterial2"]
+                .iter()
+                .filter_map(|name| d.params.text(name).ok().flatten().map(str::to_owned))
+                .collect(),
+        };
+        let [first, second] = names.as_slice() else {
+            return Err(d.params.bad("a mix needs the names of two materials"));
+        };
+        let mut part = |name: &str| {
+            let definition = self.named(name, &d.params.place)?;
+            self.material(&definition, None, &d.params.place, depth + 1)
+        };
+        let (first, second) = (part(first)?, part(second)?);
+        let share = self.colour(d, "amount", [0.5; 3])?;
+        // In pbrt 3 the amount is that of the first
+        if d.params.get("materials").is_none() {
+            return Ok(Made::Mix(second, first, share));
+        }
+        Ok(Made::Mix(first, second, share))
+    }
+
+    /// A colour or texture in 0…1.
+    fn colour(&self, d: &Definition, name: &str, missing: Rgb) -> Result<Texture, LoadError> {
+        Ok(self.texture_or_colour(d, name)?.unwrap_or(Texture::Colour(missing)))
+    }
+
+    fn texture_or_colour(&self, d: &Definition, name: &str) -> Result<Option<Texture>, LoadError> {
+        let Some(param) = d.params.get(name) else { return Ok(None) };
+        if param.kind == "texture" {
+            let called = d.params.text(name)?.unwrap_or_default();
+            let found = d.colour_textures.get(called).or_else(|| d.float_textures.get(called)).cloned();
+            let missing = || d.params.bad(format!("there is no texture `{called}`"));
+            return found.map(Some).ok_or_else(missing);
+        }
+        Ok(self.factor(&d.params, name)?.map(plain))
+    }
+
+    /// A number; of a texture its mean.
+    fn number(&mut self, d: &Definition, name: &str, missing: f64) -> Result<f64, LoadError> {
+        match d.params.get(name).map(|p| p.kind.as_str()) {
+            None => Ok(missing),
+            Some("texture") => {
+                self.approximated(
+                    &d.params.place,
+                    format!("the texture of `{name}` is replaced by its mean"),
+                );
+                let colour = self.texture_or_colour(d, name)?.map_or([0.5; 3], |texture| mean(&texture));
+                Ok(f64::from(colour.iter().sum::<f32>() / 3.0))
+            }
+            Some(_) => Ok(d.params.float(name)?.unwrap_or(missing)),
+        }
+    }
+
+    /// The index of refraction: a number or a named glass.
+    fn index(&self, d: &Definition, missing: f32) -> Result<f32, LoadError> {
+        for name in ["eta", "index"] {
+            if let Some([index, ..]) = self.factor(&d.params, name)? {
+                return Ok(index.clamp(0.25, 4.0));
+            }
+        }
+        Ok(missing)
+    }
+
+    fn roughness(&mut self, d: &Definition, missing: f64, fourth: bool) -> Result<f32, LoadError> {
+        self.roughness_of(d, "", missing, fourth)
+    }
+
+    /// GGX α: pbrt 4 takes the square root of its roughness, pbrt 3 a polynomial of its logarithm.
+    fn roughness_of(
+        &mut self,
+        d: &Definition,
+        prefix: &str,
+        missing: f64,
+        fourth: bool,
+    ) -> Result<f32, LoadError> {
+        let name = |name: &str| format!("{prefix}{name}");
+        let both = self.number(d, &name("roughness"), missing)?;
+        let u = self.number(d, &name("uroughness"), both)?;
+        let v = self.number(d, &name("vroughness"), both)?;
+        if u != v {
+            self.approximated(&d.params.place, "roughness that depends on direction is replaced by its mean");
+        }
+        let roughness = (u * v).max(0.0).sqrt();
+        let alpha = match d.params.switch("remaproughness", true)? {
+            false => roughness,
+            true if fourth => roughness.sqrt(),
+            true if roughness == 0.0 => 0.0,
+            true => {
+                let x = roughness.max(1e-3).ln();
+                1.621_42 + x * (0.819_955 + x * (0.1734 + x * (0.017_120_1 + x * 0.000_640_711)))
+            }
+        };
+        Ok(alpha.clamp(0.0, 1.0) as f32)
+    }
+}

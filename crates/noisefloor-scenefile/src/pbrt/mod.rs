@@ -1,0 +1,31 @@
+//! pbrt, versions 3 and 4.
+//!
+//! `tokens` splits the text, `params` reads what follows a directive, and `reader` executes directives one by one, as
+//! pbrt does, over a stack of states. Each kind of thing has a module: `camera`, `colours`, `lights`, `materials`,
+//! `shapes`, `textures`. Errors of shapes and lights are collected, so that one load names all.
+//!
+//! Read here and not by a crate: pbrt4 0.2.0 reads version 4 only, and its errors name neither file nor line.
+
+mod camera;
+mod colours;
+mod environment;
+mod lights;
+mod materials;
+mod params;
+mod reader;
+mod shapes;
+mod state;
+mod textures;
+mod tokens;
+
+use crate::Loaded;
+use crate::error::LoadError;
+use crate::options::LoadOptions;
+use std::path::Path;
+
+/// Loads the scene in `path`.
+pub(crate) fn load(path: &Path, options: &LoadOptions) -> Result<Loaded, LoadError> {
+    let mut reader = reader::Reader::new(path, options)?;
+    reader.file(path, 0)?;
+    reader.finish()
+}

@@ -1,0 +1,233 @@
+//! Shapes and instances.
+
+use super::params::Params;
+use super::reader::Reader;
+use super::state::{Part, Wear};
+use crate::error::{LoadError, Place};
+use crate::files::MAX_FILE_BYTES;
+use crate::mesh::{Triangles, ply, solids};
+use glam::{DMat3, DMat4, DQuat, DVec3};
+use noisefloor_ptwne::{Mesh, SceneError, Texture};
+use std::rc::Rc;
+
+impl Reader<'_> {
+    /// Adds a `Shape`, to the scene or to the object that is open.
+    pub(super) fn shape(&mut self, kind: &str, params: &Params) -> Result<(), LoadError> {
+        if self.state.in_medium {
+            if !self.options.ignore_volumes {
+                return Err(params.place.clone().unsupported("a participating medium"));
+            }
+            self.ignored(&params.place, "the participating medium is ignored");
+        }
+        let alpha = self.alpha(params)?;
+        let material = self.current_material(alpha, &params.place)?;
+        let emission = self.emission()?;
+        let wear = Wear { material, emission };
+        if kind == "sphere" && self.open_object.is_none() && self.round_sphere(params, &wear)? {
+            return Ok(());
+        }
+        let (mut mesh, own) = match kind {
+            "trianglemesh" => (self.triangle_mesh(params)?, DMat4::IDENTITY),
+            "bilinearmesh" => (self.bilinear_mesh(params)?, DMat4::IDENTITY),
+            "loopsubdiv" => (self.control_mesh(params)?, DMat4::IDENTITY),
+            "plymesh" => (self.ply_mesh(params)?, DMat4::IDENTITY),
+            "sphere" => {
+                self.whole(params, &["zmin", "zmax", "phimax"]);
+                let radius = positive(params, "radius", 1.0)?;
+                (solids::sphere(), DMat4::from_scale(DVec3::splat(radius)))
+            }
+            "cylinder" => {
+                self.whole(params, &["phimax"]);
+                let radius = positive(params, "radius", 1.0)?;
+                let low = params.float("zmin")?.unwrap_or(-1.0);
+                let high = params.float("zmax")?.unwrap_or(1.0);
+                let scale = DVec3::new(radius, radius, high - low);
+                let at = DVec3::new(0.0, 0.0, low);
+                (solids::cylinder(), DMat4::from_scale_rotation_translation(scale, DQuat::IDENTITY, at))
+            }
+            "disk" => {
+                self.whole(params, &["phimax"]);
+                let radius = positive(params, "radius", 1.0)?;
+                let inner = params.float("innerradius")?.unwrap_or(0.0) / radius;
+                let at = DVec3::new(0.0, 0.0, params.float("height")?.unwrap_or(0.0));
+                let scale = DVec3::splat(radius);
+                let own = DMat4::from_scale_rotation_translation(scale, DQuat::IDENTITY, at);
+                (solids::disk(inner.clamp(0.0, 0.999) as f32), own)
+            }
+            _ => return Err(params.place.clone().unsupported(format!("Shape \"{kind}\""))),
+        };
+        mesh.check(&params.place)?;
+
+        // The front is where shading normals point, or else the corners say so in the shape's own coordinates
+        let to_world = self.state.to_world * own;
+        if self.state.reversed {
+            mesh.normals.iter_mut().for_each(|normal| *normal = normal.map(|x| -x));
+            if mesh.normals.is_empty() {
+                mesh.indices.iter_mut().for_each(|triangle| triangle.swap(1, 2));
+            }
+        }
+        if self.open_object.is_some() {
+            mesh.place(to_world);
+            let part = Part { mesh: Rc::new(mesh), wear, place: params.place.clone() };
+            if let Some((_, parts)) = &mut self.open_object {
+                parts.push(part);
+            }
+            return Ok(());
+        }
+        mesh.place(to_world);
+        self.add(&mesh, &wear, &params.place)
+    }
+
+    /// Shows an object where the state is.
+    pub(super) fn instance(&mut self, name: &str, place: &Place) -> Result<(), LoadError> {
+        let parts = self.objects.get(name).cloned();
+        let parts = parts.ok_or_else(|| place.clone().bad(format!("there is no object `{name}`")))?;
+        for part in parts {
+            let mut mesh = (*part.mesh).clone();
+            mesh.place(self.state.to_world);
+            self.add(&mesh, &part.wear, &part.place)?;
+        }
+        Ok(())
+    }
+
+    fn add(&mut self, mesh: &Triangles, wear: &Wear, place: &Place) -> Result<(), LoadError> {
+        let Triangles { positions, normals, uvs, indices } = mesh;
+        let mesh = Mesh { positions, normals, uvs, indices };
+        match self.builder.mesh(&mesh, wear.material, wear.emission.clone()) {
+            Ok(_) => Ok(()),
+            Err(SceneError::EmptyEmitter) => {
+                self.ignored(place, "a shape is left out: it shines, but has no area");
+                Ok(())
+            }
+            Err(cause) => Err(LoadError::Scene { place: place.clone(), cause }),
+        }
+    }
+
+    /// Adds a sphere that is whole and not stretched. The result is whether it was one.
+    fn round_sphere(&mut self, params: &Params, wear: &Wear) -> Result<bool, LoadError> {
+        let radius = positive(params, "radius", 1.0)?;
+        let axes = DMat3::from_mat4(self.state.to_world);
+        let scale = axes.x_axis.length();
+        let off = (axes.transpose() * axes - DMat3::IDENTITY * (scale * scale)).to_cols_array();
+        let even = off.iter().all(|x| x.abs() <= 1e-4 * scale * scale) && scale > 0.0;
+        // Its light comes from its outside
+        let shines = wear.emission.as_ref().is_some_and(|emission| !emission.two_sided);
+        let partial = ["zmin", "zmax", "phimax"].iter().any(|name| params.get(name).is_some());
+        if !even || partial || shines && self.state.reversed {
+            return Ok(false);
+        }
+        let centre = self.state.to_world.w_axis.truncate().as_vec3().to_array();
+        // u runs around z from +x over +y; v = 1 is +z in pbrt, too
+        let [x, y, z] = [axes.x_axis, axes.y_axis, axes.z_axis].map(|axis| (axis / scale).as_vec3());
+        let axes = [-x, z, -y].map(|axis| axis.to_array());
+        let radius = (radius * scale) as f32;
+        let refused = Self::refused(&params.place);
+        let added = self.builder.turned_sphere(centre, radius, axes, wear.material, wear.emission.clone());
+        added.map_err(refused).map(|()| true)
+    }
+
+    /// Warns that a part of a round shape is whole here.
+    fn whole(&mut self, params: &Params, names: &[&str]) {
+        if names.iter().any(|name| params.get(name).is_some()) {
+            self.approximated(&params.place, "a part of a round shape is replaced by the whole");
+        }
+    }
+
+    /// Where the shape is: a number or a texture, and what to call it.
+    fn alpha(&mut self, params: &Params) -> Result<Option<(String, Texture)>, LoadError> {
+        params.ignore(&["shadowalpha"]);
+        let Some(param) = params.get("alpha") else { return Ok(None) };
+        if param.kind == "texture" {
+            let name = params.text("alpha")?.unwrap_or_default();
+            let found = self.state.float_textures.get(name).cloned();
+            let texture = found.ok_or_else(|| params.bad(format!("there is no texture `{name}`")))?;
+            return Ok(Some((name.to_owned(), texture)));
+        }
+        let alpha = params.float("alpha")?.unwrap_or(1.0).clamp(0.0, 1.0) as f32;
+        Ok((alpha < 1.0).then(|| (alpha.to_string(), Texture::Colour([alpha; 3]))))
+    }
+
+    fn triangle_mesh(&self, params: &Params) -> Result<Triangles, LoadError> {
+        params.ignore(&["S", "faceIndices"]);
+        let positions = params.rows::<3>("P")?.ok_or_else(|| params.bad("a mesh needs its points `P`"))?;
+        let uvs = match params.rows::<2>("uv")? {
+            Some(uvs) => Some(uvs),
+            None => params.rows::<2>("st")?,
+        };
+        let indices = corners::<3>(params, "indices")?.unwrap_or_else(|| vec![[0, 1, 2]]);
+        let normals = params.rows::<3>("N")?.unwrap_or_default();
+        let mesh = Triangles { positions, normals, uvs: uvs.unwrap_or_default(), indices };
+        self.fits(params, mesh)
+    }
+
+    /// Squares, each as two triangles.
+    fn bilinear_mesh(&mut self, params: &Params) -> Result<Triangles, LoadError> {
+        params.ignore(&["emissionfilename"]);
+        let positions = params.rows::<3>("P")?.ok_or_else(|| params.bad("a mesh needs its points `P`"))?;
+        let corners = corners::<4>(params, "indices")?.unwrap_or_else(|| vec![[0, 1, 2, 3]]);
+        // Corners come in rows
+        let indices = corners.iter().flat_map(|[a, b, c, d]| [[*a, *b, *d], [*a, *d, *c]]).collect();
+        let (normals, uvs) = (params.rows::<3>("N")?, params.rows::<2>("uv")?);
+        self.approximated(&params.place, "a bilinear patch is replaced by two triangles");
+        let mesh = Triangles {
+            positions,
+            normals: normals.unwrap_or_default(),
+            uvs: uvs.unwrap_or_default(),
+            indices,
+        };
+        self.fits(params, mesh)
+    }
+
+    /// The mesh that a subdivision begins with, smoothed.
+    fn control_mesh(&mut self, params: &Params) -> Result<Triangles, LoadError> {
+        params.ignore(&["levels", "nlevels", "scheme"]);
+        let positions = params.rows::<3>("P")?.ok_or_else(|| params.bad("a mesh needs its points `P`"))?;
+        let indices = corners::<3>(params, "indices")?.ok_or_else(|| params.bad("a mesh needs `indices`"))?;
+        self.approximated(&params.place, "a subdivided mesh is replaced by its control mesh, smoothed");
+        let mut mesh = Triangles { positions, indices, ..Triangles::default() };
+        mesh.check(&params.place)?;
+        mesh.smooth();
+        Ok(mesh)
+    }
+
+    fn ply_mesh(&mut self, params: &Params) -> Result<Triangles, LoadError> {
+        let name = params.text("filename")?.ok_or_else(|| params.bad("a plymesh needs a `filename`"))?;
+        for relief in ["displacement", "displacement.edgelength"] {
+            if params.get(relief).is_some() {
+                self.ignored(&params.place, "the displacement of a mesh is left out");
+            }
+        }
+        let path = self.folder.find(name, &params.place)?;
+        let bytes = self.bytes_of(&path, MAX_FILE_BYTES, &params.place)?;
+        ply::parse(&bytes, &path)
+    }
+
+    /// Checks that normals and texture coordinates are as many as points.
+    fn fits(&self, params: &Params, mesh: Triangles) -> Result<Triangles, LoadError> {
+        let points = mesh.positions.len();
+        for (name, found) in [("N", mesh.normals.len()), ("uv", mesh.uvs.len())] {
+            if found != 0 && found != points {
+                return Err(params.bad(format!("`{name}` has {found} rows for {points} points")));
+            }
+        }
+        Ok(mesh)
+    }
+}
+
+/// A number above 0.
+fn positive(params: &Params, name: &str, missing: f64) -> Result<f64, LoadError> {
+    match params.float(name)?.unwrap_or(missing) {
+        x if x > 0.0 => Ok(x),
+        x => Err(params.bad(format!("`{name}` is {x}; it must be above 0"))),
+    }
+}
+
+/// Rows of indices.
+fn corners<const N: usize>(params: &Params, name: &str) -> Result<Option<Vec<[u32; N]>>, LoadError> {
+    let Some(numbers) = params.numbers(name)? else { return Ok(None) };
+    if numbers.len() % N != 0 || !numbers.iter().all(|x| (0.0..4e9).contains(x) && x.fract() == 0.0) {
+        return Err(params.bad(format!("`{name}` must be whole numbers of at least 0, a multiple of {N}")));
+    }
+    let row = |row: &[f64]| std::array::from_fn(|i| row[i] as u32);
+    Ok(Some(numbers.chunks_exact(N).map(row).collect()))
+}

@@ -1,0 +1,83 @@
+//! The state that directives change, and what they define.
+
+use super::params::Params;
+use crate::error::Place;
+use crate::mesh::Triangles;
+use glam::DMat4;
+use noisefloor::Rgb;
+use noisefloor_ptwne::{Emission, MaterialId, Texture};
+use std::collections::HashMap;
+use std::rc::Rc;
+
+/// What attributes keep and restore.
+#[derive(Clone, Debug)]
+pub(super) struct State {
+    /// From the coordinates of what comes next to the world.
+    pub(super) to_world: DMat4,
+    pub(super) material: Look,
+    pub(super) area_light: Option<Rc<Params>>,
+    pub(super) reversed: bool,
+    /// Whether a medium is on either side of the surfaces that come.
+    pub(super) in_medium: bool,
+    /// Parameters that `Attribute` adds to all that come: by what they are for.
+    pub(super) defaults: HashMap<String, Rc<Params>>,
+    pub(super) float_textures: HashMap<String, Texture>,
+    pub(super) colour_textures: HashMap<String, Texture>,
+}
+
+/// A material, by its name or as it was given.
+#[derive(Clone, Debug)]
+pub(super) enum Look {
+    Named(String, Place),
+    Given(Rc<Definition>),
+}
+
+/// A material: its kind and parameters, with the textures that it could see.
+#[derive(Clone, Debug)]
+pub(super) struct Definition {
+    pub(super) kind: String,
+    pub(super) params: Params,
+    pub(super) float_textures: HashMap<String, Texture>,
+    pub(super) colour_textures: HashMap<String, Texture>,
+}
+
+/// What a surface looks like in the scene.
+#[derive(Clone, Debug)]
+pub(super) struct Wear {
+    pub(super) material: MaterialId,
+    pub(super) emission: Option<Emission>,
+}
+
+/// A shape of an object, to be shown by its instances.
+#[derive(Clone, Debug)]
+pub(super) struct Part {
+    pub(super) mesh: Rc<Triangles>,
+    pub(super) wear: Wear,
+    pub(super) place: Place,
+}
+
+impl State {
+    pub(super) fn new(place: Place) -> Self {
+        let diffuse = Definition {
+            kind: "diffuse".to_owned(),
+            params: Params::none(place),
+            float_textures: HashMap::new(),
+            colour_textures: HashMap::new(),
+        };
+        Self {
+            to_world: DMat4::IDENTITY,
+            material: Look::Given(Rc::new(diffuse)),
+            area_light: None,
+            reversed: false,
+            in_medium: false,
+            defaults: HashMap::new(),
+            float_textures: HashMap::new(),
+            colour_textures: HashMap::new(),
+        }
+    }
+}
+
+/// A colour as a texture.
+pub(super) fn plain(colour: Rgb) -> Texture {
+    Texture::Colour(colour.map(|c| c.clamp(0.0, 1.0)))
+}

@@ -1,0 +1,205 @@
+//! Textures.
+
+use super::params::Params;
+use super::reader::Reader;
+use super::state::plain;
+use crate::error::LoadError;
+use crate::picture::{self, Samples};
+use noisefloor::{Rgb, srgb_decode};
+use noisefloor_ptwne::{ImageTexture, Pixels, Texture, Wrap};
+use std::collections::HashMap;
+use std::sync::Arc;
+
+/// Textures by name.
+pub(super) type Named = HashMap<String, Texture>;
+
+impl Reader<'_> {
+    /// Defines a texture.
+    pub(super) fn texture(
+        &mut self,
+        name: &str,
+        values: &str,
+        class: &str,
+        params: &Params,
+    ) -> Result<(), LoadError> {
+        let floats = values == "float";
+        let known =
+            if floats { self.state.float_textures.clone() } else { self.state.colour_textures.clone() };
+        let texture = match class {
+            "imagemap" => self.image_map(params, floats)?,
+            "constant" => plain(self.factor(params, "value")?.unwrap_or([1.0; 3])),
+            "scale" => {
+                let (first, second) =
+                    if params.get("tex").is_some() { ("tex", "scale") } else { ("tex1", "tex2") };
+                let first = self.operand(params, first, &known)?;
+                let second = self.operand(params, second, &known)?;
+                self.product(params, first, second)?
+            }
+            "checkerboard" => {
+                let first = self.operand(params, "tex1", &known)?;
+                let second = self.operand(params, "tex2", &known)?;
+                let (a, b) = (mean(&first), mean(&second));
+                let image = ImageTexture::new(2, 2, Pixels::Float(Arc::new([b, a, a, b])));
+                // pbrt's squares have the size 1, a picture of ours has two
+                let to_uv = uv_map(params)?.map(|row| row.map(|x| 0.5 * x));
+                params.ignore(&["dimension"]);
+                Texture::Image(ImageTexture { to_uv, nearest: true, ..image })
+            }
+            "mix" | "directionmix" => {
+                let (first, second) =
+                    (self.operand(params, "tex1", &known)?, self.operand(params, "tex2", &known)?);
+                let amount = params.float("amount").ok().flatten().unwrap_or(0.5) as f32;
+                self.approximated(&params.place, "a mixed texture is replaced by its mean");
+                let (a, b) = (mean(&first), mean(&second));
+                plain(std::array::from_fn(|i| a[i] + (b[i] - a[i]) * amount))
+            }
+            _ => {
+                self.approximated(
+                    &params.place,
+                    format!("the texture `{class}` is replaced by a grey of 0.5"),
+                );
+                params.ignore(&["octaves", "roughness", "scale", "variation", "inside", "outside"]);
+                plain([0.5; 3])
+            }
+        };
+        let textures = if floats { &mut self.state.float_textures } else { &mut self.state.colour_textures };
+        textures.insert(name.to_owned(), texture);
+        Ok(())
+    }
+
+    /// A colour, a number or a named texture.
+    fn operand(&mut self, params: &Params, name: &str, known: &Named) -> Result<Texture, LoadError> {
+        let missing = [1.0; 3];
+        if params.get(name).is_some_and(|p| p.kind == "texture") {
+            let called = params.text(name)?.unwrap_or_default();
+            let found = known.get(called).cloned();
+            return found.ok_or_else(|| params.bad(format!("there is no texture `{called}`")));
+        }
+        Ok(Texture::Colour(self.factor(params, name)?.unwrap_or(missing)))
+    }
+
+    fn product(&mut self, params: &Params, first: Texture, second: Texture) -> Result<Texture, LoadError> {
+        Ok(match (first, second) {
+            (Texture::Colour(a), Texture::Colour(b)) => plain(std::array::from_fn(|i| a[i] * b[i])),
+            (Texture::Image(image), Texture::Colour(colour))
+            | (Texture::Colour(colour), Texture::Image(image)) => self.scaled(params, image, colour)?,
+            (Texture::Image(image), other) => {
+                self.approximated(
+                    &params.place,
+                    "of a product of two pictures the second is replaced by its mean",
+                );
+                self.scaled(params, image, mean(&other))?
+            }
+            // This reader makes no others
+            (other, _) => other,
+        })
+    }
+
+    /// A picture times a colour. What exceeds 1 is 1.
+    fn scaled(&mut self, params: &Params, image: ImageTexture, by: Rgb) -> Result<Texture, LoadError> {
+        if by.iter().all(|c| (0.0..=1.0).contains(c)) {
+            let factor = std::array::from_fn(|i| image.factor[i] * by[i]);
+            return Ok(Texture::Image(ImageTexture { factor, ..image }));
+        }
+        self.count_pixels(&params.place, image.width * image.height)?;
+        let scaled = |p: Rgb| std::array::from_fn(|i| (p[i] * image.factor[i] * by[i]).clamp(0.0, 1.0));
+        let pixels = Pixels::Float(linear(&image.pixels).into_iter().map(scaled).collect());
+        Ok(Texture::Image(ImageTexture { pixels, factor: [1.0; 3], ..image }))
+    }
+
+    fn image_map(&mut self, params: &Params, floats: bool) -> Result<Texture, LoadError> {
+        let name = params.text("filename")?.ok_or_else(|| params.bad("an imagemap needs a `filename`"))?;
+        params.ignore(&["maxanisotropy", "trilinear"]);
+        let path = self.folder.find(name, &params.place)?;
+        let picture = picture::read(&path, &params.place)?;
+        let count = picture.width * picture.height;
+        self.count_pixels(&params.place, count)?;
+        let encoding = params.text("encoding")?;
+        let raw = match (encoding, params.switch("gamma", true)?) {
+            (Some("linear"), _) | (_, false) => true,
+            (Some("sRGB") | None, true) => false,
+            (Some(other), _) => {
+                self.approximated(&params.place, format!("the encoding `{other}` is replaced by sRGB"));
+                false
+            }
+        };
+        // Shares in the alpha of a picture are its opacity
+        let with_alpha =
+            floats && matches!(&picture.samples, Samples::Eight(codes) if codes.iter().any(|p| p[3] < 255));
+        let pixels = match picture.samples {
+            Samples::Eight(codes) if with_alpha => Pixels::Linear8(codes.iter().map(|p| [p[3]; 3]).collect()),
+            Samples::Eight(codes) if raw => {
+                Pixels::Linear8(codes.iter().map(|p| [p[0], p[1], p[2]]).collect())
+            }
+            Samples::Eight(codes) => Pixels::Srgb8(codes.iter().map(|p| [p[0], p[1], p[2]]).collect()),
+            Samples::Sixteen(codes) => {
+                let value = |code: u16| {
+                    let value = f32::from(code) / 65535.0;
+                    if raw { value } else { srgb_decode(value) }
+                };
+                Pixels::Float(codes.iter().map(|p| [p[0], p[1], p[2]].map(value)).collect())
+            }
+            Samples::Linear(values) => {
+                // Also false for NaN
+                let inside = |v: f32| if v > 0.0 { v.min(1.0) } else { 0.0 };
+                Pixels::Float(values.iter().map(|p| p.map(inside)).collect())
+            }
+        };
+        let wrap = match params.text("wrap")?.unwrap_or("repeat") {
+            "repeat" => Wrap::Repeat,
+            "clamp" => Wrap::Clamp,
+            other => {
+                self.approximated(&params.place, format!("the wrap mode `{other}` is replaced by `clamp`"));
+                Wrap::Clamp
+            }
+        };
+        let nearest = params.text("filter")? == Some("point");
+        if params.text("mapping")?.is_some_and(|mapping| mapping != "uv") {
+            self.approximated(&params.place, "the texture is laid on by texture coordinates");
+        }
+        let to_uv = uv_map(params)?;
+        let image = ImageTexture::new(picture.width, picture.height, pixels);
+        let image = ImageTexture { to_uv, wrap: [wrap; 2], nearest, ..image };
+        let scale = params.float("scale")?.unwrap_or(1.0) as f32;
+        if params.switch("invert", false)? {
+            self.count_pixels(&params.place, count)?;
+            let inverse = |p: Rgb| p.map(|c| (scale * (1.0 - c)).clamp(0.0, 1.0));
+            let pixels = Pixels::Float(linear(&image.pixels).into_iter().map(inverse).collect());
+            return Ok(Texture::Image(ImageTexture { pixels, ..image }));
+        }
+        self.scaled(params, image, [scale; 3])
+    }
+}
+
+/// `uscale`, `vscale`, `udelta` and `vdelta`.
+fn uv_map(params: &Params) -> Result<[[f32; 3]; 2], LoadError> {
+    let number = |name: &str, missing: f64| Ok::<_, LoadError>(params.float(name)?.unwrap_or(missing) as f32);
+    let (us, vs) = (number("uscale", 1.0)?, number("vscale", 1.0)?);
+    let (ud, vd) = (number("udelta", 0.0)?, number("vdelta", 0.0)?);
+    params.ignore(&["v1", "v2"]);
+    Ok([[us, 0.0, ud], [0.0, vs, vd]])
+}
+
+/// Linear values of pixels.
+fn linear(pixels: &Pixels) -> Vec<Rgb> {
+    let value = |code: u8| f32::from(code) / 255.0;
+    match pixels {
+        Pixels::Srgb8(codes) => codes.iter().map(|p| p.map(|code| srgb_decode(value(code)))).collect(),
+        Pixels::Linear8(codes) => codes.iter().map(|p| p.map(value)).collect(),
+        Pixels::Float(values) => values.to_vec(),
+    }
+}
+
+/// The mean colour of a texture.
+pub(super) fn mean(texture: &Texture) -> Rgb {
+    match texture {
+        Texture::Colour(colour) => *colour,
+        Texture::Image(image) => {
+            let pixels = linear(&image.pixels);
+            let sum = |i: usize| pixels.iter().map(|p| f64::from(p[i])).sum::<f64>();
+            std::array::from_fn(|i| image.factor[i] * (sum(i) / pixels.len().max(1) as f64) as f32)
+        }
+        // This reader makes no others
+        _ => [0.5; 3],
+    }
+}

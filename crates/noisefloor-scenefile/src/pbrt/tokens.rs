@@ -1,0 +1,124 @@
+//! The words of a pbrt file.
+
+/// A word, and the line it is on.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Token {
+    pub(super) kind: Kind,
+    pub(super) line: u32,
+}
+
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Kind {
+    /// A directive, a number, `true` or `false`.
+    Word(String),
+    /// Between quotes.
+    Text(String),
+    Open,
+    Close,
+}
+
+/// Splits a file into tokens.
+pub(super) struct Tokens<'a> {
+    rest: &'a str,
+    line: u32,
+    peeked: Option<Token>,
+}
+
+impl<'a> Tokens<'a> {
+    pub(super) fn new(text: &'a str) -> Self {
+        Self { rest: text, line: 1, peeked: None }
+    }
+
+    /// The next token, which stays.
+    ///
+    /// # Errors
+    /// The line of a quote that does not end.
+    pub(super) fn peek(&mut self) -> Result<Option<&Token>, u32> {
+        if self.peeked.is_none() {
+            self.peeked = self.read()?;
+        }
+        Ok(self.peeked.as_ref())
+    }
+
+    /// The next token.
+    ///
+    /// # Errors
+    /// As [`Self::peek`].
+    pub(super) fn next(&mut self) -> Result<Option<Token>, u32> {
+        match self.peeked.take() {
+            Some(token) => Ok(Some(token)),
+            None => self.read(),
+        }
+    }
+
+    fn read(&mut self) -> Result<Option<Token>, u32> {
+        self.skip_space();
+        let line = self.line;
+        let Some(first) = self.rest.chars().next() else { return Ok(None) };
+        let kind = match first {
+            '[' | ']' => {
+                self.rest = &self.rest[1..];
+                if first == '[' { Kind::Open } else { Kind::Close }
+            }
+            '"' => {
+                let body = &self.rest[1..];
+                let end = body.find('"').ok_or(line)?;
+                self.line += body[..end].matches('\n').count() as u32;
+                self.rest = &body[end + 1..];
+                Kind::Text(body[..end].to_owned())
+            }
+            _ => {
+                let ends = |c: char| c.is_whitespace() || matches!(c, '"' | '[' | ']' | '#');
+                let end = self.rest.find(ends).unwrap_or(self.rest.len());
+                let (word, rest) = self.rest.split_at(end);
+                self.rest = rest;
+                Kind::Word(word.to_owned())
+            }
+        };
+        Ok(Some(Token { kind, line }))
+    }
+
+    /// Skips white space and comments.
+    fn skip_space(&mut self) {
+        loop {
+            let trimmed = self.rest.trim_start();
+            self.line += self.rest[..self.rest.len() - trimmed.len()].matches('\n').count() as u32;
+            self.rest = trimmed;
+            if !self.rest.starts_with('#') {
+                return;
+            }
+            self.rest = &self.rest[self.rest.find('\n').unwrap_or(self.rest.len())..];
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn words_are_split_and_counted() {
+        let text = "Shape # a \"comment\"\n\"point P\"[0 1e-3]\n\n\"a\nb\" end";
+        let mut tokens = Tokens::new(text);
+        let mut all = Vec::new();
+        while let Some(token) = tokens.next().unwrap() {
+            all.push((token.kind, token.line));
+        }
+        let word = |word: &str| Kind::Word(word.to_owned());
+        let quoted = |text: &str| Kind::Text(text.to_owned());
+        assert_eq!(
+            all,
+            [
+                (word("Shape"), 1),
+                (quoted("point P"), 2),
+                (Kind::Open, 2),
+                (word("0"), 2),
+                (word("1e-3"), 2),
+                (Kind::Close, 2),
+                (quoted("a\nb"), 4),
+                (word("end"), 5),
+            ]
+        );
+        assert_eq!(Tokens::new("\n\"open").next(), Err(2));
+    }
+}

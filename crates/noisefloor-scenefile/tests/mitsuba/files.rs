@@ -1,0 +1,114 @@
+use crate::util::{CAMERA, Folder, close, look};
+use noisefloor_scenefile::{LoadError, LoadOptions, Treatment, group_warnings, load_with};
+
+fn scene(inside: &str) -> String {
+    format!("<scene version=\"3.0.0\">{CAMERA}\n{inside}</scene>")
+}
+
+fn lamp(radiance: &str) -> String {
+    format!(
+        r#"<shape type="rectangle"><emitter type="area"><rgb name="radiance" value="{radiance}"/></emitter></shape>"#
+    )
+}
+
+#[test]
+fn includes_are_read_in_place_with_their_own_lines() {
+    let folder = Folder::new()
+        .with("lamp.xml", format!("<scene version=\"3.0.0\">\n{}</scene>", lamp("$level")))
+        .with("alone.xml", "<bsdf type=\"diffuse\" id=\"grey\"/>")
+        .with("wrong.xml", "<scene version=\"3.0.0\">\n\n<shape type=\"hair\"/></scene>")
+        .with("round.xml", "<scene version=\"3.0.0\"><include filename=\"round.xml\"/></scene>");
+    let body = r#"<default name="level" value="0.5"/><include filename="lamp.xml"/>
+        <include filename="alone.xml"/><shape type="cube"><ref id="grey"/>
+        <transform name="to_world"><translate z="-50"/></transform></shape>"#;
+    close(look(folder.body(body).unwrap()), [0.5; 3], 1e-4, body);
+    let wrong = folder.body(r#"<include filename="wrong.xml"/>"#).unwrap_err();
+    assert!(wrong.contains("wrong.xml: line 3: <shape type=\"hair\"> is not supported"), "{wrong}");
+    let round = folder.body(r#"<include filename="round.xml"/>"#).unwrap_err();
+    assert!(round.contains("33 levels of elements, more than 32"), "{round}");
+    let outside = folder.body(r#"<include filename="../a.xml"/>"#).unwrap_err();
+    assert!(outside.contains("lies outside the folder of the scene"), "{outside}");
+    let nameless = folder.body("<include/>").unwrap_err();
+    assert!(nameless.contains("line 2: an <include> needs a `filename`"), "{nameless}");
+}
+
+#[test]
+fn parameters_come_from_options_then_from_the_first_default() {
+    let folder = Folder::new();
+    let path = folder.path().join("scene.xml");
+    let text = scene(&format!(
+        r#"<default name="level" value="0.5"/><default name="level" value="4"/>{}"#,
+        lamp("$level")
+    ));
+    std::fs::write(&path, &text).unwrap();
+    let mut options = LoadOptions::default();
+    close(look(load_with(&path, &options).unwrap()), [0.5; 3], 1e-4, "default");
+    options.parameters.insert("level".to_owned(), "0.25".to_owned());
+    close(look(load_with(&path, &options).unwrap()), [0.25; 3], 1e-4, "option");
+    // What is not read needs no value
+    let unread = r#"<sensor type="perspective"><float name="fov" value="$fov"/></sensor>"#;
+    let loaded = folder.body(&format!("{unread}{}", lamp("0.5"))).unwrap();
+    close(look(loaded), [0.5; 3], 1e-4, "unset");
+    let unset = folder.body(&lamp("$level")).unwrap_err();
+    assert!(unset.contains("line 2: `$level` has no value"), "{unset}");
+}
+
+#[test]
+fn other_folders_are_searched_within_the_root() {
+    let folder = Folder::new().with("lamp.xml", scene(&lamp("0.5")));
+    std::fs::create_dir_all(folder.path().join("a/scenes")).unwrap();
+    std::fs::create_dir_all(folder.path().join("common")).unwrap();
+    let ball = "v -9 -9 0\nv 9 -9 0\nv 0 9 0\nf 1 2 3\n";
+    std::fs::write(folder.path().join("common/mesh.obj"), ball).unwrap();
+    let path = folder.path().join("a/scenes/scene.xml");
+    let text =
+        r#"<path value="../../common"/><shape type="obj"><string name="filename" value="mesh.obj"/></shape>"#;
+    std::fs::write(&path, scene(text)).unwrap();
+    let mut options = LoadOptions::default();
+    assert!(matches!(load_with(&path, &options), Err(LoadError::Outside { .. })));
+    options.root = Some(folder.path().join("a"));
+    assert!(matches!(load_with(&path, &options), Err(LoadError::Outside { .. })));
+    options.root = Some(folder.path().to_owned());
+    assert_eq!(load_with(&path, &options).unwrap().scene.surfaces(), 1);
+}
+
+#[test]
+fn volumes_are_refused_unless_they_are_to_be_ignored() {
+    let folder = Folder::new();
+    let body = r#"<medium type="homogeneous" id="fog"/><shape type="cube">
+        <ref name="interior" id="fog"/></shape>"#;
+    let error = folder.body(body).unwrap_err();
+    assert!(error.ends_with("line 3: a participating medium is not supported"), "{error}");
+    let path = folder.path().join("scene.xml");
+    let mut options = LoadOptions::default();
+    options.ignore_volumes = true;
+    let warnings = load_with(&path, &options).unwrap().warnings;
+    assert_eq!(warnings.len(), 1);
+    assert!(warnings[0].to_string().ends_with("line 3: the participating medium is ignored"));
+    // What nobody refers to makes no difference
+    assert_eq!(folder.body(r#"<medium type="homogeneous" id="fog"/>"#).unwrap().warnings, []);
+}
+
+/// One load names all that is wrong, the same things together.
+#[test]
+fn all_errors_are_said_at_once() {
+    let folder = Folder::new();
+    let hair = r#"<shape type="hair"/>"#;
+    let body = format!("{hair}\n{hair}\n<emitter type=\"projector\"/>\n{hair}");
+    let error = folder.body(&body).unwrap_err();
+    let lines: Vec<&str> = error.lines().collect();
+    assert_eq!(lines.len(), 2, "{error}");
+    assert!(lines[0].starts_with("<shape type=\"hair\"> is not supported (3 times: "), "{error}");
+    assert!(lines[0].ends_with("scene.xml: line 2, line 3, line 5)"), "{error}");
+    assert!(lines[1].ends_with("line 4: <emitter type=\"projector\"> is not supported"), "{error}");
+}
+
+#[test]
+fn warnings_that_say_the_same_are_one_finding() {
+    let folder = Folder::new();
+    let rough = r#"<shape type="cube"><bsdf type="roughplastic"/></shape>"#;
+    let loaded = folder.body(&format!("<x/>\n{rough}\n{rough}\n<x/>")).unwrap();
+    let findings = group_warnings(&loaded.warnings);
+    let counts: Vec<_> = findings.iter().map(|f| (f.treatment, f.places.len())).collect();
+    assert_eq!(counts, [(Treatment::Approximated, 2), (Treatment::Ignored, 2)]);
+}

@@ -1,0 +1,69 @@
+use crate::util::Folder;
+use noisefloor_scenefile::LoadOptions;
+
+#[test]
+fn errors_say_where_and_what() {
+    let folder = Folder::new().with("bad.ply", "ply\nformat ascii 1.0\nend_header\n");
+    for (world, want) in [
+        ("Shape \"curve\"", "line 3: Shape \"curve\" is not supported"),
+        ("\nMaterial \"hair\"\nShape \"sphere\"", "line 4: the material `hair` is not supported"),
+        ("LightSource \"goniometric\"", "line 3: LightSource \"goniometric\" is not supported"),
+        ("NamedMaterial \"a\" Shape \"sphere\"", "line 3: there is no material `a`"),
+        ("Material \"diffuse\" \"texture reflectance\" \"a\" Shape \"sphere\"", "there is no texture `a`"),
+        ("Shape \"trianglemesh\"", "line 3: a mesh needs its points `P`"),
+        ("Shape \"trianglemesh\" \"point3 P\" [0 0 0 1]", "`P` has 4 numbers, not a multiple of 3"),
+        ("Shape \"trianglemesh\" \"point3 P\" [0 0 0] \"integer indices\" [0 1 2]", "there are 1 vertices"),
+        (
+            "Shape \"trianglemesh\" \"point3 P\" [0 0 0] \"integer indices\" [0 -1 2]",
+            "whole numbers of at least 0",
+        ),
+        ("Shape \"sphere\" \"float radius\" 0", "line 3: `radius` is 0; it must be above 0"),
+        ("Shape \"sphere\" \"float radius\" \"one\"", "`radius` must be numbers"),
+        ("Shape \"sphere\" \"float radius\" [1 2]", "`radius` has 2 numbers instead of one"),
+        ("Shape \"sphere\" \"radius\" 1", "`radius` is not a type and a name"),
+        ("Shape \"sphere\" \"float radius\" [1", "the values of `radius` do not end"),
+        ("Shape \"sphere\" \"float radius\" [1 \"a\"]", "`radius` mixes numbers, texts and switches"),
+        ("Shape \"sphere\" \"float radius\" nan", "`nan` is not a finite number"),
+        ("Shape \"sph", "line 3: a quote does not end"),
+        ("Translate 1 2", "expected 3 numbers"),
+        ("Rotate 1 0 0 0", "a rotation needs an axis that is not 0"),
+        ("LookAt 0 0 0 0 0 0 0 1 0", "eye and target are the same"),
+        ("Scale 1e300 1 1 Scale 1e300 1 1", "the transform is too large"),
+        ("AttributeEnd", "AttributeEnd without its begin"),
+        ("ObjectInstance \"o\"", "there is no object `o`"),
+        ("Include \"../a.pbrt\"", "lies outside the folder of the scene"),
+        ("Shape \"plymesh\" \"string filename\" \"none.ply\"", "cannot be read"),
+        ("12", "expected a directive"),
+        ("MakeNamedMedium \"fog\"", "a participating medium is not supported"),
+        ("AreaLightSource \"diffuse\" \"rgb L\" [-1 0 0] Shape \"sphere\"", "is negative or too large"),
+        ("LightSource \"infinite\" LightSource \"infinite\"", "a second light surrounds the scene"),
+    ] {
+        let error = folder.world(world).err().unwrap_or_else(|| panic!("{world} is accepted"));
+        assert!(error.contains(want), "{world}\n{error}\nwant: {want}");
+        assert!(error.contains(".pbrt"), "{error}");
+    }
+    let part = folder.load_with("Shape \"sphere\"", &LoadOptions::default()).unwrap_err();
+    assert!(part.contains("no WorldBegin"), "{part}");
+}
+
+/// One load names all shapes that are wrong, and what is left out is warned of.
+#[test]
+fn all_is_said_at_once() {
+    let folder = Folder::new();
+    let error = folder.world("Shape \"curve\"\nShape \"curve\"\nLightSource \"projection\"").unwrap_err();
+    let lines: Vec<&str> = error.lines().collect();
+    assert_eq!(lines.len(), 2, "{error}");
+    assert!(lines[0].contains("(2 times: ") && lines[0].ends_with("line 3, line 4)"), "{error}");
+
+    let world = "Shape \"sphere\" \"float wobble\" 1\nMaterial \"coateddiffuse\" Shape \"sphere\"";
+    let warnings = folder.world(world).unwrap().warnings;
+    let warnings: Vec<String> = warnings.iter().map(ToString::to_string).collect();
+    assert_eq!(warnings.len(), 2, "{warnings:?}");
+    assert!(warnings[0].ends_with("line 3: `wobble` of Shape \"sphere\" is ignored"), "{warnings:?}");
+    assert!(warnings[1].contains("line 4: the material `coateddiffuse` is replaced by"), "{warnings:?}");
+
+    let mut options = LoadOptions::default();
+    options.ignore_volumes = true;
+    let text = "WorldBegin MakeNamedMedium \"m\" MediumInterface \"m\" \"\" Shape \"sphere\"";
+    assert!(!folder.load_with(text, &options).unwrap().warnings.is_empty());
+}

@@ -1,0 +1,153 @@
+use crate::util::{CAMERA, Folder, close, look};
+use noisefloor_ptwne::FovAxis;
+use noisefloor_scenefile::LoadOptions;
+
+/// A square from −1 to 1 whose front is +z.
+const SQUARE: &str =
+    "Shape \"trianglemesh\" \"integer indices\" [0 1 2 0 2 3] \"point3 P\" [-1 -1 0 1 -1 0 1 1 0 -1 1 0]\n";
+const LIGHT: &str = "AreaLightSource \"diffuse\" \"rgb L\" [1 2 3]\n";
+const SKY: &str = "LightSource \"infinite\" \"rgb L\" [1 1 1]\n";
+
+/// Fronts, as the source of pbrt has them: by corners in the shape's own coordinates, by normals where there are any.
+#[test]
+fn lights_shine_from_their_front() {
+    let normals = SQUARE.replace("\"point3 P\"", "\"normal N\" [0 0 -1 0 0 -1 0 0 -1 0 0 -1] \"point3 P\"");
+    for (before, shape, shines) in [
+        ("", SQUARE, true),
+        ("Rotate 180 0 1 0\n", SQUARE, false),
+        ("Scale -1 1 1\n", SQUARE, true),
+        ("Scale 1 1 -1\n", SQUARE, false),
+        ("ReverseOrientation\n", SQUARE, false),
+        ("ReverseOrientation Rotate 180 0 1 0\n", SQUARE, true),
+        ("", &normals, false),
+        ("ReverseOrientation\n", &normals, true),
+        ("", "Shape \"disk\" \"float radius\" 2\n", true),
+        ("ReverseOrientation\n", "Shape \"disk\"\n", false),
+        ("", "Shape \"sphere\" \"float radius\" 0.5\n", true),
+        ("ReverseOrientation\n", "Shape \"sphere\" \"float radius\" 0.5\n", false),
+    ] {
+        let want = if shines { [1.0, 2.0, 3.0] } else { [0.0; 3] };
+        close(Folder::new().see(&format!("{before}{LIGHT}{shape}")), want, 1e-4, &format!("{before}{shape}"));
+    }
+}
+
+/// pbrt's pictures have +x of the camera on the right: with `LookAt` from +z, +x of the world is on the left of them.
+#[test]
+fn pictures_are_not_mirrored() {
+    let world = format!("WorldBegin {LIGHT} Translate 1 0 0 {SQUARE}");
+    for (scale, lit) in [("", [true, false]), ("Scale -1 1 1 ", [false, true])] {
+        let text = format!("{scale}LookAt 0 0 5 0 0 0 0 1 0 Camera \"perspective\" \"float fov\" 40 {world}");
+        let loaded = Folder::new().load_with(&text, &LoadOptions::default()).unwrap();
+        assert_eq!(loaded.scene.optics().fov_axis, FovAxis::Smaller);
+        let pixels = look(loaded, 2);
+        for (side, lit) in [0, 1].into_iter().zip(lit) {
+            assert_eq!(pixels[side][0] > 0.05, lit, "{scale}{side}: {pixels:?}");
+        }
+    }
+}
+
+#[test]
+fn materials_of_both_versions_reflect_the_sky() {
+    let folder = Folder::new();
+    for (material, want, tolerance) in [
+        ("Material \"diffuse\" \"rgb reflectance\" [0.5 0.25 0]", [0.5, 0.25, 0.0], 1e-3),
+        ("Material \"matte\" \"color Kd\" [0.5 0.25 0]", [0.5, 0.25, 0.0], 1e-3),
+        ("MakeNamedMaterial \"m\" \"string type\" \"diffuse\" NamedMaterial \"m\"", [0.5; 3], 1e-3),
+        ("Material \"mirror\" \"rgb Kr\" [0.5 0.25 0]", [0.5, 0.25, 0.0], 1e-3),
+        ("Material \"dielectric\"", [1.0; 3], 1e-3),
+        ("Material \"glass\"", [1.0; 3], 1e-3),
+        ("Material \"thindielectric\"", [1.0; 3], 1e-3),
+        ("Material \"interface\"", [1.0; 3], 1e-3),
+        (
+            "Material \"conductor\" \"spectrum eta\" \"metal-Ag-eta\" \"spectrum k\" \"metal-Ag-k\"",
+            [0.97, 0.96, 0.90],
+            0.05,
+        ),
+        ("Material \"conductor\" \"rgb reflectance\" [0.5 0.25 0]", [0.5, 0.25, 0.0], 2e-2),
+        (
+            "MakeNamedMaterial \"a\" \"string type\" \"diffuse\" \"rgb reflectance\" [1 1 1] \
+             MakeNamedMaterial \"b\" \"string type\" \"diffuse\" \"rgb reflectance\" [0 0 0] \
+             Material \"mix\" \"string materials\" [\"a\" \"b\"] \"float amount\" 0.25",
+            [0.75; 3],
+            0.06,
+        ),
+    ] {
+        close(folder.see(&format!("{SKY}{material}\n{SQUARE}")), want, tolerance, material);
+    }
+}
+
+#[test]
+fn lights_have_the_units_of_pbrt() {
+    let folder = Folder::new();
+    let floor = format!("Material \"diffuse\" \"rgb reflectance\" [0.8 0.8 0.8] Scale 100 100 1 {SQUARE}");
+    let per_irradiance = 0.8 / std::f32::consts::PI;
+    for (light, irradiance) in [
+        ("LightSource \"point\" \"rgb I\" [4 8 0] \"point3 from\" [0 0 2]", [1.0, 2.0, 0.0]),
+        ("LightSource \"point\" \"rgb I\" [1 1 1] \"float scale\" 4 \"point3 from\" [0 0 2]", [1.0; 3]),
+        (
+            "LightSource \"distant\" \"rgb L\" [5 0 0] \"point3 from\" [0 -3 4] \"point3 to\" [0 0 0]",
+            [4.0, 0.0, 0.0],
+        ),
+        ("LightSource \"spot\" \"rgb I\" [4 4 4] \"point3 from\" [0 0 2] \"point3 to\" [0 0 0]", [1.0; 3]),
+    ] {
+        let want = irradiance.map(|e| e * per_irradiance);
+        close(folder.see(&format!("{light}\n{floor}")), want, 1e-3, light);
+    }
+    // A black body has a luminance of 1 in pbrt 4
+    let lamp = format!("AreaLightSource \"diffuse\" \"blackbody L\" 3000 \"float scale\" 2 {SQUARE}");
+    let [r, g, b] = folder.see(&lamp);
+    assert!((0.2126 * r + 0.7152 * g + 0.0722 * b - 2.0).abs() < 1e-3 && r > g && g > b, "{r} {g} {b}");
+    // The film's exposure counts for all
+    let text = format!(
+        "{CAMERA}Film \"rgb\" \"float iso\" 200 \"integer xresolution\" 4 \"integer yresolution\" 3 WorldBegin {LIGHT}{SQUARE}"
+    );
+    let loaded = folder.load_with(&text, &LoadOptions::default()).unwrap();
+    assert_eq!(loaded.size, Some((4, 3)));
+    close(look(loaded, 1)[0], [2.0, 4.0, 6.0], 1e-3, "iso");
+}
+
+#[test]
+fn objects_are_where_their_instances_are() {
+    let folder = Folder::new();
+    let object = format!("ObjectBegin \"o\" {LIGHT}{SQUARE} ObjectEnd\n");
+    close(folder.see(&object), [0.0; 3], 1e-4, "object alone");
+    close(folder.see(&format!("{object}ObjectInstance \"o\"")), [1.0, 2.0, 3.0], 1e-4, "instance");
+    let aside = format!("{object}AttributeBegin Translate 5 0 0 ObjectInstance \"o\" AttributeEnd");
+    close(folder.see(&aside), [0.0; 3], 1e-4, "aside");
+}
+
+/// Files that the scene names: includes, gzipped meshes.
+#[test]
+fn other_files_are_read() {
+    use std::io::Write;
+    let ply = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
+        element face 1\nproperty list uchar int vertex_indices\nend_header\n-9 -9 0\n9 -9 0\n0 9 0\n3 0 1 2\n";
+    let mut gz = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::default());
+    gz.write_all(ply.as_bytes()).unwrap();
+    let folder = Folder::new()
+        .with("a.ply.gz", gz.finish().unwrap())
+        .with("lamp.pbrt", format!("{LIGHT}Shape \"plymesh\" \"string filename\" \"a.ply.gz\""))
+        .with("round.pbrt", "Include \"round.pbrt\"");
+    close(folder.see("Include \"lamp.pbrt\""), [1.0, 2.0, 3.0], 1e-4, "include");
+    let round = folder.world("Include \"round.pbrt\"").unwrap_err();
+    assert!(round.contains("65 levels of included files, more than 64"), "{round}");
+}
+
+/// A map of the surroundings, in both layouts: the top row is +z, and the first column of pbrt 3 begins at +x.
+#[test]
+fn maps_lie_as_in_pbrt() {
+    let columns: Vec<[f32; 3]> = (0..8 * 4).map(|i| [(i % 8) as f32, (i / 8) as f32, 1.0]).collect();
+    let layers = noisefloor_image::RenderLayers::rgb(8, 4, &columns);
+    let folder = Folder::new();
+    noisefloor_image::write_exr(folder.path().join("sky.exr"), &layers).unwrap();
+    let sky = |more: &str| format!("{more} LightSource \"infinite\" \"string filename\" \"sky.exr\"");
+    // The camera looks along −z: the bottom row
+    let down = folder.see(&sky(""));
+    assert!((down[1] - 3.0).abs() < 0.3, "{down:?}");
+    // Turned so that −z sees what was along +x, where the first column meets the last: their mean
+    let aside = folder.see(&sky("Rotate 90 0 1 0"));
+    assert!((aside[0] - 3.5).abs() < 0.2 && (aside[1] - 1.5).abs() < 0.1, "{aside:?}");
+    // And along +y, a quarter of the way round
+    let quarter = folder.see(&sky("Rotate -90 1 0 0"));
+    assert!((quarter[0] - 1.5).abs() < 0.2 && (quarter[1] - 1.5).abs() < 0.1, "{quarter:?}");
+}
