@@ -20,11 +20,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     let loaded = load_with(Path::new(path), &options)?;
     let scene = Arc::new(loaded.scene);
     for seed in [1, 2] {
-        let options = RenderOptions {
-            seed,
-            max_depth: loaded.max_depth.unwrap_or(65),
-            ..RenderOptions::default()
-        };
+        let options =
+            RenderOptions { seed, max_depth: loaded.max_depth.unwrap_or(65), ..RenderOptions::default() };
         let mut source = Ptwne::new(scene.clone(), width, height, options)?;
         let tile = TileGrid::new(width, height, width.max(height))?.tile(0);
         let batches = source.sample(&[Request { tile, first: 0, samples: spp.parse()? }])?;

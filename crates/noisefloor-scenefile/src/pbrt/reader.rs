@@ -147,6 +147,8 @@ impl<'a> Reader<'a> {
                 self.coordinate_systems.insert("world".to_owned(), DMat4::IDENTITY);
             }
             "WorldEnd" => {}
+            // Parameters alone
+            "Option" => drop(params::read(tokens, path, line)?),
             "ReverseOrientation" => self.state.reversed = !self.state.reversed,
             "ObjectBegin" => {
                 let name = self.text(tokens, path, line)?;
@@ -271,8 +273,8 @@ impl<'a> Reader<'a> {
                 }
                 self.ignored(&params.place, "the participating medium is ignored");
             }
-            "Sampler" | "PixelFilter" | "Accelerator" | "Option" | "ColorSpace" | "SurfaceIntegrator"
-            | "Renderer" | "VolumeIntegrator" => {}
+            "Sampler" | "PixelFilter" | "Accelerator" | "ColorSpace" | "SurfaceIntegrator" | "Renderer"
+            | "VolumeIntegrator" => {}
             _ => self.ignored(&params.place, format!("the directive {word} is ignored")),
         }
         Ok(())
