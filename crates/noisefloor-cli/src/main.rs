@@ -26,6 +26,7 @@ mod render;
 #[cfg(feature = "lab")]
 mod reproduce;
 mod say;
+mod scenes;
 mod signals;
 mod sources;
 #[cfg(feature = "study")]
@@ -33,7 +34,7 @@ mod study;
 #[cfg(feature = "train")]
 mod train;
 
-use args::{Cli, Command};
+use args::{Cli, Command, ScenesCommand};
 use clap::Parser;
 use left_out::LeftOut;
 use say::{NotSaid, note, one_line};
@@ -58,7 +59,8 @@ fn run(command: Command) -> anyhow::Result<ExitCode> {
         Command::Reference(args) => reference::run(args.check()?),
         Command::Judge(args) => judge::run(&args.check()?).map(done),
         Command::Inspect(args) => inspect::run(&args.check()?).map(done),
-        Command::Scenes => Ok(inspect::scenes().map(done)?),
+        Command::Scenes { command: None } => Ok(inspect::scenes().map(done)?),
+        Command::Scenes { command: Some(ScenesCommand::Check(args)) } => scenes::check(args),
         #[cfg(feature = "adapters")]
         Command::Doctor(args) => doctor::run(&args.check()),
         #[cfg(feature = "lab")]

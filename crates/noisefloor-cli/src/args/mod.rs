@@ -17,6 +17,7 @@ mod reference;
 mod render;
 mod renderer;
 mod reproduce;
+mod scenes;
 mod study;
 mod train;
 mod values;
@@ -31,6 +32,7 @@ pub use judge::JudgeArgs;
 pub use reference::ReferenceArgs;
 pub use render::RenderArgs;
 pub use reproduce::ReproduceArgs;
+pub use scenes::{CheckArgs, ScenesCommand};
 pub use study::StudyArgs;
 pub use train::TrainArgs;
 
@@ -69,6 +71,9 @@ pub enum Command {
     Study(StudyArgs),
     Inspect(InspectArgs),
     Doctor(DoctorArgs),
-    /// List the built-in scenes.
-    Scenes,
+    /// List the built-in scenes, or check scene files.
+    Scenes {
+        #[command(subcommand)]
+        command: Option<ScenesCommand>,
+    },
 }

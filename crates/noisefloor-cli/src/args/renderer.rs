@@ -1,5 +1,6 @@
 //! Options about who renders.
 
+use super::scenes::SceneFileArgs;
 use super::values;
 #[cfg(not(feature = "adapters"))]
 use crate::left_out::LeftOut;
@@ -48,6 +49,8 @@ pub struct RendererArgs {
     /// clamped samples [default: never].
     #[arg(long, value_name = "RADIANCE")]
     clamp: Option<f32>,
+    #[command(flatten)]
+    scene_files: SceneFileArgs,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -139,6 +142,7 @@ impl RendererArgs {
             max_depth: self.max_depth,
             threads: self.threads,
             timeout: self.timeout,
+            scene_files: self.scene_files.check(),
         })
     }
 

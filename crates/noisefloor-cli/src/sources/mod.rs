@@ -14,7 +14,7 @@ use noisefloor_image::StackSource;
 use noisefloor_ptwne::{
     Estimator, Filter, Ptwne, ReferenceNoise, RenderOptions, SampleCounts, Sampling, scenes,
 };
-use noisefloor_scenefile::Loaded;
+use noisefloor_scenefile::{LoadOptions, Loaded, group_warnings};
 use std::num::NonZeroUsize;
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -40,6 +40,8 @@ pub struct SourceJob {
     /// Of one call to another renderer.
     #[cfg_attr(not(feature = "adapters"), expect(dead_code, reason = "no other renderer is in this build"))]
     pub timeout: Duration,
+    /// How the built-in renderer loads scene files.
+    pub scene_files: LoadOptions,
 }
 
 #[derive(Clone, Debug)]
@@ -182,7 +184,7 @@ impl SourceJob {
 
     fn open_ptwne(&self, options: PtwneOptions) -> anyhow::Result<Opened> {
         let Loaded { scene, size, max_depth, warnings } =
-            load(self.scene.as_deref().unwrap_or(DEFAULT_SCENE))?;
+            load(self.scene.as_deref().unwrap_or(DEFAULT_SCENE), &self.scene_files)?;
         let (width, height) = self.size.or(size).unwrap_or(DEFAULT_SIZE);
         let name = scene.name().to_owned();
         let PtwneOptions { estimator, sampling, filter, clamp } = options;
@@ -196,13 +198,13 @@ impl SourceJob {
             ..RenderOptions::default()
         };
         let source = Box::new(Ptwne::new(scene, width, height, options)?);
-        let warnings = warnings.iter().map(ToString::to_string).collect();
+        let warnings = group_warnings(&warnings).iter().map(ToString::to_string).collect();
         Ok(Opened { source, scene: name, warnings })
     }
 }
 
 /// A built-in scene of that name, or the scene in that file.
-fn load(scene: &str) -> anyhow::Result<Loaded> {
+fn load(scene: &str, options: &LoadOptions) -> anyhow::Result<Loaded> {
     if let Some(scene) = scenes::by_name(scene) {
         return Ok(Loaded { scene, size: None, max_depth: None, warnings: vec![] });
     }
@@ -212,7 +214,7 @@ fn load(scene: &str) -> anyhow::Result<Loaded> {
             "there is no built-in scene {scene:?}, and no file of that name; `noisefloor scenes` lists the scenes"
         );
     }
-    Ok(noisefloor_scenefile::load(path)?)
+    Ok(noisefloor_scenefile::load_with(path, options)?)
 }
 
 /// `hall` of `rooms/hall.xml`, and of `rooms/hall/`.
