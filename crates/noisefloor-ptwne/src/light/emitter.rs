@@ -162,21 +162,7 @@ impl Light {
                 let pdf = d2 / (cos * area);
                 (cos > 0.0 && distance > 0.0).then(|| self.surface_sample(dir, distance, pdf, [a, b]))
             }
-            LightShape::Sphere { centre, radius } => {
-                let to = centre - from;
-                let d2 = to.length_squared();
-                if d2 <= radius * radius {
-                    return self.sample_from_inside(from, centre, radius, u);
-                }
-                // Uniform in the cone that the sphere subtends (Shirley et al. 1996)
-                let m = sphere_cone(d2, radius);
-                let local = math::cone(m, u);
-                let distance = d2.sqrt();
-                let dir = Frame::new(to / distance).to_world(local);
-                let sin2 = local.x * local.x + local.y * local.y;
-                let near = distance * local.z - (radius * radius - d2 * sin2).max(0.0).sqrt();
-                Some(self.surface_sample(dir, near, math::cone_pdf(m), u))
-            }
+            LightShape::Sphere { centre, radius } => self.sample_sphere(from, centre, radius, u),
             LightShape::Sun { frame, one_minus_cos } => {
                 let dir = frame.to_world(math::cone(one_minus_cos, u));
                 Some(self.surface_sample(dir, f32::INFINITY, math::cone_pdf(one_minus_cos), u))
@@ -192,13 +178,8 @@ impl Light {
                 let dir = to / distance;
                 let fade = ((-dir.dot(axis) - outer) / (inner - outer)).clamp(0.0, 1.0);
                 let value = self.radiance * (fade * fade / d2);
-                (distance > 0.0 && fade > 0.0).then_some(LightSample {
-                    dir,
-                    distance,
-                    value,
-                    pdf: DELTA,
-                    uv: u,
-                })
+                let sample = LightSample { dir, distance, value, pdf: DELTA, uv: u };
+                (distance > 0.0 && fade > 0.0).then_some(sample)
             }
             LightShape::Distant { towards } => Some(LightSample {
                 dir: towards,
@@ -208,6 +189,23 @@ impl Light {
                 uv: u,
             }),
         }
+    }
+
+    /// From outside a sphere: uniform in the cone that it subtends (Shirley et al. 1996).
+    #[inline]
+    fn sample_sphere(&self, from: Vec3, centre: Vec3, radius: f32, u: [f32; 2]) -> Option<LightSample> {
+        let to = centre - from;
+        let d2 = to.length_squared();
+        if d2 <= radius * radius {
+            return self.sample_from_inside(from, centre, radius, u);
+        }
+        let m = sphere_cone(d2, radius);
+        let local = math::cone(m, u);
+        let distance = d2.sqrt();
+        let dir = Frame::new(to / distance).to_world(local);
+        let sin2 = local.x * local.x + local.y * local.y;
+        let near = distance * local.z - (radius * radius - d2 * sin2).max(0.0).sqrt();
+        Some(self.surface_sample(dir, near, math::cone_pdf(m), u))
     }
 
     #[inline]
