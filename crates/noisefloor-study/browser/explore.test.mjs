@@ -97,6 +97,13 @@ test("pictures are dropped, judged and disagreed with by mouse, in a small windo
   await tile(page, 0).click();
   await page.getByText("Kept: none is seen in tile 1.").waitFor();
   assert.equal(await kept(page), 1);
+  // The page adjusts to who answers, and says what that changes
+  await page.getByText("1 answers: T′ =").waitFor();
+  assert.equal(await page.locator("#audience").inputValue(), "you");
+  assert.match(await page.locator("#yours-here").textContent(), /In this picture \d → \d of 6 tiles have converged/);
+  assert.match(await page.locator("#yours-share").textContent(), /^--audience 0\.\d+,-?\d/);
+  await page.locator("#audience").selectOption("observers");
+  await until("noise again for the observers", async () => (await label(page, 0)).includes(": noise seen"));
   await tile(page, 4).click();
   await page.getByText("in tile 5.").waitFor();
   await shot(page, "explore-disagreed");

@@ -83,6 +83,9 @@ pub enum StudyError {
         /// What the system said.
         source: io::Error,
     },
+    /// A stack cannot be rendered.
+    #[error("{0}")]
+    StackRender(String),
     /// Pictures cannot be explored.
     #[error("{0}")]
     Explore(String),

@@ -40,7 +40,7 @@ pub struct Language {
 pub fn read_languages(folder: Option<&Path>) -> Result<BTreeMap<String, Language>, StudyError> {
     let mut languages = BTreeMap::new();
     for (code, text) in BUILT_IN {
-        languages.insert(code.to_owned(), parse(text, Path::new(code))?);
+        languages.insert(code.to_owned(), parse_language(text, Path::new(code))?);
     }
     let english = languages["en"].clone();
     let Some(folder) = folder else { return Ok(languages) };
@@ -51,7 +51,7 @@ pub fn read_languages(folder: Option<&Path>) -> Result<BTreeMap<String, Language
         if path.extension().is_none_or(|e| e != "toml") {
             continue;
         }
-        let language = parse(&read(&path)?, &path)?;
+        let language = parse_language(&read(&path)?, &path)?;
         check(&language, &english, &path)?;
         languages.insert(code.to_owned(), language);
     }
@@ -67,7 +67,8 @@ fn read(path: &Path) -> Result<String, StudyError> {
     std::fs::read_to_string(path).map_err(io)
 }
 
-fn parse(text: &str, path: &Path) -> Result<Language, StudyError> {
+/// Parses one file.
+pub(crate) fn parse_language(text: &str, path: &Path) -> Result<Language, StudyError> {
     toml::from_str(text)
         .map_err(|e| StudyError::File { path: path.to_owned(), what: e.to_string().trim_end().to_owned() })
 }

@@ -56,6 +56,7 @@ mod server;
 mod session;
 pub mod simulated;
 mod stack;
+mod stack_render;
 pub mod store;
 mod viewing;
 
@@ -76,5 +77,6 @@ pub use session::{
     CatchKind, Class, EventMisfit, ParticipantSession, Stage, Trial, TrialOutcome, TrialRole, grids, replay,
 };
 pub use stack::{MAX_LEVELS, NOISY_SHARE, StudyStack};
+pub use stack_render::render_stack;
 pub use store::{AnswerStore, NewSession, SessionRecord};
 pub use viewing::{Ambient, Conditions, ViewingLimits, ViewingProblem};

@@ -74,7 +74,7 @@ impl Oracle {
     fn verdict_for(&self, mut raw: Vec<f32>, spp: f64, audience: Audience) -> Option<Verdict> {
         let seen_as = audience.seen_as(spp);
         // For someone who is never satisfied with so few samples, the need of the trained audience is sought from one sample on.
-        let from = seen_as.max(1.0).min(spp);
+        let from = seen_as.max(spp.min(1.0));
         if !self.model.descriptor().project(&mut raw, (from / spp) as f32) {
             return None;
         }

@@ -67,21 +67,24 @@ impl Audience {
         Self { slope: other.slope * self.slope, offset: other.slope * self.offset + other.offset }
     }
 
-    /// The samples per pixel at which the trained audience sees as much noise as this one sees in a picture of `samples`
-    /// samples per pixel: the inverse of [`Audience::samples`], never more than `samples`; 0 if no picture satisfies them.
+    /// The samples per pixel at which the trained audience sees as much noise as this one sees in a picture of
+    /// `samples` samples per pixel: the inverse of [`Audience::samples`]. Never more than `samples`, or, for a less
+    /// demanding audience (a < 1), than `samples`/a: a negative offset makes nobody see less. 0 if no picture satisfies
+    /// them.
     pub fn seen_as(&self, samples: f64) -> f64 {
         let seen = (samples - self.offset) / self.slope;
         match seen.is_nan() || seen <= 0.0 {
             true if self.slope == 0.0 && self.offset <= samples => samples,
             true => 0.0,
-            false => seen.min(samples),
+            false => seen.min(if self.slope > 0.0 { samples / self.slope.min(1.0) } else { samples }),
         }
     }
 
-    /// Samples per pixel that satisfy this audience where `samples` satisfy the trained one; never fewer, since these have
-    /// been taken.
+    /// Samples per pixel that satisfy this audience where `samples` satisfy the trained one: never fewer, or, for a
+    /// less demanding audience (a < 1), never fewer than a·`samples`.
     pub fn samples(&self, samples: u64) -> u64 {
-        samples.max((self.slope * samples as f64 + self.offset).ceil().clamp(0.0, 1e15) as u64)
+        let least = if self.slope > 0.0 { self.slope.min(1.0) } else { 1.0 } * samples as f64;
+        (self.slope * samples as f64 + self.offset).max(least).ceil().clamp(0.0, 1e15) as u64
     }
 }
 

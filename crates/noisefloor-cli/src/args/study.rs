@@ -1,5 +1,6 @@
 //! `noisefloor study`.
 
+use super::renderer::RendererArgs;
 use clap::{Args, Subcommand, ValueEnum};
 use std::net::IpAddr;
 use std::path::PathBuf;
@@ -10,6 +11,7 @@ use std::path::PathBuf;
 /// observers read and agree to. docs/study.md explains it.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
+  noisefloor study stack cornell-box --size 256x256 --out stacks/cornell-box
   noisefloor study serve hall.toml
   noisefloor study simulate hall.toml --observers 12      a rehearsal, kept apart from people's answers
   noisefloor study analyse hall.toml --out out/hall
@@ -21,6 +23,7 @@ pub struct StudyArgs {
 
 #[derive(Debug, Subcommand)]
 enum StudyCommand {
+    Stack(StackArgs),
     Serve(ServeArgs),
     Analyse(AnalyseArgs),
     Simulate(SimulateArgs),
@@ -31,6 +34,22 @@ enum StudyCommand {
     Export(ObserverArgs),
     /// Erase everything that is stored about one observer, for good.
     Erase(ObserverArgs),
+}
+
+/// Render a stack of pictures for a study in one go: each level goes on from the one before.
+#[derive(Debug, Args)]
+struct StackArgs {
+    /// Scene, as for `render`.
+    #[arg(value_name = "SCENE")]
+    scene: String,
+    #[command(flatten)]
+    renderer: RendererArgs,
+    /// Samples per pixel of the levels, increasing; the last one is the reference.
+    #[arg(long, value_name = "N,…", value_delimiter = ',', default_value = "8,16,32,64,128,256,512,1024,2048")]
+    levels: Vec<u64>,
+    /// Folder to write the levels into, as linear EXRs.
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
 }
 
 /// Serve the pages of a study until Ctrl-C.
@@ -160,7 +179,8 @@ struct ObserverArgs {
 mod check {
     use super::{ObserverArgs, StudyArgs, StudyCommand, ThresholdChoice};
     use crate::study::{
-        AnalyseJob, BackupJob, DataFolderJob, LinksJob, ObserverJob, ServeJob, SimulateJob, StudyJob,
+        AnalyseJob, BackupJob, DataFolderJob, LinksJob, ObserverJob, ServeJob, SimulateJob, StackJob,
+        StudyJob,
     };
     use anyhow::Context;
     use noisefloor_study::analysis::{AnalysisOptions, CorpusThreshold};
@@ -173,6 +193,11 @@ mod check {
         /// A study that can be opened, and what to do with it.
         pub fn check(self) -> anyhow::Result<StudyJob> {
             Ok(match self.command {
+                StudyCommand::Stack(args) => StudyJob::Stack(StackJob {
+                    source: args.renderer.check(Some(&args.scene))?,
+                    levels: args.levels,
+                    out: args.out,
+                }),
                 StudyCommand::Serve(args) => StudyJob::Serve(ServeJob {
                     study: complete(&args.study)?,
                     address: SocketAddr::new(args.listen, args.port),

@@ -3,20 +3,24 @@
 mod report;
 
 use crate::say::say;
+use crate::signals::cancel_on_signal;
+use crate::sources::{Opened, SourceJob};
 use anyhow::Context;
 use noisefloor_study::analysis::files::write;
 use noisefloor_study::analysis::raw::write_raw;
 use noisefloor_study::analysis::{AnalysisOptions, CorpusThreshold, analyse};
 use noisefloor_study::simulated::{Public, drive};
-use noisefloor_study::{Exposure, Study, StudyServer, interrupted, store};
+use noisefloor_study::{Exposure, Study, StudyServer, interrupted, render_stack, store};
 use std::net::{Ipv4Addr, SocketAddr};
 use std::path::PathBuf;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use tokio::runtime::{Builder, Runtime};
 use tokio::sync::oneshot;
 
 /// What to do with a study: checked.
 pub enum StudyJob {
+    Stack(StackJob),
     Serve(ServeJob),
     Analyse(AnalyseJob),
     Simulate(SimulateJob),
@@ -25,6 +29,12 @@ pub enum StudyJob {
     Backup(BackupJob),
     Export(ObserverJob),
     Erase(ObserverJob),
+}
+
+pub struct StackJob {
+    pub source: SourceJob,
+    pub levels: Vec<u64>,
+    pub out: PathBuf,
 }
 
 pub struct ServeJob {
@@ -74,6 +84,7 @@ pub struct ObserverJob {
 
 pub fn run(job: StudyJob) -> anyhow::Result<()> {
     match job {
+        StudyJob::Stack(job) => stack(&job),
         StudyJob::Serve(job) => serve(job),
         StudyJob::Analyse(job) => analysis(&job),
         StudyJob::Simulate(job) => simulate(&job),
@@ -144,6 +155,19 @@ fn simulate(job: &SimulateJob) -> anyhow::Result<()> {
             say!("{:20} {tile:4} {median:9.0} {level95:14.0}", stack.name())?;
         }
     }
+    Ok(())
+}
+
+fn stack(job: &StackJob) -> anyhow::Result<()> {
+    job.source.start_threads()?;
+    let opened = job.source.open()?;
+    opened.warn(false);
+    let Opened { mut source, .. } = opened;
+    let cancel = Arc::new(AtomicBool::new(false));
+    cancel_on_signal(Arc::clone(&cancel), "keeping the levels that are finished")?;
+    let go_on = |_, _| !cancel.load(Ordering::Relaxed);
+    render_stack(source.as_mut(), &job.levels, &job.out, go_on, Ok)?;
+    say!("written to {}", job.out.display())?;
     Ok(())
 }
 

@@ -13,6 +13,8 @@ let t;
 let state;
 let grid;
 let learning;
+/** The line of the person who answers, once there are answers. */
+let mine = null;
 /** Judged pictures by increasing samples, and which of them is shown. */
 let levels = [];
 let level = 0;
@@ -103,6 +105,7 @@ function counted(n) {
 function audience() {
   const chosen = get("audience").value;
   if (chosen === "students") return state.art_students;
+  if (chosen === "you") return mine ? [mine.slope, mine.offset] : [1, 0];
   return chosen === "line" ? [get("slope").valueAsNumber, get("offset").valueAsNumber] : [1, 0];
 }
 
@@ -113,7 +116,7 @@ async function look() {
   get("threshold-now").textContent = Number(get("threshold").value).toFixed(2);
   get("line").hidden = get("audience").value !== "line";
   const picture = levels[level];
-  const mine = ++turn;
+  const order = ++turn;
   if (!picture || audience().some(Number.isNaN)) return blank(picture);
   const spoken = fill(t.spp, { n: picture.spp });
   get("level-now").textContent = spoken;
@@ -121,12 +124,12 @@ async function look() {
   try {
     if (!view) say(t.judging);
     const next = await server.verdicts(question());
-    if (mine !== turn) return;
+    if (order !== turn) return;
     view = next;
     if (get("status").textContent === t.judging) say("");
-    await draw(picture, mine);
+    await draw(picture, order);
   } catch (error) {
-    if (mine !== turn) return;
+    if (order !== turn) return;
     blank();
     problem(error);
   }
@@ -135,18 +138,18 @@ async function look() {
 function blank() {
   view = null;
   say("");
-  for (const id of ["verdict", "answers", "learn", "frame"]) get(id).hidden = true;
+  for (const id of ["verdict", "answers", "yours", "learn", "frame"]) get(id).hidden = true;
   get("welcome").hidden = false;
   // With pictures and nothing judged, the threshold and the level would have nothing to act on
   if (levels.length > 1) get("verdict").hidden = false;
 }
 
-async function draw(picture, mine) {
+async function draw(picture, order) {
   const which = `${picture.id} ${turn}`;
   if (!shown.startsWith(picture.id)) {
     const drawn = [["picture", "shown"], ...(view.has_noise_map ? [["noise", "noise"]] : [])];
     const bitmaps = await Promise.all(drawn.map(([, path]) => server.image(picture.id, path, turn)));
-    if (mine !== turn) return;
+    if (order !== turn) return;
     drawn.forEach(([id], i) => {
       const [canvas, bitmap] = [get(id), bitmaps[i]];
       [canvas.width, canvas.height] = [bitmap.width, bitmap.height];
@@ -156,11 +159,12 @@ async function draw(picture, mine) {
   }
   get("picture").setAttribute("aria-label", fill(t.picture_label, { name: picture.name, spp: picture.spp }));
   get("welcome").hidden = true;
-  for (const id of ["verdict", "answers", "learn", "frame"]) get(id).hidden = false;
+  for (const id of ["verdict", "answers", "yours", "learn", "frame"]) get(id).hidden = false;
   fit();
   grid.show(view);
   layers();
   summarise();
+  await showLine();
 }
 
 function fit() {
@@ -211,6 +215,7 @@ const answer = does(async (tile) => {
     say(fill(tile.converged ? t.kept_noise : t.kept_none, { n: tile.tile + 1 }));
     counted(kept.disagreements);
   }
+  await learnLine(true);
   await look();
 });
 
@@ -227,8 +232,42 @@ const undo = does(async () => {
     counted(kept.disagreements);
   }
   say(t.taken_back);
+  await learnLine(false);
   await look();
 });
+
+/** Learns the line of the person who answers; `use` chooses it as the audience when it is first there. */
+async function learnLine(use) {
+  const first = mine === null;
+  mine = await server.line(Number(get("threshold").value));
+  const option = get("audience").querySelector('[value="you"]');
+  option.disabled = mine === null;
+  if (mine === null && get("audience").value === "you") get("audience").value = "observers";
+  if (mine !== null && first && use) get("audience").value = "you";
+}
+
+/** What the line changes in the picture that is looked at: its verdicts beside those for the observers. */
+async function showLine() {
+  get("yours-none").hidden = mine !== null;
+  get("yours-learned").hidden = mine === null;
+  if (mine === null) return;
+  const number = (n) => String(Number(n.toPrecision(3)));
+  const offset = `${mine.offset < 0 ? "−" : "+"} ${number(Math.abs(mine.offset))}`;
+  const factor = `×${mine.slope.toFixed(2)}`;
+  get("yours-line").textContent = fill(t.yours_line, { answers: mine.answers, slope: mine.slope.toFixed(2), offset, factor });
+  get("yours-agree").textContent = fill(t.yours_agree, { now: mine.agree_now, of: mine.answers, before: mine.agreed_before });
+  get("yours-share").textContent = `--audience ${mine.slope.toFixed(3)},${number(mine.offset)}`;
+  const asked = question();
+  const [before, after] = await Promise.all([[1, 0], [mine.slope, mine.offset]]
+    .map((line) => server.verdicts({ ...asked, audience: line })));
+  const converged = ({ tiles }) => tiles.filter((tile) => tile.converged).length;
+  const need = ({ tiles }) => tiles.reduce((sum, tile) => sum + (tile.expected_spp ?? NaN), 0) / tiles.length;
+  const known = Number.isFinite(need(before)) && Number.isFinite(need(after));
+  get("yours-here").textContent = fill(known ? t.yours_here : t.yours_here_beyond, {
+    before: converged(before), after: converged(after), of: after.tiles.length,
+    from: Math.round(need(before)), to: Math.round(need(after)),
+  });
+}
 
 function speak() {
   for (const element of document.querySelectorAll("[data-t]")) element.textContent = t[element.dataset.t];
@@ -256,7 +295,8 @@ function listen() {
   get("files").addEventListener("change", does(async (event) => { await take(event.target.files); event.target.value = ""; }));
   get("clear").addEventListener("click", does(async () => { undoable.length = 0; await arrange(await server.clear()); get("files").focus(); }));
   get("level").addEventListener("input", does(async () => { level = Number(get("level").value); await look(); }));
-  for (const id of ["threshold", "audience", "slope", "offset"]) get(id).addEventListener("input", does(look));
+  for (const id of ["audience", "slope", "offset"]) get(id).addEventListener("input", does(look));
+  get("threshold").addEventListener("input", does(async () => { await learnLine(false); await look(); }));
   for (const id of ["show-verdicts", "show-noise"]) get(id).addEventListener("change", layers);
   get("undo").addEventListener("click", undo);
   document.addEventListener("dragover", (event) => { event.preventDefault(); document.body.classList.add("over"); });
@@ -289,6 +329,7 @@ async function start() {
   }
   get("model").textContent = fill(t.model, { digest: first.model.digest.slice(0, 8) });
   if (!TILES.includes(first.tile)) get("tile").add(new Option(fill(t.tile_option, { n: first.tile }), first.tile));
+  await learnLine(false);
   await arrange(first);
   await learning.follow();
   counted(state.disagreements);

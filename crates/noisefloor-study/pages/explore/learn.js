@@ -55,7 +55,7 @@ function report(t, learned, onUse) {
   const line = element("label", "", use, element("span", t.use));
   line.className = "line";
   const save = element("a", t.save);
-  Object.assign(save, { href: "/api/retrained.nfm", download: "retrained.nfm", className: "button" });
+  Object.assign(save, { href: "api/retrained.nfm", download: "retrained.nfm", className: "button" });
   parts.push(why, line, element("p", "", save));
   return parts;
 }

@@ -18,22 +18,23 @@ async function ask(path, options = {}) {
 
 const json = (method, body) => ({ method, headers: { "content-type": "application/json" }, body: JSON.stringify(body) });
 
-export const strings = (language) => ask(`/${language}.json`);
-export const state = () => ask("/api/state");
-export const add = (file) => ask(`/api/pictures/${encodeURIComponent(file.name)}`, { method: "POST", headers: { "content-type": "application/octet-stream" }, body: file });
-export const setSamples = (id, spp) => ask(`/api/pictures/${id}`, json("PUT", { spp }));
-export const remove = (id) => ask(`/api/pictures/${id}`, { method: "DELETE" });
-export const clear = () => ask("/api/pictures", { method: "DELETE" });
-export const arrange = (arrangement) => ask("/api/arrangement", json("PUT", arrangement));
-export const verdicts = (question) => ask("/api/verdicts", json("POST", question));
-export const disagree = (question, tile, seesNoise) => ask("/api/disagreements", json("POST", { question, tile, sees_noise: seesNoise }));
-export const takeBack = (id) => ask(`/api/disagreements/${id}`, { method: "DELETE" });
-export const retrain = (threshold) => ask("/api/retrain", json("POST", { threshold }));
-export const progress = () => ask("/api/retrain");
+export const strings = (language) => ask(`api/texts/${language}`);
+export const state = () => ask("api/state");
+export const add = (file) => ask(`api/pictures/${encodeURIComponent(file.name)}`, { method: "POST", headers: { "content-type": "application/octet-stream" }, body: file });
+export const setSamples = (id, spp) => ask(`api/pictures/${id}`, json("PUT", { spp }));
+export const remove = (id) => ask(`api/pictures/${id}`, { method: "DELETE" });
+export const clear = () => ask("api/pictures", { method: "DELETE" });
+export const arrange = (arrangement) => ask("api/arrangement", json("PUT", arrangement));
+export const verdicts = (question) => ask("api/verdicts", json("POST", question));
+export const disagree = (question, tile, seesNoise) => ask("api/disagreements", json("POST", { question, tile, sees_noise: seesNoise }));
+export const takeBack = (id) => ask(`api/disagreements/${id}`, { method: "DELETE" });
+export const line = (threshold) => ask("api/line", json("POST", { threshold }));
+export const retrain = (threshold) => ask("api/retrain", json("POST", { threshold }));
+export const progress = () => ask("api/retrain");
 
 /** A picture's PNG, its values as they are: no profile of the screen may touch them. */
 export async function image(id, which, revision) {
-  const answer = await fetch(`/api/pictures/${id}/${which}.png?${revision}`, { cache: "no-store" });
+  const answer = await fetch(`api/pictures/${id}/${which}.png?${revision}`, { cache: "no-store" });
   if (!answer.ok) throw new Refused(answer.status, await answer.json());
   return createImageBitmap(await answer.blob(), { colorSpaceConversion: "none", premultiplyAlpha: "none" });
 }

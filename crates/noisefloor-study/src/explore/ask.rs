@@ -1,11 +1,12 @@
 //! Requests about verdicts, disagreements and retraining.
 
 use super::answers::TileAnswer;
-use super::api::{Answer, Named, Shared, describe, gone, kept, refuse};
+use super::api::{Answer, Named, Shared, blocking, describe, gone, kept, refuse};
 use super::app::App;
 use super::gallery::{GalleryError, GalleryPicture};
 use super::job::{self, Job};
 use super::learn::LearnStep;
+use super::line::fit_line;
 use super::verdicts::{Answered, Judge, Question};
 use crate::http::{Refusal, read_json};
 use axum::Json;
@@ -116,6 +117,20 @@ pub(crate) async fn disagree(State(app): Shared, body: Body) -> Answer {
         Ok(Kept { id, before, disagreements: kept.all()?.len() })
     });
     Ok((StatusCode::CREATED, Json(done.await?)).into_response())
+}
+
+/// `POST /api/line`: the line of the person who answered, at the model and threshold of a question.
+pub(crate) async fn line(State(app): Shared, body: Body) -> Answer {
+    let Retraining { threshold: p } = read_json(body).await?;
+    let threshold = threshold(p)?;
+    let all = kept(&app, |kept| kept.all()).await?;
+    let model = app.setup.model.clone();
+    let work = move || {
+        let fitting = all.iter().filter(|d| d.said.fits(model.descriptor(), model.evidence()));
+        let answers: Vec<_> = fitting.map(|d| d.said.answer()).collect();
+        fit_line(&model, threshold, &answers)
+    };
+    Ok(Json(blocking(work).await?).into_response())
 }
 
 /// `DELETE /api/disagreements/{id}`

@@ -12,6 +12,7 @@ mod gallery;
 mod images;
 mod job;
 mod learn;
+mod line;
 mod pages;
 mod verdicts;
 
@@ -19,6 +20,7 @@ pub use answers::{Disagreement, Disagreements, TileAnswer, read_answers};
 pub use app::ExploreSetup;
 pub use gallery::{GalleryPicture, MAX_GALLERY_PIXELS, MAX_PICTURES};
 pub use learn::{AnswerAgreement, LearnStep, Learned, retrain};
+pub use line::{PersonalLine, fit_line};
 
 use crate::error::StudyError;
 use crate::http::{self, Exposure, Guard, Listening};
@@ -88,6 +90,7 @@ fn router(app: Arc<App>, guard: Arc<Guard>) -> Router {
     Router::new()
         .route("/", get(pages::page))
         .route("/{file}", get(pages::file))
+        .route("/api/texts/{language}", get(pages::texts))
         .route("/api/state", get(api::state))
         .route("/api/arrangement", put(api::arrange))
         .route("/api/pictures", delete(api::clear))
@@ -97,6 +100,7 @@ fn router(app: Arc<App>, guard: Arc<Guard>) -> Router {
         .route("/api/verdicts", post(ask::verdicts))
         .route("/api/disagreements", post(ask::disagree))
         .route("/api/disagreements/{id}", delete(ask::take_back))
+        .route("/api/line", post(ask::line))
         .route("/api/retrain", get(ask::progress).post(ask::retrain))
         .route("/api/retrained.nfm", get(ask::retrained))
         .fallback(http::nothing_here)

@@ -1,6 +1,8 @@
 //! The page, embedded in the program.
 
 use crate::http::Refusal;
+use crate::languages::parse_language;
+use axum::Json;
 use axum::extract::Path;
 use axum::http::StatusCode;
 use axum::http::header::CONTENT_TYPE;
@@ -9,20 +11,35 @@ use axum::response::{IntoResponse, Response};
 const HTML: &str = include_str!("../../pages/explore/index.html");
 const SCRIPT: &str = "text/javascript; charset=utf-8";
 /// Name, type and text of each file.
-const FILES: [(&str, &str, &str); 8] = [
+const FILES: [(&str, &str, &str); 6] = [
     ("explore.js", SCRIPT, include_str!("../../pages/explore/explore.js")),
     ("grid.js", SCRIPT, include_str!("../../pages/explore/grid.js")),
     ("learn.js", SCRIPT, include_str!("../../pages/explore/learn.js")),
     ("server.js", SCRIPT, include_str!("../../pages/explore/server.js")),
     ("style.css", "text/css; charset=utf-8", include_str!("../../pages/style.css")),
     ("explore.css", "text/css; charset=utf-8", include_str!("../../pages/explore/explore.css")),
-    ("en.json", "application/json", include_str!("../../pages/explore/en.json")),
-    ("fr.json", "application/json", include_str!("../../pages/explore/fr.json")),
 ];
 
 /// The page.
 pub(crate) async fn page() -> Response {
     ([(CONTENT_TYPE, "text/html; charset=utf-8")], HTML).into_response()
+}
+
+const LANGUAGES: [(&str, &str); 2] = [
+    ("en", include_str!("../../pages/explore/languages/en.toml")),
+    ("fr", include_str!("../../pages/explore/languages/fr.toml")),
+];
+
+/// Texts of the page in one language.
+pub(crate) async fn texts(Path(code): Path<String>) -> Response {
+    let found = LANGUAGES.iter().find(|(known, _)| *known == code);
+    match found.map(|(code, text)| parse_language(text, std::path::Path::new(code))) {
+        Some(Ok(language)) => Json(language.text).into_response(),
+        _ => {
+            Refusal::new(StatusCode::NOT_FOUND, "the page is not in that language", "language", "ask for en")
+                .into_response()
+        }
+    }
 }
 
 /// A file of the page.

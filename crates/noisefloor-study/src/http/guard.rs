@@ -104,9 +104,12 @@ fn foreign(guard: &Guard, scheme: &str, request: &Request) -> Option<Refusal> {
     };
     let origin = headers.get(ORIGIN).map(|o| o.to_str().unwrap_or_default().to_lowercase());
     let site = headers.get("sec-fetch-site").map(|s| s.to_str().unwrap_or_default());
-    let own = origin.is_none_or(|o| o == format!("{scheme}://{host}"));
+    // Files of the pages are no secret: they load, and can say what is wrong with what they ask for
+    let path = request.uri().path();
+    let file = request.method() == Method::GET && !path.contains("/api/");
+    let own = file || origin.is_none_or(|o| o == format!("{scheme}://{host}"));
     let page = format!("{}/", guard.exposure.base_path);
-    let navigation = request.method() == Method::GET && page.starts_with(request.uri().path());
+    let navigation = request.method() == Method::GET && page.starts_with(path);
     if !own || (matches!(site, Some("cross-site" | "same-site")) && !navigation) {
         let what = "the request comes from a page of another site";
         let do_ = "use the pages that this server sends; behind a proxy, start it with --trust-proxy";

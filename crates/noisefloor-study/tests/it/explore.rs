@@ -93,10 +93,11 @@ fn verdicts_and_descriptors_are_those_of_judge() {
 fn texts_are_complete_in_both_languages() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("pages/explore");
     let read = |name: &str| std::fs::read_to_string(folder.join(name)).unwrap();
-    let texts = |name: &str| -> std::collections::BTreeMap<String, String> {
-        serde_json::from_str(&read(name)).unwrap()
+    let texts = |code: &str| {
+        let file = read(&format!("languages/{code}.toml"));
+        toml::from_str::<noisefloor_study::Language>(&file).unwrap().text
     };
-    let (english, french) = (texts("en.json"), texts("fr.json"));
+    let (english, french) = (texts("en"), texts("fr"));
     let gaps = |text: &str| {
         let mut gaps: Vec<String> =
             text.split('{').skip(1).filter_map(|t| Some(t.split_once('}')?.0.to_owned())).collect();
@@ -155,6 +156,32 @@ fn threshold_and_audience_move_verdicts() {
     {
         assert_eq!(ask(threshold, audience).0, 422, "{threshold} {audience:?}");
     }
+}
+
+/// The line of who answers is learned from the stored answers, and turns verdicts the way that was said.
+#[test]
+fn answers_become_a_line() {
+    let dir = tempfile::tempdir().unwrap();
+    let server = Served::explorer(setup(dir.path()));
+    let line = || server.post("/api/line", &json!({ "threshold": 0.9 }));
+    assert_eq!(line(), (200, Value::Null));
+    let state = server.get("/api/state");
+    for (picture, tile) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
+        let asked = question(&state["pictures"][picture]);
+        let said = json!({ "question": asked, "tile": tile, "sees_noise": false });
+        assert_eq!(server.post("/api/disagreements", &said).0, 201);
+    }
+    let (status, learned) = line();
+    assert_eq!((status, &learned["answers"]), (200, &json!(4)), "{learned}");
+    assert!(learned["slope"].as_f64().unwrap() < 1.0, "{learned}");
+    assert!(learned["agree_now"].as_u64() >= learned["agreed_before"].as_u64(), "{learned}");
+    let p = |audience: Value| {
+        let mut asked = question(&state["pictures"][1]);
+        asked["audience"] = audience;
+        server.post("/api/verdicts", &asked).1["tiles"][0]["probability"].as_f64().unwrap()
+    };
+    assert!(p(json!([learned["slope"], learned["offset"]])) > p(json!([1.0, 0.0])), "{learned}");
+    assert_eq!(server.post("/api/line", &json!({ "threshold": 1.5 })).0, 422);
 }
 
 /// A single picture has nothing to be held against, and is told what is missing; a model that looks at

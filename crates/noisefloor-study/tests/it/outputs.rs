@@ -1,8 +1,9 @@
 use crate::kit::{Folder, Running, levels, public};
+use noisefloor::{Batch, ProgressiveSource, Repeats, Request, SourceError, SourceInfo, Unit};
 use noisefloor_study::analysis::raw::{DICTIONARY, responses, write_raw};
 use noisefloor_study::analysis::{AnalysisOptions, analyse};
 use noisefloor_study::simulated::drive;
-use noisefloor_study::{AnswerStore, StoreError, store};
+use noisefloor_study::{AnswerStore, StoreError, render_stack, store};
 use std::fs;
 
 /// Every response of three sessions is in the table, with all its columns described, and no code.
@@ -37,6 +38,50 @@ fn raw_data_are_complete_and_name_nobody() {
     for text in [participants, own, fs::read_to_string(out.join("responses.csv")).unwrap()] {
         assert!(codes.iter().all(|code| !text.contains(code)));
     }
+}
+
+/// A wall of noise: sample i of a pixel is i plus a value of the pixel, so that every mean is known.
+struct Wall;
+
+impl ProgressiveSource for Wall {
+    fn info(&self) -> SourceInfo {
+        SourceInfo {
+            name: "wall".into(),
+            width: 80,
+            height: 70,
+            unit: Unit::SamplesPerPixel,
+            aims: true,
+            repeats: Repeats::Samples,
+        }
+    }
+
+    fn sample(&mut self, requests: &[Request]) -> Result<Vec<Batch>, SourceError> {
+        let mean = |r: &Request| r.first as f32 + 0.5 * (r.spp as f32 - 1.0);
+        let batch =
+            |r: &Request| Batch { tile: r.tile, spp: r.spp, mean: vec![[mean(r); 3]; r.tile.pixels()] };
+        Ok(requests.iter().map(batch).collect())
+    }
+}
+
+/// Each level is the mean of its first samples: of 0 to n − 1 that is (n − 1)/2. A stopped render keeps what is done.
+#[test]
+fn a_stack_is_rendered_in_one_go() {
+    let dir = tempfile::tempdir().unwrap();
+    let levels = [1, 4, 100, 130];
+    render_stack(&mut Wall, &levels, dir.path(), |_, _| true, Ok).unwrap();
+    for level in levels {
+        let path = dir.path().join(format!("{level:05}.exr"));
+        let noisefloor_image::Picture::Linear(image) = noisefloor_image::read_picture(&path).unwrap() else {
+            panic!("an EXR is linear")
+        };
+        assert_eq!((image.width, image.height), (80, 70));
+        let expected = 0.5 * (level as f32 - 1.0);
+        assert!(image.pixels.iter().flatten().all(|c| (c - expected).abs() < 1e-3), "{level}");
+    }
+    let stopped = tempfile::tempdir().unwrap();
+    render_stack(&mut Wall, &levels, stopped.path(), |level, _| level < 100, Ok).unwrap();
+    assert_eq!(fs::read_dir(stopped.path()).unwrap().count(), 2);
+    assert!(render_stack(&mut Wall, &[4, 4], dir.path(), |_, _| true, Ok).is_err());
 }
 
 /// A copy made while observers answer is whole, belongs to the study, and can be served in place of the original.

@@ -1,0 +1,183 @@
+//! One person's own line, T′ = aT + b, on top of the model: learned from their answers in milliseconds.
+//!
+//! Somebody who sees noise for longer, or for less long, than the observers of the training data is described by the
+//! line from those observers' thresholds to their own, as any audience is (Takouachet et al. 2017, §7.3). The line is
+//! the mean of its posterior: with few answers it stays near the model, with many it follows the person.
+
+use noisefloor::{Audience, Model, Threshold};
+use noisefloor_learn::Answer;
+use serde::Serialize;
+
+/// Prior standard deviation of ln a: two people of three need between half and twice the samples of the observers.
+const LN_SLOPE_SD: f64 = 0.7;
+/// Prior standard deviation of b, in the geometric mean of the samples that were asked about.
+const OFFSET_SD: f64 = 0.1;
+/// The grid of the posterior: values on each side of the middle, and their distance.
+const SLOPES: (i32, f64) = (32, 0.08);
+const OFFSETS: (i32, f64) = (6, 0.04);
+/// P is computed at this many factors of samples on each side of 1, a tenth apart in ln, and interpolated.
+const FACTORS: (i32, f64) = (36, 0.1);
+
+/// What was learned about one person.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct PersonalLine {
+    /// Slope a.
+    pub slope: f64,
+    /// Offset b, in samples per pixel.
+    pub offset: f64,
+    /// Answers.
+    pub answers: usize,
+    /// Answers that the verdicts of the model agree with.
+    pub agreed_before: usize,
+    /// Answers that the verdicts for this line agree with.
+    pub agree_now: usize,
+}
+
+/// One answer, with what the model says of the tile at other numbers of samples.
+struct Curve<'a> {
+    answer: &'a Answer,
+    /// logit P by ln(factor).
+    logits: Vec<f64>,
+}
+
+impl Curve<'_> {
+    /// logit P of a person with this line.
+    fn logit(&self, line: Audience) -> f64 {
+        let seen_as = line.seen_as(self.answer.spp);
+        let (reach, step) = FACTORS;
+        let ln = (seen_as / self.answer.spp).max(1e-6).ln();
+        let place = (ln / step + f64::from(reach)).clamp(0.0, f64::from(2 * reach));
+        let (at, part) = (place as usize, place.fract());
+        let next = (at + 1).min(self.logits.len() - 1);
+        self.logits[at] * (1.0 - part) + self.logits[next] * part
+    }
+
+    fn says_none(&self, line: Audience, threshold: f64) -> bool {
+        self.logit(line) >= threshold
+    }
+}
+
+fn logit(p: f64) -> f64 {
+    let p = p.clamp(1e-6, 1.0 - 1e-6);
+    (p / (1.0 - p)).ln()
+}
+
+/// Learns the line of one person from answers whose descriptors are the model's. `None` without answers, or if the
+/// descriptor does not tell noise from picture.
+pub fn fit_line(model: &Model, threshold: Threshold, answers: &[Answer]) -> Option<PersonalLine> {
+    let curves: Vec<Curve<'_>> = answers.iter().map(|answer| curve(model, answer)).collect::<Option<_>>()?;
+    let n = curves.len() as f64;
+    let middle = (answers.iter().map(|a| a.spp.ln()).sum::<f64>() / n).exp();
+    let threshold = logit(f64::from(threshold.get()));
+    if curves.is_empty() {
+        return None;
+    }
+    let line = |slope: i32, offset: i32| Audience {
+        slope: (f64::from(slope) * SLOPES.1).exp(),
+        offset: f64::from(offset) * OFFSETS.1 * middle,
+    };
+
+    // The posterior on a grid; the mean of ln a and b
+    let (mut total, mut ln_slope, mut offset_sum) = (0.0, 0.0, 0.0);
+    let mut all = Vec::new();
+    for slope in -SLOPES.0..=SLOPES.0 {
+        for offset in -OFFSETS.0..=OFFSETS.0 {
+            let (own, base) = (line(slope, offset), model.audience());
+            let [a, b] =
+                [f64::from(slope) * SLOPES.1 / LN_SLOPE_SD, f64::from(offset) * OFFSETS.1 / OFFSET_SD];
+            let mut ln_posterior = -0.5 * (a * a + b * b);
+            for curve in &curves {
+                // A verdict at the threshold is an even chance; the further beyond, the likelier the answer
+                let towards = curve.logit(base.then(own)) - threshold;
+                let agrees = if curve.answer.sees_noise { -towards } else { towards };
+                ln_posterior -= (-agrees).exp().ln_1p();
+            }
+            all.push((ln_posterior, own));
+        }
+    }
+    let best = all.iter().map(|(l, _)| *l).fold(f64::NEG_INFINITY, f64::max);
+    for (ln_posterior, own) in all {
+        let weight = (ln_posterior - best).exp();
+        total += weight;
+        ln_slope += weight * own.slope.ln();
+        offset_sum += weight * own.offset;
+    }
+    let own = Audience { slope: (ln_slope / total).exp(), offset: offset_sum / total };
+    let agree = |line: Audience| {
+        let same =
+            |c: &&Curve<'_>| c.says_none(model.audience().then(line), threshold) != c.answer.sees_noise;
+        curves.iter().filter(same).count()
+    };
+    Some(PersonalLine {
+        slope: own.slope,
+        offset: own.offset,
+        answers: answers.len(),
+        agreed_before: agree(Audience::TRAINED),
+        agree_now: agree(own),
+    })
+}
+
+fn curve<'a>(model: &Model, answer: &'a Answer) -> Option<Curve<'a>> {
+    let (reach, step) = FACTORS;
+    let logits = (-reach..=reach).map(|i| {
+        let mut raw = answer.descriptor.clone();
+        let factor = (f64::from(i) * step).exp() as f32;
+        let projected = model.descriptor().project(&mut raw, factor);
+        projected.then(|| logit(f64::from(model.judge(&raw).probability)))
+    });
+    Some(Curve { answer, logits: logits.collect::<Option<_>>()? })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Answers of a person whose thresholds are `slope` times those of the observers, about tiles of the mean texture of
+    /// the training data around the observers' threshold.
+    fn answers(model: &Model, threshold: Threshold, slope: f32, count: usize) -> Vec<Answer> {
+        let at = |factor: f32| {
+            let mut raw = model.classifier().scaler.mean.clone();
+            assert!(model.descriptor().project(&mut raw, factor));
+            raw
+        };
+        let none = |factor: f32| threshold.is_reached_by(model.judge(&at(factor)).probability);
+        let just = (-200..200).map(|i| (i as f32 * 0.05).exp()).find(|f| none(*f)).unwrap();
+        let answer = |i: usize| {
+            // From an eighth of the observers' threshold to eight times
+            let factor = just * (8f32.ln() * (2.0 * i as f32 / (count - 1) as f32 - 1.0)).exp();
+            let (group, spp) = ("wall".to_owned(), 100.0 * f64::from(factor / just));
+            Answer { group, spp, descriptor: at(factor), sees_noise: !none(factor / slope) }
+        };
+        (0..count).map(answer).collect()
+    }
+
+    #[test]
+    fn a_persons_line_is_learned_and_shrunk() {
+        let (model, threshold) = (Model::bundled(), Threshold::PAPER);
+        for slope in [0.4f32, 1.0, 2.5] {
+            let fit = |count| fit_line(&model, threshold, &answers(&model, threshold, slope, count)).unwrap();
+            let [few, many] = [fit(4), fit(40)];
+            let truth = f64::from(slope).ln();
+            assert!((many.slope.ln() - truth).abs() < 0.35, "{slope}: {many:?}");
+            assert!(few.slope.ln().abs() < many.slope.ln().abs() + 0.2, "{slope}: {few:?} {many:?}");
+            assert!(many.agree_now >= many.agreed_before && many.agree_now >= 37, "{slope}: {many:?}");
+        }
+        assert_eq!(fit_line(&model, threshold, &[]), None);
+    }
+
+    /// Twelve times "I see none" of tiles that the model calls noisy: verdicts turn, at once.
+    #[test]
+    fn a_dozen_answers_turn_verdicts_in_no_time() {
+        let (model, threshold) = (Model::bundled(), Threshold::PAPER);
+        let all = answers(&model, threshold, 1.0, 25);
+        let mut twelve: Vec<Answer> = all.into_iter().filter(|a| a.sees_noise).collect();
+        twelve.truncate(12);
+        twelve.iter_mut().for_each(|a| a.sees_noise = false);
+        assert_eq!(twelve.len(), 12);
+        let begun = std::time::Instant::now();
+        let line = fit_line(&model, threshold, &twelve).unwrap();
+        println!("{line:?} in {:?}", begun.elapsed());
+        assert!(begun.elapsed().as_secs_f64() < 1.0);
+        assert!(line.agreed_before == 0 && line.agree_now >= 8 && line.slope < 0.5, "{line:?}");
+    }
+}
