@@ -12,10 +12,14 @@ const { stack, other } = JSON.parse(STACK);
 
 /** Drops files on the page, as the file manager does. */
 async function drop(page, paths) {
-  const files = paths.map((path) => ({ name: basename(path), base64: readFileSync(path).toString("base64") }));
+  const files = paths.map((path) => ({
+    name: basename(path),
+    base64: readFileSync(path).toString("base64"),
+  }));
   const transfer = await page.evaluateHandle((files) => {
     const made = new DataTransfer();
-    for (const { name, base64 } of files) made.items.add(new File([Uint8Array.from(atob(base64), (c) => c.charCodeAt(0))], name));
+    for (const { name, base64 } of files)
+      made.items.add(new File([Uint8Array.from(atob(base64), (c) => c.charCodeAt(0))], name));
     return made;
   }, files);
   await page.dispatchEvent("#drop", "dragover", { dataTransfer: transfer });
@@ -86,9 +90,9 @@ test("pictures are dropped, judged and disagreed with by mouse, in a small windo
   await page.getByText("at 1200 spp").waitFor();
   const p = await probability();
   assert.ok(p > 0.05 && p < 0.99, `P ${p}`);
-  await page.locator("#threshold").fill((Math.max(p - 0.02, 0.05)).toFixed(2));
+  await page.locator("#threshold").fill(Math.max(p - 0.02, 0.05).toFixed(2));
   await until("a lower threshold converges", async () => (await label(page, 0)).includes(": converged"));
-  await page.locator("#threshold").fill((Math.min(p + 0.02, 0.99)).toFixed(2));
+  await page.locator("#threshold").fill(Math.min(p + 0.02, 0.99).toFixed(2));
   await until("a higher one does not", async () => (await label(page, 0)).includes(": noise seen"));
   await page.locator("#threshold").fill("0.9");
 
@@ -100,7 +104,10 @@ test("pictures are dropped, judged and disagreed with by mouse, in a small windo
   // The page adjusts to who answers, and says what that changes
   await page.getByText("1 answers: T′ =").waitFor();
   assert.equal(await page.locator("#audience").inputValue(), "you");
-  assert.match(await page.locator("#yours-here").textContent(), /In this picture \d → \d of 6 tiles have converged/);
+  assert.match(
+    await page.locator("#yours-here").textContent(),
+    /In this picture \d → \d of 6 tiles have converged/,
+  );
   assert.match(await page.locator("#yours-share").textContent(), /^--audience 0\.\d+,-?\d/);
   await page.locator("#audience").selectOption("observers");
   await until("noise again for the observers", async () => (await label(page, 0)).includes(": noise seen"));
@@ -135,7 +142,13 @@ test("everything goes by keyboard alone, in a large window", async (t) => {
   await empty(page);
   const focus = async (matches) => {
     for (let i = 0; i < 60; i += 1) {
-      const at = await page.evaluate(() => [document.activeElement?.id, document.activeElement?.getAttribute("aria-label"), document.activeElement?.textContent].join("|"));
+      const at = await page.evaluate(() =>
+        [
+          document.activeElement?.id,
+          document.activeElement?.getAttribute("aria-label"),
+          document.activeElement?.textContent,
+        ].join("|"),
+      );
       if (matches.test(at)) return;
       await page.keyboard.press("Tab");
     }
@@ -149,7 +162,10 @@ test("everything goes by keyboard alone, in a large window", async (t) => {
   await focus(/Samples per pixel of last\.png/);
   await page.keyboard.type("12800");
   await page.keyboard.press("Tab");
-  await until("there is one more level", async () => (await page.locator("#level").getAttribute("max")) === String(stack.length - 1));
+  await until(
+    "there is one more level",
+    async () => (await page.locator("#level").getAttribute("max")) === String(stack.length - 1),
+  );
   await focus(/Scene, relation, tiles$/);
   await page.keyboard.press("Enter");
   await focus(/^scene/);
@@ -172,11 +188,17 @@ test("everything goes by keyboard alone, in a large window", async (t) => {
   await page.keyboard.press("ArrowRight");
   await page.keyboard.press("ArrowDown");
   await page.keyboard.press("ArrowDown");
-  assert.match(await page.evaluate(() => document.activeElement.getAttribute("aria-label")), /^Tile 5, row 2, column 2/);
+  assert.match(
+    await page.evaluate(() => document.activeElement.getAttribute("aria-label")),
+    /^Tile 5, row 2, column 2/,
+  );
   await page.keyboard.press("Enter");
   await page.getByText("in tile 5.").waitFor();
   assert.equal(await kept(page), 1);
-  assert.match(await page.evaluate(() => document.activeElement.getAttribute("aria-label")), /^Tile 5.*, you: none/);
+  assert.match(
+    await page.evaluate(() => document.activeElement.getAttribute("aria-label")),
+    /^Tile 5.*, you: none/,
+  );
   await page.keyboard.press("Home");
   await page.keyboard.press("Enter");
   await page.getByText("in tile 4.").waitFor();

@@ -16,14 +16,22 @@ export const LARGE = { width: 1920, height: 1080 };
 let browser;
 const profile = mkdtempSync(join(tmpdir(), "noisefloor-browser-"));
 
-const launch = (...more) => chromium.launch({
-  executablePath: "/usr/bin/chromium",
-  args: [
-    "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run",
-    "--disable-background-networking", "--disable-component-update", "--disable-sync", ...more,
-  ],
-  env: { ...process.env, HOME: profile },
-});
+const launch = (...more) =>
+  chromium.launch({
+    executablePath: "/usr/bin/chromium",
+    args: [
+      "--headless",
+      "--no-sandbox",
+      "--disable-gpu",
+      "--disable-quic",
+      "--no-first-run",
+      "--disable-background-networking",
+      "--disable-component-update",
+      "--disable-sync",
+      ...more,
+    ],
+    env: { ...process.env, HOME: profile },
+  });
 
 before(async () => {
   browser = await launch();
@@ -52,7 +60,8 @@ export async function open(t, url, viewport, { refusals = false, ...options } = 
   const problems = [];
   context.on("request", (request) => {
     const to = new URL(request.url());
-    if (to.protocol !== "blob:" && to.origin !== new URL(url).origin) problems.push(`left the machine: ${to}`);
+    if (to.protocol !== "blob:" && to.origin !== new URL(url).origin)
+      problems.push(`left the machine: ${to}`);
   });
   const page = await context.newPage();
   watch(page, problems, refusals);
@@ -69,7 +78,8 @@ export function watch(page, problems, refusals = false) {
   page.on("pageerror", (error) => problems.push(String(error)));
   page.on("console", (said) => {
     const text = said.text();
-    const expected = /ERR_INTERNET_DISCONNECTED|404/.test(text) || (refusals && /status of 4(22|03)/.test(text));
+    const expected =
+      /ERR_INTERNET_DISCONNECTED|404/.test(text) || (refusals && /status of 4(22|03)/.test(text));
     if (said.type() === "error" && !expected) problems.push(said.text());
   });
 }
@@ -77,7 +87,9 @@ export function watch(page, problems, refusals = false) {
 export async function accessible(page, name) {
   // The policy of the pages forbids scripts from elsewhere: axe is evaluated by the debugger
   await page.evaluate(axe);
-  const { violations } = await page.evaluate(() => globalThis.axe.run(document, { resultTypes: ["violations"] }));
+  const { violations } = await page.evaluate(() =>
+    globalThis.axe.run(document, { resultTypes: ["violations"] }),
+  );
   const found = violations.map((v) => `${v.id}: ${v.help} (${v.nodes.map((n) => n.target).join(", ")})`);
   assert.deepEqual(found, [], name);
 }
@@ -107,7 +119,7 @@ export async function arrive(page, each = async () => {}) {
   const begin = page.getByRole("button", { name: "Begin" });
   await begin.waitFor();
   await each(page, "welcome");
-  if (await page.locator("#group").count() > 0) {
+  if ((await page.locator("#group").count()) > 0) {
     assert.ok(await begin.isDisabled(), "a group has to be chosen");
     await page.locator("#group").selectOption({ index: 1 });
   }
@@ -123,17 +135,19 @@ export async function arrive(page, each = async () => {}) {
 }
 
 /** Code of the session in this window. */
-export const code = (page) => page.evaluate(() => localStorage.getItem(`noisefloor.code.${location.pathname}`));
+export const code = (page) =>
+  page.evaluate(() => localStorage.getItem(`noisefloor.code.${location.pathname}`));
 
 /** The session as the server has it, once nothing is under way. */
-export const settled = (page) => page.evaluate(async () => {
-  const of = localStorage.getItem(`noisefloor.code.${location.pathname}`);
-  for (let i = 0; i < 500; i += 1) {
-    if (JSON.parse(localStorage.getItem(`noisefloor.outbox.${of}`)).length === 0) break;
-    await new Promise((go) => setTimeout(go, 10));
-  }
-  return (await fetch(`api/sessions/${of}`)).json();
-});
+export const settled = (page) =>
+  page.evaluate(async () => {
+    const of = localStorage.getItem(`noisefloor.code.${location.pathname}`);
+    for (let i = 0; i < 500; i += 1) {
+      if (JSON.parse(localStorage.getItem(`noisefloor.outbox.${of}`)).length === 0) break;
+      await new Promise((go) => setTimeout(go, 10));
+    }
+    return (await fetch(`api/sessions/${of}`)).json();
+  });
 
 /** Time before which no answer is taken, and a little. */
 export const look = (page) => page.waitForTimeout(350);

@@ -24,7 +24,10 @@ observers.forEach((showings, number) => {
       const { width, tile } = study.stacks[trial.stack];
       for (let at = 0; !trial.identical && at < trial.levels.length; at += 1) {
         const columns = Math.ceil(width / tile);
-        await page.mouse.click(box.x + ((at % columns) + 0.5) * tile, box.y + (Math.floor(at / columns) + 0.5) * tile);
+        await page.mouse.click(
+          box.x + ((at % columns) + 0.5) * tile,
+          box.y + (Math.floor(at / columns) + 0.5) * tile,
+        );
       }
       await page.getByRole("button", { name: "I see no difference" }).click();
     }
@@ -44,7 +47,10 @@ observers.forEach((showings, number) => {
         levels[at] += 1;
         // Somewhere in the tile, not always in its middle
         const [dx, dy] = [0.2 + 0.06 * (levels[at] % 10), 0.8 - 0.06 * (levels[at] % 10)];
-        await page.mouse.click(box.x + ((at % columns) + dx) * tile, box.y + (Math.floor(at / columns) + dy) * tile);
+        await page.mouse.click(
+          box.x + ((at % columns) + dx) * tile,
+          box.y + (Math.floor(at / columns) + dy) * tile,
+        );
       }
       assert.deepEqual((await settled(page)).trial.levels, levels);
       await page.getByRole("button", { name: "I see no difference" }).click();

@@ -4,20 +4,39 @@ import { test } from "node:test";
 import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
 import {
-  LARGE, SMALL, accessible, arrive, heading, look, measure, open, openScaled, settled, shot, test_picture, watch,
+  LARGE,
+  SMALL,
+  accessible,
+  arrive,
+  heading,
+  look,
+  measure,
+  open,
+  openScaled,
+  settled,
+  shot,
+  test_picture,
+  watch,
 } from "./kit.mjs";
 
-const { ACQUISITION, VALIDATION, FORCED, INVITED } = process.env;
+const { ACQUISITION, VALIDATION, FORCED } = process.env;
 
 /** An acquisition of this study: two trials of practice, then the data with no catch trials. */
-const ready = async (page, name, words = name.startsWith("Practice") ? "This one does not count" : "Click where you see") => {
+const ready = async (
+  page,
+  name,
+  words = name.startsWith("Practice") ? "This one does not count" : "Click where you see",
+) => {
   await heading(page, name);
   await page.getByText(words).waitFor();
   await look(page);
 };
 
 /** Middle of a tile of the 3×2 grid of 128 pixels. */
-const middle = (tile, ratio = 1) => ({ x: ((tile % 3) * 128 + 64) / ratio, y: (Math.floor(tile / 3) * 128 + 64) / ratio });
+const middle = (tile, ratio = 1) => ({
+  x: ((tile % 3) * 128 + 64) / ratio,
+  y: (Math.floor(tile / 3) * 128 + 64) / ratio,
+});
 
 /** Levels that the server has for the session under way. */
 const levels = async (page) => (await settled(page)).trial.levels;
@@ -35,14 +54,18 @@ async function practise(page) {
 
 test("a session by mouse, in a small window", async (t) => {
   const { page } = await open(t, ACQUISITION, SMALL);
-  await arrive(page, async (at, name) => { await accessible(at, name); await shot(at, `small-${name}`); });
+  await arrive(page, async (at, name) => {
+    await accessible(at, name);
+    await shot(at, `small-${name}`);
+  });
   await ready(page, "Practice 1 of 2");
   await accessible(page, "practice");
   await shot(page, "small-acquisition");
   await practise(page);
   await ready(page, "Trial 1 of 1");
   for (let tile = 0; tile < 6; tile += 1) {
-    for (let level = 0; level <= tile; level += 1) await test_picture(page).click({ position: middle(tile) });
+    for (let level = 0; level <= tile; level += 1)
+      await test_picture(page).click({ position: middle(tile) });
   }
   // Two too far, and back: by the right button, and by undoing
   await test_picture(page).click({ position: middle(2) });
@@ -61,7 +84,10 @@ test("a session by mouse, in a small window", async (t) => {
   assert.match(text, /"seed": ?"\d+"/, "the seed is exact, as text");
   const steps = saved.events.map((e) => e.event).filter((e) => e.kind === "step");
   assert.equal(steps.length, 6 + 21 + 4);
-  assert.ok(steps.every((s) => s.ms >= 300) && steps.slice(0, 6).every((s, tile) => Math.abs(s.at[0] - middle(tile).x) <= 1));
+  assert.ok(
+    steps.every((s) => s.ms >= 300) &&
+      steps.slice(0, 6).every((s, tile) => Math.abs(s.at[0] - middle(tile).x) <= 1),
+  );
 });
 
 test("the practice is asked for again, and a double click answers nothing", async (t) => {
@@ -85,7 +111,9 @@ test("a session by keyboard alone, in a large window, in French", async (t) => {
   const { page } = await open(t, ACQUISITION, LARGE, { locale: "fr-FR" });
   const focus = async (name) => {
     for (let i = 0; i < 40; i += 1) {
-      const at = await page.evaluate(() => document.activeElement?.textContent || document.activeElement?.id || "");
+      const at = await page.evaluate(
+        () => document.activeElement?.textContent || document.activeElement?.id || "",
+      );
       const id = await page.evaluate(() => document.activeElement?.id ?? "");
       if (at.startsWith(name) || id === name) return;
       await page.keyboard.press("Tab");
@@ -122,27 +150,42 @@ test("a session by keyboard alone, in a large window, in French", async (t) => {
   await focus("Continuer");
   await page.keyboard.press("Enter");
   // The cross begins in the middle of 384×256 and moves by 22 pixels: to each tile in turn
-  const walk = async (key, times) => { for (let i = 0; i < times; i += 1) await page.keyboard.press(key); };
+  const walk = async (key, times) => {
+    for (let i = 0; i < times; i += 1) await page.keyboard.press(key);
+  };
   const tour = async (mark) => {
     await walk("ArrowLeft", 6);
     await walk("ArrowUp", 3);
     await mark();
-    for (let i = 0; i < 2; i += 1) { await walk("ArrowRight", 6); await mark(); }
+    for (let i = 0; i < 2; i += 1) {
+      await walk("ArrowRight", 6);
+      await mark();
+    }
     await walk("ArrowDown", 6);
     await mark();
-    for (let i = 0; i < 2; i += 1) { await walk("ArrowLeft", 6); await mark(); }
+    for (let i = 0; i < 2; i += 1) {
+      await walk("ArrowLeft", 6);
+      await mark();
+    }
   };
   await ready(page, "Entraînement 1 sur 2", "Celui-ci ne compte pas");
   const canvas = test_picture(page);
   assert.ok(await canvas.evaluate((c) => c === document.activeElement), "the picture has the focus");
   await page.keyboard.press("Enter");
-  assert.deepEqual(await levels(page), [0, 0, 0, 0, 0, 0], "the first key shows the cross, and answers nothing");
+  assert.deepEqual(
+    await levels(page),
+    [0, 0, 0, 0, 0, 0],
+    "the first key shows the cross, and answers nothing",
+  );
   await tour(() => page.keyboard.press("Enter"));
   await page.keyboard.press("d");
   await ready(page, "Entraînement 2 sur 2", "Celui-ci ne compte pas");
   await page.keyboard.press("d");
   await ready(page, "Essai 1 sur 1", "Cliquez où vous voyez");
-  await tour(async () => { await walk("Enter", 3); await page.keyboard.press("Backspace"); });
+  await tour(async () => {
+    await walk("Enter", 3);
+    await page.keyboard.press("Backspace");
+  });
   await shot(page, "large-acquisition-fr");
   await accessible(page, "essai");
   assert.deepEqual(await levels(page), [2, 2, 2, 2, 2, 2]);
@@ -195,88 +238,28 @@ test("clicks made without a connection arrive later, in order", async (t) => {
   assert.deepEqual(await levels(page), [2, 2, 0, 0, 0, 0]);
 });
 
-test("by a personal link, questions, a break, and a completion code at the end alone", async (t) => {
-  const { url, link, experimenter } = JSON.parse(INVITED);
-  const alone = await open(t, url, LARGE);
-  await alone.page.getByText("open to invited participants").waitFor();
-  assert.equal(await alone.page.getByRole("button", { name: "Begin" }).count(), 0);
-
-  const { page } = await open(t, `${url}/?link=${link}&PROLIFIC_PID=5f00&other=1`, LARGE);
-  await page.getByText("about 7 minutes").waitFor();
-  await page.getByRole("button", { name: "Begin" }).click();
-  await heading(page, "Before you begin");
-  assert.equal(new URL(page.url()).search, "", "the link is not left in the address");
-  assert.equal(await page.getByText("COMPLETE-77").count(), 0);
-  await page.getByLabel("I have read this").check();
-  await page.getByRole("button", { name: "Go on" }).click();
-  await heading(page, "A few questions");
-  await accessible(page, "questions");
-  await shot(page, "large-questions");
-  await page.getByLabel("Your age").fill("17");
-  await page.getByRole("button", { name: "Go on" }).click();
-  await heading(page, "A few questions");
-  await page.getByLabel("Your age").fill("41");
-  await page.getByLabel("Do you wear glasses").selectOption("yes");
-  await page.getByRole("button", { name: "Go on" }).click();
-  await measure(page);
-  // Practice: the obvious pair, and the identical one, which the server tells apart by its levels
-  let breaks = 0;
-  for (let trial = 0; trial < 5; trial += 1) {
-    const { trial: shown, break_due: due } = await settled(page);
-    if (due) {
-      await heading(page, "Time for a short break");
-      await shot(page, "large-break");
-      breaks += 1;
-      await page.getByRole("button", { name: "Go on" }).click();
-    }
-    await page.getByText("Are these two pictures identical?").waitFor();
-    await look(page);
-    assert.ok(await page.evaluate(() => document.activeElement?.tagName !== "BUTTON"), "no answer has the focus");
-    const same = JSON.stringify(shown.left) === JSON.stringify(shown.right);
-    await page.keyboard.press(same ? "1" : "2");
-    await page.waitForFunction((n) => (document.querySelector("progress")?.value ?? 99) > n, trial);
-  }
-  assert.equal(breaks, 1);
-  await heading(page, "Thank you");
-  await page.getByText("COMPLETE-77").waitFor();
-  await page.getByText("This was about noise.").waitFor();
-  assert.equal(await page.getByRole("link", { name: "Finish and return" }).getAttribute("href"), "https://example.org/done");
-  await accessible(page, "completion");
-  await shot(page, "large-completion");
-
-  // The same link, somewhere else: the same session, and no second one
-  const again = await open(t, `${url}/?link=${link}`, LARGE);
-  await again.page.getByRole("button", { name: "Begin" }).click();
-  await heading(again.page, "Thank you");
-
-  // The experimenter sees it
-  const watching = await open(t, `${url}${experimenter}`, LARGE, { refusals: true });
-  await watching.page.getByText("1 sessions").waitFor();
-  await watching.page.getByText("PROLIFIC_PID 5f00").waitFor();
-  await watching.page.getByText("finished", { exact: true }).waitFor();
-  assert.equal(new URL(watching.page.url()).hash, "", "the key is not left in the address");
-  await accessible(watching.page, "experimenter");
-  await shot(watching.page, "large-experimenter");
-  const stranger = await open(t, `${url}/experimenter.html#WRONG`, LARGE, { refusals: true });
-  await stranger.page.getByText("this page is for the experimenter").waitFor();
-});
-
 /** Pixels of the screen where the picture is, against the pixels of the picture. */
 async function unscaled(page, ratio) {
   const canvas = page.locator("canvas.picture").first();
   const box = await canvas.boundingBox();
-  for (const at of [box.x, box.y]) assert.ok(Math.abs(at * ratio - Math.round(at * ratio)) < 0.02, JSON.stringify(box));
+  for (const at of [box.x, box.y])
+    assert.ok(Math.abs(at * ratio - Math.round(at * ratio)) < 0.02, JSON.stringify(box));
   // The whole window: clips are rounded to CSS pixels
   const png = await page.screenshot({ scale: "device" });
-  return canvas.evaluate(async (picture, [base64, x, y]) => {
-    const shown = await createImageBitmap(new Blob([Uint8Array.from(atob(base64), (c) => c.charCodeAt(0))], { type: "image/png" }));
-    const screen = new OffscreenCanvas(shown.width, shown.height).getContext("2d");
-    screen.drawImage(shown, 0, 0);
-    const { width, height } = picture;
-    const a = screen.getImageData(x, y, width, height).data;
-    const b = picture.getContext("2d").getImageData(0, 0, width, height).data;
-    return a.reduce((count, v, i) => count + (v === b[i] ? 0 : 1), 0);
-  }, [png.toString("base64"), Math.round(box.x * ratio), Math.round(box.y * ratio)]);
+  return canvas.evaluate(
+    async (picture, [base64, x, y]) => {
+      const shown = await createImageBitmap(
+        new Blob([Uint8Array.from(atob(base64), (c) => c.charCodeAt(0))], { type: "image/png" }),
+      );
+      const screen = new OffscreenCanvas(shown.width, shown.height).getContext("2d");
+      screen.drawImage(shown, 0, 0);
+      const { width, height } = picture;
+      const a = screen.getImageData(x, y, width, height).data;
+      const b = picture.getContext("2d").getImageData(0, 0, width, height).data;
+      return a.reduce((count, v, i) => count + (v === b[i] ? 0 : 1), 0);
+    },
+    [png.toString("base64"), Math.round(box.x * ratio), Math.round(box.y * ratio)],
+  );
 }
 
 for (const ratio of [1, 2]) {
@@ -313,7 +296,12 @@ test("pictures that would be cut off or recoloured are not shown", async (t) => 
   await shot(page, "large-high-contrast");
   await page.emulateMedia({ forcedColors: "none" });
   await page.getByLabel("I have read this").check();
-  const phone = await open(t, VALIDATION, { width: 390, height: 844 }, { hasTouch: true, isMobile: true, deviceScaleFactor: 3 });
+  const phone = await open(
+    t,
+    VALIDATION,
+    { width: 390, height: 844 },
+    { hasTouch: true, isMobile: true, deviceScaleFactor: 3 },
+  );
   await phone.page.getByRole("button", { name: "Begin" }).click();
   await phone.page.locator("#cover").waitFor();
   await shot(phone.page, "phone");
@@ -337,7 +325,10 @@ test("validation, by keys", async (t) => {
   const right = (shown) => (JSON.stringify(shown.left) === JSON.stringify(shown.right) ? "1" : "2");
   await keys(page, 5, right, "Are these two pictures identical?", async (trial) => {
     if (trial === 0) await accessible(page, "validation");
-    if (trial === 2) { await heading(page, "Trial 1 of 3"); await shot(page, "small-validation"); }
+    if (trial === 2) {
+      await heading(page, "Trial 1 of 3");
+      await shot(page, "small-validation");
+    }
   });
   await heading(page, "Thank you");
 });
@@ -347,13 +338,18 @@ test("forced choice, and erasure", async (t) => {
   await arrive(page);
   const right = (shown) => (shown.first < shown.second ? "1" : "2");
   await keys(page, 6, right, /(Which one was noisy)/, async (trial) => {
-    if (trial === 4) { await accessible(page, "forced choice"); await shot(page, "small-forced-choice"); }
+    if (trial === 4) {
+      await accessible(page, "forced choice");
+      await shot(page, "small-forced-choice");
+    }
   });
   const text = await page.evaluate(async () => {
     const of = localStorage.getItem(`noisefloor.code.${location.pathname}`);
     return (await fetch(`api/sessions/${of}/export`)).text();
   });
-  const shown = JSON.parse(text).events.filter((e) => e.event.kind === "answer").flatMap((e) => e.event.timing.intervals);
+  const shown = JSON.parse(text)
+    .events.filter((e) => e.event.kind === "answer")
+    .flatMap((e) => e.event.timing.intervals);
   console.log(`intervals of 60 ms were shown for ${shown.map((ms) => ms.toFixed(0)).join(", ")} ms`);
   assert.equal(shown.length, 12);
   assert.ok(shown.every((ms) => ms > 30 && ms < 500));

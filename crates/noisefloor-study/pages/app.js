@@ -21,7 +21,10 @@ const announced = new Set();
 let turn = 0;
 
 const spoken = (code) => code.replace(/(....)(?=.)/g, "$1-");
-const send = (event) => { outbox.add(event); go().catch(failed); };
+const send = (event) => {
+  outbox.add(event);
+  go().catch(failed);
+};
 
 async function speak(wanted) {
   const known = Object.keys(study.text);
@@ -64,7 +67,9 @@ function failed(error) {
 }
 
 function join(view) {
-  const state = (waiting) => { bar.status.textContent = waiting ? t.waiting : ""; };
+  const state = (waiting) => {
+    bar.status.textContent = waiting ? t.waiting : "";
+  };
   outbox = new server.Outbox(view, state, () => go().catch(failed));
   server.remember(view.code);
 }
@@ -81,7 +86,14 @@ async function go() {
   progress(view);
   if (view.paused) return paused(view);
   // A study in the middle of a session is not announced again
-  const pages = { consent: agree, questions: asked, conditions, trials: trial, finished, "screened-out": out };
+  const pages = {
+    consent: agree,
+    questions: asked,
+    conditions,
+    trials: trial,
+    finished,
+    "screened-out": out,
+  };
   pages[view.stage](view);
   return watch();
 }
@@ -91,8 +103,21 @@ function begin() {
   turn += 1;
   bar.code.textContent = "";
   bar.status.textContent = "";
-  const begun = (view) => { join(view); go().catch(failed); };
-  welcome({ study, language, t, begun, failed, speak: async (wanted) => { await speak(wanted); begin(); } });
+  const begun = (view) => {
+    join(view);
+    go().catch(failed);
+  };
+  welcome({
+    study,
+    language,
+    t,
+    begun,
+    failed,
+    speak: async (wanted) => {
+      await speak(wanted);
+      begin();
+    },
+  });
 }
 
 const agree = (view) => consent({ study, language, t, code: spoken(view.code), send });
@@ -125,13 +150,26 @@ async function trial(view) {
   }
   if (view.break_due && announce("break", t.break_title, t.break_text, view)) return undefined;
   const heading = fill(practice ? t.practice : t.trial, { n, of });
-  const how = await trials.run({ main, study, trial: view.trial, heading, t, send: (event) => outbox.add(event) });
+  const how = await trials.run({
+    main,
+    study,
+    trial: view.trial,
+    heading,
+    t,
+    send: (event) => outbox.add(event),
+  });
   if (how === "pause") outbox.add({ kind: "pause" });
   return go().catch(failed);
 }
 
 function paused(view) {
-  const leave = [t.leave, () => { server.forget(view.code); begin(); }];
+  const leave = [
+    t.leave,
+    () => {
+      server.forget(view.code);
+      begin();
+    },
+  ];
   const resume = [t.resume, () => send({ kind: "resume" }), true];
   sheet(t.paused, ...paragraphs(fill(t.paused_how, { code: spoken(view.code) })), actions(resume, leave));
 }
@@ -148,13 +186,19 @@ function farewell(view, title, text) {
   const { code, completion } = view;
   let sure = false;
   const erase = async (pressed) => {
-    if (!sure) { sure = true; pressed.textContent = t.erase_sure; return; }
+    if (!sure) {
+      sure = true;
+      pressed.textContent = t.erase_sure;
+      return;
+    }
     try {
       await server.erase(code);
       server.forget(code);
       bar.code.textContent = "";
       sheet(t.erased, ...paragraphs(t.erased_text), actions([t.next_observer, begin, true]));
-    } catch (error) { failed(error); }
+    } catch (error) {
+      failed(error);
+    }
   };
   const parts = paragraphs(fill(text, { code: spoken(code) }));
   if (completion.code) {
@@ -163,7 +207,14 @@ function farewell(view, title, text) {
     parts.unshift(proof);
   }
   parts.push(...paragraphs(completion.debriefing));
-  const next = [t.next_observer, () => { server.forget(code); begin(); }, !completion.url];
+  const next = [
+    t.next_observer,
+    () => {
+      server.forget(code);
+      begin();
+    },
+    !completion.url,
+  ];
   const row = actions(next, [t.save, () => save(code).catch(failed)], [t.erase, erase]);
   if (completion.url) row.firstChild.replaceWith(wayOut(t.completion_return, completion.url));
   sheet(title, ...parts, row);

@@ -17,13 +17,20 @@ const ago = (ms) => {
 function row(session, now) {
   const made = element("tr");
   made.className = session.state;
-  const ids = Object.entries(session.ids).map(([name, value]) => `${name} ${value}`).join(", ");
+  const ids = Object.entries(session.ids)
+    .map(([name, value]) => `${name} ${value}`)
+    .join(", ");
   const code = element("th", session.code.replace(/(....)(?=.)/g, "$1-"));
   code.scope = "row";
   const cells = [
-    ids, session.group, session.state.replace("-", " "), session.progress.join(" / "),
-    session.trials_per_minute?.toFixed(1) ?? "", new Date(session.begun_ms).toLocaleString(),
-    ago(now - session.last_ms), session.exclusions.join("; "),
+    ids,
+    session.group,
+    session.state.replace("-", " "),
+    session.progress.join(" / "),
+    session.trials_per_minute?.toFixed(1) ?? "",
+    new Date(session.begun_ms).toLocaleString(),
+    ago(now - session.last_ms),
+    session.exclusions.join("; "),
   ];
   made.append(code, ...cells.map((text) => element("td", text)));
   return made;
@@ -33,15 +40,21 @@ function summary(sessions) {
   const count = (state) => sessions.filter((s) => s.state === state).length;
   const excluded = sessions.filter((s) => s.state === "finished" && s.exclusions.length > 0).length;
   const words = [
-    `${sessions.length} sessions`, `${count("active")} active`, `${count("finished")} finished`,
-    `${excluded} of these would be excluded`, `${count("dropped-out")} dropped out`,
+    `${sessions.length} sessions`,
+    `${count("active")} active`,
+    `${count("finished")} finished`,
+    `${excluded} of these would be excluded`,
+    `${count("dropped-out")} dropped out`,
     `${count("screened-out")} screened out`,
   ];
   return words.join(" · ");
 }
 
 async function refresh() {
-  const answer = await fetch("api/overview", { headers: { authorization: `Bearer ${key}` }, cache: "no-store" });
+  const answer = await fetch("api/overview", {
+    headers: { authorization: `Bearer ${key}` },
+    cache: "no-store",
+  });
   const body = await answer.json();
   if (!answer.ok) throw new Error(`${body.what}: ${body.what_to_do}`);
   get("summary").textContent = summary(body.sessions);
@@ -54,7 +67,8 @@ for (;;) {
     await refresh();
     get("problem").hidden = true;
   } catch (error) {
-    get("problem").textContent = error instanceof TypeError ? "The server cannot be reached." : error.message;
+    get("problem").textContent =
+      error instanceof TypeError ? "The server cannot be reached." : error.message;
     get("problem").hidden = false;
   }
   await new Promise((go) => setTimeout(go, EVERY_MS));

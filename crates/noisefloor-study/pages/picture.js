@@ -27,7 +27,10 @@ export function tile(stack, level, index) {
   const path = `api/tiles/${stack}/${level}/${index}.png`;
   let found = tiles.get(path);
   tiles.delete(path);
-  found ??= load(path).catch((error) => { tiles.delete(path); throw error; });
+  found ??= load(path).catch((error) => {
+    tiles.delete(path);
+    throw error;
+  });
   tiles.set(path, found);
   if (tiles.size > MOST_TILES) tiles.delete(tiles.keys().next().value);
   return found;
@@ -82,7 +85,11 @@ export class Picture {
       if (fits ? misfits.delete(this) : !misfits.has(this) && misfits.add(this)) onMisfit();
     });
     // Browsers without the device's pixels are believed
-    try { this.observer.observe(this.canvas, { box: "device-pixel-content-box" }); } catch { /* Safari */ }
+    try {
+      this.observer.observe(this.canvas, { box: "device-pixel-content-box" });
+    } catch {
+      /* Safari */
+    }
     this.fit();
     this.blank();
   }
@@ -132,7 +139,12 @@ export class Picture {
     const [right, bottom] = [Math.min(x + edge, width), Math.min(y + edge, height)];
     this.context.fillStyle = "rgb(20 20 20)";
     const reach = Math.round(edge / 8);
-    const corners = [[x, y, 1, 1], [right - 1, y, -1, 1], [x, bottom - 1, 1, -1], [right - 1, bottom - 1, -1, -1]];
+    const corners = [
+      [x, y, 1, 1],
+      [right - 1, y, -1, 1],
+      [x, bottom - 1, 1, -1],
+      [right - 1, bottom - 1, -1, -1],
+    ];
     for (const [cx, cy, sx, sy] of corners) {
       this.context.fillRect(Math.min(cx, cx + sx * reach), cy, reach, 1);
       this.context.fillRect(cx, Math.min(cy, cy + sy * reach), 1, reach);

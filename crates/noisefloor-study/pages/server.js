@@ -23,7 +23,9 @@ async function ask(path, options = {}) {
 }
 
 const json = (method, body) => ({
-  method, headers: { "content-type": "application/json" }, body: JSON.stringify(body),
+  method,
+  headers: { "content-type": "application/json" },
+  body: JSON.stringify(body),
 });
 
 // Paths are relative, so that the study may lie under any path of a proxy
@@ -71,14 +73,18 @@ export class Outbox {
     this.events.push({ seq: this.next, at: Date.now(), event });
     this.next += 1;
     this.save();
-    this.sending ??= this.send().finally(() => { this.sending = null; });
+    this.sending ??= this.send().finally(() => {
+      this.sending = null;
+    });
     return this.sending;
   }
 
   /** Waits until everything is acknowledged; the state of the session then. */
   async settled() {
     while (this.events.length > 0) {
-      this.sending ??= this.send().finally(() => { this.sending = null; });
+      this.sending ??= this.send().finally(() => {
+        this.sending = null;
+      });
       await this.sending;
     }
     return this.view;

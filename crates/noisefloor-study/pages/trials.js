@@ -11,7 +11,10 @@ const CUE_MS = 700;
 
 const frame = () => new Promise((go) => requestAnimationFrame(go));
 /** The time when what was drawn is on screen: the frame after next begins. */
-const painted = async () => { await frame(); return frame(); };
+const painted = async () => {
+  await frame();
+  return frame();
+};
 
 /** Waits for the frame, at least one on, at which `ms` have passed since the frame `since`, to half a frame. What is
  * drawn before anything else is awaited is on screen with that frame. */
@@ -62,7 +65,10 @@ class Room {
     this.listen = (pressed) => {
       if (pressed.ctrlKey || pressed.metaKey || pressed.altKey || pressed.repeat) return;
       const action = this.keys.get(pressed.key.toLowerCase());
-      if (action && !main.inert) { pressed.preventDefault(); action(); }
+      if (action && !main.inert) {
+        pressed.preventDefault();
+        action();
+      }
     };
     document.addEventListener("keydown", this.listen);
     this.pictures = [];
@@ -73,7 +79,12 @@ class Room {
     this.moved.observe(this.stage);
     this.onset = Infinity;
     this.intervals = [];
-    this.finish = (how) => { if (!this.closed) { this.close(); finish(how); } };
+    this.finish = (how) => {
+      if (!this.closed) {
+        this.close();
+        finish(how);
+      }
+    };
   }
 
   picture(label) {
@@ -160,8 +171,9 @@ async function acquisition(room) {
     levels[index] = level;
     room.send({ kind: "step", trial: trial.number, tile: index, level, at, ms: room.elapsed() });
     // A tile that came late must not cover a later one
-    tile(trial.stack, shown(level), index)
-      .then(() => levels[index] === level && test.showTile(shown(level), index));
+    tile(trial.stack, shown(level), index).then(
+      () => levels[index] === level && test.showTile(shown(level), index),
+    );
     if (level < last) tile(trial.stack, shown(level + 1), index);
     undo.disabled = history.length === 0;
   };
@@ -191,10 +203,15 @@ function pointing(test, point) {
   // Mouse: anywhere in the picture; the right button, or Shift, goes back
   const place = (pressed) => {
     const box = canvas.getBoundingClientRect();
-    return [pressed.clientX - box.left, pressed.clientY - box.top].map((at) => Math.floor(at * devicePixelRatio));
+    return [pressed.clientX - box.left, pressed.clientY - box.top].map((at) =>
+      Math.floor(at * devicePixelRatio),
+    );
   };
   canvas.addEventListener("click", (pressed) => point(...place(pressed), pressed.shiftKey ? -1 : 1));
-  canvas.addEventListener("contextmenu", (pressed) => { pressed.preventDefault(); point(...place(pressed), -1); });
+  canvas.addEventListener("contextmenu", (pressed) => {
+    pressed.preventDefault();
+    point(...place(pressed), -1);
+  });
 
   // Keyboard: a cross that arrow keys move. The first key only shows it
   canvas.tabIndex = 0;
@@ -223,7 +240,9 @@ function pointing(test, point) {
     move(dx * CROSS_STEP, dy * CROSS_STEP);
     if (key in marks && !hidden && !pressed.repeat) point(...at, marks[key]);
   });
-  canvas.addEventListener("pointermove", () => { cross.hidden = true; });
+  canvas.addEventListener("pointermove", () => {
+    cross.hidden = true;
+  });
 }
 
 async function validation(room) {
@@ -250,7 +269,8 @@ async function forcedChoice(room) {
   const last = study.stacks[trial.stack].levels.length - 1;
   room.show(figure(picture, ""));
   room.say.textContent = t.loading;
-  const levels = (level) => Array.from({ length: picture.count }, (_, i) => (i === trial.tile ? level : last));
+  const levels = (level) =>
+    Array.from({ length: picture.count }, (_, i) => (i === trial.tile ? level : last));
   const all = levels(last).map((level, i) => tile(trial.stack, level, i));
   await Promise.all([...all, ...[trial.first, trial.second].map((l) => tile(trial.stack, l, trial.tile))]);
   const pause = room.bind("P", t.pause, () => room.finish("pause"));
@@ -260,7 +280,10 @@ async function forcedChoice(room) {
   picture.blank();
   picture.mark(trial.tile);
   at = await until(at, CUE_MS);
-  for (const [level, name] of [[trial.first, t.first], [trial.second, t.second]]) {
+  for (const [level, name] of [
+    [trial.first, t.first],
+    [trial.second, t.second],
+  ]) {
     // All tiles are there: they are drawn within this frame
     room.say.textContent = name;
     await picture.show(levels(level));

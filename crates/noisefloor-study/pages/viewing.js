@@ -63,7 +63,10 @@ function chart(t, onChange) {
   canvas.style.height = `${canvas.height / devicePixelRatio}px`;
   const begin = GREYS[Math.random() < 0.5 ? 0 : 1];
   drawChart(canvas, begin);
-  const moved = (grey) => { drawChart(canvas, grey); onChange(); };
+  const moved = (grey) => {
+    drawChart(canvas, grey);
+    onChange();
+  };
   return [canvas, ...slider("gamma", t.gamma_slider, GREYS, begin, moved)];
 }
 
@@ -90,7 +93,9 @@ export function ask(sheet, t, done) {
   const check = (name) => {
     if (name) set.add(name);
     const left = ["card", "distance", "gamma", "ambient"].filter((part) => !set.has(part));
-    missing.textContent = left.length ? fill(t.missing, { what: left.map((p) => t[`${p}_missing`]).join(", ") }) : "";
+    missing.textContent = left.length
+      ? fill(t.missing, { what: left.map((p) => t[`${p}_missing`]).join(", ") })
+      : "";
     go.disabled = left.length > 0;
   };
 
@@ -111,7 +116,10 @@ export function ask(sheet, t, done) {
   Object.assign(distance, { type: "number", id: "distance", min: 10, max: 1000, step: 1, required: true });
   distance.addEventListener("input", () => {
     if (distance.value && distance.checkValidity()) check("distance");
-    else { set.delete("distance"); check(); }
+    else {
+      set.delete("distance");
+      check();
+    }
   });
   field(form, t.distance, element("label", "", `${t.distance_how} `, distance));
 

@@ -37,21 +37,29 @@ export function welcome({ study, language, t, begun, speak, failed }) {
 function beginning({ study, t, link, ids, begun, failed }) {
   const parts = [];
   let group = null;
-  const row = actions([t.begin, async (pressed) => {
-    pressed.disabled = true;
-    try {
-      begun(await server.begin({ group: group?.value ?? "", link, ids }));
-      // Neither the link nor the identifiers are needed any more
-      history.replaceState(null, "", location.pathname);
-    } catch (error) { failed(error); }
-  }, true]);
+  const row = actions([
+    t.begin,
+    async (pressed) => {
+      pressed.disabled = true;
+      try {
+        begun(await server.begin({ group: group?.value ?? "", link, ids }));
+        // Neither the link nor the identifiers are needed any more
+        history.replaceState(null, "", location.pathname);
+      } catch (error) {
+        failed(error);
+      }
+    },
+    true,
+  ]);
   if (study.groups.length > 0) {
     const options = study.groups.map((name) => [name, name]);
     const [label, select] = choice("group", t.group, options, t.choose);
     group = select;
     const begin = row.querySelector("button");
     begin.disabled = true;
-    select.addEventListener("change", () => { begin.disabled = false; });
+    select.addEventListener("change", () => {
+      begin.disabled = false;
+    });
     parts.push(label);
   }
   return [...parts, row];
@@ -59,13 +67,23 @@ function beginning({ study, t, link, ids, begun, failed }) {
 
 function resume(t, begun) {
   const input = element("input");
-  Object.assign(input, { type: "text", id: "resume-code", autocomplete: "off", required: true, maxLength: 40 });
+  Object.assign(input, {
+    type: "text",
+    id: "resume-code",
+    autocomplete: "off",
+    required: true,
+    maxLength: 40,
+  });
   const wrong = element("p");
   wrong.setAttribute("role", "alert");
   const row = element("div", "", element("button", t.resume));
   row.className = "actions";
   const label = element("label", "", `${t.code} `, input);
-  const form = element("form", "", element("fieldset", "", element("legend", t.resume_title), label, wrong, row));
+  const form = element(
+    "form",
+    "",
+    element("fieldset", "", element("legend", t.resume_title), label, wrong, row),
+  );
   form.className = "resume";
   form.addEventListener("submit", async (submitted) => {
     submitted.preventDefault();
@@ -91,7 +109,9 @@ export function consent({ study, language, t, code, send }) {
   const row = actions([t.go_on, () => send({ kind: "consent", language }), true]);
   const next = row.querySelector("button");
   next.disabled = true;
-  box.addEventListener("change", () => { next.disabled = !box.checked; });
+  box.addEventListener("change", () => {
+    next.disabled = !box.checked;
+  });
   page.append(row);
 }
 
@@ -130,7 +150,8 @@ function field(question, text, language, t) {
   }
   const input = element("input");
   const [min, max] = question.range ?? [null, null];
-  if (question.kind === "number") Object.assign(input, { type: "number", step: "any", ...(min !== null && { min, max }) });
+  if (question.kind === "number")
+    Object.assign(input, { type: "number", step: "any", ...(min !== null && { min, max }) });
   else Object.assign(input, { type: "text", maxLength: 500 });
   Object.assign(input, { id, autocomplete: "off" });
   return [element("label", "", `${text} `, input), input];

@@ -45,7 +45,12 @@ struct StackArgs {
     #[command(flatten)]
     renderer: RendererArgs,
     /// Samples per pixel of the levels, increasing; the last one is the reference.
-    #[arg(long, value_name = "N,…", value_delimiter = ',', default_value = "8,16,32,64,128,256,512,1024,2048")]
+    #[arg(
+        long,
+        value_name = "N,…",
+        value_delimiter = ',',
+        default_value = "8,16,32,64,128,256,512,1024,2048"
+    )]
     levels: Vec<u64>,
     /// Folder to write the levels into, as linear EXRs.
     #[arg(long, value_name = "DIR")]

@@ -2,6 +2,8 @@
 
 import { Grid, fill } from "./grid.js";
 import { Learning } from "./learn.js";
+import { PersonalLine } from "./line.js";
+import { legend, row } from "./parts.js";
 import * as server from "./server.js";
 
 const get = (id) => document.getElementById(id);
@@ -13,8 +15,7 @@ let t;
 let state;
 let grid;
 let learning;
-/** The line of the person who answers, once there are answers. */
-let mine = null;
+let line;
 /** Judged pictures by increasing samples, and which of them is shown. */
 let levels = [];
 let level = 0;
@@ -28,46 +29,47 @@ const ids = new Map();
 
 function problem(error) {
   const sentence = (part) => `${part[0].toUpperCase()}${part.slice(1)}.`;
-  const text = error?.body ? `${sentence(error.body.what)} ${sentence(error.body.what_to_do)}` : error instanceof TypeError ? t.unreachable : error ? String(error.message ?? error) : "";
+  const text = error?.body
+    ? `${sentence(error.body.what)} ${sentence(error.body.what_to_do)}`
+    : error instanceof TypeError
+      ? t.unreachable
+      : error
+        ? String(error.message ?? error)
+        : "";
   get("problem").textContent = text;
   get("problem").hidden = !text;
 }
 
-const say = (text) => { get("status").textContent = text; };
+const say = (text) => {
+  get("status").textContent = text;
+};
 
 /** Runs what a control asks for; what goes wrong is said. */
-const does = (action) => async (...given) => {
-  try { problem(null); await action(...given); } catch (error) { problem(error); }
-};
+const does =
+  (action) =>
+  async (...given) => {
+    try {
+      problem(null);
+      await action(...given);
+    } catch (error) {
+      problem(error);
+    }
+  };
 
 async function take(files) {
   const all = [...files];
   let wrong = null;
   for (const [i, file] of all.entries()) {
     say(fill(t.loading, { name: file.name, n: i + 1, of: all.length }));
-    try { await server.add(file); } catch (error) { wrong ??= error; }
+    try {
+      await server.add(file);
+    } catch (error) {
+      wrong ??= error;
+    }
   }
   say("");
   await arrange(await server.state());
   if (wrong) throw wrong;
-}
-
-function row(picture) {
-  const item = document.createElement("li");
-  const name = document.createElement("span");
-  name.className = "name";
-  name.title = name.textContent = picture.name;
-  const input = document.createElement("input");
-  Object.assign(input, { type: "number", min: 1, step: "any", value: picture.spp ?? "", placeholder: t.no_spp, required: true });
-  input.setAttribute("aria-label", fill(t.spp_of, { name: picture.name }));
-  input.addEventListener("change", does(async () => { if (input.value) await arrange(await server.setSamples(picture.id, Number(input.value))); }));
-  const away = document.createElement("button");
-  away.type = "button";
-  away.textContent = "×";
-  away.setAttribute("aria-label", fill(t.remove, { name: picture.name }));
-  away.addEventListener("click", does(async () => arrange(await server.remove(picture.id))));
-  item.append(name, input, "spp", away);
-  return item;
 }
 
 /** Shows the pictures there are, and judges the one that is looked at. */
@@ -78,8 +80,11 @@ async function arrange(next) {
   state = next;
   shown = "";
   const focused = document.activeElement?.getAttribute("aria-label");
-  get("list").replaceChildren(...state.pictures.map(row));
-  if (focused) [...get("list").querySelectorAll("[aria-label]")].find((e) => e.getAttribute("aria-label") === focused)?.focus();
+  get("list").replaceChildren(...state.pictures.map((picture) => row(picture, t, does, arrange)));
+  if (focused)
+    [...get("list").querySelectorAll("[aria-label]")]
+      .find((e) => e.getAttribute("aria-label") === focused)
+      ?.focus();
   levels = state.pictures.filter((p) => p.spp !== null);
   const again = levels.findIndex((p) => p.id === looked);
   level = again < 0 ? 0 : again;
@@ -105,11 +110,16 @@ function counted(n) {
 function audience() {
   const chosen = get("audience").value;
   if (chosen === "students") return state.art_students;
-  if (chosen === "you") return mine ? [mine.slope, mine.offset] : [1, 0];
+  if (chosen === "you") return line.audience();
   return chosen === "line" ? [get("slope").valueAsNumber, get("offset").valueAsNumber] : [1, 0];
 }
 
-const question = () => ({ picture: levels[level].id, threshold: Number(get("threshold").value), audience: audience(), retrained });
+const question = () => ({
+  picture: levels[level].id,
+  threshold: Number(get("threshold").value),
+  audience: audience(),
+  retrained,
+});
 
 /** Asks for the verdicts on the picture that is looked at; of answers that overtake one another, the last question's counts. */
 async function look() {
@@ -157,14 +167,17 @@ async function draw(picture, order) {
     });
     shown = which;
   }
-  get("picture").setAttribute("aria-label", fill(t.picture_label, { name: picture.name, spp: picture.spp }));
+  get("picture").setAttribute(
+    "aria-label",
+    fill(t.picture_label, { name: picture.name, spp: picture.spp }),
+  );
   get("welcome").hidden = true;
   for (const id of ["verdict", "answers", "yours", "learn", "frame"]) get(id).hidden = false;
   fit();
   grid.show(view);
   layers();
   summarise();
-  await showLine();
+  await line.show(question());
 }
 
 function fit() {
@@ -181,7 +194,8 @@ function layers() {
   get("legend").hidden = !noise;
   get("show-noise").disabled = !view.has_noise_map;
   get("tiles").classList.toggle("bare", !get("show-verdicts").checked);
-  if (view.just_visible !== null) get("seen-at").textContent = fill(t.seen, { n: view.just_visible.toFixed(1) });
+  if (view.just_visible !== null)
+    get("seen-at").textContent = fill(t.seen, { n: view.just_visible.toFixed(1) });
 }
 
 function summarise() {
@@ -190,14 +204,18 @@ function summarise() {
   const bits = [fill(t.summary, { converged, of: tiles.length, spp: view.spp })];
   const needs = tiles.map((tile) => tile.expected_spp ?? Infinity).sort((a, b) => a - b);
   const [need, median] = [needs.at(-1), needs[Math.floor((needs.length - 1) / 2)]];
-  if (converged < tiles.length) bits.push(Number.isFinite(need) ? fill(t.summary_need, { need, median }) : t.summary_beyond);
+  if (converged < tiles.length)
+    bits.push(Number.isFinite(need) ? fill(t.summary_need, { need, median }) : t.summary_beyond);
   get("summary").textContent = bits.join(" ");
   const notes = [view.nested ? t.is_nested : t.is_independent];
   const unfamiliar = tiles.filter((tile) => tile.unfamiliar).length;
   if (unfamiliar > 0) notes.push(fill(t.unfamiliar, { n: unfamiliar }));
   if (!Number.isInteger(devicePixelRatio)) notes.unshift(t.scaled);
-  get("note").textContent = state.model.evidence === "halves" ? notes.join(" ") : notes.slice(0, -1).join(" ");
-  get("model").textContent = fill(retrained ? t.model_retrained : t.model, { digest: view.model.slice(0, 8) });
+  get("note").textContent =
+    state.model.evidence === "halves" ? notes.join(" ") : notes.slice(0, -1).join(" ");
+  get("model").textContent = fill(retrained ? t.model_retrained : t.model, {
+    digest: view.model.slice(0, 8),
+  });
   get("undo").disabled = undoable.length === 0;
 }
 
@@ -215,7 +233,7 @@ const answer = does(async (tile) => {
     say(fill(tile.converged ? t.kept_noise : t.kept_none, { n: tile.tile + 1 }));
     counted(kept.disagreements);
   }
-  await learnLine(true);
+  await line.learn(true);
   await look();
 });
 
@@ -232,82 +250,100 @@ const undo = does(async () => {
     counted(kept.disagreements);
   }
   say(t.taken_back);
-  await learnLine(false);
+  await line.learn(false);
   await look();
 });
 
-/** Learns the line of the person who answers; `use` chooses it as the audience when it is first there. */
-async function learnLine(use) {
-  const first = mine === null;
-  mine = await server.line(Number(get("threshold").value));
-  const option = get("audience").querySelector('[value="you"]');
-  option.disabled = mine === null;
-  if (mine === null && get("audience").value === "you") get("audience").value = "observers";
-  if (mine !== null && first && use) get("audience").value = "you";
-}
-
-/** What the line changes in the picture that is looked at: its verdicts beside those for the observers. */
-async function showLine() {
-  get("yours-none").hidden = mine !== null;
-  get("yours-learned").hidden = mine === null;
-  if (mine === null) return;
-  const number = (n) => String(Number(n.toPrecision(3)));
-  const offset = `${mine.offset < 0 ? "−" : "+"} ${number(Math.abs(mine.offset))}`;
-  const factor = `×${mine.slope.toFixed(2)}`;
-  get("yours-line").textContent = fill(t.yours_line, { answers: mine.answers, slope: mine.slope.toFixed(2), offset, factor });
-  get("yours-agree").textContent = fill(t.yours_agree, { now: mine.agree_now, of: mine.answers, before: mine.agreed_before });
-  get("yours-share").textContent = `--audience ${mine.slope.toFixed(3)},${number(mine.offset)}`;
-  const asked = question();
-  const [before, after] = await Promise.all([[1, 0], [mine.slope, mine.offset]]
-    .map((line) => server.verdicts({ ...asked, audience: line })));
-  const converged = ({ tiles }) => tiles.filter((tile) => tile.converged).length;
-  const need = ({ tiles }) => tiles.reduce((sum, tile) => sum + (tile.expected_spp ?? NaN), 0) / tiles.length;
-  const known = Number.isFinite(need(before)) && Number.isFinite(need(after));
-  get("yours-here").textContent = fill(known ? t.yours_here : t.yours_here_beyond, {
-    before: converged(before), after: converged(after), of: after.tiles.length,
-    from: Math.round(need(before)), to: Math.round(need(after)),
-  });
-}
-
 function speak() {
   for (const element of document.querySelectorAll("[data-t]")) element.textContent = t[element.dataset.t];
-  for (const element of document.querySelectorAll("[data-t-label]")) element.setAttribute("aria-label", t[element.dataset.tLabel]);
+  for (const element of document.querySelectorAll("[data-t-label]"))
+    element.setAttribute("aria-label", t[element.dataset.tLabel]);
   get("undo").textContent = t.undo;
   get("progress").setAttribute("aria-label", t.progress);
-  for (const n of TILES) get("tile").add(new Option(fill(n < ASKED ? t.tile_small : t.tile_option, { n }), n));
-}
-
-/** The colours of the map, as the server has them: inferno, sampled. */
-function legend() {
-  const stops = ["#000004", "#1b0c41", "#4a0c6b", "#781c6d", "#a52c60", "#cf4446", "#ed6925", "#fb9b06", "#f7d13d", "#fcffa4"];
-  const context = get("scale").getContext("2d");
-  const gradient = context.createLinearGradient(0, 0, get("scale").width, 0);
-  stops.forEach((colour, i) => gradient.addColorStop(i / (stops.length - 1), colour));
-  context.fillStyle = gradient;
-  context.fillRect(0, 0, get("scale").width, get("scale").height);
+  for (const n of TILES)
+    get("tile").add(new Option(fill(n < ASKED ? t.tile_small : t.tile_option, { n }), n));
 }
 
 function listen() {
-  const rearrange = does(async () => arrange(await server.arrange({
-    tile: Number(get("tile").value), samples: get("samples").value || null, scene: get("scene").value === state.scene ? state.named : get("scene").value,
-  })));
+  const rearrange = does(async () =>
+    arrange(
+      await server.arrange({
+        tile: Number(get("tile").value),
+        samples: get("samples").value || null,
+        scene: get("scene").value === state.scene ? state.named : get("scene").value,
+      }),
+    ),
+  );
   for (const id of ["tile", "samples", "scene"]) get(id).addEventListener("change", rearrange);
-  get("files").addEventListener("change", does(async (event) => { await take(event.target.files); event.target.value = ""; }));
-  get("clear").addEventListener("click", does(async () => { undoable.length = 0; await arrange(await server.clear()); get("files").focus(); }));
-  get("level").addEventListener("input", does(async () => { level = Number(get("level").value); await look(); }));
+  get("files").addEventListener(
+    "change",
+    does(async (event) => {
+      await take(event.target.files);
+      event.target.value = "";
+    }),
+  );
+  get("clear").addEventListener(
+    "click",
+    does(async () => {
+      undoable.length = 0;
+      await arrange(await server.clear());
+      get("files").focus();
+    }),
+  );
+  get("level").addEventListener(
+    "input",
+    does(async () => {
+      level = Number(get("level").value);
+      await look();
+    }),
+  );
   for (const id of ["audience", "slope", "offset"]) get(id).addEventListener("input", does(look));
-  get("threshold").addEventListener("input", does(async () => { await learnLine(false); await look(); }));
+  get("threshold").addEventListener(
+    "input",
+    does(async () => {
+      await line.learn(false);
+      await look();
+    }),
+  );
   for (const id of ["show-verdicts", "show-noise"]) get(id).addEventListener("change", layers);
   get("undo").addEventListener("click", undo);
-  document.addEventListener("dragover", (event) => { event.preventDefault(); document.body.classList.add("over"); });
-  document.addEventListener("dragleave", (event) => { if (!event.relatedTarget) document.body.classList.remove("over"); });
-  document.addEventListener("drop", does(async (event) => { event.preventDefault(); document.body.classList.remove("over"); await take(event.dataTransfer.files); }));
-  document.addEventListener("keydown", (event) => {
-    if (event.target.matches("input:not([type=range]):not([type=checkbox]), select") || event.ctrlKey || event.altKey || event.metaKey || !view) return;
-    const box = { v: "show-verdicts", n: "show-noise" }[event.key.toLowerCase()];
-    if (box && !get(box).disabled) { get(box).checked = !get(box).checked; layers(); }
+  document.addEventListener("dragover", (event) => {
+    event.preventDefault();
+    document.body.classList.add("over");
   });
-  window.addEventListener("resize", () => { if (view) { fit(); grid.show(view); summarise(); } });
+  document.addEventListener("dragleave", (event) => {
+    if (!event.relatedTarget) document.body.classList.remove("over");
+  });
+  document.addEventListener(
+    "drop",
+    does(async (event) => {
+      event.preventDefault();
+      document.body.classList.remove("over");
+      await take(event.dataTransfer.files);
+    }),
+  );
+  document.addEventListener("keydown", (event) => {
+    if (
+      event.target.matches("input:not([type=range]):not([type=checkbox]), select") ||
+      event.ctrlKey ||
+      event.altKey ||
+      event.metaKey ||
+      !view
+    )
+      return;
+    const box = { v: "show-verdicts", n: "show-noise" }[event.key.toLowerCase()];
+    if (box && !get(box).disabled) {
+      get(box).checked = !get(box).checked;
+      layers();
+    }
+  });
+  window.addEventListener("resize", () => {
+    if (view) {
+      fit();
+      grid.show(view);
+      summarise();
+    }
+  });
 }
 
 async function start() {
@@ -317,19 +353,29 @@ async function start() {
   speak();
   legend();
   grid = new Grid(get("tiles"), t, answer, undo);
-  learning = new Learning(t, does(async (use) => { retrained = use; if (levels.length) await look(); }), problem);
+  learning = new Learning(
+    t,
+    does(async (use) => {
+      retrained = use;
+      if (levels.length) await look();
+    }),
+    problem,
+  );
+  line = new PersonalLine(t, () => Number(get("threshold").value));
   learning.threshold = () => Number(get("threshold").value);
   listen();
   const first = await server.state();
   get("threshold").value = first.threshold;
   const [slope, offset] = first.audience;
   if (slope !== 1 || offset !== 0) {
-    get("audience").value = slope === first.art_students[0] && offset === first.art_students[1] ? "students" : "line";
+    get("audience").value =
+      slope === first.art_students[0] && offset === first.art_students[1] ? "students" : "line";
     [get("slope").value, get("offset").value] = [slope, offset];
   }
   get("model").textContent = fill(t.model, { digest: first.model.digest.slice(0, 8) });
-  if (!TILES.includes(first.tile)) get("tile").add(new Option(fill(t.tile_option, { n: first.tile }), first.tile));
-  await learnLine(false);
+  if (!TILES.includes(first.tile))
+    get("tile").add(new Option(fill(t.tile_option, { n: first.tile }), first.tile));
+  await line.learn(false);
   await arrange(first);
   await learning.follow();
   counted(state.disagreements);

@@ -15,7 +15,10 @@ export class Grid {
       this.buttons = view.tiles.map((_, i) => {
         const button = document.createElement("button");
         button.type = "button";
-        button.addEventListener("click", () => { this.go(i, false); this.onAnswer(this.view.tiles[i]); });
+        button.addEventListener("click", () => {
+          this.go(i, false);
+          this.onAnswer(this.view.tiles[i]);
+        });
         return button;
       });
       this.element.replaceChildren(...this.buttons);
@@ -30,17 +33,37 @@ export class Grid {
   draw(button, tile) {
     const { t } = this;
     const ratio = devicePixelRatio;
-    for (const [name, value] of [["left", tile.x], ["top", tile.y], ["width", tile.width], ["height", tile.height]]) button.style[name] = `${value / ratio}px`;
+    for (const [name, value] of [
+      ["left", tile.x],
+      ["top", tile.y],
+      ["width", tile.width],
+      ["height", tile.height],
+    ])
+      button.style[name] = `${value / ratio}px`;
     const said = tile.said?.sees_noise;
     const small = Math.min(tile.width, tile.height) / ratio < 88;
-    button.className = [tile.converged ? "converged" : "noisy", small ? "small" : "", tile.said ? "answered" : ""].join(" ");
+    button.className = [
+      tile.converged ? "converged" : "noisy",
+      small ? "small" : "",
+      tile.said ? "answered" : "",
+    ].join(" ");
     const p = tile.probability.toFixed(2);
-    const need = tile.converged ? "" : tile.expected_spp === null ? t.need_beyond : fill(t.need, { n: tile.expected_spp });
+    const need = tile.converged
+      ? ""
+      : tile.expected_spp === null
+        ? t.need_beyond
+        : fill(t.need, { n: tile.expected_spp });
     const opposite = tile.said ? t.take_back : tile.converged ? t.i_see_noise : t.i_see_none;
     const label = fill(t.tile_label, {
-      n: tile.tile + 1, row: Math.floor(tile.tile / this.columns) + 1, column: (tile.tile % this.columns) + 1,
-      verdict: tile.converged ? t.converged : t.noisy, p, need, unfamiliar: tile.unfamiliar ? t.label_unfamiliar : "",
-      said: tile.said ? (said ? t.said_noise : t.said_none) : "", opposite,
+      n: tile.tile + 1,
+      row: Math.floor(tile.tile / this.columns) + 1,
+      column: (tile.tile % this.columns) + 1,
+      verdict: tile.converged ? t.converged : t.noisy,
+      p,
+      need,
+      unfamiliar: tile.unfamiliar ? t.label_unfamiliar : "",
+      said: tile.said ? (said ? t.said_noise : t.said_none) : "",
+      opposite,
     });
     if (button.getAttribute("aria-label") !== label) button.setAttribute("aria-label", label);
     button.title = tile.said ? `${said ? t.you_noise : t.you_none} · ${t.take_back}` : opposite;
@@ -54,7 +77,8 @@ export class Grid {
     const words = [`${tile.converged ? "✓" : "✗"}${tile.unfamiliar ? " ?" : ""}`];
     if (!small) words.push(`P ${p}`);
     const chips = [chip("top", words.join("  "))];
-    if (!tile.converged) chips.push(chip("need", tile.expected_spp === null ? "→ ∞" : `→ ${short(tile.expected_spp)}`));
+    if (!tile.converged)
+      chips.push(chip("need", tile.expected_spp === null ? "→ ∞" : `→ ${short(tile.expected_spp)}`));
     // Drawn by the style: the label says it in its own words
     if (tile.said) button.dataset.said = small ? (said ? "✗!" : "✓!") : said ? t.you_noise : t.you_none;
     else delete button.dataset.said;
@@ -64,7 +88,9 @@ export class Grid {
   /** Moves the one tile that Tab reaches. */
   go(index, focus) {
     this.at = Math.min(Math.max(index, 0), this.buttons.length - 1);
-    this.buttons.forEach((button, i) => { button.tabIndex = i === this.at ? 0 : -1; });
+    this.buttons.forEach((button, i) => {
+      button.tabIndex = i === this.at ? 0 : -1;
+    });
     if (focus) this.buttons[this.at]?.focus();
   }
 
@@ -72,9 +98,12 @@ export class Grid {
     const column = this.at % this.columns;
     const last = this.buttons.length - 1;
     const moves = {
-      ArrowLeft: column > 0 ? -1 : 0, ArrowRight: column < this.columns - 1 && this.at < last ? 1 : 0,
-      ArrowUp: this.at >= this.columns ? -this.columns : 0, ArrowDown: this.at + this.columns <= last ? this.columns : 0,
-      Home: -column, End: Math.min(this.columns - 1 - column, last - this.at),
+      ArrowLeft: column > 0 ? -1 : 0,
+      ArrowRight: column < this.columns - 1 && this.at < last ? 1 : 0,
+      ArrowUp: this.at >= this.columns ? -this.columns : 0,
+      ArrowDown: this.at + this.columns <= last ? this.columns : 0,
+      Home: -column,
+      End: Math.min(this.columns - 1 - column, last - this.at),
     };
     if (pressed.key in moves && !pressed.ctrlKey && !pressed.altKey && !pressed.metaKey) {
       pressed.preventDefault();

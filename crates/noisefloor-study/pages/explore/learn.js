@@ -15,7 +15,13 @@ function element(name, text, ...inside) {
 
 function table(head, rows) {
   const header = element("tr");
-  header.append(...head.map((text) => { const cell = element("th", text); cell.scope = "col"; return cell; }));
+  header.append(
+    ...head.map((text) => {
+      const cell = element("th", text);
+      cell.scope = "col";
+      return cell;
+    }),
+  );
   const body = rows.map(([name, ...values]) => {
     const row = element("tr");
     const first = element("th", name);
@@ -32,19 +38,37 @@ function report(t, learned, onUse) {
   if (before && after) {
     const factor = (value) => `×${value.toFixed(3)}`;
     const share = (value) => `${(100 * value).toFixed(1)} %`;
-    parts.push(table([t.score, t.before, t.after], [
-      [t.error, factor(before.error_factor), factor(after.error_factor)],
-      [t.early, share(before.early_share), share(after.early_share)],
-      [t.bias, factor(before.bias_factor), factor(after.bias_factor)],
-    ]));
-    const verdict = element("p", worse.length > 0 ? fill(t.worse, { what: worse.join("; ") }) : t.not_worse);
+    parts.push(
+      table(
+        [t.score, t.before, t.after],
+        [
+          [t.error, factor(before.error_factor), factor(after.error_factor)],
+          [t.early, share(before.early_share), share(after.early_share)],
+          [t.bias, factor(before.bias_factor), factor(after.bias_factor)],
+        ],
+      ),
+    );
+    const verdict = element(
+      "p",
+      worse.length > 0 ? fill(t.worse, { what: worse.join("; ") }) : t.not_worse,
+    );
     verdict.className = worse.length > 0 ? "worse" : "";
     parts.push(verdict);
   } else {
     parts.push(element("p", t.not_scored));
   }
   const of = (n) => `${n} / ${a.of}`;
-  parts.push(element("h3", t.on_you), table(["", ""], [[t.before, of(a.before)], [t.fitted, of(a.fitted)], [t.left_out, of(a.left_out)]]));
+  parts.push(
+    element("h3", t.on_you),
+    table(
+      ["", ""],
+      [
+        [t.before, of(a.before)],
+        [t.fitted, of(a.fitted)],
+        [t.left_out, of(a.left_out)],
+      ],
+    ),
+  );
   // An empty header has nothing to say
   parts.at(-1).querySelector("thead").remove();
   const why = element("p", scenes.length === 1 ? `${t.fitted_why} ${t.one_scene}` : t.fitted_why);
@@ -96,7 +120,8 @@ export class Learning {
       }
       get("outcome").hidden = job.state === "idle";
       if (job.state === "done") get("outcome").replaceChildren(...report(this.t, job, this.onUse));
-      if (job.state === "failed") get("outcome").replaceChildren(element("p", fill(this.t.failed, { what: job.what })));
+      if (job.state === "failed")
+        get("outcome").replaceChildren(element("p", fill(this.t.failed, { what: job.what })));
       return;
     }
   }

@@ -16,17 +16,27 @@ async function ask(path, options = {}) {
   return body;
 }
 
-const json = (method, body) => ({ method, headers: { "content-type": "application/json" }, body: JSON.stringify(body) });
+const json = (method, body) => ({
+  method,
+  headers: { "content-type": "application/json" },
+  body: JSON.stringify(body),
+});
 
 export const strings = (language) => ask(`api/texts/${language}`);
 export const state = () => ask("api/state");
-export const add = (file) => ask(`api/pictures/${encodeURIComponent(file.name)}`, { method: "POST", headers: { "content-type": "application/octet-stream" }, body: file });
+export const add = (file) =>
+  ask(`api/pictures/${encodeURIComponent(file.name)}`, {
+    method: "POST",
+    headers: { "content-type": "application/octet-stream" },
+    body: file,
+  });
 export const setSamples = (id, spp) => ask(`api/pictures/${id}`, json("PUT", { spp }));
 export const remove = (id) => ask(`api/pictures/${id}`, { method: "DELETE" });
 export const clear = () => ask("api/pictures", { method: "DELETE" });
 export const arrange = (arrangement) => ask("api/arrangement", json("PUT", arrangement));
 export const verdicts = (question) => ask("api/verdicts", json("POST", question));
-export const disagree = (question, tile, seesNoise) => ask("api/disagreements", json("POST", { question, tile, sees_noise: seesNoise }));
+export const disagree = (question, tile, seesNoise) =>
+  ask("api/disagreements", json("POST", { question, tile, sees_noise: seesNoise }));
 export const takeBack = (id) => ask(`api/disagreements/${id}`, { method: "DELETE" });
 export const line = (threshold) => ask("api/line", json("POST", { threshold }));
 export const retrain = (threshold) => ask("api/retrain", json("POST", { threshold }));

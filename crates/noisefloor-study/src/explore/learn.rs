@@ -106,19 +106,29 @@ pub fn retrain(
     );
     let new = train(&told, params, corpus, after)?;
 
-    let agree = |p: &dyn Fn(usize, &Answer) -> f32| {
-        told.answers.iter().enumerate().filter(|(i, a)| a.agrees(p(*i, a), threshold)).count()
-    };
-    let agreement = AnswerAgreement {
-        of: told.answers.len(),
-        before: agree(&|_, a| a.probability(&base)),
-        fitted: agree(&|_, a| a.probability(&new)),
-        left_out: agree(&|i, _| left_out[i]),
-    };
+    let agreement = agreement(&told.answers, threshold, [&base, &new], &left_out);
     let scenes = told.answer_groups().into_iter().map(str::to_owned).collect();
     let worse = worse(before, after);
     let learned = Learned { before, after, agreement, scenes, worse, model: new.digest() };
     Ok((new, learned))
+}
+
+/// Answers that the model before, the one after, and those that left the scene out agree with.
+fn agreement(
+    answers: &[Answer],
+    threshold: Threshold,
+    [before, after]: [&Model; 2],
+    left_out: &[f32],
+) -> AnswerAgreement {
+    let agree = |p: &dyn Fn(usize, &Answer) -> f32| {
+        answers.iter().enumerate().filter(|(i, a)| a.agrees(p(*i, a), threshold)).count()
+    };
+    AnswerAgreement {
+        of: answers.len(),
+        before: agree(&|_, a| a.probability(before)),
+        fitted: agree(&|_, a| a.probability(after)),
+        left_out: agree(&|i, _| left_out[i]),
+    }
 }
 
 /// Scores that got worse by more than rounding.

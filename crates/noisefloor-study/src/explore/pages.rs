@@ -11,10 +11,12 @@ use axum::response::{IntoResponse, Response};
 const HTML: &str = include_str!("../../pages/explore/index.html");
 const SCRIPT: &str = "text/javascript; charset=utf-8";
 /// Name, type and text of each file.
-const FILES: [(&str, &str, &str); 6] = [
+const FILES: [(&str, &str, &str); 8] = [
     ("explore.js", SCRIPT, include_str!("../../pages/explore/explore.js")),
     ("grid.js", SCRIPT, include_str!("../../pages/explore/grid.js")),
     ("learn.js", SCRIPT, include_str!("../../pages/explore/learn.js")),
+    ("line.js", SCRIPT, include_str!("../../pages/explore/line.js")),
+    ("parts.js", SCRIPT, include_str!("../../pages/explore/parts.js")),
     ("server.js", SCRIPT, include_str!("../../pages/explore/server.js")),
     ("style.css", "text/css; charset=utf-8", include_str!("../../pages/style.css")),
     ("explore.css", "text/css; charset=utf-8", include_str!("../../pages/explore/explore.css")),

@@ -136,6 +136,7 @@ fn observers_use_the_pages_in_a_browser() {
         studies.iter().zip(&servers).map(|((name, _), server)| (*name, server.url.as_str())).collect();
     urls[3].1 = &invited;
     run("test.mjs", &urls);
+    run("invited.test.mjs", &urls);
 
     // What was clicked: two observers left the six tiles at levels 1 to 6 (by mouse) and at 2 (by keyboard).
     let study = &studies[0].1.1;

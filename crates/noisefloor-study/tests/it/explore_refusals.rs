@@ -2,20 +2,20 @@ use crate::explore::{question, setup};
 use crate::kit::{Served, stack};
 use serde_json::{Value, json};
 
-/// Malformed, oversized, repeated and forged requests are refused with what, where and what to do, and
-/// leave nothing behind.
+/// A refusal says what, where and what to do, and names no path of the machine.
+fn refused(answer: (u16, Value), status: u16) {
+    assert_eq!(answer.0, status, "{}", answer.1);
+    for part in ["what", "where", "what_to_do"] {
+        assert!(answer.1[part].as_str().is_some_and(|s| s.len() > 1), "{part}: {}", answer.1);
+    }
+    assert!(!answer.1.to_string().contains("/tmp"), "paths of the machine: {}", answer.1);
+}
+
+/// Broken, oversized and misnamed pictures.
 #[test]
-fn what_does_not_fit_is_refused() {
+fn malformed_pictures_are_refused() {
     let dir = tempfile::tempdir().unwrap();
     let server = Served::explorer(setup(dir.path()));
-    let picture = server.get("/api/state")["pictures"][0].clone();
-    let refused = |answer: (u16, Value), status: u16| {
-        assert_eq!(answer.0, status, "{}", answer.1);
-        for part in ["what", "where", "what_to_do"] {
-            assert!(answer.1[part].as_str().is_some_and(|s| s.len() > 1), "{part}: {}", answer.1);
-        }
-        assert!(!answer.1.to_string().contains("/tmp"), "paths of the machine: {}", answer.1);
-    };
     let file = |name: &str, bytes: &[u8]| {
         let (status, _, body) = server.raw(
             "POST",
@@ -25,8 +25,6 @@ fn what_does_not_fit_is_refused() {
         );
         (status, serde_json::from_slice(&body).unwrap_or(Value::Null))
     };
-
-    // Pictures
     refused(file("a.png", b"no picture"), 422);
     refused(file("a.png", b""), 422);
     let whole = std::fs::read(dir.path().join("wall/00100.png")).unwrap();
@@ -50,8 +48,14 @@ fn what_does_not_fit_is_refused() {
     // The same once more is the same
     assert_eq!(file("again.png", &whole).0, 201);
     assert_eq!(server.get("/api/state")["pictures"].as_array().unwrap().len(), 3);
+}
 
-    // Samples, arrangement, questions
+/// Samples, arrangements, questions, and models that are not there.
+#[test]
+fn malformed_questions_are_refused() {
+    let dir = tempfile::tempdir().unwrap();
+    let server = Served::explorer(setup(dir.path()));
+    let picture = server.get("/api/state")["pictures"][0].clone();
     let id = picture["id"].as_str().unwrap();
     for spp in [json!(0), json!(-1), json!(1e300), json!("many"), Value::Null] {
         let answer = server.put(&format!("/api/pictures/{id}"), &json!({ "spp": spp }));
@@ -71,7 +75,19 @@ fn what_does_not_fit_is_refused() {
     refused(server.post("/api/verdicts", &unknown), 404);
     refused(server.post("/api/verdicts", &json!("x".repeat(20_000))), 413);
 
-    // Disagreements: what the model said cannot be sent along, and tiles have to be there
+    // Retraining without a table, without answers; models that are not there
+    refused(server.post("/api/retrain", &json!({ "threshold": 0.9 })), 422);
+    refused(server.post("/api/retrain", &json!({ "threshold": 2 })), 422);
+    let (status, _, body) = server.raw("GET", "/api/retrained.nfm", "", b"");
+    refused((status, serde_json::from_slice(&body).unwrap()), 404);
+}
+
+/// What the model said cannot be sent along, and tiles have to be there. Said twice, it is one answer.
+#[test]
+fn forged_and_repeated_answers_change_nothing() {
+    let dir = tempfile::tempdir().unwrap();
+    let server = Served::explorer(setup(dir.path()));
+    let picture = server.get("/api/state")["pictures"][0].clone();
     let said = json!({ "question": question(&picture), "tile": 2, "sees_noise": true });
     refused(server.post("/api/disagreements", &said), 404);
     let mut forged = json!({ "question": question(&picture), "tile": 0, "sees_noise": true });
@@ -95,14 +111,14 @@ fn what_does_not_fit_is_refused() {
     refused(server.delete(&format!("/api/disagreements/{}", first["id"])), 404);
     assert_eq!(server.delete(&format!("/api/disagreements/{}", third["id"])).0, 204);
     refused(server.delete(&format!("/api/disagreements/{}", third["id"])), 404);
+}
 
-    // Retraining without a table, without answers; models that are not there
-    refused(server.post("/api/retrain", &json!({ "threshold": 0.9 })), 422);
-    refused(server.post("/api/retrain", &json!({ "threshold": 2 })), 422);
-    let (status, _, body) = server.raw("GET", "/api/retrained.nfm", "", b"");
-    refused((status, serde_json::from_slice(&body).unwrap()), 404);
-
-    // Other sites and hosts
+#[test]
+fn requests_of_other_sites_are_refused() {
+    let dir = tempfile::tempdir().unwrap();
+    let server = Served::explorer(setup(dir.path()));
+    let picture = server.get("/api/state")["pictures"][0].clone();
+    let yes = json!({ "question": question(&picture), "tile": 0, "sees_noise": true });
     for (headers, status) in [
         ("content-type: application/json\r\norigin: http://evil.example\r\n", 403),
         ("content-type: application/json\r\nsec-fetch-site: cross-site\r\n", 403),

@@ -27,7 +27,7 @@ mod kill;
 /// Studies, stacks and servers for the tests.
 #[cfg(test)]
 mod kit;
-/// Fifty observers at once.
+/// Two hundred observers at once.
 #[cfg(test)]
 mod load;
 /// Raw data, languages and copies of the database.
