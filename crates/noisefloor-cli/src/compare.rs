@@ -102,7 +102,8 @@ fn one(
 /// Samples of a reference have a seed of their own, so that no run shares any with it.
 const SEED: u64 = 0x5eed_0f7e_0000_0000;
 
-/// The picture that `--reference` names, or one with `--reference-spp` samples, resumed from what is in the folder.
+/// The picture that `--reference` names, or one with `--reference-spp` samples, resumed from what is in the
+/// folder.
 fn converged(
     job: &CompareJob,
     source: &SourceJob,

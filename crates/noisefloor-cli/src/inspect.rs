@@ -22,7 +22,8 @@ struct Summary<'a> {
     tone_mapping: ToneMapping,
     support_vectors: usize,
     gamma: f32,
-    /// Zones whose texture is familiar, and how far around them it still is, in standard deviations; null if all is.
+    /// Zones whose texture is familiar, and how far around them it still is, in standard deviations; null
+    /// if all is.
     familiar_zones: Option<usize>,
     familiar_reach: Option<f32>,
     audience: Audience,

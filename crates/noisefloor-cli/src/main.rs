@@ -1,5 +1,5 @@
-//! The `noisefloor` command, in three steps: what was typed ([`args`]) becomes a checked job, and the job is run by the module of its
-//! command. Libraries do the work; nothing here computes.
+//! The `noisefloor` command, in three steps: what was typed ([`args`]) becomes a checked job, and the job
+//! is run by the module of its command. Libraries do the work; nothing here computes.
 #![allow(missing_docs, unreachable_pub, reason = "a command has no public items")]
 
 mod args;

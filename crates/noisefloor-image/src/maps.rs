@@ -64,8 +64,8 @@ impl ColourScale {
     }
 }
 
-/// The scale of visible noise: always the same, so that maps of different pictures and stages compare. `just_visible` is
-/// marked as "seen".
+/// The scale of visible noise: always the same, so that maps of different pictures and stages compare.
+/// `just_visible` is marked as "seen".
 pub fn noise_scale(just_visible: Option<f32>) -> ColourScale {
     let title = "visible noise\n8-bit steps";
     let landmark = just_visible.map(|v| (f64::from(v), "seen"));
@@ -251,8 +251,8 @@ fn frame(canvas: &mut Canvas, TileMark { tile, label, unfamiliar, .. }: &TileMar
     }
 }
 
-/// Draws one value a pixel over a display-encoded picture `width` pixels wide, legend at the right. The picture is dark and grey
-/// below the colours; it stays bare where a value is NaN.
+/// Draws one value a pixel over a display-encoded picture `width` pixels wide, legend at the right. The
+/// picture is dark and grey below the colours; it stays bare where a value is NaN.
 pub fn draw_field(width: usize, encoded: &[Rgb], values: &[f32], scale: &ColourScale) -> Canvas {
     let height = encoded.len() / width;
     let mut canvas = Canvas::new(width + LEGEND, height.max(LEAST_HEIGHT), PAPER);

@@ -1,5 +1,5 @@
-//! Pictures of an evaluation: thresholds of people and of the model over each scene, one against the other, and the reliability
-//! curve.
+//! Pictures of an evaluation: thresholds of people and of the model over each scene, one against the other,
+//! and the reliability curve.
 
 use crate::drawing::{colour, failed, sign, svg};
 use crate::error::LabError;
@@ -27,8 +27,9 @@ const GREY: Rgb = [0.85; 3];
 /// Of the ratio of predicted and human thresholds: beyond, colours are at their end.
 const WIDEST_RATIO: f64 = 3.0;
 
-/// Draws thresholds of people and of the model over each scene, with their ratio as colour: (scene, map). `corpus` are the
-/// folders that the zones come from, where they are at hand: zones are then drawn over their pictures.
+/// Draws thresholds of people and of the model over each scene, with their ratio as colour: (scene, map).
+/// `corpus` are the folders that the zones come from, where they are at hand: zones are then drawn over
+/// their pictures.
 ///
 /// # Errors
 /// [`LabError::Corpus`] if a corpus cannot be read.
@@ -68,8 +69,8 @@ fn mark(zone: &Prediction, places: &Places) -> Option<TileMark> {
     })
 }
 
-/// Writes `zones-SCENE.png` of [`map_zones`], `thresholds.svg` and `reliability.svg` into the folder, which is made. `bins` is the
-/// reliability curve.
+/// Writes `zones-SCENE.png` of [`map_zones`], `thresholds.svg` and `reliability.svg` into the folder, which
+/// is made. `bins` is the reliability curve.
 ///
 /// # Errors
 /// [`LabError`] if a corpus cannot be read or a file cannot be written.

@@ -1,12 +1,13 @@
 //! Experiments on stopping criteria: what each one costs, what it leaves, and how close it comes to people.
 //!
-//! - [`compare`]: criteria that watch one render; samples, seconds and distance from the converged picture of each.
+//! - [`compare`]: criteria that watch one render; samples, seconds and distance from the converged picture
+//!   of each.
 //! - [`rivals`]: other people's criteria on pictures whose noise thresholds people gave.
 //! - [`reproduce`]: the protocols of Takouachet et al. 2017, at the scale of the paper.
 //! - [`figures`]: plots and maps of an evaluation by [`noisefloor_learn`].
 //!
-//! Results come first, as plain data that `serde` writes; plots, pictures and pages are made from them by functions of their own.
-//! Nothing here prints: long work reports an [`Advance`] to a [`Watch`].
+//! Results come first, as plain data that `serde` writes; plots, pictures and pages are made from them by
+//! functions of their own. Nothing here prints: long work reports an [`Advance`] to a [`Watch`].
 
 mod advance;
 mod drawing;

@@ -75,7 +75,8 @@ impl PredictionScores {
 }
 
 impl Evaluation {
-    /// Scores the predictions of the zones of `table`. `spread` is that of observers, as in [`TrainParams`](crate::TrainParams).
+    /// Scores the predictions of the zones of `table`. `spread` is that of observers, as in
+    /// [`TrainParams`](crate::TrainParams).
     pub fn new(predicted_by: String, table: &Table, predictions: &[Prediction], spread: f64) -> Self {
         let (constant, median) = (constant_noise_baseline(table), scene_median_baseline(table));
         let baselines = |keep: &dyn Fn(&Prediction) -> bool| Baselines {

@@ -19,9 +19,10 @@ enum AudienceCommand {
 
 /// Fit the line T' = a T + b from the thresholds T of the observers to those of an audience, T'.
 ///
-/// Show your audience zones for which the observers' thresholds are known, or predicted by a model. FILE.csv has one line a zone and
-/// the columns `observers` and `audience`, in samples per pixel; other columns are ignored. Prints the line (the median of slopes,
-/// which tolerates outliers), Pearson's r, 95 % bootstrap intervals of a and b, and the option for `render`.
+/// Show your audience zones for which the observers' thresholds are known, or predicted by a model.
+/// FILE.csv has one line a zone and the columns `observers` and `audience`, in samples per pixel; other
+/// columns are ignored. Prints the line (the median of slopes, which tolerates outliers), Pearson's r, 95 %
+/// bootstrap intervals of a and b, and the option for `render`.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   noisefloor audience fit students.csv

@@ -8,16 +8,18 @@ use std::path::PathBuf;
 
 /// Let stopping criteria watch one render, and compare what each one costs and what it leaves.
 ///
-/// Each scene is rendered once, uniformly. Every criterion sees the same samples and takes those of a tile until it stops it. The report
-/// sets beside uniform sampling what each criterion took, what that cost, and how far its picture is from the converged one (relMSE,
-/// PSNR, FLIP, butteraugli).
+/// Each scene is rendered once, uniformly. Every criterion sees the same samples and takes those of a tile
+/// until it stops it. The report sets beside uniform sampling what each criterion took, what that cost, and
+/// how far its picture is from the converged one (relMSE, PSNR, FLIP, butteraugli).
 ///
-/// Criteria: `oracle`; `spp:N`; `relative-error`, `dammertz`, `cycles`, `luxcore`, `vdp-stages`, `vdp-first`, each with a constant of its
-/// own (`cycles:0.02`) or with a default: Blender's 0.01 for `cycles`, and for the others the one that agrees with people on average.
+/// Criteria: `oracle`; `spp:N`; `relative-error`, `dammertz`, `cycles`, `luxcore`, `vdp-stages`,
+/// `vdp-first`, each with a constant of its own (`cycles:0.02`) or with a default: Blender's 0.01 for
+/// `cycles`, and for the others the one that agrees with people on average.
 ///
-/// Writes into the output folder: index.html with everything (one file that opens without a server), runs.csv, runs.json, and for each
-/// scene curve.csv, tiles.csv, plots (SVG and PNG), crops with error maps, the picture of every criterion, and the reference, which the
-/// next comparison of the same scene uses again.
+/// Writes into the output folder: index.html with everything (one file that opens without a server),
+/// runs.csv, runs.json, and for each scene curve.csv, tiles.csv, plots (SVG and PNG), crops with error
+/// maps, the picture of every criterion, and the reference, which the next comparison of the same scene
+/// uses again.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   noisefloor compare cornell-box glass-spheres --size 256x256 --tile 64

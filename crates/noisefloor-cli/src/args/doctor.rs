@@ -4,9 +4,9 @@ use clap::Args;
 
 /// List the other renderers, say what each one lacks here, or install one.
 ///
-/// A renderer runs in the Python that NOISEFLOOR_NAME_PYTHON names (such as NOISEFLOOR_MITSUBA_PYTHON), otherwise in a private
-/// environment in the cache folder, which --install makes with pinned packages. The exit code is 1 if a renderer is installed but does
-/// not load; one that is not installed is no error.
+/// A renderer runs in the Python that NOISEFLOOR_NAME_PYTHON names (such as NOISEFLOOR_MITSUBA_PYTHON),
+/// otherwise in a private environment in the cache folder, which --install makes with pinned packages. The
+/// exit code is 1 if a renderer is installed but does not load; one that is not installed is no error.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   noisefloor doctor

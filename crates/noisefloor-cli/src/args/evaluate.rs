@@ -9,10 +9,11 @@ use std::path::PathBuf;
 
 /// Score predicted thresholds against human ones.
 ///
-/// Predicts for each zone the samples per pixel at which P crosses the threshold, and compares that with what people said: error
-/// factor exp(mean |ln ratio|), bias factor, and the share of zones that stop below half the human threshold. Two baselines stand
-/// beside it: one noise level for all scenes, and the median of the same scene's other zones. Levels between the given pictures are
-/// synthesised (noise ∝ 1/√n); the accuracy on images counts only real ones.
+/// Predicts for each zone the samples per pixel at which P crosses the threshold, and compares that with
+/// what people said: error factor exp(mean |ln ratio|), bias factor, and the share of zones that stop below
+/// half the human threshold. Two baselines stand beside it: one noise level for all scenes, and the median
+/// of the same scene's other zones. Levels between the given pictures are synthesised (noise ∝ 1/√n); the
+/// accuracy on images counts only real ones.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   noisefloor evaluate --table fixtures/human-table.csv --leave-one-scene-out
@@ -37,16 +38,17 @@ pub struct EvaluateArgs {
     /// Write the thresholds of each zone as CSV: scene,zone,human_spp,predicted_spp,censored,unfamiliar.
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
-    /// Draw into this folder: both thresholds of each zone (over the pictures, with --corpus), predicted against human thresholds, and
-    /// the reliability of P.
+    /// Draw into this folder: both thresholds of each zone (over the pictures, with --corpus), predicted
+    /// against human thresholds, and the reliability of P.
     #[arg(long, value_name = "DIR")]
     figures: Option<PathBuf>,
     /// Leave these numbers out of the descriptor, by their names in the table, to see what they are worth.
     #[arg(long, value_name = "NAME,…", value_delimiter = ',', requires = "leave_one_scene_out")]
     without: Vec<String>,
-    /// Also score what people use instead: other stopping criteria, by the names in `noisefloor compare --help`, each with a constant
-    /// fitted on the other scenes. Takes minutes each; the visible-differences predictors take an hour. With --figures, also plots
-    /// mean thresholds scene by scene. (Needs a build with the feature `lab`, and so does --figures.)
+    /// Also score what people use instead: other stopping criteria, by the names in `noisefloor compare
+    /// --help`, each with a constant fitted on the other scenes. Takes minutes each; the
+    /// visible-differences predictors take an hour. With --figures, also plots mean thresholds scene by
+    /// scene. (Needs a build with the feature `lab`, and so does --figures.)
     #[arg(long, value_name = "NAME,…", value_delimiter = ',', requires = "corpus", value_parser = values::rival)]
     rivals: Vec<&'static Rival>,
     #[command(flatten)]

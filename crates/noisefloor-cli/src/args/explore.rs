@@ -9,10 +9,11 @@ use std::path::PathBuf;
 
 /// Judge pictures of your own in the browser, disagree, and retrain.
 ///
-/// Drop renderings of one view on the page, or name them here: two with different seeds, snapshots of one rendering, or a picture and
-/// its converged reference (PNG, EXR or PFM). The page shows what `judge` says of each tile, a map of visible noise, and the predicted
-/// samples; threshold and audience follow a slider. A click on a tile says that the verdict is wrong. It is stored in the database
-/// before it is acknowledged; `train --disagreements` learns from it, and so does the page itself with --table.
+/// Drop renderings of one view on the page, or name them here: two with different seeds, snapshots of one
+/// rendering, or a picture and its converged reference (PNG, EXR or PFM). The page shows what `judge` says
+/// of each tile, a map of visible noise, and the predicted samples; threshold and audience follow a slider.
+/// A click on a tile says that the verdict is wrong. It is stored in the database before it is
+/// acknowledged; `train --disagreements` learns from it, and so does the page itself with --table.
 ///
 /// The server is for this machine: nothing leaves it.
 #[derive(Debug, Args)]
@@ -22,8 +23,8 @@ use std::path::PathBuf;
   noisefloor explore a_256spp.exr b_256spp.exr --table fixtures/human-table.csv      and retrain on the page
   noisefloor train --table fixtures/human-table.csv --disagreements explore.sqlite --out mine.nfm")]
 pub struct ExploreArgs {
-    /// Pictures to begin with. Names such as 00100.png or hall_64spp.exr say how many samples per pixel they have; otherwise the page
-    /// asks.
+    /// Pictures to begin with. Names such as 00100.png or hall_64spp.exr say how many samples per pixel
+    /// they have; otherwise the page asks.
     #[arg(value_name = "IMAGE")]
     images: Vec<PathBuf>,
     #[command(flatten)]
@@ -37,11 +38,12 @@ pub struct ExploreArgs {
     /// Database of disagreements; created if it does not exist.
     #[arg(long, default_value = "explore.sqlite", value_name = "FILE")]
     database: PathBuf,
-    /// Table of human thresholds that the page retrains on, such as the project's fixtures/human-table.csv, or one that `train
-    /// --save-table` wrote. Without it, the page cannot retrain.
+    /// Table of human thresholds that the page retrains on, such as the project's fixtures/human-table.csv,
+    /// or one that `train --save-table` wrote. Without it, the page cannot retrain.
     #[arg(long, value_name = "FILE.csv")]
     table: Option<PathBuf>,
-    /// Address and port to listen on; port 0 picks a free one. Pictures travel unencrypted: use it only in a network that you trust.
+    /// Address and port to listen on; port 0 picks a free one. Pictures travel unencrypted: use it only in
+    /// a network that you trust.
     #[arg(long, default_value = "127.0.0.1:8438", value_name = "IP:PORT")]
     listen: SocketAddr,
     /// Another name of this machine that browsers may use. Repeat for more.

@@ -9,12 +9,12 @@ use std::path::PathBuf;
 
 /// Say for each tile of a picture whether people would see noise in it.
 ///
-/// Noise shows where two renderings of one scene differ, so a second picture is needed: the same view with other samples. Several are
-/// pooled. The verdict is on IMAGE only: its noise follows from the difference and the sample counts. PNGs are judged as they are; EXRs
-/// are tone mapped first.
+/// Noise shows where two renderings of one scene differ, so a second picture is needed: the same view with
+/// other samples. Several are pooled. The verdict is on IMAGE only: its noise follows from the difference
+/// and the sample counts. PNGs are judged as they are; EXRs are tone mapped first.
 ///
-/// Two snapshots of one progressive rendering share samples. If the pictures show it, the verdict takes it into account, and a note
-/// says so; --nested and --independent override this.
+/// Two snapshots of one progressive rendering share samples. If the pictures show it, the verdict takes it
+/// into account, and a note says so; --nested and --independent override this.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   noisefloor judge a.exr --spp 256 --against b.exr --spp 256       two independent renderings
@@ -31,7 +31,8 @@ pub struct JudgeArgs {
     /// Another rendering of the same view. Repeat for more.
     #[arg(long, required = true, value_name = "IMAGE")]
     against: Vec<PathBuf>,
-    /// The pictures are snapshots of one progressive rendering: the later one contains the samples of the earlier one.
+    /// The pictures are snapshots of one progressive rendering: the later one contains the samples of the
+    /// earlier one.
     #[arg(long)]
     nested: bool,
     /// The pictures share no samples, whatever they look like.

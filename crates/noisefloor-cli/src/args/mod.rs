@@ -1,4 +1,5 @@
-//! What can be typed, one file a command. Each command's arguments become a checked job; nothing typed goes further.
+//! What can be typed, one file a command. Each command's arguments become a checked job; nothing typed goes
+//! further.
 #![cfg_attr(
     not(feature = "full"),
     allow(dead_code, reason = "a command that a build leaves out is known to the parser all the same")
@@ -40,9 +41,10 @@ use clap::{Parser, Subcommand};
 
 /// Tells progressive Monte Carlo renderers, tile by tile, when people stop seeing noise.
 ///
-/// noisefloor has learned from people when to stop: observers said at how many samples per pixel (spp) they could no longer tell
-/// parts of real renders from the converged picture. `render` stops each tile of the built-in path tracer, or of another renderer.
-/// `judge` and `explore` look at pictures rendered elsewhere. `train` and `evaluate` make models and score them.
+/// noisefloor has learned from people when to stop: observers said at how many samples per pixel (spp) they
+/// could no longer tell parts of real renders from the converged picture. `render` stops each tile of the
+/// built-in path tracer, or of another renderer. `judge` and `explore` look at pictures rendered elsewhere.
+/// `train` and `evaluate` make models and score them.
 #[derive(Debug, Parser)]
 #[command(
     name = "noisefloor",

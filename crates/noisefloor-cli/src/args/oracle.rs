@@ -13,7 +13,8 @@ pub struct OracleArgs {
     /// Model file [default: the bundled model].
     #[arg(long, value_name = "FILE")]
     pub model: Option<PathBuf>,
-    /// A tile has converged when the probability that an observer sees no noise reaches P; higher values stop later.
+    /// A tile has converged when the probability that an observer sees no noise reaches P; higher values
+    /// stop later.
     #[arg(long, default_value_t = Threshold::PAPER, value_name = "P")]
     pub threshold: Threshold,
 }
@@ -48,7 +49,8 @@ enum ToneChoice {
 pub enum EvidenceChoice {
     /// The other half of the samples: no reference is needed.
     Halves,
-    /// A noise-free reference: SCENE/reference.exr of a corpus, or its most converged picture if there is none.
+    /// A noise-free reference: SCENE/reference.exr of a corpus, or its most converged picture if there is
+    /// none.
     Reference,
     /// Nothing but the picture itself. For comparison.
     Alone,

@@ -8,10 +8,12 @@ use std::path::PathBuf;
 
 /// Render the quick noise-free reference of a scene: direct light, and its reflections in mirrors and glass.
 ///
-/// This is the ray-traced picture that Takouachet et al. compare noisy tiles with. Each part takes samples until its own noise is far
-/// below what people see. Light that diffuse surfaces scattered on its way is missing, so this is not the converged picture.
+/// This is the ray-traced picture that Takouachet et al. compare noisy tiles with. Each part takes samples
+/// until its own noise is far below what people see. Light that diffuse surfaces scattered on its way is
+/// missing, so this is not the converged picture.
 ///
-/// If a corpus has one as reference.exr beside its pictures, `train` and `evaluate` can use it with `--evidence reference`.
+/// If a corpus has one as reference.exr beside its pictures, `train` and `evaluate` can use it with
+/// `--evidence reference`.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   noisefloor reference glass-spheres --size 512x512
@@ -23,7 +25,8 @@ pub struct ReferenceArgs {
     scene: String,
     #[command(flatten)]
     renderer: RendererArgs,
-    /// The picture in linear light; a PNG of what it looks like is written beside it [default: out/SCENE-reference.exr].
+    /// The picture in linear light; a PNG of what it looks like is written beside it [default:
+    /// out/SCENE-reference.exr].
     #[arg(long, value_name = "FILE.exr")]
     out: Option<PathBuf>,
     /// No progress bar and no summary.

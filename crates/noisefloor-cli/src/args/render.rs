@@ -12,11 +12,13 @@ use std::time::Duration;
 
 /// Render a scene, and stop each tile when nobody sees noise in it any more.
 ///
-/// Writes into the output folder: image.exr (linear radiance; samples, probability, stop and visible noise as channels), image.png,
-/// stops.csv (one line a tile), stops.png (heat map of the samples), noise.png (the noise that is left, and how visible it is),
-/// timeline.csv and report.json. Files appear complete or not at all, and are refreshed while rendering (--autosave).
+/// Writes into the output folder: image.exr (linear radiance; samples, probability, stop and visible noise
+/// as channels), image.png, stops.csv (one line a tile), stops.png (heat map of the samples), noise.png
+/// (the noise that is left, and how visible it is), timeline.csv and report.json. Files appear complete or
+/// not at all, and are refreshed while rendering (--autosave).
 ///
-/// Ctrl-C stops all tiles and writes what there is (exit code 130). An interrupted or killed render continues with --resume.
+/// Ctrl-C stops all tiles and writes what there is (exit code 130). An interrupted or killed render
+/// continues with --resume.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   noisefloor render                                  the Cornell box, into out/cornell-box
@@ -28,15 +30,16 @@ use std::time::Duration;
   noisefloor render --time 60 --against truth.exr    at most a minute; relMSE to a reference in timeline.csv
   noisefloor render --time 60 --resume               another minute of the render in the output folder")]
 pub struct RenderArgs {
-    /// Built-in scene (`noisefloor scenes` lists them) or scene file: glTF 2.0 (.gltf, .glb) or Mitsuba XML (.xml). With --source,
-    /// whatever that source reads [default: cornell-box].
+    /// Built-in scene (`noisefloor scenes` lists them) or scene file: glTF 2.0 (.gltf, .glb) or Mitsuba XML
+    /// (.xml). With --source, whatever that source reads [default: cornell-box].
     scene: Option<String>,
     #[command(flatten)]
     renderer: RendererArgs,
     /// Output folder [default: out/SCENE].
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// What stops a tile: `oracle`, `spp:N` for N samples per pixel everywhere, or a criterion of `noisefloor compare --help`.
+    /// What stops a tile: `oracle`, `spp:N` for N samples per pixel everywhere, or a criterion of
+    /// `noisefloor compare --help`.
     #[arg(long, default_value = "oracle", value_parser = criterion)]
     criterion: CriterionChoice,
     #[arg(long, hide = true, value_parser = values::no_spp)]
@@ -51,7 +54,8 @@ pub struct RenderArgs {
     /// Samples per pixel between two verdicts on a tile.
     #[arg(long, default_value_t = 100, value_name = "SPP")]
     batch: u64,
-    /// When tiles are judged: after `every` batch, or `spaced` by the samples that a tile is expected to need.
+    /// When tiles are judged: after `every` batch, or `spaced` by the samples that a tile is expected to
+    /// need.
     #[arg(long, value_enum, default_value_t = ScheduleChoice::Every)]
     schedule: ScheduleChoice,
     /// No tile stops before this many samples per pixel [default: one batch].
@@ -66,7 +70,8 @@ pub struct RenderArgs {
     /// Stop a tile only after K verdicts of "converged" in a row.
     #[arg(long, default_value_t = 1, value_name = "K")]
     consecutive: u32,
-    /// For whom: `observers` (those of the training data), `art-students` (T' = 1.94 T - 346), or a,b for T' = a T + b.
+    /// For whom: `observers` (those of the training data), `art-students` (T' = 1.94 T - 346), or a,b for
+    /// T' = a T + b.
     #[arg(long, default_value = "observers", value_name = "WHO", value_parser = values::audience)]
     audience: Audience,
     /// Converged picture of the same size to compare with: relMSE in timeline.csv and report.json.
@@ -75,8 +80,9 @@ pub struct RenderArgs {
     /// Seconds between two refreshes of the files in the output folder while rendering; 0 for none.
     #[arg(long, default_value = "30", value_name = "SECONDS", value_parser = values::pause)]
     autosave: Duration,
-    /// Continue the render that Ctrl-C, --time or a kill interrupted in this output folder. Picture and stops are those of an
-    /// uninterrupted render. Scene and options must be the same. Works with the built-in renderer, and the oracle or `spp:N`.
+    /// Continue the render that Ctrl-C, --time or a kill interrupted in this output folder. Picture and
+    /// stops are those of an uninterrupted render. Scene and options must be the same. Works with the
+    /// built-in renderer, and the oracle or `spp:N`.
     #[arg(long)]
     resume: bool,
     /// No progress bar and no summary.

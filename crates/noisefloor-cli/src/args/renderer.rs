@@ -14,10 +14,11 @@ use std::time::Duration;
 /// Who renders, and how.
 #[derive(Debug, Args)]
 pub struct RendererArgs {
-    /// The renderer: `ptwne`, the built-in path tracer; `mitsuba`, `cycles`, `luxcore` (path tracing), `luxcore-sobol`,
-    /// `luxcore-metropolis` or `luxcore-bidir`, which `noisefloor doctor` installs; `exr`, which plays back a folder of pictures; or
-    /// `command: PROGRAM …`, any program that renders into an EXR or PFM file. In its arguments, {scene} {seed} {spp} {out} are filled in,
-    /// and {x0} {x1} {y0} {y1} if it can render tiles (x1 and y1 are exclusive).
+    /// The renderer: `ptwne`, the built-in path tracer; `mitsuba`, `cycles`, `luxcore` (path tracing),
+    /// `luxcore-sobol`, `luxcore-metropolis` or `luxcore-bidir`, which `noisefloor doctor` installs; `exr`,
+    /// which plays back a folder of pictures; or `command: PROGRAM …`, any program that renders into an EXR
+    /// or PFM file. In its arguments, {scene} {seed} {spp} {out} are filled in, and {x0} {x1} {y0} {y1} if
+    /// it can render tiles (x1 and y1 are exclusive).
     #[arg(long, default_value = "ptwne", value_name = "SOURCE", value_parser = source)]
     source: SourceKind,
     /// Other renderers: abort a call after this many seconds.
@@ -26,27 +27,30 @@ pub struct RendererArgs {
     /// Image size in pixels [default: the size in the scene file or of the program's pictures, else 384x384].
     #[arg(long, value_name = "WxH", value_parser = values::size)]
     size: Option<(usize, usize)>,
-    /// Seed of the random numbers. The same seed gives the same image and the same stops on any number of threads. (Other renderers
-    /// may not promise this.)
+    /// Seed of the random numbers. The same seed gives the same image and the same stops on any number of
+    /// threads. (Other renderers may not promise this.)
     #[arg(long, default_value_t = 1)]
     seed: u64,
     /// Threads [default: one a core].
     #[arg(long, value_name = "N", value_parser = values::threads)]
     threads: Option<NonZeroUsize>,
-    /// Longest path in segments: 1 is light seen directly, 2 is direct light [default: what the scene file says, else 65].
+    /// Longest path in segments: 1 is light seen directly, 2 is direct light [default: what the scene file
+    /// says, else 65].
     #[arg(long, value_name = "N")]
     max_depth: Option<u32>,
-    /// Built-in renderer: no multiple importance sampling, but the plain path tracing with next event estimation of the paper.
+    /// Built-in renderer: no multiple importance sampling, but the plain path tracing with next event
+    /// estimation of the paper.
     #[arg(long)]
     no_mis: bool,
-    /// Built-in renderer: how samples are distributed. The model was trained on independent ones [default: independent].
+    /// Built-in renderer: how samples are distributed. The model was trained on independent ones [default:
+    /// independent].
     #[arg(long, value_enum)]
     sampler: Option<SamplerChoice>,
     /// Built-in renderer: reconstruction filter [default: box].
     #[arg(long, value_enum)]
     filter: Option<FilterChoice>,
-    /// Built-in renderer: scale down samples whose largest channel exceeds this. Removes fireflies, and light; report.json counts the
-    /// clamped samples [default: never].
+    /// Built-in renderer: scale down samples whose largest channel exceeds this. Removes fireflies, and
+    /// light; report.json counts the clamped samples [default: never].
     #[arg(long, value_name = "RADIANCE")]
     clamp: Option<f32>,
     #[command(flatten)]

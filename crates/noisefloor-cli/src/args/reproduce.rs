@@ -7,17 +7,19 @@ use std::path::PathBuf;
 
 /// Repeat the paper's own experiment on human corpora, at its scale.
 ///
-/// The paper (Takouachet et al. 2017, §4.3 to §5) trains on pairs: a noisy tile and its reference, 128×128 pixels each, with C = 2 and
-/// γ = 2. Luminances failed there (P ≈ 23 %), while noise masks classified 97.98 % correctly. This command trains on both, with values
-/// as displayed and standardised. It tests each machine on the pairs it learned, on a held-out fifth of the pairs, on the other half of
-/// the scenes, and on each scene left out.
+/// The paper (Takouachet et al. 2017, §4.3 to §5) trains on pairs: a noisy tile and its reference, 128×128
+/// pixels each, with C = 2 and γ = 2. Luminances failed there (P ≈ 23 %), while noise masks classified
+/// 97.98 % correctly. This command trains on both, with values as displayed and standardised. It tests each
+/// machine on the pairs it learned, on a held-out fifth of the pairs, on the other half of the scenes, and
+/// on each scene left out.
 ///
-/// The eight scenes of the human data make 128 zones × 75 levels = 9,600 pairs of 32,768 numbers: 5 GB of memory, some twenty minutes
-/// on two cores. Every result is written as soon as it is known. After Ctrl-C (exit code 130), the same command continues. The summary
-/// is in reproduce.json and reproduce.md.
+/// The eight scenes of the human data make 128 zones × 75 levels = 9,600 pairs of 32,768 numbers: 5 GB of
+/// memory, some twenty minutes on two cores. Every result is written as soon as it is known. After Ctrl-C
+/// (exit code 130), the same command continues. The summary is in reproduce.json and reproduce.md.
 ///
-/// Levels between the given images are synthesised (noise ∝ 1/√n); real images are scored separately. Pictures are compared with
-/// SCENE/reference.exr. If there is none, the most converged image stands in for the paper's ray-traced reference.
+/// Levels between the given images are synthesised (noise ∝ 1/√n); real images are scored separately.
+/// Pictures are compared with SCENE/reference.exr. If there is none, the most converged image stands in for
+/// the paper's ray-traced reference.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   noisefloor reproduce --corpus study/lisic9 study/staircase
@@ -35,8 +37,8 @@ pub struct ReproduceArgs {
     /// Levels a zone, in equal steps up to its most converged image, 10…1000. The paper has 100.
     #[arg(long, value_name = "N", default_value_t = 75, value_parser = values::levels)]
     levels: usize,
-    /// Instead of all this: learn N of the mask pairs as displayed, and write them (rows.npy) with the decision values of N others
-    /// (machine.json), to compare with other programs.
+    /// Instead of all this: learn N of the mask pairs as displayed, and write them (rows.npy) with the
+    /// decision values of N others (machine.json), to compare with other programs.
     #[arg(long, value_name = "N", value_parser = values::count)]
     dump_subset: Option<usize>,
 }

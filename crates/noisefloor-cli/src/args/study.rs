@@ -7,8 +7,8 @@ use std::path::PathBuf;
 
 /// Ask people: collect thresholds in the browser, check what a model says, and train on the answers.
 ///
-/// STUDY.toml names stacks of pictures (folders of NNNNN.png or NNNNN.exr, named by samples per pixel), the protocol, and the texts that
-/// observers read and agree to. docs/study.md explains it.
+/// STUDY.toml names stacks of pictures (folders of NNNNN.png or NNNNN.exr, named by samples per pixel), the
+/// protocol, and the texts that observers read and agree to. docs/study.md explains it.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   noisefloor study stack cornell-box --size 256x256 --out stacks/cornell-box
@@ -59,8 +59,8 @@ struct StackArgs {
 
 /// Serve the pages of a study until Ctrl-C.
 ///
-/// Only this machine can reach the server unless --listen says otherwise. Every answer is on disk before it is acknowledged, so the
-/// server may be killed and restarted at any time.
+/// Only this machine can reach the server unless --listen says otherwise. Every answer is on disk before it
+/// is acknowledged, so the server may be killed and restarted at any time.
 #[derive(Debug, Args)]
 struct ServeArgs {
     /// Study file.
@@ -122,7 +122,8 @@ struct BackupArgs {
     to: PathBuf,
 }
 
-/// Analyse the answers: thresholds of tiles, agreement, groups, Table 2 of the paper, plots, and a corpus for `train`.
+/// Analyse the answers: thresholds of tiles, agreement, groups, Table 2 of the paper, plots, and a corpus
+/// for `train`.
 #[derive(Debug, Args)]
 struct AnalyseArgs {
     /// Study file.
@@ -154,8 +155,8 @@ enum ThresholdChoice {
     Mean,
 }
 
-/// Rehearse a study: simulated observers with made-up thresholds answer it through a real server. Their answers are kept apart from
-/// people's.
+/// Rehearse a study: simulated observers with made-up thresholds answer it through a real server. Their
+/// answers are kept apart from people's.
 #[derive(Debug, Args)]
 struct SimulateArgs {
     /// Study file.

@@ -6,9 +6,10 @@ use std::path::PathBuf;
 
 /// Train a model on human thresholds.
 ///
-/// A corpus is a folder with thresholds.csv (scene, renderer, zone, x, y, width, height, human_spp, first_spp, last_spp) and the
-/// pictures: SCENE/SPP.png, which are running means of one progressive rendering, or zoneNN/batch_FIRST_LAST.exr, which are means of
-/// only those samples. C and γ are chosen, and probabilities calibrated, by leaving out one scene at a time.
+/// A corpus is a folder with thresholds.csv (scene, renderer, zone, x, y, width, height, human_spp,
+/// first_spp, last_spp) and the pictures: SCENE/SPP.png, which are running means of one progressive
+/// rendering, or zoneNN/batch_FIRST_LAST.exr, which are means of only those samples. C and γ are chosen,
+/// and probabilities calibrated, by leaving out one scene at a time.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   noisefloor train --corpus study/lisic9 --corpus study/staircase --out my.nfm
@@ -23,8 +24,9 @@ pub struct TrainArgs {
     /// Also write the table of descriptors; `--table` trains from it without the pictures.
     #[arg(long, value_name = "FILE.csv")]
     save_table: Option<PathBuf>,
-    /// Learn from the disagreements that `explore` keeps in this database, too. Each counts as much as the levels of a zone within a
-    /// factor of two in samples. Prints the scores before and after. (Needs a build with the feature `study`.)
+    /// Learn from the disagreements that `explore` keeps in this database, too. Each counts as much as the
+    /// levels of a zone within a factor of two in samples. Prints the scores before and after. (Needs a
+    /// build with the feature `study`.)
     #[arg(long, value_name = "FILE.sqlite", conflicts_with = "no_scores")]
     disagreements: Option<PathBuf>,
     /// Do not score on left-out scenes; the model's record then has no scores.

@@ -50,7 +50,7 @@ pub fn run(job: &JudgeJob) -> anyhow::Result<()> {
         );
     }
     let rows = judge(&job.oracle, grid, &held)?;
-    report::say_all(job, &rows)?;
+    report::say_all((&job.image.0, job.image.1), &job.oracle, &rows, job.json)?;
     draw(job, &image, grid, &held, &rows)
 }
 

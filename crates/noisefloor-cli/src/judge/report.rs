@@ -1,8 +1,7 @@
 //! Verdicts as a table or as JSON.
 
-use super::JudgeJob;
 use crate::say::{NotSaid, say};
-use noisefloor::Threshold;
+use noisefloor::{Oracle, Threshold};
 use serde::Serialize;
 use std::path::Path;
 
@@ -18,7 +17,8 @@ pub(super) struct Row {
     pub(super) converged: bool,
     /// Samples per pixel at which the tile should be converged; null if that is out of sight.
     pub(super) expected_spp: Option<u64>,
-    /// Whether its texture is unlike any that the model has been tested on; P is then that of half the samples.
+    /// Whether its texture is unlike any that the model has been tested on; P is then that of half the
+    /// samples.
     pub(super) unfamiliar: bool,
 }
 
@@ -33,17 +33,23 @@ struct Report<'a> {
     tiles: &'a [Row],
 }
 
-pub(super) fn say_all(job: &JudgeJob, rows: &[Row]) -> anyhow::Result<()> {
+/// Says what the verdicts are on a picture with that many samples per pixel.
+pub(super) fn say_all(
+    (image, spp): (&Path, f64),
+    oracle: &Oracle,
+    rows: &[Row],
+    json: bool,
+) -> anyhow::Result<()> {
     let report = Report {
-        image: &job.image.0,
-        spp: job.image.1,
-        model: job.oracle.model().digest(),
-        threshold: job.oracle.threshold(),
+        image,
+        spp,
+        model: oracle.model().digest(),
+        threshold: oracle.threshold(),
         converged_tiles: rows.iter().filter(|r| r.converged).count(),
         unfamiliar_tiles: rows.iter().filter(|r| r.unfamiliar).count(),
         tiles: rows,
     };
-    if job.json {
+    if json {
         say!("{}", serde_json::to_string_pretty(&report)?)?
     } else {
         say_table(&report)?

@@ -87,8 +87,8 @@ impl Output {
         Ok(Some(checkpoint))
     }
 
-    /// Takes up the history of the render that is resumed, up to its samples. If it cannot be read, that is no reason to throw
-    /// samples away.
+    /// Takes up the history of the render that is resumed, up to its samples. If it cannot be read, that is
+    /// no reason to throw samples away.
     pub fn take_up(&mut self, samples: u64) {
         let rows =
             csv::Reader::from_path(self.folder.join("timeline.csv")).map(csv::Reader::into_deserialize);
@@ -108,7 +108,8 @@ impl Output {
         self.timeline.push(TimelineRow { seconds, samples, active_tiles, rel_mse });
     }
 
-    /// Writes every file: the checkpoint of a render that can be resumed; with the time it took and what became of the samples when the run is over.
+    /// Writes every file: the checkpoint of a render that can be resumed; with the time it took and what
+    /// became of the samples when the run is over.
     pub fn write<C: StoppingCriterion>(
         &self,
         session: &Session<C>,

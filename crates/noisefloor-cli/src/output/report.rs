@@ -39,8 +39,8 @@ pub(super) struct Report<'a> {
     samples_clamped: Option<u64>,
     /// Samples of tiles that see nothing but the background: no ray was traced for them.
     samples_background: Option<u64>,
-    /// Of the ray-traced reference, if the criterion asked for one: samples of a pixel, and the deviation of its noise mask as it
-    /// estimates it, over all blocks and in the worst.
+    /// Of the ray-traced reference, if the criterion asked for one: samples of a pixel, and the deviation
+    /// of its noise mask as it estimates it, over all blocks and in the worst.
     reference_samples: Option<f64>,
     reference_deviation: Option<f32>,
     reference_worst: Option<f32>,

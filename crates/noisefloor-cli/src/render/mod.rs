@@ -7,7 +7,7 @@ use crate::files::read_reference;
 use crate::output::{ModelFacts, Output};
 use crate::say::{note, one_line};
 use crate::signals::{AFTER_THIS_BATCH, INTERRUPTED, cancel_on_signal};
-use crate::sources::{Opened, Source, SourceJob};
+use crate::sources::{Opened, SourceJob};
 use anyhow::bail;
 use noisefloor::{
     Driver, DriverError, Event, FixedSpp, Oracle, Params, Repeats, Rgb, SourceInfo, StopReason,
@@ -20,7 +20,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 pub use progress::reference_bar;
-use snapshots::Snapshots;
+use snapshots::{Rendering, Snapshots};
 
 /// What is rendered, and until when: checked.
 pub struct RenderJob {
@@ -81,8 +81,6 @@ fn identity(job: &RenderJob, source: &str) -> String {
     format!("{source}, {scene}, seed {seed}, depth {max_depth:?}, {kind:?}")
 }
 
-type Rendering<C> = Driver<Box<dyn Source>, C>;
-
 /// What a render is made of beside its driver.
 struct Rest<'a> {
     job: &'a RenderJob,
@@ -137,7 +135,8 @@ impl Rest<'_> {
     }
 }
 
-/// Renders. A failure to save along the way is reported at once, and rendering goes on: the disk may have room again.
+/// Renders. A failure to save along the way is reported at once, and rendering goes on: the disk may have
+/// room again.
 fn sample<C: StoppingCriterion>(
     driver: &mut Rendering<C>,
     output: &mut Output,
@@ -162,7 +161,8 @@ fn sample<C: StoppingCriterion>(
     outcome
 }
 
-/// Says what the user should know after the run. Ctrl-C in a terminal ends a command that renders, too: that is no failure.
+/// Says what the user should know after the run. Ctrl-C in a terminal ends a command that renders, too:
+/// that is no failure.
 fn finish<C: StoppingCriterion>(
     driver: &Rendering<C>,
     outcome: Result<(), DriverError>,

@@ -1,10 +1,13 @@
 //! How a render is saved and resumed: known where the criterion is, used where it is not.
 
-use super::Rendering;
 use crate::output::Output;
 use crate::say::note;
+use crate::sources::Source;
 use anyhow::Context;
 use noisefloor::{Checkpoint, CheckpointError, Driver, Resumable, Session, StoppingCriterion};
+
+/// A render under way.
+pub(super) type Rendering<C> = Driver<Box<dyn Source>, C>;
 
 type Resume<C> = fn(Rendering<C>, &str, Checkpoint<'_>) -> Result<Rendering<C>, CheckpointError>;
 

@@ -19,7 +19,8 @@ fn small<'a>(out: &'a str, more: &[&'a str]) -> Vec<&'a str> {
     small.iter().chain(more).copied().collect()
 }
 
-/// Criteria watch one run: a fixed number of samples is a point of the uniform curve, and what stops earlier costs less.
+/// Criteria watch one run: a fixed number of samples is a point of the uniform curve, and what stops
+/// earlier costs less.
 #[test]
 fn a_fixed_number_of_samples_lies_on_the_curve_of_uniform_sampling() {
     let folder = tempdir().unwrap();
@@ -71,7 +72,8 @@ fn a_fixed_number_of_samples_lies_on_the_curve_of_uniform_sampling() {
     assert!(!page.contains("src=\"http") && !page.contains("href=") && !page.contains("<script"));
 }
 
-/// The reference is kept and used again; with more samples wanted, it is rendered on to what one go would have given.
+/// The reference is kept and used again; with more samples wanted, it is rendered on to what one go would
+/// have given.
 #[test]
 fn a_reference_is_rendered_on() {
     let folder = tempdir().unwrap();

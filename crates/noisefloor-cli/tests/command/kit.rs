@@ -24,8 +24,8 @@ pub(crate) fn succeed(args: &[&str]) -> String {
     String::from_utf8(output.stdout).unwrap()
 }
 
-/// Runs what must fail with exit code 1 and one line that has all of `words` in it. What clap refuses has exit code 2, and may say
-/// more.
+/// Runs what must fail with exit code 1 and one line that has all of `words` in it. What clap refuses has
+/// exit code 2, and may say more.
 pub(crate) fn fail(args: &[&str], words: &[&str]) {
     let output = run(args);
     let said = stderr(&output);

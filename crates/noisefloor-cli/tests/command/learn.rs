@@ -33,8 +33,8 @@ fn rows(scene: &str, index: usize, at: impl Fn(usize) -> (usize, usize)) -> Stri
     rows
 }
 
-/// Running means of a zone after each level, in display values: a grey checker and white noise. Checkers differ within a scene, so
-/// that no scene has textures that no other one has.
+/// Running means of a zone after each level, in display values: a grey checker and white noise. Checkers
+/// differ within a scene, so that no scene has textures that no other one has.
 fn running_means(scene: usize, zone: usize) -> Vec<Vec<f64>> {
     let mut random = random((scene * 16 + zone + 1) as u64 * 7919);
     let (grey, sigma) = (0.4 + 0.05 * zone as f64, deviation(scene, zone));
@@ -54,7 +54,8 @@ fn running_means(scene: usize, zone: usize) -> Vec<Vec<f64>> {
     means
 }
 
-/// Three synthetic scenes where people stop at one noise level: two in one folder of running means, one in batches.
+/// Three synthetic scenes where people stop at one noise level: two in one folder of running means, one in
+/// batches.
 pub(crate) struct Corpora {
     folder: TempDir,
     pub(crate) paths: [PathBuf; 2],
@@ -109,7 +110,8 @@ impl Corpora {
     }
 }
 
-/// Batches in linear light whose running means are almost the given ones: decoding bends noise of a few per cent little.
+/// Batches in linear light whose running means are almost the given ones: decoding bends noise of a few per
+/// cent little.
 fn write_batches(folder: &Path, means: &[Vec<f64>]) {
     std::fs::create_dir(folder).unwrap();
     let linear = |i: usize, pixel: usize| f64::from(noisefloor::srgb_decode(means[i][pixel] as f32));
@@ -173,7 +175,8 @@ fn train_inspect_evaluate() {
     assert!(said.contains("the model was trained on these scenes"), "{said}");
     let report = json(&scores);
     assert_scores(&report, 12);
-    // Noise alone decides here: whoever measures it is right within the spread that P = 0.9 against 95 % of observers leaves
+    // Noise alone decides here: whoever measures it is right within the spread that P = 0.9 against 95 % of
+    // observers leaves
     assert!(report["error_factor"].as_f64() < Some(1.6), "{report}");
     assert!(report["baselines"]["constant"]["error_factor"].as_f64() < Some(1.3), "{report}");
     let scenes: Vec<_> =

@@ -1,5 +1,5 @@
-//! Tests of the `noisefloor` command as it is run: exit codes, files, and one line an error. One module a subject;
-//! commands that a build leaves out are tested with `--all-features`.
+//! Tests of the `noisefloor` command as it is run: exit codes, files, and one line an error. One module a
+//! subject; commands that a build leaves out are tested with `--all-features`.
 
 /// Lines from one public to another.
 #[cfg(test)]

@@ -48,8 +48,8 @@ fn what_has_none_is_refused() {
     assert!(!out.exists());
 }
 
-/// References that would take minutes, alone and before a render: Ctrl-C ends them at once, nothing half done is left, and the render
-/// writes what it has.
+/// References that would take minutes, alone and before a render: Ctrl-C ends them at once, nothing half
+/// done is left, and the render writes what it has.
 #[test]
 #[cfg(target_os = "linux")]
 fn an_interrupt_gives_it_up() {

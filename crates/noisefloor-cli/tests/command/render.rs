@@ -120,7 +120,8 @@ fn the_error_to_a_reference_falls() {
     assert!((reported - last).abs() < 1e-15 * last.abs().max(1.0), "{reported} {last}");
 }
 
-/// The command says how free of noise the reference is that tiles were held against; without one it says nothing.
+/// The command says how free of noise the reference is that tiles were held against; without one it says
+/// nothing.
 #[test]
 fn the_noise_of_the_reference_is_told() {
     let folder = tempdir().unwrap();

@@ -35,7 +35,8 @@ fn all_protocols_are_run_and_resumed() {
     assert_eq!(said, std::fs::read_to_string(out.join("reproduce.md")).unwrap());
     assert!(said.contains("synthesised") && said.contains("ray-traced"), "{said}");
 
-    // 12 zones of 12 levels; real images are those below the most converged one, of batches those with two halves
+    // 12 zones of 12 levels; real images are those below the most converged one, of batches those with two
+    // halves
     let outcomes = report["outcomes"].as_array().unwrap();
     assert_eq!(outcomes.len(), RESULTS);
     for (outcome, protocol) in outcomes.iter().zip(PROTOCOLS.iter().cycle()) {

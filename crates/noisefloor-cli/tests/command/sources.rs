@@ -31,7 +31,8 @@ fn a_folder_of_pictures_is_played_back() {
     fail(&["render", "--source", "exr"], &["needs a folder"]);
 }
 
-/// A program that writes PFM, here in Python, in whole images: until the oracle is satisfied or the samples are used up.
+/// A program that writes PFM, here in Python, in whole images: until the oracle is satisfied or the samples
+/// are used up.
 #[test]
 fn a_command_renders() {
     let Some(python) = require_python() else { return };
@@ -82,7 +83,8 @@ fn options_of_the_built_in_renderer_are_refused_elsewhere() {
     fail(&["doctor", "--install", "povray"], &["mitsuba"]);
 }
 
-/// Nothing is installed in an empty cache folder: that is said, with what to do, and is no fault; a Python that lacks the renderer is one.
+/// Nothing is installed in an empty cache folder: that is said, with what to do, and is no fault; a Python
+/// that lacks the renderer is one.
 #[test]
 fn the_doctor_says_what_is_missing() {
     let cache = tempdir().unwrap();

@@ -68,7 +68,8 @@ mod tests {
             Costs { calls: 9, alone: vec![0.3, 0.1], seconds: 5.0, samples: 1000.0, first: (9.0, 10.0) };
         let tiles: Vec<Tile> = grid.tiles().collect();
         let each = costs.tile_seconds(&tiles);
-        // 5 ms a pixel sample, 2048 pixels: 10.24 s a sample everywhere, three quarters of it in the first tile.
+        // 5 ms a pixel sample, 2048 pixels: 10.24 s a sample everywhere, three quarters of it in the first
+        // tile.
         assert!((each[0] - 7.68).abs() < 1e-9 && (each[1] - 2.56).abs() < 1e-9, "{each:?}");
         let started = Costs { samples: 0.0, ..costs };
         assert!((started.tile_seconds(&tiles).iter().sum::<f64>() - 0.9 * 2048.0).abs() < 1e-9);

@@ -32,7 +32,8 @@ impl<'a> CurveRow<'a> {
     }
 }
 
-/// Writes what there is of one scene into a folder, which is made: curve.csv, tiles.csv, plots (SVG and PNG), pictures and crops.
+/// Writes what there is of one scene into a folder, which is made: curve.csv, tiles.csv, plots (SVG and
+/// PNG), pictures and crops.
 ///
 /// # Errors
 /// [`LabError`] if a file cannot be written.
@@ -61,7 +62,8 @@ pub fn write_scene(
     Ok(())
 }
 
-/// Writes index.html, runs.csv and runs.json of all scenes. `sections` are those of [`section`](super::section).
+/// Writes index.html, runs.csv and runs.json of all scenes. `sections` are those of
+/// [`section`](super::section).
 ///
 /// # Errors
 /// [`LabError::Write`] if a file cannot be written.

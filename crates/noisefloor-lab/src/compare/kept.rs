@@ -60,12 +60,12 @@ const STEP: u64 = 64;
 /// What a kill may cost.
 const SAVE_EVERY: Duration = Duration::from_secs(30);
 
-/// The converged picture of a job: read if the folder has it, resumed if it has some of it and the source promises to repeat its
-/// samples, and rendered otherwise. It is saved every half a minute.
+/// The converged picture of a job: read if the folder has it, resumed if it has some of it and the source
+/// promises to repeat its samples, and rendered otherwise. It is saved every half a minute.
 ///
 /// # Errors
-/// [`LabError`] if the source fails or has too few samples, or a file cannot be read or written; [`LabError::Cancelled`] once
-/// `cancel` is set and what there is has been saved.
+/// [`LabError`] if the source fails or has too few samples, or a file cannot be read or written;
+/// [`LabError::Cancelled`] once `cancel` is set and what there is has been saved.
 pub fn render_reference(
     source: &mut dyn ProgressiveSource,
     job: &ReferenceJob<'_>,
@@ -131,7 +131,8 @@ impl Kept {
         self.film.spp(0)
     }
 
-    /// Takes up what the folder has, if it is of the same picture, and enough or of samples that can be told from new ones.
+    /// Takes up what the folder has, if it is of the same picture, and enough or of samples that can be
+    /// told from new ones.
     fn resume(&mut self, job: &ReferenceJob<'_>, repeats: bool) -> Result<(), LabError> {
         let text = std::fs::read(job.folder.join(FACTS)).ok();
         let Some(kept) = text.and_then(|text| serde_json::from_slice::<Facts>(&text).ok()) else {

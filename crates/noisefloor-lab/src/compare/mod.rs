@@ -1,7 +1,8 @@
 //! Criteria side by side on one run.
 //!
-//! The scene is rendered once, uniformly. Every criterion sees the same samples and takes those of a tile until it stops it. What it
-//! took, what that cost, and how far its picture is from the converged one is set beside uniform sampling.
+//! The scene is rendered once, uniformly. Every criterion sees the same samples and takes those of a tile
+//! until it stops it. What it took, what that cost, and how far its picture is from the converged one is
+//! set beside uniform sampling.
 
 mod costs;
 mod files;
@@ -41,8 +42,8 @@ pub struct Setting<'a> {
     pub pixels_per_degree: f64,
 }
 
-/// Lets the entrants watch one run of the source, and says what each took and left. Setting `cancel` ends the run after the batch
-/// that is under way.
+/// Lets the entrants watch one run of the source, and says what each took and left. Setting `cancel` ends
+/// the run after the batch that is under way.
 ///
 /// # Errors
 /// [`LabError`] if the source fails or gives no samples, or a criterion fails.

@@ -42,8 +42,8 @@ pub struct CriterionRun {
     pub butteraugli: f64,
     /// Of the worst tile.
     pub butteraugli_worst: f64,
-    /// Samples that uniform sampling takes until its worst tile is as good, by FLIP, over those of this criterion. `None` if it
-    /// does not get there.
+    /// Samples that uniform sampling takes until its worst tile is as good, by FLIP, over those of this
+    /// criterion. `None` if it does not get there.
     pub uniform_over_this: Option<f64>,
     /// The same by butteraugli.
     pub uniform_over_this_butteraugli: Option<f64>,
@@ -188,8 +188,8 @@ fn criterion_run(
     })
 }
 
-/// Samples per pixel at which uniform sampling is as good, between points of its curve along a straight line in logarithms; `None`
-/// outside the curve.
+/// Samples per pixel at which uniform sampling is as good, between points of its curve along a straight
+/// line in logarithms; `None` outside the curve.
 fn uniform_samples(race: &Race, error: fn(&Quality) -> f64, wanted: f64) -> Option<f64> {
     let points: Vec<(f64, f64)> =
         race.curve.iter().map(|(spp, quality)| (*spp as f64, error(quality))).collect();

@@ -1,4 +1,5 @@
-//! One page with all of it, that opens without a server and can be sent by mail: pictures and plots are in it.
+//! One page with all of it, that opens without a server and can be sent by mail: pictures and plots are in
+//! it.
 
 use super::outcome::{Comparison, CriterionRun, families};
 use super::pictures::{Pictures, WORST_FLIP};

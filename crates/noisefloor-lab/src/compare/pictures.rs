@@ -1,5 +1,5 @@
-//! What each criterion leaves, and tiles side by side: the converged picture, what each criterion leaves of it, and the FLIP errors
-//! below.
+//! What each criterion leaves, and tiles side by side: the converged picture, what each criterion leaves of
+//! it, and the FLIP errors below.
 
 use super::quality::Yardstick;
 use super::race::Entrant;

@@ -96,9 +96,10 @@ pub(super) struct Course<'a> {
 impl Course<'_> {
     /// Runs until every entrant has stopped every tile, or at the largest number of samples.
     ///
-    /// Each step is half a batch for every tile: sessions fill one half of their film after the other. What a tile costs is measured in
-    /// the second step, where each is sampled in a call of its own, as shares of what all of them cost together in the calls after the
-    /// first, which may have to start something up.
+    /// Each step is half a batch for every tile: sessions fill one half of their film after the other. What
+    /// a tile costs is measured in the second step, where each is sampled in a call of its own, as shares
+    /// of what all of them cost together in the calls after the first, which may have to start something
+    /// up.
     pub(super) fn run(
         &self,
         source: &mut dyn ProgressiveSource,

@@ -1,58 +1,30 @@
 //! The protocols of Takouachet et al. 2017 (§4.3 to §5), at the scale of the paper, and what comes of them.
 //!
-//! The paper trains on pairs: a noisy tile and its reference, with C = 2 and γ = 2. [`run`] does so with luminances and with noise
-//! masks, with values as displayed and standardised, by four ways to choose the pairs that are asked about.
+//! The paper trains on pairs: a noisy tile and its reference, with C = 2 and γ = 2. [`run`] does so with
+//! luminances and with noise masks, with values as displayed and standardised, by four ways to choose the
+//! pairs that are asked about.
 
+mod job;
 mod outcome;
 mod pairs;
 mod protocol;
 mod report;
 mod subset;
 
+pub use job::Reproduction;
 pub use outcome::{Count, Fingerprint, MachineResult, ProtocolOutcome, QueryCost};
 pub use pairs::PairScaling;
 pub use protocol::PairProtocol;
 pub use report::ReproductionReport;
 pub use subset::{PairSubset, subset, write_subset};
 
-use crate::advance::{Advance, Watch};
+use crate::advance::Watch;
 use crate::error::LabError;
 use crate::files::{make_folder, write_json, write_text};
-use ndarray::Array2;
-use noisefloor::{Descriptor, NoiseMask};
-use noisefloor_learn::{Corpora, describe_pairs};
-use pairs::{Loaded, Pairs};
-use std::path::{Path, PathBuf};
-use std::time::Instant;
-
-/// What is reproduced.
-#[derive(Clone, Debug)]
-pub struct Reproduction {
-    /// Corpus folders.
-    pub corpus: Vec<PathBuf>,
-    /// Edge of the tiles in pixels: each is the centre of its zone.
-    pub edge: usize,
-    /// Levels a zone, with equal steps up to its most converged image.
-    pub levels: usize,
-}
-
-/// The distances between all pairs of one representation, and what they cost.
-struct Geometry {
-    /// ‖x − y‖² of all rows: synthesised pairs, then real ones.
-    squared: Array2<f64>,
-    seconds: f64,
-}
-
-impl Geometry {
-    fn of(pairs: &Pairs, watch: Watch<'_>) -> Self {
-        let begun = Instant::now();
-        let squared = pairs.squared_distances(|done, all| {
-            let what = "blocks of the matrix product";
-            watch(Advance { what, done: done as u64, of: all as u64, detail: "" });
-        });
-        Self { squared, seconds: begun.elapsed().as_secs_f64() }
-    }
-}
+use job::Geometry;
+use noisefloor::Descriptor;
+use pairs::Loaded;
+use std::path::Path;
 
 /// Whether a result was computed now.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -63,12 +35,13 @@ pub enum ResultState {
     Kept,
 }
 
-/// Carries out all protocols. Each result is written whole into the folder, which is made, as soon as it is there, and those that
-/// are there already are not computed again. `on_result` is told of each result, with its file.
+/// Carries out all protocols. Each result is written whole into the folder, which is made, as soon as it is
+/// there, and those that are there already are not computed again. `on_result` is told of each result, with
+/// its file.
 ///
 /// # Errors
-/// [`LabError`] if a corpus cannot be read or has fewer than three groups of scenes, a machine cannot be trained, or a result
-/// cannot be written.
+/// [`LabError`] if a corpus cannot be read or has fewer than three groups of scenes, a machine cannot be
+/// trained, or a result cannot be written.
 pub fn run(
     job: &Reproduction,
     folder: &Path,
@@ -92,26 +65,6 @@ pub fn write_report(folder: &Path, report: &ReproductionReport) -> Result<(), La
     write_json(&folder.join("reproduce.json"), report)?;
     write_text(&folder.join("reproduce.md"), &report.markdown())?;
     Ok(())
-}
-
-impl Reproduction {
-    /// Pairs of noise masks, as the paper ends with.
-    fn masks(&self) -> Descriptor {
-        Descriptor::mask_pair(NoiseMask::default(), self.edge)
-    }
-
-    fn load(&self, descriptor: &Descriptor, watch: Watch<'_>) -> Result<Loaded, LabError> {
-        let table =
-            describe_pairs(Corpora::new(&self.corpus), descriptor, self.edge, self.levels, |done, all| {
-                watch(Advance {
-                    what: "zones cut into pairs",
-                    done: done as u64,
-                    of: all as u64,
-                    detail: "",
-                });
-            })?;
-        Ok(Loaded { digest: table.digest(), table })
-    }
 }
 
 /// All protocols on one representation, as far as they are not there already.

@@ -1,6 +1,6 @@
 //! One protocol, carried out.
 
-use super::Geometry;
+use super::job::Geometry;
 use super::pairs::{PairScaling, Pairs};
 use super::protocol::{PairProtocol, Split};
 use crate::advance::{Advance, Watch};
@@ -123,8 +123,8 @@ pub struct QueryCost {
     pub seconds: f64,
     /// Support vectors and coefficients as `f32`.
     pub model_bytes: usize,
-    /// Largest difference between the decision values of the queries, in `f32` from long rows, and those that the scores go by, in `f64`
-    /// from the matrix product.
+    /// Largest difference between the decision values of the queries, in `f32` from long rows, and those
+    /// that the scores go by, in `f64` from the matrix product.
     pub largest_difference: f64,
 }
 

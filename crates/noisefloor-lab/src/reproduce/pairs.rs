@@ -43,8 +43,8 @@ pub(super) struct Loaded {
     pub(super) table: Table,
 }
 
-/// Pairs as rows of matrices: synthesised ones first, then real ones. A row of numbers is that of the tile, then that of its reference,
-/// which all pairs of a zone share.
+/// Pairs as rows of matrices: synthesised ones first, then real ones. A row of numbers is that of the tile,
+/// then that of its reference, which all pairs of a zone share.
 pub(super) struct Pairs {
     pub(super) tiles: Array2<f32>,
     pub(super) references: Array2<f32>,

@@ -3,7 +3,8 @@
 use super::pairs::Pairs;
 use serde::{Deserialize, Serialize};
 
-/// The paper does not say which pairs its 97.98 % are of: these are the ways to read it, and leaving scenes out.
+/// The paper does not say which pairs its 97.98 % are of: these are the ways to read it, and leaving scenes
+/// out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum PairProtocol {
@@ -11,8 +12,8 @@ pub enum PairProtocol {
     Learned,
     /// A fifth of the pairs, drawn at random, is held out: other levels of the same tiles are learned.
     PairsHeldOut,
-    /// Half of the scenes is learned, the other half asked about; and the other way round (Takouachet et al. 2017, §4.2.1: six and
-    /// six).
+    /// Half of the scenes is learned, the other half asked about; and the other way round (Takouachet et
+    /// al. 2017, §4.2.1: six and six).
     HalfTheScenes,
     /// Each scene is asked about by a machine that has learned all others.
     SceneLeftOut,
@@ -43,7 +44,8 @@ impl PairProtocol {
         }
     }
 
-    /// Only synthesised pairs are learned; real ones are asked about with the synthesised ones of their scene.
+    /// Only synthesised pairs are learned; real ones are asked about with the synthesised ones of their
+    /// scene.
     pub(super) fn splits(self, pairs: &Pairs) -> Vec<Split> {
         let (synthesised, all) = (0..pairs.synthesised, 0..pairs.known.len());
         let by_group = |asked: &[&str]| {

@@ -1,6 +1,6 @@
 //! All results together: reproduce.json, and the tables that are printed and written to reproduce.md.
 
-use super::Reproduction;
+use super::job::Reproduction;
 use super::outcome::{Count, MachineResult, ProtocolOutcome, QueryCost};
 use super::protocol::PairProtocol;
 use serde::Serialize;

@@ -1,6 +1,6 @@
 //! A few of the pairs, with what our machine says of them, for other programs to train on.
 
-use super::Reproduction;
+use super::job::Reproduction;
 use super::pairs::Pairs;
 use crate::advance::Watch;
 use crate::error::LabError;

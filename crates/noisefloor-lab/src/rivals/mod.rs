@@ -1,9 +1,10 @@
 //! When other criteria would have stopped the pictures that people judged.
 //!
-//! The pictures of a corpus are stages of one rendering, too few to follow a criterion that remembers what it saw. So a rendering is
-//! synthesised from them: batches of growing size, each the converged picture with noise of its own laid over it, noise that is the
-//! difference of real pictures, scaled by 1/√samples. There are five or so such differences in a corpus; they take turns, with
-//! changing sign. All zones of a scene are one picture, as people saw them, and each zone is a tile.
+//! The pictures of a corpus are stages of one rendering, too few to follow a criterion that remembers what
+//! it saw. So a rendering is synthesised from them: batches of growing size, each the converged picture
+//! with noise of its own laid over it, noise that is the difference of real pictures, scaled by 1/√samples.
+//! There are five or so such differences in a corpus; they take turns, with changing sign. All zones of a
+//! scene are one picture, as people saw them, and each zone is a tile.
 
 mod noise;
 mod plot;
@@ -21,8 +22,8 @@ use rendering::SynthesisedRendering;
 use serde::Serialize;
 use std::path::PathBuf;
 
-/// Constants that are tried for a rival, evenly spread over its range in logarithms: of one that has to be run with each, and of one whose
-/// verdicts tell what constant would do.
+/// Constants that are tried for a rival, evenly spread over its range in logarithms: of one that has to be
+/// run with each, and of one whose verdicts tell what constant would do.
 const CONSTANTS: (u32, u32) = (16, 400);
 
 /// A rival on human data.
@@ -172,8 +173,8 @@ fn at(stops: &[Vec<f64>], zone: usize, place: f64) -> f64 {
     a * (b / a).powf(share)
 }
 
-/// The place between constants where the mean of ln(stop/human) over the zones that count is nearest to 0: where a rival agrees with
-/// people on average.
+/// The place between constants where the mean of ln(stop/human) over the zones that count is nearest to 0:
+/// where a rival agrees with people on average.
 fn unbiased(stops: &[Vec<f64>], zones: &[JudgedZone], counts: &dyn Fn(usize) -> bool) -> f64 {
     let bias = |place: f64| {
         mean(
@@ -212,7 +213,8 @@ mod tests {
         }
     }
 
-    /// Three constants stop every zone at 100, 200 and 400 samples; people want 200 in one scene and 283 in the other.
+    /// Three constants stop every zone at 100, 200 and 400 samples; people want 200 in one scene and 283 in
+    /// the other.
     #[test]
     fn a_constant_is_fitted_on_the_other_scenes() {
         let rival = &noisefloor_rivals::RIVALS[1];

@@ -49,8 +49,8 @@ impl SynthesisedRendering {
         Ok(Self { zones, edge, columns, stages })
     }
 
-    /// Has a criterion judge every stage. For each zone, the least constant that would have stopped it there, stage by stage: what its
-    /// verdicts tell, or 0 where it stops it, if it is one that stops.
+    /// Has a criterion judge every stage. For each zone, the least constant that would have stopped it
+    /// there, stage by stage: what its verdicts tell, or 0 where it stops it, if it is one that stops.
     pub(super) fn follow(
         &self,
         criterion: Box<dyn StoppingCriterion + Send>,
@@ -92,8 +92,8 @@ impl SynthesisedRendering {
         Ok(needed)
     }
 
-    /// Samples at which a constant stops each zone: between the first stage that it is enough for and the one before, and within what
-    /// observers could choose.
+    /// Samples at which a constant stops each zone: between the first stage that it is enough for and the
+    /// one before, and within what observers could choose.
     pub(super) fn stops(&self, needed: &[Vec<f64>], constant: f64) -> Vec<f64> {
         let totals: Vec<u64> = self
             .stages
