@@ -236,7 +236,7 @@ impl Ptwne {
             *mean = (sum / request.spp as f64).as_vec3().to_array();
         }
         let add = |to: &AtomicU64, count: u64| to.fetch_add(count, Ordering::Relaxed);
-        let samples = out.len() as u64 * u64::from(request.spp);
+        let samples = out.len() as u64 * request.spp;
         add(&self.tally.samples, samples);
         add(&self.tally.background, if empty { samples } else { 0 });
         add(&self.tally.dropped, dropped);

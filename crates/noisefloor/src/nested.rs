@@ -45,7 +45,8 @@ pub(crate) fn shared_samples(
     let slope = weighted(&|b| b.covariance) / variance;
     let scatter: f64 = blocks.iter().map(|b| (b.weight * (b.covariance - slope * b.variance)).powi(2)).sum();
     let error = (scatter.sqrt() / variance).hypot(CURVATURE);
-    if !(independent_slope.abs() > APART * error) {
+    // Also where the error is not a number
+    if error.is_nan() || independent_slope.abs() <= APART * error {
         return None;
     }
     let nested = slope > 0.5 * independent_slope;

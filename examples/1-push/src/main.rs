@@ -30,7 +30,7 @@ fn render(Request { tile, first, spp: samples }: &Request) -> Vec<Rgb> {
     let pixel = |i: usize| {
         let (x, y) = (tile.x + i % tile.width, tile.y + i / tile.width);
         let sample = |n: u64| radiance(x as f32, y as f32, ((y * WIDTH + x) as u64) << 32 | (first + n));
-        let sum: f32 = (0..u64::from(*samples)).map(sample).sum();
+        let sum: f32 = (0..*samples).map(sample).sum();
         [sum / *samples as f32; 3]
     };
     (0..tile.pixels()).map(pixel).collect()

@@ -48,7 +48,7 @@ impl Shadow {
         let pixel = |i: usize| {
             let (x, y) = (tile.x + i % tile.width, tile.y + i / tile.width);
             let mut sum = [0.0; 3];
-            for n in first..first + u64::from(samples) {
+            for n in first..first + samples {
                 let radiance = self.radiance(x, y, n);
                 sum.iter_mut().zip(radiance).for_each(|(sum, value)| *sum += value);
             }

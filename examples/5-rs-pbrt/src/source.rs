@@ -60,7 +60,7 @@ impl Pbrt {
             let at =
                 Point2i { x: (r.tile.x + i % r.tile.width) as i32, y: (r.tile.y + i / r.tile.width) as i32 };
             let mut sum = [0.0; 3];
-            for sample in r.first..r.first + u64::from(r.spp) {
+            for sample in r.first..r.first + r.spp {
                 self.start(&mut sampler, at, sample);
                 let mut ray = Ray::default();
                 let weight = self.camera.generate_ray_differential(&sampler.get_camera_sample(at), &mut ray);

@@ -172,7 +172,7 @@ fn who_promises_less_is_held_to_less_and_no_less() {
     said(by_call(Repeats::Nothing, few), "the noise of 32 samples depends on how requests are cut");
     // Every other batch is the one before, which a renderer does that forgets to change its seed
     let twice = |r: &Request, b: &mut Batch| {
-        let first = r.first / u64::from(2 * r.spp) * u64::from(2 * r.spp);
+        let first = r.first / (2 * r.spp) * (2 * r.spp);
         b.mean = synthetic().sample(&[Request { first, ..*r }]).unwrap().remove(0).mean;
     };
     said(by_call(Repeats::Calls, twice), "correlated");

@@ -48,7 +48,7 @@ fn running_means_give_the_batches_back() {
     for (first, last, mean) in &batches {
         for tile in tiles() {
             let got = stack.sample(&[Request { tile, first: *first, spp: 1 }]).unwrap().remove(0);
-            assert_eq!((got.tile, u64::from(got.spp)), (tile, last - first));
+            assert_eq!((got.tile, got.spp), (tile, last - first));
             let want = tile.rows(SIZE.0).flat_map(|row| mean[row].to_vec());
             for (got, want) in got.mean.iter().flatten().zip(want.flatten()) {
                 // Running means are stored in f32: half an ulp of values up to 1600, times at most 100/70 +

@@ -25,7 +25,7 @@ fn lisic9_is_read() {
             break;
         }
         sum += batch.spp as f64 * f64::from(batch.mean[77][1]);
-        first += u64::from(batch.spp);
+        first += batch.spp;
     }
     assert_eq!(first, 3100);
     let last = noisefloor_image::read_picture(dir.join("Selles/03100.png")).unwrap().into_linear();
