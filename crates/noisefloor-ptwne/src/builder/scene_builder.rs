@@ -223,7 +223,7 @@ impl SceneBuilder {
         let centre = position(centre)?;
         check_range("the radius of a sphere", radius, [1e-9, MAX_COORDINATE], "1e-9…1e6")?;
         let frame = index(self.parts.geometry.frames.len())?;
-        self.parts.geometry.frames.push(axes.map(|axis| glam::Vec3A::from_array(axis)));
+        self.parts.geometry.frames.push(axes.map(glam::Vec3A::from_array));
         self.single(Shape::Sphere { centre, radius }, None, frame, material, emission)
     }
 

@@ -31,8 +31,7 @@ impl ProgressiveSource for Noise {
         let batch = |&Request { tile, first, spp: samples }: &Request| {
             let pixel = |i: usize| {
                 let (x, y) = (tile.x + i % tile.width, tile.y + i / tile.width);
-                [(first..first + samples).map(|n| sample(x, y, n)).sum::<f32>() / samples as f32;
-                    3]
+                [(first..first + samples).map(|n| sample(x, y, n)).sum::<f32>() / samples as f32; 3]
             };
             Batch { tile, spp: samples, mean: (0..tile.pixels()).map(pixel).collect() }
         };
