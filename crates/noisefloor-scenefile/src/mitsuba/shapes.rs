@@ -20,6 +20,10 @@ pub(super) struct Filling {
     meshes: HashMap<usize, Rc<Triangles>>,
 }
 
+/// Centre and axes of a disk, whose front is where their cross product points, and whether the angle of its texture runs
+/// the other way.
+type DiskFrame = ([f32; 3], [[f32; 3]; 2], bool);
+
 impl Filling {
     pub(super) fn new(builder: SceneBuilder) -> Self {
         Self { builder, materials: HashMap::new(), meshes: HashMap::new() }
@@ -254,13 +258,8 @@ impl<'d> Context<'d> {
         Ok(())
     }
 
-    /// Centre and axes of a disk, whose front is where their cross product points, and whether the angle of its
-    /// texture runs the other way.
-    fn disk(
-        &self,
-        element: &'d Element,
-        instance: Option<DMat4>,
-    ) -> Result<([f32; 3], [[f32; 3]; 2], bool), LoadError> {
+    /// Where a disk is, and how it is turned.
+    fn disk(&self, element: &'d Element, instance: Option<DMat4>) -> Result<DiskFrame, LoadError> {
         let to_world = instance.unwrap_or_default() * self.transform(element, "to_world")?;
         let [e1, mut e2] = [to_world.x_axis, to_world.y_axis].map(|axis| axis.truncate());
         let mut front = normal_matrix(to_world) * DVec3::Z;
