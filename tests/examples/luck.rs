@@ -35,7 +35,8 @@ struct Rare {
     found: u64,
 }
 
-/// SplitMix64 (Steele et al. 2014).
+/// SplitMix64 (Steele et al. 2014). Its sequence is that of the published tables (docs/numerics.md), which is
+/// why it is not the testkit's `Noise`.
 fn mix(state: &mut u64) -> u64 {
     *state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
     let mut z = *state;

@@ -6,17 +6,15 @@ use linfa_linalg::svd::SVD;
 use ndarray::Array2;
 use noisefloor::{Rgb, luminance};
 use noisefloor_rivals::{DisplayPixels, Vdp, metrics};
+use noisefloor_testkit::Noise;
 use std::hint::black_box;
 
 const EDGE: usize = 128;
 
 /// A ramp, with noise or without.
 fn tile(noise: f32) -> Vec<Rgb> {
-    let mut state = 1u64;
-    let mut uniform = || {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (state >> 40) as f32 / (1 << 24) as f32 - 0.5
-    };
+    let mut random = Noise::new(1);
+    let mut uniform = || random.uniform() as f32 - 0.5;
     (0..EDGE * EDGE)
         .map(|i| [0.2, 0.3, 0.1].map(|c| c + (i % EDGE) as f32 * 0.004 + noise * uniform()))
         .collect()

@@ -138,8 +138,9 @@ impl StoppingCriterion for CyclesAdaptive {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::{Bell, constant, empty, expose, view};
+    use crate::testing::{constant, empty, expose, view};
     use noisefloor::Rgb;
+    use noisefloor_testkit::Noise;
 
     fn all(film: &Film) -> Vec<Tile> {
         film.grid().tiles().collect()
@@ -206,6 +207,7 @@ mod tests {
         assert!(cycles.judge(&view(&film), &all(&film)).unwrap()[0].converged);
         // And nothing does before its time.
         let early = constant(0.2, 62);
+        cycles.begin(early.grid());
         assert!(!cycles.judge(&view(&early), &all(&early)).unwrap()[0].converged);
     }
 
@@ -216,9 +218,9 @@ mod tests {
         // deviation; three of those.
         let (mean, sigma, n) = (0.1f64, 0.05, 100.0f64);
         let threshold = 2.5 * 3.0 * sigma / n.sqrt() / (EPSILON + (3.0 * mean).sqrt());
-        let (mut film, mut bell) = (empty(), Bell(5));
+        let (mut film, mut noise) = (empty(), Noise::new(5));
         for _ in 0..2 {
-            expose(&mut film, 50, mean, sigma, &mut bell);
+            expose(&mut film, 50, mean, sigma, &mut noise);
         }
         let mut cycles = CyclesAdaptive::new(threshold);
         cycles.judge(&view(&film), &all(&film)).unwrap();

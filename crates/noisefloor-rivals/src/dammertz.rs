@@ -180,15 +180,16 @@ impl StoppingCriterion for Dammertz {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::{Bell, empty, expose, view};
+    use crate::testing::{empty, expose, view};
+    use noisefloor_testkit::Noise;
 
     /// Samples at which each tile is done.
     fn stops(mut criterion: Dammertz, mean: f64, sigma: f64) -> [u64; 4] {
-        let (mut film, mut bell) = (empty(), Bell(11));
+        let (mut film, mut noise) = (empty(), Noise::new(11));
         let mut stops = [0; 4];
         while stops.contains(&0) {
-            expose(&mut film, 10, mean, sigma, &mut bell);
-            expose(&mut film, 10, mean, sigma, &mut bell);
+            expose(&mut film, 10, mean, sigma, &mut noise);
+            expose(&mut film, 10, mean, sigma, &mut noise);
             let open: Vec<Tile> = film.grid().tiles().filter(|t| stops[t.index] == 0).collect();
             for (tile, verdict) in open.iter().zip(criterion.judge(&view(&film), &open).unwrap()) {
                 if verdict.converged {

@@ -27,22 +27,19 @@
 //!
 //! ```
 //! use noisefloor::*;
+//! use noisefloor_testkit::Noise;
 //!
 //! /// A renderer of a grey wall, lit by a flickering lamp.
-//! struct Wall(u64);
+//! struct Wall(Noise);
 //! impl ProgressiveSource for Wall {
 //!     fn info(&self) -> SourceInfo {
 //!         let (name, unit, repeats) = ("wall".into(), Unit::SamplesPerPixel, Repeats::Nothing);
 //!         SourceInfo { name, width: 32, height: 32, unit, aims: true, repeats }
 //!     }
 //!     fn sample(&mut self, requests: &[Request]) -> Result<Vec<Batch>, SourceError> {
-//!         let mut flicker = |samples: u64| {
-//!             self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005);
-//!             self.0 = self.0.wrapping_add(1_442_695_040_888_963_407);
-//!             0.2 + ((self.0 >> 40) as f32 / (1 << 24) as f32 - 0.5) / (samples as f32).sqrt()
-//!         };
+//!         let mut flicker = |spp: u64| 0.2 + (self.0.uniform() - 0.5) / (spp as f64).sqrt();
 //!         let batch = |r: &Request| {
-//!             let mean = (0..r.tile.pixels()).map(|_| [flicker(r.spp); 3]).collect();
+//!             let mean = (0..r.tile.pixels()).map(|_| [flicker(r.spp) as f32; 3]).collect();
 //!             Batch { tile: r.tile, spp: r.spp, mean }
 //!         };
 //!         Ok(requests.iter().map(batch).collect())
@@ -50,7 +47,7 @@
 //! }
 //!
 //! let criterion = noisefloor_rivals::parse("relative-error:0.1")?;
-//! let mut driver = Driver::new(Wall(1), criterion, Params { tile: 32, ..Params::default() })?;
+//! let mut driver = Driver::new(Wall(Noise::new(1)), criterion, Params { tile: 32, ..Params::default() })?;
 //! driver.run(|_, _| ())?;
 //! // 1.96·σ/√n ≤ 10 % of 0.2 for σ² = 1/12 at n = 800 if σ is known; 95 % of pixels take some more.
 //! let stop = driver.session().stops().next().ok_or("one tile")?;

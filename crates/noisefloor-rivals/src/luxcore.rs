@@ -92,8 +92,9 @@ impl StoppingCriterion for LuxCoreHalt {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::{Bell, empty, expose, view};
+    use crate::testing::{empty, expose, view};
     use noisefloor::{Display, Film};
+    use noisefloor_testkit::Noise;
     use statrs::distribution::{ContinuousCDF, Normal};
 
     fn judge(halt: &mut LuxCoreHalt, film: &Film) -> bool {
@@ -115,10 +116,10 @@ mod tests {
         let margin = 4.0 * (share * (1.0 - share) / 4096.0).sqrt();
         assert!(share - margin > 0.01);
         for (limit, halts) in [(share - margin, false), (share + margin, true)] {
-            let (mut film, mut bell, mut halt) = (empty(), Bell(9), LuxCoreHalt::new(limit));
+            let (mut film, mut noise, mut halt) = (empty(), Noise::new(9), LuxCoreHalt::new(limit));
             for expected in [false, halts, halts] {
-                expose(&mut film, 50, mean, sigma, &mut bell);
-                expose(&mut film, 50, mean, sigma, &mut bell);
+                expose(&mut film, 50, mean, sigma, &mut noise);
+                expose(&mut film, 50, mean, sigma, &mut noise);
                 if film.spp(0) < 300 {
                     assert_eq!(judge(&mut halt, &film), expected, "{} {limit}", film.spp(0));
                 }
@@ -128,10 +129,10 @@ mod tests {
 
     #[test]
     fn tests_begin_late_and_keep_their_distance() {
-        let (mut film, mut bell, mut halt) = (empty(), Bell(1), LuxCoreHalt::new(1.0));
+        let (mut film, mut noise, mut halt) = (empty(), Noise::new(1), LuxCoreHalt::new(1.0));
         let mut first = 0;
         while first == 0 {
-            expose(&mut film, 16, 0.5, 0.1, &mut bell);
+            expose(&mut film, 16, 0.5, 0.1, &mut noise);
             if judge(&mut halt, &film) {
                 first = film.spp(0);
             }

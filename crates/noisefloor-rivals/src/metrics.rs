@@ -61,7 +61,7 @@ fn mean_of_channels(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::Bell;
+    use noisefloor_testkit::Noise;
 
     #[test]
     fn relative_mse_of_known_pictures() {
@@ -83,8 +83,9 @@ mod tests {
         assert_eq!(psnr(&[[0.3; 3]], &[[0.3; 3]]).unwrap(), f64::INFINITY);
         // Noise of σ = 0.01 is 40 dB; the mean square of 3·10⁴ values errs by √(2/3·10⁴) = 0.8 %, 0.035 dB:
         // four of those.
-        let mut bell = Bell(3);
-        let noisy: Vec<Rgb> = (0..10_000).map(|_| [0; 3].map(|_| 0.5 + 0.01 * bell.next() as f32)).collect();
+        let mut noise = Noise::new(3);
+        let noisy: Vec<Rgb> =
+            (0..10_000).map(|_| [0; 3].map(|_| 0.5 + 0.01 * noise.normal() as f32)).collect();
         let forty = psnr(&noisy, &vec![[0.5; 3]; 10_000]).unwrap();
         assert!((forty - 40.0).abs() < 0.14, "{forty}");
     }

@@ -177,7 +177,8 @@ impl StoppingCriterion for RelativeError {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::{Bell, empty, expose, view};
+    use crate::testing::{empty, expose, view};
+    use noisefloor_testkit::Noise;
     use statrs::distribution::ChiSquared;
 
     fn all(film: &Film) -> Vec<Tile> {
@@ -201,12 +202,12 @@ mod tests {
 
     #[test]
     fn the_variance_is_unbiased_for_uneven_batches() {
-        let (mut film, mut bell, mut criterion) = (empty(), Bell(21), RelativeError::new(0.05));
+        let (mut film, mut noise, mut criterion) = (empty(), Noise::new(21), RelativeError::new(0.05));
         let (mean, sigma) = (0.5, 0.3);
         let mut batches = 0;
         for sizes in [&[10, 10][..], &[50, 7, 90], &[1], &[300, 20, 20, 20, 20], &[5, 900]] {
             let before = film.half_counts(0);
-            sizes.iter().for_each(|&n| expose(&mut film, n, mean, sigma, &mut bell));
+            sizes.iter().for_each(|&n| expose(&mut film, n, mean, sigma, &mut noise));
             batches += (0..2).filter(|&h| film.half_counts(0)[h] > before[h]).count();
             criterion.judge(&view(&film), &all(&film)).unwrap();
         }
@@ -228,12 +229,12 @@ mod tests {
     #[test]
     fn stops_where_mathematics_says() {
         let (mean, sigma, error) = (0.5, 0.2, 0.05);
-        let (mut film, mut bell) = (empty(), Bell(2));
+        let (mut film, mut noise) = (empty(), Noise::new(2));
         let mut criterion = RelativeError::new(error);
         let mut fired = [0usize; 4];
         for step in 1..=20 {
-            expose(&mut film, 50, mean, sigma, &mut bell);
-            expose(&mut film, 50, mean, sigma, &mut bell);
+            expose(&mut film, 50, mean, sigma, &mut noise);
+            expose(&mut film, 50, mean, sigma, &mut noise);
             for (tile, verdict) in all(&film).iter().zip(criterion.judge(&view(&film), &all(&film)).unwrap())
             {
                 if verdict.converged && fired[tile.index] == 0 {
@@ -258,11 +259,12 @@ mod tests {
         // Three tiles are bright and one is nearly black, with noise that is large beside it and small beside
         // 1 % of the average.
         let mut film = empty();
-        let mut bell = Bell(4);
+        let mut noise = Noise::new(4);
         for _ in 0..20 {
             for tile in 0..4 {
                 let (mean, sigma) = if tile == 0 { (1e-4, 1e-4) } else { (1.0, 0.0) };
-                let batch: Vec<Rgb> = (0..1024).map(|_| [(mean + sigma * bell.next()) as f32; 3]).collect();
+                let batch: Vec<Rgb> =
+                    (0..1024).map(|_| [(mean + sigma * noise.normal()) as f32; 3]).collect();
                 film.add(tile, 50, &batch).unwrap();
             }
         }

@@ -205,7 +205,8 @@ impl StoppingCriterion for Takouachet2007 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::{Bell, constant, empty, expose, view};
+    use crate::testing::{constant, empty, expose, view};
+    use noisefloor_testkit::Noise;
 
     #[test]
     fn stages_thin_out_and_go() {
@@ -226,10 +227,10 @@ mod tests {
 
     /// Verdicts on the first tile at each number of samples.
     fn run(criterion: &mut dyn StoppingCriterion, sigma: f64, counts: &[u64]) -> Vec<bool> {
-        let (mut film, mut bell) = (empty(), Bell(8));
+        let (mut film, mut noise) = (empty(), Noise::new(8));
         let judge = |&samples: &u64| {
             let half = (samples - film.spp(0)) / 2;
-            (0..2).for_each(|_| expose(&mut film, half, 0.2, sigma, &mut bell));
+            (0..2).for_each(|_| expose(&mut film, half, 0.2, sigma, &mut noise));
             let tiles: Vec<Tile> = film.grid().tiles().collect();
             criterion.judge(&view(&film), &tiles).unwrap()[0].converged
         };

@@ -4,6 +4,7 @@ use noisefloor::{
     Batch, Display, Film, ProgressiveSource, Repeats, Request, Rgb, SourceError, SourceInfo, TileGrid, Unit,
     View,
 };
+use noisefloor_testkit::Noise;
 
 static SRGB: Display = Display::SRGB;
 
@@ -12,35 +13,17 @@ pub(crate) fn view(film: &Film) -> View<'_> {
     View { film, display: &SRGB, reference: None }
 }
 
-/// Normal deviates by splitmix64 and Box–Muller.
-pub(crate) struct Bell(pub(crate) u64);
-
-impl Bell {
-    pub(crate) fn uniform(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
-    }
-
-    pub(crate) fn next(&mut self) -> f64 {
-        let (radius, angle) = ((1.0 - self.uniform()).ln(), self.uniform());
-        (-2.0 * radius).sqrt() * (std::f64::consts::TAU * angle).cos()
-    }
-}
-
 /// An empty film of 64×64 pixels in four tiles.
 pub(crate) fn empty() -> Film {
     Film::new(TileGrid::new(64, 64, 32).unwrap())
 }
 
 /// Adds `samples` samples of grey noise to each tile: `mean` with a standard deviation of `sigma` a sample.
-pub(crate) fn expose(film: &mut Film, samples: u64, mean: f64, sigma: f64, bell: &mut Bell) {
+pub(crate) fn expose(film: &mut Film, samples: u64, mean: f64, sigma: f64, noise: &mut Noise) {
     for tile in film.grid().tiles() {
         let deviation = sigma / (samples as f64).sqrt();
         let batch: Vec<Rgb> =
-            (0..tile.pixels()).map(|_| [(mean + deviation * bell.next()) as f32; 3]).collect();
+            (0..tile.pixels()).map(|_| [(mean + deviation * noise.normal()) as f32; 3]).collect();
         film.add(tile.index, samples, &batch).unwrap();
     }
 }
@@ -59,13 +42,13 @@ pub(crate) fn constant(value: f32, samples: u64) -> Film {
 /// A picture with noise that is normally distributed, of a standard deviation of `sigma` times the picture;
 /// deterministic.
 #[derive(Clone)]
-pub(crate) struct Noise {
+pub(crate) struct NoisySource {
     pub(crate) edge: usize,
     pub(crate) picture: fn(usize, usize) -> f64,
     pub(crate) sigma: f64,
 }
 
-impl ProgressiveSource for Noise {
+impl ProgressiveSource for NoisySource {
     fn info(&self) -> SourceInfo {
         SourceInfo {
             name: "noise".into(),
@@ -79,11 +62,11 @@ impl ProgressiveSource for Noise {
 
     fn sample(&mut self, requests: &[Request]) -> Result<Vec<Batch>, SourceError> {
         let sample = |r: &Request| {
-            let mut bell = Bell(r.first << 20 | r.tile.index as u64);
+            let mut noise = Noise::keyed(&[r.first, r.tile.index as u64]);
             let deviation = self.sigma / (r.spp as f64).sqrt();
             let pixels =
                 (0..r.tile.pixels()).map(|i| (r.tile.x + i % r.tile.width, r.tile.y + i / r.tile.width));
-            let value = |(x, y)| [((self.picture)(x, y) * (1.0 + deviation * bell.next())) as f32; 3];
+            let value = |(x, y)| [((self.picture)(x, y) * (1.0 + deviation * noise.normal())) as f32; 3];
             Batch { tile: r.tile, spp: r.spp, mean: pixels.map(value).collect() }
         };
         Ok(requests.iter().map(sample).collect())

@@ -1,6 +1,6 @@
 //! What holds for every rival.
 
-use crate::testing::{Noise, constant, empty, view};
+use crate::testing::{NoisySource, constant, empty, view};
 use crate::{RIVALS, parse};
 use noisefloor::{Driver, Film, Params, Rgb, Stop, StopReason, StoppingCriterion, Tile, Verdict};
 
@@ -19,7 +19,7 @@ const SPECS: [&str; 8] = [
 /// Drives a picture with noise of `sigma` times its brightness a sample.
 fn drive(spec: &str, sigma: f64) -> Vec<Stop> {
     let picture = |x: usize, y: usize| 0.05 + 0.01 * x as f64 + if y > 40 { 0.3 } else { 0.0 };
-    let source = Noise { edge: 64, picture, sigma };
+    let source = NoisySource { edge: 64, picture, sigma };
     let params = Params { tile: 32, max_spp: 20_000, ..Params::default() };
     let mut driver = Driver::new(source, parse(spec).unwrap(), params).unwrap();
     driver.run(|_, _| ()).unwrap();

@@ -3,16 +3,14 @@
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use noisefloor::{Display, Film, NoiseMask, Oracle, Rgb, StoppingCriterion, TileGrid, TilePlanes, View};
+use noisefloor_testkit::Noise;
 use std::hint::black_box;
 use std::time::Instant;
 
 fn film(edge: usize) -> Film {
     let mut film = Film::new(TileGrid::new(edge, edge, 128).expect("a valid grid"));
-    let mut state = 1u64;
-    let mut uniform = || {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (state >> 40) as f32 / (1 << 24) as f32
-    };
+    let mut noise = Noise::new(1);
+    let mut uniform = || noise.uniform() as f32;
     for _ in 0..2 {
         for tile in 0..film.grid().len() {
             let batch: Vec<Rgb> =

@@ -5,6 +5,7 @@
 use linfa::prelude::*;
 use ndarray::{Array1, Array2};
 use noisefloor::{SvmParams, fit_svm};
+use noisefloor_testkit::Noise;
 use std::time::Instant;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -13,11 +14,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let (count, numbers) = (count?, numbers?);
 
     // Two seeded, overlapping clouds, as far from one another as γ = 2 can tell apart
-    let mut state = 7u64;
-    let mut uniform = || {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (state >> 11) as f64 / (1u64 << 53) as f64 - 0.5
-    };
+    let mut noise = Noise::new(7);
+    let mut uniform = || noise.uniform() - 0.5;
     let labels: Vec<bool> = (0..count).map(|i| i % 2 == 0).collect();
     let scale = (numbers as f64).sqrt().recip();
     let rows = Array2::from_shape_fn((count, numbers), |(i, _)| {

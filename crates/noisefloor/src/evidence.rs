@@ -291,26 +291,17 @@ pub fn residual_scale(image: f64, other: f64, samples: Samples) -> Option<f32> {
 mod tests {
     use super::*;
     use crate::tile::TileGrid;
-
-    /// A seeded standard normal by the sum of twelve uniforms: variance exactly 1.
-    fn noise(state: &mut u64) -> f32 {
-        let mut sum = -6.0;
-        for _ in 0..12 {
-            *state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            sum += (*state >> 40) as f32 / (1u64 << 24) as f32;
-        }
-        sum
-    }
+    use noisefloor_testkit::Noise;
 
     #[test]
     fn residual_has_the_noise_of_the_mean_also_when_halves_are_uneven() {
         let grid = TileGrid::new(64, 64, 64).unwrap();
         for batches in [&[50u64, 50][..], &[10, 90], &[400, 100]] {
-            let (mut film, mut state) = (Film::new(grid), 7u64);
+            let (mut film, mut noise) = (Film::new(grid), Noise::new(7));
             for &n in batches {
                 // Mean of n samples of standard deviation 0.1 around 0.5.
                 let batch: Vec<_> =
-                    (0..4096).map(|_| [0.5 + 0.1 * noise(&mut state) / (n as f32).sqrt(); 3]).collect();
+                    (0..4096).map(|_| [0.5 + 0.1 * noise.normal() as f32 / (n as f32).sqrt(); 3]).collect();
                 film.add(0, n, &batch).unwrap();
             }
             let planes = TilePlanes::from_halves(&film, &Display::SRGB, grid.tile(0));
@@ -336,9 +327,9 @@ mod tests {
     #[test]
     fn a_pair_of_pictures_is_evidence_as_halves_are() {
         let grid = TileGrid::new(32, 32, 32).unwrap();
-        let mut state = 3u64;
+        let mut noise = Noise::new(3);
         let mut half = |n: f32| -> Vec<Rgb> {
-            (0..1024).map(|_| [0.5 + 0.1 * noise(&mut state) / n.sqrt(); 3]).collect()
+            (0..1024).map(|_| [0.5 + 0.1 * noise.normal() as f32 / n.sqrt(); 3]).collect()
         };
         let (a, b) = (half(300.0), half(100.0));
         let mut film = Film::new(grid);

@@ -98,17 +98,17 @@ fn masked((width, height): (usize, usize), picture: Rendering<'_>, display: &Dis
 mod tests {
     use super::*;
     use crate::rgb::Rgb;
+    use noisefloor_testkit::Noise;
 
     const EDGE: usize = 128;
 
     /// Sums of `spp` samples of a picture with texture in one half, and noise of standard deviation 0.5 a sample.
     fn sums(seed: u64, spp: u32) -> Vec<f32> {
-        let mut random = fastrand::Rng::with_seed(seed);
+        let mut noise = Noise::new(seed);
         let mut pixel = |i: usize| {
             let (x, y) = (i % EDGE, i / EDGE);
             let texture = if x < EDGE / 2 && (x / 3 + y / 5).is_multiple_of(2) { 0.2 } else { 0.0 };
-            let uniform: f32 = (0..12).map(|_| random.f32()).sum::<f32>() - 6.0;
-            spp as f32 * (0.4 + texture) + 0.5 * (spp as f32).sqrt() * uniform
+            spp as f32 * (0.4 + texture) + 0.5 * (spp as f32).sqrt() * noise.normal() as f32
         };
         (0..EDGE * EDGE).map(&mut pixel).collect()
     }

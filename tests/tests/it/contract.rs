@@ -1,10 +1,10 @@
-use crate::kit::{Altered, Synthetic, hash};
+use crate::kit::{Altered, Synthetic};
 use noisefloor::{
     Batch, ProgressiveSource, Reference, Repeats, Request, SourceError, SourceInfo, Tile, Unit,
 };
 use noisefloor_image::{RenderLayers, StackSource, write_exr};
 use noisefloor_ptwne::{Ptwne, RenderOptions, scenes};
-use noisefloor_testkit::{check_reference_is_free_of_noise, check_source};
+use noisefloor_testkit::{Noise, check_reference_is_free_of_noise, check_source};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 const SIZE: (usize, usize) = (48, 40);
@@ -39,10 +39,10 @@ fn noise_in_a_reference_is_noticed() {
     let said = |deviation: f64| {
         outcome(|| {
             check_reference_is_free_of_noise(|seed| {
-                let uniform = move |i: u64| hash(seed << 32 | i) as f64 / 2f64.powi(64);
-                let value = move |i: u64| 0.5 + 0.5 * deviation * 12f64.sqrt() * (uniform(i) - 0.5);
                 let image = move || {
-                    let pixels = (0..(SIZE.0 * SIZE.1) as u64).map(|i| [value(i) as f32; 3]).collect();
+                    let mut noise = Noise::new(seed);
+                    let mut value = || 0.5 + 0.5 * deviation * 12f64.sqrt() * (noise.uniform() - 0.5);
+                    let pixels = (0..SIZE.0 * SIZE.1).map(|_| [value() as f32; 3]).collect();
                     Reference { width: SIZE.0, height: SIZE.1, pixels }
                 };
                 Altered::reference(synthetic(), move || Some(image()))
@@ -186,10 +186,9 @@ fn noise_that_pixels_share_is_no_fault_of_a_markov_chain() {
             let source = Synthetic { repeats: Repeats::Calls, unit, ..synthetic() };
             Altered::batches(source, |requests, batches| {
                 for (r, batch) in requests.iter().zip(batches) {
-                    let key = hash(r.first) ^ hash(r.tile.index as u64 + 77) ^ hash(r.spp);
-                    let noise =
-                        |row: usize| (hash(key ^ row as u64) >> 11) as f64 / (1u64 << 53) as f64 - 0.5;
-                    let noise = |i: usize| noise(i / r.tile.width / 8) / (r.spp as f64).sqrt();
+                    let mut noise = Noise::keyed(&[r.first, r.tile.index as u64, r.spp]);
+                    let rows: Vec<f64> = (0..r.tile.height).map(|_| noise.uniform() - 0.5).collect();
+                    let noise = |i: usize| rows[i / r.tile.width / 8] / (r.spp as f64).sqrt();
                     batch.mean = (0..r.tile.pixels()).map(|i| [0.5 + noise(i) as f32; 3]).collect();
                 }
             })

@@ -1,6 +1,6 @@
 use noisefloor::{Batch, ProgressiveSource, Reference, Repeats, Request, Rgb, SourceError, SourceInfo, Unit};
 use noisefloor_sidecar::{Renderer, find, probe};
-use noisefloor_testkit::{Requirement, require};
+use noisefloor_testkit::{Noise, Requirement, require};
 use std::collections::BTreeMap;
 use std::sync::Mutex;
 
@@ -46,19 +46,23 @@ impl Synthetic {
 
     fn mean(&self, x: usize, y: usize, first: u64, samples: u64) -> Rgb {
         let (radiance, noise) = ((self.radiance)(x, y) * self.brightness, f64::from((self.noise)(x, y)));
-        let key = hash(self.seed ^ hash((y * self.size.0 + x) as u64));
-        let bright = (first..first + samples).filter(|i| hash(key ^ i) >> 63 == 1).count();
-        let factor = 1.0 + noise * (2.0 * bright as f64 / samples as f64 - 1.0);
+        let bright = self.bright((y * self.size.0 + x) as u64, first, first + samples);
+        let factor = 1.0 + noise * (2.0 * f64::from(bright) / samples as f64 - 1.0);
         [1.0, 0.8, 0.5].map(|c| c * radiance * factor as f32)
     }
-}
 
-/// SplitMix64's finaliser.
-pub(crate) fn hash(mut x: u64) -> u64 {
-    x = x.wrapping_add(0x9e37_79b9_7f4a_7c15);
-    x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    x ^ (x >> 31)
+    /// How many samples of a pixel are bright: each has a bit of a random word that 64 of them share.
+    fn bright(&self, pixel: u64, first: u64, end: u64) -> u32 {
+        let mut bright = 0;
+        let mut sample = first;
+        while sample < end {
+            let word = Noise::keyed(&[self.seed, pixel, sample / 64]).bits() >> (sample % 64);
+            let taken = (64 - sample % 64).min(end - sample);
+            bright += (word & (u64::MAX >> (64 - taken))).count_ones();
+            sample += taken;
+        }
+        bright
+    }
 }
 
 impl ProgressiveSource for Synthetic {

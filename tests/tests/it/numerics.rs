@@ -15,6 +15,7 @@ fn run(source: impl ProgressiveSource, params: Params) -> Run {
     driver.run(|_, _| ()).unwrap();
     let film = driver.session().film();
     let stops: Vec<Stop> = driver.session().stops().collect();
+    assert_eq!(stops.len(), film.grid().len());
     for stop in &stops {
         assert!(stop.probability.is_some_and(|p| (0.0..=1.0).contains(&p)), "{stop:?}");
     }

@@ -2,6 +2,7 @@ use noisefloor::{Descriptor, NoiseMask};
 use noisefloor_image::{RenderLayers, write_exr, write_png};
 use noisefloor_learn::Origin;
 use noisefloor_learn::{Corpora, TableError, describe_pairs};
+use noisefloor_testkit::Noise;
 use std::path::Path;
 
 const EDGE: usize = 24;
@@ -9,22 +10,14 @@ const SPP: [u32; 4] = [10, 20, 100, 400];
 
 /// One zone of 24×24 pixels: grey, with white noise that falls as that of nested running means.
 fn corpus(dir: &Path) {
-    let mut state = 11u64;
-    let mut random = || {
-        let mut sum = -6.0;
-        for _ in 0..12 {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            sum += (state >> 40) as f64 / f64::from(1u32 << 24);
-        }
-        sum
-    };
+    let mut noise = Noise::new(11);
     std::fs::create_dir(dir.join("Wall")).unwrap();
     let (mut sums, mut before) = ([0.0; EDGE * EDGE], 0);
     for spp in SPP {
         let rgb: Vec<u8> = sums
             .iter_mut()
             .flat_map(|sum| {
-                *sum += f64::from(spp - before).sqrt() * 150.0 * random();
+                *sum += f64::from(spp - before).sqrt() * 150.0 * noise.normal();
                 [(128.0 + *sum / f64::from(spp)).round().clamp(0.0, 255.0) as u8; 3]
             })
             .collect();

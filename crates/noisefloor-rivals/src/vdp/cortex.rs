@@ -179,14 +179,14 @@ impl Cortex {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::Bell;
+    use noisefloor_testkit::Noise;
 
     #[test]
     fn bands_add_up_to_the_picture() {
         for (width, height) in [(50, 40), (31, 64)] {
             let cortex = Cortex::new(&VdpViewing::default(), width, height);
-            let mut bell = Bell(7);
-            let plane: Vec<f32> = (0..width * height).map(|_| bell.next() as f32).collect();
+            let mut noise = Noise::new(7);
+            let plane: Vec<f32> = (0..width * height).map(|_| noise.normal() as f32).collect();
             let spectrum = cortex.spectrum(&plane);
             let whole = cortex.fourier.inverse(spectrum.clone());
             let mut sum = vec![0.0; whole.len()];

@@ -1,6 +1,6 @@
 use super::*;
-use crate::testing::Bell;
 use noisefloor::{Rgb, srgb_encode};
+use noisefloor_testkit::Noise;
 
 const EDGE: usize = 240;
 
@@ -118,8 +118,8 @@ fn a_mask_of_another_band_does_not() {
 }
 
 fn noisy(width: usize, height: usize, sigma: f64, seed: u64) -> Vec<Rgb> {
-    let mut bell = Bell(seed);
-    (0..width * height).map(|_| [(0.5 + sigma * bell.next()) as f32; 3]).collect()
+    let mut noise = Noise::new(seed);
+    (0..width * height).map(|_| [(0.5 + sigma * noise.normal()) as f32; 3]).collect()
 }
 
 #[test]

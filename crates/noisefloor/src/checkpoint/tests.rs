@@ -23,10 +23,8 @@ impl ProgressiveSource for Noise {
 
     fn sample(&mut self, requests: &[Request]) -> Result<Vec<Batch>, SourceError> {
         let sample = |x: usize, y: usize, n: u64| {
-            let seed = (y * 96 + x) as u64 ^ n << 20;
-            let hash = seed.wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
-            let hash = (hash ^ hash >> 29).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-            0.2 + 0.01 * x as f32 * ((hash >> 40) as f32 / (1 << 24) as f32 - 0.5)
+            let noise = noisefloor_testkit::Noise::keyed(&[(y * 96 + x) as u64, n]).uniform();
+            0.2 + 0.01 * x as f32 * (noise as f32 - 0.5)
         };
         let batch = |&Request { tile, first, spp: samples }: &Request| {
             let pixel = |i: usize| {

@@ -6,6 +6,7 @@ use crate::film::Film;
 use crate::model::tests::{changed, small};
 use crate::rgb::Rgb;
 use crate::svm::{Scaler, Svm};
+use noisefloor_testkit::Noise;
 
 /// A film of 64×64 pixels with `samples` samples of standard deviation `sigma` around grey.
 fn film(samples: u64, sigma: f32) -> Film {
@@ -15,18 +16,12 @@ fn film(samples: u64, sigma: f32) -> Film {
 /// The same around a picture that is given by the number of the pixel.
 fn film_of(picture: fn(usize) -> f32, samples: u64, sigma: f32) -> Film {
     let mut film = Film::new(TileGrid::new(64, 64, 64).unwrap());
-    let mut state = 5u64;
-    let mut bell = || {
-        let mut uniform = || {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            (state >> 40) as f32 / (1 << 24) as f32
-        };
-        (uniform() + uniform() + uniform() + uniform() - 2.0) * 3f32.sqrt()
-    };
+    let mut noise = Noise::new(5);
     for _ in 0..2 {
         let half = samples / 2;
-        let batch: Vec<Rgb> =
-            (0..64 * 64).map(|i| [picture(i) + sigma * bell() / (half as f32).sqrt(); 3]).collect();
+        let batch: Vec<Rgb> = (0..64 * 64)
+            .map(|i| [picture(i) + sigma * noise.normal() as f32 / (half as f32).sqrt(); 3])
+            .collect();
         film.add(0, half, &batch).unwrap();
     }
     film

@@ -67,13 +67,12 @@ pub fn squared_distances<T: Copy + Into<f64> + Send + Sync>(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use noisefloor_testkit::Noise;
 
-    /// Seeded uniform numbers in [-1, 1].
-    fn uniform(mut state: u64) -> impl FnMut() -> f32 {
-        move || {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            (state >> 40) as f32 / (1u64 << 23) as f32 - 1.0
-        }
+    /// Seeded uniform numbers in [−1, 1].
+    fn uniform(seed: u64) -> impl FnMut() -> f32 {
+        let mut noise = Noise::new(seed);
+        move || (2.0 * noise.uniform() - 1.0) as f32
     }
 
     fn naive(rows: &Array2<f32>) -> Array2<f64> {

@@ -81,17 +81,14 @@ pub fn fit_platt(examples: &[(f32, f64)]) -> Result<Platt, SvmTrainError> {
 mod tests {
     use super::*;
     use ndarray::{Array2, Axis};
+    use noisefloor_testkit::Noise;
 
     /// Two seeded, overlapping clouds.
     fn clouds(examples: usize, dimensions: usize) -> (Array2<f64>, Vec<bool>) {
-        let mut state = 42u64;
-        let mut uniform = || {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            (state >> 11) as f64 / (1u64 << 53) as f64
-        };
+        let mut noise = Noise::new(42);
         let labels: Vec<bool> = (0..examples).map(|i| i % 2 == 0).collect();
         let rows = Array2::from_shape_fn((examples, dimensions), |(i, _)| {
-            3.0 * uniform() - 1.5 + if labels[i] { 0.5 } else { -0.5 }
+            3.0 * noise.uniform() - 1.5 + if labels[i] { 0.5 } else { -0.5 }
         });
         (rows, labels)
     }
