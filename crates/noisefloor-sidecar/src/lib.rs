@@ -51,6 +51,7 @@ mod call;
 mod command;
 mod error;
 mod frame;
+mod fuzzing;
 mod group;
 mod launch;
 mod leftovers;
@@ -66,6 +67,8 @@ mod template;
 
 pub use command::{CommandOptions, CommandSource};
 pub use error::{CommandError, SetupError, SidecarCause, SidecarError};
+#[doc(hidden)]
+pub use fuzzing::read_any_reply;
 pub use leftovers::end_all;
 pub use light::ImpossibleLight;
 pub use renderer::{DEFAULT_TIMEOUT, HostOptions, Job, Renderer};

@@ -12,6 +12,9 @@ mod bad_input;
 #[cfg(test)]
 #[cfg(feature = "lab")]
 mod compare;
+/// Kills, full disks, folders that nobody can write.
+#[cfg(test)]
+mod crash;
 /// Every subcommand explains itself.
 #[cfg(test)]
 mod help;

@@ -227,15 +227,26 @@ fn answers_follow_the_name_of_their_scene() {
     assert_eq!(scenes(), ["hall", "hall"]);
 }
 
-/// Killed (SIGKILL) right after the acknowledgement: the disagreement is there.
 #[test]
 fn a_killed_explorer_has_lost_nothing() {
+    kill_explorers(3);
+}
+
+/// `cargo test -p noisefloor-study --test it -- --ignored --nocapture a_hundred`
+#[test]
+#[ignore = "takes minutes"]
+fn a_hundred_killed_explorers_have_lost_nothing() {
+    kill_explorers(100);
+}
+
+/// Killed (SIGKILL) right after the acknowledgement, a number of times: the disagreement is there.
+fn kill_explorers(kills: usize) {
     let dir = tempfile::tempdir().unwrap();
     pictures(dir.path());
     let mut kept = 0;
-    for round in 0..3u64 {
+    for round in 0..kills {
         let (mut child, server) = Picturing::process(dir.path());
-        let picture = server.get("/api/state")["pictures"][round as usize].clone();
+        let picture = server.get("/api/state")["pictures"][round % 3].clone();
         for tile in 0..2 {
             let said = json!({ "question": question(&picture), "tile": tile, "sees_noise": tile == 0 });
             let (status, answer) = server.post("/api/disagreements", &said);

@@ -63,14 +63,25 @@ pub(crate) fn start(what: &str, of: &std::path::Path) -> (std::process::Child, S
     (child, url.unwrap())
 }
 
-/// Killed (SIGKILL) while eight observers click, five times over: every event that was acknowledged is
-/// there afterwards, each once and in order, and at most one more a session, which was on its way.
 #[test]
 fn a_killed_server_has_lost_nothing() {
+    kill_servers(5);
+}
+
+/// `cargo test -p noisefloor-study --test it -- --ignored --nocapture a_hundred`
+#[test]
+#[ignore = "takes minutes"]
+fn a_hundred_killed_servers_have_lost_nothing() {
+    kill_servers(100);
+}
+
+/// Killed (SIGKILL) while eight observers click, a number of times: every event that was acknowledged is
+/// there afterwards, each once and in order, and at most one more a session, which was on its way.
+fn kill_servers(kills: u64) {
     let folder = Folder::new("acquisition", &["wall", "door"], &levels(40, 1.15), "");
     let study = folder.study();
     let mut acknowledged_in_all = 0;
-    for round in 0..5 {
+    for round in 0..kills {
         let (mut child, url) = process(&folder);
         let before: usize =
             store::read_all(&study.database, &study.design()).unwrap().iter().map(|r| r.events.len()).sum();
@@ -87,7 +98,7 @@ fn a_killed_server_has_lost_nothing() {
                     drop(drive(url, "", &mut observer, counted));
                 });
             }
-            std::thread::sleep(Duration::from_millis(150 + 40 * round));
+            std::thread::sleep(Duration::from_millis(150 + 40 * (round % 5)));
             child.kill().unwrap();
             child.wait().unwrap();
         });
@@ -104,5 +115,5 @@ fn a_killed_server_has_lost_nothing() {
         acknowledged_in_all += acknowledged;
     }
     assert!(acknowledged_in_all > 100, "killed before anything happened: {acknowledged_in_all}");
-    println!("{acknowledged_in_all} events acknowledged in five rounds, none lost");
+    println!("{acknowledged_in_all} events acknowledged in {kills} rounds, none lost");
 }

@@ -1,0 +1,127 @@
+use crate::kit::{FILES, command, json, run, stderr, succeed, text};
+use noisefloor::Checkpoint;
+use noisefloor_image::{read_exr, read_picture};
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::time::Duration;
+use tempfile::tempdir;
+
+/// A render of about a second, saved ten times a second.
+fn arguments<'a>(out: &'a str, more: &[&'a str]) -> Vec<&'a str> {
+    let args = ["render", "--size", "64x64", "--tile", "32", "--criterion", "spp:2500", "--threads", "1"];
+    [&args[..], &["--quiet", "--autosave", "0.1", "--out", out], more].concat()
+}
+
+/// Every file that is there is complete, whenever the power went.
+fn assert_each_whole(out: &Path) {
+    for name in FILES {
+        let path = out.join(name);
+        if !path.exists() {
+            continue;
+        }
+        match path.extension().and_then(|e| e.to_str()) {
+            Some("json") => drop(json(&path)),
+            Some("csv") => assert!(std::fs::read_to_string(&path).unwrap().ends_with('\n'), "{name}"),
+            _ => drop(read_picture(&path).unwrap()),
+        }
+    }
+    if let Ok(file) = std::fs::File::open(out.join("checkpoint.nfc")) {
+        Checkpoint::read(file).unwrap();
+    }
+}
+
+fn temporary_files(out: &Path) -> usize {
+    let names = std::fs::read_dir(out).unwrap().map(|entry| entry.unwrap().file_name());
+    names.filter(|name| name.to_string_lossy().starts_with(".noisefloor-")).count()
+}
+
+/// Kills renders (SIGKILL) at random moments and resumes them, until that has happened so many times. No file
+/// is ever half written, at most the temporary file of the last kill is left over, and what comes out in the
+/// end is what an undisturbed render gives, to the bit.
+fn kill_and_resume(kills: usize) {
+    let whole = tempdir().unwrap();
+    succeed(&arguments(text(whole.path()), &[]));
+    let pixels = |out: &Path| read_exr(out.join("image.exr")).unwrap().pixels;
+    let right = pixels(whole.path());
+    let mut random = fastrand::Rng::with_seed(kills as u64);
+    let (mut killed, mut finished, mut most_left) = (0, 0, 0);
+    while killed < kills || finished == 0 {
+        let folder = tempdir().unwrap();
+        let out = folder.path();
+        loop {
+            let resume: &[&str] = if out.join("checkpoint.nfc").exists() { &["--resume"] } else { &[] };
+            let mut child = command(&arguments(text(out), resume)).stderr(Stdio::null()).spawn().unwrap();
+            let ended = if killed < kills {
+                std::thread::sleep(Duration::from_millis(random.u64(0..700)));
+                child.try_wait().unwrap()
+            } else {
+                Some(child.wait().unwrap())
+            };
+            if let Some(status) = ended {
+                assert!(status.success(), "{status}");
+                finished += 1;
+                assert!(pixels(out) == right, "after {killed} kills the picture is another one");
+                assert_eq!(temporary_files(out), 0);
+                break;
+            }
+            child.kill().unwrap();
+            child.wait().unwrap();
+            killed += 1;
+            most_left = most_left.max(temporary_files(out));
+            assert_each_whole(out);
+        }
+    }
+    assert!(most_left <= 1, "temporary files pile up: {most_left}");
+    println!(
+        "{killed} kills, {finished} renders finished, at most {most_left} temporary file left by a kill"
+    );
+}
+
+#[test]
+fn killed_renders_lose_nothing() {
+    kill_and_resume(5);
+}
+
+/// `cargo test -p noisefloor-cli --test command -- --ignored --nocapture a_hundred`
+#[test]
+#[ignore = "takes minutes"]
+fn a_hundred_killed_renders_lose_nothing() {
+    kill_and_resume(100);
+}
+
+/// Under a limit on the length of files, which is what a full disk is like to a program: writes fail
+/// half-way.
+#[cfg(unix)]
+#[test]
+fn a_disk_that_is_full_is_an_error_and_spoils_nothing() {
+    let folder = tempdir().unwrap();
+    let out = folder.path();
+    succeed(&arguments(text(out), &[]));
+    let before = std::fs::read(out.join("image.exr")).unwrap();
+    let program = env!("CARGO_BIN_EXE_noisefloor");
+    // Blocks of 512 bytes; without the signal, writing beyond the limit is an error
+    let limited = "trap '' XFSZ; ulimit -f 16; exec \"$@\"";
+    // Not a finished render any more, which would not be overwritten
+    std::fs::remove_file(out.join("report.json")).unwrap();
+    let args = arguments(text(out), &["--seed", "2"]);
+    let output = Command::new("sh").args(["-c", limited, "sh", program]).args(args).output().unwrap();
+    let said = stderr(&output);
+    assert_eq!(output.status.code(), Some(1), "{said}");
+    assert!(said.contains("not written") && said.contains("check the space on the disk"), "{said}");
+    assert!(!said.contains("panicked"), "{said}");
+    assert_eq!(std::fs::read(out.join("image.exr")).unwrap(), before);
+    assert_eq!(temporary_files(out), 0);
+    assert_each_whole(out);
+}
+
+/// Refused before anything is rendered. In /proc not even the superuser makes files.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_folder_that_cannot_be_written_is_refused_at_once() {
+    for out in ["/proc/noisefloor", "/proc", "/dev/null/render"] {
+        let output = run(&arguments(out, &["--criterion", "spp:1000000000"]));
+        assert_eq!(output.status.code(), Some(1), "{out}");
+        let said = stderr(&output);
+        assert!(said.starts_with("error: ") && said.lines().count() == 1, "{out}: {said}");
+    }
+}

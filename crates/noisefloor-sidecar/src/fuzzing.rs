@@ -1,0 +1,27 @@
+//! An entry for fuzzers.
+
+use crate::call::{Reply, batches, describe};
+use crate::frame;
+use crate::message::{Hello, Referenced, Sampled, Status};
+use noisefloor::{Request, Tile};
+
+/// Reads bytes as a renderer's reply to each request there is. Not for other use.
+#[doc(hidden)]
+pub fn read_any_reply(mut bytes: &[u8]) {
+    const PAYLOAD: usize = 12 * 64;
+    let Ok(reply) = frame::read(&mut bytes, PAYLOAD) else { return };
+    let _ = serde_json::from_slice::<Status>(&reply.header);
+    if let Ok(hello) = serde_json::from_slice::<Hello>(&reply.header)
+        && let Ok((info, _)) = describe(hello)
+    {
+        assert!(!info.name.chars().any(char::is_control));
+    }
+    let _ = serde_json::from_slice::<Referenced>(&reply.header);
+    if let Ok(header) = serde_json::from_slice::<Sampled>(&reply.header) {
+        let tile = |index| Tile { index, x: 4 * index, y: 0, width: 4, height: 4 };
+        let requests = [0, 1].map(|index| Request { tile: tile(index), first: 0, spp: 8 });
+        if let Ok(batches) = batches(&requests, Reply { header, payload: reply.payload }) {
+            assert!(batches.iter().all(|b| b.spp <= 8 && [0, b.tile.pixels()].contains(&b.mean.len())));
+        }
+    }
+}

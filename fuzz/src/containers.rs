@@ -1,0 +1,87 @@
+//! Models and checkpoints: the bytes are the payload; magic, version, length and checksum are right.
+
+use noisefloor::{Checkpoint, FixedSpp, Model, Params, Session};
+
+/// Magic and version.
+const HEAD: usize = 12;
+/// Magic, version, length and checksum.
+const HEADER: usize = HEAD + 8 + 32;
+/// What the checkpoints belong to.
+const JOB: &str = "a job";
+
+fn wrap(head: &[u8], payload: &[u8]) -> Vec<u8> {
+    let length = (payload.len() as u64).to_le_bytes();
+    [&head[..HEAD], &length, blake3::hash(payload).as_bytes(), payload].concat()
+}
+
+pub(crate) fn model(payload: &[u8]) {
+    thread_local!(static HEAD: Vec<u8> = small_model());
+    let Ok(model) = HEAD.with(|head| Model::read(wrap(head, payload).as_slice())) else { return };
+    // What can be read can be used, and written so that it reads back
+    let mut again = Vec::new();
+    model.write(&mut again).expect("a model that was read can be written");
+    assert_eq!(Model::read(again.as_slice()).expect("and read again").digest(), model.digest());
+}
+
+pub(crate) fn model_seeds() -> Vec<Vec<u8>> {
+    vec![small_model().split_off(HEADER)]
+}
+
+/// The bundled model with few support vectors, so that mutants differ in what matters.
+fn small_model() -> Vec<u8> {
+    let mut parts = Model::bundled().into_parts();
+    let svm = &mut parts.classifier.svm;
+    let dimensions = svm.dimensions();
+    svm.coefficients.truncate(3);
+    svm.vectors.truncate(3 * dimensions);
+    if let Some(familiarity) = &mut parts.familiarity {
+        familiarity.zones.truncate(3);
+    }
+    let mut bytes = Vec::new();
+    Model::new(parts).and_then(|model| model.write(&mut bytes)).expect("a part of a model is a model");
+    bytes
+}
+
+pub(crate) fn checkpoint(payload: &[u8]) {
+    thread_local!(static HEAD: Vec<u8> = kept(&session()));
+    let Ok(checkpoint) = HEAD.with(|head| Checkpoint::read(wrap(head, payload).as_slice())) else { return };
+    let Ok(mut session) = fresh().resume(JOB, checkpoint) else { return };
+    // A session that resumes can go on
+    let requests = session.requests();
+    for request in requests {
+        let grey = vec![[0.5; 3]; request.tile.pixels()];
+        if session.push(request.tile.index, request.spp, &grey).is_err() {
+            return;
+        }
+    }
+    let _ = session.judge();
+}
+
+pub(crate) fn checkpoint_seeds() -> Vec<Vec<u8>> {
+    vec![kept(&fresh()).split_off(HEADER), kept(&session()).split_off(HEADER)]
+}
+
+fn fresh() -> Session<FixedSpp> {
+    let params = Params { tile: 16, ..Params::default() };
+    Session::new(20, 16, FixedSpp(1000), params).expect("a small picture")
+}
+
+/// With samples in both halves of both tiles.
+fn session() -> Session<FixedSpp> {
+    let mut session = fresh();
+    for round in 0..2 {
+        for request in session.requests() {
+            let value = |i: usize| [(i + round) as f32 / 400.0; 3];
+            let mean: Vec<_> = (0..request.tile.pixels()).map(value).collect();
+            session.push(request.tile.index, request.spp, &mean).expect("finite samples");
+        }
+        session.judge().expect("a count needs no evidence");
+    }
+    session
+}
+
+fn kept(session: &Session<FixedSpp>) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    session.checkpoint(JOB).write(&mut bytes).expect("memory takes all");
+    bytes
+}

@@ -1,0 +1,179 @@
+//! Scenes and their meshes: of a GLB, lengths are right; of a serialized mesh, the bytes are what is inside
+//! the compression.
+
+use crate::files::Folder;
+use base64::Engine;
+use flate2::Compression;
+use flate2::write::ZlibEncoder;
+use noisefloor_scenefile::load;
+use std::io::Write;
+
+thread_local!(static FOLDER: Folder = Folder::new());
+
+fn read(name: &str, bytes: &[u8]) {
+    let path = FOLDER.with(|folder| folder.write(name, bytes));
+    // Errors and warnings can be said
+    match load(&path) {
+        Ok(loaded) => assert!(loaded.warnings.iter().all(|warning| !warning.to_string().is_empty())),
+        Err(error) => assert!(!error.to_string().is_empty()),
+    }
+}
+
+/// Loads a scene with the mesh in it.
+fn read_mesh(name: &str, kind: &str, bytes: &[u8]) {
+    FOLDER.with(|folder| folder.write(name, bytes));
+    let shape = format!(r#"<shape type="{kind}"><string name="filename" value="{name}"/></shape>"#);
+    let scene = format!(r#"<scene version="3.0.0"><sensor type="perspective"/>{shape}</scene>"#);
+    read("mesh.xml", scene.as_bytes());
+}
+
+/// A triangle under a lamp, seen by a camera; `uri` names or holds its positions.
+fn triangle(uri: &str) -> String {
+    format!(
+        r#"{{"asset":{{"version":"2.0"}},"scene":0,"scenes":[{{"nodes":[0,1,2]}}],
+"extensionsUsed":["KHR_lights_punctual"],
+"extensions":{{"KHR_lights_punctual":{{"lights":[
+{{"type":"spot","intensity":9,"spot":{{"outerConeAngle":1}}}}]}}}},
+"nodes":[{{"mesh":0,"scale":[2,1,1]}},{{"camera":0,"translation":[0,0,3]}},
+{{"extensions":{{"KHR_lights_punctual":{{"light":0}}}},"rotation":[0,0,0,1]}}],
+"cameras":[{{"type":"perspective","perspective":{{"yfov":1,"znear":0.1}}}}],
+"materials":[{{"name":"a","pbrMetallicRoughness":{{"baseColorFactor":[1,0.5,0,1],"metallicFactor":0.5}},
+"emissiveFactor":[1,0,1],"doubleSided":true}}],
+"meshes":[{{"primitives":[{{"attributes":{{"POSITION":0}},"indices":1,"material":0}}]}}],
+"accessors":[{{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3","min":[0,0,0],"max":[1,1,0]}},
+{{"bufferView":1,"componentType":5123,"count":3,"type":"SCALAR"}}],
+"bufferViews":[{{"buffer":0,"byteLength":36}},{{"buffer":0,"byteOffset":36,"byteLength":6}}],
+"buffers":[{{"byteLength":44{uri}}}]}}"#
+    )
+}
+
+fn positions() -> Vec<u8> {
+    let values = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0f32];
+    let mut bytes: Vec<u8> = values.into_iter().flat_map(f32::to_le_bytes).collect();
+    bytes.extend([0u16, 1, 2, 0].into_iter().flat_map(u16::to_le_bytes));
+    bytes
+}
+
+pub(crate) fn gltf(bytes: &[u8]) {
+    read("scene.gltf", bytes);
+}
+
+pub(crate) fn gltf_seeds() -> Vec<Vec<u8>> {
+    let data = base64::engine::general_purpose::STANDARD.encode(positions());
+    vec![triangle(&format!(r#","uri":"data:application/octet-stream;base64,{data}""#)).into_bytes()]
+}
+
+/// The JSON up to the first zero byte, and the binary chunk after it.
+pub(crate) fn glb(bytes: &[u8]) {
+    let at = bytes.iter().position(|&b| b == 0).unwrap_or(bytes.len());
+    let (json, binary) = (&bytes[..at], bytes.get(at + 1..).unwrap_or_default());
+    let pad = |bytes: &[u8], with: u8| {
+        let mut bytes = bytes.to_vec();
+        bytes.resize(bytes.len().next_multiple_of(4), with);
+        bytes
+    };
+    let (json, binary) = (pad(json, b' '), pad(binary, 0));
+    let mut file = b"glTF".to_vec();
+    for number in [2, (12 + 8 + json.len() + 8 + binary.len()) as u32, json.len() as u32] {
+        file.extend(number.to_le_bytes());
+    }
+    file.extend(b"JSON");
+    file.extend(&json);
+    file.extend((binary.len() as u32).to_le_bytes());
+    file.extend(b"BIN\0");
+    file.extend(&binary);
+    read("scene.glb", &file);
+}
+
+pub(crate) fn glb_seeds() -> Vec<Vec<u8>> {
+    vec![[triangle("").as_bytes(), &[0], &positions()].concat()]
+}
+
+pub(crate) fn xml(bytes: &[u8]) {
+    read("scene.xml", bytes);
+}
+
+pub(crate) fn xml_seeds() -> Vec<Vec<u8>> {
+    let scene = r##"<?xml version="1.0"?>
+<scene version="3.0.0"><default name="r" value="0.5"/>
+<integrator type="path"><integer name="max_depth" value="9"/></integrator>
+<sensor type="perspective"><float name="fov" value="40"/><string name="fov_axis" value="smaller"/>
+<transform name="to_world"><lookat origin="0,0,5" target="0,0,0" up="0,1,0"/></transform>
+<film type="hdrfilm"><integer name="width" value="32"/></film></sensor>
+<bsdf type="twosided" id="a"><bsdf type="roughplastic">
+<rgb name="diffuse_reflectance" value="0.2"/></bsdf></bsdf>
+<bsdf type="conductor" id="b"><rgb name="eta" value="0.2, 0.9, 1.1"/><rgb name="k" value="3"/></bsdf>
+<bsdf type="mask" id="c"><float name="opacity" value="0.4"/><bsdf type="diffuse"/></bsdf>
+<shape type="rectangle"><ref id="a"/><transform name="to_world"><rotate y="1" angle="30"/>
+<matrix value="1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1"/><scale x="2"/></transform></shape>
+<shape type="cube"><bsdf type="dielectric"><string name="int_ior" value="bk7"/></bsdf></shape>
+<shape type="sphere"><float name="radius" value="$r"/><ref id="c"/></shape>
+<shape type="cylinder"><point name="p0" value="0,0,1"/><ref id="b"/></shape>
+<shape type="disk"><emitter type="area"><rgb name="radiance" value="9"/></emitter></shape>
+<texture type="checkerboard" id="t"/>
+<emitter type="constant"/><emitter type="point"/><emitter type="directional"/>
+<emitter type="spot"><float name="cutoff_angle" value="30"/></emitter></scene>"##;
+    vec![scene.as_bytes().to_vec(), include_bytes!("../../fixtures/cornell-box.xml").to_vec()]
+}
+
+pub(crate) fn ply(bytes: &[u8]) {
+    read_mesh("mesh.ply", "ply", bytes);
+}
+
+pub(crate) fn ply_seeds() -> Vec<Vec<u8>> {
+    let header = |format: &str| {
+        format!(
+            "ply\nformat {format} 1.0\ncomment a\nelement vertex 3\nproperty float x\nproperty float y\n\
+             property float z\nproperty float u\nproperty float v\nelement face 1\n\
+             property list uchar int vertex_indices\nend_header\n"
+        )
+    };
+    let text = header("ascii") + "0 0 0 0 0\n1 0 0 1 0\n1 1 0 1 1\n3 0 1 2\n";
+    let mut little = header("binary_little_endian").into_bytes();
+    let mut big = header("binary_big_endian").into_bytes();
+    for value in [0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 0.0, 1.0, 1.0, 0.0, 1.0, 1.0f32] {
+        little.extend(value.to_le_bytes());
+        big.extend(value.to_be_bytes());
+    }
+    little.push(3);
+    big.push(3);
+    little.extend([0i32, 1, 2].map(i32::to_le_bytes).concat());
+    big.extend([0i32, 1, 2].map(i32::to_be_bytes).concat());
+    vec![text.into_bytes(), little, big]
+}
+
+pub(crate) fn obj(bytes: &[u8]) {
+    read_mesh("mesh.obj", "obj", bytes);
+}
+
+pub(crate) fn obj_seeds() -> Vec<Vec<u8>> {
+    let quad = "# a\no b\nv -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvn 0 0 1\n\
+                g c\nusemtl d\ns 1\nf 1/1/1 2/2/1 3/3/1 4//1\nf -1 -2 -3\n";
+    vec![quad.as_bytes().to_vec()]
+}
+
+/// The first four bytes are the version; the rest is compressed, by storing it.
+pub(crate) fn serialized(bytes: &[u8]) {
+    let (head, inside) = bytes.split_at(bytes.len().min(4));
+    let mut encoder = ZlibEncoder::new(head.to_vec(), Compression::none());
+    let packed = encoder.write_all(inside).and_then(|()| encoder.finish());
+    let mut file = packed.expect("memory takes all");
+    file.extend([0u32, 1].map(u32::to_le_bytes).concat());
+    read_mesh("mesh.serialized", "serialized", &file);
+}
+
+pub(crate) fn serialized_seeds() -> Vec<Vec<u8>> {
+    let seed = |version: u8, flags: u32, name: &[u8], colours: usize| {
+        let mut bytes = vec![0x1c, 0x04, version, 0];
+        bytes.extend(flags.to_le_bytes());
+        bytes.extend(name);
+        bytes.extend([3u64, 1].map(u64::to_le_bytes).concat());
+        for i in 0..9 + 9 + 6 + colours {
+            bytes.extend((i as f32 / 7.0).to_le_bytes());
+        }
+        bytes.extend([0u32, 1, 2].map(u32::to_le_bytes).concat());
+        bytes
+    };
+    // Single precision with normals and coordinates; version 4 has a name, and may have colours
+    vec![seed(3, 0x1003, b"", 0), seed(4, 0x100b, b"mesh\0", 9)]
+}
