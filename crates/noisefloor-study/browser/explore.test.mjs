@@ -56,12 +56,15 @@ test("pictures are dropped, judged and disagreed with by mouse, in a small windo
 
   // One alone says what is missing; another size is refused; then the stack
   await drop(page, [stack[0]]);
-  await page.getByRole("alert").getByText("nothing to hold the picture against").waitFor();
+  await page.getByRole("alert").getByText("othing to compare the picture with").waitFor();
   await accessible(page, "one picture");
   await shot(page, "explore-alone");
   await drop(page, [other]);
   await page.getByRole("alert").getByText("different sizes").waitFor();
   await drop(page, stack.slice(1));
+  // These pictures do not show whether they share samples: the page asks
+  await page.getByRole("alert").getByText("do not show whether").waitFor();
+  await page.locator("#samples").selectOption("independent");
   await page.getByText("tiles have converged at").waitFor();
   await until("nothing is wrong any more", () => page.getByRole("alert").isHidden());
   const tiles = await page.locator("#tiles button").count();
@@ -135,7 +138,7 @@ test("pictures are dropped, judged and disagreed with by mouse, in a small windo
 });
 
 test("everything goes by keyboard alone, in a large window", async (t) => {
-  const { page } = await open(t, EXPLORER, LARGE);
+  const { page } = await open(t, EXPLORER, LARGE, { refusals: true });
   // Asked for well before the key that opens it: Chromium is told to hand choosers over only while somebody listens, and
   // a key pressed right after that overtakes it.
   const chooser = page.waitForEvent("filechooser", { timeout: 60000 });
@@ -157,6 +160,9 @@ test("everything goes by keyboard alone, in a large window", async (t) => {
   await focus(/^files/);
   await page.keyboard.press("Enter");
   await (await chooser).setFiles(stack);
+  await page.getByRole("alert").getByText("do not show whether").waitFor();
+  await focus(/^samples/);
+  await page.keyboard.type("independent");
   await page.getByText("tiles have converged at").waitFor();
   // A name that says nothing: the samples are typed
   await focus(/Samples per pixel of last\.png/);
@@ -166,8 +172,6 @@ test("everything goes by keyboard alone, in a large window", async (t) => {
     "there is one more level",
     async () => (await page.locator("#level").getAttribute("max")) === String(stack.length - 1),
   );
-  await focus(/Scene, relation, tiles$/);
-  await page.keyboard.press("Enter");
   await focus(/^scene/);
   await page.keyboard.press("Control+A");
   await page.keyboard.type("hall");

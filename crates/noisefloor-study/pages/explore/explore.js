@@ -38,6 +38,8 @@ function problem(error) {
         : "";
   get("problem").textContent = text;
   get("problem").hidden = !text;
+  // Where it is to be said
+  if (error?.body?.where === "relation") get("arrangement").open = true;
 }
 
 const say = (text) => {

@@ -43,10 +43,15 @@ impl From<GalleryError> for Refusal {
                 "drop another rendering of the same view beside it, or start with --model and a model trained with \
                  `--evidence alone`"
             }
+            GalleryError::Still(noisefloor::StillError::Undecided { .. }) => {
+                "choose it under `Scene, relation, tiles`"
+            }
             GalleryError::Many | GalleryError::Large => "take some away",
             _ => "see `noisefloor judge --help` for what pictures can be held against each other",
         };
-        Self::new(status, error.to_string(), "pictures", do_)
+        let unclear = matches!(&error, GalleryError::Still(noisefloor::StillError::Undecided { .. }));
+        let place = if unclear { "relation" } else { "pictures" };
+        Self::new(status, error.to_string(), place, do_)
     }
 }
 

@@ -12,6 +12,8 @@ use serde::Serialize;
 const LN_SLOPE_SD: f64 = 0.7;
 /// Prior standard deviation of b, in the geometric mean of the samples that were asked about.
 const OFFSET_SD: f64 = 0.1;
+/// Share of answers that may be slips: one alone about the noisiest tile must not decide everything.
+const SLIPS: f64 = 0.05;
 /// The grid of the posterior: values on each side of the middle, and their distance.
 const SLOPES: (i32, f64) = (32, 0.08);
 const OFFSETS: (i32, f64) = (6, 0.04);
@@ -90,7 +92,8 @@ pub fn fit_line(model: &Model, threshold: Threshold, answers: &[Answer]) -> Opti
                 // A verdict at the threshold is an even chance; the further beyond, the likelier the answer
                 let towards = curve.logit(base.then(own)) - threshold;
                 let agrees = if curve.answer.sees_noise { -towards } else { towards };
-                ln_posterior -= (-agrees).exp().ln_1p();
+                let likelihood = 0.5 * SLIPS + (1.0 - SLIPS) / (1.0 + (-agrees).exp());
+                ln_posterior += likelihood.ln();
             }
             all.push((ln_posterior, own));
         }

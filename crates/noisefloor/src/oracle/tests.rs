@@ -128,8 +128,13 @@ fn another_audience_sees_the_noise_of_fewer_samples() {
     let own = oracle.judge_described(&at)[0];
     assert_eq!(oracle.judge_described_for(&at, Audience::TRAINED).unwrap()[0], own);
     let for_line = |slope, offset| oracle.judge_described_for(&at, Audience { slope, offset }).unwrap()[0];
-    // Half the demands are no reason to stop sooner than the session would.
-    assert_eq!(for_line(0.5, 0.0), own);
+    // Half the demands are met by half the samples; a negative offset alone makes nobody see less.
+    let lenient = for_line(0.5, 0.0);
+    assert!(lenient.probability > own.probability, "{lenient:?} {own:?}");
+    let need = |verdict: Verdict| verdict.expected_spp.unwrap() as f64;
+    assert!((need(lenient) / need(own) - 0.5).abs() < 0.02, "{lenient:?} {own:?}");
+    assert_eq!(for_line(1.0, -100.0).probability, own.probability);
+    assert_eq!((Audience { slope: 0.5, offset: -10.0 }).seen_as(100.0), 200.0);
     let half = describe(200);
     let twice = for_line(2.0, 0.0);
     // Another film has other noise: its amplitude over 4096 pixels is known to 1 %.
