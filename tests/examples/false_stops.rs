@@ -1,5 +1,6 @@
-//! How often the oracle stops a tile of a stiff scene too early: `false_stops [SEEDS]` renders scenes whose light is hard to find with
-//! many seeds, holds each stopped tile against a converged picture, and prints a Markdown table, with and without the guards there are.
+//! How often the oracle stops a tile of a stiff scene too early: `false_stops [SEEDS]` renders scenes whose
+//! light is hard to find with many seeds, holds each stopped tile against a converged picture, and prints a
+//! Markdown table, with and without the guards there are.
 #![allow(clippy::print_stdout, reason = "an example prints")]
 
 use noisefloor::{Display, Driver, FixedSpp, NoiseMask, Oracle, Params, Rgb, Schedule, StopReason, Tile};
@@ -11,7 +12,8 @@ const TILE: usize = 32;
 const MOST: u64 = 2000;
 /// Samples of each of two pictures whose mean counts as converged.
 const CONVERGED: u64 = 6000;
-/// Deviation of the noise mask of a tile's error that nobody overlooked, in 8-bit steps: the human thresholds are 1.0 to 2.8.
+/// Deviation of the noise mask of a tile's error that nobody overlooked, in 8-bit steps: the human thresholds
+/// are 1.0 to 2.8.
 const SEEN: f64 = 2.8;
 /// Error of a tile's mean that is seen as another brightness, in 8-bit steps.
 const DARKER: f64 = 2.0;

@@ -1,5 +1,6 @@
-//! How often the oracle stops a tile on luck: `luck [SEEDS [LIGHT]]` renders pictures of four tiles, one of which holds light that is seldom
-//! found, and prints a Markdown table of where that tile stops and what it misses, with and without the guards there are.
+//! How often the oracle stops a tile on luck: `luck [SEEDS [LIGHT]]` renders pictures of four tiles, one of
+//! which holds light that is seldom found, and prints a Markdown table of where that tile stops and what it
+//! misses, with and without the guards there are.
 #![allow(clippy::print_stdout, reason = "an example prints")]
 
 use noisefloor::{
@@ -105,8 +106,8 @@ impl ProgressiveSource for Rare {
     }
 }
 
-/// What became of the first tile: samples, whether any found the rare light, and the deviation of the noise mask of its error on the
-/// screen, in 8-bit steps, less than which people see of it.
+/// What became of the first tile: samples, whether any found the rare light, and the deviation of the noise
+/// mask of its error on the screen, in 8-bit steps, less than which people see of it.
 fn stop(source: Rare, params: Params) -> Result<(u64, bool, f64), Box<dyn Error>> {
     let mut driver = Driver::new(source, Oracle::bundled(), params)?;
     driver.run(|_, _| ())?;

@@ -1,6 +1,6 @@
-//! Hours of renders in one process: `soak [MINUTES]` renders the same pictures again and again, each with a new driver but one oracle
-//! and one source that live on, and fails if a decision or a picture differs from those of a fresh process, or if memory grows.
-//! Linux only, for the size of the process.
+//! Hours of renders in one process: `soak [MINUTES]` renders the same pictures again and again, each with a
+//! new driver but one oracle and one source that live on, and fails if a decision or a picture differs from
+//! those of a fresh process, or if memory grows. Linux only, for the size of the process.
 #![allow(clippy::print_stdout, reason = "an example prints")]
 
 use noisefloor::{Driver, Oracle, Params, ProgressiveSource};

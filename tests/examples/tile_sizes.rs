@@ -1,5 +1,5 @@
-//! What smaller tiles do: `tile_sizes [SCENE]…` renders built-in scenes with one model at tiles of 128, 64, 32 and 16 pixels, and
-//! prints a Markdown table of samples, agreement with tiles of 128, and seams.
+//! What smaller tiles do: `tile_sizes [SCENE]…` renders built-in scenes with one model at tiles of 128, 64,
+//! 32 and 16 pixels, and prints a Markdown table of samples, agreement with tiles of 128, and seams.
 #![allow(clippy::print_stdout, reason = "an example prints")]
 
 use ndarray::Array2;
@@ -57,8 +57,8 @@ fn measure(name: &str) -> Result<(), Box<dyn Error>> {
         ratios.sort_by(f64::total_cmp);
         let within = ratios.iter().filter(|r| (1.0 / 1.5..=1.5).contains(*r)).count();
 
-        // Noise beside the borders against noise deeper in the tile; the same places of a picture without borders take out what
-        // scene and geometry do.
+        // Noise beside the borders against noise deeper in the tile; the same places of a picture without
+        // borders take out what scene and geometry do.
         let edges = borders(tile, &spp);
         let energy = |image: &[Rgb]| noise_energy(image, &converged, &display);
         let (tiled, plain) = (energy(&session.film().image()), energy(&even));
@@ -100,7 +100,8 @@ fn noise_energy(image: &[Rgb], converged: &[Rgb], display: &Display) -> Array2<f
     NoiseMask::default().apply(&noise).mapv_into(|v| v * v)
 }
 
-/// A pixel at a border between tiles that stopped apart, the one deeper in its tile, and the one beyond the border.
+/// A pixel at a border between tiles that stopped apart, the one deeper in its tile, and the one beyond the
+/// border.
 struct Edge {
     near: usize,
     deep: usize,
@@ -126,7 +127,8 @@ fn borders(tile: usize, spp: &[f64]) -> Vec<Edge> {
     edges
 }
 
-/// Median noise energy beside the borders over that deeper in the tiles: medians, since a few fireflies would decide means.
+/// Median noise energy beside the borders over that deeper in the tiles: medians, since a few fireflies would
+/// decide means.
 fn beside(edges: &[Edge], energy: &Array2<f32>) -> f64 {
     let median = |place: fn(&Edge) -> usize| -> f64 {
         let mut energies: Vec<f32> =

@@ -3,11 +3,12 @@
 use noisefloor::{Model, Threshold};
 use serde::{Deserialize, Serialize};
 
-/// One person's answer about a tile at one number of samples. A threshold seen from one side: above `spp` if noise is seen, at or below it
-/// if none is.
+/// One person's answer about a tile at one number of samples. A threshold seen from one side: above `spp` if
+/// noise is seen, at or below it if none is.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Answer {
-    /// Pictures of one group show the same room, and are left out together, also with zones of a group of that name.
+    /// Pictures of one group show the same room, and are left out together, also with zones of a group of
+    /// that name.
     pub group: String,
     /// Samples per pixel, above 0.
     pub spp: f64,

@@ -8,7 +8,8 @@ use thiserror::Error;
 pub const MIN_PAIRS: usize = 3;
 /// Most pairs that a line is fitted to: all slopes between two of them are held at once.
 pub const MAX_PAIRS: usize = 2000;
-/// Pairs are drawn anew, with replacement, so often; the percentiles of 1000 lines are known to about half a percent.
+/// Pairs are drawn anew, with replacement, so often; the percentiles of 1000 lines are known to about half a
+/// percent.
 const RESAMPLES: u64 = 1000;
 
 /// A fitted line T′ = a·T + b and how far it can be trusted.
@@ -60,15 +61,17 @@ pub enum AudienceFitError {
 }
 
 impl AudienceFit {
-    /// Whether a number can be a threshold: 10⁻⁶ to 10¹⁵ samples per pixel, so that no slope between two of them overflows.
+    /// Whether a number can be a threshold: 10⁻⁶ to 10¹⁵ samples per pixel, so that no slope between two of
+    /// them overflows.
     pub fn accepts(threshold: f64) -> bool {
         (1e-6..=1e15).contains(&threshold)
     }
 
-    /// Fits T′ = a·T + b to pairs (T, T′) of thresholds of the same zones: T of the observers that a model stands for, T′ of the
-    /// audience. a is the median slope between two pairs, b the median of T′ − a·T (Theil 1950, Sen 1968): up to 29 % of the pairs may
-    /// be wrong without spoiling the line. Intervals are percentiles over lines through pairs drawn with replacement (Efron 1979),
-    /// seeded: the same pairs give the same intervals.
+    /// Fits T′ = a·T + b to pairs (T, T′) of thresholds of the same zones: T of the observers that a model
+    /// stands for, T′ of the audience. a is the median slope between two pairs, b the median of T′ − a·T
+    /// (Theil 1950, Sen 1968): up to 29 % of the pairs may be wrong without spoiling the line. Intervals are
+    /// percentiles over lines through pairs drawn with replacement (Efron 1979), seeded: the same pairs give
+    /// the same intervals.
     ///
     /// ```
     /// use noisefloor::{Audience, AudienceFit};
@@ -78,8 +81,8 @@ impl AudienceFit {
     /// ```
     ///
     /// # Errors
-    /// [`AudienceFitError`] if there are too few or too many pairs, a threshold is not one, all T are the same, or
-    /// the line falls.
+    /// [`AudienceFitError`] if there are too few or too many pairs, a threshold is not one, all T are the
+    /// same, or the line falls.
     pub fn new(pairs: &[(f64, f64)]) -> Result<Self, AudienceFitError> {
         if !(MIN_PAIRS..=MAX_PAIRS).contains(&pairs.len()) {
             return Err(AudienceFitError::Pairs(pairs.len()));
@@ -170,7 +173,8 @@ fn below(state: &mut u64, n: usize) -> usize {
 mod tests {
     use super::*;
 
-    /// `n` thresholds between 250 and 4250, and 1.94·T − 346 of each with errors of standard deviation `spread`.
+    /// `n` thresholds between 250 and 4250, and 1.94·T − 346 of each with errors of standard deviation
+    /// `spread`.
     fn students(n: usize, spread: f64, seed: u64) -> Vec<(f64, f64)> {
         let mut state = seed;
         let mut uniform = || below(&mut state, 1 << 30) as f64 / f64::from(1 << 30);
@@ -203,8 +207,8 @@ mod tests {
         assert!(fit.correlation.unwrap() < 0.5, "{fit:?}");
     }
 
-    /// The line of Takouachet et al. 2017, §7.3, lies in the interval that 95 % of simulated studies give, as often as it says:
-    /// of 40 seeded ones, 38 on average, and fewer than 33 in 4 of 1000.
+    /// The line of Takouachet et al. 2017, §7.3, lies in the interval that 95 % of simulated studies give, as
+    /// often as it says: of 40 seeded ones, 38 on average, and fewer than 33 in 4 of 1000.
     #[test]
     fn the_line_of_the_paper_is_recovered() {
         let within = |[low, high]: [f64; 2], v: f64| (low..=high).contains(&v);

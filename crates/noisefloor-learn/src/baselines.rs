@@ -5,9 +5,10 @@ use crate::table::{Table, Zone};
 use statrs::statistics::{Data, Median};
 use std::collections::BTreeMap;
 
-/// The constant-noise baseline: a zone has converged once the standard deviation of its noise mask falls to one constant. Of the
-/// noise levels at the human thresholds of all other groups, it is the one that errs least on those groups. In a table of one
-/// group there are no others: the constant is then fitted to what it predicts, and flattered.
+/// The constant-noise baseline: a zone has converged once the standard deviation of its noise mask falls to
+/// one constant. Of the noise levels at the human thresholds of all other groups, it is the one that errs
+/// least on those groups. In a table of one group there are no others: the constant is then fitted to what it
+/// predicts, and flattered.
 pub fn constant_noise_baseline(table: &Table) -> Vec<Prediction> {
     // Quietness −ln(noise) grows with samples.
     let zones: Vec<(&Zone, Vec<(f64, f64)>)> = table
@@ -39,8 +40,8 @@ fn value_at(levels: &[(f64, f64)], spp: f64) -> Option<f64> {
     Some(v0 + (v1 - v0) * ((spp / n0).ln() / (n1 / n0).ln()).clamp(0.0, 1.0))
 }
 
-/// The scene-median baseline: the median threshold of the same scene's other zones, which no predictor of unseen scenes can
-/// know. Scenes of a single zone stay out.
+/// The scene-median baseline: the median threshold of the same scene's other zones, which no predictor of
+/// unseen scenes can know. Scenes of a single zone stay out.
 pub fn scene_median_baseline(table: &Table) -> Vec<Prediction> {
     let predict = |zone: &Zone| {
         let same = |o: &&Zone| o.scene == zone.scene && o.zone != zone.zone && !o.censored;
@@ -58,7 +59,8 @@ mod tests {
     use crate::table::tests::zone;
     use noisefloor::{Descriptor, Evidence, ToneMapping};
 
-    /// Two scenes that people stop at the same noise: the baseline that knows this finds their thresholds exactly.
+    /// Two scenes that people stop at the same noise: the baseline that knows this finds their thresholds
+    /// exactly.
     #[test]
     fn constant_noise_is_right_where_noise_is_all() {
         let zones = vec![zone("A", 0, 100.0, 1.0), zone("B", 0, 400.0, 2.0)];

@@ -13,7 +13,8 @@ use noisefloor::{
 use rayon::prelude::*;
 use std::collections::BTreeSet;
 
-/// What may be learned from: the zones of some groups, and the answers of these and of all groups without zones.
+/// What may be learned from: the zones of some groups, and the answers of these and of all groups without
+/// zones.
 struct Material<'a> {
     table: &'a Table,
     params: &'a TrainParams,
@@ -83,7 +84,8 @@ impl<'a> Material<'a> {
     }
 }
 
-/// Trains on the zones of `groups`, at least two, with C and γ chosen, and P calibrated, by leaving each group out in turn.
+/// Trains on the zones of `groups`, at least two, with C and γ chosen, and P calibrated, by leaving each
+/// group out in turn.
 pub(crate) fn fit_groups(
     table: &Table,
     groups: &[&str],
@@ -127,8 +129,8 @@ pub(crate) fn parts(
 /// Share of the zones of left-out scenes that are familiar to the others.
 const FAMILIAR: f64 = 0.95;
 
-/// What textures the zones of `groups` show, and how far from those of the others the zones of each group lie. `None` if the
-/// descriptor does not separate noise from picture.
+/// What textures the zones of `groups` show, and how far from those of the others the zones of each group
+/// lie. `None` if the descriptor does not separate noise from picture.
 pub(crate) fn familiarity(table: &Table, groups: &[&str], scaler: &Scaler) -> Option<Familiarity> {
     let texture = table.descriptor.texture();
     if texture.is_empty() {

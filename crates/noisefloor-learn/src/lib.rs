@@ -1,9 +1,12 @@
 //! From what people said of pictures to models of [`noisefloor`] and their scores.
 //!
 //! - [`Corpus`]: thresholds that observers gave, with the images they judged.
-//! - [`describe_corpora`], [`describe_pairs`]: a corpus as a [`Table`] of descriptors; [`read_table`] and [`write_table`] keep it as CSV.
-//! - [`train`]: a [`noisefloor::Model`] from a table; [`leave_one_scene_out`]: predictions for scenes that the model has not seen.
-//! - [`score`], [`reliability`], [`constant_noise_baseline`], [`scene_median_baseline`]: how close predictions come to people.
+//! - [`describe_corpora`], [`describe_pairs`]: a corpus as a [`Table`] of descriptors; [`read_table`] and
+//!   [`write_table`] keep it as CSV.
+//! - [`train`]: a [`noisefloor::Model`] from a table; [`leave_one_scene_out`]: predictions for scenes that
+//!   the model has not seen.
+//! - [`score`], [`reliability`], [`constant_noise_baseline`], [`scene_median_baseline`]: how close
+//!   predictions come to people.
 //! - [`Evaluation`]: all of these scores together.
 //! - [`AudienceFit`]: the line from the thresholds of one audience to those of another.
 

@@ -66,8 +66,8 @@ impl Machine {
     }
 }
 
-/// An answer is about one number of samples. It counts as much as a zone, whose examples spread over range² in samples, has
-/// within a doubling of them.
+/// An answer is about one number of samples. It counts as much as a zone, whose examples spread over range²
+/// in samples, has within a doubling of them.
 fn answer_weight(examples: usize, zones: usize, range: f64) -> usize {
     let doublings = 2.0 * range.log2();
     (examples as f64 / zones.max(1) as f64 / doublings).round().max(1.0) as usize

@@ -10,9 +10,10 @@ pub struct TrainParams {
     pub candidates: Vec<SvmParams>,
     /// Levels within this factor of the human threshold are examples; those beyond are clear anyway. Above 1.
     pub range: f64,
-    /// Spread of the observers of one zone: scale of the logistic distribution of their thresholds in ln(samples), above 0. The
-    /// human data give means alone; the default is where thresholds predicted on left-out scenes are neither early nor late,
-    /// and amounts to a standard deviation of 0.29 in ln(contrast).
+    /// Spread of the observers of one zone: scale of the logistic distribution of their thresholds in
+    /// ln(samples), above 0. The human data give means alone; the default is where thresholds predicted on
+    /// left-out scenes are neither early nor late, and amounts to a standard deviation of 0.29 in
+    /// ln(contrast).
     pub spread: f64,
 }
 

@@ -4,8 +4,8 @@ use crate::table::{Origin, Zone};
 use noisefloor::{Judgement, Threshold};
 use serde::{Deserialize, Serialize};
 
-/// Samples at which a quantity, known at increasing levels, first reaches `goal`, interpolated in ln(spp); the first or last
-/// level if it has there or not yet. `None` without levels.
+/// Samples at which a quantity, known at increasing levels, first reaches `goal`, interpolated in ln(spp);
+/// the first or last level if it has there or not yet. `None` without levels.
 pub(crate) fn crossing(levels: &[(f64, f64)], goal: f64) -> Option<f64> {
     let at = levels.iter().position(|&(_, v)| v >= goal);
     match at {
@@ -79,7 +79,8 @@ impl Prediction {
     }
 }
 
-/// Predicts a zone's threshold: the samples at which P first reaches `threshold`. `judge` judges a raw descriptor, as
+/// Predicts a zone's threshold: the samples at which P first reaches `threshold`. `judge` judges a raw
+/// descriptor, as
 /// [`noisefloor::Model::judge`] does.
 pub fn predict(judge: impl Fn(&[f32]) -> Judgement, threshold: Threshold, zone: &Zone) -> Prediction {
     let p: Vec<f32> = zone.levels.iter().map(|level| judge(&level.descriptor).probability).collect();

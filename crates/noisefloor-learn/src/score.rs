@@ -1,7 +1,7 @@
 //! Predicted thresholds against human ones.
 //!
-//! Scores are those of the rules of evidence in `docs/guide.md`: whole scenes left out, predictions clipped to the levels that
-//! observers could choose, real pictures scored apart from synthesised levels.
+//! Scores are those of the rules of evidence in `docs/guide.md`: whole scenes left out, predictions clipped
+//! to the levels that observers could choose, real pictures scored apart from synthesised levels.
 
 use crate::predict::Prediction;
 use noisefloor::Scores;
@@ -20,8 +20,8 @@ pub fn score<'a>(predictions: impl Iterator<Item = &'a Prediction> + Clone) -> S
     }
 }
 
-/// Levels within this factor of the human threshold say how well probabilities are calibrated: further ones are easy, and would
-/// flatter.
+/// Levels within this factor of the human threshold say how well probabilities are calibrated: further ones
+/// are easy, and would flatter.
 const CALIBRATION_RANGE: f64 = 8.0;
 
 /// Levels whose probabilities lie in one tenth of the scale.
@@ -35,8 +35,9 @@ pub struct ReliabilityBin {
     pub levels: usize,
 }
 
-/// The reliability curve, in ten bins of equal width, of which empty ones are left out. `observed(spp, human_spp)` is the
-/// probability that was observed, or 0 or 1. Levels further than eightfold from the threshold, and censored zones, stay out.
+/// The reliability curve, in ten bins of equal width, of which empty ones are left out.
+/// `observed(spp, human_spp)` is the probability that was observed, or 0 or 1. Levels further than eightfold
+/// from the threshold, and censored zones, stay out.
 pub fn reliability<'a>(
     predictions: impl Iterator<Item = &'a Prediction>,
     observed: impl Fn(f64, f64) -> f64,

@@ -1,4 +1,5 @@
-//! Descriptors of a corpus, from noisy to converged, and what people said: all that training and scoring need.
+//! Descriptors of a corpus, from noisy to converged, and what people said: all that training and scoring
+//! need.
 
 use crate::answer::Answer;
 use noisefloor::{Descriptor, Evidence, ToneMapping};
@@ -15,15 +16,16 @@ pub enum Origin {
     Synthesised,
 }
 
-/// One zone at one number of samples. Several levels may have the same number: other realisations of the noise.
+/// One zone at one number of samples. Several levels may have the same number: other realisations of the
+/// noise.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Level {
     /// Samples per pixel.
     pub spp: f64,
     /// Rendered or synthesised.
     pub origin: Origin,
-    /// Standard deviation of the noise mask (σ = 1) of the residual over the zone, in display luminance: what the constant-noise
-    /// baseline goes by.
+    /// Standard deviation of the noise mask (σ = 1) of the residual over the zone, in display luminance: what
+    /// the constant-noise baseline goes by.
     pub noise: f32,
     /// The raw descriptor.
     pub descriptor: Vec<f32>,
@@ -72,7 +74,8 @@ impl Zone {
         self.levels.iter().min_by(|a, b| distance(a).total_cmp(&distance(b)))
     }
 
-    /// A quantity of the levels that observers could choose, by increasing samples; realisations of one level are averaged.
+    /// A quantity of the levels that observers could choose, by increasing samples; realisations of one level
+    /// are averaged.
     pub(crate) fn path(&self, quantity: impl Fn(usize) -> f64) -> Vec<(f64, f64)> {
         let mut path: Vec<(f64, f64, f64)> = Vec::new();
         for (i, level) in self.levels.iter().enumerate() {
@@ -91,8 +94,8 @@ impl Zone {
 }
 
 impl Table {
-    /// Takes away numbers of the descriptor, named as in its columns: to see what each is worth. A machine that is trained on what
-    /// is left can be scored, but is not a model.
+    /// Takes away numbers of the descriptor, named as in its columns: to see what each is worth. A machine
+    /// that is trained on what is left can be scored, but is not a model.
     ///
     /// # Errors
     /// The name that is not a column.
@@ -156,8 +159,9 @@ impl Table {
     }
 }
 
-/// The first word of a scene's name, as the group that the scene belongs to: a word which ends before a capital letter that follows
-/// a small one, or at `-` or `_`. `SdbCentre` and `SdbDroite` are two cameras in one room.
+/// The first word of a scene's name, as the group that the scene belongs to: a word which ends before a
+/// capital letter that follows a small one, or at `-` or `_`. `SdbCentre` and `SdbDroite` are two cameras in
+/// one room.
 pub fn first_word(scene: &str) -> &str {
     let mut previous = ' ';
     for (at, c) in scene.char_indices() {

@@ -23,8 +23,8 @@ fn check(table: &Table, params: &TrainParams, needed: usize) -> Result<(), Train
     }
 }
 
-/// Predicts every zone, at P = `threshold`, by a model that has seen nothing of its group, not even to choose C, γ or the
-/// sigmoid. `on_fold` is called before each group with its name.
+/// Predicts every zone, at P = `threshold`, by a model that has seen nothing of its group, not even to choose
+/// C, γ or the sigmoid. `on_fold` is called before each group with its name.
 ///
 /// # Errors
 /// [`TrainError`] if the table has fewer than three groups, or training fails.
@@ -49,8 +49,8 @@ pub fn leave_one_scene_out(
     Ok(predictions)
 }
 
-/// P of each of the table's answers, in their order, by a model that has learned nothing of its group, neither answers nor zones. `on_fold` is
-/// called before each group of answers with its name.
+/// P of each of the table's answers, in their order, by a model that has learned nothing of its group,
+/// neither answers nor zones. `on_fold` is called before each group of answers with its name.
 ///
 /// # Errors
 /// [`TrainError`] if fewer than two groups of zones are left, or training fails.
@@ -75,7 +75,8 @@ pub fn leave_answers_out(
     Ok(probabilities)
 }
 
-/// Trains a model on all of a table. `corpus` says in words where it comes from; `leave_one_scene_out` are the scores of
+/// Trains a model on all of a table. `corpus` says in words where it comes from; `leave_one_scene_out` are
+/// the scores of
 /// [`leave_one_scene_out`], where they were computed.
 ///
 /// # Errors
@@ -110,7 +111,8 @@ mod tests {
     use crate::table::{Level, Origin, Zone};
     use noisefloor::{Descriptor, Evidence, ToneMapping};
 
-    /// Scenes where people stop at noise 0.01, whatever else: the first number is ln(noise), the others distract.
+    /// Scenes where people stop at noise 0.01, whatever else: the first number is ln(noise), the others
+    /// distract.
     fn table(scenes: usize) -> Table {
         let dimensions = Descriptor::default().dimensions();
         // Not the testkit's `Noise`: the bounds below were measured with this sequence, and are not those of every other
@@ -161,7 +163,8 @@ mod tests {
         let predictions =
             leave_one_scene_out(&table(4), &TrainParams::default(), Threshold::PAPER, |_| ()).unwrap();
         assert_eq!(predictions.len(), 24);
-        // P = 0.9 is where nine in ten agree: by the psychometric function, a little before the recorded threshold of 95 %.
+        // P = 0.9 is where nine in ten agree: by the psychometric function, a little before the recorded
+        // threshold of 95 %.
         let params = TrainParams::default();
         let nine_in_ten = (-params.spread * (19.0f64 / 9.0).ln()).exp();
         assert!((observers_agreeing(nine_in_ten, 1.0, params.spread) - 0.9).abs() < 1e-9);
@@ -170,8 +173,9 @@ mod tests {
         assert!(error_factor < 1.2, "{error_factor}");
     }
 
-    /// The rule is noise 0.01: who still sees noise at half of that, in a picture of a group of its own, lowers P there, and who sees none at
-    /// twice as much raises it there; a model that has left that picture out is as if nothing had been said.
+    /// The rule is noise 0.01: who still sees noise at half of that, in a picture of a group of its own,
+    /// lowers P there, and who sees none at twice as much raises it there; a model that has left that picture
+    /// out is as if nothing had been said.
     #[test]
     fn answers_move_p_their_way_and_are_left_out_with_their_picture() {
         let plain = table(4);

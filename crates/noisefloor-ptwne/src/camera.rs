@@ -42,8 +42,8 @@ pub struct Optics {
     pub aperture_radius: f32,
     /// Distance of what is in focus, along the view, in scene units: above 0 if there is a lens.
     pub focus_distance: f32,
-    /// For parallel projection: the height of what is seen, in scene units. The field of view and the lens do not
-    /// count then.
+    /// For parallel projection: the height of what is seen, in scene units. The field of view and the lens do
+    /// not count then.
     pub parallel_height: Option<f32>,
     /// Whether left and right are exchanged.
     pub mirrored: bool,
@@ -141,8 +141,8 @@ enum Projection {
 }
 
 impl Lens {
-    /// The eye, and the inward normals of the four planes through it and the sides of a rectangle of pixels; none
-    /// unless all rays begin at the eye.
+    /// The eye, and the inward normals of the four planes through it and the sides of a rectangle of pixels;
+    /// none unless all rays begin at the eye.
     pub(crate) fn pyramid(&self, x: [f32; 2], y: [f32; 2]) -> Option<(Vec3, [Vec3; 4])> {
         let Projection::Pinhole = self.projection else { return None };
         let at = |x: f32, y: f32| self.corner + self.right * x + self.down * y;
@@ -209,8 +209,8 @@ mod tests {
         Camera { eye: [0.0; 3], target: [0.0, 0.0, -1.0], up: [0.0, 1.0, 0.0], vertical_fov: 90.0 }
     }
 
-    /// The slope of the ray through the right edge of an image of 300×200 pixels is 1 where the field of view spans
-    /// the width.
+    /// The slope of the ray through the right edge of an image of 300×200 pixels is 1 where the field of view
+    /// spans the width.
     #[test]
     fn fields_of_view_span_the_edge_they_name() {
         for (fov_axis, slope) in [

@@ -36,8 +36,8 @@ pub enum Material {
         /// Factor on light each time it crosses the surface, 0…1.
         tint: Rgb,
     },
-    /// A rough dielectric boundary of GGX microfacets that hide each other independently (Walter et al. 2007).
-    /// Radiance as in [`Material::Glass`].
+    /// A rough dielectric boundary of GGX microfacets that hide each other independently (Walter et al.
+    /// 2007). Radiance as in [`Material::Glass`].
     RoughGlass {
         /// Index of refraction on the back (where the normal does not point), over that on the front: 0.25…4.
         ior: f32,

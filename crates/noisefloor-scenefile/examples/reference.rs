@@ -1,8 +1,8 @@
-//! What the ray-traced reference costs, and how free of noise it is: `reference SIZE SCENE…`, scenes by name or file; prints a table
-//! in Markdown.
+//! What the ray-traced reference costs, and how free of noise it is: `reference SIZE SCENE…`, scenes by name
+//! or file; prints a table in Markdown.
 //!
-//! Two references of different seeds share no random number. What they differ by, divided by √2, is the error of one; through tone
-//! mapping and the noise mask it is what the oracle would take for noise.
+//! Two references of different seeds share no random number. What they differ by, divided by √2, is the error
+//! of one; through tone mapping and the noise mask it is what the oracle would take for noise.
 
 #![expect(clippy::print_stdout, reason = "a table for people")]
 
@@ -14,9 +14,11 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 
-/// Samples per pixel of the small picture that the reference takes its exposure from; the path tracer is timed with them.
+/// Samples per pixel of the small picture that the reference takes its exposure from; the path tracer is
+/// timed with them.
 const PREVIEW: u64 = 8;
-/// Samples per pixel at the first verdict of a render. In scenes where most pixels are black after a few, the picture is darker by then.
+/// Samples per pixel at the first verdict of a render. In scenes where most pixels are black after a few, the
+/// picture is darker by then.
 const FIRST: u64 = 100;
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -67,7 +69,8 @@ fn row(scene: &Arc<Scene>, size: usize) -> Result<String, Box<dyn Error>> {
     ))
 }
 
-/// Deviations of the noise mask of one of two references, of all and of the worst tile, in 1/255, shown as `picture` is.
+/// Deviations of the noise mask of one of two references, of all and of the worst tile, in 1/255, shown as
+/// `picture` is.
 fn deviations(references: &[Vec<Rgb>], picture: &[Rgb], size: usize) -> Result<[f64; 2], Box<dyn Error>> {
     let display = ToneMapping::default().settle(picture);
     let error = |y: usize, x: usize| {

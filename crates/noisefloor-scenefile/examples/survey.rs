@@ -1,5 +1,5 @@
-//! Loads every scene file under some folders: `survey FOLDER…`. Prints a line for each file, and a count at the end. A
-//! scene may name files anywhere in its folder of the command line; volumes are left out.
+//! Loads every scene file under some folders: `survey FOLDER…`. Prints a line for each file, and a count at
+//! the end. A scene may name files anywhere in its folder of the command line; volumes are left out.
 
 #![expect(clippy::print_stdout, reason = "a table for people")]
 

@@ -10,22 +10,22 @@ const Y_INTEGRAL: f64 = 106.857;
 /// Temperatures that black bodies may have, in kelvin.
 pub(crate) const TEMPERATURES: std::ops::RangeInclusive<f64> = 100.0..=1e6;
 
-/// Linear Rec.709 colour of a spectrum that is 1 at all wavelengths: an equal-energy white is a little redder than
-/// D65.
+/// Linear Rec.709 colour of a spectrum that is 1 at all wavelengths: an equal-energy white is a little redder
+/// than D65.
 pub(crate) const EQUAL_ENERGY: Rgb = [1.20479, 0.948_29, 0.908_92];
 
 /// What a spectrum describes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Quantity {
-    /// A factor on light, such as a reflectance: seen under D65, the white of Rec.709, so that 1 at all wavelengths is
-    /// white.
+    /// A factor on light, such as a reflectance: seen under D65, the white of Rec.709, so that 1 at all
+    /// wavelengths is white.
     Factor,
     /// Emitted light.
     Light,
 }
 
-/// The colour of a spectrum given at rising wavelengths in nanometres: linear in between, zero beyond. Channels that
-/// would be negative, as colours outside Rec.709 have them, are zero.
+/// The colour of a spectrum given at rising wavelengths in nanometres: linear in between, zero beyond.
+/// Channels that would be negative, as colours outside Rec.709 have them, are zero.
 pub(crate) fn of_spectrum(samples: &[(f64, f64)], quantity: Quantity) -> Rgb {
     let at = |wavelength: f64| {
         let next = samples.partition_point(|(w, _)| *w <= wavelength);
@@ -100,8 +100,8 @@ const RGB_OF_XYZ: [[f64; 3]; 3] = [
     [0.055_648, -0.204_043, 1.057_311],
 ];
 
-/// The colour matching functions x̄, ȳ and z̄ of the CIE 1931 standard observer (CIE 018:2019), and the relative power of
-/// the illuminant D65 (ISO/CIE 11664-2), every 5 nm from 360 to 830.
+/// The colour matching functions x̄, ȳ and z̄ of the CIE 1931 standard observer (CIE 018:2019), and the
+/// relative power of the illuminant D65 (ISO/CIE 11664-2), every 5 nm from 360 to 830.
 #[rustfmt::skip]
 const CIE: [[f64; 4]; 95] = [
     [0.0001299, 3.917e-06, 0.0006061, 46.6383],
@@ -224,7 +224,8 @@ mod tests {
         close(of_spectrum(&cut, Quantity::Light), [0.230_967, 0.994_374, 0.917_431], 1e-2);
     }
 
-    /// 6500 K is nearly D65: white within a few per cent. And as Stefan and Boltzmann have it, hotter is brighter.
+    /// 6500 K is nearly D65: white within a few per cent. And as Stefan and Boltzmann have it, hotter is
+    /// brighter.
     #[test]
     fn black_bodies_are_red_white_and_blue() {
         let [r, g, b] = of_black_body(6500.0);

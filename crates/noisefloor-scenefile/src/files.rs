@@ -40,12 +40,12 @@ impl Folder {
         Ok(())
     }
 
-    /// The file called `name` at `place`: the first there is, as seen from the scene's folder and those added to it.
-    /// Backslashes separate folders, too.
+    /// The file called `name` at `place`: the first there is, as seen from the scene's folder and those added
+    /// to it. Backslashes separate folders, too.
     ///
     /// # Errors
-    /// [`LoadError::Outside`] if the name, or a link on the way, leads out of the root; [`LoadError::Read`] if there is no
-    /// such file.
+    /// [`LoadError::Outside`] if the name, or a link on the way, leads out of the root; [`LoadError::Read`]
+    /// if there is no such file.
     pub(crate) fn find(&self, name: &str, place: &Place) -> Result<PathBuf, LoadError> {
         let outside = || LoadError::Outside { place: place.clone(), name: name.to_owned() };
         let failed = |cause| LoadError::Read { place: place.clone(), cause };

@@ -28,8 +28,9 @@ pub(crate) const DIELECTRICS: [(&str, f64); 22] = [
     ("diamond", 2.419),
 ];
 
-/// Complex indices of refraction η + ik of metals and other solids: linear Rec.709 colours of the spectra that Mitsuba
-/// 3.9 ships, as it computes them in its RGB mode. A name with the suffix `_palik` means the same.
+/// Complex indices of refraction η + ik of metals and other solids: linear Rec.709 colours of the spectra
+/// that Mitsuba 3.9 ships, as it computes them in its RGB mode. A name with the suffix `_palik` means the
+/// same.
 pub(crate) const CONDUCTORS: [(&str, Rgb, Rgb); 41] = [
     ("Ag", [0.1553, 0.1167, 0.1384], [4.8284, 3.1222, 2.1469]),
     ("Al", [1.6575, 0.8804, 0.5212], [9.2238, 6.2695, 4.8370]),

@@ -22,8 +22,8 @@ pub(crate) struct Triangles {
 }
 
 impl Triangles {
-    /// Checks that indices are in range and positions finite. Normals and texture coordinates that are not finite become
-    /// 0.
+    /// Checks that indices are in range and positions finite. Normals and texture coordinates that are not
+    /// finite become 0.
     ///
     /// # Errors
     /// [`LoadError::Bad`] at `place`.

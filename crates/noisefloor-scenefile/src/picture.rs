@@ -42,12 +42,12 @@ pub(crate) enum Samples {
     Linear(Vec<Rgb>),
 }
 
-/// Reads the EXR, PFM, Radiance, PNG, JPEG, BMP or TGA file in `path`, named at `place`. Its content says which it is, not
-/// its name, but for TGA, which has no mark.
+/// Reads the EXR, PFM, Radiance, PNG, JPEG, BMP or TGA file in `path`, named at `place`. Its content says
+/// which it is, not its name, but for TGA, which has no mark.
 ///
 /// # Errors
-/// [`LoadError`] if the file cannot be read, is of another format, broken, or has more than [`MAX_TEXTURE_PIXELS`] pixels
-/// (known from its header).
+/// [`LoadError`] if the file cannot be read, is of another format, broken, or has more than
+/// [`MAX_TEXTURE_PIXELS`] pixels (known from its header).
 pub(crate) fn read(path: &Path, place: &Place) -> Result<Picture, LoadError> {
     let bytes = files::read(path, MAX_FILE_BYTES, place)?;
     let here = Place::file(path);
@@ -77,8 +77,8 @@ fn decode_as(bytes: &[u8], format: Option<ImageFormat>, place: &Place) -> Result
     let broken = |e: image::ImageError| place.clone().bad(format!("the picture is broken: {e}"));
     let format = image::guess_format(bytes).ok().or(format);
     let (reader, length) = (Cursor::new(bytes), bytes.len());
-    // The decoders are other people's code over hostile bytes: where one of them panics, the file is broken, and the
-    // program that reads it continues. No state outlives the call.
+    // The decoders are other people's code over hostile bytes: where one of them panics, the file is broken,
+    // and the program that reads it continues. No state outlives the call.
     let decoded = catch_unwind(AssertUnwindSafe(|| match format {
         Some(ImageFormat::Png) => {
             let mut limits = Limits::no_limits();

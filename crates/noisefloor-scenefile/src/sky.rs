@@ -101,7 +101,8 @@ fn solid_angle(index: usize) -> f64 {
     (edge(row) - edge(row + 1)) * std::f64::consts::TAU / WIDTH as f64
 }
 
-/// Radiance of the sun's disk in W/(m²·sr·nm) as linear Rec.709, interpolated between what Mitsuba 3.9.1 gives for it.
+/// Radiance of the sun's disk in W/(m²·sr·nm) as linear Rec.709, interpolated between what Mitsuba 3.9.1
+/// gives for it.
 fn sun_radiance(elevation: f64, turbidity: f64) -> [f64; 3] {
     let (e, et) = place(&ELEVATIONS, elevation);
     let (t, tt) = place(&SUN_TURBIDITIES, turbidity);

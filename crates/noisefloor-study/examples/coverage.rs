@@ -22,7 +22,8 @@ fn geometric_levels() -> Vec<u64> {
     (0..24).map(|i| (10.0 * 1.35f64.powi(i)).round() as u64).collect()
 }
 
-/// Shares of intervals that hold the median and the 95 % level of `truth`, and the mean ratio of the latter to it.
+/// Shares of intervals that hold the median and the 95 % level of `truth`, and the mean ratio of the latter
+/// to it.
 fn coverage(study: &Arc<Study>, drawn: &Public, truth: &Public, observers: u64, studies: u64) -> String {
     let truths: Vec<[f64; 2]> = (0..2).map(|t| [0.5, 0.95].map(|s| truth.quantile(0, t, s))).collect();
     let (mut median, mut level95, mut below, mut ratio, mut width) = (0, 0, 0, 0.0, 0.0);

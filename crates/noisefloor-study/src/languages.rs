@@ -32,8 +32,8 @@ pub struct Language {
     pub text: BTreeMap<String, String>,
 }
 
-/// The built-in languages, and those in a folder, by their code. A file `ar.toml` adds the language `ar` or replaces
-/// the built-in one.
+/// The built-in languages, and those in a folder, by their code. A file `ar.toml` adds the language `ar` or
+/// replaces the built-in one.
 ///
 /// # Errors
 /// [`StudyError`] if a file is malformed, or lacks a text that the English one has.

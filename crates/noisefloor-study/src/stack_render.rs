@@ -10,10 +10,10 @@ const EDGE: usize = 64;
 /// Most samples per pixel asked for at once: a stop is possible in between.
 const MOST_AT_ONCE: u64 = 64;
 
-/// Renders `levels` (samples per pixel, increasing, from 1) into `folder` as `00064.exr` and so on, linear, and makes
-/// the folder. What a level holds is what a render of that many samples holds. Between batches `go_on` is told the level
-/// and the samples so far, and may stop it by returning false; the levels finished by then are kept. `finish` sees each
-/// picture before it is written, and may denoise it.
+/// Renders `levels` (samples per pixel, increasing, from 1) into `folder` as `00064.exr` and so on, linear,
+/// and makes the folder. What a level holds is what a render of that many samples holds. Between batches
+/// `go_on` is told the level and the samples so far, and may stop it by returning false; the levels finished
+/// by then are kept. `finish` sees each picture before it is written, and may denoise it.
 ///
 /// # Errors
 /// [`StudyError`] if the levels do not increase, the source fails or ends early, or a file cannot be written.

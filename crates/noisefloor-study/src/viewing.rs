@@ -49,7 +49,8 @@ pub struct Conditions {
     pub pixels_per_mm: f64,
     /// Distance of the eyes from the screen, in millimetres: 100 to 10 000.
     pub distance_mm: f64,
-    /// Device pixels per CSS pixel: 0.25 to 8. Pictures are shown one image pixel to one device pixel at any ratio.
+    /// Device pixels per CSS pixel: 0.25 to 8. Pictures are shown one image pixel to one device pixel at any
+    /// ratio.
     pub pixel_ratio: f64,
     /// Pinch zoom, which must be 1.
     pub zoom: f64,

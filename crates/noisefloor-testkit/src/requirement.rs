@@ -75,7 +75,8 @@ pub fn require<T>(requirement: Requirement, found: Result<T, impl Display>) -> O
             // The harness names its threads after their tests
             let thread = std::thread::current();
             let test = thread.name().unwrap_or("a test");
-            // Written at once, lest something come in between, and not by `eprintln!`, which would be captured
+            // Written at once, lest something come in between, and not by `eprintln!`, which would be
+            // captured
             let message = format!("SKIPPED {test} (needs {requirement}): {reason}\n");
             std::io::stderr().write_all(message.as_bytes()).ok();
             None

@@ -1,4 +1,5 @@
-//! What a verdict on one tile of 128×128 pixels costs, and its parts; and verdicts on whole pictures, by their size.
+//! What a verdict on one tile of 128×128 pixels costs, and its parts; and verdicts on whole pictures, by
+//! their size.
 #![allow(missing_docs, reason = "a benchmark")]
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};

@@ -1,4 +1,5 @@
-//! Trains one machine on long rows twice, through linfa's own kernel matrix and from a matrix product, and says what each takes:
+//! Trains one machine on long rows twice, through linfa's own kernel matrix and from a matrix product, and
+//! says what each takes:
 //! `cargo run --release -p noisefloor --features train --example long_rows -- ROWS NUMBERS`
 #![allow(clippy::print_stdout, reason = "an example prints")]
 

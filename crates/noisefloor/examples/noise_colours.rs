@@ -1,9 +1,10 @@
-//! What the bundled model makes of noise unlike that of its training data: for each kind, the samples it asks for, where
-//! independent noise *of equal visibility* gets four times what it has. Prints a table in Markdown.
+//! What the bundled model makes of noise unlike that of its training data: for each kind, the samples it asks
+//! for, where independent noise *of equal visibility* gets four times what it has. Prints a table in
+//! Markdown.
 //!
-//! Equal visibility is that of an observer who is not ours: noise energy weighted by the squared contrast sensitivity of Mannos
-//! and Sakrison 1974, A(f) = 2.6·(0.0192 + 0.114 f)·exp(−(0.114 f)^1.1), f in cycles per degree, at 40 pixels per degree. No
-//! person has looked at these pictures.
+//! Equal visibility is that of an observer who is not ours: noise energy weighted by the squared contrast
+//! sensitivity of Mannos and Sakrison 1974, A(f) = 2.6·(0.0192 + 0.114 f)·exp(−(0.114 f)^1.1), f in cycles
+//! per degree, at 40 pixels per degree. No person has looked at these pictures.
 
 #![allow(clippy::print_stdout, reason = "a table for people")]
 
@@ -132,8 +133,8 @@ fn shaped(kind: &Kind, random: &mut Random) -> Array2<f64> {
     })
 }
 
-/// Samples the model asks for, over those that are there: geometric mean over tiles and seeds. `amplitude` is that of the noise of
-/// the mean of both halves, in display values.
+/// Samples the model asks for, over those that are there: geometric mean over tiles and seeds. `amplitude` is
+/// that of the noise of the mean of both halves, in display values.
 fn asked(oracle: &Oracle, kind: &Kind, clean: Picture, amplitude: f64) -> f64 {
     let grid = TileGrid::new(SIZE, SIZE, TILE).expect("a valid grid");
     let (mut sum, mut count) = (0.0, 0.0);

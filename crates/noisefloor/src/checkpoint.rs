@@ -14,9 +14,10 @@ const FORMAT: Format = Format { magic: *b"NFCHECK\0", version: VERSION };
 const VERSION: u32 = 2;
 
 /// A snapshot of a session, for resuming it: samples, verdicts and the display. Made by
-/// [`Session::checkpoint`](crate::Session::checkpoint), resumed by [`Session::resume`](crate::Session::resume) and
-/// [`Driver::resume`](crate::Driver::resume). Its file has up to 21 bytes per pixel for each half that is kept, and writing it
-/// takes as much memory again.
+/// [`Session::checkpoint`](crate::Session::checkpoint), resumed by
+/// [`Session::resume`](crate::Session::resume) and
+/// [`Driver::resume`](crate::Driver::resume). Its file has up to 21 bytes per pixel for each half that is
+/// kept, and writing it takes as much memory again.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Checkpoint<'a> {
     pub(crate) job: Cow<'a, str>,
@@ -64,7 +65,8 @@ pub enum CheckpointError {
     /// The content contradicts itself.
     #[error("the checkpoint contradicts itself: {0}")]
     Invalid(&'static str),
-    /// The source does not promise to repeat its samples: after a restart it could return the same ones again as new.
+    /// The source does not promise to repeat its samples: after a restart it could return the same ones again
+    /// as new.
     #[error("{0} cannot be resumed: it does not promise new samples after a restart")]
     Source(String),
 }
@@ -93,13 +95,14 @@ impl Checkpoint<'_> {
     /// Writes the checkpoint.
     ///
     /// # Errors
-    /// [`CheckpointError::Io`] if it cannot be written, [`CheckpointError::Oversized`] if it has more than 2 GiB: some 50 million pixels.
+    /// [`CheckpointError::Io`] if it cannot be written, [`CheckpointError::Oversized`] if it has more than 2
+    /// GiB: some 50 million pixels.
     pub fn write(&self, to: impl Write) -> Result<(), CheckpointError> {
         Ok(FORMAT.write(self, to)?)
     }
 
-    /// Checks that it belongs to this job, and that nothing in it can lead a session astray. `fresh` is the film that the
-    /// session would begin with.
+    /// Checks that it belongs to this job, and that nothing in it can lead a session astray. `fresh` is the
+    /// film that the session would begin with.
     pub(crate) fn check(
         &self,
         job: &str,

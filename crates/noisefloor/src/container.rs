@@ -1,12 +1,13 @@
 //! Files of this library.
 //!
-//! Layout: magic (8 bytes), version (u32), length of the payload (u64), BLAKE3 of the payload (32 bytes), payload
-//! (bincode 2, standard configuration); numbers little-endian. All use of bincode is in this module.
+//! Layout: magic (8 bytes), version (u32), length of the payload (u64), BLAKE3 of the payload (32 bytes),
+//! payload (bincode 2, standard configuration); numbers little-endian. All use of bincode is in this module.
 
 use serde::{Serialize, de::DeserializeOwned};
 use std::io::{self, Read, Write};
 
-/// Largest payload that is read or written: the paper's own model, 9,600 pairs of 2·128² numbers, would have 1.26 GB.
+/// Largest payload that is read or written: the paper's own model, 9,600 pairs of 2·128² numbers, would have
+/// 1.26 GB.
 pub(crate) const MAX_PAYLOAD: u64 = 2 << 30;
 
 /// A kind of file.
@@ -58,7 +59,8 @@ impl Format {
             return Err(Fault::Oversized(length));
         }
 
-        // Read the payload as far as there is one: memory grows with what arrives, not with what is announced.
+        // Read the payload as far as there is one: memory grows with what arrives, not with what is
+        // announced.
         let mut payload = Vec::new();
         from.take(length + 1).read_to_end(&mut payload)?;
         if payload.len() as u64 != length {
@@ -88,8 +90,9 @@ impl Format {
 
 /// The content of bytes that [`payload`] returned.
 pub(crate) fn unpack<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, Fault> {
-    // A length inside the payload is believed up to bincode's limit, which is part of a type. The smallest limit that the
-    // payload fits keeps what a short, crafted payload can reserve within sixteen times its length.
+    // A length inside the payload is believed up to bincode's limit, which is part of a type. The smallest
+    // limit that the payload fits keeps what a short, crafted payload can reserve within sixteen times its
+    // length.
     match bytes.len() {
         0..=0x1_0000 => unpack_within::<T, 0x1_0000>(bytes),
         0x1_0001..=0x10_0000 => unpack_within::<T, 0x10_0000>(bytes),

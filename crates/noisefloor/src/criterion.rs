@@ -17,7 +17,8 @@ pub struct View<'a> {
     pub film: &'a Film,
     /// How radiance is displayed; settled before the first verdict.
     pub display: &'a Display,
-    /// The quick reference, display-encoded, row-major over the image; present if [`Needs::reference`] is set.
+    /// The quick reference, display-encoded, row-major over the image; present if [`Needs::reference`] is
+    /// set.
     pub reference: Option<&'a [Rgb]>,
 }
 
@@ -35,13 +36,15 @@ pub struct Needs {
 pub struct Verdict {
     /// Whether the tile needs no more samples.
     pub converged: bool,
-    /// Probability that an observer sees no difference from the converged picture, if the criterion computes one.
+    /// Probability that an observer sees no difference from the converged picture, if the criterion computes
+    /// one.
     pub probability: Option<f32>,
     /// Samples per pixel at which the criterion expects to be satisfied, if it can tell.
     pub expected_spp: Option<u64>,
     /// Whether the tile is unlike everything the criterion was made for: treat the verdict with care.
     pub unfamiliar: bool,
-    /// What `probability` would be without the penalty for an unfamiliar tile; equal to it where there is no penalty.
+    /// What `probability` would be without the penalty for an unfamiliar tile; equal to it where there is no
+    /// penalty.
     pub probability_without_penalty: Option<f32>,
 }
 
@@ -77,22 +80,23 @@ pub enum CriterionError {
 /// Judges the tiles of a film.
 ///
 /// # Why it is shaped so
-/// All tiles that are due come in one call, so that a criterion can distribute them over threads or look at the whole
-/// image once. A criterion may keep state between calls (one that compares with the previous picture does): hence
-/// `&mut`. One that can save that state is also [`Resumable`].
+/// All tiles that are due come in one call, so that a criterion can distribute them over threads or look at
+/// the whole image once. A criterion may keep state between calls (one that compares with the previous
+/// picture does): hence `&mut`. One that can save that state is also [`Resumable`].
 ///
 /// # For implementers
 /// - Return one verdict for each tile, in order.
 /// - Verdicts must not depend on the number of threads.
 /// - Declare in [`StoppingCriterion::needs`] what you read; what nobody needs is neither rendered nor kept.
-/// - Forget the previous film in [`StoppingCriterion::begin`]; a criterion without state has nothing to do there.
+/// - Forget the previous film in [`StoppingCriterion::begin`]; a criterion without state has nothing to do
+///   there.
 #[auto_impl(&mut, Box)]
 pub trait StoppingCriterion {
     /// A short name for reports, such as `"svm oracle"`.
     fn name(&self) -> String;
 
-    /// Everything its verdicts depend on besides the film and the display: model digest, threshold, constants. Two
-    /// criteria with the same fingerprint and state give the same verdicts.
+    /// Everything its verdicts depend on besides the film and the display: model digest, threshold,
+    /// constants. Two criteria with the same fingerprint and state give the same verdicts.
     fn fingerprint(&self) -> String;
 
     /// A new film begins, with these tiles.
@@ -108,9 +112,9 @@ pub trait StoppingCriterion {
         Audience::TRAINED
     }
 
-    /// How visible the noise is at each pixel of the image, row-major, in 8-bit display steps; NaN where a tile gives no
-    /// evidence. `None`, the default, if the criterion cannot say. Costs as much as a verdict on every tile; called where
-    /// a map is wanted, never for a verdict.
+    /// How visible the noise is at each pixel of the image, row-major, in 8-bit display steps; NaN where a
+    /// tile gives no evidence. `None`, the default, if the criterion cannot say. Costs as much as a verdict
+    /// on every tile; called where a map is wanted, never for a verdict.
     fn visible_noise(&self, _view: &View<'_>) -> Option<Vec<f32>> {
         None
     }
@@ -124,13 +128,14 @@ pub trait StoppingCriterion {
 
 /// A criterion whose session can be saved and resumed: see [`crate::Checkpoint`].
 pub trait Resumable: StoppingCriterion {
-    /// What the criterion keeps between verdicts and cannot derive from the film; empty, the default, if nothing.
+    /// What the criterion keeps between verdicts and cannot derive from the film; empty, the default, if
+    /// nothing.
     fn state(&self) -> Vec<u8> {
         Vec::new()
     }
 
-    /// Restores what [`Resumable::state`] returned for a film with these tiles. The bytes may come from anywhere: returns
-    /// false, and changes nothing, if they are not such a state.
+    /// Restores what [`Resumable::state`] returned for a film with these tiles. The bytes may come from
+    /// anywhere: returns false, and changes nothing, if they are not such a state.
     fn restore(&mut self, _grid: TileGrid, state: &[u8]) -> bool {
         state.is_empty()
     }

@@ -8,8 +8,9 @@ use thiserror::Error;
 /// Key of an average scene (Reinhard et al. 2002, §3.1): what the log-average luminance is mapped to.
 pub const DEFAULT_KEY: f32 = 0.18;
 
-/// δ of the log-average (Reinhard et al. 2002, eq. 1), as a share of the geometric mean of the luminances above zero. The paper
-/// leaves δ absolute; a relative one makes the unit of radiance irrelevant, and a geometric mean withstands fireflies.
+/// δ of the log-average (Reinhard et al. 2002, eq. 1), as a share of the geometric mean of the luminances
+/// above zero. The paper leaves δ absolute; a relative one makes the unit of radiance irrelevant, and a
+/// geometric mean withstands fireflies.
 pub const DELTA: f64 = 1e-4;
 
 /// Rec.709 luminance of a linear RGB triple, in the unit of its input.
@@ -20,8 +21,8 @@ pub fn luminance([r, g, b]: Rgb) -> f32 {
 
 /// sRGB encoding of one linear channel (IEC 61966-2-1): [0, 1] → [0, 1], clamped; NaN stays NaN.
 ///
-/// The curve is a polynomial of the fourth root, within 10⁻⁶ of the formula: without a table or a power, the compiler can encode
-/// many channels at once. Every verdict encodes each pixel nine times.
+/// The curve is a polynomial of the fourth root, within 10⁻⁶ of the formula: without a table or a power, the
+/// compiler can encode many channels at once. Every verdict encodes each pixel nine times.
 #[inline(always)]
 pub fn srgb_encode(linear: f32) -> f32 {
     let linear = linear.clamp(0.0, 1.0);
@@ -30,8 +31,8 @@ pub fn srgb_encode(linear: f32) -> f32 {
     if linear <= 0.003_130_8 { 12.92 * linear } else { curve }
 }
 
-/// 1.055·t^(5/3) − 0.055 for t from 0.0031308^(1/4) to 1, within 3.2·10⁻⁷ before rounding: the polynomial of seventh degree with
-/// the least error, lowest power first.
+/// 1.055·t^(5/3) − 0.055 for t from 0.0031308^(1/4) to 1, within 3.2·10⁻⁷ before rounding: the polynomial of
+/// seventh degree with the least error, lowest power first.
 const CURVE: [f32; 8] = [
     -0.058_446_594,
     0.123_575_896,
@@ -58,7 +59,8 @@ pub enum ToneMapping {
     Reinhard {
         /// What the log-average luminance becomes, above 0; 0.18 for an average scene.
         key: f32,
-        /// Smallest luminance that becomes white, after exposure, above 0; `None` compresses without burning out (eq. 3).
+        /// Smallest luminance that becomes white, after exposure, above 0; `None` compresses without burning
+        /// out (eq. 3).
         white: Option<f32>,
     },
     /// Plain sRGB: multiply, clamp to [0, 1], encode.
@@ -100,9 +102,9 @@ impl ToneMapping {
         }
     }
 
-    /// Settles the exposure for a picture. Use the result for this picture, its halves and its reference alike: if the
-    /// log-average drifted, the drift would look like noise. `pixels` are linear radiance; non-finite ones are
-    /// skipped. A black picture gets exposure 1.
+    /// Settles the exposure for a picture. Use the result for this picture, its halves and its reference
+    /// alike: if the log-average drifted, the drift would look like noise. `pixels` are linear radiance;
+    /// non-finite ones are skipped. A black picture gets exposure 1.
     pub fn settle(&self, pixels: &[Rgb]) -> Display {
         match *self {
             Self::Reinhard { key, white } => {
@@ -114,8 +116,8 @@ impl ToneMapping {
     }
 }
 
-/// exp(mean ln(δ + L)), Reinhard et al. 2002, eq. 1 with the 1/N inside the exponential as their text has it; `None` if no
-/// pixel is brighter than black.
+/// exp(mean ln(δ + L)), Reinhard et al. 2002, eq. 1 with the 1/N inside the exponential as their text has it;
+/// `None` if no pixel is brighter than black.
 fn log_average(pixels: &[Rgb]) -> Option<f64> {
     let luminances = || pixels.iter().map(|&p| f64::from(luminance(p))).filter(|l| l.is_finite());
     let geometric_mean = |of: &dyn Fn(f64) -> Option<f64>| {
@@ -186,14 +188,16 @@ impl Display {
         self.map(pixel).map(srgb_encode)
     }
 
-    /// Linear radiance → display-encoded Rec.709 luminance in [0, 1]: the plane that observers are modelled on.
+    /// Linear radiance → display-encoded Rec.709 luminance in [0, 1]: the plane that observers are modelled
+    /// on.
     #[inline(always)]
     pub fn luma(&self, pixel: Rgb) -> f32 {
         luminance(self.encode(pixel))
     }
 }
 
-/// [`Display::luma`] of many pixels. The arithmetic is that of IEEE 754 with any instructions: all processors agree to the bit.
+/// [`Display::luma`] of many pixels. The arithmetic is that of IEEE 754 with any instructions: all processors
+/// agree to the bit.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx2", "x86_64+avx2"))]
 pub(crate) fn luma_row(display: &Display, linear: &[Rgb], shown: &mut [f32]) {
     // Channel by channel, as vector instructions want it; few enough to stay in the nearest cache

@@ -13,8 +13,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 use thiserror::Error;
 
-/// Most pixel samples requested in one call. A fast renderer takes about a second for it, so that cancelling, the time
-/// limit and progress are prompt. A constant rather than a time, so that batches are the same on every machine.
+/// Most pixel samples requested in one call. A fast renderer takes about a second for it, so that cancelling,
+/// the time limit and progress are prompt. A constant rather than a time, so that batches are the same on
+/// every machine.
 const CALL_SAMPLES: u64 = 1 << 22;
 
 /// Why a run failed. All samples taken before are in the session's film.
@@ -125,7 +126,8 @@ impl<S: ProgressiveSource, C: StoppingCriterion> Driver<S, C> {
         Ok(Self { source, session, time_limit: None, cancel, timeline, clock, samples_before: 0 })
     }
 
-    /// Stops all tiles once a run has taken this long. A call to the source that is under way is finished first.
+    /// Stops all tiles once a run has taken this long. A call to the source that is under way is finished
+    /// first.
     pub fn set_time_limit(&mut self, limit: Option<Duration>) {
         self.time_limit = limit;
     }
@@ -170,7 +172,8 @@ impl<S: ProgressiveSource, C: StoppingCriterion> Driver<S, C> {
         self.clock
     }
 
-    /// Runs until every tile is done. Whatever happens, all samples taken are in the film, and every tile has a stop.
+    /// Runs until every tile is done. Whatever happens, all samples taken are in the film, and every tile has
+    /// a stop.
     ///
     /// # Errors
     /// [`DriverError`] if source or criterion fail; open tiles are then stopped with [`StopReason::Failed`].
@@ -300,12 +303,13 @@ impl<S: ProgressiveSource, C: StoppingCriterion> Driver<S, C> {
 }
 
 impl<S: ProgressiveSource, C: Resumable> Driver<S, C> {
-    /// Resumes an interrupted run of the same job; see [`Session::resume`]. The picture and every decision are then those
-    /// of a run that was not interrupted, to the bit.
+    /// Resumes an interrupted run of the same job; see [`Session::resume`]. The picture and every decision
+    /// are then those of a run that was not interrupted, to the bit.
     ///
     /// # Errors
-    /// [`CheckpointError`] as in [`Session::resume`], and [`CheckpointError::Source`] if the source does not promise to
-    /// repeat its samples ([`Repeats::Samples`]): it could return samples that the film already has.
+    /// [`CheckpointError`] as in [`Session::resume`], and [`CheckpointError::Source`] if the source does not
+    /// promise to repeat its samples ([`Repeats::Samples`]): it could return samples that the film already
+    /// has.
     pub fn resume(mut self, job: &str, checkpoint: Checkpoint<'_>) -> Result<Self, CheckpointError> {
         let info = self.source.info();
         if info.repeats != Repeats::Samples {

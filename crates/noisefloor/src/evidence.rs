@@ -23,7 +23,8 @@ pub enum Evidence {
     Halves,
     /// A noise-free reference: in the paper a quick ray-traced one (Takouachet et al. 2017, §4.3).
     Reference,
-    /// Nothing: everything in the picture that passes the mask counts as noise. For comparison only; useless on texture.
+    /// Nothing: everything in the picture that passes the mask counts as noise. For comparison only; useless
+    /// on texture.
     Alone,
 }
 
@@ -67,24 +68,25 @@ thread_local! {
 }
 
 /// A tile as displayed, and its noise. All planes are display-encoded and have the same shape (rows,
-/// columns): the tile, whose edges are rounded up to multiples of [`HALO`], with a halo of that width around it. Neighbours are
-/// read where they exist; beyond the image, it is mirrored.
+/// columns): the tile, whose edges are rounded up to multiples of [`HALO`], with a halo of that width around
+/// it. Neighbours are read where they exist; beyond the image, it is mirrored.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TilePlanes {
     /// Luminance Y′ in [0, 1].
     pub image: Array2<f32>,
-    /// Residual of the luminance Y′: the picture minus what it is compared with, scaled so that its standard deviation is that
-    /// of the noise in the picture.
+    /// Residual of the luminance Y′: the picture minus what it is compared with, scaled so that its standard
+    /// deviation is that of the noise in the picture.
     pub residual: Array2<f32>,
-    /// Variance of known white rounding noise in each of the residuals of R′, G′ and B′; 0 for pictures in floating point.
+    /// Variance of known white rounding noise in each of the residuals of R′, G′ and B′; 0 for pictures in
+    /// floating point.
     pub rounding: f32,
     /// The tile itself within the planes: rows and columns of the planes that belong to it.
     pub inner: Tile,
 }
 
 impl TilePlanes {
-    /// Collects the planes of a tile of an image of `width`×`height` pixels, both at least 1; `pixel(x, y)` gives the
-    /// display-encoded picture and its residual at image coordinates.
+    /// Collects the planes of a tile of an image of `width`×`height` pixels, both at least 1; `pixel(x, y)`
+    /// gives the display-encoded picture and its residual at image coordinates.
     pub fn gather(
         (width, height): (usize, usize),
         tile: Tile,
@@ -98,9 +100,10 @@ impl TilePlanes {
         })
     }
 
-    /// As [`TilePlanes::gather`] of `N` linear pictures, of which the first is what is shown. `read(y, columns, pictures, numbers)` reads
-    /// the pixels of them in row `y` and these columns, and one number more for each; `residual` says what is noise, from the display
-    /// luminances and that number. A verdict spends most of its time here: rows are read and tone mapped channel by channel, in vector
+    /// As [`TilePlanes::gather`] of `N` linear pictures, of which the first is what is shown.
+    /// `read(y, columns, pictures, numbers)` reads the pixels of them in row `y` and these columns, and one
+    /// number more for each; `residual` says what is noise, from the display luminances and that number. A
+    /// verdict spends most of its time here: rows are read and tone mapped channel by channel, in vector
     /// instructions.
     fn gather_linear<const N: usize>(
         size: (usize, usize),
@@ -125,8 +128,8 @@ impl TilePlanes {
         })
     }
 
-    /// Fills both planes row by row: `row(y, columns, scratch, image, residual)` fills a row of each, with the pixels of the image
-    /// that lie in row `y` and these columns.
+    /// Fills both planes row by row: `row(y, columns, scratch, image, residual)` fills a row of each, with
+    /// the pixels of the image that lie in row `y` and these columns.
     fn fill(
         (width, height): (usize, usize),
         tile: Tile,
@@ -159,9 +162,9 @@ impl TilePlanes {
 
     /// Evidence from the film's two halves.
     ///
-    /// With n_A and n_B samples, Var(A − B) = σ²/n_A + σ²/n_B = σ²·(n_A + n_B)/(n_A·n_B), and the mean of all samples has
-    /// σ²/(n_A + n_B); so (A − B)·√(n_A·n_B)/(n_A + n_B) has exactly the noise of the mean, also for uneven halves. The
-    /// halves are tone mapped first, since people see display values.
+    /// With n_A and n_B samples, Var(A − B) = σ²/n_A + σ²/n_B = σ²·(n_A + n_B)/(n_A·n_B), and the mean of all
+    /// samples has σ²/(n_A + n_B); so (A − B)·√(n_A·n_B)/(n_A + n_B) has exactly the noise of the mean, also
+    /// for uneven halves. The halves are tone mapped first, since people see display values.
     ///
     /// A pixel without valid samples in one half gives no evidence: its residual is 0.
     pub fn from_halves(film: &Film, display: &Display, tile: Tile) -> Self {
@@ -173,7 +176,8 @@ impl TilePlanes {
                     None => row.fill([0.0; 3]),
                 }
             }
-            // The numbers of samples change from tile to tile, and from pixel to pixel where some were kept out.
+            // The numbers of samples change from tile to tile, and from pixel to pixel where some were kept
+            // out.
             let owner = |i: usize| tile.owner(grid, columns.all[i], y);
             let mut from = 0;
             while from < mean.len() {
@@ -192,8 +196,8 @@ impl TilePlanes {
         Self::gather_linear((grid.width(), grid.height()), tile, display, read, residual)
     }
 
-    /// Evidence on `image` from another rendering of the same view, both `width`×`height` pixels. `None` if their difference says nothing
-    /// about the noise: see [`residual_scale`].
+    /// Evidence on `image` from another rendering of the same view, both `width`×`height` pixels. `None` if
+    /// their difference says nothing about the noise: see [`residual_scale`].
     ///
     /// # Panics
     /// If a rendering has fewer pixels than that.
@@ -245,8 +249,8 @@ impl TilePlanes {
     }
 }
 
-/// The image coordinate that shows at `place` of a plane that begins [`HALO`] before the image, mirrored at its first and last
-/// pixel.
+/// The image coordinate that shows at `place` of a plane that begins [`HALO`] before the image, mirrored at
+/// its first and last pixel.
 fn mirror(place: usize, edge: usize) -> usize {
     let period = (2 * (edge - 1)).max(1);
     let distance = place.abs_diff(HALO) % period;
@@ -273,11 +277,12 @@ pub enum Samples {
     Nested,
 }
 
-/// The factor that turns the difference of two pictures into a residual with the noise of the first one, which has `image`
-/// samples per pixel; the other has `other`.
+/// The factor that turns the difference of two pictures into a residual with the noise of the first one,
+/// which has `image` samples per pixel; the other has `other`.
 ///
-/// Independent samples: Var(difference) = σ²(1/image + 1/other); nested ones: σ²·|1/image − 1/other|. The noise of the first
-/// picture is σ²/image. `None` if one has no samples or nested ones have the same number: the difference then says nothing about the noise.
+/// Independent samples: Var(difference) = σ²(1/image + 1/other); nested ones: σ²·|1/image − 1/other|. The
+/// noise of the first picture is σ²/image. `None` if one has no samples or nested ones have the same number:
+/// the difference then says nothing about the noise.
 pub fn residual_scale(image: f64, other: f64, samples: Samples) -> Option<f32> {
     let variance = match samples {
         Samples::Independent => 1.0 / image + 1.0 / other,
@@ -308,7 +313,8 @@ mod tests {
             let mean = planes.image.mean().unwrap();
             let spread = planes.image.mapv(|v| (v - mean).powi(2)).mean().unwrap();
             let residual = planes.residual.mapv(|v| v * v).mean().unwrap();
-            // Each variance estimate over 4096 pixels errs by √(2/4096) = 2.2 %; 13 % is 4 σ of their ratio: 1 in 16,000.
+            // Each variance estimate over 4096 pixels errs by √(2/4096) = 2.2 %; 13 % is 4 σ of their ratio:
+            // 1 in 16,000.
             assert!((residual / spread - 1.0).abs() < 0.13, "{batches:?}: {residual} against {spread}");
         }
     }

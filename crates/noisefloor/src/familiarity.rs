@@ -2,25 +2,30 @@
 
 use serde::{Deserialize, Serialize};
 
-/// How many times the samples an unfamiliar tile gets: its P is that of the same tile with this fraction of its samples.
-/// Noise falls with samples whatever the texture, so such a tile stops too, at twice what the model expects.
+/// How many times the samples an unfamiliar tile gets: its P is that of the same tile with this fraction of
+/// its samples. Noise falls with samples whatever the texture, so such a tile stops too, at twice what the
+/// model expects.
 pub(crate) const CAUTION: f32 = 2.0;
 
-/// The textures that a model knows, as scaled numbers of its descriptor that describe the picture and not the noise.
+/// The textures that a model knows, as scaled numbers of its descriptor that describe the picture and not the
+/// noise.
 ///
-/// A tile is familiar if it lies near one of the training zones. How near follows from held-out scenes: 95 % of their zones
-/// are that near to a zone of another scene. The scores of held-out scenes are evidence for such tiles, and for no others.
-/// Noise plays no part, since every tile goes from noisier to cleaner than anything in the training data.
+/// A tile is familiar if it lies near one of the training zones. How near follows from held-out scenes: 95 %
+/// of their zones are that near to a zone of another scene. The scores of held-out scenes are evidence for
+/// such tiles, and for no others. Noise plays no part, since every tile goes from noisier to cleaner than
+/// anything in the training data.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Familiarity {
     /// The scaled texture numbers of each training zone at its human threshold.
     pub zones: Vec<Vec<f32>>,
-    /// Greatest distance to the nearest of them at which a tile is familiar, in standard deviations of the training data.
+    /// Greatest distance to the nearest of them at which a tile is familiar, in standard deviations of the
+    /// training data.
     pub reach: f32,
 }
 
 impl Familiarity {
-    /// Whether scaled texture numbers lie within reach of a training zone; numbers that are not finite do not.
+    /// Whether scaled texture numbers lie within reach of a training zone; numbers that are not finite do
+    /// not.
     pub fn includes(&self, numbers: &[f32]) -> bool {
         nearest(&self.zones, numbers) <= self.reach
     }

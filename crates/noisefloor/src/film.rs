@@ -35,10 +35,10 @@ pub enum FilmError {
 
 /// One half: a mean for each pixel, with the rounding error of its last bits kept beside it.
 ///
-/// A plain f32 running mean stops changing once a batch weighs less than 2⁻²⁴ of it. `mean + carry·ulp/2¹⁶` is a
-/// 40-bit number in 6 bytes: each update then errs by at most 2⁻¹⁷ ulp, and since update j is averaged with weight j/K, K
-/// updates err by at most K·2⁻¹⁸ ulp; 10⁹ samples in batches of 100 (K = 10⁷) stay within 39 ulp, 2.4·10⁻⁶ relative, in the
-/// worst case, and within 0.02 ulp if roundings are independent.
+/// A plain f32 running mean stops changing once a batch weighs less than 2⁻²⁴ of it. `mean + carry·ulp/2¹⁶`
+/// is a 40-bit number in 6 bytes: each update then errs by at most 2⁻¹⁷ ulp, and since update j is averaged
+/// with weight j/K, K updates err by at most K·2⁻¹⁸ ulp; 10⁹ samples in batches of 100 (K = 10⁷) stay within
+/// 39 ulp, 2.4·10⁻⁶ relative, in the worst case, and within 0.02 ulp if roundings are independent.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 struct Half {
     mean: Vec<Rgb>,
@@ -90,8 +90,8 @@ impl Half {
 
 /// Accumulates batches of each tile into two independent halves, A and B.
 ///
-/// Each batch goes to whichever half of its tile has fewer samples, so that the two stay as even as the batches allow.
-/// Non-finite pixels of a batch are rejected and counted.
+/// Each batch goes to whichever half of its tile has fewer samples, so that the two stay as even as the
+/// batches allow. Non-finite pixels of a batch are rejected and counted.
 ///
 /// Memory: 36 bytes per pixel, 18 without halves.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -159,7 +159,8 @@ impl Film {
     /// Adds the mean of `spp` new samples per pixel; `mean` is row-major over the tile.
     ///
     /// # Errors
-    /// [`FilmError`] if the tile does not exist, the size differs or `spp` is zero; the film is then unchanged.
+    /// [`FilmError`] if the tile does not exist, the size differs or `spp` is zero; the film is then
+    /// unchanged.
     pub fn add(&mut self, tile: usize, spp: u64, mean: &[Rgb]) -> Result<(), FilmError> {
         let tile = self.check(tile, mean.len())?;
         let [a, b] = self.counts[tile.index];
@@ -182,9 +183,9 @@ impl Film {
         Ok(())
     }
 
-    /// Adds the new samples in a running mean of `total` samples per pixel, for renderers that keep one of their own. The
-    /// difference is computed in f64 and amplifies the rounding of the running mean by total/(new samples): push batches
-    /// where you can.
+    /// Adds the new samples in a running mean of `total` samples per pixel, for renderers that keep one of
+    /// their own. The difference is computed in f64 and amplifies the rounding of the running mean by
+    /// total/(new samples): push batches where you can.
     ///
     /// # Errors
     /// [`FilmError`] as [`Film::add`], and if `total` is not above the samples that the film has.
@@ -265,9 +266,9 @@ impl Film {
         rect.rows(self.grid.width()).flatten().filter(|&pixel| lacks(pixel)).count()
     }
 
-    /// The mean linear radiance of either half, A and B, at one pixel of `tile`, each with its number of valid samples;
-    /// black where there are none, as in all of B where no halves are kept. `pixel` is row-major over the image, and must lie in
-    /// `tile`: counts of samples are kept by tile.
+    /// The mean linear radiance of either half, A and B, at one pixel of `tile`, each with its number of
+    /// valid samples; black where there are none, as in all of B where no halves are kept. `pixel` is
+    /// row-major over the image, and must lie in `tile`: counts of samples are kept by tile.
     ///
     /// # Panics
     /// If the tile or the pixel does not exist.
@@ -291,8 +292,8 @@ impl Film {
         })
     }
 
-    /// Mean linear radiance of all valid samples of one pixel of `tile`; black where there are none. `pixel` is row-major over
-    /// the image, and must lie in `tile`.
+    /// Mean linear radiance of all valid samples of one pixel of `tile`; black where there are none. `pixel`
+    /// is row-major over the image, and must lie in `tile`.
     ///
     /// # Panics
     /// If the tile or the pixel does not exist.

@@ -1,15 +1,18 @@
 //! Tells progressive Monte Carlo renderers, tile by tile, when people stop seeing noise.
 //!
-//! An oracle trained on human thresholds estimates, for each tile of a progressive rendering, the probability that an
-//! observer sees no difference from the converged picture, after Takouachet et al. 2017, "Perception of noise and Global
-//! Illumination: toward an automatic stopping criterion based on SVM".
+//! An oracle trained on human thresholds estimates, for each tile of a progressive rendering, the probability
+//! that an observer sees no difference from the converged picture, after Takouachet et al. 2017, "Perception
+//! of noise and Global Illumination: toward an automatic stopping criterion based on SVM".
 //!
 //! - A renderer that owns its loop pushes samples into a [`Session`].
 //! - A renderer behind [`ProgressiveSource`] is driven by a [`Driver`].
 //! - A [`Checkpoint`] is a snapshot of either, for resuming it in another process.
-//! - [`Oracle`] is the [`StoppingCriterion`] that judges by a trained [`Model`]; [`FixedSpp`] is the simplest one.
-//! - [`Film`], [`Display`], [`TilePlanes`], [`NoiseMask`], [`Descriptor`] and [`Svm`] lead from samples to a verdict.
-//! - [`Familiarity`] describes the textures a model has been tried on; elsewhere it asks for twice the samples.
+//! - [`Oracle`] is the [`StoppingCriterion`] that judges by a trained [`Model`]; [`FixedSpp`] is the simplest
+//!   one.
+//! - [`Film`], [`Display`], [`TilePlanes`], [`NoiseMask`], [`Descriptor`] and [`Svm`] lead from samples to a
+//!   verdict.
+//! - [`Familiarity`] describes the textures a model has been tried on; elsewhere it asks for twice the
+//!   samples.
 //!
 //! ```
 //! use noisefloor::{Oracle, Params, Session, StopReason};

@@ -77,7 +77,8 @@ impl NoiseMask {
         out
     }
 
-    /// The mask of one row of a plane, `here`, which is not empty, into `out`; `column` is room for as many numbers.
+    /// The mask of one row of a plane, `here`, which is not empty, into `out`; `column` is room for as many
+    /// numbers.
     pub(crate) fn apply_to_row(self, [above, here, below]: [&[f32]; 3], column: &mut [f32], out: &mut [f32]) {
         mask_row(self.weights(), above, here, below, column, out);
     }

@@ -121,12 +121,13 @@ pub struct ModelParts {
     pub descriptor: Descriptor,
     /// What the tile is compared with.
     pub evidence: Evidence,
-    /// How the training pictures were displayed. For the record: descriptors are computed from display values, however
-    /// these were made, and a session may display its picture in another way.
+    /// How the training pictures were displayed. For the record: descriptors are computed from display
+    /// values, however these were made, and a session may display its picture in another way.
     pub tone_mapping: ToneMapping,
     /// From raw descriptors to probabilities.
     pub classifier: Classifier,
-    /// The texture that the model has been tried on; `None` if the descriptor does not separate noise from picture.
+    /// The texture that the model has been tried on; `None` if the descriptor does not separate noise from
+    /// picture.
     pub familiarity: Option<Familiarity>,
     /// Whose thresholds it predicts, as a line from those of the training data.
     pub audience: Audience,
@@ -154,7 +155,8 @@ struct ModelFile<'a> {
 /// What a model says about one tile.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Judgement {
-    /// Probability in [0, 1] that an observer sees no difference. For an unfamiliar tile, that with half of the samples.
+    /// Probability in [0, 1] that an observer sees no difference. For an unfamiliar tile, that with half of
+    /// the samples.
     pub probability: f32,
     /// The same without the penalty for unfamiliar tiles.
     pub probability_without_penalty: f32,
@@ -163,8 +165,8 @@ pub struct Judgement {
 }
 
 impl Model {
-    /// The model trained on the human data of LISIC (lisic9 and one SIN3D view), inside the library; see the project's
-    /// `docs/guide.md` for the command that makes it.
+    /// The model trained on the human data of LISIC (lisic9 and one SIN3D view), inside the library; see the
+    /// project's `docs/guide.md` for the command that makes it.
     #[cfg(feature = "bundled-model")]
     pub fn bundled() -> Self {
         Self::read(BUNDLED).expect("the bundled model is checked by a test")
@@ -182,8 +184,8 @@ impl Model {
     /// Reads a model with a built-in descriptor.
     ///
     /// # Errors
-    /// [`ModelError`] if it is foreign, damaged, oversized, newer, older, contradicts itself, or needs another version of
-    /// the descriptor.
+    /// [`ModelError`] if it is foreign, damaged, oversized, newer, older, contradicts itself, or needs
+    /// another version of the descriptor.
     pub fn read(from: impl Read) -> Result<Self, ModelError> {
         Self::read_with(from, &[])
     }
@@ -292,8 +294,8 @@ impl Model {
 }
 
 impl ModelParts {
-    /// Judges a tile by its raw descriptor, as [`Model::judge`] does: for scoring what is not a whole model, such as one
-    /// trained on some of a descriptor's numbers.
+    /// Judges a tile by its raw descriptor, as [`Model::judge`] does: for scoring what is not a whole model,
+    /// such as one trained on some of a descriptor's numbers.
     ///
     /// # Panics
     /// If the descriptor does not have the classifier's dimensionality.
@@ -343,8 +345,8 @@ impl ModelParts {
     }
 }
 
-/// P of one tile as a function of its samples: noise falls as 1/√n, nothing else changes. Texture decides once whether
-/// the tile is familiar.
+/// P of one tile as a function of its samples: noise falls as 1/√n, nothing else changes. Texture decides
+/// once whether the tile is familiar.
 pub(crate) struct ProbabilityCurve<'a> {
     parts: &'a ModelParts,
     raw: &'a [f32],

@@ -7,22 +7,23 @@ use ndarray::Array2;
 
 /// Edge of the blocks that count as independent observations, in pixels: wider than any pixel filter.
 const BLOCK: usize = 16;
-/// Standard errors that the two hypotheses must lie apart: the one in the middle between them is then reached by chance
-/// once in 740.
+/// Standard errors that the two hypotheses must lie apart: the one in the middle between them is then reached
+/// by chance once in 740.
 const APART: f64 = 6.0;
 
-/// Error of the slope that the curvature of the display adds, which blocks do not scatter by: below this at noise up to a
-/// tenth of the radiance (the test has 0.0087 where two standard errors are 0.0105). Ratios of counts above 40 are therefore
-/// never decided.
+/// Error of the slope that the curvature of the display adds, which blocks do not scatter by: below this at
+/// noise up to a tenth of the radiance (the test has 0.0087 where two standard errors are 0.0105). Ratios of
+/// counts above 40 are therefore never decided.
 const CURVATURE: f64 = 0.004;
 
 /// Whether two pictures of one view share samples, as far as they show it.
 ///
-/// Let x be the mean of n samples and y that of m > n, both masked, so that little of the picture is left beside the noise.
-/// If y contains the samples of x, y has nothing in common with their difference; if it does not, the noise of y is part
-/// of the difference: the regression of y on x − y has the slope 0 or −n/(n + m). The slope is averaged over blocks,
-/// weighted so that textured ones, where y says little about its noise, count less; the scatter of the blocks gives its
-/// standard error. `None` if that is too large to tell the slopes apart, as with equal counts, where there is no nesting.
+/// Let x be the mean of n samples and y that of m > n, both masked, so that little of the picture is left
+/// beside the noise. If y contains the samples of x, y has nothing in common with their difference; if it
+/// does not, the noise of y is part of the difference: the regression of y on x − y has the slope 0 or −n/(n
+/// + m). The slope is averaged over blocks, weighted so that textured ones, where y says little about its
+/// noise, count less; the scatter of the blocks gives its standard error. `None` if that is too large to tell
+/// the slopes apart, as with equal counts, where there is no nesting.
 pub(crate) fn shared_samples(
     size: (usize, usize),
     one: Rendering<'_>,
@@ -102,7 +103,8 @@ mod tests {
 
     const EDGE: usize = 128;
 
-    /// Sums of `spp` samples of a picture with texture in one half, and noise of standard deviation 0.5 a sample.
+    /// Sums of `spp` samples of a picture with texture in one half, and noise of standard deviation 0.5 a
+    /// sample.
     fn sums(seed: u64, spp: u32) -> Vec<f32> {
         let mut noise = Noise::new(seed);
         let mut pixel = |i: usize| {
@@ -138,7 +140,8 @@ mod tests {
         }
     }
 
-    /// Ten thousand times the samples, a hundred times, or no noise at all: the pictures do not show it, and that is what is said.
+    /// Ten thousand times the samples, a hundred times, or no noise at all: the pictures do not show it, and
+    /// that is what is said.
     #[test]
     fn what_cannot_be_told_is_not_guessed() {
         let (few, many) = (sums(1, 10), sums(2, 100_000));

@@ -10,7 +10,8 @@ use crate::threshold::Threshold;
 use crate::tile::{Tile, TileGrid};
 use rayon::prelude::*;
 
-/// A tile with more than one in this many pixels without valid samples gives no evidence, and is not called converged.
+/// A tile with more than one in this many pixels without valid samples gives no evidence, and is not called
+/// converged.
 const NO_EVIDENCE: usize = 16;
 
 /// Judges tiles by a trained model.
@@ -44,8 +45,8 @@ impl Oracle {
         self.threshold
     }
 
-    /// Describes one tile of a picture by its planes, which have `spp` samples per pixel, above 0. [`Oracle::judge_described`]
-    /// wants all tiles of the picture.
+    /// Describes one tile of a picture by its planes, which have `spp` samples per pixel, above 0.
+    /// [`Oracle::judge_described`] wants all tiles of the picture.
     ///
     /// # Errors
     /// [`CriterionError::TileSize`] if the model is for tiles of another size.
@@ -53,16 +54,17 @@ impl Oracle {
         self.model.descriptor().describe_tile(planes, spp).map_err(|e| self.misfit(e))
     }
 
-    /// Judges the tiles that make up a picture, or as many as there are of it: people see a tile in its picture, and so does
-    /// the model. One verdict a tile.
+    /// Judges the tiles that make up a picture, or as many as there are of it: people see a tile in its
+    /// picture, and so does the model. One verdict a tile.
     pub fn judge_described(&self, tiles: &[Described]) -> Vec<Verdict> {
         let numbers = self.model.descriptor().in_picture(tiles);
         tiles.iter().zip(numbers).map(|(tile, raw)| self.verdict(&raw, tile.spp.round() as u64)).collect()
     }
 
-    /// Judges tiles as [`Oracle::judge_described`] does, for other eyes than those of the training data: P is the share of *them*, who see of
-    /// n samples what trained observers see of [`Audience::seen_as`] n. `None` if that cannot be told, since the descriptor does not tell noise from
-    /// picture, and the audience is not [`Audience::TRAINED`].
+    /// Judges tiles as [`Oracle::judge_described`] does, for other eyes than those of the training data: P is
+    /// the share of *them*, who see of n samples what trained observers see of [`Audience::seen_as`] n.
+    /// `None` if that cannot be told, since the descriptor does not tell noise from picture, and the audience
+    /// is not [`Audience::TRAINED`].
     pub fn judge_described_for(&self, tiles: &[Described], audience: Audience) -> Option<Vec<Verdict>> {
         if audience == Audience::TRAINED {
             return Some(self.judge_described(tiles));
@@ -73,7 +75,8 @@ impl Oracle {
 
     fn verdict_for(&self, mut raw: Vec<f32>, spp: f64, audience: Audience) -> Option<Verdict> {
         let seen_as = audience.seen_as(spp);
-        // For someone who is never satisfied with so few samples, the need of the trained audience is sought from one sample on.
+        // For someone who is never satisfied with so few samples, the need of the trained audience is sought
+        // from one sample on.
         let from = seen_as.max(spp.min(1.0));
         if !self.model.descriptor().project(&mut raw, (from / spp) as f32) {
             return None;
@@ -110,8 +113,9 @@ impl Oracle {
         }
     }
 
-    /// The visible noise (see [`crate::Descriptor::visible_noise`]) from which it is seen: of an even noise in a tile of the mean
-    /// texture of the training data, where P crosses the threshold. `None` if the descriptor does not tell noise from picture.
+    /// The visible noise (see [`crate::Descriptor::visible_noise`]) from which it is seen: of an even noise
+    /// in a tile of the mean texture of the training data, where P crosses the threshold. `None` if the
+    /// descriptor does not tell noise from picture.
     pub fn just_visible(&self) -> Option<f32> {
         let descriptor = self.model.descriptor();
         let mean = &self.model.classifier().scaler.mean;
@@ -129,8 +133,9 @@ impl Oracle {
         descriptor.pooled_visible_noise(&at(clean))
     }
 
-    /// The visible noise of a whole image (see [`crate::Descriptor::visible_noise`]), row-major, from the planes of its tiles; NaN
-    /// where `planes` has none. `None` if the descriptor does not tell noise from picture.
+    /// The visible noise of a whole image (see [`crate::Descriptor::visible_noise`]), row-major, from the
+    /// planes of its tiles; NaN where `planes` has none. `None` if the descriptor does not tell noise from
+    /// picture.
     ///
     /// # Errors
     /// Those of `planes`.
@@ -186,9 +191,9 @@ impl Oracle {
         }
     }
 
-    /// Samples per pixel at which P crosses the threshold if only the noise changes, as noise does: σ ∝ 1/√n. Found by
-    /// doubling, then bisecting ln n; `None` if the descriptor does not separate noise from picture, or 2²⁰ times the
-    /// samples are not enough.
+    /// Samples per pixel at which P crosses the threshold if only the noise changes, as noise does: σ ∝ 1/√n.
+    /// Found by doubling, then bisecting ln n; `None` if the descriptor does not separate noise from picture,
+    /// or 2²⁰ times the samples are not enough.
     fn expect(&self, curve: &mut ProbabilityCurve<'_>, spp: u64) -> Option<u64> {
         let mut satisfied =
             |doublings: f32| curve.at(doublings.exp2()).map(|p| self.threshold.is_reached_by(p));
@@ -237,8 +242,8 @@ impl StoppingCriterion for Oracle {
         self.map_visible_noise(view.film.grid(), |tile| self.planes(view, tile)).ok()?
     }
 
-    /// Tiles that are not named count for the picture as they were when last described; they are described again if their
-    /// samples have changed since.
+    /// Tiles that are not named count for the picture as they were when last described; they are described
+    /// again if their samples have changed since.
     fn judge(&mut self, view: &View<'_>, tiles: &[Tile]) -> Result<Vec<Verdict>, CriterionError> {
         let grid = view.film.grid();
         if self.described.len() != grid.len() {
@@ -280,8 +285,8 @@ impl StoppingCriterion for Oracle {
 }
 
 impl Resumable for Oracle {
-    /// How each tile was last described: stopped tiles count so for the picture, whatever has become of their neighbours,
-    /// whose edges were read too.
+    /// How each tile was last described: stopped tiles count so for the picture, whatever has become of their
+    /// neighbours, whose edges were read too.
     fn state(&self) -> Vec<u8> {
         container::payload(&self.described).unwrap_or_default()
     }

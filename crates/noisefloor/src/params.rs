@@ -14,8 +14,9 @@ pub enum Schedule {
         /// Samples per pixel between two verdicts, at least 2.
         step: u64,
     },
-    /// Spaced by the expected need: most of the way to where the criterion expects to be satisfied, at most doubling what the
-    /// tile has, in multiples of `step`. Fewer verdicts and fewer, larger batches; stops on the same grid.
+    /// Spaced by the expected need: most of the way to where the criterion expects to be satisfied, at most
+    /// doubling what the tile has, in multiples of `step`. Fewer verdicts and fewer, larger batches; stops on
+    /// the same grid.
     Spaced {
         /// The finest spacing, in samples per pixel, at least 2.
         step: u64,
@@ -23,8 +24,8 @@ pub enum Schedule {
 }
 
 impl Schedule {
-    /// Share of the way to the expected need that is sampled before the next verdict. Expectations err; an early verdict is
-    /// cheap, late samples are not.
+    /// Share of the way to the expected need that is sampled before the next verdict. Expectations err; an
+    /// early verdict is cheap, late samples are not.
     const APPROACH: f64 = 0.75;
 
     fn step(self) -> u64 {
@@ -47,7 +48,8 @@ impl Schedule {
     }
 }
 
-/// A straight line from the threshold of the observers in the training data to that of another audience: T′ = a·T + b.
+/// A straight line from the threshold of the observers in the training data to that of another audience: T′ =
+/// a·T + b.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Audience {
     /// Slope a, at least 0.
@@ -67,10 +69,10 @@ impl Audience {
         Self { slope: other.slope * self.slope, offset: other.slope * self.offset + other.offset }
     }
 
-    /// The samples per pixel at which the trained audience sees as much noise as this one sees in a picture of
-    /// `samples` samples per pixel: the inverse of [`Audience::samples`]. Never more than `samples`, or, for a less
-    /// demanding audience (a < 1), than `samples`/a: a negative offset makes nobody see less. 0 if no picture satisfies
-    /// them.
+    /// The samples per pixel at which the trained audience sees as much noise as this one sees in a picture
+    /// of `samples` samples per pixel: the inverse of [`Audience::samples`]. Never more than `samples`, or,
+    /// for a less demanding audience (a < 1), than `samples`/a: a negative offset makes nobody see less. 0 if
+    /// no picture satisfies them.
     pub fn seen_as(&self, samples: f64) -> f64 {
         let seen = (samples - self.offset) / self.slope;
         match seen.is_nan() || seen <= 0.0 {
@@ -80,8 +82,8 @@ impl Audience {
         }
     }
 
-    /// Samples per pixel that satisfy this audience where `samples` satisfy the trained one: never fewer, or, for a
-    /// less demanding audience (a < 1), never fewer than a·`samples`.
+    /// Samples per pixel that satisfy this audience where `samples` satisfy the trained one: never fewer, or,
+    /// for a less demanding audience (a < 1), never fewer than a·`samples`.
     pub fn samples(&self, samples: u64) -> u64 {
         let least = if self.slope > 0.0 { self.slope.min(1.0) } else { 1.0 } * samples as f64;
         (self.slope * samples as f64 + self.offset).max(least).ceil().clamp(0.0, 1e15) as u64
@@ -103,7 +105,8 @@ pub struct Params {
     pub max_spp: u64,
     /// Consecutive "converged" verdicts that stop a tile, at least 1.
     pub consecutive: u32,
-    /// Whose thresholds, relative to those that the criterion stands for ([`crate::StoppingCriterion::audience`]).
+    /// Whose thresholds, relative to those that the criterion stands for
+    /// ([`crate::StoppingCriterion::audience`]).
     pub audience: Audience,
 }
 

@@ -36,8 +36,8 @@ pub enum SessionError {
     },
 }
 
-/// Film, criterion and limits, for a renderer that owns its main loop: it pushes batches, asks which tiles are open and how
-/// many samples each needs, and ends when none is open.
+/// Film, criterion and limits, for a renderer that owns its main loop: it pushes batches, asks which tiles
+/// are open and how many samples each needs, and ends when none is open.
 ///
 /// ```
 /// use noisefloor::{FixedSpp, Params, Session};
@@ -106,8 +106,8 @@ impl<C: StoppingCriterion> Session<C> {
         self.display.as_ref()
     }
 
-    /// Fixes how radiance is displayed before that is settled automatically: for renderers with an exposure of their own, or
-    /// that finish one tile before they start the next.
+    /// Fixes how radiance is displayed before that is settled automatically: for renderers with an exposure
+    /// of their own, or that finish one tile before they start the next.
     pub fn set_display(&mut self, display: Display) {
         self.display = Some(display);
         self.displayed_reference = None;
@@ -129,8 +129,8 @@ impl<C: StoppingCriterion> Session<C> {
         Ok(())
     }
 
-    /// What the open tiles need next; empty when all are done. Where halves are kept, requests fill one half at a time, so
-    /// that the two stay even.
+    /// What the open tiles need next; empty when all are done. Where halves are kept, requests fill one half
+    /// at a time, so that the two stay even.
     pub fn requests(&self) -> Vec<Request> {
         let wish = |(index, state): (usize, &TileState)| {
             if state.stop.is_some() {
@@ -149,8 +149,8 @@ impl<C: StoppingCriterion> Session<C> {
         self.tiles.iter().enumerate().filter_map(wish).collect()
     }
 
-    /// Adds the mean of `spp` new samples per pixel of a tile, row-major over the tile. Finished tiles accept samples,
-    /// too: they improve, and keep their stop.
+    /// Adds the mean of `spp` new samples per pixel of a tile, row-major over the tile. Finished tiles accept
+    /// samples, too: they improve, and keep their stop.
     ///
     /// # Errors
     /// [`FilmError`] if it does not fit; nothing is changed then.
@@ -168,8 +168,8 @@ impl<C: StoppingCriterion> Session<C> {
 
     /// Judges the tiles that are due, and returns those that are now done.
     ///
-    /// The first verdicts wait until every open tile has samples: the exposure is settled then, once and for all, unless the tone
-    /// mapping is plain sRGB or [`Session::set_display`] was called.
+    /// The first verdicts wait until every open tile has samples: the exposure is settled then, once and for
+    /// all, unless the tone mapping is plain sRGB or [`Session::set_display`] was called.
     ///
     /// # Errors
     /// [`CriterionError`] if the criterion does not fit the job.
@@ -311,15 +311,16 @@ impl<C: StoppingCriterion> Session<C> {
         self.tiles[tile].verdict
     }
 
-    /// How visible the noise is at each pixel of the image, row-major, in 8-bit display steps (see [`crate::Descriptor::visible_noise`]);
-    /// NaN where there is no evidence. Computed at each call. `None` before the display is settled, or if the criterion cannot
-    /// say.
+    /// How visible the noise is at each pixel of the image, row-major, in 8-bit display steps (see
+    /// [`crate::Descriptor::visible_noise`]); NaN where there is no evidence. Computed at each call. `None`
+    /// before the display is settled, or if the criterion cannot say.
     pub fn visible_noise(&self) -> Option<Vec<f32>> {
         let reference = self.displayed_reference.as_deref();
         self.criterion.visible_noise(&View { film: &self.film, display: self.display.as_ref()?, reference })
     }
 
-    /// Samples still to be taken, over all pixels, by the criterion's expectations; `None` while it has none for an open tile.
+    /// Samples still to be taken, over all pixels, by the criterion's expectations; `None` while it has none
+    /// for an open tile.
     pub fn expected_samples_to_go(&self) -> Option<u64> {
         let (max, audience) = (self.params.max_spp, self.audience());
         self.tiles.iter().enumerate().filter(|(_, state)| state.stop.is_none()).try_fold(

@@ -20,11 +20,11 @@ pub enum Unit {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Repeats {
-    /// Every sample: it follows from (seed, pixel, index of the sample), however requests are cut and whatever other tiles are
-    /// asked for with it. Only rounding of the means differs.
+    /// Every sample: it follows from (seed, pixel, index of the sample), however requests are cut and
+    /// whatever other tiles are asked for with it. Only rounding of the means differs.
     Samples,
-    /// Every call: the same requests in the same order give the same bits. Cut otherwise, they give other samples of the same
-    /// distribution.
+    /// Every call: the same requests in the same order give the same bits. Cut otherwise, they give other
+    /// samples of the same distribution.
     Calls,
     /// Nothing: threads race, say. The distribution is the same.
     Nothing,
@@ -52,8 +52,9 @@ pub struct SourceInfo {
 pub struct Request {
     /// The tile to sample.
     pub tile: Tile,
-    /// Samples per pixel that this tile already has: the index of the first new one. A source that derives its random
-    /// numbers from (seed, pixel, sample index) is deterministic however the work is split into batches.
+    /// Samples per pixel that this tile already has: the index of the first new one. A source that derives
+    /// its random numbers from (seed, pixel, sample index) is deterministic however the work is split into
+    /// batches.
     pub first: u64,
     /// New samples per pixel wanted, at least 1.
     pub spp: u64,
@@ -64,8 +65,8 @@ pub struct Request {
 pub struct Batch {
     /// The tile that was sampled.
     pub tile: Tile,
-    /// Exact number of new samples per pixel. Normally what was asked for; a playback of stored images hands out
-    /// what it has. Zero says that the source is exhausted in this tile.
+    /// Exact number of new samples per pixel. Normally what was asked for; a playback of stored images hands
+    /// out what it has. Zero says that the source is exhausted in this tile.
     pub spp: u64,
     /// Mean of the new samples only, row-major over the tile, `tile.pixels()` values (none if `spp` is zero).
     /// Non-finite values are allowed: the film rejects and counts them.
@@ -107,23 +108,26 @@ pub enum SourceError {
     },
 }
 
-/// Adds samples to tiles on request. It never accumulates, judges, tone maps or stops: that is the oracle's part.
+/// Adds samples to tiles on request. It never accumulates, judges, tone maps or stops: that is the oracle's
+/// part.
 ///
 /// # Why it is shaped so
-/// All tiles that are still open come in one call, so that a source can spread them over its threads (or over one
-/// wavefront of a GPU). Batches are means of *new* samples only, so that the film can keep two independent halves of any
-/// source, and no renderer has to know what a half buffer is.
+/// All tiles that are still open come in one call, so that a source can spread them over its threads (or over
+/// one wavefront of a GPU). Batches are means of *new* samples only, so that the film can keep two
+/// independent halves of any source, and no renderer has to know what a half buffer is.
 ///
 /// # For implementers
-/// - Return one batch for each request, in the order of the requests. A source that cannot aim ([`SourceInfo::aims`] is
-///   false) is always asked for all tiles.
+/// - Return one batch for each request, in the order of the requests. A source that cannot aim
+///   ([`SourceInfo::aims`] is false) is always asked for all tiles.
 /// - Samples must be independent of all samples handed out before, in this tile and in others.
-/// - The same seed should give the same samples, whatever the number of threads and however requests are split into
-///   batches. [`SourceInfo::repeats`] says how much of this holds: a run is as reproducible as its source.
-/// - Use no reconstruction filter wider than a pixel unless you document it: shared samples correlate the noise of
-///   neighbours, and the model has learned from independent noise.
+/// - The same seed should give the same samples, whatever the number of threads and however requests are
+///   split into batches. [`SourceInfo::repeats`] says how much of this holds: a run is as reproducible as its
+///   source.
+/// - Use no reconstruction filter wider than a pixel unless you document it: shared samples correlate the
+///   noise of neighbours, and the model has learned from independent noise.
 ///
-/// The crate `noisefloor-testkit` has `check_source`, the contract that every source of this project passes: run it on yours.
+/// The crate `noisefloor-testkit` has `check_source`, the contract that every source of this project passes:
+/// run it on yours.
 #[auto_impl(&mut, Box)]
 pub trait ProgressiveSource {
     /// Describes the source. Must not change over its life.
@@ -132,11 +136,12 @@ pub trait ProgressiveSource {
     /// Adds samples to the tiles named.
     ///
     /// # Errors
-    /// [`SourceError`] if the renderer failed; samples of this call are then lost, all earlier ones stay valid.
+    /// [`SourceError`] if the renderer failed; samples of this call are then lost, all earlier ones stay
+    /// valid.
     fn sample(&mut self, requests: &[Request]) -> Result<Vec<Batch>, SourceError>;
 
-    /// Renders the quick noise-free reference, if this source has one. Called at most once, and only if the criterion
-    /// needs it.
+    /// Renders the quick noise-free reference, if this source has one. Called at most once, and only if the
+    /// criterion needs it.
     ///
     /// # Errors
     /// [`SourceError`] if the renderer failed.

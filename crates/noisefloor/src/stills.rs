@@ -125,9 +125,9 @@ pub struct SnapshotPair<'a> {
 }
 
 impl<'a> SnapshotPair<'a> {
-    /// Compares a picture with others of the same view, as models with this evidence need it. Independent renderings are
-    /// pooled; of nested ones and of references, the most informative is used. `samples` says how the pictures were made;
-    /// with `None` this is recognised from the pictures, where they show it.
+    /// Compares a picture with others of the same view, as models with this evidence need it. Independent
+    /// renderings are pooled; of nested ones and of references, the most informative is used. `samples` says
+    /// how the pictures were made; with `None` this is recognised from the pictures, where they show it.
     ///
     /// # Errors
     /// [`StillError`] if they do not fit, or there is nothing to hold the picture against.
@@ -228,7 +228,8 @@ fn recognise(image: &Still, others: &[&Still], display: &Display) -> Result<Samp
     }
 }
 
-/// Independent renderings make one of all their samples. Of nested ones, the one that differs most in its samples says most.
+/// Independent renderings make one of all their samples. Of nested ones, the one that differs most in its
+/// samples says most.
 fn pool<'a>(others: &[&'a Still], image_spp: f64, samples: Samples) -> Option<Cow<'a, Still>> {
     let distance = |r: &Still| (1.0 / r.spp - 1.0 / image_spp).abs();
     let (first, rest) = others.split_first()?;

@@ -44,7 +44,8 @@ pub struct Stop {
     pub tile: Tile,
     /// Samples per pixel when it stopped.
     pub spp: u64,
-    /// Probability, at the last verdict, that an observer sees no difference; `None` if never judged or not offered.
+    /// Probability, at the last verdict, that an observer sees no difference; `None` if never judged or not
+    /// offered.
     pub probability: Option<f32>,
     /// Why.
     pub reason: StopReason,

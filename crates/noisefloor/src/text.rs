@@ -4,8 +4,8 @@ use std::borrow::Cow;
 
 /// Makes text from a file or another program safe to print on a terminal.
 ///
-/// Control characters, which can move the cursor, hide text or retitle a window, and invisible marks that reorder text become
-/// escapes like `\u{1b}`. Line breaks and tabs stay.
+/// Control characters, which can move the cursor, hide text or retitle a window, and invisible marks that
+/// reorder text become escapes like `\u{1b}`. Line breaks and tabs stay.
 ///
 /// ```
 /// assert_eq!(noisefloor::printable("wall\x1b[2J\tgrey"), "wall\\u{1b}[2J\tgrey");
@@ -37,7 +37,8 @@ mod tests {
         for same in ["", "a wall, grün\n\tand 灰色 🙂"] {
             assert!(matches!(printable(same), Cow::Borrowed(text) if text == same));
         }
-        // Colour, title of the window, the eight-bit form of ESC [, carriage return, delete, right-to-left override
+        // Colour, title of the window, the eight-bit form of ESC [, carriage return, delete, right-to-left
+        // override
         assert_eq!(printable("\x1b[31m"), "\\u{1b}[31m");
         assert_eq!(printable("\x1b]0;owned\x07"), "\\u{1b}]0;owned\\u{7}");
         assert_eq!(printable("\u{9b}2J\r\x7f\u{202e}x"), "\\u{9b}2J\\r\\u{7f}\\u{202e}x");

@@ -64,7 +64,8 @@ pub enum TileError {
     Image(usize, usize),
 }
 
-/// A grid of square tiles over an image, row-major from the top left; those of the last column and row may be narrower.
+/// A grid of square tiles over an image, row-major from the top left; those of the last column and row may be
+/// narrower.
 ///
 /// ```
 /// let grid = noisefloor::TileGrid::new(800, 600, 128)?;

@@ -1,4 +1,5 @@
-//! Push: a renderer keeps its own loop, hands its samples to a session tile by tile, and leaves tiles alone that are done.
+//! Push: a renderer keeps its own loop, hands its samples to a session tile by tile, and leaves tiles alone
+//! that are done.
 #![allow(clippy::print_stdout, reason = "an example prints")]
 
 use noisefloor::{Oracle, Params, Request, Rgb, Session, SessionError};
@@ -10,7 +11,8 @@ fn main() -> Result<(), SessionError> {
     let params = Params { tile: 64, ..Params::default() };
     let mut session = Session::new(WIDTH, HEIGHT, Oracle::bundled(), params)?;
 
-    // The loop stays the renderer's. `requests` names the open tiles, and how many samples each deserves next.
+    // The loop stays the renderer's. `requests` names the open tiles, and how many samples each deserves
+    // next.
     while !session.is_done() {
         for request in session.requests() {
             session.push(request.tile.index, request.spp, &render(&request))?;
@@ -36,7 +38,8 @@ fn render(Request { tile, first, spp: samples }: &Request) -> Vec<Rgb> {
     (0..tile.pixels()).map(pixel).collect()
 }
 
-/// Sample `n` of a pixel: a floor in the light of a square lamp, and the shadow of a ball that hangs between them.
+/// Sample `n` of a pixel: a floor in the light of a square lamp, and the shadow of a ball that hangs between
+/// them.
 fn radiance(x: f32, y: f32, n: u64) -> f32 {
     let [dx, dy, u, v] = [0, 1, 2, 3].map(|dimension| random(4 * n + dimension));
     let depth = 300.0 / (y + dy + 20.0); // the floor runs away towards the top of the picture

@@ -1,4 +1,5 @@
-//! Source: the renderer becomes a [`noisefloor::ProgressiveSource`], and the driver runs it: events, a time limit, a table.
+//! Source: the renderer becomes a [`noisefloor::ProgressiveSource`], and the driver runs it: events, a time
+//! limit, a table.
 #![allow(clippy::print_stdout, reason = "an example prints")]
 
 mod shadow;

@@ -57,8 +57,8 @@ impl Shadow {
         Batch { tile, spp: samples, mean: (0..tile.pixels()).map(pixel).collect() }
     }
 
-    /// Sample `n` of a pixel. All random numbers follow from (seed, pixel, n): the same picture whatever the threads, and however
-    /// the driver cuts its requests.
+    /// Sample `n` of a pixel. All random numbers follow from (seed, pixel, n): the same picture whatever the
+    /// threads, and however the driver cuts its requests.
     fn radiance(&self, x: usize, y: usize, n: u64) -> Rgb {
         let pixel = (y * self.width + x) as u64;
         let key = random_bits(random_bits(self.seed) ^ pixel);

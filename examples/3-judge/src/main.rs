@@ -1,4 +1,5 @@
-//! Judge: says of each tile of an EXR file whether people would see noise in it, by another rendering of the same view.
+//! Judge: says of each tile of an EXR file whether people would see noise in it, by another rendering of the
+//! same view.
 #![allow(clippy::print_stdout, reason = "an example prints")]
 
 use noisefloor::{DEFAULT_TILE, Oracle, Rendering, Samples, TileGrid, TilePlanes, ToneMapping};

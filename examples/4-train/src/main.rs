@@ -12,7 +12,8 @@ use std::io::{self, BufReader};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-/// What people said of the scenes that the bundled model has learned from, with the descriptors of their pictures.
+/// What people said of the scenes that the bundled model has learned from, with the descriptors of their
+/// pictures.
 const TABLE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../fixtures/human-table.csv");
 const OUT: &str = "out/example.nfm";
 

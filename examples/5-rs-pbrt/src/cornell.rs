@@ -19,7 +19,8 @@ const WHITE: [f32; 3] = [0.73, 0.73, 0.71];
 const RED: [f32; 3] = [0.61, 0.06, 0.05];
 const GREEN: [f32; 3] = [0.13, 0.44, 0.10];
 const LIGHT: [f32; 3] = [22.0, 18.0, 12.5];
-/// Longest path in bounces, pbrt's own choice. Bidirectional paths are always that long, and connected everywhere.
+/// Longest path in bounces, pbrt's own choice. Bidirectional paths are always that long, and connected
+/// everywhere.
 const MAX_DEPTH: i32 = 5;
 
 /// The built-in scene cornell-box of noisefloor-ptwne, for `path` or `bdpt`.
@@ -31,7 +32,8 @@ pub(crate) fn cornell_box(width: usize, height: usize, integrator: &str) -> Rend
     options.integrator_params.add_int("maxdepth".into(), MAX_DEPTH);
     options.integrator_params.add_string("lightsamplestrategy".into(), "uniform".into());
 
-    // Of the shorter side. pbrt's coordinates are left-handed: seen from a mirrored camera, the scene is as it should be
+    // Of the shorter side. pbrt's coordinates are left-handed: seen from a mirrored camera, the scene is as
+    // it should be
     options.camera_params.add_float("fov".into(), 39.0);
     let eye = Point3f { x: 0.0, y: 1.0, z: 3.82 };
     let target = Point3f { x: 0.0, y: 1.0, z: 0.0 };

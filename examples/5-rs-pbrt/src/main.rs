@@ -1,5 +1,5 @@
-//! A renderer that nobody here wrote: [rs_pbrt](https://crates.io/crates/rs_pbrt), pbrt-v3 in Rust, stops where people stop seeing
-//! noise. Its public interface is all that is used.
+//! A renderer that nobody here wrote: [rs_pbrt](https://crates.io/crates/rs_pbrt), pbrt-v3 in Rust, stops
+//! where people stop seeing noise. Its public interface is all that is used.
 #![allow(clippy::print_stdout, reason = "an example prints")]
 
 mod cornell;

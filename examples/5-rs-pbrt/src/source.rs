@@ -1,4 +1,5 @@
-//! rs_pbrt behind [`ProgressiveSource`]: path tracing pixel by pixel, and bidirectional path tracing of whole pictures.
+//! rs_pbrt behind [`ProgressiveSource`]: path tracing pixel by pixel, and bidirectional path tracing of whole
+//! pictures.
 
 use noisefloor::{Batch, ProgressiveSource, Repeats, Request, Rgb, SourceError, SourceInfo, Tile, Unit};
 use rayon::prelude::*;
@@ -73,8 +74,8 @@ impl Pbrt {
         Batch { tile: r.tile, spp: r.spp, mean }
     }
 
-    /// Bidirectional path tracing of the whole picture. Paths from the lights meet the camera in any pixel, so that tiles cannot
-    /// be rendered alone.
+    /// Bidirectional path tracing of the whole picture. Paths from the lights meet the camera in any pixel,
+    /// so that tiles cannot be rendered alone.
     fn trace_both(&self, both: &BDPTIntegrator, first: u64, samples: u64) -> Vec<Rgb> {
         let (width, height) = self.size();
         let row = |y: usize| {

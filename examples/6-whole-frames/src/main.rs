@@ -1,4 +1,5 @@
-//! A renderer that nobody here wrote, and that can do nothing but one more sample for each pixel of the whole picture:
+//! A renderer that nobody here wrote, and that can do nothing but one more sample for each pixel of the whole
+//! picture:
 //! [rust-pathtracer](https://crates.io/crates/rust-pathtracer). It has no seed, so that every run is another.
 #![allow(clippy::print_stdout, reason = "an example prints")]
 

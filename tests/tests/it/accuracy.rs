@@ -7,7 +7,8 @@ fn table() -> Table {
     noisefloor_learn::read_table(std::fs::File::open(path).unwrap()).unwrap()
 }
 
-/// What the bundled model was trained with; the search among candidates takes minutes and is not repeated here.
+/// What the bundled model was trained with; the search among candidates takes minutes and is not repeated
+/// here.
 fn params(model: &Model) -> TrainParams {
     let candidates = vec![SvmParams { c: model.record().c, gamma: model.record().gamma }];
     TrainParams { candidates, ..TrainParams::default() }
@@ -21,13 +22,15 @@ fn the_bundled_model_is_what_the_table_trains() {
     let trained = train(&table, &params(&bundled), String::new(), None).unwrap();
     for level in table.zones.iter().flat_map(|z| &z.levels) {
         let p = |model: &Model| model.judge(&level.descriptor).probability;
-        // The solver ends within 1e-3 of the optimum; on another machine, exp may round otherwise on the way there
+        // The solver ends within 1e-3 of the optimum; on another machine, exp may round otherwise on the way
+        // there
         let (trained, bundled) = (p(&trained), p(&bundled));
         assert!((trained - bundled).abs() < 5e-3, "{trained} {bundled}");
     }
 }
 
-/// The rules of evidence hold, and so do the scores in README: this repeats them with C and γ of the bundled model.
+/// The rules of evidence hold, and so do the scores in README: this repeats them with C and γ of the bundled
+/// model.
 #[test]
 fn left_out_scenes_are_predicted_better_than_by_one_noise_level() {
     let table = table();

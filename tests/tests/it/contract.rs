@@ -158,7 +158,8 @@ fn who_promises_less_is_held_to_less_and_no_less() {
     said(by_call(Repeats::Calls, |_, _| ()), "kept");
     said(by_call(Repeats::Nothing, |_, _| ()), "kept");
 
-    // Small batches a little darker; half of the samples they claim; all the noise in a tenth of the pixels of a batch
+    // Small batches a little darker; half of the samples they claim; all the noise in a tenth of the pixels
+    // of a batch
     let dark = |r: &Request, b: &mut Batch| {
         b.mean.iter_mut().flatten().for_each(|c| *c *= if r.spp == 8 { 0.97 } else { 1.0 })
     };

@@ -82,8 +82,8 @@ fn table(descriptor: &Descriptor) -> Table {
     Table { descriptor: descriptor.clone(), evidence, tone_mapping, zones, answers: vec![] }
 }
 
-/// CONTRIBUTING's recipe "One more descriptor", followed outside the library: describe, keep as a table, train, judge, and keep
-/// as a model, which only those can read who know the kind.
+/// CONTRIBUTING's recipe "One more descriptor", followed outside the library: describe, keep as a table,
+/// train, judge, and keep as a model, which only those can read who know the kind.
 #[test]
 fn one_more_descriptor_is_added_in_one_place() {
     let descriptor = Descriptor::new(PlainNoise { floor: 1e-8 });

@@ -94,7 +94,8 @@ fn the_cornell_box_stops_by_itself_whatever_the_threads_and_whoever_owns_the_loo
     assert_eq!(outcome, Outcome::of(&session));
 }
 
-/// Renderers that keep a running mean push that: the same stops, but for what f32 takes from a difference of two means.
+/// Renderers that keep a running mean push that: the same stops, but for what f32 takes from a difference of
+/// two means.
 #[test]
 fn running_means_stop_where_batches_do() {
     let mut source = Synthetic::new(96, 32);
@@ -134,8 +135,9 @@ fn a_fixed_number_of_samples_is_that_everywhere() {
     }
 }
 
-/// Spaced verdicts see fewer pictures: they stop on the same grid, never earlier than a neighbour's noise in the apron can make
-/// them (a step), and late by no more than a look at three quarters of the way to an expectation that errs by a third.
+/// Spaced verdicts see fewer pictures: they stop on the same grid, never earlier than a neighbour's noise in
+/// the apron can make them (a step), and late by no more than a look at three quarters of the way to an
+/// expectation that errs by a third.
 #[test]
 fn spaced_verdicts_stop_about_where_frequent_ones_do() {
     let count = |schedule: Schedule| {
@@ -229,7 +231,8 @@ fn the_reference_is_rendered_once_where_it_is_needed_and_never_elsewhere() {
     assert!(rendered.stops.iter().all(|s| s.probability.is_some()));
 }
 
-/// A tile whose source has nothing at all is done at once; the exposure, and with it every other tile, does not wait for it.
+/// A tile whose source has nothing at all is done at once; the exposure, and with it every other tile, does
+/// not wait for it.
 #[test]
 fn a_tile_without_samples_does_not_hold_up_the_others() {
     let calls = Rc::new(RefCell::new(0));

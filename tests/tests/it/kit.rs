@@ -4,8 +4,8 @@ use noisefloor_testkit::{Noise, Requirement, require};
 use std::collections::BTreeMap;
 use std::sync::Mutex;
 
-/// Noise without a renderer. A sample of a pixel is `radiance`·(1 ± `noise`), one as likely as the other. All follows from (seed,
-/// pixel, sample).
+/// Noise without a renderer. A sample of a pixel is `radiance`·(1 ± `noise`), one as likely as the other. All
+/// follows from (seed, pixel, sample).
 #[derive(Clone)]
 pub(crate) struct Synthetic {
     pub(crate) size: (usize, usize),

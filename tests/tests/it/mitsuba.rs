@@ -50,8 +50,8 @@ fn crop_windows_keep_the_contract() {
     check_source(make);
 }
 
-/// The same scene by two renderers: tile by tile the same mean. Each z exceeds 6 with p = 2e-9, and 24 are looked at; the sources are
-/// seeded.
+/// The same scene by two renderers: tile by tile the same mean. Each z exceeds 6 with p = 2e-9, and 24 are
+/// looked at; the sources are seeded.
 #[test]
 fn it_renders_what_our_renderer_does() {
     if !usable(&RENDERER) {
@@ -116,7 +116,8 @@ fn depth_and_size_are_those_asked_for() {
     }
 }
 
-/// A plane under a sky, seen from infinity: what a pixel gets follows from its random numbers alone, not from its place.
+/// A plane under a sky, seen from infinity: what a pixel gets follows from its random numbers alone, not from
+/// its place.
 fn plane(folder: &Path) -> PathBuf {
     let (width, height) = (32, 16);
     let at = |i: usize| (i as f32).mul_add(0.37, 1.0).sin().mul_add(0.4, 1.0);
@@ -146,8 +147,9 @@ fn values(source: &mut Sidecar, request: Request) -> Vec<[u32; 3]> {
     source.sample(&[request]).unwrap().remove(0).mean.iter().map(|p| p.map(f32::to_bits)).collect()
 }
 
-/// The trap of the scalar variant: it numbers streams seed × area + pixel, so that windows of different areas share streams under equal or
-/// neighbouring seeds. Where two pixels share a stream they get the same value to the bit, and by chance three channels never do.
+/// The trap of the scalar variant: it numbers streams seed × area + pixel, so that windows of different areas
+/// share streams under equal or neighbouring seeds. Where two pixels share a stream they get the same value
+/// to the bit, and by chance three channels never do.
 #[test]
 fn no_two_pixels_or_batches_share_random_numbers() {
     if !usable(&RENDERER) {
@@ -156,7 +158,8 @@ fn no_two_pixels_or_batches_share_random_numbers() {
     let folder = tempfile::tempdir().unwrap();
     let scene = plane(folder.path());
 
-    // The test can fail: two processes whose first request is of one index start with the same streams, wherever the tile is
+    // The test can fail: two processes whose first request is of one index start with the same streams,
+    // wherever the tile is
     let mut one = open(&scene, (128, 128), Variant::Scalar);
     let mut other = open(&scene, (128, 128), Variant::Scalar);
     let same = values(&mut one, request(3, (0, 0), (16, 16), 0))

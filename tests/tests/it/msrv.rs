@@ -7,7 +7,8 @@ fn version(text: &str) -> (u32, u32) {
     (parts.next().unwrap_or(0), parts.next().unwrap_or(0))
 }
 
-/// No dependency states a newer Rust than the workspace promises. (Clippy's `incompatible_msrv` looks at the standard library.)
+/// No dependency states a newer Rust than the workspace promises. (Clippy's `incompatible_msrv` looks at the
+/// standard library.)
 #[test]
 fn no_dependency_needs_a_newer_rust() {
     let cargo = std::env::var_os("CARGO").unwrap_or_else(|| env!("CARGO").into());

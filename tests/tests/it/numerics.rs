@@ -35,7 +35,8 @@ fn the_unit_of_radiance_changes_nothing() {
     for unit in [1e-30, 1e-8, 1e-4, 1e4, 1e8, 1e30] {
         for (usual, stop) in usual.iter().zip(at(unit)) {
             assert_eq!((usual.spp, usual.reason), (stop.spp, stop.reason), "unit {unit}");
-            // Display values differ by roundings of 1e-7 of each; noise of a step is 1/255, the machine's slope below 10 a unit of ln
+            // Display values differ by roundings of 1e-7 of each; noise of a step is 1/255, the machine's
+            // slope below 10 a unit of ln
             let difference = (usual.probability.unwrap() - stop.probability.unwrap()).abs();
             assert!(difference < 1e-3, "unit {unit}: {difference}");
         }
@@ -54,7 +55,8 @@ fn what_is_constant_or_black_has_converged_at_once() {
     }
 }
 
-/// Samples that are not numbers are counted, kept out, and change no other tile by more than the step that a grain of exposure can.
+/// Samples that are not numbers are counted, kept out, and change no other tile by more than the step that a
+/// grain of exposure can.
 #[test]
 fn samples_that_are_not_finite_are_kept_out() {
     let clean = run(Synthetic::new(96, 32), tiles_of(32));
@@ -98,9 +100,9 @@ fn every_size_is_judged() {
 
 /// Halves of 1 and 10,000 samples: the residual has the noise of the mean of all 10,001.
 ///
-/// Over 128×128 independent pixels of almost normal noise the standard deviation is known to 1/√(2·16384) = 0.55 %, and so is that of
-/// even halves; their ratio errs by 0.8 %. 5 of that, and 1 % for the curvature of the display curve under noise of 3 %: 5 %. Fails by
-/// chance with p < 1e-6.
+/// Over 128×128 independent pixels of almost normal noise the standard deviation is known to 1/√(2·16384) =
+/// 0.55 %, and so is that of even halves; their ratio errs by 0.8 %. 5 of that, and 1 % for the curvature of
+/// the display curve under noise of 3 %: 5 %. Fails by chance with p < 1e-6.
 #[test]
 fn uneven_halves_have_the_noise_of_their_mean() {
     let residual = |batches: [u64; 2]| {
@@ -128,8 +130,8 @@ fn uneven_halves_have_the_noise_of_their_mean() {
     assert!((uneven / even - 1.0).abs() < 0.05, "{uneven} {even}");
 }
 
-/// A single sample of 10¹² before the exposure settles. It is one pixel of thousands: nobody's screen goes dark, and the tiles
-/// beside it stop where they do without it, to a step.
+/// A single sample of 10¹² before the exposure settles. It is one pixel of thousands: nobody's screen goes
+/// dark, and the tiles beside it stop where they do without it, to a step.
 #[test]
 fn one_firefly_leaves_the_other_tiles_alone() {
     let clean = run(Synthetic::new(96, 64), tiles_of(32));

@@ -32,7 +32,8 @@ fn converged(
     oracle.judge_described(&described).iter().filter(|v| v.converged).count()
 }
 
-/// Of what production renderers made: most zones of the first pictures are noisy, most of the last ones are not.
+/// Of what production renderers made: most zones of the first pictures are noisy, most of the last ones are
+/// not.
 #[test]
 fn early_pictures_are_noisy_and_last_ones_are_not() {
     let Some(dir) = require_shared("human/lisic9") else { return };

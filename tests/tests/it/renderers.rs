@@ -93,8 +93,8 @@ fn built_in() -> Vec<Rgb> {
     )
 }
 
-/// Right ones have 2e-4 to 1.7e-3, most of it from the few blocks with an edge of the lamp in them. LuxCore's bidir with Russian
-/// roulette, which is wrong by 6 % on average, has 2e-2. LuxCore is not seeded to the bit.
+/// Right ones have 2e-4 to 1.7e-3, most of it from the few blocks with an edge of the lamp in them. LuxCore's
+/// bidir with Russian roulette, which is wrong by 6 % on average, has 2e-2. LuxCore is not seeded to the bit.
 const SAME: f64 = 4e-3;
 
 #[test]

@@ -71,7 +71,8 @@ pub struct JudgedImage {
     pub patch: Patch,
 }
 
-/// An iterator over images of zones that decodes each image once, when it is needed. Ends after the first error.
+/// An iterator over images of zones that decodes each image once, when it is needed. Ends after the first
+/// error.
 #[derive(Debug)]
 pub struct JudgedImages<'a> {
     jobs: VecDeque<Job<'a>>,
@@ -90,7 +91,8 @@ struct Job<'a> {
 }
 
 /// Every real image of one zone, samples ascending. For all zones of a scene,
-/// [`Corpus::scene_levels`](crate::Corpus::scene_levels) decodes each shared image once instead of once a zone.
+/// [`Corpus::scene_levels`](crate::Corpus::scene_levels) decodes each shared image once instead of once a
+/// zone.
 ///
 /// # Errors
 /// [`CorpusError::Stack`] if the zone's folder cannot be listed.
@@ -166,7 +168,8 @@ impl<'a> JudgedImages<'a> {
     }
 }
 
-/// The reference of a scene cut into patches of the same shape as its images', zone by zone; `None` if there is none.
+/// The reference of a scene cut into patches of the same shape as its images', zone by zone; `None` if there
+/// is none.
 pub(super) fn reference(zones: &[&JudgedZone]) -> Result<Option<Vec<Patch>>, CorpusError> {
     let Some(first) = zones.first() else { return Ok(None) };
     let folder = match &first.stack {

@@ -1,14 +1,14 @@
 //! Thresholds that observers gave, and the images they judged.
 //!
-//! A corpus is a folder with `thresholds.csv` (columns scene, renderer, zone, x, y, width, height, human_spp, first_spp,
-//! last_spp; one line a zone, in any order of columns) and one of two layouts:
-//! - a folder a scene, named as in the table, with running means named by samples per pixel (`<scene>/00100.png`), for any
-//!   number of scenes; zones are rectangles of these images;
-//! - a folder a zone (`zone07/batch_00060_00100.exr`) with batch means, for one scene; an image is the zone alone, and x, y say
-//!   where it lay in the full picture.
+//! A corpus is a folder with `thresholds.csv` (columns scene, renderer, zone, x, y, width, height, human_spp,
+//! first_spp, last_spp; one line a zone, in any order of columns) and one of two layouts:
+//! - a folder a scene, named as in the table, with running means named by samples per pixel
+//!   (`<scene>/00100.png`), for any number of scenes; zones are rectangles of these images;
+//! - a folder a zone (`zone07/batch_00060_00100.exr`) with batch means, for one scene; an image is the zone
+//!   alone, and x, y say where it lay in the full picture.
 //!
-//! A scene may have a noise-free reference of the full picture, in linear light, in its folder or beside those of its zones:
-//! `reference.exr`.
+//! A scene may have a noise-free reference of the full picture, in linear light, in its folder or beside
+//! those of its zones: `reference.exr`.
 
 mod error;
 mod levels;
@@ -30,10 +30,12 @@ pub struct Corpus {
 }
 
 impl Corpus {
-    /// Reads `thresholds.csv` and checks that the images of every zone are there, by name; opens none of them.
+    /// Reads `thresholds.csv` and checks that the images of every zone are there, by name; opens none of
+    /// them.
     ///
     /// # Errors
-    /// [`CorpusError`] with the line of a malformed row, or with the name of what is missing, doubled, or leaves a gap.
+    /// [`CorpusError`] with the line of a malformed row, or with the name of what is missing, doubled, or
+    /// leaves a gap.
     pub fn open(dir: impl AsRef<Path>) -> Result<Self, CorpusError> {
         let dir = dir.as_ref();
         let rows = table::read(&dir.join("thresholds.csv"))?;
@@ -80,20 +82,22 @@ impl Corpus {
         scenes
     }
 
-    /// Every real image of every zone of a scene, each image decoded once however many zones share it. Running means come
-    /// image by image, batches zone by zone, samples ascending.
+    /// Every real image of every zone of a scene, each image decoded once however many zones share it.
+    /// Running means come image by image, batches zone by zone, samples ascending.
     ///
     /// # Errors
-    /// [`CorpusError::Unknown`] if there is no such scene, [`CorpusError::Stack`] if its folders have changed since.
+    /// [`CorpusError::Unknown`] if there is no such scene, [`CorpusError::Stack`] if its folders have changed
+    /// since.
     pub fn scene_levels(&self, scene: &str) -> Result<JudgedImages<'_>, CorpusError> {
         JudgedImages::of(&self.scene_zones(scene)?)
     }
 
-    /// The noise-free reference of a scene in linear light, cut into patches like those of its images, in the order of its zones;
-    /// `None` if there is none.
+    /// The noise-free reference of a scene in linear light, cut into patches like those of its images, in the
+    /// order of its zones; `None` if there is none.
     ///
     /// # Errors
-    /// [`CorpusError::Unknown`] if there is no such scene, [`CorpusError::Stack`] if the reference cannot be read,
+    /// [`CorpusError::Unknown`] if there is no such scene, [`CorpusError::Stack`] if the reference cannot be
+    /// read,
     /// [`CorpusError::JudgedZone`] if a zone lies outside it.
     pub fn scene_reference(&self, scene: &str) -> Result<Option<Vec<Patch>>, CorpusError> {
         levels::reference(&self.scene_zones(scene)?)

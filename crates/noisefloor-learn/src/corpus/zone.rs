@@ -33,11 +33,13 @@ pub struct JudgedZone {
     pub height: usize,
     /// Mean samples per pixel at which observers could no longer tell the zone from the reference; positive.
     pub human_spp: f64,
-    /// Whether `human_spp` is only a lower bound: it is at least [`CENSORED_SPP`], or at least `last_spp`. Keep it out of means.
+    /// Whether `human_spp` is only a lower bound: it is at least [`CENSORED_SPP`], or at least `last_spp`.
+    /// Keep it out of means.
     pub censored: bool,
     /// Samples per pixel of the least converged image observers could choose.
     pub first_spp: u64,
-    /// Samples per pixel of the most converged image observers could choose. Not all images up to it need be here.
+    /// Samples per pixel of the most converged image observers could choose. Not all images up to it need be
+    /// here.
     pub last_spp: u64,
     /// Where its images are.
     pub stack: ZoneImages,

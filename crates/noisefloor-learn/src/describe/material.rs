@@ -72,14 +72,15 @@ impl Material {
         ((patch.width, patch.height), tile)
     }
 
-    /// Running means that contain one another, in display values. Realisations are the first `a` samples and the next `b − a`.
+    /// Running means that contain one another, in display values. Realisations are the first `a` samples and
+    /// the next `b − a`.
     fn from_running_means(images: &[&Image]) -> Option<Self> {
         let last = images.last()?;
         let converged_spp = last.last as f64;
         let early: Vec<&&Image> = images.iter().filter(|i| (i.last as f64) <= 0.5 * converged_spp).collect();
 
-        // Both realisations need many samples, and the second must not amplify rounding: at most threefold more before it than
-        // in it. Among equals, the first.
+        // Both realisations need many samples, and the second must not amplify rounding: at most threefold
+        // more before it than in it. Among equals, the first.
         let pairs = early.iter().flat_map(|a| early.iter().map(move |b| (a, b)));
         let usable = pairs.filter(|(a, b)| b.last > a.last && a.last <= 3 * (b.last - a.last));
         let (a, b) = usable.min_by_key(|(a, b)| std::cmp::Reverse(a.last.min(b.last - a.last)))?;
@@ -101,7 +102,8 @@ impl Material {
             rounding: rounding * (1.0 + (na * na + nb * nb) / (batch * batch)) * scale * scale,
         };
 
-        // An early picture is held against the converged one, a late one against the early one with most samples.
+        // An early picture is held against the converged one, a late one against the early one with most
+        // samples.
         let real = |image: &&Image| {
             let is_early = (image.last as f64) <= 0.5 * converged_spp;
             let other = if is_early { last } else { b };
@@ -224,14 +226,15 @@ impl Material {
         Ok(real.chain(synthesised).collect())
     }
 
-    /// The picture of `spp` samples, its noise one realisation (0 or 1). The converged picture has noise of its own, so that less is
-    /// laid over it; beyond its samples none is.
+    /// The picture of `spp` samples, its noise one realisation (0 or 1). The converged picture has noise of
+    /// its own, so that less is laid over it; beyond its samples none is.
     fn shown(&self, spp: f64, realisation: usize) -> Pixels {
         let missing = (1.0 / spp - 1.0 / self.converged_spp).max(0.0).sqrt();
         combine(&self.converged, 1.0, &self.noise[realisation].pixels, missing)
     }
 
-    /// The level of `spp` samples: one realisation (0 or 1) is the noise in the picture, the other the residual.
+    /// The level of `spp` samples: one realisation (0 or 1) is the noise in the picture, the other the
+    /// residual.
     fn synthesise(&self, spp: f64, realisation: usize, evidence: Evidence) -> TilePlanes {
         let held_against = &self.noise[1 - realisation];
         let strength = (1.0 / spp).sqrt();

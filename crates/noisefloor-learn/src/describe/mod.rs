@@ -1,9 +1,10 @@
 //! Descriptors of a corpus, computed from its images.
 //!
-//! Observers chose among many levels, of which a corpus has few images. Levels between them, and beyond, are synthesised:
-//! noise of unit variance a sample, Z = (mean of some samples − converged)·const, is laid over the converged picture R in the
-//! strength of the level, R + Z/√n. Two independent realisations of Z take turns as the noise in the picture and as the
-//! residual, as they do in two half buffers. Synthesised levels are marked so.
+//! Observers chose among many levels, of which a corpus has few images. Levels between them, and beyond, are
+//! synthesised: noise of unit variance a sample, Z = (mean of some samples − converged)·const, is laid over
+//! the converged picture R in the strength of the level, R + Z/√n. Two independent realisations of Z take
+//! turns as the noise in the picture and as the residual, as they do in two half buffers. Synthesised levels
+//! are marked so.
 
 mod material;
 
@@ -16,9 +17,11 @@ use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-/// Synthesised levels are 10·2^(3k/4) samples per pixel, in whole samples, for these k: a grid that knows nothing of the thresholds.
+/// Synthesised levels are 10·2^(3k/4) samples per pixel, in whole samples, for these k: a grid that knows
+/// nothing of the thresholds.
 const GRID: std::ops::Range<i32> = -4..20;
-/// Levels are synthesised up to this factor below and above the human threshold, and wherever observers could choose.
+/// Levels are synthesised up to this factor below and above the human threshold, and wherever observers could
+/// choose.
 const REACH: f64 = 8.0;
 
 /// Folders with corpora, and which scenes belong together.
@@ -37,11 +40,11 @@ impl<'a> Corpora<'a> {
     }
 }
 
-/// Describes every zone of the corpora, by the evidence given. `on_zone(done, all)` is told of progress. The zones of a scene
-/// are its picture.
+/// Describes every zone of the corpora, by the evidence given. `on_zone(done, all)` is told of progress. The
+/// zones of a scene are its picture.
 ///
-/// [`Evidence::Reference`] holds pictures against the scene's reference ([`Corpus::scene_reference`]); where it has none, the most
-/// converged picture stands in for it.
+/// [`Evidence::Reference`] holds pictures against the scene's reference ([`Corpus::scene_reference`]); where
+/// it has none, the most converged picture stands in for it.
 ///
 /// # Errors
 /// [`TableError`] if a corpus cannot be read, or a zone has too few images.
@@ -57,13 +60,15 @@ pub fn describe_corpora(
     describe(corpora, descriptor, evidence, levels, on_zone)
 }
 
-/// Describes every zone as the paper does (Takouachet et al. 2017, §4.3): the `edge`×`edge` pixels at its centre, at `levels` levels with
-/// equal steps up to its most converged image, each held against the scene's reference, or that image. All these levels are synthesised, from the two
-/// realisations of the noise in turn; the real images, but for the most converged one, are there besides. `on_zone(done, all)` is told of
+/// Describes every zone as the paper does (Takouachet et al. 2017, §4.3): the `edge`×`edge` pixels at its
+/// centre, at `levels` levels with equal steps up to its most converged image, each held against the scene's
+/// reference, or that image. All these levels are synthesised, from the two realisations of the noise in
+/// turn; the real images, but for the most converged one, are there besides. `on_zone(done, all)` is told of
 /// progress.
 ///
 /// # Errors
-/// [`TableError`] if a corpus cannot be read, or a zone has too few images or is smaller than `edge`×`edge` pixels.
+/// [`TableError`] if a corpus cannot be read, or a zone has too few images or is smaller than `edge`×`edge`
+/// pixels.
 pub fn describe_pairs(
     corpora: Corpora<'_>,
     descriptor: &Descriptor,
@@ -155,7 +160,8 @@ fn describe_zone(
 /// Sees each level of each zone of one scene beside the same level of the other zones.
 fn in_picture(zones: Vec<(Zone, Vec<Alone>)>, descriptor: &Descriptor) -> Vec<Zone> {
     let (mut zones, levels): (Vec<Zone>, Vec<Vec<Alone>>) = zones.into_iter().unzip();
-    // Of equal samples, the first belongs to the first of other zones: realisations of the noise come in one order.
+    // Of equal samples, the first belongs to the first of other zones: realisations of the noise come in one
+    // order.
     let mut pictures: BTreeMap<(u64, bool, usize), Vec<(usize, Alone)>> = BTreeMap::new();
     for (zone, levels) in levels.into_iter().enumerate() {
         let mut before: Option<(u64, bool, usize)> = None;
@@ -177,8 +183,8 @@ fn in_picture(zones: Vec<(Zone, Vec<Alone>)>, descriptor: &Descriptor) -> Vec<Zo
     zones
 }
 
-/// Standard deviation of the noise mask (σ = 1) of the luminance residual over a zone, less known rounding noise; in display
-/// values. The constant-noise baseline goes by it.
+/// Standard deviation of the noise mask (σ = 1) of the luminance residual over a zone, less known rounding
+/// noise; in display values. The constant-noise baseline goes by it.
 pub fn noise_level(planes: &TilePlanes) -> f32 {
     let (mask, t) = (NoiseMask::default(), planes.inner);
     let plane = mask.apply(&planes.residual);

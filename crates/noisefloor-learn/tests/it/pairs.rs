@@ -59,7 +59,8 @@ fn a_pair_is_the_noisy_centre_and_the_most_converged_one() {
         }
     }
 
-    // Noise of known strength: 150/255 a sample, less that of the reference. 256 pixels leave 4.4 % of chance, rounding less
+    // Noise of known strength: 150/255 a sample, less that of the reference. 256 pixels leave 4.4 % of
+    // chance, rounding less
     for level in synthesised.iter().chain(&real) {
         let (shown, reference) = level.descriptor.split_at(256);
         let squares: f32 = shown.iter().zip(reference).map(|(a, b)| (a - b) * (a - b)).sum();

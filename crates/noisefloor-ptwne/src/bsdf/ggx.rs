@@ -39,8 +39,8 @@ impl Ggx {
         Self { alpha, facets }
     }
 
-    /// Density of microfacet normals (Walter et al. 2007, eqs. 33 and 25), written with sin² to stay precise at
-    /// h = n.
+    /// Density of microfacet normals (Walter et al. 2007, eqs. 33 and 25), written with sin² to stay precise
+    /// at h = n.
     #[inline]
     pub(super) fn d(self, h: Vec3) -> f32 {
         let a2 = self.alpha * self.alpha;

@@ -72,8 +72,8 @@ impl SceneBuilder {
         Ok(MaterialId(self.parts.materials.len() as u32 - 1))
     }
 
-    /// Adds a material that is `share` of the second one (the mean of the channels) and the rest of the first.
-    /// Their opacities do not count, only that of `options`.
+    /// Adds a material that is `share` of the second one (the mean of the channels) and the rest of the
+    /// first. Their opacities do not count, only that of `options`.
     ///
     /// # Errors
     /// [`SceneError`] if a material is of another builder, or a share is not in 0…1.
@@ -169,8 +169,8 @@ impl SceneBuilder {
         self.single(Shape::Disk { centre, e1, e2 }, Some(uvs), NO, material, emission)
     }
 
-    /// Adds an ellipse with texture coordinates in rings: u = √(a² + b²) at `centre` + a·`e1` + b·`e2`, and v = 1
-    /// − φ/2π, where φ is the angle of (a, b); φ/2π if `reversed`.
+    /// Adds an ellipse with texture coordinates in rings: u = √(a² + b²) at `centre` + a·`e1` + b·`e2`, and v
+    /// = 1 − φ/2π, where φ is the angle of (a, b); φ/2π if `reversed`.
     ///
     /// # Errors
     /// As [`SceneBuilder::parallelogram`].
@@ -204,8 +204,8 @@ impl SceneBuilder {
         self.single(Shape::Sphere { centre, radius }, None, NO, material, emission)
     }
 
-    /// As [`SceneBuilder::sphere`], with axes of length 1 for its texture coordinates: the second points to the
-    /// top, v = 1, and u runs from minus the first over minus the third.
+    /// As [`SceneBuilder::sphere`], with axes of length 1 for its texture coordinates: the second points to
+    /// the top, v = 1, and u runs from minus the first over minus the third.
     ///
     /// # Errors
     /// As [`SceneBuilder::sphere`].

@@ -58,8 +58,8 @@ pub(crate) fn cylinder() -> Triangles {
     mesh
 }
 
-/// The disk of radius 1 around the origin in the plane of x and y, from radius `inner` on; its front is +z. u runs around
-/// z from +x over +y, v from the outside to the inside.
+/// The disk of radius 1 around the origin in the plane of x and y, from radius `inner` on; its front is +z. u
+/// runs around z from +x over +y, v from the outside to the inside.
 pub(crate) fn disk(inner: f32) -> Triangles {
     let mut mesh = grid(1, |u, v| {
         let (y, x) = (TAU * u).sin_cos();

@@ -158,7 +158,8 @@ impl<'d> Context<'d> {
         }
     }
 
-    /// Phong's and Ward's lobes on a diffuse base, of Mitsuba 0.6: a blend with microfacets of the same width.
+    /// Phong's and Ward's lobes on a diffuse base, of Mitsuba 0.6: a blend with microfacets of the same
+    /// width.
     fn lobe_on_diffuse(&self, element: &'d Element) -> Result<Surface, LoadError> {
         element.ignore(&["variant"]);
         let roughness = if element.kind() == "phong" {

@@ -62,8 +62,8 @@ impl<'d> Context<'d> {
         Ok(if encoded { colour.map(srgb_decode) } else { colour })
     }
 
-    /// One number for all wavelengths, three for red, green and blue, pairs of wavelength and value, or a file of such
-    /// pairs.
+    /// One number for all wavelengths, three for red, green and blue, pairs of wavelength and value, or a
+    /// file of such pairs.
     fn spectrum(&self, element: &Element, quantity: Quantity) -> Result<Rgb, LoadError> {
         let samples = match (element.attribute("filename"), element.attribute("value")) {
             (Some(name), _) => self.spectrum_file(element, name)?,
@@ -90,8 +90,8 @@ impl<'d> Context<'d> {
         self.of_samples(element, &samples, quantity)
     }
 
-    /// A spectrum of the same value at all wavelengths. Mitsuba 3 takes emitters for equal-energy whites, which are a
-    /// little redder than the white of Rec.709.
+    /// A spectrum of the same value at all wavelengths. Mitsuba 3 takes emitters for equal-energy whites,
+    /// which are a little redder than the white of Rec.709.
     fn uniform(&self, level: f32, quantity: Quantity) -> Rgb {
         match quantity {
             Quantity::Light => EQUAL_ENERGY.map(|white| white * level),

@@ -40,8 +40,8 @@ impl Document {
     /// Parses the scene file in `path`.
     ///
     /// # Errors
-    /// [`LoadError`] if a file cannot be read, is not XML, not a scene, of an unknown version, too large, or nested too
-    /// deeply.
+    /// [`LoadError`] if a file cannot be read, is not XML, not a scene, of an unknown version, too large, or
+    /// nested too deeply.
     pub(super) fn read(path: &Path, options: &LoadOptions) -> Result<Self, LoadError> {
         let mut builder = Builder {
             files: vec![],
@@ -206,8 +206,8 @@ impl Builder {
         Ok(())
     }
 
-    /// Puts in the values of `$parameters`, of two names that fit the longer one. The second result is the first name
-    /// without a value.
+    /// Puts in the values of `$parameters`, of two names that fit the longer one. The second result is the
+    /// first name without a value.
     fn substitute(&mut self, text: &str, place: &Place) -> Result<(String, Option<String>), LoadError> {
         let mut pieces = text.split('$');
         let mut result = pieces.next().unwrap_or_default().to_owned();
@@ -263,7 +263,8 @@ impl Lines {
     }
 }
 
-/// The name that Mitsuba 2 and 3 have for one of older versions: `toWorld` is `to_world`, `intIOR` is `int_ior`.
+/// The name that Mitsuba 2 and 3 have for one of older versions: `toWorld` is `to_world`, `intIOR` is
+/// `int_ior`.
 fn snake_case(name: &str) -> String {
     let mut result = String::with_capacity(name.len() + 4);
     let mut after_small = false;

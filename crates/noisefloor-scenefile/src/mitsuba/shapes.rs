@@ -20,8 +20,8 @@ pub(super) struct Filling {
     meshes: HashMap<usize, Rc<Triangles>>,
 }
 
-/// Centre and axes of a disk, whose front is where their cross product points, and whether the angle of its texture runs
-/// the other way.
+/// Centre and axes of a disk, whose front is where their cross product points, and whether the angle of its
+/// texture runs the other way.
 type DiskFrame = ([f32; 3], [[f32; 3]; 2], bool);
 
 impl Filling {

@@ -86,7 +86,8 @@ impl Element {
         self.children.iter().filter(ignored).for_each(Element::irrelevant);
     }
 
-    /// Collects the elements below this one that nobody has read. An element that is not read stands for all in it.
+    /// Collects the elements below this one that nobody has read. An element that is not read stands for all
+    /// in it.
     pub(super) fn unread<'a>(&'a self, found: &mut Vec<&'a Element>) {
         for child in &self.children {
             match child.seen.get() {

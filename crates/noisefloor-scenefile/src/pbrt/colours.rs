@@ -20,8 +20,8 @@ impl Reader<'_> {
         Ok(Some(colour.map(|c| c.max(0.0))))
     }
 
-    /// The radiance of a light. pbrt 4 brings spectra other than `rgb` to a luminance of 1; pbrt 3 takes them as they
-    /// are, but black bodies with a peak of 1.
+    /// The radiance of a light. pbrt 4 brings spectra other than `rgb` to a luminance of 1; pbrt 3 takes them
+    /// as they are, but black bodies with a peak of 1.
     pub(super) fn light(&self, params: &Params, name: &str) -> Result<Rgb, LoadError> {
         let scale = match params.numbers("scale")? {
             None => [1.0; 3],

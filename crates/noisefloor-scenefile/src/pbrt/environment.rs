@@ -27,8 +27,9 @@ pub(super) fn equal_area(side: usize, square: &[Rgb], rotation: DMat3) -> Enviro
     EnvironmentMap { width, height, pixels, to_world: rows(rotation) }
 }
 
-/// The rotation from a map's own axes to the world. The map sees (x, y, z) at u = atan2(x, −z)/2π, with +y on top;
-/// pbrt at u = atan2(y, x)/2π, with +z on top: its x is the map's −z, its y the map's x, its z the map's y.
+/// The rotation from a map's own axes to the world. The map sees (x, y, z) at u = atan2(x, −z)/2π, with +y on
+/// top; pbrt at u = atan2(y, x)/2π, with +z on top: its x is the map's −z, its y the map's x, its z the map's
+/// y.
 fn rows(rotation: DMat3) -> [[f32; 3]; 3] {
     let own = DMat3::from_cols(DVec3::Y, DVec3::Z, DVec3::NEG_X);
     (rotation * own).transpose().to_cols_array_2d().map(|row| row.map(|x| x as f32))

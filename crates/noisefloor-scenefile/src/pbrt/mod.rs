@@ -1,8 +1,8 @@
 //! pbrt, versions 3 and 4.
 //!
-//! `tokens` splits the text, `params` reads what follows a directive, and `reader` executes directives one by one, as
-//! pbrt does, over a stack of states. Each kind of thing has a module: `camera`, `colours`, `lights`, `materials`,
-//! `shapes`, `textures`. Errors of shapes and lights are collected, so that one load names all.
+//! `tokens` splits the text, `params` reads what follows a directive, and `reader` executes directives one by
+//! one, as pbrt does, over a stack of states. Each kind of thing has a module: `camera`, `colours`, `lights`,
+//! `materials`, `shapes`, `textures`. Errors of shapes and lights are collected, so that one load names all.
 //!
 //! Read here and not by a crate: pbrt4 0.2.0 reads version 4 only, and its errors name neither file nor line.
 

@@ -296,8 +296,8 @@ fn reflectances_may_be_spectra() {
     close(folder().see(&body), [0.340_779, 0.242_912, 0.140_304], 2e-2, &body);
 }
 
-/// A textured sphere and disk, seen from +z: u and v as Mitsuba 3.9.1 has them. The picture is red, green; grey,
-/// white.
+/// A textured sphere and disk, seen from +z: u and v as Mitsuba 3.9.1 has them. The picture is red, green;
+/// grey, white.
 #[test]
 fn spheres_and_disks_have_the_coordinates_of_mitsuba() {
     let folder = folder();

@@ -8,7 +8,8 @@ const SQUARE: &str =
 const LIGHT: &str = "AreaLightSource \"diffuse\" \"rgb L\" [1 2 3]\n";
 const SKY: &str = "LightSource \"infinite\" \"rgb L\" [1 1 1]\n";
 
-/// Fronts, as the source of pbrt has them: by corners in the shape's own coordinates, by normals where there are any.
+/// Fronts, as the source of pbrt has them: by corners in the shape's own coordinates, by normals where there
+/// are any.
 #[test]
 fn lights_shine_from_their_front() {
     let normals = SQUARE.replace("\"point3 P\"", "\"normal N\" [0 0 -1 0 0 -1 0 0 -1 0 0 -1] \"point3 P\"");
@@ -31,7 +32,8 @@ fn lights_shine_from_their_front() {
     }
 }
 
-/// pbrt's pictures have +x of the camera on the right: with `LookAt` from +z, +x of the world is on the left of them.
+/// pbrt's pictures have +x of the camera on the right: with `LookAt` from +z, +x of the world is on the left
+/// of them.
 #[test]
 fn pictures_are_not_mirrored() {
     let world = format!("WorldBegin {LIGHT} Translate 1 0 0 {SQUARE}");
@@ -133,7 +135,8 @@ fn other_files_are_read() {
     assert!(round.contains("65 levels of included files, more than 64"), "{round}");
 }
 
-/// A map of the surroundings, in both layouts: the top row is +z, and the first column of pbrt 3 begins at +x.
+/// A map of the surroundings, in both layouts: the top row is +z, and the first column of pbrt 3 begins at
+/// +x.
 #[test]
 fn maps_lie_as_in_pbrt() {
     let columns: Vec<[f32; 3]> = (0..8 * 4).map(|i| [(i % 8) as f32, (i / 8) as f32, 1.0]).collect();

@@ -1,16 +1,16 @@
 //! How the thresholds of a tile are spread over observers, and where 95 % of them see no difference.
 //!
-//! With thirty observers nobody sees the shape of the spread, but the 95 % level depends on it. The posterior is
-//! therefore taken over median, width and shape ([`super::shapes`]) and a share of slips, on a grid; estimates are
-//! posterior medians, intervals hold 95 % of the posterior. How often they hold the truth is simulated in
-//! `examples/coverage.rs`.
+//! With thirty observers nobody sees the shape of the spread, but the 95 % level depends on it. The posterior
+//! is therefore taken over median, width and shape ([`super::shapes`]) and a share of slips, on a grid;
+//! estimates are posterior medians, intervals hold 95 % of the posterior. How often they hold the truth is
+//! simulated in `examples/coverage.rs`.
 
 use super::shapes::{SHAPES, Shape};
 use crate::questplus::Posterior;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-/// Shares of stops that may be slips, anywhere in the stack (Wichmann and Hill 2001, "The psychometric function: I",
-/// §2): without any, one slip would widen the curve of a whole tile.
+/// Shares of stops that may be slips, anywhere in the stack (Wichmann and Hill 2001, "The psychometric
+/// function: I", §2): without any, one slip would widen the curve of a whole tile.
 const SLIPS: [f64; 3] = [5e-4, 0.02, 0.06];
 /// Distances between the quartiles that are considered, in ln(spp).
 const WIDTHS: [f64; 2] = [0.02, 4.0];
@@ -25,7 +25,8 @@ const CELL: f64 = 5.0;
 /// What is known about one threshold, in ln(spp).
 #[derive(Clone, Debug, PartialEq)]
 pub enum Observation {
-    /// It lies between two levels: a difference is seen at `above`, none at `to`. `None` where the stack ends.
+    /// It lies between two levels: a difference is seen at `above`, none at `to`. `None` where the stack
+    /// ends.
     Between {
         /// Last level at which a difference is seen.
         above: Option<f64>,
@@ -125,8 +126,8 @@ pub struct ThresholdFit {
 }
 
 impl ThresholdFit {
-    /// Fits observations, each with a weight above 0; `None` without any. Weights below 1 say that observations repeat
-    /// each other, as showings to one observer do.
+    /// Fits observations, each with a weight above 0; `None` without any. Weights below 1 say that
+    /// observations repeat each other, as showings to one observer do.
     pub fn new(observations: &[(Observation, f64)]) -> Option<Self> {
         let weight: f64 = observations.iter().map(|(_, w)| w).sum();
         if weight <= 0.0 || !weight.is_finite() {
@@ -162,9 +163,9 @@ impl ThresholdFit {
         self.best.share(spp.ln())
     }
 
-    /// Probability of stops at least as unlike the best hypothesis as these, if it were true (Pearson's χ² over cells
-    /// of five expected stops, divided by `design`, the factor by which repeated showings raise it). `None` for fewer
-    /// than five cells.
+    /// Probability of stops at least as unlike the best hypothesis as these, if it were true (Pearson's χ²
+    /// over cells of five expected stops, divided by `design`, the factor by which repeated showings raise
+    /// it). `None` for fewer than five cells.
     pub fn fit_probability(&self, stops: &[u32], spp: &[u64], design: f64) -> Option<f64> {
         let n = stops.len() as f64;
         let ln = |level: usize| (spp[level].max(1) as f64).ln();

@@ -9,7 +9,8 @@ use std::collections::BTreeSet;
 
 /// Fewest observers among whom one can be unlike the others.
 const FEWEST: usize = 5;
-/// Smallest median deviation assumed, in ln(spp): where all agree to within a level, half a level is no outlier.
+/// Smallest median deviation assumed, in ln(spp): where all agree to within a level, half a level is no
+/// outlier.
 const LEAST_DEVIATION: f64 = 0.05;
 /// Standard deviation of a normal distribution in units of its median absolute deviation.
 const MAD_TO_SD: f64 = 1.4826;
@@ -61,8 +62,8 @@ fn blind(observer: &Observer) -> Option<String> {
     })
 }
 
-/// Why each observer is excluded; empty for those who count. Rules that compare observers look only at those who break
-/// none by themselves: a few who click at random must not hide each other.
+/// Why each observer is excluded; empty for those who count. Rules that compare observers look only at those
+/// who break none by themselves: a few who click at random must not hide each other.
 pub fn exclusions(observers: &[Observer], study: &Study) -> Vec<Vec<String>> {
     let mut reasons: Vec<Vec<String>> = observers.iter().map(|o| individual(o, study)).collect();
     let mut seen = BTreeSet::new();
@@ -133,9 +134,9 @@ impl LnThresholds {
         Self { sensitivities, inconsistencies: observers.iter().map(inconsistency).collect(), table }
     }
 
-    /// Recommendation ITU-R BT.500-15, annex 1, §2.3.1: thresholds more than 2 (if they are spread normally by their
-    /// kurtosis, else √20) standard deviations above or below the mean are counted. An observer with more than 5 % of
-    /// them, on both sides alike, is rejected: `[above, below, all]`.
+    /// Recommendation ITU-R BT.500-15, annex 1, §2.3.1: thresholds more than 2 (if they are spread normally
+    /// by their kurtosis, else √20) standard deviations above or below the mean are counted. An observer with
+    /// more than 5 % of them, on both sides alike, is rejected: `[above, below, all]`.
     fn bt500(&self, of: usize) -> Option<[usize; 3]> {
         let (mut above, mut below, mut all) = (0, 0, 0);
         for tile in 0..self.table.first()?.len() {
@@ -156,8 +157,9 @@ impl LnThresholds {
     }
 }
 
-/// Modified z-score of a value (Iglewicz and Hoaglin 1993, "How to detect and handle outliers", §3.3). The default limit
-/// is 5, not their 3.5, which one logistic value in 150 exceeds: that would exclude part of the spread to be measured.
+/// Modified z-score of a value (Iglewicz and Hoaglin 1993, "How to detect and handle outliers", §3.3). The
+/// default limit is 5, not their 3.5, which one logistic value in 150 exceeds: that would exclude part of the
+/// spread to be measured.
 fn modified_z(values: &[Option<f64>], of: usize) -> Option<f64> {
     let all: Vec<f64> = values.iter().flatten().copied().collect();
     if all.len() < FEWEST {
@@ -172,8 +174,9 @@ fn modified_z(values: &[Option<f64>], of: usize) -> Option<f64> {
 mod tests {
     use super::*;
 
-    /// Forty observers agree on forty tiles up to a known ripple; one of them is far above on a third of the tiles and
-    /// far below on another third, which the rule is made for. One who is always far above is not its business.
+    /// Forty observers agree on forty tiles up to a known ripple; one of them is far above on a third of the
+    /// tiles and far below on another third, which the rule is made for. One who is always far above is not
+    /// its business.
     #[test]
     fn bt500_rejects_who_errs_to_both_sides() {
         let ripple = |o: usize, t: usize| ((o * 7 + t * 3) % 11) as f64 / 10.0 - 0.5;

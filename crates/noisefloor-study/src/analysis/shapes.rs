@@ -1,8 +1,9 @@
 //! Shapes of the spread of observers: Tukey's g distributions over a normal or a logistic base.
 //!
 //! A threshold is x = m + S·T(z) in ln(spp), where m is the median, S the distance between the quartiles, and
-//! T(z) = (e^{gz} − 1)/g, scaled to quartiles one apart, of a standard variable z (Hoaglin 1985, "Summarizing shape
-//! numerically: the g-and-h distributions"). g = 0 is the base itself; a normal base with g > 0 is the lognormal.
+//! T(z) = (e^{gz} − 1)/g, scaled to quartiles one apart, of a standard variable z (Hoaglin 1985, "Summarizing
+//! shape numerically: the g-and-h distributions"). g = 0 is the base itself; a normal base with g > 0 is the
+//! lognormal.
 
 use statrs::distribution::{ContinuousCDF, Normal};
 use std::sync::LazyLock;
@@ -92,8 +93,8 @@ impl Shape {
 mod tests {
     use super::*;
 
-    /// Quartiles lie one apart around the median, and the 95 % quantile where it says; known values of the normal
-    /// (1.645/1.349), the logistic (ln 19/(2 ln 3)) and the lognormal with σ = ½.
+    /// Quartiles lie one apart around the median, and the 95 % quantile where it says; known values of the
+    /// normal (1.645/1.349), the logistic (ln 19/(2 ln 3)) and the lognormal with σ = ½.
     #[test]
     fn quantiles_are_where_they_should_be() {
         for shape in SHAPES.iter() {

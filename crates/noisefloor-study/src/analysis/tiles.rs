@@ -18,8 +18,8 @@ const MAD_TO_SD: f64 = 1.4826;
 /// Which threshold of a tile goes into the corpus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum CorpusThreshold {
-    /// Where 95 % of observers see no difference: what `train` takes as the threshold (Takouachet et al. 2017,
-    /// §4.2.2).
+    /// Where 95 % of observers see no difference: what `train` takes as the threshold (Takouachet et al.
+    /// 2017, §4.2.2).
     Level95,
     /// The mean over observers.
     Mean,
@@ -58,8 +58,8 @@ pub struct TileRow {
     pub level95_interval: Option<[f64; 2]>,
     /// Whether the 95 % level lies above the last level before the reference, and is therefore extrapolated.
     pub beyond: bool,
-    /// Acquisition: probability of stops at least as unlike the fitted spread, if it were true. Below 0.01 the
-    /// estimates of the tile are doubtful.
+    /// Acquisition: probability of stops at least as unlike the fitted spread, if it were true. Below 0.01
+    /// the estimates of the tile are doubtful.
     pub fit_probability: Option<f64>,
     #[serde(skip)]
     pub(super) fit: ThresholdFit,
@@ -126,8 +126,8 @@ fn add(all: &mut Vec<(Observation, f64)>, observation: Observation, weight: f64)
     }
 }
 
-/// Correlation between two showings of a tile to one observer, from medians, so that slips hardly matter. Where levels
-/// are too coarse to tell, it is 1, which makes intervals wider.
+/// Correlation between two showings of a tile to one observer, from medians, so that slips hardly matter.
+/// Where levels are too coarse to tell, it is 1, which makes intervals wider.
 fn repeat_correlation(study: &Study, observers: &[&Observer]) -> f64 {
     let (mut within, mut deviations) = (Vec::new(), Vec::new());
     for place in places(study) {

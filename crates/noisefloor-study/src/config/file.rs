@@ -40,6 +40,7 @@ pub(super) struct StackEntry {
     pub(super) folder: PathBuf,
     #[serde(default)]
     pub(super) renderer: String,
-    /// Where each tile stopped: `stops.csv` of `noisefloor render`, or a table with the columns `tile` and `spp`.
+    /// Where each tile stopped: `stops.csv` of `noisefloor render`, or a table with the columns `tile` and
+    /// `spp`.
     pub(super) stops: Option<PathBuf>,
 }

@@ -1,4 +1,5 @@
-//! What a study file may ask for beside its pictures: texts, questions, and rules that are fixed before anyone answers.
+//! What a study file may ask for beside its pictures: texts, questions, and rules that are fixed before
+//! anyone answers.
 
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;

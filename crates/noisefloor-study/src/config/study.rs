@@ -62,8 +62,8 @@ pub struct Study {
     pub stacks: Vec<StudyStack>,
 }
 
-/// The part of a study that answers depend on. A database belongs to one design. The rules of exclusion are part of
-/// it: nobody changes them after looking at the answers.
+/// The part of a study that answers depend on. A database belongs to one design. The rules of exclusion are
+/// part of it: nobody changes them after looking at the answers.
 #[derive(Serialize)]
 struct Design<'a> {
     protocol: StudyProtocol,
@@ -86,7 +86,8 @@ struct StackDesign<'a> {
 }
 
 impl Study {
-    /// Reads a study file. Relative paths start at its folder. Opens the most converged picture of each stack;
+    /// Reads a study file. Relative paths start at its folder. Opens the most converged picture of each
+    /// stack;
     /// [`Study::check_pictures`] opens the others.
     ///
     /// # Errors

@@ -99,7 +99,8 @@ impl Disagreements {
     /// Opens the database, creating it if needed.
     ///
     /// # Errors
-    /// [`StoreError::Database`] if it cannot be opened, [`StoreError::NotDisagreements`] if it holds something else.
+    /// [`StoreError::Database`] if it cannot be opened, [`StoreError::NotDisagreements`] if it holds
+    /// something else.
     pub fn open(path: impl AsRef<Path>) -> Result<Self, StoreError> {
         let path = path.as_ref().to_owned();
         let failed = |source| StoreError::Database { path: path.clone(), source };

@@ -1,14 +1,16 @@
 //! One person's own line, T′ = aT + b, on top of the model: learned from their answers in milliseconds.
 //!
-//! Somebody who sees noise for longer, or for less long, than the observers of the training data is described by the
-//! line from those observers' thresholds to their own, as any audience is (Takouachet et al. 2017, §7.3). The line is
-//! the mean of its posterior: with few answers it stays near the model, with many it follows the person.
+//! Somebody who sees noise for longer, or for less long, than the observers of the training data is described
+//! by the line from those observers' thresholds to their own, as any audience is (Takouachet et al. 2017,
+//! §7.3). The line is the mean of its posterior: with few answers it stays near the model, with many it
+//! follows the person.
 
 use noisefloor::{Audience, Model, Threshold};
 use noisefloor_learn::Answer;
 use serde::Serialize;
 
-/// Prior standard deviation of ln a: two people of three need between half and twice the samples of the observers.
+/// Prior standard deviation of ln a: two people of three need between half and twice the samples of the
+/// observers.
 const LN_SLOPE_SD: f64 = 0.7;
 /// Prior standard deviation of b, in the geometric mean of the samples that were asked about.
 const OFFSET_SD: f64 = 0.1;
@@ -64,8 +66,8 @@ fn logit(p: f64) -> f64 {
     (p / (1.0 - p)).ln()
 }
 
-/// Learns the line of one person from answers whose descriptors are the model's. `None` without answers, or if the
-/// descriptor does not tell noise from picture.
+/// Learns the line of one person from answers whose descriptors are the model's. `None` without answers, or
+/// if the descriptor does not tell noise from picture.
 pub fn fit_line(model: &Model, threshold: Threshold, answers: &[Answer]) -> Option<PersonalLine> {
     let curves: Vec<Curve<'_>> = answers.iter().map(|answer| curve(model, answer)).collect::<Option<_>>()?;
     let n = curves.len() as f64;
@@ -135,8 +137,8 @@ fn curve<'a>(model: &Model, answer: &'a Answer) -> Option<Curve<'a>> {
 mod tests {
     use super::*;
 
-    /// Answers of a person whose thresholds are `slope` times those of the observers, about tiles of the mean texture of
-    /// the training data around the observers' threshold.
+    /// Answers of a person whose thresholds are `slope` times those of the observers, about tiles of the mean
+    /// texture of the training data around the observers' threshold.
     fn answers(model: &Model, threshold: Threshold, slope: f32, count: usize) -> Vec<Answer> {
         let at = |factor: f32| {
             let mut raw = model.classifier().scaler.mean.clone();

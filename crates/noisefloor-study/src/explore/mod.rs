@@ -41,8 +41,8 @@ pub struct ExploreServer {
 }
 
 impl ExploreServer {
-    /// Reads the pictures, opens the database and binds the address. Port 0 picks a free port. `exposure` says
-    /// under which other names and behind which proxies it may be reached; a base path is ignored.
+    /// Reads the pictures, opens the database and binds the address. Port 0 picks a free port. `exposure`
+    /// says under which other names and behind which proxies it may be reached; a base path is ignored.
     ///
     /// # Errors
     /// [`StudyError`] if a picture or the database cannot be read, or the address is in use.

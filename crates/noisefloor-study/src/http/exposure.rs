@@ -6,12 +6,13 @@ use std::net::{IpAddr, SocketAddr};
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Exposure {
-    /// Further host names, `host` (at any port) or `host:port`. A page elsewhere whose name was made to resolve to
-    /// this machine sends its own name, and is turned away.
+    /// Further host names, `host` (at any port) or `host:port`. A page elsewhere whose name was made to
+    /// resolve to this machine sends its own name, and is turned away.
     pub names: Vec<String>,
     /// Addresses of proxies whose `X-Forwarded-For` and `X-Forwarded-Proto` are believed.
     pub proxies: Vec<IpAddr>,
-    /// Path under which the proxy passes requests on without stripping it, for example `/noise`; empty for none.
+    /// Path under which the proxy passes requests on without stripping it, for example `/noise`; empty for
+    /// none.
     pub base_path: String,
 }
 

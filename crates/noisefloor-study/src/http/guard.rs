@@ -59,8 +59,8 @@ impl Guard {
         (client, if secure { "https" } else { "http" })
     }
 
-    /// Counts a wrong code. After [`WRONG_CODES`] different ones from an address, its guesses are refused for a
-    /// while; requests with a valid code never get here.
+    /// Counts a wrong code. After [`WRONG_CODES`] different ones from an address, its guesses are refused for
+    /// a while; requests with a valid code never get here.
     pub(crate) fn wrong_code(&self, client: Client, code: &str) -> Refusal {
         let mut wrong = self.wrong.lock().unwrap_or_else(PoisonError::into_inner);
         if wrong.len() >= MOST_ADDRESSES {

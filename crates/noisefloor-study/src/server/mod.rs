@@ -36,8 +36,8 @@ pub struct StudyServer {
 }
 
 impl StudyServer {
-    /// Opens the answers of a study and binds the address. Port 0 picks a free port. `exposure` says under which
-    /// other names, behind which proxies and under which path the server may be reached.
+    /// Opens the answers of a study and binds the address. Port 0 picks a free port. `exposure` says under
+    /// which other names, behind which proxies and under which path the server may be reached.
     ///
     /// # Errors
     /// [`StudyError`] if the answers cannot be opened, or the address is in use.

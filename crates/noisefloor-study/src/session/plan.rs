@@ -122,8 +122,9 @@ fn obvious_choice(study: &Study, random: &mut fastrand::Rng) -> Task {
     Task::ForcedChoice { stack, tile, noise_first: random.bool(), obvious: true }
 }
 
-/// The catch trials that the protocol has. In an acquisition every trial begins with obvious noise, so that only
-/// identical pairs are added; two intervals cannot both be the reference, so that a forced choice has obvious ones.
+/// The catch trials that the protocol has. In an acquisition every trial begins with obvious noise, so that
+/// only identical pairs are added; two intervals cannot both be the reference, so that a forced choice has
+/// obvious ones.
 fn catch_trials(study: &Study, random: &mut fastrand::Rng) -> Vec<(Task, CatchKind)> {
     let mut trials = Vec::new();
     for _ in 0..study.screening.catch_trials(study.protocol) {

@@ -300,7 +300,8 @@ impl ParticipantSession {
         Ok(())
     }
 
-    /// After a round of practice: on to the data if all of it was passed, else another round, if there is one.
+    /// After a round of practice: on to the data if all of it was passed, else another round, if there is
+    /// one.
     fn end_practice(&mut self) {
         let [from, to] = self.practice;
         let most = self.study.screening.practice_attempts;

@@ -16,15 +16,16 @@ pub struct Public {
     pub thresholds: Vec<Vec<f64>>,
     /// How observers are spread around the median one.
     pub shape: SpreadShape,
-    /// Scale of the spread between observers, in ln(spp), at least 0. All shapes have the standard deviation of a
-    /// logistic distribution of this scale.
+    /// Scale of the spread between observers, in ln(spp), at least 0. All shapes have the standard deviation
+    /// of a logistic distribution of this scale.
     pub between: f64,
-    /// Scale of the logistic spread of one observer from showing to showing (the inverse slope of the psychometric
-    /// function), in ln(spp), at least 0.
+    /// Scale of the logistic spread of one observer from showing to showing (the inverse slope of the
+    /// psychometric function), in ln(spp), at least 0.
     pub within: f64,
     /// Share of answers given without looking, 0 to 1.
     pub lapse: f64,
-    /// Bias of all observers, in ln(spp): above 0 they report noise they do not see. Forced choices are unaffected.
+    /// Bias of all observers, in ln(spp): above 0 they report noise they do not see. Forced choices are
+    /// unaffected.
     pub bias: f64,
 }
 
@@ -204,8 +205,8 @@ impl SimulatedObserver {
         }
     }
 
-    /// Whether two pictures look different. One look at the whole picture: all tiles share the deviation of this
-    /// showing.
+    /// Whether two pictures look different. One look at the whole picture: all tiles share the deviation of
+    /// this showing.
     fn differ(&mut self, stack: usize, left: &[u32], right: &[u32], stacks: &[StackView]) -> bool {
         if self.random.f64() < self.lapse {
             return self.random.bool();

@@ -39,8 +39,8 @@ pub fn make_links(path: impl AsRef<Path>, design: &str, count: u32) -> Result<Ve
     Ok(tokens)
 }
 
-/// Copies a database, consistent even while a server writes to it. The copy is a database like the original: to
-/// restore it, put it in the place of the original while no server runs.
+/// Copies a database, consistent even while a server writes to it. The copy is a database like the original:
+/// to restore it, put it in the place of the original while no server runs.
 ///
 /// # Errors
 /// [`StoreError`] if the database belongs to another study, or the copy exists or cannot be written.

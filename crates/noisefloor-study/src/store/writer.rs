@@ -34,7 +34,8 @@ impl AnswerStore {
     /// ([`crate::Study::design`]).
     ///
     /// # Errors
-    /// [`StoreError::Database`] if it cannot be opened, [`StoreError::OtherStudy`] if it belongs to another design.
+    /// [`StoreError::Database`] if it cannot be opened, [`StoreError::OtherStudy`] if it belongs to another
+    /// design.
     pub fn open(path: impl AsRef<Path>, design: &str) -> Result<Self, StoreError> {
         let path = path.as_ref().to_owned();
         let mut connection = open(&path, design)?;

@@ -9,7 +9,8 @@ fn served() -> (Folder, Running) {
     (folder, server)
 }
 
-/// Half a header keeps neither a connection nor the server: it is closed in time, and the server ends without it.
+/// Half a header keeps neither a connection nor the server: it is closed in time, and the server ends without
+/// it.
 #[test]
 fn half_sent_headers_hold_nothing() {
     let (_folder, server) = served();

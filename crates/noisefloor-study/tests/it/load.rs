@@ -5,8 +5,8 @@ use noisefloor_study::{Study, store};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
-/// Two hundred observers who click twice a second, and fifty who click as fast as they are answered; a server in a
-/// process of its own. Times are printed, not checked, since other work on the machine would decide:
+/// Two hundred observers who click twice a second, and fifty who click as fast as they are answered; a server
+/// in a process of its own. Times are printed, not checked, since other work on the machine would decide:
 /// `cargo test -p noisefloor-study -- --ignored at_once --nocapture`. What is checked: nothing is lost.
 #[test]
 #[ignore = "measures time: run it alone"]

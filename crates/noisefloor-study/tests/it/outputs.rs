@@ -63,7 +63,8 @@ impl ProgressiveSource for Wall {
     }
 }
 
-/// Each level is the mean of its first samples: of 0 to n − 1 that is (n − 1)/2. A stopped render keeps what is done.
+/// Each level is the mean of its first samples: of 0 to n − 1 that is (n − 1)/2. A stopped render keeps what
+/// is done.
 #[test]
 fn a_stack_is_rendered_in_one_go() {
     let dir = tempfile::tempdir().unwrap();
@@ -84,7 +85,8 @@ fn a_stack_is_rendered_in_one_go() {
     assert!(render_stack(&mut Wall, &[4, 4], dir.path(), |_, _| true, Ok).is_err());
 }
 
-/// A copy made while observers answer is whole, belongs to the study, and can be served in place of the original.
+/// A copy made while observers answer is whole, belongs to the study, and can be served in place of the
+/// original.
 #[test]
 fn a_copy_made_while_serving_can_be_restored() {
     let folder = Folder::new("acquisition", &["wall"], &levels(10, 1.8), "");

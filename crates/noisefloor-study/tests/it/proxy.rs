@@ -47,8 +47,8 @@ fn nginx(folder: &Path, kept: u16, stripped: u16) -> (Nginx, u16) {
     );
 }
 
-/// A participant behind nginx with TLS, under a path that is passed on and under one that is stripped; and what the
-/// server refuses that is not told to trust the proxy.
+/// A participant behind nginx with TLS, under a path that is passed on and under one that is stripped; and
+/// what the server refuses that is not told to trust the proxy.
 #[test]
 fn a_study_works_behind_nginx() {
     if browser::browser(&["nginx", "openssl"]).is_none() {

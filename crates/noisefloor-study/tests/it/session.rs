@@ -159,7 +159,8 @@ fn nothing_is_shown_before_consent_or_while_paused() {
     session.apply(&step(0, 0, 1)).unwrap();
 }
 
-/// Conditions outside the limits keep the trials closed, also in the middle of a session, until they are mended.
+/// Conditions outside the limits keep the trials closed, also in the middle of a session, until they are
+/// mended.
 #[test]
 fn viewing_limits_are_kept() {
     let (_folder, mut session) = begun("acquisition", "");
@@ -216,7 +217,8 @@ fn order_depends_on_the_seed_alone() {
     assert_ne!(answered(3), answered(4));
 }
 
-/// Who answers without looking is excluded, in every protocol, and attentive observers are not: of 60 each, seeded.
+/// Who answers without looking is excluded, in every protocol, and attentive observers are not: of 60 each,
+/// seeded.
 #[test]
 fn inattentive_observers_are_excluded() {
     use noisefloor_study::analysis::{Observer, screening};

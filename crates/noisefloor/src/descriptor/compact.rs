@@ -1,12 +1,15 @@
-//! The compact descriptor: how visible the noise is where it is most visible, and how much texture there is to hide it.
+//! The compact descriptor: how visible the noise is where it is most visible, and how much texture there is
+//! to hide it.
 //!
-//! Noise mask energies of the residual, at four scales, are taken on blocks of 8×8 pixels. Texture of the picture masks them,
-//! brightness brings them out; pooling with a high exponent follows the observers, who look for the worst place. Beside this
-//! one number that falls with the samples stand two that say what the tile is made of.
+//! Noise mask energies of the residual, at four scales, are taken on blocks of 8×8 pixels. Texture of the
+//! picture masks them, brightness brings them out; pooling with a high exponent follows the observers, who
+//! look for the worst place. Beside this one number that falls with the samples stand two that say what the
+//! tile is made of.
 //!
-//! The same three of the whole picture stand beside them, since people judge a tile in its picture: between the zones of one
-//! picture, thresholds vary less than in proportion to noise energy (in six of eight scenes as its power of 0.26 to 0.65). Constants were chosen by
-//! leaving scenes out, on the human data; `docs/accuracy.md` has the scores of each choice.
+//! The same three of the whole picture stand beside them, since people judge a tile in its picture: between
+//! the zones of one picture, thresholds vary less than in proportion to noise energy (in six of eight scenes
+//! as its power of 0.26 to 0.65). Constants were chosen by leaving scenes out, on the human data;
+//! `docs/accuracy.md` has the scores of each choice.
 
 use super::kind::{Described, Descriptor, DescriptorError, DescriptorKind, TileDescriptor, mask};
 use crate::evidence::{HALO, ROUNDING_LUMINANCE, TilePlanes};
@@ -31,8 +34,8 @@ const NOISE: [usize; 2] = [0, OWN];
 /// Which of the tile's own are texture, and stay as they are when noise falls.
 const TEXTURE: [usize; 2] = [1, 2];
 
-/// All numbers are logarithms of amplitudes, and differ by 0.4 to 0.8 over the human data. Where scenes are few and alike, the
-/// picture's numbers hardly differ, and a machine would make much of it.
+/// All numbers are logarithms of amplitudes, and differ by 0.4 to 0.8 over the human data. Where scenes are
+/// few and alike, the picture's numbers hardly differ, and a machine would make much of it.
 const LEAST_DEVIATION: f64 = 0.3;
 
 /// Edge of a block at full resolution, in pixels; the halo is one block.
@@ -41,7 +44,8 @@ const BLOCK: usize = HALO;
 const SCALES: [f32; 4] = [1.0, 1.6, 5.3, 5.0];
 /// Times the noise that is taken off the mask energy of the picture: what remains is texture for certain.
 const CERTAIN: f32 = 2.0;
-/// Texture energy, in squared 8-bit steps, from which masking sets in; energies fall as 1/√(1 + texture/knee).
+/// Texture energy, in squared 8-bit steps, from which masking sets in; energies fall as 1/√(1 +
+/// texture/knee).
 const MASKING_KNEE: f32 = 100.0;
 /// Noise energies count (Y′ + offset)^exponent.
 const BRIGHTNESS_OFFSET: f32 = 0.05;
@@ -116,8 +120,9 @@ impl TileDescriptor for Compact {
     }
 }
 
-/// What the numbers are pooled from, on the grid of 8×8-pixel blocks, row-major, energies in squared 8-bit steps; and room for what
-/// they are made from. Each thread keeps its own, so that a verdict allocates nothing.
+/// What the numbers are pooled from, on the grid of 8×8-pixel blocks, row-major, energies in squared 8-bit
+/// steps; and room for what they are made from. Each thread keeps its own, so that a verdict allocates
+/// nothing.
 #[derive(Default)]
 struct Blocks {
     visible: Vec<f32>,
@@ -191,8 +196,8 @@ fn pool(Blocks { visible, texture, .. }: &Blocks) -> [f32; OWN] {
     ]
 }
 
-/// The amplitude of visible noise at each pixel of the tile, that of its block, in 8-bit steps. Its mean of order [`POOLING`] over
-/// the blocks is what the first number is the logarithm of.
+/// The amplitude of visible noise at each pixel of the tile, that of its block, in 8-bit steps. Its mean of
+/// order [`POOLING`] over the blocks is what the first number is the logarithm of.
 fn visible_noise(planes: &TilePlanes, mask: NoiseMask) -> Array2<f32> {
     let (height, width) = (planes.inner.height, planes.inner.width);
     Blocks::with(planes, mask, |Blocks { visible, .. }| {
@@ -215,9 +220,10 @@ fn noise_number(energy: f64) -> f32 {
     (0.5 * (energy + f64::from(NOISE_FLOOR)).ln()) as f32
 }
 
-/// Appends to each tile's own numbers those of the picture that the tiles make up: root mean square of their visible noise, and
-/// means of their texture numbers, by area. Noise is what the tile at hand has with its own samples and the picture would have
-/// with as many: energies are taken to one sample, averaged, and brought to the tile's samples.
+/// Appends to each tile's own numbers those of the picture that the tiles make up: root mean square of their
+/// visible noise, and means of their texture numbers, by area. Noise is what the tile at hand has with its
+/// own samples and the picture would have with as many: energies are taken to one sample, averaged, and
+/// brought to the tile's samples.
 fn in_picture(tiles: &[Described]) -> Vec<Vec<f32>> {
     let area: f64 = tiles.iter().map(|t| t.area).sum();
     let mean =
@@ -253,8 +259,9 @@ fn level(plane: &Array2<f32>) -> (usize, &[f32]) {
     (plane.ncols(), plane.as_slice().expect("planes are in standard layout"))
 }
 
-/// Mask energies of a plane with halo at full, half, quarter and eighth resolution, each on the grid of 8×8-pixel blocks, in
-/// squared 8-bit steps; `rounding` is the known variance of white rounding noise in the plane, which is taken off.
+/// Mask energies of a plane with halo at full, half, quarter and eighth resolution, each on the grid of
+/// 8×8-pixel blocks, in squared 8-bit steps; `rounding` is the known variance of white rounding noise in the
+/// plane, which is taken off.
 fn energies(
     width: usize,
     plane: &[f32],
@@ -295,8 +302,8 @@ fn halve(width: usize, plane: &[f32], out: &mut Vec<f32>) {
     }
 }
 
-/// Means over blocks of `edge`×`edge` pixels of a plane of [width, height], without the halo, which is one block wide; `add(y, sums)`
-/// adds row `y` to sums along columns.
+/// Means over blocks of `edge`×`edge` pixels of a plane of [width, height], without the halo, which is one
+/// block wide; `add(y, sums)` adds row `y` to sums along columns.
 fn block_means(
     [width, height]: [usize; 2],
     edge: usize,

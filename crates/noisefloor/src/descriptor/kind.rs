@@ -14,20 +14,23 @@ use thiserror::Error;
 /// Computes numbers from a tile.
 ///
 /// # For implementers
-/// The default methods suit a descriptor that looks at one tile and does not separate noise from picture. One that does
-/// separate them overrides [`TileDescriptor::project`], from which the expected need and the audience follow, and
+/// The default methods suit a descriptor that looks at one tile and does not separate noise from picture. One
+/// that does separate them overrides [`TileDescriptor::project`], from which the expected need and the
+/// audience follow, and
 /// [`TileDescriptor::texture`], by which unfamiliar tiles are recognised.
 pub trait TileDescriptor: fmt::Debug + Send + Sync {
     /// The name in model files and tables, such as `"compact"`.
     fn name(&self) -> &'static str;
 
-    /// Version of the formulas. Raise it whenever a number changes: models trained with another version are refused.
+    /// Version of the formulas. Raise it whenever a number changes: models trained with another version are
+    /// refused.
     fn version(&self) -> u16;
 
     /// What [`DescriptorKind::make`] needs to make it again.
     fn parameters(&self) -> BTreeMap<String, f64>;
 
-    /// What each number is, for the columns of tables; as many as the whole descriptor has, the picture's included.
+    /// What each number is, for the columns of tables; as many as the whole descriptor has, the picture's
+    /// included.
     fn number_names(&self) -> Vec<String>;
 
     /// How many of the numbers are the tile's own: what [`TileDescriptor::describe`] returns.
@@ -46,8 +49,8 @@ pub trait TileDescriptor: fmt::Debug + Send + Sync {
         tiles.iter().map(|t| t.own.clone()).collect()
     }
 
-    /// How visible the noise is at each pixel of the tile (rows × columns), as an amplitude in 8-bit display steps; `None`
-    /// if the descriptor does not separate noise from picture.
+    /// How visible the noise is at each pixel of the tile (rows × columns), as an amplitude in 8-bit display
+    /// steps; `None` if the descriptor does not separate noise from picture.
     fn visible_noise(&self, _planes: &TilePlanes) -> Option<Array2<f32>> {
         None
     }
@@ -57,8 +60,8 @@ pub trait TileDescriptor: fmt::Debug + Send + Sync {
         None
     }
 
-    /// Which of the numbers are the tile's own texture and do not change as noise falls; none if the descriptor does not
-    /// separate noise from picture.
+    /// Which of the numbers are the tile's own texture and do not change as noise falls; none if the
+    /// descriptor does not separate noise from picture.
     fn texture(&self) -> &[usize] {
         &[]
     }
@@ -68,8 +71,8 @@ pub trait TileDescriptor: fmt::Debug + Send + Sync {
         0.0
     }
 
-    /// Changes a raw descriptor into that of `factor` times the samples, if only noise changes, as 1/√n. Returns false if
-    /// the descriptor does not separate noise from picture.
+    /// Changes a raw descriptor into that of `factor` times the samples, if only noise changes, as 1/√n.
+    /// Returns false if the descriptor does not separate noise from picture.
     fn project(&self, _raw: &mut [f32], _factor: f32) -> bool {
         false
     }

@@ -1,7 +1,8 @@
 //! From the planes of a tile to the numbers that the machine judges.
 //!
-//! A descriptor is a [`TileDescriptor`]; its [`DescriptorKind`] makes it again from the name and the parameters in a model
-//! file. To add one, write both and name the kind in `KINDS`, or, outside this crate, hand it to
+//! A descriptor is a [`TileDescriptor`]; its [`DescriptorKind`] makes it again from the name and the
+//! parameters in a model file. To add one, write both and name the kind in `KINDS`, or, outside this crate,
+//! hand it to
 //! [`Model::read_with`](crate::Model::read_with).
 
 mod compact;
@@ -16,20 +17,21 @@ use crate::mask::NoiseMask;
 const KINDS: [DescriptorKind; 3] = [compact::KIND, pair::MASKS, pair::LUMINANCES];
 
 impl Descriptor {
-    /// Six numbers, whatever the tile size: how visible the noise is where it is most visible, how much texture hides it,
-    /// and the same for the whole picture. The default.
+    /// Six numbers, whatever the tile size: how visible the noise is where it is most visible, how much
+    /// texture hides it, and the same for the whole picture. The default.
     pub fn compact(mask: NoiseMask) -> Self {
         Self::new(compact::Compact { mask })
     }
 
-    /// The paper's: the noise mask of the tile and of what it is compared with, pixel by pixel (Takouachet et al. 2017,
-    /// §5). 2·edge² numbers, for tiles of exactly edge×edge pixels.
+    /// The paper's: the noise mask of the tile and of what it is compared with, pixel by pixel (Takouachet et
+    /// al. 2017, §5). 2·edge² numbers, for tiles of exactly edge×edge pixels.
     pub fn mask_pair(mask: NoiseMask, edge: usize) -> Self {
         Self::new(pair::MaskPair { mask, edge })
     }
 
-    /// The paper's first attempt, without a mask, which failed: the luminance of the tile and of what it is compared with,
-    /// pixel by pixel (Takouachet et al. 2017, §4.3, §4.4). 2·edge² numbers, for tiles of exactly edge×edge pixels.
+    /// The paper's first attempt, without a mask, which failed: the luminance of the tile and of what it is
+    /// compared with, pixel by pixel (Takouachet et al. 2017, §4.3, §4.4). 2·edge² numbers, for tiles of
+    /// exactly edge×edge pixels.
     pub fn luminance_pair(edge: usize) -> Self {
         Self::new(pair::LuminancePair { edge })
     }

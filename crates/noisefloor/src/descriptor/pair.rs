@@ -1,4 +1,5 @@
-//! The paper's descriptors: the tile and what it is compared with, pixel by pixel (Takouachet et al. 2017, §4.3, §5).
+//! The paper's descriptors: the tile and what it is compared with, pixel by pixel (Takouachet et al. 2017,
+//! §4.3, §5).
 
 use super::kind::{Descriptor, DescriptorError, DescriptorKind, TileDescriptor, edge, mask};
 use crate::evidence::TilePlanes;

@@ -59,8 +59,9 @@ fn running_means_equal_batches() {
     }
 }
 
-/// The bound that `Half` states: 10⁹ samples in batches of 100 stay within 2.4·10⁻⁶ of the exact mean. Where a plain f32
-/// running mean goes by then is asserted too, so that the test would notice if the carry did nothing.
+/// The bound that `Half` states: 10⁹ samples in batches of 100 stay within 2.4·10⁻⁶ of the exact mean. Where
+/// a plain f32 running mean goes by then is asserted too, so that the test would notice if the carry did
+/// nothing.
 #[test]
 fn stays_accurate_at_a_billion_samples() {
     let mut half = Half::new(1);
@@ -98,7 +99,8 @@ fn a_film_that_was_kept_goes_on_to_the_bit() {
     assert!(bytes(&film) == bytes(&other));
 }
 
-/// −0, the smallest numbers there are, the largest ones, and negative radiance: the mean is that of f64, to the last bits.
+/// −0, the smallest numbers there are, the largest ones, and negative radiance: the mean is that of f64, to
+/// the last bits.
 #[test]
 fn both_ends_of_f32_are_averaged() {
     for values in [[-0.0, 0.0], [1e-45, 3e-45], [1e-38, 2e-39], [f32::MAX, f32::MAX], [-3.0, 1.0]] {

@@ -93,8 +93,8 @@ fn clean_tiles_are_converged_and_noisy_ones_are_not_whatever_the_texture() {
             (tile[0], tile[3]) = (noise, noise);
             model.judge(&tile).probability
         };
-        // From no noise, at the floor, to white noise from black to white: 128 steps, which the masks and the weights of the
-        // scales let through almost whole.
+        // From no noise, at the floor, to white noise from black to white: 128 steps, which the masks and the
+        // weights of the scales let through almost whole.
         let path: Vec<f32> = (0..=83).map(|i| p(-3.45 + 0.1 * i as f32)).collect();
         assert!(path[0] > 0.99 && path[83] < 0.6, "{texture}: {path:?}");
         // Far from all training data a Gaussian kernel forgets, so that P ends a little above its least.

@@ -114,7 +114,8 @@ fn an_unfamiliar_tile_gets_twice_the_samples() {
     assert!((ratio.log2() - 1.0).abs() < 0.04, "{ratio}");
 }
 
-/// People who need twice the samples see at 2n what the trained see at n, and expect twice the samples; who need no more see the same.
+/// People who need twice the samples see at 2n what the trained see at n, and expect twice the samples; who
+/// need no more see the same.
 #[cfg(feature = "bundled-model")]
 #[test]
 fn another_audience_sees_the_noise_of_fewer_samples() {

@@ -7,7 +7,8 @@ use crate::stop::{Stop, StopReason};
 use std::borrow::Cow;
 
 impl<C: Resumable> Session<C> {
-    /// A snapshot, for resuming the session later. `job` is how the caller identifies the job: scene, seed, options.
+    /// A snapshot, for resuming the session later. `job` is how the caller identifies the job: scene, seed,
+    /// options.
     pub fn checkpoint<'a>(&'a self, job: &'a str) -> Checkpoint<'a> {
         Checkpoint {
             job: job.into(),
@@ -20,14 +21,16 @@ impl<C: Resumable> Session<C> {
         }
     }
 
-    /// Resumes another session of the same job where it stood. Tiles that were ended by a limit or a failure are open
-    /// again; those that have converged, or have as many samples as are allowed, are not.
+    /// Resumes another session of the same job where it stood. Tiles that were ended by a limit or a failure
+    /// are open again; those that have converged, or have as many samples as are allowed, are not.
     ///
-    /// If the same samples are pushed, everything that follows equals the session that was not interrupted, to the bit.
+    /// If the same samples are pushed, everything that follows equals the session that was not interrupted,
+    /// to the bit.
     ///
     /// # Errors
-    /// [`CheckpointError`] if job, criterion (its [fingerprint](crate::StoppingCriterion::fingerprint): model, threshold,
-    /// constants), parameters or image size are not those of the checkpoint, or if it contradicts itself.
+    /// [`CheckpointError`] if job, criterion (its [fingerprint](crate::StoppingCriterion::fingerprint):
+    /// model, threshold, constants), parameters or image size are not those of the checkpoint, or if it
+    /// contradicts itself.
     pub fn resume(mut self, job: &str, checkpoint: Checkpoint<'_>) -> Result<Self, CheckpointError> {
         checkpoint.check(job, &self.criterion.fingerprint(), &self.params, &self.film)?;
         if !self.criterion.restore(self.film.grid(), &checkpoint.state) {

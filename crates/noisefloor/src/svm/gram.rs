@@ -9,11 +9,11 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 const BLOCK: usize = 256;
 /// Columns that are multiplied at a time: two panels of 256×2,048 numbers are 8 MB a thread.
 const PANEL: usize = 2048;
-/// Squared distances ‖xᵢ − xⱼ‖² of all pairs of rows, n×n, symmetric, in `f64` whatever the rows are kept in. `on_block(done, all)` is
-/// told of progress. The same to the bit whatever the number of threads.
+/// Squared distances ‖xᵢ − xⱼ‖² of all pairs of rows, n×n, symmetric, in `f64` whatever the rows are kept in.
+/// `on_block(done, all)` is told of progress. The same to the bit whatever the number of threads.
 ///
-/// From ‖x‖² + ‖y‖² − 2x·y of rows less their mean, which keeps cancellation small: within (2d + 16)·u·(‖x‖² + ‖y‖²) for rows of d numbers,
-/// u = 2⁻⁵³.
+/// From ‖x‖² + ‖y‖² − 2x·y of rows less their mean, which keeps cancellation small: within (2d + 16)·u·(‖x‖²
+/// + ‖y‖²) for rows of d numbers, u = 2⁻⁵³.
 pub fn squared_distances<T: Copy + Into<f64> + Send + Sync>(
     rows: ArrayView2<'_, T>,
     on_block: impl Fn(usize, usize) + Sync,
@@ -82,13 +82,15 @@ mod tests {
         })
     }
 
-    /// More rows than a block and more columns than a panel, neither a multiple; far from the origin, so that the mean matters.
+    /// More rows than a block and more columns than a panel, neither a multiple; far from the origin, so that
+    /// the mean matters.
     #[test]
     fn distances_are_those_of_the_definition() {
         let mut next = uniform(3);
         let rows = Array2::from_shape_fn((BLOCK + 45, PANEL + 77), |_| 10.0 + next());
         let (ours, exact) = (squared_distances(rows.view(), |_, _| ()), naive(&rows));
-        // Rows less their mean have squares below 4 each; the definition itself rounds d additions of its result.
+        // Rows less their mean have squares below 4 each; the definition itself rounds d additions of its
+        // result.
         let d = rows.ncols() as f64;
         let bound = (2.0 * d + 16.0) * 0.5 * f64::EPSILON * 8.0 * d + d * 0.5 * f64::EPSILON * 4.0 * d;
         assert!(ours.iter().zip(&exact).all(|(a, b)| (a - b).abs() <= bound));

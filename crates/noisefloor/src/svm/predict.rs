@@ -17,8 +17,9 @@ impl Scaler {
         Self { mean: vec![0.0; dimensions], scale: vec![1.0; dimensions] }
     }
 
-    /// Learns from rows of equal length. A column whose standard deviation is below `least`, at least 0, is scaled as if it had that:
-    /// differences that are nothing are not blown up to matter as much as the others.
+    /// Learns from rows of equal length. A column whose standard deviation is below `least`, at least 0, is
+    /// scaled as if it had that: differences that are nothing are not blown up to matter as much as the
+    /// others.
     pub fn fit<'a>(rows: impl Iterator<Item = &'a [f32]> + Clone, least: f64) -> Self {
         let dimensions = rows.clone().next().map_or(0, <[f32]>::len);
         let count = rows.clone().count().max(1) as f64;

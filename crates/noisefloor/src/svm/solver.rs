@@ -1,7 +1,8 @@
 //! Training from distances that are there already: sequential minimal optimisation on a kernel matrix.
 //!
-//! linfa-svm computes its kernel matrix from rows, one scalar after another in one thread, and takes no other: neither its kernel trait
-//! nor its fitting functions are public. For the paper's descriptor, 9,600 rows of 32,768 numbers, that would take hours a machine.
+//! linfa-svm computes its kernel matrix from rows, one scalar after another in one thread, and takes no
+//! other: neither its kernel trait nor its fitting functions are public. For the paper's descriptor, 9,600
+//! rows of 32,768 numbers, that would take hours a machine.
 
 use super::params::{LIGHTEST, SOLVER_EPS, SvmParams, SvmTrainError, check};
 use ndarray::{Array2, ArrayView2};
@@ -21,8 +22,10 @@ pub struct Weights {
     pub rho: f64,
 }
 
-/// Trains on examples whose squared distances are given, n×n and symmetric; `converged[i]` is the class of example i. What
-/// [`fit_svm`](super::fit_svm) does for long rows, for those who train several machines on parts of the same rows.
+/// Trains on examples whose squared distances are given, n×n and symmetric; `converged[i]` is the class of
+/// example i. What
+/// [`fit_svm`](super::fit_svm) does for long rows, for those who train several machines on parts of the same
+/// rows.
 ///
 /// # Errors
 /// [`SvmTrainError`] if parameters or examples are out of range.
@@ -44,8 +47,8 @@ pub fn fit_weights(
     Ok(solve(kernel.view(), converged, params.c))
 }
 
-/// Minimises ½ αᵀQα − Σα, 0 ≤ α ≤ C, Σ yα = 0, Q = yᵢyⱼK, two variables at a time, chosen by second-order information (Fan, Chen and
-/// Lin 2005, "Working set selection using second order information", WSS 2).
+/// Minimises ½ αᵀQα − Σα, 0 ≤ α ≤ C, Σ yα = 0, Q = yᵢyⱼK, two variables at a time, chosen by second-order
+/// information (Fan, Chen and Lin 2005, "Working set selection using second order information", WSS 2).
 fn solve(kernel: ArrayView2<'_, f64>, converged: &[bool], c: f64) -> Weights {
     let n = converged.len();
     let sign = |t: usize| if converged[t] { 1.0 } else { -1.0 };
@@ -128,7 +131,8 @@ mod tests {
         assert!(bound.rho.abs() < 1e-12);
     }
 
-    /// Far from everything, an example weighs on itself alone, and the smaller class is bound by what balances it.
+    /// Far from everything, an example weighs on itself alone, and the smaller class is bound by what
+    /// balances it.
     #[test]
     fn far_examples_have_a_known_solution() {
         let squared = Array2::from_shape_fn((4, 4), |(i, j)| if i == j { 0.0 } else { 1e6 });

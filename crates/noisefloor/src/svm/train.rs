@@ -9,7 +9,8 @@ use linfa::composing::platt_scaling::{Platt as LinfaPlatt, platt_newton_method};
 use linfa::prelude::*;
 use ndarray::{Array1, ArrayView2};
 
-/// Rows longer than this are trained on from a matrix product, by [`fit_weights`]; linfa's kernel would take longer than all the rest.
+/// Rows longer than this are trained on from a matrix product, by [`fit_weights`]; linfa's kernel would take
+/// longer than all the rest.
 const WIDE: usize = 256;
 
 /// Trains on scaled descriptors, one a row; `converged[i]` is the class of row i.
@@ -54,12 +55,13 @@ fn fit_linfa(
     Ok(trained)
 }
 
-/// Observers that each probability is put to in [`fit_platt`]: linfa's Platt scaling takes classes, not probabilities.
+/// Observers that each probability is put to in [`fit_platt`]: linfa's Platt scaling takes classes, not
+/// probabilities.
 const OBSERVERS: usize = 40;
 
-/// Fits the sigmoid to (decision value, probability that an observer sees no difference) of examples that the machine has not
-/// been trained on: each is put to 40 observers, of whom that share agrees (Platt 1999; Newton's method of Lin, Lin and Weng
-/// 2007 in linfa).
+/// Fits the sigmoid to (decision value, probability that an observer sees no difference) of examples that the
+/// machine has not been trained on: each is put to 40 observers, of whom that share agrees (Platt 1999;
+/// Newton's method of Lin, Lin and Weng 2007 in linfa).
 ///
 /// # Errors
 /// [`SvmTrainError::Platt`] if the fit does not converge.
@@ -93,8 +95,8 @@ mod tests {
         (rows, labels)
     }
 
-    /// Within 10⁻⁴ of linfa's own decision values, also with C = 100, where coefficients are large and roundings add up; and for long
-    /// rows, which linfa does not train.
+    /// Within 10⁻⁴ of linfa's own decision values, also with C = 100, where coefficients are large and
+    /// roundings add up; and for long rows, which linfa does not train.
     #[test]
     fn prediction_equals_linfa() {
         for (examples, dimensions, c, gamma) in [
@@ -132,8 +134,8 @@ mod tests {
         }
     }
 
-    /// What training may be given: examples that repeat or contradict one another, two of them, numbers that say nothing, tiny or huge
-    /// ones, and classes of very different sizes.
+    /// What training may be given: examples that repeat or contradict one another, two of them, numbers that
+    /// say nothing, tiny or huge ones, and classes of very different sizes.
     fn extremes() -> Vec<(&'static str, Array2<f64>, Vec<bool>)> {
         let (rows, labels) = clouds(60, 3);
         let scaled = |factor: f64| rows.mapv(|v| v * factor);
@@ -154,7 +156,8 @@ mod tests {
         ]
     }
 
-    /// Whatever it is given, training ends in a machine that decides by finite numbers, the same in f32 as linfa's in f64.
+    /// Whatever it is given, training ends in a machine that decides by finite numbers, the same in f32 as
+    /// linfa's in f64.
     #[test]
     fn extremes_end_in_a_machine() {
         for (name, rows, labels) in extremes() {
@@ -164,8 +167,9 @@ mod tests {
                     let ours = fit_svm(rows.view(), &labels, params).unwrap();
                     let theirs = fit_linfa(rows.view(), &labels, params).unwrap();
                     assert_eq!(ours.dimensions(), 3, "{name}, {params:?}: no support vectors");
-                    // Each term errs by the roundings of its coefficient and kernel, 2⁻²³ each; distances of numbers beyond 10⁹ by more,
-                    // but there the kernel is 0 off the diagonal. Exponents to 16 lose 2⁻²⁰ of the kernel.
+                    // Each term errs by the roundings of its coefficient and kernel, 2⁻²³ each; distances of
+                    // numbers beyond 10⁹ by more, but there the kernel is 0 off the diagonal. Exponents to 16
+                    // lose 2⁻²⁰ of the kernel.
                     let weight: f64 = ours.coefficients.iter().map(|a| f64::from(a.abs())).sum();
                     let bound = 2e-6 * (weight + f64::from(ours.rho.abs())) + 1e-9;
                     for x in rows.axis_iter(Axis(0)) {
@@ -185,8 +189,8 @@ mod tests {
         }
     }
 
-    /// A kernel that has underflowed to the identity knows nothing but its examples: these it tells apart, and far from them it says the
-    /// same of everything.
+    /// A kernel that has underflowed to the identity knows nothing but its examples: these it tells apart,
+    /// and far from them it says the same of everything.
     #[test]
     fn a_kernel_that_is_the_identity_knows_its_examples_alone() {
         let (rows, labels) = clouds(60, 3);
@@ -198,7 +202,8 @@ mod tests {
         assert_eq!(svm.decision(&[50.0; 3]), -svm.rho);
     }
 
-    /// Classes that do not overlap have no finite slope of greatest likelihood; Platt's targets, short of 0 and 1, bound it.
+    /// Classes that do not overlap have no finite slope of greatest likelihood; Platt's targets, short of 0
+    /// and 1, bound it.
     #[test]
     fn platt_on_classes_that_do_not_overlap_is_finite_and_right() {
         for distance in [1e-3f32, 1.0, 1e3] {

@@ -3,7 +3,8 @@ use crate::tile::Tile;
 use noisefloor_testkit::Noise;
 use proptest::prelude::*;
 
-/// A seeded tile of 64×64 pixels with its halo: a ramp with a checker on it, and noise, four times as strong in one corner.
+/// A seeded tile of 64×64 pixels with its halo: a ramp with a checker on it, and noise, four times as strong
+/// in one corner.
 #[derive(Clone, Copy)]
 struct Recipe {
     seed: u64,
@@ -95,7 +96,8 @@ fn white_noise_has_the_energy_it_should() {
     }
 }
 
-/// White noise of known σ on flat grey: a mask energy of σ²·gain/4ˢ at each scale s, weighted by scale and brightness.
+/// White noise of known σ on flat grey: a mask energy of σ²·gain/4ˢ at each scale s, weighted by scale and
+/// brightness.
 #[test]
 fn the_map_shows_white_noise_as_strong_as_it_is() {
     let mut planes = tile(Recipe { seed: 7, base: 0.5, ramp: (0.0, 0.0), checker: (0.0, 4), noise: 0.01 });
@@ -111,8 +113,8 @@ fn the_map_shows_white_noise_as_strong_as_it_is() {
     let scales: f32 = SCALES.iter().enumerate().map(|(s, w)| w / (1 << (2 * s)) as f32).sum();
     let brightness = (0.5 + BRIGHTNESS_OFFSET).powf(BRIGHTNESS_EXPONENT);
     let expected = variance * mask.white_noise_gain() * scales * brightness;
-    // Half of the energy is in the first scale (standard error 2.5 %), a quarter, a fifth and a twentieth in the others
-    // (5, 10, 20 %), as in `white_noise_has_the_energy_it_should`: 3 % in all; 4 σ.
+    // Half of the energy is in the first scale (standard error 2.5 %), a quarter, a fifth and a twentieth in
+    // the others (5, 10, 20 %), as in `white_noise_has_the_energy_it_should`: 3 % in all; 4 σ.
     let energy = map.mapv(|v| v * v).mean().unwrap();
     assert!((energy / expected - 1.0).abs() < 0.12, "{energy} against {expected}");
 }
@@ -153,7 +155,8 @@ fn described(own: [f32; OWN], samples: f64, area: f64) -> Described {
     Described { own: own.to_vec(), spp: samples, area }
 }
 
-/// Two tiles, the second with three times the area and a quarter of the samples: at as many samples, energies average.
+/// Two tiles, the second with three times the area and a quarter of the samples: at as many samples, energies
+/// average.
 #[test]
 fn the_picture_is_the_mean_of_its_tiles_at_the_samples_of_each() {
     let amplitude = |a: f32| 0.5 * (a * a + NOISE_FLOOR).ln();
