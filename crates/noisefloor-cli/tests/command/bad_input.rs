@@ -42,13 +42,13 @@ fn pictures() {
     case.judge("nan.exr", "b.exr", &SPP, &["nan.exr", "(0, 0)", "finite"]);
     case.judge("a.exr", "nan.exr", &SPP, &["nan.exr", "finite"]);
     case.judge("a.exr", "small.exr", &SPP, &["small.exr", "32×32", "32×16"]);
-    case.judge("a.exr", "a.exr", &SPP, &["same"]);
+    case.judge("a.exr", "a.exr", &SPP, &["identical"]);
     case.judge("a.exr", ".", &SPP, &["folder"]);
     case.judge("a.exr", "b.exr", &["--spp", "0", "--spp", "16"], &["a.exr", "positive", "0"]);
     case.judge("a.exr", "b.exr", &["--spp", "16", "--spp", "nan"], &["b.exr", "positive"]);
     case.judge("a.exr", "b.exr", &["--spp", "16"], &["--spp", "1 given for 2"]);
     case.judge("a.exr", "b.exr", &["--spp", "16", "--spp", "16", "--spp", "16"], &["3 given for 2"]);
-    case.judge("a.exr", "b.exr", &["--spp", "16", "--spp", "16", "--nested"], &["same"]);
+    case.judge("a.exr", "b.exr", &["--spp", "16", "--spp", "16", "--nested"], &["identical"]);
     case.judge("a.exr", "b.exr", &["--spp", "16", "--spp", "16", "--threshold", "1"], &["threshold"]);
 
     let (a, b) = (case.path("a.exr"), case.path("b.exr"));
@@ -235,7 +235,7 @@ fn scene_files() {
         .unwrap();
     std::fs::write(case.path("cut.glb"), "glTF").unwrap();
     render("absent.xml", &["absent.xml"]);
-    render("a.exr", &["a.exr", ".gltf, .glb or .xml"]);
+    render("a.exr", &["a.exr", ".gltf, .glb, .pbrt or .xml"]);
     render("cut.xml", &["cut.xml", "line"]);
     render("odd.xml", &["odd.xml"]);
     render("cut.glb", &["cut.glb"]);

@@ -94,6 +94,7 @@ fn extreme_counts_and_sizes_are_judged() {
         grey_exr(&b, size, 2, 0.5);
         for spp in ["1", "1e18", "0.001"] {
             let args = ["judge", text(&a), "--spp", spp, "--against", text(&b), "--spp", spp, "--json"];
+            let args = [&args[..], &["--independent"]].concat();
             let report: Value = serde_json::from_str(&succeed(&args)).unwrap();
             assert!(report["tiles"][0]["probability"].as_f64().is_some(), "{report}");
         }
