@@ -90,12 +90,11 @@ impl Format {
 
 /// The content of bytes that [`payload`] returned.
 pub(crate) fn unpack<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, Fault> {
-    // A length inside the payload is believed up to bincode's limit, which is part of a type. The smallest
-    // limit that the payload fits keeps what a short, crafted payload can reserve within sixteen times its
-    // length.
-    match bytes.len() {
-        0..=0x1_0000 => unpack_within::<T, 0x1_0000>(bytes),
-        0x1_0001..=0x10_0000 => unpack_within::<T, 0x10_0000>(bytes),
+    // A length inside the payload is believed up to bincode's limit, which is part of a type and counts numbers by their
+    // size in memory: up to sixteen times that in the payload. The least limit above that bounds what a short, crafted
+    // payload can reserve.
+    match bytes.len().saturating_mul(16) {
+        0..=0x10_0000 => unpack_within::<T, 0x10_0000>(bytes),
         0x10_0001..=0x100_0000 => unpack_within::<T, 0x100_0000>(bytes),
         0x100_0001..=0x1000_0000 => unpack_within::<T, 0x1000_0000>(bytes),
         _ => unpack_within::<T, { MAX_PAYLOAD as usize }>(bytes),
@@ -141,7 +140,10 @@ mod tests {
             let Err(Fault::Damaged(what)) = unpack::<String>(&crafted) else { panic!("{length}") };
             assert!(what.contains("LimitExceeded"), "{length}: {what}");
         }
-        let whole = payload(&vec![7u64; 0x1_0000]).unwrap_or_default();
-        assert_eq!(unpack::<Vec<u64>>(&whole).ok(), Some(vec![7; 0x1_0000]));
+        // One byte each in the payload, eight in memory
+        for count in [1000, 0xfff0, 0x10_0000] {
+            let whole = payload(&vec![7u64; count]).unwrap_or_default();
+            assert!(unpack::<Vec<u64>>(&whole).is_ok_and(|read| read.len() == count), "{count}");
+        }
     }
 }
