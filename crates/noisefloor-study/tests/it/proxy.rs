@@ -33,7 +33,13 @@ fn nginx(folder: &Path, kept: u16, stripped: u16) -> (Nginx, u16) {
         .replace("STRIPPED", &stripped.to_string());
     let file = folder.join("nginx.conf");
     std::fs::write(&file, text).unwrap();
-    let child = Command::new("nginx").arg("-c").arg(&file).stderr(Stdio::null()).spawn().unwrap();
+    let child = Command::new("nginx")
+        .arg("-c")
+        .arg(&file)
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
     let nginx = Nginx(child);
     for _ in 0..100 {
         if std::net::TcpStream::connect(("127.0.0.1", port)).is_ok() {
