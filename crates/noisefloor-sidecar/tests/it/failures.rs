@@ -27,7 +27,7 @@ fn a_process_that_fails_again_and_again_is_an_error() {
         ("send no JSON", "expected value"),
         ("send a list", "invalid"),
         ("nest deeply", "EOF while parsing"),
-        ("send strange counts", "expected u32"),
+        ("send strange counts", "expected u64"),
         ("send too few counts", "1 sample counts for 4 tiles"),
         ("send no counts", "missing field `samples`"),
         ("claim many samples", "4294967295 samples where 1 were requested"),
