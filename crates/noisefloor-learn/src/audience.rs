@@ -74,10 +74,11 @@ impl AudienceFit {
     /// the same intervals.
     ///
     /// ```
-    /// use noisefloor::{Audience, AudienceFit};
+    /// use noisefloor::Audience;
+    /// use noisefloor_learn::AudienceFit;
     /// let fit = AudienceFit::new(&[(100.0, 150.0), (200.0, 300.0), (300.0, 450.0), (400.0, 600.0), (800.0, 50.0)])?;
     /// assert_eq!(fit.line, Audience { slope: 1.5, offset: 0.0 });
-    /// # Ok::<(), noisefloor::AudienceFitError>(())
+    /// # Ok::<(), noisefloor_learn::AudienceFitError>(())
     /// ```
     ///
     /// # Errors

@@ -57,7 +57,13 @@ pub(crate) fn describe(hello: Hello) -> Result<(SourceInfo, Vec<String>), Blame>
     Ok((SourceInfo { name, width, height, unit, aims: true, repeats }, warnings))
 }
 
-/// The batches of a reply: as many as requests, none with more samples than requested.
+/// Most samples that are believed where `spp` were requested: LuxCore stops a session a little late, and a tile may get what
+/// its threads had begun.
+fn most(spp: u64) -> u64 {
+    spp.saturating_mul(16).saturating_add(256)
+}
+
+/// The batches of a reply: as many as requests, none with many more samples than requested.
 pub(crate) fn batches(
     requests: &[Request],
     Reply { header: Sampled { samples }, payload }: Reply<Sampled>,
@@ -67,7 +73,7 @@ pub(crate) fn batches(
         return Err((None, SidecarCause::Wrong { what }));
     }
     let given = || requests.iter().zip(samples.iter().copied());
-    if let Some((request, samples)) = given().find(|(request, samples)| *samples > request.spp) {
+    if let Some((request, samples)) = given().find(|(request, samples)| *samples > most(request.spp)) {
         let what = format!("{samples} samples where {} were requested", request.spp);
         return Err((Some(request.tile.index), SidecarCause::Wrong { what }));
     }

@@ -38,7 +38,8 @@
 //! let study = Arc::new(Study::open(&file)?);
 //! let mut session = ParticipantSession::new(study.clone(), grids(&study), 1);
 //! session.apply(&StudyEvent::Consent { language: "en".into() })?;
-//! assert_eq!((session.stage(), session.progress()), (Stage::Conditions, (0, 3)));
+//! // Two tiles, and the practice and catch trials that a study has unless its file says otherwise.
+//! assert_eq!((session.stage(), session.progress()), (Stage::Conditions, (0, 6)));
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
