@@ -120,7 +120,7 @@ impl Rest<'_> {
         let checkpoint = snapshots.as_ref().map(|snapshots| snapshots.of(driver.session()));
         let over = Some((driver.clock(), driver.source().as_ref()));
         let written = output.write(driver.session(), checkpoint, over);
-        finish(&driver, outcome, &cancel)?;
+        let interrupted = finish(&driver, outcome, &cancel)?;
         written?;
         if !job.quiet {
             output.summarise(
@@ -131,7 +131,7 @@ impl Rest<'_> {
             )?;
         }
         let stopped = driver.session().stops().any(|s| s.reason == StopReason::Cancelled);
-        Ok(if stopped { ExitCode::from(INTERRUPTED) } else { ExitCode::SUCCESS })
+        Ok(if stopped || interrupted { ExitCode::from(INTERRUPTED) } else { ExitCode::SUCCESS })
     }
 }
 
@@ -161,19 +161,19 @@ fn sample<C: StoppingCriterion>(
     outcome
 }
 
-/// Says what the user should know after the run. Ctrl-C in a terminal ends a command that renders, too:
-/// that is no failure.
+/// Says what the user should know after the run, and whether Ctrl-C ended the source in the middle of a batch: in a
+/// terminal it ends a command that renders, too, which is no failure.
 fn finish<C: StoppingCriterion>(
     driver: &Rendering<C>,
     outcome: Result<(), DriverError>,
     cancel: &AtomicBool,
-) -> anyhow::Result<()> {
+) -> anyhow::Result<bool> {
     driver.source().notes().iter().for_each(|text| note!("warning: {text}"));
     match outcome {
         Err(error) if cancel.load(Ordering::Relaxed) => {
             note!("warning: the batch under way is lost: {}", one_line(&error.into()));
-            Ok(())
+            Ok(true)
         }
-        outcome => Ok(outcome?),
+        outcome => Ok(outcome.map(|()| false)?),
     }
 }

@@ -48,7 +48,7 @@ fn pictures() {
     case.judge("a.exr", "b.exr", &["--spp", "16", "--spp", "nan"], &["b.exr", "positive"]);
     case.judge("a.exr", "b.exr", &["--spp", "16"], &["--spp", "1 given for 2"]);
     case.judge("a.exr", "b.exr", &["--spp", "16", "--spp", "16", "--spp", "16"], &["3 given for 2"]);
-    case.judge("a.exr", "b.exr", &["--spp", "16", "--spp", "16", "--nested"], &["identical"]);
+    case.judge("a.exr", "b.exr", &["--spp", "16", "--spp", "16", "--nested"], &["the same picture"]);
     case.judge("a.exr", "b.exr", &["--spp", "16", "--spp", "16", "--threshold", "1"], &["threshold"]);
 
     let (a, b) = (case.path("a.exr"), case.path("b.exr"));

@@ -168,7 +168,7 @@ fn a_checkpoint_of_another_render_is_refused() {
     let out = text(folder.path());
     succeed(&short(out, &["--time", "0.01"]));
     let refused = |more: &[&str], says: &str| fail(&short(out, more), &[says]);
-    refused(&["--resume", "--seed", "2"], "of another job");
+    refused(&["--resume", "--seed", "2"], "belongs to another job");
     refused(&["--resume", "--batch", "50"], "set of parameters");
     let rival = ["render", "--size", "64x64", "--resume", "--out", out, "--criterion", "cycles:0.01"];
     fail(&rival, &["leave it out"]);
@@ -182,7 +182,7 @@ fn a_checkpoint_of_another_render_is_refused() {
         out,
         "--resume",
     ];
-    fail(&source, &["does not promise", "leave it out"]);
+    fail(&source, &["cannot be resumed", "leave it out"]);
     let file = folder.path().join("checkpoint.nfc");
     let bytes = std::fs::read(&file).unwrap();
     std::fs::write(&file, &bytes[..bytes.len() / 2]).unwrap();
