@@ -2,7 +2,7 @@
 //!
 //! A target takes any bytes and must return: no panic, no abort, no endless loop, no memory beyond what the
 //! bytes pay for. Checksums and lengths around the bytes are repaired first, so that mutants get past them:
-//! [`containers`] and [`pictures`] do so. Every target has seeds, small valid inputs.
+//! `containers` and `pictures` do so. Every target has seeds, small valid inputs.
 //!
 //! - `cargo test -p noisefloor-fuzz` runs the seeds, all inputs that ever failed (`found/TARGET/*`), and a
 //!   second of mutants of each target. It needs nothing but Rust; CI does it.

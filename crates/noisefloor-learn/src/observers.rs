@@ -2,7 +2,7 @@
 
 /// Share of observers who see no difference at the recorded threshold, as it is read here (Takouachet et al.
 /// 2017, §4.2.2: "identical to the reference one by 95% of the observers"). The human data call it a mean
-/// over observers and give no spread, so that this share and [`TrainParams::spread`] are one assumption
+/// over observers and give no spread, so that this share and [`TrainParams::spread`](crate::TrainParams::spread) are one assumption
 /// together: they place P = 0.9 where predictions on left-out scenes are neither early nor late.
 pub const OBSERVERS_AT_THRESHOLD: f64 = 0.95;
 

@@ -113,7 +113,7 @@ impl Oracle {
         }
     }
 
-    /// The visible noise (see [`crate::Descriptor::visible_noise`]) from which it is seen: of an even noise
+    /// The visible noise (see [`crate::TileDescriptor::visible_noise`]) from which it is seen: of an even noise
     /// in a tile of the mean texture of the training data, where P crosses the threshold. `None` if the
     /// descriptor does not tell noise from picture.
     pub fn just_visible(&self) -> Option<f32> {
@@ -133,7 +133,7 @@ impl Oracle {
         descriptor.pooled_visible_noise(&at(clean))
     }
 
-    /// The visible noise of a whole image (see [`crate::Descriptor::visible_noise`]), row-major, from the
+    /// The visible noise of a whole image (see [`crate::TileDescriptor::visible_noise`]), row-major, from the
     /// planes of its tiles; NaN where `planes` has none. `None` if the descriptor does not tell noise from
     /// picture.
     ///

@@ -312,7 +312,7 @@ impl<C: StoppingCriterion> Session<C> {
     }
 
     /// How visible the noise is at each pixel of the image, row-major, in 8-bit display steps (see
-    /// [`crate::Descriptor::visible_noise`]); NaN where there is no evidence. Computed at each call. `None`
+    /// [`crate::TileDescriptor::visible_noise`]); NaN where there is no evidence. Computed at each call. `None`
     /// before the display is settled, or if the criterion cannot say.
     pub fn visible_noise(&self) -> Option<Vec<f32>> {
         let reference = self.displayed_reference.as_deref();

@@ -98,7 +98,7 @@ impl Corpus {
     /// # Errors
     /// [`CorpusError::Unknown`] if there is no such scene, [`CorpusError::Stack`] if the reference cannot be
     /// read,
-    /// [`CorpusError::JudgedZone`] if a zone lies outside it.
+    /// [`CorpusError::Zone`] if a zone lies outside it.
     pub fn scene_reference(&self, scene: &str) -> Result<Option<Vec<Patch>>, CorpusError> {
         levels::reference(&self.scene_zones(scene)?)
     }

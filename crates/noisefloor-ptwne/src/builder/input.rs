@@ -10,7 +10,7 @@ pub const MAX_SURFACES: usize = 1 << 26;
 /// Planar surfaces with less area than this, in squared scene units, are left out.
 pub const MIN_AREA: f32 = 1e-18;
 
-/// A material of a [`SceneBuilder`].
+/// A material of a [`SceneBuilder`](crate::SceneBuilder).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct MaterialId(pub(super) u32);
 

@@ -1,7 +1,7 @@
 //! How the thresholds of a tile are spread over observers, and where 95 % of them see no difference.
 //!
 //! With thirty observers nobody sees the shape of the spread, but the 95 % level depends on it. The posterior
-//! is therefore taken over median, width and shape ([`super::shapes`]) and a share of slips, on a grid;
+//! is therefore taken over median, width and shape (`shapes`) and a share of slips, on a grid;
 //! estimates are posterior medians, intervals hold 95 % of the posterior. How often they hold the truth is
 //! simulated in `examples/coverage.rs`.
 
