@@ -18,12 +18,12 @@ const CURVATURE: f64 = 0.004;
 
 /// Whether two pictures of one view share samples, as far as they show it.
 ///
-/// Let x be the mean of n samples and y that of m > n, both masked, so that little of the picture is left
-/// beside the noise. If y contains the samples of x, y has nothing in common with their difference; if it
-/// does not, the noise of y is part of the difference: the regression of y on x − y has the slope 0 or −n/(n
-/// + m). The slope is averaged over blocks, weighted so that textured ones, where y says little about its
-/// noise, count less; the scatter of the blocks gives its standard error. `None` if that is too large to tell
-/// the slopes apart, as with equal counts, where there is no nesting.
+/// Let x be the mean of n samples and y that of m > n, both masked, so that little of the picture is left beside the
+/// noise. If y contains the samples of x, y has nothing in common with their difference; if it does not, the noise of y
+/// is part of the difference: the slope of the regression of y on that difference is 0 or −n/(n + m). It is averaged
+/// over blocks, weighted so that textured ones, where y says little about its noise, count less; the scatter of the
+/// blocks gives its standard error. `None` if that is too large to tell the slopes apart, as with equal counts, where
+/// there is no nesting.
 pub(crate) fn shared_samples(
     size: (usize, usize),
     one: Rendering<'_>,
