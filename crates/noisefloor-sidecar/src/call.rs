@@ -59,7 +59,7 @@ pub(crate) fn describe(hello: Hello) -> Result<(SourceInfo, Vec<String>), Blame>
 
 /// Most samples that are believed where `spp` were requested: LuxCore stops a session a little late, and a tile may get what
 /// its threads had begun.
-fn most(spp: u64) -> u64 {
+pub(crate) fn most(spp: u64) -> u64 {
     spp.saturating_mul(16).saturating_add(256)
 }
 
