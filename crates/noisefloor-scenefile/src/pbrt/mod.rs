@@ -6,11 +6,14 @@
 //!
 //! Read here and not by a crate: pbrt4 0.2.0 reads version 4 only, and its errors name neither file nor line.
 
+mod arguments;
 mod camera;
 mod colours;
+mod directives;
 mod environment;
 mod lights;
 mod materials;
+mod moves;
 mod params;
 mod reader;
 mod shapes;

@@ -1,0 +1,79 @@
+//! What follows the name of a directive.
+
+use super::params::{self, Params, at, number};
+use super::tokens::{Kind, Tokens};
+use crate::error::{LoadError, Place};
+use std::path::Path;
+
+/// The tokens behind a directive, and where it stands.
+pub(super) struct Arguments<'a, 't> {
+    tokens: &'a mut Tokens<'t>,
+    path: &'a Path,
+    line: u32,
+}
+
+impl<'a, 't> Arguments<'a, 't> {
+    pub(super) fn new(tokens: &'a mut Tokens<'t>, path: &'a Path, line: u32) -> Self {
+        Self { tokens, path, line }
+    }
+
+    pub(super) fn place(&self) -> Place {
+        at(self.path, self.line)
+    }
+
+    /// A name in quotes.
+    pub(super) fn text(&mut self) -> Result<String, LoadError> {
+        self.skip()?.ok_or_else(|| self.place().bad("expected a directive with a name in quotes"))
+    }
+
+    /// The next token, if it is a text in quotes, or nothing.
+    fn skip(&mut self) -> Result<Option<String>, LoadError> {
+        let path = self.path;
+        let token = self.tokens.next().map_err(|line| unended(path, line))?;
+        Ok(token.and_then(|token| if let Kind::Text(text) = token.kind { Some(text) } else { None }))
+    }
+
+    /// All names in quotes that come next, at least one.
+    pub(super) fn texts(&mut self) -> Result<Vec<String>, LoadError> {
+        let mut names = vec![self.text()?];
+        let path = self.path;
+        while let Some(Kind::Text(_)) =
+            self.tokens.peek().map_err(|line| unended(path, line))?.map(|token| &token.kind)
+        {
+            names.push(self.text()?);
+        }
+        Ok(names)
+    }
+
+    /// Passes over one token.
+    pub(super) fn pass(&mut self) -> Result<(), LoadError> {
+        self.skip().map(drop)
+    }
+
+    pub(super) fn params(&mut self) -> Result<Params, LoadError> {
+        params::read(self.tokens, self.path, self.line)
+    }
+
+    /// As many numbers, bare or in brackets.
+    pub(super) fn numbers<const N: usize>(&mut self) -> Result<[f64; N], LoadError> {
+        let (path, mut found, mut count, mut bracket) = (self.path, [0.0; N], 0, false);
+        while count < N || bracket {
+            let token = self.tokens.next().map_err(|line| unended(path, line))?;
+            let here = at(path, token.as_ref().map_or(self.line, |token| token.line));
+            match token.map(|token| token.kind) {
+                Some(Kind::Open) if count == 0 && !bracket => bracket = true,
+                Some(Kind::Close) if bracket && count == N => bracket = false,
+                Some(Kind::Word(word)) if count < N => {
+                    found[count] = number(&word, &here)?;
+                    count += 1;
+                }
+                _ => return Err(here.bad(format!("expected {N} numbers"))),
+            }
+        }
+        Ok(found)
+    }
+}
+
+fn unended(path: &Path, line: u32) -> LoadError {
+    at(path, line).bad("a quote does not end")
+}

@@ -1,0 +1,193 @@
+//! Executes the directives of a file.
+
+use super::arguments::Arguments;
+use super::params::Params;
+use super::reader::{MAX_DEPTH, Reader};
+use super::state::{Definition, Look};
+use crate::error::{LoadError, Place};
+use glam::DMat4;
+use std::rc::Rc;
+
+impl Reader<'_> {
+    /// Executes a directive in a file that is included `depth` deep.
+    pub(super) fn directive(
+        &mut self,
+        word: &str,
+        args: &mut Arguments<'_, '_>,
+        depth: u32,
+    ) -> Result<(), LoadError> {
+        if self.moves(word, args)? || self.nests(word, args)? {
+            return Ok(());
+        }
+        match word {
+            "WorldBegin" => {
+                self.in_world = true;
+                self.state.to_world = DMat4::IDENTITY;
+                self.coordinate_systems.insert("world".to_owned(), DMat4::IDENTITY);
+            }
+            "WorldEnd" => {}
+            // Parameters alone
+            "Option" => drop(args.params()?),
+            "ReverseOrientation" => self.state.reversed = !self.state.reversed,
+            "ObjectInstance" => {
+                let name = args.text()?;
+                let result = self.instance(&name, &args.place());
+                self.errors.take(result)?;
+            }
+            "Include" | "Import" => {
+                let included = self.folder.find(&args.text()?, &args.place())?;
+                self.file(&included, depth + 1)?;
+            }
+            "NamedMaterial" => self.state.material = Look::Named(args.text()?, args.place()),
+            // One name or two
+            "MediumInterface" => self.state.in_medium = args.texts()?.iter().any(|name| !name.is_empty()),
+            "Texture" => {
+                let (name, values, class) = (args.text()?, args.text()?, args.text()?);
+                let params = args.params()?;
+                let result = self.texture(&name, &values, &class, &params);
+                self.errors.take(result)?;
+                self.say_unused(&params, &format!("{word} \"{class}\""));
+            }
+            _ => {
+                let kind = args.text()?;
+                let params = args.params()?;
+                let result = self.with_params(word, &kind, params);
+                self.errors.take(result)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Executes a directive that begins or ends a part of the file. The result is whether it was one.
+    fn nests(&mut self, word: &str, args: &mut Arguments<'_, '_>) -> Result<bool, LoadError> {
+        let place = args.place();
+        let without_begin = || place.clone().bad(format!("{word} without its begin"));
+        match word {
+            "AttributeBegin" => self.push(&place)?,
+            "AttributeEnd" => self.state = self.stack.pop().ok_or_else(without_begin)?,
+            "TransformBegin" => {
+                place.clone().at_most(
+                    "nested transforms",
+                    self.transforms.len() as u64,
+                    u64::from(MAX_DEPTH),
+                )?;
+                self.transforms.push(self.state.to_world);
+            }
+            "TransformEnd" => self.state.to_world = self.transforms.pop().ok_or_else(without_begin)?,
+            "ObjectBegin" => {
+                let name = args.text()?;
+                if self.open_object.is_some() {
+                    return Err(place.clone().bad("an object in an object"));
+                }
+                self.push(&place)?;
+                self.open_object = Some((name, vec![]));
+            }
+            "ObjectEnd" => {
+                let (name, parts) = self.open_object.take().ok_or_else(without_begin)?;
+                self.objects.insert(name, parts);
+                self.state = self.stack.pop().ok_or_else(without_begin)?;
+            }
+            _ => return Ok(false),
+        }
+        Ok(true)
+    }
+
+    /// Executes a directive with a kind and parameters.
+    fn with_params(&mut self, word: &str, kind: &str, params: Params) -> Result<(), LoadError> {
+        let called = format!("{word} \"{kind}\"");
+        if self.sets_up(word, kind, &params, &called)? {
+            return Ok(());
+        }
+        match word {
+            "Shape" => {
+                let defaults = self.defaults("shape", &params);
+                let params = params.or(&defaults);
+                self.shape(kind, &params)?;
+                self.say_unused(&params, &called);
+            }
+            "Material" => self.state.material = Look::Given(self.definition(kind, params)),
+            "MakeNamedMaterial" => {
+                let class = params.text("type")?.unwrap_or_default().to_owned();
+                let definition = self.definition(&class, params);
+                self.named_materials.insert(kind.to_owned(), definition);
+            }
+            "LightSource" => {
+                let defaults = self.defaults("light", &params);
+                let params = params.or(&defaults);
+                self.light_source(kind, &params)?;
+                self.say_unused(&params, &called);
+            }
+            "AreaLightSource" => {
+                if kind != "diffuse" && kind != "area" {
+                    return Err(params.place.clone().unsupported(called));
+                }
+                self.state.area_light = Some(Rc::new(params));
+            }
+            "Attribute" => {
+                let all = params.or(&self.defaults(kind, &Params::none(Place::file(&self.path))));
+                self.state.defaults.insert(kind.to_owned(), Rc::new(all));
+            }
+            "MakeNamedMedium" => {
+                if !self.options.ignore_volumes {
+                    return Err(params.place.clone().unsupported("a participating medium"));
+                }
+                self.ignored(&params.place, "the participating medium is ignored");
+            }
+            _ => self.ignored(&params.place, format!("the directive {word} is ignored")),
+        }
+        Ok(())
+    }
+
+    /// Executes a directive on how the picture is taken. The result is whether it was one.
+    fn sets_up(&mut self, word: &str, kind: &str, params: &Params, called: &str) -> Result<bool, LoadError> {
+        match word {
+            "Camera" => {
+                self.coordinate_systems.insert("camera".to_owned(), self.state.to_world.inverse());
+                self.view.camera(kind, params, self.state.to_world)?;
+                self.say_unused(params, called);
+            }
+            "Film" => {
+                self.view.film(params)?;
+                // Names and formats of files, and parts of the picture
+                params.ignore(&["filename", "diagonal", "savefp16", "maxcomponentvalue"]);
+                params.ignore(&["cropwindow", "pixelbounds"]);
+                self.say_unused(params, called);
+            }
+            "Integrator" => {
+                self.max_depth =
+                    params.count("maxdepth")?.map(|d| u32::try_from(d).unwrap_or(u32::MAX - 1) + 1);
+                if !matches!(kind, "path" | "volpath" | "simplepath" | "simplevolpath" | "bdpt") {
+                    let what = format!("the integrator `{kind}` is replaced by path tracing");
+                    self.approximated(&params.place, what);
+                }
+            }
+            "Sampler" | "PixelFilter" | "Accelerator" | "ColorSpace" | "SurfaceIntegrator" | "Renderer"
+            | "VolumeIntegrator" => {}
+            _ => return Ok(false),
+        }
+        Ok(true)
+    }
+
+    /// The parameters that `Attribute` gave for things of a kind, but for colour spaces.
+    fn defaults(&self, kind: &str, params: &Params) -> Params {
+        match self.state.defaults.get(kind) {
+            Some(defaults) => (**defaults).clone(),
+            None => Params::none(params.place.clone()),
+        }
+    }
+
+    fn definition(&self, kind: &str, params: Params) -> Rc<Definition> {
+        Rc::new(Definition {
+            kind: kind.to_owned(),
+            params,
+            float_textures: self.state.float_textures.clone(),
+            colour_textures: self.state.colour_textures.clone(),
+        })
+    }
+
+    fn push(&mut self, place: &Place) -> Result<(), LoadError> {
+        place.clone().at_most("nested attributes", self.stack.len() as u64, 1024)?;
+        self.stack.push(self.state.clone());
+        Ok(())
+    }
+}
