@@ -68,6 +68,7 @@ mod tests {
             descriptor: Descriptor::default(),
             evidence: Evidence::Halves,
             tone_mapping: ToneMapping::Srgb { exposure: 1.0 },
+            viewing: noisefloor::Viewing::default(),
             zones,
             answers: Vec::new(),
         };

@@ -119,6 +119,7 @@ pub(crate) fn parts(
         descriptor: table.descriptor.clone(),
         evidence: table.evidence,
         tone_mapping: table.tone_mapping,
+        viewing: table.viewing,
         classifier,
         familiarity,
         audience: Audience::TRAINED,

@@ -2,7 +2,7 @@
 //! need.
 
 use crate::answer::Answer;
-use noisefloor::{Descriptor, Evidence, ToneMapping};
+use noisefloor::{Descriptor, Evidence, ToneMapping, Viewing};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 
@@ -61,6 +61,8 @@ pub struct Table {
     pub evidence: Evidence,
     /// How the pictures were displayed.
     pub tone_mapping: ToneMapping,
+    /// On which display they were seen, and from how far: an assumption where nobody recorded it.
+    pub viewing: Viewing,
     /// The zones.
     pub zones: Vec<Zone>,
     /// What single people said of tiles of other pictures: examples to train on, never scored as thresholds.
@@ -211,6 +213,7 @@ pub(crate) mod tests {
             descriptor: Descriptor::default(),
             evidence: Evidence::Halves,
             tone_mapping: ToneMapping::Srgb { exposure: 1.0 },
+            viewing: Viewing::default(),
             zones: vec![zone],
             answers: Vec::new(),
         };

@@ -3,7 +3,7 @@
 use crate::error::TableError;
 use crate::table::{Level, Origin, Table, Zone};
 use csv::{ReaderBuilder, StringRecord, Writer};
-use noisefloor::{Descriptor, DescriptorKind, DescriptorSpec, Evidence, ToneMapping};
+use noisefloor::{Descriptor, DescriptorKind, DescriptorSpec, Evidence, ToneMapping, Viewing};
 use serde::{Deserialize, Serialize};
 use std::io::{Read, Write};
 
@@ -19,6 +19,9 @@ struct Head {
     descriptor_version: u16,
     evidence: Evidence,
     tone_mapping: ToneMapping,
+    /// Tables of earlier releases assume the default without saying so.
+    #[serde(default)]
+    viewing: Viewing,
 }
 
 /// Writes a table as CSV.
@@ -31,6 +34,7 @@ pub fn write_table(table: &Table, mut to: impl Write) -> Result<(), TableError> 
         descriptor_version: table.descriptor.version(),
         evidence: table.evidence,
         tone_mapping: table.tone_mapping,
+        viewing: table.viewing,
     };
     let head = serde_json::to_string(&head).map_err(std::io::Error::from).map_err(csv::Error::from)?;
     writeln!(to, "{MARK}{head}").map_err(csv::Error::from)?;
@@ -84,7 +88,7 @@ pub fn read_table_with(from: impl Read, kinds: &[DescriptorKind]) -> Result<Tabl
         bad(1, "this is not a table of descriptors: it does not begin with \"# noisefloor table\"")
     })?;
     let head: Head = serde_json::from_str(head).map_err(|e| bad(1, &e.to_string()))?;
-    let Head { descriptor, descriptor_version, evidence, tone_mapping } = head;
+    let Head { descriptor, descriptor_version, evidence, tone_mapping, viewing } = head;
     let descriptor = Descriptor::from_spec(&descriptor, kinds).map_err(|e| bad(1, &e.to_string()))?;
     if descriptor_version != descriptor.version() {
         let here = descriptor.version();
@@ -121,7 +125,7 @@ pub fn read_table_with(from: impl Read, kinds: &[DescriptorKind]) -> Result<Tabl
     if zones.is_empty() {
         return Err(bad(3, "the table has no zones"));
     }
-    Ok(Table { descriptor, evidence, tone_mapping, zones, answers: Vec::new() })
+    Ok(Table { descriptor, evidence, tone_mapping, viewing, zones, answers: Vec::new() })
 }
 
 fn parse(record: &StringRecord) -> Result<(Zone, Level), String> {

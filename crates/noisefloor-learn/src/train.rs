@@ -153,6 +153,7 @@ mod tests {
             descriptor: Descriptor::default(),
             evidence: Evidence::Halves,
             tone_mapping,
+            viewing: noisefloor::Viewing::default(),
             zones,
             answers: Vec::new(),
         }

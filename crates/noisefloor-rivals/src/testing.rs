@@ -2,7 +2,7 @@
 
 use noisefloor::{
     Batch, Display, Film, ProgressiveSource, Repeats, Request, Rgb, SourceError, SourceInfo, TileGrid, Unit,
-    View,
+    View, Viewing,
 };
 use noisefloor_testkit::Noise;
 
@@ -10,7 +10,7 @@ static SRGB: Display = Display::SRGB;
 
 /// A look at a film through plain sRGB.
 pub(crate) fn view(film: &Film) -> View<'_> {
-    View { film, display: &SRGB, reference: None }
+    View { film, display: &SRGB, viewing: Viewing::default(), reference: None }
 }
 
 /// An empty film of 64×64 pixels in four tiles.

@@ -3,7 +3,9 @@
 #![allow(missing_docs, reason = "a benchmark")]
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use noisefloor::{Display, Film, NoiseMask, Oracle, Rgb, StoppingCriterion, TileGrid, TilePlanes, View};
+use noisefloor::{
+    Display, Film, NoiseMask, Oracle, Rgb, StoppingCriterion, TileGrid, TilePlanes, View, Viewing,
+};
 use noisefloor_testkit::Noise;
 use std::hint::black_box;
 use std::time::Instant;
@@ -39,7 +41,7 @@ fn verdict(c: &mut Criterion) {
     group.bench_function("query", |b| {
         b.iter(|| oracle.model().judge(black_box(&numbers)));
     });
-    let view = View { film: &film, display: &display, reference: None };
+    let view = View { film: &film, display: &display, viewing: Viewing::default(), reference: None };
     // All on one core, as the rest
     let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread");
     group.bench_function("verdict", |b| {
@@ -62,7 +64,7 @@ fn pictures(c: &mut Criterion) {
         let (film, display) = (film(edge), Display::SRGB);
         let tiles: Vec<_> = film.grid().tiles().collect();
         let mut oracle = Oracle::bundled();
-        let view = View { film: &film, display: &display, reference: None };
+        let view = View { film: &film, display: &display, viewing: Viewing::default(), reference: None };
         group.throughput(Throughput::Elements((edge * edge) as u64));
         group.bench_function(format!("{edge}x{edge}"), |b| b.iter(|| oracle.judge(&view, black_box(&tiles))));
     }

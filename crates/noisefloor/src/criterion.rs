@@ -7,6 +7,7 @@ use crate::params::Audience;
 use crate::rgb::Rgb;
 use crate::tile::{Tile, TileGrid};
 use auto_impl::auto_impl;
+use noisefloor_vision::Viewing;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
@@ -17,6 +18,8 @@ pub struct View<'a> {
     pub film: &'a Film,
     /// How radiance is displayed; settled before the first verdict.
     pub display: &'a Display,
+    /// On which display, and from how far.
+    pub viewing: Viewing,
     /// The quick reference, display-encoded, row-major over the image; present if [`Needs::reference`] is
     /// set.
     pub reference: Option<&'a [Rgb]>,
@@ -71,6 +74,19 @@ pub enum CriterionError {
         width: usize,
         /// Height of the tile it was given.
         height: usize,
+    },
+    /// The criterion does not know what other viewing conditions change.
+    #[error(
+        "{name} was trained for the viewing conditions {trained} and cannot tell what people see with {asked}: \
+         use a model whose descriptor knows viewing conditions, or leave them as they are"
+    )]
+    Viewing {
+        /// The criterion.
+        name: String,
+        /// Those it was trained for, as text.
+        trained: String,
+        /// Those it was given, as text.
+        asked: String,
     },
     /// The descriptor cannot describe the tile.
     #[error(transparent)]

@@ -5,6 +5,7 @@ use crate::film::Film;
 use crate::rgb::Rgb;
 use crate::tile::Tile;
 use ndarray::Array2;
+use noisefloor_vision::Viewing;
 use serde::{Deserialize, Serialize};
 use std::cell::RefCell;
 use std::ops::Range;
@@ -80,6 +81,8 @@ pub struct TilePlanes {
     /// Variance of known white rounding noise in each of the residuals of R′, G′ and B′; 0 for pictures in
     /// floating point.
     pub rounding: f32,
+    /// On which display the picture is seen, and from how far: the default, unless changed.
+    pub viewing: Viewing,
     /// The tile itself within the planes: rows and columns of the planes that belong to it.
     pub inner: Tile,
 }
@@ -151,7 +154,7 @@ impl TilePlanes {
         let [image, residual] =
             [image, residual].map(|values| Array2::from_shape_vec(shape, values).expect("one value a pixel"));
         let inner = Tile { x: HALO, y: HALO, ..tile };
-        Self { image, residual, rounding: 0.0, inner }
+        Self { image, residual, rounding: 0.0, viewing: Viewing::default(), inner }
     }
 
     /// Returns its memory to this thread's buffers, so that the next verdict does not allocate.

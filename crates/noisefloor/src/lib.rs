@@ -70,6 +70,8 @@ pub use mask::{NoiseMask, SigmaError};
 pub use model::{Judgement, Model, ModelError, ModelParts, Scores, TrainingRecord};
 /// Planes, maps and training rows are its arrays.
 pub use ndarray;
+/// Viewing conditions are its types.
+pub use noisefloor_vision::{Viewing, ViewingError, ViewingParams, ViewingTextError};
 pub use oracle::Oracle;
 pub use params::{Audience, Params, ParamsError, Schedule};
 pub use rgb::Rgb;

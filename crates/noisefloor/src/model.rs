@@ -7,13 +7,14 @@ use crate::evidence::Evidence;
 use crate::familiarity::{CAUTION, Familiarity};
 use crate::params::Audience;
 use crate::svm::Classifier;
+use noisefloor_vision::Viewing;
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 use std::io::{self, Read, Write};
 use thiserror::Error;
 
 const FORMAT: Format = Format { magic: *b"NFMODEL\0", version: VERSION };
-const VERSION: u32 = 3;
+const VERSION: u32 = 4;
 #[cfg(feature = "bundled-model")]
 static BUNDLED: &[u8] = include_bytes!("../models/human.nfm");
 
@@ -124,6 +125,9 @@ pub struct ModelParts {
     /// How the training pictures were displayed. For the record: descriptors are computed from display
     /// values, however these were made, and a session may display its picture in another way.
     pub tone_mapping: ToneMapping,
+    /// On which display the training pictures were seen, and from how far. An assumption where nobody
+    /// recorded it, as with the bundled model's.
+    pub viewing: Viewing,
     /// From raw descriptors to probabilities.
     pub classifier: Classifier,
     /// The texture that the model has been tried on; `None` if the descriptor does not separate noise from
@@ -146,6 +150,7 @@ struct ModelFile<'a> {
     descriptor_version: u16,
     evidence: Evidence,
     tone_mapping: ToneMapping,
+    viewing: Viewing,
     classifier: Cow<'a, Classifier>,
     familiarity: Cow<'a, Option<Familiarity>>,
     audience: Audience,
@@ -205,6 +210,7 @@ impl Model {
             descriptor,
             evidence: file.evidence,
             tone_mapping: file.tone_mapping,
+            viewing: file.viewing,
             classifier: file.classifier.into_owned(),
             familiarity: file.familiarity.into_owned(),
             audience: file.audience,
@@ -221,13 +227,22 @@ impl Model {
     }
 
     fn file(&self) -> ModelFile<'_> {
-        let ModelParts { descriptor, evidence, tone_mapping, classifier, familiarity, audience, record } =
-            &self.0;
+        let ModelParts {
+            descriptor,
+            evidence,
+            tone_mapping,
+            viewing,
+            classifier,
+            familiarity,
+            audience,
+            record,
+        } = &self.0;
         ModelFile {
             descriptor: descriptor.spec(),
             descriptor_version: descriptor.version(),
             evidence: *evidence,
             tone_mapping: *tone_mapping,
+            viewing: *viewing,
             classifier: Cow::Borrowed(classifier),
             familiarity: Cow::Borrowed(familiarity),
             audience: *audience,
@@ -258,6 +273,12 @@ impl Model {
     /// How the training pictures were displayed.
     pub fn tone_mapping(&self) -> ToneMapping {
         self.0.tone_mapping
+    }
+
+    /// The viewing conditions that it was trained for. Those of the bundled model are an assumption (`desk`):
+    /// the data do not say on what display, and from where, people saw the pictures.
+    pub fn viewing(&self) -> Viewing {
+        self.0.viewing
     }
 
     /// From raw descriptors to probabilities.

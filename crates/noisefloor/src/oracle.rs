@@ -49,8 +49,14 @@ impl Oracle {
     /// [`Oracle::judge_described`] wants all tiles of the picture.
     ///
     /// # Errors
-    /// [`CriterionError::TileSize`] if the model is for tiles of another size.
+    /// [`CriterionError::TileSize`] if the model is for tiles of another size, [`CriterionError::Viewing`] if
+    /// it is for other viewing conditions.
     pub fn describe(&self, planes: &TilePlanes, spp: f64) -> Result<Described, CriterionError> {
+        let (trained, asked) = (self.model.viewing(), planes.viewing);
+        if asked != trained && !self.model.descriptor().knows_viewing() {
+            let (trained, asked) = (trained.to_string(), asked.to_string());
+            return Err(CriterionError::Viewing { name: self.name(), trained, asked });
+        }
         self.model.descriptor().describe_tile(planes, spp).map_err(|e| self.misfit(e))
     }
 
@@ -172,14 +178,15 @@ impl Oracle {
         if view.film.unsampled_pixels(tile.index) > tile.pixels() / NO_EVIDENCE {
             return Ok(None);
         }
-        Ok(Some(match self.model.evidence() {
+        let planes = match self.model.evidence() {
             Evidence::Halves => TilePlanes::from_halves(view.film, view.display, tile),
             Evidence::Reference => {
                 let reference = view.reference.ok_or_else(|| CriterionError::NoReference(self.name()))?;
                 TilePlanes::from_reference(view.film, view.display, reference, tile)
             }
             Evidence::Alone => TilePlanes::from_picture(view.film, view.display, tile),
-        }))
+        };
+        Ok(Some(TilePlanes { viewing: view.viewing, ..planes }))
     }
 
     fn misfit(&self, error: DescriptorError) -> CriterionError {

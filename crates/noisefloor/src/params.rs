@@ -2,6 +2,7 @@
 
 use crate::display::{ToneMapping, ToneMappingError};
 use crate::tile::DEFAULT_TILE;
+use noisefloor_vision::Viewing;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
@@ -97,6 +98,9 @@ pub struct Params {
     pub tile: usize,
     /// How radiance is displayed.
     pub tone_mapping: ToneMapping,
+    /// On which display the picture is seen, and from how far; checked by its type. The default is what the
+    /// training data are taken to have been seen on: see [`crate::Model::viewing`].
+    pub viewing: Viewing,
     /// When tiles are judged.
     pub schedule: Schedule,
     /// Fewest samples per pixel at which a tile may stop.
@@ -115,6 +119,7 @@ impl Default for Params {
         Self {
             tile: DEFAULT_TILE,
             tone_mapping: ToneMapping::default(),
+            viewing: Viewing::default(),
             schedule: Schedule::Every { step: 100 },
             min_spp: 100,
             max_spp: 10_000,

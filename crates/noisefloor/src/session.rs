@@ -188,7 +188,8 @@ impl<C: StoppingCriterion> Session<C> {
         // Ask the criterion for the others.
         if !judged.is_empty() {
             let Some(display) = &self.display else { return Ok(stops) };
-            let view = View { film: &self.film, display, reference: self.displayed_reference.as_deref() };
+            let reference = self.displayed_reference.as_deref();
+            let view = View { film: &self.film, display, viewing: self.params.viewing, reference };
             let verdicts = self.criterion.judge(&view, &judged)?;
             for (tile, verdict) in judged.into_iter().zip(verdicts) {
                 stops.extend(self.take(tile.index, verdict));
@@ -315,8 +316,9 @@ impl<C: StoppingCriterion> Session<C> {
     /// [`crate::TileDescriptor::visible_noise`]); NaN where there is no evidence. Computed at each call. `None`
     /// before the display is settled, or if the criterion cannot say.
     pub fn visible_noise(&self) -> Option<Vec<f32>> {
+        let (film, display, viewing) = (&self.film, self.display.as_ref()?, self.params.viewing);
         let reference = self.displayed_reference.as_deref();
-        self.criterion.visible_noise(&View { film: &self.film, display: self.display.as_ref()?, reference })
+        self.criterion.visible_noise(&View { film, display, viewing, reference })
     }
 
     /// Samples still to be taken, over all pixels, by the criterion's expectations; `None` while it has none

@@ -8,6 +8,7 @@ use crate::nested::shared_samples;
 use crate::oracle::Oracle;
 use crate::rgb::Rgb;
 use crate::tile::{Tile, TileGrid};
+use noisefloor_vision::Viewing;
 use rayon::prelude::*;
 use std::borrow::Cow;
 use thiserror::Error;
@@ -122,6 +123,7 @@ pub struct SnapshotPair<'a> {
     evidence: Evidence,
     samples: Samples,
     display: Display,
+    viewing: Viewing,
 }
 
 impl<'a> SnapshotPair<'a> {
@@ -153,7 +155,12 @@ impl<'a> SnapshotPair<'a> {
                 Some(Cow::Borrowed(*cleanest.ok_or(StillError::Nothing)?))
             }
         };
-        Ok(Self { image, other, evidence, samples, display })
+        Ok(Self { image, other, evidence, samples, display, viewing: Viewing::default() })
+    }
+
+    /// The same pictures on this display, from this far; without it, [`Viewing::default`].
+    pub fn seen_on(self, viewing: Viewing) -> Self {
+        Self { viewing, ..self }
     }
 
     /// Whether the pictures share samples.
@@ -176,6 +183,10 @@ impl<'a> SnapshotPair<'a> {
     /// # Errors
     /// [`StillError::Nested`] if nested pictures have as many samples.
     pub fn planes(&self, tile: Tile) -> Result<TilePlanes, StillError> {
+        Ok(TilePlanes { viewing: self.viewing, ..self.gather(tile)? })
+    }
+
+    fn gather(&self, tile: Tile) -> Result<TilePlanes, StillError> {
         let (image, size) = (self.image, self.image.size);
         let at = |x: usize, y: usize| y * size.0 + x;
         let shown = |still: &Still, x, y| self.display.encode(still.pixels[at(x, y)]);

@@ -1,6 +1,6 @@
 use noisefloor::{
     Described, Descriptor, DescriptorError, DescriptorKind, Evidence, Model, ModelError, SvmParams,
-    TileDescriptor, TileGrid, TilePlanes, ToneMapping,
+    TileDescriptor, TileGrid, TilePlanes, ToneMapping, Viewing,
 };
 use noisefloor_learn::{Level, Origin, Table, TrainParams, Zone, read_table_with, train, write_table};
 use std::collections::BTreeMap;
@@ -79,7 +79,14 @@ fn table(descriptor: &Descriptor) -> Table {
     };
     let (evidence, tone_mapping) = (Evidence::Halves, ToneMapping::Srgb { exposure: 1.0 });
     let zones = (0..16).map(zone).collect();
-    Table { descriptor: descriptor.clone(), evidence, tone_mapping, zones, answers: vec![] }
+    Table {
+        descriptor: descriptor.clone(),
+        evidence,
+        tone_mapping,
+        viewing: Viewing::default(),
+        zones,
+        answers: vec![],
+    }
 }
 
 /// CONTRIBUTING's recipe "One more descriptor", followed outside the library: describe, keep as a table,

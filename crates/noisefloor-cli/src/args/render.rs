@@ -158,6 +158,7 @@ impl RenderArgs {
         let params = Params {
             tile: self.tile,
             tone_mapping: self.tone.check()?,
+            viewing: noisefloor::Viewing::default(),
             schedule,
             min_spp: self.min_spp.unwrap_or(0),
             max_spp,

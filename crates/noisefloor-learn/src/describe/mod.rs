@@ -12,7 +12,9 @@ use crate::corpus::{Corpus, JudgedImage as Image, JudgedZone};
 use crate::error::TableError;
 use crate::table::{Level, Origin, Table, Zone, first_word};
 use material::{Material, Shown, does_not_fit};
-use noisefloor::{Described, Descriptor, Evidence, NoiseMask, ROUNDING_LUMINANCE, TilePlanes, ToneMapping};
+use noisefloor::{
+    Described, Descriptor, Evidence, NoiseMask, ROUNDING_LUMINANCE, TilePlanes, ToneMapping, Viewing,
+};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -31,12 +33,14 @@ pub struct Corpora<'a> {
     pub folders: &'a [PathBuf],
     /// The group of a scene, by its name: scenes of one group show the same room, and are left out together.
     pub group_of: fn(&str) -> &str,
+    /// On which display people saw the pictures, and from how far.
+    pub viewing: Viewing,
 }
 
 impl<'a> Corpora<'a> {
     /// Corpora whose scenes belong together if their names begin with the same word; see [`first_word`].
     pub fn new(folders: &'a [PathBuf]) -> Self {
-        Self { folders, group_of: first_word }
+        Self { folders, group_of: first_word, viewing: Viewing::default() }
     }
 }
 
@@ -102,7 +106,9 @@ fn describe(
                 let images: Vec<&Image> = images.iter().filter(|i| i.zone == zone.zone).collect();
                 let material = Material::of(zone, &images, references.as_ref().map(|r| &r[i]))?;
                 let group = (corpora.group_of)(&zone.scene);
-                describe_zone(zone, group, levels(&of_scene, zone, &material)?, descriptor)
+                let mut shown = levels(&of_scene, zone, &material)?;
+                shown.iter_mut().for_each(|(_, _, planes)| planes.viewing = corpora.viewing);
+                describe_zone(zone, group, shown, descriptor)
             };
             let described = of_scene.par_iter().enumerate().map(describe).collect::<Result<Vec<_>, _>>()?;
             zones.extend(in_picture(described, descriptor));
@@ -110,7 +116,8 @@ fn describe(
     }
     on_zone(all, all);
     let tone_mapping = ToneMapping::Srgb { exposure: 1.0 };
-    Ok(Table { descriptor: descriptor.clone(), evidence, tone_mapping, zones, answers: Vec::new() })
+    let viewing = corpora.viewing;
+    Ok(Table { descriptor: descriptor.clone(), evidence, tone_mapping, viewing, zones, answers: Vec::new() })
 }
 
 /// The levels that are synthesised for each zone of a scene, in samples per pixel.

@@ -1,7 +1,7 @@
 use crate::kit::{Picturing, Served, stack};
 use noisefloor::{
     Descriptor, Evidence, Model, ModelParts, Oracle, Samples, SnapshotPair, Still, Threshold, TileGrid,
-    ToneMapping,
+    ToneMapping, Viewing,
 };
 use noisefloor_image::read_picture;
 use noisefloor_learn::{Level, Origin, Table, Zone};
@@ -306,7 +306,14 @@ pub(crate) fn table() -> Table {
     };
     let zones = (0..4).flat_map(|s| (0..5).map(move |z| (s, z))).map(|(s, z)| zone(s, z)).collect();
     let tone_mapping = ToneMapping::Srgb { exposure: 1.0 };
-    Table { descriptor, evidence: Evidence::Halves, tone_mapping, zones, answers: Vec::new() }
+    Table {
+        descriptor,
+        evidence: Evidence::Halves,
+        tone_mapping,
+        viewing: Viewing::default(),
+        zones,
+        answers: Vec::new(),
+    }
 }
 
 /// Learned in the background, on the server: P of the tile that was disagreed with moves the way that was

@@ -71,6 +71,12 @@ pub trait TileDescriptor: fmt::Debug + Send + Sync {
         0.0
     }
 
+    /// Whether the numbers depend on [`TilePlanes::viewing`]. Models with a descriptor that does not judge only
+    /// for the viewing conditions they were trained for.
+    fn knows_viewing(&self) -> bool {
+        false
+    }
+
     /// Changes a raw descriptor into that of `factor` times the samples, if only noise changes, as 1/√n.
     /// Returns false if the descriptor does not separate noise from picture.
     fn project(&self, _raw: &mut [f32], _factor: f32) -> bool {

@@ -14,6 +14,7 @@ pub(crate) fn small() -> Model {
         platt: Platt { a: -2.0, b: 0.0 },
     };
     let parts = ModelParts {
+        viewing: Viewing::default(),
         descriptor,
         evidence: Evidence::Halves,
         tone_mapping: ToneMapping::default(),

@@ -7,6 +7,7 @@ use crate::model::tests::{changed, small};
 use crate::rgb::Rgb;
 use crate::svm::{Scaler, Svm};
 use noisefloor_testkit::Noise;
+use noisefloor_vision::Viewing;
 
 /// A film of 64×64 pixels with `samples` samples of standard deviation `sigma` around grey.
 fn film(samples: u64, sigma: f32) -> Film {
@@ -28,7 +29,7 @@ fn film_of(picture: fn(usize) -> f32, samples: u64, sigma: f32) -> Film {
 }
 
 fn judge(oracle: &mut Oracle, film: &Film, reference: Option<&[Rgb]>) -> Result<Verdict, CriterionError> {
-    let view = View { film, display: &Display::SRGB, reference };
+    let view = View { film, display: &Display::SRGB, viewing: Viewing::default(), reference };
     Ok(oracle.judge(&view, &[film.grid().tile(0)])?[0])
 }
 
@@ -169,7 +170,12 @@ fn tiles_are_judged_in_their_picture_whoever_is_asked_about() {
     let (film, fresh) = (two_tiles(100), || Oracle::new(small(), Threshold::PAPER));
     let ask = |oracle: &mut Oracle, film: &Film, tiles: &[usize]| {
         let tiles: Vec<Tile> = tiles.iter().map(|&t| film.grid().tile(t)).collect();
-        oracle.judge(&View { film, display: &Display::SRGB, reference: None }, &tiles).unwrap()
+        oracle
+            .judge(
+                &View { film, display: &Display::SRGB, viewing: Viewing::default(), reference: None },
+                &tiles,
+            )
+            .unwrap()
     };
     let both = ask(&mut fresh(), &film, &[0, 1]);
     assert_eq!(ask(&mut fresh(), &film, &[1, 0, 1]), [both[1], both[0], both[1]]);
@@ -203,11 +209,26 @@ fn the_paper_s_descriptor_judges_tiles_of_its_size_only() {
     assert_eq!(verdict.expected_spp, None, "masks do not tell noise from picture");
     assert_eq!(oracle.just_visible(), None);
     let film = film(100, 0.0);
-    let view = View { film: &film, display: &Display::SRGB, reference: None };
+    let view = View { film: &film, display: &Display::SRGB, viewing: Viewing::default(), reference: None };
     assert_eq!(oracle.visible_noise(&view), None);
 
     let mut ragged = Film::new(TileGrid::new(40, 64, 64).unwrap());
     (0..2).for_each(|_| ragged.add(0, 1, &[[0.0; 3]; 40 * 64]).unwrap());
     let error = judge(&mut oracle, &ragged, None).unwrap_err();
     assert!(matches!(error, CriterionError::TileSize { expected: 64, width: 40, .. }), "{error}");
+}
+
+#[test]
+fn a_descriptor_that_knows_nothing_of_displays_refuses_another_one() {
+    let grid = TileGrid::new(32, 32, 32).unwrap();
+    let mut film = Film::new(grid);
+    [0.2, 0.3].map(|value| film.add(0, 10, &[[value; 3]; 1024]).unwrap());
+    let mut oracle = Oracle::new(small(), Threshold::PAPER);
+    let tiles: Vec<Tile> = grid.tiles().collect();
+    let mut judge = |viewing: Viewing| {
+        oracle.judge(&View { film: &film, display: &Display::SRGB, viewing, reference: None }, &tiles)
+    };
+    assert!(judge(Viewing::default()).is_ok());
+    let error = judge("tv".parse().unwrap()).unwrap_err().to_string();
+    assert!(error.contains("desk") && error.contains("tv"), "{error}");
 }

@@ -1,6 +1,7 @@
 use super::*;
 use crate::tile::Tile;
 use noisefloor_testkit::Noise;
+use noisefloor_vision::Viewing;
 use proptest::prelude::*;
 
 /// A seeded tile of 64×64 pixels with its halo: a ramp with a checker on it, and noise, four times as strong
@@ -40,7 +41,7 @@ fn tile(Recipe { seed, base, ramp, checker, noise }: Recipe) -> TilePlanes {
     }
     let [image, residual] = planes;
     let inner = Tile { index: 0, x: 8, y: 8, width: 64, height: 64 };
-    TilePlanes { image, residual, rounding: 0.0, inner }
+    TilePlanes { image, residual, rounding: 0.0, viewing: Viewing::default(), inner }
 }
 
 fn describe_tile(planes: &TilePlanes) -> Vec<f32> {
