@@ -8,15 +8,10 @@ use std::cell::RefCell;
 use std::rc::Rc;
 use std::sync::atomic::Ordering;
 
-const TILE: Params = Params {
-    tile: 32,
-    tone_mapping: noisefloor::ToneMapping::Reinhard { key: noisefloor::DEFAULT_KEY, white: None },
-    schedule: Schedule::Every { step: 100 },
-    min_spp: 100,
-    max_spp: 3000,
-    consecutive: 1,
-    audience: noisefloor::Audience::TRAINED,
-};
+/// The defaults with small tiles.
+fn small_tiles() -> Params {
+    Params { tile: 32, max_spp: 3000, ..Params::default() }
+}
 
 fn cornell() -> Ptwne {
     let options = RenderOptions { seed: 1, ..RenderOptions::default() };
@@ -59,7 +54,7 @@ fn recorded(threads: usize) -> (Outcome, Vec<Batch>) {
         let to = Rc::clone(&log);
         let source =
             Altered::batches(cornell(), move |_, batches| to.borrow_mut().extend_from_slice(batches));
-        let outcome = run(source, Oracle::bundled(), TILE);
+        let outcome = run(source, Oracle::bundled(), small_tiles());
         (outcome, log.take())
     })
 }
@@ -81,7 +76,7 @@ fn the_cornell_box_stops_by_itself_whatever_the_threads_and_whoever_owns_the_loo
     assert_eq!(outcome, four);
 
     // Pushed by a renderer that owns its loop: the same to the bit
-    let mut session = Session::new(96, 96, Oracle::bundled(), TILE).unwrap();
+    let mut session = Session::new(96, 96, Oracle::bundled(), small_tiles()).unwrap();
     let mut batches = batches.into_iter().peekable();
     while let Some(batch) = batches.next() {
         session.push(batch.tile.index, batch.spp, &batch.mean).unwrap();
@@ -99,8 +94,8 @@ fn the_cornell_box_stops_by_itself_whatever_the_threads_and_whoever_owns_the_loo
 #[test]
 fn running_means_stop_where_batches_do() {
     let mut source = Synthetic::new(96, 32);
-    let pulled = run(source.clone(), Oracle::bundled(), TILE);
-    let mut session = Session::new(96, 32, Oracle::bundled(), TILE).unwrap();
+    let pulled = run(source.clone(), Oracle::bundled(), small_tiles());
+    let mut session = Session::new(96, 32, Oracle::bundled(), small_tiles()).unwrap();
     let mut mean = vec![[0.0f64; 3]; 96 * 32];
     while !session.is_done() {
         for batch in source.sample(&session.requests()).unwrap() {
@@ -122,7 +117,7 @@ fn running_means_stop_where_batches_do() {
 
 #[test]
 fn a_fixed_number_of_samples_is_that_everywhere() {
-    let fixed = run(cornell(), FixedSpp(200), TILE);
+    let fixed = run(cornell(), FixedSpp(200), small_tiles());
     assert_eq!(fixed.samples(), [200; 9]);
     assert!(fixed.stops.iter().all(|s| s.reason == StopReason::Converged && s.probability.is_none()));
 
@@ -141,7 +136,7 @@ fn a_fixed_number_of_samples_is_that_everywhere() {
 #[test]
 fn spaced_verdicts_stop_about_where_frequent_ones_do() {
     let count = |schedule: Schedule| {
-        let params = Params { schedule, max_spp: 10_000, ..TILE };
+        let params = Params { schedule, max_spp: 10_000, ..small_tiles() };
         // Much noise on smooth walls, so that there are rounds to save
         let source = Synthetic {
             radiance: |x, _| 0.2 + 0.003 * x as f32,
@@ -164,7 +159,7 @@ fn spaced_verdicts_stop_about_where_frequent_ones_do() {
 
 #[test]
 fn limits_have_their_reasons() {
-    let limited = run(cornell(), Oracle::bundled(), Params { max_spp: 150, ..TILE });
+    let limited = run(cornell(), Oracle::bundled(), Params { max_spp: 150, ..small_tiles() });
     for stop in &limited.stops {
         match stop.reason {
             StopReason::Converged => assert!(stop.probability >= Some(0.9), "{stop:?}"),
@@ -177,7 +172,7 @@ fn limits_have_their_reasons() {
     assert!(limited.samples().contains(&150));
 
     // Cancelled after the first batch: what is there stays
-    let mut driver = Driver::new(cornell(), Oracle::bundled(), TILE).unwrap();
+    let mut driver = Driver::new(cornell(), Oracle::bundled(), small_tiles()).unwrap();
     let flag = driver.cancel_flag();
     driver
         .run(|_, event| {
@@ -193,8 +188,11 @@ fn limits_have_their_reasons() {
 
 #[test]
 fn a_stack_that_ends_says_so() {
-    let stops =
-        run(Synthetic { store: 130, noise: |_, _| 1.0, ..Synthetic::new(96, 32) }, Oracle::bundled(), TILE);
+    let stops = run(
+        Synthetic { store: 130, noise: |_, _| 1.0, ..Synthetic::new(96, 32) },
+        Oracle::bundled(),
+        small_tiles(),
+    );
     for stop in stops.stops {
         assert_eq!((stop.spp, stop.reason), (130, StopReason::SourceExhausted));
     }
@@ -203,8 +201,16 @@ fn a_stack_that_ends_says_so() {
 #[test]
 fn the_reference_is_rendered_once_where_it_is_needed_and_never_elsewhere() {
     // Halves are evidence enough
-    run(Altered::reference(Synthetic::new(64, 32), || panic!("nobody needs it")), Oracle::bundled(), TILE);
-    run(Altered::reference(Synthetic::new(64, 32), || panic!("nobody needs it")), FixedSpp(100), TILE);
+    run(
+        Altered::reference(Synthetic::new(64, 32), || panic!("nobody needs it")),
+        Oracle::bundled(),
+        small_tiles(),
+    );
+    run(
+        Altered::reference(Synthetic::new(64, 32), || panic!("nobody needs it")),
+        FixedSpp(100),
+        small_tiles(),
+    );
 
     // The same machine, held against a reference: here, the converged picture itself
     let parts = ModelParts { evidence: Evidence::Reference, ..Model::bundled().into_parts() };
@@ -221,13 +227,13 @@ fn the_reference_is_rendered_once_where_it_is_needed_and_never_elsewhere() {
         *count.borrow_mut() += 1;
         Some(Reference { width: 64, height: 32, pixels: converged.clone() })
     });
-    let outcome = run(source, oracle(), TILE);
+    let outcome = run(source, oracle(), small_tiles());
     assert_eq!(*calls.borrow(), 1);
     assert!(outcome.stops.iter().all(|s| s.reason == StopReason::Converged));
     assert!(outcome.halves.iter().all(|h| h[1] == 0), "halves were kept, and nobody reads them");
 
     // And the path tracer has one to give
-    let rendered = run(cornell(), oracle(), Params { max_spp: 100, ..TILE });
+    let rendered = run(cornell(), oracle(), Params { max_spp: 100, ..small_tiles() });
     assert!(rendered.stops.iter().all(|s| s.probability.is_some()));
 }
 
@@ -243,7 +249,7 @@ fn a_tile_without_samples_does_not_hold_up_the_others() {
             (batch.spp, batch.mean) = (0, Vec::new());
         }
     });
-    let mut driver = Driver::new(source, Oracle::bundled(), TILE).unwrap();
+    let mut driver = Driver::new(source, Oracle::bundled(), small_tiles()).unwrap();
     let flag = driver.cancel_flag();
     driver.run(|_, _| flag.store(*calls.borrow() > 200, Ordering::Relaxed)).unwrap();
     let stops = Outcome::of(driver.session()).stops;
