@@ -254,20 +254,8 @@ impl CompiledMaterial {
     ) -> Result<Self, SceneError> {
         material.check()?;
         options.opacity.as_ref().map_or(Ok(()), Texture::check)?;
-        let metal = |fresnel, colour, alpha: f32| {
-            if alpha < MIN_ROUGHNESS {
-                Bsdf::Mirror { fresnel, colour }
-            } else {
-                Bsdf::Metal { fresnel, colour, ggx: Ggx::of(alpha, options.facets) }
-            }
-        };
-        let mut coat = |ior, alpha, inside| match coats.iter().find(|c| c.is_for(ior, alpha, inside)) {
-            Some(coat) => coat.clone(),
-            None => {
-                coats.push(Arc::new(Coat::new(ior, alpha, inside)));
-                coats[coats.len() - 1].clone()
-            }
-        };
+        let metal = |fresnel, colour, alpha| metal(fresnel, colour, alpha, options.facets);
+        let mut coat = |ior, alpha, inside| shared_coat(coats, ior, alpha, inside);
         // A smooth coat masks nothing
         let inside = |alpha: f32| {
             if alpha < MIN_ROUGHNESS { Interior::Conserving } else { Interior::SingleScattering }
@@ -339,4 +327,23 @@ impl CompiledMaterial {
         };
         colours || self.opacity.as_ref().is_some_and(|o| o.constant().is_none())
     }
+}
+
+/// A metal, which is a mirror if it is smooth.
+fn metal(fresnel: Fresnel, colour: Reflectance, alpha: f32, facets: Facets) -> Bsdf {
+    if alpha < MIN_ROUGHNESS {
+        Bsdf::Mirror { fresnel, colour }
+    } else {
+        Bsdf::Metal { fresnel, colour, ggx: Ggx::of(alpha, facets) }
+    }
+}
+
+/// The coat among `coats` that is for these values; it is added if there is none.
+fn shared_coat(coats: &mut Vec<Arc<Coat>>, ior: f32, alpha: Option<f32>, inside: Interior) -> Arc<Coat> {
+    if let Some(coat) = coats.iter().find(|c| c.is_for(ior, alpha, inside)) {
+        return coat.clone();
+    }
+    let coat = Arc::new(Coat::new(ior, alpha, inside));
+    coats.push(coat.clone());
+    coat
 }

@@ -1,5 +1,6 @@
 use crate::kit::succeed;
 
+// Long: a list of cases
 #[test]
 fn every_subcommand_explains_itself() {
     let options: [(&str, &[&str]); 12] = [

@@ -4,6 +4,7 @@ use serde_json::Value;
 use std::path::PathBuf;
 use tempfile::tempdir;
 
+// Long: one run, looked at from all sides
 #[test]
 fn two_renders_with_two_seeds() {
     let folder = tempdir().unwrap();

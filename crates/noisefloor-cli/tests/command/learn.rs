@@ -142,6 +142,7 @@ fn assert_scores(report: &Value, zones: u64) {
     }
 }
 
+// Long: one run, looked at from all sides
 #[test]
 fn train_inspect_evaluate() {
     let corpora = Corpora::new();

@@ -4,6 +4,7 @@ use tempfile::tempdir;
 
 const STOPS: &str = "tile,x,y,width,height,spp,probability,reason,unfamiliar";
 
+// Long: one run, looked at from all sides
 #[test]
 fn writes_all_it_promises() {
     let folder = tempdir().unwrap();

@@ -26,6 +26,7 @@ fn timeless(value: &Value) -> Value {
     }
 }
 
+// Long: one run, looked at from all sides
 #[test]
 fn all_protocols_are_run_and_resumed() {
     let (corpora, folder) = (Corpora::new(), tempdir().unwrap());

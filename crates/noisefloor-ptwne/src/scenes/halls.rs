@@ -5,6 +5,7 @@ use crate::{Environment, Scene, SceneError, Sun, Texture};
 
 /// A hall with two arcades and an open roof: the sun falls in from above.
 // Longer than 60 lines: one list of what stands where.
+// Long: a list of what stands in the scene
 pub(super) fn arcade(name: &str) -> Result<Scene, SceneError> {
     let mut k = Kit::new(name, look([0.35, 1.7, 8.6], [-0.25, 2.1, 0.0], 55.0))?;
     let floor = Texture::Checker { colours: [[0.58, 0.54, 0.47], [0.24, 0.20, 0.18]], scale: [1.0, 1.0] };
@@ -88,6 +89,7 @@ pub(super) fn arcade(name: &str) -> Result<Scene, SceneError> {
 
 /// A market street at night, under more than a hundred lanterns of many colours.
 // Longer than 60 lines: one list of what stands where.
+// Long: a list of what stands in the scene
 pub(super) fn lanterns(name: &str) -> Result<Scene, SceneError> {
     let mut k = Kit::new(name, look([0.1, 1.8, 7.0], [0.0, 1.55, 0.0], 46.0))?;
     let cobbles = Texture::Brick { brick: [0.42, 0.40, 0.39], mortar: [0.20, 0.19, 0.18], scale: [2.6, 4.0] };

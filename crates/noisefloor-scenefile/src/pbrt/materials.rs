@@ -72,16 +72,29 @@ impl Reader<'_> {
         }
     }
 
-    fn made(&mut self, d: &Definition, depth: u32) -> Result<Made, LoadError> {
+    fn leave_out_relief(&mut self, d: &Definition) {
         for relief in ["bumpmap", "displacement", "normalmap"] {
             if d.params.get(relief).is_some() {
-                self.ignored(
-                    &d.params.place,
-                    format!("the relief `{relief}` is left out: the surface is smooth"),
-                );
+                let what = format!("the relief `{relief}` is left out: the surface is smooth");
+                self.ignored(&d.params.place, what);
             }
         }
-        let near = |what: &str| format!("the material `{}` is replaced by {what}", d.kind);
+    }
+
+    fn disney(&mut self, d: &Definition) -> Result<Material, LoadError> {
+        self.approximated(&d.params.place, replaced(d, "metal and gloss of the same colour"));
+        let (metallic, roughness) = (self.number(d, "metallic", 0.0)?, self.number(d, "roughness", 0.5)?);
+        let share = [1.0, roughness.clamp(0.0, 1.0) as f32, metallic.clamp(0.0, 1.0) as f32];
+        Ok(Material::MetallicRoughness {
+            base: self.colour(d, "color", [0.5; 3])?,
+            metallic_roughness: Texture::Colour(share),
+            ior: (self.number(d, "eta", 1.5)? as f32).clamp(1.001, 4.0),
+        })
+    }
+
+    fn made(&mut self, d: &Definition, depth: u32) -> Result<Made, LoadError> {
+        self.leave_out_relief(d);
+        let near = |what| replaced(d, what);
         Ok(Made::Plain(match d.kind.as_str() {
             "diffuse" => Material::Diffuse { albedo: self.colour(d, "reflectance", [0.5; 3])? },
             "matte" => {
@@ -121,17 +134,7 @@ impl Reader<'_> {
                     Material::RoughGlass { ior, tint, roughness }
                 }
             }
-            "disney" => {
-                self.approximated(&d.params.place, near("metal and gloss of the same colour"));
-                let (metallic, roughness) =
-                    (self.number(d, "metallic", 0.0)?, self.number(d, "roughness", 0.5)?);
-                let share = [1.0, roughness.clamp(0.0, 1.0) as f32, metallic.clamp(0.0, 1.0) as f32];
-                Material::MetallicRoughness {
-                    base: self.colour(d, "color", [0.5; 3])?,
-                    metallic_roughness: Texture::Colour(share),
-                    ior: (self.number(d, "eta", 1.5)? as f32).clamp(1.001, 4.0),
-                }
-            }
+            "disney" => self.disney(d)?,
             "diffusetransmission" => {
                 self.approximated(&d.params.place, near("its diffuse reflection"));
                 d.params.ignore(&["transmittance", "scale"]);
@@ -282,4 +285,8 @@ impl Reader<'_> {
         };
         Ok(alpha.clamp(0.0, 1.0) as f32)
     }
+}
+
+fn replaced(d: &Definition, what: &str) -> String {
+    format!("the material `{}` is replaced by {what}", d.kind)
 }

@@ -26,7 +26,32 @@ impl Reader<'_> {
         if kind == "sphere" && self.open_object.is_none() && self.round_sphere(params, &wear)? {
             return Ok(());
         }
-        let (mut mesh, own) = match kind {
+        let (mut mesh, own) = self.form(kind, params)?;
+        mesh.check(&params.place)?;
+
+        // The front is where shading normals point, or else the corners say so in the shape's own coordinates
+        let to_world = self.state.to_world * own;
+        if self.state.reversed {
+            mesh.normals.iter_mut().for_each(|normal| *normal = normal.map(|x| -x));
+            if mesh.normals.is_empty() {
+                mesh.indices.iter_mut().for_each(|triangle| triangle.swap(1, 2));
+            }
+        }
+        if self.open_object.is_some() {
+            mesh.place(to_world);
+            let part = Part { mesh: Rc::new(mesh), wear, place: params.place.clone() };
+            if let Some((_, parts)) = &mut self.open_object {
+                parts.push(part);
+            }
+            return Ok(());
+        }
+        mesh.place(to_world);
+        self.add(&mesh, &wear, &params.place)
+    }
+
+    /// The triangles of a shape, and where they lie in its own coordinates.
+    fn form(&mut self, kind: &str, params: &Params) -> Result<(Triangles, DMat4), LoadError> {
+        Ok(match kind {
             "trianglemesh" => (self.triangle_mesh(params)?, DMat4::IDENTITY),
             "bilinearmesh" => (self.bilinear_mesh(params)?, DMat4::IDENTITY),
             "loopsubdiv" => (self.control_mesh(params)?, DMat4::IDENTITY),
@@ -55,27 +80,7 @@ impl Reader<'_> {
                 (solids::disk(inner.clamp(0.0, 0.999) as f32), own)
             }
             _ => return Err(params.place.clone().unsupported(format!("Shape \"{kind}\""))),
-        };
-        mesh.check(&params.place)?;
-
-        // The front is where shading normals point, or else the corners say so in the shape's own coordinates
-        let to_world = self.state.to_world * own;
-        if self.state.reversed {
-            mesh.normals.iter_mut().for_each(|normal| *normal = normal.map(|x| -x));
-            if mesh.normals.is_empty() {
-                mesh.indices.iter_mut().for_each(|triangle| triangle.swap(1, 2));
-            }
-        }
-        if self.open_object.is_some() {
-            mesh.place(to_world);
-            let part = Part { mesh: Rc::new(mesh), wear, place: params.place.clone() };
-            if let Some((_, parts)) = &mut self.open_object {
-                parts.push(part);
-            }
-            return Ok(());
-        }
-        mesh.place(to_world);
-        self.add(&mesh, &wear, &params.place)
+        })
     }
 
     /// Shows an object where the state is.

@@ -126,25 +126,7 @@ impl Reader<'_> {
         // Shares in the alpha of a picture are its opacity
         let with_alpha =
             floats && matches!(&picture.samples, Samples::Eight(codes) if codes.iter().any(|p| p[3] < 255));
-        let pixels = match picture.samples {
-            Samples::Eight(codes) if with_alpha => Pixels::Linear8(codes.iter().map(|p| [p[3]; 3]).collect()),
-            Samples::Eight(codes) if raw => {
-                Pixels::Linear8(codes.iter().map(|p| [p[0], p[1], p[2]]).collect())
-            }
-            Samples::Eight(codes) => Pixels::Srgb8(codes.iter().map(|p| [p[0], p[1], p[2]]).collect()),
-            Samples::Sixteen(codes) => {
-                let value = |code: u16| {
-                    let value = f32::from(code) / 65535.0;
-                    if raw { value } else { srgb_decode(value) }
-                };
-                Pixels::Float(codes.iter().map(|p| [p[0], p[1], p[2]].map(value)).collect())
-            }
-            Samples::Linear(values) => {
-                // Also false for NaN
-                let inside = |v: f32| if v > 0.0 { v.min(1.0) } else { 0.0 };
-                Pixels::Float(values.iter().map(|p| p.map(inside)).collect())
-            }
-        };
+        let pixels = texels(picture.samples, raw, with_alpha);
         let wrap = match params.text("wrap")?.unwrap_or("repeat") {
             "repeat" => Wrap::Repeat,
             "clamp" => Wrap::Clamp,
@@ -201,5 +183,26 @@ pub(super) fn mean(texture: &Texture) -> Rgb {
         }
         // This reader makes no others
         _ => [0.5; 3],
+    }
+}
+
+/// The pixels of a picture: as they are if they are `raw`, decoded from sRGB otherwise, or its alpha alone.
+fn texels(samples: Samples, raw: bool, alpha_alone: bool) -> Pixels {
+    match samples {
+        Samples::Eight(codes) if alpha_alone => Pixels::Linear8(codes.iter().map(|p| [p[3]; 3]).collect()),
+        Samples::Eight(codes) if raw => Pixels::Linear8(codes.iter().map(|p| [p[0], p[1], p[2]]).collect()),
+        Samples::Eight(codes) => Pixels::Srgb8(codes.iter().map(|p| [p[0], p[1], p[2]]).collect()),
+        Samples::Sixteen(codes) => {
+            let value = |code: u16| {
+                let value = f32::from(code) / 65535.0;
+                if raw { value } else { srgb_decode(value) }
+            };
+            Pixels::Float(codes.iter().map(|p| [p[0], p[1], p[2]].map(value)).collect())
+        }
+        Samples::Linear(values) => {
+            // Also false for NaN
+            let inside = |v: f32| if v > 0.0 { v.min(1.0) } else { 0.0 };
+            Pixels::Float(values.iter().map(|p| p.map(inside)).collect())
+        }
     }
 }

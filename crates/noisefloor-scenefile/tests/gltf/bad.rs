@@ -44,6 +44,7 @@ fn the_good_scene_is_good() {
     assert_eq!(loaded.scene.surfaces(), 2);
 }
 
+// Long: a list of cases
 #[test]
 fn every_error_names_its_place() {
     let table = r#"mesh 0 "Table", primitive 0: "#;

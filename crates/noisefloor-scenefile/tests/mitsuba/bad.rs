@@ -94,6 +94,7 @@ fn unsupported_kinds_are_named() {
     ]);
 }
 
+// Long: a list of cases
 #[test]
 fn bad_values_are_named() {
     all_fail(&[

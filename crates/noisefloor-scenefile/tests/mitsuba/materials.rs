@@ -148,6 +148,7 @@ fn in_the_sky(folder: &Folder, bsdf: &str) -> [[f32; 3]; 2] {
     })
 }
 
+// Long: a list of cases
 #[test]
 fn surfaces_reflect_a_white_sky_as_they_should() {
     let folder = folder();

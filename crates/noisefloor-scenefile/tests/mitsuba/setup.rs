@@ -38,6 +38,7 @@ fn fields_of_view_are_those_of_mitsuba() {
 }
 
 /// The columns left, up, view and eye of transforms, as Mitsuba 3.9.1 has them.
+// Long: a list of cases
 #[test]
 fn transforms_are_those_of_mitsuba() {
     for (version, steps, up, view, eye) in [
