@@ -1,27 +1,20 @@
 //! Any program that renders into a file, as a source.
 
 use crate::error::CommandError;
-use crate::group::Group;
 use crate::light::LightCheck;
+use crate::picture_run::PictureRun;
 use crate::renderer::DEFAULT_TIMEOUT;
-use crate::scratch::Scratch;
 use crate::template::Template;
 use noisefloor::{
     Batch, ProgressiveSource, Repeats, Request, SourceError, SourceInfo, Tile, Unit, check_image, printable,
 };
-use noisefloor_image::{LinearImage, Picture, read_picture};
+use noisefloor_image::LinearImage;
 use std::ffi::OsString;
-use std::fs::File;
-use std::io::{Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
-use std::thread;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// Seeds are positive in 31 bits, which every program accepts.
 const SEEDS: u64 = 1 << 31;
-/// How much of a program's output is kept for messages, in bytes.
-const TAIL: u64 = 2048;
 
 /// What a command is given. Made by [`CommandOptions::default`]; all fields can then be changed.
 #[derive(Clone, Debug)]
@@ -81,7 +74,7 @@ impl CommandSource {
     /// [`CommandError`] if the template is not a command or lacks a placeholder, or if the run that
     /// determines the size fails.
     pub fn new(template: &str, options: CommandOptions) -> Result<Self, CommandError> {
-        let template = Template::parse(template, options.scene.is_some())?;
+        let template = Template::renderer(template, options.scene.is_some())?;
         let stem = Path::new(template.program()).file_stem().unwrap_or_default().to_string_lossy();
         let info = SourceInfo {
             name: format!("command {}", printable(&stem)),
@@ -116,44 +109,10 @@ impl CommandSource {
     /// Renders samples of a tile, or of the whole image if the command cannot aim. Returns the command that
     /// was run, too.
     fn run(&mut self, tile: &Tile, samples: u64) -> Result<(LinearImage, String), CommandError> {
-        let folder = |source| CommandError::Folder { folder: std::env::temp_dir(), source };
-        let scratch = Scratch::new().map_err(folder)?;
-        let pictures = scratch.path().join("out");
-        std::fs::create_dir(&pictures).map_err(folder)?;
-        let words = self.fill(tile, samples, &pictures.join("picture"));
+        let run = PictureRun::new()?;
+        let words = self.fill(tile, samples, &run.out());
         self.runs += 1;
-        let lossy: Vec<_> = words.iter().map(|word| word.to_string_lossy()).collect();
-        let command = shlex::try_join(lossy.iter().map(AsRef::as_ref)).unwrap_or_else(|_| lossy.join(" "));
-        let command = printable(&command).into_owned();
-
-        // Its output goes to a file: nobody has to read while it runs
-        let log = scratch.path().join("log");
-        let both = File::create(&log).and_then(|file| Ok((file.try_clone()?, file))).map_err(folder)?;
-        let mut program = Command::new(&words[0]);
-        program.args(&words[1..]).stdin(Stdio::null()).stdout(both.0).stderr(both.1);
-        let started = Group::spawn(&mut program);
-        let mut group =
-            started.map_err(|source| CommandError::Start { program: lossy[0].to_string(), source })?;
-        if let Err(how) = wait(&mut group, self.options.timeout) {
-            return Err(CommandError::Failed { command, how, said: tail(&log) });
-        }
-        drop(group);
-
-        let files = std::fs::read_dir(&pictures).and_then(|files| files.collect::<Result<Vec<_>, _>>());
-        let files = files.map_err(folder)?;
-        let [file] = files.as_slice() else {
-            let names: Vec<_> = files.iter().map(|f| f.file_name().to_string_lossy().into_owned()).collect();
-            let found = if names.is_empty() { "no file".to_owned() } else { names.join(", ") };
-            return Err(CommandError::Output {
-                command,
-                found: printable(&found).into_owned(),
-                said: tail(&log),
-            });
-        };
-        match read_picture(file.path())? {
-            Picture::Linear(image) => Ok((image, command)),
-            Picture::Display(_) => Err(CommandError::Display { command }),
-        }
+        run.finish(&words, self.options.timeout)
     }
 
     /// The words of the command for a run.
@@ -241,26 +200,6 @@ fn cut(image: &LinearImage, tile: &Tile) -> Vec<noisefloor::Rgb> {
     tile.rows(image.width).flat_map(|row| image.pixels[row].iter().copied()).collect()
 }
 
-/// Waits for the program to end well; how it ended otherwise.
-fn wait(group: &mut Group, limit: Duration) -> Result<(), String> {
-    let begun = Instant::now();
-    let mut pause = Duration::from_millis(1);
-    loop {
-        match group.ended().map_err(|error| error.to_string())? {
-            Some(status) if status.success() => return Ok(()),
-            Some(status) => return Err(status.to_string()),
-            None if begun.elapsed() > limit => {
-                let seconds = limit.as_secs_f64();
-                return Err(format!("not finished after {seconds} s; allow more time with --timeout"));
-            }
-            None => {
-                thread::sleep(pause);
-                pause = (2 * pause).min(Duration::from_millis(50));
-            }
-        }
-    }
-}
-
 /// The seed of a run. Scattered, since some programs derive correlated random numbers from neighbouring
 /// seeds; different in every run, since each step is a bijection of 31 bits.
 fn scatter(seed: u64, run: u64) -> u64 {
@@ -272,22 +211,6 @@ fn scatter(seed: u64, run: u64) -> u64 {
         x = x.wrapping_mul(odd) & MASK;
     }
     x ^ (x >> 15)
-}
-
-/// The end of a log, in one line that is safe to print.
-fn tail(log: &Path) -> String {
-    let mut bytes = Vec::new();
-    let mut read = || {
-        let mut file = File::open(log)?;
-        let length = file.seek(SeekFrom::End(0))?;
-        file.seek(SeekFrom::Start(length.saturating_sub(TAIL)))?;
-        file.take(TAIL).read_to_end(&mut bytes)
-    };
-    // A log that cannot be read is empty
-    let _ = read();
-    let text = String::from_utf8_lossy(&bytes);
-    let said = text.split_whitespace().collect::<Vec<_>>().join(" ");
-    if said.is_empty() { "none".to_owned() } else { printable(&said).into_owned() }
 }
 
 #[cfg(test)]

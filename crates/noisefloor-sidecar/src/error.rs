@@ -3,7 +3,7 @@
 
 use crate::light::ImpossibleLight;
 use crate::renderer::Renderer;
-use noisefloor_image::PictureError;
+use noisefloor_image::{PictureError, WriteError};
 use std::io;
 use std::path::PathBuf;
 use std::process::ExitStatus;
@@ -239,6 +239,31 @@ pub enum CommandError {
         /// The picture's height in pixels.
         got_height: usize,
     },
+    /// The picture has another size than the one that the program was given.
+    #[error(
+        "{command}: its picture has {got_width}×{got_height} pixels, but it was given one of {width}×{height}"
+    )]
+    Resized {
+        /// The whole command.
+        command: String,
+        /// Width given, in pixels.
+        width: usize,
+        /// Height given, in pixels.
+        height: usize,
+        /// The picture's width in pixels.
+        got_width: usize,
+        /// The picture's height in pixels.
+        got_height: usize,
+    },
+    /// The picture has pixels that are not finite.
+    #[error("{command}: its picture has pixels that are not finite; check the program and its options")]
+    NotFinite {
+        /// The whole command.
+        command: String,
+    },
+    /// The picture for the program could not be written.
+    #[error(transparent)]
+    Write(#[from] WriteError),
     /// The picture is display-encoded.
     #[error("{command}: its picture is a PNG, whose values are clipped and encoded; write EXR or PFM")]
     Display {

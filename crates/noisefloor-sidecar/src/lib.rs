@@ -5,6 +5,7 @@
 //! - [`Sidecar`]: a running renderer as a [`noisefloor::ProgressiveSource`], with time limits, one restart
 //!   per failure, and errors that carry its last words.
 //! - [`CommandSource`]: any program that renders into a file, run once per batch.
+//! - [`PictureCommand`]: any program that turns a picture into another, such as a denoiser.
 //! - `host/host.py` ([`HOST`]): the other end, which host scripts import.
 //!
 //! Nothing here accumulates or judges, and nothing knows a renderer by name.
@@ -57,6 +58,8 @@ mod launch;
 mod leftovers;
 mod light;
 mod message;
+mod picture_command;
+mod picture_run;
 mod process;
 mod renderer;
 mod run;
@@ -71,6 +74,7 @@ pub use error::{CommandError, SetupError, SidecarCause, SidecarError};
 pub use fuzzing::read_any_reply;
 pub use leftovers::end_all;
 pub use light::ImpossibleLight;
+pub use picture_command::PictureCommand;
 pub use renderer::{DEFAULT_TIMEOUT, HostOptions, Job, Renderer};
 pub use setup::{HOST, find, install, private_folder, probe};
 pub use sidecar::Sidecar;

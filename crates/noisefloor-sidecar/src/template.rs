@@ -3,7 +3,7 @@
 use crate::error::CommandError;
 use std::ffi::{OsStr, OsString};
 
-/// Every placeholder.
+/// Every placeholder of a command that renders.
 const PLACEHOLDERS: [&str; 10] = ["scene", "seed", "spp", "x0", "x1", "y0", "y1", "width", "height", "out"];
 /// The corners of a tile; a template has all of them or none.
 const CORNERS: [&str; 4] = ["x0", "x1", "y0", "y1"];
@@ -15,9 +15,23 @@ pub(crate) struct Template {
 }
 
 impl Template {
-    /// Splits a template into words as a POSIX shell does, and checks that the placeholders it needs are
-    /// there.
-    pub(crate) fn parse(template: &str, scene: bool) -> Result<Self, CommandError> {
+    /// A command that renders, with the placeholders that it needs.
+    pub(crate) fn renderer(template: &str, scene: bool) -> Result<Self, CommandError> {
+        let wrong = |why: String| Err(CommandError::Template { template: template.to_owned(), why });
+        let words = Self::parse(template, &PLACEHOLDERS, &["seed", "spp", "out"])?;
+        if let Some(missing) = CORNERS.iter().find(|corner| words.aims() && !words.has(corner)) {
+            return wrong(format!("{{{missing}}} is missing; name all corners of a tile, or none"));
+        }
+        match (words.has("scene"), scene) {
+            (true, false) => wrong("it contains {scene}, but no scene is given".to_owned()),
+            (false, true) => wrong("a scene is given, but it does not contain {scene}".to_owned()),
+            _ => Ok(words),
+        }
+    }
+
+    /// Splits a template into words as a POSIX shell does. It may contain only `known` placeholders, and must
+    /// contain the `required` ones.
+    pub(crate) fn parse(template: &str, known: &[&str], required: &[&str]) -> Result<Self, CommandError> {
         let wrong = |why: String| Err(CommandError::Template { template: template.to_owned(), why });
         let Some(words) = shlex::split(template) else { return wrong("a quote is not closed".to_owned()) };
         if words.is_empty() {
@@ -25,22 +39,13 @@ impl Template {
         }
         let template = Self { words };
         let named: Vec<&str> = template.words.iter().flat_map(|word| placeholders(word)).collect();
-        if let Some(unknown) = named.iter().find(|name| !PLACEHOLDERS.contains(name)) {
-            let known = PLACEHOLDERS.map(|name| format!("{{{name}}}")).join(" ");
-            return wrong(format!("{{{unknown}}} is not a placeholder; use {known}"));
+        if let Some(unknown) = named.iter().find(|name| !known.contains(name)) {
+            let known: Vec<_> = known.iter().map(|name| format!("{{{name}}}")).collect();
+            return wrong(format!("{{{unknown}}} is not a placeholder; use {}", known.join(" ")));
         }
-        for required in ["seed", "spp", "out"] {
-            if !template.has(required) {
-                return wrong(format!("{{{required}}} is missing; it differs from run to run"));
-            }
-        }
-        if let Some(missing) = CORNERS.iter().find(|corner| template.aims() && !template.has(corner)) {
-            return wrong(format!("{{{missing}}} is missing; name all corners of a tile, or none"));
-        }
-        match (template.has("scene"), scene) {
-            (true, false) => wrong("it contains {scene}, but no scene is given".to_owned()),
-            (false, true) => wrong("a scene is given, but it does not contain {scene}".to_owned()),
-            _ => Ok(template),
+        match required.iter().find(|name| !template.has(name)) {
+            Some(missing) => wrong(format!("{{{missing}}} is missing; it differs from run to run")),
+            None => Ok(template),
         }
     }
 

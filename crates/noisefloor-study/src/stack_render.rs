@@ -13,7 +13,8 @@ const MOST_AT_ONCE: u64 = 64;
 /// Renders `levels` (samples per pixel, increasing, from 1) into `folder` as `00064.exr` and so on, linear,
 /// and makes the folder. What a level holds is what a render of that many samples holds. Between batches
 /// `go_on` is told the level and the samples so far, and may stop it by returning false; the levels finished
-/// by then are kept. `finish` sees each picture before it is written, and may denoise it.
+/// by then are kept. `finish` sees each picture before it is written, and may denoise it; the last level, which
+/// is the reference, is written as rendered.
 ///
 /// # Errors
 /// [`StudyError`] if the levels do not increase, the source fails or ends early, or a file cannot be written.
@@ -57,7 +58,8 @@ pub fn render_stack(
             }
             have += spp;
         }
-        let pixels = finish(film.image())?;
+        let reference = Some(&level) == levels.last();
+        let pixels = if reference { film.image() } else { finish(film.image())? };
         let path = folder.join(format!("{level:05}.exr"));
         write_exr(&path, &RenderLayers::rgb(info.width, info.height, &pixels))?;
     }

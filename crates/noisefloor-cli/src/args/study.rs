@@ -52,6 +52,11 @@ struct StackArgs {
         default_value = "8,16,32,64,128,256,512,1024,2048"
     )]
     levels: Vec<u64>,
+    /// Pass every level but the last, the reference, through a program, for example a denoiser: {in} is the
+    /// EXR that it reads, {out} the path, without extension, of the EXR or PFM that it writes. Thresholds of
+    /// such pictures hold for this program; a model cannot learn from them.
+    #[arg(long, value_name = "PROGRAM …")]
+    denoise: Option<String>,
     /// Folder to write the levels into, as linear EXRs.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
@@ -183,12 +188,16 @@ struct ObserverArgs {
 
 #[cfg(feature = "study")]
 mod check {
-    use super::{ObserverArgs, StudyArgs, StudyCommand, ThresholdChoice};
+    use super::{ObserverArgs, StackArgs, StudyArgs, StudyCommand, ThresholdChoice};
+    #[cfg(not(feature = "adapters"))]
+    use crate::left_out::left_out;
     use crate::study::{
         AnalyseJob, BackupJob, DataFolderJob, LinksJob, ObserverJob, ServeJob, SimulateJob, StackJob,
         StudyJob,
     };
     use anyhow::Context;
+    #[cfg(feature = "adapters")]
+    use noisefloor_sidecar::PictureCommand;
     use noisefloor_study::analysis::{AnalysisOptions, CorpusThreshold};
     use noisefloor_study::{Exposure, Study, parse_code};
     use std::net::SocketAddr;
@@ -199,11 +208,7 @@ mod check {
         /// A study that can be opened, and what to do with it.
         pub fn check(self) -> anyhow::Result<StudyJob> {
             Ok(match self.command {
-                StudyCommand::Stack(args) => StudyJob::Stack(StackJob {
-                    source: args.renderer.check(Some(&args.scene))?,
-                    levels: args.levels,
-                    out: args.out,
-                }),
+                StudyCommand::Stack(args) => StudyJob::Stack(stack(args)?),
                 StudyCommand::Serve(args) => StudyJob::Serve(ServeJob {
                     study: complete(&args.study)?,
                     address: SocketAddr::new(args.listen, args.port),
@@ -246,6 +251,24 @@ mod check {
                 StudyCommand::Erase(args) => StudyJob::Erase(observer(&args)?),
             })
         }
+    }
+
+    fn stack(args: StackArgs) -> anyhow::Result<StackJob> {
+        let StackArgs { scene, renderer, levels, denoise, out } = args;
+        let source = renderer.check(Some(&scene))?;
+        #[cfg(feature = "adapters")]
+        let denoise = denoise.map(|program| PictureCommand::new(&program, source.timeout)).transpose()?;
+        #[cfg(not(feature = "adapters"))]
+        if denoise.is_some() {
+            return left_out("study stack --denoise", "study,adapters", "study stack …");
+        }
+        Ok(StackJob {
+            source,
+            levels,
+            #[cfg(feature = "adapters")]
+            denoise,
+            out,
+        })
     }
 
     /// A study all of whose pictures can be shown.

@@ -6,11 +6,16 @@ use crate::say::say;
 use crate::signals::cancel_on_signal;
 use crate::sources::{Opened, SourceJob};
 use anyhow::Context;
+use noisefloor::{Rgb, SourceInfo};
+#[cfg(feature = "adapters")]
+use noisefloor_image::LinearImage;
+#[cfg(feature = "adapters")]
+use noisefloor_sidecar::PictureCommand;
 use noisefloor_study::analysis::files::write;
 use noisefloor_study::analysis::raw::write_raw;
 use noisefloor_study::analysis::{AnalysisOptions, CorpusThreshold, analyse};
 use noisefloor_study::simulated::{Public, drive};
-use noisefloor_study::{Exposure, Study, StudyServer, interrupted, render_stack, store};
+use noisefloor_study::{Exposure, Study, StudyError, StudyServer, interrupted, render_stack, store};
 use std::net::{Ipv4Addr, SocketAddr};
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -34,7 +39,25 @@ pub enum StudyJob {
 pub struct StackJob {
     pub source: SourceJob,
     pub levels: Vec<u64>,
+    /// A program that all levels but the last pass through.
+    #[cfg(feature = "adapters")]
+    pub denoise: Option<PictureCommand>,
     pub out: PathBuf,
+}
+
+impl StackJob {
+    /// A level as it is written.
+    #[cfg(feature = "adapters")]
+    fn finish(&self, (width, height): (usize, usize), pixels: Vec<Rgb>) -> Result<Vec<Rgb>, StudyError> {
+        let Some(program) = &self.denoise else { return Ok(pixels) };
+        let made = program.apply(&LinearImage { width, height, pixels });
+        made.map(|image| image.pixels).map_err(|error| StudyError::StackRender(error.to_string()))
+    }
+
+    #[cfg(not(feature = "adapters"))]
+    fn finish(&self, _size: (usize, usize), pixels: Vec<Rgb>) -> Result<Vec<Rgb>, StudyError> {
+        Ok(pixels)
+    }
 }
 
 pub struct ServeJob {
@@ -166,7 +189,9 @@ fn stack(job: &StackJob) -> anyhow::Result<()> {
     let cancel = Arc::new(AtomicBool::new(false));
     cancel_on_signal(Arc::clone(&cancel), "keeping the levels that are finished")?;
     let go_on = |_, _| !cancel.load(Ordering::Relaxed);
-    render_stack(source.as_mut(), &job.levels, &job.out, go_on, Ok)?;
+    let SourceInfo { width, height, .. } = source.info();
+    let finish = |pixels| job.finish((width, height), pixels);
+    render_stack(source.as_mut(), &job.levels, &job.out, go_on, finish)?;
     say!("written to {}", job.out.display())?;
     Ok(())
 }

@@ -42,7 +42,7 @@ fn every_subcommand_explains_itself() {
         ("evaluate", &["--corpus", "--model", "--leave-one-scene-out", "--json", "--csv"]),
         ("audience", &["fit"]),
         ("reproduce", &["--corpus", "--out", "--edge", "--levels", "--dump-subset"]),
-        ("study", &["serve", "analyse", "simulate", "export", "erase"]),
+        ("study", &["stack", "serve", "links", "analyse", "data", "simulate", "backup", "export", "erase"]),
         ("inspect", &["MODEL", "--json"]),
         ("doctor", &["--install", "NOISEFLOOR_NAME_PYTHON"]),
         ("scenes", &["--help"]),

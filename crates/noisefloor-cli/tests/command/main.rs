@@ -52,3 +52,7 @@ mod signals;
 #[cfg(test)]
 #[cfg(feature = "adapters")]
 mod sources;
+/// Stacks, links, raw data and copies of a study.
+#[cfg(test)]
+#[cfg(feature = "study")]
+mod study;

@@ -1,0 +1,160 @@
+use crate::kit::{column, fail, run, succeed, text};
+use noisefloor_image::{Picture, read_picture};
+use std::collections::HashSet;
+use std::fs;
+use std::path::{Path, PathBuf};
+use tempfile::TempDir;
+
+const LEVELS: [u64; 5] = [1, 2, 4, 8, 16];
+
+/// A stack of 32×32 pixels, and what else is asked for.
+fn stack(out: &Path, more: &[&str]) -> Vec<String> {
+    let levels = LEVELS.map(|level| level.to_string()).join(",");
+    let args = ["study", "stack", "cornell-box", "--size", "32x32", "--levels", &levels, "--out", text(out)];
+    args.iter().chain(more).map(|&arg| arg.to_owned()).collect()
+}
+
+fn strs(args: &[String]) -> Vec<&str> {
+    args.iter().map(String::as_str).collect()
+}
+
+fn level(folder: &Path, spp: u64) -> Vec<[f32; 3]> {
+    match read_picture(folder.join(format!("{spp:05}.exr"))).unwrap() {
+        Picture::Linear(image) if (image.width, image.height) == (32, 32) => image.pixels,
+        other => panic!("{spp}: {other:?}"),
+    }
+}
+
+/// Every level is what `render` makes of as many samples.
+#[test]
+fn a_stack_holds_what_renders_hold() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("stack");
+    assert!(succeed(&strs(&stack(&out, &[]))).contains("written to"));
+    assert_eq!(fs::read_dir(&out).unwrap().count(), LEVELS.len());
+    let rendered = folder.path().join("render");
+    let render = ["render", "cornell-box", "--size", "32x32", "--tile", "32", "--criterion", "spp:8"];
+    succeed(&[&render[..], &["--max-spp", "8", "--quiet", "--out", text(&rendered)]].concat());
+    let Picture::Linear(image) = read_picture(rendered.join("image.exr")).unwrap() else {
+        panic!("an EXR is linear")
+    };
+    let differ = image.pixels.iter().zip(level(&out, 8)).flat_map(|(a, b)| [0, 1, 2].map(|c| (a[c], b[c])));
+    for (a, b) in differ {
+        assert!((a - b).abs() <= 1e-5 * a.abs().max(1.0), "{a} {b}");
+    }
+    fail(&strs(&stack(&out, &["--levels", "4,4"])), &["at least two levels"]);
+}
+
+/// All levels but the reference pass through the program; what it does wrong is said, and leaves no level
+/// that did not pass.
+#[test]
+#[cfg(all(unix, feature = "adapters"))]
+fn levels_are_denoised_by_any_program() {
+    let folder = tempfile::tempdir().unwrap();
+    let [plain, denoised, failed] = ["plain", "denoised", "failed"].map(|name| folder.path().join(name));
+    succeed(&strs(&stack(&plain, &[])));
+    // It is given the picture of 1 sample first, and answers with that of 16 always
+    let clean = plain.join("00016.exr");
+    let program =
+        format!("sh -c 'test -s \"$1\" && /bin/cp \"$0\" \"$2.exr\"' '{}' {{in}} {{out}}", text(&clean));
+    succeed(&strs(&stack(&denoised, &["--denoise", &program])));
+    for spp in LEVELS {
+        assert_eq!(level(&denoised, spp), level(&plain, 16), "{spp}");
+    }
+    let copy = "sh -c '/bin/cp \"$0\" \"$1.exr\"' {in} {out}";
+    succeed(&strs(&stack(&denoised, &["--denoise", copy])));
+    for spp in LEVELS {
+        assert_eq!(level(&denoised, spp), level(&plain, spp), "{spp}");
+    }
+
+    let small = folder.path().join("small");
+    let mut args = stack(&small, &[]);
+    args[4] = "16x16".into();
+    succeed(&strs(&args));
+    let resized =
+        format!("sh -c '/bin/cp \"$0\" \"$1.exr\"' '{}' {{out}} {{in}}", text(&small.join("00001.exr")));
+    for (program, words) in [
+        ("cp {in} out.exr", &["{out} is missing"][..]),
+        ("cp {in} {out}.exr {spp}", &["{spp} is not a placeholder", "{in} {out}"]),
+        ("sh -c 'echo no memory; exit 3' {in} {out}", &["exit status: 3", "no memory"]),
+        ("sh -c : {in} {out}", &["it wrote no file"]),
+        (resized.as_str(), &["16×16", "given one of 32×32"]),
+    ] {
+        fail(&strs(&stack(&failed, &["--denoise", program])), words);
+    }
+    assert!(fs::read_dir(&failed).map_or(true, |mut files| files.next().is_none()));
+}
+
+/// A study of a stack just rendered, with simulated observers who have answered.
+struct Answered {
+    dir: TempDir,
+    file: PathBuf,
+}
+
+impl Answered {
+    fn new(observers: &str) -> Self {
+        let dir = tempfile::tempdir().unwrap();
+        succeed(&strs(&stack(&dir.path().join("box"), &[])));
+        let file = dir.path().join("study.toml");
+        let design = "protocol = \"acquisition\"\ndatabase = \"answers.sqlite\"\ntile = 16\nrepeats = 1\n\
+            [text.en]\ntitle = \"A box\"\nconsent = \"I take part.\"\n\
+            [[stack]]\nname = \"box\"\nfolder = \"box\"\n";
+        fs::write(&file, design).unwrap();
+        let said = succeed(&["study", "simulate", text(&file), "--observers", observers]);
+        assert!(said.contains("which should find:"), "{said}");
+        Self { dir, file }
+    }
+
+    /// The table of all responses of simulated observers.
+    fn responses(&self) -> PathBuf {
+        let out = self.dir.path().join("data");
+        succeed(&["study", "data", text(&self.file), "--simulated", "--out", text(&out)]);
+        out.join("responses.csv")
+    }
+}
+
+#[test]
+fn links_are_printed_once_each() {
+    let study = Answered::new("1");
+    let url = "https://study.example.org/noise/";
+    let print = || succeed(&["study", "links", text(&study.file), "--count", "3", "--url", url]);
+    let said = print() + &print();
+    let links: HashSet<&str> = said.lines().collect();
+    assert_eq!((said.lines().count(), links.len()), (6, 6));
+    assert!(links.iter().all(|link| link.starts_with("https://study.example.org/noise/?link=")), "{said}");
+}
+
+/// Raw data name every response and no return code, and leave simulated observers out unless asked for.
+#[test]
+fn data_are_written_for_others() {
+    let study = Answered::new("3");
+    let responses = study.responses();
+    let participants: HashSet<String> = column(&responses, "participant").into_iter().collect();
+    assert_eq!(participants.len(), 3);
+    let out = study.dir.path().join("data");
+    for name in ["dataset_description.json", "participants.tsv", "design.json"] {
+        assert!(out.join(name).exists(), "{name}");
+    }
+    let people = study.dir.path().join("people");
+    fail(&["study", "data", text(&study.file), "--out", text(&people)], &["no answers"]);
+}
+
+/// What was erased since the copy, or lost, is there again.
+#[test]
+fn a_copy_is_restored_as_the_guide_says() {
+    let study = Answered::new("2");
+    let before = fs::read(study.responses()).unwrap();
+    let copy = study.dir.path().join("copy.sqlite");
+    succeed(&["study", "backup", text(&study.file), text(&copy)]);
+    fail(&["study", "backup", text(&study.file), text(&copy)], &["copy.sqlite"]);
+    succeed(&["study", "simulate", text(&study.file), "--observers", "1", "--seed", "9"]);
+    assert_ne!(fs::read(study.responses()).unwrap(), before);
+
+    for name in ["answers.sqlite", "answers.sqlite-wal", "answers.sqlite-shm"] {
+        drop(fs::remove_file(study.dir.path().join(name)));
+    }
+    fs::rename(&copy, study.dir.path().join("answers.sqlite")).unwrap();
+    assert_eq!(fs::read(study.responses()).unwrap(), before);
+    let elsewhere = study.dir.path().join("no/such/folder/copy.sqlite");
+    assert!(!run(&["study", "backup", text(&study.file), text(&elsewhere)]).status.success());
+}
