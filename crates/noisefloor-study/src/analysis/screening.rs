@@ -7,8 +7,11 @@ use crate::session::{Class, Stage};
 use crate::viewing::ViewingProblem;
 use std::collections::BTreeSet;
 
-/// Fewest observers among whom one can be unlike the others.
+/// Fewest observers among whom BT.500 looks for one unlike the others.
 const FEWEST: usize = 5;
+/// Fewest observers whose median deviation is known well enough to judge one of them by it. Among eight, one
+/// attentive observer in nine would be called an outlier.
+const FEWEST_FOR_DEVIATION: usize = 20;
 /// Smallest median deviation assumed, in ln(spp): where all agree to within a level, half a level is no
 /// outlier.
 const LEAST_DEVIATION: f64 = 0.05;
@@ -162,7 +165,7 @@ impl LnThresholds {
 /// spread to be measured.
 fn modified_z(values: &[Option<f64>], of: usize) -> Option<f64> {
     let all: Vec<f64> = values.iter().flatten().copied().collect();
-    if all.len() < FEWEST {
+    if all.len() < FEWEST_FOR_DEVIATION {
         return None;
     }
     let middle = median(all.clone())?;

@@ -66,7 +66,7 @@ pub struct Screening {
     pub hasty_share: f64,
     /// Acquisition: largest share of tiles left at the noisiest level.
     pub untouched_share: f64,
-    /// Largest modified z-score of an observer's sensitivity and consistency.
+    /// Largest modified z-score of an observer's sensitivity and consistency, where there are at least 20.
     pub outlying: f64,
     /// Whether to screen observers by Recommendation ITU-R BT.500, annex 1, §2.3.1.
     pub bt500: bool,
