@@ -12,6 +12,10 @@ const shots = process.env.NOISEFLOOR_SCREENSHOTS;
 const axe = readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8");
 export const SMALL = { width: 1024, height: 640 };
 export const LARGE = { width: 1920, height: 1080 };
+/** Time after which something on a page has failed to come, in milliseconds; long, since tests run side by side. */
+const PATIENCE = 60000;
+/** Tests of one file that know nothing of one another: most of their time is spent waiting. */
+export const SIDE_BY_SIDE = { concurrency: 3 };
 
 let browser;
 const profile = mkdtempSync(join(tmpdir(), "noisefloor-browser-"));
@@ -48,7 +52,7 @@ export async function openScaled(t, url, ratio) {
   const context = await scaled.newContext({ viewport: null, locale: "en-GB" });
   t.after(() => scaled.close());
   const page = await context.newPage();
-  page.setDefaultTimeout(8000);
+  page.setDefaultTimeout(PATIENCE);
   await page.goto(url);
   return { page };
 }
@@ -65,7 +69,7 @@ export async function open(t, url, viewport, { refusals = false, ...options } = 
   });
   const page = await context.newPage();
   watch(page, problems, refusals);
-  page.setDefaultTimeout(8000);
+  page.setDefaultTimeout(PATIENCE);
   t.after(async () => {
     await context.close();
     assert.deepEqual(problems, []);
@@ -149,7 +153,30 @@ export const settled = (page) =>
     return (await fetch(`api/sessions/${of}`)).json();
   });
 
-/** Time before which no answer is taken, and a little. */
-export const look = (page) => page.waitForTimeout(350);
+/** Waits until answers count: what comes sooner is not taken. */
+export const look = (page) =>
+  page.waitForFunction(() => {
+    const from = document.querySelector(".stage")?.dataset.answers;
+    return from !== undefined && performance.now() > Number(from);
+  });
+
+/** Presses Tab until something has the focus whose name or identifier begins so. */
+export async function reach(page, name) {
+  for (let i = 0; i < 60; i += 1) {
+    const at = await page.evaluate(() => {
+      const { id, textContent } = document.activeElement ?? {};
+      return [id, textContent].map((text) => text?.trim() ?? "");
+    });
+    if (at.some((text) => text.startsWith(name))) return;
+    await page.keyboard.press("Tab");
+  }
+  assert.fail(`${name} cannot be reached by Tab`);
+}
+
+/** Goes to a control by Tab alone, and presses a key there. */
+export async function press(page, name, key = "Enter") {
+  await reach(page, name);
+  await page.keyboard.press(key);
+}
 
 export const test_picture = (page) => page.locator("canvas.picture").nth(1);

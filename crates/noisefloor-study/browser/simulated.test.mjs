@@ -1,17 +1,18 @@
-// Simulated observers at the real acquisition page: what each of them does at each showing was decided in Rust (src/simulated); here it is clicked.
+// Simulated observers at the real acquisition page, side by side: what each of them does at each showing was decided in
+// Rust (src/simulated); here it is clicked.
 
-import { test } from "node:test";
+import { describe, test } from "node:test";
 import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
-import { LARGE, arrive, heading, look, open, settled, test_picture } from "./kit.mjs";
+import { SIDE_BY_SIDE, SMALL, arrive, heading, look, open, settled, test_picture } from "./kit.mjs";
 
 const { SIMULATED, DECISIONS } = process.env;
 /** By observer, stack and showing: the tiles that are clicked, in order. */
 const observers = JSON.parse(readFileSync(DECISIONS, "utf8"));
 
-observers.forEach((showings, number) => {
+const observe = (showings, number) =>
   test(`simulated observer ${number + 1}`, async (t) => {
-    const { page } = await open(t, SIMULATED, LARGE);
+    const { page } = await open(t, SIMULATED, SMALL);
     const study = await (await fetch(`${SIMULATED}/api/study`)).json();
     const shown = showings.map(() => 0);
     await arrive(page);
@@ -57,4 +58,5 @@ observers.forEach((showings, number) => {
     }
     await heading(page, "Thank you");
   });
-});
+
+describe("simulated observers", SIDE_BY_SIDE, () => observers.forEach(observe));

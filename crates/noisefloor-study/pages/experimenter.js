@@ -4,8 +4,10 @@ import { element } from "./sheet.js";
 
 const EVERY_MS = 3000;
 const get = (id) => document.getElementById(id);
-const key = location.hash.slice(1);
-// The key is not left in the history
+// The key is not left in the history, but lasts as long as the tab, for when the page is loaded again
+const KEPT = `noisefloor.experimenter.${location.pathname}`;
+if (location.hash) sessionStorage.setItem(KEPT, location.hash.slice(1));
+const key = sessionStorage.getItem(KEPT) ?? "";
 history.replaceState(null, "", location.pathname);
 
 const ago = (ms) => {
@@ -40,7 +42,7 @@ function summary(sessions) {
   const count = (state) => sessions.filter((s) => s.state === state).length;
   const excluded = sessions.filter((s) => s.state === "finished" && s.exclusions.length > 0).length;
   const words = [
-    `${sessions.length} sessions`,
+    sessions.length === 1 ? "1 session" : `${sessions.length} sessions`,
     `${count("active")} active`,
     `${count("finished")} finished`,
     `${excluded} of these would be excluded`,

@@ -103,6 +103,8 @@ class Room {
   async open() {
     this.onset = await painted();
     this.shown = Date.now();
+    // For whoever drives the page: when answers begin to count
+    this.stage.dataset.answers = this.onset + this.study.minimum_ms;
   }
 
   /** Time since answers are possible; a negative one, while they are not. */

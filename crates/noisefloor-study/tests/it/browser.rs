@@ -13,7 +13,7 @@ use noisefloor_study::{StackView, Study, StudyEvent, Trial, store};
 use noisefloor_testkit::{Requirement, require};
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 use tempfile::TempDir;
 
 /// Levels of the stacks that the browser is shown.
@@ -59,6 +59,7 @@ links-only = true
 id-parameters = ["PROLIFIC_PID"]
 completion-code = "COMPLETE-77"
 completion-url = "https://example.org/done"
+screened-out-url = "https://example.org/screened-out"
 
 [[question]]
 id = "age"
@@ -76,6 +77,31 @@ option = [
     { id = "no", text = { en = "no", fr = "non" } },
 ]
 "#;
+
+/// A language written from right to left: the English texts, with those that the test reads in Arabic.
+fn arabic() -> String {
+    let mut text = include_str!("../../pages/languages/en.toml").to_owned();
+    for (english, arabic) in [
+        ("name = \"English\"", "name = \"العربية\""),
+        ("direction = \"ltr\"", "direction = \"rtl\""),
+        ("\"Begin\"", "\"ابدأ\""),
+        ("\"Before you begin\"", "\"قبل أن تبدأ\""),
+        ("\"I have read this, and I take part.\"", "\"قرأت هذا وأشارك.\""),
+        ("\"Go on\"", "\"متابعة\""),
+        ("\"Practice {n} of {of}\"", "\"تدريب {n} من {of}\""),
+        ("\"Reference\"", "\"المرجع\""),
+        ("\"Click where it differs\"", "\"انقر حيث تختلف\""),
+        ("\"I see no difference\"", "\"لا أرى فرقًا\""),
+        ("\"Undo\"", "\"تراجع\""),
+        ("\"Pause\"", "\"استراحة\""),
+        ("\"Distance\"", "\"المسافة\""),
+        ("\"From your eyes to the screen, in centimetres\"", "\"من عينيك إلى الشاشة بالسنتيمتر\""),
+    ] {
+        assert!(text.contains(english), "{english}");
+        text = text.replacen(english, arabic, 1);
+    }
+    text
+}
 
 /// Whether the pages can be tested, with further programs.
 pub(crate) fn browser(programs: &[&str]) -> Option<()> {
@@ -100,10 +126,8 @@ pub(crate) fn browser(programs: &[&str]) -> Option<()> {
     require(Requirement::Browser, found)
 }
 
-/// Runs a file of the browser's tests, which must pass; one at a time, since each has a Chromium of its own.
+/// Runs a file of the browser's tests, which must pass, in a Chromium of its own.
 pub(crate) fn run(file: &str, environment: &[(&str, &str)]) {
-    static TURN: Mutex<()> = Mutex::new(());
-    let _turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("browser");
     let mut node = Command::new("node");
     node.args(["--test", "--test-reporter=spec", file]).current_dir(folder).envs(environment.iter().copied());
@@ -124,19 +148,11 @@ fn observers_use_the_pages_in_a_browser() {
         ("ACQUISITION", study("acquisition", "repeats = 1\ngroups = [\"painters\", \"programmers\"]", "")),
         ("VALIDATION", study("validation", "", "")),
         ("FORCED", study("forced-choice", "", "")),
-        ("INVITED", study("validation", "minutes = 7\nbreak-every = 2", INVITED)),
     ];
     let servers: Vec<Running> = studies.iter().map(|(_, (_, study))| Running::start(study.clone())).collect();
-    let invited = &studies[3].1.1;
-    let links = store::make_links(&invited.database, &invited.design(), 1).unwrap();
-    let (url, experimenter) = (&servers[3].url, &servers[3].experimenter);
-    let invited =
-        serde_json::json!({ "url": url, "link": links[0], "experimenter": experimenter }).to_string();
-    let mut urls: Vec<(&str, &str)> =
+    let urls: Vec<(&str, &str)> =
         studies.iter().zip(&servers).map(|((name, _), server)| (*name, server.url.as_str())).collect();
-    urls[3].1 = &invited;
     run("test.mjs", &urls);
-    run("invited.test.mjs", &urls);
 
     // What was clicked: two observers left the six tiles at levels 1 to 6 (by mouse) and at 2 (by keyboard).
     let study = &studies[0].1.1;
@@ -154,6 +170,36 @@ fn observers_use_the_pages_in_a_browser() {
     assert_eq!(stops, [vec![1, 2, 3, 4, 5, 6], vec![2; 6]]);
     let conditions = replayed[0].conditions.unwrap();
     assert!((conditions.pixels_per_mm - 324.0 / 85.6).abs() < 1e-9 && conditions.distance_mm == 600.0);
+}
+
+/// People who come by links, who fail the practice, or who read from right to left, and the experimenter's
+/// page: browser/invited.test.mjs.
+#[test]
+fn invited_people_use_the_pages_in_a_browser() {
+    if browser(&[]).is_none() {
+        return;
+    }
+    let (_invited_dir, invited) = study("validation", "minutes = 7\nbreak-every = 2", INVITED);
+    let open = INVITED.replace("links-only = true", "");
+    let (_strict_dir, strict) = study("validation", "", &format!("practice-attempts = 1\n{open}"));
+    // Its languages lie beside its file
+    let (dir, _) = study("acquisition", "repeats = 1", "");
+    std::fs::create_dir(dir.path().join("languages")).unwrap();
+    std::fs::write(dir.path().join("languages/ar.toml"), arabic()).unwrap();
+    let file = dir.path().join("study.toml");
+    let texts = "languages = \"languages\"\n[text.ar]\ntitle = \"الضوضاء في الصور\"\n\
+        instructions = \"اجلس كما تجلس عادة.\"\nconsent = \"أشارك بإرادتي، ويمكنني التوقف في أي وقت.\"\n";
+    let text = std::fs::read_to_string(&file).unwrap().replacen("[text.en]", &format!("{texts}[text.en]"), 1);
+    std::fs::write(&file, text).unwrap();
+    let arabic = Arc::new(Study::open(&file).unwrap());
+
+    let servers = [&invited, &strict, &arabic].map(|study| Running::start(study.clone()));
+    let links = store::make_links(&invited.database, &invited.design(), 1).unwrap();
+    let (url, experimenter) = (&servers[0].url, &servers[0].experimenter);
+    let invited =
+        serde_json::json!({ "url": url, "link": links[0], "experimenter": experimenter }).to_string();
+    let (strict, arabic) = (servers[1].url.as_str(), servers[2].url.as_str());
+    run("invited.test.mjs", &[("INVITED", &invited), ("STRICT", strict), ("ARABIC", arabic)]);
 }
 
 /// A stack whose last picture's name says nothing, and a picture of another size, on the page of `explore`:

@@ -1,77 +1,93 @@
 use crate::browser;
 use crate::kit::Running;
 use noisefloor_study::Exposure;
+use std::fs;
 use std::net::TcpListener;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 
-/// nginx, until it is dropped.
-struct Nginx(Child);
+/// A proxy with TLS in front of two servers, until it is dropped.
+struct Proxy {
+    child: Child,
+    url: String,
+}
 
-impl Drop for Nginx {
+impl Drop for Proxy {
     fn drop(&mut self) {
-        drop(self.0.kill());
-        drop(self.0.wait());
+        drop(self.child.kill());
+        drop(self.child.wait());
     }
 }
 
-/// Starts nginx with TLS in front of two servers; its port.
-fn nginx(folder: &Path, kept: u16, stripped: u16) -> (Nginx, u16) {
-    let port = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
+/// A certificate for localhost, in a folder.
+fn certify(folder: &Path) {
     let made = Command::new("openssl")
         .args(["req", "-x509", "-newkey", "rsa:2048", "-nodes", "-days", "2", "-subj", "/CN=localhost"])
-        .args(["-keyout", "key.pem", "-out", "cert.pem"])
+        .args(["-addext", "subjectAltName=DNS:localhost", "-keyout", "key.pem", "-out", "cert.pem"])
         .current_dir(folder)
         .stderr(Stdio::null())
         .status()
         .unwrap();
     assert!(made.success(), "openssl makes a certificate");
-    let text = include_str!("nginx.conf")
+}
+
+/// Starts a proxy by its configuration in this folder: `kept` gets the path as it is, `stripped` without its
+/// first part.
+fn start(program: &str, folder: &Path, kept: &Running, stripped: &Running) -> Proxy {
+    let port = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
+    let (name, arguments): (_, &[&str]) = match program {
+        "nginx" => ("nginx.conf", &["-c"]),
+        _ => ("Caddyfile", &["run", "--adapter", "caddyfile", "--config"]),
+    };
+    let folder = folder.join(format!("{program}-{port}"));
+    fs::create_dir(&folder).unwrap();
+    certify(&folder);
+    let written = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/it").join(name);
+    let text = fs::read_to_string(written)
+        .unwrap()
         .replace("FOLDER", folder.to_str().unwrap())
         .replace("PORT", &port.to_string())
-        .replace("KEPT", &kept.to_string())
-        .replace("STRIPPED", &stripped.to_string());
-    let file = folder.join("nginx.conf");
-    std::fs::write(&file, text).unwrap();
-    let child = Command::new("nginx")
-        .arg("-c")
+        .replace("KEPT", &kept.address.port().to_string())
+        .replace("STRIPPED", &stripped.address.port().to_string());
+    let file = folder.join(name);
+    fs::write(&file, text).unwrap();
+    let log = fs::File::create(folder.join("error.log")).unwrap();
+    let child = Command::new(program)
+        .args(arguments)
         .arg(&file)
+        .env("HOME", &folder)
         .stdout(Stdio::null())
-        .stderr(Stdio::null())
+        .stderr(log)
         .spawn()
         .unwrap();
-    let nginx = Nginx(child);
-    for _ in 0..100 {
+    let proxy = Proxy { child, url: format!("https://localhost:{port}") };
+    for _ in 0..200 {
         if std::net::TcpStream::connect(("127.0.0.1", port)).is_ok() {
-            return (nginx, port);
+            return proxy;
         }
         std::thread::sleep(std::time::Duration::from_millis(50));
     }
-    panic!(
-        "nginx does not listen: {}",
-        std::fs::read_to_string(folder.join("error.log")).unwrap_or_default()
-    );
+    let said = fs::read_to_string(folder.join("error.log")).unwrap_or_default();
+    panic!("{program} does not listen: {said}");
 }
 
-/// A participant behind nginx with TLS, under a path that is passed on and under one that is stripped; and
-/// what the server refuses that is not told to trust the proxy.
+/// Participants behind nginx and Caddy with TLS, under a path that is passed on and under one that is
+/// stripped; and what a server refuses that is not told to trust the proxy.
 #[test]
-fn a_study_works_behind_nginx() {
-    if browser::browser(&["nginx", "openssl"]).is_none() {
+fn a_study_works_behind_proxies() {
+    if browser::browser(&["nginx", "caddy", "openssl"]).is_none() {
         return;
     }
     let folder = tempfile::tempdir().unwrap();
-    let studies = [0, 1].map(|_| browser::study("validation", "", ""));
-    let exposure = Exposure::named(&["localhost".into()]).trusting(&[[127, 0, 0, 1].into()]);
-    let kept = Running::exposed(studies[0].1.clone(), exposure.clone().under("/noise"));
-    let stripped = Running::exposed(studies[1].1.clone(), exposure);
-    let (_nginx, port) = nginx(folder.path(), kept.address.port(), stripped.address.port());
-    browser::run("proxy.test.mjs", &[("PROXY", &format!("https://localhost:{port}"))]);
-
-    // Without trust in the proxy, its pages are those of another site
-    drop(kept);
-    let named = Exposure::named(&["localhost".into()]).under("/noise");
-    let kept = Running::exposed(studies[0].1.clone(), named);
-    let (_nginx, port) = nginx(folder.path(), kept.address.port(), stripped.address.port());
-    browser::run("untrusted.test.mjs", &[("PROXY", &format!("https://localhost:{port}"))]);
+    let studies = [0, 1, 2].map(|_| browser::study("validation", "", ""));
+    let named = Exposure::named(&["localhost".into()]);
+    let trusting = named.clone().trusting(&[[127, 0, 0, 1].into()]);
+    let kept = Running::exposed(studies[0].1.clone(), trusting.clone().under("/noise"));
+    let stripped = Running::exposed(studies[1].1.clone(), trusting);
+    // Its pages look like those of another site
+    let untrusting = Running::exposed(studies[2].1.clone(), named.under("/noise"));
+    let proxies = ["nginx", "caddy"].map(|program| start(program, folder.path(), &kept, &stripped));
+    let untrusted = start("nginx", folder.path(), &untrusting, &stripped);
+    let urls = serde_json::json!({ "nginx": proxies[0].url, "Caddy": proxies[1].url }).to_string();
+    browser::run("proxy.test.mjs", &[("PROXIES", &urls), ("UNTRUSTED", &untrusted.url)]);
 }
