@@ -40,6 +40,7 @@ pub const TARGETS: &[Target] = &[
     Target { name: "obj", run: scenes::obj, seeds: scenes::obj_seeds },
     Target { name: "serialized", run: scenes::serialized, seeds: scenes::serialized_seeds },
     Target { name: "table", run: texts::table, seeds: texts::table_seeds },
+    Target { name: "cube", run: texts::cube, seeds: texts::cube_seeds },
     Target { name: "wire", run: texts::wire, seeds: texts::wire_seeds },
     Target { name: "study", run: texts::study, seeds: texts::study_seeds },
 ];

@@ -1,7 +1,8 @@
 //! Pictures: of a PNG, the checksums of chunks are right.
 
 use crate::files::Folder;
-use noisefloor_image::{RenderLayers, read_picture, write_exr, write_png};
+use noisefloor::SampleOrigin;
+use noisefloor_image::{RenderLayers, SampleFacts, read_facts, read_picture, write_exr, write_png};
 use std::fs;
 
 /// Signature of a PNG.
@@ -10,6 +11,7 @@ const SIGNATURE: usize = 8;
 fn read(name: &str, bytes: &[u8]) {
     thread_local!(static FOLDER: Folder = Folder::new());
     let path = FOLDER.with(|folder| folder.write(name, bytes));
+    let _ = read_facts(&path);
     let Ok(picture) = read_picture(path) else { return };
     let (width, height) = picture.size();
     assert_eq!(picture.into_linear().pixels.len(), width * height);
@@ -23,7 +25,10 @@ pub(crate) fn exr_seeds() -> Vec<Vec<u8>> {
     let folder = Folder::new();
     let path = folder.write("seed.exr", "");
     let rgb: Vec<[f32; 3]> = (0..20 * 18).map(|i| [(i * 37 % 101) as f32 / 7.0, -0.5, 1e9]).collect();
-    write_exr(&path, &RenderLayers::rgb(20, 18, &rgb)).expect("a small picture");
+    let origin = SampleOrigin { source: "hall".into(), seed: 7, repeats: true };
+    let facts = SampleFacts { samples: Some((16, 16)), origin: Some(origin) };
+    let layers = RenderLayers { facts: Some(&facts), ..RenderLayers::rgb(20, 18, &rgb) };
+    write_exr(&path, &layers).expect("a small picture");
     let plain = fs::read(&path).expect("it was written");
     // The same with its data announced in every other compression: decoders find nonsense of the right length
     let at = plain.windows(11).position(|w| w == b"compression").expect("every EXR says it") + 11 + 13 + 4;

@@ -1,5 +1,6 @@
 //! Tables, replies of renderers, and what browsers send.
 
+use noisefloor_image::parse_cube;
 use noisefloor_learn::{read_table, write_table};
 use noisefloor_study::{Beginning, Envelope, ParticipantSession, Study, grids, parse_code};
 use std::sync::Arc;
@@ -15,6 +16,23 @@ pub(crate) fn table(bytes: &[u8]) {
 pub(crate) fn table_seeds() -> Vec<Vec<u8>> {
     let whole = include_str!("../../fixtures/human-table.csv");
     vec![whole.lines().take(12).flat_map(|line| [line, "\n"]).collect::<String>().into_bytes()]
+}
+
+/// A LUT: what it makes of colours is finite.
+pub(crate) fn cube(bytes: &[u8]) {
+    let Ok(lut) = parse_cube(bytes) else { return };
+    for colour in [[0.0; 3], [0.3, 0.9, 2.0], [-1.0, f32::MAX, f32::NAN]] {
+        assert!(lut.map(colour).iter().all(|c| !c.is_nan()));
+    }
+}
+
+pub(crate) fn cube_seeds() -> Vec<Vec<u8>> {
+    let curve = "TITLE \"a\"\n# b\nLUT_1D_SIZE 2\nLUT_1D_INPUT_RANGE 0 8\n";
+    let corners: String = (0..8).map(|i| format!("{} {} {}\n", i % 2, i / 2 % 2, i / 4)).collect();
+    vec![
+        format!("{curve}LUT_3D_SIZE 2\n0 0 0\n1 1e0 +1.0\n{corners}").into_bytes(),
+        format!("LUT_3D_SIZE 2\nDOMAIN_MIN -1 0 0\nDOMAIN_MAX 1 2 3\n{corners}").into_bytes(),
+    ]
 }
 
 pub(crate) fn wire(bytes: &[u8]) {

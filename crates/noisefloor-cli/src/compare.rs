@@ -136,7 +136,7 @@ fn converged(
 fn say_runs(compared: &Comparison) -> Result<(), NotSaid> {
     say!("{} by {}, against {}", compared.scene, compared.source, compared.reference)?;
     say!(
-        "{:24} {:>8} {:>6} {:>9} {:>9} {:>9}  {:>7} {:>7} {:>7} {:>7}  uniform for the same worst tile",
+        "{:24} {:>8} {:>6} {:>9} {:>9} {:>9}  {:>7} {:>7} {:>7} {:>6} {:>6} {:>7}  uniform for the same worst tile",
         "criterion",
         "spp mean",
         "most",
@@ -146,11 +146,13 @@ fn say_runs(compared: &Comparison) -> Result<(), NotSaid> {
         "relMSE",
         "FLIP",
         "worst",
+        "JOD",
+        "worst",
         "butter."
     )?;
     for run in &compared.runs {
         say!(
-            "{:24} {:8.0} {:6} {:>9} {:9.2} {:9.3}  {:7.5} {:7.4} {:7.4} {:7.3}  {}",
+            "{:24} {:8.0} {:6} {:>9} {:9.2} {:9.3}  {:7.5} {:7.4} {:7.4} {:6.3} {:6.3} {:7.3}  {}",
             run.criterion,
             run.spp_mean,
             run.spp_most,
@@ -160,6 +162,8 @@ fn say_runs(compared: &Comparison) -> Result<(), NotSaid> {
             run.rel_mse,
             run.flip,
             run.flip_worst,
+            run.cvvdp_jod,
+            run.cvvdp_jod_worst,
             run.butteraugli_worst,
             run.uniform_over_this.map_or_else(|| "–".to_owned(), |ratio| format!("×{ratio:.2}")),
         )?;

@@ -81,6 +81,8 @@ fn say_all(summary: &Summary<'_>) -> Result<(), NotSaid> {
         "trained through  {}",
         match summary.tone_mapping {
             ToneMapping::Srgb { exposure } => format!("plain sRGB, exposure {exposure}"),
+            ToneMapping::Custom { exposure, curve } =>
+                format!("a curve of its own ({}), exposure {exposure}", curve.digest()),
             ToneMapping::Reinhard { key, white: None } => format!("Reinhard, key {key}"),
             ToneMapping::Reinhard { key, white: Some(white) } =>
                 format!("Reinhard, key {key}, white {white}"),

@@ -2,7 +2,7 @@
 
 use crate::bars::bar;
 use anyhow::Context;
-use noisefloor::{Descriptor, Evidence, Threshold};
+use noisefloor::{Descriptor, Evidence, Threshold, Viewing};
 use noisefloor_learn::{
     Corpora, Prediction, Table, TrainParams, describe_corpora, leave_one_scene_out, read_table,
 };
@@ -15,6 +15,8 @@ pub struct DataJob {
     pub source: DataSource,
     pub descriptor: Descriptor,
     pub evidence: Evidence,
+    /// Where people are taken to have seen the pictures.
+    pub viewing: Viewing,
 }
 
 pub enum DataSource {
@@ -30,7 +32,8 @@ impl DataJob {
             DataSource::Corpora(folders) => folders,
         };
         let bar = bar(0, "zones described");
-        let table = describe_corpora(Corpora::new(folders), &self.descriptor, self.evidence, |done, all| {
+        let corpora = Corpora { viewing: self.viewing, ..Corpora::new(folders) };
+        let table = describe_corpora(corpora, &self.descriptor, self.evidence, |done, all| {
             bar.set_length(all as u64);
             bar.set_position(done as u64);
         })?;

@@ -24,7 +24,7 @@ impl fmt::Display for LeftOut {
 impl std::error::Error for LeftOut {}
 
 /// Fails with [`LeftOut`].
-#[cfg(feature = "train")]
+#[cfg(any(feature = "train", not(feature = "lab")))]
 pub fn left_out<T>(what: &'static str, feature: &'static str, again: &'static str) -> anyhow::Result<T> {
     Err(LeftOut { what, feature, again }.into())
 }

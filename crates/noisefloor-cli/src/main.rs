@@ -20,6 +20,7 @@ mod judge;
 #[cfg(feature = "train")]
 mod learning;
 mod left_out;
+mod metrics;
 mod output;
 mod reference;
 mod render;
@@ -58,6 +59,7 @@ fn run(command: Command) -> anyhow::Result<ExitCode> {
         Command::Render(args) => render::run(args.check()?),
         Command::Reference(args) => reference::run(args.check()?),
         Command::Judge(args) => judge::run(&args.check()?).map(done),
+        Command::Metrics(args) => metrics::run(&args.check()?).map(done),
         Command::Inspect(args) => inspect::run(&args.check()?).map(done),
         Command::Scenes { command: None } => Ok(inspect::scenes().map(done)?),
         Command::Scenes { command: Some(ScenesCommand::Check(args)) } => scenes::check(args),

@@ -99,6 +99,26 @@ pub enum PictureError {
         /// Names of the existing channels, comma-separated, at most twenty.
         found: String,
     },
+    /// It does not say how many samples it has, and nobody else did.
+    #[error("{}: does not say how many samples per pixel it has; give the number with --spp", path.display())]
+    NoSamples {
+        /// The file.
+        path: PathBuf,
+    },
+    /// Its tiles have different numbers of samples, and one for all is needed.
+    #[error(
+        "{}: has {fewest} to {most} samples per pixel, not the same everywhere; judge a picture rendered \
+         with --criterion spp:N, or give one number with --spp",
+        path.display()
+    )]
+    UnevenSamples {
+        /// The file.
+        path: PathBuf,
+        /// Fewest samples per pixel of a tile.
+        fewest: u64,
+        /// Most samples per pixel of a tile.
+        most: u64,
+    },
     /// A valid file that uses a feature this crate does not read.
     #[error("{}: {what}; {advice}", path.display())]
     Unsupported {

@@ -3,13 +3,15 @@
 //! - [`read_picture`], [`read_exr`], [`read_pfm`], [`read_png`]: linear EXR and PFM, display-encoded PNG. The
 //!   content tells the format. Files may be hostile: sizes are checked before pixels are allocated, and a
 //!   broken file is a [`PictureError`].
+//! - [`read_facts`], [`read_still`]: what an EXR says of its samples, and a picture with them.
 //! - [`write_exr`], [`write_png`], [`write_atomic`], [`check_writable`]: files that appear complete or not at
 //!   all.
+//! - [`read_cube`]: a `.cube` LUT, and as a tone mapping ([`ColourLut::into_tone_curve`]).
 //! - `maps`, behind the feature of that name: numbers drawn over a picture, in colours, with a legend.
 //! - [`StackSource`]: a folder of images as a [`noisefloor::ProgressiveSource`].
 //! - [`running_means`], [`batches`]: which samples are in which file of a stack.
 //!
-//! Nothing here accumulates, tone maps or judges.
+//! Nothing here accumulates or judges.
 //!
 //! ```
 //! use noisefloor::{ProgressiveSource, Request, TileGrid};
@@ -31,11 +33,14 @@
 //! ```
 
 mod atomic;
+mod cube;
 mod decode_exr;
 mod decode_pfm;
 mod decode_png;
 mod error;
+mod facts;
 mod frames;
+mod lut;
 #[cfg(feature = "maps")]
 pub mod maps;
 mod open;
@@ -45,13 +50,16 @@ mod stack;
 mod write;
 
 pub use atomic::{check_writable, write_atomic};
+pub use cube::{CubeError, parse_cube, read_cube};
 pub use decode_exr::read_exr;
 pub use decode_pfm::read_pfm;
 pub use decode_png::read_png;
 pub use error::{PictureError, StackError, WriteError};
+pub use facts::{SampleFacts, read_facts};
 pub use frames::{Frame, batches, running_means};
+pub use lut::{ColourLut, LutInput, LutInputError};
 pub use open::MAX_FILE_BYTES;
 pub use picture::{DisplayImage, LinearImage, Picture};
-pub use read::{read_picture, read_picture_within};
+pub use read::{read_picture, read_picture_within, read_still};
 pub use stack::StackSource;
 pub use write::{RenderLayers, write_exr, write_png};

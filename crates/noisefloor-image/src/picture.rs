@@ -74,6 +74,6 @@ impl Picture {
     pub fn into_still(self, spp: f64) -> Still {
         let (size, rounding) = (self.size(), self.rounding());
         let display_referred = matches!(self, Picture::Display(_));
-        Still { size, pixels: self.into_linear().pixels, spp, display_referred, rounding }
+        Still { size, pixels: self.into_linear().pixels, spp, display_referred, rounding, origin: None }
     }
 }

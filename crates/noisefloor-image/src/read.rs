@@ -1,9 +1,11 @@
 //! Reading a picture in whichever format its first bytes announce.
 
 use crate::error::PictureError;
+use crate::facts::read_facts;
 use crate::open::{Format, Opened};
 use crate::picture::Picture;
 use crate::{decode_exr, decode_pfm, decode_png};
+use noisefloor::Still;
 use std::path::Path;
 
 /// Reads an EXR, PFM or PNG file. Its first bytes tell the format; its name does not matter.
@@ -28,4 +30,24 @@ pub fn read_picture_within(path: impl AsRef<Path>, most: usize) -> Result<Pictur
         Format::Png => decode_png::decode(path, opened).map(Picture::Display),
         _ => Err(opened.foreign(path, "an OpenEXR, PFM or PNG file")),
     }
+}
+
+/// [`read_picture`], as one side of a comparison: with `spp` samples per pixel, or with those that the file
+/// says it has. Whatever it says of where they come from is kept.
+///
+/// # Errors
+/// Those of [`read_picture`]; without `spp`, also [`PictureError::NoSamples`] and
+/// [`PictureError::UnevenSamples`].
+pub fn read_still(path: impl AsRef<Path>, spp: Option<f64>) -> Result<Still, PictureError> {
+    let path = path.as_ref();
+    let facts = read_facts(path)?;
+    let spp = match (spp, facts.samples) {
+        (Some(spp), _) => spp,
+        (None, Some((fewest, most))) if fewest < most => {
+            return Err(PictureError::UnevenSamples { path: path.to_owned(), fewest, most });
+        }
+        (None, Some((_, spp))) => spp as f64,
+        (None, None) => return Err(PictureError::NoSamples { path: path.to_owned() }),
+    };
+    Ok(Still { origin: facts.origin, ..read_picture(path)?.into_still(spp) })
 }

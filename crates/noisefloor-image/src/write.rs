@@ -2,6 +2,7 @@
 
 use crate::atomic::write_atomic;
 use crate::error::WriteError;
+use crate::facts::{SampleFacts, sample_attributes};
 use exr::prelude::{
     AnyChannel, AnyChannels, Blocks, Compression, Encoding, FlatSamples, Image, Layer, LayerAttributes,
     LineOrder, Text, WritableImage,
@@ -33,12 +34,15 @@ pub struct RenderLayers<'a> {
     /// How visible the noise is, in 8-bit display steps; written as floats `oracle.visible_noise`. NaN
     /// without evidence.
     pub visible_noise: Option<&'a [f32]>,
+    /// How many samples, and from where; written as attributes that [`read_facts`](crate::read_facts) reads.
+    pub facts: Option<&'a SampleFacts>,
 }
 
 impl<'a> RenderLayers<'a> {
     /// A picture without further layers.
     pub fn rgb(width: usize, height: usize, rgb: &'a [Rgb]) -> Self {
-        Self { width, height, rgb, spp: None, probability: None, stopped: None, visible_noise: None }
+        let (probability, visible_noise) = (None, None);
+        Self { width, height, rgb, spp: None, probability, stopped: None, visible_noise, facts: None }
     }
 }
 
@@ -82,8 +86,11 @@ pub fn write_exr(path: impl AsRef<Path>, layers: &RenderLayers<'_>) -> Result<()
         channels.push(AnyChannel::new("oracle.visible_noise", FlatSamples::F32(noise.to_vec())));
     }
 
-    let attributes =
-        LayerAttributes { software_name: Some(Text::from("noisefloor")), ..LayerAttributes::default() };
+    let attributes = LayerAttributes {
+        software_name: Some(Text::from("noisefloor")),
+        other: layers.facts.map(sample_attributes).unwrap_or_default(),
+        ..LayerAttributes::default()
+    };
     let encoding = Encoding {
         compression: Compression::ZIP16,
         blocks: Blocks::ScanLines,

@@ -11,10 +11,11 @@
 //! | [`LuxCoreHalt`] | `luxcore:0.35` | few displayed pixels have changed (LuxCoreRender) |
 //! | [`Myszkowski1998`] | `vdp-stages:0.55` | nobody sees a difference between successive stages |
 //! | [`Takouachet2007`] | `vdp-first:0.66` | the difference from the first, noisy picture stops growing |
+//! | [`ConvergedCvvdp`] | `cvvdp:0.1` | it hardly differs from the *converged* picture: a yardstick |
 //!
 //! [`parse`] makes a criterion from such a spec; [`RIVALS`] lists those with one open constant, to be fitted
-//! to data. [`Vdp`] is Daly's visible differences predictor; [`metrics`] has relMSE and PSNR, and FLIP and
-//! butteraugli behind features of these names.
+//! to data. [`Vdp`] is Daly's visible differences predictor; [`metrics`] has ColorVideoVDP, relMSE and PSNR,
+//! and FLIP and butteraugli behind features of these names.
 //!
 //! # Pixels and tiles
 //! Renderers that judge pixels sample pixels. Here, as for noisefloor's oracle, a tile is sampled as a whole
@@ -55,6 +56,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod converged;
 mod cycles;
 mod dammertz;
 mod luxcore;
@@ -71,6 +73,7 @@ mod tests;
 mod time;
 mod vdp;
 
+pub use converged::ConvergedCvvdp;
 pub use cycles::CyclesAdaptive;
 pub use dammertz::Dammertz;
 pub use luxcore::LuxCoreHalt;

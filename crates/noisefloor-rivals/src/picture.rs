@@ -1,6 +1,7 @@
 //! Pictures in, maps of differences out.
 
 use noisefloor::{Rgb, TileError, check_image};
+use noisefloor_vision::VisionError;
 use std::ops::RangeInclusive;
 use thiserror::Error;
 
@@ -49,6 +50,21 @@ pub enum MetricError {
         /// Its reason.
         why: String,
     },
+    /// A pixel is not finite.
+    #[error(
+        "pixel ({x}, {y}) of the {picture} is not finite; repair the render or paint over the pixel first"
+    )]
+    NotFinite {
+        /// `"picture"` or `"reference"`.
+        picture: &'static str,
+        /// Its column.
+        x: usize,
+        /// Its row.
+        y: usize,
+    },
+    /// ColorVideoVDP cannot compare them.
+    #[error("ColorVideoVDP: {0}")]
+    Vision(#[from] VisionError),
     /// The resolution of the viewing condition is out of range.
     #[error(
         "the resolution must be {least} to {most} pixels per degree of the visual field, not {0}",

@@ -1,8 +1,8 @@
 //! Criteria by name.
 
 use crate::{
-    CyclesAdaptive, Dammertz, LuxCoreHalt, Myszkowski1998, RelativeError, Takouachet2007, TimeLimit, cycles,
-    dammertz, luxcore, relative_error, stages,
+    ConvergedCvvdp, CyclesAdaptive, Dammertz, LuxCoreHalt, Myszkowski1998, RelativeError, Takouachet2007,
+    TimeLimit, converged, cycles, dammertz, luxcore, relative_error, stages,
 };
 use noisefloor::{FixedSpp, StoppingCriterion};
 use thiserror::Error;
@@ -27,6 +27,9 @@ pub struct Rival {
     pub range: (f64, f64),
     /// The criterion with its constant.
     pub make: fn(f64) -> Box<dyn StoppingCriterion + Send>,
+    /// Whether it compares with the converged picture, which it takes as the session's reference: for
+    /// comparison only.
+    pub against_converged: bool,
     /// Whether the probability of its verdicts is one minus the smallest constant at which the tile would be
     /// done: one run then covers all constants.
     pub tells: bool,
@@ -48,6 +51,7 @@ pub const RIVALS: &[Rival] = &[
         default: DEFAULT_SAMPLES,
         range: (100_000.0, 2.0),
         make: |samples| Box::new(FixedSpp(samples.round() as u64)),
+        against_converged: false,
         tells: false,
         valid: |samples| (1.0..=1e15).contains(&samples),
         wanted: "a number of samples per pixel, at least 1",
@@ -58,6 +62,7 @@ pub const RIVALS: &[Rival] = &[
         default: relative_error::DEFAULT_ERROR,
         range: (1e-3, 1.0),
         make: |error| Box::new(RelativeError::new(error)),
+        against_converged: false,
         tells: false,
         valid: |error| error > 0.0,
         wanted: POSITIVE,
@@ -68,6 +73,7 @@ pub const RIVALS: &[Rival] = &[
         default: dammertz::DEFAULT_STOP,
         range: (1e-5, 0.1),
         make: |stop| Box::new(Dammertz::new(stop)),
+        against_converged: false,
         tells: false,
         valid: |stop| stop > 0.0,
         wanted: POSITIVE,
@@ -78,6 +84,7 @@ pub const RIVALS: &[Rival] = &[
         default: cycles::DEFAULT_THRESHOLD,
         range: (1e-4, 1.0),
         make: |threshold| Box::new(CyclesAdaptive::new(threshold)),
+        against_converged: false,
         tells: false,
         valid: |threshold| threshold > 0.0,
         wanted: POSITIVE,
@@ -88,6 +95,7 @@ pub const RIVALS: &[Rival] = &[
         default: luxcore::DEFAULT_SHARE,
         range: (1e-4, 1.0),
         make: |share| Box::new(LuxCoreHalt::new(share)),
+        against_converged: false,
         tells: false,
         valid: |share| share > 0.0 && share <= 1.0,
         wanted: SHARE,
@@ -98,6 +106,7 @@ pub const RIVALS: &[Rival] = &[
         default: stages::DEFAULT_SEEN,
         range: (1e-4, 0.999),
         make: |probability| Box::new(Myszkowski1998::new(probability)),
+        against_converged: false,
         tells: true,
         valid: |probability| probability > 0.0 && probability < 1.0,
         wanted: PROBABILITY,
@@ -108,9 +117,21 @@ pub const RIVALS: &[Rival] = &[
         default: stages::DEFAULT_GROWTH,
         range: (1e-4, 0.999),
         make: |probability| Box::new(Takouachet2007::new(probability)),
+        against_converged: false,
         tells: true,
         valid: |probability| probability > 0.0 && probability < 1.0,
         wanted: PROBABILITY,
+    },
+    Rival {
+        name: "cvvdp",
+        title: "ColorVideoVDP, against the converged picture",
+        default: converged::DEFAULT_LOST,
+        range: (1e-3, 3.0),
+        make: |lost| Box::new(ConvergedCvvdp::new(lost)),
+        against_converged: true,
+        tells: false,
+        valid: |lost| lost > 0.0,
+        wanted: POSITIVE,
     },
 ];
 
@@ -146,7 +167,7 @@ fn known() -> String {
 /// Makes a criterion of a spec: a name, and after a colon its constant, or the default without one;
 /// `spp` needs its number.
 /// `"spp:256"`, `"time:30"` (seconds), `"relative-error:0.19"`, `"dammertz:0.003"`, `"cycles:0.01"`,
-/// `"luxcore:0.35"`, `"vdp-stages:0.55"`, `"vdp-first:0.66"`.
+/// `"luxcore:0.35"`, `"vdp-stages:0.55"`, `"vdp-first:0.66"`, `"cvvdp:0.1"`.
 ///
 /// # Errors
 /// [`SpecError`] if the name is unknown or the criterion does not accept the number.
@@ -187,6 +208,7 @@ mod tests {
             ("luxcore:1e-2", "LuxCore, 0.01 of the pixels"),
             ("vdp-stages:0.6", "Myszkowski 1998, P 0.6"),
             ("vdp-first", "Takouachet et al. 2007, P 0.66"),
+            ("cvvdp:0.5", "ColorVideoVDP against the converged picture, 0.5 JOD"),
         ] {
             assert_eq!(parse(spec).unwrap().name(), name, "{spec}");
         }

@@ -1,6 +1,7 @@
 //! From linear radiance to what a screen shows: exposure, tone mapping, sRGB encoding, luminance.
 
 use crate::rgb::Rgb;
+use crate::tone_curve::ToneCurve;
 use multiversion::multiversion;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
@@ -68,6 +69,13 @@ pub enum ToneMapping {
         /// Factor on linear radiance, above 0; 1 shows radiance 1 as white.
         exposure: f32,
     },
+    /// A function of the caller's own, such as a LUT.
+    Custom {
+        /// Factor on linear radiance, above 0, before the function.
+        exposure: f32,
+        /// From exposed radiance to display values.
+        curve: ToneCurve,
+    },
 }
 
 impl Default for ToneMapping {
@@ -76,22 +84,35 @@ impl Default for ToneMapping {
     }
 }
 
-/// A tone mapping parameter that is not a positive finite number.
+/// A tone mapping that cannot be used.
 #[derive(Debug, Error, Clone, Copy, PartialEq)]
-#[error("{name} must be a positive finite number, not {value}")]
-pub struct ToneMappingError {
-    name: &'static str,
-    value: f32,
+#[non_exhaustive]
+pub enum ToneMappingError {
+    /// A parameter is not a positive finite number.
+    #[error("{name} must be a positive finite number, not {value}")]
+    Number {
+        /// The parameter.
+        name: &'static str,
+        /// Its value.
+        value: f32,
+    },
+    /// A curve was read from a file, which cannot hold its function.
+    #[error("a tone curve that comes from a file has lost its function: make it again with ToneCurve::new")]
+    Incomplete,
 }
 
 impl ToneMapping {
     /// Checks the parameters.
     ///
     /// # Errors
-    /// [`ToneMappingError`] if one is not a positive finite number.
+    /// [`ToneMappingError`] if one is not a positive finite number, or a curve has lost its function.
     pub fn check(&self) -> Result<(), ToneMappingError> {
         let positive = |name, value: f32| {
-            if value.is_finite() && value > 0.0 { Ok(()) } else { Err(ToneMappingError { name, value }) }
+            if value.is_finite() && value > 0.0 {
+                Ok(())
+            } else {
+                Err(ToneMappingError::Number { name, value })
+            }
         };
         match *self {
             Self::Reinhard { key, white } => {
@@ -99,6 +120,8 @@ impl ToneMapping {
                 white.map_or(Ok(()), |w| positive("the white point of Reinhard tone mapping", w))
             }
             Self::Srgb { exposure } => positive("the sRGB exposure", exposure),
+            Self::Custom { curve, .. } if !curve.is_complete() => Err(ToneMappingError::Incomplete),
+            Self::Custom { exposure, .. } => positive("the exposure of a tone curve", exposure),
         }
     }
 
@@ -112,6 +135,7 @@ impl ToneMapping {
                 Display { exposure, curve: Curve::Reinhard { white } }
             }
             Self::Srgb { exposure } => Display { exposure, curve: Curve::Clamp },
+            Self::Custom { exposure, curve } => Display { exposure, curve: Curve::Custom(curve) },
         }
     }
 }
@@ -132,6 +156,7 @@ fn log_average(pixels: &[Rgb]) -> Option<f64> {
 enum Curve {
     Clamp,
     Reinhard { white: Option<f32> },
+    Custom(ToneCurve),
 }
 
 impl Curve {
@@ -139,7 +164,7 @@ impl Curve {
     #[inline(always)]
     fn terms(self) -> (f32, f32) {
         match self {
-            Self::Clamp => (0.0, 0.0),
+            Self::Clamp | Self::Custom(_) => (0.0, 0.0),
             // A white point near 0 makes all white but black.
             Self::Reinhard { white } => (white.map_or(0.0, |w| (1.0 / (w * w)).min(f32::MAX)), 1.0),
         }
@@ -174,6 +199,20 @@ impl Display {
     /// Linear radiance → linear display values in [0, 1]. Negative radiance shows as black.
     #[inline(always)]
     pub fn map(&self, pixel: Rgb) -> Rgb {
+        match self.curve {
+            Curve::Custom(curve) => curve.show(self.expose(pixel)).map(srgb_decode),
+            _ => self.map_plain(pixel),
+        }
+    }
+
+    /// Radiance that a curve can take: finite, and not negative.
+    fn expose(&self, pixel: Rgb) -> Rgb {
+        pixel.map(|c| (c * self.exposure).max(0.0).min(f32::MAX))
+    }
+
+    /// [`Display::map`] of the curves that this crate has.
+    #[inline(always)]
+    fn map_plain(&self, pixel: Rgb) -> Rgb {
         let exposed = pixel.map(|c| (c * self.exposure).max(0.0));
         let l = luminance(exposed).min(1e30);
         // eq. 4; without a white point eq. 3. Colours keep their ratios: L_d / L.
@@ -185,7 +224,28 @@ impl Display {
     /// Linear radiance → display-encoded sRGB in [0, 1].
     #[inline(always)]
     pub fn encode(&self, pixel: Rgb) -> Rgb {
-        self.map(pixel).map(srgb_encode)
+        match self.curve {
+            Curve::Custom(curve) => curve.show(self.expose(pixel)),
+            _ => self.encode_plain(pixel),
+        }
+    }
+
+    /// [`Display::encode`] of the curves that this crate has.
+    #[inline(always)]
+    fn encode_plain(&self, pixel: Rgb) -> Rgb {
+        self.map_plain(pixel).map(srgb_encode)
+    }
+
+    /// The same display with the function of `tone`, if it has lost its own in a file. `None` if its own is
+    /// another one.
+    pub(crate) fn completed_by(self, tone: ToneMapping) -> Option<Self> {
+        match (self.curve, tone) {
+            (Curve::Custom(lost), ToneMapping::Custom { curve, .. }) if lost == curve => {
+                Some(Self { curve: Curve::Custom(curve), ..self })
+            }
+            (Curve::Custom(_), _) => None,
+            _ => Some(self),
+        }
     }
 
     /// Linear radiance → display-encoded Rec.709 luminance in [0, 1]: the plane that observers are modelled
@@ -200,6 +260,10 @@ impl Display {
 /// agree to the bit.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx2", "x86_64+avx2"))]
 pub(crate) fn luma_row(display: &Display, linear: &[Rgb], shown: &mut [f32]) {
+    if let Curve::Custom(_) = display.curve {
+        shown.iter_mut().zip(linear).for_each(|(shown, &pixel)| *shown = display.luma(pixel));
+        return;
+    }
     // Channel by channel, as vector instructions want it; few enough to stay in the nearest cache
     const PIXELS: usize = 128;
     let mut channels = [[0.0; PIXELS]; 3];
@@ -209,7 +273,7 @@ pub(crate) fn luma_row(display: &Display, linear: &[Rgb], shown: &mut [f32]) {
             [*r, *g, *b] = *pixel;
         }
         for (((shown, r), g), b) in shown.iter_mut().zip(r).zip(g).zip(b) {
-            *shown = display.luma([*r, *g, *b]);
+            *shown = luminance(display.encode_plain([*r, *g, *b]));
         }
     }
 }
@@ -228,6 +292,20 @@ mod tests {
         let display = Display { exposure: 1.0, curve: Curve::Reinhard { white: Some(3.0) } };
         assert!((display.map([3.0; 3])[0] - 1.0).abs() < 1e-6);
         assert!((Display::SRGB.luma([1.0; 3]) - 1.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn a_curve_of_the_caller_s_own_shows_what_it_says() {
+        let curve = ToneCurve::new(b"root", &|exposed| exposed.map(f32::sqrt));
+        let tone = ToneMapping::Custom { exposure: 4.0, curve };
+        assert_eq!(tone.check(), Ok(()));
+        let display = tone.settle(&[[7.0; 3]]);
+        // √(4·0.0625) = ½ on the screen, and 1 from 0.25
+        assert_eq!(display.encode([0.0625, 0.25, -1.0]), [0.5, 1.0, 0.0]);
+        assert!((display.luma([0.0625; 3]) - 0.5).abs() < 1e-6);
+        assert!((display.map([0.0625; 3])[0] - srgb_decode(0.5)).abs() < 1e-6);
+        assert_eq!(display.encode([f32::INFINITY, f32::NAN, f32::MAX]), [1.0, 0.0, 1.0]);
+        assert!(ToneMapping::Custom { exposure: 0.0, curve }.check().is_err());
     }
 
     #[test]
@@ -270,7 +348,9 @@ mod tests {
         for width in [1, 7, 8, 127, 128, 129, 300] {
             let row: Vec<Rgb> =
                 (0..width).map(|i| [radiance(i), radiance(2 * i + 1), radiance(3 * i + 5)]).collect();
-            for tone in [ToneMapping::default(), ToneMapping::Srgb { exposure: 2.0 }] {
+            let curve = ToneCurve::new(b"root", &|exposed| exposed.map(f32::sqrt));
+            let custom = ToneMapping::Custom { exposure: 2.0, curve };
+            for tone in [ToneMapping::default(), ToneMapping::Srgb { exposure: 2.0 }, custom] {
                 let (display, mut shown) = (tone.settle(&row), vec![0.0; width]);
                 luma_row(&display, &row, &mut shown);
                 let one_by_one: Vec<f32> = row.iter().map(|&pixel| display.luma(pixel)).collect();

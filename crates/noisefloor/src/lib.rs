@@ -43,6 +43,7 @@ mod mask;
 mod model;
 mod nested;
 mod oracle;
+mod origin;
 mod params;
 mod rgb;
 mod session;
@@ -53,6 +54,7 @@ mod svm;
 mod text;
 mod threshold;
 mod tile;
+mod tone_curve;
 
 pub use checkpoint::{Checkpoint, CheckpointError};
 pub use criterion::{CriterionError, FixedSpp, Needs, Resumable, StoppingCriterion, Verdict, View};
@@ -73,6 +75,7 @@ pub use ndarray;
 /// Viewing conditions are its types.
 pub use noisefloor_vision::{Viewing, ViewingError, ViewingParams, ViewingTextError};
 pub use oracle::Oracle;
+pub use origin::SampleOrigin;
 pub use params::{Audience, Params, ParamsError, Schedule};
 pub use rgb::Rgb;
 pub use session::{Session, SessionError};
@@ -91,3 +94,4 @@ pub use {linfa, linfa_svm};
 pub use tile::{
     DEFAULT_TILE, MAX_EDGE, MAX_PIXELS, MAX_TILE, MIN_TILE, Tile, TileError, TileGrid, check_image,
 };
+pub use tone_curve::ToneCurve;

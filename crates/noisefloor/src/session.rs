@@ -78,9 +78,9 @@ impl<C: StoppingCriterion> Session<C> {
         let first = params.schedule.next(params.min_spp.saturating_sub(1), None).min(params.max_spp);
         let tile = TileState { next: first, streak: 0, verdict: None, target: None, stop: None };
         let tiles = vec![tile; grid.len()];
-        // Plain sRGB does not depend on the picture; an exposure by log-average has to wait for one.
+        // Only an exposure by log-average depends on the picture, and has to wait for one
         let display = match params.tone_mapping {
-            ToneMapping::Srgb { .. } => Some(params.tone_mapping.settle(&[])),
+            ToneMapping::Srgb { .. } | ToneMapping::Custom { .. } => Some(params.tone_mapping.settle(&[])),
             ToneMapping::Reinhard { .. } => None,
         };
         Ok(Self { film, criterion, params, display, reference: None, displayed_reference: None, tiles })

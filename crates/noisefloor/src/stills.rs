@@ -6,6 +6,7 @@ use crate::display::{Display, ToneMapping};
 use crate::evidence::{Evidence, Rendering, Samples, TilePlanes};
 use crate::nested::shared_samples;
 use crate::oracle::Oracle;
+use crate::origin::SampleOrigin;
 use crate::rgb::Rgb;
 use crate::tile::{Tile, TileGrid};
 use noisefloor_vision::Viewing;
@@ -26,6 +27,8 @@ pub struct Still {
     pub display_referred: bool,
     /// Variance of the rounding of its display values; 0 for pictures in floating point.
     pub rounding: f32,
+    /// Where its samples come from, if its file says so.
+    pub origin: Option<SampleOrigin>,
 }
 
 /// Why pictures cannot be compared.
@@ -129,7 +132,8 @@ pub struct SnapshotPair<'a> {
 impl<'a> SnapshotPair<'a> {
     /// Compares a picture with others of the same view, as models with this evidence need it. Independent
     /// renderings are pooled; of nested ones and of references, the most informative is used. `samples` says
-    /// how the pictures were made; with `None` this is recognised from the pictures, where they show it.
+    /// how the pictures were made; with `None`, their origins tell, and where these do not, it is recognised
+    /// from the pictures, where they show it.
     ///
     /// # Errors
     /// [`StillError`] if they do not fit, or there is nothing to hold the picture against.
@@ -224,11 +228,15 @@ impl<'a> SnapshotPair<'a> {
     }
 }
 
-/// Whether the pictures share samples, as far as they show it: one that does not show it must not be guessed.
+/// Whether the pictures share samples, as far as their origins say or they show it: never a guess.
 fn recognise(image: &Still, others: &[&Still], display: &Display) -> Result<Samples, StillError> {
     let told: Vec<Option<Samples>> = others
         .iter()
-        .map(|other| shared_samples(image.size, image.rendering(), other.rendering(), display))
+        .map(|other| {
+            let said = image.origin.as_ref().zip(other.origin.as_ref());
+            let said = said.and_then(|(origin, other)| origin.relation(other));
+            said.or_else(|| shared_samples(image.size, image.rendering(), other.rendering(), display))
+        })
         .collect();
     if told.contains(&Some(Samples::Nested)) {
         return Ok(Samples::Nested);

@@ -1,7 +1,9 @@
 //! `noisefloor compare`.
 
-use super::oracle::{OracleArgs, ToneArgs};
+use super::oracle::OracleArgs;
 use super::renderer::RendererArgs;
+use super::tone::ToneArgs;
+use super::viewing::ViewingArgs;
 use clap::Args;
 use noisefloor::DEFAULT_TILE;
 use std::path::PathBuf;
@@ -14,7 +16,8 @@ use std::path::PathBuf;
 ///
 /// Criteria: `oracle`; `spp:N`; `relative-error`, `dammertz`, `cycles`, `luxcore`, `vdp-stages`,
 /// `vdp-first`, each with a constant of its own (`cycles:0.02`) or with a default: Blender's 0.01 for
-/// `cycles`, and for the others the one that agrees with people on average.
+/// `cycles`, and for the others the one that agrees with people on average. `cvvdp:JODS` stops a tile that
+/// has lost at most so many JODs against the converged picture: a yardstick that no render has.
 ///
 /// Writes into the output folder: index.html with everything (one file that opens without a server),
 /// runs.csv, runs.json, and for each scene curve.csv, tiles.csv, plots (SVG and PNG), crops with error
@@ -68,6 +71,8 @@ pub struct CompareArgs {
     /// Viewing distance, for FLIP: pixels per degree of the field of view.
     #[arg(long, value_name = "N", default_value_t = 67.0)]
     pixels_per_degree: f64,
+    #[command(flatten)]
+    viewing: ViewingArgs,
     /// No progress bar and no table.
     #[arg(long, short)]
     quiet: bool,
@@ -84,12 +89,12 @@ mod check {
     impl CompareArgs {
         /// A comparison that can begin.
         pub fn check(self) -> anyhow::Result<CompareJob> {
-            let params = self.params()?;
             if self.reference.is_some() && self.scenes.len() > 1 {
                 bail!("--reference is of one scene, but {} are given", self.scenes.len());
             }
             // What is wrong with a criterion is found before the reference is rendered.
             let oracle = self.oracle.check()?;
+            let params = self.params(&oracle)?;
             let specs = self.specs();
             for spec in &specs {
                 criterion(spec, &oracle)?;
@@ -110,10 +115,11 @@ mod check {
         }
 
         /// Session parameters, checked.
-        fn params(&self) -> anyhow::Result<Params> {
+        fn params(&self, oracle: &Oracle) -> anyhow::Result<Params> {
             let params = Params {
                 tile: self.tile,
                 tone_mapping: self.tone.check()?,
+                viewing: self.viewing.of(oracle),
                 schedule: Schedule::Every { step: self.batch },
                 max_spp: self.max_spp,
                 ..Params::default()

@@ -1,6 +1,7 @@
 //! Options about human thresholds, and about training on them.
 
 use super::oracle::EvidenceChoice;
+use super::viewing::ViewingArgs;
 use clap::Args;
 use std::path::PathBuf;
 
@@ -25,6 +26,8 @@ pub struct SearchArgs {
     /// What tiles are compared with (for --corpus; a table has its own).
     #[arg(long, value_enum, default_value_t = EvidenceChoice::Halves)]
     pub(super) evidence: EvidenceChoice,
+    #[command(flatten)]
+    pub(super) viewing: ViewingArgs,
     /// Values of C to choose from [default: a grid].
     #[arg(long, value_delimiter = ',', value_name = "C,…")]
     pub(super) c: Vec<f64>,
@@ -56,7 +59,8 @@ mod checks {
             None => DataSource::Corpora(data.corpus),
         };
         let descriptor = Descriptor::compact(mask);
-        Ok((DataJob { source, descriptor, evidence: search.evidence.into() }, params))
+        let viewing = search.viewing.or_default();
+        Ok((DataJob { source, descriptor, evidence: search.evidence.into(), viewing }, params))
     }
 
     fn candidates(search: &SearchArgs) -> anyhow::Result<TrainParams> {

@@ -46,8 +46,9 @@ pub struct EvaluateArgs {
     #[arg(long, value_name = "NAME,…", value_delimiter = ',', requires = "leave_one_scene_out")]
     without: Vec<String>,
     /// Also score what people use instead: other stopping criteria, by the names in `noisefloor compare
-    /// --help`, each with a constant fitted on the other scenes. Takes minutes each; the
-    /// visible-differences predictors take an hour. With --figures, also plots mean thresholds scene by
+    /// --help`, each with a constant fitted on the other scenes. `cvvdp`
+    /// compares with the converged picture, for comparison only. Takes minutes each; the visible-differences
+    /// predictors take an hour. With --figures, also plots mean thresholds scene by
     /// scene. (Needs a build with the feature `lab`, and so does --figures.)
     #[arg(long, value_name = "NAME,…", value_delimiter = ',', requires = "corpus", value_parser = values::rival)]
     rivals: Vec<&'static Rival>,

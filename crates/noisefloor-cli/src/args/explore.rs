@@ -2,6 +2,7 @@
 
 use super::oracle::OracleArgs;
 use super::values;
+use super::viewing::ViewingArgs;
 use clap::Args;
 use noisefloor::{Audience, DEFAULT_TILE};
 use std::net::SocketAddr;
@@ -23,12 +24,14 @@ use std::path::PathBuf;
   noisefloor explore a_256spp.exr b_256spp.exr --table fixtures/human-table.csv      and retrain on the page
   noisefloor train --table fixtures/human-table.csv --disagreements explore.sqlite --out mine.nfm")]
 pub struct ExploreArgs {
-    /// Pictures to begin with. Names such as 00100.png or hall_64spp.exr say how many samples per pixel
-    /// they have; otherwise the page asks.
+    /// Pictures to begin with. EXRs of `render` say how many samples per pixel they have, and so do names
+    /// such as 00100.png or hall_64spp.exr; otherwise the page asks.
     #[arg(value_name = "IMAGE")]
     images: Vec<PathBuf>,
     #[command(flatten)]
     oracle: OracleArgs,
+    #[command(flatten)]
+    viewing: ViewingArgs,
     /// For whom: `observers`, `art-students`, or a,b for T' = a T + b.
     #[arg(long, default_value = "observers", value_name = "WHO", value_parser = values::audience)]
     audience: Audience,
@@ -59,6 +62,7 @@ impl ExploreArgs {
             model: oracle.model().clone(),
             threshold: oracle.threshold(),
             audience: self.audience,
+            viewing: self.viewing.judged_by(&oracle)?,
             tile: self.tile,
             database: self.database,
             table: self.table.as_deref().map(crate::learning::read_table_file).transpose()?,

@@ -1,6 +1,8 @@
 //! `noisefloor judge`.
 
-use super::oracle::{OracleArgs, ToneArgs};
+use super::oracle::OracleArgs;
+use super::tone::ToneArgs;
+use super::viewing::ViewingArgs;
 use crate::judge::JudgeJob;
 use anyhow::bail;
 use clap::Args;
@@ -13,11 +15,13 @@ use std::path::PathBuf;
 /// other samples. Several are pooled. The verdict is on IMAGE only: its noise follows from the difference
 /// and the sample counts. PNGs are judged as they are; EXRs are tone mapped first.
 ///
-/// Two snapshots of one progressive rendering share samples. If the pictures show it, the verdict takes it
-/// into account, and a note says so; --nested and --independent override this.
+/// Two snapshots of one progressive rendering share samples. If the files say so (those of `render` do) or
+/// the pictures show it, the verdict takes it into account, and a note says so. If neither tells, the
+/// command asks for --nested or --independent, which also override what it finds.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   noisefloor judge a.exr --spp 256 --against b.exr --spp 256       two independent renderings
+  noisefloor judge out/a/image.exr --against out/b/image.exr       of `render`: the files say the rest
   noisefloor judge 00100.png --spp 100 --against 00900.png --spp 900 --nested --heat-map verdict.png
   noisefloor judge a.exr --spp 64 --against b.exr --spp 64 --noise-map noise.png
   noisefloor judge a.exr --spp 64 --against b.exr --spp 64 --json > verdicts.json")]
@@ -25,8 +29,9 @@ pub struct JudgeArgs {
     /// Picture to judge, PNG or EXR.
     #[arg(value_name = "IMAGE")]
     image: PathBuf,
-    /// Samples per pixel: first of IMAGE, then of each --against, in their order.
-    #[arg(long, required = true, value_name = "N")]
+    /// Samples per pixel: first of IMAGE, then of each --against, in their order [default: what the EXR files
+    /// say, as those of `render --criterion spp:N` and of pbrt do].
+    #[arg(long, value_name = "N")]
     spp: Vec<f64>,
     /// Another rendering of the same view. Repeat for more.
     #[arg(long, required = true, value_name = "IMAGE")]
@@ -42,6 +47,8 @@ pub struct JudgeArgs {
     oracle: OracleArgs,
     #[command(flatten)]
     tone: ToneArgs,
+    #[command(flatten)]
+    viewing: ViewingArgs,
     /// Tile edge in pixels, 16…512.
     #[arg(long, default_value_t = DEFAULT_TILE, value_name = "PIXELS")]
     tile: usize,
@@ -63,13 +70,14 @@ impl JudgeArgs {
     pub fn check(self) -> anyhow::Result<JudgeJob> {
         let tone = self.tone.check()?;
         let oracle = self.oracle.check()?;
+        let viewing = self.viewing.judged_by(&oracle)?;
         if oracle.model().evidence() != Evidence::Halves {
             bail!(
                 "this model does not compare tiles with other samples, as `judge` does: use one that was trained on half buffers"
             );
         }
         let pictures = 1 + self.against.len();
-        if self.spp.len() != pictures {
+        if !self.spp.is_empty() && self.spp.len() != pictures {
             bail!("--spp is needed once for each picture: {} given for {pictures} pictures", self.spp.len());
         }
         if self.noise_map.is_some() && oracle.just_visible().is_none() {
@@ -83,13 +91,16 @@ impl JudgeArgs {
             (_, true) => Some(Samples::Independent),
             _ => None,
         };
-        let against = self.against.into_iter().zip(self.spp[1..].iter().copied()).collect();
+        let mut counts = self.spp.into_iter().map(Some).chain(std::iter::repeat(None));
+        let image = (self.image, counts.next().flatten());
+        let against = self.against.into_iter().zip(counts).collect();
         Ok(JudgeJob {
-            image: (self.image, self.spp[0]),
+            image,
             against,
             samples,
             oracle,
             tone,
+            viewing,
             tile: self.tile,
             json: self.json,
             heat_map: self.heat_map,

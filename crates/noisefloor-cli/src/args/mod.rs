@@ -13,6 +13,7 @@ mod evaluate;
 mod explore;
 mod inspect;
 mod judge;
+mod metrics;
 mod oracle;
 mod reference;
 mod render;
@@ -20,8 +21,10 @@ mod renderer;
 mod reproduce;
 mod scenes;
 mod study;
+mod tone;
 mod train;
 mod values;
+mod viewing;
 
 pub use audience::AudienceArgs;
 pub use compare::CompareArgs;
@@ -30,6 +33,7 @@ pub use evaluate::EvaluateArgs;
 pub use explore::ExploreArgs;
 pub use inspect::InspectArgs;
 pub use judge::JudgeArgs;
+pub use metrics::MetricsArgs;
 pub use reference::ReferenceArgs;
 pub use render::RenderArgs;
 pub use reproduce::ReproduceArgs;
@@ -44,7 +48,7 @@ use clap::{Parser, Subcommand};
 /// noisefloor has learned from people when to stop: observers said at how many samples per pixel (spp) they
 /// could no longer tell parts of real renders from the converged picture. `render` stops each tile of the
 /// built-in path tracer, or of another renderer. `judge` and `explore` look at pictures rendered elsewhere.
-/// `train` and `evaluate` make models and score them.
+/// `metrics` compares a picture with its reference. `train` and `evaluate` make models and score them.
 #[derive(Debug, Parser)]
 #[command(
     name = "noisefloor",
@@ -65,6 +69,7 @@ pub enum Command {
     Reference(ReferenceArgs),
     Compare(Box<CompareArgs>),
     Judge(JudgeArgs),
+    Metrics(MetricsArgs),
     Explore(ExploreArgs),
     Train(TrainArgs),
     Evaluate(EvaluateArgs),

@@ -1,8 +1,8 @@
-//! Options about the model, and about the way from radiance to the screen.
+//! Options about the model.
 
-use anyhow::{Context, bail};
+use anyhow::Context;
 use clap::{Args, ValueEnum};
-use noisefloor::{DEFAULT_KEY, Evidence, Model, Oracle, Threshold, ToneMapping};
+use noisefloor::{Evidence, Model, Oracle, Threshold};
 use std::fs::File;
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
@@ -17,31 +17,6 @@ pub struct OracleArgs {
     /// stop later.
     #[arg(long, default_value_t = Threshold::PAPER, value_name = "P")]
     pub threshold: Threshold,
-}
-
-/// From radiance to the screen.
-#[derive(Debug, Args)]
-pub struct ToneArgs {
-    /// Tone mapping of linear pictures.
-    #[arg(long, value_enum, default_value_t = ToneChoice::Reinhard)]
-    tone_mapping: ToneChoice,
-    /// Reinhard: what the log-average luminance becomes [default: 0.18].
-    #[arg(long)]
-    key: Option<f32>,
-    /// Reinhard: the smallest luminance, after exposure, that becomes white [default: none burns out].
-    #[arg(long)]
-    white: Option<f32>,
-    /// sRGB: factor on radiance [default: 1].
-    #[arg(long)]
-    exposure: Option<f32>,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum ToneChoice {
-    /// Reinhard et al. 2002, global operator.
-    Reinhard,
-    /// Multiply, clamp, encode.
-    Srgb,
 }
 
 /// What a tile is compared with.
@@ -78,27 +53,4 @@ pub(super) fn load_model(path: Option<&Path>) -> anyhow::Result<Model> {
     let Some(path) = path else { return Ok(Model::bundled()) };
     let file = File::open(path).with_context(|| format!("{}: cannot be opened", path.display()))?;
     Model::read(BufReader::new(file)).with_context(|| format!("{}", path.display()))
-}
-
-impl ToneArgs {
-    /// The tone mapping, checked.
-    pub fn check(&self) -> anyhow::Result<ToneMapping> {
-        let (other, ignored) = match self.tone_mapping {
-            ToneChoice::Reinhard => ("srgb", [("--exposure", self.exposure.is_some()), ("", false)]),
-            ToneChoice::Srgb => {
-                ("reinhard", [("--key", self.key.is_some()), ("--white", self.white.is_some())])
-            }
-        };
-        if let Some((option, _)) = ignored.iter().find(|(_, given)| *given) {
-            bail!("{option} needs --tone-mapping {other}");
-        }
-        let tone = match self.tone_mapping {
-            ToneChoice::Reinhard => {
-                ToneMapping::Reinhard { key: self.key.unwrap_or(DEFAULT_KEY), white: self.white }
-            }
-            ToneChoice::Srgb => ToneMapping::Srgb { exposure: self.exposure.unwrap_or(1.0) },
-        };
-        tone.check()?;
-        Ok(tone)
-    }
 }

@@ -1,8 +1,10 @@
 //! `noisefloor render`.
 
-use super::oracle::{OracleArgs, ToneArgs};
+use super::oracle::OracleArgs;
 use super::renderer::RendererArgs;
+use super::tone::ToneArgs;
 use super::values;
+use super::viewing::ViewingArgs;
 use crate::render::{Judge, RenderJob};
 use anyhow::bail;
 use clap::{Args, ValueEnum};
@@ -48,6 +50,8 @@ pub struct RenderArgs {
     oracle: OracleArgs,
     #[command(flatten)]
     tone: ToneArgs,
+    #[command(flatten)]
+    viewing: ViewingArgs,
     /// Tile edge in pixels, 16…512.
     #[arg(long, default_value_t = DEFAULT_TILE, value_name = "PIXELS")]
     tile: usize,
@@ -112,6 +116,9 @@ fn criterion(text: &str) -> Result<CriterionChoice, String> {
             _ => Err(format!("spp:{n} needs a positive whole number of samples, as in spp:1000")),
         },
         _ => match noisefloor_rivals::parse(text) {
+            Ok(criterion) if criterion.needs().reference => Err(format!(
+                "{text} compares with the converged picture, which no render has; it is for `compare`"
+            )),
             Ok(_) => Ok(CriterionChoice::Rival(text.to_owned())),
             Err(error) => Err(format!("{error}; or `oracle`")),
         },
@@ -121,12 +128,16 @@ fn criterion(text: &str) -> Result<CriterionChoice, String> {
 impl RenderArgs {
     /// A render that can begin.
     pub fn check(self) -> anyhow::Result<RenderJob> {
-        let params = self.params()?;
+        let mut params = self.params()?;
         let judge = match self.criterion {
             CriterionChoice::Rival(spec) if self.resume => {
                 bail!("--resume does not work with --criterion {spec}, whose state is not kept; leave it out")
             }
-            CriterionChoice::Oracle => Judge::Oracle(Box::new(self.oracle.check()?)),
+            CriterionChoice::Oracle => {
+                let oracle = self.oracle.check()?;
+                params.viewing = self.viewing.judged_by(&oracle)?;
+                Judge::Oracle(Box::new(oracle))
+            }
             CriterionChoice::Fixed(samples) => Judge::Fixed(samples),
             CriterionChoice::Rival(spec) => Judge::Rival(spec),
         };
@@ -158,7 +169,7 @@ impl RenderArgs {
         let params = Params {
             tile: self.tile,
             tone_mapping: self.tone.check()?,
-            viewing: noisefloor::Viewing::default(),
+            viewing: self.viewing.or_default(),
             schedule,
             min_spp: self.min_spp.unwrap_or(0),
             max_spp,

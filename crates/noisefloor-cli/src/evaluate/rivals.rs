@@ -15,7 +15,8 @@ pub(super) fn rate(job: &EvaluateJob) -> anyhow::Result<Vec<RatedRival>> {
         return Ok(Vec::new());
     }
     let bars = Bars::new(false);
-    let rated = rivals::rate(job.data.corpora(), &job.rivals, &|advance| bars.show(advance))?;
+    let rated =
+        rivals::rate(job.data.corpora(), &job.rivals, job.data.viewing, &|advance| bars.show(advance))?;
     bars.finish();
     Ok(rated)
 }

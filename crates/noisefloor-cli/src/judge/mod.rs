@@ -4,23 +4,26 @@ mod report;
 
 use crate::say::note;
 use anyhow::Context;
-use noisefloor::{Evidence, Oracle, Samples, SnapshotPair, Still, Tile, TileGrid, ToneMapping, Verdict};
+use noisefloor::{
+    Evidence, Oracle, Samples, SnapshotPair, Still, Tile, TileGrid, ToneMapping, Verdict, Viewing,
+};
 use noisefloor_image::maps::{ColourScale, TileMark, draw_field, draw_tiles, noise_scale};
-use noisefloor_image::{RenderLayers, check_writable, read_picture, write_exr};
+use noisefloor_image::{RenderLayers, SampleFacts, check_writable, read_facts, read_still, write_exr};
 use report::Row;
 use std::path::{Path, PathBuf};
 
 /// Pictures to judge: checked.
 pub struct JudgeJob {
-    /// With its samples per pixel.
-    pub image: (PathBuf, f64),
-    /// At least one, with their samples per pixel.
-    pub against: Vec<(PathBuf, f64)>,
+    /// With its samples per pixel; without them, the file says how many.
+    pub image: (PathBuf, Option<f64>),
+    /// At least one, in the same way.
+    pub against: Vec<(PathBuf, Option<f64>)>,
     /// If the user says so.
     pub samples: Option<Samples>,
     /// Of a model that goes by halves; with a map of visible noise if one is to be drawn.
     pub oracle: Oracle,
     pub tone: ToneMapping,
+    pub viewing: Viewing,
     pub tile: usize,
     pub json: bool,
     pub heat_map: Option<PathBuf>,
@@ -43,20 +46,29 @@ pub fn run(job: &JudgeJob) -> anyhow::Result<()> {
 
     // Compare the picture with the others, and judge.
     let others: Vec<&Still> = others.iter().collect();
-    let held = SnapshotPair::new(Evidence::Halves, &image, &others, job.tone, job.samples)?;
+    let held =
+        SnapshotPair::new(Evidence::Halves, &image, &others, job.tone, job.samples)?.seen_on(job.viewing);
     if job.samples.is_none() && held.samples() == Samples::Nested {
         note!(
             "note: the pictures share samples, as snapshots of one rendering do, and are judged as --nested; --independent overrides this"
         );
     }
     let rows = judge(&job.oracle, grid, &held)?;
-    report::say_all((&job.image.0, job.image.1), &job.oracle, &rows, job.json)?;
+    report::say_all((&job.image.0, image.spp), &job.oracle, &rows, job.json)?;
     draw(job, &image, grid, &held, &rows)
 }
 
 /// A picture that can be judged; errors name it.
-fn read((path, spp): &(PathBuf, f64)) -> anyhow::Result<Still> {
-    let still = read_picture(path)?.into_still(*spp);
+fn read((path, spp): &(PathBuf, Option<f64>)) -> anyhow::Result<Still> {
+    let still = read_still(path, *spp)?;
+    if let (Some(typed), Some(said)) = (spp, read_facts(path)?.spp())
+        && *typed != said as f64
+    {
+        note!(
+            "note: {} says that it has {said} samples per pixel; --spp {typed} overrides it",
+            path.display()
+        );
+    }
     still.check().with_context(|| format!("{}", path.display()))?;
     Ok(still)
 }
@@ -118,9 +130,12 @@ fn write_channels(
     for row in rows {
         grid.tile(row.tile).rows(width).flatten().for_each(|pixel| probability[pixel] = row.probability);
     }
+    let spp = (image.spp.fract() == 0.0 && image.spp < 1e15).then_some(image.spp as u64);
+    let facts = SampleFacts { samples: spp.map(|spp| (spp, spp)), origin: image.origin.clone() };
     let layers = RenderLayers {
         probability: Some(&probability),
         visible_noise: noise,
+        facts: Some(&facts),
         ..RenderLayers::rgb(width, height, &image.pixels)
     };
     Ok(write_exr(path, &layers)?)

@@ -10,7 +10,9 @@ pub use summary::say_noise;
 use crate::files::{write_csv, write_json};
 use crate::sources::Source;
 use anyhow::Context;
-use noisefloor::{Checkpoint, Clock, Progress, Rgb, Session, Stop, StopReason, StoppingCriterion};
+use noisefloor::{
+    Checkpoint, Clock, Progress, Rgb, SampleOrigin, Session, Stop, StopReason, StoppingCriterion,
+};
 use noisefloor_image::{check_writable, write_atomic};
 use noisefloor_rivals::metrics::relative_mse;
 use report::Report;
@@ -46,6 +48,8 @@ pub struct Output {
     pub model: Option<ModelFacts>,
     /// To compare with: as many pixels as are rendered.
     pub reference: Option<Vec<Rgb>>,
+    /// Where the samples come from, for whoever compares the picture with another.
+    pub origin: Option<SampleOrigin>,
     timeline: Vec<TimelineRow>,
     seconds_before: f64,
 }
@@ -61,8 +65,8 @@ impl Output {
         })?;
         check_writable(folder.join("image.exr"))?;
         let (timeline, seconds_before) = (Vec::new(), 0.0);
-        let (model, reference) = (None, None);
-        Ok(Self { folder, scene, source, seed, model, reference, timeline, seconds_before })
+        let (model, reference, origin) = (None, None, None);
+        Ok(Self { folder, scene, source, seed, model, reference, origin, timeline, seconds_before })
     }
 
     /// The output folder, for people.

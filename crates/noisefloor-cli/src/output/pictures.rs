@@ -4,7 +4,7 @@ use super::Output;
 use super::tiles::{TileState, marks};
 use noisefloor::{Rgb, Session, StoppingCriterion};
 use noisefloor_image::maps::{Canvas, draw_field, draw_tiles, noise_scale};
-use noisefloor_image::{RenderLayers, write_exr};
+use noisefloor_image::{RenderLayers, SampleFacts, write_exr};
 
 impl Output {
     pub(super) fn write_pictures<C: StoppingCriterion>(
@@ -28,11 +28,15 @@ impl Output {
             }
         }
         let noise = session.visible_noise();
+        let counts = || tiles.iter().map(|tile| tile.stop.spp);
+        let samples = counts().min().zip(counts().max()).filter(|(fewest, _)| *fewest > 0);
+        let facts = SampleFacts { samples, origin: self.origin.clone() };
         let layers = RenderLayers {
             spp: Some(&spp),
             probability: Some(&probability),
             stopped: Some(&stopped),
             visible_noise: noise.as_deref(),
+            facts: Some(&facts),
             ..RenderLayers::rgb(width, height, &image)
         };
         write_exr(self.folder.join("image.exr"), &layers)?;

@@ -7,10 +7,10 @@ use crate::files::read_reference;
 use crate::output::{ModelFacts, Output};
 use crate::say::{note, one_line};
 use crate::signals::{AFTER_THIS_BATCH, INTERRUPTED, cancel_on_signal};
-use crate::sources::{Opened, SourceJob};
+use crate::sources::{Opened, SourceJob, SourceKind};
 use anyhow::bail;
 use noisefloor::{
-    Driver, DriverError, Event, FixedSpp, Oracle, Params, Repeats, Rgb, SourceInfo, StopReason,
+    Driver, DriverError, Event, FixedSpp, Oracle, Params, Repeats, Rgb, SampleOrigin, SourceInfo, StopReason,
     StoppingCriterion,
 };
 use std::path::PathBuf;
@@ -81,6 +81,19 @@ fn identity(job: &RenderJob, source: &str) -> String {
     format!("{source}, {scene}, seed {seed}, depth {max_depth:?}, {kind:?}")
 }
 
+/// Where samples come from, for the picture's file; none for pictures that are played back. Paths and command
+/// lines go in as a digest: pictures travel further than they should.
+fn origin(job: &SourceJob, scene: &str, info: &SourceInfo) -> Option<SampleOrigin> {
+    let SourceJob { kind, scene: typed, seed, max_depth, scene_files, .. } = job;
+    if matches!(kind, SourceKind::Exr) {
+        return None;
+    }
+    let all = format!("{typed:?}, {max_depth:?}, {kind:?}, {scene_files:?}");
+    let digest = blake3::hash(all.as_bytes()).to_hex();
+    let source = format!("{scene} by {}, options {}", info.name, &digest[..16]);
+    Some(SampleOrigin { source, seed: *seed, repeats: info.repeats == Repeats::Samples })
+}
+
 /// What a render is made of beside its driver.
 struct Rest<'a> {
     job: &'a RenderJob,
@@ -105,8 +118,9 @@ impl Rest<'_> {
             )
         }
         let folder = job.out.clone().unwrap_or_else(|| PathBuf::from("out").join(&scene));
+        let origin = origin(&job.source, &scene, &info);
         let mut output = Output::create(folder, scene, info.name, job.source.seed)?;
-        (output.model, output.reference) = (model, reference);
+        (output.model, output.reference, output.origin) = (model, reference, origin);
         if let Some(snapshots) = snapshots.as_ref().filter(|_| job.resume) {
             driver = snapshots.resume(driver, &mut output, job.quiet)?;
         }

@@ -57,6 +57,7 @@ fn pictures() {
         &["tile", "16…512"],
     );
     fail(&["judge", text(&a), "--spp", "9"], &["--against"]);
+    fail(&["judge", text(&a), "--against", text(&b)], &["a.exr", "--spp"]);
     let below = a.join("heat.png");
     let args = ["--heat-map", text(&below)];
     case.judge("a.exr", "b.exr", &[&SPP[..], &args].concat(), &["heat.png"]);

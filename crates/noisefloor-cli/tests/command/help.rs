@@ -3,7 +3,7 @@ use crate::kit::succeed;
 // Long: a list of cases
 #[test]
 fn every_subcommand_explains_itself() {
-    let options: [(&str, &[&str]); 12] = [
+    let options: [(&str, &[&str]); 13] = [
         ("reference", &["--out", "--size", "--seed", "--quiet"]),
         (
             "render",
@@ -37,6 +37,19 @@ fn every_subcommand_explains_itself() {
                 "--tone-mapping",
             ],
         ),
+        (
+            "metrics",
+            &[
+                "IMAGE",
+                "REFERENCE",
+                "--viewing",
+                "--map",
+                "--flip-map",
+                "--json",
+                "--tone-mapping",
+                "cvvdp_jod",
+            ],
+        ),
         ("explore", &["IMAGE", "--model", "--threshold", "--audience", "--database", "--table", "--listen"]),
         ("train", &["--corpus", "--table", "--out", "--save-table", "--sigma", "--disagreements"]),
         ("evaluate", &["--corpus", "--model", "--leave-one-scene-out", "--json", "--csv"]),
@@ -64,6 +77,8 @@ fn every_subcommand_explains_itself() {
         "--autosave",
         "--schedule",
         "--threshold",
+        "--viewing",
+        "--lut-input",
     ] {
         assert!(render.contains(option), "{option} is not in\n{render}");
     }

@@ -1,5 +1,5 @@
-use crate::kit::{grey_exr, run, stderr, succeed, text, tiny};
-use noisefloor_image::{Picture, read_exr, read_picture};
+use crate::kit::{fail, grey_exr, run, stderr, succeed, text, tiny};
+use noisefloor_image::{Picture, RenderLayers, SampleFacts, read_exr, read_facts, read_picture, write_exr};
 use serde_json::Value;
 use std::path::PathBuf;
 use tempfile::tempdir;
@@ -129,4 +129,72 @@ fn stages_of_one_rendering_are_told_from_independent_ones() {
     // Both see the same noise; taken for independent, the shared samples hide most of it.
     assert!((nested - independent).abs() < 0.15, "{nested} {independent}");
     assert!(verdict(&later, &["--independent"]).0 > nested + 0.1);
+}
+
+/// What `render` wrote says how many samples it has, and whether it shares them: nobody has to.
+#[test]
+fn our_own_files_say_what_they_are() {
+    let folder = tempdir().unwrap();
+    let render = |name: &str, seed: &str, spp: &str| {
+        let out = folder.path().join(name);
+        succeed(&tiny(text(&out), &["--seed", seed, "--criterion", spp]));
+        out.join("image.exr")
+    };
+    // Equal counts and a ratio of 25 show nothing, or too little, in pictures of 64×64 pixels
+    let (first, later) = (render("a", "1", "spp:8"), render("b", "1", "spp:200"));
+    let other = render("c", "2", "spp:200");
+    let judge = |against: &PathBuf, more: &[&str]| {
+        let output =
+            run(&[&["judge", text(&first), "--against", text(against), "--tile", "32", "--json"], more]
+                .concat());
+        (serde_json::from_slice::<Value>(&output.stdout), stderr(&output))
+    };
+    let probability = |report: &Value| report["tiles"][0]["probability"].as_f64().unwrap();
+    let (nested, said) = judge(&later, &[]);
+    let nested = nested.unwrap();
+    assert!(said.contains("share samples"), "{said}");
+    assert_eq!(nested["spp"].as_f64(), Some(8.0));
+    let (typed, said) = judge(&later, &["--spp", "8", "--spp", "200", "--nested"]);
+    assert!(said.is_empty() && probability(&typed.unwrap()) == probability(&nested), "{said}");
+    let (independent, said) = judge(&other, &[]);
+    assert!(said.is_empty(), "{said}");
+    let (typed, _) = judge(&other, &["--spp", "8", "--spp", "200", "--independent"]);
+    assert_eq!(probability(&typed.unwrap()), probability(&independent.unwrap()));
+
+    // What was typed counts, and is not passed over in silence
+    let (_, said) = judge(&other, &["--spp", "9", "--spp", "200"]);
+    assert!(said.contains("says that it has 8 samples") && said.contains("--spp 9"), "{said}");
+    let verdict = folder.path().join("verdict.exr");
+    assert!(judge(&other, &["--exr", text(&verdict)]).0.is_ok());
+    assert_eq!(read_facts(&verdict).unwrap(), read_facts(&first).unwrap());
+
+    // Tiles that stopped at different counts have none in common
+    let uneven = folder.path().join("uneven.exr");
+    let facts = SampleFacts { samples: Some((100, 200)), origin: None };
+    let rgb = read_exr(&other).unwrap().pixels;
+    write_exr(&uneven, &RenderLayers { facts: Some(&facts), ..RenderLayers::rgb(64, 64, &rgb) }).unwrap();
+    let (_, said) = judge(&uneven, &[]);
+    assert!(said.contains("100 to 200 samples") && said.contains("--spp"), "{said}");
+    let plain = folder.path().join("plain.exr");
+    grey_exr(&plain, (64, 64), 1, 0.4);
+    let (_, said) = judge(&plain, &[]);
+    assert!(said.contains("plain.exr") && said.contains("--spp"), "{said}");
+}
+
+/// Said or not, `desk` is where the bundled model takes people to have sat.
+#[test]
+fn viewing_conditions_are_said_and_checked() {
+    let folder = tempdir().unwrap();
+    let [a, b] = ["a.exr", "b.exr"].map(|name| folder.path().join(name));
+    grey_exr(&a, (32, 32), 1, 0.4);
+    grey_exr(&b, (32, 32), 2, 0.4);
+    let judge = |more: &[&str]| {
+        let pair = ["judge", text(&a), "--spp", "16", "--against", text(&b), "--spp", "16", "--json"];
+        succeed(&[&pair[..], &["--independent"], more].concat())
+    };
+    assert_eq!(judge(&["--viewing", "desk"]), judge(&[]));
+    assert_eq!(judge(&["--viewing", "standard_fhd"]), judge(&[]));
+    let pair = ["judge", text(&a), "--spp", "16", "--against", text(&b), "--spp", "16"];
+    fail(&[&pair[..], &["--viewing", "ppd=0"]].concat(), &["pixels per degree"]);
+    fail(&[&pair[..], &["--viewing", "bed"]].concat(), &["bed", "desk"]);
 }

@@ -31,6 +31,9 @@ mod learn;
 /// What a build leaves out.
 #[cfg(test)]
 mod left_out;
+/// Published metrics of two pictures.
+#[cfg(test)]
+mod metrics;
 /// The quick reference alone.
 #[cfg(test)]
 mod reference;
@@ -56,3 +59,6 @@ mod sources;
 #[cfg(test)]
 #[cfg(feature = "study")]
 mod study;
+/// What the screen shows: LUTs.
+#[cfg(test)]
+mod tone;

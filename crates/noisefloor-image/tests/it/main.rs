@@ -1,5 +1,11 @@
 //! Tests of noisefloor-image, one module a subject.
 
+/// LUTs: known answers, and what is refused.
+#[cfg(test)]
+mod cube;
+/// What EXRs say of their samples.
+#[cfg(test)]
+mod facts;
 /// Broken files: every byte flip and cut is an error or a picture, never a panic.
 #[cfg(test)]
 mod hostile;

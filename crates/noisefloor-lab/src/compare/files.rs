@@ -4,7 +4,6 @@ use super::outcome::{Comparison, CriterionRun, CurvePoint};
 use super::page::page;
 use super::pictures::Pictures;
 use super::plots::{Cost, Plot};
-use super::quality::Quality;
 use crate::error::LabError;
 use crate::files::{make_folder, write_csv, write_json, write_text};
 use serde::Serialize;
@@ -22,13 +21,26 @@ struct CurveRow<'a> {
     flip_worst: f64,
     butteraugli: f64,
     butteraugli_worst: f64,
+    cvvdp_jod: f64,
+    cvvdp_jod_worst: f64,
 }
 
 impl<'a> CurveRow<'a> {
     fn new(scene: &'a str, point: &CurvePoint) -> Self {
         let CurvePoint { spp, source_seconds, quality } = *point;
-        let Quality { rel_mse, psnr, flip, flip_worst, butteraugli, butteraugli_worst } = quality;
-        Self { scene, spp, source_seconds, rel_mse, psnr, flip, flip_worst, butteraugli, butteraugli_worst }
+        Self {
+            scene,
+            spp,
+            source_seconds,
+            rel_mse: quality.rel_mse,
+            psnr: quality.psnr,
+            flip: quality.flip,
+            flip_worst: quality.flip_worst,
+            butteraugli: quality.butteraugli,
+            butteraugli_worst: quality.butteraugli_worst,
+            cvvdp_jod: quality.cvvdp_jod,
+            cvvdp_jod_worst: quality.cvvdp_jod_worst,
+        }
     }
 }
 

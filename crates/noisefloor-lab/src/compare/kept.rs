@@ -4,7 +4,7 @@ use crate::advance::{Advance, Watch};
 use crate::error::LabError;
 use crate::files::write_json;
 use noisefloor::{Film, ProgressiveSource, Repeats, Request, Rgb, SourceInfo, TileGrid};
-use noisefloor_image::{RenderLayers, read_exr, write_exr};
+use noisefloor_image::{RenderLayers, SampleFacts, read_exr, write_exr};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -158,7 +158,9 @@ impl Kept {
 
     fn save(&self, folder: &Path) -> Result<(), LabError> {
         let (pixels, Facts { width, height, .. }) = (self.film.image(), self.facts.clone());
-        write_exr(folder.join(PICTURE), &RenderLayers::rgb(width, height, &pixels))?;
+        let facts = SampleFacts { samples: Some((self.spp(), self.spp())), origin: None };
+        let layers = RenderLayers { facts: Some(&facts), ..RenderLayers::rgb(width, height, &pixels) };
+        write_exr(folder.join(PICTURE), &layers)?;
         write_json(&folder.join(FACTS), &Facts { spp: self.spp(), ..self.facts.clone() })?;
         Ok(())
     }

@@ -26,13 +26,14 @@ pub use race::Entrant;
 use crate::advance::Watch;
 use crate::error::LabError;
 use noisefloor::{Params, ProgressiveSource, Rgb};
+use noisefloor_vision::VisionModel;
 use race::Course;
 use std::sync::atomic::AtomicBool;
 
 /// How criteria are compared.
 #[derive(Clone, Copy, Debug)]
 pub struct Setting<'a> {
-    /// Tiles, tone mapping and the largest number of samples.
+    /// Tiles, tone mapping, viewing conditions and the largest number of samples.
     pub params: &'a Params,
     /// Samples per pixel between two verdicts.
     pub batch: u64,
@@ -61,6 +62,7 @@ pub fn run(
         step: setting.batch.div_ceil(2),
         truth: setting.reference,
         pixels_per_degree: setting.pixels_per_degree,
+        vision: VisionModel::new(&setting.params.viewing),
         cancel,
         watch,
     };

@@ -42,11 +42,17 @@ pub struct CriterionRun {
     pub butteraugli: f64,
     /// Of the worst tile.
     pub butteraugli_worst: f64,
+    /// JOD.
+    pub cvvdp_jod: f64,
+    /// JOD of the worst tile.
+    pub cvvdp_jod_worst: f64,
     /// Samples that uniform sampling takes until its worst tile is as good, by FLIP, over those of this
     /// criterion. `None` if it does not get there.
     pub uniform_over_this: Option<f64>,
     /// The same by butteraugli.
     pub uniform_over_this_butteraugli: Option<f64>,
+    /// The same by ColorVideoVDP.
+    pub uniform_over_this_cvvdp: Option<f64>,
 }
 
 /// Uniform sampling with that many samples: a line of curve.csv.
@@ -183,8 +189,11 @@ fn criterion_run(
         flip_worst: quality.flip_worst,
         butteraugli: quality.butteraugli,
         butteraugli_worst: quality.butteraugli_worst,
+        cvvdp_jod: quality.cvvdp_jod,
+        cvvdp_jod_worst: quality.cvvdp_jod_worst,
         uniform_over_this: over(|q| q.flip_worst),
         uniform_over_this_butteraugli: over(|q| q.butteraugli_worst),
+        uniform_over_this_cvvdp: over(|q| 10.0 - q.cvvdp_jod_worst),
     })
 }
 

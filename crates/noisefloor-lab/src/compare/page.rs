@@ -29,7 +29,8 @@ pub fn page(all: &[Comparison], sections: &[String]) -> String {
          <title>Stopping criteria compared</title><style>{STYLE}</style></head><body>\n<h1>Stopping criteria compared</h1>\n\
          <p class=\"note\">noisefloor {}. On each scene all criteria watched one run: each took the samples of a tile until it stopped it. \
          <b>Uniform / this</b> is what uniform sampling takes until its worst tile is as good as the worst one here, over what this \
-         criterion took: above 1 it saves. Source seconds are samples times what a sample of the tile cost in that run.</p>\n",
+         criterion took: above 1 it saves. JOD is ColorVideoVDP's quality: 10 is no visible difference. \
+         Source seconds are samples times what a sample of the tile cost in that run.</p>\n",
         env!("CARGO_PKG_VERSION")
     );
     if all.len() > 1 {
@@ -42,7 +43,7 @@ pub fn page(all: &[Comparison], sections: &[String]) -> String {
 
 /// Ratio at equal worst tile, a line a family, a column a scene.
 fn summary(all: &[Comparison]) -> String {
-    let mut html = "<h2>All scenes</h2>\n<p>Uniform / this, at equal worst tile by FLIP (by butteraugli):</p>\n<div class=\"wide\"><table>\
+    let mut html = "<h2>All scenes</h2>\n<p>Uniform / this, at equal worst tile by FLIP (by butteraugli, by ColorVideoVDP):</p>\n<div class=\"wide\"><table>\
                     <thead><tr><th>criterion</th>"
         .to_owned();
     for comparison in all {
@@ -56,7 +57,8 @@ fn summary(all: &[Comparison]) -> String {
             let run = comparison.runs.iter().find(|run| run.family == family);
             let flip = ratio(run.and_then(|run| run.uniform_over_this));
             let butteraugli = ratio(run.and_then(|run| run.uniform_over_this_butteraugli));
-            put(&mut html, format_args!("<td>{flip} ({butteraugli})</td>"));
+            let jod = ratio(run.and_then(|run| run.uniform_over_this_cvvdp));
+            put(&mut html, format_args!("<td>{flip} ({butteraugli}, {jod})</td>"));
         }
         html.push_str("</tr>\n");
     }
@@ -116,7 +118,8 @@ fn table(comparison: &Comparison) -> String {
     let mut html = format!(
         "<h2>{}</h2>\n<p class=\"note\">{}, {width}×{height} pixels, against {}.</p>\n{broken_off}<div class=\"wide\"><table><thead><tr>\
          <th>criterion</th><th>spp, mean</th><th>most</th><th>tiles satisfied</th><th>source, s</th><th>criterion, s</th><th>relMSE</th>\
-         <th>PSNR, dB</th><th>FLIP</th><th>worst tile</th><th>butter&shy;augli</th><th>worst tile</th><th>uniform / this</th></tr></thead>\
+         <th>PSNR, dB</th><th>FLIP</th><th>worst tile</th><th>JOD</th><th>worst tile</th><th>butter&shy;augli</th><th>worst tile</th>\
+         <th>uniform / this</th></tr></thead>\
          <tbody>\n",
         escape(&comparison.scene),
         escape(&comparison.source),
@@ -138,6 +141,8 @@ fn row(run: &CriterionRun) -> String {
         format!("{:.1}", run.psnr),
         short(run.flip),
         short(run.flip_worst),
+        format!("{:.3}", run.cvvdp_jod),
+        format!("{:.3}", run.cvvdp_jod_worst),
         short(run.butteraugli),
         short(run.butteraugli_worst),
         ratio(run.uniform_over_this),

@@ -79,7 +79,7 @@ type Measure = (&'static str, fn(&Quality) -> f64, fn(&CriterionRun) -> f64);
 const MEASURES: [Measure; 4] = [
     ("relMSE", |q| q.rel_mse, |r| r.rel_mse),
     ("FLIP, worst tile", |q| q.flip_worst, |r| r.flip_worst),
-    ("FLIP, mean", |q| q.flip, |r| r.flip),
+    ("JODs lost, worst tile", |q| 10.0 - q.cvvdp_jod_worst, |r| 10.0 - r.cvvdp_jod_worst),
     ("butteraugli, worst tile", |q| q.butteraugli_worst, |r| r.butteraugli_worst),
 ];
 

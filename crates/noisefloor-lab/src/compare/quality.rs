@@ -1,8 +1,9 @@
 //! How far a picture is from the converged one.
 
 use crate::error::LabError;
-use noisefloor::{Display, Rgb, TileGrid};
-use noisefloor_rivals::metrics;
+use noisefloor::{Display, Rgb, Tile, TileGrid};
+use noisefloor_rivals::{MetricError, metrics};
+use noisefloor_vision::{VisionModel, VisionWorkspace};
 use serde::Serialize;
 
 /// Distances of a picture from the reference.
@@ -20,6 +21,18 @@ pub struct Quality {
     pub butteraugli: f64,
     /// Butteraugli, 3-norm, of the worst tile.
     pub butteraugli_worst: f64,
+    /// ColorVideoVDP: just-objectionable differences (JOD), of at most 10.
+    pub cvvdp_jod: f64,
+    /// ColorVideoVDP of the worst tile, each compared as a picture of its own.
+    pub cvvdp_jod_worst: f64,
+}
+
+/// Whose eyes.
+pub(super) struct Eye {
+    /// For FLIP.
+    pub(super) pixels_per_degree: f64,
+    /// For ColorVideoVDP.
+    pub(super) vision: VisionModel,
 }
 
 /// The converged picture, and how it is looked at.
@@ -28,7 +41,7 @@ pub(super) struct Yardstick {
     display: Display,
     linear: Vec<Rgb>,
     shown: Vec<Rgb>,
-    pixels_per_degree: f64,
+    eye: Eye,
 }
 
 /// The 3-norm of the values of an area: what the authors of butteraugli pool its map with.
@@ -44,9 +57,9 @@ fn mean(values: &mut dyn Iterator<Item = f32>) -> f64 {
 
 impl Yardstick {
     /// `reference` is linear radiance, row-major over the image of `grid`.
-    pub(super) fn new(grid: TileGrid, display: Display, reference: Vec<Rgb>, pixels_per_degree: f64) -> Self {
+    pub(super) fn new(grid: TileGrid, display: Display, reference: Vec<Rgb>, eye: Eye) -> Self {
         let shown = reference.iter().map(|&p| display.encode(p)).collect();
-        Self { grid, display, linear: reference, shown, pixels_per_degree }
+        Self { grid, display, linear: reference, shown, eye }
     }
 
     pub(super) fn grid(&self) -> TileGrid {
@@ -66,7 +79,7 @@ impl Yardstick {
     /// FLIP error of each pixel of a display-encoded picture.
     pub(super) fn flip(&self, shown: &[Rgb]) -> Result<Vec<f32>, LabError> {
         let (width, height) = (self.grid.width(), self.grid.height());
-        Ok(metrics::flip(&self.shown, shown, width, height, self.pixels_per_degree)?.values)
+        Ok(metrics::flip(&self.shown, shown, width, height, self.eye.pixels_per_degree)?.values)
     }
 
     /// Mean over each tile of the FLIP errors of the pixels.
@@ -81,6 +94,7 @@ impl Yardstick {
         let (flip, butteraugli) =
             rayon::join(|| self.flip(&shown), || metrics::butteraugli(&self.shown, &shown, width, height));
         let (flip, butteraugli) = (flip?, butteraugli?.values);
+        let (cvvdp_jod, jods) = self.jods(&shown)?;
         let worst = |tiles: Vec<f64>| tiles.into_iter().fold(0.0, f64::max);
         Ok(Quality {
             rel_mse: metrics::relative_mse(image, &self.linear)?,
@@ -89,7 +103,19 @@ impl Yardstick {
             flip_worst: worst(self.of_tiles(&flip, mean)),
             butteraugli: norm3(&mut butteraugli.iter().copied()),
             butteraugli_worst: worst(self.of_tiles(&butteraugli, norm3)),
+            cvvdp_jod,
+            cvvdp_jod_worst: jods.into_iter().fold(10.0, f64::min),
         })
+    }
+
+    /// JODs of a display-encoded picture, and of each tile.
+    fn jods(&self, shown: &[Rgb]) -> Result<(f64, Vec<f64>), LabError> {
+        let (vision, size) = (&self.eye.vision, (self.grid.width(), self.grid.height()));
+        let tiles: Vec<Tile> = self.grid.tiles().collect();
+        let jods = metrics::cvvdp_of_tiles(&self.shown, shown, self.grid, &tiles, vision)?;
+        let mut workspace = VisionWorkspace::default();
+        let whole = vision.compare(shown, &self.shown, size, &mut workspace).map_err(MetricError::from)?;
+        Ok((whole.jod(), jods))
     }
 
     fn of_tiles(&self, values: &[f32], pool: fn(&mut dyn Iterator<Item = f32>) -> f64) -> Vec<f64> {

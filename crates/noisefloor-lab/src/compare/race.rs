@@ -1,13 +1,14 @@
 //! One run that all criteria watch: each sees the same samples, and takes those of a tile until it stops it.
 
 use super::costs::Costs;
-use super::quality::{Quality, Yardstick};
+use super::quality::{Eye, Quality, Yardstick};
 use crate::advance::{Advance, Watch};
 use crate::error::LabError;
 use noisefloor::{
-    Batch, Film, Params, ProgressiveSource, Request, Rgb, Session, StopReason, StoppingCriterion, Tile,
-    TileGrid,
+    Batch, Film, Params, ProgressiveSource, Reference, Request, Rgb, Session, StopReason, StoppingCriterion,
+    Tile, TileGrid,
 };
+use noisefloor_vision::VisionModel;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
@@ -89,6 +90,8 @@ pub(super) struct Course<'a> {
     pub(super) truth: &'a [Rgb],
     /// For FLIP.
     pub(super) pixels_per_degree: f64,
+    /// For ColorVideoVDP.
+    pub(super) vision: VisionModel,
     pub(super) cancel: &'a AtomicBool,
     pub(super) watch: Watch<'a>,
 }
@@ -108,6 +111,7 @@ impl Course<'_> {
         let info = source.info();
         let grid = TileGrid::new(info.width, info.height, self.params.tile)?;
         let mut field = Field { entrants, film: Film::without_halves(grid), costs: Costs::new(grid.len()) };
+        field.show_converged(self.truth)?;
         let mut yardstick: Option<Yardstick> = None;
         let mut curve: Vec<(u64, Quality)> = Vec::new();
         let (mut done, mut cancelled) = (0u64, false);
@@ -145,7 +149,8 @@ impl Course<'_> {
     fn settle(&self, field: &mut Field) -> Yardstick {
         let display = self.params.tone_mapping.settle(&field.film.image());
         field.entrants.iter_mut().for_each(|e| e.session.set_display(display));
-        Yardstick::new(field.film.grid(), display, self.truth.to_vec(), self.pixels_per_degree)
+        let eye = Eye { pixels_per_degree: self.pixels_per_degree, vision: self.vision.clone() };
+        Yardstick::new(field.film.grid(), display, self.truth.to_vec(), eye)
     }
 }
 
@@ -157,6 +162,17 @@ struct Field {
 }
 
 impl Field {
+    /// Gives the converged picture to those who ask for it.
+    fn show_converged(&mut self, truth: &[Rgb]) -> Result<(), LabError> {
+        let grid = self.film.grid();
+        let asking = self.entrants.iter_mut().filter(|e| e.session.criterion().needs().reference);
+        for entrant in asking {
+            let (width, height) = (grid.width(), grid.height());
+            entrant.session.set_reference(Reference { width, height, pixels: truth.to_vec() })?;
+        }
+        Ok(())
+    }
+
     /// Entrants that are not satisfied yet.
     fn open(&self) -> usize {
         self.entrants.iter().filter(|e| !e.session.is_done()).count()

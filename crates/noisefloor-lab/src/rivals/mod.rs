@@ -4,7 +4,8 @@
 //! it saw. So a rendering is synthesised from them: batches of growing size, each the converged picture
 //! with noise of its own laid over it, noise that is the difference of real pictures, scaled by 1/√samples.
 //! There are five or so such differences in a corpus; they take turns, with changing sign. All zones of a
-//! scene are one picture, as people saw them, and each zone is a tile.
+//! scene are one picture, as people saw them, and each zone is a tile. A rival that compares with the
+//! converged picture is given it.
 
 mod noise;
 mod plot;
@@ -14,7 +15,7 @@ pub use plot::plot_scene_means;
 
 use crate::advance::{Advance, Watch};
 use crate::error::LabError;
-use noisefloor::Scores;
+use noisefloor::{Scores, Viewing};
 use noisefloor_learn::{Corpus, JudgedZone, Prediction, first_word, score};
 use noisefloor_rivals::Rival;
 use rayon::prelude::*;
@@ -56,13 +57,15 @@ pub struct SceneMean {
     pub predicted_spp: f64,
 }
 
-/// Scores rivals on the corpora, the constant of each fitted on the other groups of scenes.
+/// Scores rivals on the corpora, the constant of each fitted on the other groups of scenes. `viewing` is
+/// where a rival that asks for it takes people to have sat.
 ///
 /// # Errors
 /// [`LabError`] if a corpus cannot be read or its zones are not squares of one size, or a criterion fails.
 pub fn rate(
     folders: &[PathBuf],
     rivals: &[&'static Rival],
+    viewing: Viewing,
     watch: Watch<'_>,
 ) -> Result<Vec<RatedRival>, LabError> {
     let mut scenes: Vec<(Corpus, String)> = Vec::new();
@@ -79,7 +82,10 @@ pub fn rate(
         for (rival, stops) in rivals.iter().zip(&mut stops) {
             let detail = format!("{}, {scene}", rival.name);
             watch(Advance { what: "rivals on scenes", done, of, detail: &detail });
-            stops.iter_mut().zip(stops_of(rival, &rendering)?).for_each(|(all, new)| all.extend(new));
+            stops
+                .iter_mut()
+                .zip(stops_of(rival, viewing, &rendering)?)
+                .for_each(|(all, new)| all.extend(new));
             done += 1;
         }
         zones.extend(rendering.zones);
@@ -88,14 +94,18 @@ pub fn rate(
 }
 
 /// Samples per pixel at which a rival stops: a row for each constant, a column for each zone.
-fn stops_of(rival: &Rival, rendering: &SynthesisedRendering) -> Result<Vec<Vec<f64>>, LabError> {
+fn stops_of(
+    rival: &Rival,
+    viewing: Viewing,
+    rendering: &SynthesisedRendering,
+) -> Result<Vec<Vec<f64>>, LabError> {
     let constants = constants(rival);
     if rival.tells {
-        let needed = rendering.follow((rival.make)(rival.range.0), false)?;
+        let needed = rendering.follow((rival.make)(rival.range.0), viewing, false)?;
         return Ok(constants.into_iter().map(|constant| rendering.stops(&needed, constant)).collect());
     }
     let stops = |constant| {
-        let needed = rendering.follow((rival.make)(constant), true)?;
+        let needed = rendering.follow((rival.make)(constant), viewing, true)?;
         Ok(rendering.stops(&needed, constant))
     };
     constants.into_par_iter().map(stops).collect()

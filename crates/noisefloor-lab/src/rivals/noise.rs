@@ -8,7 +8,7 @@ const AMPLIFICATION: f64 = 8.0;
 
 /// What the pictures of a zone say of its noise, in linear light.
 pub(super) struct Noise {
-    converged: Vec<Rgb>,
+    pub(super) converged: Vec<Rgb>,
     /// Differences from the converged picture, scaled to the variance of a single sample.
     realisations: Vec<Vec<Rgb>>,
 }

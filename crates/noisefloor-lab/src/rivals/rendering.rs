@@ -2,7 +2,9 @@
 
 use super::noise::Noise;
 use crate::error::LabError;
-use noisefloor::{Params, Rgb, Schedule, Session, StopReason, StoppingCriterion, ToneMapping};
+use noisefloor::{
+    Params, Reference, Rgb, Schedule, Session, StopReason, StoppingCriterion, ToneMapping, Viewing,
+};
 use noisefloor_learn::{Corpus, JudgedImage, JudgedZone};
 
 /// Samples of one stage over those of the stage before.
@@ -11,11 +13,12 @@ const GROWTH: f64 = 1.15;
 /// A scene as a rendering that can be followed.
 pub(super) struct SynthesisedRendering {
     pub(super) zones: Vec<JudgedZone>,
-    /// Edge of a zone in pixels, and zones in a row.
+    /// Edge of a zone in pixels.
     edge: usize,
-    columns: usize,
     /// What comes stage by stage: samples, and the mean of these samples alone for each zone.
     stages: Vec<(u64, Vec<Vec<Rgb>>)>,
+    /// All zones, converged, as one picture.
+    converged: Reference,
 }
 
 impl SynthesisedRendering {
@@ -46,7 +49,9 @@ impl SynthesisedRendering {
             goal *= GROWTH;
         }
         let columns = (zones.len() as f64).sqrt().ceil() as usize;
-        Ok(Self { zones, edge, columns, stages })
+        let tiles: Vec<&[Rgb]> = noises.iter().map(|noise| noise.converged.as_slice()).collect();
+        let converged = mosaic(&tiles, edge, columns);
+        Ok(Self { zones, edge, stages, converged })
     }
 
     /// Has a criterion judge every stage. For each zone, the least constant that would have stopped it
@@ -54,12 +59,14 @@ impl SynthesisedRendering {
     pub(super) fn follow(
         &self,
         criterion: Box<dyn StoppingCriterion + Send>,
+        viewing: Viewing,
         stops: bool,
     ) -> Result<Vec<Vec<f64>>, LabError> {
-        let size = (self.columns * self.edge, self.zones.len().div_ceil(self.columns) * self.edge);
+        let size = (self.converged.width, self.converged.height);
         let params = Params {
             tile: self.edge,
             tone_mapping: ToneMapping::Srgb { exposure: 1.0 },
+            viewing,
             // At every stage: each brings more than a step.
             schedule: Schedule::Every { step: 2 },
             max_spp: u64::from(u32::MAX),
@@ -67,7 +74,11 @@ impl SynthesisedRendering {
             consecutive: if stops { 1 } else { u32::MAX },
             ..Params::default()
         };
+        let against_converged = criterion.needs().reference;
         let mut session = Session::new(size.0, size.1, criterion, params)?;
+        if against_converged {
+            session.set_reference(self.converged.clone())?;
+        }
         // Places of the picture that no zone fills.
         for tile in self.zones.len()..session.film().grid().len() {
             session.close(tile, StopReason::Cancelled);
@@ -110,5 +121,32 @@ impl SynthesisedRendering {
             stage.map_or(last, between).clamp(first, last)
         };
         self.zones.iter().zip(needed).map(stop).collect()
+    }
+}
+
+/// Squares side by side; places that none fills are black.
+fn mosaic(tiles: &[&[Rgb]], edge: usize, columns: usize) -> Reference {
+    let (width, height) = (columns * edge, tiles.len().div_ceil(columns) * edge);
+    let mut pixels = vec![[0.0; 3]; width * height];
+    for (i, tile) in tiles.iter().enumerate() {
+        for (y, row) in tile.chunks(edge).enumerate() {
+            let start = (i / columns * edge + y) * width + i % columns * edge;
+            pixels[start..start + row.len()].copy_from_slice(row);
+        }
+    }
+    Reference { width, height, pixels }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_mosaic_is_in_the_order_of_its_tiles() {
+        let [a, b, c] = [1.0f32, 2.0, 3.0].map(|v| vec![[v; 3]; 4]);
+        let picture = mosaic(&[&a, &b, &c], 2, 2);
+        assert_eq!((picture.width, picture.height), (4, 4));
+        let red: Vec<f32> = picture.pixels.iter().map(|p| p[0]).collect();
+        assert_eq!(red, [1., 1., 2., 2., 1., 1., 2., 2., 3., 3., 0., 0., 3., 3., 0., 0.]);
     }
 }

@@ -251,7 +251,7 @@ pub(crate) async fn describe(app: &Arc<App>, id: &str) -> Result<Arc<Tiles>, Ref
     let (worker, id) = (app.clone(), id.to_owned());
     let work = move || {
         let gallery = worker.gallery().clone();
-        worker.judged.blocking_lock().tiles(&gallery, &id, &worker.setup.model)
+        worker.judged.blocking_lock().tiles(&gallery, &id, &worker.setup.model, worker.setup.viewing)
     };
     Ok(blocking(work).await??)
 }

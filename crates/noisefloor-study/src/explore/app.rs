@@ -4,7 +4,7 @@ use super::answers::Disagreements;
 use super::gallery::Gallery;
 use super::job::Job;
 use super::verdicts::Judged;
-use noisefloor::{Audience, DEFAULT_TILE, Model};
+use noisefloor::{Audience, DEFAULT_TILE, Model, Viewing};
 use noisefloor_learn::Table;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -18,6 +18,8 @@ pub struct ExploreSetup {
     pub threshold: noisefloor::Threshold,
     /// Initial audience.
     pub audience: Audience,
+    /// On which display pictures are seen, and from how far.
+    pub viewing: Viewing,
     /// Initial tile edge in pixels, 16…512.
     pub tile: usize,
     /// Database of disagreements.
@@ -35,6 +37,7 @@ impl ExploreSetup {
             model: Model::bundled(),
             threshold: noisefloor::Threshold::PAPER,
             audience: Audience::TRAINED,
+            viewing: Model::bundled().viewing(),
             tile: DEFAULT_TILE,
             database: database.as_ref().to_owned(),
             table: None,

@@ -2,7 +2,7 @@
 
 use crate::error::StudyError;
 use noisefloor::{Samples, Still, StillError, TileError, TileGrid};
-use noisefloor_image::read_picture_within;
+use noisefloor_image::{read_facts, read_picture_within};
 use serde::Serialize;
 use std::path::Path;
 use std::sync::Arc;
@@ -62,8 +62,8 @@ pub(crate) struct PictureView {
 }
 
 impl GalleryPicture {
-    /// Reads a PNG, EXR or PFM file. Its name may state the samples per pixel: `00100.png`,
-    /// `kitchen-64spp.exr`.
+    /// Reads a PNG, EXR or PFM file. An EXR may state its samples per pixel, as those of `noisefloor render`
+    /// do; otherwise its name may: `00100.png`, `kitchen-64spp.exr`.
     ///
     /// # Errors
     /// [`StudyError::Picture`] if the file is not a picture, broken or too large; [`StudyError::NotFinite`]
@@ -72,8 +72,13 @@ impl GalleryPicture {
         let path = path.as_ref();
         let name = path.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
         let picture = read_picture_within(path, MAX_GALLERY_PIXELS)?;
-        let spp = samples_in(&name);
-        let still = picture.into_still(spp.unwrap_or(1.0));
+        let facts = read_facts(path)?;
+        // Tiles of different counts have none in common: the page asks
+        let spp = match facts.samples {
+            Some(_) => facts.spp().map(|spp| spp as f64),
+            None => samples_in(&name),
+        };
+        let still = Still { origin: facts.origin, ..picture.into_still(spp.unwrap_or(1.0)) };
         still.check().map_err(|_| StudyError::NotFinite { path: path.to_owned() })?;
         let mut hash = blake3::Hasher::new();
         let mut file =

@@ -3,7 +3,7 @@
 use super::gallery::{Gallery, GalleryError, GalleryPicture};
 use noisefloor::{
     Audience, Described, Descriptor, Evidence, Model, Oracle, Rgb, Samples, SnapshotPair, Still, Threshold,
-    TileGrid, ToneMapping, Verdict,
+    TileGrid, ToneMapping, Verdict, Viewing,
 };
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
@@ -37,6 +37,7 @@ impl Judged {
         gallery: &Gallery,
         id: &str,
         model: &Model,
+        viewing: Viewing,
     ) -> Result<Arc<Tiles>, GalleryError> {
         if self.revision != gallery.revision {
             *self = Self { revision: gallery.revision, tiles: HashMap::new() };
@@ -44,13 +45,13 @@ impl Judged {
         if let Some(tiles) = self.tiles.get(id) {
             return Ok(tiles.clone());
         }
-        let tiles = Arc::new(describe(gallery, id, model)?);
+        let tiles = Arc::new(describe(gallery, id, model, viewing)?);
         self.tiles.insert(id.to_owned(), tiles.clone());
         Ok(tiles)
     }
 }
 
-fn describe(gallery: &Gallery, id: &str, model: &Model) -> Result<Tiles, GalleryError> {
+fn describe(gallery: &Gallery, id: &str, model: &Model, viewing: Viewing) -> Result<Tiles, GalleryError> {
     let picture = gallery.pictures.iter().find(|p| p.id == id).ok_or(GalleryError::Gone)?;
     let spp = picture.spp().ok_or_else(|| GalleryError::NoSamples(picture.name.clone()))?;
     let others: Vec<&Still> =
@@ -61,7 +62,8 @@ fn describe(gallery: &Gallery, id: &str, model: &Model) -> Result<Tiles, Gallery
         &others,
         ToneMapping::default(),
         gallery.samples,
-    )?;
+    )?
+    .seen_on(viewing);
     let (width, height) = picture.still.size;
     let grid = TileGrid::new(width, height, gallery.tile)?;
     // The threshold affects verdicts only

@@ -3,6 +3,7 @@
 use super::Session;
 use crate::checkpoint::{Checkpoint, CheckpointError};
 use crate::criterion::Resumable;
+use crate::display::Display;
 use crate::stop::{Stop, StopReason};
 use std::borrow::Cow;
 
@@ -41,7 +42,12 @@ impl<C: Resumable> Session<C> {
             let done = |stop: &Stop| matches!(stop.reason, StopReason::Converged | StopReason::MaxSpp);
             state.stop = state.stop.filter(done);
         }
+        let complete = |display: Display| {
+            let lost = "it was displayed through a function that only the caller of `set_display` has";
+            display.completed_by(self.params.tone_mapping).ok_or(CheckpointError::Invalid(lost))
+        };
+        let display = checkpoint.display.map(complete).transpose()?;
         let film = checkpoint.film.into_owned();
-        Ok(Self { film, tiles, display: checkpoint.display, displayed_reference: None, ..self })
+        Ok(Self { film, tiles, display, displayed_reference: None, ..self })
     }
 }

@@ -1,0 +1,41 @@
+//! Where pictures are seen.
+
+use anyhow::bail;
+use clap::Args;
+use noisefloor::{Oracle, Viewing};
+
+/// On which display, and from how far.
+#[derive(Debug, Args)]
+pub struct ViewingArgs {
+    /// What pictures are seen on: `desk` (24 inches, Full HD, 60 cm), `laptop`, `tv`, `phone`, `cinema`; a
+    /// display of ColorVideoVDP such as `standard_4k`; numbers, `ppd=60,peak=300,black=0.3,ambient=100`
+    /// (pixels per degree, cd/m², lux); or a preset with changes, `desk,distance=1.2` (metres) [default: what
+    /// the model was trained for; `desk` for the bundled one, and without a model].
+    #[arg(long, value_name = "WHERE")]
+    viewing: Option<Viewing>,
+}
+
+impl ViewingArgs {
+    /// What was typed, or the default conditions.
+    pub fn or_default(&self) -> Viewing {
+        self.viewing.unwrap_or_default()
+    }
+
+    /// What was typed, or what the model was trained for.
+    pub fn of(&self, oracle: &Oracle) -> Viewing {
+        self.viewing.unwrap_or_else(|| oracle.model().viewing())
+    }
+
+    /// [`ViewingArgs::of`], checked: not every model knows what other conditions change.
+    pub fn judged_by(&self, oracle: &Oracle) -> anyhow::Result<Viewing> {
+        let (asked, model) = (self.of(oracle), oracle.model());
+        if asked != model.viewing() && !model.descriptor().knows_viewing() {
+            bail!(
+                "--viewing {asked}: this model was trained for {}, and its descriptor does not know what \
+                 other conditions change",
+                model.viewing()
+            );
+        }
+        Ok(asked)
+    }
+}

@@ -1,0 +1,105 @@
+//! What an EXR says of its own samples: how many, of which seed, from where.
+
+use crate::error::PictureError;
+use crate::open::{Format, Opened, guarded};
+use exr::meta::attribute::AttributeValue;
+use exr::meta::header::Header;
+use exr::prelude::Text;
+use noisefloor::{SampleOrigin, printable};
+use std::collections::HashMap;
+use std::path::Path;
+
+/// Samples per pixel, the same everywhere: the attribute that pbrt writes, too.
+const SPP: &str = "samplesPerPixel";
+const FEWEST: &str = "noisefloor.fewestSamples";
+const MOST: &str = "noisefloor.mostSamples";
+const SEED: &str = "noisefloor.seed";
+const SOURCE: &str = "noisefloor.source";
+/// `samples` if the seed fixes every sample.
+const REPEATS: &str = "noisefloor.repeats";
+/// Longest text of an attribute that is believed, in bytes.
+const MAX_TEXT: usize = 1000;
+
+/// What the file of a picture says of its samples.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct SampleFacts {
+    /// Fewest and most samples per pixel of its tiles.
+    pub samples: Option<(u64, u64)>,
+    /// Where the samples come from.
+    pub origin: Option<SampleOrigin>,
+}
+
+impl SampleFacts {
+    /// Samples per pixel, if they are the same everywhere.
+    pub fn spp(&self) -> Option<u64> {
+        self.samples.filter(|(fewest, most)| fewest == most).map(|(spp, _)| spp)
+    }
+}
+
+/// Reads what a file says of its samples: the attributes that [`write_exr`](crate::write_exr) writes, and
+/// `samplesPerPixel` of other programs, such as pbrt. Nothing, the default, for a file that says nothing, and
+/// for PFM and PNG. Attributes that make no sense are as good as none.
+///
+/// # Errors
+/// [`PictureError`] if the file cannot be read, or is an EXR whose header is broken.
+pub fn read_facts(path: impl AsRef<Path>) -> Result<SampleFacts, PictureError> {
+    let path = path.as_ref();
+    let opened = Opened::open(path)?;
+    if opened.format != Format::Exr {
+        return Ok(SampleFacts::default());
+    }
+    guarded(path, "EXR", || {
+        let reader = exr::block::read(opened.reader, false).map_err(|error| PictureError::Broken {
+            path: path.to_owned(),
+            format: "EXR",
+            reason: error.to_string(),
+        })?;
+        Ok(reader.headers().first().map(of_header).unwrap_or_default())
+    })
+}
+
+fn of_header(header: &Header) -> SampleFacts {
+    let find = |name: &str| {
+        let name = Text::from(name);
+        header.own_attributes.other.get(&name).or_else(|| header.shared_attributes.other.get(&name))
+    };
+    let count = |name| find(name).and_then(positive);
+    let even = count(SPP).map(|spp| (spp, spp));
+    let uneven = || Some((count(FEWEST)?, count(MOST)?)).filter(|(fewest, most)| fewest <= most);
+    let said = |name| match find(name) {
+        Some(AttributeValue::Text(text)) => Some(text.to_string()).filter(|t| t.len() <= MAX_TEXT),
+        _ => None,
+    };
+    let origin = || {
+        let (source, seed) = (printable(&said(SOURCE)?).into_owned(), said(SEED)?.parse().ok()?);
+        Some(SampleOrigin { source, seed, repeats: said(REPEATS).is_some_and(|r| r == "samples") })
+    };
+    SampleFacts { samples: even.or_else(uneven), origin: origin() }
+}
+
+/// A whole number above 0, however it is stored.
+fn positive(value: &AttributeValue) -> Option<u64> {
+    match value {
+        AttributeValue::I32(n) => u64::try_from(*n).ok().filter(|&n| n > 0),
+        AttributeValue::Text(text) => text.to_string().parse().ok().filter(|&n| n > 0),
+        _ => None,
+    }
+}
+
+/// The attributes that say this.
+pub(crate) fn sample_attributes(facts: &SampleFacts) -> HashMap<Text, AttributeValue> {
+    let text = |value: &str| AttributeValue::Text(Text::from(value));
+    // Other programs expect an integer; what does not fit is text
+    let count = |n: u64| i32::try_from(n).map_or_else(|_| text(&n.to_string()), AttributeValue::I32);
+    let mut all = Vec::new();
+    match facts.samples {
+        Some((fewest, most)) if fewest == most => all.push((SPP, count(most))),
+        Some((fewest, most)) => all.extend([(FEWEST, count(fewest)), (MOST, count(most))]),
+        None => {}
+    }
+    if let Some(SampleOrigin { source, seed, repeats }) = &facts.origin {
+        all.extend([(SOURCE, text(source)), (SEED, text(&seed.to_string()))]);
+        all.push((REPEATS, text(if *repeats { "samples" } else { "nothing" })));
+    }
+    all.into_iter().map(|(name, value)| (Text::from(name), value)).collect()
+}
