@@ -206,6 +206,7 @@ impl Display {
     }
 
     /// Radiance that a curve can take: finite, and not negative.
+    #[allow(clippy::manual_clamp, reason = "clamp would let NaN through; here it becomes black")]
     fn expose(&self, pixel: Rgb) -> Rgb {
         pixel.map(|c| (c * self.exposure).max(0.0).min(f32::MAX))
     }
