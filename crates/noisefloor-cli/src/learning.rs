@@ -2,10 +2,13 @@
 
 use crate::bars::bar;
 use anyhow::Context;
-use noisefloor::{Descriptor, Evidence, Threshold, Viewing};
+use indicatif::ProgressBar;
+use noisefloor::{Descriptor, DescriptorSpec, Evidence, Threshold, Viewing};
 use noisefloor_learn::{
-    Corpora, Prediction, Table, TrainParams, describe_corpora, leave_one_scene_out, read_table,
+    Chosen, Corpora, Prediction, Table, TrainParams, VISIBLE_CHOICES, choices, choose_and_leave_out,
+    describe_corpora, leave_one_scene_out, read_table, read_table_with,
 };
+use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
@@ -27,13 +30,31 @@ pub enum DataSource {
 impl DataJob {
     /// The table: read, or computed from pictures.
     pub fn load(&self) -> anyhow::Result<Table> {
-        let folders = match &self.source {
-            DataSource::Table(path) => return read_table_file(path),
-            DataSource::Corpora(folders) => folders,
-        };
+        match &self.source {
+            DataSource::Table(path) => read_table_file(path),
+            DataSource::Corpora(folders) => self.describe(folders, &self.descriptor),
+        }
+    }
+
+    /// The table with numbers for every choice of constants: read, or computed from pictures.
+    pub fn load_choices(&self) -> anyhow::Result<Table> {
+        match &self.source {
+            DataSource::Table(path) => {
+                let table = read_table_with(open(path)?, &[VISIBLE_CHOICES]);
+                table.with_context(|| format!("{}", path.display()))
+            }
+            DataSource::Corpora(folders) => {
+                let (name, parameters) = (VISIBLE_CHOICES.name.to_owned(), BTreeMap::new());
+                let spec = DescriptorSpec { name, parameters };
+                self.describe(folders, &Descriptor::from_spec(&spec, &[VISIBLE_CHOICES])?)
+            }
+        }
+    }
+
+    fn describe(&self, folders: &[PathBuf], descriptor: &Descriptor) -> anyhow::Result<Table> {
         let bar = bar(0, "zones described");
         let corpora = Corpora { viewing: self.viewing, ..Corpora::new(folders) };
-        let table = describe_corpora(corpora, &self.descriptor, self.evidence, |done, all| {
+        let table = describe_corpora(corpora, descriptor, self.evidence, |done, all| {
             bar.set_length(all as u64);
             bar.set_position(done as u64);
         })?;
@@ -63,8 +84,12 @@ impl DataJob {
 
 /// A table that `train --save-table` wrote.
 pub fn read_table_file(path: &Path) -> anyhow::Result<Table> {
+    read_table(open(path)?).with_context(|| format!("{}", path.display()))
+}
+
+fn open(path: &Path) -> anyhow::Result<BufReader<File>> {
     let file = File::open(path).with_context(|| format!("{}: cannot be opened", path.display()))?;
-    read_table(BufReader::new(file)).with_context(|| format!("{}", path.display()))
+    Ok(BufReader::new(file))
 }
 
 /// Predictions on left-out scenes, with a bar.
@@ -73,15 +98,37 @@ pub fn held_out(
     params: &TrainParams,
     threshold: Threshold,
 ) -> anyhow::Result<Vec<Prediction>> {
-    let bar = bar(table.groups().len() as u64, "scenes left out");
-    let mut begun = false;
-    let predictions = leave_one_scene_out(table, params, threshold, |group| {
-        if begun {
-            bar.inc(1);
-        }
-        begun = true;
-        bar.set_message(group.to_owned());
-    })?;
-    bar.finish_and_clear();
+    let bar = LeftOut::new(table);
+    let predictions = leave_one_scene_out(table, params, threshold, |group| bar.show(group))?;
+    bar.0.finish_and_clear();
     Ok(predictions)
+}
+
+/// Predictions on left-out scenes with everything chosen without them, and what was chosen, with a bar.
+pub fn chosen_and_held_out(
+    table: &Table,
+    params: &TrainParams,
+    threshold: Threshold,
+) -> anyhow::Result<(Vec<Prediction>, Vec<Chosen>)> {
+    let bar = LeftOut::new(table);
+    let result = choose_and_leave_out(&choices(table)?, params, threshold, |group| bar.show(group))?;
+    bar.0.finish_and_clear();
+    Ok(result)
+}
+
+/// A bar over the groups of scenes.
+struct LeftOut(ProgressBar);
+
+impl LeftOut {
+    fn new(table: &Table) -> Self {
+        Self(bar(table.groups().len() as u64, "scenes left out"))
+    }
+
+    /// A group begins, and the one before it has ended.
+    fn show(&self, group: &str) {
+        if !self.0.message().is_empty() {
+            self.0.inc(1);
+        }
+        self.0.set_message(group.to_owned());
+    }
 }

@@ -3,7 +3,7 @@
 use crate::baselines::{constant_noise_baseline, scene_median_baseline};
 use crate::observers::observers_agreeing;
 use crate::predict::Prediction;
-use crate::score::{ReliabilityBin, calibration_error, image_accuracy, reliability, score};
+use crate::score::{ReliabilityBin, calibration_error, error_interval, image_accuracy, reliability, score};
 use crate::table::{Origin, Table};
 use noisefloor::Scores;
 use serde::Serialize;
@@ -47,6 +47,9 @@ pub struct Evaluation {
     /// Over all zones.
     #[serde(flatten)]
     pub summary: PredictionScores,
+    /// The middle 90 % of the error factor over groups of scenes drawn again; see [`error_interval`]. `None`
+    /// with fewer than three groups.
+    pub error_interval: Option<(f64, f64)>,
     /// Over all zones.
     pub baselines: Baselines,
     /// Scene by scene.
@@ -93,9 +96,12 @@ impl Evaluation {
         let agreeing = |spp: f64, human: f64| observers_agreeing(spp, human, spread);
         let step = |spp: f64, human: f64| f64::from(u8::from(spp >= human));
         let curve = reliability(predictions.iter(), agreeing);
+        let group =
+            |scene: &str| table.zones.iter().find(|z| z.scene == scene).map_or("", |z| z.group.as_str());
         Self {
             predicted_by,
             summary: PredictionScores::of(predictions, &|_| true),
+            error_interval: error_interval(predictions.iter(), group),
             baselines: baselines(&|_| true),
             scenes: table.scenes().into_iter().map(scene).collect(),
             calibration_error: calibration_error(&curve),

@@ -50,7 +50,7 @@ impl<'a> Material<'a> {
         let zones: Vec<&Zone> = self.zones.iter().copied().filter(|z| Some(&*z.group) != group).collect();
         let answers: Vec<&Answer> =
             self.answers.iter().copied().filter(|a| Some(&*a.group) != group).collect();
-        Machine::fit(&zones, &answers, svm, self.params.range, self.table.descriptor.least_deviation())
+        Machine::fit(&zones, &answers, svm, self.params, self.table.descriptor.least_deviation())
     }
 
     /// Machines that have not seen one group judge that group; one sigmoid is fitted to all of that.
@@ -82,6 +82,16 @@ impl<'a> Material<'a> {
         }
         Ok((score(predictions.iter()).error_factor, platt))
     }
+}
+
+/// Error factor of a pair of C and γ on the zones of `groups`, each group held out in turn.
+pub(crate) fn held_out_error(
+    table: &Table,
+    groups: &[&str],
+    params: &TrainParams,
+    svm: SvmParams,
+) -> Result<f64, TrainError> {
+    Ok(Material::of(table, groups, params).without_answers().held_out_error(svm)?.0)
 }
 
 /// Trains on the zones of `groups`, at least two, with C and γ chosen, and P calibrated, by leaving each

@@ -13,12 +13,15 @@
 mod answer;
 mod audience;
 mod baselines;
+mod choices;
 mod corpus;
 mod describe;
 mod error;
 mod evaluation;
 mod fit;
+mod line;
 mod machine;
+mod nested;
 mod observers;
 mod params;
 mod predict;
@@ -30,6 +33,7 @@ mod train;
 pub use answer::Answer;
 pub use audience::{AudienceFit, AudienceFitError, MAX_PAIRS, MIN_PAIRS};
 pub use baselines::{constant_noise_baseline, scene_median_baseline};
+pub use choices::{Choice, VISIBLE_CHOICES, choices};
 pub use corpus::{
     CENSORED_SPP, Corpus, CorpusError, Encoding, Inner, JudgedImage, JudgedImages, JudgedZone, Patch,
     ZoneImages, zone_levels,
@@ -37,10 +41,11 @@ pub use corpus::{
 pub use describe::{Corpora, describe_corpora, describe_pairs, noise_level};
 pub use error::TableError;
 pub use evaluation::{Baselines, Evaluation, PredictionScores, SceneScores};
+pub use nested::{Chosen, choose_and_leave_out};
 pub use observers::{OBSERVERS_AT_THRESHOLD, observers_agreeing};
-pub use params::{TrainError, TrainParams};
+pub use params::{Learner, TrainError, TrainParams};
 pub use predict::{Prediction, predict};
-pub use score::{ReliabilityBin, calibration_error, image_accuracy, reliability, score};
+pub use score::{ReliabilityBin, calibration_error, error_interval, image_accuracy, reliability, score};
 pub use table::{Level, Origin, Table, Zone, first_word};
 pub use table_csv::{read_table, read_table_with, write_table};
 pub use train::{leave_answers_out, leave_one_scene_out, train};

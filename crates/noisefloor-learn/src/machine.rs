@@ -1,8 +1,9 @@
 //! A support vector machine trained on the examples of some zones and answers.
 
 use crate::answer::Answer;
+use crate::line::fit_line;
 use crate::observers::observers_agreeing;
-use crate::params::{TrainError, TrainParams};
+use crate::params::{Learner, TrainError, TrainParams};
 use crate::table::Zone;
 use ndarray::Array2;
 use noisefloor::{Classifier, Platt, Scaler, Svm, SvmParams, fit_svm};
@@ -20,25 +21,43 @@ impl Machine {
         zones: &[&Zone],
         answers: &[&Answer],
         svm: SvmParams,
-        range: f64,
+        params: &TrainParams,
         least_deviation: f64,
     ) -> Result<Self, TrainError> {
-        let mut examples: Vec<(&[f32], bool)> =
-            zones.iter().flat_map(|z| examples(z, range)).map(|e| (e.descriptor, e.converged)).collect();
+        let range = params.range;
+        // What people said, and the share of them who agree that it has converged
+        let mut examples: Vec<(&[f32], bool, f64)> = Vec::new();
+        for zone in zones {
+            let agreeing = |spp: f64| observers_agreeing(spp, zone.human_spp, params.spread);
+            examples
+                .extend(self::examples(zone, range).map(|e| (e.descriptor, e.converged, agreeing(e.spp))));
+        }
         let scaler = Scaler::fit(examples.iter().map(|e| e.0), least_deviation);
         let weight = answer_weight(examples.len(), zones.len(), range);
         for answer in answers {
-            examples.extend(std::iter::repeat_n((&answer.descriptor[..], !answer.sees_noise), weight));
+            examples.extend(std::iter::repeat_n(
+                (&answer.descriptor[..], !answer.sees_noise, f64::from(u8::from(!answer.sees_noise))),
+                weight,
+            ));
         }
 
         let dimensions = examples.first().map_or(0, |e| e.0.len());
         let mut rows = Array2::zeros((examples.len(), dimensions));
-        for (mut row, (descriptor, _)) in rows.rows_mut().into_iter().zip(&examples) {
+        for (mut row, (descriptor, ..)) in rows.rows_mut().into_iter().zip(&examples) {
             let scaled = scaler.scaled(descriptor);
             row.iter_mut().zip(&scaled).for_each(|(to, &from)| *to = f64::from(from));
         }
-        let labels: Vec<bool> = examples.iter().map(|e| e.1).collect();
-        Ok(Self { scaler, weight, svm: fit_svm(rows.view(), &labels, svm)? })
+        let svm = match params.learner {
+            Learner::Svm => {
+                let labels: Vec<bool> = examples.iter().map(|e| e.1).collect();
+                fit_svm(rows.view(), &labels, svm)?
+            }
+            Learner::Line => {
+                let shares: Vec<f64> = examples.iter().map(|e| e.2).collect();
+                fit_line(rows.view(), &shares, svm.c)
+            }
+        };
+        Ok(Self { scaler, weight, svm })
     }
 
     fn decide(&self, descriptor: &[f32]) -> f32 {

@@ -3,9 +3,25 @@
 use noisefloor::{ModelError, SvmParams, SvmTrainError};
 use thiserror::Error;
 
+/// γ of the kernel in which a straight line is kept.
+pub(crate) const WIDE: f64 = 1e-4;
+
+/// What kind of machine is trained.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Learner {
+    /// A support vector machine, on examples that are noisy or converged (Takouachet et al. 2017, §5).
+    #[default]
+    Svm,
+    /// Logistic regression on the share of observers who see no difference. It decides on a straight line, and
+    /// is kept as two support vectors of a wide kernel. C is how little its weights are penalised, γ nothing.
+    Line,
+}
+
 /// How a model is to be trained.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TrainParams {
+    /// What is trained.
+    pub learner: Learner,
     /// Pairs of C and γ to choose from, by leave-one-group-out.
     pub candidates: Vec<SvmParams>,
     /// Levels within this factor of the human threshold are examples; those beyond are clear anyway. Above 1.
@@ -22,11 +38,17 @@ impl Default for TrainParams {
     fn default() -> Self {
         let candidates =
             [0.1, 0.3, 1.0].iter().flat_map(|&c| [0.003, 0.01].map(|gamma| SvmParams { c, gamma })).collect();
-        Self { candidates, range: 8.0, spread: 0.32 }
+        Self { learner: Learner::Svm, candidates, range: 8.0, spread: 0.32 }
     }
 }
 
 impl TrainParams {
+    /// Logistic regression, which serves the visible descriptor better.
+    pub fn line() -> Self {
+        let candidates = [100.0, 300.0, 1000.0].map(|c| SvmParams { c, gamma: WIDE }).to_vec();
+        Self { learner: Learner::Line, candidates, ..Self::default() }
+    }
+
     /// For the paper's descriptor: its C and γ, [`SvmParams::PAPER`].
     pub fn paper() -> Self {
         Self { candidates: vec![SvmParams::PAPER], ..Self::default() }

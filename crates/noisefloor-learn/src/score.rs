@@ -6,6 +6,7 @@
 use crate::predict::Prediction;
 use noisefloor::Scores;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 
 /// Scores predictions. Censored thresholds stay out.
 pub fn score<'a>(predictions: impl Iterator<Item = &'a Prediction> + Clone) -> Scores {
@@ -18,6 +19,35 @@ pub fn score<'a>(predictions: impl Iterator<Item = &'a Prediction> + Clone) -> S
         bias_factor: mean(|r| r).exp(),
         early_share: mean(|r| if r < -std::f64::consts::LN_2 { 1.0 } else { 0.0 }),
     }
+}
+
+/// Resamplings of groups behind [`error_interval`].
+const RESAMPLINGS: usize = 10_000;
+
+/// The middle 90 % of the error factor if the groups of scenes were drawn again, with replacement, from those
+/// that are there: what other scenes might have given. `None` with fewer than three groups.
+pub fn error_interval<'a>(
+    predictions: impl Iterator<Item = &'a Prediction>,
+    group_of: impl Fn(&str) -> &'a str,
+) -> Option<(f64, f64)> {
+    let mut groups: BTreeMap<&str, (f64, f64)> = BTreeMap::new();
+    for p in predictions.filter(|p| !p.censored) {
+        let (sum, zones) = groups.entry(group_of(&p.scene)).or_default();
+        (*sum, *zones) = (*sum + p.log_ratio().abs(), *zones + 1.0);
+    }
+    let groups: Vec<(f64, f64)> = groups.into_values().collect();
+    if groups.len() < 3 {
+        return None;
+    }
+    let mut random = fastrand::Rng::with_seed(1);
+    let mut resampled = || {
+        let drawn = (0..groups.len()).map(|_| groups[random.usize(..groups.len())]);
+        let (sum, zones) = drawn.fold((0.0, 0.0), |(s, n), (sum, zones)| (s + sum, n + zones));
+        (sum / zones).exp()
+    };
+    let mut errors: Vec<f64> = (0..RESAMPLINGS).map(|_| resampled()).collect();
+    errors.sort_by(f64::total_cmp);
+    Some((errors[RESAMPLINGS / 20], errors[RESAMPLINGS - RESAMPLINGS / 20 - 1]))
 }
 
 /// Levels within this factor of the human threshold say how well probabilities are calibrated: further ones
@@ -95,6 +125,26 @@ mod tests {
         assert_eq!(bins.len(), 2);
         assert_eq!((bins[0].observed, bins[1].observed, bins[1].levels), (0.25, 0.5, 20));
         assert!((calibration_error(&bins) - 0.25 / 3.0).abs() < 1e-12);
+    }
+
+    /// Two of three groups err by ×1, one by ×8: a mean of ln 8 · k/3 with k drawn of three, k = 0 in 8/27 and
+    /// k = 3 in 1/27 of the drawings, so that the middle 90 % reach from k = 0 to k = 2.
+    #[test]
+    fn intervals_are_those_of_groups_drawn_again() {
+        let of = |scene: &str, spp: f64| Prediction::by_threshold(&zone(scene, 0, 100.0, 1.0), spp);
+        let three = [of("A", 100.0), of("B", 800.0), of("C", 100.0)];
+        let group = |scene: &str| {
+            if scene == "A" {
+                "A"
+            } else if scene == "B" {
+                "B"
+            } else {
+                "C"
+            }
+        };
+        let (low, high) = error_interval(three.iter(), group).unwrap();
+        assert!((low - 1.0).abs() < 1e-9 && (high - 4.0).abs() < 1e-9, "{low} {high}");
+        assert_eq!(error_interval(three[..2].iter(), group), None);
     }
 
     #[test]

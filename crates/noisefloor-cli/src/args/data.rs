@@ -2,7 +2,7 @@
 
 use super::oracle::EvidenceChoice;
 use super::viewing::ViewingArgs;
-use clap::Args;
+use clap::{Args, ValueEnum};
 use std::path::PathBuf;
 
 /// Where the human thresholds are.
@@ -20,7 +20,14 @@ pub struct DataArgs {
 /// How to train.
 #[derive(Debug, Args)]
 pub struct SearchArgs {
-    /// σ of the noise mask, 0.3…1.5 pixels (for --corpus; a table has its own).
+    /// What is computed from a tile (for --corpus; a table has its own).
+    #[arg(long, value_enum, default_value_t = DescriptorChoice::Compact)]
+    pub(super) descriptor: DescriptorChoice,
+    /// What is trained [default: line for the visible descriptor and for --nested, svm otherwise; a table does
+    /// not say].
+    #[arg(long, value_enum)]
+    pub(super) machine: Option<MachineChoice>,
+    /// σ of the noise mask of the compact descriptor, 0.3…1.5 pixels (for --corpus; a table has its own).
     #[arg(long, default_value_t = 1.0, value_name = "PIXELS")]
     pub(super) sigma: f32,
     /// What tiles are compared with (for --corpus; a table has its own).
@@ -36,12 +43,30 @@ pub struct SearchArgs {
     pub(super) gamma: Vec<f64>,
 }
 
+/// The machines that can be trained.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum MachineChoice {
+    /// A support vector machine.
+    Svm,
+    /// Logistic regression: a straight line.
+    Line,
+}
+
+/// The descriptors that models can be trained with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum DescriptorChoice {
+    /// How many times too strong the noise is by a model of human vision, in the tile and its picture.
+    Visible,
+    /// Visible noise by constants of our own; knows no viewing conditions.
+    Compact,
+}
+
 #[cfg(feature = "train")]
 pub(super) use checks::check_data;
 
 #[cfg(feature = "train")]
 mod checks {
-    use super::{DataArgs, SearchArgs};
+    use super::{DataArgs, DescriptorChoice, MachineChoice, SearchArgs};
     use crate::learning::{DataJob, DataSource};
     use anyhow::{Context, bail};
     use noisefloor::{Descriptor, NoiseMask, SvmParams};
@@ -51,25 +76,35 @@ mod checks {
     pub(in crate::args) fn check_data(
         data: DataArgs,
         search: &SearchArgs,
+        nested: bool,
     ) -> anyhow::Result<(DataJob, TrainParams)> {
-        let params = candidates(search)?;
+        let line = nested || search.descriptor == DescriptorChoice::Visible;
+        let machine = search.machine.unwrap_or(if line { MachineChoice::Line } else { MachineChoice::Svm });
+        let params = candidates(search, machine)?;
         let mask = NoiseMask::try_from(search.sigma).context("--sigma")?;
         let source = match data.table {
             Some(path) => DataSource::Table(path),
             None => DataSource::Corpora(data.corpus),
         };
-        let descriptor = Descriptor::compact(mask);
-        let viewing = search.viewing.or_default();
-        Ok((DataJob { source, descriptor, evidence: search.evidence.into(), viewing }, params))
+        let descriptor = match search.descriptor {
+            DescriptorChoice::Visible => Descriptor::visible(),
+            DescriptorChoice::Compact => Descriptor::compact(mask),
+        };
+        let (evidence, viewing) = (search.evidence.into(), search.viewing.or_default());
+        Ok((DataJob { source, descriptor, evidence, viewing }, params))
     }
 
-    fn candidates(search: &SearchArgs) -> anyhow::Result<TrainParams> {
-        let mut params = TrainParams::default();
+    fn candidates(search: &SearchArgs, machine: MachineChoice) -> anyhow::Result<TrainParams> {
+        let mut params = match machine {
+            MachineChoice::Svm => TrainParams::default(),
+            MachineChoice::Line => TrainParams::line(),
+        };
+        let defaults = params.candidates.clone();
         let given = |values: &[f64], default: fn(&SvmParams) -> f64| -> Vec<f64> {
             if !values.is_empty() {
                 return values.to_vec();
             }
-            let mut all: Vec<f64> = TrainParams::default().candidates.iter().map(default).collect();
+            let mut all: Vec<f64> = defaults.iter().map(default).collect();
             all.sort_by(f64::total_cmp);
             all.dedup();
             all

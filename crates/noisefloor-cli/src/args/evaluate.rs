@@ -17,6 +17,7 @@ use std::path::PathBuf;
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   noisefloor evaluate --table fixtures/human-table.csv --leave-one-scene-out
+  noisefloor evaluate --table fixtures/human-choices.csv --nested
   noisefloor evaluate --corpus study/mine --model my.nfm --json scores.json --csv zones.csv
   noisefloor evaluate --corpus study/mine --leave-one-scene-out --figures out/scores
   noisefloor evaluate --table fixtures/human-table.csv --leave-one-scene-out --without picture_noise")]
@@ -29,6 +30,10 @@ pub struct EvaluateArgs {
     /// Predict each scene with a model that has seen neither the scene nor another view of its room.
     #[arg(long)]
     leave_one_scene_out: bool,
+    /// Predict each scene with everything chosen without it and without other views of its room: the constants
+    /// of the descriptor, its numbers, C and γ. Takes a table that `train --save-choices` wrote, or a corpus.
+    #[arg(long, conflicts_with_all = ["model", "leave_one_scene_out", "without", "rivals"])]
+    nested: bool,
     /// A tile has converged when P reaches this.
     #[arg(long, default_value_t = Threshold::PAPER, value_name = "P")]
     threshold: Threshold,
@@ -64,14 +69,15 @@ impl EvaluateArgs {
             let what = if self.rivals.is_empty() { "evaluate --figures" } else { "evaluate --rivals" };
             return crate::left_out::left_out(what, "lab", "evaluate …");
         }
-        let (mut data, params) = super::data::check_data(self.data, &self.search)?;
-        let model = match self.leave_one_scene_out {
+        let (mut data, params) = super::data::check_data(self.data, &self.search, self.nested)?;
+        let model = match self.leave_one_scene_out || self.nested {
             true => None,
             false => Some(super::oracle::load_model(self.model.as_deref())?),
         };
         // A model is scored by its own descriptor and evidence
         if let Some(model) = &model {
             (data.descriptor, data.evidence) = (model.descriptor().clone(), model.evidence());
+            data.viewing = model.viewing();
         }
         Ok(crate::evaluate::EvaluateJob {
             data,
@@ -83,6 +89,7 @@ impl EvaluateArgs {
             #[cfg(feature = "lab")]
             figures: self.figures,
             without: self.without,
+            nested: self.nested,
             #[cfg(feature = "lab")]
             rivals: self.rivals,
         })

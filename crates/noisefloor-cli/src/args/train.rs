@@ -24,6 +24,9 @@ pub struct TrainArgs {
     /// Also write the table of descriptors; `--table` trains from it without the pictures.
     #[arg(long, value_name = "FILE.csv")]
     save_table: Option<PathBuf>,
+    /// Also write the numbers for every choice of constants in the descriptor, for `evaluate --nested`.
+    #[arg(long, value_name = "FILE.csv", requires = "corpus")]
+    save_choices: Option<PathBuf>,
     /// Learn from the disagreements that `explore` keeps in this database, too. Each counts as much as the
     /// levels of a zone within a factor of two in samples. Prints the scores before and after. (Needs a
     /// build with the feature `study`.)
@@ -43,12 +46,13 @@ impl TrainArgs {
         if self.disagreements.is_some() {
             return crate::left_out::left_out("train --disagreements", "study", "train --disagreements …");
         }
-        let (data, params) = super::data::check_data(self.data, &self.search)?;
+        let (data, params) = super::data::check_data(self.data, &self.search, false)?;
         Ok(crate::train::TrainJob {
             data,
             params,
             out: self.out,
             save_table: self.save_table,
+            save_choices: self.save_choices,
             #[cfg(feature = "study")]
             disagreements: self.disagreements,
             scores: !self.no_scores,

@@ -5,14 +5,14 @@ mod rivals;
 mod tables;
 
 use crate::files::{write_csv, write_json};
-use crate::learning::{DataJob, held_out};
+use crate::learning::{DataJob, chosen_and_held_out, held_out};
 use crate::say::say;
 use anyhow::{anyhow, bail};
 use noisefloor::{Model, Threshold};
 use noisefloor_image::check_writable;
 #[cfg(feature = "lab")]
 use noisefloor_lab::rivals::RatedRival;
-use noisefloor_learn::{Evaluation, Prediction, Table, TrainParams, predict};
+use noisefloor_learn::{Chosen, Evaluation, Prediction, Table, TrainParams, predict};
 #[cfg(feature = "lab")]
 use noisefloor_rivals::Rival;
 use serde::Serialize;
@@ -30,6 +30,8 @@ pub struct EvaluateJob {
     #[cfg(feature = "lab")]
     pub figures: Option<PathBuf>,
     pub without: Vec<String>,
+    /// Whether everything is chosen without the scene that is predicted.
+    pub nested: bool,
     #[cfg(feature = "lab")]
     pub rivals: Vec<&'static Rival>,
 }
@@ -39,6 +41,9 @@ pub struct EvaluateJob {
 struct Report {
     #[serde(flatten)]
     evaluation: Evaluation,
+    /// What was chosen without each group of scenes, with `--nested`.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    choices: Vec<Chosen>,
     /// Other criteria on the same zones, if `--rivals` asked for them.
     #[cfg(feature = "lab")]
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -49,13 +54,11 @@ pub fn run(job: &EvaluateJob) -> anyhow::Result<()> {
     for path in job.json.iter().chain(&job.csv) {
         check_writable(path)?;
     }
-    let table = job.data.load()?.without(&job.without).map_err(|name| {
-        let names = job.data.descriptor.number_names().join(", ");
-        anyhow!("--without {name}: the numbers of the table are {names}")
-    })?;
-    let (predicted_by, predictions) = predictions(job, &table)?;
+    let table = if job.nested { job.data.load_choices()? } else { table(job)? };
+    let Predicted { by, predictions, choices } = predict_zones(job, &table)?;
     let report = Report {
-        evaluation: Evaluation::new(predicted_by, &table, &predictions, job.params.spread),
+        evaluation: Evaluation::new(by, &table, &predictions, job.params.spread),
+        choices,
         #[cfg(feature = "lab")]
         rivals: rivals::rate(job)?,
     };
@@ -68,6 +71,7 @@ pub fn run(job: &EvaluateJob) -> anyhow::Result<()> {
     #[cfg(feature = "lab")]
     rivals::draw(job, &predictions, &report)?;
     tables::say_scores(&report.evaluation)?;
+    tables::say_choices(&report.choices)?;
     #[cfg(feature = "lab")]
     if !report.rivals.is_empty() {
         rivals::say_rated(&predictions, &report.rivals)?;
@@ -75,10 +79,31 @@ pub fn run(job: &EvaluateJob) -> anyhow::Result<()> {
     say_caveats(job, &table)
 }
 
+/// Predictions of the zones of a table.
+struct Predicted {
+    by: String,
+    predictions: Vec<Prediction>,
+    choices: Vec<Chosen>,
+}
+
+/// The table without the numbers that are left out.
+fn table(job: &EvaluateJob) -> anyhow::Result<Table> {
+    let table = job.data.load()?;
+    let names = table.descriptor.number_names().join(", ");
+    table
+        .without(&job.without)
+        .map_err(|name| anyhow!("--without {name}: the numbers of the table are {names}"))
+}
+
 /// Who predicts, and what.
-fn predictions(job: &EvaluateJob, table: &Table) -> anyhow::Result<(String, Vec<Prediction>)> {
+fn predict_zones(job: &EvaluateJob, table: &Table) -> anyhow::Result<Predicted> {
+    if job.nested {
+        let (predictions, choices) = chosen_and_held_out(table, &job.params, job.threshold)?;
+        return Ok(Predicted { by: "nested leave-one-scene-out".to_owned(), predictions, choices });
+    }
     let Some(model) = &job.model else {
-        return Ok(("leave-one-scene-out".to_owned(), held_out(table, &job.params, job.threshold)?));
+        let predictions = held_out(table, &job.params, job.threshold)?;
+        return Ok(Predicted { by: "leave-one-scene-out".to_owned(), predictions, choices: Vec::new() });
     };
     if (model.descriptor(), model.evidence()) != (&table.descriptor, table.evidence) {
         bail!(
@@ -91,7 +116,7 @@ fn predictions(job: &EvaluateJob, table: &Table) -> anyhow::Result<(String, Vec<
         );
     }
     let predictions = table.zones.iter().map(|z| predict(|raw| model.judge(raw), job.threshold, z)).collect();
-    Ok((model.digest(), predictions))
+    Ok(Predicted { by: model.digest(), predictions, choices: Vec::new() })
 }
 
 /// What flatters a number stands beside it.

@@ -1,7 +1,7 @@
 //! Scores as a table.
 
 use crate::say::{NotSaid, say};
-use noisefloor_learn::{Baselines, Evaluation, PredictionScores};
+use noisefloor_learn::{Baselines, Chosen, Evaluation, PredictionScores};
 
 pub(super) fn say_scores(evaluation: &Evaluation) -> Result<(), NotSaid> {
     say!("{:22} zones  error  bias   early  images right    constant noise    scene median", "scene")?;
@@ -9,6 +9,11 @@ pub(super) fn say_scores(evaluation: &Evaluation) -> Result<(), NotSaid> {
         say_line(&scene.scene, &scene.summary, &scene.baselines)?;
     }
     say_line("all", &evaluation.summary, &evaluation.baselines)?;
+    if let Some((low, high)) = evaluation.error_interval {
+        say!(
+            "error if other groups of scenes were drawn from those that are there: ×{low:.2} to ×{high:.2} (90 %)"
+        )?;
+    }
     say!(
         "calibration error of P: {:.3} against the share of observers (assumed: logistic around the recorded threshold), {:.3} against \
          the recorded threshold as a step",
@@ -25,6 +30,16 @@ pub(super) fn say_scores(evaluation: &Evaluation) -> Result<(), NotSaid> {
         evaluation.censored_zones,
         evaluation.unfamiliar_zones
     )
+}
+
+/// What was chosen without each group.
+pub(super) fn say_choices(choices: &[Chosen]) -> Result<(), NotSaid> {
+    for Chosen { without, choice, c, gamma, error_factor } in choices {
+        say!(
+            "chosen without {without}: {choice}; C = {c}, γ = {gamma} (×{error_factor:.2} on the other scenes)"
+        )?;
+    }
+    Ok(())
 }
 
 fn say_line(name: &str, s: &PredictionScores, b: &Baselines) -> Result<(), NotSaid> {

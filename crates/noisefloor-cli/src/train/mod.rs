@@ -16,14 +16,20 @@ pub struct TrainJob {
     pub params: TrainParams,
     pub out: PathBuf,
     pub save_table: Option<PathBuf>,
+    pub save_choices: Option<PathBuf>,
     #[cfg(feature = "study")]
     pub disagreements: Option<PathBuf>,
     pub scores: bool,
 }
 
 pub fn run(job: &TrainJob) -> anyhow::Result<()> {
-    for path in job.save_table.iter().chain([&job.out]) {
+    for path in job.save_table.iter().chain(&job.save_choices).chain([&job.out]) {
         check_writable(path)?;
+    }
+    if let Some(path) = &job.save_choices {
+        let table = job.data.load_choices()?;
+        write_atomic(path, |to| write_table(&table, to))?;
+        note!("numbers for every choice written to {}", path.display());
     }
     let table = job.data.load()?;
     if let Some(path) = &job.save_table {

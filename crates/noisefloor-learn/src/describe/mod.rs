@@ -131,11 +131,11 @@ fn synthesised_levels(zones: &[&JudgedZone]) -> Vec<f64> {
 }
 
 /// A level before it is seen in its picture.
-struct Alone {
-    spp: f64,
-    origin: Origin,
-    noise: f32,
-    described: Described,
+pub(crate) struct Alone {
+    pub(crate) spp: f64,
+    pub(crate) origin: Origin,
+    pub(crate) noise: f32,
+    pub(crate) described: Described,
 }
 
 /// A zone, of which the levels are still to come, and these.
@@ -165,7 +165,7 @@ fn describe_zone(
 }
 
 /// Sees each level of each zone of one scene beside the same level of the other zones.
-fn in_picture(zones: Vec<(Zone, Vec<Alone>)>, descriptor: &Descriptor) -> Vec<Zone> {
+pub(crate) fn in_picture(zones: Vec<(Zone, Vec<Alone>)>, descriptor: &Descriptor) -> Vec<Zone> {
     let (mut zones, levels): (Vec<Zone>, Vec<Vec<Alone>>) = zones.into_iter().unzip();
     // Of equal samples, the first belongs to the first of other zones: realisations of the noise come in one
     // order.

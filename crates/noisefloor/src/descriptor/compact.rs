@@ -183,17 +183,27 @@ fn describe(planes: &TilePlanes, mask: NoiseMask) -> [f32; OWN] {
 }
 
 /// Pools over the blocks. Sums run over ratios to the largest energy, so that no power overflows.
-fn pool(Blocks { visible, texture, .. }: &Blocks) -> [f32; OWN] {
-    let blocks = visible.len() as f32;
+fn pool(blocks: &Blocks) -> [f32; OWN] {
+    let Blocks { visible, texture, .. } = blocks;
+    let count = visible.len() as f32;
     let largest = visible.iter().copied().fold(f32::MIN_POSITIVE, f32::max);
-    let pooled = visible.iter().map(|v| (v / largest).powi(POOLING / 2)).sum::<f32>() / blocks;
+    let pooled = visible.iter().map(|v| (v / largest).powi(POOLING / 2)).sum::<f32>() / count;
     let energy = largest * pooled.powf(2.0 / POOLING as f32);
     let log_amplitude = |energy: f32| 0.5 * energy.ln();
     [
         log_amplitude(energy + NOISE_FLOOR),
-        texture.iter().map(|t| log_amplitude(t + TEXTURE_FLOOR)).sum::<f32>() / blocks,
-        log_amplitude(texture.iter().sum::<f32>() / blocks + TEXTURE_FLOOR),
+        texture.iter().map(|t| log_amplitude(t + TEXTURE_FLOOR)).sum::<f32>() / count,
+        mean_texture(blocks),
     ]
+}
+
+/// The third number, for another descriptor.
+pub(super) fn texture_energy(planes: &TilePlanes, mask: NoiseMask) -> f32 {
+    Blocks::with(planes, mask, mean_texture)
+}
+
+fn mean_texture(Blocks { texture, .. }: &Blocks) -> f32 {
+    0.5 * (texture.iter().sum::<f32>() / texture.len() as f32 + TEXTURE_FLOOR).ln()
 }
 
 /// The amplitude of visible noise at each pixel of the tile, that of its block, in 8-bit steps. Its mean of

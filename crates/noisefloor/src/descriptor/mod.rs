@@ -8,17 +8,26 @@
 mod compact;
 mod kind;
 mod pair;
+mod visible;
 
 pub use kind::{Described, Descriptor, DescriptorError, DescriptorKind, DescriptorSpec, TileDescriptor};
 
 use crate::mask::NoiseMask;
 
 /// The built-in descriptors.
-const KINDS: [DescriptorKind; 3] = [compact::KIND, pair::MASKS, pair::LUMINANCES];
+const KINDS: [DescriptorKind; 4] = [visible::KIND, compact::KIND, pair::MASKS, pair::LUMINANCES];
 
 impl Descriptor {
+    /// Five numbers, whatever the tile size: how many times too strong the noise is by a model of human vision,
+    /// the tile's texture and brightness, and noise and brightness of the whole picture.
+    /// Knows viewing conditions.
+    pub fn visible() -> Self {
+        Self::new(visible::Visible::default())
+    }
+
     /// Six numbers, whatever the tile size: how visible the noise is where it is most visible, how much
-    /// texture hides it, and the same for the whole picture. The default.
+    /// texture hides it, and the same for the whole picture. By constants of our own; knows no viewing
+    /// conditions.
     pub fn compact(mask: NoiseMask) -> Self {
         Self::new(compact::Compact { mask })
     }

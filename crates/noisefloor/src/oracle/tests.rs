@@ -222,7 +222,9 @@ fn the_paper_s_descriptor_judges_tiles_of_its_size_only() {
 fn a_descriptor_that_knows_nothing_of_displays_refuses_another_one() {
     let grid = TileGrid::new(32, 32, 32).unwrap();
     let mut film = Film::new(grid);
-    [0.2, 0.3].map(|value| film.add(0, 10, &[[value; 3]; 1024]).unwrap());
+    for value in [0.2, 0.3] {
+        film.add(0, 10, &[[value; 3]; 1024]).unwrap();
+    }
     let mut oracle = Oracle::new(small(), Threshold::PAPER);
     let tiles: Vec<Tile> = grid.tiles().collect();
     let mut judge = |viewing: Viewing| {

@@ -1,0 +1,295 @@
+//! The descriptor on the vision model: how many times too strong the noise is, by a model of contrast
+//! sensitivity and masking that was fitted to other pictures and other people.
+//!
+//! The vision model says how visible the residual is on its picture, place by place. The mean of high order
+//! over the tile is one number, since observers look for the worst place. What counts is the contrast that
+//! the residual would need for this number to reach a fixed difference: 0.5 says that the noise is twice too
+//! strong. Its logarithm falls with samples exactly as that of the noise does, so that the expected need
+//! follows without looking at the picture again.
+//!
+//! Two more numbers say what the tile is made of: its texture, by which unfamiliar tiles are told, and its
+//! brightness. The picture's noise and brightness stand beside them: people judge a tile in its picture, and
+//! ask for more samples in bright pictures than the vision model expects. `docs/accuracy.md` has the scores,
+//! with all of this chosen without the scenes that are scored.
+
+use super::compact::texture_energy;
+use super::kind::{Described, Descriptor, DescriptorError, DescriptorKind, TileDescriptor};
+use crate::evidence::{ROUNDING_LUMINANCE, TilePlanes};
+use crate::mask::NoiseMask;
+use ndarray::{Array2, ArrayView2, s};
+use noisefloor_vision::{
+    DifferenceBand, ResidualPatch, ResidualPixels, VisibleDifference, VisionDetail, VisionModel,
+    VisionWorkspace,
+};
+use std::cell::RefCell;
+use std::collections::BTreeMap;
+
+/// What the numbers are.
+const NAMES: [&str; 5] = ["visible_noise", "texture", "light", "picture_noise", "picture_light"];
+/// Those of the tile by itself; the others are the picture's.
+const OWN: usize = 3;
+/// Which of them are noise, the tile's and the picture's.
+const NOISE: [usize; 2] = [0, OWN];
+/// Which of the tile's own say what it is made of, and stay as they are when noise falls.
+const TEXTURE: [usize; 2] = [1, 2];
+
+/// All numbers are logarithms, and differ by 0.4 to 1 over the human data. Where scenes are few and alike, the
+/// picture's numbers hardly differ, and a machine would make much of it.
+const LEAST_DEVIATION: f64 = 0.3;
+
+/// Least amplitude of noise that is told from none, in units of the amplitude that is just too strong.
+const NOISE_FLOOR: f64 = 0.03;
+/// Least light that is told from black, as a share of white.
+const LIGHT_FLOOR: f32 = 0.002;
+/// Exponent from display luminance Y′ to a share of the light of white; close to sRGB's curve, and the same
+/// for all displays.
+const GAMMA: f32 = 2.2;
+/// How often the contrast is corrected; the last correction is not checked. What is left is 5 % at a tenth of the
+/// noise that is too strong, and below 2 % near it.
+const CORRECTIONS: usize = 3;
+/// How a pooled difference grows with contrast before that is known: between weak noise (2.26) and strong.
+const USUAL_GROWTH: f64 = 1.3;
+
+pub(super) const KIND: DescriptorKind = DescriptorKind {
+    name: "visible",
+    make: |parameters| Ok(Descriptor::new(Visible::from_parameters(parameters)?)),
+};
+
+/// See [`Descriptor::visible`].
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Visible {
+    /// Order of the mean over a tile.
+    order: Order,
+    /// Pooled difference at which noise is just too strong, in units of the vision model.
+    difference: f64,
+    /// Order of the mean over the tiles of a picture, on amplitudes of noise.
+    picture_order: Order,
+}
+
+/// The order of a mean: 2 to the power of this.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Order(u32);
+
+impl Order {
+    fn number(self) -> f64 {
+        f64::from(1u32 << self.0)
+    }
+
+    fn power(self, x: f64) -> f64 {
+        (0..self.0).fold(x, |x, _| x * x)
+    }
+
+    fn root(self, x: f64) -> f64 {
+        (0..self.0).fold(x, |x, _| x.sqrt())
+    }
+}
+
+impl Default for Visible {
+    fn default() -> Self {
+        Self { order: Order(3), difference: 20.0, picture_order: Order(3) }
+    }
+}
+
+impl Visible {
+    fn from_parameters(parameters: &BTreeMap<String, f64>) -> Result<Self, String> {
+        let given = |name: &str| parameters.get(name).copied().ok_or(format!("its {name} is missing"));
+        let order = |name: &str| {
+            let number = given(name)?;
+            let order = (0..5).map(Order).find(|order| order.number() == number);
+            order.ok_or(format!("its {name} is {number}, and not 1, 2, 4, 8 or 16"))
+        };
+        let difference = given("difference")?;
+        if !(1.0..=300.0).contains(&difference) {
+            return Err(format!("its difference of {difference} is not within 1…300"));
+        }
+        Ok(Self { order: order("order")?, difference, picture_order: order("picture_order")? })
+    }
+}
+
+impl TileDescriptor for Visible {
+    fn name(&self) -> &'static str {
+        KIND.name
+    }
+
+    fn version(&self) -> u16 {
+        1
+    }
+
+    fn parameters(&self) -> BTreeMap<String, f64> {
+        let numbers = [
+            ("order", self.order.number()),
+            ("difference", self.difference),
+            ("picture_order", self.picture_order.number()),
+        ];
+        numbers.map(|(name, number)| (name.to_owned(), number)).into()
+    }
+
+    fn number_names(&self) -> Vec<String> {
+        NAMES.map(str::to_owned).to_vec()
+    }
+
+    fn own_len(&self) -> usize {
+        OWN
+    }
+
+    fn describe(&self, planes: &TilePlanes) -> Result<Vec<f32>, DescriptorError> {
+        // What is not finite is never converged
+        let noise =
+            with_differences(planes, |differences| self.amplitude(differences)).unwrap_or(f64::INFINITY);
+        let noise = noise * without_rounding(planes);
+        Ok(vec![noise_number(noise), texture_energy(planes, NoiseMask::default()), light(planes)])
+    }
+
+    fn in_picture(&self, tiles: &[Described]) -> Vec<Vec<f32>> {
+        Visible::in_picture(*self, tiles)
+    }
+
+    fn texture(&self) -> &[usize] {
+        &TEXTURE
+    }
+
+    fn least_deviation(&self) -> f64 {
+        LEAST_DEVIATION
+    }
+
+    fn knows_viewing(&self) -> bool {
+        true
+    }
+
+    fn project(&self, raw: &mut [f32], factor: f32) -> bool {
+        for i in NOISE {
+            raw[i] = noise_number(amplitude(raw[i]) / f64::from(factor).sqrt());
+        }
+        true
+    }
+}
+
+impl Visible {
+    /// How many times stronger the noise is than noise whose pooled difference is [`Visible::difference`]; 0
+    /// without noise. Found on logarithms, by secants: differences grow nearly as a power of contrast.
+    fn amplitude(self, differences: &mut VisibleDifference<'_>) -> f64 {
+        let mut excess = |contrast: f64| {
+            let pooled = self.pooled(differences.map_at(contrast.exp() as f32));
+            (pooled > 0.0).then(|| (pooled / self.difference).ln())
+        };
+        let Some(mut above) = excess(0.0) else { return 0.0 };
+        let (mut at, mut growth) = (0.0, USUAL_GROWTH);
+        for correction in 0..CORRECTIONS {
+            // Beyond ±6, four hundred times too strong or weak, a projection says nothing
+            let next = (at - above / growth).clamp(-6.0, 6.0);
+            if (next - at).abs() < 1e-3 || correction + 1 == CORRECTIONS {
+                return (-next).exp();
+            }
+            let Some(there) = excess(next) else { return (-next).exp() };
+            growth = ((there - above) / (next - at)).clamp(0.3, 2.3);
+            (at, above) = (next, there);
+        }
+        (-at).exp()
+    }
+
+    /// The mean of high order of a map.
+    fn pooled(self, map: DifferenceBand<'_>) -> f64 {
+        let (columns, rows) = map.size();
+        let sum: f64 = map.rows().map(|row| self.powers(row)).sum();
+        self.order.root(sum / (columns * rows) as f64)
+    }
+
+    /// The sum of the powers of a row, in eight sums that processors take side by side.
+    fn powers(self, row: &[f32]) -> f64 {
+        let (chunks, rest) = row.as_chunks::<8>();
+        let mut sums = [0.0; 8];
+        for chunk in chunks {
+            sums.iter_mut().zip(chunk).for_each(|(sum, &x)| *sum += self.order.power(f64::from(x)));
+        }
+        sums.iter().sum::<f64>() + rest.iter().map(|&x| self.order.power(f64::from(x))).sum::<f64>()
+    }
+
+    /// Appends to each tile's own numbers those of the picture that the tiles make up: the mean of high order
+    /// of the amplitudes of their noise, and the mean of their light, by area. Noise is what the tile at hand
+    /// has with its own samples and the picture would have with as many.
+    fn in_picture(self, tiles: &[Described]) -> Vec<Vec<f32>> {
+        let area: f64 = tiles.iter().map(|t| t.area).sum();
+        let mean = |quantity: &dyn Fn(&Described) -> f64| {
+            tiles.iter().map(|t| t.area * quantity(t)).sum::<f64>() / area
+        };
+        let power = |t: &Described| self.picture_order.power(amplitude(t.own[0]) * t.spp.sqrt());
+        let of_one_sample = self.picture_order.root(mean(&power));
+        let light = mean(&|t| f64::from(t.own[2])) as f32;
+        let complete = |tile: &Described| {
+            let picture = [noise_number(of_one_sample / tile.spp.sqrt()), light];
+            tile.own.iter().copied().chain(picture).collect()
+        };
+        tiles.iter().map(complete).collect()
+    }
+}
+
+/// What a thread keeps for its next tile: what is constant for a display, and room.
+#[derive(Default)]
+struct Eyes {
+    model: Option<VisionModel>,
+    workspace: VisionWorkspace,
+}
+
+thread_local! {
+    static EYES: RefCell<Eyes> = RefCell::default();
+}
+
+/// What `use_them` makes of the visible differences in a tile; `None` if a pixel is not finite.
+fn with_differences<T>(
+    planes: &TilePlanes,
+    use_them: impl FnOnce(&mut VisibleDifference<'_>) -> T,
+) -> Option<T> {
+    EYES.with_borrow_mut(|Eyes { model, workspace }| {
+        if model.as_ref().is_some_and(|model| *model.viewing() != planes.viewing) {
+            *model = None;
+        }
+        let model = model.get_or_insert_with(|| VisionModel::new(&planes.viewing));
+        let (rows, columns) = planes.image.dim();
+        let [picture, residual] = [&planes.image, &planes.residual]
+            .map(|plane| plane.as_slice().expect("planes are in standard layout"));
+        let t = planes.inner;
+        let patch = ResidualPatch {
+            pixels: ResidualPixels::Grey { picture, residual },
+            size: (columns, rows),
+            columns: t.x..t.x + t.width,
+            rows: t.y..t.y + t.height,
+        };
+        model.residual(&patch, VisionDetail::FAST, workspace).ok().as_mut().map(use_them)
+    })
+}
+
+/// The pixels of the tile itself.
+fn inner<'a>(plane: &'a Array2<f32>, planes: &TilePlanes) -> ArrayView2<'a, f32> {
+    let t = planes.inner;
+    plane.slice(s![t.y..t.y + t.height, t.x..t.x + t.width])
+}
+
+/// The share of the amplitude of the residual that is not known rounding noise.
+fn without_rounding(planes: &TilePlanes) -> f64 {
+    let known = f64::from(planes.rounding * ROUNDING_LUMINANCE);
+    if known == 0.0 {
+        return 1.0;
+    }
+    let squares = inner(&planes.residual, planes).fold(0.0, |sum, &v| sum + f64::from(v) * f64::from(v));
+    (1.0 - known * planes.inner.pixels() as f64 / squares.max(f64::MIN_POSITIVE)).max(0.0).sqrt()
+}
+
+/// The amplitude above the floor, of a noise number.
+fn amplitude(number: f32) -> f64 {
+    ((2.0 * f64::from(number)).exp() - NOISE_FLOOR * NOISE_FLOOR).max(0.0).sqrt()
+}
+
+fn noise_number(amplitude: f64) -> f32 {
+    let amplitude = amplitude.min(1e6);
+    (0.5 * (amplitude * amplitude + NOISE_FLOOR * NOISE_FLOOR).ln()) as f32
+}
+
+/// The mean logarithm of the tile's light, as a share of that of white.
+fn light(planes: &TilePlanes) -> f32 {
+    let mean = inner(&planes.image, planes).fold(0.0, |sum, &luma| sum + f64::from(luma))
+        / planes.inner.pixels() as f64;
+    ((mean as f32).clamp(0.0, 1.0).powf(GAMMA) + LIGHT_FLOOR).ln()
+}
+
+#[cfg(test)]
+mod tests;

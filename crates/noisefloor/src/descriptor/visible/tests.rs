@@ -1,0 +1,107 @@
+use super::*;
+use crate::tile::TileGrid;
+use noisefloor_testkit::Noise;
+use noisefloor_vision::Viewing;
+
+/// A grey tile of this brightness with white noise of this standard deviation, in display values.
+fn tile(brightness: f32, noise: f32) -> TilePlanes {
+    let tile = TileGrid::new(96, 80, 96).unwrap().tile(0);
+    let mut random = Noise::new(17);
+    let values: Vec<f32> = (0..96 * 80).map(|_| noise * random.normal() as f32).collect();
+    TilePlanes::gather((96, 80), tile, |x, y| ([brightness; 3], [values[y * 96 + x]; 3]))
+}
+
+fn on(viewing: &str, planes: &TilePlanes) -> TilePlanes {
+    TilePlanes { viewing: viewing.parse::<Viewing>().unwrap(), ..planes.clone() }
+}
+
+fn own(planes: &TilePlanes) -> Vec<f32> {
+    Descriptor::visible().describe(planes).unwrap()
+}
+
+/// A tenth to five times the noise that is too strong: the contrast that is found has the difference that is
+/// looked for. Three corrections leave 8 % of the difference at a tenth, which is 5 % of the contrast.
+#[test]
+fn noise_is_as_strong_as_its_contrast_says() {
+    let visible = Visible::default();
+    for (noise, left) in [(0.001, 0.1), (0.004, 0.02), (0.016, 0.02), (0.064, 0.02)] {
+        let planes = tile(0.5, noise);
+        let amplitude = with_differences(&planes, |differences| visible.amplitude(differences)).unwrap();
+        let there = |differences: &mut VisibleDifference<'_>| {
+            visible.pooled(differences.map_at(1.0 / amplitude as f32))
+        };
+        let pooled = with_differences(&planes, there).unwrap();
+        assert!((pooled / visible.difference - 1.0).abs() < left, "{noise}: {amplitude} {pooled}");
+    }
+}
+
+#[test]
+fn projecting_is_what_more_samples_do() {
+    let descriptor = Descriptor::visible();
+    for noise in [0.01, 0.04] {
+        let (mut noisy, clean) = (own(&tile(0.5, noise)), own(&tile(0.5, noise / 2.0)));
+        noisy.extend([0.0; 2]);
+        assert!(descriptor.project(&mut noisy, 4.0));
+        // A weaker residual hides less of what masks it: 3 % of the contrast here
+        assert!((noisy[0] - clean[0]).abs() < 0.05, "{noisy:?} {clean:?}");
+        assert_eq!(noisy[1..3], clean[1..3]);
+    }
+}
+
+#[test]
+fn no_noise_is_the_floor_and_broken_pixels_never_converge() {
+    let floor = NOISE_FLOOR.ln() as f32;
+    // Contrasts end at e⁶
+    assert!((own(&tile(0.5, 0.0))[0] - floor).abs() < 0.005);
+    // Nothing but the rounding of 8-bit pictures
+    let mut rounded = tile(0.5, (1.0 / 255.0) / 12f32.sqrt());
+    let exact = own(&rounded)[0];
+    rounded.rounding = (1.0f32 / 255.0).powi(2) / 12.0 / ROUNDING_LUMINANCE;
+    // Its variance is known within 2 % from 7680 pixels, so a seventh of the amplitude can remain
+    assert!(own(&rounded)[0] < exact - 1.5, "{} {exact}", own(&rounded)[0]);
+    let mut broken = tile(0.5, 0.01);
+    broken.residual[(20, 20)] = f32::NAN;
+    assert!(own(&broken)[0] > 10.0);
+}
+
+#[test]
+fn distance_hides_noise_and_bright_displays_show_it() {
+    let planes = tile(0.4, 0.02);
+    let at = |viewing: &str| own(&on(viewing, &planes));
+    let desk = at("desk");
+    assert_eq!(desk, own(&planes));
+    let far = at("desk,distance=1.2");
+    assert!(far[0] < desk[0] - 0.3, "{far:?} {desk:?}");
+    let bright = at("desk,peak=1000");
+    assert!(bright[0] > desk[0] + 0.05, "{bright:?} {desk:?}");
+    // What the tile is made of stays
+    assert_eq!((&far[1..], &bright[1..]), (&desk[1..], &desk[1..]));
+}
+
+#[test]
+fn a_picture_of_equal_tiles_is_as_noisy_as_each_and_samples_count() {
+    let tile =
+        |spp: f64, noise: f64| Described { own: vec![noise_number(noise), 1.0, -1.0], spp, area: 100.0 };
+    let descriptor = Descriptor::visible();
+    for numbers in descriptor.in_picture(&[tile(64.0, 2.0), tile(64.0, 2.0)]) {
+        assert!((numbers[0] - numbers[3]).abs() < 1e-5 && numbers[2] == numbers[4], "{numbers:?}");
+    }
+    // The same scene at a quarter of the samples in one of the tiles
+    let uneven = descriptor.in_picture(&[tile(16.0, 4.0), tile(64.0, 2.0)]);
+    assert!((uneven[0][3] - uneven[0][0]).abs() < 1e-5 && (uneven[1][3] - uneven[1][0]).abs() < 1e-5);
+    // The mean of eighth order of 1 and 0, by area
+    let half = descriptor.in_picture(&[tile(16.0, 1.0), tile(16.0, 0.0)]);
+    assert!((amplitude(half[0][3]) - 0.5f64.powf(0.125)).abs() < 1e-3, "{half:?}");
+}
+
+#[test]
+fn files_name_the_constants() {
+    let spec = Descriptor::visible().spec();
+    assert_eq!(Descriptor::from_spec(&spec, &[]).unwrap(), Descriptor::visible());
+    for (name, wrong) in [("order", 3.0), ("picture_order", 0.0), ("difference", f64::NAN)] {
+        let mut spec = spec.clone();
+        spec.parameters.insert(name.into(), wrong);
+        let error = Descriptor::from_spec(&spec, &[]).unwrap_err().to_string();
+        assert!(error.contains(name), "{error}");
+    }
+}
