@@ -137,6 +137,40 @@ test("pictures are dropped, judged and disagreed with by mouse, in a small windo
   await until("verdicts are hidden", () => page.locator(".chip.top").first().isHidden());
 });
 
+test("a dozen answers turn verdicts, each within a second of its click", async (t) => {
+  const { page } = await open(t, EXPLORER, SMALL, { refusals: true });
+  await empty(page);
+  await drop(page, stack);
+  await page.getByRole("alert").getByText("do not show whether").waitFor();
+  await page.locator("#samples").selectOption("independent");
+  const times = [];
+  for (const [level, spp] of [50, 1200].entries()) {
+    await page.locator("#level").fill(String(level));
+    for (let n = 0; n < 6; n += 1) {
+      await page.locator("#audience").selectOption("observers");
+      await page.getByText(`0 of 6 tiles have converged at ${spp} spp`).waitFor();
+      await page.evaluate((n) => {
+        const button = document.querySelectorAll("#tiles button")[n];
+        const begun = performance.now();
+        globalThis.turned = new Promise((turned) => {
+          new MutationObserver(() => {
+            if (button.getAttribute("aria-label").includes(", you: none")) turned(performance.now() - begun);
+          }).observe(button, { attributeFilter: ["aria-label"] });
+        });
+        button.click();
+      }, n);
+      times.push(await page.evaluate(() => globalThis.turned));
+    }
+  }
+  times.sort((a, b) => a - b);
+  console.log(`from a click to the new verdicts: ${times.map((ms) => ms.toFixed(0)).join(", ")} ms`);
+  assert.ok(times[6] < 1000, "the median of them");
+  await page.locator("#audience").selectOption("you");
+  await page.locator("#yours-here").getByText(/In this picture 0 → [4-6] of 6/).waitFor();
+  await page.getByText("12 answers: T′ =").waitFor();
+  await accessible(page, "the line");
+});
+
 test("everything goes by keyboard alone, in a large window", async (t) => {
   const { page } = await open(t, EXPLORER, LARGE, { refusals: true });
   // Asked for well before the key that opens it: Chromium is told to hand choosers over only while somebody listens, and
