@@ -33,7 +33,7 @@ def render(noisefloor, scene, out, *options, tile=TILE):
     if os.path.exists(os.path.join(out, "report.json")) and report(out)["complete"]:
         return
     print(os.path.basename(out), flush=True)
-    command = [noisefloor, "render", scene, "--tile", str(tile), "--quiet", "--out", out, *options]
+    command = [noisefloor, "render", scene, "--tile", str(tile), "--quiet", "--force", "--out", out, *options]
     subprocess.run(command, check=True)
 
 

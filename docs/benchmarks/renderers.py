@@ -45,7 +45,7 @@ def run(args):
             if complete(out):
                 continue
             command = [args.noisefloor, "render", scene, "--source", source, "--size", args.size, "--tile", str(TILE)]
-            command += ["--seed", str(seed), "--max-spp", str(args.max_spp), "--out", out, "--quiet"]
+            command += ["--seed", str(seed), "--max-spp", str(args.max_spp), "--out", out, "--quiet", "--force"]
             print(source, seed, flush=True)
             subprocess.run(command, check=True)
 

@@ -1,6 +1,6 @@
 //! `noisefloor audience`.
 
-use crate::say::say;
+use crate::say::{say, say_json};
 use anyhow::{Context, bail};
 use csv::{ReaderBuilder, Trim};
 use noisefloor::Audience;
@@ -32,8 +32,7 @@ pub fn fit(job: &FitJob) -> anyhow::Result<()> {
     let Audience { slope, offset } = fit.line;
     let argument = format!("{slope:.4},{offset:.2}");
     if job.json {
-        say!("{}", serde_json::to_string_pretty(&Report { fit, argument })?)?;
-        return Ok(());
+        return say_json(&Report { fit, argument });
     }
     let sign = if offset < 0.0 { '-' } else { '+' };
     let r = fit.correlation.map_or("undefined".into(), |r| format!("{r:.3}"));

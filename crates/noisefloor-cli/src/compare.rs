@@ -2,15 +2,16 @@
 
 use crate::bars::Bars;
 use crate::files::read_reference;
-use crate::say::{NotSaid, note, say};
+use crate::folder::{Earlier, Folder, Occupied};
+use crate::say::{NotSaid, note, one_line, say};
 use crate::signals::{AFTER_THIS_BATCH, INTERRUPTED, cancel_on_signal};
-use crate::sources::{Opened, SourceJob, SourceKind};
+use crate::sources::{Opened, SourceJob};
 use anyhow::Context;
 use noisefloor::{Params, SourceInfo, StoppingCriterion};
-use noisefloor_lab::Advance;
 use noisefloor_lab::compare::{
     self, Comparison, Converged, Cost, Entrant, Labels, ReferenceJob, Setting, render_reference,
 };
+use noisefloor_lab::{Advance, LabError};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::Arc;
@@ -32,26 +33,39 @@ pub struct CompareJob {
     pub reference: Option<PathBuf>,
     pub reference_spp: u64,
     pub pixels_per_degree: f64,
+    pub earlier: Earlier,
     pub quiet: bool,
 }
 
 pub fn run(job: &CompareJob) -> anyhow::Result<ExitCode> {
     job.source.start_threads()?;
-    std::fs::create_dir_all(&job.out).with_context(|| {
-        format!("{}: this folder cannot be made; choose another with --out", job.out.display())
-    })?;
+    let folder = Folder::claim(job.out.clone())?;
+    if job.earlier == Earlier::Keep && folder.first_of(&["index.html"]).is_some() {
+        let path = job.out.display();
+        let what = format!(
+            "{path}: holds a comparison; --force overwrites it, and uses its references where they still \
+             fit; --out names another folder"
+        );
+        return Err(Occupied::new(what).into());
+    }
     let cancel = Arc::new(AtomicBool::new(false));
     cancel_on_signal(Arc::clone(&cancel), AFTER_THIS_BATCH)?;
 
     let (mut all, mut sections) = (Vec::new(), Vec::new());
     for scene in &job.scenes {
         let source = SourceJob { scene: Some(scene.clone()), ..job.source.clone() };
-        let (comparison, section) = one(job, &source, &cancel)?;
+        let (comparison, section) = match one(job, &source, &cancel) {
+            Err(error) if matches!(error.downcast_ref(), Some(LabError::Cancelled { .. })) => {
+                note!("warning: {}", one_line(&error));
+                return Ok(ExitCode::from(INTERRUPTED));
+            }
+            outcome => outcome?,
+        };
         let cancelled = comparison.cancelled;
         // All that there is so far, so that a page is there whatever comes after
         all.push(comparison);
         sections.push(section);
-        compare::write_page(&job.out, &all, &sections)?;
+        compare::write_page(&job.out, &all, &sections, job.scenes.len())?;
         if cancelled {
             note!("warning: stopped early; what there is was written to {}", job.out.display());
             return Ok(ExitCode::from(INTERRUPTED));
@@ -116,20 +130,8 @@ fn converged(
         return Ok(Converged { pixels: read_reference(path, size)?, origin: path.display().to_string() });
     }
     let source = SourceJob { seed: source.seed ^ SEED, ..source.clone() };
-    let (filter, clamp) = match &source.kind {
-        SourceKind::Ptwne(options) => (format!("{:?}", options.filter), options.clamp),
-        _ => (String::new(), None),
-    };
-    let reference = ReferenceJob {
-        folder,
-        scene: source.scene.as_deref().unwrap_or_default(),
-        seed: source.seed,
-        max_depth: source.max_depth,
-        filter,
-        clamp,
-        tile: job.params.tile,
-        spp: job.reference_spp,
-    };
+    let overwrite = job.earlier == Earlier::Overwrite;
+    let reference = ReferenceJob { folder, tile: job.params.tile, spp: job.reference_spp, overwrite };
     Ok(render_reference(source.open()?.source.as_mut(), &reference, cancel, watch)?)
 }
 

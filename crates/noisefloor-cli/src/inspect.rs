@@ -1,6 +1,6 @@
 //! `noisefloor inspect` and `noisefloor scenes`.
 
-use crate::say::{NotSaid, say};
+use crate::say::{NotSaid, say, say_json};
 use noisefloor::{Audience, DescriptorSpec, Evidence, Model, Scores, ToneMapping, TrainingRecord};
 use noisefloor_ptwne::scenes;
 use serde::Serialize;
@@ -53,7 +53,7 @@ impl<'a> Summary<'a> {
 pub fn run(job: &InspectJob) -> anyhow::Result<()> {
     let summary = Summary::of(&job.model);
     if job.json {
-        say!("{}", serde_json::to_string_pretty(&summary)?)?;
+        say_json(&summary)?;
     } else {
         say_all(&summary)?;
     }

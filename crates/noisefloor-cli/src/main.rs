@@ -15,6 +15,7 @@ mod evaluate;
 #[cfg(feature = "study")]
 mod explore;
 mod files;
+mod folder;
 mod inspect;
 mod judge;
 #[cfg(feature = "train")]
@@ -37,6 +38,7 @@ mod train;
 
 use args::{Cli, Command, ScenesCommand};
 use clap::Parser;
+use folder::Occupied;
 use left_out::LeftOut;
 use say::{NotSaid, note, one_line};
 use std::process::ExitCode;
@@ -112,5 +114,7 @@ fn end(error: &anyhow::Error) -> ExitCode {
         return ExitCode::SUCCESS;
     }
     note!("error: {}", one_line(error));
-    if error.is::<LeftOut>() { ExitCode::from(2) } else { ExitCode::FAILURE }
+    // What was typed has to be typed otherwise
+    let usage = error.is::<LeftOut>() || error.is::<Occupied>();
+    if usage { ExitCode::from(2) } else { ExitCode::FAILURE }
 }

@@ -1,5 +1,6 @@
 //! `noisefloor reference`.
 
+use crate::folder::{Earlier, Occupied};
 use crate::output::say_noise;
 use crate::render::reference_bar;
 use crate::say::{note, one_line, say};
@@ -20,6 +21,7 @@ pub struct ReferenceJob {
     pub source: SourceJob,
     /// Ends in .exr.
     pub out: Option<PathBuf>,
+    pub earlier: Earlier,
     pub quiet: bool,
 }
 
@@ -35,6 +37,10 @@ pub fn run(job: ReferenceJob) -> anyhow::Result<ExitCode> {
             PathBuf::from(format!("out/{scene}-reference.exr"))
         }
     };
+    if job.earlier == Earlier::Keep && out.exists() {
+        let what = format!("{}: exists; --force overwrites it, --out names another file", out.display());
+        return Err(Occupied::new(what).into());
+    }
     check_writable(&out)?;
 
     let cancel = Arc::new(AtomicBool::new(false));

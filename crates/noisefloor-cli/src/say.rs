@@ -1,5 +1,8 @@
 //! What the command says: results on standard output, everything else on standard error.
 
+use noisefloor::printable;
+use serde::Serialize;
+use std::borrow::Cow;
 use std::fmt;
 use std::io::{self, Write};
 
@@ -28,9 +31,25 @@ impl From<io::Error> for NotSaid {
     }
 }
 
+/// Names and messages from outside may hold what a terminal would obey: it is shown instead.
+fn safe(text: fmt::Arguments<'_>) -> String {
+    printable(&text.to_string()).into_owned()
+}
+
 /// Writes to standard output, without a line end.
 pub fn print(text: fmt::Arguments<'_>) -> Result<(), NotSaid> {
-    Ok(io::stdout().lock().write_fmt(text)?)
+    Ok(io::stdout().lock().write_all(safe(text).as_bytes())?)
+}
+
+/// A value as JSON, where what a terminal would obey is escaped as JSON does it.
+pub fn say_json(value: &impl Serialize) -> anyhow::Result<()> {
+    let mut text = String::new();
+    for c in serde_json::to_string_pretty(value)?.chars() {
+        let safe = matches!(printable(c.encode_utf8(&mut [0; 4])), Cow::Borrowed(_));
+        // All of them are in the basic plane
+        if safe { text.push(c) } else { text.push_str(&format!("\\u{:04x}", u32::from(c))) }
+    }
+    Ok(print(format_args!("{text}\n"))?)
 }
 
 /// Whatever is left goes out.
@@ -40,7 +59,7 @@ pub fn flush() -> Result<(), NotSaid> {
 
 /// Writes to standard error, where nothing can be done about a failure.
 pub fn aside(text: fmt::Arguments<'_>) {
-    let _ = io::stderr().lock().write_fmt(text);
+    let _ = io::stderr().lock().write_all(safe(text).as_bytes());
 }
 
 /// A line of results, as `println!`; fails with [`NotSaid`].
@@ -83,5 +102,10 @@ mod tests {
         let inner = anyhow::anyhow!("no such file");
         let error = inner.context("a.exr: no such file").context("the scene\ncannot be\u{1b}[2J read");
         assert_eq!(one_line(&error), "the scene cannot be [2J read: a.exr: no such file");
+    }
+
+    #[test]
+    fn what_a_terminal_would_obey_is_shown() {
+        assert_eq!(safe(format_args!("{}\n", "a\u{1b}[2J\u{202e}b")), "a\\u{1b}[2J\\u{202e}b\n");
     }
 }

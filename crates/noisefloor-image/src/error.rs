@@ -214,6 +214,14 @@ pub enum StackError {
         /// What the system said.
         source: io::Error,
     },
+    /// An image of the stack cannot be read.
+    #[error("{}: cannot be read: {source}", path.display())]
+    Unreadable {
+        /// The image.
+        path: PathBuf,
+        /// What the system said.
+        source: io::Error,
+    },
     /// No image in the folder is named as one of a stack.
     #[error(
         "{}: no stack here; name images by their samples per pixel (00100.png, 00100.exr) \

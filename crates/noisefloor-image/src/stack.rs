@@ -5,8 +5,11 @@ use crate::error::StackError;
 use crate::frames::{self, Frame, Layout};
 use crate::picture::LinearImage;
 use crate::read::read_picture;
-use noisefloor::{Batch, ProgressiveSource, Repeats, Request, Rgb, SourceError, SourceInfo, Tile, Unit};
+use noisefloor::{
+    Batch, ProgressiveSource, Repeats, Request, Rgb, SourceError, SourceIdentity, SourceInfo, Tile, Unit,
+};
 use std::collections::VecDeque;
+use std::fs::File;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -170,6 +173,20 @@ impl ProgressiveSource for StackSource {
             aims: true,
             repeats: Repeats::Samples,
         }
+    }
+
+    /// Reads every picture once, for its digest.
+    fn identity(&self) -> Result<SourceIdentity, SourceError> {
+        let mut identity = SourceIdentity::new(format!("stack, {:?}", self.layout));
+        for Frame { path, .. } in &self.frames {
+            let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
+            let added = File::open(path).and_then(|file| identity.add_from(name, file));
+            added.map_err(|source| {
+                let cause = StackError::Unreadable { path: path.clone(), source };
+                SourceError::Failed { name: self.name.clone(), tile: None, cause: Box::new(cause) }
+            })?;
+        }
+        Ok(identity)
     }
 
     fn sample(&mut self, requests: &[Request]) -> Result<Vec<Batch>, SourceError> {

@@ -55,8 +55,8 @@ pub enum LabError {
         /// Why not.
         source: SvmTrainError,
     },
-    /// A folder could not be made.
-    #[error("{}: this folder cannot be made: {source}", path.display())]
+    /// A folder could not be made or read.
+    #[error("{}: this folder cannot be made or read: {source}", path.display())]
     Folder {
         /// The folder.
         path: PathBuf,
@@ -83,8 +83,16 @@ pub enum LabError {
         /// Where it is kept.
         path: PathBuf,
     },
+    /// The kept reference is of something else.
+    #[error("{}: is another reference: {what}; choose another folder, or overwrite it with --force", path.display())]
+    OtherReference {
+        /// The picture.
+        path: PathBuf,
+        /// What is different.
+        what: String,
+    },
     /// A kept reference is not what the file beside it says.
-    #[error("{}: is not the picture that the file beside it describes; remove both", path.display())]
+    #[error("{}: is not the picture that reference.json describes; remove both, or use --force", path.display())]
     KeptReference {
         /// The picture.
         path: PathBuf,

@@ -79,6 +79,7 @@ class LuxCore:
             "height": self.height,
             "unit": "mutations-per-pixel" if self.metropolis else "samples-per-pixel",
             "repeats": "nothing",
+            "late": True,
             "warnings": warnings,
         }
 

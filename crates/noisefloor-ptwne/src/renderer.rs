@@ -10,8 +10,8 @@ use crate::rng::Key;
 use crate::sampler::{Sampler, Sampling};
 use crate::scene::Scene;
 use noisefloor::{
-    Batch, Display, ProgressiveSource, Reference, Repeats, Request, Rgb, SourceError, SourceInfo, Tile,
-    ToneMapping, Unit,
+    Batch, Display, ProgressiveSource, Reference, Repeats, Request, Rgb, SourceError, SourceIdentity,
+    SourceInfo, Tile, ToneMapping, Unit,
 };
 use rayon::prelude::*;
 use std::fmt;
@@ -303,6 +303,14 @@ impl ProgressiveSource for Ptwne {
             aims: true,
             repeats: Repeats::Samples,
         }
+    }
+
+    /// Never fails.
+    fn identity(&self) -> Result<SourceIdentity, SourceError> {
+        // Threads do not change samples
+        let options = RenderOptions { threads: None, ..self.options };
+        let camera = self.scene.camera();
+        Ok(self.scene.identity().clone().with_options(&format!("ptwne, {options:?}, {camera:?}")))
     }
 
     /// # Errors

@@ -10,6 +10,7 @@ use crate::material::CompiledMaterial;
 use crate::math::Vec3;
 use crate::parts::{Parts, Surroundings};
 use crate::texture::Texture;
+use noisefloor::SourceIdentity;
 
 /// A scene whose centre is farther from the origin than this many of its radii is moved there: `f32` keeps 24
 /// bits of each coordinate, and those that only say where the scene is are lost to its detail.
@@ -43,6 +44,7 @@ pub struct Scene {
     pub(crate) has_opacity: bool,
     /// The least distance by which origins of scattered rays are moved off a surface.
     pub(crate) offset: f32,
+    identity: SourceIdentity,
 }
 
 impl Scene {
@@ -86,6 +88,7 @@ impl Scene {
         let bounds = bvh.bounds();
         let lights = Lights::new(lights, bounds, &means);
         let offset = 1e-6 * 0.5 * (bounds[1] - bounds[0]).length();
+        let identity = SourceIdentity::new(name.clone());
         Self {
             name,
             camera,
@@ -100,12 +103,25 @@ impl Scene {
             bvh,
             has_opacity,
             offset,
+            identity,
         }
     }
 
     /// The scene's name.
     pub fn name(&self) -> &str {
         &self.name
+    }
+
+    /// What the scene was made from, for checkpoints: its name, unless a loader gave it more.
+    pub fn identity(&self) -> &SourceIdentity {
+        &self.identity
+    }
+
+    /// The same scene, with what its loader read.
+    #[must_use]
+    pub fn with_identity(mut self, identity: SourceIdentity) -> Self {
+        self.identity = identity;
+        self
     }
 
     /// The camera.

@@ -1,6 +1,8 @@
-//! Files that a scene file names, and how much of them is read.
+//! Files that a scene file names, how much of them is read, and what was in them.
 
 use crate::error::{LoadError, Place};
+use noisefloor::SourceIdentity;
+use std::cell::RefCell;
 use std::fs::File;
 use std::io::{self, Read};
 use std::path::{Component, Path, PathBuf};
@@ -17,16 +19,20 @@ pub(crate) struct Folder {
     root: PathBuf,
     /// The scene's own folder, and those that it adds.
     searched: Vec<PathBuf>,
+    /// Digests of all files that were read.
+    contents: RefCell<SourceIdentity>,
 }
 
 impl Folder {
     /// The folder that holds `scene`. Its files must lie in `root`, by default in that same folder.
-    pub(crate) fn of(scene: &Path, root: Option<&Path>) -> Self {
+    /// `options` are what changes the scene beside its files.
+    pub(crate) fn of(scene: &Path, root: Option<&Path>, options: String) -> Self {
         let path = match scene.parent() {
             Some(parent) if parent != Path::new("") => parent.to_owned(),
             _ => PathBuf::from("."),
         };
-        Self { root: root.map_or_else(|| path.clone(), Path::to_owned), searched: vec![path] }
+        let root = root.map_or_else(|| path.clone(), Path::to_owned);
+        Self { root, searched: vec![path], contents: RefCell::new(SourceIdentity::new(options)) }
     }
 
     /// Adds a folder, relative to the scene's own, in which to look for files.
@@ -76,6 +82,20 @@ impl Folder {
         }
     }
 
+    /// Reads a regular file of at most `limit` bytes that is named at `place`, and notes what is in it.
+    pub(crate) fn read(&self, path: &Path, limit: u64, place: &Place) -> Result<Vec<u8>, LoadError> {
+        let bytes = read(path, limit, place)?;
+        // As seen from the scene, which may be moved with its files
+        let name = path.strip_prefix(&self.searched[0]).unwrap_or(path).display().to_string();
+        self.contents.borrow_mut().add(name, &bytes);
+        Ok(bytes)
+    }
+
+    /// Digests of all files that were read.
+    pub(crate) fn contents(&self) -> SourceIdentity {
+        self.contents.borrow().clone()
+    }
+
     /// Whether `name`, seen from `folder`, stays below the root, judged by the names alone.
     fn stays_inside(&self, folder: &Path, name: &Path) -> bool {
         // How far the folder is below the root
@@ -97,8 +117,8 @@ impl Folder {
     }
 }
 
-/// Reads a regular file of at most `limit` bytes that is named at `place`.
-pub(crate) fn read(path: &Path, limit: u64, place: &Place) -> Result<Vec<u8>, LoadError> {
+/// Reads a regular file.
+fn read(path: &Path, limit: u64, place: &Place) -> Result<Vec<u8>, LoadError> {
     let failed = |cause: io::Error| {
         let cause = io::Error::new(cause.kind(), format!("`{}`: {cause}", path.display()));
         LoadError::Read { place: place.clone(), cause }

@@ -16,3 +16,11 @@ pub struct LoadOptions {
     /// The folder that files named by the scene must lie in; by default the folder of the scene file.
     pub root: Option<PathBuf>,
 }
+
+impl LoadOptions {
+    /// What of it changes the scene.
+    pub(crate) fn identity(&self) -> String {
+        let Self { parameters, ignore_volumes, .. } = self;
+        format!("parameters {parameters:?}, volumes {}", if *ignore_volumes { "left out" } else { "refused" })
+    }
+}

@@ -1,7 +1,7 @@
 //! Pictures for textures and environments.
 
 use crate::error::{LoadError, Place};
-use crate::files::{self, MAX_FILE_BYTES};
+use crate::files::{Folder, MAX_FILE_BYTES};
 use image::codecs::bmp::BmpDecoder;
 use image::codecs::hdr::HdrDecoder;
 use image::codecs::jpeg::JpegDecoder;
@@ -48,8 +48,8 @@ pub(crate) enum Samples {
 /// # Errors
 /// [`LoadError`] if the file cannot be read, is of another format, broken, or has more than
 /// [`MAX_TEXTURE_PIXELS`] pixels (known from its header).
-pub(crate) fn read(path: &Path, place: &Place) -> Result<Picture, LoadError> {
-    let bytes = files::read(path, MAX_FILE_BYTES, place)?;
+pub(crate) fn read(folder: &Folder, path: &Path, place: &Place) -> Result<Picture, LoadError> {
+    let bytes = folder.read(path, MAX_FILE_BYTES, place)?;
     let here = Place::file(path);
     let linear = match bytes.as_slice() {
         [0x76, 0x2f, 0x31, 0x01, ..] => noisefloor_image::read_exr(path),

@@ -43,9 +43,18 @@ pub(crate) fn ask<T: DeserializeOwned>(
     Ok(Reply { header, payload: frame.payload })
 }
 
-/// What the renderer says of itself, and its warnings.
-pub(crate) fn describe(hello: Hello) -> Result<(SourceInfo, Vec<String>), Blame> {
-    let Hello { name, width, height, unit, repeats, warnings } = hello;
+/// What a renderer says of itself.
+#[derive(Debug)]
+pub(crate) struct Described {
+    pub(crate) info: SourceInfo,
+    /// Whether it may give more samples than requested.
+    pub(crate) late: bool,
+    pub(crate) warnings: Vec<String>,
+}
+
+/// What the renderer says of itself, checked.
+pub(crate) fn describe(hello: Hello) -> Result<Described, Blame> {
+    let Hello { name, width, height, unit, repeats, late, warnings } = hello;
     let wrong = |what: String| (None, SidecarCause::Wrong { what });
     check_image(width, height).map_err(|e| wrong(e.to_string()))?;
     let name: String = name.chars().filter(|c| !c.is_control()).take(NAME).collect();
@@ -54,18 +63,20 @@ pub(crate) fn describe(hello: Hello) -> Result<(SourceInfo, Vec<String>), Blame>
         return Err(wrong("it has no name".to_owned()));
     }
     let warnings = warnings.iter().map(|warning| printable(warning).into_owned()).collect();
-    Ok((SourceInfo { name, width, height, unit, aims: true, repeats }, warnings))
+    let info = SourceInfo { name, width, height, unit, aims: true, repeats };
+    Ok(Described { info, late, warnings })
 }
 
-/// Most samples that are believed where `spp` were requested: LuxCore stops a session a little late, and a tile may get what
-/// its threads had begun.
-pub(crate) fn most(spp: u64) -> u64 {
-    spp.saturating_mul(16).saturating_add(256)
+/// Most samples that are believed where `spp` were requested. A renderer that is `late` stops when its threads
+/// notice that they have to. In a small tile, with many threads, that takes a multiple of the samples.
+pub(crate) fn most(spp: u64, late: bool) -> u64 {
+    if late { spp.saturating_mul(16).saturating_add(256) } else { spp }
 }
 
-/// The batches of a reply: as many as requests, none with many more samples than requested.
+/// The batches of a reply: as many as requests, none with more samples than [`most`].
 pub(crate) fn batches(
     requests: &[Request],
+    late: bool,
     Reply { header: Sampled { samples }, payload }: Reply<Sampled>,
 ) -> Result<Vec<Batch>, Blame> {
     if samples.len() != requests.len() {
@@ -73,7 +84,7 @@ pub(crate) fn batches(
         return Err((None, SidecarCause::Wrong { what }));
     }
     let given = || requests.iter().zip(samples.iter().copied());
-    if let Some((request, samples)) = given().find(|(request, samples)| *samples > most(request.spp)) {
+    if let Some((request, samples)) = given().find(|(request, samples)| *samples > most(request.spp, late)) {
         let what = format!("{samples} samples where {} were requested", request.spp);
         return Err((Some(request.tile.index), SidecarCause::Wrong { what }));
     }

@@ -1,12 +1,13 @@
 //! Any program that renders into a file, as a source.
 
+use crate::contents::contents;
 use crate::error::CommandError;
-use crate::light::LightCheck;
 use crate::picture_run::PictureRun;
 use crate::renderer::DEFAULT_TIMEOUT;
 use crate::template::Template;
 use noisefloor::{
-    Batch, ProgressiveSource, Repeats, Request, SourceError, SourceInfo, Tile, Unit, check_image, printable,
+    Batch, LightCheck, ProgressiveSource, Repeats, Request, SourceError, SourceIdentity, SourceInfo, Tile,
+    Unit, check_image, printable,
 };
 use noisefloor_image::LinearImage;
 use std::ffi::OsString;
@@ -65,6 +66,7 @@ pub struct CommandSource {
     /// Runs so far.
     runs: u64,
     light: LightCheck,
+    identity: SourceIdentity,
 }
 
 impl CommandSource {
@@ -74,6 +76,7 @@ impl CommandSource {
     /// [`CommandError`] if the template is not a command or lacks a placeholder, or if the run that
     /// determines the size fails.
     pub fn new(template: &str, options: CommandOptions) -> Result<Self, CommandError> {
+        let typed = template;
         let template = Template::renderer(template, options.scene.is_some())?;
         let stem = Path::new(template.program()).file_stem().unwrap_or_default().to_string_lossy();
         let info = SourceInfo {
@@ -84,7 +87,14 @@ impl CommandSource {
             aims: template.aims(),
             repeats: Repeats::Nothing,
         };
-        let mut source = Self { template, options, info, runs: 0, light: LightCheck::default() };
+        let about = format!("command {typed}, seed {}", options.seed);
+        let identity = match &options.scene {
+            Some(scene) => contents(scene, about)
+                .map_err(|source| CommandError::Scene { scene: scene.clone(), source })?,
+            None => SourceIdentity::new(about),
+        };
+        let light = LightCheck::default();
+        let mut source = Self { template, options, info, runs: 0, light, identity };
         let (width, height) = source.options.size.map_or_else(|| source.find_size(), Ok)?;
         check_image(width, height).map_err(|e| CommandError::Size(e.to_string()))?;
         (source.info.width, source.info.height) = (width, height);
@@ -143,7 +153,7 @@ impl CommandSource {
             cut(&image, &tile)
         };
         let batch = Batch { tile, spp: samples, mean };
-        self.light.check(&batch)?;
+        self.light.check(&batch.mean)?;
         Ok(batch)
     }
 
@@ -157,7 +167,7 @@ impl CommandSource {
         let mut batches = Vec::with_capacity(requests.len());
         for Request { tile, .. } in requests {
             let batch = Batch { tile: *tile, spp: samples, mean: cut(&image, tile) };
-            self.light.check(&batch)?;
+            self.light.check(&batch.mean)?;
             batches.push(batch);
         }
         Ok(batches)
@@ -180,6 +190,11 @@ impl CommandSource {
 impl ProgressiveSource for CommandSource {
     fn info(&self) -> SourceInfo {
         self.info.clone()
+    }
+
+    /// The command, the scene, and what can be known of the files that it reads. Never fails.
+    fn identity(&self) -> Result<SourceIdentity, SourceError> {
+        Ok(self.identity.clone())
     }
 
     fn sample(&mut self, requests: &[Request]) -> Result<Vec<Batch>, SourceError> {

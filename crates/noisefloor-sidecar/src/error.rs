@@ -1,8 +1,8 @@
 //! What can go wrong with a renderer in another process. Every message says what, where, and what to do. What
 //! others wrote is safe to print.
 
-use crate::light::ImpossibleLight;
 use crate::renderer::Renderer;
+use noisefloor::ImpossibleLight;
 use noisefloor_image::{PictureError, WriteError};
 use std::io;
 use std::path::PathBuf;
@@ -179,6 +179,14 @@ pub enum CommandError {
         template: String,
         /// What is wrong with it, and what to do.
         why: String,
+    },
+    /// The scene, or a file that it names, cannot be read.
+    #[error("{}: it, or a file that it names, cannot be read: {source}", scene.display())]
+    Scene {
+        /// The scene.
+        scene: PathBuf,
+        /// What the system said.
+        source: io::Error,
     },
     /// The size of the picture is unknown.
     #[error("the size of the picture is unknown: {0}; give it with --size")]

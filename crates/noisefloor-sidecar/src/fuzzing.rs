@@ -1,6 +1,6 @@
 //! An entry for fuzzers.
 
-use crate::call::{Reply, batches, describe, most};
+use crate::call::{Described, Reply, batches, describe, most};
 use crate::frame;
 use crate::message::{Hello, Referenced, Sampled, Status};
 use noisefloor::{Request, Tile};
@@ -12,7 +12,7 @@ pub fn read_any_reply(mut bytes: &[u8]) {
     let Ok(reply) = frame::read(&mut bytes, PAYLOAD) else { return };
     let _ = serde_json::from_slice::<Status>(&reply.header);
     if let Ok(hello) = serde_json::from_slice::<Hello>(&reply.header)
-        && let Ok((info, _)) = describe(hello)
+        && let Ok(Described { info, .. }) = describe(hello)
     {
         assert!(!info.name.chars().any(char::is_control));
     }
@@ -20,8 +20,12 @@ pub fn read_any_reply(mut bytes: &[u8]) {
     if let Ok(header) = serde_json::from_slice::<Sampled>(&reply.header) {
         let tile = |index| Tile { index, x: 4 * index, y: 0, width: 4, height: 4 };
         let requests = [0, 1].map(|index| Request { tile: tile(index), first: 0, spp: 8 });
-        if let Ok(batches) = batches(&requests, Reply { header, payload: reply.payload }) {
-            assert!(batches.iter().all(|b| b.spp <= most(8) && [0, b.tile.pixels()].contains(&b.mean.len())));
+        if let Ok(batches) = batches(&requests, true, Reply { header, payload: reply.payload }) {
+            assert!(
+                batches
+                    .iter()
+                    .all(|b| b.spp <= most(8, true) && [0, b.tile.pixels()].contains(&b.mean.len()))
+            );
         }
     }
 }

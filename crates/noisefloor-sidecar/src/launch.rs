@@ -1,13 +1,14 @@
 //! Starting a renderer's process.
 
-use crate::call::{ask, describe};
+use crate::call::{Described, ask, describe};
+use crate::contents::contents;
 use crate::error::{SidecarCause, SidecarError};
 use crate::frame::MAX_HEADER;
 use crate::message::{Init, PROTOCOL};
 use crate::process::Process;
 use crate::renderer::{HostOptions, Job, Renderer};
 use crate::setup;
-use noisefloor::SourceInfo;
+use noisefloor::SourceIdentity;
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -20,6 +21,9 @@ pub(crate) struct Launch {
     script: PathBuf,
     env: Vec<(String, OsString)>,
     init: Vec<u8>,
+    scene: PathBuf,
+    /// What the samples depend on beside the scene.
+    options: String,
     loading: String,
     pub(crate) timeout: Duration,
 }
@@ -58,20 +62,30 @@ impl Launch {
             script: setup::host_script(renderer)?,
             env: options.env.clone(),
             init,
+            options: identity(renderer, job, options),
+            scene: path,
             loading: format!("loading {}", job.scene.display()),
             timeout: job.timeout,
         })
     }
 
-    /// A process that has loaded the scene, its description, and its warnings.
-    pub(crate) fn start(&self) -> Result<(Process, SourceInfo, Vec<String>), SidecarError> {
+    /// Digests of the scene and of what it is known to read.
+    pub(crate) fn contents(&self) -> Result<SourceIdentity, SidecarError> {
+        contents(&self.scene, self.options.clone()).map_err(|error| {
+            let why = format!("it, or a file that it names, cannot be read: {error}");
+            self.error(SidecarCause::Scene { path: self.scene.clone(), why }, String::new())
+        })
+    }
+
+    /// A process that has loaded the scene, and its description.
+    pub(crate) fn start(&self) -> Result<(Process, Described), SidecarError> {
         let start = |source| SidecarCause::Start { python: self.python.clone(), source };
         let mut process = Process::start(&self.python, &self.script, &self.env)
             .map_err(|error| self.error(start(error), String::new()))?;
         let hello =
             ask(&mut process, self.init.clone(), 0, self.timeout).and_then(|reply| describe(reply.header));
         match hello {
-            Ok((info, warnings)) => Ok((process, info, warnings)),
+            Ok(described) => Ok((process, described)),
             Err((_, cause)) => Err(self.error(cause, process.last_words())),
         }
     }
@@ -80,4 +94,10 @@ impl Launch {
         let (renderer, doing) = (self.title.clone(), self.loading.clone());
         SidecarError { renderer, doing, tile: None, cause: Box::new(cause), last_words }
     }
+}
+
+/// What the samples depend on beside the scene; threads are not part of it.
+fn identity(renderer: &Renderer, job: &Job, options: &HostOptions) -> String {
+    let (title, Job { seed, max_depth, .. }) = (renderer.title, job);
+    format!("{title}, seed {seed}, max_depth {max_depth:?}, {:?}", options.options)
 }

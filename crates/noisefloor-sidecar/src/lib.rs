@@ -34,14 +34,15 @@
 //!
 //! | request | reply |
 //! |---|---|
-//! | `init` | `name`, `width`, `height`, `unit`, `repeats`, `warnings` |
+//! | `init` | `name`, `width`, `height`, `unit`, `repeats`, `late` (optional), `warnings` |
 //! | `sample` | `samples`; payload: the means of the new samples of each tile that has any |
 //! | `reference` | `reference` (true or false); payload: the whole image if true |
 //! | `quit` | the process ends after its reply |
 //!
 //! `init` has `protocol` (1), `scene`, `seed`, `width`, `height`, `max_depth`, `threads` (or null) and
 //! `options`. `sample` has `tiles`, each with `index`, `x`, `y`, `width`, `height`, `first` and `samples`;
-//! the reply's `samples` has a count for each, at most as many as requested.
+//! the reply's `samples` has a count for each: at most as many as requested, unless `late` in the reply to
+//! `init` says that the renderer cannot stop in time.
 //!
 //! # What is left behind
 //! Nothing. A renderer leads a process group of its own, and the whole group is killed with it. It ends when
@@ -50,13 +51,13 @@
 
 mod call;
 mod command;
+mod contents;
 mod error;
 mod frame;
 mod fuzzing;
 mod group;
 mod launch;
 mod leftovers;
-mod light;
 mod message;
 mod picture_command;
 mod picture_run;
@@ -73,7 +74,6 @@ pub use error::{CommandError, SetupError, SidecarCause, SidecarError};
 #[doc(hidden)]
 pub use fuzzing::read_any_reply;
 pub use leftovers::end_all;
-pub use light::ImpossibleLight;
 pub use picture_command::PictureCommand;
 pub use renderer::{DEFAULT_TIMEOUT, HostOptions, Job, Renderer};
 pub use setup::{HOST, find, install, private_folder, probe};

@@ -52,6 +52,9 @@ pub(crate) struct Hello {
     pub(crate) height: usize,
     pub(crate) unit: Unit,
     pub(crate) repeats: Repeats,
+    /// Whether it may give more samples than requested, because it cannot stop in time.
+    #[serde(default)]
+    pub(crate) late: bool,
     #[serde(default)]
     pub(crate) warnings: Vec<String>,
 }

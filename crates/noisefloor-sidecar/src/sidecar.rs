@@ -1,14 +1,15 @@
 //! A renderer in another process as a source.
 
-use crate::call::{Blame, Reply, ask, batches, exactly, rgb};
+use crate::call::{Blame, Described, Reply, ask, batches, exactly, rgb};
 use crate::error::{SidecarCause, SidecarError};
 use crate::launch::Launch;
-use crate::light::LightCheck;
 use crate::message::{Referenced, Sample, TileRequest};
 use crate::process::Process;
 use crate::renderer::{HostOptions, Job, Renderer};
 use crate::setup;
-use noisefloor::{Batch, ProgressiveSource, Reference, Request, SourceError, SourceInfo};
+use noisefloor::{
+    Batch, LightCheck, ProgressiveSource, Reference, Request, SourceError, SourceIdentity, SourceInfo,
+};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::path::Path;
@@ -23,12 +24,15 @@ const CALL_PIXELS: usize = noisefloor::MAX_PIXELS;
 /// A call that fails because the process ended, did not answer in time, or sent something else than requested
 /// is repeated once in a new process; all earlier batches stay valid. If it fails again, or if the renderer
 /// itself refuses, the call is an error, and the next call tries again. Batches of impossible light
-/// ([`ImpossibleLight`](crate::ImpossibleLight)) are errors, too.
+/// ([`ImpossibleLight`](noisefloor::ImpossibleLight)) are errors, too.
 #[derive(Debug)]
 pub struct Sidecar {
     launch: Launch,
     process: Option<Process>,
     info: SourceInfo,
+    /// Whether it may give more samples than requested.
+    late: bool,
+    identity: SourceIdentity,
     warnings: Vec<String>,
     restarts: Vec<SidecarError>,
     light: LightCheck,
@@ -49,10 +53,13 @@ impl Sidecar {
     ) -> Result<Self, SidecarError> {
         let launch = Launch::new(renderer, python, job, &options)
             .map_err(|cause| SidecarError::at_the_start(renderer, cause))?;
-        let (process, info, said) = launch.start()?;
+        // Before the scene is loaded: an edit in between is then noticed, if not now
+        let identity = launch.contents()?;
+        let (process, Described { info, late, warnings: said }) = launch.start()?;
+        let identity = identity.with_options(&info.name);
         let warnings = options.warnings.into_iter().chain(said).collect();
         let (process, restarts, light) = (Some(process), Vec::new(), LightCheck::default());
-        Ok(Self { launch, process, info, warnings, restarts, light })
+        Ok(Self { launch, process, info, late, identity, warnings, restarts, light })
     }
 
     /// As [`Sidecar::open`], with the interpreter that [`find`](crate::find) returns.
@@ -140,9 +147,14 @@ impl Sidecar {
         }
     }
 
-    /// A new process that describes itself exactly as the first one did.
+    /// A new process that describes itself exactly as the first one did, and has loaded the same scene.
     fn restart(&self) -> Result<Process, SidecarError> {
-        let (mut process, info, _) = self.launch.start()?;
+        let contents = self.launch.contents()?.with_options(&self.info.name);
+        if let Some(change) = contents.change_since(&self.identity) {
+            let what = format!("after a restart it would render another scene: {change}");
+            return Err(self.launch.error(SidecarCause::Refused(what), String::new()));
+        }
+        let (mut process, Described { info, .. }) = self.launch.start()?;
         if info == self.info {
             return Ok(process);
         }
@@ -163,10 +175,11 @@ impl Sidecar {
             }
             [] => return Ok(Vec::new()),
         };
-        let pixels = requests.iter().map(|r| r.tile.pixels()).sum();
-        let batches = self.call(&doing, requests, &request, pixels, |reply| batches(requests, reply))?;
+        let (pixels, late) = (requests.iter().map(|r| r.tile.pixels()).sum(), self.late);
+        let batches =
+            self.call(&doing, requests, &request, pixels, |reply| batches(requests, late, reply))?;
         for batch in &batches {
-            if let Err(cause) = self.light.check(batch) {
+            if let Err(cause) = self.light.check(&batch.mean) {
                 return Err(SidecarError {
                     renderer: self.info.name.clone(),
                     doing,
@@ -187,6 +200,11 @@ impl Sidecar {
 impl ProgressiveSource for Sidecar {
     fn info(&self) -> SourceInfo {
         self.info.clone()
+    }
+
+    /// The scene file, and what can be known of the files that it reads. Never fails.
+    fn identity(&self) -> Result<SourceIdentity, SourceError> {
+        Ok(self.identity.clone())
     }
 
     fn sample(&mut self, requests: &[Request]) -> Result<Vec<Batch>, SourceError> {

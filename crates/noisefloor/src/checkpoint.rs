@@ -3,6 +3,7 @@
 use crate::container::{Fault, Format, MAX_PAYLOAD};
 use crate::display::Display;
 use crate::film::Film;
+use crate::identity::{IdentityChange, SourceIdentity};
 use crate::params::Params;
 use crate::stop::TileState;
 use serde::{Deserialize, Serialize};
@@ -21,6 +22,7 @@ const VERSION: u32 = 3;
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Checkpoint<'a> {
     pub(crate) job: Cow<'a, str>,
+    pub(crate) source: Cow<'a, SourceIdentity>,
     /// Fingerprint of the criterion.
     pub(crate) criterion: String,
     /// State of the criterion.
@@ -62,6 +64,9 @@ pub enum CheckpointError {
         /// What is asked for.
         now: String,
     },
+    /// Its samples are of another scene, or of other options.
+    #[error("the checkpoint belongs to another job: {0}")]
+    Changed(#[from] IdentityChange),
     /// The content contradicts itself.
     #[error("the checkpoint contradicts itself: {0}")]
     Invalid(&'static str),
@@ -106,6 +111,7 @@ impl Checkpoint<'_> {
     pub(crate) fn check(
         &self,
         job: &str,
+        source: &SourceIdentity,
         criterion: &str,
         params: &Params,
         fresh: &Film,
@@ -114,6 +120,7 @@ impl Checkpoint<'_> {
             if kept == now { Ok(()) } else { Err(CheckpointError::Other { what, kept, now }) }
         };
         same("job", self.job.to_string(), job.to_owned())?;
+        source.change_since(&self.source).map_or(Ok(()), Err)?;
         same("criterion", self.criterion.clone(), criterion.to_owned())?;
         same("set of parameters", format!("{:?}", self.params), format!("{params:?}"))?;
         let size = |film: &Film| format!("{}×{} pixels", film.grid().width(), film.grid().height());

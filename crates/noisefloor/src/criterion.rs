@@ -128,6 +128,12 @@ pub trait StoppingCriterion {
         Audience::TRAINED
     }
 
+    /// Whether it only counts samples and looks at no noise. Tiles that satisfy it then stop with
+    /// [`StopReason::ReachedSpp`](crate::StopReason::ReachedSpp) and not as converged.
+    fn only_counts(&self) -> bool {
+        false
+    }
+
     /// How visible the noise is at each pixel of the image, row-major, in 8-bit display steps; NaN where a
     /// tile gives no evidence. `None`, the default, if the criterion cannot say. Costs as much as a verdict
     /// on every tile; called where a map is wanted, never for a verdict.
@@ -168,6 +174,10 @@ impl StoppingCriterion for FixedSpp {
 
     fn fingerprint(&self) -> String {
         self.name()
+    }
+
+    fn only_counts(&self) -> bool {
+        true
     }
 
     fn judge(&mut self, view: &View<'_>, tiles: &[Tile]) -> Result<Vec<Verdict>, CriterionError> {

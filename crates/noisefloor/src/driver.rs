@@ -3,6 +3,7 @@
 use crate::checkpoint::{Checkpoint, CheckpointError};
 use crate::criterion::{CriterionError, Resumable, StoppingCriterion};
 use crate::film::FilmError;
+use crate::light::LightCheck;
 use crate::params::Params;
 use crate::session::{Session, SessionError};
 use crate::source::{Batch, ProgressiveSource, Repeats, Request, SourceError};
@@ -99,7 +100,7 @@ pub struct Clock {
 /// let params = Params { tile: 32, ..Params::default() };
 /// let mut driver = Driver::new(Wall, FixedSpp(300), params)?;
 /// driver.run(|_session, event| if let Event::TileStopped(stop) = event { println!("{} {}", stop.tile.index, stop.spp) })?;
-/// assert!(driver.session().stops().all(|stop| stop.spp == 300 && stop.reason == StopReason::Converged));
+/// assert!(driver.session().stops().all(|stop| stop.spp == 300 && stop.reason == StopReason::ReachedSpp));
 /// # Ok::<(), DriverError>(())
 /// ```
 pub struct Driver<S, C> {
@@ -111,19 +112,23 @@ pub struct Driver<S, C> {
     clock: Clock,
     /// Samples in the film before the run.
     samples_before: u64,
+    light: LightCheck,
 }
 
 impl<S: ProgressiveSource, C: StoppingCriterion> Driver<S, C> {
     /// Combines a source and a criterion.
     ///
     /// # Errors
-    /// [`DriverError::Session`] if a parameter or the source's image size is out of range.
+    /// [`DriverError::Session`] if a parameter or the source's image size is out of range,
+    /// [`DriverError::Source`] if the source cannot read what it depends on.
     pub fn new(source: S, criterion: C, params: Params) -> Result<Self, DriverError> {
         let info = source.info();
-        let session = Session::new(info.width, info.height, criterion, params)?;
+        let mut session = Session::new(info.width, info.height, criterion, params)?;
+        session.set_source(source.identity()?);
         let cancel = Arc::new(AtomicBool::new(false));
         let (timeline, clock) = (Vec::new(), Clock::default());
-        Ok(Self { source, session, time_limit: None, cancel, timeline, clock, samples_before: 0 })
+        let light = LightCheck::default();
+        Ok(Self { source, session, time_limit: None, cancel, timeline, clock, samples_before: 0, light })
     }
 
     /// Stops all tiles once a run has taken this long. A call to the source that is under way is finished
@@ -270,11 +275,16 @@ impl<S: ProgressiveSource, C: StoppingCriterion> Driver<S, C> {
                 exhausted.push(batch.tile.index);
                 continue;
             }
+            let impossible = |error| broken(format!("in tile {}, {error}", request.tile.index));
+            self.light.check_finite(&batch.mean).map_err(impossible)?;
             match self.session.push(batch.tile.index, batch.spp, &batch.mean) {
                 Ok(()) => {}
                 Err(error @ FilmError::Pixels { .. }) => return Err(broken(error.to_string()).into()),
                 Err(error) => return Err(SessionError::from(error).into()),
             }
+            let (film, tile) = (self.session.film(), request.tile);
+            let so_far = (0..tile.pixels()).map(|pixel| film.pixel(tile.index, pixel));
+            self.light.check_sign(so_far).map_err(impossible)?;
         }
         Ok(exhausted)
     }

@@ -39,6 +39,8 @@ mod driver;
 mod evidence;
 mod familiarity;
 mod film;
+mod identity;
+mod light;
 mod mask;
 mod model;
 mod nested;
@@ -68,6 +70,8 @@ pub use driver::{Clock, Driver, DriverError, Event, Progress, TimelinePoint};
 pub use evidence::{Evidence, HALO, ROUNDING_LUMINANCE, Rendering, Samples, TilePlanes, residual_scale};
 pub use familiarity::{Familiarity, nearest};
 pub use film::{Film, FilmError};
+pub use identity::{IdentityChange, SourceIdentity};
+pub use light::{ImpossibleLight, LightCheck};
 pub use mask::{NoiseMask, SigmaError};
 pub use model::{Judgement, Model, ModelError, ModelParts, Scores, TrainingRecord};
 /// Planes, maps and training rows are its arrays.

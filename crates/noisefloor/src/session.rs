@@ -3,6 +3,7 @@
 use crate::criterion::{CriterionError, StoppingCriterion, Verdict, View};
 use crate::display::{Display, ToneMapping};
 use crate::film::{Film, FilmError};
+use crate::identity::SourceIdentity;
 use crate::params::{Audience, Params, ParamsError};
 use crate::rgb::Rgb;
 use crate::source::{Reference, Request};
@@ -63,6 +64,7 @@ pub struct Session<C> {
     /// The reference as displayed, once the display is settled.
     displayed_reference: Option<Vec<Rgb>>,
     tiles: Vec<TileState>,
+    source: SourceIdentity,
 }
 
 impl<C: StoppingCriterion> Session<C> {
@@ -83,7 +85,17 @@ impl<C: StoppingCriterion> Session<C> {
             ToneMapping::Srgb { .. } | ToneMapping::Custom { .. } => Some(params.tone_mapping.settle(&[])),
             ToneMapping::Reinhard { .. } => None,
         };
-        Ok(Self { film, criterion, params, display, reference: None, displayed_reference: None, tiles })
+        let source = SourceIdentity::default();
+        Ok(Self {
+            film,
+            criterion,
+            params,
+            display,
+            reference: None,
+            displayed_reference: None,
+            tiles,
+            source,
+        })
     }
 
     /// The film.
@@ -111,6 +123,12 @@ impl<C: StoppingCriterion> Session<C> {
     pub fn set_display(&mut self, display: Display) {
         self.display = Some(display);
         self.displayed_reference = None;
+    }
+
+    /// Says what the samples depend on, for checkpoints: a session whose source has changed is not resumed. A
+    /// [`Driver`](crate::Driver) does this by itself.
+    pub fn set_source(&mut self, source: SourceIdentity) {
+        self.source = source;
     }
 
     /// Provides the quick noise-free reference, for criteria that need one.
@@ -234,7 +252,7 @@ impl<C: StoppingCriterion> Session<C> {
         if state.streak >= consecutive {
             let target = audience.samples(samples);
             if target <= samples {
-                return Some(self.stop(index, StopReason::Converged));
+                return Some(self.stop(index, self.satisfied()));
             }
             state.target = Some(target.min(max_spp).max(samples + 1));
         }
@@ -253,7 +271,12 @@ impl<C: StoppingCriterion> Session<C> {
     /// Whether an audience's wish was granted or cut short by the limit.
     fn audience_reason(&self, index: usize) -> StopReason {
         let at_limit = self.film.spp(index) >= self.params.max_spp;
-        if at_limit { StopReason::MaxSpp } else { StopReason::Converged }
+        if at_limit { StopReason::MaxSpp } else { self.satisfied() }
+    }
+
+    /// Why a tile stops that the criterion is satisfied with.
+    fn satisfied(&self) -> StopReason {
+        if self.criterion.only_counts() { StopReason::ReachedSpp } else { StopReason::Converged }
     }
 
     fn stop(&mut self, index: usize, reason: StopReason) -> Stop {

@@ -1,5 +1,6 @@
 //! What a renderer offers: samples on request.
 
+use crate::identity::SourceIdentity;
 use crate::rgb::Rgb;
 use crate::tile::Tile;
 use auto_impl::auto_impl;
@@ -132,6 +133,15 @@ pub enum SourceError {
 pub trait ProgressiveSource {
     /// Describes the source. Must not change over its life.
     fn info(&self) -> SourceInfo;
+
+    /// What its samples depend on: options, and the contents of every file it reads. Kept in checkpoints, so
+    /// that a render is not resumed with another scene. By default its name.
+    ///
+    /// # Errors
+    /// [`SourceError`] if a file cannot be read.
+    fn identity(&self) -> Result<SourceIdentity, SourceError> {
+        Ok(SourceIdentity::new(self.info().name))
+    }
 
     /// Adds samples to the tiles named.
     ///

@@ -2,7 +2,7 @@
 
 use crate::criterion::CriterionError;
 use crate::descriptor::Described;
-use crate::display::{Display, ToneMapping};
+use crate::display::{Display, ToneMapping, luminance};
 use crate::evidence::{Evidence, Rendering, Samples, TilePlanes};
 use crate::nested::shared_samples;
 use crate::oracle::Oracle;
@@ -13,6 +13,9 @@ use noisefloor_vision::Viewing;
 use rayon::prelude::*;
 use std::borrow::Cow;
 use thiserror::Error;
+
+/// Mean difference of a tile from which it may be unlike, as a share of the display's range.
+const UNLIKE: f64 = 0.1;
 
 /// A picture with its samples per pixel.
 #[derive(Clone, Debug, PartialEq)]
@@ -217,6 +220,21 @@ impl<'a> SnapshotPair<'a> {
         }
     }
 
+    /// Number of tiles whose brightness differs between the two pictures by more than their noise explains: by
+    /// a tenth of the display's range on average, and three times the standard deviation from pixel to pixel.
+    /// Renderings of one view have none. 0 if there is nothing to compare with.
+    pub fn unlike_tiles(&self, grid: TileGrid) -> usize {
+        let Some(other) = &self.other else { return 0 };
+        let light = |still: &Still, pixel: usize| luminance(self.display.encode(still.pixels[pixel]));
+        let unlike = |tile: &Tile| {
+            let rows = tile.rows(self.image.size.0);
+            let differences: Vec<Vec<f32>> =
+                rows.map(|row| row.map(|p| light(self.image, p) - light(other, p)).collect()).collect();
+            is_unlike(&differences)
+        };
+        grid.tiles().collect::<Vec<_>>().par_iter().filter(|tile| unlike(tile)).count()
+    }
+
     /// Describes all tiles, in their order, for [`Oracle::judge_described`].
     ///
     /// # Errors
@@ -226,6 +244,18 @@ impl<'a> SnapshotPair<'a> {
         let describe = |&tile: &Tile| Ok(oracle.describe(&self.planes(tile)?, self.image.spp.max(1.0))?);
         tiles.par_iter().map(describe).collect()
     }
+}
+
+/// Whether rows of differences have a mean that their changes from pixel to pixel do not explain.
+fn is_unlike(differences: &[Vec<f32>]) -> bool {
+    let count: usize = differences.iter().map(Vec::len).sum();
+    let mean = differences.iter().flatten().map(|&d| f64::from(d)).sum::<f64>() / count.max(1) as f64;
+    let beside = differences.iter().flat_map(|row| row.windows(2)).map(|pair| pair[1] - pair[0]);
+    let below = differences.windows(2).flat_map(|rows| rows[0].iter().zip(&rows[1])).map(|(a, b)| b - a);
+    let steps: Vec<f64> = beside.chain(below).map(|step| f64::from(step).powi(2)).collect();
+    // Of two independent pixels, the difference has twice the variance of one
+    let variance = steps.iter().sum::<f64>() / (2 * steps.len().max(1)) as f64;
+    !steps.is_empty() && mean.abs() > UNLIKE && mean.abs() > 3.0 * variance.sqrt()
 }
 
 /// Whether the pictures share samples, as far as their origins say or they show it: never a guess.
@@ -266,4 +296,36 @@ fn pool<'a>(others: &[&'a Still], image_spp: f64, samples: Samples) -> Option<Co
         all.spp += one.spp;
     }
     Some(all)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn still(value: impl Fn(usize) -> f32) -> Still {
+        let pixels = (0..32 * 32).map(|i| [value(i); 3]).collect();
+        Still { size: (32, 32), pixels, spp: 16.0, display_referred: true, rounding: 0.0 }
+    }
+
+    fn unlike(a: &Still, b: &Still) -> usize {
+        let tone = ToneMapping::default();
+        let pair = SnapshotPair::new(Evidence::Halves, a, &[b], tone, Some(Samples::Independent)).unwrap();
+        pair.unlike_tiles(TileGrid::new(32, 32, 16).unwrap())
+    }
+
+    #[test]
+    fn pictures_of_different_things_are_noticed_and_noise_is_not() {
+        let mut noise = noisefloor_testkit::Noise::keyed(&[21]);
+        let mut sparse = |share: f64| -> Vec<f32> {
+            (0..32 * 32).map(|_| if noise.uniform() < share { 1.0 } else { 0.0 }).collect()
+        };
+        let (a, b) = (sparse(0.1), sparse(0.5));
+        assert_eq!(unlike(&still(|_| 0.0), &still(|_| 1.0)), 4);
+        // Brighter on the left alone, with noise of three display steps
+        let step = |i: usize| if i % 32 < 16 { 0.2 } else { 0.0 };
+        assert_eq!(unlike(&still(|i| 0.3 + 0.01 * a[i]), &still(|i| 0.3 + 0.01 * b[i] + step(i))), 2);
+        // Few samples of a dim light look darker than many of them: that is noise
+        assert_eq!(unlike(&still(|i| a[i]), &still(|i| b[i])), 0);
+        assert_eq!(unlike(&still(|_| 0.5), &still(|_| 0.55)), 0);
+    }
 }

@@ -12,6 +12,9 @@ use std::fmt;
 pub enum StopReason {
     /// The criterion is satisfied.
     Converged,
+    /// The number of samples that was asked for is there; nobody looked at the noise
+    /// ([`FixedSpp`](crate::FixedSpp)).
+    ReachedSpp,
     /// The largest number of samples was reached first.
     MaxSpp,
     /// The time limit was reached.
@@ -24,10 +27,24 @@ pub enum StopReason {
     Failed,
 }
 
+impl StopReason {
+    /// Whether the criterion has what it wanted.
+    pub fn is_satisfied(self) -> bool {
+        matches!(self, Self::Converged | Self::ReachedSpp)
+    }
+
+    /// Whether no later run would add samples: the criterion is satisfied, or has all it may have. Tiles that
+    /// ended otherwise are open again when a session is resumed.
+    pub fn is_final(self) -> bool {
+        self.is_satisfied() || self == Self::MaxSpp
+    }
+}
+
 impl fmt::Display for StopReason {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Self::Converged => "converged",
+            Self::ReachedSpp => "reached-spp",
             Self::MaxSpp => "max-spp",
             Self::TimeLimit => "time-limit",
             Self::Cancelled => "cancelled",

@@ -119,7 +119,7 @@ fn running_means_stop_where_batches_do() {
 fn a_fixed_number_of_samples_is_that_everywhere() {
     let fixed = run(cornell(), FixedSpp(200), small_tiles());
     assert_eq!(fixed.samples(), [200; 9]);
-    assert!(fixed.stops.iter().all(|s| s.reason == StopReason::Converged && s.probability.is_none()));
+    assert!(fixed.stops.iter().all(|s| s.reason == StopReason::ReachedSpp && s.probability.is_none()));
 
     // Which is the picture that one call gives, but for rounding; no halves were kept
     let tile = noisefloor::Tile { index: 0, x: 0, y: 0, width: 96, height: 96 };

@@ -152,10 +152,18 @@ fn one_firefly_leaves_the_other_tiles_alone() {
 /// Where every sample was kept out there is no evidence of anything: that is not "converged".
 #[test]
 fn a_tile_without_a_valid_sample_never_converges() {
-    let source = Altered::batches(Synthetic::new(64, 32), |_, batches| {
-        batches.iter_mut().filter(|b| b.tile.index == 0).for_each(|b| b.mean.fill([f32::NAN; 3]));
-    });
-    let run = run(source, tiles_of(32));
-    assert_eq!(run.stops[1].reason, StopReason::Converged);
-    assert_eq!(run.stops[0].reason, StopReason::MaxSpp, "{:?}", run.stops[0]);
+    let mut source = Synthetic::new(64, 32);
+    let mut session = Session::new(64, 32, Oracle::bundled(), tiles_of(32)).unwrap();
+    while !session.is_done() {
+        for mut batch in source.sample(&session.requests()).unwrap() {
+            if batch.tile.index == 0 {
+                batch.mean.fill([f32::NAN; 3]);
+            }
+            session.push(batch.tile.index, batch.spp, &batch.mean).unwrap();
+        }
+        session.judge().unwrap();
+    }
+    let stops: Vec<_> = session.stops().collect();
+    assert_eq!(stops[1].reason, StopReason::Converged);
+    assert_eq!(stops[0].reason, StopReason::MaxSpp, "{:?}", stops[0]);
 }

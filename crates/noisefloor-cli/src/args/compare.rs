@@ -22,7 +22,7 @@ use std::path::PathBuf;
 /// Writes into the output folder: index.html with everything (one file that opens without a server),
 /// runs.csv, runs.json, and for each scene curve.csv, tiles.csv, plots (SVG and PNG), crops with error
 /// maps, the picture of every criterion, and the reference, which the next comparison of the same scene
-/// uses again.
+/// uses again (--force).
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   noisefloor compare cornell-box glass-spheres --size 256x256 --tile 64
@@ -73,6 +73,10 @@ pub struct CompareArgs {
     pixels_per_degree: f64,
     #[command(flatten)]
     viewing: ViewingArgs,
+    /// Overwrite the comparison that is in the output folder. A reference in it that is of this scene and
+    /// these options is used again; any other is rendered anew.
+    #[arg(long)]
+    force: bool,
     /// No progress bar and no table.
     #[arg(long, short)]
     quiet: bool,
@@ -82,6 +86,7 @@ pub struct CompareArgs {
 mod check {
     use super::CompareArgs;
     use crate::compare::{CompareJob, Named};
+    use crate::folder::Earlier;
     use anyhow::{Context, bail};
     use noisefloor::{Oracle, Params, Schedule};
     use noisefloor_rivals::RIVALS;
@@ -110,6 +115,7 @@ mod check {
                 reference: self.reference,
                 reference_spp: self.reference_spp,
                 pixels_per_degree: self.pixels_per_degree,
+                earlier: Earlier::of(self.force, false),
                 quiet: self.quiet,
             })
         }

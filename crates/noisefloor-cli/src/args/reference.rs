@@ -1,6 +1,7 @@
 //! `noisefloor reference`.
 
 use super::renderer::RendererArgs;
+use crate::folder::Earlier;
 use crate::reference::ReferenceJob;
 use anyhow::bail;
 use clap::Args;
@@ -29,6 +30,9 @@ pub struct ReferenceArgs {
     /// out/SCENE-reference.exr].
     #[arg(long, value_name = "FILE.exr")]
     out: Option<PathBuf>,
+    /// Overwrite the picture if there is one of that name.
+    #[arg(long)]
+    force: bool,
     /// No progress bar and no summary.
     #[arg(long, short)]
     quiet: bool,
@@ -42,6 +46,7 @@ impl ReferenceArgs {
             bail!("{}: the reference is written as EXR, so its name must end in .exr", out.display());
         }
         let source = self.renderer.check(Some(&self.scene))?;
-        Ok(ReferenceJob { source, out: self.out, quiet: self.quiet })
+        let earlier = Earlier::of(self.force, false);
+        Ok(ReferenceJob { source, out: self.out, earlier, quiet: self.quiet })
     }
 }

@@ -5,6 +5,7 @@ use super::renderer::RendererArgs;
 use super::tone::ToneArgs;
 use super::values;
 use super::viewing::ViewingArgs;
+use crate::folder::Earlier;
 use crate::render::{Judge, RenderJob};
 use anyhow::bail;
 use clap::{Args, ValueEnum};
@@ -30,7 +31,8 @@ use std::time::Duration;
   noisefloor render --criterion spp:1000             for comparison: a fixed number of samples
   noisefloor render --audience art-students          for more demanding viewers (more samples)
   noisefloor render --time 60 --against truth.exr    at most a minute; relMSE to a reference in timeline.csv
-  noisefloor render --time 60 --resume               another minute of the render in the output folder")]
+  noisefloor render --time 60 --resume               another minute of the render in the output folder
+  noisefloor render --force                          once more, over the render in the output folder")]
 pub struct RenderArgs {
     /// Built-in scene (`noisefloor scenes` lists them) or scene file: glTF 2.0 (.gltf, .glb) or Mitsuba XML
     /// (.xml). With --source, whatever that source reads [default: cornell-box].
@@ -85,10 +87,15 @@ pub struct RenderArgs {
     #[arg(long, default_value = "30", value_name = "SECONDS", value_parser = values::pause)]
     autosave: Duration,
     /// Continue the render that Ctrl-C, --time or a kill interrupted in this output folder. Picture and
-    /// stops are those of an uninterrupted render. Scene and options must be the same. Works with the
-    /// built-in renderer, and the oracle or `spp:N`.
+    /// stops are those of an uninterrupted render. Options must be the same, and so must the contents of the
+    /// scene and of all files that it reads. Works with sources that repeat their samples (`noisefloor doctor`
+    /// says which), and the oracle or `spp:N`.
     #[arg(long)]
     resume: bool,
+    /// Overwrite the render that is in the output folder, finished or not. Without it, a folder that holds
+    /// one is refused.
+    #[arg(long, conflicts_with = "resume")]
+    force: bool,
     /// No progress bar and no summary.
     #[arg(long, short)]
     quiet: bool,
@@ -149,7 +156,7 @@ impl RenderArgs {
             time: self.time,
             against: self.against,
             autosave: self.autosave,
-            resume: self.resume,
+            earlier: Earlier::of(self.force, self.resume),
             quiet: self.quiet,
         })
     }

@@ -53,6 +53,14 @@ pub fn run(job: &JudgeJob) -> anyhow::Result<()> {
             "note: the pictures share samples, as snapshots of one rendering do, and are judged as --nested; --independent overrides this"
         );
     }
+    let unlike = held.unlike_tiles(grid);
+    if unlike > 0 {
+        note!(
+            "warning: in {unlike} of {} tiles the pictures differ in brightness by more than noise explains, so the verdict means \
+             nothing there; compare renderings of one view with one exposure",
+            grid.len()
+        );
+    }
     let rows = judge(&job.oracle, grid, &held)?;
     report::say_all((&job.image.0, image.spp), &job.oracle, &rows, job.json)?;
     draw(job, &image, grid, &held, &rows)

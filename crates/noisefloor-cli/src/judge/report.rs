@@ -1,6 +1,6 @@
 //! Verdicts as a table or as JSON.
 
-use crate::say::{NotSaid, say};
+use crate::say::{NotSaid, say, say_json};
 use noisefloor::{Oracle, Threshold};
 use serde::Serialize;
 use std::path::Path;
@@ -50,7 +50,7 @@ pub(super) fn say_all(
         tiles: rows,
     };
     if json {
-        say!("{}", serde_json::to_string_pretty(&report)?)?
+        say_json(&report)?
     } else {
         say_table(&report)?
     }

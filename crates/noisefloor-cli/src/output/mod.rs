@@ -8,18 +8,17 @@ mod tiles;
 pub use summary::say_noise;
 
 use crate::files::{write_csv, write_json};
+use crate::folder::{Earlier, Folder, Occupied};
 use crate::sources::Source;
 use anyhow::Context;
-use noisefloor::{
-    Checkpoint, Clock, Progress, Rgb, SampleOrigin, Session, Stop, StopReason, StoppingCriterion,
-};
+use noisefloor::{Checkpoint, Clock, Progress, Rgb, SampleOrigin, Session, StoppingCriterion};
 use noisefloor_image::{check_writable, write_atomic};
 use noisefloor_rivals::metrics::relative_mse;
 use report::Report;
 use serde::{Deserialize, Serialize};
 use std::fs::File;
 use std::io::{self, BufReader};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use tiles::TileState;
 
 /// One line of timeline.csv.
@@ -41,7 +40,7 @@ pub struct ModelFacts {
 
 /// The output folder, and what has been recorded for it.
 pub struct Output {
-    folder: PathBuf,
+    folder: Folder,
     scene: String,
     source: String,
     seed: u64,
@@ -52,36 +51,63 @@ pub struct Output {
     pub origin: Option<SampleOrigin>,
     timeline: Vec<TimelineRow>,
     seconds_before: f64,
+    /// Whether there is an earlier render in the folder, and it is not resumed.
+    overwrites: bool,
 }
 
 /// Where an interrupted render continues, in its output folder.
 const CHECKPOINT: &str = "checkpoint.nfc";
+const REPORT: &str = "report.json";
+const PICTURE: &str = "image.exr";
 
 impl Output {
-    /// Makes the folder, and makes sure that files can be written before hours are spent.
-    pub fn create(folder: PathBuf, scene: String, source: String, seed: u64) -> anyhow::Result<Self> {
-        std::fs::create_dir_all(&folder).with_context(|| {
-            format!("{}: this folder cannot be made; choose another with --out", folder.display())
-        })?;
-        check_writable(folder.join("image.exr"))?;
+    /// Makes sure that files can be written, and that no other render is lost by it, before hours are spent.
+    pub fn create(
+        folder: Folder,
+        earlier: Earlier,
+        scene: String,
+        source: String,
+        seed: u64,
+    ) -> anyhow::Result<Self> {
+        if let Some(occupied) = occupied(&folder, earlier) {
+            return Err(occupied.into());
+        }
+        check_writable(folder.path().join("image.exr"))?;
         let (timeline, seconds_before) = (Vec::new(), 0.0);
         let (model, reference, origin) = (None, None, None);
-        Ok(Self { folder, scene, source, seed, model, reference, origin, timeline, seconds_before })
+        let overwrites = earlier == Earlier::Overwrite;
+        Ok(Self {
+            folder,
+            scene,
+            source,
+            seed,
+            model,
+            reference,
+            origin,
+            timeline,
+            seconds_before,
+            overwrites,
+        })
     }
 
     /// The output folder, for people.
     pub fn folder(&self) -> impl std::fmt::Display + '_ {
-        self.folder.display()
+        self.folder.path().display()
+    }
+
+    /// A file in the output folder.
+    fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
     }
 
     /// The file of the checkpoint, for people.
     pub fn checkpoint_file(&self) -> String {
-        self.folder.join(CHECKPOINT).display().to_string()
+        self.path(CHECKPOINT).display().to_string()
     }
 
     /// The checkpoint in the folder, if there is one.
     pub fn checkpoint(&self) -> anyhow::Result<Option<Checkpoint<'static>>> {
-        let file = match File::open(self.folder.join(CHECKPOINT)) {
+        let file = match File::open(self.path(CHECKPOINT)) {
             Ok(file) => file,
             Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
             Err(error) => return Err(error).with_context(|| self.checkpoint_file()),
@@ -94,8 +120,7 @@ impl Output {
     /// Takes up the history of the render that is resumed, up to its samples. If it cannot be read, that is
     /// no reason to throw samples away.
     pub fn take_up(&mut self, samples: u64) {
-        let rows =
-            csv::Reader::from_path(self.folder.join("timeline.csv")).map(csv::Reader::into_deserialize);
+        let rows = csv::Reader::from_path(self.path("timeline.csv")).map(csv::Reader::into_deserialize);
         let rows = rows.into_iter().flatten().map_while(Result::ok);
         self.timeline = rows.take_while(|row: &TimelineRow| row.samples <= samples).collect();
         self.seconds_before = self.timeline.last().map_or(0.0, |row| row.seconds);
@@ -115,39 +140,56 @@ impl Output {
     /// Writes every file: the checkpoint of a render that can be resumed; with the time it took and what
     /// became of the samples when the run is over.
     pub fn write<C: StoppingCriterion>(
-        &self,
+        &mut self,
         session: &Session<C>,
         checkpoint: Option<Checkpoint<'_>>,
         over: Option<(Clock, &dyn Source)>,
     ) -> anyhow::Result<()> {
         let tiles = tiles::states(session);
+        // A report is of the pictures beside it: one of an earlier render is none any more
+        if std::mem::take(&mut self.overwrites) {
+            remove(&self.path(REPORT))?;
+        }
         self.write_pictures(session, &tiles)?;
-        write_csv(&self.folder.join("stops.csv"), tiles.iter().map(TileState::row))?;
-        write_csv(&self.folder.join("timeline.csv"), self.timeline.iter())?;
-        if let Some(checkpoint) = checkpoint {
-            self.write_checkpoint(session, &checkpoint)?;
+        write_csv(&self.path("stops.csv"), tiles.iter().map(TileState::row))?;
+        write_csv(&self.path("timeline.csv"), self.timeline.iter())?;
+        // The report goes before a checkpoint is removed: whatever is killed in between, one of them says how
+        // far the render is
+        let done = session.is_done() && tiles.iter().all(TileState::is_final);
+        let kept = checkpoint.filter(|_| !done);
+        if let Some(checkpoint) = &kept {
+            write_atomic(self.path(CHECKPOINT), |to| checkpoint.write(to))?;
         }
-        let report = Report::new(self, session, &tiles, over);
-        write_json(&self.folder.join("report.json"), &report)
+        write_json(&self.path(REPORT), &Report::new(self, session, &tiles, over))?;
+        if kept.is_none() { remove(&self.path(CHECKPOINT)) } else { Ok(()) }
     }
+}
 
-    /// Writes the checkpoint of a render that is not done, and removes that of one that is.
-    fn write_checkpoint<C: StoppingCriterion>(
-        &self,
-        session: &Session<C>,
-        checkpoint: &Checkpoint<'_>,
-    ) -> anyhow::Result<()> {
-        let path = self.folder.join(CHECKPOINT);
-        let done = |stop: Stop| matches!(stop.reason, StopReason::Converged | StopReason::MaxSpp);
-        if !session.is_done() || !session.stops().all(done) {
-            return Ok(write_atomic(path, |to| checkpoint.write(to))?);
+/// The render that must not be overwritten, if there is one.
+fn occupied(folder: &Folder, earlier: Earlier) -> Option<Occupied> {
+    let (found, path) = (folder.first_of(&[CHECKPOINT, REPORT, PICTURE])?, folder.path().display());
+    let resumable = found == CHECKPOINT;
+    let what = match earlier {
+        Earlier::Overwrite => return None,
+        Earlier::Resume if found != REPORT => return None,
+        Earlier::Resume => {
+            "holds a render that is finished, or that cannot be resumed; --force overwrites it"
         }
-        match std::fs::remove_file(&path) {
-            Err(error) if error.kind() != io::ErrorKind::NotFound => {
-                Err(error).with_context(|| self.checkpoint_file())
-            }
-            _ => Ok(()),
+        Earlier::Keep if resumable => {
+            "holds a render that is not finished; --resume resumes it, --force overwrites it"
         }
+        Earlier::Keep => "holds a render; --force overwrites it",
+    };
+    Some(Occupied::new(format!("{path}: {what}, and --out names another folder")))
+}
+
+/// Removes a file if it is there.
+fn remove(path: &Path) -> anyhow::Result<()> {
+    match std::fs::remove_file(path) {
+        Err(error) if error.kind() != io::ErrorKind::NotFound => {
+            Err(error).with_context(|| path.display().to_string())
+        }
+        _ => Ok(()),
     }
 }
 

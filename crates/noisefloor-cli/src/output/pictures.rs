@@ -39,18 +39,18 @@ impl Output {
             facts: Some(&facts),
             ..RenderLayers::rgb(width, height, &image)
         };
-        write_exr(self.folder.join("image.exr"), &layers)?;
+        write_exr(self.path("image.exr"), &layers)?;
 
         // image.png, stops.png and noise.png: as the oracle saw it
         let display =
             session.display().copied().unwrap_or_else(|| session.params().tone_mapping.settle(&image));
         let encoded: Vec<Rgb> = image.iter().map(|&p| display.encode(p)).collect();
-        Canvas::of_picture(width, &encoded).save(self.folder.join("image.png"))?;
+        Canvas::of_picture(width, &encoded).save(self.path("image.png"))?;
         let (marks, scale) = marks(tiles);
-        draw_tiles(width, &encoded, &marks, &scale).save(self.folder.join("stops.png"))?;
+        draw_tiles(width, &encoded, &marks, &scale).save(self.path("stops.png"))?;
         if let Some(noise) = &noise {
             let scale = noise_scale(self.model.as_ref().and_then(|m| m.just_visible));
-            draw_field(width, &encoded, noise, &scale).save(self.folder.join("noise.png"))?;
+            draw_field(width, &encoded, noise, &scale).save(self.path("noise.png"))?;
         }
         Ok(())
     }

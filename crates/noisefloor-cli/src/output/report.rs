@@ -22,6 +22,8 @@ pub(super) struct Report<'a> {
     params: &'a Params,
     /// Display exposure that was settled.
     exposure: Option<f32>,
+    /// Whether every tile has what it should have: false for a render that was interrupted or ran out of
+    /// time, and while it runs.
     complete: bool,
     tiles: usize,
     stops: BTreeMap<String, usize>,
@@ -79,7 +81,7 @@ impl<'a> Report<'a> {
             model: output.model.as_ref().map(|m| m.digest.as_str()),
             params: session.params(),
             exposure: session.display().map(noisefloor::Display::exposure),
-            complete: clock.is_some() && tiles.iter().all(|tile| !tile.open),
+            complete: clock.is_some() && tiles.iter().all(TileState::is_final),
             tiles: tiles.len(),
             stops,
             unfamiliar_tiles: tiles.iter().filter(|tile| tile.stop.unfamiliar).count(),

@@ -3,7 +3,7 @@
 use super::{CHECKPOINT, Output, uniform_samples};
 use crate::say::{NotSaid, say};
 use crate::sources::Source;
-use noisefloor::{Clock, Session, StopReason, StoppingCriterion};
+use noisefloor::{Clock, Session, StoppingCriterion};
 use noisefloor_ptwne::ReferenceNoise;
 
 impl Output {
@@ -13,7 +13,6 @@ impl Output {
         session: &Session<C>,
         clock: Clock,
         source: &dyn Source,
-        resumable: bool,
     ) -> Result<(), NotSaid> {
         self.say_stops(session)?;
         say!(
@@ -35,9 +34,8 @@ impl Output {
         if let Some(noise) = source.reference_noise() {
             say_noise(noise)?;
         }
-        say!("written to {}", self.folder.display())?;
-        // One that is not of this render may lie there too
-        if resumable && self.folder.join(CHECKPOINT).exists() {
+        say!("written to {}", self.folder())?;
+        if self.path(CHECKPOINT).exists() {
             say!("to continue, repeat the command with --resume")?;
         }
         Ok(())
@@ -47,10 +45,13 @@ impl Output {
         let grid = session.film().grid();
         let samples = session.film().total_samples() as f64;
         let spp: Vec<u64> = session.stops().map(|s| s.spp).collect();
-        let converged = session.stops().filter(|s| s.reason == StopReason::Converged).count();
+        let satisfied = session.stops().filter(|s| s.reason.is_satisfied()).count();
+        // A count has looked at no noise
+        let counts = session.criterion().only_counts();
+        let as_wanted = if counts { "have the samples that were asked for" } else { "converged" };
         let (least, most) = (spp.iter().min().unwrap_or(&0), spp.iter().max().unwrap_or(&0));
         say!(
-            "{converged} of {} tiles converged, after {least} to {most} samples per pixel ({:.0} on average: {:.0} % of uniform \
+            "{satisfied} of {} tiles {as_wanted}, after {least} to {most} samples per pixel ({:.0} on average: {:.0} % of uniform \
              rendering at {most})",
             spp.len(),
             samples / (grid.width() * grid.height()) as f64,

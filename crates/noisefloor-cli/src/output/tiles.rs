@@ -51,6 +51,12 @@ impl TileState {
         if self.open { "open".into() } else { self.stop.reason.to_string() }
     }
 
+    /// Whether no later run would add samples: the criterion is satisfied, or there are no more.
+    pub(super) fn is_final(&self) -> bool {
+        let reason = self.stop.reason;
+        !self.open && (reason.is_final() || reason == StopReason::SourceExhausted)
+    }
+
     pub(super) fn row(&self) -> StopRow {
         let Stop { tile: Tile { index, x, y, width, height }, spp, probability, unfamiliar, .. } = self.stop;
         let (tile, reason) = (index, self.reason());

@@ -4,6 +4,7 @@ mod progress;
 mod snapshots;
 
 use crate::files::read_reference;
+use crate::folder::{Earlier, Folder};
 use crate::output::{ModelFacts, Output};
 use crate::say::{note, one_line};
 use crate::signals::{AFTER_THIS_BATCH, INTERRUPTED, cancel_on_signal};
@@ -32,7 +33,7 @@ pub struct RenderJob {
     pub against: Option<PathBuf>,
     /// Zero for never.
     pub autosave: Duration,
-    pub resume: bool,
+    pub earlier: Earlier,
     pub quiet: bool,
 }
 
@@ -54,31 +55,23 @@ pub fn run(job: RenderJob) -> anyhow::Result<ExitCode> {
     let SourceInfo { width, height, .. } = source.info();
     let against = job.against.as_deref();
     let reference = against.map(|path| read_reference(path, (width, height))).transpose()?;
-    let what = identity(&job, &source.info().name);
     let rest = Rest { job: &job, scene, reference, model: None };
     match judge {
         Judge::Oracle(oracle) => {
             let (digest, just_visible) = (oracle.model().digest(), oracle.just_visible());
             let rest = Rest { model: Some(ModelFacts { digest, just_visible }), ..rest };
             let driver = Driver::new(source, oracle.as_ref().clone(), *params)?;
-            rest.drive(driver, Some(Snapshots::new(what)))
+            rest.drive(driver, Some(Snapshots::new()))
         }
         Judge::Fixed(spp) => {
             let driver = Driver::new(source, FixedSpp(*spp), *params)?;
-            rest.drive(driver, Some(Snapshots::new(what)))
+            rest.drive(driver, Some(Snapshots::new()))
         }
         // A rival's state is not kept
         Judge::Rival(spec) => {
             rest.drive(Driver::new(source, noisefloor_rivals::parse(spec)?, *params)?, None)
         }
     }
-}
-
-/// What must be the same for a render to be resumed, beside parameters, criterion and size.
-fn identity(job: &RenderJob, source: &str) -> String {
-    let SourceJob { kind, scene, seed, max_depth, .. } = &job.source;
-    let scene = scene.as_deref().unwrap_or("the default scene");
-    format!("{source}, {scene}, seed {seed}, depth {max_depth:?}, {kind:?}")
 }
 
 /// Where samples come from, for the picture's file; none for pictures that are played back. Paths and command
@@ -111,7 +104,8 @@ impl Rest<'_> {
         let Rest { job, scene, reference, model } = self;
         let info = driver.source().info();
         let snapshots = snapshots.filter(|_| info.repeats == Repeats::Samples);
-        if job.resume && snapshots.is_none() {
+        let resume = job.earlier == Earlier::Resume;
+        if resume && snapshots.is_none() {
             bail!(
                 "--resume: {} cannot be resumed, since it may repeat samples after a restart; leave it out",
                 info.name
@@ -119,9 +113,10 @@ impl Rest<'_> {
         }
         let folder = job.out.clone().unwrap_or_else(|| PathBuf::from("out").join(&scene));
         let origin = origin(&job.source, &scene, &info);
-        let mut output = Output::create(folder, scene, info.name, job.source.seed)?;
+        let folder = Folder::claim(folder)?;
+        let mut output = Output::create(folder, job.earlier, scene, info.name, job.source.seed)?;
         (output.model, output.reference, output.origin) = (model, reference, origin);
-        if let Some(snapshots) = snapshots.as_ref().filter(|_| job.resume) {
+        if let Some(snapshots) = snapshots.as_ref().filter(|_| resume) {
             driver = snapshots.resume(driver, &mut output, job.quiet)?;
         }
         driver.set_time_limit(job.time);
@@ -137,12 +132,7 @@ impl Rest<'_> {
         let interrupted = finish(&driver, outcome, &cancel)?;
         written?;
         if !job.quiet {
-            output.summarise(
-                driver.session(),
-                driver.clock(),
-                driver.source().as_ref(),
-                snapshots.is_some(),
-            )?;
+            output.summarise(driver.session(), driver.clock(), driver.source().as_ref())?;
         }
         let stopped = driver.session().stops().any(|s| s.reason == StopReason::Cancelled);
         Ok(if stopped || interrupted { ExitCode::from(INTERRUPTED) } else { ExitCode::SUCCESS })

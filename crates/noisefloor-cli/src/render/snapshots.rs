@@ -9,26 +9,27 @@ use noisefloor::{Checkpoint, CheckpointError, Driver, Resumable, Session, Stoppi
 /// A render under way.
 pub(super) type Rendering<C> = Driver<Box<dyn Source>, C>;
 
+/// All that must be the same for a render to be resumed, the library checks.
+const JOB: &str = "noisefloor render";
+
 type Resume<C> = fn(Rendering<C>, &str, Checkpoint<'_>) -> Result<Rendering<C>, CheckpointError>;
 
 /// Of a criterion that is [`Resumable`], on a source that repeats its samples.
 pub(super) struct Snapshots<C> {
-    /// What must be the same for a render to be resumed, beside what the library checks.
-    pub(super) job: String,
     save: for<'a> fn(&'a Session<C>, &'a str) -> Checkpoint<'a>,
     resume: Resume<C>,
 }
 
 impl<C: Resumable> Snapshots<C> {
-    pub(super) fn new(job: String) -> Self {
-        Self { job, save: Session::checkpoint, resume: Driver::resume }
+    pub(super) fn new() -> Self {
+        Self { save: Session::checkpoint, resume: Driver::resume }
     }
 }
 
 impl<C: StoppingCriterion> Snapshots<C> {
     /// Everything that has to be known to continue.
     pub(super) fn of<'a>(&'a self, session: &'a Session<C>) -> Checkpoint<'a> {
-        (self.save)(session, &self.job)
+        (self.save)(session, JOB)
     }
 
     /// The driver of the render that the output folder holds; as it is if there is none.
@@ -44,8 +45,8 @@ impl<C: StoppingCriterion> Snapshots<C> {
             }
             return Ok(driver);
         };
-        let driver =
-            (self.resume)(driver, &self.job, checkpoint).with_context(|| output.checkpoint_file())?;
+        let driver = (self.resume)(driver, JOB, checkpoint)
+            .with_context(|| format!("{} (--force renders anew)", output.checkpoint_file()))?;
         output.take_up(driver.session().film().total_samples());
         Ok(driver)
     }

@@ -2,13 +2,15 @@
 
 mod report;
 
-use crate::say::say;
+use crate::folder::{Folder, Occupied};
+use crate::say::{say, say_json};
 use crate::signals::cancel_on_signal;
 use crate::sources::{Opened, SourceJob};
 use anyhow::Context;
 use noisefloor::{Rgb, SourceInfo};
 #[cfg(feature = "adapters")]
 use noisefloor_image::LinearImage;
+use noisefloor_image::running_means;
 #[cfg(feature = "adapters")]
 use noisefloor_sidecar::PictureCommand;
 use noisefloor_study::analysis::files::write;
@@ -116,8 +118,7 @@ pub fn run(job: StudyJob) -> anyhow::Result<()> {
         StudyJob::Backup(job) => backup(&job),
         StudyJob::Export(ObserverJob { study, code }) => {
             let record = store::read_one(&study.database, &study.design(), &code)?;
-            say!("{}", serde_json::to_string_pretty(&record)?)?;
-            Ok(())
+            say_json(&record)
         }
         StudyJob::Erase(ObserverJob { study, code }) => {
             store::erase_one(&study.database, &study.design(), &code)?;
@@ -186,6 +187,15 @@ fn stack(job: &StackJob) -> anyhow::Result<()> {
     let opened = job.source.open()?;
     opened.warn(false);
     let Opened { mut source, .. } = opened;
+    let folder = Folder::claim(job.out.clone())?;
+    // Levels of two renders in one folder would be taken for one stack
+    if running_means(folder.path()).is_ok() {
+        let path = job.out.display();
+        let what = format!(
+            "{path}: holds a stack of pictures already; remove it, or choose another folder with --out"
+        );
+        return Err(Occupied::new(what).into());
+    }
     let cancel = Arc::new(AtomicBool::new(false));
     cancel_on_signal(Arc::clone(&cancel), "keeping the levels that are finished")?;
     let go_on = |_, _| !cancel.load(Ordering::Relaxed);

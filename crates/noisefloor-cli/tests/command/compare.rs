@@ -81,7 +81,7 @@ fn a_reference_is_rendered_on() {
         let out = folder.path().join(out);
         let small =
             ["compare", "cornell-box", "--size", "64x64", "--tile", "32", "--max-spp", "100", "--quiet"];
-        let more = ["--criteria", "spp:100", "--reference-spp", spp, "--out", text(&out)];
+        let more = ["--criteria", "spp:100", "--reference-spp", spp, "--force", "--out", text(&out)];
         succeed(&[&small[..], &more].concat());
         let image = noisefloor_image::read_exr(out.join("cornell-box/reference.exr")).unwrap();
         (image.pixels, json(&out.join("cornell-box/reference.json"))["spp"].as_u64())

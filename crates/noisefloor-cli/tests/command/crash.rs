@@ -49,8 +49,8 @@ fn kill_and_resume(kills: usize) {
         let folder = tempdir().unwrap();
         let out = folder.path();
         loop {
-            let resume: &[&str] = if out.join("checkpoint.nfc").exists() { &["--resume"] } else { &[] };
-            let mut child = command(&arguments(text(out), resume)).stderr(Stdio::null()).spawn().unwrap();
+            let mut child =
+                command(&arguments(text(out), &["--resume"])).stderr(Stdio::null()).spawn().unwrap();
             let ended = if killed < kills {
                 std::thread::sleep(Duration::from_millis(random.u64(0..700)));
                 child.try_wait().unwrap()
@@ -101,9 +101,7 @@ fn a_disk_that_is_full_is_an_error_and_spoils_nothing() {
     let program = env!("CARGO_BIN_EXE_noisefloor");
     // Blocks of 512 bytes; without the signal, writing beyond the limit is an error
     let limited = "trap '' XFSZ; ulimit -f 16; exec \"$@\"";
-    // Not a finished render any more, which would not be overwritten
-    std::fs::remove_file(out.join("report.json")).unwrap();
-    let args = arguments(text(out), &["--seed", "2"]);
+    let args = arguments(text(out), &["--seed", "2", "--force"]);
     let output = Command::new("sh").args(["-c", limited, "sh", program]).args(args).output().unwrap();
     let said = stderr(&output);
     assert_eq!(output.status.code(), Some(1), "{said}");

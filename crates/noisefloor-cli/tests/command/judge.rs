@@ -198,3 +198,24 @@ fn viewing_conditions_are_said_and_checked() {
     fail(&[&pair[..], &["--viewing", "ppd=0"]].concat(), &["pixels per degree"]);
     fail(&[&pair[..], &["--viewing", "bed"]].concat(), &["bed", "desk"]);
 }
+
+/// Black and white agree with themselves from pixel to pixel, and are still no two renderings of one view.
+#[test]
+fn pictures_of_different_things_are_told() {
+    let folder = tempdir().unwrap();
+    let [black, white, grey, other] =
+        ["black.exr", "white.exr", "grey.exr", "other.exr"].map(|name| folder.path().join(name));
+    for (path, value) in [(&black, 0.0), (&white, 1.0)] {
+        let pixels = vec![[value; 3]; 32 * 32];
+        write_exr(path, &RenderLayers::rgb(32, 32, &pixels)).unwrap();
+    }
+    grey_exr(&grey, (32, 32), 1, 0.4);
+    grey_exr(&other, (32, 32), 2, 0.4);
+    let warned = |a: &PathBuf, b: &PathBuf| {
+        let args = ["judge", text(a), "--spp", "9", "--against", text(b), "--spp", "9", "--independent"];
+        let output = run(&[&args[..], &["--tone-mapping", "srgb"]].concat());
+        stderr(&output).contains("warning: in 1 of 1 tiles the pictures differ in brightness")
+    };
+    assert!(warned(&black, &white) && warned(&white, &black) && warned(&grey, &white));
+    assert!(!warned(&grey, &other));
+}

@@ -15,6 +15,9 @@ mod compare;
 /// Kills, full disks, folders that nobody can write.
 #[cfg(test)]
 mod crash;
+/// Output folders that are taken, and scenes that were edited.
+#[cfg(test)]
+mod folders;
 /// Every subcommand explains itself.
 #[cfg(test)]
 mod help;

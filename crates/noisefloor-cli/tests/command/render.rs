@@ -12,6 +12,8 @@ fn writes_all_it_promises() {
     succeed(&tiny(text(&out), &["--seed", "7"]));
     let mut written: Vec<_> =
         std::fs::read_dir(&out).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
+    // The lock is hidden
+    written.retain(|name| name != ".noisefloor.lock");
     written.sort();
     let mut promised: Vec<_> = FILES.iter().chain(&["noise.png"]).map(|&name| name.to_owned()).collect();
     promised.sort();
@@ -96,7 +98,8 @@ fn a_fixed_number_of_samples() {
     succeed(&tiny(text(folder.path()), &["bulb", "--criterion", "spp:100"]));
     let stops = folder.path().join("stops.csv");
     assert_eq!(column(&stops, "spp"), ["100"; 4]);
-    assert_eq!(column(&stops, "reason"), ["converged"; 4]);
+    // Nobody has looked at the noise
+    assert_eq!(column(&stops, "reason"), ["reached-spp"; 4]);
     assert_eq!(column(&stops, "probability"), [""; 4]);
     let report = json(&folder.path().join("report.json"));
     assert!(report["model"].is_null() && report["scene"] == "bulb");
@@ -153,6 +156,7 @@ fn time_is_kept() {
     let seconds = begun.elapsed().as_secs_f64();
     assert!((1.0..20.0).contains(&seconds), "{seconds} s");
     assert_eq!(column(&folder.path().join("stops.csv"), "reason"), ["time-limit"; 4]);
+    assert_eq!(json(&folder.path().join("report.json"))["complete"], false);
 }
 
 #[test]
@@ -160,7 +164,7 @@ fn a_fixed_number_of_samples_need_not_be_a_multiple_of_the_batch() {
     let folder = tempdir().unwrap();
     for spp in ["30", "150"] {
         let criterion = format!("spp:{spp}");
-        succeed(&tiny(text(folder.path()), &["--criterion", &criterion]));
+        succeed(&tiny(text(folder.path()), &["--criterion", &criterion, "--force"]));
         assert_eq!(column(&folder.path().join("stops.csv"), "spp"), [spp; 4]);
     }
 }
@@ -180,7 +184,36 @@ fn scene_files_are_rendered() {
     assert_eq!((report["samples_dropped"].as_u64(), report["samples_clamped"].as_u64()), (Some(0), Some(0)));
 
     // With all that can be chosen; brighter samples than the walls give back are counted
-    args.extend(["--sampler", "sobol", "--filter", "gaussian", "--clamp", "0.5", "--max-depth", "3"]);
+    args.extend([
+        "--sampler",
+        "sobol",
+        "--filter",
+        "gaussian",
+        "--clamp",
+        "0.5",
+        "--max-depth",
+        "3",
+        "--force",
+    ]);
     succeed(&args);
     assert!(json(&out.join("report.json"))["samples_clamped"].as_u64() > Some(0));
+}
+
+/// The map of stops is wider than the picture.
+#[test]
+fn the_widest_picture_is_written() {
+    let folder = tempdir().unwrap();
+    let args = ["render", "--size", "65536x16", "--tile", "512", "--criterion", "spp:2", "--quiet", "--out"];
+    succeed(&[&args[..], &[text(folder.path())]].concat());
+    for map in ["image.png", "stops.png"] {
+        let (width, _) = image_size(&folder.path().join(map));
+        assert!(width >= 65_536, "{map}: {width}");
+    }
+}
+
+/// Width and height in the header of a PNG.
+fn image_size(path: &std::path::Path) -> (u32, u32) {
+    let bytes = std::fs::read(path).unwrap();
+    let number = |at: usize| u32::from_be_bytes(bytes[at..at + 4].try_into().unwrap());
+    (number(16), number(20))
 }

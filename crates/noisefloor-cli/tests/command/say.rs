@@ -39,8 +39,28 @@ impl Talkers {
             owned(&["render", "--help"]),
             owned(&["--version"]),
         ];
+        let reference = self.path("reference.exr");
+        let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/../../fixtures/cornell-box.xml");
+        all.push(owned(&["reference", "cornell-box", "--size", "16x16", "--out", &reference]));
+        all.push(owned(&["scenes", "check", scene]));
         if cfg!(feature = "adapters") {
             all.push(owned(&["doctor"]));
+        }
+        if cfg!(feature = "train") {
+            let table = self.path("pairs.csv");
+            std::fs::write(&table, "observers,audience\n1,2\n2,4\n3,6\n").unwrap();
+            all.push(owned(&["audience", "fit", &table]));
+            all.push(owned(&["audience", "fit", &table, "--json"]));
+        }
+        if cfg!(feature = "lab") {
+            let small = ["compare", "bulb", "--size", "16x16", "--tile", "16", "--criteria", "spp:4"];
+            let few = ["--max-spp", "4", "--batch", "2", "--reference-spp", "4", "--out"];
+            all.push(owned(&[&small[..], &few, &[self.path("compared").as_str()]].concat()));
+        }
+        if cfg!(feature = "study") {
+            let stack = self.path("stack");
+            let small = ["study", "stack", "bulb", "--size", "64x64", "--levels", "1,2", "--out", &stack];
+            all.push(owned(&small));
         }
         all
     }

@@ -60,6 +60,7 @@ fn an_interrupt_ends_with_what_is_there_written() {
         assert_eq!(end(child).code(), Some(130), "{name}");
         assert_whole(out);
         assert!(table(&out.join("stops.csv")).1.iter().all(|row| row[7] == "cancelled" && row[5] != "0"));
+        assert_eq!(json(&out.join("report.json"))["complete"], false);
         std::fs::remove_dir_all(out).unwrap();
     }
     std::fs::create_dir(out).unwrap();
@@ -80,8 +81,19 @@ fn what_was_saved_survives_a_kill() {
     assert_eq!(report["complete"], false);
     assert!(table(&out.join("stops.csv")).1.iter().all(|row| row[7] == "open"));
 
-    // And does not stand in the way of the next run
-    let small = ["render", "--size", "64x64", "--tile", "32", "--criterion", "spp:100", "--quiet", "--out"];
+    // And the next run overwrites it only if it is told to
+    let small = [
+        "render",
+        "--size",
+        "64x64",
+        "--tile",
+        "32",
+        "--criterion",
+        "spp:100",
+        "--quiet",
+        "--force",
+        "--out",
+    ];
     succeed(&[&small[..], &[text(out)]].concat());
     assert_whole(out);
     assert_eq!(json(&out.join("report.json"))["complete"], true);
@@ -144,6 +156,7 @@ fn what_was_killed_goes_on_to_the_bit() {
         let before = samples(out);
         succeed(&short(text(out), &["--resume", "--time", "0.1"]));
         assert!(before < samples(out) && samples(out) < samples(whole.path()));
+        assert_eq!(json(&out.join("report.json"))["complete"], false);
     }
     succeed(&short(text(out), &["--resume"]));
     let pixels = |out: &Path| read_exr(out.join("image.exr")).unwrap().pixels;
@@ -188,5 +201,25 @@ fn a_checkpoint_of_another_render_is_refused() {
     std::fs::write(&file, &bytes[..bytes.len() / 2]).unwrap();
     refused(&["--resume"], "remove it to begin anew");
     std::fs::remove_file(&file).unwrap();
-    succeed(&short(out, &["--resume", "--time", "0.01"]));
+    refused(&["--resume"], "--force");
+    succeed(&short(out, &["--force", "--time", "0.01"]));
+}
+
+/// Two scenes, of which the second would take minutes: the page says that it has one.
+#[test]
+#[cfg(feature = "lab")]
+fn the_page_of_an_interrupted_comparison_says_so() {
+    let folder = tempdir().unwrap();
+    let out = folder.path();
+    let args = ["compare", "bulb", "cornell-box", "--size", "32x32", "--tile", "32", "--criteria", "spp:4"];
+    let args = [&args[..], &["--max-spp", "4", "--batch", "2", "--reference-spp", "4000", "--out"]].concat();
+    let child = command(&args).arg(out).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+    let page = || std::fs::read_to_string(out.join("index.html")).ok();
+    let first = wait_for("the first scene", page);
+    signal(&child, "-INT");
+    let code = end(child).code();
+    assert!(first.contains("<b>Not finished:</b> 1 of 2 scenes"), "{first:.2000}");
+    // A fast machine may have finished
+    let done = !page().unwrap().contains("Not finished");
+    assert_eq!(code, Some(if done { 0 } else { 130 }));
 }

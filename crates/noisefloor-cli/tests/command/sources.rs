@@ -62,7 +62,10 @@ fn a_command_renders() {
     assert!((deviation / 0.2 - 1.0).abs() < 0.1, "{deviation} at {spp} samples");
 
     std::fs::write(&scene, "no lamp").unwrap();
-    fail(&fixed(&source, text(&scene), &out, &["--size", "48x40"]), &["AssertionError", "render it.py"]);
+    fail(
+        &fixed(&source, text(&scene), &out, &["--size", "48x40", "--force"]),
+        &["AssertionError", "render it.py"],
+    );
     fail(&fixed("command: ", text(&scene), &out, &[]), &["it is empty"]);
 }
 

@@ -181,3 +181,16 @@ fn odd_images_are_named_when_they_are_reached() {
     let error = cause(stack.sample(&[Request { tile: tiles()[0], first: 40, spp: 1 }]).unwrap_err());
     assert!(matches!(error, StackError::Picture(PictureError::Foreign { .. })), "{error}");
 }
+
+#[test]
+fn the_identity_of_a_stack_is_what_is_in_its_pictures() {
+    let folder = tempfile::tempdir().unwrap();
+    batch(folder.path(), 0, 10, 0.5);
+    batch(folder.path(), 10, 20, 0.5);
+    let identity = || StackSource::open(folder.path()).unwrap().identity().unwrap();
+    let before = identity();
+    assert_eq!(before, identity());
+    batch(folder.path(), 10, 20, 0.25);
+    let change = identity().change_since(&before).unwrap().to_string();
+    assert_eq!(change, "`batch_00010_00020.exr` has changed");
+}

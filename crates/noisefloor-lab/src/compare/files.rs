@@ -75,13 +75,18 @@ pub fn write_scene(
 }
 
 /// Writes index.html, runs.csv and runs.json of all scenes. `sections` are those of
-/// [`section`](super::section).
+/// [`section`](super::section), `scenes` the number that there will be.
 ///
 /// # Errors
 /// [`LabError::Write`] if a file cannot be written.
-pub fn write_page(folder: &Path, all: &[Comparison], sections: &[String]) -> Result<(), LabError> {
+pub fn write_page(
+    folder: &Path,
+    all: &[Comparison],
+    sections: &[String],
+    scenes: usize,
+) -> Result<(), LabError> {
     let runs: Vec<&CriterionRun> = all.iter().flat_map(|comparison| &comparison.runs).collect();
-    write_text(&folder.join("index.html"), &page(all, sections))?;
+    write_text(&folder.join("index.html"), &page(all, sections, scenes))?;
     write_csv(&folder.join("runs.csv"), &runs)?;
     write_json(&folder.join("runs.json"), &runs)?;
     Ok(())

@@ -3,9 +3,11 @@
 use crate::advance::{Advance, Watch};
 use crate::error::LabError;
 use crate::files::write_json;
-use noisefloor::{Film, ProgressiveSource, Repeats, Request, Rgb, SourceInfo, TileGrid};
+use noisefloor::{Film, ProgressiveSource, Repeats, Request, Rgb, SourceIdentity, SourceInfo, TileGrid};
 use noisefloor_image::{RenderLayers, SampleFacts, read_exr, write_exr};
 use serde::{Deserialize, Serialize};
+use std::fs::File;
+use std::io;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -19,38 +21,27 @@ pub struct Converged {
     pub origin: String,
 }
 
-/// What a reference is of, beside what the source says.
+/// Which reference is wanted, beside what the source says of itself.
 #[derive(Clone, Debug)]
 pub struct ReferenceJob<'a> {
     /// Where it is kept: reference.exr, and reference.json beside it.
     pub folder: &'a Path,
-    /// The scene.
-    pub scene: &'a str,
-    /// Seed of the source.
-    pub seed: u64,
-    /// Longest path.
-    pub max_depth: Option<u32>,
-    /// What else changes the picture that it converges to.
-    pub filter: String,
-    /// Largest radiance of a sample.
-    pub clamp: Option<f32>,
     /// Tile edge in pixels.
     pub tile: usize,
     /// Samples per pixel that are enough.
     pub spp: u64,
+    /// Whether a kept picture of something else is rendered anew.
+    pub overwrite: bool,
 }
 
 /// What reference.json says of reference.exr.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 struct Facts {
-    scene: String,
-    source: String,
+    source: SourceIdentity,
     width: usize,
     height: usize,
-    seed: u64,
-    max_depth: Option<u32>,
-    filter: String,
-    clamp: Option<f32>,
+    /// BLAKE3 of reference.exr.
+    digest: String,
     /// Samples per pixel so far.
     spp: u64,
 }
@@ -63,8 +54,12 @@ const SAVE_EVERY: Duration = Duration::from_secs(30);
 /// The converged picture of a job: read if the folder has it, resumed if it has some of it and the source
 /// promises to repeat its samples, and rendered otherwise. It is saved every half a minute.
 ///
+/// A kept picture of another scene, or of the scene before an edit, is refused unless
+/// [`ReferenceJob::overwrite`] is set.
+///
 /// # Errors
 /// [`LabError`] if the source fails or has too few samples, or a file cannot be read or written;
+/// [`LabError::OtherReference`] if the folder keeps another one;
 /// [`LabError::Cancelled`] once `cancel` is set and what there is has been saved.
 pub fn render_reference(
     source: &mut dyn ProgressiveSource,
@@ -73,7 +68,7 @@ pub fn render_reference(
     watch: Watch<'_>,
 ) -> Result<Converged, LabError> {
     let info = source.info();
-    let mut kept = Kept::new(job, &info)?;
+    let mut kept = Kept::new(job, &info, source.identity()?)?;
     kept.resume(job, info.repeats == Repeats::Samples)?;
     let mut saved = Instant::now();
     while kept.spp() < job.spp {
@@ -110,18 +105,8 @@ struct Kept {
 }
 
 impl Kept {
-    fn new(job: &ReferenceJob<'_>, info: &SourceInfo) -> Result<Self, LabError> {
-        let facts = Facts {
-            scene: job.scene.into(),
-            source: info.name.clone(),
-            width: info.width,
-            height: info.height,
-            seed: job.seed,
-            max_depth: job.max_depth,
-            filter: job.filter.clone(),
-            clamp: job.clamp,
-            spp: 0,
-        };
+    fn new(job: &ReferenceJob<'_>, info: &SourceInfo, source: SourceIdentity) -> Result<Self, LabError> {
+        let facts = Facts { source, width: info.width, height: info.height, digest: String::new(), spp: 0 };
         let film = Film::without_halves(TileGrid::new(info.width, info.height, job.tile)?);
         Ok(Self { facts, film })
     }
@@ -131,15 +116,10 @@ impl Kept {
         self.film.spp(0)
     }
 
-    /// Takes up what the folder has, if it is of the same picture, and enough or of samples that can be
-    /// told from new ones.
+    /// Takes up what the folder has, if it is enough, or of samples that can be told from new ones.
     fn resume(&mut self, job: &ReferenceJob<'_>, repeats: bool) -> Result<(), LabError> {
-        let text = std::fs::read(job.folder.join(FACTS)).ok();
-        let Some(kept) = text.and_then(|text| serde_json::from_slice::<Facts>(&text).ok()) else {
-            return Ok(());
-        };
-        let same = Facts { spp: 0, ..kept.clone() } == self.facts;
-        if !same || (kept.spp < job.spp && !repeats) {
+        let Some(kept) = self.kept(job)? else { return Ok(()) };
+        if kept.spp < job.spp && !repeats {
             return Ok(());
         }
         let path = job.folder.join(PICTURE);
@@ -156,12 +136,59 @@ impl Kept {
         Ok(())
     }
 
+    /// What the folder says of its picture; `None` if there is none, or another one that may be overwritten.
+    fn kept(&self, job: &ReferenceJob<'_>) -> Result<Option<Facts>, LabError> {
+        let path = job.folder.join(PICTURE);
+        if job.overwrite && !self.is_like(job.folder) {
+            return Ok(None);
+        }
+        let unlike = || LabError::KeptReference { path: path.clone() };
+        let text = match std::fs::read(job.folder.join(FACTS)) {
+            Ok(text) => text,
+            Err(error) if error.kind() == io::ErrorKind::NotFound && !path.exists() => return Ok(None),
+            Err(_) => return Err(unlike()),
+        };
+        let kept: Facts = serde_json::from_slice(&text).map_err(|_| unlike())?;
+        let other = |what: String| LabError::OtherReference { path: path.clone(), what };
+        if let Some(change) = self.facts.source.change_since(&kept.source) {
+            return Err(other(change.to_string()));
+        }
+        let size = |facts: &Facts| format!("{}×{} pixels", facts.width, facts.height);
+        if size(&kept) != size(&self.facts) {
+            return Err(other(format!("it has {}, not {}", size(&kept), size(&self.facts))));
+        }
+        // A kill may come between the picture and the file beside it
+        if digest(&path).ok().as_ref() != Some(&kept.digest) {
+            return Err(unlike());
+        }
+        Ok(Some(kept))
+    }
+
+    /// Whether the folder keeps this picture.
+    fn is_like(&self, folder: &Path) -> bool {
+        let kept = std::fs::read(folder.join(FACTS)).ok();
+        let kept = kept.and_then(|text| serde_json::from_slice::<Facts>(&text).ok());
+        kept.is_some_and(|kept| {
+            let facts = Facts { spp: kept.spp, digest: kept.digest.clone(), ..self.facts.clone() };
+            facts == kept && digest(&folder.join(PICTURE)).is_ok_and(|digest| digest == kept.digest)
+        })
+    }
+
     fn save(&self, folder: &Path) -> Result<(), LabError> {
         let (pixels, Facts { width, height, .. }) = (self.film.image(), self.facts.clone());
         let facts = SampleFacts { samples: Some((self.spp(), self.spp())), origin: None };
         let layers = RenderLayers { facts: Some(&facts), ..RenderLayers::rgb(width, height, &pixels) };
         write_exr(folder.join(PICTURE), &layers)?;
-        write_json(&folder.join(FACTS), &Facts { spp: self.spp(), ..self.facts.clone() })?;
+        let digest = digest(&folder.join(PICTURE))
+            .map_err(|source| LabError::Folder { path: folder.to_owned(), source })?;
+        write_json(&folder.join(FACTS), &Facts { spp: self.spp(), digest, ..self.facts.clone() })?;
         Ok(())
     }
+}
+
+/// BLAKE3 of a file.
+fn digest(path: &Path) -> io::Result<String> {
+    let mut hasher = blake3::Hasher::new();
+    hasher.update_reader(File::open(path)?)?;
+    Ok(hasher.finalize().to_hex().to_string())
 }

@@ -22,8 +22,9 @@ const STYLE: &str = "
   .pictures figure { margin: 0; } .pictures img { width: 100%; }
 ";
 
-/// One HTML page about all comparisons, with a [`section`] for each.
-pub fn page(all: &[Comparison], sections: &[String]) -> String {
+/// One HTML page about all comparisons, with a [`section`] for each. If there are fewer than `scenes`, it says
+/// that it is not finished.
+pub fn page(all: &[Comparison], sections: &[String], scenes: usize) -> String {
     let mut html = format!(
         "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" content=\"width=device-width\">\n\
          <title>Stopping criteria compared</title><style>{STYLE}</style></head><body>\n<h1>Stopping criteria compared</h1>\n\
@@ -33,6 +34,15 @@ pub fn page(all: &[Comparison], sections: &[String]) -> String {
          Source seconds are samples times what a sample of the tile cost in that run.</p>\n",
         env!("CARGO_PKG_VERSION")
     );
+    if all.len() < scenes {
+        let done = all.len();
+        put(
+            &mut html,
+            format_args!(
+                "<p><b>Not finished:</b> {done} of {scenes} scenes have been compared so far.</p>\n"
+            ),
+        );
+    }
     if all.len() > 1 {
         html.push_str(&summary(all));
     }

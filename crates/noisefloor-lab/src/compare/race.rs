@@ -51,7 +51,7 @@ impl Entrant {
 
     /// Tiles that it was satisfied with, before a limit came.
     pub fn converged(&self) -> usize {
-        self.session.stops().filter(|s| s.reason == StopReason::Converged).count()
+        self.session.stops().filter(|s| s.reason.is_satisfied()).count()
     }
 }
 

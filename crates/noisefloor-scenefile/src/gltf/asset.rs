@@ -1,6 +1,7 @@
 //! A glTF file as it is: its JSON, and the bytes that it names.
 
 use super::uri;
+use crate::files::Folder;
 use crate::{LoadError, Place};
 use gltf::json::root::Get;
 use gltf::json::{Buffer, Index, Root, buffer, deserialize};
@@ -16,6 +17,7 @@ const MAX_VALUES: u64 = 1 << 22;
 #[derive(Debug)]
 pub(super) struct Asset<'a> {
     pub(super) path: &'a Path,
+    folder: &'a Folder,
     pub(super) root: Root,
     binary: Option<&'a [u8]>,
     /// Those that are not the binary chunk, filled when first asked for.
@@ -24,8 +26,8 @@ pub(super) struct Asset<'a> {
 }
 
 impl<'a> Asset<'a> {
-    /// Parses `file`, the bytes of `path`: JSON or GLB.
-    pub(super) fn parse(path: &'a Path, file: &'a [u8]) -> Result<Self, LoadError> {
+    /// Parses `file`, the bytes of `path`: JSON or GLB. What it names lies in `folder`.
+    pub(super) fn parse(path: &'a Path, folder: &'a Folder, file: &'a [u8]) -> Result<Self, LoadError> {
         let (json, binary) = if file.starts_with(b"glTF") { split_glb(path, file)? } else { (file, None) };
         let values = json.iter().filter(|b| matches!(b, b'{' | b'[' | b',')).count() as u64;
         Place::file(path).at_most("JSON values", values, MAX_VALUES)?;
@@ -34,7 +36,7 @@ impl<'a> Asset<'a> {
                 .bad(format_args!("not the JSON of a glTF file: {e}"))
         })?;
         let buffers = root.buffers.iter().map(|_| OnceCell::new()).collect();
-        Ok(Self { path, root, binary, buffers, bytes: Cell::new(file.len() as u64) })
+        Ok(Self { path, folder, root, binary, buffers, bytes: Cell::new(file.len() as u64) })
     }
 
     /// The element of that index, named by `place`; `kind` is what to call it.
@@ -70,7 +72,7 @@ impl<'a> Asset<'a> {
 
     /// The bytes that `uri` names. They count towards [`MAX_BYTES`].
     pub(super) fn resolve(&self, uri: &str, place: &Place) -> Result<Vec<u8>, LoadError> {
-        let bytes = uri::read(uri, self.path, place, MAX_BYTES.saturating_sub(self.bytes()))?;
+        let bytes = uri::read(uri, self.folder, place, MAX_BYTES.saturating_sub(self.bytes()))?;
         self.bytes.set(self.bytes() + bytes.len() as u64);
         Ok(bytes)
     }

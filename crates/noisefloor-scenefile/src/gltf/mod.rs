@@ -14,7 +14,8 @@ mod notes;
 mod texture;
 mod uri;
 
-use crate::{LoadError, Loaded, Place, files};
+use crate::files::Folder;
+use crate::{LoadError, Loaded, Place};
 use asset::{Asset, MAX_BYTES, name};
 use glam::DVec3;
 use gltf::json::mesh::{Mode, Primitive, Semantic};
@@ -28,8 +29,9 @@ use std::collections::HashSet;
 use std::path::Path;
 
 pub(crate) fn load(path: &Path) -> Result<Loaded, LoadError> {
-    let file = files::read(path, MAX_BYTES, &Place::file(path))?;
-    let asset = Asset::parse(path, &file)?;
+    let folder = Folder::of(path, None, String::new());
+    let file = folder.read(path, MAX_BYTES, &Place::file(path))?;
+    let asset = Asset::parse(path, &folder, &file)?;
     notes::check_required(&asset)?;
     let placed = nodes::placed(&asset)?;
     check_size(&asset, &placed)?;
@@ -67,7 +69,7 @@ pub(crate) fn load(path: &Path) -> Result<Loaded, LoadError> {
         notes.warn(&whole, "it has no light: a radiance of 1 comes from all directions");
         builder.environment(Environment::constant([1.0; 3])).map_err(refused)?;
     }
-    let scene = builder.build().map_err(refused)?;
+    let scene = builder.build().map_err(refused)?.with_identity(folder.contents());
     Ok(Loaded { scene, size: None, max_depth: None, warnings: notes.finish(&asset) })
 }
 

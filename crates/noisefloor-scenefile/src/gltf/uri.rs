@@ -1,11 +1,10 @@
 //! Data and files that a URI names.
 
-use crate::files::{self, Folder};
+use crate::files::Folder;
 use crate::{LoadError, Place};
-use std::path::Path;
 
-/// Reads what `uri` names: the data in it, or a file in the folder of `scene`. At most `limit` bytes.
-pub(super) fn read(uri: &str, scene: &Path, place: &Place, limit: u64) -> Result<Vec<u8>, LoadError> {
+/// Reads what `uri` names: the data in it, or a file in the folder of the scene. At most `limit` bytes.
+pub(super) fn read(uri: &str, folder: &Folder, place: &Place, limit: u64) -> Result<Vec<u8>, LoadError> {
     if let Some(data) = uri.strip_prefix("data:") {
         let (kind, data) = data
             .split_once(',')
@@ -21,7 +20,7 @@ pub(super) fn read(uri: &str, scene: &Path, place: &Place, limit: u64) -> Result
         return Err(place.clone().unsupported(format_args!("a URI of the scheme {scheme:?}")));
     }
     let name = percent_decoded(uri).ok_or_else(|| place.clone().bad(format_args!("{uri:?} is not a URI")))?;
-    files::read(&Folder::of(scene, None).find(&name, place)?, limit, place)
+    folder.read(&folder.find(&name, place)?, limit, place)
 }
 
 /// The text with every `%20` and the like replaced by what it stands for (RFC 3986, §2.1).

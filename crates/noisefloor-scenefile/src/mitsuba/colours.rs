@@ -4,7 +4,7 @@ use super::context::Context;
 use super::xml::Element;
 use crate::colour::{self, EQUAL_ENERGY, Quantity, TEMPERATURES};
 use crate::error::LoadError;
-use crate::files::{self, MAX_FILE_BYTES};
+use crate::files::MAX_FILE_BYTES;
 use noisefloor::{Rgb, srgb_decode};
 
 /// Elements that are colours.
@@ -122,7 +122,7 @@ impl<'d> Context<'d> {
     fn spectrum_file(&self, element: &Element, name: &str) -> Result<Vec<(f64, f64)>, LoadError> {
         let place = self.place(element);
         let path = self.document.folder.find(name, &place)?;
-        let bytes = files::read(&path, MAX_FILE_BYTES, &place)?;
+        let bytes = self.document.folder.read(&path, MAX_FILE_BYTES, &place)?;
         let text = String::from_utf8_lossy(&bytes);
         let lines = text.lines().map(|line| line.split('#').next().unwrap_or_default().trim());
         let mut samples = Vec::new();

@@ -2,7 +2,7 @@
 
 use super::xml::{Element, Origin};
 use crate::error::{LoadError, Place};
-use crate::files::{self, Folder};
+use crate::files::Folder;
 use crate::options::LoadOptions;
 use roxmltree::{Node, ParsingOptions};
 use std::collections::HashMap;
@@ -45,7 +45,7 @@ impl Document {
     pub(super) fn read(path: &Path, options: &LoadOptions) -> Result<Self, LoadError> {
         let mut builder = Builder {
             files: vec![],
-            folder: Folder::of(path, options.root.as_deref()),
+            folder: Folder::of(path, options.root.as_deref(), options.identity()),
             parameters: options.parameters.clone().into_iter().collect(),
             bytes: 0,
             added: 0,
@@ -98,7 +98,7 @@ impl Builder {
     /// The root element of the file in `path`, which `place` names, and whether its version is below 2.
     fn file(&mut self, path: &Path, place: &Place, depth: u32) -> Result<(bool, Element), LoadError> {
         place.clone().at_most("files", self.files.len() as u64 + 1, MAX_FILES)?;
-        let bytes = files::read(path, MAX_XML_BYTES - self.bytes, place)?;
+        let bytes = self.folder.read(path, MAX_XML_BYTES - self.bytes, place)?;
         self.bytes += bytes.len() as u64;
         let bad = |what: String| Place::file(path).bad(what);
         let text = std::str::from_utf8(&bytes).map_err(|e| bad(format!("the file is not UTF-8: {e}")))?;

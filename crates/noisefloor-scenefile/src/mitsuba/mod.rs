@@ -70,5 +70,6 @@ pub(crate) fn load(path: &Path, options: &LoadOptions) -> Result<Loaded, LoadErr
 
     let scene =
         filling.builder.build().map_err(|cause| LoadError::Scene { place: Place::file(path), cause })?;
+    let scene = scene.with_identity(document.folder.contents());
     Ok(Loaded { scene, size, max_depth, warnings: context.into_warnings() })
 }

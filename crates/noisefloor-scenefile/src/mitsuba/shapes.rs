@@ -4,7 +4,7 @@ use super::context::Context;
 use super::surface::{Body, Surface};
 use super::xml::Element;
 use crate::error::{LoadError, Place};
-use crate::files::{self, MAX_FILE_BYTES};
+use crate::files::MAX_FILE_BYTES;
 use crate::mesh::{Triangles, normal_matrix, obj, ply, serialized, solids};
 use glam::{DMat3, DMat4, DQuat, DVec3};
 use noisefloor_ptwne::{Emission, MaterialId, MaterialOptions, Mesh, SceneBuilder};
@@ -218,7 +218,7 @@ impl<'d> Context<'d> {
         let name =
             name.ok_or_else(|| self.bad(element, format!("{} needs a `filename`", element.species())))?;
         let path = self.document.folder.find(name, &place)?;
-        let bytes = files::read(&path, MAX_FILE_BYTES, &place)?;
+        let bytes = self.document.folder.read(&path, MAX_FILE_BYTES, &place)?;
         let (mut mesh, flat) = match element.kind() {
             "obj" => (obj::parse(&bytes, &path)?, false),
             "ply" => (ply::parse(&bytes, &path)?, false),

@@ -222,7 +222,7 @@ impl<'d> Context<'d> {
         if let Some(found) = self.rasters.borrow().get(&key) {
             return Ok(found.clone());
         }
-        let Picture { width, height, samples } = picture::read(&key.0, place)?;
+        let Picture { width, height, samples } = picture::read(&self.document.folder, &key.0, place)?;
         self.count_pixels(element, width * height)?;
         let pixels = match samples {
             Samples::Eight(codes) if raw => {

@@ -4,7 +4,7 @@ use super::params::{Param, Params, Values};
 use super::reader::Reader;
 use crate::colour::{self, Quantity, TEMPERATURES};
 use crate::error::LoadError;
-use crate::files::{self, MAX_FILE_BYTES};
+use crate::files::MAX_FILE_BYTES;
 use crate::indices;
 use noisefloor::{Rgb, luminance};
 
@@ -112,7 +112,7 @@ impl Reader<'_> {
             return Ok([1.0; 3]);
         }
         let path = self.folder.find(name, &params.place)?;
-        let bytes = files::read(&path, MAX_FILE_BYTES, &params.place)?;
+        let bytes = self.folder.read(&path, MAX_FILE_BYTES, &params.place)?;
         let text = String::from_utf8_lossy(&bytes);
         let words =
             text.lines().flat_map(|line| line.split('#').next().unwrap_or_default().split_ascii_whitespace());

@@ -88,7 +88,7 @@ impl Reader<'_> {
     /// The linear values of a picture.
     fn linear_picture(&mut self, params: &Params, name: &str) -> Result<(usize, usize, Vec<Rgb>), LoadError> {
         let path = self.folder.find(name, &params.place)?;
-        let picture = picture::read(&path, &params.place)?;
+        let picture = picture::read(&self.folder, &path, &params.place)?;
         self.count_pixels(&params.place, 2 * picture.width * picture.height)?;
         let decode = |code: f32| srgb_decode(code);
         let pixels: Vec<Rgb> = match picture.samples {

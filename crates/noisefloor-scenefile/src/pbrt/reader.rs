@@ -7,7 +7,7 @@ use super::state::{Definition, Part, State};
 use super::tokens::{Kind, Tokens};
 use crate::Loaded;
 use crate::error::{Errors, LoadError, Place, Warning};
-use crate::files::{self, Folder, MAX_FILE_BYTES};
+use crate::files::{Folder, MAX_FILE_BYTES};
 use crate::options::LoadOptions;
 use flate2::read::GzDecoder;
 use glam::DMat4;
@@ -62,7 +62,7 @@ impl<'a> Reader<'a> {
         Ok(Self {
             path: path.to_owned(),
             options,
-            folder: Folder::of(path, options.root.as_deref()),
+            folder: Folder::of(path, options.root.as_deref(), options.identity()),
             state: State::new(place.clone()),
             view: View::default(),
             builder: SceneBuilder::new(crate::title(path), View::anywhere()).map_err(refused)?,
@@ -106,7 +106,7 @@ impl<'a> Reader<'a> {
 
     /// The bytes of a file, inflated if it is gzipped.
     pub(super) fn bytes_of(&self, path: &Path, limit: u64, place: &Place) -> Result<Vec<u8>, LoadError> {
-        let bytes = files::read(path, limit.min(MAX_FILE_BYTES), place)?;
+        let bytes = self.folder.read(path, limit.min(MAX_FILE_BYTES), place)?;
         if !bytes.starts_with(&[0x1f, 0x8b]) {
             return Ok(bytes);
         }
@@ -154,7 +154,7 @@ impl<'a> Reader<'a> {
 
     /// The scene, after the last directive.
     pub(super) fn finish(self) -> Result<Loaded, LoadError> {
-        let Self { view, mut builder, errors, warnings, path, max_depth, in_world, .. } = self;
+        let Self { view, mut builder, errors, warnings, path, max_depth, in_world, folder, .. } = self;
         errors.finish()?;
         let whole = Place::file(&path);
         if !in_world {
@@ -163,7 +163,7 @@ impl<'a> Reader<'a> {
         let refused = Self::refused(&whole);
         builder.optics(view.optics()).map_err(&refused)?;
         let scene = builder.build().map_err(&refused)?;
-        let scene = scene.with_camera(view.look()).map_err(&refused)?;
+        let scene = scene.with_camera(view.look()).map_err(&refused)?.with_identity(folder.contents());
         // One more segment than bounces
         Ok(Loaded { scene, size: Some(view.size()), max_depth, warnings })
     }

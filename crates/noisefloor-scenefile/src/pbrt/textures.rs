@@ -111,7 +111,7 @@ impl Reader<'_> {
         let name = params.text("filename")?.ok_or_else(|| params.bad("an imagemap needs a `filename`"))?;
         params.ignore(&["maxanisotropy", "trilinear"]);
         let path = self.folder.find(name, &params.place)?;
-        let picture = picture::read(&path, &params.place)?;
+        let picture = picture::read(&self.folder, &path, &params.place)?;
         let count = picture.width * picture.height;
         self.count_pixels(&params.place, count)?;
         let encoding = params.text("encoding")?;

@@ -112,3 +112,34 @@ fn warnings_that_say_the_same_are_one_finding() {
     let counts: Vec<_> = findings.iter().map(|f| (f.treatment, f.places.len())).collect();
     assert_eq!(counts, [(Treatment::Approximated, 2), (Treatment::Ignored, 2)]);
 }
+
+/// Everything that was read is in the scene's identity, and the values of parameters.
+#[test]
+fn the_identity_of_a_scene_has_all_its_files() {
+    let triangle = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+    let folder = Folder::new()
+        .with("rest.xml", scene(r#"<shape type="obj"><string name="filename" value="a.obj"/></shape>"#))
+        .with("a.obj", triangle)
+        .with_png("wood.png", 1, &[[9; 4]])
+        .with("unused.png", "not read")
+        .with(
+            "scene.xml",
+            format!(
+                r#"<scene version="3.0.0"><include filename="rest.xml"/><shape type="cube"><bsdf type="diffuse">
+                <texture type="bitmap" name="reflectance"><string name="filename" value="wood.png"/></texture>
+                </bsdf></shape>{}</scene>"#,
+                lamp("1")
+            ),
+        );
+    let path = folder.path().join("scene.xml");
+    let identity = |options: &LoadOptions| load_with(&path, options).unwrap().scene.identity().clone();
+    let before = identity(&LoadOptions::default());
+    assert_eq!(before.files().collect::<Vec<_>>(), ["a.obj", "rest.xml", "scene.xml", "wood.png"]);
+    let mut options = LoadOptions::default();
+    options.parameters.insert("level".into(), "2".into());
+    assert!(identity(&options).change_since(&before).unwrap().to_string().contains("level"));
+    let folder = folder.with("a.obj", format!("{triangle}# edited\n"));
+    let now = load_with(&folder.path().join("scene.xml"), &LoadOptions::default()).unwrap();
+    let change = now.scene.identity().change_since(&before).unwrap();
+    assert_eq!(change.to_string(), "`a.obj` has changed");
+}

@@ -1,6 +1,6 @@
 use crate::kit::{Fake, expected, requests, tiles};
-use noisefloor::{ProgressiveSource, Request, SourceError};
-use noisefloor_sidecar::{ImpossibleLight, SidecarCause, SidecarError};
+use noisefloor::{ImpossibleLight, ProgressiveSource, Request, SourceError};
+use noisefloor_sidecar::{SidecarCause, SidecarError};
 use std::error::Error;
 use std::time::{Duration, Instant};
 
@@ -31,6 +31,7 @@ fn a_process_that_fails_again_and_again_is_an_error() {
         ("send too few counts", "1 sample counts for 4 tiles"),
         ("send no counts", "missing field `samples`"),
         ("claim many samples", "4294967295 samples where 1 were requested"),
+        ("give too many", "4 samples where 1 were requested"),
     ];
     for (how, words) in wrong {
         let Some(fake) = Fake::new(how) else { return };
@@ -232,4 +233,30 @@ fn an_interpreter_that_is_not_there_is_named() {
         .unwrap_err();
     assert!(matches!(*error.cause, SidecarCause::Start { .. }), "{error}");
     assert!(error.to_string().contains("no python"), "{error}");
+}
+
+/// A renderer that cannot stop in time says so, and is believed within bounds.
+#[test]
+fn a_renderer_that_stops_late_is_believed() {
+    let Some(fake) = Fake::new("stop late") else { return };
+    let mut source = fake.open().unwrap();
+    source.sample(&requests(0, 1)).unwrap();
+    assert!(source.sample(&requests(1, 1)).unwrap().iter().all(|batch| batch.spp == 4));
+}
+
+/// Its identity is the scene's contents; a process that is started again after an edit would mix two scenes.
+#[test]
+fn a_scene_edited_before_a_restart_is_refused() {
+    let Some(fake) = Fake::new("die") else { return };
+    let fake = fake.once();
+    let mut source = fake.open().unwrap();
+    let identity = source.identity().unwrap();
+    assert_eq!(identity.files().collect::<Vec<_>>(), ["scene π.fake"]);
+    source.sample(&requests(0, 1)).unwrap();
+    std::fs::write(&fake.job.scene, "darker lamps").unwrap();
+    let error = source.sample(&requests(1, 1)).unwrap_err();
+    let said = cause(&error).to_string();
+    assert!(said.contains("another scene: `scene π.fake` has changed"), "{said}");
+    let change = fake.open().unwrap().identity().unwrap().change_since(&identity);
+    assert_eq!(change.unwrap().to_string(), "`scene π.fake` has changed");
 }

@@ -78,6 +78,8 @@ class Fake:
             self.info = {}
         if self.told("ignore the end"):
             host._end = lambda: time.sleep(1000)
+        if self.told("stop late"):
+            self.info["late"] = True
         if self.options.get("how") == "change" and starts > 1:
             self.info["width"] += 1
 
@@ -121,6 +123,8 @@ class Fake:
                     mean = mean[3:]
                 if self.told("be exhausted"):
                     samples = 0
+            if late and self.options.get("how") in ("stop late", "give too many"):
+                samples += 3
             batches.append((samples, mean))
         if late and self.told("forget a tile"):
             batches.pop()

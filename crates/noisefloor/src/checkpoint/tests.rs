@@ -161,6 +161,27 @@ fn a_tone_curve_is_resumed_with_its_function() {
     assert!(matches!(refused, Err(CheckpointError::Invalid(_))));
 }
 
+/// A source says what it is made from; its session keeps that, and does not resume after a change.
+#[test]
+fn another_source_is_refused() {
+    let driver = broken_off(FixedSpp(40), 1);
+    let resumed = |source: &str, contents: &[u8]| {
+        let mut now = crate::SourceIdentity::new(source);
+        now.add("hall.xml", contents);
+        let mut kept = crate::SourceIdentity::new("noise");
+        kept.add("hall.xml", b"lamps");
+        let mut checkpoint = driver.session().checkpoint("noise");
+        checkpoint.source = Cow::Owned(kept);
+        let mut session = crate::Session::new(96, 48, FixedSpp(40), params()).unwrap();
+        session.set_source(now);
+        session.resume("noise", checkpoint).map(drop).map_err(|e| e.to_string())
+    };
+    assert_eq!(resumed("noise", b"lamps"), Ok(()));
+    let error = |what: &str| Err(format!("the checkpoint belongs to another job: {what}"));
+    assert_eq!(resumed("noise", b"sun"), error("`hall.xml` has changed"));
+    assert_eq!(resumed("hum", b"lamps"), error("it is of noise, not of hum"));
+}
+
 #[test]
 fn what_does_not_hold_together_is_refused() {
     let driver = broken_off(FixedSpp(40), 1);

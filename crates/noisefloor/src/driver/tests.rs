@@ -124,7 +124,7 @@ fn a_failure_keeps_what_is_there() {
 
 #[test]
 fn broken_promises_are_typed_errors() {
-    let lies: [fn(Vec<Batch>) -> Vec<Batch>; 3] = [
+    let lies: [fn(Vec<Batch>) -> Vec<Batch>; 5] = [
         |mut b| {
             b.pop();
             b
@@ -135,6 +135,15 @@ fn broken_promises_are_typed_errors() {
         },
         |mut b| {
             b[0].mean.pop();
+            b
+        },
+        // What is no light: mostly NaN, and mostly negative
+        |mut b| {
+            b[1].mean.iter_mut().enumerate().filter(|(i, _)| i % 6 != 0).for_each(|(_, p)| p[1] = f32::NAN);
+            b
+        },
+        |mut b| {
+            b[1].mean.iter_mut().step_by(7).for_each(|p| *p = [-1e6; 3]);
             b
         },
     ];

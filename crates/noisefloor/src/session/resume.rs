@@ -4,15 +4,16 @@ use super::Session;
 use crate::checkpoint::{Checkpoint, CheckpointError};
 use crate::criterion::Resumable;
 use crate::display::Display;
-use crate::stop::{Stop, StopReason};
+use crate::stop::Stop;
 use std::borrow::Cow;
 
 impl<C: Resumable> Session<C> {
-    /// A snapshot, for resuming the session later. `job` is how the caller identifies the job: scene, seed,
-    /// options.
+    /// A snapshot, for resuming the session later. `job` is how the caller identifies the job, beside what
+    /// [`Session::set_source`] said.
     pub fn checkpoint<'a>(&'a self, job: &'a str) -> Checkpoint<'a> {
         Checkpoint {
             job: job.into(),
+            source: Cow::Borrowed(&self.source),
             criterion: self.criterion.fingerprint(),
             state: self.criterion.state(),
             params: self.params,
@@ -29,18 +30,17 @@ impl<C: Resumable> Session<C> {
     /// to the bit.
     ///
     /// # Errors
-    /// [`CheckpointError`] if job, criterion (its [fingerprint](crate::StoppingCriterion::fingerprint):
+    /// [`CheckpointError`] if job, source, criterion (its [fingerprint](crate::StoppingCriterion::fingerprint):
     /// model, threshold, constants), parameters or image size are not those of the checkpoint, or if it
     /// contradicts itself.
     pub fn resume(mut self, job: &str, checkpoint: Checkpoint<'_>) -> Result<Self, CheckpointError> {
-        checkpoint.check(job, &self.criterion.fingerprint(), &self.params, &self.film)?;
+        checkpoint.check(job, &self.source, &self.criterion.fingerprint(), &self.params, &self.film)?;
         if !self.criterion.restore(self.film.grid(), &checkpoint.state) {
             return Err(CheckpointError::Invalid("the state of its criterion is not valid"));
         }
         let mut tiles = checkpoint.tiles.into_owned();
         for state in &mut tiles {
-            let done = |stop: &Stop| matches!(stop.reason, StopReason::Converged | StopReason::MaxSpp);
-            state.stop = state.stop.filter(done);
+            state.stop = state.stop.filter(|stop: &Stop| stop.reason.is_final());
         }
         let complete = |display: Display| {
             let lost = "it was displayed through a function that only the caller of `set_display` has";

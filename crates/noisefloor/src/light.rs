@@ -1,6 +1,7 @@
 //! Light that cannot be: what a broken renderer sends in a well-formed batch.
 
-use noisefloor::{Batch, luminance};
+use crate::display::luminance;
+use crate::rgb::Rgb;
 use thiserror::Error;
 
 /// Share of a tile's pixels that may be non-finite. The film keeps single ones out, and the report counts
@@ -34,28 +35,55 @@ pub enum ImpossibleLight {
     },
 }
 
-/// Looks at all batches of one source.
+/// Looks at the light of one source.
+///
+/// ```
+/// let mut light = noisefloor::LightCheck::default();
+/// assert!(light.check(&[[0.2; 3], [0.4, 0.5, -0.01]]).is_ok());
+/// assert!(light.check(&[[0.2; 3], [-1e6; 3]]).is_err());
+/// ```
 ///
 /// Single channels may be negative: colours outside Rec.709 are. Luminance is not, but for rounding, whose
 /// scale is that of the brightest pixel seen.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct LightCheck {
+pub struct LightCheck {
     brightest: f64,
 }
 
 impl LightCheck {
-    pub(crate) fn check(&mut self, batch: &Batch) -> Result<(), ImpossibleLight> {
-        let (mut sum, mut finite) = (0.0, 0usize);
-        for pixel in &batch.mean {
-            if pixel.iter().all(|channel| channel.is_finite()) {
-                let light = f64::from(luminance(*pixel));
-                (sum, finite) = (sum + light, finite + 1);
-                self.brightest = self.brightest.max(light);
-            }
+    /// Both checks, of the pixels of a tile: new samples alone, which no light leaves negative.
+    ///
+    /// # Errors
+    /// [`ImpossibleLight`].
+    pub fn check(&mut self, pixels: &[Rgb]) -> Result<(), ImpossibleLight> {
+        self.check_finite(pixels)?;
+        self.check_sign(pixels.iter().copied())
+    }
+
+    /// Whether most pixels are finite.
+    ///
+    /// # Errors
+    /// [`ImpossibleLight::NotFinite`].
+    pub fn check_finite(&self, pixels: &[Rgb]) -> Result<(), ImpossibleLight> {
+        let lost = pixels.iter().filter(|pixel| !is_finite(pixel)).count();
+        let share = lost as f64 / pixels.len().max(1) as f64;
+        if share > MOST_NON_FINITE {
+            return Err(ImpossibleLight::NotFinite { percent: 100.0 * share });
         }
-        let lost = (batch.mean.len() - finite) as f64 / batch.mean.len().max(1) as f64;
-        if lost > MOST_NON_FINITE {
-            return Err(ImpossibleLight::NotFinite { percent: 100.0 * lost });
+        Ok(())
+    }
+
+    /// Whether there is light on average, and not less than none. For sources whose batches are differences of
+    /// stored pictures, this holds of all their samples together.
+    ///
+    /// # Errors
+    /// [`ImpossibleLight::Negative`].
+    pub fn check_sign(&mut self, pixels: impl Iterator<Item = Rgb>) -> Result<(), ImpossibleLight> {
+        let (mut sum, mut finite) = (0.0, 0usize);
+        for pixel in pixels.filter(is_finite) {
+            let light = f64::from(luminance(pixel));
+            (sum, finite) = (sum + light, finite + 1);
+            self.brightest = self.brightest.max(light);
         }
         let mean = sum / finite.max(1) as f64;
         if mean < -ROUNDING * self.brightest - f64::from(f32::EPSILON) {
@@ -65,17 +93,18 @@ impl LightCheck {
     }
 }
 
+fn is_finite(pixel: &Rgb) -> bool {
+    pixel.iter().all(|channel| channel.is_finite())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use noisefloor::{Rgb, Tile};
 
     fn check(before: f32, value: impl Fn(usize) -> Rgb) -> Result<(), ImpossibleLight> {
-        let tile = Tile { index: 0, x: 0, y: 0, width: 10, height: 10 };
-        let batch = |mean: Vec<Rgb>| Batch { tile, spp: 1, mean };
         let mut light = LightCheck::default();
-        light.check(&batch(vec![[before; 3]; 100])).unwrap();
-        light.check(&batch((0..100).map(value).collect()))
+        light.check(&[[before; 3]; 100]).unwrap();
+        light.check(&(0..100).map(value).collect::<Vec<_>>())
     }
 
     #[test]
@@ -95,10 +124,6 @@ mod tests {
         assert_eq!(check(0.5, |_| [-0.5, 0.9, -0.1]), Ok(()));
         assert_eq!(check(100.0, |_| [-1e-3; 3]), Ok(()));
         assert_eq!(check(0.0, |_| [-1e-9; 3]), Ok(()));
-        assert_eq!(LightCheck::default().check(&Batch { spp: 0, mean: Vec::new(), ..one() }), Ok(()));
-    }
-
-    fn one() -> Batch {
-        Batch { tile: Tile { index: 0, x: 0, y: 0, width: 1, height: 1 }, spp: 1, mean: vec![[0.0; 3]] }
+        assert_eq!(LightCheck::default().check(&[]), Ok(()));
     }
 }

@@ -1,0 +1,92 @@
+//! Output folders: one run at a time, and nothing overwritten that was not meant to be.
+
+use crate::say::note;
+use anyhow::{Context, bail};
+use std::fmt;
+use std::fs::{File, OpenOptions, TryLockError};
+use std::path::{Path, PathBuf};
+
+/// The work of another run is in the way; the user has to say what is to become of it.
+#[derive(Debug)]
+pub struct Occupied(String);
+
+impl Occupied {
+    pub fn new(what: impl Into<String>) -> Self {
+        Self(what.into())
+    }
+}
+
+impl fmt::Display for Occupied {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+impl std::error::Error for Occupied {}
+
+/// What a run does about the work of an earlier one in its output folder.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Earlier {
+    /// It is an error that there is any.
+    Keep,
+    /// It is overwritten.
+    Overwrite,
+    /// It is resumed.
+    Resume,
+}
+
+impl Earlier {
+    /// As typed.
+    pub fn of(force: bool, resume: bool) -> Self {
+        match (force, resume) {
+            (true, _) => Self::Overwrite,
+            (false, true) => Self::Resume,
+            (false, false) => Self::Keep,
+        }
+    }
+}
+
+/// The lock on an output folder. It stays an empty hidden file; the lock itself ends with the process, however
+/// that ends.
+const LOCK: &str = ".noisefloor.lock";
+
+/// An output folder that no other run writes into as long as this value lives.
+#[derive(Debug)]
+pub struct Folder {
+    path: PathBuf,
+    _lock: File,
+}
+
+impl Folder {
+    /// Makes the folder, and locks it.
+    pub fn claim(path: PathBuf) -> anyhow::Result<Self> {
+        std::fs::create_dir_all(&path).with_context(|| {
+            format!("{}: this folder cannot be made; choose another with --out", path.display())
+        })?;
+        let lock = OpenOptions::new().create(true).truncate(false).write(true).open(path.join(LOCK));
+        let lock = lock.with_context(|| {
+            format!("{}: no files can be made in this folder; choose another with --out", path.display())
+        })?;
+        match lock.try_lock() {
+            Ok(()) => {}
+            Err(TryLockError::WouldBlock) => bail!(
+                "{}: another noisefloor is writing into this folder; wait for it, or choose another with --out",
+                path.display()
+            ),
+            // File systems without locks are rare, and no reason not to render
+            Err(TryLockError::Error(error)) => {
+                note!("warning: {}: not locked against other runs: {error}", path.display());
+            }
+        }
+        Ok(Self { path, _lock: lock })
+    }
+
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// The first of these files that the folder has.
+    pub fn first_of<'a>(&self, names: &[&'a str]) -> Option<&'a str> {
+        names.iter().copied().find(|name| self.path.join(name).exists())
+    }
+}
