@@ -5,6 +5,7 @@ use crate::table::{Level, Origin, Table, Zone};
 use csv::{ReaderBuilder, StringRecord, Writer};
 use noisefloor::{Descriptor, DescriptorKind, DescriptorSpec, Evidence, ToneMapping, Viewing};
 use serde::{Deserialize, Serialize};
+use std::collections::HashSet;
 use std::io::{Read, Write};
 
 /// Longest table that is read, in bytes.
@@ -107,7 +108,7 @@ pub fn read_table_with(from: impl Read, kinds: &[DescriptorKind]) -> Result<Tabl
     if !csv.headers()?.iter().eq(expected.iter().map(String::as_str)) {
         return Err(bad(2, &format!("the columns should be {}", expected.join(","))));
     }
-    let mut zones: Vec<Zone> = Vec::new();
+    let (mut zones, mut seen): (Vec<Zone>, HashSet<(String, u32)>) = (Vec::new(), HashSet::new());
     for record in csv.records() {
         let record = record?;
         let line = record.position().map_or(0, csv::Position::line) + 1;
@@ -118,6 +119,11 @@ pub fn read_table_with(from: impl Read, kinds: &[DescriptorKind]) -> Result<Tabl
                     return Err(bad(line, "levels of a zone must come by increasing spp"));
                 }
                 last.levels.push(level);
+            }
+            // A table that was pasted twice would weigh its zones twice
+            _ if !seen.insert((zone.scene.clone(), zone.zone)) => {
+                let what = format!("zone {} of {} has rows further above already", zone.zone, zone.scene);
+                return Err(bad(line, &what));
             }
             _ => zones.push(Zone { levels: vec![level], ..zone }),
         }

@@ -123,7 +123,7 @@ fn a_reference_of_a_scene_that_was_edited_is_not_used() {
     let (folder, scene) = scene();
     let out = folder.path().join("compared");
     let args = ["compare", text(&scene), "--size", "32x32", "--tile", "32", "--criteria", "spp:4", "--quiet"];
-    let few = ["--max-spp", "4", "--batch", "2", "--reference-spp", "64", "--out", text(&out)];
+    let few = ["--max-spp", "100", "--reference-spp", "64", "--out", text(&out)];
     let args = [&args[..], &few].concat();
     let force = [&args[..], &["--force"]].concat();
     succeed(&args);

@@ -135,7 +135,7 @@ fn the_noise_of_the_reference_is_told() {
     let plain = succeed(&args);
     assert!(!plain.contains("reference"), "{plain}");
     assert!(json(&folder.path().join("report.json"))["reference_samples"].is_null());
-    args.extend(["--model", model]);
+    args.extend(["--force", "--model", model]);
     let told = succeed(&args);
     assert!(told.contains("the reference took"), "{told}");
     let report = json(&folder.path().join("report.json"));

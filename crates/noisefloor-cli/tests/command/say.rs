@@ -53,8 +53,8 @@ impl Talkers {
             all.push(owned(&["audience", "fit", &table, "--json"]));
         }
         if cfg!(feature = "lab") {
-            let small = ["compare", "bulb", "--size", "16x16", "--tile", "16", "--criteria", "spp:4"];
-            let few = ["--max-spp", "4", "--batch", "2", "--reference-spp", "4", "--out"];
+            let small = ["compare", "bulb", "--size", "32x32", "--tile", "32", "--criteria", "spp:4"];
+            let few = ["--max-spp", "100", "--reference-spp", "4", "--out"];
             all.push(owned(&[&small[..], &few, &[self.path("compared").as_str()]].concat()));
         }
         if cfg!(feature = "study") {

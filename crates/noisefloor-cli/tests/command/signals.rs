@@ -212,7 +212,7 @@ fn the_page_of_an_interrupted_comparison_says_so() {
     let folder = tempdir().unwrap();
     let out = folder.path();
     let args = ["compare", "bulb", "cornell-box", "--size", "32x32", "--tile", "32", "--criteria", "spp:4"];
-    let args = [&args[..], &["--max-spp", "4", "--batch", "2", "--reference-spp", "4000", "--out"]].concat();
+    let args = [&args[..], &["--max-spp", "100", "--reference-spp", "1000", "--out"]].concat();
     let child = command(&args).arg(out).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
     let page = || std::fs::read_to_string(out.join("index.html")).ok();
     let first = wait_for("the first scene", page);

@@ -65,6 +65,10 @@ pub(super) fn check(
         let what = format!("{} rows, {} labels", rows.nrows(), converged.len());
         return Err(SvmTrainError::Examples(what));
     }
+    if rows.nrows() == 0 {
+        let what = "there are no examples; do all thresholds lie outside the levels that there are?";
+        return Err(SvmTrainError::Examples(what.into()));
+    }
     if rows.ncols() == 0 {
         return Err(SvmTrainError::Examples("rows without numbers".into()));
     }
