@@ -46,8 +46,8 @@ impl Earlier {
     }
 }
 
-/// The lock on an output folder. It stays an empty hidden file; the lock itself ends with the process, however
-/// that ends.
+/// The lock on an output folder. It stays an empty hidden file; the lock itself ends with the process,
+/// however that ends.
 const LOCK: &str = ".noisefloor.lock";
 
 /// An output folder that no other run writes into as long as this value lives.
@@ -70,7 +70,8 @@ impl Folder {
         match lock.try_lock() {
             Ok(()) => {}
             Err(TryLockError::WouldBlock) => bail!(
-                "{}: another noisefloor is writing into this folder; wait for it, or choose another with --out",
+                "{}: another noisefloor is writing into this folder; wait for it, or choose another with \
+                 --out",
                 path.display()
             ),
             // File systems without locks are rare, and no reason not to render

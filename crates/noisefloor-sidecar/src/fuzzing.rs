@@ -24,7 +24,7 @@ pub fn read_any_reply(mut bytes: &[u8]) {
             assert!(
                 batches
                     .iter()
-                    .all(|b| b.spp <= most(8, true) && [0, b.tile.pixels()].contains(&b.mean.len()))
+                    .all(|b| b.spp <= most(&requests[0], true) && [0, b.tile.pixels()].contains(&b.mean.len()))
             );
         }
     }
