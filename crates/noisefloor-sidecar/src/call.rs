@@ -71,8 +71,8 @@ pub(crate) fn describe(hello: Hello) -> Result<Described, Blame> {
 /// they have to stop. LuxCore with two threads on two busy cores took 3,600 (2026-11-22); this is for 64.
 const LATE: u64 = 1 << 17;
 
-/// Most samples that are believed where `request` asks for some. A renderer that is late may have been ahead by
-/// a batch, waits for pixels without samples (four more at most), and stops late.
+/// Most samples that are believed where `request` asks for some. A renderer that is late may have been ahead
+/// by a batch, waits for pixels without samples (four more at most), and stops late.
 pub(crate) fn most(request: &Request, late: bool) -> u64 {
     let Request { tile, spp, .. } = request;
     let over = LATE / tile.pixels().max(1) as u64 + 8;

@@ -22,9 +22,9 @@ pub fn read_any_reply(mut bytes: &[u8]) {
         let requests = [0, 1].map(|index| Request { tile: tile(index), first: 0, spp: 8 });
         if let Ok(batches) = batches(&requests, true, Reply { header, payload: reply.payload }) {
             assert!(
-                batches
-                    .iter()
-                    .all(|b| b.spp <= most(&requests[0], true) && [0, b.tile.pixels()].contains(&b.mean.len()))
+                batches.iter().all(
+                    |b| b.spp <= most(&requests[0], true) && [0, b.tile.pixels()].contains(&b.mean.len())
+                )
             );
         }
     }

@@ -73,8 +73,8 @@ impl LightCheck {
         Ok(())
     }
 
-    /// Whether there is light on average, and not less than none. For sources whose batches are differences of
-    /// stored pictures, this holds of all their samples together.
+    /// Whether there is light on average, and not less than none. For sources whose batches are differences
+    /// of stored pictures, this holds of all their samples together.
     ///
     /// # Errors
     /// [`ImpossibleLight::Negative`].

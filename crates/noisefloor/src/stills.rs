@@ -304,7 +304,7 @@ mod tests {
 
     fn still(value: impl Fn(usize) -> f32) -> Still {
         let pixels = (0..32 * 32).map(|i| [value(i); 3]).collect();
-        Still { size: (32, 32), pixels, spp: 16.0, display_referred: true, rounding: 0.0 }
+        Still { size: (32, 32), pixels, spp: 16.0, display_referred: true, rounding: 0.0, origin: None }
     }
 
     fn unlike(a: &Still, b: &Still) -> usize {

@@ -88,8 +88,8 @@ pub struct RenderArgs {
     autosave: Duration,
     /// Continue the render that Ctrl-C, --time or a kill interrupted in this output folder. Picture and
     /// stops are those of an uninterrupted render. Options must be the same, and so must the contents of the
-    /// scene and of all files that it reads. Works with sources that repeat their samples (`noisefloor doctor`
-    /// says which), and the oracle or `spp:N`.
+    /// scene and of all files that it reads. Works with sources that repeat their samples: `ptwne`, `exr`, `cycles`,
+    /// and `mitsuba` with libLLVM; and with the oracle or `spp:N`.
     #[arg(long)]
     resume: bool,
     /// Overwrite the render that is in the output folder, finished or not. Without it, a folder that holds

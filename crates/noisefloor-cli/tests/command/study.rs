@@ -31,7 +31,8 @@ fn a_stack_holds_what_renders_hold() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("stack");
     assert!(succeed(&strs(&stack(&out, &[]))).contains("written to"));
-    assert_eq!(fs::read_dir(&out).unwrap().count(), LEVELS.len());
+    // The levels, and the hidden lock
+    assert_eq!(fs::read_dir(&out).unwrap().count(), LEVELS.len() + 1);
     let rendered = folder.path().join("render");
     let render = ["render", "cornell-box", "--size", "32x32", "--tile", "32", "--criterion", "spp:8"];
     succeed(&[&render[..], &["--max-spp", "8", "--quiet", "--out", text(&rendered)]].concat());
@@ -42,7 +43,8 @@ fn a_stack_holds_what_renders_hold() {
     for (a, b) in differ {
         assert!((a - b).abs() <= 1e-5 * a.abs().max(1.0), "{a} {b}");
     }
-    fail(&strs(&stack(&out, &["--levels", "4,4"])), &["at least two levels"]);
+    let other = folder.path().join("other");
+    fail(&strs(&stack(&other, &["--levels", "4,4"])), &["at least two levels"]);
 }
 
 /// All levels but the reference pass through the program; what it does wrong is said, and leaves no level
