@@ -86,9 +86,18 @@ fn positive(value: &AttributeValue) -> Option<u64> {
     }
 }
 
+/// Texts of an EXR are in Latin-1, and `exr` panics at other characters: these become escapes.
+fn latin(text: &str) -> String {
+    let mut all = String::with_capacity(text.len());
+    for c in text.chars() {
+        if u32::from(c) < 256 { all.push(c) } else { all.extend(c.escape_unicode()) }
+    }
+    all
+}
+
 /// The attributes that say this.
 pub(crate) fn sample_attributes(facts: &SampleFacts) -> HashMap<Text, AttributeValue> {
-    let text = |value: &str| AttributeValue::Text(Text::from(value));
+    let text = |value: &str| AttributeValue::Text(Text::from(latin(value).as_str()));
     // Other programs expect an integer; what does not fit is text
     let count = |n: u64| i32::try_from(n).map_or_else(|_| text(&n.to_string()), AttributeValue::I32);
     let mut all = Vec::new();
