@@ -48,13 +48,24 @@ def run(program, *args):
 
 
 @functools.cache
-def evaluate(*options):
+def evaluate(*options, table=TABLE):
     """The report of `noisefloor evaluate`, and its zones."""
     with tempfile.TemporaryDirectory() as folder:
         report, zones = f"{folder}/scores.json", f"{folder}/zones.csv"
-        run(noisefloor, "evaluate", "--table", TABLE, *options, "--json", report, "--csv", zones)
+        run(noisefloor, "evaluate", "--table", table, *options, "--json", report, "--csv", zones)
         with open(report) as scores, open(zones) as lines:
             return json.load(scores), list(csv.DictReader(lines))
+
+
+def nested():
+    """The vision model, with everything chosen without the scene that is scored."""
+    return evaluate("--nested", table="fixtures/human-choices.csv")[0]
+
+
+def visible():
+    """The vision model, with constants that were chosen on all scenes."""
+    options = ["--leave-one-scene-out", "--machine", "line"]
+    return evaluate(*options, table="fixtures/human-visible.csv")[0]
 
 
 def unseen():
@@ -102,6 +113,16 @@ def scene_table():
             "one noise level for all scenes: error, early", "the scene's own median: error"]
     rows = [row(scene["scene"], scene) for scene in unseen()["scenes"]]
     return table(head, [*rows, row("**all**", unseen())])
+
+
+def nested_table():
+    """Scores with blind choices, beside those of the default descriptor."""
+    ours = {scene["scene"]: scene for scene in unseen()["scenes"]}
+    def row(name, scores, other):
+        return [name, factor(scores["error_factor"]), factor(scores["bias_factor"]), share(scores["early_share"]), other]
+    rows = [row(s["scene"], s, factor(ours[s["scene"]]["error_factor"])) for s in nested()["scenes"]]
+    head = ["scene", "error", "bias", "early", "six numbers: error"]
+    return table(head, [*rows, row("**all**", nested(), "")])
 
 
 def ablation_table():
@@ -164,7 +185,12 @@ VALUES = {
     "alone.error": lambda: factor(ablated(dict(ABLATIONS)["only the tile"])["error_factor"]),
     "inspect.error": lambda: factor(inspect()["record"]["leave_one_scene_out"]["error_factor"]),
     "inspect.familiar": lambda: f"{inspect()['familiar_reach']:.2f}",
+    "nested.error": lambda: factor(nested()["error_factor"]),
+    "nested.low": lambda: factor(nested()["error_interval"][0]),
+    "nested.high": lambda: factor(nested()["error_interval"][1]),
+    "visible.error": lambda: factor(visible()["error_factor"]),
     "tables.scenes": scene_table,
+    "tables.nested": nested_table,
     "tables.ablation": ablation_table,
     "tables.thresholds": threshold_table,
     "tables.noise": noise_table,
