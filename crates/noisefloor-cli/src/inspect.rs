@@ -89,7 +89,7 @@ fn say_all(summary: &Summary<'_>) -> Result<(), NotSaid> {
         }
     )?;
     say!(
-        "machine          C-SVC, RBF kernel, C = {}, γ = {}; {} support vectors of {} examples",
+        "machine          RBF kernel, C = {}, γ = {}; {} support vectors of {} examples",
         record.c,
         record.gamma,
         summary.support_vectors,

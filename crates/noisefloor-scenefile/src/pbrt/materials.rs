@@ -106,13 +106,9 @@ impl Reader<'_> {
             "coateddiffuse" => {
                 d.params.ignore(&["thickness", "g", "albedo", "maxdepth", "nsamples"]);
                 self.approximated(&d.params.place, near("a coat on a Lambertian base"));
-                let roughness = self.roughness(d, 0.0, true)?;
-                self.plastic(
-                    self.colour(d, "reflectance", [0.5; 3])?,
-                    [1.0; 3],
-                    self.index(d, 1.5)?,
-                    roughness,
-                )
+                let (base, roughness) =
+                    (self.colour(d, "reflectance", [0.5; 3])?, self.roughness(d, 0.0, true)?);
+                self.plastic(base, [1.0; 3], self.index(d, 1.5)?, roughness)
             }
             "plastic" | "uber" | "substrate" | "translucent" => {
                 self.approximated(&d.params.place, near("a coat on a Lambertian base"));
@@ -148,9 +144,7 @@ impl Reader<'_> {
             }
             "interface" | "none" | "" => return Ok(Made::Nothing),
             "mix" => return self.mix(d, depth),
-            other => {
-                return Err(d.params.place.clone().unsupported(format!("the material `{other}`")));
-            }
+            other => return Err(d.params.place.clone().unsupported(format!("the material `{other}`"))),
         }))
     }
 

@@ -241,6 +241,7 @@ fn clicks(observer: &mut SimulatedObserver, stack: u32, stacks: &[StackView]) ->
 /// Simulated observers, with thresholds, a slope, lapses and a bias, click through the real pages in
 /// Chromium; what the server kept, the analysis takes apart: the known thresholds lie within its intervals;
 /// and of its corpus a model is trained that predicts them.
+// Long: one study, from the first page to the model
 #[test]
 fn simulated_observers_drive_the_pages_and_a_model_learns_from_them() {
     const OBSERVERS: u64 = 8;

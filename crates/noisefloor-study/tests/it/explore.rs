@@ -320,6 +320,7 @@ pub(crate) fn table() -> Table {
 
 /// Learned in the background, on the server: P of the tile that was disagreed with moves the way that was
 /// said, scores come with it, and are the same as those of the library and of another time.
+// Long: one retraining, looked at from all sides
 #[test]
 fn retraining_moves_p_and_says_what_it_costs() {
     let dir = tempfile::tempdir().unwrap();
