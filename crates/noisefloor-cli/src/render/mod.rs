@@ -81,7 +81,13 @@ fn origin(job: &SourceJob, scene: &str, info: &SourceInfo) -> Option<SampleOrigi
     if matches!(kind, SourceKind::Exr) {
         return None;
     }
-    let all = format!("{typed:?}, {max_depth:?}, {kind:?}, {scene_files:?}");
+    let kind = match kind {
+        // Its functions have other addresses in every run
+        #[cfg(feature = "adapters")]
+        SourceKind::Adapter(_) => kind.name().to_owned(),
+        kind => format!("{kind:?}"),
+    };
+    let all = format!("{typed:?}, {max_depth:?}, {kind}, {scene_files:?}");
     let digest = blake3::hash(all.as_bytes()).to_hex();
     let source = format!("{scene} by {}, options {}", info.name, &digest[..16]);
     Some(SampleOrigin { source, seed: *seed, repeats: info.repeats == Repeats::Samples })
