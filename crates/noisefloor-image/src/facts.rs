@@ -11,12 +11,9 @@ use std::path::Path;
 
 /// Samples per pixel, the same everywhere: the attribute that pbrt writes, too.
 const SPP: &str = "samplesPerPixel";
-const FEWEST: &str = "noisefloor.fewestSamples";
-const MOST: &str = "noisefloor.mostSamples";
-const SEED: &str = "noisefloor.seed";
-const SOURCE: &str = "noisefloor.source";
-/// `samples` if the seed fixes every sample.
-const REPEATS: &str = "noisefloor.repeats";
+/// All else, a line each: `fewest`, `most`, `seed`, `repeats` (`samples` if the seed fixes every sample), `source`.
+/// One text, because `exr` writes several attributes of its own names in another order every time.
+const FACTS: &str = "noisefloor.samples";
 /// Longest text of an attribute that is believed, in bytes.
 const MAX_TEXT: usize = 1000;
 
@@ -63,16 +60,20 @@ fn of_header(header: &Header) -> SampleFacts {
         let name = Text::from(name);
         header.own_attributes.other.get(&name).or_else(|| header.shared_attributes.other.get(&name))
     };
-    let count = |name| find(name).and_then(positive);
-    let even = count(SPP).map(|spp| (spp, spp));
-    let uneven = || Some((count(FEWEST)?, count(MOST)?)).filter(|(fewest, most)| fewest <= most);
-    let said = |name| match find(name) {
-        Some(AttributeValue::Text(text)) => Some(text.to_string()).filter(|t| t.len() <= MAX_TEXT),
-        _ => None,
+    let even = find(SPP).and_then(positive).map(|spp| (spp, spp));
+    let Some(AttributeValue::Text(text)) = find(FACTS) else {
+        return SampleFacts { samples: even, origin: None };
     };
+    let text = text.to_string();
+    let said = |name: &str| {
+        let lines = text.lines().filter(|_| text.len() <= MAX_TEXT);
+        lines.filter_map(|line| line.split_once('=')).find(|(n, _)| *n == name).map(|(_, value)| value)
+    };
+    let count = |name| said(name)?.parse().ok().filter(|&n: &u64| n > 0);
+    let uneven = || Some((count("fewest")?, count("most")?)).filter(|(fewest, most)| fewest <= most);
     let origin = || {
-        let (source, seed) = (printable(&said(SOURCE)?).into_owned(), said(SEED)?.parse().ok()?);
-        Some(SampleOrigin { source, seed, repeats: said(REPEATS).is_some_and(|r| r == "samples") })
+        let (source, seed) = (printable(said("source")?).into_owned(), said("seed")?.parse().ok()?);
+        Some(SampleOrigin { source, seed, repeats: said("repeats") == Some("samples") })
     };
     SampleFacts { samples: even.or_else(uneven), origin: origin() }
 }
@@ -95,20 +96,25 @@ fn latin(text: &str) -> String {
     all
 }
 
-/// The attributes that say this.
-pub(crate) fn sample_attributes(facts: &SampleFacts) -> HashMap<Text, AttributeValue> {
-    let text = |value: &str| AttributeValue::Text(Text::from(latin(value).as_str()));
-    // Other programs expect an integer; what does not fit is text
-    let count = |n: u64| i32::try_from(n).map_or_else(|_| text(&n.to_string()), AttributeValue::I32);
-    let mut all = Vec::new();
+/// The attributes that say this, of the picture and of its only layer.
+pub(crate) fn sample_attributes(facts: &SampleFacts) -> [HashMap<Text, AttributeValue>; 2] {
+    let text = |value: &str| AttributeValue::Text(Text::from(value));
+    let (mut spp, mut lines) = (None, String::new());
     match facts.samples {
-        Some((fewest, most)) if fewest == most => all.push((SPP, count(most))),
-        Some((fewest, most)) => all.extend([(FEWEST, count(fewest)), (MOST, count(most))]),
+        // Other programs expect an integer; what does not fit is text
+        Some((fewest, most)) if fewest == most => {
+            let number = i32::try_from(most).map(AttributeValue::I32);
+            spp = Some(number.unwrap_or_else(|_| text(&most.to_string())));
+        }
+        Some((fewest, most)) => lines += &format!("fewest={fewest}\nmost={most}\n"),
         None => {}
     }
     if let Some(SampleOrigin { source, seed, repeats }) = &facts.origin {
-        all.extend([(SOURCE, text(source)), (SEED, text(&seed.to_string()))]);
-        all.push((REPEATS, text(if *repeats { "samples" } else { "nothing" })));
+        let repeats = if *repeats { "samples" } else { "nothing" };
+        lines += &format!("seed={seed}\nrepeats={repeats}\nsource={}\n", latin(&printable(source)));
     }
-    all.into_iter().map(|(name, value)| (Text::from(name), value)).collect()
+    let rest = Some(lines).filter(|lines| !lines.is_empty()).map(|lines| text(&lines));
+    let attribute =
+        |name, value: Option<_>| value.map(|value| (Text::from(name), value)).into_iter().collect();
+    [attribute(SPP, spp), attribute(FACTS, rest)]
 }

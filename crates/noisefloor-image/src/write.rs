@@ -86,9 +86,10 @@ pub fn write_exr(path: impl AsRef<Path>, layers: &RenderLayers<'_>) -> Result<()
         channels.push(AnyChannel::new("oracle.visible_noise", FlatSamples::F32(noise.to_vec())));
     }
 
+    let [of_picture, of_layer] = layers.facts.map(sample_attributes).unwrap_or_default();
     let attributes = LayerAttributes {
         software_name: Some(Text::from("noisefloor")),
-        other: layers.facts.map(sample_attributes).unwrap_or_default(),
+        other: of_layer,
         ..LayerAttributes::default()
     };
     let encoding = Encoding {
@@ -97,7 +98,8 @@ pub fn write_exr(path: impl AsRef<Path>, layers: &RenderLayers<'_>) -> Result<()
         line_order: LineOrder::Increasing,
     };
     let channels = AnyChannels::sort(channels.into_iter().collect());
-    let image = Image::from_layer(Layer::new((width, height), attributes, encoding, channels));
+    let mut image = Image::from_layer(Layer::new((width, height), attributes, encoding, channels));
+    image.attributes.other = of_picture;
     write_atomic(path, |writer| image.write().to_buffered(writer))
 }
 

@@ -26,6 +26,11 @@ fn what_is_written_is_read_again() {
     ] {
         write(&path, &facts);
         assert_eq!(read_facts(&path).unwrap(), facts);
+        let bytes = std::fs::read(&path).unwrap();
+        for _ in 0..8 {
+            write(&path, &facts);
+            assert!(std::fs::read(&path).unwrap() == bytes, "the same facts, another file");
+        }
     }
     // What Latin-1 lacks is escaped, the same way every time
     write(&path, &SampleFacts { samples: None, origin: Some(origin("灰色", 0, false)) });
@@ -58,8 +63,11 @@ fn samples_of_other_programs_are_read_and_nonsense_is_not() {
     {
         assert_eq!(read("samplesPerPixel", nonsense), SampleFacts::default());
     }
-    assert_eq!(read("noisefloor.seed", text("7")), SampleFacts::default(), "a seed of what?");
-    assert_eq!(read("noisefloor.fewestSamples", AttributeValue::I32(7)), SampleFacts::default());
+    for nonsense in ["seed=7", "fewest=7", "fewest=9\nmost=7", "seed=x\nsource=a", "source=a", "=", ""] {
+        assert_eq!(read("noisefloor.samples", text(nonsense)), SampleFacts::default(), "{nonsense}");
+    }
+    let long = format!("seed=7\nsource={}", "a".repeat(5000));
+    assert_eq!(read("noisefloor.samples", text(&long)), SampleFacts::default());
 }
 
 #[test]
