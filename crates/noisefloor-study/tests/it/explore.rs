@@ -234,7 +234,7 @@ fn a_killed_explorer_has_lost_nothing() {
 
 /// `cargo test -p noisefloor-study --test it -- --ignored --nocapture a_hundred`
 #[test]
-#[ignore = "takes minutes"]
+#[ignore = "five kills are in the suite"]
 fn a_hundred_killed_explorers_have_lost_nothing() {
     kill_explorers(100);
 }
