@@ -4,8 +4,8 @@
 #![allow(clippy::print_stdout, reason = "an example prints")]
 
 use noisefloor::{
-    Batch, Display, Driver, NoiseMask, Oracle, Params, ProgressiveSource, Repeats, Request, Rgb, SourceError,
-    SourceInfo, Unit,
+    Batch, Counts, Display, Driver, NoiseMask, Oracle, Params, ProgressiveSource, Repeats, Request, Rgb,
+    SourceError, SourceInfo, Unit,
 };
 use std::error::Error;
 
@@ -73,7 +73,7 @@ impl ProgressiveSource for Rare {
     fn info(&self) -> SourceInfo {
         let (width, height) = (2 * self.edge, 2 * self.edge);
         let (unit, repeats) = (Unit::SamplesPerPixel, Repeats::Nothing);
-        SourceInfo { name: "rare".into(), width, height, unit, aims: true, repeats }
+        SourceInfo { name: "rare".into(), width, height, unit, aims: true, repeats, counts: Counts::Asked }
     }
 
     fn sample(&mut self, requests: &[Request]) -> Result<Vec<Batch>, SourceError> {

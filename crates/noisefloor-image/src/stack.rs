@@ -6,7 +6,8 @@ use crate::frames::{self, Frame, Layout};
 use crate::picture::LinearImage;
 use crate::read::read_picture;
 use noisefloor::{
-    Batch, ProgressiveSource, Repeats, Request, Rgb, SourceError, SourceIdentity, SourceInfo, Tile, Unit,
+    Batch, Counts, ProgressiveSource, Repeats, Request, Rgb, SourceError, SourceIdentity, SourceInfo, Tile,
+    Unit,
 };
 use std::collections::VecDeque;
 use std::fs::File;
@@ -172,6 +173,7 @@ impl ProgressiveSource for StackSource {
             unit: Unit::SamplesPerPixel,
             aims: true,
             repeats: Repeats::Samples,
+            counts: Counts::Stored,
         }
     }
 

@@ -10,7 +10,7 @@
 //! Scene units are the caller's, skies have +y up, colours are linear Rec.709 RGB, and angles are in degrees.
 //!
 //! ```
-//! use noisefloor::{ProgressiveSource, Request, TileGrid};
+//! use noisefloor::{Counts, ProgressiveSource, Request, TileGrid};
 //! use noisefloor_ptwne::{Ptwne, RenderOptions, scenes};
 //!
 //! let scene = scenes::by_name("cornell-box").ok_or("no such scene")?;

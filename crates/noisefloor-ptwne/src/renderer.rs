@@ -10,7 +10,7 @@ use crate::rng::Key;
 use crate::sampler::{Sampler, Sampling};
 use crate::scene::Scene;
 use noisefloor::{
-    Batch, Display, ProgressiveSource, Reference, Repeats, Request, Rgb, SourceError, SourceIdentity,
+    Batch, Counts, Display, ProgressiveSource, Reference, Repeats, Request, Rgb, SourceError, SourceIdentity,
     SourceInfo, Tile, ToneMapping, Unit,
 };
 use rayon::prelude::*;
@@ -301,6 +301,7 @@ impl ProgressiveSource for Ptwne {
             height: self.height,
             unit: Unit::SamplesPerPixel,
             aims: true,
+            counts: Counts::Asked,
             repeats: Repeats::Samples,
         }
     }

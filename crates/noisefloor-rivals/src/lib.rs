@@ -35,7 +35,7 @@
 //! impl ProgressiveSource for Wall {
 //!     fn info(&self) -> SourceInfo {
 //!         let (name, unit, repeats) = ("wall".into(), Unit::SamplesPerPixel, Repeats::Nothing);
-//!         SourceInfo { name, width: 32, height: 32, unit, aims: true, repeats }
+//!         SourceInfo { name, width: 32, height: 32, unit, aims: true, repeats, counts: Counts::Asked }
 //!     }
 //!     fn sample(&mut self, requests: &[Request]) -> Result<Vec<Batch>, SourceError> {
 //!         let mut flicker = |spp: u64| 0.2 + (self.0.uniform() - 0.5) / (spp as f64).sqrt();

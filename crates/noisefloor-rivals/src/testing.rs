@@ -1,8 +1,8 @@
 //! Films and sources of known noise, for tests.
 
 use noisefloor::{
-    Batch, Display, Film, ProgressiveSource, Repeats, Request, Rgb, SourceError, SourceInfo, TileGrid, Unit,
-    View, Viewing,
+    Batch, Counts, Display, Film, ProgressiveSource, Repeats, Request, Rgb, SourceError, SourceInfo,
+    TileGrid, Unit, View, Viewing,
 };
 use noisefloor_testkit::Noise;
 
@@ -57,6 +57,7 @@ impl ProgressiveSource for NoisySource {
             unit: Unit::SamplesPerPixel,
             aims: true,
             repeats: Repeats::Calls,
+            counts: Counts::Asked,
         }
     }
 

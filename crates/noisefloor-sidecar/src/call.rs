@@ -3,7 +3,7 @@
 use crate::error::SidecarCause;
 use crate::message::{Hello, Sampled, Status};
 use crate::process::{Failure, Process};
-use noisefloor::{Batch, Request, Rgb, SourceInfo, check_image, printable};
+use noisefloor::{Batch, Counts, Request, Rgb, SourceInfo, check_image, printable};
 use serde::de::DeserializeOwned;
 use std::time::Duration;
 
@@ -47,8 +47,6 @@ pub(crate) fn ask<T: DeserializeOwned>(
 #[derive(Debug)]
 pub(crate) struct Described {
     pub(crate) info: SourceInfo,
-    /// Whether it may give more samples than requested.
-    pub(crate) late: bool,
     pub(crate) warnings: Vec<String>,
 }
 
@@ -63,26 +61,15 @@ pub(crate) fn describe(hello: Hello) -> Result<Described, Blame> {
         return Err(wrong("it has no name".to_owned()));
     }
     let warnings = warnings.iter().map(|warning| printable(warning).into_owned()).collect();
-    let info = SourceInfo { name, width, height, unit, aims: true, repeats };
-    Ok(Described { info, late, warnings })
+    let counts = if late { Counts::Late } else { Counts::Asked };
+    let info = SourceInfo { name, width, height, unit, aims: true, repeats, counts };
+    Ok(Described { info, warnings })
 }
 
-/// Samples that the threads of a late renderer may take, over all pixels of a tile, before they notice that
-/// they have to stop. LuxCore with two threads on two busy cores took 3,600 (2026-11-22); this is for 64.
-const LATE: u64 = 1 << 17;
-
-/// Most samples that are believed where `request` asks for some. A renderer that is late may have been ahead
-/// by a batch, waits for pixels without samples (four more at most), and stops late.
-pub(crate) fn most(request: &Request, late: bool) -> u64 {
-    let Request { tile, spp, .. } = request;
-    let over = LATE / tile.pixels().max(1) as u64 + 8;
-    if late { spp.saturating_mul(2).saturating_add(over) } else { *spp }
-}
-
-/// The batches of a reply: as many as requests, none with more samples than [`most`].
+/// The batches of a reply: as many as requests, none with more samples than `counts` allows.
 pub(crate) fn batches(
     requests: &[Request],
-    late: bool,
+    counts: Counts,
     Reply { header: Sampled { samples }, payload }: Reply<Sampled>,
 ) -> Result<Vec<Batch>, Blame> {
     if samples.len() != requests.len() {
@@ -90,7 +77,7 @@ pub(crate) fn batches(
         return Err((None, SidecarCause::Wrong { what }));
     }
     let given = || requests.iter().zip(samples.iter().copied());
-    if let Some((request, samples)) = given().find(|(request, samples)| *samples > most(request, late)) {
+    if let Some((request, samples)) = given().find(|(request, samples)| *samples > counts.most(request)) {
         let what = format!("{samples} samples where {} were requested", request.spp);
         return Err((Some(request.tile.index), SidecarCause::Wrong { what }));
     }

@@ -6,8 +6,8 @@ use crate::picture_run::PictureRun;
 use crate::renderer::DEFAULT_TIMEOUT;
 use crate::template::Template;
 use noisefloor::{
-    Batch, LightCheck, ProgressiveSource, Repeats, Request, SourceError, SourceIdentity, SourceInfo, Tile,
-    Unit, check_image, printable,
+    Batch, Counts, LightCheck, ProgressiveSource, Repeats, Request, SourceError, SourceIdentity, SourceInfo,
+    Tile, Unit, check_image, printable,
 };
 use noisefloor_image::LinearImage;
 use std::ffi::OsString;
@@ -86,6 +86,7 @@ impl CommandSource {
             unit: Unit::SamplesPerPixel,
             aims: template.aims(),
             repeats: Repeats::Nothing,
+            counts: Counts::Asked,
         };
         let about = format!("command {typed}, seed {}", options.seed);
         let identity = match &options.scene {

@@ -90,7 +90,7 @@ pub struct Clock {
 /// struct Wall;
 /// impl ProgressiveSource for Wall {
 ///     fn info(&self) -> SourceInfo {
-///         SourceInfo { name: "wall".into(), width: 64, height: 32, unit: Unit::SamplesPerPixel, aims: true, repeats: Repeats::Samples }
+///         SourceInfo { name: "wall".into(), width: 64, height: 32, unit: Unit::SamplesPerPixel, aims: true, repeats: Repeats::Samples, counts: Counts::Asked }
 ///     }
 ///     fn sample(&mut self, requests: &[Request]) -> Result<Vec<Batch>, SourceError> {
 ///         Ok(requests.iter().map(|r| Batch { tile: r.tile, spp: r.spp, mean: vec![[0.2; 3]; r.tile.pixels()] }).collect())
@@ -269,6 +269,11 @@ impl<S: ProgressiveSource, C: StoppingCriterion> Driver<S, C> {
         for (request, batch) in requests.iter().zip(batches) {
             if batch.tile != request.tile {
                 let what = format!("a batch of tile {} for tile {}", batch.tile.index, request.tile.index);
+                return Err(broken(what).into());
+            }
+            if batch.spp > self.source.info().counts.most(request) {
+                let (tile, asked) = (batch.tile.index, request.spp);
+                let what = format!("{} samples where {asked} were asked for, in tile {tile}", batch.spp);
                 return Err(broken(what).into());
             }
             if batch.spp == 0 {

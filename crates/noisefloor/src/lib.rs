@@ -15,7 +15,7 @@
 //!   samples.
 //!
 //! ```
-//! use noisefloor::{Oracle, Params, Session, StopReason};
+//! use noisefloor::{Counts, Oracle, Params, Session, StopReason};
 //!
 //! let mut session = Session::new(64, 64, Oracle::bundled(), Params { tile: 32, ..Params::default() })?;
 //! while !session.is_done() {
@@ -83,7 +83,9 @@ pub use origin::SampleOrigin;
 pub use params::{Audience, Params, ParamsError, Schedule};
 pub use rgb::Rgb;
 pub use session::{Session, SessionError};
-pub use source::{Batch, ProgressiveSource, Reference, Repeats, Request, SourceError, SourceInfo, Unit};
+pub use source::{
+    Batch, Counts, ProgressiveSource, Reference, Repeats, Request, SourceError, SourceInfo, Unit,
+};
 pub use stills::{SnapshotPair, Still, StillError};
 pub use stop::{Stop, StopReason};
 pub use svm::{Classifier, Platt, Scaler, Svm};

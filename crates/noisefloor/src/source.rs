@@ -31,6 +31,36 @@ pub enum Repeats {
     Nothing,
 }
 
+/// How the numbers of samples that a source gives relate to those asked for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Counts {
+    /// As many as asked for; at its end what is left, and nothing from then on.
+    Asked,
+    /// Now and then more, because its threads notice late that they have to stop.
+    Late,
+    /// What is stored, whatever is asked for: a playback.
+    Stored,
+}
+
+/// Samples that the threads of a late renderer may take, over all pixels of a tile, before they notice that
+/// they have to stop. LuxCore with two threads on two busy cores took 3,600 (2026-11-22); this is for 64.
+const LATE: u64 = 1 << 17;
+
+impl Counts {
+    /// Most samples per pixel that are believed where `request` asks for some.
+    pub fn most(self, request: &Request) -> u64 {
+        let Request { tile, spp, .. } = request;
+        match self {
+            Self::Asked => *spp,
+            // It may have been ahead by a batch, waits for pixels without samples (four more at most), and
+            // stops late
+            Self::Late => spp.saturating_mul(2).saturating_add(LATE / tile.pixels().max(1) as u64 + 8),
+            Self::Stored => u64::MAX,
+        }
+    }
+}
+
 /// A source's description of itself.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SourceInfo {
@@ -46,6 +76,8 @@ pub struct SourceInfo {
     pub aims: bool,
     /// What the same seed repeats.
     pub repeats: Repeats,
+    /// Whether it gives as many samples as asked for.
+    pub counts: Counts,
 }
 
 /// A request for samples of one tile.
@@ -66,8 +98,7 @@ pub struct Request {
 pub struct Batch {
     /// The tile that was sampled.
     pub tile: Tile,
-    /// Exact number of new samples per pixel. Normally what was asked for; a playback of stored images hands
-    /// out what it has. Zero says that the source is exhausted in this tile.
+    /// Exact number of new samples per pixel, in the range that [`SourceInfo::counts`] allows. Zero says that the source is exhausted in this tile.
     pub spp: u64,
     /// Mean of the new samples only, row-major over the tile, `tile.pixels()` values (none if `spp` is zero).
     /// Non-finite values are allowed: the film rejects and counts them.

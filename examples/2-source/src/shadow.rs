@@ -1,6 +1,6 @@
 //! The renderer of the first example as a source: in colour, from a seed, on all cores.
 
-use noisefloor::{Batch, ProgressiveSource, Repeats, Request, Rgb, SourceError, SourceInfo, Unit};
+use noisefloor::{Batch, Counts, ProgressiveSource, Repeats, Request, Rgb, SourceError, SourceInfo, Unit};
 use std::num::NonZeroUsize;
 use std::thread;
 
@@ -19,6 +19,7 @@ impl ProgressiveSource for Shadow {
             height: self.height,
             unit: Unit::SamplesPerPixel,
             aims: true,
+            counts: Counts::Asked,
             repeats: Repeats::Samples,
         }
     }

@@ -6,8 +6,8 @@
 mod scene;
 
 use noisefloor::{
-    Batch, Driver, DriverError, Event, Oracle, Params, ProgressiveSource, Repeats, Request, SourceError,
-    SourceInfo, Unit,
+    Batch, Counts, Driver, DriverError, Event, Oracle, Params, ProgressiveSource, Repeats, Request,
+    SourceError, SourceInfo, Unit,
 };
 use rust_pathtracer::prelude::{ColorBuffer, Tracer};
 use scene::Spheres;
@@ -34,6 +34,7 @@ impl ProgressiveSource for WholeFrames {
             unit: Unit::SamplesPerPixel,
             aims: false,
             repeats: Repeats::Nothing,
+            counts: Counts::Asked,
         }
     }
 

@@ -1,6 +1,6 @@
 use crate::kit::{Altered, Synthetic};
 use noisefloor::{
-    Batch, ProgressiveSource, Reference, Repeats, Request, SourceError, SourceInfo, Tile, Unit,
+    Batch, Counts, ProgressiveSource, Reference, Repeats, Request, SourceError, SourceInfo, Tile, Unit,
 };
 use noisefloor_image::{RenderLayers, StackSource, write_exr};
 use noisefloor_ptwne::{Ptwne, RenderOptions, scenes};
@@ -112,7 +112,7 @@ fn broken_promises_are_noticed() {
     said(broken(|_, b| b.reverse()), "order of the requests");
     said(broken(|_, b| b.iter_mut().for_each(|b| b.mean.truncate(7))), "number of values in a batch");
     said(broken(|_, b| b.iter_mut().for_each(|b| b.spp = 0)), "number of values in a batch of 0");
-    said(broken(|_, b| b.iter_mut().for_each(|b| b.spp += 1)), "other batches because other numbers");
+    said(broken(|_, b| b.iter_mut().for_each(|b| b.spp += 1)), "9 samples where 8 were asked for");
 
     // The first samples over and over
     let again = |r: &[Request], b: &mut Vec<Batch>| {
@@ -179,6 +179,25 @@ fn who_promises_less_is_held_to_less_and_no_less() {
     said(by_call(Repeats::Calls, twice), "correlated");
 }
 
+/// Gives more samples than asked for, in some tiles.
+fn late(counts: Counts, over: u64) -> String {
+    verdict(move || {
+        let source = Synthetic { counts, repeats: Repeats::Nothing, ..synthetic() };
+        Altered::batches(source, move |requests, batches| {
+            let more =
+                |r: &Request| Request { spp: r.spp + over * ((r.first + r.tile.index as u64) % 7), ..*r };
+            *batches = synthetic().sample(&requests.iter().map(more).collect::<Vec<_>>()).unwrap();
+        })
+    })
+}
+
+#[test]
+fn late_renderers_give_more_within_bounds() {
+    assert_eq!(late(Counts::Late, 1), "kept");
+    assert!(late(Counts::Asked, 1).contains("samples where 8 were asked for"));
+    assert!(late(Counts::Late, 100_000).contains("samples where 8 were asked for"));
+}
+
 /// Work in mutations: neighbouring pixels of a batch share their noise, which is no fault there.
 #[test]
 fn noise_that_pixels_share_is_no_fault_of_a_markov_chain() {
@@ -218,7 +237,7 @@ impl ProgressiveSource for Running {
 
 #[test]
 fn playbacks_and_references_that_break_it_are_noticed() {
-    let running = verdict(|| Running { source: synthetic() });
+    let running = verdict(|| Running { source: Synthetic { counts: Counts::Stored, ..synthetic() } });
     assert!(running.contains("successive batches are correlated"), "{running}");
 
     let reference = |width: usize, value: f32| {

@@ -1,4 +1,6 @@
-use noisefloor::{Batch, ProgressiveSource, Reference, Repeats, Request, Rgb, SourceError, SourceInfo, Unit};
+use noisefloor::{
+    Batch, Counts, ProgressiveSource, Reference, Repeats, Request, Rgb, SourceError, SourceInfo, Unit,
+};
 use noisefloor_sidecar::{Renderer, find, probe};
 use noisefloor_testkit::{Noise, Requirement, require};
 use std::collections::BTreeMap;
@@ -19,6 +21,7 @@ pub(crate) struct Synthetic {
     pub(crate) store: u64,
     pub(crate) aims: bool,
     pub(crate) repeats: Repeats,
+    pub(crate) counts: Counts,
     pub(crate) unit: Unit,
 }
 
@@ -36,6 +39,7 @@ impl Synthetic {
             store: u64::MAX,
             aims: true,
             repeats: Repeats::Samples,
+            counts: Counts::Asked,
             unit: Unit::SamplesPerPixel,
         }
     }
@@ -75,6 +79,7 @@ impl ProgressiveSource for Synthetic {
             unit: self.unit,
             aims: self.aims,
             repeats: self.repeats,
+            counts: self.counts,
         }
     }
 

@@ -1,5 +1,5 @@
 use crate::kit::{Folder, Running, levels, public};
-use noisefloor::{Batch, ProgressiveSource, Repeats, Request, SourceError, SourceInfo, Unit};
+use noisefloor::{Batch, Counts, ProgressiveSource, Repeats, Request, SourceError, SourceInfo, Unit};
 use noisefloor_study::analysis::raw::{DICTIONARY, responses, write_raw};
 use noisefloor_study::analysis::{AnalysisOptions, analyse};
 use noisefloor_study::simulated::drive;
@@ -52,6 +52,7 @@ impl ProgressiveSource for Wall {
             unit: Unit::SamplesPerPixel,
             aims: true,
             repeats: Repeats::Samples,
+            counts: Counts::Asked,
         }
     }
 

@@ -3,7 +3,7 @@
 use super::probe::Round;
 use super::rounding::{LARGEST_Z, ROUNDING};
 use crate::noise::Noise;
-use noisefloor::Unit;
+use noisefloor::{Rgb, Unit};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
 /// Batches of 32 samples that are compared with as many in four parts.
@@ -14,10 +14,13 @@ const FALSE_ALARM: f64 = 1e-8;
 /// The numbers of one batch, pixel by pixel.
 type Values = Vec<f64>;
 
+/// Means of a batch, pixel by pixel, each with its number of samples. A late renderer gives some tiles more.
+type Means = Vec<(f64, f64)>;
+
 /// Compares batches of 32 samples, asked for at once, with means of four batches of 8.
 pub(super) fn check_distribution(long: &[Round], short: &[Round], unit: Unit) {
-    let parts: Vec<Values> = short.iter().map(values).collect();
-    let batches: Vec<Values> = long.iter().map(values).chain(parts.chunks(4).map(mean)).collect();
+    let parts: Vec<Means> = short.iter().map(means).collect();
+    let batches: Vec<Means> = long.iter().map(means).chain(parts.chunks(4).map(pool)).collect();
     let batches = deviations(&batches);
     if batches[0].is_empty() {
         return;
@@ -32,30 +35,37 @@ pub(super) fn check_distribution(long: &[Round], short: &[Round], unit: Unit) {
 }
 
 /// Sums of the channels, tile after tile.
-fn values(round: &Round) -> Values {
-    let pixels = round.iter().flat_map(|batch| &batch.mean);
-    pixels.map(|pixel| pixel.iter().map(|&c| f64::from(c)).sum()).collect()
+fn means(round: &Round) -> Means {
+    let sum = |pixel: &Rgb| pixel.iter().map(|&c| f64::from(c)).sum();
+    round.iter().flat_map(|batch| batch.mean.iter().map(move |p| (sum(p), batch.spp as f64))).collect()
 }
 
-fn mean(batches: &[Values]) -> Values {
-    let mean = |pixel: usize| batches.iter().map(|b| b[pixel]).sum::<f64>() / batches.len() as f64;
-    (0..batches[0].len()).map(mean).collect()
+/// The mean of all their samples.
+fn pool(batches: &[Means]) -> Means {
+    let pool = |pixel: usize| {
+        let count: f64 = batches.iter().map(|b| b[pixel].1).sum();
+        (batches.iter().map(|b| b[pixel].0 * b[pixel].1 / count).sum(), count)
+    };
+    (0..batches[0].len()).map(pool).collect()
 }
 
-/// Noise alone: deviations from the mean of all batches, in units of each pixel's standard deviation. Pixels
-/// without noise, or with a sample that is not finite, are left out.
-fn deviations(batches: &[Values]) -> Vec<Values> {
-    let centre = mean(batches);
+/// Noise alone: deviations from the mean of all batches, as 32 samples have them, in units of each pixel's
+/// standard deviation. Pixels without noise, or with a sample that is not finite, are left out.
+fn deviations(batches: &[Means]) -> Vec<Values> {
+    let centre = pool(batches);
+    let deviation = |batch: &Means, pixel: usize| {
+        let (mean, count) = batch[pixel];
+        (mean - centre[pixel].0) * (count / 32.0).sqrt()
+    };
     let mut noisy = Vec::new();
-    for (pixel, &centre) in centre.iter().enumerate() {
-        let squares = batches.iter().map(|batch| (batch[pixel] - centre).powi(2));
-        let deviation = (squares.sum::<f64>() / batches.len() as f64).sqrt();
-        if deviation.is_finite() && deviation > ROUNDING * centre.abs() {
-            noisy.push((pixel, deviation));
+    for (pixel, &(centre, _)) in centre.iter().enumerate() {
+        let squares = batches.iter().map(|batch| deviation(batch, pixel).powi(2));
+        let unit = (squares.sum::<f64>() / batches.len() as f64).sqrt();
+        if unit.is_finite() && unit > ROUNDING * centre.abs() {
+            noisy.push((pixel, unit));
         }
     }
-    let deviations =
-        |batch: &Values| noisy.iter().map(|&(pixel, unit)| (batch[pixel] - centre[pixel]) / unit).collect();
+    let deviations = |batch| noisy.iter().map(|&(pixel, unit)| deviation(batch, pixel) / unit).collect();
     batches.iter().map(deviations).collect()
 }
 

@@ -16,19 +16,6 @@ pub(super) fn same(a: &[Round], b: &[Round]) -> bool {
     a.len() == b.len() && a.iter().flatten().zip(b.iter().flatten()).all(equal)
 }
 
-/// A tile gives as many samples as asked for until it ends: then what it has left, and nothing from then on.
-pub(super) fn check_counts(rounds: &[Round], asked: &[u64]) {
-    for tile in 0..rounds[0].len() {
-        let mut ended = false;
-        for (round, &asked) in rounds.iter().zip(asked) {
-            let samples = round[tile].spp;
-            let right = if ended { samples == 0 } else { samples <= asked };
-            assert!(right, "tile {tile}: {samples} samples where {asked} were asked for");
-            ended |= samples < asked;
-        }
-    }
-}
-
 /// 8 and then 24 samples have the mean that 32 samples have, but for rounding.
 pub(super) fn check_cut(whole: &Round, parts: &[Round]) {
     for (tile, all) in whole.iter().enumerate() {

@@ -1,6 +1,8 @@
 //! Asking a source for samples, and checking the shape of each answer.
 
-use noisefloor::{Batch, ProgressiveSource, Repeats, Request, SourceInfo, Tile, TileGrid, check_image};
+use noisefloor::{
+    Batch, Counts, ProgressiveSource, Repeats, Request, SourceInfo, Tile, TileGrid, check_image,
+};
 
 /// Tile edge that sources are asked in: an image of 48×40 pixels has ragged tiles to the right and below.
 pub(super) const EDGE: usize = 32;
@@ -53,13 +55,22 @@ pub(super) struct Probe<S> {
     pub(super) source: S,
     pub(super) tiles: Vec<Tile>,
     taken: Vec<u64>,
+    counts: Counts,
+    /// Tiles that gave fewer samples than asked for.
+    ended: Vec<bool>,
 }
 
 impl<S: ProgressiveSource> Probe<S> {
     fn new(source: S) -> Self {
         let info = source.info();
         let grid = TileGrid::new(info.width, info.height, EDGE).expect("the size was checked");
-        Self { source, tiles: grid.tiles().collect(), taken: vec![0; grid.len()] }
+        Self {
+            source,
+            tiles: grid.tiles().collect(),
+            taken: vec![0; grid.len()],
+            counts: info.counts,
+            ended: vec![false; grid.len()],
+        }
     }
 
     /// Asks for the next samples of some tiles, and checks the shape of the answer.
@@ -79,9 +90,19 @@ impl<S: ProgressiveSource> Probe<S> {
                 "wrong number of values in a batch of {} samples, tile {tile}",
                 batch.spp
             );
+            self.check_count(request, batch.spp);
             self.taken[tile] += batch.spp;
         }
         batches
+    }
+
+    /// A tile gives as many samples as its source says until it ends: then what it has left, and nothing from
+    /// then on.
+    fn check_count(&mut self, request: &Request, samples: u64) {
+        let (tile, asked) = (request.tile.index, request.spp);
+        let most = if self.ended[tile] { 0 } else { self.counts.most(request) };
+        assert!(samples <= most, "tile {tile}: {samples} samples where {asked} were asked for");
+        self.ended[tile] |= self.counts != Counts::Stored && samples < asked;
     }
 
     /// Asks for all tiles, the last one first, and returns their batches in the order of the grid.

@@ -2,7 +2,7 @@ use super::*;
 use crate::criterion::{FixedSpp, Resumable, StoppingCriterion};
 use crate::driver::{Driver, Event};
 use crate::oracle::Oracle;
-use crate::source::{Batch, ProgressiveSource, Repeats, Request, SourceError, SourceInfo, Unit};
+use crate::source::{Batch, Counts, ProgressiveSource, Repeats, Request, SourceError, SourceInfo, Unit};
 use proptest::prelude::*;
 use std::sync::atomic::Ordering;
 
@@ -18,6 +18,7 @@ impl ProgressiveSource for Noise {
             unit: Unit::SamplesPerPixel,
             aims: true,
             repeats: self.0,
+            counts: Counts::Asked,
         }
     }
 

@@ -1,6 +1,6 @@
 use super::*;
 use crate::criterion::{FixedSpp, Needs, Verdict, View};
-use crate::source::{Repeats, SourceInfo, Unit};
+use crate::source::{Counts, Repeats, SourceInfo, Unit};
 use crate::tile::Tile;
 
 /// A grey source that can be told to misbehave.
@@ -24,6 +24,7 @@ impl ProgressiveSource for Grey {
             unit,
             aims: !self.cannot_aim,
             repeats: Repeats::Samples,
+            counts: Counts::Asked,
         }
     }
 
@@ -124,7 +125,11 @@ fn a_failure_keeps_what_is_there() {
 
 #[test]
 fn broken_promises_are_typed_errors() {
-    let lies: [fn(Vec<Batch>) -> Vec<Batch>; 5] = [
+    let lies: [fn(Vec<Batch>) -> Vec<Batch>; 6] = [
+        |mut b| {
+            b[2].spp += 1;
+            b
+        },
         |mut b| {
             b.pop();
             b
