@@ -88,8 +88,10 @@ fn say_all(summary: &Summary<'_>) -> Result<(), NotSaid> {
                 format!("Reinhard, key {key}, white {white}"),
         }
     )?;
+    // Logistic regression is kept as two support vectors of a kernel too wide to bend
+    let line = if summary.support_vectors == 2 { " (a straight line)" } else { "" };
     say!(
-        "machine          RBF kernel, C = {}, γ = {}; {} support vectors of {} examples",
+        "machine          RBF kernel, C = {}, γ = {}; {} support vectors{line}, of {} examples",
         record.c,
         record.gamma,
         summary.support_vectors,

@@ -3,9 +3,9 @@
 use crate::bars::bar;
 use anyhow::Context;
 use indicatif::ProgressBar;
-use noisefloor::{Descriptor, DescriptorSpec, Evidence, Threshold, Viewing};
+use noisefloor::{Descriptor, DescriptorSpec, Evidence, SvmParams, Threshold, Viewing};
 use noisefloor_learn::{
-    Chosen, Corpora, Prediction, Table, TrainParams, VISIBLE_CHOICES, choices, choose_and_leave_out,
+    Chosen, Corpora, Learner, Prediction, Table, TrainParams, VISIBLE_CHOICES, choices, choose_and_leave_out,
     describe_corpora, leave_one_scene_out, read_table, read_table_with,
 };
 use std::collections::BTreeMap;
@@ -20,6 +20,40 @@ pub struct DataJob {
     pub evidence: Evidence,
     /// Where people are taken to have seen the pictures.
     pub viewing: Viewing,
+}
+
+/// How to train, where the table leaves a choice.
+pub struct SearchJob {
+    /// By default what serves the table's descriptor.
+    pub learner: Option<Learner>,
+    /// Values of C to choose from; those of the learner if there are none.
+    pub c: Vec<f64>,
+    /// The same of γ.
+    pub gamma: Vec<f64>,
+}
+
+impl SearchJob {
+    /// How to train on a table.
+    pub fn params(&self, table: &Table) -> TrainParams {
+        let mut params = match self.learner {
+            Some(Learner::Line) => TrainParams::default(),
+            Some(Learner::Svm) => TrainParams::svm(),
+            None => TrainParams::for_descriptor(&table.descriptor),
+        };
+        let given = |values: &[f64], default: fn(&SvmParams) -> f64| -> Vec<f64> {
+            if !values.is_empty() {
+                return values.to_vec();
+            }
+            let mut all: Vec<f64> = params.candidates.iter().map(default).collect();
+            all.sort_by(f64::total_cmp);
+            all.dedup();
+            all
+        };
+        let (cs, gammas) = (given(&self.c, |p| p.c), given(&self.gamma, |p| p.gamma));
+        params.candidates =
+            cs.iter().flat_map(|&c| gammas.iter().map(move |&gamma| SvmParams { c, gamma })).collect();
+        params
+    }
 }
 
 pub enum DataSource {

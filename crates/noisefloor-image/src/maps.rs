@@ -64,13 +64,16 @@ impl ColourScale {
     }
 }
 
-/// The scale of visible noise: always the same, so that maps of different pictures and stages compare.
-/// `just_visible` is marked as "seen".
-pub fn noise_scale(just_visible: Option<f32>) -> ColourScale {
-    let title = "visible noise\n8-bit steps";
-    let landmark = just_visible.map(|v| (f64::from(v), "seen"));
-    ColourScale { title, low: 1.0, high: 16.0, log: true, colours: INFERNO, landmark }
-}
+/// The scale of visible noise, as multiples of what is just seen: always the same, so that maps of different
+/// pictures and stages compare.
+pub const NOISE_SCALE: ColourScale = ColourScale {
+    title: "visible noise\n1 = just seen",
+    low: 0.25,
+    high: 4.0,
+    log: true,
+    colours: INFERNO,
+    landmark: Some((1.0, "seen")),
+};
 
 /// An RGB picture to draw on, also with `embedded_graphics`. Whatever lies outside is left out.
 #[derive(Clone, Debug, PartialEq)]

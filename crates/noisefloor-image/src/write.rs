@@ -31,7 +31,7 @@ pub struct RenderLayers<'a> {
     pub probability: Option<&'a [f32]>,
     /// Whether the pixel's tile has stopped; written as floats `oracle.stop`, 1 or 0.
     pub stopped: Option<&'a [bool]>,
-    /// How visible the noise is, in 8-bit display steps; written as floats `oracle.visible_noise`. NaN
+    /// How visible the noise is, as a multiple of what is just seen; written as floats `oracle.visible_noise`. NaN
     /// without evidence.
     pub visible_noise: Option<&'a [f32]>,
     /// How many samples, and from where; written as attributes that [`read_facts`](crate::read_facts) reads.

@@ -29,6 +29,10 @@ pub(crate) fn fit_line(rows: ArrayView2<'_, f64>, shares: &[f64], c: f64) -> Svm
         let curvature = p.mapv(|p| p * (1.0 - p)).insert_axis(Axis(1));
         let hessian = x.t().dot(&(&x * &curvature)) + Array2::from_diag(&penalty);
         let step = solve(hessian, slope);
+        // Classes that a line separates, and next to no penalty: as steep as numbers allow
+        if !step.iter().all(|s| s.is_finite()) {
+            break;
+        }
         weights -= &step;
         if step.iter().all(|s| s.abs() < SMALL) {
             break;

@@ -6,7 +6,7 @@ use crate::observers::observers_agreeing;
 use crate::params::{Learner, TrainError, TrainParams};
 use crate::table::Zone;
 use ndarray::Array2;
-use noisefloor::{Classifier, Platt, Scaler, Svm, SvmParams, fit_svm};
+use noisefloor::{Classifier, Platt, Scaler, Svm, SvmParams, check_examples, fit_svm};
 
 /// Machine and scaler, before calibration.
 pub(crate) struct Machine {
@@ -47,12 +47,11 @@ impl Machine {
             let scaled = scaler.scaled(descriptor);
             row.iter_mut().zip(&scaled).for_each(|(to, &from)| *to = f64::from(from));
         }
+        let labels: Vec<bool> = examples.iter().map(|e| e.1).collect();
         let svm = match params.learner {
-            Learner::Svm => {
-                let labels: Vec<bool> = examples.iter().map(|e| e.1).collect();
-                fit_svm(rows.view(), &labels, svm)?
-            }
+            Learner::Svm => fit_svm(rows.view(), &labels, svm)?,
             Learner::Line => {
+                check_examples(rows.view(), &labels, svm)?;
                 let shares: Vec<f64> = examples.iter().map(|e| e.2).collect();
                 fit_line(rows.view(), &shares, svm.c)
             }

@@ -1,16 +1,16 @@
 //! How a model is trained, and why it cannot be.
 
-use noisefloor::{ModelError, SvmParams, SvmTrainError};
+use crate::choices::VISIBLE_CHOICES;
+use noisefloor::{Descriptor, ModelError, SvmParams, SvmTrainError};
 use thiserror::Error;
 
 /// γ of the kernel in which a straight line is kept.
 pub(crate) const WIDE: f64 = 1e-4;
 
 /// What kind of machine is trained.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Learner {
     /// A support vector machine, on examples that are noisy or converged (Takouachet et al. 2017, §5).
-    #[default]
     Svm,
     /// Logistic regression on the share of observers who see no difference. It decides on a straight line, and
     /// is kept as two support vectors of a wide kernel. C is how little its weights are penalised, γ nothing.
@@ -34,24 +34,30 @@ pub struct TrainParams {
 }
 
 impl Default for TrainParams {
-    /// For the compact descriptor.
+    /// Logistic regression, for the visible descriptor.
     fn default() -> Self {
-        let candidates =
-            [0.1, 0.3, 1.0].iter().flat_map(|&c| [0.003, 0.01].map(|gamma| SvmParams { c, gamma })).collect();
-        Self { learner: Learner::Svm, candidates, range: 8.0, spread: 0.32 }
+        let candidates = [100.0, 300.0, 1000.0].map(|c| SvmParams { c, gamma: WIDE }).to_vec();
+        Self { learner: Learner::Line, candidates, range: 8.0, spread: 0.32 }
     }
 }
 
 impl TrainParams {
-    /// Logistic regression, which serves the visible descriptor better.
-    pub fn line() -> Self {
-        let candidates = [100.0, 300.0, 1000.0].map(|c| SvmParams { c, gamma: WIDE }).to_vec();
-        Self { learner: Learner::Line, candidates, ..Self::default() }
+    /// A support vector machine, for the compact descriptor.
+    pub fn svm() -> Self {
+        let candidates =
+            [0.1, 0.3, 1.0].iter().flat_map(|&c| [0.003, 0.01].map(|gamma| SvmParams { c, gamma })).collect();
+        Self { learner: Learner::Svm, candidates, ..Self::default() }
+    }
+
+    /// What serves a descriptor best: a line for those on the vision model, a machine for all others.
+    pub fn for_descriptor(descriptor: &Descriptor) -> Self {
+        let visible = [Descriptor::visible().name(), VISIBLE_CHOICES.name];
+        if visible.contains(&descriptor.name()) { Self::default() } else { Self::svm() }
     }
 
     /// For the paper's descriptor: its C and γ, [`SvmParams::PAPER`].
     pub fn paper() -> Self {
-        Self { candidates: vec![SvmParams::PAPER], ..Self::default() }
+        Self { candidates: vec![SvmParams::PAPER], ..Self::svm() }
     }
 }
 

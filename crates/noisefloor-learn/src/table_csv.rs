@@ -168,3 +168,33 @@ fn parse(record: &StringRecord) -> Result<(Zone, Level), String> {
     }
     Ok((zone, level))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::table::tests::zone;
+
+    #[test]
+    fn zones_that_are_listed_twice_are_refused_with_their_line() {
+        let mut zones = vec![zone("A", 0, 100.0, 1.0), zone("B", 0, 100.0, 1.0), zone("A", 0, 100.0, 1.0)];
+        zones.iter_mut().flat_map(|z| &mut z.levels).for_each(|l| l.descriptor = vec![0.0; 5]);
+        let table = Table {
+            descriptor: Descriptor::default(),
+            evidence: Evidence::Halves,
+            tone_mapping: ToneMapping::Srgb { exposure: 1.0 },
+            viewing: Viewing::default(),
+            zones,
+            answers: Vec::new(),
+        };
+        let read = |table: &Table| {
+            let mut file = Vec::new();
+            write_table(table, &mut file).unwrap();
+            read_table(&file[..])
+        };
+        let error = read(&table).unwrap_err().to_string();
+        // Two lines of head, and fourteen levels a zone
+        assert!(error.contains("31") && error.contains("zone 0 of A has rows further above"), "{error}");
+        let once = Table { zones: table.zones[..2].to_vec(), ..table };
+        assert_eq!(read(&once).unwrap().zones.len(), 2);
+    }
+}

@@ -161,12 +161,16 @@ mod tests {
 
     #[test]
     fn finds_the_rule_that_people_follow_on_scenes_it_has_not_seen() {
-        let predictions =
-            leave_one_scene_out(&table(4), &TrainParams::default(), Threshold::PAPER, |_| ()).unwrap();
+        for params in [TrainParams::default(), TrainParams::svm()] {
+            finds_the_rule(&params);
+        }
+    }
+
+    fn finds_the_rule(params: &TrainParams) {
+        let predictions = leave_one_scene_out(&table(4), params, Threshold::PAPER, |_| ()).unwrap();
         assert_eq!(predictions.len(), 24);
         // P = 0.9 is where nine in ten agree: by the psychometric function, a little before the recorded
         // threshold of 95 %.
-        let params = TrainParams::default();
         let nine_in_ten = (-params.spread * (19.0f64 / 9.0).ln()).exp();
         assert!((observers_agreeing(nine_in_ten, 1.0, params.spread) - 0.9).abs() < 1e-9);
         let errors = predictions.iter().map(|p| (p.predicted_spp / p.human_spp / nine_in_ten).ln().abs());
@@ -213,7 +217,7 @@ mod tests {
         let short = Answer { group: "mine".into(), spp: 1.0, descriptor: vec![0.0], sees_noise: true };
         let error =
             train(&Table { answers: vec![short], ..plain }, &params, String::new(), None).unwrap_err();
-        assert!(matches!(error, TrainError::Answer { expected: 6, found: 1 }), "{error}");
+        assert!(matches!(error, TrainError::Answer { expected: 5, found: 1 }), "{error}");
     }
 
     /// Zones at 0, 1, 2, … in one number of texture, each of a group of its own: all are 1 from the next.
@@ -252,6 +256,26 @@ mod tests {
             train(&table(1), &TrainParams::default(), String::new(), None),
             Err(TrainError::Groups { .. })
         ));
+    }
+
+    #[test]
+    fn thresholds_beyond_all_levels_teach_nothing() {
+        for params in [TrainParams::default(), TrainParams::svm()] {
+            let mut beyond = table(4);
+            beyond.zones.iter_mut().for_each(|zone| zone.human_spp = 1e9);
+            let error = train(&beyond, &params, String::new(), None).unwrap_err().to_string();
+            assert!(error.contains("there are no examples; do all thresholds lie outside"), "{error}");
+        }
+    }
+
+    /// A line separates these classes, and nothing holds it back: it is steep, and still a model.
+    #[test]
+    fn next_to_no_penalty_is_survived() {
+        let candidates = vec![SvmParams { c: 1e300, gamma: 1e-4 }];
+        let model =
+            train(&table(3), &TrainParams { candidates, ..TrainParams::default() }, String::new(), None);
+        let clean = table(3).zones[0].levels.last().map(|level| level.descriptor.clone()).unwrap();
+        assert!(model.unwrap().judge(&clean).probability > 0.9);
     }
 
     #[test]

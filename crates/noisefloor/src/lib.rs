@@ -90,7 +90,9 @@ pub use stills::{SnapshotPair, Still, StillError};
 pub use stop::{Stop, StopReason};
 pub use svm::{Classifier, Platt, Scaler, Svm};
 #[cfg(feature = "train")]
-pub use svm::{SvmParams, SvmTrainError, Weights, fit_platt, fit_svm, fit_weights, squared_distances};
+pub use svm::{
+    SvmParams, SvmTrainError, Weights, check_examples, fit_platt, fit_svm, fit_weights, squared_distances,
+};
 pub use text::printable;
 pub use threshold::{Threshold, ThresholdError};
 #[cfg(feature = "train")]

@@ -119,10 +119,10 @@ impl Oracle {
         }
     }
 
-    /// The visible noise (see [`crate::TileDescriptor::visible_noise`]) from which it is seen: of an even noise
-    /// in a tile of the mean texture of the training data, where P crosses the threshold. `None` if the
-    /// descriptor does not tell noise from picture.
-    pub fn just_visible(&self) -> Option<f32> {
+    /// The visible noise, in the descriptor's unit, from which it is seen: of an even noise in a tile like the
+    /// mean of the training data, where P crosses the threshold. `None` if the descriptor does not tell noise
+    /// from picture.
+    fn just_visible(&self) -> Option<f32> {
         let descriptor = self.model.descriptor();
         let mean = &self.model.classifier().scaler.mean;
         let at = |doublings: f32| {
@@ -139,9 +139,14 @@ impl Oracle {
         descriptor.pooled_visible_noise(&at(clean))
     }
 
-    /// The visible noise of a whole image (see [`crate::TileDescriptor::visible_noise`]), row-major, from the
-    /// planes of its tiles; NaN where `planes` has none. `None` if the descriptor does not tell noise from
-    /// picture.
+    /// Whether [`Oracle::map_visible_noise`] can tell noise from picture.
+    pub fn maps_visible_noise(&self) -> bool {
+        self.just_visible().is_some()
+    }
+
+    /// The visible noise of a whole image, row-major, from the planes of its tiles; NaN where `planes` has
+    /// none. 1 is the amplitude from which an even noise is seen, in a tile like the mean of the training
+    /// data. `None` if the descriptor does not tell noise from picture.
     ///
     /// # Errors
     /// Those of `planes`.
@@ -150,6 +155,7 @@ impl Oracle {
         grid: TileGrid,
         planes: impl Fn(Tile) -> Result<Option<TilePlanes>, E> + Sync,
     ) -> Result<Option<Vec<f32>>, E> {
+        let Some(just_visible) = self.just_visible() else { return Ok(None) };
         let tiles: Vec<Tile> = grid.tiles().collect();
         let map_of = |&tile: &Tile| {
             Ok(planes(tile)?.map(|planes| {
@@ -164,7 +170,7 @@ impl Oracle {
             match map {
                 Some(Some(map)) => {
                     let pixels = tile.rows(grid.width()).flatten();
-                    pixels.zip(&map).for_each(|(pixel, &value)| image[pixel] = value);
+                    pixels.zip(&map).for_each(|(pixel, &value)| image[pixel] = value / just_visible);
                 }
                 Some(None) => return Ok(None),
                 None => {}

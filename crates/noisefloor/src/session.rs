@@ -335,8 +335,8 @@ impl<C: StoppingCriterion> Session<C> {
         self.tiles[tile].verdict
     }
 
-    /// How visible the noise is at each pixel of the image, row-major, in 8-bit display steps (see
-    /// [`crate::TileDescriptor::visible_noise`]); NaN where there is no evidence. Computed at each call. `None`
+    /// How visible the noise is at each pixel of the image, row-major, as a multiple of what is just seen
+    /// (see [`crate::Oracle::map_visible_noise`]); NaN where there is no evidence. Computed at each call. `None`
     /// before the display is settled, or if the criterion cannot say.
     pub fn visible_noise(&self) -> Option<Vec<f32>> {
         let (film, display, viewing) = (&self.film, self.display.as_ref()?, self.params.viewing);

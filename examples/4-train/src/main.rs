@@ -52,7 +52,7 @@ fn run() -> Result<(), Box<dyn Error>> {
     println!("{} zones of {} scenes", table.zones.len(), table.scenes().len());
 
     // How good is it where it matters: on scenes the model has never seen, beside a plain limit on the noise.
-    let params = TrainParams::default();
+    let params = TrainParams::for_descriptor(&table.descriptor);
     let predictions = leave_one_scene_out(&table, &params, Threshold::PAPER, |group| {
         eprintln!("training without {group} …");
     })?;

@@ -112,7 +112,7 @@ fn broken_promises_are_noticed() {
     said(broken(|_, b| b.reverse()), "order of the requests");
     said(broken(|_, b| b.iter_mut().for_each(|b| b.mean.truncate(7))), "number of values in a batch");
     said(broken(|_, b| b.iter_mut().for_each(|b| b.spp = 0)), "number of values in a batch of 0");
-    said(broken(|_, b| b.iter_mut().for_each(|b| b.spp += 1)), "9 samples where 8 were asked for");
+    said(broken(|_, b| b.iter_mut().for_each(|b| b.spp += 1)), "17 samples where 16 were asked for");
 
     // The first samples over and over
     let again = |r: &[Request], b: &mut Vec<Batch>| {
@@ -194,8 +194,8 @@ fn late(counts: Counts, over: u64) -> String {
 #[test]
 fn late_renderers_give_more_within_bounds() {
     assert_eq!(late(Counts::Late, 1), "kept");
-    assert!(late(Counts::Asked, 1).contains("samples where 8 were asked for"));
-    assert!(late(Counts::Late, 100_000).contains("samples where 8 were asked for"));
+    assert!(late(Counts::Asked, 1).contains("samples where 16 were asked for"));
+    assert!(late(Counts::Late, 100_000).contains("samples where 16 were asked for"));
 }
 
 /// Work in mutations: neighbouring pixels of a batch share their noise, which is no fault there.

@@ -99,7 +99,7 @@ fn one_more_descriptor_is_added_in_one_place() {
     write_table(&table, &mut file).unwrap();
     assert_eq!(read_table_with(&file[..], &[KIND]).unwrap(), table);
 
-    let params = TrainParams { candidates: vec![SvmParams { c: 1.0, gamma: 0.1 }], ..TrainParams::default() };
+    let params = TrainParams { candidates: vec![SvmParams { c: 1.0, gamma: 0.1 }], ..TrainParams::svm() };
     let model = train(&table, &params, "made for a test".into(), None).unwrap();
     let p = |amplitude: f32| {
         let Described { own, .. } = descriptor.describe_tile(&planes(amplitude), 100.0).unwrap();

@@ -21,10 +21,9 @@ pub struct DataArgs {
 #[derive(Debug, Args)]
 pub struct SearchArgs {
     /// What is computed from a tile (for --corpus; a table has its own).
-    #[arg(long, value_enum, default_value_t = DescriptorChoice::Compact)]
+    #[arg(long, value_enum, default_value_t = DescriptorChoice::Visible)]
     pub(super) descriptor: DescriptorChoice,
-    /// What is trained [default: line for the visible descriptor and for --nested, svm otherwise; a table does
-    /// not say].
+    /// What is trained [default: line for the visible descriptor, svm for others].
     #[arg(long, value_enum)]
     pub(super) machine: Option<MachineChoice>,
     /// σ of the noise mask of the compact descriptor, 0.3…1.5 pixels (for --corpus; a table has its own).
@@ -67,20 +66,16 @@ pub(super) use checks::check_data;
 #[cfg(feature = "train")]
 mod checks {
     use super::{DataArgs, DescriptorChoice, MachineChoice, SearchArgs};
-    use crate::learning::{DataJob, DataSource};
+    use crate::learning::{DataJob, DataSource, SearchJob};
     use anyhow::{Context, bail};
-    use noisefloor::{Descriptor, NoiseMask, SvmParams};
-    use noisefloor_learn::TrainParams;
+    use noisefloor::{Descriptor, NoiseMask};
+    use noisefloor_learn::Learner;
 
     /// What to learn from or to score, and how to train on it.
     pub(in crate::args) fn check_data(
         data: DataArgs,
-        search: &SearchArgs,
-        nested: bool,
-    ) -> anyhow::Result<(DataJob, TrainParams)> {
-        let line = nested || search.descriptor == DescriptorChoice::Visible;
-        let machine = search.machine.unwrap_or(if line { MachineChoice::Line } else { MachineChoice::Svm });
-        let params = candidates(search, machine)?;
+        search: SearchArgs,
+    ) -> anyhow::Result<(DataJob, SearchJob)> {
         let mask = NoiseMask::try_from(search.sigma).context("--sigma")?;
         let source = match data.table {
             Some(path) => DataSource::Table(path),
@@ -91,30 +86,14 @@ mod checks {
             DescriptorChoice::Compact => Descriptor::compact(mask),
         };
         let (evidence, viewing) = (search.evidence.into(), search.viewing.or_default());
-        Ok((DataJob { source, descriptor, evidence, viewing }, params))
-    }
-
-    fn candidates(search: &SearchArgs, machine: MachineChoice) -> anyhow::Result<TrainParams> {
-        let mut params = match machine {
-            MachineChoice::Svm => TrainParams::default(),
-            MachineChoice::Line => TrainParams::line(),
-        };
-        let defaults = params.candidates.clone();
-        let given = |values: &[f64], default: fn(&SvmParams) -> f64| -> Vec<f64> {
-            if !values.is_empty() {
-                return values.to_vec();
-            }
-            let mut all: Vec<f64> = defaults.iter().map(default).collect();
-            all.sort_by(f64::total_cmp);
-            all.dedup();
-            all
-        };
-        let (cs, gammas) = (given(&search.c, |p| p.c), given(&search.gamma, |p| p.gamma));
-        if let Some(bad) = cs.iter().chain(&gammas).find(|v| !(v.is_finite() && **v > 0.0)) {
+        let learner = search.machine.map(|machine| match machine {
+            MachineChoice::Svm => Learner::Svm,
+            MachineChoice::Line => Learner::Line,
+        });
+        let (c, gamma) = (search.c, search.gamma);
+        if let Some(bad) = c.iter().chain(&gamma).find(|v| !(v.is_finite() && **v > 0.0)) {
             bail!("C and γ must be positive numbers, not {bad}");
         }
-        params.candidates =
-            cs.iter().flat_map(|&c| gammas.iter().map(move |&gamma| SvmParams { c, gamma })).collect();
-        Ok(params)
+        Ok((DataJob { source, descriptor, evidence, viewing }, SearchJob { learner, c, gamma }))
     }
 }

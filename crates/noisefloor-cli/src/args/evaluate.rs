@@ -69,7 +69,7 @@ impl EvaluateArgs {
             let what = if self.rivals.is_empty() { "evaluate --figures" } else { "evaluate --rivals" };
             return crate::left_out::left_out(what, "lab", "evaluate …");
         }
-        let (mut data, params) = super::data::check_data(self.data, &self.search, self.nested)?;
+        let (mut data, search) = super::data::check_data(self.data, self.search)?;
         let model = match self.leave_one_scene_out || self.nested {
             true => None,
             false => Some(super::oracle::load_model(self.model.as_deref())?),
@@ -81,7 +81,7 @@ impl EvaluateArgs {
         }
         Ok(crate::evaluate::EvaluateJob {
             data,
-            params,
+            search,
             model,
             threshold: self.threshold,
             json: self.json,

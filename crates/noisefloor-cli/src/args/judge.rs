@@ -61,7 +61,7 @@ pub struct JudgeArgs {
     /// Write a map of the visible noise over the picture, in blocks of 8x8 pixels.
     #[arg(long, value_name = "FILE.png")]
     noise_map: Option<PathBuf>,
-    /// Write the picture as linear EXR, with probability and visible noise (in 8-bit steps) as channels.
+    /// Write the picture as linear EXR, with probability and visible noise (1 is just seen) as channels.
     #[arg(long, value_name = "FILE.exr")]
     exr: Option<PathBuf>,
 }
@@ -80,9 +80,9 @@ impl JudgeArgs {
         if !self.spp.is_empty() && self.spp.len() != pictures {
             bail!("--spp is needed once for each picture: {} given for {pictures} pictures", self.spp.len());
         }
-        if self.noise_map.is_some() && oracle.just_visible().is_none() {
+        if self.noise_map.is_some() && !oracle.maps_visible_noise() {
             bail!(
-                "--noise-map: a model with the {} descriptor has no map of visible noise; use one with the compact descriptor",
+                "--noise-map: a model with the {} descriptor has no map of visible noise; the bundled model has one",
                 oracle.model().descriptor().name()
             );
         }

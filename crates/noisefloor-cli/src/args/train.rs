@@ -46,10 +46,10 @@ impl TrainArgs {
         if self.disagreements.is_some() {
             return crate::left_out::left_out("train --disagreements", "study", "train --disagreements …");
         }
-        let (data, params) = super::data::check_data(self.data, &self.search, false)?;
+        let (data, search) = super::data::check_data(self.data, self.search)?;
         Ok(crate::train::TrainJob {
             data,
-            params,
+            search,
             out: self.out,
             save_table: self.save_table,
             save_choices: self.save_choices,

@@ -5,7 +5,7 @@ mod rivals;
 mod tables;
 
 use crate::files::{write_csv, write_json};
-use crate::learning::{DataJob, chosen_and_held_out, held_out};
+use crate::learning::{DataJob, SearchJob, chosen_and_held_out, held_out};
 use crate::say::say;
 use anyhow::{anyhow, bail};
 use noisefloor::{Model, Threshold};
@@ -21,7 +21,7 @@ use std::path::PathBuf;
 /// What to score: checked.
 pub struct EvaluateJob {
     pub data: DataJob,
-    pub params: TrainParams,
+    pub search: SearchJob,
     /// None to leave out one scene after the other.
     pub model: Option<Model>,
     pub threshold: Threshold,
@@ -55,9 +55,10 @@ pub fn run(job: &EvaluateJob) -> anyhow::Result<()> {
         check_writable(path)?;
     }
     let table = if job.nested { job.data.load_choices()? } else { table(job)? };
-    let Predicted { by, predictions, choices } = predict_zones(job, &table)?;
+    let params = job.search.params(&table);
+    let Predicted { by, predictions, choices } = predict_zones(job, &table, &params)?;
     let report = Report {
-        evaluation: Evaluation::new(by, &table, &predictions, job.params.spread),
+        evaluation: Evaluation::new(by, &table, &predictions, params.spread),
         choices,
         #[cfg(feature = "lab")]
         rivals: rivals::rate(job)?,
@@ -96,13 +97,13 @@ fn table(job: &EvaluateJob) -> anyhow::Result<Table> {
 }
 
 /// Who predicts, and what.
-fn predict_zones(job: &EvaluateJob, table: &Table) -> anyhow::Result<Predicted> {
+fn predict_zones(job: &EvaluateJob, table: &Table, params: &TrainParams) -> anyhow::Result<Predicted> {
     if job.nested {
-        let (predictions, choices) = chosen_and_held_out(table, &job.params, job.threshold)?;
+        let (predictions, choices) = chosen_and_held_out(table, params, job.threshold)?;
         return Ok(Predicted { by: "nested leave-one-scene-out".to_owned(), predictions, choices });
     }
     let Some(model) = &job.model else {
-        let predictions = held_out(table, &job.params, job.threshold)?;
+        let predictions = held_out(table, params, job.threshold)?;
         return Ok(Predicted { by: "leave-one-scene-out".to_owned(), predictions, choices: Vec::new() });
     };
     if (model.descriptor(), model.evidence()) != (&table.descriptor, table.evidence) {

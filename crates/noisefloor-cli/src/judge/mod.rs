@@ -7,7 +7,7 @@ use anyhow::Context;
 use noisefloor::{
     Evidence, Oracle, Samples, SnapshotPair, Still, Tile, TileGrid, ToneMapping, Verdict, Viewing,
 };
-use noisefloor_image::maps::{ColourScale, TileMark, draw_field, draw_tiles, noise_scale};
+use noisefloor_image::maps::{ColourScale, NOISE_SCALE, TileMark, draw_field, draw_tiles};
 use noisefloor_image::{RenderLayers, SampleFacts, check_writable, read_facts, read_still, write_exr};
 use report::Row;
 use std::path::{Path, PathBuf};
@@ -105,8 +105,7 @@ fn draw(
     let noise =
         if wants_noise { job.oracle.map_visible_noise(grid, |t| held.planes(t).map(Some))? } else { None };
     if let (Some(path), Some(noise)) = (&job.noise_map, &noise) {
-        let scale = noise_scale(job.oracle.just_visible());
-        draw_field(width, &held.shown(), noise, &scale).save(path)?;
+        draw_field(width, &held.shown(), noise, &NOISE_SCALE).save(path)?;
     }
     if let Some(path) = &job.exr {
         write_channels(path, image, grid, rows, noise.as_deref())?;

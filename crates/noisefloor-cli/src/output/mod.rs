@@ -30,21 +30,14 @@ struct TimelineRow {
     rel_mse: Option<f64>,
 }
 
-/// What reports say of a model.
-pub struct ModelFacts {
-    /// BLAKE3 of the model.
-    pub digest: String,
-    /// Visible noise from which it is seen.
-    pub just_visible: Option<f32>,
-}
-
 /// The output folder, and what has been recorded for it.
 pub struct Output {
     folder: Folder,
     scene: String,
     source: String,
     seed: u64,
-    pub model: Option<ModelFacts>,
+    /// Digest of the model.
+    pub model: Option<String>,
     /// To compare with: as many pixels as are rendered.
     pub reference: Option<Vec<Rgb>>,
     /// Where the samples come from, for whoever compares the picture with another.

@@ -3,7 +3,7 @@
 use super::Output;
 use super::tiles::{TileState, marks};
 use noisefloor::{Rgb, Session, StoppingCriterion};
-use noisefloor_image::maps::{Canvas, draw_field, draw_tiles, noise_scale};
+use noisefloor_image::maps::{Canvas, NOISE_SCALE, draw_field, draw_tiles};
 use noisefloor_image::{RenderLayers, SampleFacts, write_exr};
 
 impl Output {
@@ -49,8 +49,7 @@ impl Output {
         let (marks, scale) = marks(tiles);
         draw_tiles(width, &encoded, &marks, &scale).save(self.path("stops.png"))?;
         if let Some(noise) = &noise {
-            let scale = noise_scale(self.model.as_ref().and_then(|m| m.just_visible));
-            draw_field(width, &encoded, noise, &scale).save(self.path("noise.png"))?;
+            draw_field(width, &encoded, noise, &NOISE_SCALE).save(self.path("noise.png"))?;
         }
         Ok(())
     }

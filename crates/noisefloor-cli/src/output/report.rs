@@ -78,7 +78,7 @@ impl<'a> Report<'a> {
             height: grid.height(),
             seed: output.seed,
             criterion: session.criterion().name(),
-            model: output.model.as_ref().map(|m| m.digest.as_str()),
+            model: output.model.as_deref(),
             params: session.params(),
             exposure: session.display().map(noisefloor::Display::exposure),
             complete: clock.is_some() && tiles.iter().all(TileState::is_final),

@@ -5,7 +5,7 @@ mod snapshots;
 
 use crate::files::read_reference;
 use crate::folder::{Earlier, Folder};
-use crate::output::{ModelFacts, Output};
+use crate::output::Output;
 use crate::say::{note, one_line};
 use crate::signals::{AFTER_THIS_BATCH, INTERRUPTED, cancel_on_signal};
 use crate::sources::{Opened, SourceJob, SourceKind};
@@ -58,8 +58,7 @@ pub fn run(job: RenderJob) -> anyhow::Result<ExitCode> {
     let rest = Rest { job: &job, scene, reference, model: None };
     match judge {
         Judge::Oracle(oracle) => {
-            let (digest, just_visible) = (oracle.model().digest(), oracle.just_visible());
-            let rest = Rest { model: Some(ModelFacts { digest, just_visible }), ..rest };
+            let rest = Rest { model: Some(oracle.model().digest()), ..rest };
             let driver = Driver::new(source, oracle.as_ref().clone(), *params)?;
             rest.drive(driver, Some(Snapshots::new()))
         }
@@ -98,7 +97,7 @@ struct Rest<'a> {
     job: &'a RenderJob,
     scene: String,
     reference: Option<Vec<Rgb>>,
-    model: Option<ModelFacts>,
+    model: Option<String>,
 }
 
 impl Rest<'_> {

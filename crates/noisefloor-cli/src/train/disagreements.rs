@@ -6,12 +6,17 @@ use crate::say::{note, say};
 use anyhow::bail;
 use noisefloor::{Model, Threshold};
 use noisefloor_image::write_atomic;
-use noisefloor_learn::Table;
+use noisefloor_learn::{Table, TrainParams};
 use noisefloor_study::explore::{AnswerAgreement, LearnStep, read_answers, retrain};
 use std::path::Path;
 
 /// Trains, and says what the answers have changed.
-pub(super) fn run(job: &TrainJob, table: &Table, database: &Path) -> anyhow::Result<()> {
+pub(super) fn run(
+    job: &TrainJob,
+    table: &Table,
+    params: &TrainParams,
+    database: &Path,
+) -> anyhow::Result<()> {
     let all = read_answers(database)?;
     let fitting = all.iter().filter(|d| d.said.fits(&table.descriptor, table.evidence));
     let answers: Vec<_> = fitting.map(|d| d.said.answer()).collect();
@@ -36,7 +41,7 @@ pub(super) fn run(job: &TrainJob, table: &Table, database: &Path) -> anyhow::Res
         bar.set_message(step.doing);
     };
     let base = (&Model::bundled(), Threshold::PAPER);
-    let (model, learned) = retrain(table, answers, &job.params, base, &job.data.origin(), on_step)?;
+    let (model, learned) = retrain(table, answers, params, base, &job.data.origin(), on_step)?;
     bar.finish_and_clear();
     write_atomic(&job.out, |to| model.write(to))?;
     say_model(&model, &job.out)?;

@@ -3,17 +3,17 @@
 #[cfg(feature = "study")]
 mod disagreements;
 
-use crate::learning::{DataJob, held_out};
+use crate::learning::{DataJob, SearchJob, held_out};
 use crate::say::{NotSaid, note, say};
 use noisefloor::{Model, Scores, Threshold};
 use noisefloor_image::{check_writable, write_atomic};
-use noisefloor_learn::{TrainParams, score, train, write_table};
+use noisefloor_learn::{score, train, write_table};
 use std::path::{Path, PathBuf};
 
 /// What to train on, and how: checked.
 pub struct TrainJob {
     pub data: DataJob,
-    pub params: TrainParams,
+    pub search: SearchJob,
     pub out: PathBuf,
     pub save_table: Option<PathBuf>,
     pub save_choices: Option<PathBuf>,
@@ -36,20 +36,21 @@ pub fn run(job: &TrainJob) -> anyhow::Result<()> {
         write_atomic(path, |to| write_table(&table, to))?;
         note!("table of {} zones written to {}", table.zones.len(), path.display());
     }
+    let params = job.search.params(&table);
     #[cfg(feature = "study")]
     if let Some(database) = &job.disagreements {
-        return disagreements::run(job, &table, database);
+        return disagreements::run(job, &table, &params, database);
     }
 
     // Scores on scenes left out, where there are enough to leave one out and still choose among the others.
     let scores = if !job.scores || table.groups().len() < 3 {
         None
     } else {
-        let predictions = held_out(&table, &job.params, Threshold::PAPER)?;
+        let predictions = held_out(&table, &params, Threshold::PAPER)?;
         Some(score(predictions.iter()))
     };
     note!("training on all scenes");
-    let model = train(&table, &job.params, job.data.origin(), scores)?;
+    let model = train(&table, &params, job.data.origin(), scores)?;
     write_atomic(&job.out, |to| model.write(to))?;
     say_model(&model, &job.out)?;
     scores.map_or(Ok(()), |scores| say_scores("", scores))?;

@@ -1,8 +1,8 @@
-use crate::kit::{FILES, command, json, run, stderr, succeed, text};
+use crate::kit::{FILES, command, grey_exr, json, run, stderr, succeed, text};
 use noisefloor::Checkpoint;
 use noisefloor_image::{read_exr, read_picture};
 use std::path::Path;
-use std::process::{Command, Stdio};
+use std::process::{Command, Output, Stdio};
 use std::time::Duration;
 use tempfile::tempdir;
 
@@ -89,8 +89,16 @@ fn a_hundred_killed_renders_lose_nothing() {
     kill_and_resume(100);
 }
 
-/// Under a limit on the length of files, which is what a full disk is like to a program: writes fail
-/// half-way.
+/// Runs the command under a limit on the length of files, in blocks of 512 bytes. That is what a full disk is
+/// like to a program: writes fail half-way.
+#[cfg(unix)]
+fn run_with_files_of(blocks: u32, args: &[&str]) -> Output {
+    // Without the signal, writing beyond the limit is an error
+    let limited = format!("trap '' XFSZ; ulimit -f {blocks}; exec \"$@\"");
+    let program = env!("CARGO_BIN_EXE_noisefloor");
+    Command::new("sh").args(["-c", &limited, "sh", program]).args(args).output().unwrap()
+}
+
 #[cfg(unix)]
 #[test]
 fn a_disk_that_is_full_is_an_error_and_spoils_nothing() {
@@ -98,11 +106,7 @@ fn a_disk_that_is_full_is_an_error_and_spoils_nothing() {
     let out = folder.path();
     succeed(&arguments(text(out), &[]));
     let before = std::fs::read(out.join("image.exr")).unwrap();
-    let program = env!("CARGO_BIN_EXE_noisefloor");
-    // Blocks of 512 bytes; without the signal, writing beyond the limit is an error
-    let limited = "trap '' XFSZ; ulimit -f 16; exec \"$@\"";
-    let args = arguments(text(out), &["--seed", "2", "--force"]);
-    let output = Command::new("sh").args(["-c", limited, "sh", program]).args(args).output().unwrap();
+    let output = run_with_files_of(16, &arguments(text(out), &["--seed", "2", "--force"]));
     let said = stderr(&output);
     assert_eq!(output.status.code(), Some(1), "{said}");
     assert!(said.contains("not written") && said.contains("check the space on the disk"), "{said}");
@@ -110,6 +114,78 @@ fn a_disk_that_is_full_is_an_error_and_spoils_nothing() {
     assert_eq!(std::fs::read(out.join("image.exr")).unwrap(), before);
     assert_eq!(temporary_files(out), 0);
     assert_each_whole(out);
+}
+
+/// What each command writes, besides `render`: the arguments before the name of the file or folder, and
+/// whether it is a file.
+#[cfg(unix)]
+fn writers(folder: &Path) -> Vec<(Vec<String>, bool)> {
+    let path = |name: &str| text(&folder.join(name)).to_owned();
+    let mut writers = Vec::new();
+    let mut writer = |args: &str, is_file| {
+        let words = args.split(' ').map(|word| match word.strip_prefix('@') {
+            Some(name) => path(name),
+            None => word.to_owned(),
+        });
+        writers.push((words.collect(), is_file));
+    };
+    let judge = "judge @a.exr --spp 9 --against @b.exr --spp 9 --tile 32 --independent";
+    for option in ["--heat-map", "--noise-map", "--exr"] {
+        writer(&format!("{judge} {option}"), true);
+    }
+    writer("metrics @a.exr @b.exr --map", true);
+    writer("reference bulb --size 16x16 --quiet --out", true);
+    if cfg!(feature = "train") {
+        writer("train --table @table.csv --no-scores --out", true);
+        writer("train --table @table.csv --no-scores --out @model.nfm --save-table", true);
+        writer("evaluate --table @table.csv --json", true);
+        writer("evaluate --table @table.csv --csv", true);
+    }
+    if cfg!(feature = "lab") {
+        let small = "compare bulb --size 32x32 --tile 32 --criteria spp:4 --max-spp 100 --reference-spp 4";
+        writer(&format!("{small} --quiet --out"), false);
+    }
+    if cfg!(feature = "study") {
+        writer("study stack bulb --size 64x64 --levels 1,2 --quiet --out", false);
+    }
+    writers
+}
+
+/// Runs each of [`writers`] into a file or folder of its own, and into one that nobody can write.
+#[cfg(target_os = "linux")]
+#[test]
+fn no_command_spoils_a_file_on_a_full_disk() {
+    let folder = tempdir().unwrap();
+    let (a, b) = (folder.path().join("a.exr"), folder.path().join("b.exr"));
+    grey_exr(&a, (32, 32), 1, 0.4);
+    grey_exr(&b, (32, 32), 2, 0.4);
+    let table = include_str!("../../../../fixtures/human-table.csv");
+    std::fs::write(folder.path().join("table.csv"), table).unwrap();
+    for (i, (args, is_file)) in writers(folder.path()).into_iter().enumerate() {
+        let target = folder.path().join(format!("target{i}{}", if is_file { ".exr" } else { "" }));
+        if is_file {
+            std::fs::write(&target, "as it was").unwrap();
+        }
+        let mut args: Vec<&str> = args.iter().map(String::as_str).collect();
+        args.push(text(&target));
+        let output = run_with_files_of(0, &args);
+        let said = stderr(&output);
+        assert_eq!(output.status.code(), Some(1), "{args:?}: {said}");
+        let error = said.lines().find(|line| line.starts_with("error: ")).unwrap_or_default();
+        assert!(error.contains(&format!("target{i}")), "{args:?}: {said}");
+        assert!(!said.contains("panicked"), "{args:?}: {said}");
+        if is_file {
+            assert_eq!(std::fs::read(&target).unwrap(), b"as it was", "{args:?}");
+        }
+
+        // In /proc not even the superuser makes files
+        *args.last_mut().unwrap() = "/proc/noisefloor.exr";
+        let output = run(&args);
+        let said = stderr(&output);
+        assert_eq!(output.status.code(), Some(1), "{args:?}: {said}");
+        assert!(said.contains("error: ") && said.contains("/proc/noisefloor.exr"), "{args:?}: {said}");
+    }
+    assert_eq!(temporary_files(folder.path()), 0);
 }
 
 /// Refused before anything is rendered. In /proc not even the superuser makes files.

@@ -196,8 +196,6 @@ function layers() {
   get("legend").hidden = !noise;
   get("show-noise").disabled = !view.has_noise_map;
   get("tiles").classList.toggle("bare", !get("show-verdicts").checked);
-  if (view.just_visible !== null)
-    get("seen-at").textContent = fill(t.seen, { n: view.just_visible.toFixed(1) });
 }
 
 function summarise() {

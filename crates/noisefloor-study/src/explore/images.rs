@@ -4,8 +4,8 @@ use super::verdicts::Tiles;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, ImageEncoder, ImageError};
 
-/// Range of the noise map, as in `noisefloor judge --noise-map`: 1 to 16 display steps, logarithmic.
-const SCALE: [f32; 2] = [1.0, 16.0];
+/// Range of the noise map, as in `noisefloor judge --noise-map`: logarithmic, 1 is just seen.
+const SCALE: [f32; 2] = [0.25, 4.0];
 
 /// The picture as displayed.
 pub(crate) fn shown(tiles: &Tiles) -> Result<Vec<u8>, ImageError> {

@@ -68,7 +68,8 @@ pub(crate) fn begin(
     std::thread::spawn(move || {
         let work = || {
             let on_step = |step| set(Job::Running(step));
-            retrain(&table, answers, &TrainParams::default(), (&model, threshold), &corpus, on_step)
+            let params = TrainParams::for_descriptor(&table.descriptor);
+            retrain(&table, answers, &params, (&model, threshold), &corpus, on_step)
         };
         // A panic in the solver must not leave the page waiting
         let outcome = std::panic::catch_unwind(std::panic::AssertUnwindSafe(work));

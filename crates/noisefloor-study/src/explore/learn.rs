@@ -65,8 +65,9 @@ pub fn retrain(
     let plain = Table { answers: Vec::new(), ..table.clone() };
     let told = Table { answers, ..plain.clone() };
     let (groups, scenes) = (plain.groups().len(), told.answer_groups().len());
-    let known = Some(model)
-        .filter(|m| m.record().table_digest == plain.digest() && *params == TrainParams::default());
+    let known = Some(model).filter(|m| {
+        m.record().table_digest == plain.digest() && *params == TrainParams::for_descriptor(&plain.descriptor)
+    });
     let scored = groups >= 3;
     let known_scores = known.and_then(|m| m.record().leave_one_scene_out);
     let folds = if scored { groups } else { 0 };

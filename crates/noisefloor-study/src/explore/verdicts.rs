@@ -66,7 +66,7 @@ fn describe(gallery: &Gallery, id: &str, model: &Model, viewing: Viewing) -> Res
     .seen_on(viewing);
     let (width, height) = picture.still.size;
     let grid = TileGrid::new(width, height, gallery.tile)?;
-    // The threshold affects verdicts only
+    // The threshold affects verdicts only; 1 in the map is seen at that of the paper
     let oracle = Oracle::new(model.clone(), Threshold::PAPER);
     let described = held.describe(&oracle, grid)?;
     let noise = oracle.map_visible_noise(grid, |tile| held.planes(tile).map(Some))?;
@@ -117,8 +117,6 @@ pub(crate) struct VerdictView {
     pub(crate) model: String,
     pub(crate) columns: usize,
     pub(crate) tiles: Vec<TileView>,
-    /// Visible noise, in 8-bit steps, that is just seen.
-    pub(crate) just_visible: Option<f32>,
     pub(crate) has_noise_map: bool,
 }
 
@@ -188,7 +186,6 @@ impl Judge {
             model: self.oracle.model().digest(),
             columns: tiles.grid.width().div_ceil(tiles.grid.edge()),
             tiles: tiles.grid.tiles().zip(self.verdicts(tiles)?).map(view).collect(),
-            just_visible: self.oracle.just_visible(),
             has_noise_map: tiles.noise.is_some(),
         })
     }

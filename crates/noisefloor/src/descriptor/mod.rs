@@ -62,6 +62,6 @@ impl Descriptor {
 
 impl Default for Descriptor {
     fn default() -> Self {
-        Self::compact(NoiseMask::default())
+        Self::visible()
     }
 }

@@ -135,13 +135,23 @@ impl TileDescriptor for Visible {
     fn describe(&self, planes: &TilePlanes) -> Result<Vec<f32>, DescriptorError> {
         // What is not finite is never converged
         let noise =
-            with_differences(planes, |differences| self.amplitude(differences)).unwrap_or(f64::INFINITY);
+            with_differences(planes, |differences| self.noise(differences).0).unwrap_or(f64::INFINITY);
         let noise = noise * without_rounding(planes);
         Ok(vec![noise_number(noise), texture_energy(planes, NoiseMask::default()), light(planes)])
     }
 
     fn in_picture(&self, tiles: &[Described]) -> Vec<Vec<f32>> {
         Visible::in_picture(*self, tiles)
+    }
+
+    fn visible_noise(&self, planes: &TilePlanes) -> Option<Array2<f32>> {
+        let (height, width) = (planes.inner.height, planes.inner.width);
+        let map = with_differences(planes, |differences| self.map(differences, (height, width)));
+        Some(map.unwrap_or_else(|| Array2::from_elem((height, width), f32::INFINITY)))
+    }
+
+    fn pooled_visible_noise(&self, raw: &[f32]) -> Option<f32> {
+        Some(amplitude(raw[0]) as f32)
     }
 
     fn texture(&self) -> &[usize] {
@@ -165,26 +175,44 @@ impl TileDescriptor for Visible {
 }
 
 impl Visible {
-    /// How many times stronger the noise is than noise whose pooled difference is [`Visible::difference`]; 0
-    /// without noise. Found on logarithms, by secants: differences grow nearly as a power of contrast.
-    fn amplitude(self, differences: &mut VisibleDifference<'_>) -> f64 {
+    /// How many times stronger the noise is than noise whose pooled difference is [`Visible::difference`], 0
+    /// without noise; and how differences grow with contrast there. Found on logarithms, by secants:
+    /// differences grow nearly as a power of contrast.
+    fn noise(self, differences: &mut VisibleDifference<'_>) -> (f64, f64) {
         let mut excess = |contrast: f64| {
             let pooled = self.pooled(differences.map_at(contrast.exp() as f32));
             (pooled > 0.0).then(|| (pooled / self.difference).ln())
         };
-        let Some(mut above) = excess(0.0) else { return 0.0 };
         let (mut at, mut growth) = (0.0, USUAL_GROWTH);
+        let Some(mut above) = excess(0.0) else { return (0.0, growth) };
         for correction in 0..CORRECTIONS {
             // Beyond ±6, four hundred times too strong or weak, a projection says nothing
             let next = (at - above / growth).clamp(-6.0, 6.0);
             if (next - at).abs() < 1e-3 || correction + 1 == CORRECTIONS {
-                return (-next).exp();
+                return ((-next).exp(), growth);
             }
-            let Some(there) = excess(next) else { return (-next).exp() };
+            let Some(there) = excess(next) else { return ((-next).exp(), growth) };
             growth = ((there - above) / (next - at)).clamp(0.3, 2.3);
             (at, above) = (next, there);
         }
-        (-at).exp()
+        ((-at).exp(), growth)
+    }
+
+    /// How many times too strong the noise is at each pixel, rows × columns. Its mean of the order `order` ·
+    /// growth is that of the tile. Where noise is much weaker than in the tile's worst place, differences grow
+    /// faster with contrast than they do there, and the map says too little.
+    fn map(self, differences: &mut VisibleDifference<'_>, size: (usize, usize)) -> Array2<f32> {
+        let (noise, growth) = self.noise(differences);
+        if noise == 0.0 {
+            return Array2::zeros(size);
+        }
+        let band = differences.map_at(noise.recip() as f32);
+        let rows: Vec<&[f32]> = band.rows().collect();
+        let times = |x: f32| (noise * (f64::from(x) / self.difference).powf(growth.recip())) as f32;
+        Array2::from_shape_fn(size, |(y, x)| {
+            let row = rows[(y / band.step).min(rows.len() - 1)];
+            times(row[(x / band.step).min(row.len() - 1)])
+        })
     }
 
     /// The mean of high order of a map.

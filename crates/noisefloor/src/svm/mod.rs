@@ -18,7 +18,7 @@ pub use predict::{Scaler, Svm};
 #[cfg(feature = "train")]
 pub use {
     gram::squared_distances,
-    params::{SvmParams, SvmTrainError},
+    params::{SvmParams, SvmTrainError, check_examples},
     solver::{Weights, fit_weights},
     train::{fit_platt, fit_svm},
 };

@@ -52,8 +52,12 @@ pub(super) const SOLVER_EPS: f64 = 1e-3;
 /// linfa drops support vectors lighter than this from its decision function; the same are left out here.
 pub(super) const LIGHTEST: f64 = 100.0 * f64::EPSILON;
 
-/// Checks parameters, that every row has a label, that all numbers are finite and both classes there.
-pub(super) fn check(
+/// Checks what any machine is trained on: parameters, that every row has a label, that all numbers are finite
+/// and both classes there.
+///
+/// # Errors
+/// [`SvmTrainError`] says what is wrong.
+pub fn check_examples(
     rows: ArrayView2<'_, f64>,
     converged: &[bool],
     SvmParams { c, gamma }: SvmParams,

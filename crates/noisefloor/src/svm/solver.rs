@@ -4,7 +4,7 @@
 //! other: neither its kernel trait nor its fitting functions are public. For the paper's descriptor, 9,600
 //! rows of 32,768 numbers, that would take hours a machine.
 
-use super::params::{LIGHTEST, SOLVER_EPS, SvmParams, SvmTrainError, check};
+use super::params::{LIGHTEST, SOLVER_EPS, SvmParams, SvmTrainError, check_examples};
 use ndarray::{Array2, ArrayView2};
 use rayon::prelude::*;
 
@@ -34,7 +34,7 @@ pub fn fit_weights(
     converged: &[bool],
     params: SvmParams,
 ) -> Result<Weights, SvmTrainError> {
-    check(squared, converged, params)?;
+    check_examples(squared, converged, params)?;
     if squared.nrows() != squared.ncols() {
         let what = format!("{}×{} distances are not a square", squared.nrows(), squared.ncols());
         return Err(SvmTrainError::Examples(what));

@@ -1,7 +1,7 @@
 //! Training through linfa-svm, or from a matrix product where rows are long.
 
 use super::gram::squared_distances;
-use super::params::{LIGHTEST, SOLVER_EPS, SvmParams, SvmTrainError, check};
+use super::params::{LIGHTEST, SOLVER_EPS, SvmParams, SvmTrainError, check_examples};
 use super::platt::Platt;
 use super::predict::Svm;
 use super::solver::{Weights, fit_weights};
@@ -22,7 +22,7 @@ pub fn fit_svm(
     converged: &[bool],
     params: SvmParams,
 ) -> Result<Svm, SvmTrainError> {
-    check(rows, converged, params)?;
+    check_examples(rows, converged, params)?;
     let Weights { alpha, rho } = if rows.ncols() > WIDE {
         fit_weights(squared_distances(rows, |_, _| ()).view(), converged, params)?
     } else {

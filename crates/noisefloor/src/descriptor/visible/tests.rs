@@ -1,4 +1,5 @@
 use super::*;
+use crate::evidence::HALO;
 use crate::tile::TileGrid;
 use noisefloor_testkit::Noise;
 use noisefloor_vision::Viewing;
@@ -26,7 +27,7 @@ fn noise_is_as_strong_as_its_contrast_says() {
     let visible = Visible::default();
     for (noise, left) in [(0.001, 0.1), (0.004, 0.02), (0.016, 0.02), (0.064, 0.02)] {
         let planes = tile(0.5, noise);
-        let amplitude = with_differences(&planes, |differences| visible.amplitude(differences)).unwrap();
+        let amplitude = with_differences(&planes, |differences| visible.noise(differences).0).unwrap();
         let there = |differences: &mut VisibleDifference<'_>| {
             visible.pooled(differences.map_at(1.0 / amplitude as f32))
         };
@@ -93,6 +94,27 @@ fn a_picture_of_equal_tiles_is_as_noisy_as_each_and_samples_count() {
     // The mean of eighth order of 1 and 0, by area
     let half = descriptor.in_picture(&[tile(16.0, 1.0), tile(16.0, 0.0)]);
     assert!((amplitude(half[0][3]) - 0.5f64.powf(0.125)).abs() < 1e-3, "{half:?}");
+}
+
+/// The map pools to the tile's number, and is where the noise is.
+#[test]
+fn the_map_is_where_the_noise_is() {
+    let mut planes = tile(0.5, 0.03);
+    let visible = Visible::default();
+    let map = Descriptor::visible().visible_noise(&planes).unwrap();
+    assert_eq!(map.dim(), (80, 96));
+    let (noise, growth) = with_differences(&planes, |differences| visible.noise(differences)).unwrap();
+    let order = visible.order.number() * growth;
+    let pooled = map.mapv(|v| f64::from(v).powf(order)).mean().unwrap().powf(order.recip());
+    assert!((pooled / noise - 1.0).abs() < 0.02, "{pooled} {noise}");
+    assert_eq!(f64::from(own(&planes)[0]), f64::from(noise_number(noise)));
+
+    planes.residual.slice_mut(s![.., 48 + HALO..]).fill(0.0);
+    let map = Descriptor::visible().visible_noise(&planes).unwrap();
+    let mean = |columns: std::ops::Range<usize>| map.slice(s![.., columns]).mean().unwrap();
+    assert!(mean(0..40) > 20.0 * mean(60..96), "{} {}", mean(0..40), mean(60..96));
+    planes.residual.fill(0.0);
+    assert!(Descriptor::visible().visible_noise(&planes).unwrap().iter().all(|&v| v == 0.0));
 }
 
 #[test]
