@@ -295,13 +295,13 @@ fn draw_legend(canvas: &mut Canvas, width: usize, bottom: usize, scale: &ColourS
     }
     if let Some((value, name)) = scale.landmark {
         let y = bottom - ((bottom - top) as f64 * scale.place(value)) as usize;
-        for x in left - 3..left + 50 {
+        for x in left - 3..left + 23 {
             canvas.set(x, y, INK);
         }
         for x in left..left + 18 {
             canvas.set(x, y, PAPER);
         }
-        canvas.text(name, (left + 53, y), &FONT_7X13, INK, Alignment::Left);
+        canvas.text(name, (left + 59, y), &FONT_7X13, INK, Alignment::Left);
     }
 }
 

@@ -136,8 +136,11 @@ pub enum ParamsError {
     /// The step is too small for two halves.
     #[error("a step of {0} samples cannot be split into two halves: use at least 2")]
     Step(u64),
+    /// The limit is too small for two halves.
+    #[error("{0} samples per pixel at most cannot be split into two halves: use at least 2")]
+    MaxSpp(u64),
     /// The limits leave nothing.
-    #[error("at most {max} samples per pixel are allowed, but at least {min} (and at least 2) are asked for")]
+    #[error("at most {max} samples per pixel are allowed, but at least {min} are asked for")]
     Spp {
         /// The minimum asked for.
         min: u64,
@@ -166,7 +169,10 @@ impl Params {
         if step < 2 {
             return Err(ParamsError::Step(step));
         }
-        if self.max_spp < self.min_spp.max(2) {
+        if self.max_spp < 2 {
+            return Err(ParamsError::MaxSpp(self.max_spp));
+        }
+        if self.max_spp < self.min_spp {
             return Err(ParamsError::Spp { min: self.min_spp, max: self.max_spp });
         }
         if self.consecutive == 0 {

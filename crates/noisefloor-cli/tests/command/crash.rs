@@ -134,7 +134,7 @@ fn writers(folder: &Path) -> Vec<(Vec<String>, bool)> {
         writer(&format!("{judge} {option}"), true);
     }
     writer("metrics @a.exr @b.exr --map", true);
-    writer("reference bulb --size 16x16 --quiet --out", true);
+    writer("reference bulb --size 16x16 --quiet --force --out", true);
     if cfg!(feature = "train") {
         writer("train --table @table.csv --no-scores --out", true);
         writer("train --table @table.csv --no-scores --out @model.nfm --save-table", true);
@@ -146,7 +146,7 @@ fn writers(folder: &Path) -> Vec<(Vec<String>, bool)> {
         writer(&format!("{small} --quiet --out"), false);
     }
     if cfg!(feature = "study") {
-        writer("study stack bulb --size 64x64 --levels 1,2 --quiet --out", false);
+        writer("study stack bulb --size 64x64 --levels 1,2 --out", false);
     }
     writers
 }

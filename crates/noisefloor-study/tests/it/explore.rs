@@ -281,7 +281,7 @@ fn a_database_of_something_else_is_refused() {
     assert!(!dir.path().join("absent.sqlite").exists(), "reading makes no database");
 }
 
-/// Four scenes where people stop at an even noise of 2 steps.
+/// Four scenes where people stop where noise is no longer too strong.
 pub(crate) fn table() -> Table {
     let descriptor = Descriptor::default();
     let mut random = fastrand::Rng::with_seed(5);
@@ -290,8 +290,8 @@ pub(crate) fn table() -> Table {
         let human_spp = 100.0 * (1.0 + 9.0 * f64::from(random.f32()));
         let level = |i: i32| {
             let spp = 20.0 * 1.4f64.powi(i);
-            let noise = 2.0 * (human_spp / spp).sqrt() as f32;
-            let descriptor = vec![noise.ln(), texture, 2.0 * texture, noise.ln(), texture, 2.0 * texture];
+            let noise = (human_spp / spp).sqrt() as f32;
+            let descriptor = vec![noise.ln(), texture, -texture, noise.ln(), -texture];
             Level { spp, origin: Origin::Real, noise, descriptor }
         };
         let (name, levels) = (format!("Scene{scene}"), (0..18).map(level).collect());

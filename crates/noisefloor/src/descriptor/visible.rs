@@ -203,7 +203,8 @@ impl Visible {
     /// faster with contrast than they do there, and the map says too little.
     fn map(self, differences: &mut VisibleDifference<'_>, size: (usize, usize)) -> Array2<f32> {
         let (noise, growth) = self.noise(differences);
-        if noise == 0.0 {
+        // What cannot be told from none is not drawn
+        if noise < NOISE_FLOOR {
             return Array2::zeros(size);
         }
         let band = differences.map_at(noise.recip() as f32);

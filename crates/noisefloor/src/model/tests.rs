@@ -2,7 +2,7 @@ use super::*;
 use crate::svm::{Platt, Scaler, Svm};
 use proptest::prelude::*;
 
-/// A model that goes by the first number of the compact descriptor alone.
+/// A model that goes by the first number of the default descriptor alone.
 pub(crate) fn small() -> Model {
     let descriptor = Descriptor::default();
     let n = descriptor.dimensions();
@@ -52,7 +52,7 @@ fn the_bundled_model_is_whole_small_and_scored() {
     let model = Model::bundled();
     assert!(BUNDLED.len() < 1 << 20);
     assert_eq!(model.evidence(), Evidence::Halves);
-    assert!(model.record().leave_one_scene_out.is_some_and(|s| s.zones == 128));
+    assert!(model.record().leave_one_scene_out.is_some_and(|s| s.zones == 112));
 }
 
 /// An unfamiliar tile has the P that a familiar one of the same noise has with half of the samples.
@@ -83,23 +83,16 @@ fn the_model_for_references_is_whole() {
 
 #[cfg(feature = "bundled-model")]
 #[test]
-fn clean_tiles_are_converged_and_noisy_ones_are_not_whatever_the_texture() {
+fn clean_tiles_are_converged_and_noisy_ones_are_not_whatever_the_picture() {
     let model = Model::bundled();
-    for textured in 0..=17 {
-        // From no texture at all, ln 2, to a checkerboard of black and white, ln 128.
-        let texture = 0.693 + 0.25 * textured as f32;
-        let p = |noise: f32| {
-            let mut tile = vec![texture; model.descriptor().dimensions()];
-            // Of the tile and of its picture.
-            (tile[0], tile[3]) = (noise, noise);
-            model.judge(&tile).probability
-        };
-        // From no noise, at the floor, to white noise from black to white: 128 steps, which the masks and the
-        // weights of the scales let through almost whole.
-        let path: Vec<f32> = (0..=83).map(|i| p(-3.45 + 0.1 * i as f32)).collect();
-        assert!(path[0] > 0.99 && path[83] < 0.6, "{texture}: {path:?}");
-        // Far from all training data a Gaussian kernel forgets, so that P ends a little above its least.
-        assert!(path.windows(2).all(|w| w[1] <= w[0] + 2e-3), "{texture}: {path:?}");
+    // From no texture at all, ln 2, to a checkerboard of black and white, ln 128; from black to white
+    for (textured, lit) in (0..=17).flat_map(|textured| (0..=6).map(move |lit| (textured, lit))) {
+        let (texture, light) = (0.693 + 0.25 * textured as f32, 0.002f32.ln() * (1.0 - lit as f32 / 6.0));
+        let p = |noise: f32| model.judge(&[noise, texture, light, noise, light]).probability;
+        // From no noise, at the floor, to a hundred times too much
+        let path: Vec<f32> = (0..=81).map(|i| p(-3.5 + 0.1 * i as f32)).collect();
+        assert!(path[0] > 0.99 && path[81] < 0.01, "{texture} {light}: {path:?}");
+        assert!(path.windows(2).all(|w| w[1] <= w[0] + 1e-6), "{texture} {light}: {path:?}");
     }
 }
 
@@ -157,7 +150,7 @@ fn a_descriptor_that_is_not_here_is_refused() {
         "{unknown}"
     );
     let empty = read(|f| f.descriptor.parameters.clear());
-    assert!(empty.to_string().contains("mask"), "{empty}");
+    assert!(empty.to_string().contains("difference"), "{empty}");
 }
 
 proptest! {

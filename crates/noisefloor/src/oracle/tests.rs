@@ -37,7 +37,8 @@ fn judge(oracle: &mut Oracle, film: &Film, reference: Option<&[Rgb]>) -> Result<
 #[test]
 fn more_samples_are_less_visible_and_the_expected_need_is_near() {
     let mut oracle = Oracle::bundled();
-    let few = judge(&mut oracle, &film(100, 0.5), None).unwrap();
+    // A quarter of what is needed; from further away, noise that masks itself hides some of the need
+    let few = judge(&mut oracle, &film(500, 0.5), None).unwrap();
     let many = judge(&mut oracle, &film(100_000, 0.5), None).unwrap();
     assert!(!few.converged && many.converged, "{few:?} {many:?}");
     // At the samples that were expected, another realisation of the noise is about at the threshold.
@@ -85,10 +86,10 @@ fn checker(pixel: usize) -> f32 {
 #[test]
 fn what_nobody_was_asked_about_is_told_from_what_is_only_noisy_or_clean() {
     let verdict = |film: &Film| judge(&mut Oracle::bundled(), film, None).unwrap();
-    // Black, next to black, and flat: nothing unheard of, and nothing to see.
-    for picture in [|_| 0.0, |_| 1e-9, |_| 0.2] {
+    // Flat: nothing to see, and nothing unheard of but black, of which nobody was asked.
+    for (picture, black) in [((|_| 0.0) as fn(usize) -> f32, true), (|_| 1e-9, true), (|_| 0.2, false)] {
         let flat = verdict(&film_of(picture, 100, 0.0));
-        assert!(!flat.unfamiliar && flat.converged, "{flat:?}");
+        assert!(flat.unfamiliar == black && flat.converged, "{flat:?}");
     }
     // Noise alone, however much, is no texture: it is not converged, and is expected to be.
     for sigma in [1.0, 10.0] {
@@ -225,7 +226,13 @@ fn a_descriptor_that_knows_nothing_of_displays_refuses_another_one() {
     for value in [0.2, 0.3] {
         film.add(0, 10, &[[value; 3]; 1024]).unwrap();
     }
-    let mut oracle = Oracle::new(small(), Threshold::PAPER);
+    let compact = Descriptor::compact(NoiseMask::default());
+    let model = changed(small(), |m| {
+        m.classifier.scaler = Scaler::identity(compact.dimensions());
+        m.classifier.svm.vectors = vec![0.0; 2 * compact.dimensions()];
+        m.descriptor = compact;
+    });
+    let mut oracle = Oracle::new(model.unwrap(), Threshold::PAPER);
     let tiles: Vec<Tile> = grid.tiles().collect();
     let mut judge = |viewing: Viewing| {
         oracle.judge(&View { film: &film, display: &Display::SRGB, viewing, reference: None }, &tiles)
