@@ -1,13 +1,14 @@
 //! `noisefloor doctor`.
 
 use crate::say::{note, say};
-use crate::sources::{ADAPTERS, Adapter};
-use noisefloor_sidecar::{SetupError, find, install, probe};
+use crate::sources::ADAPTERS;
+use noisefloor_denoise::OIDN;
+use noisefloor_sidecar::{Renderer, SetupError, find, install, probe};
 use std::process::ExitCode;
 
 /// What to look at, or to install.
 pub struct DoctorJob {
-    pub install: Option<&'static Adapter>,
+    pub install: Option<&'static Renderer>,
 }
 
 /// One line of the table, and what is to be said below it.
@@ -18,10 +19,10 @@ struct Row {
 }
 
 pub fn run(job: &DoctorJob) -> anyhow::Result<ExitCode> {
-    if let Some(adapter) = job.install {
-        let python = install(adapter.renderer, |line| note!("{line}"))?;
-        say!("{} is installed: {}", adapter.renderer.title, python.display())?;
-        for text in (adapter.notes)() {
+    if let Some(renderer) = job.install {
+        let python = install(renderer, |line| note!("{line}"))?;
+        say!("{} is installed: {}", renderer.title, python.display())?;
+        for text in notes(renderer) {
             say!("note: {text}")?;
         }
         return Ok(ExitCode::SUCCESS);
@@ -31,7 +32,8 @@ pub fn run(job: &DoctorJob) -> anyhow::Result<ExitCode> {
     let ptwne = Row { cells: ["ptwne".into(), "yes".into(), version, place], notes: vec![], broken: false };
     // Several sources may be one renderer's
     let renderers = ADAPTERS.iter().filter(|adapter| adapter.name == adapter.renderer.name);
-    let rows: Vec<Row> = std::iter::once(ptwne).chain(renderers.map(examine)).collect();
+    let others = renderers.map(|adapter| adapter.renderer).chain([&OIDN]);
+    let rows: Vec<Row> = std::iter::once(ptwne).chain(others.map(examine)).collect();
     let line = |cells: [&str; 4]| say!("{:10} {:7} {:10} {}", cells[0], cells[1], cells[2], cells[3]);
     line(["renderer", "usable", "version", "where"])?;
     for row in &rows {
@@ -43,18 +45,24 @@ pub fn run(job: &DoctorJob) -> anyhow::Result<ExitCode> {
     Ok(if rows.iter().any(|row| row.broken) { ExitCode::FAILURE } else { ExitCode::SUCCESS })
 }
 
-fn examine(adapter: &Adapter) -> Row {
-    let name = adapter.renderer.name;
-    let python = find(adapter.renderer);
+/// What keeps a renderer from being all it could be here.
+fn notes(renderer: &Renderer) -> Vec<String> {
+    let adapter = ADAPTERS.iter().find(|adapter| adapter.renderer.name == renderer.name);
+    adapter.map(|adapter| (adapter.notes)()).unwrap_or_default()
+}
+
+fn examine(renderer: &Renderer) -> Row {
+    let name = renderer.name;
+    let python = find(renderer);
     let place = python.as_ref().map_or_else(|_| "-".to_owned(), |python| python.display().to_string());
-    let (usable, version, notes, broken) = match python.and_then(|python| probe(adapter.renderer, &python)) {
-        Ok(version) => ("yes", version, (adapter.notes)(), false),
+    let (usable, version, notes, broken) = match python.and_then(|python| probe(renderer, &python)) {
+        Ok(version) => ("yes", version, notes(renderer), false),
         Err(SetupError::Missing { .. }) => {
             ("no", "-".to_owned(), vec![format!("not installed: noisefloor doctor --install {name}")], false)
         }
         Err(error) => {
-            let cure = match std::env::var_os(adapter.renderer.variable()) {
-                Some(_) => format!("correct {} or unset it", adapter.renderer.variable()),
+            let cure = match std::env::var_os(renderer.variable()) {
+                Some(_) => format!("correct {} or unset it", renderer.variable()),
                 None => format!("make it anew: noisefloor doctor --install {name}"),
             };
             let error = error.to_string().replace('\n', " ");

@@ -14,6 +14,10 @@ A host script defines a class and hands it to `serve`:
 
     host.serve(Renderer)
 
+A filter, such as a denoiser, has a name in `info`, and one method instead:
+
+        def filter(self, width, height, pictures): ...   # an array; pictures: bytes of float32 RGB by name
+
 `TileError` blames a failure on a tile; `rectangles` joins tiles for renderers to which every piece costs a start.
 Import the renderer in `__init__`, not at the top: what it prints while it loads must not get into the stream of frames.
 A frame is two little-endian u32 (length of header, length of payload), a header (a JSON object) and a payload (raw
@@ -66,10 +70,10 @@ def serve(Host):
 
     renderer = None
     while True:
-        request = requests.get()
+        request, data = requests.get()
         payload = []
         try:
-            renderer, reply, payload = _answer(Host, renderer, request)
+            renderer, reply, payload = _answer(Host, renderer, request, data)
         except BaseException as error:  # a renderer may raise SystemExit, too
             traceback.print_exc()
             reply, payload = {"ok": False, "error": _describe(error)}, []
@@ -125,7 +129,7 @@ def rectangles(tiles, alike):
         yield region, tuple(part[key] for key in alike), part["members"]
 
 
-def _answer(Host, renderer, request):
+def _answer(Host, renderer, request, data):
     """The renderer from now on, the reply, and its payload."""
     op = request.get("op")
     if op == "quit":
@@ -155,6 +159,13 @@ def _answer(Host, renderer, request):
             return renderer, {"ok": True, "reference": False}, []
         payload = [_bytes(image, renderer.info["width"], renderer.info["height"])]
         return renderer, {"ok": True, "reference": True}, payload
+    if op == "filter":
+        width, height, names = request["width"], request["height"], request["pictures"]
+        if len(data) != 12 * width * height * len(names):
+            raise ValueError(f"{len(data)} bytes for {len(names)} pictures of {width}x{height}")
+        size = 12 * width * height
+        pictures = {name: memoryview(data)[i * size : (i + 1) * size] for i, name in enumerate(names)}
+        return renderer, {"ok": True}, [_bytes(renderer.filter(width, height, pictures), width, height)]
     raise ValueError(f"{op!r} is no operation")
 
 
@@ -183,12 +194,12 @@ def _receive(stream, requests):
             if len(prefix) < 8:
                 break
             header, payload = struct.unpack("<II", prefix)
-            if header > MAX_HEADER or payload != 0:
+            if header > MAX_HEADER:
                 break
-            text = stream.read(header)
-            if len(text) < header:
+            text, data = stream.read(header), stream.read(payload)
+            if len(text) < header or len(data) < payload:
                 break
-            requests.put(json.loads(text))
+            requests.put((json.loads(text), data))
     except BaseException:
         traceback.print_exc()
     _end()

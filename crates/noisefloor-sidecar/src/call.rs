@@ -25,15 +25,17 @@ pub(crate) struct Reply<T> {
 pub(crate) fn ask<T: DeserializeOwned>(
     process: &mut Process,
     header: Vec<u8>,
+    payload: Vec<u8>,
     most_pixels: usize,
     timeout: Duration,
 ) -> Result<Reply<T>, Blame> {
     let wrong = |what: String| (None, SidecarCause::Wrong { what: printable(&what).into_owned() });
-    let frame = process.call(header, most_pixels * PIXEL, timeout).map_err(|failure| match failure {
-        Failure::Ended(status) => (None, SidecarCause::Died { status }),
-        Failure::Silent => (None, SidecarCause::Silent { limit: timeout }),
-        Failure::Garbled(error) => wrong(error.to_string()),
-    })?;
+    let frame =
+        process.call(header, payload, most_pixels * PIXEL, timeout).map_err(|failure| match failure {
+            Failure::Ended(status) => (None, SidecarCause::Died { status }),
+            Failure::Silent => (None, SidecarCause::Silent { limit: timeout }),
+            Failure::Garbled(error) => wrong(error.to_string()),
+        })?;
     let status: Status = serde_json::from_slice(&frame.header).map_err(|e| wrong(e.to_string()))?;
     if !status.ok {
         let said = status.error.unwrap_or_else(|| "it refused without giving a reason".to_owned());

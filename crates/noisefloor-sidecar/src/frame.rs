@@ -28,12 +28,14 @@ pub(crate) enum FrameError {
     Long { part: &'static str, bytes: usize, most: usize },
 }
 
-/// Writes a frame without payload: requests have none.
-pub(crate) fn write(to: &mut impl Write, header: &[u8]) -> io::Result<()> {
-    let length = u32::try_from(header.len()).map_err(|_| io::ErrorKind::InvalidInput)?;
-    to.write_all(&length.to_le_bytes())?;
-    to.write_all(&0u32.to_le_bytes())?;
+/// Writes a frame. Only requests to filters have a payload.
+pub(crate) fn write(to: &mut impl Write, header: &[u8], payload: &[u8]) -> io::Result<()> {
+    for part in [header, payload] {
+        let length = u32::try_from(part.len()).map_err(|_| io::ErrorKind::InvalidInput)?;
+        to.write_all(&length.to_le_bytes())?;
+    }
     to.write_all(header)?;
+    to.write_all(payload)?;
     to.flush()
 }
 
@@ -70,8 +72,11 @@ mod tests {
     #[test]
     fn a_frame_is_two_lengths_a_header_and_a_payload() {
         let mut bytes = Vec::new();
-        write(&mut bytes, b"{}").unwrap();
+        write(&mut bytes, b"{}", b"").unwrap();
         assert_eq!(bytes, [2, 0, 0, 0, 0, 0, 0, 0, b'{', b'}']);
+        let mut with_payload = Vec::new();
+        write(&mut with_payload, b"{}", b"ab").unwrap();
+        assert_eq!(with_payload, [2, 0, 0, 0, 2, 0, 0, 0, b'{', b'}', b'a', b'b']);
         let two = [frame(2, 3, b"{}abc"), bytes].concat();
         let mut from = two.as_slice();
         let first = read(&mut from, 3).unwrap();

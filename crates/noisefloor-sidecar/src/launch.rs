@@ -82,8 +82,8 @@ impl Launch {
         let start = |source| SidecarCause::Start { python: self.python.clone(), source };
         let mut process = Process::start(&self.python, &self.script, &self.env)
             .map_err(|error| self.error(start(error), String::new()))?;
-        let hello =
-            ask(&mut process, self.init.clone(), 0, self.timeout).and_then(|reply| describe(reply.header));
+        let hello = ask(&mut process, self.init.clone(), Vec::new(), 0, self.timeout)
+            .and_then(|reply| describe(reply.header));
         match hello {
             Ok(described) => Ok((process, described)),
             Err((_, cause)) => Err(self.error(cause, process.last_words())),

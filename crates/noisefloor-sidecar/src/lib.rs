@@ -6,6 +6,7 @@
 //!   per failure, and errors that carry its last words.
 //! - [`CommandSource`]: any program that renders into a file, run once per batch.
 //! - [`PictureCommand`]: any program that turns a picture into another, such as a denoiser.
+//! - [`PictureFilter`]: the same in a process that stays, described by a [`Renderer`] too.
 //! - `host/host.py` ([`HOST`]): the other end, which host scripts import.
 //!
 //! Nothing here accumulates or judges, and nothing knows a renderer by name.
@@ -29,7 +30,7 @@
 //! # The wire
 //! The process is `python -I -u NAME_host.py`. A frame is two little-endian u32, the lengths of header and
 //! payload; then the header, a JSON object of at most 1 MiB; then the payload, little-endian f32 RGB, top row
-//! first. Requests have no payload. There is one reply to each, in order; `{"ok": false, "error": …, "tile":
+//! first. Only `filter` has a payload in its request. There is one reply to each, in order; `{"ok": false, "error": …, "tile":
 //! …}` if the renderer refuses.
 //!
 //! | request | reply |
@@ -37,12 +38,16 @@
 //! | `init` | `name`, `width`, `height`, `unit`, `repeats`, `late` (optional), `warnings` |
 //! | `sample` | `samples`; payload: the means of the new samples of each tile that has any |
 //! | `reference` | `reference` (true or false); payload: the whole image if true |
+//! | `filter` | payload: one picture |
 //! | `quit` | the process ends after its reply |
 //!
 //! `init` has `protocol` (1), `scene`, `seed`, `width`, `height`, `max_depth`, `threads` (or null) and
 //! `options`. `sample` has `tiles`, each with `index`, `x`, `y`, `width`, `height`, `first` and `samples`;
 //! the reply's `samples` has a count for each: at most as many as requested, unless `late` in the reply to
 //! `init` says that the renderer cannot stop in time.
+//!
+//! A host that filters pictures gets `init` with `protocol` and `threads` only, and replies with its `name`. `filter`
+//! has `width`, `height` and `pictures`, the names of the pictures in the payload.
 //!
 //! # What is left behind
 //! Nothing. A renderer leads a process group of its own, and the whole group is killed with it. It ends when
@@ -60,6 +65,7 @@ mod launch;
 mod leftovers;
 mod message;
 mod picture_command;
+mod picture_filter;
 mod picture_run;
 mod process;
 mod renderer;
@@ -75,6 +81,7 @@ pub use error::{CommandError, SetupError, SidecarCause, SidecarError};
 pub use fuzzing::read_any_reply;
 pub use leftovers::end_all;
 pub use picture_command::PictureCommand;
+pub use picture_filter::{FilterPlan, PictureFilter};
 pub use renderer::{DEFAULT_TIMEOUT, HostOptions, Job, Renderer};
 pub use setup::{HOST, find, install, private_folder, probe};
 pub use sidecar::Sidecar;

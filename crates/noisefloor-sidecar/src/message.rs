@@ -64,6 +64,33 @@ pub(crate) struct Sampled {
     pub(crate) samples: Vec<u64>,
 }
 
+/// To a filter, in place of [`Init`].
+#[derive(Serialize)]
+pub(crate) struct InitFilter {
+    pub(crate) op: &'static str,
+    pub(crate) protocol: u32,
+    pub(crate) threads: Option<usize>,
+}
+
+/// What a filter says of itself.
+#[derive(Deserialize)]
+pub(crate) struct FilterHello {
+    pub(crate) name: String,
+}
+
+/// The pictures follow as payload, in this order.
+#[derive(Serialize)]
+pub(crate) struct Filtering<'a> {
+    pub(crate) op: &'static str,
+    pub(crate) width: usize,
+    pub(crate) height: usize,
+    pub(crate) pictures: &'a [&'a str],
+}
+
+/// One picture is its payload.
+#[derive(Deserialize)]
+pub(crate) struct Filtered {}
+
 #[derive(Deserialize)]
 pub(crate) struct Referenced {
     pub(crate) reference: bool,

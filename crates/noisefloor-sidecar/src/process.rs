@@ -32,6 +32,7 @@ pub(crate) enum Failure {
 /// A request, and the longest payload its reply may have.
 struct Order {
     header: Vec<u8>,
+    payload: Vec<u8>,
     most_payload: usize,
 }
 
@@ -75,10 +76,12 @@ impl Process {
     pub(crate) fn call(
         &mut self,
         header: Vec<u8>,
+        payload: Vec<u8>,
         most_payload: usize,
         limit: Duration,
     ) -> Result<Frame, Failure> {
-        let sent = self.orders.as_ref().is_some_and(|to| to.send(Order { header, most_payload }).is_ok());
+        let order = Order { header, payload, most_payload };
+        let sent = self.orders.as_ref().is_some_and(|to| to.send(order).is_ok());
         let reply = if sent { self.replies.recv_timeout(limit) } else { Err(RecvTimeoutError::Disconnected) };
         let failure = match reply {
             Ok(Ok(frame)) => return Ok(frame),
@@ -124,7 +127,7 @@ impl Drop for Process {
     fn drop(&mut self) {
         // A renderer that works is asked to quit, so that it can clean up; one that does not respond is
         // killed
-        if !self.broken && self.call(br#"{"op":"quit"}"#.to_vec(), 0, GRACE).is_ok() {
+        if !self.broken && self.call(br#"{"op":"quit"}"#.to_vec(), Vec::new(), 0, GRACE).is_ok() {
             self.wait(GRACE);
         }
         self.end();
@@ -151,8 +154,8 @@ fn converse(
     }
     let Some((mut stdin, stdout)) = pipes else { return };
     let mut stdout = BufReader::new(stdout);
-    for Order { header, most_payload } in orders {
-        let reply = match frame::write(&mut stdin, &header) {
+    for Order { header, payload, most_payload } in orders {
+        let reply = match frame::write(&mut stdin, &header, &payload) {
             Ok(()) => frame::read(&mut stdout, most_payload),
             Err(error) => Err(FrameError::Io(error)),
         };

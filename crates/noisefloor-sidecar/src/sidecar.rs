@@ -120,7 +120,7 @@ impl Sidecar {
         };
         let header = serde_json::to_vec(request).map_err(|e| (None, SidecarCause::Refused(e.to_string())));
         let outcome = header
-            .and_then(|header| ask(&mut process, header, most_pixels, self.launch.timeout))
+            .and_then(|header| ask(&mut process, header, Vec::new(), most_pixels, self.launch.timeout))
             .and_then(read);
         match outcome {
             Ok(result) => {

@@ -4,6 +4,7 @@
 //!   [`ProgressiveSource`](noisefloor::ProgressiveSource) promises. One call in a test is enough.
 //!   [`check_reference_is_free_of_noise`] looks at its reference.
 //! - [`Noise`] is a seeded stream of uniform and normal random numbers.
+//! - [`bilateral`] is a denoiser of a few lines.
 //! - [`require`] is for tests that need something which not every machine has, such as a renderer or Python.
 //!   Such a test is skipped with a message that is always seen, or fails where `NOISEFLOOR_REQUIRE` says that
 //!   the thing must be there.
@@ -44,11 +45,13 @@
 //! check_source(|| Wall { seed: 7 });
 //! ```
 
+mod bilateral;
 mod contract;
 mod noise;
 mod process;
 mod requirement;
 
+pub use bilateral::bilateral;
 pub use contract::{check_reference_is_free_of_noise, check_source};
 pub use noise::Noise;
 #[cfg(target_os = "linux")]

@@ -88,6 +88,14 @@ pub enum CriterionError {
         /// Those it was given, as text.
         asked: String,
     },
+    /// Something that the criterion works with failed, such as a denoiser.
+    #[error("{name} cannot judge: {why}")]
+    Failed {
+        /// The criterion.
+        name: String,
+        /// What went wrong, and its causes.
+        why: String,
+    },
     /// The descriptor cannot describe the tile.
     #[error(transparent)]
     Descriptor(DescriptorError),

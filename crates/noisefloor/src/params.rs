@@ -22,6 +22,12 @@ pub enum Schedule {
         /// The finest spacing, in samples per pixel, at least 2.
         step: u64,
     },
+    /// After `step` samples per pixel, then whenever a tile has half as many more, in multiples of `step`: for
+    /// criteria that take long, such as those that denoise.
+    Growing {
+        /// The finest spacing, in samples per pixel, at least 2.
+        step: u64,
+    },
 }
 
 impl Schedule {
@@ -31,7 +37,7 @@ impl Schedule {
 
     fn step(self) -> u64 {
         match self {
-            Self::Every { step } | Self::Spaced { step } => step,
+            Self::Every { step } | Self::Spaced { step } | Self::Growing { step } => step,
         }
     }
 
@@ -45,6 +51,7 @@ impl Schedule {
                 let missing = expected.map_or(0, |e| e.saturating_sub(samples)).min(samples.max(step));
                 on_grid(samples + (missing as f64 * Self::APPROACH) as u64)
             }
+            Self::Growing { .. } => on_grid(samples + samples / 2),
         }
     }
 }
@@ -165,7 +172,7 @@ impl Params {
     /// [`ParamsError`] naming the first one out of range.
     pub fn check(&self) -> Result<(), ParamsError> {
         self.tone_mapping.check()?;
-        let (Schedule::Every { step } | Schedule::Spaced { step }) = self.schedule;
+        let step = self.schedule.step();
         if step < 2 {
             return Err(ParamsError::Step(step));
         }
@@ -206,6 +213,13 @@ mod tests {
     fn every_step_is_every_step() {
         let schedule = Schedule::Every { step: 100 };
         assert_eq!([0, 99, 100, 250].map(|n| schedule.next(n, Some(5000))), [100, 100, 200, 300]);
+    }
+
+    #[test]
+    fn growing_steps_grow() {
+        let schedule = Schedule::Growing { step: 16 };
+        assert_eq!([0, 16, 32, 48, 64, 96].map(|n| schedule.next(n, Some(5000))), [16, 32, 48, 64, 96, 144]);
+        assert_eq!(schedule.next(17, None), 32);
     }
 
     #[test]

@@ -20,6 +20,10 @@ use std::time::Duration;
 /// (the noise that is left, and how visible it is), timeline.csv and report.json. Files appear complete or
 /// not at all, and are refreshed while rendering (--autosave).
 ///
+/// With --denoise, each tile stops when nobody would see a difference between the denoised picture and the
+/// converged one. Nobody has been asked about denoised tiles: the limit is the vision model's.
+/// image-denoised.exr, image-denoised.png and denoised-error.png are written as well.
+///
 /// Ctrl-C stops all tiles and writes what there is (exit code 130). An interrupted or killed render
 /// continues with --resume.
 #[derive(Debug, Args)]
@@ -30,6 +34,7 @@ use std::time::Duration;
   noisefloor render --source mitsuba hall/scene.xml  another renderer; `noisefloor doctor` lists them
   noisefloor render --criterion spp:1000             for comparison: a fixed number of samples
   noisefloor render --audience art-students          for more demanding viewers (more samples)
+  noisefloor render --denoise oidn                   for a picture that will be denoised (fewer samples)
   noisefloor render --time 60 --against truth.exr    at most a minute; relMSE to a reference in timeline.csv
   noisefloor render --time 60 --resume               another minute of the render in the output folder
   noisefloor render --force                          once more, over the render in the output folder")]
@@ -48,6 +53,15 @@ pub struct RenderArgs {
     criterion: CriterionChoice,
     #[arg(long, hide = true, value_parser = values::no_spp)]
     spp: Option<String>,
+    /// Judge the picture that this denoiser makes of the samples, and write it: `oidn`, Open Image Denoise
+    /// (`noisefloor doctor --install oidn`). Its error is measured from the two halves of the samples, bias
+    /// included. What both halves miss, such as a caustic that no sample has found, it cannot know.
+    #[arg(long, value_enum, conflicts_with_all = ["model", "threshold", "schedule", "criterion", "audience"])]
+    denoise: Option<DenoiserChoice>,
+    /// With --denoise: just-objectionable differences (JOD) that a tile may have lost when it stops. At 1,
+    /// three of four people prefer the converged picture; the default is what people call clean of noise.
+    #[arg(long, value_name = "JOD", requires = "denoise", default_value_t = DEFAULT_LOST, value_parser = values::jods)]
+    lost: f64,
     #[command(flatten)]
     oracle: OracleArgs,
     #[command(flatten)]
@@ -57,9 +71,10 @@ pub struct RenderArgs {
     /// Tile edge in pixels, 16…512.
     #[arg(long, default_value_t = DEFAULT_TILE, value_name = "PIXELS")]
     tile: usize,
-    /// Samples per pixel between two verdicts on a tile.
-    #[arg(long, default_value_t = 100, value_name = "SPP")]
-    batch: u64,
+    /// Samples per pixel between two verdicts on a tile [default: 100; with --denoise 16, and then half as
+    /// many more each time].
+    #[arg(long, value_name = "SPP")]
+    batch: Option<u64>,
     /// When tiles are judged: after `every` batch, or `spaced` by the samples that a tile is expected to
     /// need.
     #[arg(long, value_enum, default_value_t = ScheduleChoice::Every)]
@@ -107,6 +122,14 @@ enum ScheduleChoice {
     Spaced,
 }
 
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum DenoiserChoice {
+    /// Open Image Denoise, on the CPU.
+    Oidn,
+}
+
+const DEFAULT_LOST: f64 = noisefloor_denoise::DEFAULT_JODS_LOST;
+
 #[derive(Clone, Debug, PartialEq, Eq)]
 enum CriterionChoice {
     Oracle,
@@ -137,6 +160,7 @@ impl RenderArgs {
     pub fn check(self) -> anyhow::Result<RenderJob> {
         let mut params = self.params()?;
         let judge = match self.criterion {
+            _ if self.denoise.is_some() => denoised(self.lost)?,
             CriterionChoice::Rival(spec) if self.resume => {
                 bail!("--resume does not work with --criterion {spec}, whose state is not kept; leave it out")
             }
@@ -162,9 +186,11 @@ impl RenderArgs {
     }
 
     fn params(&self) -> anyhow::Result<Params> {
+        let step = self.batch.unwrap_or(if self.denoise.is_some() { 16 } else { 100 });
         let schedule = match self.schedule {
-            ScheduleChoice::Every => Schedule::Every { step: self.batch },
-            ScheduleChoice::Spaced => Schedule::Spaced { step: self.batch },
+            _ if self.denoise.is_some() => Schedule::Growing { step },
+            ScheduleChoice::Every => Schedule::Every { step },
+            ScheduleChoice::Spaced => Schedule::Spaced { step },
         };
         let max_spp = match &self.criterion {
             CriterionChoice::Oracle | CriterionChoice::Rival(_) => {
@@ -186,4 +212,15 @@ impl RenderArgs {
         params.check()?;
         Ok(params)
     }
+}
+
+#[cfg(feature = "adapters")]
+fn denoised(lost: f64) -> anyhow::Result<Judge> {
+    Ok(Judge::Denoised(lost))
+}
+
+#[cfg(not(feature = "adapters"))]
+fn denoised(_lost: f64) -> anyhow::Result<Judge> {
+    let (what, feature, again) = ("render --denoise", "adapters", "render --denoise …");
+    Err(crate::left_out::LeftOut { what, feature, again }.into())
 }

@@ -70,6 +70,11 @@ pub(super) fn pause(text: &str) -> Result<Duration, String> {
     if text.parse() == Ok(0.0) { Ok(Duration::ZERO) } else { seconds(text) }
 }
 
+pub(super) fn jods(text: &str) -> Result<f64, String> {
+    let jods = text.parse().ok().filter(|jods| (1e-3..=5.0).contains(jods));
+    jods.ok_or_else(|| "expected just-objectionable differences within 0.001…5, such as 0.04".into())
+}
+
 /// `render --spp 100` is what people try first.
 pub(super) fn no_spp(text: &str) -> Result<String, String> {
     Err(format!(

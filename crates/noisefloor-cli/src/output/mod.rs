@@ -1,10 +1,12 @@
 //! The files that `render` writes.
 
+mod denoised;
 mod pictures;
 mod report;
 mod summary;
 mod tiles;
 
+pub use denoised::Denoised;
 pub use summary::say_noise;
 
 use crate::files::{write_csv, write_json};
@@ -42,6 +44,8 @@ pub struct Output {
     pub reference: Option<Vec<Rgb>>,
     /// Where the samples come from, for whoever compares the picture with another.
     pub origin: Option<SampleOrigin>,
+    /// Who denoises the picture, if it is judged and written denoised.
+    pub denoised: Option<Denoised>,
     timeline: Vec<TimelineRow>,
     seconds_before: f64,
     /// Whether there is an earlier render in the folder, and it is not resumed.
@@ -77,6 +81,7 @@ impl Output {
             model,
             reference,
             origin,
+            denoised: None,
             timeline,
             seconds_before,
             overwrites,
@@ -144,6 +149,9 @@ impl Output {
             remove(&self.path(REPORT))?;
         }
         self.write_pictures(session, &tiles)?;
+        if over.is_some() {
+            self.write_denoised(session)?;
+        }
         write_csv(&self.path("stops.csv"), tiles.iter().map(TileState::row))?;
         write_csv(&self.path("timeline.csv"), self.timeline.iter())?;
         // The report goes before a checkpoint is removed: whatever is killed in between, one of them says how

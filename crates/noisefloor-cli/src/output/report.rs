@@ -1,5 +1,6 @@
 //! report.json.
 
+use super::denoised::DenoisedReport;
 use super::tiles::TileState;
 use super::{Output, uniform_samples};
 use crate::sources::Source;
@@ -52,6 +53,9 @@ pub(super) struct Report<'a> {
     seconds_oracle: Option<f64>,
     seconds_total: Option<f64>,
     rel_mse: Option<f64>,
+    /// With --denoise.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    denoised: Option<DenoisedReport>,
 }
 
 impl<'a> Report<'a> {
@@ -99,6 +103,7 @@ impl<'a> Report<'a> {
             seconds_oracle: clock.map(|c| c.criterion_seconds),
             seconds_total: clock.map(|c| c.total_seconds),
             rel_mse: output.timeline.last().and_then(|row| row.rel_mse),
+            denoised: output.denoised.as_ref().map(|denoised| denoised.report(session)),
         }
     }
 }

@@ -15,6 +15,7 @@ impl Output {
         source: &dyn Source,
     ) -> Result<(), NotSaid> {
         self.say_stops(session)?;
+        self.say_denoised(session)?;
         say!(
             "{:.1} s, of which {:.2} s ({:.2} %) in the oracle",
             clock.total_seconds,

@@ -5,7 +5,7 @@ mod snapshots;
 
 use crate::files::read_reference;
 use crate::folder::{Earlier, Folder};
-use crate::output::Output;
+use crate::output::{Denoised, Output};
 use crate::say::{note, one_line};
 use crate::signals::{AFTER_THIS_BATCH, INTERRUPTED, cancel_on_signal};
 use crate::sources::{Opened, SourceJob, SourceKind};
@@ -14,9 +14,15 @@ use noisefloor::{
     Driver, DriverError, Event, FixedSpp, Oracle, Params, Repeats, Rgb, SampleOrigin, SourceInfo, StopReason,
     StoppingCriterion,
 };
+#[cfg(feature = "adapters")]
+use noisefloor_denoise::{DenoisedQuality, Oidn};
+#[cfg(feature = "adapters")]
+use noisefloor_sidecar::FilterPlan;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::Arc;
+#[cfg(feature = "adapters")]
+use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
@@ -41,6 +47,9 @@ pub struct RenderJob {
 pub enum Judge {
     Oracle(Box<Oracle>),
     Fixed(u64),
+    /// By the picture that Open Image Denoise makes, of which a tile may lose so many JODs.
+    #[cfg(feature = "adapters")]
+    Denoised(f64),
     /// A specification that is known to be right.
     Rival(String),
 }
@@ -55,7 +64,7 @@ pub fn run(job: RenderJob) -> anyhow::Result<ExitCode> {
     let SourceInfo { width, height, .. } = source.info();
     let against = job.against.as_deref();
     let reference = against.map(|path| read_reference(path, (width, height))).transpose()?;
-    let rest = Rest { job: &job, scene, reference, model: None };
+    let rest = Rest { job: &job, scene, reference, model: None, denoised: None };
     match judge {
         Judge::Oracle(oracle) => {
             let rest = Rest { model: Some(oracle.model().digest()), ..rest };
@@ -65,6 +74,14 @@ pub fn run(job: RenderJob) -> anyhow::Result<ExitCode> {
         Judge::Fixed(spp) => {
             let driver = Driver::new(source, FixedSpp(*spp), *params)?;
             rest.drive(driver, Some(Snapshots::new()))
+        }
+        #[cfg(feature = "adapters")]
+        Judge::Denoised(lost) => {
+            let plan = FilterPlan { threads: job.source.threads, ..FilterPlan::default() };
+            let denoiser = Arc::new(Mutex::new(Oidn::start(plan)?));
+            let criterion = DenoisedQuality::new(Arc::clone(&denoiser), *lost);
+            let rest = Rest { denoised: Some(Denoised::new(denoiser, criterion.record())), ..rest };
+            rest.drive(Driver::new(source, criterion, *params)?, Some(Snapshots::new()))
         }
         // A rival's state is not kept
         Judge::Rival(spec) => {
@@ -98,6 +115,7 @@ struct Rest<'a> {
     scene: String,
     reference: Option<Vec<Rgb>>,
     model: Option<String>,
+    denoised: Option<Denoised>,
 }
 
 impl Rest<'_> {
@@ -106,7 +124,7 @@ impl Rest<'_> {
         mut driver: Rendering<C>,
         snapshots: Option<Snapshots<C>>,
     ) -> anyhow::Result<ExitCode> {
-        let Rest { job, scene, reference, model } = self;
+        let Rest { job, scene, reference, model, denoised } = self;
         let info = driver.source().info();
         let snapshots = snapshots.filter(|_| info.repeats == Repeats::Samples);
         let resume = job.earlier == Earlier::Resume;
@@ -121,6 +139,7 @@ impl Rest<'_> {
         let folder = Folder::claim(folder)?;
         let mut output = Output::create(folder, job.earlier, scene, info.name, job.source.seed)?;
         (output.model, output.reference, output.origin) = (model, reference, origin);
+        output.denoised = denoised;
         if let Some(snapshots) = snapshots.as_ref().filter(|_| resume) {
             driver = snapshots.resume(driver, &mut output, job.quiet)?;
         }

@@ -15,6 +15,10 @@ mod compare;
 /// Kills, full disks, folders that nobody can write.
 #[cfg(test)]
 mod crash;
+/// Renders that are judged denoised.
+#[cfg(test)]
+#[cfg(feature = "adapters")]
+mod denoise;
 /// Output folders that are taken, and scenes that were edited.
 #[cfg(test)]
 mod folders;

@@ -3,6 +3,7 @@
 
 mod command;
 mod failures;
+mod filter;
 mod kit;
 mod life;
 mod setup;

@@ -1,0 +1,117 @@
+//! image-denoised.exr, image-denoised.png and denoised-error.png, and what is said of them.
+
+use super::Output;
+use crate::say::{NotSaid, note, say};
+use noisefloor::{Rgb, Session, StoppingCriterion};
+use noisefloor_denoise::{DenoisedRecord, Denoiser, NoisyPicture};
+use noisefloor_image::maps::{Canvas, ColourScale, draw_field};
+use noisefloor_image::{RenderLayers, write_exr};
+use noisefloor_vision::VisionModel;
+use serde::Serialize;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Instant;
+
+/// The denoiser of a render, and what its verdicts looked at.
+pub struct Denoised {
+    denoiser: Box<dyn Denoiser>,
+    record: Arc<Mutex<DenoisedRecord>>,
+}
+
+/// What report.json says of it.
+#[derive(Serialize)]
+pub(super) struct DenoisedReport {
+    denoiser: String,
+    /// Verdicts, each of two denoisings, and the seconds that they took.
+    verdicts: usize,
+    seconds: f64,
+    /// Just-objectionable differences lost, by the estimate when a tile was last judged: the most of any tile.
+    jods_lost: Option<f64>,
+    /// Samples per pixel that the picture would need without denoising, on average, to lose as little as is
+    /// allowed; null if that is out of sight for a tile.
+    spp_without: Option<f64>,
+}
+
+impl Denoised {
+    #[cfg(feature = "adapters")]
+    pub fn new(denoiser: impl Denoiser + 'static, record: Arc<Mutex<DenoisedRecord>>) -> Self {
+        Self { denoiser: Box::new(denoiser), record }
+    }
+
+    fn record(&self) -> MutexGuard<'_, DenoisedRecord> {
+        self.record.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    pub(super) fn report<C: StoppingCriterion>(&self, session: &Session<C>) -> DenoisedReport {
+        let record = self.record();
+        let grid = session.film().grid();
+        let pixels = (grid.width() * grid.height()) as f64;
+        let needed = record.needed_without.iter().zip(grid.tiles());
+        let needed: Option<f64> = needed.map(|(spp, tile)| Some((*spp)? as f64 * tile.pixels() as f64)).sum();
+        let lost = record.jods_lost.iter().copied().filter(|lost| lost.is_finite());
+        DenoisedReport {
+            denoiser: self.denoiser.name(),
+            verdicts: record.verdicts,
+            seconds: record.seconds,
+            jods_lost: lost.max_by(f64::total_cmp),
+            spp_without: needed.filter(|_| record.verdicts > 0).map(|samples| samples / pixels),
+        }
+    }
+}
+
+/// JODs lost, from nothing that people see to what three of four do.
+const SCALE: ColourScale = ColourScale {
+    title: "error left\nJODs lost",
+    low: 0.01,
+    high: 1.0,
+    log: true,
+    colours: colorous::INFERNO,
+    landmark: None,
+};
+
+impl Output {
+    /// Denoises the picture, and writes it with the map of its error.
+    pub(super) fn write_denoised<C: StoppingCriterion>(
+        &mut self,
+        session: &Session<C>,
+    ) -> anyhow::Result<()> {
+        let Some(denoised) = &mut self.denoised else { return Ok(()) };
+        let grid = session.film().grid();
+        let (width, height) = (grid.width(), grid.height());
+        let began = Instant::now();
+        let image =
+            denoised.denoiser.denoise(&NoisyPicture::new((width, height), &session.film().image()))?;
+        denoised.record().seconds += began.elapsed().as_secs_f64();
+
+        let display = session.display().copied();
+        let display = display.unwrap_or_else(|| session.params().tone_mapping.settle(&image));
+        let encoded: Vec<Rgb> = image.iter().map(|&p| display.encode(p)).collect();
+        let eyes = VisionModel::new(&session.params().viewing);
+        let map = denoised.record().error.as_ref().map(|error| error.map_of_jods_lost(&eyes)).transpose()?;
+        write_exr(self.path("image-denoised.exr"), &RenderLayers::rgb(width, height, &image))?;
+        Canvas::of_picture(width, &encoded).save(self.path("image-denoised.png"))?;
+        match map {
+            Some(map) => draw_field(width, &encoded, &map, &SCALE).save(self.path("denoised-error.png"))?,
+            None => note!("note: no tile was judged, so the error of the denoised picture is not known"),
+        }
+        Ok(())
+    }
+
+    /// Says what denoising was worth.
+    pub(super) fn say_denoised<C: StoppingCriterion>(&self, session: &Session<C>) -> Result<(), NotSaid> {
+        let Some(denoised) = &self.denoised else { return Ok(()) };
+        let DenoisedReport { denoiser, verdicts, seconds, jods_lost, spp_without } = denoised.report(session);
+        let grid = session.film().grid();
+        let spp = session.film().total_samples() as f64 / (grid.width() * grid.height()) as f64;
+        let without = spp_without.map_or_else(
+            || "out of sight without".to_owned(),
+            |spp| format!("about {spp:.0} without, as estimated from the same halves"),
+        );
+        say!("{spp:.0} spp denoised by {denoiser}; {without}")?;
+        if let Some(lost) = jods_lost {
+            say!(
+                "the worst tile lost {lost:.3} JOD when it was last judged; nobody has been asked about denoised tiles"
+            )?;
+        }
+        say!("{verdicts} verdicts on denoised halves, and the picture itself, took {seconds:.1} s")
+    }
+}

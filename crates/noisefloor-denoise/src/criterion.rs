@@ -1,0 +1,201 @@
+//! A limit on what people would see of the error of the denoised picture, as a stopping criterion.
+
+use crate::denoiser::{DenoiseError, Denoiser, NoisyPicture};
+use crate::estimate::{DenoisedError, DenoisedHalves};
+use noisefloor::{
+    CriterionError, Display, Film, Needs, Resumable, Rgb, StoppingCriterion, Tile, TilePlanes, Verdict, View,
+};
+use noisefloor_vision::{VisionModel, VisionWorkspace};
+use rayon::prelude::*;
+use std::error::Error;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Instant;
+
+/// A tile with more than one in this many pixels without valid samples gives no evidence.
+const NO_EVIDENCE: usize = 16;
+/// What is wrong with a picture is n^−DECAY of n samples: of noise, and of what Open Image Denoise makes of it
+/// (`docs/denoising.md`).
+const DECAY: f64 = 0.5;
+const DENOISED_DECAY: f64 = 0.38;
+/// JODs that a tile may lose, unless one says otherwise. Tiles with as much *noise* are those that people call
+/// clean, on average over the human data (`docs/benchmarks/criteria.md`).
+pub const DEFAULT_JODS_LOST: f64 = 0.04;
+/// Limits of the contrast at which an error is sought that is just allowed.
+const CONTRASTS: (f64, f64) = (1.0 / 64.0, 8.0);
+
+/// What the last verdicts looked at, for reports.
+#[derive(Clone, Debug, Default)]
+pub struct DenoisedRecord {
+    /// The error of the denoised picture at the last verdict.
+    pub error: Option<DenoisedError>,
+    /// For each tile, the just-objectionable differences lost when it was last judged; NaN before that.
+    pub jods_lost: Vec<f64>,
+    /// For each tile, the samples per pixel at which the picture without denoising would lose as little as is
+    /// allowed, estimated when it was last judged; `None` where that is out of sight.
+    pub needed_without: Vec<Option<u64>>,
+    /// Seconds spent on denoising and on the estimates from it.
+    pub seconds: f64,
+    /// Verdicts so far: each takes two denoisings.
+    pub verdicts: usize,
+}
+
+/// Stops a tile when the *denoised* picture has lost little against the converged one, in the eyes of the
+/// vision model.
+///
+/// The two halves of the film are denoised apart, whole, and [`DenoisedError`] says how wrong the denoised
+/// picture is; the vision model says how many just-objectionable differences (JOD) each tile has lost by that.
+/// A verdict takes two denoisings of the whole picture: use a schedule with growing intervals, such as
+/// [`Schedule::Growing`](noisefloor::Schedule::Growing).
+///
+/// Nobody has been asked about denoised tiles: the threshold is the vision model's, which was fitted to
+/// judgements of other distortions, blur and compression among them.
+#[derive(Debug)]
+pub struct DenoisedQuality<D> {
+    denoiser: D,
+    lost: f64,
+    record: Arc<Mutex<DenoisedRecord>>,
+}
+
+impl<D: Denoiser> DenoisedQuality<D> {
+    /// Tiles may lose at most so many JODs: a positive number.
+    pub fn new(denoiser: D, lost: f64) -> Self {
+        Self { denoiser, lost, record: Arc::default() }
+    }
+
+    /// What the verdicts look at: updated by each of them.
+    pub fn record(&self) -> Arc<Mutex<DenoisedRecord>> {
+        Arc::clone(&self.record)
+    }
+
+    fn estimate(&mut self, view: &View<'_>) -> Result<DenoisedError, DenoiseError> {
+        let grid = view.film.grid();
+        let size = (grid.width(), grid.height());
+        let [a, b] = film_halves(view.film);
+        let mut denoise = |half: &[Rgb]| self.denoiser.denoise(&NoisyPicture::new(size, half));
+        let (da, db) = (denoise(&a)?, denoise(&b)?);
+        DenoisedError::new(&DenoisedHalves { size, noisy: [&a, &b], denoised: [&da, &db] }, view.display)
+    }
+
+    fn failed(&self, error: &DenoiseError) -> CriterionError {
+        let (mut why, mut cause) = (error.to_string(), error.source());
+        while let Some(error) = cause {
+            why = format!("{why}: {error}");
+            cause = error.source();
+        }
+        CriterionError::Failed { name: self.name(), why }
+    }
+}
+
+/// The two halves of a film, row-major; where one has no valid sample, it shows the other.
+fn film_halves(film: &Film) -> [Vec<Rgb>; 2] {
+    let grid = film.grid();
+    let mut halves = [0, 1].map(|_| vec![[0.0; 3]; grid.width() * grid.height()]);
+    for tile in grid.tiles() {
+        for pixel in tile.rows(grid.width()).flatten() {
+            let [(a, na), (b, nb)] = film.pixel_halves(tile.index, pixel);
+            halves[0][pixel] = if na > 0 { a } else { b };
+            halves[1][pixel] = if nb > 0 { b } else { a };
+        }
+    }
+    halves
+}
+
+impl<D: Denoiser> StoppingCriterion for DenoisedQuality<D> {
+    fn name(&self) -> String {
+        format!("at most {} JOD lost after {}", self.lost, self.denoiser.name())
+    }
+
+    fn fingerprint(&self) -> String {
+        self.name()
+    }
+
+    fn needs(&self) -> Needs {
+        Needs { halves: true, reference: false }
+    }
+
+    fn judge(&mut self, view: &View<'_>, tiles: &[Tile]) -> Result<Vec<Verdict>, CriterionError> {
+        let began = Instant::now();
+        let error = self.estimate(view).map_err(|error| self.failed(&error))?;
+        let eyes = VisionModel::new(&view.viewing);
+        let judged: Vec<Judged> = tiles
+            .par_iter()
+            .map_init(VisionWorkspace::default, |room, tile| {
+                judge_tile(view, &error, *tile, self.lost, &mut Eyes { model: &eyes, room })
+            })
+            .collect();
+
+        let count = view.film.grid().len();
+        let mut record = self.record.lock().unwrap_or_else(PoisonError::into_inner);
+        record.needed_without.resize(count, None);
+        record.jods_lost.resize(count, f64::NAN);
+        for (tile, judged) in tiles.iter().zip(&judged) {
+            record.needed_without[tile.index] = judged.needed_without;
+            record.jods_lost[tile.index] = judged.lost;
+        }
+        record.error = Some(error);
+        record.seconds += began.elapsed().as_secs_f64();
+        record.verdicts += 1;
+        Ok(judged.into_iter().map(|judged| judged.verdict).collect())
+    }
+}
+
+/// Verdicts follow from film and display alone.
+impl<D: Denoiser> Resumable for DenoisedQuality<D> {}
+
+/// What is found of a tile.
+struct Judged {
+    verdict: Verdict,
+    lost: f64,
+    needed_without: Option<u64>,
+}
+
+/// The vision model, and room for it.
+struct Eyes<'a> {
+    model: &'a VisionModel,
+    room: &'a mut VisionWorkspace,
+}
+
+fn judge_tile(view: &View<'_>, error: &DenoisedError, tile: Tile, limit: f64, eyes: &mut Eyes<'_>) -> Judged {
+    let spp = view.film.spp(tile.index);
+    let mut lost = |error: &DenoisedError, contrast: f64| {
+        // What cannot be compared stays open
+        error.jods_lost_at(contrast as f32, eyes.model, eyes.room).unwrap_or(10.0)
+    };
+    let mut needed = |error: &DenoisedError, decay: f64| {
+        let contrast = just_allowed(limit, |contrast| lost(error, contrast))?;
+        Some((spp as f64 * contrast.powf(-1.0 / decay)).clamp(1.0, 1e15).ceil() as u64)
+    };
+    let here = error.part(tile);
+    let noise = here.with_residual(noise_of(view.film, view.display, tile));
+    let (expected_spp, needed_without) = (needed(&here, DENOISED_DECAY), needed(&noise, DECAY));
+    let now = lost(&here, 1.0);
+    let evidence = view.film.unsampled_pixels(tile.index) <= tile.pixels() / NO_EVIDENCE;
+    let converged = evidence && now <= limit;
+    let expected_spp = if converged { Some(spp) } else { expected_spp };
+    Judged { verdict: Verdict { converged, expected_spp, ..Verdict::default() }, lost: now, needed_without }
+}
+
+/// The noise of a tile of the film, as displayed.
+fn noise_of(film: &Film, display: &Display, tile: Tile) -> Vec<f32> {
+    let planes = TilePlanes::from_halves(film, display, tile);
+    let inner = planes.inner;
+    let rows =
+        (inner.y..inner.y + inner.height).flat_map(|y| (inner.x..inner.x + inner.width).map(move |x| (y, x)));
+    rows.map(|at| planes.residual[at]).collect()
+}
+
+/// The contrast at which no more than `limit` is lost, within 3 %; `None` if it lies beyond [`CONTRASTS`].
+fn just_allowed(limit: f64, mut lost: impl FnMut(f64) -> f64) -> Option<f64> {
+    let (mut low, mut high) = CONTRASTS;
+    if lost(low) > limit {
+        return None;
+    }
+    if lost(high) <= limit {
+        return Some(high);
+    }
+    while high / low > 1.03 {
+        let middle = (low * high).sqrt();
+        if lost(middle) <= limit { low = middle } else { high = middle }
+    }
+    Some(low)
+}

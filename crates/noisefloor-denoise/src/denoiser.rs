@@ -1,0 +1,105 @@
+//! What a denoiser is.
+
+use auto_impl::auto_impl;
+use noisefloor::Rgb;
+use std::error::Error;
+use std::sync::{Arc, Mutex, PoisonError};
+use thiserror::Error;
+
+/// A noisy picture, row-major, with what else is known of its pixels.
+#[derive(Clone, Copy, Debug)]
+pub struct NoisyPicture<'a> {
+    /// Width and height in pixels.
+    pub size: (usize, usize),
+    /// Linear radiance, width × height values.
+    pub radiance: &'a [Rgb],
+    /// Colour of the surface first hit, in [0, 1], as many values.
+    pub albedo: Option<&'a [Rgb]>,
+    /// Its normal, each component in [−1, 1], as many values.
+    pub normal: Option<&'a [Rgb]>,
+}
+
+impl<'a> NoisyPicture<'a> {
+    /// A picture of which only the radiance is known.
+    pub fn new(size: (usize, usize), radiance: &'a [Rgb]) -> Self {
+        Self { size, radiance, albedo: None, normal: None }
+    }
+
+    /// Whether all pictures have as many pixels as the size says.
+    pub fn fits(&self) -> bool {
+        let fits = |picture: &[Rgb]| self.size.0.checked_mul(self.size.1) == Some(picture.len());
+        fits(self.radiance) && [self.albedo, self.normal].into_iter().flatten().all(fits)
+    }
+}
+
+/// Which auxiliary pictures a denoiser makes use of.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct AuxiliaryPictures {
+    /// [`NoisyPicture::albedo`].
+    pub albedo: bool,
+    /// [`NoisyPicture::normal`].
+    pub normal: bool,
+}
+
+/// Why a picture could not be denoised.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum DenoiseError {
+    /// A picture has another number of pixels than its size says.
+    #[error("a picture to denoise has {got} pixels, not {}×{}", size.0, size.1)]
+    Pixels {
+        /// Width and height.
+        size: (usize, usize),
+        /// Pixels of the radiance.
+        got: usize,
+    },
+    /// The denoiser failed.
+    #[error("{name} cannot denoise the picture")]
+    Failed {
+        /// The denoiser.
+        name: String,
+        /// Why.
+        #[source]
+        cause: Box<dyn Error + Send + Sync>,
+    },
+}
+
+/// Turns a noisy picture into one that people look at.
+///
+/// # For implementers
+/// - The result depends on the picture alone: the same picture gives the same result, whatever was denoised
+///   before. A half buffer must not influence how the other one is denoised, or the measured error is too
+///   small.
+/// - Return as many pixels, linear and finite.
+/// - Use auxiliary pictures only if they are there.
+#[auto_impl(&mut, Box)]
+pub trait Denoiser {
+    /// Its name and version, and all settings that its results depend on.
+    fn name(&self) -> String;
+
+    /// What it makes use of besides the radiance: nothing, unless it says so.
+    fn wants(&self) -> AuxiliaryPictures {
+        AuxiliaryPictures::default()
+    }
+
+    /// Denoises a picture of linear radiance.
+    ///
+    /// # Errors
+    /// [`DenoiseError`] if the pictures differ in size, or the denoiser fails.
+    fn denoise(&mut self, picture: &NoisyPicture<'_>) -> Result<Vec<Rgb>, DenoiseError>;
+}
+
+/// One denoiser for a criterion and for whoever writes the picture.
+impl<D: Denoiser> Denoiser for Arc<Mutex<D>> {
+    fn name(&self) -> String {
+        self.lock().unwrap_or_else(PoisonError::into_inner).name()
+    }
+
+    fn wants(&self) -> AuxiliaryPictures {
+        self.lock().unwrap_or_else(PoisonError::into_inner).wants()
+    }
+
+    fn denoise(&mut self, picture: &NoisyPicture<'_>) -> Result<Vec<Rgb>, DenoiseError> {
+        self.lock().unwrap_or_else(PoisonError::into_inner).denoise(picture)
+    }
+}

@@ -1,0 +1,218 @@
+//! How wrong a denoised picture still is, from two halves of its samples.
+//!
+//! With independent halves A and B of a picture whose expected value is t, and any denoiser D, the error of a
+//! denoised half has two parts, and each follows from what is there:
+//!
+//! - **Variance:** E (D(A) − D(B))² / 2. It shows where the denoiser makes different things of different
+//!   noise: blotches, flickering edges.
+//! - **Bias:** E (A − D(A))·(B − D(B)) = (t − E D)², since the two residuals are independent and both have
+//!   the mean t − E D. What a denoiser removes from both halves alike is no noise but picture: texture, the
+//!   light of rare paths.
+//!
+//! Their sum is E (D(A) − B)² − Var(B), without the squares of the noise that cancel in it. Of the mean of
+//! the two denoised halves, which stands for the denoised picture, the variance is half of that.
+//!
+//! The product of the residuals is far too noisy in a single pixel: the noise of A and B goes into it. So it is
+//! taken scale by scale, since noise is weak where it is coarse, and averaged over [`RADIUS`] pixels around.
+//! What people would see is then built from fields that have the right shape: half the difference of the
+//! denoised halves, plus, of each scale of the mean residual, the share that both halves have in common.
+
+use crate::bands::Plane;
+use crate::denoiser::DenoiseError;
+use noisefloor::{Display, Rgb, Tile, TilePlanes, Viewing};
+use noisefloor_vision::{VisionError, VisionModel, VisionWorkspace};
+use rayon::prelude::*;
+
+/// What two residuals have in common is averaged over this many pixels to each side: 4,225 pixels in all, so
+/// that the finest scale tells a bias of an eighth of the noise from none.
+const RADIUS: usize = 32;
+/// Scales that are told apart, from details of two pixels to those of 64; what is coarser is one more.
+const SCALES: u32 = 5;
+/// Residuals are cut here, as a share of the display's range: a firefly is as wrong as can be seen, and the
+/// product of one with any noise would drown what the halves have in common.
+const MOST: f32 = 0.5;
+/// Step of the slope of the display, as a share of the brightest channel, and the least, of white.
+const STEP: (f32, f32) = (0.02, 1e-4);
+
+/// Two independent halves of a picture, and what a denoiser makes of each: linear radiance, row-major.
+#[derive(Clone, Copy, Debug)]
+pub struct DenoisedHalves<'a> {
+    /// Width and height in pixels.
+    pub size: (usize, usize),
+    /// Halves A and B as rendered.
+    pub noisy: [&'a [Rgb]; 2],
+    /// D(A) and D(B), each made without a look at the other half.
+    pub denoised: [&'a [Rgb]; 2],
+}
+
+/// The error of a denoised picture as displayed: a picture, and a residual as wrong as it is expected to be.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DenoisedError {
+    size: (usize, usize),
+    shown: Vec<f32>,
+    residual: Vec<f32>,
+}
+
+/// One pixel on the display: luminance Y′ of the denoised mean, half the difference of the denoised halves,
+/// and the residuals of both halves.
+type Displayed = [f32; 4];
+
+impl DenoisedError {
+    /// Estimates the error of the picture that is denoised from all samples of both halves.
+    ///
+    /// The estimate is for the mean of the two denoised halves. Denoising all samples at once removes the
+    /// noise no worse, and keeps more of the picture.
+    ///
+    /// # Errors
+    /// [`DenoiseError::Pixels`] if a picture has another number of pixels than the size says.
+    pub fn new(halves: &DenoisedHalves<'_>, display: &Display) -> Result<Self, DenoiseError> {
+        let DenoisedHalves { size, noisy, denoised } = *halves;
+        let pictures = noisy.into_iter().chain(denoised);
+        if let Some(odd) = pictures.into_iter().find(|p| size.0.checked_mul(size.1) != Some(p.len())) {
+            return Err(DenoiseError::Pixels { size, got: odd.len() });
+        }
+        let all: Vec<Displayed> = (0..noisy[0].len())
+            .into_par_iter()
+            .map(|i| displayed(display, noisy.map(|p| p[i]), denoised.map(|p| p[i])))
+            .collect();
+        let plane = |n: usize| Plane::new(size, all.iter().map(|pixel| pixel[n]).collect());
+        let mut residual = plane(1).values;
+        add_common(&mut residual, [plane(2), plane(3)]);
+        Ok(Self { size, shown: plane(0).values, residual })
+    }
+
+    /// The error of a picture whose truth is known, in the same form: for comparison.
+    ///
+    /// # Errors
+    /// [`DenoiseError::Pixels`] if a picture has another number of pixels than the size says.
+    pub fn known(
+        size: (usize, usize),
+        picture: &[Rgb],
+        truth: &[Rgb],
+        display: &Display,
+    ) -> Result<Self, DenoiseError> {
+        if let Some(odd) = [picture, truth].into_iter().find(|p| size.0.checked_mul(size.1) != Some(p.len()))
+        {
+            return Err(DenoiseError::Pixels { size, got: odd.len() });
+        }
+        let shown: Vec<f32> = truth.iter().map(|&p| display.luma(p)).collect();
+        let residual = picture.iter().zip(&shown).map(|(&p, truth)| display.luma(p) - truth).collect();
+        Ok(Self { size, shown, residual })
+    }
+
+    /// Width and height in pixels.
+    pub fn size(&self) -> (usize, usize) {
+        self.size
+    }
+
+    /// Luminance Y′ of the picture as displayed, row-major, in [0, 1].
+    pub fn shown(&self) -> &[f32] {
+        &self.shown
+    }
+
+    /// What may be wrong with it at each pixel, in the same unit. Its size is what is expected; its sign, and
+    /// the places of its details, are one possibility of many.
+    pub fn residual(&self) -> &[f32] {
+        &self.residual
+    }
+
+    /// What a tile is judged by: see [`noisefloor::Oracle::describe`].
+    pub fn planes(&self, tile: Tile, viewing: Viewing) -> TilePlanes {
+        let planes = TilePlanes::gather(self.size, tile, |x, y| {
+            let pixel = y * self.size.0 + x;
+            ([self.shown[pixel]; 3], [self.residual[pixel]; 3])
+        });
+        TilePlanes { viewing, ..planes }
+    }
+
+    /// Just-objectionable differences that a tile has lost, seen as a picture of its own.
+    ///
+    /// # Errors
+    /// [`VisionError`] if a side of the tile has less than two pixels.
+    pub fn jods_lost(
+        &self,
+        tile: Tile,
+        eyes: &VisionModel,
+        room: &mut VisionWorkspace,
+    ) -> Result<f64, VisionError> {
+        self.part(tile).jods_lost_at(1.0, eyes, room)
+    }
+
+    /// The same of the whole, if the residual had `contrast` times its strength.
+    pub(crate) fn jods_lost_at(
+        &self,
+        contrast: f32,
+        eyes: &VisionModel,
+        room: &mut VisionWorkspace,
+    ) -> Result<f64, VisionError> {
+        let pairs = self.shown.iter().zip(&self.residual);
+        let test: Vec<Rgb> = pairs.map(|(shown, residual)| [shown + contrast * residual; 3]).collect();
+        let reference: Vec<Rgb> = self.shown.iter().map(|&shown| [shown; 3]).collect();
+        Ok(10.0 - eyes.compare(&test, &reference, self.size, room)?.jod())
+    }
+
+    /// A tile of it, alone.
+    pub(crate) fn part(&self, tile: Tile) -> Self {
+        let crop = |plane: &[f32]| tile.rows(self.size.0).flatten().map(|pixel| plane[pixel]).collect();
+        let (shown, residual) = (crop(&self.shown), crop(&self.residual));
+        Self { size: (tile.width, tile.height), shown, residual }
+    }
+
+    /// The same picture with something else wrong with it: as many pixels.
+    pub(crate) fn with_residual(&self, residual: Vec<f32>) -> Self {
+        Self { size: self.size, shown: self.shown.clone(), residual }
+    }
+
+    /// A map of just-objectionable differences lost, row-major.
+    ///
+    /// # Errors
+    /// [`VisionError`] if a side of the picture has less than two pixels.
+    pub fn map_of_jods_lost(&self, eyes: &VisionModel) -> Result<Vec<f32>, VisionError> {
+        let pairs = || self.shown.iter().zip(&self.residual);
+        let test: Vec<Rgb> = pairs().map(|(shown, residual)| [shown + residual; 3]).collect();
+        let reference: Vec<Rgb> = self.shown.iter().map(|&shown| [shown; 3]).collect();
+        let mut room = VisionWorkspace::default();
+        Ok(eyes.compare(&test, &reference, self.size, &mut room)?.map().to_vec())
+    }
+}
+
+/// Shows one pixel. Residuals are multiplied by the slope of the display at the denoised mean: the display
+/// would bend noise so that its mean moves, and the bend would pass for bias.
+fn displayed(display: &Display, noisy: [Rgb; 2], denoised: [Rgb; 2]) -> Displayed {
+    let mean: Rgb = std::array::from_fn(|c| (0.5 * (denoised[0][c] + denoised[1][c])).max(0.0));
+    let brightest = mean.into_iter().fold(0.0, f32::max);
+    let step = (STEP.0 * brightest).max(STEP.1 / display.exposure());
+    let slope: Rgb = std::array::from_fn(|c| {
+        let (mut up, mut down) = (mean, mean);
+        (up[c], down[c]) = (mean[c] + step, (mean[c] - step).max(0.0));
+        (display.luma(up) - display.luma(down)) / (up[c] - down[c])
+    });
+    let residual = |half: usize| {
+        let along = |c: usize| slope[c] * (noisy[half][c] - denoised[half][c]);
+        (along(0) + along(1) + along(2)).clamp(-MOST, MOST)
+    };
+    let difference = 0.5 * (display.luma(denoised[0]) - display.luma(denoised[1]));
+    [display.luma(mean), difference, residual(0), residual(1)]
+}
+
+/// Adds, scale by scale, the share of the mean of two residuals that they have in common.
+fn add_common(sum: &mut [f32], mut residuals: [Plane; 2]) {
+    for scale in 0..=SCALES {
+        let [a, b] = if scale < SCALES {
+            residuals.each_mut().map(|residual| residual.split(scale))
+        } else {
+            residuals.clone()
+        };
+        let pairs = || a.values.iter().zip(&b.values);
+        let product = Plane::new(a.size, pairs().map(|(a, b)| a * b).collect()).local_mean(RADIUS);
+        let energy = pairs().map(|(a, b)| 0.25 * (a + b) * (a + b)).collect();
+        let energy = Plane::new(a.size, energy).local_mean(RADIUS);
+        let local = product.values.iter().zip(&energy.values);
+        for ((sum, (a, b)), (&common, &energy)) in sum.iter_mut().zip(pairs()).zip(local) {
+            // Chance makes the mean product negative, too: nothing in common then. The estimate is that much too
+            // large on average where there is no bias; what it misses elsewhere makes up for it
+            let share = if energy > 0.0 { (common / energy).clamp(0.0, 1.0).sqrt() } else { 0.0 };
+            *sum += share * 0.5 * (a + b);
+        }
+    }
+}

@@ -1,0 +1,52 @@
+//! Denoisers, and how wrong a denoised picture still is: measured from half buffers, without a reference.
+//!
+//! - [`Denoiser`]: a linear picture in, a picture out; what an implementer promises.
+//! - [`Oidn`](crate::Oidn): Open Image Denoise in a process of its own (feature `oidn`).
+//! - [`DenoisedError`]: what is wrong with a denoised picture, from two halves and what becomes of each.
+//! - [`DenoisedQuality`]: a [`noisefloor::StoppingCriterion`] that stops tiles by it, for
+//!   [`noisefloor::Session`] and [`noisefloor::Driver`].
+//!
+//! ```
+//! use noisefloor::{Params, Rgb, Schedule, Session};
+//! use noisefloor_denoise::{DEFAULT_JODS_LOST, DenoiseError, DenoisedQuality, Denoiser, NoisyPicture};
+//!
+//! /// Each row becomes its mean.
+//! struct Rows;
+//! impl Denoiser for Rows {
+//!     fn name(&self) -> String {
+//!         "rows".into()
+//!     }
+//!     fn denoise(&mut self, picture: &NoisyPicture<'_>) -> Result<Vec<Rgb>, DenoiseError> {
+//!         let (width, _) = picture.size;
+//!         let mean = |row: &[Rgb]| [0, 1, 2].map(|c| row.iter().map(|p| p[c]).sum::<f32>() / width as f32);
+//!         Ok(picture.radiance.chunks_exact(width).flat_map(|row| vec![mean(row); width]).collect())
+//!     }
+//! }
+//!
+//! let criterion = DenoisedQuality::new(Rows, DEFAULT_JODS_LOST);
+//! let params = Params { tile: 32, min_spp: 16, schedule: Schedule::Growing { step: 16 }, ..Params::default() };
+//! let mut session = Session::new(64, 64, criterion, params)?;
+//! while !session.is_done() {
+//!     for request in session.requests() {
+//!         // A renderer of a grey wall
+//!         let mean = vec![[0.5; 3]; request.tile.pixels()];
+//!         session.push(request.tile.index, request.spp, &mean)?;
+//!     }
+//!     session.judge()?;
+//! }
+//! assert!(session.stops().all(|stop| stop.spp == 16));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+mod bands;
+mod criterion;
+mod denoiser;
+mod estimate;
+#[cfg(feature = "oidn")]
+mod oidn;
+
+pub use criterion::{DEFAULT_JODS_LOST, DenoisedQuality, DenoisedRecord};
+pub use denoiser::{AuxiliaryPictures, DenoiseError, Denoiser, NoisyPicture};
+pub use estimate::{DenoisedError, DenoisedHalves};
+#[cfg(feature = "oidn")]
+pub use oidn::{OIDN, Oidn};

@@ -1,0 +1,62 @@
+//! Open Image Denoise, in a process of its own.
+
+use crate::denoiser::{AuxiliaryPictures, DenoiseError, Denoiser, NoisyPicture};
+use noisefloor::Rgb;
+use noisefloor_sidecar::{FilterPlan, PictureFilter, Renderer, SidecarError, find};
+
+/// How Open Image Denoise is installed and found: the package `mitsuba-oidn`, with the library and its
+/// weights.
+pub const OIDN: Renderer = Renderer {
+    name: "oidn",
+    title: "Open Image Denoise 2.5",
+    script: include_str!("../host/oidn_host.py"),
+    requirements: include_str!("../requirements.txt"),
+    pythons: &[12, 11, 13, 14],
+    probe: "import mitsuba_oidn; print(mitsuba_oidn.oidn_version())",
+};
+
+/// [Open Image Denoise](https://www.openimagedenoise.org) on the CPU: its filter `RT` for linear pictures, in
+/// its highest quality.
+#[derive(Debug)]
+pub struct Oidn(PictureFilter);
+
+impl Oidn {
+    /// Starts it in the interpreter that [`noisefloor_sidecar::find`] returns.
+    ///
+    /// # Errors
+    /// [`SidecarError`] if it is not installed, or does not load.
+    pub fn start(plan: FilterPlan) -> Result<Self, SidecarError> {
+        let python = find(&OIDN).map_err(|error| SidecarError {
+            renderer: OIDN.title.to_owned(),
+            doing: "starting".to_owned(),
+            tile: None,
+            cause: Box::new(error.into()),
+            last_words: String::new(),
+        })?;
+        Ok(Self(PictureFilter::open(&OIDN, &python, plan)?))
+    }
+}
+
+impl Denoiser for Oidn {
+    fn name(&self) -> String {
+        self.0.name().to_owned()
+    }
+
+    fn wants(&self) -> AuxiliaryPictures {
+        AuxiliaryPictures { albedo: true, normal: true }
+    }
+
+    fn denoise(&mut self, picture: &NoisyPicture<'_>) -> Result<Vec<Rgb>, DenoiseError> {
+        if !picture.fits() {
+            return Err(DenoiseError::Pixels { size: picture.size, got: picture.radiance.len() });
+        }
+        let mut pictures = vec![("radiance", picture.radiance)];
+        // Its filter takes normals only beside albedo
+        if let Some(albedo) = picture.albedo {
+            pictures.push(("albedo", albedo));
+            pictures.extend(picture.normal.map(|normal| ("normal", normal)));
+        }
+        let made = self.0.apply(picture.size, &pictures);
+        made.map_err(|error| DenoiseError::Failed { name: self.name(), cause: Box::new(error) })
+    }
+}

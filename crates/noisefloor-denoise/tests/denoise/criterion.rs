@@ -1,0 +1,79 @@
+use crate::kit::{SIZE, Simple, noisy, truth};
+use noisefloor::{CriterionError, Params, Schedule, Session, StopReason, ToneMapping};
+use noisefloor_denoise::{DenoisedQuality, Denoiser};
+use std::sync::{Arc, Mutex};
+
+/// Deviation of one sample.
+const NOISE: f32 = 0.1;
+
+/// A session of the striped wall, until 2,000 spp at most.
+fn session<D: Denoiser>(denoiser: D) -> Session<DenoisedQuality<D>> {
+    let criterion = DenoisedQuality::new(denoiser, 0.1);
+    let params = Params {
+        tile: 64,
+        schedule: Schedule::Growing { step: 20 },
+        min_spp: 20,
+        max_spp: 2_000,
+        tone_mapping: ToneMapping::Srgb { exposure: 1.0 },
+        ..Params::default()
+    };
+    Session::new(SIZE.0, SIZE.1, criterion, params).unwrap()
+}
+
+/// Renders, and returns the stops' samples per pixel: 0 and 3 are striped, the others plain.
+fn run<D: Denoiser>(session: &mut Session<DenoisedQuality<D>>) -> Result<Vec<u64>, CriterionError> {
+    while !session.is_done() {
+        for request in session.requests() {
+            let seed = 1000 * request.first + request.tile.index as u64;
+            let picture = noisy(seed, NOISE / (request.spp as f32).sqrt());
+            let tile: Vec<_> = request.tile.rows(SIZE.0).flatten().map(|i| picture[i]).collect();
+            session.push(request.tile.index, request.spp, &tile).unwrap();
+        }
+        session.judge()?;
+    }
+    Ok(session.stops().map(|stop| stop.spp).collect())
+}
+
+#[test]
+fn a_plain_wall_is_done_sooner_when_denoised_and_a_smeared_one_is_not() {
+    let plain = run(&mut session(Simple::Nothing)).unwrap();
+    let mut denoised = session(Simple::Bilateral(0.3));
+    let stops = run(&mut denoised).unwrap();
+    assert!([2, 5].into_iter().all(|tile| stops[tile] < plain[tile]), "{stops:?} and {plain:?}");
+    // The filter smears the stripes, however many samples they have
+    let reasons: Vec<StopReason> = denoised.stops().map(|stop| stop.reason).collect();
+    assert_eq!([reasons[0], reasons[3]], [StopReason::MaxSpp; 2], "{stops:?}");
+
+    // What is recorded beside: the need of the noisy picture, and the error at the end
+    let record = denoised.criterion().record();
+    let record = record.lock().unwrap();
+    let needed = record.needed_without[2].unwrap();
+    assert!(
+        needed > stops[2] && needed < 2 * plain[2] && 2 * needed > plain[2],
+        "{needed}, and {plain:?} without denoising"
+    );
+    assert_eq!(record.error.as_ref().unwrap().size(), SIZE);
+    assert!(record.jods_lost[2] <= 0.1 && record.jods_lost[0] > 0.1, "{:?}", record.jods_lost);
+    assert!(record.verdicts > 0 && record.seconds > 0.0);
+}
+
+#[test]
+fn verdicts_repeat() {
+    let [one, other] = [0; 2].map(|_| run(&mut session(Simple::Bilateral(0.1))).unwrap());
+    assert_eq!(one, other);
+}
+
+#[test]
+fn a_denoiser_may_be_shared() {
+    let shared = Arc::new(Mutex::new(Simple::Flat(0.2)));
+    let criterion = DenoisedQuality::new(Arc::clone(&shared), 0.1);
+    drop(criterion);
+    assert_eq!(Simple::Flat(0.2).of(&truth()), shared.lock().unwrap().of(&truth()));
+}
+
+#[test]
+fn failures_are_said() {
+    let outcome = run(&mut session(Simple::Fails));
+    let Err(CriterionError::Failed { why, .. }) = outcome else { panic!("{outcome:?}") };
+    assert!(why.contains("out of order"), "{why}");
+}

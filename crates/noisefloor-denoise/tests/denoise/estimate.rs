@@ -1,0 +1,95 @@
+use crate::kit::{SIZE, Simple, noisy, truth};
+use noisefloor::{Display, Rgb, TileGrid, Viewing};
+use noisefloor_denoise::{DenoiseError, DenoisedError, DenoisedHalves};
+use noisefloor_vision::{VisionModel, VisionWorkspace};
+
+/// What is estimated of halves with these seeds, and the true error of the mean of the denoised halves.
+fn estimated_and_true(seeds: [u64; 2], deviation: f32, denoiser: Simple) -> [DenoisedError; 2] {
+    let [a, b] = seeds.map(|seed| noisy(seed, deviation));
+    let (da, db) = (denoiser.of(&a), denoiser.of(&b));
+    let halves = DenoisedHalves { size: SIZE, noisy: [&a, &b], denoised: [&da, &db] };
+    let mean: Vec<Rgb> =
+        da.iter().zip(&db).map(|(a, b)| std::array::from_fn(|c| 0.5 * (a[c] + b[c]))).collect();
+    [
+        DenoisedError::new(&halves, &Display::SRGB).unwrap(),
+        DenoisedError::known(SIZE, &mean, &truth(), &Display::SRGB).unwrap(),
+    ]
+}
+
+/// Root mean square of the residual, on the stripes and on the wall away from them, in 8-bit steps.
+fn sizes(error: &DenoisedError) -> [f32; 2] {
+    [0..64, 128..192].map(|columns| {
+        let inside = error.residual().iter().enumerate().filter(|(i, _)| columns.contains(&(i % SIZE.0)));
+        255.0 * (inside.map(|(_, r)| r * r).sum::<f32>() / 8192.0).sqrt()
+    })
+}
+
+/// Without a denoiser, the error is the noise of the mean of both halves: 0.02/√2 of linear light.
+#[test]
+fn of_an_undenoised_picture_it_is_its_noise() {
+    let [estimated, known] = estimated_and_true([1, 2], 0.02, Simple::Nothing).map(|e| sizes(&e));
+    // Each is a root mean square of 8192 numbers: it errs by 0.8 %, their ratio by 1.1 %; 5 % is 4 σ and more
+    for (e, k) in estimated.into_iter().zip(known) {
+        assert!((e / k - 1.0).abs() < 0.05, "{estimated:?} and {known:?}");
+    }
+}
+
+/// A denoiser that ignores its input errs by bias alone, and the halves do not differ.
+#[test]
+fn bias_is_seen_though_denoised_halves_agree() {
+    let [estimated, known] = estimated_and_true([3, 4], 0.02, Simple::Flat(0.3)).map(|e| sizes(&e));
+    // The stripes
+    assert!((estimated[0] / known[0] - 1.0).abs() < 0.1, "{estimated:?} and {known:?}");
+    // A wall has no bias; what chance makes of the noise of 10 steps stays below a sixth of it
+    assert!(known[1] < 1e-3 && estimated[1] < 1.7, "{estimated:?} and {known:?}");
+}
+
+/// A denoiser that blurs: both parts, at several strengths of noise.
+#[test]
+fn a_blurring_denoiser_errs_as_estimated() {
+    for (deviation, range) in [(0.01, 0.03), (0.03, 0.08), (0.06, 0.2)] {
+        let [estimated, known] =
+            estimated_and_true([5, 6], deviation, Simple::Bilateral(range)).map(|e| sizes(&e));
+        for (e, k) in estimated.into_iter().zip(known) {
+            // Where there is little bias, chance adds to it (measured: 0.95 to 1.19)
+            assert!((0.85..1.3).contains(&(e / k)), "{deviation}, {range}: {estimated:?} and {known:?}");
+        }
+    }
+}
+
+/// The same in units of what people see, tile by tile.
+#[test]
+fn so_does_what_people_see_of_it() {
+    let [estimated, known] = estimated_and_true([7, 8], 0.04, Simple::Bilateral(0.1));
+    let (eyes, mut room) = (VisionModel::new(&Viewing::default()), VisionWorkspace::default());
+    for tile in TileGrid::new(SIZE.0, SIZE.1, 64).unwrap().tiles() {
+        let mut lost = |error: &DenoisedError| error.jods_lost(tile, &eyes, &mut room).unwrap();
+        let (e, k) = (lost(&estimated), lost(&known));
+        // Measured: 0.80 to 0.99
+        assert!((0.7..1.15).contains(&(e / k)), "{tile:?}: {e} and {k} JOD");
+    }
+}
+
+/// Fireflies cannot pass for bias, whatever they are like.
+#[test]
+fn a_firefly_does_not_drown_the_rest() {
+    let [a, mut b] = [9, 10].map(|seed| noisy(seed, 0.02));
+    let flat = Simple::Flat(0.3).of(&a);
+    let estimate = |a: &[Rgb], b: &[Rgb]| {
+        let halves = DenoisedHalves { size: SIZE, noisy: [a, b], denoised: [&flat, &flat] };
+        sizes(&DenoisedError::new(&halves, &Display::SRGB).unwrap())
+    };
+    let without = estimate(&a, &b);
+    b[64 * SIZE.0 + 20] = [1e6; 3];
+    let with = estimate(&a, &b);
+    assert!((with[0] / without[0] - 1.0).abs() < 0.1, "{with:?} and {without:?}");
+}
+
+#[test]
+fn pictures_of_other_sizes_are_refused() {
+    let (a, b) = (noisy(1, 0.1), noisy(2, 0.1));
+    let halves = DenoisedHalves { size: SIZE, noisy: [&a, &b], denoised: [&a, &b[..100]] };
+    let outcome = DenoisedError::new(&halves, &Display::SRGB);
+    assert!(matches!(outcome, Err(DenoiseError::Pixels { got: 100, .. })));
+    assert!(DenoisedError::known(SIZE, &a, &b[1..], &Display::SRGB).is_err());
+}

@@ -1,0 +1,12 @@
+//! Tests of the crate as others see it.
+#![allow(clippy::unwrap_used, reason = "a panic in a test is how a test fails")]
+
+/// The criterion, in sessions.
+mod criterion;
+/// The estimate, against truths that are known.
+mod estimate;
+/// Synthetic scenes and simple denoisers.
+mod kit;
+/// Open Image Denoise itself, where it is installed.
+#[cfg(feature = "oidn")]
+mod oidn;

@@ -1,0 +1,148 @@
+//! A process that turns pictures into a picture, such as a denoiser.
+
+use crate::call::{Blame, Reply, ask, exactly, rgb};
+use crate::error::{SidecarCause, SidecarError};
+use crate::message::{FilterHello, Filtered, Filtering, InitFilter, PROTOCOL};
+use crate::process::Process;
+use crate::renderer::{DEFAULT_TIMEOUT, Renderer};
+use crate::setup;
+use noisefloor::{MAX_PIXELS, Rgb, printable};
+use std::num::NonZeroUsize;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+/// Most bytes of a request: lengths have 32 bits.
+const MOST: usize = u32::MAX as usize;
+
+/// How a filter is run.
+#[derive(Clone, Copy, Debug)]
+pub struct FilterPlan {
+    /// Number of threads; the filter's choice if `None`.
+    pub threads: Option<NonZeroUsize>,
+    /// Time limit for one call, including the one that loads the filter.
+    pub timeout: Duration,
+}
+
+impl Default for FilterPlan {
+    fn default() -> Self {
+        Self { threads: None, timeout: DEFAULT_TIMEOUT }
+    }
+}
+
+/// A filter in another process. Dropping it ends the process.
+///
+/// A call that fails because the process ended, did not answer in time, or sent something else than a picture
+/// is repeated once in a new process.
+#[derive(Debug)]
+pub struct PictureFilter {
+    title: &'static str,
+    python: PathBuf,
+    script: PathBuf,
+    init: Vec<u8>,
+    timeout: Duration,
+    process: Option<Process>,
+    name: String,
+}
+
+impl PictureFilter {
+    /// Starts a filter. `python` is an interpreter that has it, see [`find`](crate::find).
+    ///
+    /// # Errors
+    /// [`SidecarError`] if the process does not start, or the filter does not load.
+    pub fn open(filter: &Renderer, python: &Path, plan: FilterPlan) -> Result<Self, SidecarError> {
+        let init =
+            InitFilter { op: "init", protocol: PROTOCOL, threads: plan.threads.map(NonZeroUsize::get) };
+        let fail = |cause| SidecarError::at_the_start(filter, cause);
+        let init = serde_json::to_vec(&init).map_err(|e| fail(SidecarCause::Refused(e.to_string())))?;
+        let script = setup::host_script(filter).map_err(|error| fail(error.into()))?;
+        let (title, name, timeout) = (filter.title, filter.title.to_owned(), plan.timeout);
+        let mut this = Self { title, python: python.to_owned(), script, init, timeout, process: None, name };
+        this.process = Some(this.start()?);
+        Ok(this)
+    }
+
+    /// Its name and version, as it says.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// What the filter makes of named pictures of `width`×`height` pixels: a picture of the same size.
+    ///
+    /// # Errors
+    /// [`SidecarError`] if the pictures are too large or have another size, the process fails twice, the
+    /// filter refuses, or the result is not finite.
+    pub fn apply(
+        &mut self,
+        (width, height): (usize, usize),
+        pictures: &[(&str, &[Rgb])],
+    ) -> Result<Vec<Rgb>, SidecarError> {
+        let pixels = width.saturating_mul(height);
+        if pixels == 0 || pixels > MAX_PIXELS || pixels.saturating_mul(12 * pictures.len()) > MOST {
+            let what =
+                format!("{} pictures of {width}×{height} pixels do not fit into a call", pictures.len());
+            return Err(self.error(SidecarCause::Refused(what), String::new()));
+        }
+        if let Some((name, picture)) = pictures.iter().find(|(_, picture)| picture.len() != pixels) {
+            let what = format!("its picture {name} has {} pixels, not {width}×{height}", picture.len());
+            return Err(self.error(SidecarCause::Refused(what), String::new()));
+        }
+        match self.attempt((width, height), pictures) {
+            Err(error) if error.cause.deserves_a_restart() => self.attempt((width, height), pictures),
+            outcome => outcome,
+        }
+    }
+
+    fn attempt(
+        &mut self,
+        (width, height): (usize, usize),
+        pictures: &[(&str, &[Rgb])],
+    ) -> Result<Vec<Rgb>, SidecarError> {
+        let mut process = match self.process.take() {
+            Some(process) => process,
+            None => self.start()?,
+        };
+        let names: Vec<&str> = pictures.iter().map(|(name, _)| *name).collect();
+        let request = Filtering { op: "filter", width, height, pictures: &names };
+        let values = pictures.iter().flat_map(|(_, picture)| picture.as_flattened());
+        let payload: Vec<u8> = values.flat_map(|value| value.to_le_bytes()).collect();
+        let outcome = serde_json::to_vec(&request)
+            .map_err(|e| (None, SidecarCause::Refused(e.to_string())))
+            .and_then(|header| ask(&mut process, header, payload, width * height, self.timeout))
+            .and_then(|reply| read(reply, width * height));
+        let stays = outcome.as_ref().err().is_none_or(|(_, cause)| !cause.deserves_a_restart());
+        let outcome = outcome.map_err(|(_, cause)| self.error(cause, process.last_words()));
+        if stays {
+            self.process = Some(process);
+        }
+        outcome
+    }
+
+    fn start(&mut self) -> Result<Process, SidecarError> {
+        let start = |source| SidecarCause::Start { python: self.python.clone(), source };
+        let mut process = Process::start(&self.python, &self.script, &[])
+            .map_err(|error| self.error(start(error), String::new()))?;
+        let hello = ask::<FilterHello>(&mut process, self.init.clone(), Vec::new(), 0, self.timeout);
+        match hello {
+            Ok(hello) => {
+                self.name = printable(&hello.header.name).into_owned();
+                Ok(process)
+            }
+            Err((_, cause)) => Err(self.error(cause, process.last_words())),
+        }
+    }
+
+    fn error(&self, cause: SidecarCause, last_words: String) -> SidecarError {
+        let (renderer, doing) = (self.title.to_owned(), "filtering a picture".to_owned());
+        SidecarError { renderer, doing, tile: None, cause: Box::new(cause), last_words }
+    }
+}
+
+/// The picture of a reply.
+fn read(Reply { payload, .. }: Reply<Filtered>, pixels: usize) -> Result<Vec<Rgb>, Blame> {
+    exactly(&payload, pixels)?;
+    let picture: Vec<Rgb> = rgb(&payload).collect();
+    if picture.as_flattened().iter().all(|value| value.is_finite()) {
+        return Ok(picture);
+    }
+    Err((None, SidecarCause::Refused("its picture is not finite".to_owned())))
+}
