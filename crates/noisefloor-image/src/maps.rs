@@ -115,6 +115,14 @@ impl Canvas {
         canvas
     }
 
+    /// An sRGB-encoded picture `width` pixels wide, row-major, three bytes a pixel; an incomplete last row is
+    /// left out.
+    pub fn of_bytes(width: usize, rgb: &[u8]) -> Self {
+        let mut canvas = Self::new(width, rgb.len() / (3 * width.max(1)), PAPER);
+        canvas.0.iter_mut().zip(rgb).for_each(|(to, &from)| *to = from);
+        canvas
+    }
+
     /// Width in pixels.
     pub fn width(&self) -> usize {
         self.0.width() as usize
@@ -170,6 +178,20 @@ impl Canvas {
                 self.set(x + column, y + row, if on_edge { INK } else { PAPER });
             }
         }
+    }
+
+    /// White letters around a centre, with dark outlines that keep them readable on any picture.
+    pub fn label(&mut self, text: &str, (x, y): (usize, usize), font: &MonoFont<'_>) {
+        for (dx, dy) in [(0, 1), (2, 1), (1, 0), (1, 2)] {
+            self.text(
+                text,
+                ((x + dx).saturating_sub(1), (y + dy).saturating_sub(1)),
+                font,
+                INK,
+                Alignment::Center,
+            );
+        }
+        self.text(text, (x, y), font, [255; 3], Alignment::Center);
     }
 
     /// Letters in `colour`, their middle line at the height given.
@@ -244,10 +266,7 @@ fn frame(canvas: &mut Canvas, TileMark { tile, label, unfamiliar, .. }: &TileMar
     let (font, advance) = if tile.width >= 100 { (&FONT_7X13_BOLD, 7) } else { (&FONT_6X10, 6) };
     if label.len() * advance + 4 <= tile.width && tile.height >= 14 {
         let (x, y) = (tile.x + tile.width / 2, tile.y + tile.height / 2);
-        for (dx, dy) in [(0, 1), (2, 1), (1, 0), (1, 2)] {
-            canvas.text(label, (x + dx - 1, y + dy - 1), font, INK, Alignment::Center);
-        }
-        canvas.text(label, (x, y), font, [255; 3], Alignment::Center);
+        canvas.label(label, (x, y), font);
     }
     if *unfamiliar {
         canvas.corner(tile.x + 1, tile.y + 1);

@@ -106,8 +106,7 @@ pub fn write(
         svg(&dir.join(format!("curves-{}.svg", stack.name())), plots::curves(&tiles, stack.levels())?)?;
         let picture = stack.shown(stack.last())?;
         let grid = plots::grid(stack.grid(), &picture, &tiles, threshold);
-        let (width, height) = (stack.grid().width(), stack.grid().height());
-        write_png(dir.join(format!("grid-{}.png", stack.name())), width, height, &grid)?;
+        grid.save(dir.join(format!("grid-{}.png", stack.name())))?;
         pictures(&corpus_dir, study, number)?;
     }
     corpus(&corpus_dir, study, report, threshold)

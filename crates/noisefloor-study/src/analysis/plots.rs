@@ -3,17 +3,13 @@
 use super::classes::ClassRow;
 use super::tiles::{CorpusThreshold, TileRow};
 use crate::error::StudyError;
-use embedded_graphics::mono_font::MonoTextStyle;
 use embedded_graphics::mono_font::iso_8859_1::{FONT_6X10, FONT_7X13_BOLD, FONT_9X18_BOLD};
-use embedded_graphics::pixelcolor::Rgb888;
-use embedded_graphics::prelude::*;
-use embedded_graphics::text::{Alignment, Baseline, Text, TextStyleBuilder};
 use noisefloor::TileGrid;
+use noisefloor_image::maps::Canvas;
 use plotters::prelude::{
     ChartBuilder, Circle, IntoDrawingArea, IntoLogRange, LineSeries, PathElement, RGBColor, SVGBackend, WHITE,
 };
 use plotters::style::Color;
-use std::convert::Infallible;
 
 const SIZE: (u32, u32) = (720, 480);
 const LETTERS: (&str, u32) = ("sans-serif", 15);
@@ -151,15 +147,10 @@ pub(super) fn classes(rows: &[ClassRow]) -> Result<String, StudyError> {
     Ok(text)
 }
 
-/// The picture with the tile grid and a threshold in each tile (Takouachet et al. 2017, figure 3): RGB,
-/// three bytes a pixel.
-pub(super) fn grid(
-    grid: TileGrid,
-    picture: &[u8],
-    tiles: &[&TileRow],
-    threshold: CorpusThreshold,
-) -> Vec<u8> {
-    let mut canvas = Canvas { width: grid.width(), height: grid.height(), bytes: picture.to_vec() };
+/// The picture, three bytes a pixel, with the tile grid and a threshold in each tile (Takouachet et al. 2017,
+/// figure 3).
+pub(super) fn grid(grid: TileGrid, picture: &[u8], tiles: &[&TileRow], threshold: CorpusThreshold) -> Canvas {
+    let mut canvas = Canvas::of_bytes(grid.width(), picture);
     for t in tiles {
         for x in t.x..t.x + t.width {
             canvas.set(x, t.y, [255; 3]);
@@ -177,54 +168,9 @@ pub(super) fn grid(
             48.. => (&FONT_7X13_BOLD, 7),
             _ => (&FONT_6X10, 6),
         };
-        if label.len() * advance + 2 > t.width || t.height < 12 {
-            continue;
-        }
-        let centre = Point::new((t.x + t.width / 2) as i32, (t.y + t.height / 2) as i32);
-        let style = TextStyleBuilder::new().alignment(Alignment::Center).baseline(Baseline::Middle).build();
-        let mut write = |shift: Point, grey: u8| {
-            let letters = MonoTextStyle::new(font, Rgb888::new(grey, grey, grey));
-            let Ok(_) = Text::with_text_style(&label, centre + shift, letters, style).draw(&mut canvas);
-        };
-        // Dark outlines keep white letters readable on any picture
-        for shift in [(-1, 0), (1, 0), (0, -1), (0, 1)] {
-            write(Point::new(shift.0, shift.1), 0);
-        }
-        write(Point::zero(), 255);
-    }
-    canvas.bytes
-}
-
-struct Canvas {
-    width: usize,
-    height: usize,
-    bytes: Vec<u8>,
-}
-
-impl Canvas {
-    fn set(&mut self, x: usize, y: usize, colour: [u8; 3]) {
-        if x < self.width && y < self.height {
-            self.bytes[(y * self.width + x) * 3..][..3].copy_from_slice(&colour);
+        if label.len() * advance + 2 <= t.width && t.height >= 12 {
+            canvas.label(&label, (t.x + t.width / 2, t.y + t.height / 2), font);
         }
     }
-}
-
-impl OriginDimensions for Canvas {
-    fn size(&self) -> Size {
-        Size::new(self.width as u32, self.height as u32)
-    }
-}
-
-impl DrawTarget for Canvas {
-    type Color = Rgb888;
-    type Error = Infallible;
-
-    fn draw_iter<I: IntoIterator<Item = Pixel<Rgb888>>>(&mut self, pixels: I) -> Result<(), Infallible> {
-        for Pixel(at, colour) in pixels {
-            if let (Ok(x), Ok(y)) = (usize::try_from(at.x), usize::try_from(at.y)) {
-                self.set(x, y, [colour.r(), colour.g(), colour.b()]);
-            }
-        }
-        Ok(())
-    }
+    canvas
 }

@@ -15,7 +15,7 @@ use tokio::sync::oneshot;
 /// fixed seeds.
 pub(crate) fn picture(width: usize, height: usize, spp: u64) -> Vec<u8> {
     let mut random = fastrand::Rng::with_seed(spp);
-    let amplitude = (3.0f64 * 0.3 / spp as f64).sqrt();
+    let amplitude = (3.0f64 * 0.5 / spp as f64).sqrt();
     let value = |i: usize| {
         let (x, y) = ((i % width) as f64, (i / width) as f64);
         0.35 + 0.25 * (x / 17.0).sin() * (y / 23.0).cos() + 0.1 * x / width as f64
