@@ -2,11 +2,13 @@
 
 use super::oracle::OracleArgs;
 use super::tone::ToneArgs;
+use super::values;
 use super::viewing::ViewingArgs;
-use crate::judge::JudgeJob;
+use crate::judge::{DenoisedJob, JudgeJob, Question};
 use anyhow::bail;
 use clap::Args;
 use noisefloor::{DEFAULT_TILE, Evidence, Samples};
+use noisefloor_denoise::DEFAULT_JODS_LOST;
 use std::path::PathBuf;
 
 /// Say for each tile of a picture whether people would see noise in it.
@@ -18,12 +20,17 @@ use std::path::PathBuf;
 /// Two snapshots of one progressive rendering share samples. If the files say so (those of `render` do) or
 /// the pictures show it, the verdict takes it into account, and a note says so. If neither tells, the
 /// command asks for --nested or --independent, which also override what it finds.
+///
+/// With --denoised, the verdict is on what a denoiser makes of both pictures together: how many
+/// just-objectionable differences (JOD) it has lost against the converged picture, bias included. Nobody has
+/// been asked about denoised tiles: the limit is the vision model's.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   noisefloor judge a.exr --spp 256 --against b.exr --spp 256       two independent renderings
   noisefloor judge out/a/image.exr --against out/b/image.exr       of `render`: the files say the rest
   noisefloor judge 00100.png --spp 100 --against 00900.png --spp 900 --nested --heat-map verdict.png
   noisefloor judge a.exr --spp 64 --against b.exr --spp 64 --noise-map noise.png
+  noisefloor judge a.exr --spp 64 --against b.exr --spp 64 --denoised a-denoised.exr b-denoised.exr
   noisefloor judge a.exr --spp 64 --against b.exr --spp 64 --json > verdicts.json")]
 pub struct JudgeArgs {
     /// Picture to judge, PNG or EXR.
@@ -43,6 +50,13 @@ pub struct JudgeArgs {
     /// The pictures share no samples, whatever they look like.
     #[arg(long, conflicts_with = "nested")]
     independent: bool,
+    /// Judge denoised pictures: what a denoiser has made of IMAGE, and of the one --against, each without a
+    /// look at the other.
+    #[arg(long, num_args = 2, value_names = ["IMAGE", "AGAINST"], conflicts_with_all = ["model", "threshold", "heat_map", "exr", "nested"])]
+    denoised: Vec<PathBuf>,
+    /// With --denoised: just-objectionable differences (JOD) that a tile may have lost.
+    #[arg(long, value_name = "JOD", requires = "denoised", default_value_t = DEFAULT_JODS_LOST, value_parser = values::jods)]
+    lost: f64,
     #[command(flatten)]
     oracle: OracleArgs,
     #[command(flatten)]
@@ -58,7 +72,8 @@ pub struct JudgeArgs {
     /// Write the probabilities as a heat map over the picture.
     #[arg(long, value_name = "FILE.png")]
     heat_map: Option<PathBuf>,
-    /// Write a map of the visible noise over the picture, in blocks of 8x8 pixels.
+    /// Write a map of the visible noise over the picture, in blocks of 8x8 pixels; with --denoised, of the JODs
+    /// lost.
     #[arg(long, value_name = "FILE.png")]
     noise_map: Option<PathBuf>,
     /// Write the picture as linear EXR, with probability and visible noise (1 is just seen) as channels.
@@ -67,7 +82,37 @@ pub struct JudgeArgs {
 }
 
 impl JudgeArgs {
-    pub fn check(self) -> anyhow::Result<JudgeJob> {
+    pub fn check(self) -> anyhow::Result<Question> {
+        match <[PathBuf; 2]>::try_from(self.denoised.clone()) {
+            Ok(denoised) => self.check_denoised(denoised).map(|job| Question::Denoised(Box::new(job))),
+            Err(_) => self.check_noise().map(|job| Question::Noise(Box::new(job))),
+        }
+    }
+
+    fn check_denoised(self, denoised: [PathBuf; 2]) -> anyhow::Result<DenoisedJob> {
+        let tone = self.tone.check()?;
+        let Ok([against]) = <[PathBuf; 1]>::try_from(self.against) else {
+            bail!("--denoised compares two halves: give one picture with --against");
+        };
+        let spp = match self.spp.as_slice() {
+            [] => [None; 2],
+            [a, b] => [Some(*a), Some(*b)],
+            other => bail!("--spp is needed once for each picture: {} given for 2 pictures", other.len()),
+        };
+        Ok(DenoisedJob {
+            noisy: [(self.image, spp[0]), (against, spp[1])],
+            denoised,
+            samples: self.independent.then_some(Samples::Independent),
+            lost: self.lost,
+            tone,
+            viewing: self.viewing.or_default(),
+            tile: self.tile,
+            json: self.json,
+            noise_map: self.noise_map,
+        })
+    }
+
+    fn check_noise(self) -> anyhow::Result<JudgeJob> {
         let tone = self.tone.check()?;
         let oracle = self.oracle.check()?;
         let viewing = self.viewing.judged_by(&oracle)?;

@@ -1,6 +1,9 @@
 //! `noisefloor judge`.
 
+mod denoised;
 mod report;
+
+pub use denoised::DenoisedJob;
 
 use crate::say::note;
 use anyhow::Context;
@@ -31,7 +34,20 @@ pub struct JudgeJob {
     pub exr: Option<PathBuf>,
 }
 
-pub fn run(job: &JudgeJob) -> anyhow::Result<()> {
+/// What `judge` is asked.
+pub enum Question {
+    Noise(Box<JudgeJob>),
+    Denoised(Box<DenoisedJob>),
+}
+
+pub fn run(question: &Question) -> anyhow::Result<()> {
+    match question {
+        Question::Noise(job) => judge_noise(job),
+        Question::Denoised(job) => denoised::run(job),
+    }
+}
+
+fn judge_noise(job: &JudgeJob) -> anyhow::Result<()> {
     for path in [&job.heat_map, &job.noise_map, &job.exr].into_iter().flatten() {
         check_writable(path)?;
     }

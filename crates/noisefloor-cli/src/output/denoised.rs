@@ -59,7 +59,7 @@ impl Denoised {
 }
 
 /// JODs lost, from nothing that people see to what three of four do.
-const SCALE: ColourScale = ColourScale {
+pub const ERROR_SCALE: ColourScale = ColourScale {
     title: "error left\nJODs lost",
     low: 0.01,
     high: 1.0,
@@ -90,7 +90,9 @@ impl Output {
         write_exr(self.path("image-denoised.exr"), &RenderLayers::rgb(width, height, &image))?;
         Canvas::of_picture(width, &encoded).save(self.path("image-denoised.png"))?;
         match map {
-            Some(map) => draw_field(width, &encoded, &map, &SCALE).save(self.path("denoised-error.png"))?,
+            Some(map) => {
+                draw_field(width, &encoded, &map, &ERROR_SCALE).save(self.path("denoised-error.png"))?
+            }
             None => note!("note: no tile was judged, so the error of the denoised picture is not known"),
         }
         Ok(())

@@ -6,7 +6,7 @@ mod report;
 mod summary;
 mod tiles;
 
-pub use denoised::Denoised;
+pub use denoised::{Denoised, ERROR_SCALE};
 pub use summary::say_noise;
 
 use crate::files::{write_csv, write_json};

@@ -1,6 +1,6 @@
-use crate::kit::{FILES, column, fail, json, run, stderr, succeed, text, tiny};
+use crate::kit::{FILES, column, fail, json, random, run, stderr, succeed, text, tiny};
 use noisefloor_denoise::OIDN;
-use noisefloor_image::read_exr;
+use noisefloor_image::{RenderLayers, read_exr, write_exr};
 use noisefloor_sidecar::find;
 use noisefloor_testkit::{Requirement, require};
 use tempfile::tempdir;
@@ -64,4 +64,47 @@ fn the_denoised_picture_and_its_error_are_written() {
 
     let said = run(&["doctor"]);
     assert!(String::from_utf8(said.stdout).unwrap().lines().any(|line| line.starts_with("oidn ")));
+}
+
+#[test]
+fn denoised_pictures_made_elsewhere() {
+    let folder = tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).display().to_string();
+    let stripes = |noise: &mut dyn FnMut() -> f64| -> Vec<[f32; 3]> {
+        (0..64 * 64).map(|i| [0.4 + 0.05 * (i / 4 % 2) as f32 + 0.01 * noise() as f32; 3]).collect()
+    };
+    let flat = vec![[0.425; 3]; 64 * 64];
+    for (name, pixels) in [
+        ("a.exr", stripes(&mut random(1))),
+        ("b.exr", stripes(&mut random(2))),
+        ("good.exr", stripes(&mut || 0.0)),
+        ("good2.exr", stripes(&mut || 0.001)),
+        ("bad.exr", flat),
+    ] {
+        write_exr(path(name), &RenderLayers::rgb(64, 64, &pixels)).unwrap();
+    }
+    let [a, b, good, good2, bad] = ["a.exr", "b.exr", "good.exr", "good2.exr", "bad.exr"].map(path);
+    let judge = |more: &[&str]| -> Vec<String> {
+        let all = ["judge", &a, "--spp", "8", "--against", &b, "--spp", "8", "--tile", "32", "--lost", "0.2"];
+        all.iter().chain(more).map(|word| (*word).to_owned()).collect()
+    };
+    let say = |more: &[&str]| {
+        let words = judge(more);
+        succeed(&words.iter().map(String::as_str).collect::<Vec<_>>())
+    };
+    let map = path("map.png");
+    let clean = say(&["--independent", "--denoised", &good, &good2, "--noise-map", &map]);
+    assert!(clean.contains("4 of 4 denoised tiles") && clean.contains("nobody has been asked"), "{clean}");
+    assert!(std::path::Path::new(&map).exists());
+    let json = say(&["--independent", "--json", "--denoised", &bad, &bad]);
+    let report: serde_json::Value = serde_json::from_str(&json).unwrap();
+    assert_eq!(report["converged_tiles"].as_u64(), Some(0), "{json}");
+
+    let refuse = |more: &[&str], words: &[&str]| {
+        let typed = judge(more);
+        fail(&typed.iter().map(String::as_str).collect::<Vec<_>>(), words);
+    };
+    refuse(&["--nested", "--denoised", &good, &bad], &["--nested"]);
+    refuse(&["--denoised", &good], &["--denoised"]);
+    refuse(&["--independent", "--denoised", &a, &bad], &["identical"]);
 }
