@@ -76,7 +76,6 @@ fn validate(folder: &Path, oidn: &mut Oidn) -> Outcome<()> {
         let halves = DenoisedHalves { size, noisy: [&a, &b], denoised: [&da, &db] };
         print(2 * half, "estimate", &DenoisedError::new(&halves, &display)?)?;
         print(2 * half, "true", &DenoisedError::known(size, &all, &truth, &display)?)?;
-        print(2 * half, "mean", &DenoisedError::known(size, &mean(&da, &db), &truth, &display)?)?;
         print(2 * half, "noisy", &DenoisedError::known(size, &whole, &truth, &display)?)?;
     }
     Ok(())
