@@ -1,7 +1,7 @@
 //! Denoisers, and how wrong a denoised picture still is: measured from half buffers, without a reference.
 //!
 //! - [`Denoiser`]: a linear picture in, a picture out; what an implementer promises.
-//! - [`Oidn`](crate::Oidn): Open Image Denoise in a process of its own (feature `oidn`).
+//! - [`Oidn`]: Open Image Denoise in a process of its own (feature `oidn`).
 //! - [`DenoisedError`]: what is wrong with a denoised picture, from two halves and what becomes of each.
 //! - [`DenoisedQuality`]: a [`noisefloor::StoppingCriterion`] that stops tiles by it, for
 //!   [`noisefloor::Session`] and [`noisefloor::Driver`].
