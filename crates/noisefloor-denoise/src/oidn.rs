@@ -16,7 +16,8 @@ pub const OIDN: Renderer = Renderer {
 };
 
 /// [Open Image Denoise](https://www.openimagedenoise.org) on the CPU: its filter `RT` for linear pictures, in
-/// its highest quality.
+/// its highest quality. It always runs with four threads, whatever [`FilterPlan::threads`] says: the last bits
+/// of its results depend on their number.
 #[derive(Debug)]
 pub struct Oidn(PictureFilter);
 

@@ -77,8 +77,7 @@ pub fn run(job: RenderJob) -> anyhow::Result<ExitCode> {
         }
         #[cfg(feature = "adapters")]
         Judge::Denoised(lost) => {
-            let plan = FilterPlan { threads: job.source.threads, ..FilterPlan::default() };
-            let denoiser = Arc::new(Mutex::new(Oidn::start(plan)?));
+            let denoiser = Arc::new(Mutex::new(Oidn::start(FilterPlan::default())?));
             let criterion = DenoisedQuality::new(Arc::clone(&denoiser), *lost);
             let rest = Rest { denoised: Some(Denoised::new(denoiser, criterion.record())), ..rest };
             rest.drive(Driver::new(source, criterion, *params)?, Some(Snapshots::new()))

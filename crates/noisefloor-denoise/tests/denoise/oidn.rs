@@ -3,6 +3,7 @@ use noisefloor::Rgb;
 use noisefloor_denoise::{DenoiseError, Denoiser, NoisyPicture, OIDN, Oidn};
 use noisefloor_sidecar::{FilterPlan, find};
 use noisefloor_testkit::{Requirement, require};
+use std::num::NonZeroUsize;
 
 fn started() -> Option<Oidn> {
     let _python = require(Requirement::Renderers, find(&OIDN))?;
@@ -21,6 +22,9 @@ fn it_denoises_and_repeats_itself() {
     let once = oidn.denoise(&NoisyPicture::new(SIZE, &noisy)).unwrap();
     assert!(error(&once) < 0.2 * error(&noisy), "{} of {}", error(&once), error(&noisy));
     assert_eq!(once, oidn.denoise(&NoisyPicture::new(SIZE, &noisy)).unwrap());
+    let alone = FilterPlan { threads: NonZeroUsize::new(1), ..FilterPlan::default() };
+    let other = Oidn::start(alone).unwrap().denoise(&NoisyPicture::new(SIZE, &noisy)).unwrap();
+    assert!(once == other, "the number of threads changes the picture");
     // With albedo that shows the stripes, they survive
     let (albedo, normal) = (truth(), vec![[0.0, 0.0, 1.0]; noisy.len()]);
     let helped =
