@@ -21,6 +21,8 @@ pub enum Requirement {
     Llvm,
     /// `python`: a Python interpreter on the path, without any package.
     Python,
+    /// `cmake`: CMake, pkg-config, and a compiler for C and C++ with its sanitizers.
+    Cmake,
     /// `browser`: Chromium, and what it takes to drive it.
     Browser,
     /// `shared`: data that are not part of the repository, such as what observers said.
@@ -28,13 +30,15 @@ pub enum Requirement {
 }
 
 impl Requirement {
-    const ALL: [Self; 5] = [Self::Renderers, Self::Llvm, Self::Python, Self::Browser, Self::Shared];
+    const ALL: [Self; 6] =
+        [Self::Renderers, Self::Llvm, Self::Python, Self::Cmake, Self::Browser, Self::Shared];
 
     fn word(self) -> &'static str {
         match self {
             Self::Renderers => "renderers",
             Self::Llvm => "llvm",
             Self::Python => "python",
+            Self::Cmake => "cmake",
             Self::Browser => "browser",
             Self::Shared => "shared",
         }
@@ -64,7 +68,7 @@ impl Display for Requirement {
 /// # Panics
 /// If the environment variable `NOISEFLOOR_REQUIRE` names the requirement, and nothing was found: where
 /// everything has been set up, a test that cannot run has failed. The variable holds words with commas
-/// between them: `renderers`, `llvm`, `python`, `browser`, `shared`. Any other word is a panic, too, since a
+/// between them: `renderers`, `llvm`, `python`, `cmake`, `browser`, `shared`. Any other word is a panic, too, since a
 /// misspelt one would require nothing.
 pub fn require<T>(requirement: Requirement, found: Result<T, impl Display>) -> Option<T> {
     let required = is_required(requirement, std::env::var_os(REQUIRED).as_deref());

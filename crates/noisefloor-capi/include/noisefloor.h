@@ -1,0 +1,301 @@
+// noisefloor tells a progressive renderer, tile by tile, when people stop seeing noise.
+//
+// An oracle (a trained model and a threshold) judges the tiles of a session. The renderer asks the session
+// which tiles are open, pushes the mean of new samples of each, lets the session judge, and ends when no tile
+// is open.
+//
+// Errors. Every function that can fail returns an NfStatus, and writes its results through pointers only if
+// that is NF_STATUS_OK. nf_last_error says what was wrong. No function throws, aborts, or unwinds into the
+// caller. An error inside the library is NF_STATUS_INTERNAL, also reported on standard error; the session it
+// happened in answers NF_STATUS_INTERNAL from then on and can only be freed.
+//
+// Threads. Any thread may call any function on any object at any time, except that nothing else may use an
+// object while it is freed, or after. Calls on one session take turns: pushes wait while nf_session_judge
+// runs. Judging uses all cores. Stops do not depend on the number of threads, but each tile has to get its
+// own batches in the same order for results to be the same to the bit.
+//
+// Pointers. A pointer that is NULL where it must not be is NF_STATUS_NULL_POINTER. Beside a pointer to an
+// array goes the number of its elements, which is checked. What cannot be checked: pointers must lead to as
+// many elements as said, or to one object; handles must come from this library and not be freed yet. Text
+// ends with a zero byte and is UTF-8. The library keeps no pointer after a call, and owns what it returns.
+//
+// Pictures are rows from the top, pixels from the left, three floats a pixel: linear red, green and blue with
+// the primaries of Rec. 709. Floats that are not finite do not count as samples.
+
+#ifndef NOISEFLOOR_H
+#define NOISEFLOOR_H
+
+// Generated from the sources of noisefloor-capi. Do not edit; see header.rs there.
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+// A verdict after every step samples per pixel.
+#define NF_SCHEDULE_EVERY 0
+
+// Verdicts spaced by the expected need, in multiples of step: fewer verdicts, larger batches.
+#define NF_SCHEDULE_SPACED 1
+
+// The photographic operator (Reinhard et al. 2002) with an exposure by the log-average of the picture.
+// Verdicts wait until every tile has samples.
+#define NF_TONE_REINHARD 0
+
+// Plain sRGB: multiply by the exposure, clamp, encode.
+#define NF_TONE_SRGB 1
+
+// The tile is open: it gets more samples.
+#define NF_REASON_OPEN 0
+
+// Nobody would see noise in it.
+#define NF_REASON_CONVERGED 1
+
+// It has as many samples as are allowed.
+#define NF_REASON_MAX_SPP 2
+
+// Closed by the caller: there is no more time.
+#define NF_REASON_TIME_LIMIT 3
+
+// Closed by the caller: somebody cancelled.
+#define NF_REASON_CANCELLED 4
+
+// Closed by the caller: the renderer failed.
+#define NF_REASON_FAILED 5
+
+// How a call ended. nf_last_error has the words.
+typedef enum {
+    // Done.
+    NF_STATUS_OK = 0,
+    // A pointer is NULL that must not be, or not aligned for what it leads to.
+    NF_STATUS_NULL_POINTER = 1,
+    // A parameter is out of its range.
+    NF_STATUS_ARGUMENT = 2,
+    // An array, a picture or a tile has another size than it must have.
+    NF_STATUS_SIZE = 3,
+    // A tile that does not exist, or a batch without new samples.
+    NF_STATUS_BATCH = 4,
+    // A model file is damaged, foreign, or made for another version.
+    NF_STATUS_MODEL = 5,
+    // The model cannot judge this: it needs a reference, other tiles, or other viewing conditions.
+    NF_STATUS_CRITERION = 6,
+    // A checkpoint is damaged, foreign, or of another job.
+    NF_STATUS_CHECKPOINT = 7,
+    // A file cannot be read or written.
+    NF_STATUS_IO = 8,
+    // Not known yet, or never: the call says which.
+    NF_STATUS_UNAVAILABLE = 9,
+    // A mistake inside the library. Please report it.
+    NF_STATUS_INTERNAL = 10,
+} NfStatus;
+
+// A trained model with the probability from which a tile counts as converged. It never changes, and any
+// number of sessions can be made from it.
+typedef struct NfOracle NfOracle;
+
+// Film, oracle and limits of one picture.
+typedef struct NfSession NfSession;
+
+// Parameters of a session. Let nf_params_default fill them in, then change some.
+typedef struct {
+    // Edge of a tile in pixels, 16 to 512. Default: 128.
+    uint32_t tile;
+    // When tiles are judged: NF_SCHEDULE_EVERY (default) or NF_SCHEDULE_SPACED.
+    uint32_t schedule;
+    // The step of the schedule in samples per pixel, at least 2. Default: 100.
+    uint64_t step;
+    // Fewest samples per pixel at which a tile may stop. Default: 100.
+    uint64_t min_spp;
+    // Samples per pixel at which every tile stops, at least 2. Default: 10000.
+    uint64_t max_spp;
+    // Verdicts in a row that must say "converged" before a tile stops, at least 1. Default: 1.
+    uint32_t consecutive;
+    // How radiance is displayed: NF_TONE_REINHARD (default) or NF_TONE_SRGB. What people see depends on it.
+    uint32_t tone_mapping;
+    // For NF_TONE_REINHARD: what the log-average luminance becomes, above 0. Default: 0.18.
+    float key;
+    // For NF_TONE_REINHARD: smallest exposed luminance that becomes white, or 0 (default) for none.
+    float white;
+    // For NF_TONE_SRGB: factor on radiance, above 0. Default: 1.
+    float exposure;
+    // Whose thresholds, as a line T' = slope * T + offset from those of the observers in the training data.
+    // slope is at least 0. Default: 1.
+    double audience_slope;
+    // The offset of that line in samples per pixel. Default: 0.
+    double audience_offset;
+    // On which display the picture is seen and from how far, as text such as "desk" or
+    // "ppd=60,peak=300,black=0.3,ambient=100"; NULL (default) for "desk". Read by nf_session_new only.
+    const char *viewing;
+} NfParams;
+
+// A rectangle of pixels that stops as a whole. Tiles lie in rows from the top left.
+typedef struct {
+    // Its number: 0 to nf_session_tile_count - 1.
+    size_t index;
+    // Left edge in pixels.
+    size_t x;
+    // Top edge in pixels.
+    size_t y;
+    // Width in pixels.
+    size_t width;
+    // Height in pixels.
+    size_t height;
+} NfTile;
+
+// What an open tile needs next.
+typedef struct {
+    // The tile.
+    NfTile tile;
+    // Number of the first new sample: a renderer that derives its random numbers from pixel and sample
+    // number repeats none.
+    uint64_t first;
+    // New samples per pixel. Fewer or more are fine.
+    uint64_t spp;
+} NfRequest;
+
+// Where a tile stands.
+typedef struct {
+    // Samples per pixel; if the tile is done, when it stopped.
+    uint64_t spp;
+    // Samples per pixel at which the oracle expects the tile to be free of visible noise; 0 if it cannot
+    // tell.
+    uint64_t expected_spp;
+    // Probability that an observer sees no difference from the converged picture, by the last verdict; NaN
+    // before the first.
+    float probability;
+    // NF_REASON_OPEN, or why the tile is done.
+    uint32_t reason;
+    // Whether the tile's texture is unlike all that the model was trained on: treat the verdict with care.
+    bool unfamiliar;
+} NfTileState;
+
+#ifdef __cplusplus
+extern "C" {
+#endif // __cplusplus
+
+// What went wrong in the last call on this thread that failed, in English, for people; an empty string if
+// none has. Valid until the next call on this thread fails, or the thread ends.
+const char *nf_last_error(void);
+
+// The version of the library, as text: "0.1.0". Lives as long as the program.
+const char *nf_version(void);
+
+// Makes an oracle from the model inside the library, which was trained on human data and judges by half
+// buffers. threshold lies between 0 and 1; 0.9 is that of the paper. The caller frees the oracle with
+// nf_oracle_free.
+NfStatus nf_oracle_bundled(float threshold,
+                           NfOracle **oracle);
+
+// As nf_oracle_bundled, with a model that "noisefloor train" has written to a file.
+NfStatus nf_oracle_load(const char *path, float threshold, NfOracle **oracle);
+
+// Frees an oracle; sessions made from it do not need it. NULL is ignored.
+void nf_oracle_free(NfOracle *oracle);
+
+// Fills in the defaults.
+NfStatus nf_params_default(NfParams *params);
+
+// Starts a session for a picture of width x height pixels: each edge up to 65536, 2^28 pixels in all. It
+// takes 36 bytes a pixel. params is NULL for the defaults. The caller frees the session with
+// nf_session_free.
+NfStatus nf_session_new(size_t width,
+                        size_t height,
+                        const NfOracle *oracle,
+                        const NfParams *params,
+                        NfSession **session);
+
+// Frees a session. NULL is ignored.
+void nf_session_free(NfSession *session);
+
+// The number of tiles; 0 if session is NULL.
+size_t nf_session_tile_count(const NfSession *session);
+
+// Where a tile lies.
+NfStatus nf_session_tile(const NfSession *session, size_t index, NfTile *tile);
+
+// What the open tiles need next, into an array for as many requests as there are tiles (capacity says how
+// many). count becomes the number of requests: 0 when all tiles are done.
+NfStatus nf_session_requests(const NfSession *session,
+                             NfRequest *requests,
+                             size_t capacity,
+                             size_t *count);
+
+// Judges the tiles that are due. newly_done, which may be NULL, becomes the number of tiles that are now
+// done and were not before. The first verdicts wait until every open tile has samples, unless tone_mapping
+// is NF_TONE_SRGB.
+NfStatus nf_session_judge(const NfSession *session,
+                          size_t *newly_done);
+
+// Adds the mean of spp new samples per pixel of a tile: rows of the tile from the top, floats = 3 * width *
+// height of the tile. Tiles that are done accept samples, too: they improve, and stay done.
+NfStatus nf_session_push(const NfSession *session,
+                         size_t tile,
+                         uint64_t spp,
+                         const float *mean,
+                         size_t floats);
+
+// As nf_session_push, for a renderer that keeps running means: the mean of all total samples per pixel of
+// the tile so far. The new samples are what it has more than the session.
+NfStatus nf_session_push_running(const NfSession *session,
+                                 size_t tile,
+                                 uint64_t total,
+                                 const float *mean,
+                                 size_t floats);
+
+// As nf_session_push, from a picture of the whole image with this many channels per pixel, of which the
+// first three are red, green and blue: floats = channels * width * height of the image. Only the tile is
+// read.
+NfStatus nf_session_push_image(const NfSession *session,
+                               size_t tile,
+                               uint64_t spp,
+                               const float *image,
+                               size_t floats,
+                               size_t channels);
+
+// Where all tiles stand, in their order, into an array for as many states as there are tiles (capacity says
+// how many).
+NfStatus nf_session_states(const NfSession *session,
+                           NfTileState *states,
+                           size_t capacity);
+
+// The number of open tiles; 0 when all are done.
+NfStatus nf_session_open_tiles(const NfSession *session, size_t *open);
+
+// Ends every open tile for NF_REASON_TIME_LIMIT, NF_REASON_CANCELLED or NF_REASON_FAILED.
+NfStatus nf_session_close_all(const NfSession *session, uint32_t reason);
+
+// Samples still to be taken, over all pixels, as the oracle expects; NF_STATUS_UNAVAILABLE while an open
+// tile has no expectation.
+NfStatus nf_session_expected_samples(const NfSession *session,
+                                     uint64_t *samples);
+
+// The picture: the mean of all samples, floats = 3 * width * height of the image. Pixels without samples are
+// black.
+NfStatus nf_session_image(const NfSession *session,
+                          float *image,
+                          size_t floats);
+
+// How visible the noise is at each pixel, in the unit that docs/guide.md states: floats = width * height of the
+// image, NaN where there is no evidence. Costs as much as a verdict on every tile. NF_STATUS_UNAVAILABLE before
+// the first verdict, or if the model makes no map.
+NfStatus nf_session_visible_noise(const NfSession *session,
+                                  float *map,
+                                  size_t floats);
+
+// Writes a snapshot of the session, for resuming it. The file is whole or not there. job is text that names
+// all the samples depend on: scene, seed, options of the renderer.
+NfStatus nf_session_save(const NfSession *session,
+                         const char *job,
+                         const char *path);
+
+// Puts a session back where nf_session_save found it. The session must have been made with the same size,
+// parameters and oracle, and job must be the same. If the renderer repeats its samples, all that follows is
+// the same to the bit as without the interruption. On failure the session is as it was.
+NfStatus nf_session_resume(const NfSession *session,
+                           const char *job,
+                           const char *path);
+
+#ifdef __cplusplus
+}  // extern "C"
+#endif  // __cplusplus
+
+#endif  /* NOISEFLOOR_H */

@@ -1,0 +1,117 @@
+//! From pointers of C to references and slices of Rust. All that can be checked is: a pointer is there, is
+//! aligned, and leads to as many elements as are wanted. The rest is the caller's promise, which the header
+//! asks for.
+
+use crate::status::{Failure, NfStatus};
+use std::ffi::{CStr, c_char};
+
+fn check<T>(pointer: *const T, what: &str) -> Result<(), Failure> {
+    if pointer.is_null() {
+        return Err(Failure::new(NfStatus::NullPointer, format!("{what} is NULL")));
+    }
+    if !pointer.is_aligned() {
+        return Err(Failure::new(NfStatus::NullPointer, format!("{what} is not aligned")));
+    }
+    Ok(())
+}
+
+/// An array of exactly `wanted` elements, of which the caller says that it has `got`.
+///
+/// # Safety
+/// `pointer` leads to `got` elements that nothing changes during `'a`, if it is neither null nor misaligned.
+pub(crate) unsafe fn array<'a, T>(
+    pointer: *const T,
+    got: usize,
+    wanted: usize,
+    what: &str,
+) -> Result<&'a [T], Failure> {
+    check(pointer, what)?;
+    expect(got, wanted, what)?;
+    // SAFETY: not null, aligned, and `got` elements long by the caller's promise; `wanted` is a size of ours,
+    // below `isize::MAX` bytes.
+    Ok(unsafe { std::slice::from_raw_parts(pointer, wanted) })
+}
+
+/// As [`array`], to be written.
+///
+/// # Safety
+/// `pointer` leads to `got` elements that have values and that nothing else uses during `'a`, if it is
+/// neither null nor misaligned.
+pub(crate) unsafe fn array_mut<'a, T>(
+    pointer: *mut T,
+    got: usize,
+    wanted: usize,
+    what: &str,
+) -> Result<&'a mut [T], Failure> {
+    check(pointer, what)?;
+    expect(got, wanted, what)?;
+    // SAFETY: as in `array`, and nothing else uses it by the caller's promise.
+    Ok(unsafe { std::slice::from_raw_parts_mut(pointer, wanted) })
+}
+
+fn expect(got: usize, wanted: usize, what: &str) -> Result<(), Failure> {
+    if got == wanted {
+        return Ok(());
+    }
+    Err(Failure::new(NfStatus::Size, format!("{what} has {got} elements instead of {wanted}")))
+}
+
+/// One object.
+///
+/// # Safety
+/// `pointer` leads to an object that is not freed during `'a`, if it is neither null nor misaligned.
+pub(crate) unsafe fn object<'a, T>(pointer: *const T, what: &str) -> Result<&'a T, Failure> {
+    check(pointer, what)?;
+    // SAFETY: not null, aligned, and alive by the caller's promise.
+    Ok(unsafe { &*pointer })
+}
+
+/// Writes one result.
+///
+/// # Safety
+/// `pointer` leads to memory for one `T`, if it is neither null nor misaligned.
+pub(crate) unsafe fn write<T>(pointer: *mut T, value: T, what: &str) -> Result<(), Failure> {
+    check(pointer, what)?;
+    // SAFETY: not null, aligned, and memory for a `T` by the caller's promise. It may be uninitialised:
+    // nothing is dropped.
+    unsafe { pointer.write(value) };
+    Ok(())
+}
+
+/// Makes an object and gives it to the caller. A pointer that cannot be written is noticed before `make`
+/// runs.
+///
+/// # Safety
+/// As [`write`].
+pub(crate) unsafe fn give<T>(
+    pointer: *mut *mut T,
+    what: &str,
+    make: impl FnOnce() -> Result<T, Failure>,
+) -> Result<(), Failure> {
+    check(pointer, what)?;
+    let made = Box::into_raw(Box::new(make()?));
+    // SAFETY: as for this function.
+    unsafe { write(pointer, made, what) }
+}
+
+/// Takes back an object that [`give`] gave. Null is nothing to take.
+///
+/// # Safety
+/// `pointer` is null or comes from [`give`], and nobody uses it any more.
+pub(crate) unsafe fn take_back<T>(pointer: *mut T) {
+    if !pointer.is_null() {
+        // SAFETY: `give` made it of a box of this type, and it is taken back once by the caller's promise.
+        drop(unsafe { Box::from_raw(pointer) });
+    }
+}
+
+/// Text.
+///
+/// # Safety
+/// `pointer` leads to bytes that end with a zero and that nothing changes during `'a`, if it is not null.
+pub(crate) unsafe fn text<'a>(pointer: *const c_char, what: &str) -> Result<&'a str, Failure> {
+    check(pointer, what)?;
+    // SAFETY: not null, and ended by a zero by the caller's promise.
+    let text = unsafe { CStr::from_ptr(pointer) };
+    text.to_str().map_err(|_| Failure::new(NfStatus::Argument, format!("{what} is not UTF-8")))
+}

@@ -1,0 +1,59 @@
+//! Checkpoints in files.
+
+use crate::border;
+use crate::session::NfSession;
+use crate::status::{Failure, NfStatus, guard};
+use noisefloor::{Checkpoint, Session};
+use std::ffi::c_char;
+use std::fs::File;
+use std::io::{self, BufReader, BufWriter};
+use std::path::Path;
+use tempfile::NamedTempFile;
+
+/// Writes a snapshot of the session, for resuming it. The file is whole or not there. job is text that names
+/// all the samples depend on: scene, seed, options of the renderer.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn nf_session_save(
+    session: *const NfSession,
+    job: *const c_char,
+    path: *const c_char,
+) -> NfStatus {
+    guard(|| {
+        // SAFETY: promised by the caller.
+        let (session, job) = unsafe { (border::object(session, "session")?, border::text(job, "job")?) };
+        // SAFETY: promised by the caller.
+        let path = Path::new(unsafe { border::text(path, "path") }?);
+        let failed = |error: io::Error| Failure::new(NfStatus::Io, format!("{}: {error}", path.display()));
+
+        // A file beside it takes its place once it is complete
+        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+        let mut file = NamedTempFile::new_in(folder.unwrap_or(Path::new("."))).map_err(failed)?;
+        session.lock()?.checkpoint(job).write(BufWriter::new(&mut file))?;
+        file.persist(path).map_err(|error| failed(error.error))?;
+        Ok(())
+    })
+}
+
+/// Puts a session back where nf_session_save found it. The session must have been made with the same size,
+/// parameters and oracle, and job must be the same. If the renderer repeats its samples, all that follows is
+/// the same to the bit as without the interruption. On failure the session is as it was.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn nf_session_resume(
+    session: *const NfSession,
+    job: *const c_char,
+    path: *const c_char,
+) -> NfStatus {
+    guard(|| {
+        // SAFETY: promised by the caller.
+        let (session, job) = unsafe { (border::object(session, "session")?, border::text(job, "job")?) };
+        // SAFETY: promised by the caller.
+        let path = unsafe { border::text(path, "path") }?;
+        let file = File::open(path).map_err(|e| Failure::new(NfStatus::Io, format!("{path}: {e}")))?;
+        let checkpoint = Checkpoint::read(BufReader::new(file))?;
+        let mut locked = session.lock()?;
+        let grid = locked.film().grid();
+        let fresh = Session::new(grid.width(), grid.height(), locked.criterion().clone(), *locked.params())?;
+        *locked = fresh.resume(job, checkpoint)?;
+        Ok(())
+    })
+}

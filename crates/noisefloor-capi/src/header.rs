@@ -1,0 +1,26 @@
+//! The header is what cbindgen makes of these sources.
+//!
+//! After a change of the interface, write it anew and look at the difference:
+//! `NOISEFLOOR_WRITE_HEADER=1 cargo test --workspace --all-features --lib header`.
+
+use std::path::Path;
+
+#[test]
+fn the_header_is_that_of_the_sources() {
+    let package = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let config = cbindgen::Config::from_file(package.join("cbindgen.toml")).unwrap();
+    // In the order in which one reads a header
+    let sources = ["status", "oracle", "params", "session", "push", "results", "files"];
+    let builder = cbindgen::Builder::new().with_config(config);
+    let builder = sources.iter().fold(builder, |b, name| b.with_src(package.join(format!("src/{name}.rs"))));
+    let mut made = Vec::new();
+    builder.generate().unwrap().write(&mut made);
+    let made = String::from_utf8(made).unwrap();
+
+    let path = package.join("include/noisefloor.h");
+    if std::env::var_os("NOISEFLOOR_WRITE_HEADER").is_some() {
+        std::fs::write(&path, &made).unwrap();
+    }
+    let kept = std::fs::read_to_string(&path).unwrap();
+    assert!(kept == made, "include/noisefloor.h is not that of the sources; see header.rs");
+}

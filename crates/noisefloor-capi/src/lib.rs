@@ -1,0 +1,25 @@
+//! noisefloor for C and C++: the oracle and its push session behind opaque handles.
+//!
+//! This crate has no Rust interface. cbindgen makes `include/noisefloor.h` from it, which says all there is
+//! to say: errors, threads, pointers. The functions are declared here as C sees them:
+//!
+//! - `status.rs`: error codes, their messages, and the guard that no panic passes;
+//! - `border.rs`: pointers from C become references and slices, checked as far as that is possible;
+//! - `params.rs`, `oracle.rs`, `session.rs`, `push.rs`, `results.rs`, `files.rs`: the functions.
+#![allow(unsafe_code, reason = "pointers come from C; nothing else here is unsafe")]
+#![allow(unreachable_pub, reason = "C reaches what Rust does not, and cbindgen takes only what is public")]
+#![allow(clippy::missing_safety_doc, reason = "one rule for all functions stands at the top of the header")]
+
+mod border;
+mod files;
+mod oracle;
+mod params;
+mod push;
+mod results;
+mod session;
+mod status;
+
+#[cfg(test)]
+mod header;
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,122 @@
+//! Parameters of a session.
+
+use crate::border;
+use crate::status::{Failure, NfStatus, guard};
+use noisefloor::{Audience, Params, Schedule, ToneMapping, Viewing};
+use std::ffi::c_char;
+
+/// A verdict after every step samples per pixel.
+pub const NF_SCHEDULE_EVERY: u32 = 0;
+/// Verdicts spaced by the expected need, in multiples of step: fewer verdicts, larger batches.
+pub const NF_SCHEDULE_SPACED: u32 = 1;
+
+/// The photographic operator (Reinhard et al. 2002) with an exposure by the log-average of the picture.
+/// Verdicts wait until every tile has samples.
+pub const NF_TONE_REINHARD: u32 = 0;
+/// Plain sRGB: multiply by the exposure, clamp, encode.
+pub const NF_TONE_SRGB: u32 = 1;
+
+/// Parameters of a session. Let nf_params_default fill them in, then change some.
+#[repr(C)]
+#[derive(Clone, Copy, Debug)]
+pub struct NfParams {
+    /// Edge of a tile in pixels, 16 to 512. Default: 128.
+    pub tile: u32,
+    /// When tiles are judged: NF_SCHEDULE_EVERY (default) or NF_SCHEDULE_SPACED.
+    pub schedule: u32,
+    /// The step of the schedule in samples per pixel, at least 2. Default: 100.
+    pub step: u64,
+    /// Fewest samples per pixel at which a tile may stop. Default: 100.
+    pub min_spp: u64,
+    /// Samples per pixel at which every tile stops, at least 2. Default: 10000.
+    pub max_spp: u64,
+    /// Verdicts in a row that must say "converged" before a tile stops, at least 1. Default: 1.
+    pub consecutive: u32,
+    /// How radiance is displayed: NF_TONE_REINHARD (default) or NF_TONE_SRGB. What people see depends on it.
+    pub tone_mapping: u32,
+    /// For NF_TONE_REINHARD: what the log-average luminance becomes, above 0. Default: 0.18.
+    pub key: f32,
+    /// For NF_TONE_REINHARD: smallest exposed luminance that becomes white, or 0 (default) for none.
+    pub white: f32,
+    /// For NF_TONE_SRGB: factor on radiance, above 0. Default: 1.
+    pub exposure: f32,
+    /// Whose thresholds, as a line T' = slope * T + offset from those of the observers in the training data.
+    /// slope is at least 0. Default: 1.
+    pub audience_slope: f64,
+    /// The offset of that line in samples per pixel. Default: 0.
+    pub audience_offset: f64,
+    /// On which display the picture is seen and from how far, as text such as "desk" or
+    /// "ppd=60,peak=300,black=0.3,ambient=100"; NULL (default) for "desk". Read by nf_session_new only.
+    pub viewing: *const c_char,
+}
+
+/// Fills in the defaults.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn nf_params_default(params: *mut NfParams) -> NfStatus {
+    // SAFETY: promised by the caller.
+    guard(|| unsafe { border::write(params, NfParams::default(), "params") })
+}
+
+impl Default for NfParams {
+    fn default() -> Self {
+        let Params { tile, schedule, min_spp, max_spp, consecutive, audience, .. } = Params::default();
+        let (schedule, step) = match schedule {
+            Schedule::Every { step } => (NF_SCHEDULE_EVERY, step),
+            Schedule::Spaced { step } => (NF_SCHEDULE_SPACED, step),
+        };
+        Self {
+            tile: tile as u32,
+            schedule,
+            step,
+            min_spp,
+            max_spp,
+            consecutive,
+            tone_mapping: NF_TONE_REINHARD,
+            key: noisefloor::DEFAULT_KEY,
+            white: 0.0,
+            exposure: 1.0,
+            audience_slope: audience.slope,
+            audience_offset: audience.offset,
+            viewing: std::ptr::null(),
+        }
+    }
+}
+
+impl NfParams {
+    /// The same for Rust; ranges are left to be checked by the session.
+    ///
+    /// # Safety
+    /// `viewing` is null, or leads to text.
+    pub(crate) unsafe fn to_params(self) -> Result<Params, Failure> {
+        let unknown = |what: &str, value: u32| {
+            Failure::new(NfStatus::Argument, format!("{value} is no {what}: use a constant of noisefloor.h"))
+        };
+        let schedule = match self.schedule {
+            NF_SCHEDULE_EVERY => Schedule::Every { step: self.step },
+            NF_SCHEDULE_SPACED => Schedule::Spaced { step: self.step },
+            other => return Err(unknown("schedule", other)),
+        };
+        let white = (self.white != 0.0).then_some(self.white);
+        let tone_mapping = match self.tone_mapping {
+            NF_TONE_REINHARD => ToneMapping::Reinhard { key: self.key, white },
+            NF_TONE_SRGB => ToneMapping::Srgb { exposure: self.exposure },
+            other => return Err(unknown("tone mapping", other)),
+        };
+        let viewing = if self.viewing.is_null() {
+            Viewing::default()
+        } else {
+            // SAFETY: not null, so it leads to text.
+            unsafe { border::text(self.viewing, "viewing") }?.parse()?
+        };
+        Ok(Params {
+            tile: self.tile as usize,
+            tone_mapping,
+            viewing,
+            schedule,
+            min_spp: self.min_spp,
+            max_spp: self.max_spp,
+            consecutive: self.consecutive,
+            audience: Audience { slope: self.audience_slope, offset: self.audience_offset },
+        })
+    }
+}

@@ -1,0 +1,169 @@
+//! What comes of a session: where its tiles stand, its picture, and the map of visible noise.
+
+use crate::border;
+use crate::session::NfSession;
+use crate::status::{Failure, NfStatus, guard};
+use noisefloor::StopReason;
+
+/// The tile is open: it gets more samples.
+pub const NF_REASON_OPEN: u32 = 0;
+/// Nobody would see noise in it.
+pub const NF_REASON_CONVERGED: u32 = 1;
+/// It has as many samples as are allowed.
+pub const NF_REASON_MAX_SPP: u32 = 2;
+/// Closed by the caller: there is no more time.
+pub const NF_REASON_TIME_LIMIT: u32 = 3;
+/// Closed by the caller: somebody cancelled.
+pub const NF_REASON_CANCELLED: u32 = 4;
+/// Closed by the caller: the renderer failed.
+pub const NF_REASON_FAILED: u32 = 5;
+
+/// Where a tile stands.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct NfTileState {
+    /// Samples per pixel; if the tile is done, when it stopped.
+    pub spp: u64,
+    /// Samples per pixel at which the oracle expects the tile to be free of visible noise; 0 if it cannot
+    /// tell.
+    pub expected_spp: u64,
+    /// Probability that an observer sees no difference from the converged picture, by the last verdict; NaN
+    /// before the first.
+    pub probability: f32,
+    /// NF_REASON_OPEN, or why the tile is done.
+    pub reason: u32,
+    /// Whether the tile's texture is unlike all that the model was trained on: treat the verdict with care.
+    pub unfamiliar: bool,
+}
+
+fn reason_code(reason: StopReason) -> u32 {
+    match reason {
+        // An oracle counts no samples and no source is exhausted here; whatever is added is a stop.
+        StopReason::MaxSpp => NF_REASON_MAX_SPP,
+        StopReason::TimeLimit => NF_REASON_TIME_LIMIT,
+        StopReason::Cancelled => NF_REASON_CANCELLED,
+        StopReason::Failed => NF_REASON_FAILED,
+        _ => NF_REASON_CONVERGED,
+    }
+}
+
+/// Where all tiles stand, in their order, into an array for as many states as there are tiles (capacity says
+/// how many).
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn nf_session_states(
+    session: *const NfSession,
+    states: *mut NfTileState,
+    capacity: usize,
+) -> NfStatus {
+    guard(|| {
+        // SAFETY: promised by the caller.
+        let session = unsafe { border::object(session, "session") }?;
+        // SAFETY: promised by the caller.
+        let room = unsafe { border::array_mut(states, capacity, session.grid.len(), "states") }?;
+        let locked = session.lock()?;
+        for (tile, state) in room.iter_mut().enumerate() {
+            let verdict = locked.verdict(tile);
+            *state = NfTileState {
+                spp: locked.film().spp(tile),
+                expected_spp: verdict.and_then(|v| v.expected_spp).unwrap_or(0),
+                probability: verdict.and_then(|v| v.probability).unwrap_or(f32::NAN),
+                reason: NF_REASON_OPEN,
+                unfamiliar: verdict.is_some_and(|v| v.unfamiliar),
+            };
+        }
+        for stop in locked.stops() {
+            let state = &mut room[stop.tile.index];
+            (state.spp, state.reason) = (stop.spp, reason_code(stop.reason));
+        }
+        Ok(())
+    })
+}
+
+/// The number of open tiles; 0 when all are done.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn nf_session_open_tiles(session: *const NfSession, open: *mut usize) -> NfStatus {
+    guard(|| {
+        // SAFETY: promised by the caller.
+        let found = unsafe { border::object(session, "session") }?.lock()?.open_tiles();
+        // SAFETY: promised by the caller.
+        unsafe { border::write(open, found, "open") }
+    })
+}
+
+/// Ends every open tile for NF_REASON_TIME_LIMIT, NF_REASON_CANCELLED or NF_REASON_FAILED.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn nf_session_close_all(session: *const NfSession, reason: u32) -> NfStatus {
+    guard(|| {
+        // SAFETY: promised by the caller.
+        let session = unsafe { border::object(session, "session") }?;
+        let reason = match reason {
+            NF_REASON_TIME_LIMIT => StopReason::TimeLimit,
+            NF_REASON_CANCELLED => StopReason::Cancelled,
+            NF_REASON_FAILED => StopReason::Failed,
+            other => {
+                let message = format!("{other} is no reason for a caller to end tiles");
+                return Err(Failure::new(NfStatus::Argument, message));
+            }
+        };
+        session.lock()?.close_all(reason);
+        Ok(())
+    })
+}
+
+/// Samples still to be taken, over all pixels, as the oracle expects; NF_STATUS_UNAVAILABLE while an open
+/// tile has no expectation.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn nf_session_expected_samples(
+    session: *const NfSession,
+    samples: *mut u64,
+) -> NfStatus {
+    guard(|| {
+        // SAFETY: promised by the caller.
+        let expected = unsafe { border::object(session, "session") }?.lock()?.expected_samples_to_go();
+        let unknown = "there is a tile of which the oracle cannot yet say how many samples it needs";
+        let expected = expected.ok_or_else(|| Failure::new(NfStatus::Unavailable, unknown))?;
+        // SAFETY: promised by the caller.
+        unsafe { border::write(samples, expected, "samples") }
+    })
+}
+
+/// The picture: the mean of all samples, floats = 3 * width * height of the image. Pixels without samples are
+/// black.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn nf_session_image(
+    session: *const NfSession,
+    image: *mut f32,
+    floats: usize,
+) -> NfStatus {
+    guard(|| {
+        // SAFETY: promised by the caller.
+        let session = unsafe { border::object(session, "session") }?;
+        let wanted = 3 * session.grid.width() * session.grid.height();
+        // SAFETY: promised by the caller.
+        let room = unsafe { border::array_mut(image, floats, wanted, "image") }?;
+        room.copy_from_slice(session.lock()?.film().image().as_flattened());
+        Ok(())
+    })
+}
+
+/// How visible the noise is at each pixel, in the unit that docs/guide.md states: floats = width * height of the
+/// image, NaN where there is no evidence. Costs as much as a verdict on every tile. NF_STATUS_UNAVAILABLE before
+/// the first verdict, or if the model makes no map.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn nf_session_visible_noise(
+    session: *const NfSession,
+    map: *mut f32,
+    floats: usize,
+) -> NfStatus {
+    guard(|| {
+        // SAFETY: promised by the caller.
+        let session = unsafe { border::object(session, "session") }?;
+        let wanted = session.grid.width() * session.grid.height();
+        // SAFETY: promised by the caller.
+        let room = unsafe { border::array_mut(map, floats, wanted, "map") }?;
+        let none = "no map: there is no verdict yet, or the model makes none";
+        let found = session.lock()?.visible_noise();
+        room.copy_from_slice(&found.ok_or_else(|| Failure::new(NfStatus::Unavailable, none))?);
+        Ok(())
+    })
+}

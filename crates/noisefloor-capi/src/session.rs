@@ -1,0 +1,171 @@
+//! Sessions: pushed samples in, stops out.
+
+use crate::border;
+use crate::oracle::NfOracle;
+use crate::params::NfParams;
+use crate::status::{Failure, NfStatus, guard};
+use noisefloor::{Oracle, Params, Request, Session, Tile, TileGrid};
+use std::sync::{Mutex, MutexGuard};
+
+/// Film, oracle and limits of one picture.
+pub struct NfSession {
+    session: Mutex<Session<Oracle>>,
+    pub(crate) grid: TileGrid,
+}
+
+/// A rectangle of pixels that stops as a whole. Tiles lie in rows from the top left.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct NfTile {
+    /// Its number: 0 to nf_session_tile_count - 1.
+    pub index: usize,
+    /// Left edge in pixels.
+    pub x: usize,
+    /// Top edge in pixels.
+    pub y: usize,
+    /// Width in pixels.
+    pub width: usize,
+    /// Height in pixels.
+    pub height: usize,
+}
+
+/// What an open tile needs next.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct NfRequest {
+    /// The tile.
+    pub tile: NfTile,
+    /// Number of the first new sample: a renderer that derives its random numbers from pixel and sample
+    /// number repeats none.
+    pub first: u64,
+    /// New samples per pixel. Fewer or more are fine.
+    pub spp: u64,
+}
+
+impl NfSession {
+    pub(crate) fn new(session: Session<Oracle>) -> Self {
+        Self { grid: session.film().grid(), session: Mutex::new(session) }
+    }
+
+    pub(crate) fn lock(&self) -> Result<MutexGuard<'_, Session<Oracle>>, Failure> {
+        let broken = "the session cannot be used since an error inside the library";
+        self.session.lock().map_err(|_| Failure::new(NfStatus::Internal, broken))
+    }
+
+    pub(crate) fn tile(&self, index: usize) -> Result<Tile, Failure> {
+        let missing = || format!("tile {index} does not exist: there are {}", self.grid.len());
+        (index < self.grid.len())
+            .then(|| self.grid.tile(index))
+            .ok_or_else(|| Failure::new(NfStatus::Batch, missing()))
+    }
+}
+
+impl From<Tile> for NfTile {
+    fn from(Tile { index, x, y, width, height }: Tile) -> Self {
+        Self { index, x, y, width, height }
+    }
+}
+
+/// Starts a session for a picture of width x height pixels: each edge up to 65536, 2^28 pixels in all. It
+/// takes 36 bytes a pixel. params is NULL for the defaults. The caller frees the session with
+/// nf_session_free.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn nf_session_new(
+    width: usize,
+    height: usize,
+    oracle: *const NfOracle,
+    params: *const NfParams,
+    session: *mut *mut NfSession,
+) -> NfStatus {
+    guard(|| {
+        // SAFETY: promised by the caller.
+        let oracle = unsafe { border::object(oracle, "oracle") }?;
+        let params = if params.is_null() {
+            Params::default()
+        } else {
+            // SAFETY: not null, and promised by the caller.
+            unsafe { border::object(params, "params")?.to_params() }?
+        };
+        let make = || Ok(NfSession::new(Session::new(width, height, oracle.0.clone(), params)?));
+        // SAFETY: promised by the caller.
+        unsafe { border::give(session, "session", make) }
+    })
+}
+
+/// Frees a session. NULL is ignored.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn nf_session_free(session: *mut NfSession) {
+    guard(|| {
+        // SAFETY: promised by the caller.
+        unsafe { border::take_back(session) };
+        Ok(())
+    });
+}
+
+/// The number of tiles; 0 if session is NULL.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn nf_session_tile_count(session: *const NfSession) -> usize {
+    let mut count = 0;
+    guard(|| {
+        // SAFETY: promised by the caller.
+        count = unsafe { border::object(session, "session") }?.grid.len();
+        Ok(())
+    });
+    count
+}
+
+/// Where a tile lies.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn nf_session_tile(
+    session: *const NfSession,
+    index: usize,
+    tile: *mut NfTile,
+) -> NfStatus {
+    guard(|| {
+        // SAFETY: promised by the caller.
+        let found = unsafe { border::object(session, "session") }?.tile(index)?;
+        // SAFETY: promised by the caller.
+        unsafe { border::write(tile, found.into(), "tile") }
+    })
+}
+
+/// What the open tiles need next, into an array for as many requests as there are tiles (capacity says how
+/// many). count becomes the number of requests: 0 when all tiles are done.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn nf_session_requests(
+    session: *const NfSession,
+    requests: *mut NfRequest,
+    capacity: usize,
+    count: *mut usize,
+) -> NfStatus {
+    guard(|| {
+        // SAFETY: promised by the caller.
+        let session = unsafe { border::object(session, "session") }?;
+        // SAFETY: promised by the caller.
+        let room = unsafe { border::array_mut(requests, capacity, session.grid.len(), "requests") }?;
+        let wanted = session.lock()?.requests();
+        // SAFETY: promised by the caller.
+        unsafe { border::write(count, wanted.len(), "count") }?;
+        for (place, Request { tile, first, spp }) in room.iter_mut().zip(wanted) {
+            *place = NfRequest { tile: tile.into(), first, spp };
+        }
+        Ok(())
+    })
+}
+
+/// Judges the tiles that are due. newly_done, which may be NULL, becomes the number of tiles that are now
+/// done and were not before. The first verdicts wait until every open tile has samples, unless tone_mapping
+/// is NF_TONE_SRGB.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn nf_session_judge(session: *const NfSession, newly_done: *mut usize) -> NfStatus {
+    guard(|| {
+        // SAFETY: promised by the caller.
+        let session = unsafe { border::object(session, "session") }?;
+        let stops = session.lock()?.judge()?;
+        if newly_done.is_null() {
+            return Ok(());
+        }
+        // SAFETY: not null, and promised by the caller.
+        unsafe { border::write(newly_done, stops.len(), "newly_done") }
+    })
+}

@@ -1,0 +1,375 @@
+//! The functions, called as C calls them.
+
+use crate::files::*;
+use crate::oracle::*;
+use crate::params::*;
+use crate::push::*;
+use crate::results::*;
+use crate::session::*;
+use crate::status::*;
+use noisefloor::{CriterionError, Oracle, Params, Rgb, Session, Tile};
+use std::ffi::{CStr, CString};
+use std::ptr::{null, null_mut};
+
+const WIDTH: usize = 96;
+const HEIGHT: usize = 80;
+const EDGE: usize = 32;
+const PIXELS: usize = WIDTH * HEIGHT;
+
+fn message() -> String {
+    // SAFETY: text of this library, read before the next call.
+    unsafe { CStr::from_ptr(nf_last_error()) }.to_str().unwrap().to_owned()
+}
+
+fn params() -> NfParams {
+    NfParams { tile: EDGE as u32, max_spp: 400, ..NfParams::default() }
+}
+
+/// A handle that is freed in the end. Handles may go from thread to thread.
+struct Handle(*mut NfSession);
+// SAFETY: sessions stand behind a lock; the tests free them when all threads have ended.
+unsafe impl Sync for Handle {}
+unsafe impl Send for Handle {} // SAFETY: as above
+
+impl Drop for Handle {
+    fn drop(&mut self) {
+        // SAFETY: made by `session`, and freed once.
+        unsafe { nf_session_free(self.0) };
+    }
+}
+
+fn session(params: &NfParams) -> Handle {
+    let (mut oracle, mut session) = (null_mut(), null_mut());
+    // SAFETY: pointers to variables of this function, and a handle that was just made.
+    unsafe {
+        assert_eq!(nf_oracle_bundled(0.9, &mut oracle), NfStatus::Ok);
+        assert_eq!(
+            nf_session_new(WIDTH, HEIGHT, oracle, params, &mut session),
+            NfStatus::Ok,
+            "{}",
+            message()
+        );
+        nf_oracle_free(oracle); // the session does not need it
+    }
+    Handle(session)
+}
+
+/// A grey wall with noise that shrinks as it should, the same for the same samples.
+fn render(tile: Tile, first: u64, spp: u64) -> Vec<f32> {
+    let noise = |i: usize| {
+        let mut key = (tile.index as u64) << 40 | first << 20 | i as u64;
+        key = (key ^ key >> 31).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+        key = (key ^ key >> 29).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        (key >> 40) as f32 / (1 << 23) as f32 - 1.0
+    };
+    (0..3 * tile.pixels()).map(|i| 0.5 + 0.4 * noise(i) / (spp as f32).sqrt()).collect()
+}
+
+fn tile(t: NfTile) -> Tile {
+    Tile { index: t.index, x: t.x, y: t.y, width: t.width, height: t.height }
+}
+
+fn requests(session: &Handle) -> Vec<NfRequest> {
+    // SAFETY: a living handle, and arrays of the sizes given.
+    unsafe {
+        let mut all = vec![NfRequest::default(); nf_session_tile_count(session.0)];
+        let mut count = 99;
+        assert_eq!(nf_session_requests(session.0, all.as_mut_ptr(), all.len(), &mut count), NfStatus::Ok);
+        all.truncate(count);
+        all
+    }
+}
+
+fn push(session: &Handle, request: &NfRequest) {
+    let mean = render(tile(request.tile), request.first, request.spp);
+    // SAFETY: a living handle, and an array of the size given.
+    let status =
+        unsafe { nf_session_push(session.0, request.tile.index, request.spp, mean.as_ptr(), mean.len()) };
+    assert_eq!(status, NfStatus::Ok, "{}", message());
+}
+
+/// Pushes from this many threads, then judges.
+fn round(session: &Handle, threads: usize) {
+    let wanted = requests(session);
+    std::thread::scope(|scope| {
+        for part in wanted.chunks(wanted.len().div_ceil(threads).max(1)) {
+            scope.spawn(move || part.iter().for_each(|request| push(session, request)));
+        }
+    });
+    // SAFETY: a living handle, and NULL where it is allowed.
+    assert_eq!(unsafe { nf_session_judge(session.0, null_mut()) }, NfStatus::Ok, "{}", message());
+}
+
+fn states(session: &Handle) -> Vec<NfTileState> {
+    // SAFETY: a living handle, and an array of the size given.
+    unsafe {
+        let mut states = vec![NfTileState::default(); nf_session_tile_count(session.0)];
+        let status = nf_session_states(session.0, states.as_mut_ptr(), states.len());
+        assert_eq!(status, NfStatus::Ok, "{}", message());
+        states
+    }
+}
+
+fn image(session: &Handle) -> Vec<f32> {
+    let mut image = vec![f32::NAN; 3 * PIXELS];
+    // SAFETY: a living handle, and an array of the size given.
+    assert_eq!(unsafe { nf_session_image(session.0, image.as_mut_ptr(), image.len()) }, NfStatus::Ok);
+    image
+}
+
+fn open(session: &Handle) -> usize {
+    let mut open = 99;
+    // SAFETY: a living handle, and a variable of this function.
+    assert_eq!(unsafe { nf_session_open_tiles(session.0, &mut open) }, NfStatus::Ok);
+    open
+}
+
+#[test]
+fn stops_and_picture_are_those_of_rust_whatever_the_number_of_threads() {
+    let rust = Params { tile: EDGE, max_spp: 400, ..Params::default() };
+    let mut expected = Session::new(WIDTH, HEIGHT, Oracle::bundled(), rust).unwrap();
+    while !expected.is_done() {
+        for request in expected.requests() {
+            let mean = render(request.tile, request.first, request.spp);
+            expected.push(request.tile.index, request.spp, mean.as_chunks().0).unwrap();
+        }
+        expected.judge().unwrap();
+    }
+    for threads in [1, 5] {
+        let session = session(&params());
+        while open(&session) > 0 {
+            round(&session, threads);
+        }
+        assert!(requests(&session).is_empty());
+        assert_eq!(image(&session), expected.film().image().as_flattened());
+        for (state, stop) in states(&session).iter().zip(expected.stops()) {
+            assert_eq!((state.spp, Some(state.probability)), (stop.spp, stop.probability));
+            assert_ne!(state.reason, NF_REASON_OPEN);
+        }
+        let mut map = vec![0.0; PIXELS];
+        // SAFETY: a living handle, and an array of the size given.
+        assert_eq!(unsafe { nf_session_visible_noise(session.0, map.as_mut_ptr(), PIXELS) }, NfStatus::Ok);
+        assert_eq!(Some(map), expected.visible_noise());
+    }
+}
+
+#[test]
+fn tiles_of_a_whole_picture_are_cut_out() {
+    let (cut, whole) = (session(&params()), session(&params()));
+    // RGBA, each pixel another colour
+    let frame: Vec<f32> = (0..4 * PIXELS).map(|i| (i % 1013) as f32 / 1013.0).collect();
+    for request in requests(&cut) {
+        let (t, index) = (tile(request.tile), request.tile.index);
+        let pixel = |p: usize| -> Rgb { [frame[4 * p], frame[4 * p + 1], frame[4 * p + 2]] };
+        let mean: Vec<f32> = t.rows(WIDTH).flatten().flat_map(pixel).collect();
+        // SAFETY: living handles, and arrays of the sizes given.
+        unsafe {
+            assert_eq!(nf_session_push(cut.0, index, 8, mean.as_ptr(), mean.len()), NfStatus::Ok);
+            assert_eq!(
+                nf_session_push_image(whole.0, index, 8, frame.as_ptr(), frame.len(), 4),
+                NfStatus::Ok
+            );
+            // Of a running mean with twice the samples, the other half is new
+            assert_eq!(nf_session_push_running(cut.0, index, 16, mean.as_ptr(), mean.len()), NfStatus::Ok);
+            assert_eq!(nf_session_push_running(cut.0, index, 16, mean.as_ptr(), mean.len()), NfStatus::Batch);
+        }
+    }
+    let expected: Vec<f32> = frame.chunks(4).flat_map(|p| p[..3].to_vec()).collect();
+    assert_eq!(image(&whole), expected);
+    let far = image(&cut).iter().zip(&expected).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+    assert!(far < 1e-6, "{far}");
+}
+
+#[test]
+fn a_resumed_session_ends_as_the_uninterrupted_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = CString::new(folder.path().join("session.nfc").to_str().unwrap()).unwrap();
+    let whole = session(&params());
+    round(&whole, 1);
+    // SAFETY: living handles, and text.
+    unsafe {
+        assert_eq!(nf_session_save(whole.0, c"wall".as_ptr(), path.as_ptr()), NfStatus::Ok, "{}", message());
+        let other = session(&params());
+        assert_eq!(nf_session_resume(other.0, c"hall".as_ptr(), path.as_ptr()), NfStatus::Checkpoint);
+        assert!(message().contains("its job is wall, not hall"), "{}", message());
+        assert_eq!(states(&other)[0].spp, 0, "a failure changes nothing");
+        assert_eq!(
+            nf_session_resume(other.0, c"wall".as_ptr(), path.as_ptr()),
+            NfStatus::Ok,
+            "{}",
+            message()
+        );
+        assert_eq!(nf_session_resume(other.0, c"wall".as_ptr(), c"/nowhere/at/all".as_ptr()), NfStatus::Io);
+        for session in [&whole, &other] {
+            while open(session) > 0 {
+                round(session, 2);
+            }
+        }
+        assert_eq!(states(&whole), states(&other));
+        assert_eq!(image(&whole), image(&other));
+        let lost = CString::new(folder.path().join("no/such/folder").to_str().unwrap()).unwrap();
+        assert_eq!(nf_session_save(whole.0, c"wall".as_ptr(), lost.as_ptr()), NfStatus::Io);
+    }
+}
+
+#[test]
+fn every_pointer_may_be_null_and_none_is_followed_then() {
+    use NfStatus::NullPointer;
+    let session = session(&params());
+    let (s, mut n) = (session.0, 0);
+    let mean = [0.5_f32; 3 * EDGE * EDGE];
+    // SAFETY: null pointers are checked for; all others lead to variables of this function.
+    unsafe {
+        nf_oracle_free(null_mut());
+        nf_session_free(null_mut());
+        assert_eq!(nf_session_tile_count(null()), 0);
+        let mut oracle = null_mut();
+        let made = [
+            nf_params_default(null_mut()),
+            nf_oracle_bundled(0.9, null_mut()),
+            nf_oracle_load(null(), 0.9, &mut oracle),
+            nf_session_new(8, 8, null(), null(), &mut null_mut()),
+        ];
+        assert_eq!(made, [NullPointer; 4]);
+        assert!(oracle.is_null());
+        let without_session = [
+            nf_session_tile(null(), 0, &mut NfTile::default()),
+            nf_session_requests(null(), null_mut(), 0, &mut n),
+            nf_session_push(null(), 0, 1, mean.as_ptr(), mean.len()),
+            nf_session_push_running(null(), 0, 1, mean.as_ptr(), mean.len()),
+            nf_session_push_image(null(), 0, 1, mean.as_ptr(), mean.len(), 3),
+            nf_session_judge(null(), &mut n),
+            nf_session_open_tiles(null(), &mut n),
+            nf_session_states(null(), null_mut(), 0),
+            nf_session_close_all(null(), NF_REASON_CANCELLED),
+            nf_session_expected_samples(null(), &mut 0),
+            nf_session_image(null(), null_mut(), 0),
+            nf_session_visible_noise(null(), null_mut(), 0),
+            nf_session_save(null(), c"".as_ptr(), c"".as_ptr()),
+            nf_session_resume(null(), c"".as_ptr(), c"".as_ptr()),
+        ];
+        assert_eq!(without_session, [NullPointer; 14]);
+        let without_place = [
+            nf_session_tile(s, 0, null_mut()),
+            nf_session_requests(s, null_mut(), 9, &mut n),
+            nf_session_requests(s, [NfRequest::default(); 9].as_mut_ptr(), 9, null_mut()),
+            nf_session_push(s, 0, 1, null(), mean.len()),
+            nf_session_push_running(s, 0, 1, null(), mean.len()),
+            nf_session_push_image(s, 0, 1, null(), 3 * PIXELS, 3),
+            nf_session_open_tiles(s, null_mut()),
+            nf_session_states(s, null_mut(), 9),
+            nf_session_image(s, null_mut(), 3 * PIXELS),
+            nf_session_visible_noise(s, null_mut(), PIXELS),
+            nf_session_save(s, null(), c"x".as_ptr()),
+            nf_session_save(s, c"x".as_ptr(), null()),
+            nf_session_resume(s, null(), c"x".as_ptr()),
+            nf_session_resume(s, c"x".as_ptr(), null()),
+        ];
+        assert_eq!(without_place, [NullPointer; 14]);
+        let odd = mean.as_ptr().cast::<u8>().add(1).cast();
+        assert_eq!(nf_session_push(s, 0, 1, odd, mean.len()), NullPointer);
+        assert_eq!(message(), "mean is not aligned");
+    }
+    assert_eq!(states(&session)[0].spp, 0);
+}
+
+#[test]
+fn sizes_tiles_and_parameters_are_checked() {
+    use NfStatus::{Argument, Batch, Io, Model, Size, Unavailable};
+    let session = session(&params());
+    let (s, mean) = (session.0, [0.5_f32; 4 * PIXELS]);
+    let (whole, mut out) = (3 * EDGE * EDGE, [0.0_f32; 4]);
+    // SAFETY: arrays are as long as said or longer.
+    unsafe {
+        for wrong in [0, 1, whole - 1, whole + 1, usize::MAX] {
+            assert_eq!(nf_session_push(s, 0, 1, mean.as_ptr(), wrong), Size);
+            assert_eq!(message(), format!("mean has {wrong} elements instead of {whole}"));
+            assert_eq!(nf_session_push_image(s, 0, 1, mean.as_ptr(), wrong, 3), Size);
+        }
+        assert_eq!(nf_session_push_image(s, 0, 1, mean.as_ptr(), usize::MAX, usize::MAX), Argument);
+        assert_eq!(nf_session_push(s, 9, 1, mean.as_ptr(), whole), Batch);
+        assert_eq!(nf_session_push(s, usize::MAX, 1, mean.as_ptr(), whole), Batch);
+        assert_eq!(nf_session_push(s, 0, 0, mean.as_ptr(), whole), Batch);
+        assert_eq!(nf_session_states(s, [NfTileState::default(); 8].as_mut_ptr(), 8), Size);
+        assert_eq!(nf_session_tile(s, 9, &mut NfTile::default()), Batch);
+        assert_eq!(nf_session_requests(s, [NfRequest::default(); 8].as_mut_ptr(), 8, &mut 0), Size);
+        assert_eq!(nf_session_image(s, out.as_mut_ptr(), 4), Size);
+        assert_eq!(nf_session_visible_noise(s, out.as_mut_ptr(), 4), Size);
+        let mut map = vec![0.0; PIXELS];
+        assert_eq!(nf_session_visible_noise(s, map.as_mut_ptr(), PIXELS), Unavailable);
+        assert_eq!(nf_session_expected_samples(s, &mut 0), Unavailable);
+        for wrong in [NF_REASON_OPEN, NF_REASON_CONVERGED, NF_REASON_MAX_SPP, 99] {
+            assert_eq!(nf_session_close_all(s, wrong), Argument);
+        }
+
+        let mut oracle = null_mut();
+        assert_eq!(nf_oracle_bundled(1.5, &mut oracle), Argument);
+        assert_eq!(nf_oracle_load(c"/nowhere/at/all".as_ptr(), 0.9, &mut oracle), Io);
+        assert_eq!(nf_oracle_load(c"\xff".as_ptr(), 0.9, &mut oracle), Argument);
+        let here = CString::new(concat!(env!("CARGO_MANIFEST_DIR"), "/src/tests.rs")).unwrap();
+        assert_eq!(nf_oracle_load(here.as_ptr(), 0.9, &mut oracle), Model);
+        assert!(oracle.is_null());
+        assert_eq!(nf_oracle_bundled(0.9, &mut oracle), NfStatus::Ok);
+        let new =
+            |size: usize, params: &NfParams| nf_session_new(size, size, oracle, params, &mut null_mut());
+        let ok = params();
+        assert_eq!(new(0, &ok), Size);
+        assert_eq!(new(usize::MAX, &ok), Size);
+        assert_eq!(new(64, &NfParams { tile: 0, ..ok }), Size);
+        assert_eq!(new(64, &NfParams { schedule: 2, ..ok }), Argument);
+        assert_eq!(new(64, &NfParams { tone_mapping: 7, ..ok }), Argument);
+        assert_eq!(new(64, &NfParams { key: f32::NAN, ..ok }), Argument);
+        assert_eq!(new(64, &NfParams { step: 1, ..ok }), Argument);
+        assert_eq!(new(64, &NfParams { viewing: c"moon".as_ptr(), ..ok }), Argument);
+        nf_oracle_free(oracle);
+    }
+}
+
+#[test]
+fn a_caller_can_end_all_tiles() {
+    let session = session(&params());
+    round(&session, 1);
+    // SAFETY: a living handle.
+    assert_eq!(unsafe { nf_session_close_all(session.0, NF_REASON_TIME_LIMIT) }, NfStatus::Ok);
+    assert_eq!(open(&session), 0);
+    assert!(states(&session).iter().any(|state| state.reason == NF_REASON_TIME_LIMIT));
+}
+
+#[test]
+fn a_panic_is_a_status_and_breaks_only_its_session() {
+    let (broken, whole) = (session(&params()), session(&params()));
+    // SAFETY: a living handle.
+    let inside = unsafe { &*broken.0 };
+    let status = guard(|| {
+        let _locked = inside.lock()?;
+        panic!("tile {} is odd", 7)
+    });
+    assert_eq!(
+        (status, message().as_str()),
+        (NfStatus::Internal, "noisefloor made a mistake: tile 7 is odd")
+    );
+    // SAFETY: living handles.
+    unsafe {
+        assert_eq!(nf_session_judge(broken.0, null_mut()), NfStatus::Internal);
+        assert_eq!(nf_session_judge(whole.0, null_mut()), NfStatus::Ok);
+    }
+    assert_eq!(guard(|| panic!()), NfStatus::Internal);
+}
+
+#[test]
+fn a_model_that_does_not_fit_says_so() {
+    let failure = Failure::from(CriterionError::NoReference("the oracle".into()));
+    assert_eq!(failure.status, NfStatus::Criterion);
+    assert!(failure.message.contains("needs a ray-traced reference"), "{}", failure.message);
+}
+
+#[test]
+fn messages_belong_to_their_thread() {
+    assert_eq!(guard(|| Err(Failure::new(NfStatus::Argument, "here\0!"))), NfStatus::Argument);
+    std::thread::scope(|scope| {
+        scope.spawn(|| assert_eq!(message(), ""));
+    });
+    assert_eq!(message(), "here?!");
+    // SAFETY: text of this library.
+    assert_eq!(unsafe { CStr::from_ptr(nf_version()) }.to_str(), Ok(env!("CARGO_PKG_VERSION")));
+}

@@ -1,0 +1,65 @@
+"""Tells progressive renderers, tile by tile, when people stop seeing noise.
+
+A renderer pushes samples into a Session, which names the tiles that need more and says when each is done:
+
+    import noisefloor
+
+    session = noisefloor.Session(width, height)
+    while not session.done:
+        for request in session.requests():
+            session.push(request.tile, request.spp, render(request))   # float32, (height, width, 3)
+        session.judge()
+    picture = session.image()
+
+judge() judges finished pictures, and metrics() compares two. Pictures are arrays of shape (height, width, 3)
+with linear radiance, Rec. 709 primaries. C-contiguous float32 arrays are read where they lie; others are
+converted.
+Every error is a noisefloor.Error.
+"""
+
+from ._noisefloor import (
+    BatchError,
+    CheckpointError,
+    CriterionError,
+    Error,
+    Judged,
+    Metrics,
+    ModelError,
+    Oracle,
+    ParameterError,
+    Params,
+    PictureError,
+    Request,
+    Session,
+    SizeError,
+    Stop,
+    Tile,
+    Verdict,
+    Viewing,
+    __version__,
+    judge,
+    metrics,
+)
+
+__all__ = [
+    "BatchError",
+    "CheckpointError",
+    "CriterionError",
+    "Error",
+    "Judged",
+    "Metrics",
+    "ModelError",
+    "Oracle",
+    "ParameterError",
+    "Params",
+    "PictureError",
+    "Request",
+    "Session",
+    "SizeError",
+    "Stop",
+    "Tile",
+    "Verdict",
+    "Viewing",
+    "judge",
+    "metrics",
+]

@@ -1,0 +1,70 @@
+//! Exceptions.
+
+use noisefloor_rivals::MetricError;
+use pyo3::exceptions::PyException;
+use pyo3::{PyErr, create_exception};
+use std::path::Path;
+
+create_exception!(noisefloor, Error, PyException, "Whatever goes wrong in noisefloor.");
+create_exception!(noisefloor, ParameterError, Error, "A parameter is out of its range, or no such thing.");
+create_exception!(
+    noisefloor,
+    SizeError,
+    Error,
+    "An array, a picture or a tile has another size than it must have."
+);
+create_exception!(
+    noisefloor,
+    BatchError,
+    Error,
+    "A tile that does not exist, or a batch without new samples."
+);
+create_exception!(noisefloor, ModelError, Error, "A model file is damaged, foreign, or of another version.");
+create_exception!(noisefloor, CriterionError, Error, "The model cannot judge this.");
+create_exception!(noisefloor, CheckpointError, Error, "A checkpoint is damaged, foreign, or of another job.");
+create_exception!(noisefloor, PictureError, Error, "Pictures cannot be judged or compared.");
+
+/// An error of the Rust library as an exception.
+pub(crate) trait Raise {
+    fn raise(self) -> PyErr;
+}
+
+macro_rules! raised_as {
+    ($($error:ty => $exception:ident),* $(,)?) => {
+        $(impl Raise for $error {
+            fn raise(self) -> PyErr {
+                $exception::new_err(self.to_string())
+            }
+        })*
+    };
+}
+
+raised_as! {
+    noisefloor::ParamsError => ParameterError,
+    noisefloor::ThresholdError => ParameterError,
+    noisefloor::ViewingTextError => ParameterError,
+    noisefloor::TileError => SizeError,
+    noisefloor::FilmError => BatchError,
+    noisefloor::ModelError => ModelError,
+    noisefloor::CriterionError => CriterionError,
+    noisefloor::CheckpointError => CheckpointError,
+    noisefloor::StillError => PictureError,
+    MetricError => PictureError,
+}
+
+impl Raise for noisefloor::SessionError {
+    fn raise(self) -> PyErr {
+        match self {
+            Self::Params(error) => error.raise(),
+            Self::Tile(error) => error.raise(),
+            Self::Film(error) => error.raise(),
+            Self::Criterion(error) => error.raise(),
+            other => ParameterError::new_err(other.to_string()),
+        }
+    }
+}
+
+/// OSError, or the one of its subclasses that fits, with the name of the file.
+pub(crate) fn file_error(path: &Path, error: &std::io::Error) -> PyErr {
+    std::io::Error::new(error.kind(), format!("{}: {error}", path.display())).into()
+}

@@ -1,0 +1,48 @@
+//! noisefloor for Python: the module `noisefloor._noisefloor`, which `python/noisefloor/__init__.py`
+//! re-exports.
+//!
+//! - `errors.rs`: one exception for each kind of error;
+//! - `arrays.rs`: between numpy and slices;
+//! - `params.rs`, `oracle.rs`, `verdicts.rs`, `session.rs`: the push session;
+//! - `stills.rs`, `metrics.rs`: finished pictures.
+//!
+//! What takes long runs without the interpreter's lock. Its types never change, or stand behind a lock of
+//! their own.
+
+mod arrays;
+mod errors;
+mod metrics;
+mod oracle;
+mod params;
+mod session;
+mod stills;
+mod verdicts;
+
+use pyo3::prelude::*;
+
+#[pymodule]
+mod _noisefloor {
+    #[pymodule_export]
+    use crate::errors::{
+        BatchError, CheckpointError, CriterionError, Error, ModelError, ParameterError, PictureError,
+        SizeError,
+    };
+    #[pymodule_export]
+    use crate::metrics::{PyMetrics, metrics};
+    #[pymodule_export]
+    use crate::oracle::PyOracle;
+    #[pymodule_export]
+    use crate::params::{PyParams, PyViewing};
+    #[pymodule_export]
+    use crate::session::PySession;
+    #[pymodule_export]
+    use crate::stills::{PyJudged, judge};
+    #[pymodule_export]
+    use crate::verdicts::{PyRequest, PyStop, PyTile, PyVerdict};
+    use pyo3::prelude::*;
+
+    #[pymodule_init]
+    fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        module.add("__version__", env!("CARGO_PKG_VERSION"))
+    }
+}

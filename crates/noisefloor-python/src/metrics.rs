@@ -1,0 +1,108 @@
+//! Metrics of a picture against a reference.
+
+use crate::arrays::{Pixels, pixels, plane};
+use crate::errors::{Raise, SizeError};
+use crate::params::{ViewingLike, tone_mapping};
+use noisefloor::{Display, Rgb, Viewing};
+use noisefloor_rivals::metrics::{MetricMaps, MetricPair, MetricScores};
+use numpy::PyArray2;
+use pyo3::prelude::*;
+
+/// How far a picture is from a reference.
+#[pyclass(frozen, name = "Metrics", module = "noisefloor")]
+pub(crate) struct PyMetrics {
+    scores: MetricScores,
+    maps: MetricMaps,
+}
+
+#[pymethods]
+impl PyMetrics {
+    /// ColorVideoVDP in JOD: 10 is no visible difference; at 9, three of four people prefer the reference.
+    #[getter]
+    fn cvvdp_jod(&self) -> f64 {
+        self.scores.cvvdp_jod
+    }
+
+    /// Peak signal-to-noise ratio of display values in dB; infinite for equal pictures.
+    #[getter]
+    fn psnr(&self) -> f64 {
+        self.scores.psnr
+    }
+
+    /// Mean of (x - r)² / (r² + 0.01) of linear radiance.
+    #[getter]
+    fn rel_mse(&self) -> f64 {
+        self.scores.rel_mse
+    }
+
+    /// Mean of FLIP in 0 to 1; None if the module was built without the feature "flip".
+    #[getter]
+    fn flip(&self) -> Option<f64> {
+        self.scores.flip
+    }
+
+    /// Largest value of butteraugli; None if the module was built without the feature "butteraugli".
+    #[getter]
+    fn butteraugli(&self) -> Option<f64> {
+        self.scores.butteraugli
+    }
+
+    /// The JODs that ColorVideoVDP takes off at each pixel: float32 of shape (height, width).
+    fn cvvdp_map<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f32>>> {
+        let map = &self.maps.cvvdp;
+        plane(py, (map.width, map.height), map.values.clone())
+    }
+
+    fn __repr__(&self) -> String {
+        let MetricScores { cvvdp_jod, psnr, rel_mse, .. } = self.scores;
+        format!("<noisefloor.Metrics: {cvvdp_jod:.3} JOD, {psnr:.2} dB, relMSE {rel_mse:.3e}>")
+    }
+}
+
+/// Compares a picture with a reference, both of shape (height, width, 3), linear radiance: a Metrics.
+///
+/// Both are shown through one tone mapping ("reinhard" or "srgb"), settled for the reference; see Params.
+/// viewing is a Viewing or its text, for ColorVideoVDP; None is "desk". The interpreter's lock is released
+/// meanwhile.
+///
+/// Raises SizeError, ParameterError, and PictureError if a value is not finite or the pictures are too small.
+#[pyfunction]
+#[pyo3(signature = (image, reference, *, tone_mapping = "reinhard", key = 0.18, white = None, exposure = 1.0,
+    viewing = None))]
+#[expect(clippy::too_many_arguments, reason = "Python names them")]
+pub(crate) fn metrics(
+    py: Python<'_>,
+    image: Pixels<'_>,
+    reference: Pixels<'_>,
+    tone_mapping: &str,
+    key: f32,
+    white: Option<f32>,
+    exposure: f32,
+    viewing: Option<ViewingLike>,
+) -> PyResult<PyMetrics> {
+    let tone = self::tone_mapping(tone_mapping, key, white, exposure)?;
+    let viewing = ViewingLike::checked(viewing)?;
+    let (width, height, image) = pixels(&image, "image")?;
+    let (other_width, other_height, reference) = pixels(&reference, "reference")?;
+    if (width, height) != (other_width, other_height) {
+        let message = format!(
+            "image has shape ({height}, {width}, 3), and reference ({other_height}, {other_width}, 3)"
+        );
+        return Err(SizeError::new_err(message));
+    }
+    // Copies, so that nobody changes them while they are compared without the interpreter
+    let (image, reference) = (image.into_owned(), reference.into_owned());
+    py.detach(|| measure((width, height), &image, &reference, &tone.settle(&reference), &viewing))
+}
+
+fn measure(
+    size: (usize, usize),
+    image: &[Rgb],
+    reference: &[Rgb],
+    display: &Display,
+    viewing: &Viewing,
+) -> PyResult<PyMetrics> {
+    let pair = MetricPair { size, image, reference, display, viewing };
+    let (scores, maps) = pair.measure().map_err(Raise::raise)?;
+    Ok(PyMetrics { scores, maps })
+}

@@ -1,0 +1,183 @@
+//! Parameters, unchecked until a session or a picture uses them, and viewing conditions.
+
+use crate::errors::{ParameterError, Raise};
+use noisefloor::{Audience, Params, Schedule, ToneMapping, Viewing};
+use pyo3::prelude::*;
+
+/// Viewing(conditions="desk") --
+///
+/// A display, the light in the room, and how far away the display is.
+///
+/// conditions is a preset ("desk", "laptop", "tv", "phone", "cinema", or a display of ColorVideoVDP such as
+/// "standard_4k"), numbers ("ppd=60,peak=300,black=0.3,ambient=100": pixels per degree, cd/m², cd/m², lux),
+/// or a preset with changes ("desk,distance=1.2": metres).
+///
+/// Raises ParameterError if there are no such conditions, or a number is out of range.
+#[pyclass(frozen, eq, name = "Viewing", module = "noisefloor", from_py_object)]
+#[derive(Clone, Copy, PartialEq)]
+pub(crate) struct PyViewing(pub(crate) Viewing);
+
+#[pymethods]
+impl PyViewing {
+    #[new]
+    #[pyo3(signature = (conditions = "desk"))]
+    fn new(conditions: &str) -> PyResult<Self> {
+        conditions.parse().map(Self).map_err(Raise::raise)
+    }
+
+    /// Pixels per degree of visual angle in the centre of the picture.
+    #[getter]
+    fn pixels_per_degree(&self) -> f64 {
+        self.0.pixels_per_degree()
+    }
+
+    /// Luminance of white in cd/m².
+    #[getter]
+    fn peak(&self) -> f64 {
+        self.0.params().peak
+    }
+
+    /// Luminance of black in a dark room in cd/m².
+    #[getter]
+    fn black(&self) -> f64 {
+        self.0.params().black
+    }
+
+    /// Light of the room that falls on the display, in lux.
+    #[getter]
+    fn ambient(&self) -> f64 {
+        self.0.params().ambient
+    }
+
+    fn __str__(&self) -> String {
+        self.0.to_string()
+    }
+
+    fn __repr__(&self) -> String {
+        format!("Viewing({:?})", self.0.to_string())
+    }
+}
+
+/// When tiles are judged, how the picture is displayed, and the limits that end tiles.
+///
+/// tile: edge of a tile in pixels, 16 to 512.
+/// tone_mapping: "reinhard" (exposure by the log-average of the picture, with key and white) or "srgb" (with
+///     exposure, a factor on radiance).
+/// viewing: on which display the picture is seen, and from how far; a Viewing or its text.
+/// schedule: "every" step samples per pixel, or "spaced" by the expected need in multiples of step.
+/// min_spp, max_spp: fewest and most samples per pixel of a tile.
+/// consecutive: verdicts in a row that must say "converged".
+/// audience: (slope, offset) of the line from thresholds of the training data to those of your viewers;
+///     None is (1, 0).
+///
+/// Raises ParameterError if a value is out of range.
+#[pyclass(frozen, eq, name = "Params", module = "noisefloor", from_py_object)]
+#[derive(Clone, Copy, PartialEq)]
+pub(crate) struct PyParams(pub(crate) Params);
+
+/// A Viewing, or its text.
+#[derive(FromPyObject)]
+pub(crate) enum ViewingLike {
+    Made(PyViewing),
+    Text(String),
+}
+
+impl ViewingLike {
+    /// The conditions; the default without any.
+    pub(crate) fn checked(this: Option<Self>) -> PyResult<Viewing> {
+        match this {
+            None => Ok(Viewing::default()),
+            Some(Self::Made(viewing)) => Ok(viewing.0),
+            Some(Self::Text(text)) => {
+                text.parse().map_err(|error: noisefloor::ViewingTextError| error.raise())
+            }
+        }
+    }
+}
+
+/// Tone mapping by its name.
+pub(crate) fn tone_mapping(name: &str, key: f32, white: Option<f32>, exposure: f32) -> PyResult<ToneMapping> {
+    let tone = match name {
+        "reinhard" => ToneMapping::Reinhard { key, white },
+        "srgb" => ToneMapping::Srgb { exposure },
+        _ => {
+            return Err(ParameterError::new_err(format!(
+                "{name:?} is no tone mapping: use \"reinhard\" or \"srgb\""
+            )));
+        }
+    };
+    tone.check().map_err(|error| ParameterError::new_err(error.to_string()))?;
+    Ok(tone)
+}
+
+#[pymethods]
+impl PyParams {
+    #[new]
+    #[pyo3(signature = (*, tile = 128, tone_mapping = "reinhard", key = 0.18, white = None, exposure = 1.0,
+        viewing = None, schedule = "every", step = 100, min_spp = 100, max_spp = 10_000, consecutive = 1,
+        audience = None))]
+    #[expect(clippy::too_many_arguments, reason = "Python names them")]
+    fn new(
+        tile: usize,
+        tone_mapping: &str,
+        key: f32,
+        white: Option<f32>,
+        exposure: f32,
+        viewing: Option<ViewingLike>,
+        schedule: &str,
+        step: u64,
+        min_spp: u64,
+        max_spp: u64,
+        consecutive: u32,
+        audience: Option<(f64, f64)>,
+    ) -> PyResult<Self> {
+        let schedule = match schedule {
+            "every" => Schedule::Every { step },
+            "spaced" => Schedule::Spaced { step },
+            other => {
+                let message = format!("{other:?} is no schedule: use \"every\" or \"spaced\"");
+                return Err(ParameterError::new_err(message));
+            }
+        };
+        let params = Params {
+            tile,
+            tone_mapping: self::tone_mapping(tone_mapping, key, white, exposure)?,
+            viewing: ViewingLike::checked(viewing)?,
+            schedule,
+            min_spp,
+            max_spp,
+            consecutive,
+            audience: audience.map_or(Audience::TRAINED, |(slope, offset)| Audience { slope, offset }),
+        };
+        params.check().map_err(Raise::raise)?;
+        Ok(Self(params))
+    }
+
+    /// Edge of a tile in pixels.
+    #[getter]
+    fn tile(&self) -> usize {
+        self.0.tile
+    }
+
+    /// On which display the picture is seen, and from how far.
+    #[getter]
+    fn viewing(&self) -> PyViewing {
+        PyViewing(self.0.viewing)
+    }
+
+    /// Fewest samples per pixel at which a tile may stop.
+    #[getter]
+    fn min_spp(&self) -> u64 {
+        self.0.min_spp
+    }
+
+    /// Samples per pixel at which every tile stops.
+    #[getter]
+    fn max_spp(&self) -> u64 {
+        self.0.max_spp
+    }
+
+    fn __repr__(&self) -> String {
+        format!("{:?}", self.0)
+    }
+}

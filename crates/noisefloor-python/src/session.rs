@@ -1,0 +1,289 @@
+//! The push session.
+
+use crate::arrays::{Pixels, picture, pixels, plane};
+use crate::errors::{BatchError, CheckpointError, Error, ParameterError, Raise, SizeError, file_error};
+use crate::oracle::PyOracle;
+use crate::params::PyParams;
+use crate::verdicts::{PyRequest, PyStop, PyVerdict, TileLike};
+use noisefloor::{Checkpoint, Oracle, Params, Rgb, Session, StopReason, Tile, TileGrid};
+use numpy::{PyArray2, PyArray3};
+use pyo3::prelude::*;
+use pyo3::sync::MutexExt;
+use std::fs::File;
+use std::io::{BufReader, BufWriter};
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, MutexGuard};
+
+/// Film, oracle and limits of one picture: a renderer pushes samples, and is told which tiles need more.
+///
+/// width, height: of the picture in pixels, each up to 65536, 2**28 in all. It takes 36 bytes a pixel.
+/// oracle: an Oracle; None is Oracle(). params: a Params; None is Params().
+///
+/// Threads may call any method at any time; calls take turns. The interpreter's lock is released while
+/// judging.
+///
+/// Raises SizeError if the picture or a tile has an impossible size.
+#[pyclass(frozen, name = "Session", module = "noisefloor")]
+pub(crate) struct PySession {
+    session: Mutex<Session<Oracle>>,
+    grid: TileGrid,
+}
+
+const BROKEN: &str = "the session cannot be used since an error inside the library";
+
+impl PySession {
+    /// The session, for something short. Others may have the interpreter while this waits.
+    fn attached(&self, py: Python<'_>) -> PyResult<MutexGuard<'_, Session<Oracle>>> {
+        self.session.lock_py_attached(py).map_err(|_| Error::new_err(BROKEN))
+    }
+
+    /// Does something long without the interpreter.
+    fn detached<T: Send>(
+        &self,
+        py: Python<'_>,
+        work: impl FnOnce(&mut Session<Oracle>) -> T + Send,
+    ) -> PyResult<T> {
+        py.detach(|| self.session.lock().map(|mut session| work(&mut session)).ok())
+            .ok_or_else(|| Error::new_err(BROKEN))
+    }
+
+    fn size(&self) -> (usize, usize) {
+        (self.grid.width(), self.grid.height())
+    }
+
+    fn tile(&self, tile: &TileLike<'_>) -> PyResult<Tile> {
+        let (index, all) = (tile.index(), self.grid.len());
+        if index < all {
+            return Ok(self.grid.tile(index));
+        }
+        Err(BatchError::new_err(format!("tile {index} does not exist: there are {all}")))
+    }
+
+    /// Checks the shape of a batch.
+    fn batch<'a>(&self, tile: Tile, mean: &'a Pixels<'_>) -> PyResult<std::borrow::Cow<'a, [Rgb]>> {
+        let (width, height, pixels) = pixels(mean, "mean")?;
+        if (width, height) != (tile.width, tile.height) {
+            let Tile { index, width: w, height: h, .. } = tile;
+            let message = format!("mean has shape ({height}, {width}, 3), and tile {index} is ({h}, {w}, 3)");
+            return Err(SizeError::new_err(message));
+        }
+        Ok(pixels)
+    }
+
+    /// A value for each tile, on all of its pixels.
+    fn spread<T: Copy + Default>(&self, value: impl Fn(usize) -> T) -> Vec<T> {
+        let width = self.grid.width();
+        let mut all = vec![T::default(); width * self.grid.height()];
+        for tile in self.grid.tiles() {
+            let value = value(tile.index);
+            tile.rows(width).for_each(|row| all[row].fill(value));
+        }
+        all
+    }
+}
+
+#[pymethods]
+impl PySession {
+    #[new]
+    #[pyo3(signature = (width, height, oracle = None, params = None))]
+    fn new(
+        width: usize,
+        height: usize,
+        oracle: Option<PyRef<'_, PyOracle>>,
+        params: Option<PyParams>,
+    ) -> PyResult<Self> {
+        let oracle = oracle.map_or_else(Oracle::bundled, |oracle| oracle.0.clone());
+        let params = params.map_or_else(Params::default, |params| params.0);
+        let session = Session::new(width, height, oracle, params).map_err(Raise::raise)?;
+        Ok(Self { grid: session.film().grid(), session: Mutex::new(session) })
+    }
+
+    /// Width of the picture in pixels.
+    #[getter]
+    fn width(&self) -> usize {
+        self.grid.width()
+    }
+
+    /// Height of the picture in pixels.
+    #[getter]
+    fn height(&self) -> usize {
+        self.grid.height()
+    }
+
+    /// Whether every tile is done.
+    #[getter]
+    fn done(&self, py: Python<'_>) -> PyResult<bool> {
+        Ok(self.attached(py)?.is_done())
+    }
+
+    /// Number of open tiles.
+    #[getter]
+    fn open_tiles(&self, py: Python<'_>) -> PyResult<usize> {
+        Ok(self.attached(py)?.open_tiles())
+    }
+
+    /// What the open tiles need next: a list of Request, empty when all are done.
+    fn requests(&self, py: Python<'_>) -> PyResult<Vec<PyRequest>> {
+        Ok(self.attached(py)?.requests().into_iter().map(PyRequest::from).collect())
+    }
+
+    /// Adds the mean of spp new samples per pixel of a tile (a Tile or its number).
+    ///
+    /// mean: array of shape (tile.height, tile.width, 3), linear radiance. Values that are not finite do not
+    /// count
+    ///     as samples. Tiles that are done accept samples, too: they improve, and stay done.
+    ///
+    /// Raises SizeError if the shape is another, BatchError if the tile does not exist or spp is 0.
+    fn push(&self, py: Python<'_>, tile: TileLike<'_>, spp: u64, mean: Pixels<'_>) -> PyResult<()> {
+        let tile = self.tile(&tile)?;
+        let pixels = self.batch(tile, &mean)?;
+        self.attached(py)?.push(tile.index, spp, &pixels).map_err(Raise::raise)
+    }
+
+    /// As push, for a renderer that keeps running means: the mean of all total samples per pixel so far. The
+    /// new samples are what it has more than the session.
+    ///
+    /// Raises SizeError, BatchError also if there are no new samples.
+    fn push_running(&self, py: Python<'_>, tile: TileLike<'_>, total: u64, mean: Pixels<'_>) -> PyResult<()> {
+        let tile = self.tile(&tile)?;
+        let pixels = self.batch(tile, &mean)?;
+        self.attached(py)?.push_running(tile.index, total, &pixels).map_err(Raise::raise)
+    }
+
+    /// Adds the mean of spp new samples per pixel of the whole picture to every open tile.
+    ///
+    /// image: array of shape (height, width, 3), linear radiance.
+    ///
+    /// Raises SizeError if the shape is another, BatchError if spp is 0.
+    fn push_image(&self, py: Python<'_>, spp: u64, image: Pixels<'_>) -> PyResult<()> {
+        let (width, height, pixels) = pixels(&image, "image")?;
+        if (width, height) != self.size() {
+            let (w, h) = self.size();
+            let message = format!("image has shape ({height}, {width}, 3), and the session ({h}, {w}, 3)");
+            return Err(SizeError::new_err(message));
+        }
+        let mut session = self.attached(py)?;
+        for tile in self.grid.tiles().filter(|tile| session.is_open(tile.index)).collect::<Vec<_>>() {
+            let mean: Vec<Rgb> = tile.rows(width).flat_map(|row| pixels[row].to_vec()).collect();
+            session.push(tile.index, spp, &mean).map_err(Raise::raise)?;
+        }
+        Ok(())
+    }
+
+    /// Judges the tiles that are due, on all cores, and returns a list of Stop: those that are now done.
+    ///
+    /// The first verdicts wait until every open tile has samples, unless tone_mapping is "srgb".
+    ///
+    /// Raises CriterionError if the model cannot judge these tiles.
+    fn judge(&self, py: Python<'_>) -> PyResult<Vec<PyStop>> {
+        let stops = self.detached(py, |session| session.judge())?.map_err(Raise::raise)?;
+        Ok(stops.into_iter().map(PyStop::from).collect())
+    }
+
+    /// All tiles that are done: a list of Stop, by their numbers.
+    fn stops(&self, py: Python<'_>) -> PyResult<Vec<PyStop>> {
+        Ok(self.attached(py)?.stops().map(PyStop::from).collect())
+    }
+
+    /// The last verdict on a tile (a Tile or its number); None before the first.
+    ///
+    /// Raises BatchError if the tile does not exist.
+    fn verdict(&self, py: Python<'_>, tile: TileLike<'_>) -> PyResult<Option<PyVerdict>> {
+        let tile = self.tile(&tile)?;
+        Ok(self.attached(py)?.verdict(tile.index).map(|verdict| PyVerdict::new(tile, verdict)))
+    }
+
+    /// Ends every open tile for "time-limit", "cancelled" or "failed", and returns them as a list of Stop.
+    ///
+    /// Raises ParameterError for any other reason.
+    fn close_all(&self, py: Python<'_>, reason: &str) -> PyResult<Vec<PyStop>> {
+        let reasons = [StopReason::TimeLimit, StopReason::Cancelled, StopReason::Failed];
+        let found = reasons.into_iter().find(|known| known.to_string() == reason);
+        let unknown = || ParameterError::new_err(format!("{reason:?} is no reason to end tiles"));
+        let reason = found.ok_or_else(unknown)?;
+        Ok(self.attached(py)?.close_all(reason).into_iter().map(PyStop::from).collect())
+    }
+
+    /// Samples still to be taken, over all pixels, as the oracle expects; None while it cannot tell for a
+    /// tile.
+    #[getter]
+    fn expected_samples(&self, py: Python<'_>) -> PyResult<Option<u64>> {
+        Ok(self.attached(py)?.expected_samples_to_go())
+    }
+
+    /// The picture so far: float32 of shape (height, width, 3), linear radiance; black without samples.
+    fn image<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f32>>> {
+        picture(py, self.size(), self.detached(py, |session| session.film().image())?)
+    }
+
+    /// Samples per pixel: uint64 of shape (height, width).
+    fn spp<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<u64>>> {
+        let session = self.attached(py)?;
+        plane(py, self.size(), self.spread(|tile| session.film().spp(tile)))
+    }
+
+    /// P of the last verdicts: float32 of shape (height, width); NaN where there is none.
+    fn probability<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f32>>> {
+        let session = self.attached(py)?;
+        let p = |tile| session.verdict(tile).and_then(|verdict| verdict.probability).unwrap_or(f32::NAN);
+        plane(py, self.size(), self.spread(p))
+    }
+
+    /// How visible the noise is, in the unit that the guide states: float32 of shape (height, width), NaN
+    /// where there is no evidence. Costs as much as a verdict on every tile. None before the first verdict,
+    /// or if the model makes no map.
+    fn visible_noise<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray2<f32>>>> {
+        let map = self.detached(py, |session| session.visible_noise())?;
+        map.map(|map| plane(py, self.size(), map)).transpose()
+    }
+
+    /// Writes a snapshot to a file, for resuming the session. The file is whole or not there.
+    ///
+    /// job: names all that the samples depend on: scene, seed, options of the renderer.
+    ///
+    /// Raises OSError if the file cannot be written, CheckpointError if it would be too large.
+    fn save(&self, py: Python<'_>, path: PathBuf, job: &str) -> PyResult<()> {
+        self.detached(py, |session| save(session, &path, job))?
+    }
+
+    /// Puts the session back where save() found it. Size, parameters, oracle and job must be the same. If the
+    /// renderer repeats its samples, all that follows is the same to the bit as without the interruption.
+    ///
+    /// Raises OSError if the file cannot be read, CheckpointError if it is damaged or of another job; the
+    /// session is then as it was.
+    fn resume(&self, py: Python<'_>, path: PathBuf, job: &str) -> PyResult<()> {
+        self.detached(py, |session| resume(session, &path, job))?
+    }
+
+    fn __repr__(&self) -> String {
+        let (width, height) = self.size();
+        format!("<noisefloor.Session: {width}×{height} pixels, {} tiles>", self.grid.len())
+    }
+}
+
+fn save(session: &Session<Oracle>, path: &Path, job: &str) -> PyResult<()> {
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+    // A file beside it takes its place once it is complete
+    let mut file = tempfile::NamedTempFile::new_in(folder.unwrap_or(Path::new(".")))
+        .map_err(|error| file_error(path, &error))?;
+    let written = session.checkpoint(job).write(BufWriter::new(&mut file));
+    written.map_err(|error| raise(path, error))?;
+    file.persist(path).map_err(|error| file_error(path, &error.error))?;
+    Ok(())
+}
+
+fn resume(session: &mut Session<Oracle>, path: &Path, job: &str) -> PyResult<()> {
+    let file = File::open(path).map_err(|error| file_error(path, &error))?;
+    let checkpoint = Checkpoint::read(BufReader::new(file)).map_err(|error| raise(path, error))?;
+    let grid = session.film().grid();
+    let fresh = Session::new(grid.width(), grid.height(), session.criterion().clone(), *session.params());
+    *session = fresh.map_err(Raise::raise)?.resume(job, checkpoint).map_err(|error| raise(path, error))?;
+    Ok(())
+}
+
+fn raise(path: &Path, error: noisefloor::CheckpointError) -> PyErr {
+    match error {
+        noisefloor::CheckpointError::Io(error) => file_error(path, &error),
+        other => CheckpointError::new_err(other.to_string()),
+    }
+}

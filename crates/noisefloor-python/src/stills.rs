@@ -1,0 +1,121 @@
+//! Finished pictures.
+
+use crate::arrays::{Pixels, pixels, plane};
+use crate::errors::{CriterionError, ParameterError, PictureError, Raise};
+use crate::oracle::PyOracle;
+use crate::params::PyParams;
+use crate::verdicts::PyVerdict;
+use noisefloor::{Evidence, Oracle, Params, Samples, SnapshotPair, Still, TileGrid};
+use numpy::PyArray2;
+use pyo3::prelude::*;
+
+/// What judge() found out about a picture.
+#[pyclass(frozen, name = "Judged", module = "noisefloor")]
+pub(crate) struct PyJudged {
+    size: (usize, usize),
+    verdicts: Vec<PyVerdict>,
+    samples: Samples,
+    visible_noise: Option<Vec<f32>>,
+}
+
+#[pymethods]
+impl PyJudged {
+    /// A list of Verdict, one for each tile.
+    #[getter]
+    fn verdicts(&self) -> Vec<PyVerdict> {
+        self.verdicts.clone()
+    }
+
+    /// "independent" or "nested": how the pictures share samples, as said or recognised.
+    #[getter]
+    fn samples(&self) -> &'static str {
+        match self.samples {
+            Samples::Independent => "independent",
+            Samples::Nested => "nested",
+        }
+    }
+
+    /// How visible the noise is, in the unit that the guide states: float32 of shape (height, width); None if
+    /// the model makes no map.
+    fn visible_noise<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray2<f32>>>> {
+        self.visible_noise.clone().map(|map| plane(py, self.size, map)).transpose()
+    }
+}
+
+/// Judges a picture by another rendering of the same view: a Judged with a verdict for each tile.
+///
+/// image: array of shape (height, width, 3), linear radiance, all finite. spp: its samples per pixel, above
+/// 0. against: another rendering, of the same shape; against_spp: its samples per pixel. samples:
+/// "independent" (different seeds), "nested" (two stages of one rendering), or None: recognised from the
+///     pictures, where they show it.
+/// oracle: an Oracle; None is Oracle(). params: tile size, display and audience; None is Params().
+///
+/// The interpreter's lock is released while judging.
+///
+/// Raises SizeError, ParameterError, CriterionError, and PictureError if the pictures cannot be judged.
+#[pyfunction]
+#[pyo3(signature = (image, spp, against, against_spp, *, samples = None, oracle = None, params = None))]
+#[expect(clippy::too_many_arguments, reason = "Python names them")]
+pub(crate) fn judge(
+    py: Python<'_>,
+    image: Pixels<'_>,
+    spp: f64,
+    against: Pixels<'_>,
+    against_spp: f64,
+    samples: Option<&str>,
+    oracle: Option<PyRef<'_, PyOracle>>,
+    params: Option<PyParams>,
+) -> PyResult<PyJudged> {
+    let samples = match samples {
+        None => None,
+        Some("independent") => Some(Samples::Independent),
+        Some("nested") => Some(Samples::Nested),
+        Some(other) => {
+            let message = format!("samples are \"independent\" or \"nested\", not {other:?}");
+            return Err(ParameterError::new_err(message));
+        }
+    };
+    let oracle = oracle.map_or_else(Oracle::bundled, |oracle| oracle.0.clone());
+    let params = params.map_or_else(Params::default, |params| params.0);
+    let (image, other) = (still(&image, spp, "image")?, still(&against, against_spp, "against")?);
+    py.detach(|| judge_still(&oracle, &params, &image, &other, samples))
+}
+
+/// A copy, so that nobody changes it while it is judged without the interpreter.
+fn still(array: &Pixels<'_>, spp: f64, what: &str) -> PyResult<Still> {
+    let (width, height, pixels) = pixels(array, what)?;
+    let pixels = pixels.into_owned();
+    let still =
+        Still { size: (width, height), pixels, spp, display_referred: false, rounding: 0.0, origin: None };
+    still.check().map_err(|error| PictureError::new_err(format!("{what}: {error}")))?;
+    Ok(still)
+}
+
+fn judge_still(
+    oracle: &Oracle,
+    params: &Params,
+    image: &Still,
+    other: &Still,
+    samples: Option<Samples>,
+) -> PyResult<PyJudged> {
+    let evidence = oracle.model().evidence();
+    let pair = SnapshotPair::new(evidence, image, &[other], params.tone_mapping, samples);
+    let pair = pair.map_err(Raise::raise)?.seen_on(params.viewing);
+    let grid = TileGrid::new(image.size.0, image.size.1, params.tile).map_err(Raise::raise)?;
+    let described = pair.describe(oracle, grid).map_err(Raise::raise)?;
+    let verdicts = oracle.judge_described_for(&described, params.audience).ok_or_else(|| {
+        CriterionError::new_err(
+            "the model does not tell noise from picture, and serves only the trained audience",
+        )
+    })?;
+    let visible_noise = match evidence {
+        Evidence::Halves => oracle.map_visible_noise(grid, |tile| pair.planes(tile).map(Some)),
+        _ => Ok(None),
+    };
+    Ok(PyJudged {
+        size: image.size,
+        verdicts: grid.tiles().zip(verdicts).map(|(tile, verdict)| PyVerdict::new(tile, verdict)).collect(),
+        samples: pair.samples(),
+        visible_noise: visible_noise.map_err(Raise::raise)?,
+    })
+}

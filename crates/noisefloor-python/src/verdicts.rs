@@ -1,0 +1,145 @@
+//! What a session says: tiles, requests, verdicts, stops.
+
+use noisefloor::{Request, Stop, Tile, Verdict};
+use pyo3::prelude::*;
+
+/// A rectangle of pixels that stops as a whole.
+#[pyclass(frozen, eq, hash, get_all, name = "Tile", module = "noisefloor")]
+#[derive(Clone, Copy, PartialEq, Eq, Hash)]
+pub(crate) struct PyTile {
+    /// Its number, in rows from the top left.
+    index: usize,
+    /// Left edge in pixels.
+    x: usize,
+    /// Top edge in pixels.
+    y: usize,
+    /// Width in pixels.
+    width: usize,
+    /// Height in pixels.
+    height: usize,
+}
+
+#[pymethods]
+impl PyTile {
+    /// The slices that cut the tile out of an array of the whole picture: image[tile.slices].
+    #[getter]
+    fn slices<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let slice = |start: usize, length: usize| {
+            pyo3::types::PySlice::new(py, start as isize, (start + length) as isize, 1)
+        };
+        Ok((slice(self.y, self.height), slice(self.x, self.width)).into_pyobject(py)?.into_any())
+    }
+
+    fn __repr__(&self) -> String {
+        let Self { index, x, y, width, height } = self;
+        format!("Tile(index={index}, x={x}, y={y}, width={width}, height={height})")
+    }
+}
+
+impl From<Tile> for PyTile {
+    fn from(Tile { index, x, y, width, height }: Tile) -> Self {
+        Self { index, x, y, width, height }
+    }
+}
+
+/// A tile, or its number.
+#[derive(FromPyObject)]
+pub(crate) enum TileLike<'py> {
+    Index(usize),
+    Tile(PyRef<'py, PyTile>),
+}
+
+impl TileLike<'_> {
+    pub(crate) fn index(&self) -> usize {
+        match self {
+            Self::Index(index) => *index,
+            Self::Tile(tile) => tile.index,
+        }
+    }
+}
+
+/// What an open tile needs next.
+#[pyclass(frozen, get_all, name = "Request", module = "noisefloor")]
+#[derive(Clone, Copy)]
+pub(crate) struct PyRequest {
+    /// The tile.
+    tile: PyTile,
+    /// Number of the first new sample, so that a renderer repeats none.
+    first: u64,
+    /// New samples per pixel. Fewer or more are fine.
+    spp: u64,
+}
+
+#[pymethods]
+impl PyRequest {
+    fn __repr__(&self) -> String {
+        format!("Request(tile={}, first={}, spp={})", self.tile.__repr__(), self.first, self.spp)
+    }
+}
+
+impl From<Request> for PyRequest {
+    fn from(Request { tile, first, spp }: Request) -> Self {
+        Self { tile: tile.into(), first, spp }
+    }
+}
+
+/// What the oracle says about one tile.
+#[pyclass(frozen, get_all, name = "Verdict", module = "noisefloor")]
+#[derive(Clone, Copy)]
+pub(crate) struct PyVerdict {
+    /// The tile.
+    tile: PyTile,
+    /// Whether the tile needs no more samples.
+    converged: bool,
+    /// Probability that an observer sees no difference from the converged picture; None if not known.
+    probability: Option<f32>,
+    /// Samples per pixel at which the tile is expected to be free of visible noise; None if not known.
+    expected_spp: Option<u64>,
+    /// Whether the tile is unlike all that the model was trained on: treat the verdict with care.
+    unfamiliar: bool,
+}
+
+#[pymethods]
+impl PyVerdict {
+    fn __repr__(&self) -> String {
+        let said = if self.converged { "converged" } else { "noise seen" };
+        let p = self.probability.map_or("unknown".to_owned(), |p| format!("{p:.3}"));
+        format!("<noisefloor.Verdict: tile {}, {said}, P {p}>", self.tile.index)
+    }
+}
+
+impl PyVerdict {
+    pub(crate) fn new(tile: Tile, verdict: Verdict) -> Self {
+        let Verdict { converged, probability, expected_spp, unfamiliar, .. } = verdict;
+        Self { tile: tile.into(), converged, probability, expected_spp, unfamiliar }
+    }
+}
+
+/// A tile that is done.
+#[pyclass(frozen, get_all, name = "Stop", module = "noisefloor")]
+#[derive(Clone)]
+pub(crate) struct PyStop {
+    /// The tile.
+    tile: PyTile,
+    /// Samples per pixel when it stopped.
+    spp: u64,
+    /// Probability, by the last verdict, that an observer sees no difference; None if never judged.
+    probability: Option<f32>,
+    /// "converged", "max-spp", "time-limit", "cancelled" or "failed".
+    reason: String,
+    /// Whether the last verdict called the tile unlike all that the model was trained on.
+    unfamiliar: bool,
+}
+
+#[pymethods]
+impl PyStop {
+    fn __repr__(&self) -> String {
+        format!("<noisefloor.Stop: tile {}, {} at {} spp>", self.tile.index, self.reason, self.spp)
+    }
+}
+
+impl From<Stop> for PyStop {
+    fn from(Stop { tile, spp, probability, reason, unfamiliar }: Stop) -> Self {
+        Self { tile: tile.into(), spp, probability, reason: reason.to_string(), unfamiliar }
+    }
+}

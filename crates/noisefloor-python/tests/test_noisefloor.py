@@ -1,0 +1,265 @@
+"""Tests of the installed module: python -m unittest discover crates/noisefloor-python/tests"""
+
+import ast
+import inspect
+import os
+import pathlib
+import tempfile
+import threading
+import time
+import unittest
+
+import numpy as np
+
+import noisefloor as nf
+
+EDGE = 32
+PARAMS = nf.Params(tile=EDGE, max_spp=400)
+
+
+def batch(tile, first, spp):
+    """A wall with noise that shrinks as it should; the same for the same samples."""
+    noise = np.random.default_rng([tile.index, first]).uniform(-1, 1, (tile.height, tile.width, 3))
+    return (0.5 + 0.4 * noise / np.sqrt(spp)).astype(np.float32)
+
+
+def finish(session):
+    while not session.done:
+        for request in session.requests():
+            session.push(request.tile, request.spp, batch(request.tile, request.first, request.spp))
+        session.judge()
+
+
+def stops(session):
+    return [(stop.tile.index, stop.spp, stop.probability, stop.reason) for stop in session.stops()]
+
+
+def noisy(seed, spp, shape=(64, 96, 3)):
+    ramp = np.linspace(0.2, 0.8, shape[1], dtype=np.float32)[None, :, None]
+    return (ramp + np.random.default_rng(seed).normal(0, 1 / np.sqrt(spp), shape)).astype(np.float32)
+
+
+class Sessions(unittest.TestCase):
+    def test_a_loop_ends_with_picture_stops_and_maps(self):
+        session = nf.Session(96, 80, params=PARAMS)
+        self.assertEqual((session.width, session.height, session.open_tiles), (96, 80, 9))
+        self.assertTrue(all(session.verdict(tile) is None for tile in range(9)))
+        self.assertTrue(np.isnan(session.probability()).all())
+        finish(session)
+        self.assertEqual(len(session.stops()), 9)
+        self.assertEqual(session.requests(), [])
+        self.assertEqual(session.expected_samples, 0)
+        picture, spp, p = session.image(), session.spp(), session.probability()
+        self.assertEqual((picture.shape, picture.dtype), ((80, 96, 3), np.float32))
+        self.assertEqual((spp.shape, spp.dtype, p.shape), ((80, 96), np.uint64, (80, 96)))
+        self.assertLess(abs(float(picture.mean()) - 0.5), 0.01)
+        for stop in session.stops():
+            self.assertTrue((spp[stop.tile.slices] == stop.spp).all())
+            self.assertTrue((p[stop.tile.slices] == np.float32(stop.probability)).all())
+        noise = session.visible_noise()
+        self.assertEqual((noise.shape, noise.dtype), ((80, 96), np.float32))
+
+    def test_pixels_lie_where_they_were_pushed(self):
+        session = nf.Session(96, 80, params=PARAMS)
+        frame = np.arange(80 * 96 * 3, dtype=np.float32).reshape(80, 96, 3)
+        for request in session.requests():
+            session.push(request.tile.index, 1, frame[request.tile.slices])  # a view, not contiguous
+        np.testing.assert_array_equal(session.image(), frame)
+        whole = nf.Session(96, 80, params=PARAMS)
+        whole.push_image(1, frame.astype(np.float64))  # converted
+        np.testing.assert_array_equal(whole.image(), frame)
+        whole.push_running(0, 2, np.full((EDGE, EDGE, 3), 7.0))
+        np.testing.assert_allclose(whole.image()[:EDGE, :EDGE], 7.0, rtol=1e-4)
+
+    def test_a_float32_array_is_read_where_it_lies(self):
+        statm = pathlib.Path("/proc/self/statm")
+        if not statm.exists():
+            self.skipTest("no /proc")
+        resident = lambda: int(statm.read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+        # 32 MiB: a copy would show in the resident size
+        session = nf.Session(2048, 1365, params=nf.Params(tile=512))
+        frame = np.ones((1365, 2048, 3), dtype=np.float32)
+        for _ in range(2):
+            session.push_image(1, frame)  # touches both halves of the film
+        peak, running, before = [0], [True], resident()
+        def watch():
+            while running[0]:
+                peak[0] = max(peak[0], resident())
+        watcher = threading.Thread(target=watch)
+        watcher.start()
+        for _ in range(3):
+            session.push_image(1, frame)
+        running[0] = False
+        watcher.join()
+        self.assertLess(peak[0] - before, frame.nbytes // 2)
+
+    def test_a_resumed_session_ends_as_the_uninterrupted_one(self):
+        whole, other = (nf.Session(64, 64, params=PARAMS) for _ in range(2))
+        for request in whole.requests():
+            whole.push(request.tile, request.spp, batch(request.tile, request.first, request.spp))
+        whole.judge()
+        with tempfile.TemporaryDirectory() as folder:
+            path = pathlib.Path(folder) / "session.nfc"
+            whole.save(path, "wall")
+            with self.assertRaisesRegex(nf.CheckpointError, "its job is wall, not hall"):
+                other.resume(path, "hall")
+            other.resume(str(path), "wall")
+            with self.assertRaises(FileNotFoundError):
+                other.resume(path.with_name("none"), "wall")
+            with self.assertRaises(FileNotFoundError):
+                whole.save(path.parent / "no" / "folder", "wall")
+            path.write_bytes(b"something else entirely")
+            with self.assertRaises(nf.CheckpointError):
+                other.resume(path, "wall")
+        finish(whole)
+        finish(other)
+        self.assertEqual(stops(whole), stops(other))
+        np.testing.assert_array_equal(whole.image(), other.image())
+
+    def test_threads_push_and_stops_stay_the_same(self):
+        alone, together = (nf.Session(96, 80, params=PARAMS) for _ in range(2))
+        finish(alone)
+        def push(part):
+            for r in part:
+                together.push(r.tile, r.spp, batch(r.tile, r.first, r.spp))
+        while not together.done:
+            wanted = together.requests()
+            threads = [threading.Thread(target=push, args=(wanted[i::4],)) for i in range(4)]
+            for thread in threads:
+                thread.start()
+            for thread in threads:
+                thread.join()
+            together.judge()
+        self.assertEqual(stops(alone), stops(together))
+
+    def test_others_run_while_the_oracle_judges(self):
+        session = nf.Session(1024, 1024, params=nf.Params(tile=64))
+        for seed in range(2):
+            session.push_image(50, noisy(seed, 50, (1024, 1024, 3)))
+        ticks, running = [], [True]
+        def tick():
+            while running[0]:
+                ticks.append(time.monotonic())
+        thread = threading.Thread(target=tick)
+        thread.start()
+        began = time.monotonic()
+        session.judge()
+        ended = time.monotonic()
+        running[0] = False
+        thread.join()
+        # With the lock held, no tick would fall into the middle of the call
+        middle = [t for t in ticks if began + 0.25 * (ended - began) < t < began + 0.75 * (ended - began)]
+        self.assertGreater(len(middle), 10)
+
+    def test_a_caller_can_end_all_tiles(self):
+        session = nf.Session(64, 64, params=PARAMS)
+        self.assertEqual([stop.reason for stop in session.close_all("time-limit")], ["time-limit"] * 4)
+        self.assertTrue(session.done)
+        with self.assertRaises(nf.ParameterError):
+            session.close_all("converged")
+
+
+class Errors(unittest.TestCase):
+    def test_every_error_is_typed_and_says_what_is_wrong(self):
+        session = nf.Session(96, 80, params=PARAMS)
+        black = np.zeros((EDGE, EDGE, 3), np.float32)
+        cases = [
+            (nf.SizeError, r"\(16, 32, 3\), and tile 0 is \(32, 32, 3\)", lambda: session.push(0, 1, black[:16])),
+            (nf.SizeError, r"\(height, width, 3\) is needed", lambda: session.push(0, 1, black[..., :2])),
+            (nf.SizeError, "and the session", lambda: session.push_image(1, black)),
+            (nf.SizeError, "0×5", lambda: nf.Session(0, 5)),
+            (nf.BatchError, "tile 9 does not exist", lambda: session.push(9, 1, black)),
+            (nf.BatchError, "no new samples", lambda: session.push(0, 0, black)),
+            (nf.BatchError, "tile 99", lambda: session.verdict(99)),
+            (nf.ParameterError, "step of 1", lambda: nf.Params(step=1)),
+            (nf.ParameterError, "tone mapping", lambda: nf.Params(tone_mapping="filmic")),
+            (nf.ParameterError, "positive finite", lambda: nf.Params(key=float("nan"))),
+            (nf.ParameterError, "schedule", lambda: nf.Params(schedule="never")),
+            (nf.ParameterError, "moon", lambda: nf.Viewing("moon")),
+            (nf.ParameterError, "moon", lambda: nf.Params(viewing="moon")),
+            (nf.ParameterError, "threshold", lambda: nf.Oracle(1.0)),
+            (nf.ModelError, "model", lambda: nf.Oracle(model=__file__)),
+            (FileNotFoundError, "nowhere", lambda: nf.Oracle(model="/nowhere/at/all")),
+            (nf.PictureError, "identical", lambda: nf.judge(black, 8, black, 8)),
+            (nf.PictureError, "against: pixel", lambda: nf.judge(black, 8, black * np.nan, 8)),
+            (nf.PictureError, "positive number", lambda: nf.judge(black, 0, black + 1, 8)),
+            (nf.ParameterError, "nested", lambda: nf.judge(black, 8, black + 1, 8, samples="both")),
+            (nf.SizeError, "reference", lambda: nf.metrics(black, black[:16])),
+            (nf.PictureError, "not finite", lambda: nf.metrics(black + np.inf, black)),
+        ]
+        for kind, words, call in cases:
+            with self.subTest(words):
+                with self.assertRaisesRegex(kind, words):
+                    call()
+        for name in ("Parameter", "Size", "Batch", "Model", "Criterion", "Checkpoint", "Picture"):
+            self.assertTrue(issubclass(getattr(nf, name + "Error"), nf.Error))
+        for wrong in (lambda: session.push(-1, 1, black), lambda: session.push("0", 1, black),
+                      lambda: session.push(0, 1, "black"), lambda: nf.Session("8", 8)):
+            with self.assertRaises((TypeError, ValueError, OverflowError, nf.Error)):
+                wrong()
+
+
+class Pictures(unittest.TestCase):
+    def test_little_noise_is_not_seen_and_much_is(self):
+        params = nf.Params(tile=64)
+        seen = nf.judge(noisy(1, 20), 20, noisy(2, 20), 20, samples="independent", params=params)
+        clean = nf.judge(noisy(1, 1e7), 1e7, noisy(2, 1e7), 1e7, samples="independent", params=params)
+        self.assertEqual([verdict.converged for verdict in seen.verdicts], [False, False])
+        self.assertEqual([verdict.converged for verdict in clean.verdicts], [True, True])
+        self.assertGreater(clean.verdicts[0].probability, seen.verdicts[0].probability)
+        self.assertGreater(seen.verdicts[0].expected_spp, 20)
+        self.assertEqual(seen.samples, "independent")
+        noise = seen.visible_noise()
+        self.assertEqual((noise.shape, noise.dtype), ((64, 96), np.float32))
+
+    def test_metrics_are_those_of_arithmetic(self):
+        image, reference = np.full((16, 12, 3), 0.3), np.full((16, 12, 3), 0.2)
+        found = nf.metrics(image, reference, tone_mapping="srgb")
+        self.assertAlmostEqual(found.rel_mse, 0.01 / 0.05, places=5)
+        encode = lambda linear: 1.055 * linear ** (1 / 2.4) - 0.055
+        self.assertAlmostEqual(found.psnr, -20 * np.log10(encode(0.3) - encode(0.2)), places=3)
+        worse = nf.metrics(noisy(1, 100), noisy(1, 1e8))
+        self.assertLess(worse.cvvdp_jod, 9.9)
+        self.assertEqual(worse.cvvdp_map().shape, (64, 96))
+        near = nf.metrics(noisy(1, 100), noisy(1, 1e8), viewing=nf.Viewing("desk,distance=5"))
+        self.assertGreater(near.cvvdp_jod, worse.cvvdp_jod)
+
+
+class Documentation(unittest.TestCase):
+    def test_everything_public_has_a_docstring(self):
+        for name in nf.__all__:
+            thing = getattr(nf, name)
+            self.assertTrue(thing.__doc__, name)
+            members = vars(thing).items() if inspect.isclass(thing) else ()
+            for member, value in members:
+                if not member.startswith("_"):
+                    self.assertTrue(value.__doc__, f"{name}.{member}")
+
+    def test_the_stubs_have_what_the_module_has(self):
+        stub = pathlib.Path(nf.__file__).with_name("_noisefloor.pyi")
+        declared = {node.name: node for node in ast.parse(stub.read_text()).body
+                    if isinstance(node, (ast.ClassDef, ast.FunctionDef))}
+        self.assertEqual(set(declared), set(nf.__all__))
+        for name, node in declared.items():
+            thing = getattr(nf, name)
+            functions = [node] if isinstance(node, ast.FunctionDef) else [
+                part for part in node.body if isinstance(part, ast.FunctionDef)]
+            if isinstance(node, ast.ClassDef) and not issubclass(thing, Exception):
+                public = {member for member in vars(thing) if not member.startswith("_")}
+                stubbed = {part.name for part in functions if not part.name.startswith("_")}
+                self.assertEqual(stubbed, public, name)
+            for function in functions:
+                real = thing if isinstance(node, ast.FunctionDef) else getattr(thing, function.name)
+                if function.name == "__new__":
+                    real = thing
+                elif function.name.startswith("__") or not callable(real):
+                    continue
+                arguments = function.args.posonlyargs + function.args.args + function.args.kwonlyargs
+                names = [argument.arg for argument in arguments if argument.arg != "cls"]
+                signature = [p for p in inspect.signature(real).parameters]
+                self.assertEqual([n for n in names if n != "self"], [p for p in signature if p != "self"],
+                                 f"{name}.{function.name}")
+
+
+if __name__ == "__main__":
+    unittest.main()
