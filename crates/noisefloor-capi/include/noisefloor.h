@@ -37,6 +37,9 @@
 // Verdicts spaced by the expected need, in multiples of step: fewer verdicts, larger batches.
 #define NF_SCHEDULE_SPACED 1
 
+// A verdict whenever a tile has half as many samples more, in multiples of step.
+#define NF_SCHEDULE_GROWING 2
+
 // The photographic operator (Reinhard et al. 2002) with an exposure by the log-average of the picture.
 // Verdicts wait until every tile has samples.
 #define NF_TONE_REINHARD 0
@@ -99,7 +102,7 @@ typedef struct NfSession NfSession;
 typedef struct {
     // Edge of a tile in pixels, 16 to 512. Default: 128.
     uint32_t tile;
-    // When tiles are judged: NF_SCHEDULE_EVERY (default) or NF_SCHEDULE_SPACED.
+    // When tiles are judged: NF_SCHEDULE_EVERY (default), _SPACED or _GROWING.
     uint32_t schedule;
     // The step of the schedule in samples per pixel, at least 2. Default: 100.
     uint64_t step;
@@ -274,8 +277,8 @@ NfStatus nf_session_image(const NfSession *session,
                           float *image,
                           size_t floats);
 
-// How visible the noise is at each pixel, in the unit that docs/guide.md states: floats = width * height of the
-// image, NaN where there is no evidence. Costs as much as a verdict on every tile. NF_STATUS_UNAVAILABLE before
+// How visible the noise is at each pixel, 1 where it is just seen: floats = width * height of the image, NaN
+// where there is no evidence. Costs as much as a verdict on every tile. NF_STATUS_UNAVAILABLE before
 // the first verdict, or if the model makes no map.
 NfStatus nf_session_visible_noise(const NfSession *session,
                                   float *map,

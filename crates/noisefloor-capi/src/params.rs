@@ -9,6 +9,8 @@ use std::ffi::c_char;
 pub const NF_SCHEDULE_EVERY: u32 = 0;
 /// Verdicts spaced by the expected need, in multiples of step: fewer verdicts, larger batches.
 pub const NF_SCHEDULE_SPACED: u32 = 1;
+/// A verdict whenever a tile has half as many samples more, in multiples of step.
+pub const NF_SCHEDULE_GROWING: u32 = 2;
 
 /// The photographic operator (Reinhard et al. 2002) with an exposure by the log-average of the picture.
 /// Verdicts wait until every tile has samples.
@@ -22,7 +24,7 @@ pub const NF_TONE_SRGB: u32 = 1;
 pub struct NfParams {
     /// Edge of a tile in pixels, 16 to 512. Default: 128.
     pub tile: u32,
-    /// When tiles are judged: NF_SCHEDULE_EVERY (default) or NF_SCHEDULE_SPACED.
+    /// When tiles are judged: NF_SCHEDULE_EVERY (default), _SPACED or _GROWING.
     pub schedule: u32,
     /// The step of the schedule in samples per pixel, at least 2. Default: 100.
     pub step: u64,
@@ -63,6 +65,7 @@ impl Default for NfParams {
         let (schedule, step) = match schedule {
             Schedule::Every { step } => (NF_SCHEDULE_EVERY, step),
             Schedule::Spaced { step } => (NF_SCHEDULE_SPACED, step),
+            Schedule::Growing { step } => (NF_SCHEDULE_GROWING, step),
         };
         Self {
             tile: tile as u32,
@@ -94,6 +97,7 @@ impl NfParams {
         let schedule = match self.schedule {
             NF_SCHEDULE_EVERY => Schedule::Every { step: self.step },
             NF_SCHEDULE_SPACED => Schedule::Spaced { step: self.step },
+            NF_SCHEDULE_GROWING => Schedule::Growing { step: self.step },
             other => return Err(unknown("schedule", other)),
         };
         let white = (self.white != 0.0).then_some(self.white);

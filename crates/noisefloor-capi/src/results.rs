@@ -146,8 +146,8 @@ pub unsafe extern "C" fn nf_session_image(
     })
 }
 
-/// How visible the noise is at each pixel, in the unit that docs/guide.md states: floats = width * height of the
-/// image, NaN where there is no evidence. Costs as much as a verdict on every tile. NF_STATUS_UNAVAILABLE before
+/// How visible the noise is at each pixel, 1 where it is just seen: floats = width * height of the image, NaN
+/// where there is no evidence. Costs as much as a verdict on every tile. NF_STATUS_UNAVAILABLE before
 /// the first verdict, or if the model makes no map.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn nf_session_visible_noise(

@@ -316,7 +316,7 @@ fn sizes_tiles_and_parameters_are_checked() {
         assert_eq!(new(0, &ok), Size);
         assert_eq!(new(usize::MAX, &ok), Size);
         assert_eq!(new(64, &NfParams { tile: 0, ..ok }), Size);
-        assert_eq!(new(64, &NfParams { schedule: 2, ..ok }), Argument);
+        assert_eq!(new(64, &NfParams { schedule: 3, ..ok }), Argument);
         assert_eq!(new(64, &NfParams { tone_mapping: 7, ..ok }), Argument);
         assert_eq!(new(64, &NfParams { key: f32::NAN, ..ok }), Argument);
         assert_eq!(new(64, &NfParams { step: 1, ..ok }), Argument);

@@ -64,7 +64,8 @@ impl PyViewing {
 /// tone_mapping: "reinhard" (exposure by the log-average of the picture, with key and white) or "srgb" (with
 ///     exposure, a factor on radiance).
 /// viewing: on which display the picture is seen, and from how far; a Viewing or its text.
-/// schedule: "every" step samples per pixel, or "spaced" by the expected need in multiples of step.
+/// schedule: "every" step samples per pixel, "spaced" by the expected need, or "growing" by half of what a
+///     tile has; the last two in multiples of step.
 /// min_spp, max_spp: fewest and most samples per pixel of a tile.
 /// consecutive: verdicts in a row that must say "converged".
 /// audience: (slope, offset) of the line from thresholds of the training data to those of your viewers;
@@ -134,8 +135,9 @@ impl PyParams {
         let schedule = match schedule {
             "every" => Schedule::Every { step },
             "spaced" => Schedule::Spaced { step },
+            "growing" => Schedule::Growing { step },
             other => {
-                let message = format!("{other:?} is no schedule: use \"every\" or \"spaced\"");
+                let message = format!("{other:?} is no schedule: use \"every\", \"spaced\" or \"growing\"");
                 return Err(ParameterError::new_err(message));
             }
         };

@@ -229,7 +229,7 @@ impl PySession {
         plane(py, self.size(), self.spread(p))
     }
 
-    /// How visible the noise is, in the unit that the guide states: float32 of shape (height, width), NaN
+    /// How visible the noise is, 1 where it is just seen: float32 of shape (height, width), NaN
     /// where there is no evidence. Costs as much as a verdict on every tile. None before the first verdict,
     /// or if the model makes no map.
     fn visible_noise<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray2<f32>>>> {

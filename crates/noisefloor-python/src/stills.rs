@@ -35,7 +35,7 @@ impl PyJudged {
         }
     }
 
-    /// How visible the noise is, in the unit that the guide states: float32 of shape (height, width); None if
+    /// How visible the noise is, 1 where it is just seen: float32 of shape (height, width); None if
     /// the model makes no map.
     fn visible_noise<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray2<f32>>>> {
         self.visible_noise.clone().map(|map| plane(py, self.size, map)).transpose()

@@ -45,7 +45,7 @@ class Params:
         white: float | None = None,
         exposure: float = 1.0,
         viewing: Viewing | str | None = None,
-        schedule: Literal["every", "spaced"] = "every",
+        schedule: Literal["every", "spaced", "growing"] = "every",
         step: int = 100,
         min_spp: int = 100,
         max_spp: int = 10_000,
