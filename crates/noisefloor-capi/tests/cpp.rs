@@ -32,7 +32,8 @@ fn package() -> &'static Path {
 /// Installs the libraries that cargo has built beside this test.
 fn install(folder: &Path) -> PathBuf {
     let prefix = folder.join("installed");
-    let built = std::env::current_exe().unwrap().parent().unwrap().to_owned();
+    let test = std::env::current_exe().expect("a test knows its path");
+    let built = test.parent().expect("a program lies in a folder");
     run(Command::new(package().join("install.sh")).arg(&prefix).arg(built));
     prefix
 }
