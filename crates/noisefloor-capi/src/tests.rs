@@ -29,7 +29,8 @@ fn params() -> NfParams {
 struct Handle(*mut NfSession);
 // SAFETY: sessions stand behind a lock; the tests free them when all threads have ended.
 unsafe impl Sync for Handle {}
-unsafe impl Send for Handle {} // SAFETY: as above
+// SAFETY: as above.
+unsafe impl Send for Handle {}
 
 impl Drop for Handle {
     fn drop(&mut self) {
