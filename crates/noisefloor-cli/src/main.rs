@@ -91,7 +91,7 @@ fn done((): ()) -> ExitCode {
 }
 
 /// What to type for a command that is not in this build.
-#[cfg(not(feature = "full"))]
+#[cfg_attr(feature = "full", allow(dead_code, reason = "a full build leaves out nothing"))]
 fn left_out(command: &Command) -> LeftOut {
     let (what, feature, again) = match command {
         Command::Doctor(_) => ("doctor", "adapters", "doctor …"),
@@ -117,4 +117,30 @@ fn end(error: &anyhow::Error) -> ExitCode {
     // What was typed has to be typed otherwise
     let usage = error.is::<LeftOut>() || error.is::<Occupied>();
     if usage { ExitCode::from(2) } else { ExitCode::FAILURE }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// As `tests/command/left_out.rs` sees it in a build that leaves them out.
+    #[test]
+    fn what_is_left_out_says_what_to_type() {
+        for (typed, feature) in [
+            ("doctor", "adapters"),
+            ("compare cornell-box", "lab"),
+            ("reproduce --corpus absent", "lab"),
+            ("train --corpus absent --out my.nfm", "train"),
+            ("evaluate --corpus absent", "train"),
+            ("audience fit absent.csv", "train"),
+            ("explore", "study"),
+            ("study serve absent.toml", "study"),
+        ] {
+            let cli = Cli::try_parse_from(format!("noisefloor {typed}").split(' ')).unwrap();
+            let name = typed.split(' ').next().unwrap_or_default();
+            let again = format!("cargo run --release --features {feature} -- {name} …");
+            let said = left_out(&cli.command).to_string();
+            assert_eq!(said, format!("this build has no '{name}': run `{again}`"));
+        }
+    }
 }

@@ -145,7 +145,7 @@ mod tests {
         assert_eq!(required(None), []);
         assert_eq!(required(Some("")), []);
         assert_eq!(required(Some("shared, python")), [Requirement::Python, Requirement::Shared]);
-        assert_eq!(required(Some("renderers,llvm,python,browser,shared")), Requirement::ALL);
+        assert_eq!(required(Some("renderers,llvm,python,cmake,browser,shared")), Requirement::ALL);
     }
 
     #[test]
