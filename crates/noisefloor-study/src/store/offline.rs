@@ -2,7 +2,7 @@
 
 use super::database::{open, open_existing};
 use super::record::SessionRecord;
-use super::rows::{all_codes, erase, load, truncate_log};
+use super::rows::{all_codes, erase, load, scrub};
 use crate::code;
 use crate::error::StoreError;
 use rusqlite::TransactionBehavior;
@@ -74,6 +74,6 @@ pub fn erase_one(path: impl AsRef<Path>, design: &str, code: &str) -> Result<(),
     let transaction = connection.transaction_with_behavior(TransactionBehavior::Immediate).map_err(failed)?;
     erase(&transaction, path, code)?;
     transaction.commit().map_err(failed)?;
-    truncate_log(&connection);
+    scrub(&connection);
     Ok(())
 }

@@ -121,9 +121,10 @@ pub(super) fn erase(connection: &Connection, path: &Path, code: &str) -> Result<
     }
 }
 
-/// Writes the log back and truncates it, so that no erased rows remain there. If a reader prevents this,
-/// the next erasure or the end of the server does it.
-pub(super) fn truncate_log(connection: &Connection) {
-    let done = connection.query_row("PRAGMA wal_checkpoint(TRUNCATE)", [], |_| Ok(()));
+/// Rewrites the database, and truncates its log, so that nothing of erased rows remains: `secure_delete` does
+/// not reach the copies that stay in a page when its rows move to another one. If a reader prevents this, the
+/// next erasure does it.
+pub(super) fn scrub(connection: &Connection) {
+    let done = connection.execute_batch("VACUUM; PRAGMA wal_checkpoint(TRUNCATE)");
     drop(done);
 }

@@ -2,7 +2,7 @@
 
 use super::database::open;
 use super::record::{NewSession, SessionRecord};
-use super::rows::{all_codes, append, begin, erase, event, load, truncate_log};
+use super::rows::{all_codes, append, begin, erase, event, load, scrub};
 use crate::error::StoreError;
 use crate::event::Envelope;
 use rusqlite::{Connection, TransactionBehavior};
@@ -134,7 +134,7 @@ fn write(connection: &mut Connection, path: &Path, commands: &mpsc::Receiver<Com
             answer(failure.as_ref().map(copy));
         }
         if erased && failure.take().is_none() {
-            truncate_log(connection);
+            scrub(connection);
         }
     }
 }
