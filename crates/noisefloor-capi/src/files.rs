@@ -6,7 +6,7 @@ use crate::status::{Failure, NfStatus, guard};
 use noisefloor::{Checkpoint, Session};
 use std::ffi::c_char;
 use std::fs::File;
-use std::io::{self, BufReader, BufWriter};
+use std::io::{self, BufReader};
 use std::path::Path;
 use tempfile::NamedTempFile;
 
@@ -28,7 +28,9 @@ pub unsafe extern "C" fn nf_session_save(
         // A file beside it takes its place once it is complete
         let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
         let mut file = NamedTempFile::new_in(folder.unwrap_or(Path::new("."))).map_err(failed)?;
-        session.lock()?.checkpoint(job).write(BufWriter::new(&mut file))?;
+        // No buffer: what is left in one when it is dropped fails without a word
+        session.lock()?.checkpoint(job).write(&mut file)?;
+        file.as_file().sync_all().map_err(failed)?;
         file.persist(path).map_err(|error| failed(error.error))?;
         Ok(())
     })

@@ -10,7 +10,7 @@ use numpy::{PyArray2, PyArray3};
 use pyo3::prelude::*;
 use pyo3::sync::MutexExt;
 use std::fs::File;
-use std::io::{BufReader, BufWriter};
+use std::io::BufReader;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard};
 
@@ -266,8 +266,9 @@ fn save(session: &Session<Oracle>, path: &Path, job: &str) -> PyResult<()> {
     // A file beside it takes its place once it is complete
     let mut file = tempfile::NamedTempFile::new_in(folder.unwrap_or(Path::new(".")))
         .map_err(|error| file_error(path, &error))?;
-    let written = session.checkpoint(job).write(BufWriter::new(&mut file));
-    written.map_err(|error| raise(path, error))?;
+    // No buffer: what is left in one when it is dropped fails without a word
+    session.checkpoint(job).write(&mut file).map_err(|error| raise(path, error))?;
+    file.as_file().sync_all().map_err(|error| file_error(path, &error))?;
     file.persist(path).map_err(|error| file_error(path, &error.error))?;
     Ok(())
 }

@@ -68,8 +68,8 @@ impl Display for Requirement {
 /// # Panics
 /// If the environment variable `NOISEFLOOR_REQUIRE` names the requirement, and nothing was found: where
 /// everything has been set up, a test that cannot run has failed. The variable holds words with commas
-/// between them: `renderers`, `llvm`, `python`, `cmake`, `browser`, `shared`. Any other word is a panic, too, since a
-/// misspelt one would require nothing.
+/// between them: `renderers`, `llvm`, `python`, `cmake`, `browser`, `shared`. Any other word is a panic, too,
+/// since a misspelt one would require nothing.
 pub fn require<T>(requirement: Requirement, found: Result<T, impl Display>) -> Option<T> {
     let required = is_required(requirement, std::env::var_os(REQUIRED).as_deref());
     match found {

@@ -98,7 +98,8 @@ pub struct Request {
 pub struct Batch {
     /// The tile that was sampled.
     pub tile: Tile,
-    /// Exact number of new samples per pixel, in the range that [`SourceInfo::counts`] allows. Zero says that the source is exhausted in this tile.
+    /// Exact number of new samples per pixel, in the range that [`SourceInfo::counts`] allows. Zero says that
+    /// the source is exhausted in this tile.
     pub spp: u64,
     /// Mean of the new samples only, row-major over the tile, `tile.pixels()` values (none if `spp` is zero).
     /// Non-finite values are allowed: the film rejects and counts them.

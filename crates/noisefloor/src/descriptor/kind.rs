@@ -50,7 +50,8 @@ pub trait TileDescriptor: fmt::Debug + Send + Sync {
     }
 
     /// How visible the noise is at each pixel of the tile (rows × columns), as an amplitude in a unit of the
-    /// descriptor's own; [`crate::Oracle::map_visible_noise`] knows from where it is seen. `None` if the descriptor does not separate noise from picture.
+    /// descriptor's own; [`crate::Oracle::map_visible_noise`] knows from where it is seen. `None` if the
+    /// descriptor does not separate noise from picture.
     fn visible_noise(&self, _planes: &TilePlanes) -> Option<Array2<f32>> {
         None
     }
