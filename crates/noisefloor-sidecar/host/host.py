@@ -76,6 +76,7 @@ def serve(Host):
             renderer, reply, payload = _answer(Host, renderer, request, data)
         except BaseException as error:  # a renderer may raise SystemExit, too
             traceback.print_exc()
+            os.write(2, b"\0")  # the reader knows by it that it has read all of that
             reply, payload = {"ok": False, "error": _describe(error)}, []
             if isinstance(error, TileError):
                 reply["tile"] = error.tile

@@ -38,6 +38,7 @@ pub(crate) fn ask<T: DeserializeOwned>(
         })?;
     let status: Status = serde_json::from_slice(&frame.header).map_err(|e| wrong(e.to_string()))?;
     if !status.ok {
+        process.hear_out();
         let said = status.error.unwrap_or_else(|| "it refused without giving a reason".to_owned());
         return Err((status.tile, SidecarCause::Refused(printable(&said).into_owned())));
     }

@@ -9,7 +9,7 @@ use std::io::{self, BufReader, Read};
 use std::path::Path;
 use std::process::{ChildStderr, Command, ExitStatus, Stdio};
 use std::sync::mpsc::{self, Receiver, RecvTimeoutError, Sender};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Condvar, Mutex, PoisonError};
 use std::thread;
 use std::time::{Duration, Instant};
 
@@ -104,6 +104,11 @@ impl Process {
         self.tail.text()
     }
 
+    /// Waits for what it wrote on standard error before it refused: that takes another way than its reply.
+    pub(crate) fn hear_out(&self) {
+        self.tail.wait_for_mark(GRACE);
+    }
+
     /// How it ended, if it does so in time.
     fn wait(&mut self, limit: Duration) -> Option<ExitStatus> {
         let begun = Instant::now();
@@ -165,48 +170,85 @@ fn converse(
     }
 }
 
+/// What a host writes on standard error before it sends a refusal.
+const MARK: u8 = 0;
+
 /// The end of a process's output on standard error.
 #[derive(Debug, Default)]
 struct Tail {
-    bytes: Arc<Mutex<VecDeque<u8>>>,
-    /// Disconnected at the end of the stream.
-    following: Option<Receiver<()>>,
+    heard: Arc<Heard>,
+}
+
+#[derive(Debug, Default)]
+struct Heard {
+    words: Mutex<Words>,
+    more: Condvar,
+}
+
+#[derive(Debug, Default)]
+struct Words {
+    bytes: VecDeque<u8>,
+    /// Whether a mark has come that nobody has waited for.
+    marked: bool,
+    /// Whether more may come.
+    open: bool,
+}
+
+impl Words {
+    fn add(&mut self, bytes: &[u8]) {
+        self.marked |= bytes.contains(&MARK);
+        self.bytes.extend(bytes.iter().filter(|byte| **byte != MARK));
+        let old = self.bytes.len().saturating_sub(TAIL);
+        self.bytes.drain(..old);
+    }
+}
+
+impl Heard {
+    fn change(&self, change: impl FnOnce(&mut Words)) {
+        change(&mut self.words.lock().unwrap_or_else(PoisonError::into_inner));
+        self.more.notify_all();
+    }
 }
 
 impl Tail {
     fn follow(mut stderr: ChildStderr) -> Self {
-        let bytes = Arc::new(Mutex::new(VecDeque::new()));
-        let (sender, following) = mpsc::channel();
-        let kept = Arc::clone(&bytes);
+        let heard = Arc::new(Heard::default());
+        let hearing = Arc::clone(&heard);
         let follow = move || {
-            let _until_the_end: Sender<()> = sender;
             let mut buffer = [0; TAIL];
             loop {
-                let n = match stderr.read(&mut buffer) {
-                    Ok(n @ 1..) => n,
-                    Err(error) if error.kind() == io::ErrorKind::Interrupted => continue,
+                match stderr.read(&mut buffer) {
+                    Ok(n @ 1..) => hearing.change(|words| words.add(&buffer[..n])),
+                    Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
                     Ok(0) | Err(_) => break,
-                };
-                let mut kept = kept.lock().unwrap_or_else(PoisonError::into_inner);
-                kept.extend(&buffer[..n]);
-                let old = kept.len().saturating_sub(TAIL);
-                kept.drain(..old);
+                }
             }
+            hearing.change(|words| words.open = false);
         };
+        heard.change(|words| words.open = true);
         // Without a thread there are no last words; nothing else is lost
-        let started = thread::Builder::new().name("sidecar stderr".into()).spawn(follow);
-        Self { bytes, following: started.is_ok().then_some(following) }
+        if thread::Builder::new().name("sidecar stderr".into()).spawn(follow).is_err() {
+            heard.change(|words| words.open = false);
+        }
+        Self { heard }
     }
 
     fn wait(&self, limit: Duration) {
-        if let Some(following) = &self.following {
-            // The sender never sends: this returns at the end of the stream, or when time is up
-            let _ = following.recv_timeout(limit);
-        }
+        self.wait_while(limit, |words| words.open);
+    }
+
+    fn wait_for_mark(&self, limit: Duration) {
+        self.wait_while(limit, |words| words.open && !words.marked);
+        self.heard.change(|words| words.marked = false);
+    }
+
+    fn wait_while(&self, limit: Duration, go_on: impl Fn(&Words) -> bool) {
+        let words = self.heard.words.lock().unwrap_or_else(PoisonError::into_inner);
+        drop(self.heard.more.wait_timeout_while(words, limit, |words| go_on(words)));
     }
 
     fn text(&self) -> String {
-        let mut bytes = self.bytes.lock().unwrap_or_else(PoisonError::into_inner);
-        printable(String::from_utf8_lossy(bytes.make_contiguous()).trim()).into_owned()
+        let mut words = self.heard.words.lock().unwrap_or_else(PoisonError::into_inner);
+        printable(String::from_utf8_lossy(words.bytes.make_contiguous()).trim()).into_owned()
     }
 }
