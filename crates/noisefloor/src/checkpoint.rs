@@ -2,7 +2,7 @@
 
 use crate::container::{Fault, Format, MAX_PAYLOAD};
 use crate::display::Display;
-use crate::film::Film;
+use crate::film::{Film, FilmHead};
 use crate::identity::{IdentityChange, SourceIdentity};
 use crate::params::Params;
 use crate::stop::TileState;
@@ -12,14 +12,14 @@ use std::io::{self, Read, Write};
 use thiserror::Error;
 
 const FORMAT: Format = Format { magic: *b"NFCHECK\0", version: VERSION };
-const VERSION: u32 = 4;
+const VERSION: u32 = 5;
 
 /// A snapshot of a session, for resuming it: samples, verdicts and the display. Made by
 /// [`Session::checkpoint`](crate::Session::checkpoint), resumed by
 /// [`Session::resume`](crate::Session::resume) and
-/// [`Driver::resume`](crate::Driver::resume). Its file has up to 21 bytes per pixel for each half that is
-/// kept, and writing it takes as much memory again.
-#[derive(Clone, Debug, Serialize, Deserialize)]
+/// [`Driver::resume`](crate::Driver::resume). Its file has 18 bytes per pixel for each half that is kept; writing it
+/// takes next to no memory.
+#[derive(Clone, Debug)]
 pub struct Checkpoint<'a> {
     pub(crate) job: Cow<'a, str>,
     pub(crate) source: Cow<'a, SourceIdentity>,
@@ -31,6 +31,19 @@ pub struct Checkpoint<'a> {
     pub(crate) display: Option<Display>,
     pub(crate) film: Cow<'a, Film>,
     pub(crate) tiles: Cow<'a, [TileState]>,
+}
+
+/// A checkpoint in its file, without the pixels of its film, which follow.
+#[derive(Serialize, Deserialize)]
+struct Head<'a> {
+    job: Cow<'a, str>,
+    source: Cow<'a, SourceIdentity>,
+    criterion: Cow<'a, str>,
+    state: Cow<'a, [u8]>,
+    params: Params,
+    display: Option<Display>,
+    film: FilmHead,
+    tiles: Cow<'a, [TileState]>,
 }
 
 /// Why a checkpoint cannot be used.
@@ -94,16 +107,32 @@ impl Checkpoint<'_> {
     /// # Errors
     /// [`CheckpointError`] if it is foreign, damaged, oversized, or of another version.
     pub fn read(from: impl Read) -> Result<Checkpoint<'static>, CheckpointError> {
-        Ok(FORMAT.read(from)?)
+        let whole = |head: Head<'static>, from: &mut dyn Read| {
+            let Head { job, source, criterion, state, params, display, film, tiles } = head;
+            let film = Film::read_pixels(film, from).map_err(ended)?;
+            let film = film.ok_or_else(|| Fault::Damaged("there is no such film".into()))?;
+            let (criterion, state, film) = (criterion.into_owned(), state.into_owned(), Cow::Owned(film));
+            Ok(Checkpoint { job, source, criterion, state, params, display, film, tiles })
+        };
+        Ok(FORMAT.read_with_body(from, whole)?)
     }
 
     /// Writes the checkpoint.
     ///
     /// # Errors
-    /// [`CheckpointError::Io`] if it cannot be written, [`CheckpointError::Oversized`] if it has more than 2
-    /// GiB: some 50 million pixels.
+    /// [`CheckpointError::Io`] if it cannot be written.
     pub fn write(&self, to: impl Write) -> Result<(), CheckpointError> {
-        Ok(FORMAT.write(self, to)?)
+        let head = Head {
+            job: Cow::Borrowed(&self.job),
+            source: Cow::Borrowed(&self.source),
+            criterion: Cow::Borrowed(&self.criterion),
+            state: Cow::Borrowed(&self.state),
+            params: self.params,
+            display: self.display,
+            film: self.film.head(),
+            tiles: Cow::Borrowed(&self.tiles),
+        };
+        Ok(FORMAT.write_with_body(&head, to, |to| self.film.write_pixels(to))?)
     }
 
     /// Checks that it belongs to this job, and that nothing in it can lead a session astray. `fresh` is the
@@ -142,6 +171,14 @@ impl Checkpoint<'_> {
             return Err(CheckpointError::Invalid("its tiles are not those of its picture"));
         }
         Ok(())
+    }
+}
+
+/// A file that ends early is damaged, and not unreadable.
+fn ended(error: io::Error) -> Fault {
+    match error.kind() {
+        io::ErrorKind::UnexpectedEof => Fault::Damaged("it ends within its film".into()),
+        _ => Fault::Io(error),
     }
 }
 

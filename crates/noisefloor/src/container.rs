@@ -1,7 +1,8 @@
 //! Files of this library.
 //!
 //! Layout: magic (8 bytes), version (u32), length of the payload (u64), BLAKE3 of the payload (32 bytes),
-//! payload (bincode 2, standard configuration); numbers little-endian. All use of bincode is in this module.
+//! payload (bincode 2, standard configuration); numbers little-endian. A body can follow, and BLAKE3 of it (32 bytes).
+//! All use of bincode is in this module.
 
 use serde::{Serialize, de::DeserializeOwned};
 use std::io::{self, Read, Write};
@@ -38,14 +39,38 @@ impl From<io::Error> for Fault {
 impl Format {
     /// Reads what [`Format::write`] wrote.
     pub(crate) fn read<T: DeserializeOwned>(&self, mut from: impl Read) -> Result<T, Fault> {
+        let content = self.read_payload(&mut from)?;
+        end(from)?;
+        Ok(content)
+    }
+
+    /// Reads what [`Format::write_with_body`] wrote: `body` turns the payload, and the bytes after it, into
+    /// the content, and is answered for by the checksum after them.
+    pub(crate) fn read_with_body<H: DeserializeOwned, T>(
+        &self,
+        mut from: impl Read,
+        body: impl FnOnce(H, &mut dyn Read) -> Result<T, Fault>,
+    ) -> Result<T, Fault> {
+        let head = self.read_payload(&mut from)?;
+        let mut hashed = Hashed::new(&mut from);
+        let content = body(head, &mut hashed)?;
+        let (computed, mut checksum) = (hashed.hasher.finalize(), [0; 32]);
+        if !read_up_to(&mut from, &mut checksum)? || *computed.as_bytes() != checksum {
+            return Err(Fault::Damaged("its checksum differs".into()));
+        }
+        end(from)?;
+        Ok(content)
+    }
+
+    fn read_payload<T: DeserializeOwned>(&self, from: &mut impl Read) -> Result<T, Fault> {
         // Read the header. A file too short to have one is foreign.
         let mut magic = [0; 8];
-        let whole = read_up_to(&mut from, &mut magic)?;
+        let whole = read_up_to(from, &mut magic)?;
         if !whole || magic != self.magic {
             return Err(Fault::Foreign);
         }
         let mut header = [0; 4 + 8 + 32];
-        if !read_up_to(&mut from, &mut header)? {
+        if !read_up_to(from, &mut header)? {
             return Err(Fault::Damaged("it ends within its header".into()));
         }
         let (version, rest) = header.split_at(4);
@@ -62,10 +87,9 @@ impl Format {
         // Read the payload as far as there is one: memory grows with what arrives, not with what is
         // announced.
         let mut payload = Vec::new();
-        from.take(length + 1).read_to_end(&mut payload)?;
-        if payload.len() as u64 != length {
-            let relation = if (payload.len() as u64) < length { "ends before" } else { "goes on after" };
-            return Err(Fault::Damaged(format!("it {relation} the {length} bytes it announces")));
+        from.take(length).read_to_end(&mut payload)?;
+        if (payload.len() as u64) < length {
+            return Err(Fault::Damaged(format!("it ends before the {length} bytes it announces")));
         }
         if blake3::hash(&payload).as_bytes() != checksum {
             return Err(Fault::Damaged("its checksum differs".into()));
@@ -86,6 +110,62 @@ impl Format {
         to.write_all(&payload)?;
         Ok(())
     }
+
+    /// Writes a file whose payload is followed by what `body` writes, and by BLAKE3 of that. The body is not held in
+    /// memory.
+    pub(crate) fn write_with_body(
+        &self,
+        head: &impl Serialize,
+        mut to: impl Write,
+        body: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+    ) -> Result<(), Fault> {
+        self.write(head, &mut to)?;
+        let mut hashed = Hashed::new(&mut to);
+        body(&mut hashed)?;
+        let checksum = hashed.hasher.finalize();
+        to.write_all(checksum.as_bytes())?;
+        Ok(())
+    }
+}
+
+/// Passes bytes on, and computes BLAKE3 of them.
+struct Hashed<S> {
+    stream: S,
+    hasher: blake3::Hasher,
+}
+
+impl<S> Hashed<S> {
+    fn new(stream: S) -> Self {
+        Self { stream, hasher: blake3::Hasher::new() }
+    }
+}
+
+impl<W: Write> Write for Hashed<W> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let written = self.stream.write(bytes)?;
+        self.hasher.update(&bytes[..written]);
+        Ok(written)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.stream.flush()
+    }
+}
+
+impl<R: Read> Read for Hashed<R> {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let read = self.stream.read(buffer)?;
+        self.hasher.update(&buffer[..read]);
+        Ok(read)
+    }
+}
+
+/// Makes sure that nothing follows.
+fn end(mut from: impl Read) -> Result<(), Fault> {
+    if read_up_to(&mut from, &mut [0])? {
+        return Err(Fault::Damaged("it goes on after its end".into()));
+    }
+    Ok(())
 }
 
 /// The content of bytes that [`payload`] returned.

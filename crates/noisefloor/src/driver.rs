@@ -243,7 +243,8 @@ impl<S: ProgressiveSource, C: StoppingCriterion> Driver<S, C> {
         Ok(())
     }
 
-    /// The session's requests, cut to what one call may ask for; all tiles for a source that cannot aim.
+    /// The session's requests, cut to what one call may ask for; all tiles for a source that cannot aim. Of a
+    /// picture with more pixels than that, the tiles that have the fewest samples.
     fn plan(&self) -> Vec<Request> {
         let mut requests = self.session.requests();
         if !self.source.info().aims {
@@ -251,6 +252,8 @@ impl<S: ProgressiveSource, C: StoppingCriterion> Driver<S, C> {
             let film = self.session.film();
             requests =
                 film.grid().tiles().map(|tile| Request { tile, first: film.spp(tile.index), spp }).collect();
+        } else {
+            keep_rearmost(&mut requests);
         }
         let pixels: u64 = requests.iter().map(|r| r.tile.pixels() as u64).sum();
         let most = (CALL_SAMPLES / pixels.max(1)).max(1);
@@ -333,6 +336,19 @@ impl<S: ProgressiveSource, C: Resumable> Driver<S, C> {
         self.session = self.session.resume(job, checkpoint)?;
         Ok(self)
     }
+}
+
+/// Keeps as many of the tiles furthest behind as a call with one sample per pixel has room for.
+fn keep_rearmost(requests: &mut Vec<Request>) {
+    requests.sort_by_key(|request| request.first);
+    let mut samples = 0;
+    let count = requests.iter().take_while(|request| {
+        samples += request.tile.pixels() as u64;
+        samples <= CALL_SAMPLES
+    });
+    let count = count.count();
+    requests.truncate(count.max(1));
+    requests.sort_by_key(|request| request.tile.index);
 }
 
 #[cfg(test)]

@@ -2,8 +2,10 @@
 
 use crate::rgb::Rgb;
 use crate::tile::{Tile, TileGrid};
-use serde::{Deserialize, Serialize};
 use thiserror::Error;
+
+mod planes;
+pub(crate) use planes::FilmHead;
 
 /// A batch that the film refuses.
 #[derive(Debug, Error, Clone, PartialEq, Eq)]
@@ -39,7 +41,7 @@ pub enum FilmError {
 /// is a 40-bit number in 6 bytes: each update then errs by at most 2⁻¹⁷ ulp, and since update j is averaged
 /// with weight j/K, K updates err by at most K·2⁻¹⁸ ulp; 10⁹ samples in batches of 100 (K = 10⁷) stay within
 /// 39 ulp, 2.4·10⁻⁶ relative, in the worst case, and within 0.02 ulp if roundings are independent.
-#[derive(Clone, Debug, Serialize, Deserialize)]
+#[derive(Clone, Debug)]
 struct Half {
     mean: Vec<Rgb>,
     carry: Vec<[i16; 3]>,
@@ -94,7 +96,7 @@ impl Half {
 /// batches allow. Non-finite pixels of a batch are rejected and counted.
 ///
 /// Memory: 36 bytes per pixel, 18 without halves.
-#[derive(Clone, Debug, Serialize, Deserialize)]
+#[derive(Clone, Debug)]
 pub struct Film {
     grid: TileGrid,
     /// A and B; only A where no criterion needs halves.

@@ -221,3 +221,32 @@ proptest! {
         prop_assert!(Checkpoint::read(&file[..]).is_err());
     }
 }
+
+/// A head may announce any film: memory is taken for what follows it only.
+#[test]
+fn a_film_is_believed_as_far_as_it_comes() {
+    let driver = broken_off(FixedSpp(40), 1);
+    let mut checkpoint = driver.session().checkpoint("noise");
+    let mut file = Vec::new();
+    checkpoint.film = Cow::Owned(Film::new(crate::TileGrid::new(96, 48, 16).unwrap()));
+    checkpoint.write(&mut file).unwrap();
+    assert_eq!(file.len() - 32 - 96 * 48 * 36, head(&file), "18 bytes per pixel of each half");
+    for left in [head(&file), head(&file) + 1000, file.len() - 1] {
+        let error = Checkpoint::read(&file[..left]).unwrap_err();
+        assert!(matches!(error, CheckpointError::Damaged(_)), "{left}: {error}");
+    }
+    let mut long = file.clone();
+    long.push(0);
+    assert!(matches!(Checkpoint::read(&long[..]), Err(CheckpointError::Damaged(_))));
+
+    // The largest picture there may be, 2²⁸ pixels, in a file of a few hundred bytes
+    let vast = crate::TileGrid::new(1 << 14, 1 << 14, 512).unwrap();
+    let film = FilmHead::announcing(vast);
+    let mut nothing: &[u8] = &[];
+    assert!(Film::read_pixels(film, &mut nothing).is_err());
+}
+
+/// Bytes before the pixels.
+fn head(file: &[u8]) -> usize {
+    52 + u64::from_le_bytes(file[12..20].try_into().unwrap()) as usize
+}

@@ -185,3 +185,22 @@ fn a_missing_reference_is_an_error_before_any_sample() {
     assert!(matches!(error, DriverError::Criterion(CriterionError::NoReference(_))));
     assert!(driver.source.calls.is_empty());
 }
+
+/// The tiles of a picture too large for one call grow together, in calls that are full.
+#[test]
+fn large_pictures_take_turns() {
+    let grid = crate::TileGrid::new(7680, 4320, 512).unwrap();
+    let mut spp = vec![0; grid.len()];
+    for call in 0..60 {
+        let mut requests: Vec<_> =
+            grid.tiles().map(|tile| Request { tile, first: spp[tile.index], spp: 1 }).collect();
+        keep_rearmost(&mut requests);
+        let samples: u64 = requests.iter().map(|r| r.tile.pixels() as u64).sum();
+        assert!(samples <= CALL_SAMPLES && samples > CALL_SAMPLES - 512 * 512, "{call}: {samples}");
+        assert!(requests.is_sorted_by_key(|r| r.tile.index), "{call}");
+        requests.iter().for_each(|r| spp[r.tile.index] += 1);
+        let (least, most) = (spp.iter().min().unwrap(), spp.iter().max().unwrap());
+        assert!(most - least <= 1, "{call}: {least} to {most}");
+    }
+    assert!(spp.iter().all(|&n| n >= 6), "60 calls of 4 million samples on 33 million pixels");
+}
