@@ -5,6 +5,7 @@ use crate::criterion::{CriterionError, Resumable, StoppingCriterion};
 use crate::film::FilmError;
 use crate::light::LightCheck;
 use crate::params::Params;
+use crate::session::rounds::CALL_SAMPLES;
 use crate::session::{Session, SessionError};
 use crate::source::{Batch, ProgressiveSource, Repeats, Request, SourceError};
 use crate::stop::{Stop, StopReason};
@@ -13,11 +14,6 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 use thiserror::Error;
-
-/// Most pixel samples requested in one call. A fast renderer takes about a second for it, so that cancelling,
-/// the time limit and progress are prompt. A constant rather than a time, so that batches are the same on
-/// every machine.
-const CALL_SAMPLES: u64 = 1 << 22;
 
 /// Why a run failed. All samples taken before are in the session's film.
 #[derive(Debug, Error)]
@@ -210,19 +206,19 @@ impl<S: ProgressiveSource, C: StoppingCriterion> Driver<S, C> {
             // Take samples where the criterion is not satisfied.
             let requests = self.plan();
             let began = Instant::now();
-            let batches = self.source.sample(&requests)?;
+            // Nothing is missing where an earlier run failed to judge
+            let batches = if requests.is_empty() { Vec::new() } else { self.source.sample(&requests)? };
             self.clock.source_seconds += began.elapsed().as_secs_f64();
             let exhausted = self.take(&requests, batches)?;
 
-            // Judge what is due.
+            let mut stops = self.close_exhausted(&exhausted);
+
+            // Judge when every tile has what it needs.
             let began = Instant::now();
-            let mut stops = self.session.judge()?;
+            if self.session.is_round_complete() {
+                stops.extend(self.session.judge()?);
+            }
             self.clock.criterion_seconds += began.elapsed().as_secs_f64();
-            stops.extend(
-                exhausted
-                    .into_iter()
-                    .filter_map(|tile| self.session.close(tile, StopReason::SourceExhausted)),
-            );
             self.clock.total_seconds = start.elapsed().as_secs_f64();
             self.report(stops, on_event);
         }
@@ -243,22 +239,27 @@ impl<S: ProgressiveSource, C: StoppingCriterion> Driver<S, C> {
         Ok(())
     }
 
-    /// The session's requests, cut to what one call may ask for; all tiles for a source that cannot aim. Of a
-    /// picture with more pixels than that, the tiles that have the fewest samples.
+    /// The batches of one call: of the tiles with the fewest samples, as many as one call may ask for; of all
+    /// tiles for a source that cannot aim.
     fn plan(&self) -> Vec<Request> {
-        let mut requests = self.session.requests();
-        if !self.source.info().aims {
-            let spp = requests.iter().map(|r| r.spp).max().unwrap_or(1);
-            let film = self.session.film();
-            requests =
-                film.grid().tiles().map(|tile| Request { tile, first: film.spp(tile.index), spp }).collect();
-        } else {
+        let mut requests = self.session.next_batches();
+        if self.source.info().aims {
             keep_rearmost(&mut requests);
+            return requests;
         }
-        let pixels: u64 = requests.iter().map(|r| r.tile.pixels() as u64).sum();
-        let most = (CALL_SAMPLES / pixels.max(1)).max(1);
-        requests.iter_mut().for_each(|r| r.spp = r.spp.min(most));
-        requests
+        let film = self.session.film();
+        let pixels = (film.grid().width() * film.grid().height()) as u64;
+        let spp = requests.iter().map(|r| r.spp).max().unwrap_or(1).min((CALL_SAMPLES / pixels).max(1));
+        film.grid().tiles().map(|tile| Request { tile, first: film.spp(tile.index), spp }).collect()
+    }
+
+    /// Ends the tiles of which the source has no more, unless they have enough for a verdict.
+    fn close_exhausted(&mut self, tiles: &[usize]) -> Vec<Stop> {
+        let close = |&tile: &usize| match self.session.is_due(tile) {
+            true => None,
+            false => self.session.close(tile, StopReason::SourceExhausted),
+        };
+        tiles.iter().filter_map(close).collect()
     }
 
     /// Files the batches of one call; returns the tiles that have no more.
@@ -338,12 +339,12 @@ impl<S: ProgressiveSource, C: Resumable> Driver<S, C> {
     }
 }
 
-/// Keeps as many of the tiles furthest behind as a call with one sample per pixel has room for.
+/// Keeps as many of the tiles furthest behind as a call has room for, one at least.
 fn keep_rearmost(requests: &mut Vec<Request>) {
     requests.sort_by_key(|request| request.first);
     let mut samples = 0;
     let count = requests.iter().take_while(|request| {
-        samples += request.tile.pixels() as u64;
+        samples += request.spp * request.tile.pixels() as u64;
         samples <= CALL_SAMPLES
     });
     let count = count.count();

@@ -156,12 +156,7 @@ impl<C: StoppingCriterion> Session<C> {
             }
             let first = self.film.spp(index);
             let goal = state.target.unwrap_or(state.next);
-            let wanted = if self.film.has_halves() {
-                let [a, b] = self.film.half_counts(index);
-                goal.div_ceil(2).saturating_sub(a.min(b)).min(goal.saturating_sub(first))
-            } else {
-                goal.saturating_sub(first)
-            };
+            let wanted = self.wanted(self.film.half_counts(index), goal);
             Some(Request { tile: self.film.grid().tile(index), first, spp: wanted.max(1) })
         };
         self.tiles.iter().enumerate().filter_map(wish).collect()
@@ -217,10 +212,10 @@ impl<C: StoppingCriterion> Session<C> {
     }
 
     /// Whether a tile has what its next verdict needs.
-    fn is_due(&self, index: usize) -> bool {
+    pub(crate) fn is_due(&self, index: usize) -> bool {
         let state = &self.tiles[index];
-        let has_halves = !self.film.has_halves() || self.film.half_counts(index).iter().all(|&n| n > 0);
-        state.stop.is_none() && has_halves && self.film.spp(index) >= state.target.unwrap_or(state.next)
+        let goal = state.target.unwrap_or(state.next);
+        state.stop.is_none() && self.has_enough(self.film.half_counts(index), goal)
     }
 
     /// Settles exposure and reference; false if it is too early.
@@ -369,5 +364,6 @@ impl<C: StoppingCriterion> Session<C> {
 }
 
 mod resume;
+pub(crate) mod rounds;
 #[cfg(test)]
 mod tests;

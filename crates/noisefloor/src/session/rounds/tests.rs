@@ -1,0 +1,120 @@
+use crate::criterion::{CriterionError, StoppingCriterion, Verdict, View};
+use crate::film::Film;
+use crate::{FixedSpp, Needs, Params, Request, Schedule, Session, Stop, Tile};
+use proptest::prelude::*;
+
+/// Later tiles need more; keeps halves, and looks at the samples of the whole picture, as the oracle does.
+struct Neighbours;
+
+impl StoppingCriterion for Neighbours {
+    fn name(&self) -> String {
+        "neighbours".into()
+    }
+
+    fn fingerprint(&self) -> String {
+        self.name()
+    }
+
+    fn needs(&self) -> Needs {
+        Needs { halves: true, reference: false }
+    }
+
+    fn judge(&mut self, view: &View<'_>, tiles: &[Tile]) -> Result<Vec<Verdict>, CriterionError> {
+        let others = view.film.total_samples() / 1_000_000;
+        let verdict = |tile: &Tile| {
+            let enough = 150 * (tile.index as u64 + 1) + others % 50;
+            let (converged, expected_spp) = (view.film.spp(tile.index) >= enough, Some(enough));
+            Verdict { converged, expected_spp, ..Verdict::default() }
+        };
+        Ok(tiles.iter().map(verdict).collect())
+    }
+}
+
+/// A batch that depends on its request alone, and rounds.
+fn sample(request: &Request) -> Vec<[f32; 3]> {
+    let value =
+        |pixel: usize| (request.first as f32 + 1.1).sqrt() / (pixel as f32 + request.spp as f32 + 0.7);
+    (0..request.tile.pixels()).map(|pixel| [value(pixel), 0.1, value(pixel) * 3.0]).collect()
+}
+
+fn bits(film: &Film) -> Vec<u32> {
+    film.image().as_flattened().iter().map(|v| v.to_bits()).collect()
+}
+
+/// Renders, choosing what to sample next as `choose` says.
+fn render(schedule: Schedule, mut choose: impl FnMut(usize) -> usize) -> (Vec<u32>, Vec<Stop>) {
+    let params = Params { tile: 512, schedule, max_spp: 500, ..Params::default() };
+    let mut session = Session::new(700, 600, Neighbours, params).unwrap();
+    while !session.is_done() {
+        let batches = session.next_batches();
+        match batches.len() {
+            0 => drop(session.judge().unwrap()),
+            n => {
+                let request = batches[choose(n)];
+                session.push(request.tile.index, request.spp, &sample(&request)).unwrap();
+            }
+        }
+    }
+    (bits(session.film()), session.stops().collect())
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 2, ..ProptestConfig::default() })]
+    #[test]
+    fn film_and_stops_do_not_depend_on_the_order(seed: u64, spaced: bool) {
+        let schedule = if spaced { Schedule::Spaced { step: 50 } } else { Schedule::Every { step: 50 } };
+        let mut random = random_numbers(seed);
+        prop_assert!(render(schedule, |n| random() as usize % n) == render(schedule, |_| 0));
+    }
+}
+
+fn random_numbers(mut state: u64) -> impl FnMut() -> u64 {
+    move || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        state >> 33
+    }
+}
+
+/// What is asked for ahead is what will be asked for, in that order, as long as nothing stops.
+#[test]
+fn batches_ahead_are_those_to_come() {
+    let params = Params { tile: 512, max_spp: 1000, ..Params::default() };
+    let mut session = Session::new(2048, 1024, Neighbours, params).unwrap();
+    let mut asked: Vec<Vec<Request>> = vec![Vec::new(); 8];
+    let mut ahead = vec![Vec::new(); 8];
+    while !session.is_done() {
+        for (tile, (ahead, asked)) in ahead.iter_mut().zip(&asked).enumerate() {
+            let known: &Vec<Request> = ahead;
+            if session.is_open(tile) && known.len() <= asked.len() {
+                let mut longer = known.clone();
+                longer.extend(session.batches_ahead(tile));
+                *ahead = longer;
+            }
+        }
+        for request in session.next_batches() {
+            asked[request.tile.index].push(request);
+            session.push(request.tile.index, request.spp, &sample(&request)).unwrap();
+        }
+        if session.is_round_complete() {
+            session.judge().unwrap();
+        }
+    }
+    for (ahead, asked) in ahead.iter().zip(&asked) {
+        assert!(ahead.starts_with(asked), "{ahead:?} {asked:?}");
+    }
+    // In a picture of 2 megapixels, batches begin with two samples
+    let first: Vec<u64> = asked[0].iter().map(|request| request.spp).take(8).collect();
+    assert_eq!(first, [2, 2, 2, 2, 4, 4, 8, 8]);
+    assert!(ahead[7].len() >= asked[7].len());
+    let rounds = asked[7].iter().map(|request| request.spp).max();
+    assert_eq!(rounds, Some(16));
+}
+
+#[test]
+fn a_count_without_halves_has_batches_too() {
+    let params = Params { tile: 64, max_spp: 250, ..Params::default() };
+    let session = Session::new(64, 64, FixedSpp(250), params).unwrap();
+    let batches = session.batches_ahead(0);
+    assert_eq!(batches.iter().map(|b| (b.first, b.spp)).collect::<Vec<_>>(), [(0, 100)]);
+    assert_eq!(session.next_batches(), batches);
+}
