@@ -1,10 +1,35 @@
-//! Progress bars.
+//! Progress: bars in a terminal, lines in a log.
 
+use crate::say::note;
 use indicatif::{ProgressBar, ProgressStyle};
 #[cfg(feature = "lab")]
 use noisefloor_lab::Advance;
+use std::io::{self, IsTerminal};
 #[cfg(feature = "lab")]
 use std::sync::Mutex;
+use std::time::{Duration, Instant};
+
+/// Pause between two lines of a log.
+const LINES: Duration = Duration::from_secs(30);
+
+/// Where standard error is not a terminal, which shows a bar, a line now and then.
+pub struct Log {
+    next: Option<Instant>,
+}
+
+impl Log {
+    pub fn new(quiet: bool) -> Self {
+        let wanted = !quiet && !io::stderr().is_terminal();
+        Self { next: wanted.then(|| Instant::now() + LINES) }
+    }
+
+    pub fn tell(&mut self, line: impl FnOnce() -> String) {
+        if self.next.is_some_and(|next| Instant::now() >= next) {
+            note!("{}", line());
+            self.next = Some(Instant::now() + LINES);
+        }
+    }
+}
 
 /// A bar with an estimate of the time left.
 pub fn bar(len: u64, what: &'static str) -> ProgressBar {
@@ -19,12 +44,13 @@ pub fn bar(len: u64, what: &'static str) -> ProgressBar {
 pub struct Bars {
     quiet: bool,
     now: Mutex<Option<(&'static str, ProgressBar)>>,
+    log: Mutex<Log>,
 }
 
 #[cfg(feature = "lab")]
 impl Bars {
     pub fn new(quiet: bool) -> Self {
-        Self { quiet, now: Mutex::new(None) }
+        Self { quiet, now: Mutex::new(None), log: Mutex::new(Log::new(quiet)) }
     }
 
     pub fn show(&self, Advance { what, done, of, detail }: Advance<'_>) {
@@ -42,6 +68,10 @@ impl Bars {
             bar.set_length(of);
             bar.set_position(done);
             bar.set_message(detail.to_owned());
+            if let Ok(mut log) = self.log.lock() {
+                let (gone, left) = (bar.elapsed().as_secs(), bar.eta().as_secs());
+                log.tell(|| format!("{done}/{of} {what} after {gone} s, about {left} s to go {detail}"));
+            }
         }
     }
 

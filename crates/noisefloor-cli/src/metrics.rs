@@ -3,7 +3,7 @@
 use crate::say::{NotSaid, note, say};
 use anyhow::{Context, bail};
 use noisefloor::{Display, Rgb, ToneMapping, Viewing};
-use noisefloor_image::maps::{ColourScale, draw_field};
+use noisefloor_image::maps::{Canvas, ColourScale, draw_field};
 use noisefloor_image::{Picture, check_writable, read_picture};
 use noisefloor_rivals::DifferenceMap;
 use noisefloor_rivals::metrics::{MetricPair, MetricScores};
@@ -120,7 +120,7 @@ fn draw(
     scale: &ColourScale,
 ) -> anyhow::Result<()> {
     if let (Some(path), Some(map)) = (path, map) {
-        draw_field(width, shown, &map.values, scale).save(path)?;
+        draw_field(&Canvas::of_picture(width, shown), &map.values, scale).save(path)?;
     }
     Ok(())
 }

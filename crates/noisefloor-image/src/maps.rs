@@ -108,9 +108,14 @@ impl Canvas {
 
     /// A display-encoded picture `width` pixels wide, in [0, 1]; an incomplete last row is left out.
     pub fn of_picture(width: usize, encoded: &[Rgb]) -> Self {
-        let mut canvas = Self::new(width, encoded.len() / width.max(1), PAPER);
-        for (to, from) in canvas.0.pixels_mut().zip(encoded) {
-            to.0 = from.map(|c| (c.clamp(0.0, 1.0) * 255.0).round() as u8);
+        Self::of_pixels(width, encoded.len() / width.max(1), |pixel| encoded[pixel])
+    }
+
+    /// A picture whose display-encoded pixels, in [0, 1], are computed from their row-major index.
+    pub fn of_pixels(width: usize, height: usize, encoded: impl Fn(usize) -> Rgb) -> Self {
+        let mut canvas = Self::new(width, height, PAPER);
+        for (pixel, to) in canvas.0.pixels_mut().enumerate() {
+            to.0 = encoded(pixel).map(|c| (c.clamp(0.0, 1.0) * 255.0).round() as u8);
         }
         canvas
     }
@@ -141,6 +146,11 @@ impl Canvas {
     /// Colours one pixel.
     pub fn set(&mut self, x: usize, y: usize, colour: [u8; 3]) {
         self.blend(x, y, colour, 1.0);
+    }
+
+    /// Luminance of a pixel as displayed, 0 to 255.
+    fn grey(&self, x: usize, y: usize) -> f32 {
+        noisefloor::luminance(self.0.get_pixel(x as u32, y as u32).0.map(f32::from))
     }
 
     /// Mixes a colour into a pixel; `alpha` is its share, in [0, 1].
@@ -223,13 +233,13 @@ pub fn display_bytes(encoded: &[Rgb]) -> Vec<u8> {
     encoded.iter().flatten().map(|c| (c.clamp(0.0, 1.0) * 255.0).round() as u8).collect()
 }
 
-/// Draws `marks` over a display-encoded picture `width` pixels wide, legend at the right.
-pub fn draw_tiles(width: usize, encoded: &[Rgb], marks: &[TileMark], scale: &ColourScale) -> Canvas {
-    let height = encoded.len() / width;
+/// Draws `marks` over a picture, legend at the right.
+pub fn draw_tiles(picture: &Canvas, marks: &[TileMark], scale: &ColourScale) -> Canvas {
+    let (width, height) = (picture.width(), picture.height());
     let mut canvas = Canvas::new(width + LEGEND, height.max(LEAST_HEIGHT), PAPER);
 
     for mark in marks {
-        tint(&mut canvas, width, encoded, mark.tile, scale.colour(mark.value));
+        tint(&mut canvas, picture, mark.tile, scale.colour(mark.value));
     }
     for mark in marks {
         frame(&mut canvas, mark);
@@ -247,11 +257,11 @@ pub fn draw_tiles(width: usize, encoded: &[Rgb], marks: &[TileMark], scale: &Col
 }
 
 /// The picture in grey below a colour, so that colour means the value alone.
-fn tint(canvas: &mut Canvas, width: usize, encoded: &[Rgb], tile: Tile, colour: [u8; 3]) {
-    for pixel in tile.rows(width).flatten() {
-        let grey = 255.0 * noisefloor::luminance(encoded[pixel]);
-        let blend = colour.map(|c| (0.55 * f32::from(c) + 0.45 * grey).round() as u8);
-        canvas.set(pixel % width, pixel / width, blend);
+fn tint(canvas: &mut Canvas, picture: &Canvas, tile: Tile, colour: [u8; 3]) {
+    let (columns, rows) = (tile.x..tile.x + tile.width, tile.y..tile.y + tile.height);
+    for (x, y) in rows.flat_map(|y| columns.clone().map(move |x| (x, y))) {
+        let grey = picture.grey(x, y);
+        canvas.set(x, y, colour.map(|c| (0.55 * f32::from(c) + 0.45 * grey).round() as u8));
     }
 }
 
@@ -273,13 +283,13 @@ fn frame(canvas: &mut Canvas, TileMark { tile, label, unfamiliar, .. }: &TileMar
     }
 }
 
-/// Draws one value a pixel over a display-encoded picture `width` pixels wide, legend at the right. The
-/// picture is dark and grey below the colours; it stays bare where a value is NaN.
-pub fn draw_field(width: usize, encoded: &[Rgb], values: &[f32], scale: &ColourScale) -> Canvas {
-    let height = encoded.len() / width;
+/// Draws one value a pixel over a picture, legend at the right. The picture is dark and grey below the
+/// colours; it stays bare where a value is NaN.
+pub fn draw_field(picture: &Canvas, values: &[f32], scale: &ColourScale) -> Canvas {
+    let (width, height) = (picture.width(), picture.height());
     let mut canvas = Canvas::new(width + LEGEND, height.max(LEAST_HEIGHT), PAPER);
-    for (pixel, (&rgb, &value)) in encoded.iter().zip(values).enumerate() {
-        let grey = 255.0 * noisefloor::luminance(rgb);
+    for (pixel, &value) in values.iter().enumerate().take(width * height) {
+        let grey = picture.grey(pixel % width, pixel / width);
         let colour = if value.is_nan() { [0; 3] } else { scale.colour(f64::from(value)) };
         let blend = colour.map(|c| (0.7 * f32::from(c) + 0.3 * grey).round() as u8);
         canvas.set(pixel % width, pixel / width, blend);
@@ -361,7 +371,7 @@ mod tests {
             colours: colorous::VIRIDIS,
             landmark: None,
         };
-        let canvas = draw_tiles(64, &vec![[0.0; 3]; 64 * 32], &[mark(0), mark(1)], &scale);
+        let canvas = draw_tiles(&Canvas::new(64, 32, [0; 3]), &[mark(0), mark(1)], &scale);
         let at = |x: usize, y: usize| &canvas.bytes()[(y * canvas.width() + x) * 3..][..3];
         // Over black: 55 % of viridis' first and last colour.
         assert_eq!(at(16, 16), [68.0, 1.0, 84.0].map(|c: f32| (0.55 * c).round() as u8));
@@ -381,8 +391,8 @@ mod tests {
             colours: INFERNO,
             landmark: Some((4.0, "here")),
         };
-        let canvas =
-            draw_field(4, &[[0.0; 3], [1.0; 3], [0.0; 3], [1.0; 3]], &[0.0, 16.0, 100.0, f32::NAN], &scale);
+        let picture = Canvas::of_picture(4, &[[0.0; 3], [1.0; 3], [0.0; 3], [1.0; 3]]);
+        let canvas = draw_field(&picture, &[0.0, 16.0, 100.0, f32::NAN], &scale);
         let at = |x: usize| &canvas.bytes()[x * 3..][..3];
         let over = |colour: [f32; 3], grey: f32| colour.map(|c| (0.7 * c + 0.3 * 255.0 * grey).round() as u8);
         // The first colour of the gradient, its last one twice, and none.

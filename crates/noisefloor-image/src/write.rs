@@ -3,9 +3,9 @@
 use crate::atomic::write_atomic;
 use crate::error::WriteError;
 use crate::facts::{SampleFacts, sample_attributes};
+use crate::plane::{Channel, Channels, Plane};
 use exr::prelude::{
-    AnyChannel, AnyChannels, Blocks, Compression, Encoding, FlatSamples, Image, Layer, LayerAttributes,
-    LineOrder, Text, WritableImage,
+    Blocks, Compression, Encoding, Image, Layer, LayerAttributes, LineOrder, Text, WritableImage,
 };
 use image::codecs::png::PngEncoder;
 use image::{ExtendedColorType, ImageEncoder};
@@ -23,17 +23,17 @@ pub struct RenderLayers<'a> {
     /// Height in pixels.
     pub height: usize,
     /// Linear RGB, Rec.709, row-major, `width * height` values.
-    pub rgb: &'a [Rgb],
+    pub rgb: Plane<'a, Rgb>,
     /// Samples behind each pixel; written as 32-bit unsigned integers `oracle.spp`.
-    pub spp: Option<&'a [u32]>,
+    pub spp: Option<Plane<'a, u32>>,
     /// Probability, 0…1, that an observer sees no difference; written as floats `oracle.P`. NaN where nobody
     /// judged.
-    pub probability: Option<&'a [f32]>,
+    pub probability: Option<Plane<'a, f32>>,
     /// Whether the pixel's tile has stopped; written as floats `oracle.stop`, 1 or 0.
-    pub stopped: Option<&'a [bool]>,
+    pub stopped: Option<Plane<'a, bool>>,
     /// How visible the noise is, as a multiple of what is just seen; written as floats `oracle.visible_noise`. NaN
     /// without evidence.
-    pub visible_noise: Option<&'a [f32]>,
+    pub visible_noise: Option<Plane<'a, f32>>,
     /// How many samples, and from where; written as attributes that [`read_facts`](crate::read_facts) reads.
     pub facts: Option<&'a SampleFacts>,
 }
@@ -42,7 +42,16 @@ impl<'a> RenderLayers<'a> {
     /// A picture without further layers.
     pub fn rgb(width: usize, height: usize, rgb: &'a [Rgb]) -> Self {
         let (probability, visible_noise) = (None, None);
-        Self { width, height, rgb, spp: None, probability, stopped: None, visible_noise, facts: None }
+        Self {
+            width,
+            height,
+            rgb: rgb.into(),
+            spp: None,
+            probability,
+            stopped: None,
+            visible_noise,
+            facts: None,
+        }
     }
 }
 
@@ -56,34 +65,32 @@ pub fn write_exr(path: impl AsRef<Path>, layers: &RenderLayers<'_>) -> Result<()
     let path = path.as_ref();
     let (width, height) = (layers.width, layers.height);
     check_image(width, height).map_err(|source| WriteError::Image { path: path.to_owned(), source })?;
-    let check = |what, got: usize| check_len(path, what, (width, height), got, width * height);
+    let check = |what, got: Option<usize>| {
+        check_len(path, what, (width, height), got.unwrap_or(width * height), width * height)
+    };
 
-    // Colours
+    // Colours, and what the oracle knows
     check("rgb", layers.rgb.len())?;
-    let colour = |c: usize| FlatSamples::F32(layers.rgb.iter().map(|pixel| pixel[c]).collect());
     let mut channels = vec![
-        AnyChannel::new("R", colour(0)),
-        AnyChannel::new("G", colour(1)),
-        AnyChannel::new("B", colour(2)),
+        Channel::new("R", |pixel| layers.rgb.at(pixel)[0]),
+        Channel::new("G", |pixel| layers.rgb.at(pixel)[1]),
+        Channel::new("B", |pixel| layers.rgb.at(pixel)[2]),
     ];
-
-    // What the oracle knows
     if let Some(spp) = layers.spp {
         check("spp", spp.len())?;
-        channels.push(AnyChannel::new("oracle.spp", FlatSamples::U32(spp.to_vec())));
+        channels.push(Channel::counts("oracle.spp", move |pixel| spp.at(pixel)));
     }
     if let Some(probability) = layers.probability {
         check("probability", probability.len())?;
-        channels.push(AnyChannel::new("oracle.P", FlatSamples::F32(probability.to_vec())));
+        channels.push(Channel::new("oracle.P", move |pixel| probability.at(pixel)));
     }
     if let Some(stopped) = layers.stopped {
         check("stopped", stopped.len())?;
-        let stopped = stopped.iter().map(|&s| f32::from(u8::from(s))).collect();
-        channels.push(AnyChannel::new("oracle.stop", FlatSamples::F32(stopped)));
+        channels.push(Channel::new("oracle.stop", move |pixel| f32::from(u8::from(stopped.at(pixel)))));
     }
     if let Some(noise) = layers.visible_noise {
         check("visible_noise", noise.len())?;
-        channels.push(AnyChannel::new("oracle.visible_noise", FlatSamples::F32(noise.to_vec())));
+        channels.push(Channel::new("oracle.visible_noise", move |pixel| noise.at(pixel)));
     }
 
     let [of_picture, of_layer] = layers.facts.map(sample_attributes).unwrap_or_default();
@@ -97,7 +104,7 @@ pub fn write_exr(path: impl AsRef<Path>, layers: &RenderLayers<'_>) -> Result<()
         blocks: Blocks::ScanLines,
         line_order: LineOrder::Increasing,
     };
-    let channels = AnyChannels::sort(channels.into_iter().collect());
+    let channels = Channels::new(width, channels);
     let mut image = Image::from_layer(Layer::new((width, height), attributes, encoding, channels));
     image.attributes.other = of_picture;
     write_atomic(path, |writer| image.write().to_buffered(writer))

@@ -45,7 +45,10 @@ pub fn map_zones(corpus: &[PathBuf], predictions: &[Prediction]) -> Result<Vec<(
         let zones: Vec<&Prediction> = predictions.iter().filter(|p| p.scene == scene).collect();
         let (picture, places) = pictures.remove(scene).unwrap_or_else(|| blank(&zones));
         let marks: Vec<TileMark> = zones.iter().filter_map(|zone| mark(zone, &places)).collect();
-        maps.push((scene.to_owned(), draw_tiles(picture.width, &picture.pixels, &marks, &RATIO)));
+        maps.push((
+            scene.to_owned(),
+            draw_tiles(&Canvas::of_picture(picture.width, &picture.pixels), &marks, &RATIO),
+        ));
     }
     Ok(maps)
 }

@@ -6,7 +6,7 @@ use super::tone::ToneArgs;
 use super::values;
 use super::viewing::ViewingArgs;
 use crate::folder::Earlier;
-use crate::render::{Judge, RenderJob};
+use crate::render::{Autosave, Judge, RenderJob};
 use anyhow::bail;
 use clap::{Args, ValueEnum};
 use noisefloor::{Audience, DEFAULT_TILE, Params, Schedule};
@@ -85,7 +85,7 @@ pub struct RenderArgs {
     /// Every tile stops at this many samples per pixel [default: 10000; N with --criterion spp:N].
     #[arg(long, value_name = "SPP")]
     max_spp: Option<u64>,
-    /// Stop all tiles after this many seconds of sampling.
+    /// Be done after this many seconds, with all files written: tiles that are still open then stop.
     #[arg(long, value_name = "SECONDS", value_parser = values::seconds)]
     time: Option<Duration>,
     /// Stop a tile only after K verdicts of "converged" in a row.
@@ -98,9 +98,10 @@ pub struct RenderArgs {
     /// Converged picture of the same size to compare with: relMSE in timeline.csv and report.json.
     #[arg(long, value_name = "FILE.exr")]
     against: Option<PathBuf>,
-    /// Seconds between two refreshes of the files in the output folder while rendering; 0 for none.
-    #[arg(long, default_value = "30", value_name = "SECONDS", value_parser = values::pause)]
-    autosave: Duration,
+    /// Seconds between two refreshes of the files in the output folder while rendering; 0 for none [default:
+    /// 30, or as many as keep all refreshes within 2 % of the time].
+    #[arg(long, value_name = "SECONDS", value_parser = values::autosave)]
+    autosave: Option<Autosave>,
     /// Continue the render that Ctrl-C, --time or a kill interrupted in this output folder. Picture and
     /// stops are those of an uninterrupted render. Options must be the same, and so must the contents of the
     /// scene and of all files that it reads. Works with sources that repeat their samples: `ptwne`, `exr`, `cycles`,
@@ -179,7 +180,7 @@ impl RenderArgs {
             out: self.out,
             time: self.time,
             against: self.against,
-            autosave: self.autosave,
+            autosave: self.autosave.unwrap_or(Autosave::Paced),
             earlier: Earlier::of(self.force, self.resume),
             quiet: self.quiet,
         })

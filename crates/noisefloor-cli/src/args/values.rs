@@ -1,5 +1,6 @@
 //! Values as they are typed.
 
+use crate::render::Autosave;
 use noisefloor::{Audience, MAX_TILE, MIN_TILE};
 use noisefloor_rivals::{RIVALS, Rival};
 use std::num::NonZeroUsize;
@@ -66,8 +67,8 @@ pub(super) fn seconds(text: &str) -> Result<Duration, String> {
 }
 
 /// As [`seconds`], or 0 for never.
-pub(super) fn pause(text: &str) -> Result<Duration, String> {
-    if text.parse() == Ok(0.0) { Ok(Duration::ZERO) } else { seconds(text) }
+pub(super) fn autosave(text: &str) -> Result<Autosave, String> {
+    if text.parse() == Ok(0.0) { Ok(Autosave::Never) } else { seconds(text).map(Autosave::Every) }
 }
 
 pub(super) fn jods(text: &str) -> Result<f64, String> {

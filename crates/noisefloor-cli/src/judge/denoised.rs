@@ -6,7 +6,7 @@ use anyhow::{Context, bail};
 use noisefloor::{Evidence, Rgb, Samples, SnapshotPair, Still, Tile, TileGrid, ToneMapping, Viewing};
 use noisefloor_denoise::{DenoisedError, DenoisedHalves};
 use noisefloor_image::check_writable;
-use noisefloor_image::maps::draw_field;
+use noisefloor_image::maps::{Canvas, draw_field};
 use noisefloor_vision::{VisionModel, VisionWorkspace};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -74,7 +74,7 @@ pub fn run(job: &DenoisedJob) -> anyhow::Result<()> {
     if let Some(path) = &job.noise_map {
         let shown: Vec<Rgb> = error.shown().iter().map(|&shown| [shown; 3]).collect();
         let map = error.map_of_jods_lost(&VisionModel::new(&job.viewing))?;
-        draw_field(size.0, &shown, &map, &crate::output::ERROR_SCALE).save(path)?;
+        draw_field(&Canvas::of_picture(size.0, &shown), &map, &crate::output::ERROR_SCALE).save(path)?;
     }
     Ok(())
 }

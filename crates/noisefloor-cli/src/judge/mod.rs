@@ -10,8 +10,8 @@ use anyhow::Context;
 use noisefloor::{
     Evidence, Oracle, Samples, SnapshotPair, Still, Tile, TileGrid, ToneMapping, Verdict, Viewing,
 };
-use noisefloor_image::maps::{ColourScale, NOISE_SCALE, TileMark, draw_field, draw_tiles};
-use noisefloor_image::{RenderLayers, SampleFacts, check_writable, read_facts, read_still, write_exr};
+use noisefloor_image::maps::{Canvas, ColourScale, NOISE_SCALE, TileMark, draw_field, draw_tiles};
+use noisefloor_image::{Plane, RenderLayers, SampleFacts, check_writable, read_facts, read_still, write_exr};
 use report::Row;
 use std::path::{Path, PathBuf};
 
@@ -121,7 +121,7 @@ fn draw(
     let noise =
         if wants_noise { job.oracle.map_visible_noise(grid, |t| held.planes(t).map(Some))? } else { None };
     if let (Some(path), Some(noise)) = (&job.noise_map, &noise) {
-        draw_field(width, &held.shown(), noise, &NOISE_SCALE).save(path)?;
+        draw_field(&Canvas::of_picture(width, &held.shown()), noise, &NOISE_SCALE).save(path)?;
     }
     if let Some(path) = &job.exr {
         write_channels(path, image, grid, rows, noise.as_deref())?;
@@ -136,7 +136,7 @@ fn draw(
         let marks: Vec<TileMark> = rows.iter().map(mark).collect();
         let (title, colours) = ("P(no noise\nis seen)", colorous::CIVIDIS);
         let scale = ColourScale { title, low: 0.0, high: 1.0, log: false, colours, landmark: None };
-        draw_tiles(width, &held.shown(), &marks, &scale).save(path)?;
+        draw_tiles(&Canvas::of_picture(width, &held.shown()), &marks, &scale).save(path)?;
     }
     Ok(())
 }
@@ -149,15 +149,12 @@ fn write_channels(
     noise: Option<&[f32]>,
 ) -> anyhow::Result<()> {
     let (width, height) = image.size;
-    let mut probability = vec![f32::NAN; image.pixels.len()];
-    for row in rows {
-        grid.tile(row.tile).rows(width).flatten().for_each(|pixel| probability[pixel] = row.probability);
-    }
+    let probability = |pixel: usize| rows[grid.index_at(pixel % width, pixel / width)].probability;
     let spp = (image.spp.fract() == 0.0 && image.spp < 1e15).then_some(image.spp as u64);
     let facts = SampleFacts { samples: spp.map(|spp| (spp, spp)), origin: image.origin.clone() };
     let layers = RenderLayers {
-        probability: Some(&probability),
-        visible_noise: noise,
+        probability: Some(Plane::Computed(&probability)),
+        visible_noise: noise.map(Plane::from),
         facts: Some(&facts),
         ..RenderLayers::rgb(width, height, &image.pixels)
     };

@@ -88,11 +88,10 @@ impl Output {
         let eyes = VisionModel::new(&session.params().viewing);
         let map = denoised.record().error.as_ref().map(|error| error.map_of_jods_lost(&eyes)).transpose()?;
         write_exr(self.path("image-denoised.exr"), &RenderLayers::rgb(width, height, &image))?;
-        Canvas::of_picture(width, &encoded).save(self.path("image-denoised.png"))?;
+        let shown = Canvas::of_picture(width, &encoded);
+        shown.save(self.path("image-denoised.png"))?;
         match map {
-            Some(map) => {
-                draw_field(width, &encoded, &map, &ERROR_SCALE).save(self.path("denoised-error.png"))?
-            }
+            Some(map) => draw_field(&shown, &map, &ERROR_SCALE).save(self.path("denoised-error.png"))?,
             None => note!("note: no tile was judged, so the error of the denoised picture is not known"),
         }
         Ok(())

@@ -135,23 +135,35 @@ impl Output {
         self.timeline.push(TimelineRow { seconds, samples, active_tiles, rel_mse });
     }
 
-    /// Writes every file: the checkpoint of a render that can be resumed; with the time it took and what
-    /// became of the samples when the run is over.
+    /// Writes every file, with the time that the run took and what became of the samples: it is over.
     pub fn write<C: StoppingCriterion>(
+        &mut self,
+        session: &Session<C>,
+        checkpoint: Option<Checkpoint<'_>>,
+        over: (Clock, &dyn Source),
+    ) -> anyhow::Result<()> {
+        self.write_pictures(session)?;
+        self.write_denoised(session)?;
+        self.write_tables(session, checkpoint, Some(over))
+    }
+
+    /// Writes what is known so far, pictures excepted: tables, and the checkpoint of a render that can be resumed.
+    pub fn write_progress<C: StoppingCriterion>(
+        &mut self,
+        session: &Session<C>,
+        checkpoint: Option<Checkpoint<'_>>,
+    ) -> anyhow::Result<()> {
+        self.write_tables(session, checkpoint, None)
+    }
+
+    fn write_tables<C: StoppingCriterion>(
         &mut self,
         session: &Session<C>,
         checkpoint: Option<Checkpoint<'_>>,
         over: Option<(Clock, &dyn Source)>,
     ) -> anyhow::Result<()> {
+        self.forget_earlier()?;
         let tiles = tiles::states(session);
-        // A report is of the pictures beside it: one of an earlier render is none any more
-        if std::mem::take(&mut self.overwrites) {
-            remove(&self.path(REPORT))?;
-        }
-        self.write_pictures(session, &tiles)?;
-        if over.is_some() {
-            self.write_denoised(session)?;
-        }
         write_csv(&self.path("stops.csv"), tiles.iter().map(TileState::row))?;
         write_csv(&self.path("timeline.csv"), self.timeline.iter())?;
         // The report goes before a checkpoint is removed: whatever is killed in between, one of them says how
@@ -163,6 +175,11 @@ impl Output {
         }
         write_json(&self.path(REPORT), &Report::new(self, session, &tiles, over))?;
         if kept.is_none() { remove(&self.path(CHECKPOINT)) } else { Ok(()) }
+    }
+
+    /// A report is of the pictures beside it: one of an earlier render is none any more.
+    fn forget_earlier(&mut self) -> anyhow::Result<()> {
+        if std::mem::take(&mut self.overwrites) { remove(&self.path(REPORT)) } else { Ok(()) }
     }
 }
 

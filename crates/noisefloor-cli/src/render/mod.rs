@@ -1,8 +1,10 @@
 //! `noisefloor render`.
 
 mod progress;
+mod saving;
 mod snapshots;
 
+use crate::bars::Log;
 use crate::files::read_reference;
 use crate::folder::{Earlier, Folder};
 use crate::output::{Denoised, Output};
@@ -27,6 +29,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 pub use progress::reference_bar;
+pub use saving::Autosave;
+use saving::Pace;
 use snapshots::{Rendering, Snapshots};
 
 /// What is rendered, and until when: checked.
@@ -35,10 +39,10 @@ pub struct RenderJob {
     pub judge: Judge,
     pub params: Params,
     pub out: Option<PathBuf>,
+    /// For everything, from the start of the command to the last file.
     pub time: Option<Duration>,
     pub against: Option<PathBuf>,
-    /// Zero for never.
-    pub autosave: Duration,
+    pub autosave: Autosave,
     pub earlier: Earlier,
     pub quiet: bool,
 }
@@ -56,6 +60,7 @@ pub enum Judge {
 
 pub fn run(job: RenderJob) -> anyhow::Result<ExitCode> {
     // Whatever can be wrong is found before anything is rendered.
+    let began = Instant::now();
     let RenderJob { source, judge, params, .. } = &job;
     source.start_threads()?;
     let opened = source.open()?;
@@ -64,7 +69,7 @@ pub fn run(job: RenderJob) -> anyhow::Result<ExitCode> {
     let SourceInfo { width, height, .. } = source.info();
     let against = job.against.as_deref();
     let reference = against.map(|path| read_reference(path, (width, height))).transpose()?;
-    let rest = Rest { job: &job, scene, reference, model: None, denoised: None };
+    let rest = Rest { job: &job, began, scene, reference, model: None, denoised: None };
     match judge {
         Judge::Oracle(oracle) => {
             let rest = Rest { model: Some(oracle.model().digest()), ..rest };
@@ -111,6 +116,7 @@ fn origin(job: &SourceJob, scene: &str, info: &SourceInfo) -> Option<SampleOrigi
 /// What a render is made of beside its driver.
 struct Rest<'a> {
     job: &'a RenderJob,
+    began: Instant,
     scene: String,
     reference: Option<Vec<Rgb>>,
     model: Option<String>,
@@ -123,7 +129,7 @@ impl Rest<'_> {
         mut driver: Rendering<C>,
         snapshots: Option<Snapshots<C>>,
     ) -> anyhow::Result<ExitCode> {
-        let Rest { job, scene, reference, model, denoised } = self;
+        let Rest { job, began, scene, reference, model, denoised } = self;
         let info = driver.source().info();
         let snapshots = snapshots.filter(|_| info.repeats == Repeats::Samples);
         let resume = job.earlier == Earlier::Resume;
@@ -142,7 +148,7 @@ impl Rest<'_> {
         if let Some(snapshots) = snapshots.as_ref().filter(|_| resume) {
             driver = snapshots.resume(driver, &mut output, job.quiet)?;
         }
-        driver.set_time_limit(job.time);
+        driver.set_time_limit(job.time.map(|time| sampling_time(time, began, info.width * info.height)));
         let cancel = driver.cancel_flag();
         cancel_on_signal(Arc::clone(&cancel), AFTER_THIS_BATCH)?;
         driver.source_mut().watch_reference(reference_bar(job.quiet), Arc::clone(&cancel));
@@ -150,7 +156,7 @@ impl Rest<'_> {
 
         // Write what there is, also after a failure.
         let checkpoint = snapshots.as_ref().map(|snapshots| snapshots.of(driver.session()));
-        let over = Some((driver.clock(), driver.source().as_ref()));
+        let over = (driver.clock(), driver.source().as_ref());
         let written = output.write(driver.session(), checkpoint, over);
         let interrupted = finish(&driver, outcome, &cancel)?;
         written?;
@@ -162,6 +168,13 @@ impl Rest<'_> {
     }
 }
 
+/// What is left for samples of the time for everything, once all is set up: the files are still to be written. At least
+/// half of it, so that there is something to write.
+fn sampling_time(time: Duration, began: Instant, pixels: usize) -> Duration {
+    let left = time.saturating_sub(began.elapsed());
+    left.saturating_sub(saving::last_save(pixels)).max(left / 2)
+}
+
 /// Renders. A failure to save along the way is reported at once, and rendering goes on: the disk may have
 /// room again.
 fn sample<C: StoppingCriterion>(
@@ -171,18 +184,26 @@ fn sample<C: StoppingCriterion>(
     job: &RenderJob,
 ) -> Result<(), DriverError> {
     let bar = progress::bar(job.quiet);
-    let mut saved = Instant::now();
+    let mut log = Log::new(job.quiet);
+    let grid = driver.session().film().grid();
+    let [mut checkpoints, mut pictures] = Pace::both(job.autosave, grid.width() * grid.height());
     let outcome = driver.run(|session, event| {
         let Event::BatchDone(progress) = event else { return };
         output.record(session, progress);
-        progress::show(&bar, session, progress);
-        if !job.autosave.is_zero() && saved.elapsed() >= job.autosave {
-            let checkpoint = snapshots.map(|snapshots| snapshots.of(session));
-            if let Err(error) = output.write(session, checkpoint, None) {
-                bar.suspend(|| note!("warning: not saved: {}", one_line(&error)));
+        progress::show(&bar, &mut log, session, progress);
+        let mut save = |pace: &mut Pace, write: &mut dyn FnMut(&mut Output) -> anyhow::Result<()>| {
+            if pace.is_due() {
+                let began = Instant::now();
+                if let Err(error) = write(output) {
+                    bar.suspend(|| note!("warning: not saved: {}", one_line(&error)));
+                }
+                pace.pause_after(began.elapsed());
             }
-            saved = Instant::now();
-        }
+        };
+        save(&mut pictures, &mut |output| output.write_pictures(session));
+        save(&mut checkpoints, &mut |output| {
+            output.write_progress(session, snapshots.map(|snapshots| snapshots.of(session)))
+        });
     });
     bar.finish_and_clear();
     outcome

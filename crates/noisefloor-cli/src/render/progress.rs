@@ -1,6 +1,6 @@
 //! The progress of a render.
 
-use crate::bars;
+use crate::bars::{self, Log};
 use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressStyle};
 use noisefloor::{Progress, Session, StoppingCriterion};
 use std::time::Duration;
@@ -16,7 +16,12 @@ pub(super) fn bar(quiet: bool) -> ProgressBar {
     style.map(|style| bar.clone().with_style(style)).unwrap_or(bar)
 }
 
-pub(super) fn show<C: StoppingCriterion>(bar: &ProgressBar, session: &Session<C>, progress: &Progress) {
+pub(super) fn show<C: StoppingCriterion>(
+    bar: &ProgressBar,
+    log: &mut Log,
+    session: &Session<C>,
+    progress: &Progress,
+) {
     let pixels = (session.film().grid().width() * session.film().grid().height()) as f64;
     let eta = match progress.eta_seconds {
         Some(seconds) => {
@@ -25,7 +30,10 @@ pub(super) fn show<C: StoppingCriterion>(bar: &ProgressBar, session: &Session<C>
         }
         None => "no estimate yet".into(),
     };
-    bar.set_length(progress.tiles as u64);
-    bar.set_position((progress.tiles - progress.now.active_tiles) as u64);
-    bar.set_message(format!("{:.0} spp, {eta}", progress.now.samples as f64 / pixels));
+    let (done, tiles) = (progress.tiles - progress.now.active_tiles, progress.tiles);
+    let message = format!("{:.1} spp, {eta}", progress.now.samples as f64 / pixels);
+    log.tell(|| format!("{done}/{tiles} tiles done after {:.0} s, {message}", progress.now.seconds));
+    bar.set_length(tiles as u64);
+    bar.set_position(done as u64);
+    bar.set_message(message);
 }

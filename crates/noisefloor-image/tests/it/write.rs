@@ -1,4 +1,6 @@
-use noisefloor_image::{RenderLayers, WriteError, read_exr, read_png, write_atomic, write_exr, write_png};
+use noisefloor_image::{
+    Plane, RenderLayers, WriteError, read_exr, read_png, write_atomic, write_exr, write_png,
+};
 use std::io::{self, Write};
 
 fn entries(folder: &std::path::Path) -> usize {
@@ -11,14 +13,13 @@ fn exr_there_and_back_with_layers() {
     let path = folder.path().join("a.exr");
     let rgb: Vec<[f32; 3]> = (0..35 * 20).map(|i| [i as f32 * 0.1, -1.0, 1e9]).collect();
     let spp: Vec<u32> = (0..35 * 20).map(|i| 4_000_000_000 - i).collect();
-    let stopped = vec![true; 35 * 20];
     let probability = vec![0.9; 35 * 20];
     let noise: Vec<f32> = (0..35 * 20).map(|i| i as f32).collect();
     let layers = RenderLayers {
-        spp: Some(&spp),
-        probability: Some(&probability),
-        stopped: Some(&stopped),
-        visible_noise: Some(&noise),
+        spp: Some(spp[..].into()),
+        probability: Some(probability[..].into()),
+        stopped: Some(Plane::Computed(&|_| true)),
+        visible_noise: Some(Plane::Computed(&|pixel| noise[pixel])),
         ..RenderLayers::rgb(35, 20, &rgb)
     };
     write_exr(&path, &layers).unwrap();
@@ -68,7 +69,7 @@ fn wrong_lengths_are_errors() {
         Err(WriteError::Size { got: 4, want: 6, .. })
     ));
     assert!(matches!(write_exr(&path, &RenderLayers::rgb(0, 3, &rgb)), Err(WriteError::Image { .. })));
-    let layers = RenderLayers { spp: Some(&[1]), ..RenderLayers::rgb(2, 2, &rgb) };
+    let layers = RenderLayers { spp: Some([1][..].into()), ..RenderLayers::rgb(2, 2, &rgb) };
     assert!(matches!(write_exr(&path, &layers), Err(WriteError::Size { what: "spp", .. })));
     assert!(matches!(write_png(&path, 2, 2, &[0; 4]), Err(WriteError::Size { want: 12, .. })));
     assert!(matches!(write_png(&path, 0, 2, &[]), Err(WriteError::Png { .. })));

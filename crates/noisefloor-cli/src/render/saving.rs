@@ -1,0 +1,81 @@
+//! When a render is saved: often enough that a kill loses little, rarely enough that saving costs little.
+
+use std::time::{Duration, Instant};
+
+/// How often the user wants a render to be saved.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Autosave {
+    /// Only at the end.
+    Never,
+    /// After each pause of this length, whatever it costs.
+    Every(Duration),
+    /// After half a minute, or as soon as saving takes 2 % of the time.
+    Paced,
+}
+
+/// Least pause of [`Autosave::Paced`].
+const LEAST: Duration = Duration::from_secs(30);
+/// Checkpoint and pictures may take a hundredth of the time each: a pause is 99 times as long as what comes
+/// before it took.
+const PAUSES: u32 = 99;
+/// Nanoseconds that a pixel of a checkpoint and of all pictures take, until it is measured
+/// (docs/benchmarks/large.md).
+const CHECKPOINT: u64 = 80;
+const PICTURES: u64 = 600;
+
+/// How long the pictures of a render will take at its end.
+pub(super) fn last_save(pixels: usize) -> Duration {
+    Duration::from_nanos(PICTURES.saturating_mul(pixels as u64))
+}
+
+/// When something is saved next.
+pub(super) struct Pace {
+    autosave: Autosave,
+    next: Option<Instant>,
+}
+
+impl Pace {
+    fn new(autosave: Autosave, expected: Duration) -> Self {
+        let mut pace = Self { autosave, next: None };
+        pace.pause_after(expected);
+        pace
+    }
+
+    /// For checkpoints, and for pictures, of a render of so many pixels.
+    pub(super) fn both(autosave: Autosave, pixels: usize) -> [Self; 2] {
+        let expected = |nanoseconds: u64| Duration::from_nanos(nanoseconds.saturating_mul(pixels as u64));
+        [Self::new(autosave, expected(CHECKPOINT)), Self::new(autosave, expected(PICTURES))]
+    }
+
+    pub(super) fn is_due(&self) -> bool {
+        self.next.is_some_and(|next| Instant::now() >= next)
+    }
+
+    /// Saving is over, and took this long.
+    pub(super) fn pause_after(&mut self, took: Duration) {
+        let pause = match self.autosave {
+            Autosave::Never => None,
+            Autosave::Every(pause) => Some(pause),
+            Autosave::Paced => Some(LEAST.max(took.saturating_mul(PAUSES))),
+        };
+        self.next = pause.and_then(|pause| Instant::now().checked_add(pause));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_pause_grows_with_what_saving_costs() {
+        let pause = |autosave, took| {
+            let began = Instant::now();
+            let next = Pace::new(autosave, Duration::from_millis(took)).next;
+            next.map(|next| next.duration_since(began).as_secs())
+        };
+        assert_eq!(pause(Autosave::Paced, 10), Some(30));
+        assert_eq!(pause(Autosave::Paced, 1000), Some(99));
+        assert_eq!(pause(Autosave::Every(Duration::from_secs(5)), 1000), Some(5));
+        assert_eq!(pause(Autosave::Never, 10), None);
+    }
+}
