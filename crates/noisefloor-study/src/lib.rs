@@ -8,6 +8,7 @@
 //! - [`analysis`] makes thresholds, agreements and tables of the answers, and a corpus for `noisefloor
 //!   train`.
 //! - [`explore`] judges one's own pictures in the browser, keeps disagreements, and learns from them.
+//! - [`watch`] shows a render while it runs.
 //! - [`simulated`] are observers made of numbers, who drive the same server: to test the whole chain, and
 //!   to plan a study.
 //!
@@ -60,6 +61,7 @@ mod stack;
 mod stack_render;
 pub mod store;
 mod viewing;
+pub mod watch;
 
 pub use code::parse as parse_code;
 pub use config::{

@@ -6,10 +6,11 @@ use super::tone::ToneArgs;
 use super::values;
 use super::viewing::ViewingArgs;
 use crate::folder::Earlier;
-use crate::render::{Autosave, Judge, RenderJob};
+use crate::render::{Autosave, Judge, RenderJob, TEV_ADDRESS};
 use anyhow::bail;
 use clap::{Args, ValueEnum};
 use noisefloor::{Audience, DEFAULT_TILE, Params, Schedule};
+use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -37,6 +38,7 @@ use std::time::Duration;
   noisefloor render --denoise oidn                   for a picture that will be denoised (fewer samples)
   noisefloor render --time 60 --against truth.exr    at most a minute; relMSE to a reference in timeline.csv
   noisefloor render --time 60 --resume               another minute of the render in the output folder
+  noisefloor render --watch                          the picture so far, in a browser
   noisefloor render --force                          once more, over the render in the output folder")]
 pub struct RenderArgs {
     /// Built-in scene (`noisefloor scenes` lists them) or scene file: glTF 2.0 (.gltf, .glb) or Mitsuba XML
@@ -112,6 +114,14 @@ pub struct RenderArgs {
     /// one is refused.
     #[arg(long, conflicts_with = "resume")]
     force: bool,
+    /// Show the picture in the viewer tev while it is rendered: samples and probabilities, too. A tev that runs
+    /// on this machine is found by itself.
+    #[arg(long, value_name = "HOST:PORT", num_args = 0..=1, require_equals = true, default_missing_value = TEV_ADDRESS)]
+    tev: Option<String>,
+    /// Serve a page with the picture so far, the tiles that are open, and the time left. It is for this machine
+    /// unless an address says otherwise.
+    #[arg(long, value_name = "IP:PORT", num_args = 0..=1, require_equals = true, default_missing_value = "127.0.0.1:8439")]
+    watch: Option<SocketAddr>,
     /// No progress bar and no summary.
     #[arg(long, short)]
     quiet: bool,
@@ -159,6 +169,11 @@ fn criterion(text: &str) -> Result<CriterionChoice, String> {
 impl RenderArgs {
     /// A render that can begin.
     pub fn check(self) -> anyhow::Result<RenderJob> {
+        #[cfg(not(feature = "study"))]
+        if self.watch.is_some() {
+            let (what, feature, again) = ("render --watch", "study", "render --watch …");
+            return Err(crate::left_out::LeftOut { what, feature, again }.into());
+        }
         let mut params = self.params()?;
         let judge = match self.criterion {
             _ if self.denoise.is_some() => denoised(self.lost)?,
@@ -183,6 +198,9 @@ impl RenderArgs {
             autosave: self.autosave.unwrap_or(Autosave::Paced),
             earlier: Earlier::of(self.force, self.resume),
             quiet: self.quiet,
+            tev: self.tev,
+            #[cfg(feature = "study")]
+            watch: self.watch,
         })
     }
 

@@ -35,8 +35,8 @@ struct TimelineRow {
 /// The output folder, and what has been recorded for it.
 pub struct Output {
     folder: Folder,
-    scene: String,
-    source: String,
+    pub scene: String,
+    pub source: String,
     seed: u64,
     /// Digest of the model.
     pub model: Option<String>,

@@ -3,6 +3,9 @@
 mod progress;
 mod saving;
 mod snapshots;
+mod tev;
+#[cfg(feature = "study")]
+mod watch;
 
 use crate::bars::Log;
 use crate::files::read_reference;
@@ -13,13 +16,15 @@ use crate::signals::{AFTER_THIS_BATCH, INTERRUPTED, cancel_on_signal};
 use crate::sources::{Opened, SourceJob, SourceKind};
 use anyhow::bail;
 use noisefloor::{
-    Driver, DriverError, Event, FixedSpp, Oracle, Params, Repeats, Rgb, SampleOrigin, SourceInfo, StopReason,
-    StoppingCriterion,
+    Driver, DriverError, Event, FixedSpp, Oracle, Params, Progress, Repeats, Rgb, SampleOrigin, Session,
+    SourceInfo, StopReason, StoppingCriterion,
 };
 #[cfg(feature = "adapters")]
 use noisefloor_denoise::{DenoisedQuality, Oidn};
 #[cfg(feature = "adapters")]
 use noisefloor_sidecar::FilterPlan;
+#[cfg(feature = "study")]
+use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::Arc;
@@ -32,6 +37,8 @@ pub use progress::reference_bar;
 pub use saving::Autosave;
 use saving::Pace;
 use snapshots::{Rendering, Snapshots};
+pub use tev::ADDRESS as TEV_ADDRESS;
+use tev::Tev;
 
 /// What is rendered, and until when: checked.
 pub struct RenderJob {
@@ -45,6 +52,11 @@ pub struct RenderJob {
     pub autosave: Autosave,
     pub earlier: Earlier,
     pub quiet: bool,
+    /// Address of a viewer.
+    pub tev: Option<String>,
+    /// Where to serve a page.
+    #[cfg(feature = "study")]
+    pub watch: Option<SocketAddr>,
 }
 
 /// Who stops the tiles.
@@ -152,7 +164,13 @@ impl Rest<'_> {
         let cancel = driver.cancel_flag();
         cancel_on_signal(Arc::clone(&cancel), AFTER_THIS_BATCH)?;
         driver.source_mut().watch_reference(reference_bar(job.quiet), Arc::clone(&cancel));
-        let outcome = sample(&mut driver, &mut output, snapshots.as_ref(), job);
+        let size = (info.width, info.height);
+        let mut views = Views {
+            tev: job.tev.as_deref().map(|address| Tev::open(address, &output.scene, size)).transpose()?,
+            #[cfg(feature = "study")]
+            page: job.watch.map(|address| watch::Page::serve(address, &output, job.quiet)).transpose()?,
+        };
+        let outcome = sample(&mut driver, &mut output, &mut views, snapshots.as_ref(), job);
 
         // Write what there is, also after a failure.
         let checkpoint = snapshots.as_ref().map(|snapshots| snapshots.of(driver.session()));
@@ -168,6 +186,33 @@ impl Rest<'_> {
     }
 }
 
+/// Where a render is watched.
+struct Views {
+    tev: Option<Tev>,
+    #[cfg(feature = "study")]
+    page: Option<watch::Page>,
+}
+
+impl Views {
+    fn show<C: StoppingCriterion>(&mut self, session: &Session<C>, progress: &Progress) {
+        tev::show(&mut self.tev, session, false);
+        #[cfg(feature = "study")]
+        if let Some(page) = &mut self.page {
+            page.show(session, progress);
+        }
+        #[cfg(not(feature = "study"))]
+        let _ = progress;
+    }
+
+    fn close<C: StoppingCriterion>(&mut self, session: &Session<C>) {
+        tev::show(&mut self.tev, session, true);
+        #[cfg(feature = "study")]
+        if let Some(page) = &mut self.page {
+            page.close(session);
+        }
+    }
+}
+
 /// What is left for samples of the time for everything, once all is set up: the files are still to be written. At least
 /// half of it, so that there is something to write.
 fn sampling_time(time: Duration, began: Instant, pixels: usize) -> Duration {
@@ -180,6 +225,7 @@ fn sampling_time(time: Duration, began: Instant, pixels: usize) -> Duration {
 fn sample<C: StoppingCriterion>(
     driver: &mut Rendering<C>,
     output: &mut Output,
+    views: &mut Views,
     snapshots: Option<&Snapshots<C>>,
     job: &RenderJob,
 ) -> Result<(), DriverError> {
@@ -191,6 +237,7 @@ fn sample<C: StoppingCriterion>(
         let Event::BatchDone(progress) = event else { return };
         output.record(session, progress);
         progress::show(&bar, &mut log, session, progress);
+        bar.suspend(|| views.show(session, progress));
         let mut save = |pace: &mut Pace, write: &mut dyn FnMut(&mut Output) -> anyhow::Result<()>| {
             if pace.is_due() {
                 let began = Instant::now();
@@ -206,6 +253,7 @@ fn sample<C: StoppingCriterion>(
         });
     });
     bar.finish_and_clear();
+    views.close(driver.session());
     outcome
 }
 

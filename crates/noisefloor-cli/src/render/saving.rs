@@ -28,17 +28,30 @@ pub(super) fn last_save(pixels: usize) -> Duration {
     Duration::from_nanos(PICTURES.saturating_mul(pixels as u64))
 }
 
-/// When something is saved next.
+/// When something is saved, or shown, next.
 pub(super) struct Pace {
-    autosave: Autosave,
+    /// Least pause; none for never.
+    least: Option<Duration>,
+    /// Times that a pause is as long as what comes before it took.
+    pauses: u32,
     next: Option<Instant>,
 }
 
 impl Pace {
     fn new(autosave: Autosave, expected: Duration) -> Self {
-        let mut pace = Self { autosave, next: None };
+        let (least, pauses) = match autosave {
+            Autosave::Never => (None, 0),
+            Autosave::Every(pause) => (Some(pause), 0),
+            Autosave::Paced => (Some(LEAST), PAUSES),
+        };
+        let mut pace = Self { least, pauses, next: None };
         pace.pause_after(expected);
         pace
+    }
+
+    /// For what people watch: at once, and then after this pause, or as soon as it takes 1 % of the time.
+    pub(super) fn of_view(least: Duration) -> Self {
+        Self { least: Some(least), pauses: PAUSES, next: Some(Instant::now()) }
     }
 
     /// For checkpoints, and for pictures, of a render of so many pixels.
@@ -53,11 +66,7 @@ impl Pace {
 
     /// Saving is over, and took this long.
     pub(super) fn pause_after(&mut self, took: Duration) {
-        let pause = match self.autosave {
-            Autosave::Never => None,
-            Autosave::Every(pause) => Some(pause),
-            Autosave::Paced => Some(LEAST.max(took.saturating_mul(PAUSES))),
-        };
+        let pause = self.least.map(|least| least.max(took.saturating_mul(self.pauses)));
         self.next = pause.and_then(|pause| Instant::now().checked_add(pause));
     }
 }

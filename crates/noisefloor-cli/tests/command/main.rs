@@ -69,3 +69,4 @@ mod study;
 /// What the screen shows: LUTs.
 #[cfg(test)]
 mod tone;
+mod watch;

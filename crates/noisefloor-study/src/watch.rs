@@ -1,0 +1,191 @@
+//! A page on which a render is watched: the picture so far, the tiles that are open, and the time left.
+//!
+//! Whoever renders [publishes](LiveRender::publish) states and pictures; a [`WatchServer`] hands out the latest ones.
+
+use crate::error::StudyError;
+use crate::http::{self, Exposure, Guard, Listening, Refusal};
+use axum::Router;
+use axum::extract::{Path, State};
+use axum::http::StatusCode;
+use axum::http::header::CONTENT_TYPE;
+use axum::middleware::{from_fn, from_fn_with_state};
+use axum::response::{IntoResponse, Response};
+use axum::routing::get;
+use serde::Serialize;
+use std::io;
+use std::net::SocketAddr;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::thread;
+use std::time::{Duration, Instant};
+
+/// A page that has asked for nothing for so long is closed.
+const GONE: Duration = Duration::from_secs(10);
+
+const SCRIPT: &str = "text/javascript; charset=utf-8";
+const STYLE: &str = "text/css; charset=utf-8";
+const HTML: &str = include_str!("../pages/watch/index.html");
+const FILES: [(&str, &str, &str); 3] = [
+    ("watch.js", SCRIPT, include_str!("../pages/watch/watch.js")),
+    ("style.css", STYLE, include_str!("../pages/style.css")),
+    ("watch.css", STYLE, include_str!("../pages/watch/watch.css")),
+];
+
+/// How far a render is.
+#[derive(Clone, Debug, Serialize)]
+#[non_exhaustive]
+pub struct LiveState {
+    /// What is rendered.
+    pub scene: String,
+    /// Who renders it.
+    pub source: String,
+    /// Width in pixels.
+    pub width: usize,
+    /// Height in pixels.
+    pub height: usize,
+    /// Since the render began.
+    pub seconds: f64,
+    /// How many more it is expected to take; `None` while that is not known.
+    pub eta_seconds: Option<f64>,
+    /// Whether it has ended.
+    pub over: bool,
+    /// All tiles, row-major.
+    pub tiles: Vec<LiveTile>,
+    /// Number of the latest picture; 0 for none yet.
+    picture: u64,
+}
+
+/// A tile of a render.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct LiveTile {
+    /// Left edge in pixels.
+    pub x: usize,
+    /// Top edge in pixels.
+    pub y: usize,
+    /// Width in pixels.
+    pub width: usize,
+    /// Height in pixels.
+    pub height: usize,
+    /// Samples per pixel.
+    pub spp: u64,
+    /// Probability, 0…1, that nobody sees noise, by the latest verdict.
+    pub probability: Option<f32>,
+    /// Whether it gets more samples.
+    pub open: bool,
+}
+
+impl LiveState {
+    /// A render that has not begun.
+    pub fn new(scene: &str, source: &str) -> Self {
+        Self {
+            scene: scene.to_owned(),
+            source: source.to_owned(),
+            width: 0,
+            height: 0,
+            seconds: 0.0,
+            eta_seconds: None,
+            over: false,
+            tiles: Vec::new(),
+            picture: 0,
+        }
+    }
+}
+
+/// The latest state and picture of a render.
+#[derive(Debug, Default)]
+pub struct LiveRender(Mutex<Latest>);
+
+#[derive(Debug, Default)]
+struct Latest {
+    state: Option<LiveState>,
+    png: Vec<u8>,
+    picture: u64,
+    /// When a page asked last.
+    asked: Option<Instant>,
+}
+
+impl LiveRender {
+    fn latest(&self) -> MutexGuard<'_, Latest> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Replaces the state, and the picture if there is a new one (a PNG).
+    pub fn publish(&self, state: &LiveState, picture: Option<Vec<u8>>) {
+        let mut latest = self.latest();
+        if let Some(png) = picture {
+            latest.png = png;
+            latest.picture += 1;
+        }
+        latest.state = Some(LiveState { picture: latest.picture, ..state.clone() });
+    }
+
+    /// Whether a page is open: pictures need not be made for nobody.
+    pub fn is_watched(&self) -> bool {
+        self.latest().asked.is_some_and(|asked| asked.elapsed() < GONE)
+    }
+}
+
+/// Serves the page, in a thread of its own, as long as the process runs.
+#[derive(Debug)]
+pub struct WatchServer;
+
+impl WatchServer {
+    /// Binds an address, of which port 0 picks a free port, and serves; returns the bound address.
+    ///
+    /// # Errors
+    /// [`StudyError::Listen`] if the address is in use or not of this machine, or there is no thread for it.
+    pub fn start(
+        live: Arc<LiveRender>,
+        address: SocketAddr,
+        exposure: &Exposure,
+    ) -> Result<SocketAddr, StudyError> {
+        let failed = |source: io::Error| StudyError::Listen { address: address.to_string(), source };
+        let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(failed)?;
+        let listening = runtime.block_on(Listening::bind(address))?;
+        let bound = listening.address();
+        let router = router(live, Arc::new(Guard::new(bound, exposure)));
+        let serve = move || runtime.block_on(listening.serve(router, std::future::pending()));
+        thread::Builder::new().name("watch".into()).spawn(serve).map_err(failed)?;
+        Ok(bound)
+    }
+}
+
+fn router(live: Arc<LiveRender>, guard: Arc<Guard>) -> Router {
+    Router::new()
+        .route("/", get(|| async { ([(CONTENT_TYPE, "text/html; charset=utf-8")], HTML) }))
+        .route("/{file}", get(file))
+        .route("/api/state", get(state))
+        .route("/api/picture.png", get(picture))
+        .fallback(http::nothing_here)
+        .method_not_allowed_fallback(http::wrong_method)
+        .layer(from_fn_with_state(guard, http::check))
+        .layer(from_fn(http::security_headers))
+        .with_state(live)
+}
+
+async fn file(Path(name): Path<String>) -> Response {
+    match FILES.iter().find(|(known, ..)| *known == name) {
+        Some((_, kind, text)) => ([(CONTENT_TYPE, *kind)], *text).into_response(),
+        None => nothing("there is no such page").into_response(),
+    }
+}
+
+async fn state(State(live): State<Arc<LiveRender>>) -> Response {
+    let mut latest = live.latest();
+    latest.asked = Some(Instant::now());
+    match &latest.state {
+        Some(state) => axum::Json(state).into_response(),
+        None => nothing("the render has not begun").into_response(),
+    }
+}
+
+async fn picture(State(live): State<Arc<LiveRender>>) -> Response {
+    let png = live.latest().png.clone();
+    if png.is_empty() {
+        return nothing("there is no picture yet").into_response();
+    }
+    ([(CONTENT_TYPE, "image/png")], png).into_response()
+}
+
+fn nothing(what: &str) -> Refusal {
+    Refusal::new(StatusCode::NOT_FOUND, what, "path", "go to /")
+}
