@@ -88,6 +88,13 @@ impl LiveState {
             picture: 0,
         }
     }
+
+    /// The same, so much later: the clock of a render that goes on is not that of its batches.
+    fn after(&self, pause: Duration) -> Self {
+        let seconds = if self.over { 0.0 } else { pause.as_secs_f64() };
+        let eta_seconds = self.eta_seconds.map(|eta| (eta - seconds).max(0.0));
+        Self { seconds: self.seconds + seconds, eta_seconds, ..self.clone() }
+    }
 }
 
 /// The latest state and picture of a render.
@@ -96,7 +103,7 @@ pub struct LiveRender(Mutex<Latest>);
 
 #[derive(Debug, Default)]
 struct Latest {
-    state: Option<LiveState>,
+    state: Option<(LiveState, Instant)>,
     png: Vec<u8>,
     picture: u64,
     /// When a page asked last.
@@ -115,7 +122,7 @@ impl LiveRender {
             latest.png = png;
             latest.picture += 1;
         }
-        latest.state = Some(LiveState { picture: latest.picture, ..state.clone() });
+        latest.state = Some((LiveState { picture: latest.picture, ..state.clone() }, Instant::now()));
     }
 
     /// Whether a page is open: pictures need not be made for nobody.
@@ -173,7 +180,7 @@ async fn state(State(live): State<Arc<LiveRender>>) -> Response {
     let mut latest = live.latest();
     latest.asked = Some(Instant::now());
     match &latest.state {
-        Some(state) => axum::Json(state).into_response(),
+        Some((state, since)) => axum::Json(state.after(since.elapsed())).into_response(),
         None => nothing("the render has not begun").into_response(),
     }
 }

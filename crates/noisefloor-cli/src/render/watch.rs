@@ -19,6 +19,8 @@ const PAUSE: Duration = Duration::from_secs(1);
 pub struct Page {
     live: Arc<LiveRender>,
     state: LiveState,
+    /// Whether there is no picture yet: whoever opens the page should not wait for one.
+    blank: bool,
     pace: Pace,
 }
 
@@ -30,13 +32,14 @@ impl Page {
             note!("watch it at http://{bound}");
         }
         let state = LiveState::new(&output.scene, &output.source);
-        Ok(Self { live, state, pace: Pace::of_view(PAUSE) })
+        Ok(Self { live, state, blank: true, pace: Pace::of_view(PAUSE) })
     }
 
     pub fn show<C: StoppingCriterion>(&mut self, session: &Session<C>, progress: &Progress) {
         self.state.seconds = progress.now.seconds;
         self.state.eta_seconds = progress.eta_seconds;
-        self.publish(session, self.pace.is_due() && self.live.is_watched());
+        let wanted = self.live.is_watched() || self.blank;
+        self.publish(session, wanted && self.pace.is_due());
     }
 
     /// Shows the end, if somebody watches: the page stays until the command is done.
@@ -62,6 +65,7 @@ impl Page {
             Err(error) => note!("warning: no picture for the page: {}", one_line(&error.into())),
         }
         if draw {
+            self.blank = false;
             self.pace.pause_after(began.elapsed());
         }
     }

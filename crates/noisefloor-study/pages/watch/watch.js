@@ -34,7 +34,7 @@ function show(next) {
   const samples = state.tiles.reduce((sum, tile) => sum + tile.spp * tile.width * tile.height, 0);
   const left = state.over ? "finished" : state.eta_seconds === null ? "no estimate yet" : `about ${time(state.eta_seconds)} to go`;
   const words = [`${done} of ${state.tiles.length} tiles done`, `${(samples / pixels).toPrecision(3)} samples per pixel`, time(state.seconds), left];
-  byId("scene").textContent = `${state.scene}, ${state.width}×${state.height}, by ${state.source}`;
+  byId("scene").textContent = `${state.scene}, ${state.width}×${state.height}, ${state.source}`;
   byId("progress").textContent = words.join(" · ");
   byId("done").value = done / state.tiles.length;
   document.title = `${Math.round((100 * done) / state.tiles.length)} % ${state.scene}`;
