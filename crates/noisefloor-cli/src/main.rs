@@ -44,10 +44,11 @@ use say::{NotSaid, note, one_line};
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    let outcome = match Cli::try_parse() {
-        Ok(cli) => run(cli.command),
+    let outcome = match args::expand(std::env::args_os().collect()).map(Cli::try_parse_from) {
+        Err(error) => Err(error),
+        Ok(Ok(cli)) => run(cli.command),
         // Help and version are no errors; what was typed wrong has exit code 2
-        Err(said) => {
+        Ok(Err(said)) => {
             let code = u8::try_from(said.exit_code()).unwrap_or(2);
             said.print().map(|()| ExitCode::from(code)).map_err(|error| NotSaid::from(error).into())
         }
@@ -58,6 +59,7 @@ fn main() -> ExitCode {
 
 fn run(command: Command) -> anyhow::Result<ExitCode> {
     match command {
+        Command::Render(args) if args.is_sequence() => render::render_frames(&args.check_frames()?),
         Command::Render(args) => render::run(args.check()?),
         Command::Reference(args) => reference::run(args.check()?),
         Command::Judge(args) => judge::run(&args.check()?).map(done),

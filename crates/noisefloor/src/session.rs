@@ -243,7 +243,10 @@ impl<C: StoppingCriterion> Session<C> {
         let audience = self.audience();
         let state = &mut self.tiles[index];
         state.verdict = Some(verdict);
-        state.streak = if verdict.converged { state.streak + 1 } else { 0 };
+        // A less demanding audience has enough where the others are still expected to need more
+        let has_enough = |need| audience.slope < 1.0 && audience.samples(need) <= samples;
+        let converged = verdict.converged || verdict.expected_spp.is_some_and(has_enough);
+        state.streak = if converged { state.streak + 1 } else { 0 };
         if state.streak >= consecutive {
             let target = audience.samples(samples);
             if target <= samples {

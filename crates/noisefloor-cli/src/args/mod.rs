@@ -7,6 +7,7 @@
 
 mod audience;
 mod compare;
+mod config;
 mod data;
 mod doctor;
 mod evaluate;
@@ -28,6 +29,7 @@ mod viewing;
 
 pub use audience::AudienceArgs;
 pub use compare::CompareArgs;
+pub use config::expand;
 pub use doctor::DoctorArgs;
 pub use evaluate::EvaluateArgs;
 pub use explore::ExploreArgs;

@@ -6,7 +6,7 @@ use super::tone::ToneArgs;
 use super::values;
 use super::viewing::ViewingArgs;
 use crate::folder::Earlier;
-use crate::render::{Autosave, Judge, RenderJob, TEV_ADDRESS};
+use crate::render::{Autosave, FramePattern, Judge, RenderJob, SequenceJob, TEV_ADDRESS};
 use anyhow::bail;
 use clap::{Args, ValueEnum};
 use noisefloor::{Audience, DEFAULT_TILE, Params, Schedule};
@@ -28,6 +28,7 @@ use std::time::Duration;
 /// Ctrl-C stops all tiles and writes what there is (exit code 130). An interrupted or killed render
 /// continues with --resume.
 #[derive(Debug, Args)]
+#[command(args_override_self = true)]
 #[command(after_help = "Examples:
   noisefloor render                                  the Cornell box, into out/cornell-box
   noisefloor render glass-spheres --size 800x600 --seed 7    another scene; `noisefloor scenes` lists them
@@ -38,6 +39,8 @@ use std::time::Duration;
   noisefloor render --denoise oidn                   for a picture that will be denoised (fewer samples)
   noisefloor render --time 60 --against truth.exr    at most a minute; relMSE to a reference in timeline.csv
   noisefloor render --time 60 --resume               another minute of the render in the output folder
+  noisefloor render --frames 1-240 'shots/hall.{frame:04}.xml'   a sequence, into out/hall/0001 and so on
+  noisefloor render --config shot.toml --preset draft     options from a file; a quick look
   noisefloor render --watch                          the picture so far, in a browser
   noisefloor render --force                          once more, over the render in the output folder")]
 pub struct RenderArgs {
@@ -114,6 +117,18 @@ pub struct RenderArgs {
     /// one is refused.
     #[arg(long, conflicts_with = "resume")]
     force: bool,
+    /// Render a sequence: SCENE holds {frame}, or {frame:04} for four digits, in place of the number. Each frame goes
+    /// into a folder of its own, and frames.csv sums up. --resume goes on where the sequence was interrupted. All
+    /// frames have the same seed: noise then stays where it is on the screen, and flickers a third as much.
+    #[arg(long, value_name = "FIRST-LAST", value_parser = values::frames)]
+    frames: Option<(u32, u32)>,
+    /// Options from a file, as max-spp = 2000 or denoise = "oidn", a line each. What is typed as well wins.
+    #[arg(long, value_name = "FILE.toml")]
+    config: Option<PathBuf>,
+    /// `draft` for a quarter of the samples that people ask for: noise that is twice as strong as what is just seen
+    /// (with --denoise, 0.3 JOD lost). `final` for two verdicts in a row, so that no tile stops by luck.
+    #[arg(long, value_enum)]
+    preset: Option<Preset>,
     /// Show the picture in the viewer tev while it is rendered: samples and probabilities, too. A tev that runs
     /// on this machine is found by itself.
     #[arg(long, value_name = "HOST:PORT", num_args = 0..=1, require_equals = true, default_missing_value = TEV_ADDRESS)]
@@ -132,6 +147,18 @@ enum ScheduleChoice {
     Every,
     Spaced,
 }
+
+/// What a picture is for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Preset {
+    Draft,
+    Final,
+}
+
+/// A quarter of the samples: twice the noise.
+const DRAFT: Audience = Audience { slope: 0.25, offset: 0.0 };
+/// JODs that a tile of a draft may have lost.
+const DRAFT_LOST: f64 = 0.3;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum DenoiserChoice {
@@ -176,6 +203,7 @@ impl RenderArgs {
         }
         let mut params = self.params()?;
         let judge = match self.criterion {
+            _ if self.denoise.is_some() && self.is_draft() => denoised(self.lost.max(DRAFT_LOST))?,
             _ if self.denoise.is_some() => denoised(self.lost)?,
             CriterionChoice::Rival(spec) if self.resume => {
                 bail!("--resume does not work with --criterion {spec}, whose state is not kept; leave it out")
@@ -204,6 +232,26 @@ impl RenderArgs {
         })
     }
 
+    /// Whether several frames are asked for.
+    pub fn is_sequence(&self) -> bool {
+        self.frames.is_some()
+    }
+
+    /// Frames that can begin; each is rendered by a command of its own, which checks the rest.
+    pub fn check_frames(&self) -> anyhow::Result<SequenceJob> {
+        let (Some(frames), Some(scene)) = (self.frames, &self.scene) else {
+            bail!("--frames needs a scene with {{frame}} in its name, as in 'hall.{{frame:04}}.xml'")
+        };
+        let scene = FramePattern::parse(scene)?;
+        let out = self.out.clone().unwrap_or_else(|| PathBuf::from("out").join(scene.stem()));
+        let typed = super::expand(std::env::args_os().collect())?.split_off(1);
+        Ok(SequenceJob { scene, frames, out, resume: self.resume, quiet: self.quiet, typed })
+    }
+
+    fn is_draft(&self) -> bool {
+        self.preset == Some(Preset::Draft)
+    }
+
     fn params(&self) -> anyhow::Result<Params> {
         let step = self.batch.unwrap_or(if self.denoise.is_some() { 16 } else { 100 });
         let schedule = match self.schedule {
@@ -225,8 +273,12 @@ impl RenderArgs {
             schedule,
             min_spp: self.min_spp.unwrap_or(0),
             max_spp,
-            consecutive: self.consecutive,
-            audience: self.audience,
+            consecutive: if self.preset == Some(Preset::Final) {
+                self.consecutive.max(2)
+            } else {
+                self.consecutive
+            },
+            audience: if self.is_draft() { self.audience.then(DRAFT) } else { self.audience },
         };
         params.check()?;
         Ok(params)

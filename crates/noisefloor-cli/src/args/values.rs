@@ -71,6 +71,15 @@ pub(super) fn autosave(text: &str) -> Result<Autosave, String> {
     if text.parse() == Ok(0.0) { Ok(Autosave::Never) } else { seconds(text).map(Autosave::Every) }
 }
 
+/// `1-240`, or one frame.
+pub(super) fn frames(text: &str) -> Result<(u32, u32), String> {
+    let (first, last) = text.split_once('-').unwrap_or((text, text));
+    match (first.trim().parse(), last.trim().parse()) {
+        (Ok(first), Ok(last)) if first <= last => Ok((first, last)),
+        _ => Err("expected the first and the last frame, such as 1-240".into()),
+    }
+}
+
 pub(super) fn jods(text: &str) -> Result<f64, String> {
     let jods = text.parse().ok().filter(|jods| (1e-3..=5.0).contains(jods));
     jods.ok_or_else(|| "expected just-objectionable differences within 0.001…5, such as 0.04".into())

@@ -1,5 +1,6 @@
 //! `noisefloor render`.
 
+mod frames;
 mod progress;
 mod saving;
 mod snapshots;
@@ -33,6 +34,7 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
+pub use frames::{FramePattern, SequenceJob, render_frames};
 pub use progress::reference_bar;
 pub use saving::Autosave;
 use saving::Pace;

@@ -24,6 +24,7 @@ mod denoise;
 mod folders;
 /// Every subcommand explains itself.
 #[cfg(test)]
+mod frames;
 mod help;
 /// Verdicts on pictures.
 #[cfg(test)]

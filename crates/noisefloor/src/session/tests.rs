@@ -99,6 +99,14 @@ fn a_demanding_audience_gets_more() {
 }
 
 #[test]
+fn a_less_demanding_audience_gets_less() {
+    let audience = Audience { slope: 0.5, offset: 0.0 };
+    let mut s = session(300, true, Params { audience, ..Params::default() });
+    // Half of 300, 600 and 900, at the next verdict
+    assert_eq!(run(&mut s).map_samples(), [200, 300, 500]);
+}
+
+#[test]
 fn nothing_is_judged_before_every_tile_has_samples() {
     let mut s = session(100, true, Params::default());
     for _ in 0..2 {
