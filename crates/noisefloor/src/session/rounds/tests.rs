@@ -63,15 +63,8 @@ proptest! {
     #[test]
     fn film_and_stops_do_not_depend_on_the_order(seed: u64, spaced: bool) {
         let schedule = if spaced { Schedule::Spaced { step: 50 } } else { Schedule::Every { step: 50 } };
-        let mut random = random_numbers(seed);
-        prop_assert!(render(schedule, |n| random() as usize % n) == render(schedule, |_| 0));
-    }
-}
-
-fn random_numbers(mut state: u64) -> impl FnMut() -> u64 {
-    move || {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        state >> 33
+        let mut random = noisefloor_testkit::Noise::new(seed);
+        prop_assert!(render(schedule, |n| random.below(n)) == render(schedule, |_| 0));
     }
 }
 
