@@ -12,6 +12,7 @@ use std::path::PathBuf;
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   noisefloor study stack cornell-box --size 256x256 --out stacks/cornell-box
+  noisefloor study stack cornell-box --size 256x256 --denoise oidn --out stacks/denoised-cornell-box
   noisefloor study serve hall.toml
   noisefloor study simulate hall.toml --observers 12      a rehearsal, kept apart from people's answers
   noisefloor study analyse hall.toml --out out/hall
@@ -52,10 +53,11 @@ struct StackArgs {
         default_value = "8,16,32,64,128,256,512,1024,2048"
     )]
     levels: Vec<u64>,
-    /// Pass every level but the last, the reference, through a program, for example a denoiser: {in} is the
-    /// EXR that it reads, {out} the path, without extension, of the EXR or PFM that it writes. Thresholds of
-    /// such pictures hold for this program; a model cannot learn from them.
-    #[arg(long, value_name = "PROGRAM …")]
+    /// Denoise every level but the last, the reference: `oidn` is Open Image Denoise (`noisefloor doctor
+    /// --install oidn`). Or name any program: {in} is the EXR that it reads, {out} the path, without extension,
+    /// of the EXR or PFM that it writes. Thresholds of such pictures hold for this denoiser; a model cannot
+    /// learn from them.
+    #[arg(long, value_name = "oidn|PROGRAM …")]
     denoise: Option<String>,
     /// Folder to write the levels into, as linear EXRs.
     #[arg(long, value_name = "DIR")]
@@ -197,12 +199,18 @@ mod check {
     };
     use anyhow::Context;
     #[cfg(feature = "adapters")]
+    use crate::study::StackDenoiser;
+    #[cfg(feature = "adapters")]
+    use noisefloor_denoise::OIDN;
+    #[cfg(feature = "adapters")]
     use noisefloor_sidecar::PictureCommand;
     use noisefloor_study::analysis::{AnalysisOptions, CorpusThreshold};
     use noisefloor_study::{Exposure, Study, parse_code};
     use std::net::SocketAddr;
     use std::path::Path;
     use std::sync::Arc;
+    #[cfg(feature = "adapters")]
+    use std::time::Duration;
 
     impl StudyArgs {
         /// A study that can be opened, and what to do with it.
@@ -257,7 +265,7 @@ mod check {
         let StackArgs { scene, renderer, levels, denoise, out } = args;
         let source = renderer.check(Some(&scene))?;
         #[cfg(feature = "adapters")]
-        let denoise = denoise.map(|program| PictureCommand::new(&program, source.timeout)).transpose()?;
+        let denoise = denoise.map(|word| stack_denoiser(&word, source.timeout)).transpose()?;
         #[cfg(not(feature = "adapters"))]
         if denoise.is_some() {
             return left_out("study stack --denoise", "study,adapters", "study stack …");
@@ -269,6 +277,14 @@ mod check {
             denoise,
             out,
         })
+    }
+
+    #[cfg(feature = "adapters")]
+    fn stack_denoiser(word: &str, timeout: Duration) -> anyhow::Result<StackDenoiser> {
+        if word == OIDN.name {
+            return Ok(StackDenoiser::Oidn { timeout });
+        }
+        Ok(StackDenoiser::Program(PictureCommand::new(word, timeout)?))
     }
 
     /// A study all of whose pictures can be shown.

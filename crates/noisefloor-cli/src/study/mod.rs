@@ -1,27 +1,21 @@
 //! `noisefloor study`.
 
 mod report;
+mod stack;
 
-use crate::folder::{Folder, Occupied};
 use crate::say::{say, say_json};
-use crate::signals::cancel_on_signal;
-use crate::sources::{Opened, SourceJob};
+use crate::sources::SourceJob;
 use anyhow::Context;
-use noisefloor::{Rgb, SourceInfo};
-#[cfg(feature = "adapters")]
-use noisefloor_image::LinearImage;
-use noisefloor_image::running_means;
-#[cfg(feature = "adapters")]
-use noisefloor_sidecar::PictureCommand;
 use noisefloor_study::analysis::files::write;
 use noisefloor_study::analysis::raw::write_raw;
 use noisefloor_study::analysis::{AnalysisOptions, CorpusThreshold, analyse};
 use noisefloor_study::simulated::{Public, drive};
-use noisefloor_study::{Exposure, Study, StudyError, StudyServer, interrupted, render_stack, store};
+use noisefloor_study::{Exposure, Study, StudyServer, interrupted, store};
+#[cfg(feature = "adapters")]
+pub use stack::StackDenoiser;
 use std::net::{Ipv4Addr, SocketAddr};
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 use tokio::runtime::{Builder, Runtime};
 use tokio::sync::oneshot;
 
@@ -41,25 +35,10 @@ pub enum StudyJob {
 pub struct StackJob {
     pub source: SourceJob,
     pub levels: Vec<u64>,
-    /// A program that all levels but the last pass through.
+    /// What all levels but the last pass through.
     #[cfg(feature = "adapters")]
-    pub denoise: Option<PictureCommand>,
+    pub denoise: Option<StackDenoiser>,
     pub out: PathBuf,
-}
-
-impl StackJob {
-    /// A level as it is written.
-    #[cfg(feature = "adapters")]
-    fn finish(&self, (width, height): (usize, usize), pixels: Vec<Rgb>) -> Result<Vec<Rgb>, StudyError> {
-        let Some(program) = &self.denoise else { return Ok(pixels) };
-        let made = program.apply(&LinearImage { width, height, pixels });
-        made.map(|image| image.pixels).map_err(|error| StudyError::StackRender(error.to_string()))
-    }
-
-    #[cfg(not(feature = "adapters"))]
-    fn finish(&self, _size: (usize, usize), pixels: Vec<Rgb>) -> Result<Vec<Rgb>, StudyError> {
-        Ok(pixels)
-    }
 }
 
 pub struct ServeJob {
@@ -109,7 +88,7 @@ pub struct ObserverJob {
 
 pub fn run(job: StudyJob) -> anyhow::Result<()> {
     match job {
-        StudyJob::Stack(job) => stack(&job),
+        StudyJob::Stack(job) => stack::render(&job),
         StudyJob::Serve(job) => serve(job),
         StudyJob::Analyse(job) => analysis(&job),
         StudyJob::Simulate(job) => simulate(&job),
@@ -179,30 +158,6 @@ fn simulate(job: &SimulateJob) -> anyhow::Result<()> {
             say!("{:20} {tile:4} {median:9.0} {level95:14.0}", stack.name())?;
         }
     }
-    Ok(())
-}
-
-fn stack(job: &StackJob) -> anyhow::Result<()> {
-    job.source.start_threads()?;
-    let opened = job.source.open()?;
-    opened.warn(false);
-    let Opened { mut source, .. } = opened;
-    let folder = Folder::claim(job.out.clone())?;
-    // Levels of two renders in one folder would be taken for one stack
-    if running_means(folder.path()).is_ok() {
-        let path = job.out.display();
-        let what = format!(
-            "{path}: holds a stack of pictures already; remove it, or choose another folder with --out"
-        );
-        return Err(Occupied::new(what).into());
-    }
-    let cancel = Arc::new(AtomicBool::new(false));
-    cancel_on_signal(Arc::clone(&cancel), "keeping the levels that are finished")?;
-    let go_on = |_, _| !cancel.load(Ordering::Relaxed);
-    let SourceInfo { width, height, .. } = source.info();
-    let finish = |pixels| job.finish((width, height), pixels);
-    render_stack(source.as_mut(), &job.levels, &job.out, go_on, finish)?;
-    say!("written to {}", job.out.display())?;
     Ok(())
 }
 

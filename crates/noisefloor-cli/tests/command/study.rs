@@ -1,5 +1,11 @@
 use crate::kit::{column, fail, run, succeed, text};
+#[cfg(feature = "adapters")]
+use noisefloor_denoise::OIDN;
 use noisefloor_image::{Picture, read_picture};
+#[cfg(feature = "adapters")]
+use noisefloor_sidecar::find;
+#[cfg(feature = "adapters")]
+use noisefloor_testkit::{Requirement, require};
 use std::collections::HashSet;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -88,6 +94,38 @@ fn levels_are_denoised_by_any_program() {
     // Nothing but the hidden lock
     let mut left = fs::read_dir(&failed).into_iter().flatten().map(|file| file.unwrap().file_name());
     assert!(left.all(|name| name == ".noisefloor.lock"));
+}
+
+/// The protocol of docs/denoised-study.md, rehearsed: a denoised stack, the study file of that page, simulated
+/// observers, and their analysis.
+#[test]
+#[cfg(feature = "adapters")]
+fn a_denoised_stack_goes_through_a_whole_study() {
+    let folder = tempfile::tempdir().unwrap();
+    let design = include_str!("../../../../docs/studies/denoised.toml");
+    let file = folder.path().join("denoised.toml");
+    fs::write(&file, design).unwrap();
+    // Where nothing is rendered the file is still read, and names the folder that is missing
+    fail(&["study", "simulate", text(&file)], &["stacks/denoised-cornell-box"]);
+    if require(Requirement::Renderers, find(&OIDN)).is_none() {
+        return;
+    }
+    let [plain, name] = ["plain", "stacks/denoised-cornell-box"].map(|name| folder.path().join(name));
+    succeed(&strs(&stack(&plain, &[])));
+    succeed(&strs(&stack(&name, &["--denoise", "oidn"])));
+    let error = |folder: &Path, spp: u64| -> f32 {
+        let pairs = level(folder, spp).into_iter().zip(level(&plain, 16));
+        pairs.map(|(p, t)| (p[1].min(1.0) - t[1].min(1.0)).powi(2)).sum()
+    };
+    assert!(error(&name, 2) < 0.7 * error(&plain, 2), "{} {}", error(&name, 2), error(&plain, 2));
+    assert_eq!(level(&name, 16), level(&plain, 16), "the reference is as rendered");
+
+    fs::rename(&plain, folder.path().join("stacks/denoised-arcade")).unwrap();
+    let said = succeed(&["study", "simulate", text(&file), "--observers", "2"]);
+    assert!(said.contains("which should find:"), "{said}");
+    let out = folder.path().join("out");
+    let said = succeed(&["study", "analyse", text(&file), "--simulated", "--out", text(&out)]);
+    assert!(said.contains("2 simulated observers") && said.contains("denoised-cornell-box"), "{said}");
 }
 
 /// A study of a stack just rendered, with simulated observers who have answered.

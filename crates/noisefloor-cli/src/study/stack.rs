@@ -1,0 +1,79 @@
+//! `noisefloor study stack`.
+
+use super::StackJob;
+use crate::folder::{Folder, Occupied};
+use crate::say::{one_line, say};
+use crate::signals::cancel_on_signal;
+use crate::sources::Opened;
+use noisefloor::{Rgb, SourceInfo};
+#[cfg(feature = "adapters")]
+use noisefloor_denoise::{Denoiser, NoisyPicture, Oidn};
+#[cfg(feature = "adapters")]
+use noisefloor_image::LinearImage;
+use noisefloor_image::running_means;
+#[cfg(feature = "adapters")]
+use noisefloor_sidecar::{FilterPlan, PictureCommand};
+use noisefloor_study::{StudyError, render_stack};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+#[cfg(feature = "adapters")]
+use std::time::Duration;
+
+/// What the levels of a stack pass through.
+#[cfg(feature = "adapters")]
+pub enum StackDenoiser {
+    /// Open Image Denoise, with a time limit for one picture.
+    Oidn { timeout: Duration },
+    Program(PictureCommand),
+}
+
+/// What is made of a level before it is written.
+type Finish<'a> = Box<dyn FnMut(Vec<Rgb>) -> Result<Vec<Rgb>, StudyError> + 'a>;
+
+pub(super) fn render(job: &StackJob) -> anyhow::Result<()> {
+    job.source.start_threads()?;
+    let opened = job.source.open()?;
+    opened.warn(false);
+    let Opened { mut source, .. } = opened;
+    let SourceInfo { width, height, .. } = source.info();
+    let finish = finish(job, (width, height))?;
+    let folder = Folder::claim(job.out.clone())?;
+    // Levels of two renders in one folder would be taken for one stack
+    if running_means(folder.path()).is_ok() {
+        let path = job.out.display();
+        let what = format!(
+            "{path}: holds a stack of pictures already; remove it, or choose another folder with --out"
+        );
+        return Err(Occupied::new(what).into());
+    }
+    let cancel = Arc::new(AtomicBool::new(false));
+    cancel_on_signal(Arc::clone(&cancel), "keeping the levels that are finished")?;
+    let go_on = |_, _| !cancel.load(Ordering::Relaxed);
+    render_stack(source.as_mut(), &job.levels, &job.out, go_on, finish)?;
+    say!("written to {}", job.out.display())?;
+    Ok(())
+}
+
+/// Starts the denoiser, if there is one: what it lacks is found before anything is rendered.
+#[cfg(feature = "adapters")]
+fn finish(job: &StackJob, (width, height): (usize, usize)) -> anyhow::Result<Finish<'_>> {
+    Ok(match &job.denoise {
+        None => Box::new(Ok),
+        Some(StackDenoiser::Oidn { timeout }) => {
+            let mut oidn = Oidn::start(FilterPlan { timeout: *timeout, ..FilterPlan::default() })?;
+            Box::new(move |pixels| {
+                let made = oidn.denoise(&NoisyPicture::new((width, height), &pixels));
+                made.map_err(|error| StudyError::StackRender(one_line(&error.into())))
+            })
+        }
+        Some(StackDenoiser::Program(program)) => Box::new(move |pixels| {
+            let made = program.apply(&LinearImage { width, height, pixels });
+            made.map(|image| image.pixels).map_err(|error| StudyError::StackRender(error.to_string()))
+        }),
+    })
+}
+
+#[cfg(not(feature = "adapters"))]
+fn finish(_job: &StackJob, _size: (usize, usize)) -> anyhow::Result<Finish<'_>> {
+    Ok(Box::new(Ok))
+}
