@@ -116,14 +116,42 @@ class Cycles:
     def reference(self):
         return None
 
-    def _mean(self, region, first, samples):
-        """Mean of samples first…first + samples of a region, block by block."""
+    def first_hits(self, index, samples):
+        """Albedo and normals as Cycles gives them to its own denoisers: where a mirror or glass is hit, of what is seen in it."""
+        scene, render, cycles, groups = self.scene, self.scene.render, self.scene.cycles, self.bpy.data.node_groups
+        layer = next(layer for layer in scene.view_layers if layer.use)
+        before = cycles.diffuse_bounces, layer.cycles.denoising_store_passes
+        # Paths need go no further than to the first surface that is no mirror
+        cycles.diffuse_bounces, layer.cycles.denoising_store_passes = 0, True
+        # Only a compositor makes a pass the picture
+        tree = groups.new("noisefloor", "CompositorNodeTree")
+        tree.interface.new_socket("Image", in_out="OUTPUT", socket_type="NodeSocketColor")
+        node, out = tree.nodes.new("CompositorNodeRLayers"), tree.nodes.new("NodeGroupOutput")
+        node.scene, node.layer = scene, layer.name
+        scene.compositing_node_group, render.use_compositing = tree, True
+        region = (0, 0, self.info["width"], self.info["height"])
+        try:
+            pictures = []
+            for name in ["Denoising Albedo", "Denoising Normal"]:
+                tree.links.clear()
+                tree.links.new(node.outputs[name], out.inputs[0])
+                pictures.append(self._mean(region, 0, samples, f" first hits {index}"))
+        finally:
+            scene.compositing_node_group, render.use_compositing = None, False
+            groups.remove(tree)
+            cycles.diffuse_bounces, layer.cycles.denoising_store_passes = before
+        albedo, normal = pictures
+        # A lamp's albedo is its radiance
+        return [self.np.ascontiguousarray(part, self.np.float32) for part in (self.np.clip(albedo, 0, 1), normal)]
+
+    def _mean(self, region, first, samples, stream=""):
+        """Mean of samples first…first + samples of a region, block by block. Streams share no patterns."""
         self._aim(*region)
         total, done = 0.0, 0
         while done < samples:
             block, offset = divmod(first + done, BLOCK)
             length = min(BLOCK - offset, samples - done)
-            total = total + self._render(block, offset, length) * length
+            total = total + self._render(stream, block, offset, length) * length
             done += length
         return total / samples
 
@@ -137,10 +165,10 @@ class Cycles:
         render.border_min_y, render.border_max_y = (bottom + 0.25) / down, min(1.0, (bottom + height + 0.25) / down)
         self.shape = (height, width, 3)
 
-    def _render(self, block, offset, length):
+    def _render(self, stream, block, offset, length):
         """Mean of some samples of a block, rows from the top, as float64."""
         cycles, images = self.scene.cycles, self.bpy.data.images
-        digest = hashlib.blake2b(f"{self.seed} {block}".encode(), digest_size=4).digest()
+        digest = hashlib.blake2b(f"{self.seed}{stream} {block}".encode(), digest_size=4).digest()
         cycles.seed = int.from_bytes(digest, "little") >> 1
         cycles.sample_offset, cycles.sample_subset_length = offset, length
         self.bpy.ops.render.render()

@@ -1,11 +1,12 @@
 //! Compares the estimated error of denoised pictures with the true one, tile by tile.
 //!
 //! `validate_denoised FOLDER…`: each folder has the stacks of `noisefloor study stack` of two halves, `a` and
-//! `b`, and of the converged picture, `t`, whose two last levels are used. One line of CSV a tile and level goes
-//! to standard output. Denoised pictures are kept in the folder. docs/benchmarks/denoising.sh runs all of it.
+//! `b`, and of the converged picture, `t`, whose two last levels are used. If it also has renders `ga` and `gb`
+//! with albedo.exr and normal.exr, all is done once more with these ("guided"). One line of CSV a tile and level
+//! goes to standard output. Denoised pictures are kept in the folder. docs/benchmarks/denoising.sh runs all of it.
 #![allow(clippy::print_stdout, reason = "it is what this example is for")]
 
-use noisefloor::{Rgb, Tile, TileGrid, ToneMapping, Viewing};
+use noisefloor::{FirstHits, Rgb, Tile, TileGrid, ToneMapping, Viewing};
 use noisefloor_denoise::{DenoisedError, DenoisedHalves, Denoiser, NoisyPicture, Oidn};
 use noisefloor_image::{RenderLayers, read_exr, write_exr};
 use noisefloor_sidecar::FilterPlan;
@@ -46,6 +47,16 @@ fn mean(a: &[Rgb], b: &[Rgb]) -> Vec<Rgb> {
     a.iter().zip(b).map(|(a, b)| std::array::from_fn(|c| 0.5 * (a[c] + b[c]))).collect()
 }
 
+/// Albedo and normals of a half, if they were rendered.
+fn guide(render: &Path) -> Outcome<Option<FirstHits>> {
+    if !render.join("normal.exr").exists() {
+        return Ok(None);
+    }
+    let albedo = read_exr(render.join("albedo.exr"))?;
+    let normal = load(&render.join("normal.exr"))?;
+    Ok(Some(FirstHits { width: albedo.width, height: albedo.height, albedo: albedo.pixels, normal }))
+}
+
 fn validate(folder: &Path, oidn: &mut Oidn) -> Outcome<()> {
     let truths = levels(&folder.join("t"))?;
     let [.., (_, earlier), (_, converged)] = truths.as_slice() else {
@@ -59,24 +70,34 @@ fn validate(folder: &Path, oidn: &mut Oidn) -> Outcome<()> {
     // Of n samples that contain half as many: their difference is as large as the noise of all
     print(0, "truth", &DenoisedError::known(size, &load(earlier)?, &truth, &display)?)?;
     let others = levels(&folder.join("b"))?;
+    let mut guides = vec![("", None)];
+    if let (Some(a), Some(b)) = (guide(&folder.join("ga"))?, guide(&folder.join("gb"))?) {
+        let (albedo, normal) = (mean(&a.albedo, &b.albedo), mean(&a.normal, &b.normal));
+        let both = FirstHits { width: size.0, height: size.1, albedo, normal };
+        guides.push(("guided-", Some([a, b, both])));
+    }
     for (half, path) in levels(&folder.join("a"))? {
         let Some((_, other)) = others.iter().find(|(spp, _)| *spp == half) else { continue };
         let (a, b) = (load(&path)?, load(other)?);
         let whole = mean(&a, &b);
-        let mut denoise = |name: &str, noisy: &[Rgb]| -> Outcome<Vec<Rgb>> {
-            let kept = folder.join(format!("{name}{half:05}.exr"));
-            if kept.exists() {
-                return load(&kept);
-            }
-            let made = oidn.denoise(&NoisyPicture::new(size, noisy))?;
-            write_exr(&kept, &RenderLayers::rgb(size.0, size.1, &made))?;
-            Ok(made)
-        };
-        let (da, db, all) = (denoise("da", &a)?, denoise("db", &b)?, denoise("df", &whole)?);
-        let halves = DenoisedHalves { size, noisy: [&a, &b], denoised: [&da, &db] };
-        print(2 * half, "estimate", &DenoisedError::new(&halves, &display)?)?;
-        print(2 * half, "true", &DenoisedError::known(size, &all, &truth, &display)?)?;
         print(2 * half, "noisy", &DenoisedError::known(size, &whole, &truth, &display)?)?;
+        for (kind, guides) in &guides {
+            let mut denoise = |which: usize, noisy: &[Rgb]| -> Outcome<Vec<Rgb>> {
+                let kept = folder.join(format!("{kind}{}{half:05}.exr", ["da", "db", "df"][which]));
+                if kept.exists() {
+                    return load(&kept);
+                }
+                let picture = NoisyPicture::new(size, noisy);
+                let guide = guides.as_ref().map(|guides| &guides[which]);
+                let made = oidn.denoise(&guide.map_or(picture, |g| picture.guided(g, oidn.wants())))?;
+                write_exr(&kept, &RenderLayers::rgb(size.0, size.1, &made))?;
+                Ok(made)
+            };
+            let (da, db, all) = (denoise(0, &a)?, denoise(1, &b)?, denoise(2, &whole)?);
+            let halves = DenoisedHalves { size, noisy: [&a, &b], denoised: [&da, &db] };
+            print(2 * half, &format!("{kind}estimate"), &DenoisedError::new(&halves, &display)?)?;
+            print(2 * half, &format!("{kind}true"), &DenoisedError::known(size, &all, &truth, &display)?)?;
+        }
     }
     Ok(())
 }

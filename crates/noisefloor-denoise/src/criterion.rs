@@ -3,7 +3,8 @@
 use crate::denoiser::{DenoiseError, Denoiser, NoisyPicture};
 use crate::estimate::{DenoisedError, DenoisedHalves};
 use noisefloor::{
-    CriterionError, Display, Film, Needs, Resumable, Rgb, StoppingCriterion, Tile, TilePlanes, Verdict, View,
+    CriterionError, Display, Film, FirstHits, Needs, Resumable, Rgb, StoppingCriterion, Tile, TilePlanes,
+    Verdict, View,
 };
 use noisefloor_vision::{VisionModel, VisionWorkspace};
 use rayon::prelude::*;
@@ -53,13 +54,21 @@ pub struct DenoisedRecord {
 pub struct DenoisedQuality<D> {
     denoiser: D,
     lost: f64,
+    guides: Option<Arc<[FirstHits; 2]>>,
     record: Arc<Mutex<DenoisedRecord>>,
 }
 
 impl<D: Denoiser> DenoisedQuality<D> {
     /// Tiles may lose at most so many JODs: a positive number.
     pub fn new(denoiser: D, lost: f64) -> Self {
-        Self { denoiser, lost, record: Arc::default() }
+        Self { denoiser, lost, guides: None, record: Arc::default() }
+    }
+
+    /// Helps the denoiser with albedo and normals: one picture for each half of the film, independent of each
+    /// other, from [`ProgressiveSource::first_hits`](noisefloor::ProgressiveSource::first_hits).
+    #[must_use]
+    pub fn guided_by(self, guides: Arc<[FirstHits; 2]>) -> Self {
+        Self { guides: Some(guides), ..self }
     }
 
     /// What the verdicts look at: updated by each of them.
@@ -71,8 +80,13 @@ impl<D: Denoiser> DenoisedQuality<D> {
         let grid = view.film.grid();
         let size = (grid.width(), grid.height());
         let [a, b] = film_halves(view.film);
-        let mut denoise = |half: &[Rgb]| self.denoiser.denoise(&NoisyPicture::new(size, half));
-        let (da, db) = (denoise(&a)?, denoise(&b)?);
+        let wants = self.denoiser.wants();
+        let mut denoise = |half: &[Rgb], which: usize| {
+            let picture = NoisyPicture::new(size, half);
+            let guide = self.guides.as_ref().map(|guides| &guides[which]);
+            self.denoiser.denoise(&guide.map_or(picture, |guide| picture.guided(guide, wants)))
+        };
+        let (da, db) = (denoise(&a, 0)?, denoise(&b, 1)?);
         DenoisedError::new(&DenoisedHalves { size, noisy: [&a, &b], denoised: [&da, &db] }, view.display)
     }
 
@@ -102,7 +116,8 @@ fn film_halves(film: &Film) -> [Vec<Rgb>; 2] {
 
 impl<D: Denoiser> StoppingCriterion for DenoisedQuality<D> {
     fn name(&self) -> String {
-        format!("at most {} JOD lost after {}", self.lost, self.denoiser.name())
+        let guided = if self.guides.is_some() { " with albedo and normals" } else { "" };
+        format!("at most {} JOD lost after {}{guided}", self.lost, self.denoiser.name())
     }
 
     fn fingerprint(&self) -> String {

@@ -1,7 +1,7 @@
 //! What a denoiser is.
 
 use auto_impl::auto_impl;
-use noisefloor::Rgb;
+use noisefloor::{FirstHits, Rgb};
 use std::error::Error;
 use std::sync::{Arc, Mutex, PoisonError};
 use thiserror::Error;
@@ -25,6 +25,13 @@ impl<'a> NoisyPicture<'a> {
         Self { size, radiance, albedo: None, normal: None }
     }
 
+    /// The same with those of the first hits that the denoiser makes use of.
+    #[must_use]
+    pub fn guided(self, hits: &'a FirstHits, wants: AuxiliaryPictures) -> Self {
+        let albedo = wants.albedo.then_some(hits.albedo.as_slice());
+        Self { albedo, normal: wants.normal.then_some(hits.normal.as_slice()), ..self }
+    }
+
     /// Whether all pictures have as many pixels as the size says.
     pub fn fits(&self) -> bool {
         let fits = |picture: &[Rgb]| self.size.0.checked_mul(self.size.1) == Some(picture.len());
@@ -39,6 +46,13 @@ pub struct AuxiliaryPictures {
     pub albedo: bool,
     /// [`NoisyPicture::normal`].
     pub normal: bool,
+}
+
+impl AuxiliaryPictures {
+    /// Whether it makes use of any.
+    pub fn any(self) -> bool {
+        self.albedo || self.normal
+    }
 }
 
 /// Why a picture could not be denoised.

@@ -17,6 +17,8 @@ BLOCK = 16
 PATHS, FIRST_HITS, WRAPPERS = ("path", "volpath", "volpathmis"), ("direct", "depth"), ("aov", "moment", "stokes")
 # Increment and multipliers of SplitMix64 (Steele, Lea and Flood 2014).
 GOLDEN, MIX_1, MIX_2 = 0x9E3779B97F4A7C15, 0xBF58476D1CE4E5B9, 0x94D049BB133111EB
+# Divides the seeds of first hits from those of paths.
+APART = 0x6669727374686974
 # Divides the second word of a stream's seed from the first.
 SECOND = 0xD1B54A32D192ED03
 
@@ -38,6 +40,7 @@ class Mitsuba:
         collector.loading = False
         kind = Scalar if variant.startswith("scalar") else Wavefront
         self.renderer = kind(mi, *parts, init["seed"])
+        self.mi, self.np, self.aov = mi, self.renderer.np, None
         film = self.renderer.film
         self.info = {
             "name": f"Mitsuba {mi.__version__} ({variant})",
@@ -53,6 +56,28 @@ class Mitsuba:
 
     def reference(self):
         return None
+
+    def first_hits(self, index, samples):
+        """Albedo and shading normals, from passes that are seeded apart. Mitsuba has no albedo for some materials: it is black."""
+        mi, np, renderer = self.mi, self.np, self.renderer
+        film, sensor = renderer.film, renderer.sensor
+        crop = mi.traverse(sensor)
+        crop["film.crop_size"] = [film["width"], film["height"]]
+        crop["film.crop_offset"] = [film["x"], film["y"]]
+        crop.update()
+        if self.aov is None:
+            self.aov = mi.load_dict({"type": "aov", "aovs": "albedo:albedo,normal:sh_normal"})
+        most = max(1, LANES // (film["width"] * film["height"]))
+        total, done = 0.0, 0
+        while done < samples:
+            number = min(most, samples - done)
+            word = mix_integer(mix_integer(int(renderer.seed) ^ APART) + mix_integer(index << 32 | done))
+            image = self.aov.render(renderer.scene, sensor=sensor, seed=word % (1 << 32), spp=number)
+            total = total + np.array(image)[:, :, -6:].astype(np.float64) * number
+            done += number
+        mean = total / samples
+        albedo, normal = mean[:, :, :3], mean[:, :, 3:]
+        return [np.ascontiguousarray(part, np.float32) for part in (np.clip(albedo, 0, 1), normal)]
 
 
 def choose_variant(mi, wanted, warnings):

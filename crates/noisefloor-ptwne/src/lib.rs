@@ -39,6 +39,7 @@ mod direct;
 mod environment;
 mod error;
 mod filter;
+mod first_hits;
 mod geometry;
 mod guide;
 mod illumination;

@@ -174,6 +174,23 @@ pub(crate) enum Bsdf {
     },
 }
 
+impl Bsdf {
+    /// What colour a denoiser should take the surface for: of diffuse and metallic parts their albedo, of glass
+    /// its tint.
+    pub(crate) fn colour(&self, uv: [f32; 2]) -> Vec3 {
+        match self {
+            Self::Diffuse { albedo: colour }
+            | Self::Mirror { colour, .. }
+            | Self::Metal { colour, .. }
+            | Self::Plastic { diffuse: colour, .. }
+            | Self::Blend { base: colour, .. } => colour.at(uv),
+            Self::Glass { tint, .. } | Self::ThinGlass { tint, .. } | Self::RoughGlass { tint, .. } => *tint,
+            // Intersections have one of its parts
+            Self::Mix { .. } => Vec3::ZERO,
+        }
+    }
+}
+
 impl Reflectance {
     pub(crate) fn new(texture: Texture) -> Self {
         match texture.constant() {

@@ -3,6 +3,7 @@
 use crate::camera::Lens;
 use crate::error::{OutsideError, RenderError};
 use crate::filter::Filter;
+use crate::first_hits;
 use crate::integrator::{Estimator, SampleRadiance, Settings, integrator};
 use crate::math::Vec3;
 use crate::reference::{self, ReferenceNoise, Watch};
@@ -10,8 +11,8 @@ use crate::rng::Key;
 use crate::sampler::{Sampler, Sampling};
 use crate::scene::Scene;
 use noisefloor::{
-    Batch, Counts, Display, ProgressiveSource, Reference, Repeats, Request, Rgb, SourceError, SourceIdentity,
-    SourceInfo, Tile, ToneMapping, Unit,
+    Batch, Counts, Display, FirstHits, ProgressiveSource, Reference, Repeats, Request, Rgb, SourceError,
+    SourceIdentity, SourceInfo, Tile, ToneMapping, Unit,
 };
 use rayon::prelude::*;
 use std::fmt;
@@ -361,5 +362,13 @@ impl ProgressiveSource for Ptwne {
         let picture = picture.ok_or_else(|| self.fail(None, RenderError::Cancelled))?;
         self.reference_noise = Some(picture.noise);
         Ok(Some(Reference { width: self.width, height: self.height, pixels: picture.pixels }))
+    }
+
+    /// Never fails.
+    fn first_hits(&mut self, index: u64, spp: u64) -> Result<Option<FirstHits>, SourceError> {
+        let RenderOptions { seed, filter, .. } = self.options;
+        let size = (self.width, self.height);
+        let render = || first_hits::render(&self.scene, size, filter, (seed, index), spp.max(1));
+        Ok(Some(self.on_threads(render)))
     }
 }

@@ -11,6 +11,7 @@ A host script defines a class and hands it to `serve`:
         info = {...}                    # name, width, height, unit, repeats, warnings
         def sample(self, tiles): ...    # [(samples, array of height x width x 3 float32), ...], in the order of the tiles
         def reference(self): ...        # None, or an array of the whole image
+        def first_hits(self, index, samples): ...   # optional: arrays of the albedo and the normals of the whole image
 
     host.serve(Renderer)
 
@@ -160,6 +161,14 @@ def _answer(Host, renderer, request, data):
             return renderer, {"ok": True, "reference": False}, []
         payload = [_bytes(image, renderer.info["width"], renderer.info["height"])]
         return renderer, {"ok": True, "reference": True}, payload
+    if op == "first_hits":
+        render = getattr(renderer, "first_hits", lambda index, samples: None)
+        pictures = render(request["index"], request["samples"])
+        if pictures is None:
+            return renderer, {"ok": True, "first_hits": False}, []
+        albedo, normal = pictures
+        width, height = renderer.info["width"], renderer.info["height"]
+        return renderer, {"ok": True, "first_hits": True}, [_bytes(albedo, width, height), _bytes(normal, width, height)]
     if op == "filter":
         width, height, names = request["width"], request["height"], request["pictures"]
         if len(data) != 12 * width * height * len(names):

@@ -95,3 +95,16 @@ pub(crate) struct Filtered {}
 pub(crate) struct Referenced {
     pub(crate) reference: bool,
 }
+
+#[derive(Serialize)]
+pub(crate) struct HitFirst {
+    pub(crate) op: &'static str,
+    pub(crate) index: u64,
+    pub(crate) samples: u64,
+}
+
+/// Albedo and normals are its payload, if there are any.
+#[derive(Deserialize)]
+pub(crate) struct FirstHitsMade {
+    pub(crate) first_hits: bool,
+}

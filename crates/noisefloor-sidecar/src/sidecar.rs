@@ -3,12 +3,13 @@
 use crate::call::{Blame, Described, Reply, ask, batches, exactly, rgb};
 use crate::error::{SidecarCause, SidecarError};
 use crate::launch::Launch;
-use crate::message::{Referenced, Sample, TileRequest};
+use crate::message::{FirstHitsMade, HitFirst, Referenced, Sample, TileRequest};
 use crate::process::Process;
 use crate::renderer::{HostOptions, Job, Renderer};
 use crate::setup;
 use noisefloor::{
-    Batch, LightCheck, ProgressiveSource, Reference, Request, SourceError, SourceIdentity, SourceInfo,
+    Batch, FirstHits, LightCheck, ProgressiveSource, Reference, Request, Rgb, SourceError, SourceIdentity,
+    SourceInfo,
 };
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -231,6 +232,24 @@ impl ProgressiveSource for Sidecar {
             Ok(reference.then(|| Reference { width, height, pixels: rgb(&payload).collect() }))
         };
         self.call("rendering the reference", &[], &request, width * height, read)
+            .map_err(|error| self.failed(error))
+    }
+
+    /// Albedo is cut to [0, 1], and what is not finite becomes 0.
+    fn first_hits(&mut self, index: u64, spp: u64) -> Result<Option<FirstHits>, SourceError> {
+        let SourceInfo { width, height, .. } = self.info;
+        let request = HitFirst { op: "first_hits", index, samples: spp };
+        let read = |Reply { header: FirstHitsMade { first_hits }, payload }: Reply<FirstHitsMade>| {
+            exactly(&payload, if first_hits { 2 * width * height } else { 0 })?;
+            let (albedo, normal) = payload.split_at(payload.len() / 2);
+            let within = |payload, low| -> Vec<Rgb> {
+                let cut = |c: f32| if c.is_finite() { c.clamp(low, 1.0) } else { 0.0 };
+                rgb(payload).map(|pixel| pixel.map(cut)).collect()
+            };
+            let (albedo, normal) = (within(albedo, 0.0), within(normal, -1.0));
+            Ok(first_hits.then_some(FirstHits { width, height, albedo, normal }))
+        };
+        self.call("rendering first hits", &[], &request, 2 * width * height, read)
             .map_err(|error| self.failed(error))
     }
 }

@@ -84,7 +84,7 @@ pub use params::{Audience, Params, ParamsError, Schedule};
 pub use rgb::Rgb;
 pub use session::{Session, SessionError};
 pub use source::{
-    Batch, Counts, ProgressiveSource, Reference, Repeats, Request, SourceError, SourceInfo, Unit,
+    Batch, Counts, FirstHits, ProgressiveSource, Reference, Repeats, Request, SourceError, SourceInfo, Unit,
 };
 pub use stills::{SnapshotPair, Still, StillError};
 pub use stop::{Stop, StopReason};

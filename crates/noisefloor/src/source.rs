@@ -117,6 +117,21 @@ pub struct Reference {
     pub pixels: Vec<Rgb>,
 }
 
+/// What camera rays meet first, without any light: auxiliary pictures for denoisers.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FirstHits {
+    /// Width in pixels, the same as the source's.
+    pub width: usize,
+    /// Height in pixels, the same as the source's.
+    pub height: usize,
+    /// Colour of the surface (diffuse albedo, or the tint of metal and glass), in [0, 1], row-major. What a ray
+    /// shows that meets no surface is the source's choice.
+    pub albedo: Vec<Rgb>,
+    /// Shading normal on the side of the camera, averaged over the pixel: a vector no longer than 1, as many
+    /// values. Zero where there is no surface. The coordinates are the source's choice.
+    pub normal: Vec<Rgb>,
+}
+
 /// Why a source gave no samples.
 #[derive(Debug, Error)]
 pub enum SourceError {
@@ -188,6 +203,19 @@ pub trait ProgressiveSource {
     /// # Errors
     /// [`SourceError`] if the renderer failed.
     fn reference(&mut self) -> Result<Option<Reference>, SourceError> {
+        Ok(None)
+    }
+
+    /// Renders albedo and normals of first hits from `spp` camera rays a pixel, if this source has them.
+    ///
+    /// Pictures of different `index` are independent of each other and of all samples: each half buffer is
+    /// denoised with a picture of its own. A source whose pictures have no noise may return the same for every
+    /// index. What [`SourceInfo::repeats`] promises of samples holds for them, too.
+    ///
+    /// # Errors
+    /// [`SourceError`] if the renderer failed.
+    fn first_hits(&mut self, index: u64, spp: u64) -> Result<Option<FirstHits>, SourceError> {
+        let _ = (index, spp);
         Ok(None)
     }
 }

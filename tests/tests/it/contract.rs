@@ -1,11 +1,13 @@
 use crate::kit::{Altered, Synthetic};
 use noisefloor::{
-    Batch, Counts, ProgressiveSource, Reference, Repeats, Request, SourceError, SourceInfo, Tile, Unit,
+    Batch, Counts, FirstHits, ProgressiveSource, Reference, Repeats, Request, SourceError, SourceInfo, Tile,
+    Unit,
 };
 use noisefloor_image::{RenderLayers, StackSource, write_exr};
 use noisefloor_ptwne::{Ptwne, RenderOptions, scenes};
 use noisefloor_testkit::{Noise, check_reference_is_free_of_noise, check_source};
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::atomic::{AtomicU64, Ordering};
 
 const SIZE: (usize, usize) = (48, 40);
 
@@ -256,4 +258,40 @@ fn playbacks_and_references_that_break_it_are_noticed() {
         Synthetic { seed: calls.get(), ..synthetic() }
     });
     assert!(unsteady.contains("second time"), "{unsteady}");
+}
+
+#[test]
+fn first_hits_that_break_it_are_noticed() {
+    // What the albedo is of an index and a pixel
+    let said = |albedo: fn(u64, u64) -> f64| {
+        verdict(move || {
+            Altered::first_hits(synthetic(), move |index| {
+                let (width, height) = SIZE;
+                let albedo =
+                    (0..(width * height) as u64).map(|pixel| [albedo(index, pixel) as f32; 3]).collect();
+                Some(FirstHits { width, height, albedo, normal: vec![[0.0, 0.6, 0.8]; width * height] })
+            })
+        })
+    };
+    assert_eq!(said(|_, _| 0.5), "kept");
+    assert_eq!(said(|index, pixel| Noise::keyed(&[index, pixel]).uniform()), "kept");
+    assert!(said(|_, _| 1.5).contains("outside of 0 to 1"));
+    let two = said(|index, pixel| Noise::keyed(&[index / 2, pixel]).uniform());
+    assert!(two.contains("correlated"), "two pictures for four indices: {two}");
+    // Each has half of its noise in common with another
+    let shared = said(|index, pixel| {
+        0.5 * Noise::keyed(&[index, pixel]).uniform() + 0.5 * Noise::keyed(&[9, index / 2, pixel]).uniform()
+    });
+    assert!(shared.contains("correlated"), "{shared}");
+    let calls = said(|_, pixel| {
+        static CALLS: AtomicU64 = AtomicU64::new(0);
+        Noise::keyed(&[CALLS.fetch_add(1, Ordering::Relaxed), pixel]).uniform()
+    });
+    assert!(calls.contains("differ the second time"), "{calls}");
+    let small = verdict(|| {
+        let pixels = vec![[0.0; 3]; SIZE.0];
+        let hits = FirstHits { width: SIZE.0, height: 1, albedo: pixels.clone(), normal: pixels };
+        Altered::first_hits(synthetic(), move |_| Some(hits.clone()))
+    });
+    assert!(small.contains("image's size"), "{small}");
 }

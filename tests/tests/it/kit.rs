@@ -1,5 +1,6 @@
 use noisefloor::{
-    Batch, Counts, ProgressiveSource, Reference, Repeats, Request, Rgb, SourceError, SourceInfo, Unit,
+    Batch, Counts, FirstHits, ProgressiveSource, Reference, Repeats, Request, Rgb, SourceError, SourceInfo,
+    Unit,
 };
 use noisefloor_sidecar::{Renderer, find, probe};
 use noisefloor_testkit::{Noise, Requirement, require};
@@ -103,15 +104,21 @@ pub(crate) struct Altered<S> {
     pub(crate) source: S,
     pub(crate) batches: Change,
     pub(crate) reference: Box<dyn FnMut() -> Option<Reference>>,
+    pub(crate) first_hits: Box<dyn FnMut(u64) -> Option<FirstHits>>,
 }
 
 impl<S: ProgressiveSource> Altered<S> {
     pub(crate) fn batches(source: S, change: impl FnMut(&[Request], &mut Vec<Batch>) + 'static) -> Self {
-        Self { source, batches: Box::new(change), reference: Box::new(|| None) }
+        Self { batches: Box::new(change), ..Self::reference(source, || None) }
     }
 
     pub(crate) fn reference(source: S, reference: impl FnMut() -> Option<Reference> + 'static) -> Self {
-        Self { source, batches: Box::new(|_, _| ()), reference: Box::new(reference) }
+        let (batches, first_hits): (Change, _) = (Box::new(|_, _| ()), Box::new(|_| None));
+        Self { source, batches, reference: Box::new(reference), first_hits }
+    }
+
+    pub(crate) fn first_hits(source: S, first_hits: impl FnMut(u64) -> Option<FirstHits> + 'static) -> Self {
+        Self { first_hits: Box::new(first_hits), ..Self::reference(source, || None) }
     }
 }
 
@@ -128,6 +135,10 @@ impl<S: ProgressiveSource> ProgressiveSource for Altered<S> {
 
     fn reference(&mut self) -> Result<Option<Reference>, SourceError> {
         Ok((self.reference)())
+    }
+
+    fn first_hits(&mut self, index: u64, _spp: u64) -> Result<Option<FirstHits>, SourceError> {
+        Ok((self.first_hits)(index))
     }
 }
 

@@ -193,13 +193,13 @@ mod check {
     use super::{ObserverArgs, StackArgs, StudyArgs, StudyCommand, ThresholdChoice};
     #[cfg(not(feature = "adapters"))]
     use crate::left_out::left_out;
+    #[cfg(feature = "adapters")]
+    use crate::study::StackDenoiser;
     use crate::study::{
         AnalyseJob, BackupJob, DataFolderJob, LinksJob, ObserverJob, ServeJob, SimulateJob, StackJob,
         StudyJob,
     };
     use anyhow::Context;
-    #[cfg(feature = "adapters")]
-    use crate::study::StackDenoiser;
     #[cfg(feature = "adapters")]
     use noisefloor_denoise::OIDN;
     #[cfg(feature = "adapters")]

@@ -1,8 +1,9 @@
-//! image-denoised.exr, image-denoised.png and denoised-error.png, and what is said of them.
+//! image-denoised.exr, image-denoised.png, denoised-error.png, albedo.exr and normal.exr, and what is said of
+//! them.
 
 use super::Output;
 use crate::say::{NotSaid, note, say};
-use noisefloor::{Rgb, Session, StoppingCriterion};
+use noisefloor::{FirstHits, Rgb, Session, StoppingCriterion};
 use noisefloor_denoise::{DenoisedRecord, Denoiser, NoisyPicture};
 use noisefloor_image::maps::{Canvas, ColourScale, draw_field};
 use noisefloor_image::{RenderLayers, write_exr};
@@ -14,6 +15,8 @@ use std::time::Instant;
 /// The denoiser of a render, and what its verdicts looked at.
 pub struct Denoised {
     denoiser: Box<dyn Denoiser>,
+    /// Albedo and normals of both halves together.
+    guide: Option<FirstHits>,
     record: Arc<Mutex<DenoisedRecord>>,
 }
 
@@ -21,6 +24,8 @@ pub struct Denoised {
 #[derive(Serialize)]
 pub(super) struct DenoisedReport {
     denoiser: String,
+    /// Whether the source gave it albedo and normals.
+    guided: bool,
     /// Verdicts, each of two denoisings, and the seconds that they took.
     verdicts: usize,
     seconds: f64,
@@ -33,8 +38,12 @@ pub(super) struct DenoisedReport {
 
 impl Denoised {
     #[cfg(feature = "adapters")]
-    pub fn new(denoiser: impl Denoiser + 'static, record: Arc<Mutex<DenoisedRecord>>) -> Self {
-        Self { denoiser: Box::new(denoiser), record }
+    pub fn new(
+        denoiser: impl Denoiser + 'static,
+        guides: Option<&[FirstHits; 2]>,
+        record: Arc<Mutex<DenoisedRecord>>,
+    ) -> Self {
+        Self { denoiser: Box::new(denoiser), guide: guides.map(together), record }
     }
 
     fn record(&self) -> MutexGuard<'_, DenoisedRecord> {
@@ -50,12 +59,23 @@ impl Denoised {
         let lost = record.jods_lost.iter().copied().filter(|lost| lost.is_finite());
         DenoisedReport {
             denoiser: self.denoiser.name(),
+            guided: self.guide.is_some(),
             verdicts: record.verdicts,
             seconds: record.seconds,
             jods_lost: lost.max_by(f64::total_cmp),
             spp_without: needed.filter(|_| record.verdicts > 0).map(|samples| samples / pixels),
         }
     }
+}
+
+/// The mean of two pictures of first hits.
+#[cfg(feature = "adapters")]
+fn together([a, b]: &[FirstHits; 2]) -> FirstHits {
+    let mean = |a: &[Rgb], b: &[Rgb]| -> Vec<Rgb> {
+        a.iter().zip(b).map(|(a, b)| std::array::from_fn(|c| 0.5 * (a[c] + b[c]))).collect()
+    };
+    let (albedo, normal) = (mean(&a.albedo, &b.albedo), mean(&a.normal, &b.normal));
+    FirstHits { width: a.width, height: a.height, albedo, normal }
 }
 
 /// JODs lost, from nothing that people see to what three of four do.
@@ -78,8 +98,11 @@ impl Output {
         let grid = session.film().grid();
         let (width, height) = (grid.width(), grid.height());
         let began = Instant::now();
+        let (noisy, wants) = (session.film().image(), denoised.denoiser.wants());
+        let picture = NoisyPicture::new((width, height), &noisy);
+        let guide = denoised.guide.as_ref();
         let image =
-            denoised.denoiser.denoise(&NoisyPicture::new((width, height), &session.film().image()))?;
+            denoised.denoiser.denoise(&guide.map_or(picture, |guide| picture.guided(guide, wants)))?;
         denoised.record().seconds += began.elapsed().as_secs_f64();
 
         let display = session.display().copied();
@@ -88,6 +111,10 @@ impl Output {
         let eyes = VisionModel::new(&session.params().viewing);
         let map = denoised.record().error.as_ref().map(|error| error.map_of_jods_lost(&eyes)).transpose()?;
         write_exr(self.path("image-denoised.exr"), &RenderLayers::rgb(width, height, &image))?;
+        if let Some(guide) = self.denoised.as_ref().and_then(|denoised| denoised.guide.as_ref()) {
+            write_exr(self.path("albedo.exr"), &RenderLayers::rgb(width, height, &guide.albedo))?;
+            write_exr(self.path("normal.exr"), &RenderLayers::rgb(width, height, &guide.normal))?;
+        }
         let shown = Canvas::of_picture(width, &encoded);
         shown.save(self.path("image-denoised.png"))?;
         match map {
@@ -100,14 +127,16 @@ impl Output {
     /// Says what denoising was worth.
     pub(super) fn say_denoised<C: StoppingCriterion>(&self, session: &Session<C>) -> Result<(), NotSaid> {
         let Some(denoised) = &self.denoised else { return Ok(()) };
-        let DenoisedReport { denoiser, verdicts, seconds, jods_lost, spp_without } = denoised.report(session);
+        let DenoisedReport { denoiser, guided, verdicts, seconds, jods_lost, spp_without } =
+            denoised.report(session);
         let grid = session.film().grid();
         let spp = session.film().total_samples() as f64 / (grid.width() * grid.height()) as f64;
         let without = spp_without.map_or_else(
             || "out of sight without".to_owned(),
             |spp| format!("about {spp:.0} without, as estimated from the same halves"),
         );
-        say!("{spp:.0} spp denoised by {denoiser}; {without}")?;
+        let with = if guided { " with albedo and normals" } else { "" };
+        say!("{spp:.0} spp denoised by {denoiser}{with}; {without}")?;
         if let Some(lost) = jods_lost {
             say!(
                 "the worst tile lost {lost:.3} JOD when it was last judged; nobody has been asked about denoised tiles"

@@ -21,7 +21,9 @@ use noisefloor::{
     SourceInfo, StopReason, StoppingCriterion,
 };
 #[cfg(feature = "adapters")]
-use noisefloor_denoise::{DenoisedQuality, Oidn};
+use noisefloor::{FirstHits, ProgressiveSource, SourceError};
+#[cfg(feature = "adapters")]
+use noisefloor_denoise::{AuxiliaryPictures, DenoisedQuality, Denoiser, Oidn};
 #[cfg(feature = "adapters")]
 use noisefloor_sidecar::FilterPlan;
 #[cfg(feature = "study")]
@@ -41,6 +43,11 @@ use saving::Pace;
 use snapshots::{Rendering, Snapshots};
 pub use tev::ADDRESS as TEV_ADDRESS;
 use tev::Tev;
+
+/// Camera rays a pixel for albedo and normals, of each half: edges are then smoother than in the radiance of most
+/// pictures, for the time of a few samples of it.
+#[cfg(feature = "adapters")]
+const FIRST_HITS_SPP: u64 = 32;
 
 /// What is rendered, and until when: checked.
 pub struct RenderJob {
@@ -97,8 +104,13 @@ pub fn run(job: RenderJob) -> anyhow::Result<ExitCode> {
         #[cfg(feature = "adapters")]
         Judge::Denoised(lost) => {
             let denoiser = Arc::new(Mutex::new(Oidn::start(FilterPlan::default())?));
-            let criterion = DenoisedQuality::new(Arc::clone(&denoiser), *lost);
-            let rest = Rest { denoised: Some(Denoised::new(denoiser, criterion.record())), ..rest };
+            let (mut source, mut criterion) = (source, DenoisedQuality::new(Arc::clone(&denoiser), *lost));
+            let guides = guides(&mut source, denoiser.wants())?;
+            if let Some(guides) = &guides {
+                criterion = criterion.guided_by(Arc::clone(guides));
+            }
+            let denoised = Denoised::new(denoiser, guides.as_deref(), criterion.record());
+            let rest = Rest { denoised: Some(denoised), ..rest };
             rest.drive(Driver::new(source, criterion, *params)?, Some(Snapshots::new()))
         }
         // A rival's state is not kept
@@ -106,6 +118,19 @@ pub fn run(job: RenderJob) -> anyhow::Result<ExitCode> {
             rest.drive(Driver::new(source, noisefloor_rivals::parse(spec)?, *params)?, None)
         }
     }
+}
+
+/// Albedo and normals for each half, if the denoiser makes use of them and the source has them.
+#[cfg(feature = "adapters")]
+fn guides(
+    source: &mut impl ProgressiveSource,
+    wants: AuxiliaryPictures,
+) -> Result<Option<Arc<[FirstHits; 2]>>, SourceError> {
+    if !wants.any() {
+        return Ok(None);
+    }
+    let Some(a) = source.first_hits(0, FIRST_HITS_SPP)? else { return Ok(None) };
+    Ok(source.first_hits(1, FIRST_HITS_SPP)?.map(|b| Arc::new([a, b])))
 }
 
 /// Where samples come from, for the picture's file; none for pictures that are played back. Paths and command

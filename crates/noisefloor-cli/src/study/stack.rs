@@ -23,7 +23,9 @@ use std::time::Duration;
 #[cfg(feature = "adapters")]
 pub enum StackDenoiser {
     /// Open Image Denoise, with a time limit for one picture.
-    Oidn { timeout: Duration },
+    Oidn {
+        timeout: Duration,
+    },
     Program(PictureCommand),
 }
 

@@ -39,13 +39,15 @@ fn the_denoised_picture_and_its_error_are_written() {
     let folder = tempdir().unwrap();
     let (out, noisy) = (folder.path().join("out"), folder.path().join("noisy"));
     succeed(&tiny(text(&out), &["--denoise", "oidn", "--lost", "0.5"]));
-    for file in FILES.iter().chain(&["image-denoised.exr", "image-denoised.png", "denoised-error.png"]) {
+    let more = ["image-denoised.exr", "image-denoised.png", "denoised-error.png", "albedo.exr", "normal.exr"];
+    for file in FILES.iter().chain(&more) {
         assert!(out.join(file).exists(), "{file}");
     }
     let spp: Vec<u64> = column(&out.join("stops.csv"), "spp").iter().map(|n| n.parse().unwrap()).collect();
     assert!(spp.iter().all(|n| [16, 32, 48, 64, 96, 144, 200].contains(n)), "{spp:?}");
     let report = &json(&out.join("report.json"))["denoised"];
     assert!(report["denoiser"].as_str().unwrap().contains("Open Image Denoise"));
+    assert_eq!(report["guided"].as_bool(), Some(true));
     assert!(report["verdicts"].as_u64() > Some(0) && report["seconds"].as_f64() > Some(0.0));
     assert!(report["spp_without"].as_f64().unwrap() > *spp.iter().max().unwrap() as f64 / 4.0);
 

@@ -1,6 +1,8 @@
 use crate::kit::{SIZE, Simple, noisy, truth};
-use noisefloor::{CriterionError, Params, Schedule, Session, StopReason, ToneMapping};
-use noisefloor_denoise::{DenoisedQuality, Denoiser};
+use noisefloor::{
+    CriterionError, FirstHits, Params, Rgb, Schedule, Session, StopReason, StoppingCriterion, ToneMapping,
+};
+use noisefloor_denoise::{AuxiliaryPictures, DenoiseError, DenoisedQuality, Denoiser, NoisyPicture};
 use std::sync::{Arc, Mutex};
 
 /// Deviation of one sample.
@@ -76,4 +78,42 @@ fn failures_are_said() {
     let outcome = run(&mut session(Simple::Fails));
     let Err(CriterionError::Failed { why, .. }) = outcome else { panic!("{outcome:?}") };
     assert!(why.contains("out of order"), "{why}");
+}
+
+/// Notes the albedo that it is given, and takes it for the picture.
+struct Guided(Arc<Mutex<Vec<Option<f32>>>>);
+
+impl Denoiser for Guided {
+    fn name(&self) -> String {
+        "guided".into()
+    }
+
+    fn wants(&self) -> AuxiliaryPictures {
+        AuxiliaryPictures { albedo: true, normal: false }
+    }
+
+    fn denoise(&mut self, picture: &NoisyPicture<'_>) -> Result<Vec<Rgb>, DenoiseError> {
+        assert!(picture.normal.is_none(), "what it does not want is kept from it");
+        self.0.lock().unwrap().push(picture.albedo.map(|albedo| albedo[0][0]));
+        Ok(picture.radiance.to_vec())
+    }
+}
+
+/// Each half is denoised with its own albedo, and which pictures help is part of the fingerprint.
+#[test]
+fn halves_have_guides_of_their_own() {
+    let seen: Arc<Mutex<Vec<Option<f32>>>> = Arc::default();
+    let plain = DenoisedQuality::new(Guided(Arc::clone(&seen)), 0.1);
+    let before = plain.fingerprint();
+    let hits = |albedo: f32| {
+        let (width, height) = SIZE;
+        let pixels = |value: f32| vec![[value; 3]; width * height];
+        FirstHits { width, height, albedo: pixels(albedo), normal: pixels(0.5) }
+    };
+    let guided = plain.guided_by(Arc::new([hits(0.25), hits(0.75)]));
+    assert_ne!(guided.fingerprint(), before);
+    let params = Params { tile: 64, max_spp: 200, ..Params::default() };
+    run(&mut Session::new(SIZE.0, SIZE.1, guided, params).unwrap()).unwrap();
+    let seen = seen.lock().unwrap();
+    assert!(!seen.is_empty() && seen.chunks(2).all(|two| two == [Some(0.25), Some(0.75)]), "{seen:?}");
 }

@@ -12,6 +12,7 @@
 mod determinism; // threads, batches, seeds, independence
 mod direct; // direct light in closed form, and the reference
 mod extremes; // nothing but finite numbers
+mod first_hits; // colours and normals of a known surface
 mod furnace; // energy neither made nor lost
 mod kit;
 mod mis; // next events, scattering, and both

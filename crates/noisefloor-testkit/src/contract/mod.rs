@@ -2,6 +2,7 @@
 
 mod distribution;
 mod exact;
+mod first_hits;
 mod independence;
 mod probe;
 mod reference;
@@ -11,6 +12,7 @@ pub use reference::check_reference_is_free_of_noise;
 
 use distribution::{LONG, check_distribution};
 use exact::{all_have, check_aiming, check_cut, same};
+use first_hits::check_first_hits;
 use independence::check_independence;
 use noisefloor::{Counts, ProgressiveSource, Repeats, Unit};
 use probe::{Round, Subject};
@@ -48,6 +50,8 @@ const MOST_OF_A_RENDERER: usize = 8;
 /// - **Independence**: new samples are independent of those before, in the same tile and in others.
 /// - **The reference**, if there is one, has the image's size and is finite, and rendering it changes no
 ///   sample. Whether it is free of noise takes two seeds to tell: see [`check_reference_is_free_of_noise`].
+/// - **First hits**, if there are any, have the image's size, albedo in [0, 1] and normals no longer than 1.
+///   Those of different indices are independent, or have no noise at all, and rendering them changes no sample.
 /// - **The end.** At its end a source gives empty batches, however often it is asked.
 ///
 /// A playback is asked for neither parts of a batch nor single tiles at other depths.
@@ -59,8 +63,8 @@ const MOST_OF_A_RENDERER: usize = 8;
 /// *Independence:* p < 1.3e-7 a source. The noise of a pixel is the difference x of two batches of equal
 /// size, which is symmetric around 0, and so is the difference y of two others. Given all |xy|, only their
 /// signs are left to chance, and those are independent from pixel to pixel. Then z = Σxy/√Σ(xy)² exceeds 6
-/// with p ≤ 2·exp(−6²/2) = 3.1e-8, whatever the distribution (Hoeffding 1963). There are four such z. The
-/// batches of a playback differ in size; for them this holds as far as z is normal. Where work is counted in
+/// with p ≤ 2·exp(−6²/2) = 3.1e-8, whatever the distribution (Hoeffding 1963). There are four such z, and
+/// three more of first hits, where there are any: p < 2.2e-7 then. The batches of a playback differ in size; for them this holds as far as z is normal. Where work is counted in
 /// mutations, neighbouring pixels share a Markov chain, and the signs are those of whole tiles, in 64 batches
 /// instead of 4.
 ///
@@ -123,13 +127,14 @@ fn check_cuts<S: ProgressiveSource>(subject: &Subject<impl Fn() -> S>) {
     }
 }
 
-/// The reference is rendered for nobody's samples.
+/// The reference and first hits are rendered for nobody's samples.
 fn check_reference_changes_nothing<S: ProgressiveSource>(subject: &Subject<impl Fn() -> S>, four: &[Round]) {
     let mut probe = subject.start();
     check_reference(&mut probe.source, &subject.info);
+    check_first_hits(&mut probe.source, &subject.info);
     let after = [probe.ask_all(16)];
     if subject.promises(Repeats::Calls) {
-        assert!(same(&after, &four[..1]), "rendering the reference changed the samples");
+        assert!(same(&after, &four[..1]), "rendering the reference or first hits changed the samples");
     }
 }
 
