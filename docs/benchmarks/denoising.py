@@ -10,6 +10,8 @@ import numpy
 LIMITS = [0.04, 0.1, 0.3, 1.0]
 # JODs below this are the same to everyone
 LEAST = 1e-4
+# Samples per pixel before the first verdict of the command
+FIRST = 16
 
 
 def read(path):
@@ -30,8 +32,8 @@ def ranks(values):
     return places
 
 
-def line(name, rows):
-    true, estimate = (numpy.array([row[kind] for row in rows]) for kind in ["true", "estimate"])
+def line(name, rows, guided=""):
+    true, estimate = (numpy.array([row[guided + kind] for row in rows]) for kind in ["true", "estimate"])
     rank = numpy.corrcoef(ranks(true[:, 0]), ranks(estimate[:, 0]))[0, 1]
     logs = numpy.log(numpy.maximum(estimate[:, 0], LEAST) / numpy.maximum(true[:, 0], LEAST))
     bias, error = numpy.exp(logs.mean()), numpy.exp(abs(logs).mean())
@@ -41,24 +43,52 @@ def line(name, rows):
 
 def first(found, scene, tile, kind, limit):
     """The first level of a tile that has lost no more than the limit; twice the last one if none."""
-    levels = sorted(spp for s, spp, t in found if (s, t) == (scene, tile))
+    levels = sorted(spp for s, spp, t in found if (s, t) == (scene, tile) and spp >= FIRST)
     return next((spp for spp in levels if found[scene, spp, tile][kind][0] <= limit), 2 * levels[-1])
 
 
-def stops(found, truth, limit):
-    most = 2 * max(spp for _, spp, _ in found)
-    samples, stopped, early, logs = collections.Counter(), 0, 0, []
+def stops(found, truth, limit, guided=""):
+    """Tiles whose truth has itself lost more than half of the limit cannot be scored: whether they stopped early is not known."""
+    samples, stopped, early, unknown, worst, logs = collections.Counter(), 0, 0, 0, 0.0, []
     for scene, tile in truth:
-        need = {kind: first(found, scene, tile, kind, limit) for kind in ["estimate", "true", "noisy"]}
+        last = max(spp for s, spp, t in found if (s, t) == (scene, tile))
+        need = {kind: first(found, scene, tile, kind, limit) for kind in [guided + "estimate", guided + "true", "noisy"]}
         samples.update(need)
-        if need["estimate"] < most:
-            stopped += 1
-            early += found[scene, need["estimate"], tile]["true"][0] > 2 * limit
-            if need["noisy"] < most:
-                logs.append(numpy.log(need["noisy"] / need["estimate"]))
-    saved, typical = samples["noisy"] / samples["estimate"], numpy.exp(numpy.mean(logs))
-    print(f"| {limit} | {stopped} of {len(truth)} | {early} | {samples['estimate']:,} | {samples['true']:,} "
-          f"| {samples['noisy']:,} | ×{saved:.2f} | ×{typical:.2f} |")
+        at = need[guided + "estimate"]
+        if at > last:
+            continue
+        stopped += 1
+        if need["noisy"] <= last:
+            logs.append(numpy.log(need["noisy"] / at))
+        if truth[scene, tile][0] > 0.5 * limit:
+            unknown += 1
+            continue
+        lost = found[scene, at, tile][guided + "true"][0] / limit
+        early, worst = early + (lost > 2), max(worst, lost)
+    saved = samples["noisy"] / samples[guided + "estimate"]
+    typical = f"×{numpy.exp(numpy.mean(logs)):.2f}" if logs else "–"
+    print(f"| {limit} | {stopped} of {len(truth)} | {early} of {stopped - unknown} | ×{worst:.1f} "
+          f"| {samples[guided + 'estimate']:,} | {samples[guided + 'true']:,} | {samples['noisy']:,} | ×{saved:.2f} | {typical} |")
+
+
+HEADER = ("\n| limit, JOD | tiles stopped | early | worst | samples | with the truth known | without denoising | saved | "
+          "saved by the typical tile |\n|---|---|---|---|---|---|---|---|---|")
+
+
+def guides(found, truth):
+    """What albedo and normals gain, by scene: of tiles with a usable truth, the ratio of true losses, and who stops when."""
+    print("\n| | tiles | true loss, 16 spp | 64 spp | 256 spp | samples to 0.3 JOD without | with |\n|---|---|---|---|---|---|---|")
+    for scene in dict.fromkeys(key[0] for key in found):
+        if any("guided-true" not in row for key, row in found.items() if key[0] == scene):
+            continue
+        ratios = []
+        for spp in [16, 64, 256]:
+            rows = [row for key, row in found.items() if key[:2] == (scene, spp)]
+            pairs = [(max(r["guided-true"][0], LEAST), max(r["true"][0], LEAST)) for r in rows]
+            ratios.append(numpy.exp(numpy.mean([numpy.log(a / b) for a, b in pairs])) if pairs else float("nan"))
+        tiles = [tile for s, tile in truth if s == scene]
+        without, with_guides = (sum(first(found, scene, t, kind, 0.3) for t in tiles) for kind in ["estimate", "guided-estimate"])
+        print(f"| {scene} | {len(tiles)} | " + " | ".join(f"×{r:.2f}" for r in ratios) + f" | {without:,} | {with_guides:,} |")
 
 
 def main():
@@ -68,12 +98,23 @@ def main():
     for scene in dict.fromkeys(key[0] for key in good):
         line(scene, [row for key, row in good.items() if key[0] == scene])
     line(f"**all** (of {len(found)})", list(good.values()))
+    guided = [row for row in good.values() if "guided-true" in row]
+    if guided:
+        line("with albedo and normals", guided, "guided-")
     for spp in sorted({key[1] for key in good}):
         line(f"{spp} spp", [row for key, row in good.items() if key[1] == spp])
-    print("\n| limit, JOD | tiles stopped | early | samples | with the truth known | without denoising | saved | "
-          "saved by the typical tile |\n|---|---|---|---|---|---|---|---|")
+    print(HEADER)
     for limit in LIMITS:
         stops(found, truth, limit)
+    if guided:
+        scenes = {key[0] for key, row in found.items() if "guided-true" in row}
+        some = {key: value for key, value in truth.items() if key[0] in scenes}
+        for kind in ["", "guided-"]:
+            print(f"\nThe {len(scenes)} scenes with albedo and normals, {'with' if kind else 'without'} them:")
+            print(HEADER)
+            for limit in LIMITS:
+                stops(found, some, limit, kind)
+        guides(found, truth)
 
 
 main()

@@ -7,7 +7,8 @@ use crate::say::{NotSaid, note, one_line, say};
 use crate::signals::{AFTER_THIS_BATCH, INTERRUPTED, cancel_on_signal};
 use crate::sources::{Opened, SourceJob};
 use anyhow::Context;
-use noisefloor::{Params, SourceInfo, StoppingCriterion};
+use noisefloor::{Params, Schedule, SourceInfo, StoppingCriterion};
+use noisefloor_denoise::Denoiser;
 use noisefloor_lab::compare::{
     self, Comparison, Converged, Cost, Entrant, Labels, ReferenceJob, Setting, render_reference,
 };
@@ -20,6 +21,9 @@ use std::sync::atomic::AtomicBool;
 /// A criterion, and how it was asked for.
 pub type Named = (String, Box<dyn StoppingCriterion + Send>);
 
+/// How the criterion on denoised halves is asked for, before the JODs that a tile may lose.
+pub const DENOISED: &str = "denoised:";
+
 /// What to compare, and on which scenes: checked.
 pub struct CompareJob {
     pub scenes: Vec<String>,
@@ -28,6 +32,8 @@ pub struct CompareJob {
     pub out: PathBuf,
     /// Each scene has criteria of its own: they remember what they saw.
     pub criteria: Box<dyn Fn() -> anyhow::Result<Vec<Named>>>,
+    /// Looks at every picture denoised, too.
+    pub denoiser: Option<Box<dyn Denoiser>>,
     pub params: Params,
     pub batch: u64,
     pub reference: Option<PathBuf>,
@@ -37,7 +43,9 @@ pub struct CompareJob {
     pub quiet: bool,
 }
 
-pub fn run(job: &CompareJob) -> anyhow::Result<ExitCode> {
+pub fn run(mut job: CompareJob) -> anyhow::Result<ExitCode> {
+    let mut denoiser = job.denoiser.take();
+    let job = &job;
     job.source.start_threads()?;
     let folder = Folder::claim(job.out.clone())?;
     if job.earlier == Earlier::Keep && folder.first_of(&["index.html"]).is_some() {
@@ -54,7 +62,7 @@ pub fn run(job: &CompareJob) -> anyhow::Result<ExitCode> {
     let (mut all, mut sections) = (Vec::new(), Vec::new());
     for scene in &job.scenes {
         let source = SourceJob { scene: Some(scene.clone()), ..job.source.clone() };
-        let (comparison, section) = match one(job, &source, &cancel) {
+        let (comparison, section) = match one(job, &source, denoiser.as_deref_mut(), &cancel) {
             Err(error) if matches!(error.downcast_ref(), Some(LabError::Cancelled { .. })) => {
                 note!("warning: {}", one_line(&error));
                 return Ok(ExitCode::from(INTERRUPTED));
@@ -82,6 +90,7 @@ pub fn run(job: &CompareJob) -> anyhow::Result<ExitCode> {
 fn one(
     job: &CompareJob,
     source_job: &SourceJob,
+    denoiser: Option<&mut (dyn Denoiser + 'static)>,
     cancel: &AtomicBool,
 ) -> anyhow::Result<(Comparison, String)> {
     let opened = source_job.open()?;
@@ -91,7 +100,13 @@ fn one(
     let folder = job.out.join(&scene);
     std::fs::create_dir_all(&folder).with_context(|| folder.display().to_string())?;
 
-    let entrant = |(spec, criterion)| Entrant::new(spec, criterion, (width, height), &job.params);
+    let entrant = |(spec, criterion): Named| {
+        let mut params = job.params;
+        if spec.starts_with(DENOISED) {
+            params.schedule = Schedule::Growing { step: job.batch };
+        }
+        Entrant::new(spec, criterion, (width, height), &params)
+    };
     let entrants = (job.criteria)()?.into_iter().map(entrant).collect::<Result<Vec<_>, _>>()?;
     let bars = Bars::new(job.quiet);
     let watch = |advance: Advance<'_>| bars.show(advance);
@@ -103,7 +118,9 @@ fn one(
         pixels_per_degree: job.pixels_per_degree,
     };
     let labels = Labels { scene, reference: truth.origin };
-    let (comparison, pictures) = compare::run(source.as_mut(), entrants, setting, labels, cancel, &watch)?;
+    let denoiser = denoiser.map(|denoiser| denoiser as &mut dyn Denoiser);
+    let (comparison, pictures) =
+        compare::run(source.as_mut(), entrants, setting, labels, denoiser, cancel, &watch)?;
     bars.finish();
 
     let plot = |cost| Ok((cost, compare::plot(&comparison, cost)?));
@@ -169,6 +186,11 @@ fn say_runs(compared: &Comparison) -> Result<(), NotSaid> {
             run.butteraugli_worst,
             run.uniform_over_this.map_or_else(|| "–".to_owned(), |ratio| format!("×{ratio:.2}")),
         )?;
+        if let (Some(jod), Some(worst), Some(seconds)) =
+            (run.denoised_jod, run.denoised_jod_worst, run.denoised_seconds)
+        {
+            say!("{:24} denoised: JOD {jod:.3}, worst tile {worst:.3}, {seconds:.2} s in all", "")?;
+        }
     }
     Ok(())
 }

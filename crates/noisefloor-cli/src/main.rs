@@ -70,7 +70,7 @@ fn run(command: Command) -> anyhow::Result<ExitCode> {
         #[cfg(feature = "adapters")]
         Command::Doctor(args) => doctor::run(&args.check()),
         #[cfg(feature = "lab")]
-        Command::Compare(args) => compare::run(&args.check()?),
+        Command::Compare(args) => compare::run(args.check()?),
         #[cfg(feature = "lab")]
         Command::Reproduce(args) => reproduce::run(&args.check()).map(done),
         #[cfg(feature = "train")]

@@ -23,6 +23,9 @@
 //! them differ a little more than they should, and much more at edges of lamps. Cycles renders one block of
 //! one rectangle of tiles at a time, at a cost of 5 ms beside the samples.
 //!
+//! Albedo and normals (`first_hits`) are those that Cycles gives its own
+//! denoisers: where a mirror or glass is hit first, they are of what is seen in it.
+//!
 //! In nearly all pixels noise decreases with the number of samples as that of independent ones does. At edges
 //! of lamps it decreases faster inside a block.
 

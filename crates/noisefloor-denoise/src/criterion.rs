@@ -2,9 +2,10 @@
 
 use crate::denoiser::{DenoiseError, Denoiser, NoisyPicture};
 use crate::estimate::{DenoisedError, DenoisedHalves};
+use crate::record::DenoisedRecord;
 use noisefloor::{
-    CriterionError, Display, Film, FirstHits, Needs, Resumable, Rgb, StoppingCriterion, Tile, TilePlanes,
-    Verdict, View,
+    CriterionError, Display, Film, FirstHits, Needs, Resumable, Rgb, StoppingCriterion, Tile, TileGrid,
+    TilePlanes, Verdict, View,
 };
 use noisefloor_vision::{VisionModel, VisionWorkspace};
 use rayon::prelude::*;
@@ -23,22 +24,6 @@ const DENOISED_DECAY: f64 = 0.38;
 pub const DEFAULT_JODS_LOST: f64 = 0.04;
 /// Limits of the contrast at which an error is sought that is just allowed.
 const CONTRASTS: (f64, f64) = (1.0 / 64.0, 8.0);
-
-/// What the last verdicts looked at, for reports.
-#[derive(Clone, Debug, Default)]
-pub struct DenoisedRecord {
-    /// The error of the denoised picture at the last verdict.
-    pub error: Option<DenoisedError>,
-    /// For each tile, the just-objectionable differences lost when it was last judged; NaN before that.
-    pub jods_lost: Vec<f64>,
-    /// For each tile, the samples per pixel at which the picture without denoising would lose as little as is
-    /// allowed, estimated when it was last judged; `None` where that is out of sight.
-    pub needed_without: Vec<Option<u64>>,
-    /// Seconds spent on denoising and on the estimates from it.
-    pub seconds: f64,
-    /// Verdicts so far: each takes two denoisings.
-    pub verdicts: usize,
-}
 
 /// Stops a tile when the *denoised* picture has lost little against the converged one, in the eyes of the
 /// vision model.
@@ -154,8 +139,18 @@ impl<D: Denoiser> StoppingCriterion for DenoisedQuality<D> {
     }
 }
 
-/// Verdicts follow from film and display alone.
-impl<D: Denoiser> Resumable for DenoisedQuality<D> {}
+/// Verdicts follow from film and display alone; what is kept is what reports say of tiles that have stopped.
+impl<D: Denoiser> Resumable for DenoisedQuality<D> {
+    fn state(&self) -> Vec<u8> {
+        self.record.lock().unwrap_or_else(PoisonError::into_inner).to_bytes()
+    }
+
+    fn restore(&mut self, grid: TileGrid, state: &[u8]) -> bool {
+        let Some(record) = DenoisedRecord::from_bytes(grid.len(), state) else { return false };
+        *self.record.lock().unwrap_or_else(PoisonError::into_inner) = record;
+        true
+    }
+}
 
 /// What is found of a tile.
 struct Judged {

@@ -44,9 +44,11 @@ mod denoiser;
 mod estimate;
 #[cfg(feature = "oidn")]
 mod oidn;
+mod record;
 
-pub use criterion::{DEFAULT_JODS_LOST, DenoisedQuality, DenoisedRecord};
+pub use criterion::{DEFAULT_JODS_LOST, DenoisedQuality};
 pub use denoiser::{AuxiliaryPictures, DenoiseError, Denoiser, NoisyPicture};
 pub use estimate::{DenoisedError, DenoisedHalves};
 #[cfg(feature = "oidn")]
 pub use oidn::{OIDN, Oidn};
+pub use record::DenoisedRecord;

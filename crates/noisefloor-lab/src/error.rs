@@ -3,6 +3,7 @@
 use noisefloor::{
     CriterionError, FilmError, ParamsError, SessionError, SourceError, SvmTrainError, TileError,
 };
+use noisefloor_denoise::DenoiseError;
 use noisefloor_image::{PictureError, WriteError};
 use noisefloor_learn::{CorpusError, TableError};
 use noisefloor_rivals::MetricError;
@@ -35,6 +36,9 @@ pub enum LabError {
     /// Pictures that a metric cannot compare.
     #[error(transparent)]
     Metric(#[from] MetricError),
+    /// A picture could not be denoised.
+    #[error(transparent)]
+    Denoise(#[from] DenoiseError),
     /// A picture could not be read.
     #[error(transparent)]
     Picture(#[from] PictureError),

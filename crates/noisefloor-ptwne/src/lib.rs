@@ -25,7 +25,8 @@
 //! # Where things are
 //! `integrator` traces paths, `bsdf` scatters light, `light` samples emitters, `illumination` and
 //! `intersection` are what a scene answers them, and `accel` is its hierarchy. The reference is in
-//! `reference`, its samples in `direct`, and its choice of lights in `guide`. `builder` fills `parts`, of
+//! `reference`, its samples in `direct`, and its choice of lights in `guide`. `first_hits` has albedo and
+//! normals for denoisers. `builder` fills `parts`, of
 //! which `scene` is made. Absent on purpose: state between samples, allocation along paths, and any number
 //! that depends on threads.
 

@@ -23,7 +23,9 @@ pub enum Schedule {
         step: u64,
     },
     /// After `step` samples per pixel, then whenever a tile has half as many more, in multiples of `step`: for
-    /// criteria that take long, such as those that denoise.
+    /// criteria that take long however few tiles they judge, such as those that denoise. Where few tiles are
+    /// open, each gets more between two verdicts, up to twice what it has: as many samples in all as `step`
+    /// for each pixel of the picture.
     Growing {
         /// The finest spacing, in samples per pixel, at least 2.
         step: u64,
@@ -41,8 +43,8 @@ impl Schedule {
         }
     }
 
-    /// Samples per pixel at the next verdict.
-    pub(crate) fn next(self, samples: u64, expected: Option<u64>) -> u64 {
+    /// Samples per pixel at the next verdict. `open` is the share of tiles that are open.
+    pub(crate) fn next(self, samples: u64, expected: Option<u64>, open: f64) -> u64 {
         let step = self.step();
         let on_grid = |n: u64| (n / step).max(samples / step + 1) * step;
         match self {
@@ -51,7 +53,10 @@ impl Schedule {
                 let missing = expected.map_or(0, |e| e.saturating_sub(samples)).min(samples.max(step));
                 on_grid(samples + (missing as f64 * Self::APPROACH) as u64)
             }
-            Self::Growing { .. } => on_grid(samples + samples / 2),
+            Self::Growing { .. } => {
+                let whole = (step as f64 / open.max(f64::MIN_POSITIVE)) as u64;
+                on_grid(samples + whole.min(samples).max(samples / 2))
+            }
         }
     }
 }
@@ -212,14 +217,18 @@ mod tests {
     #[test]
     fn every_step_is_every_step() {
         let schedule = Schedule::Every { step: 100 };
-        assert_eq!([0, 99, 100, 250].map(|n| schedule.next(n, Some(5000))), [100, 100, 200, 300]);
+        assert_eq!([0, 99, 100, 250].map(|n| schedule.next(n, Some(5000), 0.1)), [100, 100, 200, 300]);
     }
 
     #[test]
     fn growing_steps_grow() {
         let schedule = Schedule::Growing { step: 16 };
-        assert_eq!([0, 16, 32, 48, 64, 96].map(|n| schedule.next(n, Some(5000))), [16, 32, 48, 64, 96, 144]);
-        assert_eq!(schedule.next(17, None), 32);
+        let next = |n: u64, open: f64| schedule.next(n, Some(5000), open);
+        assert_eq!([0, 16, 32, 48, 64, 96].map(|n| next(n, 1.0)), [16, 32, 48, 64, 96, 144]);
+        assert_eq!(next(17, 1.0), 32);
+        // With a quarter of the tiles open 64 more, but no more than the tile has
+        assert_eq!([0, 16, 48, 64, 96, 128, 160].map(|n| next(n, 0.25)), [16, 32, 96, 128, 160, 192, 240]);
+        assert_eq!(next(160, 0.0), 320);
     }
 
     #[test]
@@ -237,7 +246,7 @@ mod tests {
     proptest! {
         #[test]
         fn spacing_moves_on_but_never_more_than_doubles(n in 0u64..20_000, e in prop::option::of(0u64..50_000), step in 2u64..500) {
-            let next = Schedule::Spaced { step }.next(n, e);
+            let next = Schedule::Spaced { step }.next(n, e, 0.5);
             prop_assert!(next > n && next.is_multiple_of(step));
             prop_assert!(next <= n + n.max(step) + step);
             if let Some(e) = e.filter(|&e| e > n + step) {

@@ -77,7 +77,7 @@ impl<C: StoppingCriterion> Session<C> {
         let grid = TileGrid::new(width, height, params.tile)?;
         criterion.begin(grid);
         let film = if criterion.needs().halves { Film::new(grid) } else { Film::without_halves(grid) };
-        let first = params.schedule.next(params.min_spp.saturating_sub(1), None).min(params.max_spp);
+        let first = params.schedule.next(params.min_spp.saturating_sub(1), None, 1.0).min(params.max_spp);
         let tile = TileState { next: first, streak: 0, verdict: None, target: None, stop: None };
         let tiles = vec![tile; grid.len()];
         // Only an exposure by log-average depends on the picture, and has to wait for one
@@ -204,8 +204,9 @@ impl<C: StoppingCriterion> Session<C> {
             let reference = self.displayed_reference.as_deref();
             let view = View { film: &self.film, display, viewing: self.params.viewing, reference };
             let verdicts = self.criterion.judge(&view, &judged)?;
+            let open = self.open_tiles() as f64 / self.tiles.len() as f64;
             for (tile, verdict) in judged.into_iter().zip(verdicts) {
-                stops.extend(self.take(tile.index, verdict));
+                stops.extend(self.take(tile.index, verdict, open));
             }
         }
         Ok(stops)
@@ -236,8 +237,9 @@ impl<C: StoppingCriterion> Session<C> {
         true
     }
 
-    /// Files one verdict; returns the stop if the tile is done by it.
-    fn take(&mut self, index: usize, verdict: Verdict) -> Option<Stop> {
+    /// Files one verdict, with the share of tiles that were open before; returns the stop if the tile is done by
+    /// it.
+    fn take(&mut self, index: usize, verdict: Verdict, open: f64) -> Option<Stop> {
         let samples = self.film.spp(index);
         let Params { schedule, consecutive, max_spp, .. } = self.params;
         let audience = self.audience();
@@ -257,7 +259,7 @@ impl<C: StoppingCriterion> Session<C> {
         if samples >= max_spp {
             return Some(self.stop(index, StopReason::MaxSpp));
         }
-        state.next = schedule.next(samples, verdict.expected_spp).min(max_spp);
+        state.next = schedule.next(samples, verdict.expected_spp, open).min(max_spp);
         None
     }
 

@@ -1,6 +1,7 @@
 //! `noisefloor compare`.
 
 use super::oracle::OracleArgs;
+use super::render::DenoiserChoice;
 use super::renderer::RendererArgs;
 use super::tone::ToneArgs;
 use super::viewing::ViewingArgs;
@@ -18,6 +19,7 @@ use std::path::PathBuf;
 /// `vdp-first`, each with a constant of its own (`cycles:0.02`) or with a default: Blender's 0.01 for
 /// `cycles`, and for the others the one that agrees with people on average. `cvvdp:JODS` stops a tile that
 /// has lost at most so many JODs against the converged picture: a yardstick that no render has.
+/// `denoised:JODS` stops a tile as `render --denoise --lost JODS` does.
 ///
 /// Writes into the output folder: index.html with everything (one file that opens without a server),
 /// runs.csv, runs.json, and for each scene curve.csv, tiles.csv, plots (SVG and PNG), crops with error
@@ -28,7 +30,8 @@ use std::path::PathBuf;
   noisefloor compare cornell-box glass-spheres --size 256x256 --tile 64
   noisefloor compare hall/scene.xml --reference hall.exr --criteria oracle,cycles:0.01,dammertz
   noisefloor compare cornell-box --criteria oracle,cycles,dammertz --sweep 6    the rivals at six more constants each
-  noisefloor compare hall/scene.xml --source mitsuba --max-spp 1000")]
+  noisefloor compare hall/scene.xml --source mitsuba --max-spp 1000
+  noisefloor compare cornell-box --denoise oidn --criteria spp:64,spp:256,cycles,oracle,denoised:0.3")]
 pub struct CompareArgs {
     /// Scenes, as for `render`.
     #[arg(required = true, value_name = "SCENE")]
@@ -49,6 +52,11 @@ pub struct CompareArgs {
     /// Also run each criterion that is given without a constant at N other constants, from strict to lax.
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=50))]
     sweep: u32,
+    /// Also look at every picture as this denoiser leaves it, without albedo and normals: `oidn`. How good its worst
+    /// tile then is, and the seconds, come into runs.csv, curve.csv and the page. Needed by the criterion
+    /// `denoised:JODS`.
+    #[arg(long, value_enum)]
+    denoise: Option<DenoiserChoice>,
     #[command(flatten)]
     oracle: OracleArgs,
     #[command(flatten)]
@@ -85,11 +93,20 @@ pub struct CompareArgs {
 #[cfg(feature = "lab")]
 mod check {
     use super::CompareArgs;
-    use crate::compare::{CompareJob, Named};
+    use crate::args::values;
+    use crate::compare::{CompareJob, DENOISED, Named};
     use crate::folder::Earlier;
-    use anyhow::{Context, bail};
-    use noisefloor::{Oracle, Params, Schedule};
+    #[cfg(not(feature = "adapters"))]
+    use crate::left_out::left_out;
+    use anyhow::{Context, anyhow, bail};
+    use noisefloor::{Oracle, Params, Schedule, StoppingCriterion};
+    #[cfg(feature = "adapters")]
+    use noisefloor_denoise::Oidn;
+    use noisefloor_denoise::{DenoisedQuality, Denoiser};
     use noisefloor_rivals::RIVALS;
+    #[cfg(feature = "adapters")]
+    use noisefloor_sidecar::FilterPlan;
+    use std::sync::{Arc, Mutex};
 
     impl CompareArgs {
         /// A comparison that can begin.
@@ -101,15 +118,20 @@ mod check {
             let oracle = self.oracle.check()?;
             let params = self.params(&oracle)?;
             let specs = self.specs();
+            let denoiser = self.denoise.map(|_| shared_denoiser()).transpose()?;
+            let denoised = denoiser.clone();
             for spec in &specs {
-                criterion(spec, &oracle)?;
+                criterion(spec, &oracle, denoised.as_ref())?;
             }
             let source = self.renderer.check(None)?;
             Ok(CompareJob {
                 scenes: self.scenes,
                 source,
                 out: self.out,
-                criteria: Box::new(move || specs.iter().map(|spec| criterion(spec, &oracle)).collect()),
+                criteria: Box::new(move || {
+                    specs.iter().map(|spec| criterion(spec, &oracle, denoised.as_ref())).collect()
+                }),
+                denoiser: denoiser.map(|denoiser| Box::new(denoiser) as Box<dyn Denoiser>),
                 params,
                 batch: self.batch,
                 reference: self.reference,
@@ -127,6 +149,7 @@ mod check {
                 tone_mapping: self.tone.check()?,
                 viewing: self.viewing.of(oracle),
                 schedule: Schedule::Every { step: self.batch },
+                min_spp: Params::default().min_spp.min(self.batch),
                 max_spp: self.max_spp,
                 ..Params::default()
             };
@@ -154,10 +177,28 @@ mod check {
         }
     }
 
+    /// Open Image Denoise, for criteria and for whoever looks at their pictures.
+    type Shared = Arc<Mutex<Box<dyn Denoiser + Send>>>;
+
+    #[cfg(feature = "adapters")]
+    fn shared_denoiser() -> anyhow::Result<Shared> {
+        Ok(Arc::new(Mutex::new(Box::new(Oidn::start(FilterPlan::default())?))))
+    }
+
+    #[cfg(not(feature = "adapters"))]
+    fn shared_denoiser() -> anyhow::Result<Shared> {
+        left_out("compare --denoise", "lab,adapters", "compare --denoise …")
+    }
+
     /// The criterion of a specification.
-    fn criterion(spec: &str, oracle: &Oracle) -> anyhow::Result<Named> {
-        let criterion = match spec {
-            "oracle" => Box::new(oracle.clone()),
+    fn criterion(spec: &str, oracle: &Oracle, denoiser: Option<&Shared>) -> anyhow::Result<Named> {
+        let criterion: Box<dyn StoppingCriterion + Send> = match (spec, spec.strip_prefix(DENOISED)) {
+            ("oracle", _) => Box::new(oracle.clone()),
+            (_, Some(lost)) => {
+                let lost = values::jods(lost).map_err(|error| anyhow!("{spec}: {error}"))?;
+                let Some(denoiser) = denoiser else { bail!("{spec} needs --denoise oidn") };
+                Box::new(DenoisedQuality::new(Arc::clone(denoiser), lost))
+            }
             _ => noisefloor_rivals::parse(spec)?,
         };
         Ok((spec.to_owned(), criterion))

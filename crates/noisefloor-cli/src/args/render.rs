@@ -23,7 +23,8 @@ use std::time::Duration;
 ///
 /// With --denoise, each tile stops when nobody would see a difference between the denoised picture and the
 /// converged one. Nobody has been asked about denoised tiles: the limit is the vision model's.
-/// image-denoised.exr, image-denoised.png and denoised-error.png are written as well.
+/// image-denoised.exr, image-denoised.png and denoised-error.png are written as well; and albedo.exr and
+/// normal.exr, which help the denoiser, if the renderer has them (ptwne, mitsuba and cycles do).
 ///
 /// Ctrl-C stops all tiles and writes what there is (exit code 130). An interrupted or killed render
 /// continues with --resume.
@@ -76,8 +77,8 @@ pub struct RenderArgs {
     /// Tile edge in pixels, 16…512.
     #[arg(long, default_value_t = DEFAULT_TILE, value_name = "PIXELS")]
     tile: usize,
-    /// Samples per pixel between two verdicts on a tile [default: 100; with --denoise 16, and then half as
-    /// many more each time].
+    /// Samples per pixel between two verdicts on a tile [default: 100; with --denoise 48, or 16 of other renderers,
+    /// and then half as many more each time, or more where few tiles are open].
     #[arg(long, value_name = "SPP")]
     batch: Option<u64>,
     /// When tiles are judged: after `every` batch, or `spaced` by the samples that a tile is expected to
@@ -161,7 +162,7 @@ const DRAFT: Audience = Audience { slope: 0.25, offset: 0.0 };
 const DRAFT_LOST: f64 = 0.3;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum DenoiserChoice {
+pub enum DenoiserChoice {
     /// Open Image Denoise, on the CPU.
     Oidn,
 }
@@ -253,7 +254,12 @@ impl RenderArgs {
     }
 
     fn params(&self) -> anyhow::Result<Params> {
-        let step = self.batch.unwrap_or(if self.denoise.is_some() { 16 } else { 100 });
+        let step = self.batch.unwrap_or(match self.denoise {
+            None => 100,
+            // What two denoisings cost is worth more samples of the built-in renderer than of slower ones
+            Some(_) if self.renderer.is_built_in() => 48,
+            Some(_) => 16,
+        });
         let schedule = match self.schedule {
             _ if self.denoise.is_some() => Schedule::Growing { step },
             ScheduleChoice::Every => Schedule::Every { step },

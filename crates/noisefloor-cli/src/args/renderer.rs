@@ -150,10 +150,15 @@ impl RendererArgs {
         })
     }
 
+    /// Whether our own path tracer renders.
+    pub fn is_built_in(&self) -> bool {
+        matches!(self.source, SourceKind::Ptwne(_))
+    }
+
     /// Refuses options that the source would ignore.
     fn check_options(&self) -> anyhow::Result<()> {
         let name = self.source.name();
-        let ptwne = matches!(self.source, SourceKind::Ptwne(_));
+        let ptwne = self.is_built_in();
         let given = [
             ("--no-mis", self.no_mis && !ptwne),
             ("--sampler", self.sampler.is_some() && !ptwne),

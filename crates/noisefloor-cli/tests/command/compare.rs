@@ -1,4 +1,10 @@
 use crate::kit::{column, fail, json, succeed, text};
+#[cfg(feature = "adapters")]
+use noisefloor_denoise::OIDN;
+#[cfg(feature = "adapters")]
+use noisefloor_sidecar::find;
+#[cfg(feature = "adapters")]
+use noisefloor_testkit::{Requirement, require};
 use tempfile::tempdir;
 
 fn small<'a>(out: &'a str, more: &[&'a str]) -> Vec<&'a str> {
@@ -107,4 +113,37 @@ fn what_is_wrong_is_said_before_anything_is_rendered() {
     fail(&small(out, &["glass-spheres", "--reference", "a.exr"]), &["--reference", "2"]);
     fail(&small(out, &["--reference", "nowhere.exr"]), &["nowhere.exr"]);
     assert!(!folder.path().join("cornell-box/reference.exr").exists());
+}
+
+/// With a denoiser, every picture is looked at denoised, too, and there is a criterion on denoised halves.
+#[test]
+#[cfg(feature = "adapters")]
+fn pictures_are_compared_denoised_too() {
+    let folder = tempdir().unwrap();
+    let out = text(folder.path());
+    fail(&small(out, &["--criteria", "denoised:0.3"]), &["denoised:0.3 needs --denoise oidn"]);
+    if require(Requirement::Renderers, find(&OIDN)).is_none() {
+        return;
+    }
+    fail(&small(out, &["--denoise", "oidn", "--criteria", "denoised:-1"]), &["denoised:-1"]);
+    let job =
+        ["compare", "cornell-box", "--size", "64x64", "--tile", "32", "--max-spp", "200", "--batch", "20"];
+    let more =
+        ["--reference-spp", "1500", "--denoise", "oidn", "--criteria", "spp:20,denoised:1", "--out", out];
+    let said = succeed(&[&job[..], &more].concat());
+    assert!(said.lines().filter(|line| line.contains("denoised: JOD")).count() == 2, "{said}");
+    let numbers = |file: &str, name: &str| -> Vec<f64> {
+        column(&folder.path().join(file), name).iter().map(|n| n.parse().unwrap()).collect()
+    };
+    let runs = |name: &str| numbers("runs.csv", name);
+    let (noisy, denoised) = (runs("cvvdp_jod_worst"), runs("denoised_jod_worst"));
+    assert!(denoised[0] > noisy[0] + 0.2, "{denoised:?} after {noisy:?}");
+    assert!(runs("denoised_seconds").iter().zip(runs("source_seconds")).all(|(all, source)| *all > source));
+    let curve = |name: &str| numbers("cornell-box/curve.csv", name);
+    let at = curve("spp").iter().position(|&spp| spp == 20.0).unwrap();
+    // A film with halves rounds otherwise than one without
+    let on_curve = curve("denoised_jod_worst")[at];
+    assert!((on_curve - denoised[0]).abs() < 1e-3, "spp:20 lies on the curve: {on_curve}, {denoised:?}");
+    let page = std::fs::read_to_string(folder.path().join("index.html")).unwrap();
+    assert!(page.contains("Nobody has been asked about denoised pictures"));
 }

@@ -1,8 +1,11 @@
-use crate::kit::{FILES, column, fail, json, random, run, stderr, succeed, text, tiny};
+use crate::kit::{FILES, column, command, fail, json, random, run, stderr, succeed, text, tiny};
 use noisefloor_denoise::OIDN;
 use noisefloor_image::{RenderLayers, read_exr, write_exr};
 use noisefloor_sidecar::find;
 use noisefloor_testkit::{Requirement, require};
+use std::path::Path;
+use std::process::Stdio;
+use std::time::Duration;
 use tempfile::tempdir;
 
 #[test]
@@ -23,9 +26,9 @@ fn options_that_have_no_say_are_refused() {
 #[test]
 fn without_the_denoiser_it_says_how_to_install_it() {
     let folder = tempdir().unwrap();
-    let mut command = crate::kit::command(&tiny(text(folder.path()), &["--denoise", "oidn"]));
-    command.env("XDG_CACHE_HOME", folder.path()).env_remove(OIDN.variable());
-    let output = command.output().unwrap();
+    let mut typed = command(&tiny(text(folder.path()), &["--denoise", "oidn"]));
+    typed.env("XDG_CACHE_HOME", folder.path()).env_remove(OIDN.variable());
+    let output = typed.output().unwrap();
     assert_eq!(output.status.code(), Some(1));
     let said = stderr(&output);
     assert!(said.contains("doctor --install oidn") && said.lines().count() == 1, "{said}");
@@ -54,7 +57,7 @@ fn the_denoised_picture_and_its_error_are_written() {
     // It is nearer to a converged picture than what it was made from
     let many = ["render", "--size", "64x64", "--criterion", "spp:600", "--seed", "5", "--quiet", "--out"];
     succeed(&many.into_iter().chain([text(&noisy)]).collect::<Vec<_>>());
-    let read = |path: &std::path::Path, name: &str| read_exr(path.join(name)).unwrap().pixels;
+    let read = |path: &Path, name: &str| read_exr(path.join(name)).unwrap().pixels;
     let truth = read(&noisy, "image.exr");
     let error = |name: &str| -> f32 {
         let squares =
@@ -66,6 +69,45 @@ fn the_denoised_picture_and_its_error_are_written() {
 
     let said = run(&["doctor"]);
     assert!(String::from_utf8(said.stdout).unwrap().lines().any(|line| line.starts_with("oidn ")));
+}
+
+/// Killed at random moments and resumed, a render ends as an undisturbed one does, and knows what was found of
+/// tiles that had stopped before.
+#[test]
+fn killed_denoised_renders_lose_nothing() {
+    if require(Requirement::Renderers, find(&OIDN)).is_none() {
+        return;
+    }
+    let [whole, killed] = [tempdir().unwrap(), tempdir().unwrap()];
+    let arguments = |out: &Path, more: &[&str]| -> Vec<String> {
+        let args = ["render", "--size", "64x64", "--tile", "32", "--denoise", "oidn", "--lost", "0.02"];
+        let rest = ["--max-spp", "700", "--threads", "1", "--quiet", "--autosave", "0.1", "--out", text(out)];
+        args.iter().chain(&rest).chain(more).map(|word| (*word).to_owned()).collect()
+    };
+    let words = arguments(whole.path(), &[]);
+    succeed(&words.iter().map(String::as_str).collect::<Vec<_>>());
+    let resume = arguments(killed.path(), &["--resume"]);
+    let resume: Vec<&str> = resume.iter().map(String::as_str).collect();
+    for wait in [0, 150, 400] {
+        let mut child = command(&resume).stderr(Stdio::null()).spawn().unwrap();
+        let saved = killed.path().join("checkpoint.nfc");
+        while !saved.exists() && child.try_wait().unwrap().is_none() {
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        std::thread::sleep(Duration::from_millis(wait));
+        child.kill().unwrap();
+        child.wait().unwrap();
+    }
+    succeed(&resume);
+    for name in ["image.exr", "image-denoised.exr"] {
+        let pixels = |out: &Path| read_exr(out.join(name)).unwrap().pixels;
+        assert!(pixels(killed.path()) == pixels(whole.path()), "{name}");
+    }
+    let report = |out: &Path| json(&out.join("report.json"))["denoised"].clone();
+    let (right, found) = (report(whole.path()), report(killed.path()));
+    for key in ["verdicts", "jods_lost", "spp_without", "guided"] {
+        assert_eq!(found[key], right[key], "{key}");
+    }
 }
 
 #[test]
@@ -97,7 +139,7 @@ fn denoised_pictures_made_elsewhere() {
     let map = path("map.png");
     let clean = say(&["--independent", "--denoised", &good, &good2, "--noise-map", &map]);
     assert!(clean.contains("4 of 4 denoised tiles") && clean.contains("nobody has been asked"), "{clean}");
-    assert!(std::path::Path::new(&map).exists());
+    assert!(Path::new(&map).exists());
     let json = say(&["--independent", "--json", "--denoised", &bad, &bad]);
     let report: serde_json::Value = serde_json::from_str(&json).unwrap();
     assert_eq!(report["converged_tiles"].as_u64(), Some(0), "{json}");

@@ -23,11 +23,13 @@ struct CurveRow<'a> {
     butteraugli_worst: f64,
     cvvdp_jod: f64,
     cvvdp_jod_worst: f64,
+    denoised_jod_worst: Option<f64>,
+    denoised_seconds: Option<f64>,
 }
 
 impl<'a> CurveRow<'a> {
     fn new(scene: &'a str, point: &CurvePoint) -> Self {
-        let CurvePoint { spp, source_seconds, quality } = *point;
+        let CurvePoint { spp, source_seconds, quality, denoised_jod_worst, denoised_seconds } = *point;
         Self {
             scene,
             spp,
@@ -40,6 +42,8 @@ impl<'a> CurveRow<'a> {
             butteraugli_worst: quality.butteraugli_worst,
             cvvdp_jod: quality.cvvdp_jod,
             cvvdp_jod_worst: quality.cvvdp_jod_worst,
+            denoised_jod_worst,
+            denoised_seconds,
         }
     }
 }

@@ -5,6 +5,7 @@
 //! set beside uniform sampling.
 
 mod costs;
+mod denoising;
 mod files;
 mod kept;
 mod outcome;
@@ -14,6 +15,7 @@ mod plots;
 mod quality;
 mod race;
 
+pub use denoising::{AfterDenoising, DENOISED_LIMIT};
 pub use files::{write_page, write_scene};
 pub use kept::{Converged, ReferenceJob, render_reference};
 pub use outcome::{Comparison, CriterionRun, CurvePoint, Labels, TileStop};
@@ -26,6 +28,7 @@ pub use race::Entrant;
 use crate::advance::Watch;
 use crate::error::LabError;
 use noisefloor::{Params, ProgressiveSource, Rgb};
+use noisefloor_denoise::Denoiser;
 use noisefloor_vision::VisionModel;
 use race::Course;
 use std::sync::atomic::AtomicBool;
@@ -44,15 +47,17 @@ pub struct Setting<'a> {
 }
 
 /// Lets the entrants watch one run of the source, and says what each took and left. Setting `cancel` ends
-/// the run after the batch that is under way.
+/// the run after the batch that is under way. With a `denoiser`, every picture is also looked at denoised, without
+/// albedo and normals.
 ///
 /// # Errors
-/// [`LabError`] if the source fails or gives no samples, or a criterion fails.
+/// [`LabError`] if the source fails or gives no samples, or a criterion or the denoiser fails.
 pub fn run(
     source: &mut dyn ProgressiveSource,
     entrants: Vec<Entrant>,
     setting: Setting<'_>,
     labels: Labels,
+    mut denoiser: Option<&mut dyn Denoiser>,
     cancel: &AtomicBool,
     watch: Watch<'_>,
 ) -> Result<(Comparison, Pictures), LabError> {
@@ -66,10 +71,16 @@ pub fn run(
         cancel,
         watch,
     };
-    let (race, yardstick) = course.run(source, entrants)?;
+    let (race, yardstick) = course.run(source, entrants, &mut denoiser)?;
     let seen = race.entrants.iter().map(|entrant| pictures::Seen::new(entrant, &yardstick));
     let seen: Vec<pictures::Seen<'_>> = seen.collect::<Result<_, _>>()?;
     let flips: Vec<Vec<f64>> = seen.iter().map(|seen| yardstick.flip_of_tiles(&seen.errors)).collect();
-    let comparison = Comparison::new(labels, name, &race, &yardstick, &flips)?;
+    let mut comparison = Comparison::new(labels, name, &race, &yardstick, &flips)?;
+    if let Some(denoiser) = denoiser {
+        for (run, entrant) in comparison.runs.iter_mut().zip(&race.entrants) {
+            let after = AfterDenoising::of(&entrant.film().image(), denoiser, &yardstick)?;
+            run.set_denoised(after);
+        }
+    }
     Ok((comparison, Pictures::new(&seen, &yardstick)))
 }

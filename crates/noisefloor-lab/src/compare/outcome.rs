@@ -1,7 +1,8 @@
 //! What came of a comparison, as data.
 
+use super::denoising::{AfterDenoising, DENOISED_LIMIT};
 use super::quality::{Quality, Yardstick};
-use super::race::{Entrant, Race};
+use super::race::{Entrant, Race, UniformPoint};
 use crate::error::LabError;
 use serde::Serialize;
 
@@ -53,6 +54,21 @@ pub struct CriterionRun {
     pub uniform_over_this_butteraugli: Option<f64>,
     /// The same by ColorVideoVDP.
     pub uniform_over_this_cvvdp: Option<f64>,
+    /// JOD of the denoised picture. `None`, as those that follow, where nothing is denoised.
+    pub denoised_jod: Option<f64>,
+    /// JOD of its worst tile.
+    pub denoised_jod_worst: Option<f64>,
+    /// Seconds in the source, the criterion and the denoiser, which denoises the final picture once. The denoisings
+    /// of a criterion are among the seconds of the criterion.
+    pub denoised_seconds: Option<f64>,
+}
+
+impl CriterionRun {
+    pub(super) fn set_denoised(&mut self, after: AfterDenoising) {
+        self.denoised_jod = Some(after.jod);
+        self.denoised_jod_worst = Some(after.jod_worst);
+        self.denoised_seconds = Some(self.source_seconds + self.criterion_seconds + after.seconds);
+    }
 }
 
 /// Uniform sampling with that many samples: a line of curve.csv.
@@ -64,6 +80,10 @@ pub struct CurvePoint {
     pub source_seconds: f64,
     /// How far the picture is from the converged one.
     pub quality: Quality,
+    /// JOD of the worst tile of the denoised picture, where it is denoised.
+    pub denoised_jod_worst: Option<f64>,
+    /// Seconds in the source and the denoiser, which denoises once.
+    pub denoised_seconds: Option<f64>,
 }
 
 /// Where a criterion stopped a tile, and how that tile looks: a line of tiles.csv.
@@ -128,10 +148,15 @@ impl Comparison {
         let grid = yardstick.grid();
         let run = |entrant: &Entrant| criterion_run(entrant, race, yardstick, &scene, &source);
         let runs = race.entrants.iter().map(run).collect::<Result<_, _>>()?;
-        let point = |&(spp, quality): &(u64, Quality)| CurvePoint {
-            spp,
-            source_seconds: race.uniform_seconds(spp as f64),
-            quality,
+        let point = |&UniformPoint { spp, quality, denoised }: &UniformPoint| {
+            let source_seconds = race.uniform_seconds(spp as f64);
+            CurvePoint {
+                spp,
+                source_seconds,
+                quality,
+                denoised_jod_worst: denoised.map(|after| after.jod_worst),
+                denoised_seconds: denoised.map(|after| source_seconds + after.seconds),
+            }
         };
         let mut tiles = Vec::new();
         for (entrant, flips) in race.entrants.iter().zip(flips) {
@@ -155,6 +180,17 @@ impl Comparison {
             tiles,
             scene: scene.clone(),
         })
+    }
+}
+
+impl Comparison {
+    /// Samples per pixel at which uniform sampling is within [`DENOISED_LIMIT`] once it is denoised; `None`
+    /// outside its curve, and where nothing is denoised.
+    pub fn uniform_denoised(&self) -> Option<f64> {
+        let points = self.curve.iter().map(|p| Some((p.spp as f64, 10.0 - p.denoised_jod_worst?)));
+        let points: Vec<(f64, f64)> = points.collect::<Option<_>>()?;
+        let (first, lost) = *points.first()?;
+        if lost <= DENOISED_LIMIT { Some(first) } else { crossing(&points, DENOISED_LIMIT) }
     }
 }
 
@@ -194,6 +230,9 @@ fn criterion_run(
         uniform_over_this: over(|q| q.flip_worst),
         uniform_over_this_butteraugli: over(|q| q.butteraugli_worst),
         uniform_over_this_cvvdp: over(|q| 10.0 - q.cvvdp_jod_worst),
+        denoised_jod: None,
+        denoised_jod_worst: None,
+        denoised_seconds: None,
     })
 }
 
@@ -201,7 +240,7 @@ fn criterion_run(
 /// line in logarithms; `None` outside the curve.
 fn uniform_samples(race: &Race, error: fn(&Quality) -> f64, wanted: f64) -> Option<f64> {
     let points: Vec<(f64, f64)> =
-        race.curve.iter().map(|(spp, quality)| (*spp as f64, error(quality))).collect();
+        race.curve.iter().map(|point| (point.spp as f64, error(&point.quality))).collect();
     crossing(&points, wanted)
 }
 

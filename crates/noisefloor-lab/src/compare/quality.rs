@@ -109,7 +109,7 @@ impl Yardstick {
     }
 
     /// JODs of a display-encoded picture, and of each tile.
-    fn jods(&self, shown: &[Rgb]) -> Result<(f64, Vec<f64>), LabError> {
+    pub(super) fn jods(&self, shown: &[Rgb]) -> Result<(f64, Vec<f64>), LabError> {
         let (vision, size) = (&self.eye.vision, (self.grid.width(), self.grid.height()));
         let tiles: Vec<Tile> = self.grid.tiles().collect();
         let jods = metrics::cvvdp_of_tiles(&self.shown, shown, self.grid, &tiles, vision)?;

@@ -1,6 +1,7 @@
 //! One run that all criteria watch: each sees the same samples, and takes those of a tile until it stops it.
 
 use super::costs::Costs;
+use super::denoising::AfterDenoising;
 use super::quality::{Eye, Quality, Yardstick};
 use crate::advance::{Advance, Watch};
 use crate::error::LabError;
@@ -8,6 +9,7 @@ use noisefloor::{
     Batch, Film, Params, ProgressiveSource, Reference, Request, Rgb, Session, StopReason, StoppingCriterion,
     Tile, TileGrid,
 };
+use noisefloor_denoise::Denoiser;
 use noisefloor_vision::VisionModel;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
@@ -59,7 +61,7 @@ impl Entrant {
 pub(super) struct Race {
     pub(super) entrants: Vec<Entrant>,
     /// Uniform sampling: samples per pixel, and how far the picture then is from the converged one.
-    pub(super) curve: Vec<(u64, Quality)>,
+    pub(super) curve: Vec<UniformPoint>,
     /// Seconds that one more sample of each pixel of a tile costs, tile by tile.
     pub(super) tile_seconds: Vec<f64>,
     /// Whether somebody cancelled it.
@@ -75,6 +77,29 @@ impl Race {
     /// Seconds in the source for so many samples of every pixel.
     pub(super) fn uniform_seconds(&self, spp: f64) -> f64 {
         self.tile_seconds.iter().sum::<f64>() * spp
+    }
+}
+
+/// Uniform sampling, somewhere along its way.
+pub(super) struct UniformPoint {
+    pub(super) spp: u64,
+    pub(super) quality: Quality,
+    /// With a denoiser only.
+    pub(super) denoised: Option<AfterDenoising>,
+}
+
+impl UniformPoint {
+    fn new(
+        film: &Film,
+        yardstick: &Yardstick,
+        denoiser: &mut Option<&mut dyn Denoiser>,
+    ) -> Result<Self, LabError> {
+        let image = film.image();
+        let denoised = match denoiser {
+            Some(denoiser) => Some(AfterDenoising::of(&image, *denoiser, yardstick)?),
+            None => None,
+        };
+        Ok(Self { spp: film.spp(0), quality: yardstick.quality(&image)?, denoised })
     }
 }
 
@@ -107,13 +132,14 @@ impl Course<'_> {
         &self,
         source: &mut dyn ProgressiveSource,
         entrants: Vec<Entrant>,
+        denoiser: &mut Option<&mut dyn Denoiser>,
     ) -> Result<(Race, Yardstick), LabError> {
         let info = source.info();
         let grid = TileGrid::new(info.width, info.height, self.params.tile)?;
         let mut field = Field { entrants, film: Film::without_halves(grid), costs: Costs::new(grid.len()) };
         field.show_converged(self.truth)?;
         let mut yardstick: Option<Yardstick> = None;
-        let mut curve: Vec<(u64, Quality)> = Vec::new();
+        let mut curve: Vec<UniformPoint> = Vec::new();
         let (mut done, mut cancelled) = (0u64, false);
         while done < self.params.max_spp && field.open() > 0 {
             cancelled = self.cancel.load(Ordering::Relaxed);
@@ -125,9 +151,9 @@ impl Course<'_> {
             done = field.film.spp(0);
             let yardstick = yardstick.get_or_insert_with(|| self.settle(&mut field));
             field.judge()?;
-            let last = curve.last().map_or(0.0, |&(spp, _)| spp as f64);
+            let last = curve.last().map_or(0.0, |point| point.spp as f64);
             if done as f64 >= SPACING * last {
-                curve.push((done, yardstick.quality(&field.film.image())?));
+                curve.push(UniformPoint::new(&field.film, yardstick, denoiser)?);
             }
             let detail = format!("{} criteria not satisfied yet", field.open());
             let (what, of) = ("samples per pixel", self.params.max_spp);
@@ -138,8 +164,8 @@ impl Course<'_> {
             entrant.session.close_all(if cancelled { StopReason::Cancelled } else { StopReason::MaxSpp });
         }
         let yardstick = yardstick.ok_or(LabError::NoSamples)?;
-        if curve.last().is_none_or(|&(spp, _)| spp < done) {
-            curve.push((done, yardstick.quality(&film.image())?));
+        if curve.last().is_none_or(|point| point.spp < done) {
+            curve.push(UniformPoint::new(&film, &yardstick, denoiser)?);
         }
         let tile_seconds = costs.tile_seconds(&grid.tiles().collect::<Vec<_>>());
         Ok((Race { entrants, curve, tile_seconds, cancelled }, yardstick))
