@@ -52,9 +52,9 @@ pub struct CompareArgs {
     /// Also run each criterion that is given without a constant at N other constants, from strict to lax.
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=50))]
     sweep: u32,
-    /// Also look at every picture as this denoiser leaves it, without albedo and normals: `oidn`. How good its worst
-    /// tile then is, and the seconds, come into runs.csv, curve.csv and the page. Needed by the criterion
-    /// `denoised:JODS`.
+    /// Also look at every picture as this denoiser leaves it, without albedo and normals: `oidn`. How good its
+    /// worst tile then is, and the seconds, come into runs.csv, curve.csv and the page. Needed by the
+    /// criterion `denoised:JODS`.
     #[arg(long, value_enum)]
     denoise: Option<DenoiserChoice>,
     #[command(flatten)]

@@ -77,8 +77,8 @@ pub struct RenderArgs {
     /// Tile edge in pixels, 16…512.
     #[arg(long, default_value_t = DEFAULT_TILE, value_name = "PIXELS")]
     tile: usize,
-    /// Samples per pixel between two verdicts on a tile [default: 100; with --denoise 48, or 16 of other renderers,
-    /// and then half as many more each time, or more where few tiles are open].
+    /// Samples per pixel between two verdicts on a tile [default: 100; with --denoise 48, or 16 of other
+    /// renderers, and then half as many more each time, or more where few tiles are open].
     #[arg(long, value_name = "SPP")]
     batch: Option<u64>,
     /// When tiles are judged: after `every` batch, or `spaced` by the samples that a tile is expected to

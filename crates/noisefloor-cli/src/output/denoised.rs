@@ -118,12 +118,10 @@ impl Output {
         let shown = Canvas::of_picture(width, &encoded);
         shown.save(self.path("image-denoised.png"))?;
         match map {
-        if let Some(guide) = self.denoised.as_ref().and_then(|denoised| denoised.guide.as_ref()) {
-            write_exr(self.path("albedo.exr"), &RenderLayers::rgb(width, height, &guide.albedo))?;
-            write_exr(self.path("normal.exr"), &RenderLayers::rgb(width, height, &guide.normal))?;
-        }
-        let shown = Canvas::of_picture(width, &encoded);
-        shown.save(self.path("image-denoised.png"))?;
+            Some(map) => draw_field(&shown, &map, &ERROR_SCALE).save(self.path("denoised-error.png"))?,
+            None => note!(
+                "note: no tile was judged in this run, so the error of the denoised picture is not known"
+            ),
         }
         Ok(())
     }

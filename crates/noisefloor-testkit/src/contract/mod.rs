@@ -51,7 +51,8 @@ const MOST_OF_A_RENDERER: usize = 8;
 /// - **The reference**, if there is one, has the image's size and is finite, and rendering it changes no
 ///   sample. Whether it is free of noise takes two seeds to tell: see [`check_reference_is_free_of_noise`].
 /// - **First hits**, if there are any, have the image's size, albedo in [0, 1] and normals no longer than 1.
-///   Those of different indices are independent, or have no noise at all, and rendering them changes no sample.
+///   Those of different indices are independent, or have no noise at all, and rendering them changes no
+///   sample.
 /// - **The end.** At its end a source gives empty batches, however often it is asked.
 ///
 /// A playback is asked for neither parts of a batch nor single tiles at other depths.
@@ -64,9 +65,9 @@ const MOST_OF_A_RENDERER: usize = 8;
 /// size, which is symmetric around 0, and so is the difference y of two others. Given all |xy|, only their
 /// signs are left to chance, and those are independent from pixel to pixel. Then z = Σxy/√Σ(xy)² exceeds 6
 /// with p ≤ 2·exp(−6²/2) = 3.1e-8, whatever the distribution (Hoeffding 1963). There are four such z, and
-/// three more of first hits, where there are any: p < 2.2e-7 then. The batches of a playback differ in size; for them this holds as far as z is normal. Where work is counted in
-/// mutations, neighbouring pixels share a Markov chain, and the signs are those of whole tiles, in 64 batches
-/// instead of 4.
+/// three more of first hits, where there are any: p < 2.2e-7 then. The batches of a playback differ in size;
+/// for them this holds as far as z is normal. Where work is counted in mutations, neighbouring pixels share a
+/// Markov chain, and the signs are those of whole tiles, in 64 batches instead of 4.
 ///
 /// *Distribution:* p < 1e-7 a source. The mean of a batch over its pixels, and the mean square of its
 /// deviations (in units of each pixel's standard deviation over all batches), are compared by Welch's t

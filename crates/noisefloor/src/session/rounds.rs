@@ -56,7 +56,7 @@ impl<C: StoppingCriterion> Session<C> {
                 batches.push(batch);
             }
             let samples = counts[0] + counts[1];
-            let next = self.params.schedule.next(samples, None).min(self.params.max_spp);
+            let next = self.params.schedule.next(samples, None, 1.0).min(self.params.max_spp);
             if next > last || next <= samples {
                 return batches;
             }
@@ -69,7 +69,7 @@ impl<C: StoppingCriterion> Session<C> {
         let TileState { next, streak, verdict, target, .. } = self.tiles[tile];
         match (self.params.schedule, verdict.and_then(|v| v.expected_spp), target) {
             (Schedule::Every { step }, Some(expected), None) if streak == 0 => {
-                Schedule::Spaced { step }.next(self.film.spp(tile), Some(expected)).max(next)
+                Schedule::Spaced { step }.next(self.film.spp(tile), Some(expected), 1.0).max(next)
             }
             _ => target.unwrap_or(next),
         }
