@@ -14,6 +14,8 @@ mod doctor;
 mod evaluate;
 #[cfg(feature = "study")]
 mod explore;
+#[cfg(feature = "farm")]
+mod farm;
 mod files;
 mod folder;
 mod inspect;
@@ -67,6 +69,10 @@ fn run(command: Command) -> anyhow::Result<ExitCode> {
         Command::Inspect(args) => inspect::run(&args.check()?).map(done),
         Command::Scenes { command: None } => Ok(inspect::scenes().map(done)?),
         Command::Scenes { command: Some(ScenesCommand::Check(args)) } => scenes::check(args),
+        #[cfg(feature = "farm")]
+        Command::Farm(args) => farm::run(args),
+        #[cfg(feature = "farm")]
+        Command::Merge(args) => farm::merge(args),
         #[cfg(feature = "adapters")]
         Command::Doctor(args) => doctor::run(&args.check()),
         #[cfg(feature = "lab")]
@@ -96,6 +102,8 @@ fn done((): ()) -> ExitCode {
 #[cfg_attr(feature = "full", allow(dead_code, reason = "a full build leaves out nothing"))]
 fn left_out(command: &Command) -> LeftOut {
     let (what, feature, again) = match command {
+        Command::Farm(_) => ("farm", "farm", "farm …"),
+        Command::Merge(_) => ("merge", "farm", "merge …"),
         Command::Doctor(_) => ("doctor", "adapters", "doctor …"),
         Command::Compare(_) => ("compare", "lab", "compare …"),
         Command::Reproduce(_) => ("reproduce", "lab", "reproduce …"),
@@ -129,6 +137,8 @@ mod tests {
     #[test]
     fn what_is_left_out_says_what_to_type() {
         for (typed, feature) in [
+            ("farm status absent", "farm"),
+            ("merge absent.nfs --out out", "farm"),
             ("doctor", "adapters"),
             ("compare cornell-box", "lab"),
             ("reproduce --corpus absent", "lab"),

@@ -25,13 +25,15 @@ pub enum Requirement {
     Cmake,
     /// `browser`: Chromium, and what it takes to drive it.
     Browser,
+    /// `slurm`: the daemons of Slurm and Munge, and the right to start them.
+    Slurm,
     /// `shared`: data that are not part of the repository, such as what observers said.
     Shared,
 }
 
 impl Requirement {
-    const ALL: [Self; 6] =
-        [Self::Renderers, Self::Llvm, Self::Python, Self::Cmake, Self::Browser, Self::Shared];
+    const ALL: [Self; 7] =
+        [Self::Renderers, Self::Llvm, Self::Python, Self::Cmake, Self::Browser, Self::Slurm, Self::Shared];
 
     fn word(self) -> &'static str {
         match self {
@@ -40,6 +42,7 @@ impl Requirement {
             Self::Python => "python",
             Self::Cmake => "cmake",
             Self::Browser => "browser",
+            Self::Slurm => "slurm",
             Self::Shared => "shared",
         }
     }
@@ -68,8 +71,8 @@ impl Display for Requirement {
 /// # Panics
 /// If the environment variable `NOISEFLOOR_REQUIRE` names the requirement, and nothing was found: where
 /// everything has been set up, a test that cannot run has failed. The variable holds words with commas
-/// between them: `renderers`, `llvm`, `python`, `cmake`, `browser`, `shared`. Any other word is a panic, too,
-/// since a misspelt one would require nothing.
+/// between them: `renderers`, `llvm`, `python`, `cmake`, `browser`, `slurm`, `shared`. Any other word is a
+/// panic, too, since a misspelt one would require nothing.
 pub fn require<T>(requirement: Requirement, found: Result<T, impl Display>) -> Option<T> {
     let required = is_required(requirement, std::env::var_os(REQUIRED).as_deref());
     match found {
@@ -145,7 +148,7 @@ mod tests {
         assert_eq!(required(None), []);
         assert_eq!(required(Some("")), []);
         assert_eq!(required(Some("shared, python")), [Requirement::Python, Requirement::Shared]);
-        assert_eq!(required(Some("renderers,llvm,python,cmake,browser,shared")), Requirement::ALL);
+        assert_eq!(required(Some("renderers,llvm,python,cmake,browser,slurm,shared")), Requirement::ALL);
     }
 
     #[test]

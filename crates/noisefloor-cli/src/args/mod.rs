@@ -12,6 +12,7 @@ mod data;
 mod doctor;
 mod evaluate;
 mod explore;
+mod farm;
 mod inspect;
 mod judge;
 mod metrics;
@@ -33,6 +34,9 @@ pub use config::expand;
 pub use doctor::DoctorArgs;
 pub use evaluate::EvaluateArgs;
 pub use explore::ExploreArgs;
+pub use farm::{
+    DirArgs, FarmArgs, FarmCommand, MergeArgs, PlanArgs, RunArgs, StatusArgs, StepArgs, TaskArgs,
+};
 pub use inspect::InspectArgs;
 pub use judge::JudgeArgs;
 pub use metrics::MetricsArgs;
@@ -68,6 +72,8 @@ pub struct Cli {
 #[derive(Debug, Subcommand)]
 pub enum Command {
     Render(Box<RenderArgs>),
+    Farm(FarmArgs),
+    Merge(MergeArgs),
     Reference(ReferenceArgs),
     Compare(Box<CompareArgs>),
     Judge(JudgeArgs),

@@ -40,6 +40,7 @@ pub use frames::{FramePattern, SequenceJob, render_frames};
 pub use progress::reference_bar;
 pub use saving::Autosave;
 use saving::Pace;
+pub use snapshots::JOB;
 use snapshots::{Rendering, Snapshots};
 pub use tev::ADDRESS as TEV_ADDRESS;
 use tev::Tev;
@@ -135,7 +136,7 @@ fn guides(
 
 /// Where samples come from, for the picture's file; none for pictures that are played back. Paths and command
 /// lines go in as a digest: pictures travel further than they should.
-fn origin(job: &SourceJob, scene: &str, info: &SourceInfo) -> Option<SampleOrigin> {
+pub fn origin(job: &SourceJob, scene: &str, info: &SourceInfo) -> Option<SampleOrigin> {
     let SourceJob { kind, scene: typed, seed, max_depth, scene_files, .. } = job;
     if matches!(kind, SourceKind::Exr) {
         return None;

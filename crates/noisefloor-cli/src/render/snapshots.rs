@@ -10,7 +10,7 @@ use noisefloor::{Checkpoint, CheckpointError, Driver, Resumable, Session, Stoppi
 pub(super) type Rendering<C> = Driver<Box<dyn Source>, C>;
 
 /// All that must be the same for a render to be resumed, the library checks.
-const JOB: &str = "noisefloor render";
+pub const JOB: &str = "noisefloor render";
 
 type Resume<C> = fn(Rendering<C>, &str, Checkpoint<'_>) -> Result<Rendering<C>, CheckpointError>;
 

@@ -3,7 +3,9 @@ use crate::kit::succeed;
 // Long: a list of cases
 #[test]
 fn every_subcommand_explains_itself() {
-    let options: [(&str, &[&str]); 13] = [
+    let options: [(&str, &[&str]); 15] = [
+        ("farm", &["plan", "run", "merge", "status", "--local", "{frame:04}"]),
+        ("merge", &["--out", "--force", "render --resume"]),
         ("reference", &["--out", "--size", "--seed", "--quiet"]),
         (
             "render",

@@ -1,7 +1,9 @@
 use crate::kit::{run, stderr, succeed};
 
 /// Each command that a build may leave out, the feature that has it, and what can be typed.
-const OPTIONAL: [(&str, &str, &[&str], bool); 8] = [
+const OPTIONAL: [(&str, &str, &[&str], bool); 10] = [
+    ("farm", "farm", &["status", "absent"], cfg!(feature = "farm")),
+    ("merge", "farm", &["absent.nfs", "--out", "out"], cfg!(feature = "farm")),
     ("doctor", "adapters", &[], cfg!(feature = "adapters")),
     ("compare", "lab", &["cornell-box"], cfg!(feature = "lab")),
     ("reproduce", "lab", &["--corpus", "absent"], cfg!(feature = "lab")),

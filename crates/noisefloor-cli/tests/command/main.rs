@@ -19,6 +19,10 @@ mod crash;
 #[cfg(test)]
 #[cfg(feature = "adapters")]
 mod denoise;
+/// Many processes, kills, rubbish.
+#[cfg(test)]
+#[cfg(all(feature = "farm", target_os = "linux"))]
+mod farm;
 /// Output folders that are taken, and scenes that were edited.
 #[cfg(test)]
 mod folders;
@@ -59,6 +63,10 @@ mod say;
 /// Ctrl-C, and worse.
 #[cfg(test)]
 mod signals;
+/// A real Slurm.
+#[cfg(test)]
+#[cfg(all(feature = "farm", target_os = "linux"))]
+mod slurm;
 /// Other renderers than our own.
 #[cfg(test)]
 #[cfg(feature = "adapters")]

@@ -1,0 +1,177 @@
+use crate::kit::{command, fail, json, run, stderr, succeed, text};
+use noisefloor_image::read_exr;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+use tempfile::tempdir;
+
+/// Of 24 tiles: some stop early, some late, and one round has several tasks.
+pub(crate) const SCENE: &str =
+    "cornell-box --size 192x128 --tile 32 --batch 40 --max-spp 160 --seed 5 --threads 1";
+
+pub(crate) fn render(out: &Path, scene: &str) {
+    let args = ["render", "--quiet", "--out", text(out)];
+    succeed(&args.into_iter().chain(scene.split(' ')).collect::<Vec<_>>());
+}
+
+pub(crate) fn plan(dir: &Path, more: &[&str], scene: &str) {
+    let args = [&["farm", "plan", text(dir), "--tasks", "4"], more, &["--"]].concat();
+    succeed(&args.into_iter().chain(scene.split(' ')).collect::<Vec<_>>());
+}
+
+/// The same picture and the same stops.
+pub(crate) fn assert_same(one: &Path, other: &Path) {
+    let read = |dir: &Path| read_exr(dir.join("image.exr")).unwrap().pixels;
+    assert!(read(one) == read(other), "{} and {} differ", one.display(), other.display());
+    let stops = |dir: &Path| fs::read_to_string(dir.join("stops.csv")).unwrap();
+    assert_eq!(stops(one), stops(other));
+    assert_eq!(json(&other.join("report.json"))["complete"], true);
+}
+
+pub(crate) fn wait_for<T>(what: &str, mut found: impl FnMut() -> Option<T>) -> T {
+    let began = Instant::now();
+    loop {
+        if let Some(found) = found() {
+            return found;
+        }
+        assert!(began.elapsed() < Duration::from_secs(60), "{what} did not happen within a minute");
+        std::thread::sleep(Duration::from_millis(20));
+    }
+}
+
+pub(crate) fn shards(folder: &Path) -> Vec<PathBuf> {
+    let Ok(entries) = fs::read_dir(folder) else { return Vec::new() };
+    let mut paths: Vec<PathBuf> = entries.map(|entry| entry.unwrap().path()).collect();
+    paths.retain(|path| path.extension().is_some_and(|extension| extension == "nfs"));
+    paths.retain(|path| !path.file_name().unwrap().to_string_lossy().starts_with('.'));
+    paths.sort();
+    paths
+}
+
+fn coordinator(dir: &Path) -> Child {
+    let mut command = command(&["farm", "run", text(dir), "--local", "2"]);
+    command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap()
+}
+
+/// Coordinators killed at any moment, and one of their tasks with the first of them, lose nothing; while one
+/// works, another is refused.
+#[test]
+fn killed_farms_give_the_picture_of_one_machine() {
+    let folder = tempdir().unwrap();
+    let (one, dir) = (folder.path().join("one"), folder.path().join("farm"));
+    render(&one, SCENE);
+    plan(&dir, &["--keep-shards"], SCENE);
+    let mut random = fastrand::Rng::with_seed(1);
+    for kill in 0..4 {
+        let mut first = coordinator(&dir);
+        if kill == 0 {
+            wait_for("a lock", || {
+                let other = run(&["farm", "plan", text(&dir)]);
+                stderr(&other).contains("another noisefloor plans or merges in this folder").then_some(())
+            });
+            // A task dies with its coordinator
+            let id = first.id();
+            let children = wait_for("a task", || {
+                let children = fs::read_to_string(format!("/proc/{id}/task/{id}/children")).unwrap();
+                (!children.trim().is_empty()).then_some(children)
+            });
+            let killed = Command::new("kill").arg("-9").args(children.split_whitespace()).status().unwrap();
+            assert!(killed.success());
+        }
+        std::thread::sleep(Duration::from_millis(random.u64(50..600)));
+        first.kill().unwrap();
+        first.wait().unwrap();
+    }
+    let done = coordinator(&dir).wait_with_output().unwrap();
+    assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+    let frame = dir.join("frame");
+    assert_same(&one, &frame);
+    let status = succeed(&["farm", "status", text(&dir)]);
+    assert!(status.contains("frame: done") && status.contains("done in"), "{status}");
+    assert!(shards(&frame.join("shards")).is_empty() && !frame.join("checkpoint.nfc").exists());
+
+    // The shards alone give the same, in any order; without one of them, it is known what is missing
+    let mut kept = shards(&frame.join("merged"));
+    random.shuffle(&mut kept);
+    let merge = |kept: &[PathBuf], out: &Path| {
+        run(&[&["merge", "--out", text(out)], &kept.iter().map(|p| text(p)).collect::<Vec<_>>()[..]].concat())
+    };
+    let merged = folder.path().join("merged");
+    let output = merge(&kept, &merged);
+    assert!(output.status.success(), "{}", stderr(&output));
+    assert_same(&one, &merged);
+    kept.sort();
+    let partial = folder.path().join("partial");
+    let output = merge(&kept[..kept.len() - 1], &partial);
+    assert_eq!(output.status.code(), Some(1));
+    assert!(stderr(&output).contains("no shard has tile"), "{}", stderr(&output));
+    let rest = ["render", "--resume", "--quiet", "--out", text(&partial)];
+    succeed(&rest.into_iter().chain(SCENE.split(' ')).collect::<Vec<_>>());
+    assert_same(&one, &partial);
+}
+
+/// A shard of rubbish, and one that was cut short, are put aside and rendered again.
+#[test]
+fn rubbish_is_named_and_rendered_again() {
+    let folder = tempdir().unwrap();
+    let (one, dir) = (folder.path().join("one"), folder.path().join("farm"));
+    render(&one, SCENE);
+    plan(&dir, &[], SCENE);
+    let place = dir.join("frame/shards");
+    let task = |index: &str| succeed(&["farm", "task", text(&dir), "1", index]);
+    task("0");
+    task("1");
+    let there = shards(&place);
+    assert_eq!(there.len(), 2);
+    let half = fs::read(&there[0]).unwrap();
+    fs::write(&there[0], &half[..half.len() / 2]).unwrap();
+    fs::write(&there[1], "a task of another program").unwrap();
+    let output = run(&["farm", "run", text(&dir), "--local", "1", "--quiet"]);
+    let said = stderr(&output);
+    assert!(output.status.success(), "{said}");
+    for word in [
+        "00000.nfs: it is damaged: it is cut short",
+        "00001.nfs: it is not a shard",
+        "00001.nfs.bad was put aside",
+    ] {
+        assert!(said.contains(word), "{word}: {said}");
+    }
+    assert!(place.join("0001-00001.nfs.bad").exists());
+    assert_same(&one, &dir.join("frame"));
+}
+
+/// What cannot work ends, and says what to do.
+#[test]
+fn what_is_wrong_with_a_farm_is_said() {
+    let folder = tempdir().unwrap();
+    let dir = folder.path().join("farm");
+    fail(&["farm", "run", text(&dir), "--local", "1"], &["no farm was planned", "farm plan DIR"]);
+    fail(&["farm", "plan", text(&dir), "--", "bulb", "--out", "x"], &["--out", "leave it out"]);
+    fail(&["farm", "plan", text(&dir), "--", "bulb", "--criterion", "variance:0.1"], &["oracle"]);
+    fail(
+        &["merge", text(&folder.path().join("absent.nfs")), "--out", "x"],
+        &["none of these files is a shard"],
+    );
+
+    // The scene is edited after the plan: three rounds bring nothing
+    let scene = folder.path().join("scene.xml");
+    let xml = "<scene version=\"3.0.0\"><sensor type=\"perspective\"/><shape type=\"sphere\"/>\
+               <emitter type=\"constant\"/></scene>";
+    fs::write(&scene, xml).unwrap();
+    plan(&dir, &[], &format!("{} --size 32x32 --tile 32", text(&scene)));
+    fail(&["farm", "plan", text(&dir), "--", "bulb"], &["planned here already"]);
+    fs::write(&scene, xml.replace("sphere", "cube")).unwrap();
+    let output = run(&["farm", "run", text(&dir), "--local", "1", "--quiet"]);
+    let said = stderr(&output);
+    assert!(
+        output.status.code() == Some(1) && said.contains("3 rounds in a row brought no samples"),
+        "{said}"
+    );
+    let log = fs::read_to_string(dir.join("log/0001-0.log")).unwrap();
+    assert!(log.contains("scene.xml` has changed") && log.contains("restore it"), "{log}");
+    // Mended, it goes on
+    fs::write(&scene, xml).unwrap();
+    succeed(&["farm", "run", text(&dir), "--local", "1", "--quiet"]);
+    assert_eq!(json(&dir.join("frame/report.json"))["complete"], true);
+}

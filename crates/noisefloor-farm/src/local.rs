@@ -1,0 +1,71 @@
+//! A round in a few processes on this machine.
+
+use crate::error::FarmError;
+use crate::folder::{FarmFolder, Round};
+use std::fs::File;
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use std::time::Duration;
+
+/// How often processes are looked after.
+const PAUSE: Duration = Duration::from_millis(50);
+
+/// Runs the tasks of a round, `processes` at a time, as `PROGRAM farm task DIR ROUND TASK`; returns those
+/// that failed. Once `cancel` says so, no more are started. Those that run are waited for: a terminal's
+/// Ctrl-C reaches them as well, and they end with what they have.
+///
+/// # Errors
+/// [`FarmError`] if a process cannot be started or its log cannot be written.
+pub fn run_local(
+    program: &Path,
+    folder: &FarmFolder,
+    round: &Round,
+    processes: usize,
+    cancel: impl Fn() -> bool,
+) -> Result<Vec<usize>, FarmError> {
+    let (mut failed, mut running): (Vec<usize>, Vec<(usize, Child)>) = (Vec::new(), Vec::new());
+    let mut waiting = 0..round.tasks.len();
+    loop {
+        while running.len() < processes.max(1) && !cancel() {
+            let Some(task) = waiting.next() else { break };
+            running.push((task, start(program, folder, round.number, task, processes)?));
+        }
+        if running.is_empty() {
+            return Ok(failed);
+        }
+        std::thread::sleep(PAUSE);
+        let mut left = Vec::new();
+        for (task, mut process) in running {
+            match process.try_wait() {
+                Ok(None) => left.push((task, process)),
+                Ok(Some(status)) if status.success() => {}
+                _ => failed.push(task),
+            }
+        }
+        running = left;
+    }
+}
+
+fn start(
+    program: &Path,
+    folder: &FarmFolder,
+    round: usize,
+    task: usize,
+    processes: usize,
+) -> Result<Child, FarmError> {
+    let log = folder.log(round, task);
+    let cannot_write = |source| FarmError::Read { path: log.clone(), source };
+    let said = File::create(&log).map_err(cannot_write)?;
+    let also = said.try_clone().map_err(cannot_write)?;
+    let mut command = Command::new(program);
+    command.args(["farm", "task"]).arg(folder.path()).args([round.to_string(), task.to_string()]);
+    if std::env::var_os("RAYON_NUM_THREADS").is_none() {
+        let cores = std::thread::available_parallelism().map_or(1, usize::from);
+        command.env("RAYON_NUM_THREADS", cores.div_ceil(processes.max(1)).to_string());
+    }
+    let child = command.stdin(Stdio::null()).stdout(said).stderr(also).spawn();
+    child.map_err(|error| FarmError::Program {
+        program: program.display().to_string(),
+        what: format!("cannot be started: {error}"),
+    })
+}

@@ -1,0 +1,333 @@
+//! Files of samples.
+//!
+//! Layout: magic (8 bytes), version (u32), length of the header (u64), BLAKE3 of the header (32 bytes), header
+//! (JSON); then for each batch of the header, in its order, three f32 per pixel, row-major over its tile.
+//! Numbers are little-endian. The header has the BLAKE3 of each batch, so that a merge reads only the batch it
+//! needs.
+
+use crate::error::ShardError;
+use noisefloor::{ProgressiveSource, Resumable, Rgb, Session, SourceError, SourceIdentity, Tile, TileGrid};
+use noisefloor_image::{WriteError, write_atomic};
+use serde::{Deserialize, Serialize};
+use std::fs::File;
+use std::io::{self, BufReader, Read, Seek, SeekFrom, Write};
+use std::path::{Path, PathBuf};
+
+const MAGIC: [u8; 8] = *b"NFSHARD\0";
+pub(crate) const VERSION: u32 = 1;
+/// Longest header that is read: some 300,000 batches.
+const MAX_HEADER: u64 = 64 << 20;
+/// Bytes before the header.
+const PREFIX: u64 = 8 + 4 + 8 + 32;
+/// Bytes per pixel: three f32.
+const PIXEL: usize = 12;
+
+/// What the samples of a shard are of. Shards of different jobs are never merged.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ShardJob {
+    /// What the samples depend on: scene, seed, options of the renderer.
+    pub source: SourceIdentity,
+    /// Width of the picture in pixels.
+    pub width: usize,
+    /// Height of the picture in pixels.
+    pub height: usize,
+    /// Edge of the tiles in pixels.
+    pub tile: usize,
+    /// Fingerprint of the criterion.
+    pub criterion: String,
+    /// Parameters of the session, as text.
+    pub params: String,
+}
+
+impl ShardJob {
+    /// The job of a source and a session that has its size.
+    ///
+    /// # Errors
+    /// [`SourceError`] if the source cannot read what it depends on.
+    pub fn new<C: Resumable>(
+        source: &impl ProgressiveSource,
+        session: &Session<C>,
+    ) -> Result<Self, SourceError> {
+        Ok(Self::of(source.identity()?, session))
+    }
+
+    /// The job of a session whose samples depend on `source`.
+    pub fn of<C: Resumable>(source: SourceIdentity, session: &Session<C>) -> Self {
+        let (grid, params) = (session.film().grid(), session.params());
+        Self {
+            source,
+            width: grid.width(),
+            height: grid.height(),
+            tile: params.tile,
+            criterion: session.criterion().fingerprint(),
+            params: format!("{params:?}"),
+        }
+    }
+
+    /// The tiles.
+    ///
+    /// # Errors
+    /// [`ShardError::Tile`] if a size is out of range.
+    pub fn grid(&self) -> Result<TileGrid, ShardError> {
+        Ok(TileGrid::new(self.width, self.height, self.tile)?)
+    }
+
+    /// Checks that `kept` is the same job as this one.
+    ///
+    /// # Errors
+    /// [`ShardError`] that names the first difference.
+    pub fn check(&self, kept: &Self) -> Result<(), ShardError> {
+        self.source.change_since(&kept.source).map_or(Ok(()), Err)?;
+        let size = |job: &Self| format!("{}×{} in tiles of {}", job.width, job.height, job.tile);
+        for (what, kept, now) in [
+            ("picture", size(kept), size(self)),
+            ("criterion", kept.criterion.clone(), self.criterion.clone()),
+            ("set of parameters", kept.params.clone(), self.params.clone()),
+        ] {
+            if kept != now {
+                return Err(ShardError::Other { what, kept, now });
+            }
+        }
+        Ok(())
+    }
+}
+
+/// One batch of a shard.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct BatchEntry {
+    /// The tile.
+    pub tile: usize,
+    /// Index of its first sample.
+    pub first: u64,
+    /// Samples per pixel asked for.
+    pub asked: u64,
+    /// Samples per pixel that the source gave; 0 if it has no more.
+    pub spp: u64,
+    /// BLAKE3 of its pixels.
+    digest: String,
+}
+
+#[derive(Clone, Debug, Serialize, Deserialize)]
+struct Header {
+    job: ShardJob,
+    /// Options of `noisefloor render`, if the command made the shard.
+    arguments: Vec<String>,
+    /// Seconds in the source.
+    seconds: f64,
+    batches: Vec<BatchEntry>,
+}
+
+/// Samples in memory, on their way to a file.
+#[derive(Clone, Debug)]
+pub struct Shard {
+    header: Header,
+    pixels: Vec<Vec<Rgb>>,
+}
+
+impl Shard {
+    /// A shard without samples.
+    pub fn new(job: ShardJob) -> Self {
+        Self { header: Header { job, arguments: vec![], seconds: 0.0, batches: vec![] }, pixels: vec![] }
+    }
+
+    /// Adds how `noisefloor render` is told the job, so that the file alone is enough to merge it.
+    #[must_use]
+    pub fn with_arguments(mut self, arguments: Vec<String>) -> Self {
+        self.header.arguments = arguments;
+        self
+    }
+
+    /// Adds seconds that the source took.
+    pub fn add_seconds(&mut self, seconds: f64) {
+        self.header.seconds += seconds;
+    }
+
+    /// Adds a batch of `spp` samples per pixel where `asked` were wanted from the sample `first` on; `mean` is
+    /// row-major over the tile.
+    pub fn add(&mut self, tile: usize, first: u64, asked: u64, spp: u64, mean: Vec<Rgb>) {
+        let digest = digest(&bytes(&mean));
+        self.header.batches.push(BatchEntry { tile, first, asked, spp, digest });
+        self.pixels.push(mean);
+    }
+
+    /// Number of batches.
+    pub fn len(&self) -> usize {
+        self.header.batches.len()
+    }
+
+    /// Whether it has no batches.
+    pub fn is_empty(&self) -> bool {
+        self.header.batches.is_empty()
+    }
+
+    /// Writes the file, which appears complete or not at all.
+    ///
+    /// # Errors
+    /// [`WriteError`] if it cannot be written.
+    pub fn write(&self, path: impl AsRef<Path>) -> Result<(), WriteError> {
+        write_atomic(path, |to| -> io::Result<()> {
+            let header = serde_json::to_vec(&self.header)?;
+            to.write_all(&MAGIC)?;
+            to.write_all(&VERSION.to_le_bytes())?;
+            to.write_all(&(header.len() as u64).to_le_bytes())?;
+            to.write_all(blake3::hash(&header).as_bytes())?;
+            to.write_all(&header)?;
+            self.pixels.iter().try_for_each(|mean| to.write_all(&bytes(mean)))
+        })
+    }
+}
+
+fn bytes(pixels: &[Rgb]) -> Vec<u8> {
+    pixels.as_flattened().iter().flat_map(|value| value.to_le_bytes()).collect()
+}
+
+fn digest(bytes: &[u8]) -> String {
+    blake3::hash(bytes).to_hex().to_string()
+}
+
+/// A shard on disk, of which the header has been read and checked.
+#[derive(Clone, Debug)]
+pub struct ShardFile {
+    path: PathBuf,
+    header: Header,
+    grid: TileGrid,
+    /// Where each batch begins.
+    offsets: Vec<u64>,
+}
+
+impl ShardFile {
+    /// Reads the header, and checks that the file is as long as it says. Memory grows with the header that
+    /// arrives, not with what the file claims to hold.
+    ///
+    /// # Errors
+    /// [`ShardError`] if it is foreign, damaged, or of another version.
+    pub fn open(path: impl Into<PathBuf>) -> Result<Self, ShardError> {
+        let path = path.into();
+        let file = File::open(&path)?;
+        let there = file.metadata()?.len();
+        let mut from = BufReader::new(file);
+        let mut prefix = [0; PREFIX as usize];
+        let read = read_up_to(&mut from, &mut prefix)?;
+        if read < 8 || prefix[..8] != MAGIC {
+            return Err(ShardError::Foreign);
+        }
+        if read < prefix.len() {
+            return Err(ShardError::Damaged("it ends within its first bytes".into()));
+        }
+        let version = u32::from_le_bytes(prefix[8..12].try_into().unwrap_or_default());
+        if version != VERSION {
+            return Err(ShardError::Version(version));
+        }
+        let length = u64::from_le_bytes(prefix[12..20].try_into().unwrap_or_default());
+        if length > MAX_HEADER {
+            let what = format!("its header has {length} bytes, more than the limit of {MAX_HEADER}");
+            return Err(ShardError::Damaged(what));
+        }
+        let mut header = Vec::new();
+        from.take(length).read_to_end(&mut header)?;
+        if header.len() as u64 != length {
+            return Err(ShardError::Damaged("it ends within its header".into()));
+        }
+        if blake3::hash(&header).as_bytes() != &prefix[20..] {
+            return Err(ShardError::Damaged("the checksum of its header differs".into()));
+        }
+        let header = serde_json::from_slice(&header).map_err(|e| ShardError::Damaged(e.to_string()))?;
+        Self::check(path, header, PREFIX + length, there)
+    }
+
+    /// Checks that the header holds together, and that the file has `there` bytes as it says.
+    fn check(path: PathBuf, header: Header, begin: u64, there: u64) -> Result<Self, ShardError> {
+        let grid = header.job.grid()?;
+        let (mut offsets, mut end) = (Vec::new(), begin);
+        for BatchEntry { tile, first, asked, spp, .. } in &header.batches {
+            let possible = |n: &u64| *n < 1 << 34;
+            if *tile >= grid.len() || ![first, asked, spp].into_iter().all(possible) {
+                return Err(ShardError::Damaged(format!("it has an impossible batch of tile {tile}")));
+            }
+            offsets.push(end);
+            end += length(grid.tile(*tile), *spp) as u64;
+        }
+        if there != end {
+            let relation = if there < end { "is cut short" } else { "is too long" };
+            return Err(ShardError::Damaged(format!("it {relation}: it has {there} bytes of {end}")));
+        }
+        if !(header.seconds.is_finite() && header.seconds >= 0.0) {
+            return Err(ShardError::Damaged("its seconds are no time".into()));
+        }
+        Ok(Self { path, header, grid, offsets })
+    }
+
+    /// The file.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// What its samples are of.
+    pub fn job(&self) -> &ShardJob {
+        &self.header.job
+    }
+
+    /// Options of `noisefloor render` that describe the job; none if the command did not make it.
+    pub fn arguments(&self) -> &[String] {
+        &self.header.arguments
+    }
+
+    /// Seconds that the source took.
+    pub fn seconds(&self) -> f64 {
+        self.header.seconds
+    }
+
+    /// Its samples, over all pixels.
+    pub fn samples(&self) -> u64 {
+        let samples = |entry: &BatchEntry| entry.spp * self.grid.tile(entry.tile).pixels() as u64;
+        self.header.batches.iter().map(samples).sum()
+    }
+
+    /// Its batches.
+    pub fn batches(&self) -> &[BatchEntry] {
+        &self.header.batches
+    }
+
+    /// The mean of the samples of a batch, row-major over its tile.
+    ///
+    /// # Errors
+    /// [`ShardError`] if it cannot be read or its checksum differs.
+    ///
+    /// # Panics
+    /// If there is no such batch.
+    pub fn read(&self, batch: usize) -> Result<Vec<Rgb>, ShardError> {
+        let entry = &self.header.batches[batch];
+        let mut file = File::open(&self.path)?;
+        file.seek(SeekFrom::Start(self.offsets[batch]))?;
+        let mut bytes = vec![0; length(self.grid.tile(entry.tile), entry.spp)];
+        file.read_exact(&mut bytes)?;
+        if digest(&bytes) != entry.digest {
+            let BatchEntry { tile, first, .. } = entry;
+            let what = format!("the checksum of tile {tile} from sample {first} on differs");
+            return Err(ShardError::Damaged(what));
+        }
+        let value = |at: &[u8]| f32::from_le_bytes(at.try_into().unwrap_or_default());
+        let pixel = |at: &[u8]| std::array::from_fn(|c| value(&at[4 * c..4 * c + 4]));
+        Ok(bytes.chunks_exact(PIXEL).map(pixel).collect())
+    }
+}
+
+/// Bytes of a batch.
+fn length(tile: Tile, spp: u64) -> usize {
+    if spp == 0 { 0 } else { tile.pixels() * PIXEL }
+}
+
+/// Fills the buffer as far as there is something; how much that is.
+fn read_up_to(from: &mut impl Read, buffer: &mut [u8]) -> io::Result<usize> {
+    let mut filled = 0;
+    while filled < buffer.len() {
+        match from.read(&mut buffer[filled..])? {
+            0 => break,
+            read => filled += read,
+        }
+    }
+    Ok(filled)
+}
+
+#[cfg(test)]
+mod tests;
