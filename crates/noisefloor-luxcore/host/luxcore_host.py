@@ -47,6 +47,17 @@ SOBOL_BLOCK = 8
 PATIENCE = 4
 
 
+def _root(folder, scene_file):
+    """The folder that a configuration's names begin at. For LuxCore that is the working directory; where it does not hold the
+    scene, it is the folder of the configuration, or one above, as in LuxCore's own scenes."""
+    above = [folder]
+    while os.path.dirname(above[-1]) != above[-1]:
+        above.append(os.path.dirname(above[-1]))
+    roots = [os.getcwd(), *above] if scene_file != os.path.basename(scene_file) else [folder, os.getcwd()]
+    found = (root for root in roots if os.path.exists(os.path.join(root, scene_file)))
+    return next(found, folder)
+
+
 class LuxCore:
     def __init__(self, init):
         options = dict(init.get("options") or {})
@@ -66,10 +77,7 @@ class LuxCore:
         self.seed, self.drawn = init["seed"], 0
         self.metropolis, self.sobol = sampler == "metropolis", sampler == "sobol"
 
-        # Files that a scene names lie beside it
-        folder, name = os.path.split(init["scene"])
-        os.chdir(folder)
-        warnings = self._configure(name, init, engine, sampler)
+        warnings = self._configure(init["scene"], init, engine, sampler)
         self.scene = None if self.metropolis else self._scene()
         # Samples a pixel that tiles have been given beyond those said, and the pairs of chains of tiles
         self.surplus, self.chains = {}, {}
@@ -93,15 +101,17 @@ class LuxCore:
 
     # Setting up
 
-    def _configure(self, name, init, engine, sampler):
+    def _configure(self, path, init, engine, sampler):
         """Reads configuration and scene; returns warnings."""
         config = self.lux.Properties()
+        folder, name = os.path.split(path)
         scene_file = name
         if not name.endswith(".scn"):
-            config.SetFromFile(name)
+            config.SetFromFile(path)
             if not config.IsDefined("scene.file"):
                 raise ValueError(f"{name} does not say scene.file")
             scene_file = config.Get("scene.file").GetString()
+        os.chdir(_root(folder, scene_file))
         self.description = self.lux.Properties(scene_file)
 
         warnings = []

@@ -12,7 +12,8 @@
 //! # What is rendered
 //! The scene as its configuration (`.cfg`) describes it, or a scene (`.scn`) with LuxCore's own settings; in
 //! either case without filter, clamping, adaptive sampling, photon caches and early stops, and with size and
-//! depth from the [`Job`] if given. Files that a scene names are relative to it. Pictures lie one row of
+//! depth from the [`Job`] if given. Names in a configuration begin at the working
+//! directory, as for LuxCore, or at the folder of the configuration or one above it, wherever the scene is. Pictures lie one row of
 //! pixels lower than those of other renderers: that is LuxCore's way.
 //!
 //! # Samples

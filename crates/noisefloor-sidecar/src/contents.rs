@@ -18,8 +18,8 @@ const NAMING: [&str; 7] = ["xml", "cfg", "scn", "py", "mtl", "pbrt", "gltf"];
 const ENDS: &[u8] = b"\"'<>=\n\r\t\0";
 
 /// Digests of a scene and of the files that it names: whatever stands in it between quotes, or alone in a
-/// line or a binary field, and exists, as seen from the file that names it or from the scene. Names that a
-/// program puts together, and what is in compressed files, are not found.
+/// line or a binary field, and exists, as seen from the file that names it, from the scene, from the working directory, or from above the scene.
+/// Names that a program puts together, and what is in compressed files, are not found.
 ///
 /// # Errors
 /// What the system says if a file cannot be read.
@@ -31,6 +31,9 @@ pub(crate) fn contents(scene: &Path, options: String) -> io::Result<SourceIdenti
         return Ok(identity);
     }
     let home = scene.parent().unwrap_or(Path::new("/")).to_owned();
+    // LuxCore's names begin at the working directory, or above the scene
+    let here = std::env::current_dir().unwrap_or_default();
+    let above: Vec<&Path> = home.ancestors().skip(1).collect();
     let (mut seen, mut left) = (BTreeSet::from([scene.clone()]), vec![scene.clone()]);
     while let Some(path) = left.pop() {
         let name = path.strip_prefix(&home).unwrap_or(&path).display().to_string();
@@ -41,7 +44,7 @@ pub(crate) fn contents(scene: &Path, options: String) -> io::Result<SourceIdenti
             continue;
         }
         let folder = path.parent().unwrap_or(&home);
-        for named in named_in(&path, [folder, &home])? {
+        for named in named_in(&path, &[&[folder, &home, &here], &above[..]].concat())? {
             if seen.len() < MOST_FILES && seen.insert(named.clone()) {
                 left.push(named);
             }
@@ -51,16 +54,16 @@ pub(crate) fn contents(scene: &Path, options: String) -> io::Result<SourceIdenti
 }
 
 /// Files that exist and are named in a file.
-fn named_in(path: &Path, folders: [&Path; 2]) -> io::Result<BTreeSet<PathBuf>> {
+fn named_in(path: &Path, folders: &[&Path]) -> io::Result<BTreeSet<PathBuf>> {
     let mut bytes = Vec::new();
     File::open(path)?.take(SEARCHED).read_to_end(&mut bytes)?;
     let pieces = bytes.split(|b| ENDS.contains(b)).filter(|piece| piece.len() <= LONGEST);
     let names: BTreeSet<&str> =
         pieces.filter_map(|piece| std::str::from_utf8(piece).ok()).map(name).collect();
-    let files = names.into_iter().filter(|name| looks_like_a_file(name)).flat_map(|name| {
-        let places = folders.map(|folder| folder.join(name));
-        places.into_iter().find(|path| path.is_file())
-    });
+    let files = names
+        .into_iter()
+        .filter(|name| looks_like_a_file(name))
+        .flat_map(|name| folders.iter().map(|folder| folder.join(name)).find(|path| path.is_file()));
     Ok(files.collect())
 }
 

@@ -12,7 +12,7 @@ use thiserror::Error;
 
 /// A failure of a renderer in another process.
 #[derive(Debug, Error)]
-#[error("{renderer}, {doing}: {cause}{}", quote(.last_words))]
+#[error("{renderer}, {doing}: {cause}{}", if cause.is_told() { String::new() } else { quote(.last_words) })]
 pub struct SidecarError {
     /// The renderer.
     pub renderer: String,
@@ -32,6 +32,13 @@ impl SidecarError {
     pub(crate) fn at_the_start(renderer: &Renderer, cause: SidecarCause) -> Self {
         let (renderer, doing) = (renderer.title.to_owned(), "starting".to_owned());
         Self { renderer, doing, tile: None, cause: Box::new(cause), last_words: String::new() }
+    }
+}
+
+impl SidecarCause {
+    /// Whether the renderer itself has said what is wrong: its last words are then a traceback of that.
+    fn is_told(&self) -> bool {
+        matches!(self, Self::Refused(_))
     }
 }
 

@@ -205,6 +205,18 @@ fn scenes_that_cannot_be_loaded_are_errors() {
     if usable(&noisefloor_luxcore::RENDERER) {
         let open = |job: &Job| noisefloor_luxcore::open(job, Engine::Path, Sampler::Random);
         said(open(&job("aimless.cfg", "film.width = 48\n")), "aimless.cfg does not say scene.file");
+        // As in LuxCore's own scenes, whose names begin two folders above
+        let (room, above) = (folder.path().join("scenes/room"), cornell_box("cfg", 48, 40).scene);
+        std::fs::create_dir_all(&room).unwrap();
+        let text =
+            std::fs::read_to_string(&above).unwrap().replace("scene.file = ", "scene.file = scenes/room/");
+        std::fs::write(room.join("room.cfg"), text).unwrap();
+        for entry in std::fs::read_dir(above.parent().unwrap()).unwrap() {
+            let path = entry.unwrap().path();
+            let text = std::fs::read(&path).unwrap();
+            std::fs::write(room.join(path.file_name().unwrap()), text).unwrap();
+        }
+        assert!(open(&Job::new(room.join("room.cfg"))).is_ok());
         said(open(&job("lost.cfg", "scene.file = gone.scn\n")), "gone.scn");
         let mut flat = cornell_box("cfg", 48, 40);
         flat.max_depth = Some(1);
