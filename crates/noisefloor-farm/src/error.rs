@@ -17,7 +17,10 @@ pub enum ShardError {
     #[error("it is not a shard: its first bytes are not those of one")]
     Foreign,
     /// Of another release.
-    #[error("it has format version {0}, and this release reads version {VERSION}: render it again", VERSION = crate::shard::VERSION)]
+    #[error(
+        "it has format version {0}, and this release reads version {VERSION}: render it again",
+        VERSION = crate::shard::VERSION
+    )]
     Version(u32),
     /// The content is not what was written.
     #[error("it is damaged: {0}")]

@@ -174,8 +174,8 @@ impl ShardSet {
         self.files.iter().filter(|file| !file.batches().iter().any(needed)).collect()
     }
 
-    /// Finds what was not merged although the session has samples of that range: batches that overlap those of
-    /// other shards. Call it after a merge into a session that began without samples.
+    /// Finds what was not merged although the session has samples of that range: batches that overlap those
+    /// of other shards. Call it after a merge into a session that began without samples.
     pub fn find_overlaps<C: StoppingCriterion>(&mut self, session: &Session<C>) {
         let overlaps: Vec<(usize, Key)> = (self.index.iter())
             .filter(|(key, _)| !self.merged.contains(*key) && key.1 < session.film().spp(key.0))

@@ -60,7 +60,8 @@ mod tests {
                 split.iter().flat_map(|t| t.batches.iter().map(|&(i, f, s)| (t.frame, i, f, s))).collect();
             let wanted: Vec<_> = all.iter().map(|(f, b)| (*f, b.tile.index, b.first, b.spp)).collect();
             assert_eq!(flat, wanted);
-            // A frame more than asked for, where a task would span two; and no task has less than half of 2¹⁸ samples
+            // A frame more than asked for, where a task would span two; and no task has less than half of 2¹⁸
+            // samples
             assert!(split.len() <= tasks.min(128) + 1, "{} for {tasks}", split.len());
             let (least, most) =
                 (split.iter().map(|t| t.batches.len()).min(), split.iter().map(|t| t.batches.len()).max());

@@ -1,9 +1,9 @@
 //! Files of samples.
 //!
-//! Layout: magic (8 bytes), version (u32), length of the header (u64), BLAKE3 of the header (32 bytes), header
-//! (JSON); then for each batch of the header, in its order, three f32 per pixel, row-major over its tile.
-//! Numbers are little-endian. The header has the BLAKE3 of each batch, so that a merge reads only the batch it
-//! needs.
+//! Layout: magic (8 bytes), version (u32), length of the header (u64), BLAKE3 of the header (32 bytes),
+//! header (JSON); then for each batch of the header, in its order, three f32 per pixel, row-major over its
+//! tile. Numbers are little-endian. The header has the BLAKE3 of each batch, so that a merge reads only the
+//! batch it needs.
 
 use crate::error::ShardError;
 use noisefloor::{ProgressiveSource, Resumable, Rgb, Session, SourceError, SourceIdentity, Tile, TileGrid};
@@ -142,8 +142,8 @@ impl Shard {
         self.header.seconds += seconds;
     }
 
-    /// Adds a batch of `spp` samples per pixel where `asked` were wanted from the sample `first` on; `mean` is
-    /// row-major over the tile.
+    /// Adds a batch of `spp` samples per pixel where `asked` were wanted from the sample `first` on; `mean`
+    /// is row-major over the tile.
     pub fn add(&mut self, tile: usize, first: u64, asked: u64, spp: u64, mean: Vec<Rgb>) {
         let digest = digest(&bytes(&mean));
         self.header.batches.push(BatchEntry { tile, first, asked, spp, digest });

@@ -29,7 +29,8 @@ pub struct FarmArgs {
 pub enum FarmCommand {
     /// Say what is to be rendered, or plan the next round of what is there.
     ///
-    /// What follows `--` is as for `noisefloor render`, without --out and the like. Every scene is opened once.
+    /// What follows `--` is as for `noisefloor render`, without --out and the like. Every scene is opened
+    /// once.
     Plan(PlanArgs),
     /// Render round after round: as Slurm array jobs that follow each other, or with --local here.
     ///

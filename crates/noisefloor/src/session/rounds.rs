@@ -35,10 +35,11 @@ impl<C: StoppingCriterion> Session<C> {
         (0..self.tiles.len()).all(|index| !self.is_open(index) || self.is_due(index))
     }
 
-    /// The batches that an open tile is going to need, in the order of its samples: up to its next verdict and,
-    /// if verdicts are due after [every](Schedule::Every) step, beyond it for most of the way to where the
-    /// criterion expects to be satisfied, at most doubling what the tile has. For those who render ahead of the
-    /// verdicts, on other machines. Batches beyond a stop are never asked for by [`Session::next_batches`].
+    /// The batches that an open tile is going to need, in the order of its samples: up to its next verdict
+    /// and, if verdicts are due after [every](Schedule::Every) step, beyond it for most of the way to where
+    /// the criterion expects to be satisfied, at most doubling what the tile has. For those who render ahead
+    /// of the verdicts, on other machines. Batches beyond a stop are never asked for by
+    /// [`Session::next_batches`].
     ///
     /// # Panics
     /// If the tile does not exist.
