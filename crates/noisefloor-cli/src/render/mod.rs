@@ -48,7 +48,7 @@ use tev::Tev;
 /// Camera rays a pixel for albedo and normals, of each half: edges are then smoother than in the radiance of most
 /// pictures, for the time of a few samples of it.
 #[cfg(feature = "adapters")]
-const FIRST_HITS_SPP: u64 = 32;
+pub const FIRST_HITS_SPP: u64 = 32;
 
 /// What is rendered, and until when: checked.
 pub struct RenderJob {

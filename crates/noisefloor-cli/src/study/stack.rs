@@ -2,9 +2,13 @@
 
 use super::StackJob;
 use crate::folder::{Folder, Occupied};
-use crate::say::{one_line, say};
+#[cfg(feature = "adapters")]
+use crate::render::FIRST_HITS_SPP;
+#[cfg(feature = "adapters")]
+use crate::say::one_line;
+use crate::say::say;
 use crate::signals::cancel_on_signal;
-use crate::sources::Opened;
+use crate::sources::{Opened, Source};
 use noisefloor::{Rgb, SourceInfo};
 #[cfg(feature = "adapters")]
 use noisefloor_denoise::{Denoiser, NoisyPicture, Oidn};
@@ -38,7 +42,7 @@ pub(super) fn render(job: &StackJob) -> anyhow::Result<()> {
     opened.warn(false);
     let Opened { mut source, .. } = opened;
     let SourceInfo { width, height, .. } = source.info();
-    let finish = finish(job, (width, height))?;
+    let finish = finish(job, source.as_mut(), (width, height))?;
     let folder = Folder::claim(job.out.clone())?;
     // Levels of two renders in one folder would be taken for one stack
     if running_means(folder.path()).is_ok() {
@@ -56,15 +60,23 @@ pub(super) fn render(job: &StackJob) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Starts the denoiser, if there is one: what it lacks is found before anything is rendered.
+/// Starts the denoiser, if there is one: what it lacks is found before anything is rendered. It gets albedo and
+/// normals as in `render --denoise`.
 #[cfg(feature = "adapters")]
-fn finish(job: &StackJob, (width, height): (usize, usize)) -> anyhow::Result<Finish<'_>> {
+fn finish<'a>(
+    job: &'a StackJob,
+    source: &mut dyn Source,
+    (width, height): (usize, usize),
+) -> anyhow::Result<Finish<'a>> {
     Ok(match &job.denoise {
         None => Box::new(Ok),
         Some(StackDenoiser::Oidn { timeout }) => {
             let mut oidn = Oidn::start(FilterPlan { timeout: *timeout, ..FilterPlan::default() })?;
+            let (wants, guide) = (oidn.wants(), source.first_hits(0, 2 * FIRST_HITS_SPP)?);
             Box::new(move |pixels| {
-                let made = oidn.denoise(&NoisyPicture::new((width, height), &pixels));
+                let picture = NoisyPicture::new((width, height), &pixels);
+                let guided = guide.as_ref().map_or(picture, |guide| picture.guided(guide, wants));
+                let made = oidn.denoise(&guided);
                 made.map_err(|error| StudyError::StackRender(one_line(&error.into())))
             })
         }
@@ -76,6 +88,10 @@ fn finish(job: &StackJob, (width, height): (usize, usize)) -> anyhow::Result<Fin
 }
 
 #[cfg(not(feature = "adapters"))]
-fn finish(_job: &StackJob, _size: (usize, usize)) -> anyhow::Result<Finish<'_>> {
+fn finish<'a>(
+    _job: &'a StackJob,
+    _source: &mut dyn Source,
+    _size: (usize, usize),
+) -> anyhow::Result<Finish<'a>> {
     Ok(Box::new(Ok))
 }
