@@ -7,7 +7,7 @@ use crate::args::{RunArgs, StepArgs};
 use crate::say::{note, say};
 use crate::signals::{INTERRUPTED, cancel_on_signal};
 use anyhow::{Context, bail};
-use noisefloor_farm::{FarmFolder, FarmJob, Round, Slurm, SlurmJobs, run_local};
+use noisefloor_farm::{FarmError, FarmFolder, FarmJob, Round, Slurm, SlurmJobs, run_local};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::Arc;
@@ -16,6 +16,8 @@ use std::time::Duration;
 
 /// Rounds in a row without samples after which a farm gives up.
 const MOST_BARREN: usize = 3;
+/// Seconds that a step waits for the lock of its folder.
+const LOCK_TRIES: usize = 600;
 
 pub fn run(args: RunArgs) -> anyhow::Result<ExitCode> {
     let coordinator = Coordinator::claim(&args.dir)?;
@@ -77,7 +79,7 @@ fn locally(coordinator: &Coordinator, processes: usize, quiet: bool) -> anyhow::
 
 /// What follows a round on Slurm: merge, judge, and submit the next one.
 pub fn step(args: &StepArgs) -> anyhow::Result<ExitCode> {
-    let coordinator = Coordinator::claim(&args.dir)?;
+    let coordinator = claim_patiently(&args.dir)?;
     let round = coordinator.folder.round()?.unwrap_or_default();
     // A step that Slurm started once more, or whose round was given up
     let own = std::env::var("SLURM_JOB_ID").ok();
@@ -89,6 +91,22 @@ pub fn step(args: &StepArgs) -> anyhow::Result<ExitCode> {
     match submit_next(&coordinator, &slurm, false)? {
         Some(_) => Ok(ExitCode::SUCCESS),
         None => finished(&coordinator.folder, &coordinator.job, false),
+    }
+}
+
+/// Waits for a `farm merge` that somebody has typed meanwhile: without this step nothing would go on.
+fn claim_patiently(dir: &Path) -> anyhow::Result<Coordinator> {
+    let mut tries = 0;
+    loop {
+        match Coordinator::claim(dir) {
+            Err(error)
+                if tries < LOCK_TRIES && matches!(error.downcast_ref(), Some(FarmError::Locked(_))) =>
+            {
+                tries += 1;
+                std::thread::sleep(Duration::from_secs(1));
+            }
+            claimed => return claimed,
+        }
     }
 }
 

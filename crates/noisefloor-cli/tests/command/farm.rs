@@ -66,18 +66,18 @@ fn killed_farms_give_the_picture_of_one_machine() {
     for kill in 0..4 {
         let mut first = coordinator(&dir);
         if kill == 0 {
-            wait_for("a lock", || {
-                let other = run(&["farm", "plan", text(&dir)]);
-                stderr(&other).contains("another noisefloor plans or merges in this folder").then_some(())
-            });
-            // A task dies with its coordinator
+            // Once it has tasks, it has the lock
             let id = first.id();
-            let children = wait_for("a task", || {
+            let tasks = || {
                 let children = fs::read_to_string(format!("/proc/{id}/task/{id}/children")).unwrap();
                 (!children.trim().is_empty()).then_some(children)
-            });
+            };
+            wait_for("a task", tasks);
+            fail(&["farm", "plan", text(&dir)], &["another noisefloor plans or merges in this folder"]);
+            // A task dies with its coordinator
+            let children = wait_for("a task", tasks);
             let killed = Command::new("kill").arg("-9").args(children.split_whitespace()).status().unwrap();
-            assert!(killed.success());
+            assert!(killed.success(), "{children}");
         }
         std::thread::sleep(Duration::from_millis(random.u64(50..600)));
         first.kill().unwrap();

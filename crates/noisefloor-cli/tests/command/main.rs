@@ -78,4 +78,6 @@ mod study;
 /// What the screen shows: LUTs.
 #[cfg(test)]
 mod tone;
+/// Renders that are watched.
+#[cfg(test)]
 mod watch;
