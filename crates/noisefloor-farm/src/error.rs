@@ -6,6 +6,9 @@ use std::io;
 use std::path::PathBuf;
 use thiserror::Error;
 
+/// Version of the format of shards.
+pub(crate) const VERSION: u32 = 1;
+
 /// Why a shard cannot be used.
 #[derive(Debug, Error)]
 #[non_exhaustive]
@@ -17,10 +20,7 @@ pub enum ShardError {
     #[error("it is not a shard: its first bytes are not those of one")]
     Foreign,
     /// Of another release.
-    #[error(
-        "it has format version {0}, and this release reads version {VERSION}: render it again",
-        VERSION = crate::shard::VERSION
-    )]
+    #[error("it has format version {0}, and this release reads version {VERSION}: render it again")]
     Version(u32),
     /// The content is not what was written.
     #[error("it is damaged: {0}")]

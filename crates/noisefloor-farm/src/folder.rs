@@ -13,7 +13,6 @@
 use crate::error::FarmError;
 use crate::plan::Task;
 use crate::shard::{ShardFile, ShardJob};
-use crate::slurm::SlurmJobs;
 use noisefloor_image::write_atomic;
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use std::fs::{self, File, OpenOptions, TryLockError};
@@ -131,6 +130,15 @@ pub struct Round {
     pub started: bool,
     /// What Slurm runs it as.
     pub slurm: Option<SlurmJobs>,
+}
+
+/// What Slurm runs a round as.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct SlurmJobs {
+    /// The array of tasks; none if there was nothing to sample.
+    pub tasks: String,
+    /// The job that merges them, judges, and submits the next round.
+    pub step: String,
 }
 
 /// The folder of a farm.

@@ -46,10 +46,10 @@ mod slurm;
 mod task;
 
 pub use error::{FarmError, ShardError};
-pub use folder::{FarmFolder, FarmJob, FarmLock, FrameJob, FrameState, Round, frame_arguments};
+pub use folder::{FarmFolder, FarmJob, FarmLock, FrameJob, FrameState, Round, SlurmJobs, frame_arguments};
 pub use local::run_local;
 pub use merge::{Merged, Problem, ShardSet};
 pub use plan::{Task, split};
 pub use shard::{BatchEntry, Shard, ShardFile, ShardJob};
-pub use slurm::{Slurm, SlurmJobs};
+pub use slurm::Slurm;
 pub use task::sample;

@@ -5,7 +5,7 @@
 //! tile. Numbers are little-endian. The header has the BLAKE3 of each batch, so that a merge reads only the
 //! batch it needs.
 
-use crate::error::ShardError;
+use crate::error::{ShardError, VERSION};
 use noisefloor::{ProgressiveSource, Resumable, Rgb, Session, SourceError, SourceIdentity, Tile, TileGrid};
 use noisefloor_image::{WriteError, write_atomic};
 use serde::{Deserialize, Serialize};
@@ -14,7 +14,6 @@ use std::io::{self, BufReader, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
 const MAGIC: [u8; 8] = *b"NFSHARD\0";
-pub(crate) const VERSION: u32 = 1;
 /// Longest header that is read: some 300,000 batches.
 const MAX_HEADER: u64 = 64 << 20;
 /// Bytes before the header.

@@ -1,22 +1,12 @@
 //! A round as an array of Slurm jobs, followed by a job that merges it and submits the next one.
 
 use crate::error::FarmError;
-use crate::folder::{FarmFolder, Round};
-use serde::{Deserialize, Serialize};
+use crate::folder::{FarmFolder, Round, SlurmJobs};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// Array jobs have at most this many tasks, unless a cluster allows more (`MaxArraySize`, 1001 by default).
 const MAX_ARRAY: usize = 1000;
-
-/// What Slurm runs a round as.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct SlurmJobs {
-    /// The array of tasks; none if there was nothing to sample.
-    pub tasks: String,
-    /// The job that merges them, judges, and submits the next round.
-    pub step: String,
-}
 
 /// How rounds are submitted.
 #[derive(Clone, Debug)]

@@ -34,9 +34,9 @@ pub use config::expand;
 pub use doctor::DoctorArgs;
 pub use evaluate::EvaluateArgs;
 pub use explore::ExploreArgs;
-pub use farm::{
-    DirArgs, FarmArgs, FarmCommand, MergeArgs, PlanArgs, RunArgs, StatusArgs, StepArgs, TaskArgs,
-};
+#[cfg(feature = "farm")]
+pub use farm::{DirArgs, FarmCommand, PlanArgs, RunArgs, StatusArgs, StepArgs, TaskArgs};
+pub use farm::{FarmArgs, MergeArgs};
 pub use inspect::InspectArgs;
 pub use judge::JudgeArgs;
 pub use metrics::MetricsArgs;

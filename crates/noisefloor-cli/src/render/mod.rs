@@ -40,6 +40,7 @@ pub use frames::{FramePattern, SequenceJob, render_frames};
 pub use progress::reference_bar;
 pub use saving::Autosave;
 use saving::Pace;
+#[cfg(feature = "farm")]
 pub use snapshots::JOB;
 use snapshots::{Rendering, Snapshots};
 pub use tev::ADDRESS as TEV_ADDRESS;

@@ -1,0 +1,63 @@
+use super::*;
+
+#[test]
+fn values_map_to_the_ends_of_the_scale() {
+    let scale = ColourScale {
+        title: "",
+        low: 100.0,
+        high: 10_000.0,
+        log: true,
+        colours: colorous::VIRIDIS,
+        landmark: None,
+    };
+    assert_eq!((scale.place(100.0), scale.place(10_000.0), scale.place(5.0)), (0.0, 1.0, 0.0));
+    assert!((scale.place(1000.0) - 0.5).abs() < 1e-9 && (scale.value_at(0.5) - 1000.0).abs() < 1e-6);
+    let flat = ColourScale { low: 7.0, high: 7.0, log: false, ..scale };
+    assert_eq!(flat.place(7.0), 0.5);
+}
+
+#[test]
+fn colours_lie_over_their_tiles() {
+    let grid = noisefloor::TileGrid::new(64, 32, 32).unwrap();
+    let mark =
+        |i: usize| TileMark { tile: grid.tile(i), value: i as f64, label: String::new(), unfamiliar: i == 1 };
+    let scale = ColourScale {
+        title: "t",
+        low: 0.0,
+        high: 1.0,
+        log: false,
+        colours: colorous::VIRIDIS,
+        landmark: None,
+    };
+    let canvas = draw_tiles(&Canvas::new(64, 32, [0; 3]), &[mark(0), mark(1)], &scale);
+    let at = |x: usize, y: usize| &canvas.bytes()[(y * canvas.width() + x) * 3..][..3];
+    // Over black: 55 % of viridis' first and last colour.
+    assert_eq!(at(16, 16), [68.0, 1.0, 84.0].map(|c: f32| (0.55 * c).round() as u8));
+    assert_eq!(at(48, 16), [253.0, 231.0, 37.0].map(|c: f32| (0.55 * c).round() as u8));
+    // The mark of the second tile, and its like in the legend.
+    assert_eq!((at(34, 2), at(64 + 13, LEAST_HEIGHT - 16)), (&PAPER[..], &PAPER[..]));
+    assert_ne!(at(2, 2), PAPER);
+}
+
+#[test]
+fn fields_lie_over_a_dark_picture() {
+    let scale = ColourScale {
+        title: "t",
+        low: 1.0,
+        high: 16.0,
+        log: true,
+        colours: INFERNO,
+        landmark: Some((4.0, "here")),
+    };
+    let picture = Canvas::of_picture(4, &[[0.0; 3], [1.0; 3], [0.0; 3], [1.0; 3]]);
+    let canvas = draw_field(&picture, &[0.0, 16.0, 100.0, f32::NAN], &scale);
+    let at = |x: usize| &canvas.bytes()[x * 3..][..3];
+    let over = |colour: [f32; 3], grey: f32| colour.map(|c| (0.7 * c + 0.3 * 255.0 * grey).round() as u8);
+    // The first colour of the gradient, its last one twice, and none.
+    let last = [252.0, 255.0, 164.0];
+    assert_eq!(at(0), over([0.0, 0.0, 4.0], 0.0));
+    assert_eq!((at(1), at(2), at(3)), (&over(last, 1.0)[..], &over(last, 0.0)[..], &over([0.0; 3], 1.0)[..]));
+    // The landmark lies across the middle of the bar.
+    let y = LEAST_HEIGHT - 16 - (LEAST_HEIGHT - 16 - 50) / 2;
+    assert_eq!(&canvas.bytes()[(y * canvas.width() + 4 + 12) * 3..][..3], PAPER);
+}
