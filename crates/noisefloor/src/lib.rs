@@ -50,6 +50,7 @@ mod params;
 mod rgb;
 mod session;
 mod source;
+mod srgb;
 mod stills;
 mod stop;
 mod svm;
@@ -63,9 +64,7 @@ pub use criterion::{CriterionError, FixedSpp, Needs, Resumable, StoppingCriterio
 pub use descriptor::{
     Described, Descriptor, DescriptorError, DescriptorKind, DescriptorSpec, TileDescriptor,
 };
-pub use display::{
-    DEFAULT_KEY, DELTA, Display, ToneMapping, ToneMappingError, luminance, srgb_decode, srgb_encode,
-};
+pub use display::{DEFAULT_KEY, DELTA, Display, ToneMapping, ToneMappingError, luminance};
 pub use driver::{Clock, Driver, DriverError, Event, Progress, TimelinePoint};
 pub use evidence::{Evidence, HALO, ROUNDING_LUMINANCE, Rendering, Samples, TilePlanes, residual_scale};
 pub use familiarity::{Familiarity, nearest};
@@ -86,6 +85,7 @@ pub use session::{Session, SessionError};
 pub use source::{
     Batch, Counts, FirstHits, ProgressiveSource, Reference, Repeats, Request, SourceError, SourceInfo, Unit,
 };
+pub use srgb::{srgb_decode, srgb_encode};
 pub use stills::{SnapshotPair, Still, StillError};
 pub use stop::{Stop, StopReason};
 pub use svm::{Classifier, Platt, Scaler, Svm};

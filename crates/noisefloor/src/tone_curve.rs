@@ -58,7 +58,7 @@ impl ToneCurve {
 
     /// Exposed linear radiance → display values in [0, 1]. Without its function, plain sRGB.
     pub(crate) fn show(&self, exposed: Rgb) -> Rgb {
-        let shown = self.map.map_or_else(|| exposed.map(crate::display::srgb_encode), |map| map(exposed));
+        let shown = self.map.map_or_else(|| exposed.map(crate::srgb::srgb_encode), |map| map(exposed));
         shown.map(|c| if c > 0.0 { c.min(1.0) } else { 0.0 })
     }
 }
