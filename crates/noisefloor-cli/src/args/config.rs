@@ -9,9 +9,11 @@ use toml::{Table, Value};
 /// What was typed, with the options of the file that `--config` names after the name of the command: options typed
 /// come later, and win.
 pub fn expand(typed: Vec<OsString>) -> anyhow::Result<Vec<OsString>> {
-    let Some(at) = typed.iter().position(|word| word == "render") else { return Ok(typed) };
-    let Some(path) = config(&typed[at..]) else { return Ok(typed) };
-    let (before, after) = typed.split_at(at + 1);
+    if typed.get(1).is_none_or(|command| command != "render") {
+        return Ok(typed);
+    }
+    let Some(path) = config(&typed[2..]) else { return Ok(typed) };
+    let (before, after) = typed.split_at(2);
     let options = options(&path).with_context(|| format!("--config {}", path.display()))?;
     Ok([before, &options, after].concat())
 }
@@ -74,7 +76,7 @@ mod tests {
         expanded[2..6].sort();
         expected.extend_from_slice(&typed[2..]);
         assert_eq!(expanded, expected);
-        let nothing = words(&["noisefloor", "judge", "--config", file]);
+        let nothing = words(&["noisefloor", "judge", "render", "--config", file]);
         assert_eq!(expand(nothing.clone()).unwrap(), nothing);
         fs::write(&path, "size = [64, 32]").unwrap();
         assert!(expand(typed.clone()).unwrap_err().chain().any(|e| e.to_string().contains("size is a list")));

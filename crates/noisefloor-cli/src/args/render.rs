@@ -127,7 +127,7 @@ pub struct RenderArgs {
     #[arg(long, value_name = "FILE.toml")]
     config: Option<PathBuf>,
     /// `draft` for a quarter of the samples that people ask for: noise that is twice as strong as what is just seen
-    /// (with --denoise, 0.3 JOD lost). `final` for two verdicts in a row, so that no tile stops by luck.
+    /// (with --denoise, 0.3 JOD lost). `final` for two verdicts in a row, so that fewer tiles stop by luck.
     #[arg(long, value_enum)]
     preset: Option<Preset>,
     /// Show the picture in the viewer tev while it is rendered: samples and probabilities, too. A tev that runs
