@@ -128,7 +128,7 @@ impl<S: ProgressiveSource, C: StoppingCriterion> Driver<S, C> {
     }
 
     /// Stops all tiles once a run has taken this long. A call to the source that is under way is finished
-    /// first.
+    /// first, and one call is made however short the time.
     pub fn set_time_limit(&mut self, limit: Option<Duration>) {
         self.time_limit = limit;
     }
@@ -193,12 +193,13 @@ impl<S: ProgressiveSource, C: StoppingCriterion> Driver<S, C> {
             self.fetch_reference(on_event)?;
         }
         while !self.session.is_done() {
-            // Limits come first, so that a run with no time left takes no samples.
             if self.cancel.load(Ordering::Relaxed) {
                 self.end_all(StopReason::Cancelled, on_event);
                 break;
             }
-            if self.time_limit.is_some_and(|limit| start.elapsed() >= limit) {
+            // One call is made even so: whoever resumes in short runs arrives one day.
+            let begun = self.session.film().total_samples() > self.samples_before;
+            if begun && self.time_limit.is_some_and(|limit| start.elapsed() >= limit) {
                 self.end_all(StopReason::TimeLimit, on_event);
                 break;
             }
