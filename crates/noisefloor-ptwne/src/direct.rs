@@ -105,14 +105,15 @@ impl<'a> Tracer<'a> {
         // Both branches of glass
         let mut split = |reflectance: f32, dir: Vec3, tint: Vec3| {
             let mut both = self.follow(&surface, mirrored, DELTA, weight * reflectance, 2 * code);
-            if reflectance < 1.0 {
+            // Not what a shading normal sends through the surface, and yet to its front
+            if reflectance < 1.0 && dir.dot(surface.flat) < 0.0 {
                 both += self.follow(&surface, dir, DELTA, weight * tint * (1.0 - reflectance), 2 * code + 1);
             }
             both
         };
         sum + match &surface.material.bsdf {
             Bsdf::Diffuse { albedo } => {
-                let weight = weight * albedo.at(surface.uv);
+                let weight = weight * albedo.tinted(surface.uv, surface.tint);
                 let lambert = |dir: Vec3| dir.dot(surface.normal).max(0.0) * FRAC_1_PI;
                 let directions = self.directions() as f32;
                 let lights = self.lights(&surface, weight, code, |dir, pdf| {
@@ -121,7 +122,7 @@ impl<'a> Tracer<'a> {
                 lights + self.hemisphere(&surface, weight, code, |dir| Vec3::splat(lambert(dir)))
             }
             Bsdf::Mirror { fresnel, colour } => {
-                let factor = fresnel.at(colour.at(surface.uv), cos);
+                let factor = fresnel.at(colour.tinted(surface.uv, surface.tint), cos);
                 self.follow(&surface, mirrored, DELTA, weight * factor, 2 * code)
             }
             Bsdf::Glass { ior, tint } => {

@@ -53,7 +53,7 @@ fn first_hit(scene: &Scene, ray: &Ray, seed: u64, stack: &mut Stack) -> (Vec3, V
         (scene.background(ray.dir, |_, _| 1.0), Vec3::ZERO)
     } else {
         let surface = scene.surface(ray, &hit);
-        (surface.material.bsdf.colour(surface.uv), surface.normal)
+        (surface.material.bsdf.colour(surface.uv, surface.tint), surface.normal)
     };
     // NaN becomes 0, too
     (colour.max(Vec3::ZERO).min(Vec3::ONE), normal)

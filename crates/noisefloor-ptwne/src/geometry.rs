@@ -21,6 +21,8 @@ pub(crate) struct Group {
     /// Where the group's normals and texture coordinates begin in [`Vertices`]; [`NO`] if there are none.
     pub(crate) normals: u32,
     pub(crate) uvs: u32,
+    /// Where its colours of corners begin there; [`NO`] if there are none.
+    pub(crate) colours: u32,
     /// The axes of a sphere's texture coordinates, or how those of a disk run; [`NO`] for the usual ones.
     pub(crate) frame: u32,
 }
@@ -31,6 +33,7 @@ pub(crate) struct Vertices {
     pub(crate) corners: Vec<[u32; 3]>,
     pub(crate) normals: Vec<[f32; 3]>,
     pub(crate) uvs: Vec<[f32; 2]>,
+    pub(crate) colours: Vec<[f32; 3]>,
 }
 
 /// All surfaces of a scene, apart from their shapes.
@@ -83,14 +86,25 @@ impl Geometry {
         (a * (1.0 - u - v) + b * u + c * v).try_normalize()
     }
 
+    /// The colour between the corners of a planar surface of `group`, which has colours.
+    #[inline(never)]
+    pub(crate) fn tint(&self, group: &Group, prim: u32, [u, v]: [f32; 2]) -> Vec3 {
+        let corners = self.vertices.corners[(group.corners + prim - group.first) as usize];
+        let [a, b, c] =
+            corners.map(|i| Vec3::from_array(self.vertices.colours[(group.colours + i) as usize]));
+        // The edges are widened a little
+        (a * (1.0 - u - v) + b * u + c * v).clamp(Vec3::ZERO, Vec3::ONE)
+    }
+
     /// Memory that it takes, in bytes.
     pub(crate) fn bytes(&self) -> usize {
-        let Vertices { corners, normals, uvs } = &self.vertices;
+        let Vertices { corners, normals, uvs, colours } = &self.vertices;
         size_of_val(self.group_of.as_slice())
             + size_of_val(self.groups.as_slice())
             + size_of_val(corners.as_slice())
             + size_of_val(normals.as_slice())
             + size_of_val(uvs.as_slice())
+            + size_of_val(colours.as_slice())
             + size_of_val(self.frames.as_slice())
     }
 }

@@ -169,14 +169,14 @@ impl<'a, const OPACITY: bool> Path<'a, OPACITY> {
         sum: &mut Vec3,
     ) -> Option<Scattered> {
         match &surface.material.bsdf {
-            Bsdf::Diffuse { albedo } => self.diffuse(albedo.at(surface.uv), surface, throughput, sum),
+            Bsdf::Diffuse { albedo } => {
+                self.diffuse(albedo.tinted(surface.uv, surface.tint), surface, throughput, sum)
+            }
             Bsdf::Metal { .. } | Bsdf::Plastic { .. } | Bsdf::Blend { .. } => {
                 self.glossy(ray, surface, throughput, sum)
             }
             Bsdf::RoughGlass { .. } => self.rough_glass(ray, surface, throughput, sum),
-            Bsdf::Mirror { .. } | Bsdf::Glass { .. } | Bsdf::ThinGlass { .. } => {
-                Some(self.specular(ray, surface))
-            }
+            Bsdf::Mirror { .. } | Bsdf::Glass { .. } | Bsdf::ThinGlass { .. } => self.specular(ray, surface),
             // Intersections have one of its parts
             Bsdf::Mix { .. } => None,
         }
@@ -309,7 +309,7 @@ impl<'a, const OPACITY: bool> Path<'a, OPACITY> {
 
     /// Mirrors and glass. Glass reflects with the probability of its Fresnel term.
     #[inline(never)]
-    fn specular(&mut self, ray: &Ray, surface: &Intersection<'a>) -> Scattered {
+    fn specular(&mut self, ray: &Ray, surface: &Intersection<'a>) -> Option<Scattered> {
         let n = surface.normal;
         let cos = (-ray.dir.dot(n)).clamp(0.0, 1.0);
         let [pick, roulette, ..] = self.sampler.four();
@@ -320,7 +320,12 @@ impl<'a, const OPACITY: bool> Path<'a, OPACITY> {
                 if pick < reflectance {
                     (math::reflect(ray.dir, n), Vec3::ONE)
                 } else {
-                    (bsdf::refract(ray.dir, n, cos, cos_t, eta), *tint)
+                    let dir = bsdf::refract(ray.dir, n, cos, cos_t, eta);
+                    // A shading normal must not send through the surface what stays in front of it
+                    if dir.dot(surface.flat) >= 0.0 {
+                        return None;
+                    }
+                    (dir, *tint)
                 }
             }
             Bsdf::ThinGlass { ior, tint } => {
@@ -331,10 +336,10 @@ impl<'a, const OPACITY: bool> Path<'a, OPACITY> {
                 }
             }
             Bsdf::Mirror { fresnel, colour } => {
-                (math::reflect(ray.dir, n), fresnel.at(colour.at(surface.uv), cos))
+                (math::reflect(ray.dir, n), fresnel.at(colour.tinted(surface.uv, surface.tint), cos))
             }
             _ => (ray.dir, Vec3::ZERO),
         };
-        Scattered { dir, weight, pdf: DELTA, roulette }
+        Some(Scattered { dir, weight, pdf: DELTA, roulette })
     }
 }

@@ -1,12 +1,16 @@
 //! Rays through a scene, and the surfaces they hit.
 
 use crate::accel::{Hit, HitShape, Stack};
-use crate::bsdf::{Glossy, MIN_ROUGHNESS, RoughGlass};
+use crate::bsdf::{Glossy, MIN_ROUGHNESS, RoughGlass, schlick};
 use crate::geometry::NO;
 use crate::material::{Bsdf, CompiledMaterial};
 use crate::math::{Ray, Vec3};
+use crate::relief::{self, Relief};
 use crate::rng;
 use crate::scene::Scene;
+
+/// What a coat with an index of refraction of 1.5 reflects at normal incidence.
+const COAT: f32 = 0.04;
 
 /// How it is decided whether a ray passes a partly transparent surface.
 #[derive(Clone, Copy, Debug)]
@@ -29,6 +33,8 @@ pub(crate) struct Intersection<'a> {
     /// Whether the ray hit the front.
     pub(crate) front: bool,
     pub(crate) uv: [f32; 2],
+    /// The colour between its corners; white if they have none.
+    pub(crate) tint: Vec3,
     pub(crate) material: &'a CompiledMaterial,
     /// The index of its light; [`NO`] if it does not shine.
     pub(crate) light: u32,
@@ -115,15 +121,41 @@ impl Scene {
         if normal.dot(ray.dir) >= 0.0 {
             normal = flat;
         }
-        let mut material = material;
-        while let Bsdf::Mix { parts, share } = &material.bsdf {
+        let (mut material, mut relief) = (material, &material.relief);
+        while let Bsdf::Mix { parts, share, coat } = &material.bsdf {
             let number = rng::hash(bits_of(ray, hit.t), parts[0]);
             let share = share.at(uv);
-            let second = number < (share.x + share.y + share.z) * (1.0 / 3.0);
+            let mut share = (share.x + share.y + share.z) * (1.0 / 3.0);
+            if *coat {
+                share *= schlick(Vec3::splat(COAT), -ray.dir.dot(normal)).x;
+            }
+            let second = number < share;
             material = &self.materials[parts[usize::from(second)] as usize];
+            if material.relief.is_some() {
+                relief = &material.relief;
+            }
         }
+        if let Some(relief) = relief {
+            let shiny = !matches!(material.bsdf, Bsdf::Diffuse { .. });
+            normal = self.relieved(relief, hit, ray.dir, Sides { flat, normal, front, uv, shiny });
+        }
+        let tint = if group.colours == NO { Vec3::ONE } else { self.geometry.tint(group, prim, hit.uv) };
         let light = if group.light == NO { NO } else { group.light + prim - group.first };
-        Intersection { position, flat, normal, front, uv, material, light }
+        Intersection { position, flat, normal, front, uv, tint, material, light }
+    }
+
+    /// The shading normal of a surface with relief, on the side of the ray's origin.
+    #[cold]
+    #[inline(never)]
+    fn relieved(&self, relief: &Relief, hit: &Hit, dir: Vec3, sides: Sides) -> Vec3 {
+        let Sides { flat, normal, front, uv, shiny } = sides;
+        // Relief is that of the front; from behind its bumps are dents
+        let sign = if front { 1.0 } else { -1.0 };
+        let along = self.tangents(hit, flat * sign);
+        match along.and_then(|along| relief.turned(normal * sign, along, uv)) {
+            Some(turned) => relief::bent(turned * sign, flat, -dir, shiny),
+            None => normal,
+        }
     }
 
     /// The origin of a ray that leaves `surface` on the side that `dir` points to.
@@ -134,6 +166,16 @@ impl Scene {
         let side = if dir.dot(surface.flat) < 0.0 { -distance } else { distance };
         surface.position + surface.flat * side
     }
+}
+
+/// The normals of a surface without its relief, towards the ray's origin.
+struct Sides {
+    flat: Vec3,
+    normal: Vec3,
+    front: bool,
+    uv: [f32; 2],
+    /// Whether it mirrors.
+    shiny: bool,
 }
 
 /// The bits of a ray and a distance: different ones for different samples, so that a hash of them is random.
@@ -156,15 +198,18 @@ impl<'a> Intersection<'a> {
     #[inline]
     pub(crate) fn glossy(&self, cos: f32) -> Option<Glossy<'a>> {
         match &self.material.bsdf {
-            Bsdf::Metal { fresnel, colour, ggx } => Some(Glossy::metal(fresnel, colour.at(self.uv), *ggx)),
+            Bsdf::Metal { fresnel, colour, ggx } => {
+                Some(Glossy::metal(fresnel, colour.tinted(self.uv, self.tint), *ggx))
+            }
             Bsdf::Plastic { diffuse, specular, alpha, nonlinear, coat } => {
-                let diffuse = diffuse.at(self.uv);
+                let diffuse = diffuse.tinted(self.uv, self.tint);
                 Some(Glossy::plastic(coat, diffuse, *specular, *alpha, *nonlinear, cos))
             }
             Bsdf::Blend { base, metallic_roughness, coat } => {
                 let values = metallic_roughness.at(self.uv);
                 let alpha = (values.y * values.y).max(MIN_ROUGHNESS);
-                Some(Glossy::blend(coat, base.at(self.uv), alpha, values.z, cos))
+                let base = base.tinted(self.uv, self.tint);
+                Some(Glossy::blend(coat, base, alpha, values.z, cos))
             }
             _ => None,
         }

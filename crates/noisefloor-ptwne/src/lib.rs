@@ -26,7 +26,7 @@
 //! `integrator` traces paths, `bsdf` scatters light, `light` samples emitters, `illumination` and
 //! `intersection` are what a scene answers them, and `accel` is its hierarchy. The reference is in
 //! `reference`, its samples in `direct`, and its choice of lights in `guide`. `first_hits` has albedo and
-//! normals for denoisers. `builder` fills `parts`, of
+//! normals for denoisers. `relief` turns shading normals, along `tangents`. `builder` fills `parts`, of
 //! which `scene` is made. Absent on purpose: state between samples, allocation along paths, and any number
 //! that depends on threads.
 
@@ -51,11 +51,13 @@ mod material;
 mod math;
 mod parts;
 mod reference;
+mod relief;
 mod renderer;
 mod rng;
 mod sampler;
 mod scene;
 pub mod scenes;
+mod tangents;
 mod texture;
 
 pub use bsdf::{Facets, MIN_ROUGHNESS};
@@ -69,6 +71,7 @@ pub use integrator::Estimator;
 pub use light::Punctual;
 pub use material::{Material, MaterialOptions};
 pub use reference::ReferenceNoise;
+pub use relief::Relief;
 pub use renderer::{MAX_DEPTH, MAX_THREADS, Ptwne, RenderOptions, SampleCounts};
 pub use sampler::Sampling;
 pub use scene::Scene;

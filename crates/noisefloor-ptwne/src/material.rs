@@ -4,6 +4,7 @@ use crate::bsdf::{Coat, Facets, Fresnel, Ggx, Interior, MIN_ROUGHNESS};
 use crate::checks::{check_range, check_reflectance};
 use crate::error::SceneError;
 use crate::math::Vec3;
+use crate::relief::Relief;
 use crate::texture::Texture;
 use noisefloor::Rgb;
 use std::sync::Arc;
@@ -110,6 +111,8 @@ pub struct MaterialOptions {
     pub one_sided: bool,
     /// The microfacets of rough conductors.
     pub facets: Facets,
+    /// Structure of the surface. That of a mix is also that of its parts that have none.
+    pub relief: Option<Relief>,
 }
 
 /// A material and its options, prepared for the inner loop.
@@ -118,6 +121,7 @@ pub(crate) struct CompiledMaterial {
     pub(crate) bsdf: Bsdf,
     pub(crate) opacity: Option<Texture>,
     pub(crate) one_sided: bool,
+    pub(crate) relief: Option<Box<Relief>>,
 }
 
 /// A colour, looked up only if it varies.
@@ -125,6 +129,8 @@ pub(crate) struct CompiledMaterial {
 pub(crate) enum Reflectance {
     Constant(Vec3),
     Textured(Box<Texture>),
+    /// Times the colours of corners.
+    Corners(Option<Box<Texture>>),
 }
 
 /// How a surface scatters light.
@@ -167,23 +173,25 @@ pub(crate) enum Bsdf {
         metallic_roughness: Reflectance,
         coat: Arc<Coat>,
     },
-    /// `share` of the second material, and the rest of the first, by their indices.
+    /// `share` of the second material, and the rest of the first, by their indices. The share of a `coat` is
+    /// multiplied with what a smooth boundary reflects.
     Mix {
         parts: [u32; 2],
         share: Reflectance,
+        coat: bool,
     },
 }
 
 impl Bsdf {
     /// What colour a denoiser should take the surface for: of diffuse and metallic parts their albedo, of glass
     /// its tint.
-    pub(crate) fn colour(&self, uv: [f32; 2]) -> Vec3 {
+    pub(crate) fn colour(&self, uv: [f32; 2], tint: Vec3) -> Vec3 {
         match self {
             Self::Diffuse { albedo: colour }
             | Self::Mirror { colour, .. }
             | Self::Metal { colour, .. }
             | Self::Plastic { diffuse: colour, .. }
-            | Self::Blend { base: colour, .. } => colour.at(uv),
+            | Self::Blend { base: colour, .. } => colour.tinted(uv, tint),
             Self::Glass { tint, .. } | Self::ThinGlass { tint, .. } | Self::RoughGlass { tint, .. } => *tint,
             // Intersections have one of its parts
             Self::Mix { .. } => Vec3::ZERO,
@@ -193,22 +201,31 @@ impl Bsdf {
 
 impl Reflectance {
     pub(crate) fn new(texture: Texture) -> Self {
-        match texture.constant() {
-            Some(colour) => Self::Constant(colour),
-            None => Self::Textured(Box::new(texture)),
+        match (texture.constant(), texture) {
+            (Some(colour), _) => Self::Constant(colour),
+            (None, Texture::Corners(texture)) => Self::Corners(texture),
+            (None, texture) => Self::Textured(Box::new(texture)),
         }
     }
 
     fn varies(&self) -> bool {
-        matches!(self, Self::Textured(_))
+        !matches!(self, Self::Constant(_) | Self::Corners(None))
     }
 
-    /// The colour at `uv`.
+    /// The colour at `uv`, where that of the corners does not count.
     #[inline]
     pub(crate) fn at(&self, uv: [f32; 2]) -> Vec3 {
+        self.tinted(uv, Vec3::ONE)
+    }
+
+    /// The colour at `uv`, between corners of the colour `tint`.
+    #[inline]
+    pub(crate) fn tinted(&self, uv: [f32; 2], tint: Vec3) -> Vec3 {
         match self {
             Self::Constant(colour) => *colour,
             Self::Textured(texture) => texture.eval(uv[0], uv[1]),
+            Self::Corners(None) => tint,
+            Self::Corners(Some(texture)) => tint * texture.eval(uv[0], uv[1]),
         }
     }
 }
@@ -261,6 +278,13 @@ impl Material {
     }
 }
 
+impl MaterialOptions {
+    fn check(&self) -> Result<(), SceneError> {
+        self.opacity.as_ref().map_or(Ok(()), Texture::check)?;
+        self.relief.as_ref().map_or(Ok(()), Relief::check)
+    }
+}
+
 impl CompiledMaterial {
     /// Checks a material and its options, and prepares them for the inner loop. Equal coats are shared, since
     /// they are tables.
@@ -270,7 +294,7 @@ impl CompiledMaterial {
         coats: &mut Vec<Arc<Coat>>,
     ) -> Result<Self, SceneError> {
         material.check()?;
-        options.opacity.as_ref().map_or(Ok(()), Texture::check)?;
+        options.check()?;
         let metal = |fresnel, colour, alpha| metal(fresnel, colour, alpha, options.facets);
         let mut coat = |ior, alpha, inside| shared_coat(coats, ior, alpha, inside);
         // A smooth coat masks nothing
@@ -313,21 +337,26 @@ impl CompiledMaterial {
                 }
             }
         };
-        Ok(Self::with(bsdf, options.opacity, options.one_sided))
+        Ok(Self::with(bsdf, options))
     }
 
     /// A mix of two materials that exist already.
-    pub(crate) fn mix(parts: [u32; 2], share: Texture, options: MaterialOptions) -> Result<Self, SceneError> {
+    pub(crate) fn mix(
+        parts: [u32; 2],
+        share: Texture,
+        coat: bool,
+        options: MaterialOptions,
+    ) -> Result<Self, SceneError> {
         share.check()?;
-        options.opacity.as_ref().map_or(Ok(()), Texture::check)?;
-        let bsdf = Bsdf::Mix { parts, share: Reflectance::new(share) };
-        Ok(Self::with(bsdf, options.opacity, options.one_sided))
+        options.check()?;
+        let bsdf = Bsdf::Mix { parts, share: Reflectance::new(share), coat };
+        Ok(Self::with(bsdf, options))
     }
 
-    fn with(bsdf: Bsdf, opacity: Option<Texture>, one_sided: bool) -> Self {
+    fn with(bsdf: Bsdf, MaterialOptions { opacity, one_sided, relief, .. }: MaterialOptions) -> Self {
         // An opacity of one everywhere is none
         let opacity = opacity.filter(|o| o.constant() != Some(Vec3::ONE));
-        Self { bsdf, opacity, one_sided }
+        Self { bsdf, opacity, one_sided, relief: relief.map(Box::new) }
     }
 
     /// Whether it has a texture.
@@ -342,7 +371,7 @@ impl CompiledMaterial {
             // Its parts may have one
             Bsdf::Mix { .. } => true,
         };
-        colours || self.opacity.as_ref().is_some_and(|o| o.constant().is_none())
+        colours || self.relief.is_some() || self.opacity.as_ref().is_some_and(|o| o.constant().is_none())
     }
 }
 

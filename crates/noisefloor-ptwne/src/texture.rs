@@ -41,6 +41,10 @@ pub enum Texture {
     },
     /// An image.
     Image(ImageTexture),
+    /// The colours of the mesh's corners ([`Mesh::colours`](crate::Mesh::colours)), interpolated, times a texture
+    /// if there is one. Only for the colour of a material: anywhere else, and on surfaces without such colours,
+    /// corners are white.
+    Corners(Option<Box<Texture>>),
 }
 
 /// An image in memory. It covers the unit square of u and v; v = 0 is the bottom row.
@@ -162,6 +166,8 @@ impl Texture {
             Texture::Checker { colours, scale } | Texture::Noise { colours, scale } => (colours, scale),
             Texture::Brick { brick, mortar, scale } => (&[*brick, *mortar], scale),
             Texture::Image(image) => return image.check(),
+            Texture::Corners(None) => return Ok(()),
+            Texture::Corners(Some(texture)) => return texture.check(),
         };
         if !scale.iter().all(|s| s.is_finite()) {
             return Err(SceneError::NotFinite { what: "the scale of a texture" });
@@ -180,8 +186,7 @@ impl Texture {
     /// The mean colour of an image's pixels, or of a pattern over the unit square.
     pub(crate) fn mean(&self) -> Vec3 {
         if let Texture::Image(image) = self {
-            let sum: glam::DVec3 = (0..image.pixels.len()).map(|i| image.pixels.at(i).as_dvec3()).sum();
-            return (sum / image.pixels.len() as f64).as_vec3a() * Vec3::from_array(image.factor);
+            return image.mean().into();
         }
         const SIDE: u32 = 64;
         let centre = |i: u32| (i as f32 + 0.5) / SIDE as f32;
@@ -217,6 +222,8 @@ impl Texture {
                 Vec3::from_array(colours[0]).lerp(Vec3::from_array(colours[1]), t)
             }
             Texture::Image(image) => image.eval(u, v),
+            Texture::Corners(None) => Vec3::ONE,
+            Texture::Corners(Some(texture)) => texture.eval(u, v),
         }
     }
 }
@@ -229,6 +236,13 @@ impl ImageTexture {
     pub fn new(width: usize, height: usize, pixels: Pixels) -> Self {
         let (factor, wrap) = ([1.0; 3], [Wrap::Repeat; 2]);
         Self { width, height, pixels, to_uv: Self::IDENTITY, factor, wrap, nearest: false }
+    }
+
+    /// The mean colour of its pixels, times the factor.
+    pub fn mean(&self) -> Rgb {
+        let sum: glam::DVec3 = (0..self.pixels.len()).map(|i| self.pixels.at(i).as_dvec3()).sum();
+        let mean = (sum / self.pixels.len() as f64).as_vec3a() * Vec3::from_array(self.factor);
+        mean.to_array()
     }
 
     fn check(&self) -> Result<(), SceneError> {
@@ -249,7 +263,12 @@ impl ImageTexture {
 
     fn eval(&self, u: f32, v: f32) -> Vec3 {
         let place = |row: [f32; 3]| row[0] * u + row[1] * v + row[2];
-        let (u, v) = (place(self.to_uv[0]), place(self.to_uv[1]));
+        self.at(place(self.to_uv[0]), place(self.to_uv[1]))
+    }
+
+    /// The colour at image coordinates.
+    #[inline]
+    pub(crate) fn at(&self, u: f32, v: f32) -> Vec3 {
         let (x0, x1, fx) = self.wrap[0].around(u * self.width as f32 - 0.5, self.width);
         let (y0, y1, fy) = self.wrap[1].around((1.0 - v) * self.height as f32 - 0.5, self.height);
         let factor = Vec3::from_array(self.factor);

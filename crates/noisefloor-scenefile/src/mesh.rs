@@ -4,6 +4,7 @@ pub(crate) mod obj;
 pub(crate) mod ply;
 pub(crate) mod serialized;
 pub(crate) mod solids;
+pub(crate) mod subdivide;
 
 use crate::error::{LoadError, Place};
 use glam::{DMat3, DMat4, DVec3, Vec3};

@@ -87,6 +87,22 @@ impl Bvh {
         (round.prim, shape)
     }
 
+    /// The edges of the planar surface or ellipse that was hit, along which its coordinates run; none for
+    /// spheres.
+    pub(crate) fn edges(&self, hit: &Hit) -> Option<[Vec3; 2]> {
+        let [normal, u, v] = if hit.slot & ROUND == 0 {
+            self.packs[(hit.slot >> 2) as usize].plane((hit.slot & 3) as usize)
+        } else {
+            match self.rounds[(hit.slot & !ROUND) as usize].shape {
+                RoundShape::Sphere { .. } => return None,
+                RoundShape::Disk { normal, dual_u, dual_v } => [normal, dual_u, dual_v],
+            }
+        };
+        // The dual basis of the dual basis
+        let inverse = normal.dot(u.cross(v)).recip();
+        Some([v.cross(normal) * inverse, normal.cross(u) * inverse])
+    }
+
     /// Memory that the hierarchy takes, in bytes.
     pub(crate) fn bytes(&self) -> usize {
         size_of_val(self.nodes.as_slice())

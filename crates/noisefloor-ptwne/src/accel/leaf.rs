@@ -71,6 +71,11 @@ impl Pack {
         self.prim[lane] = prim;
     }
 
+    /// The normal and the dual basis of a lane.
+    pub(super) fn plane(&self, lane: usize) -> [Vec3; 3] {
+        [&self.normal, &self.dual_u, &self.dual_v].map(|v| Vec3::new(v[0][lane], v[1][lane], v[2][lane]))
+    }
+
     /// Distances, u, v, and a mask of the surfaces that the ray meets before `t_max`.
     #[inline]
     pub(super) fn intersect(&self, ray: &WideRay, t_max: f32) -> (Vec4, Vec4, Vec4, u32) {

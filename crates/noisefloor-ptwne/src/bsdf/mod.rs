@@ -10,7 +10,7 @@ mod rough_glass;
 mod tests;
 
 pub(crate) use coat::{Coat, Interior};
-pub(crate) use fresnel::{Fresnel, fresnel, pane, refract};
+pub(crate) use fresnel::{Fresnel, fresnel, pane, refract, schlick};
 pub(crate) use ggx::Ggx;
 pub use ggx::{Facets, MIN_ROUGHNESS};
 pub(crate) use glossy::Glossy;

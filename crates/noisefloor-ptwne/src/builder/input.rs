@@ -1,6 +1,6 @@
 //! What a builder is given.
 
-use crate::checks::position;
+use crate::checks::{check_reflectance, position};
 use crate::error::SceneError;
 use crate::texture::Texture;
 use noisefloor::Rgb;
@@ -48,6 +48,8 @@ pub struct Mesh<'a> {
     pub normals: &'a [[f32; 3]],
     /// One pair of texture coordinates per position, or none: then (0, 0), (1, 0), (0, 1) on each triangle.
     pub uvs: &'a [[f32; 2]],
+    /// One colour per position for [`Texture::Corners`], each channel in 0…1, or none.
+    pub colours: &'a [[f32; 3]],
     /// Three indices per triangle, counter-clockwise as seen from the front.
     pub indices: &'a [[u32; 3]],
 }
@@ -56,7 +58,11 @@ impl Mesh<'_> {
     /// Checks that all numbers are in range, and that lengths and indices fit.
     pub(super) fn check(&self) -> Result<(), SceneError> {
         let vertices = self.positions.len();
-        for (what, found) in [("normals", self.normals.len()), ("texture coordinates", self.uvs.len())] {
+        for (what, found) in [
+            ("normals", self.normals.len()),
+            ("texture coordinates", self.uvs.len()),
+            ("colours", self.colours.len()),
+        ] {
             if found != 0 && found != vertices {
                 return Err(SceneError::Lengths { what, positions: vertices, found });
             }
@@ -67,6 +73,7 @@ impl Mesh<'_> {
         for p in self.positions.iter().chain(self.normals) {
             position(*p)?;
         }
+        self.colours.iter().try_for_each(|c| check_reflectance(*c))?;
         match self.indices.iter().flatten().find(|i| **i as usize >= vertices) {
             Some(&index) => Err(SceneError::Index { index, vertices }),
             None => Ok(()),

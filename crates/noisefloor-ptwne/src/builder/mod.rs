@@ -1,6 +1,7 @@
 //! Builds scenes from meshes, spheres, materials, emitters, an environment and a camera.
 
 mod input;
+mod materials;
 mod scene_builder;
 
 #[cfg(test)]

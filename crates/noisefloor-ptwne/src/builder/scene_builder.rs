@@ -9,10 +9,8 @@ use crate::environment::{Environment, EnvironmentMap};
 use crate::error::SceneError;
 use crate::geometry::{Group, NO, RINGS, RINGS_REVERSED};
 use crate::light::{Light, Punctual};
-use crate::material::{CompiledMaterial, Material, MaterialOptions};
 use crate::parts::{Parts, Surroundings};
 use crate::scene::Scene;
-use crate::texture::Texture;
 use glam::Vec3;
 use noisefloor::Rgb;
 use std::sync::Arc;
@@ -36,8 +34,8 @@ use std::sync::Arc;
 pub struct SceneBuilder {
     name: String,
     camera: Camera,
-    parts: Parts,
-    coats: Vec<Arc<Coat>>,
+    pub(super) parts: Parts,
+    pub(super) coats: Vec<Arc<Coat>>,
 }
 
 impl SceneBuilder {
@@ -48,49 +46,6 @@ impl SceneBuilder {
     pub fn new(name: impl Into<String>, camera: Camera) -> Result<Self, SceneError> {
         camera.check()?;
         Ok(Self { name: name.into(), camera, parts: Parts::default(), coats: vec![] })
-    }
-
-    /// Adds a material that is opaque and two-sided.
-    ///
-    /// # Errors
-    /// As [`SceneBuilder::material_with`].
-    pub fn material(&mut self, material: Material) -> Result<MaterialId, SceneError> {
-        self.material_with(material, MaterialOptions::default())
-    }
-
-    /// Adds a material that may be transparent in parts, or one-sided.
-    ///
-    /// # Errors
-    /// [`SceneError`] if a reflectance, index of refraction or roughness is out of range, or an image has the
-    /// wrong number of pixels.
-    pub fn material_with(
-        &mut self,
-        material: Material,
-        options: MaterialOptions,
-    ) -> Result<MaterialId, SceneError> {
-        self.parts.materials.push(CompiledMaterial::new(material, options, &mut self.coats)?);
-        Ok(MaterialId(self.parts.materials.len() as u32 - 1))
-    }
-
-    /// Adds a material that is `share` of the second one (the mean of the channels) and the rest of the
-    /// first. Their opacities do not count, only that of `options`.
-    ///
-    /// # Errors
-    /// [`SceneError`] if a material is of another builder, or a share is not in 0…1.
-    pub fn mixed_material(
-        &mut self,
-        first: MaterialId,
-        second: MaterialId,
-        share: Texture,
-        options: MaterialOptions,
-    ) -> Result<MaterialId, SceneError> {
-        for MaterialId(id) in [first, second] {
-            if id as usize >= self.parts.materials.len() {
-                return Err(SceneError::Material(id));
-            }
-        }
-        self.parts.materials.push(CompiledMaterial::mix([first.0, second.0], share, options)?);
-        Ok(MaterialId(self.parts.materials.len() as u32 - 1))
     }
 
     /// Sets how the camera projects, besides its field of view.
@@ -239,7 +194,7 @@ impl SceneBuilder {
         emission: Option<Emission>,
     ) -> Result<usize, SceneError> {
         mesh.check()?;
-        let with_vertices = !mesh.normals.is_empty() || !mesh.uvs.is_empty();
+        let with_vertices = [mesh.normals.len(), mesh.uvs.len(), mesh.colours.len()] != [0; 3];
         let (mut group, group_emission) = self.group(material, emission.as_ref())?;
         if with_vertices {
             let vertices = &mut self.parts.geometry.vertices;
@@ -252,6 +207,10 @@ impl SceneBuilder {
             if !mesh.uvs.is_empty() {
                 group.uvs = index(vertices.uvs.len())?;
                 vertices.uvs.extend(mesh.uvs);
+            }
+            if !mesh.colours.is_empty() {
+                group.colours = index(vertices.colours.len())?;
+                vertices.colours.extend(mesh.colours);
             }
         }
         let mut left_out = 0;
@@ -307,7 +266,16 @@ impl SceneBuilder {
         let light = if group_emission.is_some() { index(self.parts.lights.len())? } else { NO };
         let first = index(self.parts.shapes.len())?;
         Ok((
-            Group { first, material: material.0, light, corners: NO, normals: NO, uvs: NO, frame: NO },
+            Group {
+                first,
+                material: material.0,
+                light,
+                corners: NO,
+                normals: NO,
+                uvs: NO,
+                colours: NO,
+                frame: NO,
+            },
             group_emission,
         ))
     }

@@ -160,6 +160,15 @@ impl Kit {
                 indices.extend([[a, a + 2, a + 1], [a + 1, a + 2, a + 3]]);
             }
         }
-        self.mesh(&Mesh { positions: &positions, normals: &normals, uvs: &uvs, indices: &indices }, m);
+        self.mesh(
+            &Mesh {
+                positions: &positions,
+                normals: &normals,
+                uvs: &uvs,
+                indices: &indices,
+                ..Mesh::default()
+            },
+            m,
+        );
     }
 }

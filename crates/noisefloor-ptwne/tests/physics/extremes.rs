@@ -41,7 +41,7 @@ fn tiny_bright_lights_and_grazing_cameras_stay_finite() {
                         positions: &needle,
                         normals: &[[0.0, -1.0, 1e-20]; 3],
                         indices: &[[0, 1, 2]],
-                        uvs: &[],
+                        ..Mesh::default()
                     },
                     floor,
                     None,

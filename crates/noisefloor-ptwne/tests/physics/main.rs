@@ -17,4 +17,5 @@ mod furnace; // energy neither made nor lost
 mod kit;
 mod mis; // next events, scattering, and both
 mod reference; // how free of noise the reference is
+mod relief; // normal maps, bumps, coats, colours of corners
 mod stiff; // scenes with known trouble

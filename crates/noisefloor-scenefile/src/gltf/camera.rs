@@ -38,6 +38,11 @@ pub(super) fn first(
     Ok(Some(camera(at.to_world.translation, view, up, f64::from(perspective.yfov).to_degrees())))
 }
 
+/// Any camera, until there is one that sees the scene.
+pub(super) fn anywhere() -> Camera {
+    camera(DVec3::Z, DVec3::NEG_Z, DVec3::Y, DEFAULT_FOV)
+}
+
 /// A camera that sees the whole box from in front of it, above and to the right.
 pub(super) fn framing([min, max]: [DVec3; 2]) -> Camera {
     let centre = (min + max) / 2.0;

@@ -1,16 +1,19 @@
 //! Materials (glTF 2.0, §3.9) with their extensions.
 
 use super::asset::{Asset, name};
+use super::clearcoat::{self, Clearcoat, Coat};
+use super::gloss::Gloss;
 use super::notes::Notes;
-use super::texture::{Encoding, Textures, set};
+use super::texture::{Encoding, Textures, mean, normal_info, set};
 use crate::{LoadError, Place};
+use gltf::json::extensions::material::PbrSpecularGlossiness;
 use gltf::json::material::{AlphaMode, Material as Source};
 use gltf::json::texture::Info;
 use gltf::json::validation::Checked;
 use gltf::json::{Index, extensions};
-use noisefloor::Rgb;
+use noisefloor::{Rgb, luminance};
 use noisefloor_ptwne::{
-    Emission, ImageTexture, Material, MaterialId, MaterialOptions, SceneBuilder, Texture,
+    Emission, ImageTexture, Material, MaterialId, MaterialOptions, Relief, SceneBuilder, Texture,
 };
 use std::collections::HashMap;
 
@@ -18,11 +21,18 @@ use std::collections::HashMap;
 const MIN_COAT_IOR: f32 = 1.001;
 const MAX_IOR: f32 = 4.0;
 
+/// From which mean luminance on an emission lights a scene, instead of only showing that something glows.
+const LAMP: f32 = 0.5;
+
 /// A material in the scene.
 #[derive(Clone, Debug)]
 pub(super) struct Look {
     pub(super) id: MaterialId,
     pub(super) emission: Option<Emission>,
+    /// Whether its emission lights the scene.
+    pub(super) lamp: bool,
+    /// Whether it shows its colour without any light.
+    pub(super) unlit: bool,
     /// The set of texture coordinates of its textures, if it has any.
     pub(super) set: Option<u32>,
 }
@@ -32,7 +42,8 @@ pub(super) struct Look {
 pub(super) struct Materials<'a> {
     asset: &'a Asset<'a>,
     textures: Textures<'a>,
-    looks: HashMap<Option<usize>, Look>,
+    /// By index, and whether the mesh has colours.
+    looks: HashMap<(Option<usize>, bool), Look>,
 }
 
 impl<'a> Materials<'a> {
@@ -40,15 +51,17 @@ impl<'a> Materials<'a> {
         Self { asset, textures: Textures::new(asset), looks: HashMap::new() }
     }
 
-    /// The material of that index, named by `place`; or glTF's default material.
+    /// The material of that index, named by `place`; or glTF's default material. `coloured` multiplies it with the
+    /// colours of corners.
     pub(super) fn look(
         &mut self,
         index: Option<Index<Source>>,
+        coloured: bool,
         place: &Place,
         builder: &mut SceneBuilder,
         notes: &mut Notes,
     ) -> Result<Look, LoadError> {
-        let key = index.map(|index| index.value());
+        let key = (index.map(|index| index.value()), coloured);
         if let Some(look) = self.looks.get(&key) {
             return Ok(look.clone());
         }
@@ -61,11 +74,17 @@ impl<'a> Materials<'a> {
             None => (&default, "default material".to_owned()),
         };
         let place = Place::part(self.asset.path, called);
-        let mut reader = Reader { source, place, set: None, textures: &mut self.textures, notes };
-        let (material, cover, emission) = reader.read()?;
+        let mut reader = Reader { source, place, set: None, coloured, textures: &mut self.textures, notes };
+        let read = reader.read()?;
+        let coat = if read.unlit { None } else { reader.coat()? };
         let (set, place) = (reader.set, reader.place);
-        let id = builder.material_with(material, cover).map_err(|cause| LoadError::Scene { place, cause })?;
-        let look = Look { id, emission, set };
+        let Read { material, cover, emission, lamp, unlit } = read;
+        let refused = |cause| LoadError::Scene { place: place.clone(), cause };
+        let id = match coat {
+            None => builder.material_with(material, cover).map_err(refused)?,
+            Some(coat) => coat.over(material, cover, builder).map_err(refused)?,
+        };
+        let look = Look { id, emission, lamp, unlit, set };
         self.looks.insert(key, look.clone());
         Ok(look)
     }
@@ -76,42 +95,139 @@ struct Reader<'m, 'a> {
     source: &'m Source,
     place: Place,
     set: Option<u32>,
+    coloured: bool,
     textures: &'m mut Textures<'a>,
     notes: &'m mut Notes,
 }
 
+/// What it reads.
+struct Read {
+    material: Material,
+    cover: MaterialOptions,
+    emission: Option<Emission>,
+    lamp: bool,
+    unlit: bool,
+}
+
 impl<'m> Reader<'m, '_> {
-    fn read(&mut self) -> Result<(Material, MaterialOptions, Option<Emission>), LoadError> {
+    fn read(&mut self) -> Result<Read, LoadError> {
         let source = self.source;
         let pbr = &source.pbr_metallic_roughness;
-        let ignored = [
-            ("a normal map", source.normal_texture.is_some()),
-            ("an occlusion map", source.occlusion_texture.is_some()),
-        ];
-        for (what, _) in ignored.iter().filter(|(_, there)| *there) {
-            self.notes.warn(&self.place, format_args!("{what} is ignored"));
+        if source.occlusion_texture.is_some() {
+            self.notes.warn(&self.place, "an occlusion map is ignored: light is traced");
         }
-        self.notes.extensions(&self.place, source.extensions.iter().flat_map(|e| e.others.keys()));
+        let others = source.extensions.iter().flat_map(|e| e.others.keys());
+        self.notes.extensions(&self.place, others.filter(|name| *name != clearcoat::NAME));
         self.notes.extensions(&self.place, pbr.extensions.iter().flat_map(|e| e.others.keys()));
 
         // The first texture chooses the set of texture coordinates
+        let gloss = self.extensions().and_then(|e| e.pbr_specular_glossiness.as_ref());
+        let (base_texture, metal_texture) = match gloss {
+            Some(gloss) => (&gloss.diffuse_texture, &gloss.specular_glossiness_texture),
+            None => (&pbr.base_color_texture, &pbr.metallic_roughness_texture),
+        };
         let [base_texture, metal_texture, emissive_texture] =
-            [&pbr.base_color_texture, &pbr.metallic_roughness_texture, &source.emissive_texture]
-                .map(Option::as_ref);
-        self.set = [base_texture, metal_texture, emissive_texture].into_iter().flatten().map(set).next();
+            [base_texture, metal_texture, &source.emissive_texture].map(Option::as_ref);
+        let normals = source.normal_texture.as_ref().map(|normals| (normal_info(normals), normals.scale));
+        let all = [base_texture, metal_texture, normals.as_ref().map(|n| &n.0), emissive_texture];
+        self.set = all.into_iter().flatten().map(set).next();
 
-        let material = match self.transmission(base_texture)? {
-            Some(glass) => glass,
-            None => self.opaque(base_texture, metal_texture)?,
+        if self.extensions().is_some_and(|e| e.unlit.is_some()) {
+            return self.unlit(base_texture);
+        }
+        let material = match (self.transmission(base_texture)?, gloss) {
+            (Some(glass), _) => glass,
+            (None, Some(gloss)) => self.glossy(gloss)?,
+            (None, None) => self.opaque(base_texture, metal_texture)?,
+        };
+        let relief = match normals.filter(|(info, _)| self.fits(info)) {
+            Some((info, scale)) => {
+                let map = self.textures.colour(&info, Encoding::Linear, &self.place, self.notes)?;
+                let scale = self.within(scale, "scale of the normal map", -1e6, 1e6);
+                Some(Relief::Normals { map: Texture::Image(map), scale, mirrors: true })
+            }
+            None => None,
         };
         // The inside of glass is part of it, and a pane has no inside
         let glass = matches!(material, Material::Glass { .. } | Material::ThinGlass { .. });
         let cover = MaterialOptions {
             opacity: self.opacity(base_texture)?,
             one_sided: !source.double_sided && !glass,
+            relief,
             ..MaterialOptions::default()
         };
-        Ok((material, cover, self.emission(emissive_texture)?))
+        let emission = self.emission(emissive_texture)?;
+        let lamp = emission.as_ref().is_some_and(|e| luminance(e.radiance) * mean(&e.texture) >= LAMP);
+        if emission.is_some() && !lamp {
+            self.notes.near(&self.place, "it glows too little to count as the light of the scene");
+        }
+        Ok(Read { material, cover, emission, lamp, unlit: false })
+    }
+
+    /// `KHR_materials_clearcoat`.
+    fn coat(&mut self) -> Result<Option<Coat>, LoadError> {
+        let Some(value) = self.extensions().and_then(|e| e.others.get(clearcoat::NAME)) else {
+            return Ok(None);
+        };
+        let Some(Clearcoat { factor, texture, roughness }) =
+            clearcoat::parse(value, &self.place, self.notes)?
+        else {
+            return Ok(None);
+        };
+        let share = match texture.filter(|info| self.fits(info)) {
+            Some(info) => {
+                let image = self.textures.red(&info, &self.place, self.notes)?;
+                Texture::Image(ImageTexture { factor: [factor; 3], ..image })
+            }
+            None => Texture::Colour([factor; 3]),
+        };
+        Ok(Some(Coat { share, roughness: roughness * roughness }))
+    }
+
+    /// `KHR_materials_unlit`: shows its colour, and reflects nothing. In a traced scene that is light.
+    fn unlit(&mut self, base: Option<&Info>) -> Result<Read, LoadError> {
+        if self.coloured {
+            self.notes.warn(&self.place, "the colours of corners are ignored: it is unlit");
+        }
+        let [r, g, b, _] = self.source.pbr_metallic_roughness.base_color_factor.0;
+        let radiance = [r, g, b].map(|x| self.within(x, "baseColorFactor", 0.0, 1.0));
+        let texture = match base {
+            Some(_) => Some(self.colour([1.0; 3], base, Encoding::Srgb)?),
+            None => None,
+        };
+        let cover = MaterialOptions {
+            opacity: self.opacity(base)?,
+            one_sided: !self.source.double_sided,
+            ..MaterialOptions::default()
+        };
+        let emission = Emission { radiance, texture, two_sided: self.source.double_sided };
+        let emission = Some(emission).filter(|_| radiance != [0.0; 3]);
+        Ok(Read { material: Material::diffuse([0.0; 3]), cover, emission, lamp: false, unlit: true })
+    }
+
+    /// `KHR_materials_pbrSpecularGlossiness`.
+    fn glossy(&mut self, gloss: &PbrSpecularGlossiness) -> Result<Material, LoadError> {
+        let [r, g, b, _] = gloss.diffuse_factor.0;
+        let diffuse = [r, g, b].map(|x| self.within(x, "diffuseFactor", 0.0, 1.0));
+        let specular = gloss.specular_factor.0.map(|x| self.within(x, "specularFactor", 0.0, 1.0));
+        let glossiness = self.within(gloss.glossiness_factor.0, "glossinessFactor", 0.0, 1.0);
+        let factor = Gloss { diffuse, specular, glossiness };
+        self.notes.near(&self.place, "its specular colour and glossiness become metal and roughness");
+        let of_diffuse = gloss.diffuse_texture.as_ref().filter(|info| self.fits(info));
+        let of_specular = gloss.specular_glossiness_texture.as_ref().filter(|info| self.fits(info));
+        let (base, metallic_roughness) =
+            self.textures.gloss(factor, [of_diffuse, of_specular], &self.place, self.notes)?;
+        let base = self.tinted(base);
+        Ok(Material::MetallicRoughness { base, metallic_roughness, ior: self.ior(MIN_COAT_IOR) })
+    }
+
+    /// Times the colours of corners, if the mesh has any.
+    fn tinted(&self, base: Texture) -> Texture {
+        match (self.coloured, &base) {
+            (false, _) => base,
+            (true, Texture::Colour([1.0, 1.0, 1.0])) => Texture::Corners(None),
+            (true, _) => Texture::Corners(Some(Box::new(base))),
+        }
     }
 
     /// Colour times texture.
@@ -128,7 +244,7 @@ impl<'m> Reader<'m, '_> {
 
     /// Whether a texture uses the material's set of texture coordinates: meshes have one.
     fn fits(&mut self, info: &Info) -> bool {
-        let fits = Some(set(info)) == self.set;
+        let fits = *self.set.get_or_insert(set(info)) == set(info);
         if !fits {
             let what = format_args!(
                 "texture {} is ignored: it uses set {} of texture coordinates, another texture set {}",
@@ -146,6 +262,7 @@ impl<'m> Reader<'m, '_> {
         let [r, g, b, _] = pbr.base_color_factor.0;
         let factor = [r, g, b].map(|x| self.within(x, "baseColorFactor", 0.0, 1.0));
         let base = self.colour(factor, base, Encoding::Srgb)?;
+        let base = self.tinted(base);
         let roughness = self.within(pbr.roughness_factor.0, "roughnessFactor", 0.0, 1.0);
         let metallic = self.within(pbr.metallic_factor.0, "metallicFactor", 0.0, 1.0);
         let metallic_roughness = self.colour([1.0, roughness, metallic], metal, Encoding::Linear)?;
@@ -200,7 +317,10 @@ impl<'m> Reader<'m, '_> {
     }
 
     fn opacity(&mut self, base: Option<&Info>) -> Result<Option<Texture>, LoadError> {
-        let [.., alpha] = self.source.pbr_metallic_roughness.base_color_factor.0;
+        let [.., alpha] = match self.extensions().and_then(|e| e.pbr_specular_glossiness.as_ref()) {
+            Some(gloss) => gloss.diffuse_factor.0,
+            None => self.source.pbr_metallic_roughness.base_color_factor.0,
+        };
         let (alpha, cutoff) = match self.source.alpha_mode {
             Checked::Valid(AlphaMode::Opaque) => return Ok(None),
             Checked::Valid(AlphaMode::Blend) => {

@@ -3,17 +3,20 @@
 use super::accessor::{floats, indices};
 use super::asset::Asset;
 use crate::{LoadError, Place};
-use glam::{DAffine3, DVec3};
+use glam::{DAffine3, DMat3, DVec3};
+use gltf::json::accessor::Type;
 use gltf::json::mesh::{Mode, Primitive, Semantic};
 use gltf::json::validation::Checked;
 use gltf::json::{Accessor, Index};
 
-/// An indexed mesh, as the renderer takes it. `normals` and `uvs` may be empty.
+/// An indexed mesh, as the renderer takes it. `normals`, `uvs` and `colours` may be empty.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Triangles {
     pub(super) positions: Vec<[f32; 3]>,
     pub(super) normals: Vec<[f32; 3]>,
     pub(super) uvs: Vec<[f32; 2]>,
+    /// One a corner, or none.
+    pub(super) colours: Vec<[f32; 3]>,
     pub(super) indices: Vec<[u32; 3]>,
 }
 
@@ -63,11 +66,27 @@ pub(super) fn triangles(
         Some(uvs) => floats(asset, uvs, place)?.into_iter().map(|[u, v]: [f32; 2]| [u, 1.0 - v]).collect(),
         None => vec![],
     };
+    let colours = match alike(attribute(primitive, Semantic::Colors(0)), "colours")? {
+        Some(colours) => colours_of(asset, colours, place)?,
+        None => vec![],
+    };
     let corners = match primitive.indices {
         Some(accessor) => indices(asset, accessor, place)?,
         None => (0..u32::try_from(positions.len()).unwrap_or(u32::MAX)).collect(),
     };
-    Ok(Triangles { positions, normals, uvs, indices: assemble(mode, &corners) })
+    Ok(Triangles { positions, normals, uvs, colours, indices: assemble(mode, &corners) })
+}
+
+/// Colours with or without an alpha, which has no part in it.
+fn colours_of(asset: &Asset<'_>, index: Index<Accessor>, place: &Place) -> Result<Vec<[f32; 3]>, LoadError> {
+    // Also false for NaN
+    let inside = |x: f32| if x > 0.0 { x.min(1.0) } else { 0.0 };
+    let colour = |[r, g, b]: [f32; 3]| [r, g, b].map(inside);
+    Ok(if asset.get(index, "accessor", place)?.type_ == Checked::Valid(Type::Vec4) {
+        floats::<4>(asset, index, place)?.into_iter().map(|[r, g, b, _]| colour([r, g, b])).collect()
+    } else {
+        floats::<3>(asset, index, place)?.into_iter().map(colour).collect()
+    })
 }
 
 /// Number of triangles of a mode that `corners` make.
@@ -101,22 +120,46 @@ impl Triangles {
         for p in &mut self.positions {
             *p = moved(*p, to_world);
         }
-        // Normals go by the inverse transpose. That is the matrix of cofactors over the determinant, of which
-        // a normal needs the sign only; the cofactors exist even of a scale by zero.
-        let [x, y, z] = [to_world.matrix3.x_axis, to_world.matrix3.y_axis, to_world.matrix3.z_axis];
-        let mirrored = to_world.matrix3.determinant() < 0.0;
-        let sign = if mirrored { -1.0 } else { 1.0 };
-        let [x, y, z] = [y.cross(z), z.cross(x), x.cross(y)].map(|c| c * sign);
+        let matrix = normal_matrix(to_world);
         for n in &mut self.normals {
-            let [a, b, c] = n.map(f64::from);
-            *n = (x * a + y * b + z * c).normalize_or_zero().as_vec3().to_array();
+            *n = turned(*n, &matrix);
         }
-        if mirrored {
-            for [_, b, c] in &mut self.indices {
-                std::mem::swap(b, c);
-            }
+        if to_world.matrix3.determinant() < 0.0 {
+            self.mirror();
         }
     }
+
+    /// Moves each vertex by its own transform.
+    pub(super) fn place_each(&mut self, moves: &[DAffine3]) {
+        for (p, to_world) in self.positions.iter_mut().zip(moves) {
+            *p = moved(*p, to_world);
+        }
+        for (n, to_world) in self.normals.iter_mut().zip(moves) {
+            *n = turned(*n, &normal_matrix(to_world));
+        }
+        if moves.first().is_some_and(|to_world| to_world.matrix3.determinant() < 0.0) {
+            self.mirror();
+        }
+    }
+
+    fn mirror(&mut self) {
+        for [_, b, c] in &mut self.indices {
+            std::mem::swap(b, c);
+        }
+    }
+}
+
+/// Normals go by the inverse transpose. That is the matrix of cofactors over the determinant, of which a normal
+/// needs the sign only; the cofactors exist even of a scale by zero.
+fn normal_matrix(to_world: &DAffine3) -> DMat3 {
+    let [x, y, z] = [to_world.matrix3.x_axis, to_world.matrix3.y_axis, to_world.matrix3.z_axis];
+    let sign = if to_world.matrix3.determinant() < 0.0 { -1.0 } else { 1.0 };
+    let [x, y, z] = [y.cross(z), z.cross(x), x.cross(y)].map(|c| c * sign);
+    DMat3::from_cols(x, y, z)
+}
+
+fn turned(n: [f32; 3], matrix: &DMat3) -> [f32; 3] {
+    (*matrix * DVec3::from_array(n.map(f64::from))).normalize_or_zero().as_vec3().to_array()
 }
 
 /// A point in the world.
@@ -127,7 +170,7 @@ pub(super) fn moved(p: [f32; 3], to_world: &DAffine3) -> [f32; 3] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use glam::{DMat3, DQuat};
+    use glam::DQuat;
 
     #[test]
     fn modes_make_triangles_that_face_alike() {
@@ -148,8 +191,8 @@ mod tests {
         let triangle = Triangles {
             positions: vec![[0.0; 3], [1.0, 0.0, 0.5], [0.0, 1.0, 0.25]],
             normals: vec![[-0.5, -0.25, 1.0]; 3],
-            uvs: vec![],
             indices: vec![[0, 1, 2]],
+            ..Triangles::default()
         };
         let turn = DMat3::from_quat(DQuat::from_euler(glam::EulerRot::XYZ, 0.3, -1.1, 2.0));
         for scale in [[1.0, 1.0, 1.0], [3.0, 0.5, 1.0], [-1.0, 2.0, 0.7], [-1.0, -1.0, -1.0]] {

@@ -6,27 +6,34 @@
 mod accessor;
 mod asset;
 mod camera;
+mod clearcoat;
+mod daylight;
+mod gloss;
 mod light;
 mod material;
 mod mesh;
 mod nodes;
 mod notes;
+mod rest;
 mod texture;
 mod uri;
 
 use crate::files::Folder;
 use crate::{LoadError, Loaded, Place};
 use asset::{Asset, MAX_BYTES, name};
-use glam::DVec3;
+use glam::{DAffine3, DVec3};
 use gltf::json::mesh::{Mode, Primitive, Semantic};
 use gltf::json::validation::Checked;
-use gltf::json::{Accessor, Index};
+use gltf::json::{Accessor, Index, Skin};
 use material::Materials;
+use mesh::Triangles;
 use nodes::Placed;
-use noisefloor_ptwne::{Environment, MAX_SURFACES, Mesh, SceneBuilder, SceneError};
+use noisefloor_ptwne::{Camera, MAX_SURFACES, Mesh, SceneBuilder, SceneError};
 use notes::Notes;
-use std::collections::HashSet;
+use rest::Joints;
+use std::collections::{HashMap, HashSet};
 use std::path::Path;
+use std::rc::Rc;
 
 pub(crate) fn load(path: &Path) -> Result<Loaded, LoadError> {
     let folder = Folder::of(path, None, String::new());
@@ -38,16 +45,13 @@ pub(crate) fn load(path: &Path) -> Result<Loaded, LoadError> {
 
     let mut notes = Notes::default();
     let whole = Place::file(path);
-    let camera = match camera::first(&asset, &placed, &mut notes)? {
-        Some(camera) => camera,
-        None => {
-            notes.warn(&whole, "it has no camera: all of it is seen from the front, above and to the right");
-            camera::framing(bounds(&asset, &placed)?)
-        }
-    };
+    let camera = camera::first(&asset, &placed, &mut notes)?;
+    if camera.is_none() {
+        notes.warn(&whole, "it has no camera: all of it is seen from the front, above and to the right");
+    }
     let title = crate::title(path);
     let refused = |cause| LoadError::Scene { place: whole.clone(), cause };
-    let builder = SceneBuilder::new(title, camera).map_err(refused)?;
+    let builder = SceneBuilder::new(title, camera.unwrap_or_else(camera::anywhere)).map_err(refused)?;
 
     let mut loader = Loader {
         asset: &asset,
@@ -55,21 +59,31 @@ pub(crate) fn load(path: &Path) -> Result<Loaded, LoadError> {
         materials: Materials::new(&asset),
         notes,
         meshes: HashSet::new(),
+        nodes: rest::by_index(&placed),
+        skins: HashMap::new(),
         lit: false,
+        needs_light: false,
+        undrawn: false,
+        bounds: [DVec3::INFINITY, DVec3::NEG_INFINITY],
     };
     for placed in &placed {
         loader.node(placed)?;
     }
-    let Loader { mut builder, mut notes, lit, .. } = loader;
+    let camera = match camera {
+        Some(camera) => camera,
+        None => loader.framing()?,
+    };
+    let Loader { mut builder, mut notes, lit, needs_light, .. } = loader;
     for (index, animation) in asset.root.animations.iter().enumerate() {
         let place = Place::part(path, name("animation", index, animation.name.as_deref()));
-        notes.warn(&place, "it is ignored: everything stays where its node is");
+        notes.warn(&place, "it is ignored: everything stays at rest, where its node is");
     }
-    if !lit {
-        notes.warn(&whole, "it has no light: a radiance of 1 comes from all directions");
-        builder.environment(Environment::constant([1.0; 3])).map_err(refused)?;
+    if !lit && needs_light {
+        notes.warn(&whole, "it has no light: it gets a grey sky, and a sun over the viewer's left shoulder");
+        builder.environment(daylight::daylight(&camera)).map_err(refused)?;
     }
-    let scene = builder.build().map_err(refused)?.with_identity(folder.contents());
+    let scene = builder.build().and_then(|scene| scene.with_camera(camera)).map_err(refused)?;
+    let scene = scene.with_identity(folder.contents());
     Ok(Loaded { scene, size: None, max_depth: None, warnings: notes.finish(&asset) })
 }
 
@@ -81,16 +95,22 @@ struct Loader<'a> {
     notes: Notes,
     /// Meshes that some node has shown already: warnings come with the first.
     meshes: HashSet<usize>,
+    /// Where nodes are, by their index.
+    nodes: HashMap<usize, DAffine3>,
+    skins: HashMap<usize, Rc<Joints>>,
     lit: bool,
+    /// Whether there is anything that light can show.
+    needs_light: bool,
+    /// Whether there are points or lines.
+    undrawn: bool,
+    /// The smallest and largest coordinates of what was added.
+    bounds: [DVec3; 2],
 }
 
 impl Loader<'_> {
     fn node(&mut self, placed: &Placed<'_>) -> Result<(), LoadError> {
         let Placed { node, place, .. } = placed;
         self.notes.extensions(place, node.extensions.iter().flat_map(|e| e.others.keys()));
-        if node.skin.is_some() {
-            self.notes.warn(place, "its skin is ignored: its mesh is rigid");
-        }
         if let Some(light) = node.extensions.as_ref().and_then(|e| e.khr_lights_punctual.as_ref()) {
             light::add(self.asset, placed, light.light, &mut self.builder, &mut self.notes)?;
             self.lit = true;
@@ -103,18 +123,47 @@ impl Loader<'_> {
             let place = Place::part(self.asset.path, &called);
             self.notes.extensions(&place, mesh.extensions.iter().flat_map(|e| e.others.keys()));
         }
+        let joints = match node.skin {
+            Some(skin) => Some(self.joints(skin, place)?),
+            None => None,
+        };
+        let weights = node.weights.as_ref().or(mesh.weights.as_ref()).map(Vec::as_slice).unwrap_or_default();
+        let pose = Pose { to_world: &placed.to_world, joints: joints.as_deref(), weights };
         for (number, primitive) in mesh.primitives.iter().enumerate() {
             let place = Place::part(self.asset.path, format_args!("{called}, primitive {number}"));
-            self.primitive(primitive, placed, first, &place)?;
+            self.primitive(primitive, &pose, first, &place)?;
         }
         Ok(())
+    }
+
+    /// The joints of a skin, found once.
+    fn joints(&mut self, skin: Index<Skin>, place: &Place) -> Result<Rc<Joints>, LoadError> {
+        if let Some(known) = self.skins.get(&skin.value()) {
+            return Ok(known.clone());
+        }
+        let joints = Rc::new(rest::joints(self.asset, skin, &self.nodes, place)?);
+        self.skins.insert(skin.value(), joints.clone());
+        Ok(joints)
+    }
+
+    /// A camera that sees all that was added.
+    fn framing(&self) -> Result<Camera, LoadError> {
+        let place = Place::file(self.asset.path);
+        if self.bounds[0].cmple(self.bounds[1]).all() {
+            return Ok(camera::framing(self.bounds));
+        }
+        Err(if self.undrawn {
+            place.unsupported("a scene of points and lines alone")
+        } else {
+            place.bad("its scene has neither a camera nor a mesh")
+        })
     }
 
     /// Adds a primitive; warns only if it is the `first` time.
     fn primitive(
         &mut self,
         primitive: &Primitive,
-        placed: &Placed<'_>,
+        pose: &Pose<'_>,
         first: bool,
         place: &Place,
     ) -> Result<(), LoadError> {
@@ -126,8 +175,8 @@ impl Loader<'_> {
             for (there, what) in [
                 (!drawn, "its points or lines are ignored"),
                 (!has(Semantic::Positions), "it is ignored: it has no positions"),
-                (has(Semantic::Colors(0)), "its vertex colours are ignored"),
-                (primitive.targets.is_some(), "its morph targets are ignored"),
+                (has(Semantic::Colors(1)), "its second set of vertex colours is ignored"),
+                (has(Semantic::Joints(1)), "its joints beyond four a vertex are ignored"),
             ] {
                 if there {
                     self.notes.warn(place, what);
@@ -135,9 +184,12 @@ impl Loader<'_> {
             }
         }
         if !drawn {
+            self.undrawn = true;
             return Ok(());
         }
-        let look = self.materials.look(primitive.material, place, &mut self.builder, &mut self.notes)?;
+        let coloured = has_colours(primitive);
+        let (builder, notes) = (&mut self.builder, &mut self.notes);
+        let look = self.materials.look(primitive.material, coloured, place, builder, notes)?;
         let mut triangles = mesh::triangles(self.asset, primitive, mode, look.set, place)?;
         if triangles.indices.is_empty() {
             return Ok(());
@@ -148,18 +200,23 @@ impl Loader<'_> {
             }
             triangles.uvs = vec![[0.0, 1.0]; triangles.positions.len()];
         }
-        triangles.place(&placed.to_world);
+        pose.strike(self.asset, primitive, &mut triangles, place)?;
+        for p in &triangles.positions {
+            let p = DVec3::from_array(p.map(f64::from));
+            self.bounds = [self.bounds[0].min(p), self.bounds[1].max(p)];
+        }
+        self.needs_light |= !look.unlit;
         let mesh = Mesh {
             positions: &triangles.positions,
             normals: &triangles.normals,
             uvs: &triangles.uvs,
+            colours: &triangles.colours,
             indices: &triangles.indices,
         };
-        let shines = look.emission.is_some();
         match self.builder.mesh(&mesh, look.id, look.emission) {
-            Ok(0) => self.lit |= shines,
+            Ok(0) => self.lit |= look.lamp,
             Ok(count) => {
-                self.lit |= shines;
+                self.lit |= look.lamp;
                 if first {
                     self.notes.warn(place, format_args!("triangles without area are left out: {count}"));
                 }
@@ -171,6 +228,37 @@ impl Loader<'_> {
         }
         Ok(())
     }
+}
+
+/// Where a mesh is.
+struct Pose<'a> {
+    to_world: &'a DAffine3,
+    joints: Option<&'a Joints>,
+    weights: &'a [f32],
+}
+
+impl Pose<'_> {
+    /// Moves triangles to where they are in the world: a skin takes no notice of the node that has it.
+    fn strike(
+        &self,
+        asset: &Asset<'_>,
+        primitive: &Primitive,
+        triangles: &mut Triangles,
+        place: &Place,
+    ) -> Result<(), LoadError> {
+        rest::morph(asset, primitive, self.weights, triangles, place)?;
+        if let Some(joints) = self.joints
+            && rest::skin(asset, primitive, joints, triangles, place)?
+        {
+            return Ok(());
+        }
+        triangles.place(self.to_world);
+        Ok(())
+    }
+}
+
+fn has_colours(primitive: &Primitive) -> bool {
+    mesh::attribute(primitive, Semantic::Colors(0)).is_some()
 }
 
 fn mode(primitive: &Primitive, place: &Place) -> Result<Mode, LoadError> {
@@ -208,26 +296,11 @@ fn check_size(asset: &Asset<'_>, placed: &[Placed<'_>]) -> Result<(), LoadError>
         };
         let corners = count(mesh::attribute(primitive, Semantic::Positions))?;
         let indices = if primitive.indices.is_some() { count(primitive.indices)? } else { corners };
-        // An empty primitive takes time, too
-        vertices = vertices.saturating_add(corners.max(1));
+        // An empty primitive takes time, too, and so does each morph target
+        let shapes = 1 + primitive.targets.as_ref().map_or(0, Vec::len) as u64;
+        vertices = vertices.saturating_add(corners.max(1).saturating_mul(shapes));
         triangles = triangles.saturating_add(mesh::count(mode(primitive, place)?, indices));
         place.clone().at_most("vertices up to here", vertices, 3 * MAX_SURFACES as u64)?;
         place.clone().at_most("triangles up to here", triangles, MAX_SURFACES as u64)
     })
-}
-
-/// The smallest and largest coordinates of the scene.
-fn bounds(asset: &Asset<'_>, placed: &[Placed<'_>]) -> Result<[DVec3; 2], LoadError> {
-    let mut bounds = [DVec3::INFINITY, DVec3::NEG_INFINITY];
-    each_primitive(asset, placed, |placed, primitive, place| {
-        for p in mesh::positions(asset, primitive, place)? {
-            let p = DVec3::from_array(mesh::moved(p, &placed.to_world).map(f64::from));
-            bounds = [bounds[0].min(p), bounds[1].max(p)];
-        }
-        Ok(())
-    })?;
-    if bounds[0].cmple(bounds[1]).all() {
-        return Ok(bounds);
-    }
-    Err(Place::file(asset.path).bad("its scene has neither a camera nor a mesh"))
 }

@@ -9,6 +9,7 @@ use gltf::json::{Index, Node};
 #[derive(Clone, Debug)]
 pub(super) struct Placed<'a> {
     pub(super) node: &'a Node,
+    pub(super) index: usize,
     /// What to call it.
     pub(super) place: Place,
     pub(super) to_world: DAffine3,
@@ -44,7 +45,7 @@ pub(super) fn placed<'a>(asset: &'a Asset<'a>) -> Result<Vec<Placed<'a>>, LoadEr
             })?;
         let children = node.children.as_deref().unwrap_or_default();
         waiting.extend(children.iter().rev().map(|child| (*child, to_world)));
-        placed.push(Placed { node, place, to_world });
+        placed.push(Placed { node, index: index.value(), place, to_world });
     }
     Ok(placed)
 }

@@ -2,15 +2,17 @@
 
 use super::asset::Asset;
 use crate::{LoadError, Place, Warning};
-use std::collections::BTreeSet;
+use std::collections::{BTreeSet, HashSet};
 use std::fmt;
 
-/// Extensions that a file may require. Of `KHR_materials_unlit` the specification gives a lit fallback, which
-/// is used; `KHR_mesh_quantization` is but a wider choice of accessors, all of which are read.
-const KNOWN: [&str; 8] = [
+/// Extensions that a file may require. `KHR_mesh_quantization` is but a wider choice of accessors, all of which are
+/// read.
+const KNOWN: [&str; 10] = [
     "KHR_lights_punctual",
+    "KHR_materials_clearcoat",
     "KHR_materials_emissive_strength",
     "KHR_materials_ior",
+    "KHR_materials_pbrSpecularGlossiness",
     "KHR_materials_transmission",
     "KHR_materials_unlit",
     "KHR_materials_volume",
@@ -22,6 +24,8 @@ const KNOWN: [&str; 8] = [
 #[derive(Debug, Default)]
 pub(super) struct Notes {
     warnings: Vec<Warning>,
+    /// What has been said already, with its place.
+    said: HashSet<String>,
     /// Extensions that some warning names.
     extensions: BTreeSet<String>,
 }
@@ -29,7 +33,18 @@ pub(super) struct Notes {
 impl Notes {
     /// Something is ignored or replaced.
     pub(super) fn warn(&mut self, place: &Place, what: impl fmt::Display) {
-        self.warnings.push(Warning::ignored(place.clone(), what));
+        self.push(Warning::ignored(place.clone(), what));
+    }
+
+    /// Something is replaced by what looks much the same.
+    pub(super) fn near(&mut self, place: &Place, what: impl fmt::Display) {
+        self.push(Warning::approximated(place.clone(), what));
+    }
+
+    fn push(&mut self, warning: Warning) {
+        if self.said.insert(warning.to_string()) {
+            self.warnings.push(warning);
+        }
     }
 
     /// An element has these extensions, which are ignored.
@@ -59,10 +74,12 @@ pub(super) fn check_required(asset: &Asset<'_>) -> Result<(), LoadError> {
     if header.min_version.as_ref().is_some_and(|v| v != "2.0") || !version.starts_with("2.") {
         return Err(Place::part(asset.path, "asset").unsupported(format_args!("version {version:?} of glTF")));
     }
-    let required = &asset.root.extensions_required;
-    match required.iter().find(|name| !KNOWN.contains(&name.as_str())) {
-        Some(name) => Err(Place::part(asset.path, "extensionsRequired")
-            .unsupported(format_args!("the extension {name}, which the file requires,"))),
-        None => Ok(()),
+    let required = asset.root.extensions_required.iter();
+    let missing: Vec<&str> = required.map(String::as_str).filter(|name| !KNOWN.contains(name)).collect();
+    let (named, place) = (missing.join(", "), Place::part(asset.path, "extensionsRequired"));
+    match missing.len() {
+        0 => Ok(()),
+        1 => Err(place.unsupported(format_args!("the extension {named}, which the file requires,"))),
+        _ => Err(place.unsupported(format_args!("each of the extensions {named}, which the file requires,"))),
     }
 }

@@ -1,14 +1,17 @@
 //! Textures: images, their samplers (glTF 2.0, §3.8), and `KHR_texture_transform`.
 
 use super::asset::{Asset, name};
+use super::gloss::Gloss;
 use super::notes::Notes;
 use crate::picture::{self, Samples};
 use crate::{LoadError, Place};
 use gltf::json::extensions::texture::TextureTransform;
+use gltf::json::material::NormalTexture;
 use gltf::json::texture::{Info, MagFilter, Sampler, WrappingMode};
 use gltf::json::validation::Checked;
-use gltf::json::{Image, Index};
-use noisefloor_ptwne::{ImageTexture, MAX_TEXTURE_PIXELS, Pixels, Wrap};
+use gltf::json::{Image, Index, Value, deserialize};
+use noisefloor::{Rgb, srgb_decode, srgb_encode};
+use noisefloor_ptwne::{ImageTexture, MAX_TEXTURE_PIXELS, Pixels, Texture, Wrap};
 use std::collections::HashMap;
 use std::sync::Arc;
 
@@ -97,6 +100,70 @@ impl<'a> Textures<'a> {
         Ok(Some(texture))
     }
 
+    /// The red channel of a texture, as shares.
+    pub(super) fn red(
+        &mut self,
+        info: &Info,
+        place: &Place,
+        notes: &mut Notes,
+    ) -> Result<ImageTexture, LoadError> {
+        let (image, texture) = self.texture(info, place, notes)?;
+        let codes = self.images.get(&image).map(|decoded| decoded.colour.clone()).unwrap_or_default();
+        self.count(codes.len(), place)?;
+        Ok(ImageTexture { pixels: Pixels::Linear8(codes.iter().map(|[r, ..]| [*r; 3]).collect()), ..texture })
+    }
+
+    /// Base colour, and roughness and metal, of diffuse and of specular colours with glossiness: factors times
+    /// textures. Pixels lie as in the first texture that there is.
+    pub(super) fn gloss(
+        &mut self,
+        factor: Gloss,
+        [diffuse, specular]: [Option<&Info>; 2],
+        place: &Place,
+        notes: &mut Notes,
+    ) -> Result<(Texture, Texture), LoadError> {
+        let mut read = |info: Option<&Info>| match info {
+            Some(info) => self.texture(info, place, notes).map(Some),
+            None => Ok(None),
+        };
+        let (diffuse, specular) = (read(diffuse)?, read(specular)?);
+        let Some((_, frame)) = diffuse.as_ref().or(specular.as_ref()) else {
+            let (base, [roughness, metal]) = factor.metal();
+            return Ok((Texture::Colour(base), Texture::Colour([1.0, roughness, metal])));
+        };
+        let (width, height, frame) = (frame.width, frame.height, frame.clone());
+        self.count(2 * width * height, place)?;
+        let decoded = |found: &Option<(usize, ImageTexture)>| {
+            found.as_ref().and_then(|f| self.images.get(&f.0).cloned())
+        };
+        let (diffuse, specular) = (decoded(&diffuse), decoded(&specular));
+        let at = |image: &Option<Decoded>, x: usize, y: usize| match image {
+            None => ([1.0; 3], 1.0),
+            Some(image) => {
+                let i = y * image.height / height * image.width + x * image.width / width;
+                let alpha = image.alpha.as_ref().map_or(255, |alpha| alpha[i]);
+                (image.colour[i].map(|c| srgb_decode(f32::from(c) / 255.0)), f32::from(alpha) / 255.0)
+            }
+        };
+        let code = |x: f32| (x * 255.0 + 0.5) as u8;
+        let (mut bases, mut shares) =
+            (Vec::with_capacity(width * height), Vec::with_capacity(width * height));
+        for (y, x) in (0..height).flat_map(|y| (0..width).map(move |x| (y, x))) {
+            let ((d, _), (s, glossiness)) = (at(&diffuse, x, y), at(&specular, x, y));
+            let times = |a: Rgb, b: Rgb| std::array::from_fn(|i| a[i] * b[i]);
+            let (base, [roughness, metal]) = Gloss {
+                diffuse: times(factor.diffuse, d),
+                specular: times(factor.specular, s),
+                glossiness: factor.glossiness * glossiness,
+            }
+            .metal();
+            bases.push(base.map(|c| code(srgb_encode(c))));
+            shares.push([255, code(roughness), code(metal)]);
+        }
+        let image = |pixels| Texture::Image(ImageTexture { pixels, ..frame.clone() });
+        Ok((image(Pixels::Srgb8(bases.into())), image(Pixels::Linear8(shares.into()))))
+    }
+
     /// The texture with its colours taken for sRGB, and the index of its image.
     fn texture(
         &mut self,
@@ -109,6 +176,14 @@ impl<'a> Textures<'a> {
         let here = Place::part(asset.path, name("texture", info.index.value(), texture.name.as_deref()));
         notes.extensions(&here, texture.extensions.iter().flat_map(|e| e.others.keys()));
         notes.extensions(place, info.extensions.iter().flat_map(|e| e.others.keys()));
+        // A texture without a source is one of an extension
+        if texture.source.value() >= asset.root.images.len() {
+            let names = texture.extensions.iter().flat_map(|e| e.others.keys());
+            let names: Vec<&str> = names.map(String::as_str).collect();
+            if !names.is_empty() {
+                return Err(here.unsupported(format_args!("an image of {} alone", names.join(", "))));
+            }
+        }
         let Decoded { width, height, colour, .. } = self.decoded(texture.source, &here, notes)?;
         let default = Sampler::default();
         let sampler = match texture.sampler {
@@ -168,6 +243,21 @@ impl<'a> Textures<'a> {
     fn count(&mut self, pixels: usize, place: &Place) -> Result<(), LoadError> {
         self.pixels += pixels as u64;
         place.clone().at_most("pixels of images in all", self.pixels, MAX_PIXELS)
+    }
+}
+
+/// A normal map as any texture. The types of the JSON leave its transform among unknown extensions.
+pub(super) fn normal_info(normals: &NormalTexture) -> Info {
+    let others = normals.extensions.as_ref().map(|e| &e.others);
+    let extensions = others.and_then(|others| deserialize::from_value(Value::Object(others.clone())).ok());
+    Info { index: normals.index, tex_coord: normals.tex_coord, extensions, extras: normals.extras.clone() }
+}
+
+/// The mean luminance of an emission texture; 1 if there is none.
+pub(super) fn mean(texture: &Option<Texture>) -> f32 {
+    match texture {
+        Some(Texture::Image(image)) => noisefloor::luminance(image.mean()),
+        _ => 1.0,
     }
 }
 

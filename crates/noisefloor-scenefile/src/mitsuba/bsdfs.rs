@@ -4,9 +4,10 @@ use super::context::Context;
 use super::surface::{Body, Surface};
 use super::textures::{mean, peak};
 use super::xml::Element;
+use crate::colour::Quantity;
 use crate::error::LoadError;
 use noisefloor::Rgb;
-use noisefloor_ptwne::{Material, Texture};
+use noisefloor_ptwne::{Material, Relief, Texture};
 
 impl<'d> Context<'d> {
     /// A `bsdf`.
@@ -40,15 +41,7 @@ impl<'d> Context<'d> {
             "blendbsdf" => self.blend(element),
             "mixturebsdf" => self.mixture(element),
             "coating" | "roughcoating" => self.coating(element),
-            kind @ ("bumpmap" | "normalmap" | "bump" | "normal") => {
-                self.ignored(
-                    element,
-                    format!("the relief of <bsdf type=\"{kind}\"> is left out: it is smooth"),
-                );
-                element.children.iter().filter(|c| c.tag == "texture").for_each(Element::irrelevant);
-                element.ignore(&["scale", "normalmap"]);
-                self.surface(self.nested(element)?)
-            }
+            "bumpmap" | "bump" | "normalmap" | "normal" => self.relief(element),
             _ => Err(self.unsupported(element, element.species())),
         }
     }
@@ -108,6 +101,28 @@ impl<'d> Context<'d> {
         };
         let share = self.luminance(element, self.factor(element, "weight", 0.5)?)?;
         Ok(Surface::blend(self.surface(first)?, self.surface(second)?, share))
+    }
+
+    /// Bumps on a surface: by heights or by normals.
+    fn relief(&self, element: &'d Element) -> Result<Surface, LoadError> {
+        element.ignore(&["flip_invalid_normals", "use_shadowing_function"]);
+        let surface = self.surface(self.nested(element)?)?;
+        if surface.relief.is_some() {
+            return Err(self.unsupported(element, "relief on relief"));
+        }
+        let textures = self.parts(element, "texture")?;
+        let [texture] = textures.as_slice() else {
+            return Err(self.bad(element, format!("{} needs one <texture> in it", element.label())));
+        };
+        let relief = if element.kind().starts_with("bump") {
+            let scale = self.float(element, "scale")?.unwrap_or(1.0) as f32;
+            let (peak, map) = self.image(texture, Quantity::Light)?;
+            Relief::Heights { map, scale: scale * peak }
+        } else {
+            let (_, map) = self.image(texture, Quantity::Factor)?;
+            Relief::Normals { map, scale: 1.0, mirrors: false }
+        };
+        Ok(Surface { relief: Some(relief), ..surface })
     }
 
     /// Any number of surfaces by their `weights`, of Mitsuba 0.6. What the weights lack to 1 is absorbed.

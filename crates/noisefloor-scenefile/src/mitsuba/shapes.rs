@@ -153,8 +153,8 @@ impl<'d> Context<'d> {
         surface: Surface,
         builder: &mut SceneBuilder,
     ) -> Result<MaterialId, LoadError> {
-        let Surface { body, opacity, one_sided, facets } = surface;
-        let options = MaterialOptions { opacity, one_sided, facets };
+        let Surface { body, opacity, one_sided, facets, relief } = surface;
+        let options = MaterialOptions { opacity, one_sided, facets, relief };
         match body {
             Body::Plain(material) => builder.material_with(material, options).map_err(self.refused(element)),
             Body::Blend(parts, share) => {
@@ -245,7 +245,7 @@ impl<'d> Context<'d> {
         emission: Option<Emission>,
     ) -> Result<(), LoadError> {
         let Triangles { positions, normals, uvs, indices } = mesh;
-        let mesh = Mesh { positions, normals, uvs, indices };
+        let mesh = Mesh { positions, normals, uvs, indices, ..Mesh::default() };
         let left_out = filling.builder.mesh(&mesh, material, emission).map_err(self.refused(element))?;
         if indices.is_empty() {
             self.ignored(element, "the mesh has no faces");

@@ -1,6 +1,6 @@
 //! What a shape's surface is made of.
 
-use noisefloor_ptwne::{Facets, Material, Texture};
+use noisefloor_ptwne::{Facets, Material, Relief, Texture};
 
 /// A material, or a blend of two surfaces, and what it lets through.
 #[derive(Clone, Debug)]
@@ -12,6 +12,8 @@ pub(super) struct Surface {
     pub(super) one_sided: bool,
     /// Its microfacets.
     pub(super) facets: Facets,
+    /// Its bumps, and of a blend those of its parts that have none.
+    pub(super) relief: Option<Relief>,
 }
 
 /// What reflects.
@@ -25,7 +27,8 @@ pub(super) enum Body {
 impl Surface {
     /// What reflects, and is black from behind.
     pub(super) fn one_sided(material: Material) -> Self {
-        Self { body: Body::Plain(material), opacity: None, one_sided: true, facets: Facets::GgxUncorrelated }
+        let (body, facets) = (Body::Plain(material), Facets::GgxUncorrelated);
+        Self { body, opacity: None, one_sided: true, facets, relief: None }
     }
 
     /// What is seen from both sides.
@@ -37,7 +40,7 @@ impl Surface {
     pub(super) fn blend(first: Self, second: Self, share: Texture) -> Self {
         let one_sided = first.one_sided && second.one_sided;
         let body = Body::Blend(Box::new([first, second]), share);
-        Self { body, opacity: None, one_sided, facets: Facets::default() }
+        Self { body, opacity: None, one_sided, facets: Facets::default(), relief: None }
     }
 
     /// What Mitsuba gives shapes without a surface: grey, or, if they shine, black.
@@ -73,7 +76,8 @@ impl Surface {
     /// Whether it has a texture.
     pub(super) fn is_textured(&self) -> bool {
         let varies = |texture: &Texture| !matches!(texture, Texture::Colour(_));
-        self.opacity.as_ref().is_some_and(varies)
+        self.relief.is_some()
+            || self.opacity.as_ref().is_some_and(varies)
             || match &self.body {
                 Body::Blend(parts, share) => varies(share) || parts.iter().any(Self::is_textured),
                 Body::Plain(material) => match material {

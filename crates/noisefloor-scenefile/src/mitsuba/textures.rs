@@ -65,7 +65,11 @@ impl<'d> Context<'d> {
     }
 
     /// A texture, and what it is to be multiplied with: 1, but for lights brighter than 1.
-    fn image(&self, element: &'d Element, quantity: Quantity) -> Result<(f32, Texture), LoadError> {
+    pub(super) fn image(
+        &self,
+        element: &'d Element,
+        quantity: Quantity,
+    ) -> Result<(f32, Texture), LoadError> {
         let (scale, image) = match element.kind() {
             "bitmap" => self.bitmap(element, quantity)?,
             "checkerboard" => (1.0, self.checkerboard(element)?),

@@ -182,6 +182,7 @@ impl Reader<'_> {
             params,
             float_textures: self.state.float_textures.clone(),
             colour_textures: self.state.colour_textures.clone(),
+            heights: self.state.heights.clone(),
         })
     }
 

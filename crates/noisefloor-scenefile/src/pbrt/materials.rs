@@ -1,11 +1,11 @@
 //! Materials of pbrt 3 and 4.
 
 use super::reader::Reader;
-use super::state::{Definition, Look, plain};
+use super::state::{Definition, Height, Look, plain};
 use super::textures::mean;
 use crate::error::{LoadError, Place};
 use noisefloor::Rgb;
-use noisefloor_ptwne::{Material, MaterialId, MaterialOptions, Texture};
+use noisefloor_ptwne::{ImageTexture, Material, MaterialId, MaterialOptions, Relief, Texture};
 use std::rc::Rc;
 
 /// How deep materials may refer to others.
@@ -55,10 +55,11 @@ impl Reader<'_> {
         depth: u32,
     ) -> Result<MaterialId, LoadError> {
         place.clone().at_most("nested materials", u64::from(depth), u64::from(MAX_NESTED))?;
-        let options = MaterialOptions { opacity, ..MaterialOptions::default() };
+        let relief = self.relief(definition)?;
+        let options = MaterialOptions { opacity, relief, ..MaterialOptions::default() };
         let refused = Self::refused(&definition.params.place);
         let made = self.made(definition, depth)?;
-        definition.params.ignore(&["type", "bumpmap", "displacement"]);
+        definition.params.ignore(&["type"]);
         self.say_unused(&definition.params, &format!("the material `{}`", definition.kind));
         match made {
             Made::Plain(material) => self.builder.material_with(material, options).map_err(refused),
@@ -72,13 +73,26 @@ impl Reader<'_> {
         }
     }
 
-    fn leave_out_relief(&mut self, d: &Definition) {
-        for relief in ["bumpmap", "displacement", "normalmap"] {
-            if d.params.get(relief).is_some() {
-                let what = format!("the relief `{relief}` is left out: the surface is smooth");
-                self.ignored(&d.params.place, what);
-            }
+    /// Bumps: heights of a texture, or a picture of normals.
+    fn relief(&mut self, d: &Definition) -> Result<Option<Relief>, LoadError> {
+        if let Some(name) = d.params.text("normalmap")? {
+            return Ok(Some(Relief::Normals { map: self.normal_map(d, name)?, scale: 1.0, mirrors: false }));
         }
+        for name in ["bumpmap", "displacement"] {
+            let Some(param) = d.params.get(name) else { continue };
+            if param.kind != "texture" {
+                // A constant height
+                continue;
+            }
+            let called = d.params.text(name)?.unwrap_or_default();
+            if let Some(Height { map, scale }) = d.heights.get(called) {
+                let map = Texture::Image(ImageTexture { nearest: false, ..map.clone() });
+                return Ok(Some(Relief::Heights { map, scale: *scale }));
+            }
+            let what = format!("the relief `{name}` is left out: its texture is no picture times a number");
+            self.ignored(&d.params.place, what);
+        }
+        Ok(None)
     }
 
     fn disney(&mut self, d: &Definition) -> Result<Material, LoadError> {
@@ -93,7 +107,6 @@ impl Reader<'_> {
     }
 
     fn made(&mut self, d: &Definition, depth: u32) -> Result<Made, LoadError> {
-        self.leave_out_relief(d);
         let near = |what| replaced(d, what);
         Ok(Made::Plain(match d.kind.as_str() {
             "diffuse" => Material::Diffuse { albedo: self.colour(d, "reflectance", [0.5; 3])? },

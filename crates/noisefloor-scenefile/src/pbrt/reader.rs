@@ -45,6 +45,8 @@ pub(super) struct Reader<'a> {
     pub(super) surrounded: bool,
     pub(super) max_depth: Option<u32>,
     pub(super) pixels: u64,
+    /// Triangles that subdivision has made.
+    pub(super) subdivided: u64,
     pub(super) stack: Vec<State>,
     pub(super) transforms: Vec<DMat4>,
     pub(super) coordinate_systems: HashMap<String, DMat4>,
@@ -74,6 +76,7 @@ impl<'a> Reader<'a> {
             surrounded: false,
             max_depth: None,
             pixels: 0,
+            subdivided: 0,
             stack: vec![],
             transforms: vec![],
             coordinate_systems: HashMap::new(),

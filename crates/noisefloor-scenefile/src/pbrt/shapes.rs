@@ -5,10 +5,13 @@ use super::reader::Reader;
 use super::state::{Part, Wear};
 use crate::error::{LoadError, Place};
 use crate::files::MAX_FILE_BYTES;
-use crate::mesh::{Triangles, ply, solids};
+use crate::mesh::{Triangles, ply, solids, subdivide};
 use glam::{DMat3, DMat4, DQuat, DVec3};
 use noisefloor_ptwne::{Mesh, SceneError, Texture};
 use std::rc::Rc;
+
+/// Most triangles that subdivision makes in a scene: a short file can ask for any number.
+const MAX_SUBDIVIDED: u64 = 1 << 23;
 
 impl Reader<'_> {
     /// Adds a `Shape`, to the scene or to the object that is open.
@@ -54,7 +57,7 @@ impl Reader<'_> {
         Ok(match kind {
             "trianglemesh" => (self.triangle_mesh(params)?, DMat4::IDENTITY),
             "bilinearmesh" => (self.bilinear_mesh(params)?, DMat4::IDENTITY),
-            "loopsubdiv" => (self.control_mesh(params)?, DMat4::IDENTITY),
+            "loopsubdiv" => (self.subdivision(params)?, DMat4::IDENTITY),
             "plymesh" => (self.ply_mesh(params)?, DMat4::IDENTITY),
             "sphere" => {
                 self.whole(params, &["zmin", "zmax", "phimax"]);
@@ -97,7 +100,7 @@ impl Reader<'_> {
 
     fn add(&mut self, mesh: &Triangles, wear: &Wear, place: &Place) -> Result<(), LoadError> {
         let Triangles { positions, normals, uvs, indices } = mesh;
-        let mesh = Mesh { positions, normals, uvs, indices };
+        let mesh = Mesh { positions, normals, uvs, indices, ..Mesh::default() };
         match self.builder.mesh(&mesh, wear.material, wear.emission.clone()) {
             Ok(_) => Ok(()),
             Err(SceneError::EmptyEmitter) => {
@@ -183,16 +186,20 @@ impl Reader<'_> {
         self.fits(params, mesh)
     }
 
-    /// The mesh that a subdivision begins with, smoothed.
-    fn control_mesh(&mut self, params: &Params) -> Result<Triangles, LoadError> {
-        params.ignore(&["levels", "nlevels", "scheme"]);
+    /// Loop's subdivision of a mesh, whose vertices lie on its limit.
+    fn subdivision(&mut self, params: &Params) -> Result<Triangles, LoadError> {
+        params.ignore(&["scheme"]);
         let positions = params.rows::<3>("P")?.ok_or_else(|| params.bad("a mesh needs its points `P`"))?;
         let indices = corners::<3>(params, "indices")?.ok_or_else(|| params.bad("a mesh needs `indices`"))?;
-        self.approximated(&params.place, "a subdivided mesh is replaced by its control mesh, smoothed");
+        // Version 3 calls them nlevels
+        let name = if params.get("levels").is_some() { "levels" } else { "nlevels" };
+        let levels = params.float(name)?.unwrap_or(3.0).max(0.0) as u32;
         let mut mesh = Triangles { positions, indices, ..Triangles::default() };
         mesh.check(&params.place)?;
-        mesh.smooth();
-        Ok(mesh)
+        let after = subdivide::triangles_after(mesh.indices.len() as u64, levels).unwrap_or(u64::MAX);
+        self.subdivided = self.subdivided.saturating_add(after);
+        params.place.clone().at_most("triangles of subdivision in all", self.subdivided, MAX_SUBDIVIDED)?;
+        Ok(subdivide::subdivide(&mesh, levels))
     }
 
     fn ply_mesh(&mut self, params: &Params) -> Result<Triangles, LoadError> {

@@ -5,7 +5,7 @@ use crate::error::Place;
 use crate::mesh::Triangles;
 use glam::DMat4;
 use noisefloor::Rgb;
-use noisefloor_ptwne::{Emission, MaterialId, Texture};
+use noisefloor_ptwne::{Emission, ImageTexture, MaterialId, Texture};
 use std::collections::HashMap;
 use std::rc::Rc;
 
@@ -23,6 +23,15 @@ pub(super) struct State {
     pub(super) defaults: HashMap<String, Rc<Params>>,
     pub(super) float_textures: HashMap<String, Texture>,
     pub(super) colour_textures: HashMap<String, Texture>,
+    /// Those of `float_textures` that are heights: pictures, and what they are multiplied with.
+    pub(super) heights: HashMap<String, Height>,
+}
+
+/// A picture of heights, and the unit of its values.
+#[derive(Clone, Debug)]
+pub(super) struct Height {
+    pub(super) map: ImageTexture,
+    pub(super) scale: f32,
 }
 
 /// A material, by its name or as it was given.
@@ -39,6 +48,7 @@ pub(super) struct Definition {
     pub(super) params: Params,
     pub(super) float_textures: HashMap<String, Texture>,
     pub(super) colour_textures: HashMap<String, Texture>,
+    pub(super) heights: HashMap<String, Height>,
 }
 
 /// What a surface looks like in the scene.
@@ -63,6 +73,7 @@ impl State {
             params: Params::none(place),
             float_textures: HashMap::new(),
             colour_textures: HashMap::new(),
+            heights: HashMap::new(),
         };
         Self {
             to_world: DMat4::IDENTITY,
@@ -73,6 +84,7 @@ impl State {
             defaults: HashMap::new(),
             float_textures: HashMap::new(),
             colour_textures: HashMap::new(),
+            heights: HashMap::new(),
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use super::params::Params;
 use super::reader::Reader;
-use super::state::plain;
+use super::state::{Definition, Height, plain};
 use crate::error::LoadError;
 use crate::picture::{self, Samples};
 use noisefloor::{Rgb, srgb_decode};
@@ -25,12 +25,18 @@ impl Reader<'_> {
         let floats = values == "float";
         let known =
             if floats { self.state.float_textures.clone() } else { self.state.colour_textures.clone() };
+        let mut height = None;
         let texture = match class {
-            "imagemap" => self.image_map(params, floats)?,
+            "imagemap" => {
+                let (texture, map) = self.image_map(params, floats)?;
+                height = Some(map);
+                texture
+            }
             "constant" => plain(self.factor(params, "value")?.unwrap_or([1.0; 3])),
             "scale" => {
                 let (first, second) =
                     if params.get("tex").is_some() { ("tex", "scale") } else { ("tex1", "tex2") };
+                height = self.scaled_height(params, [first, second])?;
                 let first = self.operand(params, first, &known)?;
                 let second = self.operand(params, second, &known)?;
                 self.product(params, first, second)?
@@ -62,6 +68,12 @@ impl Reader<'_> {
                 plain([0.5; 3])
             }
         };
+        if floats {
+            self.state.heights.remove(name);
+        }
+        if let Some(height) = height.filter(|_| floats) {
+            self.state.heights.insert(name.to_owned(), height);
+        }
         let textures = if floats { &mut self.state.float_textures } else { &mut self.state.colour_textures };
         textures.insert(name.to_owned(), texture);
         Ok(())
@@ -76,6 +88,26 @@ impl Reader<'_> {
             return found.ok_or_else(|| params.bad(format!("there is no texture `{called}`")));
         }
         Ok(Texture::Colour(self.factor(params, name)?.unwrap_or(missing)))
+    }
+
+    /// The heights of a product: those of one texture, times a number.
+    fn scaled_height(&self, params: &Params, names: [&str; 2]) -> Result<Option<Height>, LoadError> {
+        for (texture, number) in [(names[0], names[1]), (names[1], names[0])] {
+            if params.get(texture).is_none_or(|p| p.kind != "texture") {
+                continue;
+            }
+            let known = params.text(texture)?.and_then(|called| self.state.heights.get(called));
+            let by = match params.get(number) {
+                None => Some(1.0),
+                Some(p) if p.kind == "texture" => None,
+                // It may be negative, as factors on light may not
+                Some(_) => params.numbers(number)?.and_then(|numbers| numbers.first().copied()),
+            };
+            if let (Some(known), Some(by)) = (known, by) {
+                return Ok(Some(Height { scale: known.scale * by as f32, ..known.clone() }));
+            }
+        }
+        Ok(None)
     }
 
     fn product(&mut self, params: &Params, first: Texture, second: Texture) -> Result<Texture, LoadError> {
@@ -107,7 +139,8 @@ impl Reader<'_> {
         Ok(Texture::Image(ImageTexture { pixels, factor: [1.0; 3], ..image }))
     }
 
-    fn image_map(&mut self, params: &Params, floats: bool) -> Result<Texture, LoadError> {
+    /// A picture as a texture, and as heights.
+    fn image_map(&mut self, params: &Params, floats: bool) -> Result<(Texture, Height), LoadError> {
         let name = params.text("filename")?.ok_or_else(|| params.bad("an imagemap needs a `filename`"))?;
         params.ignore(&["maxanisotropy", "trilinear"]);
         let path = self.folder.find(name, &params.place)?;
@@ -146,10 +179,24 @@ impl Reader<'_> {
         if params.switch("invert", false)? {
             self.count_pixels(&params.place, count)?;
             let inverse = |p: Rgb| p.map(|c| (scale * (1.0 - c)).clamp(0.0, 1.0));
+            let height = Height { map: image.clone(), scale: -scale };
             let pixels = Pixels::Float(linear(&image.pixels).into_iter().map(inverse).collect());
-            return Ok(Texture::Image(ImageTexture { pixels, ..image }));
+            return Ok((Texture::Image(ImageTexture { pixels, ..image }), height));
         }
-        self.scaled(params, image, [scale; 3])
+        let height = Height { map: image.clone(), scale };
+        Ok((self.scaled(params, image, [scale; 3])?, height))
+    }
+}
+
+impl Reader<'_> {
+    /// A picture of normals, whose codes are linear.
+    pub(super) fn normal_map(&mut self, d: &Definition, name: &str) -> Result<Texture, LoadError> {
+        let place = &d.params.place;
+        let path = self.folder.find(name, place)?;
+        let picture = picture::read(&self.folder, &path, place)?;
+        self.count_pixels(place, picture.width * picture.height)?;
+        let pixels = texels(picture.samples, true, false);
+        Ok(Texture::Image(ImageTexture::new(picture.width, picture.height, pixels)))
     }
 }
 

@@ -183,14 +183,12 @@ fn without_a_camera_all_is_seen() {
 fn what_is_ignored_is_named() {
     let mut maker = lamp(&[0, 1, 2], |_| String::new());
     let primitive = &mut maker.root["meshes"][0]["primitives"][0];
-    primitive["attributes"]["COLOR_0"] = 0.into();
-    primitive["targets"] = json(r#"[{"POSITION": 0}]"#);
+    primitive["attributes"]["COLOR_1"] = 0.into();
+    primitive["attributes"]["JOINTS_1"] = 0.into();
     primitive["extensions"] = json(r#"{"EXT_primitive": {}}"#);
     maker.root["meshes"][0]["name"] = "Table".into();
-    maker.root["nodes"][1]["skin"] = 0.into();
     maker.root["nodes"][1]["name"] = "Legs".into();
     maker.root["nodes"][1]["extensions"] = json(r#"{"EXT_mesh_gpu_instancing": {}}"#);
-    maker.push("skins", r#"{"joints": [1]}"#);
     maker.push("animations", r#"{"name": "walk", "channels": [], "samplers": []}"#);
     // The mesh again: warnings about it come once
     maker.node(r#"{"mesh": 0}"#);
@@ -198,15 +196,64 @@ fn what_is_ignored_is_named() {
         json(r#"["EXT_primitive", "EXT_mesh_gpu_instancing", "EXT_elsewhere", "KHR_mesh_quantization"]"#);
     let loaded = maker.load().unwrap();
     for parts in [
-        [r#"mesh 0 "Table", primitive 0"#, "vertex colours"],
-        [r#"mesh 0 "Table", primitive 0"#, "morph targets"],
+        [r#"mesh 0 "Table", primitive 0"#, "second set of vertex colours"],
+        [r#"mesh 0 "Table", primitive 0"#, "joints beyond four"],
         [r#"mesh 0 "Table", primitive 0"#, "EXT_primitive"],
-        [r#"node 1 "Legs""#, "skin"],
         [r#"node 1 "Legs""#, "EXT_mesh_gpu_instancing"],
         [r#"animation 0 "walk""#, "ignored"],
         ["extensionsUsed", "EXT_elsewhere"],
     ] {
         assert_warns(&loaded, &parts);
     }
-    assert_eq!(loaded.warnings.len(), 7, "{:#?}", loaded.warnings);
+    assert_eq!(loaded.warnings.len(), 6, "{:#?}", loaded.warnings);
+}
+
+/// A rectangle whose vertices hang on two joints by halves, one moved by +x: it is moved by half of that, its own
+/// node's transform does not count, and a morph target of weight ½ moves it up.
+#[test]
+fn skins_and_morph_targets_are_at_rest() {
+    let mut maker = Maker::new();
+    let mesh = maker.rectangle([-0.25, 0.25], [-0.25, 0.25], -1.0, r#"{"emissiveFactor": [1, 1, 1]}"#);
+    let joints = maker.accessor(5121, "VEC4", 4, &[0, 1, 0, 0].repeat(4), "");
+    let halves: Vec<u8> = [0.5f32, 0.5, 0.0, 0.0].repeat(4).into_iter().flat_map(f32::to_le_bytes).collect();
+    let weights = maker.accessor(5126, "VEC4", 4, &halves, "");
+    let up = maker.floats(&[[0.0f32, 0.5, 0.0]; 4]);
+    let primitive = &mut maker.root["meshes"][mesh]["primitives"][0];
+    primitive["attributes"]["JOINTS_0"] = joints.into();
+    primitive["attributes"]["WEIGHTS_0"] = weights.into();
+    primitive["targets"] = json(&format!(r#"[{{"POSITION": {up}}}]"#));
+    maker.root["meshes"][mesh]["weights"] = json("[0.5]");
+    // Bound where it is: the inverse of the second joint at its first place, (1, 0, 0)
+    let identity = [1.0f32, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0];
+    let mut inverse = identity;
+    inverse[12] = -1.0;
+    let matrices: Vec<u8> = [identity, inverse].concat().into_iter().flat_map(f32::to_le_bytes).collect();
+    let matrices = maker.accessor(5126, "MAT4", 2, &matrices, "");
+    maker.node(&format!(r#"{{"mesh": {mesh}, "skin": 0, "translation": [9, 9, 9]}}"#));
+    let first = maker.node("{}");
+    let second = maker.node(r#"{"translation": [2, 0, 0]}"#);
+    maker.push("skins", &format!(r#"{{"joints": [{first}, {second}], "inverseBindMatrices": {matrices}}}"#));
+    let expected = "........\n........\n.....##.\n.....##.\n........\n........\n........\n........\n";
+    assert_eq!(drawing(maker.load().unwrap(), 8), expected);
+    // Joints that are not in the scene, and matrices too few
+    for (pointer, value, what) in [
+        ("joints", format!("[{first}, 77]"), "77 does not exist"),
+        ("joints", format!("[{first}, {second}, {second}]"), "3 joints, but 2 matrices"),
+        ("joints", format!("[{first}]"), "joint 1 is past the 1 of its skin"),
+    ] {
+        let mut maker = maker.clone();
+        maker.root["skins"][0][pointer] = json(&value);
+        let error = maker.load().unwrap_err().to_string();
+        assert!(error.contains(what), "{error}");
+    }
+}
+
+#[test]
+fn points_and_lines_alone_are_no_scene() {
+    let mut maker = Maker::empty();
+    let mesh = maker.rectangle([-1.0, 1.0], [-1.0, 1.0], -1.0, "{}");
+    maker.root["meshes"][mesh]["primitives"][0]["mode"] = 1.into();
+    maker.node(&format!(r#"{{"mesh": {mesh}}}"#));
+    let error = maker.load().unwrap_err().to_string();
+    assert!(error.contains("a scene of points and lines alone is not supported"), "{error}");
 }

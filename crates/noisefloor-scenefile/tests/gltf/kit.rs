@@ -104,6 +104,24 @@ impl Maker {
         )
     }
 
+    /// Adds a cube around the scene that shines with a radiance of 1, and reflects nothing.
+    pub(crate) fn surroundings(&mut self) {
+        let material =
+            self.push("materials", r#"{"doubleSided": true, "extensions": {"KHR_materials_unlit": {}}}"#);
+        let corners: [[f32; 3]; 8] =
+            std::array::from_fn(|i| [0, 1, 2].map(|axis| if i >> axis & 1 == 1 { 50.0 } else { -50.0 }));
+        let positions = self.floats(&corners);
+        let sides = [[0, 1, 3, 2], [4, 5, 7, 6], [0, 1, 5, 4], [2, 3, 7, 6], [0, 2, 6, 4], [1, 3, 7, 5]];
+        let indices: Vec<u16> = sides.iter().flat_map(|[a, b, c, d]| [*a, *b, *c, *a, *c, *d]).collect();
+        let indices = self.indices(&indices);
+        let mesh = format!(
+            r#"{{"primitives": [{{"attributes": {{"POSITION": {positions}}},
+                "indices": {indices}, "material": {material}}}]}}"#
+        );
+        let mesh = self.push("meshes", &mesh);
+        self.node(&format!(r#"{{"mesh": {mesh}}}"#));
+    }
+
     /// Adds a texture of an image of `width` pixels a row.
     pub(crate) fn texture(&mut self, width: u32, pixels: &[[u8; 4]], sampler: &str) -> usize {
         let height = pixels.len() as u32 / width;

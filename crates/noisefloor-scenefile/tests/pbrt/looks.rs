@@ -48,6 +48,47 @@ fn pictures_are_not_mirrored() {
     }
 }
 
+/// Bumps, normal maps and subdivided meshes.
+#[test]
+fn relief_and_subdivision_shape_what_is_lit() {
+    let exr = |pixels: &[[f32; 3]]| {
+        let folder = Folder::new();
+        let layers = noisefloor_image::RenderLayers::rgb(pixels.len(), 1, pixels);
+        noisefloor_image::write_exr(folder.path().join("a.exr"), &layers).unwrap();
+        folder
+    };
+    // From +x +z onto the square, whose u runs along +x over 2 units
+    let sun = "LightSource \"distant\" \"rgb L\" [3 3 3] \"point3 from\" [1 0 1] \"point3 to\" [0 0 0]\n";
+    let square = SQUARE.replace("\"point3 P\"", "\"point2 uv\" [0 0 1 0 1 1 0 1] \"point3 P\"");
+    let lambert =
+        |[x, z]: [f32; 2]| [0.5 / std::f32::consts::PI * 3.0 * (x + z) / (2.0 * (x * x + z * z)).sqrt(); 3];
+    // A picture of two pixels rises by 1 between their middles, 1 unit apart; times −0.1·4
+    let ramp = exr(&[[0.0; 3], [1.0; 3]]);
+    let texture = "Texture \"t\" \"float\" \"imagemap\" \"string filename\" \"a.exr\" \"float scale\" 4\n\
+        Texture \"s\" \"float\" \"scale\" \"texture tex\" \"t\" \"float scale\" -0.1\n";
+    for material in [
+        "Material \"diffuse\" \"texture displacement\" \"s\"\n",
+        "Material \"matte\" \"texture bumpmap\" \"s\"\n",
+    ] {
+        let world = format!("{sun}{texture}{material}{square}");
+        close(ramp.see(&world), lambert([0.4, 1.0]), 5e-3, material);
+    }
+    let turned = exr(&[[0.8, 0.5, 0.9]]);
+    let material = "Material \"diffuse\" \"string normalmap\" \"a.exr\"\n";
+    close(turned.see(&format!("{sun}{material}{square}")), lambert([0.6, 0.8]), 5e-3, material);
+
+    // A flat square of four: subdivided, its middle stays where it is. Levels beyond memory are refused
+    let grid = "Shape \"loopsubdiv\" \"integer indices\" [0 1 4 0 4 3 1 2 5 1 5 4 3 4 7 3 7 6 4 5 8 4 8 7] \
+        \"point3 P\" [-1 -1 0 0 -1 0 1 -1 0 -1 0 0 0 0 0 1 0 0 -1 1 0 0 1 0 1 1 0] \"integer levels\" ";
+    let loaded = ramp.world(&format!("{sun}{grid}2")).unwrap();
+    assert_eq!((loaded.scene.surfaces(), loaded.warnings.len()), (8 * 16, 0));
+    close(ramp.see(&format!("{sun}{grid}2")), lambert([0.0, 1.0]), 5e-3, grid);
+    for levels in ["11", "77", "1e30"] {
+        let error = ramp.world(&format!("{grid}{levels}")).unwrap_err();
+        assert!(error.contains("triangles of subdivision in all"), "{error}");
+    }
+}
+
 #[test]
 fn materials_of_both_versions_reflect_the_sky() {
     let folder = Folder::new();

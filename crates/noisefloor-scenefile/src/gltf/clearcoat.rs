@@ -1,0 +1,73 @@
+//! `KHR_materials_clearcoat`.
+
+use super::notes::Notes;
+use crate::{LoadError, Place};
+use gltf::json::texture::Info;
+use gltf::json::{Value, deserialize};
+use noisefloor_ptwne::{Material, MaterialId, MaterialOptions, SceneBuilder, SceneError, Texture};
+
+/// The extension.
+pub(super) const NAME: &str = "KHR_materials_clearcoat";
+
+/// What the extension says of a coat.
+#[derive(Debug)]
+pub(super) struct Clearcoat {
+    pub(super) factor: f32,
+    pub(super) texture: Option<Info>,
+    pub(super) roughness: f32,
+}
+
+/// A clear coat over a material. It has the smooth normals of the mesh.
+#[derive(Debug)]
+pub(super) struct Coat {
+    pub(super) share: Texture,
+    /// GGX α.
+    pub(super) roughness: f32,
+}
+
+/// Reads the extension; none if there is no coat.
+pub(super) fn parse(value: &Value, place: &Place, notes: &mut Notes) -> Result<Option<Clearcoat>, LoadError> {
+    let factor = number(value, "clearcoatFactor", place)?;
+    let roughness = number(value, "clearcoatRoughnessFactor", place)?;
+    if factor == 0.0 {
+        return Ok(None);
+    }
+    for (name, what) in [
+        (
+            "clearcoatRoughnessTexture",
+            "the texture of its coat's roughness is ignored, the factor used alone",
+        ),
+        ("clearcoatNormalTexture", "the normal map of its coat is ignored: the coat is smooth"),
+    ] {
+        if value.get(name).is_some() {
+            notes.warn(place, what);
+        }
+    }
+    let texture = value.get("clearcoatTexture").map(|info| deserialize::from_value::<Info>(info.clone()));
+    let texture = texture.transpose().map_err(|e| place.clone().bad(format_args!("its {NAME}: {e}")))?;
+    Ok(Some(Clearcoat { factor, texture, roughness }))
+}
+
+/// A factor of 0…1; 0 if it is missing.
+fn number(value: &Value, name: &str, place: &Place) -> Result<f32, LoadError> {
+    let Some(number) = value.get(name) else { return Ok(0.0) };
+    let number = number.as_f64().filter(|x| (0.0..=1.0).contains(x));
+    number.map(|x| x as f32).ok_or_else(|| place.clone().bad(format_args!("its {name} is no number of 0…1")))
+}
+
+impl Coat {
+    /// Adds the coated material.
+    pub(super) fn over(
+        self,
+        material: Material,
+        cover: MaterialOptions,
+        builder: &mut SceneBuilder,
+    ) -> Result<MaterialId, SceneError> {
+        let MaterialOptions { opacity, one_sided, relief, .. } = cover;
+        let sides = MaterialOptions { one_sided, ..MaterialOptions::default() };
+        let base = builder.material_with(material, MaterialOptions { relief, ..sides.clone() })?;
+        let film = Material::RoughConductor { reflectance: [1.0; 3].into(), roughness: self.roughness };
+        let film = builder.material_with(film, sides.clone())?;
+        builder.coated_material(base, film, self.share, MaterialOptions { opacity, ..sides })
+    }
+}
