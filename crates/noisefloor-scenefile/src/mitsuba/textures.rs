@@ -74,6 +74,11 @@ impl<'d> Context<'d> {
             "bitmap" => self.bitmap(element, quantity)?,
             "checkerboard" => (1.0, self.checkerboard(element)?),
             "scale" => return self.scale(element, quantity),
+            "rawconstant" => {
+                let colour = self.colour(element, "value", quantity)?.unwrap_or([1.0; 3]);
+                let scale = colour.into_iter().fold(1.0, f32::max);
+                return Ok((scale, Texture::Colour(colour.map(|c| c.max(0.0) / scale))));
+            }
             _ => return Err(self.unsupported(element, element.species())),
         };
         Ok((scale, Texture::Image(image)))
