@@ -73,7 +73,16 @@ fn zoo() -> Vec<(Material, CompiledMaterial)> {
 /// The microfacets and coat of a material, seen from `wo`.
 fn seen(material: &CompiledMaterial, wo: Vec3) -> Glossy<'_> {
     let (position, up, uv) = (Vec3::ZERO, Vec3::Z, [0.0; 2]);
-    let surface = Intersection { position, flat: up, normal: up, front: true, uv, material, light: NO };
+    let surface = Intersection {
+        position,
+        flat: up,
+        normal: up,
+        front: true,
+        uv,
+        tint: Vec3::ONE,
+        material,
+        light: NO,
+    };
     surface.glossy(wo.z).unwrap()
 }
 
