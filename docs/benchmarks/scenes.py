@@ -77,7 +77,9 @@ def survey(args):
 
 
 def prepared(text):
-    """The XML with a box filter, and a film that Mitsuba does not quantise."""
+    """The XML with independent samples, a box filter, and a film that Mitsuba does not quantise."""
+    text = re.sub(r'<sampler type="[^"]*"\s*/>', '<sampler type="independent"/>', text)
+    text = re.sub(r'<sampler type="[^"]*"\s*>.*?</sampler>', '<sampler type="independent"/>', text, flags=re.S)
     text = re.sub(r'<rfilter type="[^"]*"\s*/>', '<rfilter type="box"/>', text)
     text = re.sub(r'<rfilter type="[^"]*"\s*>.*?</rfilter>', '<rfilter type="box"/>', text, flags=re.S)
     if "rfilter" not in text:

@@ -60,7 +60,41 @@ pub(crate) fn gltf(bytes: &[u8]) {
 
 pub(crate) fn gltf_seeds() -> Vec<Vec<u8>> {
     let data = base64::engine::general_purpose::STANDARD.encode(positions());
-    vec![triangle(&format!(r#","uri":"data:application/octet-stream;base64,{data}""#)).into_bytes()]
+    let uri = format!(r#","uri":"data:application/octet-stream;base64,{data}""#);
+    vec![triangle(&uri).into_bytes(), dressed(&uri).into_bytes()]
+}
+
+/// The triangle with a skin, a morph target, colours, and materials of extensions; its positions are all of its
+/// numbers.
+fn dressed(uri: &str) -> String {
+    let image = base64::engine::general_purpose::STANDARD.encode(include_bytes!("../seeds/two.png"));
+    let material = r#"[{"normalTexture":{"index":0,"scale":0.5},"occlusionTexture":{"index":0},
+"extensions":{"KHR_materials_clearcoat":{"clearcoatFactor":0.5,"clearcoatTexture":{"index":0}},
+"KHR_materials_pbrSpecularGlossiness":{"diffuseTexture":{"index":0},"specularFactor":[1,0.5,0]}}},
+{"extensions":{"KHR_materials_unlit":{}}}]"#;
+    let primitive = |material: u32| {
+        format!(
+            r#"{{"attributes":{{"POSITION":0,"NORMAL":0,"COLOR_0":0,"TEXCOORD_0":2,"JOINTS_0":3,"WEIGHTS_0":4}},
+"targets":[{{"POSITION":0}}],"indices":1,"material":{material}}}"#
+        )
+    };
+    format!(
+        r#"{{"asset":{{"version":"2.0"}},"scenes":[{{"nodes":[0]}}],
+"nodes":[{{"mesh":0,"skin":0,"weights":[0.5],"children":[1]}},{{"translation":[1,0,0]}}],
+"skins":[{{"joints":[1,0]}}],"materials":{material},
+"textures":[{{"source":0}}],"images":[{{"uri":"data:image/png;base64,{image}"}}],
+"meshes":[{{"weights":[1],"primitives":[{},{}]}}],
+"accessors":[{{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3"}},
+{{"bufferView":1,"componentType":5123,"count":3,"type":"SCALAR"}},
+{{"bufferView":0,"componentType":5126,"count":3,"type":"VEC2"}},
+{{"bufferView":2,"componentType":5121,"count":3,"type":"VEC4"}},
+{{"bufferView":0,"componentType":5121,"count":3,"type":"VEC4","normalized":true}}],
+"bufferViews":[{{"buffer":0,"byteLength":36}},{{"buffer":0,"byteOffset":36,"byteLength":6}},
+{{"buffer":0,"byteLength":12}}],
+"buffers":[{{"byteLength":44{uri}}}]}}"#,
+        primitive(0),
+        primitive(1)
+    )
 }
 
 /// The JSON up to the first zero byte, and the binary chunk after it.
@@ -114,6 +148,60 @@ pub(crate) fn xml_seeds() -> Vec<Vec<u8>> {
 <emitter type="constant"/><emitter type="point"/><emitter type="directional"/>
 <emitter type="spot"><float name="cutoff_angle" value="30"/></emitter></scene>"##;
     vec![scene.as_bytes().to_vec(), include_bytes!("../../fixtures/cornell-box.xml").to_vec()]
+}
+
+pub(crate) fn pbrt(bytes: &[u8]) {
+    read("scene.pbrt", bytes);
+}
+
+pub(crate) fn pbrt_seeds() -> Vec<Vec<u8>> {
+    let head = "Scale -1 1 1 LookAt 0 0 5 0 0 0 0 1 0 # a\nCamera \"perspective\" \"float fov\" 40\n\
+                Film \"rgb\" \"integer xresolution\" [8] WorldBegin\n";
+    let looks = "MakeNamedMaterial \"a\" \"string type\" \"conductor\" \"spectrum eta\" \"metal-Cu-eta\"\n\
+        Texture \"t\" \"float\" \"constant\" \"float value\" 2\n\
+        Texture \"s\" \"float\" \"scale\" \"texture tex\" \"t\" \"float scale\" -0.5\n\
+        Material \"diffuse\" \"texture displacement\" \"s\" \"rgb reflectance\" [1 0.5 0]\n";
+    let shapes = "AttributeBegin ReverseOrientation Rotate 30 0 1 0 AreaLightSource \"diffuse\" \"blackbody L\" 5000\n\
+        Shape \"sphere\" \"float radius\" 0.5 AttributeEnd NamedMaterial \"a\"\n\
+        ObjectBegin \"o\" Shape \"trianglemesh\" \"integer indices\" [0 1 2] \"point3 P\" [0 0 0 1 0 0 0 1 0] ObjectEnd\n\
+        ObjectInstance \"o\" Shape \"loopsubdiv\" \"integer levels\" 2 \"integer indices\" [0 1 2 0 2 3]\n\
+        \"point3 P\" [-1 -1 0 1 -1 0 1 1 0 -1 1 0] Shape \"disk\" \"float alpha\" 0.5\n\
+        LightSource \"infinite\" \"rgb L\" [1 1 1] LightSource \"spot\" \"point3 to\" [0 0 -1]\n";
+    vec![format!("{head}{looks}{shapes}").into_bytes()]
+}
+
+/// A file of a spectrum.
+pub(crate) fn spectrum(bytes: &[u8]) {
+    FOLDER.with(|folder| folder.write("a.spd", bytes));
+    read(
+        "spectrum.xml",
+        br#"<scene version="3.0.0"><sensor type="perspective"/><emitter type="point">
+<spectrum name="intensity" filename="a.spd"/></emitter></scene>"#,
+    );
+    read("spectrum.pbrt", b"WorldBegin LightSource \"point\" \"spectrum I\" \"a.spd\"");
+}
+
+pub(crate) fn spectrum_seeds() -> Vec<Vec<u8>> {
+    vec![b"# a\n400 0.5\n550.5 1e0\n700 0\n".to_vec(), b"400, 0.5\n 500 , 1\n".to_vec()]
+}
+
+/// A picture on a surface and around the scene: those without a mark are tried as TGA.
+pub(crate) fn texture(bytes: &[u8]) {
+    FOLDER.with(|folder| folder.write("a.tga", bytes));
+    read(
+        "texture.xml",
+        br#"<scene version="3.0.0"><sensor type="perspective"/><shape type="rectangle"><bsdf type="bumpmap">
+<texture type="bitmap"><string name="filename" value="a.tga"/></texture><bsdf type="diffuse"/></bsdf></shape>
+<emitter type="envmap"><string name="filename" value="a.tga"/></emitter></scene>"#,
+    );
+}
+
+pub(crate) fn texture_seeds() -> Vec<Vec<u8>> {
+    // 2 by 1 pixels each
+    let tga = [&[0, 0, 2, 0, 0, 0, 0, 0, 0, 0, 0, 0, 2, 0, 1, 0, 24, 0][..], &[1, 2, 3, 4, 5, 6]].concat();
+    let packed = [&[0, 0, 10, 0, 0, 0, 0, 0, 0, 0, 0, 0, 2, 0, 1, 0, 24, 0][..], &[0x81, 1, 2, 3]].concat();
+    let hdr = b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 2\n\x80\x40\x20\x80\x10\x20\x30\x81".to_vec();
+    vec![tga, packed, hdr, include_bytes!("../seeds/two.png").to_vec()]
 }
 
 pub(crate) fn ply(bytes: &[u8]) {
