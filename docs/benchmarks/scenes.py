@@ -76,15 +76,35 @@ def survey(args):
         print(f"{files} {reason}")
 
 
-def prepared(text):
-    """The XML with independent samples, a box filter, and a film that Mitsuba does not quantise."""
-    text = re.sub(r'<sampler type="[^"]*"\s*/>', '<sampler type="independent"/>', text)
-    text = re.sub(r'<sampler type="[^"]*"\s*>.*?</sampler>', '<sampler type="independent"/>', text, flags=re.S)
-    text = re.sub(r'<rfilter type="[^"]*"\s*/>', '<rfilter type="box"/>', text)
-    text = re.sub(r'<rfilter type="[^"]*"\s*>.*?</rfilter>', '<rfilter type="box"/>', text, flags=re.S)
-    if "rfilter" not in text:
-        text = re.sub(r'(<film type="[^"]*"\s*>)', r'\1<rfilter type="box"/>', text)
-    return re.sub(r'<film type="[^"]*"', '<film type="hdrfilm"', text)
+def prepared(args, file):
+    """Mitsuba's scene of a file with independent samples and a box filter, and the path depth that the file asks for."""
+    import mitsuba as mi
+
+    config = mi.parser.ParserConfig(args.variant)
+    state = mi.parser.parse_file(config, str(file))
+    mi.parser.transform_all(config, state)
+    # Its own default where a file has none
+    depth = 65
+
+    def become(node, plugin):
+        for name in list(node.props.keys()):
+            node.props.remove_property(name)
+        node.props.set_plugin_name(plugin)
+
+    for node in state.nodes:
+        if node.type == mi.ObjectType.Integrator:
+            given = node.props.get("max_depth", -1)
+            depth = 2 if node.props.plugin_name() == "direct" else given if given > 0 else 65
+            become(node, "path")
+        elif node.type == mi.ObjectType.Sampler:
+            become(node, "independent")
+        elif node.type == mi.ObjectType.ReconstructionFilter:
+            become(node, "box")
+        elif node.type == mi.ObjectType.Film:
+            node.props.set_plugin_name("hdrfilm")
+            node.props["pixel_format"] = "rgb"
+    scene = mi.parser.instantiate(config, state)
+    return (scene[0] if isinstance(scene, list) else scene), depth
 
 
 def ours(args, file, size, spp, root):
@@ -108,13 +128,7 @@ def theirs(args, file, spp):
     import mitsuba as mi
     import numpy as np
 
-    text = file.read_text()
-    beside = file.with_name(f".{file.stem}-compared.xml")
-    beside.write_text(prepared(text))
-    try:
-        scene = mi.load_file(str(beside))
-    finally:
-        beside.unlink()
+    scene, depth = prepared(args, file)
     sensor = scene.sensors()[0]
     params = mi.traverse(sensor)
     width, height = (int(x) for x in params["film.size"])
@@ -124,9 +138,7 @@ def theirs(args, file, spp):
     if "film.crop_size" in params:
         params["film.crop_size"], params["film.crop_offset"] = size, [0, 0]
     params.update()
-    depth = re.search(r'name="max_?[dD]epth"\s+value="(-?\d+)"', text)
-    depth = int(depth.group(1)) if depth else -1
-    integrator = mi.load_dict({"type": "path", "max_depth": depth if depth > 0 else 65, "rr_depth": 5})
+    integrator = mi.load_dict({"type": "path", "max_depth": depth, "rr_depth": 5})
 
     def render():
         start = time.time()
