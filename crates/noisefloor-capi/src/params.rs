@@ -121,6 +121,7 @@ impl NfParams {
             max_spp: self.max_spp,
             consecutive: self.consecutive,
             audience: Audience { slope: self.audience_slope, offset: self.audience_offset },
+            ..Params::default()
         })
     }
 }

@@ -11,8 +11,8 @@ use crate::rng::Key;
 use crate::sampler::{Sampler, Sampling};
 use crate::scene::Scene;
 use noisefloor::{
-    Batch, Counts, Display, FirstHits, ProgressiveSource, Reference, Repeats, Request, Rgb, SourceError,
-    SourceIdentity, SourceInfo, Tile, ToneMapping, Unit,
+    Batch, BlockRequest, BlockSamples, Counts, Display, FirstHits, ProgressiveSource, Reference, Repeats,
+    Request, Rgb, SourceError, SourceIdentity, SourceInfo, Tile, ToneMapping, Unit,
 };
 use rayon::prelude::*;
 use std::fmt;
@@ -203,18 +203,22 @@ impl Ptwne {
 
     /// Renders one row of a tile: the mean of the samples of each pixel.
     fn render_row(&self, lens: &Lens, job: Job<'_>) {
-        let Job { request, y, empty, out } = job;
+        let Job { tile, counts, y, empty, out } = job;
         let key = Key::new(self.options.seed);
         let RenderOptions { max_depth, roulette, estimator, sampling, filter, clamp, .. } = self.options;
         let settings = Settings { max_depth, roulette, estimator };
         let mut stack = self.scene.bvh.stack();
-        let (mut dropped, mut clamped) = (0, 0);
+        let (mut samples, mut dropped, mut clamped) = (0, 0, 0);
         for (i, mean) in out.iter_mut().enumerate() {
-            let x = request.tile.x + i;
+            let x = tile.x + i;
             let pixel = (y * self.width + x) as u64;
+            let BlockSamples { first, spp } = match counts {
+                Counted::Alike(all) => all,
+                Counted::ByBlocks(request) => request.at(i, y - tile.y),
+            };
             let mut sum = glam::DVec3::ZERO;
-            for k in 0..request.spp {
-                let mut sampler = Sampler::new(sampling, key, pixel, request.first.wrapping_add(k));
+            for k in 0..spp {
+                let mut sampler = Sampler::new(sampling, key, pixel, first.wrapping_add(k));
                 let [u, v, lens_u, lens_v] = sampler.four();
                 let [dx, dy] = filter.offset([u, v]);
                 let ray = lens.ray(x as f32 + dx, y as f32 + dy, [lens_u, lens_v]);
@@ -234,14 +238,46 @@ impl Ptwne {
                 }
                 sum += sample.as_dvec3();
             }
-            *mean = (sum / request.spp as f64).as_vec3().to_array();
+            *mean = (sum / spp as f64).as_vec3().to_array();
+            samples += spp;
         }
         let add = |to: &AtomicU64, count: u64| to.fetch_add(count, Ordering::Relaxed);
-        let samples = out.len() as u64 * request.spp;
         add(&self.tally.samples, samples);
         add(&self.tally.background, if empty { samples } else { 0 });
         add(&self.tally.dropped, dropped);
         add(&self.tally.clamped, clamped);
+    }
+
+    /// Renders batches of tiles, each with its number of samples.
+    fn render(&self, requests: Vec<(Tile, u64, Counted<'_>)>) -> Result<Vec<Batch>, SourceError> {
+        let (width, height) = (self.width, self.height);
+        for (tile, ..) in &requests {
+            let (right, bottom) = (tile.x.saturating_add(tile.width), tile.y.saturating_add(tile.height));
+            if right > width || bottom > height {
+                return Err(self.fail(
+                    Some(tile.index),
+                    OutsideError { index: tile.index, right, bottom, width, height },
+                ));
+            }
+        }
+        let batch = |&(tile, spp, _): &(Tile, u64, Counted<'_>)| {
+            let pixels = if spp == 0 { 0 } else { tile.pixels() };
+            Batch { tile, spp, mean: vec![[0.0; 3]; pixels] }
+        };
+        let mut batches: Vec<Batch> = requests.iter().map(batch).collect();
+        // Rows of tiles are the jobs: so small that no thread waits long for the last one
+        let lens = self.scene.lens(width, height);
+        let jobs: Vec<Job<'_>> = requests
+            .into_iter()
+            .zip(&mut batches)
+            .flat_map(|((tile, _, counts), batch)| {
+                let empty = self.is_empty(&lens, &tile);
+                let rows = batch.mean.chunks_mut(tile.width.max(1)).enumerate();
+                rows.map(move |(row, out)| Job { tile, counts, y: tile.y + row, empty, out })
+            })
+            .collect();
+        self.on_threads(|| jobs.into_par_iter().with_max_len(1).for_each(|job| self.render_row(&lens, job)));
+        Ok(batches)
     }
 
     /// Whether no ray through the tile can meet a surface.
@@ -285,9 +321,17 @@ impl fmt::Debug for Ptwne {
     }
 }
 
+/// How many samples the pixels of a tile get.
+#[derive(Clone, Copy)]
+enum Counted<'a> {
+    Alike(BlockSamples),
+    ByBlocks(&'a BlockRequest),
+}
+
 /// A row of a tile to render.
 struct Job<'a> {
-    request: &'a Request,
+    tile: Tile,
+    counts: Counted<'a>,
     y: usize,
     /// Whether the tile sees only the background.
     empty: bool,
@@ -318,37 +362,17 @@ impl ProgressiveSource for Ptwne {
     /// # Errors
     /// [`SourceError::Failed`] if a tile is partly outside the image.
     fn sample(&mut self, requests: &[Request]) -> Result<Vec<Batch>, SourceError> {
-        let this = &*self;
-        let (width, height) = (this.width, this.height);
-        for Request { tile, .. } in requests {
-            let (right, bottom) = (tile.x.saturating_add(tile.width), tile.y.saturating_add(tile.height));
-            if right > width || bottom > height {
-                return Err(this.fail(
-                    Some(tile.index),
-                    OutsideError { index: tile.index, right, bottom, width, height },
-                ));
-            }
-        }
-        let mut batches: Vec<Batch> = requests
-            .iter()
-            .map(|r| {
-                let pixels = if r.spp == 0 { 0 } else { r.tile.pixels() };
-                Batch { tile: r.tile, spp: r.spp, mean: vec![[0.0; 3]; pixels] }
-            })
-            .collect();
-        // Rows of tiles are the jobs: so small that no thread waits long for the last one
-        let lens = this.scene.lens(width, height);
-        let jobs: Vec<Job<'_>> = requests
-            .iter()
-            .zip(&mut batches)
-            .flat_map(|(request, batch)| {
-                let empty = this.is_empty(&lens, &request.tile);
-                let rows = batch.mean.chunks_mut(request.tile.width.max(1)).enumerate();
-                rows.map(move |(row, out)| Job { request, y: request.tile.y + row, empty, out })
-            })
-            .collect();
-        this.on_threads(|| jobs.into_par_iter().with_max_len(1).for_each(|job| this.render_row(&lens, job)));
-        Ok(batches)
+        let alike = |&Request { tile, first, spp }: &Request| {
+            (tile, spp, Counted::Alike(BlockSamples { first, spp }))
+        };
+        self.render(requests.iter().map(alike).collect())
+    }
+
+    /// # Errors
+    /// [`SourceError::Failed`] if a tile is partly outside the image.
+    fn sample_blocks(&mut self, requests: &[BlockRequest]) -> Result<Option<Vec<Batch>>, SourceError> {
+        let by_blocks = requests.iter().map(|r| (r.tile, r.spp, Counted::ByBlocks(r)));
+        self.render(by_blocks.collect()).map(Some)
     }
 
     /// # Errors

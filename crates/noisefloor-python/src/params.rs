@@ -150,6 +150,7 @@ impl PyParams {
             max_spp,
             consecutive,
             audience: audience.map_or(Audience::TRAINED, |(slope, offset)| Audience { slope, offset }),
+            ..Params::default()
         };
         params.check().map_err(Raise::raise)?;
         Ok(Self(params))

@@ -3,7 +3,7 @@
 use crate::descriptor::DescriptorError;
 use crate::display::Display;
 use crate::film::Film;
-use crate::params::Audience;
+use crate::params::{Audience, Params};
 use crate::rgb::Rgb;
 use crate::tile::{Tile, TileGrid};
 use auto_impl::auto_impl;
@@ -23,6 +23,19 @@ pub struct View<'a> {
     /// The quick reference, display-encoded, row-major over the image; present if [`Needs::reference`] is
     /// set.
     pub reference: Option<&'a [Rgb]>,
+}
+
+impl<'a> View<'a> {
+    /// None before the display is settled.
+    pub(crate) fn of(
+        film: &'a Film,
+        display: &'a Option<Display>,
+        params: &Params,
+        reference: &'a Option<Vec<Rgb>>,
+    ) -> Option<Self> {
+        let (display, reference) = (display.as_ref()?, reference.as_deref());
+        Some(Self { film, display, viewing: params.viewing, reference })
+    }
 }
 
 /// What a criterion reads besides the mean picture; nothing else is kept or rendered.
@@ -146,6 +159,14 @@ pub trait StoppingCriterion {
     /// tile gives no evidence. `None`, the default, if the criterion cannot say. Costs as much as a verdict
     /// on every tile; called where a map is wanted, never for a verdict.
     fn visible_noise(&self, _view: &View<'_>) -> Option<Vec<f32>> {
+        None
+    }
+
+    /// How many samples each block of `edge` pixels of the given tiles needs, relative to the others of its
+    /// tile, row-major; `None` for a tile without evidence, and, the default, if the criterion cannot say: blocks
+    /// are then sampled alike. An estimate: nothing depends on it but how samples are spread. Costs about as much as
+    /// a verdict.
+    fn block_needs(&self, _view: &View<'_>, _tiles: &[Tile], _edge: usize) -> Option<Vec<Option<Vec<f64>>>> {
         None
     }
 

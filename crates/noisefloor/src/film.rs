@@ -1,9 +1,11 @@
 //! The film: batches of every tile, in two independent halves.
 
+use crate::blocks::BlockCounts;
 use crate::rgb::Rgb;
 use crate::tile::{Tile, TileGrid};
 use thiserror::Error;
 
+mod blocks;
 mod planes;
 pub(crate) use planes::FilmHead;
 
@@ -33,6 +35,9 @@ pub enum FilmError {
         /// Samples claimed now.
         now: u64,
     },
+    /// Block by block, the batch is none that a session of this film asks for.
+    #[error("a batch for blocks of tile {0} that the film does not have, or without samples in one of them")]
+    Blocks(usize),
 }
 
 /// One half: a mean for each pixel, with the rounding error of its last bits kept beside it.
@@ -95,6 +100,11 @@ impl Half {
 /// Each batch goes to whichever half of its tile has fewer samples, so that the two stay as even as the
 /// batches allow. Non-finite pixels of a batch are rejected and counted.
 ///
+/// Where [blocks](crate::Params::blocks) of a tile got different numbers of samples, its numbers of samples are
+/// those that it got on average, and each batch counts by that in every block: see [`BlockRequest::spp`](crate::BlockRequest::spp).
+/// Batches of the two halves come in pairs with equal numbers in every block, so that the halves of a block are
+/// as alike as those of a tile.
+///
 /// Memory: 36 bytes per pixel, 18 without halves.
 #[derive(Clone, Debug)]
 pub struct Film {
@@ -103,6 +113,8 @@ pub struct Film {
     halves: Vec<Half>,
     counts: Vec<[u64; 2]>,
     rejected: u64,
+    /// What the blocks have, if they are counted.
+    blocks: Option<BlockCounts>,
 }
 
 impl Film {
@@ -118,7 +130,7 @@ impl Film {
 
     fn with_halves(grid: TileGrid, halves: usize) -> Self {
         let halves = vec![Half::new(grid.width() * grid.height()); halves];
-        Self { grid, halves, counts: vec![[0; 2]; grid.len()], rejected: 0 }
+        Self { grid, halves, counts: vec![[0; 2]; grid.len()], rejected: 0, blocks: None }
     }
 
     /// The grid.
@@ -139,7 +151,7 @@ impl Film {
         self.counts[tile]
     }
 
-    /// Samples per pixel of a tile, both halves together.
+    /// Samples per pixel of a tile, both halves together; the average where its blocks have different numbers.
     ///
     /// # Panics
     /// If the tile does not exist.
@@ -148,13 +160,19 @@ impl Film {
         a + b
     }
 
-    /// Samples rejected so far, over all pixels, because their batch was not finite.
+    /// Samples rejected so far, over all pixels, because their batch was not finite. They count as their batch
+    /// does, by the average of the tile.
     pub fn rejected(&self) -> u64 {
         self.rejected
     }
 
     /// All samples taken, over all pixels.
     pub fn total_samples(&self) -> u64 {
+        self.blocks.as_ref().map_or_else(|| self.averages(), BlockCounts::samples)
+    }
+
+    /// Samples per pixel of each tile, over all its pixels.
+    fn averages(&self) -> u64 {
         self.grid.tiles().map(|t| self.spp(t.index) * t.pixels() as u64).sum()
     }
 
@@ -169,6 +187,16 @@ impl Film {
         if spp == 0 {
             return Err(FilmError::NothingNew { tile: tile.index, had: a + b, now: a + b });
         }
+        let half = self.accumulate(tile, spp, mean);
+        if let Some(blocks) = &mut self.blocks {
+            blocks.count(tile, half, std::iter::repeat(spp));
+        }
+        Ok(())
+    }
+
+    /// Adds a batch to the half of its tile that has fewer samples, and returns which.
+    fn accumulate(&mut self, tile: Tile, spp: u64, mean: &[Rgb]) -> usize {
+        let [a, b] = self.counts[tile.index];
         let half = usize::from(self.has_halves() && b < a);
         for (row, values) in tile.rows(self.grid.width()).zip(mean.chunks_exact(tile.width)) {
             for (pixel, &value) in row.zip(values) {
@@ -182,7 +210,7 @@ impl Film {
             }
         }
         self.counts[tile.index][half] += spp;
-        Ok(())
+        half
     }
 
     /// Adds the new samples in a running mean of `total` samples per pixel, for renderers that keep one of
@@ -246,7 +274,12 @@ impl Film {
                     .flatten()
                     .all(|pixel| halves().all(|(half, count)| half.rejected(pixel) <= count))
         };
-        if !self.grid.tiles().all(possible) || self.rejected > self.total_samples() {
+        if !self.counts_blocks_like(fresh) {
+            return Err("its film counts other blocks");
+        }
+        let mut of_blocks = self.blocks.iter().flat_map(|blocks| &blocks.counts).flatten();
+        let countable = of_blocks.all(|&count| count < 1 << 34);
+        if !countable || !self.grid.tiles().all(possible) || self.rejected > self.averages() {
             return Err("its film counts samples that there cannot be");
         }
         Ok(())

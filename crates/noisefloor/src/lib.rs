@@ -30,6 +30,7 @@
 //! # Ok::<(), noisefloor::SessionError>(())
 //! ```
 
+mod blocks;
 mod checkpoint;
 mod container;
 mod criterion;
@@ -59,6 +60,7 @@ mod threshold;
 mod tile;
 mod tone_curve;
 
+pub use blocks::{BlockRequest, BlockSamples};
 pub use checkpoint::{Checkpoint, CheckpointError};
 pub use criterion::{CriterionError, FixedSpp, Needs, Resumable, StoppingCriterion, Verdict, View};
 pub use descriptor::{

@@ -1,7 +1,7 @@
 //! When tiles are judged, and the limits that end them.
 
 use crate::display::{ToneMapping, ToneMappingError};
-use crate::tile::DEFAULT_TILE;
+use crate::tile::{DEFAULT_TILE, MIN_TILE};
 use noisefloor_vision::Viewing;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
@@ -124,6 +124,10 @@ pub struct Params {
     /// Whose thresholds, relative to those that the criterion stands for
     /// ([`crate::StoppingCriterion::audience`]).
     pub audience: Audience,
+    /// Edge in pixels of the blocks that get samples by their need, which has to divide that of the tiles:
+    /// [`MIN_TILE`](crate::MIN_TILE)…[`Params::tile`]. 0, the default, samples all of a tile alike. For criteria that know what blocks need, such as
+    /// the oracle, and sources that can aim at them; with others nothing changes.
+    pub blocks: usize,
 }
 
 impl Default for Params {
@@ -137,6 +141,7 @@ impl Default for Params {
             max_spp: 10_000,
             consecutive: 1,
             audience: Audience::TRAINED,
+            blocks: 0,
         }
     }
 }
@@ -165,12 +170,25 @@ pub enum ParamsError {
     /// The line of the audience falls.
     #[error("the audience line T′ = {0}·T + {1} needs finite numbers and a slope of at least 0")]
     Audience(f64, f64),
+    /// Blocks of which tiles do not consist.
+    #[error("blocks of {blocks} pixels do not make up tiles of {tile}: use 16 or 32, or 0 for none")]
+    Blocks {
+        /// Edge of the blocks.
+        blocks: usize,
+        /// Edge of the tiles.
+        tile: usize,
+    },
     /// The tone mapping.
     #[error(transparent)]
     ToneMapping(#[from] ToneMappingError),
 }
 
 impl Params {
+    /// Samples per pixel at the first verdict.
+    pub(crate) fn first_verdict(&self) -> u64 {
+        self.schedule.next(self.min_spp.saturating_sub(1), None, 1.0).min(self.max_spp)
+    }
+
     /// Checks every parameter but the tile size, which [`crate::TileGrid::new`] checks with the image.
     ///
     /// # Errors
@@ -193,6 +211,10 @@ impl Params {
         let Audience { slope, offset } = self.audience;
         if !(slope.is_finite() && slope >= 0.0 && offset.is_finite()) {
             return Err(ParamsError::Audience(slope, offset));
+        }
+        let Self { blocks, tile, .. } = *self;
+        if blocks != 0 && (blocks < MIN_TILE || !tile.is_multiple_of(blocks)) {
+            return Err(ParamsError::Blocks { blocks, tile });
         }
         Ok(())
     }
@@ -239,6 +261,8 @@ mod tests {
         assert!(Params { max_spp: 50, ..ok }.check().is_err());
         assert!(Params { max_spp: 1, min_spp: 0, ..ok }.check().is_err());
         assert!(Params { consecutive: 0, ..ok }.check().is_err());
+        assert_eq!([0, 16, 32, 64, 128].map(|blocks| Params { blocks, ..ok }.check()), [const { Ok(()) }; 5]);
+        assert!([1, 8, 24, 48, 256].iter().all(|&blocks| Params { blocks, ..ok }.check().is_err()));
         assert!(Params { audience: Audience { slope: f64::NAN, offset: 0.0 }, ..ok }.check().is_err());
         assert!(Params { tone_mapping: ToneMapping::Srgb { exposure: 0.0 }, ..ok }.check().is_err());
     }

@@ -1,5 +1,6 @@
 //! The push loop: for a renderer that owns its main loop.
 
+use crate::blocks::PILOT;
 use crate::criterion::{CriterionError, StoppingCriterion, Verdict, View};
 use crate::display::{Display, ToneMapping};
 use crate::film::{Film, FilmError};
@@ -64,6 +65,8 @@ pub struct Session<C> {
     /// The reference as displayed, once the display is settled.
     displayed_reference: Option<Vec<Rgb>>,
     tiles: Vec<TileState>,
+    /// Of each tile, the share that each of its blocks gets of its samples; none if all get as many.
+    shares: Vec<Option<Vec<f32>>>,
     source: SourceIdentity,
 }
 
@@ -76,8 +79,11 @@ impl<C: StoppingCriterion> Session<C> {
         params.check()?;
         let grid = TileGrid::new(width, height, params.tile)?;
         criterion.begin(grid);
-        let film = if criterion.needs().halves { Film::new(grid) } else { Film::without_halves(grid) };
-        let first = params.schedule.next(params.min_spp.saturating_sub(1), None, 1.0).min(params.max_spp);
+        let mut film = if criterion.needs().halves { Film::new(grid) } else { Film::without_halves(grid) };
+        let mut first = params.first_verdict();
+        if params.blocks > 0 {
+            (film, first) = (film.by_blocks(params.blocks)?, first.min(PILOT));
+        }
         let tile = TileState { next: first, streak: 0, verdict: None, target: None, stop: None };
         let tiles = vec![tile; grid.len()];
         // Only an exposure by log-average depends on the picture, and has to wait for one
@@ -93,6 +99,7 @@ impl<C: StoppingCriterion> Session<C> {
             display,
             reference: None,
             displayed_reference: None,
+            shares: vec![None; tiles.len()],
             tiles,
             source,
         })
@@ -184,6 +191,9 @@ impl<C: StoppingCriterion> Session<C> {
     /// The first verdicts wait until every open tile has samples: the exposure is settled then, once and for
     /// all, unless the tone mapping is plain sRGB or [`Session::set_display`] was called.
     ///
+    /// With [`Params::blocks`], the shares of the blocks are decided here, too: for the first time at 32 samples
+    /// per pixel, and without a verdict where that is too early for one.
+    ///
     /// # Errors
     /// [`CriterionError`] if the criterion does not fit the job.
     pub fn judge(&mut self) -> Result<Vec<Stop>, CriterionError> {
@@ -191,8 +201,13 @@ impl<C: StoppingCriterion> Session<C> {
         if due.is_empty() || !self.settle_display() {
             return Ok(Vec::new());
         }
+        let (early, due_now): (Vec<Tile>, Vec<Tile>) =
+            due.iter().partition(|t| self.film.spp(t.index) < self.params.first_verdict());
+        for tile in early {
+            self.tiles[tile.index].next = self.params.first_verdict();
+        }
         let (judged, waited): (Vec<Tile>, Vec<Tile>) =
-            due.into_iter().partition(|t| self.tiles[t.index].target.is_none());
+            due_now.into_iter().partition(|t| self.tiles[t.index].target.is_none());
 
         // Tiles that had converged for the trained audience have now what this audience wants.
         let mut stops: Vec<Stop> =
@@ -200,15 +215,17 @@ impl<C: StoppingCriterion> Session<C> {
 
         // Ask the criterion for the others.
         if !judged.is_empty() {
-            let Some(display) = &self.display else { return Ok(stops) };
-            let reference = self.displayed_reference.as_deref();
-            let view = View { film: &self.film, display, viewing: self.params.viewing, reference };
+            let Some(view) = View::of(&self.film, &self.display, &self.params, &self.displayed_reference)
+            else {
+                return Ok(stops);
+            };
             let verdicts = self.criterion.judge(&view, &judged)?;
             let open = self.open_tiles() as f64 / self.tiles.len() as f64;
             for (tile, verdict) in judged.into_iter().zip(verdicts) {
                 stops.extend(self.take(tile.index, verdict, open));
             }
         }
+        self.share_out(due);
         Ok(stops)
     }
 
@@ -339,9 +356,8 @@ impl<C: StoppingCriterion> Session<C> {
     /// (see [`crate::Oracle::map_visible_noise`]); NaN where there is no evidence. Computed at each call. `None`
     /// before the display is settled, or if the criterion cannot say.
     pub fn visible_noise(&self) -> Option<Vec<f32>> {
-        let (film, display, viewing) = (&self.film, self.display.as_ref()?, self.params.viewing);
-        let reference = self.displayed_reference.as_deref();
-        self.criterion.visible_noise(&View { film, display, viewing, reference })
+        let view = View::of(&self.film, &self.display, &self.params, &self.displayed_reference)?;
+        self.criterion.visible_noise(&view)
     }
 
     /// Samples still to be taken, over all pixels, by the criterion's expectations; `None` while it has none
@@ -368,6 +384,7 @@ impl<C: StoppingCriterion> Session<C> {
     }
 }
 
+mod blocks;
 mod resume;
 pub(crate) mod rounds;
 #[cfg(test)]

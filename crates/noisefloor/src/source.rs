@@ -1,5 +1,6 @@
 //! What a renderer offers: samples on request.
 
+use crate::blocks::BlockRequest;
 use crate::identity::SourceIdentity;
 use crate::rgb::Rgb;
 use crate::tile::Tile;
@@ -196,6 +197,22 @@ pub trait ProgressiveSource {
     /// [`SourceError`] if the renderer failed; samples of this call are then lost, all earlier ones stay
     /// valid.
     fn sample(&mut self, requests: &[Request]) -> Result<Vec<Batch>, SourceError>;
+
+    /// Adds samples to the blocks of the tiles named, if this source can give blocks of one tile different
+    /// numbers of samples; `None`, the default, if not: it is then asked by [`ProgressiveSource::sample`].
+    ///
+    /// Batches are as of [`ProgressiveSource::sample`]: their [`Batch::mean`] has for each pixel the mean of as many
+    /// new samples as its block was asked for ([`BlockRequest::at`]), and [`Batch::spp`] is
+    /// [`BlockRequest::spp`]. Only for sources that give exactly as many samples as asked for
+    /// ([`Counts::Asked`]). Where blocks are asked for equal numbers, the samples are those of
+    /// [`ProgressiveSource::sample`].
+    ///
+    /// # Errors
+    /// [`SourceError`] as [`ProgressiveSource::sample`].
+    fn sample_blocks(&mut self, requests: &[BlockRequest]) -> Result<Option<Vec<Batch>>, SourceError> {
+        let _ = requests;
+        Ok(None)
+    }
 
     /// Renders the quick noise-free reference, if this source has one. Called at most once, and only if the
     /// criterion needs it.

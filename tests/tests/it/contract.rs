@@ -1,7 +1,7 @@
 use crate::kit::{Altered, Synthetic};
 use noisefloor::{
-    Batch, Counts, FirstHits, ProgressiveSource, Reference, Repeats, Request, SourceError, SourceInfo, Tile,
-    Unit,
+    Batch, BlockRequest, BlockSamples, Counts, FirstHits, ProgressiveSource, Reference, Repeats, Request,
+    SourceError, SourceInfo, Tile, Unit,
 };
 use noisefloor_image::{RenderLayers, StackSource, write_exr};
 use noisefloor_ptwne::{Ptwne, RenderOptions, scenes};
@@ -217,6 +217,54 @@ fn noise_that_pixels_share_is_no_fault_of_a_markov_chain() {
         })
     };
     assert_eq!(shared(Unit::MutationsPerPixel), "kept");
+}
+
+/// A source that aims at blocks, with one thing changed in its answers to requests for them.
+struct ByBlocks<F>(Synthetic, F);
+
+impl<F: Fn(&[BlockRequest], &mut Vec<Batch>)> ProgressiveSource for ByBlocks<F> {
+    fn info(&self) -> SourceInfo {
+        self.0.info()
+    }
+
+    fn sample(&mut self, requests: &[Request]) -> Result<Vec<Batch>, SourceError> {
+        self.0.sample(requests)
+    }
+
+    fn sample_blocks(&mut self, requests: &[BlockRequest]) -> Result<Option<Vec<Batch>>, SourceError> {
+        let mut batches = self.0.sample_blocks(requests)?.expect("synthetic sources aim at blocks");
+        (self.1)(requests, &mut batches);
+        Ok(Some(batches))
+    }
+}
+
+#[test]
+fn broken_promises_about_blocks_are_noticed() {
+    fn said(change: impl Fn(&[BlockRequest], &mut Vec<Batch>) + Copy, expected: &str) {
+        let said = verdict(|| ByBlocks(synthetic(), change));
+        assert!(said.contains(expected), "{said:?}, not {expected:?}");
+    }
+    said(|_, _| (), "kept");
+    said(|_, b| drop(b.pop()), "the number of batches");
+    said(|_, b| b.reverse(), "order of the requests for blocks");
+    said(|_, b| b.iter_mut().for_each(|b| b.spp += 1), "another shape");
+    // Whoever gives all blocks what the first is asked for
+    let same_for_all = |requests: &[BlockRequest], batches: &mut Vec<Batch>| {
+        for (r, batch) in requests.iter().zip(batches) {
+            let BlockSamples { first, spp } = r.blocks[0];
+            batch.mean = synthetic().sample(&[Request { tile: r.tile, first, spp }]).unwrap().remove(0).mean;
+        }
+    };
+    said(same_for_all, "got other samples than its tile would have got");
+    // Whoever begins anew in every call
+    let again = |requests: &[BlockRequest], batches: &mut Vec<Batch>| {
+        for (r, batch) in requests.iter().zip(batches) {
+            let spp = r.blocks[0].spp;
+            batch.mean =
+                synthetic().sample(&[Request { tile: r.tile, first: 0, spp }]).unwrap().remove(0).mean;
+        }
+    };
+    said(again, "others than their tile");
 }
 
 /// A playback of running means that forgets to take the difference.

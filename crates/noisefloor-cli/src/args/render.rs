@@ -77,6 +77,11 @@ pub struct RenderArgs {
     /// Tile edge in pixels, 16…512.
     #[arg(long, default_value_t = DEFAULT_TILE, value_name = "PIXELS")]
     tile: usize,
+    /// Sample blocks of this many pixels (16 or 32) of a tile by their need: where the vision model sees less
+    /// noise, a block gets down to a quarter of the samples of the noisiest one. The verdict stays the tile's.
+    /// For the oracle and the built-in renderer; 0 samples all of a tile alike.
+    #[arg(long, default_value_t = 0, value_name = "PIXELS")]
+    blocks: usize,
     /// Samples per pixel between two verdicts on a tile [default: 100; with --denoise 48, or 16 of other
     /// renderers, and then half as many more each time, or more where few tiles are open].
     #[arg(long, value_name = "SPP")]
@@ -203,6 +208,10 @@ impl RenderArgs {
             return Err(crate::left_out::LeftOut { what, feature, again }.into());
         }
         let mut params = self.params()?;
+        let by_oracle = self.denoise.is_none() && self.criterion == CriterionChoice::Oracle;
+        if params.blocks > 0 && !(by_oracle && self.renderer.is_built_in()) {
+            bail!("--blocks is for the oracle and the built-in renderer, --source ptwne; leave it out")
+        }
         let judge = match self.criterion {
             _ if self.denoise.is_some() && self.is_draft() => denoised(self.lost.max(DRAFT_LOST))?,
             _ if self.denoise.is_some() => denoised(self.lost)?,
@@ -285,6 +294,7 @@ impl RenderArgs {
                 self.consecutive
             },
             audience: if self.is_draft() { self.audience.then(DRAFT) } else { self.audience },
+            blocks: self.blocks,
         };
         params.check()?;
         Ok(params)

@@ -32,6 +32,9 @@ pub fn parse(arguments: &[String]) -> anyhow::Result<RenderJob> {
         bail!("--frames: before `--`, as in `farm plan DIR --frames 1-240 -- 'hall.{{frame:04}}.xml'`");
     }
     let job = args.check()?;
+    if job.params.blocks > 0 {
+        bail!("--blocks: not for a farm, whose shards hold whole tiles; leave it out");
+    }
     #[cfg(feature = "study")]
     let watched = job.watch.is_some();
     #[cfg(not(feature = "study"))]

@@ -1,7 +1,7 @@
-use crate::kit::{fail, grey_exr, run, stderr, succeed, text, tiny};
+use crate::kit::{channel, fail, grey_exr, run, stderr, succeed, text, tiny};
 use noisefloor_image::{Picture, RenderLayers, SampleFacts, read_exr, read_facts, read_picture, write_exr};
 use serde_json::Value;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use tempfile::tempdir;
 
 // Long: one run, looked at from all sides
@@ -95,13 +95,6 @@ fn extreme_counts_and_sizes_are_judged() {
             assert!(report["tiles"][0]["probability"].as_f64().is_some(), "{report}");
         }
     }
-}
-
-/// A channel of an EXR.
-fn channel(path: &Path, name: &str) -> Vec<f32> {
-    let layers = exr::prelude::read_all_flat_layers_from_file(path).unwrap();
-    let channels = &layers.layer_data[0].channel_data.list;
-    channels.iter().find(|c| c.name.to_string() == name).unwrap().sample_data.values_as_f32().collect()
 }
 
 /// Renders of one seed contain one another: the second picture holds all samples of the first.

@@ -76,6 +76,13 @@ pub(crate) fn column(path: &Path, name: &str) -> Vec<String> {
     rows.into_iter().map(|mut row| row.swap_remove(at)).collect()
 }
 
+/// A channel of an EXR.
+pub(crate) fn channel(path: &Path, name: &str) -> Vec<f32> {
+    let layers = exr::prelude::read_all_flat_layers_from_file(path).unwrap();
+    let channels = &layers.layer_data[0].channel_data.list;
+    channels.iter().find(|c| c.name.to_string() == name).unwrap().sample_data.values_as_f32().collect()
+}
+
 /// An EXR of noise around grey, drawn from (seed, pixel); pixel 0 is `first`.
 pub(crate) fn grey_exr(path: &Path, (width, height): (usize, usize), seed: u64, first: f32) {
     let mut random = random(seed);

@@ -1,4 +1,5 @@
 use super::*;
+use crate::blocks::{BlockRequest, BlockSamples};
 use crate::criterion::{FixedSpp, Resumable, StoppingCriterion};
 use crate::driver::{Driver, Event};
 use crate::oracle::Oracle;
@@ -36,6 +37,26 @@ impl ProgressiveSource for Noise {
         };
         Ok(requests.iter().map(batch).collect())
     }
+
+    fn sample_blocks(&mut self, requests: &[BlockRequest]) -> Result<Option<Vec<Batch>>, SourceError> {
+        let mut batches = Vec::new();
+        for request in requests {
+            let (tile, mut mean) = (request.tile, Vec::new());
+            for i in 0..tile.pixels() {
+                let BlockSamples { first, spp } = request.at(i % tile.width, i / tile.width);
+                let pixel = Tile {
+                    x: tile.x + i % tile.width,
+                    y: tile.y + i / tile.width,
+                    width: 1,
+                    height: 1,
+                    ..tile
+                };
+                mean.extend(self.sample(&[Request { tile: pixel, first, spp }])?.remove(0).mean);
+            }
+            batches.push(Batch { tile, spp: request.spp, mean });
+        }
+        Ok(Some(batches))
+    }
 }
 
 fn params() -> Params {
@@ -50,7 +71,11 @@ fn params() -> Params {
 
 /// A driver of the job, broken off after some batches.
 fn broken_off<C: StoppingCriterion>(criterion: C, batches: usize) -> Driver<Noise, C> {
-    let mut driver = Driver::new(Noise(Repeats::Samples), criterion, params()).unwrap();
+    broken_off_with(criterion, params(), batches)
+}
+
+fn broken_off_with<C: StoppingCriterion>(criterion: C, params: Params, batches: usize) -> Driver<Noise, C> {
+    let mut driver = Driver::new(Noise(Repeats::Samples), criterion, params).unwrap();
     let (cancel, mut left) = (driver.cancel_flag(), batches);
     let mut count = |event: &Event| {
         if matches!(event, Event::BatchDone(_)) {
@@ -84,6 +109,42 @@ fn a_run_that_was_broken_off_goes_on_to_the_bit() {
         assert!(!driver.session().is_done(), "{batches}");
         driver.run(|_, _| ()).unwrap();
         assert!(kept(&driver) == kept(&whole), "{batches} batches");
+    }
+}
+
+#[cfg(feature = "bundled-model")]
+#[test]
+fn blocks_keep_their_samples_and_shares() {
+    let params = Params { tile: 48, blocks: 16, schedule: crate::Schedule::Every { step: 40 }, ..params() };
+    let whole = broken_off_with(Oracle::bundled(), params, usize::MAX);
+    let film = whole.session().film();
+    assert!(film.grid().tiles().any(|t| film.spp_range(t.index).0 < film.spp_range(t.index).1));
+    let n = whole.timeline().len();
+    for batches in [1, 2, n / 2, n - 1] {
+        let bytes = kept(&broken_off_with(Oracle::bundled(), params, batches));
+        let checkpoint = Checkpoint::read(&bytes[..]).unwrap();
+        let driver = Driver::new(Noise(Repeats::Samples), Oracle::bundled(), params).unwrap();
+        let mut driver = driver.resume("noise", checkpoint).unwrap();
+        driver.run(|_, _| ()).unwrap();
+        assert!(kept(&driver) == kept(&whole), "{batches} of {n} batches");
+    }
+
+    // What cannot be is refused
+    let wrong = |change: &dyn Fn(&mut Vec<Option<Vec<f32>>>)| {
+        let bytes = kept(&broken_off_with(Oracle::bundled(), params, n - 1));
+        let mut checkpoint = Checkpoint::read(&bytes[..]).unwrap();
+        change(checkpoint.shares.to_mut());
+        let driver = Driver::new(Noise(Repeats::Samples), Oracle::bundled(), params).unwrap();
+        driver.resume("noise", checkpoint).map(|_| ()).unwrap_err().to_string()
+    };
+    let changes: [&dyn Fn(&mut Vec<Option<Vec<f32>>>); 4] = [
+        &|shares| drop(shares.pop()),
+        &|shares| shares[0] = Some(vec![1.0; 8]),
+        &|shares| shares[0] = Some(vec![f32::NAN; 9]),
+        &|shares| shares[0] = Some(vec![1e9; 9]),
+    ];
+    for change in changes {
+        assert!(wrong(change).contains("shares"), "{}", wrong(change));
     }
 }
 

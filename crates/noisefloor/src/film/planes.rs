@@ -1,6 +1,7 @@
 //! A film in a file: what it knows of its tiles, and then its pixels, which memory need not hold twice.
 
 use super::{Film, Half};
+use crate::blocks::BlockCounts;
 use crate::rgb::Rgb;
 use crate::tile::TileGrid;
 use serde::{Deserialize, Serialize};
@@ -17,19 +18,21 @@ pub(crate) struct FilmHead {
     halves: Vec<bool>,
     counts: Vec<[u64; 2]>,
     rejected: u64,
+    blocks: Option<BlockCounts>,
 }
 
 #[cfg(test)]
 impl FilmHead {
     pub(crate) fn announcing(grid: TileGrid) -> Self {
-        Self { grid, halves: vec![true; 2], counts: Vec::new(), rejected: 0 }
+        Self { grid, halves: vec![true; 2], counts: Vec::new(), rejected: 0, blocks: None }
     }
 }
 
 impl Film {
     pub(crate) fn head(&self) -> FilmHead {
         let halves = self.halves.iter().map(|half| !half.rejected.is_empty()).collect();
-        FilmHead { grid: self.grid, halves, counts: self.counts.clone(), rejected: self.rejected }
+        let (counts, blocks) = (self.counts.clone(), self.blocks.clone());
+        FilmHead { grid: self.grid, halves, counts, rejected: self.rejected, blocks }
     }
 
     /// Writes the pixels: for each half the means (three f32), the carries (three i16) and, if there are any, the
@@ -45,7 +48,7 @@ impl Film {
 
     /// Reads what [`Film::write_pixels`] wrote. Memory grows with what arrives. None if there cannot be such a film.
     pub(crate) fn read_pixels(head: FilmHead, from: &mut dyn Read) -> io::Result<Option<Self>> {
-        let FilmHead { grid, halves, counts, rejected } = head;
+        let FilmHead { grid, halves, counts, rejected, blocks } = head;
         if TileGrid::new(grid.width(), grid.height(), grid.edge()).ok() != Some(grid) || halves.len() > 2 {
             return Ok(None);
         }
@@ -57,7 +60,7 @@ impl Film {
             Ok(Half { mean, carry, rejected })
         };
         let halves = halves.iter().map(&mut half).collect::<io::Result<_>>()?;
-        Ok(Some(Self { grid, halves, counts, rejected }))
+        Ok(Some(Self { grid, halves, counts, rejected, blocks }))
     }
 }
 

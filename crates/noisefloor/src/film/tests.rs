@@ -35,6 +35,22 @@ fn non_finite_pixels_are_kept_out_and_counted() {
 }
 
 #[test]
+fn blocks_with_as_many_samples_each_are_a_tile() {
+    let (mut plain, mut blocks) = (small(), small().by_blocks(16).unwrap());
+    let tile = plain.grid().tile(0);
+    for (n, value) in [(5, 0.1f32), (3, 0.7), (40, 0.33)] {
+        let mean: Vec<Rgb> = (0..256).map(|i| [value + i as f32 * 1e-3, value, 0.1 * value]).collect();
+        plain.add(0, n, &mean).unwrap();
+        let alike = vec![crate::blocks::BlockSamples { first: 0, spp: n }];
+        blocks.add_blocks(&BlockRequest { tile, spp: n, edge: 16, blocks: alike }, &mean).unwrap();
+    }
+    assert_eq!(plain.image(), blocks.image());
+    assert_eq!(plain.half_counts(0), blocks.half_counts(0));
+    assert_eq!(plain.total_samples(), blocks.total_samples());
+    assert_eq!(blocks.spp_range(0), (48, 48));
+}
+
+#[test]
 fn refuses_what_does_not_fit() {
     let mut film = small();
     assert_eq!(film.add(2, 1, &[]), Err(FilmError::Tile(2, 2)));

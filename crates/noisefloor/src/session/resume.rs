@@ -20,6 +20,7 @@ impl<C: Resumable> Session<C> {
             display: self.display,
             film: Cow::Borrowed(&self.film),
             tiles: Cow::Borrowed(&self.tiles),
+            shares: Cow::Borrowed(&self.shares),
         }
     }
 
@@ -48,6 +49,7 @@ impl<C: Resumable> Session<C> {
         };
         let display = checkpoint.display.map(complete).transpose()?;
         let film = checkpoint.film.into_owned();
-        Ok(Self { film, tiles, display, displayed_reference: None, ..self })
+        let shares = checkpoint.shares.into_owned();
+        Ok(Self { film, tiles, shares, display, displayed_reference: None, ..self })
     }
 }
