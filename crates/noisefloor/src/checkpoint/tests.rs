@@ -129,22 +129,17 @@ fn blocks_keep_their_samples_and_shares() {
         assert!(kept(&driver) == kept(&whole), "{batches} of {n} batches");
     }
 
-    // What cannot be is refused
-    let wrong = |change: &dyn Fn(&mut Vec<Option<Vec<f32>>>)| {
-        let bytes = kept(&broken_off_with(Oracle::bundled(), params, n - 1));
+    // What cannot be is refused: too few tiles, too few blocks, no number, more than there is
+    let bytes = kept(&broken_off_with(Oracle::bundled(), params, n - 1));
+    for wrong in [vec![], vec![1.0; 8], vec![f32::NAN; 9], vec![1e9; 9]] {
         let mut checkpoint = Checkpoint::read(&bytes[..]).unwrap();
-        change(checkpoint.shares.to_mut());
+        match wrong.len() {
+            0 => drop(checkpoint.shares.to_mut().pop()),
+            _ => checkpoint.shares.to_mut()[0] = Some(wrong.clone()),
+        }
         let driver = Driver::new(Noise(Repeats::Samples), Oracle::bundled(), params).unwrap();
-        driver.resume("noise", checkpoint).map(|_| ()).unwrap_err().to_string()
-    };
-    let changes: [&dyn Fn(&mut Vec<Option<Vec<f32>>>); 4] = [
-        &|shares| drop(shares.pop()),
-        &|shares| shares[0] = Some(vec![1.0; 8]),
-        &|shares| shares[0] = Some(vec![f32::NAN; 9]),
-        &|shares| shares[0] = Some(vec![1e9; 9]),
-    ];
-    for change in changes {
-        assert!(wrong(change).contains("shares"), "{}", wrong(change));
+        let said = driver.resume("noise", checkpoint).map(|_| ()).unwrap_err().to_string();
+        assert!(said.contains("shares"), "{wrong:?}: {said}");
     }
 }
 

@@ -1,4 +1,5 @@
 use super::*;
+use crate::blocks::BlockRequest;
 use proptest::prelude::*;
 
 fn small() -> Film {
