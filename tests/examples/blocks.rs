@@ -1,6 +1,8 @@
-//! What blocks save: `blocks SIZE TILE REFERENCE SCENE…` renders built-in scenes at SIZE×SIZE pixels with tiles
-//! of TILE, with and without blocks and with needs that are known beforehand, and prints a Markdown table. The
-//! converged picture has REFERENCE samples of another seed, from which the needs are known, too.
+//! What blocks save: `blocks SIZE TILE REFERENCE SCENE…` renders built-in scenes at SIZE×SIZE pixels with
+//! tiles of TILE, with and without blocks and with needs that are known beforehand, and prints a Markdown
+//! table. The converged picture has REFERENCE samples of another seed, from which the needs are known, too.
+//!
+//! `blocks bias SEEDS SCENE…` compares the means of small pictures with those of uniform sampling.
 #![allow(clippy::print_stdout, reason = "an example prints")]
 
 use noisefloor::{
@@ -27,6 +29,13 @@ const NAMES: [&str; 6] = [
 
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
+    if let [first, seeds, names @ ..] = &arguments[..]
+        && first == "bias"
+    {
+        println!("| scene | spp of a block | z of the picture | largest z of 16 blocks |");
+        println!("|---|---|---|---|");
+        return names.iter().try_for_each(|name| compare_means(name, seeds.parse()?));
+    }
     let [size, tile, reference, names @ ..] = &arguments[..] else {
         return Err("SIZE TILE REFERENCE SCENE…".into());
     };
@@ -67,7 +76,7 @@ fn measure(name: &str, size: usize, tile: usize, reference: u64) -> Result<(), B
     for (blocks, known, step) in
         [(0, false, 100), (0, false, 20), (16, false, 100), (16, false, 20), (32, false, 20), (16, true, 20)]
     {
-        let criterion = Known { oracle: Oracle::bundled(), film: known.then_some(&converged) };
+        let criterion = Known { oracle: Oracle::bundled(), film: known.then_some(&converged), until: None };
         let schedule = Schedule::Every { step };
         let params = Params { tile, blocks, schedule, min_spp: 0, max_spp: MOST, ..Params::default() };
         let mut driver = Driver::new(source(name, size, 1)?, criterion, params)?;
@@ -109,10 +118,63 @@ fn crossing(curve: &[(f64, f64)], value: f64) -> Option<f64> {
     Some(a.0 * (b.0 / a.0).powf(share))
 }
 
-/// The oracle, which knows what blocks need from a converged film if it is given one.
+/// Samples per pixel of the pictures that are compared.
+const UNTIL: u64 = 128;
+
+/// Whether pictures are as bright with blocks as without, over many seeds: differences of means in standard
+/// errors.
+fn compare_means(name: &str, seeds: u64) -> Result<(), Box<dyn Error>> {
+    let grid = TileGrid::new(64, 64, 16)?;
+    // Of each block, and of the whole picture last: sums and sums of squares with blocks and without
+    let mut sums = vec![[[0.0; 2]; 2]; grid.len() + 1];
+    let mut range = (u64::MAX, 0);
+    for seed in 0..seeds {
+        for (way, blocks) in [16, 0].into_iter().enumerate() {
+            let film = count_only(name, blocks, 2 * seed + way as u64 + 100)?;
+            if blocks > 0 {
+                let (least, most) = film.spp_range(0);
+                range = (range.0.min(least), range.1.max(most));
+            }
+            let light: Vec<f32> = film.image().iter().map(|pixel| pixel.iter().sum()).collect();
+            let of_block = |block: Tile| {
+                let sum: f64 = block.rows(64).flatten().map(|pixel| f64::from(light[pixel])).sum();
+                sum / block.pixels() as f64
+            };
+            let mut means: Vec<f64> = grid.tiles().map(of_block).collect();
+            means.push(means.iter().sum::<f64>() / means.len() as f64);
+            for (sum, mean) in sums.iter_mut().zip(means) {
+                sum[way][0] += mean;
+                sum[way][1] += mean * mean;
+            }
+        }
+    }
+    let n = seeds as f64;
+    let z = |sum: &[[f64; 2]; 2]| {
+        let variance = sum.map(|[sum, squares]| (squares - sum * sum / n) / (n - 1.0) / n);
+        (sum[0][0] - sum[1][0]) / n / (variance[0] + variance[1]).max(f64::MIN_POSITIVE).sqrt()
+    };
+    let (blocks, whole) = sums.split_at(grid.len());
+    let largest = blocks.iter().map(|sum| z(sum).abs()).fold(0.0, f64::max);
+    println!("| {name} | {} to {} | {:.2} | {largest:.2} |", range.0, range.1, z(&whole[0]));
+    Ok(())
+}
+
+/// A picture of 64×64 pixels, one tile, whose blocks get what the oracle says they need.
+fn count_only(name: &str, blocks: usize, seed: u64) -> Result<Film, Box<dyn Error>> {
+    let criterion = Known { oracle: Oracle::bundled(), film: None, until: Some(UNTIL) };
+    let schedule = Schedule::Every { step: 32 };
+    let params = Params { tile: 64, blocks, schedule, min_spp: 0, max_spp: UNTIL, ..Params::default() };
+    let mut driver = Driver::new(source(name, 64, seed)?, criterion, params)?;
+    driver.run(|_, _| ())?;
+    Ok(driver.into_parts().1.into_film().0)
+}
+
+/// The oracle, which knows what blocks need from a converged film if it is given one, and only counts samples
+/// if it is given a number.
 struct Known<'a> {
     oracle: Oracle,
     film: Option<&'a Film>,
+    until: Option<u64>,
 }
 
 impl StoppingCriterion for Known<'_> {
@@ -137,7 +199,9 @@ impl StoppingCriterion for Known<'_> {
     }
 
     fn judge(&mut self, view: &View<'_>, tiles: &[Tile]) -> Result<Vec<Verdict>, CriterionError> {
-        self.oracle.judge(view, tiles)
+        let Some(until) = self.until else { return self.oracle.judge(view, tiles) };
+        let enough = |tile: &Tile| view.film.spp(tile.index) >= until;
+        Ok(tiles.iter().map(|tile| Verdict { converged: enough(tile), ..Verdict::default() }).collect())
     }
 }
 

@@ -4,8 +4,8 @@
 //! its tile, and nothing else: in every block the batch counts as what the tile got on average
 //! ([`BlockRequest::spp`]), however many samples the block had. So the weight of a batch in the mean does not
 //! depend on its own samples or on those before, each batch is right on average, and so is their mean: blocks
-//! that look quiet by luck get fewer samples and stay unbiased. Were batches weighted by their counts, a block
-//! that had found a rare light would get more samples, and dilute what it had found.
+//! that look quiet by luck get fewer samples and stay unbiased. Were batches weighted by their counts, a
+//! block that had found a rare light would get more samples, and dilute what it had found.
 
 use crate::tile::{Tile, TileGrid};
 use serde::{Deserialize, Serialize};
@@ -21,8 +21,8 @@ const FLOOR: f64 = 0.25;
 pub struct BlockRequest {
     /// The tile to sample.
     pub tile: Tile,
-    /// New samples per pixel, on average over the tile, to within half a sample of each pixel of one block. The
-    /// batch has this as its number of samples.
+    /// New samples per pixel, on average over the tile, to within half a sample of each pixel of one block.
+    /// The batch has this as its number of samples.
     pub spp: u64,
     /// Edge of the blocks in pixels. They are counted row by row from the top left of the tile; those of the
     /// last column and row may be narrower.
@@ -89,7 +89,8 @@ pub(crate) fn shares(needs: &[f64], tile: Tile, edge: usize) -> Vec<f32> {
     floored.iter().map(|need| (need * tile.pixels() as f64 / sum) as f32).collect()
 }
 
-/// Averages each block with its neighbours, by ¼ ½ ¼ along rows and columns; beyond the tile its edge repeats.
+/// Averages each block with its neighbours, by ¼ ½ ¼ along rows and columns; beyond the tile its edge
+/// repeats.
 fn smooth(needs: &[f64], columns: usize) -> Vec<f64> {
     let rows = needs.len() / columns;
     let blur = |values: &[f64], stride: usize, place: usize, count: usize, at: usize| {

@@ -100,10 +100,10 @@ impl Half {
 /// Each batch goes to whichever half of its tile has fewer samples, so that the two stay as even as the
 /// batches allow. Non-finite pixels of a batch are rejected and counted.
 ///
-/// Where [blocks](crate::Params::blocks) of a tile got different numbers of samples, its numbers of samples are
-/// those that it got on average, and each batch counts by that in every block: see [`BlockRequest::spp`](crate::BlockRequest::spp).
-/// Batches of the two halves come in pairs with equal numbers in every block, so that the halves of a block are
-/// as alike as those of a tile.
+/// Where [blocks](crate::Params::blocks) of a tile got different numbers of samples, its numbers of samples
+/// are those that it got on average, and each batch counts by that in every block: see
+/// [`BlockRequest::spp`](crate::BlockRequest::spp). Batches of the two halves come in pairs with equal
+/// numbers in every block, so that the halves of a block are as alike as those of a tile.
 ///
 /// Memory: 36 bytes per pixel, 18 without halves.
 #[derive(Clone, Debug)]
@@ -151,7 +151,8 @@ impl Film {
         self.counts[tile]
     }
 
-    /// Samples per pixel of a tile, both halves together; the average where its blocks have different numbers.
+    /// Samples per pixel of a tile, both halves together; the average where its blocks have different
+    /// numbers.
     ///
     /// # Panics
     /// If the tile does not exist.
@@ -160,8 +161,8 @@ impl Film {
         a + b
     }
 
-    /// Samples rejected so far, over all pixels, because their batch was not finite. They count as their batch
-    /// does, by the average of the tile.
+    /// Samples rejected so far, over all pixels, because their batch was not finite. They count as their
+    /// batch does, by the average of the tile.
     pub fn rejected(&self) -> u64 {
         self.rejected
     }

@@ -257,11 +257,11 @@ impl StoppingCriterion for Oracle {
         self.map_visible_noise(view.film.grid(), |tile| self.planes(view, tile)).ok()?
     }
 
-    /// In proportion to the map of visible noise, pooled over each block by a mean of order 4, since people look
-    /// for the worst place. The map tells the noise of weak places as too weak: their differences grow as
-    /// contrast^2.26, and it takes the 1.3 of the worst place for all. A difference that is x times that of the
-    /// worst place is noise of x^(1/2.26) times its amplitude, which is the map to the power of 1.3/2.26 = 0.58;
-    /// samples go as the square of that, 1.15, and so nearly as the map itself.
+    /// In proportion to the map of visible noise, pooled over each block by a mean of order 4, since people
+    /// look for the worst place. The map tells the noise of weak places as too weak: their differences grow
+    /// as contrast^2.26, and it takes the 1.3 of the worst place for all. A difference that is x times that
+    /// of the worst place is noise of x^(1/2.26) times its amplitude, which is the map to the power of
+    /// 1.3/2.26 = 0.58; samples go as the square of that, 1.15, and so nearly as the map itself.
     fn block_needs(&self, view: &View<'_>, tiles: &[Tile], edge: usize) -> Option<Vec<Option<Vec<f64>>>> {
         let needs = |&tile: &Tile| -> Option<Option<Vec<f64>>> {
             // What makes tiles impossible to judge is said by the verdict

@@ -191,8 +191,8 @@ impl<C: StoppingCriterion> Session<C> {
     /// The first verdicts wait until every open tile has samples: the exposure is settled then, once and for
     /// all, unless the tone mapping is plain sRGB or [`Session::set_display`] was called.
     ///
-    /// With [`Params::blocks`], the shares of the blocks are decided here, too: for the first time at 32 samples
-    /// per pixel, and without a verdict where that is too early for one.
+    /// With [`Params::blocks`], the shares of the blocks are decided here, too: for the first time at 32
+    /// samples per pixel, and without a verdict where that is too early for one.
     ///
     /// # Errors
     /// [`CriterionError`] if the criterion does not fit the job.

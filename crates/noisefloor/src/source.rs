@@ -201,8 +201,8 @@ pub trait ProgressiveSource {
     /// Adds samples to the blocks of the tiles named, if this source can give blocks of one tile different
     /// numbers of samples; `None`, the default, if not: it is then asked by [`ProgressiveSource::sample`].
     ///
-    /// Batches are as of [`ProgressiveSource::sample`]: their [`Batch::mean`] has for each pixel the mean of as many
-    /// new samples as its block was asked for ([`BlockRequest::at`]), and [`Batch::spp`] is
+    /// Batches are as of [`ProgressiveSource::sample`]: their [`Batch::mean`] has for each pixel the mean of
+    /// as many new samples as its block was asked for ([`BlockRequest::at`]), and [`Batch::spp`] is
     /// [`BlockRequest::spp`]. Only for sources that give exactly as many samples as asked for
     /// ([`Counts::Asked`]). Where blocks are asked for equal numbers, the samples are those of
     /// [`ProgressiveSource::sample`].

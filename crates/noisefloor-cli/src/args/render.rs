@@ -78,8 +78,8 @@ pub struct RenderArgs {
     #[arg(long, default_value_t = DEFAULT_TILE, value_name = "PIXELS")]
     tile: usize,
     /// Sample blocks of this many pixels (16 or 32) of a tile by their need: where the vision model sees less
-    /// noise, a block gets down to a quarter of the samples of the noisiest one. The verdict stays the tile's.
-    /// For the oracle and the built-in renderer; 0 samples all of a tile alike.
+    /// noise, a block gets down to a quarter of the samples of the noisiest one. The verdict stays the
+    /// tile's. For the oracle and the built-in renderer; 0 samples all of a tile alike.
     #[arg(long, default_value_t = 0, value_name = "PIXELS")]
     blocks: usize,
     /// Samples per pixel between two verdicts on a tile [default: 100; with --denoise 48, or 16 of other

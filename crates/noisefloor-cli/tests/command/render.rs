@@ -93,8 +93,8 @@ fn the_same_seed_gives_the_same_files_whatever_the_threads() {
     assert!(one != render("other", "4", "2"), "the same picture from another seed");
 }
 
-/// Blocks get different numbers of samples; tables and channels say which, whatever the threads and however often
-/// the render is interrupted.
+/// Blocks get different numbers of samples; tables and channels say which, whatever the threads and however
+/// often the render is interrupted.
 #[test]
 fn blocks_are_sampled_by_their_need() {
     let folder = tempdir().unwrap();

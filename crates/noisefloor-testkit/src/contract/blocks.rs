@@ -7,8 +7,8 @@ use noisefloor::{Batch, BlockRequest, BlockSamples, Counts, ProgressiveSource, R
 /// Edge of the blocks that are asked for.
 const BLOCK: usize = 16;
 
-/// A source that takes requests for blocks gives each block what it was asked for, and the samples that it would
-/// have given to the whole tile. `four` are its first rounds of 16 samples.
+/// A source that takes requests for blocks gives each block what it was asked for, and the samples that it
+/// would have given to the whole tile. `four` are its first rounds of 16 samples.
 pub(super) fn check_blocks<S: ProgressiveSource>(subject: &Subject<impl Fn() -> S>, four: &[Round]) {
     let mut source = subject.start().source;
     let Some(none) = answer(&mut source, &[]) else { return };

@@ -58,8 +58,8 @@ proptest! {
         };
         prop_assert!(counts.iter().all(|&n| n > 0));
         let (asked, even) = (request(counts).samples(), spp * tile.pixels() as u64);
-        // Half a sample of each pixel of the last block, and where shares begin at ¼ nobody needs the floor of one
-        // sample
+        // Half a sample of each pixel of the last block, and where shares begin at ¼ nobody needs the floor
+        // of one sample
         let half_a_block = (edge * edge) as u64 / 2 + 1;
         prop_assert!(asked.abs_diff(even) <= half_a_block, "{asked} instead of {even}");
         prop_assert_eq!(blocks_of(tile, edge).map(|block| block.pixels()).sum::<usize>(), tile.pixels());

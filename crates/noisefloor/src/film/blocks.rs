@@ -48,8 +48,8 @@ impl Film {
     /// tile. Every pixel of the batch counts as [`BlockRequest::spp`] samples.
     ///
     /// # Errors
-    /// [`FilmError`] as [`Film::add`], and [`FilmError::Blocks`] if the film does not count such blocks, or one
-    /// of them gets no samples; the film is then unchanged.
+    /// [`FilmError`] as [`Film::add`], and [`FilmError::Blocks`] if the film does not count such blocks, or
+    /// one of them gets no samples; the film is then unchanged.
     pub fn add_blocks(&mut self, request: &BlockRequest, mean: &[Rgb]) -> Result<(), FilmError> {
         let tile = self.check(request.tile.index, mean.len())?;
         let fits = |blocks: &BlockCounts| {

@@ -9,8 +9,8 @@ use crate::source::Request;
 use crate::tile::Tile;
 
 impl<C: StoppingCriterion> Session<C> {
-    /// A request of [`Session::requests`] or [`Session::next_batches`] spread over the blocks of its tile, for
-    /// renderers that can give different blocks different numbers of samples; none unless
+    /// A request of [`Session::requests`] or [`Session::next_batches`] spread over the blocks of its tile,
+    /// for renderers that can give different blocks different numbers of samples; none unless
     /// [`Params::blocks`](crate::Params::blocks) is set. Answer it with [`Session::push_blocks`].
     ///
     /// A renderer that cannot answers the request itself with [`Session::push`], as if there were no blocks.
@@ -27,8 +27,8 @@ impl<C: StoppingCriterion> Session<C> {
         Some(BlockRequest { tile, spp, edge, blocks })
     }
 
-    /// Adds the mean of the new samples of each pixel that [`Session::block_request`] asked for, row-major over
-    /// the tile.
+    /// Adds the mean of the new samples of each pixel that [`Session::block_request`] asked for, row-major
+    /// over the tile.
     ///
     /// # Errors
     /// [`FilmError`] if it does not fit; nothing is changed then.

@@ -104,8 +104,8 @@ fn render(seed: u64, chance: f64) -> (f64, f64) {
 
 /// A light that one sample in a thousand to a million finds, and a criterion that spreads samples by what was
 /// found: means of 300 pictures are right, to within 5 standard errors. They are sums over at least 49 finds,
-/// so that a correct film fails with p < 1e-5. Weighting each batch by the counts of its block, the usual way,
-/// is found out by the same test.
+/// so that a correct film fails with p < 1e-5. Weighting each batch by the counts of its block, the usual
+/// way, is found out by the same test.
 #[test]
 fn blocks_that_look_quiet_by_luck_lose_no_light() {
     let z = |values: &[f64]| {
