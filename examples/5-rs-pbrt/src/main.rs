@@ -61,7 +61,7 @@ mod tests {
     #[test]
     fn both_integrators_keep_the_contract_of_a_source() {
         for integrator in ["path", "bdpt"] {
-            check_source(|| Pbrt::new(&cornell_box(48, 40, integrator), 3).unwrap());
+            check_source(|| Pbrt::new(&cornell_box(24, 20, integrator), 3).unwrap());
         }
     }
 }

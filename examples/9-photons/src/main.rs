@@ -1,0 +1,104 @@
+//! A renderer that nobody here wrote, and that is no path tracer: [rustic-zen](https://crates.io/crates/rustic-zen)
+//! follows light across a plane and draws its way as lines. It draws whole frames, and has no seed, so that every
+//! run is another.
+#![allow(clippy::print_stdout, reason = "an example prints")]
+
+mod scene;
+
+use noisefloor::{
+    Batch, Counts, Driver, Event, Oracle, Params, ProgressiveSource, Repeats, Request, SourceError,
+    SourceInfo, Unit,
+};
+use noisefloor_image::{RenderLayers, write_exr};
+use rayon::iter::{IntoParallelIterator, ParallelIterator};
+use rustic_zen::prelude::{ExportImage, Image, RenderConstraint};
+use std::error::Error;
+use std::path::Path;
+use std::process::ExitCode;
+use std::sync::Arc;
+
+/// The renderer as a source.
+struct Photons {
+    width: usize,
+    height: usize,
+    /// What is called one sample per pixel: so many rays in the whole picture. Any number would do; with this one
+    /// a picture converges within hundreds or thousands.
+    rays: usize,
+}
+
+impl Photons {
+    /// The sum of the rays of one sample: red, green, blue and 1 for each pixel. On one thread, since rustic-zen's
+    /// own threads add to a picture without a lock, and now and then lose what another has added.
+    fn draw(&self) -> Vec<f32> {
+        let mut image = Arc::new(Image::new(self.width, self.height));
+        scene::prism(self.width, self.height).render(RenderConstraint::Count(self.rays), 1, &mut image);
+        image.to_rgbaf32()
+    }
+}
+
+impl ProgressiveSource for Photons {
+    fn info(&self) -> SourceInfo {
+        SourceInfo {
+            name: "rustic-zen".into(),
+            width: self.width,
+            height: self.height,
+            unit: Unit::SamplesPerPixel,
+            aims: false,
+            repeats: Repeats::Nothing,
+            counts: Counts::Asked,
+        }
+    }
+
+    fn sample(&mut self, requests: &[Request]) -> Result<Vec<Batch>, SourceError> {
+        // All tiles are asked for, and for the same number: this source cannot aim
+        let samples = requests.first().map_or(0, |request| request.spp);
+        let black = || vec![0.0; 4 * self.width * self.height];
+        let add = |sum: Vec<f32>, part: Vec<f32>| sum.iter().zip(&part).map(|(a, b)| a + b).collect();
+        let sum = (0..samples).into_par_iter().map(|_| self.draw()).reduce(black, add);
+        let scale = 1.0 / (self.rays as f32 * samples as f32);
+        let at = |pixel: usize| std::array::from_fn(|channel| sum[4 * pixel + channel] * scale);
+        let cut = |r: &Request| r.tile.rows(self.width).flatten().map(at).collect();
+        Ok(requests.iter().map(|r| Batch { tile: r.tile, spp: samples, mean: cut(r) }).collect())
+    }
+}
+
+fn main() -> ExitCode {
+    match run() {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run() -> Result<(), Box<dyn Error>> {
+    let (width, height, rays) = (384, 256, 2000);
+    let source = Photons { width, height, rays };
+    let mut driver = Driver::new(source, Oracle::bundled(), Params { tile: 64, ..Params::default() })?;
+    driver.run(|_, event| {
+        if let Event::TileStopped(stop) = event {
+            println!("people see no noise in tile {:2} after {:5} samples", stop.tile.index, stop.spp);
+        }
+    })?;
+    let (film, clock) = (driver.session().film(), driver.clock());
+    std::fs::create_dir_all("out")?;
+    write_exr(Path::new("out/photons.exr"), &RenderLayers::rgb(width, height, &film.image()))?;
+    println!(
+        "out/photons.exr: about {} million rays, {:.1} s, of which {:.2} s the oracle's",
+        film.total_samples() as usize / (width * height) * rays / 1_000_000,
+        clock.total_seconds,
+        clock.criterion_seconds
+    );
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn it_keeps_the_contract_of_a_source() {
+        noisefloor_testkit::check_source(|| Photons { width: 48, height: 40, rays: 20 });
+    }
+}
