@@ -1,7 +1,9 @@
 //! Emitters that are no shapes, and the light of those that are.
 
 use super::context::Context;
+use super::textures::mean;
 use super::xml::Element;
+use crate::colour::Quantity;
 use crate::error::LoadError;
 use crate::sky::{ClearSky, SUN_DIAMETER, TURBIDITIES};
 use glam::{DMat3, DVec3};
@@ -38,7 +40,13 @@ impl<'d> Context<'d> {
             }
             "spot" => {
                 let (position, direction) = self.position_and_direction(element)?;
-                let intensity = self.plain_light(element, "intensity")?;
+                let mut intensity = self.plain_light(element, "intensity")?;
+                for texture in self.parts(element, "texture")? {
+                    self.approximated(texture, "the picture that a spot projects is replaced by its mean");
+                    let (peak, map) = self.image(texture, Quantity::Light)?;
+                    let mean = mean(&map).map(|c| c * peak);
+                    intensity = std::array::from_fn(|i| intensity[i] * mean[i]);
+                }
                 let outer = self.float(element, "cutoff_angle")?.unwrap_or(20.0);
                 let inner = self.float(element, "beam_width")?.unwrap_or(0.75 * outer);
                 self.approximated(element, "the spot fades towards its edge as those of glTF do");
