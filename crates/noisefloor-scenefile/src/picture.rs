@@ -90,7 +90,11 @@ fn decode_as(bytes: &[u8], format: Option<ImageFormat>, place: &Place) -> Result
         Some(ImageFormat::Bmp) => pixels(BmpDecoder::new(reader).map_err(broken)?, length, place),
         Some(ImageFormat::Tga) => pixels(TgaDecoder::new(reader).map_err(broken)?, length, place),
         _ => {
-            let what = "a picture that is neither PNG, JPEG, BMP, TGA, PFM, OpenEXR nor Radiance";
+            let what = match bytes {
+                [0xab, b'K', b'T', b'X', ..] => "a KTX2 picture (KHR_texture_basisu)",
+                [b'R', b'I', b'F', b'F', ..] => "a WebP picture (EXT_texture_webp)",
+                _ => "a picture that is neither PNG, JPEG, BMP, TGA, PFM, OpenEXR nor Radiance",
+            };
             Err(place.clone().unsupported(what))
         }
     }));

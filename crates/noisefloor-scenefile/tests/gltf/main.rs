@@ -8,6 +8,7 @@
 )]
 
 mod bad; // bad files, and what is said of them
+mod extensions; // normal maps, coats, colours of vertices, daylight
 mod fuzz; // thousands of files with damage
 mod geometry; // where triangles and cameras are
 mod kit;

@@ -8,7 +8,7 @@ const NEAREST: &str = r#"{"magFilter": 9728}"#;
 const POLISHED: &str = r#""metallicFactor": 1, "roughnessFactor": 0"#;
 
 /// A rectangle that fills the image, at z = −1, in surroundings of radiance 1.
-fn wall(material: &str) -> Maker {
+pub(crate) fn wall(material: &str) -> Maker {
     let mut maker = Maker::new();
     let mesh = maker.rectangle([-1.0, 1.0], [-1.0, 1.0], -1.0, material);
     maker.node(&format!(r#"{{"mesh": {mesh}}}"#));
@@ -17,23 +17,23 @@ fn wall(material: &str) -> Maker {
 }
 
 /// The wall through a field of view of half a degree: head on.
-fn near(mut maker: Maker) -> Maker {
+pub(crate) fn near(mut maker: Maker) -> Maker {
     maker.root["cameras"][0]["perspective"]["yfov"] = json("0.01");
     maker
 }
 
-fn mean(maker: &Maker, samples: u64, max_depth: u32) -> Rgb {
+pub(crate) fn mean(maker: &Maker, samples: u64, max_depth: u32) -> Rgb {
     let pixels = render(maker.load().unwrap(), 8, samples, max_depth);
     std::array::from_fn(|c| pixels.iter().map(|p| p[c]).sum::<f32>() / 64.0)
 }
 
-fn assert_close(found: Rgb, expected: Rgb, tolerance: f32) {
+pub(crate) fn assert_close(found: Rgb, expected: Rgb, tolerance: f32) {
     let close = found.iter().zip(expected).all(|(a, b)| (a - b).abs() <= tolerance);
     assert!(close, "{found:?}, expected {expected:?} within {tolerance}");
 }
 
 /// sRGB decoded (IEC 61966-2-1).
-fn linear(code: u8) -> f32 {
+pub(crate) fn linear(code: u8) -> f32 {
     ((f32::from(code) / 255.0 + 0.055) / 1.055).powf(2.4)
 }
 
@@ -360,143 +360,4 @@ fn images_come_from_views_and_files_too() {
     let loaded = noisefloor_scenefile::load(&folder.path().join("a.gltf")).unwrap();
     let pixels = render(loaded, 2, 1, 1);
     assert!(pixels.iter().all(|p| (p[0] - linear(188)).abs() < 1e-5), "{pixels:?}");
-}
-
-/// A distant light along −z: what a wall of normal n reflects of it is Lambert's cosine.
-fn sunlit(material: &str) -> Maker {
-    let mut maker = wall(material);
-    // Without its white surroundings
-    maker.root["scenes"][0]["nodes"] = json("[0, 1, 3]");
-    maker.root["extensions"]["KHR_lights_punctual"]["lights"] =
-        json(r#"[{"type": "directional", "intensity": 3}]"#);
-    // −z turned by 45° about −y comes from +x +z
-    let node = r#"{"rotation": [0, 0.38268343, 0, 0.92387953], "extensions": {"KHR_lights_punctual": {"light": 0}}}"#;
-    maker.push("nodes", node);
-    maker
-}
-
-/// A diffuse surface: a coat of index 1.001 reflects nothing.
-const CHALK: &str =
-    r#""pbrMetallicRoughness": {"metallicFactor": 0}, "extensions": {"KHR_materials_ior": {"ior": 1.001}}"#;
-
-#[test]
-fn normal_maps_turn_the_normal() {
-    let lambert = |n: [f32; 3]| {
-        let length = n.iter().map(|x| x * x).sum::<f32>().sqrt();
-        3.0 / std::f32::consts::PI * ((n[0] + n[2]) / (2f32.sqrt() * length)).max(0.0)
-    };
-    // Codes of 8 bits: (204, 128, 230) is (0.6, 0.004, 0.804)
-    let n = [204u8, 128, 230].map(|c| f32::from(c) / 255.0 * 2.0 - 1.0);
-    for (scale, mirrored) in [(1.0, false), (0.5, false), (1.0, true)] {
-        let material = format!(r#"{{"normalTexture": {{"index": 0, "scale": {scale}}}, {CHALK}}}"#);
-        let mut maker = sunlit(&material);
-        maker.texture(1, &[[204, 128, 230, 255]], "{}");
-        if mirrored {
-            // u runs the other way, and red with it
-            let mirrored = maker.floats(&[[1.0f32, 1.0], [0.0, 1.0], [0.0, 0.0], [1.0, 0.0]]);
-            maker.root["meshes"][0]["primitives"][0]["attributes"]["TEXCOORD_0"] = mirrored.into();
-        }
-        let side = if mirrored { -1.0 } else { 1.0 };
-        let expected = lambert([side * scale * n[0], scale * n[1], n[2]]);
-        assert_close(mean(&near(maker), 16, 9), [expected; 3], 5e-3 * expected + 1e-4);
-    }
-    // Green points up in the picture, also where u is mirrored: lit from above instead
-    for mirrored in [false, true] {
-        let mut maker = sunlit(&format!(r#"{{"normalTexture": {{"index": 0}}, {CHALK}}}"#));
-        maker.texture(1, &[[128, 204, 230, 255]], "{}");
-        if mirrored {
-            let mirrored = maker.floats(&[[1.0f32, 1.0], [0.0, 1.0], [0.0, 0.0], [1.0, 0.0]]);
-            maker.root["meshes"][0]["primitives"][0]["attributes"]["TEXCOORD_0"] = mirrored.into();
-        }
-        maker.root["nodes"][3]["rotation"] = json("[-0.38268343, 0, 0, 0.92387953]");
-        let expected = lambert([n[0], 0.0, n[2]]);
-        assert_close(mean(&near(maker), 16, 9), [expected; 3], 5e-3 * expected);
-    }
-}
-
-/// Head on, a coat reflects 0.04 of the surroundings, and the rest comes from a black base.
-#[test]
-fn clear_coats_reflect() {
-    let black = r#""pbrMetallicRoughness": {"baseColorFactor": [0, 0, 0, 1], "metallicFactor": 1}"#;
-    for (factor, texture, share) in [(1.0, None, 1.0), (0.5, None, 0.5), (1.0, Some(51u8), 0.2)] {
-        let more = if texture.is_some() { r#", "clearcoatTexture": {"index": 0}"# } else { "" };
-        let coat = format!(r#""KHR_materials_clearcoat": {{"clearcoatFactor": {factor}{more}}}"#);
-        let mut maker = near(wall(&format!(r#"{{{black}, "extensions": {{{coat}}}}}"#)));
-        if let Some(red) = texture {
-            maker.texture(1, &[[red, 255, 0, 255]], "{}");
-        }
-        // A standard error of √(0.04·0.96/64/8192) = 2.7e-4
-        assert_close(mean(&maker, 8192, 9), [0.04 * share; 3], 1.4e-3);
-    }
-    let broken = wall(r#"{"extensions": {"KHR_materials_clearcoat": {"clearcoatFactor": "much"}}}"#);
-    let error = broken.load().unwrap_err().to_string();
-    assert!(error.contains("material 0: its clearcoatFactor is no number of 0…1"), "{error}");
-}
-
-#[test]
-fn unlit_surfaces_show_their_colour() {
-    let unlit = r#"{"extensions": {"KHR_materials_unlit": {}},
-        "pbrMetallicRoughness": {"baseColorFactor": [0.5, 1, 0.25, 1], "baseColorTexture": {"index": 0}}}"#;
-    let mut maker = sunlit(unlit);
-    maker.texture(1, &[[188, 188, 188, 255]], "{}");
-    let seen = linear(188);
-    assert_close(mean(&maker, 16, 9), [0.5 * seen, seen, 0.25 * seen], 1e-4);
-}
-
-#[test]
-fn colours_of_vertices_multiply() {
-    let chalk =
-        CHALK.replace(r#"{"metallicFactor""#, r#"{"baseColorFactor": [0.5, 1, 1, 1], "metallicFactor""#);
-    let mut maker = sunlit(&format!("{{{chalk}}}"));
-    let colours = maker.floats(&[[1.0f32, 0.5, 0.25]; 4]);
-    maker.root["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"] = colours.into();
-    let lit = 3.0 / std::f32::consts::PI * 0.5f32.sqrt();
-    assert_close(mean(&maker, 64, 9), [0.5 * lit, 0.5 * lit, 0.25 * lit], 3e-3);
-}
-
-#[test]
-fn specular_and_glossy_become_metal_and_rough() {
-    // A mirror of that colour, and a dielectric
-    let gold = r#"{"extensions": {"KHR_materials_pbrSpecularGlossiness": {"diffuseFactor": [0, 0, 0, 1],
-        "specularFactor": [0.9, 0.7, 0.3], "glossinessFactor": 1}}}"#;
-    assert_close(mean(&near(wall(gold)), 64, 9), [0.9, 0.7, 0.3], 5e-3);
-    let mut textured = near(wall(
-        r#"{"extensions": {"KHR_materials_pbrSpecularGlossiness": {"diffuseFactor": [0, 0, 0, 1],
-        "specularGlossinessTexture": {"index": 0}}}}"#,
-    ));
-    textured.texture(1, &[[188, 255, 150, 255]], "{}");
-    assert_close(mean(&textured, 64, 9), [linear(188), 1.0, linear(150)], 6e-3);
-}
-
-/// A glow does not count as light, a lamp does; and a white ball in daylight is seen by its shades.
-#[test]
-fn what_glows_a_little_does_not_light_the_scene() {
-    let warns = |material: &str| {
-        let mut maker = Maker::new();
-        let mesh = maker.rectangle([-1.0, 1.0], [-1.0, 1.0], -1.0, material);
-        maker.node(&format!(r#"{{"mesh": {mesh}}}"#));
-        maker.load().unwrap().warnings.iter().any(|w| w.what.contains("a grey sky"))
-    };
-    assert!(warns("{}"));
-    assert!(warns(r#"{"emissiveFactor": [0.001, 0.001, 0.001]}"#));
-    assert!(!warns(r#"{"emissiveFactor": [1, 1, 1]}"#));
-    assert!(!warns(
-        r#"{"emissiveFactor": [0.1, 0.1, 0.1],
-            "extensions": {"KHR_materials_emissive_strength": {"emissiveStrength": 20}}}"#
-    ));
-    assert!(!warns(r#"{"extensions": {"KHR_materials_unlit": {}}}"#));
-
-    // A roof: two white sides that face left and right
-    let mut maker = Maker::new();
-    let mesh =
-        maker.rectangle([-1.0, 1.0], [-1.0, 1.0], 0.0, "{\"pbrMetallicRoughness\": {\"metallicFactor\": 0}}");
-    maker.node(&format!(
-        r#"{{"mesh": {mesh}, "rotation": [0, 0.38268343, 0, 0.92387953], "translation": [0.7, 0, -2]}}"#
-    ));
-    maker.node(&format!(
-        r#"{{"mesh": {mesh}, "rotation": [0, -0.38268343, 0, 0.92387953], "translation": [-0.7, 0, -2]}}"#
-    ));
-    let pixels = render(maker.load().unwrap(), 8, 1024, 9);
-    let [left, right, sky] = [pixels[8 * 4 + 2][1], pixels[8 * 4 + 5][1], pixels[0][1]];
-    assert!(left > 1.5 * right && left > 1.3 * sky, "{left} {right} {sky}");
 }
