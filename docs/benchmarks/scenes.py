@@ -59,8 +59,8 @@ def survey(args):
             if outcome == "refused" and re.search("no <sensor>|no WorldBegin|No such file", what):
                 continue
             volumes = "medium" in what
-            count.update(complete=1, load=outcome == "loaded", clear=outcome == "loaded" and not volumes)
-            count.update(noted=outcome == "loaded" and bool(what))
+            count.update(complete=1, load=int(outcome == "loaded"), clear=int(outcome == "loaded" and not volumes))
+            count.update(noted=int(outcome == "loaded" and bool(what)))
             if outcome == "refused":
                 reasons.update({f"{kind}: {reason}" for reason in what.split(" | ")})
         for kind, count in counts.items():
@@ -81,14 +81,26 @@ def prepared(args, file):
     import mitsuba as mi
 
     config = mi.parser.ParserConfig(args.variant)
-    state = mi.parser.parse_file(config, str(file))
+    # As our reader takes them: unknown properties are ignored, and names are those of any version
+    config.unused_properties = mi.LogLevel.Debug
+    mi.file_resolver().prepend(str(file.parent))
+    text = re.sub(r"<mode>.*?</mode>|<mode [^>]*/>", "", file.read_text(), flags=re.S).replace("<lookAt", "<lookat")
+    given = dict(re.findall(r'<default name="([^"]*)" value="([^"]*)"', text))
+    extra = {name: "16" for name in ("spp",) if "$" + name in text and name not in given}
+    beside = file.with_name(f".{file.stem}-compared.xml")
+    beside.write_text(text)
+    try:
+        state = mi.parser.parse_file(config, str(beside), **extra)
+    finally:
+        beside.unlink()
     mi.parser.transform_all(config, state)
     # Its own default where a file has none
     depth = 65
 
-    def become(node, plugin):
+    def become(node, plugin, keep=()):
         for name in list(node.props.keys()):
-            node.props.remove_property(name)
+            if name not in keep and not name.startswith("_"):
+                del node.props[name]
         node.props.set_plugin_name(plugin)
 
     for node in state.nodes:
@@ -101,7 +113,7 @@ def prepared(args, file):
         elif node.type == mi.ObjectType.ReconstructionFilter:
             become(node, "box")
         elif node.type == mi.ObjectType.Film:
-            node.props.set_plugin_name("hdrfilm")
+            become(node, "hdrfilm", ("width", "height"))
             node.props["pixel_format"] = "rgb"
     scene = mi.parser.instantiate(config, state)
     return (scene[0] if isinstance(scene, list) else scene), depth
@@ -169,7 +181,8 @@ def measured(a, b):
     variance = lambda p: blocks((grey(p[0]) - grey(p[1])) ** 2) / scale
     ours, mitsubas = variance(a), variance(b)
     both = (ours > 0) & (mitsubas > 0)
-    mean = [float(x) for x in (a[0] + a[1]).mean((0, 1)) / np.maximum((b[0] + b[1]).mean((0, 1)), 1e-20)]
+    sums = zip((a[0] + a[1]).mean((0, 1)), (b[0] + b[1]).mean((0, 1)))
+    mean = [float(ours / theirs) if theirs > 0 else 1.0 for ours, theirs in sums]
     return {
         "mean": mean,
         "square": float(square.mean()),
@@ -236,18 +249,31 @@ def compare(args):
 
 def table(args):
     rows = [json.loads(line) for line in (args.out / "scenes.jsonl").read_text().splitlines()]
-    print("| scene | ours / Mitsuba, mean | systematic difference | blocks off by more than 10 % | variance, ours / Mitsuba | what is said |")
+    done = [row for row in rows if "failed" not in row]
+    print("| repository | compared | nothing approximated | of these within 3 standard errors | blocks off, median | variance, median |")
     print("|---|---|---|---|---|---|")
-    for row in sorted(rows, key=lambda r: r["file"]):
-        if "failed" in row:
-            continue
-        mean = " ".join(f"{x:.3f}" for x in row["mean"])
-        variance = "-" if row["variance"] is None else f"{row['variance']:.2f}"
-        said = "; ".join(row["findings"].split(" | "))[:160]
-        print(f"| {row['file']} | {mean} | {row['square']:.1e} ± {row['error']:.0e} | {row['off']:.0%} | {variance} | {said} |")
-    failed = [row for row in rows if "failed" in row]
-    print(f"\n{len(rows) - len(failed)} compared, {len(failed)} not:")
-    for reason, files in Counter(row["failed"][:120].replace("\n", " ") for row in failed).most_common():
+    by_source = OrderedDict()
+    for row in sorted(done, key=lambda r: r["repository"]):
+        by_source.setdefault(row["repository"], []).append(row)
+    middle = lambda numbers: sorted(numbers)[len(numbers) // 2] if numbers else float("nan")
+    for name, found in by_source.items():
+        exact = [row for row in found if not re.search("replaced by (?!path)|fades|metal, gloss|is ignored: light", row["findings"])]
+        inside = sum(row["square"] < 3 * row["error"] for row in exact)
+        off = middle([row["off"] for row in exact])
+        ratio = middle([row["variance"] for row in exact if row["variance"]])
+        print(f"| {name.replace('+', '/')} | {len(found)} | {len(exact)} | {inside} | {off:.0%} | {ratio:.2f} |")
+    print(f"\nMore than {args.off:.0%} of blocks off by more than 10 %:\n")
+    print("| scene | ours / Mitsuba, mean | systematic difference | blocks off | variance, ours / Mitsuba | what is said |")
+    print("|---|---|---|---|---|---|")
+    for row in sorted(done, key=lambda r: r["file"]):
+        if row["off"] > args.off:
+            mean = " ".join(f"{x:.3f}" for x in row["mean"])
+            variance = "-" if row["variance"] is None else f"{row['variance']:.2f}"
+            said = "; ".join(row["findings"].split(" | "))[:160]
+            print(f"| {row['file']} | {mean} | {row['square']:.1e} ± {row['error']:.0e} | {row['off']:.0%} | {variance} | {said} |")
+    print(f"\n{len(done)} compared, {len(rows) - len(done)} that Mitsuba does not read or not in time:")
+    failed = (row["failed"].replace("\n", " ") for row in rows if "failed" in row)
+    for reason, files in Counter(re.sub(r"^.*?(?:\)|\]):? ", "", text)[:100] for text in failed).most_common():
         print(f"{files} {reason}")
 
 
@@ -259,6 +285,7 @@ def main():
     parser.add_argument("--edge", type=int, default=128, help="pixels of the longer side [128]")
     parser.add_argument("--spp", type=int, default=64, help="samples a pixel of each of the two pictures [64]")
     parser.add_argument("--variant", default="llvm_ad_rgb", help="of Mitsuba [llvm_ad_rgb]")
+    parser.add_argument("--off", type=float, default=0.04, help="share of blocks from which table lists a scene [0.04]")
     parser.add_argument("--timeout", type=float, default=120, help="seconds for both of our pictures [120]")
     args = parser.parse_args()
     if args.what != "survey":

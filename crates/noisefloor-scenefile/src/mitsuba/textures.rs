@@ -75,7 +75,13 @@ impl<'d> Context<'d> {
             "checkerboard" => (1.0, self.checkerboard(element)?),
             "scale" => return self.scale(element, quantity),
             "rawconstant" => {
-                let colour = self.colour(element, "value", quantity)?.unwrap_or([1.0; 3]);
+                // As a colour or as a vector
+                let vector = element.get("value").is_some_and(|value| value.tag == "vector");
+                let colour = match self.point(element, "value") {
+                    Ok(Some(value)) if vector => value.as_vec3().to_array(),
+                    Err(error) if vector => return Err(error),
+                    _ => self.colour(element, "value", quantity)?.unwrap_or([1.0; 3]),
+                };
                 let scale = colour.into_iter().fold(1.0, f32::max);
                 return Ok((scale, Texture::Colour(colour.map(|c| c.max(0.0) / scale))));
             }
