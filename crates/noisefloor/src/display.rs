@@ -96,7 +96,7 @@ impl ToneMapping {
 
     /// Settles the exposure for a picture. Use the result for this picture, its halves and its reference
     /// alike: if the log-average drifted, the drift would look like noise. `pixels` are linear radiance;
-    /// non-finite ones are skipped. A black picture gets exposure 1.
+    /// those that are black or not finite are skipped. A black picture gets exposure 1.
     pub fn settle(&self, pixels: &[Rgb]) -> Display {
         match *self {
             Self::Reinhard { key, white } => {
@@ -109,16 +109,16 @@ impl ToneMapping {
     }
 }
 
-/// exp(mean ln(δ + L)), Reinhard et al. 2002, eq. 1 with the 1/N inside the exponential as their text has it;
-/// `None` if no pixel is brighter than black.
+/// exp(mean ln(δ + L)), Reinhard et al. 2002, eq. 1 with the 1/N inside the exponential as their text has it,
+/// over the pixels that are not black: a model on black would else be shown the brighter the smaller it is,
+/// until it burns out. `None` if there is none.
 fn log_average(pixels: &[Rgb]) -> Option<f64> {
-    let luminances = || pixels.iter().map(|&p| f64::from(luminance(p))).filter(|l| l.is_finite());
-    let geometric_mean = |of: &dyn Fn(f64) -> Option<f64>| {
-        let (sum, count) = luminances().filter_map(of).fold((0.0, 0u64), |(sum, n), l| (sum + l.ln(), n + 1));
+    let lit = || pixels.iter().map(|&p| f64::from(luminance(p))).filter(|&l| l > 0.0 && l.is_finite());
+    let geometric_mean = |delta: f64| {
+        let (sum, count) = lit().fold((0.0, 0u64), |(sum, n), l| (sum + (delta + l).ln(), n + 1));
         (count > 0).then(|| (sum / count as f64).exp())
     };
-    let delta = DELTA * geometric_mean(&|l| (l > 0.0).then_some(l))?;
-    geometric_mean(&|l| Some(delta + l.max(0.0)))
+    geometric_mean(DELTA * geometric_mean(0.0)?)
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -282,6 +282,8 @@ mod tests {
     fn log_average_of_known_pictures() {
         let two = [[0.1_f32; 3], [10.0; 3]];
         assert!((log_average(&two).unwrap() - 1.0).abs() < 1e-2);
+        let on_black = [[0.1_f32; 3], [0.0; 3], [10.0; 3], [0.0; 3], [-1.0; 3]];
+        assert_eq!(log_average(&on_black), log_average(&two));
         assert_eq!(log_average(&[[0.0; 3]; 5]), None);
         assert_eq!(log_average(&[[f32::NAN; 3]]), None);
     }

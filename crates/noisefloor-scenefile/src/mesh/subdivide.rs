@@ -209,10 +209,14 @@ mod tests {
                 assert!((glam::Vec3::from(*p) - glam::Vec3::from(expected)).length() < 1e-6, "{p:?}");
             }
         }
-        // Round but for 12 %: the radius, and normals along it
+        // The middle of an edge: 3/8 (a + b) after a step, among 33/64 a, 33/64 b and four such middles; half of it
+        // and a twelfth of those are 75/256 (a + b).
         let fine = subdivide(&octahedron(), 4);
+        let middle = glam::Vec3::new(75.0 / 256.0, 75.0 / 256.0, 0.0);
+        assert!(fine.positions.iter().any(|p| (glam::Vec3::from(p.map(f32::abs)) - middle).length() < 1e-6));
+        // Round but for 12 %: the radius, largest at the vertices, and normals along it
         let [low, high] = lengths(&fine);
-        assert!(high / low < 1.12 && low > 0.43, "{low} {high}");
+        assert!(high / low < 1.12 && high < 24.0 / 55.0 + 1e-6, "{low} {high}");
         for (p, n) in fine.positions.iter().zip(&fine.normals) {
             assert!(glam::Vec3::from(*p).normalize().dot(glam::Vec3::from(*n)) > 0.98);
         }
