@@ -96,9 +96,28 @@ fn run() -> Result<(), Box<dyn Error>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use noisefloor::TileGrid;
 
+    /// Light of the whole picture in 16 batches of so many samples: its mean, and the variance of that mean.
+    fn light(spp: u64) -> (f64, f64) {
+        let mut source = Photons { width: 48, height: 40, rays: 20 };
+        let tile = TileGrid::new(48, 40, 48).unwrap().tile(0);
+        let mut batch = || {
+            let batch = source.sample(&[Request { tile, first: 0, spp }]).unwrap().remove(0);
+            assert!(batch.spp == spp && batch.mean.len() == 48 * 40);
+            batch.mean.iter().flatten().map(|&c| f64::from(c)).sum::<f64>()
+        };
+        let lights: Vec<f64> = (0..16).map(|_| batch()).collect();
+        let mean = lights.iter().sum::<f64>() / 16.0;
+        (mean, lights.iter().map(|light| (light - mean).powi(2)).sum::<f64>() / (15.0 * 16.0))
+    }
+
+    /// Not `check_source`, which takes the noise of pixels to be independent; here a line crosses many.
     #[test]
-    fn it_keeps_the_contract_of_a_source() {
-        noisefloor_testkit::check_source(|| Photons { width: 48, height: 40, rays: 20 });
+    fn light_does_not_depend_on_how_it_is_asked_for() {
+        let ((few, error), (many, other)) = (light(2), light(16));
+        // Chance exceeds 6 standard errors once in a million times (Student's t, at least 15 degrees of freedom: once
+        // in 40,000)
+        assert!(few > 0.0 && (few - many).abs() < 6.0 * (error + other).sqrt(), "{few} {many}");
     }
 }
