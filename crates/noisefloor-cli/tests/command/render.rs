@@ -30,7 +30,7 @@ fn writes_all_it_promises() {
         let (spp, p): (u64, f32) = (row[5].parse().unwrap(), row[6].parse().unwrap());
         match row[7].as_str() {
             "converged" => assert!((100..=200).contains(&spp) && (0.9..=1.0).contains(&p), "{row:?}"),
-            "max-samples" => assert!(spp == 200 && (0.0..0.9).contains(&p), "{row:?}"),
+            "max-spp" => assert!(spp == 200 && (0.0..0.9).contains(&p), "{row:?}"),
             _ => panic!("{row:?}"),
         }
     }

@@ -159,6 +159,22 @@ impl Loader<'_> {
         })
     }
 
+    /// Warns of what a primitive has and nobody reads.
+    fn warn_of_what_is_ignored(&mut self, primitive: &Primitive, drawn: bool, place: &Place) {
+        self.notes.extensions(place, primitive.extensions.iter().flat_map(|e| e.others.keys()));
+        let has = |semantic| mesh::attribute(primitive, semantic).is_some();
+        for (there, what) in [
+            (!drawn, "its points or lines are ignored"),
+            (!has(Semantic::Positions), "it is ignored: it has no positions"),
+            (has(Semantic::Colors(1)), "its second set of vertex colours is ignored"),
+            (has(Semantic::Joints(1)), "its joints beyond four a vertex are ignored"),
+        ] {
+            if there {
+                self.notes.warn(place, what);
+            }
+        }
+    }
+
     /// Adds a primitive; warns only if it is the `first` time.
     fn primitive(
         &mut self,
@@ -170,18 +186,7 @@ impl Loader<'_> {
         let mode = mode(primitive, place)?;
         let drawn = matches!(mode, Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan);
         if first {
-            self.notes.extensions(place, primitive.extensions.iter().flat_map(|e| e.others.keys()));
-            let has = |semantic| mesh::attribute(primitive, semantic).is_some();
-            for (there, what) in [
-                (!drawn, "its points or lines are ignored"),
-                (!has(Semantic::Positions), "it is ignored: it has no positions"),
-                (has(Semantic::Colors(1)), "its second set of vertex colours is ignored"),
-                (has(Semantic::Joints(1)), "its joints beyond four a vertex are ignored"),
-            ] {
-                if there {
-                    self.notes.warn(place, what);
-                }
-            }
+            self.warn_of_what_is_ignored(primitive, drawn, place);
         }
         if !drawn {
             self.undrawn = true;

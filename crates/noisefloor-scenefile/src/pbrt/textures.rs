@@ -41,16 +41,7 @@ impl Reader<'_> {
                 let second = self.operand(params, second, &known)?;
                 self.product(params, first, second)?
             }
-            "checkerboard" => {
-                let first = self.operand(params, "tex1", &known)?;
-                let second = self.operand(params, "tex2", &known)?;
-                let (a, b) = (mean(&first), mean(&second));
-                let image = ImageTexture::new(2, 2, Pixels::Float(Arc::new([b, a, a, b])));
-                // pbrt's squares have the size 1, a picture of ours has two
-                let to_uv = uv_map(params)?.map(|row| row.map(|x| 0.5 * x));
-                params.ignore(&["dimension"]);
-                Texture::Image(ImageTexture { to_uv, nearest: true, ..image })
-            }
+            "checkerboard" => self.checkerboard(params, &known)?,
             "mix" | "directionmix" => {
                 let (first, second) =
                     (self.operand(params, "tex1", &known)?, self.operand(params, "tex2", &known)?);
@@ -77,6 +68,17 @@ impl Reader<'_> {
         let textures = if floats { &mut self.state.float_textures } else { &mut self.state.colour_textures };
         textures.insert(name.to_owned(), texture);
         Ok(())
+    }
+
+    fn checkerboard(&mut self, params: &Params, known: &Named) -> Result<Texture, LoadError> {
+        let first = self.operand(params, "tex1", known)?;
+        let second = self.operand(params, "tex2", known)?;
+        let (a, b) = (mean(&first), mean(&second));
+        let image = ImageTexture::new(2, 2, Pixels::Float(Arc::new([b, a, a, b])));
+        // pbrt's squares have the size 1, a picture of ours has two
+        let to_uv = uv_map(params)?.map(|row| row.map(|x| 0.5 * x));
+        params.ignore(&["dimension"]);
+        Ok(Texture::Image(ImageTexture { to_uv, nearest: true, ..image }))
     }
 
     /// A colour, a number or a named texture.

@@ -15,6 +15,9 @@ mod lights;
 /// Surfaces and textures.
 #[cfg(test)]
 mod materials;
+/// Bump and normal maps.
+#[cfg(test)]
+mod relief;
 /// Camera, image size, path length; parameters and references.
 #[cfg(test)]
 mod setup;

@@ -3,7 +3,7 @@ use crate::util::{Folder, close};
 const SKY: &str = r#"<emitter type="constant"><rgb name="radiance" value="1"/></emitter>"#;
 
 /// A 2 × 2 picture: red, green; grey, white; all transparent but one.
-fn folder() -> Folder {
+pub(crate) fn folder() -> Folder {
     Folder::new()
         .with_png("a.png", 2, &[[255, 0, 0, 0], [0, 255, 0, 255], [128, 128, 128, 0], [255, 255, 255, 0]])
         .with_exr("bright.exr", 1, &[[4.0, 2.0, -1.0]])
@@ -377,35 +377,4 @@ fn rough_glass_keeps_most_light() {
         let want = 0.04 + (mitsuba - 0.04) * 2.25;
         assert!((glass(1.5, alpha) - want).abs() < 0.02, "{alpha}: {} {want}", glass(1.5, alpha));
     }
-}
-
-/// A ramp that rises by 1 over a quarter turn of u: where its slope lies, and which way green points, are those of
-/// Mitsuba 3.9.1. The rectangle is 2 units wide, of which a ramp of 2 pixels rises over half: a slope of `scale`
-/// along +x between the middles of the pixels. Lit along −z +x.
-#[test]
-fn reliefs_turn_normals_as_in_mitsuba() {
-    let folder = folder();
-    let lit = |relief: &str| {
-        folder.see(&format!(
-            r#"<shape type="rectangle">{relief}</shape><emitter type="directional">
-            <vector name="direction" x="-1" y="-0.5" z="-1"/><rgb name="irradiance" value="3"/></emitter>"#
-        ))
-    };
-    let light = glam::Vec3::new(1.0, 0.5, 1.0).normalize();
-    let lambert =
-        |n: [f32; 3]| [0.5 / std::f32::consts::PI * 3.0 * glam::Vec3::from(n).normalize().dot(light); 3];
-    let bump = |scale: f32| {
-        format!(
-            r#"<bsdf type="bumpmap"><texture type="bitmap"><string name="filename" value="ramp.exr"/>
-            <boolean name="raw" value="true"/></texture><float name="scale" value="{scale}"/>
-            <bsdf type="diffuse"/></bsdf>"#
-        )
-    };
-    for scale in [0.25, 0.5, -0.5] {
-        close(lit(&bump(scale)), lambert([-scale, 0.0, 1.0]), 2e-3, &format!("bumps of {scale}"));
-    }
-    let turned = r#"<bsdf type="normalmap"><texture name="normalmap" type="bitmap">
-        <string name="filename" value="turned.exr"/><boolean name="raw" value="true"/></texture>
-        <bsdf type="diffuse"/></bsdf>"#;
-    close(lit(turned), lambert([0.8, 0.0, 0.6]), 2e-3, "normals");
 }
