@@ -31,7 +31,7 @@ impl Photons {
     /// own threads add to a picture without a lock, and now and then lose what another has added.
     fn draw(&self) -> Vec<f32> {
         let mut image = Arc::new(Image::new(self.width, self.height));
-        scene::prism(self.width, self.height).render(RenderConstraint::Count(self.rays), 1, &mut image);
+        scene::lamps(self.width, self.height).render(RenderConstraint::Count(self.rays), 1, &mut image);
         image.to_rgbaf32()
     }
 }
@@ -116,8 +116,7 @@ mod tests {
     #[test]
     fn light_does_not_depend_on_how_it_is_asked_for() {
         let ((few, error), (many, other)) = (light(2), light(16));
-        // Chance exceeds 6 standard errors once in a million times (Student's t, at least 15 degrees of freedom: once
-        // in 40,000)
+        // By chance beyond 6 standard errors at most once in 40,000 runs (Student's t, 15 degrees of freedom)
         assert!(few > 0.0 && (few - many).abs() < 6.0 * (error + other).sqrt(), "{few} {many}");
     }
 }

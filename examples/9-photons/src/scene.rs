@@ -1,10 +1,10 @@
-//! A lamp among walls that reflect, let through and scatter.
+//! Two lamps among walls that reflect, let through and scatter.
 
 use rustic_zen::material::hqz_legacy;
 use rustic_zen::prelude::{Light, Sampler, Scene, Segment};
 
 /// The scene, for a picture of this size.
-pub(crate) fn prism(width: usize, height: usize) -> Scene {
+pub(crate) fn lamps(width: usize, height: usize) -> Scene {
     let (w, h) = (width as f64, height as f64);
     let at = |x: f64, y: f64| (x * w, y * h);
     let lamp = |x, y, radius: f64, kelvin: f64| {
