@@ -182,11 +182,17 @@ impl TilePlanes {
             // The numbers of samples change from tile to tile, and from pixel to pixel where some were kept
             // out.
             let owner = |i: usize| tile.owner(grid, columns.all[i], y);
+            // The tile's own columns have one owner, in whatever row
+            let own = HALO..HALO + tile.width;
             let mut from = 0;
             while from < mean.len() {
                 let of = owner(from);
-                let alike = |&i: &usize| film.rejected() == 0 && owner(i) == of;
-                let to = from + 1 + (from + 1..mean.len()).take_while(alike).count();
+                let alike = |&i: &usize| film.rejected() == 0 && i != own.start && owner(i) == of;
+                let to = if from == own.start && film.rejected() == 0 {
+                    own.end
+                } else {
+                    from + 1 + (from + 1..mean.len()).take_while(alike).count()
+                };
                 let counts = film.pixel_counts(of, y * grid.width() + columns.all[from]);
                 let [na, nb] = counts.map(|n| n as f32);
                 let both = na > 0.0 && nb > 0.0;

@@ -16,6 +16,7 @@ use super::compact::texture_energy;
 use super::kind::{Described, Descriptor, DescriptorError, DescriptorKind, TileDescriptor};
 use crate::evidence::{ROUNDING_LUMINANCE, TilePlanes};
 use crate::mask::NoiseMask;
+use multiversion::multiversion;
 use ndarray::{Array2, ArrayView2, s};
 use noisefloor_vision::{
     DifferenceBand, ResidualPatch, ResidualPixels, VisibleDifference, VisionDetail, VisionModel,
@@ -219,18 +220,8 @@ impl Visible {
     /// The mean of high order of a map.
     fn pooled(self, map: DifferenceBand<'_>) -> f64 {
         let (columns, rows) = map.size();
-        let sum: f64 = map.rows().map(|row| self.powers(row)).sum();
+        let sum: f64 = map.rows().map(|row| powers(self.order, row)).sum();
         self.order.root(sum / (columns * rows) as f64)
-    }
-
-    /// The sum of the powers of a row, in eight sums that processors take side by side.
-    fn powers(self, row: &[f32]) -> f64 {
-        let (chunks, rest) = row.as_chunks::<8>();
-        let mut sums = [0.0; 8];
-        for chunk in chunks {
-            sums.iter_mut().zip(chunk).for_each(|(sum, &x)| *sum += self.order.power(f64::from(x)));
-        }
-        sums.iter().sum::<f64>() + rest.iter().map(|&x| self.order.power(f64::from(x))).sum::<f64>()
     }
 
     /// Appends to each tile's own numbers those of the picture that the tiles make up: the mean of high order
@@ -250,6 +241,19 @@ impl Visible {
         };
         tiles.iter().map(complete).collect()
     }
+}
+
+/// The sum of the powers of a row, in eight sums that processors take side by side.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx2", "x86_64+avx2"))]
+fn powers(order: Order, row: &[f32]) -> f64 {
+    let (chunks, rest) = row.as_chunks::<8>();
+    let mut sums = [0.0; 8];
+    for chunk in chunks {
+        let mut powers = chunk.map(f64::from);
+        (0..order.0).for_each(|_| powers.iter_mut().for_each(|x| *x *= *x));
+        sums.iter_mut().zip(powers).for_each(|(sum, x)| *sum += x);
+    }
+    sums.iter().sum::<f64>() + rest.iter().map(|&x| order.power(f64::from(x))).sum::<f64>()
 }
 
 /// What a thread keeps for its next tile: what is constant for a display, and room.
