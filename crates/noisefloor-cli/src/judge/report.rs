@@ -81,7 +81,7 @@ fn say_table(report: &Report<'_>) -> Result<(), NotSaid> {
     )?;
     if report.unfamiliar_tiles > 0 {
         say!(
-            "{} tiles have texture unlike any that the model was tested on: their P is that of half the samples, and less certain",
+            "tiles with texture unlike any that the model was tested on: {}; their P is that of half the samples, and less certain",
             report.unfamiliar_tiles
         )?;
     }

@@ -61,8 +61,8 @@ impl Output {
         let unfamiliar = session.stops().filter(|s| s.unfamiliar).count();
         if unfamiliar > 0 {
             say!(
-                "{unfamiliar} tiles have texture unlike any that the model was tested on: they got twice the samples it asks for, and \
-                 their verdicts are less certain"
+                "tiles with texture unlike any that the model was tested on: {unfamiliar}; they got twice the samples it asks \
+                 for, and their verdicts are less certain"
             )?;
         }
         Ok(())

@@ -78,7 +78,7 @@ fn what_is_unfamiliar_is_judged_as_if_it_had_half_the_samples() {
 #[test]
 fn the_model_for_references_is_whole() {
     let model = Model::read(&include_bytes!("../../models/human-reference.nfm")[..]).unwrap();
-    assert_eq!((model.evidence(), model.record().scenes.len()), (Evidence::Reference, 8));
+    assert_eq!((model.evidence(), model.record().scenes.len()), (Evidence::Reference, 7));
 }
 
 #[cfg(feature = "bundled-model")]
