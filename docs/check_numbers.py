@@ -15,8 +15,10 @@ import argparse
 import csv
 import functools
 import json
+import math
 import pathlib
 import re
+import statistics
 import subprocess
 import sys
 import tempfile
@@ -140,6 +142,28 @@ def threshold_table():
     return table(["scene", "people", "model, learned", "model, unseen"], rows)
 
 
+def other_study_table():
+    """The bundled model on views of another study, before and after the factor that the other view teaches."""
+    zones = [zone for zone in evaluate(table="fixtures/sin3d-table.csv")[1] if zone["censored"] == "false"]
+    views = list(dict.fromkeys(zone["scene"] for zone in zones))
+    def logs(view, column):
+        return [math.log(float(zone[column])) for zone in zones if zone["scene"] == view]
+    off = {v: [p - h for p, h in zip(logs(v, "predicted_spp"), logs(v, "human_spp"))] for v in views}
+    def row(view):
+        others = statistics.mean(statistics.mean(off[other]) for other in views if other != view)
+        def typical(shift):
+            return factor(math.exp(statistics.mean(abs(x - shift) for x in off[view])))
+        early = sum(x < math.log(0.5) for x in off[view]) / len(off[view])
+        return [
+            view, f"{len(off[view])}", f"{statistics.mean(map(math.exp, logs(view, 'human_spp'))):,.0f}",
+            typical(0), factor(math.exp(statistics.mean(off[view]))), share(early), typical(others),
+            f"{statistics.correlation(logs(view, 'predicted_spp'), logs(view, 'human_spp')):.2f}",
+        ]
+    head = ["view", "zones", "people, mean spp", "error", "bias", "early", "error after the other view's factor",
+            "correlation within the view"]
+    return table(head, [row(view) for view in views])
+
+
 def noise_table():
     """What the example prints about noise of other kinds."""
     built = pathlib.Path(noisefloor).parent / "examples/noise_colours"
@@ -179,6 +203,7 @@ VALUES = {
     "tables.scenes": scene_table,
     "tables.ablation": ablation_table,
     "tables.thresholds": threshold_table,
+    "tables.other-study": other_study_table,
     "tables.noise": noise_table,
 }
 
