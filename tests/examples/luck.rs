@@ -5,7 +5,7 @@
 
 use noisefloor::{
     Batch, Counts, Display, Driver, NoiseMask, Oracle, Params, ProgressiveSource, Repeats, Request, Rgb,
-    SourceError, SourceInfo, Unit,
+    Schedule, SourceError, SourceInfo, Unit,
 };
 use std::error::Error;
 
@@ -131,7 +131,15 @@ fn main() -> Result<(), Box<dyn Error>> {
         "| light | chance | tile | guard | stops at, median | stopped without having found it | noise left, median | 95 % |"
     );
     println!("|---|---|---|---|---|---|---|---|");
-    let guards = [("none", 0, 1), ("--consecutive 3", 0, 3), ("--min-spp 1000", 1000, 1)];
+    let (every, fine) = (Params::default().schedule, Schedule::FINE);
+    let guards = [
+        ("none", every, 0, 1),
+        ("--consecutive 3", every, 0, 3),
+        ("--min-spp 1000", every, 1000, 1),
+        ("none, --schedule fine", fine, 50, 1),
+        ("--schedule fine --min-spp 100", fine, 100, 1),
+        ("--schedule fine --consecutive 2", fine, 50, 2),
+    ];
     for (name, place) in
         [("in a black tile", Place::Black), ("caustic", Place::Caustic), ("firefly of 10⁶", Place::Firefly)]
     {
@@ -140,9 +148,15 @@ fn main() -> Result<(), Box<dyn Error>> {
         }
         for chance in [1e-3, 1e-4, 1e-5, 1e-6] {
             for edge in [32, 128] {
-                for (guard, min_spp, consecutive) in guards {
-                    let params =
-                        Params { tile: edge, min_spp, consecutive, max_spp: MOST, ..Params::default() };
+                for (guard, schedule, min_spp, consecutive) in guards {
+                    let params = Params {
+                        tile: edge,
+                        schedule,
+                        min_spp,
+                        consecutive,
+                        max_spp: MOST,
+                        ..Params::default()
+                    };
                     let mut runs = Vec::new();
                     for seed in 0..seeds {
                         let source = Rare { edge, place, chance, seed: seed * 0x1_0000_0001 + 1, found: 0 };

@@ -7,7 +7,7 @@ use crate::say::{NotSaid, note, one_line, say};
 use crate::signals::{AFTER_THIS_BATCH, INTERRUPTED, cancel_on_signal};
 use crate::sources::{Opened, SourceJob};
 use anyhow::Context;
-use noisefloor::{Params, Schedule, SourceInfo, StoppingCriterion};
+use noisefloor::{Params, SourceInfo, StoppingCriterion};
 use noisefloor_denoise::Denoiser;
 use noisefloor_lab::compare::{
     self, Comparison, Converged, Cost, Entrant, Labels, ReferenceJob, Setting, render_reference,
@@ -18,11 +18,12 @@ use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-/// A criterion, and how it was asked for.
-pub type Named = (String, Box<dyn StoppingCriterion + Send>);
-
-/// How the criterion on denoised halves is asked for, before the JODs that a tile may lose.
-pub const DENOISED: &str = "denoised:";
+/// A criterion, how it was asked for, and when it is to judge.
+pub struct Named {
+    pub spec: String,
+    pub criterion: Box<dyn StoppingCriterion + Send>,
+    pub params: Params,
+}
 
 /// What to compare, and on which scenes: checked.
 pub struct CompareJob {
@@ -100,13 +101,7 @@ fn one(
     let folder = job.out.join(&scene);
     std::fs::create_dir_all(&folder).with_context(|| folder.display().to_string())?;
 
-    let entrant = |(spec, criterion): Named| {
-        let mut params = job.params;
-        if spec.starts_with(DENOISED) {
-            params.schedule = Schedule::Growing { step: job.batch };
-        }
-        Entrant::new(spec, criterion, (width, height), &params)
-    };
+    let entrant = |Named { spec, criterion, params }| Entrant::new(spec, criterion, (width, height), &params);
     let entrants = (job.criteria)()?.into_iter().map(entrant).collect::<Result<Vec<_>, _>>()?;
     let bars = Bars::new(job.quiet);
     let watch = |advance: Advance<'_>| bars.show(advance);

@@ -50,12 +50,14 @@ pub(crate) fn ask<T: DeserializeOwned>(
 #[derive(Debug)]
 pub(crate) struct Described {
     pub(crate) info: SourceInfo,
+    /// Whether parts of tiles may be asked for.
+    pub(crate) blocks: bool,
     pub(crate) warnings: Vec<String>,
 }
 
 /// What the renderer says of itself, checked.
 pub(crate) fn describe(hello: Hello) -> Result<Described, Blame> {
-    let Hello { name, width, height, unit, repeats, late, warnings } = hello;
+    let Hello { name, width, height, unit, repeats, late, blocks, warnings } = hello;
     let wrong = |what: String| (None, SidecarCause::Wrong { what });
     check_image(width, height).map_err(|e| wrong(e.to_string()))?;
     let name: String = name.chars().filter(|c| !c.is_control()).take(NAME).collect();
@@ -66,7 +68,8 @@ pub(crate) fn describe(hello: Hello) -> Result<Described, Blame> {
     let warnings = warnings.iter().map(|warning| printable(warning).into_owned()).collect();
     let counts = if late { Counts::Late } else { Counts::Asked };
     let info = SourceInfo { name, width, height, unit, aims: true, repeats, counts };
-    Ok(Described { info, warnings })
+    let blocks = blocks && counts == Counts::Asked;
+    Ok(Described { info, blocks, warnings })
 }
 
 /// The batches of a reply: as many as requests, none with more samples than `counts` allows.

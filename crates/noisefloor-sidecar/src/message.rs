@@ -55,6 +55,9 @@ pub(crate) struct Hello {
     /// Whether it may give more samples than requested, because it cannot stop in time.
     #[serde(default)]
     pub(crate) late: bool,
+    /// Whether it takes requests for parts of tiles, each with samples of its own.
+    #[serde(default)]
+    pub(crate) blocks: bool,
     #[serde(default)]
     pub(crate) warnings: Vec<String>,
 }

@@ -33,6 +33,11 @@ pub enum Schedule {
 }
 
 impl Schedule {
+    /// Verdicts where they are needed, in steps of 10 samples, best from 50 on ([`Params::min_spp`]): a tile
+    /// stops within a few percent of its need, where steps of 100 overshoot it by two fifths on average in
+    /// ordinary scenes. No default, since the recorded numbers of this project belong to the paper's steps.
+    pub const FINE: Self = Self::Spaced { step: 10 };
+
     /// Share of the way to the expected need that is sampled before the next verdict. Expectations err; an
     /// early verdict is cheap, late samples are not.
     const APPROACH: f64 = 0.75;

@@ -1,6 +1,6 @@
 //! What a renderer offers: samples on request.
 
-use crate::blocks::BlockRequest;
+use crate::blocks::{BlockRequest, BlockSamples, blocks_of};
 use crate::identity::SourceIdentity;
 use crate::rgb::Rgb;
 use crate::tile::Tile;
@@ -92,6 +92,20 @@ pub struct Request {
     pub first: u64,
     /// New samples per pixel wanted, at least 1.
     pub spp: u64,
+}
+
+impl Request {
+    /// Each block of a request as a request of its own, for renderers that sample rectangles. Their tiles are
+    /// the blocks, with the index of the tile that they are parts of.
+    pub fn of_blocks(request: &BlockRequest) -> impl Iterator<Item = Self> {
+        let index = request.tile.index;
+        let blocks = blocks_of(request.tile, request.edge).zip(&request.blocks);
+        blocks.map(move |(block, &BlockSamples { first, spp })| Self {
+            tile: Tile { index, ..block },
+            first,
+            spp,
+        })
+    }
 }
 
 /// New samples of one tile.

@@ -21,6 +21,10 @@ use std::path::PathBuf;
 /// has lost at most so many JODs against the converged picture: a yardstick that no render has.
 /// `denoised:JODS` stops a tile as `render --denoise --lost JODS` does.
 ///
+/// `oracle:spaced=10:min-spp=50:blocks=16` is the oracle with options of `render`: every=N and spaced=N for
+/// --schedule and --batch, min-spp=N, consecutive=K and blocks=PIXELS, as many of them as you like; `fine` is
+/// spaced=10:min-spp=50. With blocks or spaced verdicts it renders by itself, from the same source and seed.
+///
 /// Writes into the output folder: index.html with everything (one file that opens without a server),
 /// runs.csv, runs.json, and for each scene curve.csv, tiles.csv, plots (SVG and PNG), crops with error
 /// maps, the picture of every criterion, and the reference, which the next comparison of the same scene
@@ -93,8 +97,9 @@ pub struct CompareArgs {
 #[cfg(feature = "lab")]
 mod check {
     use super::CompareArgs;
+    use crate::args::render::FINE_FROM;
     use crate::args::values;
-    use crate::compare::{CompareJob, DENOISED, Named};
+    use crate::compare::{CompareJob, Named};
     use crate::folder::Earlier;
     #[cfg(not(feature = "adapters"))]
     use crate::left_out::left_out;
@@ -121,7 +126,7 @@ mod check {
             let denoiser = self.denoise.map(|_| shared_denoiser()).transpose()?;
             let denoised = denoiser.clone();
             for spec in &specs {
-                criterion(spec, &oracle, denoised.as_ref())?;
+                criterion(spec, &oracle, &params, denoised.as_ref())?;
             }
             let source = self.renderer.check(None)?;
             Ok(CompareJob {
@@ -129,7 +134,7 @@ mod check {
                 source,
                 out: self.out,
                 criteria: Box::new(move || {
-                    specs.iter().map(|spec| criterion(spec, &oracle, denoised.as_ref())).collect()
+                    specs.iter().map(|spec| criterion(spec, &oracle, &params, denoised.as_ref())).collect()
                 }),
                 denoiser: denoiser.map(|denoiser| Box::new(denoiser) as Box<dyn Denoiser>),
                 params,
@@ -191,16 +196,52 @@ mod check {
     }
 
     /// The criterion of a specification.
-    fn criterion(spec: &str, oracle: &Oracle, denoiser: Option<&Shared>) -> anyhow::Result<Named> {
-        let criterion: Box<dyn StoppingCriterion + Send> = match (spec, spec.strip_prefix(DENOISED)) {
-            ("oracle", _) => Box::new(oracle.clone()),
-            (_, Some(lost)) => {
-                let lost = values::jods(lost).map_err(|error| anyhow!("{spec}: {error}"))?;
+    fn criterion(
+        spec: &str,
+        oracle: &Oracle,
+        params: &Params,
+        denoiser: Option<&Shared>,
+    ) -> anyhow::Result<Named> {
+        let mut params = *params;
+        let (family, words) = spec.split_once(':').unwrap_or((spec, ""));
+        let criterion: Box<dyn StoppingCriterion + Send> = match family {
+            "oracle" => {
+                params = oracle_params(words, params).with_context(|| spec.to_owned())?;
+                Box::new(oracle.clone())
+            }
+            "denoised" => {
+                let lost = values::jods(words).map_err(|error| anyhow!("{spec}: {error}"))?;
                 let Some(denoiser) = denoiser else { bail!("{spec} needs --denoise oidn") };
+                if let Schedule::Every { step } = params.schedule {
+                    params.schedule = Schedule::Growing { step };
+                }
                 Box::new(DenoisedQuality::new(Arc::clone(denoiser), lost))
             }
             _ => noisefloor_rivals::parse(spec)?,
         };
-        Ok((spec.to_owned(), criterion))
+        Ok(Named { spec: spec.to_owned(), criterion, params })
+    }
+
+    /// The words of `oracle:every=100:blocks=16`.
+    fn oracle_params(words: &str, mut params: Params) -> anyhow::Result<Params> {
+        for word in words.split(':').filter(|word| !word.is_empty()) {
+            let (name, number) = word.split_once('=').unwrap_or((word, ""));
+            match (name, number.parse::<u32>()) {
+                ("fine", Err(_)) if number.is_empty() => {
+                    (params.schedule, params.min_spp) = (Schedule::FINE, FINE_FROM);
+                }
+                ("blocks", Ok(edge)) => params.blocks = edge as usize,
+                ("every", Ok(step)) => params.schedule = Schedule::Every { step: step.into() },
+                ("spaced", Ok(step)) => params.schedule = Schedule::Spaced { step: step.into() },
+                ("min-spp", Ok(samples)) => params.min_spp = samples.into(),
+                ("consecutive", Ok(verdicts)) => params.consecutive = verdicts,
+                _ => bail!(
+                    "{word:?} is none of fine, blocks=16, every=100, spaced=10, min-spp=50 and consecutive=2, \
+                     or of other numbers"
+                ),
+            }
+        }
+        params.check()?;
+        Ok(params)
     }
 }

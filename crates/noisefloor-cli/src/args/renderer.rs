@@ -155,6 +155,11 @@ impl RendererArgs {
         matches!(self.source, SourceKind::Ptwne(_))
     }
 
+    /// Whether it may sample blocks of a tile by their need. Mitsuba can if it is compiled here.
+    pub fn may_sample_blocks(&self) -> bool {
+        self.is_built_in() || self.source.name() == "mitsuba"
+    }
+
     /// Refuses options that the source would ignore.
     fn check_options(&self) -> anyhow::Result<()> {
         let name = self.source.name();

@@ -17,11 +17,11 @@ use crate::signals::{AFTER_THIS_BATCH, INTERRUPTED, cancel_on_signal};
 use crate::sources::{Opened, SourceJob, SourceKind};
 use anyhow::bail;
 use noisefloor::{
-    Driver, DriverError, Event, FixedSpp, Oracle, Params, Progress, Repeats, Rgb, SampleOrigin, Session,
-    SourceInfo, StopReason, StoppingCriterion,
+    Driver, DriverError, Event, FixedSpp, Oracle, Params, Progress, ProgressiveSource, Repeats, Rgb,
+    SampleOrigin, Session, SourceInfo, StopReason, StoppingCriterion,
 };
 #[cfg(feature = "adapters")]
-use noisefloor::{FirstHits, ProgressiveSource, SourceError};
+use noisefloor::{FirstHits, SourceError};
 #[cfg(feature = "adapters")]
 use noisefloor_denoise::{AuxiliaryPictures, DenoisedQuality, Denoiser, Oidn};
 #[cfg(feature = "adapters")]
@@ -88,8 +88,11 @@ pub fn run(job: RenderJob) -> anyhow::Result<ExitCode> {
     source.start_threads()?;
     let opened = source.open()?;
     opened.warn(job.quiet);
-    let Opened { source, scene, .. } = opened;
-    let SourceInfo { width, height, .. } = source.info();
+    let Opened { mut source, scene, .. } = opened;
+    let SourceInfo { name, width, height, .. } = source.info();
+    if params.blocks > 0 && source.sample_blocks(&[])?.is_none() {
+        bail!("{name} cannot sample blocks of a tile by their need: leave out --blocks");
+    }
     let against = job.against.as_deref();
     let reference = against.map(|path| read_reference(path, (width, height))).transpose()?;
     let rest = Rest { job: &job, began, scene, reference, model: None, denoised: None };
@@ -106,7 +109,7 @@ pub fn run(job: RenderJob) -> anyhow::Result<ExitCode> {
         #[cfg(feature = "adapters")]
         Judge::Denoised(lost) => {
             let denoiser = Arc::new(Mutex::new(Oidn::start(FilterPlan::default())?));
-            let (mut source, mut criterion) = (source, DenoisedQuality::new(Arc::clone(&denoiser), *lost));
+            let mut criterion = DenoisedQuality::new(Arc::clone(&denoiser), *lost);
             let guides = guides(&mut source, denoiser.wants())?;
             if let Some(guides) = &guides {
                 criterion = criterion.guided_by(Arc::clone(guides));

@@ -78,6 +78,27 @@ fn a_fixed_number_of_samples_lies_on_the_curve_of_uniform_sampling() {
     assert!(!page.contains("src=\"http") && !page.contains("href=") && !page.contains("<script"));
 }
 
+/// The oracle with options of `render` is what that would have rendered.
+#[test]
+fn an_oracle_that_renders_by_itself_is_that_of_a_render() {
+    let folder = tempdir().unwrap();
+    let spec = "oracle:every=40:blocks=16";
+    succeed(&small(text(folder.path()), &["--criteria", &format!("oracle,{spec},spp:200"), "--batch", "40"]));
+    let runs = |name: &str| column(&folder.path().join("runs.csv"), name);
+    assert_eq!(runs("criterion")[1], spec);
+    let number = |name: &str, row: usize| runs(name)[row].parse::<f64>().unwrap();
+    let out = folder.path().join("render");
+    let same =
+        ["render", "cornell-box", "--size", "64x64", "--tile", "32", "--max-spp", "200", "--batch", "40"];
+    let more = ["--blocks", "16", "--key", "0.18", "--out", text(&out), "--quiet"];
+    succeed(&[&same[..], &more].concat());
+    let rendered = json(&out.join("report.json"))["samples"].as_f64().unwrap() / 4096.0;
+    assert!((number("spp_mean", 1) / rendered - 1.0).abs() < 0.2, "{rendered} {:?}", runs("spp_mean"));
+    assert!(number("source_seconds", 1) > 0.0 && number("flip_worst_block", 1) >= number("flip_worst", 1));
+    assert!(number("flip_bad_block", 1) <= number("flip_worst_block", 1));
+    assert_ne!(number("rel_mse", 1), number("rel_mse", 0), "blocks changed nothing");
+}
+
 /// The reference is kept and used again; with more samples wanted, it is rendered on to what one go would
 /// have given.
 #[test]
@@ -110,6 +131,8 @@ fn what_is_wrong_is_said_before_anything_is_rendered() {
     fail(&small(out, &["--criteria", "cycles:0"]), &["cycles", "above 0"]);
     fail(&small(out, &["--criteria", "magic"]), &["magic", "dammertz"]);
     fail(&small(out, &["--batch", "1"]), &["--batch", "2"]);
+    fail(&small(out, &["--criteria", "oracle:often"]), &["oracle:often", "every=100"]);
+    fail(&small(out, &["--criteria", "oracle:blocks=24"]), &["oracle:blocks=24", "32"]);
     fail(&small(out, &["glass-spheres", "--reference", "a.exr"]), &["--reference", "2"]);
     fail(&small(out, &["--reference", "nowhere.exr"]), &["nowhere.exr"]);
     assert!(!folder.path().join("cornell-box/reference.exr").exists());

@@ -132,12 +132,42 @@ fn blocks_are_sampled_by_their_need() {
     for (more, words) in [
         (&["--blocks", "24"][..], &["24", "32"][..]),
         (&["--blocks", "16", "--criterion", "spp:100"], &["--blocks", "oracle"]),
-        (&["--blocks", "16", "--source", "mitsuba"], &["--blocks", "ptwne"]),
+        (&["--blocks", "16", "--source", "exr"], &["--blocks", "ptwne"]),
     ] {
         fail(&tiny(text(&folder.path().join("none")), more), words);
     }
     let farm = folder.path().join("farm");
     fail(&["farm", "plan", text(&farm), "--", "softbox", "--blocks", "16"], &["--blocks", "farm"]);
+}
+
+/// Fine verdicts stop tiles sooner, on steps of their own, and a render may be interrupted between them.
+#[test]
+fn fine_verdicts_stop_tiles_sooner() {
+    let folder = tempdir().unwrap();
+    let render = |name: &str, more: &[&str]| {
+        let out = folder.path().join(name);
+        succeed(&tiny(text(&out), &[&["cornell-box", "--autosave", "0"][..], more].concat()));
+        out
+    };
+    let samples = |out: &Path| json(&out.join("report.json"))["samples"].as_u64().unwrap();
+    let (fine, coarse) = (render("fine", &["--schedule", "fine"]), render("coarse", &[]));
+    assert!(samples(&fine) < samples(&coarse), "{} {}", samples(&fine), samples(&coarse));
+    let (_, rows) = table(&fine.join("stops.csv"));
+    let stops: Vec<u64> = rows.iter().map(|row| row[5].parse().unwrap()).collect();
+    assert!(stops.iter().all(|spp| *spp >= 50 && spp.is_multiple_of(10)), "{stops:?}");
+    assert!(stops.iter().any(|spp| !spp.is_multiple_of(100)), "{stops:?}");
+
+    let files = |out: &Path| ["image.exr", "stops.csv"].map(|name| std::fs::read(out.join(name)).unwrap());
+    let mut parts = render("parts", &["--schedule", "fine", "--time", "0.001"]);
+    for _ in 0..50 {
+        if json(&parts.join("report.json"))["complete"] == true {
+            break;
+        }
+        parts = render("parts", &["--schedule", "fine", "--time", "0.001", "--resume"]);
+    }
+    assert!(files(&fine) == files(&parts), "another picture in parts");
+    let more = ["--schedule", "fine", "--batch", "20"];
+    fail(&tiny(text(&folder.path().join("none")), &more), &["--schedule fine", "--batch"]);
 }
 
 #[test]

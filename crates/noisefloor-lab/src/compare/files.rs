@@ -19,8 +19,11 @@ struct CurveRow<'a> {
     psnr: f64,
     flip: f64,
     flip_worst: f64,
+    flip_worst_block: f64,
+    flip_bad_block: f64,
     butteraugli: f64,
     butteraugli_worst: f64,
+    butteraugli_worst_block: f64,
     cvvdp_jod: f64,
     cvvdp_jod_worst: f64,
     denoised_jod_worst: Option<f64>,
@@ -38,8 +41,11 @@ impl<'a> CurveRow<'a> {
             psnr: quality.psnr,
             flip: quality.flip,
             flip_worst: quality.flip_worst,
+            flip_worst_block: quality.flip_worst_block,
+            flip_bad_block: quality.flip_bad_block,
             butteraugli: quality.butteraugli,
             butteraugli_worst: quality.butteraugli_worst,
+            butteraugli_worst_block: quality.butteraugli_worst_block,
             cvvdp_jod: quality.cvvdp_jod,
             cvvdp_jod_worst: quality.cvvdp_jod_worst,
             denoised_jod_worst,
@@ -65,7 +71,7 @@ pub fn write_scene(
     write_csv(&folder.join("tiles.csv"), &comparison.tiles)?;
     pictures.reference.save(folder.join("reference.png"))?;
     for (spec, canvas) in &pictures.criteria {
-        canvas.save(folder.join(format!("{}.png", spec.replace(':', "-"))))?;
+        canvas.save(folder.join(format!("{}.png", spec.replace([':', '='], "-"))))?;
     }
     for crop in &pictures.crops {
         crop.sheet.save(folder.join(format!("crop-{}.png", crop.name)))?;

@@ -39,10 +39,16 @@ pub struct CriterionRun {
     pub flip: f64,
     /// Of the worst tile.
     pub flip_worst: f64,
+    /// Of the worst block of 16×16 pixels.
+    pub flip_worst_block: f64,
+    /// Of the block that one in a hundred is worse than.
+    pub flip_bad_block: f64,
     /// 3-norm.
     pub butteraugli: f64,
     /// Of the worst tile.
     pub butteraugli_worst: f64,
+    /// Of the worst block.
+    pub butteraugli_worst_block: f64,
     /// JOD.
     pub cvvdp_jod: f64,
     /// JOD of the worst tile.
@@ -54,6 +60,14 @@ pub struct CriterionRun {
     pub uniform_over_this_butteraugli: Option<f64>,
     /// The same by ColorVideoVDP.
     pub uniform_over_this_cvvdp: Option<f64>,
+    /// The same by FLIP, in seconds of the source, over those of source and criterion.
+    pub uniform_over_this_seconds: Option<f64>,
+    /// In samples, until the worst block is as good by FLIP.
+    pub uniform_over_this_block: Option<f64>,
+    /// Until the block is as good that one in a hundred is worse than.
+    pub uniform_over_this_bad_block: Option<f64>,
+    /// Until the worst block is as good by butteraugli.
+    pub uniform_over_this_block_butteraugli: Option<f64>,
     /// JOD of the denoised picture. `None`, as those that follow, where nothing is denoised.
     pub denoised_jod: Option<f64>,
     /// JOD of its worst tile.
@@ -205,8 +219,10 @@ fn criterion_run(
     let grid = film.grid();
     let spp_mean = film.total_samples() as f64 / (grid.width() * grid.height()) as f64;
     let quality = yardstick.quality(&film.image())?;
-    let over =
-        |error: fn(&Quality) -> f64| uniform_samples(race, error, error(&quality)).map(|spp| spp / spp_mean);
+    let uniform = |error: fn(&Quality) -> f64| uniform_samples(race, error, error(&quality));
+    let over = |error| uniform(error).map(|spp| spp / spp_mean);
+    let (source_seconds, criterion_seconds) = (race.source_seconds(entrant), entrant.criterion_seconds);
+    let in_seconds = |spp| race.uniform_seconds(spp) / (source_seconds + criterion_seconds);
     Ok(CriterionRun {
         scene: scene.into(),
         source: source.into(),
@@ -217,19 +233,26 @@ fn criterion_run(
         spp_most: (0..grid.len()).map(|t| film.spp(t)).max().unwrap_or(0),
         tiles: grid.len(),
         tiles_converged: entrant.converged(),
-        source_seconds: race.source_seconds(film),
-        criterion_seconds: entrant.criterion_seconds,
+        source_seconds,
+        criterion_seconds,
         rel_mse: quality.rel_mse,
         psnr: quality.psnr,
         flip: quality.flip,
         flip_worst: quality.flip_worst,
+        flip_worst_block: quality.flip_worst_block,
+        flip_bad_block: quality.flip_bad_block,
         butteraugli: quality.butteraugli,
         butteraugli_worst: quality.butteraugli_worst,
+        butteraugli_worst_block: quality.butteraugli_worst_block,
         cvvdp_jod: quality.cvvdp_jod,
         cvvdp_jod_worst: quality.cvvdp_jod_worst,
         uniform_over_this: over(|q| q.flip_worst),
         uniform_over_this_butteraugli: over(|q| q.butteraugli_worst),
         uniform_over_this_cvvdp: over(|q| 10.0 - q.cvvdp_jod_worst),
+        uniform_over_this_seconds: uniform(|q| q.flip_worst).map(in_seconds),
+        uniform_over_this_block: over(|q| q.flip_worst_block),
+        uniform_over_this_bad_block: over(|q| q.flip_bad_block),
+        uniform_over_this_block_butteraugli: over(|q| q.butteraugli_worst_block),
         denoised_jod: None,
         denoised_jod_worst: None,
         denoised_seconds: None,

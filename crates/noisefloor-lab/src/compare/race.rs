@@ -1,4 +1,5 @@
 //! One run that all criteria watch: each sees the same samples, and takes those of a tile until it stops it.
+//! Those that want samples of their own get them between two steps of that run.
 
 use super::costs::Costs;
 use super::denoising::AfterDenoising;
@@ -6,8 +7,8 @@ use super::quality::{Eye, Quality, Yardstick};
 use crate::advance::{Advance, Watch};
 use crate::error::LabError;
 use noisefloor::{
-    Batch, Film, Params, ProgressiveSource, Reference, Request, Rgb, Session, StopReason, StoppingCriterion,
-    Tile, TileGrid,
+    Batch, BlockRequest, Film, Params, ProgressiveSource, Reference, Request, Rgb, Schedule, Session,
+    StopReason, StoppingCriterion, Tile, TileGrid,
 };
 use noisefloor_denoise::Denoiser;
 use noisefloor_vision::VisionModel;
@@ -21,12 +22,19 @@ pub struct Entrant {
     /// What it is one of: `cycles`. Entrants of one family differ in their constant alone.
     pub family: String,
     session: Session<Box<dyn StoppingCriterion + Send>>,
+    /// Whether it is given samples of its own.
+    apart: bool,
+    /// Seconds in the source for samples of its own.
+    own_seconds: f64,
     /// Seconds in the criterion.
     pub criterion_seconds: f64,
 }
 
 impl Entrant {
     /// A criterion that is about to watch a run of that size. `spec` is how it was asked for.
+    ///
+    /// With [blocks](Params::blocks), or with verdicts that are [spaced](Schedule::Spaced) for each tile by
+    /// its need, it does not watch: it renders as a driver would, from the same source.
     ///
     /// # Errors
     /// [`LabError::Session`] if the parameters are out of range.
@@ -38,7 +46,8 @@ impl Entrant {
     ) -> Result<Self, LabError> {
         let family = spec.split(':').next().unwrap_or_default().to_owned();
         let session = Session::new(width, height, criterion, *params)?;
-        Ok(Self { spec, family, session, criterion_seconds: 0.0 })
+        let apart = params.blocks > 0 || matches!(params.schedule, Schedule::Spaced { .. });
+        Ok(Self { spec, family, session, apart, own_seconds: 0.0, criterion_seconds: 0.0 })
     }
 
     /// Its picture: each tile as it was when it stopped.
@@ -55,6 +64,38 @@ impl Entrant {
     pub fn converged(&self) -> usize {
         self.session.stops().filter(|s| s.reason.is_satisfied()).count()
     }
+
+    /// Takes the next samples of its own, as a [`Driver`](noisefloor::Driver) does, and judges once all tiles
+    /// have what they need; `false` if the source has no more.
+    fn sample_apart(&mut self, source: &mut dyn ProgressiveSource) -> Result<bool, LabError> {
+        let requests = self.session.next_batches();
+        let by_blocks: Option<Vec<BlockRequest>> =
+            requests.iter().map(|request| self.session.block_request(request)).collect();
+        let began = Instant::now();
+        let batches = match &by_blocks {
+            Some(blocks) => source.sample_blocks(blocks)?.ok_or_else(|| LabError::Blocks(source.info().name)),
+            None => Ok(source.sample(&requests)?),
+        };
+        self.own_seconds += began.elapsed().as_secs_f64();
+        for (place, Batch { tile, spp, mean }) in batches?.into_iter().enumerate() {
+            match by_blocks.as_ref().map(|blocks| &blocks[place]) {
+                _ if spp == 0 => return Ok(false),
+                Some(request) => self.session.push_blocks(request, &mean)?,
+                None => self.session.push(tile.index, spp, &mean)?,
+            }
+        }
+        if self.session.is_round_complete() {
+            self.judge()?;
+        }
+        Ok(true)
+    }
+
+    fn judge(&mut self) -> Result<(), LabError> {
+        let began = Instant::now();
+        self.session.judge()?;
+        self.criterion_seconds += began.elapsed().as_secs_f64();
+        Ok(())
+    }
 }
 
 /// What came of a run.
@@ -69,9 +110,14 @@ pub(super) struct Race {
 }
 
 impl Race {
-    /// Seconds in the source for the samples of a film.
-    pub(super) fn source_seconds(&self, film: &Film) -> f64 {
-        self.tile_seconds.iter().enumerate().map(|(tile, seconds)| seconds * film.spp(tile) as f64).sum()
+    /// Seconds in the source for the samples of an entrant: of its own as they were measured, of the others by
+    /// what one costs.
+    pub(super) fn source_seconds(&self, entrant: &Entrant) -> f64 {
+        if entrant.apart {
+            return entrant.own_seconds;
+        }
+        let costs = self.tile_seconds.iter().enumerate();
+        costs.map(|(tile, seconds)| seconds * entrant.film().spp(tile) as f64).sum()
     }
 
     /// Seconds in the source for so many samples of every pixel.
@@ -135,6 +181,10 @@ impl Course<'_> {
         denoiser: &mut Option<&mut dyn Denoiser>,
     ) -> Result<(Race, Yardstick), LabError> {
         let info = source.info();
+        let by_blocks = entrants.iter().any(|e| e.session.params().blocks > 0);
+        if by_blocks && source.sample_blocks(&[])?.is_none() {
+            return Err(LabError::Blocks(info.name));
+        }
         let grid = TileGrid::new(info.width, info.height, self.params.tile)?;
         let mut field = Field { entrants, film: Film::without_halves(grid), costs: Costs::new(grid.len()) };
         field.show_converged(self.truth)?;
@@ -149,8 +199,14 @@ impl Course<'_> {
                 break;
             }
             done = field.film.spp(0);
-            let yardstick = yardstick.get_or_insert_with(|| self.settle(&mut field));
+            if yardstick.is_none() {
+                yardstick = Some(self.settle(&mut field)?);
+            }
+            let Some(yardstick) = &yardstick else { break };
             field.judge()?;
+            if !field.step_apart(source)? {
+                break;
+            }
             let last = curve.last().map_or(0.0, |point| point.spp as f64);
             if done as f64 >= SPACING * last {
                 curve.push(UniformPoint::new(&field.film, yardstick, denoiser)?);
@@ -158,6 +214,9 @@ impl Course<'_> {
             let detail = format!("{} criteria not satisfied yet", field.open());
             let (what, of) = ("samples per pixel", self.params.max_spp);
             (self.watch)(Advance { what, done, of, detail: &detail });
+        }
+        while !cancelled && field.apart() > 0 && field.step_apart(source)? {
+            cancelled = self.cancel.load(Ordering::Relaxed);
         }
         let Field { mut entrants, film, costs } = field;
         for entrant in &mut entrants {
@@ -172,7 +231,7 @@ impl Course<'_> {
     }
 
     /// All judge by one way to the screen, settled as a session would.
-    fn settle(&self, field: &mut Field) -> Yardstick {
+    fn settle(&self, field: &mut Field) -> Result<Yardstick, LabError> {
         let display = self.params.tone_mapping.settle(&field.film.image());
         field.entrants.iter_mut().for_each(|e| e.session.set_display(display));
         let eye = Eye { pixels_per_degree: self.pixels_per_degree, vision: self.vision.clone() };
@@ -204,6 +263,11 @@ impl Field {
         self.entrants.iter().filter(|e| !e.session.is_done()).count()
     }
 
+    /// Those of them that want samples of their own.
+    fn apart(&self) -> usize {
+        self.entrants.iter().filter(|e| e.apart && !e.session.is_done()).count()
+    }
+
     /// Gives everybody the next samples of every tile; `false` if the source has no more.
     fn step(
         &mut self,
@@ -219,7 +283,8 @@ impl Field {
         }
         for Batch { tile, spp: samples, mean } in &batches {
             self.film.add(tile.index, *samples, mean)?;
-            for entrant in self.entrants.iter_mut().filter(|e| e.session.is_open(tile.index)) {
+            let watching = |e: &&mut Entrant| !e.apart && e.session.is_open(tile.index);
+            for entrant in self.entrants.iter_mut().filter(watching) {
                 entrant.session.push(tile.index, *samples, mean)?;
             }
         }
@@ -227,11 +292,17 @@ impl Field {
     }
 
     fn judge(&mut self) -> Result<(), LabError> {
-        for entrant in &mut self.entrants {
-            let began = Instant::now();
-            entrant.session.judge()?;
-            entrant.criterion_seconds += began.elapsed().as_secs_f64();
+        self.entrants.iter_mut().filter(|e| !e.apart).try_for_each(Entrant::judge)
+    }
+
+    /// One call to the source for each entrant that wants samples of its own; `false` if it has no more. Calls
+    /// alternate with steps of the run, so that whatever else the machine does slows both alike.
+    fn step_apart(&mut self, source: &mut dyn ProgressiveSource) -> Result<bool, LabError> {
+        for entrant in self.entrants.iter_mut().filter(|e| e.apart && !e.session.is_done()) {
+            if !entrant.sample_apart(source)? {
+                return Ok(false);
+            }
         }
-        Ok(())
+        Ok(true)
     }
 }

@@ -1,5 +1,7 @@
 use crate::kit::{Fake, SIZE, expected, requests, tiles};
-use noisefloor::{ProgressiveSource, Reference, Repeats, Request, Tile, Unit};
+use noisefloor::{
+    BlockRequest, BlockSamples, ProgressiveSource, Reference, Repeats, Request, SourceError, Tile, Unit,
+};
 use std::num::NonZeroUsize;
 
 #[test]
@@ -24,6 +26,38 @@ fn samples_come_as_they_were_rendered() {
     assert!(source.sample(&[]).unwrap().is_empty());
     assert!(source.reference().unwrap().is_none());
     assert!(source.restarts().is_empty());
+}
+
+/// Blocks are asked for as tiles of their own, and come back in their places.
+#[test]
+fn blocks_get_what_was_asked_for() {
+    let requests = |first: u64| -> Vec<BlockRequest> {
+        let request = |tile: Tile| {
+            let count = tile.width.div_ceil(16) * tile.height.div_ceil(16);
+            let samples = |block| BlockSamples { first: first + block, spp: 1 + block % 3 };
+            BlockRequest { tile, spp: 2, edge: 16, blocks: (0..count as u64).map(samples).collect() }
+        };
+        tiles().into_iter().map(request).collect()
+    };
+    let Some(fake) = Fake::new("sample blocks") else { return };
+    let batches = fake.open().unwrap().sample_blocks(&requests(7)).unwrap().unwrap();
+    for (request, batch) in requests(7).iter().zip(&batches) {
+        assert_eq!((batch.tile, batch.spp), (request.tile, request.spp));
+        for (at, mean) in batch.mean.iter().enumerate() {
+            let (column, row) = (at % request.tile.width, at / request.tile.width);
+            let BlockSamples { first, spp } = request.at(column, row);
+            let (x, y) = (request.tile.x + column, request.tile.y + row);
+            let pixel = Tile { x, y, width: 1, height: 1, ..request.tile };
+            assert_eq!(expected(5, &Request { tile: pixel, first, spp }), [*mean], "{x} {y}");
+        }
+    }
+
+    // A renderer that does not say so is not asked, and one that gives something else is at fault
+    let Some(other) = Fake::new("work") else { return };
+    assert!(other.open().unwrap().sample_blocks(&requests(0)).unwrap().is_none());
+    let Some(exhausted) = Fake::new("be exhausted") else { return };
+    let error = exhausted.open().unwrap().sample_blocks(&requests(1)).unwrap_err();
+    assert!(matches!(&error, SourceError::Contract { what, .. } if what.contains("tile 1")), "{error}");
 }
 
 #[test]
