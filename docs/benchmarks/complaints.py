@@ -3,6 +3,7 @@
 
     complaints.py run --noisefloor ../../target/release/noisefloor --out OUT
     complaints.py show --compared DIR --out OUT
+    complaints.py run --only-rest … and show --out OUT      frames of a camera at rest alone
 
 `run` renders what is needed besides a comparison into OUT; what is there already is not rendered again. `show` reads that and the
 output folders of `noisefloor compare` below DIR (criteria.md has the command), prints the numbers, and writes the pictures into OUT.
@@ -27,6 +28,7 @@ EXPOSURES = ("0.1", "1", "10")
 # The camera of the Cornell box moves to the right, by about two pixels a frame.
 FRAMES = [f"{0.015 * i:.3f}" for i in range(4)]
 REFERENCE_SPP = 4000
+RESTING = {"oracle": [], "fine": ["--schedule", "fine"], "blocks": ["--schedule", "fine", "--blocks", "16"]}
 
 
 def render(noisefloor, scene, out, *options, tile=TILE):
@@ -58,6 +60,20 @@ def run(args):
         render(args.noisefloor, scene, folder("frame", str(i), "uniform"), "--seed", str(100 + i), "--criterion", f"spp:{fixed}", *size)
         reference = ["--seed", "77", "--criterion", f"spp:{REFERENCE_SPP}"]
         render(args.noisefloor, scene, folder("frame", str(i), "reference"), *reference, *size)
+    rest(args)
+
+
+def rest(args):
+    """Frames of a camera at rest, each with a seed of its own: what differs is noise, without any reference."""
+    folder = lambda *name: os.path.join(args.out, "-".join(name))
+    for i in range(len(FRAMES)):
+        for kind, options in RESTING.items():
+            seed = ["--size", "192x192", "--seed", str(200 + i)]
+            render(args.noisefloor, "cornell-box", folder("rest", str(i), kind), *options, *seed)
+        for kind in RESTING:
+            spp = str(round(report(folder("rest", "0", kind))["samples"] / 192**2))
+            uniform = ["--size", "192x192", "--seed", str(300 + i), "--criterion", f"spp:{spp}"]
+            render(args.noisefloor, "cornell-box", folder("rest", str(i), kind, "uniform"), *uniform)
 
 
 def rows(path):
@@ -322,7 +338,24 @@ def flicker(args):
     save_grid(os.path.join(args.out, "complaints-flicker.png"), columns)
 
 
+def resting(args):
+    """Change of the noise between frames of a camera at rest."""
+    print("\n## flicker at rest\n\n| | mean spp | change of noise, median tile | worst tile | worst block |\n|---|---|---|---|---|")
+    for kind in RESTING:
+        for name in (kind, f"{kind}-uniform"):
+            folders = [os.path.join(args.out, f"rest-{i}-{name}") for i in range(len(FRAMES))]
+            shown = [255 * pixels(folder) for folder in folders]
+            changes = [mask(b - a) for a, b in zip(shown, shown[1:])]
+            tiles = [np.median([of_tile(c, row).std() for c in changes]) for row in stops(folders[0])]
+            corners = [{"x": x, "y": y} for y in range(0, 192, 16) for x in range(0, 192, 16)]
+            blocks = [np.median([of_tile(c, corner, 16, 16).std() for c in changes]) for corner in corners]
+            spp = np.mean([report(folder)["samples"] / 192**2 for folder in folders])
+            print(f"| {name} | {spp:.0f} | {np.median(tiles):.2f} | {max(tiles):.2f} | {max(blocks):.2f} |")
+
+
 def show(args):
+    if not args.compared:
+        return resting(args)
     scenes = compared(args.compared)
     dark(args, scenes)
     seams(args, scenes)
@@ -332,6 +365,7 @@ def show(args):
     meaning(args, scenes)
     slower(args, scenes)
     flicker(args)
+    resting(args)
 
 
 def main():
@@ -339,13 +373,14 @@ def main():
     commands = parser.add_subparsers(dest="command", required=True)
     one = commands.add_parser("run")
     one.add_argument("--noisefloor", required=True)
+    one.add_argument("--only-rest", action="store_true", help="frames of a camera at rest, and nothing else")
     two = commands.add_parser("show")
-    two.add_argument("--compared", required=True)
+    two.add_argument("--compared", help="without it, frames of a camera at rest are shown, and nothing else")
     for command in (one, two):
         command.add_argument("--out", required=True)
     args = parser.parse_args()
     os.makedirs(args.out, exist_ok=True)
-    {"run": run, "show": show}[args.command](args)
+    {"run": rest if args.command == "run" and args.only_rest else run, "show": show}[args.command](args)
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-//! How often the oracle stops a tile on luck: `luck [SEEDS [LIGHT]]` renders pictures of four tiles, one of
+//! How often the oracle stops a tile on luck: `luck [SEEDS [LIGHT [CHANCE]]]` renders pictures of four tiles, one of
 //! which holds light that is seldom found, and prints a Markdown table of where that tile stops and what it
 //! misses, with and without the guards there are.
 #![allow(clippy::print_stdout, reason = "an example prints")]
@@ -127,6 +127,10 @@ fn stop(source: Rare, params: Params) -> Result<(u64, bool, f64), Box<dyn Error>
 fn main() -> Result<(), Box<dyn Error>> {
     let seeds: u64 = std::env::args().nth(1).map_or(Ok(100), |n| n.parse())?;
     let only = std::env::args().nth(2).unwrap_or_default();
+    let chances = match std::env::args().nth(3) {
+        Some(chance) => vec![chance.parse()?],
+        None => vec![1e-3, 1e-4, 1e-5, 1e-6],
+    };
     println!(
         "| light | chance | tile | guard | stops at, median | stopped without having found it | noise left, median | 95 % |"
     );
@@ -136,9 +140,9 @@ fn main() -> Result<(), Box<dyn Error>> {
         ("none", every, 0, 1),
         ("--consecutive 3", every, 0, 3),
         ("--min-spp 1000", every, 1000, 1),
-        ("none, --schedule fine", fine, 50, 1),
-        ("--schedule fine --min-spp 100", fine, 100, 1),
-        ("--schedule fine --consecutive 2", fine, 50, 2),
+        ("--schedule fine", fine, 100, 1),
+        ("--schedule fine --min-spp 50", fine, 50, 1),
+        ("--schedule fine --consecutive 2", fine, 100, 2),
     ];
     for (name, place) in
         [("in a black tile", Place::Black), ("caustic", Place::Caustic), ("firefly of 10⁶", Place::Firefly)]
@@ -146,7 +150,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         if !name.contains(&only) {
             continue;
         }
-        for chance in [1e-3, 1e-4, 1e-5, 1e-6] {
+        for &chance in &chances {
             for edge in [32, 128] {
                 for (guard, schedule, min_spp, consecutive) in guards {
                     let params = Params {

@@ -70,6 +70,8 @@ impl PyViewing {
 /// consecutive: verdicts in a row that must say "converged".
 /// audience: (slope, offset) of the line from thresholds of the training data to those of your viewers;
 ///     None is (1, 0).
+/// blocks: edge in pixels, 16 or 32, of the blocks of a tile that get samples by their need; 0 for none. See
+///     Session.blocks.
 ///
 /// Raises ParameterError if a value is out of range.
 #[pyclass(frozen, eq, name = "Params", module = "noisefloor", from_py_object)]
@@ -116,7 +118,7 @@ impl PyParams {
     #[new]
     #[pyo3(signature = (*, tile = 128, tone_mapping = "reinhard", key = 0.18, white = None, exposure = 1.0,
         viewing = None, schedule = "every", step = 100, min_spp = 100, max_spp = 10_000, consecutive = 1,
-        audience = None))]
+        audience = None, blocks = 0))]
     #[expect(clippy::too_many_arguments, reason = "Python names them")]
     fn new(
         tile: usize,
@@ -131,6 +133,7 @@ impl PyParams {
         max_spp: u64,
         consecutive: u32,
         audience: Option<(f64, f64)>,
+        blocks: usize,
     ) -> PyResult<Self> {
         let schedule = match schedule {
             "every" => Schedule::Every { step },
@@ -150,7 +153,7 @@ impl PyParams {
             max_spp,
             consecutive,
             audience: audience.map_or(Audience::TRAINED, |(slope, offset)| Audience { slope, offset }),
-            ..Params::default()
+            blocks,
         };
         params.check().map_err(Raise::raise)?;
         Ok(Self(params))

@@ -4,8 +4,8 @@ use crate::arrays::{Pixels, picture, pixels, plane};
 use crate::errors::{BatchError, CheckpointError, Error, ParameterError, Raise, SizeError, file_error};
 use crate::oracle::PyOracle;
 use crate::params::PyParams;
-use crate::verdicts::{PyRequest, PyStop, PyVerdict, TileLike};
-use noisefloor::{Checkpoint, Oracle, Params, Rgb, Session, StopReason, Tile, TileGrid};
+use crate::verdicts::{PyBlocks, PyRequest, PyStop, PyVerdict, TileLike};
+use noisefloor::{Checkpoint, Oracle, Params, Request, Rgb, Session, StopReason, Tile, TileGrid};
 use numpy::{PyArray2, PyArray3};
 use pyo3::prelude::*;
 use pyo3::sync::MutexExt;
@@ -140,6 +140,27 @@ impl PySession {
         self.attached(py)?.push(tile.index, spp, &pixels).map_err(Raise::raise)
     }
 
+    /// What each pixel of a request is to get, for a renderer that can give some pixels more samples than
+    /// others: a Blocks, or None unless Params.blocks is set. Push what comes of it with push_blocks, before
+    /// anything else is pushed to the tile or judged. A renderer that cannot answers the request with push.
+    ///
+    /// Raises BatchError if the tile does not exist.
+    fn blocks(&self, py: Python<'_>, request: &PyRequest) -> PyResult<Option<PyBlocks>> {
+        let tile = self.tile(&TileLike::Index(request.tile.index))?;
+        let request = Request { tile, first: request.first, spp: request.spp };
+        Ok(self.attached(py)?.block_request(&request).map(PyBlocks))
+    }
+
+    /// Adds the means of the samples that Blocks.samples asked for.
+    ///
+    /// mean: array of shape (tile.height, tile.width, 3), for each pixel the mean of its own new samples.
+    ///
+    /// Raises SizeError if the shape is another, BatchError if the blocks are none of this session.
+    fn push_blocks(&self, py: Python<'_>, blocks: &PyBlocks, mean: Pixels<'_>) -> PyResult<()> {
+        let pixels = self.batch(blocks.0.tile, &mean)?;
+        self.attached(py)?.push_blocks(&blocks.0, &pixels).map_err(Raise::raise)
+    }
+
     /// As push, for a renderer that keeps running means: the mean of all total samples per pixel so far. The
     /// new samples are what it has more than the session.
     ///
@@ -216,10 +237,17 @@ impl PySession {
         picture(py, self.size(), self.detached(py, |session| session.film().image())?)
     }
 
-    /// Samples per pixel: uint64 of shape (height, width).
+    /// Samples of each pixel: uint64 of shape (height, width). Those of its block, where blocks have different
+    /// numbers; Stop.spp is the average of the tile.
     fn spp<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<u64>>> {
-        let session = self.attached(py)?;
-        plane(py, self.size(), self.spread(|tile| session.film().spp(tile)))
+        let (session, width) = (self.attached(py)?, self.grid.width());
+        let mut all = vec![0; width * self.grid.height()];
+        for tile in self.grid.tiles() {
+            for pixel in tile.rows(width).flatten() {
+                all[pixel] = session.film().samples_at(tile.index, pixel);
+            }
+        }
+        plane(py, self.size(), all)
     }
 
     /// P of the last verdicts: float32 of shape (height, width); NaN where there is none.

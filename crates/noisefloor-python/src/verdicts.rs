@@ -1,6 +1,8 @@
 //! What a session says: tiles, requests, verdicts, stops.
 
-use noisefloor::{Request, Stop, Tile, Verdict};
+use crate::arrays::plane;
+use noisefloor::{BlockRequest, BlockSamples, Request, Stop, Tile, Verdict};
+use numpy::PyArray2;
 use pyo3::prelude::*;
 
 /// A rectangle of pixels that stops as a whole.
@@ -8,7 +10,7 @@ use pyo3::prelude::*;
 #[derive(Clone, Copy, PartialEq, Eq, Hash)]
 pub(crate) struct PyTile {
     /// Its number, in rows from the top left.
-    index: usize,
+    pub(crate) index: usize,
     /// Left edge in pixels.
     x: usize,
     /// Top edge in pixels.
@@ -63,11 +65,11 @@ impl TileLike<'_> {
 #[derive(Clone, Copy)]
 pub(crate) struct PyRequest {
     /// The tile.
-    tile: PyTile,
+    pub(crate) tile: PyTile,
     /// Number of the first new sample, so that a renderer repeats none.
-    first: u64,
+    pub(crate) first: u64,
     /// New samples per pixel. Fewer or more are fine.
-    spp: u64,
+    pub(crate) spp: u64,
 }
 
 #[pymethods]
@@ -80,6 +82,51 @@ impl PyRequest {
 impl From<Request> for PyRequest {
     fn from(Request { tile, first, spp }: Request) -> Self {
         Self { tile: tile.into(), first, spp }
+    }
+}
+
+/// What each pixel of a tile is to get, where Params.blocks is set; made by Session.blocks.
+#[pyclass(frozen, name = "Blocks", module = "noisefloor")]
+pub(crate) struct PyBlocks(pub(crate) BlockRequest);
+
+#[pymethods]
+impl PyBlocks {
+    /// The tile.
+    #[getter]
+    fn tile(&self) -> PyTile {
+        self.0.tile.into()
+    }
+
+    /// New samples per pixel, on average over the tile.
+    #[getter]
+    fn spp(&self) -> u64 {
+        self.0.spp
+    }
+
+    /// Number of the first new sample of each pixel: uint64 of shape (tile.height, tile.width).
+    fn first<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<u64>>> {
+        self.plane(py, |samples| samples.first)
+    }
+
+    /// New samples of each pixel, at least 1: uint64 of shape (tile.height, tile.width).
+    fn samples<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<u64>>> {
+        self.plane(py, |samples| samples.spp)
+    }
+
+    fn __repr__(&self) -> String {
+        format!("Blocks(tile={}, spp={}, edge={})", self.tile().__repr__(), self.0.spp, self.0.edge)
+    }
+}
+
+impl PyBlocks {
+    fn plane<'py>(
+        &self,
+        py: Python<'py>,
+        value: impl Fn(BlockSamples) -> u64,
+    ) -> PyResult<Bound<'py, PyArray2<u64>>> {
+        let Tile { width, height, .. } = self.0.tile;
+        let values = (0..width * height).map(|at| value(self.0.at(at % width, at / width)));
+        plane(py, (width, height), values.collect())
     }
 }
 

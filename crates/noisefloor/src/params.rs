@@ -33,9 +33,10 @@ pub enum Schedule {
 }
 
 impl Schedule {
-    /// Verdicts where they are needed, in steps of 10 samples, best from 50 on ([`Params::min_spp`]): a tile
-    /// stops within a few percent of its need, where steps of 100 overshoot it by two fifths on average in
-    /// ordinary scenes. No default, since the recorded numbers of this project belong to the paper's steps.
+    /// Verdicts where they are needed, in steps of 10 samples: a tile stops within a few percent of its need,
+    /// where steps of 100 overshoot it by two fifths in ordinary scenes. Not the default, since the numbers
+    /// that this project has recorded belong to the paper's steps. Set [`Params::min_spp`], too: with fewer
+    /// than 100 samples, light that is seldom found is missed more often.
     pub const FINE: Self = Self::Spaced { step: 10 };
 
     /// Share of the way to the expected need that is sampled before the next verdict. Expectations err; an

@@ -23,7 +23,7 @@ use std::path::PathBuf;
 ///
 /// `oracle:spaced=10:min-spp=50:blocks=16` is the oracle with options of `render`: every=N and spaced=N for
 /// --schedule and --batch, min-spp=N, consecutive=K and blocks=PIXELS, as many of them as you like; `fine` is
-/// spaced=10:min-spp=50. With blocks or spaced verdicts it renders by itself, from the same source and seed.
+/// spaced=10:min-spp=100. With blocks or spaced verdicts it renders by itself, from the same source and seed.
 ///
 /// Writes into the output folder: index.html with everything (one file that opens without a server),
 /// runs.csv, runs.json, and for each scene curve.csv, tiles.csv, plots (SVG and PNG), crops with error

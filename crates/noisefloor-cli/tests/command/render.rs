@@ -154,7 +154,7 @@ fn fine_verdicts_stop_tiles_sooner() {
     assert!(samples(&fine) < samples(&coarse), "{} {}", samples(&fine), samples(&coarse));
     let (_, rows) = table(&fine.join("stops.csv"));
     let stops: Vec<u64> = rows.iter().map(|row| row[5].parse().unwrap()).collect();
-    assert!(stops.iter().all(|spp| *spp >= 50 && spp.is_multiple_of(10)), "{stops:?}");
+    assert!(stops.iter().all(|spp| *spp >= 100 && spp.is_multiple_of(10)), "{stops:?}");
     assert!(stops.iter().any(|spp| !spp.is_multiple_of(100)), "{stops:?}");
 
     let files = |out: &Path| ["image.exr", "stops.csv"].map(|name| std::fs::read(out.join(name)).unwrap());

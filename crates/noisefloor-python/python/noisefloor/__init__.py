@@ -19,6 +19,7 @@ Every error is a noisefloor.Error.
 
 from ._noisefloor import (
     BatchError,
+    Blocks,
     CheckpointError,
     CriterionError,
     Error,
@@ -43,6 +44,7 @@ from ._noisefloor import (
 
 __all__ = [
     "BatchError",
+    "Blocks",
     "CheckpointError",
     "CriterionError",
     "Error",
