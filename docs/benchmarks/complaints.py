@@ -3,7 +3,7 @@
 
     complaints.py run --noisefloor ../../target/release/noisefloor --out OUT
     complaints.py show --compared DIR --out OUT
-    complaints.py run --only-rest … and show --out OUT      frames of a camera at rest alone
+    complaints.py run --only-rest …, and show --parts resting --out OUT      frames of a camera at rest alone
 
 `run` renders what is needed besides a comparison into OUT; what is there already is not rendered again. `show` reads that and the
 output folders of `noisefloor compare` below DIR (criteria.md has the command), prints the numbers, and writes the pictures into OUT.
@@ -28,7 +28,7 @@ EXPOSURES = ("0.1", "1", "10")
 # The camera of the Cornell box moves to the right, by about two pixels a frame.
 FRAMES = [f"{0.015 * i:.3f}" for i in range(4)]
 REFERENCE_SPP = 4000
-RESTING = {"oracle": [], "fine": ["--schedule", "fine"], "blocks": ["--schedule", "fine", "--blocks", "16"]}
+RESTING = {"oracle": [], "blocks": ["--schedule", "fine", "--blocks", "16"]}
 
 
 def render(noisefloor, scene, out, *options, tile=TILE):
@@ -353,19 +353,20 @@ def resting(args):
             print(f"| {name} | {spp:.0f} | {np.median(tiles):.2f} | {max(tiles):.2f} | {max(blocks):.2f} |")
 
 
+# What is shown, and of what: comparisons or renders
+OF_COMPARISONS = {"dark": dark, "seams": seams, "meaning": meaning, "slower": slower}
+OF_RENDERS = {"caustics": caustics, "displayed": displayed, "ends": ends, "flicker": flicker, "resting": resting}
+
+
 def show(args):
-    if not args.compared:
-        return resting(args)
-    scenes = compared(args.compared)
-    dark(args, scenes)
-    seams(args, scenes)
-    caustics(args)
-    displayed(args)
-    ends(args)
-    meaning(args, scenes)
-    slower(args, scenes)
-    flicker(args)
-    resting(args)
+    global TILE
+    TILE = args.tile
+    scenes = compared(args.compared) if args.compared else {}
+    for name in args.parts.split(",") if args.parts else [*OF_COMPARISONS, *OF_RENDERS]:
+        if name in OF_RENDERS:
+            OF_RENDERS[name](args)
+        else:
+            OF_COMPARISONS[name](args, scenes)
 
 
 def main():
@@ -375,7 +376,9 @@ def main():
     one.add_argument("--noisefloor", required=True)
     one.add_argument("--only-rest", action="store_true", help="frames of a camera at rest, and nothing else")
     two = commands.add_parser("show")
-    two.add_argument("--compared", help="without it, frames of a camera at rest are shown, and nothing else")
+    two.add_argument("--compared", help="output folders of comparisons")
+    two.add_argument("--tile", type=int, default=TILE, help="of the comparisons")
+    two.add_argument("--parts", help="what to show, as in dark,seams,resting; all without it")
     for command in (one, two):
         command.add_argument("--out", required=True)
     args = parser.parse_args()

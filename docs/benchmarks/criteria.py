@@ -8,11 +8,13 @@ import math
 import os
 import sys
 
-FINE = "oracle:spaced=10:min-spp=50"
+FINE = "oracle:fine:min-spp=50"
+# As it was typed before it had a name
+OLDER = {"oracle:spaced=10:min-spp=100": "oracle:fine", "oracle:spaced=10:min-spp=50": FINE}
 SHOWN = {
     "oracle:every=100": "oracle, every 100",
     "oracle": "oracle, every 20",
-    "oracle:spaced=10:min-spp=100": "oracle, fine",
+    "oracle:fine": "oracle, fine",
     FINE: "oracle, fine, from 50",
     FINE + ":blocks=16": "with blocks of 16",
     FINE + ":blocks=32": "with blocks of 32",
@@ -57,8 +59,8 @@ def scenes_table(by_source):
 
 def means_table(by_source):
     """Geometric means over scenes in which all of these were compared and uniform sampling got there."""
-    oracles = [spec for spec in SHOWN if spec.startswith("oracle")]
-    scenes = [criteria for criteria in by_source.values() if all(spec in criteria for spec in oracles)]
+    scenes = [criteria for criteria in by_source.values() if FINE in criteria]
+    oracles = [spec for spec in SHOWN if spec.startswith("oracle") and all(spec in criteria for criteria in scenes)]
     say(f"\nGeometric means over {len(scenes)} scenes, where every ratio is known:\n")
     say("| who | spp | " + " | ".join(RATIOS.values()) + " |\n" + "|---" * (len(RATIOS) + 2) + "|")
     for spec in oracles:
@@ -76,12 +78,14 @@ def main():
     for path in sorted(glob.glob(os.path.join(sys.argv[1], "**/runs.csv"), recursive=True)):
         with open(path) as file:
             runs += list(csv.DictReader(file))
+    by_source = {}
+    for run in runs:
+        for older, newer in OLDER.items():
+            run["criterion"] = run["criterion"].replace(older, newer)
+        by_source.setdefault((run["scene"], run["source"]), {})[run["criterion"]] = run
     out = csv.DictWriter(sys.stdout, runs[0].keys(), lineterminator="\n")
     out.writeheader()
     out.writerows(runs)
-    by_source = {}
-    for run in runs:
-        by_source.setdefault((run["scene"], run["source"]), {})[run["criterion"]] = run
     scenes_table(by_source)
     means_table(by_source)
 
