@@ -58,8 +58,9 @@ def scenes_table(by_source):
 
 
 def means_table(by_source):
-    """Geometric means over scenes in which all of these were compared and uniform sampling got there."""
-    scenes = [criteria for criteria in by_source.values() if FINE in criteria]
+    """Geometric means over scenes in which the oracle stopped all tiles and uniform sampling got there."""
+    whole = lambda criteria: all(r["tiles"] == r["tiles_converged"] for spec, r in criteria.items() if spec.startswith("oracle"))
+    scenes = [criteria for criteria in by_source.values() if FINE in criteria and whole(criteria)]
     oracles = [spec for spec in SHOWN if spec.startswith("oracle") and all(spec in criteria for criteria in scenes)]
     say(f"\nGeometric means over {len(scenes)} scenes, where every ratio is known:\n")
     say("| who | spp | " + " | ".join(RATIOS.values()) + " |\n" + "|---" * (len(RATIOS) + 2) + "|")
