@@ -105,8 +105,10 @@ def prepared(args, file):
 
     for node in state.nodes:
         if node.type == mi.ObjectType.Integrator:
-            given = node.props.get("max_depth", -1)
-            depth = 2 if node.props.plugin_name() == "direct" else given if given > 0 else 65
+            given, kind = node.props.get("max_depth", -1), node.props.plugin_name()
+            # These have none of their own: it is that of the integrator in them
+            if kind not in ("aov", "moment", "stokes"):
+                depth = 2 if kind == "direct" else given if given > 0 else 65
             become(node, "path")
         elif node.type == mi.ObjectType.Sampler:
             become(node, "independent")

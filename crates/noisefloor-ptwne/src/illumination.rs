@@ -75,6 +75,8 @@ impl Scene {
     fn emission_factor(&self, light: &Light, uv: [f32; 2]) -> Vec3 {
         match self.emission_textures.get(light.texture as usize) {
             None => Vec3::ONE,
+            // The picture of a projector
+            Some(texture) if light.prim == NO => texture.eval(uv[0], uv[1]),
             Some(texture) => {
                 let group = self.geometry.group(light.prim);
                 let [u, v] = self.geometry.texture_coordinates(group, light.prim, uv);

@@ -121,10 +121,11 @@ impl Scene {
         if normal.dot(ray.dir) >= 0.0 {
             normal = flat;
         }
+        let tint = if group.colours == NO { Vec3::ONE } else { self.geometry.tint(group, prim, hit.uv) };
         let (mut material, mut relief) = (material, &material.relief);
         while let Bsdf::Mix { parts, share, coat } = &material.bsdf {
             let number = rng::hash(bits_of(ray, hit.t), parts[0]);
-            let share = share.at(uv);
+            let share = share.tinted(uv, tint);
             let mut share = (share.x + share.y + share.z) * (1.0 / 3.0);
             if *coat {
                 share *= schlick(Vec3::splat(COAT), -ray.dir.dot(normal)).x;
@@ -139,7 +140,6 @@ impl Scene {
             let shiny = !matches!(material.bsdf, Bsdf::Diffuse { .. });
             normal = self.relieved(relief, hit, ray.dir, Sides { flat, normal, front, uv, shiny });
         }
-        let tint = if group.colours == NO { Vec3::ONE } else { self.geometry.tint(group, prim, hit.uv) };
         let light = if group.light == NO { NO } else { group.light + prim - group.first };
         Intersection { position, flat, normal, front, uv, tint, material, light }
     }
@@ -201,9 +201,9 @@ impl<'a> Intersection<'a> {
             Bsdf::Metal { fresnel, colour, ggx } => {
                 Some(Glossy::metal(fresnel, colour.tinted(self.uv, self.tint), *ggx))
             }
-            Bsdf::Plastic { diffuse, specular, alpha, nonlinear, coat } => {
+            Bsdf::Plastic { diffuse, specular, ggx, nonlinear, coat } => {
                 let diffuse = diffuse.tinted(self.uv, self.tint);
-                Some(Glossy::plastic(coat, diffuse, *specular, *alpha, *nonlinear, cos))
+                Some(Glossy::plastic(coat, diffuse, *specular, *ggx, *nonlinear, cos))
             }
             Bsdf::Blend { base, metallic_roughness, coat } => {
                 let values = metallic_roughness.at(self.uv);
@@ -218,8 +218,8 @@ impl<'a> Intersection<'a> {
     /// Its rough boundary, seen from the ray's side; `None` if it is something else.
     #[inline]
     pub(crate) fn rough_glass(&self) -> Option<RoughGlass> {
-        let Bsdf::RoughGlass { ior, tint, alpha } = &self.material.bsdf else { return None };
+        let Bsdf::RoughGlass { ior, tint, ggx } = &self.material.bsdf else { return None };
         let eta = if self.front { *ior } else { 1.0 / ior };
-        Some(RoughGlass::new(*alpha, eta, *tint))
+        Some(RoughGlass::new(*ggx, eta, *tint))
     }
 }

@@ -68,7 +68,7 @@ pub use environment::{Environment, EnvironmentMap, Sun};
 pub use error::{RenderError, SceneError};
 pub use filter::Filter;
 pub use integrator::Estimator;
-pub use light::Punctual;
+pub use light::{Falloff, Profile, Punctual};
 pub use material::{Material, MaterialOptions};
 pub use reference::ReferenceNoise;
 pub use relief::Relief;

@@ -13,7 +13,7 @@ use std::sync::Arc;
 /// otherwise.
 ///
 /// Microfacets are GGX with Smith's height-correlated masking, single scattering (Walter et al. 2007; Heitz
-/// 2014, 2018).
+/// 2014, 2018), unless [`MaterialOptions::facets`] says otherwise.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Material {
@@ -37,14 +37,14 @@ pub enum Material {
         /// Factor on light each time it crosses the surface, 0…1.
         tint: Rgb,
     },
-    /// A rough dielectric boundary of GGX microfacets that hide each other independently (Walter et al.
-    /// 2007). Radiance as in [`Material::Glass`].
+    /// A rough dielectric boundary of microfacets that hide each other independently, whatever
+    /// [`MaterialOptions::facets`] says (Walter et al. 2007). Radiance as in [`Material::Glass`].
     RoughGlass {
         /// Index of refraction on the back (where the normal does not point), over that on the front: 0.25…4.
         ior: f32,
         /// Factor on light each time it crosses the surface, 0…1.
         tint: Rgb,
-        /// GGX α, 0…1; below [`MIN_ROUGHNESS`] it is smooth.
+        /// α, 0…1; below [`MIN_ROUGHNESS`] it is smooth.
         roughness: f32,
     },
     /// A thin pane: one surface for both boundaries, including all reflections between them. Light passes
@@ -109,7 +109,8 @@ pub struct MaterialOptions {
     pub opacity: Option<Texture>,
     /// Whether the back absorbs all light.
     pub one_sided: bool,
-    /// The microfacets of rough conductors.
+    /// The microfacets of [`Material::RoughConductor`], [`Material::Conductor`], [`Material::Plastic`] and
+    /// [`Material::RoughGlass`].
     pub facets: Facets,
     /// Structure of the surface. That of a mix is also that of its parts that have none.
     pub relief: Option<Relief>,
@@ -154,7 +155,7 @@ pub(crate) enum Bsdf {
     RoughGlass {
         ior: f32,
         tint: Vec3,
-        alpha: f32,
+        ggx: Ggx,
     },
     Metal {
         fresnel: Fresnel,
@@ -164,7 +165,7 @@ pub(crate) enum Bsdf {
     Plastic {
         diffuse: Reflectance,
         specular: Vec3,
-        alpha: f32,
+        ggx: Ggx,
         nonlinear: bool,
         coat: Arc<Coat>,
     },
@@ -296,7 +297,7 @@ impl CompiledMaterial {
         material.check()?;
         options.check()?;
         let metal = |fresnel, colour, alpha| metal(fresnel, colour, alpha, options.facets);
-        let mut coat = |ior, alpha, inside| shared_coat(coats, ior, alpha, inside);
+        let mut coat = |ior, alpha, facets, inside| shared_coat(coats, ior, alpha, facets, inside);
         // A smooth coat masks nothing
         let inside = |alpha: f32| {
             if alpha < MIN_ROUGHNESS { Interior::Conserving } else { Interior::SingleScattering }
@@ -312,7 +313,11 @@ impl CompiledMaterial {
                 Bsdf::Glass { ior, tint: tint.into() }
             }
             Material::RoughGlass { ior, tint, roughness } => {
-                Bsdf::RoughGlass { ior, tint: tint.into(), alpha: roughness }
+                let facets = match options.facets {
+                    Facets::Ggx => Facets::GgxUncorrelated,
+                    other => other,
+                };
+                Bsdf::RoughGlass { ior, tint: tint.into(), ggx: Ggx::of(roughness, facets) }
             }
             Material::RoughConductor { reflectance, roughness } => {
                 metal(Fresnel::Schlick, Reflectance::new(reflectance), roughness)
@@ -324,16 +329,16 @@ impl CompiledMaterial {
             Material::Plastic { diffuse, specular, ior, roughness, nonlinear } => Bsdf::Plastic {
                 diffuse: Reflectance::new(diffuse),
                 specular: specular.into(),
-                alpha: roughness,
+                ggx: Ggx::of(roughness, options.facets),
                 nonlinear,
-                coat: coat(ior, Some(roughness), inside(roughness)),
+                coat: coat(ior, Some(roughness), options.facets, inside(roughness)),
             },
             Material::MetallicRoughness { base, metallic_roughness, ior } => {
                 let fixed = metallic_roughness.constant().map(|c| (c.y * c.y).max(MIN_ROUGHNESS));
                 Bsdf::Blend {
                     base: Reflectance::new(base),
                     metallic_roughness: Reflectance::new(metallic_roughness),
-                    coat: coat(ior, fixed, Interior::Conserving),
+                    coat: coat(ior, fixed, Facets::Ggx, Interior::Conserving),
                 }
             }
         };
@@ -385,11 +390,17 @@ fn metal(fresnel: Fresnel, colour: Reflectance, alpha: f32, facets: Facets) -> B
 }
 
 /// The coat among `coats` that is for these values; it is added if there is none.
-fn shared_coat(coats: &mut Vec<Arc<Coat>>, ior: f32, alpha: Option<f32>, inside: Interior) -> Arc<Coat> {
-    if let Some(coat) = coats.iter().find(|c| c.is_for(ior, alpha, inside)) {
+fn shared_coat(
+    coats: &mut Vec<Arc<Coat>>,
+    ior: f32,
+    alpha: Option<f32>,
+    facets: Facets,
+    inside: Interior,
+) -> Arc<Coat> {
+    if let Some(coat) = coats.iter().find(|c| c.is_for(ior, alpha, facets, inside)) {
         return coat.clone();
     }
-    let coat = Arc::new(Coat::new(ior, alpha, inside));
+    let coat = Arc::new(Coat::new(ior, alpha, facets, inside));
     coats.push(coat.clone());
     coat
 }

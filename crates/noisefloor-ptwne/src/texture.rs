@@ -42,8 +42,8 @@ pub enum Texture {
     /// An image.
     Image(ImageTexture),
     /// The colours of the mesh's corners ([`Mesh::colours`](crate::Mesh::colours)), interpolated, times a texture
-    /// if there is one. Only for the colour of a material: anywhere else, and on surfaces without such colours,
-    /// corners are white.
+    /// if there is one. Only for the colour of a material and the share of a mix: anywhere else, and on surfaces
+    /// without such colours, corners are white.
     Corners(Option<Box<Texture>>),
 }
 

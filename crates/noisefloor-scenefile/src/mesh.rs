@@ -7,9 +7,10 @@ pub(crate) mod solids;
 pub(crate) mod subdivide;
 
 use crate::error::{LoadError, Place};
-use glam::{DMat3, DMat4, DVec3, Vec3};
+use glam::{DMat3, DMat4, DVec3, Vec2, Vec3};
+use noisefloor_ptwne::{Emission, MIN_AREA, MaterialId, Mesh, SceneBuilder, SceneError};
 
-/// Indexed triangles. Normals and texture coordinates are one a position, or none.
+/// Indexed triangles. Normals, texture coordinates and colours are one a position, or none.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Triangles {
     /// Corners.
@@ -18,6 +19,10 @@ pub(crate) struct Triangles {
     pub(crate) normals: Vec<[f32; 3]>,
     /// Texture coordinates.
     pub(crate) uvs: Vec<[f32; 2]>,
+    /// Colours; none but of meshes that were asked for them.
+    pub(crate) colours: Vec<[f32; 3]>,
+    /// Colours of the triangles, or none.
+    pub(crate) face_colours: Vec<[f32; 3]>,
     /// Corners of each triangle; the front is where they run counter-clockwise.
     pub(crate) indices: Vec<[u32; 3]>,
 }
@@ -99,6 +104,77 @@ impl Triangles {
         }
     }
 
+    /// Gives each triangle corners of its own, and those the colour of the triangle.
+    pub(crate) fn spread_face_colours(&mut self) {
+        if self.face_colours.is_empty() {
+            return;
+        }
+        let corners = self.indices.as_flattened();
+        let spread = |rows: &[[f32; 3]]| -> Vec<[f32; 3]> {
+            if rows.is_empty() { vec![] } else { corners.iter().map(|i| rows[*i as usize]).collect() }
+        };
+        let (positions, normals) = (spread(&self.positions), spread(&self.normals));
+        if !self.uvs.is_empty() {
+            self.uvs = corners.iter().map(|i| self.uvs[*i as usize]).collect();
+        }
+        self.colours = self.face_colours.iter().flat_map(|colour| [*colour; 3]).collect();
+        self.indices = (0..self.indices.len() as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+        (self.positions, self.normals) = (positions, normals);
+    }
+
+    /// Adds it to a scene: as a parallelogram, which is one light, or as triangles. Returns how many of them have no
+    /// area and are left out.
+    pub(crate) fn add_to(
+        &self,
+        builder: &mut SceneBuilder,
+        material: MaterialId,
+        emission: Option<Emission>,
+    ) -> Result<usize, SceneError> {
+        if let Some(Parallelogram { corner, edges, uvs }) = self.parallelogram() {
+            builder.mapped_parallelogram(corner, edges, uvs, material, emission)?;
+            return Ok(0);
+        }
+        let Self { positions, normals, uvs, colours, indices, .. } = self;
+        builder.mesh(&Mesh { positions, normals, uvs, colours, indices }, material, emission)
+    }
+
+    /// The parallelogram of one colour that the mesh consists of, as two flat triangles.
+    fn parallelogram(&self) -> Option<Parallelogram> {
+        let [first, second] = self.indices.as_slice() else { return None };
+        if !self.colours.is_empty() {
+            return None;
+        }
+        let at = |i: u32| Vec3::from_array(self.positions[i as usize]);
+        // Turned so that they are (a, b, c) and (a, c, d)
+        let turned = |by: usize, corners: &[u32; 3]| [0, 1, 2].map(|k| corners[(k + by) % 3]);
+        let mut turns = (0..9).map(|i| [turned(i / 3, first), turned(i % 3, second)]);
+        let [one, two] = turns.find(|[one, two]| at(one[0]) == at(two[0]) && at(one[2]) == at(two[1]))?;
+        let [a, b, c, d] = [one[0], one[1], one[2], two[2]];
+        let edges = [at(b) - at(a), at(d) - at(a)];
+        let cross = edges[0].cross(edges[1]);
+        let even = (at(c) - at(b) - edges[1]).length() <= 1e-5 * (edges[0].length() + edges[1].length());
+
+        // Flat, and its texture is stretched evenly
+        let along = |i: &u32| {
+            let normal = self.normals.get(*i as usize).map_or(cross, |n| Vec3::from_array(*n));
+            normal.normalize_or_zero().dot(cross.normalize_or_zero()) > 0.9999
+        };
+        let uv = |i: u32| self.uvs.get(i as usize).map(|uv| Vec2::from_array(*uv));
+        let uvs = match [a, b, d].map(uv) {
+            [Some(a), Some(b), Some(d)] => [a, b, d],
+            _ => [Vec2::ZERO, Vec2::X, Vec2::Y],
+        };
+        let mapped = |i: u32, want: Vec2| uv(i).is_none_or(|uv| (uv - want).length() <= 1e-5);
+        let stretched = mapped(c, uvs[1] + uvs[2] - uvs[0]) && mapped(two[0], uvs[0]);
+        let whole =
+            even && stretched && first.iter().chain(second).all(along) && cross.length() > 2.0 * MIN_AREA;
+        whole.then(|| Parallelogram {
+            corner: at(a).to_array(),
+            edges: edges.map(|edge| edge.to_array()),
+            uvs: uvs.map(|uv| uv.to_array()),
+        })
+    }
+
     /// Exchanges front and back.
     pub(crate) fn flip(&mut self) {
         for normal in &mut self.normals {
@@ -108,6 +184,15 @@ impl Triangles {
             triangle.swap(1, 2);
         }
     }
+}
+
+/// A corner, the two edges from there, whose cross product points to the front, and the texture coordinates of the
+/// corner and of the edges' ends.
+#[derive(Debug, PartialEq)]
+struct Parallelogram {
+    corner: [f32; 3],
+    edges: [[f32; 3]; 2],
+    uvs: [[f32; 2]; 3],
 }
 
 /// The matrix that takes normals along: the inverse transpose of the upper left 3×3, but for a positive
@@ -168,6 +253,50 @@ mod tests {
         assert!(
             (b - a).cross(c - a).dot(normal) < 0.0 && Vec3::from_array(mesh.normals[0]).dot(normal) < 0.0
         );
+    }
+
+    #[test]
+    fn two_triangles_are_a_parallelogram() {
+        let positions = vec![[0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [3.0, 1.0, 0.0], [1.0, 1.0, 0.0]];
+        let flat = Triangles { positions, ..Triangles::default() };
+        for indices in [[[0, 1, 2], [0, 2, 3]], [[2, 0, 1], [3, 0, 2]], [[1, 2, 3], [3, 0, 1]]] {
+            let mesh = Triangles { indices: indices.to_vec(), ..flat.clone() };
+            let found = mesh.parallelogram().unwrap();
+            let (a, [e1, e2]) = (Vec3::from_array(found.corner), found.edges.map(Vec3::from_array));
+            assert!((e1.cross(e2) - Vec3::new(0.0, 0.0, 2.0)).length() < 1e-6, "{indices:?}");
+            let middle = a + 0.5 * (e1 + e2);
+            assert!((middle - Vec3::new(1.5, 0.5, 0.0)).length() < 1e-6, "{indices:?}");
+        }
+        // Fronts on different sides, a bend, a trapezium, smooth normals
+        let odd = Triangles { indices: vec![[0, 1, 2], [0, 3, 2]], ..flat.clone() };
+        assert_eq!(odd.parallelogram(), None);
+        let square = Triangles { indices: vec![[0, 1, 2], [0, 2, 3]], ..flat };
+        for moved in [[1.0, 1.0, 0.5], [1.5, 1.0, 0.0]] {
+            let mut odd = square.clone();
+            odd.positions[3] = moved;
+            assert_eq!(odd.parallelogram(), None);
+        }
+        let mut smooth = square.clone();
+        smooth.normals = vec![[0.0, 0.0, 1.0], [0.0, 0.0, 1.0], [0.1, 0.0, 1.0], [0.0, 0.0, 1.0]];
+        assert_eq!(smooth.parallelogram(), None);
+        // A texture that is stretched evenly, and one that is not
+        let mut mapped = square.clone();
+        mapped.uvs = vec![[0.0, 0.0], [1.0, 0.0], [1.5, 1.0], [0.5, 1.0]];
+        assert_eq!(mapped.parallelogram().unwrap().uvs, [[0.0, 0.0], [1.0, 0.0], [0.5, 1.0]]);
+        mapped.uvs[2] = [1.0, 1.0];
+        assert_eq!(mapped.parallelogram(), None);
+        assert_eq!(bent().parallelogram(), None);
+    }
+
+    #[test]
+    fn colours_of_faces_have_corners_of_their_own() {
+        let mut mesh = bent();
+        mesh.smooth();
+        mesh.face_colours = vec![[0.1; 3], [0.9; 3]];
+        mesh.spread_face_colours();
+        assert_eq!((mesh.indices.as_slice(), mesh.positions.len()), ([[0, 1, 2], [3, 4, 5]].as_slice(), 6));
+        assert_eq!((mesh.colours[2], mesh.colours[3]), ([0.1; 3], [0.9; 3]));
+        assert_eq!((mesh.positions[3], mesh.normals[3]), (bent().positions[1], mesh.normals[1]));
     }
 
     #[test]

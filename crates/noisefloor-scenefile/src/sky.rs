@@ -26,7 +26,7 @@ pub(crate) struct ClearSky {
     pub(crate) albedo: Rgb,
     /// Factors on the radiance of the sky and of the sun; 0 leaves one out.
     pub(crate) scales: [f64; 2],
-    /// Apparent diameter of the sun in degrees. Its radiance does not depend on it.
+    /// Apparent diameter of the sun in degrees. Its light in all does not depend on it.
     pub(crate) sun_diameter: f64,
 }
 
@@ -74,7 +74,8 @@ impl ClearSky {
         let reach = radius.max(std::f64::consts::PI / HEIGHT as f64).cos();
         let covered: Vec<usize> = (0..pixels.len()).filter(|i| direction(*i).dot(sun) >= reach).collect();
         let area: f64 = covered.iter().map(|i| solid_angle(*i)).sum();
-        let disk = std::f64::consts::TAU * (1.0 - radius.cos());
+        // The light of a sun of its natural size, as in all versions of Mitsuba
+        let disk = std::f64::consts::TAU * (1.0 - (0.5 * SUN_DIAMETER).to_radians().cos());
         let radiance = sun_radiance(elevation, self.turbidity);
         for index in covered {
             for (value, sun) in pixels[index].iter_mut().zip(radiance) {
@@ -175,6 +176,11 @@ mod tests {
         let disk = std::f64::consts::TAU * (1.0 - (0.5 * SUN_DIAMETER).to_radians().cos());
         assert!((flux / (18_034.7 * disk) - 1.0).abs() < 0.02, "{flux}");
         assert!(look(&map, DVec3::new(0.0, 0.6, 0.8))[1] > 1000.0);
+        // A larger sun gives off as much
+        let large = ClearSky { sun_diameter: 4.0 * SUN_DIAMETER, ..sky([0.0, 1.0]) };
+        let map = large.map(DMat3::IDENTITY).unwrap();
+        let spread: f64 = map.pixels.iter().enumerate().map(|(i, p)| f64::from(p[1]) * solid_angle(i)).sum();
+        assert!((spread / flux - 1.0).abs() < 1e-3, "{spread} {flux}");
     }
 
     #[test]

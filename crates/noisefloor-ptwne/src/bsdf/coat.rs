@@ -1,7 +1,7 @@
 //! Dielectric coats over a diffuse base: how much light they let through, in tables.
 
 use super::fresnel::{fresnel, refract};
-use super::ggx::{Ggx, MIN_ROUGHNESS};
+use super::ggx::{Facets, Ggx, MIN_ROUGHNESS};
 use crate::math::Vec3;
 use std::f32::consts::FRAC_1_PI;
 
@@ -9,8 +9,9 @@ use std::f32::consts::FRAC_1_PI;
 #[derive(Clone, Debug)]
 pub(crate) struct Coat {
     pub(crate) ior: f32,
-    /// GGX α; `None` if it varies.
+    /// α; `None` if it varies.
     alpha: Option<f32>,
+    facets: Facets,
     interior: Interior,
     rows: Vec<Row>,
 }
@@ -42,19 +43,18 @@ const ALPHAS: usize = 24;
 
 impl Coat {
     /// A coat with index of refraction `ior` and roughness `alpha`, or any roughness if that is `None`.
-    pub(crate) fn new(ior: f32, alpha: Option<f32>, interior: Interior) -> Self {
+    pub(crate) fn new(ior: f32, alpha: Option<f32>, facets: Facets, interior: Interior) -> Self {
+        let row = |alpha: f32| Row::new(ior, Ggx::of(alpha, facets), interior);
         let rows = match alpha {
-            Some(alpha) => vec![Row::new(ior, alpha, interior)],
-            None => {
-                (0..=ALPHAS).map(|i| Row::new(ior, (i as f32 / ALPHAS as f32).powi(2), interior)).collect()
-            }
+            Some(alpha) => vec![row(alpha)],
+            None => (0..=ALPHAS).map(|i| row((i as f32 / ALPHAS as f32).powi(2))).collect(),
         };
-        Self { ior, alpha, interior, rows }
+        Self { ior, alpha, facets, interior, rows }
     }
 
     /// Whether [`Coat::new`] would make the same coat.
-    pub(crate) fn is_for(&self, ior: f32, alpha: Option<f32>, interior: Interior) -> bool {
-        (self.ior, self.alpha, self.interior) == (ior, alpha, interior)
+    pub(crate) fn is_for(&self, ior: f32, alpha: Option<f32>, facets: Facets, interior: Interior) -> bool {
+        (self.ior, self.alpha, self.facets, self.interior) == (ior, alpha, facets, interior)
     }
 
     /// Interpolates a value of the rows at `alpha`.
@@ -90,12 +90,12 @@ impl Coat {
 }
 
 impl Row {
-    fn new(ior: f32, alpha: f32, interior: Interior) -> Self {
+    fn new(ior: f32, ggx: Ggx, interior: Interior) -> Self {
         let at: [f32; STEPS + 1] = std::array::from_fn(|i| {
             let cos = (i as f32 / STEPS as f32).powi(2);
             match interior {
-                Interior::Conserving => 1.0 - reflectance(ior, alpha, cos),
-                Interior::SingleScattering => single_scattering(ior, alpha, cos)[1],
+                Interior::Conserving => 1.0 - reflectance(ior, ggx, cos),
+                Interior::SingleScattering => single_scattering(ior, ggx, cos)[1],
             }
         });
         let inside = match interior {
@@ -103,7 +103,7 @@ impl Row {
                 1.0 - mean(|s| f64::from(at[(s * STEPS as f64).round() as usize])) / f64::from(ior * ior)
             }
             Interior::SingleScattering => {
-                mean(|s| f64::from(single_scattering(1.0 / ior, alpha, (s * s) as f32)[0]))
+                mean(|s| f64::from(single_scattering(1.0 / ior, ggx, (s * s) as f32)[0]))
             }
         };
         Self { at, inside: inside as f32 }
@@ -122,11 +122,11 @@ fn mean(f: impl Fn(f64) -> f64) -> f64 {
 }
 
 /// Share of the light from a direction that microfacets reflect: the mean of F·G₂/G₁ over visible normals.
-fn reflectance(eta: f32, alpha: f32, cos: f32) -> f32 {
-    if alpha < MIN_ROUGHNESS {
+fn reflectance(eta: f32, ggx: Ggx, cos: f32) -> f32 {
+    if ggx.alpha < MIN_ROUGHNESS {
         return fresnel(cos, eta).0;
     }
-    let [reflected] = over_facets(alpha, cos, |ggx, wo, u| {
+    let [reflected] = over_facets(cos, |wo, u| {
         let (_, weight, cos_h) = ggx.sample(wo, u);
         [weight * fresnel(cos_h, eta).0]
     });
@@ -136,8 +136,8 @@ fn reflectance(eta: f32, alpha: f32, cos: f32) -> f32 {
 /// Shares of the light from a direction that a rough boundary reflects and transmits in a single scattering
 /// event, masked by [`Ggx::lambda`] of the new direction only (Walter et al. 2007, §5): the means of F·G₁ and
 /// (1 − F)·G₁ over visible normals.
-fn single_scattering(eta: f32, alpha: f32, cos: f32) -> [f32; 2] {
-    over_facets(alpha, cos, |ggx, wo, u| {
+fn single_scattering(eta: f32, ggx: Ggx, cos: f32) -> [f32; 2] {
+    over_facets(cos, |wo, u| {
         let h = ggx.visible_normal(wo, u);
         let cos_h = wo.dot(h);
         let (reflectance, cos_t) = fresnel(cos_h.clamp(0.0, 1.0), eta);
@@ -152,18 +152,14 @@ fn single_scattering(eta: f32, alpha: f32, cos: f32) -> [f32; 2] {
 }
 
 /// The mean of `f` over a grid of the numbers that choose a facet.
-fn over_facets<const N: usize>(
-    alpha: f32,
-    cos: f32,
-    f: impl Fn(Ggx, Vec3, [f32; 2]) -> [f32; N],
-) -> [f32; N] {
+fn over_facets<const N: usize>(cos: f32, f: impl Fn(Vec3, [f32; 2]) -> [f32; N]) -> [f32; N] {
     const SIDE: u32 = 24;
     let cos = cos.max(1e-3);
     let wo = Vec3::new((1.0 - cos * cos).sqrt(), 0.0, cos);
     let point = |i: u32| (i as f32 + 0.5) / SIDE as f32;
     let mut sums = [0.0; N];
     for i in 0..SIDE * SIDE {
-        for (sum, value) in sums.iter_mut().zip(f(Ggx::new(alpha), wo, [point(i % SIDE), point(i / SIDE)])) {
+        for (sum, value) in sums.iter_mut().zip(f(wo, [point(i % SIDE), point(i / SIDE)])) {
             *sum += f64::from(value);
         }
     }

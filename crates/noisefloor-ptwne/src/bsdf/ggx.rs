@@ -1,5 +1,6 @@
 //! Microfacets: GGX and Beckmann.
 
+use super::beckmann;
 use crate::math::{self, Vec3};
 use std::f32::consts::FRAC_1_PI;
 
@@ -77,26 +78,10 @@ impl Ggx {
         }
     }
 
-    /// Density of the normals that [`Ggx::normal`] samples.
+    /// Density of the normals that [`Ggx::visible_normal`] samples.
     #[inline]
     pub(super) fn normal_pdf(self, wo: Vec3, h: Vec3) -> f32 {
-        match self.facets {
-            Facets::BeckmannUncorrelated => self.d(h) * h.z,
-            _ => self.d(h) * wo.dot(h).max(0.0) / (wo.z * (1.0 + self.lambda(wo))),
-        }
-    }
-
-    /// A normal: one of GGX's that `wo` sees, or any of Beckmann's.
-    #[inline]
-    pub(super) fn normal(self, wo: Vec3, u: [f32; 2]) -> Vec3 {
-        if self.facets != Facets::BeckmannUncorrelated {
-            return self.visible_normal(wo, u);
-        }
-        let tan2 = -self.alpha * self.alpha * (1.0 - u[0]).max(1e-20).ln();
-        let z = (1.0 / (1.0 + tan2)).sqrt();
-        let r = (1.0 - z * z).max(0.0).sqrt();
-        let (sin, cos) = math::turn(u[1]);
-        Vec3::new(r * cos, r * sin, z)
+        self.d(h) * wo.dot(h).max(0.0) / (wo.z * (1.0 + self.lambda(wo)))
     }
 
     /// f·cos θᵢ without the Fresnel term, the density of [`Ggx::sample`], and the half vector's cosine with
@@ -108,19 +93,19 @@ impl Ggx {
         }
         let h = (wo + wi).normalize();
         let (d, lo, li) = (self.d(h), self.lambda(wo), self.lambda(wi));
-        let (base, cos_h) = (d / (4.0 * wo.z), wo.dot(h).max(0.0));
-        let density = match self.facets {
-            Facets::BeckmannUncorrelated => d * h.z / (4.0 * cos_h).max(1e-12),
-            _ => base / (1.0 + lo),
-        };
-        (base * self.g2(lo, li), density, cos_h)
+        let base = d / (4.0 * wo.z);
+        (base * self.g2(lo, li), base / (1.0 + lo), wo.dot(h).max(0.0))
     }
 
-    /// A normal from the distribution of visible normals (Dupuy, Benyoub 2023).
+    /// A normal from the distribution of visible normals (Dupuy, Benyoub 2023; Beckmann's: Heitz, d'Eon 2014).
     #[inline]
     pub(super) fn visible_normal(self, wo: Vec3, u: [f32; 2]) -> Vec3 {
         // Stretch; a normal of the hemisphere is the sum of wo and a point of a spherical cap; stretch back
         let stretched = Vec3::new(wo.x * self.alpha, wo.y * self.alpha, wo.z).normalize();
+        if self.facets == Facets::BeckmannUncorrelated {
+            let [x, y] = beckmann::visible_slopes(stretched, u);
+            return Vec3::new(-x * self.alpha, -y * self.alpha, 1.0).normalize();
+        }
         let z = (1.0 - u[0]) * (1.0 + stretched.z) - stretched.z;
         let r = (1.0 - z * z).max(0.0).sqrt();
         let (sin, cos) = math::turn(u[1]);
@@ -128,21 +113,17 @@ impl Ggx {
         Vec3::new(c.x * self.alpha, c.y * self.alpha, c.z.max(1e-7)).normalize()
     }
 
-    /// A direction, reflected by a sampled normal; its weight f·cos θᵢ / density (of visible normals: G₂/G₁)
-    /// without the Fresnel term; and the half vector's cosine. Weight 0: nothing is reflected.
+    /// A direction, reflected by a visible normal; its weight f·cos θᵢ / density = G₂/G₁ without the Fresnel
+    /// term; and the half vector's cosine. Weight 0: nothing is reflected.
     #[inline]
     pub(crate) fn sample(self, wo: Vec3, u: [f32; 2]) -> (Vec3, f32, f32) {
-        let h = self.normal(wo, u);
+        let h = self.visible_normal(wo, u);
         let cos_h = wo.dot(h);
         let wi = h * (2.0 * cos_h) - wo;
         if wi.z <= 0.0 || cos_h <= 0.0 {
             return (wi, 0.0, 1.0);
         }
         let (lo, li) = (self.lambda(wo), self.lambda(wi));
-        let weight = match self.facets {
-            Facets::BeckmannUncorrelated => self.g2(lo, li) * cos_h / (wo.z * h.z),
-            _ => (1.0 + lo) * self.g2(lo, li),
-        };
-        (wi, weight, cos_h)
+        (wi, (1.0 + lo) * self.g2(lo, li), cos_h)
     }
 }

@@ -46,15 +46,16 @@ impl<'a> Glossy<'a> {
         coat: &'a Coat,
         diffuse: Vec3,
         specular: Vec3,
-        alpha: f32,
+        ggx: Ggx,
         nonlinear: bool,
         cos: f32,
     ) -> Self {
+        let alpha = ggx.alpha;
         let through = coat.transmittance(alpha, cos);
         let (reflected, inside) =
             ((1.0 - through) * math::luminance(specular), through * math::luminance(diffuse));
         Self {
-            ggx: Ggx::new(alpha),
+            ggx,
             fresnel: &Fresnel::None,
             metal: Vec3::ZERO,
             metal_share: 0.0,
@@ -67,7 +68,7 @@ impl<'a> Glossy<'a> {
     }
 
     pub(crate) fn blend(coat: &'a Coat, base: Vec3, alpha: f32, metallic: f32, cos: f32) -> Self {
-        let plastic = Self::plastic(coat, base, Vec3::ONE, alpha, true, cos);
+        let plastic = Self::plastic(coat, base, Vec3::ONE, Ggx::new(alpha), true, cos);
         let through = coat.transmittance(alpha, cos);
         let reflected = metallic * math::luminance(schlick(base, cos)) + (1.0 - metallic) * (1.0 - through);
         Self {

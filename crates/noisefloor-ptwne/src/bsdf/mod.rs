@@ -1,5 +1,6 @@
 //! How surfaces scatter light. Directions are local: the normal is +z, and both point away from the surface.
 
+mod beckmann;
 mod coat;
 mod fresnel;
 mod ggx;

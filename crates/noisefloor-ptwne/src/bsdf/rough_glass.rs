@@ -1,7 +1,7 @@
 //! A rough dielectric boundary (Walter et al. 2007).
 
 use super::fresnel::{fresnel, refract};
-use super::ggx::{Facets, Ggx};
+use super::ggx::Ggx;
 use crate::math::Vec3;
 
 /// Microfacets that reflect and refract, seen from one side. Radiance is that of paths, L/η².
@@ -15,8 +15,8 @@ pub(crate) struct RoughGlass {
 }
 
 impl RoughGlass {
-    pub(crate) fn new(alpha: f32, eta: f32, tint: Vec3) -> Self {
-        Self { ggx: Ggx::of(alpha, Facets::GgxUncorrelated), eta, tint }
+    pub(crate) fn new(ggx: Ggx, eta: f32, tint: Vec3) -> Self {
+        Self { ggx, eta, tint }
     }
 
     /// f·cos θᵢ, and the density of [`RoughGlass::sample`]. `wi` may lie on either side.
@@ -51,7 +51,7 @@ impl RoughGlass {
     /// A direction, its weight f·cos θᵢ / density, and its density; `None` if nothing is scattered.
     #[inline]
     pub(crate) fn sample(&self, wo: Vec3, [pick, u, v]: [f32; 3]) -> Option<(Vec3, Vec3, f32)> {
-        let h = self.ggx.normal(wo, [u, v]);
+        let h = self.ggx.visible_normal(wo, [u, v]);
         let cos_h = wo.dot(h);
         if wo.z <= 0.0 || cos_h <= 0.0 {
             return None;
@@ -72,13 +72,20 @@ impl RoughGlass {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::bsdf::Facets;
     use crate::math::sphere;
 
     /// The density integrates to the share of samples that scatter, and weights are f·cos / density.
     #[test]
     fn what_is_sampled_is_what_is_evaluated() {
-        for (alpha, eta, cos) in [(0.3f32, 1.5f32, 0.8f32), (0.5, 1.0 / 1.5, 0.9), (0.2, 1.33, 0.4)] {
-            let glass = RoughGlass::new(alpha, eta, Vec3::splat(0.8));
+        let (ggx, beckmann) = (Facets::GgxUncorrelated, Facets::BeckmannUncorrelated);
+        for (facets, alpha, eta, cos) in [
+            (ggx, 0.3f32, 1.5f32, 0.8f32),
+            (ggx, 0.5, 1.0 / 1.5, 0.9),
+            (beckmann, 0.2, 1.33, 0.4),
+            (beckmann, 0.5, 1.0 / 1.5, 0.9),
+        ] {
+            let glass = RoughGlass::new(Ggx::of(alpha, facets), eta, Vec3::splat(0.8));
             let wo = Vec3::new((1.0 - cos * cos).sqrt(), 0.0, cos);
             let n = 400u32;
             let at = |i: u32| (i as f32 + 0.5) / n as f32;

@@ -8,9 +8,10 @@ use crate::checks::{MAX_COORDINATE, check_radiance, check_range, position};
 use crate::environment::{Environment, EnvironmentMap};
 use crate::error::SceneError;
 use crate::geometry::{Group, NO, RINGS, RINGS_REVERSED};
-use crate::light::{Light, Punctual};
+use crate::light::{Light, LightShape, Punctual};
 use crate::parts::{Parts, Surroundings};
 use crate::scene::Scene;
+use crate::texture::Texture;
 use glam::Vec3;
 use noisefloor::Rgb;
 use std::sync::Arc;
@@ -88,6 +89,22 @@ impl SceneBuilder {
         Ok(())
     }
 
+    /// Adds a [`Punctual::Projector`] with its picture, whose channels are in 0…1; other lights without size
+    /// take no notice of the picture.
+    ///
+    /// # Errors
+    /// As [`SceneBuilder::punctual`]; and if the picture has the wrong number of pixels.
+    pub fn projector(&mut self, light: Punctual, picture: Texture) -> Result<(), SceneError> {
+        let mut light = Light::punctual(light)?;
+        if matches!(light.shape, LightShape::Projector { .. }) {
+            picture.check()?;
+            light.texture = index(self.parts.emission_textures.len())?;
+            self.parts.emission_textures.push(picture);
+        }
+        self.parts.lights.push(light);
+        Ok(())
+    }
+
     /// Adds the points `corner` + u·`e1` + v·`e2` for u, v in 0…1. Texture coordinates run along the edges in
     /// scene units, so that patterns have the same size on all parallelograms.
     ///
@@ -104,6 +121,25 @@ impl SceneBuilder {
     ) -> Result<(), SceneError> {
         let [corner, e1, e2] = [position(corner)?, position(e1)?, position(e2)?];
         let uvs = [[0.0, 0.0], [e1.length(), 0.0], [0.0, e2.length()]];
+        self.single(Shape::Planar { corner, e1, e2, whole: true }, Some(uvs), NO, material, emission)
+    }
+
+    /// As [`SceneBuilder::parallelogram`], with the texture coordinates of the corner and of the ends of its edges.
+    ///
+    /// # Errors
+    /// As [`SceneBuilder::parallelogram`].
+    pub fn mapped_parallelogram(
+        &mut self,
+        corner: [f32; 3],
+        [e1, e2]: [[f32; 3]; 2],
+        uvs: [[f32; 2]; 3],
+        material: MaterialId,
+        emission: Option<Emission>,
+    ) -> Result<(), SceneError> {
+        let [corner, e1, e2] = [position(corner)?, position(e1)?, position(e2)?];
+        if !uvs.iter().flatten().all(|x| x.is_finite()) {
+            return Err(SceneError::NotFinite { what: "a texture coordinate" });
+        }
         self.single(Shape::Planar { corner, e1, e2, whole: true }, Some(uvs), NO, material, emission)
     }
 

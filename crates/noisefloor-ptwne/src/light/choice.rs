@@ -161,7 +161,10 @@ impl FarLight {
             }
             LightShape::Map => (PI, None, 1.0),
             LightShape::Distant { towards } => (1.0, Some(towards), 0.0),
-            LightShape::Planar { .. } | LightShape::Sphere { .. } | LightShape::Point { .. } => return None,
+            LightShape::Planar { .. }
+            | LightShape::Sphere { .. }
+            | LightShape::Point { .. }
+            | LightShape::Projector { .. } => return None,
         };
         let irradiance = f64::from(math::luminance(emitter.radiance)) * f64::from(solid_angle) * scale;
         Some(Self { light, irradiance: irradiance as f32, dir, sin })

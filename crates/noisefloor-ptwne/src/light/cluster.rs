@@ -39,12 +39,17 @@ impl Cluster {
             LightShape::Sphere { centre, radius } => {
                 (centre, Vec3::splat(radius), radius, everywhere, PI * radius * radius)
             }
-            LightShape::Point { position, inner, .. } if inner < -1.0 => {
+            LightShape::Point { position, cone, .. } if cone.inner < -1.0 => {
                 (position, Vec3::ZERO, 0.0, everywhere, 1.0)
             }
-            LightShape::Point { position, axis, inner, outer } => {
-                let (inner, outer) = (inner.acos(), outer.acos());
+            LightShape::Point { position, axis, cone } => {
+                let (inner, outer) = (cone.inner.acos(), cone.outer.acos());
                 (position, Vec3::ZERO, 0.0, (axis, inner, outer - inner), 1.0)
+            }
+            LightShape::Projector { position, u, v, axis, .. } => {
+                // All directions up to the corners count alike
+                let corner = u.length_recip().hypot(v.length_recip()).atan();
+                (position, Vec3::ZERO, 0.0, (axis, corner, 0.02), 1.0)
             }
             LightShape::Sun { .. } | LightShape::Map | LightShape::Distant { .. } => return None,
         };

@@ -1,5 +1,6 @@
 //! One emitter, and samples of points on it.
 
+use super::punctual::Cone;
 use crate::accel::Shape;
 use crate::environment::Map;
 use crate::geometry::NO;
@@ -28,17 +29,33 @@ pub(crate) enum LightShape {
     },
     /// The environment map.
     Map,
-    /// A point that shines within `outer` of `axis`, given as cosines. Its radiance is its intensity.
+    /// A point that shines within a cone around `axis`. Its radiance is its intensity.
     Point {
         position: Vec3,
         axis: Vec3,
-        inner: f32,
-        outer: f32,
+        cone: Cone,
+    },
+    /// A point that projects its texture along `axis`. `u` and `v` are perpendicular to it, and one over the
+    /// tangents of the texture's half angles long. Its radiance is its intensity.
+    Projector {
+        position: Vec3,
+        u: Vec3,
+        v: Vec3,
+        axis: Vec3,
+        projection: Projection,
     },
     /// Light from one direction. Its radiance is the irradiance of a surface that faces it.
     Distant {
         towards: Vec3,
     },
+}
+
+/// How the intensity of a projector depends on the angle, besides its texture.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Projection {
+    /// As 1/cos³ θ.
+    EvenPlane,
+    Cone(Cone),
 }
 
 /// The part of a plane that shines.
@@ -75,7 +92,7 @@ pub(crate) struct LightSample {
     pub(crate) value: Vec3,
     /// That density; [`DELTA`] if scattered rays cannot hit the light.
     pub(crate) pdf: f32,
-    /// Coordinates along the edges of the surface.
+    /// Coordinates along the edges of the surface, or in the picture of a projector.
     pub(crate) uv: [f32; 2],
 }
 
@@ -129,7 +146,14 @@ impl Light {
             LightShape::Sphere { radius, .. } => 4.0 * PI * radius * radius * sides * PI,
             LightShape::Sun { one_minus_cos, .. } => 2.0 * PI * one_minus_cos * cross,
             LightShape::Map => 4.0 * PI * cross,
-            LightShape::Point { outer, .. } => 2.0 * PI * (1.0 - outer.max(-1.0)),
+            LightShape::Point { cone, .. } => 2.0 * PI * (1.0 - cone.outer.max(-1.0)),
+            LightShape::Projector { u, v, projection, .. } => {
+                let picture = 4.0 / (u.length() * v.length());
+                match projection {
+                    Projection::EvenPlane => picture,
+                    Projection::Cone(cone) => picture.min(2.0 * PI * (1.0 - cone.outer.max(0.0))),
+                }
+            }
             LightShape::Distant { .. } => cross,
         };
         math::luminance(self.radiance * texture) * area
@@ -171,15 +195,22 @@ impl Light {
                 let (dir, pdf) = map?.sample(u, more)?;
                 Some(LightSample::far(dir, pdf))
             }
-            LightShape::Point { position, axis, inner, outer } => {
+            LightShape::Point { position, axis, cone } => {
                 let to = position - from;
-                let d2 = to.length_squared();
-                let distance = d2.sqrt();
-                let dir = to / distance;
-                let fade = ((-dir.dot(axis) - outer) / (inner - outer)).clamp(0.0, 1.0);
-                let value = self.radiance * (fade * fade / d2);
-                let sample = LightSample { dir, distance, value, pdf: DELTA, uv: u };
-                (distance > 0.0 && fade > 0.0).then_some(sample)
+                let fade = cone.fade(-to.dot(axis) / to.length());
+                self.point_sample(to, fade, u)
+            }
+            LightShape::Projector { position, u, v, axis, projection } => {
+                let to = position - from;
+                let depth = -to.dot(axis);
+                let [a, b] = [u, v].map(|edge| 0.5 - 0.5 * to.dot(edge) / depth);
+                let inside = depth > 0.0 && (0.0..=1.0).contains(&a) && (0.0..=1.0).contains(&b);
+                let cos = depth / to.length();
+                let fade = match projection {
+                    Projection::EvenPlane => 1.0 / (cos * cos * cos),
+                    Projection::Cone(cone) => cone.fade(cos),
+                };
+                if inside { self.point_sample(to, fade, [a, b]) } else { None }
             }
             LightShape::Distant { towards } => Some(LightSample {
                 dir: towards,
@@ -189,6 +220,16 @@ impl Light {
                 uv: u,
             }),
         }
+    }
+
+    /// A point without size in the direction `to`, whose intensity is multiplied by `fade`.
+    #[inline]
+    fn point_sample(&self, to: Vec3, fade: f32, uv: [f32; 2]) -> Option<LightSample> {
+        let d2 = to.length_squared();
+        let distance = d2.sqrt();
+        let (dir, value) = (to / distance, self.radiance * (fade / d2));
+        let sample = LightSample { dir, distance, value, pdf: DELTA, uv };
+        (distance > 0.0 && fade > 0.0).then_some(sample)
     }
 
     /// From outside a sphere: uniform in the cone that it subtends (Shirley et al. 1996).
@@ -253,7 +294,10 @@ impl Light {
             }
             LightShape::Sun { one_minus_cos, .. } => math::cone_pdf(one_minus_cos),
             // Rays never hit these
-            LightShape::Map | LightShape::Point { .. } | LightShape::Distant { .. } => 0.0,
+            LightShape::Map
+            | LightShape::Point { .. }
+            | LightShape::Projector { .. }
+            | LightShape::Distant { .. } => 0.0,
         }
     }
 
@@ -262,7 +306,8 @@ impl Light {
         match &mut self.shape {
             LightShape::Planar { corner: at, .. }
             | LightShape::Sphere { centre: at, .. }
-            | LightShape::Point { position: at, .. } => *at += by,
+            | LightShape::Point { position: at, .. }
+            | LightShape::Projector { position: at, .. } => *at += by,
             LightShape::Sun { .. } | LightShape::Map | LightShape::Distant { .. } => {}
         }
     }

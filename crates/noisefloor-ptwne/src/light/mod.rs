@@ -13,5 +13,5 @@ mod tests;
 
 pub(crate) use choice::Lights;
 pub(crate) use emitter::{Light, LightSample, LightShape};
-pub use punctual::Punctual;
+pub use punctual::{Falloff, Profile, Punctual};
 pub(crate) use receiver::Receiver;

@@ -2,7 +2,7 @@
 
 use super::choice::Lights;
 use super::emitter::Light;
-use super::punctual::Punctual;
+use super::punctual::{Falloff, Punctual};
 use super::receiver::Receiver;
 use crate::accel::Shape;
 use crate::math::{self, Vec3};
@@ -45,7 +45,14 @@ impl Draw {
             _ => {
                 let direction = self.direction().to_array();
                 let (inner, outer) = (10.0, 10.0 + 80.0 * self.0.one());
-                let spot = Punctual::Spot { position, direction, intensity, inner, outer };
+                let spot = Punctual::Spot {
+                    position,
+                    direction,
+                    intensity,
+                    inner,
+                    outer,
+                    falloff: Falloff::Squared,
+                };
                 return Light::punctual(spot).unwrap();
             }
         };

@@ -7,7 +7,7 @@ use crate::{LoadError, Place};
 use gltf::json::Index;
 use gltf::json::extensions::scene::khr_lights_punctual::{Light, Type};
 use gltf::json::validation::Checked;
-use noisefloor_ptwne::{Punctual, SceneBuilder};
+use noisefloor_ptwne::{Falloff, Punctual, SceneBuilder};
 
 /// Adds the light of a node. Candela become units of radiant intensity, and lux of irradiance, by their
 /// numbers, as nits of emissive materials become units of radiance.
@@ -33,7 +33,8 @@ pub(super) fn add(
             let [inner, outer] = [spot.inner_cone_angle, spot.outer_cone_angle].map(f32::to_degrees);
             // Exporters write equal angles for a hard edge
             let inner = inner.min(0.999 * outer);
-            Punctual::Spot { position, direction, intensity: power, inner, outer }
+            let falloff = Falloff::Squared;
+            Punctual::Spot { position, direction, intensity: power, inner, outer, falloff }
         }
         _ => return Err(place.bad("it is not a point, directional or spot light with its properties")),
     };

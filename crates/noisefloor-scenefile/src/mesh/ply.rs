@@ -1,21 +1,33 @@
-//! PLY, text and binary: positions, normals, texture coordinates and faces; all else is left out.
+//! PLY, text and binary: positions, normals, texture coordinates, faces and one attribute; all else is left out.
 
 use super::Triangles;
 use crate::error::{LoadError, Place};
 use ply_rs_bw::parser::{Parser, Reader};
 use ply_rs_bw::ply::{
-    ElementDef, Encoding, Property, PropertyAccess, PropertyAccessResult, PropertyType, ScalarType,
+    ElementDef, Encoding, KeyMap, Property, PropertyAccess, PropertyAccessResult, PropertyType, ScalarType,
 };
 use std::path::Path;
 
 /// Most characters of a message of the parser that are passed on.
 const MAX_MESSAGE: usize = 200;
 
+/// Names of the properties that hold the attribute that is asked for: no file has a space in a name.
+const ATTRIBUTE: [&str; 3] = ["attribute 0", "attribute 1", "attribute 2"];
+
 /// Reads the PLY file `bytes`, which came from `path`. Polygons become fans.
 ///
 /// # Errors
 /// [`LoadError::Bad`] if the file is cut short or corrupt, or its header asks for more than the file holds.
 pub(crate) fn parse(bytes: &[u8], path: &Path) -> Result<Triangles, LoadError> {
+    parse_with(bytes, path, None)
+}
+
+/// As [`parse`], with the colours of an attribute as Mitsuba names it: `vertex_` or `face_` and the name of its
+/// properties without their numbers. One of a single number is grey.
+///
+/// # Errors
+/// As [`parse`]; and if the mesh has no such attribute.
+pub(crate) fn parse_with(bytes: &[u8], path: &Path, attribute: Option<&str>) -> Result<Triangles, LoadError> {
     let place = Place::file(path);
     // Its messages repeat whole lines, however long
     let bad = |e: ply_rs_bw::parser::ParseError| {
@@ -25,7 +37,7 @@ pub(crate) fn parse(bytes: &[u8], path: &Path) -> Result<Triangles, LoadError> {
     };
 
     let mut reader = Reader::new(bytes);
-    let header = Parser::<Skipped>::new().read_header(&mut reader).map_err(bad)?;
+    let mut header = Parser::<Skipped>::new().read_header(&mut reader).map_err(bad)?;
     // The parser makes as many elements as the header says, even of elements that take no bytes
     let needed = header.elements.iter().try_fold(0u64, |sum, (_, element)| {
         sum.checked_add(least_bytes(element, header.encoding).checked_mul(element.count as u64)?)
@@ -33,6 +45,15 @@ pub(crate) fn parse(bytes: &[u8], path: &Path) -> Result<Triangles, LoadError> {
     let empty = header.elements.iter().any(|(_, e)| e.properties.is_empty() && e.count > 0);
     if empty || needed.is_none_or(|needed| needed > bytes.len() as u64) {
         return Err(place.clone().bad("the header asks for more elements than the file holds"));
+    }
+
+    if let Some(attribute) = attribute {
+        let found = attribute.split_once('_').is_some_and(|(element, name)| {
+            header.elements.get_mut(element).is_some_and(|element| mark(element, name))
+        });
+        if !found {
+            return Err(place.clone().bad(format!("the mesh has no attribute `{attribute}`")));
+        }
     }
 
     let mut mesh = Triangles::default();
@@ -45,7 +66,7 @@ pub(crate) fn parse(bytes: &[u8], path: &Path) -> Result<Triangles, LoadError> {
             }
             "face" => {
                 let faces = Parser::<Face>::new().read_payload_for_element(&mut reader, element, &header);
-                add_faces(&mut mesh, &faces.map_err(bad)?, &place)?;
+                add_faces(&mut mesh, element, &faces.map_err(bad)?, &place)?;
             }
             _ => {
                 let skipped =
@@ -55,6 +76,32 @@ pub(crate) fn parse(bytes: &[u8], path: &Path) -> Result<Triangles, LoadError> {
         }
     }
     Ok(mesh)
+}
+
+/// Renames the properties of the attribute called `name` to [`ATTRIBUTE`]. Returns whether it has one number or
+/// three.
+fn mark(element: &mut ElementDef, name: &str) -> bool {
+    let colour = |property: &str| ["r", "g", "b"].iter().position(|c| name == "color" && *c == property);
+    let number = |property: &str| {
+        let number = property.strip_prefix(name)?.strip_prefix('_')?;
+        ["0", "1", "2"].iter().position(|n| *n == number)
+    };
+    let mut renamed = KeyMap::new();
+    for (_, mut property) in std::mem::take(&mut element.properties) {
+        if let Some(at) = number(&property.name).or_else(|| colour(&property.name)) {
+            ATTRIBUTE[at].clone_into(&mut property.name);
+        }
+        renamed.insert(property.name.clone(), property);
+    }
+    element.properties = renamed;
+    let has = |at: usize| element.properties.contains_key(ATTRIBUTE[at]);
+    has(0) && has(1) == has(2)
+}
+
+/// The attribute of something, if the element has it.
+fn colour(element: &ElementDef, values: [f32; 3]) -> Option<[f32; 3]> {
+    let has = |at: usize| element.properties.contains_key(ATTRIBUTE[at]);
+    has(0).then(|| if has(1) { values } else { [values[0]; 3] })
 }
 
 fn add_vertices(
@@ -74,10 +121,16 @@ fn add_vertices(
     if has(&["u", "v"]) || has(&["s", "t"]) {
         mesh.uvs.extend(vertices.iter().map(|v| v.uv));
     }
+    mesh.colours.extend(vertices.iter().filter_map(|v| colour(element, v.attribute)));
     Ok(())
 }
 
-fn add_faces(mesh: &mut Triangles, faces: &[Face], place: &Place) -> Result<(), LoadError> {
+fn add_faces(
+    mesh: &mut Triangles,
+    element: &ElementDef,
+    faces: &[Face],
+    place: &Place,
+) -> Result<(), LoadError> {
     for (index, face) in faces.iter().enumerate() {
         let Some(corners) = face.corners.as_deref().filter(|corners| corners.len() >= 3) else {
             let what = format!("face {index} has no `vertex_indices`, or fewer than 3");
@@ -85,6 +138,7 @@ fn add_faces(mesh: &mut Triangles, faces: &[Face], place: &Place) -> Result<(), 
         };
         for pair in corners[1..].windows(2) {
             mesh.indices.push([corners[0], pair[0], pair[1]]);
+            mesh.face_colours.extend(colour(element, face.attribute));
         }
     }
     Ok(())
@@ -117,6 +171,7 @@ struct Vertex {
     position: [f32; 3],
     normal: [f32; 3],
     uv: [f32; 2],
+    attribute: [f32; 3],
 }
 
 impl PropertyAccess for Vertex {
@@ -134,21 +189,29 @@ impl PropertyAccess for Vertex {
             "nz" => &mut self.normal[2],
             "u" | "s" => &mut self.uv[0],
             "v" | "t" => &mut self.uv[1],
-            _ => return PropertyAccessResult::Ignored,
+            _ => match ATTRIBUTE.iter().position(|attribute| *attribute == name) {
+                Some(at) => &mut self.attribute[at],
+                None => return PropertyAccessResult::Ignored,
+            },
         };
-        match value.to_f32_lossy() {
-            Some(value) => {
-                *slot = value;
-                PropertyAccessResult::Set
-            }
-            None => PropertyAccessResult::UnsupportedType,
+        set(slot, &value)
+    }
+}
+
+fn set(slot: &mut f32, value: &Property) -> PropertyAccessResult {
+    match value.to_f32_lossy() {
+        Some(value) => {
+            *slot = value;
+            PropertyAccessResult::Set
         }
+        None => PropertyAccessResult::UnsupportedType,
     }
 }
 
 #[derive(Default)]
 struct Face {
     corners: Option<Vec<u32>>,
+    attribute: [f32; 3],
 }
 
 impl PropertyAccess for Face {
@@ -157,6 +220,9 @@ impl PropertyAccess for Face {
     }
 
     fn set_property(&mut self, name: &str, value: Property) -> PropertyAccessResult {
+        if let Some(at) = ATTRIBUTE.iter().position(|attribute| *attribute == name) {
+            return set(&mut self.attribute[at], &value);
+        }
         if name != "vertex_indices" && name != "vertex_index" {
             return PropertyAccessResult::Ignored;
         }

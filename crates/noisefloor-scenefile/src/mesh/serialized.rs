@@ -110,6 +110,7 @@ impl Inflated<'_> {
                     .map(|row| [corner(&row[..4]), corner(&row[4..8]), corner(&row[8..])])
                     .collect()
             },
+            ..Triangles::default()
         };
         Ok((mesh, flags & FACE_NORMALS != 0))
     }

@@ -16,6 +16,7 @@ pub(crate) fn rectangle() -> Triangles {
         normals: vec![[0.0, 0.0, 1.0]; 4],
         uvs: corners.map(|corner| corner.map(|x| 0.5 * x + 0.5)).to_vec(),
         indices: vec![[0, 1, 2], [0, 2, 3]],
+        ..Triangles::default()
     }
 }
 

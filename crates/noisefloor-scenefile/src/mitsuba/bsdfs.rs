@@ -7,7 +7,7 @@ use super::xml::Element;
 use crate::colour::Quantity;
 use crate::error::LoadError;
 use noisefloor::Rgb;
-use noisefloor_ptwne::{Material, Relief, Texture};
+use noisefloor_ptwne::{Facets, Material, Relief, Texture};
 
 impl<'d> Context<'d> {
     /// A `bsdf`.
@@ -27,7 +27,10 @@ impl<'d> Context<'d> {
     fn of_kind(&self, element: &'d Element) -> Result<Surface, LoadError> {
         match element.kind() {
             "diffuse" | "roughdiffuse" => self.diffuse(element),
-            "plastic" | "roughplastic" | "pplastic" => self.plastic(element).map(Surface::one_sided),
+            "plastic" | "roughplastic" | "pplastic" => {
+                let facets = self.facets(element)?;
+                Ok(Surface { facets, ..Surface::one_sided(self.plastic(element)?) })
+            }
             "conductor" | "roughconductor" => {
                 let facets = self.facets(element)?;
                 Ok(Surface { facets, ..Surface::one_sided(self.conductor(element)?) })
@@ -90,7 +93,8 @@ impl<'d> Context<'d> {
         if surface.opacity.is_some() {
             return Err(self.unsupported(element, "a mask in a mask"));
         }
-        let opacity = self.luminance(element, self.factor(element, "opacity", 0.5)?)?;
+        let opacity = self.varying(element, self.factor(element, "opacity", 0.5)?)?;
+        let opacity = self.luminance(element, opacity)?;
         Ok(Surface { opacity: Some(opacity), ..surface })
     }
 
@@ -117,9 +121,9 @@ impl<'d> Context<'d> {
         let relief = if element.kind().starts_with("bump") {
             let scale = self.float(element, "scale")?.unwrap_or(1.0) as f32;
             let (peak, map) = self.image(texture, Quantity::Light)?;
-            Relief::Heights { map, scale: scale * peak }
+            Relief::Heights { map: self.varying(texture, map)?, scale: scale * peak }
         } else {
-            let (_, map) = self.image(texture, Quantity::Factor)?;
+            let map = self.varying(texture, self.image(texture, Quantity::Factor)?.1)?;
             Relief::Normals { map, scale: 1.0, mirrors: false }
         };
         Ok(Surface { relief: Some(relief), ..surface })
@@ -153,7 +157,7 @@ impl<'d> Context<'d> {
         let inside = self.surface(self.nested(element)?)?;
         let ior = self.relative_ior(element, "bk7")?;
         let specular = self.constant_factor(element, "specular_reflectance", 1.0)?;
-        element.ignore(&["distribution"]);
+        let facets = self.facets(element)?;
         let roughness = self.roughness(element, rough)?;
         match inside.body {
             Body::Plain(Material::Diffuse { albedo }) if ior > 1.0 => {
@@ -164,7 +168,7 @@ impl<'d> Context<'d> {
                     roughness,
                     nonlinear: true,
                 });
-                Ok(Surface { body, ..inside })
+                Ok(Surface { body, facets, ..inside })
             }
             _ => {
                 self.approximated(element, format!("the coat of {} is left out", element.species()));
@@ -187,7 +191,7 @@ impl<'d> Context<'d> {
         };
         self.approximated(
             element,
-            format!("{} is replaced by GGX microfacets on a diffuse base", element.species()),
+            format!("{} is replaced by Beckmann's microfacets on a diffuse base", element.species()),
         );
         let diffuse = self.factor(element, "diffuse_reflectance", 0.5)?;
         let specular = self.constant_factor(element, "specular_reflectance", 0.2)?;
@@ -218,7 +222,8 @@ impl<'d> Context<'d> {
         };
         let albedo = self.scaled(element, diffuse, scale / (1.0 - share).max(1e-6))?;
         let first = Surface::one_sided(Material::Diffuse { albedo });
-        Ok(Surface::blend(first, Surface::one_sided(glossy), Texture::Colour([share; 3])))
+        let glossy = Surface { facets: Facets::BeckmannUncorrelated, ..Surface::one_sided(glossy) };
+        Ok(Surface::blend(first, glossy, Texture::Colour([share; 3])))
     }
 
     /// Disney's principled surface (Burley 2012, 2015): its metal, gloss and glass.

@@ -1,9 +1,7 @@
 //! Emitters that are no shapes, and the light of those that are.
 
 use super::context::Context;
-use super::textures::mean;
 use super::xml::Element;
-use crate::colour::Quantity;
 use crate::error::LoadError;
 use crate::sky::{ClearSky, SUN_DIAMETER, TURBIDITIES};
 use glam::{DMat3, DVec3};
@@ -38,22 +36,8 @@ impl<'d> Context<'d> {
                 let intensity = self.plain_light(element, "intensity")?;
                 builder.punctual(Punctual::Point { position, intensity }).map_err(refused)?;
             }
-            "spot" => {
-                let (position, direction) = self.position_and_direction(element)?;
-                let mut intensity = self.plain_light(element, "intensity")?;
-                for texture in self.parts(element, "texture")? {
-                    self.approximated(texture, "the picture that a spot projects is replaced by its mean");
-                    let (peak, map) = self.image(texture, Quantity::Light)?;
-                    let mean = mean(&map).map(|c| c * peak);
-                    intensity = std::array::from_fn(|i| intensity[i] * mean[i]);
-                }
-                let outer = self.float(element, "cutoff_angle")?.unwrap_or(20.0);
-                let inner = self.float(element, "beam_width")?.unwrap_or(0.75 * outer);
-                self.approximated(element, "the spot fades towards its edge as those of glTF do");
-                let (inner, outer) = (inner as f32, outer as f32);
-                let spot = Punctual::Spot { position, direction, intensity, inner, outer };
-                builder.punctual(spot).map_err(refused)?;
-            }
+            "spot" => self.spot(element, builder)?,
+            "projector" => self.projector(element, builder)?,
             "directional" => {
                 let (_, direction) = self.position_and_direction(element)?;
                 let irradiance = self.plain_light(element, "irradiance")?;
@@ -84,7 +68,7 @@ impl<'d> Context<'d> {
     }
 
     /// Light that does not vary.
-    fn plain_light(&self, element: &'d Element, name: &str) -> Result<Rgb, LoadError> {
+    pub(super) fn plain_light(&self, element: &'d Element, name: &str) -> Result<Rgb, LoadError> {
         match self.light(element, name)? {
             (light, None) => Ok(light),
             _ => Err(self.unsupported(element, format!("a texture as `{name}`"))),
@@ -93,7 +77,10 @@ impl<'d> Context<'d> {
 
     /// Where an emitter stands and where it shines to: by `to_world` from 0 along +z, or by `position` and
     /// `direction`.
-    fn position_and_direction(&self, element: &'d Element) -> Result<([f32; 3], [f32; 3]), LoadError> {
+    pub(super) fn position_and_direction(
+        &self,
+        element: &'d Element,
+    ) -> Result<([f32; 3], [f32; 3]), LoadError> {
         let to_world = self.transform(element, "to_world")?;
         let position = self.point(element, "position")?.unwrap_or(to_world.w_axis.truncate());
         let direction = self.point(element, "direction")?.unwrap_or(to_world.z_axis.truncate());
@@ -105,7 +92,7 @@ impl<'d> Context<'d> {
         let number =
             |name: &str, missing: f64| Ok::<_, LoadError>(self.float(element, name)?.unwrap_or(missing));
         let scale = number("scale", 1.0)?;
-        let [sky, sun] = [number("sky_scale", 1.0)? * scale, number("sun_scale", 1.0)? * scale];
+        let [sky, sun] = [number("sky_scale", scale)?, number("sun_scale", scale)?];
         let scales = match element.kind() {
             "sky" => [sky, 0.0],
             "sun" => [0.0, sun],
@@ -125,7 +112,7 @@ impl<'d> Context<'d> {
         let sky = ClearSky {
             sun: up * self.sun_direction(element)?,
             turbidity: number("turbidity", 3.0)?.clamp(*TURBIDITIES.start(), *TURBIDITIES.end()),
-            albedo: self.constant_factor(element, "albedo", if self.document.old { 0.15 } else { 0.3 })?,
+            albedo: self.constant_factor(element, "albedo", if self.document.old { 0.2 } else { 0.3 })?,
             scales,
             sun_diameter,
         };

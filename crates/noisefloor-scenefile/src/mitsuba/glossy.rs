@@ -15,9 +15,6 @@ impl<'d> Context<'d> {
             self.approximated(element, "the polarisation of <bsdf type=\"pplastic\"> is left out");
         }
         let rough = element.kind() == "roughplastic" || element.has("alpha");
-        if rough && self.facets(element)? != Facets::GgxUncorrelated {
-            self.approximated(element, "the distribution `beckmann` is replaced by `ggx` of the same alpha");
-        }
         Ok(Material::Plastic {
             diffuse: self.factor(element, "diffuse_reflectance", 0.5)?,
             specular: self.constant_factor(element, "specular_reflectance", 1.0)?,
@@ -75,21 +72,17 @@ impl<'d> Context<'d> {
         }
         let tint = self.constant_factor(element, "specular_transmittance", 1.0)?;
         let ior = self.relative_ior(element, "bk7")?;
-        Ok(Surface::two_sided(match element.kind() {
+        let facets = self.facets(element)?;
+        let body = match element.kind() {
             "thindielectric" => Material::ThinGlass { ior, tint },
             // Mitsuba lets light through unbent
             _ if (ior - 1.0).abs() < 1e-6 => Material::ThinGlass { ior, tint },
             "roughdielectric" => {
-                if self.facets(element)? != Facets::GgxUncorrelated {
-                    self.approximated(
-                        element,
-                        "Beckmann's facets of a rough dielectric are replaced by GGX's",
-                    );
-                }
                 Material::RoughGlass { ior, tint, roughness: self.roughness(element, true)? }
             }
             _ => Material::Glass { ior, tint },
-        }))
+        };
+        Ok(Surface { facets, ..Surface::two_sided(body) })
     }
 
     /// The distribution of microfacets. Phong's is one of lobes, which Beckmann's comes close to.

@@ -5,12 +5,14 @@
 //! leaves. Each part of a scene has a module. The README lists what is read. Errors of shapes and emitters
 //! are collected, so that one load names all.
 
+mod attributes;
 mod bsdfs;
 mod colours;
 mod context;
 mod document;
 mod emitters;
 mod glossy;
+mod points;
 mod raster;
 mod sensor;
 mod shapes;

@@ -98,7 +98,7 @@ impl<'d> Context<'d> {
     }
 
     /// The field of view in degrees, and the edge that it spans.
-    fn field_of_view(&self, sensor: &'d Element) -> Result<(f64, FovAxis), LoadError> {
+    pub(super) fn field_of_view(&self, sensor: &'d Element) -> Result<(f64, FovAxis), LoadError> {
         let axis = self.string(sensor, "fov_axis")?.unwrap_or("x");
         let (fov, axis) = match (self.float(sensor, "fov")?, self.string(sensor, "focal_length")?) {
             (Some(fov), _) => (fov, axis),
@@ -141,8 +141,11 @@ impl<'d> Context<'d> {
                 return Ok(Some(2));
             }
             // Records more than light
-            "aov" | "moment" => {
+            "aov" | "moment" | "stokes" => {
                 integrator.irrelevant();
+                if integrator.kind() == "stokes" {
+                    self.approximated(integrator, "the polarisation of light is left out");
+                }
                 return match integrator.children.iter().find(|child| child.tag == "integrator") {
                     Some(inner) => self.max_depth(inner),
                     None => Ok(None),

@@ -7,7 +7,7 @@ use crate::error::{LoadError, Place};
 use crate::files::MAX_FILE_BYTES;
 use crate::mesh::{Triangles, normal_matrix, obj, ply, serialized, solids};
 use glam::{DMat3, DMat4, DQuat, DVec3};
-use noisefloor_ptwne::{Emission, MaterialId, MaterialOptions, Mesh, SceneBuilder};
+use noisefloor_ptwne::{Emission, MaterialId, MaterialOptions, SceneBuilder};
 use std::collections::HashMap;
 use std::rc::Rc;
 
@@ -208,6 +208,7 @@ impl<'d> Context<'d> {
         if polyhedron {
             mesh.normals.clear();
         }
+        mesh.spread_face_colours();
         Ok(mesh)
     }
 
@@ -219,9 +220,15 @@ impl<'d> Context<'d> {
             name.ok_or_else(|| self.bad(element, format!("{} needs a `filename`", element.species())))?;
         let path = self.document.folder.find(name, &place)?;
         let bytes = self.document.folder.read(&path, MAX_FILE_BYTES, &place)?;
-        let (mut mesh, flat) = match element.kind() {
-            "obj" => (obj::parse(&bytes, &path)?, false),
-            "ply" => (ply::parse(&bytes, &path)?, false),
+        let attribute = self.attribute_of(element)?;
+        let (mut mesh, flat) = match (element.kind(), &attribute) {
+            ("ply", Some(attribute)) => (self.coloured(element, &bytes, &path, attribute)?, false),
+            ("ply", None) => (ply::parse(&bytes, &path)?, false),
+            (_, Some(attribute)) => {
+                let what = format!("`{}` of a mesh that is no PLY", attribute.name);
+                return Err(self.unsupported(element, what));
+            }
+            ("obj", None) => (obj::parse(&bytes, &path)?, false),
             _ => {
                 let index = self.integer(element, "shape_index")?.unwrap_or(0);
                 let index =
@@ -244,15 +251,14 @@ impl<'d> Context<'d> {
         material: MaterialId,
         emission: Option<Emission>,
     ) -> Result<(), LoadError> {
-        let Triangles { positions, normals, uvs, indices } = mesh;
-        let mesh = Mesh { positions, normals, uvs, indices, ..Mesh::default() };
-        let left_out = filling.builder.mesh(&mesh, material, emission).map_err(self.refused(element))?;
-        if indices.is_empty() {
+        let added = mesh.add_to(&mut filling.builder, material, emission);
+        let left_out = added.map_err(self.refused(element))?;
+        if mesh.indices.is_empty() {
             self.ignored(element, "the mesh has no faces");
         }
         // The poles of our own spheres have none either
         if left_out > 0 && element.kind() != "sphere" {
-            let what = format!("{left_out} of {} faces have no area and are left out", indices.len());
+            let what = format!("{left_out} of {} faces have no area and are left out", mesh.indices.len());
             self.ignored(element, what);
         }
         Ok(())

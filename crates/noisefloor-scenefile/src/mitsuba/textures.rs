@@ -28,7 +28,7 @@ impl<'d> Context<'d> {
     ) -> Result<Rgb, LoadError> {
         if let Some(texture) = self.texture(object, name)? {
             self.approximated(texture, format!("the texture of `{name}` is replaced by its mean"));
-            return Ok(mean(&self.image(texture, Quantity::Factor)?.1));
+            return Ok(mean(&self.varying(texture, self.image(texture, Quantity::Factor)?.1)?));
         }
         let colour = self.colour(object, name, Quantity::Factor)?.unwrap_or([default; 3]);
         if colour.iter().any(|c| *c > 1.0) {
@@ -44,6 +44,7 @@ impl<'d> Context<'d> {
     pub(super) fn light(&self, object: &'d Element, name: &str) -> Result<(Rgb, Option<Texture>), LoadError> {
         if let Some(element) = self.texture(object, name)? {
             let (scale, texture) = self.image(element, Quantity::Light)?;
+            let texture = self.varying(element, texture)?;
             return Ok(([scale; 3], Some(texture)));
         }
         Ok((self.colour(object, name, Quantity::Light)?.unwrap_or([1.0; 3]), None))
@@ -74,6 +75,11 @@ impl<'d> Context<'d> {
             "bitmap" => self.bitmap(element, quantity)?,
             "checkerboard" => (1.0, self.checkerboard(element)?),
             "scale" => return self.scale(element, quantity),
+            // Read with the mesh
+            "mesh_attribute" => {
+                element.ignore(&["name", "scale"]);
+                return Ok((1.0, Texture::Corners(None)));
+            }
             "rawconstant" => {
                 // As a colour or as a vector
                 let vector = element.get("value").is_some_and(|value| value.tag == "vector");
@@ -88,6 +94,24 @@ impl<'d> Context<'d> {
             _ => return Err(self.unsupported(element, element.species())),
         };
         Ok((scale, Texture::Image(image)))
+    }
+
+    /// The colours of corners times a factor of at most 1.
+    fn tinted_corners(&self, element: &Element, texture: Texture, factor: Rgb) -> Result<Texture, LoadError> {
+        match texture {
+            Texture::Corners(None) if factor.iter().all(|f| *f <= 1.0) => {
+                Ok(Texture::Corners(Some(Box::new(Texture::Colour(factor)))))
+            }
+            _ => Err(self.unsupported(element, "a factor on an attribute of a mesh")),
+        }
+    }
+
+    /// A texture where colours of corners do not count, which is an error of those.
+    pub(super) fn varying(&self, element: &Element, texture: Texture) -> Result<Texture, LoadError> {
+        match texture {
+            Texture::Corners(_) => Err(self.unsupported(element, "an attribute of a mesh as this parameter")),
+            other => Ok(other),
+        }
     }
 
     /// A texture times a number, of Mitsuba 0.6.
@@ -110,8 +134,7 @@ impl<'d> Context<'d> {
         let texture = match texture {
             Texture::Colour(colour) => Texture::Colour(tint(colour)),
             Texture::Image(image) => Texture::Image(ImageTexture { factor: tint(image.factor), ..image }),
-            // This reader makes no others
-            other => other,
+            other => self.tinted_corners(element, other, tint([1.0; 3]))?,
         };
         Ok((scale * over, texture))
     }
@@ -134,8 +157,7 @@ impl<'d> Context<'d> {
                 let pixels = Pixels::Float(linear(&image.pixels).into_iter().map(larger).collect());
                 Texture::Image(ImageTexture { pixels, factor: [1.0; 3], ..image })
             }
-            // This reader makes no others
-            other => other,
+            other => self.tinted_corners(element, other, [scale; 3])?,
         })
     }
 

@@ -7,7 +7,7 @@ use crate::error::LoadError;
 use crate::picture::{self, Samples};
 use glam::{DMat3, DVec3};
 use noisefloor::{Rgb, srgb_decode};
-use noisefloor_ptwne::{Emission, Environment, Punctual};
+use noisefloor_ptwne::{Emission, Environment, Falloff, Punctual};
 
 impl Reader<'_> {
     /// Adds a `LightSource`.
@@ -40,10 +40,11 @@ impl Reader<'_> {
                 let outer = params.float("coneangle")?.unwrap_or(30.0);
                 let inner = outer - params.float("conedeltaangle")?.unwrap_or(5.0);
                 let intensity = self.exposed(self.light(params, "I")?);
-                self.approximated(&params.place, "the spot fades towards its edge as those of glTF do");
                 let (inner, outer) = (inner.clamp(0.0, 0.999 * outer) as f32, outer as f32);
                 let direction = array((to - from).normalize_or_zero());
-                let spot = Punctual::Spot { position: array(from), direction, intensity, inner, outer };
+                let position = array(from);
+                let falloff = if self.version_3 { Falloff::Fourth } else { Falloff::Smooth };
+                let spot = Punctual::Spot { position, direction, intensity, inner, outer, falloff };
                 self.builder.punctual(spot).map_err(refused)
             }
             "infinite" => self.infinite(params),

@@ -51,6 +51,8 @@ pub(super) struct Reader<'a> {
     pub(super) transforms: Vec<DMat4>,
     pub(super) coordinate_systems: HashMap<String, DMat4>,
     pub(super) in_world: bool,
+    /// Whether the file is of version 3: version 4 has no `WorldEnd`.
+    pub(super) version_3: bool,
     bytes: u64,
     pub(super) errors: Errors,
     warnings: Vec<Warning>,
@@ -81,6 +83,7 @@ impl<'a> Reader<'a> {
             transforms: vec![],
             coordinate_systems: HashMap::new(),
             in_world: false,
+            version_3: false,
             bytes: 0,
             errors: Errors::default(),
             warnings: vec![],
@@ -96,6 +99,7 @@ impl<'a> Reader<'a> {
         self.bytes += bytes.len() as u64;
         let text =
             std::str::from_utf8(&bytes).map_err(|e| place.bad(format!("the file is not UTF-8: {e}")))?;
+        self.version_3 |= depth == 0 && text.contains("WorldEnd");
         let mut tokens = Tokens::new(text);
         loop {
             let open = |line: u32| at(path, line).bad("a quote does not end");

@@ -7,7 +7,7 @@ use crate::error::{LoadError, Place};
 use crate::files::MAX_FILE_BYTES;
 use crate::mesh::{Triangles, ply, solids, subdivide};
 use glam::{DMat3, DMat4, DQuat, DVec3};
-use noisefloor_ptwne::{Mesh, SceneError, Texture};
+use noisefloor_ptwne::{SceneError, Texture};
 use std::rc::Rc;
 
 /// Most triangles that subdivision makes in a scene: a short file can ask for any number.
@@ -99,9 +99,7 @@ impl Reader<'_> {
     }
 
     fn add(&mut self, mesh: &Triangles, wear: &Wear, place: &Place) -> Result<(), LoadError> {
-        let Triangles { positions, normals, uvs, indices } = mesh;
-        let mesh = Mesh { positions, normals, uvs, indices, ..Mesh::default() };
-        match self.builder.mesh(&mesh, wear.material, wear.emission.clone()) {
+        match mesh.add_to(&mut self.builder, wear.material, wear.emission.clone()) {
             Ok(_) => Ok(()),
             Err(SceneError::EmptyEmitter) => {
                 self.ignored(place, "a shape is left out: it shines, but has no area");
@@ -164,7 +162,8 @@ impl Reader<'_> {
         };
         let indices = corners::<3>(params, "indices")?.unwrap_or_else(|| vec![[0, 1, 2]]);
         let normals = params.rows::<3>("N")?.unwrap_or_default();
-        let mesh = Triangles { positions, normals, uvs: uvs.unwrap_or_default(), indices };
+        let uvs = uvs.unwrap_or_default();
+        let mesh = Triangles { positions, normals, uvs, indices, ..Triangles::default() };
         self.fits(params, mesh)
     }
 
@@ -182,6 +181,7 @@ impl Reader<'_> {
             normals: normals.unwrap_or_default(),
             uvs: uvs.unwrap_or_default(),
             indices,
+            ..Triangles::default()
         };
         self.fits(params, mesh)
     }

@@ -90,7 +90,7 @@ fn unsupported_kinds_are_named() {
         (bsdf("<bsdf type=\"diffuse\"/><bsdf type=\"diffuse\"/>"), "line 3: a shape has at most one bsdf"),
         (bsdf("<emitter type=\"area\"/><emitter type=\"area\"/>"), "line 3: a shape has at most one emitter"),
         (bsdf("<emitter type=\"point\"/>"), "line 3: <emitter type=\"point\"> in a shape is not supported"),
-        ("<emitter type=\"projector\"/>".to_owned(), "line 2: <emitter type=\"projector\"> is not supported"),
+        ("<emitter type=\"ies\"/>".to_owned(), "line 2: <emitter type=\"ies\"> is not supported"),
     ]);
 }
 
@@ -261,9 +261,9 @@ fn warnings_say_what_is_left_out() {
         ),
         ("\n<volume type=\"grid\"/>", "line 3: <volume type=\"grid\"> is ignored"),
         (
-            "<shape type=\"cube\"><bsdf type=\"roughplastic\"><float name=\"alpha\" value=\"0.2\"/></bsdf>\
-                </shape>",
-            "line 2: the distribution `beckmann` is replaced by `ggx` of the same alpha",
+            "<shape type=\"cube\"><bsdf type=\"roughplastic\"><string name=\"distribution\" value=\"phong\"/>\
+                </bsdf></shape>",
+            "line 2: the distribution `phong` is replaced by `beckmann`",
         ),
         (
             "<shape type=\"cube\"><bsdf type=\"dielectric\">\

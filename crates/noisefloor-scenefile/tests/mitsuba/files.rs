@@ -94,19 +94,19 @@ fn volumes_are_refused_unless_they_are_to_be_ignored() {
 fn all_errors_are_said_at_once() {
     let folder = Folder::new();
     let hair = r#"<shape type="hair"/>"#;
-    let body = format!("{hair}\n{hair}\n<emitter type=\"projector\"/>\n{hair}");
+    let body = format!("{hair}\n{hair}\n<emitter type=\"ies\"/>\n{hair}");
     let error = folder.body(&body).unwrap_err();
     let lines: Vec<&str> = error.lines().collect();
     assert_eq!(lines.len(), 2, "{error}");
     assert!(lines[0].starts_with("<shape type=\"hair\"> is not supported (3 times: "), "{error}");
     assert!(lines[0].ends_with("scene.xml: line 2, line 3, line 5)"), "{error}");
-    assert!(lines[1].ends_with("line 4: <emitter type=\"projector\"> is not supported"), "{error}");
+    assert!(lines[1].ends_with("line 4: <emitter type=\"ies\"> is not supported"), "{error}");
 }
 
 #[test]
 fn warnings_that_say_the_same_are_one_finding() {
     let folder = Folder::new();
-    let rough = r#"<shape type="cube"><bsdf type="roughplastic"/></shape>"#;
+    let rough = r#"<shape type="cube"><bsdf type="roughdiffuse"/></shape>"#;
     let loaded = folder.body(&format!("<x/>\n{rough}\n{rough}\n<x/>")).unwrap();
     let findings = group_warnings(&loaded.warnings);
     let counts: Vec<_> = findings.iter().map(|f| (f.treatment, f.places.len())).collect();

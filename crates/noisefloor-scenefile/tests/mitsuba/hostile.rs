@@ -8,8 +8,8 @@ fn folder() -> Folder {
     let quad = "v -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvn 0 0 1\nf 1/1/1 2/2/1 \
         3/3/1 4//1\n";
     let ascii = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
-        property float u\nproperty float v\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n\
-        0 0 0 0 0\n1 0 0 1 0\n1 1 0 1 1\n3 0 1 2\n";
+        property float u\nproperty float v\nproperty float u_0\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n\
+        0 0 0 0 0 1\n1 0 0 1 0 1\n1 1 0 1 1 1\n3 0 1 2\n";
     let mut binary =
         b"ply\nformat binary_little_endian 1.0\nelement vertex 3\nproperty float x\nproperty float y\n\
         property float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n"
@@ -47,7 +47,9 @@ const SCENE: &str = r##"<?xml version="1.0"?>
 <shape type="sphere"><float name="radius" value="$r"/><bsdf type="diffuse"><srgb name="reflectance" value="#80ff10"/></bsdf></shape>
 <shape type="disk"><emitter type="area"><texture name="radiance" type="bitmap"><string name="filename" value="picture.hdr"/></texture></emitter></shape>
 <emitter type="envmap"><string name="filename" value="sky.exr"/><float name="scale" value="2"/></emitter>
-<emitter type="spot"><float name="cutoff_angle" value="30"/></emitter></scene>"##;
+<emitter type="spot"><float name="cutoff_angle" value="30"/><texture type="bitmap" name="texture"><string name="filename" value="picture.png"/></texture></emitter>
+<shape type="ply"><string name="filename" value="ascii.ply"/><bsdf type="diffuse"><texture type="mesh_attribute" name="reflectance"><string name="name" value="vertex_u"/></texture></bsdf></shape>
+<emitter type="projector"><float name="scale" value="9"/><texture type="bitmap" name="irradiance"><string name="filename" value="picture.hdr"/></texture></emitter></scene>"##;
 
 fn serialized() -> Vec<u8> {
     use std::io::Write;

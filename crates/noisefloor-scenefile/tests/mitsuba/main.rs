@@ -2,6 +2,7 @@
 
 /// What is broken, unsupported or too large, and what is only warned of.
 #[cfg(test)]
+mod attributes;
 mod bad;
 /// Includes, parameters, search paths, volumes, and errors and warnings together.
 #[cfg(test)]

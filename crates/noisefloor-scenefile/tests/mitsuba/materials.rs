@@ -269,8 +269,11 @@ fn near_surfaces_are_warned_of() {
     let diffuse = r#"<bsdf type="diffuse"/>"#;
     for (bsdf, what) in [
         (r#"<bsdf type="roughdiffuse"/>"#.to_owned(), "Lambertian"),
-        (r#"<bsdf type="phong"><float name="exponent" value="50"/></bsdf>"#.to_owned(), "GGX microfacets"),
-        (r#"<bsdf type="ward"/>"#.to_owned(), "GGX microfacets"),
+        (
+            r#"<bsdf type="phong"><float name="exponent" value="50"/></bsdf>"#.to_owned(),
+            "Beckmann's microfacets",
+        ),
+        (r#"<bsdf type="ward"/>"#.to_owned(), "Beckmann's microfacets"),
         (r#"<bsdf type="principled"><float name="metallic" value="1"/></bsdf>"#.to_owned(), "sheen"),
         (r#"<bsdf type="principled"><float name="spec_trans" value="1"/></bsdf>"#.to_owned(), "sheen"),
         (format!(r#"<bsdf type="twosided">{diffuse}{diffuse}</bsdf>"#), "the back of"),

@@ -132,6 +132,11 @@ fn lights_have_the_units_of_pbrt() {
             [4.0, 0.0, 0.0],
         ),
         ("LightSource \"spot\" \"rgb I\" [4 4 4] \"point3 from\" [0 0 2] \"point3 to\" [0 0 0]", [1.0; 3]),
+        // Halfway between 25° and 30° by the cosine, 27.6046°
+        (
+            "LightSource \"spot\" \"rgb I\" [4 4 4] \"point3 from\" [0 0 2] \"point3 to\" [1.045778 0 0]",
+            [0.5; 3],
+        ),
     ] {
         let want = irradiance.map(|e| e * per_irradiance);
         close(folder.see(&format!("{light}\n{floor}")), want, 1e-3, light);

@@ -1,0 +1,79 @@
+//! Attributes of meshes, which are colours at their corners or on their faces.
+
+use super::context::Context;
+use super::xml::Element;
+use crate::error::LoadError;
+use crate::mesh::{Triangles, ply};
+use std::collections::HashSet;
+use std::path::Path;
+
+/// An attribute that a surface takes its colour from.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Attribute {
+    /// With `vertex_` or `face_` in front.
+    pub(super) name: String,
+    /// Factor on it.
+    scale: f64,
+}
+
+impl<'d> Context<'d> {
+    /// The attribute that the surfaces of a shape use, if they use one.
+    ///
+    /// # Errors
+    /// [`LoadError`] if they use several.
+    pub(super) fn attribute_of(&self, shape: &'d Element) -> Result<Option<Attribute>, LoadError> {
+        let (mut found, mut seen) = (None, HashSet::new());
+        self.find_attribute(shape, &mut found, &mut seen)?;
+        Ok(found)
+    }
+
+    fn find_attribute(
+        &self,
+        element: &'d Element,
+        found: &mut Option<Attribute>,
+        seen: &mut HashSet<usize>,
+    ) -> Result<(), LoadError> {
+        for child in &element.children {
+            let part = self.resolve(child)?;
+            if !matches!(part.tag.as_str(), "bsdf" | "texture") || !seen.insert(part.serial) {
+                continue;
+            }
+            if part.tag == "texture" && part.kind() == "mesh_attribute" {
+                let name = self.string(part, "name")?;
+                let name = name.ok_or_else(|| self.bad(part, "a mesh attribute needs a `name`"))?.to_owned();
+                let attribute = Attribute { name, scale: self.float(part, "scale")?.unwrap_or(1.0) };
+                if found.as_ref().is_some_and(|found| *found != attribute) {
+                    return Err(self.unsupported(part, "a second attribute of one mesh"));
+                }
+                *found = Some(attribute);
+            }
+            self.find_attribute(part, found, seen)?;
+        }
+        Ok(())
+    }
+
+    /// A PLY mesh with the colours of an attribute, brought into 0…1.
+    pub(super) fn coloured(
+        &self,
+        shape: &Element,
+        bytes: &[u8],
+        path: &Path,
+        attribute: &Attribute,
+    ) -> Result<Triangles, LoadError> {
+        let mut mesh = ply::parse_with(bytes, path, Some(&attribute.name))?;
+        let mut outside = 0;
+        for value in mesh.colours.iter_mut().chain(&mut mesh.face_colours).flatten() {
+            *value *= attribute.scale as f32;
+            if !(0.0..=1.0).contains(value) {
+                outside += 1;
+                // Also what is no number
+                *value = value.max(0.0).min(1.0);
+            }
+        }
+        if outside > 0 {
+            let what = format!("{outside} values of `{}` are outside 0…1 and are clamped", attribute.name);
+            self.approximated(shape, what);
+        }
+        Ok(mesh)
+    }
+}
