@@ -76,6 +76,12 @@ def survey(args):
         print(f"{files} {reason}")
 
 
+def boxed(text):
+    """Gives films without a filter a box: Mitsuba's own choice is a Gaussian, which smoothes noise and edges."""
+    text = re.sub(r"<film\b([^>]*)/>", r"<film\1></film>", text)
+    return re.sub(r"(<film\b[^>]*>)(?!(?:(?!</film>).)*<rfilter)", r'\1<rfilter type="box"/>', text, flags=re.S)
+
+
 def prepared(args, file):
     """Mitsuba's scene of a file with independent samples and a box filter, and the path depth that the file asks for."""
     import mitsuba as mi
@@ -85,6 +91,7 @@ def prepared(args, file):
     config.unused_properties = mi.LogLevel.Debug
     mi.file_resolver().prepend(str(file.parent))
     text = re.sub(r"<mode>.*?</mode>|<mode [^>]*/>", "", file.read_text(), flags=re.S).replace("<lookAt", "<lookat")
+    text = boxed(text)
     given = dict(re.findall(r'<default name="([^"]*)" value="([^"]*)"', text))
     extra = {name: "16" for name in ("spp",) if "$" + name in text and name not in given}
     beside = file.with_name(f".{file.stem}-compared.xml")
@@ -233,6 +240,8 @@ def compare(args):
         for file, outcome, what in findings(args, folder):
             if outcome != "loaded" or not file.endswith(".xml") or "medium" in what or file in done:
                 continue
+            if args.only and not re.search(args.only, file):
+                continue
             found = {"file": file, "repository": folder.name, "findings": what, "spp": args.spp}
             try:
                 size, render = theirs(args, Path(file), args.spp)
@@ -288,6 +297,7 @@ def main():
     parser.add_argument("--spp", type=int, default=64, help="samples a pixel of each of the two pictures [64]")
     parser.add_argument("--variant", default="llvm_ad_rgb", help="of Mitsuba [llvm_ad_rgb]")
     parser.add_argument("--off", type=float, default=0.04, help="share of blocks from which table lists a scene [0.04]")
+    parser.add_argument("--only", help="of compare: files whose path contains this regular expression")
     parser.add_argument("--timeout", type=float, default=120, help="seconds for both of our pictures [120]")
     args = parser.parse_args()
     if args.what != "survey":

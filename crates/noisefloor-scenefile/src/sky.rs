@@ -64,7 +64,7 @@ impl ClearSky {
         let [x, y, z] = [to_world.x_axis, to_world.y_axis, to_world.z_axis].map(|axis| axis.as_vec3());
         // The map's own axes: its +y is the sky's +z, its +z the sky's −y
         let rows = [[x.x, z.x, -y.x], [x.y, z.y, -y.y], [x.z, z.z, -y.z]];
-        Ok(EnvironmentMap { width: WIDTH, height: HEIGHT, pixels, to_world: rows })
+        Ok(EnvironmentMap { width: WIDTH, height: HEIGHT, pixels, to_world: rows, poles: false })
     }
 
     /// Adds the sun's disk: what it gives off in all is exact, its outline as fine as the pixels.

@@ -21,6 +21,9 @@ pub struct EnvironmentMap {
     pub pixels: Vec<Rgb>,
     /// Rows of the rotation from the map's axes to the scene's.
     pub to_world: [[f32; 3]; 3],
+    /// Whether the first and the last row show the poles themselves, as in Mitsuba 3, and not what lies half a row
+    /// away from them.
+    pub poles: bool,
 }
 
 impl EnvironmentMap {
@@ -46,6 +49,7 @@ pub(crate) struct Map {
     width: usize,
     height: usize,
     pixels: Vec<Rgb>,
+    poles: bool,
     /// Rows take the map's axes to the scene's; columns take them back.
     pub(super) to_world: [Vec3; 3],
     /// Cells of the sampling grid, in columns and rows.
@@ -63,11 +67,17 @@ const MAX_CELLS: [usize; 2] = [512, 256];
 
 impl Map {
     pub(crate) fn new(map: EnvironmentMap) -> Self {
-        let EnvironmentMap { width, height, pixels, to_world } = map;
+        let EnvironmentMap { width, height, pixels, to_world, poles } = map;
         let cells = [width.min(MAX_CELLS[0]), height.min(MAX_CELLS[1])];
         // A pixel's weight is its solid angle times its mean luminance. The mean of the interpolated image
         // over a pixel is that of nine pixels with weights 1/8, 3/4, 1/8 in each direction
-        let at = |x: usize, y: usize| Vec3::from_array(pixels[y * width + x]);
+        let at = |x: usize, y: usize| {
+            // Where the middle of a row of the grid lies among rows that reach from pole to pole
+            let row = if poles { (y as f32 + 0.5) * (1.0 - 1.0 / height as f32) } else { y as f32 };
+            let above = row as usize;
+            let one = |y: usize| Vec3::from_array(pixels[y.min(height - 1) * width + x]);
+            one(above).lerp(one(above + 1), row - above as f32)
+        };
         let across = |x: usize, y: usize| {
             0.75 * at(x, y) + 0.125 * (at((x + 1) % width, y) + at((x + width - 1) % width, y))
         };
@@ -99,6 +109,7 @@ impl Map {
             pmf,
             mean: (mean / total).as_vec3a(),
             pixels,
+            poles,
             to_world: to_world.map(Vec3::from_array),
         }
     }
@@ -117,7 +128,8 @@ impl Map {
     #[inline]
     pub(crate) fn radiance(&self, dir: Vec3) -> Vec3 {
         let [u, v, _] = self.uv(dir);
-        let (x, y) = (u * self.width as f32 - 0.5, v * self.height as f32 - 0.5);
+        let x = u * self.width as f32 - 0.5;
+        let y = if self.poles { v * (self.height - 1) as f32 } else { v * self.height as f32 - 0.5 };
         let (x0, y0) = (x.floor(), y.floor());
         let column = |i: isize| i.rem_euclid(self.width as isize) as usize;
         let row = |i: isize| i.clamp(0, self.height as isize - 1) as usize * self.width;

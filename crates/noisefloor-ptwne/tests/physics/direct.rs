@@ -241,7 +241,7 @@ fn environment_maps_light_by_their_image() {
         irradiance *= 2.0 * std::f64::consts::PI.powi(2) / (columns * rows) as f64;
         let pixels = values.iter().map(|v| [*v as f32; 3]).collect();
         let to_world = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-        let map = EnvironmentMap { width, height, pixels, to_world };
+        let map = EnvironmentMap { width, height, pixels, to_world, poles: false };
         let scene = lit(|b, _| b.environment_map(map).unwrap());
         let expected = 0.5 / std::f64::consts::PI * irradiance;
         check(&scene, expected);

@@ -187,6 +187,7 @@ impl<'d> Context<'d> {
         }
         let [x, y, z] = axes.map(|axis| axis.as_vec3());
         let to_world = [[x.x, y.x, z.x], [x.y, y.y, z.y], [x.z, y.z, z.z]];
-        Ok(EnvironmentMap { width, height, pixels, to_world })
+        let poles = !self.document.old;
+        Ok(EnvironmentMap { width, height, pixels, to_world, poles })
     }
 }

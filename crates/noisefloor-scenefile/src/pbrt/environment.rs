@@ -8,7 +8,7 @@ use std::f64::consts::{FRAC_2_PI, PI, TAU};
 
 /// A map of latitudes and longitudes, of pbrt 3: φ = 0 at +x on the left, θ = 0 at +z on top.
 pub(super) fn latitudes(width: usize, height: usize, pixels: Vec<Rgb>, rotation: DMat3) -> EnvironmentMap {
-    EnvironmentMap { width, height, pixels, to_world: rows(rotation) }
+    EnvironmentMap { width, height, pixels, to_world: rows(rotation), poles: false }
 }
 
 /// A square map of equal areas (Clarberg 2008), of pbrt 4, as one of latitudes and longitudes.
@@ -24,7 +24,7 @@ pub(super) fn equal_area(side: usize, square: &[Rgb], rotation: DMat3) -> Enviro
             pixels.push(square[at(v) * side + at(u)]);
         }
     }
-    EnvironmentMap { width, height, pixels, to_world: rows(rotation) }
+    EnvironmentMap { width, height, pixels, to_world: rows(rotation), poles: false }
 }
 
 /// The rotation from a map's own axes to the world. The map sees (x, y, z) at u = atan2(x, −z)/2π, with +y on
