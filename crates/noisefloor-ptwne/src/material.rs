@@ -297,7 +297,7 @@ impl CompiledMaterial {
         material.check()?;
         options.check()?;
         let metal = |fresnel, colour, alpha| metal(fresnel, colour, alpha, options.facets);
-        let mut coat = |ior, alpha, facets, inside| shared_coat(coats, ior, alpha, facets, inside);
+        let mut coat = |ior, alpha, facets, inside| Coat::shared(coats, ior, alpha, facets, inside);
         // A smooth coat masks nothing
         let inside = |alpha: f32| {
             if alpha < MIN_ROUGHNESS { Interior::Conserving } else { Interior::SingleScattering }
@@ -313,11 +313,8 @@ impl CompiledMaterial {
                 Bsdf::Glass { ior, tint: tint.into() }
             }
             Material::RoughGlass { ior, tint, roughness } => {
-                let facets = match options.facets {
-                    Facets::Ggx => Facets::GgxUncorrelated,
-                    other => other,
-                };
-                Bsdf::RoughGlass { ior, tint: tint.into(), ggx: Ggx::of(roughness, facets) }
+                let ggx = Ggx::of(roughness, options.facets.uncorrelated());
+                Bsdf::RoughGlass { ior, tint: tint.into(), ggx }
             }
             Material::RoughConductor { reflectance, roughness } => {
                 metal(Fresnel::Schlick, Reflectance::new(reflectance), roughness)
@@ -387,20 +384,4 @@ fn metal(fresnel: Fresnel, colour: Reflectance, alpha: f32, facets: Facets) -> B
     } else {
         Bsdf::Metal { fresnel, colour, ggx: Ggx::of(alpha, facets) }
     }
-}
-
-/// The coat among `coats` that is for these values; it is added if there is none.
-fn shared_coat(
-    coats: &mut Vec<Arc<Coat>>,
-    ior: f32,
-    alpha: Option<f32>,
-    facets: Facets,
-    inside: Interior,
-) -> Arc<Coat> {
-    if let Some(coat) = coats.iter().find(|c| c.is_for(ior, alpha, facets, inside)) {
-        return coat.clone();
-    }
-    let coat = Arc::new(Coat::new(ior, alpha, facets, inside));
-    coats.push(coat.clone());
-    coat
 }

@@ -4,6 +4,7 @@ use super::fresnel::{fresnel, refract};
 use super::ggx::{Facets, Ggx, MIN_ROUGHNESS};
 use crate::math::Vec3;
 use std::f32::consts::FRAC_1_PI;
+use std::sync::Arc;
 
 /// A smooth or rough dielectric boundary over a base: how much light it lets through, tabulated per material.
 #[derive(Clone, Debug)]
@@ -22,7 +23,7 @@ pub(crate) enum Interior {
     /// All light that does not get out returns to the base. By reciprocity that is 1 − T̄/η² of diffuse
     /// light, with T̄ = 2∫T(μ)μ dμ. A white base loses no energy.
     Conserving,
-    /// Facets transmit or reflect it once, and what they mask is lost.
+    /// Facets transmit or reflect it once, and what they mask is lost: as Mitsuba computes it.
     SingleScattering,
 }
 
@@ -53,8 +54,24 @@ impl Coat {
     }
 
     /// Whether [`Coat::new`] would make the same coat.
-    pub(crate) fn is_for(&self, ior: f32, alpha: Option<f32>, facets: Facets, interior: Interior) -> bool {
+    fn is_for(&self, ior: f32, alpha: Option<f32>, facets: Facets, interior: Interior) -> bool {
         (self.ior, self.alpha, self.facets, self.interior) == (ior, alpha, facets, interior)
+    }
+
+    /// The coat among `coats` that is for these values; it is added if there is none.
+    pub(crate) fn shared(
+        coats: &mut Vec<Arc<Self>>,
+        ior: f32,
+        alpha: Option<f32>,
+        facets: Facets,
+        interior: Interior,
+    ) -> Arc<Self> {
+        if let Some(coat) = coats.iter().find(|c| c.is_for(ior, alpha, facets, interior)) {
+            return coat.clone();
+        }
+        let coat = Arc::new(Self::new(ior, alpha, facets, interior));
+        coats.push(coat.clone());
+        coat
     }
 
     /// Interpolates a value of the rows at `alpha`.
@@ -102,8 +119,11 @@ impl Row {
             Interior::Conserving => {
                 1.0 - mean(|s| f64::from(at[(s * STEPS as f64).round() as usize])) / f64::from(ior * ior)
             }
+            // Mitsuba's mean of 64 cosines from 0 to 1, both ends in full, which comes out a 64th too low
             Interior::SingleScattering => {
-                mean(|s| f64::from(single_scattering(1.0 / ior, ggx, (s * s) as f32)[0]))
+                let cosines = (0..64).map(|i| i as f32 / 63.0);
+                cosines.map(|c| f64::from(2.0 * c * single_scattering(1.0 / ior, ggx, c)[0])).sum::<f64>()
+                    / 64.0
             }
         };
         Self { at, inside: inside as f32 }

@@ -21,6 +21,16 @@ pub enum Facets {
     BeckmannUncorrelated,
 }
 
+impl Facets {
+    /// The same with masking and shadowing independent of each other.
+    pub(crate) fn uncorrelated(self) -> Self {
+        match self {
+            Self::Ggx => Self::GgxUncorrelated,
+            other => other,
+        }
+    }
+}
+
 /// Isotropic microfacets.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Ggx {

@@ -219,8 +219,8 @@ fn smooth_coats_keep_the_light_of_their_base() {
 
 /// What Mitsuba 3.9.1's `roughplastic` (GGX, nonlinear, index 1.5) reflects of a white sky: the mean weight
 /// of 2²⁰ of its own samples, accurate to 1e-3. Its facets mask by a product of two terms, ours by the
-/// height-correlated one; the difference is found by quadrature. Tables of 64 steps in both renderers, and a
-/// bright base that amplifies their difference, leave one percent.
+/// height-correlated one; the difference is found by quadrature. Tables of 64 steps in both renderers leave half a
+/// percent.
 #[test]
 fn rough_coats_reflect_what_mitsubas_do() {
     for (base, alpha, mitsuba) in [
@@ -235,7 +235,7 @@ fn rough_coats_reflect_what_mitsubas_do() {
             let expected =
                 mitsuba + facets(|o, i| 1.0 / (1.0 + o + i)) - facets(|o, i| 1.0 / ((1.0 + o) * (1.0 + i)));
             let (got, error) = albedo(plastic(base, alpha, true), cos.acos().to_degrees(), 200);
-            let tolerance = 5.0 * error + 1e-3 + 1e-2 * expected;
+            let tolerance = 5.0 * error + 1e-3 + 5e-3 * expected;
             assert!((got - expected).abs() < tolerance, "{base} {alpha} {cos}: {got} ± {error}, {expected}");
         }
     }

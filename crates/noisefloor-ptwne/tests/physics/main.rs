@@ -16,6 +16,7 @@ mod first_hits; // colours and normals of a known surface
 mod furnace; // energy neither made nor lost
 mod kit;
 mod mis; // next events, scattering, and both
+mod points; // spots and projectors
 mod reference; // how free of noise the reference is
 mod relief; // normal maps, bumps, coats, colours of corners
 mod stiff; // scenes with known trouble
