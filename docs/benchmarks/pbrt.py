@@ -14,6 +14,7 @@ The systematic difference is that of scenes.py, with one picture of theirs in pl
 
 import argparse
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -124,6 +125,8 @@ def row(args, name, a, b):
 
 
 def compare_made(args):
+    import numpy as np
+
     for name, text in made(args):
         if args.only and args.only not in name:
             continue
@@ -136,7 +139,8 @@ def compare_made(args):
             a = ours(args, file, (args.edge, args.edge), folder)
             if run.returncode:
                 raise RuntimeError("rs_pbrt: " + run.stderr.strip()[-150:].replace("\n", " "))
-            row(args, name, a, read(folder / "pbrt.png"))
+            # A PNG ends at 1
+            row(args, name, [np.minimum(picture, 1) for picture in a], read(folder / "pbrt.png"))
         except RuntimeError as error:
             print(f"| {name} | {error} |", flush=True)
 
@@ -154,8 +158,16 @@ def compare_beside(args):
             b = mi.Bitmap(str(picture)).convert(mi.Bitmap.PixelFormat.RGB, mi.Struct.Type.Float32, False)
             scale = args.edge / max(b.size())
             size = [max(8, round(edge * scale / 8) * 8) for edge in b.size()]
-            b = np.array(b.resample(size, mi.scalar_rgb.load_dict({"type": "box"})))
-            row(args, str(file), ours(args, file, size, file.parent.parent), b)
+            b = np.array(b.resample(size, mi.load_dict({"type": "box"})))
+            # The depth of the reference is not always that of the file
+            beside = file.with_name(f".{file.stem}-compared.pbrt")
+            depth = f'"integer maxdepth" [ {args.depth} ]' if args.depth else r"\g<0>"
+            beside.write_text(re.sub(r'"integer maxdepth" *\[ *\d+ *\]', depth, file.read_text()))
+            try:
+                a = ours(args, beside, size, file.parent.parent)
+            finally:
+                beside.unlink()
+            row(args, str(file), a, b)
         except RuntimeError as error:
             print(f"| {file} | {error} |", flush=True)
 
@@ -170,6 +182,7 @@ def main():
     parser.add_argument("--edge", type=int, default=64, help="pixels of the longer side [64]")
     parser.add_argument("--spp", type=int, default=256, help="our samples a pixel, twice [256]")
     parser.add_argument("--their-spp", type=int, default=1024, help="samples a pixel of rs_pbrt [1024]")
+    parser.add_argument("--depth", type=int, help="of beside: pbrt's maxdepth in place of that of the files")
     parser.add_argument("--only", help="scenes with this in their name")
     args = parser.parse_args()
     import mitsuba as mi

@@ -22,6 +22,7 @@ fn facets_are_sampled_as_they_are_evaluated() {
         (beckmann, 0.15, 0.9),
         (beckmann, 0.5, 0.7),
         (beckmann, 1.0, 0.3),
+        (beckmann, 0.15, 0.15),
     ] {
         let ggx = Ggx::of(alpha, facets);
         let wo = Vec3::new((1.0 - cos * cos).sqrt(), 0.0, cos);

@@ -66,8 +66,7 @@ impl<'d> Context<'d> {
             *value *= attribute.scale as f32;
             if !(0.0..=1.0).contains(value) {
                 outside += 1;
-                // Also what is no number
-                *value = value.max(0.0).min(1.0);
+                *value = if value.is_nan() { 0.0 } else { value.clamp(0.0, 1.0) };
             }
         }
         if outside > 0 {
