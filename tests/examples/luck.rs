@@ -135,14 +135,15 @@ fn main() -> Result<(), Box<dyn Error>> {
         "| light | chance | tile | guard | stops at, median | stopped without having found it | noise left, median | 95 % |"
     );
     println!("|---|---|---|---|---|---|---|---|");
-    let (every, fine) = (Params::default().schedule, Schedule::FINE);
+    let spaced = Schedule::default();
     let guards = [
-        ("none", every, 0, 1),
-        ("--consecutive 3", every, 0, 3),
-        ("--min-spp 1000", every, 1000, 1),
-        ("--schedule fine", fine, 100, 1),
-        ("--schedule fine --min-spp 50", fine, 50, 1),
-        ("--schedule fine --consecutive 2", fine, 100, 2),
+        ("none", spaced, 100, 1),
+        ("--consecutive 2", spaced, 100, 2),
+        ("--consecutive 3", spaced, 100, 3),
+        ("--min-spp 50", spaced, 50, 1),
+        ("--min-spp 1000", spaced, 1000, 1),
+        ("--schedule every", Schedule::Every { step: 100 }, 100, 1),
+        ("--schedule every --consecutive 3", Schedule::Every { step: 100 }, 100, 3),
     ];
     for (name, place) in
         [("in a black tile", Place::Black), ("caustic", Place::Caustic), ("firefly of 10⁶", Place::Firefly)]

@@ -22,7 +22,7 @@ const MOST: u64 = 600;
 fn rules() -> Vec<(&'static str, Params)> {
     let params = Params { tile: TILE, max_spp: MOST, min_spp: 0, ..Params::default() };
     let every = |step| Params { schedule: Schedule::Every { step }, ..params };
-    let fine = |min_spp, consecutive| Params { schedule: Schedule::FINE, min_spp, consecutive, ..params };
+    let fine = |min_spp, consecutive| Params { min_spp, consecutive, ..params };
     vec![
         ("every 100", every(100)),
         ("every 20", every(20)),

@@ -34,7 +34,7 @@
 // A verdict after every step samples per pixel.
 #define NF_SCHEDULE_EVERY 0
 
-// Verdicts spaced by the expected need, in multiples of step: fewer verdicts, larger batches.
+// Verdicts spaced by the expected need, in multiples of step.
 #define NF_SCHEDULE_SPACED 1
 
 // A verdict whenever a tile has half as many samples more, in multiples of step.
@@ -102,9 +102,9 @@ typedef struct NfSession NfSession;
 typedef struct {
     // Edge of a tile in pixels, 16 to 512. Default: 128.
     uint32_t tile;
-    // When tiles are judged: NF_SCHEDULE_EVERY (default), _SPACED or _GROWING.
+    // When tiles are judged: NF_SCHEDULE_SPACED (default), _EVERY or _GROWING.
     uint32_t schedule;
-    // The step of the schedule in samples per pixel, at least 2. Default: 100.
+    // The step of the schedule in samples per pixel, at least 2. Default: 10.
     uint64_t step;
     // Fewest samples per pixel at which a tile may stop. Default: 100.
     uint64_t min_spp;

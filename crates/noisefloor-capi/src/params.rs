@@ -7,7 +7,7 @@ use std::ffi::c_char;
 
 /// A verdict after every step samples per pixel.
 pub const NF_SCHEDULE_EVERY: u32 = 0;
-/// Verdicts spaced by the expected need, in multiples of step: fewer verdicts, larger batches.
+/// Verdicts spaced by the expected need, in multiples of step.
 pub const NF_SCHEDULE_SPACED: u32 = 1;
 /// A verdict whenever a tile has half as many samples more, in multiples of step.
 pub const NF_SCHEDULE_GROWING: u32 = 2;
@@ -24,9 +24,9 @@ pub const NF_TONE_SRGB: u32 = 1;
 pub struct NfParams {
     /// Edge of a tile in pixels, 16 to 512. Default: 128.
     pub tile: u32,
-    /// When tiles are judged: NF_SCHEDULE_EVERY (default), _SPACED or _GROWING.
+    /// When tiles are judged: NF_SCHEDULE_SPACED (default), _EVERY or _GROWING.
     pub schedule: u32,
-    /// The step of the schedule in samples per pixel, at least 2. Default: 100.
+    /// The step of the schedule in samples per pixel, at least 2. Default: 10.
     pub step: u64,
     /// Fewest samples per pixel at which a tile may stop. Default: 100.
     pub min_spp: u64,

@@ -64,8 +64,8 @@ impl PyViewing {
 /// tone_mapping: "reinhard" (exposure by the log-average of the picture, with key and white) or "srgb" (with
 ///     exposure, a factor on radiance).
 /// viewing: on which display the picture is seen, and from how far; a Viewing or its text.
-/// schedule: "every" step samples per pixel, "spaced" by the expected need, or "growing" by half of what a
-///     tile has; the last two in multiples of step.
+/// schedule: "spaced" by the expected need, "growing" by half of what a tile has (both in multiples of step),
+///     or "every" step samples per pixel.
 /// min_spp, max_spp: fewest and most samples per pixel of a tile.
 /// consecutive: verdicts in a row that must say "converged".
 /// audience: (slope, offset) of the line from thresholds of the training data to those of your viewers;
@@ -117,7 +117,7 @@ pub(crate) fn tone_mapping(name: &str, key: f32, white: Option<f32>, exposure: f
 impl PyParams {
     #[new]
     #[pyo3(signature = (*, tile = 128, tone_mapping = "reinhard", key = 0.18, white = None, exposure = 1.0,
-        viewing = None, schedule = "every", step = 100, min_spp = 100, max_spp = 10_000, consecutive = 1,
+        viewing = None, schedule = "spaced", step = 10, min_spp = 100, max_spp = 10_000, consecutive = 1,
         audience = None, blocks = 0))]
     #[expect(clippy::too_many_arguments, reason = "Python names them")]
     fn new(

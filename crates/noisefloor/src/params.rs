@@ -16,8 +16,9 @@ pub enum Schedule {
         step: u64,
     },
     /// Spaced by the expected need: most of the way to where the criterion expects to be satisfied, at most
-    /// doubling what the tile has, in multiples of `step`. Fewer verdicts and fewer, larger batches; stops on
-    /// the same grid.
+    /// doubling what the tile has, in multiples of `step`. Where it expects
+    /// nothing, or is to say the same twice ([`Params::consecutive`]), after a quarter more. Tiles
+    /// stop as close to their need as with a verdict after every step, with a third of the verdicts.
     Spaced {
         /// The finest spacing, in samples per pixel, at least 2.
         step: u64,
@@ -32,13 +33,15 @@ pub enum Schedule {
     },
 }
 
-impl Schedule {
-    /// Verdicts where they are needed, in steps of 10 samples: a tile stops within a few percent of its need,
-    /// where steps of 100 overshoot it by two fifths in ordinary scenes. Not the default, since the numbers
-    /// that this project has recorded belong to the paper's steps. Set [`Params::min_spp`], too: with fewer
-    /// than 100 samples, light that is seldom found is missed more often.
-    pub const FINE: Self = Self::Spaced { step: 10 };
+impl Default for Schedule {
+    /// Spaced, in steps of 10: a tile stops within a few percent of its need, where the paper's steps of 100
+    /// overshoot it by two fifths in ordinary scenes (docs/benchmarks/verdicts.md).
+    fn default() -> Self {
+        Self::Spaced { step: 10 }
+    }
+}
 
+impl Schedule {
     /// Share of the way to the expected need that is sampled before the next verdict. Expectations err; an
     /// early verdict is cheap, late samples are not.
     const APPROACH: f64 = 0.75;
@@ -49,6 +52,11 @@ impl Schedule {
         }
     }
 
+    /// Samples per pixel at the first verdict: the first step that has `least`.
+    fn first(self, least: u64) -> u64 {
+        least.div_ceil(self.step()).max(1) * self.step()
+    }
+
     /// Samples per pixel at the next verdict. `open` is the share of tiles that are open.
     pub(crate) fn next(self, samples: u64, expected: Option<u64>, open: f64) -> u64 {
         let step = self.step();
@@ -56,8 +64,9 @@ impl Schedule {
         match self {
             Self::Every { .. } => on_grid(0),
             Self::Spaced { .. } => {
-                let missing = expected.map_or(0, |e| e.saturating_sub(samples)).min(samples.max(step));
-                on_grid(samples + (missing as f64 * Self::APPROACH) as u64)
+                let missing = |e: u64| e.saturating_sub(samples).min(samples.max(step));
+                let approach = |e| (missing(e) as f64 * Self::APPROACH) as u64;
+                on_grid(samples + expected.map_or(samples / 4, approach))
             }
             Self::Growing { .. } => {
                 let whole = (step as f64 / open.max(f64::MIN_POSITIVE)) as u64;
@@ -121,7 +130,8 @@ pub struct Params {
     pub viewing: Viewing,
     /// When tiles are judged.
     pub schedule: Schedule,
-    /// Fewest samples per pixel at which a tile may stop.
+    /// Fewest samples per pixel at which a tile may stop. Below 100, light that is seldom found is missed more
+    /// often.
     pub min_spp: u64,
     /// Samples per pixel at which every tile stops (Takouachet et al. 2017, §4.2.1: 10,000).
     pub max_spp: u64,
@@ -143,7 +153,7 @@ impl Default for Params {
             tile: DEFAULT_TILE,
             tone_mapping: ToneMapping::default(),
             viewing: Viewing::default(),
-            schedule: Schedule::Every { step: 100 },
+            schedule: Schedule::default(),
             min_spp: 100,
             max_spp: 10_000,
             consecutive: 1,
@@ -193,7 +203,7 @@ pub enum ParamsError {
 impl Params {
     /// Samples per pixel at the first verdict.
     pub(crate) fn first_verdict(&self) -> u64 {
-        self.schedule.next(self.min_spp.saturating_sub(1), None, 1.0).min(self.max_spp)
+        self.schedule.first(self.min_spp).min(self.max_spp)
     }
 
     /// Checks every parameter but the tile size, which [`crate::TileGrid::new`] checks with the image.
@@ -247,6 +257,24 @@ mod tests {
     fn every_step_is_every_step() {
         let schedule = Schedule::Every { step: 100 };
         assert_eq!([0, 99, 100, 250].map(|n| schedule.next(n, Some(5000), 0.1)), [100, 100, 200, 300]);
+    }
+
+    #[test]
+    fn the_first_verdict_is_where_a_tile_may_stop() {
+        for schedule in
+            [Schedule::Every { step: 10 }, Schedule::Spaced { step: 10 }, Schedule::Growing { step: 10 }]
+        {
+            assert_eq!([0, 10, 95, 100, 1001].map(|n| schedule.first(n)), [10, 10, 100, 100, 1010]);
+        }
+    }
+
+    #[test]
+    fn spacing_approaches_what_is_expected() {
+        let next = |n, expected| Schedule::Spaced { step: 10 }.next(n, expected, 1.0);
+        assert_eq!(next(100, Some(400)), 170); // three quarters of the way, which would more than double it
+        assert_eq!(next(200, Some(300)), 270);
+        assert_eq!([next(100, Some(105)), next(100, Some(20))], [110; 2]);
+        assert_eq!([next(40, None), next(100, None), next(1000, None)], [50, 120, 1250]);
     }
 
     #[test]

@@ -259,12 +259,12 @@ impl<C: StoppingCriterion> Session<C> {
     fn take(&mut self, index: usize, verdict: Verdict, open: f64) -> Option<Stop> {
         let samples = self.film.spp(index);
         let Params { schedule, consecutive, max_spp, .. } = self.params;
-        let audience = self.audience();
+        let (audience, expected) = (self.audience(), self.expected(&verdict));
         let state = &mut self.tiles[index];
         state.verdict = Some(verdict);
         // A less demanding audience has enough where the others are still expected to need more
-        let has_enough = |need| audience.slope < 1.0 && audience.samples(need) <= samples;
-        let converged = verdict.converged || verdict.expected_spp.is_some_and(has_enough);
+        let content = audience.slope < 1.0 && expected.is_some_and(|need| need <= samples);
+        let converged = verdict.converged || content;
         state.streak = if converged { state.streak + 1 } else { 0 };
         if state.streak >= consecutive {
             let target = audience.samples(samples);
@@ -276,8 +276,16 @@ impl<C: StoppingCriterion> Session<C> {
         if samples >= max_spp {
             return Some(self.stop(index, StopReason::MaxSpp));
         }
-        state.next = schedule.next(samples, verdict.expected_spp, open).min(max_spp);
+        // Asked again about much the same samples, a criterion would say the same
+        let expected = expected.filter(|_| state.streak == 0);
+        state.next = schedule.next(samples, expected, open).min(max_spp);
         None
+    }
+
+    /// Where a verdict like this expects the next ones to say "converged": for a less demanding audience sooner.
+    fn expected(&self, verdict: &Verdict) -> Option<u64> {
+        let audience = self.audience();
+        verdict.expected_spp.map(|need| if audience.slope < 1.0 { audience.samples(need) } else { need })
     }
 
     /// The line from the thresholds of the training data to those wanted.

@@ -4,7 +4,7 @@
 
 mod shadow;
 
-use noisefloor::{Driver, Event, Oracle, Params, Progress, Schedule, StopReason};
+use noisefloor::{Driver, Event, Oracle, Params, Progress, StopReason};
 use shadow::Shadow;
 use std::error::Error;
 use std::process::ExitCode;
@@ -26,8 +26,7 @@ fn run() -> Result<(), Box<dyn Error>> {
     let limit = typed.ok().and_then(|seconds| Duration::try_from_secs_f64(seconds).ok());
     let limit = limit.ok_or("usage: example-source [SECONDS], such as 0.5")?;
 
-    // Fewer looks than one every 100 samples: the oracle says how many samples it expects to need.
-    let params = Params { tile: 64, schedule: Schedule::Spaced { step: 100 }, ..Params::default() };
+    let params = Params { tile: 64, ..Params::default() };
     let source = Shadow { width: 480, height: 320, seed: 1 };
     let mut driver = Driver::new(source, Oracle::bundled(), params)?;
     driver.set_time_limit(Some(limit));

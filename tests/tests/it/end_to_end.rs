@@ -189,7 +189,7 @@ fn limits_have_their_reasons() {
 #[test]
 fn a_stack_that_ends_says_so() {
     let stops = run(
-        Synthetic { store: 130, noise: |_, _| 1.0, ..Synthetic::new(96, 32) },
+        Synthetic { store: 130, noise: |_, _| 3.0, ..Synthetic::new(96, 32) },
         Oracle::bundled(),
         small_tiles(),
     );

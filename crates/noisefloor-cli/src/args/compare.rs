@@ -22,8 +22,9 @@ use std::path::PathBuf;
 /// `denoised:JODS` stops a tile as `render --denoise --lost JODS` does.
 ///
 /// `oracle:spaced=10:min-spp=50:blocks=16` is the oracle with options of `render`: every=N and spaced=N for
-/// --schedule and --batch, min-spp=N, consecutive=K and blocks=PIXELS, as many of them as you like; `fine` is
-/// spaced=10:min-spp=100. With blocks or spaced verdicts it renders by itself, from the same source and seed.
+/// --schedule and --batch, min-spp=N, consecutive=K and blocks=PIXELS, as many of them as you like. `fine` is
+/// what `render` does, spaced=10:min-spp=100; without options it judges as often as the rivals do. With blocks
+/// or spaced verdicts it renders by itself, from the same source and seed.
 ///
 /// Writes into the output folder: index.html with everything (one file that opens without a server),
 /// runs.csv, runs.json, and for each scene curve.csv, tiles.csv, plots (SVG and PNG), crops with error
@@ -97,7 +98,6 @@ pub struct CompareArgs {
 #[cfg(feature = "lab")]
 mod check {
     use super::CompareArgs;
-    use crate::args::render::FINE_FROM;
     use crate::args::values;
     use crate::compare::{CompareJob, Named};
     use crate::folder::Earlier;
@@ -228,7 +228,7 @@ mod check {
             let (name, number) = word.split_once('=').unwrap_or((word, ""));
             match (name, number.parse::<u32>()) {
                 ("fine", Err(_)) if number.is_empty() => {
-                    (params.schedule, params.min_spp) = (Schedule::FINE, FINE_FROM);
+                    Params { schedule: params.schedule, min_spp: params.min_spp, .. } = Params::default();
                 }
                 ("blocks", Ok(edge)) => params.blocks = edge as usize,
                 ("every", Ok(step)) => params.schedule = Schedule::Every { step: step.into() },

@@ -83,17 +83,17 @@ pub struct RenderArgs {
     /// tile alike.
     #[arg(long, default_value_t = 0, value_name = "PIXELS")]
     blocks: usize,
-    /// Samples per pixel between two verdicts on a tile [default: 100; with --denoise 48, or 16 of other
-    /// renderers, and then half as many more each time, or more where few tiles are open].
+    /// Samples per pixel between two verdicts on a tile, at the least [default: 10, or 100 with --schedule
+    /// every; with --denoise 48, or 16 of other renderers, and then half as many more each time, or more
+    /// where few tiles are open].
     #[arg(long, value_name = "SPP")]
     batch: Option<u64>,
-    /// When tiles are judged: after `every` batch, or `spaced` by the samples that a tile is expected to
-    /// need. `fine` is spaced in steps of 10 samples, from 100 on: in ordinary scenes tiles stop a fifth to a
-    /// quarter sooner than with batches of 100. With --min-spp 50 it saves more where little is needed, and
-    /// light that is seldom found is missed more often.
-    #[arg(long, value_enum, default_value_t = ScheduleChoice::Every)]
+    /// When tiles are judged: `spaced` by the samples that a tile is expected to need, or after `every` batch,
+    /// as in the paper: tiles then stop a quarter to two fifths later in ordinary scenes.
+    #[arg(long, value_enum, default_value_t = ScheduleChoice::Spaced)]
     schedule: ScheduleChoice,
-    /// No tile stops before this many samples per pixel [default: one batch; 100 with --schedule fine].
+    /// No tile stops before this many samples per pixel [default: 100, or one batch with --batch or --denoise].
+    /// 50 saves more where little is needed, and light that is seldom found is missed more often.
     #[arg(long, value_name = "SPP")]
     min_spp: Option<u64>,
     /// Every tile stops at this many samples per pixel [default: 10000; N with --criterion spp:N].
@@ -153,13 +153,9 @@ pub struct RenderArgs {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum ScheduleChoice {
-    Every,
     Spaced,
-    Fine,
+    Every,
 }
-
-/// Samples per pixel of the first verdict of a fine schedule.
-pub const FINE_FROM: u64 = 100;
 
 /// What a picture is for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -270,22 +266,17 @@ impl RenderArgs {
     }
 
     fn params(&self) -> anyhow::Result<Params> {
-        let step = self.batch.unwrap_or(match self.denoise {
-            None => 100,
+        let step = |default: u64| self.batch.unwrap_or(default);
+        let schedule = match (self.denoise, self.schedule) {
             // What two denoisings cost is worth more samples of the built-in renderer than of slower ones
-            Some(_) if self.renderer.is_built_in() => 48,
-            Some(_) => 16,
-        });
-        let schedule = match self.schedule {
-            _ if self.denoise.is_some() => Schedule::Growing { step },
-            ScheduleChoice::Every => Schedule::Every { step },
-            ScheduleChoice::Spaced => Schedule::Spaced { step },
-            ScheduleChoice::Fine if self.batch.is_some() => {
-                bail!("--schedule fine has steps of its own; leave out --batch, or use --schedule spaced")
-            }
-            ScheduleChoice::Fine => Schedule::FINE,
+            (Some(_), _) if self.renderer.is_built_in() => Schedule::Growing { step: step(48) },
+            (Some(_), _) => Schedule::Growing { step: step(16) },
+            (None, ScheduleChoice::Spaced) => Schedule::Spaced { step: step(10) },
+            (None, ScheduleChoice::Every) => Schedule::Every { step: step(100) },
         };
-        let first = if self.schedule == ScheduleChoice::Fine { FINE_FROM } else { 0 };
+        // With steps that were asked for, or that a denoiser has, the first one is a verdict
+        let first =
+            if self.batch.or(self.denoise.map(|_| 0)).is_some() { 0 } else { Params::default().min_spp };
         let max_spp = match &self.criterion {
             CriterionChoice::Oracle | CriterionChoice::Rival(_) => {
                 self.max_spp.unwrap_or(Params::default().max_spp)

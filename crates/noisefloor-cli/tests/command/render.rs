@@ -140,9 +140,9 @@ fn blocks_are_sampled_by_their_need() {
     fail(&["farm", "plan", text(&farm), "--", "softbox", "--blocks", "16"], &["--blocks", "farm"]);
 }
 
-/// Fine verdicts stop tiles sooner, on steps of their own, and a render may be interrupted between them.
+/// Spaced verdicts stop tiles sooner, and a render may be interrupted between them.
 #[test]
-fn fine_verdicts_stop_tiles_sooner() {
+fn spaced_verdicts_stop_tiles_sooner() {
     let folder = tempdir().unwrap();
     let render = |name: &str, more: &[&str]| {
         let out = folder.path().join(name);
@@ -150,24 +150,22 @@ fn fine_verdicts_stop_tiles_sooner() {
         out
     };
     let samples = |out: &Path| json(&out.join("report.json"))["samples"].as_u64().unwrap();
-    let (fine, coarse) = (render("fine", &["--schedule", "fine"]), render("coarse", &[]));
-    assert!(samples(&fine) < samples(&coarse), "{} {}", samples(&fine), samples(&coarse));
-    let (_, rows) = table(&fine.join("stops.csv"));
+    let (spaced, every) = (render("spaced", &[]), render("every", &["--schedule", "every"]));
+    assert!(samples(&spaced) < samples(&every), "{} {}", samples(&spaced), samples(&every));
+    let (_, rows) = table(&spaced.join("stops.csv"));
     let stops: Vec<u64> = rows.iter().map(|row| row[5].parse().unwrap()).collect();
     assert!(stops.iter().all(|spp| *spp >= 100 && spp.is_multiple_of(10)), "{stops:?}");
     assert!(stops.iter().any(|spp| !spp.is_multiple_of(100)), "{stops:?}");
 
     let files = |out: &Path| ["image.exr", "stops.csv"].map(|name| std::fs::read(out.join(name)).unwrap());
-    let mut parts = render("parts", &["--schedule", "fine", "--time", "0.001"]);
+    let mut parts = render("parts", &["--time", "0.001"]);
     for _ in 0..50 {
         if json(&parts.join("report.json"))["complete"] == true {
             break;
         }
-        parts = render("parts", &["--schedule", "fine", "--time", "0.001", "--resume"]);
+        parts = render("parts", &["--time", "0.001", "--resume"]);
     }
-    assert!(files(&fine) == files(&parts), "another picture in parts");
-    let more = ["--schedule", "fine", "--batch", "20"];
-    fail(&tiny(text(&folder.path().join("none")), &more), &["--schedule fine", "--batch"]);
+    assert!(files(&spaced) == files(&parts), "another picture in parts");
 }
 
 #[test]
@@ -190,7 +188,8 @@ fn the_error_to_a_reference_falls() {
     let (truth, out) = (folder.path().join("truth"), folder.path().join("out"));
     succeed(&tiny(text(&truth), &["--criterion", "spp:1000", "--seed", "1"]));
     let against = truth.join("image.exr");
-    let more = ["--criterion", "spp:200", "--seed", "2", "--batch", "20", "--against", text(&against)];
+    let more = ["--criterion", "spp:200", "--seed", "2", "--schedule", "every", "--batch", "20"];
+    let more = [&more[..], &["--against", text(&against)]].concat();
     succeed(&tiny(text(&out), &more));
     let errors: Vec<f64> =
         column(&out.join("timeline.csv"), "rel_mse").iter().map(|e| e.parse().unwrap()).collect();

@@ -68,7 +68,7 @@ impl<C: StoppingCriterion> Session<C> {
     /// Samples up to which a tile is unlikely to stop.
     fn look_ahead(&self, tile: usize) -> u64 {
         let TileState { next, streak, verdict, target, .. } = self.tiles[tile];
-        match (self.params.schedule, verdict.and_then(|v| v.expected_spp), target) {
+        match (self.params.schedule, verdict.and_then(|v| self.expected(&v)), target) {
             (Schedule::Every { step }, Some(expected), None) if streak == 0 => {
                 Schedule::Spaced { step }.next(self.film.spp(tile), Some(expected), 1.0).max(next)
             }

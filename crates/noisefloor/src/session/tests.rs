@@ -68,8 +68,8 @@ fn each_tile_stops_when_it_has_enough() {
 
 #[test]
 fn spaced_verdicts_stop_at_the_same_samples_with_fewer_looks() {
-    let params = Params { schedule: Schedule::Spaced { step: 100 }, ..Params::default() };
-    let (mut every, mut spaced) = (session(2000, true, Params::default()), session(2000, true, params));
+    let params = Params { schedule: Schedule::Every { step: 10 }, ..Params::default() };
+    let (mut every, mut spaced) = (session(2000, true, params), session(2000, true, Params::default()));
     assert_eq!(run(&mut every), run(&mut spaced));
     assert!(spaced.criterion.asked.len() * 2 < every.criterion.asked.len());
 }
@@ -84,6 +84,9 @@ fn limits_hold() {
 #[test]
 fn one_verdict_is_not_a_streak() {
     let params = Params { consecutive: 3, ..Params::default() };
+    // Each time a quarter more, in steps of 10
+    assert_eq!(run(&mut session(300, true, params)).map_samples(), [460, 930, 1400]);
+    let params = Params { schedule: Schedule::Every { step: 100 }, ..params };
     assert_eq!(run(&mut session(300, true, params)).map_samples(), [500, 800, 1100]);
 }
 
@@ -102,8 +105,8 @@ fn a_demanding_audience_gets_more() {
 fn a_less_demanding_audience_gets_less() {
     let audience = Audience { slope: 0.5, offset: 0.0 };
     let mut s = session(300, true, Params { audience, ..Params::default() });
-    // Half of 300, 600 and 900, at the next verdict
-    assert_eq!(run(&mut s).map_samples(), [200, 300, 500]);
+    // Half of 300, 600 and 900, and no verdict on the way beyond
+    assert_eq!(run(&mut s).map_samples(), [150, 300, 450]);
 }
 
 #[test]
