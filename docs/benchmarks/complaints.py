@@ -28,7 +28,7 @@ EXPOSURES = ("0.1", "1", "10")
 # The camera of the Cornell box moves to the right, by about two pixels a frame.
 FRAMES = [f"{0.015 * i:.3f}" for i in range(4)]
 REFERENCE_SPP = 4000
-RESTING = {"oracle": [], "blocks": ["--schedule", "fine", "--blocks", "16"]}
+RESTING = {"oracle": ["--schedule", "every"], "blocks": ["--blocks", "16"]}
 
 
 def render(noisefloor, scene, out, *options, tile=TILE):

@@ -132,7 +132,7 @@ def through(renderer, args):
     scene = RENDERERS[renderer][1]
     with tempfile.TemporaryDirectory() as out:
         command = [args.noisefloor, "render", scene, "--source", renderer, "--size", f"{args.size}x{args.size}"]
-        command += ["--tile", str(TILE), "--criterion", f"spp:{SPP * (args.batches + 1)}", "--batch", str(SPP)]
+        command += ["--tile", str(TILE), "--criterion", f"spp:{SPP * (args.batches + 1)}", "--schedule", "every", "--batch", str(SPP)]
         subprocess.run(command + ["--quiet", "--autosave", "0", "--out", out], check=True)
         with open(os.path.join(out, "timeline.csv")) as file:
             rows = [(float(r["seconds"]), int(r["samples"])) for r in csv.DictReader(file)]
