@@ -12,7 +12,7 @@ fn check(scene: Scene, samples: u64) {
     let counts = source.counts();
     assert_eq!((counts.samples, counts.dropped, counts.clamped), (32 * 32 * samples, 0, 0));
     // References take thousands of samples per pixel where light is hard to find
-    let mut small = Ptwne::new(scene, 16, 16, RenderOptions::default()).unwrap();
+    let mut small = Ptwne::new(scene, 8, 8, RenderOptions::default()).unwrap();
     all.extend(small.reference().unwrap().unwrap().pixels);
     let good = |v: &f32| v.is_finite() && *v >= 0.0;
     assert!(all.iter().flatten().all(good), "{:?}", all.iter().find(|p| !p.iter().all(good)));

@@ -2,7 +2,7 @@ use super::*;
 use noisefloor::{Rgb, srgb_encode};
 use noisefloor_testkit::Noise;
 
-const EDGE: usize = 240;
+const EDGE: usize = 144;
 
 /// Contrast, frequency in cycles per pixel, and angle in radians of a grating whose crest is in the middle of
 /// the picture.

@@ -101,7 +101,7 @@ fn changed_bytes_never_panic() {
     ];
     let mut random = fastrand::Rng::with_seed(20);
     let mut broken = 0;
-    for round in 0..4000 {
+    for round in 0..1600 {
         let path = folder.path().join(files[round % files.len()]);
         let original = std::fs::read(&path).unwrap();
         let mut bytes = original.clone();
@@ -129,5 +129,5 @@ fn changed_bytes_never_panic() {
         replace(&path, &original);
     }
     // Most changes matter
-    assert!(broken > 1000, "{broken}");
+    assert!(broken > 400, "{broken}");
 }
