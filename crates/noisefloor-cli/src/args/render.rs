@@ -102,7 +102,7 @@ pub struct RenderArgs {
     /// Be done after this many seconds, with all files written: tiles that are still open then stop.
     #[arg(long, value_name = "SECONDS", value_parser = values::seconds)]
     time: Option<Duration>,
-    /// Stop a tile only after K verdicts of "converged" in a row.
+    /// Stop a tile only after K verdicts of "converged" in a row, each a quarter more samples after the last.
     #[arg(long, default_value_t = 1, value_name = "K")]
     consecutive: u32,
     /// For whom: `observers` (those of the training data), `art-students` (T' = 1.94 T - 346), or a,b for
