@@ -2,12 +2,13 @@
 //! distance.
 //!
 //! The image path of ColorVideoVDP (Mantiuk et al. 2024) in Rust, with the constants of the PyPI package
-//! `cvvdp` 0.5.7 and its results: on 87 recorded pairs, JODs agree within 0.00002 and difference maps within
+//! `cvvdp` 0.5.7 and its results: on 98 recorded pairs, JODs agree within 0.00003 and difference maps within
 //! 0.01 %. Reads no files, starts no threads, knows no renderer.
 //!
 //! | item | |
 //! |---|---|
 //! | [`Viewing`] | a display, the room's light, the distance; as text `desk` or `ppd=60,peak=300` |
+//! | [`Chromaticities`] | its primaries and its white, where they are not those of sRGB |
 //! | [`PRESETS`], [`Screen`] | viewing conditions by name; pixels per degree of a screen |
 //! | [`VisionModel::compare`] | JODs and a map of two pictures |
 //! | [`VisionModel::residual`] | visible differences by band and channel in a tile, for stopping rules |
@@ -40,6 +41,7 @@
 
 mod bands;
 mod check;
+mod chromaticity;
 mod csf;
 mod engine;
 mod error;
@@ -57,6 +59,7 @@ mod text;
 mod viewing;
 mod workspace;
 
+pub use chromaticity::{Chromaticities, ChromaticityError};
 pub use csf::{OpponentChannel, contrast_sensitivity};
 pub use error::VisionError;
 pub use model::{VisionComparison, VisionModel};

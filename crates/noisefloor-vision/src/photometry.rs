@@ -72,6 +72,7 @@ impl Photometry {
         let to_xyz = match params.primaries {
             Primaries::Rec709 => REC709_TO_XYZ,
             Primaries::Rec2020 => REC2020_TO_XYZ,
+            Primaries::Measured(colours) => colours.to_xyz().expect("`ViewingParams::check` refuses others"),
         };
         let to_opponent =
             product(LMS_TO_DKL, product(XYZ_TO_LMS, to_xyz)).map(|row| row.map(|value| value as f32));
@@ -116,6 +117,7 @@ impl Photometry {
         let (range, floor) = (self.peak - self.black, self.black + self.reflected);
         for ((r, g), b) in r.iter_mut().zip(g).zip(b) {
             let [x, y, z] = [hlg(unit(*r)), hlg(unit(*g)), hlg(unit(*b))];
+            // BT.2100 fixes these weights, whatever the primaries of the display
             let luminance = 0.2627 * x + 0.6780 * y + 0.0593 * z;
             let gain = if luminance > 0.0 { range * pow(luminance, gamma) } else { 0.0 };
             [*r, *g, *b] = [gain * x + floor, gain * y + floor, gain * z + floor];
@@ -231,6 +233,7 @@ pub(crate) fn grey_row(photometry: &Photometry, codes: &mut [f32]) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::chromaticity::Chromaticities;
     use crate::viewing::ViewingParams;
     use proptest::prelude::*;
 
@@ -272,16 +275,49 @@ mod tests {
     #[test]
     fn greys_have_hardly_any_colour_and_about_their_luminance() {
         let photometry = Photometry::new(&viewing("desk"));
-        let mut planes = [[0.0; 1]; CHANNELS];
-        let [a, b, c] = planes.each_mut();
-        opponent_row(&photometry, &[[0.6; 3]], &mut [a, b, c]);
-        let [[achromatic], [red], [violet]] = planes;
+        let [achromatic, red, violet] = opponent(&viewing("desk"), [0.6; 3]);
         let luminance = viewing("desk").luminance(0.6) as f32;
         assert!((achromatic / luminance - 1.0).abs() < 0.1, "{achromatic} for {luminance}");
         assert!(red.abs() < 0.02 * luminance && violet.abs() < 0.02 * luminance, "{red}, {violet}");
         let mut grey = [0.6];
         grey_row(&photometry, &mut grey);
         assert!((grey[0] / achromatic - 1.0).abs() < 1e-6);
+    }
+
+    /// Opponent channels of one colour.
+    fn opponent(viewing: &Viewing, code: [f32; 3]) -> [f32; CHANNELS] {
+        let mut planes = [[0.0; 1]; CHANNELS];
+        let [a, b, c] = planes.each_mut();
+        opponent_row(&Photometry::new(viewing), &[code], &mut [a, b, c]);
+        planes.map(|[value]| value)
+    }
+
+    #[test]
+    fn matrices_of_standards_are_those_of_their_chromaticities() {
+        // That of Rec.709 was made for the D65 of ASTM E308, (0.31273, 0.32902); that of BT.2020 has four digits
+        for (colours, matrix) in
+            [(Chromaticities::REC709, REC709_TO_XYZ), (Chromaticities::REC2020, REC2020_TO_XYZ)]
+        {
+            let derived = colours.to_xyz().unwrap();
+            for (a, b) in derived.iter().flatten().zip(matrix.iter().flatten()) {
+                assert!((a - b).abs() < 3e-4, "{a} for {b}");
+            }
+        }
+    }
+
+    #[test]
+    fn whites_colour_greys_and_hardly_change_their_light() {
+        let grey = |text: &str| opponent(&viewing(text), [0.6; 3]);
+        let [light, red, violet] = grey("desk,white=0.3127:0.3291");
+        let [warm_light, warm_red, warm_violet] = grey("desk,white=d50");
+        let [cold_light, cold_red, cold_violet] = grey("desk,white=d93");
+        // Yellow is negative: with a white of D50 greys are redder and more yellow, with one of D93 bluer
+        assert!(warm_red > red + 0.02 * light && warm_violet < violet - 0.1 * light);
+        assert!(cold_red < red && cold_violet > violet + 0.1 * light);
+        assert!((warm_light / light - 1.0).abs() < 0.003 && (cold_light / light - 1.0).abs() < 0.003);
+        // White's luminance stays the peak, only its parts change: there is less blue light in a warm white
+        let blue = |text: &str| opponent(&viewing(text), [0.0, 0.0, 1.0])[0];
+        assert!(blue("desk,white=d50") < 0.8 * blue("desk"));
     }
 
     proptest! {

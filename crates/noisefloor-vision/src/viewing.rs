@@ -1,5 +1,6 @@
 //! What a picture is seen on, and from where: the display's light and its pixels per degree.
 
+use crate::chromaticity::{Chromaticities, ChromaticityError};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 use thiserror::Error;
@@ -21,15 +22,41 @@ pub enum Eotf {
     Linear,
 }
 
-/// The primaries of code values; the white point is D65.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+/// The primaries of code values, and the white that all three show together. Values are sent to the display
+/// as they are, and eyes are taken as adapted to D65, as in ColorVideoVDP: with another white, greys have a
+/// colour.
+// Model files number the variants: new ones come last
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Primaries {
-    /// ITU-R BT.709, those of sRGB.
+    /// ITU-R BT.709, those of sRGB; white is D65.
     #[default]
     Rec709,
-    /// ITU-R BT.2020.
+    /// ITU-R BT.2020; white is D65.
     Rec2020,
+    /// Any others, or another white. The light of the room that the display reflects has the colour of white,
+    /// too, and HLG keeps the luminance weights of BT.2020, which its standard fixes.
+    Measured(Chromaticities),
+}
+
+impl Primaries {
+    /// What they mix from.
+    pub fn chromaticities(self) -> Chromaticities {
+        match self {
+            Self::Rec709 => Chromaticities::REC709,
+            Self::Rec2020 => Chromaticities::REC2020,
+            Self::Measured(chromaticities) => chromaticities,
+        }
+    }
+}
+
+impl From<Chromaticities> for Primaries {
+    /// A standard if they are exactly its own. Its published matrix differs from theirs in the fifth digit.
+    fn from(chromaticities: Chromaticities) -> Self {
+        let standards = [Self::Rec709, Self::Rec2020].into_iter();
+        let mut equal = standards.filter(|standard| standard.chromaticities() == chromaticities);
+        equal.next().unwrap_or(Self::Measured(chromaticities))
+    }
 }
 
 /// Unchecked viewing conditions. [`ViewingParams::check`] makes them a [`Viewing`].
@@ -47,7 +74,7 @@ pub struct ViewingParams {
     pub reflectivity: f64,
     /// How code values become light.
     pub eotf: Eotf,
-    /// Their primaries.
+    /// Their primaries and white.
     pub primaries: Primaries,
 }
 
@@ -82,15 +109,18 @@ pub enum ViewingError {
         "HLG displays above 1000 cd/m² need ambient light of at least 0.01 lux, on which their gamma depends"
     )]
     DarkHlg,
+    /// No display mixes colours so.
+    #[error(transparent)]
+    Colours(#[from] ChromaticityError),
 }
 
 impl ViewingParams {
-    /// Checks every value.
+    /// Checks every value. Measured primaries that are those of a standard become the standard's.
     ///
     /// # Errors
     /// The first value that is out of its range.
     pub fn check(self) -> Result<Viewing, ViewingError> {
-        let Self { pixels_per_degree, peak, black, ambient, reflectivity, eotf, .. } = self;
+        let Self { pixels_per_degree, peak, black, ambient, reflectivity, eotf, primaries } = self;
         if !(1.0..=2000.0).contains(&pixels_per_degree) {
             return Err(ViewingError::PixelsPerDegree(pixels_per_degree));
         }
@@ -107,17 +137,20 @@ impl ViewingParams {
             return Err(ViewingError::Reflectivity(reflectivity));
         }
         match eotf {
-            Eotf::Gamma(gamma) if !(1.0..=4.0).contains(&gamma) => Err(ViewingError::Gamma(gamma)),
-            Eotf::Hlg if peak > 1000.0 && ambient < 0.01 => Err(ViewingError::DarkHlg),
-            _ => Ok(Viewing(self)),
+            Eotf::Gamma(gamma) if !(1.0..=4.0).contains(&gamma) => return Err(ViewingError::Gamma(gamma)),
+            Eotf::Hlg if peak > 1000.0 && ambient < 0.01 => return Err(ViewingError::DarkHlg),
+            _ => {}
         }
+        let colours = primaries.chromaticities();
+        colours.to_xyz()?;
+        Ok(Viewing(Self { primaries: colours.into(), ..self }))
     }
 }
 
 /// Checked viewing conditions: a display, the light in the room, and how far away the display is.
 ///
 /// As text, they are a preset (`desk`, `standard_4k`), numbers (`ppd=60,peak=300,black=0.3,ambient=100`), or
-/// a preset with changes (`desk,distance=1.2`).
+/// a preset with changes (`desk,distance=1.2`, `desk,primaries=p3,white=d50`).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "ViewingParams", into = "ViewingParams")]
 pub struct Viewing(ViewingParams);

@@ -3,13 +3,15 @@
     pip install cvvdp==0.5.7
     python crates/noisefloor-vision/tests/record_cvvdp.py
 
-The pictures are integers out of integers, so that both languages see the same ones.
+Pairs that the file has already are kept if they were recorded with the same versions; delete the file to
+record all of them again. The pictures are integers out of integers, so that both languages see the same ones.
 """
 
 import json
 import platform
 from importlib.metadata import version
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 import torch
@@ -77,21 +79,52 @@ class Recorder(cvvdp):
         return quality, self.raw
 
 
+# CIE 1931 x and y of red, green and blue (ITU-R BT.709 and BT.2020), and of whites
+GAMUTS = {
+    "rec709": ((0.64, 0.33), (0.30, 0.60), (0.15, 0.06)),
+    "rec2020": ((0.708, 0.292), (0.170, 0.797), (0.131, 0.046)),
+}
+WHITES = {"d50": (0.3457, 0.3585), "d93": (0.2831, 0.2971)}
+# Spaces that the package has
+OWN = {"rec709": "sRGB", "rec2020": "BT.2020-linear", "p3": "Display P3 Apple"}
+
+
+def space(primaries, white):
+    """An entry of color_spaces.json: linear RGB to XYZ, such that RGB of 1 is white with a Y of 1."""
+    numbers = lambda text: [float(number) for number in text.split(":")]
+    corners = GAMUTS.get(primaries)
+    corners = np.reshape(numbers(primaries), (3, 2)) if corners is None else np.array(corners)
+    x, y = WHITES[white] if white in WHITES else numbers(white)
+    columns = np.column_stack([corners, 1 - corners.sum(axis=1)]).T
+    matrix = columns * np.linalg.solve(columns, np.array([x, y, 1 - x - y]) / y)
+    return {"EOTF": "sRGB", **dict(zip(("RGB2X", "RGB2Y", "RGB2Z"), matrix.tolist()))}
+
+
+def photometry(of):
+    """The display of these numbers; a colour space that the package lacks goes into a file of its own."""
+    primaries, white = of.get("primaries", "rec709"), of.get("white", "d65")
+    settings = dict(
+        contrast=float(of["contrast"]),
+        EOTF={"srgb": "sRGB", "hlg": "HLG"}.get(of["eotf"], of["eotf"].removeprefix("gamma")),
+        E_ambient=float(of["ambient"]),
+        k_refl=float(of["reflectivity"]),
+    )
+    if white == "d65" and primaries in OWN:
+        return vvdp_display_photo_eotf(float(of["peak"]), source_colorspace=OWN[primaries], **settings)
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "color_spaces.json"
+        path.write_text(json.dumps({"own": space(primaries, white)}))
+        own = dict(source_colorspace="own", config_paths=[str(path)])
+        return vvdp_display_photo_eotf(float(of["peak"]), **own, **settings)
+
+
 def metric(viewing):
     """The metric for a display of cvvdp, or for numbers."""
     if "=" not in viewing:
         return Recorder(display_name=viewing, heatmap="raw", device=torch.device("cpu"), quiet=True)
     of = dict(part.split("=") for part in viewing.split(","))
-    photometry = vvdp_display_photo_eotf(
-        float(of["peak"]),
-        contrast=float(of["contrast"]),
-        source_colorspace={"rec709": "sRGB", "rec2020": "BT.2020-linear"}[of.get("primaries", "rec709")],
-        EOTF={"srgb": "sRGB"}.get(of["eotf"], of["eotf"].removeprefix("gamma")),
-        E_ambient=float(of["ambient"]),
-        k_refl=float(of["reflectivity"]),
-    )
     geometry = vvdp_display_geometry((1920, 1080), ppd=float(of["ppd"]))
-    display = dict(display_photometry=photometry, display_geometry=geometry)
+    display = dict(display_photometry=photometry(of), display_geometry=geometry)
     return Recorder(**display, heatmap="raw", device=torch.device("cpu"), quiet=True)
 
 
@@ -150,6 +183,16 @@ def cases():
         "ppd=200,peak=1000,contrast=100000,ambient=10,reflectivity=0.005,eotf=srgb",
     ):
         vary(viewing=viewing, width=150, height=150, amount=[25] * 3)
+    # Primaries and whites
+    desk = "ppd=38,peak=200,contrast=1000,ambient=250,reflectivity=0.005,eotf="
+    chroma = dict(low=[128] * 3, high=[128] * 3, amount=[15, 5, 0])
+    for colours in ("primaries=p3", "white=d50", "primaries=rec2020,white=d93", "white=0.45:0.41"):
+        vary(viewing=f"{desk}srgb,{colours}", grey=True, amount=[25] * 3)
+        vary(viewing=f"{desk}srgb,{colours}", **chroma)
+    own = "primaries=0.67:0.32:0.22:0.7:0.14:0.05,white=0.29:0.31"
+    vary(viewing=f"{desk}gamma2.4,{own}", pattern="mosaic", high=[220, 180, 140], amount=[25] * 3)
+    vary(viewing=f"{desk}hlg,primaries=rec2020,white=d93", low=[10, 60, 20], high=[200, 90, 40])
+    vary(viewing=f"{desk}srgb,white=d50", pattern="flat")
     return listed
 
 
@@ -171,14 +214,24 @@ def record(case):
     }
 
 
+def key(pair):
+    """What was compared, without the results."""
+    results = ("jod", "mean", "rms", "sample")
+    return json.dumps({name: value for name, value in pair.items() if name not in results}, sort_keys=True)
+
+
 def main():
     torch.set_num_threads(1)
-    recorded = [record(case) for case in cases()]
+    path = Path(__file__).with_name("cvvdp.json")
     versions = {name: version(name) for name in ("cvvdp", "torch", "torchvision", "numpy")}
-    head = json.dumps({"python": platform.python_version(), **versions})
+    head = {"python": platform.python_version(), **versions}
+    before = json.loads(path.read_text()) if path.exists() else {}
+    kept = before["pairs"] if before.get("versions") == head else []
+    known = {key(pair): pair for pair in kept}
+    recorded = [known.get(key(case)) or record(case) for case in cases()]
     lines = ",\n".join(json.dumps(case, separators=(",", ":")) for case in recorded)
-    Path(__file__).with_name("cvvdp.json").write_text(f'{{"versions": {head}, "pairs": [\n{lines}\n]}}\n')
-    print(f"{len(recorded)} pairs")
+    path.write_text(f'{{"versions": {json.dumps(head)}, "pairs": [\n{lines}\n]}}\n')
+    print(f"{len(recorded)} pairs, {sum(key(case) in known for case in recorded)} of them from before")
 
 
 main()

@@ -9,8 +9,9 @@ use noisefloor::{Oracle, Viewing};
 pub struct ViewingArgs {
     /// What pictures are seen on: `desk` (24 inches, Full HD, 60 cm), `laptop`, `tv`, `phone`, `cinema`; a
     /// display of ColorVideoVDP such as `standard_4k`; numbers, `ppd=60,peak=300,black=0.3,ambient=100`
-    /// (pixels per degree, cd/m², lux); or a preset with changes, `desk,distance=1.2` (metres) [default: what
-    /// the model was trained for; `desk` for the bundled one, and without a model].
+    /// (pixels per degree, cd/m², lux); or a preset with changes, `desk,distance=1.2` (metres),
+    /// `desk,primaries=p3`, `desk,white=d50` (or `white=5500K`, or x:y) [default: what the model was trained
+    /// for; `desk` for the bundled one, and without a model].
     #[arg(long, value_name = "WHERE")]
     viewing: Option<Viewing>,
 }

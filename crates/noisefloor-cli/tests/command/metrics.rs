@@ -79,7 +79,7 @@ fn files_get_the_jods_of_cvvdp() {
         assert!((jod - pair["jod"].as_f64().unwrap()).abs() < 0.001, "{jod} for {pair}");
         compared += 1;
     }
-    assert_eq!(compared, 4);
+    assert_eq!(compared, 5);
 }
 
 #[test]
