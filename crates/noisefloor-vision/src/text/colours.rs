@@ -7,7 +7,8 @@ use std::fmt;
 pub(super) const PRIMARIES: &str =
     "rec709, rec2020, p3, or CIE 1931 x and y of red, green and blue, such as 0.64:0.33:0.3:0.6:0.15:0.06";
 /// What `white` takes.
-pub(super) const WHITE: &str = "d50, d55, d65, d75, d93, daylight such as 5500K (4000K to 25000K), or CIE 1931 x:y such as 0.3457:0.3585";
+pub(super) const WHITE: &str =
+    "d50, d55, d65, d75, d93, 4000K to 25000K (daylight), or CIE 1931 x:y such as 0.3457:0.3585";
 
 const GAMUTS: [(&str, Chromaticities); 3] = [
     ("rec709", Chromaticities::REC709),

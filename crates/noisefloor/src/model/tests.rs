@@ -46,6 +46,15 @@ fn survives_the_file() {
     assert_eq!(model.digest(), small().digest());
 }
 
+#[test]
+fn files_keep_measured_colours_of_a_display() {
+    let viewing = "desk,primaries=p3,white=d50".parse().unwrap();
+    let model = changed(small(), |m| m.viewing = viewing).unwrap();
+    let mut bytes = Vec::new();
+    model.write(&mut bytes).unwrap();
+    assert_eq!(Model::read(&bytes[..]).unwrap().viewing(), viewing);
+}
+
 #[cfg(feature = "bundled-model")]
 #[test]
 fn the_bundled_model_is_whole_small_and_scored() {
