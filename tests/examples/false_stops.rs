@@ -53,7 +53,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         let [one, other] = [converged(u64::MAX)?, converged(u64::MAX - 1)?];
         let truth: Vec<Rgb> =
             one.iter().zip(&other).map(|(a, b)| std::array::from_fn(|c| 0.5 * (a[c] + b[c]))).collect();
-        for (guard, min_spp, consecutive) in [("none", 0, 1), ("--consecutive 3", 0, 3)] {
+        for (guard, min_spp, consecutive) in [("none", 100, 1), ("--consecutive 3", 100, 3)] {
             let params = Params { tile: TILE, min_spp, consecutive, max_spp: MOST, ..Params::default() };
             let (mut tiles, mut samples, mut stopped) = (0, 0, Vec::new());
             for seed in 0..seeds {

@@ -78,7 +78,9 @@ pub use model::{Judgement, Model, ModelError, ModelParts, Scores, TrainingRecord
 /// Planes, maps and training rows are its arrays.
 pub use ndarray;
 /// Viewing conditions are its types.
-pub use noisefloor_vision::{Viewing, ViewingError, ViewingParams, ViewingTextError};
+pub use noisefloor_vision::{
+    Chromaticities, ChromaticityError, Eotf, Primaries, Viewing, ViewingError, ViewingParams, ViewingTextError,
+};
 pub use oracle::Oracle;
 pub use origin::SampleOrigin;
 pub use params::{Audience, Params, ParamsError, Schedule};
