@@ -4,7 +4,7 @@
 #![allow(clippy::print_stdout, reason = "its output is its purpose")]
 
 use noisefloor::{Oracle, Params, Schedule, Session, SourceIdentity};
-use noisefloor_farm::{Shard, ShardJob, ShardSet};
+use noisefloor_farm::{PlannedBatch, Shard, ShardJob, ShardSet};
 use noisefloor_testkit::Noise;
 use std::path::PathBuf;
 use std::time::Instant;
@@ -26,17 +26,16 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let job = ShardJob::of(SourceIdentity::new("noise"), &session);
 
     let began = Instant::now();
-    let batches: Vec<_> =
-        (0..session.film().grid().len()).flat_map(|tile| session.batches_ahead(tile)).collect();
+    let (batches, grid) = (PlannedBatch::ahead(&session), job.grid()?);
     let mut random = Noise::keyed(&[1]);
     let noise: Vec<[f32; 3]> = (0..128 * 128 + 977).map(|_| [random.uniform() as f32; 3]).collect();
     let (mut paths, mut bytes) = (Vec::new(), 0);
     for (index, some) in batches.chunks(batches.len().div_ceil(count)).enumerate() {
         let mut shard = Shard::new(job.clone());
         for batch in some {
-            let start = (batch.first as usize * 31 + batch.tile.index) % 977;
-            let mean = noise[start..start + batch.tile.pixels()].to_vec();
-            shard.add(batch.tile.index, batch.first, batch.spp, batch.spp, mean);
+            let start = (batch.first as usize * 31 + batch.tile) % 977;
+            let mean = noise[start..start + grid.tile(batch.tile).pixels()].to_vec();
+            shard.add(batch.clone(), batch.spp, mean);
         }
         let path = folder.join(format!("{index:05}.nfs"));
         shard.write(&path)?;

@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use thiserror::Error;
 
 /// Version of the format of shards.
-pub(crate) const VERSION: u32 = 1;
+pub(crate) const VERSION: u32 = 2;
 
 /// Why a shard cannot be used.
 #[derive(Debug, Error)]
@@ -86,6 +86,9 @@ pub enum FarmError {
          `noisefloor render` renders it on one machine"
     )]
     Repeats(String),
+    /// The source cannot sample blocks.
+    #[error("{0} cannot sample blocks of a tile by their need: leave out --blocks")]
+    Blocks(String),
     /// The source failed.
     #[error(transparent)]
     Source(#[from] SourceError),

@@ -1,7 +1,7 @@
 //! A frame or a sequence over many machines.
 //!
-//! - A [`Shard`] is a file of batches, each the samples of one tile in one range. It says which job they are
-//!   of ([`ShardJob`]).
+//! - A [`Shard`] is a file of batches, each the samples of one tile in one range, or in one range for each of
+//!   its blocks ([`PlannedBatch`]). It says which job they are of ([`ShardJob`]).
 //! - [`sample`] takes the samples of a shard; [`split`] divides work into tasks of about equal length.
 //! - [`ShardSet`] merges shards into a [`Session`](noisefloor::Session), batch by batch as a
 //!   [`Driver`](noisefloor::Driver) on one machine would take them. So the film, every verdict and every stop
@@ -12,7 +12,7 @@
 //!
 //! ```
 //! use noisefloor::{FixedSpp, Params, Session, TileGrid};
-//! use noisefloor_farm::{Shard, ShardJob, ShardSet, Task, sample, split};
+//! use noisefloor_farm::{PlannedBatch, ShardJob, ShardSet, sample, split};
 //! use noisefloor_ptwne::{Ptwne, RenderOptions, scenes};
 //!
 //! let (criterion, params) = (FixedSpp(100), Params { tile: 32, ..Params::default() });
@@ -22,9 +22,9 @@
 //! let folder = tempfile::tempdir()?;
 //!
 //! // On one machine: what is to be done, in two tasks. On others: doing it.
-//! let wanted = (0..2).flat_map(|tile| session.batches_ahead(tile)).map(|batch| (0, batch)).collect();
+//! let wanted = PlannedBatch::ahead(&session);
 //! let mut files = Vec::new();
-//! for (index, task) in split(wanted, 2).iter().enumerate() {
+//! for (index, task) in split(vec![(job.grid()?, wanted)], 2).iter().enumerate() {
 //!     let shard = sample(&mut source, job.clone(), &task.batches, || false)?;
 //!     files.push(folder.path().join(format!("{index}.nfs")));
 //!     shard.write(&files[index])?;
@@ -36,6 +36,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod batch;
 mod error;
 mod folder;
 mod local;
@@ -45,6 +46,7 @@ mod shard;
 mod slurm;
 mod task;
 
+pub use batch::PlannedBatch;
 pub use error::{FarmError, ShardError};
 pub use folder::{FarmFolder, FarmJob, FarmLock, FrameJob, FrameState, Round, SlurmJobs, frame_arguments};
 pub use local::run_local;

@@ -1,8 +1,9 @@
 //! Shards back into one film, as one machine would have filled it.
 
+use crate::batch::PlannedBatch;
 use crate::error::FarmError;
 use crate::shard::{BatchEntry, ShardFile, ShardJob};
-use noisefloor::{Request, Rgb, Session, StopReason, StoppingCriterion};
+use noisefloor::{BlockRequest, Request, Rgb, Session, StopReason, StoppingCriterion};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -115,8 +116,8 @@ impl ShardSet {
     }
 
     /// Whether a batch is there.
-    pub fn has(&self, request: &Request) -> bool {
-        self.index.contains_key(&(request.tile.index, request.first, request.spp))
+    pub fn has(&self, batch: &PlannedBatch) -> bool {
+        self.index.contains_key(&(batch.tile, batch.first, batch.spp))
     }
 
     /// Adds the batches that the session asks for, as far as they are there, and judges each round that is
@@ -128,18 +129,18 @@ impl ShardSet {
         &mut self,
         session: &mut Session<C>,
     ) -> Result<Merged, FarmError> {
-        let mut merged = Merged::default();
+        let (mut merged, before) = (Merged::default(), session.film().total_samples());
         while !session.is_done() {
             let before = merged.batches;
             for request in session.next_batches() {
-                let Some((spp, mean)) = self.take(&request) else { continue };
-                let tile = request.tile;
+                let by_blocks = session.block_request(&request);
+                let Some((spp, mean)) = self.take(&request, by_blocks.as_ref()) else { continue };
+                let tile = request.tile.index;
                 merged.batches += 1;
-                merged.samples += spp * tile.pixels() as u64;
-                if spp == 0 {
-                    session.close(tile.index, StopReason::SourceExhausted);
-                } else {
-                    session.push(tile.index, spp, &mean)?;
+                match &by_blocks {
+                    _ if spp == 0 => drop(session.close(tile, StopReason::SourceExhausted)),
+                    Some(by_blocks) => session.push_blocks(by_blocks, &mean)?,
+                    None => session.push(tile, spp, &mean)?,
                 }
             }
             if session.is_round_complete() {
@@ -149,14 +150,23 @@ impl ShardSet {
                 break;
             }
         }
+        merged.samples = session.film().total_samples() - before;
         Ok(merged)
     }
 
-    /// The samples of a batch; none if it is not there, or damaged in every file that has it.
-    fn take(&mut self, request: &Request) -> Option<(u64, Vec<Rgb>)> {
+    /// The samples of a batch; none if it is not there, or damaged or spread over blocks in another way in
+    /// every file that has it.
+    fn take(&mut self, request: &Request, by_blocks: Option<&BlockRequest>) -> Option<(u64, Vec<Rgb>)> {
         let key = (request.tile.index, request.first, request.spp);
         while let Some(&(file, batch)) = self.index.get(&key).and_then(|places| places.first()) {
-            match self.files[file].read(batch) {
+            let shard = &self.files[file];
+            if shard.by_blocks(&shard.batches()[batch]).as_ref() != by_blocks {
+                // Counts and shares of blocks follow from the samples before
+                let what = "is spread over the blocks in another way than in this job";
+                self.discard(file, format!("it belongs to another job: {} {what}", name(&key)));
+                continue;
+            }
+            match shard.read(batch) {
                 Ok(mean) => {
                     self.merged.insert(key);
                     return Some((self.files[file].batches()[batch].spp, mean));

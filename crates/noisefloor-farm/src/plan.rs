@@ -1,6 +1,7 @@
 //! Work in tasks of about equal length.
 
-use noisefloor::Request;
+use crate::batch::PlannedBatch;
+use noisefloor::TileGrid;
 use serde::{Deserialize, Serialize};
 
 /// Samples, over all pixels, below which a task would spend its time on starting.
@@ -13,31 +14,40 @@ const MOST_PIXELS: u64 = 1 << 25;
 pub struct Task {
     /// Index of the frame.
     pub frame: usize,
-    /// Tile, first sample and samples of each batch, in the order of the samples of each tile.
-    pub batches: Vec<(usize, u64, u64)>,
+    /// Its batches, in the order of the samples of each tile.
+    pub batches: Vec<PlannedBatch>,
 }
 
-/// Splits batches of (frame, batch) into tasks of about equal length, at most about `tasks`, by frames, tiles
-/// and ranges of samples. The batches of a frame, and the samples of a tile, must come one after the other.
+/// Splits what each frame needs into tasks of about equal length, at most about `tasks`, by frames, tiles and
+/// ranges of samples. The samples of a tile must come one after the other.
 ///
 /// Few batches make fewer tasks; many make more where a task would hold too many in memory.
-pub fn split(batches: Vec<(usize, Request)>, tasks: usize) -> Vec<Task> {
-    let cost = |batch: &Request| batch.spp * batch.tile.pixels() as u64;
-    let total: u64 = batches.iter().map(|(_, batch)| cost(batch)).sum();
+///
+/// # Panics
+/// If a frame has no such tile.
+pub fn split(frames: Vec<(TileGrid, Vec<PlannedBatch>)>, tasks: usize) -> Vec<Task> {
+    let cost = |grid: &TileGrid, batch: &PlannedBatch| batch.spp * grid.tile(batch.tile).pixels() as u64;
+    let of_frame = |(grid, batches): &(TileGrid, Vec<PlannedBatch>)| -> u64 {
+        batches.iter().map(|batch| cost(grid, batch)).sum()
+    };
+    let total: u64 = frames.iter().map(of_frame).sum();
     let share = total.div_ceil(tasks.max(1) as u64).max(LEAST);
     let mut split: Vec<Task> = Vec::new();
     let (mut samples, mut place, mut pixels) = (0, 0, 0);
-    for (frame, batch) in batches {
-        // Each batch goes where its middle is
-        let here = (samples + cost(&batch) / 2) / share;
-        samples += cost(&batch);
-        pixels += batch.tile.pixels() as u64;
-        if here != place || pixels > MOST_PIXELS || split.last().is_none_or(|task| task.frame != frame) {
-            split.push(Task { frame, batches: Vec::new() });
-            (place, pixels) = (here, batch.tile.pixels() as u64);
-        }
-        if let Some(task) = split.last_mut() {
-            task.batches.push((batch.tile.index, batch.first, batch.spp));
+    for (frame, (grid, batches)) in frames.into_iter().enumerate() {
+        for batch in batches {
+            // Each batch goes where its middle is
+            let (cost, area) = (cost(&grid, &batch), grid.tile(batch.tile).pixels() as u64);
+            let here = (samples + cost / 2) / share;
+            samples += cost;
+            pixels += area;
+            if here != place || pixels > MOST_PIXELS || split.last().is_none_or(|task| task.frame != frame) {
+                split.push(Task { frame, batches: Vec::new() });
+                (place, pixels) = (here, area);
+            }
+            if let Some(task) = split.last_mut() {
+                task.batches.push(batch);
+            }
         }
     }
     split
@@ -46,20 +56,18 @@ pub fn split(batches: Vec<(usize, Request)>, tasks: usize) -> Vec<Task> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use noisefloor::TileGrid;
 
     #[test]
     fn every_batch_is_in_one_task_and_tasks_are_even() {
         let grid = TileGrid::new(1024, 512, 128).unwrap();
-        let batch = |tile, first| Request { tile: grid.tile(tile), first, spp: 50 };
-        let all: Vec<(usize, Request)> =
-            (0..2).flat_map(|f| (0..32).flat_map(move |t| [(f, batch(t, 0)), (f, batch(t, 50))])).collect();
+        let of_frame: Vec<PlannedBatch> =
+            (0..32).flat_map(|t| [PlannedBatch::even(t, 0, 50), PlannedBatch::even(t, 50, 50)]).collect();
+        let all = vec![(grid, of_frame.clone()), (grid, of_frame)];
         for tasks in [1, 2, 3, 7, 20, 64, 1000] {
             let split = split(all.clone(), tasks);
-            let flat: Vec<_> =
-                split.iter().flat_map(|t| t.batches.iter().map(|&(i, f, s)| (t.frame, i, f, s))).collect();
-            let wanted: Vec<_> = all.iter().map(|(f, b)| (*f, b.tile.index, b.first, b.spp)).collect();
-            assert_eq!(flat, wanted);
+            let flat: Vec<_> = split.iter().flat_map(|t| t.batches.iter().map(|b| (t.frame, b))).collect();
+            let wanted = all.iter().enumerate().flat_map(|(f, (_, bs))| bs.iter().map(move |b| (f, b)));
+            assert_eq!(flat, wanted.collect::<Vec<_>>());
             // A frame more than asked for, where a task would span two; and no task has less than half of 2¹⁸
             // samples
             assert!(split.len() <= tasks.min(128) + 1, "{} for {tasks}", split.len());

@@ -3,10 +3,14 @@
 //! Layout: magic (8 bytes), version (u32), length of the header (u64), BLAKE3 of the header (32 bytes),
 //! header (JSON); then for each batch of the header, in its order, three f32 per pixel, row-major over its
 //! tile. Numbers are little-endian. The header has the BLAKE3 of each batch, so that a merge reads only the
-//! batch it needs.
+//! batch it needs. Where blocks of a tile got different numbers of samples, it has these, too.
 
+use crate::batch::{PlannedBatch, by_blocks, fit};
 use crate::error::{ShardError, VERSION};
-use noisefloor::{ProgressiveSource, Resumable, Rgb, Session, SourceError, SourceIdentity, Tile, TileGrid};
+use noisefloor::{
+    BlockRequest, ProgressiveSource, Request, Resumable, Rgb, Session, SourceError, SourceIdentity, Tile,
+    TileGrid,
+};
 use noisefloor_image::{WriteError, write_atomic};
 use serde::{Deserialize, Serialize};
 use std::fs::File;
@@ -14,7 +18,7 @@ use std::io::{self, BufReader, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
 const MAGIC: [u8; 8] = *b"NFSHARD\0";
-/// Longest header that is read: some 300,000 batches.
+/// Longest header that is read: some 300,000 batches, or 50,000 with different samples in 100 blocks each.
 const MAX_HEADER: u64 = 64 << 20;
 /// Bytes before the header.
 const PREFIX: u64 = 8 + 4 + 8 + 32;
@@ -32,6 +36,9 @@ pub struct ShardJob {
     pub height: usize,
     /// Edge of the tiles in pixels.
     pub tile: usize,
+    /// Edge of the blocks of a tile in pixels; 0 if all of a tile is sampled alike.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub blocks: usize,
     /// Fingerprint of the criterion.
     pub criterion: String,
     /// Parameters of the session, as text.
@@ -58,6 +65,7 @@ impl ShardJob {
             width: grid.width(),
             height: grid.height(),
             tile: params.tile,
+            blocks: params.blocks,
             criterion: session.criterion().fingerprint(),
             params: format!("{params:?}"),
         }
@@ -80,6 +88,7 @@ impl ShardJob {
         let size = |job: &Self| format!("{}×{} in tiles of {}", job.width, job.height, job.tile);
         for (what, kept, now) in [
             ("picture", size(kept), size(self)),
+            ("edge of blocks", kept.blocks.to_string(), self.blocks.to_string()),
             ("criterion", kept.criterion.clone(), self.criterion.clone()),
             ("set of parameters", kept.params.clone(), self.params.clone()),
         ] {
@@ -89,6 +98,11 @@ impl ShardJob {
         }
         Ok(())
     }
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde calls it so")]
+fn is_zero(n: &usize) -> bool {
+    *n == 0
 }
 
 /// One batch of a shard.
@@ -102,8 +116,25 @@ pub struct BatchEntry {
     pub asked: u64,
     /// Samples per pixel that the source gave; 0 if it has no more.
     pub spp: u64,
+    /// First sample and number of samples of each block; see [`PlannedBatch::blocks`].
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub blocks: Vec<(u64, u64)>,
     /// BLAKE3 of its pixels.
     digest: String,
+}
+
+impl BatchEntry {
+    /// Whether it can be a batch of these tiles, with blocks of this edge if that is not 0.
+    fn is_possible(&self, grid: &TileGrid, edge: usize) -> bool {
+        let &Self { tile, first, asked, spp, ref blocks, .. } = self;
+        let possible = |n: u64| n < 1 << 34;
+        tile < grid.len()
+            && [first, asked, spp].into_iter().all(possible)
+            && fit(grid.tile(tile), edge, blocks)
+            && blocks.iter().all(|&(first, spp)| possible(first) && possible(spp))
+            // Blocks get exactly what is asked for
+            && (edge == 0 || spp == 0 || spp == asked)
+    }
 }
 
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -141,11 +172,12 @@ impl Shard {
         self.header.seconds += seconds;
     }
 
-    /// Adds a batch of `spp` samples per pixel where `asked` were wanted from the sample `first` on; `mean`
-    /// is row-major over the tile.
-    pub fn add(&mut self, tile: usize, first: u64, asked: u64, spp: u64, mean: Vec<Rgb>) {
+    /// Adds what came of `batch`: `spp` samples per pixel, as many as asked for or fewer, and none at the
+    /// source's end; `mean` is row-major over the tile.
+    pub fn add(&mut self, batch: PlannedBatch, spp: u64, mean: Vec<Rgb>) {
+        let PlannedBatch { tile, first, spp: asked, blocks } = batch;
         let digest = digest(&bytes(&mean));
-        self.header.batches.push(BatchEntry { tile, first, asked, spp, digest });
+        self.header.batches.push(BatchEntry { tile, first, asked, spp, blocks, digest });
         self.pixels.push(mean);
     }
 
@@ -238,13 +270,15 @@ impl ShardFile {
     fn check(path: PathBuf, header: Header, begin: u64, there: u64) -> Result<Self, ShardError> {
         let grid = header.job.grid()?;
         let (mut offsets, mut end) = (Vec::new(), begin);
-        for BatchEntry { tile, first, asked, spp, .. } in &header.batches {
-            let possible = |n: &u64| *n < 1 << 34;
-            if *tile >= grid.len() || ![first, asked, spp].into_iter().all(possible) {
-                return Err(ShardError::Damaged(format!("it has an impossible batch of tile {tile}")));
+        for entry in &header.batches {
+            if !entry.is_possible(&grid, header.job.blocks) {
+                return Err(ShardError::Damaged(format!(
+                    "it has an impossible batch of tile {}",
+                    entry.tile
+                )));
             }
             offsets.push(end);
-            end += length(grid.tile(*tile), *spp) as u64;
+            end += length(grid.tile(entry.tile), entry.spp) as u64;
         }
         if there != end {
             let relation = if there < end { "is cut short" } else { "is too long" };
@@ -278,8 +312,18 @@ impl ShardFile {
 
     /// Its samples, over all pixels.
     pub fn samples(&self) -> u64 {
-        let samples = |entry: &BatchEntry| entry.spp * self.grid.tile(entry.tile).pixels() as u64;
+        let samples = |entry: &BatchEntry| match self.by_blocks(entry) {
+            Some(request) if entry.spp > 0 => request.samples(),
+            _ => entry.spp * self.grid.tile(entry.tile).pixels() as u64,
+        };
         self.header.batches.iter().map(samples).sum()
+    }
+
+    /// What was asked for in a batch of this shard, block by block; none without blocks.
+    pub(crate) fn by_blocks(&self, entry: &BatchEntry) -> Option<BlockRequest> {
+        let &BatchEntry { tile, first, asked, ref blocks, .. } = entry;
+        let request = Request { tile: self.grid.tile(tile), first, spp: asked };
+        by_blocks(&request, self.header.job.blocks, blocks)
     }
 
     /// Its batches.

@@ -1,77 +1,109 @@
 //! Taking the samples of a shard.
 
+use crate::batch::{PlannedBatch, by_blocks, fit};
 use crate::error::FarmError;
 use crate::shard::{Shard, ShardJob};
-use noisefloor::{LightCheck, ProgressiveSource, Request, SourceError};
+use noisefloor::{Batch, LightCheck, ProgressiveSource, Request, SourceError, SourceInfo};
 use std::time::Instant;
 
 /// Most samples of one call, over all pixels: as on one machine, so that cancelling is prompt.
 const CALL: u64 = 1 << 22;
 
-/// Takes the batches (tile, first sample, samples) from a source. Once `cancel` says so, it returns with what
-/// it has: that is a shard, too.
+/// A batch, and the request that asks for it.
+type Wanted<'a> = (Request, &'a PlannedBatch);
+
+/// Takes these batches from a source. Once `cancel` says so, it returns with what it has: that is a shard,
+/// too.
 ///
 /// # Errors
-/// [`FarmError::Edited`] if the source is not that of `job`, [`FarmError::Source`] if it fails or breaks its
-/// contract, or a batch is no light.
+/// [`FarmError::Edited`] if the source is not that of `job`, [`FarmError::Blocks`] if it cannot sample the
+/// blocks that the job has, [`FarmError::Source`] if it fails or breaks its contract, or a batch is no light.
 pub fn sample(
     source: &mut impl ProgressiveSource,
     job: ShardJob,
-    batches: &[(usize, u64, u64)],
+    batches: &[PlannedBatch],
     cancel: impl Fn() -> bool,
 ) -> Result<Shard, FarmError> {
     let info = source.info();
     let now = ShardJob { source: source.identity()?, width: info.width, height: info.height, ..job.clone() };
     now.check(&job).map_err(FarmError::Edited)?;
     let grid = job.grid().map_err(FarmError::Edited)?;
-    let broken = |what| FarmError::Source(SourceError::Contract { name: info.name.clone(), what });
-    let mut requests = Vec::new();
-    for &(tile, first, spp) in batches {
-        if tile >= grid.len() || spp == 0 {
-            return Err(broken(format!("it was asked for {spp} samples of tile {tile}")));
+    let edge = job.blocks;
+    let mut wanted: Vec<Wanted<'_>> = Vec::new();
+    for batch in batches {
+        let &PlannedBatch { tile, first, spp, ref blocks } = batch;
+        if tile >= grid.len() || spp == 0 || !fit(grid.tile(tile), edge, blocks) {
+            return Err(broken(&info, format!("it was asked for {spp} samples of tile {tile}")));
         }
-        requests.push(Request { tile: grid.tile(tile), first, spp });
+        wanted.push((Request { tile: grid.tile(tile), first, spp }, batch));
     }
     // So that different tiles share calls
-    requests.sort_by_key(|request| request.first);
+    wanted.sort_by_key(|(request, _)| request.first);
 
     let (mut shard, mut light) = (Shard::new(job), LightCheck::default());
-    while !requests.is_empty() && !cancel() {
-        let call = next_call(&mut requests);
+    while !wanted.is_empty() && !cancel() {
+        let call = next_call(&mut wanted);
         let began = Instant::now();
-        let given = source.sample(&call)?;
+        let given = ask(source, &call, edge)?;
         shard.add_seconds(began.elapsed().as_secs_f64());
         if given.len() != call.len() {
-            return Err(broken(format!("{} batches for {} requests", given.len(), call.len())));
+            return Err(broken(&info, format!("{} batches for {} requests", given.len(), call.len())));
         }
-        for (request, batch) in call.iter().zip(given) {
-            let index = request.tile.index;
-            let pixels = if batch.spp == 0 { 0 } else { request.tile.pixels() };
-            let fits = batch.tile == request.tile && batch.mean.len() == pixels;
-            if !fits || batch.spp > info.counts.most(request) {
-                let (pixels, spp) = (batch.mean.len(), batch.spp);
-                return Err(broken(format!("{pixels} pixels of {spp} samples for tile {index}")));
-            }
-            let lit = if pixels == 0 { Ok(()) } else { light.check(&batch.mean) };
-            lit.map_err(|error| broken(format!("in tile {index}, {error}")))?;
-            shard.add(index, request.first, request.spp, batch.spp, batch.mean);
+        for ((request, planned), batch) in call.into_iter().zip(given) {
+            check(&info, &request, edge, &batch)?;
+            let lit = if batch.spp == 0 { Ok(()) } else { light.check(&batch.mean) };
+            lit.map_err(|error| broken(&info, format!("in tile {}, {error}", request.tile.index)))?;
+            shard.add(planned.clone(), batch.spp, batch.mean);
         }
     }
     Ok(shard)
 }
 
+/// Asks for the batches of one call, block by block if the job has blocks of this edge.
+fn ask(
+    source: &mut impl ProgressiveSource,
+    call: &[Wanted<'_>],
+    edge: usize,
+) -> Result<Vec<Batch>, FarmError> {
+    if edge == 0 {
+        let requests: Vec<Request> = call.iter().map(|(request, _)| *request).collect();
+        return Ok(source.sample(&requests)?);
+    }
+    let requests = call.iter().filter_map(|(request, batch)| by_blocks(request, edge, &batch.blocks));
+    let given = source.sample_blocks(&requests.collect::<Vec<_>>())?;
+    given.ok_or_else(|| FarmError::Blocks(source.info().name))
+}
+
+/// Checks that a batch is of what was asked for.
+fn check(info: &SourceInfo, request: &Request, edge: usize, batch: &Batch) -> Result<(), FarmError> {
+    let pixels = if batch.spp == 0 { 0 } else { request.tile.pixels() };
+    let counted = match edge {
+        0 => batch.spp <= info.counts.most(request),
+        _ => batch.spp == request.spp || batch.spp == 0,
+    };
+    if counted && batch.tile == request.tile && batch.mean.len() == pixels {
+        return Ok(());
+    }
+    let (pixels, spp, index) = (batch.mean.len(), batch.spp, request.tile.index);
+    Err(broken(info, format!("{pixels} pixels of {spp} samples for tile {index}")))
+}
+
+fn broken(info: &SourceInfo, what: String) -> FarmError {
+    FarmError::Source(SourceError::Contract { name: info.name.clone(), what })
+}
+
 /// The next batches of different tiles, as many as one call may have.
-fn next_call(requests: &mut Vec<Request>) -> Vec<Request> {
+fn next_call<'a>(wanted: &mut Vec<Wanted<'a>>) -> Vec<Wanted<'a>> {
     let mut samples = 0;
-    let mut call: Vec<Request> = Vec::new();
-    for request in requests.iter() {
+    let mut call: Vec<Wanted<'a>> = Vec::new();
+    for (request, batch) in wanted.iter() {
         samples += request.spp * request.tile.pixels() as u64;
-        let again = call.iter().any(|other| other.tile.index == request.tile.index);
+        let again = call.iter().any(|(other, _)| other.tile.index == request.tile.index);
         if !call.is_empty() && (again || samples > CALL) {
             break;
         }
-        call.push(*request);
+        call.push((*request, batch));
     }
-    requests.drain(..call.len());
+    wanted.drain(..call.len());
     call
 }

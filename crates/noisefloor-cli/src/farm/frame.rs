@@ -11,9 +11,12 @@ use anyhow::{Context, bail};
 use clap::Parser;
 use noisefloor::{
     Batch, Clock, Counts, FixedSpp, Progress, ProgressiveSource, Repeats, Request, Resumable, Session,
-    SourceError, SourceIdentity, SourceInfo, TimelinePoint, Unit,
+    SourceError, SourceIdentity, SourceInfo, TileGrid, TimelinePoint, Unit,
 };
-use noisefloor_farm::{FarmError, FarmFolder, FarmJob, FrameJob, FrameState, ShardFile, ShardJob, ShardSet};
+use noisefloor_farm::{
+    FarmError, FarmFolder, FarmJob, FrameJob, FrameState, PlannedBatch, ShardError, ShardFile, ShardJob,
+    ShardSet,
+};
 use std::time::Instant;
 
 /// When a merge writes pictures.
@@ -32,9 +35,6 @@ pub fn parse(arguments: &[String]) -> anyhow::Result<RenderJob> {
         bail!("--frames: before `--`, as in `farm plan DIR --frames 1-240 -- 'hall.{{frame:04}}.xml'`");
     }
     let job = args.check()?;
-    if job.params.blocks > 0 {
-        bail!("--blocks: not for a farm, whose shards hold whole tiles; leave it out");
-    }
     #[cfg(feature = "study")]
     let watched = job.watch.is_some();
     #[cfg(not(feature = "study"))]
@@ -140,11 +140,14 @@ impl<'a> Frame<'a> {
     /// Opens the scene once, and keeps what it is.
     pub fn find_out(folder: &FarmFolder, farm: &FarmJob, index: usize, name: &str) -> anyhow::Result<()> {
         let render = parse(&farm.arguments_of(index))?;
-        let opened = render.source.open()?;
+        let mut opened = render.source.open()?;
         opened.warn(index > 0);
         let info = opened.source.info();
         if info.repeats != Repeats::Samples {
             return Err(FarmError::Repeats(info.name).into());
+        }
+        if render.params.blocks > 0 && opened.source.sample_blocks(&[])?.is_none() {
+            return Err(FarmError::Blocks(info.name).into());
         }
         let identity = Identity(opened.source.identity()?);
         let shards = on_session(&render, (info.width, info.height), opened.source.identity()?, identity)?;
@@ -163,8 +166,13 @@ impl<'a> Frame<'a> {
         Ok(Self { folder, farm, name, render, job })
     }
 
+    /// Its tiles.
+    pub fn grid(&self) -> Result<TileGrid, ShardError> {
+        self.job.shards.grid()
+    }
+
     /// Merges the shards that are there; how far the frame then is, and what it needs next.
-    pub fn merge(self, pictures: Pictures) -> anyhow::Result<(FrameState, Vec<Request>)> {
+    pub fn merge(self, pictures: Pictures) -> anyhow::Result<(FrameState, Vec<PlannedBatch>)> {
         let state = self.folder.state(self.name)?;
         if state.done {
             return Ok((state, Vec::new()));
@@ -197,7 +205,7 @@ struct Merge<'a> {
 }
 
 impl Work for Merge<'_> {
-    type Outcome = (FrameState, Vec<Request>);
+    type Outcome = (FrameState, Vec<PlannedBatch>);
 
     fn run<C: Resumable>(mut self, mut session: Session<C>) -> anyhow::Result<Self::Outcome> {
         let began = Instant::now();
@@ -224,8 +232,8 @@ impl Work for Merge<'_> {
         folder.write_state(name, &self.state)?;
         self.put_away(&shards, &used_up)?;
 
-        let open = (0..self.state.tiles).flat_map(|tile| session.batches_ahead(tile));
-        let wanted = open.filter(|batch| !shards.has(batch)).collect();
+        let mut wanted = PlannedBatch::ahead(&session);
+        wanted.retain(|batch| !shards.has(batch));
         Ok((self.state, wanted))
     }
 }

@@ -65,9 +65,10 @@ impl Coordinator {
         let (mut wanted, mut samples) = (Vec::new(), 0);
         for (index, name) in self.job.names().iter().enumerate() {
             let frame = Frame::open(&self.folder, &self.job, index, name)?;
+            let grid = frame.grid().with_context(|| name.clone())?;
             let (state, batches) = frame.merge(pictures).with_context(|| name.clone())?;
             samples += state.samples;
-            wanted.extend(batches.into_iter().map(|batch| (index, batch)));
+            wanted.push((grid, batches));
         }
         let planned = now();
         let brought = samples - before.samples.min(samples);

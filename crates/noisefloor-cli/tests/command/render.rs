@@ -136,8 +136,6 @@ fn blocks_are_sampled_by_their_need() {
     ] {
         fail(&tiny(text(&folder.path().join("none")), more), words);
     }
-    let farm = folder.path().join("farm");
-    fail(&["farm", "plan", text(&farm), "--", "softbox", "--blocks", "16"], &["--blocks", "farm"]);
 }
 
 /// Spaced verdicts stop tiles sooner, and a render may be interrupted between them.

@@ -15,16 +15,36 @@ impl<C: StoppingCriterion> Session<C> {
     ///
     /// A renderer that cannot answers the request itself with [`Session::push`], as if there were no blocks.
     pub fn block_request(&self, request: &Request) -> Option<BlockRequest> {
-        let (tile, edge, spp) = (request.tile, self.params.blocks, request.spp);
-        let had = self.film.block_counts(tile.index)?.map(|[a, b]| a + b);
-        let blocks = match &self.shares[tile.index] {
-            None => had.map(|first| BlockSamples { first, spp }).collect(),
-            Some(shares) => {
-                let new = spread(shares, tile, edge, spp);
-                had.zip(new).map(|(first, spp)| BlockSamples { first, spp }).collect()
-            }
+        let had: Vec<u64> = self.film.block_counts(request.tile.index)?.map(|[a, b]| a + b).collect();
+        Some(self.spread_over(request, &had))
+    }
+
+    /// [`Session::batches_ahead`] spread over the blocks of the tile, as [`Session::block_request`] will
+    /// spread them; none unless [`Params::blocks`](crate::Params::blocks) is set.
+    ///
+    /// # Panics
+    /// If the tile does not exist.
+    pub fn block_requests_ahead(&self, tile: usize) -> Option<Vec<BlockRequest>> {
+        let mut had: Vec<u64> = self.film.block_counts(tile)?.map(|[a, b]| a + b).collect();
+        let mut ahead = Vec::new();
+        for batch in self.batches_ahead(tile) {
+            let request = self.spread_over(&batch, &had);
+            had.iter_mut().zip(&request.blocks).for_each(|(had, new)| *had += new.spp);
+            ahead.push(request);
+        }
+        Some(ahead)
+    }
+
+    /// Spreads a request over blocks that have these samples.
+    fn spread_over(&self, request: &Request, had: &[u64]) -> BlockRequest {
+        let &Request { tile, spp, .. } = request;
+        let edge = self.params.blocks;
+        let new = match &self.shares[tile.index] {
+            None => vec![spp; had.len()],
+            Some(shares) => spread(shares, tile, edge, spp),
         };
-        Some(BlockRequest { tile, spp, edge, blocks })
+        let blocks = had.iter().zip(new).map(|(&first, spp)| BlockSamples { first, spp }).collect();
+        BlockRequest { tile, spp, edge, blocks }
     }
 
     /// Adds the mean of the new samples of each pixel that [`Session::block_request`] asked for, row-major

@@ -41,6 +41,9 @@ impl<C: StoppingCriterion> Session<C> {
     /// of the verdicts, on other machines. Batches beyond a stop are never asked for by
     /// [`Session::next_batches`].
     ///
+    /// With [`Params::blocks`](crate::Params::blocks) they end at the next verdict, which may change how
+    /// samples are spread over the blocks ([`Session::block_requests_ahead`]).
+    ///
     /// # Panics
     /// If the tile does not exist.
     pub fn batches_ahead(&self, tile: usize) -> Vec<Request> {
@@ -69,7 +72,7 @@ impl<C: StoppingCriterion> Session<C> {
     fn look_ahead(&self, tile: usize) -> u64 {
         let TileState { next, streak, verdict, target, .. } = self.tiles[tile];
         match (self.params.schedule, verdict.and_then(|v| self.expected(&v)), target) {
-            (Schedule::Every { step }, Some(expected), None) if streak == 0 => {
+            (Schedule::Every { step }, Some(expected), None) if streak == 0 && self.params.blocks == 0 => {
                 Schedule::Spaced { step }.next(self.film.spp(tile), Some(expected), 1.0).max(next)
             }
             _ => target.unwrap_or(next),

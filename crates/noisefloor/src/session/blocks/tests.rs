@@ -32,8 +32,11 @@ impl StoppingCriterion for Bright {
     }
 
     fn judge(&mut self, view: &View<'_>, tiles: &[Tile]) -> Result<Vec<Verdict>, CriterionError> {
-        let enough = |tile: &Tile| view.film.spp(tile.index) >= self.0;
-        Ok(tiles.iter().map(|tile| Verdict { converged: enough(tile), ..Verdict::default() }).collect())
+        let verdict = |tile: &Tile| {
+            let converged = view.film.spp(tile.index) >= self.0;
+            Verdict { converged, expected_spp: Some(self.0), ..Verdict::default() }
+        };
+        Ok(tiles.iter().map(verdict).collect())
     }
 }
 
@@ -224,6 +227,32 @@ fn without_shares_everything_is_as_without_blocks() {
     }
     assert!(ignored.stops().all(|stop| stop.spp == 96));
     assert!(ignored.film().grid().tiles().all(|tile| ignored.film().spp_range(tile.index) == (96, 96)));
+}
+
+/// What is asked for ahead is what will be asked for, in that order, up to the next verdict and no further:
+/// it changes the shares, whatever the criterion expects.
+#[test]
+fn requests_ahead_are_those_to_come() {
+    for schedule in [Schedule::Every { step: 32 }, Schedule::Spaced { step: 10 }] {
+        let mut session = Session::new(56, 40, Bright(256), Params { schedule, ..params(16) }).unwrap();
+        let tiles = 0..session.film().grid().len();
+        while !session.is_done() {
+            let ahead: Vec<_> = tiles.clone().map(|t| session.block_requests_ahead(t).unwrap()).collect();
+            let mut asked = vec![Vec::new(); tiles.len()];
+            while !session.is_round_complete() {
+                for request in session.next_batches() {
+                    let request = session.block_request(&request).unwrap();
+                    session.push_blocks(&request, &mean_of(&request, 7, 1e-2)).unwrap();
+                    asked[request.tile.index].push(request);
+                }
+            }
+            assert_eq!(ahead, asked, "{schedule:?}");
+            session.judge().unwrap();
+        }
+        let range = |tile| session.film().spp_range(tile);
+        assert!(tiles.into_iter().any(|tile| range(tile).0 < range(tile).1), "{schedule:?}");
+    }
+    assert!(session(Bright(256), 0).block_requests_ahead(0).is_none());
 }
 
 #[test]
