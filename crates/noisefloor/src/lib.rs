@@ -79,7 +79,8 @@ pub use model::{Judgement, Model, ModelError, ModelParts, Scores, TrainingRecord
 pub use ndarray;
 /// Viewing conditions are its types.
 pub use noisefloor_vision::{
-    Chromaticities, ChromaticityError, Eotf, Primaries, Viewing, ViewingError, ViewingParams, ViewingTextError,
+    Chromaticities, ChromaticityError, Eotf, Primaries, Viewing, ViewingError, ViewingParams,
+    ViewingTextError,
 };
 pub use oracle::Oracle;
 pub use origin::SampleOrigin;
