@@ -1,9 +1,9 @@
-//! Loop's subdivision of triangle meshes (Loop 1987; masks of the limit: Hoppe et al. 1994, §3).
+//! Loop's subdivision of triangle meshes (Loop 1987; masks of the limit: Hoppe et al. 1994, §3) with the weights of
+//! Warren 1995, which pbrt has.
 
 use super::Triangles;
 use glam::DVec3;
 use std::collections::HashMap;
-use std::f64::consts::TAU;
 
 /// A mesh without anything at its corners.
 struct Net {
@@ -121,11 +121,9 @@ impl Net {
 }
 
 impl Ring {
-    /// The weight of each neighbour (Loop 1987).
+    /// The weight of each neighbour. Loop's own weights differ from Warren's, but for three and six neighbours.
     fn weight(&self) -> f64 {
-        let n = f64::from(self.edges);
-        let c = 0.375 + 0.25 * (TAU / n).cos();
-        (0.625 - c * c) / n
+        if self.edges == 3 { 3.0 / 16.0 } else { 0.375 / f64::from(self.edges) }
     }
 
     /// Where a step of subdivision moves the vertex.
@@ -198,27 +196,27 @@ mod tests {
     }
 
     /// The limit does not depend on how finely it is drawn. Where the octahedron's own vertices end up is known: with
-    /// four neighbours around it whose mean is the middle, β = (5/8 − (3/8)²)/4 = 31/256, and the limit keeps
-    /// 1 − 4/(4 + 96/31) = 24/55 of a vertex.
+    /// four neighbours around it whose mean is the middle, β = 3/32, and the limit keeps 1 − 4/(4 + 4) = 1/2 of a
+    /// vertex.
     #[test]
     fn octahedra_become_round() {
         for levels in 0..5 {
             let fine = subdivide(&octahedron(), levels);
             for (i, p) in fine.positions[..6].iter().enumerate() {
-                let expected = octahedron().positions[i].map(|x| x * 24.0 / 55.0);
+                let expected = octahedron().positions[i].map(|x| x * 0.5);
                 assert!((glam::Vec3::from(*p) - glam::Vec3::from(expected)).length() < 1e-6, "{p:?}");
             }
         }
-        // The middle of an edge: 3/8 (a + b) after a step, among 33/64 a, 33/64 b and four such middles; half of it
-        // and a twelfth of those are 75/256 (a + b).
+        // The middle of an edge: 3/8 (a + b) after a step, among 5/8 a, 5/8 b and four such middles; half of it and a
+        // twelfth of those are 29/96 (a + b).
         let fine = subdivide(&octahedron(), 4);
-        let middle = glam::Vec3::new(75.0 / 256.0, 75.0 / 256.0, 0.0);
+        let middle = glam::Vec3::new(29.0 / 96.0, 29.0 / 96.0, 0.0);
         assert!(fine.positions.iter().any(|p| (glam::Vec3::from(p.map(f32::abs)) - middle).length() < 1e-6));
-        // Round but for 12 %: the radius, largest at the vertices, and normals along it
+        // Round but for 21 %: the radius, largest at the vertices, and normals along it
         let [low, high] = lengths(&fine);
-        assert!(high / low < 1.12 && high < 24.0 / 55.0 + 1e-6, "{low} {high}");
+        assert!(high / low < 1.21 && high < 0.5 + 1e-6, "{low} {high}");
         for (p, n) in fine.positions.iter().zip(&fine.normals) {
-            assert!(glam::Vec3::from(*p).normalize().dot(glam::Vec3::from(*n)) > 0.98);
+            assert!(glam::Vec3::from(*p).normalize().dot(glam::Vec3::from(*n)) > 0.95);
         }
     }
 
