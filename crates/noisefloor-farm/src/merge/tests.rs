@@ -145,8 +145,10 @@ proptest! {
                 let checkpoint = farm.checkpoint("farm");
                 farm = begin().resume("farm", checkpoint).unwrap();
             }
-            let again = ShardSet::gather(&job, &paths).merge_into(&mut farm).unwrap();
+            let mut all = ShardSet::gather(&job, &paths);
+            let again = all.merge_into(&mut farm).unwrap();
             prop_assert_eq!(again, Merged::default(), "a merge repeated adds something");
+            prop_assert!(all.problems().is_empty(), "{:?}", all.problems());
         }
         prop_assert!(outcome(&farm) == one_machine(spaced, blocks));
         // From scratch, too
