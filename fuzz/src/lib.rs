@@ -2,7 +2,7 @@
 //!
 //! A target takes any bytes and must return: no panic, no abort, no endless loop, no memory beyond what the
 //! bytes pay for. Checksums and lengths around the bytes are repaired first, so that mutants get past them:
-//! `containers` and `pictures` do so. Every target has seeds, small valid inputs.
+//! `containers`, `shards` and `pictures` do so. Every target has seeds, small valid inputs.
 //!
 //! - `cargo test -p noisefloor-fuzz` runs the seeds, all inputs that ever failed (`found/TARGET/*`), and a
 //!   second of mutants of each target. It needs nothing but Rust; CI does it. `NOISEFLOOR_FUZZ_SECONDS=200`
@@ -14,6 +14,7 @@ mod containers;
 mod files;
 mod pictures;
 mod scenes;
+mod shards;
 mod texts;
 
 /// A parser to fuzz.
@@ -31,6 +32,7 @@ pub struct Target {
 pub const TARGETS: &[Target] = &[
     Target { name: "model", run: containers::model, seeds: containers::model_seeds },
     Target { name: "checkpoint", run: containers::checkpoint, seeds: containers::checkpoint_seeds },
+    Target { name: "shard", run: shards::shard, seeds: shards::shard_seeds },
     Target { name: "exr", run: pictures::exr, seeds: pictures::exr_seeds },
     Target { name: "pfm", run: pictures::pfm, seeds: pictures::pfm_seeds },
     Target { name: "png", run: pictures::png, seeds: pictures::png_seeds },

@@ -1,0 +1,82 @@
+//! Shards of a farm: the bytes are the header; magic, version, length and checksum are right, and samples follow.
+
+use crate::files::Folder;
+use noisefloor::{FixedSpp, Params, Session, SourceIdentity};
+use noisefloor_farm::{PlannedBatch, Shard, ShardJob, ShardSet};
+
+/// Magic and version.
+const HEAD: usize = 12;
+/// Magic, version, length and checksum.
+const PREFIX: usize = HEAD + 8 + 32;
+
+fn wrap(whole: &[u8], header: &[u8]) -> Vec<u8> {
+    let length = (header.len() as u64).to_le_bytes();
+    let samples = &whole[PREFIX + header_of(whole).len()..];
+    [&whole[..HEAD], &length, blake3::hash(header).as_bytes(), header, samples].concat()
+}
+
+fn header_of(whole: &[u8]) -> &[u8] {
+    let length = u64::from_le_bytes(whole[HEAD..HEAD + 8].try_into().expect("eight bytes"));
+    &whole[PREFIX..][..length as usize]
+}
+
+pub(crate) fn shard(header: &[u8]) {
+    thread_local!(static BEFORE: (Folder, [Vec<u8>; 2]) = (Folder::new(), [written(0), written(16)]));
+    BEFORE.with(|(folder, wholes)| {
+        for (blocks, whole) in [0, 16].into_iter().zip(wholes) {
+            merge(folder, blocks, &wrap(whole, header));
+        }
+    });
+}
+
+/// Samples that come of a shard.
+fn merge(folder: &Folder, blocks: usize, bytes: &[u8]) -> u64 {
+    let path = folder.write("shard.nfs", bytes);
+    let mut session = session(blocks);
+    let mut shards = ShardSet::gather(&job(&session), &[path]);
+    shards.merge_into(&mut session).map_or(0, |merged| merged.samples)
+}
+
+pub(crate) fn shard_seeds() -> Vec<Vec<u8>> {
+    [0, 16].map(|blocks| header_of(&written(blocks)).to_vec()).into()
+}
+
+fn session(blocks: usize) -> Session<FixedSpp> {
+    let params = Params { tile: 32, blocks, ..Params::default() };
+    Session::new(40, 32, FixedSpp(100), params).expect("a small picture")
+}
+
+fn job(session: &Session<FixedSpp>) -> ShardJob {
+    ShardJob::of(SourceIdentity::new("grey"), session)
+}
+
+/// A shard with samples for both tiles.
+fn written(blocks: usize) -> Vec<u8> {
+    let session = session(blocks);
+    let mut shard = Shard::new(job(&session));
+    for PlannedBatch { tile, first, spp, .. } in PlannedBatch::ahead(&session) {
+        let pixels = session.film().grid().tile(tile).pixels();
+        // By blocks, so that mutants have some
+        let edges = if blocks > 0 { pixels / (blocks * blocks) } else { 0 };
+        let batch = PlannedBatch { tile, first, spp, blocks: vec![(first, spp); edges] };
+        shard.add(batch, spp, vec![[0.5; 3]; pixels]);
+    }
+    let folder = Folder::new();
+    let path = folder.write("new.nfs", "");
+    shard.write(&path).expect("space for a shard");
+    std::fs::read(path).expect("what was just written")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn seeds_are_merged() {
+        for blocks in [0, 16] {
+            let whole = written(blocks);
+            let again = wrap(&whole, header_of(&whole));
+            assert_eq!(merge(&Folder::new(), blocks, &again), 40 * 32 * 100);
+        }
+    }
+}
