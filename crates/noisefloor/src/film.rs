@@ -3,42 +3,15 @@
 use crate::blocks::BlockCounts;
 use crate::rgb::Rgb;
 use crate::tile::{Tile, TileGrid};
-use thiserror::Error;
 
 mod blocks;
+mod error;
 mod planes;
+pub use error::FilmError;
 pub(crate) use planes::FilmHead;
 
-/// A batch that the film refuses.
-#[derive(Debug, Error, Clone, PartialEq, Eq)]
-pub enum FilmError {
-    /// The tile does not exist.
-    #[error("tile {0} does not exist: the film has {1}")]
-    Tile(usize, usize),
-    /// The batch has another number of pixels than the tile.
-    #[error("a batch of {got} pixels for tile {tile}, which has {expected}")]
-    Pixels {
-        /// The tile.
-        tile: usize,
-        /// Pixels in the batch.
-        got: usize,
-        /// Pixels in the tile.
-        expected: usize,
-    },
-    /// A batch without samples, or a running mean of no more samples than the film has.
-    #[error("a batch for tile {tile} brings no new samples ({had} before, {now} now)")]
-    NothingNew {
-        /// The tile.
-        tile: usize,
-        /// Samples before.
-        had: u64,
-        /// Samples claimed now.
-        now: u64,
-    },
-    /// Block by block, the batch is none that a session of this film asks for.
-    #[error("a batch for blocks of tile {0} that the film does not have, or without samples in one of them")]
-    Blocks(usize),
-}
+/// Samples per pixel that no half of a tile has: sums over the largest picture, of 2²⁸ pixels, stay within 64 bits.
+const COUNTABLE: u64 = 1 << 34;
 
 /// One half: a mean for each pixel, with the rounding error of its last bits kept beside it.
 ///
@@ -188,6 +161,7 @@ impl Film {
         if spp == 0 {
             return Err(FilmError::NothingNew { tile: tile.index, had: a + b, now: a + b });
         }
+        Self::countable(tile, a + b, spp)?;
         let half = self.accumulate(tile, spp, mean);
         if let Some(blocks) = &mut self.blocks {
             blocks.count(tile, half, std::iter::repeat(spp));
@@ -249,6 +223,12 @@ impl Film {
         Ok(tile)
     }
 
+    /// Checks that `spp` more samples can be counted.
+    fn countable(tile: Tile, had: u64, spp: u64) -> Result<(), FilmError> {
+        let now = had.saturating_add(spp);
+        if now < COUNTABLE { Ok(()) } else { Err(FilmError::TooMany { tile: tile.index, now }) }
+    }
+
     /// Validates a film that was read, against an empty one of the same job.
     pub(crate) fn check_like(&self, fresh: &Self) -> Result<(), &'static str> {
         if self.grid != fresh.grid || self.halves.len() != fresh.halves.len() {
@@ -268,8 +248,7 @@ impl Film {
         }
         let possible = |tile: Tile| {
             let halves = || self.halves.iter().zip(self.counts[tile.index]);
-            // Sums over the largest picture, of 2²⁸ pixels, stay within 64 bits
-            self.counts[tile.index].iter().all(|&count| count < 1 << 34)
+            self.counts[tile.index].iter().all(|&count| count < COUNTABLE)
                 && tile
                     .rows(self.grid.width())
                     .flatten()
@@ -279,7 +258,7 @@ impl Film {
             return Err("its film counts other blocks");
         }
         let mut of_blocks = self.blocks.iter().flat_map(|blocks| &blocks.counts).flatten();
-        let countable = of_blocks.all(|&count| count < 1 << 34);
+        let countable = of_blocks.all(|&count| count < COUNTABLE);
         if !countable || !self.grid.tiles().all(possible) || self.rejected > self.averages() {
             return Err("its film counts samples that there cannot be");
         }
@@ -381,7 +360,7 @@ impl Film {
         match what {
             0 => self.halves[0].mean.truncate(3),
             1 => self.halves[0].mean[0][0] = f32::NAN,
-            2 => self.counts[0][0] = 1 << 34,
+            2 => self.counts[0][0] = COUNTABLE,
             3 => self.rejected = u64::MAX,
             _ => self.halves[0].rejected = vec![u32::MAX; self.halves[0].mean.len()],
         }

@@ -61,6 +61,10 @@ impl Film {
         if tile != request.tile || request.spp == 0 || !self.blocks.as_ref().is_some_and(fits) {
             return Err(FilmError::Blocks(tile.index));
         }
+        let (_, most) = self.spp_range(tile.index);
+        for spp in request.blocks.iter().map(|block| block.spp).chain([request.spp]) {
+            Self::countable(tile, most, spp)?;
+        }
         let half = self.accumulate(tile, request.spp, mean);
         if let Some(blocks) = &mut self.blocks {
             blocks.count(tile, half, request.blocks.iter().map(|block| block.spp));

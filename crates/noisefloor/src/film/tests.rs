@@ -1,5 +1,6 @@
 use super::*;
 use crate::blocks::BlockRequest;
+use crate::{FixedSpp, Params, Session};
 use proptest::prelude::*;
 
 fn small() -> Film {
@@ -16,6 +17,31 @@ fn batches_go_to_the_lighter_half() {
     assert_eq!(film.half_counts(1), [150, 110]);
     assert_eq!(film.spp(0), 0);
     assert_eq!(film.total_samples(), 260 * 64);
+}
+
+/// No caller can make counts overflow, whatever it claims to have sampled.
+#[test]
+fn counts_have_a_limit() {
+    let grey = [[1.0; 3]; 64];
+    let mut film = small();
+    film.add(1, (1 << 33) - 1, &grey).unwrap();
+    film.add(1, 1 << 33, &grey).unwrap();
+    for spp in [1, u64::MAX] {
+        assert!(matches!(film.add(1, spp, &grey), Err(FilmError::TooMany { tile: 1, .. })), "{spp}");
+        assert!(film.add_running(1, u64::MAX, &grey).is_err());
+    }
+    assert_eq!(film.spp(1), (1 << 34) - 1);
+
+    let params = Params { tile: 32, blocks: 16, ..Params::default() };
+    let mut session = Session::new(32, 32, FixedSpp(100), params).unwrap();
+    let asked = session.block_request(&session.requests()[0]).unwrap();
+    for (of_tile, of_block) in [(u64::MAX, 8), (8, u64::MAX)] {
+        let mut blocks = asked.clone();
+        (blocks.spp, blocks.blocks[3].spp) = (of_tile, of_block);
+        let refused = session.push_blocks(&blocks, &[[1.0; 3]; 32 * 32]);
+        assert!(matches!(refused, Err(FilmError::TooMany { .. })), "{refused:?}");
+    }
+    assert_eq!(session.film().total_samples(), 0);
 }
 
 #[test]
