@@ -49,6 +49,25 @@ pub(crate) unsafe fn array_mut<'a, T>(
     Ok(unsafe { std::slice::from_raw_parts_mut(pointer, wanted) })
 }
 
+/// An array of at least `wanted` elements, to be written: the first `wanted` of `capacity`.
+///
+/// # Safety
+/// As [`array_mut`], for `capacity` elements.
+pub(crate) unsafe fn room<'a, T>(
+    pointer: *mut T,
+    capacity: usize,
+    wanted: usize,
+    what: &str,
+) -> Result<&'a mut [T], Failure> {
+    check(pointer, what)?;
+    if capacity < wanted {
+        let message = format!("{what} has {capacity} elements, and at least {wanted} are needed");
+        return Err(Failure::new(NfStatus::Size, message));
+    }
+    // SAFETY: there are `capacity` elements by the caller's promise, which are enough.
+    unsafe { array_mut(pointer, wanted, wanted, what) }
+}
+
 fn expect(got: usize, wanted: usize, what: &str) -> Result<(), Failure> {
     if got == wanted {
         return Ok(());

@@ -1,5 +1,6 @@
 //! The functions, called as C calls them.
 
+use crate::blocks::*;
 use crate::files::*;
 use crate::oracle::*;
 use crate::params::*;
@@ -10,6 +11,8 @@ use crate::status::*;
 use noisefloor::{CriterionError, Oracle, Params, Rgb, Session, Tile};
 use std::ffi::{CStr, CString};
 use std::ptr::{null, null_mut};
+
+mod blocks;
 
 const WIDTH: usize = 96;
 const HEIGHT: usize = 80;
@@ -239,6 +242,8 @@ fn every_pointer_may_be_null_and_none_is_followed_then() {
             nf_session_push(null(), 0, 1, mean.as_ptr(), mean.len()),
             nf_session_push_running(null(), 0, 1, mean.as_ptr(), mean.len()),
             nf_session_push_image(null(), 0, 1, mean.as_ptr(), mean.len(), 3),
+            nf_session_block_request(null(), 0, 1, &mut NfBlocks::default(), null_mut(), 4),
+            nf_session_push_blocks(null(), 0, 1, null(), 4, mean.as_ptr(), mean.len()),
             nf_session_judge(null(), &mut n),
             nf_session_open_tiles(null(), &mut n),
             nf_session_states(null(), null_mut(), 0),
@@ -249,7 +254,7 @@ fn every_pointer_may_be_null_and_none_is_followed_then() {
             nf_session_save(null(), c"".as_ptr(), c"".as_ptr()),
             nf_session_resume(null(), c"".as_ptr(), c"".as_ptr()),
         ];
-        assert_eq!(without_session, [NullPointer; 14]);
+        assert_eq!(without_session, [NullPointer; 16]);
         let without_place = [
             nf_session_tile(s, 0, null_mut()),
             nf_session_requests(s, null_mut(), 9, &mut n),
@@ -321,6 +326,10 @@ fn sizes_tiles_and_parameters_are_checked() {
         assert_eq!(new(64, &NfParams { tone_mapping: 7, ..ok }), Argument);
         assert_eq!(new(64, &NfParams { key: f32::NAN, ..ok }), Argument);
         assert_eq!(new(64, &NfParams { step: 1, ..ok }), Argument);
+        for blocks in [1, 8, 24, 64, u32::MAX] {
+            assert_eq!(new(64, &NfParams { blocks, ..ok }), Argument);
+            assert!(message().starts_with(&format!("blocks of {blocks} pixels")), "{}", message());
+        }
         assert_eq!(new(64, &NfParams { viewing: c"moon".as_ptr(), ..ok }), Argument);
         nf_oracle_free(oracle);
     }
