@@ -55,11 +55,11 @@ fn written(blocks: usize) -> Vec<u8> {
     let session = session(blocks);
     let mut shard = Shard::new(job(&session));
     for PlannedBatch { tile, first, spp, .. } in PlannedBatch::ahead(&session) {
-        let pixels = session.film().grid().tile(tile).pixels();
+        let place = session.film().grid().tile(tile);
         // By blocks, so that mutants have some
-        let edges = if blocks > 0 { pixels / (blocks * blocks) } else { 0 };
-        let batch = PlannedBatch { tile, first, spp, blocks: vec![(first, spp); edges] };
-        shard.add(batch, spp, vec![[0.5; 3]; pixels]);
+        let count = if blocks > 0 { place.width.div_ceil(blocks) * place.height.div_ceil(blocks) } else { 0 };
+        let batch = PlannedBatch { tile, first, spp, blocks: vec![(first, spp); count] };
+        shard.add(batch, spp, vec![[0.5; 3]; place.pixels()]);
     }
     let folder = Folder::new();
     let path = folder.write("new.nfs", "");
@@ -76,7 +76,9 @@ mod tests {
         for blocks in [0, 16] {
             let whole = written(blocks);
             let again = wrap(&whole, header_of(&whole));
-            assert_eq!(merge(&Folder::new(), blocks, &again), 40 * 32 * 100);
+            let planned: u64 = PlannedBatch::ahead(&session(blocks)).iter().map(|b| b.spp).sum();
+            // Two tiles of 32 and of 8 by 32 pixels, with as many samples per pixel
+            assert_eq!(merge(&Folder::new(), blocks, &again), planned / 2 * 40 * 32);
         }
     }
 }
