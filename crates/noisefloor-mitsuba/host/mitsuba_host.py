@@ -127,6 +127,8 @@ def load(mi, init, warnings):
     path = init["scene"]
     mi.file_resolver().append(os.path.dirname(path))
     config = mi.parser.ParserConfig(mi.variant())
+    # Merged meshes come in an order that changes from process to process, and so do lights and what a seed gives
+    config.merge_meshes = False
     state = mi.parser.parse_file(config, path)
     mi.parser.transform_all(config, state)
     nodes = state.nodes

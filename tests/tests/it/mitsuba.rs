@@ -206,6 +206,41 @@ fn a_new_process_does_not_repeat_the_old_one() {
     }
 }
 
+/// Mitsuba merges meshes in an order that changes from process to process, and with it that of the lights.
+#[test]
+fn scenes_of_many_meshes_are_the_same_in_a_new_process() {
+    if !usable(&RENDERER) {
+        return;
+    }
+    let cube = |i: usize| {
+        let (x, grey) = (i as f32 - 3.5, 0.1 * (i % 4) as f32);
+        let light = if i.is_multiple_of(2) {
+            format!(r#"<emitter type="area"><rgb name="radiance" value="{}"/></emitter>"#, i + 1)
+        } else {
+            String::new()
+        };
+        format!(
+            r#"<shape type="cube"><transform name="to_world"><scale value="0.3"/><translate x="{x}" y="{i}"/></transform>
+            <bsdf type="diffuse"><rgb name="reflectance" value="{grey}"/></bsdf>{light}</shape>"#
+        )
+    };
+    let cubes: String = (0..8).map(cube).collect();
+    let text = format!(
+        r#"<scene version="3.0.0"><sensor type="perspective"><transform name="to_world">
+        <lookat origin="0, 3, 12" target="0, 3, 0" up="0, 1, 0"/></transform></sensor>
+        <shape type="rectangle"><transform name="to_world"><scale value="9"/><translate z="-1"/></transform></shape>
+        {cubes}</scene>"#
+    );
+    let folder = tempfile::tempdir().unwrap();
+    let scene = folder.path().join("cubes.xml");
+    std::fs::write(&scene, text).unwrap();
+    let begin = || values(&mut open(&scene, (32, 32), variants()[0]), request(0, (0, 0), (32, 32), 0));
+    let first = begin();
+    for process in 0..4 {
+        assert!(begin() == first, "process {process} has another picture");
+    }
+}
+
 #[test]
 fn scenes_that_cannot_be_loaded_are_errors() {
     if !usable(&RENDERER) {
