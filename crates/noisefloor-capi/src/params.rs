@@ -127,7 +127,6 @@ impl NfParams {
             consecutive: self.consecutive,
             blocks: self.blocks as usize,
             audience: Audience { slope: self.audience_slope, offset: self.audience_offset },
-            ..Params::default()
         })
     }
 }
