@@ -1,9 +1,9 @@
 //! Rays through a scene, and the surfaces they hit.
 
-use crate::accel::{Hit, HitShape, Stack};
-use crate::bsdf::{Glossy, MIN_ROUGHNESS, RoughGlass, schlick};
+use crate::accel::{Hit, HitShape, Spot, Stack};
+use crate::bsdf::{Glossy, LobesAt, MIN_ROUGHNESS, RoughGlass, schlick};
 use crate::geometry::NO;
-use crate::material::{Bsdf, CompiledMaterial};
+use crate::material::{Bsdf, CompiledMaterial, Reflectance};
 use crate::math::{Ray, Vec3};
 use crate::relief::{self, Relief};
 use crate::rng;
@@ -50,7 +50,7 @@ impl Scene {
         test: OpacityTest,
     ) -> Hit {
         if OPACITY {
-            self.bvh.closest(ray, stack, |prim, uv| self.is_solid(prim, uv, test))
+            self.bvh.closest(ray, stack, |prim, spot| self.is_solid(prim, spot, test))
         } else {
             self.bvh.closest(ray, stack, |_, _| true)
         }
@@ -66,23 +66,30 @@ impl Scene {
         test: OpacityTest,
     ) -> bool {
         if OPACITY {
-            self.bvh.blocked::<true>(ray, t_max, stack, |prim, uv| self.is_solid(prim, uv, test))
+            self.bvh.blocked::<true>(ray, t_max, stack, |prim, spot| self.is_solid(prim, spot, test))
         } else {
             self.bvh.blocked::<false>(ray, t_max, stack, |_, _| true)
         }
     }
 
-    fn is_solid(&self, prim: u32, uv: [f32; 2], test: OpacityTest) -> bool {
+    fn is_solid(&self, prim: u32, spot: Spot, test: OpacityTest) -> bool {
         let group = self.geometry.group(prim);
         match &self.materials[group.material as usize].opacity {
             None => true,
             Some(opacity) => {
-                let [u, v] = self.geometry.texture_coordinates(group, prim, uv);
+                let ([u, v], far) = match spot {
+                    Spot::Plane(uv) => (self.geometry.texture_coordinates(group, prim, uv), false),
+                    Spot::Sphere { normal, far } => {
+                        (sphere_coordinates(self.geometry.to_local(group, normal)), far)
+                    }
+                };
                 let c = opacity.eval(u, v);
+                // The two sides of a sphere decide for themselves
+                let side = u64::from(far) << 63;
                 let number = match test {
-                    OpacityTest::Random(seed) => rng::hash(seed, prim),
+                    OpacityTest::Random(seed) => rng::hash(seed ^ side, prim),
                     OpacityTest::Stratified { index, seed } => {
-                        sobol_burley::sample(index, 0, rng::mix(seed ^ u64::from(prim)) as u32)
+                        sobol_burley::sample(index, 0, rng::mix(seed ^ side ^ u64::from(prim)) as u32)
                     }
                 };
                 number < (c.x + c.y + c.z) * (1.0 / 3.0)
@@ -211,8 +218,26 @@ impl<'a> Intersection<'a> {
                 let base = base.tinted(self.uv, self.tint);
                 Some(Glossy::blend(coat, base, alpha, values.z, cos))
             }
+            Bsdf::Lobes { diffuse, through, specular, gloss, oren_nayar, ggx } => {
+                let at = |colour: &Reflectance| colour.tinted(self.uv, self.tint);
+                let (diffuse, through, specular) = (at(diffuse), at(through), at(specular));
+                let (gloss, oren_nayar, ggx) = (*gloss, *oren_nayar, *ggx);
+                Some(Glossy::lobes(LobesAt { diffuse, through, specular, gloss, oren_nayar, ggx }, cos))
+            }
             _ => None,
         }
+    }
+
+    /// Whether a direction `dir`, `wi` in the frame of the shading normal, is on the same side of both normals. A
+    /// shading normal must not carry light through the surface that it reflects, or the other way round.
+    #[inline]
+    pub(crate) fn is_consistent(&self, dir: Vec3, wi: Vec3) -> bool {
+        (dir.dot(self.flat) > 0.0) == (wi.z > 0.0)
+    }
+
+    /// The same surface seen from behind.
+    pub(crate) fn turned_over(&self) -> Self {
+        Self { flat: -self.flat, normal: -self.normal, front: !self.front, ..*self }
     }
 
     /// Its rough boundary, seen from the ray's side; `None` if it is something else.

@@ -30,6 +30,15 @@ pub(super) struct Round {
     pub(super) shape: RoundShape,
 }
 
+/// Where on a surface a ray meets it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Spot {
+    /// Coordinates along its edges.
+    Plane([f32; 2]),
+    /// The normal outside; and whether the ray came in through the other side of the sphere.
+    Sphere { normal: Vec3, far: bool },
+}
+
 #[derive(Clone, Copy, Debug)]
 pub(super) enum RoundShape {
     Sphere { radius: f32 },
@@ -105,12 +114,22 @@ impl Round {
         Self { centre: centre.into(), prim, shape: form }
     }
 
-    /// The nearest distance in (0, `t_max`) and the coordinates along the edges there, if any.
+    /// The nearest distance in (0, `t_max`) and the spot there, if any; with `far` that of the far side of a
+    /// sphere that has both sides in front.
     #[inline]
-    pub(super) fn intersect(&self, ray: &Ray, t_max: f32) -> Option<(f32, [f32; 2])> {
+    pub(super) fn intersect(&self, ray: &Ray, t_max: f32, far: bool) -> Option<(f32, Spot)> {
         let to = self.centre - ray.origin;
-        let (t, uv) = match self.shape {
-            RoundShape::Sphere { radius } => (sphere(to, ray.dir, radius)?, [0.0; 2]),
+        let (t, spot) = match self.shape {
+            RoundShape::Sphere { radius } => {
+                let [low, high] = sphere(to, ray.dir, radius)?;
+                let t = match far {
+                    false if low > 0.0 => low,
+                    true if low <= 0.0 => return None,
+                    _ => high,
+                };
+                (t, Spot::Sphere { normal: (ray.dir * t - to) / radius, far })
+            }
+            RoundShape::Disk { .. } if far => return None,
             RoundShape::Disk { normal, dual_u, dual_v } => {
                 let t = normal.dot(to) / normal.dot(ray.dir);
                 let at = ray.dir * t - to;
@@ -119,18 +138,33 @@ impl Round {
                     return None;
                 }
                 // Along the plane t is NaN, and not below `t_max`
-                (t, uv)
+                (t, Spot::Plane(uv))
             }
         };
-        (t > 0.0 && t < t_max).then_some((t, uv))
+        (t > 0.0 && t < t_max).then_some((t, spot))
+    }
+
+    /// The nearest spot before `t_max` that is `solid`.
+    #[inline]
+    pub(super) fn meets(
+        &self,
+        ray: &Ray,
+        t_max: f32,
+        solid: &impl Fn(u32, Spot) -> bool,
+    ) -> Option<(f32, Spot)> {
+        let first = self.intersect(ray, t_max, false)?;
+        if solid(self.prim, first.1) {
+            return Some(first);
+        }
+        self.intersect(ray, t_max, true).filter(|(_, spot)| solid(self.prim, *spot))
     }
 }
 
-/// Where a ray from the origin first meets a sphere around `to`, in front. The discriminant is taken at the
+/// Where a ray from the origin meets a sphere around `to`, the nearer side first. The discriminant is taken at the
 /// point nearest to the centre instead of as b² − c (Haines et al. 2019, "Precision Improvements for
 /// Ray/Sphere Intersection").
 #[inline]
-fn sphere(to: Vec3, dir: Vec3, radius: f32) -> Option<f32> {
+fn sphere(to: Vec3, dir: Vec3, radius: f32) -> Option<[f32; 2]> {
     let b = to.dot(dir);
     let discriminant = radius * radius - (to - dir * b).length_squared();
     if discriminant <= 0.0 {
@@ -138,6 +172,5 @@ fn sphere(to: Vec3, dir: Vec3, radius: f32) -> Option<f32> {
     }
     let q = b + discriminant.sqrt().copysign(b);
     let (r1, r2) = ((to.length_squared() - radius * radius) / q, q);
-    let (low, high) = if r1 < r2 { (r1, r2) } else { (r2, r1) };
-    Some(if low > 0.0 { low } else { high })
+    Some(if r1 < r2 { [r1, r2] } else { [r2, r1] })
 }

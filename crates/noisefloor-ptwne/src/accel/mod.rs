@@ -15,4 +15,5 @@ mod traverse;
 mod tests;
 
 pub(crate) use bvh::{Bvh, Hit, HitShape, Stack};
+pub(crate) use leaf::Spot;
 pub(crate) use shape::{Shape, bounds};

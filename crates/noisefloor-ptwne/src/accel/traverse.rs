@@ -1,15 +1,15 @@
 //! Walking the hierarchy along a ray.
 
 use super::bvh::{Bvh, Hit, MISS, ROUND, Stack};
-use super::leaf::{Leaf, NO_PACK, Round};
+use super::leaf::{Leaf, NO_PACK, Round, Spot};
 use super::node::{LEAF, WideRay};
 use crate::math::{Ray, Vec3};
 
 impl Bvh {
-    /// The nearest surface along the ray. `solid` decides whether the surface of an index stops the ray at
-    /// (u, v) or is transparent there.
+    /// The nearest surface along the ray. `solid` decides whether the surface of an index stops the ray at a
+    /// spot or is transparent there.
     #[inline]
-    pub(crate) fn closest(&self, ray: &Ray, stack: &mut Stack, solid: impl Fn(u32, [f32; 2]) -> bool) -> Hit {
+    pub(crate) fn closest(&self, ray: &Ray, stack: &mut Stack, solid: impl Fn(u32, Spot) -> bool) -> Hit {
         if self.rounds.is_empty() {
             self.nearest::<false>(ray, stack, solid)
         } else {
@@ -22,7 +22,7 @@ impl Bvh {
         &self,
         ray: &Ray,
         stack: &mut Stack,
-        solid: impl Fn(u32, [f32; 2]) -> bool,
+        solid: impl Fn(u32, Spot) -> bool,
     ) -> Hit {
         let wide = WideRay::new(ray);
         let mut best = MISS;
@@ -76,7 +76,7 @@ impl Bvh {
         ray: &Ray,
         wide: &WideRay,
         best: &mut Hit,
-        solid: &impl Fn(u32, [f32; 2]) -> bool,
+        solid: &impl Fn(u32, Spot) -> bool,
     ) {
         let leaf = self.leaf_of::<ROUNDS>(node);
         if leaf.pack != NO_PACK {
@@ -87,7 +87,7 @@ impl Bvh {
                 while mask != 0 {
                     let lane = mask.trailing_zeros() as usize & 3;
                     mask &= mask - 1;
-                    if t[lane] < best.t && solid(pack.prim[lane], [u[lane], v[lane]]) {
+                    if t[lane] < best.t && solid(pack.prim[lane], Spot::Plane([u[lane], v[lane]])) {
                         *best =
                             Hit { t: t[lane], slot: leaf.pack << 2 | lane as u32, uv: [u[lane], v[lane]] };
                     }
@@ -97,9 +97,8 @@ impl Bvh {
         if ROUNDS {
             for index in leaf.first_round..leaf.first_round + leaf.rounds {
                 let round = &self.rounds[index as usize];
-                if let Some((t, uv)) = round.intersect(ray, best.t)
-                    && solid(round.prim, uv)
-                {
+                if let Some((t, spot)) = round.meets(ray, best.t, solid) {
+                    let uv = if let Spot::Plane(uv) = spot { uv } else { [0.0; 2] };
                     *best = Hit { t, slot: ROUND | index, uv };
                 }
             }
@@ -120,7 +119,7 @@ impl Bvh {
         ray: &Ray,
         t_max: f32,
         stack: &mut Stack,
-        solid: impl Fn(u32, [f32; 2]) -> bool,
+        solid: impl Fn(u32, Spot) -> bool,
     ) -> bool {
         if self.rounds.is_empty() {
             self.any::<false, OPACITY>(ray, t_max, stack, solid)
@@ -135,7 +134,7 @@ impl Bvh {
         ray: &Ray,
         t_max: f32,
         stack: &mut Stack,
-        solid: impl Fn(u32, [f32; 2]) -> bool,
+        solid: impl Fn(u32, Spot) -> bool,
     ) -> bool {
         let wide = WideRay::new(ray);
         let mut top = 0;
@@ -174,7 +173,7 @@ impl Bvh {
         ray: &Ray,
         wide: &WideRay,
         t_max: f32,
-        solid: &impl Fn(u32, [f32; 2]) -> bool,
+        solid: &impl Fn(u32, Spot) -> bool,
     ) -> bool {
         let leaf = self.leaf_of::<ROUNDS>(node);
         if leaf.pack != NO_PACK {
@@ -186,13 +185,13 @@ impl Bvh {
             while mask != 0 {
                 let lane = mask.trailing_zeros() as usize & 3;
                 mask &= mask - 1;
-                if solid(pack.prim[lane], [u[lane], v[lane]]) {
+                if solid(pack.prim[lane], Spot::Plane([u[lane], v[lane]])) {
                     return true;
                 }
             }
         }
         let first = leaf.first_round as usize;
-        let meets = |round: &Round| round.intersect(ray, t_max).is_some_and(|(_, uv)| solid(round.prim, uv));
+        let meets = |round: &Round| round.meets(ray, t_max, solid).is_some();
         ROUNDS && self.rounds[first..first + leaf.rounds as usize].iter().any(meets)
     }
 

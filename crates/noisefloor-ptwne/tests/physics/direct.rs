@@ -317,6 +317,40 @@ fn transparent_surfaces_are_seen_through() {
     agrees(mean(scene, 16, 64, 16, 0, RenderOptions::default()), 1.0 / 3.0, 1e-6);
 }
 
+/// Through a ball before a sky of radiance 1: rays have to pass two sides, by the opacity that each has
+/// where it is met.
+#[test]
+fn balls_stop_rays_on_both_sides() {
+    let ball = |albedo: f32, opacity: Texture, height: f32| {
+        let camera = look([0.0, height, 4.0], [0.0, height, 0.0], [0.0, 1.0, 0.0], 2.0);
+        scene(camera, |b| {
+            let options = MaterialOptions { opacity: Some(opacity), ..MaterialOptions::default() };
+            let m = b.material_with(Material::diffuse([albedo; 3]), options).unwrap();
+            b.sphere([0.0; 3], 1.0, m, None).unwrap();
+            b.environment(Environment::constant([1.0; 3])).unwrap();
+        })
+    };
+    let seen = |scene: Scene| {
+        let mut source = Ptwne::new(scene.clone(), 16, 16, RenderOptions::default()).unwrap();
+        let quick = source.reference().unwrap().unwrap().pixels;
+        let quick = quick.iter().map(|pixel| f64::from(pixel[1])).sum::<f64>() / quick.len() as f64;
+        (mean(scene, 16, 64, 16, 0, RenderOptions::default()), quick)
+    };
+    let (traced, quick) = seen(ball(0.0, [0.4; 3].into(), 0.0));
+    agrees(traced, 0.36, 1e-6);
+    assert!((quick - 0.36).abs() < 0.01, "{quick}");
+    // An albedo of ρ: inside, the radiance is I = ½ + ½ρI, and outside ½ρ + ½I
+    let (traced, _) = seen(ball(0.6, [0.5; 3].into(), 0.0));
+    agrees(traced, 0.3 + 0.25 / 0.7, 1e-4);
+    // The northern half is opaque, the southern is not there
+    let mut image = ImageTexture::new(1, 2, Pixels::Linear8([[255; 3], [0; 3]].into()));
+    image.nearest = true;
+    for (height, expected) in [(0.5, 0.0), (-0.5, 1.0)] {
+        let ((traced, _), quick) = seen(ball(0.0, Texture::Image(image.clone()), height));
+        assert!((traced - expected).abs() < 1e-6 && (quick - expected).abs() < 1e-6, "{traced} {quick}");
+    }
+}
+
 #[test]
 fn backs_of_one_sided_surfaces_are_black() {
     for (z, expected) in [(4.0, 0.5), (-4.0, 0.0)] {
