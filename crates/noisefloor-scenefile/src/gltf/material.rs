@@ -149,7 +149,7 @@ impl<'m> Reader<'m, '_> {
             None => None,
         };
         // The inside of glass is part of it, and a pane has no inside
-        let glass = matches!(material, Material::Glass { .. } | Material::ThinGlass { .. });
+        let glass = matches!(material, Material::RoughGlass { .. } | Material::ThinGlass { .. });
         let cover = MaterialOptions {
             opacity: self.opacity(base_texture)?,
             one_sided: !source.double_sided && !glass,
@@ -270,7 +270,7 @@ impl<'m> Reader<'m, '_> {
         Ok(Material::MetallicRoughness { base, metallic_roughness, ior })
     }
 
-    /// `KHR_materials_transmission`: all or nothing, and smooth. A pane, unless `KHR_materials_volume` says
+    /// `KHR_materials_transmission`: all or nothing. A smooth pane, unless `KHR_materials_volume` says
     /// that the surface bounds a volume.
     fn transmission(&mut self, base: Option<&Info>) -> Result<Option<Material>, LoadError> {
         let Some(transmission) = self.extensions().and_then(|e| e.transmission.as_ref()) else {
@@ -288,21 +288,25 @@ impl<'m> Reader<'m, '_> {
             return Ok(None);
         }
         let pbr = &self.source.pbr_metallic_roughness;
-        if pbr.roughness_factor.0 > 0.0 {
-            let what = format_args!("a roughness of {} is ignored: glass is smooth", pbr.roughness_factor.0);
-            self.notes.warn(&self.place, what);
-        }
         if base.is_some() {
             self.notes.warn(&self.place, "its base colour texture is ignored: glass has one tint");
         }
         let [r, g, b, _] = pbr.base_color_factor.0;
         let tint = [r, g, b].map(|x| self.within(x, "baseColorFactor", 0.0, 1.0));
+        let roughness = self.within(pbr.roughness_factor.0, "roughnessFactor", 0.0, 1.0);
         let ior = self.ior(0.25);
-        Ok(Some(if self.is_solid() {
-            Material::Glass { ior, tint }
-        } else {
-            Material::ThinGlass { ior, tint }
-        }))
+        if self.is_solid() {
+            if pbr.metallic_roughness_texture.is_some() {
+                let what = "the texture of its roughness is ignored, its factor used alone";
+                self.notes.warn(&self.place, what);
+            }
+            return Ok(Some(Material::RoughGlass { ior, tint, roughness: roughness * roughness }));
+        }
+        if roughness > 0.0 {
+            let what = format_args!("a roughness of {roughness} is ignored: panes are smooth");
+            self.notes.warn(&self.place, what);
+        }
+        Ok(Some(Material::ThinGlass { ior, tint }))
     }
 
     /// Whether the surface bounds a volume, whose extent is that of the mesh: the thickness serves renderers

@@ -306,6 +306,11 @@ fn transmission_into_a_volume_is_solid_glass() {
     assert_eq!(solid.load().unwrap().warnings.len(), 1, "that there is no light");
     // Seen from within as well
     assert_close(mean(&turned(solid), 4096, 9), expected, 5e-3);
+    // Rough, it scatters what goes through, and nearly all light still leaves in front or behind
+    let frosted = glass(1.0, 0.5, r#", "KHR_materials_volume": {"thicknessFactor": 0.1}"#);
+    assert_eq!(frosted.load().unwrap().warnings.len(), 1, "that there is no light");
+    let [_, green, blue] = mean(&frosted, 4096, 9);
+    assert!(green > 0.95 && green <= 1.0 + 5e-3 && (blue - r).abs() < 0.03, "{green} {blue}");
     let volume = r#""thicknessFactor": 1, "attenuationDistance": 2, "attenuationColor": [1, 0, 0]"#;
     let tinted = glass(1.0, 0.0, &format!(r#", "KHR_materials_volume": {{{volume}}}"#)).load().unwrap();
     assert_warns(&tinted, &["material 0", "attenuation in its volume is ignored"]);
