@@ -134,7 +134,7 @@ impl<'a> Tracer<'a> {
             Bsdf::RoughGlass { .. } => self.rough_glass(&ray, &surface, weight, code),
             // Intersections have one of its parts
             Bsdf::Mix { .. } => Vec3::ZERO,
-            Bsdf::Metal { .. } | Bsdf::Plastic { .. } | Bsdf::Blend { .. } => {
+            Bsdf::Metal { .. } | Bsdf::Plastic { .. } | Bsdf::Blend { .. } | Bsdf::Lobes { .. } => {
                 self.glossy(&ray, &surface, weight, code)
             }
         }
@@ -165,7 +165,7 @@ impl<'a> Tracer<'a> {
             .and_then(|glass| glass.sample(frame.to_local(-ray.dir), [numbers[2], numbers[0], numbers[1]]));
         let Some((wi, factor, _)) = sampled else { return Vec3::ZERO };
         let dir = frame.to_world(wi).normalize();
-        if (dir.dot(surface.flat) > 0.0) != (wi.z > 0.0) {
+        if !surface.is_consistent(dir, wi) {
             return Vec3::ZERO;
         }
         self.follow(surface, dir, DELTA, weight * factor, 2 * code)
@@ -184,10 +184,19 @@ impl<'a> Tracer<'a> {
             let wi = frame.to_local(dir);
             let (facets, chosen) = glossy.facets(wo, wi);
             let share = if follows { balance(pdf, chosen) } else { 1.0 };
-            glossy.base(wi) * balance(pdf, wi.z.max(0.0) * FRAC_1_PI * directions) + facets * share
+            glossy.base(wo, wi) * balance(pdf, wi.z.max(0.0) * FRAC_1_PI * directions) + facets * share
         });
         if glossy.has_base() {
-            sum += self.hemisphere(surface, weight, code, |dir| glossy.base(frame.to_local(dir)));
+            sum += self.hemisphere(surface, weight, code, |dir| glossy.base(wo, frame.to_local(dir)));
+        }
+        if glossy.transmits() {
+            let far = surface.turned_over();
+            let through = |dir: Vec3| glossy.through(frame.to_local(dir));
+            sum += self.lights(&far, weight, code, |dir, pdf| {
+                let cos = dir.dot(far.normal).max(0.0);
+                through(dir) * balance(pdf, cos * FRAC_1_PI * directions)
+            });
+            sum += self.hemisphere(&far, weight, code, through);
         }
         if let Some((wi, factor, density)) = glossy.reflect(wo, [u, v]) {
             let dir = frame.to_world(wi).normalize();

@@ -173,8 +173,9 @@ impl<'a, const OPACITY: bool> Path<'a, OPACITY> {
                 self.diffuse(albedo.tinted(surface.uv, surface.tint), surface, throughput, sum)
             }
             Bsdf::Metal { .. } | Bsdf::Plastic { .. } | Bsdf::Blend { .. } => {
-                self.glossy(ray, surface, throughput, sum)
+                self.glossy::<false>(ray, surface, throughput, sum)
             }
+            Bsdf::Lobes { .. } => self.glossy::<true>(ray, surface, throughput, sum),
             Bsdf::RoughGlass { .. } => self.rough_glass(ray, surface, throughput, sum),
             Bsdf::Mirror { .. } | Bsdf::Glass { .. } | Bsdf::ThinGlass { .. } => self.specular(ray, surface),
             // Intersections have one of its parts
@@ -247,9 +248,9 @@ impl<'a, const OPACITY: bool> Path<'a, OPACITY> {
         Some(Scattered { dir, weight: albedo, pdf: local.z * FRAC_1_PI, roulette })
     }
 
-    /// Microfacets and coats.
+    /// Microfacets, coats and diffuse lobes. `THROUGH` also sends light through the surface.
     #[inline(never)]
-    fn glossy(
+    fn glossy<const THROUGH: bool>(
         &mut self,
         ray: &Ray,
         surface: &Intersection<'a>,
@@ -260,17 +261,25 @@ impl<'a, const OPACITY: bool> Path<'a, OPACITY> {
         let wo = frame.to_local(-ray.dir);
         let glossy = surface.glossy(wo.z)?;
         let mis = self.settings.estimator == Estimator::Mis;
-        let origin = self.scene.leave(surface, surface.flat);
-        let receiver = glossy.receiver(origin, surface.normal, wo, frame);
+        let receiver = if THROUGH && glossy.transmits() {
+            Receiver::all_round(surface.position)
+        } else {
+            let origin = self.scene.leave(surface, surface.flat);
+            glossy.receiver(origin, surface.normal, wo, frame)
+        };
         *sum += throughput
-            * self.next_event::<false>(surface, receiver, |dir, pdf| {
-                let (f_cos, bsdf_pdf) = glossy.eval(wo, frame.to_local(dir));
+            * self.next_event::<THROUGH>(surface, receiver, |dir, pdf| {
+                let wi = frame.to_local(dir);
+                if THROUGH && !surface.is_consistent(dir, wi) {
+                    return Vec3::ZERO;
+                }
+                let (f_cos, bsdf_pdf) = glossy.eval(wo, wi);
                 f_cos * if mis { power_heuristic(pdf, bsdf_pdf) } else { 1.0 }
             });
         let [pick, u, v, roulette] = self.sampler.four();
         let (wi, weight, pdf) = glossy.sample(wo, [pick, u, v])?;
         let dir = frame.to_world(wi);
-        if dir.dot(surface.flat) <= 0.0 {
+        if !surface.is_consistent(dir, wi) {
             return None;
         }
         Some(Scattered { dir: dir.normalize(), weight, pdf, roulette })
@@ -289,13 +298,11 @@ impl<'a, const OPACITY: bool> Path<'a, OPACITY> {
         let receiver = Receiver::all_round(surface.position);
         let frame = Frame::new(surface.normal);
         let wo = frame.to_local(-ray.dir);
-        // A shading normal must not carry light through the surface that it reflects, or the other way round
-        let consistent = |dir: Vec3, wi: Vec3| (dir.dot(surface.flat) > 0.0) == (wi.z > 0.0);
         let mis = self.settings.estimator == Estimator::Mis;
         *sum += throughput
             * self.next_event::<true>(surface, receiver, |dir, pdf| {
                 let wi = frame.to_local(dir);
-                if !consistent(dir, wi) {
+                if !surface.is_consistent(dir, wi) {
                     return Vec3::ZERO;
                 }
                 let (f_cos, bsdf_pdf) = glass.eval(wo, wi);
@@ -304,7 +311,7 @@ impl<'a, const OPACITY: bool> Path<'a, OPACITY> {
         let [pick, u, v, roulette] = self.sampler.four();
         let (wi, weight, pdf) = glass.sample(wo, [pick, u, v])?;
         let dir = frame.to_world(wi).normalize();
-        consistent(dir, wi).then_some(Scattered { dir, weight, pdf, roulette })
+        surface.is_consistent(dir, wi).then_some(Scattered { dir, weight, pdf, roulette })
     }
 
     /// Mirrors and glass. Glass reflects with the probability of its Fresnel term.

@@ -1,12 +1,13 @@
 //! Materials, as described by the caller and as used in the inner loop.
 
-use crate::bsdf::{Coat, Facets, Fresnel, Ggx, Interior, MIN_ROUGHNESS};
+use crate::bsdf::{Coat, Facets, Fresnel, Ggx, Interior, MIN_ROUGHNESS, OrenNayar};
 use crate::checks::{check_range, check_reflectance};
 use crate::error::SceneError;
 use crate::math::Vec3;
 use crate::relief::Relief;
 use crate::texture::Texture;
 use noisefloor::Rgb;
+use std::f32::consts::FRAC_PI_2;
 use std::sync::Arc;
 
 /// What a surface is made of. Except for glass, both sides look the same, unless [`MaterialOptions`] says
@@ -99,6 +100,52 @@ pub enum Material {
         /// Index of refraction of the dielectric, above 1 and up to 4; glTF's default is 1.5.
         ior: f32,
     },
+    /// Lobes that add up.
+    Lobes(Lobes),
+}
+
+/// A sum of diffuse reflection, diffuse transmission and microfacets, as the `matte`, `plastic`, `uber`,
+/// `substrate` and `translucent` of pbrt's version 3 and the `diffusetransmission` of version 4 (Pharr, Jakob,
+/// Humphreys 2016, §8.4 and §9.2). The facets of a [`Gloss::Dielectric`] take nothing from the rest: the sum can
+/// be more light than comes. All black by default.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Lobes {
+    /// Albedo of the reflection, 0…1.
+    pub diffuse: Texture,
+    /// Albedo of the transmission, 0…1.
+    pub through: Texture,
+    /// Factor on the facets' reflection, or what they reflect at normal incidence, by `gloss`: 0…1.
+    pub specular: Texture,
+    /// How the facets reflect.
+    pub gloss: Gloss,
+    /// Standard deviation of the slopes of the diffuse surface in radians, 0…π/2 (Oren, Nayar 1994); 0 is
+    /// Lambertian. [`Gloss::AshikhminShirley`] has none.
+    pub sigma: f32,
+    /// GGX α of the facets, [`MIN_ROUGHNESS`]…1.
+    pub roughness: f32,
+}
+
+impl Default for Lobes {
+    fn default() -> Self {
+        let black = || Texture::Colour([0.0; 3]);
+        let gloss = Gloss::Dielectric { ior: 1.5 };
+        Self { diffuse: black(), through: black(), specular: black(), gloss, sigma: 0.0, roughness: 1.0 }
+    }
+}
+
+/// How the microfacets of [`Material::Lobes`] reflect.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum Gloss {
+    /// As the boundary of a dielectric.
+    Dielectric {
+        /// Index of refraction of what lies below, over that above: 0.25…4. Below 1, light that comes flatly is
+        /// reflected totally.
+        ior: f32,
+    },
+    /// By Schlick's term and without masking; the diffuse reflection gets what they leave (Ashikhmin, Shirley
+    /// 2000, with GGX).
+    AshikhminShirley,
 }
 
 /// Opacity and sidedness of a surface, besides its [`Material`].
@@ -109,8 +156,8 @@ pub struct MaterialOptions {
     pub opacity: Option<Texture>,
     /// Whether the back absorbs all light.
     pub one_sided: bool,
-    /// The microfacets of [`Material::RoughConductor`], [`Material::Conductor`], [`Material::Plastic`] and
-    /// [`Material::RoughGlass`].
+    /// The microfacets of [`Material::RoughConductor`], [`Material::Conductor`], [`Material::Plastic`],
+    /// [`Material::RoughGlass`] and [`Material::Lobes`].
     pub facets: Facets,
     /// Structure of the surface. That of a mix is also that of its parts that have none.
     pub relief: Option<Relief>,
@@ -174,6 +221,14 @@ pub(crate) enum Bsdf {
         metallic_roughness: Reflectance,
         coat: Arc<Coat>,
     },
+    Lobes {
+        diffuse: Reflectance,
+        through: Reflectance,
+        specular: Reflectance,
+        gloss: Gloss,
+        oren_nayar: OrenNayar,
+        ggx: Ggx,
+    },
     /// `share` of the second material, and the rest of the first, by their indices. The share of a `coat` is
     /// multiplied with what a smooth boundary reflects.
     Mix {
@@ -192,6 +247,7 @@ impl Bsdf {
             | Self::Mirror { colour, .. }
             | Self::Metal { colour, .. }
             | Self::Plastic { diffuse: colour, .. }
+            | Self::Lobes { diffuse: colour, .. }
             | Self::Blend { base: colour, .. } => colour.tinted(uv, tint),
             Self::Glass { tint, .. } | Self::ThinGlass { tint, .. } | Self::RoughGlass { tint, .. } => *tint,
             // Intersections have one of its parts
@@ -275,6 +331,16 @@ impl Material {
                 metallic_roughness.check()?;
                 base.check()
             }
+            Material::Lobes(Lobes { diffuse, through, specular, gloss, sigma, roughness }) => {
+                if let Gloss::Dielectric { ior } = gloss {
+                    check_range("an index of refraction", *ior, [0.25, 4.0], "0.25…4")?;
+                }
+                check_range("a deviation of slopes", *sigma, [0.0, FRAC_PI_2], "0…π/2")?;
+                check_range("a roughness", *roughness, [MIN_ROUGHNESS, 1.0], "0.001…1")?;
+                diffuse.check()?;
+                through.check()?;
+                specular.check()
+            }
         }
     }
 }
@@ -338,6 +404,14 @@ impl CompiledMaterial {
                     coat: coat(ior, fixed, Facets::Ggx, Interior::Conserving),
                 }
             }
+            Material::Lobes(Lobes { diffuse, through, specular, gloss, sigma, roughness }) => Bsdf::Lobes {
+                diffuse: Reflectance::new(diffuse),
+                through: Reflectance::new(through),
+                specular: Reflectance::new(specular),
+                gloss,
+                oren_nayar: OrenNayar::new(sigma),
+                ggx: Ggx::of(roughness, options.facets),
+            },
         };
         Ok(Self::with(bsdf, options))
     }
@@ -368,6 +442,9 @@ impl CompiledMaterial {
                 c.varies()
             }
             Bsdf::Plastic { diffuse, .. } => diffuse.varies(),
+            Bsdf::Lobes { diffuse, through, specular, .. } => {
+                diffuse.varies() || through.varies() || specular.varies()
+            }
             Bsdf::Blend { base, metallic_roughness, .. } => base.varies() || metallic_roughness.varies(),
             Bsdf::Glass { .. } | Bsdf::ThinGlass { .. } | Bsdf::RoughGlass { .. } => false,
             // Its parts may have one

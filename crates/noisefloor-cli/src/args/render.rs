@@ -33,7 +33,7 @@ use std::time::Duration;
 #[command(after_help = "Examples:
   noisefloor render                                  the Cornell box, into out/cornell-box
   noisefloor render glass-spheres --size 800x600 --seed 7    another scene; `noisefloor scenes` lists them
-  noisefloor render hall/scene.xml --out out/hall    a scene file: .gltf, .glb, or Mitsuba .xml
+  noisefloor render hall/scene.xml --out out/hall    a scene file: glTF, Mitsuba XML or pbrt
   noisefloor render --source mitsuba hall/scene.xml  another renderer; `noisefloor doctor` lists them
   noisefloor render --criterion spp:1000             for comparison: a fixed number of samples
   noisefloor render --audience art-students          for more demanding viewers (more samples)
@@ -45,8 +45,8 @@ use std::time::Duration;
   noisefloor render --watch                          the picture so far, in a browser
   noisefloor render --force                          once more, over the render in the output folder")]
 pub struct RenderArgs {
-    /// Built-in scene (`noisefloor scenes` lists them) or scene file: glTF 2.0 (.gltf, .glb) or Mitsuba XML
-    /// (.xml). With --source, whatever that source reads [default: cornell-box].
+    /// Built-in scene (`noisefloor scenes` lists them) or scene file: glTF 2.0 (.gltf, .glb), Mitsuba XML
+    /// (.xml) or pbrt (.pbrt). With --source, whatever that source reads [default: cornell-box].
     scene: Option<String>,
     #[command(flatten)]
     renderer: RendererArgs,

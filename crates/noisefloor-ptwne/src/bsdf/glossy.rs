@@ -1,13 +1,14 @@
-//! Microfacets and coats, as one lobe or two.
+//! Microfacets, coats and diffuse lobes.
 
 use super::coat::Coat;
 use super::fresnel::{Fresnel, fresnel, schlick};
 use super::ggx::{Ggx, MIN_ROUGHNESS};
 use crate::light::Receiver;
+use crate::material::Gloss;
 use crate::math::{self, DELTA, Frame, Vec3};
 use std::f32::consts::FRAC_1_PI;
 
-/// Microfacets of a metal or a coat, and the diffuse base below the coat, seen from one direction.
+/// Microfacets, what lies below them, and light that shines through, seen from one direction.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Glossy<'a> {
     ggx: Ggx,
@@ -15,29 +16,83 @@ pub(crate) struct Glossy<'a> {
     /// Colour of the metal, and its weight in the blend.
     metal: Vec3,
     metal_share: f32,
-    /// The coat, and the factor on its reflection.
-    coat: Option<&'a Coat>,
+    /// The index of refraction of facets that are no metal, and the factor on their reflection.
+    ior: f32,
     specular: Vec3,
-    /// [`Coat::base`], times the transmittance of the outgoing direction.
+    below: Below<'a>,
+    /// Of a coat [`Coat::base`], times the transmittance of the outgoing direction; else the albedo over π.
     base: Vec3,
-    /// Probability of choosing a microfacet.
+    /// The albedo over π of diffuse transmission.
+    through: Vec3,
+    /// Probabilities of choosing a microfacet, and transmission.
     pub(super) facet: f32,
+    transmission: f32,
     /// Whether the coat is smooth, without microfacets.
     pub(super) smooth: bool,
 }
 
+/// What lies below the microfacets.
+#[derive(Clone, Copy, Debug)]
+enum Below<'a> {
+    Nothing,
+    Coat(&'a Coat),
+    /// A diffuse surface from which the facets take nothing.
+    Diffuse(OrenNayar),
+    /// The diffuse part of Ashikhmin and Shirley, whose facets it comes with.
+    AshikhminShirley,
+}
+
+/// The two constants of Oren and Nayar's qualitative model (1994, eq. 30).
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct OrenNayar {
+    a: f32,
+    b: f32,
+}
+
+impl OrenNayar {
+    /// Slopes of a standard deviation of `sigma` radians; 0 is Lambertian.
+    pub(crate) fn new(sigma: f32) -> Self {
+        let s2 = sigma * sigma;
+        Self { a: 1.0 - 0.5 * s2 / (s2 + 0.33), b: 0.45 * s2 / (s2 + 0.09) }
+    }
+
+    /// The factor on Lambertian reflection.
+    fn at(self, wo: Vec3, wi: Vec3) -> f32 {
+        if self.b == 0.0 {
+            return self.a;
+        }
+        // cos(φᵢ − φₒ)·sin α·tan β, where the sines cancel
+        let across = (wo.x * wi.x + wo.y * wi.y).max(0.0);
+        self.a + self.b * across / wo.z.max(wi.z).max(1e-6)
+    }
+}
+
+/// [`crate::Lobes`] at one point.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct LobesAt {
+    pub(crate) diffuse: Vec3,
+    pub(crate) through: Vec3,
+    pub(crate) specular: Vec3,
+    pub(crate) gloss: Gloss,
+    pub(crate) oren_nayar: OrenNayar,
+    pub(crate) ggx: Ggx,
+}
+
 impl<'a> Glossy<'a> {
     pub(crate) fn metal(fresnel: &'a Fresnel, colour: Vec3, ggx: Ggx) -> Self {
-        let (coat, zero) = (None, Vec3::ZERO);
+        let zero = Vec3::ZERO;
         Self {
             ggx,
             fresnel,
             metal: colour,
             metal_share: 1.0,
-            coat,
+            ior: 1.0,
             specular: zero,
+            below: Below::Nothing,
             base: zero,
+            through: zero,
             facet: 1.0,
+            transmission: 0.0,
             smooth: false,
         }
     }
@@ -51,34 +106,63 @@ impl<'a> Glossy<'a> {
         cos: f32,
     ) -> Self {
         let alpha = ggx.alpha;
-        let through = coat.transmittance(alpha, cos);
+        let passed = coat.transmittance(alpha, cos);
         let (reflected, inside) =
-            ((1.0 - through) * math::luminance(specular), through * math::luminance(diffuse));
+            ((1.0 - passed) * math::luminance(specular), passed * math::luminance(diffuse));
         Self {
             ggx,
             fresnel: &Fresnel::None,
             metal: Vec3::ZERO,
             metal_share: 0.0,
-            coat: Some(coat),
+            ior: coat.ior,
             specular,
-            base: coat.base(alpha, diffuse, nonlinear) * through,
+            below: Below::Coat(coat),
+            base: coat.base(alpha, diffuse, nonlinear) * passed,
+            through: Vec3::ZERO,
             facet: lobe_probability(reflected, inside),
+            transmission: 0.0,
             smooth: alpha < MIN_ROUGHNESS,
         }
     }
 
     pub(crate) fn blend(coat: &'a Coat, base: Vec3, alpha: f32, metallic: f32, cos: f32) -> Self {
         let plastic = Self::plastic(coat, base, Vec3::ONE, Ggx::new(alpha), true, cos);
-        let through = coat.transmittance(alpha, cos);
-        let reflected = metallic * math::luminance(schlick(base, cos)) + (1.0 - metallic) * (1.0 - through);
+        let passed = coat.transmittance(alpha, cos);
+        let reflected = metallic * math::luminance(schlick(base, cos)) + (1.0 - metallic) * (1.0 - passed);
         Self {
             fresnel: &Fresnel::Schlick,
             metal: base,
             metal_share: metallic,
             specular: Vec3::splat(1.0 - metallic),
             base: plastic.base * (1.0 - metallic),
-            facet: lobe_probability(reflected, (1.0 - metallic) * through * math::luminance(base)),
+            facet: lobe_probability(reflected, (1.0 - metallic) * passed * math::luminance(base)),
             ..plastic
+        }
+    }
+
+    pub(crate) fn lobes(lobes: LobesAt, cos: f32) -> Self {
+        let LobesAt { diffuse, through, specular, gloss, oren_nayar, ggx } = lobes;
+        let (ior, below, reflected) = match gloss {
+            Gloss::Dielectric { ior } => {
+                (ior, Below::Diffuse(oren_nayar), specular * fresnel(cos.clamp(0.0, 1.0), ior).0)
+            }
+            Gloss::AshikhminShirley => (1.0, Below::AshikhminShirley, schlick(specular, cos)),
+        };
+        let shares = [reflected, diffuse, through].map(math::luminance);
+        let facet = lobe_probability(shares[0], shares[1] + shares[2]);
+        Self {
+            ggx,
+            fresnel: &Fresnel::None,
+            metal: Vec3::ZERO,
+            metal_share: 0.0,
+            ior,
+            specular,
+            below,
+            base: diffuse * FRAC_1_PI,
+            through: through * FRAC_1_PI,
+            facet,
+            transmission: (1.0 - facet) * lobe_probability(shares[2], shares[1]),
+            smooth: false,
         }
     }
 
@@ -89,8 +173,10 @@ impl<'a> Glossy<'a> {
         if self.metal_share > 0.0 {
             sum += self.metal_share * self.fresnel.at(self.metal, cos_h);
         }
-        if let Some(coat) = self.coat {
-            sum += self.specular * fresnel(cos_h, coat.ior).0;
+        match self.below {
+            Below::Nothing => {}
+            Below::Coat(_) | Below::Diffuse(_) => sum += self.specular * fresnel(cos_h, self.ior).0,
+            Below::AshikhminShirley => sum += schlick(self.specular, cos_h),
         }
         sum
     }
@@ -101,42 +187,79 @@ impl<'a> Glossy<'a> {
         if self.smooth || wi.z <= 0.0 {
             return (Vec3::ZERO, 0.0);
         }
-        let (facets, density, cos_h) = self.ggx.eval(wo, wi);
+        let (mut facets, density, cos_h) = self.ggx.eval(wo, wi);
+        if matches!(self.below, Below::AshikhminShirley) {
+            // Ashikhmin, Shirley 2000, eq. 4 with GGX
+            facets = self.unmasked(wo, wi, cos_h) * density;
+        }
         (self.reflectance(cos_h) * facets, density)
     }
 
-    /// Whether there is a base below a coat.
+    /// f·cos θᵢ of Ashikhmin's and Shirley's facets without the Fresnel term, over the density with which they
+    /// are sampled.
+    #[inline]
+    fn unmasked(&self, wo: Vec3, wi: Vec3, cos_h: f32) -> f32 {
+        wo.z * wi.z * (1.0 + self.ggx.lambda(wo)) / (cos_h * wo.z.max(wi.z)).max(1e-6)
+    }
+
+    /// Whether there is a base below the microfacets.
     pub(crate) fn has_base(&self) -> bool {
         self.base != Vec3::ZERO
     }
 
-    /// f·cos θᵢ of the base below the coat.
+    /// Whether light shines through.
+    pub(crate) fn transmits(&self) -> bool {
+        self.through != Vec3::ZERO
+    }
+
+    /// f·cos θᵢ of the base below the microfacets.
     #[inline]
-    pub(crate) fn base(&self, wi: Vec3) -> Vec3 {
-        match self.coat {
-            Some(coat) if wi.z > 0.0 => self.base * (coat.transmittance(self.ggx.alpha, wi.z) * wi.z),
-            _ => Vec3::ZERO,
+    pub(crate) fn base(&self, wo: Vec3, wi: Vec3) -> Vec3 {
+        if wi.z <= 0.0 {
+            return Vec3::ZERO;
         }
+        match self.below {
+            Below::Nothing => Vec3::ZERO,
+            Below::Coat(coat) => self.base * (coat.transmittance(self.ggx.alpha, wi.z) * wi.z),
+            Below::Diffuse(oren_nayar) => self.base * (oren_nayar.at(wo, wi) * wi.z),
+            Below::AshikhminShirley => {
+                // Ashikhmin, Shirley 2000, eq. 5
+                let part = |cos: f32| 1.0 - (1.0 - 0.5 * cos).powi(5);
+                let factor = 28.0 / 23.0 * part(wo.z) * part(wi.z) * wi.z;
+                self.base * (Vec3::ONE - self.specular) * factor
+            }
+        }
+    }
+
+    /// f·|cos θᵢ| of transmission in a direction of the far side.
+    #[inline]
+    pub(crate) fn through(&self, wi: Vec3) -> Vec3 {
+        self.through * (-wi.z).max(0.0)
     }
 
     /// How a light's choice sees it, with the direction `wo` to where it is seen from.
     #[inline]
     pub(crate) fn receiver(&self, position: Vec3, normal: Vec3, wo: Vec3, frame: Frame) -> Receiver {
         // Transmittance hardly depends on the direction, but close to the horizon
-        let diffuse = match self.coat {
-            Some(coat) => math::luminance(self.base) * coat.transmittance(self.ggx.alpha, 0.7),
-            None => 0.0,
+        let diffuse = match self.below {
+            Below::Coat(coat) => math::luminance(self.base) * coat.transmittance(self.ggx.alpha, 0.7),
+            Below::Diffuse(_) | Below::AshikhminShirley => math::luminance(self.base),
+            Below::Nothing => 0.0,
         };
         let glossy = if self.smooth { 0.0 } else { math::luminance(self.reflectance(wo.z)) / wo.z.max(0.1) };
         let mirror = frame.to_world(Vec3::new(-wo.x, -wo.y, wo.z));
         Receiver { position, normal, diffuse, glossy, mirror, alpha2: self.ggx.alpha * self.ggx.alpha }
     }
 
-    /// f·cos θᵢ, and the density of [`Glossy::sample`].
+    /// f·|cos θᵢ|, and the density of [`Glossy::sample`].
     #[inline]
     pub(crate) fn eval(&self, wo: Vec3, wi: Vec3) -> (Vec3, f32) {
+        if wi.z < 0.0 {
+            return (self.through(wi), self.transmission * FRAC_1_PI * -wi.z);
+        }
         let (f, density) = self.facets(wo, wi);
-        (f + self.base(wi), self.facet * density + (1.0 - self.facet) * FRAC_1_PI * wi.z.max(0.0))
+        let diffuse = 1.0 - self.facet - self.transmission;
+        (f + self.base(wo, wi), self.facet * density + diffuse * FRAC_1_PI * wi.z)
     }
 
     /// A direction of reflection by microfacets or a smooth coat, its weight f·cos θᵢ / density, and its
@@ -147,8 +270,13 @@ impl<'a> Glossy<'a> {
             return Some((Vec3::new(-wo.x, -wo.y, wo.z), self.reflectance(wo.z), DELTA));
         }
         let (wi, weight, cos_h) = self.ggx.sample(wo, u);
+        if weight <= 0.0 {
+            return None;
+        }
         let (_, density, _) = self.ggx.eval(wo, wi);
-        (weight > 0.0).then(|| (wi, self.reflectance(cos_h) * weight, density))
+        let ashikhmin = matches!(self.below, Below::AshikhminShirley);
+        let weight = if ashikhmin { self.unmasked(wo, wi, cos_h) } else { weight };
+        Some((wi, self.reflectance(cos_h) * weight, density))
     }
 
     /// A direction, its weight f·cos θᵢ / density, and its density; `None` if nothing is scattered.
@@ -156,12 +284,14 @@ impl<'a> Glossy<'a> {
     pub(crate) fn sample(&self, wo: Vec3, [pick, u, v]: [f32; 3]) -> Option<(Vec3, Vec3, f32)> {
         let wi = if pick < self.facet {
             let (wi, weight, density) = self.reflect(wo, [u, v])?;
-            if self.coat.is_none() || density == DELTA {
+            if matches!(self.below, Below::Nothing) || density == DELTA {
                 return Some((wi, weight / self.facet, density));
             }
             wi
         } else {
-            math::cosine_hemisphere([u, v])
+            let wi = math::cosine_hemisphere([u, v]);
+            let crosses = pick < self.facet + self.transmission;
+            if crosses { Vec3::new(wi.x, wi.y, -wi.z) } else { wi }
         };
         let (f, pdf) = self.eval(wo, wi);
         // Also false for NaN

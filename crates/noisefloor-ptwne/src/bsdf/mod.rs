@@ -14,5 +14,5 @@ pub(crate) use coat::{Coat, Interior};
 pub(crate) use fresnel::{Fresnel, fresnel, pane, refract, schlick};
 pub(crate) use ggx::Ggx;
 pub use ggx::{Facets, MIN_ROUGHNESS};
-pub(crate) use glossy::Glossy;
+pub(crate) use glossy::{Glossy, LobesAt, OrenNayar};
 pub(crate) use rough_glass::RoughGlass;

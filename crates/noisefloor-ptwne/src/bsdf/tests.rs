@@ -5,9 +5,10 @@ use super::fresnel::fresnel;
 use super::ggx::{Facets, Ggx};
 use crate::geometry::NO;
 use crate::intersection::Intersection;
-use crate::material::{CompiledMaterial, Material, MaterialOptions};
+use crate::material::{CompiledMaterial, Gloss, Lobes, Material, MaterialOptions};
 use crate::math::{self, DELTA, Vec3};
 use crate::rng::{Key, Rng};
+use crate::texture::Texture;
 use std::f32::consts::PI;
 
 /// ∫ density over the hemisphere and ∫ f·cos agree with the sampled weights: both by midpoint rule over (θ,
@@ -56,7 +57,7 @@ fn facets_are_sampled_as_they_are_evaluated() {
     }
 }
 
-/// Metals, coats and blends of them, from smooth to rough.
+/// Metals, coats, blends of them, and sums of lobes, from smooth to rough.
 fn zoo() -> Vec<(Material, CompiledMaterial)> {
     let colour = [0.9, 0.5, 0.2];
     let mut all = vec![];
@@ -76,6 +77,14 @@ fn zoo() -> Vec<(Material, CompiledMaterial)> {
     for (roughness, metal) in [(0.3, 0.0), (0.5, 0.4), (0.9, 1.0)] {
         let metallic_roughness = [0.0, roughness, metal].into();
         all.push(Material::MetallicRoughness { base: colour.into(), metallic_roughness, ior: 1.5 });
+    }
+    for (gloss, sigma, roughness) in [
+        (Gloss::Dielectric { ior: 1.5 }, 0.0, 0.3),
+        (Gloss::Dielectric { ior: 1.0 / 1.5 }, 0.6, 0.1),
+        (Gloss::AshikhminShirley, 0.0, 0.2),
+    ] {
+        let [diffuse, through, specular] = [colour, [0.3; 3], [0.4, 0.3, 0.2]].map(Texture::Colour);
+        all.push(Material::Lobes(Lobes { diffuse, through, specular, gloss, sigma, roughness }));
     }
     let compile = |m, facets| {
         let options = MaterialOptions { facets, ..MaterialOptions::default() };
@@ -122,7 +131,8 @@ fn scattering_is_reciprocal() {
     }
 }
 
-/// Parts of the hemisphere, in polar angle and azimuth; then come smooth reflection and no scattering.
+/// Parts of the hemisphere, in polar angle and azimuth; then come smooth reflection, and no scattering or
+/// transmission.
 const PARTS: [usize; 2] = [8, 12];
 const SMOOTH: usize = PARTS[0] * PARTS[1];
 const NOTHING: usize = SMOOTH + 1;
@@ -159,6 +169,9 @@ fn sampled_part(glossy: &Glossy<'_>, wo: Vec3, rng: &mut Rng) -> usize {
     assert!((density - pdf).abs() <= 2e-3 * pdf, "{density} {pdf}");
     let error = (weight * pdf - f).abs().max_element();
     assert!(error <= 4e-3 * f.max_element(), "{weight} {pdf} {f}");
+    if wi.z < 0.0 {
+        return NOTHING;
+    }
     let theta = wi.z.clamp(0.0, 1.0).acos() / (0.5 * PI) * PARTS[0] as f32;
     let phi = (wi.y.atan2(wi.x) / (2.0 * PI)).rem_euclid(1.0) * PARTS[1] as f32;
     let part = |x: f32, axis: usize| (x as usize).min(PARTS[axis] - 1);
@@ -200,6 +213,51 @@ fn samples_have_the_density_they_report() {
             assert!(square < limit, "{description:?} at {cos}: χ² {square} of {freedom}");
         }
     }
+}
+
+/// The shares of a white sky that come from the two sides, as sampled.
+fn albedo(material: &CompiledMaterial, cos: f32) -> [f64; 2] {
+    const SIDE: u32 = 64;
+    let wo = Vec3::new((1.0 - cos * cos).sqrt(), 0.0, cos);
+    let glossy = seen(material, wo);
+    let at = |i: u32| (i as f32 + 0.5) / SIDE as f32;
+    let mut sums = [0.0; 2];
+    for i in 0..SIDE.pow(3) {
+        let numbers = [i % SIDE, i / SIDE % SIDE, i / SIDE / SIDE].map(at);
+        if let Some((wi, weight, _)) = glossy.sample(wo, numbers) {
+            sums[usize::from(wi.z < 0.0)] += f64::from(weight.x) / f64::from(SIDE.pow(3));
+        }
+    }
+    sums
+}
+
+/// Sums of lobes at known albedos.
+#[test]
+fn lobes_reflect_and_transmit_what_they_should() {
+    let lobes = |diffuse: f32, through: f32, specular: f32, gloss, sigma: f32| {
+        let [diffuse, through, specular] = [diffuse, through, specular].map(|x| Texture::Colour([x; 3]));
+        let material = Material::Lobes(Lobes { diffuse, through, specular, gloss, sigma, roughness: 0.01 });
+        CompiledMaterial::new(material, MaterialOptions::default(), &mut vec![]).unwrap()
+    };
+    let dielectric = |ior| Gloss::Dielectric { ior };
+    // Numbers are midpoints of 64 strata, and lobes choose by one of them
+    let near = |got: [f64; 2], expected: [f64; 2]| {
+        let error = got.iter().zip(expected).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        assert!(error < 0.01, "{got:?} instead of {expected:?}");
+    };
+    near(albedo(&lobes(0.3, 0.5, 0.0, dielectric(1.5), 0.0), 0.6), [0.3, 0.5]);
+    // Facets so smooth that they are a mirror: 4 % at normal incidence, all beyond the critical angle
+    near(albedo(&lobes(0.3, 0.0, 0.5, dielectric(1.5), 0.0), 1.0), [0.3 + 0.5 * 0.04, 0.0]);
+    near(albedo(&lobes(0.3, 0.0, 0.5, dielectric(1.0 / 1.5), 0.0), 0.5), [0.8, 0.0]);
+    // Seen along the normal, Oren and Nayar's factor is A = 1 − σ²/(2(σ² + 0.33))
+    let s2 = 0.25f64;
+    let a = 1.0 - 0.5 * s2 / (s2 + 0.33);
+    near(albedo(&lobes(0.6, 0.0, 0.0, dielectric(1.5), 0.5), 1.0), [0.6 * a, 0.0]);
+    // Ashikhmin's and Shirley's diffuse part along the normal: (1 − ½⁵)·28/23·2∫μ(1 − (1 − μ/2)⁵)dμ. With
+    // u = 1 − μ/2, ∫μu⁵dμ = 4∫(u⁵ − u⁶)du from ½ to 1
+    let moment = 4.0 * ((1.0 - 0.5f64.powi(6)) / 6.0 - (1.0 - 0.5f64.powi(7)) / 7.0);
+    let share = (1.0 - 0.5f64.powi(5)) * 28.0 / 23.0 * 2.0 * (0.5 - moment);
+    near(albedo(&lobes(0.6, 0.0, 0.0, Gloss::AshikhminShirley, 0.0), 1.0), [0.6 * share, 0.0]);
 }
 
 #[test]

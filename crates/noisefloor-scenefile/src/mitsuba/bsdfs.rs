@@ -7,7 +7,8 @@ use super::xml::Element;
 use crate::colour::Quantity;
 use crate::error::LoadError;
 use noisefloor::Rgb;
-use noisefloor_ptwne::{Facets, Material, Relief, Texture};
+use noisefloor_ptwne::{Facets, Lobes, Material, Relief, Texture};
+use std::f32::consts::FRAC_1_SQRT_2;
 
 impl<'d> Context<'d> {
     /// A `bsdf`.
@@ -63,17 +64,20 @@ impl<'d> Context<'d> {
     }
 
     fn diffuse(&self, element: &'d Element) -> Result<Surface, LoadError> {
-        if element.kind() == "roughdiffuse" {
-            element.ignore(&["alpha", "use_fast_approx"]);
-            self.approximated(
-                element,
-                "the roughness of <bsdf type=\"roughdiffuse\"> is left out: it is Lambertian",
-            );
-        }
         // Older versions have another name for it, too
         let old = element.has("diffuse_reflectance");
         let name = if old { "diffuse_reflectance" } else { "reflectance" };
-        Ok(Surface::one_sided(Material::Diffuse { albedo: self.factor(element, name, 0.5)? }))
+        let diffuse = self.factor(element, name, 0.5)?;
+        if element.kind() == "diffuse" {
+            return Ok(Surface::one_sided(Material::Diffuse { albedo: diffuse }));
+        }
+        if !self.boolean(element, "use_fast_approx", false)? {
+            self.approximated(element, "<bsdf type=\"roughdiffuse\"> is replaced by its fast approximation");
+        }
+        // Its α is that of Beckmann's slopes (Mitsuba 0.6)
+        let alpha = self.mean_float(element, "alpha")?.unwrap_or(0.2).clamp(0.0, 1.0);
+        let sigma = alpha as f32 * FRAC_1_SQRT_2;
+        Ok(Surface::one_sided(Material::Lobes(Lobes { diffuse, sigma, ..Lobes::default() })))
     }
 
     fn twosided(&self, element: &'d Element) -> Result<Surface, LoadError> {

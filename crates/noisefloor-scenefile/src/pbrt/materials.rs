@@ -5,7 +5,9 @@ use super::state::{Definition, Height, Look, plain};
 use super::textures::mean;
 use crate::error::{LoadError, Place};
 use noisefloor::Rgb;
-use noisefloor_ptwne::{ImageTexture, Material, MaterialId, MaterialOptions, Relief, Texture};
+use noisefloor_ptwne::{
+    Gloss, ImageTexture, Lobes, MIN_ROUGHNESS, Material, MaterialId, MaterialOptions, Relief, Texture,
+};
 use std::rc::Rc;
 
 /// How deep materials may refer to others.
@@ -56,6 +58,7 @@ impl Reader<'_> {
     ) -> Result<MaterialId, LoadError> {
         place.clone().at_most("nested materials", u64::from(depth), u64::from(MAX_NESTED))?;
         let relief = self.relief(definition)?;
+        let opacity = self.opacity(definition, opacity)?;
         let options = MaterialOptions { opacity, relief, ..MaterialOptions::default() };
         let refused = Self::refused(&definition.params.place);
         let made = self.made(definition, depth)?;
@@ -71,6 +74,15 @@ impl Reader<'_> {
                 self.builder.mixed_material(first, second, share, options).map_err(refused)
             }
         }
+    }
+
+    /// The opacity of `uber`, times that of the shape.
+    fn opacity(&mut self, d: &Definition, of_shape: Option<Texture>) -> Result<Option<Texture>, LoadError> {
+        let own = if d.kind == "uber" { self.texture_or_colour(d, "opacity")? } else { None };
+        Ok(match (own, of_shape) {
+            (Some(own), Some(of_shape)) => Some(self.product(&d.params, own, of_shape)?),
+            (own, of_shape) => own.or(of_shape),
+        })
     }
 
     /// Bumps: heights of a texture, or a picture of normals.
@@ -111,10 +123,13 @@ impl Reader<'_> {
         Ok(Made::Plain(match d.kind.as_str() {
             "diffuse" => Material::Diffuse { albedo: self.colour(d, "reflectance", [0.5; 3])? },
             "matte" => {
-                if self.number(d, "sigma", 0.0)? > 0.0 {
-                    self.approximated(&d.params.place, "the roughness of a `matte` surface is left out");
+                let (diffuse, sigma) =
+                    (self.colour(d, "Kd", [0.5; 3])?, self.number(d, "sigma", 0.0)?.clamp(0.0, 90.0));
+                if sigma == 0.0 {
+                    Material::Diffuse { albedo: diffuse }
+                } else {
+                    Material::Lobes(Lobes { diffuse, sigma: sigma.to_radians() as f32, ..Lobes::default() })
                 }
-                Material::Diffuse { albedo: self.colour(d, "Kd", [0.5; 3])? }
             }
             "coateddiffuse" => {
                 d.params.ignore(&["thickness", "g", "albedo", "maxdepth", "nsamples"]);
@@ -123,14 +138,7 @@ impl Reader<'_> {
                     (self.colour(d, "reflectance", [0.5; 3])?, self.roughness(d, 0.0, true)?);
                 self.plastic(base, [1.0; 3], self.index(d, 1.5)?, roughness)
             }
-            "plastic" | "uber" | "substrate" | "translucent" => {
-                self.approximated(&d.params.place, near("a coat on a Lambertian base"));
-                d.params.ignore(&["Kr", "Kt", "opacity", "reflect", "transmit"]);
-                let (kd, ks) = if d.kind == "substrate" { (0.5, 0.5) } else { (0.25, 0.25) };
-                let roughness = self.roughness(d, 0.1, false)?;
-                let specular = mean(&self.colour(d, "Ks", [ks; 3])?);
-                self.plastic(self.colour(d, "Kd", [kd; 3])?, specular, self.index(d, 1.5)?, roughness)
-            }
+            "plastic" | "uber" | "substrate" | "translucent" => Material::Lobes(self.lobes(d)?),
             "conductor" | "metal" | "coatedconductor" => self.conductor(d)?,
             "mirror" => Material::Mirror { reflectance: mean(&self.colour(d, "Kr", [0.9; 3])?) },
             "dielectric" | "glass" | "thindielectric" => {
@@ -145,9 +153,12 @@ impl Reader<'_> {
             }
             "disney" => self.disney(d)?,
             "diffusetransmission" => {
-                self.approximated(&d.params.place, near("its diffuse reflection"));
-                d.params.ignore(&["transmittance", "scale"]);
-                Material::Diffuse { albedo: self.colour(d, "reflectance", [0.25; 3])? }
+                let scale = Texture::Colour([self.number(d, "scale", 1.0)?.max(0.0) as f32; 3]);
+                let [diffuse, through] = ["reflectance", "transmittance"].map(|name| {
+                    let colour = self.colour(d, name, [0.25; 3])?;
+                    self.product(&d.params, colour, scale.clone())
+                });
+                Material::Lobes(Lobes { diffuse: diffuse?, through: through?, ..Lobes::default() })
             }
             "subsurface" | "kdsubsurface" => {
                 self.approximated(&d.params.place, near("a coat on a Lambertian base"));
@@ -159,6 +170,43 @@ impl Reader<'_> {
             "mix" => return self.mix(d, depth),
             other => return Err(d.params.place.clone().unsupported(format!("the material `{other}`"))),
         }))
+    }
+
+    /// The sums of lobes of version 3, but for what is perfectly specular besides facets.
+    fn lobes(&mut self, d: &Definition) -> Result<Lobes, LoadError> {
+        let missing = if d.kind == "substrate" { 0.5 } else { 0.25 };
+        let (diffuse, specular) = (self.colour(d, "Kd", [missing; 3])?, self.colour(d, "Ks", [missing; 3])?);
+        let roughness = self.roughness(d, 0.1, false)?.max(MIN_ROUGHNESS);
+        let lobes = Lobes { diffuse, specular, roughness, ..Lobes::default() };
+        let dielectric = |ior| Gloss::Dielectric { ior };
+        Ok(match d.kind.as_str() {
+            // Its source has the two indices the wrong way round
+            "plastic" => Lobes { gloss: dielectric(1.0 / 1.5), ..lobes },
+            "substrate" => Lobes { gloss: Gloss::AshikhminShirley, ..lobes },
+            "uber" => {
+                for name in ["Kr", "Kt"] {
+                    if self.texture_or_colour(d, name)?.is_some_and(|k| mean(&k) != [0.0; 3]) {
+                        let what = format!("`{name}` of the material `uber` is left out");
+                        self.approximated(&d.params.place, what);
+                    }
+                }
+                Lobes { gloss: dielectric(self.index(d, 1.5)?), ..lobes }
+            }
+            _ => {
+                let [reflect, transmit] =
+                    [self.colour(d, "reflect", [0.5; 3])?, self.colour(d, "transmit", [0.5; 3])?];
+                if mean(&lobes.specular) != [0.0; 3] && mean(&transmit) != [0.0; 3] {
+                    let what = "the glossy transmission of the material `translucent` is left out";
+                    self.approximated(&d.params.place, what);
+                }
+                Lobes {
+                    through: self.product(&d.params, lobes.diffuse.clone(), transmit)?,
+                    diffuse: self.product(&d.params, lobes.diffuse, reflect.clone())?,
+                    specular: self.product(&d.params, lobes.specular, reflect)?,
+                    ..lobes
+                }
+            }
+        })
     }
 
     fn plastic(&self, diffuse: Texture, specular: Rgb, ior: f32, roughness: f32) -> Material {

@@ -112,7 +112,12 @@ impl Reader<'_> {
         Ok(None)
     }
 
-    fn product(&mut self, params: &Params, first: Texture, second: Texture) -> Result<Texture, LoadError> {
+    pub(super) fn product(
+        &mut self,
+        params: &Params,
+        first: Texture,
+        second: Texture,
+    ) -> Result<Texture, LoadError> {
         Ok(match (first, second) {
             (Texture::Colour(a), Texture::Colour(b)) => plain(std::array::from_fn(|i| a[i] * b[i])),
             (Texture::Image(image), Texture::Colour(colour))

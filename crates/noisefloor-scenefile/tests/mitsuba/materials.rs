@@ -268,7 +268,7 @@ fn near_surfaces_are_warned_of() {
     let folder = folder();
     let diffuse = r#"<bsdf type="diffuse"/>"#;
     for (bsdf, what) in [
-        (r#"<bsdf type="roughdiffuse"/>"#.to_owned(), "Lambertian"),
+        (r#"<bsdf type="roughdiffuse"/>"#.to_owned(), "fast approximation"),
         (
             r#"<bsdf type="phong"><float name="exponent" value="50"/></bsdf>"#.to_owned(),
             "Beckmann's microfacets",

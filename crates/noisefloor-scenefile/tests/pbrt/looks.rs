@@ -107,6 +107,33 @@ fn materials_of_both_versions_reflect_the_sky() {
             0.05,
         ),
         ("Material \"conductor\" \"rgb reflectance\" [0.5 0.25 0]", [0.5, 0.25, 0.0], 2e-2),
+        ("Material \"plastic\" \"rgb Kd\" [0.5 0.25 0] \"rgb Ks\" [0 0 0]", [0.5, 0.25, 0.0], 1e-3),
+        // Seen along the normal, Oren's and Nayar's A of 20°: 1 − σ²/(2(σ² + 0.33)) = 0.8652
+        ("Material \"matte\" \"rgb Kd\" [0.5 0.25 0] \"float sigma\" 20", [0.4326, 0.2163, 0.0], 2e-2),
+        // 4 % of a mirror. One of ten samples takes the facets: four standard deviations
+        (
+            "Material \"uber\" \"rgb Kd\" [0 0.2 0] \"rgb Ks\" [0.5 0.5 0.5] \"float roughness\" 0.001 \
+             \"bool remaproughness\" false",
+            [0.02, 0.22, 0.02],
+            0.19,
+        ),
+        (
+            "Material \"uber\" \"rgb Kd\" [0.5 0.25 0] \"rgb Ks\" [0 0 0] \"rgb opacity\" [0.5 0.5 0.5]",
+            [0.75, 0.625, 0.5],
+            6e-2,
+        ),
+        (
+            "Material \"translucent\" \"rgb Kd\" [1 0.5 0] \"rgb Ks\" [0 0 0] \"rgb reflect\" [0.5 0.5 0.5] \
+             \"rgb transmit\" [0.25 0.25 0.25]",
+            [0.75, 0.375, 0.0],
+            1e-3,
+        ),
+        (
+            "Material \"diffusetransmission\" \"rgb reflectance\" [0.2 0 0] \"rgb transmittance\" [0 0.8 0] \
+             \"float scale\" 0.5",
+            [0.1, 0.4, 0.0],
+            5e-2,
+        ),
         (
             "MakeNamedMaterial \"a\" \"string type\" \"diffuse\" \"rgb reflectance\" [1 1 1] \
              MakeNamedMaterial \"b\" \"string type\" \"diffuse\" \"rgb reflectance\" [0 0 0] \
