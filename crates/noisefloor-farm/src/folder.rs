@@ -19,7 +19,7 @@ use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
 
-/// Longest file of JSON that is read: a round of some ten million batches.
+/// Longest file of JSON that is written and read: a round of some ten million batches.
 const MAX_JSON: u64 = 1 << 30;
 /// An empty hidden file. The lock itself ends with the process that holds it, however that ends.
 const LOCK: &str = ".noisefloor-farm.lock";
@@ -330,6 +330,44 @@ fn read_json<T: DeserializeOwned>(path: &Path) -> Result<Option<T>, FarmError> {
 
 fn write_json<T: Serialize>(path: &Path, content: &T) -> Result<(), FarmError> {
     Ok(write_atomic(path, |to| {
-        serde_json::to_writer(&mut *to, content).map_err(io::Error::from).and_then(|()| to.write_all(b"\n"))
+        let mut to = UpTo { to, left: MAX_JSON };
+        serde_json::to_writer(&mut to, content).map_err(io::Error::from).and_then(|()| to.write_all(b"\n"))
     })?)
+}
+
+/// Writes no more than can be read back.
+struct UpTo<W> {
+    to: W,
+    left: u64,
+}
+
+impl<W: Write> Write for UpTo<W> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let Some(left) = self.left.checked_sub(bytes.len() as u64) else {
+            let what = "it would be too long to be read back: render fewer frames in one farm";
+            return Err(io::Error::new(io::ErrorKind::FileTooLarge, what));
+        };
+        let written = self.to.write(bytes)?;
+        self.left = left + (bytes.len() - written) as u64;
+        Ok(written)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.to.flush()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_could_not_be_read_back_is_not_written() {
+        let mut text = Vec::new();
+        let mut to = UpTo { to: &mut text, left: 4 };
+        to.write_all(b"ab").unwrap();
+        assert_eq!(to.write_all(b"cde").unwrap_err().kind(), io::ErrorKind::FileTooLarge);
+        to.write_all(b"cd").unwrap();
+        assert_eq!(text, b"abcd");
+    }
 }
