@@ -122,7 +122,7 @@ def prepared(args, file):
         elif node.type == mi.ObjectType.ReconstructionFilter:
             become(node, "box")
         elif node.type == mi.ObjectType.Film:
-            become(node, "hdrfilm", ("width", "height"))
+            become(node, "hdrfilm", ("width", "height", "rfilter"))
             node.props["pixel_format"] = "rgb"
     scene = mi.parser.instantiate(config, state)
     return (scene[0] if isinstance(scene, list) else scene), depth

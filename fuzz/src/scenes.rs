@@ -141,6 +141,7 @@ pub(crate) fn xml_seeds() -> Vec<Vec<u8>> {
 <shape type="rectangle"><ref id="a"/><transform name="to_world"><rotate y="1" angle="30"/>
 <matrix value="1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1"/><scale x="2"/></transform></shape>
 <shape type="cube"><bsdf type="dielectric"><string name="int_ior" value="bk7"/></bsdf></shape>
+<shape type="cube"><bsdf type="roughdiffuse"><float name="alpha" value="0.3"/></bsdf></shape>
 <shape type="sphere"><float name="radius" value="$r"/><ref id="c"/></shape>
 <shape type="cylinder"><point name="p0" value="0,0,1"/><ref id="b"/></shape>
 <shape type="disk"><emitter type="area"><rgb name="radiance" value="9"/></emitter></shape>
@@ -167,7 +168,13 @@ pub(crate) fn pbrt_seeds() -> Vec<Vec<u8>> {
         ObjectInstance \"o\" Shape \"loopsubdiv\" \"integer levels\" 2 \"integer indices\" [0 1 2 0 2 3]\n\
         \"point3 P\" [-1 -1 0 1 -1 0 1 1 0 -1 1 0] Shape \"disk\" \"float alpha\" 0.5\n\
         LightSource \"infinite\" \"rgb L\" [1 1 1] LightSource \"spot\" \"point3 to\" [0 0 -1]\n";
-    vec![format!("{head}{looks}{shapes}").into_bytes()]
+    let lobes = "Material \"matte\" \"float sigma\" 20 Shape \"sphere\"\n\
+        Material \"plastic\" \"rgb Kd\" [1 0 0] \"float roughness\" 0.1 Shape \"sphere\"\n\
+        Material \"uber\" \"rgb opacity\" [0.5 1 0] \"rgb Kr\" [0 0 0] \"float eta\" 1.5 Shape \"disk\" \"float alpha\" 0.5\n\
+        Material \"substrate\" \"float uroughness\" 0.1 \"float vroughness\" 0.2 Shape \"sphere\"\n\
+        Material \"translucent\" \"rgb reflect\" [1 1 1] \"rgb transmit\" [0 1 0] Shape \"sphere\"\n\
+        Material \"diffusetransmission\" \"rgb transmittance\" [1 0 0] \"float scale\" 2 Shape \"sphere\"\n";
+    vec![format!("{head}{looks}{shapes}").into_bytes(), format!("{head}{lobes}").into_bytes()]
 }
 
 /// A file of a spectrum.
