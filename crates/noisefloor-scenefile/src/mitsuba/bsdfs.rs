@@ -234,7 +234,6 @@ impl<'d> Context<'d> {
     fn principled(&self, element: &'d Element) -> Result<Surface, LoadError> {
         let number =
             |name: &str, missing: f64| Ok::<_, LoadError>(self.mean_float(element, name)?.unwrap_or(missing));
-        let [roughness, metallic] = [number("roughness", 0.5)?, number("metallic", 0.0)?];
         let transmission = number("spec_trans", 0.0)?;
         let ior = match self.float(element, "eta")? {
             Some(eta) => eta,
@@ -270,6 +269,8 @@ impl<'d> Context<'d> {
             let tint = mean(&base).map(f32::sqrt);
             let ior = ior as f32;
             let thin = element.kind() == "principledthin";
+            element.ignore(&["metallic"]);
+            let roughness = number("roughness", 0.5)?;
             let roughness = (roughness * roughness).clamp(0.0, 1.0) as f32;
             return Ok(Surface::two_sided(if thin {
                 Material::ThinGlass { ior, tint }
@@ -277,8 +278,7 @@ impl<'d> Context<'d> {
                 Material::RoughGlass { ior, tint, roughness }
             }));
         }
-        let share = [1.0, roughness.clamp(0.0, 1.0) as f32, metallic.clamp(0.0, 1.0) as f32];
-        let metallic_roughness = Texture::Colour(share);
+        let metallic_roughness = self.green_and_blue(element, ["roughness", "metallic"], [0.5, 0.0])?;
         let ior = (ior as f32).clamp(1.001, 4.0);
         Ok(Surface::one_sided(Material::MetallicRoughness { base, metallic_roughness, ior }))
     }

@@ -246,6 +246,38 @@ fn surfaces_reflect_a_white_sky_as_they_should() {
     assert!(error.unwrap_err().contains("the metal `Xx` (known: none, Ag, Al"));
 }
 
+/// Roughness and metal may both vary. Red metal of α = 0.01 shows no green, red plastic shows it in its coat: 4 %
+/// along the normal.
+#[test]
+fn principled_surfaces_vary() {
+    let folder = folder().with_png("rough.png", 2, &[[25, 25, 25, 255]; 4]);
+    let rough = r#"<texture name="roughness" type="bitmap"><string name="filename" value="rough.png"/>
+        <boolean name="raw" value="true"/><string name="filter_type" value="nearest"/></texture>"#;
+    let metal = format!(r#"<texture name="metallic" {BITMAP}</texture>"#);
+    for (roughness, warnings) in [
+        (rough, 1),
+        (r#"<float name="roughness" value="0.1"/>"#, 1),
+        (&rough.replace("nearest", "bilinear"), 2),
+    ] {
+        let bsdf = format!(
+            r#"<bsdf type="principled"><rgb name="base_color" value="0.5 0 0"/><float name="eta" value="1.5"/>
+                {roughness}{metal}</bsdf>"#
+        );
+        let loaded = folder.body(&format!(r#"<shape type="cube">{bsdf}</shape>"#)).unwrap();
+        assert_eq!(loaded.warnings.len(), warnings, "{:?}", loaded.warnings);
+        // The picture's luminance is the share of metal
+        for ((u, v), share) in QUARTERS.into_iter().zip([0.2126, 0.7152, 0.2159, 1.0]) {
+            let (x, y) = (1.0 - 2.0 * u, 1.0 - 2.0 * v);
+            let seen = folder.see(&format!(
+                r#"<shape type="rectangle"><transform name="to_world"><translate x="{x}" y="{y}"/></transform>
+                    {bsdf}</shape>{SKY}"#
+            ));
+            let metal = if warnings == 2 { 0.5359 } else { share };
+            assert!((seen[1] - 0.04 * (1.0 - metal)).abs() < 0.006, "{u} {v}: {seen:?}");
+        }
+    }
+}
+
 /// Opacity is luminance: 0.7152 where the picture is green, whatever its alpha.
 #[test]
 fn masks_take_the_luminance_of_pictures() {
