@@ -268,7 +268,7 @@ def table(args):
         by_source.setdefault(row["repository"], []).append(row)
     middle = lambda numbers: sorted(numbers)[len(numbers) // 2] if numbers else float("nan")
     for name, found in by_source.items():
-        exact = [row for row in found if not re.search("replaced by (?!path)|fades|metal, gloss|is ignored: light", row["findings"])]
+        exact = [row for row in found if not re.search("replaced by (?!path)|fades|metal, gloss|is ignored: light|polarisation|the sun", row["findings"])]
         inside = sum(row["square"] < 3 * row["error"] for row in exact)
         off = middle([row["off"] for row in exact])
         ratio = middle([row["variance"] for row in exact if row["variance"]])
