@@ -55,6 +55,8 @@ MATERIALS = {
     "mirror": '"mirror" "rgb Kr" [0.9 0.8 0.7]',
     "uber": '"uber" "rgb Kd" [0.3 0.3 0.1] "rgb Ks" [0.3 0.3 0.3] "float roughness" [0.2] '
     '"bool remaproughness" ["false"]',
+    "uber, mirror": '"uber" "rgb Kd" [0.3 0.3 0.1] "rgb Ks" [0.3 0.3 0.3] "rgb Kr" [0.9 0.9 0.9] "float roughness" [0.2] '
+    '"bool remaproughness" ["false"]',
     "uber, half opaque": '"uber" "rgb Kd" [0.5 0.3 0.1] "rgb Ks" [0 0 0] "rgb opacity" [0.5 0.5 0.5]',
     "substrate": '"substrate" "rgb Kd" [0.4 0.3 0.1] "rgb Ks" [0.1 0.1 0.1] "float uroughness" [0.2] '
     '"float vroughness" [0.2] "bool remaproughness" ["false"]',

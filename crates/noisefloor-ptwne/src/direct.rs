@@ -198,6 +198,12 @@ impl<'a> Tracer<'a> {
             });
             sum += self.hemisphere(&far, weight, code, through);
         }
+        if let Some(factor) = glossy.mirror() {
+            let dir = math::reflect(ray.dir, surface.normal);
+            if dir.dot(surface.flat) > 0.0 {
+                sum += self.follow(surface, dir, DELTA, weight * factor, 2 * code + 1);
+            }
+        }
         if let Some((wi, factor, density)) = glossy.reflect(wo, [u, v]) {
             let dir = frame.to_world(wi).normalize();
             if dir.dot(surface.flat) > 0.0 {

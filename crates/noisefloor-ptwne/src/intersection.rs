@@ -3,7 +3,7 @@
 use crate::accel::{Hit, HitShape, Spot, Stack};
 use crate::bsdf::{Glossy, LobesAt, MIN_ROUGHNESS, RoughGlass, schlick};
 use crate::geometry::NO;
-use crate::material::{Bsdf, CompiledMaterial, Reflectance};
+use crate::material::{Bsdf, CompiledMaterial};
 use crate::math::{Ray, Vec3};
 use crate::relief::{self, Relief};
 use crate::rng;
@@ -218,11 +218,12 @@ impl<'a> Intersection<'a> {
                 let base = base.tinted(self.uv, self.tint);
                 Some(Glossy::blend(coat, base, alpha, values.z, cos))
             }
-            Bsdf::Lobes { diffuse, through, specular, gloss, oren_nayar, ggx } => {
-                let at = |colour: &Reflectance| colour.tinted(self.uv, self.tint);
-                let (diffuse, through, specular) = (at(diffuse), at(through), at(specular));
+            Bsdf::Lobes { diffuse, through, specular, mirror, gloss, oren_nayar, ggx } => {
+                let [diffuse, through, specular, mirror] =
+                    [diffuse, through, specular, mirror].map(|colour| colour.tinted(self.uv, self.tint));
                 let (gloss, oren_nayar, ggx) = (*gloss, *oren_nayar, *ggx);
-                Some(Glossy::lobes(LobesAt { diffuse, through, specular, gloss, oren_nayar, ggx }, cos))
+                let lobes = LobesAt { diffuse, through, specular, mirror, gloss, oren_nayar, ggx };
+                Some(Glossy::lobes(lobes, cos))
             }
             _ => None,
         }

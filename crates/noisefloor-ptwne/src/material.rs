@@ -101,7 +101,7 @@ pub enum Material {
         ior: f32,
     },
     /// Lobes that add up.
-    Lobes(Lobes),
+    Lobes(Box<Lobes>),
 }
 
 /// A sum of diffuse reflection, diffuse transmission and microfacets, as the `matte`, `plastic`, `uber`,
@@ -116,6 +116,8 @@ pub struct Lobes {
     pub through: Texture,
     /// Factor on the facets' reflection, or what they reflect at normal incidence, by `gloss`: 0…1.
     pub specular: Texture,
+    /// Factor on a smooth reflection beside that of the facets, 0…1; none with [`Gloss::AshikhminShirley`].
+    pub mirror: Texture,
     /// How the facets reflect.
     pub gloss: Gloss,
     /// Standard deviation of the slopes of the diffuse surface in radians, 0…π/2 (Oren, Nayar 1994); 0 is
@@ -125,11 +127,17 @@ pub struct Lobes {
     pub roughness: f32,
 }
 
+impl From<Lobes> for Material {
+    fn from(lobes: Lobes) -> Self {
+        Self::Lobes(Box::new(lobes))
+    }
+}
+
 impl Default for Lobes {
     fn default() -> Self {
-        let black = || Texture::Colour([0.0; 3]);
         let gloss = Gloss::Dielectric { ior: 1.5 };
-        Self { diffuse: black(), through: black(), specular: black(), gloss, sigma: 0.0, roughness: 1.0 }
+        let [diffuse, through, specular, mirror] = std::array::from_fn(|_| Texture::Colour([0.0; 3]));
+        Self { diffuse, through, specular, mirror, gloss, sigma: 0.0, roughness: 1.0 }
     }
 }
 
@@ -225,6 +233,7 @@ pub(crate) enum Bsdf {
         diffuse: Reflectance,
         through: Reflectance,
         specular: Reflectance,
+        mirror: Reflectance,
         gloss: Gloss,
         oren_nayar: OrenNayar,
         ggx: Ggx,
@@ -331,7 +340,8 @@ impl Material {
                 metallic_roughness.check()?;
                 base.check()
             }
-            Material::Lobes(Lobes { diffuse, through, specular, gloss, sigma, roughness }) => {
+            Material::Lobes(lobes) => {
+                let Lobes { diffuse, through, specular, mirror, gloss, sigma, roughness } = lobes.as_ref();
                 if let Gloss::Dielectric { ior } = gloss {
                     check_range("an index of refraction", *ior, [0.25, 4.0], "0.25…4")?;
                 }
@@ -339,7 +349,8 @@ impl Material {
                 check_range("a roughness", *roughness, [MIN_ROUGHNESS, 1.0], "0.001…1")?;
                 diffuse.check()?;
                 through.check()?;
-                specular.check()
+                specular.check()?;
+                mirror.check()
             }
         }
     }
@@ -404,14 +415,18 @@ impl CompiledMaterial {
                     coat: coat(ior, fixed, Facets::Ggx, Interior::Conserving),
                 }
             }
-            Material::Lobes(Lobes { diffuse, through, specular, gloss, sigma, roughness }) => Bsdf::Lobes {
-                diffuse: Reflectance::new(diffuse),
-                through: Reflectance::new(through),
-                specular: Reflectance::new(specular),
-                gloss,
-                oren_nayar: OrenNayar::new(sigma),
-                ggx: Ggx::of(roughness, options.facets),
-            },
+            Material::Lobes(lobes) => {
+                let Lobes { diffuse, through, specular, mirror, gloss, sigma, roughness } = *lobes;
+                Bsdf::Lobes {
+                    diffuse: Reflectance::new(diffuse),
+                    through: Reflectance::new(through),
+                    specular: Reflectance::new(specular),
+                    mirror: Reflectance::new(mirror),
+                    gloss,
+                    oren_nayar: OrenNayar::new(sigma),
+                    ggx: Ggx::of(roughness, options.facets),
+                }
+            }
         };
         Ok(Self::with(bsdf, options))
     }
@@ -442,8 +457,8 @@ impl CompiledMaterial {
                 c.varies()
             }
             Bsdf::Plastic { diffuse, .. } => diffuse.varies(),
-            Bsdf::Lobes { diffuse, through, specular, .. } => {
-                diffuse.varies() || through.varies() || specular.varies()
+            Bsdf::Lobes { diffuse, through, specular, mirror, .. } => {
+                [diffuse, through, specular, mirror].into_iter().any(Reflectance::varies)
             }
             Bsdf::Blend { base, metallic_roughness, .. } => base.varies() || metallic_roughness.varies(),
             Bsdf::Glass { .. } | Bsdf::ThinGlass { .. } | Bsdf::RoughGlass { .. } => false,

@@ -24,9 +24,12 @@ pub(crate) struct Glossy<'a> {
     base: Vec3,
     /// The albedo over π of diffuse transmission.
     through: Vec3,
-    /// Probabilities of choosing a microfacet, and transmission.
+    /// What is mirrored besides the facets' reflection.
+    mirror: Vec3,
+    /// Probabilities of choosing a microfacet, transmission, and the mirror.
     pub(super) facet: f32,
     transmission: f32,
+    pub(super) mirrored: f32,
     /// Whether the coat is smooth, without microfacets.
     pub(super) smooth: bool,
 }
@@ -73,6 +76,7 @@ pub(crate) struct LobesAt {
     pub(crate) diffuse: Vec3,
     pub(crate) through: Vec3,
     pub(crate) specular: Vec3,
+    pub(crate) mirror: Vec3,
     pub(crate) gloss: Gloss,
     pub(crate) oren_nayar: OrenNayar,
     pub(crate) ggx: Ggx,
@@ -91,8 +95,10 @@ impl<'a> Glossy<'a> {
             below: Below::Nothing,
             base: zero,
             through: zero,
+            mirror: zero,
             facet: 1.0,
             transmission: 0.0,
+            mirrored: 0.0,
             smooth: false,
         }
     }
@@ -119,8 +125,10 @@ impl<'a> Glossy<'a> {
             below: Below::Coat(coat),
             base: coat.base(alpha, diffuse, nonlinear) * passed,
             through: Vec3::ZERO,
+            mirror: Vec3::ZERO,
             facet: lobe_probability(reflected, inside),
             transmission: 0.0,
+            mirrored: 0.0,
             smooth: alpha < MIN_ROUGHNESS,
         }
     }
@@ -141,15 +149,18 @@ impl<'a> Glossy<'a> {
     }
 
     pub(crate) fn lobes(lobes: LobesAt, cos: f32) -> Self {
-        let LobesAt { diffuse, through, specular, gloss, oren_nayar, ggx } = lobes;
-        let (ior, below, reflected) = match gloss {
+        let LobesAt { diffuse, through, specular, mirror, gloss, oren_nayar, ggx } = lobes;
+        let (ior, below, reflected, mirror) = match gloss {
             Gloss::Dielectric { ior } => {
-                (ior, Below::Diffuse(oren_nayar), specular * fresnel(cos.clamp(0.0, 1.0), ior).0)
+                let (share, _) = fresnel(cos.clamp(0.0, 1.0), ior);
+                (ior, Below::Diffuse(oren_nayar), specular * share, mirror * share)
             }
-            Gloss::AshikhminShirley => (1.0, Below::AshikhminShirley, schlick(specular, cos)),
+            Gloss::AshikhminShirley => (1.0, Below::AshikhminShirley, schlick(specular, cos), Vec3::ZERO),
         };
-        let shares = [reflected, diffuse, through].map(math::luminance);
-        let facet = lobe_probability(shares[0], shares[1] + shares[2]);
+        let [facets, over, under, flat] = [reflected, diffuse, through, mirror].map(math::luminance);
+        let mirrored = lobe_probability(flat, facets + over + under);
+        let facet = (1.0 - mirrored) * lobe_probability(facets, over + under);
+        let transmission = (1.0 - mirrored - facet) * lobe_probability(under, over);
         Self {
             ggx,
             fresnel: &Fresnel::None,
@@ -160,8 +171,10 @@ impl<'a> Glossy<'a> {
             below,
             base: diffuse * FRAC_1_PI,
             through: through * FRAC_1_PI,
+            mirror,
             facet,
-            transmission: (1.0 - facet) * lobe_probability(shares[2], shares[1]),
+            transmission,
+            mirrored,
             smooth: false,
         }
     }
@@ -231,6 +244,11 @@ impl<'a> Glossy<'a> {
         }
     }
 
+    /// The factor on light from the mirrored direction, besides what facets reflect; none if that is black.
+    pub(crate) fn mirror(&self) -> Option<Vec3> {
+        (self.mirror != Vec3::ZERO).then_some(self.mirror)
+    }
+
     /// f·|cos θᵢ| of transmission in a direction of the far side.
     #[inline]
     pub(crate) fn through(&self, wi: Vec3) -> Vec3 {
@@ -258,7 +276,7 @@ impl<'a> Glossy<'a> {
             return (self.through(wi), self.transmission * FRAC_1_PI * -wi.z);
         }
         let (f, density) = self.facets(wo, wi);
-        let diffuse = 1.0 - self.facet - self.transmission;
+        let diffuse = 1.0 - self.facet - self.transmission - self.mirrored;
         (f + self.base(wo, wi), self.facet * density + diffuse * FRAC_1_PI * wi.z)
     }
 
@@ -282,6 +300,9 @@ impl<'a> Glossy<'a> {
     /// A direction, its weight f·cos θᵢ / density, and its density; `None` if nothing is scattered.
     #[inline]
     pub(crate) fn sample(&self, wo: Vec3, [pick, u, v]: [f32; 3]) -> Option<(Vec3, Vec3, f32)> {
+        if pick >= 1.0 - self.mirrored {
+            return Some((Vec3::new(-wo.x, -wo.y, wo.z), self.mirror / self.mirrored, DELTA));
+        }
         let wi = if pick < self.facet {
             let (wi, weight, density) = self.reflect(wo, [u, v])?;
             if matches!(self.below, Below::Nothing) || density == DELTA {

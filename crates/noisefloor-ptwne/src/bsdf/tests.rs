@@ -84,7 +84,8 @@ fn zoo() -> Vec<(Material, CompiledMaterial)> {
         (Gloss::AshikhminShirley, 0.0, 0.2),
     ] {
         let [diffuse, through, specular] = [colour, [0.3; 3], [0.4, 0.3, 0.2]].map(Texture::Colour);
-        all.push(Material::Lobes(Lobes { diffuse, through, specular, gloss, sigma, roughness }));
+        let mirror = Texture::Colour([0.2; 3]);
+        all.push(Lobes { diffuse, through, specular, mirror, gloss, sigma, roughness }.into());
     }
     let compile = |m, facets| {
         let options = MaterialOptions { facets, ..MaterialOptions::default() };
@@ -151,7 +152,7 @@ fn expected_parts(glossy: &Glossy<'_>, wo: Vec3) -> [f64; NOTHING + 1] {
             expected[part] += f64::from(glossy.eval(wo, wi).1) * area;
         }
     }
-    expected[SMOOTH] = if glossy.smooth { f64::from(glossy.facet) } else { 0.0 };
+    expected[SMOOTH] = f64::from(if glossy.smooth { glossy.facet } else { glossy.mirrored });
     let mass: f64 = expected.iter().sum();
     assert!(mass < 1.0 + 2e-3, "{mass}");
     expected[NOTHING] = (1.0 - mass).max(0.0);
@@ -234,9 +235,10 @@ fn albedo(material: &CompiledMaterial, cos: f32) -> [f64; 2] {
 /// Sums of lobes at known albedos.
 #[test]
 fn lobes_reflect_and_transmit_what_they_should() {
-    let lobes = |diffuse: f32, through: f32, specular: f32, gloss, sigma: f32| {
+    let lobes = |diffuse: f32, through: f32, specular: f32, mirror: f32, gloss, sigma: f32| {
         let [diffuse, through, specular] = [diffuse, through, specular].map(|x| Texture::Colour([x; 3]));
-        let material = Material::Lobes(Lobes { diffuse, through, specular, gloss, sigma, roughness: 0.01 });
+        let lobes = Lobes { diffuse, through, specular, gloss, sigma, roughness: 0.01, ..Lobes::default() };
+        let material = Lobes { mirror: Texture::Colour([mirror; 3]), ..lobes }.into();
         CompiledMaterial::new(material, MaterialOptions::default(), &mut vec![]).unwrap()
     };
     let dielectric = |ior| Gloss::Dielectric { ior };
@@ -245,19 +247,20 @@ fn lobes_reflect_and_transmit_what_they_should() {
         let error = got.iter().zip(expected).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
         assert!(error < 0.01, "{got:?} instead of {expected:?}");
     };
-    near(albedo(&lobes(0.3, 0.5, 0.0, dielectric(1.5), 0.0), 0.6), [0.3, 0.5]);
+    near(albedo(&lobes(0.3, 0.5, 0.0, 0.0, dielectric(1.5), 0.0), 0.6), [0.3, 0.5]);
     // Facets so smooth that they are a mirror: 4 % at normal incidence, all beyond the critical angle
-    near(albedo(&lobes(0.3, 0.0, 0.5, dielectric(1.5), 0.0), 1.0), [0.3 + 0.5 * 0.04, 0.0]);
-    near(albedo(&lobes(0.3, 0.0, 0.5, dielectric(1.0 / 1.5), 0.0), 0.5), [0.8, 0.0]);
+    near(albedo(&lobes(0.3, 0.0, 0.5, 0.0, dielectric(1.5), 0.0), 1.0), [0.3 + 0.5 * 0.04, 0.0]);
+    near(albedo(&lobes(0.3, 0.0, 0.5, 0.0, dielectric(1.0 / 1.5), 0.0), 0.5), [0.8, 0.0]);
+    near(albedo(&lobes(0.3, 0.0, 0.0, 0.4, dielectric(1.0 / 1.5), 0.0), 0.5), [0.7, 0.0]);
     // Seen along the normal, Oren and Nayar's factor is A = 1 − σ²/(2(σ² + 0.33))
     let s2 = 0.25f64;
     let a = 1.0 - 0.5 * s2 / (s2 + 0.33);
-    near(albedo(&lobes(0.6, 0.0, 0.0, dielectric(1.5), 0.5), 1.0), [0.6 * a, 0.0]);
+    near(albedo(&lobes(0.6, 0.0, 0.0, 0.0, dielectric(1.5), 0.5), 1.0), [0.6 * a, 0.0]);
     // Ashikhmin's and Shirley's diffuse part along the normal: (1 − ½⁵)·28/23·2∫μ(1 − (1 − μ/2)⁵)dμ. With
     // u = 1 − μ/2, ∫μu⁵dμ = 4∫(u⁵ − u⁶)du from ½ to 1
     let moment = 4.0 * ((1.0 - 0.5f64.powi(6)) / 6.0 - (1.0 - 0.5f64.powi(7)) / 7.0);
     let share = (1.0 - 0.5f64.powi(5)) * 28.0 / 23.0 * 2.0 * (0.5 - moment);
-    near(albedo(&lobes(0.6, 0.0, 0.0, Gloss::AshikhminShirley, 0.0), 1.0), [0.6 * share, 0.0]);
+    near(albedo(&lobes(0.6, 0.0, 0.0, 0.0, Gloss::AshikhminShirley, 0.0), 1.0), [0.6 * share, 0.0]);
 }
 
 #[test]

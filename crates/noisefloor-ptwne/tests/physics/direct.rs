@@ -3,8 +3,9 @@
 use crate::kit::{agrees, batch, look, mean, scene};
 use noisefloor::ProgressiveSource;
 use noisefloor_ptwne::{
-    Camera, Emission, Environment, EnvironmentMap, Estimator, Falloff, ImageTexture, Material, MaterialId,
-    MaterialOptions, Mesh, Pixels, Ptwne, Punctual, RenderOptions, Scene, SceneBuilder, Sun, Texture, scenes,
+    Camera, Emission, Environment, EnvironmentMap, Estimator, Falloff, Gloss, ImageTexture, Lobes, Material,
+    MaterialId, MaterialOptions, Mesh, Pixels, Ptwne, Punctual, RenderOptions, Scene, SceneBuilder, Sun,
+    Texture, scenes,
 };
 
 const DIRECT: u32 = 2;
@@ -315,6 +316,35 @@ fn transparent_surfaces_are_seen_through() {
         b.environment(Environment::constant([1.0; 3])).unwrap();
     });
     agrees(mean(scene, 16, 64, 16, 0, RenderOptions::default()), 1.0 / 3.0, 1e-6);
+}
+
+/// Panels above and below a floor that reflects 0.4 and lets 0.3 through; and a smooth boundary that reflects 0.7 of
+/// a sky, since the camera sees it at 72°, where reflection from inside is total.
+#[test]
+fn lobes_are_lit_from_both_sides() {
+    let floor = |lobes: Lobes, light: &dyn Fn(&mut SceneBuilder)| {
+        scene(spot(), |b| {
+            let m = b.material(lobes.into()).unwrap();
+            b.parallelogram([-9.0, 0.0, -9.0], [0.0, 0.0, 18.0], [18.0, 0.0, 0.0], m, None).unwrap();
+            light(b);
+        })
+    };
+    let lobes = Lobes { diffuse: [0.4; 3].into(), through: [0.3; 3].into(), ..Lobes::default() };
+    let panels = floor(lobes, &|b| {
+        let black = b.material(Material::diffuse([0.0; 3])).unwrap();
+        for (y, radiance) in [(2.0, 3.0), (-2.0, 5.0)] {
+            let light = Some(Emission::two_sided([radiance; 3]));
+            b.parallelogram([-1.0, y, -1.0], [2.0, 0.0, 0.0], [0.0, 0.0, 2.0], black, light).unwrap();
+        }
+    });
+    let expected = (0.4 * 3.0 + 0.3 * 5.0) * 4.0 * corner(0.5, 0.5);
+    check(&panels, expected);
+    check_brute_force(&panels, expected);
+    let gloss = Gloss::Dielectric { ior: 1.0 / 1.5 };
+    let lobes = Lobes { diffuse: [0.1; 3].into(), mirror: [0.7; 3].into(), gloss, ..Lobes::default() };
+    let sky = floor(lobes, &|b| b.environment(Environment::constant([1.0; 3])).unwrap());
+    check(&sky, 0.8);
+    check_brute_force(&sky, 0.8);
 }
 
 /// Through a ball before a sky of radiance 1: rays have to pass two sides, by the opacity that each has

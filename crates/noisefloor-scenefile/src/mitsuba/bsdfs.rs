@@ -77,7 +77,7 @@ impl<'d> Context<'d> {
         // Its α is that of Beckmann's slopes (Mitsuba 0.6)
         let alpha = self.mean_float(element, "alpha")?.unwrap_or(0.2).clamp(0.0, 1.0);
         let sigma = alpha as f32 * FRAC_1_SQRT_2;
-        Ok(Surface::one_sided(Material::Lobes(Lobes { diffuse, sigma, ..Lobes::default() })))
+        Ok(Surface::one_sided(Lobes { diffuse, sigma, ..Lobes::default() }.into()))
     }
 
     fn twosided(&self, element: &'d Element) -> Result<Surface, LoadError> {

@@ -1,6 +1,6 @@
 //! What a shape's surface is made of.
 
-use noisefloor_ptwne::{Facets, Lobes, Material, Relief, Texture};
+use noisefloor_ptwne::{Facets, Material, Relief, Texture};
 
 /// A material, or a blend of two surfaces, and what it lets through.
 #[derive(Clone, Debug)]
@@ -83,9 +83,9 @@ impl Surface {
                 Body::Plain(material) => match material {
                     Material::Diffuse { albedo: texture }
                     | Material::Plastic { diffuse: texture, .. }
-                    | Material::Lobes(Lobes { diffuse: texture, .. })
                     | Material::RoughConductor { reflectance: texture, .. }
                     | Material::Conductor { reflectance: texture, .. } => varies(texture),
+                    Material::Lobes(lobes) => varies(&lobes.diffuse),
                     Material::MetallicRoughness { base, metallic_roughness, .. } => {
                         varies(base) || varies(metallic_roughness)
                     }

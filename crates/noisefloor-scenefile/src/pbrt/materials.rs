@@ -128,7 +128,7 @@ impl Reader<'_> {
                 if sigma == 0.0 {
                     Material::Diffuse { albedo: diffuse }
                 } else {
-                    Material::Lobes(Lobes { diffuse, sigma: sigma.to_radians() as f32, ..Lobes::default() })
+                    Lobes { diffuse, sigma: sigma.to_radians() as f32, ..Lobes::default() }.into()
                 }
             }
             "coateddiffuse" => {
@@ -138,7 +138,7 @@ impl Reader<'_> {
                     (self.colour(d, "reflectance", [0.5; 3])?, self.roughness(d, 0.0, true)?);
                 self.plastic(base, [1.0; 3], self.index(d, 1.5)?, roughness)
             }
-            "plastic" | "uber" | "substrate" | "translucent" => Material::Lobes(self.lobes(d)?),
+            "plastic" | "uber" | "substrate" | "translucent" => self.lobes(d)?.into(),
             "conductor" | "metal" | "coatedconductor" => self.conductor(d)?,
             "mirror" => Material::Mirror { reflectance: mean(&self.colour(d, "Kr", [0.9; 3])?) },
             "dielectric" | "glass" | "thindielectric" => {
@@ -158,7 +158,7 @@ impl Reader<'_> {
                     let colour = self.colour(d, name, [0.25; 3])?;
                     self.product(&d.params, colour, scale.clone())
                 });
-                Material::Lobes(Lobes { diffuse: diffuse?, through: through?, ..Lobes::default() })
+                Lobes { diffuse: diffuse?, through: through?, ..Lobes::default() }.into()
             }
             "subsurface" | "kdsubsurface" => {
                 self.approximated(&d.params.place, near("a coat on a Lambertian base"));
@@ -184,13 +184,11 @@ impl Reader<'_> {
             "plastic" => Lobes { gloss: dielectric(1.0 / 1.5), ..lobes },
             "substrate" => Lobes { gloss: Gloss::AshikhminShirley, ..lobes },
             "uber" => {
-                for name in ["Kr", "Kt"] {
-                    if self.texture_or_colour(d, name)?.is_some_and(|k| mean(&k) != [0.0; 3]) {
-                        let what = format!("`{name}` of the material `uber` is left out");
-                        self.approximated(&d.params.place, what);
-                    }
+                if self.texture_or_colour(d, "Kt")?.is_some_and(|k| mean(&k) != [0.0; 3]) {
+                    self.approximated(&d.params.place, "`Kt` of the material `uber` is left out");
                 }
-                Lobes { gloss: dielectric(self.index(d, 1.5)?), ..lobes }
+                let mirror = self.colour(d, "Kr", [0.0; 3])?;
+                Lobes { mirror, gloss: dielectric(self.index(d, 1.5)?), ..lobes }
             }
             _ => {
                 let [reflect, transmit] =
