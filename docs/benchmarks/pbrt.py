@@ -48,7 +48,9 @@ MATERIALS = {
     "plastic": '"plastic" "rgb Kd" [0.3 0.2 0.1] "rgb Ks" [0.4 0.4 0.4] "float roughness" [0.1]',
     "plastic, no remapping": '"plastic" "rgb Kd" [0.3 0.2 0.1] "rgb Ks" [0.4 0.4 0.4] "float roughness" [0.2] '
     '"bool remaproughness" ["false"]',
+    "plastic, roughness 0": '"plastic" "rgb Kd" [0.3 0.2 0.1] "rgb Ks" [0.4 0.4 0.4] "float roughness" [0]',
     "metal": '"metal" "float roughness" [0.01]',
+    "metal, roughness 0": '"metal" "float roughness" [0]',
     "metal, rough": '"metal" "float roughness" [0.3] "bool remaproughness" ["false"]',
     "glass": '"glass"',
     "glass, rough": '"glass" "float uroughness" [0.2] "float vroughness" [0.2] "bool remaproughness" ["false"]',

@@ -79,6 +79,9 @@ impl Reader<'_> {
     /// The opacity of `uber`, times that of the shape.
     fn opacity(&mut self, d: &Definition, of_shape: Option<Texture>) -> Result<Option<Texture>, LoadError> {
         let own = if d.kind == "uber" { self.texture_or_colour(d, "opacity")? } else { None };
+        if own.as_ref().map(mean).is_some_and(|[r, g, b]| r != g || g != b) {
+            self.approximated(&d.params.place, "the colour of `opacity` is replaced by its mean");
+        }
         Ok(match (own, of_shape) {
             (Some(own), Some(of_shape)) => Some(self.product(&d.params, own, of_shape)?),
             (own, of_shape) => own.or(of_shape),
@@ -330,7 +333,8 @@ impl Reader<'_> {
         let alpha = match d.params.switch("remaproughness", true)? {
             false => roughness,
             true if fourth => roughness.sqrt(),
-            true if roughness == 0.0 => 0.0,
+            // Of version 3 only glass can be smooth
+            true if roughness == 0.0 && d.kind == "glass" => 0.0,
             true => {
                 let x = roughness.max(1e-3).ln();
                 1.621_42 + x * (0.819_955 + x * (0.1734 + x * (0.017_120_1 + x * 0.000_640_711)))
