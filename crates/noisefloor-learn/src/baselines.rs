@@ -1,6 +1,7 @@
 //! Predictors that a model has to beat.
 
 use crate::predict::{Prediction, crossing};
+use crate::stimulus::as_difference;
 use crate::table::{Table, Zone};
 use statrs::statistics::{Data, Median};
 use std::collections::BTreeMap;
@@ -18,14 +19,15 @@ pub fn constant_noise_baseline(table: &Table) -> Vec<Prediction> {
         .filter(|(_, path)| path.len() > 1)
         .collect();
     let predict = |(zone, path): &(&Zone, Vec<(f64, f64)>), quietness: f64| {
-        Prediction::by_threshold(zone, crossing(path, quietness).unwrap_or(zone.last_spp))
+        let as_noise = crossing(path, quietness).unwrap_or(f64::INFINITY);
+        Prediction::by_threshold(zone, as_difference(as_noise, zone.reference_spp))
     };
     let constant = |left_out: &str| {
         let alone = zones.iter().all(|(z, _)| z.group == left_out);
         let others = || zones.iter().filter(|(z, _)| (alone || z.group != left_out) && !z.censored);
         let error =
             |constant: f64| others().map(|other| predict(other, constant).log_ratio().abs()).sum::<f64>();
-        let candidates = others().filter_map(|(zone, path)| value_at(path, zone.human_spp));
+        let candidates = others().filter_map(|(zone, path)| value_at(path, zone.human_as_noise()));
         candidates.map(|c| (error(c), c)).min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, c)| c)
     };
     let of_group: BTreeMap<&str, Option<f64>> =

@@ -8,15 +8,19 @@ use noisefloor::{
 };
 use std::collections::BTreeMap;
 
-/// Orders of the mean over a tile.
+/// Orders of the mean over a tile: 4 is that of most vision models, 8 looks for the worst spot.
 const ORDERS: [u32; 2] = [4, 8];
-/// Pooled differences at which noise is just too strong.
+/// Pooled differences at which noise is just too strong: near what people just see, and twice as much.
 const DIFFERENCES: [u32; 2] = [20, 40];
-/// Orders of the mean over a picture.
-const PICTURE_ORDERS: [u32; 2] = [4, 8];
-/// Numbers that are left out, besides none.
-const LEFT_OUT: [&[&str]; 4] =
-    [&[], &["texture"], &["texture", "light"], &["texture", "light", "picture_light"]];
+/// Quantiles of noise over the tiles that are the noise of the picture: the typical tile, and the noisier ones.
+const PICTURE_QUANTILES: [f64; 2] = [0.5, 0.75];
+/// Numbers that are left out, simplest first: the noise of the tile decides; then also that of its picture; then
+/// also the picture's light.
+const LEFT_OUT: [&[&str]; 3] = [
+    &["texture", "light", "picture_noise", "picture_light"],
+    &["texture", "light", "picture_light"],
+    &["texture", "light"],
+];
 
 /// Numbers for every choice of constants in the visible descriptor: a descriptor for tables, not for models.
 pub const VISIBLE_CHOICES: DescriptorKind = DescriptorKind {
@@ -29,18 +33,27 @@ pub const VISIBLE_CHOICES: DescriptorKind = DescriptorKind {
 pub struct Choice {
     /// The constants, and the numbers that are used.
     pub name: String,
+    /// How many numbers are weighed: how much there is to learn.
+    pub learned: usize,
     /// The zones, described so.
     pub table: Table,
 }
+
+/// Numbers of the visible descriptor.
+const LEARNED: usize = 5;
 
 #[derive(Debug)]
 struct VisibleChoices {
     descriptors: Vec<Descriptor>,
 }
 
-fn visible(order: u32, difference: u32, picture_order: u32) -> Result<Descriptor, DescriptorError> {
-    let numbers = [("order", order), ("difference", difference), ("picture_order", picture_order)];
-    let parameters = numbers.map(|(name, number)| (name.to_owned(), f64::from(number))).into();
+fn visible(order: u32, difference: u32, picture_quantile: f64) -> Result<Descriptor, DescriptorError> {
+    let numbers = [
+        ("order", f64::from(order)),
+        ("difference", f64::from(difference)),
+        ("picture_quantile", picture_quantile),
+    ];
+    let parameters = numbers.map(|(name, number)| (name.to_owned(), number)).into();
     Descriptor::from_spec(&DescriptorSpec { name: "visible".to_owned(), parameters }, &[])
 }
 
@@ -52,7 +65,7 @@ fn constants() -> impl Iterator<Item = (u32, u32)> {
 impl VisibleChoices {
     fn new() -> Result<Self, DescriptorError> {
         let descriptors =
-            constants().map(|(order, difference)| visible(order, difference, PICTURE_ORDERS[0]));
+            constants().map(|(order, difference)| visible(order, difference, PICTURE_QUANTILES[0]));
         Ok(Self { descriptors: descriptors.collect::<Result<_, _>>()? })
     }
 }
@@ -91,7 +104,7 @@ impl TileDescriptor for VisibleChoices {
     }
 }
 
-/// A table for each choice, from one of [`VISIBLE_CHOICES`].
+/// A table for each choice, from one of [`VISIBLE_CHOICES`], the simplest first.
 ///
 /// # Errors
 /// [`DescriptorError`] if the table is of another descriptor.
@@ -101,18 +114,18 @@ pub fn choices(table: &Table) -> Result<Vec<Choice>, DescriptorError> {
         return Err(DescriptorError::Unknown { name, known: VISIBLE_CHOICES.name.to_owned() });
     }
     let mut choices = Vec::new();
-    for (column, (order, difference)) in constants().enumerate() {
-        for picture_order in PICTURE_ORDERS {
-            let descriptor = visible(order, difference, picture_order)?;
-            let all = chosen(table, column, &descriptor);
-            for names in LEFT_OUT {
-                let used =
-                    if names.is_empty() { String::new() } else { format!(", without {}", names.join(", ")) };
+    for names in LEFT_OUT {
+        let whole_picture = !names.contains(&"picture_noise");
+        for (column, (order, difference)) in constants().enumerate() {
+            for quantile in PICTURE_QUANTILES.into_iter().take(if whole_picture { usize::MAX } else { 1 }) {
+                let all = chosen(table, column, &visible(order, difference, quantile)?);
+                let picture = if whole_picture { format!(", picture quantile {quantile}") } else { String::new() };
                 let name =
-                    format!("order {order}, difference {difference}, picture order {picture_order}{used}");
+                    format!("order {order}, difference {difference}{picture}, without {}", names.join(", "));
                 let names: Vec<String> = names.iter().map(|&name| name.to_owned()).collect();
-                let without = all.clone().without(&names);
-                choices.extend(without.map(|table| Choice { name, table }));
+                let learned = LEARNED - names.len();
+                let without = all.without(&names);
+                choices.extend(without.map(|table| Choice { name, learned, table }));
             }
         }
     }

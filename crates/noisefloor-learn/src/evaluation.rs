@@ -1,7 +1,6 @@
 //! Everything that predictions are scored by, as data.
 
 use crate::baselines::{constant_noise_baseline, scene_median_baseline};
-use crate::observers::observers_agreeing;
 use crate::predict::Prediction;
 use crate::score::{ReliabilityBin, calibration_error, error_interval, image_accuracy, reliability, score};
 use crate::table::{Origin, Table};
@@ -54,12 +53,10 @@ pub struct Evaluation {
     pub baselines: Baselines,
     /// Scene by scene.
     pub scenes: Vec<SceneScores>,
-    /// P against the share of observers who see no difference, as [`observers_agreeing`] has it.
+    /// P against how often people saw no noise.
     pub reliability: Vec<ReliabilityBin>,
     /// Of that curve.
     pub calibration_error: f64,
-    /// P against the recorded mean threshold as a step from 0 to 1, which P does not stand for.
-    pub calibration_error_of_step: f64,
     /// Zones whose human threshold is only a lower bound: not in the factors.
     pub censored_zones: usize,
     /// Zones unlike any that the model which predicts them was tested on.
@@ -78,9 +75,8 @@ impl PredictionScores {
 }
 
 impl Evaluation {
-    /// Scores the predictions of the zones of `table`. `spread` is that of observers, as in
-    /// [`TrainParams`](crate::TrainParams).
-    pub fn new(predicted_by: String, table: &Table, predictions: &[Prediction], spread: f64) -> Self {
+    /// Scores the predictions of the zones of `table`.
+    pub fn new(predicted_by: String, table: &Table, predictions: &[Prediction]) -> Self {
         let (constant, median) = (constant_noise_baseline(table), scene_median_baseline(table));
         let baselines = |keep: &dyn Fn(&Prediction) -> bool| Baselines {
             constant: PredictionScores::of(&constant, keep),
@@ -93,9 +89,7 @@ impl Evaluation {
         };
         let levels = || table.zones.iter().flat_map(|z| &z.levels);
         let real = levels().filter(|l| l.origin == Origin::Real).count();
-        let agreeing = |spp: f64, human: f64| observers_agreeing(spp, human, spread);
-        let step = |spp: f64, human: f64| f64::from(u8::from(spp >= human));
-        let curve = reliability(predictions.iter(), agreeing);
+        let curve = reliability(predictions.iter());
         let group =
             |scene: &str| table.zones.iter().find(|z| z.scene == scene).map_or("", |z| z.group.as_str());
         Self {
@@ -105,7 +99,6 @@ impl Evaluation {
             baselines: baselines(&|_| true),
             scenes: table.scenes().into_iter().map(scene).collect(),
             calibration_error: calibration_error(&curve),
-            calibration_error_of_step: calibration_error(&reliability(predictions.iter(), step)),
             reliability: curve,
             censored_zones: table.zones.iter().filter(|z| z.censored).count(),
             unfamiliar_zones: predictions.iter().filter(|p| p.unfamiliar).count(),

@@ -72,26 +72,26 @@ impl<'a> Material<'a> {
         Ok((folds, fit_platt(&decisions)?))
     }
 
-    /// Error factor of a pair of C and γ on zones whose groups were left out, and the sigmoid of these.
-    fn held_out_error(&self, svm: SvmParams) -> Result<(f64, Platt), TrainError> {
+    /// Predictions with a pair of C and γ for zones whose groups were left out, and the sigmoid of these.
+    fn held_out(&self, svm: SvmParams) -> Result<(Vec<Prediction>, Platt), TrainError> {
         let (folds, platt) = self.cross_validate(svm)?;
         let mut predictions: Vec<Prediction> = Vec::new();
         for Fold { machine, zones } in folds {
             let fold = parts(self.table, machine.calibrated(platt), None, TrainingRecord::default());
             predictions.extend(zones.iter().map(|z| predict(|raw| fold.judge(raw), Threshold::PAPER, z)));
         }
-        Ok((score(predictions.iter()).error_factor, platt))
+        Ok((predictions, platt))
     }
 }
 
-/// Error factor of a pair of C and γ on the zones of `groups`, each group held out in turn.
-pub(crate) fn held_out_error(
+/// Predictions with a pair of C and γ for the zones of `groups`, each group held out in turn.
+pub(crate) fn held_out(
     table: &Table,
     groups: &[&str],
     params: &TrainParams,
     svm: SvmParams,
-) -> Result<f64, TrainError> {
-    Ok(Material::of(table, groups, params).without_answers().held_out_error(svm)?.0)
+) -> Result<Vec<Prediction>, TrainError> {
+    Ok(Material::of(table, groups, params).without_answers().held_out(svm)?.0)
 }
 
 /// Trains on the zones of `groups`, at least two, with C and γ chosen, and P calibrated, by leaving each
@@ -105,8 +105,12 @@ pub(crate) fn fit_groups(
 
     // Thresholds choose C and γ. Answers are none.
     let zones_only = material.without_answers();
+    let outcome = |&svm: &SvmParams| {
+        let (predictions, platt) = zones_only.held_out(svm)?;
+        Ok((score(predictions.iter()).error_factor, platt))
+    };
     let outcomes: Vec<(f64, Platt)> =
-        params.candidates.par_iter().map(|&svm| zones_only.held_out_error(svm)).collect::<Result<_, _>>()?;
+        params.candidates.par_iter().map(outcome).collect::<Result<_, TrainError>>()?;
     let best = (0..outcomes.len())
         .min_by(|&i, &j| outcomes[i].0.total_cmp(&outcomes[j].0))
         .ok_or(TrainError::Params)?;

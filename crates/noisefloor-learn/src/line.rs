@@ -12,15 +12,18 @@ const SMALL: f64 = 1e-6;
 /// How far the two support vectors lie from the mean of the data, in standard deviations.
 const REACH: f32 = 100.0;
 
-/// Minimises the mean of −y·ln p − (1 − y)·ln(1 − p) with p = 1/(1 + exp(−w·x − b)), plus |w|²/(2c), by
-/// Newton's method. `rows` are examples, and `shares` their y, in [0, 1].
-pub(crate) fn fit_line(rows: ArrayView2<'_, f64>, shares: &[f64], c: f64) -> Svm {
+/// Minimises the mean of −y·ln p − (1 − y)·ln(1 − p) with p = 1/(1 + exp(−w·x − b)), plus |w′|²/(2c), by
+/// Newton's method. `rows` are examples, and `shares` their y, in [0, 1]. w′ is w without its first number, which
+/// is the noise of the tile: what is learned beside it is shrunk towards what the vision model says by itself.
+/// Only the numbers of `weighed` have a weight.
+pub(crate) fn fit_line(all: ArrayView2<'_, f64>, weighed: &[usize], shares: &[f64], c: f64) -> Svm {
+    let rows = all.select(Axis(1), weighed);
     let (examples, numbers) = rows.dim();
     // A last column of ones for b, which is not penalised
     let mut x = Array2::ones((examples, numbers + 1));
     x.slice_mut(ndarray::s![.., ..numbers]).assign(&rows);
     let mut penalty = Array1::from_elem(numbers + 1, examples as f64 / c);
-    penalty[numbers] = 1e-9;
+    (penalty[0], penalty[numbers]) = (1e-9, 1e-9);
 
     let mut weights = Array1::<f64>::zeros(numbers + 1);
     for _ in 0..STEPS {
@@ -38,7 +41,10 @@ pub(crate) fn fit_line(rows: ArrayView2<'_, f64>, shares: &[f64], c: f64) -> Svm
             break;
         }
     }
-    as_svm(weights.as_slice().unwrap_or_default())
+    let mut of_all = vec![0.0; all.ncols() + 1];
+    weighed.iter().zip(&weights).for_each(|(&number, &weight)| of_all[number] = weight);
+    of_all[all.ncols()] = weights[numbers];
+    as_svm(&of_all)
 }
 
 /// Solves A·x = b for a symmetric, positive definite A, by Gaussian elimination.
@@ -94,7 +100,7 @@ mod tests {
         let line = |r: &[f64]| 1.25 * r[0] - 0.5 * r[1] + 0.75;
         let shares: Vec<f64> =
             rows.rows().into_iter().map(|r| 1.0 / (1.0 + (-line(&[r[0], r[1]])).exp())).collect();
-        let svm = fit_line(rows.view(), &shares, 1e12);
+        let svm = fit_line(rows.view(), &[0, 1], &shares, 1e12);
         for x in [[0.5, -0.5], [-1.0, 1.0], [0.0, 0.0]] {
             let f = f64::from(svm.decision(&[x[0] as f32, x[1] as f32]));
             assert!((f - line(&x)).abs() < 2e-3, "{f} {}", line(&x));

@@ -28,7 +28,8 @@ impl Machine {
         // What people said, and the share of them who agree that it has converged
         let mut examples: Vec<(&[f32], bool, f64)> = Vec::new();
         for zone in zones {
-            let agreeing = |spp: f64| observers_agreeing(spp, zone.human_spp, params.spread);
+            let threshold = zone.human_as_noise();
+            let agreeing = |spp: f64| observers_agreeing(spp, threshold, params.spread);
             examples
                 .extend(self::examples(zone, range).map(|e| (e.descriptor, e.converged, agreeing(e.spp))));
         }
@@ -53,7 +54,9 @@ impl Machine {
             Learner::Line => {
                 check_examples(rows.view(), &labels, svm)?;
                 let shares: Vec<f64> = examples.iter().map(|e| e.2).collect();
-                fit_line(rows.view(), &shares, svm.c)
+                let all = || (0..dimensions).collect();
+                let weighed = params.weighed.clone().unwrap_or_else(all);
+                fit_line(rows.view(), &weighed, &shares, svm.c)
             }
         };
         Ok(Self { scaler, weight, svm })
@@ -69,14 +72,14 @@ impl Machine {
         std::iter::repeat_n((self.decide(&answer.descriptor), agreeing), self.weight)
     }
 
-    /// (decision value, share of observers that agree) of a zone's examples.
+    /// (decision value, 0 or 1) of a zone's examples.
     pub(crate) fn decisions<'a>(
         &'a self,
         zone: &'a Zone,
         params: &'a TrainParams,
     ) -> impl Iterator<Item = (f32, f64)> + 'a {
         examples(zone, params.range)
-            .map(|e| (self.decide(e.descriptor), observers_agreeing(e.spp, zone.human_spp, params.spread)))
+            .map(|e| (self.decide(e.descriptor), f64::from(u8::from(e.converged))))
     }
 
     pub(crate) fn calibrated(self, platt: Platt) -> Classifier {
@@ -97,13 +100,14 @@ pub(crate) struct Example<'a> {
     converged: bool,
 }
 
-/// A zone's levels near its threshold. Of a censored zone, only what is certain: the levels below.
+/// A zone's levels whose noise is near what people just saw. Of a censored zone, only what is certain: the levels below.
 pub(crate) fn examples(zone: &Zone, range: f64) -> impl Iterator<Item = Example<'_>> {
-    let near = move |spp: f64| (spp / zone.human_spp).ln().abs() <= range.ln() * (1.0 + 1e-9);
-    let certain = move |spp: f64| !zone.censored || spp < zone.human_spp;
-    zone.levels.iter().filter(move |l| near(l.spp) && certain(l.spp)).map(|l| Example {
+    let threshold = zone.human_as_noise();
+    let near = move |spp: f64| (spp / threshold).ln().abs() <= range.ln() * (1.0 + 1e-9);
+    let certain = move |spp: f64| !zone.censored || spp < threshold;
+    zone.levels.iter().filter(move |l| near(l.spp) && certain(l.spp)).map(move |l| Example {
         spp: l.spp,
         descriptor: &l.descriptor,
-        converged: l.spp >= zone.human_spp,
+        converged: l.spp >= threshold,
     })
 }

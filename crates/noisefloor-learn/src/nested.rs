@@ -1,12 +1,15 @@
 //! Scores of a way to choose, not of one choice.
 
 use crate::choices::Choice;
-use crate::fit::{familiarity, fit_groups, held_out_error, parts};
+use crate::fit::{familiarity, fit_groups, held_out, parts};
 use crate::params::{TrainError, TrainParams};
 use crate::predict::{Prediction, predict};
 use noisefloor::{SvmParams, Threshold, TrainingRecord};
+use crate::table::Table;
 use rayon::prelude::*;
 use serde::Serialize;
+use statrs::statistics::Statistics;
+use std::collections::BTreeMap;
 
 /// What was chosen without a group of scenes.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -25,7 +28,8 @@ pub struct Chosen {
 
 /// Predicts every zone with everything chosen without its group: first one of the choices, by its error on the
 /// other groups, with each of them held out in turn (with the candidate of C and γ in the middle); then C, γ
-/// and the calibration of P, in the same way. `on_fold` is called before each group with its name.
+/// and the calibration of P, in the same way. Of all choices within one standard error over groups of the best one,
+/// those with least to learn are taken, and of these the best. `on_fold` is called before each group with its name.
 ///
 /// # Errors
 /// [`TrainError`] if there are no choices, fewer than four groups, or training fails.
@@ -45,19 +49,51 @@ pub fn choose_and_leave_out(
     for &left_out in &groups {
         on_fold(left_out);
         let others: Vec<&str> = groups.iter().copied().filter(|&g| g != left_out).collect();
-        let error = |choice: &Choice| held_out_error(&choice.table, &others, params, middle);
-        let errors: Vec<f64> = choices.par_iter().map(error).collect::<Result<_, _>>()?;
-        let best =
-            (0..errors.len()).min_by(|&i, &j| errors[i].total_cmp(&errors[j])).ok_or(TrainError::Params)?;
-        let Choice { name, table } = &choices[best];
+        let error = |choice: &Choice| {
+            let predictions = held_out(&choice.table, &others, params, middle)?;
+            Ok(GroupErrors::of(&predictions, &choice.table))
+        };
+        let errors: Vec<GroupErrors> =
+            choices.par_iter().map(error).collect::<Result<_, TrainError>>()?;
+        let chosen = simplest(choices, &errors).ok_or(TrainError::Params)?;
+        let Choice { name, table, .. } = &choices[chosen];
 
         let (classifier, SvmParams { c, gamma }) = fit_groups(table, &others, params)?;
         let known = familiarity(table, &others, &classifier.scaler);
         let model = parts(table, classifier, known, TrainingRecord::default());
         let zones = table.zones.iter().filter(|z| z.group == left_out);
         predictions.extend(zones.map(|z| predict(|raw| model.judge(raw), threshold, z)));
-        let (without, choice, error_factor) = (left_out.to_owned(), name.clone(), errors[best]);
+        let (without, choice, error_factor) = (left_out.to_owned(), name.clone(), errors[chosen].mean.exp());
         all_chosen.push(Chosen { without, choice, c, gamma, error_factor });
     }
     Ok((predictions, all_chosen))
+}
+
+/// The mean of |ln(predicted/human)| over groups, each by the mean of its zones, and the standard error of that.
+struct GroupErrors {
+    mean: f64,
+    standard_error: f64,
+}
+
+impl GroupErrors {
+    fn of(predictions: &[Prediction], table: &Table) -> Self {
+        let of_scene: BTreeMap<&str, &str> =
+            table.zones.iter().map(|z| (z.scene.as_str(), z.group.as_str())).collect();
+        let mut groups: BTreeMap<&str, Vec<f64>> = BTreeMap::new();
+        for p in predictions.iter().filter(|p| !p.censored) {
+            groups.entry(of_scene[p.scene.as_str()]).or_default().push(p.log_ratio().abs());
+        }
+        let means: Vec<f64> = groups.into_values().map(|errors| errors.mean()).collect();
+        Self { mean: means.as_slice().mean(), standard_error: means.as_slice().std_dev() / (means.len() as f64).sqrt() }
+    }
+}
+
+/// The choice with least to learn within one standard error of the best one, and of several the best.
+fn simplest(choices: &[Choice], errors: &[GroupErrors]) -> Option<usize> {
+    let best = errors.iter().min_by(|a, b| a.mean.total_cmp(&b.mean))?;
+    let enough = (0..errors.len()).filter(|&i| errors[i].mean <= best.mean + best.standard_error);
+    enough.min_by(|&i, &j| {
+        let (a, b) = (choices[i].learned, choices[j].learned);
+        a.cmp(&b).then(errors[i].mean.total_cmp(&errors[j].mean))
+    })
 }

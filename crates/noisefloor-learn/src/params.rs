@@ -7,6 +7,10 @@ use thiserror::Error;
 /// γ of the kernel in which a straight line is kept.
 pub(crate) const WIDE: f64 = 1e-4;
 
+/// Numbers of the visible descriptor that decide. Texture and the light of the tile do not help on scenes that were left
+/// out (docs/accuracy.md).
+const WEIGHED: [&str; 3] = ["visible_noise", "picture_noise", "picture_light"];
+
 /// What kind of machine is trained.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Learner {
@@ -26,18 +30,19 @@ pub struct TrainParams {
     pub candidates: Vec<SvmParams>,
     /// Levels within this factor of the human threshold are examples; those beyond are clear anyway. Above 1.
     pub range: f64,
-    /// Spread of the observers of one zone: scale of the logistic distribution of their thresholds in
-    /// ln(samples), above 0. The human data give means alone; the default is where thresholds predicted on
-    /// left-out scenes are neither early nor late, and amounts to a standard deviation of 0.29 in
-    /// ln(contrast).
+    /// How gradually noise disappears in the examples of a line: scale of a logistic function of ln(samples), above 0.
+    /// P does not depend on it: its spread is that of predictions for scenes that were left out.
     pub spread: f64,
+    /// Which numbers a line weighs, by index, the noise first; `None` for all. The others only tell which tiles are
+    /// familiar.
+    pub weighed: Option<Vec<usize>>,
 }
 
 impl Default for TrainParams {
     /// Logistic regression, for the visible descriptor.
     fn default() -> Self {
-        let candidates = [100.0, 300.0, 1000.0].map(|c| SvmParams { c, gamma: WIDE }).to_vec();
-        Self { learner: Learner::Line, candidates, range: 8.0, spread: 0.32 }
+        let candidates = vec![SvmParams { c: 100.0, gamma: WIDE }];
+        Self { learner: Learner::Line, candidates, range: 8.0, spread: 0.32, weighed: None }
     }
 }
 
@@ -51,8 +56,15 @@ impl TrainParams {
 
     /// What serves a descriptor best: a line for those on the vision model, a machine for all others.
     pub fn for_descriptor(descriptor: &Descriptor) -> Self {
-        let visible = [Descriptor::visible().name(), VISIBLE_CHOICES.name];
-        if visible.contains(&descriptor.name()) { Self::default() } else { Self::svm() }
+        if descriptor.name() == VISIBLE_CHOICES.name {
+            Self::default()
+        } else if descriptor.name() == Descriptor::visible().name() {
+            let names = descriptor.number_names();
+            let weighed = WEIGHED.iter().filter_map(|name| names.iter().position(|n| n == name)).collect();
+            Self { weighed: Some(weighed), ..Self::default() }
+        } else {
+            Self::svm()
+        }
     }
 
     /// For the paper's descriptor: its C and γ, [`SvmParams::PAPER`].

@@ -1,5 +1,6 @@
 //! The threshold that a model predicts for a zone.
 
+use crate::stimulus::as_difference;
 use crate::table::{Origin, Zone};
 use noisefloor::{Judgement, Threshold};
 use serde::{Deserialize, Serialize};
@@ -34,8 +35,13 @@ pub struct Prediction {
     pub zone: u32,
     /// Human threshold, in samples per pixel.
     pub human_spp: f64,
-    /// Predicted threshold, within what observers could choose.
+    /// Predicted threshold, within what observers could choose: where half of such zones would have converged.
     pub predicted_spp: f64,
+    /// Where the predictor stops, within what observers could choose: not before the predicted threshold.
+    pub stop_spp: f64,
+    /// [`Zone::human_as_noise`]: to hold probabilities against, which are those of noise without a reference.
+    #[serde(skip)]
+    pub human_as_noise: f64,
     /// Whether the human threshold is only a lower bound.
     pub censored: bool,
     /// Whether the zone, at its human threshold, is unfamiliar to the model that predicts.
@@ -52,10 +58,10 @@ pub struct Prediction {
 }
 
 impl Prediction {
-    /// A prediction whose real pictures are classified by `converged`.
-    fn new(zone: &Zone, spp: f64, converged: impl Fn(usize) -> bool) -> Self {
-        let real = || zone.levels.iter().enumerate().filter(|(_, l)| l.origin == Origin::Real);
-        let right = real().filter(|(i, l)| converged(*i) == (l.spp >= zone.human_spp));
+    /// By a threshold and a stop alone, without looking at pictures.
+    fn new(zone: &Zone, spp: f64, stop: f64) -> Self {
+        let real = || zone.levels.iter().filter(|l| l.origin == Origin::Real);
+        let right = real().filter(|l| (l.spp >= spp) == (l.spp >= zone.human_spp));
         Self {
             scene: zone.scene.clone(),
             zone: zone.zone,
@@ -63,33 +69,46 @@ impl Prediction {
             censored: zone.censored,
             unfamiliar: false,
             predicted_spp: spp.clamp(zone.first_spp, zone.last_spp),
+            stop_spp: stop.clamp(zone.first_spp, zone.last_spp),
+            human_as_noise: zone.human_as_noise(),
             images_right: right.count(),
             images: real().count(),
             probabilities: Vec::new(),
         }
     }
 
-    /// By a threshold alone, without looking at pictures.
+    /// By a threshold alone, at which the predictor stops.
     pub(crate) fn by_threshold(zone: &Zone, spp: f64) -> Self {
-        Self::new(zone, spp, |i| zone.levels[i].spp >= spp)
+        Self::new(zone, spp, spp)
     }
 
     pub(crate) fn log_ratio(&self) -> f64 {
         (self.predicted_spp / self.human_spp).ln()
     }
+
+    /// Whether it stops below half of what people asked for.
+    pub(crate) fn is_early(&self) -> bool {
+        self.stop_spp < 0.5 * self.human_spp
+    }
 }
 
-/// Predicts a zone's threshold: the samples at which P first reaches `threshold`. `judge` judges a raw
-/// descriptor, as
-/// [`noisefloor::Model::judge`] does.
+/// Predicts what people say of a zone: the samples at which P first reaches one half, without the penalty of unfamiliar
+/// tiles, and those at which it reaches `threshold` and a render would stop. P is that of noise; both are turned into the samples of a picture that
+/// differs as much from what people compared with. `judge` judges a raw descriptor, as [`noisefloor::Model::judge`]
+/// does.
 pub fn predict(judge: impl Fn(&[f32]) -> Judgement, threshold: Threshold, zone: &Zone) -> Prediction {
-    let p: Vec<f32> = zone.levels.iter().map(|level| judge(&level.descriptor).probability).collect();
-    let odds = zone.path(|i| log_odds(f64::from(p[i])));
-    let spp = crossing(&odds, log_odds(f64::from(threshold.get()))).unwrap_or(zone.last_spp);
-    let probabilities = zone.levels.iter().map(|l| l.spp).zip(p.iter().copied()).collect();
+    let judged: Vec<Judgement> = zone.levels.iter().map(|level| judge(&level.descriptor)).collect();
+    let expected = zone.path(|i| log_odds(f64::from(judged[i].probability_without_penalty)));
+    let stopping = zone.path(|i| log_odds(f64::from(judged[i].probability)));
+    let reaches = |odds: &[(f64, f64)], p: f64| {
+        let as_noise = crossing(odds, log_odds(p)).unwrap_or(f64::INFINITY);
+        as_difference(as_noise, zone.reference_spp)
+    };
+    let probabilities =
+        zone.levels.iter().zip(&judged).map(|(l, j)| (l.spp, j.probability_without_penalty)).collect();
     let unfamiliar = zone.at_threshold().is_some_and(|level| judge(&level.descriptor).unfamiliar);
-    let converged = |level: usize| threshold.is_reached_by(p[level]);
-    Prediction { probabilities, unfamiliar, ..Prediction::new(zone, spp, converged) }
+    let (threshold, stop) = (reaches(&expected, 0.5), reaches(&stopping, f64::from(threshold.get())));
+    Prediction { probabilities, unfamiliar, ..Prediction::new(zone, threshold, stop) }
 }
 
 #[cfg(test)]

@@ -10,14 +10,15 @@ use std::collections::BTreeMap;
 
 /// Scores predictions. Censored thresholds stay out.
 pub fn score<'a>(predictions: impl Iterator<Item = &'a Prediction> + Clone) -> Scores {
-    let ratios = || predictions.clone().filter(|p| !p.censored).map(Prediction::log_ratio);
+    let known = || predictions.clone().filter(|p| !p.censored);
+    let ratios = || known().map(Prediction::log_ratio);
     let zones = ratios().count();
     let mean = |f: fn(f64) -> f64| ratios().map(f).sum::<f64>() / zones as f64;
     Scores {
         zones,
         error_factor: mean(f64::abs).exp(),
         bias_factor: mean(|r| r).exp(),
-        early_share: mean(|r| if r < -std::f64::consts::LN_2 { 1.0 } else { 0.0 }),
+        early_share: known().filter(|p| p.is_early()).count() as f64 / zones as f64,
     }
 }
 
@@ -65,19 +66,18 @@ pub struct ReliabilityBin {
     pub levels: usize,
 }
 
-/// The reliability curve, in ten bins of equal width, of which empty ones are left out.
-/// `observed(spp, human_spp)` is the probability that was observed, or 0 or 1. Levels further than eightfold
-/// from the threshold, and censored zones, stay out.
+/// The reliability curve, in ten bins of equal width, of which empty ones are left out: how often people saw no
+/// noise where P was such. Levels further than eightfold from the threshold, and censored zones, stay out.
 pub fn reliability<'a>(
     predictions: impl Iterator<Item = &'a Prediction>,
-    observed: impl Fn(f64, f64) -> f64,
 ) -> Vec<ReliabilityBin> {
     let mut bins = [(0.0, 0.0, 0usize); 10];
     for p in predictions.filter(|p| !p.censored) {
         for &(spp, probability) in &p.probabilities {
-            if (spp / p.human_spp).ln().abs() <= CALIBRATION_RANGE.ln() {
+            if (spp / p.human_as_noise).ln().abs() <= CALIBRATION_RANGE.ln() {
                 let bin = &mut bins[((probability * 10.0) as usize).min(9)];
-                *bin = (bin.0 + f64::from(probability), bin.1 + observed(spp, p.human_spp), bin.2 + 1);
+                let observed = f64::from(u8::from(spp >= p.human_as_noise));
+                *bin = (bin.0 + f64::from(probability), bin.1 + observed, bin.2 + 1);
             }
         }
     }

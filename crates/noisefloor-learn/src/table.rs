@@ -2,6 +2,7 @@
 //! need.
 
 use crate::answer::Answer;
+use crate::stimulus::as_noise;
 use noisefloor::{Descriptor, Evidence, ToneMapping, Viewing};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
@@ -48,6 +49,9 @@ pub struct Zone {
     pub first_spp: f64,
     /// Most samples that observers could choose.
     pub last_spp: f64,
+    /// Samples of the picture that people compared with, if it contains those of the levels; infinite if it had no
+    /// noise. See [`crate::as_noise`].
+    pub reference_spp: f64,
     /// By increasing `spp`.
     pub levels: Vec<Level>,
 }
@@ -70,18 +74,26 @@ pub struct Table {
 }
 
 impl Zone {
-    /// The level nearest to the human threshold; `None` without levels.
+    /// The samples whose noise is as strong as the difference that people just saw. For a censored threshold, a
+    /// number that is certainly not above that.
+    pub fn human_as_noise(&self) -> f64 {
+        if self.censored { self.human_spp } else { as_noise(self.human_spp, self.reference_spp) }
+    }
+
+    /// The level whose noise is nearest to what people just saw; `None` without levels.
     pub(crate) fn at_threshold(&self) -> Option<&Level> {
-        let distance = |level: &Level| (level.spp / self.human_spp).ln().abs();
+        let threshold = self.human_as_noise();
+        let distance = |level: &Level| (level.spp / threshold).ln().abs();
         self.levels.iter().min_by(|a, b| distance(a).total_cmp(&distance(b)))
     }
 
-    /// A quantity of the levels that observers could choose, by increasing samples; realisations of one level
-    /// are averaged.
+    /// A quantity of the levels, by increasing samples, from the least that observers could choose; realisations of
+    /// one level are averaged. It goes beyond the last one: noise is as weak as what was seen near the last picture
+    /// only there.
     pub(crate) fn path(&self, quantity: impl Fn(usize) -> f64) -> Vec<(f64, f64)> {
         let mut path: Vec<(f64, f64, f64)> = Vec::new();
         for (i, level) in self.levels.iter().enumerate() {
-            if !(self.first_spp..=self.last_spp).contains(&level.spp) {
+            if level.spp < self.first_spp {
                 continue;
             }
             match path.last_mut() {
@@ -121,7 +133,7 @@ impl Table {
         let mut hash = blake3::Hasher::new();
         for z in &self.zones {
             hash.update(z.scene.as_bytes()).update(z.group.as_bytes()).update(&z.zone.to_le_bytes());
-            for spp in [z.human_spp, z.first_spp, z.last_spp] {
+            for spp in [z.human_spp, z.first_spp, z.last_spp, z.reference_spp] {
                 hash.update(&spp.to_le_bytes());
             }
             for level in &z.levels {
@@ -195,6 +207,7 @@ pub(crate) mod tests {
             censored: false,
             first_spp: 20.0,
             last_spp,
+            reference_spp: f64::INFINITY,
             levels,
         }
     }

@@ -1,6 +1,7 @@
 //! The table as CSV: a comment line that says what it holds, a header, a line a level.
 
 use crate::error::TableError;
+use crate::stimulus::parse_reference;
 use crate::table::{Level, Origin, Table, Zone};
 use csv::{ReaderBuilder, StringRecord, Writer};
 use noisefloor::{Descriptor, DescriptorKind, DescriptorSpec, Evidence, ToneMapping, Viewing};
@@ -10,8 +11,10 @@ use std::io::{Read, Write};
 
 /// Longest table that is read, in bytes.
 const MAX_BYTES: u64 = 1 << 30;
-const COLUMNS: [&str; 10] =
-    ["scene", "group", "zone", "human_spp", "censored", "first_spp", "last_spp", "spp", "origin", "noise"];
+const COLUMNS: [&str; 11] = [
+    "scene", "group", "zone", "human_spp", "censored", "first_spp", "last_spp", "reference_spp", "spp", "origin",
+    "noise",
+];
 const MARK: &str = "# noisefloor table ";
 
 #[derive(Serialize, Deserialize)]
@@ -55,6 +58,7 @@ pub fn write_table(table: &Table, mut to: impl Write) -> Result<(), TableError> 
                 zone.censored.to_string(),
                 zone.first_spp.to_string(),
                 zone.last_spp.to_string(),
+                zone.reference_spp.to_string(),
                 level.spp.to_string(),
                 origin.to_owned(),
                 level.noise.to_string(),
@@ -144,13 +148,13 @@ fn parse(record: &StringRecord) -> Result<(Zone, Level), String> {
         Ok(v) if v.is_finite() => Ok(v),
         _ => Err(format!("column {} is {:?}, not a finite number", i + 1, text(i))),
     };
-    let origin = match text(8) {
+    let origin = match text(9) {
         "real" => Origin::Real,
         "synthesised" => Origin::Synthesised,
         other => return Err(format!("origin is {other:?}, neither real nor synthesised")),
     };
     let descriptor = (COLUMNS.len()..record.len()).map(finite).collect::<Result<_, _>>()?;
-    let level = Level { spp: positive(7)?, origin, noise: finite(9)?, descriptor };
+    let level = Level { spp: positive(8)?, origin, noise: finite(10)?, descriptor };
     let zone = Zone {
         scene: text(0).to_owned(),
         group: text(1).to_owned(),
@@ -161,8 +165,12 @@ fn parse(record: &StringRecord) -> Result<(Zone, Level), String> {
             .map_err(|_| format!("censored is {:?}, neither true nor false", text(4)))?,
         first_spp: positive(5)?,
         last_spp: positive(6)?,
+        reference_spp: parse_reference(text(7))?,
         levels: Vec::new(),
     };
+    if zone.reference_spp < zone.last_spp {
+        return Err("reference_spp is below last_spp".into());
+    }
     if zone.first_spp > zone.last_spp {
         return Err("first_spp is above last_spp".into());
     }

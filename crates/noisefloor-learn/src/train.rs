@@ -144,6 +144,7 @@ mod tests {
                     censored: false,
                     first_spp: 20.0,
                     last_spp: 8000.0,
+                    reference_spp: f64::INFINITY,
                     levels,
                 });
             }

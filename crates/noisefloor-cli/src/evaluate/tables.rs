@@ -15,10 +15,8 @@ pub(super) fn say_scores(evaluation: &Evaluation) -> Result<(), NotSaid> {
         )?;
     }
     say!(
-        "calibration error of P: {:.3} against the share of observers (assumed: logistic around the recorded threshold), {:.3} against \
-         the recorded threshold as a step",
-        evaluation.calibration_error,
-        evaluation.calibration_error_of_step
+        "calibration error of P: {:.3} (how far P is from how often people saw no noise)",
+        evaluation.calibration_error
     )?;
     say!(
         "error = exp(mean |ln(predicted/human)|); bias = exp(mean ln(predicted/human)); early = stopped below half the human threshold.\n\

@@ -16,7 +16,7 @@ pub use plot::plot_scene_means;
 use crate::advance::{Advance, Watch};
 use crate::error::LabError;
 use noisefloor::{Scores, Viewing};
-use noisefloor_learn::{Corpus, JudgedZone, Prediction, first_word, score};
+use noisefloor_learn::{as_noise, Corpus, JudgedZone, Prediction, first_word, score};
 use noisefloor_rivals::Rival;
 use rayon::prelude::*;
 use rendering::SynthesisedRendering;
@@ -131,6 +131,8 @@ impl RatedRival {
                 zone: zone.zone,
                 human_spp: zone.human_spp,
                 predicted_spp: at(stops, i, place),
+                stop_spp: at(stops, i, place),
+                human_as_noise: as_noise(zone.human_spp, zone.reference_spp),
                 censored: zone.censored,
                 unfamiliar: false,
                 images_right: 0,
@@ -219,6 +221,7 @@ mod tests {
             censored: false,
             first_spp: 1,
             last_spp: 10_000,
+            reference_spp: f64::INFINITY,
             stack,
         }
     }

@@ -1,11 +1,16 @@
 //! Thresholds that observers gave, and the images they judged.
 //!
 //! A corpus is a folder with `thresholds.csv` (columns scene, renderer, zone, x, y, width, height, human_spp,
-//! first_spp, last_spp; one line a zone, in any order of columns) and one of two layouts:
+//! first_spp, last_spp, and, if wanted, reference_spp; one line a zone, in any order of columns) and one of two
+//! layouts:
 //! - a folder a scene, named as in the table, with running means named by samples per pixel
 //!   (`<scene>/00100.png`), for any number of scenes; zones are rectangles of these images;
 //! - a folder a zone (`zone07/batch_00060_00100.exr`) with batch means, for one scene; an image is the zone
 //!   alone, and x, y say where it lay in the full picture.
+//!
+//! `reference_spp` says how many samples the picture has that people compared with, if it contains those of the
+//! pictures they judged, or `inf` if it has no noise. Without that column it is the last running mean, and
+//! clean beside batches.
 //!
 //! A scene may have a noise-free reference of the full picture, in linear light, in its folder or beside
 //! those of its zones: `reference.exr`.

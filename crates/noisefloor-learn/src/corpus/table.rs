@@ -2,6 +2,7 @@
 
 use super::error::CorpusError;
 use super::zone::{CENSORED_SPP, JudgedZone, ZoneImages};
+use crate::stimulus::{REFERENCE, parse_reference};
 use csv::{ReaderBuilder, StringRecord, Trim};
 use noisefloor::MAX_EDGE;
 use std::collections::HashMap;
@@ -27,12 +28,17 @@ pub(super) struct Row {
     human_spp: f64,
     first_spp: u64,
     last_spp: u64,
+    /// As given; by default that of the last running mean, or a clean one beside batches.
+    reference_spp: Option<f64>,
 }
 
 impl Row {
     pub(super) fn into_zone(self, stack: ZoneImages) -> JudgedZone {
         let censored = self.human_spp >= CENSORED_SPP || self.human_spp >= self.last_spp as f64;
-        let Row { scene, renderer, zone, x, y, width, height, human_spp, first_spp, last_spp } = self;
+        let nested = matches!(stack, ZoneImages::RunningMeans(_));
+        let reference_spp =
+            self.reference_spp.unwrap_or(if nested { self.last_spp as f64 } else { f64::INFINITY });
+        let Row { scene, renderer, zone, x, y, width, height, human_spp, first_spp, last_spp, .. } = self;
         JudgedZone {
             scene,
             renderer,
@@ -45,6 +51,7 @@ impl Row {
             censored,
             first_spp,
             last_spp,
+            reference_spp,
             stack,
         }
     }
@@ -64,6 +71,7 @@ pub(super) fn read(path: &Path) -> Result<Vec<Row>, CorpusError> {
 
     // Columns, in any order
     let header = reader.headers().map_err(malformed)?.clone();
+    let reference = header.iter().position(|name| name == REFERENCE);
     let mut places = [0; COLUMNS.len()];
     for (place, column) in places.iter_mut().zip(COLUMNS) {
         let found = header.iter().position(|name| name == column);
@@ -76,7 +84,7 @@ pub(super) fn read(path: &Path) -> Result<Vec<Row>, CorpusError> {
     for record in reader.records() {
         let record = record.map_err(malformed)?;
         let line = record.position().map_or(0, csv::Position::line);
-        let row = parse(&record, &places).map_err(|what| bad(line, what))?;
+        let row = parse(&record, &places, reference).map_err(|what| bad(line, what))?;
         if let Some(before) = seen.insert((row.scene.clone(), row.zone), line) {
             return Err(bad(
                 line,
@@ -88,7 +96,11 @@ pub(super) fn read(path: &Path) -> Result<Vec<Row>, CorpusError> {
     if rows.is_empty() { Err(bad(1, "no zones in the table".to_owned())) } else { Ok(rows) }
 }
 
-fn parse(record: &StringRecord, places: &[usize; COLUMNS.len()]) -> Result<Row, String> {
+fn parse(
+    record: &StringRecord,
+    places: &[usize; COLUMNS.len()],
+    reference: Option<usize>,
+) -> Result<Row, String> {
     let text = |column: usize| record.get(places[column]).unwrap_or_default();
 
     // The scene names a folder: one plain name, nothing that leads elsewhere
@@ -110,6 +122,7 @@ fn parse(record: &StringRecord, places: &[usize; COLUMNS.len()]) -> Result<Row, 
         human_spp: number(text(7), 7)?,
         first_spp: number(text(8), 8)?,
         last_spp: number(text(9), 9)?,
+        reference_spp: reference.map(|at| parse_reference(record.get(at).unwrap_or_default())).transpose()?,
     };
     if row.x > MAX_EDGE || row.y > MAX_EDGE {
         return Err(format!("x and y must be 0…{MAX_EDGE} pixels, not {} and {}", row.x, row.y));
@@ -117,6 +130,9 @@ fn parse(record: &StringRecord, places: &[usize; COLUMNS.len()]) -> Result<Row, 
     noisefloor::check_image(row.width, row.height).map_err(|e| e.to_string())?;
     if !row.human_spp.is_finite() || row.human_spp <= 0.0 {
         return Err(format!("human_spp must be positive, not {}", row.human_spp));
+    }
+    if row.reference_spp.is_some_and(|spp| spp < row.last_spp as f64) {
+        return Err(format!("{REFERENCE} is below last_spp {}", row.last_spp));
     }
     if row.first_spp > row.last_spp {
         return Err(format!("first_spp {} is above last_spp {}", row.first_spp, row.last_spp));

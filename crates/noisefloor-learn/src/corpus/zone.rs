@@ -41,6 +41,9 @@ pub struct JudgedZone {
     /// Samples per pixel of the most converged image observers could choose. Not all images up to it need be
     /// here.
     pub last_spp: u64,
+    /// Samples per pixel of the picture that people compared with, if it contains those of the pictures they judged;
+    /// infinite if it had no noise. See [`crate::as_noise`].
+    pub reference_spp: f64,
     /// Where its images are.
     pub stack: ZoneImages,
 }

@@ -10,6 +10,7 @@ mod material;
 
 use crate::corpus::{Corpus, JudgedImage as Image, JudgedZone};
 use crate::error::TableError;
+use crate::stimulus::as_noise;
 use crate::table::{Level, Origin, Table, Zone, first_word};
 use material::{Material, Shown, does_not_fit};
 use noisefloor::{
@@ -123,7 +124,9 @@ fn describe(
 /// The levels that are synthesised for each zone of a scene, in samples per pixel.
 fn synthesised_levels(zones: &[&JudgedZone]) -> Vec<f64> {
     let least = |z: &&JudgedZone| (z.first_spp as f64).min(z.human_spp / REACH);
-    let most = |z: &&JudgedZone| (z.last_spp as f64).max(z.human_spp * REACH);
+    // Noise as weak as the difference that was just seen may lie beyond the last picture
+    let as_noise = |z: &&JudgedZone| as_noise(z.human_spp.min(0.9 * z.reference_spp), z.reference_spp);
+    let most = |z: &&JudgedZone| (z.last_spp as f64).max(as_noise(z) * REACH);
     let low = zones.iter().map(least).fold(f64::INFINITY, f64::min);
     let high = zones.iter().map(most).fold(0.0, f64::max);
     let grid = GRID.map(|k| (10.0 * 2f64.powf(0.75 * f64::from(k))).round());
@@ -159,6 +162,7 @@ fn describe_zone(
         censored: zone.censored,
         first_spp: zone.first_spp as f64,
         last_spp: zone.last_spp as f64,
+        reference_spp: zone.reference_spp,
         levels: Vec::new(),
     };
     Ok((zone, levels))

@@ -303,6 +303,7 @@ pub(crate) fn table() -> Table {
             censored: false,
             first_spp: 20.0,
             last_spp: 6000.0,
+            reference_spp: f64::INFINITY,
             levels,
         }
     };

@@ -7,10 +7,10 @@
 //! strong. Its logarithm falls with samples exactly as that of the noise does, so that the expected need
 //! follows without looking at the picture again.
 //!
-//! Two more numbers say what the tile is made of: its texture, by which unfamiliar tiles are told, and its
-//! brightness. The picture's noise and brightness stand beside them: people judge a tile in its picture, and
-//! ask for more samples in bright pictures than the vision model expects. `docs/accuracy.md` has the scores,
-//! with all of this chosen without the scenes that are scored.
+//! Two more numbers say what the tile is made of, its texture and its brightness: unfamiliar tiles are told by
+//! them. Two are the picture's, its noise and its brightness: people judge a tile in its picture, and ask for more
+//! samples in bright pictures than the vision model expects. The noise of a picture is a quantile over its
+//! tiles, not a mean of high order, so that one bad spot does not make all tiles wait. `docs/accuracy.md` has the scores, with all of this chosen without the scenes that are scored.
 
 use super::compact::texture_energy;
 use super::kind::{Described, Descriptor, DescriptorError, DescriptorKind, TileDescriptor};
@@ -63,8 +63,8 @@ pub(super) struct Visible {
     order: Order,
     /// Pooled difference at which noise is just too strong, in units of the vision model.
     difference: f64,
-    /// Order of the mean over the tiles of a picture, on amplitudes of noise.
-    picture_order: Order,
+    /// Share of the picture that is less noisy than what counts as its noise.
+    picture_quantile: f64,
 }
 
 /// The order of a mean: 2 to the power of this.
@@ -87,7 +87,7 @@ impl Order {
 
 impl Default for Visible {
     fn default() -> Self {
-        Self { order: Order(3), difference: 20.0, picture_order: Order(3) }
+        Self { order: Order(2), difference: 20.0, picture_quantile: 0.75 }
     }
 }
 
@@ -103,7 +103,11 @@ impl Visible {
         if !(1.0..=300.0).contains(&difference) {
             return Err(format!("its difference of {difference} is not within 1…300"));
         }
-        Ok(Self { order: order("order")?, difference, picture_order: order("picture_order")? })
+        let picture_quantile = given("picture_quantile")?;
+        if !(0.0..=1.0).contains(&picture_quantile) {
+            return Err(format!("its picture_quantile of {picture_quantile} is not within 0…1"));
+        }
+        Ok(Self { order: order("order")?, difference, picture_quantile })
     }
 }
 
@@ -113,14 +117,14 @@ impl TileDescriptor for Visible {
     }
 
     fn version(&self) -> u16 {
-        1
+        2
     }
 
     fn parameters(&self) -> BTreeMap<String, f64> {
         let numbers = [
             ("order", self.order.number()),
             ("difference", self.difference),
-            ("picture_order", self.picture_order.number()),
+            ("picture_quantile", self.picture_quantile),
         ];
         numbers.map(|(name, number)| (name.to_owned(), number)).into()
     }
@@ -224,23 +228,40 @@ impl Visible {
         self.order.root(sum / (columns * rows) as f64)
     }
 
-    /// Appends to each tile's own numbers those of the picture that the tiles make up: the mean of high order
-    /// of the amplitudes of their noise, and the mean of their light, by area. Noise is what the tile at hand
-    /// has with its own samples and the picture would have with as many.
+    /// Appends to each tile's own numbers those of the picture that the tiles make up: a quantile of the amplitudes
+    /// of their noise, and the mean of their light, both by area. Noise is what the tile at hand has with its own
+    /// samples and the picture would have with as many.
     fn in_picture(self, tiles: &[Described]) -> Vec<Vec<f32>> {
         let area: f64 = tiles.iter().map(|t| t.area).sum();
-        let mean = |quantity: &dyn Fn(&Described) -> f64| {
-            tiles.iter().map(|t| t.area * quantity(t)).sum::<f64>() / area
-        };
-        let power = |t: &Described| self.picture_order.power(amplitude(t.own[0]) * t.spp.sqrt());
-        let of_one_sample = self.picture_order.root(mean(&power));
-        let light = mean(&|t| f64::from(t.own[2])) as f32;
+        let light = tiles.iter().map(|t| t.area * f64::from(t.own[2])).sum::<f64>() / area;
+        let of_one_sample = |t: &Described| (amplitude(t.own[0]) * t.spp.sqrt(), t.area);
+        let mut noises: Vec<(f64, f64)> = tiles.iter().map(of_one_sample).collect();
+        noises.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let noise = quantile(&noises, self.picture_quantile);
         let complete = |tile: &Described| {
-            let picture = [noise_number(of_one_sample / tile.spp.sqrt()), light];
+            let picture = [noise_number(noise / tile.spp.sqrt()), light as f32];
             tile.own.iter().copied().chain(picture).collect()
         };
         tiles.iter().map(complete).collect()
     }
+}
+
+/// The quantile `q` of values with weights, by increasing value: linear between the middles of the weights, from the
+/// first value to the last. With equal weights these are the usual quantiles (definition 7 of Hyndman and Fan 1996).
+fn quantile(sorted: &[(f64, f64)], q: f64) -> f64 {
+    let (Some(first), Some(last)) = (sorted.first(), sorted.last()) else { return 0.0 };
+    let all: f64 = sorted.iter().map(|&(_, weight)| weight).sum();
+    // Between the middle of the first weight and that of the last
+    let goal = q * (all - 0.5 * (first.1 + last.1));
+    let mut middle = 0.0;
+    for pair in sorted.windows(2) {
+        let step = 0.5 * (pair[0].1 + pair[1].1);
+        if middle + step >= goal {
+            return pair[0].0 + (pair[1].0 - pair[0].0) * ((goal - middle) / step);
+        }
+        middle += step;
+    }
+    last.0
 }
 
 /// The sum of the powers of a row, in eight sums that processors take side by side.
