@@ -119,7 +119,8 @@ pub fn choices(table: &Table) -> Result<Vec<Choice>, DescriptorError> {
         for (column, (order, difference)) in constants().enumerate() {
             for quantile in PICTURE_QUANTILES.into_iter().take(if whole_picture { usize::MAX } else { 1 }) {
                 let all = chosen(table, column, &visible(order, difference, quantile)?);
-                let picture = if whole_picture { format!(", picture quantile {quantile}") } else { String::new() };
+                let picture =
+                    if whole_picture { format!(", picture quantile {quantile}") } else { String::new() };
                 let name =
                     format!("order {order}, difference {difference}{picture}, without {}", names.join(", "));
                 let names: Vec<String> = names.iter().map(|&name| name.to_owned()).collect();

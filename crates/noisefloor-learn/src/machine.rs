@@ -78,8 +78,7 @@ impl Machine {
         zone: &'a Zone,
         params: &'a TrainParams,
     ) -> impl Iterator<Item = (f32, f64)> + 'a {
-        examples(zone, params.range)
-            .map(|e| (self.decide(e.descriptor), f64::from(u8::from(e.converged))))
+        examples(zone, params.range).map(|e| (self.decide(e.descriptor), f64::from(u8::from(e.converged))))
     }
 
     pub(crate) fn calibrated(self, platt: Platt) -> Classifier {

@@ -4,8 +4,8 @@ use crate::choices::Choice;
 use crate::fit::{familiarity, fit_groups, held_out, parts};
 use crate::params::{TrainError, TrainParams};
 use crate::predict::{Prediction, predict};
-use noisefloor::{SvmParams, Threshold, TrainingRecord};
 use crate::table::Table;
+use noisefloor::{SvmParams, Threshold, TrainingRecord};
 use rayon::prelude::*;
 use serde::Serialize;
 use statrs::statistics::Statistics;
@@ -51,10 +51,9 @@ pub fn choose_and_leave_out(
         let others: Vec<&str> = groups.iter().copied().filter(|&g| g != left_out).collect();
         let error = |choice: &Choice| {
             let predictions = held_out(&choice.table, &others, params, middle)?;
-            Ok(GroupErrors::of(&predictions, &choice.table))
+            Ok(group_errors(&predictions, &choice.table))
         };
-        let errors: Vec<GroupErrors> =
-            choices.par_iter().map(error).collect::<Result<_, TrainError>>()?;
+        let errors: Vec<Vec<f64>> = choices.par_iter().map(error).collect::<Result<_, TrainError>>()?;
         let chosen = simplest(choices, &errors).ok_or(TrainError::Params)?;
         let Choice { name, table, .. } = &choices[chosen];
 
@@ -63,37 +62,36 @@ pub fn choose_and_leave_out(
         let model = parts(table, classifier, known, TrainingRecord::default());
         let zones = table.zones.iter().filter(|z| z.group == left_out);
         predictions.extend(zones.map(|z| predict(|raw| model.judge(raw), threshold, z)));
-        let (without, choice, error_factor) = (left_out.to_owned(), name.clone(), errors[chosen].mean.exp());
+        let (without, choice, error_factor) =
+            (left_out.to_owned(), name.clone(), errors[chosen].as_slice().mean().exp());
         all_chosen.push(Chosen { without, choice, c, gamma, error_factor });
     }
     Ok((predictions, all_chosen))
 }
 
-/// The mean of |ln(predicted/human)| over groups, each by the mean of its zones, and the standard error of that.
-struct GroupErrors {
-    mean: f64,
-    standard_error: f64,
-}
-
-impl GroupErrors {
-    fn of(predictions: &[Prediction], table: &Table) -> Self {
-        let of_scene: BTreeMap<&str, &str> =
-            table.zones.iter().map(|z| (z.scene.as_str(), z.group.as_str())).collect();
-        let mut groups: BTreeMap<&str, Vec<f64>> = BTreeMap::new();
-        for p in predictions.iter().filter(|p| !p.censored) {
-            groups.entry(of_scene[p.scene.as_str()]).or_default().push(p.log_ratio().abs());
-        }
-        let means: Vec<f64> = groups.into_values().map(|errors| errors.mean()).collect();
-        Self { mean: means.as_slice().mean(), standard_error: means.as_slice().std_dev() / (means.len() as f64).sqrt() }
+/// The mean of |ln(predicted/human)| over the zones of each group, in the order of the groups.
+fn group_errors(predictions: &[Prediction], table: &Table) -> Vec<f64> {
+    let group_of: BTreeMap<&str, &str> = table.zones.iter().map(|z| (&*z.scene, &*z.group)).collect();
+    let mut groups: BTreeMap<&str, Vec<f64>> = BTreeMap::new();
+    for p in predictions.iter().filter(|p| !p.censored) {
+        groups.entry(group_of[p.scene.as_str()]).or_default().push(p.log_ratio().abs());
     }
+    groups.into_values().map(|errors| errors.as_slice().mean()).collect()
 }
 
-/// The choice with least to learn within one standard error of the best one, and of several the best.
-fn simplest(choices: &[Choice], errors: &[GroupErrors]) -> Option<usize> {
-    let best = errors.iter().min_by(|a, b| a.mean.total_cmp(&b.mean))?;
-    let enough = (0..errors.len()).filter(|&i| errors[i].mean <= best.mean + best.standard_error);
+/// The choice with least to learn that is not worse than the best one by more than one standard error, over groups, of
+/// what it is worse by; of several the best.
+fn simplest(choices: &[Choice], errors: &[Vec<f64>]) -> Option<usize> {
+    let best = errors.iter().min_by(|a, b| a.as_slice().mean().total_cmp(&b.as_slice().mean()))?;
+    let as_good = |errors: &[f64]| {
+        let worse: Vec<f64> = errors.iter().zip(best).map(|(error, best)| error - best).collect();
+        let mean = worse.as_slice().mean();
+        mean <= worse.as_slice().std_dev() / (worse.len() as f64).sqrt()
+    };
+    // The best one is as good as itself, though nothing scatters
+    let enough = (0..errors.len()).filter(|&i| std::ptr::eq(&errors[i], best) || as_good(&errors[i]));
     enough.min_by(|&i, &j| {
         let (a, b) = (choices[i].learned, choices[j].learned);
-        a.cmp(&b).then(errors[i].mean.total_cmp(&errors[j].mean))
+        a.cmp(&b).then(errors[i].as_slice().mean().total_cmp(&errors[j].as_slice().mean()))
     })
 }

@@ -68,9 +68,7 @@ pub struct ReliabilityBin {
 
 /// The reliability curve, in ten bins of equal width, of which empty ones are left out: how often people saw no
 /// noise where P was such. Levels further than eightfold from the threshold, and censored zones, stay out.
-pub fn reliability<'a>(
-    predictions: impl Iterator<Item = &'a Prediction>,
-) -> Vec<ReliabilityBin> {
+pub fn reliability<'a>(predictions: impl Iterator<Item = &'a Prediction>) -> Vec<ReliabilityBin> {
     let mut bins = [(0.0, 0.0, 0usize); 10];
     for p in predictions.filter(|p| !p.censored) {
         for &(spp, probability) in &p.probabilities {

@@ -12,7 +12,16 @@ use std::io::{Read, Write};
 /// Longest table that is read, in bytes.
 const MAX_BYTES: u64 = 1 << 30;
 const COLUMNS: [&str; 11] = [
-    "scene", "group", "zone", "human_spp", "censored", "first_spp", "last_spp", "reference_spp", "spp", "origin",
+    "scene",
+    "group",
+    "zone",
+    "human_spp",
+    "censored",
+    "first_spp",
+    "last_spp",
+    "reference_spp",
+    "spp",
+    "origin",
     "noise",
 ];
 const MARK: &str = "# noisefloor table ";

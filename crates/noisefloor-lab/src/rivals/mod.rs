@@ -16,7 +16,7 @@ pub use plot::plot_scene_means;
 use crate::advance::{Advance, Watch};
 use crate::error::LabError;
 use noisefloor::{Scores, Viewing};
-use noisefloor_learn::{as_noise, Corpus, JudgedZone, Prediction, first_word, score};
+use noisefloor_learn::{Corpus, JudgedZone, Prediction, as_noise, first_word, score};
 use noisefloor_rivals::Rival;
 use rayon::prelude::*;
 use rendering::SynthesisedRendering;
