@@ -71,6 +71,7 @@ mod tests {
             evidence: Evidence::Halves,
             tone_mapping: ToneMapping::Srgb { exposure: 1.0 },
             viewing: noisefloor::Viewing::default(),
+            numbers: Descriptor::default().number_names(),
             zones,
             answers: Vec::new(),
         };

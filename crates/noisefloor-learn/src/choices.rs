@@ -10,17 +10,11 @@ use std::collections::BTreeMap;
 
 /// Orders of the mean over a tile: 4 is that of most vision models, 8 looks for the worst spot.
 const ORDERS: [u32; 2] = [4, 8];
-/// Pooled differences at which noise is just too strong: near what people just see, and twice as much.
-const DIFFERENCES: [u32; 2] = [20, 40];
-/// Quantiles of noise over the tiles that are the noise of the picture: the typical tile, and the noisier ones.
-const PICTURE_QUANTILES: [f64; 2] = [0.5, 0.75];
-/// Numbers that are left out, simplest first: the noise of the tile decides; then also that of its picture; then
-/// also the picture's light.
-const LEFT_OUT: [&[&str]; 3] = [
-    &["texture", "light", "picture_noise", "picture_light"],
-    &["texture", "light", "picture_light"],
-    &["texture", "light"],
-];
+/// Pooled difference at which noise is just too strong: near what people just see.
+const DIFFERENCE: u32 = 20;
+/// Quantiles of noise over the tiles that are the noise of the picture: that of the typical tile, or what a quarter or
+/// an eighth of the picture exceeds.
+const PICTURE_QUANTILES: [f64; 3] = [0.5, 0.75, 0.875];
 
 /// Numbers for every choice of constants in the visible descriptor: a descriptor for tables, not for models.
 pub const VISIBLE_CHOICES: DescriptorKind = DescriptorKind {
@@ -31,41 +25,30 @@ pub const VISIBLE_CHOICES: DescriptorKind = DescriptorKind {
 /// One of the choices.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Choice {
-    /// The constants, and the numbers that are used.
+    /// The constants.
     pub name: String,
-    /// How many numbers are weighed: how much there is to learn.
-    pub learned: usize,
     /// The zones, described so.
     pub table: Table,
 }
-
-/// Numbers of the visible descriptor.
-const LEARNED: usize = 5;
 
 #[derive(Debug)]
 struct VisibleChoices {
     descriptors: Vec<Descriptor>,
 }
 
-fn visible(order: u32, difference: u32, picture_quantile: f64) -> Result<Descriptor, DescriptorError> {
+fn visible(order: u32, picture_quantile: f64) -> Result<Descriptor, DescriptorError> {
     let numbers = [
         ("order", f64::from(order)),
-        ("difference", f64::from(difference)),
+        ("difference", f64::from(DIFFERENCE)),
         ("picture_quantile", picture_quantile),
     ];
     let parameters = numbers.map(|(name, number)| (name.to_owned(), number)).into();
     Descriptor::from_spec(&DescriptorSpec { name: "visible".to_owned(), parameters }, &[])
 }
 
-/// Every order with every difference.
-fn constants() -> impl Iterator<Item = (u32, u32)> {
-    ORDERS.into_iter().flat_map(|order| DIFFERENCES.map(|difference| (order, difference)))
-}
-
 impl VisibleChoices {
     fn new() -> Result<Self, DescriptorError> {
-        let descriptors =
-            constants().map(|(order, difference)| visible(order, difference, PICTURE_QUANTILES[0]));
+        let descriptors = ORDERS.iter().map(|&order| visible(order, PICTURE_QUANTILES[0]));
         Ok(Self { descriptors: descriptors.collect::<Result<_, _>>()? })
     }
 }
@@ -84,7 +67,7 @@ impl TileDescriptor for VisibleChoices {
     }
 
     fn number_names(&self) -> Vec<String> {
-        let noise = constants().map(|(order, difference)| format!("noise_{order}_{difference}"));
+        let noise = ORDERS.iter().map(|order| format!("noise_{order}_{DIFFERENCE}"));
         noise.chain(["texture".to_owned(), "light".to_owned()]).collect()
     }
 
@@ -104,7 +87,7 @@ impl TileDescriptor for VisibleChoices {
     }
 }
 
-/// A table for each choice, from one of [`VISIBLE_CHOICES`], the simplest first.
+/// A table for each choice, from one of [`VISIBLE_CHOICES`]. What is weighed is no choice: weights are shrunk instead.
 ///
 /// # Errors
 /// [`DescriptorError`] if the table is of another descriptor.
@@ -114,20 +97,11 @@ pub fn choices(table: &Table) -> Result<Vec<Choice>, DescriptorError> {
         return Err(DescriptorError::Unknown { name, known: VISIBLE_CHOICES.name.to_owned() });
     }
     let mut choices = Vec::new();
-    for names in LEFT_OUT {
-        let whole_picture = !names.contains(&"picture_noise");
-        for (column, (order, difference)) in constants().enumerate() {
-            for quantile in PICTURE_QUANTILES.into_iter().take(if whole_picture { usize::MAX } else { 1 }) {
-                let all = chosen(table, column, &visible(order, difference, quantile)?);
-                let picture =
-                    if whole_picture { format!(", picture quantile {quantile}") } else { String::new() };
-                let name =
-                    format!("order {order}, difference {difference}{picture}, without {}", names.join(", "));
-                let names: Vec<String> = names.iter().map(|&name| name.to_owned()).collect();
-                let learned = LEARNED - names.len();
-                let without = all.without(&names);
-                choices.extend(without.map(|table| Choice { name, learned, table }));
-            }
+    for (column, order) in ORDERS.into_iter().enumerate() {
+        for quantile in PICTURE_QUANTILES {
+            let name = format!("order {order}, picture quantile {quantile}");
+            let table = chosen(table, column, &visible(order, quantile)?);
+            choices.push(Choice { name, table });
         }
     }
     Ok(choices)
@@ -148,5 +122,5 @@ fn chosen(table: &Table, column: usize, descriptor: &Descriptor) -> Table {
         scenes.entry(&zone.scene).or_default().push((empty, alone.collect()));
     }
     let zones = scenes.into_values().flat_map(|zones| in_picture(zones, descriptor)).collect();
-    Table { descriptor: descriptor.clone(), zones, ..table.clone() }
+    Table { descriptor: descriptor.clone(), numbers: descriptor.number_names(), zones, ..table.clone() }
 }

@@ -50,7 +50,8 @@ impl<'a> Material<'a> {
         let zones: Vec<&Zone> = self.zones.iter().copied().filter(|z| Some(&*z.group) != group).collect();
         let answers: Vec<&Answer> =
             self.answers.iter().copied().filter(|a| Some(&*a.group) != group).collect();
-        Machine::fit(&zones, &answers, svm, self.params, self.table.descriptor.least_deviation())
+        let least = self.table.descriptor.least_deviation();
+        Machine::fit(&zones, &answers, svm, self.params, least, &weighed(self.table, self.params))
     }
 
     /// Machines that have not seen one group judge that group; one sigmoid is fitted to all of that.
@@ -82,6 +83,22 @@ impl<'a> Material<'a> {
         }
         Ok((predictions, platt))
     }
+}
+
+/// The numbers that a line weighs, and by how much each grows with ln(samples).
+fn weighed(table: &Table, params: &TrainParams) -> Vec<(usize, f64)> {
+    let all = table.descriptor.number_names();
+    // Far above any floor of noise
+    let noisy = vec![3.0f32; all.len()];
+    let mut cleaner = noisy.clone();
+    table.descriptor.project(&mut cleaner, std::f32::consts::E);
+    let growth = |name: &String| {
+        let at = all.iter().position(|n| n == name)?;
+        Some(f64::from(cleaner[at] - noisy[at]))
+    };
+    let used = |name: &&String| params.weighed.as_ref().is_none_or(|names| names.contains(name));
+    let numbers = table.numbers.iter().enumerate().filter(|(_, name)| used(name));
+    numbers.map(|(number, name)| (number, growth(name).unwrap_or(0.0))).collect()
 }
 
 /// Predictions with a pair of C and γ for the zones of `groups`, each group held out in turn.

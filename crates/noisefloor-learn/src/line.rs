@@ -12,23 +12,49 @@ const SMALL: f64 = 1e-6;
 /// How far the two support vectors lie from the mean of the data, in standard deviations.
 const REACH: f32 = 100.0;
 
-/// Minimises the mean of −y·ln p − (1 − y)·ln(1 − p) with p = 1/(1 + exp(−w·x − b)), plus |w′|²/(2c), by
-/// Newton's method. `rows` are examples, and `shares` their y, in [0, 1]. w′ is w without its first number, which
-/// is the noise of the tile: what is learned beside it is shrunk towards what the vision model says by itself.
-/// Only the numbers of `weighed` have a weight.
-pub(crate) fn fit_line(all: ArrayView2<'_, f64>, weighed: &[usize], shares: &[f64], c: f64) -> Svm {
-    let rows = all.select(Axis(1), weighed);
-    let (examples, numbers) = rows.dim();
-    // A last column of ones for b, which is not penalised
-    let mut x = Array2::ones((examples, numbers + 1));
-    x.slice_mut(ndarray::s![.., ..numbers]).assign(&rows);
-    let mut penalty = Array1::from_elem(numbers + 1, examples as f64 / c);
-    (penalty[0], penalty[numbers]) = (1e-9, 1e-9);
+/// A number that a line weighs.
+pub(crate) struct Weighed {
+    /// Its place in the descriptor.
+    pub(crate) number: usize,
+    /// By how much it grows with ln(samples), as noise falls: −½ for the logarithm of an amplitude of noise.
+    pub(crate) growth: f64,
+}
 
-    let mut weights = Array1::<f64>::zeros(numbers + 1);
+/// Logistic regression on `rows` with the shares `shares`, in [0, 1]: minimises the mean of
+/// −y·ln p − (1 − y)·ln(1 − p) with p = 1/(1 + exp(−w·x − b)), by Newton's method.
+///
+/// How steep the line is in ln(samples) is known, 1/`spread`, since noise falls as 1/√n and the shares were made so;
+/// the first of the numbers weighed, the noise of the tile, takes what the others leave of it. These others correct
+/// what the vision model says of the tile by itself, and |their weights|²/(2`c`) is added: what is learned is shrunk
+/// towards the vision model. Left free, the steepness would be lessened by all that differs between scenes and that no
+/// number tells.
+pub(crate) fn fit_line(
+    rows: ArrayView2<'_, f64>,
+    weighed: &[Weighed],
+    shares: &[f64],
+    (spread, c): (f64, f64),
+) -> Svm {
+    let Some((noise, others)) = weighed.split_first() else { return as_svm(&vec![0.0; rows.ncols() + 1]) };
+    let examples = rows.nrows();
+    // Of what does not tell noise from picture, nothing is known beforehand
+    let steepness = if noise.growth == 0.0 { 0.0 } else { 1.0 / (noise.growth * spread) };
+    let known = &rows.column(noise.number) * steepness;
+    let ratio = |other: &Weighed| if noise.growth == 0.0 { 0.0 } else { other.growth / noise.growth };
+
+    // The other numbers as they differ from the noise, and a last column of ones for b, which is not penalised
+    let free = others.len();
+    let mut x = Array2::ones((examples, free + 1));
+    for (mut column, other) in x.columns_mut().into_iter().zip(others) {
+        column.assign(&(&rows.column(other.number) - &(&rows.column(noise.number) * ratio(other))));
+    }
+    let mut penalty = Array1::from_elem(free + 1, examples as f64 / c);
+    penalty[free] = 1e-9;
+
+    let shares = Array1::from(shares.to_vec());
+    let mut weights = Array1::<f64>::zeros(free + 1);
     for _ in 0..STEPS {
-        let p = x.dot(&weights).mapv(|f| 1.0 / (1.0 + (-f).exp()));
-        let slope = x.t().dot(&(&p - &Array1::from(shares.to_vec()))) + &penalty * &weights;
+        let p = (x.dot(&weights) + &known).mapv(|f| 1.0 / (1.0 + (-f).exp()));
+        let slope = x.t().dot(&(&p - &shares)) + &penalty * &weights;
         let curvature = p.mapv(|p| p * (1.0 - p)).insert_axis(Axis(1));
         let hessian = x.t().dot(&(&x * &curvature)) + Array2::from_diag(&penalty);
         let step = solve(hessian, slope);
@@ -41,9 +67,14 @@ pub(crate) fn fit_line(all: ArrayView2<'_, f64>, weighed: &[usize], shares: &[f6
             break;
         }
     }
-    let mut of_all = vec![0.0; all.ncols() + 1];
-    weighed.iter().zip(&weights).for_each(|(&number, &weight)| of_all[number] = weight);
-    of_all[all.ncols()] = weights[numbers];
+
+    let mut of_all = vec![0.0; rows.ncols() + 1];
+    of_all[noise.number] = steepness;
+    for (other, &weight) in others.iter().zip(&weights) {
+        of_all[other.number] = weight;
+        of_all[noise.number] -= weight * ratio(other);
+    }
+    of_all[rows.ncols()] = weights[free];
     as_svm(&of_all)
 }
 
@@ -93,17 +124,25 @@ mod tests {
         }
     }
 
-    /// Shares that follow a logistic function exactly are found exactly, where nothing is penalised.
+    /// Shares that follow a logistic function exactly are found exactly, where nothing is penalised. The first number
+    /// falls by ½ with ln(samples), the second by ¼, and shares go from noisy to converged with a spread of ⅔.
     #[test]
     fn finds_the_line_that_shares_follow() {
-        let rows = Array2::from_shape_fn((200, 2), |(i, j)| ((i * (7 + 6 * j)) % 41) as f64 / 20.0 - 1.0);
-        let line = |r: &[f64]| 1.25 * r[0] - 0.5 * r[1] + 0.75;
+        let rows = Array2::from_shape_fn((200, 3), |(i, j)| ((i * (7 + 6 * j)) % 41) as f64 / 20.0 - 1.0);
+        // ½·2.75 + ¼·0.5 = 3/2
+        let line = |r: &[f64]| -2.75 * r[0] - 0.5 * r[1] + 0.75;
         let shares: Vec<f64> =
             rows.rows().into_iter().map(|r| 1.0 / (1.0 + (-line(&[r[0], r[1]])).exp())).collect();
-        let svm = fit_line(rows.view(), &[0, 1], &shares, 1e12);
-        for x in [[0.5, -0.5], [-1.0, 1.0], [0.0, 0.0]] {
-            let f = f64::from(svm.decision(&[x[0] as f32, x[1] as f32]));
-            assert!((f - line(&x)).abs() < 2e-3, "{f} {}", line(&x));
+        let weighed = [(0, -0.5), (1, -0.25)].map(|(number, growth)| Weighed { number, growth });
+        let svm = fit_line(rows.view(), &weighed, &shares, (1.0 / 1.5, 1e12));
+        // The third number is not weighed
+        for x in [[0.5, -0.5, 9.0], [-1.0, 1.0, 0.0], [0.0, 0.0, -9.0]] {
+            let f = f64::from(svm.decision(&[x[0] as f32, x[1] as f32, x[2] as f32]));
+            assert!((f - line(&x[..2])).abs() < 0.02, "{f} {}", line(&x[..2]));
         }
+        // Nothing is left but the vision model where all else is penalised
+        let shrunk = fit_line(rows.view(), &weighed, &shares, (1.0 / 1.5, 1e-6));
+        let by_the_second = shrunk.decision(&[0.0, 1.0, 0.0]) - shrunk.decision(&[0.0, 0.0, 0.0]);
+        assert!(by_the_second.abs() < 1e-3, "{by_the_second}");
     }
 }

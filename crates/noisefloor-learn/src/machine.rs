@@ -1,7 +1,7 @@
 //! A support vector machine trained on the examples of some zones and answers.
 
 use crate::answer::Answer;
-use crate::line::fit_line;
+use crate::line::{Weighed, fit_line};
 use crate::observers::observers_agreeing;
 use crate::params::{Learner, TrainError, TrainParams};
 use crate::table::Zone;
@@ -23,6 +23,7 @@ impl Machine {
         svm: SvmParams,
         params: &TrainParams,
         least_deviation: f64,
+        weighed: &[(usize, f64)],
     ) -> Result<Self, TrainError> {
         let range = params.range;
         // What people said, and the share of them who agree that it has converged
@@ -54,9 +55,12 @@ impl Machine {
             Learner::Line => {
                 check_examples(rows.view(), &labels, svm)?;
                 let shares: Vec<f64> = examples.iter().map(|e| e.2).collect();
-                let all = || (0..dimensions).collect();
-                let weighed = params.weighed.clone().unwrap_or_else(all);
-                fit_line(rows.view(), &weighed, &shares, svm.c)
+                let scaled = |&(number, growth): &(usize, f64)| Weighed {
+                    number,
+                    growth: growth * f64::from(scaler.scale[number]),
+                };
+                let weighed: Vec<Weighed> = weighed.iter().map(scaled).collect();
+                fit_line(rows.view(), &weighed, &shares, (params.spread, svm.c))
             }
         };
         Ok(Self { scaler, weight, svm })

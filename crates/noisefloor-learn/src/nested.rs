@@ -4,12 +4,10 @@ use crate::choices::Choice;
 use crate::fit::{familiarity, fit_groups, held_out, parts};
 use crate::params::{TrainError, TrainParams};
 use crate::predict::{Prediction, predict};
-use crate::table::Table;
+use crate::score::score;
 use noisefloor::{SvmParams, Threshold, TrainingRecord};
 use rayon::prelude::*;
 use serde::Serialize;
-use statrs::statistics::Statistics;
-use std::collections::BTreeMap;
 
 /// What was chosen without a group of scenes.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -28,8 +26,7 @@ pub struct Chosen {
 
 /// Predicts every zone with everything chosen without its group: first one of the choices, by its error on the
 /// other groups, with each of them held out in turn (with the candidate of C and γ in the middle); then C, γ
-/// and the calibration of P, in the same way. Of all choices within one standard error over groups of the best one,
-/// those with least to learn are taken, and of these the best. `on_fold` is called before each group with its name.
+/// and the calibration of P, in the same way. `on_fold` is called before each group with its name.
 ///
 /// # Errors
 /// [`TrainError`] if there are no choices, fewer than four groups, or training fails.
@@ -51,47 +48,20 @@ pub fn choose_and_leave_out(
         let others: Vec<&str> = groups.iter().copied().filter(|&g| g != left_out).collect();
         let error = |choice: &Choice| {
             let predictions = held_out(&choice.table, &others, params, middle)?;
-            Ok(group_errors(&predictions, &choice.table))
+            Ok(score(predictions.iter()).error_factor)
         };
-        let errors: Vec<Vec<f64>> = choices.par_iter().map(error).collect::<Result<_, TrainError>>()?;
-        let chosen = simplest(choices, &errors).ok_or(TrainError::Params)?;
-        let Choice { name, table, .. } = &choices[chosen];
+        let errors: Vec<f64> = choices.par_iter().map(error).collect::<Result<_, TrainError>>()?;
+        let best =
+            (0..errors.len()).min_by(|&i, &j| errors[i].total_cmp(&errors[j])).ok_or(TrainError::Params)?;
+        let Choice { name, table } = &choices[best];
 
         let (classifier, SvmParams { c, gamma }) = fit_groups(table, &others, params)?;
         let known = familiarity(table, &others, &classifier.scaler);
         let model = parts(table, classifier, known, TrainingRecord::default());
         let zones = table.zones.iter().filter(|z| z.group == left_out);
         predictions.extend(zones.map(|z| predict(|raw| model.judge(raw), threshold, z)));
-        let (without, choice, error_factor) =
-            (left_out.to_owned(), name.clone(), errors[chosen].as_slice().mean().exp());
+        let (without, choice, error_factor) = (left_out.to_owned(), name.clone(), errors[best]);
         all_chosen.push(Chosen { without, choice, c, gamma, error_factor });
     }
     Ok((predictions, all_chosen))
-}
-
-/// The mean of |ln(predicted/human)| over the zones of each group, in the order of the groups.
-fn group_errors(predictions: &[Prediction], table: &Table) -> Vec<f64> {
-    let group_of: BTreeMap<&str, &str> = table.zones.iter().map(|z| (&*z.scene, &*z.group)).collect();
-    let mut groups: BTreeMap<&str, Vec<f64>> = BTreeMap::new();
-    for p in predictions.iter().filter(|p| !p.censored) {
-        groups.entry(group_of[p.scene.as_str()]).or_default().push(p.log_ratio().abs());
-    }
-    groups.into_values().map(|errors| errors.as_slice().mean()).collect()
-}
-
-/// The choice with least to learn that is not worse than the best one by more than one standard error, over groups, of
-/// what it is worse by; of several the best.
-fn simplest(choices: &[Choice], errors: &[Vec<f64>]) -> Option<usize> {
-    let best = errors.iter().min_by(|a, b| a.as_slice().mean().total_cmp(&b.as_slice().mean()))?;
-    let as_good = |errors: &[f64]| {
-        let worse: Vec<f64> = errors.iter().zip(best).map(|(error, best)| error - best).collect();
-        let mean = worse.as_slice().mean();
-        mean <= worse.as_slice().std_dev() / (worse.len() as f64).sqrt()
-    };
-    // The best one is as good as itself, though nothing scatters
-    let enough = (0..errors.len()).filter(|&i| std::ptr::eq(&errors[i], best) || as_good(&errors[i]));
-    enough.min_by(|&i, &j| {
-        let (a, b) = (choices[i].learned, choices[j].learned);
-        a.cmp(&b).then(errors[i].as_slice().mean().total_cmp(&errors[j].as_slice().mean()))
-    })
 }

@@ -33,16 +33,16 @@ pub struct TrainParams {
     /// How gradually noise disappears in the examples of a line: scale of a logistic function of ln(samples), above 0.
     /// P does not depend on it: its spread is that of predictions for scenes that were left out.
     pub spread: f64,
-    /// Which numbers a line weighs, by index, the noise first; `None` for all. The others only tell which tiles are
-    /// familiar.
-    pub weighed: Option<Vec<usize>>,
+    /// Which numbers a line weighs, by name, of those that the table has; `None` for all. The others only tell which
+    /// tiles are familiar.
+    pub weighed: Option<Vec<String>>,
 }
 
 impl Default for TrainParams {
     /// Logistic regression, for the visible descriptor.
     fn default() -> Self {
-        let candidates = vec![SvmParams { c: 100.0, gamma: WIDE }];
-        Self { learner: Learner::Line, candidates, range: 8.0, spread: 0.32, weighed: None }
+        let candidates = vec![SvmParams { c: 300.0, gamma: WIDE }];
+        Self { learner: Learner::Line, candidates, range: 8.0, spread: 0.8, weighed: None }
     }
 }
 
@@ -56,12 +56,8 @@ impl TrainParams {
 
     /// What serves a descriptor best: a line for those on the vision model, a machine for all others.
     pub fn for_descriptor(descriptor: &Descriptor) -> Self {
-        if descriptor.name() == VISIBLE_CHOICES.name {
-            Self::default()
-        } else if descriptor.name() == Descriptor::visible().name() {
-            let names = descriptor.number_names();
-            let weighed = WEIGHED.iter().filter_map(|name| names.iter().position(|n| n == name)).collect();
-            Self { weighed: Some(weighed), ..Self::default() }
+        if [Descriptor::visible().name(), VISIBLE_CHOICES.name].contains(&descriptor.name()) {
+            Self { weighed: Some(WEIGHED.map(str::to_owned).to_vec()), ..Self::default() }
         } else {
             Self::svm()
         }

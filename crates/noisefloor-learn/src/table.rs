@@ -67,6 +67,8 @@ pub struct Table {
     pub tone_mapping: ToneMapping,
     /// On which display they were seen, and from how far: an assumption where nobody recorded it.
     pub viewing: Viewing,
+    /// What the numbers of each level are: those of the descriptor, less what was taken away.
+    pub numbers: Vec<String>,
     /// The zones.
     pub zones: Vec<Zone>,
     /// What single people said of tiles of other pictures: examples to train on, never scored as thresholds.
@@ -114,10 +116,9 @@ impl Table {
     /// # Errors
     /// The name that is not a column.
     pub fn without(mut self, names: &[String]) -> Result<Self, String> {
-        let mut columns = self.descriptor.number_names();
         for name in names {
-            let at = columns.iter().position(|c| c == name).ok_or_else(|| name.clone())?;
-            columns.remove(at);
+            let at = self.numbers.iter().position(|n| n == name).ok_or_else(|| name.clone())?;
+            self.numbers.remove(at);
             self.zones.iter_mut().flat_map(|z| &mut z.levels).for_each(|l| {
                 l.descriptor.remove(at);
             });
@@ -227,6 +228,7 @@ pub(crate) mod tests {
             evidence: Evidence::Halves,
             tone_mapping: ToneMapping::Srgb { exposure: 1.0 },
             viewing: Viewing::default(),
+            numbers: Descriptor::default().number_names(),
             zones: vec![zone],
             answers: Vec::new(),
         };

@@ -144,7 +144,8 @@ pub fn read_table_with(from: impl Read, kinds: &[DescriptorKind]) -> Result<Tabl
     if zones.is_empty() {
         return Err(bad(3, "the table has no zones"));
     }
-    Ok(Table { descriptor, evidence, tone_mapping, viewing, zones, answers: Vec::new() })
+    let numbers = descriptor.number_names();
+    Ok(Table { descriptor, evidence, tone_mapping, viewing, numbers, zones, answers: Vec::new() })
 }
 
 fn parse(record: &StringRecord) -> Result<(Zone, Level), String> {
@@ -200,6 +201,7 @@ mod tests {
             evidence: Evidence::Halves,
             tone_mapping: ToneMapping::Srgb { exposure: 1.0 },
             viewing: Viewing::default(),
+            numbers: Descriptor::default().number_names(),
             zones,
             answers: Vec::new(),
         };

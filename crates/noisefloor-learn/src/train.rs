@@ -155,6 +155,7 @@ mod tests {
             evidence: Evidence::Halves,
             tone_mapping,
             viewing: noisefloor::Viewing::default(),
+            numbers: Descriptor::default().number_names(),
             zones,
             answers: Vec::new(),
         }

@@ -55,11 +55,7 @@ pub fn run(job: &EvaluateJob) -> anyhow::Result<()> {
         check_writable(path)?;
     }
     let table = if job.nested { job.data.load_choices()? } else { table(job)? };
-    let mut params = job.search.params(&table);
-    if !job.without.is_empty() {
-        // What is left is weighed
-        params.weighed = None;
-    }
+    let params = job.search.params(&table);
     let Predicted { by, predictions, choices } = predict_zones(job, &table, &params)?;
     let report = Report {
         evaluation: Evaluation::new(by, &table, &predictions),

@@ -109,16 +109,29 @@ fn describe(
                 let group = (corpora.group_of)(&zone.scene);
                 let mut shown = levels(&of_scene, zone, &material)?;
                 shown.iter_mut().for_each(|(_, _, planes)| planes.viewing = corpora.viewing);
-                describe_zone(zone, group, shown, descriptor)
+                let (described, levels) = describe_zone(zone, group, shown, descriptor)?;
+                // A residual from what people compared with is what they saw
+                let seen = evidence == Evidence::Reference;
+                let reference_spp = if seen { f64::INFINITY } else { described.reference_spp };
+                Ok((Zone { reference_spp, ..described }, levels))
             };
-            let described = of_scene.par_iter().enumerate().map(describe).collect::<Result<Vec<_>, _>>()?;
+            let described =
+                of_scene.par_iter().enumerate().map(describe).collect::<Result<Vec<_>, TableError>>()?;
             zones.extend(in_picture(described, descriptor));
         }
     }
     on_zone(all, all);
     let tone_mapping = ToneMapping::Srgb { exposure: 1.0 };
     let viewing = corpora.viewing;
-    Ok(Table { descriptor: descriptor.clone(), evidence, tone_mapping, viewing, zones, answers: Vec::new() })
+    Ok(Table {
+        descriptor: descriptor.clone(),
+        evidence,
+        tone_mapping,
+        viewing,
+        numbers: descriptor.number_names(),
+        zones,
+        answers: Vec::new(),
+    })
 }
 
 /// The levels that are synthesised for each zone of a scene, in samples per pixel.

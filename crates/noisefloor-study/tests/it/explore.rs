@@ -309,11 +309,13 @@ pub(crate) fn table() -> Table {
     };
     let zones = (0..4).flat_map(|s| (0..5).map(move |z| (s, z))).map(|(s, z)| zone(s, z)).collect();
     let tone_mapping = ToneMapping::Srgb { exposure: 1.0 };
+    let numbers = descriptor.number_names();
     Table {
         descriptor,
         evidence: Evidence::Halves,
         tone_mapping,
         viewing: Viewing::default(),
+        numbers,
         zones,
         answers: Vec::new(),
     }

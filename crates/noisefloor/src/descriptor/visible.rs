@@ -87,7 +87,7 @@ impl Order {
 
 impl Default for Visible {
     fn default() -> Self {
-        Self { order: Order(2), difference: 20.0, picture_quantile: 0.75 }
+        Self { order: Order(2), difference: 20.0, picture_quantile: 0.875 }
     }
 }
 
