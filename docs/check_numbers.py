@@ -30,14 +30,10 @@ MARK = re.compile(r"<!--=(?P<key>[\w.-]+)-->(?P<text>.*?)<!--/-->", re.DOTALL)
 NUMBER = re.compile(r"\d+(?:,\d{3})*(?:\.\d+)?")
 
 # What `evaluate --without` leaves out, and how accuracy.md calls the rest.
-LIGHT = ["light", "picture_light"]
-PICTURE = ["picture_noise", "picture_light"]
 ABLATIONS = [
-    ("all five numbers", []),
-    ("without texture", ["texture"]),
-    ("without light", LIGHT),
-    ("only the tile", PICTURE),
-    ("only the tile's noise", ["texture", "light", *PICTURE]),
+    ("the tile's noise, its picture's noise and light", []),
+    ("without light", ["picture_light"]),
+    ("only the tile's noise", ["picture_noise", "picture_light"]),
 ]
 
 
@@ -70,6 +66,13 @@ def compact():
     """The compact descriptor, with one C and γ: the search takes a minute."""
     options = ["--leave-one-scene-out", "--c", "0.3", "--gamma", "0.01"]
     return evaluate(*options, table="fixtures/human-compact.csv")[0]
+
+
+def nine_scenes():
+    """Error over the scenes of LISIC."""
+    zones = [z for z in evaluate("--nested", table="fixtures/human-choices.csv")[1] if "-view" not in z["scene"]]
+    off = [abs(math.log(float(z["predicted_spp"]) / float(z["human_spp"]))) for z in zones]
+    return math.exp(statistics.mean(off))
 
 
 def ablated(names):
@@ -142,28 +145,6 @@ def threshold_table():
     return table(["scene", "people", "model, learned", "model, unseen"], rows)
 
 
-def other_study_table():
-    """The bundled model on views of another study, before and after the factor that the other view teaches."""
-    zones = [zone for zone in evaluate(table="fixtures/sin3d-table.csv")[1] if zone["censored"] == "false"]
-    views = list(dict.fromkeys(zone["scene"] for zone in zones))
-    def logs(view, column):
-        return [math.log(float(zone[column])) for zone in zones if zone["scene"] == view]
-    off = {v: [p - h for p, h in zip(logs(v, "predicted_spp"), logs(v, "human_spp"))] for v in views}
-    def row(view):
-        others = statistics.mean(statistics.mean(off[other]) for other in views if other != view)
-        def typical(shift):
-            return factor(math.exp(statistics.mean(abs(x - shift) for x in off[view])))
-        early = sum(x < math.log(0.5) for x in off[view]) / len(off[view])
-        return [
-            view, f"{len(off[view])}", f"{statistics.mean(map(math.exp, logs(view, 'human_spp'))):,.0f}",
-            typical(0), factor(math.exp(statistics.mean(off[view]))), share(early), typical(others),
-            f"{statistics.correlation(logs(view, 'predicted_spp'), logs(view, 'human_spp')):.2f}",
-        ]
-    head = ["view", "zones", "people, mean spp", "error", "bias", "early", "error after the other view's factor",
-            "correlation within the view"]
-    return table(head, [row(view) for view in views])
-
-
 def noise_table():
     """What the example prints about noise of other kinds."""
     built = pathlib.Path(noisefloor).parent / "examples/noise_colours"
@@ -187,8 +168,8 @@ VALUES = {
     **scores_of("median", lambda: nested()["baselines"]["scene_median"]),
     "unseen.error": lambda: factor(unseen()["error_factor"]),
     "unseen.unfamiliar": lambda: f"{unseen()['unfamiliar_zones']}",
-    "unseen.calibration": lambda: f"{unseen()['calibration_error']:.3f}",
-    "unseen.calibration-of-step": lambda: f"{unseen()['calibration_error_of_step']:.3f}",
+    "nested.calibration": lambda: f"{nested()['calibration_error']:.3f}",
+    "nine.error": lambda: factor(nine_scenes()),
     "worst.scene": lambda: worst(nested())["scene"],
     "worst.error": lambda: factor(worst(nested())["error_factor"]),
     "table.zones": lambda: f"{unseen()['zones']}",
@@ -203,7 +184,6 @@ VALUES = {
     "tables.scenes": scene_table,
     "tables.ablation": ablation_table,
     "tables.thresholds": threshold_table,
-    "tables.other-study": other_study_table,
     "tables.noise": noise_table,
 }
 

@@ -108,20 +108,17 @@ mod tests {
     /// Probabilities of 0.25 and 0.75 that come true in a quarter and in half of the cases.
     #[test]
     fn calibration_is_the_distance_from_the_diagonal() {
-        let levels = |p: f32, n: usize| (0..n).map(move |_| (100.0, p));
-        let mut prediction = Prediction::by_threshold(&zone("A", 0, 100.0, 1.0), 100.0);
-        prediction.probabilities = levels(0.25, 40).chain(levels(0.75, 20)).collect();
-        // Ninefold away: stays out.
-        prediction.probabilities.push((900.0, 0.5));
-        let turn = std::cell::Cell::new(0);
-        let observed = |_, _| {
-            turn.set(turn.get() + 1);
-            let every = if turn.get() <= 40 { 4 } else { 2 };
-            if turn.get() % every == 0 { 1.0 } else { 0.0 }
+        // People stop at 50 or 200 samples, and P is said of 100; ninefold away stays out
+        let said = |p: f32, human: f64| {
+            let mut prediction = Prediction::by_threshold(&zone("A", 0, human, 1.0), 100.0);
+            prediction.probabilities = vec![(100.0, p), (9.0 * human, 0.5)];
+            prediction
         };
-        let bins = reliability([&prediction].into_iter(), observed);
+        let quarter = [50.0, 200.0, 200.0, 200.0].map(|human| said(0.25, human));
+        let half = [50.0, 200.0].map(|human| said(0.75, human));
+        let bins = reliability(quarter.iter().chain(&half));
         assert_eq!(bins.len(), 2);
-        assert_eq!((bins[0].observed, bins[1].observed, bins[1].levels), (0.25, 0.5, 20));
+        assert_eq!((bins[0].observed, bins[1].observed, bins[1].levels), (0.25, 0.5, 2));
         assert!((calibration_error(&bins) - 0.25 / 3.0).abs() < 1e-12);
     }
 

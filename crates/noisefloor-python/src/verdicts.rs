@@ -142,6 +142,9 @@ pub(crate) struct PyVerdict {
     probability: Option<f32>,
     /// Samples per pixel at which the tile is expected to be free of visible noise; None if not known.
     expected_spp: Option<u64>,
+    /// Where people are expected to stop seeing noise, in samples per pixel: the 10 %, 50 % and 90 % points.
+    /// ``expected_spp`` is where the tile stops, which is later.
+    threshold: Option<(u64, u64, u64)>,
     /// Whether the tile is unlike all that the model was trained on: treat the verdict with care.
     unfamiliar: bool,
 }
@@ -157,8 +160,9 @@ impl PyVerdict {
 
 impl PyVerdict {
     pub(crate) fn new(tile: Tile, verdict: Verdict) -> Self {
-        let Verdict { converged, probability, expected_spp, unfamiliar, .. } = verdict;
-        Self { tile: tile.into(), converged, probability, expected_spp, unfamiliar }
+        let Verdict { converged, probability, threshold, expected_spp, unfamiliar, .. } = verdict;
+        let threshold = threshold.map(|t| (t.low, t.median, t.high));
+        Self { tile: tile.into(), converged, probability, threshold, expected_spp, unfamiliar }
     }
 }
 

@@ -47,6 +47,18 @@ pub struct Needs {
     pub reference: bool,
 }
 
+/// Where people are expected to stop seeing noise in a tile: not where the tile stops, which is later, and said by
+/// [`Verdict::expected_spp`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ExpectedThreshold {
+    /// Samples per pixel below which it lies with a probability of 10 %.
+    pub low: u64,
+    /// Samples per pixel below which it lies as often as not: what predictions of people are scored by.
+    pub median: u64,
+    /// Samples per pixel below which it lies with a probability of 90 %.
+    pub high: u64,
+}
+
 /// What a criterion says about one tile.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Verdict {
@@ -55,6 +67,9 @@ pub struct Verdict {
     /// Probability that an observer sees no difference from the converged picture, if the criterion computes
     /// one.
     pub probability: Option<f32>,
+    /// Where people are expected to stop seeing noise, whatever the criterion's own threshold; `None` if it has learned
+    /// nothing from people.
+    pub threshold: Option<ExpectedThreshold>,
     /// Samples per pixel at which the criterion expects to be satisfied, if it can tell.
     pub expected_spp: Option<u64>,
     /// Whether the tile is unlike everything the criterion was made for: treat the verdict with care.

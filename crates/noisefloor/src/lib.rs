@@ -62,7 +62,9 @@ mod tone_curve;
 
 pub use blocks::{BlockRequest, BlockSamples};
 pub use checkpoint::{Checkpoint, CheckpointError};
-pub use criterion::{CriterionError, FixedSpp, Needs, Resumable, StoppingCriterion, Verdict, View};
+pub use criterion::{
+    CriterionError, ExpectedThreshold, FixedSpp, Needs, Resumable, StoppingCriterion, Verdict, View,
+};
 pub use descriptor::{
     Described, Descriptor, DescriptorError, DescriptorKind, DescriptorSpec, TileDescriptor,
 };

@@ -387,8 +387,13 @@ impl ProbabilityCurve<'_> {
     /// P with `factor` times the samples; `None` if the descriptor does not separate noise from picture.
     pub(crate) fn at(&mut self, factor: f32) -> Option<f32> {
         let penalty = if self.unfamiliar { CAUTION } else { 1.0 };
+        self.without_penalty(factor / penalty)
+    }
+
+    /// The same without the penalty for an unfamiliar tile.
+    pub(crate) fn without_penalty(&mut self, factor: f32) -> Option<f32> {
         self.projected.copy_from_slice(self.raw);
-        let known = self.parts.descriptor.project(&mut self.projected, factor / penalty);
+        let known = self.parts.descriptor.project(&mut self.projected, factor);
         known.then(|| self.parts.classifier.probability_in_place(&mut self.projected))
     }
 }

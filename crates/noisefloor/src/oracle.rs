@@ -2,7 +2,9 @@
 
 use crate::blocks::blocks_of;
 use crate::container;
-use crate::criterion::{CriterionError, Needs, Resumable, StoppingCriterion, Verdict, View};
+use crate::criterion::{
+    CriterionError, ExpectedThreshold, Needs, Resumable, StoppingCriterion, Verdict, View,
+};
 use crate::descriptor::{Described, DescriptorError};
 use crate::evidence::{Evidence, TilePlanes};
 use crate::model::{Model, ProbabilityCurve};
@@ -101,6 +103,11 @@ impl Oracle {
         Some(Verdict {
             converged,
             probability: seen(trained.probability),
+            threshold: trained.threshold.map(|t| ExpectedThreshold {
+                low: audience.samples(t.low),
+                median: audience.samples(t.median),
+                high: audience.samples(t.high),
+            }),
             expected_spp,
             unfamiliar: trained.unfamiliar,
             probability_without_penalty: seen(trained.probability_without_penalty),
@@ -115,6 +122,7 @@ impl Oracle {
         Verdict {
             converged,
             probability: Some(judgement.probability),
+            threshold: expected_threshold(&mut curve, spp),
             expected_spp: if converged { Some(spp) } else { self.expect(&mut curve, spp) },
             unfamiliar: judgement.unfamiliar,
             probability_without_penalty: Some(judgement.probability_without_penalty),
@@ -226,6 +234,24 @@ impl Oracle {
         }
         Some((spp as f64 * f64::from(high).exp2()).ceil() as u64)
     }
+}
+
+/// Samples per pixel at which P is 10, 50 and 90 %, if only the noise changes; `None` if the descriptor does not separate
+/// noise from picture, or one of them lies beyond 2²⁰ times the samples.
+fn expected_threshold(curve: &mut ProbabilityCurve<'_>, spp: u64) -> Option<ExpectedThreshold> {
+    let mut reaches = |p: f32| {
+        // Doublings of the samples, from a million times fewer to a million times more
+        let (mut low, mut high) = (-20.0f32, 20.0f32);
+        if curve.without_penalty(high.exp2())? < p {
+            return None;
+        }
+        while high - low > 0.01 {
+            let middle = 0.5 * (low + high);
+            if curve.without_penalty(middle.exp2())? >= p { high = middle } else { low = middle }
+        }
+        Some((spp as f64 * f64::from(high).exp2()).ceil() as u64)
+    };
+    Some(ExpectedThreshold { low: reaches(0.1)?, median: reaches(0.5)?, high: reaches(0.9)? })
 }
 
 impl StoppingCriterion for Oracle {

@@ -99,10 +99,10 @@ fn read((path, spp): &(PathBuf, Option<f64>)) -> anyhow::Result<Still> {
 
 fn judge(oracle: &Oracle, grid: TileGrid, held: &SnapshotPair<'_>) -> anyhow::Result<Vec<Row>> {
     let row = |(tile, verdict): (Tile, Verdict)| {
-        let Verdict { converged, probability, expected_spp, unfamiliar, .. } = verdict;
+        let Verdict { converged, probability, threshold, expected_spp, unfamiliar, .. } = verdict;
         let Tile { index, x, y, width, height } = tile;
         let probability = probability.unwrap_or(0.0);
-        Row { tile: index, x, y, width, height, probability, converged, expected_spp, unfamiliar }
+        Row { tile: index, x, y, width, height, probability, converged, threshold, expected_spp, unfamiliar }
     };
     let described = held.describe(oracle, grid)?;
     Ok(grid.tiles().zip(oracle.judge_described(&described)).map(row).collect())

@@ -1,7 +1,7 @@
 //! Verdicts as a table or as JSON.
 
 use crate::say::{NotSaid, say, say_json};
-use noisefloor::{Oracle, Threshold};
+use noisefloor::{ExpectedThreshold, Oracle, Threshold};
 use serde::Serialize;
 use std::path::Path;
 
@@ -15,6 +15,8 @@ pub(super) struct Row {
     pub(super) height: usize,
     pub(super) probability: f32,
     pub(super) converged: bool,
+    /// Where people are expected to stop seeing noise, in samples per pixel.
+    pub(super) threshold: Option<ExpectedThreshold>,
     /// Samples per pixel at which the tile should be converged; null if that is out of sight.
     pub(super) expected_spp: Option<u64>,
     /// Whether its texture is unlike any that the model has been tested on; P is then that of half the
@@ -58,13 +60,16 @@ pub(super) fn say_all(
 }
 
 fn say_table(report: &Report<'_>) -> Result<(), NotSaid> {
-    say!("tile     x     y   size       P  verdict      expected spp")?;
+    say!(
+        "tile     x     y   size       P  verdict      stops at spp  people stop seeing noise at spp (80 %)"
+    )?;
     for row in report.tiles {
         let verdict = if row.converged { "converged" } else { "noise seen" };
         let expected = row.expected_spp.filter(|_| !row.converged).map_or(String::new(), |n| n.to_string());
         let size = format!("{}×{}", row.width, row.height);
+        let range = row.threshold.map_or(String::new(), |t| format!("{}…{}", t.low, t.high));
         say!(
-            "{:4} {:5} {:5} {size:>8} {:6.3}  {verdict:10} {expected:>14}{}",
+            "{:4} {:5} {:5} {size:>8} {:6.3}  {verdict:10} {expected:>14}  {range:>16}{}",
             row.tile,
             row.x,
             row.y,

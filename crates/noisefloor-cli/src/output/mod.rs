@@ -13,7 +13,9 @@ use crate::files::{write_csv, write_json};
 use crate::folder::{Earlier, Folder, Occupied};
 use crate::sources::Source;
 use anyhow::Context;
-use noisefloor::{Checkpoint, Clock, Progress, Rgb, SampleOrigin, Session, StoppingCriterion};
+use noisefloor::{
+    Checkpoint, Clock, ExpectedThreshold, Progress, Rgb, SampleOrigin, Session, StoppingCriterion,
+};
 use noisefloor_image::{check_writable, write_atomic};
 use noisefloor_rivals::metrics::relative_mse;
 use report::Report;
@@ -213,6 +215,16 @@ fn remove(path: &Path) -> anyhow::Result<()> {
         }
         _ => Ok(()),
     }
+}
+
+/// Where people are expected to stop seeing noise in the typical tile: that of median need. `None` if the criterion
+/// does not say.
+fn typical_threshold<C: StoppingCriterion>(session: &Session<C>) -> Option<ExpectedThreshold> {
+    let tiles = 0..session.film().grid().len();
+    let mut thresholds: Vec<ExpectedThreshold> =
+        tiles.filter_map(|tile| session.verdict(tile)?.threshold).collect();
+    thresholds.sort_by_key(|threshold| threshold.median);
+    thresholds.get(thresholds.len() / 2).copied()
 }
 
 /// Samples that uniform rendering at the largest stop would take, over all pixels.

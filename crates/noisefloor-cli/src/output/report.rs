@@ -2,9 +2,9 @@
 
 use super::denoised::DenoisedReport;
 use super::tiles::TileState;
-use super::{Output, uniform_samples};
+use super::{Output, typical_threshold, uniform_samples};
 use crate::sources::Source;
-use noisefloor::{Clock, Params, Session, StoppingCriterion};
+use noisefloor::{Clock, ExpectedThreshold, Params, Session, StoppingCriterion};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -30,6 +30,8 @@ pub(super) struct Report<'a> {
     stops: BTreeMap<String, usize>,
     /// Tiles with texture unlike any that the model has been tried on.
     unfamiliar_tiles: usize,
+    /// Where people are expected to stop seeing noise in the typical tile, in samples per pixel.
+    expected_threshold: Option<ExpectedThreshold>,
     /// Over all pixels.
     samples: u64,
     /// What uniform rendering at the largest stop would take.
@@ -89,6 +91,7 @@ impl<'a> Report<'a> {
             tiles: tiles.len(),
             stops,
             unfamiliar_tiles: tiles.iter().filter(|tile| tile.stop.unfamiliar).count(),
+            expected_threshold: typical_threshold(session),
             samples: session.film().total_samples(),
             samples_uniform: uniform_samples(session),
             samples_rejected: session.film().rejected(),

@@ -1,6 +1,6 @@
 //! A render in a few lines, for people.
 
-use super::{CHECKPOINT, Output, uniform_samples};
+use super::{CHECKPOINT, Output, typical_threshold, uniform_samples};
 use crate::say::{NotSaid, say};
 use crate::sources::Source;
 use noisefloor::{Clock, Session, StoppingCriterion};
@@ -58,6 +58,13 @@ impl Output {
             samples / (grid.width() * grid.height()) as f64,
             100.0 * samples / uniform_samples(session).max(1) as f64,
         )?;
+        if let Some(threshold) = typical_threshold(session) {
+            say!(
+                "in the typical tile, people stop seeing noise between {} and {} samples per pixel (80 %)",
+                threshold.low,
+                threshold.high
+            )?;
+        }
         let unfamiliar = session.stops().filter(|s| s.unfamiliar).count();
         if unfamiliar > 0 {
             say!(

@@ -45,7 +45,7 @@ const LIGHT_FLOOR: f32 = 0.002;
 /// Exponent from display luminance Y′ to a share of the light of white; close to sRGB's curve, and the same
 /// for all displays.
 const GAMMA: f32 = 2.2;
-/// How often the contrast is corrected; the last correction is not checked. What is left is 5 % at a tenth of the
+/// How often the contrast is corrected; the last correction is not checked. What is left is 8 % at a tenth of the
 /// noise that is too strong, and below 2 % near it.
 const CORRECTIONS: usize = 3;
 /// How a pooled difference grows with contrast before that is known: between weak noise (2.26) and strong.

@@ -38,7 +38,7 @@ fn judge(oracle: &mut Oracle, film: &Film, reference: Option<&[Rgb]>) -> Result<
 fn more_samples_are_less_visible_and_the_expected_need_is_near() {
     let mut oracle = Oracle::bundled();
     // A quarter of what is needed; from further away, noise that masks itself hides some of the need
-    let few = judge(&mut oracle, &film(500, 0.5), None).unwrap();
+    let few = judge(&mut oracle, &film(1_500, 0.5), None).unwrap();
     let many = judge(&mut oracle, &film(100_000, 0.5), None).unwrap();
     assert!(!few.converged && many.converged, "{few:?} {many:?}");
     // At the samples that were expected, another realisation of the noise is about at the threshold.
