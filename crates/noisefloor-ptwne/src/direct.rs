@@ -134,9 +134,11 @@ impl<'a> Tracer<'a> {
             Bsdf::RoughGlass { .. } => self.rough_glass(&ray, &surface, weight, code),
             // Intersections have one of its parts
             Bsdf::Mix { .. } => Vec3::ZERO,
-            Bsdf::Metal { .. } | Bsdf::Plastic { .. } | Bsdf::Blend { .. } | Bsdf::Lobes { .. } => {
-                self.glossy(&ray, &surface, weight, code)
-            }
+            Bsdf::Metal { .. }
+            | Bsdf::Plastic { .. }
+            | Bsdf::Gltf { .. }
+            | Bsdf::Principled { .. }
+            | Bsdf::Lobes { .. } => self.glossy(&ray, &surface, weight, code),
         }
     }
 
@@ -158,7 +160,7 @@ impl<'a> Tracer<'a> {
 
     /// A rough boundary: one sampled direction, by which lights are found, too.
     fn rough_glass(&mut self, ray: &Ray, surface: &Intersection<'_>, weight: Vec3, code: u64) -> Vec3 {
-        let frame = Frame::new(surface.normal);
+        let frame = surface.frame();
         let numbers = sobol_burley::sample_4d(self.index, 0, self.seed(code, Use::Facets) as u32);
         let sampled = surface
             .rough_glass()
@@ -173,7 +175,7 @@ impl<'a> Tracer<'a> {
 
     /// Microfacets and coats: direct light, and what the facets reflect.
     fn glossy(&mut self, ray: &Ray, surface: &Intersection<'_>, weight: Vec3, code: u64) -> Vec3 {
-        let frame = Frame::new(surface.normal);
+        let frame = surface.frame();
         let wo = frame.to_local(-ray.dir);
         let Some(glossy) = surface.glossy(wo.z) else { return Vec3::ZERO };
         let [u, v] = pair(self.index, self.seed(code, Use::Facets));

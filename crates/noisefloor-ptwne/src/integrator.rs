@@ -172,7 +172,7 @@ impl<'a, const OPACITY: bool> Path<'a, OPACITY> {
             Bsdf::Diffuse { albedo } => {
                 self.diffuse(albedo.tinted(surface.uv, surface.tint), surface, throughput, sum)
             }
-            Bsdf::Metal { .. } | Bsdf::Plastic { .. } | Bsdf::Blend { .. } => {
+            Bsdf::Metal { .. } | Bsdf::Plastic { .. } | Bsdf::Gltf { .. } | Bsdf::Principled { .. } => {
                 self.glossy::<false>(ray, surface, throughput, sum)
             }
             Bsdf::Lobes { .. } => self.glossy::<true>(ray, surface, throughput, sum),
@@ -257,7 +257,7 @@ impl<'a, const OPACITY: bool> Path<'a, OPACITY> {
         throughput: Vec3,
         sum: &mut Vec3,
     ) -> Option<Scattered> {
-        let frame = Frame::new(surface.normal);
+        let frame = surface.frame();
         let wo = frame.to_local(-ray.dir);
         let glossy = surface.glossy(wo.z)?;
         let mis = self.settings.estimator == Estimator::Mis;
@@ -296,7 +296,7 @@ impl<'a, const OPACITY: bool> Path<'a, OPACITY> {
     ) -> Option<Scattered> {
         let glass = surface.rough_glass()?;
         let receiver = Receiver::all_round(surface.position);
-        let frame = Frame::new(surface.normal);
+        let frame = surface.frame();
         let wo = frame.to_local(-ray.dir);
         let mis = self.settings.estimator == Estimator::Mis;
         *sum += throughput

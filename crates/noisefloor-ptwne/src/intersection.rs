@@ -4,7 +4,7 @@ use crate::accel::{Hit, HitShape, Spot, Stack};
 use crate::bsdf::{Glossy, LobesAt, MIN_ROUGHNESS, RoughGlass, schlick};
 use crate::geometry::NO;
 use crate::material::{Bsdf, CompiledMaterial};
-use crate::math::{Ray, Vec3};
+use crate::math::{Frame, Ray, Vec3};
 use crate::relief::{self, Relief};
 use crate::rng;
 use crate::scene::Scene;
@@ -33,6 +33,8 @@ pub(crate) struct Intersection<'a> {
     /// Whether the ray hit the front.
     pub(crate) front: bool,
     pub(crate) uv: [f32; 2],
+    /// Along growing u, of any length; 0 if that does not count.
+    pub(crate) along: Vec3,
     /// The colour between its corners; white if they have none.
     pub(crate) tint: Vec3,
     pub(crate) material: &'a CompiledMaterial,
@@ -74,12 +76,17 @@ impl Scene {
 
     fn is_solid(&self, prim: u32, spot: Spot, test: OpacityTest) -> bool {
         let group = self.geometry.group(prim);
-        match &self.materials[group.material as usize].opacity {
+        let material = &self.materials[group.material as usize];
+        let (Spot::Plane { front, .. } | Spot::Sphere { front, .. }) = spot;
+        if material.culled && !front {
+            return false;
+        }
+        match &material.opacity {
             None => true,
             Some(opacity) => {
                 let ([u, v], far) = match spot {
-                    Spot::Plane(uv) => (self.geometry.texture_coordinates(group, prim, uv), false),
-                    Spot::Sphere { normal, far } => {
+                    Spot::Plane { uv, .. } => (self.geometry.texture_coordinates(group, prim, uv), false),
+                    Spot::Sphere { normal, far, .. } => {
                         (sphere_coordinates(self.geometry.to_local(group, normal)), far)
                     }
                 };
@@ -147,8 +154,9 @@ impl Scene {
             let shiny = !matches!(material.bsdf, Bsdf::Diffuse { .. });
             normal = self.relieved(relief, hit, ray.dir, Sides { flat, normal, front, uv, shiny });
         }
+        let along = if material.directional { self.growing_u(hit, flat) } else { Vec3::ZERO };
         let light = if group.light == NO { NO } else { group.light + prim - group.first };
-        Intersection { position, flat, normal, front, uv, tint, material, light }
+        Intersection { position, flat, normal, front, uv, along, tint, material, light }
     }
 
     /// The shading normal of a surface with relief, on the side of the ray's origin.
@@ -163,6 +171,13 @@ impl Scene {
             Some(turned) => relief::bent(turned * sign, flat, -dir, shiny),
             None => normal,
         }
+    }
+
+    /// How the position grows with u; 0 where texture coordinates do not span the surface.
+    #[cold]
+    #[inline(never)]
+    fn growing_u(&self, hit: &Hit, flat: Vec3) -> Vec3 {
+        self.tangents(hit, flat).map_or(Vec3::ZERO, |[along, _]| along.normalize_or_zero())
     }
 
     /// The origin of a ray that leaves `surface` on the side that `dir` points to.
@@ -201,27 +216,38 @@ fn sphere_coordinates(n: Vec3) -> [f32; 2] {
 }
 
 impl<'a> Intersection<'a> {
+    /// The frame in which directions of scattering are local.
+    #[inline]
+    pub(crate) fn frame(&self) -> Frame {
+        if self.along == Vec3::ZERO { Frame::new(self.normal) } else { Frame::along(self.normal, self.along) }
+    }
+
     /// Its microfacets and coat, seen at a cosine with the shading normal; `None` if it has none.
     #[inline]
     pub(crate) fn glossy(&self, cos: f32) -> Option<Glossy<'a>> {
+        let facets = |own| self.material.facets(own, self.uv);
         match &self.material.bsdf {
             Bsdf::Metal { fresnel, colour, ggx } => {
-                Some(Glossy::metal(fresnel, colour.tinted(self.uv, self.tint), *ggx))
+                Some(Glossy::metal(fresnel, colour.tinted(self.uv, self.tint), facets(*ggx)))
             }
             Bsdf::Plastic { diffuse, specular, ggx, nonlinear, coat } => {
                 let diffuse = diffuse.tinted(self.uv, self.tint);
-                Some(Glossy::plastic(coat, diffuse, *specular, *ggx, *nonlinear, cos))
+                Some(Glossy::plastic(coat, diffuse, *specular, facets(*ggx), *nonlinear, cos))
             }
-            Bsdf::Blend { base, metallic_roughness, coat } => {
+            Bsdf::Gltf { base, metallic_roughness, f0 } => {
                 let values = metallic_roughness.at(self.uv);
                 let alpha = (values.y * values.y).max(MIN_ROUGHNESS);
+                Some(Glossy::gltf(base.tinted(self.uv, self.tint), alpha, values.z, *f0, cos))
+            }
+            Bsdf::Principled { base, metallic_roughness, more } => {
+                let values = metallic_roughness.at(self.uv);
                 let base = base.tinted(self.uv, self.tint);
-                Some(Glossy::blend(coat, base, alpha, values.z, cos))
+                Some(Glossy::principled(more, base, [values.y, values.z], cos))
             }
             Bsdf::Lobes { diffuse, through, specular, mirror, gloss, oren_nayar, ggx } => {
                 let [diffuse, through, specular, mirror] =
                     [diffuse, through, specular, mirror].map(|colour| colour.tinted(self.uv, self.tint));
-                let (gloss, oren_nayar, ggx) = (*gloss, *oren_nayar, *ggx);
+                let (gloss, oren_nayar, ggx) = (*gloss, *oren_nayar, facets(*ggx));
                 let lobes = LobesAt { diffuse, through, specular, mirror, gloss, oren_nayar, ggx };
                 Some(Glossy::lobes(lobes, cos))
             }
@@ -246,6 +272,6 @@ impl<'a> Intersection<'a> {
     pub(crate) fn rough_glass(&self) -> Option<RoughGlass> {
         let Bsdf::RoughGlass { ior, tint, ggx } = &self.material.bsdf else { return None };
         let eta = if self.front { *ior } else { 1.0 / ior };
-        Some(RoughGlass::new(*ggx, eta, *tint))
+        Some(RoughGlass::new(self.material.facets(*ggx, self.uv), eta, *tint))
     }
 }

@@ -69,7 +69,7 @@ pub use error::{RenderError, SceneError};
 pub use filter::Filter;
 pub use integrator::Estimator;
 pub use light::{Falloff, Profile, Punctual};
-pub use material::{Gloss, Lobes, Material, MaterialOptions};
+pub use material::{Dialect, Gloss, Lobes, Material, MaterialOptions, Principled};
 pub use reference::ReferenceNoise;
 pub use relief::Relief;
 pub use renderer::{MAX_DEPTH, MAX_THREADS, Ptwne, RenderOptions, SampleCounts};

@@ -36,6 +36,15 @@ impl Frame {
         }
     }
 
+    /// With x along `tangent`, as far as it is perpendicular to `n`; any x if it is not.
+    #[inline]
+    pub(crate) fn along(n: Vec3, tangent: Vec3) -> Self {
+        match (tangent - n * n.dot(tangent)).try_normalize() {
+            Some(x) => Self { x, y: n.cross(x), z: n },
+            None => Self::new(n),
+        }
+    }
+
     #[inline]
     pub(crate) fn to_world(self, v: Vec3) -> Vec3 {
         self.x * v.x + self.y * v.y + self.z * v.z

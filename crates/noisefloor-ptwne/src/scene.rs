@@ -83,7 +83,7 @@ impl Scene {
             None => {}
         }
 
-        let has_opacity = geometry.groups.iter().any(|g| materials[g.material as usize].opacity.is_some());
+        let has_opacity = geometry.groups.iter().any(|g| materials[g.material as usize].lets_pass());
         let means: Vec<Vec3> = emission_textures.iter().map(Texture::mean).collect();
         let bounds = bvh.bounds();
         let lights = Lights::new(lights, bounds, &means);
@@ -164,8 +164,8 @@ impl Scene {
         self.lights.all.iter().filter(|l| l.power_pmf <= 0.0).count()
     }
 
-    /// Whether any surface is partly transparent
-    /// ([`MaterialOptions::opacity`](crate::MaterialOptions::opacity)), so that rays must test it. Other
+    /// Whether any surface is partly transparent or has no back
+    /// ([`MaterialOptions::opacity`](crate::MaterialOptions::opacity) and `culled`), so that rays must test it. Other
     /// scenes are rendered by code without that test.
     pub fn has_opacity(&self) -> bool {
         self.has_opacity

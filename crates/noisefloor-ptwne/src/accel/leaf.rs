@@ -33,10 +33,10 @@ pub(super) struct Round {
 /// Where on a surface a ray meets it.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Spot {
-    /// Coordinates along its edges.
-    Plane([f32; 2]),
-    /// The normal outside; and whether the ray came in through the other side of the sphere.
-    Sphere { normal: Vec3, far: bool },
+    /// Coordinates along its edges, and whether the ray comes to its front.
+    Plane { uv: [f32; 2], front: bool },
+    /// The normal outside, where the ray comes to the front; and whether the ray came in through the other side of the sphere.
+    Sphere { normal: Vec3, front: bool, far: bool },
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -85,6 +85,13 @@ impl Pack {
         [&self.normal, &self.dual_u, &self.dual_v].map(|v| Vec3::new(v[0][lane], v[1][lane], v[2][lane]))
     }
 
+    /// Where a ray of that direction meets the surface of a lane.
+    #[inline]
+    pub(super) fn spot(&self, lane: usize, uv: [f32; 2], dir: Vec3) -> Spot {
+        let [x, y, z] = [0, 1, 2].map(|i| self.normal[i][lane] * dir[i]);
+        Spot::Plane { uv, front: x + y + z < 0.0 }
+    }
+
     /// Distances, u, v, and a mask of the surfaces that the ray meets before `t_max`.
     #[inline]
     pub(super) fn intersect(&self, ray: &WideRay, t_max: f32) -> (Vec4, Vec4, Vec4, u32) {
@@ -127,7 +134,8 @@ impl Round {
                     true if low <= 0.0 => return None,
                     _ => high,
                 };
-                (t, Spot::Sphere { normal: (ray.dir * t - to) / radius, far })
+                let normal = (ray.dir * t - to) / radius;
+                (t, Spot::Sphere { normal, front: normal.dot(ray.dir) < 0.0, far })
             }
             RoundShape::Disk { .. } if far => return None,
             RoundShape::Disk { normal, dual_u, dual_v } => {
@@ -138,7 +146,7 @@ impl Round {
                     return None;
                 }
                 // Along the plane t is NaN, and not below `t_max`
-                (t, Spot::Plane(uv))
+                (t, Spot::Plane { uv, front: normal.dot(ray.dir) < 0.0 })
             }
         };
         (t > 0.0 && t < t_max).then_some((t, spot))

@@ -87,7 +87,9 @@ impl Bvh {
                 while mask != 0 {
                     let lane = mask.trailing_zeros() as usize & 3;
                     mask &= mask - 1;
-                    if t[lane] < best.t && solid(pack.prim[lane], Spot::Plane([u[lane], v[lane]])) {
+                    if t[lane] < best.t
+                        && solid(pack.prim[lane], pack.spot(lane, [u[lane], v[lane]], ray.dir))
+                    {
                         *best =
                             Hit { t: t[lane], slot: leaf.pack << 2 | lane as u32, uv: [u[lane], v[lane]] };
                     }
@@ -98,7 +100,7 @@ impl Bvh {
             for index in leaf.first_round..leaf.first_round + leaf.rounds {
                 let round = &self.rounds[index as usize];
                 if let Some((t, spot)) = round.meets(ray, best.t, solid) {
-                    let uv = if let Spot::Plane(uv) = spot { uv } else { [0.0; 2] };
+                    let uv = if let Spot::Plane { uv, .. } = spot { uv } else { [0.0; 2] };
                     *best = Hit { t, slot: ROUND | index, uv };
                 }
             }
@@ -185,7 +187,7 @@ impl Bvh {
             while mask != 0 {
                 let lane = mask.trailing_zeros() as usize & 3;
                 mask &= mask - 1;
-                if solid(pack.prim[lane], Spot::Plane([u[lane], v[lane]])) {
+                if solid(pack.prim[lane], pack.spot(lane, [u[lane], v[lane]], ray.dir)) {
                     return true;
                 }
             }

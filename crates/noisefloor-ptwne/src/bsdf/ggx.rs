@@ -31,29 +31,42 @@ impl Facets {
     }
 }
 
-/// Isotropic microfacets.
+/// Microfacets.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Ggx {
+    /// α, or the geometric mean of those along both axes.
     pub(crate) alpha: f32,
+    /// α along x over the mean, and its inverse; 1 if no direction differs.
+    stretch: [f32; 2],
     facets: Facets,
 }
 
 impl Ggx {
-    /// GGX with correlated masking and shadowing.
-    #[inline]
-    pub(crate) fn new(alpha: f32) -> Self {
-        Self::of(alpha, Facets::Ggx)
-    }
-
     #[inline]
     pub(crate) fn of(alpha: f32, facets: Facets) -> Self {
-        Self { alpha, facets }
+        Self { alpha, stretch: [1.0; 2], facets }
+    }
+
+    /// The same facets with other α along x and y.
+    #[inline]
+    pub(crate) fn stretched(self, [x, y]: [f32; 2]) -> Self {
+        let alpha = (x * y).sqrt();
+        let stretch = if x == y { [1.0; 2] } else { [x / alpha, alpha / x] };
+        Self { alpha, stretch, ..self }
+    }
+
+    /// A normal of the facets as it would be if their α was the same in all directions (Heitz 2014, §5.3); but for
+    /// its length.
+    #[inline]
+    fn squeezed(self, h: Vec3) -> Vec3 {
+        Vec3::new(h.x * self.stretch[1], h.y * self.stretch[0], h.z)
     }
 
     /// Density of microfacet normals (Walter et al. 2007, eqs. 33 and 25), written with sin² to stay precise
     /// at h = n.
     #[inline]
     pub(super) fn d(self, h: Vec3) -> f32 {
+        let h = self.squeezed(h);
         let a2 = self.alpha * self.alpha;
         if self.facets == Facets::BeckmannUncorrelated {
             let z2 = (h.z * h.z).max(1e-12);
@@ -67,7 +80,12 @@ impl Ggx {
     #[inline]
     pub(super) fn lambda(self, w: Vec3) -> f32 {
         let z2 = (w.z * w.z).max(1e-12);
-        let tan2 = (1.0 - w.z * w.z).max(0.0) / z2;
+        let tan2 = if self.stretch[0] == 1.0 {
+            (1.0 - w.z * w.z).max(0.0) / z2
+        } else {
+            let [x, y] = [w.x * self.stretch[0], w.y * self.stretch[1]];
+            (x * x + y * y) / z2
+        };
         if self.facets == Facets::BeckmannUncorrelated {
             let a = 1.0 / (self.alpha * tan2.sqrt()).max(1e-6);
             return if a < 1.6 {
@@ -111,16 +129,17 @@ impl Ggx {
     #[inline]
     pub(super) fn visible_normal(self, wo: Vec3, u: [f32; 2]) -> Vec3 {
         // Stretch; a normal of the hemisphere is the sum of wo and a point of a spherical cap; stretch back
-        let stretched = Vec3::new(wo.x * self.alpha, wo.y * self.alpha, wo.z).normalize();
+        let [x, y] = self.stretch.map(|stretch| self.alpha * stretch);
+        let stretched = Vec3::new(wo.x * x, wo.y * y, wo.z).normalize();
         if self.facets == Facets::BeckmannUncorrelated {
-            let [x, y] = beckmann::visible_slopes(stretched, u);
-            return Vec3::new(-x * self.alpha, -y * self.alpha, 1.0).normalize();
+            let slopes = beckmann::visible_slopes(stretched, u);
+            return Vec3::new(-slopes[0] * x, -slopes[1] * y, 1.0).normalize();
         }
         let z = (1.0 - u[0]) * (1.0 + stretched.z) - stretched.z;
         let r = (1.0 - z * z).max(0.0).sqrt();
         let (sin, cos) = math::turn(u[1]);
         let c = Vec3::new(r * cos, r * sin, z) + stretched;
-        Vec3::new(c.x * self.alpha, c.y * self.alpha, c.z.max(1e-7)).normalize()
+        Vec3::new(c.x * x, c.y * y, c.z.max(1e-7)).normalize()
     }
 
     /// A direction, reflected by a visible normal; its weight f·cos θᵢ / density = G₂/G₁ without the Fresnel

@@ -2,9 +2,10 @@
 
 use super::coat::Coat;
 use super::fresnel::{Fresnel, fresnel, schlick};
-use super::ggx::{Ggx, MIN_ROUGHNESS};
+use super::ggx::{Facets, Ggx, MIN_ROUGHNESS};
+use super::principled::{Burley, Clearcoat};
 use crate::light::Receiver;
-use crate::material::Gloss;
+use crate::material::{Gloss, Principled};
 use crate::math::{self, DELTA, Frame, Vec3};
 use std::f32::consts::FRAC_1_PI;
 
@@ -20,6 +21,8 @@ pub(crate) struct Glossy<'a> {
     ior: f32,
     specular: Vec3,
     below: Below<'a>,
+    /// A second reflection, over all else.
+    clearcoat: Option<Clearcoat>,
     /// Of a coat [`Coat::base`], times the transmittance of the outgoing direction; else the albedo over π.
     base: Vec3,
     /// The albedo over π of diffuse transmission.
@@ -43,6 +46,10 @@ enum Below<'a> {
     Diffuse(OrenNayar),
     /// The diffuse part of Ashikhmin and Shirley, whose facets it comes with.
     AshikhminShirley,
+    /// A Lambertian surface that gets what facets with Schlick's term leave.
+    Schlick,
+    /// A diffuse surface from which the facets take nothing.
+    Burley(Burley),
 }
 
 /// The two constants of Oren and Nayar's qualitative model (1994, eq. 30).
@@ -93,6 +100,7 @@ impl<'a> Glossy<'a> {
             ior: 1.0,
             specular: zero,
             below: Below::Nothing,
+            clearcoat: None,
             base: zero,
             through: zero,
             mirror: zero,
@@ -123,6 +131,7 @@ impl<'a> Glossy<'a> {
             ior: coat.ior,
             specular,
             below: Below::Coat(coat),
+            clearcoat: None,
             base: coat.base(alpha, diffuse, nonlinear) * passed,
             through: Vec3::ZERO,
             mirror: Vec3::ZERO,
@@ -133,18 +142,47 @@ impl<'a> Glossy<'a> {
         }
     }
 
-    pub(crate) fn blend(coat: &'a Coat, base: Vec3, alpha: f32, metallic: f32, cos: f32) -> Self {
-        let plastic = Self::plastic(coat, base, Vec3::ONE, Ggx::new(alpha), true, cos);
-        let passed = coat.transmittance(alpha, cos);
-        let reflected = metallic * math::luminance(schlick(base, cos)) + (1.0 - metallic) * (1.0 - passed);
+    /// glTF 2.0, appendix B.3.
+    pub(crate) fn gltf(base: Vec3, alpha: f32, metallic: f32, dielectric: f32, cos: f32) -> Self {
+        let f0 = Vec3::splat(dielectric).lerp(base, metallic);
+        let diffuse = base * (1.0 - metallic);
+        let reflected = schlick(f0, cos);
+        let below = diffuse * (Vec3::ONE - reflected);
         Self {
-            fresnel: &Fresnel::Schlick,
-            metal: base,
-            metal_share: metallic,
-            specular: Vec3::splat(1.0 - metallic),
-            base: plastic.base * (1.0 - metallic),
-            facet: lobe_probability(reflected, (1.0 - metallic) * passed * math::luminance(base)),
-            ..plastic
+            specular: f0,
+            below: Below::Schlick,
+            base: diffuse * FRAC_1_PI,
+            facet: lobe_probability(math::luminance(reflected), math::luminance(below)),
+            metal_share: 0.0,
+            ..Self::metal(&Fresnel::None, Vec3::ZERO, Ggx::of(alpha, Facets::GgxUncorrelated))
+        }
+    }
+
+    /// Burley's surface with its roughness, whose square is α, and the share of metal.
+    pub(crate) fn principled(
+        more: &Principled,
+        base: Vec3,
+        [roughness, metallic]: [f32; 2],
+        cos: f32,
+    ) -> Self {
+        let burley = Burley::new(more, base, roughness, metallic);
+        let (share, colour) = burley.schlick;
+        let specular = Vec3::splat(1.0 - share);
+        let reflected =
+            share * math::luminance(schlick(colour, cos)) + (1.0 - share) * fresnel(cos, more.ior).0;
+        let clearcoat = Clearcoat::new(more, reflected);
+        let diffuse = base * (1.0 - metallic);
+        let below = math::luminance(diffuse) + math::luminance(burley.sheen);
+        Self {
+            metal: colour,
+            metal_share: share,
+            ior: more.ior,
+            specular,
+            below: Below::Burley(burley),
+            clearcoat,
+            base: diffuse * FRAC_1_PI,
+            facet: lobe_probability(reflected + clearcoat.map_or(0.0, Clearcoat::power), below),
+            ..Self::metal(&Fresnel::Schlick, colour, burley.ggx)
         }
     }
 
@@ -169,6 +207,7 @@ impl<'a> Glossy<'a> {
             ior,
             specular,
             below,
+            clearcoat: None,
             base: diffuse * FRAC_1_PI,
             through: through * FRAC_1_PI,
             mirror,
@@ -188,8 +227,10 @@ impl<'a> Glossy<'a> {
         }
         match self.below {
             Below::Nothing => {}
-            Below::Coat(_) | Below::Diffuse(_) => sum += self.specular * fresnel(cos_h, self.ior).0,
-            Below::AshikhminShirley => sum += schlick(self.specular, cos_h),
+            Below::Coat(_) | Below::Diffuse(_) | Below::Burley(_) => {
+                sum += self.specular * fresnel(cos_h, self.ior).0;
+            }
+            Below::AshikhminShirley | Below::Schlick => sum += schlick(self.specular, cos_h),
         }
         sum
     }
@@ -205,7 +246,14 @@ impl<'a> Glossy<'a> {
             // Ashikhmin, Shirley 2000, eq. 4 with GGX
             facets = self.unmasked(wo, wi, cos_h) * density;
         }
-        (self.reflectance(cos_h) * facets, density)
+        let f = self.reflectance(cos_h) * facets;
+        match &self.clearcoat {
+            None => (f, density),
+            Some(coat) => {
+                let (more, coat_density) = coat.eval(wo, wi);
+                (f + more, density + (coat_density - density) * coat.share)
+            }
+        }
     }
 
     /// f·cos θᵢ of Ashikhmin's and Shirley's facets without the Fresnel term, over the density with which they
@@ -217,7 +265,8 @@ impl<'a> Glossy<'a> {
 
     /// Whether there is a base below the microfacets.
     pub(crate) fn has_base(&self) -> bool {
-        self.base != Vec3::ZERO
+        let sheen = matches!(self.below, Below::Burley(burley) if burley.sheen != Vec3::ZERO);
+        self.base != Vec3::ZERO || sheen
     }
 
     /// Whether light shines through.
@@ -235,6 +284,11 @@ impl<'a> Glossy<'a> {
             Below::Nothing => Vec3::ZERO,
             Below::Coat(coat) => self.base * (coat.transmittance(self.ggx.alpha, wi.z) * wi.z),
             Below::Diffuse(oren_nayar) => self.base * (oren_nayar.at(wo, wi) * wi.z),
+            Below::Schlick => {
+                let cos_h = wo.dot((wo + wi).normalize()).max(0.0);
+                self.base * (Vec3::ONE - schlick(self.specular, cos_h)) * wi.z
+            }
+            Below::Burley(burley) => burley.at(wo, wi, self.base) * wi.z,
             Below::AshikhminShirley => {
                 // Ashikhmin, Shirley 2000, eq. 5
                 let part = |cos: f32| 1.0 - (1.0 - 0.5 * cos).powi(5);
@@ -261,7 +315,9 @@ impl<'a> Glossy<'a> {
         // Transmittance hardly depends on the direction, but close to the horizon
         let diffuse = match self.below {
             Below::Coat(coat) => math::luminance(self.base) * coat.transmittance(self.ggx.alpha, 0.7),
-            Below::Diffuse(_) | Below::AshikhminShirley => math::luminance(self.base),
+            Below::Diffuse(_) | Below::AshikhminShirley | Below::Schlick | Below::Burley(_) => {
+                math::luminance(self.base)
+            }
             Below::Nothing => 0.0,
         };
         let glossy = if self.smooth { 0.0 } else { math::luminance(self.reflectance(wo.z)) / wo.z.max(0.1) };
@@ -286,6 +342,11 @@ impl<'a> Glossy<'a> {
     pub(crate) fn reflect(&self, wo: Vec3, u: [f32; 2]) -> Option<(Vec3, Vec3, f32)> {
         if self.smooth {
             return Some((Vec3::new(-wo.x, -wo.y, wo.z), self.reflectance(wo.z), DELTA));
+        }
+        if let Some(coat) = &self.clearcoat {
+            let wi = coat.sample_with(wo, u, self.ggx)?;
+            let (f, density) = self.facets(wo, wi);
+            return (density > 0.0).then(|| (wi, f / density, density));
         }
         let (wi, weight, cos_h) = self.ggx.sample(wo, u);
         if weight <= 0.0 {

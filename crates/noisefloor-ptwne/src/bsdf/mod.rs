@@ -5,6 +5,7 @@ mod coat;
 mod fresnel;
 mod ggx;
 mod glossy;
+mod principled;
 mod rough_glass;
 
 #[cfg(test)]

@@ -5,7 +5,7 @@ use super::fresnel::fresnel;
 use super::ggx::{Facets, Ggx};
 use crate::geometry::NO;
 use crate::intersection::Intersection;
-use crate::material::{CompiledMaterial, Gloss, Lobes, Material, MaterialOptions};
+use crate::material::{CompiledMaterial, Dialect, Gloss, Lobes, Material, MaterialOptions, Principled};
 use crate::math::{self, DELTA, Vec3};
 use crate::rng::{Key, Rng};
 use crate::texture::Texture;
@@ -87,14 +87,28 @@ fn zoo() -> Vec<(Material, CompiledMaterial)> {
         let mirror = Texture::Colour([0.2; 3]);
         all.push(Lobes { diffuse, through, specular, mirror, gloss, sigma, roughness }.into());
     }
-    let compile = |m, facets| {
-        let options = MaterialOptions { facets, ..MaterialOptions::default() };
+    for (dialect, roughness, metal) in [(Dialect::Mitsuba, 0.4, 0.3), (Dialect::Pbrt, 0.7, 0.0)] {
+        let (metallic_roughness, plain) = ([0.0, roughness, metal].into(), Principled::default());
+        let one = Principled { base: colour.into(), metallic_roughness, dialect, ..plain };
+        let other = Principled { anisotropic: 0.7, specular_tint: 0.5, flatness: 0.3, ..one.clone() };
+        let coated =
+            Principled { sheen: 0.8, sheen_tint: 0.5, clearcoat: 1.0, clearcoat_gloss: 0.5, ..one.clone() };
+        all.extend([one, other, coated].map(Material::from));
+    }
+    let compile = |m, facets, roughness| {
+        let options = MaterialOptions { facets, roughness, ..MaterialOptions::default() };
         CompiledMaterial::new(m, options, &mut vec![]).unwrap()
     };
     let two = [Facets::Ggx, Facets::BeckmannUncorrelated];
-    all.into_iter()
-        .flat_map(|m: Material| two.map(|facets| (m.clone(), compile(m.clone(), facets))))
-        .collect()
+    let along = || Some(Texture::Colour([0.5, 0.15, 0.0]));
+    let mut compiled = vec![];
+    for m in all {
+        compiled.extend(two.map(|facets| (m.clone(), compile(m.clone(), facets, None))));
+        if !matches!(m, Material::MetallicRoughness { .. } | Material::Principled(_)) {
+            compiled.extend(two.map(|facets| (m.clone(), compile(m.clone(), facets, along()))));
+        }
+    }
+    compiled
 }
 
 /// The microfacets and coat of a material, seen from `wo`.
@@ -106,6 +120,7 @@ fn seen(material: &CompiledMaterial, wo: Vec3) -> Glossy<'_> {
         normal: up,
         front: true,
         uv,
+        along: Vec3::ZERO,
         tint: Vec3::ONE,
         material,
         light: NO,

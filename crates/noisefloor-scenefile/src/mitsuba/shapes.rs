@@ -154,7 +154,7 @@ impl<'d> Context<'d> {
         builder: &mut SceneBuilder,
     ) -> Result<MaterialId, LoadError> {
         let Surface { body, opacity, one_sided, facets, relief } = surface;
-        let options = MaterialOptions { opacity, one_sided, facets, relief };
+        let options = MaterialOptions { opacity, one_sided, facets, relief, ..MaterialOptions::default() };
         match body {
             Body::Plain(material) => builder.material_with(material, options).map_err(self.refused(element)),
             Body::Blend(parts, share) => {
