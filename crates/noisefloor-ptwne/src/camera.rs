@@ -34,7 +34,7 @@ pub enum FovAxis {
 }
 
 /// How a [`Camera`] projects, besides its field of view. The default is a pinhole.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Optics {
     /// The edge that the field of view spans.
     pub fov_axis: FovAxis,
@@ -47,6 +47,25 @@ pub struct Optics {
     pub parallel_height: Option<f32>,
     /// Whether left and right are exchanged.
     pub mirrored: bool,
+    /// The part of the picture that is shown, as shares of its width from the left and of its height from the top:
+    /// −100…100. The field of view is that of the whole. [[0, 1], [0, 1]] is all of it.
+    pub window: [[f32; 2]; 2],
+    /// What is nearer along the view is not seen, in scene units, 0…1e6.
+    pub near: f32,
+}
+
+impl Default for Optics {
+    fn default() -> Self {
+        Self {
+            fov_axis: FovAxis::default(),
+            aperture_radius: 0.0,
+            focus_distance: 0.0,
+            parallel_height: None,
+            mirrored: false,
+            window: [[0.0, 1.0]; 2],
+            near: 0.0,
+        }
+    }
 }
 
 impl Optics {
@@ -55,6 +74,14 @@ impl Optics {
         if !all.iter().all(|x| x.is_finite()) {
             return Err(SceneError::NotFinite { what: "the optics of the camera" });
         }
+        for [from, to] in self.window {
+            let range = "-100…100, and rise";
+            for edge in [from, to] {
+                check_range("an edge of the camera's window", edge, [-100.0, 100.0], range)?;
+            }
+            check_range("the size of the camera's window", to - from, [1e-5, 200.0], "1e-5…200")?;
+        }
+        check_range("the nearest distance that is seen", self.near, [0.0, MAX_COORDINATE], "0…1e6")?;
         check_range("the radius of the lens", self.aperture_radius, [0.0, MAX_COORDINATE], "0…1e6")?;
         if self.aperture_radius > 0.0 {
             let (what, range) = ("the focus distance", "1e-6…1e9");
@@ -88,8 +115,9 @@ impl Camera {
         let down = view.cross(side);
         let right = if optics.mirrored { -side } else { side };
 
-        // Height of a pixel: on the plane one unit away, or in scene units
-        let (w, h) = (width as f32, height as f32);
+        // Size of the whole picture, and height of a pixel: on the plane one unit away, or in scene units
+        let [[left, over], [top, under]] = optics.window;
+        let (w, h) = (width as f32 / (over - left), height as f32 / (under - top));
         let span = match optics.fov_axis {
             FovAxis::Vertical => h,
             FovAxis::Horizontal => w,
@@ -101,7 +129,7 @@ impl Camera {
             Some(seen) => seen / h,
             None => 2.0 * (0.5 * self.vertical_fov.to_radians()).tan() / span,
         };
-        let corner = -right * (0.5 * w * pixel) - down * (0.5 * h * pixel);
+        let corner = -right * ((0.5 - left) * w * pixel) - down * ((0.5 - top) * h * pixel);
         let projection = match optics.parallel_height {
             Some(_) => Projection::Parallel { view },
             None if optics.aperture_radius > 0.0 => Projection::Thin {
@@ -111,7 +139,8 @@ impl Camera {
             None => Projection::Pinhole,
         };
         let corner = if optics.parallel_height.is_some() { corner } else { corner + view };
-        Lens { eye: eye - origin, corner, right: right * pixel, down: down * pixel, projection }
+        let near = view * optics.near;
+        Lens { eye: eye - origin, corner, right: right * pixel, down: down * pixel, projection, near }
     }
 }
 
@@ -123,6 +152,8 @@ pub(crate) struct Lens {
     right: Vec3,
     down: Vec3,
     projection: Projection,
+    /// From the eye to the nearest plane that is seen.
+    near: Vec3,
 }
 
 /// Where rays begin.
@@ -159,15 +190,21 @@ impl Lens {
     #[inline]
     pub(crate) fn ray(&self, x: f32, y: f32, u: [f32; 2]) -> Ray {
         let at = self.corner + self.right * x + self.down * y;
-        match self.projection {
-            Projection::Pinhole => Ray { origin: self.eye, dir: at.normalize() },
+        let (origin, dir) = match self.projection {
+            Projection::Pinhole => (self.eye, at.normalize()),
             Projection::Thin { across, focus } => {
                 let [a, b] = math::disk(u);
                 let offset = across[0] * a + across[1] * b;
-                Ray { origin: self.eye + offset, dir: (at * focus - offset).normalize() }
+                (self.eye + offset, (at * focus - offset).normalize())
             }
-            Projection::Parallel { view } => Ray { origin: self.eye + at, dir: view },
+            Projection::Parallel { view } => (self.eye + at, view),
+        };
+        if self.near == Vec3::ZERO {
+            return Ray { origin, dir };
         }
+        // To the plane at that distance: near·near/(near·dir) along the ray
+        let along = self.near.length_squared() / self.near.dot(dir).max(1e-12);
+        Ray { origin: origin + dir * along, dir }
     }
 }
 
@@ -241,6 +278,27 @@ mod tests {
             assert!((at - Vec3::new(2.0, 0.0, -4.0)).length() < 1e-5, "{at}");
         }
         assert!(lens.pyramid([0.0, 1.0], [0.0, 1.0]).is_none());
+    }
+
+    /// A window shows the pixels that the whole picture has there, and rays begin on the near plane.
+    #[test]
+    fn windows_are_parts_of_the_picture() {
+        for parallel_height in [None, Some(3.0)] {
+            let whole = Optics { fov_axis: FovAxis::Smaller, parallel_height, ..Optics::default() };
+            let part = Optics { window: [[0.25, 0.75], [0.5, 1.0]], near: 2.0, ..whole };
+            let (of_whole, of_part) =
+                (straight().lens(&whole, 400, 200, Vec3::ZERO), straight().lens(&part, 200, 100, Vec3::ZERO));
+            for [x, y] in [[0.0, 0.0], [200.0, 100.0], [30.0, 80.0]] {
+                let (a, b) = (of_whole.ray(x + 100.0, y + 100.0, [0.5; 2]), of_part.ray(x, y, [0.5; 2]));
+                assert!((a.dir - b.dir).length() < 1e-6);
+                assert!((b.origin.z + 2.0).abs() < 1e-5, "{}", b.origin);
+                let across = b.origin - a.origin;
+                assert!((across - a.dir * across.dot(a.dir)).length() < 1e-5);
+            }
+        }
+        for window in [[[0.5, 0.5], [0.0, 1.0]], [[0.0, f32::NAN], [0.0, 1.0]], [[0.0, 1.0], [0.0, 101.0]]] {
+            assert!(Optics { window, ..Optics::default() }.check().is_err());
+        }
     }
 
     #[test]
