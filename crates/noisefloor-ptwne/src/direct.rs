@@ -46,6 +46,9 @@ pub(crate) struct Tracer<'a> {
 /// A ray of a sample.
 struct Branch {
     ray: Ray,
+    /// Where its direction was sampled, and how far it has come since, through surfaces of nothing.
+    from: Vec3,
+    passed: f32,
     /// Density with which its direction was sampled.
     density: f32,
     /// Factor on its light.
@@ -65,7 +68,14 @@ impl<'a> Tracer<'a> {
         (self.index, self.seed) = (index, seed);
         let [u, v, lens_u, lens_v] = sobol_burley::sample_4d(index, 0, seed as u32);
         let ray = lens.ray(at[0] as f32 + u, at[1] as f32 + v, [lens_u, lens_v]);
-        self.radiance(Branch { ray, density: DELTA, weight: Vec3::ONE, code: 1 })
+        self.radiance(Branch {
+            ray,
+            from: ray.origin,
+            passed: 0.0,
+            density: DELTA,
+            weight: Vec3::ONE,
+            code: 1,
+        })
     }
 
     /// Number of directions that each surface samples in [`Tracer::hemisphere`], the only way to find a
@@ -84,7 +94,8 @@ impl<'a> Tracer<'a> {
     }
 
     /// Radiance along a ray, times its weight.
-    fn radiance(&mut self, Branch { ray, density, weight, code }: Branch) -> Vec3 {
+    fn radiance(&mut self, branch: Branch) -> Vec3 {
+        let Branch { ray, from, passed, density, weight, code } = branch;
         let scene = self.scene;
         let test = self.opacity_test(code, Use::Ray);
         let hit = scene.closest::<true>(&ray, &mut self.stack, test);
@@ -94,11 +105,19 @@ impl<'a> Tracer<'a> {
         let surface = scene.surface(&ray, &hit);
         let mut sum = Vec3::ZERO;
         if let Some(emitted) = scene.emitted(&surface, &hit, ray.dir) {
-            let own = emitted.light.pdf(ray.origin, hit.t, emitted.cos);
+            let own = emitted.light.pdf(from, passed + hit.t, emitted.cos);
             sum += weight * emitted.radiance * self.share(density, surface.light as usize, own);
         }
         if surface.material.one_sided && !surface.front {
             return sum;
+        }
+        if surface.material.is_nothing() {
+            let code = 2 * code;
+            if code >> MAX_SPECULAR != 0 {
+                return sum;
+            }
+            let ray = Ray { origin: scene.leave(&surface, ray.dir), dir: ray.dir };
+            return sum + self.radiance(Branch { ray, passed: passed + hit.t, code, ..branch });
         }
         let cos = (-ray.dir.dot(surface.normal)).clamp(0.0, 1.0);
         let mirrored = math::reflect(ray.dir, surface.normal);
@@ -132,8 +151,8 @@ impl<'a> Tracer<'a> {
             }
             Bsdf::ThinGlass { ior, tint } => split(bsdf::pane(cos, *ior), ray.dir, *tint),
             Bsdf::RoughGlass { .. } => self.rough_glass(&ray, &surface, weight, code),
-            // Intersections have one of its parts
-            Bsdf::Mix { .. } => Vec3::ZERO,
+            // Rays pass it, and intersections have one of its parts
+            Bsdf::Nothing | Bsdf::Mix { .. } => Vec3::ZERO,
             Bsdf::Metal { .. }
             | Bsdf::Plastic { .. }
             | Bsdf::Gltf { .. }
@@ -155,7 +174,7 @@ impl<'a> Tracer<'a> {
             return Vec3::ZERO;
         }
         let ray = Ray { origin: self.scene.leave(surface, dir), dir };
-        self.radiance(Branch { ray, density, weight, code })
+        self.radiance(Branch { ray, from: ray.origin, passed: 0.0, density, weight, code })
     }
 
     /// A rough boundary: one sampled direction, by which lights are found, too.
@@ -283,20 +302,28 @@ impl<'a> Tracer<'a> {
     }
 
     /// The weighted light that a ray hits, whose direction was sampled with that density, and the stratum of
-    /// its light.
+    /// its last light.
     fn emitted_along(&mut self, ray: &Ray, test: OpacityTest, density: f32) -> (Vec3, Option<usize>) {
-        let scene = self.scene;
-        let hit = scene.closest::<true>(ray, &mut self.stack, test);
-        if hit.is_miss() {
-            return self.background(ray.dir, density);
+        let (scene, mut passed, mut onward) = (self.scene, 0.0, *ray);
+        let (mut sum, mut stratum) = (Vec3::ZERO, None);
+        loop {
+            let hit = scene.closest::<true>(&onward, &mut self.stack, test);
+            if hit.is_miss() {
+                let (radiance, seen) = self.background(ray.dir, density);
+                return (sum + radiance, seen.or(stratum));
+            }
+            let surface = scene.surface(&onward, &hit);
+            passed += hit.t;
+            if let Some(emitted) = scene.emitted(&surface, &hit, ray.dir) {
+                let own = emitted.light.pdf(ray.origin, passed, emitted.cos);
+                sum += emitted.radiance * self.share(density, surface.light as usize, own);
+                stratum = Some(surface.light as usize);
+            }
+            if !surface.material.is_nothing() {
+                return (sum, stratum);
+            }
+            onward.origin = scene.leave(&surface, ray.dir);
         }
-        let surface = scene.surface(ray, &hit);
-        let Some(emitted) = scene.emitted(&surface, &hit, ray.dir) else {
-            return (Vec3::ZERO, None);
-        };
-        let stratum = surface.light as usize;
-        let own = emitted.light.pdf(ray.origin, hit.t, emitted.cos);
-        (emitted.radiance * self.share(density, stratum, own), Some(stratum))
     }
 
     /// The weighted radiance from infinitely far away for a direction of that density, and the stratum of its

@@ -86,6 +86,8 @@ impl<'a, const OPACITY: bool> Path<'a, OPACITY> {
         let mut throughput = Vec3::ONE;
         // Density with which the ray's direction was sampled
         let mut pdf = DELTA;
+        // Where it was sampled, and how far the ray has come since, through surfaces of nothing
+        let (mut from, mut passed) = (ray.origin, 0.0);
         let mut depth = 0;
         loop {
             depth += 1;
@@ -100,12 +102,18 @@ impl<'a, const OPACITY: bool> Path<'a, OPACITY> {
 
             // Light that the ray hit
             if let Some(emitted) = scene.emitted(&surface, &hit, ray.dir) {
-                let light_pdf = emitted.light.pdf(ray.origin, hit.t, emitted.cos);
+                let light_pdf = emitted.light.pdf(from, passed + hit.t, emitted.cos);
                 sum +=
                     throughput * emitted.radiance * self.hit_weight(pdf, surface.light as usize, light_pdf);
             }
             if depth >= self.settings.max_depth || surface.material.one_sided && !surface.front {
                 return sum;
+            }
+
+            if OPACITY && surface.material.is_nothing() {
+                passed += hit.t;
+                ray.origin = scene.leave(&surface, ray.dir);
+                continue;
             }
 
             // Scatter: next event estimation, then a new direction
@@ -125,6 +133,7 @@ impl<'a, const OPACITY: bool> Path<'a, OPACITY> {
                 return sum;
             }
             ray = Ray { origin: scene.leave(&surface, next.dir), dir: next.dir };
+            (from, passed) = (ray.origin, 0.0);
         }
     }
 
@@ -178,8 +187,8 @@ impl<'a, const OPACITY: bool> Path<'a, OPACITY> {
             Bsdf::Lobes { .. } => self.glossy::<true>(ray, surface, throughput, sum),
             Bsdf::RoughGlass { .. } => self.rough_glass(ray, surface, throughput, sum),
             Bsdf::Mirror { .. } | Bsdf::Glass { .. } | Bsdf::ThinGlass { .. } => self.specular(ray, surface),
-            // Intersections have one of its parts
-            Bsdf::Mix { .. } => None,
+            // Rays pass it, and intersections have one of its parts
+            Bsdf::Nothing | Bsdf::Mix { .. } => None,
         }
     }
 

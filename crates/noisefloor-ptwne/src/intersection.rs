@@ -68,7 +68,10 @@ impl Scene {
         test: OpacityTest,
     ) -> bool {
         if OPACITY {
-            self.bvh.blocked::<true>(ray, t_max, stack, |prim, spot| self.is_solid(prim, spot, test))
+            self.bvh.blocked::<true>(ray, t_max, stack, |prim, spot| {
+                let material = self.geometry.group(prim).material;
+                self.is_solid(prim, spot, test) && !self.materials[material as usize].is_nothing()
+            })
         } else {
             self.bvh.blocked::<false>(ray, t_max, stack, |_, _| true)
         }

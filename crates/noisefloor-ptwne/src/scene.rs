@@ -65,28 +65,10 @@ impl Scene {
         let bvh = Bvh::new(&shapes);
         drop(shapes);
 
-        // Lights that are far away come last
-        let (mut sky, mut sun) = (None, None);
-        match surroundings {
-            Some(Surroundings::Sky(environment)) => {
-                sky = Some(Sky::Dome(Dome::new(&environment)));
-                if let Some(light) = sun_of(&environment) {
-                    sun = Some(lights.len());
-                    lights.push(light);
-                }
-            }
-            Some(Surroundings::Map(map)) => {
-                let map = Map::new(map);
-                lights.push(Light::map(map.mean));
-                sky = Some(Sky::Map(Box::new(map)));
-            }
-            None => {}
-        }
-
+        let (sky, sun) = surround(surroundings, &mut lights);
         let has_opacity = geometry.groups.iter().any(|g| materials[g.material as usize].lets_pass());
-        let means: Vec<Vec3> = emission_textures.iter().map(Texture::mean).collect();
         let bounds = bvh.bounds();
-        let lights = Lights::new(lights, bounds, &means);
+        let lights = Lights::new(lights, bounds, &means(&emission_textures));
         let offset = 1e-6 * 0.5 * (bounds[1] - bounds[0]).length();
         let identity = SourceIdentity::new(name.clone());
         Self {
@@ -144,6 +126,22 @@ impl Scene {
         Ok(self)
     }
 
+    /// The same scene under a sky, which replaces what surrounds it.
+    ///
+    /// # Errors
+    /// As [`SceneBuilder::environment`](crate::SceneBuilder::environment).
+    pub fn with_environment(mut self, environment: Environment) -> Result<Self, SceneError> {
+        environment.check()?;
+        let mut lights = std::mem::take(&mut self.lights.all);
+        // What is far away comes last
+        if self.sun.is_some() || self.map().is_some() {
+            lights.pop();
+        }
+        (self.sky, self.sun) = surround(Some(Surroundings::Sky(environment)), &mut lights);
+        self.lights = Lights::new(lights, self.bvh.bounds(), &means(&self.emission_textures));
+        Ok(self)
+    }
+
     /// The camera, prepared for an image of `width`×`height` pixels.
     pub(crate) fn lens(&self, width: usize, height: usize) -> Lens {
         self.camera.lens(&self.optics, width, height, self.origin)
@@ -157,6 +155,12 @@ impl Scene {
     /// Number of lights. Each emitting triangle counts as one; so does the sun or the environment map.
     pub fn lights(&self) -> usize {
         self.lights.all.len()
+    }
+
+    /// Whether there is any light: an emitter, or a sky that is not black.
+    pub fn is_lit(&self) -> bool {
+        self.lights.all.iter().any(|l| l.radiance != Vec3::ZERO)
+            || matches!(&self.sky, Some(Sky::Dome(dome)) if !dome.is_black())
     }
 
     /// Number of lights that are never sampled, since they are black or face away from the whole scene.
@@ -185,6 +189,30 @@ impl Scene {
             _ => None,
         }
     }
+}
+
+/// What surrounds a scene, and the index of the sun; its lights are added to `lights`, and come last.
+fn surround(surroundings: Option<Surroundings>, lights: &mut Vec<Light>) -> (Option<Sky>, Option<usize>) {
+    match surroundings {
+        Some(Surroundings::Sky(environment)) => {
+            let sun = sun_of(&environment).map(|light| {
+                lights.push(light);
+                lights.len() - 1
+            });
+            (Some(Sky::Dome(Dome::new(&environment))), sun)
+        }
+        Some(Surroundings::Map(map)) => {
+            let map = Map::new(map);
+            lights.push(Light::map(map.mean));
+            (Some(Sky::Map(Box::new(map))), None)
+        }
+        None => (None, None),
+    }
+}
+
+/// The mean colour of each texture.
+fn means(textures: &[Texture]) -> Vec<Vec3> {
+    textures.iter().map(Texture::mean).collect()
 }
 
 /// The sun of an environment, if it shines.

@@ -62,6 +62,10 @@ pub(crate) struct Dome {
 }
 
 impl Dome {
+    pub(crate) fn is_black(&self) -> bool {
+        self.zenith.max(self.horizon).max(self.ground) == Vec3::ZERO
+    }
+
     pub(crate) fn new(environment: &Environment) -> Self {
         Self {
             zenith: Vec3::from_array(environment.zenith),

@@ -87,6 +87,7 @@ pub(crate) enum Bsdf {
         oren_nayar: OrenNayar,
         ggx: Ggx,
     },
+    Nothing,
     /// `share` of the second material, and the rest of the first, by their indices. The share of a `coat` is
     /// multiplied with what a smooth boundary reflects.
     Mix {
@@ -110,7 +111,7 @@ impl Bsdf {
             | Self::Principled { base: colour, .. } => colour.tinted(uv, tint),
             Self::Glass { tint, .. } | Self::ThinGlass { tint, .. } | Self::RoughGlass { tint, .. } => *tint,
             // Intersections have one of its parts
-            Self::Mix { .. } => Vec3::ZERO,
+            Self::Nothing | Self::Mix { .. } => Vec3::ZERO,
         }
     }
 }
@@ -217,6 +218,7 @@ impl CompiledMaterial {
                     ggx: Ggx::of(roughness, options.facets),
                 }
             }
+            Material::Nothing => Bsdf::Nothing,
         };
         Ok(Self::with(bsdf, options))
     }
@@ -248,7 +250,13 @@ impl CompiledMaterial {
 
     /// Whether rays may pass it.
     pub(crate) fn lets_pass(&self) -> bool {
-        self.culled || self.opacity.is_some()
+        self.culled || self.opacity.is_some() || self.is_nothing()
+    }
+
+    /// Whether it stops no light.
+    #[inline]
+    pub(crate) fn is_nothing(&self) -> bool {
+        matches!(self.bsdf, Bsdf::Nothing)
     }
 
     /// The microfacets at `uv`, which are `own` unless α varies.
@@ -277,7 +285,7 @@ impl CompiledMaterial {
             | Bsdf::Principled { base, metallic_roughness, .. } => {
                 base.varies() || metallic_roughness.varies()
             }
-            Bsdf::Glass { .. } | Bsdf::ThinGlass { .. } | Bsdf::RoughGlass { .. } => false,
+            Bsdf::Glass { .. } | Bsdf::ThinGlass { .. } | Bsdf::RoughGlass { .. } | Bsdf::Nothing => false,
             // Its parts may have one
             Bsdf::Mix { .. } => true,
         };

@@ -109,6 +109,9 @@ pub enum Material {
     Principled(Box<Principled>),
     /// Lobes that add up.
     Lobes(Box<Lobes>),
+    /// Nothing that stops light: only what the surface emits is seen, before what lies behind it. Light samples pass
+    /// it unseen, scattered rays count it as one of their segments.
+    Nothing,
 }
 
 /// Opacity and sidedness of a surface, besides its [`Material`].
@@ -178,6 +181,7 @@ impl Material {
             }
             Material::Principled(principled) => principled.check(),
             Material::Lobes(lobes) => lobes.check(),
+            Material::Nothing => Ok(()),
         }
     }
 }
