@@ -95,7 +95,7 @@ fn one(
     cancel: &AtomicBool,
 ) -> anyhow::Result<(Comparison, String)> {
     let opened = source_job.open()?;
-    opened.warn(job.quiet);
+    opened.warn();
     let Opened { mut source, scene, .. } = opened;
     let SourceInfo { width, height, .. } = source.info();
     let folder = job.out.join(&scene);

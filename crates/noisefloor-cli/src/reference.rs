@@ -28,7 +28,7 @@ pub struct ReferenceJob {
 pub fn run(job: ReferenceJob) -> anyhow::Result<ExitCode> {
     job.source.start_threads()?;
     let opened = job.source.open()?;
-    opened.warn(job.quiet);
+    opened.warn();
     let Opened { mut source, scene, .. } = opened;
     let out = match job.out {
         Some(out) => out,

@@ -141,7 +141,9 @@ impl<'a> Frame<'a> {
     pub fn find_out(folder: &FarmFolder, farm: &FarmJob, index: usize, name: &str) -> anyhow::Result<()> {
         let render = parse(&farm.arguments_of(index))?;
         let mut opened = render.source.open()?;
-        opened.warn(index > 0);
+        if index == 0 {
+            opened.warn();
+        }
         let info = opened.source.info();
         if info.repeats != Repeats::Samples {
             return Err(FarmError::Repeats(info.name).into());

@@ -178,7 +178,7 @@ fn task(args: &TaskArgs) -> anyhow::Result<ExitCode> {
     render.source.start_threads()?;
     let planned = folder.frame_job(name)?.context("the frame was not planned")?;
     let opened = render.source.open()?;
-    opened.warn(false);
+    opened.warn();
     let mut source = opened.source;
     let cancel = Arc::new(AtomicBool::new(false));
     cancel_on_signal(Arc::clone(&cancel), "stopping after this batch, and writing what there is")?;

@@ -87,7 +87,7 @@ pub fn run(job: RenderJob) -> anyhow::Result<ExitCode> {
     let RenderJob { source, judge, params, .. } = &job;
     source.start_threads()?;
     let opened = source.open()?;
-    opened.warn(job.quiet);
+    opened.warn();
     let Opened { mut source, scene, .. } = opened;
     let SourceInfo { name, width, height, .. } = source.info();
     if params.blocks > 0 && source.sample_blocks(&[])?.is_none() {

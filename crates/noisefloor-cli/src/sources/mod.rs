@@ -150,10 +150,8 @@ pub struct Opened {
 
 impl Opened {
     /// Says what the user should know before the run.
-    pub fn warn(&self, quiet: bool) {
-        if !quiet {
-            self.warnings.iter().for_each(|warning| note!("warning: {warning}"));
-        }
+    pub fn warn(&self) {
+        self.warnings.iter().for_each(|warning| note!("warning: {warning}"));
     }
 }
 

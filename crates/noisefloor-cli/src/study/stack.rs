@@ -39,7 +39,7 @@ type Finish<'a> = Box<dyn FnMut(Vec<Rgb>) -> Result<Vec<Rgb>, StudyError> + 'a>;
 pub(super) fn render(job: &StackJob) -> anyhow::Result<()> {
     job.source.start_threads()?;
     let opened = job.source.open()?;
-    opened.warn(false);
+    opened.warn();
     let Opened { mut source, .. } = opened;
     let SourceInfo { width, height, .. } = source.info();
     let finish = finish(job, source.as_mut(), (width, height))?;
