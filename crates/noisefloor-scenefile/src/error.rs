@@ -184,7 +184,7 @@ pub enum LoadError {
         what: String,
     },
     /// A file names a file outside its own folder.
-    #[error("{place}: `{name}` lies outside the folder of the scene")]
+    #[error("{place}: `{name}` lies outside the folder of the scene; allow a folder by `--scene-root DIR`")]
     Outside {
         /// Where it is named.
         place: Place,
@@ -232,7 +232,8 @@ impl LoadError {
             Self::Bad { place, what } => (Some(place), what.clone()),
             Self::Unsupported { place, what } => (Some(place), format!("{what} is not supported")),
             Self::Outside { place, name } => {
-                (Some(place), format!("`{name}` lies outside the folder of the scene"))
+                let what = "lies outside the folder of the scene; allow a folder by `--scene-root DIR`";
+                (Some(place), format!("`{name}` {what}"))
             }
             Self::TooLarge { place, what, found, limit } => {
                 (Some(place), format!("{found} {what}, more than {limit}"))

@@ -24,14 +24,16 @@ pub(crate) struct Folder {
 }
 
 impl Folder {
-    /// The folder that holds `scene`. Its files must lie in `root`, by default in that same folder.
+    /// The folder that holds `scene`. Its files must lie in `root`, by default as [`LoadOptions::root`] says.
+    ///
+    /// [`LoadOptions::root`]: crate::LoadOptions::root
     /// `options` are what changes the scene beside its files.
     pub(crate) fn of(scene: &Path, root: Option<&Path>, options: String) -> Self {
         let path = match scene.parent() {
             Some(parent) if parent != Path::new("") => parent.to_owned(),
             _ => PathBuf::from("."),
         };
-        let root = root.map_or_else(|| path.clone(), Path::to_owned);
+        let root = root.map_or_else(|| shared(&path), Path::to_owned);
         Self { root, searched: vec![path], contents: RefCell::new(SourceIdentity::new(options)) }
     }
 
@@ -117,6 +119,33 @@ impl Folder {
     }
 }
 
+/// The farthest folder that a scene in `folder` shares with others: up to two above its own. Meshes and textures of
+/// a collection lie there. It must be deep enough that a scene cannot show what is no part of the collection.
+fn shared(folder: &Path) -> PathBuf {
+    let home = std::env::var_os("HOME").or_else(|| std::env::var_os("USERPROFILE")).map(PathBuf::from);
+    let home = home.and_then(|home| home.canonicalize().ok());
+    let temporary = std::env::temp_dir().canonicalize().unwrap_or_default();
+    let Ok(real) = folder.canonicalize() else { return folder.to_owned() };
+    let above = real.ancestors().skip(1).take(2);
+    above
+        .take_while(|above| {
+            is_private_to_a_collection(above, home.as_deref()) && !temporary.starts_with(above)
+        })
+        .last()
+        .map_or_else(|| folder.to_owned(), Path::to_owned)
+}
+
+/// Whether nothing but scenes is likely to lie in a folder.
+fn is_private_to_a_collection(folder: &Path, home: Option<&Path>) -> bool {
+    let names = |path: &Path| path.components().filter(|c| matches!(c, Component::Normal(_))).count();
+    let below_home = match home.map(|home| (folder.strip_prefix(home), home.starts_with(folder))) {
+        Some((_, true)) => return false,
+        Some((Ok(rest), _)) => names(rest),
+        _ => usize::MAX,
+    };
+    names(folder) >= 3 && below_home >= 2
+}
+
 /// Reads a regular file.
 fn read(path: &Path, limit: u64, place: &Place) -> Result<Vec<u8>, LoadError> {
     let failed = |cause: io::Error| {
@@ -135,4 +164,46 @@ fn read(path: &Path, limit: u64, place: &Place) -> Result<Vec<u8>, LoadError> {
     let mut bytes = Vec::new();
     File::open(path).and_then(|file| file.take(limit).read_to_end(&mut bytes)).map_err(failed)?;
     Ok(bytes)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn collections_are_below_home_and_the_top() {
+        let home = Some(Path::new("/home/ada"));
+        for (folder, private) in [
+            ("/home/ada/scenes/rooms", true),
+            ("/home/ada/scenes", false),
+            ("/home/ada", false),
+            ("/home", false),
+            ("/", false),
+            ("/tmp/x", false),
+            ("/data/scenes/rooms", true),
+            ("/home/adam/scenes/rooms", true),
+        ] {
+            assert_eq!(is_private_to_a_collection(Path::new(folder), home), private, "{folder}");
+        }
+        assert!(is_private_to_a_collection(Path::new("/a/b/c"), None));
+    }
+
+    /// Two folders up, and no farther: other scenes' files are found, what lies beyond is not.
+    #[test]
+    fn scenes_share_what_lies_nearby() {
+        let top = tempfile::tempdir().unwrap();
+        let scene = top.path().join("a/b/collection/rooms/kitchen");
+        std::fs::create_dir_all(&scene).unwrap();
+        for name in ["a/b/secret", "a/b/collection/shared", "a/b/collection/rooms/near"] {
+            std::fs::write(top.path().join(name), "").unwrap();
+        }
+        let folder = Folder::of(&scene.join("scene.xml"), None, String::new());
+        let find = |name: &str| folder.find(name, &Place::file(Path::new("scene.xml")));
+        assert!(find("../near").is_ok() && find("../../shared").is_ok());
+        let error = find("../../../secret").unwrap_err();
+        assert!(matches!(error, LoadError::Outside { .. }) && error.to_string().contains("--scene-root"));
+        // Asked for, it is strict
+        let folder = Folder::of(&scene.join("scene.xml"), Some(&scene), String::new());
+        assert!(folder.find("../near", &Place::file(Path::new("scene.xml"))).is_err());
+    }
 }

@@ -4,6 +4,7 @@
 //! Files are hostile until parsed: every length is checked before anything is allocated, every error says
 //! which file and where, and what is not supported is named, with whether it was ignored or is fatal.
 
+mod channels;
 mod colour;
 mod error;
 mod files;
@@ -49,12 +50,16 @@ pub fn load(path: &Path) -> Result<Loaded, LoadError> {
 /// As [`load`].
 pub fn load_with(path: &Path, options: &LoadOptions) -> Result<Loaded, LoadError> {
     let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
-    match extension.as_str() {
-        "gltf" | "glb" => gltf::load(path),
+    let mut loaded = match extension.as_str() {
+        "gltf" | "glb" => gltf::load(path, options.root.as_deref()),
         "pbrt" => pbrt::load(path, options),
         "xml" => mitsuba::load(path, options),
         _ => Err(LoadError::Format { path: path.to_owned() }),
+    }?;
+    if !loaded.scene.is_lit() {
+        loaded.warnings.push(Warning::ignored(Place::file(path), "the scene has no light: it is black"));
     }
+    Ok(loaded)
 }
 
 /// What a scene is called: as its file, or as the folder if the file's name says no more than "scene".

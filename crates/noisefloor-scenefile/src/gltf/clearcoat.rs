@@ -15,6 +15,7 @@ pub(super) struct Clearcoat {
     pub(super) factor: f32,
     pub(super) texture: Option<Info>,
     pub(super) roughness: f32,
+    pub(super) roughness_texture: Option<Info>,
 }
 
 /// A clear coat over a material. It has the smooth normals of the mesh.
@@ -23,6 +24,8 @@ pub(super) struct Coat {
     pub(super) share: Texture,
     /// GGX α.
     pub(super) roughness: f32,
+    /// The same by place, if it varies.
+    pub(super) alphas: Option<Texture>,
 }
 
 /// Reads the extension; none if there is no coat.
@@ -32,20 +35,15 @@ pub(super) fn parse(value: &Value, place: &Place, notes: &mut Notes) -> Result<O
     if factor == 0.0 {
         return Ok(None);
     }
-    for (name, what) in [
-        (
-            "clearcoatRoughnessTexture",
-            "the texture of its coat's roughness is ignored, the factor used alone",
-        ),
-        ("clearcoatNormalTexture", "the normal map of its coat is ignored: the coat is smooth"),
-    ] {
-        if value.get(name).is_some() {
-            notes.warn(place, what);
-        }
+    if value.get("clearcoatNormalTexture").is_some() {
+        notes.warn(place, "the normal map of its coat is ignored: the coat is smooth");
     }
-    let texture = value.get("clearcoatTexture").map(|info| deserialize::from_value::<Info>(info.clone()));
-    let texture = texture.transpose().map_err(|e| place.clone().bad(format_args!("its {NAME}: {e}")))?;
-    Ok(Some(Clearcoat { factor, texture, roughness }))
+    let texture = |name: &str| {
+        let info = value.get(name).map(|info| deserialize::from_value::<Info>(info.clone()));
+        info.transpose().map_err(|e| place.clone().bad(format_args!("its {NAME}: {e}")))
+    };
+    let (texture, roughness_texture) = (texture("clearcoatTexture")?, texture("clearcoatRoughnessTexture")?);
+    Ok(Some(Clearcoat { factor, texture, roughness, roughness_texture }))
 }
 
 /// A factor of 0…1; 0 if it is missing.
@@ -63,11 +61,12 @@ impl Coat {
         cover: MaterialOptions,
         builder: &mut SceneBuilder,
     ) -> Result<MaterialId, SceneError> {
-        let MaterialOptions { opacity, one_sided, relief, .. } = cover;
-        let sides = MaterialOptions { one_sided, ..MaterialOptions::default() };
-        let base = builder.material_with(material, MaterialOptions { relief, ..sides.clone() })?;
+        let MaterialOptions { opacity, culled, roughness, relief, .. } = cover;
+        let sides = MaterialOptions { culled, ..MaterialOptions::default() };
+        let base = builder.material_with(material, MaterialOptions { roughness, relief, ..sides.clone() })?;
         let film = Material::RoughConductor { reflectance: [1.0; 3].into(), roughness: self.roughness };
-        let film = builder.material_with(film, sides.clone())?;
+        let coat = MaterialOptions { roughness: self.alphas, ..sides.clone() };
+        let film = builder.material_with(film, coat)?;
         builder.coated_material(base, film, self.share, MaterialOptions { opacity, ..sides })
     }
 }

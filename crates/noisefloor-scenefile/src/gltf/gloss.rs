@@ -15,13 +15,13 @@ pub(super) struct Gloss {
 
 impl Gloss {
     /// Base colour, roughness and share of metal of what reflects the same at normal incidence: of a base b with
-    /// the share m of metal, that is b·(1 − m)·0.96 diffusely and 0.04·(1 − m) + b·m specularly. The share is solved
+    /// the share m of metal, that is b·(1 − m) diffusely and 0.04·(1 − m) + b·m specularly. The share is solved
     /// for with luminances, the colour then taken from the specular one as far as it is metal.
     pub(super) fn metal(self) -> (Rgb, [f32; 2]) {
         let strongest = self.specular.into_iter().fold(0.0, f32::max);
         let [d, s] = [self.diffuse, self.specular].map(noisefloor::luminance);
-        // What is left below a reflecting surface, over what is left below a dielectric
-        let d = d * (1.0 - strongest) / (1.0 - DIELECTRIC);
+        // The diffuse colour is that below what reflects most
+        let d = d * (1.0 - strongest);
         // From b = (s − 0.04·(1 − m))/m in d = b·(1 − m): a quadratic in m
         let metal = if s <= DIELECTRIC {
             0.0
@@ -30,7 +30,7 @@ impl Gloss {
             let root = (b * b - 4.0 * DIELECTRIC * (DIELECTRIC - s)).max(0.0).sqrt();
             ((root - b) / (2.0 * DIELECTRIC)).clamp(0.0, 1.0)
         };
-        let below = (1.0 - strongest) / ((1.0 - DIELECTRIC) * (1.0 - metal).max(1e-4));
+        let below = (1.0 - strongest) / (1.0 - metal).max(1e-4);
         let base = std::array::from_fn(|i| {
             let plain = self.diffuse[i] * below;
             let shiny = (self.specular[i] - DIELECTRIC * (1.0 - metal)) / metal.max(1e-4);
@@ -48,7 +48,8 @@ mod tests {
     fn plastic_and_gold_are_what_they_were() {
         let plastic = Gloss { diffuse: [0.5, 0.2, 0.1], specular: [DIELECTRIC; 3], glossiness: 0.75 };
         let (base, [roughness, metal]) = plastic.metal();
-        assert!(base.iter().zip(plastic.diffuse).all(|(a, b)| (a - b).abs() < 1e-5), "{base:?}");
+        let below = plastic.diffuse.map(|d| d * (1.0 - DIELECTRIC));
+        assert!(base.iter().zip(below).all(|(a, b)| (a - b).abs() < 1e-5), "{base:?}");
         assert_eq!((roughness, metal), (0.25, 0.0));
         let gold = Gloss { diffuse: [0.0; 3], specular: [1.0, 0.77, 0.34], glossiness: 0.5 };
         let (base, [_, metal]) = gold.metal();
@@ -62,7 +63,7 @@ mod tests {
         for (b, m) in [(0.6, 0.3), (0.9, 0.7), (0.3, 0.5)] {
             let specular = DIELECTRIC * (1.0 - m) + b * m;
             // The diffuse colour whose rest below the specular one is that of the mix
-            let diffuse = b * (1.0 - m) * (1.0 - DIELECTRIC) / (1.0 - specular);
+            let diffuse = b * (1.0 - m) / (1.0 - specular);
             let (base, [_, metal]) =
                 Gloss { diffuse: [diffuse; 3], specular: [specular; 3], glossiness: 1.0 }.metal();
             assert!((metal - m).abs() < 1e-4 && (base[0] - b).abs() < 1e-4, "{b} {m}: {base:?} {metal}");

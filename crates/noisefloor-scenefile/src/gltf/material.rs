@@ -4,33 +4,28 @@ use super::asset::{Asset, name};
 use super::clearcoat::{self, Clearcoat, Coat};
 use super::gloss::Gloss;
 use super::notes::Notes;
-use super::texture::{Encoding, Textures, mean, normal_info, set};
+use super::texture::{Encoding, Textures, normal_info, set};
 use crate::{LoadError, Place};
 use gltf::json::extensions::material::PbrSpecularGlossiness;
 use gltf::json::material::{AlphaMode, Material as Source};
 use gltf::json::texture::Info;
 use gltf::json::validation::Checked;
 use gltf::json::{Index, extensions};
-use noisefloor::{Rgb, luminance};
+use noisefloor::Rgb;
 use noisefloor_ptwne::{
     Emission, ImageTexture, Material, MaterialId, MaterialOptions, Relief, SceneBuilder, Texture,
 };
 use std::collections::HashMap;
 
 /// Indices of refraction that the renderer takes for a material that is not transparent.
-const MIN_COAT_IOR: f32 = 1.001;
+const MIN_OPAQUE_IOR: f32 = 1.0;
 const MAX_IOR: f32 = 4.0;
-
-/// From which mean luminance on an emission lights a scene, instead of only showing that something glows.
-const LAMP: f32 = 0.5;
 
 /// A material in the scene.
 #[derive(Clone, Debug)]
 pub(super) struct Look {
     pub(super) id: MaterialId,
     pub(super) emission: Option<Emission>,
-    /// Whether its emission lights the scene.
-    pub(super) lamp: bool,
     /// Whether it shows its colour without any light.
     pub(super) unlit: bool,
     /// The set of texture coordinates of its textures, if it has any.
@@ -78,13 +73,13 @@ impl<'a> Materials<'a> {
         let read = reader.read()?;
         let coat = if read.unlit { None } else { reader.coat()? };
         let (set, place) = (reader.set, reader.place);
-        let Read { material, cover, emission, lamp, unlit } = read;
+        let Read { material, cover, emission, unlit } = read;
         let refused = |cause| LoadError::Scene { place: place.clone(), cause };
         let id = match coat {
             None => builder.material_with(material, cover).map_err(refused)?,
             Some(coat) => coat.over(material, cover, builder).map_err(refused)?,
         };
-        let look = Look { id, emission, lamp, unlit, set };
+        let look = Look { id, emission, unlit, set };
         self.looks.insert(key, look.clone());
         Ok(look)
     }
@@ -105,7 +100,6 @@ struct Read {
     material: Material,
     cover: MaterialOptions,
     emission: Option<Emission>,
-    lamp: bool,
     unlit: bool,
 }
 
@@ -135,10 +129,10 @@ impl<'m> Reader<'m, '_> {
         if self.extensions().is_some_and(|e| e.unlit.is_some()) {
             return self.unlit(base_texture);
         }
-        let material = match (self.transmission(base_texture)?, gloss) {
+        let (material, roughness) = match (self.transmission(base_texture)?, gloss) {
             (Some(glass), _) => glass,
-            (None, Some(gloss)) => self.glossy(gloss)?,
-            (None, None) => self.opaque(base_texture, metal_texture)?,
+            (None, Some(gloss)) => (self.glossy(gloss)?, None),
+            (None, None) => (self.opaque(base_texture, metal_texture)?, None),
         };
         let relief = match normals.filter(|(info, _)| self.fits(info)) {
             Some((info, scale)) => {
@@ -152,16 +146,13 @@ impl<'m> Reader<'m, '_> {
         let glass = matches!(material, Material::RoughGlass { .. } | Material::ThinGlass { .. });
         let cover = MaterialOptions {
             opacity: self.opacity(base_texture)?,
-            one_sided: !source.double_sided && !glass,
+            culled: !source.double_sided && !glass,
+            roughness,
             relief,
             ..MaterialOptions::default()
         };
         let emission = self.emission(emissive_texture)?;
-        let lamp = emission.as_ref().is_some_and(|e| luminance(e.radiance) * mean(&e.texture) >= LAMP);
-        if emission.is_some() && !lamp {
-            self.notes.near(&self.place, "it glows too little to count as the light of the scene");
-        }
-        Ok(Read { material, cover, emission, lamp, unlit: false })
+        Ok(Read { material, cover, emission, unlit: false })
     }
 
     /// `KHR_materials_clearcoat`.
@@ -169,7 +160,7 @@ impl<'m> Reader<'m, '_> {
         let Some(value) = self.extensions().and_then(|e| e.others.get(clearcoat::NAME)) else {
             return Ok(None);
         };
-        let Some(Clearcoat { factor, texture, roughness }) =
+        let Some(Clearcoat { factor, texture, roughness, roughness_texture }) =
             clearcoat::parse(value, &self.place, self.notes)?
         else {
             return Ok(None);
@@ -181,7 +172,11 @@ impl<'m> Reader<'m, '_> {
             }
             None => Texture::Colour([factor; 3]),
         };
-        Ok(Some(Coat { share, roughness: roughness * roughness }))
+        let alphas = match roughness_texture.filter(|info| self.fits(info)) {
+            Some(info) => Some(self.textures.alphas(&info, roughness, &self.place, self.notes)?),
+            None => None,
+        };
+        Ok(Some(Coat { share, roughness: roughness * roughness, alphas }))
     }
 
     /// `KHR_materials_unlit`: shows its colour, and reflects nothing. In a traced scene that is light.
@@ -197,12 +192,12 @@ impl<'m> Reader<'m, '_> {
         };
         let cover = MaterialOptions {
             opacity: self.opacity(base)?,
-            one_sided: !self.source.double_sided,
+            culled: !self.source.double_sided,
             ..MaterialOptions::default()
         };
         let emission = Emission { radiance, texture, two_sided: self.source.double_sided };
         let emission = Some(emission).filter(|_| radiance != [0.0; 3]);
-        Ok(Read { material: Material::diffuse([0.0; 3]), cover, emission, lamp: false, unlit: true })
+        Ok(Read { material: Material::diffuse([0.0; 3]), cover, emission, unlit: true })
     }
 
     /// `KHR_materials_pbrSpecularGlossiness`.
@@ -218,7 +213,7 @@ impl<'m> Reader<'m, '_> {
         let (base, metallic_roughness) =
             self.textures.gloss(factor, [of_diffuse, of_specular], &self.place, self.notes)?;
         let base = self.tinted(base);
-        Ok(Material::MetallicRoughness { base, metallic_roughness, ior: self.ior(MIN_COAT_IOR) })
+        Ok(Material::MetallicRoughness { base, metallic_roughness, ior: self.ior(MIN_OPAQUE_IOR) })
     }
 
     /// Times the colours of corners, if the mesh has any.
@@ -266,13 +261,16 @@ impl<'m> Reader<'m, '_> {
         let roughness = self.within(pbr.roughness_factor.0, "roughnessFactor", 0.0, 1.0);
         let metallic = self.within(pbr.metallic_factor.0, "metallicFactor", 0.0, 1.0);
         let metallic_roughness = self.colour([1.0, roughness, metallic], metal, Encoding::Linear)?;
-        let ior = self.ior(MIN_COAT_IOR);
+        let ior = self.ior(MIN_OPAQUE_IOR);
         Ok(Material::MetallicRoughness { base, metallic_roughness, ior })
     }
 
     /// `KHR_materials_transmission`: all or nothing. A smooth pane, unless `KHR_materials_volume` says
     /// that the surface bounds a volume.
-    fn transmission(&mut self, base: Option<&Info>) -> Result<Option<Material>, LoadError> {
+    fn transmission(
+        &mut self,
+        base: Option<&Info>,
+    ) -> Result<Option<(Material, Option<Texture>)>, LoadError> {
         let Some(transmission) = self.extensions().and_then(|e| e.transmission.as_ref()) else {
             return Ok(None);
         };
@@ -296,17 +294,20 @@ impl<'m> Reader<'m, '_> {
         let roughness = self.within(pbr.roughness_factor.0, "roughnessFactor", 0.0, 1.0);
         let ior = self.ior(0.25);
         if self.is_solid() {
-            if pbr.metallic_roughness_texture.is_some() {
-                let what = "the texture of its roughness is ignored, its factor used alone";
-                self.notes.warn(&self.place, what);
-            }
-            return Ok(Some(Material::RoughGlass { ior, tint, roughness: roughness * roughness }));
+            let map = match &pbr.metallic_roughness_texture {
+                Some(info) if self.fits(info) => {
+                    Some(self.textures.alphas(info, roughness, &self.place, self.notes)?)
+                }
+                _ => None,
+            };
+            let glass = Material::RoughGlass { ior, tint, roughness: roughness * roughness };
+            return Ok(Some((glass, map)));
         }
         if roughness > 0.0 {
             let what = format_args!("a roughness of {roughness} is ignored: panes are smooth");
             self.notes.warn(&self.place, what);
         }
-        Ok(Some(Material::ThinGlass { ior, tint }))
+        Ok(Some((Material::ThinGlass { ior, tint }, None)))
     }
 
     /// Whether the surface bounds a volume, whose extent is that of the mesh: the thickness serves renderers

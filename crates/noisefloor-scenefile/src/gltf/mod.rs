@@ -10,6 +10,7 @@ mod clearcoat;
 mod daylight;
 mod gloss;
 mod light;
+mod lit;
 mod material;
 mod mesh;
 mod nodes;
@@ -35,8 +36,8 @@ use std::collections::{HashMap, HashSet};
 use std::path::Path;
 use std::rc::Rc;
 
-pub(crate) fn load(path: &Path) -> Result<Loaded, LoadError> {
-    let folder = Folder::of(path, None, String::new());
+pub(crate) fn load(path: &Path, root: Option<&Path>) -> Result<Loaded, LoadError> {
+    let folder = Folder::of(path, root, String::new());
     let file = folder.read(path, MAX_BYTES, &Place::file(path))?;
     let asset = Asset::parse(path, &folder, &file)?;
     notes::check_required(&asset)?;
@@ -61,7 +62,6 @@ pub(crate) fn load(path: &Path) -> Result<Loaded, LoadError> {
         meshes: HashSet::new(),
         nodes: rest::by_index(&placed),
         skins: HashMap::new(),
-        lit: false,
         needs_light: false,
         undrawn: false,
         bounds: [DVec3::INFINITY, DVec3::NEG_INFINITY],
@@ -73,16 +73,32 @@ pub(crate) fn load(path: &Path) -> Result<Loaded, LoadError> {
         Some(camera) => camera,
         None => loader.framing()?,
     };
-    let Loader { mut builder, mut notes, lit, needs_light, .. } = loader;
+    let Loader { builder, mut notes, needs_light, .. } = loader;
     for (index, animation) in asset.root.animations.iter().enumerate() {
         let place = Place::part(path, name("animation", index, animation.name.as_deref()));
         notes.warn(&place, "it is ignored: everything stays at rest, where its node is");
     }
-    if !lit && needs_light {
-        notes.warn(&whole, "it has no light: it gets a grey sky, and a sun over the viewer's left shoulder");
-        builder.environment(daylight::daylight(&camera)).map_err(refused)?;
+    let mut scene = builder.build().and_then(|scene| scene.with_camera(camera)).map_err(refused)?;
+    if needs_light {
+        const DAYLIGHT: &str = "it gets a grey sky, and a sun over the viewer's left shoulder";
+        let sky = match scene.lights() {
+            0 => {
+                notes.warn(&whole, format_args!("it has no light: {DAYLIGHT}"));
+                Some(daylight::daylight(&camera))
+            }
+            _ => {
+                let sky = lit::missing_daylight(&scene, &camera);
+                if sky.is_some() {
+                    let what = format_args!("its own lights show next to nothing of it: {DAYLIGHT}");
+                    notes.warn(&whole, what);
+                }
+                sky
+            }
+        };
+        if let Some(sky) = sky {
+            scene = scene.with_environment(sky).map_err(refused)?;
+        }
     }
-    let scene = builder.build().and_then(|scene| scene.with_camera(camera)).map_err(refused)?;
     let scene = scene.with_identity(folder.contents());
     Ok(Loaded { scene, size: None, max_depth: None, warnings: notes.finish(&asset) })
 }
@@ -98,7 +114,6 @@ struct Loader<'a> {
     /// Where nodes are, by their index.
     nodes: HashMap<usize, DAffine3>,
     skins: HashMap<usize, Rc<Joints>>,
-    lit: bool,
     /// Whether there is anything that light can show.
     needs_light: bool,
     /// Whether there are points or lines.
@@ -113,7 +128,6 @@ impl Loader<'_> {
         self.notes.extensions(place, node.extensions.iter().flat_map(|e| e.others.keys()));
         if let Some(light) = node.extensions.as_ref().and_then(|e| e.khr_lights_punctual.as_ref()) {
             light::add(self.asset, placed, light.light, &mut self.builder, &mut self.notes)?;
-            self.lit = true;
         }
         let Some(index) = node.mesh else { return Ok(()) };
         let mesh = self.asset.get(index, "mesh", place)?;
@@ -219,9 +233,8 @@ impl Loader<'_> {
             indices: &triangles.indices,
         };
         match self.builder.mesh(&mesh, look.id, look.emission) {
-            Ok(0) => self.lit |= look.lamp,
+            Ok(0) => {}
             Ok(count) => {
-                self.lit |= look.lamp;
                 if first {
                     self.notes.warn(place, format_args!("triangles without area are left out: {count}"));
                 }

@@ -3,6 +3,7 @@
 use super::asset::{Asset, name};
 use super::gloss::Gloss;
 use super::notes::Notes;
+use crate::channels;
 use crate::picture::{self, Samples};
 use crate::{LoadError, Place};
 use gltf::json::extensions::texture::TextureTransform;
@@ -111,6 +112,19 @@ impl<'a> Textures<'a> {
         let codes = self.images.get(&image).map(|decoded| decoded.colour.clone()).unwrap_or_default();
         self.count(codes.len(), place)?;
         Ok(ImageTexture { pixels: Pixels::Linear8(codes.iter().map(|[r, ..]| [*r; 3]).collect()), ..texture })
+    }
+
+    /// The square of a texture's green channel times a factor, which is α of its microfacets in all directions.
+    pub(super) fn alphas(
+        &mut self,
+        info: &Info,
+        factor: f32,
+        place: &Place,
+        notes: &mut Notes,
+    ) -> Result<Texture, LoadError> {
+        let image = self.colour(info, Encoding::Linear, place, notes)?;
+        self.count(image.width * image.height, place)?;
+        Ok(Texture::Image(channels::mapped(&image, |[_, green, _]| [(green * factor).powi(2); 3])))
     }
 
     /// Base colour, and roughness and metal, of diffuse and of specular colours with glossiness: factors times
@@ -251,14 +265,6 @@ pub(super) fn normal_info(normals: &NormalTexture) -> Info {
     let others = normals.extensions.as_ref().map(|e| &e.others);
     let extensions = others.and_then(|others| deserialize::from_value(Value::Object(others.clone())).ok());
     Info { index: normals.index, tex_coord: normals.tex_coord, extensions, extras: normals.extras.clone() }
-}
-
-/// The mean luminance of an emission texture; 1 if there is none.
-pub(super) fn mean(texture: &Option<Texture>) -> f32 {
-    match texture {
-        Some(Texture::Image(image)) => noisefloor::luminance(image.mean()),
-        _ => 1.0,
-    }
 }
 
 /// The set of texture coordinates of a texture.

@@ -2,7 +2,7 @@
 
 use super::context::Context;
 use super::surface::{Body, Surface};
-use super::textures::{mean, peak};
+use super::textures::peak;
 use super::xml::Element;
 use crate::colour::Quantity;
 use crate::error::LoadError;
@@ -32,10 +32,7 @@ impl<'d> Context<'d> {
                 let facets = self.facets(element)?;
                 Ok(Surface { facets, ..Surface::one_sided(self.plastic(element)?) })
             }
-            "conductor" | "roughconductor" => {
-                let facets = self.facets(element)?;
-                Ok(Surface { facets, ..Surface::one_sided(self.conductor(element)?) })
-            }
+            "conductor" | "roughconductor" => self.conductor(element),
             "dielectric" | "thindielectric" | "roughdielectric" => self.glass(element),
             "phong" | "ward" => self.lobe_on_diffuse(element),
             "principled" | "principledthin" => self.principled(element),
@@ -162,7 +159,7 @@ impl<'d> Context<'d> {
         let ior = self.relative_ior(element, "bk7")?;
         let specular = self.constant_factor(element, "specular_reflectance", 1.0)?;
         let facets = self.facets(element)?;
-        let roughness = self.roughness(element, rough)?;
+        let roughness = if rough { self.plain_roughness(element)? } else { 0.0 };
         match inside.body {
             Body::Plain(Material::Diffuse { albedo }) if ior > 1.0 => {
                 let body = Body::Plain(Material::Plastic {
@@ -185,13 +182,13 @@ impl<'d> Context<'d> {
     /// width.
     fn lobe_on_diffuse(&self, element: &'d Element) -> Result<Surface, LoadError> {
         element.ignore(&["variant"]);
-        let roughness = if element.kind() == "phong" {
+        let (roughness, alphas) = if element.kind() == "phong" {
             let exponent = self.mean_float(element, "exponent")?.unwrap_or(30.0).max(0.0);
             // Where a lobe cosⁿ and Beckmann's distribution are alike (Walter et al. 2007, §5.2)
-            (2.0 / (exponent + 2.0)).sqrt()
+            ((2.0 / (exponent + 2.0)).sqrt().clamp(0.0, 1.0) as f32, None)
         } else {
-            let [u, v] = [self.mean_float(element, "alpha_u")?, self.mean_float(element, "alpha_v")?];
-            (u.unwrap_or(0.1) * v.unwrap_or(0.1)).sqrt()
+            let [u, v] = [self.grey(element, "alpha_u", 0.1)?, self.grey(element, "alpha_v", 0.1)?];
+            self.along_and_across(element, [&u, &v])?
         };
         self.approximated(
             element,
@@ -199,7 +196,7 @@ impl<'d> Context<'d> {
         );
         let diffuse = self.factor(element, "diffuse_reflectance", 0.5)?;
         let specular = self.constant_factor(element, "specular_reflectance", 0.2)?;
-        self.sum(element, diffuse, specular, roughness.clamp(0.0, 1.0) as f32)
+        self.sum(element, diffuse, specular, (roughness, alphas))
     }
 
     /// The sum of a diffuse reflection and a glossy one that is the same at all angles.
@@ -208,7 +205,7 @@ impl<'d> Context<'d> {
         element: &Element,
         diffuse: Texture,
         specular: Rgb,
-        roughness: f32,
+        (roughness, alphas): (f32, Option<Texture>),
     ) -> Result<Surface, LoadError> {
         let gloss = specular.into_iter().fold(0.0, f32::max);
         let base = peak(&diffuse);
@@ -226,60 +223,8 @@ impl<'d> Context<'d> {
         };
         let albedo = self.scaled(element, diffuse, scale / (1.0 - share).max(1e-6))?;
         let first = Surface::one_sided(Material::Diffuse { albedo });
-        let glossy = Surface { facets: Facets::BeckmannUncorrelated, ..Surface::one_sided(glossy) };
+        let facets = Facets::BeckmannUncorrelated;
+        let glossy = Surface { facets, alphas, ..Surface::one_sided(glossy) };
         Ok(Surface::blend(first, glossy, Texture::Colour([share; 3])))
-    }
-
-    /// Disney's principled surface (Burley 2012, 2015): its metal, gloss and glass.
-    fn principled(&self, element: &'d Element) -> Result<Surface, LoadError> {
-        let number =
-            |name: &str, missing: f64| Ok::<_, LoadError>(self.mean_float(element, name)?.unwrap_or(missing));
-        let transmission = number("spec_trans", 0.0)?;
-        let ior = match self.float(element, "eta")? {
-            Some(eta) => eta,
-            // Burley 2012: 0.08·specular at normal incidence
-            None => {
-                let root = (0.08 * number("specular", 0.5)?).max(0.0).sqrt().min(0.9);
-                (1.0 + root) / (1.0 - root)
-            }
-        };
-        self.approximated(
-            element,
-            format!(
-                "of {} its metal, gloss and transmission are kept, its sheen, clearcoat, tints and flatness left out",
-                element.species()
-            ),
-        );
-        element.ignore(&[
-            "anisotropic",
-            "spec_tint",
-            "sheen",
-            "sheen_tint",
-            "clearcoat",
-            "clearcoat_gloss",
-            "flatness",
-            "diff_trans",
-            "diffuse_reflectance_sampling_rate",
-            "specular_reflectance_sampling_rate",
-            "clearcoat_sampling_rate",
-            "main_specular_sampling_rate",
-        ]);
-        let base = self.factor(element, "base_color", 0.5)?;
-        if transmission > 0.5 {
-            let tint = mean(&base).map(f32::sqrt);
-            let ior = ior as f32;
-            let thin = element.kind() == "principledthin";
-            element.ignore(&["metallic"]);
-            let roughness = number("roughness", 0.5)?;
-            let roughness = (roughness * roughness).clamp(0.0, 1.0) as f32;
-            return Ok(Surface::two_sided(if thin {
-                Material::ThinGlass { ior, tint }
-            } else {
-                Material::RoughGlass { ior, tint, roughness }
-            }));
-        }
-        let metallic_roughness = self.green_and_blue(element, ["roughness", "metallic"], [0.5, 0.0])?;
-        let ior = (ior as f32).clamp(1.001, 4.0);
-        Ok(Surface::one_sided(Material::MetallicRoughness { base, metallic_roughness, ior }))
     }
 }

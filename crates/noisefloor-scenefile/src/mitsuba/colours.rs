@@ -20,6 +20,21 @@ impl<'d> Context<'d> {
         name: &str,
         quantity: Quantity,
     ) -> Result<Option<Rgb>, LoadError> {
+        let colour = self.signed(object, name, quantity)?;
+        if let Some(colour) = colour.filter(|colour| colour.iter().any(|c| *c < 0.0)) {
+            let element = object.get(name).unwrap_or(object);
+            return Err(self.bad(element, format!("the colour {colour:?} is negative or too large")));
+        }
+        Ok(colour)
+    }
+
+    /// The same, which may be below 0.
+    pub(super) fn signed(
+        &self,
+        object: &'d Element,
+        name: &str,
+        quantity: Quantity,
+    ) -> Result<Option<Rgb>, LoadError> {
         let Some(element) = object.get(name) else { return Ok(None) };
         if !COLOURS.contains(&element.tag.as_str()) {
             let what = format!("`{name}` is a <{}>; expected <{}>", element.tag, COLOURS.join(">, <"));
@@ -31,7 +46,7 @@ impl<'d> Context<'d> {
             "blackbody" => self.black_body(element)?,
             tag => self.rgb(element, tag == "srgb")?,
         };
-        if colour.iter().any(|c| *c < 0.0 || !c.is_finite()) {
+        if !colour.iter().all(|c| c.is_finite()) {
             return Err(self.bad(element, format!("the colour {colour:?} is negative or too large")));
         }
         Ok(Some(colour))

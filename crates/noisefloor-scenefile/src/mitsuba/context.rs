@@ -6,6 +6,7 @@ use super::surface::Surface;
 use super::xml::Element;
 use crate::error::{LoadError, Place, Warning};
 use crate::options::LoadOptions;
+use crate::options::NO_MEDIA;
 use noisefloor_ptwne::SceneError;
 use std::cell::{Cell, RefCell};
 use std::collections::{HashMap, HashSet};
@@ -187,7 +188,7 @@ impl<'d> Context<'d> {
             }
             child.read();
             if !self.options.ignore_volumes {
-                return Err(self.unsupported(child, "a participating medium"));
+                return Err(self.unsupported(child, NO_MEDIA));
             }
             medium.into_iter().for_each(Element::irrelevant);
             self.ignored(child, "the participating medium is ignored");

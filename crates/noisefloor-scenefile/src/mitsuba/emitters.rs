@@ -43,6 +43,10 @@ impl<'d> Context<'d> {
                 let irradiance = self.plain_light(element, "irradiance")?;
                 builder.punctual(Punctual::Distant { direction, irradiance }).map_err(refused)?;
             }
+            "collimated" => {
+                element.irrelevant();
+                self.ignored(element, "the beam is ignored: it lights a single point");
+            }
             // A definition for shapes that refer to it
             "area" if element.attribute("id").is_some() => element.irrelevant(),
             "area" => return Err(self.bad(element, "an area emitter belongs into a shape")),
@@ -52,7 +56,13 @@ impl<'d> Context<'d> {
     }
 
     /// The light of a shape, if it gives off any.
-    pub(super) fn emission(&self, shape: &'d Element) -> Result<Option<Emission>, LoadError> {
+    ///
+    /// An emitter of another kind is added to the scene: it shines by itself, whatever its shape.
+    pub(super) fn emission(
+        &self,
+        shape: &'d Element,
+        builder: &mut SceneBuilder,
+    ) -> Result<Option<Emission>, LoadError> {
         let emitters = self.parts(shape, "emitter")?;
         let element = match emitters.as_slice() {
             [] => return Ok(None),
@@ -60,8 +70,18 @@ impl<'d> Context<'d> {
             [_, second, ..] => return Err(self.bad(second, "a shape has at most one emitter")),
         };
         element.ignore(&["sampling_weight"]);
-        if element.kind() != "area" {
-            return Err(self.unsupported(element, format!("{} in a shape", element.label())));
+        match element.kind() {
+            "area" => {}
+            "point" | "spot" | "projector" | "directional" => {
+                self.emitter(element, builder)?;
+                return Ok(None);
+            }
+            "collimated" => {
+                element.irrelevant();
+                self.ignored(element, "the beam is ignored: it lights a single point");
+                return Ok(None);
+            }
+            _ => return Err(self.unsupported(element, format!("{} in a shape", element.label()))),
         }
         let (radiance, texture) = self.light(element, "radiance")?;
         Ok(Some(Emission { radiance, texture, two_sided: false }))

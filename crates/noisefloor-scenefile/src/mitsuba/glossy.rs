@@ -2,6 +2,7 @@
 
 use super::context::Context;
 use super::surface::Surface;
+use super::textures::mean;
 use super::xml::Element;
 use crate::colour::Quantity;
 use crate::error::LoadError;
@@ -19,24 +20,28 @@ impl<'d> Context<'d> {
             diffuse: self.factor(element, "diffuse_reflectance", 0.5)?,
             specular: self.constant_factor(element, "specular_reflectance", 1.0)?,
             ior: self.relative_ior(element, "polypropylene")?,
-            roughness: self.roughness(element, rough)?,
+            roughness: if rough { self.plain_roughness(element)? } else { 0.0 },
             nonlinear: self.boolean(element, "nonlinear", false)?,
         })
     }
 
-    pub(super) fn conductor(&self, element: &'d Element) -> Result<Material, LoadError> {
+    pub(super) fn conductor(&self, element: &'d Element) -> Result<Surface, LoadError> {
         let rough = element.kind() == "roughconductor";
         let reflectance = self.factor(element, "specular_reflectance", 1.0)?;
-        let roughness = self.roughness(element, rough)?;
+        let (roughness, alphas) = self.roughness(element, rough)?;
+        let facets = self.facets(element)?;
+        let surface = |material| Surface { facets, alphas, ..Surface::one_sided(material) };
 
         // η and k, or the name of a metal
         let given =
-            [self.colour(element, "eta", Quantity::Factor)?, self.colour(element, "k", Quantity::Factor)?];
+            [self.signed(element, "eta", Quantity::Factor)?, self.signed(element, "k", Quantity::Factor)?];
         let (eta, k) = match (given, self.string(element, "material")?) {
             // Given and named, the numbers count
             ([Some(eta), Some(k)], _) => (eta, k),
             ([None, None], Some("none")) => match reflectance {
-                Texture::Colour(reflectance) if !rough => return Ok(Material::Mirror { reflectance }),
+                Texture::Colour(reflectance) if !rough => {
+                    return Ok(surface(Material::Mirror { reflectance }));
+                }
                 // Reflects all light at all angles
                 _ => ([0.0; 3], [1.0; 3]),
             },
@@ -46,7 +51,7 @@ impl<'d> Context<'d> {
                 let name = name.unwrap_or(missing);
                 match (name, &reflectance) {
                     ("none", Texture::Colour(reflectance)) if !rough => {
-                        return Ok(Material::Mirror { reflectance: *reflectance });
+                        return Ok(surface(Material::Mirror { reflectance: *reflectance }));
                     }
                     ("none", _) => ([0.0; 3], [1.0; 3]),
                     _ => indices::conductor(name).ok_or_else(|| {
@@ -62,7 +67,8 @@ impl<'d> Context<'d> {
         // Relative to what is outside
         let outside = self.ior(element, "ext_eta", "vacuum")? as f32;
         let relative = |index: Rgb| index.map(|n| n / outside);
-        Ok(Material::Conductor { eta: relative(eta), k: relative(k), reflectance, roughness })
+        let (eta, k) = (self.clamped(element, "eta", relative(eta)), self.clamped(element, "k", relative(k)));
+        Ok(surface(Material::Conductor { eta, k, reflectance, roughness }))
     }
 
     pub(super) fn glass(&self, element: &'d Element) -> Result<Surface, LoadError> {
@@ -78,7 +84,9 @@ impl<'d> Context<'d> {
             // Mitsuba lets light through unbent
             _ if (ior - 1.0).abs() < 1e-6 => Material::ThinGlass { ior, tint },
             "roughdielectric" => {
-                Material::RoughGlass { ior, tint, roughness: self.roughness(element, true)? }
+                let (roughness, alphas) = self.roughness(element, true)?;
+                let body = Material::RoughGlass { ior, tint, roughness };
+                return Ok(Surface { facets, alphas, ..Surface::two_sided(body) });
             }
             _ => Material::Glass { ior, tint },
         };
@@ -97,28 +105,80 @@ impl<'d> Context<'d> {
         }
     }
 
-    /// α.
-    pub(super) fn roughness(&self, element: &'d Element, rough: bool) -> Result<f32, LoadError> {
+    /// α, or a texture of it along and across u: of `alpha`, or of `alpha_u` and `alpha_v`.
+    pub(super) fn roughness(
+        &self,
+        element: &'d Element,
+        rough: bool,
+    ) -> Result<(f32, Option<Texture>), LoadError> {
         if !rough {
-            return Ok(0.0);
+            return Ok((0.0, None));
         }
         element.ignore(&["sample_visible"]);
-        let number = |name: &str| self.mean_float(element, name);
-        let alpha = match (number("alpha")?, number("alpha_u")?, number("alpha_v")?) {
-            (alpha, None, None) => alpha.unwrap_or(0.1),
-            (alpha, u, v) => {
-                let default = alpha.unwrap_or(0.1);
-                let (u, v) = (u.unwrap_or(default), v.unwrap_or(default));
-                if u != v {
-                    self.approximated(element, "roughness that depends on direction is replaced by its mean");
+        let [u, v] = if element.has("alpha_u") || element.has("alpha_v") {
+            let missing = if element.has("alpha") { self.mean_float(element, "alpha")? } else { None };
+            let missing = missing.unwrap_or(0.1) as f32;
+            [self.grey(element, "alpha_u", missing)?, self.grey(element, "alpha_v", missing)?]
+        } else {
+            let alpha = self.grey(element, "alpha", 0.1)?;
+            [alpha.clone(), alpha]
+        };
+        self.along_and_across(element, [&u, &v])
+    }
+
+    /// Two numbers or textures of α as one, which is a number if they are the same everywhere.
+    pub(super) fn along_and_across(
+        &self,
+        element: &Element,
+        [u, v]: [&Texture; 2],
+    ) -> Result<(f32, Option<Texture>), LoadError> {
+        let alphas = self.joined(element, [u, v], |[u, v]| [u, v, 0.0])?;
+        Ok(match alphas {
+            Texture::Colour([u, v, _]) if u == v => (u, None),
+            Texture::Colour([u, v, _]) => ((u * v).sqrt(), Some(alphas)),
+            other => {
+                let [u, v, _] = mean(&other);
+                ((u * v).sqrt(), Some(other))
+            }
+        })
+    }
+
+    /// One α for all directions and places.
+    pub(super) fn plain_roughness(&self, element: &'d Element) -> Result<f32, LoadError> {
+        match self.roughness(element, true)? {
+            (alpha, None) => Ok(alpha),
+            (alpha, Some(_)) => {
+                self.approximated(element, "roughness that varies is replaced by its mean");
+                Ok(alpha)
+            }
+        }
+    }
+
+    /// A number of 0…1 or a texture of it.
+    pub(super) fn grey(&self, element: &'d Element, name: &str, missing: f32) -> Result<Texture, LoadError> {
+        let texture = match element.get(name) {
+            Some(child) if matches!(child.tag.as_str(), "texture" | "ref" | "spectrum") => {
+                self.factor(element, name, missing)?
+            }
+            _ => {
+                let number = self.float(element, name)?.unwrap_or(f64::from(missing));
+                if !(0.0..=1.0).contains(&number) {
+                    self.approximated(element, format!("`{name}` is {number}, and is brought into 0…1"));
                 }
-                (u * v).max(0.0).sqrt()
+                return Ok(Texture::Colour([number.clamp(0.0, 1.0) as f32; 3]));
             }
         };
-        if !(0.0..=1.0).contains(&alpha) {
-            self.approximated(element, format!("a roughness of {alpha} is brought into 0…1"));
+        let texture = self.varying(element, texture)?;
+        self.luminance(element, texture)
+    }
+
+    /// An index of refraction of a conductor, at least 0, with a warning if it is not.
+    fn clamped(&self, element: &Element, name: &str, index: Rgb) -> Rgb {
+        let nearest = index.map(|n| n.clamp(0.0, 100.0));
+        if nearest != index {
+            self.approximated(element, format!("`{name}` is {index:?}, and is brought into 0…100"));
         }
-        Ok(alpha.clamp(0.0, 1.0) as f32)
+        nearest
     }
 
     /// A number; of a texture its mean, with a warning.

@@ -13,6 +13,7 @@ mod document;
 mod emitters;
 mod glossy;
 mod points;
+mod principled;
 mod raster;
 mod sensor;
 mod shapes;

@@ -1,6 +1,7 @@
 //! A picture, ready to become textures.
 
-use noisefloor::{Rgb, srgb_decode};
+pub(super) use crate::channels::linear;
+use noisefloor::Rgb;
 use noisefloor_ptwne::Pixels;
 
 /// A picture, ready for textures.
@@ -15,15 +16,5 @@ impl Raster {
     /// Width, height, and linear values.
     pub(super) fn linear(&self) -> (usize, usize, Vec<Rgb>) {
         (self.width, self.height, linear(&self.pixels))
-    }
-}
-
-/// Linear values of pixels.
-pub(super) fn linear(pixels: &Pixels) -> Vec<Rgb> {
-    let linear = |code: u8| f32::from(code) / 255.0;
-    match pixels {
-        Pixels::Srgb8(codes) => codes.iter().map(|p| p.map(|code| srgb_decode(linear(code)))).collect(),
-        Pixels::Linear8(codes) => codes.iter().map(|p| p.map(linear)).collect(),
-        Pixels::Float(values) => values.to_vec(),
     }
 }

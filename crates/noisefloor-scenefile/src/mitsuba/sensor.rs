@@ -11,6 +11,16 @@ const DEFAULT_SIZE: (usize, usize) = (768, 576);
 /// Largest width or height that is read, in pixels.
 const MAX_EDGE: i64 = 1 << 16;
 
+/// What is nearer to Mitsuba's cameras is not seen, unless they say otherwise.
+const NEAR: f64 = 0.01;
+
+/// Width and height of a picture and of the part of it that is shown, in pixels.
+#[derive(Clone, Copy, Debug)]
+struct FilmSize {
+    whole: (usize, usize),
+    shown: (usize, usize),
+}
+
 /// What looks at the scene.
 pub(super) struct View {
     pub(super) camera: Camera,
@@ -36,22 +46,26 @@ impl<'d> Context<'d> {
             return Err(self.unsupported(sensor, sensor.species()));
         }
         self.no_media(sensor)?;
-        sensor.ignore(&["near_clip", "far_clip", "shutter_open", "shutter_close", "srf"]);
+        sensor.ignore(&["far_clip", "shutter_open", "shutter_close", "srf"]);
         sensor.children.iter().filter(|c| c.tag == "sampler").for_each(Element::irrelevant);
-        for offset in ["principal_point_offset_x", "principal_point_offset_y"] {
-            if self.float(sensor, offset)?.is_some_and(|offset| offset != 0.0) {
-                return Err(self.unsupported(sensor, format!("`{offset}`")));
-            }
+        let (size, mut window) = self.film_size(sensor)?;
+        for (axis, name) in ["principal_point_offset_x", "principal_point_offset_y"].into_iter().enumerate() {
+            let offset = self.float(sensor, name)?.unwrap_or(0.0);
+            window[axis] = window[axis].map(|edge| edge + offset);
         }
-        let size = self.film_size(sensor)?;
         let to_world = self.transform(sensor, "to_world")?;
         let axes = DMat3::from_mat4(to_world);
         // Mitsuba's +x is to the left of the picture
-        let mut optics = Optics { mirrored: axes.determinant() < 0.0, ..Optics::default() };
+        let mut optics = Optics {
+            mirrored: axes.determinant() < 0.0,
+            window: window.map(|edges| edges.map(|edge| edge as f32)),
+            near: self.float(sensor, "near_clip")?.unwrap_or(NEAR) as f32,
+            ..Optics::default()
+        };
         let mut vertical_fov = 45.0;
         if kind == "orthographic" {
             // The picture is two units wide, scaled
-            let (width, height) = size.unwrap_or(DEFAULT_SIZE);
+            let (width, height) = size.map_or(DEFAULT_SIZE, |size| size.whole);
             let wide = 2.0 * axes.x_axis.length();
             optics.parallel_height = Some((wide * height as f64 / width as f64) as f32);
             sensor.ignore(&["focus_distance"]);
@@ -73,12 +87,18 @@ impl<'d> Context<'d> {
         let target = eye + view * eye.abs().max_element().max(1.0);
         let array = |v: DVec3| v.as_vec3().to_array();
         let up = array(axes.y_axis.normalize_or_zero());
-        Ok(View { camera: Camera { eye: array(eye), target: array(target), up, vertical_fov }, optics, size })
+        Ok(View {
+            camera: Camera { eye: array(eye), target: array(target), up, vertical_fov },
+            optics,
+            size: size.map(|size| size.shown),
+        })
     }
 
-    fn film_size(&self, sensor: &'d Element) -> Result<Option<(usize, usize)>, LoadError> {
+    /// The size of the picture, and which part of it is shown: shares of its width and height.
+    fn film_size(&self, sensor: &'d Element) -> Result<(Option<FilmSize>, [[f64; 2]; 2]), LoadError> {
+        const WHOLE: [[f64; 2]; 2] = [[0.0, 1.0]; 2];
         let films = self.parts(sensor, "film")?;
-        let Some(film) = films.first() else { return Ok(None) };
+        let Some(film) = films.first() else { return Ok((None, WHOLE)) };
         film.children.iter().filter(|c| c.tag == "rfilter").for_each(Element::irrelevant);
         // How the image is stored
         film.ignore(&[
@@ -94,7 +114,19 @@ impl<'d> Context<'d> {
             Some(edge @ 1..=MAX_EDGE) => Ok(edge as usize),
             Some(_) => Err(self.bad(film, format!("`{name}` is not in 1…{MAX_EDGE}"))),
         };
-        Ok(Some((edge("width", DEFAULT_SIZE.0)?, edge("height", DEFAULT_SIZE.1)?)))
+        let whole = (edge("width", DEFAULT_SIZE.0)?, edge("height", DEFAULT_SIZE.1)?);
+        let offset = |name: &str| match self.integer(film, name)? {
+            None => Ok(0),
+            Some(offset @ 0..=MAX_EDGE) => Ok(offset as usize),
+            Some(_) => Err(self.bad(film, format!("`{name}` is not in 0…{MAX_EDGE}"))),
+        };
+        let (x, y) = (offset("crop_offset_x")?, offset("crop_offset_y")?);
+        let shown = (
+            edge("crop_width", whole.0.saturating_sub(x).max(1))?,
+            edge("crop_height", whole.1.saturating_sub(y).max(1))?,
+        );
+        let share = |from: usize, size: usize, of: usize| [from, from + size].map(|at| at as f64 / of as f64);
+        Ok((Some(FilmSize { whole, shown }), [share(x, shown.0, whole.0), share(y, shown.1, whole.1)]))
     }
 
     /// The field of view in degrees, and the edge that it spans.

@@ -7,7 +7,7 @@ use crate::error::{LoadError, Place};
 use crate::files::MAX_FILE_BYTES;
 use crate::mesh::{Triangles, normal_matrix, obj, ply, serialized, solids};
 use glam::{DMat3, DMat4, DQuat, DVec3};
-use noisefloor_ptwne::{Emission, MaterialId, MaterialOptions, SceneBuilder};
+use noisefloor_ptwne::{Emission, Material, MaterialId, MaterialOptions, SceneBuilder};
 use std::collections::HashMap;
 use std::rc::Rc;
 
@@ -69,7 +69,7 @@ impl<'d> Context<'d> {
     ) -> Result<(), LoadError> {
         self.no_media(element)?;
         element.ignore(&["silhouette_sampling_weight"]);
-        let emission = self.emission(element)?;
+        let emission = self.emission(element, &mut filling.builder)?;
         let glows = emission.as_ref().is_some_and(|emission| emission.texture.is_some());
         let round = match element.kind() {
             // As triangles if stretched, or if light depends on where on it or comes from its inside
@@ -124,6 +124,10 @@ impl<'d> Context<'d> {
     ) -> Result<(MaterialId, bool), LoadError> {
         let (serial, surface) = match self.parts(element, "bsdf")?.as_slice() {
             [] => (None, Surface::missing(shines)),
+            // What lets all light through can shine, as Blender writes lamps
+            [one] if shines && one.kind() == "null" => {
+                (None, Surface { opacity: None, ..Surface::two_sided(Material::Nothing) })
+            }
             [one] => (Some(one.serial), self.surface(one)?),
             [_, second, ..] => return Err(self.bad(second, "a shape has at most one bsdf")),
         };
@@ -153,8 +157,10 @@ impl<'d> Context<'d> {
         surface: Surface,
         builder: &mut SceneBuilder,
     ) -> Result<MaterialId, LoadError> {
-        let Surface { body, opacity, one_sided, facets, relief } = surface;
-        let options = MaterialOptions { opacity, one_sided, facets, relief, ..MaterialOptions::default() };
+        let Surface { body, opacity, one_sided, facets, alphas, relief } = surface;
+        let roughness = alphas;
+        let options =
+            MaterialOptions { opacity, one_sided, facets, roughness, relief, ..MaterialOptions::default() };
         match body {
             Body::Plain(material) => builder.material_with(material, options).map_err(self.refused(element)),
             Body::Blend(parts, share) => {

@@ -12,6 +12,8 @@ pub(super) struct Surface {
     pub(super) one_sided: bool,
     /// Its microfacets.
     pub(super) facets: Facets,
+    /// α of its microfacets along and across u, instead of the material's number.
+    pub(super) alphas: Option<Texture>,
     /// Its bumps, and of a blend those of its parts that have none.
     pub(super) relief: Option<Relief>,
 }
@@ -28,7 +30,7 @@ impl Surface {
     /// What reflects, and is black from behind.
     pub(super) fn one_sided(material: Material) -> Self {
         let (body, facets) = (Body::Plain(material), Facets::GgxUncorrelated);
-        Self { body, opacity: None, one_sided: true, facets, relief: None }
+        Self { body, opacity: None, one_sided: true, facets, alphas: None, relief: None }
     }
 
     /// What is seen from both sides.
@@ -40,7 +42,7 @@ impl Surface {
     pub(super) fn blend(first: Self, second: Self, share: Texture) -> Self {
         let one_sided = first.one_sided && second.one_sided;
         let body = Body::Blend(Box::new([first, second]), share);
-        Self { body, opacity: None, one_sided, facets: Facets::default(), relief: None }
+        Self { body, opacity: None, one_sided, facets: Facets::default(), alphas: None, relief: None }
     }
 
     /// What Mitsuba gives shapes without a surface: grey, or, if they shine, black.
@@ -77,6 +79,7 @@ impl Surface {
     pub(super) fn is_textured(&self) -> bool {
         let varies = |texture: &Texture| !matches!(texture, Texture::Colour(_));
         self.relief.is_some()
+            || self.alphas.is_some()
             || self.opacity.as_ref().is_some_and(varies)
             || match &self.body {
                 Body::Blend(parts, share) => varies(share) || parts.iter().any(Self::is_textured),
@@ -86,8 +89,10 @@ impl Surface {
                     | Material::RoughConductor { reflectance: texture, .. }
                     | Material::Conductor { reflectance: texture, .. } => varies(texture),
                     Material::Lobes(lobes) => varies(&lobes.diffuse),
-                    Material::MetallicRoughness { base, metallic_roughness, .. } => {
-                        varies(base) || varies(metallic_roughness)
+                    Material::Principled(surface) => {
+                        varies(&surface.base)
+                            || varies(&surface.metallic_roughness)
+                            || surface.anisotropic > 0.0
                     }
                     _ => false,
                 },

@@ -3,6 +3,7 @@
 use super::context::Context;
 use super::raster::{Raster, linear};
 use super::xml::Element;
+use crate::channels;
 use crate::colour::Quantity;
 use crate::error::LoadError;
 use crate::picture::{self, Picture, Samples};
@@ -251,47 +252,21 @@ impl<'d> Context<'d> {
         })
     }
 
-    /// One texture of two numbers, constant or not, in green and blue.
-    pub(super) fn green_and_blue(
+    /// Grey textures as one, whose pixels `put` makes of their values.
+    pub(super) fn joined<const N: usize>(
         &self,
-        element: &'d Element,
-        names: [&str; 2],
-        missing: [f32; 2],
+        element: &Element,
+        parts: [&Texture; N],
+        put: impl Fn([f32; N]) -> Rgb,
     ) -> Result<Texture, LoadError> {
-        let number = |i: usize| {
-            let texture = self.factor(element, names[i], missing[i])?;
-            self.luminance(element, self.varying(element, texture)?)
-        };
-        let values = |image: &ImageTexture| -> Vec<f32> {
-            linear(&image.pixels).into_iter().map(|p| p[0] * image.factor[0]).collect()
-        };
-        let packed = |image: ImageTexture, green: Vec<f32>, blue: Vec<f32>| {
-            self.count_pixels(element, green.len())?;
-            let pixels = green.into_iter().zip(blue).map(|(green, blue)| [1.0, green, blue]).collect();
-            Ok(Texture::Image(ImageTexture { pixels: Pixels::Float(pixels), factor: [1.0; 3], ..image }))
-        };
-        let layout =
-            |image: &ImageTexture| (image.width, image.height, image.to_uv, image.wrap, image.nearest);
-        match (number(0)?, number(1)?) {
-            (Texture::Image(green), Texture::Image(blue)) if layout(&green) == layout(&blue) => {
-                let [green_values, blue_values] = [values(&green), values(&blue)];
-                packed(green, green_values, blue_values)
-            }
-            (Texture::Image(green), blue) => {
-                if !matches!(blue, Texture::Colour(_)) {
-                    let what = format!("the texture of `{}` is replaced by its mean", names[1]);
-                    self.approximated(element, what);
-                }
-                let (values, blue) = (values(&green), mean(&blue)[0]);
-                let blues = vec![blue; values.len()];
-                packed(green, values, blues)
-            }
-            (green, Texture::Image(blue)) => {
-                let (greens, values) = (vec![mean(&green)[0]; blue.width * blue.height], values(&blue));
-                packed(blue, greens, values)
-            }
-            (green, blue) => Ok(Texture::Colour([1.0, mean(&green)[0], mean(&blue)[0]])),
+        let (texture, replaced) = channels::joined(parts, mean, put);
+        if replaced {
+            self.approximated(element, "a second texture of another layout is replaced by its mean");
         }
+        if let Texture::Image(image) = &texture {
+            self.count_pixels(element, image.width * image.height)?;
+        }
+        Ok(texture)
     }
 
     /// The picture called `name`. Codes of 8 and 16 bits are sRGB-encoded unless `raw`.

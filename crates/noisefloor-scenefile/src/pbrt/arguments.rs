@@ -50,6 +50,12 @@ impl<'a, 't> Arguments<'a, 't> {
         self.skip().map(drop)
     }
 
+    /// Passes over an option: a declaration or a name in quotes, and its values.
+    pub(super) fn option(&mut self) -> Result<(), LoadError> {
+        self.text()?;
+        params::values(self.tokens, self.path, &self.place(), "Option").map(drop)
+    }
+
     pub(super) fn params(&mut self) -> Result<Params, LoadError> {
         params::read(self.tokens, self.path, self.line)
     }

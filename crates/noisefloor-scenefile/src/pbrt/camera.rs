@@ -19,6 +19,8 @@ pub(super) struct View {
     /// Half of the shorter edge of a parallel projection.
     parallel: Option<f64>,
     size: (usize, usize),
+    /// The part of the picture that is shown, in shares: from the left and right, top and bottom.
+    window: [[f64; 2]; 2],
     /// Factor on all light.
     pub(super) exposure: f32,
 }
@@ -32,6 +34,7 @@ impl Default for View {
             focus: 1e6,
             parallel: None,
             size: (1280, 720),
+            window: [[0.0, 1.0]; 2],
             exposure: 1.0,
         }
     }
@@ -87,6 +90,7 @@ impl View {
             Some(_) => Err(params.bad(format!("`{name}` is not in 1…{MAX_EDGE}"))),
         };
         self.size = (edge("xresolution", self.size.0)?, edge("yresolution", self.size.1)?);
+        self.window = self.crop(params)?;
         // pbrt 3 has a factor, pbrt 4 a sensor
         let scale = params.float("scale")?.unwrap_or(1.0);
         let exposure =
@@ -98,9 +102,32 @@ impl View {
         Ok(())
     }
 
-    /// Image size in pixels.
+    /// The part of the picture that is shown: `cropwindow` in shares, or `pixelbounds`.
+    fn crop(&self, params: &Params) -> Result<[[f64; 2]; 2], LoadError> {
+        let sizes = [self.size.0 as f64, self.size.1 as f64];
+        let (edges, units) = match (params.numbers("cropwindow")?, params.numbers("pixelbounds")?) {
+            (None, None) => return Ok([[0.0, 1.0]; 2]),
+            (Some([a, b, c, d]), _) => ([[*a, *b], [*c, *d]], sizes),
+            (None, Some([a, b, c, d])) => ([[*a, *b], [*c, *d]], [1.0; 2]),
+            _ => return Err(params.bad("a part of the picture has four numbers")),
+        };
+        let mut window = [[0.0, 1.0]; 2];
+        for axis in 0..2 {
+            // Whole pixels, as pbrt rounds
+            window[axis] =
+                edges[axis].map(|edge| (edge * units[axis]).clamp(0.0, sizes[axis]).ceil() / sizes[axis]);
+            if window[axis][0] >= window[axis][1] {
+                return Err(params.bad("a part of the picture is empty"));
+            }
+        }
+        Ok(window)
+    }
+
+    /// Image size in pixels, of the part that is shown.
     pub(super) fn size(&self) -> (usize, usize) {
-        self.size
+        let [x, y] = self.window.map(|[from, to]| to - from);
+        let part = |share: f64, size: usize| ((share * size as f64).round() as usize).max(1);
+        (part(x, self.size.0), part(y, self.size.1))
     }
 
     pub(super) fn look(&self) -> Camera {
@@ -126,6 +153,8 @@ impl View {
                 .map(|half| (2.0 * half * scale * (height / width).max(1.0)) as f32),
             // Its +x is to the right, where a camera of ours has view × up = −x
             mirrored: axes.determinant() > 0.0,
+            window: self.window.map(|edges| edges.map(|edge| edge as f32)),
+            ..Optics::default()
         }
     }
 }

@@ -11,13 +11,18 @@ use noisefloor::{Rgb, luminance};
 impl Reader<'_> {
     /// The colour of a factor, or an index of refraction by colour channel.
     pub(super) fn factor(&self, params: &Params, name: &str) -> Result<Option<Rgb>, LoadError> {
+        Ok(self.signed(params, name)?.map(|colour| colour.map(|c| c.max(0.0))))
+    }
+
+    /// The same as it is, which may be below 0.
+    pub(super) fn signed(&self, params: &Params, name: &str) -> Result<Option<Rgb>, LoadError> {
         let Some(param) = params.get(name) else { return Ok(None) };
         let colour = match (param.kind.as_str(), &param.values) {
             (_, Values::Numbers(numbers)) => self.of_numbers(params, param, numbers, Quantity::Factor)?,
             (_, Values::Texts(texts)) => self.named_spectrum(params, texts, Quantity::Factor)?,
             _ => return Err(params.bad(format!("`{name}` is not a colour"))),
         };
-        Ok(Some(colour.map(|c| c.max(0.0))))
+        Ok(Some(colour))
     }
 
     /// The radiance of a light. pbrt 4 brings spectra other than `rgb` to a luminance of 1; pbrt 3 takes them

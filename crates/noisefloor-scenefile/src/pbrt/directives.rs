@@ -26,8 +26,8 @@ impl Reader<'_> {
                 self.coordinate_systems.insert("world".to_owned(), DMat4::IDENTITY);
             }
             "WorldEnd" => {}
-            // Parameters alone
-            "Option" => drop(args.params()?),
+            // A parameter alone, in version 4 of a type and a name, and otherwise of a name
+            "Option" => args.option()?,
             "ReverseOrientation" => self.state.reversed = !self.state.reversed,
             "ObjectInstance" => {
                 let name = args.text()?;
@@ -129,7 +129,7 @@ impl Reader<'_> {
             }
             "MakeNamedMedium" => {
                 if !self.options.ignore_volumes {
-                    return Err(params.place.clone().unsupported("a participating medium"));
+                    return Err(params.place.clone().unsupported(crate::options::NO_MEDIA));
                 }
                 self.ignored(&params.place, "the participating medium is ignored");
             }
@@ -148,9 +148,8 @@ impl Reader<'_> {
             }
             "Film" => {
                 self.view.film(params)?;
-                // Names and formats of files, and parts of the picture
+                // Names and formats of files
                 params.ignore(&["filename", "diagonal", "savefp16", "maxcomponentvalue"]);
-                params.ignore(&["cropwindow", "pixelbounds"]);
                 self.say_unused(params, called);
             }
             "Integrator" => {
@@ -160,6 +159,10 @@ impl Reader<'_> {
                     let what = format!("the integrator `{kind}` is replaced by path tracing");
                     self.approximated(&params.place, what);
                 }
+            }
+            "ColorSpace" if kind != "srgb" => {
+                let what = format!("the colour space `{kind}` is ignored: colours are taken for sRGB's");
+                self.ignored(&params.place, what);
             }
             "Sampler" | "PixelFilter" | "Accelerator" | "ColorSpace" | "SurfaceIntegrator" | "Renderer"
             | "VolumeIntegrator" => {}

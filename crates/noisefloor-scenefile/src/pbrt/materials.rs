@@ -14,7 +14,7 @@ use std::rc::Rc;
 const MAX_NESTED: u32 = 16;
 
 /// What a material becomes.
-enum Made {
+pub(super) enum Made {
     Plain(Material),
     /// Light passes as if there were nothing.
     Nothing,
@@ -23,16 +23,21 @@ enum Made {
 }
 
 impl Reader<'_> {
-    /// The material of the shapes that come, where `alpha` is.
+    /// The material of the shapes that come, where `alpha` is, and whether they shine.
     pub(super) fn current_material(
         &mut self,
         alpha: Option<(String, Texture)>,
+        shines: bool,
         place: &Place,
     ) -> Result<MaterialId, LoadError> {
         let definition = match self.state.material.clone() {
             Look::Given(definition) => definition,
             Look::Named(name, here) => self.named(&name, &here)?,
         };
+        if shines && matches!(definition.kind.as_str(), "interface" | "none" | "") {
+            let refused = Self::refused(place);
+            return self.builder.material(Material::Nothing).map_err(refused);
+        }
         let key = (format!("{:p}", Rc::as_ptr(&definition)), alpha.as_ref().map(|alpha| alpha.0.clone()));
         // What is given stays in `kept`, so that no address is used twice
         if let Some(known) = self.materials.get(&key) {
@@ -49,7 +54,7 @@ impl Reader<'_> {
         found.ok_or_else(|| place.clone().bad(format!("there is no material `{name}`")))
     }
 
-    fn material(
+    pub(super) fn material(
         &mut self,
         definition: &Definition,
         opacity: Option<Texture>,
@@ -59,9 +64,10 @@ impl Reader<'_> {
         place.clone().at_most("nested materials", u64::from(depth), u64::from(MAX_NESTED))?;
         let relief = self.relief(definition)?;
         let opacity = self.opacity(definition, opacity)?;
-        let options = MaterialOptions { opacity, relief, ..MaterialOptions::default() };
         let refused = Self::refused(&definition.params.place);
-        let made = self.made(definition, depth)?;
+        let mut alphas = None;
+        let made = self.made(definition, depth, &mut alphas)?;
+        let options = MaterialOptions { opacity, relief, roughness: alphas, ..MaterialOptions::default() };
         definition.params.ignore(&["type"]);
         self.say_unused(&definition.params, &format!("the material `{}`", definition.kind));
         match made {
@@ -110,18 +116,8 @@ impl Reader<'_> {
         Ok(None)
     }
 
-    fn disney(&mut self, d: &Definition) -> Result<Material, LoadError> {
-        self.approximated(&d.params.place, replaced(d, "metal and gloss of the same colour"));
-        let (metallic, roughness) = (self.number(d, "metallic", 0.0)?, self.number(d, "roughness", 0.5)?);
-        let share = [1.0, roughness.clamp(0.0, 1.0) as f32, metallic.clamp(0.0, 1.0) as f32];
-        Ok(Material::MetallicRoughness {
-            base: self.colour(d, "color", [0.5; 3])?,
-            metallic_roughness: Texture::Colour(share),
-            ior: (self.number(d, "eta", 1.5)? as f32).clamp(1.001, 4.0),
-        })
-    }
-
-    fn made(&mut self, d: &Definition, depth: u32) -> Result<Made, LoadError> {
+    /// What a material becomes, and its α along and across u if they are no number.
+    fn made(&mut self, d: &Definition, depth: u32, alphas: &mut Option<Texture>) -> Result<Made, LoadError> {
         let near = |what| replaced(d, what);
         Ok(Made::Plain(match d.kind.as_str() {
             "diffuse" => Material::Diffuse { albedo: self.colour(d, "reflectance", [0.5; 3])? },
@@ -138,23 +134,24 @@ impl Reader<'_> {
                 d.params.ignore(&["thickness", "g", "albedo", "maxdepth", "nsamples"]);
                 self.approximated(&d.params.place, near("a coat on a Lambertian base"));
                 let (base, roughness) =
-                    (self.colour(d, "reflectance", [0.5; 3])?, self.roughness(d, 0.0, true)?);
+                    (self.colour(d, "reflectance", [0.5; 3])?, self.roughness(d, 0.0, true, alphas)?);
                 self.plastic(base, [1.0; 3], self.index(d, 1.5)?, roughness)
             }
-            "plastic" | "uber" | "substrate" | "translucent" => self.lobes(d)?.into(),
-            "conductor" | "metal" | "coatedconductor" => self.conductor(d)?,
+            "plastic" | "uber" | "substrate" | "translucent" => self.lobes(d, alphas)?.into(),
+            "conductor" | "metal" | "coatedconductor" => self.conductor(d, alphas)?,
             "mirror" => Material::Mirror { reflectance: mean(&self.colour(d, "Kr", [0.9; 3])?) },
             "dielectric" | "glass" | "thindielectric" => {
                 let tint = mean(&self.colour(d, "Kt", [1.0; 3])?);
                 d.params.ignore(&["Kr"]);
-                let (ior, roughness) = (self.index(d, 1.5)?, self.roughness(d, 0.0, d.kind == "dielectric")?);
+                let ior = self.index(d, 1.5)?;
                 if d.kind == "thindielectric" {
                     Material::ThinGlass { ior, tint }
                 } else {
+                    let roughness = self.roughness(d, 0.0, d.kind == "dielectric", alphas)?;
                     Material::RoughGlass { ior, tint, roughness }
                 }
             }
-            "disney" => self.disney(d)?,
+            "disney" => return self.disney(d),
             "diffusetransmission" => {
                 let scale = Texture::Colour([self.number(d, "scale", 1.0)?.max(0.0) as f32; 3]);
                 let [diffuse, through] = ["reflectance", "transmittance"].map(|name| {
@@ -166,7 +163,7 @@ impl Reader<'_> {
             "subsurface" | "kdsubsurface" => {
                 self.approximated(&d.params.place, near("a coat on a Lambertian base"));
                 d.params.ignore(&["sigma_a", "sigma_s", "mfp", "scale", "g", "name"]);
-                let roughness = self.roughness(d, 0.0, true)?;
+                let roughness = self.roughness(d, 0.0, true, alphas)?;
                 self.plastic(self.colour(d, "Kd", [0.5; 3])?, [1.0; 3], self.index(d, 1.33)?, roughness)
             }
             "interface" | "none" | "" => return Ok(Made::Nothing),
@@ -176,10 +173,10 @@ impl Reader<'_> {
     }
 
     /// The sums of lobes of version 3, but for what is perfectly specular besides facets.
-    fn lobes(&mut self, d: &Definition) -> Result<Lobes, LoadError> {
+    fn lobes(&mut self, d: &Definition, alphas: &mut Option<Texture>) -> Result<Lobes, LoadError> {
         let missing = if d.kind == "substrate" { 0.5 } else { 0.25 };
         let (diffuse, specular) = (self.colour(d, "Kd", [missing; 3])?, self.colour(d, "Ks", [missing; 3])?);
-        let roughness = self.roughness(d, 0.1, false)?.max(MIN_ROUGHNESS);
+        let roughness = self.roughness(d, 0.1, false, alphas)?.max(MIN_ROUGHNESS);
         let lobes = Lobes { diffuse, specular, roughness, ..Lobes::default() };
         let dielectric = |ior| Gloss::Dielectric { ior };
         Ok(match d.kind.as_str() {
@@ -215,7 +212,7 @@ impl Reader<'_> {
         Material::Plastic { diffuse, specular, ior, roughness, nonlinear: true }
     }
 
-    fn conductor(&mut self, d: &Definition) -> Result<Material, LoadError> {
+    fn conductor(&mut self, d: &Definition, alphas: &mut Option<Texture>) -> Result<Material, LoadError> {
         if d.kind == "coatedconductor" {
             self.approximated(&d.params.place, "the coat of a conductor is left out");
             d.params.ignore(&[
@@ -233,13 +230,13 @@ impl Reader<'_> {
         let prefix = if d.kind == "coatedconductor" { "conductor." } else { "" };
         let name = |name: &str| format!("{prefix}{name}");
         let missing = if d.kind == "metal" { 0.01 } else { 0.0 };
-        let roughness = self.roughness_of(d, prefix, missing, d.kind != "metal")?;
+        let roughness = self.roughness_of(d, prefix, missing, d.kind != "metal", alphas)?;
         if let Some(reflectance) = self.texture_or_colour(d, &name("reflectance"))? {
             return Ok(Material::RoughConductor { reflectance, roughness });
         }
         let copper = crate::indices::conductor("Cu").unwrap_or(([0.2, 0.9, 1.1], [3.9, 2.5, 2.1]));
-        let eta = self.factor(&d.params, &name("eta"))?.unwrap_or(copper.0).map(|x| x.clamp(0.0, 100.0));
-        let k = self.factor(&d.params, &name("k"))?.unwrap_or(copper.1).map(|x| x.clamp(0.0, 100.0));
+        let eta = self.metal_index(d, &name("eta"))?.unwrap_or(copper.0);
+        let k = self.metal_index(d, &name("k"))?.unwrap_or(copper.1);
         Ok(Material::Conductor { eta, k, reflectance: [1.0; 3].into(), roughness })
     }
 
@@ -269,11 +266,11 @@ impl Reader<'_> {
     }
 
     /// A colour or texture in 0…1.
-    fn colour(&self, d: &Definition, name: &str, missing: Rgb) -> Result<Texture, LoadError> {
+    pub(super) fn colour(&self, d: &Definition, name: &str, missing: Rgb) -> Result<Texture, LoadError> {
         Ok(self.texture_or_colour(d, name)?.unwrap_or(Texture::Colour(missing)))
     }
 
-    fn texture_or_colour(&self, d: &Definition, name: &str) -> Result<Option<Texture>, LoadError> {
+    pub(super) fn texture_or_colour(&self, d: &Definition, name: &str) -> Result<Option<Texture>, LoadError> {
         let Some(param) = d.params.get(name) else { return Ok(None) };
         if param.kind == "texture" {
             let called = d.params.text(name)?.unwrap_or_default();
@@ -285,7 +282,7 @@ impl Reader<'_> {
     }
 
     /// A number; of a texture its mean.
-    fn number(&mut self, d: &Definition, name: &str, missing: f64) -> Result<f64, LoadError> {
+    pub(super) fn number(&mut self, d: &Definition, name: &str, missing: f64) -> Result<f64, LoadError> {
         match d.params.get(name).map(|p| p.kind.as_str()) {
             None => Ok(missing),
             Some("texture") => {
@@ -309,41 +306,9 @@ impl Reader<'_> {
         }
         Ok(missing)
     }
-
-    fn roughness(&mut self, d: &Definition, missing: f64, fourth: bool) -> Result<f32, LoadError> {
-        self.roughness_of(d, "", missing, fourth)
-    }
-
-    /// GGX α: pbrt 4 takes the square root of its roughness, pbrt 3 a polynomial of its logarithm.
-    fn roughness_of(
-        &mut self,
-        d: &Definition,
-        prefix: &str,
-        missing: f64,
-        fourth: bool,
-    ) -> Result<f32, LoadError> {
-        let name = |name: &str| format!("{prefix}{name}");
-        let both = self.number(d, &name("roughness"), missing)?;
-        let u = self.number(d, &name("uroughness"), both)?;
-        let v = self.number(d, &name("vroughness"), both)?;
-        if u != v {
-            self.approximated(&d.params.place, "roughness that depends on direction is replaced by its mean");
-        }
-        let roughness = (u * v).max(0.0).sqrt();
-        let alpha = match d.params.switch("remaproughness", true)? {
-            false => roughness,
-            true if fourth => roughness.sqrt(),
-            // Of version 3 only glass can be smooth
-            true if roughness == 0.0 && d.kind == "glass" => 0.0,
-            true => {
-                let x = roughness.max(1e-3).ln();
-                1.621_42 + x * (0.819_955 + x * (0.1734 + x * (0.017_120_1 + x * 0.000_640_711)))
-            }
-        };
-        Ok(alpha.clamp(0.0, 1.0) as f32)
-    }
 }
 
-fn replaced(d: &Definition, what: &str) -> String {
+/// A phrase for a warning.
+pub(super) fn replaced(d: &Definition, what: &str) -> String {
     format!("the material `{}` is replaced by {what}", d.kind)
 }

@@ -11,6 +11,7 @@ mod camera;
 mod colours;
 mod directives;
 mod environment;
+mod gloss;
 mod lights;
 mod materials;
 mod moves;

@@ -51,7 +51,12 @@ pub(super) fn read(tokens: &mut Tokens<'_>, path: &Path, line: u32) -> Result<Pa
 }
 
 /// One value, or some in brackets.
-fn values(tokens: &mut Tokens<'_>, path: &Path, here: &Place, name: &str) -> Result<Values, LoadError> {
+pub(super) fn values(
+    tokens: &mut Tokens<'_>,
+    path: &Path,
+    here: &Place,
+    name: &str,
+) -> Result<Values, LoadError> {
     let open = |line: u32| at(path, line).bad("a quote does not end");
     let (mut numbers, mut texts, mut switches) = (vec![], vec![], vec![]);
     let mut bracket = false;

@@ -18,13 +18,13 @@ impl Reader<'_> {
     pub(super) fn shape(&mut self, kind: &str, params: &Params) -> Result<(), LoadError> {
         if self.state.in_medium {
             if !self.options.ignore_volumes {
-                return Err(params.place.clone().unsupported("a participating medium"));
+                return Err(params.place.clone().unsupported(crate::options::NO_MEDIA));
             }
             self.ignored(&params.place, "the participating medium is ignored");
         }
         let alpha = self.alpha(params)?;
-        let material = self.current_material(alpha, &params.place)?;
         let emission = self.emission()?;
+        let material = self.current_material(alpha, emission.is_some(), &params.place)?;
         let wear = Wear { material, emission };
         if kind == "sphere" && self.open_object.is_none() && self.round_sphere(params, &wear)? {
             return Ok(());

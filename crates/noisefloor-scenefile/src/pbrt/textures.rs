@@ -3,6 +3,7 @@
 use super::params::Params;
 use super::reader::Reader;
 use super::state::{Definition, Height, plain};
+use crate::channels::linear;
 use crate::error::LoadError;
 use crate::picture::{self, Samples};
 use noisefloor::{Rgb, srgb_decode};
@@ -214,16 +215,6 @@ fn uv_map(params: &Params) -> Result<[[f32; 3]; 2], LoadError> {
     let (ud, vd) = (number("udelta", 0.0)?, number("vdelta", 0.0)?);
     params.ignore(&["v1", "v2"]);
     Ok([[us, 0.0, ud], [0.0, vs, vd]])
-}
-
-/// Linear values of pixels.
-fn linear(pixels: &Pixels) -> Vec<Rgb> {
-    let value = |code: u8| f32::from(code) / 255.0;
-    match pixels {
-        Pixels::Srgb8(codes) => codes.iter().map(|p| p.map(|code| srgb_decode(value(code)))).collect(),
-        Pixels::Linear8(codes) => codes.iter().map(|p| p.map(value)).collect(),
-        Pixels::Float(values) => values.to_vec(),
-    }
 }
 
 /// The mean colour of a texture.

@@ -68,7 +68,7 @@ impl<'a> Tokens<'a> {
                 Kind::Text(body[..end].to_owned())
             }
             _ => {
-                let ends = |c: char| c.is_whitespace() || matches!(c, '"' | '[' | ']' | '#');
+                let ends = |c: char| c.is_whitespace() || matches!(c, '"' | '[' | ']' | '#' | ',');
                 let end = self.rest.find(ends).unwrap_or(self.rest.len());
                 let (word, rest) = self.rest.split_at(end);
                 self.rest = rest;
@@ -81,7 +81,8 @@ impl<'a> Tokens<'a> {
     /// Skips white space and comments.
     fn skip_space(&mut self) {
         loop {
-            let trimmed = self.rest.trim_start();
+            // Exporters of version 3 put commas between numbers
+            let trimmed = self.rest.trim_start_matches(|c: char| c.is_whitespace() || c == ',');
             self.line += self.rest[..self.rest.len() - trimmed.len()].matches('\n').count() as u32;
             self.rest = trimmed;
             if !self.rest.starts_with('#') {
@@ -98,7 +99,7 @@ mod tests {
 
     #[test]
     fn words_are_split_and_counted() {
-        let text = "Shape # a \"comment\"\n\"point P\"[0 1e-3]\n\n\"a\nb\" end";
+        let text = "Shape # a \"comment\"\n\"point P\"[0, 1e-3,]\n\n\"a\nb\" end";
         let mut tokens = Tokens::new(text);
         let mut all = Vec::new();
         while let Some(token) = tokens.next().unwrap() {

@@ -127,6 +127,26 @@ fn what_glows_a_little_does_not_light_the_scene() {
     ));
     assert!(!warns(r#"{"extensions": {"KHR_materials_unlit": {}}}"#));
 
+    // A headlight, however bright, shows too little of the wall that it is on
+    let mut maker = Maker::new();
+    let wall = maker.rectangle([-1.0, 1.0], [-1.0, 1.0], -1.0, "{}");
+    maker.node(&format!(r#"{{"mesh": {wall}}}"#));
+    let lamp = maker.rectangle(
+        [-0.1, 0.1],
+        [-0.1, 0.1],
+        -0.999,
+        r#"{"emissiveFactor": [1, 1, 1],
+            "extensions": {"KHR_materials_emissive_strength": {"emissiveStrength": 20}}}"#,
+    );
+    maker.node(&format!(r#"{{"mesh": {lamp}}}"#));
+    crate::kit::assert_warns(&maker.load().unwrap(), &["its own lights show next to nothing", "a grey sky"]);
+    // In front of it, and turned to it, it is a lamp
+    let turned = r#", "rotation": [0, 1, 0, 0], "translation": [0, 0, -1.2]"#;
+    maker.root["nodes"].as_array_mut().unwrap().pop();
+    maker.root["scenes"][0]["nodes"].as_array_mut().unwrap().pop();
+    maker.node(&format!(r#"{{"mesh": {lamp}{turned}}}"#));
+    assert_eq!(maker.load().unwrap().warnings, []);
+
     // A roof: two white sides that face left and right
     let mut maker = Maker::new();
     let mesh =

@@ -89,7 +89,7 @@ fn unsupported_kinds_are_named() {
         ),
         (bsdf("<bsdf type=\"diffuse\"/><bsdf type=\"diffuse\"/>"), "line 3: a shape has at most one bsdf"),
         (bsdf("<emitter type=\"area\"/><emitter type=\"area\"/>"), "line 3: a shape has at most one emitter"),
-        (bsdf("<emitter type=\"point\"/>"), "line 3: <emitter type=\"point\"> in a shape is not supported"),
+        (bsdf("<emitter type=\"ies\"/>"), "line 3: <emitter type=\"ies\"> in a shape is not supported"),
         ("<emitter type=\"ies\"/>".to_owned(), "line 2: <emitter type=\"ies\"> is not supported"),
     ]);
 }

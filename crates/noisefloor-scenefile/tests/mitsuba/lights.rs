@@ -184,3 +184,48 @@ fn emitted_spectra_are_colours() {
     assert!(warm[0] > warm[1] && warm[1] > warm[2], "{warm:?}");
     assert!((cold[1] / warm[1] - 316.6 / 74.2).abs() < 0.3, "{warm:?} {cold:?}");
 }
+
+/// A lamp of nothing, as Blender writes them: seen before what lies behind it, in front of other lights without hiding
+/// them, and dark from behind.
+#[test]
+fn lamps_of_nothing_shine() {
+    let folder = Folder::new();
+    let lamp = |more: &str| {
+        format!(
+            r#"<shape type="rectangle">{more}<bsdf type="null"/>
+            <emitter type="area"><rgb name="radiance" value="0.5 0.25 0"/></emitter></shape>"#
+        )
+    };
+    let sky = r#"<emitter type="constant"/>"#;
+    let front = lamp("") + sky;
+    close(folder.see(&front), [1.5, 1.25, 1.0], 1e-4, &front);
+    let back = lamp(r#"<boolean name="flip_normals" value="true"/>"#) + sky;
+    close(folder.see(&back), [1.0; 3], 1e-4, &back);
+
+    // A floor lit by a small lamp, and by the sky through it: ρ/π·(A·L/h² + π) where it looks straight up
+    let up = r#"<transform name="to_world"><scale value="0.05"/><rotate y="1" angle="180"/><translate z="2"/></transform>"#;
+    let floor = r#"<shape type="rectangle"><transform name="to_world"><scale value="9"/></transform>
+        <bsdf type="diffuse"><float name="reflectance" value="0.5"/></bsdf></shape>"#;
+    let small = lamp(up).replace("0.5 0.25 0", "500 250 0") + floor + sky;
+    let light = |radiance: f32| 0.5 / std::f32::consts::PI * 0.01 / 4.0 * radiance + 0.5;
+    // One lobe and one sky: 4096 samples have a standard error of 1 %
+    close(folder.see(&small), [light(500.0), light(250.0), light(0.0)], 0.04, &small);
+}
+
+/// An emitter of another kind in a shape shines as it would by itself.
+#[test]
+fn spots_in_shapes_shine() {
+    let folder = Folder::new();
+    let floor =
+        r#"<shape type="rectangle"><transform name="to_world"><scale value="9"/></transform></shape>"#;
+    let spot = r#"<emitter type="point"><point name="position" x="0" y="0" z="2"/><rgb name="intensity" value="8 4 2"/>
+        </emitter>"#;
+    let inside = format!(
+        r#"{floor}<shape type="sphere"><point name="center" x="90" y="0" z="0"/><float name="radius" value="0.1"/>
+        {spot}</shape>"#
+    );
+    let want = [8.0, 4.0, 2.0].map(|i| 0.5 / std::f32::consts::PI * i / 4.0);
+    close(folder.see(&inside), want, 1e-3, &inside);
+    let beam = format!(r#"{floor}<emitter type="collimated"/>"#);
+    assert!(folder.body(&beam).unwrap().warnings[0].what.contains("the beam is ignored"));
+}

@@ -34,7 +34,7 @@ fn errors_say_where_and_what() {
         ("Include \"../a.pbrt\"", "lies outside the folder of the scene"),
         ("Shape \"plymesh\" \"string filename\" \"none.ply\"", "cannot be read"),
         ("12", "expected a directive"),
-        ("MakeNamedMedium \"fog\"", "a participating medium is not supported"),
+        ("MakeNamedMedium \"fog\"", "a participating medium (`--ignore volumes` leaves them all out)"),
         ("AreaLightSource \"diffuse\" \"rgb L\" [-1 0 0] Shape \"sphere\"", "is negative or too large"),
         ("LightSource \"infinite\" LightSource \"infinite\"", "a second light surrounds the scene"),
     ] {
@@ -58,7 +58,8 @@ fn all_is_said_at_once() {
     let world = "Shape \"sphere\" \"float wobble\" 1\nMaterial \"coateddiffuse\" Shape \"sphere\"";
     let warnings = folder.world(world).unwrap().warnings;
     let warnings: Vec<String> = warnings.iter().map(ToString::to_string).collect();
-    assert_eq!(warnings.len(), 2, "{warnings:?}");
+    assert_eq!(warnings.len(), 3, "{warnings:?}");
+    assert!(warnings[2].ends_with("scene.pbrt: the scene has no light: it is black"), "{warnings:?}");
     assert!(warnings[0].ends_with("line 3: `wobble` of Shape \"sphere\" is ignored"), "{warnings:?}");
     assert!(warnings[1].contains("line 4: the material `coateddiffuse` is replaced by"), "{warnings:?}");
 
@@ -66,4 +67,22 @@ fn all_is_said_at_once() {
     options.ignore_volumes = true;
     let text = "WorldBegin MakeNamedMedium \"m\" MediumInterface \"m\" \"\" Shape \"sphere\"";
     assert!(!folder.load_with(text, &options).unwrap().warnings.is_empty());
+}
+
+/// What version 3 and its exporters write, and what makes the picture another one.
+#[test]
+fn odd_spellings_are_read_and_losses_are_named() {
+    let folder = Folder::new();
+    let lit = "LightSource \"infinite\" \"rgb L\" [1, 1, 1,]\n";
+    let loaded = folder.world(&format!("{lit}Shape \"sphere\" \"float radius\" 1,")).unwrap();
+    assert_eq!(loaded.warnings, []);
+    let options = "Option \"seed\" 42 Option \"string msereferenceimage\" \"a.exr\" ColorSpace \"srgb\"\n";
+    let text = format!("{options}{}WorldBegin {lit}", crate::util::CAMERA);
+    let loaded = folder.load_with(&text, &LoadOptions::default()).unwrap();
+    assert_eq!(loaded.warnings, []);
+    let loaded = folder.load_with(&text.replace("\"srgb\"", "\"rec2020\""), &LoadOptions::default()).unwrap();
+    assert!(loaded.warnings[0].what.contains("the colour space `rec2020` is ignored"));
+    let metal = "Material \"metal\" \"rgb eta\" [-0.01 1 1] \"rgb k\" [3 3 3] Shape \"sphere\"";
+    let loaded = folder.world(&format!("{lit}{metal}")).unwrap();
+    assert!(loaded.warnings[0].what.contains("brought into 0…100"), "{:?}", loaded.warnings);
 }

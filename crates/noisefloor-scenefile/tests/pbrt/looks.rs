@@ -1,5 +1,6 @@
 use crate::util::{CAMERA, Folder, close, look};
-use noisefloor_ptwne::FovAxis;
+use noisefloor::{ProgressiveSource, Request, Tile};
+use noisefloor_ptwne::{FovAxis, Ptwne, RenderOptions};
 use noisefloor_scenefile::LoadOptions;
 
 /// A square from −1 to 1 whose front is +z.
@@ -252,4 +253,76 @@ fn maps_lie_as_in_pbrt() {
     // And along +y, a quarter of the way round
     let quarter = folder.see(&sky("Rotate -90 1 0 0"));
     assert!((quarter[0] - 1.5).abs() < 0.2 && (quarter[1] - 1.5).abs() < 0.1, "{quarter:?}");
+}
+
+/// A part of the picture shows what the whole shows there: a ball right of the middle.
+#[test]
+fn windows_are_parts_of_the_picture() {
+    let folder = Folder::new();
+    let picture = |film: &str| {
+        let text = format!(
+            "LookAt 0 0 5 0 0 0 0 1 0 Camera \"perspective\" \"float fov\" 40
+            Film \"image\" \"integer xresolution\" 40 \"integer yresolution\" 30 {film} WorldBegin
+            AreaLightSource \"diffuse\" Translate -0.9 0.5 0 Shape \"sphere\" \"float radius\" 0.4"
+        );
+        let loaded = folder.load_with(&text, &LoadOptions::default()).unwrap();
+        (loaded.size.unwrap(), loaded.scene)
+    };
+    let lit = |film: &str| {
+        let ((width, height), scene) = picture(film);
+        let mut source = Ptwne::new(scene, width, height, RenderOptions::default()).unwrap();
+        let tile = Tile { index: 0, x: 0, y: 0, width, height };
+        let mean = source.sample(&[Request { tile, first: 0, spp: 64 }]).unwrap().remove(0).mean;
+        (width, height, mean.iter().map(|p| p[0]).collect::<Vec<f32>>())
+    };
+    let (_, _, whole) = lit("");
+    assert!(whole.iter().any(|p| *p > 0.9));
+    for film in ["\"float cropwindow\" [0.5 0.9 0.1 0.6]", "\"integer pixelbounds\" [20 36 3 18]"] {
+        let (width, height, part) = lit(film);
+        assert_eq!((width, height), (16, 15), "{film}");
+        for (i, p) in part.iter().enumerate() {
+            let q = whole[(3 + i / 16) * 40 + 20 + i % 16];
+            // At the rim by the shares of 64 samples: five standard deviations
+            assert!((p - q).abs() < 5.0 * (2.0 * 0.25 / 64f32).sqrt(), "{film} {i}: {p} {q}");
+        }
+    }
+}
+
+/// A surface of nothing shines before what lies behind it, and hides nothing.
+#[test]
+fn lamps_of_nothing_shine() {
+    let folder = Folder::new();
+    let lamp = "AttributeBegin AreaLightSource \"diffuse\" \"rgb L\" [0.5 0.25 0] Material \"interface\"
+        Shape \"disk\" \"float radius\" 1 AttributeEnd LightSource \"infinite\" \"rgb L\" [1 1 1]";
+    close(folder.see(lamp), [1.5, 1.25, 1.0], 1e-4, lamp);
+}
+
+/// The metal of `disney` and its roughness by a picture: a lobe that is narrow on the left and wide on the right.
+#[test]
+fn roughness_may_be_a_picture() {
+    let folder = Folder::new();
+    let image = image::RgbImage::from_fn(2, 1, |x, _| image::Rgb([if x == 0 { 26 } else { 204 }; 3]));
+    image.save(folder.path().join("r.png")).unwrap();
+    let map = "Texture \"r\" \"float\" \"imagemap\" \"string filename\" \"r.png\" \"string filter\" \"point\"
+        \"string encoding\" \"linear\"";
+    let quad = "Shape \"trianglemesh\" \"point3 P\" [-1 -1 0 1 -1 0 1 1 0 -1 1 0]
+        \"point2 uv\" [0 0 1 0 1 1 0 1] \"integer indices\" [0 1 2 0 2 3]";
+    let sun = "LightSource \"distant\" \"point3 from\" [0 0.4 1] \"point3 to\" [0 0 0] \"rgb L\" [1 1 1]";
+    for kind in [
+        "\"conductor\" \"rgb reflectance\" [1 1 1] \"bool remaproughness\" false",
+        "\"disney\" \"rgb color\" [1 1 1] \"float metallic\" 1",
+    ] {
+        let at = |x: f32, roughness: &str| {
+            folder.see(&format!("{map}\n{sun}\nTranslate {x} 0 0 Material {kind} {roughness} {quad}"))[0]
+        };
+        for (x, value) in [(0.5, 26.0 / 255.0), (-0.5, 204.0 / 255.0)] {
+            let plain = at(x, &format!("\"float roughness\" {value}"));
+            let mapped = at(x, "\"texture roughness\" \"r\"");
+            assert!((mapped / plain - 1.0).abs() < 1e-4, "{kind} {x}: {mapped} {plain}");
+        }
+        assert!(
+            (at(0.5, "\"texture roughness\" \"r\"") / at(-0.5, "\"texture roughness\" \"r\"") - 1.0).abs()
+                > 0.5
+        );
+    }
 }
