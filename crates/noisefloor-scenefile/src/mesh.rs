@@ -109,17 +109,32 @@ impl Triangles {
         if self.face_colours.is_empty() {
             return;
         }
-        let corners = self.indices.as_flattened();
-        let spread = |rows: &[[f32; 3]]| -> Vec<[f32; 3]> {
-            if rows.is_empty() { vec![] } else { corners.iter().map(|i| rows[*i as usize]).collect() }
-        };
-        let (positions, normals) = (spread(&self.positions), spread(&self.normals));
-        if !self.uvs.is_empty() {
-            self.uvs = corners.iter().map(|i| self.uvs[*i as usize]).collect();
-        }
+        self.colours.clear();
+        self.separate();
         self.colours = self.face_colours.iter().flat_map(|colour| [*colour; 3]).collect();
+    }
+
+    /// Gives each triangle corners of its own, with these texture coordinates, if there are no others.
+    pub(crate) fn map_each(&mut self, uvs: [[f32; 2]; 3]) {
+        if self.uvs.is_empty() {
+            self.separate();
+            self.uvs = self.indices.iter().flat_map(|_| uvs).collect();
+        }
+    }
+
+    /// Gives each triangle corners of its own.
+    fn separate(&mut self) {
+        fn spread<T: Copy>(rows: &mut Vec<T>, corners: &[u32]) {
+            if !rows.is_empty() {
+                *rows = corners.iter().map(|i| rows[*i as usize]).collect();
+            }
+        }
+        let corners = self.indices.as_flattened();
+        spread(&mut self.positions, corners);
+        spread(&mut self.normals, corners);
+        spread(&mut self.uvs, corners);
+        spread(&mut self.colours, corners);
         self.indices = (0..self.indices.len() as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
-        (self.positions, self.normals) = (positions, normals);
     }
 
     /// Adds it to a scene: as a parallelogram, which is one light, or as triangles. Returns how many of them have no

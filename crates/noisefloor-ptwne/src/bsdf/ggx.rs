@@ -50,9 +50,11 @@ impl Ggx {
     /// The same facets with other α along x and y.
     #[inline]
     pub(crate) fn stretched(self, [x, y]: [f32; 2]) -> Self {
+        if x == y {
+            return Self { alpha: x, stretch: [1.0; 2], ..self };
+        }
         let alpha = (x * y).sqrt();
-        let stretch = if x == y { [1.0; 2] } else { [x / alpha, alpha / x] };
-        Self { alpha, stretch, ..self }
+        Self { alpha, stretch: [x / alpha, alpha / x], ..self }
     }
 
     /// A normal of the facets as it would be if their α was the same in all directions (Heitz 2014, §5.3); but for

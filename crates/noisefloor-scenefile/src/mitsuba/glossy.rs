@@ -157,7 +157,7 @@ impl<'d> Context<'d> {
     /// A number of 0…1 or a texture of it.
     pub(super) fn grey(&self, element: &'d Element, name: &str, missing: f32) -> Result<Texture, LoadError> {
         let texture = match element.get(name) {
-            Some(child) if matches!(child.tag.as_str(), "texture" | "ref" | "spectrum") => {
+            Some(child) if !matches!(child.tag.as_str(), "float" | "integer") => {
                 self.factor(element, name, missing)?
             }
             _ => {

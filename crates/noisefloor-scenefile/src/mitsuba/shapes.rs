@@ -80,6 +80,7 @@ impl<'d> Context<'d> {
         };
         let inside_out = round.as_ref().is_some_and(|sphere| sphere.inside_out);
         let (material, textured) = self.material(element, emission.is_some(), inside_out, filling)?;
+        let mapped = textured || glows;
 
         match (element.kind(), round) {
             ("sphere", Some(Sphere { centre, radius, axes, .. })) => {
@@ -97,11 +98,11 @@ impl<'d> Context<'d> {
             }
             ("obj" | "ply" | "serialized" | "rectangle" | "cube" | "sphere" | "cylinder", _) => {
                 match instance {
-                    None => self.add(element, &self.triangles(element)?, filling, material, emission),
+                    None => self.add(element, &self.triangles(element, mapped)?, filling, material, emission),
                     Some(to_world) => {
                         let mesh = match filling.meshes.get(&element.serial) {
                             Some(mesh) => mesh.clone(),
-                            None => Rc::new(self.triangles(element)?),
+                            None => Rc::new(self.triangles(element, mapped)?),
                         };
                         filling.meshes.insert(element.serial, mesh.clone());
                         let mut mesh = (*mesh).clone();
@@ -172,8 +173,8 @@ impl<'d> Context<'d> {
         }
     }
 
-    /// The triangles of a shape, in the scene, as the renderer wants them.
-    fn triangles(&self, element: &'d Element) -> Result<Triangles, LoadError> {
+    /// The triangles of a shape, in the scene, as the renderer wants them; with texture coordinates if it is `mapped`.
+    fn triangles(&self, element: &'d Element, mapped: bool) -> Result<Triangles, LoadError> {
         let kind = element.kind();
         let (mut mesh, own_face_normals) = match kind {
             "rectangle" => (solids::rectangle(), false),
@@ -204,6 +205,10 @@ impl<'d> Context<'d> {
         mesh.transform(self.transform(element, "to_world")? * own);
         if mesh.normals.is_empty() && !flat {
             mesh.smooth();
+        }
+        if mapped {
+            // Mitsuba takes the weights of the second and third corner, and its v runs down
+            mesh.map_each([[0.0, 1.0], [1.0, 1.0], [0.0, 0.0]]);
         }
         if !mesh.normals.is_empty() {
             mesh.face_normals_outwards();

@@ -75,7 +75,7 @@ impl Surface {
         self
     }
 
-    /// Whether it has a texture.
+    /// Whether it has a texture, or runs along texture coordinates.
     pub(super) fn is_textured(&self) -> bool {
         let varies = |texture: &Texture| !matches!(texture, Texture::Colour(_));
         self.relief.is_some()

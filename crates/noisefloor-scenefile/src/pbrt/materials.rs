@@ -49,6 +49,15 @@ impl Reader<'_> {
         Ok(id)
     }
 
+    /// Whether the material of the shapes that come may have a texture.
+    pub(super) fn is_textured(&self) -> bool {
+        let definition = match &self.state.material {
+            Look::Given(definition) => Some(definition),
+            Look::Named(name, _) => self.named_materials.get(name),
+        };
+        definition.is_some_and(|d| d.kind == "mix" || d.params.has_texture())
+    }
+
     fn named(&self, name: &str, place: &Place) -> Result<Rc<Definition>, LoadError> {
         let found = self.named_materials.get(name).cloned();
         found.ok_or_else(|| place.clone().bad(format!("there is no material `{name}`")))

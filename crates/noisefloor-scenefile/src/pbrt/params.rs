@@ -131,6 +131,11 @@ impl Params {
         Some(found)
     }
 
+    /// Whether any parameter is a texture.
+    pub(super) fn has_texture(&self) -> bool {
+        self.all.iter().any(|p| p.kind == "texture")
+    }
+
     /// Marks parameters that make no difference.
     pub(super) fn ignore(&self, names: &[&str]) {
         self.all.iter().filter(|p| names.contains(&p.name.as_str())).for_each(|p| p.used.set(true));

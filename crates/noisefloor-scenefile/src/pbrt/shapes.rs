@@ -31,6 +31,9 @@ impl Reader<'_> {
         }
         let (mut mesh, own) = self.form(kind, params)?;
         mesh.check(&params.place)?;
+        if self.is_textured() {
+            mesh.map_each([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]]);
+        }
 
         // The front is where shading normals point, or else the corners say so in the shape's own coordinates
         let to_world = self.state.to_world * own;

@@ -204,3 +204,24 @@ fn instances_are_where_they_are_put() {
     let nested = format!("{group}{nested}{}", instance.replace("AT", "").replace("\"g\"", "\"h\""));
     assert!(folder.body(&nested).unwrap_err().contains("an instance in a group is not supported"));
 }
+
+/// Without coordinates in its file, a triangle has the weights of its second and third corner, as in Mitsuba: u grows
+/// to the second, and the picture's rows run to the third.
+#[test]
+fn meshes_without_coordinates_are_mapped_by_their_corners() {
+    let ply = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
+        element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n4 0 0\n0 4 0\n3 0 1 2\n";
+    let pixels = [[0, 0, 0, 255], [255, 0, 0, 255], [0, 255, 0, 255], [255, 255, 0, 255]];
+    let folder = Folder::new().with("a.ply", ply).with_png("a.png", 2, &pixels);
+    for (x, y, want) in
+        [(0.8, 0.8, [0.0, 0.0]), (2.8, 0.6, [1.0, 0.0]), (0.6, 2.8, [0.0, 1.0]), (1.9, 1.9, [0.0, 0.0])]
+    {
+        let seen = folder.see(&format!(
+            r#"<shape type="ply"><string name="filename" value="a.ply"/>
+            <transform name="to_world"><translate x="-{x}" y="-{y}"/></transform>
+            <emitter type="area"><texture type="bitmap" name="radiance"><string name="filename" value="a.png"/>
+            <boolean name="raw" value="true"/><string name="filter_type" value="nearest"/></texture></emitter></shape>"#
+        ));
+        close(seen, [want[0], want[1], 0.0], 1e-3, &format!("{x} {y}"));
+    }
+}

@@ -326,3 +326,26 @@ fn roughness_may_be_a_picture() {
         );
     }
 }
+
+/// Without coordinates, the corners of a triangle have (0, 0), (1, 0) and (1, 1), as in pbrt.
+#[test]
+fn triangles_without_coordinates_are_mapped_by_their_corners() {
+    let folder = Folder::new();
+    // White is left and below
+    let image =
+        image::RgbImage::from_fn(2, 2, |x, y| image::Rgb(if x == 0 && y == 1 { [255; 3] } else { [0; 3] }));
+    image.save(folder.path().join("a.png")).unwrap();
+    let seen = |x: f32, y: f32| {
+        folder.see(&format!(
+            "Texture \"a\" \"spectrum\" \"imagemap\" \"string filename\" \"a.png\" \"string filter\" \"point\"
+            {SKY} Material \"matte\" \"texture Kd\" \"a\" Translate {} {} 0
+            Shape \"trianglemesh\" \"point3 P\" [0 0 0 4 0 0 0 4 0] \"integer indices\" [0 1 2]",
+            -x, -y
+        ))[0]
+    };
+    // u = (x + y)/4 and v = y/4
+    close([seen(1.0, 0.5); 3], [1.0; 3], 0.03, "below and left");
+    for (x, y) in [(2.5, 0.5), (1.0, 2.2)] {
+        assert!(seen(x, y) < 1e-3, "{x} {y}");
+    }
+}
