@@ -47,8 +47,8 @@ pub struct Optics {
     pub parallel_height: Option<f32>,
     /// Whether left and right are exchanged.
     pub mirrored: bool,
-    /// The part of the picture that is shown, as shares of its width from the left and of its height from the top:
-    /// −100…100. The field of view is that of the whole. [[0, 1], [0, 1]] is all of it.
+    /// The part of the picture that is shown, as shares of its width from the left and of its height from
+    /// the top: −100…100. The field of view is that of the whole. [[0, 1], [0, 1]] is all of it.
     pub window: [[f32; 2]; 2],
     /// What is nearer along the view is not seen, in scene units, 0…1e6.
     pub near: f32,

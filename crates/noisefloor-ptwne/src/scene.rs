@@ -169,8 +169,8 @@ impl Scene {
     }
 
     /// Whether any surface is partly transparent or has no back
-    /// ([`MaterialOptions::opacity`](crate::MaterialOptions::opacity) and `culled`), so that rays must test it. Other
-    /// scenes are rendered by code without that test.
+    /// ([`MaterialOptions::opacity`](crate::MaterialOptions::opacity) and `culled`), so that rays must test
+    /// it. Other scenes are rendered by code without that test.
     pub fn has_opacity(&self) -> bool {
         self.has_opacity
     }

@@ -23,8 +23,8 @@ pub(crate) fn mapped(image: &ImageTexture, change: impl Fn(Rgb) -> Rgb) -> Image
     ImageTexture { pixels, factor: [1.0; 3], ..image.clone() }
 }
 
-/// Grey textures as one, whose pixels `put` makes of their values. A picture that does not lie as the first does is
-/// replaced by its mean; the second result is whether there was one.
+/// Grey textures as one, whose pixels `put` makes of their values. A picture that does not lie as the first
+/// does is replaced by its mean; the second result is whether there was one.
 pub(crate) fn joined<const N: usize>(
     parts: [&Texture; N],
     mean: impl Fn(&Texture) -> Rgb,

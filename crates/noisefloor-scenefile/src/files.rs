@@ -119,8 +119,9 @@ impl Folder {
     }
 }
 
-/// The farthest folder that a scene in `folder` shares with others: up to two above its own. Meshes and textures of
-/// a collection lie there. It must be deep enough that a scene cannot show what is no part of the collection.
+/// The farthest folder that a scene in `folder` shares with others: up to two above its own. Meshes and
+/// textures of a collection lie there. It must be deep enough that a scene cannot show what is no part of
+/// the collection.
 fn shared(folder: &Path) -> PathBuf {
     let home = std::env::var_os("HOME").or_else(|| std::env::var_os("USERPROFILE")).map(PathBuf::from);
     let home = home.and_then(|home| home.canonicalize().ok());

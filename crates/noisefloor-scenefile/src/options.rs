@@ -13,9 +13,10 @@ pub struct LoadOptions {
     /// Whether participating media are left out with a warning. Without it a scene that has any is refused:
     /// its picture would be another one.
     pub ignore_volumes: bool,
-    /// The folder that files named by the scene must lie in. By default that of the scene file, or one of the two
-    /// above it that it shares with other scenes: not the user's own folder nor one right below it, and none of the
-    /// first three levels from the top of the file system, where things lie that are no part of a scene.
+    /// The folder that files named by the scene must lie in. By default that of the scene file, or one of
+    /// the two above it that it shares with other scenes: not the user's own folder nor one right below it,
+    /// and none of the first three levels from the top of the file system, where things lie that are no part
+    /// of a scene.
     pub root: Option<PathBuf>,
 }
 

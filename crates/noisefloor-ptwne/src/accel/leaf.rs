@@ -35,7 +35,8 @@ pub(super) struct Round {
 pub(crate) enum Spot {
     /// Coordinates along its edges, and whether the ray comes to its front.
     Plane { uv: [f32; 2], front: bool },
-    /// The normal outside, where the ray comes to the front; and whether the ray came in through the other side of the sphere.
+    /// The normal outside, where the ray comes to the front; and whether the ray came in through the other
+    /// side of the sphere.
     Sphere { normal: Vec3, front: bool, far: bool },
 }
 

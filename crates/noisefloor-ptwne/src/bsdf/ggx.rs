@@ -57,8 +57,8 @@ impl Ggx {
         Self { alpha, stretch: [x / alpha, alpha / x], ..self }
     }
 
-    /// A normal of the facets as it would be if their α was the same in all directions (Heitz 2014, §5.3); but for
-    /// its length.
+    /// A normal of the facets as it would be if their α was the same in all directions (Heitz 2014, §5.3);
+    /// but for its length.
     #[inline]
     fn squeezed(self, h: Vec3) -> Vec3 {
         Vec3::new(h.x * self.stretch[1], h.y * self.stretch[0], h.z)

@@ -1,5 +1,5 @@
-//! What Disney's principled surface has besides microfacets (Burley 2012, "Physically Based Shading at Disney", and
-//! 2015, "Extending the Disney BRDF to a BSDF").
+//! What Disney's principled surface has besides microfacets (Burley 2012, "Physically Based Shading at
+//! Disney", and 2015, "Extending the Disney BRDF to a BSDF").
 
 use super::fresnel::schlick;
 use super::ggx::{Facets, Ggx, MIN_ROUGHNESS};
@@ -77,8 +77,8 @@ fn schlick_weight(cos: f32) -> f32 {
     m * m * (m * m) * m
 }
 
-/// A reflection with long tails: GTR of exponent 1 (Burley 2012, eq. 4), with an index of refraction of 1.5, and
-/// masked as facets of α = ¼.
+/// A reflection with long tails: GTR of exponent 1 (Burley 2012, eq. 4), with an index of refraction of 1.5,
+/// and masked as facets of α = ¼.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Clearcoat {
     weight: f32,

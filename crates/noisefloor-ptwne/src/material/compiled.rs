@@ -98,8 +98,8 @@ pub(crate) enum Bsdf {
 }
 
 impl Bsdf {
-    /// What colour a denoiser should take the surface for: of diffuse and metallic parts their albedo, of glass
-    /// its tint.
+    /// What colour a denoiser should take the surface for: of diffuse and metallic parts their albedo, of
+    /// glass its tint.
     pub(crate) fn colour(&self, uv: [f32; 2], tint: Vec3) -> Vec3 {
         match self {
             Self::Diffuse { albedo: colour }

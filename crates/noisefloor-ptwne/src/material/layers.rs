@@ -8,9 +8,9 @@ use crate::texture::Texture;
 use std::f32::consts::FRAC_PI_2;
 
 /// A sum of diffuse reflection, diffuse transmission and microfacets, as the `matte`, `plastic`, `uber`,
-/// `substrate` and `translucent` of pbrt's version 3 and the `diffusetransmission` of version 4 (Pharr, Jakob,
-/// Humphreys 2016, §8.4 and §9.2). The facets of a [`Gloss::Dielectric`] take nothing from the rest: the sum can
-/// be more light than comes. All black by default.
+/// `substrate` and `translucent` of pbrt's version 3 and the `diffusetransmission` of version 4 (Pharr,
+/// Jakob, Humphreys 2016, §8.4 and §9.2). The facets of a [`Gloss::Dielectric`] take nothing from the rest:
+/// the sum can be more light than comes. All black by default.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Lobes {
     /// Albedo of the reflection, 0…1.
@@ -50,8 +50,8 @@ impl Default for Lobes {
 pub enum Gloss {
     /// As the boundary of a dielectric.
     Dielectric {
-        /// Index of refraction of what lies below, over that above: 0.25…4. Below 1, light that comes flatly is
-        /// reflected totally.
+        /// Index of refraction of what lies below, over that above: 0.25…4. Below 1, light that comes flatly
+        /// is reflected totally.
         ior: f32,
     },
     /// By Schlick's term and without masking; the diffuse reflection gets what they leave (Ashikhmin, Shirley
@@ -59,9 +59,9 @@ pub enum Gloss {
     AshikhminShirley,
 }
 
-/// Disney's principled surface (Burley 2012, 2015) without its transmission: Burley's diffuse reflection, from which
-/// nothing is taken, and microfacets of GGX with independent masking and shadowing. As in the renderers that have
-/// it, the sum can be more light than comes.
+/// Disney's principled surface (Burley 2012, 2015) without its transmission: Burley's diffuse reflection,
+/// from which nothing is taken, and microfacets of GGX with independent masking and shadowing. As in the
+/// renderers that have it, the sum can be more light than comes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Principled {
     /// Albedo of the dielectric and reflectance of the metal, 0…1.
@@ -70,8 +70,8 @@ pub struct Principled {
     pub metallic_roughness: Texture,
     /// Index of refraction of the dielectric, 1…4.
     pub ior: f32,
-    /// How much longer than wide highlights are across growing u, 0…1: α is divided by √(1 − 0.9·`anisotropic`)
-    /// along u, and multiplied with it across.
+    /// How much longer than wide highlights are across growing u, 0…1: α is divided by √(1 −
+    /// 0.9·`anisotropic`) along u, and multiplied with it across.
     pub anisotropic: f32,
     /// How far the dielectric's reflection has the hue of the base, 0…1.
     pub specular_tint: f32,
@@ -96,7 +96,8 @@ pub enum Dialect {
     /// Mitsuba 3: `principled`.
     #[default]
     Mitsuba,
-    /// Pbrt, version 3: `disney`. Its clearcoat is divided by 4·cos θₒ·cos θᵢ, and of metal only the metal is tinted.
+    /// Pbrt, version 3: `disney`. Its clearcoat is divided by 4·cos θₒ·cos θᵢ, and of metal only the metal
+    /// is tinted.
     Pbrt,
 }
 

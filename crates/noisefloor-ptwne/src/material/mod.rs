@@ -95,8 +95,8 @@ pub enum Material {
         /// Whether light takes on the base's colour at each reflection between base and coat, or only once.
         nonlinear: bool,
     },
-    /// glTF's metallic-roughness model (glTF 2.0, appendix B): GGX whose masking and shadowing are independent,
-    /// with Schlick's Fresnel term F, over 1 − F of Lambertian reflection.
+    /// glTF's metallic-roughness model (glTF 2.0, appendix B): GGX whose masking and shadowing are
+    /// independent, with Schlick's Fresnel term F, over 1 − F of Lambertian reflection.
     MetallicRoughness {
         /// Albedo of the dielectric and reflectance of the metal, 0…1.
         base: Texture,
@@ -109,8 +109,8 @@ pub enum Material {
     Principled(Box<Principled>),
     /// Lobes that add up.
     Lobes(Box<Lobes>),
-    /// Nothing that stops light: only what the surface emits is seen, before what lies behind it. Light samples pass
-    /// it unseen, scattered rays count it as one of their segments.
+    /// Nothing that stops light: only what the surface emits is seen, before what lies behind it. Light
+    /// samples pass it unseen, scattered rays count it as one of their segments.
     Nothing,
 }
 
@@ -127,9 +127,10 @@ pub struct MaterialOptions {
     /// The microfacets of [`Material::RoughConductor`], [`Material::Conductor`], [`Material::Plastic`],
     /// [`Material::RoughGlass`] and [`Material::Lobes`].
     pub facets: Facets,
-    /// α of the microfacets instead of the material's own number: red along growing u of the texture coordinates,
-    /// green across it, at least [`MIN_ROUGHNESS`]. For the materials that [`MaterialOptions::facets`] is for. The
-    /// coat of [`Material::Plastic`] lets through what one with the geometric mean of both would.
+    /// α of the microfacets instead of the material's own number: red along growing u of the texture
+    /// coordinates, green across it, at least [`MIN_ROUGHNESS`]. For the materials that
+    /// [`MaterialOptions::facets`] is for. The coat of [`Material::Plastic`] lets through what one with the
+    /// geometric mean of both would.
     pub roughness: Option<Texture>,
     /// Structure of the surface. That of a mix is also that of its parts that have none.
     pub relief: Option<Relief>,

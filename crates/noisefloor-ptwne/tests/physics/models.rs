@@ -1,5 +1,5 @@
-//! The surfaces of glTF, Mitsuba's `principled` and pbrt's `disney`: against their formulas, written in f64 and
-//! independently of the renderer, under light from one direction and under a white sky.
+//! The surfaces of glTF, Mitsuba's `principled` and pbrt's `disney`: against their formulas, written in f64
+//! and independently of the renderer, under light from one direction and under a white sky.
 
 use crate::kit::{agrees, look, mean, scene};
 use noisefloor_ptwne::{
@@ -105,14 +105,15 @@ fn shown(material: &Material, options: &MaterialOptions, to: V, from: V) -> f64 
     mean(scene, 2, 2, 4, 1, RenderOptions::default()).0
 }
 
-/// The same by formula; rays differ from `to` by 1e-5, and f32 rounds half vectors to 1e-7, which lobes of α = 0.04
-/// turn into 1e-4 at most.
+/// The same by formula; rays differ from `to` by 1e-5, and f32 rounds half vectors to 1e-7, which lobes of α
+/// = 0.04 turn into 1e-4 at most.
 fn shows(got: f64, f: f64, from: V, what: &str) {
     let expected = f * from[2];
     assert!((got - expected).abs() <= 1e-3 * expected + 1e-6, "{what}: {got} instead of {expected}");
 }
 
-/// Where the light and the camera are, from normal to grazing, in the plane of the mirrored direction and out of it.
+/// Where the light and the camera are, from normal to grazing, in the plane of the mirrored direction and
+/// out of it.
 fn pairs() -> [[V; 2]; 6] {
     [
         [toward(10.0, 0.0), toward(15.0, 90.0)],

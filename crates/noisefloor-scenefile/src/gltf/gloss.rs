@@ -15,8 +15,8 @@ pub(super) struct Gloss {
 
 impl Gloss {
     /// Base colour, roughness and share of metal of what reflects the same at normal incidence: of a base b with
-    /// the share m of metal, that is b·(1 − m) diffusely and 0.04·(1 − m) + b·m specularly. The share is solved
-    /// for with luminances, the colour then taken from the specular one as far as it is metal.
+    /// the share m of metal, that is b·(1 − m) diffusely and 0.04·(1 − m) + b·m specularly. The share is
+    /// solved for with luminances, the colour then taken from the specular one as far as it is metal.
     pub(super) fn metal(self) -> (Rgb, [f32; 2]) {
         let strongest = self.specular.into_iter().fold(0.0, f32::max);
         let [d, s] = [self.diffuse, self.specular].map(noisefloor::luminance);

@@ -15,13 +15,14 @@ const ENOUGH: f32 = 0.02;
 /// and a scene if so many are of all that daylight shows: headlights alone are a scene in the dark.
 const SHARE: f32 = 0.25;
 
-/// The sky of a scene that has too little light of its own to be seen by; none if it has enough. Found by rendering
-/// it small, with its own light and with daylight: only that tells what arrives.
+/// The sky of a scene that has too little light of its own to be seen by; none if it has enough. Found by
+/// rendering it small, with its own light and with daylight: only that tells what arrives.
 pub(super) fn missing_daylight(scene: &Scene, camera: &Camera) -> Option<Environment> {
     let sky = daylight(camera);
     let own = picture(&Arc::new(scene.clone()), DEPTH)?;
     let daylit = Arc::new(scene.clone().with_environment(sky).ok()?);
-    // Without what is seen directly. The same samples meet the same surfaces first, so that the difference is exact
+    // Without what is seen directly. The same samples meet the same surfaces first, so that the difference
+    // is exact
     let (all, direct) = (picture(&daylit, DEPTH)?, picture(&daylit, 1)?);
     let (mut visible, mut shown) = (0u32, 0u32);
     for ((own, all), direct) in own.iter().zip(all).zip(direct) {

@@ -114,7 +114,8 @@ impl<'a> Textures<'a> {
         Ok(ImageTexture { pixels: Pixels::Linear8(codes.iter().map(|[r, ..]| [*r; 3]).collect()), ..texture })
     }
 
-    /// The square of a texture's green channel times a factor, which is α of its microfacets in all directions.
+    /// The square of a texture's green channel times a factor, which is α of its microfacets in all
+    /// directions.
     pub(super) fn alphas(
         &mut self,
         info: &Info,

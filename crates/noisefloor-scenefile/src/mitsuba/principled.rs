@@ -22,7 +22,7 @@ impl<'d> Context<'d> {
         if thin {
             self.approximated(
                 element,
-                "of <bsdf type=\"principledthin\"> what is seen from behind is left out, but for a smooth pane",
+                "of <bsdf type=\"principledthin\"> what is seen from behind is left out, but for a pane",
             );
             element.ignore(&["diff_trans"]);
         }
@@ -78,8 +78,8 @@ impl<'d> Context<'d> {
         Ok(ior.clamp(0.25, 4.0) as f32)
     }
 
-    /// A mix with glass. It is exact: with metal m and transmission t, the glass has the share s = (1 − m)t, with
-    /// its part of the dielectric's reflection, and the rest is a surface of metal m/(1 − s).
+    /// A mix with glass. It is exact: with metal m and transmission t, the glass has the share s = (1 − m)t,
+    /// with its part of the dielectric's reflection, and the rest is a surface of metal m/(1 − s).
     fn with_glass(
         &self,
         element: &'d Element,

@@ -173,7 +173,8 @@ impl<'d> Context<'d> {
         }
     }
 
-    /// The triangles of a shape, in the scene, as the renderer wants them; with texture coordinates if it is `mapped`.
+    /// The triangles of a shape, in the scene, as the renderer wants them; with texture coordinates if it is
+    /// `mapped`.
     fn triangles(&self, element: &'d Element, mapped: bool) -> Result<Triangles, LoadError> {
         let kind = element.kind();
         let (mut mesh, own_face_normals) = match kind {

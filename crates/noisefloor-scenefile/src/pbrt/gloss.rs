@@ -20,8 +20,8 @@ impl Reader<'_> {
         self.roughness_of(d, "", missing, fourth, alphas)
     }
 
-    /// GGX α: pbrt 4 takes the square root of its roughness, pbrt 3 a polynomial of its logarithm. Into `alphas`
-    /// comes what varies by place or direction.
+    /// GGX α: pbrt 4 takes the square root of its roughness, pbrt 3 a polynomial of its logarithm. Into
+    /// `alphas` comes what varies by place or direction.
     pub(super) fn roughness_of(
         &mut self,
         d: &Definition,
@@ -119,7 +119,8 @@ impl Reader<'_> {
         }
         d.params.ignore(&["flatness", "difftrans"]);
 
-        // With metal m and transmission t, glass has the share s = (1 − m)t and the rest is of metal m/(1 − s)
+        // With metal m and transmission t, glass has the share s = (1 − m)t and the rest is of metal m/(1 −
+        // s)
         let metallic = mean(&metal)[0];
         let share = (1.0 - metallic) * transmission;
         let metal =

@@ -185,8 +185,8 @@ fn emitted_spectra_are_colours() {
     assert!((cold[1] / warm[1] - 316.6 / 74.2).abs() < 0.3, "{warm:?} {cold:?}");
 }
 
-/// A lamp of nothing, as Blender writes them: seen before what lies behind it, in front of other lights without hiding
-/// them, and dark from behind.
+/// A lamp of nothing, as Blender writes them: seen before what lies behind it, in front of other lights
+/// without hiding them, and dark from behind.
 #[test]
 fn lamps_of_nothing_shine() {
     let folder = Folder::new();
@@ -203,7 +203,8 @@ fn lamps_of_nothing_shine() {
     close(folder.see(&back), [1.0; 3], 1e-4, &back);
 
     // A floor lit by a small lamp, and by the sky through it: ρ/π·(A·L/h² + π) where it looks straight up
-    let up = r#"<transform name="to_world"><scale value="0.05"/><rotate y="1" angle="180"/><translate z="2"/></transform>"#;
+    let up = r#"<transform name="to_world"><scale value="0.05"/>
+        <rotate y="1" angle="180"/><translate z="2"/></transform>"#;
     let floor = r#"<shape type="rectangle"><transform name="to_world"><scale value="9"/></transform>
         <bsdf type="diffuse"><float name="reflectance" value="0.5"/></bsdf></shape>"#;
     let small = lamp(up).replace("0.5 0.25 0", "500 250 0") + floor + sky;
@@ -218,11 +219,11 @@ fn spots_in_shapes_shine() {
     let folder = Folder::new();
     let floor =
         r#"<shape type="rectangle"><transform name="to_world"><scale value="9"/></transform></shape>"#;
-    let spot = r#"<emitter type="point"><point name="position" x="0" y="0" z="2"/><rgb name="intensity" value="8 4 2"/>
-        </emitter>"#;
+    let spot = r#"<emitter type="point"><point name="position" x="0" y="0" z="2"/>
+        <rgb name="intensity" value="8 4 2"/></emitter>"#;
     let inside = format!(
-        r#"{floor}<shape type="sphere"><point name="center" x="90" y="0" z="0"/><float name="radius" value="0.1"/>
-        {spot}</shape>"#
+        r#"{floor}<shape type="sphere"><point name="center" x="90" y="0" z="0"/>
+        <float name="radius" value="0.1"/>        {spot}</shape>"#
     );
     let want = [8.0, 4.0, 2.0].map(|i| 0.5 / std::f32::consts::PI * i / 4.0);
     close(folder.see(&inside), want, 1e-3, &inside);

@@ -19,6 +19,9 @@ mod materials;
 /// Bump and normal maps.
 #[cfg(test)]
 mod relief;
+/// Roughness by map and direction, and transmission.
+#[cfg(test)]
+mod roughness;
 /// Camera, image size, path length; parameters and references.
 #[cfg(test)]
 mod setup;

@@ -205,8 +205,8 @@ fn instances_are_where_they_are_put() {
     assert!(folder.body(&nested).unwrap_err().contains("an instance in a group is not supported"));
 }
 
-/// Without coordinates in its file, a triangle has the weights of its second and third corner, as in Mitsuba: u grows
-/// to the second, and the picture's rows run to the third.
+/// Without coordinates in its file, a triangle has the weights of its second and third corner, as in
+/// Mitsuba: u grows to the second, and the picture's rows run to the third.
 #[test]
 fn meshes_without_coordinates_are_mapped_by_their_corners() {
     let ply = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
@@ -219,8 +219,9 @@ fn meshes_without_coordinates_are_mapped_by_their_corners() {
         let seen = folder.see(&format!(
             r#"<shape type="ply"><string name="filename" value="a.ply"/>
             <transform name="to_world"><translate x="-{x}" y="-{y}"/></transform>
-            <emitter type="area"><texture type="bitmap" name="radiance"><string name="filename" value="a.png"/>
-            <boolean name="raw" value="true"/><string name="filter_type" value="nearest"/></texture></emitter></shape>"#
+            <emitter type="area"><texture type="bitmap" name="radiance">
+            <string name="filename" value="a.png"/><boolean name="raw" value="true"/>
+            <string name="filter_type" value="nearest"/></texture></emitter></shape>"#
         ));
         close(seen, [want[0], want[1], 0.0], 1e-3, &format!("{x} {y}"));
     }

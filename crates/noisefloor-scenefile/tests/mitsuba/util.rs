@@ -44,8 +44,8 @@ impl Folder {
         self
     }
 
-    /// Loads the scene file `text`; an error comes with its causes. Most of these scenes have no light: that warning
-    /// has a test of its own.
+    /// Loads the scene file `text`; an error comes with its causes. Most of these scenes have no light: that
+    /// warning has a test of its own.
     pub(crate) fn load(&self, text: &str) -> Result<Loaded, String> {
         let mut loaded = self.load_all(text)?;
         loaded.warnings.retain(|warning| !warning.what.contains("no light"));

@@ -297,7 +297,8 @@ fn lamps_of_nothing_shine() {
     close(folder.see(lamp), [1.5, 1.25, 1.0], 1e-4, lamp);
 }
 
-/// The metal of `disney` and its roughness by a picture: a lobe that is narrow on the left and wide on the right.
+/// The metal of `disney` and its roughness by a picture: a lobe that is narrow on the left and wide on the
+/// right.
 #[test]
 fn roughness_may_be_a_picture() {
     let folder = Folder::new();
