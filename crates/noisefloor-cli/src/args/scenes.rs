@@ -13,7 +13,7 @@ pub struct SceneFileArgs {
     /// Built-in renderer: leave out, with a warning, what would otherwise stop a scene file from loading.
     #[arg(long, value_enum, value_name = "WHAT", value_delimiter = ',')]
     ignore: Vec<Ignorable>,
-    /// Built-in renderer: the folder in which a scene file may name files [default: its own folder].
+    /// Built-in renderer: the folder in which a scene file may name files [default: its own, or up to two above].
     #[arg(long, value_name = "DIR")]
     scene_root: Option<PathBuf>,
 }

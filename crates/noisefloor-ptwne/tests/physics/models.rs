@@ -56,8 +56,13 @@ fn gltf(base: f64, roughness: f64, metal: f64, ior: f64, a: V, b: V) -> f64 {
     (1.0 - f) * base * (1.0 - metal) / PI + f * ggx([roughness.powi(2); 2], a, b)
 }
 
-/// Burley 2012 and 2015 as in Mitsuba 3.9.1 and pbrt-v3, for a grey base of hue 1.
+/// Burley 2012 and 2015 as in Mitsuba 3.9.1 and pbrt-v3, for a grey base.
 fn principled(p: &Principled, [base, roughness, metal]: [f64; 3], a: V, b: V) -> f64 {
+    coloured(p, [base, roughness, metal], 1.0, a, b)
+}
+
+/// The same for one channel of a base, whose hue is that channel over its luminance.
+fn coloured(p: &Principled, [base, roughness, metal]: [f64; 3], hue: f64, a: V, b: V) -> f64 {
     let [anisotropic, tint, sheen, flatness, coat, gloss, n] =
         [p.anisotropic, p.specular_tint, p.sheen, p.flatness, p.clearcoat, p.clearcoat_gloss, p.ior]
             .map(f64::from);
@@ -66,16 +71,21 @@ fn principled(p: &Principled, [base, roughness, metal]: [f64; 3], a: V, b: V) ->
     let usual = (1.0 - fa / 2.0) * (1.0 - fb / 2.0) + r * (fa + fb + fa * fb * (r - 1.0));
     let ss = (1.0 + (r / 2.0 - 1.0) * fa) * (1.0 + (r / 2.0 - 1.0) * fb);
     let flat = 1.25 * (ss * (1.0 / (a[2] + b[2]) - 0.5) + 0.5);
+    let tinted = |share: f64| 1.0 + (hue - 1.0) * share;
+    let sheen = sheen * tinted(f64::from(p.sheen_tint));
     let diffuse = base / PI * (usual * (1.0 - flatness) + flat * flatness) + sheen * weight(cos);
 
     let schlick = |f0: f64| f0 + (1.0 - f0) * weight(cos);
     let f0 = ((n - 1.0) / (n + 1.0)).powi(2);
     let facets = match p.dialect {
         Dialect::Mitsuba => {
-            let dielectric = (1.0 - tint) * fresnel(cos, n) + tint * schlick(f0);
+            let dielectric = (1.0 - tint) * fresnel(cos, n) + tint * schlick(hue * f0);
             metal * schlick(base) + (1.0 - metal) * dielectric
         }
-        _ => metal * schlick(metal * base + (1.0 - metal) * f0) + (1.0 - metal) * fresnel(cos, n),
+        _ => {
+            let normal = metal * base + (1.0 - metal) * f0 * tinted(tint);
+            metal * schlick(normal) + (1.0 - metal) * fresnel(cos, n)
+        }
     };
     let aspect = (1.0 - 0.9 * anisotropic).sqrt();
     let alpha = [roughness.powi(2) / aspect, roughness.powi(2) * aspect];
@@ -183,6 +193,24 @@ fn principled_surfaces_show_what_their_formulas_say() {
                 let got = shown(&material, &MaterialOptions::default(), to, from);
                 shows(got, f, from, &format!("{p:?} {base} {look:?} {to:?} {from:?}"));
             }
+        }
+    }
+}
+
+/// Tints have the hue of the base: green over the luminance by Rec.709.
+#[test]
+fn tints_have_the_hue_of_the_base() {
+    let base = [0.6f32, 0.3, 0.1];
+    let hue = 0.3 / (0.2126 * 0.6 + 0.7152 * 0.3 + 0.0722 * 0.1);
+    for dialect in [Dialect::Mitsuba, Dialect::Pbrt] {
+        let metallic_roughness = [1.0, 0.4, 0.3].into();
+        let tints =
+            Principled { specular_tint: 0.8, sheen: 0.5, sheen_tint: 0.6, dialect, ..Principled::default() };
+        let material = Principled { base: base.into(), metallic_roughness, ..tints.clone() }.into();
+        for [to, from] in pairs() {
+            let f = coloured(&tints, [0.3, f64::from(0.4f32), f64::from(0.3f32)], hue, to, from);
+            let got = shown(&material, &MaterialOptions::default(), to, from);
+            shows(got, f, from, &format!("{dialect:?} {to:?} {from:?}"));
         }
     }
 }
