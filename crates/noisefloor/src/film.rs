@@ -335,10 +335,11 @@ impl Film {
     #[inline]
     pub(crate) fn blend_row(a: &[Rgb], b: &[Rgb], weight: f32, mean: &mut [Rgb]) {
         let halves = a.as_flattened().iter().zip(b.as_flattened());
-        mean.as_flattened_mut()
-            .iter_mut()
-            .zip(halves)
-            .for_each(|(mean, (a, b))| *mean = b + (a - b) * weight);
+        mean.as_flattened_mut().iter_mut().zip(halves).for_each(|(mean, (a, b))| {
+            let near = b + (a - b) * weight;
+            // The difference of two huge values may be none
+            *mean = if near.is_finite() { near } else { a * weight + b * (1.0 - weight) };
+        });
     }
 
     /// The picture so far: mean linear radiance, row-major.

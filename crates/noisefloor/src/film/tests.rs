@@ -171,3 +171,19 @@ proptest! {
         prop_assert!((f64::from(film.image()[16][0]) - exact).abs() < 1e-6 * 1000.0);
     }
 }
+
+/// 3.4·10³⁸ and −3.4·10³⁸ have the mean 0, as in f64, though their difference is no f32.
+#[test]
+fn means_of_huge_values_are_finite() {
+    let grid = TileGrid::new(16, 16, 16).unwrap();
+    for mut film in [Film::new(grid), Film::without_halves(grid)] {
+        film.add(0, 1, &[[3.4e38; 3]; 256]).unwrap();
+        film.add(0, 1, &[[-3.4e38; 3]; 256]).unwrap();
+        assert!(film.image().iter().all(|pixel| *pixel == [0.0; 3]), "{:?}", film.pixel(0, 0));
+    }
+    let mut film = Film::new(grid);
+    film.add(0, 3, &[[3e38; 3]; 256]).unwrap();
+    film.add(0, 1, &[[-3e38; 3]; 256]).unwrap();
+    let mean = film.pixel(0, 0)[0];
+    assert!((mean / 1.5e38 - 1.0).abs() < 1e-6, "{mean}");
+}
