@@ -51,10 +51,44 @@ pub fn read_exr(path: impl AsRef<Path>) -> Result<LinearImage, PictureError> {
 }
 
 pub(crate) fn decode(path: &Path, opened: Opened) -> Result<LinearImage, PictureError> {
-    guarded(path, "EXR", || decode_unguarded(path, opened))
+    guarded(path, "EXR", || decode_unguarded(path, opened, choose))
 }
 
-fn decode_unguarded(path: &Path, opened: Opened) -> Result<LinearImage, PictureError> {
+/// The layers with colours, the one that is read first, and whether that one has alpha.
+pub(crate) struct Layout {
+    pub(crate) layers: Vec<String>,
+    pub(crate) has_alpha: bool,
+}
+
+pub(crate) fn layout_of(path: &Path, opened: Opened) -> Result<Layout, PictureError> {
+    guarded(path, "EXR", || {
+        let broken = |reason: String| PictureError::Broken { path: path.to_owned(), format: "EXR", reason };
+        let reader = exr::block::read(opened.reader, false).map_err(|e| broken(e.to_string()))?;
+        let parts = reader.headers();
+        let names = channel_names(parts);
+        let full = |part: usize, layer: &str| {
+            let name = parts[part].own_attributes.layer_name.as_ref().map(ToString::to_string);
+            let prefix = name.filter(|_| parts.len() > 1).map(|name| format!("{name}.")).unwrap_or_default();
+            format!("{prefix}{layer}").trim_end_matches('.').to_owned()
+        };
+        let coloured = |(part, names): (usize, &'_ Vec<String>)| -> Vec<String> {
+            coloured_layers(names).into_iter().map(|(layer, _)| full(part, layer)).collect()
+        };
+        let layers = names.iter().enumerate().flat_map(coloured).collect();
+        Ok(Layout { layers, has_alpha: choose_alpha(path, parts).is_ok() })
+    })
+}
+
+/// Alpha of the layer that is read, as grey.
+pub(crate) fn alpha_of(path: &Path, opened: Opened) -> Result<LinearImage, PictureError> {
+    guarded(path, "EXR", || decode_unguarded(path, opened, choose_alpha))
+}
+
+fn decode_unguarded(
+    path: &Path,
+    opened: Opened,
+    choose: fn(&Path, &[Header]) -> Result<Choice, PictureError>,
+) -> Result<LinearImage, PictureError> {
     let broken = |reason: String| PictureError::Broken { path: path.to_owned(), format: "EXR", reason };
 
     // Headers: which part, which channels, how large; nothing that the file is too short for
@@ -109,17 +143,41 @@ struct Choice {
     channels: [usize; 3],
 }
 
+/// The names of the channels of each part.
+fn channel_names(parts: &[Header]) -> Vec<Vec<String>> {
+    parts.iter().map(|part| part.channels.list.iter().map(|c| c.name.to_string()).collect()).collect()
+}
+
+/// The layers of a part that have colours, the most likely picture first, with the places of R, G and B.
+fn coloured_layers(names: &[String]) -> Vec<(&str, [usize; 3])> {
+    let colours = |layer: &str| {
+        let at = |channel: &str| names.iter().position(|name| *name == format!("{layer}{channel}"));
+        Some([at("R")?, at("G")?, at("B")?])
+    };
+    layers(names).into_iter().filter_map(|layer| Some((layer, colours(layer)?))).collect()
+}
+
+/// Alpha beside the colours that are read.
+fn choose_alpha(path: &Path, parts: &[Header]) -> Result<Choice, PictureError> {
+    let Choice { part, channels } = choose(path, parts)?;
+    let names = &channel_names(parts)[part];
+    let red = &names[channels[0]];
+    let alpha = format!("{}A", red.strip_suffix(['R', 'Y']).unwrap_or_default());
+    match names.iter().position(|name| *name == alpha) {
+        Some(alpha) => Ok(Choice { part, channels: [alpha; 3] }),
+        None => {
+            Err(PictureError::Channels { path: path.to_owned(), missing: alpha, found: names.join(", ") })
+        }
+    }
+}
+
 fn choose(path: &Path, parts: &[Header]) -> Result<Choice, PictureError> {
-    let names: Vec<Vec<String>> =
-        parts.iter().map(|part| part.channels.list.iter().map(|c| c.name.to_string()).collect()).collect();
+    let names = channel_names(parts);
 
     // Colour, then grey
     let colour = names.iter().enumerate().find_map(|(part, names)| {
-        let [r, g, b] = layers(names).into_iter().find_map(|layer| {
-            let at = |channel: &str| names.iter().position(|name| *name == format!("{layer}{channel}"));
-            Some([at("R")?, at("G")?, at("B")?])
-        })?;
-        Some(Choice { part, channels: [r, g, b] })
+        let (_, channels) = coloured_layers(names).into_iter().next()?;
+        Some(Choice { part, channels })
     });
     let grey = || {
         names.iter().enumerate().find_map(|(part, names)| {

@@ -29,23 +29,21 @@ pub fn read_png(path: impl AsRef<Path>) -> Result<DisplayImage, PictureError> {
     decode(path, opened)
 }
 
-pub(crate) fn decode(path: &Path, opened: Opened) -> Result<DisplayImage, PictureError> {
-    let broken = |reason: String| PictureError::Broken { path: path.to_owned(), format: "PNG", reason };
+/// Alpha in 0…1, if there is any.
+pub(crate) fn decode_alpha(path: &Path, opened: Opened) -> Result<Option<Vec<f32>>, PictureError> {
     guarded(path, "PNG", || {
-        // Header: the size, and whether the file is long enough to hold that many pixels
-        let mut limits = Limits::no_limits();
-        limits.max_alloc = Some(MAX_PNG_EXTRA);
-        let decoder = PngDecoder::with_limits(opened.reader, limits).map_err(|e| broken(e.to_string()))?;
-        let (width, height) = decoder.dimensions();
-        let (width, height) = (width as usize, height as usize);
-        check_size(path, (width, height), opened.most_pixels)?;
-        if (width * height) as u64 > opened.bytes.saturating_mul(PIXELS_A_BYTE) {
-            return Err(broken(format!("{} bytes cannot hold {width}×{height} pixels", opened.bytes)));
-        }
+        let image = decode_raw(path, opened)?;
+        let alpha =
+            |image: DynamicImage| image.into_rgba16().pixels().map(|p| f32::from(p.0[3]) / 65535.0).collect();
+        Ok(image.color().has_alpha().then(|| alpha(image)))
+    })
+}
 
-        // Pixels
-        let deep = decoder.color_type().bytes_per_pixel() > decoder.color_type().channel_count();
-        let image = DynamicImage::from_decoder(decoder).map_err(|e| broken(e.to_string()))?;
+pub(crate) fn decode(path: &Path, opened: Opened) -> Result<DisplayImage, PictureError> {
+    guarded(path, "PNG", || {
+        let image = decode_raw(path, opened)?;
+        let (width, height) = (image.width() as usize, image.height() as usize);
+        let deep = image.color().bytes_per_pixel() > image.color().channel_count();
         let (pixels, codes) = if deep {
             (image.into_rgb16().pixels().map(|p| p.0.map(|v| f32::from(v) / 65535.0)).collect(), 65535.0)
         } else {
@@ -53,4 +51,20 @@ pub(crate) fn decode(path: &Path, opened: Opened) -> Result<DisplayImage, Pictur
         };
         Ok(DisplayImage { width, height, pixels, step: 1.0 / codes })
     })
+}
+
+/// The pixels as they are stored.
+fn decode_raw(path: &Path, opened: Opened) -> Result<DynamicImage, PictureError> {
+    let broken = |reason: String| PictureError::Broken { path: path.to_owned(), format: "PNG", reason };
+    // Header: the size, and whether the file is long enough to hold that many pixels
+    let mut limits = Limits::no_limits();
+    limits.max_alloc = Some(MAX_PNG_EXTRA);
+    let decoder = PngDecoder::with_limits(opened.reader, limits).map_err(|e| broken(e.to_string()))?;
+    let (width, height) = decoder.dimensions();
+    let (width, height) = (width as usize, height as usize);
+    check_size(path, (width, height), opened.most_pixels)?;
+    if (width * height) as u64 > opened.bytes.saturating_mul(PIXELS_A_BYTE) {
+        return Err(broken(format!("{} bytes cannot hold {width}×{height} pixels", opened.bytes)));
+    }
+    DynamicImage::from_decoder(decoder).map_err(|e| broken(e.to_string()))
 }

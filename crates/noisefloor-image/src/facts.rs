@@ -14,6 +14,8 @@ const SPP: &str = "samplesPerPixel";
 /// All else, a line each: `fewest`, `most`, `seed`, `repeats` (`samples` if the seed fixes every sample), `source`.
 /// One text, because `exr` writes several attributes of its own names in another order every time.
 const FACTS: &str = "noisefloor.samples";
+/// Stands between scene and renderer, and the options, in `source`.
+const OPTIONS: &str = ", options ";
 /// Longest text of an attribute that is believed, in bytes.
 const MAX_TEXT: usize = 1000;
 
@@ -72,8 +74,10 @@ fn of_header(header: &Header) -> SampleFacts {
     let count = |name| said(name)?.parse().ok().filter(|&n: &u64| n > 0);
     let uneven = || Some((count("fewest")?, count("most")?)).filter(|(fewest, most)| fewest <= most);
     let origin = || {
-        let (source, seed) = (printable(said("source")?).into_owned(), said("seed")?.parse().ok()?);
-        Some(SampleOrigin { source, seed, repeats: said("repeats") == Some("samples") })
+        let (source, seed) = (printable(said("source")?), said("seed")?.parse().ok()?);
+        let (source, options) = source.rsplit_once(OPTIONS).unwrap_or((&source, ""));
+        let (source, options) = (source.to_owned(), options.to_owned());
+        Some(SampleOrigin { source, options, seed, repeats: said("repeats") == Some("samples") })
     };
     SampleFacts { samples: even.or_else(uneven), origin: origin() }
 }
@@ -109,9 +113,10 @@ pub(crate) fn sample_attributes(facts: &SampleFacts) -> [HashMap<Text, Attribute
         Some((fewest, most)) => lines += &format!("fewest={fewest}\nmost={most}\n"),
         None => {}
     }
-    if let Some(SampleOrigin { source, seed, repeats }) = &facts.origin {
+    if let Some(SampleOrigin { source, options, seed, repeats }) = &facts.origin {
+        let source = if options.is_empty() { source.clone() } else { format!("{source}{OPTIONS}{options}") };
         let repeats = if *repeats { "samples" } else { "nothing" };
-        lines += &format!("seed={seed}\nrepeats={repeats}\nsource={}\n", latin(&printable(source)));
+        lines += &format!("seed={seed}\nrepeats={repeats}\nsource={}\n", latin(&printable(&source)));
     }
     let rest = Some(lines).filter(|lines| !lines.is_empty()).map(|lines| text(&lines));
     let attribute =

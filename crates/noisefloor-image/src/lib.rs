@@ -4,6 +4,7 @@
 //!   content tells the format. Files may be hostile: sizes are checked before pixels are allocated, and a
 //!   broken file is a [`PictureError`].
 //! - [`read_facts`], [`read_still`]: what an EXR says of its samples, and a picture with them.
+//! - [`read_unread`]: what of a file is not read, alpha and further layers.
 //! - [`write_exr`], [`write_png`], [`write_atomic`], [`check_writable`]: files that appear complete or not at
 //!   all.
 //! - [`read_cube`]: a `.cube` LUT, and as a tone mapping ([`ColourLut::into_tone_curve`]).
@@ -48,6 +49,7 @@ mod picture;
 mod plane;
 mod read;
 mod stack;
+mod unread;
 mod write;
 
 pub use atomic::{check_writable, write_atomic};
@@ -64,4 +66,5 @@ pub use picture::{DisplayImage, LinearImage, Picture};
 pub use plane::Plane;
 pub use read::{read_picture, read_picture_within, read_still};
 pub use stack::StackSource;
+pub use unread::{Unread, read_unread};
 pub use write::{RenderLayers, write_exr, write_png};

@@ -85,7 +85,7 @@ pub use noisefloor_vision::{
     ViewingTextError,
 };
 pub use oracle::Oracle;
-pub use origin::SampleOrigin;
+pub use origin::{OriginRelation, SampleOrigin};
 pub use params::{Audience, Params, ParamsError, Schedule};
 pub use rgb::Rgb;
 pub use session::{Session, SessionError};

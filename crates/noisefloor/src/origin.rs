@@ -6,22 +6,41 @@ use crate::evidence::Samples;
 /// to say whether two of them share samples.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SampleOrigin {
-    /// All that decides which samples a seed gives: renderer, scene and options. Compared as a whole.
+    /// Scene and renderer.
     pub source: String,
+    /// All options beside the seed that change the samples: compared as a whole.
+    pub options: String,
     /// Seed of the source.
     pub seed: u64,
     /// Whether the seed fixes every sample ([`crate::Repeats::Samples`]): more samples then contain fewer.
     pub repeats: bool,
 }
 
+/// What the origins of two pictures say about their samples.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum OriginRelation {
+    /// Nothing: they are of different scenes or renderers.
+    Unknown,
+    /// How the samples of one lie in those of the other.
+    Known(Samples),
+    /// The same scene, renderer and seed, with other options, or from a renderer that does not repeat its samples:
+    /// they are made from the same random numbers, and nobody can tell how much of their noise they share.
+    Dependent,
+}
+
 impl SampleOrigin {
-    /// Whether two pictures share samples. `None` if this does not tell: sources differ, or one seed does
-    /// not give the same samples again.
-    pub fn relation(&self, other: &Self) -> Option<Samples> {
-        match (self.source == other.source, self.seed == other.seed) {
-            (false, _) => None,
-            (true, false) => Some(Samples::Independent),
-            (true, true) => (self.repeats && other.repeats).then_some(Samples::Nested),
+    /// Whether two pictures share samples. Different seeds of one scene and renderer give independent ones,
+    /// whatever the other options are.
+    pub fn relation(&self, other: &Self) -> OriginRelation {
+        if self.source != other.source {
+            OriginRelation::Unknown
+        } else if self.seed != other.seed {
+            OriginRelation::Known(Samples::Independent)
+        } else if self.options == other.options && self.repeats && other.repeats {
+            OriginRelation::Known(Samples::Nested)
+        } else {
+            OriginRelation::Dependent
         }
     }
 }
@@ -31,14 +50,27 @@ mod tests {
     use super::*;
 
     #[test]
-    fn seeds_tell_only_within_a_source() {
-        let of = |source: &str, seed, repeats| SampleOrigin { source: source.into(), seed, repeats };
-        let one = of("a", 1, true);
-        assert_eq!(one.relation(&of("a", 1, true)), Some(Samples::Nested));
-        assert_eq!(one.relation(&of("a", 2, true)), Some(Samples::Independent));
-        assert_eq!(one.relation(&of("b", 2, true)), None);
-        assert_eq!(one.relation(&of("b", 1, true)), None);
-        assert_eq!(of("a", 1, false).relation(&of("a", 1, false)), None);
-        assert_eq!(of("a", 1, false).relation(&of("a", 2, false)), Some(Samples::Independent));
+    fn one_seed_of_one_scene_is_dependent_whatever_else_differs() {
+        let of = |source: &str, options: &str, seed, repeats| SampleOrigin {
+            source: source.into(),
+            options: options.into(),
+            seed,
+            repeats,
+        };
+        let one = of("a", "x", 1, true);
+        let (nested, independent) = (Samples::Nested, Samples::Independent);
+        for (other, relation) in [
+            (of("a", "x", 1, true), OriginRelation::Known(nested)),
+            (of("a", "x", 2, true), OriginRelation::Known(independent)),
+            (of("a", "y", 2, true), OriginRelation::Known(independent)),
+            (of("a", "y", 1, true), OriginRelation::Dependent),
+            (of("a", "x", 1, false), OriginRelation::Dependent),
+            (of("a", "x", 2, false), OriginRelation::Known(independent)),
+            (of("b", "x", 1, true), OriginRelation::Unknown),
+            (of("b", "x", 2, true), OriginRelation::Unknown),
+        ] {
+            assert_eq!(one.relation(&other), relation, "{other:?}");
+            assert_eq!(other.relation(&one), relation, "{other:?}");
+        }
     }
 }

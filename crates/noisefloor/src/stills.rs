@@ -6,7 +6,7 @@ use crate::display::{Display, ToneMapping, luminance};
 use crate::evidence::{Evidence, Rendering, Samples, TilePlanes};
 use crate::nested::shared_samples;
 use crate::oracle::Oracle;
-use crate::origin::SampleOrigin;
+use crate::origin::{OriginRelation, SampleOrigin};
 use crate::rgb::Rgb;
 use crate::tile::{Tile, TileGrid};
 use noisefloor_vision::Viewing;
@@ -82,6 +82,24 @@ pub enum StillError {
         /// Samples per pixel of the one it is compared with.
         other: f64,
     },
+    /// The files say that the noise of the pictures is related, and not how.
+    #[error(
+        "both pictures come from {origin} with seed {seed}, but with other options, or from a renderer that does not \
+         repeat its samples: they are made from the same random numbers, and nobody can tell how much of their noise \
+         they share; render one with another seed, or say whether they are nested or independent"
+    )]
+    Dependent {
+        /// Scene and renderer.
+        origin: String,
+        /// Their seed.
+        seed: u64,
+    },
+    /// Two of the pictures compared with share samples, which would count twice.
+    #[error(
+        "two of the pictures to compare with ({} and {} samples per pixel) are the same or share samples, which would \
+         count twice; leave one out", .0[0], .0[1]
+    )]
+    Twice([f64; 2]),
     /// The model does not fit the tiles.
     #[error(transparent)]
     Criterion(#[from] CriterionError),
@@ -114,6 +132,19 @@ impl Still {
             return Err(StillError::Kinds);
         }
         if self.pixels == other.pixels { Err(StillError::Same) } else { Ok(()) }
+    }
+
+    /// What the origins of both say; nothing if one has none.
+    fn relation(&self, other: &Still) -> OriginRelation {
+        match (&self.origin, &other.origin) {
+            (Some(one), Some(other)) => one.relation(other),
+            _ => OriginRelation::Unknown,
+        }
+    }
+
+    fn dependent(&self) -> StillError {
+        let (origin, seed) = self.origin.as_ref().map(|o| (o.source.clone(), o.seed)).unwrap_or_default();
+        StillError::Dependent { origin, seed }
     }
 
     fn rendering(&self) -> Rendering<'_> {
@@ -149,11 +180,15 @@ impl<'a> SnapshotPair<'a> {
     ) -> Result<Self, StillError> {
         others.iter().try_for_each(|other| image.fits(other))?;
         let display = if image.display_referred { Display::SRGB } else { tone.settle(&image.pixels) };
-        let samples = match samples {
-            Some(samples) => samples,
-            None if evidence == Evidence::Halves => recognise(image, others, &display)?,
-            None => Samples::Independent,
+        let (samples, others) = match samples {
+            _ if evidence != Evidence::Halves => (Samples::Independent, others.to_vec()),
+            Some(samples) => (samples, others.to_vec()),
+            None => recognise(image, others, &display)?,
         };
+        if evidence == Evidence::Halves && samples == Samples::Independent {
+            check_apart(&others)?;
+        }
+        let others = others.as_slice();
         let other = match evidence {
             Evidence::Alone => None,
             Evidence::Halves => Some(pool(others, image.spp, samples).ok_or(StillError::Nothing)?),
@@ -220,11 +255,12 @@ impl<'a> SnapshotPair<'a> {
         }
     }
 
-    /// Number of tiles whose brightness differs between the two pictures by more than their noise explains: by
+    /// For each tile, whether its brightness differs between the two pictures by more than their noise explains: by
     /// a tenth of the display's range on average, and three times the standard deviation from pixel to pixel.
-    /// Renderings of one view have none. 0 if there is nothing to compare with.
-    pub fn unlike_tiles(&self, grid: TileGrid) -> usize {
-        let Some(other) = &self.other else { return 0 };
+    /// Renderings of one view have no such tiles, and a verdict on one means nothing. None if there is nothing to
+    /// compare with.
+    pub fn unlike_tiles(&self, grid: TileGrid) -> Vec<bool> {
+        let Some(other) = &self.other else { return vec![false; grid.len()] };
         let light = |still: &Still, pixel: usize| luminance(self.display.encode(still.pixels[pixel]));
         let unlike = |tile: &Tile| {
             let rows = tile.rows(self.image.size.0);
@@ -232,7 +268,7 @@ impl<'a> SnapshotPair<'a> {
                 rows.map(|row| row.map(|p| light(self.image, p) - light(other, p)).collect()).collect();
             is_unlike(&differences)
         };
-        grid.tiles().collect::<Vec<_>>().par_iter().filter(|tile| unlike(tile)).count()
+        grid.tiles().collect::<Vec<_>>().par_iter().map(unlike).collect()
     }
 
     /// Describes all tiles, in their order, for [`Oracle::judge_described`].
@@ -258,23 +294,48 @@ fn is_unlike(differences: &[Vec<f32>]) -> bool {
     !steps.is_empty() && mean.abs() > UNLIKE && mean.abs() > 3.0 * variance.sqrt()
 }
 
-/// Whether the pictures share samples, as far as their origins say or they show it: never a guess.
-fn recognise(image: &Still, others: &[&Still], display: &Display) -> Result<Samples, StillError> {
-    let told: Vec<Option<Samples>> = others
-        .iter()
-        .map(|other| {
-            let said = image.origin.as_ref().zip(other.origin.as_ref());
-            let said = said.and_then(|(origin, other)| origin.relation(other));
-            said.or_else(|| shared_samples(image.size, image.rendering(), other.rendering(), display))
-        })
-        .collect();
-    if told.contains(&Some(Samples::Nested)) {
-        return Ok(Samples::Nested);
+/// Whether the pictures share samples, as far as their origins say or they show it: never a guess. Beside
+/// pictures that do, those that do not are left out.
+fn recognise<'a>(
+    image: &Still,
+    others: &[&'a Still],
+    display: &Display,
+) -> Result<(Samples, Vec<&'a Still>), StillError> {
+    let mut nested = Vec::new();
+    for other in others {
+        let told = match image.relation(other) {
+            OriginRelation::Known(samples) => Some(samples),
+            OriginRelation::Dependent => return Err(image.dependent()),
+            OriginRelation::Unknown => {
+                shared_samples(image.size, image.rendering(), other.rendering(), display)
+            }
+        };
+        match told {
+            Some(Samples::Nested) => nested.push(*other),
+            Some(Samples::Independent) => {}
+            None => return Err(StillError::Undecided { image: image.spp, other: other.spp }),
+        }
     }
-    match told.iter().position(Option::is_none) {
-        Some(at) => Err(StillError::Undecided { image: image.spp, other: others[at].spp }),
-        None => Ok(Samples::Independent),
+    if nested.is_empty() {
+        Ok((Samples::Independent, others.to_vec()))
+    } else {
+        Ok((Samples::Nested, nested))
     }
+}
+
+/// Checks that no two of the pictures that are going to be pooled have samples in common, as far as it is known.
+fn check_apart(others: &[&Still]) -> Result<(), StillError> {
+    for (at, one) in others.iter().enumerate() {
+        for other in &others[..at] {
+            let known = one.relation(other);
+            let related =
+                known == OriginRelation::Known(Samples::Nested) || known == OriginRelation::Dependent;
+            if related || one.pixels == other.pixels {
+                return Err(StillError::Twice([other.spp, one.spp]));
+            }
+        }
+    }
+    Ok(())
 }
 
 /// Independent renderings make one of all their samples. Of nested ones, the one that differs most in its
@@ -290,7 +351,9 @@ fn pool<'a>(others: &[&'a Still], image_spp: f64, samples: Samples) -> Option<Co
         let all = all.to_mut();
         let weight = (one.spp / (all.spp + one.spp)) as f32;
         for (a, b) in all.pixels.iter_mut().flatten().zip(one.pixels.iter().flatten()) {
-            *a += (b - *a) * weight;
+            let mean = *a + (b - *a) * weight;
+            // The difference of two huge values may be none
+            *a = if mean.is_finite() { mean } else { *a * (1.0 - weight) + b * weight };
         }
         all.rounding = all.rounding * (1.0 - weight).powi(2) + one.rounding * weight * weight;
         all.spp += one.spp;
@@ -310,7 +373,7 @@ mod tests {
     fn unlike(a: &Still, b: &Still) -> usize {
         let tone = ToneMapping::default();
         let pair = SnapshotPair::new(Evidence::Halves, a, &[b], tone, Some(Samples::Independent)).unwrap();
-        pair.unlike_tiles(TileGrid::new(32, 32, 16).unwrap())
+        pair.unlike_tiles(TileGrid::new(32, 32, 16).unwrap()).into_iter().filter(|unlike| *unlike).count()
     }
 
     #[test]
@@ -327,5 +390,44 @@ mod tests {
         // Few samples of a dim light look darker than many of them: that is noise
         assert_eq!(unlike(&still(|i| a[i]), &still(|i| b[i])), 0);
         assert_eq!(unlike(&still(|_| 0.5), &still(|_| 0.55)), 0);
+    }
+
+    fn judge(image: &Still, others: &[&Still]) -> Result<Samples, StillError> {
+        let pair = SnapshotPair::new(Evidence::Halves, image, others, ToneMapping::default(), None)?;
+        Ok(pair.samples())
+    }
+
+    /// A still of 32×32 pixels of noise of its own, with an origin.
+    fn of(noise: u64, seed: u64, options: &str) -> Still {
+        let mut of = noisefloor_testkit::Noise::keyed(&[22, noise]);
+        let values: Vec<f32> = (0..32 * 32).map(|_| 0.4 + 0.05 * of.normal() as f32).collect();
+        let (source, options) = ("hall by a tracer".to_owned(), options.to_owned());
+        let origin = SampleOrigin { source, options, seed, repeats: true };
+        Still { origin: Some(origin), ..still(|i| values[i]) }
+    }
+
+    /// Two renders of one scene, renderer and seed are never independent, whatever their pixels look like.
+    #[test]
+    fn one_seed_is_never_independent_evidence() {
+        let image = of(1, 1, "depth 8");
+        assert_eq!(judge(&image, &[&of(2, 2, "depth 65")]).unwrap(), Samples::Independent);
+        let error = judge(&image, &[&of(3, 1, "depth 65")]).unwrap_err();
+        assert!(matches!(&error, StillError::Dependent { seed: 1, .. }), "{error}");
+        assert!(error.to_string().contains("another seed"), "{error}");
+    }
+
+    /// What is given twice would count twice.
+    #[test]
+    fn the_same_picture_is_not_pooled_with_itself() {
+        let (image, other) = (of(1, 1, ""), of(2, 2, ""));
+        assert!(matches!(judge(&image, &[&other, &other]), Err(StillError::Twice(_))));
+        let later = Still { spp: 32.0, ..of(3, 2, "") };
+        assert!(matches!(judge(&image, &[&other, &later]), Err(StillError::Twice(_))));
+        assert_eq!(judge(&image, &[&other, &of(4, 3, "")]).unwrap(), Samples::Independent);
+        let plain = |still: &Still| Still { origin: None, ..still.clone() };
+        let (tone, samples) = (ToneMapping::default(), Some(Samples::Independent));
+        let twice = [&plain(&other), &plain(&other)];
+        let error = SnapshotPair::new(Evidence::Halves, &plain(&image), &twice, tone, samples).unwrap_err();
+        assert!(matches!(error, StillError::Twice(_)), "{error}");
     }
 }

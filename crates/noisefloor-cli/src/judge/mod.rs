@@ -6,12 +6,14 @@ mod report;
 pub use denoised::DenoisedJob;
 
 use crate::say::note;
-use anyhow::Context;
+use anyhow::{Context, bail};
 use noisefloor::{
     Evidence, Oracle, Samples, SnapshotPair, Still, Tile, TileGrid, ToneMapping, Verdict, Viewing,
 };
 use noisefloor_image::maps::{Canvas, ColourScale, NOISE_SCALE, TileMark, draw_field, draw_tiles};
-use noisefloor_image::{Plane, RenderLayers, SampleFacts, check_writable, read_facts, read_still, write_exr};
+use noisefloor_image::{
+    Plane, RenderLayers, SampleFacts, check_writable, read_facts, read_still, read_unread, write_exr,
+};
 use report::Row;
 use std::path::{Path, PathBuf};
 
@@ -70,14 +72,21 @@ fn judge_noise(job: &JudgeJob) -> anyhow::Result<()> {
         );
     }
     let unlike = held.unlike_tiles(grid);
-    if unlike > 0 {
+    let count = unlike.iter().filter(|unlike| **unlike).count();
+    if count == grid.len() {
+        bail!(
+            "the pictures differ in brightness by more than noise explains, everywhere: they are no two renderings of one \
+             view with one exposure, and their difference says nothing about noise"
+        );
+    }
+    if count > 0 {
         note!(
-            "warning: in {unlike} of {} tiles the pictures differ in brightness by more than noise explains, so the verdict means \
-             nothing there; compare renderings of one view with one exposure",
+            "warning: in {count} of {} tiles the pictures differ in brightness by more than noise explains, and these are \
+             not judged; compare renderings of one view with one exposure",
             grid.len()
         );
     }
-    let rows = judge(&job.oracle, grid, &held)?;
+    let rows = judge(&job.oracle, grid, &held, &unlike)?;
     report::say_all((&job.image.0, image.spp), &job.oracle, &rows, job.json)?;
     draw(job, &image, grid, &held, &rows)
 }
@@ -93,16 +102,39 @@ fn read((path, spp): &(PathBuf, Option<f64>)) -> anyhow::Result<Still> {
             path.display()
         );
     }
+    for what in read_unread(path)?.warnings() {
+        note!("warning: {}: {what}", path.display());
+    }
     still.check().with_context(|| format!("{}", path.display()))?;
     Ok(still)
 }
 
-fn judge(oracle: &Oracle, grid: TileGrid, held: &SnapshotPair<'_>) -> anyhow::Result<Vec<Row>> {
+/// The verdicts; tiles that are `unlike` in both pictures get none, and count as not converged.
+fn judge(
+    oracle: &Oracle,
+    grid: TileGrid,
+    held: &SnapshotPair<'_>,
+    unlike: &[bool],
+) -> anyhow::Result<Vec<Row>> {
     let row = |(tile, verdict): (Tile, Verdict)| {
+        let unlike = unlike[tile.index];
+        let verdict = if unlike { Verdict::default() } else { verdict };
         let Verdict { converged, probability, threshold, expected_spp, unfamiliar, .. } = verdict;
         let Tile { index, x, y, width, height } = tile;
         let probability = probability.unwrap_or(0.0);
-        Row { tile: index, x, y, width, height, probability, converged, threshold, expected_spp, unfamiliar }
+        Row {
+            tile: index,
+            x,
+            y,
+            width,
+            height,
+            probability,
+            converged,
+            threshold,
+            expected_spp,
+            unfamiliar,
+            unlike,
+        }
     };
     let described = held.describe(oracle, grid)?;
     Ok(grid.tiles().zip(oracle.judge_described(&described)).map(row).collect())

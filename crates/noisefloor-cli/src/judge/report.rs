@@ -22,6 +22,8 @@ pub(super) struct Row {
     /// Whether its texture is unlike any that the model has been tested on; P is then that of half the
     /// samples.
     pub(super) unfamiliar: bool,
+    /// Whether the pictures differ there by more than noise: it is not judged then, and P is 0.
+    pub(super) unlike: bool,
 }
 
 #[derive(Serialize)]
@@ -64,7 +66,11 @@ fn say_table(report: &Report<'_>) -> Result<(), NotSaid> {
         "tile     x     y   size       P  verdict      stops at spp  people stop seeing noise at spp (80 %)"
     )?;
     for row in report.tiles {
-        let verdict = if row.converged { "converged" } else { "noise seen" };
+        let verdict = match row {
+            Row { unlike: true, .. } => "not judged",
+            Row { converged: true, .. } => "converged",
+            _ => "noise seen",
+        };
         let expected = row.expected_spp.filter(|_| !row.converged).map_or(String::new(), |n| n.to_string());
         let size = format!("{}×{}", row.width, row.height);
         let range = row.threshold.map_or(String::new(), |t| format!("{}…{}", t.low, t.high));

@@ -198,23 +198,111 @@ fn viewing_conditions_are_said_and_checked() {
     fail(&[&pair[..], &["--viewing", "bed"]].concat(), &["bed", "desk"]);
 }
 
-/// Black and white agree with themselves from pixel to pixel, and are still no two renderings of one view.
+/// Pictures of two different things are an error; where only a part differs, that part is not judged.
 #[test]
-fn pictures_of_different_things_are_told() {
+fn pictures_of_different_things_are_not_judged() {
     let folder = tempdir().unwrap();
-    let [black, white, grey, other] =
-        ["black.exr", "white.exr", "grey.exr", "other.exr"].map(|name| folder.path().join(name));
+    let [black, white, grey, other, mixed] =
+        ["black.exr", "white.exr", "grey.exr", "other.exr", "mixed.exr"].map(|name| folder.path().join(name));
     for (path, value) in [(&black, 0.0), (&white, 1.0)] {
         let pixels = vec![[value; 3]; 32 * 32];
         write_exr(path, &RenderLayers::rgb(32, 32, &pixels)).unwrap();
     }
     grey_exr(&grey, (32, 32), 1, 0.4);
     grey_exr(&other, (32, 32), 2, 0.4);
-    let warned = |a: &PathBuf, b: &PathBuf| {
-        let args = ["judge", text(a), "--spp", "9", "--against", text(b), "--spp", "9", "--independent"];
-        let output = run(&[&args[..], &["--tone-mapping", "srgb"]].concat());
-        stderr(&output).contains("warning: in 1 of 1 tiles the pictures differ in brightness")
+    let mut pixels = read_exr(&other).unwrap().pixels;
+    for pixel in (0..32 * 32).filter(|i| i % 32 < 16 && i / 32 < 16) {
+        pixels[pixel] = [1.0; 3];
+    }
+    write_exr(&mixed, &RenderLayers::rgb(32, 32, &pixels)).unwrap();
+    let args = |a: &PathBuf, b: &PathBuf| -> Vec<String> {
+        let all = ["judge", text(a), "--spp", "9", "--against", text(b), "--spp", "9", "--independent"];
+        let all = all.into_iter().chain(["--tone-mapping", "srgb", "--tile", "16", "--json"]);
+        all.map(str::to_owned).collect()
     };
-    assert!(warned(&black, &white) && warned(&white, &black) && warned(&grey, &white));
-    assert!(!warned(&grey, &other));
+    let refused = |a: &PathBuf, b: &PathBuf| {
+        let args = args(a, b);
+        fail(&args.iter().map(String::as_str).collect::<Vec<_>>(), &["differ in brightness", "everywhere"]);
+    };
+    refused(&black, &white);
+    refused(&white, &black);
+    refused(&grey, &white);
+    let judged = |b: &PathBuf| -> (Vec<Value>, String) {
+        let args = args(&grey, b);
+        let output = run(&args.iter().map(String::as_str).collect::<Vec<_>>());
+        let report: Value = serde_json::from_slice(&output.stdout).unwrap();
+        (report["tiles"].as_array().unwrap().clone(), stderr(&output))
+    };
+    let (right, said) = judged(&other);
+    assert!(said.is_empty() && right.iter().all(|tile| tile["unlike"] == false), "{said}");
+    let (tiles, said) = judged(&mixed);
+    assert!(said.contains("in 1 of 4 tiles") && said.contains("not judged"), "{said}");
+    assert_eq!(tiles[0]["unlike"], true);
+    assert!(tiles[0]["converged"] == false && tiles[0]["probability"] == 0.0);
+    assert!(tiles[1..].iter().all(|tile| tile["unlike"] == false));
+}
+
+/// Renders of one seed share their random numbers, whatever their depth is: the files say so, and pixels are not
+/// asked.
+#[test]
+fn one_seed_is_dependent_whatever_else_differs() {
+    let folder = tempdir().unwrap();
+    let render = |name: &str, more: &[&str]| {
+        let out = folder.path().join(name);
+        succeed(&tiny(text(&out), &[&["--criterion", "spp:64"], more].concat()));
+        out.join("image.exr")
+    };
+    let shallow = render("a", &["--seed", "1", "--max-depth", "3"]);
+    let [deep, other] = ["1", "2"].map(|seed| render(seed, &["--seed", seed, "--max-depth", "9"]));
+    let judge = ["judge", text(&shallow), "--tile", "32", "--against"];
+    fail(&[&judge[..], &[text(&deep)]].concat(), &["seed 1", "same random numbers", "another seed"]);
+    succeed(&[&judge[..], &[text(&other)]].concat());
+    succeed(&[&judge[..], &[text(&deep), "--independent"]].concat());
+}
+
+/// The same evidence twice is no more evidence.
+#[test]
+fn the_same_picture_twice_is_refused() {
+    let folder = tempdir().unwrap();
+    let [a, b] = ["a.exr", "b.exr"].map(|name| folder.path().join(name));
+    grey_exr(&a, (32, 32), 1, 0.4);
+    grey_exr(&b, (32, 32), 2, 0.4);
+    let (a, b) = (text(&a), text(&b));
+    let spp = ["--spp", "9", "--spp", "9", "--spp", "9", "--independent"];
+    fail(
+        &[&["judge", a, "--against", b, "--against", b][..], &spp].concat(),
+        &["count twice", "leave one out"],
+    );
+}
+
+/// What is not read of a picture is said: alpha, and all layers but one.
+#[test]
+fn what_is_not_read_of_a_picture_is_said() {
+    use exr::prelude::*;
+    let folder = tempdir().unwrap();
+    let [a, b] = ["a.exr", "b.exr"].map(|name| folder.path().join(name));
+    grey_exr(&b, (32, 32), 2, 0.4);
+    let mut noise = crate::kit::random(1);
+    let grey: Vec<f32> = (0..32 * 32).map(|_| 0.4 + 0.1 * noise() as f32).collect();
+    let said = |channels: &[(&str, f32)]| {
+        let values = |value: f32| if value < 0.0 { grey.clone() } else { vec![value; 32 * 32] };
+        let channel = |&(name, value): &(&str, f32)| AnyChannel::new(name, FlatSamples::F32(values(value)));
+        let channels = AnyChannels::sort(channels.iter().map(channel).collect());
+        let layer = Layer::new((32, 32), LayerAttributes::default(), Encoding::UNCOMPRESSED, channels);
+        Image::from_layer(layer).write().to_file(&a).unwrap();
+        let args = ["judge", text(&a), "--spp", "9", "--against", text(&b), "--spp", "9", "--independent"];
+        let output = run(&args);
+        assert!(output.status.success(), "{}", stderr(&output));
+        stderr(&output)
+    };
+    let grey = [("R", -1.0), ("G", -1.0), ("B", -1.0)];
+    let with = |more: &[(&'static str, f32)]| [&grey[..], more].concat();
+    assert_eq!(said(&grey), "");
+    assert_eq!(said(&with(&[("A", 1.0)])), "");
+    let half = said(&with(&[("A", 0.5)]));
+    assert!(half.contains("a.exr: it is transparent") && half.contains("alpha is ignored"), "{half}");
+    let none = said(&with(&[("A", 0.0)]));
+    assert!(none.contains("its alpha is 0 everywhere"), "{none}");
+    let layers = said(&with(&[("key.R", 0.1), ("key.G", 0.1), ("key.B", 0.1)]));
+    assert!(layers.contains("the unnamed one is read, and not key"), "{layers}");
 }

@@ -14,7 +14,7 @@ use axum::extract::{Path, State};
 use axum::http::header::{CONTENT_LENGTH, CONTENT_TYPE};
 use axum::http::{HeaderMap, StatusCode};
 use axum::response::{IntoResponse, Response};
-use noisefloor::{Audience, Evidence, Samples, Threshold};
+use noisefloor::{Audience, Evidence, Samples, StillError, Threshold};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 use std::time::Duration;
@@ -39,17 +39,20 @@ impl From<GalleryError> for Refusal {
         let do_ = match &error {
             GalleryError::Gone => "load the page again",
             GalleryError::NoSamples(_) => "type the number beside its name",
-            GalleryError::Still(noisefloor::StillError::Nothing) => {
+            GalleryError::Still(StillError::Nothing) => {
                 "drop another rendering of the same view beside it, or start with --model and a model trained with \
                  `--evidence alone`"
             }
-            GalleryError::Still(noisefloor::StillError::Undecided { .. }) => {
+            GalleryError::Still(StillError::Undecided { .. } | StillError::Dependent { .. }) => {
                 "choose it under `Scene, relation, tiles`"
             }
             GalleryError::Many | GalleryError::Large => "take some away",
             _ => "see `noisefloor judge --help` for what pictures can be held against each other",
         };
-        let unclear = matches!(&error, GalleryError::Still(noisefloor::StillError::Undecided { .. }));
+        let unclear = matches!(
+            &error,
+            GalleryError::Still(StillError::Undecided { .. } | StillError::Dependent { .. })
+        );
         let place = if unclear { "relation" } else { "pictures" };
         Self::new(status, error.to_string(), place, do_)
     }

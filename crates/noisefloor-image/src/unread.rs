@@ -1,0 +1,75 @@
+//! What a picture's file has beside the colours that are read of it: whoever judges the picture should know.
+
+use crate::decode_exr::{Layout, alpha_of, layout_of};
+use crate::error::PictureError;
+use crate::open::{Format, Opened};
+use crate::{decode_png, read_picture};
+use std::ops::RangeInclusive;
+use std::path::Path;
+
+/// What is not read of a picture.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Unread {
+    /// The layer that is read, and all others that have colours, in the order of preference; empty if there is only
+    /// one. The unnamed one has an empty name.
+    pub layers: Vec<String>,
+    /// Least and largest alpha, if there is alpha.
+    pub alpha: Option<RangeInclusive<f32>>,
+}
+
+impl Unread {
+    /// In words, one sentence each: nothing if all that matters is read.
+    pub fn warnings(&self) -> Vec<String> {
+        let name =
+            |layer: &String| if layer.is_empty() { "the unnamed one".to_owned() } else { layer.clone() };
+        let mut all = Vec::new();
+        if let [read, others @ ..] = self.layers.as_slice() {
+            let others: Vec<String> = others.iter().map(name).collect();
+            let (read, others) = (name(read), others.join(", "));
+            all.push(format!(
+                "it has several layers, of which {read} is read, and not {others}; save the one you mean by itself"
+            ));
+        }
+        match &self.alpha {
+            Some(alpha) if *alpha.end() <= 0.0 => all.push(
+                "its alpha is 0 everywhere: viewers show nothing of it; alpha is ignored, and colours are read as stored"
+                    .to_owned(),
+            ),
+            Some(alpha) if *alpha.start() < 1.0 => all.push(
+                "it is transparent in places; alpha is ignored, and colours are read as stored, as if over black"
+                    .to_owned(),
+            ),
+            _ => {}
+        }
+        all
+    }
+}
+
+/// Finds what [`read_picture`](crate::read_picture) leaves out. Reads the pixels again if there is alpha.
+///
+/// # Errors
+/// Those of [`read_picture`](crate::read_picture).
+pub fn read_unread(path: impl AsRef<Path>) -> Result<Unread, PictureError> {
+    let path = path.as_ref();
+    let opened = Opened::open(path)?;
+    match opened.format {
+        Format::Exr => {
+            let Layout { layers, has_alpha } = layout_of(path, opened)?;
+            let layers = if layers.len() > 1 { layers } else { Vec::new() };
+            let alpha = if has_alpha { Some(alpha_of(path, Opened::open(path)?)?) } else { None };
+            Ok(Unread { layers, alpha: alpha.map(|image| range(image.pixels.iter().map(|p| p[0]))) })
+        }
+        Format::Png => {
+            let alpha = decode_png::decode_alpha(path, opened)?;
+            Ok(Unread { layers: Vec::new(), alpha: alpha.map(|alpha| range(alpha.into_iter())) })
+        }
+        // PFM has colours only, and anything else is refused there
+        _ => read_picture(path).map(|_| Unread::default()),
+    }
+}
+
+fn range(values: impl Iterator<Item = f32>) -> RangeInclusive<f32> {
+    let (least, most) =
+        values.fold((f32::INFINITY, f32::NEG_INFINITY), |(a, b), value| (a.min(value), b.max(value)));
+    least..=most
+}
