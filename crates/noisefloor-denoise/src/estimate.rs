@@ -16,8 +16,11 @@
 //! taken scale by scale, since noise is weak where it is coarse, and averaged over [`RADIUS`] pixels around.
 //! What people would see is then built from fields that have the right shape: half the difference of the
 //! denoised halves, plus, of each scale of the mean residual, the share that both halves have in common.
+//!
+//! The vision model does not see the mean of a tile; `brightness.rs` compares it.
 
 use crate::bands::Plane;
+use crate::brightness::{Light, jods_of_edge, shift};
 use crate::denoiser::DenoiseError;
 use noisefloor::{Display, Rgb, Tile, TilePlanes, Viewing};
 use noisefloor_vision::{VisionError, VisionModel, VisionWorkspace};
@@ -51,6 +54,9 @@ pub struct DenoisedError {
     size: (usize, usize),
     shown: Vec<f32>,
     residual: Vec<f32>,
+    /// Of each pixel, for its brightness; empty where that is not in question.
+    light: Vec<Light>,
+    display: Display,
 }
 
 /// One pixel on the display: luminance Y′ of the denoised mean, half the difference of the denoised halves,
@@ -78,7 +84,9 @@ impl DenoisedError {
         let plane = |n: usize| Plane::new(size, all.iter().map(|pixel| pixel[n]).collect());
         let mut residual = plane(1).values;
         add_common(&mut residual, [plane(2), plane(3)]);
-        Ok(Self { size, shown: plane(0).values, residual })
+        let light = |i: usize| Light::new(noisy.map(|p| p[i]), denoised.map(|p| p[i]));
+        let light = (0..noisy[0].len()).map(light).collect();
+        Ok(Self { size, shown: plane(0).values, residual, light, display: *display })
     }
 
     /// The error of a picture whose truth is known, in the same form: for comparison.
@@ -97,7 +105,8 @@ impl DenoisedError {
         }
         let shown: Vec<f32> = truth.iter().map(|&p| display.luma(p)).collect();
         let residual = picture.iter().zip(&shown).map(|(&p, truth)| display.luma(p) - truth).collect();
-        Ok(Self { size, shown, residual })
+        let light = picture.iter().zip(truth).map(|(&p, &t)| Light::new([t; 2], [p; 2])).collect();
+        Ok(Self { size, shown, residual, light, display: *display })
     }
 
     /// Width and height in pixels.
@@ -125,7 +134,8 @@ impl DenoisedError {
         TilePlanes { viewing, ..planes }
     }
 
-    /// Just-objectionable differences that a tile has lost, seen as a picture of its own.
+    /// Just-objectionable differences that a tile has lost, seen as a picture of its own; at least those of an edge as
+    /// high as its mean is off, where noise does not explain that.
     ///
     /// # Errors
     /// [`VisionError`] if a side of the tile has less than two pixels.
@@ -148,19 +158,28 @@ impl DenoisedError {
         let pairs = self.shown.iter().zip(&self.residual);
         let test: Vec<Rgb> = pairs.map(|(shown, residual)| [shown + contrast * residual; 3]).collect();
         let reference: Vec<Rgb> = self.shown.iter().map(|&shown| [shown; 3]).collect();
-        Ok(10.0 - eyes.compare(&test, &reference, self.size, room)?.jod())
+        let lost = 10.0 - eyes.compare(&test, &reference, self.size, room)?.jod();
+        let height = shift(&self.light, &self.display);
+        if height == 0.0 {
+            return Ok(lost);
+        }
+        let level = self.shown.iter().sum::<f32>() / self.shown.len().max(1) as f32;
+        Ok(lost.max(jods_of_edge((level, height), self.size, eyes, room)?))
     }
 
     /// A tile of it, alone.
     pub(crate) fn part(&self, tile: Tile) -> Self {
-        let crop = |plane: &[f32]| tile.rows(self.size.0).flatten().map(|pixel| plane[pixel]).collect();
+        let pixels = || tile.rows(self.size.0).flatten();
+        let crop = |plane: &[f32]| pixels().map(|pixel| plane[pixel]).collect();
         let (shown, residual) = (crop(&self.shown), crop(&self.residual));
-        Self { size: (tile.width, tile.height), shown, residual }
+        let light = pixels().filter_map(|pixel| self.light.get(pixel).copied()).collect();
+        Self { size: (tile.width, tile.height), shown, residual, light, display: self.display }
     }
 
     /// The same picture with something else wrong with it: as many pixels.
     pub(crate) fn with_residual(&self, residual: Vec<f32>) -> Self {
-        Self { size: self.size, shown: self.shown.clone(), residual }
+        let (shown, light) = (self.shown.clone(), Vec::new());
+        Self { size: self.size, shown, residual, light, display: self.display }
     }
 
     /// A map of just-objectionable differences lost, row-major.

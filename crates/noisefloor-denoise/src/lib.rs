@@ -39,6 +39,7 @@
 //! ```
 
 mod bands;
+mod brightness;
 mod criterion;
 mod denoiser;
 mod estimate;

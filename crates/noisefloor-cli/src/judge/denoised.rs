@@ -51,6 +51,13 @@ pub fn run(job: &DenoisedJob) -> anyhow::Result<()> {
     job.noise_map.iter().try_for_each(check_writable)?;
     let [a, b] = [read(&job.noisy[0])?, read(&job.noisy[1])?];
     let [da, db] = [denoised(&job.denoised[0], &a)?, denoised(&job.denoised[1], &b)?];
+    if da == db {
+        bail!(
+            "{} and {} are identical: each has to be made from its own half, by a denoiser that looks at it",
+            job.denoised[0].display(),
+            job.denoised[1].display()
+        );
+    }
     let pair = SnapshotPair::new(Evidence::Halves, &a, &[&b], job.tone, job.samples)?;
     if pair.samples() == Samples::Nested {
         bail!(

@@ -85,6 +85,46 @@ fn a_firefly_does_not_drown_the_rest() {
     assert!((with[0] / without[0] - 1.0).abs() < 0.1, "{with:?} and {without:?}");
 }
 
+/// What a denoiser returns is compared with what it was given: an answer of another brightness is wrong, however
+/// well the two halves agree about it. Known answers: black, far below, far above, and a little too bright.
+#[test]
+fn another_brightness_counts() {
+    let (eyes, mut room) = (VisionModel::new(&Viewing::default()), VisionWorkspace::default());
+    let [a, b] = [11, 12].map(|seed| noisy(seed, 0.02));
+    let mut lost = |[da, db]: [&[Rgb]; 2]| -> f64 {
+        let halves = DenoisedHalves { size: SIZE, noisy: [&a, &b], denoised: [da, db] };
+        let error = DenoisedError::new(&halves, &Display::SRGB).unwrap();
+        let tiles = TileGrid::new(SIZE.0, SIZE.1, 64).unwrap().tiles();
+        tiles.map(|tile| error.jods_lost(tile, &eyes, &mut room).unwrap()).fold(f64::INFINITY, f64::min)
+    };
+    for wrong in [-1.0, 0.0, -1e6, 3e38, 0.4] {
+        let flat = Simple::Flat(wrong).of(&a);
+        let least = lost([&flat, &flat]);
+        assert!(least > 0.3, "{wrong}: {least} JOD");
+    }
+    // The truth loses nothing, nor does the noise of both halves in a wall: its mean is right within its noise
+    let wall = Simple::Flat(0.3).of(&a);
+    assert!(lost([&wall, &wall]) < 0.05);
+    let gain = |picture: &[Rgb]| -> Vec<Rgb> { picture.iter().map(|p| p.map(|c| 1.2 * c)).collect() };
+    let (bright, right) = ([gain(&a), gain(&b)], lost([&a, &b]));
+    assert!(lost([&bright[0], &bright[1]]) > right + 0.3);
+}
+
+/// A firefly that a denoiser removes is no loss of brightness: the mean was no better known.
+#[test]
+fn a_removed_firefly_is_no_shift() {
+    let (eyes, mut room) = (VisionModel::new(&Viewing::default()), VisionWorkspace::default());
+    let [mut a, b] = [13, 14].map(|seed| noisy(seed, 0.02));
+    let wall = Simple::Flat(0.3).of(&a);
+    a[20 * SIZE.0 + 150] = [1e6; 3];
+    let halves = DenoisedHalves { size: SIZE, noisy: [&a, &b], denoised: [&wall, &wall] };
+    let error = DenoisedError::new(&halves, &Display::SRGB).unwrap();
+    let tile = TileGrid::new(SIZE.0, SIZE.1, 64).unwrap().tile(2);
+    let lost = error.jods_lost(tile, &eyes, &mut room).unwrap();
+    // The firefly itself may pass for 0.16 JOD of bias; a shift to white would be an edge of several
+    assert!(lost < 0.3, "{lost}");
+}
+
 #[test]
 fn pictures_of_other_sizes_are_refused() {
     let (a, b) = (noisy(1, 0.1), noisy(2, 0.1));
