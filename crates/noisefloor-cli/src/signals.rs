@@ -13,8 +13,14 @@ pub const AFTER_THIS_BATCH: &str = "stopping after this batch, and writing what 
 
 /// Sets the flag on the first signal, and says how the work ends; a second signal ends the process at once.
 pub fn cancel_on_signal(cancel: Arc<AtomicBool>, says: &'static str) -> anyhow::Result<()> {
+    cancel_all_on_signal(vec![cancel], says)
+}
+
+/// The same for several flags, of which the first says whether there was a signal before.
+pub fn cancel_all_on_signal(flags: Vec<Arc<AtomicBool>>, says: &'static str) -> anyhow::Result<()> {
     on_signal(move || {
-        if cancel.swap(true, Ordering::Relaxed) {
+        let again: Vec<bool> = flags.iter().map(|flag| flag.swap(true, Ordering::Relaxed)).collect();
+        if again.first() == Some(&true) {
             end();
         }
         note!("\n{says} (Ctrl-C again to quit at once)");

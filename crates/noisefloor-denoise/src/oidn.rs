@@ -3,6 +3,8 @@
 use crate::denoiser::{AuxiliaryPictures, DenoiseError, Denoiser, NoisyPicture};
 use noisefloor::Rgb;
 use noisefloor_sidecar::{FilterPlan, PictureFilter, Renderer, SidecarError, find};
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
 /// How Open Image Denoise is installed and found: the package `mitsuba-oidn`, with the library and its
 /// weights.
@@ -35,6 +37,11 @@ impl Oidn {
             last_words: String::new(),
         })?;
         Ok(Self(PictureFilter::open(&OIDN, &python, plan)?))
+    }
+
+    /// Gives a call up as soon as the flag is set; see [`PictureFilter::give_up_when`].
+    pub fn give_up_when(&mut self, flag: Arc<AtomicBool>) {
+        self.0.give_up_when(flag);
     }
 }
 

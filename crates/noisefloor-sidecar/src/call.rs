@@ -34,6 +34,7 @@ pub(crate) fn ask<T: DeserializeOwned>(
         process.call(header, payload, most_pixels * PIXEL, timeout).map_err(|failure| match failure {
             Failure::Ended(status) => (None, SidecarCause::Died { status }),
             Failure::Silent => (None, SidecarCause::Silent { limit: timeout }),
+            Failure::GivenUp => (None, SidecarCause::GivenUp),
             Failure::Garbled(error) => wrong(error.to_string()),
         })?;
     let status: Status = serde_json::from_slice(&frame.header).map_err(|e| wrong(e.to_string()))?;

@@ -83,6 +83,11 @@ pub enum SidecarCause {
         /// The time allowed.
         limit: Duration,
     },
+    /// The caller gave up before it answered ([`PictureFilter::give_up_when`]). The process was killed.
+    ///
+    /// [`PictureFilter::give_up_when`]: crate::PictureFilter::give_up_when
+    #[error("it was interrupted before it answered")]
+    GivenUp,
     /// A reply that does not match the request. The process was killed.
     #[error("its answer is wrong: {what}")]
     Wrong {

@@ -9,6 +9,8 @@ use crate::setup;
 use noisefloor::{MAX_PIXELS, Rgb, printable};
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
 /// Most bytes of a request: lengths have 32 bits.
@@ -42,6 +44,7 @@ pub struct PictureFilter {
     timeout: Duration,
     process: Option<Process>,
     name: String,
+    give_up: Option<Arc<AtomicBool>>,
 }
 
 impl PictureFilter {
@@ -56,9 +59,19 @@ impl PictureFilter {
         let init = serde_json::to_vec(&init).map_err(|e| fail(SidecarCause::Refused(e.to_string())))?;
         let script = setup::host_script(filter).map_err(|error| fail(error.into()))?;
         let (title, name, timeout) = (filter.title, filter.title.to_owned(), plan.timeout);
-        let mut this = Self { title, python: python.to_owned(), script, init, timeout, process: None, name };
+        let (python, process, give_up) = (python.to_owned(), None, None);
+        let mut this = Self { title, python, script, init, timeout, process, name, give_up };
         this.process = Some(this.start()?);
         Ok(this)
+    }
+
+    /// Gives a call up as soon as the flag is set, as [`SidecarCause::GivenUp`]: one that hangs must not hold what
+    /// is to be saved.
+    pub fn give_up_when(&mut self, flag: Arc<AtomicBool>) {
+        if let Some(process) = &mut self.process {
+            process.give_up_when(Some(Arc::clone(&flag)));
+        }
+        self.give_up = Some(flag);
     }
 
     /// Its name and version, as it says.
@@ -121,6 +134,7 @@ impl PictureFilter {
         let start = |source| SidecarCause::Start { python: self.python.clone(), source };
         let mut process = Process::start(&self.python, &self.script, &[])
             .map_err(|error| self.error(start(error), String::new()))?;
+        process.give_up_when(self.give_up.clone());
         let hello = ask::<FilterHello>(&mut process, self.init.clone(), Vec::new(), 0, self.timeout);
         match hello {
             Ok(hello) => {

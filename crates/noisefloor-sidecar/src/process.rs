@@ -8,6 +8,7 @@ use std::ffi::OsString;
 use std::io::{self, BufReader, Read};
 use std::path::Path;
 use std::process::{ChildStderr, Command, ExitStatus, Stdio};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{self, Receiver, RecvTimeoutError, Sender};
 use std::sync::{Arc, Condvar, Mutex, PoisonError};
 use std::thread;
@@ -17,6 +18,8 @@ use std::time::{Duration, Instant};
 const TAIL: usize = 4096;
 /// How long a process that has closed its stream, or was told to quit, may take to exit.
 const GRACE: Duration = Duration::from_secs(2);
+/// How often a caller that may give up looks whether it does.
+const LOOK: Duration = Duration::from_millis(50);
 
 /// Why a call returned no frame. The process is of no further use.
 #[derive(Debug)]
@@ -25,6 +28,8 @@ pub(crate) enum Failure {
     Ended(Option<ExitStatus>),
     /// It did not answer in time.
     Silent,
+    /// The caller gave up.
+    GivenUp,
     /// What it sent is not a frame.
     Garbled(FrameError),
 }
@@ -45,6 +50,8 @@ pub(crate) struct Process {
     replies: Receiver<Result<Frame, FrameError>>,
     tail: Tail,
     broken: bool,
+    /// Once it is set, no reply is waited for.
+    give_up: Option<Arc<AtomicBool>>,
 }
 
 impl Process {
@@ -65,7 +72,12 @@ impl Process {
         let gone = || io::Error::other("the thread that was to start it ended");
         let mut group: Group = group.recv().map_err(|_| gone())??;
         let tail = group.child().stderr.take().map(Tail::follow).unwrap_or_default();
-        Ok(Self { group, orders: Some(orders), replies, tail, broken: false })
+        Ok(Self { group, orders: Some(orders), replies, tail, broken: false, give_up: None })
+    }
+
+    /// Waits for replies only until the flag is set.
+    pub(crate) fn give_up_when(&mut self, flag: Option<Arc<AtomicBool>>) {
+        self.give_up = flag;
     }
 
     pub(crate) fn id(&self) -> u32 {
@@ -82,8 +94,9 @@ impl Process {
     ) -> Result<Frame, Failure> {
         let order = Order { header, payload, most_payload };
         let sent = self.orders.as_ref().is_some_and(|to| to.send(order).is_ok());
-        let reply = if sent { self.replies.recv_timeout(limit) } else { Err(RecvTimeoutError::Disconnected) };
+        let reply = if sent { self.wait_for_reply(limit) } else { Err(RecvTimeoutError::Disconnected) };
         let failure = match reply {
+            Err(RecvTimeoutError::Timeout) if self.is_given_up() => Failure::GivenUp,
             Ok(Ok(frame)) => return Ok(frame),
             Ok(Err(FrameError::End | FrameError::Io(_))) | Err(RecvTimeoutError::Disconnected) => {
                 Failure::Ended(self.wait(GRACE))
@@ -93,6 +106,25 @@ impl Process {
         };
         self.broken = true;
         Err(failure)
+    }
+
+    /// The reply, if it comes in time and before the caller gives up.
+    fn wait_for_reply(&self, limit: Duration) -> Result<Result<Frame, FrameError>, RecvTimeoutError> {
+        if self.give_up.is_none() {
+            return self.replies.recv_timeout(limit);
+        }
+        let begun = Instant::now();
+        loop {
+            let left = limit.saturating_sub(begun.elapsed());
+            match self.replies.recv_timeout(left.min(LOOK)) {
+                Err(RecvTimeoutError::Timeout) if left > LOOK && !self.is_given_up() => {}
+                outcome => return outcome,
+            }
+        }
+    }
+
+    fn is_given_up(&self) -> bool {
+        self.give_up.as_ref().is_some_and(|flag| flag.load(Ordering::Relaxed))
     }
 
     /// Its last output on standard error, safe to print; complete once the process has ended.
@@ -130,6 +162,7 @@ impl Process {
 
 impl Drop for Process {
     fn drop(&mut self) {
+        self.give_up = None;
         // A renderer that works is asked to quit, so that it can clean up; one that does not respond is
         // killed
         if !self.broken && self.call(br#"{"op":"quit"}"#.to_vec(), Vec::new(), 0, GRACE).is_ok() {

@@ -112,6 +112,7 @@ mod check {
     #[cfg(feature = "adapters")]
     use noisefloor_sidecar::FilterPlan;
     use std::sync::{Arc, Mutex};
+    use std::time::Duration;
 
     impl CompareArgs {
         /// A comparison that can begin.
@@ -123,12 +124,12 @@ mod check {
             let oracle = self.oracle.check()?;
             let params = self.params(&oracle)?;
             let specs = self.specs();
-            let denoiser = self.denoise.map(|_| shared_denoiser()).transpose()?;
+            let source = self.renderer.check(None)?;
+            let denoiser = self.denoise.map(|_| shared_denoiser(source.timeout)).transpose()?;
             let denoised = denoiser.clone();
             for spec in &specs {
                 criterion(spec, &oracle, &params, denoised.as_ref())?;
             }
-            let source = self.renderer.check(None)?;
             Ok(CompareJob {
                 scenes: self.scenes,
                 source,
@@ -186,12 +187,13 @@ mod check {
     type Shared = Arc<Mutex<Box<dyn Denoiser + Send>>>;
 
     #[cfg(feature = "adapters")]
-    fn shared_denoiser() -> anyhow::Result<Shared> {
-        Ok(Arc::new(Mutex::new(Box::new(Oidn::start(FilterPlan::default())?))))
+    fn shared_denoiser(timeout: Duration) -> anyhow::Result<Shared> {
+        let plan = FilterPlan { timeout, ..FilterPlan::default() };
+        Ok(Arc::new(Mutex::new(Box::new(Oidn::start(plan)?))))
     }
 
     #[cfg(not(feature = "adapters"))]
-    fn shared_denoiser() -> anyhow::Result<Shared> {
+    fn shared_denoiser(_timeout: Duration) -> anyhow::Result<Shared> {
         left_out("compare --denoise", "lab,adapters", "compare --denoise …")
     }
 

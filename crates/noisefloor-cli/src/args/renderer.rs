@@ -21,7 +21,7 @@ pub struct RendererArgs {
     /// it can render tiles (x1 and y1 are exclusive).
     #[arg(long, default_value = "ptwne", value_name = "SOURCE", value_parser = source)]
     source: SourceKind,
-    /// Other renderers: abort a call after this many seconds.
+    /// Other renderers, and denoisers: abort a call after this many seconds.
     #[arg(long, default_value = "1800", value_name = "SECONDS", value_parser = values::seconds)]
     timeout: Duration,
     /// Image size in pixels [default: the size in the scene file or of the program's pictures, else 384x384].

@@ -9,6 +9,7 @@ use noisefloor_image::maps::{Canvas, ColourScale, draw_field};
 use noisefloor_image::{RenderLayers, write_exr};
 use noisefloor_vision::VisionModel;
 use serde::Serialize;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
@@ -18,6 +19,7 @@ pub struct Denoised {
     /// Albedo and normals of both halves together.
     guide: Option<FirstHits>,
     record: Arc<Mutex<DenoisedRecord>>,
+    give_up: Arc<AtomicBool>,
 }
 
 /// What report.json says of it.
@@ -37,13 +39,24 @@ pub(super) struct DenoisedReport {
 }
 
 impl Denoised {
+    /// The denoiser gives a call up once `give_up` is set.
     #[cfg(feature = "adapters")]
     pub fn new(
         denoiser: impl Denoiser + 'static,
         guides: Option<&[FirstHits; 2]>,
         record: Arc<Mutex<DenoisedRecord>>,
+        give_up: Arc<AtomicBool>,
     ) -> Self {
-        Self { denoiser: Box::new(denoiser), guide: guides.map(together), record }
+        Self { denoiser: Box::new(denoiser), guide: guides.map(together), record, give_up }
+    }
+
+    /// Set by whoever wants the denoiser to give up.
+    pub fn give_up(&self) -> Arc<AtomicBool> {
+        Arc::clone(&self.give_up)
+    }
+
+    pub(super) fn is_given_up(&self) -> bool {
+        self.give_up.load(Ordering::Relaxed)
     }
 
     fn record(&self) -> MutexGuard<'_, DenoisedRecord> {

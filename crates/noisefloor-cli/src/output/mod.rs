@@ -11,6 +11,7 @@ pub use summary::say_noise;
 
 use crate::files::{write_csv, write_json};
 use crate::folder::{Earlier, Folder, Occupied};
+use crate::say::{note, one_line};
 use crate::sources::Source;
 use anyhow::Context;
 use noisefloor::{
@@ -145,7 +146,19 @@ impl Output {
         over: (Clock, &dyn Source),
     ) -> anyhow::Result<()> {
         self.write_pictures(session)?;
-        self.write_denoised(session)?;
+        if self.denoised.is_some() {
+            // A denoiser that fails, or is killed, must not cost the samples
+            self.write_tables(session, checkpoint.clone(), None)?;
+            let denoised = self.write_denoised(session);
+            let given_up = self.denoised.as_ref().is_some_and(Denoised::is_given_up);
+            match denoised {
+                Err(error) if given_up => {
+                    note!("warning: the picture is not denoised: {}; --resume does it", one_line(&error));
+                    return Ok(());
+                }
+                denoised => denoised.context("everything else is saved; --resume denoises the picture")?,
+            }
+        }
         self.write_tables(session, checkpoint, Some(over))
     }
 
@@ -174,12 +187,14 @@ impl Output {
         write_csv(&self.path("timeline.csv"), self.timeline.iter())?;
         // The report goes before a checkpoint is removed: whatever is killed in between, one of them says how
         // far the render is
-        let done = session.is_done() && tiles.iter().all(TileState::is_final);
+        // A render whose pictures are not all there is not done, however its tiles stand
+        let done = over.is_some() && session.is_done() && tiles.iter().all(TileState::is_final);
+        let job = checkpoint.as_ref().map(Checkpoint::job_digest);
         let kept = checkpoint.filter(|_| !done);
         if let Some(checkpoint) = &kept {
             write_atomic(self.path(CHECKPOINT), |to| checkpoint.write(to))?;
         }
-        write_json(&self.path(REPORT), &Report::new(self, session, &tiles, over))?;
+        write_json(&self.path(REPORT), &Report::new(self, session, &tiles, (job.as_deref(), over)))?;
         if kept.is_none() { remove(&self.path(CHECKPOINT)) } else { Ok(()) }
     }
 
@@ -187,6 +202,42 @@ impl Output {
     fn forget_earlier(&mut self) -> anyhow::Result<()> {
         if std::mem::take(&mut self.overwrites) { remove(&self.path(REPORT)) } else { Ok(()) }
     }
+}
+
+/// What a folder holds that is no render under way.
+#[cfg(feature = "farm")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Finished {
+    /// Nothing.
+    Not,
+    /// The finished picture of this job.
+    This,
+    /// A picture of another job, or one that cannot be resumed.
+    Other,
+}
+
+#[cfg(feature = "farm")]
+impl Finished {
+    /// By the digest of a job, compared with what the report in the folder says.
+    pub fn of(folder: &Path, job: &str) -> anyhow::Result<Self> {
+        let path = folder.join(REPORT);
+        if folder.join(CHECKPOINT).exists() {
+            return Ok(Self::Not);
+        }
+        let report = match std::fs::read(&path) {
+            Ok(report) => serde_json::from_slice::<serde_json::Value>(&report).unwrap_or_default(),
+            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Self::Not),
+            Err(error) => return Err(error).with_context(|| path.display().to_string()),
+        };
+        let this = report["complete"] == true && report["job"] == job;
+        Ok(if this { Self::This } else { Self::Other })
+    }
+}
+
+/// The file that shows that a folder holds a render, whosever it is.
+#[cfg(feature = "farm")]
+pub fn render_in(folder: &Path) -> Option<&'static str> {
+    [CHECKPOINT, REPORT, PICTURE].into_iter().find(|name| folder.join(name).exists())
 }
 
 /// The render that must not be overwritten, if there is one.

@@ -20,6 +20,9 @@ pub(super) struct Report<'a> {
     criterion: String,
     /// BLAKE3 of the model.
     model: Option<&'a str>,
+    /// What samples and verdicts depend on ([`noisefloor::Checkpoint::job_digest`]); null for a render that cannot
+    /// be resumed.
+    job: Option<&'a str>,
     params: &'a Params,
     /// Display exposure that was settled.
     exposure: Option<f32>,
@@ -66,7 +69,7 @@ impl<'a> Report<'a> {
         output: &'a Output,
         session: &'a Session<C>,
         tiles: &[TileState],
-        over: Option<(Clock, &dyn Source)>,
+        (job, over): (Option<&'a str>, Option<(Clock, &dyn Source)>),
     ) -> Self {
         let (clock, source) = over.unzip();
         let counts = source.and_then(|source| source.counts());
@@ -85,6 +88,7 @@ impl<'a> Report<'a> {
             seed: output.seed,
             criterion: session.criterion().name(),
             model: output.model.as_deref(),
+            job,
             params: session.params(),
             exposure: session.display().map(noisefloor::Display::exposure),
             complete: clock.is_some() && tiles.iter().all(TileState::is_final),

@@ -13,7 +13,7 @@ use crate::files::read_reference;
 use crate::folder::{Earlier, Folder};
 use crate::output::{Denoised, Output};
 use crate::say::{note, one_line};
-use crate::signals::{AFTER_THIS_BATCH, INTERRUPTED, cancel_on_signal};
+use crate::signals::{AFTER_THIS_BATCH, INTERRUPTED, cancel_all_on_signal};
 use crate::sources::{Opened, SourceJob, SourceKind};
 use anyhow::bail;
 use noisefloor::{
@@ -108,13 +108,16 @@ pub fn run(job: RenderJob) -> anyhow::Result<ExitCode> {
         }
         #[cfg(feature = "adapters")]
         Judge::Denoised(lost) => {
-            let denoiser = Arc::new(Mutex::new(Oidn::start(FilterPlan::default())?));
+            let plan = FilterPlan { timeout: job.source.timeout, ..FilterPlan::default() };
+            let (mut denoiser, give_up) = (Oidn::start(plan)?, Arc::<AtomicBool>::default());
+            denoiser.give_up_when(Arc::clone(&give_up));
+            let denoiser = Arc::new(Mutex::new(denoiser));
             let mut criterion = DenoisedQuality::new(Arc::clone(&denoiser), *lost);
             let guides = guides(&mut source, denoiser.wants())?;
             if let Some(guides) = &guides {
                 criterion = criterion.guided_by(Arc::clone(guides));
             }
-            let denoised = Denoised::new(denoiser, guides.as_deref(), criterion.record());
+            let denoised = Denoised::new(denoiser, guides.as_deref(), criterion.record(), give_up);
             let rest = Rest { denoised: Some(denoised), ..rest };
             rest.drive(Driver::new(source, criterion, *params)?, Some(Snapshots::new()))
         }
@@ -153,8 +156,8 @@ pub fn origin(job: &SourceJob, scene: &str, info: &SourceInfo) -> Option<SampleO
     };
     let all = format!("{typed:?}, {max_depth:?}, {kind}, {scene_files:?}");
     let digest = blake3::hash(all.as_bytes()).to_hex();
-    let source = format!("{scene} by {}, options {}", info.name, &digest[..16]);
-    Some(SampleOrigin { source, seed: *seed, repeats: info.repeats == Repeats::Samples })
+    let (source, options) = (format!("{scene} by {}", info.name), digest[..16].to_owned());
+    Some(SampleOrigin { source, options, seed: *seed, repeats: info.repeats == Repeats::Samples })
 }
 
 /// What a render is made of beside its driver.
@@ -194,7 +197,8 @@ impl Rest<'_> {
         }
         driver.set_time_limit(job.time.map(|time| sampling_time(time, began, info.width * info.height)));
         let cancel = driver.cancel_flag();
-        cancel_on_signal(Arc::clone(&cancel), AFTER_THIS_BATCH)?;
+        let flags = [Some(Arc::clone(&cancel)), output.denoised.as_ref().map(Denoised::give_up)];
+        cancel_all_on_signal(flags.into_iter().flatten().collect(), AFTER_THIS_BATCH)?;
         driver.source_mut().watch_reference(reference_bar(job.quiet), Arc::clone(&cancel));
         let size = (info.width, info.height);
         let mut views = Views {
@@ -203,6 +207,10 @@ impl Rest<'_> {
             page: job.watch.map(|address| watch::Page::serve(address, &output, job.quiet)).transpose()?,
         };
         let outcome = sample(&mut driver, &mut output, &mut views, snapshots.as_ref(), job);
+        if let (Ok(()), Some(denoised)) = (&outcome, &output.denoised) {
+            // Ended between two verdicts, the denoiser answers: the last picture is denoised, too
+            denoised.give_up().store(false, Ordering::Relaxed);
+        }
 
         // Write what there is, also after a failure.
         let checkpoint = snapshots.as_ref().map(|snapshots| snapshots.of(driver.session()));
@@ -299,7 +307,8 @@ fn finish<C: StoppingCriterion>(
     driver.source().notes().iter().for_each(|text| note!("warning: {text}"));
     match outcome {
         Err(error) if cancel.load(Ordering::Relaxed) => {
-            note!("warning: the batch under way is lost: {}", one_line(&error.into()));
+            let what = if matches!(error, DriverError::Criterion(_)) { "verdict" } else { "batch" };
+            note!("warning: the {what} under way is lost: {}", one_line(&error.into()));
             Ok(true)
         }
         outcome => Ok(outcome.map(|()| false)?),

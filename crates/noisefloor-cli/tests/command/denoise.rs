@@ -2,7 +2,7 @@ use crate::kit::{FILES, column, command, fail, json, random, run, stderr, succee
 use noisefloor_denoise::OIDN;
 use noisefloor_image::{RenderLayers, read_exr, write_exr};
 use noisefloor_sidecar::find;
-use noisefloor_testkit::{Requirement, require};
+use noisefloor_testkit::{Requirement, require, require_python};
 use std::path::Path;
 use std::process::Stdio;
 use std::time::Duration;
@@ -124,10 +124,14 @@ fn denoised_pictures_made_elsewhere() {
         ("good.exr", stripes(&mut || 0.0)),
         ("good2.exr", stripes(&mut || 0.001)),
         ("bad.exr", flat),
+        ("bad2.exr", vec![[0.4251; 3]; 64 * 64]),
+        ("bright.exr", stripes(&mut || 30.0)),
+        ("bright2.exr", stripes(&mut || 30.01)),
     ] {
         write_exr(path(name), &RenderLayers::rgb(64, 64, &pixels)).unwrap();
     }
     let [a, b, good, good2, bad] = ["a.exr", "b.exr", "good.exr", "good2.exr", "bad.exr"].map(path);
+    let [bad2, bright, bright2] = ["bad2.exr", "bright.exr", "bright2.exr"].map(path);
     let judge = |more: &[&str]| -> Vec<String> {
         let all = ["judge", &a, "--spp", "8", "--against", &b, "--spp", "8", "--tile", "32", "--lost", "0.2"];
         all.iter().chain(more).map(|word| (*word).to_owned()).collect()
@@ -140,7 +144,12 @@ fn denoised_pictures_made_elsewhere() {
     let clean = say(&["--independent", "--denoised", &good, &good2, "--noise-map", &map]);
     assert!(clean.contains("4 of 4 denoised tiles") && clean.contains("nobody has been asked"), "{clean}");
     assert!(Path::new(&map).exists());
-    let json = say(&["--independent", "--json", "--denoised", &bad, &bad]);
+    let json = say(&["--independent", "--json", "--denoised", &bad, &bad2]);
+    let report: serde_json::Value = serde_json::from_str(&json).unwrap();
+    assert_eq!(report["converged_tiles"].as_u64(), Some(0), "{json}");
+
+    // Too bright by 0.3, with all details right
+    let json = say(&["--independent", "--json", "--denoised", &bright, &bright2]);
     let report: serde_json::Value = serde_json::from_str(&json).unwrap();
     assert_eq!(report["converged_tiles"].as_u64(), Some(0), "{json}");
 
@@ -151,4 +160,86 @@ fn denoised_pictures_made_elsewhere() {
     refuse(&["--nested", "--denoised", &good, &bad], &["--nested"]);
     refuse(&["--denoised", &good], &["--denoised"]);
     refuse(&["--independent", "--denoised", &a, &bad], &["identical"]);
+    refuse(&["--independent", "--denoised", &bad, &bad], &["identical", "its own half"]);
+}
+
+/// A stand-in for Open Image Denoise, as an interpreter that ignores the script it is given: it hands pictures back,
+/// and hangs once the file `hang` is there.
+#[cfg(unix)]
+fn fake_denoiser(folder: &Path, python: &Path) -> std::path::PathBuf {
+    use std::os::unix::fs::PermissionsExt;
+    const HOST: &str = r#"
+import json, os, struct, sys, time
+source, sink = sys.stdin.buffer, sys.stdout.buffer
+while True:
+    lengths = source.read(8)
+    if len(lengths) < 8:
+        break
+    header, payload = struct.unpack("<II", lengths)
+    asked, payload = json.loads(source.read(header)), source.read(payload)
+    reply = {"ok": True, "name": "a stand-in"}
+    if asked["op"] == "filter":
+        while os.path.exists(sys.argv[1]):
+            time.sleep(0.05)
+        payload = payload[: asked["width"] * asked["height"] * 12]
+    reply = json.dumps(reply).encode()
+    sink.write(struct.pack("<II", len(reply), len(payload)) + reply + payload)
+    sink.flush()
+"#;
+    let (host, script) = (folder.join("host.py"), folder.join("python"));
+    std::fs::write(&host, HOST).unwrap();
+    let [host, hang, python] = [&host, &folder.join("hang"), python].map(|path| path.display().to_string());
+    std::fs::write(&script, format!("#!/bin/sh\nexec '{python}' '{host}' '{hang}'\n")).unwrap();
+    std::fs::set_permissions(&script, std::fs::Permissions::from_mode(0o755)).unwrap();
+    script
+}
+
+/// A denoiser that hangs holds nothing up: the first signal ends the verdict, everything that is rendered is saved,
+/// and `--resume` ends as an undisturbed render does.
+#[test]
+#[cfg(unix)]
+fn a_denoiser_that_hangs_costs_no_samples() {
+    let Some(python) = require_python() else { return };
+    let folder = tempdir().unwrap();
+    let (denoiser, hang) = (fake_denoiser(folder.path(), &python), folder.path().join("hang"));
+    let [whole, broken] = ["whole", "broken"].map(|name| folder.path().join(name));
+    let render = |out: &Path, more: &[&str]| {
+        let args =
+            ["render", "bulb", "--size", "32x32", "--tile", "16", "--denoise", "oidn", "--max-spp", "64"];
+        let mut typed =
+            command(&[&args[..], &["--threads", "1", "--quiet", "--out", text(out)], more].concat());
+        typed.env(OIDN.variable(), &denoiser).stderr(Stdio::piped());
+        typed
+    };
+    assert!(render(&whole, &[]).status().unwrap().success());
+
+    std::fs::write(&hang, "").unwrap();
+    let mut child = render(&broken, &[]).spawn().unwrap();
+    // The first verdict hangs
+    std::thread::sleep(Duration::from_millis(1500));
+    assert!(child.try_wait().unwrap().is_none());
+    let id = child.id().to_string();
+    assert!(std::process::Command::new("kill").args(["-TERM", &id]).status().unwrap().success());
+    let begun = std::time::Instant::now();
+    let ended = child.wait_with_output().unwrap();
+    let said = stderr(&ended);
+    assert!(begun.elapsed() < Duration::from_secs(20), "{said}");
+    assert_eq!(ended.status.code(), Some(130), "{said}");
+    assert!(said.contains("the verdict under way is lost") && said.contains("is not denoised"), "{said}");
+    assert!(read_exr(broken.join("image.exr")).is_ok() && broken.join("checkpoint.nfc").exists());
+    assert!(json(&broken.join("report.json"))["samples"].as_u64() > Some(0));
+
+    // So does the time allowed, whatever the signals
+    let ended = render(&broken, &["--resume", "--timeout", "1"]).output().unwrap();
+    let said = stderr(&ended);
+    assert!(ended.status.code() == Some(1) && said.contains("no answer in 1 s"), "{said}");
+    assert!(broken.join("checkpoint.nfc").exists());
+
+    std::fs::remove_file(&hang).unwrap();
+    let ended = render(&broken, &["--resume"]).output().unwrap();
+    assert!(ended.status.success(), "{}", stderr(&ended));
+    for name in ["image.exr", "image-denoised.exr"] {
+        let pixels = |out: &Path| read_exr(out.join(name)).unwrap().pixels;
+        assert!(pixels(&broken) == pixels(&whole), "{name}");
+    }
 }
