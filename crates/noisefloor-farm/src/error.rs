@@ -89,6 +89,19 @@ pub enum FarmError {
     /// The source cannot sample blocks.
     #[error("{0} cannot sample blocks of a tile by their need: leave out --blocks")]
     Blocks(String),
+    /// A batch that no plan asks for.
+    #[error(
+        "the plan asks for {spp} samples of tile {tile} from sample {first} on, which no plan of a farm does: it is \
+         damaged; plan the farm anew in another folder"
+    )]
+    Plan {
+        /// The tile.
+        tile: usize,
+        /// Index of the first sample.
+        first: u64,
+        /// Samples per pixel.
+        spp: u64,
+    },
     /// The source failed.
     #[error(transparent)]
     Source(#[from] SourceError),

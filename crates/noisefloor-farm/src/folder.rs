@@ -21,6 +21,8 @@ use std::path::{Path, PathBuf};
 
 /// Longest file of JSON that is written and read: a round of some ten million batches.
 const MAX_JSON: u64 = 1 << 30;
+/// Most frames of one farm.
+pub const MOST_FRAMES: u32 = 1_000_000;
 /// An empty hidden file. The lock itself ends with the process that holds it, however that ends.
 const LOCK: &str = ".noisefloor-farm.lock";
 
@@ -109,6 +111,15 @@ pub struct FrameState {
     pub done: bool,
 }
 
+/// How far a frame is, with the digest of the job that it is of.
+#[derive(Serialize, Deserialize)]
+struct KeptState {
+    #[serde(default)]
+    of: String,
+    #[serde(flatten)]
+    state: FrameState,
+}
+
 /// The tasks of a round.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Round {
@@ -182,7 +193,17 @@ impl FarmFolder {
     /// # Errors
     /// [`FarmError`] if it cannot be read.
     pub fn planned_job(&self) -> Result<Option<FarmJob>, FarmError> {
-        read_json(&self.0.join("farm.json"))
+        let path = self.0.join("farm.json");
+        let job: Option<FarmJob> = read_json(&path)?;
+        match job.as_ref().and_then(|job| job.frames) {
+            Some((first, last)) if first > last || last - first >= MOST_FRAMES => {
+                let what = format!(
+                    "frames {first} to {last} are none, or more than {MOST_FRAMES}; plan them in several farms"
+                );
+                Err(FarmError::Folder { path, what })
+            }
+            _ => Ok(job),
+        }
     }
 
     /// What is rendered.
@@ -243,20 +264,28 @@ impl FarmFolder {
         write_json(&self.frame(name).join("frame.json"), job)
     }
 
-    /// How far a frame is.
+    /// How far a frame is: nowhere, if what is kept of it is of another job than the one planned.
     ///
     /// # Errors
     /// [`FarmError`] if it cannot be read.
     pub fn state(&self, name: &str) -> Result<FrameState, FarmError> {
-        Ok(read_json(&self.frame(name).join("state.json"))?.unwrap_or_default())
+        let kept: Option<KeptState> = read_json(&self.frame(name).join("state.json"))?;
+        let job = self.job_of(name)?;
+        Ok(kept.filter(|kept| kept.of == job).map(|kept| kept.state).unwrap_or_default())
     }
 
     /// Writes how far a frame is.
     ///
     /// # Errors
-    /// [`FarmError::Write`].
+    /// [`FarmError`] if it cannot be written, or the frame's job cannot be read.
     pub fn write_state(&self, name: &str, state: &FrameState) -> Result<(), FarmError> {
-        write_json(&self.frame(name).join("state.json"), state)
+        let kept = KeptState { of: self.job_of(name)?, state: state.clone() };
+        write_json(&self.frame(name).join("state.json"), &kept)
+    }
+
+    /// The digest of a frame's job; empty before it is planned.
+    fn job_of(&self, name: &str) -> Result<String, FarmError> {
+        Ok(self.frame_job(name)?.map_or_else(String::new, |job| job.shards.digest()))
     }
 
     /// The file that a task writes.
@@ -315,9 +344,18 @@ impl FarmFolder {
     }
 }
 
+/// Opens a file for reading, unless it is a pipe or a device: these might block, or never end.
+pub(crate) fn open_regular(path: &Path) -> io::Result<File> {
+    if !fs::metadata(path)?.is_file() {
+        let what = "it is a folder, a pipe or a device, and not a file";
+        return Err(io::Error::new(io::ErrorKind::InvalidInput, what));
+    }
+    File::open(path)
+}
+
 fn read_json<T: DeserializeOwned>(path: &Path) -> Result<Option<T>, FarmError> {
     let failed = |source| FarmError::Read { path: path.to_owned(), source };
-    let file = match File::open(path) {
+    let file = match open_regular(path) {
         Ok(file) => file,
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
         Err(error) => return Err(failed(error)),
@@ -360,6 +398,7 @@ impl<W: Write> Write for UpTo<W> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use noisefloor::{FixedSpp, Params, Session, SourceIdentity};
 
     #[test]
     fn what_could_not_be_read_back_is_not_written() {
@@ -369,5 +408,23 @@ mod tests {
         assert_eq!(to.write_all(b"cde").unwrap_err().kind(), io::ErrorKind::FileTooLarge);
         to.write_all(b"cd").unwrap();
         assert_eq!(text, b"abcd");
+    }
+
+    /// How far a frame is does not outlive its job.
+    #[test]
+    fn the_state_of_another_job_is_none() {
+        let dir = tempfile::tempdir().unwrap();
+        let folder = FarmFolder::new(dir.path());
+        let job = |seed: &str| {
+            let session = Session::new(40, 20, FixedSpp(8), Params::default()).unwrap();
+            let shards = ShardJob::of(SourceIdentity::new(seed), &session);
+            FrameJob { scene: "bulb".into(), source: "ptwne".into(), shards }
+        };
+        let done = FrameState { done: true, ..FrameState::default() };
+        folder.write_frame_job("frame", &job("seed 1")).unwrap();
+        folder.write_state("frame", &done).unwrap();
+        assert_eq!(folder.state("frame").unwrap(), done);
+        folder.write_frame_job("frame", &job("seed 2")).unwrap();
+        assert_eq!(folder.state("frame").unwrap(), FrameState::default());
     }
 }

@@ -48,7 +48,9 @@ mod task;
 
 pub use batch::PlannedBatch;
 pub use error::{FarmError, ShardError};
-pub use folder::{FarmFolder, FarmJob, FarmLock, FrameJob, FrameState, Round, SlurmJobs, frame_arguments};
+pub use folder::{
+    FarmFolder, FarmJob, FarmLock, FrameJob, FrameState, MOST_FRAMES, Round, SlurmJobs, frame_arguments,
+};
 pub use local::run_local;
 pub use merge::{Merged, Problem, ShardSet};
 pub use plan::{Task, split};

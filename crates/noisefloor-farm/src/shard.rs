@@ -7,6 +7,7 @@
 
 use crate::batch::{PlannedBatch, by_blocks, fit};
 use crate::error::{ShardError, VERSION};
+use crate::folder::open_regular;
 use noisefloor::{
     BlockRequest, ProgressiveSource, Request, Resumable, Rgb, Session, SourceError, SourceIdentity, Tile,
     TileGrid,
@@ -79,6 +80,11 @@ impl ShardJob {
         Ok(TileGrid::new(self.width, self.height, self.tile)?)
     }
 
+    /// A digest of all of it, for files that must not be taken for those of another job.
+    pub fn digest(&self) -> String {
+        digest(&serde_json::to_vec(self).unwrap_or_default())
+    }
+
     /// Checks that `kept` is the same job as this one.
     ///
     /// # Errors
@@ -142,6 +148,9 @@ struct Header {
     job: ShardJob,
     /// Options of `noisefloor render`, if the command made the shard.
     arguments: Vec<String>,
+    /// Names of scene and source, for people and for the picture's file.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    names: Option<(String, String)>,
     /// Seconds in the source.
     seconds: f64,
     batches: Vec<BatchEntry>,
@@ -157,13 +166,23 @@ pub struct Shard {
 impl Shard {
     /// A shard without samples.
     pub fn new(job: ShardJob) -> Self {
-        Self { header: Header { job, arguments: vec![], seconds: 0.0, batches: vec![] }, pixels: vec![] }
+        Self {
+            header: Header { job, arguments: vec![], names: None, seconds: 0.0, batches: vec![] },
+            pixels: vec![],
+        }
     }
 
     /// Adds how `noisefloor render` is told the job, so that the file alone is enough to merge it.
     #[must_use]
     pub fn with_arguments(mut self, arguments: Vec<String>) -> Self {
         self.header.arguments = arguments;
+        self
+    }
+
+    /// Adds the names of scene and source.
+    #[must_use]
+    pub fn with_names(mut self, scene: String, source: String) -> Self {
+        self.header.names = Some((scene, source));
         self
     }
 
@@ -234,7 +253,7 @@ impl ShardFile {
     /// [`ShardError`] if it is foreign, damaged, or of another version.
     pub fn open(path: impl Into<PathBuf>) -> Result<Self, ShardError> {
         let path = path.into();
-        let file = File::open(&path)?;
+        let file = open_regular(&path)?;
         let there = file.metadata()?.len();
         let mut from = BufReader::new(file);
         let mut prefix = [0; PREFIX as usize];
@@ -303,6 +322,11 @@ impl ShardFile {
     /// Options of `noisefloor render` that describe the job; none if the command did not make it.
     pub fn arguments(&self) -> &[String] {
         &self.header.arguments
+    }
+
+    /// Names of scene and source; none if whoever made the shard did not say.
+    pub fn names(&self) -> Option<(&str, &str)> {
+        self.header.names.as_ref().map(|(scene, source)| (scene.as_str(), source.as_str()))
     }
 
     /// Seconds that the source took.

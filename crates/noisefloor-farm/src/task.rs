@@ -3,7 +3,7 @@
 use crate::batch::{PlannedBatch, by_blocks, fit};
 use crate::error::FarmError;
 use crate::shard::{Shard, ShardJob};
-use noisefloor::{Batch, LightCheck, ProgressiveSource, Request, SourceError, SourceInfo};
+use noisefloor::{Batch, LightCheck, ProgressiveSource, Request, SourceError, SourceInfo, Tile};
 use std::time::Instant;
 
 /// Most samples of one call, over all pixels: as on one machine, so that cancelling is prompt.
@@ -12,11 +12,30 @@ const CALL: u64 = 1 << 22;
 /// A batch, and the request that asks for it.
 type Wanted<'a> = (Request, &'a PlannedBatch);
 
+/// Samples per pixel that no tile has.
+const COUNTABLE: u64 = 1 << 34;
+
+/// Whether a plan can have asked for this: its batches are those of [`Session::next_batches`], which fit into
+/// one call. A damaged plan must not keep a node busy for a year.
+///
+/// [`Session::next_batches`]: noisefloor::Session::next_batches
+fn is_planned(batch: &PlannedBatch, tile: Tile, edge: usize) -> bool {
+    let &PlannedBatch { first, spp, ref blocks, .. } = batch;
+    let pixels = tile.pixels() as u64;
+    // The largest share of a block is the number of blocks, and those at an edge are smaller
+    let most = 4 * CALL.max(pixels);
+    let block =
+        |&(first, spp): &(u64, u64)| first < COUNTABLE && spp.saturating_mul((edge * edge) as u64) <= most;
+    let even = spp > 0 && spp.saturating_mul(pixels) <= CALL.max(pixels);
+    even && first < COUNTABLE && fit(tile, edge, blocks) && blocks.iter().all(block)
+}
+
 /// Takes these batches from a source. Once `cancel` says so, it returns with what it has: that is a shard,
 /// too.
 ///
 /// # Errors
-/// [`FarmError::Edited`] if the source is not that of `job`, [`FarmError::Blocks`] if it cannot sample the
+/// [`FarmError::Edited`] if the source is not that of `job`, [`FarmError::Plan`] if no plan asks for such a batch,
+/// [`FarmError::Blocks`] if it cannot sample the
 /// blocks that the job has, [`FarmError::Source`] if it fails or breaks its contract, or a batch is no light.
 pub fn sample(
     source: &mut impl ProgressiveSource,
@@ -31,9 +50,9 @@ pub fn sample(
     let edge = job.blocks;
     let mut wanted: Vec<Wanted<'_>> = Vec::new();
     for batch in batches {
-        let &PlannedBatch { tile, first, spp, ref blocks } = batch;
-        if tile >= grid.len() || spp == 0 || !fit(grid.tile(tile), edge, blocks) {
-            return Err(broken(&info, format!("it was asked for {spp} samples of tile {tile}")));
+        let &PlannedBatch { tile, first, spp, .. } = batch;
+        if tile >= grid.len() || !is_planned(batch, grid.tile(tile), edge) {
+            return Err(FarmError::Plan { tile, first, spp });
         }
         wanted.push((Request { tile: grid.tile(tile), first, spp }, batch));
     }

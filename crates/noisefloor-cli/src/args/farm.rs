@@ -146,7 +146,9 @@ pub struct MergeArgs {
 fn frames(text: &str) -> Result<(u32, u32), String> {
     let parts = text.split_once('-').and_then(|(a, b)| Some((a.parse().ok()?, b.parse().ok()?)));
     match parts {
-        Some((first, last)) if first <= last && last - first < 1_000_000 => Ok((first, last)),
+        Some((first, last)) if first <= last && last - first < noisefloor_farm::MOST_FRAMES => {
+            Ok((first, last))
+        }
         _ => Err("expected FIRST-LAST, such as 1-240".to_owned()),
     }
 }

@@ -3,7 +3,7 @@
 use super::warn;
 use crate::args::{Cli, Command};
 use crate::folder::{Earlier, Folder};
-use crate::output::Output;
+use crate::output::{Finished, Output, render_in};
 use crate::render::{JOB, Judge, RenderJob, origin};
 use crate::say::note;
 use crate::sources::Source;
@@ -139,6 +139,14 @@ pub struct Frame<'a> {
 impl<'a> Frame<'a> {
     /// Opens the scene once, and keeps what it is.
     pub fn find_out(folder: &FarmFolder, farm: &FarmJob, index: usize, name: &str) -> anyhow::Result<()> {
+        let place = folder.frame(name);
+        if let Some(file) = render_in(&place) {
+            bail!(
+                "{}: holds a render already ({file}), which the farm would overwrite; move it away, or choose another \
+                 folder for the farm",
+                place.display()
+            );
+        }
         let render = parse(&farm.arguments_of(index))?;
         let mut opened = render.source.open()?;
         if index == 0 {
@@ -179,24 +187,9 @@ impl<'a> Frame<'a> {
         if state.done {
             return Ok((state, Vec::new()));
         }
-        if self.is_finished() {
-            let state = FrameState { done: true, open: 0, ..state };
-            self.folder.write_state(self.name, &state)?;
-            return Ok((state, Vec::new()));
-        }
         let ShardJob { source, width, height, .. } = &self.job.shards;
         let work = Merge { state, pictures, frame: &self };
         on_session(&self.render, (*width, *height), source.clone(), work)
-    }
-}
-
-impl Frame<'_> {
-    /// Whether a merge wrote the last picture and was killed before it could say so.
-    fn is_finished(&self) -> bool {
-        let place = self.folder.frame(self.name);
-        let report = std::fs::read(place.join("report.json")).ok();
-        let report = report.and_then(|text| serde_json::from_slice::<serde_json::Value>(&text).ok());
-        !place.join("checkpoint.nfc").exists() && report.is_some_and(|report| report["complete"] == true)
     }
 }
 
@@ -214,8 +207,23 @@ impl Work for Merge<'_> {
         let Frame { folder, name, render, job, .. } = self.frame;
         job.shards.check(&ShardJob::of(job.shards.source.clone(), &session)).map_err(FarmError::Edited)?;
 
+        // A merge that was killed may have written the last picture without saying so in its state
+        let place = folder.frame(name);
+        match Finished::of(&place, &session.checkpoint(JOB).job_digest())? {
+            Finished::This => {
+                let state = FrameState { done: true, open: 0, ..self.state };
+                folder.write_state(name, &state)?;
+                return Ok((state, Vec::new()));
+            }
+            Finished::Other => bail!(
+                "{}: holds a picture of another job than the farm's; move it away, or plan the farm in another folder",
+                place.display()
+            ),
+            Finished::Not => {}
+        }
+
         // Take up the frame where the last merge left it
-        let mut output = output_of(render, job, Folder::claim(folder.frame(name))?, Earlier::Overwrite)?;
+        let mut output = output_of(render, job, Folder::claim(place)?, Earlier::Overwrite)?;
         if let Some(checkpoint) = output.checkpoint()? {
             session = session.resume(JOB, checkpoint).with_context(|| output.checkpoint_file())?;
             output.take_up(session.film().total_samples());

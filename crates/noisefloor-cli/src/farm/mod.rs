@@ -12,7 +12,7 @@ use crate::say::{note, one_line, say};
 use crate::signals::cancel_on_signal;
 use anyhow::{Context, bail};
 use frame::{Frame, Pictures};
-use noisefloor_farm::{FarmFolder, FarmJob, FarmLock, Round, Slurm, sample, split};
+use noisefloor_farm::{FarmFolder, FarmJob, FarmLock, FrameJob, Round, Slurm, sample, split};
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -182,12 +182,13 @@ fn task(args: &TaskArgs) -> anyhow::Result<ExitCode> {
     let mut source = opened.source;
     let cancel = Arc::new(AtomicBool::new(false));
     cancel_on_signal(Arc::clone(&cancel), "stopping after this batch, and writing what there is")?;
-    let shard = sample(&mut source, planned.shards, &task.batches, || cancel.load(Ordering::Relaxed))?;
+    let FrameJob { scene, source: renderer, shards } = planned;
+    let shard = sample(&mut source, shards, &task.batches, || cancel.load(Ordering::Relaxed))?;
     source.notes().iter().for_each(|text| note!("warning: {text}"));
     if shard.is_empty() {
         bail!("stopped before the first batch was there");
     }
-    let shard = shard.with_arguments(arguments);
+    let shard = shard.with_arguments(arguments).with_names(scene, renderer);
     shard.write(folder.shard(name, number, index))?;
     say!("{} of {} batches of {name}", shard.len(), task.batches.len())?;
     Ok(if shard.len() == task.batches.len() { ExitCode::SUCCESS } else { ExitCode::FAILURE })

@@ -23,9 +23,8 @@ pub fn merge(args: MergeArgs) -> anyhow::Result<ExitCode> {
         format!("{}: its job cannot be set up; merge where its model and LUT are", first.path().display())
     })?;
     let shards = first.job().clone();
-    let scene =
-        args.out.file_name().map_or_else(|| "merged".into(), |name| name.to_string_lossy().into_owned());
-    let job = FrameJob { scene, source: "shards".into(), shards };
+    let (scene, source) = first.names().unwrap_or(("unnamed scene", "unnamed renderer"));
+    let job = FrameJob { scene: scene.to_owned(), source: source.to_owned(), shards };
     let ShardJob { source, width, height, .. } = job.shards.clone();
     on_session(&render, (width, height), source, Whole { args: &args, render: &render, job: &job })
 }

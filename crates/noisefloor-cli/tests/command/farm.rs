@@ -1,5 +1,5 @@
 use crate::kit::{command, fail, json, run, stderr, succeed, text};
-use noisefloor_image::read_exr;
+use noisefloor_image::{read_exr, read_facts};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
@@ -101,6 +101,13 @@ fn killed_farms_give_the_picture_of_one_machine() {
     let output = merge(&kept, &merged);
     assert!(output.status.success(), "{}", stderr(&output));
     assert_same(&one, &merged);
+    // Scene and renderer are those of the render, whatever the folder is called
+    for key in ["scene", "source", "seed", "job"] {
+        let said = |dir: &Path| json(&dir.join("report.json"))[key].clone();
+        assert_eq!(said(&merged), said(&one), "{key}");
+    }
+    let facts = |dir: &Path| read_facts(dir.join("image.exr")).unwrap();
+    assert_eq!(facts(&merged), facts(&one));
     kept.sort();
     let partial = folder.path().join("partial");
     let output = merge(&kept[..kept.len() - 1], &partial);
@@ -196,5 +203,71 @@ fn what_is_wrong_with_a_farm_is_said() {
     // Mended, it goes on
     fs::write(&scene, xml).unwrap();
     succeed(&["farm", "run", text(&dir), "--local", "1", "--quiet"]);
+    assert_eq!(json(&dir.join("frame/report.json"))["complete"], true);
+}
+
+/// A finished picture is the farm's only if it is of the farm's job: it is compared, always.
+#[test]
+fn a_finished_render_of_another_job_is_not_the_farms() {
+    const JOB: &str = "bulb --size 32x32 --tile 16 --criterion spp:20 --threads 1 --seed 3";
+    const OTHER: &str = "cornell-box --size 32x32 --tile 16 --criterion spp:20 --threads 1";
+    let folder = tempdir().unwrap();
+    let [before, after, own] = ["before", "after", "own"].map(|name| folder.path().join(name));
+    let foreign = |dir: &Path| fs::read(dir.join("frame/image.exr")).unwrap();
+
+    // There before the plan: it is refused, and left alone
+    render(&before.join("frame"), OTHER);
+    let picture = foreign(&before);
+    let words: Vec<&str> = ["farm", "plan", text(&before), "--"].into_iter().chain(JOB.split(' ')).collect();
+    fail(&words, &["holds a render already", "move it away"]);
+    assert!(foreign(&before) == picture);
+
+    // Put there after it, by the same scene with another seed
+    plan(&after, &[], JOB);
+    render(&after.join("frame"), &JOB.replace("--seed 3", "--seed 4"));
+    fail(&["farm", "run", text(&after), "--local", "1"], &["a picture of another job", "move it away"]);
+    fs::remove_file(after.join("frame/report.json")).unwrap();
+    succeed(&["farm", "run", text(&after), "--local", "1", "--quiet"]);
+    assert_eq!(json(&after.join("frame/report.json"))["seed"], 3);
+
+    // The job's own, finished by `render`
+    plan(&own, &[], JOB);
+    render(&own.join("frame"), JOB);
+    let picture = foreign(&own);
+    let said = succeed(&["farm", "run", text(&own), "--local", "1"]);
+    assert!(said.contains("frame: done") && foreign(&own) == picture, "{said}");
+    assert_same(&after.join("frame"), &own.join("frame"));
+}
+
+/// Neither a pipe among the shards nor a number that no plan has can hold a farm up.
+#[test]
+fn pipes_and_huge_numbers_hold_nothing_up() {
+    let folder = tempdir().unwrap();
+    let dir = folder.path().join("farm");
+    plan(&dir, &[], "bulb --size 32x32 --tile 16 --criterion spp:20 --threads 1");
+    let pipe = dir.join("frame/shards/.nfs");
+    let named = dir.join("frame/shards/a.nfs");
+    assert!(Command::new("mkfifo").args([&pipe, &named]).status().unwrap().success());
+
+    // Numbers that would keep a task busy for years
+    let round = dir.join("round.json");
+    let right = fs::read_to_string(&round).unwrap();
+    let mut huge: serde_json::Value = serde_json::from_str(&right).unwrap();
+    huge["tasks"][0]["batches"][0][2] = 1_000_000_000_000_000u64.into();
+    fs::write(&round, huge.to_string()).unwrap();
+    fail(&["farm", "task", text(&dir), "1", "0"], &["1000000000000000 samples", "plan the farm anew"]);
+    fs::write(&round, right).unwrap();
+    let farm = dir.join("farm.json");
+    let right = fs::read_to_string(&farm).unwrap();
+    let mut huge: serde_json::Value = serde_json::from_str(&right).unwrap();
+    huge["frames"] = serde_json::json!([0, u32::MAX]);
+    fs::write(&farm, huge.to_string()).unwrap();
+    fail(&["farm", "run", text(&dir), "--local", "1"], &["farm.json", "frames 0 to 4294967295"]);
+    fs::write(&farm, right).unwrap();
+
+    let mut run = coordinator(&dir);
+    let done = wait_for("the end of the farm", || run.try_wait().unwrap());
+    assert!(done.success());
+    assert!(pipe.exists() && dir.join("frame/shards/a.nfs.bad").exists());
     assert_eq!(json(&dir.join("frame/report.json"))["complete"], true);
 }
