@@ -6,6 +6,7 @@ use super::rows::{all_codes, append, begin, erase, event, load, scrub};
 use crate::error::StoreError;
 use crate::event::Envelope;
 use rusqlite::{Connection, TransactionBehavior};
+use std::ffi::{OsStr, OsString};
 use std::path::{Path, PathBuf};
 use std::sync::mpsc;
 use tokio::sync::oneshot;
@@ -38,7 +39,13 @@ impl AnswerStore {
     /// design.
     pub fn open(path: impl AsRef<Path>, design: &str) -> Result<Self, StoreError> {
         let path = path.as_ref().to_owned();
+        // A log that is left is of a server that was killed: perhaps before it had removed what it erased
+        let log = PathBuf::from([path.as_os_str(), OsStr::new("-wal")].into_iter().collect::<OsString>());
+        let killed = std::fs::metadata(log).is_ok_and(|log| log.len() > 0);
         let mut connection = open(&path, design)?;
+        if killed {
+            scrub(&connection);
+        }
         let (commands, received) = mpsc::channel();
         let work = move || write(&mut connection, &path, &received);
         std::thread::Builder::new().name("answers".into()).spawn(work).map_err(|_| StoreError::Closed)?;
@@ -129,12 +136,13 @@ fn write(connection: &mut Connection, path: &Path, commands: &mpsc::Receiver<Com
             erased |= matches!(command, Command::Erase { .. });
             held.push(run(&transaction, path, command));
         }
-        let mut failure = transaction.commit().err();
+        let failure = transaction.commit().err();
+        // An erasure is acknowledged when nothing is left of it, in the log either
+        if erased && failure.is_none() {
+            scrub(connection);
+        }
         for answer in held {
             answer(failure.as_ref().map(copy));
-        }
-        if erased && failure.take().is_none() {
-            scrub(connection);
         }
     }
 }
@@ -185,5 +193,68 @@ fn run(connection: &Connection, path: &Path, command: Command) -> Held {
         Command::Load { code, reply } => hold(path, reply, load(connection, path, &code)),
         Command::Event { code, seq, reply } => hold(path, reply, event(connection, path, &code, seq)),
         Command::Erase { code, reply } => hold(path, reply, erase(connection, path, &code)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::store::database::settle;
+    use std::collections::BTreeMap;
+
+    /// Sixteen bytes that stand nowhere else.
+    const IDENTIFIER: &str = "IDENTIFIER-4711-";
+
+    fn session(code: &str) -> NewSession {
+        let ids = BTreeMap::from([("PROLIFIC_PID".to_owned(), IDENTIFIER.repeat(20))]);
+        NewSession { code: code.into(), seed: 1, group: String::new(), simulated: false, ids, link: None }
+    }
+
+    /// The files of a database that still name the participant.
+    fn traces(database: &Path) -> Vec<PathBuf> {
+        let named = |path: &PathBuf| {
+            let bytes = std::fs::read(path).unwrap_or_default();
+            bytes.windows(IDENTIFIER.len()).any(|window| window == IDENTIFIER.as_bytes())
+        };
+        let files = std::fs::read_dir(database.parent().unwrap()).unwrap().map(|entry| entry.unwrap().path());
+        files.filter(named).collect()
+    }
+
+    /// When an erasure is acknowledged, nothing is left of it: whoever is killed then has nothing to hide.
+    #[tokio::test]
+    async fn an_erasure_is_acknowledged_when_it_is_complete() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("answers.sqlite");
+        let store = AnswerStore::open(&path, "a design").unwrap();
+        for round in 0..20 {
+            let code = store.begin(session(&format!("CODE{round:08}"))).await.unwrap();
+            assert!(!traces(&path).is_empty());
+            store.erase(&code).await.unwrap();
+            assert_eq!(traces(&path), Vec::<PathBuf>::new(), "round {round}");
+        }
+    }
+
+    /// A server killed between the two finishes the erasure when it starts again.
+    #[test]
+    fn what_a_killed_server_left_of_an_erasure_goes_at_the_next_start() {
+        let folder = tempfile::tempdir().unwrap();
+        let [there, copy] = ["there", "copy"].map(|name| folder.path().join(name));
+        for folder in [&there, &copy] {
+            std::fs::create_dir(folder).unwrap();
+        }
+        let path = there.join("answers.sqlite");
+        let connection = open(&path, "a design").unwrap();
+        settle(&connection).unwrap();
+        begin(&connection, &path, &session("CODE00000000")).unwrap();
+        erase(&connection, &path, "CODE00000000").unwrap();
+        // What a kill leaves
+        for file in ["answers.sqlite", "answers.sqlite-wal"] {
+            std::fs::copy(there.join(file), copy.join(file)).unwrap();
+        }
+        let path = copy.join("answers.sqlite");
+        assert!(!traces(&path).is_empty());
+        let store = AnswerStore::open(&path, "a design").unwrap();
+        assert_eq!(traces(&path), Vec::<PathBuf>::new());
+        drop(store);
     }
 }
