@@ -5,6 +5,7 @@
 use crate::error::StudyError;
 use crate::http::{self, Exposure, Guard, Listening, Refusal};
 use axum::Router;
+use axum::body::Bytes;
 use axum::extract::{Path, State};
 use axum::http::StatusCode;
 use axum::http::header::CONTENT_TYPE;
@@ -104,7 +105,8 @@ pub struct LiveRender(Mutex<Latest>);
 #[derive(Debug, Default)]
 struct Latest {
     state: Option<(LiveState, Instant)>,
-    png: Vec<u8>,
+    /// Shared by all who read it.
+    png: Bytes,
     picture: u64,
     /// When a page asked last.
     asked: Option<Instant>,
@@ -119,10 +121,15 @@ impl LiveRender {
     pub fn publish(&self, state: &LiveState, picture: Option<Vec<u8>>) {
         let mut latest = self.latest();
         if let Some(png) = picture {
-            latest.png = png;
+            latest.png = png.into();
             latest.picture += 1;
         }
         latest.state = Some((LiveState { picture: latest.picture, ..state.clone() }, Instant::now()));
+    }
+
+    /// The latest picture, without a copy.
+    fn png(&self) -> Bytes {
+        self.latest().png.clone()
     }
 
     /// Whether a page is open: pictures need not be made for nobody.
@@ -147,7 +154,7 @@ impl WatchServer {
     ) -> Result<SocketAddr, StudyError> {
         let failed = |source: io::Error| StudyError::Listen { address: address.to_string(), source };
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(failed)?;
-        let listening = runtime.block_on(Listening::bind(address))?;
+        let listening = runtime.block_on(Listening::bind(address, exposure))?;
         let bound = listening.address();
         let router = router(live, Arc::new(Guard::new(bound, exposure)));
         let serve = move || runtime.block_on(listening.serve(router, std::future::pending()));
@@ -186,7 +193,7 @@ async fn state(State(live): State<Arc<LiveRender>>) -> Response {
 }
 
 async fn picture(State(live): State<Arc<LiveRender>>) -> Response {
-    let png = live.latest().png.clone();
+    let png = live.png();
     if png.is_empty() {
         return nothing("there is no picture yet").into_response();
     }
@@ -195,4 +202,18 @@ async fn picture(State(live): State<Arc<LiveRender>>) -> Response {
 
 fn nothing(what: &str) -> Refusal {
     Refusal::new(StatusCode::NOT_FOUND, what, "path", "go to /")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Sixty readers of a large picture need the memory of one.
+    #[test]
+    fn readers_share_the_picture() {
+        let live = LiveRender::default();
+        live.publish(&LiveState::new("hall", "ptwne"), Some(vec![1; 1 << 20]));
+        let [one, other] = [live.png(), live.png()];
+        assert_eq!((one.as_ptr(), one.len()), (other.as_ptr(), 1 << 20));
+    }
 }

@@ -29,7 +29,13 @@ impl Page {
         let live = Arc::new(LiveRender::default());
         let bound = WatchServer::start(Arc::clone(&live), address, &Exposure::default())?;
         if !quiet {
-            note!("watch it at http://{bound}");
+            match bound.ip().is_unspecified() {
+                false => note!("watch it at http://{bound}"),
+                true => note!(
+                    "watch it at http://127.0.0.1:{port}, and elsewhere at port {port} of this machine's IP address",
+                    port = bound.port()
+                ),
+            }
         }
         let state = LiveState::new(&output.scene, &output.source);
         Ok(Self { live, state, blank: true, pace: Pace::of_view(PAUSE) })

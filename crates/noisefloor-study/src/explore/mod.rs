@@ -58,7 +58,7 @@ impl ExploreServer {
                 .map_err(|error| StudyError::Explore(error.to_string()))?;
         }
         let kept = Arc::new(Disagreements::open(&setup.database)?);
-        let listening = Listening::bind(address).await?;
+        let listening = Listening::bind(address, exposure).await?;
         let app = Arc::new(App {
             setup,
             kept,

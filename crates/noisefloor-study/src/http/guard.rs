@@ -24,6 +24,8 @@ const MOST_ADDRESSES: usize = 10_000;
 /// Names of the server, and wrong codes by address.
 pub(crate) struct Guard {
     hosts: Vec<String>,
+    /// Port at which any address of this machine is known, if the server listens on all of them.
+    any_address: Option<u16>,
     exposure: Exposure,
     wrong: Mutex<HashMap<IpAddr, (Instant, HashSet<String>)>>,
 }
@@ -34,7 +36,12 @@ pub(crate) struct Client(pub(crate) IpAddr);
 
 impl Guard {
     pub(crate) fn new(address: SocketAddr, exposure: &Exposure) -> Self {
-        Self { hosts: exposure.hosts(address), exposure: exposure.clone(), wrong: Mutex::default() }
+        Self {
+            hosts: exposure.hosts(address),
+            any_address: address.ip().is_unspecified().then(|| address.port()),
+            exposure: exposure.clone(),
+            wrong: Mutex::default(),
+        }
     }
 
     /// The Host header, if it names this server, with or without a port.
@@ -42,7 +49,10 @@ impl Guard {
         let host = headers.get(HOST)?.to_str().ok()?.to_lowercase();
         let without_port = host.rsplit_once(':').filter(|(_, port)| port.parse::<u16>().is_ok());
         let name = without_port.map_or(&host[..], |(name, _)| name);
-        self.hosts.iter().any(|h| *h == host || h == name).then_some(host)
+        // A page elsewhere can make its name resolve to this machine, but an address is no name
+        let of_machine =
+            |host: &str| host.parse().is_ok_and(|at: SocketAddr| Some(at.port()) == self.any_address);
+        (of_machine(&host) || self.hosts.iter().any(|h| *h == host || h == name)).then_some(host)
     }
 
     /// Where a request comes from, and the scheme of the page: a proxy that is trusted says both.
@@ -98,7 +108,8 @@ fn foreign(guard: &Guard, scheme: &str, request: &Request) -> Option<Refusal> {
     let headers = request.headers();
     let refuse = |status, what: &str, place: &str, do_: &str| Some(Refusal::new(status, what, place, do_));
     let Some(host) = guard.known_host(headers) else {
-        let do_ = "open the address that `noisefloor` printed, or name this host with --allow-host";
+        let do_ = "open the address that `noisefloor` printed, or the machine's IP address if it listens on all; \
+            `study serve` and `explore` take further names with --allow-host";
         let what = "this server does not go by that name";
         return refuse(StatusCode::MISDIRECTED_REQUEST, what, "Host", do_);
     };
@@ -177,6 +188,26 @@ mod tests {
         ] {
             assert_eq!(guard.known_host(&headers(&[("host", host)])).is_some(), known, "{host}");
         }
+    }
+
+    /// Listening on all addresses, it goes by each of them, and by no name that it was not given.
+    #[test]
+    fn addresses_of_the_machine_are_known_where_it_listens_on_all() {
+        let knows = |listening: [u8; 4], host: &'static str| {
+            let guard = Guard::new((listening, 8437).into(), &Exposure::default());
+            guard.known_host(&headers(&[("host", host)])).is_some()
+        };
+        for (host, known) in [
+            ("192.168.1.5:8437", true),
+            ("[fe80::1]:8437", true),
+            ("localhost:8437", true),
+            ("192.168.1.5:80", false),
+            ("192.168.1.5", false),
+            ("evil.example:8437", false),
+        ] {
+            assert_eq!(knows([0, 0, 0, 0], host), known, "{host}");
+        }
+        assert!(!knows([127, 0, 0, 1], "192.168.1.5:8437"));
     }
 
     #[test]

@@ -5,6 +5,7 @@ mod exposure;
 mod fallback;
 mod guard;
 mod listen;
+mod patience;
 mod reply;
 
 pub(crate) use body::{read_bytes, read_json};
