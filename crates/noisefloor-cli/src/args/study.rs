@@ -88,6 +88,10 @@ struct ServeArgs {
     /// Path under which the proxy serves the study, such as /noise.
     #[arg(long, value_name = "PATH", default_value = "")]
     base_path: String,
+    /// Admit simulated observers, for a rehearsal with a program of your own: they need no link, get no completion
+    /// code, and their answers are kept apart.
+    #[arg(long)]
+    admit_simulated: bool,
 }
 
 /// Make one-time links, one for each participant.
@@ -223,6 +227,7 @@ mod check {
                     exposure: Exposure::named(&args.allow_host)
                         .trusting(&args.trust_proxy)
                         .under(&args.base_path),
+                    admit_simulated: args.admit_simulated,
                 }),
                 StudyCommand::Analyse(args) => StudyJob::Analyse(AnalyseJob {
                     study: Arc::new(Study::open(&args.study)?),

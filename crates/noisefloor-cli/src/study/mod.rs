@@ -47,6 +47,7 @@ pub struct ServeJob {
     pub address: SocketAddr,
     /// Names, proxies and the path that the server answers to.
     pub exposure: Exposure,
+    pub admit_simulated: bool,
 }
 
 pub struct AnalyseJob {
@@ -112,9 +113,10 @@ fn runtime() -> anyhow::Result<Runtime> {
 }
 
 fn serve(job: ServeJob) -> anyhow::Result<()> {
-    let ServeJob { study, address, exposure } = job;
+    let ServeJob { study, address, exposure, admit_simulated } = job;
     runtime()?.block_on(async {
         let server = StudyServer::bind(study.clone(), address, &exposure).await?;
+        let server = if admit_simulated { server.admitting_simulated() } else { server };
         let address = server.address();
         say!("observers begin at http://{address}{}; Ctrl-C ends the server", exposure.base_path)?;
         say!("experimenter's page: http://{address}{}", server.experimenter_path())?;
@@ -139,6 +141,7 @@ fn simulate(job: &SimulateJob) -> anyhow::Result<()> {
     let (stop, stopped) = oneshot::channel::<()>();
     let address = SocketAddr::new(Ipv4Addr::LOCALHOST.into(), 0);
     let server = runtime.block_on(StudyServer::bind(study.clone(), address, &Exposure::default()))?;
+    let server = server.admitting_simulated();
     let url = format!("http://{}", server.address());
     let served = runtime.spawn(server.run(async { drop(stopped.await) }));
     let mut events = 0u64;

@@ -15,6 +15,7 @@ use axum::http::StatusCode;
 use axum::http::header::{CACHE_CONTROL, CONTENT_DISPOSITION, CONTENT_TYPE};
 use axum::response::{IntoResponse, Response};
 use std::sync::Arc;
+use std::sync::atomic::Ordering;
 
 type Answer = Result<Response, Refusal>;
 type Shared = State<Arc<App>>;
@@ -41,6 +42,10 @@ pub(crate) async fn begin(State(app): Shared, body: Body) -> Answer {
     let refuse = |what: &str, place: &str, do_: String| {
         Err(Refusal::new(StatusCode::UNPROCESSABLE_ENTITY, what, place, do_))
     };
+    if simulated && !app.simulated.load(Ordering::Relaxed) {
+        let do_ = "rehearse with `noisefloor study simulate`, or `study serve --admit-simulated`";
+        return refuse("simulated observers are not admitted", "simulated", do_.into());
+    }
     let groups = &app.study.groups;
     if if groups.is_empty() { !group.is_empty() } else { !groups.contains(&group) } {
         return refuse("no such group", "group", format!("choose one of {groups:?}"));

@@ -9,6 +9,7 @@ use crate::questplus::QuestGrid;
 use crate::session::{ParticipantSession, replay};
 use crate::store::AnswerStore;
 use std::collections::HashMap;
+use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// Most sessions kept in memory; others are read from the database when they continue.
@@ -25,6 +26,8 @@ pub(crate) struct App {
     pub(super) live: Mutex<HashMap<String, Live>>,
     pub(super) tiles: TileCache,
     pub(super) guard: Arc<Guard>,
+    /// Whether simulated observers are admitted.
+    pub(super) simulated: AtomicBool,
     /// Opens the experimenter's page.
     pub(super) key: String,
 }

@@ -21,18 +21,27 @@ use axum::Router;
 use axum::middleware::{from_fn, from_fn_with_state};
 use axum::response::Redirect;
 use axum::routing::{get, post};
+use std::fmt;
 use std::future::Future;
 use std::net::SocketAddr;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 use tiles::TileCache;
 
 /// A bound server, ready to run.
-#[derive(Debug)]
 pub struct StudyServer {
     listening: Listening,
     router: Router,
     base_path: String,
     key: String,
+    app: Arc<App>,
+}
+
+impl fmt::Debug for StudyServer {
+    // Neither the key nor answers belong into a log
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("StudyServer").field("listening", &self.listening).finish_non_exhaustive()
+    }
 }
 
 impl StudyServer {
@@ -47,7 +56,7 @@ impl StudyServer {
         exposure: &Exposure,
     ) -> Result<Self, StudyError> {
         let store = AnswerStore::open(&study.database, &study.design())?;
-        let listening = Listening::bind(address).await?;
+        let listening = Listening::bind(address, exposure).await?;
         let key = code::draw()?;
         let app = Arc::new(App {
             grids: session::grids(&study),
@@ -55,11 +64,20 @@ impl StudyServer {
             guard: Arc::new(Guard::new(listening.address(), exposure)),
             live: Mutex::default(),
             key: key.clone(),
+            simulated: AtomicBool::new(false),
             store,
             study,
         });
         let base_path = exposure.base_path.clone();
-        Ok(Self { listening, router: router(app, &base_path), base_path, key })
+        Ok(Self { listening, router: router(Arc::clone(&app), &base_path), base_path, key, app })
+    }
+
+    /// Admits [simulated observers](crate::simulated), who need no link and get no completion code: for a rehearsal.
+    /// Otherwise they are refused.
+    #[must_use]
+    pub fn admitting_simulated(self) -> Self {
+        self.app.simulated.store(true, Ordering::Relaxed);
+        self
     }
 
     /// The bound address.

@@ -161,16 +161,18 @@ impl SessionView {
 
 fn completion(session: &ParticipantSession) -> Option<CompletionView> {
     let study = session.study();
+    // Codes are money: a program that answers for people gets none
+    let paid = |of: &Option<String>| of.clone().filter(|_| !session.is_simulated());
     let text = session.language().and_then(|l| study.text.get(l));
     let debriefing = text.map(|t| t.debriefing.clone()).unwrap_or_default();
     match session.stage() {
         Stage::Finished => Some(CompletionView {
-            code: study.participants.completion_code.clone(),
-            url: study.participants.completion_url.clone(),
+            code: paid(&study.participants.completion_code),
+            url: paid(&study.participants.completion_url),
             debriefing,
         }),
         Stage::ScreenedOut => {
-            Some(CompletionView { code: None, url: study.participants.screened_out_url.clone(), debriefing })
+            Some(CompletionView { code: None, url: paid(&study.participants.screened_out_url), debriefing })
         }
         _ => None,
     }

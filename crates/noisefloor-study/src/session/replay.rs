@@ -16,7 +16,7 @@ pub fn replay(
     grids: Arc<Vec<Arc<QuestGrid>>>,
     record: &SessionRecord,
 ) -> Result<ParticipantSession, StoreError> {
-    let mut session = ParticipantSession::new(study, grids, record.seed);
+    let mut session = ParticipantSession::new(study, grids, record.seed).simulated(record.simulated);
     for (seq, envelope) in record.events.iter().enumerate() {
         let misfit = |what: String| StoreError::Event { code: record.code.clone(), seq: seq as u64, what };
         if envelope.seq != seq as u64 {

@@ -67,6 +67,7 @@ pub struct ParticipantSession {
     pub(super) hasty: [u32; 2],
     pub(super) quests: BTreeMap<(u32, u32), QuestPlus>,
     pub(super) outcomes: Vec<TrialOutcome>,
+    pub(super) simulated: bool,
 }
 
 /// QUEST+ tables of each stack, shared by all sessions of a study.
@@ -103,9 +104,16 @@ impl ParticipantSession {
             hasty: [0, 0],
             quests: BTreeMap::new(),
             outcomes: Vec::new(),
+            simulated: false,
         };
         session.begin_trial();
         session
+    }
+
+    /// A session of a simulated observer, who takes no code away.
+    #[must_use]
+    pub fn simulated(self, simulated: bool) -> Self {
+        Self { simulated, ..self }
     }
 
     /// Applies an event.

@@ -20,6 +20,11 @@ impl ParticipantSession {
         self.stage
     }
 
+    /// Whether the observer is simulated.
+    pub fn is_simulated(&self) -> bool {
+        self.simulated
+    }
+
     /// Whether the observer has paused.
     pub fn is_paused(&self) -> bool {
         self.paused

@@ -261,3 +261,33 @@ fn a_database_goes_with_one_study() {
     let other = folder.dir.path().join("study.toml");
     assert!(noisefloor_study::AnswerStore::open(&other, &study.design()).is_err());
 }
+
+/// Simulated observers come only if whoever runs the study admits them, whatever they say of themselves, and take no
+/// completion code away.
+#[test]
+fn simulated_observers_need_the_operator_and_are_not_paid() {
+    let more = "[participants]\nlinks-only = true\ncompletion-code = \"C0DE\"\n\
+                completion-url = \"https://example.org/paid\"\n\
+                screened-out-url = \"https://example.org/out\"";
+    let folder = Folder::new("acquisition", &["wall"], &levels(6, 2.0), more);
+    let begin = r#"{"group":"","simulated":true}"#;
+    let people = Running::for_people(folder.study());
+    let answer = post(&people, "/api/sessions", begin);
+    refused(&answer, 422);
+    assert!(
+        answer.body.contains("not admitted") && answer.body.contains("study simulate"),
+        "{}",
+        answer.body
+    );
+    refused(&post(&people, "/api/sessions", r#"{"group":""}"#), 422);
+    drop(people);
+
+    let rehearsal = Running::start(folder.study());
+    refused(&post(&rehearsal, "/api/sessions", r#"{"group":""}"#), 422);
+    let code = drive(&rehearsal.url, "", &mut public(1, &[150.0, 600.0]).draw(1), |_| ()).unwrap();
+    let view = request(&rehearsal, "GET", &format!("/api/sessions/{code}"), "", "");
+    let view: serde_json::Value = serde_json::from_str(&view.body).unwrap();
+    assert_eq!(view["stage"], "finished", "{view}");
+    let completion = &view["completion"];
+    assert!(completion["code"].is_null() && completion["url"].is_null(), "{completion}");
+}

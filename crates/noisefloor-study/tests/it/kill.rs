@@ -22,6 +22,7 @@ fn serve_for_another_process() {
     runtime.block_on(async {
         let server =
             StudyServer::bind(study, ([127, 0, 0, 1], 0).into(), &Exposure::default()).await.unwrap();
+        let server = server.admitting_simulated();
         println!("\nserving http://{}", server.address());
         server.run(std::future::pending()).await.unwrap();
     });

@@ -94,6 +94,15 @@ impl Running {
     }
 
     pub(crate) fn exposed(study: Arc<Study>, exposure: Exposure) -> Self {
+        Self::serving(study, exposure, StudyServer::admitting_simulated)
+    }
+
+    /// As the command serves it: for people.
+    pub(crate) fn for_people(study: Arc<Study>) -> Self {
+        Self::serving(study, Exposure::default(), |server| server)
+    }
+
+    fn serving(study: Arc<Study>, exposure: Exposure, set_up: fn(StudyServer) -> StudyServer) -> Self {
         let (stop, stopped) = oneshot::channel::<()>();
         let (tell, told) = std::sync::mpsc::channel();
         let thread = std::thread::spawn(move || {
@@ -101,6 +110,7 @@ impl Running {
                 tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build().unwrap();
             runtime.block_on(async {
                 let server = StudyServer::bind(study, ([127, 0, 0, 1], 0).into(), &exposure).await.unwrap();
+                let server = set_up(server);
                 tell.send((server.address(), server.experimenter_path())).unwrap();
                 server.run(async { drop(stopped.await) }).await.unwrap();
             });
