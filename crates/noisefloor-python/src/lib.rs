@@ -4,7 +4,8 @@
 //! - `errors.rs`: one exception for each kind of error;
 //! - `arrays.rs`: between numpy and slices;
 //! - `params.rs`, `oracle.rs`, `verdicts.rs`, `session.rs`: the push session;
-//! - `stills.rs`, `metrics.rs`: finished pictures.
+//! - `stills.rs`, `metrics.rs`: finished pictures;
+//! - `pool.rs`: threads that survive a fork.
 //!
 //! What takes long runs without the interpreter's lock. Its types never change, or stand behind a lock of
 //! their own.
@@ -14,6 +15,7 @@ mod errors;
 mod metrics;
 mod oracle;
 mod params;
+mod pool;
 mod session;
 mod stills;
 mod verdicts;

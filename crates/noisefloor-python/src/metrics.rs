@@ -3,6 +3,7 @@
 use crate::arrays::{Pixels, pixels, plane};
 use crate::errors::{Raise, SizeError};
 use crate::params::{ViewingLike, tone_mapping};
+use crate::pool;
 use noisefloor::{Display, Rgb, Viewing};
 use noisefloor_rivals::metrics::{MetricMaps, MetricPair, MetricScores};
 use numpy::PyArray2;
@@ -92,7 +93,9 @@ pub(crate) fn metrics(
     }
     // Copies, so that nobody changes them while they are compared without the interpreter
     let (image, reference) = (image.into_owned(), reference.into_owned());
-    py.detach(|| measure((width, height), &image, &reference, &tone.settle(&reference), &viewing))
+    py.detach(|| {
+        pool::run(|| measure((width, height), &image, &reference, &tone.settle(&reference), &viewing))
+    })
 }
 
 fn measure(

@@ -4,6 +4,7 @@ use crate::arrays::{Pixels, picture, pixels, plane};
 use crate::errors::{BatchError, CheckpointError, Error, ParameterError, Raise, SizeError, file_error};
 use crate::oracle::PyOracle;
 use crate::params::PyParams;
+use crate::pool;
 use crate::verdicts::{PyBlocks, PyRequest, PyStop, PyVerdict, TileLike};
 use noisefloor::{Checkpoint, Oracle, Params, Request, Rgb, Session, StopReason, Tile, TileGrid};
 use numpy::{PyArray2, PyArray3};
@@ -43,8 +44,11 @@ impl PySession {
         py: Python<'_>,
         work: impl FnOnce(&mut Session<Oracle>) -> T + Send,
     ) -> PyResult<T> {
-        py.detach(|| self.session.lock().map(|mut session| work(&mut session)).ok())
-            .ok_or_else(|| Error::new_err(BROKEN))
+        let locked = |mut session: MutexGuard<'_, Session<Oracle>>| {
+            let session = &mut *session;
+            pool::run(|| work(session))
+        };
+        py.detach(|| self.session.lock().map(locked).ok()).ok_or_else(|| Error::new_err(BROKEN))
     }
 
     fn size(&self) -> (usize, usize) {

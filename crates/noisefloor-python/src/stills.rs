@@ -4,6 +4,7 @@ use crate::arrays::{Pixels, pixels, plane};
 use crate::errors::{CriterionError, ParameterError, PictureError, Raise};
 use crate::oracle::PyOracle;
 use crate::params::PyParams;
+use crate::pool;
 use crate::verdicts::PyVerdict;
 use noisefloor::{Evidence, Oracle, Params, Samples, SnapshotPair, Still, TileGrid};
 use numpy::PyArray2;
@@ -78,7 +79,7 @@ pub(crate) fn judge(
     let oracle = oracle.map_or_else(Oracle::bundled, |oracle| oracle.0.clone());
     let params = params.map_or_else(Params::default, |params| params.0);
     let (image, other) = (still(&image, spp, "image")?, still(&against, against_spp, "against")?);
-    py.detach(|| judge_still(&oracle, &params, &image, &other, samples))
+    py.detach(|| pool::run(|| judge_still(&oracle, &params, &image, &other, samples)))
 }
 
 /// A copy, so that nobody changes it while it is judged without the interpreter.

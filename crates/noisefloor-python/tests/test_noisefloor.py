@@ -8,6 +8,7 @@ import tempfile
 import threading
 import time
 import unittest
+import warnings
 
 import numpy as np
 
@@ -286,6 +287,74 @@ class Documentation(unittest.TestCase):
                 signature = [p for p in inspect.signature(real).parameters]
                 self.assertEqual([n for n in names if n != "self"], [p for p in signature if p != "self"],
                                  f"{name}.{function.name}")
+
+
+@unittest.skipUnless(hasattr(os, "fork"), "there is no fork")
+class Forks(unittest.TestCase):
+    def in_child(self, work):
+        """Exit code of a forked child that works, or None if it hangs."""
+        with warnings.catch_warnings():
+            # Python warns of forks beside threads from 3.12 on
+            warnings.simplefilter("ignore", DeprecationWarning)
+            child = os.fork()
+        if child == 0:
+            try:
+                work()
+                os._exit(0)
+            finally:
+                os._exit(1)
+        end = time.monotonic() + 30
+        while time.monotonic() < end:
+            pid, status = os.waitpid(child, os.WNOHANG)
+            if pid:
+                return os.waitstatus_to_exitcode(status)
+            time.sleep(0.02)
+        os.kill(child, 9)
+        os.waitpid(child, 0)
+        return None
+
+    def test_children_judge_as_their_parents_do(self):
+        pair = noisy(1, 64), 64, noisy(2, 64), 64
+
+        def judge():
+            judged = nf.judge(*pair, samples="independent", params=PARAMS)
+            return [verdict.probability for verdict in judged.verdicts]
+
+        session = nf.Session(96, 80, params=PARAMS)
+        finish(session)
+        right = judge()
+
+        def work():
+            assert judge() == right
+            again = nf.Session(96, 80, params=PARAMS)
+            finish(again)
+            assert stops(again) == stops(session)
+            # And a child of the child
+            assert self.in_child(lambda: judge() == right or os._exit(2)) == 0
+
+        for _ in range(5):
+            self.assertEqual(self.in_child(work), 0)
+        self.assertEqual(judge(), right)
+
+    def test_a_fork_beside_threads_that_judge(self):
+        pair = noisy(1, 64), 64, noisy(2, 64), 64
+        judge = lambda: nf.judge(*pair, samples="independent", params=PARAMS)
+        going = True
+
+        def keep_judging():
+            while going:
+                judge()
+
+        threads = [threading.Thread(target=keep_judging) for _ in range(3)]
+        for thread in threads:
+            thread.start()
+        try:
+            codes = [self.in_child(judge) for _ in range(5)]
+        finally:
+            going = False
+            for thread in threads:
+                thread.join()
+        self.assertEqual(codes, [0] * 5)
 
 
 if __name__ == "__main__":
