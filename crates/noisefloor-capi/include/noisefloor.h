@@ -5,9 +5,10 @@
 // is open.
 //
 // Errors. Every function that can fail returns an NfStatus, and writes its results through pointers only if
-// that is NF_STATUS_OK. nf_last_error says what was wrong. No function throws, aborts, or unwinds into the
-// caller. An error inside the library is NF_STATUS_INTERNAL, also reported on standard error; the session it
-// happened in answers NF_STATUS_INTERNAL from then on and can only be freed.
+// that is NF_STATUS_OK. nf_last_error says what was wrong. No function throws or unwinds into the caller. An
+// error inside the library is NF_STATUS_INTERNAL, also reported on standard error; the session it happened in
+// answers NF_STATUS_INTERNAL from then on and can only be freed. A picture that there is no memory for is
+// NF_STATUS_MEMORY; where the system has not even a few megabytes left, the process ends.
 //
 // Threads. Any thread may call any function on any object at any time, except that nothing else may use an
 // object while it is freed, or after. Calls on one session take turns: pushes wait while nf_session_judge
@@ -89,6 +90,8 @@ typedef enum {
     NF_STATUS_UNAVAILABLE = 9,
     // A mistake inside the library. Please report it.
     NF_STATUS_INTERNAL = 10,
+    // There is not enough memory for the picture, or for work on all of it. The session is as it was.
+    NF_STATUS_MEMORY = 11,
 } NfStatus;
 
 // A trained model with the probability from which a tile counts as converged. It never changes, and any

@@ -3,6 +3,7 @@
 //! asks for.
 
 use crate::status::{Failure, NfStatus};
+use noisefloor::TileGrid;
 use std::ffi::{CStr, c_char};
 
 fn check<T>(pointer: *const T, what: &str) -> Result<(), Failure> {
@@ -133,4 +134,16 @@ pub(crate) unsafe fn text<'a>(pointer: *const c_char, what: &str) -> Result<&'a 
     // SAFETY: not null, and ended by a zero by the caller's promise.
     let text = unsafe { CStr::from_ptr(pointer) };
     text.to_str().map_err(|_| Failure::new(NfStatus::Argument, format!("{what} is not UTF-8")))
+}
+
+/// Checks that there is memory for so many bytes a pixel of the picture, which a call is going to take: where an
+/// allocation fails in the middle of one, the process ends.
+pub(crate) fn memory(grid: TileGrid, bytes_a_pixel: usize) -> Result<(), Failure> {
+    let (width, height) = (grid.width(), grid.height());
+    let bytes = width * height * bytes_a_pixel;
+    Vec::<u8>::new().try_reserve_exact(bytes).map_err(|_| {
+        let what =
+            format!("work on {width}x{height} pixels takes {bytes} bytes of memory, which are not to be had");
+        Failure::new(NfStatus::Memory, what)
+    })
 }

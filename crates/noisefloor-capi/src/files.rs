@@ -10,6 +10,9 @@ use std::io::{self, BufReader};
 use std::path::Path;
 use tempfile::NamedTempFile;
 
+/// Bytes of a pixel of a session.
+const FILM: usize = 36;
+
 /// Writes a snapshot of the session, for resuming it. The file is whole or not there. job is text that names
 /// all the samples depend on: scene, seed, options of the renderer.
 #[unsafe(no_mangle)]
@@ -51,6 +54,8 @@ pub unsafe extern "C" fn nf_session_resume(
         // SAFETY: promised by the caller.
         let path = unsafe { border::text(path, "path") }?;
         let file = File::open(path).map_err(|e| Failure::new(NfStatus::Io, format!("{path}: {e}")))?;
+        // The film that is read, and the one that it is checked against
+        border::memory(session.grid, 2 * FILM)?;
         let checkpoint = Checkpoint::read(BufReader::new(file))?;
         let mut locked = session.lock()?;
         let grid = locked.film().grid();

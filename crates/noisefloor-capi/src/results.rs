@@ -149,7 +149,13 @@ pub unsafe extern "C" fn nf_session_image(
         let wanted = 3 * session.grid.width() * session.grid.height();
         // SAFETY: promised by the caller.
         let room = unsafe { border::array_mut(image, floats, wanted, "image") }?;
-        room.copy_from_slice(session.lock()?.film().image().as_flattened());
+        // Without a copy of the whole picture
+        let (locked, pixels) = (session.lock()?, room.as_chunks_mut().0);
+        for tile in session.grid.tiles() {
+            for pixel in tile.rows(session.grid.width()).flatten() {
+                pixels[pixel] = locked.film().pixel(tile.index, pixel);
+            }
+        }
         Ok(())
     })
 }
@@ -169,6 +175,7 @@ pub unsafe extern "C" fn nf_session_visible_noise(
         let wanted = session.grid.width() * session.grid.height();
         // SAFETY: promised by the caller.
         let room = unsafe { border::array_mut(map, floats, wanted, "map") }?;
+        border::memory(session.grid, 4 * size_of::<f32>())?;
         let none = "no map: there is no verdict yet, or the model makes none";
         let found = session.lock()?.visible_noise();
         room.copy_from_slice(&found.ok_or_else(|| Failure::new(NfStatus::Unavailable, none))?);

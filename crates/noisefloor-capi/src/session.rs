@@ -4,7 +4,7 @@ use crate::border;
 use crate::oracle::NfOracle;
 use crate::params::NfParams;
 use crate::status::{Failure, NfStatus, guard};
-use noisefloor::{Oracle, Params, Request, Session, Tile, TileGrid};
+use noisefloor::{Oracle, Params, Request, Rgb, Session, Tile, TileGrid};
 use std::sync::{Mutex, MutexGuard};
 
 /// Film, oracle and limits of one picture.
@@ -161,6 +161,8 @@ pub unsafe extern "C" fn nf_session_judge(session: *const NfSession, newly_done:
     guard(|| {
         // SAFETY: promised by the caller.
         let session = unsafe { border::object(session, "session") }?;
+        // A picture to settle the exposure by, and what verdicts take beside
+        border::memory(session.grid, 2 * size_of::<Rgb>())?;
         let stops = session.lock()?.judge()?;
         if newly_done.is_null() {
             return Ok(());

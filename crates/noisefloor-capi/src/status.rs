@@ -35,6 +35,8 @@ pub enum NfStatus {
     Unavailable = 9,
     /// A mistake inside the library. Please report it.
     Internal = 10,
+    /// There is not enough memory for the picture, or for work on all of it. The session is as it was.
+    Memory = 11,
 }
 
 /// Why a call fails.
@@ -113,7 +115,9 @@ impl From<TileError> for Failure {
 
 impl From<FilmError> for Failure {
     fn from(error: FilmError) -> Self {
-        Self::new(NfStatus::Batch, error.to_string())
+        let status =
+            if matches!(error, FilmError::Memory { .. }) { NfStatus::Memory } else { NfStatus::Batch };
+        Self::new(status, error.to_string())
     }
 }
 

@@ -13,6 +13,8 @@ use std::ffi::{CStr, CString};
 use std::ptr::{null, null_mut};
 
 mod blocks;
+#[cfg(target_os = "linux")]
+mod memory;
 
 const WIDTH: usize = 96;
 const HEIGHT: usize = 80;

@@ -78,6 +78,7 @@ impl<C: StoppingCriterion> Session<C> {
     pub fn new(width: usize, height: usize, mut criterion: C, params: Params) -> Result<Self, SessionError> {
         params.check()?;
         let grid = TileGrid::new(width, height, params.tile)?;
+        Film::check_memory(grid, if criterion.needs().halves { 2 } else { 1 })?;
         criterion.begin(grid);
         let mut film = if criterion.needs().halves { Film::new(grid) } else { Film::without_halves(grid) };
         let mut first = params.first_verdict();
@@ -91,7 +92,6 @@ impl<C: StoppingCriterion> Session<C> {
             ToneMapping::Srgb { .. } | ToneMapping::Custom { .. } => Some(params.tone_mapping.settle(&[])),
             ToneMapping::Reinhard { .. } => None,
         };
-        let source = SourceIdentity::default();
         Ok(Self {
             film,
             criterion,
@@ -101,7 +101,7 @@ impl<C: StoppingCriterion> Session<C> {
             displayed_reference: None,
             shares: vec![None; tiles.len()],
             tiles,
-            source,
+            source: SourceIdentity::default(),
         })
     }
 

@@ -31,6 +31,16 @@ pub enum FilmError {
     /// Block by block, the batch is none that a session of this film asks for.
     #[error("a batch for blocks of tile {0} that the film does not have, or without samples in one of them")]
     Blocks(usize),
+    /// The system has less memory for a film than it would take.
+    #[error("a film of {width}×{height} pixels takes {bytes} bytes of memory, which are not to be had")]
+    Memory {
+        /// Width of the picture.
+        width: usize,
+        /// Height of the picture.
+        height: usize,
+        /// What it would take.
+        bytes: usize,
+    },
     /// More samples than a film counts.
     #[error("tile {tile} would have {now} samples per pixel or more; a film counts fewer than 2^34")]
     TooMany {

@@ -1,12 +1,14 @@
 //! A film in a file: what it knows of its tiles, and then its pixels, which memory need not hold twice.
 
-use super::{Film, Half};
+use super::{Film, FilmError, Half};
 use crate::blocks::BlockCounts;
 use crate::rgb::Rgb;
 use crate::tile::TileGrid;
 use serde::{Deserialize, Serialize};
 use std::io::{self, Read, Write};
 
+/// Bytes of a pixel of one half: three f32 and three i16.
+const PIXEL: usize = 18;
 /// Pixels that room is made for at once.
 const STEP: usize = 1 << 20;
 
@@ -29,6 +31,14 @@ impl FilmHead {
 }
 
 impl Film {
+    /// Checks that there is memory for a film with so many halves: without it, making one ends the process.
+    pub(crate) fn check_memory(grid: TileGrid, halves: usize) -> Result<(), FilmError> {
+        let (width, height) = (grid.width(), grid.height());
+        let bytes = halves * PIXEL * width * height;
+        let there = Vec::<u8>::new().try_reserve_exact(bytes);
+        there.map_err(|_| FilmError::Memory { width, height, bytes })
+    }
+
     pub(crate) fn head(&self) -> FilmHead {
         let halves = self.halves.iter().map(|half| !half.rejected.is_empty()).collect();
         let (counts, blocks) = (self.counts.clone(), self.blocks.clone());
