@@ -136,8 +136,8 @@ pub(crate) unsafe fn text<'a>(pointer: *const c_char, what: &str) -> Result<&'a 
     text.to_str().map_err(|_| Failure::new(NfStatus::Argument, format!("{what} is not UTF-8")))
 }
 
-/// Checks that there is memory for so many bytes a pixel of the picture, which a call is going to take: where an
-/// allocation fails in the middle of one, the process ends.
+/// Checks that there is memory for so many bytes a pixel of the picture, which a call is going to take: where
+/// an allocation fails in the middle of one, the process ends.
 pub(crate) fn memory(grid: TileGrid, bytes_a_pixel: usize) -> Result<(), Failure> {
     let (width, height) = (grid.width(), grid.height());
     let bytes = width * height * bytes_a_pixel;

@@ -1,16 +1,16 @@
 //! Whether a denoised picture is as bright as the picture it was made from.
 //!
-//! The vision model compares details: it does not see that a whole tile is too bright. A denoiser keeps the mean
-//! of what it smooths, so a tile whose mean has moved further than its noise explains is wrong, and that counts as
-//! what people would see where the tile meets the right picture: an edge of this height.
+//! The vision model compares details: it does not see that a whole tile is too bright. A denoiser keeps the
+//! mean of what it smooths, so a tile whose mean has moved further than its noise explains is wrong, and that
+//! counts as what people would see where the tile meets the right picture: an edge of this height.
 
 use noisefloor::{Display, Rgb};
 use noisefloor_vision::{VisionError, VisionModel, VisionWorkspace};
 
 /// Standard errors of the noisy mean that explain a difference: one normal mean in 16,000 lies beyond.
 const ERRORS: f64 = 4.0;
-/// Difference of brightness that passes, as a share of the display's range: five steps of eight bits. Denoisers
-/// bend means by a step or two, where they mistake rare bright samples for fireflies.
+/// Difference of brightness that passes, as a share of the display's range: five steps of eight bits.
+/// Denoisers bend means by a step or two, where they mistake rare bright samples for fireflies.
 const TOLERANCE: f32 = 0.02;
 
 /// Linear light of one pixel.
@@ -32,8 +32,8 @@ impl Light {
     }
 }
 
-/// By how much a region is too bright or too dark on the display, at least, in its worst channel: 0 if its noise
-/// explains the difference, or if there is next to none.
+/// By how much a region is too bright or too dark on the display, at least, in its worst channel: 0 if its
+/// noise explains the difference, or if there is next to none.
 pub(crate) fn shift(light: &[Light], display: &Display) -> f32 {
     let count = light.len().max(1) as f64;
     let mut shift = 0.0f32;
@@ -50,7 +50,8 @@ pub(crate) fn shift(light: &[Light], display: &Display) -> f32 {
     if shift > TOLERANCE { shift } else { 0.0 }
 }
 
-/// Just-objectionable differences of an edge of this height in the middle of a tile around `level`, a luminance Y′.
+/// Just-objectionable differences of an edge of this height in the middle of a tile around `level`, a
+/// luminance Y′.
 pub(crate) fn jods_of_edge(
     (level, height): (f32, f32),
     size: (usize, usize),

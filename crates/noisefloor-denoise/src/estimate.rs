@@ -134,8 +134,8 @@ impl DenoisedError {
         TilePlanes { viewing, ..planes }
     }
 
-    /// Just-objectionable differences that a tile has lost, seen as a picture of its own; at least those of an edge as
-    /// high as its mean is off, where noise does not explain that.
+    /// Just-objectionable differences that a tile has lost, seen as a picture of its own; at least those of
+    /// an edge as high as its mean is off, where noise does not explain that.
     ///
     /// # Errors
     /// [`VisionError`] if a side of the tile has less than two pixels.

@@ -91,8 +91,8 @@ pub enum FarmError {
     Blocks(String),
     /// A batch that no plan asks for.
     #[error(
-        "the plan asks for {spp} samples of tile {tile} from sample {first} on, which no plan of a farm does: it is \
-         damaged; plan the farm anew in another folder"
+        "the plan asks for {spp} samples of tile {tile} from sample {first} on, which no plan of a farm does: \
+         it is damaged; plan the farm anew in another folder"
     )]
     Plan {
         /// The tile.

@@ -33,10 +33,9 @@ fn is_planned(batch: &PlannedBatch, tile: Tile, edge: usize) -> bool {
 /// Takes these batches from a source. Once `cancel` says so, it returns with what it has: that is a shard,
 /// too.
 ///
-/// # Errors
-/// [`FarmError::Edited`] if the source is not that of `job`, [`FarmError::Plan`] if no plan asks for such a batch,
-/// [`FarmError::Blocks`] if it cannot sample the
-/// blocks that the job has, [`FarmError::Source`] if it fails or breaks its contract, or a batch is no light.
+/// # Errors [`FarmError::Edited`] if the source is not that of `job`, [`FarmError::Plan`] if no plan asks for
+/// such a batch, [`FarmError::Blocks`] if it cannot sample the blocks that the job has, [`FarmError::Source`]
+/// if it fails or breaks its contract, or a batch is no light.
 pub fn sample(
     source: &mut impl ProgressiveSource,
     job: ShardJob,

@@ -10,8 +10,8 @@ use std::path::Path;
 /// What is not read of a picture.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Unread {
-    /// The layer that is read, and all others that have colours, in the order of preference; empty if there is only
-    /// one. The unnamed one has an empty name.
+    /// The layer that is read, and all others that have colours, in the order of preference; empty if there
+    /// is only one. The unnamed one has an empty name.
     pub layers: Vec<String>,
     /// Least and largest alpha, if there is alpha.
     pub alpha: Option<RangeInclusive<f32>>,
@@ -27,16 +27,16 @@ impl Unread {
             let others: Vec<String> = others.iter().map(name).collect();
             let (read, others) = (name(read), others.join(", "));
             all.push(format!(
-                "it has several layers, of which {read} is read, and not {others}; save the one you mean by itself"
+                "of its layers, {read} is read, and not {others}; save the one you mean by itself"
             ));
         }
         match &self.alpha {
             Some(alpha) if *alpha.end() <= 0.0 => all.push(
-                "its alpha is 0 everywhere: viewers show nothing of it; alpha is ignored, and colours are read as stored"
+                "its alpha is 0 everywhere, so viewers show nothing; alpha is ignored, and colours are read as stored"
                     .to_owned(),
             ),
             Some(alpha) if *alpha.start() < 1.0 => all.push(
-                "it is transparent in places; alpha is ignored, and colours are read as stored, as if over black"
+                "it is transparent in places; alpha is ignored, and colours are read as stored"
                     .to_owned(),
             ),
             _ => {}

@@ -1,8 +1,8 @@
 //! Threads for parallel work that survive `os.fork()`.
 //!
-//! Only the thread that forks exists in the child. rayon's own pool would be there without its threads, and work
-//! would wait for them for good: `multiprocessing` forks on Linux up to Python 3.13. So work runs in a pool that
-//! belongs to a process, and another process makes its own.
+//! Only the thread that forks exists in the child. rayon's own pool would be there without its threads, and
+//! work would wait for them for good: `multiprocessing` forks on Linux up to Python 3.13. So work runs in a
+//! pool that belongs to a process, and another process makes its own.
 
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use std::cell::RefCell;
@@ -24,8 +24,8 @@ thread_local! {
     static LAST: RefCell<Option<Own>> = const { RefCell::new(None) };
 }
 
-/// Runs parallel work in the pool of this process. Locks that `work` would wait for have to be taken before: a
-/// thread of the pool that waits for one may be the one that is waited for.
+/// Runs parallel work in the pool of this process. Locks that `work` would wait for have to be taken before:
+/// a thread of the pool that waits for one may be the one that is waited for.
 pub(crate) fn run<T: Send>(work: impl FnOnce() -> T + Send) -> T {
     match pool() {
         Some(pool) => pool.install(work),
@@ -52,8 +52,8 @@ fn shared(process: u32) -> Option<Own> {
     let mut shared = match SHARED.try_lock() {
         Ok(shared) => shared,
         Err(TryLockError::Poisoned(poisoned)) => poisoned.into_inner(),
-        // Another thread makes the pool; or it did so when this process was forked off, and is not here to end it.
-        // Nothing tells the two apart, and a pool of one's own does no harm
+        // Another thread makes the pool; or it did so when this process was forked off, and is not here to
+        // end it. Nothing tells the two apart, and a pool of one's own does no harm
         Err(TryLockError::WouldBlock) => return make(),
     };
     match &*shared {

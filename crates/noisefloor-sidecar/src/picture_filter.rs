@@ -65,8 +65,8 @@ impl PictureFilter {
         Ok(this)
     }
 
-    /// Gives a call up as soon as the flag is set, as [`SidecarCause::GivenUp`]: one that hangs must not hold what
-    /// is to be saved.
+    /// Gives a call up as soon as the flag is set, as [`SidecarCause::GivenUp`]: one that hangs must not hold
+    /// what is to be saved.
     pub fn give_up_when(&mut self, flag: Arc<AtomicBool>) {
         if let Some(process) = &mut self.process {
             process.give_up_when(Some(Arc::clone(&flag)));

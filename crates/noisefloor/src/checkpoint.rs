@@ -121,8 +121,8 @@ impl Checkpoint<'_> {
         Ok(FORMAT.read_with_body(from, whole)?)
     }
 
-    /// A digest of all that its samples and verdicts depend on: job, source, criterion, parameters and size of
-    /// the picture. Whoever finds a finished picture compares it before taking it for its own.
+    /// A digest of all that its samples and verdicts depend on: job, source, criterion, parameters and size
+    /// of the picture. Whoever finds a finished picture compares it before taking it for its own.
     pub fn job_digest(&self) -> String {
         let (grid, Self { job, source, criterion, params, .. }) = (self.film.grid(), self);
         let all = format!("{:?}", (job, source, criterion, params, grid.width(), grid.height()));

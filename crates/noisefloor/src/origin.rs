@@ -24,8 +24,9 @@ pub enum OriginRelation {
     Unknown,
     /// How the samples of one lie in those of the other.
     Known(Samples),
-    /// The same scene, renderer and seed, with other options, or from a renderer that does not repeat its samples:
-    /// they are made from the same random numbers, and nobody can tell how much of their noise they share.
+    /// The same scene, renderer and seed, with other options, or from a renderer that does not repeat its
+    /// samples: they are made from the same random numbers, and nobody can tell how much of their noise they
+    /// share.
     Dependent,
 }
 

@@ -84,9 +84,9 @@ pub enum StillError {
     },
     /// The files say that the noise of the pictures is related, and not how.
     #[error(
-        "both pictures come from {origin} with seed {seed}, but with other options, or from a renderer that does not \
-         repeat its samples: they are made from the same random numbers, and nobody can tell how much of their noise \
-         they share; render one with another seed, or say whether they are nested or independent"
+        "both pictures come from {origin} with seed {seed}, but with other options, or from a renderer that does \
+         not repeat its samples: they are made from the same random numbers, and nobody can tell how much of their \
+         noise they share; render one with another seed, or say whether they are nested or independent"
     )]
     Dependent {
         /// Scene and renderer.
@@ -96,8 +96,8 @@ pub enum StillError {
     },
     /// Two of the pictures compared with share samples, which would count twice.
     #[error(
-        "two of the pictures to compare with ({} and {} samples per pixel) are the same or share samples, which would \
-         count twice; leave one out", .0[0], .0[1]
+        "two of the pictures to compare with ({} and {} samples per pixel) are the same or share samples, which \
+         would count twice; leave one out", .0[0], .0[1]
     )]
     Twice([f64; 2]),
     /// The model does not fit the tiles.
@@ -255,10 +255,10 @@ impl<'a> SnapshotPair<'a> {
         }
     }
 
-    /// For each tile, whether its brightness differs between the two pictures by more than their noise explains: by
-    /// a tenth of the display's range on average, and three times the standard deviation from pixel to pixel.
-    /// Renderings of one view have no such tiles, and a verdict on one means nothing. None if there is nothing to
-    /// compare with.
+    /// For each tile, whether its brightness differs between the two pictures by more than their noise
+    /// explains: by a tenth of the display's range on average, and three times the standard deviation from
+    /// pixel to pixel. Renderings of one view have no such tiles, and a verdict on one means nothing. All are
+    /// false if there is nothing to compare with.
     pub fn unlike_tiles(&self, grid: TileGrid) -> Vec<bool> {
         let Some(other) = &self.other else { return vec![false; grid.len()] };
         let light = |still: &Still, pixel: usize| luminance(self.display.encode(still.pixels[pixel]));
@@ -323,7 +323,8 @@ fn recognise<'a>(
     }
 }
 
-/// Checks that no two of the pictures that are going to be pooled have samples in common, as far as it is known.
+/// Checks that no two of the pictures that are going to be pooled have samples in common, as far as it is
+/// known.
 fn check_apart(others: &[&Still]) -> Result<(), StillError> {
     for (at, one) in others.iter().enumerate() {
         for other in &others[..at] {
@@ -362,72 +363,4 @@ fn pool<'a>(others: &[&'a Still], image_spp: f64, samples: Samples) -> Option<Co
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn still(value: impl Fn(usize) -> f32) -> Still {
-        let pixels = (0..32 * 32).map(|i| [value(i); 3]).collect();
-        Still { size: (32, 32), pixels, spp: 16.0, display_referred: true, rounding: 0.0, origin: None }
-    }
-
-    fn unlike(a: &Still, b: &Still) -> usize {
-        let tone = ToneMapping::default();
-        let pair = SnapshotPair::new(Evidence::Halves, a, &[b], tone, Some(Samples::Independent)).unwrap();
-        pair.unlike_tiles(TileGrid::new(32, 32, 16).unwrap()).into_iter().filter(|unlike| *unlike).count()
-    }
-
-    #[test]
-    fn pictures_of_different_things_are_noticed_and_noise_is_not() {
-        let mut noise = noisefloor_testkit::Noise::keyed(&[21]);
-        let mut sparse = |share: f64| -> Vec<f32> {
-            (0..32 * 32).map(|_| if noise.uniform() < share { 1.0 } else { 0.0 }).collect()
-        };
-        let (a, b) = (sparse(0.1), sparse(0.5));
-        assert_eq!(unlike(&still(|_| 0.0), &still(|_| 1.0)), 4);
-        // Brighter on the left alone, with noise of three display steps
-        let step = |i: usize| if i % 32 < 16 { 0.2 } else { 0.0 };
-        assert_eq!(unlike(&still(|i| 0.3 + 0.01 * a[i]), &still(|i| 0.3 + 0.01 * b[i] + step(i))), 2);
-        // Few samples of a dim light look darker than many of them: that is noise
-        assert_eq!(unlike(&still(|i| a[i]), &still(|i| b[i])), 0);
-        assert_eq!(unlike(&still(|_| 0.5), &still(|_| 0.55)), 0);
-    }
-
-    fn judge(image: &Still, others: &[&Still]) -> Result<Samples, StillError> {
-        let pair = SnapshotPair::new(Evidence::Halves, image, others, ToneMapping::default(), None)?;
-        Ok(pair.samples())
-    }
-
-    /// A still of 32×32 pixels of noise of its own, with an origin.
-    fn of(noise: u64, seed: u64, options: &str) -> Still {
-        let mut of = noisefloor_testkit::Noise::keyed(&[22, noise]);
-        let values: Vec<f32> = (0..32 * 32).map(|_| 0.4 + 0.05 * of.normal() as f32).collect();
-        let (source, options) = ("hall by a tracer".to_owned(), options.to_owned());
-        let origin = SampleOrigin { source, options, seed, repeats: true };
-        Still { origin: Some(origin), ..still(|i| values[i]) }
-    }
-
-    /// Two renders of one scene, renderer and seed are never independent, whatever their pixels look like.
-    #[test]
-    fn one_seed_is_never_independent_evidence() {
-        let image = of(1, 1, "depth 8");
-        assert_eq!(judge(&image, &[&of(2, 2, "depth 65")]).unwrap(), Samples::Independent);
-        let error = judge(&image, &[&of(3, 1, "depth 65")]).unwrap_err();
-        assert!(matches!(&error, StillError::Dependent { seed: 1, .. }), "{error}");
-        assert!(error.to_string().contains("another seed"), "{error}");
-    }
-
-    /// What is given twice would count twice.
-    #[test]
-    fn the_same_picture_is_not_pooled_with_itself() {
-        let (image, other) = (of(1, 1, ""), of(2, 2, ""));
-        assert!(matches!(judge(&image, &[&other, &other]), Err(StillError::Twice(_))));
-        let later = Still { spp: 32.0, ..of(3, 2, "") };
-        assert!(matches!(judge(&image, &[&other, &later]), Err(StillError::Twice(_))));
-        assert_eq!(judge(&image, &[&other, &of(4, 3, "")]).unwrap(), Samples::Independent);
-        let plain = |still: &Still| Still { origin: None, ..still.clone() };
-        let (tone, samples) = (ToneMapping::default(), Some(Samples::Independent));
-        let twice = [&plain(&other), &plain(&other)];
-        let error = SnapshotPair::new(Evidence::Halves, &plain(&image), &twice, tone, samples).unwrap_err();
-        assert!(matches!(error, StillError::Twice(_)), "{error}");
-    }
-}
+mod tests;

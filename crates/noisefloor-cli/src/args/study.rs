@@ -88,8 +88,8 @@ struct ServeArgs {
     /// Path under which the proxy serves the study, such as /noise.
     #[arg(long, value_name = "PATH", default_value = "")]
     base_path: String,
-    /// Admit simulated observers, for a rehearsal with a program of your own: they need no link, get no completion
-    /// code, and their answers are kept apart.
+    /// Admit simulated observers, for a rehearsal with a program of your own: they need no link, get no
+    /// completion code, and their answers are kept apart.
     #[arg(long)]
     admit_simulated: bool,
 }

@@ -142,8 +142,8 @@ impl<'a> Frame<'a> {
         let place = folder.frame(name);
         if let Some(file) = render_in(&place) {
             bail!(
-                "{}: holds a render already ({file}), which the farm would overwrite; move it away, or choose another \
-                 folder for the farm",
+                "{}: holds a render already ({file}), which the farm would overwrite; move it away, or \
+                 choose another folder for the farm",
                 place.display()
             );
         }
@@ -216,7 +216,8 @@ impl Work for Merge<'_> {
                 return Ok((state, Vec::new()));
             }
             Finished::Other => bail!(
-                "{}: holds a picture of another job than the farm's; move it away, or plan the farm in another folder",
+                "{}: holds a picture of another job than the farm's; move it away, or plan the farm in another \
+                 folder",
                 place.display()
             ),
             Finished::Not => {}

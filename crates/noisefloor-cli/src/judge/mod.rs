@@ -75,14 +75,14 @@ fn judge_noise(job: &JudgeJob) -> anyhow::Result<()> {
     let count = unlike.iter().filter(|unlike| **unlike).count();
     if count == grid.len() {
         bail!(
-            "the pictures differ in brightness by more than noise explains, everywhere: they are no two renderings of one \
-             view with one exposure, and their difference says nothing about noise"
+            "the pictures differ in brightness by more than noise explains, everywhere: they are no two renderings \
+             of one view with one exposure, and their difference says nothing about noise"
         );
     }
     if count > 0 {
         note!(
-            "warning: in {count} of {} tiles the pictures differ in brightness by more than noise explains, and these are \
-             not judged; compare renderings of one view with one exposure",
+            "warning: in {count} of {} tiles the pictures differ in brightness by more than noise explains, and \
+             these are not judged; compare renderings of one view with one exposure",
             grid.len()
         );
     }

@@ -20,8 +20,8 @@ pub(super) struct Report<'a> {
     criterion: String,
     /// BLAKE3 of the model.
     model: Option<&'a str>,
-    /// What samples and verdicts depend on ([`noisefloor::Checkpoint::job_digest`]); null for a render that cannot
-    /// be resumed.
+    /// What samples and verdicts depend on ([`noisefloor::Checkpoint::job_digest`]); null for a render that
+    /// cannot be resumed.
     job: Option<&'a str>,
     params: &'a Params,
     /// Display exposure that was settled.

@@ -32,7 +32,7 @@ impl Page {
             match bound.ip().is_unspecified() {
                 false => note!("watch it at http://{bound}"),
                 true => note!(
-                    "watch it at http://127.0.0.1:{port}, and elsewhere at port {port} of this machine's IP address",
+                    "watch it at http://127.0.0.1:{port}, and elsewhere at port {port} of this machine's address",
                     port = bound.port()
                 ),
             }

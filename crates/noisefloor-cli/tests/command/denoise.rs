@@ -163,8 +163,8 @@ fn denoised_pictures_made_elsewhere() {
     refuse(&["--independent", "--denoised", &bad, &bad], &["identical", "its own half"]);
 }
 
-/// A stand-in for Open Image Denoise, as an interpreter that ignores the script it is given: it hands pictures back,
-/// and hangs once the file `hang` is there.
+/// A stand-in for Open Image Denoise, as an interpreter that ignores the script it is given: it hands
+/// pictures back, and hangs once the file `hang` is there.
 #[cfg(unix)]
 fn fake_denoiser(folder: &Path, python: &Path) -> std::path::PathBuf {
     use std::os::unix::fs::PermissionsExt;
@@ -194,8 +194,8 @@ while True:
     script
 }
 
-/// A denoiser that hangs holds nothing up: the first signal ends the verdict, everything that is rendered is saved,
-/// and `--resume` ends as an undisturbed render does.
+/// A denoiser that hangs holds nothing up: the first signal ends the verdict, everything that is rendered is
+/// saved, and `--resume` ends as an undisturbed render does.
 #[test]
 #[cfg(unix)]
 fn a_denoiser_that_hangs_costs_no_samples() {

@@ -242,8 +242,8 @@ fn pictures_of_different_things_are_not_judged() {
     assert!(tiles[1..].iter().all(|tile| tile["unlike"] == false));
 }
 
-/// Renders of one seed share their random numbers, whatever their depth is: the files say so, and pixels are not
-/// asked.
+/// Renders of one seed share their random numbers, whatever their depth is: the files say so, and pixels are
+/// not asked.
 #[test]
 fn one_seed_is_dependent_whatever_else_differs() {
     let folder = tempdir().unwrap();

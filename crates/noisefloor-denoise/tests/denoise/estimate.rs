@@ -85,8 +85,9 @@ fn a_firefly_does_not_drown_the_rest() {
     assert!((with[0] / without[0] - 1.0).abs() < 0.1, "{with:?} and {without:?}");
 }
 
-/// What a denoiser returns is compared with what it was given: an answer of another brightness is wrong, however
-/// well the two halves agree about it. Known answers: black, far below, far above, and a little too bright.
+/// What a denoiser returns is compared with what it was given: an answer of another brightness is wrong,
+/// however well the two halves agree about it. Known answers: black, far below, far above, and a little too
+/// bright.
 #[test]
 fn another_brightness_counts() {
     let (eyes, mut room) = (VisionModel::new(&Viewing::default()), VisionWorkspace::default());
@@ -102,7 +103,8 @@ fn another_brightness_counts() {
         let least = lost([&flat, &flat]);
         assert!(least > 0.3, "{wrong}: {least} JOD");
     }
-    // The truth loses nothing, nor does the noise of both halves in a wall: its mean is right within its noise
+    // The truth loses nothing, nor does the noise of both halves in a wall: its mean is right within its
+    // noise
     let wall = Simple::Flat(0.3).of(&a);
     assert!(lost([&wall, &wall]) < 0.05);
     let gain = |picture: &[Rgb]| -> Vec<Rgb> { picture.iter().map(|p| p.map(|c| 1.2 * c)).collect() };

@@ -108,7 +108,7 @@ fn foreign(guard: &Guard, scheme: &str, request: &Request) -> Option<Refusal> {
     let headers = request.headers();
     let refuse = |status, what: &str, place: &str, do_: &str| Some(Refusal::new(status, what, place, do_));
     let Some(host) = guard.known_host(headers) else {
-        let do_ = "open the address that `noisefloor` printed, or the machine's IP address if it listens on all; \
+        let do_ = "open the address that `noisefloor` printed, or the machine's address if it listens on all; \
             `study serve` and `explore` take further names with --allow-host";
         let what = "this server does not go by that name";
         return refuse(StatusCode::MISDIRECTED_REQUEST, what, "Host", do_);

@@ -50,7 +50,8 @@ pub(crate) struct Listening {
 }
 
 impl Listening {
-    /// Binds an address; port 0 picks a free port. Proxies that are trusted may open as many connections as they like.
+    /// Binds an address; port 0 picks a free port. Proxies that are trusted may open as many connections as
+    /// they like.
     ///
     /// # Errors
     /// [`StudyError::Listen`] if the address is in use or not of this machine.

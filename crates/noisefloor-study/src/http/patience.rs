@@ -8,16 +8,18 @@ use std::task::{Context, Poll, ready};
 use std::time::Duration;
 use tokio::time::Sleep;
 
-/// Bytes that a peer has to take in each period of waiting: one that takes a byte now and then is stuck as well.
+/// Bytes that a peer has to take in each period of waiting: one that takes a byte now and then is stuck as
+/// well.
 const LEAST: usize = 64 << 10;
 
-/// Passes everything on, and fails with [`io::ErrorKind::TimedOut`] once the other end has not taken [`LEAST`]
-/// bytes of a reply, or the rest of it, within a time. Without this, whoever asks and never reads holds a
-/// connection and its reply for good.
+/// Passes everything on, and fails with [`io::ErrorKind::TimedOut`] once the other end has not taken
+/// [`LEAST`] bytes of a reply, or the rest of it, within a time. Without this, whoever asks and never reads
+/// holds a connection and its reply for good.
 pub(super) struct Patient<S> {
     stream: S,
     time: Duration,
-    /// The end of the time, and the bytes that are still to be taken until then, while the other end is waited for.
+    /// The end of the time, and the bytes that are still to be taken until then, while the other end is
+    /// waited for.
     waiting: Option<(Pin<Box<Sleep>>, usize)>,
 }
 

@@ -72,8 +72,8 @@ impl StudyServer {
         Ok(Self { listening, router: router(Arc::clone(&app), &base_path), base_path, key, app })
     }
 
-    /// Admits [simulated observers](crate::simulated), who need no link and get no completion code: for a rehearsal.
-    /// Otherwise they are refused.
+    /// Admits [simulated observers](crate::simulated), who need no link and get no completion code: for a
+    /// rehearsal. Otherwise they are refused.
     #[must_use]
     pub fn admitting_simulated(self) -> Self {
         self.app.simulated.store(true, Ordering::Relaxed);

@@ -262,8 +262,8 @@ fn a_database_goes_with_one_study() {
     assert!(noisefloor_study::AnswerStore::open(&other, &study.design()).is_err());
 }
 
-/// Simulated observers come only if whoever runs the study admits them, whatever they say of themselves, and take no
-/// completion code away.
+/// Simulated observers come only if whoever runs the study admits them, whatever they say of themselves, and
+/// take no completion code away.
 #[test]
 fn simulated_observers_need_the_operator_and_are_not_paid() {
     let more = "[participants]\nlinks-only = true\ncompletion-code = \"C0DE\"\n\
