@@ -13,6 +13,7 @@ use noisefloor_lab::compare::{
     self, Comparison, Converged, Cost, Entrant, Labels, ReferenceJob, Setting, render_reference,
 };
 use noisefloor_lab::{Advance, LabError};
+use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::Arc;
@@ -27,7 +28,7 @@ pub struct Named {
 
 /// What to compare, and on which scenes: checked.
 pub struct CompareJob {
-    pub scenes: Vec<String>,
+    pub scenes: Vec<OsString>,
     /// For whatever scene.
     pub source: SourceJob,
     pub out: PathBuf,

@@ -7,6 +7,7 @@ use super::tone::ToneArgs;
 use super::viewing::ViewingArgs;
 use clap::Args;
 use noisefloor::DEFAULT_TILE;
+use std::ffi::OsString;
 use std::path::PathBuf;
 
 /// Let stopping criteria watch one render, and compare what each one costs and what it leaves.
@@ -40,7 +41,7 @@ use std::path::PathBuf;
 pub struct CompareArgs {
     /// Scenes, as for `render`.
     #[arg(required = true, value_name = "SCENE")]
-    scenes: Vec<String>,
+    scenes: Vec<OsString>,
     #[command(flatten)]
     renderer: RendererArgs,
     /// Output folder.

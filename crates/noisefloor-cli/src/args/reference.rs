@@ -5,6 +5,7 @@ use crate::folder::Earlier;
 use crate::reference::ReferenceJob;
 use anyhow::bail;
 use clap::Args;
+use std::ffi::OsString;
 use std::path::PathBuf;
 
 /// Render the quick noise-free reference of a scene: direct light, and its reflections in mirrors and glass.
@@ -23,7 +24,7 @@ use std::path::PathBuf;
 pub struct ReferenceArgs {
     /// Scene, as for `render`.
     #[arg(value_name = "SCENE")]
-    scene: String,
+    scene: OsString,
     #[command(flatten)]
     renderer: RendererArgs,
     /// The picture in linear light; a PNG of what it looks like is written beside it [default:

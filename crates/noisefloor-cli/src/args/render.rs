@@ -10,6 +10,7 @@ use crate::render::{Autosave, FramePattern, Judge, RenderJob, SequenceJob, TEV_A
 use anyhow::bail;
 use clap::{Args, ValueEnum};
 use noisefloor::{Audience, DEFAULT_TILE, Params, Schedule};
+use std::ffi::OsString;
 use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::time::Duration;
@@ -47,7 +48,7 @@ use std::time::Duration;
 pub struct RenderArgs {
     /// Built-in scene (`noisefloor scenes` lists them) or scene file: glTF 2.0 (.gltf, .glb), Mitsuba XML
     /// (.xml) or pbrt (.pbrt). With --source, whatever that source reads [default: cornell-box].
-    scene: Option<String>,
+    scene: Option<OsString>,
     #[command(flatten)]
     renderer: RendererArgs,
     /// Output folder [default: out/SCENE].
@@ -254,6 +255,9 @@ impl RenderArgs {
     pub fn check_frames(&self) -> anyhow::Result<SequenceJob> {
         let (Some(frames), Some(scene)) = (self.frames, &self.scene) else {
             bail!("--frames needs a scene with {{frame}} in its name, as in 'hall.{{frame:04}}.xml'")
+        };
+        let Some(scene) = scene.to_str() else {
+            bail!("--frames: the name of the scene is not UTF-8; rename it")
         };
         let scene = FramePattern::parse(scene)?;
         let out = self.out.clone().unwrap_or_else(|| PathBuf::from("out").join(scene.stem()));

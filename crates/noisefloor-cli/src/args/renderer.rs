@@ -8,6 +8,7 @@ use crate::sources::{PtwneOptions, SourceJob, SourceKind};
 use anyhow::bail;
 use clap::{Args, ValueEnum};
 use noisefloor_ptwne::{Estimator, Filter, Sampling};
+use std::ffi::OsStr;
 use std::num::NonZeroUsize;
 use std::time::Duration;
 
@@ -120,7 +121,7 @@ fn left_out() -> LeftOut {
 
 impl RendererArgs {
     /// Who renders that scene, checked.
-    pub fn check(self, scene: Option<&str>) -> anyhow::Result<SourceJob> {
+    pub fn check(self, scene: Option<&OsStr>) -> anyhow::Result<SourceJob> {
         self.check_options()?;
         let kind = match self.source {
             SourceKind::Ptwne(_) => SourceKind::Ptwne(PtwneOptions {
@@ -140,7 +141,7 @@ impl RendererArgs {
         };
         Ok(SourceJob {
             kind,
-            scene: scene.map(str::to_owned),
+            scene: scene.map(OsStr::to_owned),
             seed: self.seed,
             size: self.size,
             max_depth: self.max_depth,

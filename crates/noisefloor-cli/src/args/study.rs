@@ -2,6 +2,7 @@
 
 use super::renderer::RendererArgs;
 use clap::{Args, Subcommand, ValueEnum};
+use std::ffi::OsString;
 use std::net::IpAddr;
 use std::path::PathBuf;
 
@@ -42,7 +43,7 @@ enum StudyCommand {
 struct StackArgs {
     /// Scene, as for `render`.
     #[arg(value_name = "SCENE")]
-    scene: String,
+    scene: OsString,
     #[command(flatten)]
     renderer: RendererArgs,
     /// Samples per pixel of the levels, increasing; the last one is the reference.

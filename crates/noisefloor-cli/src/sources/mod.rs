@@ -15,6 +15,7 @@ use noisefloor_ptwne::{
     Estimator, Filter, Ptwne, ReferenceNoise, RenderOptions, SampleCounts, Sampling, scenes,
 };
 use noisefloor_scenefile::{LoadOptions, Loaded, group_warnings};
+use std::ffi::{OsStr, OsString};
 use std::num::NonZeroUsize;
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -32,7 +33,7 @@ const DEFAULT_DEPTH: u32 = 65;
 pub struct SourceJob {
     pub kind: SourceKind,
     /// As typed.
-    pub scene: Option<String>,
+    pub scene: Option<OsString>,
     pub seed: u64,
     pub size: Option<(usize, usize)>,
     pub max_depth: Option<u32>,
@@ -182,7 +183,7 @@ impl SourceJob {
 
     fn open_ptwne(&self, options: PtwneOptions) -> anyhow::Result<Opened> {
         let Loaded { scene, size, max_depth, warnings } =
-            load(self.scene.as_deref().unwrap_or(DEFAULT_SCENE), &self.scene_files)?;
+            load(self.scene.as_deref().unwrap_or(OsStr::new(DEFAULT_SCENE)), &self.scene_files)?;
         let (width, height) = self.size.or(size).unwrap_or(DEFAULT_SIZE);
         let name = scene.name().to_owned();
         let PtwneOptions { estimator, sampling, filter, clamp } = options;
@@ -202,8 +203,8 @@ impl SourceJob {
 }
 
 /// A built-in scene of that name, or the scene in that file.
-fn load(scene: &str, options: &LoadOptions) -> anyhow::Result<Loaded> {
-    if let Some(scene) = scenes::by_name(scene) {
+fn load(scene: &OsStr, options: &LoadOptions) -> anyhow::Result<Loaded> {
+    if let Some(scene) = scene.to_str().and_then(scenes::by_name) {
         return Ok(Loaded { scene, size: None, max_depth: None, warnings: vec![] });
     }
     let path = Path::new(scene);
@@ -216,7 +217,7 @@ fn load(scene: &str, options: &LoadOptions) -> anyhow::Result<Loaded> {
 }
 
 /// `hall` of `rooms/hall.xml`, and of `rooms/hall/`.
-fn stem(path: &str) -> String {
+fn stem(path: &OsStr) -> String {
     let stem = Path::new(path).file_stem().map(|stem| stem.to_string_lossy().into_owned());
     stem.unwrap_or_else(|| "scene".to_owned())
 }

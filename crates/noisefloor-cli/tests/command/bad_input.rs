@@ -265,3 +265,25 @@ fn explore_begins_with_pictures_it_can_read_or_not_at_all() {
     let other = at("text.sqlite");
     fail(&["explore", "--listen", "127.0.0.1:0", "--database", text(&other)], &["text.sqlite", "database"]);
 }
+
+/// Names of files are bytes: a scene whose name is not UTF-8 renders as any other.
+#[test]
+#[cfg(target_os = "linux")]
+fn a_scene_may_have_any_name() {
+    use std::os::unix::ffi::OsStrExt;
+    let folder = tempfile::tempdir().unwrap();
+    let xml = "<scene version=\"3.0.0\"><sensor type=\"perspective\"/><shape type=\"sphere\"/>\
+               <emitter type=\"constant\"/></scene>";
+    let latin = folder.path().join(std::ffi::OsStr::from_bytes(b"sc\xe9ne.xml"));
+    let plain = folder.path().join("plain.xml");
+    let pixels = [&latin, &plain].map(|scene| {
+        std::fs::write(scene, xml).unwrap();
+        let out = folder.path().join("out");
+        let args =
+            ["render", "--size", "16x16", "--tile", "16", "--criterion", "spp:4", "--quiet", "--force"];
+        let output = crate::kit::command(&args).arg("--out").arg(&out).arg(scene).output().unwrap();
+        assert!(output.status.success(), "{}", crate::kit::stderr(&output));
+        noisefloor_image::read_exr(out.join("image.exr")).unwrap().pixels
+    });
+    assert!(pixels[0] == pixels[1]);
+}
