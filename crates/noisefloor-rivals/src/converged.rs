@@ -13,6 +13,8 @@ pub(crate) const DEFAULT_LOST: f64 = 0.04;
 /// [`View::reference`]. Each tile is compared as a picture of its own, by
 /// [`cvvdp_of_tiles`](crate::metrics::cvvdp_of_tiles).
 ///
+/// The probability of a verdict is one minus the JODs lost, or 0: it tells by what limit the tile would be done.
+///
 /// For comparison only: whoever has the converged picture need not render. It tells what a published vision
 /// model makes of noise if it is given what no criterion has.
 #[derive(Clone, Debug)]
@@ -53,7 +55,11 @@ impl StoppingCriterion for ConvergedCvvdp {
         };
         let jods = cvvdp_of_tiles(converged, &shown, grid, tiles, self.model.insert(model));
         let jods = jods.unwrap_or_else(|_| vec![0.0; tiles.len()]);
-        Ok(jods.into_iter().map(|jod| verdict(10.0 - jod <= self.lost, None)).collect())
+        let judge = |jod: f64| {
+            let lost = 10.0 - jod;
+            Verdict { probability: Some((1.0 - lost).max(0.0) as f32), ..verdict(lost <= self.lost, None) }
+        };
+        Ok(jods.into_iter().map(judge).collect())
     }
 }
 

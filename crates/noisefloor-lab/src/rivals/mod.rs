@@ -26,6 +26,8 @@ use std::path::PathBuf;
 /// Constants that are tried for a rival, evenly spread over its range in logarithms: of one that has to be
 /// run with each, and of one whose verdicts tell what constant would do.
 const CONSTANTS: (u32, u32) = (16, 400);
+/// Constants that are tried at the same time.
+const AT_ONCE: usize = 2;
 
 /// A rival on human data.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -104,11 +106,22 @@ fn stops_of(
         let needed = rendering.follow((rival.make)(rival.range.0), viewing, false)?;
         return Ok(constants.into_iter().map(|constant| rendering.stops(&needed, constant)).collect());
     }
-    let stops = |constant| {
-        let needed = rendering.follow((rival.make)(constant), viewing, true)?;
-        Ok(rendering.stops(&needed, constant))
-    };
-    constants.into_par_iter().map(stops).collect()
+    // From lax to strict: where a constant stops no zone at any stage, no stricter one does.
+    let mut stops: Vec<Vec<f64>> = Vec::new();
+    for some in constants.rchunks(AT_ONCE) {
+        let follow = |constant: &f64| rendering.follow((rival.make)(*constant), viewing, true);
+        let needed = some.par_iter().map(follow).collect::<Result<Vec<_>, _>>()?;
+        stops.extend(
+            needed.iter().zip(some).rev().map(|(needed, constant)| rendering.stops(needed, *constant)),
+        );
+        if needed[0].iter().flatten().all(|needed| needed.is_infinite()) {
+            break;
+        }
+    }
+    let strictest = stops.last().cloned().unwrap_or_default();
+    stops.resize(constants.len(), strictest);
+    stops.reverse();
+    Ok(stops)
 }
 
 fn constants(rival: &Rival) -> Vec<f64> {

@@ -5,20 +5,40 @@ use crate::error::LabError;
 use noisefloor::{
     Params, Reference, Rgb, Schedule, Session, StopReason, StoppingCriterion, ToneMapping, Viewing,
 };
-use noisefloor_learn::{Corpus, JudgedImage, JudgedZone};
+use noisefloor_learn::{Corpus, JudgedImage, JudgedZone, as_difference};
+use rayon::prelude::*;
 
 /// Samples of one stage over those of the stage before.
-const GROWTH: f64 = 1.15;
+pub(super) const GROWTH: f64 = 1.15;
+/// The last stage over the last picture. What people saw near the last picture, the difference from it, is weaker
+/// than its noise: at this factor it is that of 80 % of the last picture's samples.
+const BEYOND: f64 = 4.0;
 
 /// A scene as a rendering that can be followed.
 pub(super) struct SynthesisedRendering {
     pub(super) zones: Vec<JudgedZone>,
     /// Edge of a zone in pixels.
     edge: usize,
-    /// What comes stage by stage: samples, and the mean of these samples alone for each zone.
-    stages: Vec<(u64, Vec<Vec<Rgb>>)>,
+    /// What comes stage by stage: a batch for each half.
+    stages: Vec<Vec<Batch>>,
     /// All zones, converged, as one picture.
     converged: Reference,
+}
+
+/// Samples, and the mean of these samples alone for each zone.
+type Batch = (u64, Vec<Vec<Rgb>>);
+
+/// The samples of the batches of each stage, until `last` are reached: two batches each, so that the halves of a
+/// film are even.
+pub(super) fn stages(first: f64, last: f64) -> Vec<[u64; 2]> {
+    let (mut stages, mut done, mut goal) = (Vec::new(), 0u64, first / GROWTH.powi(2));
+    while (done as f64) < last {
+        let half = ((goal / 2.0 - done as f64 / 2.0).round() as u64).max(1);
+        stages.push([half; 2]);
+        done += 2 * half;
+        goal *= GROWTH;
+    }
+    stages
 }
 
 impl SynthesisedRendering {
@@ -39,15 +59,11 @@ impl SynthesisedRendering {
         let last = zones.iter().map(|z| z.last_spp).max().unwrap_or(1) as f64;
         let noises = levels.iter().map(|of_zone| Noise::of(of_zone)).collect::<Option<Vec<_>>>();
         let noises = noises.ok_or_else(|| LabError::TooFewImages { scene: scene.to_owned() })?;
-        let mut stages = Vec::new();
-        let (mut done, mut goal) = (0u64, first / GROWTH.powi(2));
-        while (done as f64) < last {
-            let samples = (goal.round() as u64).max(done + 1) - done;
-            let batch = noises.iter().map(|noise| noise.batch(stages.len(), samples)).collect();
-            stages.push((samples, batch));
-            done += samples;
-            goal *= GROWTH;
-        }
+        let batch = |(turn, samples): (usize, u64)| -> Batch {
+            (samples, noises.par_iter().map(|noise| noise.batch(turn, samples)).collect())
+        };
+        let stages = stages(first, BEYOND * last).into_iter().enumerate();
+        let stages = stages.map(|(i, [a, b])| vec![batch((2 * i, a)), batch((2 * i + 1, b))]).collect();
         let columns = (zones.len() as f64).sqrt().ceil() as usize;
         let tiles: Vec<&[Rgb]> = noises.iter().map(|noise| noise.converged.as_slice()).collect();
         let converged = mosaic(&tiles, edge, columns);
@@ -84,10 +100,12 @@ impl SynthesisedRendering {
             session.close(tile, StopReason::Cancelled);
         }
         let mut needed = vec![Vec::new(); self.zones.len()];
-        for (samples, batch) in &self.stages {
-            for (tile, mean) in batch.iter().enumerate() {
-                if session.is_open(tile) {
-                    session.push(tile, *samples, mean)?;
+        for batches in &self.stages {
+            for (samples, batch) in batches {
+                for (tile, mean) in batch.iter().enumerate() {
+                    if session.is_open(tile) {
+                        session.push(tile, *samples, mean)?;
+                    }
                 }
             }
             session.judge()?;
@@ -104,13 +122,14 @@ impl SynthesisedRendering {
     }
 
     /// Samples at which a constant stops each zone: between the first stage that it is enough for and the
-    /// one before, and within what observers could choose.
+    /// one before, as those of a picture that differs from people's last one as strongly as the noise of that
+    /// stage, and within what observers could choose.
     pub(super) fn stops(&self, needed: &[Vec<f64>], constant: f64) -> Vec<f64> {
         let totals: Vec<u64> = self
             .stages
             .iter()
-            .scan(0, |total, (samples, _)| {
-                *total += *samples;
+            .scan(0, |total, batches| {
+                *total += batches.iter().map(|(samples, _)| samples).sum::<u64>();
                 Some(*total)
             })
             .collect();
@@ -118,7 +137,7 @@ impl SynthesisedRendering {
             let (first, last) = (zone.first_spp as f64, zone.last_spp as f64);
             let stage = needed.iter().position(|least| *least <= constant);
             let between = |stage: usize| ((totals[stage.saturating_sub(1)] * totals[stage]) as f64).sqrt();
-            stage.map_or(last, between).clamp(first, last)
+            as_difference(stage.map_or(f64::INFINITY, between), zone.reference_spp).clamp(first, last)
         };
         self.zones.iter().zip(needed).map(stop).collect()
     }
