@@ -6,7 +6,7 @@ use noisefloor::{CriterionError, Needs, StoppingCriterion, Tile, Verdict, View};
 use noisefloor_vision::VisionModel;
 
 /// Default of [`ConvergedCvvdp::lost`]: agrees with people on average.
-pub(crate) const DEFAULT_LOST: f64 = 0.04;
+pub(crate) const DEFAULT_LOST: f64 = 0.3;
 
 /// A tile is done when ColorVideoVDP (Mantiuk et al. 2024) finds that it has lost at most so many
 /// just-objectionable differences (JOD) against the converged picture, which takes the place of

@@ -11,7 +11,7 @@
 //! | [`LuxCoreHalt`] | `luxcore:0.35` | few displayed pixels have changed (LuxCoreRender) |
 //! | [`Myszkowski1998`] | `vdp-stages:0.55` | nobody sees a difference between successive stages |
 //! | [`Takouachet2007`] | `vdp-first:0.66` | the difference from the first, noisy picture stops growing |
-//! | [`ConvergedCvvdp`] | `cvvdp:0.04` | it hardly differs from the *converged* picture: a yardstick |
+//! | [`ConvergedCvvdp`] | `cvvdp:0.3` | it hardly differs from the *converged* picture: a yardstick |
 //!
 //! [`parse`] makes a criterion from such a spec; [`RIVALS`] lists those with one open constant, to be fitted
 //! to data. [`Vdp`] is Daly's visible differences predictor; [`metrics`] has ColorVideoVDP, relMSE and PSNR,

@@ -167,7 +167,7 @@ fn known() -> String {
 /// Makes a criterion of a spec: a name, and after a colon its constant, or the default without one;
 /// `spp` needs its number.
 /// `"spp:256"`, `"time:30"` (seconds), `"relative-error:0.19"`, `"dammertz:0.003"`, `"cycles:0.01"`,
-/// `"luxcore:0.35"`, `"vdp-stages:0.55"`, `"vdp-first:0.66"`, `"cvvdp:0.04"`.
+/// `"luxcore:0.35"`, `"vdp-stages:0.55"`, `"vdp-first:0.66"`, `"cvvdp:0.3"`.
 ///
 /// # Errors
 /// [`SpecError`] if the name is unknown or the criterion does not accept the number.

@@ -66,7 +66,8 @@ pub struct RenderArgs {
     #[arg(long, value_enum, conflicts_with_all = ["model", "threshold", "schedule", "criterion", "audience"])]
     denoise: Option<DenoiserChoice>,
     /// With --denoise: just-objectionable differences (JOD) that a tile may have lost when it stops. At 1,
-    /// three of four people prefer the converged picture; the default is what people call clean of noise.
+    /// three of four people prefer the converged picture; the default is what zones had lost, on average, where
+    /// people stopped seeing noise in them.
     #[arg(long, value_name = "JOD", requires = "denoise", default_value_t = DEFAULT_LOST, value_parser = values::jods)]
     lost: f64,
     #[command(flatten)]

@@ -82,7 +82,7 @@ pub(super) fn frames(text: &str) -> Result<(u32, u32), String> {
 
 pub(super) fn jods(text: &str) -> Result<f64, String> {
     let jods = text.parse().ok().filter(|jods| (1e-3..=5.0).contains(jods));
-    jods.ok_or_else(|| "expected just-objectionable differences within 0.001…5, such as 0.04".into())
+    jods.ok_or_else(|| "expected just-objectionable differences within 0.001…5, such as 0.3".into())
 }
 
 /// `render --spp 100` is what people try first.
