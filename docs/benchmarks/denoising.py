@@ -7,7 +7,7 @@ import sys
 
 import numpy
 
-LIMITS = [0.04, 0.1, 0.3, 1.0]
+LIMITS = [0.1, 0.3, 0.35, 1.0]
 # JODs below this are the same to everyone
 LEAST = 1e-4
 # Samples per pixel before the first verdict of the command
