@@ -210,7 +210,7 @@ fn reliability(root: &DrawingArea<SVGBackend<'_>, Shift>, bins: &[ReliabilityBin
     chart
         .configure_mesh()
         .x_desc("P of the model")
-        .y_desc("share of observers who see no difference")
+        .y_desc("how often people saw no noise")
         .label_style(LETTERS)
         .axis_desc_style(LETTERS)
         .light_line_style(WHITE)

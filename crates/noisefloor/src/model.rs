@@ -170,7 +170,7 @@ pub struct Judgement {
 }
 
 impl Model {
-    /// The model trained on the human data of LISIC (lisic9 and one SIN3D view), inside the library; see the
+    /// The model trained on the human data of LISIC (nine scenes and two SIN3D views), inside the library; see the
     /// project's `docs/guide.md` for the command that makes it.
     #[cfg(feature = "bundled-model")]
     pub fn bundled() -> Self {
