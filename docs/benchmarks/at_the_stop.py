@@ -21,6 +21,7 @@ import numpy as np
 import OpenEXR
 from PIL import Image
 
+LAYER = "ViewLayer.Combined"
 WEIGHTS = np.array([0.2126, 0.7152, 0.0722])
 
 
@@ -32,7 +33,7 @@ def load(name):
         path, spp = name.rsplit(":", 1)
     with OpenEXR.File(path) as file:
         channels = {key: channel.pixels for part in file.parts for key, channel in part.channels.items()}
-    key = next((k for k in ("RGB", "RGBA", "ViewLayer.Combined") if k in channels), None)
+    key = next((k for k in ("RGB", "RGBA", LAYER) if k in channels), None)
     rgb = channels[key][..., :3] if key else np.stack([channels[c] for c in "RGB"], -1)
     samples = np.full(rgb.shape[:2], float(spp or 0))
     if folder.is_dir():
