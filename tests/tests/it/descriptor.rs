@@ -74,6 +74,7 @@ fn table(descriptor: &Descriptor) -> Table {
             censored: false,
             first_spp: 10.0,
             last_spp: 10_000.0,
+            reference_spp: f64::INFINITY,
             levels: (0..24).map(|i| level(noise_at_one, 10.0 * 1.35f64.powi(i))).collect(),
         }
     };
@@ -84,6 +85,7 @@ fn table(descriptor: &Descriptor) -> Table {
         evidence,
         tone_mapping,
         viewing: Viewing::default(),
+        numbers: descriptor.number_names(),
         zones,
         answers: vec![],
     }
