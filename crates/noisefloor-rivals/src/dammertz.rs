@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use std::ops::Range;
 
 /// Default of [`Dammertz::stop`].
-pub(crate) const DEFAULT_STOP: f64 = 0.003;
+pub(crate) const DEFAULT_STOP: f64 = 0.0046;
 /// Default of [`Dammertz::split`] (Dammertz et al. 2010, §2.2).
 const DEFAULT_SPLIT: f64 = 256.0;
 
@@ -22,10 +22,10 @@ const DEFAULT_SPLIT: f64 = 256.0;
 /// Differences from the paper: blocks are cut along the borders of tiles, since tiles are sampled as a whole;
 /// the halves of a cut are judged at once instead of after the next pass, since many passes lie between two
 /// verdicts here; radiance is multiplied by the exposure of the display, so that its unit does not matter; a
-/// black pixel has no error.
+/// pixel that is black, or negative by a filter or by synthesised noise, has no error.
 #[derive(Clone, Debug)]
 pub struct Dammertz {
-    /// Error below which a block is done, above 0. The default of 0.003 agrees with people on average
+    /// Error below which a block is done, above 0. The default of 0.0046 agrees with people on average
     /// (`noisefloor evaluate --rivals`).
     pub stop: f64,
     /// Error below which a block is cut in two, in units of `stop`, at least 1; 256 by default.
@@ -126,7 +126,7 @@ fn tile_errors(film: &Film, exposure: f64, tile: Tile) -> Errors {
     pixels.filter_map(|p| half_difference(film, tile.index, p, exposure)).fold(
         (0.0, 0),
         |(sum, n), (error, intensity)| {
-            (sum + if error > 0.0 { error / intensity.max(f64::MIN_POSITIVE).sqrt() } else { 0.0 }, n + 1)
+            (sum + if error > 0.0 && intensity > 0.0 { error / intensity.sqrt() } else { 0.0 }, n + 1)
         },
     )
 }
@@ -247,6 +247,11 @@ mod tests {
         }
         let (sum, count) = tile_errors(&film, 1.0, film.grid().tile(0));
         assert!((sum / count as f64 - 0.3 / 1.5f64.sqrt()).abs() < 1e-6);
+        // Of pixels that are black or negative as a whole there is no root, and no error, of whatever size
+        for half in [-0.6, 0.4] {
+            film.add(2, 50, &[[half; 3]; 1024]).unwrap();
+        }
+        assert_eq!(tile_errors(&film, 1.0, film.grid().tile(2)), (0.0, 1024));
         // A tile without samples gives no evidence, and keeps the image from stopping whole.
         assert_eq!(tile_errors(&film, 1.0, film.grid().tile(1)).1, 0);
     }

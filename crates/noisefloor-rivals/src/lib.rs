@@ -5,10 +5,10 @@
 //! |---|---|---|
 //! | [`FixedSpp`](noisefloor::FixedSpp) | `spp:256` | a tile has 256 samples per pixel |
 //! | [`TimeLimit`] | `time:30` | 30 seconds have passed |
-//! | [`RelativeError`] | `relative-error:0.19` | a pixel's confidence interval is small (Mitsuba 0.6) |
-//! | [`Dammertz`] | `dammertz:0.003` | the error of a block is small (Dammertz et al. 2010) |
+//! | [`RelativeError`] | `relative-error:0.17` | a pixel's confidence interval is small (Mitsuba 0.6) |
+//! | [`Dammertz`] | `dammertz:0.0046` | the error of a block is small (Dammertz et al. 2010) |
 //! | [`CyclesAdaptive`] | `cycles:0.01` | the relative error of a pixel is small (Blender) |
-//! | [`LuxCoreHalt`] | `luxcore:0.35` | few displayed pixels have changed (LuxCoreRender) |
+//! | [`LuxCoreHalt`] | `luxcore:0.31` | few displayed pixels have changed (LuxCoreRender) |
 //! | [`Myszkowski1998`] | `vdp-stages:0.55` | nobody sees a difference between successive stages |
 //! | [`Takouachet2007`] | `vdp-first:0.66` | the difference from the first, noisy picture stops growing |
 //! | [`ConvergedCvvdp`] | `cvvdp:0.3` | it hardly differs from the *converged* picture: a yardstick |

@@ -4,7 +4,7 @@ use crate::pixels::{displayed, enough, verdict};
 use noisefloor::{CriterionError, Rgb, StoppingCriterion, Tile, TileGrid, Verdict, View};
 
 /// Default of [`LuxCoreHalt::share`].
-pub(crate) const DEFAULT_SHARE: f64 = 0.35;
+pub(crate) const DEFAULT_SHARE: f64 = 0.31;
 /// Default of [`LuxCoreHalt::threshold`]: one step of an 8-bit screen.
 const DEFAULT_THRESHOLD: f32 = 1.0 / 256.0;
 /// Default of [`LuxCoreHalt::step`] and [`LuxCoreHalt::warmup`] (`batch.haltthreshold.step` and `.warmup` of
@@ -22,7 +22,7 @@ const DEFAULT_STEP: f64 = 64.0;
 /// share to the user.
 #[derive(Clone, Debug)]
 pub struct LuxCoreHalt {
-    /// Largest share of the pixels that may have changed, in [0, 1]. The default of 0.35 agrees with people
+    /// Largest share of the pixels that may have changed, in [0, 1]. The default of 0.31 agrees with people
     /// on average (`noisefloor evaluate --rivals`).
     pub share: f64,
     /// Samples per pixel between two tests, above 0; 64 by default.

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
 
 /// Default of [`RelativeError::error`] (`maxError` of Mitsuba 0.6).
-pub(crate) const DEFAULT_ERROR: f64 = 0.19;
+pub(crate) const DEFAULT_ERROR: f64 = 0.17;
 /// Default of [`RelativeError::confidence`] (`pValue` 0.05 of Mitsuba 0.6).
 pub(crate) const DEFAULT_CONFIDENCE: f64 = 0.95;
 /// Darker pixels are compared with this share of the average luminance.
@@ -29,7 +29,7 @@ const DARK: f64 = 0.01;
 /// Memory: 64 bytes per pixel in addition to the film.
 #[derive(Clone, Debug)]
 pub struct RelativeError {
-    /// Largest relative half-width of the confidence interval, above 0. The default of 0.19 agrees with
+    /// Largest relative half-width of the confidence interval, above 0. The default of 0.17 agrees with
     /// people on average (`noisefloor evaluate --rivals`).
     pub error: f64,
     /// Confidence, in (0, 1); 0.95 by default.

@@ -166,8 +166,8 @@ fn known() -> String {
 
 /// Makes a criterion of a spec: a name, and after a colon its constant, or the default without one;
 /// `spp` needs its number.
-/// `"spp:256"`, `"time:30"` (seconds), `"relative-error:0.19"`, `"dammertz:0.003"`, `"cycles:0.01"`,
-/// `"luxcore:0.35"`, `"vdp-stages:0.55"`, `"vdp-first:0.66"`, `"cvvdp:0.3"`.
+/// `"spp:256"`, `"time:30"` (seconds), `"relative-error:0.17"`, `"dammertz:0.0046"`, `"cycles:0.01"`,
+/// `"luxcore:0.31"`, `"vdp-stages:0.55"`, `"vdp-first:0.66"`, `"cvvdp:0.3"`.
 ///
 /// # Errors
 /// [`SpecError`] if the name is unknown or the criterion does not accept the number.
@@ -202,7 +202,7 @@ mod tests {
         for (spec, name) in [
             ("spp:256", "256 samples per pixel"),
             ("time:1.5", "1.5 seconds"),
-            ("relative-error", "relative error 0.19 at 95 %"),
+            ("relative-error", "relative error 0.17 at 95 %"),
             ("dammertz:0.002", "Dammertz et al. 2010, stop 0.002"),
             ("cycles: 0.1", "Cycles, threshold 0.1"),
             ("luxcore:1e-2", "LuxCore, 0.01 of the pixels"),
