@@ -5,9 +5,9 @@ use crate::pixels::{displayed, verdict};
 use crate::vdp::{Response, Vdp};
 use noisefloor::{CriterionError, Film, StoppingCriterion, Tile, TileGrid, Verdict, View};
 
-/// Default of [`Myszkowski1998::probability`]: agrees with people on average.
+/// Default of [`Myszkowski1998::probability`]: fitted to people on renderings with too little noise.
 pub(crate) const DEFAULT_SEEN: f64 = 0.55;
-/// Default of [`Takouachet2007::probability`]: agrees with people on average.
+/// Default of [`Takouachet2007::probability`]: fitted to people on renderings with too little noise.
 pub(crate) const DEFAULT_GROWTH: f64 = 0.66;
 /// Default share of a tile's pixels that may differ.
 const DEFAULT_SHARE: f64 = 0.01;
@@ -80,8 +80,8 @@ fn verdicts(map: Option<&[f32]>, width: usize, tiles: &[Tile], limit: f64, share
 /// its verdict from the map. Memory: 4 bytes per pixel for each of up to ten stages.
 #[derive(Clone, Debug)]
 pub struct Myszkowski1998 {
-    /// Probability of detection above which a pixel differs visibly, in (0, 1). The default of 0.55 agrees
-    /// with people on average (`noisefloor evaluate --rivals`).
+    /// Probability of detection above which a pixel differs visibly, in (0, 1). The default of 0.55
+    /// was fitted to people on synthesised renderings that had too little noise (`docs/benchmarks/criteria.md`).
     pub probability: f64,
     /// Share of a tile's pixels that may do so, in [0, 1]; 0.01 by default.
     pub share: f64,
@@ -144,7 +144,7 @@ impl StoppingCriterion for Myszkowski1998 {
 #[derive(Clone, Debug)]
 pub struct Takouachet2007 {
     /// Change of the probability of detection above which a pixel has changed, in (0, 1). The default of 0.66
-    /// agrees with people on average (`noisefloor evaluate --rivals`).
+    /// was fitted to people on synthesised renderings that had too little noise (`docs/benchmarks/criteria.md`).
     pub probability: f64,
     /// Share of a tile's pixels that may do so, in [0, 1]; 0.01 by default.
     pub share: f64,

@@ -151,7 +151,8 @@ fn neighbours_stay_correlated_in_a_block() {
     let mut levels = Vec::new();
     for i in 0..4u64 {
         let white = grey(10.0, &mut random);
-        let beside = |p: usize| (white[p][0] + white[if p.is_multiple_of(EDGE) { p } else { p - 1 }][0]) / 2.0;
+        let beside =
+            |p: usize| (white[p][0] + white[if p.is_multiple_of(EDGE) { p } else { p - 1 }][0]) / 2.0;
         levels.push(image(10 * i, 10 * i + 10, (0..EDGE * EDGE).map(|p| [beside(p); 3]).collect()));
     }
     levels.push(image(40, 1_000_000, vec![[MEAN as f32; 3]; EDGE * EDGE]));
