@@ -40,7 +40,8 @@ pub struct EvaluateArgs {
     /// Write the scores as JSON.
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
-    /// Write the thresholds of each zone as CSV: scene,zone,human_spp,predicted_spp,censored,unfamiliar.
+    /// Write the thresholds of each zone as CSV: scene,zone,human_spp,predicted_spp,stop_spp,censored,
+    /// unfamiliar.
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
     /// Draw into this folder: both thresholds of each zone (over the pictures, with --corpus), predicted

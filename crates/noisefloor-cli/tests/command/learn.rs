@@ -287,5 +287,5 @@ fn columns_are_in_the_order_that_is_documented() {
     args.extend(["--csv", text(&zones)]);
     succeed(&args);
     let text = std::fs::read_to_string(&zones).unwrap();
-    assert_eq!(text.lines().next(), Some("scene,zone,human_spp,predicted_spp,censored,unfamiliar"));
+    assert_eq!(text.lines().next(), Some("scene,zone,human_spp,predicted_spp,stop_spp,censored,unfamiliar"));
 }

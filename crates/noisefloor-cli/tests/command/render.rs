@@ -144,7 +144,9 @@ fn spaced_verdicts_stop_tiles_sooner() {
     let folder = tempdir().unwrap();
     let render = |name: &str, more: &[&str]| {
         let out = folder.path().join(name);
-        succeed(&tiny(text(&out), &[&["cornell-box", "--autosave", "0"][..], more].concat()));
+        // From so far away, tiles need little more than the first verdict has
+        let far = ["cornell-box", "--autosave", "0", "--viewing", "desk,distance=1.2"];
+        succeed(&tiny(text(&out), &[&far[..], more].concat()));
         out
     };
     let samples = |out: &Path| json(&out.join("report.json"))["samples"].as_u64().unwrap();

@@ -20,7 +20,7 @@
 //!   lost. In pictures of the human data neighbours correlate by 0 to 0.2, and pixels that are further apart by
 //!   less than 0.02, but where 8-bit rounding is as strong as the noise.
 //! - **Noise has no mean**: the local mean of a realisation, over 33×33 pixels, is taken off. Early pictures of
-//!   the data are darker than the converged one by up to 7/255, in proportion to 1/n, since clipping and tone
+//!   the data are darker than the converged one by up to 8/255, in proportion to 1/n, since clipping and tone
 //!   mapping bend noise; scaled by 1/√n and with signs by block, that would become a pattern of squares. White
 //!   noise loses a thousandth of its variance.
 //! - **A pixel** knows only K numbers. Its variance between batches is right on average over pixels, but
