@@ -200,7 +200,7 @@ test("everything goes by keyboard alone, in a large window", async (t) => {
   await page.getByText("tiles have converged at").waitFor();
   // A name that says nothing: the samples are typed
   await focus(/Samples per pixel of last\.png/);
-  await page.keyboard.type("12800");
+  await page.keyboard.type("51200");
   await page.keyboard.press("Tab");
   await until(
     "there is one more level",
@@ -213,7 +213,7 @@ test("everything goes by keyboard alone, in a large window", async (t) => {
   await until("the scene has a name", async () => (await state(page)).scene === "hall");
   await focus(/^level/);
   await page.keyboard.press("End");
-  await page.getByText("at 12800 spp").waitFor();
+  await page.getByText("at 51200 spp").waitFor();
   await page.keyboard.press("Home");
   await page.keyboard.press("ArrowRight");
   await page.getByText("at 1200 spp").waitFor();

@@ -19,8 +19,8 @@ fn the_bundled_model_is_what_the_table_trains() {
     let (table, bundled) = (table(), Model::bundled());
     assert_eq!(bundled.record().table_digest, table.digest());
     assert_eq!(bundled.record().scenes, table.scenes());
-    assert!(!bundled.record().scenes.contains(&"staircase2-view0".to_owned()));
-    let trained = train(&table, &TrainParams::default(), String::new(), None).unwrap();
+    let trained =
+        train(&table, &TrainParams::for_descriptor(&table.descriptor), String::new(), None).unwrap();
     for level in table.zones.iter().flat_map(|z| &z.levels) {
         let p = |model: &Model| model.judge(&level.descriptor).probability;
         // On another machine, exp may round otherwise on the way
@@ -33,17 +33,18 @@ fn the_bundled_model_is_what_the_table_trains() {
 #[test]
 fn left_out_scenes_are_predicted_better_than_by_one_noise_level() {
     let table = table();
-    assert_eq!((table.zones.len(), table.scenes().len(), table.groups().len()), (112, 7, 6));
-    let predictions = leave_one_scene_out(&table, &TrainParams::default(), Threshold::PAPER, |_| ()).unwrap();
+    assert_eq!((table.zones.len(), table.scenes().len(), table.groups().len()), (167, 11, 10));
+    let params = TrainParams::for_descriptor(&table.descriptor);
+    let predictions = leave_one_scene_out(&table, &params, Threshold::PAPER, |_| ()).unwrap();
     let (ours, constant) = (score(predictions.iter()), score(constant_noise_baseline(&table).iter()));
-    assert!(ours.error_factor < 1.26 && ours.early_share <= 0.03, "{ours:?}");
+    assert!(ours.error_factor < 1.33 && ours.early_share <= 0.02, "{ours:?}");
     assert!((0.9..1.1).contains(&ours.bias_factor), "{ours:?}");
     assert!(ours.error_factor < constant.error_factor && ours.early_share < constant.early_share);
 
-    // Known from the data's own README, though for eight scenes: ×1.40, and 2 % early
+    // Known from the data's own README, though for eight other scenes: ×1.40, and 2 % early
     let median = score(scene_median_baseline(&table).iter());
     assert!(
-        (median.error_factor - 1.40).abs() < 0.03 && (median.early_share - 0.02).abs() < 0.01,
+        (median.error_factor - 1.40).abs() < 0.06 && (median.early_share - 0.02).abs() < 0.01,
         "{median:?}"
     );
 }
@@ -55,19 +56,20 @@ fn the_compact_descriptor_predicts_left_out_scenes_too() {
     let params = TrainParams { candidates: vec![SvmParams { c: 0.3, gamma: 0.01 }], ..TrainParams::svm() };
     let predictions = leave_one_scene_out(&compact, &params, Threshold::PAPER, |_| ()).unwrap();
     let scores = score(predictions.iter());
-    assert!(scores.error_factor < 1.33 && scores.early_share <= 0.03, "{scores:?}");
+    assert!(scores.error_factor < 1.38 && scores.early_share <= 0.03, "{scores:?}");
 }
 
 /// The score in `docs/accuracy.md` with everything chosen without the scene that is predicted.
 #[test]
 fn with_blind_choices_the_vision_model_errs_less_than_one_noise_level() {
-    let (every, params) = (fixture("human-choices.csv"), TrainParams::default());
-    assert_eq!((every.zones.len(), every.groups().len()), (112, 6));
+    let every = fixture("human-choices.csv");
+    let params = TrainParams::for_descriptor(&every.descriptor);
+    assert_eq!((every.zones.len(), every.groups().len()), (167, 10));
     let all = choices(&every).unwrap();
     let (predictions, chosen) = choose_and_leave_out(&all, &params, Threshold::PAPER, |_| ()).unwrap();
-    assert_eq!(chosen.len(), 6);
+    assert_eq!(chosen.len(), 10);
     let (ours, constant) = (score(predictions.iter()), score(constant_noise_baseline(&every).iter()));
-    assert!(ours.error_factor < 1.27 && ours.early_share <= 0.03, "{ours:?} {chosen:?}");
+    assert!(ours.error_factor < 1.33 && ours.early_share <= 0.02, "{ours:?} {chosen:?}");
     assert!(constant.error_factor > 1.5, "{constant:?}");
 
     // The table of the model that is shipped is one of the choices

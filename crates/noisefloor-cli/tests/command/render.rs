@@ -144,8 +144,8 @@ fn spaced_verdicts_stop_tiles_sooner() {
     let folder = tempdir().unwrap();
     let render = |name: &str, more: &[&str]| {
         let out = folder.path().join(name);
-        // From so far away, tiles need little more than the first verdict has
-        let far = ["cornell-box", "--autosave", "0", "--viewing", "desk,distance=1.2"];
+        // From a little further away, tiles need 100 to 200 samples
+        let far = ["cornell-box", "--autosave", "0", "--viewing", "desk,distance=0.8"];
         succeed(&tiny(text(&out), &[&far[..], more].concat()));
         out
     };

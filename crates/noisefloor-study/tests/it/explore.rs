@@ -4,7 +4,7 @@ use noisefloor::{
     ToneMapping, Viewing,
 };
 use noisefloor_image::read_picture;
-use noisefloor_learn::{Level, Origin, Table, Zone};
+use noisefloor_learn::{Level, Origin, Table, TrainParams, Zone};
 use noisefloor_study::explore::{Disagreements, ExploreSetup, read_answers, retrain};
 use serde_json::{Value, json};
 use std::path::Path;
@@ -394,7 +394,7 @@ fn retraining_moves_p_and_says_what_it_costs() {
     assert_eq!(model.digest(), clean["model"].as_str().unwrap());
     let answers = read_answers(dir.path().join("explore.sqlite")).unwrap();
     let answers = answers.iter().map(|d| d.said.answer()).collect();
-    let (bundled, params) = (Model::bundled(), Default::default());
+    let (bundled, params) = (Model::bundled(), TrainParams::for_descriptor(&table().descriptor));
     // Another table than the bundled model's is not called by its name.
     let corpus = format!("a table of {}", table().scenes().join(", "));
     assert!(model.record().corpus.starts_with(&corpus), "{}", model.record().corpus);
