@@ -90,7 +90,7 @@ test("pictures are dropped, judged and disagreed with by mouse, in a small windo
   await page.locator("#audience").selectOption("observers");
   await until("the observers need as much as before", async () => (await need()) === before);
   await page.locator("#level").fill("1");
-  await page.getByText("at 1200 spp").waitFor();
+  await page.getByText("at 3000 spp").waitFor();
   const p = await probability();
   assert.ok(p > 0.05 && p < 0.99, `P ${p}`);
   await page.locator("#threshold").fill(Math.max(p - 0.02, 0.05).toFixed(2));
@@ -216,7 +216,7 @@ test("everything goes by keyboard alone, in a large window", async (t) => {
   await page.getByText("at 51200 spp").waitFor();
   await page.keyboard.press("Home");
   await page.keyboard.press("ArrowRight");
-  await page.getByText("at 1200 spp").waitFor();
+  await page.getByText("at 3000 spp").waitFor();
   await focus(/^show-noise/);
   await page.keyboard.press("Space");
   await until("the noise is shown", () => page.locator("#noise").isVisible());

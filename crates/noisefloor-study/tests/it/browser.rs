@@ -211,11 +211,11 @@ fn pictures_are_explored_in_a_browser() {
     }
     let dir = tempfile::tempdir().unwrap();
     let folder = dir.path().join("hall");
-    stack(&folder, (384, 256), &[50, 1200, 25_600, 51_200]);
+    stack(&folder, (384, 256), &[50, 3000, 25_600, 51_200]);
     std::fs::rename(folder.join("51200.png"), folder.join("last.png")).unwrap();
     stack(&dir.path().join("other"), (64, 64), &[50]);
     let files: Vec<PathBuf> =
-        ["00050.png", "01200.png", "25600.png", "last.png"].iter().map(|name| folder.join(name)).collect();
+        ["00050.png", "03000.png", "25600.png", "last.png"].iter().map(|name| folder.join(name)).collect();
     let files =
         serde_json::json!({ "stack": files, "other": dir.path().join("other/00050.png") }).to_string();
     let server = Served::explorer(ExploreSetup {
