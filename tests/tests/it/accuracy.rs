@@ -75,7 +75,10 @@ fn with_blind_choices_the_vision_model_errs_less_than_one_noise_level() {
     // The table of the model that is shipped is one of the choices
     let shipped = table();
     let same = all.iter().find(|c| c.table.descriptor == shipped.descriptor).unwrap();
-    for (ours, theirs) in shipped.zones.iter().zip(&same.table.zones) {
+    assert_eq!(shipped.zones.len(), same.table.zones.len());
+    for ours in &shipped.zones {
+        let same_zone = |z: &&noisefloor_learn::Zone| (&z.scene, z.zone) == (&ours.scene, ours.zone);
+        let theirs = same.table.zones.iter().find(same_zone).unwrap();
         for (a, b) in ours.levels.iter().zip(&theirs.levels) {
             assert_eq!((&ours.scene, ours.zone, a.spp), (&theirs.scene, theirs.zone, b.spp), "{}", same.name);
             // Areas were pixels there, and are equal here: sums round otherwise
