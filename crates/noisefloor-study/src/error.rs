@@ -141,6 +141,12 @@ pub enum StoreError {
     /// The writer thread has ended.
     #[error("answers can no longer be stored because the database thread has ended; restart the server")]
     Closed,
+    /// The stored trials of a session are not of the study.
+    #[error("the trials stored for session {code} do not fit the study; was the database edited by hand?")]
+    Plan {
+        /// The session.
+        code: String,
+    },
     /// An event in the database does not fit the study.
     #[error("event {seq} of session {code} does not fit the study: {what}; was the database edited by hand?")]
     Event {

@@ -1,6 +1,6 @@
 //! The state of a session. Events move it on; replaying them rebuilds it, and nothing else is stored.
 
-use super::plan::{Pair, PlannedTrial, Task, draw_trials};
+use super::plan::{Pair, Plan, PlannedTrial, Task};
 use super::trial::{Class, TrialOutcome, TrialRole};
 use crate::config::Study;
 use crate::event::{Choice, StudyEvent, TrialTiming};
@@ -80,15 +80,14 @@ fn misfit<T>(what: &str) -> Result<T, EventMisfit> {
 }
 
 impl ParticipantSession {
-    /// Starts a session. The order of trials depends on the seed of the study and this one.
-    pub fn new(study: Arc<Study>, grids: Arc<Vec<Arc<QuestGrid>>>, seed: u64) -> Self {
-        let mut random = crate::random::seeded(study.seed.rotate_left(32) ^ seed);
-        let [practice, data] = draw_trials(&study, &mut random);
+    /// Starts a session. `plan` is of the same study.
+    pub fn new(study: Arc<Study>, grids: Arc<Vec<Arc<QuestGrid>>>, plan: Plan) -> Self {
+        let Plan { practice, trials } = plan;
         let begin = practice.len() as u32;
         let mut session = Self {
             study,
             grids,
-            plan: Arc::new([practice, data].concat()),
+            plan: Arc::new([practice, trials].concat()),
             practice: [0, begin],
             attempts: [1, 0],
             stage: Stage::Consent,
