@@ -77,8 +77,8 @@ pub use server::{
     StudyView,
 };
 pub use session::{
-    CatchKind, Class, EventMisfit, ParticipantSession, Plan, Stage, Trial, TrialOutcome, TrialRole, grids,
-    replay,
+    CatchKind, Class, EventMisfit, Haste, ParticipantSession, Plan, Stage, Trial, TrialOutcome, TrialRole,
+    grids, replay,
 };
 pub use stack::{MAX_LEVELS, NOISY_SHARE, StudyStack};
 pub use stack_render::render_stack;

@@ -1,7 +1,7 @@
 use crate::kit::{Folder, levels, public};
 use noisefloor_study::simulated::{Behaviour, run};
 use noisefloor_study::{
-    CatchKind, Choice, Conditions, ParticipantSession, Plan, Stage, StudyEvent, Trial, TrialOutcome,
+    CatchKind, Choice, Conditions, Haste, ParticipantSession, Plan, Stage, StudyEvent, Trial, TrialOutcome,
     TrialRole, TrialTiming, ViewingProblem, grids,
 };
 use std::collections::BTreeMap;
@@ -65,7 +65,10 @@ fn each_pair_is_shown_twice_between_practice_and_catch_trials() {
     assert_eq!(shown, [0, 0, 1, 1]);
     let catch = (TrialRole::Catch(CatchKind::Identical), true);
     assert_eq!(roles, [(TrialRole::Practice, false), (TrialRole::Practice, true), catch, catch]);
-    assert_eq!((session.stage(), session.progress(), session.hasty()), (Stage::Finished, (8, 8), [6, 0]));
+    assert_eq!(
+        (session.stage(), session.progress(), session.haste()),
+        (Stage::Finished, (8, 8), Haste { trials: 6, hasty: 0 })
+    );
     let caught = |o: &&TrialOutcome| matches!(o, TrialOutcome::Caught { passed: true, .. });
     assert_eq!(session.outcomes().iter().filter(caught).count(), 2);
     let stops = |o: &&TrialOutcome| matches!(o, TrialOutcome::Stops { levels, clicks: 2, repeat: 0 | 1, .. } if levels == &[1, 1]);
