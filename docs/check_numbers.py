@@ -24,7 +24,7 @@ import sys
 import tempfile
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
-PAGES = ["README.md", "docs/accuracy.md", "docs/guide.md"]
+PAGES = ["README.md", "docs/accuracy.md", "docs/guide.md", "docs/reference.md"]
 TABLE = "fixtures/human-table.csv"
 MARK = re.compile(r"<!--=(?P<key>[\w.-]+)-->(?P<text>.*?)<!--/-->", re.DOTALL)
 NUMBER = re.compile(r"\d+(?:,\d{3})*(?:\.\d+)?")

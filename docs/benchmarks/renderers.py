@@ -5,7 +5,7 @@
     renderers.py show OUT
 
 `run` renders every source twice, with two seeds, into OUT/SOURCE-SEED; what is there already is not rendered again. Without
-SOURCE=SCENE, the Cornell box of fixtures/ through all of them. `show` prints the table of docs/renderers.md and writes
+SOURCE=SCENE, the Cornell box of fixtures/ through all of them. `show` prints a table and writes
 OUT/renderers.png: pictures above, stop maps below.
 
 Noise that is left is measured, not taken from the oracle: two runs that share no random number differ by it, and the deviation of

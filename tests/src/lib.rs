@@ -1,10 +1,10 @@
 //! Tests that cross crates: see `tests/`. Implementers find `check_source` in `noisefloor-testkit`.
 
-/// The Rust blocks of README and guide, run as doctests.
+/// The Rust blocks of README and docs, run as doctests.
 #[cfg(doctest)]
 mod documents {
     #[doc = include_str!("../../README.md")]
     struct Readme;
-    #[doc = include_str!("../../docs/guide.md")]
-    struct Guide;
+    #[doc = include_str!("../../docs/embedding.md")]
+    struct Embedding;
 }
