@@ -62,7 +62,7 @@ pub(crate) fn checkpoint_seeds() -> Vec<Vec<u8>> {
 }
 
 fn fresh() -> Session<FixedSpp> {
-    let params = Params { tile: 16, ..Params::default() };
+    let params = Params::default().with_tile(16);
     Session::new(20, 16, FixedSpp(1000), params).expect("a small picture")
 }
 

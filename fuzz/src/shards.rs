@@ -42,7 +42,7 @@ pub(crate) fn shard_seeds() -> Vec<Vec<u8>> {
 }
 
 fn session(blocks: usize) -> Session<FixedSpp> {
-    let params = Params { tile: 32, blocks, ..Params::default() };
+    let params = Params::default().with_tile(32).with_blocks(blocks);
     Session::new(40, 32, FixedSpp(100), params).expect("a small picture")
 }
 

@@ -48,7 +48,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     for scene in SCENES {
         let converged = |seed| -> Result<Vec<Rgb>, Box<dyn Error>> {
             let schedule = Schedule::Every { step: CONVERGED };
-            let params = Params { schedule, max_spp: CONVERGED, ..Params::default() };
+            let params = Params::default().with_schedule(schedule).with_max_spp(CONVERGED);
             let mut driver = Driver::new(source(scene, seed)?, FixedSpp(CONVERGED), params)?;
             driver.run(|_, _| ())?;
             Ok(driver.session().film().image())
@@ -57,7 +57,11 @@ fn main() -> Result<(), Box<dyn Error>> {
         let truth: Vec<Rgb> =
             one.iter().zip(&other).map(|(a, b)| std::array::from_fn(|c| 0.5 * (a[c] + b[c]))).collect();
         for (guard, min_spp, consecutive) in [("none", 100, 1), ("--consecutive 3", 100, 3)] {
-            let params = Params { tile: TILE, min_spp, consecutive, max_spp: MOST, ..Params::default() };
+            let params = Params::default()
+                .with_tile(TILE)
+                .with_min_spp(min_spp)
+                .with_consecutive(consecutive)
+                .with_max_spp(MOST);
             let (mut tiles, mut samples, mut stopped) = (0, 0, Vec::new());
             for seed in 0..seeds {
                 let mut driver = Driver::new(source(scene, seed)?, Oracle::bundled(), params)?;

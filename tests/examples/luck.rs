@@ -4,8 +4,8 @@
 #![allow(clippy::print_stdout, reason = "an example prints")]
 
 use noisefloor::{
-    Batch, Counts, Driver, Oracle, Params, ProgressiveSource, Repeats, Request, Rgb, Schedule, SourceError,
-    SourceInfo, Unit, descriptor::NoiseMask, display::Display,
+    Batch, Driver, Oracle, Params, ProgressiveSource, Request, Rgb, Schedule, SourceError, SourceInfo,
+    descriptor::NoiseMask, display::Display,
 };
 use std::error::Error;
 
@@ -72,8 +72,7 @@ impl Rare {
 impl ProgressiveSource for Rare {
     fn info(&self) -> SourceInfo {
         let (width, height) = (2 * self.edge, 2 * self.edge);
-        let (unit, repeats) = (Unit::SamplesPerPixel, Repeats::Nothing);
-        SourceInfo { name: "rare".into(), width, height, unit, aims: true, repeats, counts: Counts::Asked }
+        SourceInfo::new("rare", width, height)
     }
 
     fn sample(&mut self, requests: &[Request]) -> Result<Vec<Batch>, SourceError> {
@@ -154,14 +153,12 @@ fn main() -> Result<(), Box<dyn Error>> {
         for &chance in &chances {
             for edge in [32, 128] {
                 for (guard, schedule, min_spp, consecutive) in guards {
-                    let params = Params {
-                        tile: edge,
-                        schedule,
-                        min_spp,
-                        consecutive,
-                        max_spp: MOST,
-                        ..Params::default()
-                    };
+                    let params = Params::default()
+                        .with_tile(edge)
+                        .with_schedule(schedule)
+                        .with_min_spp(min_spp)
+                        .with_consecutive(consecutive)
+                        .with_max_spp(MOST);
                     let mut runs = Vec::new();
                     for seed in 0..seeds {
                         let source = Rare { edge, place, chance, seed: seed * 0x1_0000_0001 + 1, found: 0 };

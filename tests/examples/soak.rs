@@ -18,7 +18,7 @@ const WARM_UP: u64 = 5;
 
 /// Decisions and picture of one render, as one number.
 fn render(source: &mut impl ProgressiveSource, oracle: &Oracle) -> Result<u64, Box<dyn Error>> {
-    let params = Params { tile: 32, max_spp: 1500, ..Params::default() };
+    let params = Params::default().with_tile(32).with_max_spp(1500);
     let mut driver = Driver::new(Borrowed(source), oracle.clone(), params)?;
     driver.run(|_, _| ())?;
     let mut hasher = DefaultHasher::new();

@@ -92,7 +92,11 @@ fn render<C: StoppingCriterion>(
 ) -> Result<Session<C>, Box<dyn Error>> {
     let scene = scenes::by_name(name).ok_or_else(|| format!("no built-in scene {name:?}"))?;
     let source = Ptwne::new(scene, EDGE, EDGE, RenderOptions { seed, ..RenderOptions::default() })?;
-    let mut driver = Driver::new(source, criterion, Params { tile, blocks, max_spp, ..Params::default() })?;
+    let mut driver = Driver::new(
+        source,
+        criterion,
+        Params::default().with_tile(tile).with_blocks(blocks).with_max_spp(max_spp),
+    )?;
     driver.run(|_, _| ())?;
     Ok(driver.into_parts().1)
 }

@@ -21,15 +21,15 @@ const MOST: u64 = 600;
 
 /// What is compared: a name, and what is set.
 fn rules() -> Vec<(&'static str, Params)> {
-    let params = Params { tile: TILE, max_spp: MOST, min_spp: 0, ..Params::default() };
-    let every = |step| Params { schedule: Schedule::Every { step }, ..params };
-    let fine = |min_spp, consecutive| Params { min_spp, consecutive, ..params };
+    let params = Params::default().with_tile(TILE).with_max_spp(MOST).with_min_spp(0);
+    let every = |step| params.with_schedule(Schedule::Every { step });
+    let fine = |min_spp, consecutive| params.with_min_spp(min_spp).with_consecutive(consecutive);
     vec![
         ("every 100", every(100)),
         ("every 20", every(20)),
-        ("every 20, from 100", Params { min_spp: 100, ..every(20) }),
+        ("every 20, from 100", every(20).with_min_spp(100)),
         ("every 10", every(10)),
-        ("every 10, from 50", Params { min_spp: 50, ..every(10) }),
+        ("every 10, from 50", every(10).with_min_spp(50)),
         ("fine, from 20", fine(20, 1)),
         ("fine, from 50", fine(50, 1)),
         ("fine, from 100", fine(100, 1)),
@@ -128,8 +128,8 @@ fn watch(
         |params| Session::new(EDGE, EDGE, Counting { oracle: Oracle::bundled(), counts: Vec::new() }, params);
     let mut sessions = rules().into_iter().map(|rule| session(rule.1)).collect::<Result<Vec<_>, _>>()?;
     let schedule = Schedule::Every { step: STEP };
-    let params = Params { tile: TILE, schedule, min_spp: 0, max_spp: MOST, ..Params::default() };
-    let mut onlooker = session(Params { consecutive: u32::MAX, ..params })?;
+    let params = Params::default().with_tile(TILE).with_schedule(schedule).with_min_spp(0).with_max_spp(MOST);
+    let mut onlooker = session(params.with_consecutive(u32::MAX))?;
     let tiles: Vec<Tile> = onlooker.film().grid().tiles().collect();
     for step in 0..(MOST / STEP) as usize {
         for half in 0..2 {
@@ -146,7 +146,7 @@ fn watch(
         onlooker.judge()?;
         for session in &mut sessions {
             if let (None, Some(display)) = (session.display(), onlooker.display()) {
-                session.set_display(*display);
+                session.set_display(*display)?;
             }
             session.judge()?;
         }

@@ -117,16 +117,15 @@ impl NfParams {
             // SAFETY: not null, so it leads to text.
             unsafe { border::text(self.viewing, "viewing") }?.parse()?
         };
-        Ok(Params {
-            tile: self.tile as usize,
-            tone_mapping,
-            viewing,
-            schedule,
-            min_spp: self.min_spp,
-            max_spp: self.max_spp,
-            consecutive: self.consecutive,
-            blocks: self.blocks as usize,
-            audience: Audience { slope: self.audience_slope, offset: self.audience_offset },
-        })
+        Ok(Params::default()
+            .with_tile(self.tile as usize)
+            .with_tone_mapping(tone_mapping)
+            .with_viewing(viewing)
+            .with_schedule(schedule)
+            .with_min_spp(self.min_spp)
+            .with_max_spp(self.max_spp)
+            .with_consecutive(self.consecutive)
+            .with_blocks(self.blocks as usize)
+            .with_audience(Audience { slope: self.audience_slope, offset: self.audience_offset }))
     }
 }

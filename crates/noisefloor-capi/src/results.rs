@@ -3,7 +3,7 @@
 use crate::border;
 use crate::session::NfSession;
 use crate::status::{Failure, NfStatus, guard};
-use noisefloor::StopReason;
+use noisefloor::{StopReason, session::Interruption};
 
 /// The tile is open: it gets more samples.
 pub const NF_REASON_OPEN: u32 = 0;
@@ -105,9 +105,9 @@ pub unsafe extern "C" fn nf_session_close_all(session: *const NfSession, reason:
         // SAFETY: promised by the caller.
         let session = unsafe { border::object(session, "session") }?;
         let reason = match reason {
-            NF_REASON_TIME_LIMIT => StopReason::TimeLimit,
-            NF_REASON_CANCELLED => StopReason::Cancelled,
-            NF_REASON_FAILED => StopReason::Failed,
+            NF_REASON_TIME_LIMIT => Interruption::TimeLimit,
+            NF_REASON_CANCELLED => Interruption::Cancelled,
+            NF_REASON_FAILED => Interruption::Failed,
             other => {
                 let message = format!("{other} is no reason for a caller to end tiles");
                 return Err(Failure::new(NfStatus::Argument, message));

@@ -132,7 +132,7 @@ fn open(session: &Handle) -> usize {
 
 #[test]
 fn stops_and_picture_are_those_of_rust_whatever_the_number_of_threads() {
-    let rust = Params { tile: EDGE, max_spp: 400, ..Params::default() };
+    let rust = Params::default().with_tile(EDGE).with_max_spp(400);
     let mut expected = Session::new(WIDTH, HEIGHT, Oracle::bundled(), rust).unwrap();
     while !expected.is_done() {
         for request in expected.requests() {

@@ -81,9 +81,14 @@ fn measure(name: &str, size: usize, tile: usize, reference: u64) -> Result<(), B
     {
         let criterion = Known { oracle: Oracle::bundled(), film: known.then_some(&converged), until: None };
         let schedule = Schedule::Every { step };
-        let params = Params { tile, blocks, schedule, min_spp: 0, max_spp: MOST, ..Params::default() };
+        let params = Params::default()
+            .with_tile(tile)
+            .with_blocks(blocks)
+            .with_schedule(schedule)
+            .with_min_spp(0)
+            .with_max_spp(MOST);
         let mut driver = Driver::new(source(name, size, 1)?, criterion, params)?;
-        driver.session_mut().set_display(display);
+        driver.session_mut().set_display(display)?;
         driver.run(|_, _| ())?;
         let Clock { criterion_seconds, total_seconds, .. } = driver.clock();
         let film = driver.session().film();
@@ -166,7 +171,12 @@ fn compare_means(name: &str, seeds: u64) -> Result<(), Box<dyn Error>> {
 fn count_only(name: &str, blocks: usize, seed: u64) -> Result<Film, Box<dyn Error>> {
     let criterion = Known { oracle: Oracle::bundled(), film: None, until: Some(UNTIL) };
     let schedule = Schedule::Every { step: 32 };
-    let params = Params { tile: 64, blocks, schedule, min_spp: 0, max_spp: UNTIL, ..Params::default() };
+    let params = Params::default()
+        .with_tile(64)
+        .with_blocks(blocks)
+        .with_schedule(schedule)
+        .with_min_spp(0)
+        .with_max_spp(UNTIL);
     let mut driver = Driver::new(source(name, 64, seed)?, criterion, params)?;
     driver.run(|_, _| ())?;
     Ok(driver.into_parts().1.into_film().0)
@@ -204,7 +214,7 @@ impl StoppingCriterion for Known<'_> {
     fn judge(&mut self, view: &View<'_>, tiles: &[Tile]) -> Result<Vec<Verdict>, CriterionError> {
         let Some(until) = self.until else { return self.oracle.judge(view, tiles) };
         let enough = |tile: &Tile| view.film.spp(tile.index) >= until;
-        Ok(tiles.iter().map(|tile| Verdict { converged: enough(tile), ..Verdict::default() }).collect())
+        Ok(tiles.iter().map(|tile| Verdict::new(enough(tile))).collect())
     }
 }
 

@@ -113,7 +113,7 @@ impl<D: Denoiser> StoppingCriterion for DenoisedQuality<D> {
     }
 
     fn needs(&self) -> Needs {
-        Needs { halves: true, reference: false }
+        Needs::HALVES
     }
 
     fn judge(&mut self, view: &View<'_>, tiles: &[Tile]) -> Result<Vec<Verdict>, CriterionError> {
@@ -185,7 +185,7 @@ fn judge_tile(view: &View<'_>, error: &DenoisedError, tile: Tile, limit: f64, ey
     let evidence = view.film.unsampled_pixels(tile.index) <= tile.pixels() / NO_EVIDENCE;
     let converged = evidence && now <= limit;
     let expected_spp = if converged { Some(spp) } else { expected_spp };
-    Judged { verdict: Verdict { converged, expected_spp, ..Verdict::default() }, lost: now, needed_without }
+    Judged { verdict: Verdict::new(converged).expecting(expected_spp), lost: now, needed_without }
 }
 
 /// The noise of a tile of the film, as displayed.

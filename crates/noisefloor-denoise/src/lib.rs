@@ -24,7 +24,7 @@
 //! }
 //!
 //! let criterion = DenoisedQuality::new(Rows, DEFAULT_JODS_LOST);
-//! let params = Params { tile: 32, min_spp: 16, schedule: Schedule::Growing { step: 16 }, ..Params::default() };
+//! let params = Params::default().with_tile(32).with_min_spp(16).with_schedule(Schedule::Growing { step: 16 });
 //! let mut session = Session::new(64, 64, criterion, params)?;
 //! while !session.is_done() {
 //!     for request in session.requests() {

@@ -21,7 +21,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     // One verdict, at the end, since the cost of verdicts is known
     let most = layers * 16;
     let schedule = Schedule::Every { step: most };
-    let params = Params { schedule, min_spp: most, max_spp: most, ..Params::default() };
+    let params = Params::default().with_schedule(schedule).with_min_spp(most).with_max_spp(most);
     let mut session = Session::new(width, height, Oracle::bundled(), params)?;
     let job = ShardJob::of(SourceIdentity::new("noise"), &session);
 

@@ -15,7 +15,7 @@
 //! use noisefloor_farm::{PlannedBatch, ShardJob, ShardSet, sample, split};
 //! use noisefloor_ptwne::{Ptwne, RenderOptions, scenes};
 //!
-//! let (criterion, params) = (FixedSpp(100), Params { tile: 32, ..Params::default() });
+//! let (criterion, params) = (FixedSpp(100), Params::default().with_tile(32));
 //! let mut source = Ptwne::new(scenes::by_name("bulb").unwrap(), 64, 32, RenderOptions::default())?;
 //! let mut session = Session::new(64, 32, criterion, params)?;
 //! let job = ShardJob::new(&source, &session)?;

@@ -3,7 +3,7 @@
 use crate::batch::PlannedBatch;
 use crate::error::FarmError;
 use crate::shard::{BatchEntry, ShardFile, ShardJob};
-use noisefloor::{Request, Rgb, Session, StopReason, StoppingCriterion, source::BlockRequest};
+use noisefloor::{Request, Rgb, Session, StoppingCriterion, session::Interruption, source::BlockRequest};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -138,7 +138,7 @@ impl ShardSet {
                 let tile = request.tile.index;
                 merged.batches += 1;
                 match &by_blocks {
-                    _ if spp == 0 => drop(session.close(tile, StopReason::SourceExhausted)),
+                    _ if spp == 0 => drop(session.close(tile, Interruption::SourceExhausted)),
                     Some(by_blocks) => session.push_blocks(by_blocks, &mean)?,
                     None => session.push(tile, spp, &mean)?,
                 }

@@ -6,7 +6,7 @@ use crate::frames::{self, Frame, Layout};
 use crate::picture::LinearImage;
 use crate::read::read_picture;
 use noisefloor::{
-    Batch, Counts, ProgressiveSource, Repeats, Request, Rgb, SourceError, SourceInfo, Tile, Unit,
+    Batch, Counts, ProgressiveSource, Repeats, Request, Rgb, SourceError, SourceInfo, Tile,
     source::SourceIdentity,
 };
 use std::collections::VecDeque;
@@ -166,15 +166,9 @@ impl StackSource {
 
 impl ProgressiveSource for StackSource {
     fn info(&self) -> SourceInfo {
-        SourceInfo {
-            name: self.name.clone(),
-            width: self.width,
-            height: self.height,
-            unit: Unit::SamplesPerPixel,
-            aims: true,
-            repeats: Repeats::Samples,
-            counts: Counts::Stored,
-        }
+        SourceInfo::new(self.name.clone(), self.width, self.height)
+            .with_repeats(Repeats::Samples)
+            .with_counts(Counts::Stored)
     }
 
     /// Reads every picture once, for its digest.

@@ -11,8 +11,7 @@ use crate::rng::Key;
 use crate::sampler::{Sampler, Sampling};
 use crate::scene::Scene;
 use noisefloor::{
-    Batch, Counts, ProgressiveSource, Repeats, Request, Rgb, SourceError, SourceInfo, Tile, ToneMapping,
-    Unit,
+    Batch, ProgressiveSource, Repeats, Request, Rgb, SourceError, SourceInfo, Tile, ToneMapping,
     display::Display,
     source::{BlockRequest, BlockSamples, FirstHits, Reference, SourceIdentity},
 };
@@ -342,15 +341,8 @@ struct Job<'a> {
 
 impl ProgressiveSource for Ptwne {
     fn info(&self) -> SourceInfo {
-        SourceInfo {
-            name: format!("ptwne {}", self.scene.name()),
-            width: self.width,
-            height: self.height,
-            unit: Unit::SamplesPerPixel,
-            aims: true,
-            counts: Counts::Asked,
-            repeats: Repeats::Samples,
-        }
+        SourceInfo::new(format!("ptwne {}", self.scene.name()), self.width, self.height)
+            .with_repeats(Repeats::Samples)
     }
 
     /// Never fails.

@@ -144,17 +144,16 @@ impl PyParams {
                 return Err(ParameterError::new_err(message));
             }
         };
-        let params = Params {
-            tile,
-            tone_mapping: self::tone_mapping(tone_mapping, key, white, exposure)?,
-            viewing: ViewingLike::checked(viewing)?,
-            schedule,
-            min_spp,
-            max_spp,
-            consecutive,
-            audience: audience.map_or(Audience::TRAINED, |(slope, offset)| Audience { slope, offset }),
-            blocks,
-        };
+        let params = Params::default()
+            .with_tile(tile)
+            .with_tone_mapping(self::tone_mapping(tone_mapping, key, white, exposure)?)
+            .with_viewing(ViewingLike::checked(viewing)?)
+            .with_schedule(schedule)
+            .with_min_spp(min_spp)
+            .with_max_spp(max_spp)
+            .with_consecutive(consecutive)
+            .with_audience(audience.map_or(Audience::TRAINED, |(slope, offset)| Audience { slope, offset }))
+            .with_blocks(blocks);
         params.check().map_err(Raise::raise)?;
         Ok(Self(params))
     }

@@ -6,7 +6,9 @@ use crate::oracle::PyOracle;
 use crate::params::PyParams;
 use crate::pool;
 use crate::verdicts::{PyBlocks, PyRequest, PyStop, PyVerdict, TileLike};
-use noisefloor::{Checkpoint, Oracle, Params, Request, Rgb, Session, StopReason, Tile, TileGrid};
+use noisefloor::{
+    Checkpoint, Oracle, Params, Request, Rgb, Session, StopReason, Tile, TileGrid, session::Interruption,
+};
 use numpy::{PyArray2, PyArray3};
 use pyo3::prelude::*;
 use pyo3::sync::MutexExt;
@@ -222,8 +224,8 @@ impl PySession {
     ///
     /// Raises ParameterError for any other reason.
     fn close_all(&self, py: Python<'_>, reason: &str) -> PyResult<Vec<PyStop>> {
-        let reasons = [StopReason::TimeLimit, StopReason::Cancelled, StopReason::Failed];
-        let found = reasons.into_iter().find(|known| known.to_string() == reason);
+        let reasons = [Interruption::TimeLimit, Interruption::Cancelled, Interruption::Failed];
+        let found = reasons.into_iter().find(|&known| StopReason::from(known).to_string() == reason);
         let unknown = || ParameterError::new_err(format!("{reason:?} is no reason to end tiles"));
         let reason = found.ok_or_else(unknown)?;
         Ok(self.attached(py)?.close_all(reason).into_iter().map(PyStop::from).collect())

@@ -45,7 +45,7 @@ impl StoppingCriterion for ConvergedCvvdp {
     }
 
     fn needs(&self) -> Needs {
-        Needs { halves: false, reference: true }
+        Needs::REFERENCE
     }
 
     fn judge(&mut self, view: &View<'_>, tiles: &[Tile]) -> Result<Vec<Verdict>, CriterionError> {
@@ -60,7 +60,7 @@ impl StoppingCriterion for ConvergedCvvdp {
         let jods = jods.unwrap_or_else(|_| vec![0.0; tiles.len()]);
         let judge = |jod: f64| {
             let lost = 10.0 - jod;
-            Verdict { probability: Some((1.0 - lost).max(0.0) as f32), ..verdict(lost <= self.lost, None) }
+            verdict(lost <= self.lost, None).with_probability((1.0 - lost).max(0.0) as f32)
         };
         Ok(jods.into_iter().map(judge).collect())
     }

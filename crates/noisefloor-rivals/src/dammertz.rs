@@ -149,7 +149,7 @@ impl StoppingCriterion for Dammertz {
     }
 
     fn needs(&self) -> Needs {
-        Needs { halves: true, reference: false }
+        Needs::HALVES
     }
 
     fn judge(&mut self, view: &View<'_>, tiles: &[Tile]) -> Result<Vec<Verdict>, CriterionError> {

@@ -28,8 +28,7 @@
 //!
 //! ```
 //! use noisefloor::{
-//!     Batch, Counts, Driver, DriverError, Params, ProgressiveSource, Repeats, Request, SourceError, SourceInfo,
-//!     StopReason, Unit,
+//!     Batch, Driver, Params, ProgressiveSource, Request, SourceError, SourceInfo, StopReason,
 //! };
 //! use noisefloor_testkit::Noise;
 //!
@@ -37,8 +36,7 @@
 //! struct Wall(Noise);
 //! impl ProgressiveSource for Wall {
 //!     fn info(&self) -> SourceInfo {
-//!         let (name, unit, repeats) = ("wall".into(), Unit::SamplesPerPixel, Repeats::Nothing);
-//!         SourceInfo { name, width: 32, height: 32, unit, aims: true, repeats, counts: Counts::Asked }
+//!         SourceInfo::new("wall", 32, 32)
 //!     }
 //!     fn sample(&mut self, requests: &[Request]) -> Result<Vec<Batch>, SourceError> {
 //!         let mut flicker = |spp: u64| 0.2 + (self.0.uniform() - 0.5) / (spp as f64).sqrt();
@@ -51,7 +49,7 @@
 //! }
 //!
 //! let criterion = noisefloor_rivals::parse("relative-error:0.1")?;
-//! let mut driver = Driver::new(Wall(Noise::new(1)), criterion, Params { tile: 32, ..Params::default() })?;
+//! let mut driver = Driver::new(Wall(Noise::new(1)), criterion, Params::default().with_tile(32))?;
 //! driver.run(|_, _| ())?;
 //! // 1.96·σ/√n ≤ 10 % of 0.2 for σ² = 1/12 at n = 800 if σ is known; 95 % of pixels take some more.
 //! let stop = driver.session().stops().next().ok_or("one tile")?;

@@ -8,7 +8,7 @@ pub(crate) const DEFAULT_SHARE: f64 = 0.95;
 
 /// A verdict without a probability.
 pub(crate) fn verdict(converged: bool, expected_spp: Option<u64>) -> Verdict {
-    Verdict { converged, expected_spp, ..Verdict::default() }
+    Verdict::new(converged).expecting(expected_spp)
 }
 
 /// Whether `passed` of `pixels` are at least the share.

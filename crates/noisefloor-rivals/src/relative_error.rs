@@ -126,7 +126,7 @@ impl StoppingCriterion for RelativeError {
     }
 
     fn needs(&self) -> Needs {
-        Needs { halves: true, reference: false }
+        Needs::HALVES
     }
 
     fn judge(&mut self, view: &View<'_>, tiles: &[Tile]) -> Result<Vec<Verdict>, CriterionError> {

@@ -65,7 +65,7 @@ fn verdicts(map: Option<&[f32]>, width: usize, tiles: &[Tile], limit: f64, share
         let within = ((1.0 - share) * values.len() as f64).ceil() as usize;
         let place = within.clamp(1, values.len()) - 1;
         let (_, &mut least, _) = values.select_nth_unstable_by(place, f32::total_cmp);
-        Verdict { probability: Some(1.0 - least), ..verdict(f64::from(least) <= limit, None) }
+        verdict(f64::from(least) <= limit, None).with_probability(1.0 - least)
     };
     tiles.iter().map(judge).collect()
 }

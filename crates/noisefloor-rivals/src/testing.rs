@@ -1,8 +1,8 @@
 //! Films and sources of known noise, for tests.
 
 use noisefloor::{
-    Batch, Counts, Film, ProgressiveSource, Repeats, Request, Rgb, SourceError, SourceInfo, TileGrid, Unit,
-    Viewing, criterion::View, display::Display,
+    Batch, Film, ProgressiveSource, Repeats, Request, Rgb, SourceError, SourceInfo, TileGrid, Viewing,
+    criterion::View, display::Display,
 };
 use noisefloor_testkit::Noise;
 
@@ -50,15 +50,7 @@ pub(crate) struct NoisySource {
 
 impl ProgressiveSource for NoisySource {
     fn info(&self) -> SourceInfo {
-        SourceInfo {
-            name: "noise".into(),
-            width: self.edge,
-            height: self.edge,
-            unit: Unit::SamplesPerPixel,
-            aims: true,
-            repeats: Repeats::Calls,
-            counts: Counts::Asked,
-        }
+        SourceInfo::new("noise", self.edge, self.edge).with_repeats(Repeats::Calls)
     }
 
     fn sample(&mut self, requests: &[Request]) -> Result<Vec<Batch>, SourceError> {

@@ -20,7 +20,7 @@ const SPECS: [&str; 8] = [
 fn drive(spec: &str, sigma: f64) -> Vec<Stop> {
     let picture = |x: usize, y: usize| 0.05 + 0.01 * x as f64 + if y > 40 { 0.3 } else { 0.0 };
     let source = NoisySource { edge: 64, picture, sigma };
-    let params = Params { tile: 32, max_spp: 20_000, ..Params::default() };
+    let params = Params::default().with_tile(32).with_max_spp(20_000);
     let mut driver = Driver::new(source, parse(spec).unwrap(), params).unwrap();
     driver.run(|_, _| ()).unwrap();
     driver.session().stops().collect()

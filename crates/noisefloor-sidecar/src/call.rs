@@ -70,8 +70,8 @@ pub(crate) fn describe(hello: Hello) -> Result<Described, Blame> {
         return Err(wrong("it has no name".to_owned()));
     }
     let warnings = warnings.iter().map(|warning| printable(warning).into_owned()).collect();
-    let counts = if late { Counts::Late } else { Counts::Asked };
-    let info = SourceInfo { name, width, height, unit, aims: true, repeats, counts };
+    let counts = if late > 0 { Counts::Late { overrun: late } } else { Counts::Asked };
+    let info = SourceInfo::new(name, width, height).with_unit(unit).with_repeats(repeats).with_counts(counts);
     let blocks = blocks && counts == Counts::Asked;
     Ok(Described { info, blocks, warnings })
 }

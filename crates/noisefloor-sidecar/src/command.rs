@@ -6,7 +6,7 @@ use crate::picture_run::PictureRun;
 use crate::renderer::DEFAULT_TIMEOUT;
 use crate::template::Template;
 use noisefloor::{
-    Batch, Counts, ProgressiveSource, Repeats, Request, SourceError, SourceInfo, Tile, Unit,
+    Batch, ProgressiveSource, Request, SourceError, SourceInfo, Tile,
     internal::{check_image, printable},
     source::SourceIdentity,
     watch::LightCheck,
@@ -81,15 +81,7 @@ impl CommandSource {
         let typed = template;
         let template = Template::renderer(template, options.scene.is_some())?;
         let stem = Path::new(template.program()).file_stem().unwrap_or_default().to_string_lossy();
-        let info = SourceInfo {
-            name: format!("command {}", printable(&stem)),
-            width: 0,
-            height: 0,
-            unit: Unit::SamplesPerPixel,
-            aims: template.aims(),
-            repeats: Repeats::Nothing,
-            counts: Counts::Asked,
-        };
+        let info = SourceInfo::new(format!("command {}", printable(&stem)), 0, 0).with_aims(template.aims());
         let about = format!("command {typed}, seed {}", options.seed);
         let identity = match &options.scene {
             Some(scene) => contents(scene, about)

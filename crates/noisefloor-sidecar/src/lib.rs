@@ -44,7 +44,7 @@
 //! `init` has `protocol` (1), `scene`, `seed`, `width`, `height`, `max_depth`, `threads` (or null) and
 //! `options`. `sample` has `tiles`, each with `index`, `x`, `y`, `width`, `height`, `first` and `samples`;
 //! the reply's `samples` has a count for each: at most as many as requested, unless `late` in the reply to
-//! `init` says that the renderer cannot stop in time.
+//! `init` says how many samples, over all pixels of a tile, the renderer takes before it can stop.
 //!
 //! A host that filters pictures gets `init` with `protocol` and `threads` only, and replies with its `name`. `filter`
 //! has `width`, `height` and `pictures`, the names of the pictures in the payload.

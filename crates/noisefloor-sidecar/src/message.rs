@@ -52,9 +52,10 @@ pub(crate) struct Hello {
     pub(crate) height: usize,
     pub(crate) unit: Unit,
     pub(crate) repeats: Repeats,
-    /// Whether it may give more samples than requested, because it cannot stop in time.
+    /// Samples that it may give beyond those requested, over all pixels of a tile, because it cannot stop in
+    /// time.
     #[serde(default)]
-    pub(crate) late: bool,
+    pub(crate) late: u64,
     /// Whether it takes requests for parts of tiles, each with samples of its own.
     #[serde(default)]
     pub(crate) blocks: bool,

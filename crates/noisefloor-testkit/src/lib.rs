@@ -10,7 +10,7 @@
 //!   the thing must be there.
 //!
 //! ```
-//! use noisefloor::{Batch, Counts, ProgressiveSource, Repeats, Request, SourceError, SourceInfo, Unit};
+//! use noisefloor::{Batch, ProgressiveSource, Repeats, Request, SourceError, SourceInfo};
 //! use noisefloor_testkit::{Noise, check_source};
 //!
 //! /// A grey wall, as a path tracer might see it.
@@ -20,8 +20,7 @@
 //!
 //! impl ProgressiveSource for Wall {
 //!     fn info(&self) -> SourceInfo {
-//!         let (unit, repeats) = (Unit::SamplesPerPixel, Repeats::Samples);
-//!         SourceInfo { name: "wall".into(), width: 48, height: 40, unit, aims: true, repeats, counts: Counts::Asked }
+//!         SourceInfo::new("wall", 48, 40).with_repeats(Repeats::Samples)
 //!     }
 //!
 //!     fn sample(&mut self, requests: &[Request]) -> Result<Vec<Batch>, SourceError> {

@@ -40,11 +40,19 @@ impl<'a> View<'a> {
 
 /// What a criterion reads besides the mean picture; nothing else is kept or rendered.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Needs {
     /// Two half buffers.
     pub halves: bool,
     /// A quick noise-free reference.
     pub reference: bool,
+}
+
+impl Needs {
+    /// Two half buffers.
+    pub const HALVES: Self = Self { halves: true, reference: false };
+    /// A quick noise-free reference.
+    pub const REFERENCE: Self = Self { halves: false, reference: true };
 }
 
 /// Where people are expected to stop seeing noise in a tile: not where the tile stops, which is later, and said by
@@ -61,6 +69,7 @@ pub struct ExpectedThreshold {
 
 /// What a criterion says about one tile.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct Verdict {
     /// Whether the tile needs no more samples.
     pub converged: bool,
@@ -77,6 +86,23 @@ pub struct Verdict {
     /// What `probability` would be without the penalty for an unfamiliar tile; equal to it where there is no
     /// penalty.
     pub probability_without_penalty: Option<f32>,
+}
+
+impl Verdict {
+    /// A verdict of a criterion that expects nothing and computes no probability.
+    pub fn new(converged: bool) -> Self {
+        Self { converged, ..Self::default() }
+    }
+
+    /// The same with [`Verdict::expected_spp`].
+    pub fn expecting(self, expected_spp: Option<u64>) -> Self {
+        Self { expected_spp, ..self }
+    }
+
+    /// The same with [`Verdict::probability`], which no unfamiliar texture has lowered.
+    pub fn with_probability(self, probability: f32) -> Self {
+        Self { probability: Some(probability), ..self }
+    }
 }
 
 /// Why a criterion could not judge.

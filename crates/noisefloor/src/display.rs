@@ -68,16 +68,13 @@ pub enum ToneMappingError {
         /// Its value.
         value: f32,
     },
-    /// A curve was read from a file, which cannot hold its function.
-    #[error("a tone curve that comes from a file has lost its function: make it again with ToneCurve::new")]
-    Incomplete,
 }
 
 impl ToneMapping {
     /// Checks the parameters.
     ///
     /// # Errors
-    /// [`ToneMappingError`] if one is not a positive finite number, or a curve has lost its function.
+    /// [`ToneMappingError`] if one is not a positive finite number.
     pub fn check(&self) -> Result<(), ToneMappingError> {
         let positive = |name, value: f32| {
             if value.is_finite() && value > 0.0 {
@@ -92,7 +89,6 @@ impl ToneMapping {
                 white.map_or(Ok(()), |w| positive("the white point of Reinhard tone mapping", w))
             }
             Self::Srgb { exposure } => positive("the sRGB exposure", exposure),
-            Self::Custom { curve, .. } if !curve.is_complete() => Err(ToneMappingError::Incomplete),
             Self::Custom { exposure, .. } => positive("the exposure of a tone curve", exposure),
         }
     }
@@ -209,18 +205,6 @@ impl Display {
         self.map_plain(pixel).map(srgb_encode)
     }
 
-    /// The same display with the function of `tone`, if it has lost its own in a file. `None` if its own is
-    /// another one.
-    pub(crate) fn completed_by(self, tone: ToneMapping) -> Option<Self> {
-        match (self.curve, tone) {
-            (Curve::Custom(lost), ToneMapping::Custom { curve, .. }) if lost == curve => {
-                Some(Self { curve: Curve::Custom(curve), ..self })
-            }
-            (Curve::Custom(_), _) => None,
-            _ => Some(self),
-        }
-    }
-
     /// Linear radiance → display-encoded Rec.709 luminance in [0, 1]: the plane that observers are modelled
     /// on.
     #[inline(always)]
@@ -269,7 +253,7 @@ mod tests {
 
     #[test]
     fn a_curve_of_the_caller_s_own_shows_what_it_says() {
-        let curve = ToneCurve::new(b"root", &|exposed| exposed.map(f32::sqrt));
+        let curve = ToneCurve::new(b"root", |exposed| exposed.map(f32::sqrt));
         let tone = ToneMapping::Custom { exposure: 4.0, curve };
         assert_eq!(tone.check(), Ok(()));
         let display = tone.settle(&[[7.0; 3]]);
@@ -323,7 +307,7 @@ mod tests {
         for width in [1, 7, 8, 127, 128, 129, 300] {
             let row: Vec<Rgb> =
                 (0..width).map(|i| [radiance(i), radiance(2 * i + 1), radiance(3 * i + 5)]).collect();
-            let curve = ToneCurve::new(b"root", &|exposed| exposed.map(f32::sqrt));
+            let curve = ToneCurve::new(b"root", |exposed| exposed.map(f32::sqrt));
             let custom = ToneMapping::Custom { exposure: 2.0, curve };
             for tone in [ToneMapping::default(), ToneMapping::Srgb { exposure: 2.0 }, custom] {
                 let (display, mut shown) = (tone.settle(&row), vec![0.0; width]);

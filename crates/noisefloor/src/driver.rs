@@ -6,8 +6,8 @@ use crate::criterion::{CriterionError, Resumable, StoppingCriterion};
 use crate::film::FilmError;
 use crate::params::Params;
 use crate::session::rounds::CALL_SAMPLES;
+use crate::session::{Interruption, Stop};
 use crate::session::{Session, SessionError};
-use crate::session::{Stop, StopReason};
 use crate::source::{Batch, ProgressiveSource, Repeats, Request, SourceError};
 use crate::watch::LightCheck;
 use serde::{Deserialize, Serialize};
@@ -82,22 +82,22 @@ pub struct Clock {
 ///
 /// ```
 /// use noisefloor::{
-///     Batch, Counts, Driver, DriverError, Event, FixedSpp, Params, ProgressiveSource, Repeats, Request, SourceError,
-///     SourceInfo, StopReason, Unit,
+///     Batch, Driver, DriverError, Event, FixedSpp, Params, ProgressiveSource, Request, SourceError, SourceInfo,
+///     StopReason,
 /// };
 ///
 /// /// A renderer of a grey wall.
 /// struct Wall;
 /// impl ProgressiveSource for Wall {
 ///     fn info(&self) -> SourceInfo {
-///         SourceInfo { name: "wall".into(), width: 64, height: 32, unit: Unit::SamplesPerPixel, aims: true, repeats: Repeats::Samples, counts: Counts::Asked }
+///         SourceInfo::new("wall", 64, 32)
 ///     }
 ///     fn sample(&mut self, requests: &[Request]) -> Result<Vec<Batch>, SourceError> {
 ///         Ok(requests.iter().map(|r| Batch { tile: r.tile, spp: r.spp, mean: vec![[0.2; 3]; r.tile.pixels()] }).collect())
 ///     }
 /// }
 ///
-/// let params = Params { tile: 32, ..Params::default() };
+/// let params = Params::default().with_tile(32);
 /// let mut driver = Driver::new(Wall, FixedSpp(300), params)?;
 /// driver.run(|_session, event| if let Event::TileStopped(stop) = event { println!("{} {}", stop.tile.index, stop.spp) })?;
 /// assert!(driver.session().stops().all(|stop| stop.spp == 300 && stop.reason == StopReason::ReachedSpp));
@@ -181,11 +181,11 @@ impl<S: ProgressiveSource, C: StoppingCriterion> Driver<S, C> {
     /// a stop.
     ///
     /// # Errors
-    /// [`DriverError`] if source or criterion fail; open tiles are then stopped with [`StopReason::Failed`].
+    /// [`DriverError`] if source or criterion fail; open tiles are then stopped with [`StopReason::Failed`](crate::StopReason::Failed).
     pub fn run(&mut self, mut on_event: impl FnMut(&Session<C>, &Event)) -> Result<(), DriverError> {
         let outcome = self.run_until_done(&mut on_event);
         if outcome.is_err() {
-            self.end_all(StopReason::Failed, &mut on_event);
+            self.end_all(Interruption::Failed, &mut on_event);
         }
         outcome
     }
@@ -198,13 +198,13 @@ impl<S: ProgressiveSource, C: StoppingCriterion> Driver<S, C> {
         }
         while !self.session.is_done() {
             if self.cancel.load(Ordering::Relaxed) {
-                self.end_all(StopReason::Cancelled, on_event);
+                self.end_all(Interruption::Cancelled, on_event);
                 break;
             }
             // One call is made even so: whoever resumes in short runs arrives one day.
             let begun = self.session.film().total_samples() > self.samples_before;
             if begun && self.time_limit.is_some_and(|limit| start.elapsed() >= limit) {
-                self.end_all(StopReason::TimeLimit, on_event);
+                self.end_all(Interruption::TimeLimit, on_event);
                 break;
             }
 
@@ -278,7 +278,7 @@ impl<S: ProgressiveSource, C: StoppingCriterion> Driver<S, C> {
     fn close_exhausted(&mut self, tiles: &[usize]) -> Vec<Stop> {
         let close = |&tile: &usize| match self.session.is_due(tile) {
             true => None,
-            false => self.session.close(tile, StopReason::SourceExhausted),
+            false => self.session.close(tile, Interruption::SourceExhausted),
         };
         tiles.iter().filter_map(close).collect()
     }
@@ -348,7 +348,7 @@ impl<S: ProgressiveSource, C: StoppingCriterion> Driver<S, C> {
         }
     }
 
-    fn end_all(&mut self, reason: StopReason, on_event: &mut impl FnMut(&Session<C>, &Event)) {
+    fn end_all(&mut self, reason: Interruption, on_event: &mut impl FnMut(&Session<C>, &Event)) {
         for stop in self.session.close_all(reason) {
             on_event(&self.session, &Event::TileStopped(stop));
         }

@@ -17,7 +17,7 @@
 //! ```
 //! use noisefloor::{Counts, Oracle, Params, Session, StopReason};
 //!
-//! let mut session = Session::new(64, 64, Oracle::bundled(), Params { tile: 32, ..Params::default() })?;
+//! let mut session = Session::new(64, 64, Oracle::bundled(), Params::default().with_tile(32))?;
 //! while !session.is_done() {
 //!     for request in session.requests() {
 //!         // A renderer of a grey wall, whose pixels differ by nothing: nobody sees noise.

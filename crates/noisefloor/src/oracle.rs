@@ -271,8 +271,8 @@ impl StoppingCriterion for Oracle {
 
     fn needs(&self) -> Needs {
         match self.model.evidence() {
-            Evidence::Halves => Needs { halves: true, reference: false },
-            Evidence::Reference => Needs { halves: false, reference: true },
+            Evidence::Halves => Needs::HALVES,
+            Evidence::Reference => Needs::REFERENCE,
             Evidence::Alone => Needs::default(),
         }
     }

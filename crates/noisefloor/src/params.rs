@@ -119,7 +119,13 @@ impl Audience {
 }
 
 /// Parameters of a [`crate::Session`]; checked when it is made.
+///
+/// ```
+/// let params = noisefloor::Params::default().with_tile(64).with_max_spp(4000);
+/// assert_eq!((params.tile, params.min_spp, params.max_spp), (64, 100, 4000));
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct Params {
     /// Tile edge in pixels, 16…512.
     pub tile: usize,
@@ -199,6 +205,30 @@ pub enum ParamsError {
     #[error(transparent)]
     ToneMapping(#[from] ToneMappingError),
 }
+
+macro_rules! with {
+    ($($with:ident $field:ident: $type:ty),+) => {
+        /// Each returns the same parameters with another value of one.
+        impl Params {
+            $(#[doc = concat!("Sets [`Params::", stringify!($field), "`].")]
+            pub fn $with(self, $field: $type) -> Self {
+                Self { $field, ..self }
+            })+
+        }
+    };
+}
+
+with!(
+    with_tile tile: usize,
+    with_tone_mapping tone_mapping: ToneMapping,
+    with_viewing viewing: Viewing,
+    with_schedule schedule: Schedule,
+    with_min_spp min_spp: u64,
+    with_max_spp max_spp: u64,
+    with_consecutive consecutive: u32,
+    with_audience audience: Audience,
+    with_blocks blocks: usize
+);
 
 impl Params {
     /// Samples per pixel at the first verdict.

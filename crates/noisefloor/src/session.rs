@@ -13,7 +13,7 @@ use thiserror::Error;
 
 mod stop;
 pub(crate) use stop::TileState;
-pub use stop::{Stop, StopReason};
+pub use stop::{Interruption, Stop, StopReason};
 
 /// Why a session failed.
 #[derive(Debug, Error)]
@@ -39,6 +39,9 @@ pub enum SessionError {
         /// Pixels of the image.
         expected: usize,
     },
+    /// A display for a session that has judged with another one.
+    #[error("tiles were judged already with another display: set it before the first verdict")]
+    Judged,
 }
 
 /// Film, criterion and limits, for a renderer that owns its main loop: it pushes batches, asks which tiles
@@ -130,9 +133,16 @@ impl<C: StoppingCriterion> Session<C> {
 
     /// Fixes how radiance is displayed before that is settled automatically: for renderers with an exposure
     /// of their own, or that finish one tile before they start the next.
-    pub fn set_display(&mut self, display: Display) {
+    ///
+    /// # Errors
+    /// [`SessionError::Judged`] after the first verdict: what was judged was shown otherwise.
+    pub fn set_display(&mut self, display: Display) -> Result<(), SessionError> {
+        if self.tiles.iter().any(|tile| tile.verdict.is_some()) {
+            return Err(SessionError::Judged);
+        }
         self.display = Some(display);
         self.displayed_reference = None;
+        Ok(())
     }
 
     /// Says what the samples depend on, for checkpoints: a session whose source has changed is not resumed. A
@@ -323,12 +333,12 @@ impl<C: StoppingCriterion> Session<C> {
     ///
     /// # Panics
     /// If the tile does not exist.
-    pub fn close(&mut self, tile: usize, reason: StopReason) -> Option<Stop> {
-        self.tiles[tile].stop.is_none().then(|| self.stop(tile, reason))
+    pub fn close(&mut self, tile: usize, reason: Interruption) -> Option<Stop> {
+        self.tiles[tile].stop.is_none().then(|| self.stop(tile, reason.into()))
     }
 
     /// Ends every open tile for the caller's reason, and returns these tiles.
-    pub fn close_all(&mut self, reason: StopReason) -> Vec<Stop> {
+    pub fn close_all(&mut self, reason: Interruption) -> Vec<Stop> {
         (0..self.tiles.len()).filter_map(|tile| self.close(tile, reason)).collect()
     }
 

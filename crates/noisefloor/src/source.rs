@@ -42,14 +42,13 @@ pub enum Counts {
     /// As many as asked for; at its end what is left, and nothing from then on.
     Asked,
     /// Now and then more, because its threads notice late that they have to stop.
-    Late,
+    Late {
+        /// Most samples that it takes in this time, over all pixels of a tile.
+        overrun: u64,
+    },
     /// What is stored, whatever is asked for: a playback.
     Stored,
 }
-
-/// Samples that the threads of a late renderer may take, over all pixels of a tile, before they notice that
-/// they have to stop. LuxCore with two threads on two busy cores took 3,600 (2026-11-22); this is for 64.
-const LATE: u64 = 1 << 17;
 
 impl Counts {
     /// Most samples per pixel that are believed where `request` asks for some.
@@ -59,7 +58,9 @@ impl Counts {
             Self::Asked => *spp,
             // It may have been ahead by a batch, waits for pixels without samples (four more at most), and
             // stops late
-            Self::Late => spp.saturating_mul(2).saturating_add(LATE / tile.pixels().max(1) as u64 + 8),
+            Self::Late { overrun } => spp
+                .saturating_mul(2)
+                .saturating_add((overrun / tile.pixels().max(1) as u64).saturating_add(8)),
             Self::Stored => u64::MAX,
         }
     }
@@ -67,6 +68,7 @@ impl Counts {
 
 /// A source's description of itself.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct SourceInfo {
     /// Who renders, for reports and error messages: `"ptwne cornell-box"`.
     pub name: String,
@@ -82,6 +84,42 @@ pub struct SourceInfo {
     pub repeats: Repeats,
     /// Whether it gives as many samples as asked for.
     pub counts: Counts,
+}
+
+impl SourceInfo {
+    /// A source of samples per pixel that can be aimed at tiles, gives as many as asked for, and repeats
+    /// nothing.
+    pub fn new(name: impl Into<String>, width: usize, height: usize) -> Self {
+        Self {
+            name: name.into(),
+            width,
+            height,
+            unit: Unit::SamplesPerPixel,
+            aims: true,
+            repeats: Repeats::Nothing,
+            counts: Counts::Asked,
+        }
+    }
+
+    /// The same with another [`SourceInfo::unit`].
+    pub fn with_unit(self, unit: Unit) -> Self {
+        Self { unit, ..self }
+    }
+
+    /// The same with another [`SourceInfo::aims`].
+    pub fn with_aims(self, aims: bool) -> Self {
+        Self { aims, ..self }
+    }
+
+    /// The same with another [`SourceInfo::repeats`].
+    pub fn with_repeats(self, repeats: Repeats) -> Self {
+        Self { repeats, ..self }
+    }
+
+    /// The same with another [`SourceInfo::counts`].
+    pub fn with_counts(self, counts: Counts) -> Self {
+        Self { counts, ..self }
+    }
 }
 
 /// A request for samples of one tile.

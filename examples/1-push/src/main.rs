@@ -8,7 +8,7 @@ const WIDTH: usize = 384;
 const HEIGHT: usize = 256;
 
 fn main() -> Result<(), SessionError> {
-    let params = Params { tile: 64, ..Params::default() };
+    let params = Params::default().with_tile(64);
     let mut session = Session::new(WIDTH, HEIGHT, Oracle::bundled(), params)?;
 
     // The loop stays the renderer's. `requests` names the open tiles, and how many samples each deserves

@@ -26,7 +26,7 @@ fn run() -> Result<(), Box<dyn Error>> {
     let limit = typed.ok().and_then(|seconds| Duration::try_from_secs_f64(seconds).ok());
     let limit = limit.ok_or("usage: example-source [SECONDS], such as 0.5")?;
 
-    let params = Params { tile: 64, ..Params::default() };
+    let params = Params::default().with_tile(64);
     let source = Shadow { width: 480, height: 320, seed: 1 };
     let mut driver = Driver::new(source, Oracle::bundled(), params)?;
     driver.set_time_limit(Some(limit));

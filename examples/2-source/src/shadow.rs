@@ -1,6 +1,6 @@
 //! The renderer of the first example as a source: in colour, from a seed, on all cores.
 
-use noisefloor::{Batch, Counts, ProgressiveSource, Repeats, Request, Rgb, SourceError, SourceInfo, Unit};
+use noisefloor::{Batch, ProgressiveSource, Repeats, Request, Rgb, SourceError, SourceInfo};
 use std::num::NonZeroUsize;
 use std::thread;
 
@@ -13,15 +13,7 @@ pub(crate) struct Shadow {
 
 impl ProgressiveSource for Shadow {
     fn info(&self) -> SourceInfo {
-        SourceInfo {
-            name: "shadow of a ball".into(),
-            width: self.width,
-            height: self.height,
-            unit: Unit::SamplesPerPixel,
-            aims: true,
-            counts: Counts::Asked,
-            repeats: Repeats::Samples,
-        }
+        SourceInfo::new("shadow of a ball", self.width, self.height).with_repeats(Repeats::Samples)
     }
 
     /// All open tiles come in one call, so that there is work for every core up to the last tile.

@@ -33,7 +33,7 @@ fn run() -> Result<(), Box<dyn Error>> {
     }
 
     let source = Pbrt::new(&cornell_box(edge, edge, &integrator), 1)?;
-    let params = Params { tile: 64, ..Params::default() };
+    let params = Params::default().with_tile(64);
     let mut driver = Driver::new(source, Oracle::bundled(), params)?;
     driver.run(|_, event| {
         if let Event::TileStopped(stop) = event {

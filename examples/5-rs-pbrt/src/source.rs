@@ -1,9 +1,7 @@
 //! rs_pbrt behind [`ProgressiveSource`]: path tracing pixel by pixel, and bidirectional path tracing of whole
 //! pictures.
 
-use noisefloor::{
-    Batch, Counts, ProgressiveSource, Repeats, Request, Rgb, SourceError, SourceInfo, Tile, Unit,
-};
+use noisefloor::{Batch, ProgressiveSource, Repeats, Request, Rgb, SourceError, SourceInfo, Tile};
 use rayon::prelude::*;
 use rs_pbrt::core::api::RenderOptions;
 use rs_pbrt::core::camera::Camera;
@@ -163,8 +161,7 @@ impl ProgressiveSource for Pbrt {
         let (width, height) = self.size();
         let aims = matches!(self.integrator, Integrator::Sampler(_));
         let name = if aims { "rs_pbrt path" } else { "rs_pbrt bdpt" };
-        let (unit, repeats) = (Unit::SamplesPerPixel, Repeats::Samples);
-        SourceInfo { name: name.into(), width, height, unit, aims, repeats, counts: Counts::Asked }
+        SourceInfo::new(name, width, height).with_aims(aims).with_repeats(Repeats::Samples)
     }
 
     fn sample(&mut self, requests: &[Request]) -> Result<Vec<Batch>, SourceError> {

@@ -6,8 +6,7 @@
 mod scene;
 
 use noisefloor::{
-    Batch, Counts, Driver, DriverError, Event, Oracle, Params, ProgressiveSource, Repeats, Request,
-    SourceError, SourceInfo, Unit,
+    Batch, Driver, DriverError, Event, Oracle, Params, ProgressiveSource, Request, SourceError, SourceInfo,
 };
 use rust_pathtracer::prelude::{ColorBuffer, Tracer};
 use scene::Spheres;
@@ -27,15 +26,7 @@ impl WholeFrames {
 
 impl ProgressiveSource for WholeFrames {
     fn info(&self) -> SourceInfo {
-        SourceInfo {
-            name: "rust-pathtracer".into(),
-            width: self.width,
-            height: self.height,
-            unit: Unit::SamplesPerPixel,
-            aims: false,
-            repeats: Repeats::Nothing,
-            counts: Counts::Asked,
-        }
+        SourceInfo::new("rust-pathtracer", self.width, self.height).with_aims(false)
     }
 
     fn sample(&mut self, requests: &[Request]) -> Result<Vec<Batch>, SourceError> {
@@ -51,7 +42,7 @@ impl ProgressiveSource for WholeFrames {
 
 fn main() -> Result<(), DriverError> {
     let source = WholeFrames::new(256, 192);
-    let mut driver = Driver::new(source, Oracle::bundled(), Params { tile: 64, ..Params::default() })?;
+    let mut driver = Driver::new(source, Oracle::bundled(), Params::default().with_tile(64))?;
     driver.run(|_, event| {
         if let Event::TileStopped(stop) = event {
             println!("tile {:2} is done after {:5} samples per pixel", stop.tile.index, stop.spp);

@@ -5,10 +5,7 @@
 
 mod scene;
 
-use noisefloor::{
-    Batch, Counts, Driver, Event, Oracle, Params, ProgressiveSource, Repeats, Request, SourceError,
-    SourceInfo, Unit,
-};
+use noisefloor::{Batch, Driver, Event, Oracle, Params, ProgressiveSource, Request, SourceError, SourceInfo};
 use noisefloor_image::{RenderLayers, write_exr};
 use rayon::iter::{IntoParallelIterator, ParallelIterator};
 use rustic_zen::prelude::{ExportImage, Image, RenderConstraint};
@@ -38,15 +35,7 @@ impl Photons {
 
 impl ProgressiveSource for Photons {
     fn info(&self) -> SourceInfo {
-        SourceInfo {
-            name: "rustic-zen".into(),
-            width: self.width,
-            height: self.height,
-            unit: Unit::SamplesPerPixel,
-            aims: false,
-            repeats: Repeats::Nothing,
-            counts: Counts::Asked,
-        }
+        SourceInfo::new("rustic-zen", self.width, self.height).with_aims(false)
     }
 
     fn sample(&mut self, requests: &[Request]) -> Result<Vec<Batch>, SourceError> {
@@ -75,7 +64,7 @@ fn main() -> ExitCode {
 fn run() -> Result<(), Box<dyn Error>> {
     let (width, height, rays) = (384, 256, 2000);
     let source = Photons { width, height, rays };
-    let mut driver = Driver::new(source, Oracle::bundled(), Params { tile: 64, ..Params::default() })?;
+    let mut driver = Driver::new(source, Oracle::bundled(), Params::default().with_tile(64))?;
     driver.run(|_, event| {
         if let Event::TileStopped(stop) = event {
             println!("people see no noise in tile {:2} after {:5} samples", stop.tile.index, stop.spp);

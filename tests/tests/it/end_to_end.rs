@@ -10,7 +10,7 @@ use std::sync::atomic::Ordering;
 
 /// The defaults with small tiles.
 fn small_tiles() -> Params {
-    Params { tile: 32, max_spp: 3000, ..Params::default() }
+    Params::default().with_tile(32).with_max_spp(3000)
 }
 
 fn cornell() -> Ptwne {
@@ -137,7 +137,7 @@ fn a_fixed_number_of_samples_is_that_everywhere() {
 #[test]
 fn spaced_verdicts_stop_about_where_frequent_ones_do() {
     let count = |schedule: Schedule| {
-        let params = Params { schedule, max_spp: 10_000, ..small_tiles() };
+        let params = small_tiles().with_schedule(schedule).with_max_spp(10_000);
         // Much noise on smooth walls, so that there are rounds to save
         let source = Synthetic {
             radiance: |x, _| 0.2 + 0.003 * x as f32,
@@ -163,7 +163,7 @@ fn spaced_verdicts_stop_about_where_frequent_ones_do() {
 
 #[test]
 fn limits_have_their_reasons() {
-    let limited = run(cornell(), Oracle::bundled(), Params { max_spp: 150, ..small_tiles() });
+    let limited = run(cornell(), Oracle::bundled(), small_tiles().with_max_spp(150));
     for stop in &limited.stops {
         match stop.reason {
             StopReason::Converged => assert!(stop.probability >= Some(0.9), "{stop:?}"),
@@ -237,7 +237,7 @@ fn the_reference_is_rendered_once_where_it_is_needed_and_never_elsewhere() {
     assert!(outcome.halves.iter().all(|h| h[1] == 0), "halves were kept, and nobody reads them");
 
     // And the path tracer has one to give
-    let rendered = run(cornell(), oracle(), Params { max_spp: 100, ..small_tiles() });
+    let rendered = run(cornell(), oracle(), small_tiles().with_max_spp(100));
     assert!(rendered.stops.iter().all(|s| s.probability.is_some()));
 }
 

@@ -73,15 +73,11 @@ impl Synthetic {
 impl ProgressiveSource for Synthetic {
     fn info(&self) -> SourceInfo {
         let (width, height) = self.size;
-        SourceInfo {
-            name: "synthetic".into(),
-            width,
-            height,
-            unit: self.unit,
-            aims: self.aims,
-            repeats: self.repeats,
-            counts: self.counts,
-        }
+        SourceInfo::new("synthetic", width, height)
+            .with_unit(self.unit)
+            .with_aims(self.aims)
+            .with_repeats(self.repeats)
+            .with_counts(self.counts)
     }
 
     fn sample(&mut self, requests: &[Request]) -> Result<Vec<Batch>, SourceError> {

@@ -23,13 +23,13 @@ fn run(source: impl ProgressiveSource, params: Params) -> Run {
 }
 
 fn tiles_of(tile: usize) -> Params {
-    Params { tile, max_spp: 4000, ..Params::default() }
+    Params::default().with_tile(tile).with_max_spp(4000)
 }
 
 /// Radiance has no unit: whatever it is measured in, people see the same picture.
 #[test]
 fn the_unit_of_radiance_changes_nothing() {
-    let often = Params { schedule: Schedule::Every { step: 20 }, min_spp: 20, ..tiles_of(32) };
+    let often = tiles_of(32).with_schedule(Schedule::Every { step: 20 }).with_min_spp(20);
     let at = |brightness: f32| run(Synthetic { brightness, ..Synthetic::new(96, 48) }, often).stops;
     let usual = at(1.0);
     assert!(usual.iter().any(|s| s.spp > 20), "no noise to judge: {usual:?}");
@@ -108,7 +108,7 @@ fn every_size_is_judged() {
 fn uneven_halves_have_the_noise_of_their_mean() {
     let residual = |batches: [u64; 2]| {
         let source = || Synthetic { radiance: |_, _| 0.4, noise: |_, _| 0.03, ..Synthetic::new(128, 128) };
-        let params = Params { schedule: Schedule::Every { step: 2 }, min_spp: 2, ..Params::default() };
+        let params = Params::default().with_schedule(Schedule::Every { step: 2 }).with_min_spp(2);
         let mut session = Session::new(128, 128, Oracle::bundled(), params).unwrap();
         let tile = session.film().grid().tile(0);
         let mut first = 0;

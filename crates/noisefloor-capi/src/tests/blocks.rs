@@ -84,7 +84,7 @@ fn with_shares() -> Handle {
 
 #[test]
 fn blocks_of_c_get_what_those_of_rust_get() {
-    let rust = Params { tile: EDGE, max_spp: 400, blocks: 16, ..Params::default() };
+    let rust = Params::default().with_tile(EDGE).with_max_spp(400).with_blocks(16);
     let mut expected = Session::new(WIDTH, HEIGHT, Oracle::bundled(), rust).unwrap();
     let session = session(&by_blocks());
     while !expected.is_done() {

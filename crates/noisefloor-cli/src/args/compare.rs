@@ -151,15 +151,13 @@ mod check {
 
         /// Session parameters, checked.
         fn params(&self, oracle: &Oracle) -> anyhow::Result<Params> {
-            let params = Params {
-                tile: self.tile,
-                tone_mapping: self.tone.check()?,
-                viewing: self.viewing.of(oracle),
-                schedule: Schedule::Every { step: self.batch },
-                min_spp: Params::default().min_spp.min(self.batch),
-                max_spp: self.max_spp,
-                ..Params::default()
-            };
+            let params = Params::default()
+                .with_tile(self.tile)
+                .with_tone_mapping(self.tone.check()?)
+                .with_viewing(self.viewing.of(oracle))
+                .with_schedule(Schedule::Every { step: self.batch })
+                .with_min_spp(Params::default().min_spp.min(self.batch))
+                .with_max_spp(self.max_spp);
             params.check().with_context(|| {
                 format!("--tile {}, --batch {}, --max-spp {}", self.tile, self.batch, self.max_spp)
             })?;

@@ -289,21 +289,20 @@ impl RenderArgs {
             // Exactly this many, not the next multiple of the batch
             CriterionChoice::Fixed(samples) => self.max_spp.map_or(*samples, |most| most.min(*samples)),
         };
-        let params = Params {
-            tile: self.tile,
-            tone_mapping: self.tone.check()?,
-            viewing: self.viewing.or_default(),
-            schedule,
-            min_spp: self.min_spp.unwrap_or(first.min(max_spp)),
-            max_spp,
-            consecutive: if self.preset == Some(Preset::Final) {
+        let params = Params::default()
+            .with_tile(self.tile)
+            .with_tone_mapping(self.tone.check()?)
+            .with_viewing(self.viewing.or_default())
+            .with_schedule(schedule)
+            .with_min_spp(self.min_spp.unwrap_or(first.min(max_spp)))
+            .with_max_spp(max_spp)
+            .with_consecutive(if self.preset == Some(Preset::Final) {
                 self.consecutive.max(2)
             } else {
                 self.consecutive
-            },
-            audience: if self.is_draft() { self.audience.then(DRAFT) } else { self.audience },
-            blocks: self.blocks,
-        };
+            })
+            .with_audience(if self.is_draft() { self.audience.then(DRAFT) } else { self.audience })
+            .with_blocks(self.blocks);
         params.check()?;
         Ok(params)
     }

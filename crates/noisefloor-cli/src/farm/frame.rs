@@ -97,7 +97,12 @@ impl Elsewhere {
     pub fn new(name: &str, job: &ShardJob) -> Self {
         let (unit, counts, repeats) = (Unit::SamplesPerPixel, Counts::Asked, Repeats::Samples);
         let (width, height) = (job.width, job.height);
-        Self(SourceInfo { name: name.to_owned(), width, height, unit, aims: true, repeats, counts })
+        Self(
+            SourceInfo::new(name.to_owned(), width, height)
+                .with_unit(unit)
+                .with_repeats(repeats)
+                .with_counts(counts),
+        )
     }
 }
 

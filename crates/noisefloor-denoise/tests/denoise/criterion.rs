@@ -12,14 +12,12 @@ const NOISE: f32 = 0.1;
 /// A session of the striped wall, until 2,000 spp at most.
 fn session<D: Denoiser>(denoiser: D) -> Session<DenoisedQuality<D>> {
     let criterion = DenoisedQuality::new(denoiser, 0.1);
-    let params = Params {
-        tile: 64,
-        schedule: Schedule::Growing { step: 20 },
-        min_spp: 20,
-        max_spp: 2_000,
-        tone_mapping: ToneMapping::Srgb { exposure: 1.0 },
-        ..Params::default()
-    };
+    let params = Params::default()
+        .with_tile(64)
+        .with_schedule(Schedule::Growing { step: 20 })
+        .with_min_spp(20)
+        .with_max_spp(2_000)
+        .with_tone_mapping(ToneMapping::Srgb { exposure: 1.0 });
     Session::new(SIZE.0, SIZE.1, criterion, params).unwrap()
 }
 
@@ -113,7 +111,7 @@ fn halves_have_guides_of_their_own() {
     };
     let guided = plain.guided_by(Arc::new([hits(0.25), hits(0.75)]));
     assert_ne!(guided.fingerprint(), before);
-    let params = Params { tile: 64, max_spp: 200, ..Params::default() };
+    let params = Params::default().with_tile(64).with_max_spp(200);
     run(&mut Session::new(SIZE.0, SIZE.1, guided, params).unwrap()).unwrap();
     let seen = seen.lock().unwrap();
     assert!(!seen.is_empty() && seen.chunks(2).all(|two| two == [Some(0.25), Some(0.75)]), "{seen:?}");

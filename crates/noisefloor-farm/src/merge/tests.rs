@@ -1,8 +1,7 @@
 use super::*;
 use crate::{Shard, sample, split};
 use noisefloor::{
-    Batch, Counts, Driver, Oracle, Params, ProgressiveSource, Repeats, Schedule, SourceError, SourceInfo,
-    Tile, Unit,
+    Batch, Driver, Oracle, Params, ProgressiveSource, Repeats, Schedule, SourceError, SourceInfo, Tile,
     source::{BlockRequest, BlockSamples, SourceIdentity},
 };
 use noisefloor_testkit::Noise;
@@ -17,9 +16,7 @@ struct Wall {
 
 impl ProgressiveSource for Wall {
     fn info(&self) -> SourceInfo {
-        let (unit, repeats) = (Unit::SamplesPerPixel, Repeats::Samples);
-        let name = "wall".into();
-        SourceInfo { name, width: 80, height: 48, unit, aims: true, repeats, counts: Counts::Asked }
+        SourceInfo::new("wall", 80, 48).with_repeats(Repeats::Samples)
     }
 
     fn identity(&self) -> Result<SourceIdentity, SourceError> {
@@ -62,7 +59,12 @@ fn params(spaced: bool, blocks: usize) -> Params {
     let schedule = if spaced { Schedule::Spaced { step: 10 } } else { Schedule::Every { step: 10 } };
     // The first shares come before the first verdict
     let min_spp = if blocks == 0 { 10 } else { 40 };
-    Params { tile: 32, schedule, min_spp, max_spp: 200, blocks, ..Params::default() }
+    Params::default()
+        .with_tile(32)
+        .with_schedule(schedule)
+        .with_min_spp(min_spp)
+        .with_max_spp(200)
+        .with_blocks(blocks)
 }
 
 fn session(spaced: bool, blocks: usize) -> Session<Oracle> {

@@ -2,7 +2,7 @@ use super::*;
 use noisefloor::{FixedSpp, Params};
 
 fn job() -> ShardJob {
-    let session = Session::new(40, 20, FixedSpp(8), Params { tile: 16, ..Params::default() }).unwrap();
+    let session = Session::new(40, 20, FixedSpp(8), Params::default().with_tile(16)).unwrap();
     ShardJob::of(SourceIdentity::new("grey"), &session)
 }
 

@@ -7,8 +7,9 @@ use super::quality::{Eye, Quality, Yardstick};
 use crate::advance::{Advance, Watch};
 use crate::error::LabError;
 use noisefloor::{
-    Batch, Film, Params, ProgressiveSource, Request, Rgb, Schedule, Session, StopReason, StoppingCriterion,
-    Tile, TileGrid,
+    Batch, Film, Params, ProgressiveSource, Request, Rgb, Schedule, Session, StoppingCriterion, Tile,
+    TileGrid,
+    session::Interruption,
     source::{BlockRequest, Reference},
 };
 use noisefloor_denoise::Denoiser;
@@ -221,7 +222,7 @@ impl Course<'_> {
         }
         let Field { mut entrants, film, costs } = field;
         for entrant in &mut entrants {
-            entrant.session.close_all(if cancelled { StopReason::Cancelled } else { StopReason::MaxSpp });
+            entrant.session.close_all(if cancelled { Interruption::Cancelled } else { Interruption::MaxSpp });
         }
         let yardstick = yardstick.ok_or(LabError::NoSamples)?;
         if curve.last().is_none_or(|point| point.spp < done) {
@@ -234,7 +235,7 @@ impl Course<'_> {
     /// All judge by one way to the screen, settled as a session would.
     fn settle(&self, field: &mut Field) -> Result<Yardstick, LabError> {
         let display = self.params.tone_mapping.settle(&field.film.image());
-        field.entrants.iter_mut().for_each(|e| e.session.set_display(display));
+        field.entrants.iter_mut().try_for_each(|e| e.session.set_display(display))?;
         let eye = Eye { pixels_per_degree: self.pixels_per_degree, vision: self.vision.clone() };
         Yardstick::new(field.film.grid(), display, self.truth.to_vec(), eye)
     }

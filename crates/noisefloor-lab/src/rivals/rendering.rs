@@ -3,7 +3,8 @@
 use super::noise::Noise;
 use crate::error::LabError;
 use noisefloor::{
-    Params, Rgb, Schedule, Session, StopReason, StoppingCriterion, ToneMapping, Viewing, source::Reference,
+    Params, Rgb, Schedule, Session, StoppingCriterion, ToneMapping, Viewing, session::Interruption,
+    source::Reference,
 };
 use noisefloor_learn::{Corpus, JudgedImage, JudgedZone, as_difference};
 use rayon::prelude::*;
@@ -79,17 +80,15 @@ impl SynthesisedRendering {
         stops: bool,
     ) -> Result<Vec<Vec<f64>>, LabError> {
         let size = (self.converged.width, self.converged.height);
-        let params = Params {
-            tile: self.edge,
-            tone_mapping: ToneMapping::Srgb { exposure: 1.0 },
-            viewing,
+        let params = Params::default()
+            .with_tile(self.edge)
+            .with_tone_mapping(ToneMapping::Srgb { exposure: 1.0 })
+            .with_viewing(viewing)
             // At every stage: each brings more than a step.
-            schedule: Schedule::Every { step: 2 },
-            max_spp: u64::from(u32::MAX),
+            .with_schedule(Schedule::Every { step: 2 })
+            .with_max_spp(u64::from(u32::MAX))
             // A criterion that tells is asked at every stage.
-            consecutive: if stops { 1 } else { u32::MAX },
-            ..Params::default()
-        };
+            .with_consecutive(if stops { 1 } else { u32::MAX });
         let against_converged = criterion.needs().reference;
         let mut session = Session::new(size.0, size.1, criterion, params)?;
         if against_converged {
@@ -97,7 +96,7 @@ impl SynthesisedRendering {
         }
         // Places of the picture that no zone fills.
         for tile in self.zones.len()..session.film().grid().len() {
-            session.close(tile, StopReason::Cancelled);
+            session.close(tile, Interruption::Cancelled);
         }
         let mut needed = vec![Vec::new(); self.zones.len()];
         for batches in &self.stages {

@@ -1,5 +1,5 @@
 use crate::kit::{Folder, Running, levels, public};
-use noisefloor::{Batch, Counts, ProgressiveSource, Repeats, Request, SourceError, SourceInfo, Unit};
+use noisefloor::{Batch, ProgressiveSource, Repeats, Request, SourceError, SourceInfo};
 use noisefloor_study::analysis::raw::{DICTIONARY, responses, write_raw};
 use noisefloor_study::analysis::{AnalysisOptions, analyse};
 use noisefloor_study::simulated::drive;
@@ -46,15 +46,7 @@ struct Wall;
 
 impl ProgressiveSource for Wall {
     fn info(&self) -> SourceInfo {
-        SourceInfo {
-            name: "wall".into(),
-            width: 80,
-            height: 70,
-            unit: Unit::SamplesPerPixel,
-            aims: true,
-            repeats: Repeats::Samples,
-            counts: Counts::Asked,
-        }
+        SourceInfo::new("wall", 80, 70).with_repeats(Repeats::Samples)
     }
 
     fn sample(&mut self, requests: &[Request]) -> Result<Vec<Batch>, SourceError> {

@@ -1,5 +1,6 @@
 use super::*;
 use crate::criterion::{FixedSpp, Needs, Verdict, View};
+use crate::session::StopReason;
 use crate::source::{Counts, Repeats, SourceInfo, Unit};
 use crate::tile::Tile;
 
@@ -172,7 +173,7 @@ impl StoppingCriterion for Picky {
     }
 
     fn needs(&self) -> Needs {
-        Needs { halves: false, reference: true }
+        Needs::REFERENCE
     }
 
     fn judge(&mut self, _: &View<'_>, _: &[Tile]) -> Result<Vec<Verdict>, CriterionError> {

@@ -53,7 +53,7 @@ fn more_samples_are_less_visible_and_the_expected_need_is_near() {
 fn a_reference_is_evidence_as_good_as_halves() {
     let model = changed(Model::bundled(), |m| m.evidence = Evidence::Reference).unwrap();
     let mut oracle = Oracle::new(model, Threshold::PAPER);
-    assert_eq!(oracle.needs(), Needs { halves: false, reference: true });
+    assert_eq!(oracle.needs(), Needs::REFERENCE);
     let (noisy, grey) = (film(200, 0.5), vec![Display::SRGB.encode([0.2; 3]); 64 * 64]);
     assert!(matches!(judge(&mut oracle, &noisy, None), Err(CriterionError::NoReference(_))));
     let by_reference = judge(&mut oracle, &noisy, Some(&grey)).unwrap().probability.unwrap();

@@ -3,7 +3,6 @@
 use super::Session;
 use crate::checkpoint::{Checkpoint, CheckpointError};
 use crate::criterion::Resumable;
-use crate::display::Display;
 use crate::session::Stop;
 use std::borrow::Cow;
 
@@ -43,13 +42,8 @@ impl<C: Resumable> Session<C> {
         for state in &mut tiles {
             state.stop = state.stop.filter(|stop: &Stop| stop.reason.is_final());
         }
-        let complete = |display: Display| {
-            let lost = "it was displayed through a function that only the caller of `set_display` has";
-            display.completed_by(self.params.tone_mapping).ok_or(CheckpointError::Invalid(lost))
-        };
-        let display = checkpoint.display.map(complete).transpose()?;
         let film = checkpoint.film.into_owned();
         let shares = checkpoint.shares.into_owned();
-        Ok(Self { film, tiles, shares, display, displayed_reference: None, ..self })
+        Ok(Self { film, tiles, shares, display: checkpoint.display, displayed_reference: None, ..self })
     }
 }

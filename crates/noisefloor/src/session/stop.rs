@@ -40,6 +40,33 @@ impl StopReason {
     }
 }
 
+/// Why a caller ends tiles that no criterion has ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Interruption {
+    /// The caller allows no more samples.
+    MaxSpp,
+    /// The time limit was reached.
+    TimeLimit,
+    /// The run was cancelled.
+    Cancelled,
+    /// The source has no more samples.
+    SourceExhausted,
+    /// The source or the criterion failed.
+    Failed,
+}
+
+impl From<Interruption> for StopReason {
+    fn from(interruption: Interruption) -> Self {
+        match interruption {
+            Interruption::MaxSpp => Self::MaxSpp,
+            Interruption::TimeLimit => Self::TimeLimit,
+            Interruption::Cancelled => Self::Cancelled,
+            Interruption::SourceExhausted => Self::SourceExhausted,
+            Interruption::Failed => Self::Failed,
+        }
+    }
+}
+
 impl fmt::Display for StopReason {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {

@@ -117,7 +117,7 @@ fn nothing_is_judged_before_every_tile_has_samples() {
     }
     assert_eq!(s.judge().unwrap(), []);
     assert!(s.display().is_none());
-    s.set_display(Display::SRGB);
+    s.set_display(Display::SRGB).unwrap();
     assert_eq!(s.judge().unwrap().len(), 1);
 }
 
@@ -143,7 +143,7 @@ fn closing_keeps_what_is_done() {
         }
     }
     assert_eq!(s.judge().unwrap().len(), 1);
-    assert_eq!(s.close_all(StopReason::TimeLimit).len(), 2);
+    assert_eq!(s.close_all(Interruption::TimeLimit).len(), 2);
     let reasons: Vec<_> = s.stops().map(|s| s.reason).collect();
     assert_eq!(reasons, [StopReason::Converged, StopReason::TimeLimit, StopReason::TimeLimit]);
     assert!(s.requests().is_empty());

@@ -18,7 +18,7 @@ impl StoppingCriterion for Bright {
     }
 
     fn needs(&self) -> Needs {
-        Needs { halves: true, reference: false }
+        Needs::HALVES
     }
 
     fn block_needs(&self, view: &View<'_>, tiles: &[Tile], edge: usize) -> Option<Vec<Option<Vec<f64>>>> {

@@ -16,7 +16,7 @@ impl StoppingCriterion for Neighbours {
     }
 
     fn needs(&self) -> Needs {
-        Needs { halves: true, reference: false }
+        Needs::HALVES
     }
 
     fn judge(&mut self, view: &View<'_>, tiles: &[Tile]) -> Result<Vec<Verdict>, CriterionError> {
