@@ -1,4 +1,4 @@
-//! Progress of long work, for whoever shows it.
+//! Progress of long work, for display.
 
 /// How far a piece of work is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

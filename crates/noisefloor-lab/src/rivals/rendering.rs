@@ -25,7 +25,7 @@ pub(super) struct SynthesisedRendering {
     converged: Reference,
 }
 
-/// Samples, and the mean of these samples alone for each zone.
+/// Samples, and the mean of only these samples for each zone.
 type Batch = (u64, Vec<Vec<Rgb>>);
 
 /// The samples of the batches of each stage, until `last` are reached: two batches each, so that the halves of a

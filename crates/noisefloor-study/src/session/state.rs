@@ -275,7 +275,7 @@ impl ParticipantSession {
         TrialOutcome::Stops { stack, repeat, levels: self.levels.clone(), clicks: self.clicks }
     }
 
-    /// Stores the result of a trial and goes on to the next one.
+    /// Stores the result of a trial and moves on to the next one.
     fn finish_trial(
         &mut self,
         role: TrialRole,

@@ -220,7 +220,7 @@ mod tests {
         files.filter(named).collect()
     }
 
-    /// When an erasure is acknowledged, nothing is left of it: whoever is killed then has nothing to hide.
+    /// When an erasure is acknowledged, nothing is left of it, even if the server is killed right then.
     #[tokio::test]
     async fn an_erasure_is_acknowledged_when_it_is_complete() {
         let folder = tempfile::tempdir().unwrap();
