@@ -13,5 +13,5 @@ pub struct Advance<'a> {
     pub detail: &'a str,
 }
 
-/// Is told of progress, from any thread.
+/// Called with progress, from any thread.
 pub type Watch<'a> = &'a (dyn Fn(Advance<'_>) + Sync);

@@ -143,7 +143,7 @@ impl SynthesisedRendering {
     }
 }
 
-/// Squares side by side; places that none fills are black.
+/// Squares side by side; empty places are black.
 fn mosaic(tiles: &[&[Rgb]], edge: usize, columns: usize) -> Reference {
     let (width, height) = (columns * edge, tiles.len().div_ceil(columns) * edge);
     let mut pixels = vec![[0.0; 3]; width * height];

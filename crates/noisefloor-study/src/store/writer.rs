@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use std::sync::mpsc;
 use tokio::sync::oneshot;
 
-/// Most commands that share a commit; bounds what a failing disk can take with it.
+/// Most commands that share a commit; bounds what is lost if the disk fails.
 const MOST_AT_ONCE: usize = 512;
 /// The answers of a study, open for writing. Clones share one writer thread.
 #[derive(Clone, Debug)]
