@@ -1,7 +1,7 @@
 //! Pictures: of a PNG, the checksums of chunks are right.
 
 use crate::files::Folder;
-use noisefloor::SampleOrigin;
+use noisefloor::stills::SampleOrigin;
 use noisefloor_image::{RenderLayers, SampleFacts, read_facts, read_picture, write_exr, write_png};
 use std::fs;
 

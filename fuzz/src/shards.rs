@@ -1,7 +1,7 @@
 //! Shards of a farm: the bytes are the header; magic, version, length and checksum are right, and samples follow.
 
 use crate::files::Folder;
-use noisefloor::{FixedSpp, Params, Session, SourceIdentity};
+use noisefloor::{FixedSpp, Params, Session, source::SourceIdentity};
 use noisefloor_farm::{PlannedBatch, Shard, ShardJob, ShardSet};
 
 /// Magic and version.

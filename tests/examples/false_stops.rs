@@ -3,7 +3,10 @@
 //! Markdown table, with and without the guards there are.
 #![allow(clippy::print_stdout, reason = "an example prints")]
 
-use noisefloor::{Display, Driver, FixedSpp, NoiseMask, Oracle, Params, Rgb, Schedule, StopReason, Tile};
+use noisefloor::{
+    Driver, FixedSpp, Oracle, Params, Rgb, Schedule, StopReason, Tile, descriptor::NoiseMask,
+    display::Display,
+};
 use noisefloor_ptwne::{Ptwne, RenderOptions, scenes};
 use std::error::Error;
 

@@ -4,8 +4,8 @@
 #![allow(clippy::print_stdout, reason = "an example prints")]
 
 use noisefloor::{
-    Batch, Counts, Display, Driver, NoiseMask, Oracle, Params, ProgressiveSource, Repeats, Request, Rgb,
-    Schedule, SourceError, SourceInfo, Unit,
+    Batch, Counts, Driver, Oracle, Params, ProgressiveSource, Repeats, Request, Rgb, Schedule, SourceError,
+    SourceInfo, Unit, descriptor::NoiseMask, display::Display,
 };
 use std::error::Error;
 

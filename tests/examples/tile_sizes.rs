@@ -5,8 +5,10 @@
 
 use ndarray::Array2;
 use noisefloor::{
-    DEFAULT_TILE, Display, Driver, FixedSpp, NoiseMask, Oracle, Params, Rgb, Session, Stop,
-    StoppingCriterion, luminance,
+    Driver, FixedSpp, Oracle, Params, Rgb, Session, Stop, StoppingCriterion,
+    descriptor::NoiseMask,
+    display::{Display, luminance},
+    tile::DEFAULT_TILE,
 };
 use noisefloor_ptwne::{Ptwne, RenderOptions, scenes};
 use std::error::Error;

@@ -6,8 +6,9 @@
 #![allow(clippy::print_stdout, reason = "an example prints")]
 
 use noisefloor::{
-    CriterionError, Needs, Oracle, Params, ProgressiveSource, Request, Schedule, Session, StoppingCriterion,
-    Tile, TileGrid, Verdict, View,
+    Oracle, Params, ProgressiveSource, Request, Schedule, Session, StoppingCriterion, Tile, TileGrid,
+    Verdict,
+    criterion::{CriterionError, Needs, View},
 };
 use noisefloor_ptwne::{Ptwne, RenderOptions, scenes};
 use std::error::Error;

@@ -1,7 +1,7 @@
 //! What a verdict allocates. A program of its own, since counting takes an allocator of its own.
 
 use allocation_counter::{AllocationInfo, measure};
-use noisefloor::{Display, Film, Oracle, StoppingCriterion, TileGrid, View, Viewing};
+use noisefloor::{Film, Oracle, StoppingCriterion, TileGrid, Viewing, criterion::View, display::Display};
 
 /// What the second verdict on all tiles of a picture allocates, on one thread.
 fn of_a_second_verdict(edge: usize, tiles: usize) -> AllocationInfo {

@@ -3,7 +3,10 @@
 use crate::border;
 use crate::session::NfSession;
 use crate::status::{Failure, NfStatus, guard};
-use noisefloor::{BlockRequest, BlockSamples, Oracle, Request, Session, Tile};
+use noisefloor::{
+    Oracle, Request, Session, Tile,
+    source::{BlockRequest, BlockSamples},
+};
 
 /// How a tile is cut into blocks, which are counted in rows from the top left of the tile.
 #[repr(C)]

@@ -80,7 +80,7 @@ impl Default for NfParams {
             consecutive,
             blocks: blocks as u32,
             tone_mapping: NF_TONE_REINHARD,
-            key: noisefloor::DEFAULT_KEY,
+            key: noisefloor::display::DEFAULT_KEY,
             white: 0.0,
             exposure: 1.0,
             audience_slope: audience.slope,

@@ -1,8 +1,8 @@
 //! Error codes with messages, and the guard between panics and C.
 
 use noisefloor::{
-    CheckpointError, CriterionError, FilmError, ModelError, ParamsError, SessionError, ThresholdError,
-    TileError, ViewingTextError,
+    SessionError, checkpoint::CheckpointError, criterion::CriterionError, film::FilmError, model::ModelError,
+    oracle::ThresholdError, params::ParamsError, tile::TileError, viewing::ViewingTextError,
 };
 use std::any::Any;
 use std::cell::RefCell;

@@ -8,7 +8,7 @@ use crate::push::*;
 use crate::results::*;
 use crate::session::*;
 use crate::status::*;
-use noisefloor::{CriterionError, Oracle, Params, Rgb, Session, Tile};
+use noisefloor::{Oracle, Params, Rgb, Session, Tile, criterion::CriterionError};
 use std::ffi::{CStr, CString};
 use std::ptr::{null, null_mut};
 

@@ -6,8 +6,11 @@
 #![allow(clippy::print_stdout, reason = "an example prints")]
 
 use noisefloor::{
-    Clock, CriterionError, Display, Driver, Film, Needs, Oracle, Params, ProgressiveSource, Request, Rgb,
-    Schedule, StoppingCriterion, Tile, TileGrid, ToneMapping, Verdict, View, Viewing,
+    Driver, Film, Oracle, Params, ProgressiveSource, Request, Rgb, Schedule, StoppingCriterion, Tile,
+    TileGrid, ToneMapping, Verdict, Viewing,
+    criterion::{CriterionError, Needs, View},
+    display::Display,
+    driver::Clock,
 };
 use noisefloor_ptwne::{Ptwne, RenderOptions, scenes};
 use noisefloor_rivals::metrics;

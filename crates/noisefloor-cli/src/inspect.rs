@@ -1,7 +1,12 @@
 //! `noisefloor inspect` and `noisefloor scenes`.
 
 use crate::say::{NotSaid, say, say_json};
-use noisefloor::{Audience, DescriptorSpec, Evidence, Model, Scores, ToneMapping, TrainingRecord};
+use noisefloor::{
+    Audience, Model, ToneMapping,
+    descriptor::DescriptorSpec,
+    evidence::Evidence,
+    model::{Scores, TrainingRecord},
+};
 use noisefloor_ptwne::scenes;
 use serde::Serialize;
 

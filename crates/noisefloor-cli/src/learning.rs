@@ -3,7 +3,12 @@
 use crate::bars::bar;
 use anyhow::Context;
 use indicatif::ProgressBar;
-use noisefloor::{Descriptor, DescriptorSpec, Evidence, SvmParams, Threshold, Viewing};
+use noisefloor::{
+    Threshold, Viewing,
+    descriptor::{Descriptor, DescriptorSpec},
+    evidence::Evidence,
+    svm::SvmParams,
+};
 use noisefloor_learn::{
     Chosen, Corpora, Learner, Prediction, Table, TrainParams, VISIBLE_CHOICES, choices, choose_and_leave_out,
     describe_corpora, leave_one_scene_out, read_table, read_table_with,

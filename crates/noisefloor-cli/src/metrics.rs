@@ -2,7 +2,7 @@
 
 use crate::say::{NotSaid, note, say};
 use anyhow::{Context, bail};
-use noisefloor::{Display, Rgb, ToneMapping, Viewing};
+use noisefloor::{Rgb, ToneMapping, Viewing, display::Display};
 use noisefloor_image::maps::{Canvas, ColourScale, draw_field};
 use noisefloor_image::{Picture, check_writable, read_picture};
 use noisefloor_rivals::DifferenceMap;

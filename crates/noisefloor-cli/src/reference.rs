@@ -7,7 +7,7 @@ use crate::say::{note, one_line, say};
 use crate::signals::{INTERRUPTED, cancel_on_signal};
 use crate::sources::{Opened, SourceJob};
 use anyhow::Context;
-use noisefloor::{Reference, Rgb, ToneMapping};
+use noisefloor::{Rgb, ToneMapping, source::Reference};
 use noisefloor_image::maps::Canvas;
 use noisefloor_image::{RenderLayers, check_writable, write_exr};
 use std::path::PathBuf;

@@ -6,7 +6,7 @@
 //! goes to standard output. Denoised pictures are kept in the folder. docs/benchmarks/denoising.sh runs all of it.
 #![allow(clippy::print_stdout, reason = "it is what this example is for")]
 
-use noisefloor::{FirstHits, Rgb, Tile, TileGrid, ToneMapping, Viewing};
+use noisefloor::{Rgb, Tile, TileGrid, ToneMapping, Viewing, source::FirstHits};
 use noisefloor_denoise::{DenoisedError, DenoisedHalves, Denoiser, NoisyPicture, Oidn};
 use noisefloor_image::{RenderLayers, read_exr, write_exr};
 use noisefloor_sidecar::FilterPlan;

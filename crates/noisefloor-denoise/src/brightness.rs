@@ -4,7 +4,7 @@
 //! mean of what it smooths, so a tile whose mean has moved further than its noise explains is wrong, and that
 //! counts as what people would see where the tile meets the right picture: an edge of this height.
 
-use noisefloor::{Display, Rgb};
+use noisefloor::{Rgb, display::Display};
 use noisefloor_vision::{VisionError, VisionModel, VisionWorkspace};
 
 /// Standard errors of the noisy mean that explain a difference: one normal mean in 16,000 lies beyond.

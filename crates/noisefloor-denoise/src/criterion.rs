@@ -4,8 +4,11 @@ use crate::denoiser::{DenoiseError, Denoiser, NoisyPicture};
 use crate::estimate::{DenoisedError, DenoisedHalves};
 use crate::record::DenoisedRecord;
 use noisefloor::{
-    CriterionError, Display, Film, FirstHits, Needs, Resumable, Rgb, StoppingCriterion, Tile, TileGrid,
-    TilePlanes, Verdict, View,
+    Film, Rgb, StoppingCriterion, Tile, TileGrid, Verdict,
+    criterion::{CriterionError, Needs, Resumable, View},
+    display::Display,
+    evidence::TilePlanes,
+    source::FirstHits,
 };
 use noisefloor_vision::{VisionModel, VisionWorkspace};
 use rayon::prelude::*;

@@ -1,7 +1,7 @@
 //! What a denoiser is.
 
 use auto_impl::auto_impl;
-use noisefloor::{FirstHits, Rgb};
+use noisefloor::{Rgb, source::FirstHits};
 use std::error::Error;
 use std::sync::{Arc, Mutex, PoisonError};
 use thiserror::Error;

@@ -22,7 +22,7 @@
 use crate::bands::Plane;
 use crate::brightness::{Light, jods_of_edge, shift};
 use crate::denoiser::DenoiseError;
-use noisefloor::{Display, Rgb, Tile, TilePlanes, Viewing};
+use noisefloor::{Rgb, Tile, Viewing, display::Display, evidence::TilePlanes};
 use noisefloor_vision::{VisionError, VisionModel, VisionWorkspace};
 use rayon::prelude::*;
 

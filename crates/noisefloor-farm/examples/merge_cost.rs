@@ -3,7 +3,7 @@
 //! docs/benchmarks/farm.md has the numbers.
 #![allow(clippy::print_stdout, reason = "its output is its purpose")]
 
-use noisefloor::{Oracle, Params, Schedule, Session, SourceIdentity};
+use noisefloor::{Oracle, Params, Schedule, Session, source::SourceIdentity};
 use noisefloor_farm::{PlannedBatch, Shard, ShardJob, ShardSet};
 use noisefloor_testkit::Noise;
 use std::path::PathBuf;

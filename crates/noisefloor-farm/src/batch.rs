@@ -1,6 +1,9 @@
 //! A batch as plans and shards describe it.
 
-use noisefloor::{BlockRequest, BlockSamples, Request, Session, StoppingCriterion, Tile};
+use noisefloor::{
+    Request, Session, StoppingCriterion, Tile,
+    source::{BlockRequest, BlockSamples},
+};
 use serde::{Deserialize, Serialize, Serializer};
 
 /// A batch that is asked for.

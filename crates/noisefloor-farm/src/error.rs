@@ -1,6 +1,8 @@
 //! What can go wrong with shards and farms. Every message says what, where, and what to do.
 
-use noisefloor::{CriterionError, FilmError, IdentityChange, SourceError, TileError};
+use noisefloor::{
+    SourceError, criterion::CriterionError, film::FilmError, source::IdentityChange, tile::TileError,
+};
 use noisefloor_image::WriteError;
 use std::io;
 use std::path::PathBuf;

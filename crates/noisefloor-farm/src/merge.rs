@@ -3,7 +3,7 @@
 use crate::batch::PlannedBatch;
 use crate::error::FarmError;
 use crate::shard::{BatchEntry, ShardFile, ShardJob};
-use noisefloor::{BlockRequest, Request, Rgb, Session, StopReason, StoppingCriterion};
+use noisefloor::{Request, Rgb, Session, StopReason, StoppingCriterion, source::BlockRequest};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 use std::path::{Path, PathBuf};

@@ -9,8 +9,9 @@ use crate::batch::{PlannedBatch, by_blocks, fit};
 use crate::error::{ShardError, VERSION};
 use crate::folder::open_regular;
 use noisefloor::{
-    BlockRequest, ProgressiveSource, Request, Resumable, Rgb, Session, SourceError, SourceIdentity, Tile,
-    TileGrid,
+    ProgressiveSource, Request, Rgb, Session, SourceError, Tile, TileGrid,
+    criterion::Resumable,
+    source::{BlockRequest, SourceIdentity},
 };
 use noisefloor_image::{WriteError, write_atomic};
 use serde::{Deserialize, Serialize};

@@ -3,7 +3,7 @@
 use crate::batch::{PlannedBatch, by_blocks, fit};
 use crate::error::FarmError;
 use crate::shard::{Shard, ShardJob};
-use noisefloor::{Batch, LightCheck, ProgressiveSource, Request, SourceError, SourceInfo, Tile};
+use noisefloor::{Batch, ProgressiveSource, Request, SourceError, SourceInfo, Tile, watch::LightCheck};
 use std::time::Instant;
 
 /// Most samples of one call, over all pixels: as on one machine, so that cancelling is prompt.

@@ -1,6 +1,6 @@
 //! What can go wrong with picture files. Every message says what, where, and what to do.
 
-use noisefloor::TileError;
+use noisefloor::tile::TileError;
 use std::io;
 use std::path::PathBuf;
 use thiserror::Error;
@@ -40,7 +40,7 @@ pub enum PictureError {
         /// The limit in bytes.
         limit: u64,
     },
-    /// The header names a size outside the limits of [`noisefloor::check_image`]; no pixel was allocated.
+    /// The header names a size outside the limits of [`noisefloor::tile`]; no pixel was allocated.
     #[error("{}: {source}; crop or scale the image", path.display())]
     Size {
         /// The file.
@@ -174,7 +174,7 @@ pub enum WriteError {
         /// Values needed.
         want: usize,
     },
-    /// The image is empty or larger than [`noisefloor::check_image`] allows.
+    /// The image is empty or larger than [`noisefloor::tile`] allows.
     #[error("{}: {source}; write a smaller image", path.display())]
     Image {
         /// The file wanted.

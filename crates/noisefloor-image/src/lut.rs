@@ -1,6 +1,9 @@
 //! Colour look-up tables as tone mappings.
 
-use noisefloor::{Rgb, ToneCurve, srgb_encode};
+use noisefloor::{
+    Rgb,
+    display::{ToneCurve, srgb_encode},
+};
 use std::fmt;
 use std::str::FromStr;
 use thiserror::Error;

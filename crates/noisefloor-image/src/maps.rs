@@ -100,7 +100,7 @@ impl DrawTarget for Canvas {
 }
 
 impl Canvas {
-    /// A canvas of one colour, at most [`noisefloor::MAX_EDGE`] pixels and a legend wide.
+    /// A canvas of one colour, at most [`noisefloor::tile::MAX_EDGE`] pixels and a legend wide.
     pub fn new(width: usize, height: usize, colour: [u8; 3]) -> Self {
         let edge = |pixels: usize| u32::try_from(pixels).unwrap_or(u32::MAX);
         Self(RgbImage::from_pixel(edge(width), edge(height), image::Rgb(colour)))
@@ -150,7 +150,7 @@ impl Canvas {
 
     /// Luminance of a pixel as displayed, 0 to 255.
     fn grey(&self, x: usize, y: usize) -> f32 {
-        noisefloor::luminance(self.0.get_pixel(x as u32, y as u32).0.map(f32::from))
+        noisefloor::display::luminance(self.0.get_pixel(x as u32, y as u32).0.map(f32::from))
     }
 
     /// Mixes a colour into a pixel; `alpha` is its share, in [0, 1].

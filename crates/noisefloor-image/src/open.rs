@@ -1,13 +1,13 @@
 //! Opening files that may be hostile: what the decoders share.
 
 use crate::error::PictureError;
-use noisefloor::check_image;
+use noisefloor::internal::check_image;
 use std::fs::File;
 use std::io::{BufReader, Read, Seek};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 
-/// Longest file that is read, in bytes: enough for an EXR of [`noisefloor::MAX_PIXELS`] pixels in 32-bit
+/// Longest file that is read, in bytes: enough for an EXR of [`noisefloor::tile::MAX_PIXELS`] pixels in 32-bit
 /// floats.
 pub const MAX_FILE_BYTES: u64 = 1 << 32;
 
@@ -56,7 +56,7 @@ impl Opened {
             [0x89, b'P', b'N', b'G', b'\r', b'\n', 0x1a, b'\n'] => Format::Png,
             _ => Format::Other,
         };
-        Ok(Self { reader, bytes, format, most_pixels: noisefloor::MAX_PIXELS })
+        Ok(Self { reader, bytes, format, most_pixels: noisefloor::tile::MAX_PIXELS })
     }
 
     pub(crate) fn foreign(&self, path: &Path, wanted: &'static str) -> PictureError {

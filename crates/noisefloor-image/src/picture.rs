@@ -1,6 +1,6 @@
 //! Pictures in memory: linear or display-encoded.
 
-use noisefloor::{Rgb, Still, srgb_decode};
+use noisefloor::{Rgb, display::srgb_decode, stills::Still};
 
 /// A scene-referred picture: linear RGB, Rec.709 primaries, arbitrary scale. Values may be negative or
 /// non-finite.

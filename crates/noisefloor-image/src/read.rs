@@ -5,7 +5,7 @@ use crate::facts::read_facts;
 use crate::open::{Format, Opened};
 use crate::picture::Picture;
 use crate::{decode_exr, decode_pfm, decode_png};
-use noisefloor::Still;
+use noisefloor::stills::Still;
 use std::path::Path;
 
 /// Reads an EXR, PFM or PNG file. Its first bytes tell the format; its name does not matter.
@@ -14,7 +14,7 @@ use std::path::Path;
 /// Those of [`read_exr`](crate::read_exr), [`read_pfm`](crate::read_pfm) and [`read_png`](crate::read_png);
 /// [`PictureError::Foreign`] for any other format.
 pub fn read_picture(path: impl AsRef<Path>) -> Result<Picture, PictureError> {
-    read_picture_within(path, noisefloor::MAX_PIXELS)
+    read_picture_within(path, noisefloor::tile::MAX_PIXELS)
 }
 
 /// [`read_picture`], limited to `most` pixels: a larger picture is refused before any pixel is allocated.

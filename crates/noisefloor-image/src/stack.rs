@@ -6,8 +6,8 @@ use crate::frames::{self, Frame, Layout};
 use crate::picture::LinearImage;
 use crate::read::read_picture;
 use noisefloor::{
-    Batch, Counts, ProgressiveSource, Repeats, Request, Rgb, SourceError, SourceIdentity, SourceInfo, Tile,
-    Unit,
+    Batch, Counts, ProgressiveSource, Repeats, Request, Rgb, SourceError, SourceInfo, Tile, Unit,
+    source::SourceIdentity,
 };
 use std::collections::VecDeque;
 use std::fs::File;

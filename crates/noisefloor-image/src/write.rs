@@ -9,7 +9,7 @@ use exr::prelude::{
 };
 use image::codecs::png::PngEncoder;
 use image::{ExtendedColorType, ImageEncoder};
-use noisefloor::{Rgb, check_image};
+use noisefloor::{Rgb, internal::check_image};
 use std::path::Path;
 
 /// Longest edge of a PNG in pixels, by the format.

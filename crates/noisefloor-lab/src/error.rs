@@ -1,7 +1,8 @@
 //! Why an experiment failed.
 
 use noisefloor::{
-    CriterionError, FilmError, ParamsError, SessionError, SourceError, SvmTrainError, TileError,
+    SessionError, SourceError, criterion::CriterionError, film::FilmError, params::ParamsError,
+    svm::SvmTrainError, tile::TileError,
 };
 use noisefloor_denoise::DenoiseError;
 use noisefloor_image::{PictureError, WriteError};

@@ -4,7 +4,7 @@
 use crate::drawing::{colour, failed, sign, svg};
 use crate::error::LabError;
 use crate::files::{make_folder, write_text};
-use noisefloor::{Display, Rgb, Tile};
+use noisefloor::{Rgb, Tile, display::Display};
 use noisefloor_image::maps::{Canvas, ColourScale, TileMark, draw_tiles};
 use noisefloor_learn::{Corpus, CorpusError, Encoding, JudgedZone, Prediction, ReliabilityBin};
 use plotters::coord::Shift;

@@ -59,7 +59,7 @@ mod tests {
     use super::*;
     use crate::score::score;
     use crate::table::tests::zone;
-    use noisefloor::{Descriptor, Evidence, ToneMapping};
+    use noisefloor::{ToneMapping, descriptor::Descriptor, evidence::Evidence};
 
     /// Two scenes that people stop at the same noise: the baseline that knows this finds their thresholds
     /// exactly.

@@ -4,7 +4,8 @@
 use crate::describe::{Alone, in_picture};
 use crate::table::{Table, Zone};
 use noisefloor::{
-    Described, Descriptor, DescriptorError, DescriptorKind, DescriptorSpec, TileDescriptor, TilePlanes,
+    descriptor::{Described, Descriptor, DescriptorError, DescriptorKind, DescriptorSpec, TileDescriptor},
+    evidence::TilePlanes,
 };
 use std::collections::BTreeMap;
 

@@ -37,7 +37,7 @@ pub enum TableError {
         /// The zone.
         zone: u32,
         /// What does not fit.
-        source: noisefloor::DescriptorError,
+        source: noisefloor::descriptor::DescriptorError,
     },
     /// The CSV is malformed.
     #[error("line {line}: {what}")]

@@ -4,7 +4,7 @@ use crate::baselines::{constant_noise_baseline, scene_median_baseline};
 use crate::predict::Prediction;
 use crate::score::{ReliabilityBin, calibration_error, error_interval, image_accuracy, reliability, score};
 use crate::table::{Origin, Table};
-use noisefloor::Scores;
+use noisefloor::model::Scores;
 use serde::Serialize;
 
 /// Scores of one way to predict.

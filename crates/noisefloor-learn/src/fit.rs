@@ -7,8 +7,10 @@ use crate::predict::{Prediction, predict};
 use crate::score::score;
 use crate::table::{Table, Zone};
 use noisefloor::{
-    Audience, Classifier, Familiarity, ModelParts, Platt, Scaler, SvmParams, Threshold, TrainingRecord,
-    fit_platt, nearest,
+    Audience, Threshold,
+    internal::nearest,
+    model::{Familiarity, ModelParts, TrainingRecord},
+    svm::{Classifier, Platt, Scaler, SvmParams, fit_platt},
 };
 use rayon::prelude::*;
 use std::collections::BTreeSet;

@@ -3,7 +3,7 @@
 
 use crate::params::WIDE;
 use ndarray::{Array1, Array2, ArrayView2, Axis};
-use noisefloor::Svm;
+use noisefloor::svm::Svm;
 
 /// Newton steps at most; four to seven are enough on the human data.
 const STEPS: usize = 30;

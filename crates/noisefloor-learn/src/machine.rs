@@ -6,7 +6,7 @@ use crate::observers::observers_agreeing;
 use crate::params::{Learner, TrainError, TrainParams};
 use crate::table::Zone;
 use ndarray::Array2;
-use noisefloor::{Classifier, Platt, Scaler, Svm, SvmParams, check_examples, fit_svm};
+use noisefloor::svm::{Classifier, Platt, Scaler, Svm, SvmParams, check_examples, fit_svm};
 
 /// Machine and scaler, before calibration.
 pub(crate) struct Machine {

@@ -5,7 +5,7 @@ use crate::fit::{familiarity, fit_groups, held_out, parts};
 use crate::params::{TrainError, TrainParams};
 use crate::predict::{Prediction, predict};
 use crate::score::score;
-use noisefloor::{SvmParams, Threshold, TrainingRecord};
+use noisefloor::{Threshold, model::TrainingRecord, svm::SvmParams};
 use rayon::prelude::*;
 use serde::Serialize;
 

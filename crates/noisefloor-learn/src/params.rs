@@ -1,7 +1,11 @@
 //! How a model is trained, and why it cannot be.
 
 use crate::choices::VISIBLE_CHOICES;
-use noisefloor::{Descriptor, ModelError, SvmParams, SvmTrainError};
+use noisefloor::{
+    descriptor::Descriptor,
+    model::ModelError,
+    svm::{SvmParams, SvmTrainError},
+};
 use thiserror::Error;
 
 /// γ of the kernel in which a straight line is kept.

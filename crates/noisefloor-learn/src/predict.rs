@@ -2,7 +2,7 @@
 
 use crate::stimulus::as_difference;
 use crate::table::{Origin, Zone};
-use noisefloor::{Judgement, Threshold};
+use noisefloor::{Threshold, model::Judgement};
 use serde::{Deserialize, Serialize};
 
 /// Samples at which a quantity, known at increasing levels, first reaches `goal`, interpolated in ln(spp);

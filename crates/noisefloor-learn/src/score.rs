@@ -4,7 +4,7 @@
 //! to the levels that observers could choose, real pictures scored apart from synthesised levels.
 
 use crate::predict::Prediction;
-use noisefloor::Scores;
+use noisefloor::model::Scores;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 

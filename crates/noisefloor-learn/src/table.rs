@@ -3,7 +3,7 @@
 
 use crate::answer::Answer;
 use crate::stimulus::as_noise;
-use noisefloor::{Descriptor, Evidence, ToneMapping, Viewing};
+use noisefloor::{ToneMapping, Viewing, descriptor::Descriptor, evidence::Evidence};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 

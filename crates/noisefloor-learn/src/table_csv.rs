@@ -4,7 +4,11 @@ use crate::error::TableError;
 use crate::stimulus::parse_reference;
 use crate::table::{Level, Origin, Table, Zone};
 use csv::{ReaderBuilder, StringRecord, Writer};
-use noisefloor::{Descriptor, DescriptorKind, DescriptorSpec, Evidence, ToneMapping, Viewing};
+use noisefloor::{
+    ToneMapping, Viewing,
+    descriptor::{Descriptor, DescriptorKind, DescriptorSpec},
+    evidence::Evidence,
+};
 use serde::{Deserialize, Serialize};
 use std::collections::HashSet;
 use std::io::{Read, Write};

@@ -5,7 +5,11 @@ use crate::machine::examples;
 use crate::params::{TrainError, TrainParams};
 use crate::predict::{Prediction, predict};
 use crate::table::Table;
-use noisefloor::{Model, Scores, SvmParams, Threshold, TrainingRecord};
+use noisefloor::{
+    Model, Threshold,
+    model::{Scores, TrainingRecord},
+    svm::SvmParams,
+};
 
 fn check(table: &Table, params: &TrainParams, needed: usize) -> Result<(), TrainError> {
     let sound = params.range > 1.0 && params.spread > 0.0 && !params.candidates.is_empty();
@@ -108,7 +112,7 @@ mod tests {
     use super::*;
     use crate::answer::Answer;
     use crate::table::{Level, Origin, Zone};
-    use noisefloor::{Descriptor, Evidence, ToneMapping};
+    use noisefloor::{ToneMapping, descriptor::Descriptor, evidence::Evidence};
 
     /// Scenes where people stop at noise 0.01, whatever else: the first number is ln(noise), the others
     /// distract.
@@ -231,7 +235,7 @@ mod tests {
         }
         // One lies apart: it is the one in twenty that is not familiar to the others.
         table.zones[19].levels.iter_mut().for_each(|level| level.descriptor[1] = 30.0);
-        let scaler = noisefloor::Scaler::identity(table.descriptor.dimensions());
+        let scaler = noisefloor::svm::Scaler::identity(table.descriptor.dimensions());
         let known = familiarity(&table, &table.groups(), &scaler).unwrap();
         assert_eq!(known.reach, 1.0);
         let includes = |texture: f32| {

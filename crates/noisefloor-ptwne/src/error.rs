@@ -81,7 +81,7 @@ pub enum SceneError {
 pub enum RenderError {
     /// The image is empty or too large.
     #[error(transparent)]
-    Size(#[from] noisefloor::TileError),
+    Size(#[from] noisefloor::tile::TileError),
     /// An option is outside its range.
     #[error("option `{name}` is {value}; it must be {range}")]
     Option {

@@ -7,7 +7,7 @@ use crate::math::{Ray, Vec3};
 use crate::rng::{Key, mix};
 use crate::sampler::{Sampler, Sampling};
 use crate::scene::Scene;
-use noisefloor::{FirstHits, Rgb};
+use noisefloor::{Rgb, source::FirstHits};
 use rayon::prelude::*;
 
 /// Keeps the random numbers of these pictures apart from those of paths.

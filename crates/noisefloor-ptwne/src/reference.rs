@@ -27,7 +27,7 @@ use crate::math::Vec3;
 use crate::rng::{Key, Rng};
 use crate::scene::Scene;
 use glam::DVec3;
-use noisefloor::{Display, NoiseMask, Rgb};
+use noisefloor::{Rgb, descriptor::NoiseMask, display::Display};
 use rayon::prelude::*;
 use std::ops::{ControlFlow, Range};
 use std::sync::atomic::{AtomicUsize, Ordering};

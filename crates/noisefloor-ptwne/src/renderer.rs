@@ -11,8 +11,10 @@ use crate::rng::Key;
 use crate::sampler::{Sampler, Sampling};
 use crate::scene::Scene;
 use noisefloor::{
-    Batch, BlockRequest, BlockSamples, Counts, Display, FirstHits, ProgressiveSource, Reference, Repeats,
-    Request, Rgb, SourceError, SourceIdentity, SourceInfo, Tile, ToneMapping, Unit,
+    Batch, Counts, ProgressiveSource, Repeats, Request, Rgb, SourceError, SourceInfo, Tile, ToneMapping,
+    Unit,
+    display::Display,
+    source::{BlockRequest, BlockSamples, FirstHits, Reference, SourceIdentity},
 };
 use rayon::prelude::*;
 use std::fmt;
@@ -120,7 +122,7 @@ impl Ptwne {
         height: usize,
         options: RenderOptions,
     ) -> Result<Self, RenderError> {
-        noisefloor::check_image(width, height)?;
+        noisefloor::internal::check_image(width, height)?;
         let bad = |name, value, range| Err(RenderError::Option { name, value, range });
         if !(1..=MAX_DEPTH).contains(&options.max_depth) {
             return bad("max_depth", options.max_depth as usize, "1…10000 segments");

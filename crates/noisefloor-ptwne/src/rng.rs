@@ -35,7 +35,7 @@ pub(crate) fn hash(seed: u64, index: u32) -> f32 {
 pub(crate) struct Rng(u64, u64);
 
 impl Rng {
-    /// The stream of one path. `pixel` is below 2²⁸ (`noisefloor::MAX_PIXELS`), so that the packed word and
+    /// The stream of one path. `pixel` is below 2²⁸ (`noisefloor::tile::MAX_PIXELS`), so that the packed word and
     /// thus the state differ between any two paths of a render, for the first 2³⁶ samples of a pixel.
     #[inline]
     pub(crate) fn new(key: Key, pixel: u64, sample: u64) -> Self {

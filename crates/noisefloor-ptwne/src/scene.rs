@@ -10,7 +10,7 @@ use crate::material::CompiledMaterial;
 use crate::math::Vec3;
 use crate::parts::{Parts, Surroundings};
 use crate::texture::Texture;
-use noisefloor::SourceIdentity;
+use noisefloor::source::SourceIdentity;
 
 /// A scene whose centre is farther from the origin than this many of its radii is moved there: `f32` keeps 24
 /// bits of each coordinate, and those that only say where the scene is are lost to its detail.

@@ -40,15 +40,15 @@ macro_rules! raised_as {
 }
 
 raised_as! {
-    noisefloor::ParamsError => ParameterError,
-    noisefloor::ThresholdError => ParameterError,
-    noisefloor::ViewingTextError => ParameterError,
-    noisefloor::TileError => SizeError,
-    noisefloor::FilmError => BatchError,
-    noisefloor::ModelError => ModelError,
-    noisefloor::CriterionError => CriterionError,
-    noisefloor::CheckpointError => CheckpointError,
-    noisefloor::StillError => PictureError,
+    noisefloor::params::ParamsError => ParameterError,
+    noisefloor::oracle::ThresholdError => ParameterError,
+    noisefloor::viewing::ViewingTextError => ParameterError,
+    noisefloor::tile::TileError => SizeError,
+    noisefloor::film::FilmError => BatchError,
+    noisefloor::model::ModelError => ModelError,
+    noisefloor::criterion::CriterionError => CriterionError,
+    noisefloor::checkpoint::CheckpointError => CheckpointError,
+    noisefloor::stills::StillError => PictureError,
     MetricError => PictureError,
 }
 

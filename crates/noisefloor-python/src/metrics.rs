@@ -4,7 +4,7 @@ use crate::arrays::{Pixels, pixels, plane};
 use crate::errors::{Raise, SizeError};
 use crate::params::{ViewingLike, tone_mapping};
 use crate::pool;
-use noisefloor::{Display, Rgb, Viewing};
+use noisefloor::{Rgb, Viewing, display::Display};
 use noisefloor_rivals::metrics::{MetricMaps, MetricPair, MetricScores};
 use numpy::PyArray2;
 use pyo3::prelude::*;

@@ -1,7 +1,7 @@
 //! Oracles.
 
 use crate::errors::{Raise, file_error};
-use noisefloor::{Evidence, Model, Oracle, StoppingCriterion, Threshold};
+use noisefloor::{Model, Oracle, StoppingCriterion, Threshold, evidence::Evidence};
 use pyo3::prelude::*;
 use std::fs::File;
 use std::path::PathBuf;

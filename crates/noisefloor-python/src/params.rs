@@ -92,7 +92,7 @@ impl ViewingLike {
             None => Ok(Viewing::default()),
             Some(Self::Made(viewing)) => Ok(viewing.0),
             Some(Self::Text(text)) => {
-                text.parse().map_err(|error: noisefloor::ViewingTextError| error.raise())
+                text.parse().map_err(|error: noisefloor::viewing::ViewingTextError| error.raise())
             }
         }
     }

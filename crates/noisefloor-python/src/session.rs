@@ -314,9 +314,9 @@ fn resume(session: &mut Session<Oracle>, path: &Path, job: &str) -> PyResult<()>
     Ok(())
 }
 
-fn raise(path: &Path, error: noisefloor::CheckpointError) -> PyErr {
+fn raise(path: &Path, error: noisefloor::checkpoint::CheckpointError) -> PyErr {
     match error {
-        noisefloor::CheckpointError::Io(error) => file_error(path, &error),
+        noisefloor::checkpoint::CheckpointError::Io(error) => file_error(path, &error),
         other => CheckpointError::new_err(other.to_string()),
     }
 }

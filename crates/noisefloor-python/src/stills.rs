@@ -6,7 +6,11 @@ use crate::oracle::PyOracle;
 use crate::params::PyParams;
 use crate::pool;
 use crate::verdicts::PyVerdict;
-use noisefloor::{Evidence, Oracle, Params, Samples, SnapshotPair, Still, TileGrid};
+use noisefloor::{
+    Oracle, Params, TileGrid,
+    evidence::{Evidence, Samples},
+    stills::{SnapshotPair, Still},
+};
 use numpy::PyArray2;
 use pyo3::prelude::*;
 

@@ -1,7 +1,10 @@
 //! What a session says: tiles, requests, verdicts, stops.
 
 use crate::arrays::plane;
-use noisefloor::{BlockRequest, BlockSamples, Request, Stop, Tile, Verdict};
+use noisefloor::{
+    Request, Stop, Tile, Verdict,
+    source::{BlockRequest, BlockSamples},
+};
 use numpy::PyArray2;
 use pyo3::prelude::*;
 

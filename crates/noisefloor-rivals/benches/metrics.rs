@@ -4,7 +4,7 @@
 use criterion::{Criterion, criterion_group, criterion_main};
 use linfa_linalg::svd::SVD;
 use ndarray::Array2;
-use noisefloor::{Rgb, luminance};
+use noisefloor::{Rgb, display::luminance};
 use noisefloor_rivals::{DisplayPixels, Vdp, metrics};
 use noisefloor_testkit::Noise;
 use std::hint::black_box;

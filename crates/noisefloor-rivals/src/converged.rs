@@ -2,7 +2,10 @@
 
 use crate::metrics::cvvdp_of_tiles;
 use crate::pixels::{displayed, verdict};
-use noisefloor::{CriterionError, Needs, StoppingCriterion, Tile, Verdict, View};
+use noisefloor::{
+    StoppingCriterion, Tile, Verdict,
+    criterion::{CriterionError, Needs, View},
+};
 use noisefloor_vision::VisionModel;
 
 /// Default of [`ConvergedCvvdp::lost`]: agrees with people on average.
@@ -67,7 +70,7 @@ impl StoppingCriterion for ConvergedCvvdp {
 mod tests {
     use super::*;
     use crate::testing::{constant, empty, expose};
-    use noisefloor::{Display, Film, Viewing};
+    use noisefloor::{Film, Viewing, display::Display};
     use noisefloor_testkit::Noise;
 
     fn judge_on(viewing: &str, film: &Film, lost: f64) -> Result<Vec<Verdict>, CriterionError> {

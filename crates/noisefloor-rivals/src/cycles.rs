@@ -1,7 +1,10 @@
 //! Adaptive sampling as in Blender Cycles.
 
 use crate::pixels::{DEFAULT_SHARE, enough, half_difference, need_of_share, verdict};
-use noisefloor::{CriterionError, Film, Needs, StoppingCriterion, Tile, TileGrid, Verdict, View};
+use noisefloor::{
+    Film, StoppingCriterion, Tile, TileGrid, Verdict,
+    criterion::{CriterionError, Needs, View},
+};
 use rayon::prelude::*;
 
 /// Default of [`CyclesAdaptive::threshold`]: Blender's.

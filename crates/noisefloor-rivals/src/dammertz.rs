@@ -1,7 +1,10 @@
 //! The hierarchical stopping condition of Dammertz et al. 2010.
 
 use crate::pixels::{half_difference, verdict};
-use noisefloor::{CriterionError, Film, Needs, StoppingCriterion, Tile, TileGrid, Verdict, View};
+use noisefloor::{
+    Film, StoppingCriterion, Tile, TileGrid, Verdict,
+    criterion::{CriterionError, Needs, View},
+};
 use rayon::prelude::*;
 use std::ops::Range;
 

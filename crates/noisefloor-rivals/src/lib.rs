@@ -27,7 +27,10 @@
 //! Most rivals remember earlier pictures, and forget them when a new film begins.
 //!
 //! ```
-//! use noisefloor::*;
+//! use noisefloor::{
+//!     Batch, Counts, Driver, DriverError, Params, ProgressiveSource, Repeats, Request, SourceError, SourceInfo,
+//!     StopReason, Unit,
+//! };
 //! use noisefloor_testkit::Noise;
 //!
 //! /// A renderer of a grey wall, lit by a flickering lamp.

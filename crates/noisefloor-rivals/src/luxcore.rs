@@ -1,7 +1,10 @@
 //! The halt criterion of LuxCoreRender.
 
 use crate::pixels::{displayed, enough, verdict};
-use noisefloor::{CriterionError, Rgb, StoppingCriterion, Tile, TileGrid, Verdict, View};
+use noisefloor::{
+    Rgb, StoppingCriterion, Tile, TileGrid, Verdict,
+    criterion::{CriterionError, View},
+};
 
 /// Default of [`LuxCoreHalt::share`].
 pub(crate) const DEFAULT_SHARE: f64 = 0.31;
@@ -93,7 +96,7 @@ impl StoppingCriterion for LuxCoreHalt {
 mod tests {
     use super::*;
     use crate::testing::{empty, expose, view};
-    use noisefloor::{Display, Film};
+    use noisefloor::{Film, display::Display};
     use noisefloor_testkit::Noise;
     use statrs::distribution::{ContinuousCDF, Normal};
 

@@ -1,6 +1,6 @@
 //! What criteria by pixel have in common.
 
-use noisefloor::{Film, Rgb, Verdict, View};
+use noisefloor::{Film, Rgb, Verdict, criterion::View};
 use rayon::prelude::*;
 
 /// Share of a tile's pixels that must meet a condition.

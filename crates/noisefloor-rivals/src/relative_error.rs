@@ -2,7 +2,9 @@
 
 use crate::pixels::{DEFAULT_SHARE, enough, need_of_share, verdict};
 use noisefloor::{
-    CriterionError, Film, Needs, Rgb, StoppingCriterion, Tile, TileGrid, Verdict, View, luminance,
+    Film, Rgb, StoppingCriterion, Tile, TileGrid, Verdict,
+    criterion::{CriterionError, Needs, View},
+    display::luminance,
 };
 use rayon::prelude::*;
 use statrs::distribution::{ContinuousCDF, Normal, StudentsT};

@@ -3,7 +3,10 @@
 use crate::picture::DisplayPixels;
 use crate::pixels::{displayed, verdict};
 use crate::vdp::{Response, Vdp};
-use noisefloor::{CriterionError, Film, StoppingCriterion, Tile, TileGrid, Verdict, View};
+use noisefloor::{
+    Film, StoppingCriterion, Tile, TileGrid, Verdict,
+    criterion::{CriterionError, View},
+};
 
 /// Default of [`Myszkowski1998::probability`]: fitted to people on renderings with too little noise.
 pub(crate) const DEFAULT_SEEN: f64 = 0.55;

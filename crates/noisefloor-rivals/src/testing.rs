@@ -1,8 +1,8 @@
 //! Films and sources of known noise, for tests.
 
 use noisefloor::{
-    Batch, Counts, Display, Film, ProgressiveSource, Repeats, Request, Rgb, SourceError, SourceInfo,
-    TileGrid, Unit, View, Viewing,
+    Batch, Counts, Film, ProgressiveSource, Repeats, Request, Rgb, SourceError, SourceInfo, TileGrid, Unit,
+    Viewing, criterion::View, display::Display,
 };
 use noisefloor_testkit::Noise;
 

@@ -1,7 +1,10 @@
 //! A time limit.
 
 use crate::pixels::verdict;
-use noisefloor::{CriterionError, StoppingCriterion, Tile, TileGrid, Verdict, View};
+use noisefloor::{
+    StoppingCriterion, Tile, TileGrid, Verdict,
+    criterion::{CriterionError, View},
+};
 use std::time::{Duration, Instant};
 
 /// Stops all tiles a number of seconds after the first verdict.

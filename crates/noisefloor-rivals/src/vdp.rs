@@ -8,7 +8,7 @@ pub use csf::{VdpViewing, VdpViewingError};
 
 use crate::picture::{DifferenceMap, DisplayPixels, MetricError};
 use cortex::Cortex;
-use noisefloor::{luminance, srgb_decode};
+use noisefloor::display::{luminance, srgb_decode};
 use rayon::prelude::*;
 use std::sync::{Arc, Mutex, PoisonError};
 

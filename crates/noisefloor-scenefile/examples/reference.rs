@@ -7,7 +7,7 @@
 #![expect(clippy::print_stdout, reason = "a table for people")]
 
 use ndarray::Array2;
-use noisefloor::{NoiseMask, ProgressiveSource, Request, Rgb, Tile, TileGrid, ToneMapping};
+use noisefloor::{ProgressiveSource, Request, Rgb, Tile, TileGrid, ToneMapping, descriptor::NoiseMask};
 use noisefloor_ptwne::{Ptwne, RenderOptions, Scene, scenes};
 use std::error::Error;
 use std::path::Path;

@@ -1,6 +1,6 @@
 //! Textures of several numbers, one a channel.
 
-use noisefloor::{Rgb, srgb_decode};
+use noisefloor::{Rgb, display::srgb_decode};
 use noisefloor_ptwne::{ImageTexture, Pixels, Texture};
 
 /// Linear values of pixels.

@@ -1,7 +1,7 @@
 //! Files that a scene file names, how much of them is read, and what was in them.
 
 use crate::error::{LoadError, Place};
-use noisefloor::SourceIdentity;
+use noisefloor::source::SourceIdentity;
 use std::cell::RefCell;
 use std::fs::File;
 use std::io::{self, Read};

@@ -3,7 +3,10 @@
 use crate::error::SidecarCause;
 use crate::message::{Hello, Sampled, Status};
 use crate::process::{Failure, Process};
-use noisefloor::{Batch, Counts, Request, Rgb, SourceInfo, check_image, printable};
+use noisefloor::{
+    Batch, Counts, Request, Rgb, SourceInfo,
+    internal::{check_image, printable},
+};
 use serde::de::DeserializeOwned;
 use std::time::Duration;
 

@@ -6,8 +6,10 @@ use crate::picture_run::PictureRun;
 use crate::renderer::DEFAULT_TIMEOUT;
 use crate::template::Template;
 use noisefloor::{
-    Batch, Counts, LightCheck, ProgressiveSource, Repeats, Request, SourceError, SourceIdentity, SourceInfo,
-    Tile, Unit, check_image, printable,
+    Batch, Counts, ProgressiveSource, Repeats, Request, SourceError, SourceInfo, Tile, Unit,
+    internal::{check_image, printable},
+    source::SourceIdentity,
+    watch::LightCheck,
 };
 use noisefloor_image::LinearImage;
 use std::ffi::OsString;

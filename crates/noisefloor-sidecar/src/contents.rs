@@ -1,6 +1,6 @@
 //! What can be known of the files that another program reads.
 
-use noisefloor::SourceIdentity;
+use noisefloor::source::SourceIdentity;
 use std::collections::BTreeSet;
 use std::fs::File;
 use std::io::{self, Read};

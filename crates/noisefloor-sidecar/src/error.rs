@@ -2,7 +2,7 @@
 //! others wrote is safe to print.
 
 use crate::renderer::Renderer;
-use noisefloor::ImpossibleLight;
+use noisefloor::watch::ImpossibleLight;
 use noisefloor_image::{PictureError, WriteError};
 use std::io;
 use std::path::PathBuf;

@@ -8,7 +8,7 @@ use crate::message::{Init, PROTOCOL};
 use crate::process::Process;
 use crate::renderer::{HostOptions, Job, Renderer};
 use crate::setup;
-use noisefloor::SourceIdentity;
+use noisefloor::source::SourceIdentity;
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::time::Duration;

@@ -8,8 +8,9 @@ use crate::process::Process;
 use crate::renderer::{HostOptions, Job, Renderer};
 use crate::setup;
 use noisefloor::{
-    Batch, BlockRequest, FirstHits, LightCheck, ProgressiveSource, Reference, Request, Rgb, SourceError,
-    SourceIdentity, SourceInfo,
+    Batch, ProgressiveSource, Request, Rgb, SourceError, SourceInfo,
+    source::{BlockRequest, FirstHits, Reference, SourceIdentity},
+    watch::LightCheck,
 };
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -18,14 +19,14 @@ use std::path::Path;
 /// Most tiles named in one call: their names stay below the longest header.
 const CALL_TILES: usize = 4096;
 /// Most pixels in one call: a reply of 3 GiB, where lengths have 32 bits. An image has no more.
-const CALL_PIXELS: usize = noisefloor::MAX_PIXELS;
+const CALL_PIXELS: usize = noisefloor::tile::MAX_PIXELS;
 
 /// A renderer in another process. Dropping it ends the process.
 ///
 /// A call that fails because the process ended, did not answer in time, or sent something else than requested
 /// is repeated once in a new process; all earlier batches stay valid. If it fails again, or if the renderer
 /// itself refuses, the call is an error, and the next call tries again. Batches of impossible light
-/// ([`ImpossibleLight`](noisefloor::ImpossibleLight)) are errors, too.
+/// ([`ImpossibleLight`](noisefloor::watch::ImpossibleLight)) are errors, too.
 #[derive(Debug)]
 pub struct Sidecar {
     launch: Launch,

@@ -1,6 +1,6 @@
 //! Errors. Every message says what happened, where, and what to do.
 
-use noisefloor::TileError;
+use noisefloor::tile::TileError;
 use noisefloor_image::{PictureError, StackError, WriteError};
 use std::io;
 use std::path::PathBuf;

@@ -3,7 +3,7 @@
 use crate::error::StudyError;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, ImageEncoder};
-use noisefloor::{Display, Rgb, Tile, TileGrid, ToneMapping};
+use noisefloor::{Rgb, Tile, TileGrid, ToneMapping, display::Display};
 use noisefloor_image::{Frame, Picture, read_picture, running_means};
 use rayon::prelude::*;
 use std::collections::BTreeMap;

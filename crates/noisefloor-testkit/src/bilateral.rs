@@ -1,6 +1,6 @@
 //! A denoiser of a few lines.
 
-use noisefloor::{Rgb, luminance};
+use noisefloor::{Rgb, display::luminance};
 
 /// A bilateral filter (Tomasi & Manduchi 1998) of 7×7 pixels: Gaussian weights by distance, with a standard
 /// deviation of two pixels, and by the difference of luminances, with one of `range`. `pixels` are row-major.

@@ -4,7 +4,8 @@
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use noisefloor::{
-    Display, Film, NoiseMask, Oracle, Rgb, StoppingCriterion, TileGrid, TilePlanes, View, Viewing,
+    Film, Oracle, Rgb, StoppingCriterion, TileGrid, Viewing, criterion::View, descriptor::NoiseMask,
+    display::Display, evidence::TilePlanes,
 };
 use noisefloor_testkit::Noise;
 use std::hint::black_box;

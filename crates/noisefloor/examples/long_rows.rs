@@ -5,7 +5,7 @@
 
 use linfa::prelude::*;
 use ndarray::{Array1, Array2};
-use noisefloor::{SvmParams, fit_svm};
+use noisefloor::svm::{SvmParams, fit_svm};
 use noisefloor_testkit::Noise;
 use std::time::Instant;
 

@@ -9,7 +9,7 @@
 #![allow(clippy::print_stdout, reason = "a table for people")]
 
 use ndarray::Array2;
-use noisefloor::{Oracle, TileGrid, TilePlanes};
+use noisefloor::{Oracle, TileGrid, evidence::TilePlanes};
 use std::f64::consts::TAU;
 
 const SIZE: usize = 256;

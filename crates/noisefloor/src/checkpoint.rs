@@ -3,9 +3,9 @@
 use crate::container::{Fault, Format, MAX_PAYLOAD};
 use crate::display::Display;
 use crate::film::{Film, FilmHead};
-use crate::identity::{IdentityChange, SourceIdentity};
 use crate::params::Params;
-use crate::stop::TileState;
+use crate::session::TileState;
+use crate::source::{IdentityChange, SourceIdentity};
 use crate::tile::Tile;
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;

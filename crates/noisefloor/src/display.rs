@@ -1,11 +1,14 @@
 //! From linear radiance to what a screen shows: exposure, tone mapping, luminance.
 
 use crate::rgb::Rgb;
-use crate::srgb::{srgb_decode, srgb_encode};
-use crate::tone_curve::ToneCurve;
 use multiversion::multiversion;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
+
+mod srgb;
+mod tone_curve;
+pub use srgb::{srgb_decode, srgb_encode};
+pub use tone_curve::ToneCurve;
 
 /// Key of an average scene (Reinhard et al. 2002, §3.1): what the log-average luminance is mapped to.
 pub const DEFAULT_KEY: f32 = 0.18;
@@ -13,7 +16,7 @@ pub const DEFAULT_KEY: f32 = 0.18;
 /// δ of the log-average (Reinhard et al. 2002, eq. 1), as a share of the geometric mean of the luminances
 /// above zero. The paper leaves δ absolute; a relative one makes the unit of radiance irrelevant, and a
 /// geometric mean withstands fireflies.
-pub const DELTA: f64 = 1e-4;
+const DELTA: f64 = 1e-4;
 
 /// Rec.709 luminance of a linear RGB triple, in the unit of its input.
 #[inline(always)]

@@ -4,12 +4,12 @@ use crate::blocks::BlockRequest;
 use crate::checkpoint::{Checkpoint, CheckpointError};
 use crate::criterion::{CriterionError, Resumable, StoppingCriterion};
 use crate::film::FilmError;
-use crate::light::LightCheck;
 use crate::params::Params;
 use crate::session::rounds::CALL_SAMPLES;
 use crate::session::{Session, SessionError};
+use crate::session::{Stop, StopReason};
 use crate::source::{Batch, ProgressiveSource, Repeats, Request, SourceError};
-use crate::stop::{Stop, StopReason};
+use crate::watch::LightCheck;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -81,7 +81,10 @@ pub struct Clock {
 /// Drives a source until a criterion is satisfied.
 ///
 /// ```
-/// use noisefloor::*;
+/// use noisefloor::{
+///     Batch, Counts, Driver, DriverError, Event, FixedSpp, Params, ProgressiveSource, Repeats, Request, SourceError,
+///     SourceInfo, StopReason, Unit,
+/// };
 ///
 /// /// A renderer of a grey wall.
 /// struct Wall;

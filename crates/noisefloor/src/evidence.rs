@@ -2,6 +2,7 @@
 
 use crate::display::{Display, luma_row, luminance};
 use crate::film::Film;
+use crate::internal::HALO;
 use crate::rgb::Rgb;
 use crate::tile::Tile;
 use ndarray::Array2;
@@ -9,12 +10,6 @@ use noisefloor_vision::Viewing;
 use serde::{Deserialize, Serialize};
 use std::cell::RefCell;
 use std::ops::Range;
-
-/// How far filters read beyond a tile, in pixels, and the edge of the blocks that a tile is divided into.
-pub const HALO: usize = 8;
-
-/// Luminance weights, squared and summed: variance of Y′ for unit variance of R′, G′ and B′.
-pub const ROUNDING_LUMINANCE: f32 = 0.2126 * 0.2126 + 0.7152 * 0.7152 + 0.0722 * 0.0722;
 
 /// What a noisy tile is compared with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]

@@ -75,7 +75,7 @@ impl Half {
 ///
 /// Where [blocks](crate::Params::blocks) of a tile got different numbers of samples, its numbers of samples
 /// are those that it got on average, and each batch counts by that in every block: see
-/// [`BlockRequest::spp`](crate::BlockRequest::spp). Batches of the two halves come in pairs with equal
+/// [`BlockRequest::spp`](crate::source::BlockRequest::spp). Batches of the two halves come in pairs with equal
 /// numbers in every block, so that the halves of a block are as alike as those of a tile.
 ///
 /// Memory: 36 bytes per pixel, 18 without halves.

@@ -9,10 +9,10 @@
 //! - A [`Checkpoint`] is a snapshot of either, for resuming it in another process.
 //! - [`Oracle`] is the [`StoppingCriterion`] that judges by a trained [`Model`]; [`FixedSpp`] is the simplest
 //!   one.
-//! - [`Film`], [`Display`], [`TilePlanes`], [`NoiseMask`], [`Descriptor`] and [`Svm`] lead from samples to a
-//!   verdict.
-//! - [`Familiarity`] describes the textures a model has been tried on; elsewhere it asks for twice the
-//!   samples.
+//!
+//! What these three need is at the top; the rest is in modules by subject, which lead from samples to a
+//! verdict: [`source`], [`film`], [`display`], [`evidence`], [`descriptor`], [`svm`], [`model`] and
+//! [`oracle`]. [`stills`] judges pictures rendered elsewhere.
 //!
 //! ```
 //! use noisefloor::{Counts, Oracle, Params, Session, StopReason};
@@ -31,82 +31,54 @@
 //! ```
 
 mod blocks;
-mod checkpoint;
+pub mod checkpoint;
 mod container;
-mod criterion;
-mod descriptor;
-mod display;
-mod driver;
-mod evidence;
-mod familiarity;
-mod film;
-mod identity;
-mod light;
-mod mask;
-mod model;
+pub mod criterion;
+pub mod descriptor;
+pub mod display;
+pub mod driver;
+pub mod evidence;
+pub mod film;
+#[doc(hidden)]
+pub mod internal;
+pub mod model;
 mod nested;
-mod oracle;
-mod origin;
-mod params;
+pub mod oracle;
+pub mod params;
 mod rgb;
-mod session;
-mod source;
-mod srgb;
-mod stills;
-mod stop;
-mod svm;
-mod text;
-mod threshold;
-mod tile;
-mod tone_curve;
+pub mod session;
+pub mod source;
+pub mod stills;
+pub mod svm;
+pub mod tile;
+pub mod watch;
 
-pub use blocks::{BlockRequest, BlockSamples};
-pub use checkpoint::{Checkpoint, CheckpointError};
-pub use criterion::{
-    CriterionError, ExpectedThreshold, FixedSpp, Needs, Resumable, StoppingCriterion, Verdict, View,
-};
-pub use descriptor::{
-    Described, Descriptor, DescriptorError, DescriptorKind, DescriptorSpec, TileDescriptor,
-};
-pub use display::{DEFAULT_KEY, DELTA, Display, ToneMapping, ToneMappingError, luminance};
-pub use driver::{Clock, Driver, DriverError, Event, Progress, TimelinePoint};
-pub use evidence::{Evidence, HALO, ROUNDING_LUMINANCE, Rendering, Samples, TilePlanes, residual_scale};
-pub use familiarity::{Familiarity, nearest};
-pub use film::{Film, FilmError};
-pub use identity::{IdentityChange, SourceIdentity};
-pub use light::{ImpossibleLight, LightCheck};
-pub use mask::{NoiseMask, SigmaError};
-pub use model::{Judgement, Model, ModelError, ModelParts, Scores, TrainingRecord};
+/// Displays, and how far people sit from them.
+pub mod viewing {
+    pub use noisefloor_vision::{
+        Chromaticities, ChromaticityError, Eotf, Primaries, Viewing, ViewingError, ViewingParams,
+        ViewingTextError,
+    };
+}
+
+// For `Session`
+pub use checkpoint::Checkpoint;
+pub use criterion::{FixedSpp, StoppingCriterion, Verdict};
+pub use display::ToneMapping;
+pub use film::Film;
+pub use model::Model;
+pub use oracle::{Oracle, Threshold};
+pub use params::{Audience, Params, Schedule};
+pub use rgb::Rgb;
+pub use session::{Session, SessionError, Stop, StopReason};
+pub use tile::{Tile, TileGrid};
+pub use viewing::Viewing;
+
+// For `Driver`
+pub use driver::{Driver, DriverError, Event};
+
+// For `ProgressiveSource`
+pub use source::{Batch, Counts, ProgressiveSource, Repeats, Request, SourceError, SourceInfo, Unit};
+
 /// Planes, maps and training rows are its arrays.
 pub use ndarray;
-/// Viewing conditions are its types.
-pub use noisefloor_vision::{
-    Chromaticities, ChromaticityError, Eotf, Primaries, Viewing, ViewingError, ViewingParams,
-    ViewingTextError,
-};
-pub use oracle::Oracle;
-pub use origin::{OriginRelation, SampleOrigin};
-pub use params::{Audience, Params, ParamsError, Schedule};
-pub use rgb::Rgb;
-pub use session::{Session, SessionError};
-pub use source::{
-    Batch, Counts, FirstHits, ProgressiveSource, Reference, Repeats, Request, SourceError, SourceInfo, Unit,
-};
-pub use srgb::{srgb_decode, srgb_encode};
-pub use stills::{SnapshotPair, Still, StillError};
-pub use stop::{Stop, StopReason};
-pub use svm::{Classifier, Platt, Scaler, Svm};
-#[cfg(feature = "train")]
-pub use svm::{
-    SvmParams, SvmTrainError, Weights, check_examples, fit_platt, fit_svm, fit_weights, squared_distances,
-};
-pub use text::printable;
-pub use threshold::{Threshold, ThresholdError};
-#[cfg(feature = "train")]
-/// Their errors are causes of [`SvmTrainError`].
-pub use {linfa, linfa_svm};
-
-pub use tile::{
-    DEFAULT_TILE, MAX_EDGE, MAX_PIXELS, MAX_TILE, MIN_TILE, Tile, TileError, TileGrid, check_image,
-};
-pub use tone_curve::ToneCurve;

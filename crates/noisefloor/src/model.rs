@@ -1,10 +1,9 @@
-//! The model: everything a verdict depends on, and its file. The layout is that of [`container`].
+//! The model: everything a verdict depends on, and its file. The layout is that of `container.rs`.
 
 use crate::container::{self, Fault, Format, MAX_PAYLOAD};
 use crate::descriptor::{Descriptor, DescriptorError, DescriptorKind, DescriptorSpec};
 use crate::display::ToneMapping;
 use crate::evidence::Evidence;
-use crate::familiarity::{CAUTION, Familiarity};
 use crate::params::Audience;
 use crate::svm::Classifier;
 use noisefloor_vision::Viewing;
@@ -12,6 +11,10 @@ use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 use std::io::{self, Read, Write};
 use thiserror::Error;
+
+mod familiarity;
+pub(crate) use familiarity::CAUTION;
+pub use familiarity::Familiarity;
 
 const FORMAT: Format = Format { magic: *b"NFMODEL\0", version: VERSION };
 const VERSION: u32 = 4;

@@ -1,8 +1,11 @@
 //! Whether one picture contains the samples of another.
 
+use crate::descriptor::NoiseMask;
 use crate::display::{Display, luminance};
-use crate::evidence::{ROUNDING_LUMINANCE, Rendering, Samples};
-use crate::mask::NoiseMask;
+use crate::{
+    evidence::{Rendering, Samples},
+    internal::ROUNDING_LUMINANCE,
+};
 use ndarray::Array2;
 
 /// Edge of the blocks that count as independent observations, in pixels: wider than any pixel filter.

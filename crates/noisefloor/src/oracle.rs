@@ -9,10 +9,12 @@ use crate::descriptor::{Described, DescriptorError};
 use crate::evidence::{Evidence, TilePlanes};
 use crate::model::{Model, ProbabilityCurve};
 use crate::params::Audience;
-use crate::threshold::Threshold;
 use crate::tile::{Tile, TileGrid};
 use ndarray::s;
 use rayon::prelude::*;
+
+mod threshold;
+pub use threshold::{Threshold, ThresholdError};
 
 /// A tile with more than one in this many pixels without valid samples gives no evidence, and is not called
 /// converged.

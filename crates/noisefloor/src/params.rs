@@ -141,7 +141,7 @@ pub struct Params {
     /// ([`crate::StoppingCriterion::audience`]).
     pub audience: Audience,
     /// Edge in pixels of the blocks that get samples by their need, which has to divide that of the tiles:
-    /// [`MIN_TILE`](crate::MIN_TILE)…[`Params::tile`]. 0, the default, samples all of a tile alike. For
+    /// [`MIN_TILE`]…[`Params::tile`]. 0, the default, samples all of a tile alike. For
     /// criteria that know what blocks need, such as the oracle, and sources that can aim at them; with others
     /// nothing changes.
     pub blocks: usize,

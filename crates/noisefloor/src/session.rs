@@ -4,13 +4,16 @@ use crate::blocks::PILOT;
 use crate::criterion::{CriterionError, StoppingCriterion, Verdict, View};
 use crate::display::{Display, ToneMapping};
 use crate::film::{Film, FilmError};
-use crate::identity::SourceIdentity;
 use crate::params::{Audience, Params, ParamsError};
 use crate::rgb::Rgb;
+use crate::source::SourceIdentity;
 use crate::source::{Reference, Request};
-use crate::stop::{Stop, StopReason, TileState};
 use crate::tile::{Tile, TileError, TileGrid};
 use thiserror::Error;
+
+mod stop;
+pub(crate) use stop::TileState;
+pub use stop::{Stop, StopReason};
 
 /// Why a session failed.
 #[derive(Debug, Error)]

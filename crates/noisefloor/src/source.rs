@@ -1,12 +1,15 @@
 //! What a renderer offers: samples on request.
 
-use crate::blocks::{BlockRequest, BlockSamples, blocks_of};
-use crate::identity::SourceIdentity;
+use crate::blocks::blocks_of;
 use crate::rgb::Rgb;
 use crate::tile::Tile;
 use auto_impl::auto_impl;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
+
+mod identity;
+pub use crate::blocks::{BlockRequest, BlockSamples};
+pub use identity::{IdentityChange, SourceIdentity};
 
 /// What a source counts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]

@@ -6,13 +6,15 @@ use crate::display::{Display, ToneMapping, luminance};
 use crate::evidence::{Evidence, Rendering, Samples, TilePlanes};
 use crate::nested::shared_samples;
 use crate::oracle::Oracle;
-use crate::origin::{OriginRelation, SampleOrigin};
 use crate::rgb::Rgb;
 use crate::tile::{Tile, TileGrid};
 use noisefloor_vision::Viewing;
 use rayon::prelude::*;
 use std::borrow::Cow;
 use thiserror::Error;
+
+mod origin;
+pub use origin::{OriginRelation, SampleOrigin};
 
 /// Mean difference of a tile from which it may be unlike, as a share of the display's range.
 const UNLIKE: f64 = 0.1;

@@ -1,5 +1,6 @@
 //! The image as a grid of tiles.
 
+use crate::internal::check_image;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
@@ -71,7 +72,7 @@ pub enum TileError {
 /// let grid = noisefloor::TileGrid::new(800, 600, 128)?;
 /// assert_eq!((grid.columns(), grid.rows(), grid.len()), (7, 5, 35));
 /// assert_eq!(grid.tile(34).width, 800 - 6 * 128);
-/// # Ok::<(), noisefloor::TileError>(())
+/// # Ok::<(), noisefloor::tile::TileError>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct TileGrid {
@@ -145,15 +146,6 @@ impl TileGrid {
     pub fn tiles(self) -> impl ExactSizeIterator<Item = Tile> {
         (0..self.len()).map(move |index| self.tile(index))
     }
-}
-
-/// Checks an image's size against the limits, before anything of that size is allocated.
-///
-/// # Errors
-/// [`TileError::Image`] if it is empty or too large.
-pub fn check_image(width: usize, height: usize) -> Result<(), TileError> {
-    let fits = (1..=MAX_EDGE).contains(&width) && (1..=MAX_EDGE).contains(&height);
-    if fits && width * height <= MAX_PIXELS { Ok(()) } else { Err(TileError::Image(width, height)) }
 }
 
 #[cfg(test)]

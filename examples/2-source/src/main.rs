@@ -4,7 +4,7 @@
 
 mod shadow;
 
-use noisefloor::{Driver, Event, Oracle, Params, Progress, StopReason};
+use noisefloor::{Driver, Event, Oracle, Params, StopReason, driver::Progress};
 use shadow::Shadow;
 use std::error::Error;
 use std::process::ExitCode;

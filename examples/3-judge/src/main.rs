@@ -2,7 +2,11 @@
 //! same view.
 #![allow(clippy::print_stdout, reason = "an example prints")]
 
-use noisefloor::{DEFAULT_TILE, Oracle, Rendering, Samples, TileGrid, TilePlanes, ToneMapping};
+use noisefloor::{
+    Oracle, TileGrid, ToneMapping,
+    evidence::{Rendering, Samples, TilePlanes},
+    tile::DEFAULT_TILE,
+};
 use noisefloor_image::{LinearImage, read_exr};
 use std::error::Error;
 use std::process::ExitCode;

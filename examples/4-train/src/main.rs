@@ -1,7 +1,7 @@
 //! Train: learns a model from human thresholds, and scores it on scenes it has not seen.
 #![allow(clippy::print_stdout, reason = "an example prints")]
 
-use noisefloor::{Descriptor, Evidence, Model, Threshold};
+use noisefloor::{Model, Threshold, descriptor::Descriptor, evidence::Evidence};
 use noisefloor_image::write_atomic;
 use noisefloor_learn::{Corpora, describe_corpora, read_table};
 use noisefloor_learn::{Prediction, Table, constant_noise_baseline, score};

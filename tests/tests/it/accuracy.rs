@@ -1,4 +1,4 @@
-use noisefloor::{Model, SvmParams, Threshold};
+use noisefloor::{Model, Threshold, svm::SvmParams};
 use noisefloor_learn::{
     Table, VISIBLE_CHOICES, choices, choose_and_leave_out, constant_noise_baseline, read_table_with,
     scene_median_baseline, score,

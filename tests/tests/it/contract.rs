@@ -1,7 +1,7 @@
 use crate::kit::{Altered, Synthetic};
 use noisefloor::{
-    Batch, BlockRequest, BlockSamples, Counts, FirstHits, ProgressiveSource, Reference, Repeats, Request,
-    SourceError, SourceInfo, Tile, Unit,
+    Batch, Counts, ProgressiveSource, Repeats, Request, SourceError, SourceInfo, Tile, Unit,
+    source::{BlockRequest, BlockSamples, FirstHits, Reference},
 };
 use noisefloor_image::{RenderLayers, StackSource, write_exr};
 use noisefloor_ptwne::{Ptwne, RenderOptions, scenes};

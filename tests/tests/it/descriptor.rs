@@ -1,6 +1,9 @@
 use noisefloor::{
-    Described, Descriptor, DescriptorError, DescriptorKind, Evidence, Model, ModelError, SvmParams,
-    TileDescriptor, TileGrid, TilePlanes, ToneMapping, Viewing,
+    Model, TileGrid, ToneMapping, Viewing,
+    descriptor::{Described, Descriptor, DescriptorError, DescriptorKind, TileDescriptor},
+    evidence::{Evidence, TilePlanes},
+    model::ModelError,
+    svm::SvmParams,
 };
 use noisefloor_learn::{Level, Origin, Table, TrainParams, Zone, read_table_with, train, write_table};
 use std::collections::BTreeMap;

@@ -1,7 +1,7 @@
 use crate::kit::{Altered, Synthetic};
 use noisefloor::{
-    Batch, Driver, Event, Evidence, FixedSpp, Model, ModelParts, Oracle, Params, ProgressiveSource,
-    Reference, Rgb, Schedule, Session, Stop, StopReason, StoppingCriterion, Threshold,
+    Batch, Driver, Event, FixedSpp, Model, Oracle, Params, ProgressiveSource, Rgb, Schedule, Session, Stop,
+    StopReason, StoppingCriterion, Threshold, evidence::Evidence, model::ModelParts, source::Reference,
 };
 use noisefloor_ptwne::{Ptwne, RenderOptions, scenes};
 use std::cell::RefCell;

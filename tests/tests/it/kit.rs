@@ -1,6 +1,6 @@
 use noisefloor::{
-    Batch, BlockRequest, BlockSamples, Counts, FirstHits, ProgressiveSource, Reference, Repeats, Request,
-    Rgb, SourceError, SourceInfo, Unit,
+    Batch, Counts, ProgressiveSource, Repeats, Request, Rgb, SourceError, SourceInfo, Unit,
+    source::{BlockRequest, BlockSamples, FirstHits, Reference},
 };
 use noisefloor_sidecar::{Renderer, find, probe};
 use noisefloor_testkit::{Noise, Requirement, require};

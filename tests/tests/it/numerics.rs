@@ -1,6 +1,6 @@
 use crate::kit::{Altered, Synthetic};
 use noisefloor::{
-    Driver, Oracle, Params, ProgressiveSource, Rgb, Schedule, Session, Stop, StopReason, TilePlanes,
+    Driver, Oracle, Params, ProgressiveSource, Rgb, Schedule, Session, Stop, StopReason, evidence::TilePlanes,
 };
 
 /// A run by the bundled oracle.

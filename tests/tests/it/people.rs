@@ -1,4 +1,7 @@
-use noisefloor::{Oracle, Samples, Tile, TilePlanes, residual_scale};
+use noisefloor::{
+    Oracle, Tile,
+    evidence::{Samples, TilePlanes, residual_scale},
+};
 use noisefloor_image::{DisplayImage, Picture, read_picture};
 use noisefloor_learn::{Corpus, JudgedZone, ZoneImages};
 use noisefloor_testkit::require_shared;

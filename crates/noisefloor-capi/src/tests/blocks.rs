@@ -1,7 +1,7 @@
 //! Samples by blocks.
 
 use super::*;
-use noisefloor::BlockRequest;
+use noisefloor::source::BlockRequest;
 
 /// The most blocks that a tile of these tests has.
 const MOST: usize = 4;

@@ -6,7 +6,7 @@ use super::renderer::RendererArgs;
 use super::tone::ToneArgs;
 use super::viewing::ViewingArgs;
 use clap::Args;
-use noisefloor::DEFAULT_TILE;
+use noisefloor::tile::DEFAULT_TILE;
 use std::ffi::OsString;
 use std::path::PathBuf;
 

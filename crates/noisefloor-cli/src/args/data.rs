@@ -68,7 +68,7 @@ mod checks {
     use super::{DataArgs, DescriptorChoice, MachineChoice, SearchArgs};
     use crate::learning::{DataJob, DataSource, SearchJob};
     use anyhow::{Context, bail};
-    use noisefloor::{Descriptor, NoiseMask};
+    use noisefloor::descriptor::{Descriptor, NoiseMask};
     use noisefloor_learn::Learner;
 
     /// What to learn from or to score, and how to train on it.

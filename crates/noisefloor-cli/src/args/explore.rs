@@ -4,7 +4,7 @@ use super::oracle::OracleArgs;
 use super::values;
 use super::viewing::ViewingArgs;
 use clap::Args;
-use noisefloor::{Audience, DEFAULT_TILE};
+use noisefloor::{Audience, tile::DEFAULT_TILE};
 use std::net::SocketAddr;
 use std::path::PathBuf;
 

@@ -7,7 +7,10 @@ use super::viewing::ViewingArgs;
 use crate::judge::{DenoisedJob, JudgeJob, Question};
 use anyhow::bail;
 use clap::Args;
-use noisefloor::{DEFAULT_TILE, Evidence, Samples};
+use noisefloor::{
+    evidence::{Evidence, Samples},
+    tile::DEFAULT_TILE,
+};
 use noisefloor_denoise::DEFAULT_JODS_LOST;
 use std::path::PathBuf;
 

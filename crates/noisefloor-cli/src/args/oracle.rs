@@ -2,7 +2,7 @@
 
 use anyhow::Context;
 use clap::{Args, ValueEnum};
-use noisefloor::{Evidence, Model, Oracle, Threshold};
+use noisefloor::{Model, Oracle, Threshold, evidence::Evidence};
 use std::fs::File;
 use std::io::BufReader;
 use std::path::{Path, PathBuf};

@@ -9,7 +9,7 @@ use crate::folder::Earlier;
 use crate::render::{Autosave, FramePattern, Judge, RenderJob, SequenceJob, TEV_ADDRESS};
 use anyhow::bail;
 use clap::{Args, ValueEnum};
-use noisefloor::{Audience, DEFAULT_TILE, Params, Schedule};
+use noisefloor::{Audience, Params, Schedule, tile::DEFAULT_TILE};
 use std::ffi::OsString;
 use std::net::SocketAddr;
 use std::path::PathBuf;

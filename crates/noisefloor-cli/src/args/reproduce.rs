@@ -2,7 +2,7 @@
 
 use super::values;
 use clap::Args;
-use noisefloor::DEFAULT_TILE;
+use noisefloor::tile::DEFAULT_TILE;
 use std::path::PathBuf;
 
 /// Repeat the paper's own experiment on human corpora, at its scale.

@@ -144,8 +144,9 @@ struct AnalyseArgs {
     /// Folder to write into.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// The threshold of a tile in the corpus and in the grid over the picture.
-    #[arg(long, value_enum, default_value_t = ThresholdChoice::Level95)]
+    /// The threshold of a tile in the corpus and in the grid over the picture. `train` expects the mean: P counts the
+    /// scatter of observers around it.
+    #[arg(long, value_enum, default_value_t = ThresholdChoice::Mean)]
     threshold: ThresholdChoice,
     /// Keep observers whom the rules of the study exclude.
     #[arg(long)]

@@ -2,7 +2,7 @@
 
 use anyhow::bail;
 use clap::Args;
-use noisefloor::{DEFAULT_KEY, ToneMapping};
+use noisefloor::{ToneMapping, display::DEFAULT_KEY};
 use noisefloor_image::{LutInput, read_cube};
 use std::path::PathBuf;
 

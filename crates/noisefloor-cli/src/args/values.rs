@@ -1,7 +1,10 @@
 //! Values as they are typed.
 
 use crate::render::Autosave;
-use noisefloor::{Audience, MAX_TILE, MIN_TILE};
+use noisefloor::{
+    Audience,
+    tile::{MAX_TILE, MIN_TILE},
+};
 use noisefloor_rivals::{RIVALS, Rival};
 use std::num::NonZeroUsize;
 use std::time::Duration;
@@ -17,7 +20,7 @@ pub(super) fn rival(text: &str) -> Result<&'static Rival, String> {
 pub(super) fn size(text: &str) -> Result<(usize, usize), String> {
     let parts = text.split_once(['x', 'X', '×']).and_then(|(w, h)| Some((w.parse().ok()?, h.parse().ok()?)));
     let (width, height) = parts.ok_or("expected WIDTHxHEIGHT in pixels, such as 512x512")?;
-    noisefloor::check_image(width, height).map_err(|e| e.to_string())?;
+    noisefloor::internal::check_image(width, height).map_err(|e| e.to_string())?;
     Ok((width, height))
 }
 

@@ -3,7 +3,7 @@
 use super::{EvaluateJob, Report};
 use crate::bars::Bars;
 use crate::say::{NotSaid, say};
-use noisefloor::Scores;
+use noisefloor::model::Scores;
 use noisefloor_image::write_atomic;
 use noisefloor_lab::figures::write_figures;
 use noisefloor_lab::rivals::{self, RatedRival, mean, plot_scene_means};

@@ -10,8 +10,11 @@ use crate::sources::Source;
 use anyhow::{Context, bail};
 use clap::Parser;
 use noisefloor::{
-    Batch, Clock, Counts, FixedSpp, Progress, ProgressiveSource, Repeats, Request, Resumable, Session,
-    SourceError, SourceIdentity, SourceInfo, TileGrid, TimelinePoint, Unit,
+    Batch, Counts, FixedSpp, ProgressiveSource, Repeats, Request, Session, SourceError, SourceInfo, TileGrid,
+    Unit,
+    criterion::Resumable,
+    driver::{Clock, Progress, TimelinePoint},
+    source::SourceIdentity,
 };
 use noisefloor_farm::{
     FarmError, FarmFolder, FarmJob, FrameJob, FrameState, PlannedBatch, ShardError, ShardFile, ShardJob,

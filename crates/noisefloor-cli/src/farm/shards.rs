@@ -7,7 +7,11 @@ use crate::folder::{Earlier, Folder};
 use crate::render::{JOB, RenderJob};
 use crate::say::{note, say};
 use anyhow::{Context, bail};
-use noisefloor::{Clock, Progress, Resumable, Session, TimelinePoint};
+use noisefloor::{
+    Session,
+    criterion::Resumable,
+    driver::{Clock, Progress, TimelinePoint},
+};
 use noisefloor_farm::{FarmError, FrameJob, ShardFile, ShardJob, ShardSet};
 use std::process::ExitCode;
 

@@ -3,7 +3,11 @@
 use super::read;
 use crate::say::{note, say, say_json};
 use anyhow::{Context, bail};
-use noisefloor::{Evidence, Rgb, Samples, SnapshotPair, Still, Tile, TileGrid, ToneMapping, Viewing};
+use noisefloor::{
+    Rgb, Tile, TileGrid, ToneMapping, Viewing,
+    evidence::{Evidence, Samples},
+    stills::{SnapshotPair, Still},
+};
 use noisefloor_denoise::{DenoisedError, DenoisedHalves};
 use noisefloor_image::check_writable;
 use noisefloor_image::maps::{Canvas, draw_field};

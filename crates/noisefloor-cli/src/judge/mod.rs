@@ -8,7 +8,9 @@ pub use denoised::DenoisedJob;
 use crate::say::note;
 use anyhow::{Context, bail};
 use noisefloor::{
-    Evidence, Oracle, Samples, SnapshotPair, Still, Tile, TileGrid, ToneMapping, Verdict, Viewing,
+    Oracle, Tile, TileGrid, ToneMapping, Verdict, Viewing,
+    evidence::{Evidence, Samples},
+    stills::{SnapshotPair, Still},
 };
 use noisefloor_image::maps::{Canvas, ColourScale, NOISE_SCALE, TileMark, draw_field, draw_tiles};
 use noisefloor_image::{

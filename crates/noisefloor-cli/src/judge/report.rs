@@ -1,7 +1,7 @@
 //! Verdicts as a table or as JSON.
 
 use crate::say::{NotSaid, say, say_json};
-use noisefloor::{ExpectedThreshold, Oracle, Threshold};
+use noisefloor::{Oracle, Threshold, criterion::ExpectedThreshold};
 use serde::Serialize;
 use std::path::Path;
 

@@ -3,7 +3,7 @@
 
 use super::Output;
 use crate::say::{NotSaid, note, say};
-use noisefloor::{FirstHits, Rgb, Session, StoppingCriterion};
+use noisefloor::{Rgb, Session, StoppingCriterion, source::FirstHits};
 use noisefloor_denoise::{DenoisedRecord, Denoiser, NoisyPicture};
 use noisefloor_image::maps::{Canvas, ColourScale, draw_field};
 use noisefloor_image::{RenderLayers, write_exr};

@@ -15,7 +15,10 @@ use crate::say::{note, one_line};
 use crate::sources::Source;
 use anyhow::Context;
 use noisefloor::{
-    Checkpoint, Clock, ExpectedThreshold, Progress, Rgb, SampleOrigin, Session, StoppingCriterion,
+    Checkpoint, Rgb, Session, StoppingCriterion,
+    criterion::ExpectedThreshold,
+    driver::{Clock, Progress},
+    stills::SampleOrigin,
 };
 use noisefloor_image::{check_writable, write_atomic};
 use noisefloor_rivals::metrics::relative_mse;
@@ -133,7 +136,7 @@ impl Output {
             .reference
             .as_ref()
             .and_then(|reference| relative_mse(&session.film().image(), reference).ok());
-        let noisefloor::TimelinePoint { seconds, samples, active_tiles } = progress.now;
+        let noisefloor::driver::TimelinePoint { seconds, samples, active_tiles } = progress.now;
         let seconds = self.seconds_before + seconds;
         self.timeline.push(TimelineRow { seconds, samples, active_tiles, rel_mse });
     }

@@ -4,7 +4,7 @@ use super::denoised::DenoisedReport;
 use super::tiles::TileState;
 use super::{Output, typical_threshold, uniform_samples};
 use crate::sources::Source;
-use noisefloor::{Clock, ExpectedThreshold, Params, Session, StoppingCriterion};
+use noisefloor::{Params, Session, StoppingCriterion, criterion::ExpectedThreshold, driver::Clock};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -90,7 +90,7 @@ impl<'a> Report<'a> {
             model: output.model.as_deref(),
             job,
             params: session.params(),
-            exposure: session.display().map(noisefloor::Display::exposure),
+            exposure: session.display().map(noisefloor::display::Display::exposure),
             complete: clock.is_some() && tiles.iter().all(TileState::is_final),
             tiles: tiles.len(),
             stops,

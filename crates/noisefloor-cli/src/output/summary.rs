@@ -3,7 +3,7 @@
 use super::{CHECKPOINT, Output, typical_threshold, uniform_samples};
 use crate::say::{NotSaid, say};
 use crate::sources::Source;
-use noisefloor::{Clock, Session, StoppingCriterion};
+use noisefloor::{Session, StoppingCriterion, driver::Clock};
 use noisefloor_ptwne::ReferenceNoise;
 
 impl Output {

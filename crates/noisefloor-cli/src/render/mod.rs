@@ -17,11 +17,11 @@ use crate::signals::{AFTER_THIS_BATCH, INTERRUPTED, cancel_all_on_signal};
 use crate::sources::{Opened, SourceJob, SourceKind};
 use anyhow::bail;
 use noisefloor::{
-    Driver, DriverError, Event, FixedSpp, Oracle, Params, Progress, ProgressiveSource, Repeats, Rgb,
-    SampleOrigin, Session, SourceInfo, StopReason, StoppingCriterion,
+    Driver, DriverError, Event, FixedSpp, Oracle, Params, ProgressiveSource, Repeats, Rgb, Session,
+    SourceInfo, StopReason, StoppingCriterion, driver::Progress, stills::SampleOrigin,
 };
 #[cfg(feature = "adapters")]
-use noisefloor::{FirstHits, SourceError};
+use noisefloor::{SourceError, source::FirstHits};
 #[cfg(feature = "adapters")]
 use noisefloor_denoise::{AuxiliaryPictures, DenoisedQuality, Denoiser, Oidn};
 #[cfg(feature = "adapters")]

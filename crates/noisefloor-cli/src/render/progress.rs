@@ -2,7 +2,7 @@
 
 use crate::bars::{self, Log};
 use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressStyle};
-use noisefloor::{Progress, Session, StoppingCriterion};
+use noisefloor::{Session, StoppingCriterion, driver::Progress};
 use std::time::Duration;
 
 pub fn reference_bar(quiet: bool) -> ProgressBar {

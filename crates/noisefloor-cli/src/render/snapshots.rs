@@ -4,7 +4,9 @@ use crate::output::Output;
 use crate::say::note;
 use crate::sources::Source;
 use anyhow::Context;
-use noisefloor::{Checkpoint, CheckpointError, Driver, Resumable, Session, StoppingCriterion};
+use noisefloor::{
+    Checkpoint, Driver, Session, StoppingCriterion, checkpoint::CheckpointError, criterion::Resumable,
+};
 
 /// A render under way.
 pub(super) type Rendering<C> = Driver<Box<dyn Source>, C>;

@@ -3,7 +3,7 @@
 use super::saving::Pace;
 use crate::output::Output;
 use crate::say::{note, one_line};
-use noisefloor::{Progress, Rgb, Session, StoppingCriterion};
+use noisefloor::{Rgb, Session, StoppingCriterion, driver::Progress};
 use noisefloor_image::maps::Canvas;
 use noisefloor_study::Exposure;
 use noisefloor_study::watch::{LiveRender, LiveState, LiveTile, WatchServer};

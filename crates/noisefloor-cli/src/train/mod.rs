@@ -5,7 +5,7 @@ mod disagreements;
 
 use crate::learning::{DataJob, SearchJob, held_out};
 use crate::say::{NotSaid, note, say};
-use noisefloor::{Model, Scores, Threshold};
+use noisefloor::{Model, Threshold, model::Scores};
 use noisefloor_image::{check_writable, write_atomic};
 use noisefloor_learn::{score, train, write_table};
 use std::path::{Path, PathBuf};

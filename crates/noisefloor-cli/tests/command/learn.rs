@@ -1,6 +1,6 @@
 use crate::kit::{column, fail, json, random, run, succeed, text};
 #[cfg(feature = "study")]
-use noisefloor::Evidence;
+use noisefloor::evidence::Evidence;
 use noisefloor_image::{RenderLayers, write_exr, write_png};
 #[cfg(feature = "study")]
 use noisefloor_learn::read_table;
@@ -114,7 +114,7 @@ impl Corpora {
 /// cent little.
 fn write_batches(folder: &Path, means: &[Vec<f64>]) {
     std::fs::create_dir(folder).unwrap();
-    let linear = |i: usize, pixel: usize| f64::from(noisefloor::srgb_decode(means[i][pixel] as f32));
+    let linear = |i: usize, pixel: usize| f64::from(noisefloor::display::srgb_decode(means[i][pixel] as f32));
     let mut first = 0;
     for (i, last) in LEVELS.into_iter().enumerate() {
         let (n1, n2) = (f64::from(first), f64::from(last));

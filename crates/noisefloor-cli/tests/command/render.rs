@@ -67,9 +67,9 @@ fn writes_all_it_promises() {
     let exposure = report["exposure"].as_f64().unwrap() as f32;
     for (linear, shown) in linear.pixels.iter().zip(&shown.pixels) {
         let exposed = linear.map(|c| c * exposure);
-        let scale = 1.0 / (1.0 + noisefloor::luminance(exposed));
+        let scale = 1.0 / (1.0 + noisefloor::display::luminance(exposed));
         for (c, s) in exposed.iter().zip(shown) {
-            let expected = noisefloor::srgb_encode((c * scale).min(1.0));
+            let expected = noisefloor::display::srgb_encode((c * scale).min(1.0));
             assert!((expected - s).abs() < 0.6 / 255.0, "{expected} {s}");
         }
     }

@@ -1,6 +1,7 @@
 use crate::kit::{SIZE, Simple, noisy, truth};
 use noisefloor::{
-    CriterionError, FirstHits, Params, Rgb, Schedule, Session, StopReason, StoppingCriterion, ToneMapping,
+    Params, Rgb, Schedule, Session, StopReason, StoppingCriterion, ToneMapping, criterion::CriterionError,
+    source::FirstHits,
 };
 use noisefloor_denoise::{AuxiliaryPictures, DenoiseError, DenoisedQuality, Denoiser, NoisyPicture};
 use std::sync::{Arc, Mutex};

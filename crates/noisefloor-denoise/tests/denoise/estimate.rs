@@ -1,5 +1,5 @@
 use crate::kit::{SIZE, Simple, noisy, truth};
-use noisefloor::{Display, Rgb, TileGrid, Viewing};
+use noisefloor::{Rgb, TileGrid, Viewing, display::Display};
 use noisefloor_denoise::{DenoiseError, DenoisedError, DenoisedHalves};
 use noisefloor_vision::{VisionModel, VisionWorkspace};
 

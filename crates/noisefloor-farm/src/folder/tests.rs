@@ -1,5 +1,5 @@
 use super::*;
-use noisefloor::{FixedSpp, Params, Session, SourceIdentity};
+use noisefloor::{FixedSpp, Params, Session, source::SourceIdentity};
 
 #[test]
 fn what_could_not_be_read_back_is_not_written() {

@@ -1,8 +1,9 @@
 use super::*;
 use crate::{Shard, sample, split};
 use noisefloor::{
-    Batch, BlockRequest, BlockSamples, Counts, Driver, Oracle, Params, ProgressiveSource, Repeats, Schedule,
-    SourceError, SourceIdentity, SourceInfo, Tile, Unit,
+    Batch, Counts, Driver, Oracle, Params, ProgressiveSource, Repeats, Schedule, SourceError, SourceInfo,
+    Tile, Unit,
+    source::{BlockRequest, BlockSamples, SourceIdentity},
 };
 use noisefloor_testkit::Noise;
 use proptest::prelude::*;

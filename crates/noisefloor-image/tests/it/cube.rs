@@ -1,4 +1,4 @@
-use noisefloor::{Params, ToneMapping, srgb_encode};
+use noisefloor::{Params, ToneMapping, display::srgb_encode};
 use noisefloor_image::{CubeError, LutInput, parse_cube, read_cube};
 
 /// A cube whose entry at (r, g, b) is `value` of these, in [0, 1].

@@ -1,7 +1,7 @@
 use crate::util::{encoding, f32s, flat_exr};
 use exr::meta::attribute::AttributeValue;
 use exr::prelude::*;
-use noisefloor::SampleOrigin;
+use noisefloor::stills::SampleOrigin;
 use noisefloor_image::{
     PictureError, RenderLayers, SampleFacts, read_facts, read_still, write_exr, write_png,
 };

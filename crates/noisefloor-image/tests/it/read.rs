@@ -131,12 +131,15 @@ fn png_of_every_kind() {
 
 #[test]
 fn srgb_there_and_back() {
-    assert_eq!((noisefloor::srgb_decode(0.0), noisefloor::srgb_decode(1.0)), (0.0, 1.0));
+    assert_eq!((noisefloor::display::srgb_decode(0.0), noisefloor::display::srgb_decode(1.0)), (0.0, 1.0));
     // IEC 61966-2-1: mid grey of 8-bit displays
-    assert!((noisefloor::srgb_decode(128.0 / 255.0) - 0.215_861).abs() < 1e-6);
+    assert!((noisefloor::display::srgb_decode(128.0 / 255.0) - 0.215_861).abs() < 1e-6);
     for code in 0..=255u8 {
         let encoded = f32::from(code) / 255.0;
-        assert!((noisefloor::srgb_encode(noisefloor::srgb_decode(encoded)) - encoded).abs() < 1e-6);
+        assert!(
+            (noisefloor::display::srgb_encode(noisefloor::display::srgb_decode(encoded)) - encoded).abs()
+                < 1e-6
+        );
     }
 }
 

@@ -62,14 +62,14 @@ fn running_means_give_the_batches_back() {
 #[test]
 fn pngs_are_linearised_before_the_difference() {
     let folder = tempfile::tempdir().unwrap();
-    let encode = |linear: f32| (noisefloor::srgb_encode(linear) * 255.0).round() as u8;
+    let encode = |linear: f32| (noisefloor::display::srgb_encode(linear) * 255.0).round() as u8;
     let (early, late) = (encode(0.2), encode(0.4));
     for (name, code) in [("00010.png", early), ("00020.png", late)] {
         write_png(folder.path().join(name), SIZE.0, SIZE.1, &vec![code; SIZE.0 * SIZE.1 * 3]).unwrap();
     }
     let mut stack = StackSource::open_running_means(folder.path()).unwrap();
     let got = stack.sample(&[Request { tile: tiles()[0], first: 10, spp: 10 }]).unwrap().remove(0);
-    let linear = |code: u8| noisefloor::srgb_decode(f32::from(code) / 255.0);
+    let linear = |code: u8| noisefloor::display::srgb_decode(f32::from(code) / 255.0);
     let want = 2.0 * linear(late) - linear(early);
     assert!((got.mean[0][0] - want).abs() < 1e-6 && (want - 0.6).abs() < 0.01);
 }

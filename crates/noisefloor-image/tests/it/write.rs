@@ -53,7 +53,7 @@ fn png_there_and_back() {
 fn a_png_may_be_wider_than_an_image() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("stops.png");
-    let width = noisefloor::MAX_EDGE + 104;
+    let width = noisefloor::tile::MAX_EDGE + 104;
     write_png(&path, width, 2, &vec![7; width * 2 * 3]).unwrap();
     let decoder = image::ImageReader::open(&path).unwrap();
     assert_eq!(decoder.into_dimensions().unwrap(), (width as u32, 2));

@@ -3,7 +3,9 @@
 use crate::advance::{Advance, Watch};
 use crate::error::LabError;
 use crate::files::write_json;
-use noisefloor::{Film, ProgressiveSource, Repeats, Request, Rgb, SourceIdentity, SourceInfo, TileGrid};
+use noisefloor::{
+    Film, ProgressiveSource, Repeats, Request, Rgb, SourceInfo, TileGrid, source::SourceIdentity,
+};
 use noisefloor_image::{RenderLayers, SampleFacts, read_exr, write_exr};
 use serde::{Deserialize, Serialize};
 use std::fs::File;

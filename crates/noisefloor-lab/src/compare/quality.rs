@@ -1,7 +1,7 @@
 //! How far a picture is from the converged one.
 
 use crate::error::LabError;
-use noisefloor::{Display, MIN_TILE, Rgb, Tile, TileGrid};
+use noisefloor::{Rgb, Tile, TileGrid, display::Display, tile::MIN_TILE};
 use noisefloor_rivals::{MetricError, metrics};
 use noisefloor_vision::{VisionModel, VisionWorkspace};
 use serde::Serialize;

@@ -7,8 +7,9 @@ use super::quality::{Eye, Quality, Yardstick};
 use crate::advance::{Advance, Watch};
 use crate::error::LabError;
 use noisefloor::{
-    Batch, BlockRequest, Film, Params, ProgressiveSource, Reference, Request, Rgb, Schedule, Session,
-    StopReason, StoppingCriterion, Tile, TileGrid,
+    Batch, Film, Params, ProgressiveSource, Request, Rgb, Schedule, Session, StopReason, StoppingCriterion,
+    Tile, TileGrid,
+    source::{BlockRequest, Reference},
 };
 use noisefloor_denoise::Denoiser;
 use noisefloor_vision::VisionModel;

@@ -4,7 +4,7 @@ use super::pairs::{Loaded, Pairs};
 use crate::advance::{Advance, Watch};
 use crate::error::LabError;
 use ndarray::Array2;
-use noisefloor::{Descriptor, NoiseMask};
+use noisefloor::descriptor::{Descriptor, NoiseMask};
 use noisefloor_learn::{Corpora, describe_pairs};
 use std::path::PathBuf;
 use std::time::Instant;

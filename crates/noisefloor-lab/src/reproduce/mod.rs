@@ -22,7 +22,7 @@ use crate::advance::Watch;
 use crate::error::LabError;
 use crate::files::{make_folder, write_json, write_text};
 use job::Geometry;
-use noisefloor::Descriptor;
+use noisefloor::descriptor::Descriptor;
 use pairs::Loaded;
 use std::path::Path;
 
@@ -49,7 +49,7 @@ pub fn run(
 ) -> Result<ReproductionReport, LabError> {
     make_folder(folder)?;
     let mut outcomes = Vec::new();
-    for descriptor in [Descriptor::luminance_pair(job.edge), job.masks()] {
+    for descriptor in [noisefloor::internal::luminance_pair(job.edge), job.masks()] {
         let loaded = job.load(&descriptor, watch)?;
         outcomes.extend(run_protocols(loaded, &descriptor, folder, on_result, watch)?);
     }

@@ -6,7 +6,10 @@ use super::protocol::{PairProtocol, Split};
 use crate::advance::{Advance, Watch};
 use crate::error::LabError;
 use ndarray::Axis;
-use noisefloor::{Descriptor, DescriptorSpec, Svm, SvmParams, SvmTrainError, Weights, fit_weights};
+use noisefloor::{
+    descriptor::{Descriptor, DescriptorSpec},
+    svm::{Svm, SvmParams, SvmTrainError, Weights, fit_weights},
+};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use statrs::statistics::{Data, Median};

@@ -2,7 +2,7 @@
 
 use crate::error::LabError;
 use ndarray::Array2;
-use noisefloor::{Scaler, squared_distances};
+use noisefloor::svm::{Scaler, squared_distances};
 use noisefloor_learn::{Level, Origin, Table};
 use serde::{Deserialize, Serialize};
 

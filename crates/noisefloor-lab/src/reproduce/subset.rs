@@ -6,7 +6,7 @@ use crate::advance::Watch;
 use crate::error::LabError;
 use crate::files::{make_folder, write_json};
 use ndarray::{Array2, ArrayView2, s};
-use noisefloor::{SvmParams, fit_svm};
+use noisefloor::svm::{SvmParams, fit_svm};
 use noisefloor_image::write_atomic;
 use serde::Serialize;
 use std::io::Write;

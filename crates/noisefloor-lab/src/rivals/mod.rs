@@ -15,7 +15,7 @@ pub use plot::plot_scene_means;
 
 use crate::advance::{Advance, Watch};
 use crate::error::LabError;
-use noisefloor::{Scores, Viewing};
+use noisefloor::{Viewing, model::Scores};
 use noisefloor_learn::{Corpus, JudgedZone, Prediction, as_noise, first_word, score};
 use noisefloor_rivals::Rival;
 use rayon::prelude::*;

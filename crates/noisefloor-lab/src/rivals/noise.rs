@@ -27,7 +27,7 @@
 //!   scatters between them by √(2/K) however many batches there are, where that of a rendering settles. A
 //!   criterion that looks at a high quantile of it gets a laxer constant, by about the same factor in each scene.
 
-use noisefloor::{Rgb, srgb_decode};
+use noisefloor::{Rgb, display::srgb_decode};
 use noisefloor_learn::{Encoding, JudgedImage};
 
 /// The mean of some of the samples may amplify the rounding of 8-bit pictures by no more than this.

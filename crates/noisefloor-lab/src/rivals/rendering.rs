@@ -3,7 +3,7 @@
 use super::noise::Noise;
 use crate::error::LabError;
 use noisefloor::{
-    Params, Reference, Rgb, Schedule, Session, StopReason, StoppingCriterion, ToneMapping, Viewing,
+    Params, Rgb, Schedule, Session, StopReason, StoppingCriterion, ToneMapping, Viewing, source::Reference,
 };
 use noisefloor_learn::{Corpus, JudgedImage, JudgedZone, as_difference};
 use rayon::prelude::*;

@@ -2,7 +2,7 @@
 
 use super::error::CorpusError;
 use super::zone::{JudgedZone, ZoneImages};
-use noisefloor::{HALO, Rgb};
+use noisefloor::{Rgb, internal::HALO};
 use noisefloor_image::{Frame, Picture, StackError, batches, read_exr, read_picture, running_means};
 use std::collections::VecDeque;
 

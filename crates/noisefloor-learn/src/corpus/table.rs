@@ -4,7 +4,7 @@ use super::error::CorpusError;
 use super::zone::{CENSORED_SPP, JudgedZone, ZoneImages};
 use crate::stimulus::{REFERENCE, parse_reference};
 use csv::{ReaderBuilder, StringRecord, Trim};
-use noisefloor::MAX_EDGE;
+use noisefloor::tile::MAX_EDGE;
 use std::collections::HashMap;
 use std::fs::File;
 use std::io::Read;
@@ -127,7 +127,7 @@ fn parse(
     if row.x > MAX_EDGE || row.y > MAX_EDGE {
         return Err(format!("x and y must be 0…{MAX_EDGE} pixels, not {} and {}", row.x, row.y));
     }
-    noisefloor::check_image(row.width, row.height).map_err(|e| e.to_string())?;
+    noisefloor::internal::check_image(row.width, row.height).map_err(|e| e.to_string())?;
     if !row.human_spp.is_finite() || row.human_spp <= 0.0 {
         return Err(format!("human_spp must be positive, not {}", row.human_spp));
     }

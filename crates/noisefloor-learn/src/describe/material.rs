@@ -3,7 +3,11 @@
 use crate::corpus::{Encoding, JudgedImage as Image, JudgedZone, Patch};
 use crate::error::TableError;
 use crate::table::Origin;
-use noisefloor::{Display, Evidence, Rgb, Samples, Tile, TilePlanes, residual_scale};
+use noisefloor::{
+    Rgb, Tile,
+    display::Display,
+    evidence::{Evidence, Samples, TilePlanes, residual_scale},
+};
 
 /// A corpus level: samples per pixel, where it comes from, and what is to be described of it.
 pub(super) type Shown = (f64, Origin, TilePlanes);
@@ -211,7 +215,7 @@ impl Material {
     ) -> Result<Vec<Shown>, TableError> {
         let Tile { x, y, width, height, .. } = self.tile;
         if width < edge || height < edge {
-            let error = noisefloor::DescriptorError::TileSize { expected: edge, width, height };
+            let error = noisefloor::descriptor::DescriptorError::TileSize { expected: edge, width, height };
             return Err(does_not_fit(zone, error));
         }
         let (x, y) = (x + (width - edge) / 2, y + (height - edge) / 2);
@@ -257,6 +261,6 @@ impl Material {
 }
 
 /// A zone of a size that the descriptor is not for.
-pub(super) fn does_not_fit(zone: &JudgedZone, source: noisefloor::DescriptorError) -> TableError {
+pub(super) fn does_not_fit(zone: &JudgedZone, source: noisefloor::descriptor::DescriptorError) -> TableError {
     TableError::Descriptor { scene: zone.scene.clone(), zone: zone.zone, source }
 }

@@ -14,7 +14,10 @@ use crate::stimulus::as_noise;
 use crate::table::{Level, Origin, Table, Zone, first_word};
 use material::{Material, Shown, does_not_fit};
 use noisefloor::{
-    Described, Descriptor, Evidence, NoiseMask, ROUNDING_LUMINANCE, TilePlanes, ToneMapping, Viewing,
+    ToneMapping, Viewing,
+    descriptor::{Described, Descriptor, NoiseMask},
+    evidence::{Evidence, TilePlanes},
+    internal::ROUNDING_LUMINANCE,
 };
 use rayon::prelude::*;
 use std::collections::BTreeMap;

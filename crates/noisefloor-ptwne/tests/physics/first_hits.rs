@@ -1,7 +1,7 @@
 //! Albedo and normals of first hits, against what is known of the scene.
 
 use crate::kit::{look, scene};
-use noisefloor::{FirstHits, ProgressiveSource};
+use noisefloor::{ProgressiveSource, source::FirstHits};
 use noisefloor_ptwne::{Environment, Material, Ptwne, RenderOptions, Scene, scenes};
 use std::num::NonZeroUsize;
 

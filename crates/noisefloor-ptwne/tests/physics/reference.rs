@@ -1,7 +1,7 @@
 //! The reference keeps its promises about its own noise.
 
 use crate::kit::{batch, look, scene};
-use noisefloor::{NoiseMask, ProgressiveSource, ToneMapping};
+use noisefloor::{ProgressiveSource, ToneMapping, descriptor::NoiseMask};
 use noisefloor_ptwne::{Emission, Material, Ptwne, RenderOptions, Scene, scenes};
 use std::error::Error;
 use std::ops::ControlFlow;

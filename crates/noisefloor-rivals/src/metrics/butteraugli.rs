@@ -2,7 +2,7 @@
 
 use crate::picture::{DifferenceMap, DisplayPixels, MetricError};
 use ::butteraugli::{ButteraugliParams, Img, RGB};
-use noisefloor::{Rgb, srgb_decode};
+use noisefloor::{Rgb, display::srgb_decode};
 
 /// Largest value of [`butteraugli()`] below which two pictures look the same, by its authors' scale.
 pub const BUTTERAUGLI_SAME: f64 = 1.0;

@@ -7,7 +7,7 @@ use super::cvvdp::cvvdp;
 #[cfg(feature = "flip")]
 use super::flip;
 use crate::picture::{DifferenceMap, DisplayPixels, MetricError};
-use noisefloor::{Display, Rgb};
+use noisefloor::{Rgb, display::Display};
 use noisefloor_vision::Viewing;
 use serde::Serialize;
 
@@ -15,7 +15,7 @@ use serde::Serialize;
 /// the same tone mapping and, where they ask for one, the same viewing conditions.
 ///
 /// ```
-/// use noisefloor::{Display, Rgb};
+/// use noisefloor::{Rgb, display::Display};
 /// use noisefloor_rivals::metrics::MetricPair;
 /// use noisefloor_vision::Viewing;
 ///

@@ -1,5 +1,5 @@
 use super::*;
-use noisefloor::{Rgb, srgb_encode};
+use noisefloor::{Rgb, display::srgb_encode};
 use noisefloor_testkit::Noise;
 
 const EDGE: usize = 144;

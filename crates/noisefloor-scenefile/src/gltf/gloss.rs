@@ -19,7 +19,7 @@ impl Gloss {
     /// solved for with luminances, the colour then taken from the specular one as far as it is metal.
     pub(super) fn metal(self) -> (Rgb, [f32; 2]) {
         let strongest = self.specular.into_iter().fold(0.0, f32::max);
-        let [d, s] = [self.diffuse, self.specular].map(noisefloor::luminance);
+        let [d, s] = [self.diffuse, self.specular].map(noisefloor::display::luminance);
         // The diffuse colour is that below what reflects most
         let d = d * (1.0 - strongest);
         // From b = (s − 0.04·(1 − m))/m in d = b·(1 − m): a quadratic in m

@@ -1,7 +1,7 @@
 //! Whether a scene has light of its own.
 
 use super::daylight::daylight;
-use noisefloor::{ProgressiveSource, Request, Tile, luminance};
+use noisefloor::{ProgressiveSource, Request, Tile, display::luminance};
 use noisefloor_ptwne::{Camera, Environment, Ptwne, RenderOptions, Scene};
 use std::sync::Arc;
 

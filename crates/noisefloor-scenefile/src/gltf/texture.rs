@@ -11,7 +11,10 @@ use gltf::json::material::NormalTexture;
 use gltf::json::texture::{Info, MagFilter, Sampler, WrappingMode};
 use gltf::json::validation::Checked;
 use gltf::json::{Image, Index, Value, deserialize};
-use noisefloor::{Rgb, srgb_decode, srgb_encode};
+use noisefloor::{
+    Rgb,
+    display::{srgb_decode, srgb_encode},
+};
 use noisefloor_ptwne::{ImageTexture, MAX_TEXTURE_PIXELS, Pixels, Texture, Wrap};
 use std::collections::HashMap;
 use std::sync::Arc;

@@ -5,7 +5,7 @@ use super::xml::Element;
 use crate::colour::{self, EQUAL_ENERGY, Quantity, TEMPERATURES};
 use crate::error::LoadError;
 use crate::files::MAX_FILE_BYTES;
-use noisefloor::{Rgb, srgb_decode};
+use noisefloor::{Rgb, display::srgb_decode};
 
 /// Elements that are colours.
 const COLOURS: [&str; 6] = ["rgb", "srgb", "spectrum", "blackbody", "float", "integer"];

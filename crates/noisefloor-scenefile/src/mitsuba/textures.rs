@@ -7,7 +7,7 @@ use crate::channels;
 use crate::colour::Quantity;
 use crate::error::LoadError;
 use crate::picture::{self, Picture, Samples};
-use noisefloor::{Rgb, srgb_decode};
+use noisefloor::{Rgb, display::srgb_decode};
 use noisefloor_ptwne::{ImageTexture, Pixels, Texture, Wrap};
 use std::sync::Arc;
 
@@ -239,7 +239,7 @@ impl<'d> Context<'d> {
 
     /// The luminance of a texture: Mitsuba's opacity. The alpha of a picture has no part in it.
     pub(super) fn luminance(&self, element: &Element, texture: Texture) -> Result<Texture, LoadError> {
-        let grey = |colour: Rgb| [noisefloor::luminance(colour).clamp(0.0, 1.0); 3];
+        let grey = |colour: Rgb| [noisefloor::display::luminance(colour).clamp(0.0, 1.0); 3];
         Ok(match texture {
             Texture::Colour(colour) => Texture::Colour(grey(colour)),
             Texture::Image(image) => {

@@ -6,7 +6,7 @@ use crate::colour::{self, Quantity, TEMPERATURES};
 use crate::error::LoadError;
 use crate::files::MAX_FILE_BYTES;
 use crate::indices;
-use noisefloor::{Rgb, luminance};
+use noisefloor::{Rgb, display::luminance};
 
 impl Reader<'_> {
     /// The colour of a factor, or an index of refraction by colour channel.

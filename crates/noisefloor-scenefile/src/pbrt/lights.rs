@@ -6,7 +6,7 @@ use super::reader::Reader;
 use crate::error::LoadError;
 use crate::picture::{self, Samples};
 use glam::{DMat3, DVec3};
-use noisefloor::{Rgb, srgb_decode};
+use noisefloor::{Rgb, display::srgb_decode};
 use noisefloor_ptwne::{Emission, Environment, Falloff, Punctual};
 
 impl Reader<'_> {

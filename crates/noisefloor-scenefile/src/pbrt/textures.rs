@@ -6,7 +6,7 @@ use super::state::{Definition, Height, plain};
 use crate::channels::linear;
 use crate::error::LoadError;
 use crate::picture::{self, Samples};
-use noisefloor::{Rgb, srgb_decode};
+use noisefloor::{Rgb, display::srgb_decode};
 use noisefloor_ptwne::{ImageTexture, Pixels, Texture, Wrap};
 use std::collections::HashMap;
 use std::sync::Arc;

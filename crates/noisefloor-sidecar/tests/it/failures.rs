@@ -1,5 +1,5 @@
 use crate::kit::{Fake, expected, requests, tiles};
-use noisefloor::{ImpossibleLight, ProgressiveSource, Request, SourceError};
+use noisefloor::{ProgressiveSource, Request, SourceError, watch::ImpossibleLight};
 use noisefloor_sidecar::{SidecarCause, SidecarError};
 use std::error::Error;
 use std::time::{Duration, Instant};

@@ -1,6 +1,7 @@
 use crate::kit::{Fake, SIZE, expected, requests, tiles};
 use noisefloor::{
-    BlockRequest, BlockSamples, ProgressiveSource, Reference, Repeats, Request, SourceError, Tile, Unit,
+    ProgressiveSource, Repeats, Request, SourceError, Tile, Unit,
+    source::{BlockRequest, BlockSamples, Reference},
 };
 use std::num::NonZeroUsize;
 

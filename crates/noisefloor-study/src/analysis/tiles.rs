@@ -18,10 +18,10 @@ const MAD_TO_SD: f64 = 1.4826;
 /// Which threshold of a tile goes into the corpus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum CorpusThreshold {
-    /// Where 95 % of observers see no difference: what `train` takes as the threshold (Takouachet et al.
-    /// 2017, §4.2.2).
+    /// Where 95 % of observers see no difference (Takouachet et al. 2017, §4.2.2).
     Level95,
-    /// The mean over observers.
+    /// The mean over observers: what `train` takes as the threshold, since P counts the scatter of observers
+    /// around it.
     Mean,
 }
 

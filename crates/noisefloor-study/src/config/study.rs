@@ -6,7 +6,7 @@ use crate::error::StudyError;
 use crate::languages::{Language, read_languages};
 use crate::stack::{Source, StudyStack};
 use crate::viewing::ViewingLimits;
-use noisefloor::DEFAULT_TILE;
+use noisefloor::tile::DEFAULT_TILE;
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::File;

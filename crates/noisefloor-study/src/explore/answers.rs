@@ -3,7 +3,10 @@
 
 use crate::error::StoreError;
 use crate::store::{now_ms, settle};
-use noisefloor::{Descriptor, DescriptorSpec, Evidence};
+use noisefloor::{
+    descriptor::{Descriptor, DescriptorSpec},
+    evidence::Evidence,
+};
 use noisefloor_learn::Answer;
 use rusqlite::{Connection, OpenFlags, OptionalExtension, Row, params};
 use serde::Serialize;

@@ -14,7 +14,11 @@ use axum::extract::{Path, State};
 use axum::http::header::{CONTENT_LENGTH, CONTENT_TYPE};
 use axum::http::{HeaderMap, StatusCode};
 use axum::response::{IntoResponse, Response};
-use noisefloor::{Audience, Evidence, Samples, StillError, Threshold};
+use noisefloor::{
+    Audience, Threshold,
+    evidence::{Evidence, Samples},
+    stills::StillError,
+};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 use std::time::Duration;

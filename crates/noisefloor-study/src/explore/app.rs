@@ -4,7 +4,7 @@ use super::answers::Disagreements;
 use super::gallery::Gallery;
 use super::job::Job;
 use super::verdicts::Judged;
-use noisefloor::{Audience, DEFAULT_TILE, Model, Viewing};
+use noisefloor::{Audience, Model, Viewing, tile::DEFAULT_TILE};
 use noisefloor_learn::Table;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};

@@ -1,7 +1,12 @@
 //! The gallery: several pictures of one view.
 
 use crate::error::StudyError;
-use noisefloor::{Samples, Still, StillError, TileError, TileGrid};
+use noisefloor::{
+    TileGrid,
+    evidence::Samples,
+    stills::{Still, StillError},
+    tile::TileError,
+};
 use noisefloor_image::{read_facts, read_picture_within};
 use serde::Serialize;
 use std::path::Path;

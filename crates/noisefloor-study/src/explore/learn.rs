@@ -1,6 +1,6 @@
 //! Retraining on disagreements, and what that costs and gains.
 
-use noisefloor::{Model, Scores, Threshold};
+use noisefloor::{Model, Threshold, model::Scores};
 use noisefloor_learn::{Answer, TrainError, TrainParams, leave_answers_out, leave_one_scene_out, train};
 use noisefloor_learn::{Table, score};
 use serde::Serialize;

@@ -2,8 +2,10 @@
 
 use super::gallery::{Gallery, GalleryError, GalleryPicture};
 use noisefloor::{
-    Audience, Described, Descriptor, Evidence, Model, Oracle, Rgb, Samples, SnapshotPair, Still, Threshold,
-    TileGrid, ToneMapping, Verdict, Viewing,
+    Audience, Model, Oracle, Rgb, Threshold, TileGrid, ToneMapping, Verdict, Viewing,
+    descriptor::{Described, Descriptor},
+    evidence::{Evidence, Samples},
+    stills::{SnapshotPair, Still},
 };
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;

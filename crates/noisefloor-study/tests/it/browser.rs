@@ -1,6 +1,10 @@
 use crate::explore::table;
 use crate::kit::{Running, Served, levels, stack};
-use noisefloor::{Descriptor, Evidence, NoiseMask, Threshold};
+use noisefloor::{
+    Threshold,
+    descriptor::{Descriptor, NoiseMask},
+    evidence::Evidence,
+};
 use noisefloor_learn::{Corpora, describe_corpora};
 use noisefloor_learn::{TrainParams, train};
 use noisefloor_learn::{predict, score};

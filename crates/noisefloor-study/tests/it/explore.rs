@@ -1,7 +1,10 @@
 use crate::kit::{Picturing, Served, stack};
 use noisefloor::{
-    Descriptor, Evidence, Model, ModelParts, Oracle, Samples, SnapshotPair, Still, Threshold, TileGrid,
-    ToneMapping, Viewing,
+    Model, Oracle, Threshold, TileGrid, ToneMapping, Viewing,
+    descriptor::Descriptor,
+    evidence::{Evidence, Samples},
+    model::ModelParts,
+    stills::{SnapshotPair, Still},
 };
 use noisefloor_image::read_picture;
 use noisefloor_learn::{Level, Origin, Table, TrainParams, Zone};

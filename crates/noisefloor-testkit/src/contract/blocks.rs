@@ -2,7 +2,10 @@
 
 use super::exact::same;
 use super::probe::{EDGE, Round, Subject};
-use noisefloor::{Batch, BlockRequest, BlockSamples, Counts, ProgressiveSource, Repeats, Tile, TileGrid};
+use noisefloor::{
+    Batch, Counts, ProgressiveSource, Repeats, Tile, TileGrid,
+    source::{BlockRequest, BlockSamples},
+};
 
 /// Edge of the blocks that are asked for.
 const BLOCK: usize = 16;

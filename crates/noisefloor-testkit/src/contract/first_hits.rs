@@ -1,7 +1,7 @@
 //! Albedo and normals of a source.
 
 use super::rounding::LARGEST_Z;
-use noisefloor::{FirstHits, ProgressiveSource, Repeats, Rgb, SourceInfo};
+use noisefloor::{ProgressiveSource, Repeats, Rgb, SourceInfo, source::FirstHits};
 
 /// Rays a pixel: few, so that edges are noisy.
 const SPP: u64 = 4;

@@ -2,8 +2,9 @@
 
 use super::probe::EDGE;
 use noisefloor::{
-    Oracle, ProgressiveSource, Reference, Rendering, Samples, SourceInfo, Tile, TileGrid, TilePlanes,
-    ToneMapping,
+    Oracle, ProgressiveSource, SourceInfo, Tile, TileGrid, ToneMapping,
+    evidence::{Rendering, Samples, TilePlanes},
+    source::Reference,
 };
 
 /// Checks that the oracle sees no noise in the reference of a source.

@@ -198,7 +198,10 @@ fn another_job_is_refused() {
 /// A curve of the caller's own is not in the checkpoint; the session that resumes has it.
 #[test]
 fn a_tone_curve_is_resumed_with_its_function() {
-    use crate::{Display, ToneCurve, ToneMapping};
+    use crate::{
+        ToneMapping,
+        display::{Display, ToneCurve},
+    };
     let root = ToneCurve::new(b"root", &|exposed| exposed.map(f32::sqrt));
     let params = |curve| Params { tone_mapping: ToneMapping::Custom { exposure: 1.0, curve }, ..params() };
     let resume = |made: Params, shown: Option<Display>, with: Params| {
@@ -223,9 +226,9 @@ fn a_tone_curve_is_resumed_with_its_function() {
 fn another_source_is_refused() {
     let driver = broken_off(FixedSpp(40), 1);
     let resumed = |source: &str, contents: &[u8]| {
-        let mut now = crate::SourceIdentity::new(source);
+        let mut now = crate::source::SourceIdentity::new(source);
         now.add("hall.xml", contents);
-        let mut kept = crate::SourceIdentity::new("noise");
+        let mut kept = crate::source::SourceIdentity::new("noise");
         kept.add("hall.xml", b"lamps");
         let mut checkpoint = driver.session().checkpoint("noise");
         checkpoint.source = Cow::Owned(kept);

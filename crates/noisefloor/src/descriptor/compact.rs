@@ -12,8 +12,11 @@
 //! `docs/accuracy.md` has the scores of each choice.
 
 use super::kind::{Described, Descriptor, DescriptorError, DescriptorKind, TileDescriptor, mask};
-use crate::evidence::{HALO, ROUNDING_LUMINANCE, TilePlanes};
-use crate::mask::NoiseMask;
+use crate::descriptor::NoiseMask;
+use crate::{
+    evidence::TilePlanes,
+    internal::{HALO, ROUNDING_LUMINANCE},
+};
 use ndarray::Array2;
 use std::cell::RefCell;
 use std::collections::BTreeMap;

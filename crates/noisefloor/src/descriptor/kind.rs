@@ -1,7 +1,7 @@
 //! What a descriptor is, and how one is named in files.
 
+use crate::descriptor::NoiseMask;
 use crate::evidence::TilePlanes;
-use crate::mask::NoiseMask;
 use crate::tile::MAX_TILE;
 use ndarray::Array2;
 use serde::{Deserialize, Serialize};
@@ -97,7 +97,7 @@ pub struct DescriptorKind {
 /// A descriptor, shared: what is computed from a tile.
 ///
 /// ```
-/// use noisefloor::{Descriptor, TileGrid, TilePlanes};
+/// use noisefloor::{TileGrid, descriptor::Descriptor, evidence::TilePlanes};
 /// let tile = TileGrid::new(32, 16, 32)?.tile(0);
 /// let checker = |x: usize, y: usize| if (x + y) % 2 == 0 { [0.01; 3] } else { [-0.01; 3] };
 /// let noise_at_the_left = |x, y| ([0.5; 3], if x < 16 { checker(x, y) } else { [0.0; 3] });
@@ -105,7 +105,7 @@ pub struct DescriptorKind {
 /// let map = Descriptor::default().visible_noise(&planes).unwrap();
 /// assert_eq!(map.dim(), (16, 32));
 /// assert!(map[(8, 0)] > 10.0 * map[(8, 31)]);
-/// # Ok::<(), noisefloor::TileError>(())
+/// # Ok::<(), noisefloor::tile::TileError>(())
 /// ```
 #[derive(Clone, Debug)]
 pub struct Descriptor(Arc<dyn TileDescriptor>);

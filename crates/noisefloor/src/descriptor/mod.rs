@@ -7,12 +7,12 @@
 
 mod compact;
 mod kind;
+mod mask;
 mod pair;
 mod visible;
 
 pub use kind::{Described, Descriptor, DescriptorError, DescriptorKind, DescriptorSpec, TileDescriptor};
-
-use crate::mask::NoiseMask;
+pub use mask::{NoiseMask, SigmaError};
 
 /// The built-in descriptors.
 const KINDS: [DescriptorKind; 4] = [visible::KIND, compact::KIND, pair::MASKS, pair::LUMINANCES];
@@ -41,7 +41,7 @@ impl Descriptor {
     /// The paper's first attempt, without a mask, which failed: the luminance of the tile and of what it is
     /// compared with, pixel by pixel (Takouachet et al. 2017, §4.3, §4.4). 2·edge² numbers, for tiles of
     /// exactly edge×edge pixels.
-    pub fn luminance_pair(edge: usize) -> Self {
+    pub(crate) fn luminance_pair(edge: usize) -> Self {
         Self::new(pair::LuminancePair { edge })
     }
 

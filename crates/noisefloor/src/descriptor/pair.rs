@@ -2,8 +2,8 @@
 //! §4.3, §5).
 
 use super::kind::{Descriptor, DescriptorError, DescriptorKind, TileDescriptor, edge, mask};
+use crate::descriptor::NoiseMask;
 use crate::evidence::TilePlanes;
-use crate::mask::NoiseMask;
 use ndarray::{Array2, s};
 use std::collections::BTreeMap;
 

@@ -14,8 +14,8 @@
 
 use super::compact::texture_energy;
 use super::kind::{Described, Descriptor, DescriptorError, DescriptorKind, TileDescriptor};
-use crate::evidence::{ROUNDING_LUMINANCE, TilePlanes};
-use crate::mask::NoiseMask;
+use crate::descriptor::NoiseMask;
+use crate::{evidence::TilePlanes, internal::ROUNDING_LUMINANCE};
 use multiversion::multiversion;
 use ndarray::{Array2, ArrayView2, s};
 use noisefloor_vision::{

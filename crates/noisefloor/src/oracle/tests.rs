@@ -1,6 +1,6 @@
 use super::*;
-use crate::NoiseMask;
 use crate::descriptor::Descriptor;
+use crate::descriptor::NoiseMask;
 use crate::display::Display;
 use crate::film::Film;
 use crate::model::tests::{changed, small};

@@ -4,7 +4,7 @@ use super::Session;
 use crate::checkpoint::{Checkpoint, CheckpointError};
 use crate::criterion::Resumable;
 use crate::display::Display;
-use crate::stop::Stop;
+use crate::session::Stop;
 use std::borrow::Cow;
 
 impl<C: Resumable> Session<C> {

@@ -3,8 +3,8 @@
 use super::Session;
 use crate::criterion::StoppingCriterion;
 use crate::params::Schedule;
+use crate::session::TileState;
 use crate::source::Request;
-use crate::stop::TileState;
 
 /// Most pixel samples requested in one call. A fast renderer takes about a second for it, so that cancelling,
 /// the time limit and progress are prompt. A constant rather than a time, so that batches are the same on

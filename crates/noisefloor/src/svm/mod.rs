@@ -1,4 +1,4 @@
-//! Support vector machine: prediction here; training behind the feature `train`.
+//! The support vector machine: prediction; training behind the feature `train`.
 
 mod classifier;
 #[cfg(feature = "train")]
@@ -22,3 +22,7 @@ pub use {
     solver::{Weights, fit_weights},
     train::{fit_platt, fit_svm},
 };
+
+/// Their errors are causes of [`SvmTrainError`].
+#[cfg(feature = "train")]
+pub use {linfa, linfa_svm};

@@ -1,6 +1,6 @@
 use super::super::rendering::stages;
 use super::*;
-use noisefloor::{Film, TileGrid, luminance};
+use noisefloor::{Film, TileGrid, display::luminance};
 use noisefloor_learn::{Inner, Patch};
 
 const EDGE: usize = 200;

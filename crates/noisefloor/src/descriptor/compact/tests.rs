@@ -142,7 +142,7 @@ fn rounding_has_the_energy_it_should() {
     let mut rounded = || STEP * (noise.uniform() - noise.uniform()) as f32;
     for at in ndarray::indices((80, 80)) {
         let rgb = [rounded(), rounded(), rounded()];
-        planes.residual[at] = crate::luminance(rgb);
+        planes.residual[at] = crate::display::luminance(rgb);
     }
     let mask = NoiseMask::default();
     // In squared steps: two roundings, 1/12 each.

@@ -1,6 +1,6 @@
 use crate::criterion::{CriterionError, StoppingCriterion, Verdict, View};
 use crate::film::Film;
-use crate::{FixedSpp, Needs, Params, Request, Schedule, Session, Stop, Tile};
+use crate::{FixedSpp, Params, Request, Schedule, Session, Stop, Tile, criterion::Needs};
 use proptest::prelude::*;
 
 /// Later tiles need more; keeps halves, and looks at the samples of the whole picture, as the oracle does.

@@ -9,7 +9,7 @@ use thiserror::Error;
 /// keeps it, so that no render is resumed after an edit of its scene.
 ///
 /// ```
-/// use noisefloor::SourceIdentity;
+/// use noisefloor::source::SourceIdentity;
 ///
 /// let mut kept = SourceIdentity::new("a tracer, seed 1");
 /// kept.add("wood.png", b"dark");

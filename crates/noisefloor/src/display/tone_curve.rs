@@ -13,14 +13,14 @@ type Map = &'static (dyn Fn(Rgb) -> Rgb + Send + Sync);
 /// function that its session had, and refused with another one.
 ///
 /// ```
-/// use noisefloor::{Params, ToneCurve, ToneMapping};
+/// use noisefloor::{Params, ToneMapping, display::ToneCurve};
 ///
 /// // Hable's filmic curve, with a white point of 11.2; encoded for an sRGB screen
 /// fn hable(x: f32) -> f32 {
 ///     ((x * (0.15 * x + 0.05) + 0.004) / (x * (0.15 * x + 0.5) + 0.06)) - 0.02 / 0.3
 /// }
 /// let filmic = ToneCurve::new(b"Hable, white 11.2", &|exposed| {
-///     exposed.map(|x| noisefloor::srgb_encode(hable(2.0 * x) / hable(11.2)))
+///     exposed.map(|x| noisefloor::display::srgb_encode(hable(2.0 * x) / hable(11.2)))
 /// });
 /// let params = Params {
 ///     tone_mapping: ToneMapping::Custom { exposure: 1.0, curve: filmic },
@@ -58,7 +58,7 @@ impl ToneCurve {
 
     /// Exposed linear radiance → display values in [0, 1]. Without its function, plain sRGB.
     pub(crate) fn show(&self, exposed: Rgb) -> Rgb {
-        let shown = self.map.map_or_else(|| exposed.map(crate::srgb::srgb_encode), |map| map(exposed));
+        let shown = self.map.map_or_else(|| exposed.map(crate::display::srgb_encode), |map| map(exposed));
         shown.map(|c| if c > 0.0 { c.min(1.0) } else { 0.0 })
     }
 }

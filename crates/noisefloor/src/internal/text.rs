@@ -8,7 +8,7 @@ use std::borrow::Cow;
 /// reorder text become escapes like `\u{1b}`. Line breaks and tabs stay.
 ///
 /// ```
-/// assert_eq!(noisefloor::printable("wall\x1b[2J\tgrey"), "wall\\u{1b}[2J\tgrey");
+/// assert_eq!(noisefloor::internal::printable("wall\x1b[2J\tgrey"), "wall\\u{1b}[2J\tgrey");
 /// ```
 pub fn printable(text: &str) -> Cow<'_, str> {
     if !text.contains(unsafe_to_print) {

@@ -38,7 +38,7 @@ pub enum ImpossibleLight {
 /// Looks at the light of one source.
 ///
 /// ```
-/// let mut light = noisefloor::LightCheck::default();
+/// let mut light = noisefloor::watch::LightCheck::default();
 /// assert!(light.check(&[[0.2; 3], [0.4, 0.5, -0.01]]).is_ok());
 /// assert!(light.check(&[[0.2; 3], [-1e6; 3]]).is_err());
 /// ```
