@@ -4,7 +4,7 @@
 //!   content tells the format. Files may be hostile: sizes are checked before pixels are allocated, and a
 //!   broken file is a [`PictureError`].
 //! - [`read_facts`], [`read_still`]: what an EXR says of its samples, and a picture with them.
-//! - [`read_unread`]: what of a file is not read, alpha and further layers.
+//! - [`read_unread`]: what is ignored of a file: alpha and further layers.
 //! - [`write_exr`], [`write_png`], [`write_atomic`], [`check_writable`]: files that appear complete or not at
 //!   all.
 //! - [`read_cube`]: a `.cube` LUT, and as a tone mapping ([`ColourLut::into_tone_curve`]).

@@ -18,7 +18,7 @@ pub enum StudyError {
         source: io::Error,
     },
     /// The study file is invalid.
-    #[error("{}: {what}; docs/study.md lists what a study file holds", path.display())]
+    #[error("{}: {what}; docs/studies.md lists what a study file holds", path.display())]
     File {
         /// The file.
         path: PathBuf,

@@ -144,7 +144,7 @@ impl<'a> JudgedImages<'a> {
             Picture::Display(image) => (Encoding::Display, &image.pixels),
         };
         for zone in &job.zones {
-            // A batch is the zone alone
+            // A batch is only the zone
             let (x, y) = if job.batch { (0, 0) } else { (zone.x, zone.y) };
             let (exact, inside) = (
                 (zone.width, zone.height) == (w, h),
@@ -187,7 +187,7 @@ pub(super) fn reference(zones: &[&JudgedZone]) -> Result<Option<Vec<Patch>>, Cor
             let (path, scene) = (path.clone(), zone.scene.clone());
             return Err(CorpusError::Zone { path, scene, zone: zone.zone, width, height });
         }
-        // A batch is the zone alone
+        // A batch is only the zone
         let apron = if matches!(zone.stack, ZoneImages::Batches(_)) { 0 } else { HALO };
         Ok(cut(&image.pixels, (width, height), Inner { x, y, width: w, height: h }, apron))
     };

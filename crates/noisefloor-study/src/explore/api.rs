@@ -289,6 +289,6 @@ pub(crate) async fn blocking<T: Send + 'static>(
 
 impl From<StudyError> for Refusal {
     fn from(error: StudyError) -> Self {
-        refuse(error.to_string(), "pictures", "see docs/explore.md")
+        refuse(error.to_string(), "pictures", "see docs/studies.md")
     }
 }

@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, mpsc};
 use tokio::sync::oneshot;
 
-/// Most commands that share a commit; bounds what a failing disk can take with it.
+/// Most commands that share a commit; bounds what is lost if the disk fails.
 const MOST_AT_ONCE: usize = 512;
 /// The answers of a study, open for writing. Clones share one writer thread.
 #[derive(Clone, Debug)]
@@ -235,7 +235,7 @@ mod tests {
         files.filter(named).collect()
     }
 
-    /// When an erasure is acknowledged, nothing is left of it: whoever is killed then has nothing to hide.
+    /// When an erasure is acknowledged, nothing is left of it, even if the server is killed right then.
     #[tokio::test]
     async fn an_erasure_is_acknowledged_when_it_is_complete() {
         let folder = tempfile::tempdir().unwrap();
