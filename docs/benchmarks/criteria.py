@@ -9,8 +9,12 @@ import os
 import sys
 
 FINE = "oracle:fine:min-spp=50"
-# As it was typed before it had a name
-OLDER = {"oracle:spaced=10:min-spp=100": "oracle:fine", "oracle:spaced=10:min-spp=50": FINE}
+# As it was typed before it had a name, and as it is typed now
+OLDER = {
+    "oracle:spaced=10:min-spp=100": "oracle:fine",
+    "oracle:spaced=10:min-spp=50": FINE,
+    "oracle:schedule=every:batch=100": "oracle:every=100",
+}
 SHOWN = {
     "oracle:every=100": "oracle, every 100",
     "oracle": "oracle, every 20",

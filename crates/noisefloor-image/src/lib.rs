@@ -49,6 +49,8 @@ mod picture;
 mod plane;
 mod read;
 mod stack;
+#[cfg(feature = "tables")]
+mod table;
 mod unread;
 mod write;
 
@@ -66,5 +68,7 @@ pub use picture::{DisplayImage, LinearImage, Picture};
 pub use plane::Plane;
 pub use read::{read_picture, read_picture_within, read_still};
 pub use stack::StackSource;
+#[cfg(feature = "tables")]
+pub use table::write_csv;
 pub use unread::{Unread, read_unread};
 pub use write::{RenderLayers, write_exr, write_png};

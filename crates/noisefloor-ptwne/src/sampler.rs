@@ -1,9 +1,11 @@
 //! Where the random numbers of a path come from.
 
 use crate::rng::{GOLDEN, Key, Rng, mix};
+use serde::{Deserialize, Serialize};
 
 /// How the samples of a pixel are distributed.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum Sampling {
     /// Independent samples. Their noise is that which people saw in the training data.

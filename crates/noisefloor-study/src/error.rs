@@ -99,7 +99,7 @@ pub enum StudyError {
 pub enum StoreError {
     /// SQLite refused.
     #[error(
-        "{}: {source}; check the free space and that the file is a database of `noisefloor study`",
+        "{}: {source}; check the free space and that the file is a database of `noisefloor-lab study`",
         path.display()
     )]
     Database {
@@ -119,7 +119,7 @@ pub enum StoreError {
         path: PathBuf,
     },
     /// The database does not hold disagreements.
-    #[error("{}: is not a database of `noisefloor explore`; name another with --database", path.display())]
+    #[error("{}: is not a database of `noisefloor-lab explore`; name another with --database", path.display())]
     NotDisagreements {
         /// The database.
         path: PathBuf,

@@ -44,7 +44,7 @@ pub(crate) async fn begin(State(app): Shared, body: Body) -> Answer {
         Err(Refusal::new(StatusCode::UNPROCESSABLE_ENTITY, what, place, do_))
     };
     if simulated && !app.simulated.load(Ordering::Relaxed) {
-        let do_ = "rehearse with `noisefloor study simulate`, or `study serve --admit-simulated`";
+        let do_ = "rehearse with `noisefloor-lab study simulate`, or `study serve --admit-simulated`";
         return refuse("simulated observers are not admitted", "simulated", do_.into());
     }
     let groups = &app.study.groups;
