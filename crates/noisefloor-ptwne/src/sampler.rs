@@ -14,7 +14,7 @@ pub enum Sampling {
     /// Owen-scrambled Sobol points (Burley 2020, "Practical Hash-based Owen Scrambling"), four dimensions at
     /// a time, scrambled and shuffled differently for each pixel. They have less noise, but the halves of a
     /// pixel are no longer independent, and the bundled model has not seen such noise: see
-    /// `docs/benchmarks/renderer.md` of the project.
+    /// `docs/accuracy.md` of the project.
     Sobol,
 }
 
