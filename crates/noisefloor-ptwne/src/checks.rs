@@ -66,3 +66,17 @@ pub(crate) fn direction(d: [f32; 3]) -> Result<math::Vec3, SceneError> {
     let unit = Vec3::from(d).as_dvec3().try_normalize();
     unit.map(|d| d.as_vec3a()).ok_or(SceneError::NotFinite { what: "the direction of a light" })
 }
+
+/// Makes room for `more` elements, or says that there is no memory for them.
+pub(crate) fn room<T>(elements: &mut Vec<T>, more: usize) -> Result<(), SceneError> {
+    let bytes = (elements.len() + more).saturating_mul(size_of::<T>());
+    elements.try_reserve(more).map_err(|_| SceneError::Memory { bytes })
+}
+
+/// Checks that there is memory for `bytes`, before what cannot say so needs it.
+///
+/// # Errors
+/// [`SceneError::Memory`] if there is not.
+pub fn check_memory(bytes: usize) -> Result<(), SceneError> {
+    Vec::<u8>::new().try_reserve_exact(bytes).map_err(|_| SceneError::Memory { bytes })
+}

@@ -116,7 +116,7 @@ impl<'a> Tracer<'a> {
             if code >> MAX_SPECULAR != 0 {
                 return sum;
             }
-            let ray = Ray { origin: scene.leave(&surface, ray.dir), dir: ray.dir };
+            let ray = Ray { origin: surface.leave(ray.dir), dir: ray.dir };
             return sum + self.radiance(Branch { ray, passed: passed + hit.t, code, ..branch });
         }
         let cos = (-ray.dir.dot(surface.normal)).clamp(0.0, 1.0);
@@ -173,7 +173,7 @@ impl<'a> Tracer<'a> {
         if code >> MAX_SPECULAR != 0 || weight.max_element() < MIN_WEIGHT {
             return Vec3::ZERO;
         }
-        let ray = Ray { origin: self.scene.leave(surface, dir), dir };
+        let ray = Ray { origin: surface.leave(dir), dir };
         self.radiance(Branch { ray, from: ray.origin, passed: 0.0, density, weight, code })
     }
 
@@ -244,7 +244,7 @@ impl<'a> Tracer<'a> {
         scattered: impl Fn(Vec3, f32) -> Vec3,
     ) -> Vec3 {
         let scene = self.scene;
-        let origin = scene.leave(surface, surface.flat);
+        let origin = surface.leave(surface.flat);
         let seed = self.seed(code, Use::Lights);
         let mut sum = Vec3::ZERO;
         for index in self.index * LIGHT_SAMPLES..(self.index + 1) * LIGHT_SAMPLES {
@@ -289,7 +289,7 @@ impl<'a> Tracer<'a> {
             if dir.dot(surface.flat) <= 0.0 || density <= 0.0 {
                 continue;
             }
-            let ray = Ray { origin: self.scene.leave(surface, dir), dir };
+            let ray = Ray { origin: surface.leave(dir), dir };
             let (radiance, stratum) =
                 self.emitted_along(&ray, OpacityTest::Stratified { index, seed }, density * n as f32);
             let light = weight * scattered(dir) * radiance / (density * n as f32);
@@ -322,7 +322,7 @@ impl<'a> Tracer<'a> {
             if !surface.material.is_nothing() {
                 return (sum, stratum);
             }
-            onward.origin = scene.leave(&surface, ray.dir);
+            onward.origin = surface.leave(ray.dir);
         }
     }
 

@@ -63,6 +63,20 @@ pub enum SceneError {
     /// The axes of an environment map are not those of a rotation.
     #[error("the axes of an environment map must have length 1 and be perpendicular to each other")]
     Rotation,
+    /// Objects and instances do not fit together.
+    #[error("{0}; objects hold surfaces that do not shine, and are shown by instances in the scene")]
+    Object(&'static str),
+    /// The matrix of an instance flattens it, or is too near to one that does for 32-bit numbers.
+    #[error(
+        "the matrix of an instance is singular: scale no axis by zero, nor one 10⁶ times as much as another"
+    )]
+    Singular,
+    /// The memory that is allowed is too little.
+    #[error("there is no memory for {bytes} bytes more; allow more (`ulimit -v`), or simplify the scene")]
+    Memory {
+        /// Bytes that were asked for.
+        bytes: usize,
+    },
     /// The scene has more of something than the limit allows.
     #[error("the scene has {found} {what}, more than {limit}")]
     TooLarge {

@@ -114,7 +114,7 @@ impl<'a, const OPACITY: bool> Path<'a, OPACITY> {
 
             if OPACITY && surface.material.is_nothing() {
                 passed += hit.t;
-                ray.origin = scene.leave(&surface, ray.dir);
+                ray.origin = surface.leave(ray.dir);
                 continue;
             }
 
@@ -134,7 +134,7 @@ impl<'a, const OPACITY: bool> Path<'a, OPACITY> {
             if throughput.max_element() <= 0.0 {
                 return sum;
             }
-            ray = Ray { origin: scene.leave(&surface, next.dir), dir: next.dir };
+            ray = Ray { origin: surface.leave(next.dir), dir: next.dir };
             (from, passed) = (ray.origin, 0.0);
         }
     }
@@ -224,7 +224,7 @@ impl<'a, const OPACITY: bool> Path<'a, OPACITY> {
             return Vec3::ZERO;
         }
         if THROUGH {
-            origin = scene.leave(surface, dir);
+            origin = surface.leave(dir);
         }
         if self.blocked(&Ray { origin, dir }, distance * 0.9999) {
             return Vec3::ZERO;
@@ -242,7 +242,7 @@ impl<'a, const OPACITY: bool> Path<'a, OPACITY> {
         sum: &mut Vec3,
     ) -> Option<Scattered> {
         let mis = self.settings.estimator == Estimator::Mis;
-        let receiver = Receiver::diffuse(self.scene.leave(surface, surface.flat), surface.normal);
+        let receiver = Receiver::diffuse(surface.leave(surface.flat), surface.normal);
         *sum += throughput
             * self.next_event::<false>(surface, receiver, |dir, pdf| {
                 let lambert = dir.dot(surface.normal).max(0.0) * FRAC_1_PI;
@@ -275,7 +275,7 @@ impl<'a, const OPACITY: bool> Path<'a, OPACITY> {
         let receiver = if THROUGH && glossy.transmits() {
             Receiver::all_round(surface.position)
         } else {
-            let origin = self.scene.leave(surface, surface.flat);
+            let origin = surface.leave(surface.flat);
             glossy.receiver(origin, surface.normal, wo, frame)
         };
         *sum += throughput

@@ -40,6 +40,8 @@ pub(crate) struct Intersection<'a> {
     pub(crate) material: &'a CompiledMaterial,
     /// The index of its light; [`NO`] if it does not shine.
     pub(crate) light: u32,
+    /// How far origins of scattered rays are moved off it.
+    pub(crate) offset: f32,
 }
 
 impl Scene {
@@ -52,9 +54,9 @@ impl Scene {
         test: OpacityTest,
     ) -> Hit {
         if OPACITY {
-            self.bvh.closest(ray, stack, |prim, spot| self.is_solid(prim, spot, test))
+            self.bvh.closest(ray, stack, |prim, instance, spot| self.is_solid(prim, instance, spot, test))
         } else {
-            self.bvh.closest(ray, stack, |_, _| true)
+            self.bvh.closest(ray, stack, |_, _, _| true)
         }
     }
 
@@ -68,16 +70,16 @@ impl Scene {
         test: OpacityTest,
     ) -> bool {
         if OPACITY {
-            self.bvh.blocked::<true>(ray, t_max, stack, |prim, spot| {
+            self.bvh.blocked::<true>(ray, t_max, stack, |prim, instance, spot| {
                 let material = self.geometry.group(prim).material;
-                self.is_solid(prim, spot, test) && !self.materials[material as usize].is_nothing()
+                self.is_solid(prim, instance, spot, test) && !self.materials[material as usize].is_nothing()
             })
         } else {
-            self.bvh.blocked::<false>(ray, t_max, stack, |_, _| true)
+            self.bvh.blocked::<false>(ray, t_max, stack, |_, _, _| true)
         }
     }
 
-    fn is_solid(&self, prim: u32, spot: Spot, test: OpacityTest) -> bool {
+    fn is_solid(&self, prim: u32, instance: u32, spot: Spot, test: OpacityTest) -> bool {
         let group = self.geometry.group(prim);
         let material = &self.materials[group.material as usize];
         let (Spot::Plane { front, .. } | Spot::Sphere { front, .. }) = spot;
@@ -94,8 +96,8 @@ impl Scene {
                     }
                 };
                 let c = opacity.eval(u, v);
-                // The two sides of a sphere decide for themselves
-                let side = u64::from(far) << 63;
+                // The two sides of a sphere decide for themselves, and so do instances
+                let side = u64::from(far) << 63 | u64::from(instance.wrapping_add(1)) << 32;
                 let number = match test {
                     OpacityTest::Random(seed) => rng::hash(seed ^ side, prim),
                     OpacityTest::Stratified { index, seed } => {
@@ -113,9 +115,13 @@ impl Scene {
         let (prim, shape) = self.bvh.shape_at(hit);
         let group = self.geometry.group(prim);
         let material = &self.materials[group.material as usize];
-        let along = ray.origin + ray.dir * hit.t;
+        let instance = self.bvh.instance(hit);
+        let mut along = ray.origin + ray.dir * hit.t;
+        if let Some(instance) = instance {
+            along = instance.local(along);
+        }
         // Back onto the surface: an error along it does no harm, one across it would
-        let (position, mut flat) = match shape {
+        let (mut position, mut flat) = match shape {
             HitShape::Plane { point, normal } => (along - normal * normal.dot(along - point), normal),
             HitShape::Sphere { centre, radius } => {
                 let n = (along - centre).normalize();
@@ -130,6 +136,14 @@ impl Scene {
         if group.normals != NO {
             normal = self.geometry.shading_normal(group, prim, hit.uv).unwrap_or(flat);
         }
+        let mut reach = position.abs().max_element();
+        if let Some(instance) = instance {
+            position = instance.position(position);
+            (flat, normal) = (instance.normal(flat), instance.normal(normal));
+            reach = instance.reach(position);
+        }
+        // A few hundred roundings of the largest coordinate
+        let offset = (reach * 1e-5).max(self.offset);
         // Turn both normals towards the ray's origin
         let front = ray.dir.dot(flat) < 0.0;
         if !front {
@@ -159,7 +173,7 @@ impl Scene {
         }
         let along = if material.directional { self.growing_u(hit, flat) } else { Vec3::ZERO };
         let light = if group.light == NO { NO } else { group.light + prim - group.first };
-        Intersection { position, flat, normal, front, uv, along, tint, material, light }
+        Intersection { position, flat, normal, front, uv, along, tint, material, light, offset }
     }
 
     /// The shading normal of a surface with relief, on the side of the ray's origin.
@@ -181,15 +195,6 @@ impl Scene {
     #[inline(never)]
     fn growing_u(&self, hit: &Hit, flat: Vec3) -> Vec3 {
         self.tangents(hit, flat).map_or(Vec3::ZERO, |[along, _]| along.normalize_or_zero())
-    }
-
-    /// The origin of a ray that leaves `surface` on the side that `dir` points to.
-    #[inline]
-    pub(crate) fn leave(&self, surface: &Intersection<'_>, dir: Vec3) -> Vec3 {
-        // A few hundred roundings of the largest coordinate
-        let distance = (surface.position.abs().max_element() * 1e-5).max(self.offset);
-        let side = if dir.dot(surface.flat) < 0.0 { -distance } else { distance };
-        surface.position + surface.flat * side
     }
 }
 
@@ -219,6 +224,13 @@ fn sphere_coordinates(n: Vec3) -> [f32; 2] {
 }
 
 impl<'a> Intersection<'a> {
+    /// The origin of a ray that leaves it on the side that `dir` points to.
+    #[inline]
+    pub(crate) fn leave(&self, dir: Vec3) -> Vec3 {
+        let side = if dir.dot(self.flat) < 0.0 { -self.offset } else { self.offset };
+        self.position + self.flat * side
+    }
+
     /// The frame in which directions of scattering are local.
     #[inline]
     pub(crate) fn frame(&self) -> Frame {

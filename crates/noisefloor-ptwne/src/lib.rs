@@ -61,9 +61,11 @@ mod tangents;
 mod texture;
 
 pub use bsdf::{Facets, MIN_ROUGHNESS};
-pub use builder::{Emission, MAX_SURFACES, MIN_AREA, MaterialId, Mesh, SceneBuilder};
+pub use builder::{
+    Emission, MAX_INSTANCES, MAX_SURFACES, MIN_AREA, MaterialId, Mesh, ObjectId, SceneBuilder,
+};
 pub use camera::{Camera, FovAxis, Optics};
-pub use checks::MAX_COORDINATE;
+pub use checks::{MAX_COORDINATE, check_memory};
 pub use environment::{Environment, EnvironmentMap, Sun};
 pub use error::{RenderError, SceneError};
 pub use filter::Filter;

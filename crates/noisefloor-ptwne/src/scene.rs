@@ -1,20 +1,24 @@
 //! A scene, ready to be rendered.
 
-use crate::accel::{self, Bvh};
+use crate::accel::{self, Bvh, Hierarchy};
 use crate::camera::{Camera, Lens, Optics};
+use crate::checks::check_memory;
 use crate::environment::{Dome, Environment, Map};
 use crate::error::SceneError;
 use crate::geometry::Geometry;
 use crate::light::{Light, Lights};
 use crate::material::CompiledMaterial;
 use crate::math::Vec3;
-use crate::parts::{Parts, Surroundings};
+use crate::parts::{Object, Parts, Surroundings};
 use crate::texture::Texture;
 use noisefloor::source::SourceIdentity;
 
 /// A scene whose centre is farther from the origin than this many of its radii is moved there: `f32` keeps 24
 /// bits of each coordinate, and those that only say where the scene is are lost to its detail.
 const FAR: f32 = 16.0;
+
+/// Bytes that building the hierarchy takes for each surface and instance at most, besides the surfaces.
+const BUILDING: usize = 640;
 
 /// What surrounds a scene, prepared for lookup.
 #[derive(Clone, Debug)]
@@ -39,7 +43,7 @@ pub struct Scene {
     pub(crate) emission_textures: Vec<Texture>,
     /// The index of the sun among the lights.
     pub(crate) sun: Option<usize>,
-    pub(crate) bvh: Bvh,
+    pub(crate) bvh: Hierarchy,
     /// Whether any surface is partly transparent.
     pub(crate) has_opacity: bool,
     /// The least distance by which origins of scattered rays are moved off a surface.
@@ -48,22 +52,32 @@ pub struct Scene {
 }
 
 impl Scene {
-    pub(crate) fn new(name: String, camera: Camera, parts: Parts) -> Self {
-        let Parts { surroundings, optics, materials, mut shapes, geometry, mut lights, emission_textures } =
-            parts;
+    pub(crate) fn new(name: String, camera: Camera, parts: Parts) -> Result<Self, SceneError> {
+        let Parts { surroundings, optics, materials, mut shapes, geometry, mut lights, .. } = parts;
+        let Parts { emission_textures, objects, mut instances, .. } = parts;
+        check_memory((shapes.len() + instances.len()).saturating_mul(BUILDING))?;
+        let own: Vec<u32> = own(shapes.len(), &objects);
 
         // Move far-away scenes to the origin
         let mut origin = Vec3::ZERO;
-        if let Some([low, high]) = accel::bounds(&shapes) {
+        let boxes = instances.iter().map(|instance| {
+            let [middle, half] = instance.around(objects[instance.object()].bounds);
+            [middle - half, middle + half]
+        });
+        let boxes = boxes.chain(accel::bounds(own.iter().map(|prim| &shapes[*prim as usize])));
+        if let Some([low, high]) = boxes.reduce(|[a, b], [c, d]| [a.min(c), b.max(d)]) {
             let centre = 0.5 * (low + high);
             if centre.abs().max_element() > FAR * 0.5 * (high - low).length() {
                 origin = centre;
-                shapes.iter_mut().for_each(|shape| *shape = shape.translated(-glam::Vec3::from(origin)));
+                let by = -glam::Vec3::from(origin);
+                own.iter().for_each(|prim| shapes[*prim as usize] = shapes[*prim as usize].translated(by));
+                instances.iter_mut().for_each(|instance| instance.translate(-origin));
                 lights.iter_mut().for_each(|light| light.translate(-origin));
             }
         }
-        let bvh = Bvh::new(&shapes);
-        drop(shapes);
+        let inside = |object: &Object| Bvh::new(&shapes, &object.surfaces.clone().collect::<Vec<u32>>());
+        let bvh = Hierarchy::new(Bvh::new(&shapes, &own), objects.iter().map(inside).collect(), instances);
+        drop((shapes, own));
 
         let (sky, sun) = surround(surroundings, &mut lights);
         let has_opacity = geometry.groups.iter().any(|g| materials[g.material as usize].lets_pass());
@@ -71,7 +85,7 @@ impl Scene {
         let lights = Lights::new(lights, bounds, &means(&emission_textures));
         let offset = 1e-6 * 0.5 * (bounds[1] - bounds[0]).length();
         let identity = SourceIdentity::new(name.clone());
-        Self {
+        Ok(Self {
             name,
             camera,
             optics,
@@ -86,7 +100,7 @@ impl Scene {
             has_opacity,
             offset,
             identity,
-        }
+        })
     }
 
     /// The scene's name.
@@ -147,9 +161,15 @@ impl Scene {
         self.camera.lens(&self.optics, width, height, self.origin)
     }
 
-    /// Number of surfaces: triangles, parallelograms, spheres and ellipses.
+    /// Number of surfaces: triangles, parallelograms, spheres and ellipses. Those of an object count once, however
+    /// many instances show it.
     pub fn surfaces(&self) -> usize {
         self.geometry.group_of.len()
+    }
+
+    /// Number of instances of objects.
+    pub fn instances(&self) -> usize {
+        self.bvh.instances()
     }
 
     /// Number of lights. Each emitting triangle counts as one; so does the sun or the environment map.
@@ -175,8 +195,8 @@ impl Scene {
         self.has_opacity
     }
 
-    /// Memory that the surfaces take, in bytes: the hierarchy, shading normals, texture coordinates and
-    /// lights, but not the pixels of textures.
+    /// Memory that the surfaces take, in bytes: the hierarchy, shading normals, texture coordinates,
+    /// instances and lights, but not the pixels of textures.
     pub fn geometry_bytes(&self) -> usize {
         self.bvh.bytes() + self.geometry.bytes() + self.lights.bytes()
     }
@@ -189,6 +209,18 @@ impl Scene {
             _ => None,
         }
     }
+}
+
+/// The surfaces that are of no object.
+fn own(surfaces: usize, objects: &[Object]) -> Vec<u32> {
+    let mut own = Vec::with_capacity(surfaces);
+    let mut next = 0;
+    for object in objects {
+        own.extend(next..object.surfaces.start);
+        next = object.surfaces.end;
+    }
+    own.extend(next..surfaces as u32);
+    own
 }
 
 /// What surrounds a scene, and the index of the sun; its lights are added to `lights`, and come last.

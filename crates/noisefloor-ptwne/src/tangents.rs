@@ -11,6 +11,13 @@ impl Scene {
     /// the surface.
     /// `normal` is the geometric one of the front.
     pub(crate) fn tangents(&self, hit: &Hit, normal: Vec3) -> Option<[Vec3; 2]> {
+        let Some(instance) = self.bvh.instance(hit) else { return self.local_tangents(hit, normal) };
+        let along = self.local_tangents(hit, instance.local_normal(normal))?;
+        Some(along.map(|edge| instance.edge(edge)))
+    }
+
+    /// The same in the coordinates of the object that was hit.
+    fn local_tangents(&self, hit: &Hit, normal: Vec3) -> Option<[Vec3; 2]> {
         let (prim, shape) = self.bvh.shape_at(hit);
         let group = self.geometry.group(prim);
         match (shape, self.bvh.edges(hit)) {

@@ -1,7 +1,8 @@
-//! The hierarchy, and what it says of a hit.
+//! A hierarchy of surfaces, and what it says of a hit.
 
 use super::leaf::{Leaf, Pack, Round, RoundShape};
-use super::node::Node;
+use super::tree::Tree;
+use crate::geometry::NO;
 use crate::math::Vec3;
 use glam::Vec4;
 
@@ -10,39 +11,36 @@ use glam::Vec4;
 pub(crate) struct Hit {
     /// Distance along the ray; infinite for a miss.
     pub(crate) t: f32,
-    /// The surface, in the order of the hierarchy: see [`Bvh::shape_at`].
+    /// The surface, in the order of its hierarchy: see [`Bvh::shape_at`].
     pub(super) slot: u32,
+    /// The instance that it is of; [`NO`] if it is of none.
+    pub(super) instance: u32,
     /// Coordinates along the edges of a planar surface.
     pub(crate) uv: [f32; 2],
 }
 
-pub(super) const MISS: Hit = Hit { t: f32::INFINITY, slot: u32::MAX, uv: [0.0; 2] };
+pub(super) const MISS: Hit = Hit { t: f32::INFINITY, slot: NO, instance: NO, uv: [0.0; 2] };
 
 impl Hit {
     #[inline]
     pub(crate) fn is_miss(&self) -> bool {
-        self.slot == u32::MAX
+        self.slot == NO
     }
 }
 
 /// Flags the slot of a round surface.
 pub(super) const ROUND: u32 = 1 << 31;
 
+/// A hierarchy over surfaces.
 #[derive(Clone, Debug)]
 pub(crate) struct Bvh {
-    pub(super) nodes: Vec<Node>,
+    pub(super) tree: Tree,
     pub(super) leaves: Vec<Leaf>,
     pub(super) packs: Vec<Pack>,
     pub(super) rounds: Vec<Round>,
-    /// Entries that a [`Stack`] needs.
-    pub(super) stack: usize,
-    pub(super) bounds: [Vec3; 2],
+    /// Lowest and highest corner of the bounding box of all surfaces, if there are any.
+    pub(super) bounds: Option<[Vec3; 2]>,
 }
-
-/// Nodes still to visit, with the distance at which each begins. Allocated once per job, so that no path
-/// allocates.
-#[derive(Clone, Debug)]
-pub(crate) struct Stack(pub(super) Vec<(u32, f32)>);
 
 /// The shape that a ray hit.
 #[derive(Clone, Copy, Debug)]
@@ -60,19 +58,9 @@ pub(crate) enum HitShape {
 }
 
 impl Bvh {
-    /// Lowest and highest corner of the bounding box of all surfaces.
-    pub(crate) fn bounds(&self) -> [Vec3; 2] {
-        self.bounds
-    }
-
-    /// A stack for the nodes that a traversal of this hierarchy can leave behind.
-    pub(crate) fn stack(&self) -> Stack {
-        Stack(vec![(0, 0.0); self.stack])
-    }
-
     /// The index of the surface that was hit, and its shape there. The hit must not be a miss.
     #[inline]
-    pub(crate) fn shape_at(&self, hit: &Hit) -> (u32, HitShape) {
+    pub(super) fn shape_at(&self, hit: &Hit) -> (u32, HitShape) {
         if hit.slot & ROUND == 0 {
             let (pack, lane) = (&self.packs[(hit.slot >> 2) as usize], (hit.slot & 3) as usize);
             let at = |v: &[Vec4; 3]| Vec3::new(v[0][lane], v[1][lane], v[2][lane]);
@@ -89,7 +77,7 @@ impl Bvh {
 
     /// The edges of the planar surface or ellipse that was hit, along which its coordinates run; none for
     /// spheres.
-    pub(crate) fn edges(&self, hit: &Hit) -> Option<[Vec3; 2]> {
+    pub(super) fn edges(&self, hit: &Hit) -> Option<[Vec3; 2]> {
         let [normal, u, v] = if hit.slot & ROUND == 0 {
             self.packs[(hit.slot >> 2) as usize].plane((hit.slot & 3) as usize)
         } else {
@@ -104,8 +92,8 @@ impl Bvh {
     }
 
     /// Memory that the hierarchy takes, in bytes.
-    pub(crate) fn bytes(&self) -> usize {
-        size_of_val(self.nodes.as_slice())
+    pub(super) fn bytes(&self) -> usize {
+        self.tree.bytes()
             + size_of_val(self.leaves.as_slice())
             + size_of_val(self.packs.as_slice())
             + size_of_val(self.rounds.as_slice())

@@ -38,16 +38,11 @@ impl Shape {
             Shape::Disk { centre, e1, e2 } => Shape::Disk { centre: centre + by, e1, e2 },
         }
     }
-
-    /// Whether it fits into a [`Pack`](super::leaf::Pack): it is planar, with straight edges.
-    pub(super) fn packs(&self) -> bool {
-        matches!(self, Shape::Planar { .. })
-    }
 }
 
 /// Lowest and highest corner of the bounding box of `shapes`; none if there are no shapes.
-pub(crate) fn bounds(shapes: &[Shape]) -> Option<[Vec3; 2]> {
-    let all = shapes.iter().map(Shape::bounds).reduce(|a, b| a.union(&b))?;
+pub(crate) fn bounds<'a>(shapes: impl IntoIterator<Item = &'a Shape>) -> Option<[Vec3; 2]> {
+    let all = shapes.into_iter().map(Shape::bounds).reduce(|a, b| a.union(&b))?;
     Some([all.min, all.max])
 }
 

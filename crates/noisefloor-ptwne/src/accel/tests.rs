@@ -1,8 +1,12 @@
 //! The hierarchy against a loop over all surfaces.
 
-use super::{Bvh, Shape};
+use super::{Bvh, Hierarchy, Shape};
 use crate::math::{self, Ray, Vec3};
 use crate::rng::{Key, Rng};
+
+fn alone_in_scene(own: Bvh) -> Hierarchy {
+    Hierarchy::new(own, vec![], vec![])
+}
 
 /// The hierarchy finds the same surfaces as a loop over all of them.
 #[test]
@@ -17,22 +21,23 @@ fn traversal_agrees_with_a_loop() {
             k => Shape::Planar { corner: point(4.0), e1: point(1.0), e2: point(1.0), whole: k == 1 },
         })
         .collect();
-    let bvh = Bvh::new(&shapes);
-    let alone: Vec<Bvh> = shapes.iter().map(|s| Bvh::new(&[*s])).collect();
+    let all: Vec<u32> = (0..shapes.len() as u32).collect();
+    let bvh = alone_in_scene(Bvh::new(&shapes, &all));
+    let alone: Vec<Hierarchy> = shapes.iter().map(|s| alone_in_scene(Bvh::new(&[*s], &[0]))).collect();
     let mut stack = bvh.stack();
     let mut hits = 0;
     for i in 0..5000 {
         let mut rng = Rng::new(Key::new(8), i, 0);
         let ray = Ray { origin: point(4.0).into(), dir: math::sphere(rng.two()).normalize() };
-        let hit = bvh.closest(&ray, &mut stack, |_, _| true);
-        let all = alone.iter().map(|a| a.closest(&ray, &mut stack, |_, _| true).t);
+        let hit = bvh.closest(&ray, &mut stack, |_, _, _| true);
+        let all = alone.iter().map(|a| a.closest(&ray, &mut stack, |_, _, _| true).t);
         let best = all.fold(f32::INFINITY, f32::min);
         // A surface alone is widened less
         assert!(hit.t == best || (hit.t - best).abs() < 1e-5 * best, "{} {best}", hit.t);
-        assert_eq!(bvh.blocked::<true>(&ray, f32::INFINITY, &mut stack, |_, _| true), best.is_finite());
+        assert_eq!(bvh.blocked::<true>(&ray, f32::INFINITY, &mut stack, |_, _, _| true), best.is_finite());
         if best.is_finite() {
             hits += 1;
-            assert!(!bvh.blocked::<true>(&ray, hit.t, &mut stack, |_, _| true));
+            assert!(!bvh.blocked::<true>(&ray, hit.t, &mut stack, |_, _, _| true));
         }
     }
     assert!(hits > 500, "{hits}");
@@ -40,8 +45,8 @@ fn traversal_agrees_with_a_loop() {
 
 #[test]
 fn no_ray_hits_an_empty_hierarchy() {
-    let bvh = Bvh::new(&[]);
+    let bvh = alone_in_scene(Bvh::new(&[], &[]));
     let ray = Ray { origin: Vec3::ZERO, dir: Vec3::new(0.0, 0.6, -0.8) };
-    assert!(bvh.closest(&ray, &mut bvh.stack(), |_, _| true).t.is_infinite());
-    assert!(!bvh.blocked::<false>(&ray, 1.0, &mut bvh.stack(), |_, _| true));
+    assert!(bvh.closest(&ray, &mut bvh.stack(), |_, _, _| true).t.is_infinite());
+    assert!(!bvh.blocked::<false>(&ray, 1.0, &mut bvh.stack(), |_, _, _| true));
 }

@@ -124,6 +124,7 @@ fn seen(material: &CompiledMaterial, wo: Vec3) -> Glossy<'_> {
         tint: Vec3::ONE,
         material,
         light: NO,
+        offset: 0.0,
     };
     surface.glossy(wo.z).unwrap()
 }

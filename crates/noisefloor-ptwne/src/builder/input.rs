@@ -7,6 +7,8 @@ use noisefloor::Rgb;
 
 /// Largest number of surfaces (triangles, parallelograms, spheres, ellipses) of a scene.
 pub const MAX_SURFACES: usize = 1 << 26;
+/// Largest number of instances of a scene.
+pub const MAX_INSTANCES: usize = 1 << 22;
 /// Planar surfaces with less area than this, in squared scene units, are left out.
 pub const MIN_AREA: f32 = 1e-18;
 

@@ -2,10 +2,12 @@
 
 mod input;
 mod materials;
+mod objects;
 mod scene_builder;
 
 #[cfg(test)]
 mod tests;
 
-pub use input::{Emission, MAX_SURFACES, MIN_AREA, MaterialId, Mesh};
+pub use input::{Emission, MAX_INSTANCES, MAX_SURFACES, MIN_AREA, MaterialId, Mesh};
+pub use objects::ObjectId;
 pub use scene_builder::SceneBuilder;

@@ -4,7 +4,7 @@ use super::input::{Emission, MAX_SURFACES, MIN_AREA, MaterialId, Mesh};
 use crate::accel::Shape;
 use crate::bsdf::Coat;
 use crate::camera::{Camera, Optics};
-use crate::checks::{MAX_COORDINATE, check_radiance, check_range, position};
+use crate::checks::{MAX_COORDINATE, check_radiance, check_range, position, room};
 use crate::environment::{Environment, EnvironmentMap};
 use crate::error::SceneError;
 use crate::geometry::{Group, NO, RINGS, RINGS_REVERSED};
@@ -37,6 +37,8 @@ pub struct SceneBuilder {
     camera: Camera,
     pub(super) parts: Parts,
     pub(super) coats: Vec<Arc<Coat>>,
+    /// The first surface of the object that has begun.
+    pub(super) open_object: Option<u32>,
 }
 
 impl SceneBuilder {
@@ -46,7 +48,7 @@ impl SceneBuilder {
     /// [`SceneError`] if the camera has no view direction, or a number is out of range.
     pub fn new(name: impl Into<String>, camera: Camera) -> Result<Self, SceneError> {
         camera.check()?;
-        Ok(Self { name: name.into(), camera, parts: Parts::default(), coats: vec![] })
+        Ok(Self { name: name.into(), camera, parts: Parts::default(), coats: vec![], open_object: None })
     }
 
     /// Sets how the camera projects, besides its field of view.
@@ -238,16 +240,28 @@ impl SceneBuilder {
             if !mesh.normals.is_empty() {
                 group.normals = index(vertices.normals.len())?;
                 let unit = |n: &[f32; 3]| Vec3::from(*n).as_dvec3().normalize_or_zero().as_vec3().to_array();
+                room(&mut vertices.normals, mesh.normals.len())?;
                 vertices.normals.extend(mesh.normals.iter().map(unit));
             }
             if !mesh.uvs.is_empty() {
                 group.uvs = index(vertices.uvs.len())?;
+                room(&mut vertices.uvs, mesh.uvs.len())?;
                 vertices.uvs.extend(mesh.uvs);
             }
             if !mesh.colours.is_empty() {
                 group.colours = index(vertices.colours.len())?;
+                room(&mut vertices.colours, mesh.colours.len())?;
                 vertices.colours.extend(mesh.colours);
             }
+        }
+        let surfaces = self.parts.shapes.len() + mesh.indices.len();
+        if surfaces > MAX_SURFACES {
+            return Err(SceneError::TooLarge { what: "surfaces", found: surfaces, limit: MAX_SURFACES });
+        }
+        room(&mut self.parts.shapes, mesh.indices.len())?;
+        room(&mut self.parts.geometry.group_of, mesh.indices.len())?;
+        if with_vertices {
+            room(&mut self.parts.geometry.vertices.corners, mesh.indices.len())?;
         }
         let mut left_out = 0;
         for triangle in mesh.indices {
@@ -271,9 +285,13 @@ impl SceneBuilder {
     /// Builds the scene.
     ///
     /// # Errors
-    /// None today, since every part was checked when it was added.
+    /// [`SceneError::Object`] if an object has not ended; [`SceneError::Memory`] if there is too little for the
+    /// hierarchy.
     pub fn build(self) -> Result<Scene, SceneError> {
-        Ok(Scene::new(self.name, self.camera, self.parts))
+        if self.open_object.is_some() {
+            return Err(SceneError::Object("an object without its end"));
+        }
+        Scene::new(self.name, self.camera, self.parts)
     }
 
     /// A group for the surfaces to be added next, and what they emit.
@@ -286,6 +304,9 @@ impl SceneBuilder {
             return Err(SceneError::Material(material.0));
         }
         if let Some(emission) = emission {
+            if self.open_object.is_some() {
+                return Err(SceneError::Object("an emitter in an object"));
+            }
             check_radiance(emission.radiance)?;
             if let Some(texture) = &emission.texture {
                 texture.check()?;
@@ -367,9 +388,11 @@ impl SceneBuilder {
             return Err(SceneError::TooLarge { what: "surfaces", found: prim + 1, limit: MAX_SURFACES });
         }
         if let Some(GroupEmission { radiance, two_sided, texture }) = group_emission {
+            room(&mut parts.lights, 1)?;
             let light = Light::surface(&shape, radiance.into(), two_sided, prim as u32);
             parts.lights.push(Light { texture, ..light });
         }
+        room(&mut parts.shapes, 1)?;
         parts.shapes.push(shape);
         Ok(true)
     }

@@ -1,0 +1,224 @@
+//! A hierarchy of boxes: how it is built, and how a ray walks it. What its leaves hold is somebody else's.
+
+use super::bvh::Hit;
+use super::median;
+use super::node::{LEAF, Node, WideRay};
+use crate::math::Vec3;
+use obvhs::{BvhBuildParams, aabb::Aabb, bvh2::Bvh2, bvh2::builder::build_bvh2};
+
+/// Nodes still to visit, with the distance at which each begins.
+pub(super) type Waiting = [(u32, f32)];
+
+/// A ray meets so many boxes of a subtree at most, in the mean, if the tree is to be a good one: to find one
+/// takes time in proportion to that number. Meshes have about 2, forests 20, and n equal boxes have n.
+const CROWDED: f32 = 500.0;
+
+#[derive(Clone, Debug)]
+pub(super) struct Tree {
+    nodes: Vec<Node>,
+    /// The most nodes that wait during a walk.
+    pub(super) waiting: usize,
+}
+
+impl Tree {
+    /// Builds the hierarchy over `boxes`. `leaf` is told which of them a leaf has, at most `most`, and numbers
+    /// it.
+    pub(super) fn new(boxes: &[Aabb], most: usize, mut leaf: impl FnMut(&[u32]) -> u32) -> Self {
+        let mut tree = Self { nodes: vec![Node::EMPTY], waiting: 4 };
+        if !boxes.is_empty() {
+            tree.waiting = 3 * tree.collapse(&binary(boxes), most, &mut leaf) + 4;
+            tree.nodes.shrink_to_fit();
+        }
+        tree
+    }
+
+    /// Collapses the binary tree: each wide node opens the largest of its inner children until it has four.
+    /// Subtrees of at most `most` boxes become leaves. Returns the depth.
+    fn collapse(&mut self, tree: &Bvh2, most: usize, leaf: &mut impl FnMut(&[u32]) -> u32) -> usize {
+        let mut depth = 1;
+        let mut todo = vec![(0usize, vec![0usize], 1usize)];
+        while let Some((at, mut children, level)) = todo.pop() {
+            depth = level.max(depth);
+            while children.len() < 4 {
+                let large = |i: &usize| at_most(most, tree, children[*i]).is_none();
+                let area = |i: &usize| tree.nodes[children[*i]].aabb().half_area();
+                let Some(open) = (0..children.len()).filter(large).max_by(|a, b| area(a).total_cmp(&area(b)))
+                else {
+                    break;
+                };
+                let first = tree.nodes[children.swap_remove(open)].first_index as usize;
+                children.extend([first, first + 1]);
+            }
+            for (lane, &child) in children.iter().enumerate() {
+                let node = &tree.nodes[child];
+                for axis in 0..3 {
+                    self.nodes[at].bounds[axis][0][lane] = node.aabb().min[axis];
+                    self.nodes[at].bounds[axis][1][lane] = node.aabb().max[axis];
+                }
+                self.nodes[at].child[lane] = if let Some(prims) = at_most(most, tree, child) {
+                    LEAF | leaf(&prims)
+                } else {
+                    let first = node.first_index as usize;
+                    let index = self.nodes.len();
+                    self.nodes.push(Node::EMPTY);
+                    todo.push((index, vec![first, first + 1], level + 1));
+                    index as u32
+                };
+            }
+        }
+        depth
+    }
+
+    /// Visits the leaves that begin before `best`, nearest first as far as boxes tell. `visit` is given the
+    /// number of the leaf, the best hit so far, which it may better, and room for a walk of its own.
+    #[inline(always)]
+    pub(super) fn nearest(
+        &self,
+        ray: &WideRay,
+        best: &mut Hit,
+        waiting: &mut Waiting,
+        mut visit: impl FnMut(u32, &mut Hit, &mut Waiting),
+    ) {
+        let mut top = 0;
+        let mut node = 0u32;
+        loop {
+            if node & LEAF == 0 {
+                let n = &self.nodes[node as usize];
+                let (enter, mut mask) = n.intersect(ray, best.t);
+                if mask != 0 {
+                    // Descend into the nearest child, leave the others behind
+                    let mut near = mask.trailing_zeros() as usize & 3;
+                    mask &= mask - 1;
+                    if mask != 0 {
+                        let enter = enter.to_array();
+                        while mask != 0 {
+                            let mut other = mask.trailing_zeros() as usize & 3;
+                            mask &= mask - 1;
+                            if enter[other] < enter[near] {
+                                std::mem::swap(&mut near, &mut other);
+                            }
+                            waiting[top] = (n.child[other], enter[other]);
+                            top += 1;
+                        }
+                    }
+                    node = n.child[near];
+                    continue;
+                }
+            } else {
+                visit(node & !LEAF, best, &mut waiting[top..]);
+            }
+            // Return to what begins before the nearest surface found so far
+            loop {
+                if top == 0 {
+                    return;
+                }
+                top -= 1;
+                let (next, t) = waiting[top];
+                if t < best.t {
+                    node = next;
+                    break;
+                }
+            }
+        }
+    }
+
+    /// Whether `visit` says so of any leaf that begins before `t_max`. It is given the number of the leaf, and
+    /// room for a walk of its own.
+    #[inline(always)]
+    pub(super) fn any(
+        &self,
+        ray: &WideRay,
+        t_max: f32,
+        waiting: &mut Waiting,
+        mut visit: impl FnMut(u32, &mut Waiting) -> bool,
+    ) -> bool {
+        let mut top = 0;
+        let mut node = 0u32;
+        loop {
+            if node & LEAF == 0 {
+                let n = &self.nodes[node as usize];
+                let (_, mut mask) = n.intersect(ray, t_max);
+                if mask != 0 {
+                    // Descend into one child, leave the others behind
+                    let child = |mask: u32| n.child[mask.trailing_zeros() as usize & 3];
+                    node = child(mask);
+                    mask &= mask - 1;
+                    while mask != 0 {
+                        waiting[top].0 = child(mask);
+                        top += 1;
+                        mask &= mask - 1;
+                    }
+                    continue;
+                }
+            } else if visit(node & !LEAF, &mut waiting[top..]) {
+                return true;
+            }
+            if top == 0 {
+                return false;
+            }
+            top -= 1;
+            node = waiting[top].0;
+        }
+    }
+
+    /// Whether any box of the hierarchy overlaps the pyramid of rays from `apex` between planes through it
+    /// with these inward normals. Conservative: never false if a surface overlaps it.
+    pub(super) fn reaches_into(&self, apex: Vec3, inward: &[Vec3; 4]) -> bool {
+        let mut todo = vec![0u32];
+        while let Some(index) = todo.pop() {
+            let node = &self.nodes[index as usize];
+            for lane in 0..4 {
+                let bound =
+                    |end: usize| Vec3::from_array(std::array::from_fn(|axis| node.bounds[axis][end][lane]));
+                let (low, high) = (bound(0) - apex, bound(1) - apex);
+                // Empty lanes have low > high. A thousandth of size and distance covers rounding
+                let slack = 1e-3 * high.abs().max(low.abs()).max_element();
+                let meets = |n: &Vec3| Vec3::select(n.cmpgt(Vec3::ZERO), high, low).dot(*n) >= -slack;
+                if low.cmple(high).all() && inward.iter().all(meets) {
+                    match node.child[lane] {
+                        child if child & LEAF == 0 => todo.push(child),
+                        _ => return true,
+                    }
+                }
+            }
+        }
+        false
+    }
+
+    pub(super) fn bytes(&self) -> usize {
+        size_of_val(self.nodes.as_slice())
+    }
+}
+
+/// A binary tree over boxes, of which there is at least one.
+fn binary(boxes: &[Aabb]) -> Bvh2 {
+    let halved = median::tree(boxes);
+    if median::crowding(&halved) > CROWDED {
+        return halved;
+    }
+    drop(halved);
+    let params = BvhBuildParams {
+        pre_split: false,      // would need triangles
+        max_prims_per_leaf: 1, // leaves are made of the tree
+        ..BvhBuildParams::slow_build()
+    };
+    build_bvh2(boxes, params, &mut std::time::Duration::default())
+}
+
+/// The boxes below a node, if there are at most `most`.
+fn at_most(most: usize, tree: &Bvh2, root: usize) -> Option<Vec<u32>> {
+    let (mut found, mut todo) = (vec![], vec![root]);
+    while let Some(index) = todo.pop() {
+        let node = &tree.nodes[index];
+        let first = node.first_index as usize;
+        if node.is_leaf() {
+            found.extend(&tree.primitive_indices[first..first + node.prim_count as usize]);
+        } else {
+            todo.extend([first, first + 1]);
+        }
+        if found.len() + todo.len() > most {
+            return None;
+        }
+    }
+    Some(found)
+}
