@@ -12,6 +12,10 @@ use crate::scene::Scene;
 /// What a coat with an index of refraction of 1.5 reflects at normal incidence.
 const COAT: f32 = 0.04;
 
+/// By how much origins of scattered rays are moved off a surface, relative to the largest coordinate: a few
+/// hundred roundings.
+const OFFSET: f32 = 1e-5;
+
 /// How it is decided whether a ray passes a partly transparent surface.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum OpacityTest {
@@ -40,7 +44,7 @@ pub(crate) struct Intersection<'a> {
     pub(crate) material: &'a CompiledMaterial,
     /// The index of its light; [`NO`] if it does not shine.
     pub(crate) light: u32,
-    /// How far origins of scattered rays are moved off it.
+    /// The least distance by which origins of scattered rays are moved off it.
     pub(crate) offset: f32,
 }
 
@@ -112,14 +116,19 @@ impl Scene {
     /// The surface that the ray hit.
     #[inline]
     pub(crate) fn surface(&self, ray: &Ray, hit: &Hit) -> Intersection<'_> {
-        let (prim, shape) = self.bvh.shape_at(hit);
+        match self.bvh.instance(hit) {
+            None => self.surface_of::<false>(ray, hit),
+            Some(_) => self.surface_of::<true>(ray, hit),
+        }
+    }
+
+    fn surface_of<const INSTANCE: bool>(&self, ray: &Ray, hit: &Hit) -> Intersection<'_> {
+        let (prim, shape) = self.bvh.shape_at::<INSTANCE>(hit);
         let group = self.geometry.group(prim);
         let material = &self.materials[group.material as usize];
-        let instance = self.bvh.instance(hit);
-        let mut along = ray.origin + ray.dir * hit.t;
-        if let Some(instance) = instance {
-            along = instance.local(along);
-        }
+        let instance = if INSTANCE { self.bvh.instance(hit) } else { None };
+        let along = ray.origin + ray.dir * hit.t;
+        let along = instance.map_or(along, |instance| instance.local(along));
         // Back onto the surface: an error along it does no harm, one across it would
         let (mut position, mut flat) = match shape {
             HitShape::Plane { point, normal } => (along - normal * normal.dot(along - point), normal),
@@ -136,14 +145,12 @@ impl Scene {
         if group.normals != NO {
             normal = self.geometry.shading_normal(group, prim, hit.uv).unwrap_or(flat);
         }
-        let mut reach = position.abs().max_element();
+        let mut offset = self.offset;
         if let Some(instance) = instance {
             position = instance.position(position);
             (flat, normal) = (instance.normal(flat), instance.normal(normal));
-            reach = instance.reach(position);
+            offset = offset.max(instance.local_reach(position) * OFFSET);
         }
-        // A few hundred roundings of the largest coordinate
-        let offset = (reach * 1e-5).max(self.offset);
         // Turn both normals towards the ray's origin
         let front = ray.dir.dot(flat) < 0.0;
         if !front {
@@ -227,7 +234,8 @@ impl<'a> Intersection<'a> {
     /// The origin of a ray that leaves it on the side that `dir` points to.
     #[inline]
     pub(crate) fn leave(&self, dir: Vec3) -> Vec3 {
-        let side = if dir.dot(self.flat) < 0.0 { -self.offset } else { self.offset };
+        let distance = (self.position.abs().max_element() * OFFSET).max(self.offset);
+        let side = if dir.dot(self.flat) < 0.0 { -distance } else { distance };
         self.position + self.flat * side
     }
 

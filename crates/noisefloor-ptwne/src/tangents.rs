@@ -18,7 +18,7 @@ impl Scene {
 
     /// The same in the coordinates of the object that was hit.
     fn local_tangents(&self, hit: &Hit, normal: Vec3) -> Option<[Vec3; 2]> {
-        let (prim, shape) = self.bvh.shape_at(hit);
+        let (prim, shape) = self.bvh.shape_at::<true>(hit);
         let group = self.geometry.group(prim);
         match (shape, self.bvh.edges(hit)) {
             (HitShape::Sphere { radius, .. }, _) => Some(self.around(group, radius, normal)),

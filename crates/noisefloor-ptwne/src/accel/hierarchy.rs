@@ -1,9 +1,9 @@
 //! The hierarchy of a scene: its own surfaces, and instances of objects.
 
-use super::bvh::{Bvh, Hit, HitShape, MISS};
+use super::bvh::{Bvh, HitShape, LocalHit};
 use super::leaf::Spot;
 use super::node::WideRay;
-use super::tree::Tree;
+use super::tree::{Tree, Waiting};
 use crate::geometry::NO;
 use crate::math::{Ray, Vec3};
 use glam::{DAffine3, Mat3};
@@ -11,6 +11,31 @@ use obvhs::aabb::Aabb;
 
 /// By how much the box of an instance is widened, relative to its coordinates: a few roundings.
 const WIDENING: f32 = 1e-6;
+
+/// Where a ray hit a surface.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Hit {
+    /// Distance along the ray; infinite for a miss.
+    pub(crate) t: f32,
+    /// The surface, in the order of its hierarchy; [`NO`] for a miss.
+    slot: u32,
+    /// Coordinates along the edges of a planar surface.
+    pub(crate) uv: [f32; 2],
+    /// The instance that it is of; [`NO`] if it is of none.
+    instance: u32,
+}
+
+impl Hit {
+    #[inline]
+    fn new(LocalHit { t, slot, uv }: LocalHit, instance: u32) -> Self {
+        Self { t, slot, uv, instance }
+    }
+
+    #[inline]
+    pub(crate) fn is_miss(&self) -> bool {
+        self.slot == NO
+    }
+}
 
 /// The surfaces of a scene, and those that its instances show again.
 #[derive(Clone, Debug)]
@@ -35,7 +60,10 @@ pub(crate) struct Instance {
 
 /// Nodes still to visit. Allocated once per job, so that no path allocates.
 #[derive(Clone, Debug)]
-pub(crate) struct Stack(Vec<(u32, f32)>);
+pub(crate) struct Stack {
+    instances: Waiting,
+    surfaces: Waiting,
+}
 
 impl Instance {
     /// The object `object` moved by `to_world`; none if that is singular, or too near to it for `f32`.
@@ -94,10 +122,11 @@ impl Instance {
         (self.to_world.transpose() * normal).normalize()
     }
 
-    /// The largest coordinate that had a part in finding `position`, on the instance.
+    /// How far `position`, on the instance, is from the origin of the object's coordinates, along the axis on which
+    /// that is most.
     #[inline]
-    pub(crate) fn reach(&self, position: Vec3) -> f32 {
-        position.abs().max((position - Vec3::from(self.origin)).abs()).max_element()
+    pub(crate) fn local_reach(&self, position: Vec3) -> f32 {
+        (position - Vec3::from(self.origin)).abs().max_element()
     }
 
     /// A ray in the object's coordinates, and by how much distances along it are longer there.
@@ -140,8 +169,8 @@ impl Hierarchy {
 
     /// A stack for the nodes that a walk can leave behind.
     pub(crate) fn stack(&self) -> Stack {
-        let inside = self.objects.iter().map(|object| object.tree.waiting).max().unwrap_or(0);
-        Stack(vec![(0, 0.0); self.own.tree.waiting.max(self.tree.waiting + inside)])
+        let surfaces = self.objects.iter().chain([&self.own]).map(|bvh| bvh.tree.waiting).max().unwrap_or(0);
+        Stack { instances: Waiting::new(self.tree.waiting), surfaces: Waiting::new(surfaces) }
     }
 
     /// The nearest surface along the ray. `solid` decides whether the surface of an index, of an instance or of
@@ -153,7 +182,9 @@ impl Hierarchy {
         stack: &mut Stack,
         solid: impl Fn(u32, u32, Spot) -> bool,
     ) -> Hit {
-        let own = self.own.closest(ray, MISS, &mut stack.0, |prim, spot| solid(prim, NO, spot));
+        let own =
+            self.own.closest(ray, f32::INFINITY, &mut stack.surfaces, |prim, spot| solid(prim, NO, spot));
+        let own = Hit::new(own, NO);
         if self.instances.is_empty() { own } else { self.closest_instance(ray, own, stack, solid) }
     }
 
@@ -165,16 +196,18 @@ impl Hierarchy {
         stack: &mut Stack,
         solid: impl Fn(u32, u32, Spot) -> bool,
     ) -> Hit {
-        self.tree.nearest(&WideRay::new(ray), &mut best, &mut stack.0, |index, best, waiting| {
+        self.tree.nearest(&WideRay::new(ray), best.t, &mut stack.instances, |index| {
             let instance = &self.instances[index as usize];
             let (local, longer) = instance.local_ray(ray);
-            let limit = Hit { t: best.t * longer, instance: index, ..MISS };
             let object = &self.objects[instance.object()];
-            let hit = object.closest(&local, limit, waiting, |prim, spot| solid(prim, index, spot));
+            let t_max = best.t * longer;
+            let hit =
+                object.closest(&local, t_max, &mut stack.surfaces, |prim, spot| solid(prim, index, spot));
             let t = hit.t / longer;
-            if !hit.is_miss() && t < best.t {
-                *best = Hit { t, ..hit };
+            if hit.slot != NO && t < best.t {
+                best = Hit::new(LocalHit { t, ..hit }, index);
             }
+            best.t
         });
         best
     }
@@ -188,7 +221,7 @@ impl Hierarchy {
         stack: &mut Stack,
         solid: impl Fn(u32, u32, Spot) -> bool,
     ) -> bool {
-        self.own.blocked::<OPACITY>(ray, t_max, &mut stack.0, |prim, spot| solid(prim, NO, spot))
+        self.own.blocked::<OPACITY>(ray, t_max, &mut stack.surfaces, |prim, spot| solid(prim, NO, spot))
             || !self.instances.is_empty() && self.blocked_by_instance::<OPACITY>(ray, t_max, stack, solid)
     }
 
@@ -200,11 +233,13 @@ impl Hierarchy {
         stack: &mut Stack,
         solid: impl Fn(u32, u32, Spot) -> bool,
     ) -> bool {
-        self.tree.any(&WideRay::new(ray), t_max, &mut stack.0, |index, waiting| {
+        self.tree.any(&WideRay::new(ray), t_max, &mut stack.instances, |index| {
             let instance = &self.instances[index as usize];
             let (local, longer) = instance.local_ray(ray);
             let object = &self.objects[instance.object()];
-            object.blocked::<OPACITY>(&local, t_max * longer, waiting, |prim, spot| solid(prim, index, spot))
+            object.blocked::<OPACITY>(&local, t_max * longer, &mut stack.surfaces, |prim, spot| {
+                solid(prim, index, spot)
+            })
         })
     }
 
@@ -215,16 +250,16 @@ impl Hierarchy {
     }
 
     /// The index of the surface that was hit, and its shape there, in coordinates of its object. The hit must not
-    /// be a miss.
+    /// be a miss; without `INSTANCE`, nor of an instance.
     #[inline]
-    pub(crate) fn shape_at(&self, hit: &Hit) -> (u32, HitShape) {
-        self.hit(hit).shape_at(hit)
+    pub(crate) fn shape_at<const INSTANCE: bool>(&self, hit: &Hit) -> (u32, HitShape) {
+        if INSTANCE { self.hit(hit).shape_at(hit.slot) } else { self.own.shape_at(hit.slot) }
     }
 
     /// The edges of the planar surface or ellipse that was hit, along which its coordinates run, in coordinates
     /// of its object; none for spheres.
     pub(crate) fn edges(&self, hit: &Hit) -> Option<[Vec3; 2]> {
-        self.hit(hit).edges(hit)
+        self.hit(hit).edges(hit.slot)
     }
 
     /// The hierarchy that has the surface that was hit.

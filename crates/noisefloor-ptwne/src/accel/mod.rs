@@ -18,7 +18,7 @@ mod tree;
 #[cfg(test)]
 mod tests;
 
-pub(crate) use bvh::{Bvh, Hit, HitShape};
-pub(crate) use hierarchy::{Hierarchy, Instance, Stack};
+pub(crate) use bvh::{Bvh, HitShape};
+pub(crate) use hierarchy::{Hierarchy, Hit, Instance, Stack};
 pub(crate) use leaf::Spot;
 pub(crate) use shape::{Shape, bounds};

@@ -1,26 +1,27 @@
 //! Walking the hierarchy of surfaces along a ray.
 
-use super::bvh::{Bvh, Hit, ROUND};
+use super::bvh::{Bvh, LocalHit, ROUND};
 use super::leaf::{Leaf, NO_PACK, Round, Spot};
 use super::node::WideRay;
 use super::tree::Waiting;
+use crate::geometry::NO;
 use crate::math::Ray;
 
 impl Bvh {
-    /// The nearest surface along the ray that is nearer than `best`; otherwise `best`. `solid` decides whether
-    /// the surface of an index stops the ray at a spot or is transparent there.
+    /// The nearest surface along the ray before `t_max`. `solid` decides whether the surface of an index stops the
+    /// ray at a spot or is transparent there.
     #[inline]
     pub(super) fn closest(
         &self,
         ray: &Ray,
-        best: Hit,
+        t_max: f32,
         waiting: &mut Waiting,
         solid: impl Fn(u32, Spot) -> bool,
-    ) -> Hit {
+    ) -> LocalHit {
         if self.rounds.is_empty() {
-            self.nearest::<false>(ray, best, waiting, solid)
+            self.nearest::<false>(ray, t_max, waiting, solid)
         } else {
-            self.nearest::<true>(ray, best, waiting, solid)
+            self.nearest::<true>(ray, t_max, waiting, solid)
         }
     }
 
@@ -28,13 +29,15 @@ impl Bvh {
     fn nearest<const ROUNDS: bool>(
         &self,
         ray: &Ray,
-        mut best: Hit,
+        t_max: f32,
         waiting: &mut Waiting,
         solid: impl Fn(u32, Spot) -> bool,
-    ) -> Hit {
+    ) -> LocalHit {
         let wide = WideRay::new(ray);
-        self.tree.nearest(&wide, &mut best, waiting, |leaf, best, _| {
-            self.closest_in_leaf::<ROUNDS>(leaf, ray, &wide, best, &solid);
+        let mut best = LocalHit { t: t_max, slot: NO, uv: [0.0; 2] };
+        self.tree.nearest(&wide, t_max, waiting, |leaf| {
+            self.closest_in_leaf::<ROUNDS>(leaf, ray, &wide, &mut best, &solid);
+            best.t
         });
         best
     }
@@ -45,7 +48,7 @@ impl Bvh {
         index: u32,
         ray: &Ray,
         wide: &WideRay,
-        best: &mut Hit,
+        best: &mut LocalHit,
         solid: &impl Fn(u32, Spot) -> bool,
     ) {
         let leaf = self.leaf_of::<ROUNDS>(index);
@@ -61,7 +64,7 @@ impl Bvh {
                         && solid(pack.prim[lane], pack.spot(lane, [u[lane], v[lane]], ray.dir))
                     {
                         let (slot, uv) = (leaf.pack << 2 | lane as u32, [u[lane], v[lane]]);
-                        *best = Hit { t: t[lane], slot, uv, ..*best };
+                        *best = LocalHit { t: t[lane], slot, uv };
                     }
                 }
             }
@@ -71,7 +74,7 @@ impl Bvh {
                 let round = &self.rounds[index as usize];
                 if let Some((t, spot)) = round.meets(ray, best.t, solid) {
                     let uv = if let Spot::Plane { uv, .. } = spot { uv } else { [0.0; 2] };
-                    *best = Hit { t, slot: ROUND | index, uv, ..*best };
+                    *best = LocalHit { t, slot: ROUND | index, uv };
                 }
             }
         }
@@ -108,7 +111,7 @@ impl Bvh {
         solid: impl Fn(u32, Spot) -> bool,
     ) -> bool {
         let wide = WideRay::new(ray);
-        self.tree.any(&wide, t_max, waiting, |leaf, _| {
+        self.tree.any(&wide, t_max, waiting, |leaf| {
             self.blocked_in_leaf::<ROUNDS, OPACITY>(leaf, ray, &wide, t_max, &solid)
         })
     }

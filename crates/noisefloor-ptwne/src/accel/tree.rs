@@ -1,13 +1,20 @@
 //! A hierarchy of boxes: how it is built, and how a ray walks it. What its leaves hold is somebody else's.
 
-use super::bvh::Hit;
 use super::median;
 use super::node::{LEAF, Node, WideRay};
 use crate::math::Vec3;
 use obvhs::{BvhBuildParams, aabb::Aabb, bvh2::Bvh2, bvh2::builder::build_bvh2};
 
 /// Nodes still to visit, with the distance at which each begins.
-pub(super) type Waiting = [(u32, f32)];
+#[derive(Clone, Debug)]
+pub(super) struct Waiting(Vec<(u32, f32)>);
+
+impl Waiting {
+    /// Room for walks of trees that leave at most so many nodes behind.
+    pub(super) fn new(most: usize) -> Self {
+        Self(vec![(0, 0.0); most])
+    }
+}
 
 /// A ray meets so many boxes of a subtree at most, in the mean, if the tree is to be a good one: to find one
 /// takes time in proportion to that number. Meshes have about 2, forests 20, and n equal boxes have n.
@@ -69,22 +76,22 @@ impl Tree {
         depth
     }
 
-    /// Visits the leaves that begin before `best`, nearest first as far as boxes tell. `visit` is given the
-    /// number of the leaf, the best hit so far, which it may better, and room for a walk of its own.
+    /// Visits the leaves that begin before `t_max`, nearest first as far as boxes tell. `visit` is given the
+    /// number of a leaf, and says before which distance leaves count from now on.
     #[inline(always)]
     pub(super) fn nearest(
         &self,
         ray: &WideRay,
-        best: &mut Hit,
+        mut t_max: f32,
         waiting: &mut Waiting,
-        mut visit: impl FnMut(u32, &mut Hit, &mut Waiting),
+        mut visit: impl FnMut(u32) -> f32,
     ) {
         let mut top = 0;
         let mut node = 0u32;
         loop {
             if node & LEAF == 0 {
                 let n = &self.nodes[node as usize];
-                let (enter, mut mask) = n.intersect(ray, best.t);
+                let (enter, mut mask) = n.intersect(ray, t_max);
                 if mask != 0 {
                     // Descend into the nearest child, leave the others behind
                     let mut near = mask.trailing_zeros() as usize & 3;
@@ -97,7 +104,7 @@ impl Tree {
                             if enter[other] < enter[near] {
                                 std::mem::swap(&mut near, &mut other);
                             }
-                            waiting[top] = (n.child[other], enter[other]);
+                            waiting.0[top] = (n.child[other], enter[other]);
                             top += 1;
                         }
                     }
@@ -105,7 +112,7 @@ impl Tree {
                     continue;
                 }
             } else {
-                visit(node & !LEAF, best, &mut waiting[top..]);
+                t_max = visit(node & !LEAF);
             }
             // Return to what begins before the nearest surface found so far
             loop {
@@ -113,8 +120,8 @@ impl Tree {
                     return;
                 }
                 top -= 1;
-                let (next, t) = waiting[top];
-                if t < best.t {
+                let (next, t) = waiting.0[top];
+                if t < t_max {
                     node = next;
                     break;
                 }
@@ -122,15 +129,14 @@ impl Tree {
         }
     }
 
-    /// Whether `visit` says so of any leaf that begins before `t_max`. It is given the number of the leaf, and
-    /// room for a walk of its own.
+    /// Whether `visit` says so of any leaf that begins before `t_max`, of which it is given the number.
     #[inline(always)]
     pub(super) fn any(
         &self,
         ray: &WideRay,
         t_max: f32,
         waiting: &mut Waiting,
-        mut visit: impl FnMut(u32, &mut Waiting) -> bool,
+        mut visit: impl FnMut(u32) -> bool,
     ) -> bool {
         let mut top = 0;
         let mut node = 0u32;
@@ -144,20 +150,20 @@ impl Tree {
                     node = child(mask);
                     mask &= mask - 1;
                     while mask != 0 {
-                        waiting[top].0 = child(mask);
+                        waiting.0[top].0 = child(mask);
                         top += 1;
                         mask &= mask - 1;
                     }
                     continue;
                 }
-            } else if visit(node & !LEAF, &mut waiting[top..]) {
+            } else if visit(node & !LEAF) {
                 return true;
             }
             if top == 0 {
                 return false;
             }
             top -= 1;
-            node = waiting[top].0;
+            node = waiting.0[top].0;
         }
     }
 
