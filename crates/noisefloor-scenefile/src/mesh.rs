@@ -210,6 +210,11 @@ struct Parallelogram {
     uvs: [[f32; 2]; 3],
 }
 
+/// The rows of an affine transform, as instances take them.
+pub(crate) fn rows(to_world: DMat4) -> [[f64; 4]; 3] {
+    [0, 1, 2].map(|i| to_world.row(i).to_array())
+}
+
 /// The matrix that takes normals along: the inverse transpose of the upper left 3×3, but for a positive
 /// factor. Computed from cofactors, so that singular transforms work.
 pub(crate) fn normal_matrix(to_world: DMat4) -> DMat3 {

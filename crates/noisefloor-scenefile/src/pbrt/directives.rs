@@ -3,7 +3,7 @@
 use super::arguments::Arguments;
 use super::params::Params;
 use super::reader::{MAX_DEPTH, Reader};
-use super::state::{Definition, Look};
+use super::state::{Definition, Look, Object};
 use crate::error::{LoadError, Place};
 use glam::DMat4;
 use std::rc::Rc;
@@ -84,7 +84,7 @@ impl Reader<'_> {
             }
             "ObjectEnd" => {
                 let (name, parts) = self.open_object.take().ok_or_else(without_begin)?;
-                self.objects.insert(name, parts);
+                self.objects.insert(name, Object { parts, shared: None });
                 self.state = self.stack.pop().ok_or_else(without_begin)?;
             }
             _ => return Ok(false),
@@ -180,13 +180,14 @@ impl Reader<'_> {
     }
 
     fn definition(&self, kind: &str, params: Params) -> Rc<Definition> {
-        Rc::new(Definition {
-            kind: kind.to_owned(),
-            params,
-            float_textures: self.state.float_textures.clone(),
-            colour_textures: self.state.colour_textures.clone(),
-            heights: self.state.heights.clone(),
-        })
+        // Only what it names: a copy of all for each material would be quadratic
+        let state = &self.state;
+        let (float_textures, colour_textures, heights) = (
+            params.named_in(&state.float_textures),
+            params.named_in(&state.colour_textures),
+            params.named_in(&state.heights),
+        );
+        Rc::new(Definition { kind: kind.to_owned(), params, float_textures, colour_textures, heights })
     }
 
     fn push(&mut self, place: &Place) -> Result<(), LoadError> {

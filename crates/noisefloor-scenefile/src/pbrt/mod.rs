@@ -15,6 +15,7 @@ mod gloss;
 mod lights;
 mod materials;
 mod moves;
+mod objects;
 mod params;
 mod reader;
 mod shapes;

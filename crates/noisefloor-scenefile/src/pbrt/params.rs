@@ -3,6 +3,7 @@
 use super::tokens::{Kind, Tokens};
 use crate::error::{LoadError, Place};
 use std::cell::Cell;
+use std::collections::HashMap;
 use std::path::Path;
 
 /// Values of a parameter.
@@ -105,6 +106,16 @@ pub(super) fn at(path: &Path, line: u32) -> Place {
 }
 
 impl Params {
+    /// Those of `all` that texture parameters name.
+    pub(super) fn named_in<T: Clone>(&self, all: &HashMap<String, T>) -> HashMap<String, T> {
+        let textures = self.all.iter().filter(|param| param.kind == "texture");
+        let names = textures.flat_map(|param| match &param.values {
+            Values::Texts(names) => names.as_slice(),
+            _ => &[],
+        });
+        names.filter_map(|name| Some((name.clone(), all.get(name)?.clone()))).collect()
+    }
+
     /// No parameters.
     pub(super) fn none(place: Place) -> Self {
         Self { place, all: vec![] }

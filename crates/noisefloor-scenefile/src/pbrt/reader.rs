@@ -3,7 +3,7 @@
 use super::arguments::Arguments;
 use super::camera::View;
 use super::params::{Params, at};
-use super::state::{Definition, Part, State};
+use super::state::{Definition, Object, Part, State};
 use super::tokens::{Kind, Tokens};
 use crate::Loaded;
 use crate::error::{Errors, LoadError, Place, Warning};
@@ -21,6 +21,11 @@ use std::rc::Rc;
 pub(super) const MAX_DEPTH: u32 = 64;
 /// Most bytes of all files of directives.
 const MAX_BYTES: u64 = 1 << 29;
+/// Most files of directives, where those that are included more than once count as often.
+const MAX_FILES: u64 = 10_000;
+/// Most triangles that are made: by subdivision, of round shapes, and of lamps in instances. A short file can ask
+/// for any number.
+const MAX_MADE: u64 = 1 << 23;
 /// Most warnings that are kept.
 const MAX_WARNINGS: usize = 10_000;
 /// Most pixels of all pictures together.
@@ -39,14 +44,14 @@ pub(super) struct Reader<'a> {
     pub(super) materials: HashMap<(String, Option<String>), MaterialId>,
     /// Definitions whose addresses are keys of `materials`.
     pub(super) kept: Vec<Rc<Definition>>,
-    pub(super) objects: HashMap<String, Vec<Part>>,
+    pub(super) objects: HashMap<String, Object>,
     /// The object that is being defined.
     pub(super) open_object: Option<(String, Vec<Part>)>,
     pub(super) surrounded: bool,
     pub(super) max_depth: Option<u32>,
     pub(super) pixels: u64,
-    /// Triangles that subdivision has made.
-    pub(super) subdivided: u64,
+    /// Triangles that are not in the file but made of what is.
+    pub(super) made: u64,
     pub(super) stack: Vec<State>,
     pub(super) transforms: Vec<DMat4>,
     pub(super) coordinate_systems: HashMap<String, DMat4>,
@@ -54,6 +59,7 @@ pub(super) struct Reader<'a> {
     /// Whether the file is of version 3: version 4 has no `WorldEnd`.
     pub(super) version_3: bool,
     bytes: u64,
+    files: u64,
     pub(super) errors: Errors,
     warnings: Vec<Warning>,
     said: HashSet<(Option<String>, String)>,
@@ -78,13 +84,14 @@ impl<'a> Reader<'a> {
             surrounded: false,
             max_depth: None,
             pixels: 0,
-            subdivided: 0,
+            made: 0,
             stack: vec![],
             transforms: vec![],
             coordinate_systems: HashMap::new(),
             in_world: false,
             version_3: false,
             bytes: 0,
+            files: 0,
             errors: Errors::default(),
             warnings: vec![],
             said: HashSet::new(),
@@ -95,6 +102,8 @@ impl<'a> Reader<'a> {
     pub(super) fn file(&mut self, path: &Path, depth: u32) -> Result<(), LoadError> {
         let place = Place::file(path);
         place.clone().at_most("levels of included files", u64::from(depth), u64::from(MAX_DEPTH))?;
+        self.files += 1;
+        place.clone().at_most("files of directives", self.files, MAX_FILES)?;
         let bytes = self.bytes_of(path, MAX_BYTES - self.bytes, &place)?;
         self.bytes += bytes.len() as u64;
         let text =
@@ -151,6 +160,12 @@ impl<'a> Reader<'a> {
         for name in unused {
             self.ignored(&params.place, format!("`{name}` of {called} is ignored"));
         }
+    }
+
+    /// Counts triangles that are to be made, and refuses more than [`MAX_MADE`].
+    pub(super) fn count_made(&mut self, place: &Place, count: u64) -> Result<(), LoadError> {
+        self.made = self.made.saturating_add(count);
+        place.clone().at_most("triangles made of shapes so far", self.made, MAX_MADE)
     }
 
     /// Counts pixels that are kept, and refuses more than [`MAX_PIXELS`].

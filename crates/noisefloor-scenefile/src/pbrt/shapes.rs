@@ -1,17 +1,21 @@
-//! Shapes and instances.
+//! Shapes.
 
+use super::objects::ball;
 use super::params::Params;
 use super::reader::Reader;
-use super::state::{Part, Wear};
+use super::state::{Form, Part, Wear};
 use crate::error::{LoadError, Place};
 use crate::files::MAX_FILE_BYTES;
 use crate::mesh::{Triangles, ply, solids, subdivide};
-use glam::{DMat3, DMat4, DQuat, DVec3};
-use noisefloor_ptwne::{SceneError, Texture};
-use std::rc::Rc;
+use glam::{DMat4, DQuat, DVec3};
+use noisefloor_ptwne::{Texture, check_memory};
 
-/// Most triangles that subdivision makes in a scene: a short file can ask for any number.
-const MAX_SUBDIVIDED: u64 = 1 << 23;
+/// Most triangles that subdivision makes of a mesh, beside three levels of it, which are usual: a short file can
+/// ask for any number.
+const MAX_SUBDIVIDED: u64 = 1 << 20;
+const USUAL_LEVELS: u32 = 3;
+/// Bytes that each of them takes on the way.
+const SUBDIVIDING: u64 = 400;
 
 impl Reader<'_> {
     /// Adds a `Shape`, to the scene or to the object that is open.
@@ -26,9 +30,31 @@ impl Reader<'_> {
         let emission = self.emission()?;
         let material = self.current_material(alpha, emission.is_some(), &params.place)?;
         let wear = Wear { material, emission };
-        if kind == "sphere" && self.open_object.is_none() && self.round_sphere(params, &wear)? {
-            return Ok(());
+        // Whole, and its light from its outside. Whether instances stretch it is seen when they come
+        let in_object = self.open_object.is_some();
+        let shines = wear.emission.as_ref().is_some_and(|emission| !emission.two_sided);
+        let turned = self.state.reversed && (shines || in_object);
+        let partial = ["zmin", "zmax", "phimax"].iter().any(|name| params.get(name).is_some());
+        let place = params.place.clone();
+        let (to_world, radius) = (self.state.to_world, positive(params, "radius", 1.0));
+        let round = kind == "sphere" && !turned && !partial;
+        let form = if round && (in_object || ball(to_world, 1.0).is_some()) {
+            Form::Ball(to_world, radius?)
+        } else {
+            Form::Mesh(self.mesh(kind, params)?)
+        };
+        let part = Part { form, wear, place };
+        match &mut self.open_object {
+            Some((_, parts)) => {
+                parts.push(part);
+                Ok(())
+            }
+            None => self.add(part, DMat4::IDENTITY),
         }
+    }
+
+    /// The triangles of a shape where the state is, with their fronts as it says.
+    fn mesh(&mut self, kind: &str, params: &Params) -> Result<Triangles, LoadError> {
         let (mut mesh, own) = self.form(kind, params)?;
         mesh.check(&params.place)?;
         if self.is_textured() {
@@ -36,23 +62,14 @@ impl Reader<'_> {
         }
 
         // The front is where shading normals point, or else the corners say so in the shape's own coordinates
-        let to_world = self.state.to_world * own;
         if self.state.reversed {
             mesh.normals.iter_mut().for_each(|normal| *normal = normal.map(|x| -x));
             if mesh.normals.is_empty() {
                 mesh.indices.iter_mut().for_each(|triangle| triangle.swap(1, 2));
             }
         }
-        if self.open_object.is_some() {
-            mesh.place(to_world);
-            let part = Part { mesh: Rc::new(mesh), wear, place: params.place.clone() };
-            if let Some((_, parts)) = &mut self.open_object {
-                parts.push(part);
-            }
-            return Ok(());
-        }
-        mesh.place(to_world);
-        self.add(&mesh, &wear, &params.place)
+        mesh.place(self.state.to_world * own);
+        Ok(mesh)
     }
 
     /// The triangles of a shape, and where they lie in its own coordinates.
@@ -65,7 +82,7 @@ impl Reader<'_> {
             "sphere" => {
                 self.whole(params, &["zmin", "zmax", "phimax"]);
                 let radius = positive(params, "radius", 1.0)?;
-                (solids::sphere(), DMat4::from_scale(DVec3::splat(radius)))
+                self.solid(&params.place, solids::sphere(), DMat4::from_scale(DVec3::splat(radius)))?
             }
             "cylinder" => {
                 self.whole(params, &["phimax"]);
@@ -74,7 +91,8 @@ impl Reader<'_> {
                 let high = params.float("zmax")?.unwrap_or(1.0);
                 let scale = DVec3::new(radius, radius, high - low);
                 let at = DVec3::new(0.0, 0.0, low);
-                (solids::cylinder(), DMat4::from_scale_rotation_translation(scale, DQuat::IDENTITY, at))
+                let own = DMat4::from_scale_rotation_translation(scale, DQuat::IDENTITY, at);
+                self.solid(&params.place, solids::cylinder(), own)?
             }
             "disk" => {
                 self.whole(params, &["phimax"]);
@@ -83,56 +101,21 @@ impl Reader<'_> {
                 let at = DVec3::new(0.0, 0.0, params.float("height")?.unwrap_or(0.0));
                 let scale = DVec3::splat(radius);
                 let own = DMat4::from_scale_rotation_translation(scale, DQuat::IDENTITY, at);
-                (solids::disk(inner.clamp(0.0, 0.999) as f32), own)
+                self.solid(&params.place, solids::disk(inner.clamp(0.0, 0.999) as f32), own)?
             }
             _ => return Err(params.place.clone().unsupported(format!("Shape \"{kind}\""))),
         })
     }
 
-    /// Shows an object where the state is.
-    pub(super) fn instance(&mut self, name: &str, place: &Place) -> Result<(), LoadError> {
-        let parts = self.objects.get(name).cloned();
-        let parts = parts.ok_or_else(|| place.clone().bad(format!("there is no object `{name}`")))?;
-        for part in parts {
-            let mut mesh = (*part.mesh).clone();
-            mesh.place(self.state.to_world);
-            self.add(&mesh, &part.wear, &part.place)?;
-        }
-        Ok(())
-    }
-
-    fn add(&mut self, mesh: &Triangles, wear: &Wear, place: &Place) -> Result<(), LoadError> {
-        match mesh.add_to(&mut self.builder, wear.material, wear.emission.clone()) {
-            Ok(_) => Ok(()),
-            Err(SceneError::EmptyEmitter) => {
-                self.ignored(place, "a shape is left out: it shines, but has no area");
-                Ok(())
-            }
-            Err(cause) => Err(LoadError::Scene { place: place.clone(), cause }),
-        }
-    }
-
-    /// Adds a sphere that is whole and not stretched. The result is whether it was one.
-    fn round_sphere(&mut self, params: &Params, wear: &Wear) -> Result<bool, LoadError> {
-        let radius = positive(params, "radius", 1.0)?;
-        let axes = DMat3::from_mat4(self.state.to_world);
-        let scale = axes.x_axis.length();
-        let off = (axes.transpose() * axes - DMat3::IDENTITY * (scale * scale)).to_cols_array();
-        let even = off.iter().all(|x| x.abs() <= 1e-4 * scale * scale) && scale > 0.0;
-        // Its light comes from its outside
-        let shines = wear.emission.as_ref().is_some_and(|emission| !emission.two_sided);
-        let partial = ["zmin", "zmax", "phimax"].iter().any(|name| params.get(name).is_some());
-        if !even || partial || shines && self.state.reversed {
-            return Ok(false);
-        }
-        let centre = self.state.to_world.w_axis.truncate().as_vec3().to_array();
-        // u runs around z from +x over +y; v = 1 is +z in pbrt, too
-        let [x, y, z] = [axes.x_axis, axes.y_axis, axes.z_axis].map(|axis| (axis / scale).as_vec3());
-        let axes = [-x, z, -y].map(|axis| axis.to_array());
-        let radius = (radius * scale) as f32;
-        let refused = Self::refused(&params.place);
-        let added = self.builder.turned_sphere(centre, radius, axes, wear.material, wear.emission.clone());
-        added.map_err(refused).map(|()| true)
+    /// A solid as triangles, which are counted.
+    pub(super) fn solid(
+        &mut self,
+        place: &Place,
+        mesh: Triangles,
+        own: DMat4,
+    ) -> Result<(Triangles, DMat4), LoadError> {
+        self.count_made(place, mesh.indices.len() as u64)?;
+        Ok((mesh, own))
     }
 
     /// Warns that a part of a round shape is whole here.
@@ -199,9 +182,11 @@ impl Reader<'_> {
         let levels = params.float(name)?.unwrap_or(3.0).max(0.0) as u32;
         let mut mesh = Triangles { positions, indices, ..Triangles::default() };
         mesh.check(&params.place)?;
-        let after = subdivide::triangles_after(mesh.indices.len() as u64, levels).unwrap_or(u64::MAX);
-        self.subdivided = self.subdivided.saturating_add(after);
-        params.place.clone().at_most("triangles of subdivision in all", self.subdivided, MAX_SUBDIVIDED)?;
+        let after = |levels| subdivide::triangles_after(mesh.indices.len() as u64, levels).unwrap_or(u64::MAX);
+        let (usual, after) = (after(USUAL_LEVELS), after(levels));
+        params.place.clone().at_most("triangles of a subdivision", after, usual.max(MAX_SUBDIVIDED))?;
+        self.count_made(&params.place, after)?;
+        check_memory(after.saturating_mul(SUBDIVIDING) as usize).map_err(Self::refused(&params.place))?;
         Ok(subdivide::subdivide(&mesh, levels))
     }
 

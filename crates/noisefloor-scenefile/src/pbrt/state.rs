@@ -5,7 +5,7 @@ use crate::error::Place;
 use crate::mesh::Triangles;
 use glam::DMat4;
 use noisefloor::Rgb;
-use noisefloor_ptwne::{Emission, ImageTexture, MaterialId, Texture};
+use noisefloor_ptwne::{Emission, ImageTexture, MaterialId, ObjectId, Texture};
 use std::collections::HashMap;
 use std::rc::Rc;
 
@@ -21,10 +21,10 @@ pub(super) struct State {
     pub(super) in_medium: bool,
     /// Parameters that `Attribute` adds to all that come: by what they are for.
     pub(super) defaults: HashMap<String, Rc<Params>>,
-    pub(super) float_textures: HashMap<String, Texture>,
-    pub(super) colour_textures: HashMap<String, Texture>,
+    pub(super) float_textures: Rc<HashMap<String, Texture>>,
+    pub(super) colour_textures: Rc<HashMap<String, Texture>>,
     /// Those of `float_textures` that are heights: pictures, and what they are multiplied with.
-    pub(super) heights: HashMap<String, Height>,
+    pub(super) heights: Rc<HashMap<String, Height>>,
 }
 
 /// A picture of heights, and the unit of its values.
@@ -41,7 +41,7 @@ pub(super) enum Look {
     Given(Rc<Definition>),
 }
 
-/// A material: its kind and parameters, with the textures that it could see.
+/// A material: its kind and parameters, with the textures that it names.
 #[derive(Clone, Debug)]
 pub(super) struct Definition {
     pub(super) kind: String,
@@ -58,12 +58,28 @@ pub(super) struct Wear {
     pub(super) emission: Option<Emission>,
 }
 
-/// A shape of an object, to be shown by its instances.
+/// A shape of an object, in the coordinates of its instances.
 #[derive(Clone, Debug)]
 pub(super) struct Part {
-    pub(super) mesh: Rc<Triangles>,
+    pub(super) form: Form,
     pub(super) wear: Wear,
     pub(super) place: Place,
+}
+
+/// What a shape becomes.
+#[derive(Clone, Debug)]
+pub(super) enum Form {
+    Mesh(Triangles),
+    /// The sphere of that radius around the origin, moved.
+    Ball(DMat4, f64),
+}
+
+/// A defined object: parts that its instances do not share, and what they do.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Object {
+    /// Before the first instance all, then those that shine.
+    pub(super) parts: Vec<Part>,
+    pub(super) shared: Option<ObjectId>,
 }
 
 impl State {
@@ -82,9 +98,9 @@ impl State {
             reversed: false,
             in_medium: false,
             defaults: HashMap::new(),
-            float_textures: HashMap::new(),
-            colour_textures: HashMap::new(),
-            heights: HashMap::new(),
+            float_textures: Rc::default(),
+            colour_textures: Rc::default(),
+            heights: Rc::default(),
         }
     }
 }

@@ -9,6 +9,7 @@ use crate::picture::{self, Samples};
 use noisefloor::{Rgb, display::srgb_decode};
 use noisefloor_ptwne::{ImageTexture, Pixels, Texture, Wrap};
 use std::collections::HashMap;
+use std::rc::Rc;
 use std::sync::Arc;
 
 /// Textures by name.
@@ -60,14 +61,16 @@ impl Reader<'_> {
                 plain([0.5; 3])
             }
         };
-        if floats {
-            self.state.heights.remove(name);
+        // Not shared with it any more, so that nothing is copied below
+        drop(known);
+        if floats && self.state.heights.contains_key(name) {
+            Rc::make_mut(&mut self.state.heights).remove(name);
         }
         if let Some(height) = height.filter(|_| floats) {
-            self.state.heights.insert(name.to_owned(), height);
+            Rc::make_mut(&mut self.state.heights).insert(name.to_owned(), height);
         }
         let textures = if floats { &mut self.state.float_textures } else { &mut self.state.colour_textures };
-        textures.insert(name.to_owned(), texture);
+        Rc::make_mut(textures).insert(name.to_owned(), texture);
         Ok(())
     }
 
