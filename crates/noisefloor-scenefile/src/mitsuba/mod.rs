@@ -12,6 +12,7 @@ mod context;
 mod document;
 mod emitters;
 mod glossy;
+mod groups;
 mod points;
 mod principled;
 mod raster;

@@ -1,6 +1,7 @@
 //! Shapes.
 
 use super::context::Context;
+use super::groups::Group;
 use super::surface::{Body, Surface};
 use super::xml::Element;
 use crate::error::{LoadError, Place};
@@ -12,27 +13,31 @@ use std::collections::HashMap;
 use std::rc::Rc;
 
 /// The scene that is being filled.
-pub(super) struct Filling {
+pub(super) struct Filling<'d> {
     pub(super) builder: SceneBuilder,
     /// Materials in it, by the serial number of their element, and whether they are inside out.
     materials: HashMap<(usize, bool), MaterialId>,
-    /// Meshes of groups by the serial number of their element: their instances share them.
+    /// Meshes of groups that shine, by the serial number of their element.
     meshes: HashMap<usize, Rc<Triangles>>,
+    /// Triangles that were made of them for instances.
+    pub(super) copied: u64,
+    /// Groups that have been shown, by the serial number of their element; none if one cannot be.
+    pub(super) groups: HashMap<usize, Option<Group<'d>>>,
 }
 
 /// Centre and axes of a disk, whose front is where their cross product points, and whether the angle of its
 /// texture runs the other way.
 type DiskFrame = ([f32; 3], [[f32; 3]; 2], bool);
 
-impl Filling {
+impl Filling<'_> {
     pub(super) fn new(builder: SceneBuilder) -> Self {
-        Self { builder, materials: HashMap::new(), meshes: HashMap::new() }
+        Self { builder, materials: HashMap::new(), meshes: HashMap::new(), copied: 0, groups: HashMap::new() }
     }
 }
 
 impl<'d> Context<'d> {
     /// Adds a shape to the scene.
-    pub(super) fn shape(&self, element: &'d Element, filling: &mut Filling) -> Result<(), LoadError> {
+    pub(super) fn shape(&self, element: &'d Element, filling: &mut Filling<'d>) -> Result<(), LoadError> {
         match element.kind() {
             // Seen only through its instances
             "shapegroup" => Ok(()),
@@ -41,31 +46,12 @@ impl<'d> Context<'d> {
         }
     }
 
-    /// Adds the shapes of a group, moved.
-    fn instance(&self, element: &'d Element, filling: &mut Filling) -> Result<(), LoadError> {
-        let groups = self.parts(element, "shape")?;
-        let [group] = groups.as_slice() else {
-            return Err(self.bad(element, "an instance needs one <shape type=\"shapegroup\">, by reference"));
-        };
-        if group.kind() != "shapegroup" {
-            return Err(self.bad(element, format!("an instance of {}; expected a shapegroup", group.label())));
-        }
-        let to_world = self.transform(element, "to_world")?;
-        for shape in group.all("shape") {
-            if matches!(shape.kind(), "shapegroup" | "instance") {
-                return Err(self.unsupported(shape, "an instance in a group"));
-            }
-            self.simple(shape, Some(to_world), filling)?;
-        }
-        Ok(())
-    }
-
-    /// Adds a shape that is not a group; one of a group as `instance` moves it.
-    fn simple(
+    /// Adds a shape that is not a group; one of a group that shines as `instance` moves it.
+    pub(super) fn simple(
         &self,
         element: &'d Element,
         instance: Option<DMat4>,
-        filling: &mut Filling,
+        filling: &mut Filling<'d>,
     ) -> Result<(), LoadError> {
         self.no_media(element)?;
         element.ignore(&["silhouette_sampling_weight"]);
@@ -97,19 +83,19 @@ impl<'d> Context<'d> {
                 builder.ringed_disk(centre, axes, reversed, material, emission).map_err(self.refused(element))
             }
             ("obj" | "ply" | "serialized" | "rectangle" | "cube" | "sphere" | "cylinder", _) => {
-                match instance {
-                    None => self.add(element, &self.triangles(element, mapped)?, filling, material, emission),
-                    Some(to_world) => {
-                        let mesh = match filling.meshes.get(&element.serial) {
-                            Some(mesh) => mesh.clone(),
-                            None => Rc::new(self.triangles(element, mapped)?),
-                        };
-                        filling.meshes.insert(element.serial, mesh.clone());
-                        let mut mesh = (*mesh).clone();
-                        mesh.place(to_world);
-                        self.add(element, &mesh, filling, material, emission)
-                    }
-                }
+                let kept = instance.and_then(|_| filling.meshes.get(&element.serial).cloned());
+                let mesh = match kept {
+                    Some(mesh) => mesh,
+                    None => Rc::new(self.triangles(element, mapped)?),
+                };
+                let Some(to_world) = instance else {
+                    return self.add(element, &mesh, filling, material, emission);
+                };
+                filling.meshes.insert(element.serial, mesh.clone());
+                self.count_copied(element, mesh.indices.len(), filling)?;
+                let mut mesh = (*mesh).clone();
+                mesh.place(to_world);
+                self.add(element, &mesh, filling, material, emission)
             }
             _ => Err(self.unsupported(element, element.species())),
         }
@@ -121,7 +107,7 @@ impl<'d> Context<'d> {
         element: &'d Element,
         shines: bool,
         inside_out: bool,
-        filling: &mut Filling,
+        filling: &mut Filling<'d>,
     ) -> Result<(MaterialId, bool), LoadError> {
         let (serial, surface) = match self.parts(element, "bsdf")?.as_slice() {
             [] => (None, Surface::missing(shines)),
@@ -259,7 +245,7 @@ impl<'d> Context<'d> {
         &self,
         element: &'d Element,
         mesh: &Triangles,
-        filling: &mut Filling,
+        filling: &mut Filling<'d>,
         material: MaterialId,
         emission: Option<Emission>,
     ) -> Result<(), LoadError> {
