@@ -50,3 +50,25 @@ fn no_ray_hits_an_empty_hierarchy() {
     assert!(bvh.closest(&ray, &mut bvh.stack(), |_, _, _| true).t.is_infinite());
     assert!(!bvh.blocked::<false>(&ray, 1.0, &mut bvh.stack(), |_, _, _| true));
 }
+
+/// Where many boxes overlap, the hierarchy is still one of few levels, and says the same as a loop.
+#[test]
+fn crowds_make_no_deep_trees() {
+    let (near, far) = (glam::Vec3::ZERO, glam::Vec3::splat(50.0));
+    let equal = |_| Shape::Sphere { centre: near, radius: 1.0 };
+    let nested = |i| Shape::Sphere { centre: near, radius: 1.0 + i as f32 / 4000.0 };
+    for crowd in [(0..4000).map(equal).collect::<Vec<_>>(), (0..4000).map(nested).collect()] {
+        // In a scene that is mostly something else
+        let mut shapes = crowd;
+        shapes.extend((0..100).map(|i| Shape::Sphere { centre: far * i as f32, radius: 1.0 }));
+        let all: Vec<u32> = (0..shapes.len() as u32).collect();
+        let bvh = Bvh::new(&shapes, &all);
+        // log₂ 4100 < 13 levels of two children, each of which leaves at most three nodes behind
+        assert!(bvh.tree.waiting <= 3 * 13 + 4, "{}", bvh.tree.waiting);
+        let hierarchy = alone_in_scene(bvh);
+        let ray = Ray { origin: Vec3::new(0.0, 0.0, 10.0), dir: Vec3::NEG_Z };
+        let hit = hierarchy.closest(&ray, &mut hierarchy.stack(), |_, _, _| true);
+        let Shape::Sphere { radius, .. } = shapes[3999] else { unreachable!() };
+        assert!((hit.t - (10.0 - radius)).abs() < 1e-5, "{}", hit.t);
+    }
+}

@@ -14,6 +14,7 @@ mod direct; // direct light in closed form, and the reference
 mod extremes; // nothing but finite numbers
 mod first_hits; // colours and normals of a known surface
 mod furnace; // energy neither made nor lost
+mod instances; // objects shown many times: as their copies are seen
 mod kit;
 mod mis; // next events, scattering, and both
 mod models; // glTF's, Mitsuba's and pbrt's layered surfaces

@@ -16,6 +16,7 @@ mod mesh;
 mod nodes;
 mod notes;
 mod rest;
+mod shared;
 mod texture;
 mod uri;
 
@@ -29,12 +30,18 @@ use gltf::json::{Accessor, Index, Skin};
 use material::Materials;
 use mesh::Triangles;
 use nodes::Placed;
-use noisefloor_ptwne::{Camera, MAX_SURFACES, Mesh, SceneBuilder, SceneError};
+use noisefloor_ptwne::{Camera, MAX_SURFACES, Mesh, SceneBuilder, SceneError, check_memory};
 use notes::Notes;
 use rest::Joints;
+use shared::Shared;
 use std::collections::{HashMap, HashSet};
 use std::path::Path;
 use std::rc::Rc;
+
+/// Most primitives of meshes, each counted as often as nodes show it without sharing it.
+const MAX_PRIMITIVES: u64 = 1 << 20;
+/// Bytes that a vertex or a triangle takes at least, while a scene is made.
+const BYTES_EACH: u64 = 64;
 
 pub(crate) fn load(path: &Path, root: Option<&Path>) -> Result<Loaded, LoadError> {
     let folder = Folder::of(path, root, String::new());
@@ -42,7 +49,8 @@ pub(crate) fn load(path: &Path, root: Option<&Path>) -> Result<Loaded, LoadError
     let asset = Asset::parse(path, &folder, &file)?;
     notes::check_required(&asset)?;
     let placed = nodes::placed(&asset)?;
-    check_size(&asset, &placed)?;
+    let sharing = shared::sharing(&placed);
+    check_size(&asset, &placed, &sharing)?;
 
     let mut notes = Notes::default();
     let whole = Place::file(path);
@@ -62,6 +70,8 @@ pub(crate) fn load(path: &Path, root: Option<&Path>) -> Result<Loaded, LoadError
         meshes: HashSet::new(),
         nodes: rest::by_index(&placed),
         skins: HashMap::new(),
+        sharing,
+        shared: HashMap::new(),
         needs_light: false,
         undrawn: false,
         bounds: [DVec3::INFINITY, DVec3::NEG_INFINITY],
@@ -114,6 +124,10 @@ struct Loader<'a> {
     /// Where nodes are, by their index.
     nodes: HashMap<usize, DAffine3>,
     skins: HashMap<usize, Rc<Joints>>,
+    /// Nodes that show a mesh which others show, too.
+    sharing: HashSet<usize>,
+    /// What such nodes share, by the index of the mesh.
+    shared: HashMap<usize, Rc<Shared>>,
     /// Whether there is anything that light can show.
     needs_light: bool,
     /// Whether there are points or lines.
@@ -143,9 +157,15 @@ impl Loader<'_> {
         };
         let weights = node.weights.as_ref().or(mesh.weights.as_ref()).map(Vec::as_slice).unwrap_or_default();
         let pose = Pose { to_world: &placed.to_world, joints: joints.as_deref(), weights };
+        let shining = match self.sharing.contains(&placed.index) {
+            true => self.instance(placed, index.value(), mesh, &called)?,
+            false => None,
+        };
         for (number, primitive) in mesh.primitives.iter().enumerate() {
-            let place = Place::part(self.asset.path, format_args!("{called}, primitive {number}"));
-            self.primitive(primitive, &pose, first, &place)?;
+            if shining.as_ref().is_none_or(|shared| shared.shining.contains(&number)) {
+                let place = Place::part(self.asset.path, format_args!("{called}, primitive {number}"));
+                self.primitive(primitive, &pose, first, false, &place)?;
+            }
         }
         Ok(())
     }
@@ -189,14 +209,16 @@ impl Loader<'_> {
         }
     }
 
-    /// Adds a primitive; warns only if it is the `first` time.
+    /// Adds a primitive; warns only if it is the `first` time. The result is whether it shines; then it is not
+    /// added `in_object`.
     fn primitive(
         &mut self,
         primitive: &Primitive,
         pose: &Pose<'_>,
         first: bool,
+        in_object: bool,
         place: &Place,
-    ) -> Result<(), LoadError> {
+    ) -> Result<bool, LoadError> {
         let mode = mode(primitive, place)?;
         let drawn = matches!(mode, Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan);
         if first {
@@ -204,14 +226,18 @@ impl Loader<'_> {
         }
         if !drawn {
             self.undrawn = true;
-            return Ok(());
+            return Ok(false);
         }
         let coloured = has_colours(primitive);
         let (builder, notes) = (&mut self.builder, &mut self.notes);
         let look = self.materials.look(primitive.material, coloured, place, builder, notes)?;
+        let shines = look.emission.is_some();
+        if shines && in_object {
+            return Ok(true);
+        }
         let mut triangles = mesh::triangles(self.asset, primitive, mode, look.set, place)?;
         if triangles.indices.is_empty() {
-            return Ok(());
+            return Ok(false);
         }
         if let Some(set) = look.set.filter(|_| triangles.uvs.is_empty()) {
             if first {
@@ -244,7 +270,7 @@ impl Loader<'_> {
             }
             Err(cause) => return Err(LoadError::Scene { place: place.clone(), cause }),
         }
-        Ok(())
+        Ok(shines)
     }
 }
 
@@ -286,39 +312,37 @@ fn mode(primitive: &Primitive, place: &Place) -> Result<Mode, LoadError> {
     }
 }
 
-/// Calls `visit` for each primitive of each node that has a mesh.
-fn each_primitive<'a>(
-    asset: &'a Asset<'a>,
-    placed: &[Placed<'_>],
-    mut visit: impl FnMut(&Placed<'_>, &'a Primitive, &Place) -> Result<(), LoadError>,
-) -> Result<(), LoadError> {
+/// Checks what the scene would come to, by the counts that its accessors have: a small file can show a mesh
+/// many times. What nodes share counts once.
+fn check_size(asset: &Asset<'_>, placed: &[Placed<'_>], sharing: &HashSet<usize>) -> Result<(), LoadError> {
+    let (mut primitives, mut vertices, mut triangles) = (0u64, 0u64, 0u64);
+    let mut seen = HashSet::new();
     for placed in placed {
         let Some(index) = placed.node.mesh else { continue };
         let mesh = asset.get(index, "mesh", &placed.place)?;
+        let again = sharing.contains(&placed.index) && !seen.insert(index.value());
+        if again && !shared::may_shine(asset, mesh) {
+            continue;
+        }
+        let called = name("mesh", index.value(), mesh.name.as_deref());
         for (number, primitive) in mesh.primitives.iter().enumerate() {
-            let called = name("mesh", index.value(), mesh.name.as_deref());
-            visit(placed, primitive, &Place::part(asset.path, format_args!("{called}, primitive {number}")))?;
+            let place = Place::part(asset.path, format_args!("{called}, primitive {number}"));
+            let count = |index: Option<Index<Accessor>>| match index {
+                Some(index) => asset.get(index, "accessor", &place).map(|accessor| accessor.count.0),
+                None => Ok(0),
+            };
+            let corners = count(mesh::attribute(primitive, Semantic::Positions))?;
+            let indices = if primitive.indices.is_some() { count(primitive.indices)? } else { corners };
+            // Each morph target takes as much
+            let shapes = 1 + primitive.targets.as_ref().map_or(0, Vec::len) as u64;
+            primitives += shapes;
+            vertices = vertices.saturating_add(corners.saturating_mul(shapes));
+            triangles = triangles.saturating_add(mesh::count(mode(primitive, &place)?, indices));
+            place.clone().at_most("primitives of nodes up to here", primitives, MAX_PRIMITIVES)?;
+            place.clone().at_most("vertices up to here", vertices, 3 * MAX_SURFACES as u64)?;
+            place.clone().at_most("triangles up to here", triangles, MAX_SURFACES as u64)?;
         }
     }
-    Ok(())
-}
-
-/// Checks what the scene would come to, by the counts that its accessors have: a small file can show a mesh
-/// many times.
-fn check_size(asset: &Asset<'_>, placed: &[Placed<'_>]) -> Result<(), LoadError> {
-    let (mut vertices, mut triangles) = (0u64, 0u64);
-    each_primitive(asset, placed, |_, primitive, place| {
-        let count = |index: Option<Index<Accessor>>| match index {
-            Some(index) => asset.get(index, "accessor", place).map(|accessor| accessor.count.0),
-            None => Ok(0),
-        };
-        let corners = count(mesh::attribute(primitive, Semantic::Positions))?;
-        let indices = if primitive.indices.is_some() { count(primitive.indices)? } else { corners };
-        // An empty primitive takes time, too, and so does each morph target
-        let shapes = 1 + primitive.targets.as_ref().map_or(0, Vec::len) as u64;
-        vertices = vertices.saturating_add(corners.max(1).saturating_mul(shapes));
-        triangles = triangles.saturating_add(mesh::count(mode(primitive, place)?, indices));
-        place.clone().at_most("vertices up to here", vertices, 3 * MAX_SURFACES as u64)?;
-        place.clone().at_most("triangles up to here", triangles, MAX_SURFACES as u64)
-    })
+    let bytes = (vertices + triangles).saturating_mul(BYTES_EACH);
+    check_memory(bytes as usize).map_err(|cause| LoadError::Scene { place: Place::file(asset.path), cause })
 }

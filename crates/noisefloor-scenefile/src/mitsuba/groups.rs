@@ -21,11 +21,7 @@ pub(super) struct Group<'d> {
 
 impl<'d> Context<'d> {
     /// Shows the shapes of a group, moved.
-    pub(super) fn instance(
-        &self,
-        element: &'d Element,
-        filling: &mut Filling<'d>,
-    ) -> Result<(), LoadError> {
+    pub(super) fn instance(&self, element: &'d Element, filling: &mut Filling<'d>) -> Result<(), LoadError> {
         let groups = self.parts(element, "shape")?;
         let [group] = groups.as_slice() else {
             return Err(self.bad(element, "an instance needs one <shape type=\"shapegroup\">, by reference"));

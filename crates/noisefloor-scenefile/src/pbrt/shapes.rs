@@ -182,7 +182,8 @@ impl Reader<'_> {
         let levels = params.float(name)?.unwrap_or(3.0).max(0.0) as u32;
         let mut mesh = Triangles { positions, indices, ..Triangles::default() };
         mesh.check(&params.place)?;
-        let after = |levels| subdivide::triangles_after(mesh.indices.len() as u64, levels).unwrap_or(u64::MAX);
+        let after =
+            |levels| subdivide::triangles_after(mesh.indices.len() as u64, levels).unwrap_or(u64::MAX);
         let (usual, after) = (after(USUAL_LEVELS), after(levels));
         params.place.clone().at_most("triangles of a subdivision", after, usual.max(MAX_SUBDIVIDED))?;
         self.count_made(&params.place, after)?;
