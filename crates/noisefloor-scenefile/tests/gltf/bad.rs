@@ -174,11 +174,14 @@ fn nothing_is_allocated_for_what_is_only_claimed() {
     let error = maker.load().unwrap_err();
     assert!(matches!(error, LoadError::TooLarge { what: "elements without data", .. }), "{error}");
 
-    // Three times a mesh that claims half of the most triangles
+    // Three meshes that claim half of the most triangles each; one that is shown three times counts once
     let mut maker = good();
     maker.root["accessors"][2]["count"] = (3u64 << 25).into();
-    maker.node(r#"{"mesh": 0}"#);
-    maker.node(r#"{"mesh": 0}"#);
+    let mesh = maker.root["meshes"][0].clone();
+    for other in 1..3 {
+        maker.root["meshes"].as_array_mut().unwrap().push(mesh.clone());
+        maker.node(&format!(r#"{{"mesh": {other}}}"#));
+    }
     let error = maker.load().unwrap_err();
     assert!(matches!(error, LoadError::TooLarge { what: "triangles up to here", .. }), "{error}");
 
@@ -208,7 +211,8 @@ fn long_chains_of_nodes_are_walked() {
     }
     maker.push("nodes", r#"{"mesh": 0}"#);
     maker.root["nodes"][2] = json(r#"{"children": [3]}"#);
-    assert_eq!(maker.load().unwrap().scene.surfaces(), 4);
+    let scene = maker.load().unwrap().scene;
+    assert_eq!((scene.surfaces(), scene.instances()), (2, 2));
     // Back to the start
     maker.root["nodes"][50_000] = json(r#"{"children": [2]}"#);
     let error = maker.load().unwrap_err().to_string();

@@ -257,3 +257,20 @@ fn points_and_lines_alone_are_no_scene() {
     let error = maker.load().unwrap_err().to_string();
     assert!(error.contains("a scene of only points and lines is not supported"), "{error}");
 }
+
+/// Nodes share a mesh that is at rest, but for what shines in it and where a scale flattens it.
+#[test]
+fn nodes_share_a_mesh() {
+    let mut maker = Maker::new();
+    let lamp = maker.push("materials", r#"{"emissiveFactor": [1, 1, 1]}"#);
+    let mesh = maker.rectangle([-1.0, 1.0], [-1.0, 1.0], -2.0, "{}");
+    let mut primitive = maker.root["meshes"][mesh]["primitives"][0].clone();
+    primitive["material"] = lamp.into();
+    maker.root["meshes"][mesh]["primitives"].as_array_mut().unwrap().push(primitive);
+    for x in 0..1000 {
+        maker.node(&format!(r#"{{"mesh": {mesh}, "translation": [{x}, 0, 0]}}"#));
+    }
+    maker.node(&format!(r#"{{"mesh": {mesh}, "scale": [1, 0, 1]}}"#));
+    let scene = maker.load().unwrap().scene;
+    assert_eq!((scene.surfaces(), scene.instances(), scene.lights()), (2 + 2000, 1000, 2000));
+}

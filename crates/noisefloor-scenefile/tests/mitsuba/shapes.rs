@@ -193,7 +193,9 @@ fn instances_are_where_they_are_put() {
         assert_eq!(seen_at(&folder, &group, instance, x), seen, "{x}");
     }
     let two = folder.body(&format!("{group}{}{}", instance.replace("AT", ""), instance.replace("AT", "")));
-    assert_eq!(two.unwrap().scene.surfaces(), 4);
+    // The lamp twice, and what does not shine once
+    let scene = two.unwrap().scene;
+    assert_eq!((scene.surfaces(), scene.instances(), scene.lights()), (3, 2, 2));
     // A mirrored instance has its front where its original has it
     let mirrored = instance.replace("AT", r#"<scale x="-1"/>"#);
     assert_eq!(folder.see(&format!("{group}{mirrored}")), [1.0, 2.0, 3.0]);
@@ -203,6 +205,32 @@ fn instances_are_where_they_are_put() {
     let nested = format!(r#"<shape type="shapegroup" id="h">{instance}</shape>"#).replace("AT", "");
     let nested = format!("{group}{nested}{}", instance.replace("AT", "").replace("\"g\"", "\"h\""));
     assert!(folder.body(&nested).unwrap_err().contains("an instance in a group is not supported"));
+}
+
+/// Instances share their group. A sphere stays one where they stretch it, and has its front outside where they
+/// mirror it.
+#[test]
+fn instances_share_their_group() {
+    let group =
+        r#"<shape type="shapegroup" id="g"><shape type="sphere"><bsdf type="diffuse"/></shape></shape>"#;
+    let instance = r#"<shape type="instance"><ref id="g"/><transform name="to_world">
+        <scale x="-2" y="0.5" z="1"/></transform></shape>"#;
+    let folder = Folder::new();
+    let sky = r#"<emitter type="constant"/>"#;
+    let scene = folder.body(&format!("{group}{}", instance.repeat(4000))).unwrap().scene;
+    assert_eq!((scene.surfaces(), scene.instances()), (1, 4000));
+    // Grey in a white sky, black from inside
+    close(folder.see(&format!("{sky}{group}{instance}")), [0.5; 3], 0.02, "mirrored");
+
+    let flat = instance.replace("0.5", "0");
+    let loaded = folder.body(&format!("{group}{instance}{flat}{flat}")).unwrap();
+    assert_eq!(loaded.scene.instances(), 1);
+    let said: Vec<&str> = loaded.warnings.iter().map(|warning| warning.what.as_str()).collect();
+    assert_eq!(said, ["an instance is left out: its transform is singular"; 2]);
+    // What is wrong with a group is said once
+    let bad = group.replace("diffuse", "thatch");
+    let errors = folder.body(&format!("{bad}{instance}{instance}{instance}")).unwrap_err();
+    assert_eq!(errors.matches("thatch").count(), 1, "{errors}");
 }
 
 /// Without coordinates in its file, a triangle has the weights of its second and third corner, as in

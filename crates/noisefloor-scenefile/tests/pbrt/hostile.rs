@@ -74,4 +74,17 @@ fn what_is_too_large_is_an_error() {
     }
     let bomb = folder.world(&format!("{bomb}NamedMaterial \"0\" Shape \"sphere\"")).unwrap_err();
     assert!(bomb.contains("17 nested materials, more than 16"), "{bomb}");
+
+    // 11 levels of one triangle, and ten files in each of eleven that include each other
+    let levels = "Shape \"loopsubdiv\" \"integer indices\" [0 1 2] \"point3 P\" [0 0 0 1 0 0 0 1 0] \
+        \"integer levels\" 11";
+    let levels = folder.world(levels).unwrap_err();
+    assert!(levels.contains("4194304 triangles of a subdivision, more than 1048576"), "{levels}");
+    for i in 0..11 {
+        let include = format!("Include \"{}.pbrt\"\n", i + 1).repeat(10);
+        std::fs::write(folder.path().join(format!("{i}.pbrt")), include).unwrap();
+    }
+    std::fs::write(folder.path().join("11.pbrt"), "Translate 0 0 0").unwrap();
+    let includes = folder.world("Include \"0.pbrt\"").unwrap_err();
+    assert!(includes.contains("10001 files of directives, more than 10000"), "{includes}");
 }

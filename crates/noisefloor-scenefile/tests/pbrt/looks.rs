@@ -86,7 +86,7 @@ fn relief_and_subdivision_shape_what_is_lit() {
     close(ramp.see(&format!("{sun}{grid}2")), lambert([0.0, 1.0]), 5e-3, grid);
     for levels in ["11", "77", "1e30"] {
         let error = ramp.world(&format!("{grid}{levels}")).unwrap_err();
-        assert!(error.contains("triangles of subdivision in all"), "{error}");
+        assert!(error.contains("triangles of a subdivision, more than 1048576"), "{error}");
     }
 }
 
@@ -216,6 +216,34 @@ fn objects_are_where_their_instances_are() {
     close(folder.see(&format!("{object}ObjectInstance \"o\"")), [1.0, 2.0, 3.0], 1e-4, "instance");
     let aside = format!("{object}AttributeBegin Translate 5 0 0 ObjectInstance \"o\" AttributeEnd");
     close(folder.see(&aside), [0.0; 3], 1e-4, "aside");
+}
+
+/// Instances share their object but for its lamps, and a sphere stays one, round or not.
+#[test]
+fn instances_share_their_object() {
+    let folder = Folder::new();
+    let object = "ObjectBegin \"o\" Shape \"sphere\" Shape \"cylinder\" AttributeBegin Translate 0 3 0 \
+        AreaLightSource \"diffuse\" \"rgb L\" [1 2 3] Shape \"sphere\" AttributeEnd ObjectEnd\n";
+    // An object that is never shown is not in the scene
+    assert_eq!(folder.world(object).unwrap().scene.surfaces(), 0);
+    let scene = folder.world(&format!("{object}{}", "ObjectInstance \"o\"\n".repeat(4000))).unwrap().scene;
+    assert_eq!((scene.surfaces(), scene.instances(), scene.lights()), (1 + 256 + 4000, 4000, 4000));
+    // Bytes: the object's 257 surfaces, and a lamp and a matrix for each instance
+    assert!(scene.geometry_bytes() < 257 * 150 + 4000 * 1000, "{}", scene.geometry_bytes());
+
+    // The lamp shines where the instance is, stretched or not; only then it is triangles
+    let seen = |scale: &str| format!("{object}Scale {scale} Translate 0 -3 0 ObjectInstance \"o\"");
+    close(folder.see(&seen("1 1 1")), [1.0, 2.0, 3.0], 1e-4, "round");
+    close(folder.see(&seen("0.5 1 2")), [1.0, 2.0, 3.0], 1e-4, "stretched");
+    let many = format!("{object}Scale 1 1 2{}", " ObjectInstance \"o\"".repeat(600));
+    let error = folder.world(&many).unwrap_err();
+    assert!(error.contains("triangles made of shapes so far, more than 8388608"), "{error}");
+
+    let flat =
+        format!("{object}AttributeBegin Scale 1 0 1 ObjectInstance \"o\" AttributeEnd ObjectInstance \"o\"");
+    let loaded = folder.world(&flat).unwrap();
+    assert_eq!(loaded.scene.instances(), 1);
+    assert!(loaded.warnings.iter().any(|w| w.what == "an instance is left out: its transform is singular"));
 }
 
 /// Files that the scene names: includes, gzipped meshes.
