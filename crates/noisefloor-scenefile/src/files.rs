@@ -2,10 +2,16 @@
 
 use crate::error::{LoadError, Place};
 use noisefloor::source::SourceIdentity;
+use noisefloor_ptwne::check_memory;
 use std::cell::RefCell;
 use std::fs::File;
 use std::io::{self, Read};
 use std::path::{Component, Path, PathBuf};
+
+/// Bytes of memory that a byte of a file becomes at most while it is read: numbers as text, rows of a mesh.
+const EACH_BYTE: u64 = 8;
+/// The same of XML and JSON, whose elements become objects.
+const EACH_BYTE_OF_TREES: u64 = 32;
 
 /// Longest mesh or picture that is read, in bytes.
 pub(crate) const MAX_FILE_BYTES: u64 = 1 << 28;
@@ -147,6 +153,12 @@ fn is_private_to_a_collection(folder: &Path, home: Option<&Path>) -> bool {
     names(folder) >= 3 && below_home >= 2
 }
 
+/// Checks that there is memory for what so many bytes become.
+pub(crate) fn has_memory(bytes: u64, each: u64, place: &Place) -> Result<(), LoadError> {
+    let bytes = usize::try_from(bytes.saturating_mul(each)).unwrap_or(usize::MAX);
+    check_memory(bytes).map_err(|cause| LoadError::Scene { place: place.clone(), cause })
+}
+
 /// Reads a regular file.
 fn read(path: &Path, limit: u64, place: &Place) -> Result<Vec<u8>, LoadError> {
     let failed = |cause: io::Error| {
@@ -160,6 +172,9 @@ fn read(path: &Path, limit: u64, place: &Place) -> Result<Vec<u8>, LoadError> {
         return Err(failed(io::Error::new(io::ErrorKind::InvalidInput, "it is not a regular file")));
     }
     Place::file(path).at_most("bytes", meta.len(), limit)?;
+    let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
+    let tree = matches!(extension.as_str(), "xml" | "gltf");
+    has_memory(meta.len(), if tree { EACH_BYTE_OF_TREES } else { EACH_BYTE }, place)?;
 
     // A file that grows while it is read is cut off
     let mut bytes = Vec::new();

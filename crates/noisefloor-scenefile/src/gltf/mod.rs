@@ -20,7 +20,7 @@ mod shared;
 mod texture;
 mod uri;
 
-use crate::files::Folder;
+use crate::files::{Folder, has_memory};
 use crate::{LoadError, Loaded, Place};
 use asset::{Asset, MAX_BYTES, name};
 use glam::{DAffine3, DVec3};
@@ -30,7 +30,7 @@ use gltf::json::{Accessor, Index, Skin};
 use material::Materials;
 use mesh::Triangles;
 use nodes::Placed;
-use noisefloor_ptwne::{Camera, MAX_SURFACES, Mesh, SceneBuilder, SceneError, check_memory};
+use noisefloor_ptwne::{Camera, MAX_SURFACES, Mesh, SceneBuilder, SceneError};
 use notes::Notes;
 use rest::Joints;
 use shared::Shared;
@@ -343,6 +343,5 @@ fn check_size(asset: &Asset<'_>, placed: &[Placed<'_>], sharing: &HashSet<usize>
             place.clone().at_most("triangles up to here", triangles, MAX_SURFACES as u64)?;
         }
     }
-    let bytes = (vertices + triangles).saturating_mul(BYTES_EACH);
-    check_memory(bytes as usize).map_err(|cause| LoadError::Scene { place: Place::file(asset.path), cause })
+    has_memory(vertices + triangles, BYTES_EACH, &Place::file(asset.path))
 }

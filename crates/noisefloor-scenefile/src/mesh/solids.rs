@@ -1,7 +1,8 @@
 //! Curved and simple solids as triangles.
 
-use super::Triangles;
-use glam::Vec3;
+use super::{Triangles, rows};
+use glam::{DMat4, Vec3};
+use noisefloor_ptwne::{MaterialId, ObjectId, SceneBuilder, SceneError};
 use std::f32::consts::{PI, TAU};
 
 /// Triangles around a circle, and from pole to pole of a sphere.
@@ -46,6 +47,26 @@ pub(crate) fn sphere() -> Triangles {
         let normal = [sin * x, sin * y, cos];
         (normal, normal)
     })
+}
+
+/// Adds the sphere of radius 1 around the origin, moved, as an instance of `shared` or of a new object, which is
+/// returned. Its texture coordinates run as pbrt's and Mitsuba's: u around z from +x over +y, v = 1 at +z.
+pub(crate) fn ellipsoid(
+    builder: &mut SceneBuilder,
+    shared: Option<ObjectId>,
+    material: MaterialId,
+    to_world: DMat4,
+) -> Result<ObjectId, SceneError> {
+    let object = match shared {
+        Some(object) => object,
+        None => {
+            builder.begin_object()?;
+            let axes = [-Vec3::X, Vec3::Z, -Vec3::Y].map(|axis| axis.to_array());
+            builder.turned_sphere([0.0; 3], 1.0, axes, material, None)?;
+            builder.end_object()?
+        }
+    };
+    builder.instance(object, rows(to_world)).map(|()| object)
 }
 
 /// The open cylinder of radius 1 around z, from z = 0 to z = 1. u runs around z from +x over +y, v along z.

@@ -7,8 +7,8 @@ use crate::error::LoadError;
 use crate::mesh::rows;
 use noisefloor_ptwne::{ObjectId, SceneError};
 
-/// Most triangles of lamps that instances copy: a short file can ask for any number.
-const MAX_COPIED: u64 = 1 << 23;
+/// Most triangles that are made: of round shapes, and of lamps in instances. A short file can ask for any number.
+const MAX_MADE: u64 = 1 << 23;
 
 /// A group that has been shown.
 #[derive(Clone, Debug)]
@@ -60,19 +60,21 @@ impl<'d> Context<'d> {
             if lamp { &mut shining } else { &mut plain }.push(shape);
         }
         filling.builder.begin_object().map_err(self.refused(group))?;
+        filling.in_group = true;
         let added = plain.into_iter().try_for_each(|shape| self.simple(shape, None, filling));
+        filling.in_group = false;
         let shared = filling.builder.end_object().map_err(self.refused(group))?;
         added.map(|()| Group { shared, shining })
     }
 
-    /// Counts triangles that an instance copies, and refuses more than [`MAX_COPIED`].
-    pub(super) fn count_copied(
+    /// Counts triangles that are made, and refuses more than [`MAX_MADE`].
+    pub(super) fn count_made(
         &self,
         element: &Element,
         count: usize,
         filling: &mut Filling<'d>,
     ) -> Result<(), LoadError> {
-        filling.copied = filling.copied.saturating_add(count as u64);
-        self.place(element).at_most("triangles of lamps in instances so far", filling.copied, MAX_COPIED)
+        filling.made = filling.made.saturating_add(count as u64);
+        self.place(element).at_most("triangles made of shapes so far", filling.made, MAX_MADE)
     }
 }

@@ -8,7 +8,7 @@ use crate::error::{LoadError, Place};
 use crate::files::MAX_FILE_BYTES;
 use crate::mesh::{Triangles, normal_matrix, obj, ply, serialized, solids};
 use glam::{DMat3, DMat4, DQuat, DVec3};
-use noisefloor_ptwne::{Emission, Material, MaterialId, MaterialOptions, SceneBuilder};
+use noisefloor_ptwne::{Emission, Material, MaterialId, MaterialOptions, ObjectId, SceneBuilder, SceneError};
 use std::collections::HashMap;
 use std::rc::Rc;
 
@@ -19,8 +19,12 @@ pub(super) struct Filling<'d> {
     materials: HashMap<(usize, bool), MaterialId>,
     /// Meshes of groups that shine, by the serial number of their element.
     meshes: HashMap<usize, Rc<Triangles>>,
-    /// Triangles that were made of them for instances.
-    pub(super) copied: u64,
+    /// Triangles that are not in a file but made of what is.
+    pub(super) made: u64,
+    /// Spheres that ellipsoids of a material share.
+    balls: HashMap<MaterialId, ObjectId>,
+    /// Whether shapes are added to what the instances of a group share.
+    pub(super) in_group: bool,
     /// Groups that have been shown, by the serial number of their element; none if one cannot be.
     pub(super) groups: HashMap<usize, Option<Group<'d>>>,
 }
@@ -31,7 +35,8 @@ type DiskFrame = ([f32; 3], [[f32; 3]; 2], bool);
 
 impl Filling<'_> {
     pub(super) fn new(builder: SceneBuilder) -> Self {
-        Self { builder, materials: HashMap::new(), meshes: HashMap::new(), copied: 0, groups: HashMap::new() }
+        let (materials, meshes, balls, groups) = Default::default();
+        Self { builder, materials, meshes, made: 0, balls, in_group: false, groups }
     }
 }
 
@@ -68,7 +73,24 @@ impl<'d> Context<'d> {
         let (material, textured) = self.material(element, emission.is_some(), inside_out, filling)?;
         let mapped = textured || glows;
 
+        // Only one that is seen from outside, and whose group is not shared: instances do not nest
+        let plain = emission.is_none() && instance.is_none() && !filling.in_group;
+        let plain = plain && !self.boolean(element, "flip_normals", false)?;
+
         match (element.kind(), round) {
+            ("sphere", None) if plain => {
+                let to_world = self.transform(element, "to_world")? * self.own_sphere(element)?;
+                let shared = filling.balls.get(&material).copied();
+                match solids::ellipsoid(&mut filling.builder, shared, material, to_world) {
+                    Err(SceneError::Singular) => {
+                        self.ignored(element, "a sphere is left out: its transform is singular");
+                    }
+                    ball => {
+                        filling.balls.insert(material, ball.map_err(self.refused(element))?);
+                    }
+                }
+                Ok(())
+            }
             ("sphere", Some(Sphere { centre, radius, axes, .. })) => {
                 let added = if textured {
                     filling.builder.turned_sphere(centre, radius, axes, material, emission)
@@ -88,11 +110,13 @@ impl<'d> Context<'d> {
                     Some(mesh) => mesh,
                     None => Rc::new(self.triangles(element, mapped)?),
                 };
+                if instance.is_some() || matches!(element.kind(), "sphere" | "cylinder") {
+                    self.count_made(element, mesh.indices.len(), filling)?;
+                }
                 let Some(to_world) = instance else {
                     return self.add(element, &mesh, filling, material, emission);
                 };
                 filling.meshes.insert(element.serial, mesh.clone());
-                self.count_copied(element, mesh.indices.len(), filling)?;
                 let mut mesh = (*mesh).clone();
                 mesh.place(to_world);
                 self.add(element, &mesh, filling, material, emission)

@@ -5,7 +5,7 @@ use super::state::{Form, Object, Part, Wear};
 use crate::error::{LoadError, Place};
 use crate::mesh::{Triangles, rows, solids};
 use glam::{DMat3, DMat4, DVec3};
-use noisefloor_ptwne::SceneError;
+use noisefloor_ptwne::{MaterialId, SceneError};
 
 impl Reader<'_> {
     /// Shows an object where the state is. What does not shine is shared by all its instances.
@@ -78,6 +78,27 @@ impl Reader<'_> {
             mesh.place(to_world);
         }
         self.add_mesh(&mesh, wear, &place)
+    }
+
+    /// Adds the sphere of radius 1 around the origin, stretched: an instance of one that all of a material share.
+    pub(super) fn ellipsoid(
+        &mut self,
+        to_world: DMat4,
+        material: MaterialId,
+        place: &Place,
+    ) -> Result<(), LoadError> {
+        let shared = self.balls.get(&material).copied();
+        match solids::ellipsoid(&mut self.builder, shared, material, to_world) {
+            Ok(ball) => {
+                self.balls.insert(material, ball);
+                Ok(())
+            }
+            Err(SceneError::Singular) => {
+                self.ignored(place, "a sphere is left out: its transform is singular");
+                Ok(())
+            }
+            Err(cause) => Err(LoadError::Scene { place: place.clone(), cause }),
+        }
     }
 
     fn add_mesh(&mut self, mesh: &Triangles, wear: Wear, place: &Place) -> Result<(), LoadError> {

@@ -7,11 +7,11 @@ use super::state::{Definition, Object, Part, State};
 use super::tokens::{Kind, Tokens};
 use crate::Loaded;
 use crate::error::{Errors, LoadError, Place, Warning};
-use crate::files::{Folder, MAX_FILE_BYTES};
+use crate::files::{Folder, MAX_FILE_BYTES, has_memory};
 use crate::options::LoadOptions;
 use flate2::read::GzDecoder;
 use glam::DMat4;
-use noisefloor_ptwne::{MaterialId, SceneBuilder, SceneError};
+use noisefloor_ptwne::{MaterialId, ObjectId, SceneBuilder, SceneError};
 use std::collections::{HashMap, HashSet};
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -45,6 +45,8 @@ pub(super) struct Reader<'a> {
     /// Definitions whose addresses are keys of `materials`.
     pub(super) kept: Vec<Rc<Definition>>,
     pub(super) objects: HashMap<String, Object>,
+    /// Spheres that ellipsoids of a material share.
+    pub(super) balls: HashMap<MaterialId, ObjectId>,
     /// The object that is being defined.
     pub(super) open_object: Option<(String, Vec<Part>)>,
     pub(super) surrounded: bool,
@@ -80,6 +82,7 @@ impl<'a> Reader<'a> {
             materials: HashMap::new(),
             kept: vec![],
             objects: HashMap::new(),
+            balls: HashMap::new(),
             open_object: None,
             surrounded: false,
             max_depth: None,
@@ -126,6 +129,8 @@ impl<'a> Reader<'a> {
         if !bytes.starts_with(&[0x1f, 0x8b]) {
             return Ok(bytes);
         }
+        // DEFLATE makes at most 1032 bytes of one; twice, since a buffer that grows is copied
+        has_memory(limit.min(1032 * bytes.len() as u64), 2, place)?;
         let mut inflated = Vec::new();
         let read = GzDecoder::new(bytes.as_slice()).take(limit + 1).read_to_end(&mut inflated);
         read.map_err(|e| Place::file(path).bad(format!("the file cannot be inflated: {e}")))?;

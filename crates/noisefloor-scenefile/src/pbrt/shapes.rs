@@ -5,10 +5,10 @@ use super::params::Params;
 use super::reader::Reader;
 use super::state::{Form, Part, Wear};
 use crate::error::{LoadError, Place};
-use crate::files::MAX_FILE_BYTES;
+use crate::files::{MAX_FILE_BYTES, has_memory};
 use crate::mesh::{Triangles, ply, solids, subdivide};
 use glam::{DMat4, DQuat, DVec3};
-use noisefloor_ptwne::{Texture, check_memory};
+use noisefloor_ptwne::Texture;
 
 /// Most triangles that subdivision makes of a mesh, beside three levels of it, which are usual: a short file can
 /// ask for any number.
@@ -40,6 +40,12 @@ impl Reader<'_> {
         let round = kind == "sphere" && !turned && !partial;
         let form = if round && (in_object || ball(to_world, 1.0).is_some()) {
             Form::Ball(to_world, radius?)
+        } else if round && !self.state.reversed && wear.emission.is_none() {
+            return self.ellipsoid(
+                to_world * DMat4::from_scale(DVec3::splat(radius?)),
+                wear.material,
+                &place,
+            );
         } else {
             Form::Mesh(self.mesh(kind, params)?)
         };
@@ -187,7 +193,7 @@ impl Reader<'_> {
         let (usual, after) = (after(USUAL_LEVELS), after(levels));
         params.place.clone().at_most("triangles of a subdivision", after, usual.max(MAX_SUBDIVIDED))?;
         self.count_made(&params.place, after)?;
-        check_memory(after.saturating_mul(SUBDIVIDING) as usize).map_err(Self::refused(&params.place))?;
+        has_memory(after, SUBDIVIDING, &params.place)?;
         Ok(subdivide::subdivide(&mesh, levels))
     }
 
