@@ -7,8 +7,9 @@ use crate::film::{Film, FilmError};
 use crate::params::{Audience, Params, ParamsError};
 use crate::rgb::Rgb;
 use crate::source::SourceIdentity;
-use crate::source::{Reference, Request};
+use crate::source::{PixelNoise, Reference, Request};
 use crate::tile::{Tile, TileError, TileGrid};
+use crate::watch::{Fault, Warning, Watch};
 use thiserror::Error;
 
 mod stop;
@@ -16,7 +17,7 @@ pub(crate) use stop::TileState;
 pub use stop::{Interruption, Stop, StopReason};
 
 /// Why a session failed.
-#[derive(Debug, Error)]
+#[derive(Debug, Error, Clone, PartialEq)]
 #[non_exhaustive]
 pub enum SessionError {
     /// A parameter out of range.
@@ -42,6 +43,9 @@ pub enum SessionError {
     /// A display for a session that has judged with another one.
     #[error("tiles were judged already with another display: set it before the first verdict")]
     Judged,
+    /// Samples that cannot be what they are said to be.
+    #[error(transparent)]
+    Fault(#[from] Fault),
 }
 
 /// Film, criterion and limits, for a renderer that owns its main loop: it pushes batches, asks which tiles
@@ -74,6 +78,7 @@ pub struct Session<C> {
     /// Of each tile, the share that each of its blocks gets of its samples; none if all get as many.
     shares: Vec<Option<Vec<f32>>>,
     source: SourceIdentity,
+    watch: Watch,
 }
 
 impl<C: StoppingCriterion> Session<C> {
@@ -99,6 +104,7 @@ impl<C: StoppingCriterion> Session<C> {
             ToneMapping::Reinhard { .. } => None,
         };
         Ok(Self {
+            watch: Watch::new(grid),
             film,
             criterion,
             params,
@@ -151,6 +157,24 @@ impl<C: StoppingCriterion> Session<C> {
         self.source = source;
     }
 
+    /// Says that neighbouring pixels have noise in common, so that no warning needs to. A
+    /// [`Driver`](crate::Driver) does this by itself.
+    pub fn set_pixels(&mut self, pixels: PixelNoise) {
+        self.watch.set_pixels(pixels);
+    }
+
+    /// What is likely to be wrong with the samples pushed so far: each kind once, in the order found. Complete
+    /// after each [`Session::judge`]; see [`crate::watch`].
+    pub fn warnings(&self) -> &[Warning] {
+        self.watch.warnings()
+    }
+
+    /// Samples, over all pixels, of pixels of a batch that had negative luminance. A few are rounding, or lobes
+    /// of a filter. Counted since the session was made or resumed.
+    pub fn negative_samples(&self) -> u64 {
+        self.film.negative()
+    }
+
     /// Provides the quick noise-free reference, for criteria that need one.
     ///
     /// # Errors
@@ -186,17 +210,23 @@ impl<C: StoppingCriterion> Session<C> {
     /// samples, too: they improve, and keep their stop.
     ///
     /// # Errors
-    /// [`FilmError`] if it does not fit; nothing is changed then.
-    pub fn push(&mut self, tile: usize, spp: u64, mean: &[Rgb]) -> Result<(), FilmError> {
-        self.film.add(tile, spp, mean)
+    /// [`SessionError::Film`] if it does not fit, [`SessionError::Fault`] if it is no light; nothing is changed
+    /// then.
+    pub fn push(&mut self, tile: usize, spp: u64, mean: &[Rgb]) -> Result<(), SessionError> {
+        let place = self.film.check(tile, mean.len())?;
+        self.watch.check_light(&self.film, place, spp, mean)?;
+        self.film.add(tile, spp, mean)?;
+        self.watch.see(place, spp, mean);
+        Ok(())
     }
 
     /// Adds the new samples in a running mean of a tile; see [`Film::add_running`].
     ///
     /// # Errors
-    /// [`FilmError`] if it does not fit; nothing is changed then.
-    pub fn push_running(&mut self, tile: usize, total: u64, mean: &[Rgb]) -> Result<(), FilmError> {
-        self.film.add_running(tile, total, mean)
+    /// As of [`Session::push`].
+    pub fn push_running(&mut self, tile: usize, total: u64, mean: &[Rgb]) -> Result<(), SessionError> {
+        let (new, batch) = self.film.new_of_running(tile, total, mean)?;
+        self.push(tile, new, &batch)
     }
 
     /// Judges the tiles that are due, and returns those that are now done.
@@ -208,12 +238,14 @@ impl<C: StoppingCriterion> Session<C> {
     /// samples per pixel, and without a verdict where that is too early for one.
     ///
     /// # Errors
-    /// [`CriterionError`] if the criterion does not fit the job.
-    pub fn judge(&mut self) -> Result<Vec<Stop>, CriterionError> {
+    /// [`SessionError::Fault`] if the samples pushed cannot be what they are said to be: no tile stops then, now or
+    /// later. [`SessionError::Criterion`] if the criterion does not fit the job.
+    pub fn judge(&mut self) -> Result<Vec<Stop>, SessionError> {
         let due: Vec<Tile> = self.film.grid().tiles().filter(|t| self.is_due(t.index)).collect();
         if due.is_empty() || !self.settle_display() {
             return Ok(Vec::new());
         }
+        self.watch.look()?;
         let (early, due_now): (Vec<Tile>, Vec<Tile>) =
             due.iter().partition(|t| self.film.spp(t.index) < self.params.first_verdict());
         for tile in early {

@@ -3,7 +3,7 @@ use crate::blocks::{BlockRequest, BlockSamples};
 use crate::criterion::{FixedSpp, Resumable, StoppingCriterion};
 use crate::driver::{Driver, Event};
 use crate::oracle::Oracle;
-use crate::source::{Batch, Counts, ProgressiveSource, Repeats, Request, SourceError, SourceInfo, Unit};
+use crate::source::{Batch, ProgressiveSource, Repeats, Request, SourceError, SourceInfo};
 use proptest::prelude::*;
 use std::sync::atomic::Ordering;
 
@@ -12,15 +12,7 @@ struct Noise(Repeats);
 
 impl ProgressiveSource for Noise {
     fn info(&self) -> SourceInfo {
-        SourceInfo {
-            name: "noise".into(),
-            width: 96,
-            height: 48,
-            unit: Unit::SamplesPerPixel,
-            aims: true,
-            repeats: self.0,
-            counts: Counts::Asked,
-        }
+        SourceInfo::new("noise", 96, 48).with_repeats(self.0)
     }
 
     fn sample(&mut self, requests: &[Request]) -> Result<Vec<Batch>, SourceError> {

@@ -56,7 +56,7 @@ impl LightCheck {
     /// # Errors
     /// [`ImpossibleLight`].
     pub fn check(&mut self, pixels: &[Rgb]) -> Result<(), ImpossibleLight> {
-        self.check_finite(pixels)?;
+        self.check_finite(pixels.iter().copied())?;
         self.check_sign(pixels.iter().copied())
     }
 
@@ -64,9 +64,13 @@ impl LightCheck {
     ///
     /// # Errors
     /// [`ImpossibleLight::NotFinite`].
-    pub fn check_finite(&self, pixels: &[Rgb]) -> Result<(), ImpossibleLight> {
-        let lost = pixels.iter().filter(|pixel| !is_finite(pixel)).count();
-        let share = lost as f64 / pixels.len().max(1) as f64;
+    pub fn check_finite(&self, pixels: impl Iterator<Item = Rgb>) -> Result<(), ImpossibleLight> {
+        let (mut lost, mut all) = (0, 0usize);
+        for pixel in pixels {
+            lost += usize::from(!is_finite(&pixel));
+            all += 1;
+        }
+        let share = lost as f64 / all.max(1) as f64;
         if share > MOST_NON_FINITE {
             return Err(ImpossibleLight::NotFinite { percent: 100.0 * share });
         }

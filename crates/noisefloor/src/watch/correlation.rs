@@ -1,0 +1,174 @@
+//! Correlations of differences of batches, over all that was seen.
+
+use super::values::{Ends, Values};
+use super::{CERTAIN, FACTOR, Fault, LEAST_VALUES, NOTABLE, STRONG, Warning};
+
+/// The correlation of two differences x and y, each of mean 0: Σxy with what it is measured by.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Correlation {
+    sum: f64,
+    squares: f64,
+    left: f64,
+    right: f64,
+}
+
+impl Correlation {
+    /// Adds the terms of one tile, as one term if its pixels share samples.
+    pub(super) fn of(pairs: impl Iterator<Item = (f64, f64)>, as_one: bool) -> Self {
+        let mut all = Self::default();
+        for (x, y) in pairs {
+            let term = x * y;
+            all.sum += term;
+            all.squares += term * term;
+            all.left += x * x;
+            all.right += y * y;
+        }
+        if as_one {
+            all.squares = all.sum * all.sum;
+        }
+        all
+    }
+
+    pub(super) fn add(&mut self, more: &Self) {
+        self.sum += more.sum;
+        self.squares += more.squares;
+        self.left += more.left;
+        self.right += more.right;
+    }
+
+    /// Standard errors from 0.
+    fn z(&self) -> f64 {
+        if self.squares > 0.0 { self.sum / self.squares.sqrt() } else { 0.0 }
+    }
+
+    /// −1…1.
+    fn value(&self) -> f64 {
+        let size = (self.left * self.right).sqrt();
+        if size > 0.0 { self.sum / size } else { 0.0 }
+    }
+}
+
+/// Energies e and f that should be equal: Σ(e − f), with what it is measured by.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Energies {
+    one: f64,
+    other: f64,
+    squares: f64,
+}
+
+impl Energies {
+    pub(super) fn see(&mut self, one: f64, other: f64) {
+        self.one += one;
+        self.other += other;
+        self.squares += (one - other) * (one - other);
+    }
+
+    /// How many times the energy of the other the one has.
+    fn ratio(&self) -> f64 {
+        self.one / self.other
+    }
+
+    fn add(&mut self, more: &Self) {
+        self.one += more.one;
+        self.other += more.other;
+        self.squares += more.squares;
+    }
+
+    /// The larger over the smaller, if that is neither chance nor nothing.
+    fn factor(&self) -> Option<f64> {
+        let z = (self.one - self.other).abs() / self.squares.sqrt();
+        let factor = self.ratio().max(1.0 / self.ratio());
+        (z > CERTAIN && factor > FACTOR).then_some(factor)
+    }
+}
+
+/// What was found in groups of batches.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Sums {
+    /// Of a − c and b − d.
+    pub(super) batches: Correlation,
+    /// The same with what all pixels of a tile have in common.
+    pub(super) whole: Correlation,
+    /// Of a − b and a + b − 2c.
+    pub(super) nested: Correlation,
+    /// Of a − b and the same one pixel beside.
+    pub(super) neighbours: Correlation,
+    /// n·(a − b)² of sixteen watched pixels, and m·(c − d)².
+    pub(super) counts: Energies,
+    /// (a − b)² and (c − d)² of equal batches: steps of a running mean become smaller.
+    pub(super) steps: Energies,
+    /// (Σ(a − b))² of four watched pixels in a row, and Σ(a − b)².
+    pub(super) rows: [f64; 2],
+    pub(super) ends: Ends,
+}
+
+impl Sums {
+    pub(super) fn add(&mut self, more: &Self) {
+        self.batches.add(&more.batches);
+        self.whole.add(&more.whole);
+        self.nested.add(&more.nested);
+        self.neighbours.add(&more.neighbours);
+        self.counts.add(&more.counts);
+        self.steps.add(&more.steps);
+        self.rows.iter_mut().zip(more.rows).for_each(|(sum, more)| *sum += more);
+        self.ends.add(more.ends);
+    }
+
+    /// By how much watched pixels that are not independent widen z: at least 1.
+    fn widening(&self) -> f64 {
+        let [sums, all] = self.rows;
+        if all > 0.0 { (sums / all).max(1.0).sqrt() } else { 1.0 }
+    }
+
+    /// Standard errors of a correlation from 0, with care.
+    fn z(&self, correlation: &Correlation) -> f64 {
+        correlation.z() / self.widening()
+    }
+
+    pub(super) fn fault(&self) -> Result<(), Fault> {
+        let (z, correlation) = (self.z(&self.batches), self.batches.value());
+        if z < CERTAIN || correlation < STRONG {
+            return Ok(());
+        }
+        Err(if self.steps.ratio() > FACTOR {
+            Fault::Running { correlation }
+        } else {
+            Fault::Shared { correlation }
+        })
+    }
+
+    pub(super) fn warnings(&self, shared: bool) -> impl Iterator<Item = Warning> {
+        let mut warnings = Vec::new();
+        let (z, value) = (self.z(&self.batches), self.batches.value());
+        if z > CERTAIN && value < STRONG {
+            warnings.push(Warning::Shared(value));
+        }
+        let whole = self.whole.value();
+        if !shared && self.whole.z() > CERTAIN && whole > STRONG && z < CERTAIN {
+            warnings.push(Warning::Changing(whole));
+        }
+        if z < -CERTAIN && value < -NOTABLE {
+            warnings.push(Warning::Anticorrelated(value));
+        }
+        // With k times the energy in a, and as much in c as in b, it is (k − 1)/√((k + 1)(k + 5))
+        let r = self.nested.value();
+        let noise = (1.0 + 3.0 * r * r + r * (12.0 + 4.0 * r * r).sqrt()) / (1.0 - r * r);
+        if self.z(&self.nested).abs() > CERTAIN && !(1.0 / FACTOR..FACTOR).contains(&noise) {
+            warnings.push(Warning::Noise(noise.max(0.0)));
+        }
+        let (z, beside) = (self.neighbours.z(), self.neighbours.value());
+        if !shared && z.abs() > CERTAIN && beside.abs() > NOTABLE {
+            warnings.push(Warning::Neighbours(beside));
+        }
+        warnings.extend(self.counts.factor().map(Warning::Counts));
+        warnings.into_iter()
+    }
+
+    /// Noise that ends at 1, where nothing is above 1.
+    pub(super) fn clipped(&self, values: &Values) -> Option<Warning> {
+        let Ends { noisy, at_white } = self.ends;
+        let share = at_white as f64 / noisy.max(1) as f64;
+        let said = !values.above_one && at_white >= LEAST_VALUES / 4 && share > 0.05;
+        said.then_some(Warning::Clipped(100.0 * share))
+    }
+}
