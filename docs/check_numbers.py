@@ -44,10 +44,10 @@ def run(program, *args):
 
 @functools.cache
 def evaluate(*options, table=TABLE):
-    """The report of `noisefloor evaluate`, and its zones."""
+    """The report of `noisefloor-lab evaluate`, and its zones."""
     with tempfile.TemporaryDirectory() as folder:
         report, zones = f"{folder}/scores.json", f"{folder}/zones.csv"
-        run(noisefloor, "evaluate", "--table", table, *options, "--json", report, "--csv", zones)
+        run(noisefloor + "-lab", "evaluate", "--table", table, *options, "--json", report, "--csv", zones)
         with open(report) as scores, open(zones) as lines:
             return json.load(scores), list(csv.DictReader(lines))
 

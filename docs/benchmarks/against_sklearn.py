@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Compares our machine on a subset of the paper's pairs with scikit-learn's SVC: decision values, support vectors, times.
 
-    noisefloor reproduce --corpus … --dump-subset 1000 --out subset
+    noisefloor-lab reproduce --corpus … --dump-subset 1000 --out subset
     ./against_sklearn.py subset
 
 Needs numpy and scikit-learn. SVC gets the same rows, C, γ and stopping tolerance; its rows are float64, as it makes them anyhow.

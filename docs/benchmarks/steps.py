@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """What steps between verdicts do to the error against people: the table of verdicts.md.
 
-    noisefloor evaluate --table fixtures/human-table.csv --leave-one-scene-out --csv zones.csv
+    noisefloor-lab evaluate --table fixtures/human-table.csv --leave-one-scene-out --csv zones.csv
     docs/benchmarks/steps.py zones.csv
 
 A tile stops at the first verdict at or after its predicted threshold. No luck is in it: the pictures of a zone are given.

@@ -82,6 +82,6 @@ fn session() -> Session<FixedSpp> {
 
 fn kept(session: &Session<FixedSpp>) -> Vec<u8> {
     let mut bytes = Vec::new();
-    session.checkpoint(JOB).write(&mut bytes).expect("memory takes all");
+    session.checkpoint(JOB).and_then(|kept| kept.write(&mut bytes)).expect("memory takes all");
     bytes
 }

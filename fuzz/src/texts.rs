@@ -2,7 +2,7 @@
 
 use noisefloor_image::parse_cube;
 use noisefloor_learn::{read_table, write_table};
-use noisefloor_study::{Beginning, Envelope, ParticipantSession, Study, grids, parse_code};
+use noisefloor_study::{Beginning, Envelope, ParticipantSession, Plan, Study, grids, parse_code};
 use std::sync::Arc;
 
 pub(crate) fn table(bytes: &[u8]) {
@@ -82,7 +82,7 @@ fn fresh() -> ParticipantSession {
     let file = folder.path().join("study.toml");
     std::fs::write(&file, text).expect("space for a study");
     let study = Arc::new(Study::open(&file).expect("a valid study"));
-    ParticipantSession::new(study.clone(), grids(&study), 1)
+    ParticipantSession::new(study.clone(), grids(&study), Plan::draw(&study, 1))
 }
 
 pub(crate) fn study_seeds() -> Vec<Vec<u8>> {

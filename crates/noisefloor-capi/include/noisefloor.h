@@ -217,7 +217,7 @@ const char *nf_version(void);
 NfStatus nf_oracle_bundled(float threshold,
                            NfOracle **oracle);
 
-// As nf_oracle_bundled, with a model that "noisefloor train" has written to a file.
+// As nf_oracle_bundled, with a model that "noisefloor-lab train" has written to a file.
 NfStatus nf_oracle_load(const char *path, float threshold, NfOracle **oracle);
 
 // Frees an oracle; sessions made from it do not need it. NULL is ignored.

@@ -32,7 +32,7 @@ pub unsafe extern "C" fn nf_session_save(
         let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
         let mut file = NamedTempFile::new_in(folder.unwrap_or(Path::new("."))).map_err(failed)?;
         // No buffer: what is left in one when it is dropped fails without a word
-        session.lock()?.checkpoint(job).write(&mut file)?;
+        session.lock()?.checkpoint(job)?.write(&mut file)?;
         file.as_file().sync_all().map_err(failed)?;
         file.persist(path).map_err(|error| failed(error.error))?;
         Ok(())

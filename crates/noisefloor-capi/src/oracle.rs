@@ -22,7 +22,7 @@ pub unsafe extern "C" fn nf_oracle_bundled(threshold: f32, oracle: *mut *mut NfO
     })
 }
 
-/// As nf_oracle_bundled, with a model that "noisefloor train" has written to a file.
+/// As nf_oracle_bundled, with a model that "noisefloor-lab train" has written to a file.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn nf_oracle_load(
     path: *const c_char,

@@ -1,22 +1,10 @@
-//! Tables and JSON, each file complete or not there at all; and pictures to compare with.
+//! JSON, each file complete or not there at all; and pictures to compare with.
 
 use anyhow::bail;
 use noisefloor::Rgb;
 use noisefloor_image::{read_exr, write_atomic};
 use serde::Serialize;
 use std::path::Path;
-
-/// Writes rows as CSV.
-pub fn write_csv<T: Serialize>(path: &Path, rows: impl Iterator<Item = T>) -> anyhow::Result<()> {
-    write_atomic(path, |to| {
-        let mut csv = csv::Writer::from_writer(to);
-        for row in rows {
-            csv.serialize(row)?;
-        }
-        csv.flush().map_err(csv::Error::from)
-    })?;
-    Ok(())
-}
 
 /// Writes JSON.
 pub fn write_json(path: &Path, value: &impl Serialize) -> anyhow::Result<()> {

@@ -2,30 +2,12 @@
 
 use crate::say::note;
 use anyhow::{Context, bail};
-use std::fmt;
+use serde::{Deserialize, Serialize};
 use std::fs::{File, OpenOptions, TryLockError};
 use std::path::{Path, PathBuf};
 
-/// The work of another run is in the way; the user has to say what is to become of it.
-#[derive(Debug)]
-pub struct Occupied(String);
-
-impl Occupied {
-    pub fn new(what: impl Into<String>) -> Self {
-        Self(what.into())
-    }
-}
-
-impl fmt::Display for Occupied {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&self.0)
-    }
-}
-
-impl std::error::Error for Occupied {}
-
 /// What a run does about the work of an earlier one in its output folder.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Earlier {
     /// It is an error that there is any.
     Keep,

@@ -63,6 +63,7 @@ pub fn aside(text: fmt::Arguments<'_>) {
 }
 
 /// A line of results, as `println!`; fails with [`NotSaid`].
+#[macro_export]
 macro_rules! say {
     ($($text:tt)*) => {
         $crate::say::print(format_args!("{}\n", format_args!($($text)*)))
@@ -70,13 +71,14 @@ macro_rules! say {
 }
 
 /// A line for people beside the results, as `eprintln!`; never fails.
+#[macro_export]
 macro_rules! note {
     ($($text:tt)*) => {
         $crate::say::aside(format_args!("{}\n", format_args!($($text)*)))
     };
 }
 
-pub(crate) use {note, say};
+pub use crate::{note, say};
 
 /// An error and its causes in one line; a cause that its parent already quotes is not repeated.
 pub fn one_line(error: &anyhow::Error) -> String {

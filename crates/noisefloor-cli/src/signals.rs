@@ -28,7 +28,6 @@ pub fn cancel_all_on_signal(flags: Vec<Arc<AtomicBool>>, says: &'static str) -> 
 }
 
 /// Ends the process on the first signal: for work of which every result is on disk as soon as it is there.
-#[cfg(feature = "lab")]
 pub fn end_on_signal(says: &'static str) -> anyhow::Result<()> {
     on_signal(move || {
         note!("\n{says}");
@@ -41,7 +40,6 @@ fn on_signal(handler: impl FnMut() + Send + 'static) -> anyhow::Result<()> {
 }
 
 fn end() -> ! {
-    #[cfg(feature = "adapters")]
     noisefloor_sidecar::end_all();
     std::process::exit(i32::from(INTERRUPTED));
 }

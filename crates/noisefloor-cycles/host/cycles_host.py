@@ -74,7 +74,7 @@ class Cycles:
         render.use_border = render.use_crop_to_border = True
         cycles.use_auto_tile = False
 
-        # Every sample counts in one pixel alone, and in full
+        # Every sample counts in only one pixel, and in full
         cycles.pixel_filter_type, cycles.filter_width = "BOX", 1.0
         cycles.sample_clamp_direct = cycles.sample_clamp_indirect = 0.0
         cycles.light_sampling_threshold = 0.0
@@ -91,7 +91,7 @@ class Cycles:
         if depth is not None:
             # Cycles counts bounces; even with none, light comes by a lit surface
             if depth < 2:
-                raise ValueError("Cycles cannot render directly seen light alone: max_depth has to be 2 at least")
+                raise ValueError("Cycles cannot render only directly seen light: max_depth must be at least 2")
             for kind in ["max", "diffuse", "glossy", "transmission", "volume"]:
                 setattr(cycles, f"{kind}_bounces", depth - 2)
 

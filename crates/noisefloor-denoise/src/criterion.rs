@@ -5,7 +5,7 @@ use crate::estimate::{DenoisedError, DenoisedHalves};
 use crate::record::DenoisedRecord;
 use noisefloor::{
     Film, Rgb, StoppingCriterion, Tile, TileGrid, Verdict,
-    criterion::{CriterionError, Needs, Resumable, View},
+    criterion::{CriterionError, Needs, View},
     display::Display,
     evidence::TilePlanes,
     source::FirstHits,
@@ -140,12 +140,10 @@ impl<D: Denoiser> StoppingCriterion for DenoisedQuality<D> {
         record.verdicts += 1;
         Ok(judged.into_iter().map(|judged| judged.verdict).collect())
     }
-}
 
-/// Verdicts follow from film and display alone; what is kept is what reports say of tiles that have stopped.
-impl<D: Denoiser> Resumable for DenoisedQuality<D> {
-    fn state(&self) -> Vec<u8> {
-        self.record.lock().unwrap_or_else(PoisonError::into_inner).to_bytes()
+    /// Verdicts follow from film and display alone; what is kept is what reports say of tiles that have stopped.
+    fn state(&self) -> Option<Vec<u8>> {
+        Some(self.record.lock().unwrap_or_else(PoisonError::into_inner).to_bytes())
     }
 
     fn restore(&mut self, grid: TileGrid, state: &[u8]) -> bool {

@@ -51,7 +51,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let seconds = began.elapsed().as_secs_f64();
     let pixels = (width * height) as f64;
     let began = Instant::now();
-    session.checkpoint("merge").write(std::fs::File::create(folder.join("checkpoint.nfc"))?)?;
+    session.checkpoint("merge")?.write(std::fs::File::create(folder.join("checkpoint.nfc"))?)?;
     println!(
         "{width}x{height}, {} shards, {} batches, {:.2} GB: written in {wrote:.1} s; headers {gathered:.2} s, \
          merge {seconds:.1} s ({:.1} ns per pixel and batch), checkpoint {:.1} s, {:.0} MB resident ({:.0} bytes per pixel)",

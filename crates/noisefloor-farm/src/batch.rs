@@ -15,8 +15,8 @@ pub struct PlannedBatch {
     pub first: u64,
     /// Samples per pixel asked for; with blocks, on average over the tile.
     pub spp: u64,
-    /// First sample and number of samples of each block of the tile, row-major. Empty if all of the tile gets
-    /// `spp` samples from `first` on.
+    /// First sample and number of samples of each block of the tile, row-major. Empty if all of the tile
+    /// gets `spp` samples from `first` on.
     #[serde(default)]
     pub blocks: Vec<(u64, u64)>,
 }

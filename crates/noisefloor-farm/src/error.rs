@@ -1,13 +1,22 @@
 //! What can go wrong with shards and farms. Every message says what, where, and what to do.
 
-use noisefloor::{SessionError, SourceError, source::IdentityChange, tile::TileError};
+use noisefloor::{
+    SessionError, SourceError, checkpoint::CheckpointError, internal::Fault, source::IdentityChange,
+    tile::TileError,
+};
 use noisefloor_image::WriteError;
+use std::error::Error;
 use std::io;
 use std::path::PathBuf;
 use thiserror::Error;
 
 /// Version of the format of shards.
-pub(crate) const VERSION: u32 = 2;
+pub(crate) const VERSION: u32 = 3;
+/// Longest header of a shard that is read: some 300,000 batches, or 50,000 with different samples in 100
+/// blocks each.
+pub(crate) const MAX_HEADER: u64 = 64 << 20;
+/// Version of the format of plans; the first one held words of a command line.
+pub(crate) const PLAN_VERSION: u64 = 2;
 
 /// Why a shard cannot be used.
 #[derive(Debug, Error)]
@@ -29,7 +38,7 @@ pub enum ShardError {
     #[error("it belongs to another job: its {what} is {kept}, not {now}")]
     Other {
         /// What differs.
-        what: &'static str,
+        what: String,
         /// What the shard says of it.
         kept: String,
         /// What is merged.
@@ -42,6 +51,23 @@ pub enum ShardError {
     #[error(transparent)]
     Tile(#[from] TileError),
 }
+
+impl From<Fault> for ShardError {
+    fn from(fault: Fault) -> Self {
+        match fault {
+            Fault::Io(error) => Self::Io(error),
+            Fault::Foreign => Self::Foreign,
+            Fault::Version(found) => Self::Version(found),
+            Fault::Damaged(what) => Self::Damaged(what),
+            Fault::Oversized(bytes) => {
+                Self::Damaged(format!("its header has {bytes} bytes, more than the limit of {MAX_HEADER}"))
+            }
+        }
+    }
+}
+
+/// What a [`Studio`](crate::Studio) has to say of its failures.
+pub type StudioError = Box<dyn Error + Send + Sync>;
 
 /// Why a farm cannot go on.
 #[derive(Debug, Error)]
@@ -66,6 +92,18 @@ pub enum FarmError {
     /// A file of the folder cannot be written.
     #[error(transparent)]
     Write(#[from] WriteError),
+    /// Another release planned the farm.
+    #[error(
+        "{}: has format version {found}, and this release reads version {PLAN_VERSION}; finish it with the release \
+         that planned it, or plan the farm anew in another folder",
+        path.display()
+    )]
+    Version {
+        /// The file.
+        path: PathBuf,
+        /// Its version.
+        found: u64,
+    },
     /// The folder is not a farm's, or already one.
     #[error("{}: {what}", path.display())]
     Folder {
@@ -121,4 +159,101 @@ pub enum FarmError {
         /// What it did, and what to do.
         what: String,
     },
+    /// Slurm works on the round.
+    #[error(
+        "{}: round {number} is under way as Slurm jobs {} and {} ({left} left); `noisefloor farm status` shows how \
+         far it is, `scancel {} {}` ends it",
+        path.display(), tasks, step, tasks, step
+    )]
+    UnderWay {
+        /// The folder.
+        path: PathBuf,
+        /// The round.
+        number: usize,
+        /// Slurm's number of its tasks.
+        tasks: String,
+        /// Slurm's number of the job that merges them.
+        step: String,
+        /// Jobs left.
+        left: usize,
+    },
+    /// Rounds that bring nothing.
+    #[error(
+        "{}: {rounds} rounds in a row brought no samples; see {}, mend what is wrong, and run again",
+        path.display(), log.display()
+    )]
+    Barren {
+        /// The folder.
+        path: PathBuf,
+        /// How many.
+        rounds: usize,
+        /// What the first task of the last one said.
+        log: PathBuf,
+    },
+    /// A step whose round is over.
+    #[error("round {number} has been superseded by round {now}: nothing to do")]
+    Superseded {
+        /// The round of the step.
+        number: usize,
+        /// The round under way.
+        now: usize,
+    },
+    /// A task whose round is over, or that it never had.
+    #[error("{}: round {number} has no task {task} (any more): nothing to do", path.display())]
+    NoTask {
+        /// The folder.
+        path: PathBuf,
+        /// The round.
+        number: usize,
+        /// The task.
+        task: usize,
+    },
+    /// The folder of a frame has a picture that is not the farm's.
+    #[error(
+        "{}: holds a picture of another job than the farm's; move it away, or plan the farm in another folder",
+        .0.display()
+    )]
+    OtherPicture(PathBuf),
+    /// The criterion cannot be judged by from shards.
+    #[error(
+        "this model needs a reference, which a farm does not render; use a model trained on half buffers"
+    )]
+    Reference,
+    /// The checkpoint of a frame does not continue its session.
+    #[error(transparent)]
+    Checkpoint(#[from] CheckpointError),
+    /// Shards without the render that they are of.
+    #[error("{}: does not say which render it is of: {source}; render it again", path.display())]
+    Unknown {
+        /// The shard.
+        path: PathBuf,
+        /// What is wrong.
+        source: serde_json::Error,
+    },
+    /// None of the files is a shard.
+    #[error("none of these files is a shard; {}: {source}", path.display())]
+    NoShard {
+        /// The first file.
+        path: PathBuf,
+        /// Why it is none.
+        source: ShardError,
+    },
+    /// Whoever renders failed.
+    #[error(transparent)]
+    Studio(#[from] StudioError),
+    /// Something about one frame.
+    #[error("{name}: {source}")]
+    Frame {
+        /// The frame.
+        name: String,
+        /// What.
+        source: Box<Self>,
+    },
+}
+
+impl FarmError {
+    /// Says which frame it is about.
+    pub(crate) fn of(name: &str) -> impl FnOnce(Self) -> Self {
+        move |error| Self::Frame { name: name.to_owned(), source: Box::new(error) }
+    }
 }

@@ -10,106 +10,17 @@
 //!     FRAME/…                 the files of `noisefloor render`
 //! ```
 
-use crate::error::FarmError;
-use crate::plan::Task;
-use crate::shard::{ShardFile, ShardJob};
-use noisefloor_image::write_atomic;
+use crate::error::{FarmError, PLAN_VERSION};
+use crate::file::{read_json, write_json};
+use crate::shard::ShardFile;
+use crate::state::{FarmPlan, FrameJob, FrameState, Round};
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
+use serde_json::Value;
 use std::fs::{self, File, OpenOptions, TryLockError};
-use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
 
-/// Longest file of JSON that is written and read: a round of some ten million batches.
-const MAX_JSON: u64 = 1 << 30;
-/// Most frames of one farm.
-pub const MOST_FRAMES: u32 = 1_000_000;
 /// An empty hidden file. The lock itself ends with the process that holds it, however that ends.
 const LOCK: &str = ".noisefloor-farm.lock";
-
-/// What a farm renders.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct FarmJob {
-    /// Options of `noisefloor render`; {frame} and {frame:04} stand for the number of the frame.
-    pub arguments: Vec<String>,
-    /// First and last frame of a sequence.
-    pub frames: Option<(u32, u32)>,
-    /// The folder that relative paths begin at.
-    pub folder: PathBuf,
-    /// Most tasks of a round.
-    pub tasks: usize,
-    /// Whether shards are kept once they are merged.
-    pub keep: bool,
-}
-
-impl FarmJob {
-    /// Names of the frames: of their folders.
-    pub fn names(&self) -> Vec<String> {
-        match self.frames {
-            Some((first, last)) => (first..=last).map(|frame| format!("frame-{frame:04}")).collect(),
-            None => vec!["frame".to_owned()],
-        }
-    }
-
-    /// Options of `noisefloor render` for a frame.
-    pub fn arguments_of(&self, frame: usize) -> Vec<String> {
-        match self.frames {
-            Some((first, _)) => frame_arguments(&self.arguments, first.saturating_add(frame as u32)),
-            None => self.arguments.clone(),
-        }
-    }
-}
-
-/// Fills in the number of a frame: {frame} as it is, {frame:04} with at least four digits.
-///
-/// ```
-/// use noisefloor_farm::frame_arguments;
-/// let typed = ["shots/{frame:04}.xml".to_owned(), "--seed".to_owned(), "{frame}".to_owned()];
-/// assert_eq!(frame_arguments(&typed, 7), ["shots/0007.xml", "--seed", "7"]);
-/// ```
-pub fn frame_arguments(arguments: &[String], frame: u32) -> Vec<String> {
-    let fill = |argument: &String| {
-        let mut filled = argument.replace("{frame}", &frame.to_string());
-        for digits in 1..=9 {
-            filled = filled.replace(&format!("{{frame:0{digits}}}"), &format!("{frame:0digits$}"));
-        }
-        filled
-    };
-    arguments.iter().map(fill).collect()
-}
-
-/// What a frame is, found out when it is planned.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct FrameJob {
-    /// Name of the scene.
-    pub scene: String,
-    /// Name of the source.
-    pub source: String,
-    /// What its samples are of.
-    pub shards: ShardJob,
-}
-
-/// How far a frame is.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct FrameState {
-    /// All tiles.
-    pub tiles: usize,
-    /// Tiles that are still open.
-    pub open: usize,
-    /// Samples in the film, over all pixels.
-    pub samples: u64,
-    /// Samples of all shards that are used up, over all pixels: those in the film, and those beyond a stop.
-    pub sampled: u64,
-    /// Samples still expected, over all pixels.
-    pub to_go: Option<u64>,
-    /// Seconds in the source, of all tasks together.
-    pub source_seconds: f64,
-    /// Seconds of merging and judging.
-    pub merge_seconds: f64,
-    /// Rounds that were merged.
-    pub rounds: usize,
-    /// Whether the picture is there, with all the samples it should have.
-    pub done: bool,
-}
 
 /// How far a frame is, with the digest of the job that it is of.
 #[derive(Serialize, Deserialize)]
@@ -118,38 +29,6 @@ struct KeptState {
     of: String,
     #[serde(flatten)]
     state: FrameState,
-}
-
-/// The tasks of a round.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Round {
-    /// Counts from 1.
-    pub number: usize,
-    /// One process each.
-    pub tasks: Vec<Task>,
-    /// Seconds since 1970 when it was planned.
-    pub planned: f64,
-    /// Seconds that the round before took, from its plan to this one.
-    pub took: f64,
-    /// Samples of all films when it was planned, over all pixels.
-    pub samples: u64,
-    /// Samples that all films got in the round before.
-    pub brought: u64,
-    /// Rounds in a row that brought nothing; `usize::MAX` where the next one is not counted.
-    pub barren: usize,
-    /// Whether its tasks were started.
-    pub started: bool,
-    /// What Slurm runs it as.
-    pub slurm: Option<SlurmJobs>,
-}
-
-/// What Slurm runs a round as.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct SlurmJobs {
-    /// The array of tasks; none if there was nothing to sample.
-    pub tasks: String,
-    /// The job that merges them, judges, and submits the next round.
-    pub step: String,
 }
 
 /// The folder of a farm.
@@ -191,18 +70,14 @@ impl FarmFolder {
     /// What is rendered; none if nothing was planned here.
     ///
     /// # Errors
-    /// [`FarmError`] if it cannot be read.
-    pub fn planned_job(&self) -> Result<Option<FarmJob>, FarmError> {
+    /// [`FarmError`] if it cannot be read; [`FarmError::Version`] if another release planned it.
+    pub fn planned<J: DeserializeOwned>(&self) -> Result<Option<FarmPlan<J>>, FarmError> {
         let path = self.0.join("farm.json");
-        let job: Option<FarmJob> = read_json(&path)?;
-        match job.as_ref().and_then(|job| job.frames) {
-            Some((first, last)) if first > last || last - first >= MOST_FRAMES => {
-                let what = format!(
-                    "frames {first} to {last} are none, or more than {MOST_FRAMES}; plan them in several farms"
-                );
-                Err(FarmError::Folder { path, what })
-            }
-            _ => Ok(job),
+        let Some(plan) = read_json::<Value>(&path)? else { return Ok(None) };
+        // What is no plan at all is said by what it lacks
+        match plan.as_object().map(|plan| plan.get("version").and_then(Value::as_u64).unwrap_or(1)) {
+            Some(found) if found != PLAN_VERSION => Err(FarmError::Version { path, found }),
+            _ => serde_json::from_value(plan).map(Some).map_err(|source| FarmError::Json { path, source }),
         }
     }
 
@@ -210,8 +85,8 @@ impl FarmFolder {
     ///
     /// # Errors
     /// [`FarmError::Folder`] if nothing was planned here; [`FarmError`] if it cannot be read.
-    pub fn job(&self) -> Result<FarmJob, FarmError> {
-        self.planned_job()?.ok_or_else(|| FarmError::Folder {
+    pub fn plan<J: DeserializeOwned>(&self) -> Result<FarmPlan<J>, FarmError> {
+        self.planned()?.ok_or_else(|| FarmError::Folder {
             path: self.0.clone(),
             what: "no farm was planned in this folder; `noisefloor farm plan DIR -- SCENE` does".into(),
         })
@@ -221,16 +96,16 @@ impl FarmFolder {
     ///
     /// # Errors
     /// [`FarmError::Write`].
-    pub fn write_job(&self, job: &FarmJob) -> Result<(), FarmError> {
-        write_json(&self.0.join("farm.json"), job)
+    pub fn write_plan<J: Serialize>(&self, plan: &FarmPlan<J>) -> Result<(), FarmError> {
+        write_json(&self.0.join("farm.json"), plan)
     }
 
-    /// The round under way, or the last one; none before the first.
+    /// The round under way, or the last one; number 0, without tasks, before the first.
     ///
     /// # Errors
     /// [`FarmError`] if it cannot be read.
-    pub fn round(&self) -> Result<Option<Round>, FarmError> {
-        read_json(&self.0.join("round.json"))
+    pub fn round(&self) -> Result<Round, FarmError> {
+        Ok(read_json(&self.0.join("round.json"))?.unwrap_or_default())
     }
 
     /// Writes the round.
@@ -246,12 +121,14 @@ impl FarmFolder {
         self.0.join(name)
     }
 
-    /// What a frame is; none before it is planned.
+    /// What a frame is.
     ///
     /// # Errors
-    /// [`FarmError`] if it cannot be read.
-    pub fn frame_job(&self, name: &str) -> Result<Option<FrameJob>, FarmError> {
-        read_json(&self.frame(name).join("frame.json"))
+    /// [`FarmError`] if it was not planned, or cannot be read.
+    pub fn frame_job(&self, name: &str) -> Result<FrameJob, FarmError> {
+        let path = self.frame(name).join("frame.json");
+        let what = "is missing: the frame was not planned; plan the farm anew in another folder".into();
+        read_json(&path)?.ok_or(FarmError::Folder { path, what })
     }
 
     /// Writes what a frame is, and makes its folders.
@@ -283,9 +160,9 @@ impl FarmFolder {
         write_json(&self.frame(name).join("state.json"), &kept)
     }
 
-    /// The digest of a frame's job; empty before it is planned.
+    /// The digest of a frame's job.
     fn job_of(&self, name: &str) -> Result<String, FarmError> {
-        Ok(self.frame_job(name)?.map_or_else(String::new, |job| job.shards.digest()))
+        Ok(self.frame_job(name)?.shards.digest())
     }
 
     /// The file that a task writes.
@@ -341,57 +218,6 @@ impl FarmFolder {
         let failed = |source| FarmError::Read { path: shard.to_owned(), source };
         fs::rename(shard, &aside).map_err(failed)?;
         Ok(aside)
-    }
-}
-
-/// Opens a file for reading, unless it is a pipe or a device: these might block, or never end.
-pub(crate) fn open_regular(path: &Path) -> io::Result<File> {
-    if !fs::metadata(path)?.is_file() {
-        let what = "it is a folder, a pipe or a device, and not a file";
-        return Err(io::Error::new(io::ErrorKind::InvalidInput, what));
-    }
-    File::open(path)
-}
-
-fn read_json<T: DeserializeOwned>(path: &Path) -> Result<Option<T>, FarmError> {
-    let failed = |source| FarmError::Read { path: path.to_owned(), source };
-    let file = match open_regular(path) {
-        Ok(file) => file,
-        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
-        Err(error) => return Err(failed(error)),
-    };
-    let mut text = Vec::new();
-    file.take(MAX_JSON).read_to_end(&mut text).map_err(failed)?;
-    let content = serde_json::from_slice(&text);
-    content.map(Some).map_err(|source| FarmError::Json { path: path.to_owned(), source })
-}
-
-fn write_json<T: Serialize>(path: &Path, content: &T) -> Result<(), FarmError> {
-    Ok(write_atomic(path, |to| {
-        let mut to = UpTo { to, left: MAX_JSON };
-        serde_json::to_writer(&mut to, content).map_err(io::Error::from).and_then(|()| to.write_all(b"\n"))
-    })?)
-}
-
-/// Writes no more than can be read back.
-struct UpTo<W> {
-    to: W,
-    left: u64,
-}
-
-impl<W: Write> Write for UpTo<W> {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        let Some(left) = self.left.checked_sub(bytes.len() as u64) else {
-            let what = "it would be too long to be read back: render fewer frames in one farm";
-            return Err(io::Error::new(io::ErrorKind::FileTooLarge, what));
-        };
-        let written = self.to.write(bytes)?;
-        self.left = left + (bytes.len() - written) as u64;
-        Ok(written)
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        self.to.flush()
     }
 }
 

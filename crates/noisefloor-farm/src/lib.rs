@@ -6,9 +6,9 @@
 //! - [`ShardSet`] merges shards into a [`Session`](noisefloor::Session), batch by batch as a
 //!   [`Driver`](noisefloor::Driver) on one machine would take them. So the film, every verdict and every stop
 //!   are those of one machine, to the bit, whatever the order, number and size of the shards.
-//! - [`FarmFolder`] is all the state of a farm: what is rendered, the round under way, and how far each frame
-//!   is.
-//! - [`Slurm`] and [`run_local`] run the tasks of a round.
+//! - A [`Farm`] is planned once; a [`Coordinator`] then runs rounds of tasks and merges on this machine or on
+//!   [`Slurm`]. A [`FarmFolder`] is all its state: what is rendered, the round under way, and how far each frame is.
+//! - A [`Studio`] opens sources and writes pictures; the farm knows neither.
 //!
 //! ```
 //! use noisefloor::{FixedSpp, Params, Session, TileGrid};
@@ -38,22 +38,29 @@
 
 mod batch;
 mod error;
+mod farm;
+mod file;
 mod folder;
+mod frame;
 mod local;
 mod merge;
 mod plan;
 mod shard;
 mod slurm;
+mod state;
+mod studio;
 mod task;
 
 pub use batch::PlannedBatch;
-pub use error::{FarmError, ShardError};
-pub use folder::{
-    FarmFolder, FarmJob, FarmLock, FrameJob, FrameState, MOST_FRAMES, Round, SlurmJobs, frame_arguments,
-};
+pub use error::{FarmError, ShardError, StudioError};
+pub use farm::{Coordinator, Delivery, Farm, FarmProgress, FrameProgress, Order};
+pub use folder::{FarmFolder, FarmLock};
+pub use frame::{MergedShards, merge_shards};
 pub use local::run_local;
 pub use merge::{Merged, Problem, ShardSet};
 pub use plan::{Task, split};
 pub use shard::{BatchEntry, Shard, ShardFile, ShardJob};
 pub use slurm::Slurm;
+pub use state::{FarmPlan, FrameJob, FrameRange, FrameState, Round, RoundState, SlurmJobs};
+pub use studio::{Finished, FrameSource, News, RenderFiles, Studio};
 pub use task::sample;

@@ -1,7 +1,8 @@
 //! A round in a few processes on this machine.
 
 use crate::error::FarmError;
-use crate::folder::{FarmFolder, Round};
+use crate::folder::FarmFolder;
+use crate::state::Round;
 use std::fs::File;
 use std::path::Path;
 use std::process::{Child, Command, Stdio};

@@ -51,8 +51,8 @@ pub struct ShardSet {
 
 impl ShardSet {
     /// Reads the headers of these files. Those that are damaged, or of another job, become
-    /// [problems](Self::problems). So do two that have different samples for one batch: nobody can tell which
-    /// is right, and neither is used.
+    /// [problems](Self::problems). So do two that have different samples for one batch: nobody can tell
+    /// which is right, and neither is used.
     pub fn gather(job: &ShardJob, paths: &[PathBuf]) -> Self {
         let mut set = Self::default();
         for path in paths {

@@ -18,8 +18,8 @@ pub struct Task {
     pub batches: Vec<PlannedBatch>,
 }
 
-/// Splits what each frame needs into tasks of about equal length, at most about `tasks`, by frames, tiles and
-/// ranges of samples. The samples of a tile must come one after the other.
+/// Splits what each frame needs into tasks of about equal length, at most about `tasks`, by frames, tiles
+/// and ranges of samples. The samples of a tile must come one after the other.
 ///
 /// Few batches make fewer tasks; many make more where a task would hold too many in memory.
 ///
@@ -68,8 +68,8 @@ mod tests {
             let flat: Vec<_> = split.iter().flat_map(|t| t.batches.iter().map(|b| (t.frame, b))).collect();
             let wanted = all.iter().enumerate().flat_map(|(f, (_, bs))| bs.iter().map(move |b| (f, b)));
             assert_eq!(flat, wanted.collect::<Vec<_>>());
-            // A frame more than asked for, where a task would span two; and no task has less than half of 2¹⁸
-            // samples
+            // A frame more than asked for, where a task would span two; and no task has less than half of
+            // 2¹⁸ samples
             assert!(split.len() <= tasks.min(128) + 1, "{} for {tasks}", split.len());
             let (least, most) =
                 (split.iter().map(|t| t.batches.len()).min(), split.iter().map(|t| t.batches.len()).max());

@@ -1,29 +1,27 @@
 //! Files of samples.
 //!
-//! Layout: magic (8 bytes), version (u32), length of the header (u64), BLAKE3 of the header (32 bytes),
-//! header (JSON); then for each batch of the header, in its order, three f32 per pixel, row-major over its
-//! tile. Numbers are little-endian. The header has the BLAKE3 of each batch, so that a merge reads only the
-//! batch it needs. Where blocks of a tile got different numbers of samples, it has these, too.
+//! Layout: the container of models and checkpoints (magic, version, length and BLAKE3 of the header), whose
+//! payload is a header of JSON; then for each batch of the header, in its order, three f32 per pixel,
+//! row-major over its tile. Numbers are little-endian. The header has the BLAKE3 of each batch, so that a
+//! merge reads only the batch it needs. Where blocks of a tile got different numbers of samples, it has
+//! these, too.
 
 use crate::batch::{PlannedBatch, by_blocks, fit};
-use crate::error::{ShardError, VERSION};
-use crate::folder::open_regular;
+use crate::error::{MAX_HEADER, ShardError, VERSION};
+use crate::file::open_regular;
 use noisefloor::{
-    ProgressiveSource, Request, Rgb, Session, SourceError, Tile, TileGrid,
-    criterion::Resumable,
+    ProgressiveSource, Request, Rgb, Session, SourceError, StoppingCriterion, Tile, TileGrid,
+    internal::Format,
     source::{BlockRequest, SourceIdentity},
 };
 use noisefloor_image::{WriteError, write_atomic};
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Serialize, de::DeserializeOwned};
+use serde_json::Value;
 use std::fs::File;
 use std::io::{self, BufReader, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
-const MAGIC: [u8; 8] = *b"NFSHARD\0";
-/// Longest header that is read: some 300,000 batches, or 50,000 with different samples in 100 blocks each.
-const MAX_HEADER: u64 = 64 << 20;
-/// Bytes before the header.
-const PREFIX: u64 = 8 + 4 + 8 + 32;
+const FORMAT: Format = Format { magic: *b"NFSHARD\0", version: VERSION };
 /// Bytes per pixel: three f32.
 const PIXEL: usize = 12;
 
@@ -43,8 +41,8 @@ pub struct ShardJob {
     pub blocks: usize,
     /// Fingerprint of the criterion.
     pub criterion: String,
-    /// Parameters of the session, as text.
-    pub params: String,
+    /// Parameters of the session, as files keep them.
+    pub params: Value,
 }
 
 impl ShardJob {
@@ -52,7 +50,7 @@ impl ShardJob {
     ///
     /// # Errors
     /// [`SourceError`] if the source cannot read what it depends on.
-    pub fn new<C: Resumable>(
+    pub fn new<C: StoppingCriterion>(
         source: &impl ProgressiveSource,
         session: &Session<C>,
     ) -> Result<Self, SourceError> {
@@ -60,7 +58,7 @@ impl ShardJob {
     }
 
     /// The job of a session whose samples depend on `source`.
-    pub fn of<C: Resumable>(source: SourceIdentity, session: &Session<C>) -> Self {
+    pub fn of<C: StoppingCriterion>(source: SourceIdentity, session: &Session<C>) -> Self {
         let (grid, params) = (session.film().grid(), session.params());
         Self {
             source,
@@ -69,7 +67,8 @@ impl ShardJob {
             tile: params.tile,
             blocks: params.blocks,
             criterion: session.criterion().fingerprint(),
-            params: format!("{params:?}"),
+            // None of them fails to be written
+            params: serde_json::to_value(params).unwrap_or_default(),
         }
     }
 
@@ -97,13 +96,19 @@ impl ShardJob {
             ("picture", size(kept), size(self)),
             ("edge of blocks", kept.blocks.to_string(), self.blocks.to_string()),
             ("criterion", kept.criterion.clone(), self.criterion.clone()),
-            ("set of parameters", kept.params.clone(), self.params.clone()),
         ] {
             if kept != now {
-                return Err(ShardError::Other { what, kept, now });
+                return Err(ShardError::Other { what: what.to_owned(), kept, now });
             }
         }
-        Ok(())
+        if kept.params == self.params {
+            return Ok(());
+        }
+        let names = || self.params.as_object().into_iter().flat_map(|params| params.keys());
+        let differing = names().find(|name| self.params.get(name) != kept.params.get(name));
+        let of = |params: &Value| differing.and_then(|name| params.get(name)).unwrap_or(params).to_string();
+        let what = differing.map_or("set of parameters", String::as_str).to_owned();
+        Err(ShardError::Other { what, kept: of(&kept.params), now: of(&self.params) })
     }
 }
 
@@ -147,8 +152,9 @@ impl BatchEntry {
 #[derive(Clone, Debug, Serialize, Deserialize)]
 struct Header {
     job: ShardJob,
-    /// Options of `noisefloor render`, if the command made the shard.
-    arguments: Vec<String>,
+    /// The render that the samples are of, as whoever made the shard keeps it.
+    #[serde(default, skip_serializing_if = "Value::is_null")]
+    render: Value,
     /// Names of scene and source, for people and for the picture's file.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     names: Option<(String, String)>,
@@ -168,15 +174,16 @@ impl Shard {
     /// A shard without samples.
     pub fn new(job: ShardJob) -> Self {
         Self {
-            header: Header { job, arguments: vec![], names: None, seconds: 0.0, batches: vec![] },
+            header: Header { job, render: Value::Null, names: None, seconds: 0.0, batches: vec![] },
             pixels: vec![],
         }
     }
 
-    /// Adds how `noisefloor render` is told the job, so that the file alone is enough to merge it.
+    /// Adds the render that the samples are of, so that the file alone is enough to merge it. What cannot be
+    /// written is left out.
     #[must_use]
-    pub fn with_arguments(mut self, arguments: Vec<String>) -> Self {
-        self.header.arguments = arguments;
+    pub fn with_render(mut self, render: &impl Serialize) -> Self {
+        self.header.render = serde_json::to_value(render).unwrap_or_default();
         self
     }
 
@@ -217,12 +224,7 @@ impl Shard {
     /// [`WriteError`] if it cannot be written.
     pub fn write(&self, path: impl AsRef<Path>) -> Result<(), WriteError> {
         write_atomic(path, |to| -> io::Result<()> {
-            let header = serde_json::to_vec(&self.header)?;
-            to.write_all(&MAGIC)?;
-            to.write_all(&VERSION.to_le_bytes())?;
-            to.write_all(&(header.len() as u64).to_le_bytes())?;
-            to.write_all(blake3::hash(&header).as_bytes())?;
-            to.write_all(&header)?;
+            FORMAT.write_bytes(&serde_json::to_vec(&self.header)?, &mut *to)?;
             self.pixels.iter().try_for_each(|mean| to.write_all(&bytes(mean)))
         })
     }
@@ -257,33 +259,10 @@ impl ShardFile {
         let file = open_regular(&path)?;
         let there = file.metadata()?.len();
         let mut from = BufReader::new(file);
-        let mut prefix = [0; PREFIX as usize];
-        let read = read_up_to(&mut from, &mut prefix)?;
-        if read < 8 || prefix[..8] != MAGIC {
-            return Err(ShardError::Foreign);
-        }
-        if read < prefix.len() {
-            return Err(ShardError::Damaged("it ends within its first bytes".into()));
-        }
-        let version = u32::from_le_bytes(prefix[8..12].try_into().unwrap_or_default());
-        if version != VERSION {
-            return Err(ShardError::Version(version));
-        }
-        let length = u64::from_le_bytes(prefix[12..20].try_into().unwrap_or_default());
-        if length > MAX_HEADER {
-            let what = format!("its header has {length} bytes, more than the limit of {MAX_HEADER}");
-            return Err(ShardError::Damaged(what));
-        }
-        let mut header = Vec::new();
-        from.take(length).read_to_end(&mut header)?;
-        if header.len() as u64 != length {
-            return Err(ShardError::Damaged("it ends within its header".into()));
-        }
-        if blake3::hash(&header).as_bytes() != &prefix[20..] {
-            return Err(ShardError::Damaged("the checksum of its header differs".into()));
-        }
+        let header = FORMAT.read_bytes(&mut from, MAX_HEADER)?;
+        let begin = from.stream_position()?;
         let header = serde_json::from_slice(&header).map_err(|e| ShardError::Damaged(e.to_string()))?;
-        Self::check(path, header, PREFIX + length, there)
+        Self::check(path, header, begin, there)
     }
 
     /// Checks that the header holds together, and that the file has `there` bytes as it says.
@@ -320,9 +299,12 @@ impl ShardFile {
         &self.header.job
     }
 
-    /// Options of `noisefloor render` that describe the job; none if the command did not make it.
-    pub fn arguments(&self) -> &[String] {
-        &self.header.arguments
+    /// The render that its samples are of, as its maker keeps it.
+    ///
+    /// # Errors
+    /// If it is not known, or is no such value.
+    pub fn render<J: DeserializeOwned>(&self) -> Result<J, serde_json::Error> {
+        J::deserialize(&self.header.render)
     }
 
     /// Names of scene and source; none if whoever made the shard did not say.
@@ -383,18 +365,6 @@ impl ShardFile {
 /// Bytes of a batch.
 fn length(tile: Tile, spp: u64) -> usize {
     if spp == 0 { 0 } else { tile.pixels() * PIXEL }
-}
-
-/// Fills the buffer as far as there is something; how much that is.
-fn read_up_to(from: &mut impl Read, buffer: &mut [u8]) -> io::Result<usize> {
-    let mut filled = 0;
-    while filled < buffer.len() {
-        match from.read(&mut buffer[filled..])? {
-            0 => break,
-            read => filled += read,
-        }
-    }
-    Ok(filled)
 }
 
 #[cfg(test)]

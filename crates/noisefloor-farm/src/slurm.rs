@@ -1,7 +1,8 @@
 //! A round as an array of Slurm jobs, followed by a job that merges it and submits the next one.
 
 use crate::error::FarmError;
-use crate::folder::{FarmFolder, Round, SlurmJobs};
+use crate::folder::FarmFolder;
+use crate::state::{Round, SlurmJobs};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 

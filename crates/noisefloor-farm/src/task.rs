@@ -15,8 +15,8 @@ type Wanted<'a> = (Request, &'a PlannedBatch);
 /// Samples per pixel that no tile has.
 const COUNTABLE: u64 = 1 << 34;
 
-/// Whether a plan can have asked for this: its batches are those of [`Session::next_batches`], which fit into
-/// one call. A damaged plan must not keep a node busy for a year.
+/// Whether a plan can have asked for this: its batches are those of [`Session::next_batches`], which fit
+/// into one call. A damaged plan must not keep a node busy for a year.
 ///
 /// [`Session::next_batches`]: noisefloor::Session::next_batches
 fn is_planned(batch: &PlannedBatch, tile: Tile, edge: usize) -> bool {
@@ -34,8 +34,8 @@ fn is_planned(batch: &PlannedBatch, tile: Tile, edge: usize) -> bool {
 /// too.
 ///
 /// # Errors [`FarmError::Edited`] if the source is not that of `job`, [`FarmError::Plan`] if no plan asks for
-/// such a batch, [`FarmError::Blocks`] if it cannot sample the blocks that the job has, [`FarmError::Source`]
-/// if it fails or breaks its contract, or a batch is no light.
+/// such a batch, [`FarmError::Blocks`] if it cannot sample the blocks that the job has,
+/// [`FarmError::Source`] if it fails or breaks its contract, or a batch is no light.
 pub fn sample(
     source: &mut impl ProgressiveSource,
     job: ShardJob,

@@ -119,7 +119,7 @@ fn batch_name(path: &Path) -> Option<&str> {
     path.file_name()?.to_str()?.strip_prefix("batch_")?.strip_suffix(".exr")
 }
 
-/// A number of samples: digits alone, so that every difference fits [`noisefloor::Batch::samples`].
+/// A number of samples: only digits, so that every difference fits [`noisefloor::Batch::samples`].
 fn count(digits: &str) -> Option<u64> {
     digits.bytes().all(|b| b.is_ascii_digit()).then(|| digits.parse::<u32>().ok().map(u64::from)).flatten()
 }

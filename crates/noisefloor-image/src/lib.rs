@@ -4,7 +4,7 @@
 //!   content tells the format. Files may be hostile: sizes are checked before pixels are allocated, and a
 //!   broken file is a [`PictureError`].
 //! - [`read_facts`], [`read_still`]: what an EXR says of its samples, and a picture with them.
-//! - [`read_unread`]: what of a file is not read, alpha and further layers.
+//! - [`read_unread`]: what is ignored of a file: alpha and further layers.
 //! - [`write_exr`], [`write_png`], [`write_atomic`], [`check_writable`]: files that appear complete or not at
 //!   all.
 //! - [`read_cube`]: a `.cube` LUT, and as a tone mapping ([`ColourLut::into_tone_curve`]).
@@ -49,6 +49,8 @@ mod picture;
 mod plane;
 mod read;
 mod stack;
+#[cfg(feature = "tables")]
+mod table;
 mod unread;
 mod write;
 
@@ -66,5 +68,7 @@ pub use picture::{DisplayImage, LinearImage, Picture};
 pub use plane::Plane;
 pub use read::{read_picture, read_picture_within, read_still};
 pub use stack::StackSource;
+#[cfg(feature = "tables")]
+pub use table::write_csv;
 pub use unread::{Unread, read_unread};
 pub use write::{RenderLayers, write_exr, write_png};

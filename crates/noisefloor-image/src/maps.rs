@@ -256,7 +256,7 @@ pub fn draw_tiles(picture: &Canvas, marks: &[TileMark], scale: &ColourScale) -> 
     canvas
 }
 
-/// The picture in grey below a colour, so that colour means the value alone.
+/// The picture in grey below a colour, so that colour means only the value.
 fn tint(canvas: &mut Canvas, picture: &Canvas, tile: Tile, colour: [u8; 3]) {
     let (columns, rows) = (tile.x..tile.x + tile.width, tile.y..tile.y + tile.height);
     for (x, y) in rows.flat_map(|y| columns.clone().map(move |x| (x, y))) {

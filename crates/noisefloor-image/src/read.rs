@@ -40,7 +40,8 @@ pub fn read_picture_within(path: impl AsRef<Path>, most: usize) -> Result<Pictur
 /// [`PictureError::UnevenSamples`].
 pub fn read_still(path: impl AsRef<Path>, spp: Option<f64>) -> Result<Still, PictureError> {
     let path = path.as_ref();
-    let facts = read_facts(path)?;
+    // What is no picture has no samples either
+    let (picture, facts) = (read_picture(path)?, read_facts(path)?);
     let spp = match (spp, facts.samples) {
         (Some(spp), _) => spp,
         (None, Some((fewest, most))) if fewest < most => {
@@ -49,5 +50,5 @@ pub fn read_still(path: impl AsRef<Path>, spp: Option<f64>) -> Result<Still, Pic
         (None, Some((_, spp))) => spp as f64,
         (None, None) => return Err(PictureError::NoSamples { path: path.to_owned() }),
     };
-    Ok(Still { origin: facts.origin, ..read_picture(path)?.into_still(spp) })
+    Ok(Still { origin: facts.origin, ..picture.into_still(spp) })
 }

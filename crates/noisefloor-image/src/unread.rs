@@ -1,4 +1,4 @@
-//! What a picture's file has beside the colours that are read of it: whoever judges the picture should know.
+//! What a picture's file holds beside the colours that are read, for a warning.
 
 use crate::decode_exr::{Layout, alpha_of, layout_of};
 use crate::error::PictureError;

@@ -1,4 +1,4 @@
-//! Progress of long work, for whoever shows it.
+//! Progress of long work, for display.
 
 /// How far a piece of work is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -13,5 +13,5 @@ pub struct Advance<'a> {
     pub detail: &'a str,
 }
 
-/// Is told of progress, from any thread.
+/// Called with progress, from any thread.
 pub type Watch<'a> = &'a (dyn Fn(Advance<'_>) + Sync);

@@ -1,23 +1,10 @@
-//! Tables, JSON and text, each file whole or not at all.
+//! JSON and text, each file whole or not at all.
 
 use crate::error::LabError;
 use noisefloor_image::{WriteError, write_atomic};
 use serde::Serialize;
 use std::io::Write;
 use std::path::Path;
-
-pub(crate) fn write_csv<T: Serialize>(
-    path: &Path,
-    rows: impl IntoIterator<Item = T>,
-) -> Result<(), WriteError> {
-    write_atomic(path, |to| {
-        let mut csv = csv::Writer::from_writer(to);
-        for row in rows {
-            csv.serialize(row)?;
-        }
-        csv.flush().map_err(csv::Error::from)
-    })
-}
 
 pub(crate) fn write_json(path: &Path, value: &impl Serialize) -> Result<(), WriteError> {
     write_atomic(path, |to| serde_json::to_writer_pretty(to, value))

@@ -36,7 +36,7 @@ pub(crate) fn fit_line(
 ) -> Svm {
     let Some((noise, others)) = weighed.split_first() else { return as_svm(&vec![0.0; rows.ncols() + 1]) };
     let examples = rows.nrows();
-    // Of what does not tell noise from picture, nothing is known beforehand
+    // Nothing is known beforehand of numbers that do not measure noise
     let steepness = if noise.growth == 0.0 { 0.0 } else { 1.0 / (noise.growth * spread) };
     let known = &rows.column(noise.number) * steepness;
     let ratio = |other: &Weighed| if noise.growth == 0.0 { 0.0 } else { other.growth / noise.growth };

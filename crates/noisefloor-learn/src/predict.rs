@@ -58,7 +58,7 @@ pub struct Prediction {
 }
 
 impl Prediction {
-    /// By a threshold and a stop alone, without looking at pictures.
+    /// By a threshold and a stop, without looking at pictures.
     fn new(zone: &Zone, spp: f64, stop: f64) -> Self {
         let real = || zone.levels.iter().filter(|l| l.origin == Origin::Real);
         let right = real().filter(|l| (l.spp >= spp) == (l.spp >= zone.human_spp));
@@ -77,7 +77,7 @@ impl Prediction {
         }
     }
 
-    /// By a threshold alone, at which the predictor stops.
+    /// By a threshold, at which the predictor stops.
     pub(crate) fn by_threshold(zone: &Zone, spp: f64) -> Self {
         Self::new(zone, spp, spp)
     }

@@ -108,7 +108,7 @@ mod tests {
     /// Probabilities of 0.25 and 0.75 that come true in a quarter and in half of the cases.
     #[test]
     fn calibration_is_the_distance_from_the_diagonal() {
-        // People stop at 50 or 200 samples, and P is said of 100; ninefold away stays out
+        // People stop at 50 or 200 samples, and P is predicted at 100; ninefold away stays out
         let said = |p: f32, human: f64| {
             let mut prediction = Prediction::by_threshold(&zone("A", 0, human, 1.0), 100.0);
             prediction.probabilities = vec![(100.0, p), (9.0 * human, 0.5)];

@@ -31,7 +31,7 @@ mod tests {
     use super::*;
     use noisefloor_testkit::Noise;
 
-    /// The difference of nested means, measured, has the variance of the noise that it is said to be worth.
+    /// The measured difference of nested means has the variance of the noise that it is worth.
     #[test]
     fn a_difference_is_as_strong_as_the_noise_that_it_is_said_to_be() {
         let mut noise = Noise::new(7);

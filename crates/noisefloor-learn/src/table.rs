@@ -11,7 +11,7 @@ use std::collections::BTreeSet;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Origin {
-    /// Rendered with so many samples.
+    /// Rendered with this many samples.
     Real,
     /// Made from a real picture and a converged one, with noise ∝ 1/√n.
     Synthesised,

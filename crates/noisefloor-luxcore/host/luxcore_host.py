@@ -1,6 +1,6 @@
 """Serves LuxCore (pyluxcore) to noisefloor-luxcore.
 
-Scenes are LuxCore's own: a configuration (.cfg) that names a scene, or a scene (.scn) alone. Options:
+Scenes are LuxCore's own: a configuration (.cfg) that names a scene, or a scene (.scn) by itself. Options:
 
 - engine: "path" (default) or "bidir", which LuxCore calls PATHCPU and BIDIRCPU;
 - sampler: "random" (default), "sobol" or "metropolis".
@@ -27,7 +27,7 @@ REMOVED = ["batch.", "periodicsave.", "resumerendering.", "film.outputs.", "film
 # What makes batches alike, because sessions share what they have guessed of the light
 CACHES = ["path.photongi.indirect.enabled", "path.photongi.caustic.enabled"]
 FORCED = {
-    # Every sample counts in one pixel alone, and in full
+    # Every sample counts in only one pixel, and in full
     "film.filter.type": "NONE",
     "path.clamping.variance.maxvalue": 0.0,
     "sampler.random.adaptive.strength": 0.0,
@@ -136,7 +136,7 @@ class LuxCore:
         if init.get("max_depth") is not None:
             depth = init["max_depth"]
             if depth < 2:
-                raise ValueError("LuxCore cannot render directly seen light alone: max_depth has to be 2 at least")
+                raise ValueError("LuxCore cannot render only directly seen light: max_depth must be at least 2")
             set_all |= {f"path.pathdepth.{kind}": depth for kind in ["total", "diffuse", "glossy", "specular"]}
             # Surfaces touched from either end
             set_all |= {"path.maxdepth": depth - 1, "light.maxdepth": depth - 1}
@@ -253,7 +253,7 @@ class LuxCore:
         waiting = list(range(len(tiles)))
         pairs = [self._pair(tile) for tile in tiles]
         while waiting:
-            # A tile may be named more than once: each chain goes on for one request at a time
+            # A tile may be named more than once: each chain continues for one request at a time
             running, later = {}, []
             for i in waiting:
                 if any(chain in running for chain in pairs[i]):

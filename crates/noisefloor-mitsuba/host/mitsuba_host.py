@@ -13,7 +13,7 @@ RUNS = range(8, 17)
 LANES = 1 << 22
 # Edge of the blocks of the scalar variant, which number its random streams. Fixed, so that they do not depend on threads.
 BLOCK = 16
-# Integrators that sample single rays: along paths, at first hits alone, or by way of other integrators.
+# Integrators that sample single rays: along paths, only at first hits, or by way of other integrators.
 PATHS, FIRST_HITS, WRAPPERS = ("path", "volpath", "volpathmis"), ("direct", "depth"), ("aov", "moment", "stokes")
 # Increment and multipliers of SplitMix64 (Steele, Lea and Flood 2014).
 GOLDEN, MIX_1, MIX_2 = 0x9E3779B97F4A7C15, 0xBF58476D1CE4E5B9, 0x94D049BB133111EB
@@ -271,7 +271,7 @@ class Wavefront:
         return x.ravel().astype(np.uint32), y.ravel().astype(np.uint32), first
 
     def wavefront(self, x, y, first, samples):
-        """Sums of so many samples of these pixels."""
+        """Sums of this many samples of these pixels."""
         mi, dr, np = self.mi, self.dr, self.np
         # Opaque: numbers that were part of the kernel would have it compiled anew for every other.
         longest = min(RUNS, key=lambda run: -samples % run)
@@ -301,7 +301,7 @@ class Wavefront:
 
     def seed_streams(self, key, index):
         """A stream for (seed, pixel, index of the sample). The mix is a bijection: no two samples of a pixel share a stream, and
-        those of different pixels do by chance alone, once in 2^127."""
+        those of different pixels do by chance, once in 2^127."""
         mi = self.mi
         state = mix(key + index * mi.UInt64(GOLDEN), mi.UInt64)
         # Not by the constructor, which adds the number of the lane in a loop.

@@ -3,9 +3,10 @@
 use crate::checks::{MAX_COORDINATE, check_range};
 use crate::error::SceneError;
 use crate::math::{self, Ray, Vec3};
+use serde::Serialize;
 
 /// A camera, by default a pinhole. The aspect ratio follows from the resolution; pixels are square.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Camera {
     /// Position, in scene units.
     pub eye: [f32; 3],

@@ -1,12 +1,14 @@
 //! Reconstruction filters.
 
 use crate::math;
+use serde::{Deserialize, Serialize};
 
 /// A reconstruction filter. Sample positions are drawn from it (Ernst, Stamminger, Greiner 2006, "Filter
 /// Importance Sampling"). Each sample therefore counts for one pixel, with the same weight as all others, and
 /// noise stays independent from pixel to pixel: the oracle judges it as with a box. Neighbouring pixels
 /// partly see the same light, so that the picture is softer than with a box.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum Filter {
     /// Uniform over the pixel.

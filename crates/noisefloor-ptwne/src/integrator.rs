@@ -8,6 +8,7 @@ use crate::material::Bsdf;
 use crate::math::{self, DELTA, Frame, Ray, Vec3, power_heuristic};
 use crate::sampler::Sampler;
 use crate::scene::Scene;
+use serde::{Deserialize, Serialize};
 use std::f32::consts::FRAC_1_PI;
 
 /// What the integrator needs to know besides the scene.
@@ -21,7 +22,8 @@ pub(crate) struct Settings {
 }
 
 /// How paths find light. All estimators converge to the same picture.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum Estimator {
     /// By next event estimation and by scattering, combined by multiple importance sampling.

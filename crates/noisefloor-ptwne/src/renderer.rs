@@ -16,6 +16,7 @@ use noisefloor::{
     source::{BlockRequest, BlockSamples, FirstHits, Reference, SourceIdentity},
 };
 use rayon::prelude::*;
+use serde::Serialize;
 use std::fmt;
 use std::num::NonZeroUsize;
 use std::ops::ControlFlow;
@@ -31,7 +32,7 @@ pub const MAX_THREADS: usize = 1024;
 const PREVIEW: usize = 64;
 
 /// How to render. Build it with [`RenderOptions::default`] and `..`, since fields may be added.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct RenderOptions {
     /// Seed of all random numbers.
     pub seed: u64,
@@ -349,8 +350,9 @@ impl ProgressiveSource for Ptwne {
     fn identity(&self) -> Result<SourceIdentity, SourceError> {
         // Threads do not change samples
         let options = RenderOptions { threads: None, ..self.options };
-        let camera = self.scene.camera();
-        Ok(self.scene.identity().clone().with_options(&format!("ptwne, {options:?}, {camera:?}")))
+        let kept = serde_json::to_string(&(options, self.scene.camera()))
+            .map_err(|error| SourceError::Failed { name: "ptwne".into(), tile: None, cause: error.into() })?;
+        Ok(self.scene.identity().clone().with_options(&format!("ptwne, {kept}")))
     }
 
     /// # Errors

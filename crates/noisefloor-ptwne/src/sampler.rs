@@ -1,9 +1,11 @@
 //! Where the random numbers of a path come from.
 
 use crate::rng::{GOLDEN, Key, Rng, mix};
+use serde::{Deserialize, Serialize};
 
 /// How the samples of a pixel are distributed.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum Sampling {
     /// Independent samples. Their noise is that which people saw in the training data.
@@ -12,7 +14,7 @@ pub enum Sampling {
     /// Owen-scrambled Sobol points (Burley 2020, "Practical Hash-based Owen Scrambling"), four dimensions at
     /// a time, scrambled and shuffled differently for each pixel. They have less noise, but the halves of a
     /// pixel are no longer independent, and the bundled model has not seen such noise: see
-    /// `docs/benchmarks/renderer.md` of the project.
+    /// `docs/accuracy.md` of the project.
     Sobol,
 }
 

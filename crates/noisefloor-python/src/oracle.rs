@@ -9,7 +9,7 @@ use std::path::PathBuf;
 /// A trained model with the probability from which a tile counts as converged. It never changes; any number
 /// of sessions can be made from it.
 ///
-/// threshold: between 0 and 1; 0.9 is that of the paper. model: path of a model that "noisefloor train" has
+/// threshold: between 0 and 1; 0.9 is that of the paper. model: path of a model that "noisefloor-lab train" has
 /// written; None is the model inside the library, trained on
 ///     human data.
 ///

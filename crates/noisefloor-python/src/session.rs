@@ -301,7 +301,8 @@ fn save(session: &Session<Oracle>, path: &Path, job: &str) -> PyResult<()> {
     let mut file = tempfile::NamedTempFile::new_in(folder.unwrap_or(Path::new(".")))
         .map_err(|error| file_error(path, &error))?;
     // No buffer: what is left in one when it is dropped fails without a word
-    session.checkpoint(job).write(&mut file).map_err(|error| raise(path, error))?;
+    let written = session.checkpoint(job).and_then(|checkpoint| checkpoint.write(&mut file));
+    written.map_err(|error| raise(path, error))?;
     file.as_file().sync_all().map_err(|error| file_error(path, &error))?;
     file.persist(path).map_err(|error| file_error(path, &error.error))?;
     Ok(())

@@ -26,7 +26,7 @@ const EPSILON: f64 = 1e-4;
 #[derive(Clone, Debug)]
 pub struct CyclesAdaptive {
     /// Error below which a pixel has converged, above 0; 0.01 by default, as in Blender. 0.08 agrees with
-    /// people on average (`noisefloor evaluate --rivals`).
+    /// people on average (`noisefloor-lab evaluate --rivals`).
     pub threshold: f64,
     /// Share of a tile's pixels that must converge, in (0, 1]; 0.95 by default.
     pub share: f64,

@@ -29,7 +29,7 @@ const DEFAULT_SPLIT: f64 = 256.0;
 #[derive(Clone, Debug)]
 pub struct Dammertz {
     /// Error below which a block is done, above 0. The default of 0.0046 agrees with people on average
-    /// (`noisefloor evaluate --rivals`).
+    /// (`noisefloor-lab evaluate --rivals`).
     pub stop: f64,
     /// Error below which a block is cut in two, in units of `stop`, at least 1; 256 by default.
     pub split: f64,

@@ -80,7 +80,7 @@ pub use dammertz::Dammertz;
 pub use luxcore::LuxCoreHalt;
 pub use picture::{DifferenceMap, DisplayPixels, MetricError};
 pub use relative_error::RelativeError;
-pub use spec::{RIVALS, Rival, SpecError, parse};
+pub use spec::{RIVALS, Rival, RivalSpec, SpecError, parse};
 pub use stages::{Myszkowski1998, Takouachet2007};
 pub use time::TimeLimit;
 pub use vdp::{Vdp, VdpViewing, VdpViewingError};

@@ -26,7 +26,7 @@ const DEFAULT_STEP: f64 = 64.0;
 #[derive(Clone, Debug)]
 pub struct LuxCoreHalt {
     /// Largest share of the pixels that may have changed, in [0, 1]. The default of 0.31 agrees with people
-    /// on average (`noisefloor evaluate --rivals`).
+    /// on average (`noisefloor-lab evaluate --rivals`).
     pub share: f64,
     /// Samples per pixel between two tests, above 0; 64 by default.
     pub step: f64,

@@ -32,7 +32,7 @@ const DARK: f64 = 0.01;
 #[derive(Clone, Debug)]
 pub struct RelativeError {
     /// Largest relative half-width of the confidence interval, above 0. The default of 0.17 agrees with
-    /// people on average (`noisefloor evaluate --rivals`).
+    /// people on average (`noisefloor-lab evaluate --rivals`).
     pub error: f64,
     /// Confidence, in (0, 1); 0.95 by default.
     pub confidence: f64,

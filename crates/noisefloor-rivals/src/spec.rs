@@ -5,6 +5,9 @@ use crate::{
     TimeLimit, converged, cycles, dammertz, luxcore, relative_error, stages,
 };
 use noisefloor::{FixedSpp, StoppingCriterion};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use std::fmt;
+use std::str::FromStr;
 use thiserror::Error;
 
 /// Samples per pixel of the example.
@@ -41,6 +44,7 @@ pub struct Rival {
 
 const SHARE: &str = "a share of the pixels above 0 and at most 1";
 const POSITIVE: &str = "a number above 0";
+const SECONDS: &str = "a number of seconds, at least 0";
 const PROBABILITY: &str = "a probability above 0 and below 1";
 
 /// All rivals with one open constant.
@@ -164,33 +168,84 @@ fn known() -> String {
     names.map(|name| format!("{name}:…")).collect::<Vec<_>>().join(", ")
 }
 
-/// Makes a criterion of a spec: a name, and after a colon its constant, or the default without one;
-/// `spp` needs its number.
-/// `"spp:256"`, `"time:30"` (seconds), `"relative-error:0.17"`, `"dammertz:0.0046"`, `"cycles:0.01"`,
-/// `"luxcore:0.31"`, `"vdp-stages:0.55"`, `"vdp-first:0.66"`, `"cvvdp:0.3"`.
+/// A criterion by its name, and after a colon its constant, or the default without one; `spp` needs its
+/// number: `"spp:256"`, `"time:30"` (seconds), `"relative-error:0.17"`, `"dammertz:0.0046"`,
+/// `"cycles:0.01"`, `"luxcore:0.31"`, `"vdp-stages:0.55"`, `"vdp-first:0.66"`, `"cvvdp:0.3"`. Checked when
+/// it is parsed; files keep the text.
+#[derive(Clone, Debug)]
+pub struct RivalSpec {
+    text: String,
+    /// None for `time`.
+    rival: Option<&'static Rival>,
+    constant: f64,
+}
+
+impl RivalSpec {
+    /// A criterion that has not seen anything yet.
+    pub fn criterion(&self) -> Box<dyn StoppingCriterion + Send> {
+        match self.rival {
+            Some(rival) => (rival.make)(self.constant),
+            None => Box::new(TimeLimit::new(self.constant)),
+        }
+    }
+
+    /// Whether it compares with the converged picture, which no render has.
+    pub fn against_converged(&self) -> bool {
+        self.rival.is_some_and(|rival| rival.against_converged)
+    }
+}
+
+impl FromStr for RivalSpec {
+    type Err = SpecError;
+
+    fn from_str(spec: &str) -> Result<Self, SpecError> {
+        let (name, number) = spec.split_once(':').map_or((spec, None), |(name, number)| (name, Some(number)));
+        let rival = RIVALS.iter().find(|rival| rival.name == name);
+        let (name, default, wanted, valid) = match rival {
+            Some(rival) => (rival.name, rival.default, rival.wanted, rival.valid),
+            None if name == "time" => ("time", DEFAULT_SECONDS, SECONDS, (|s| s >= 0.0) as fn(f64) -> bool),
+            None => return Err(SpecError::Unknown { name: name.into() }),
+        };
+        // Any default number of samples would be wrong for somebody
+        let constant = match number.or((name == "spp").then_some("")) {
+            None => Some(default),
+            Some(number) => number.trim().parse().ok().filter(|&x: &f64| x.is_finite() && valid(x)),
+        };
+        let wrong = || SpecError::Number { spec: spec.into(), name, wanted, example: default.to_string() };
+        Ok(Self { text: spec.to_owned(), rival, constant: constant.ok_or_else(wrong)? })
+    }
+}
+
+impl fmt::Display for RivalSpec {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.text)
+    }
+}
+
+impl PartialEq for RivalSpec {
+    fn eq(&self, other: &Self) -> bool {
+        self.text == other.text
+    }
+}
+
+impl Serialize for RivalSpec {
+    fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
+        to.serialize_str(&self.text)
+    }
+}
+
+impl<'de> Deserialize<'de> for RivalSpec {
+    fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
+        String::deserialize(from)?.parse().map_err(serde::de::Error::custom)
+    }
+}
+
+/// The criterion of a [`RivalSpec`].
 ///
 /// # Errors
 /// [`SpecError`] if the name is unknown or the criterion does not accept the number.
 pub fn parse(spec: &str) -> Result<Box<dyn StoppingCriterion + Send>, SpecError> {
-    let (name, number) = spec.split_once(':').map_or((spec, None), |(name, number)| (name, Some(number)));
-    let constant = |name, default: f64, wanted, valid: fn(f64) -> bool| {
-        // Any default number of samples would be wrong for somebody
-        let Some(number) = number.or((name == "spp").then_some("")) else { return Ok(default) };
-        let parsed = number.trim().parse::<f64>().ok().filter(|&x| x.is_finite() && valid(x));
-        parsed.ok_or_else(|| SpecError::Number {
-            spec: spec.into(),
-            name,
-            wanted,
-            example: default.to_string(),
-        })
-    };
-    if name == "time" {
-        let seconds = constant("time", DEFAULT_SECONDS, "a number of seconds, at least 0", |s| s >= 0.0)?;
-        return Ok(Box::new(TimeLimit::new(seconds)));
-    }
-    let rival =
-        RIVALS.iter().find(|r| r.name == name).ok_or_else(|| SpecError::Unknown { name: name.into() })?;
-    Ok((rival.make)(constant(rival.name, rival.default, rival.wanted, rival.valid)?))
+    Ok(spec.parse::<RivalSpec>()?.criterion())
 }
 
 #[cfg(test)]
@@ -211,6 +266,9 @@ mod tests {
             ("cvvdp:0.5", "ColorVideoVDP against the converged picture, 0.5 JOD"),
         ] {
             assert_eq!(parse(spec).unwrap().name(), name, "{spec}");
+            let kept = serde_json::to_string(&spec.parse::<RivalSpec>().unwrap()).unwrap();
+            let read: RivalSpec = serde_json::from_str(&kept).unwrap();
+            assert_eq!((read.to_string().as_str(), read.criterion().name().as_str()), (spec, name));
         }
     }
 
@@ -235,7 +293,10 @@ mod tests {
             "dammertz:inf",
             "dammertz:",
         ] {
-            assert!(parse(spec).is_err(), "{spec}");
+            assert!(
+                parse(spec).is_err() && serde_json::from_value::<RivalSpec>(spec.into()).is_err(),
+                "{spec}"
+            );
         }
     }
 

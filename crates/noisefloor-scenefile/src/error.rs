@@ -274,7 +274,7 @@ pub(crate) struct Errors {
 const MAX_ERRORS: usize = 1000;
 
 impl Errors {
-    /// Keeps the error, if it is one, and goes on.
+    /// Keeps the error, if it is one, and continues.
     ///
     /// # Errors
     /// All errors so far if something was too large, or if they are too many.

@@ -98,7 +98,7 @@ impl Folder {
         self.contents.borrow().clone()
     }
 
-    /// Whether `name`, seen from `folder`, stays below the root, judged by the names alone.
+    /// Whether `name`, seen from `folder`, stays below the root, judged only by names.
     fn stays_inside(&self, folder: &Path, name: &Path) -> bool {
         // How far the folder is below the root
         let real = |path: &Path| path.canonicalize().unwrap_or_else(|_| path.to_owned());

@@ -1,5 +1,5 @@
-//! Reads scenes from files for [`noisefloor_ptwne`]: glTF 2.0 (`.gltf`, `.glb`) and the subset of Mitsuba's
-//! XML (versions 0.5 to 3) that research scenes use.
+//! Reads scenes from files for [`noisefloor_ptwne`]: glTF 2.0 (`.gltf`, `.glb`), the subset of Mitsuba's XML
+//! (versions 0.5 to 3) that research scenes use, and pbrt (versions 3 and 4).
 //!
 //! Files are hostile until parsed: every length is checked before anything is allocated, every error says
 //! which file and where, and what is not supported is named, with whether it was ignored or is fatal.
@@ -36,7 +36,7 @@ pub struct Loaded {
     pub warnings: Vec<Warning>,
 }
 
-/// Loads the scene in `path`; its extension says which format: `.gltf`, `.glb` or `.xml`.
+/// Loads the scene in `path`; its extension says which format: `.gltf`, `.glb`, `.xml` or `.pbrt`.
 ///
 /// # Errors
 /// [`LoadError`] if a file cannot be read or parsed, or asks for something that cannot be left out.

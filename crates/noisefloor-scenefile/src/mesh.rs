@@ -211,7 +211,7 @@ struct Parallelogram {
 }
 
 /// The matrix that takes normals along: the inverse transpose of the upper left 3×3, but for a positive
-/// factor. It is had from cofactors, so that it exists where a transform flattens, too.
+/// factor. Computed from cofactors, so that singular transforms work.
 pub(crate) fn normal_matrix(to_world: DMat4) -> DMat3 {
     let [x, y, z] = [to_world.x_axis, to_world.y_axis, to_world.z_axis].map(|axis| axis.truncate());
     let sign = if x.cross(y).dot(z) < 0.0 { -1.0 } else { 1.0 };

@@ -1,10 +1,11 @@
 //! How scene files are loaded.
 
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-/// What a scene file leaves to whoever loads it.
-#[derive(Clone, Debug, Default)]
+/// What a scene file leaves to the caller.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct LoadOptions {
     /// Values of `$parameters` of Mitsuba files by name, without the `$`. They override the file's own

@@ -22,7 +22,7 @@ A filter, such as a denoiser, has a name in `info`, and one method instead:
 `TileError` blames a failure on a tile; `rectangles` joins tiles for renderers to which every piece costs a start.
 Import the renderer in `__init__`, not at the top: what it prints while it loads must not get into the stream of frames.
 A frame is two little-endian u32 (length of header, length of payload), a header (a JSON object) and a payload (raw
-little-endian float32, RGB, top row first). There is one reply to a request, in order. Needs the standard library alone.
+little-endian float32, RGB, top row first). There is one reply to a request, in order. Needs only the standard library.
 """
 
 import json

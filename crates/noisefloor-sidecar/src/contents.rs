@@ -67,7 +67,7 @@ fn named_in(path: &Path, folders: &[&Path]) -> io::Result<BTreeSet<PathBuf>> {
     Ok(files.collect())
 }
 
-/// A name without what formats put around it: Blender begins names as seen from the scene with `//`.
+/// A name without the decorations of formats: Blender begins names as seen from the scene with `//`.
 fn name(piece: &str) -> &str {
     let piece = piece.trim().trim_end_matches(';');
     piece.strip_prefix("//").unwrap_or(piece)

@@ -1,4 +1,4 @@
-//! Scratch folders, of which none is left behind.
+//! Scratch folders that are always removed.
 
 use crate::leftovers;
 use std::fs::{self, File};

@@ -1,4 +1,4 @@
-//! How often the intervals of an analysis hold the truth: prints the table in docs/study.md. Takes minutes. A
+//! How often the intervals of an analysis hold the truth: prints the table in docs/studies.md. Takes minutes. A
 //! text restricts it to the rows whose names contain it.
 //!
 //! ```sh

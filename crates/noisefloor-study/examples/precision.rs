@@ -1,4 +1,4 @@
-//! What a click is worth: prints the table in docs/study.md. Takes minutes.
+//! What a click is worth: prints the table in docs/studies.md. Takes minutes.
 //!
 //! ```sh
 //! cargo run --release -p noisefloor-study --example precision

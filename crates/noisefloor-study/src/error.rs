@@ -18,7 +18,7 @@ pub enum StudyError {
         source: io::Error,
     },
     /// The study file is invalid.
-    #[error("{}: {what}; docs/study.md lists what a study file holds", path.display())]
+    #[error("{}: {what}; docs/studies.md lists what a study file holds", path.display())]
     File {
         /// The file.
         path: PathBuf,
@@ -99,7 +99,7 @@ pub enum StudyError {
 pub enum StoreError {
     /// SQLite refused.
     #[error(
-        "{}: {source}; check the free space and that the file is a database of `noisefloor study`",
+        "{}: {source}; check the free space and that the file is a database of `noisefloor-lab study`",
         path.display()
     )]
     Database {
@@ -119,7 +119,7 @@ pub enum StoreError {
         path: PathBuf,
     },
     /// The database does not hold disagreements.
-    #[error("{}: is not a database of `noisefloor explore`; name another with --database", path.display())]
+    #[error("{}: is not a database of `noisefloor-lab explore`; name another with --database", path.display())]
     NotDisagreements {
         /// The database.
         path: PathBuf,
@@ -141,6 +141,12 @@ pub enum StoreError {
     /// The writer thread has ended.
     #[error("answers can no longer be stored because the database thread has ended; restart the server")]
     Closed,
+    /// The stored trials of a session are not of the study.
+    #[error("the trials stored for session {code} do not fit the study; was the database edited by hand?")]
+    Plan {
+        /// The session.
+        code: String,
+    },
     /// An event in the database does not fit the study.
     #[error("event {seq} of session {code} does not fit the study: {what}; was the database edited by hand?")]
     Event {

@@ -14,7 +14,7 @@
 //!
 //! ```
 //! use noisefloor_image::write_png;
-//! use noisefloor_study::{StudyEvent, ParticipantSession, Stage, Study, grids};
+//! use noisefloor_study::{StudyEvent, ParticipantSession, Plan, Stage, Study, grids};
 //! use std::sync::Arc;
 //!
 //! // Three pictures, named by their samples per pixel, and a study file beside them.
@@ -37,7 +37,7 @@
 //! "#)?;
 //!
 //! let study = Arc::new(Study::open(&file)?);
-//! let mut session = ParticipantSession::new(study.clone(), grids(&study), 1);
+//! let mut session = ParticipantSession::new(study.clone(), grids(&study), Plan::draw(&study, 1));
 //! session.apply(&StudyEvent::Consent { language: "en".into() })?;
 //! // Two tiles, and the practice and catch trials that a study has unless its file says otherwise.
 //! assert_eq!((session.stage(), session.progress()), (Stage::Conditions, (0, 6)));
@@ -77,7 +77,8 @@ pub use server::{
     StudyView,
 };
 pub use session::{
-    CatchKind, Class, EventMisfit, ParticipantSession, Stage, Trial, TrialOutcome, TrialRole, grids, replay,
+    CatchKind, Class, EventMisfit, Haste, ParticipantSession, Plan, Stage, Trial, TrialOutcome, TrialRole,
+    grids, replay,
 };
 pub use stack::{MAX_LEVELS, NOISY_SHARE, StudyStack};
 pub use stack_render::render_stack;

@@ -1,4 +1,4 @@
-//! A stack of pictures for a study, rendered in one go: each level goes on from the one before.
+//! A stack of pictures for a study, rendered in one go: each level continues the one before.
 
 use crate::error::StudyError;
 use noisefloor::{Film, ProgressiveSource, Request, Rgb, TileGrid};

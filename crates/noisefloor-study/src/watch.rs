@@ -90,7 +90,7 @@ impl LiveState {
         }
     }
 
-    /// The same, so much later: the clock of a render that goes on is not that of its batches.
+    /// The same, this much later: a render's clock runs on between its batches.
     fn after(&self, pause: Duration) -> Self {
         let seconds = if self.over { 0.0 } else { pause.as_secs_f64() };
         let eta_seconds = self.eta_seconds.map(|eta| (eta - seconds).max(0.0));

@@ -51,7 +51,7 @@ impl Engine {
         }
     }
 
-    /// Converts greys into the finest level of picture `of`, its achromatic channel alone.
+    /// Converts greys into the finest level of picture `of`, only its achromatic channel.
     pub(crate) fn load_grey(
         &self,
         of: usize,

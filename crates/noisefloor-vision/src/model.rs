@@ -29,7 +29,7 @@ pub struct VisionComparison<'a> {
 }
 
 impl VisionModel {
-    /// Computes what depends on the display alone.
+    /// Computes what depends only on the display.
     pub fn new(viewing: &Viewing) -> Self {
         Self { viewing: *viewing, engine: Engine::new(viewing) }
     }

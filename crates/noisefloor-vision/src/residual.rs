@@ -24,8 +24,8 @@ pub enum ResidualPixels<'a> {
         /// Added to the picture, it makes the one that is judged.
         residual: &'a [[f32; 3]],
     },
-    /// As greys: two thirds of the time of the achromatic channel of colours, and blind to noise in colour
-    /// alone.
+    /// As greys: two thirds of the time of the achromatic channel of colours, and blind to noise that is
+    /// only in colour.
     Grey {
         /// The picture.
         picture: &'a [f32],

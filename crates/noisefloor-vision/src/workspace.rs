@@ -67,7 +67,7 @@ pub(crate) fn reserve(plane: &mut Vec<f32>, length: usize) {
 }
 
 impl VisionWorkspace {
-    /// Makes room for two pictures of `size` in so many channels and levels; returns the sizes of these.
+    /// Makes room for two pictures of `size` in this many channels and levels; returns their sizes.
     pub(crate) fn fit(&mut self, size: Size, levels: usize, channels: usize) -> Sizes {
         let sizes = Sizes::new(size, levels);
         let levels = |planes: &mut Vec<Vec<f32>>| {

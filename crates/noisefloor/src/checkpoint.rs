@@ -1,6 +1,6 @@
 //! A snapshot of a session, for resuming it.
 
-use crate::container::{Fault, Format, MAX_PAYLOAD};
+use crate::container::{self, Fault, Format, MAX_PAYLOAD};
 use crate::display::Display;
 use crate::film::{Film, FilmHead};
 use crate::params::Params;
@@ -91,6 +91,9 @@ pub enum CheckpointError {
     /// as new.
     #[error("{0} cannot be resumed: it does not promise new samples after a restart")]
     Source(String),
+    /// The criterion does not say its state ([`StoppingCriterion::state`](crate::StoppingCriterion::state)).
+    #[error("a render stopped by {0} cannot be resumed: this criterion does not keep its state")]
+    Criterion(String),
 }
 
 impl From<Fault> for CheckpointError {
@@ -125,8 +128,14 @@ impl Checkpoint<'_> {
     /// of the picture. Whoever finds a finished picture compares it before taking it for its own.
     pub fn job_digest(&self) -> String {
         let (grid, Self { job, source, criterion, params, .. }) = (self.film.grid(), self);
-        let all = format!("{:?}", (job, source, criterion, params, grid.width(), grid.height()));
-        blake3::hash(all.as_bytes()).to_hex().to_string()
+        // Nothing of it can fail to be written into memory
+        let all = container::payload(&(job, source, criterion, params, grid.width(), grid.height()));
+        blake3::hash(&all.unwrap_or_default()).to_hex().to_string()
+    }
+
+    /// Samples in its film, over all pixels.
+    pub fn total_samples(&self) -> u64 {
+        self.film.total_samples()
     }
 
     /// Writes the checkpoint.
@@ -164,7 +173,10 @@ impl Checkpoint<'_> {
         same("job", self.job.to_string(), job.to_owned())?;
         source.change_since(&self.source).map_or(Ok(()), Err)?;
         same("criterion", self.criterion.clone(), criterion.to_owned())?;
-        same("set of parameters", format!("{:?}", self.params), format!("{params:?}"))?;
+        if self.params != *params {
+            let [kept, now] = [&self.params, params].map(|params| format!("{params:?}"));
+            return Err(CheckpointError::Other { what: "set of parameters", kept, now });
+        }
         let size = |film: &Film| format!("{}×{} pixels", film.grid().width(), film.grid().height());
         same("picture", size(&self.film), size(fresh))?;
         self.film.check_like(fresh).map_err(CheckpointError::Invalid)?;

@@ -1,9 +1,10 @@
-//! Files of this library.
+//! Files of this library, and of its neighbours.
 //!
 //! Layout: magic (8 bytes), version (u32), length of the payload (u64), BLAKE3 of the payload (32 bytes),
-//! payload (bincode 2, standard configuration); numbers little-endian. A body can follow, and BLAKE3 of it (32 bytes).
-//! All use of bincode is in this module.
+//! payload (bincode 2, standard configuration); numbers little-endian. A body can follow, and BLAKE3 of it
+//! (32 bytes). All use of bincode is in this module. Other crates give payloads of their own.
 
+use bincode::error::DecodeError;
 use serde::{Serialize, de::DeserializeOwned};
 use std::io::{self, Read, Write};
 
@@ -12,19 +13,23 @@ use std::io::{self, Read, Write};
 pub(crate) const MAX_PAYLOAD: u64 = 2 << 30;
 
 /// A kind of file.
-pub(crate) struct Format {
-    pub(crate) magic: [u8; 8],
-    pub(crate) version: u32,
+pub struct Format {
+    /// First bytes.
+    pub magic: [u8; 8],
+    /// The version that is written, and the only one that is read.
+    pub version: u32,
 }
 
 /// What is wrong with a file.
 #[derive(Debug)]
-pub(crate) enum Fault {
+pub enum Fault {
+    /// It cannot be read or written.
     Io(io::Error),
     /// It does not begin with the magic.
     Foreign,
     /// It has this version.
     Version(u32),
+    /// Its content is not what was written.
     Damaged(String),
     /// Its payload has, or announces, this many bytes.
     Oversized(u64),
@@ -63,6 +68,14 @@ impl Format {
     }
 
     fn read_payload<T: DeserializeOwned>(&self, from: &mut impl Read) -> Result<T, Fault> {
+        unpack(&self.read_bytes(from, MAX_PAYLOAD)?)
+    }
+
+    /// Reads the payload, of at most `limit` bytes, and leaves what follows it.
+    ///
+    /// # Errors
+    /// [`Fault`].
+    pub fn read_bytes(&self, from: &mut impl Read, limit: u64) -> Result<Vec<u8>, Fault> {
         // Read the header. A file too short to have one is foreign.
         let mut magic = [0; 8];
         let whole = read_up_to(from, &mut magic)?;
@@ -80,7 +93,7 @@ impl Format {
             return Err(Fault::Version(version));
         }
         let length = u64::from_le_bytes(length.try_into().unwrap_or_default());
-        if length > MAX_PAYLOAD {
+        if length > limit {
             return Err(Fault::Oversized(length));
         }
 
@@ -94,7 +107,7 @@ impl Format {
         if blake3::hash(&payload).as_bytes() != checksum {
             return Err(Fault::Damaged("its checksum differs".into()));
         }
-        unpack(&payload)
+        Ok(payload)
     }
 
     /// Writes a file.
@@ -103,16 +116,23 @@ impl Format {
         if payload.len() as u64 > MAX_PAYLOAD {
             return Err(Fault::Oversized(payload.len() as u64));
         }
+        Ok(self.write_bytes(&payload, &mut to)?)
+    }
+
+    /// Writes a payload. What follows it is up to the caller.
+    ///
+    /// # Errors
+    /// Those of `to`.
+    pub fn write_bytes(&self, payload: &[u8], mut to: impl Write) -> io::Result<()> {
         to.write_all(&self.magic)?;
         to.write_all(&self.version.to_le_bytes())?;
         to.write_all(&(payload.len() as u64).to_le_bytes())?;
-        to.write_all(blake3::hash(&payload).as_bytes())?;
-        to.write_all(&payload)?;
-        Ok(())
+        to.write_all(blake3::hash(payload).as_bytes())?;
+        to.write_all(payload)
     }
 
-    /// Writes a file whose payload is followed by what `body` writes, and by BLAKE3 of that. The body is not held in
-    /// memory.
+    /// Writes a file whose payload is followed by what `body` writes, and by BLAKE3 of that. The body is
+    /// not held in memory.
     pub(crate) fn write_with_body(
         &self,
         head: &impl Serialize,
@@ -170,9 +190,9 @@ fn end(mut from: impl Read) -> Result<(), Fault> {
 
 /// The content of bytes that [`payload`] returned.
 pub(crate) fn unpack<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, Fault> {
-    // A length inside the payload is believed up to bincode's limit, which is part of a type and counts numbers by their
-    // size in memory: up to sixteen times that in the payload. The least limit above that bounds what a short, crafted
-    // payload can reserve.
+    // A length inside the payload is believed up to bincode's limit, which is part of a type and counts
+    // numbers by their size in memory: up to sixteen times that in the payload. The least limit above that
+    // bounds what a short, crafted payload can reserve.
     match bytes.len().saturating_mul(16) {
         0..=0x10_0000 => unpack_within::<T, 0x10_0000>(bytes),
         0x10_0001..=0x100_0000 => unpack_within::<T, 0x100_0000>(bytes),
@@ -183,8 +203,11 @@ pub(crate) fn unpack<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, Fault> {
 
 fn unpack_within<T: DeserializeOwned, const LIMIT: usize>(bytes: &[u8]) -> Result<T, Fault> {
     let config = bincode::config::standard().with_limit::<LIMIT>();
-    let (content, used) =
-        bincode::serde::decode_from_slice(bytes, config).map_err(|e| Fault::Damaged(e.to_string()))?;
+    let (content, used) = bincode::serde::decode_from_slice(bytes, config).map_err(|error| match error {
+        // What a type of ours says of its content
+        DecodeError::OtherString(what) => Fault::Damaged(what),
+        error => Fault::Damaged(error.to_string()),
+    })?;
     if used != bytes.len() {
         return Err(Fault::Damaged("it has bytes left over".into()));
     }

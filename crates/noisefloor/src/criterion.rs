@@ -55,8 +55,8 @@ impl Needs {
     pub const REFERENCE: Self = Self { halves: false, reference: true };
 }
 
-/// Where people are expected to stop seeing noise in a tile: not where the tile stops, which is later, and said by
-/// [`Verdict::expected_spp`].
+/// Where people are expected to stop seeing noise in a tile: not where the tile stops, which is later, and
+/// said by [`Verdict::expected_spp`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ExpectedThreshold {
     /// Samples per pixel below which it lies with a probability of 10 %.
@@ -76,8 +76,8 @@ pub struct Verdict {
     /// Probability that an observer sees no difference from the converged picture, if the criterion computes
     /// one.
     pub probability: Option<f32>,
-    /// Where people are expected to stop seeing noise, whatever the criterion's own threshold; `None` if it has learned
-    /// nothing from people.
+    /// Where people are expected to stop seeing noise, whatever the criterion's own threshold; `None` if it
+    /// has learned nothing from people.
     pub threshold: Option<ExpectedThreshold>,
     /// Samples per pixel at which the criterion expects to be satisfied, if it can tell.
     pub expected_spp: Option<u64>,
@@ -160,7 +160,7 @@ pub enum CriterionError {
 /// # Why it is shaped so
 /// All tiles that are due come in one call, so that a criterion can distribute them over threads or look at
 /// the whole image once. A criterion may keep state between calls (one that compares with the previous
-/// picture does): hence `&mut`. One that can save that state is also [`Resumable`].
+/// picture does): hence `&mut`. One that says its state can be saved and resumed with its session.
 ///
 /// # For implementers
 /// - Return one verdict for each tile, in order.
@@ -168,6 +168,8 @@ pub enum CriterionError {
 /// - Declare in [`StoppingCriterion::needs`] what you read; what nobody needs is neither rendered nor kept.
 /// - Forget the previous film in [`StoppingCriterion::begin`]; a criterion without state has nothing to do
 ///   there.
+/// - Say in [`StoppingCriterion::state`] what you keep, `Some` of nothing if nothing; otherwise no session of
+///   yours can be resumed.
 #[auto_impl(&mut, Box)]
 pub trait StoppingCriterion {
     /// A short name for reports, such as `"svm oracle"`.
@@ -216,20 +218,18 @@ pub trait StoppingCriterion {
     /// # Errors
     /// [`CriterionError`] if the criterion does not fit the job.
     fn judge(&mut self, view: &View<'_>, tiles: &[Tile]) -> Result<Vec<Verdict>, CriterionError>;
-}
 
-/// A criterion whose session can be saved and resumed: see [`crate::Checkpoint`].
-pub trait Resumable: StoppingCriterion {
-    /// What the criterion keeps between verdicts and cannot derive from the film; empty, the default, if
-    /// nothing.
-    fn state(&self) -> Vec<u8> {
-        Vec::new()
+    /// What the criterion keeps between verdicts and cannot derive from the film, for a
+    /// [`Checkpoint`](crate::Checkpoint); `None`, the default, if it cannot be saved.
+    fn state(&self) -> Option<Vec<u8>> {
+        None
     }
 
-    /// Restores what [`Resumable::state`] returned for a film with these tiles. The bytes may come from
-    /// anywhere: returns false, and changes nothing, if they are not such a state.
+    /// Restores what [`StoppingCriterion::state`] returned for a film with these tiles. The bytes may come
+    /// from anywhere: returns false, and changes nothing, if they are not such a state. The default is for
+    /// a criterion that keeps nothing.
     fn restore(&mut self, _grid: TileGrid, state: &[u8]) -> bool {
-        state.is_empty()
+        state.is_empty() && self.state().is_some()
     }
 }
 
@@ -250,6 +250,10 @@ impl StoppingCriterion for FixedSpp {
         true
     }
 
+    fn state(&self) -> Option<Vec<u8>> {
+        Some(Vec::new())
+    }
+
     fn judge(&mut self, view: &View<'_>, tiles: &[Tile]) -> Result<Vec<Verdict>, CriterionError> {
         let verdict = |t: &Tile| Verdict {
             converged: view.film.spp(t.index) >= self.0,
@@ -259,5 +263,3 @@ impl StoppingCriterion for FixedSpp {
         Ok(tiles.iter().map(verdict).collect())
     }
 }
-
-impl Resumable for FixedSpp {}

@@ -2,7 +2,7 @@
 
 use crate::blocks::BlockRequest;
 use crate::checkpoint::{Checkpoint, CheckpointError};
-use crate::criterion::{CriterionError, Resumable, StoppingCriterion};
+use crate::criterion::{CriterionError, StoppingCriterion};
 use crate::film::FilmError;
 use crate::params::Params;
 use crate::session::rounds::CALL_SAMPLES;
@@ -112,7 +112,7 @@ pub struct Clock {
 /// assert!(driver.session().stops().all(|stop| stop.spp == 300 && stop.reason == StopReason::ReachedSpp));
 /// # Ok::<(), DriverError>(())
 /// ```
-pub struct Driver<S, C> {
+pub struct Driver<S, C = Box<dyn StoppingCriterion + Send>> {
     source: S,
     session: Session<C>,
     time_limit: Option<Duration>,
@@ -361,9 +361,7 @@ impl<S: ProgressiveSource, C: StoppingCriterion> Driver<S, C> {
             on_event(&self.session, &Event::TileStopped(stop));
         }
     }
-}
 
-impl<S: ProgressiveSource, C: Resumable> Driver<S, C> {
     /// Resumes an interrupted run of the same job; see [`Session::resume`]. The picture and every decision
     /// are then those of a run that was not interrupted, to the bit.
     ///

@@ -3,6 +3,7 @@
 
 mod text;
 
+pub use crate::container::{Fault, Format};
 pub use text::printable;
 
 use crate::descriptor::Descriptor;

@@ -2,9 +2,7 @@
 
 use crate::blocks::blocks_of;
 use crate::container;
-use crate::criterion::{
-    CriterionError, ExpectedThreshold, Needs, Resumable, StoppingCriterion, Verdict, View,
-};
+use crate::criterion::{CriterionError, ExpectedThreshold, Needs, StoppingCriterion, Verdict, View};
 use crate::descriptor::{Described, DescriptorError};
 use crate::evidence::{Evidence, TilePlanes};
 use crate::model::{Model, ProbabilityCurve};
@@ -348,13 +346,11 @@ impl StoppingCriterion for Oracle {
         };
         Ok(tiles.par_iter().zip(asked).map(judge).collect())
     }
-}
 
-impl Resumable for Oracle {
     /// How each tile was last described: stopped tiles count so for the picture, whatever has become of their
     /// neighbours, whose edges were read too.
-    fn state(&self) -> Vec<u8> {
-        container::payload(&self.described).unwrap_or_default()
+    fn state(&self) -> Option<Vec<u8>> {
+        container::payload(&self.described).ok()
     }
 
     fn restore(&mut self, grid: TileGrid, state: &[u8]) -> bool {

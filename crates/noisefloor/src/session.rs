@@ -66,7 +66,7 @@ pub enum SessionError {
 /// assert!(session.stops().all(|stop| stop.spp == 200));
 /// # Ok::<(), noisefloor::SessionError>(())
 /// ```
-pub struct Session<C> {
+pub struct Session<C = Box<dyn StoppingCriterion + Send>> {
     film: Film,
     criterion: C,
     params: Params,

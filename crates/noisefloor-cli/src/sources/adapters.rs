@@ -1,12 +1,13 @@
 //! Renderers in another process.
 
-use super::{Opened, Source, SourceJob, stem};
+use super::{Opened, Resources, Source, SourceJob, stem};
 use anyhow::Context;
 use noisefloor_luxcore::{Engine, Sampler};
 use noisefloor_sidecar::{CommandOptions, CommandSource, Job, Renderer, Sidecar, SidecarError};
+use std::fmt;
+use std::str::FromStr;
 
 /// A renderer in another process, as its crate offers it.
-#[derive(Debug)]
 pub struct Adapter {
     /// What `--source` calls it.
     pub name: &'static str,
@@ -40,6 +41,35 @@ const fn luxcore(name: &'static str, open: fn(&Job) -> Result<Sidecar, SidecarEr
     Adapter { name, renderer: &noisefloor_luxcore::RENDERER, open, notes: Vec::new }
 }
 
+/// An adapter by its name: its functions have other addresses in every run.
+impl fmt::Debug for Adapter {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name)
+    }
+}
+
+impl PartialEq for Adapter {
+    fn eq(&self, other: &Self) -> bool {
+        self.name == other.name
+    }
+}
+
+impl fmt::Display for &'static Adapter {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name)
+    }
+}
+
+impl FromStr for &'static Adapter {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let names = || ADAPTERS.iter().map(|adapter| adapter.name).collect::<Vec<_>>().join(", ");
+        let found = ADAPTERS.iter().find(|adapter| adapter.name == text);
+        found.ok_or_else(|| format!("the other renderers are: {}", names()))
+    }
+}
+
 impl Source for Sidecar {
     fn notes(&self) -> Vec<String> {
         let note = |error| format!("the renderer was started again: {error}").replace('\n', " ");
@@ -49,22 +79,26 @@ impl Source for Sidecar {
 
 impl Source for CommandSource {}
 
-pub(super) fn open_adapter(adapter: &Adapter, job: &SourceJob) -> anyhow::Result<Opened> {
-    let scene = job.scene.as_deref();
+pub(super) fn open_adapter(
+    adapter: &Adapter,
+    job: &SourceJob,
+    resources: Resources,
+) -> anyhow::Result<Opened> {
+    let scene = job.scene();
     let scene = scene.with_context(|| format!("--source {} needs a scene file", adapter.name))?;
     let mut sidecar = Job::new(scene);
     (sidecar.seed, sidecar.size, sidecar.max_depth) = (job.seed, job.size, job.max_depth);
-    (sidecar.threads, sidecar.timeout) = (job.threads, job.timeout);
+    (sidecar.threads, sidecar.timeout) = (resources.threads, resources.timeout);
     let source = (adapter.open)(&sidecar)?;
     let warnings = source.warnings().to_vec();
     Ok(Opened { source: Box::new(source), scene: stem(scene), warnings })
 }
 
-pub(super) fn open_command(template: &str, job: &SourceJob) -> anyhow::Result<Opened> {
+pub(super) fn open_command(template: &str, job: &SourceJob, resources: Resources) -> anyhow::Result<Opened> {
     let mut options = CommandOptions::default();
-    (options.scene, options.seed) = (job.scene.as_deref().map(Into::into), job.seed);
-    (options.size, options.timeout) = (job.size, job.timeout);
+    (options.scene, options.seed) = (job.scene().map(Into::into), job.seed);
+    (options.size, options.timeout) = (job.size, resources.timeout);
     let source = Box::new(CommandSource::new(template, options)?);
-    let scene = job.scene.as_deref().map_or_else(|| "command".to_owned(), stem);
+    let scene = job.scene().map_or_else(|| "command".to_owned(), stem);
     Ok(Opened { source, scene, warnings: Vec::new() })
 }

@@ -1,24 +1,25 @@
 //! Who renders: the built-in path tracer, a renderer in another process, a stack of pictures, or a program.
 
-#[cfg(feature = "adapters")]
 mod adapters;
 
-#[cfg(feature = "adapters")]
 pub use adapters::{ADAPTERS, Adapter};
 
+use crate::refuse;
 use crate::say::note;
+use crate::spell::{JobPath, as_typed};
 use anyhow::{Context, bail};
 use indicatif::ProgressBar;
-use noisefloor::ProgressiveSource;
+use noisefloor::{ProgressiveSource, stills::SampleOrigin};
 use noisefloor_image::StackSource;
 use noisefloor_ptwne::{
     Estimator, Filter, Ptwne, ReferenceNoise, RenderOptions, SampleCounts, Sampling, scenes,
 };
 use noisefloor_scenefile::{LoadOptions, Loaded, group_warnings};
-use std::ffi::{OsStr, OsString};
+use serde::{Deserialize, Serialize};
+use std::ffi::OsStr;
 use std::num::NonZeroUsize;
 use std::ops::ControlFlow;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
@@ -27,38 +28,45 @@ use std::time::Duration;
 const DEFAULT_SCENE: &str = "cornell-box";
 const DEFAULT_SIZE: (usize, usize) = (384, 384);
 const DEFAULT_DEPTH: u32 = 65;
+/// Camera rays a pixel for albedo and normals, of each half: edges are then smoother than in the radiance
+/// of most pictures, for the time of a few samples of it.
+pub const FIRST_HITS_SPP: u64 = 32;
 
-/// Who renders, and how: checked, ready to be opened.
-#[derive(Clone, Debug)]
+/// Who renders what: all that samples depend on, as a value. Checked; [`SourceJob::open`] finds out the
+/// rest.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SourceJob {
     pub kind: SourceKind,
-    /// As typed.
-    pub scene: Option<OsString>,
+    /// A built-in scene, or a file or folder; {frame} stands for the frame of a sequence.
+    pub scene: Option<JobPath>,
     pub seed: u64,
     pub size: Option<(usize, usize)>,
     pub max_depth: Option<u32>,
-    pub threads: Option<NonZeroUsize>,
-    /// Of one call to another renderer.
-    #[cfg_attr(not(feature = "adapters"), expect(dead_code, reason = "no other renderer is in this build"))]
-    pub timeout: Duration,
     /// How the built-in renderer loads scene files.
     pub scene_files: LoadOptions,
 }
 
-#[derive(Clone, Debug)]
+/// What a source may use; samples do not depend on it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Resources {
+    pub threads: Option<NonZeroUsize>,
+    /// Of one call to another renderer.
+    pub timeout: Duration,
+}
+
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum SourceKind {
     Ptwne(PtwneOptions),
     /// A folder of pictures.
     Exr,
     /// A template.
-    #[cfg(feature = "adapters")]
     Command(String),
-    #[cfg(feature = "adapters")]
-    Adapter(&'static Adapter),
+    Adapter(#[serde(with = "as_typed")] &'static Adapter),
 }
 
 /// Options of the built-in renderer alone.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct PtwneOptions {
     pub estimator: Estimator,
     pub sampling: Sampling,
@@ -72,9 +80,7 @@ impl SourceKind {
         match self {
             Self::Ptwne(_) => "ptwne",
             Self::Exr => "exr",
-            #[cfg(feature = "adapters")]
             Self::Command(_) => "command",
-            #[cfg(feature = "adapters")]
             Self::Adapter(adapter) => adapter.name,
         }
     }
@@ -89,9 +95,7 @@ impl SourceKind {
         match self {
             Self::Ptwne(_) => true,
             Self::Exr => false,
-            #[cfg(feature = "adapters")]
             Self::Command(_) => false,
-            #[cfg(feature = "adapters")]
             Self::Adapter(_) => true,
         }
     }
@@ -156,7 +160,7 @@ impl Opened {
     }
 }
 
-impl SourceJob {
+impl Resources {
     /// Makes the pool of threads that was asked for.
     pub fn start_threads(&self) -> anyhow::Result<()> {
         if let Some(threads) = self.threads {
@@ -164,26 +168,81 @@ impl SourceJob {
         }
         Ok(())
     }
+}
+
+impl SourceJob {
+    /// The scene, as whoever opens it takes it.
+    fn scene(&self) -> Option<&OsStr> {
+        self.scene.as_deref().map(Path::as_os_str)
+    }
+
+    /// The same from whatever folder it is opened.
+    pub fn absolute(&self) -> anyhow::Result<Self> {
+        let is_name = |scene: &JobPath| {
+            matches!(self.kind, SourceKind::Ptwne(_)) && scene.to_str().and_then(scenes::by_name).is_some()
+        };
+        let scene = match &self.scene {
+            Some(scene) if !is_name(scene) => Some(scene.absolute().context("the current folder")?),
+            scene => scene.clone(),
+        };
+        let mut all = Self { scene, ..self.clone() };
+        if let Some(root) = &mut all.scene_files.root {
+            *root = std::path::absolute(&*root).context("the current folder")?;
+        }
+        Ok(all)
+    }
+
+    /// The source of a frame of a sequence: {frame} is filled in in the name of the scene and in values of
+    /// its parameters. All frames have the same seed.
+    #[must_use]
+    pub fn of_frame(&self, frame: u32) -> Self {
+        let mut one = Self { scene: self.scene.as_ref().map(|scene| scene.of_frame(frame)), ..self.clone() };
+        for value in one.scene_files.parameters.values_mut() {
+            *value = JobPath::from(&*value).of_frame(frame).to_string_lossy().into_owned();
+        }
+        one
+    }
+
+    /// Whether the name of the scene says which frame it is of; what is in front of that.
+    pub fn check_frames(&self) -> anyhow::Result<PathBuf> {
+        let Some(scene) = &self.scene else {
+            refuse!("--frames needs a scene with {{frame}} in its name, as in 'hall.{{frame:04}}.xml'")
+        };
+        let Some(before) = scene.before_frame() else {
+            refuse!("--frames: '{}' does not hold {{frame}} or {{frame:04}} once", scene.display())
+        };
+        Ok(before)
+    }
+
+    /// Where samples come from, for the picture's file; none for pictures that are played back. What else
+    /// they depend on beside seed and size goes in as a digest: pictures travel further than paths should.
+    pub fn origin(&self, scene: &str, source: &str, repeats: bool) -> anyhow::Result<Option<SampleOrigin>> {
+        if self.kind == SourceKind::Exr {
+            return Ok(None);
+        }
+        let options = serde_json::to_vec(&Self { seed: 0, size: None, ..self.absolute()? })?;
+        let options = blake3::hash(&options).to_hex()[..16].to_owned();
+        let source = format!("{scene} by {source}");
+        Ok(Some(SampleOrigin { source, options, seed: self.seed, repeats }))
+    }
 
     /// Opens the source.
-    pub fn open(&self) -> anyhow::Result<Opened> {
+    pub fn open(&self, resources: Resources) -> anyhow::Result<Opened> {
         match &self.kind {
             SourceKind::Ptwne(options) => self.open_ptwne(*options),
             SourceKind::Exr => {
-                let folder = self.scene.as_deref().context("--source exr needs a folder of pictures")?;
+                let folder = self.scene().context("--source exr needs a folder of pictures")?;
                 let source = Box::new(StackSource::open(folder)?);
                 Ok(Opened { source, scene: stem(folder), warnings: Vec::new() })
             }
-            #[cfg(feature = "adapters")]
-            SourceKind::Command(template) => adapters::open_command(template, self),
-            #[cfg(feature = "adapters")]
-            SourceKind::Adapter(adapter) => adapters::open_adapter(adapter, self),
+            SourceKind::Command(template) => adapters::open_command(template, self, resources),
+            SourceKind::Adapter(adapter) => adapters::open_adapter(adapter, self, resources),
         }
     }
 
     fn open_ptwne(&self, options: PtwneOptions) -> anyhow::Result<Opened> {
         let Loaded { scene, size, max_depth, warnings } =
-            load(self.scene.as_deref().unwrap_or(OsStr::new(DEFAULT_SCENE)), &self.scene_files)?;
+            load(self.scene().unwrap_or(OsStr::new(DEFAULT_SCENE)), &self.scene_files)?;
         let (width, height) = self.size.or(size).unwrap_or(DEFAULT_SIZE);
         let name = scene.name().to_owned();
         let PtwneOptions { estimator, sampling, filter, clamp } = options;

@@ -58,6 +58,8 @@ fn pictures() {
     );
     fail(&["judge", text(&a), "--spp", "9"], &["--against"]);
     fail(&["judge", text(&a), "--against", text(&b)], &["a.exr", "--spp"]);
+    let garbage = case.path("text.exr");
+    fail(&["judge", text(&garbage), "--against", text(&b)], &["text.exr: is something else, not an OpenEXR"]);
     let below = a.join("heat.png");
     let args = ["--heat-map", text(&below)];
     case.judge("a.exr", "b.exr", &[&SPP[..], &args].concat(), &["heat.png"]);
@@ -156,7 +158,7 @@ fn folders_that_cannot_be_written() {
 }
 
 #[test]
-#[cfg(feature = "train")]
+#[cfg(feature = "lab")]
 fn corpora() {
     let case = Case::new();
     let (folder, model) = (case.folder.path(), case.path("model.nfm"));
@@ -214,7 +216,7 @@ fn earlier_files_stay_when_the_last_check_fails() {
 
 /// Before the work, and not after it.
 #[test]
-#[cfg(feature = "train")]
+#[cfg(feature = "lab")]
 fn a_model_that_cannot_be_written_is_not_trained() {
     let corpora = crate::learn::Corpora::new();
     let out = corpora.paths[0].join("thresholds.csv/my.nfm");
@@ -245,7 +247,7 @@ fn scene_files() {
 }
 
 #[test]
-#[cfg(feature = "study")]
+#[cfg(feature = "lab")]
 fn explore_begins_with_pictures_it_can_read_or_not_at_all() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);

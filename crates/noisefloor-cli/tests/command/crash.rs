@@ -95,8 +95,9 @@ fn a_hundred_killed_renders_lose_nothing() {
 fn run_with_files_of(blocks: u32, args: &[&str]) -> Output {
     // Without the signal, writing beyond the limit is an error
     let limited = format!("trap '' XFSZ; ulimit -f {blocks}; exec \"$@\"");
-    let program = env!("CARGO_BIN_EXE_noisefloor");
-    Command::new("sh").args(["-c", &limited, "sh", program]).args(args).output().unwrap()
+    let program = command(args).get_program().to_owned();
+    let mut shell = Command::new("sh");
+    shell.args(["-c", &limited, "sh"]).arg(program).args(args).output().unwrap()
 }
 
 #[cfg(unix)]
@@ -135,7 +136,7 @@ fn writers(folder: &Path) -> Vec<(Vec<String>, bool)> {
     }
     writer("metrics @a.exr @b.exr --map", true);
     writer("reference bulb --size 16x16 --quiet --force --out", true);
-    if cfg!(feature = "train") {
+    if cfg!(feature = "lab") {
         writer("train --table @table.csv --no-scores --out", true);
         writer("train --table @table.csv --no-scores --out @model.nfm --save-table", true);
         writer("evaluate --table @table.csv --json", true);
@@ -145,7 +146,7 @@ fn writers(folder: &Path) -> Vec<(Vec<String>, bool)> {
         let small = "compare bulb --size 32x32 --tile 32 --criteria spp:4 --max-spp 100 --reference-spp 4";
         writer(&format!("{small} --quiet --out"), false);
     }
-    if cfg!(feature = "study") {
+    if cfg!(feature = "lab") {
         writer("study stack bulb --size 64x64 --levels 1,2 --out", false);
     }
     writers

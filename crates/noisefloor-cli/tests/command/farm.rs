@@ -95,7 +95,8 @@ fn killed_farms_give_the_picture_of_one_machine() {
     let mut kept = shards(&frame.join("merged"));
     random.shuffle(&mut kept);
     let merge = |kept: &[PathBuf], out: &Path| {
-        run(&[&["merge", "--out", text(out)], &kept.iter().map(|p| text(p)).collect::<Vec<_>>()[..]].concat())
+        run(&[&["farm", "merge", "--out", text(out)], &kept.iter().map(|p| text(p)).collect::<Vec<_>>()[..]]
+            .concat())
     };
     let merged = folder.path().join("merged");
     let output = merge(&kept, &merged);
@@ -131,7 +132,8 @@ fn blocks_on_a_farm_are_those_of_one_machine() {
     let frame = dir.join("frame");
     let kept = shards(&frame.join("merged"));
     succeed(
-        &[&["merge", "--out", text(&merged)], &kept.iter().map(|p| text(p)).collect::<Vec<_>>()[..]].concat(),
+        &[&["farm", "merge", "--out", text(&merged)], &kept.iter().map(|p| text(p)).collect::<Vec<_>>()[..]]
+            .concat(),
     );
     let files = |dir: &Path| ["image.exr", "stops.csv"].map(|name| fs::read(dir.join(name)).unwrap());
     assert!(files(&one) == files(&frame), "{} and {} differ", one.display(), frame.display());
@@ -178,9 +180,10 @@ fn what_is_wrong_with_a_farm_is_said() {
     let dir = folder.path().join("farm");
     fail(&["farm", "run", text(&dir), "--local", "1"], &["no farm was planned", "farm plan DIR"]);
     fail(&["farm", "plan", text(&dir), "--", "bulb", "--out", "x"], &["--out", "leave it out"]);
+    fail(&["farm", "plan", text(&dir), "--tasks", "5000", "--", "bulb"], &["--tasks", "1…1000"]);
     fail(&["farm", "plan", text(&dir), "--", "bulb", "--criterion", "variance:0.1"], &["oracle"]);
     fail(
-        &["merge", text(&folder.path().join("absent.nfs")), "--out", "x"],
+        &["farm", "merge", text(&folder.path().join("absent.nfs")), "--out", "x"],
         &["none of these files is a shard"],
     );
 

@@ -46,7 +46,7 @@ fn other_results_are_overwritten_only_on_request() {
     refuse(&args, &["reference.exr", "--force"]);
     succeed(&[&args[..], &["--force"]].concat());
 
-    #[cfg(feature = "study")]
+    #[cfg(feature = "lab")]
     {
         let stack = folder.path().join("stack");
         let args = ["study", "stack", "bulb", "--size", "64x64", "--levels", "1,2", "--out", text(&stack)];

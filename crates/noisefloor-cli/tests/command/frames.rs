@@ -1,4 +1,4 @@
-use crate::kit::{command, fail, json, stderr, succeed, text};
+use crate::kit::{column, command, fail, json, stderr, succeed, text};
 use std::fs;
 use std::path::Path;
 use tempfile::{TempDir, tempdir};
@@ -63,10 +63,11 @@ fn what_is_typed_wins_over_a_file_and_nonsense_is_refused() {
     let report = json(&out.join("report.json"));
     assert_eq!((report["width"].as_u64(), report["samples"].as_u64()), (Some(32), Some(4 * 32 * 32)));
     fail(&["render", "--frames", "1-3", "hall.xml"], &["hall.xml", "{frame:04}"]);
-    fail(&["render", "--frames", "3-1", "hall.{frame}.xml"], &["1-240"]);
+    fail(&["render", "--frames", "3-1", "hall.{frame}.xml"], &["frames 3 to 1"]);
+    fail(&["render", "--frames", "all", "hall.{frame}.xml"], &["1-240"]);
     fail(&["render", "--config", "absent.toml"], &["--config absent.toml"]);
     fs::write(&shot, "colour = \"green\"").unwrap();
-    fail(&["render", "--config", text(&shot)], &["--colour"]);
+    fail(&["render", "--config", text(&shot)], &["shot.toml: line 1: ", "no option colour"]);
 }
 
 /// A draft stops where people want four times the samples; a final picture is judged twice.
@@ -94,4 +95,17 @@ fn presets_ask_for_less_and_for_more() {
     let (draft, plain) = (samples(&["--preset", "draft"], "draft"), samples(&[], "plain"));
     let last = samples(&["--preset", "final"], "final");
     assert!(2 * draft < plain && plain < last, "{draft}, {plain} and {last} samples");
+}
+
+/// A draft has its first verdict at a quarter of the samples, too; and small tiles are warned of, once.
+#[test]
+fn a_draft_may_stop_below_a_hundred_samples() {
+    let folder = tempdir().unwrap();
+    let out = folder.path().join("draft");
+    let args = ["render", "--size", "64x64", "--tile", "32", "--preset", "draft", "--out", text(&out)];
+    let output = command(&args).output().unwrap();
+    assert!(output.status.success());
+    assert_eq!(stderr(&output).matches("tiles of 32 pixels are small").count(), 1);
+    let spp = column(&out.join("stops.csv"), "spp");
+    assert!(spp.iter().any(|spp| (25..100).contains(&spp.parse::<u64>().unwrap())), "{spp:?}");
 }

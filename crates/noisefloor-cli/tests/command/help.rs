@@ -3,9 +3,8 @@ use crate::kit::succeed;
 // Long: a list of cases
 #[test]
 fn every_subcommand_explains_itself() {
-    let options: [(&str, &[&str]); 15] = [
+    let options: [(&str, &[&str]); 8] = [
         ("farm", &["plan", "run", "merge", "status", "--local", "{frame:04}"]),
-        ("merge", &["--out", "--force", "render --resume"]),
         ("reference", &["--out", "--size", "--seed", "--quiet"]),
         (
             "render",
@@ -52,12 +51,6 @@ fn every_subcommand_explains_itself() {
                 "cvvdp_jod",
             ],
         ),
-        ("explore", &["IMAGE", "--model", "--threshold", "--audience", "--database", "--table", "--listen"]),
-        ("train", &["--corpus", "--table", "--out", "--save-table", "--sigma", "--disagreements"]),
-        ("evaluate", &["--corpus", "--model", "--leave-one-scene-out", "--json", "--csv"]),
-        ("audience", &["fit"]),
-        ("reproduce", &["--corpus", "--out", "--edge", "--levels", "--dump-subset"]),
-        ("study", &["stack", "serve", "links", "analyse", "data", "simulate", "backup", "export", "erase"]),
         ("inspect", &["MODEL", "--json"]),
         ("doctor", &["--install", "NOISEFLOOR_NAME_PYTHON"]),
         ("scenes", &["--help"]),
@@ -84,6 +77,13 @@ fn every_subcommand_explains_itself() {
     ] {
         assert!(render.contains(option), "{option} is not in\n{render}");
     }
+    // What people need first, and no more
+    let short = succeed(&["render", "-h"]);
+    let first = short.lines().filter(|line| line.trim_start().starts_with('-')).count();
+    assert!((10..=14).contains(&first), "{first} options in\n{short}");
+    for heading in ["Renderer:", "Verdicts:", "What people see:", "To look on:"] {
+        assert!(render.contains(&format!("\n{heading}\n")), "{heading} is not in\n{render}");
+    }
     assert!(succeed(&["--version"]).starts_with("noisefloor "));
 }
 
@@ -95,4 +95,32 @@ fn at_least_six_scenes_are_listed() {
         scenes.lines().all(|line| line.split_whitespace().count() > 2),
         "a name and what it shows:\n{scenes}"
     );
+}
+
+#[test]
+#[cfg(feature = "lab")]
+fn every_command_of_the_lab_explains_itself() {
+    let options: [(&str, &[&str]); 6] = [
+        ("explore", &["IMAGE", "--model", "--threshold", "--audience", "--database", "--table", "--listen"]),
+        ("train", &["--corpus", "--table", "--out", "--save-table", "--sigma", "--disagreements"]),
+        ("evaluate", &["--corpus", "--model", "--leave-one-scene-out", "--json", "--csv", "--rivals"]),
+        ("audience", &["fit"]),
+        ("reproduce", &["--corpus", "--out", "--edge", "--levels", "--dump-subset"]),
+        ("study", &["stack", "serve", "links", "analyse", "data", "simulate", "backup", "export", "erase"]),
+    ];
+    for (name, options) in options {
+        let help = succeed(&[name, "--help"]);
+        assert!(options.iter().all(|option| help.contains(option)), "{options:?} are not all in\n{help}");
+    }
+}
+
+/// Shells complete the options that there are, and every command has a page.
+#[test]
+fn shells_and_man_know_the_command() {
+    let bash = succeed(&["completions", "bash"]);
+    assert!(bash.contains("_noisefloor") && bash.contains("--max-spp"), "{bash}");
+    let folder = tempfile::tempdir().unwrap();
+    succeed(&["man", folder.path().to_str().unwrap()]);
+    let page = std::fs::read_to_string(folder.path().join("noisefloor-render.1")).unwrap();
+    assert!(page.contains("max\\-spp") && folder.path().join("noisefloor-farm-plan.1").exists(), "{page}");
 }

@@ -3,8 +3,18 @@ use serde_json::Value;
 use std::path::Path;
 use std::process::{Command, Output};
 
+/// Commands of `noisefloor-lab`; all others are those of `noisefloor`.
+pub(crate) const LAB: [&str; 7] =
+    ["train", "evaluate", "audience", "compare", "reproduce", "study", "explore"];
+#[cfg(feature = "lab")]
+const LAB_PROGRAM: &str = env!("CARGO_BIN_EXE_noisefloor-lab");
+/// Which says where they are.
+#[cfg(not(feature = "lab"))]
+const LAB_PROGRAM: &str = env!("CARGO_BIN_EXE_noisefloor");
+
 pub(crate) fn command(args: &[&str]) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_noisefloor"));
+    let lab = args.first().is_some_and(|command| LAB.contains(command));
+    let mut command = Command::new(if lab { LAB_PROGRAM } else { env!("CARGO_BIN_EXE_noisefloor") });
     command.args(args);
     command
 }

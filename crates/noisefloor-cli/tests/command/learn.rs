@@ -1,10 +1,7 @@
 use crate::kit::{column, fail, json, random, run, succeed, text};
-#[cfg(feature = "study")]
 use noisefloor::evidence::Evidence;
 use noisefloor_image::{RenderLayers, write_exr, write_png};
-#[cfg(feature = "study")]
 use noisefloor_learn::read_table;
-#[cfg(feature = "study")]
 use noisefloor_study::explore::{Disagreements, TileAnswer};
 use serde_json::Value;
 use std::fmt::Write;
@@ -210,7 +207,6 @@ fn train_inspect_evaluate() {
 
 /// What `explore` has kept is learned beside the table: the model differs, and what it costs is said.
 #[test]
-#[cfg(feature = "study")]
 fn disagreements_are_learned_beside_the_table() {
     let corpora = Corpora::new();
     let [model, saved, database] =

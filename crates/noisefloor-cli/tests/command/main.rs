@@ -1,9 +1,9 @@
-//! Tests of the `noisefloor` command as it is run: exit codes, files, and one line an error. One module a
-//! subject; commands that a build leaves out are tested with `--all-features`.
+//! Tests of the two commands as they are run: exit codes, files, and one line an error. One module a
+//! subject; those of `noisefloor-lab` need `--all-features`.
 
 /// Lines from one public to another.
 #[cfg(test)]
-#[cfg(feature = "train")]
+#[cfg(feature = "lab")]
 mod audience;
 /// One line, no panic, nothing lost.
 #[cfg(test)]
@@ -17,11 +17,10 @@ mod compare;
 mod crash;
 /// Renders that are judged denoised.
 #[cfg(test)]
-#[cfg(feature = "adapters")]
 mod denoise;
 /// Many processes, kills, rubbish.
 #[cfg(test)]
-#[cfg(all(feature = "farm", target_os = "linux"))]
+#[cfg(target_os = "linux")]
 mod farm;
 /// Output folders that are taken, and scenes that were edited.
 #[cfg(test)]
@@ -38,7 +37,7 @@ mod judge;
 mod kit;
 /// Train, inspect, evaluate.
 #[cfg(test)]
-#[cfg(feature = "train")]
+#[cfg(feature = "lab")]
 mod learn;
 /// What a build leaves out.
 #[cfg(test)]
@@ -65,15 +64,14 @@ mod say;
 mod signals;
 /// A real Slurm.
 #[cfg(test)]
-#[cfg(all(feature = "farm", target_os = "linux"))]
+#[cfg(target_os = "linux")]
 mod slurm;
 /// Other renderers than our own.
 #[cfg(test)]
-#[cfg(feature = "adapters")]
 mod sources;
 /// Stacks, links, raw data and copies of a study.
 #[cfg(test)]
-#[cfg(feature = "study")]
+#[cfg(feature = "lab")]
 mod study;
 /// What the screen shows: LUTs.
 #[cfg(test)]

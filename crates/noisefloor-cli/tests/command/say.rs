@@ -43,10 +43,8 @@ impl Talkers {
         let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/../../fixtures/cornell-box.xml");
         all.push(owned(&["reference", "cornell-box", "--size", "16x16", "--out", &reference]));
         all.push(owned(&["scenes", "check", scene]));
-        if cfg!(feature = "adapters") {
-            all.push(owned(&["doctor"]));
-        }
-        if cfg!(feature = "train") {
+        all.push(owned(&["doctor"]));
+        if cfg!(feature = "lab") {
             let table = self.path("pairs.csv");
             std::fs::write(&table, "observers,audience\n1,2\n2,4\n3,6\n").unwrap();
             all.push(owned(&["audience", "fit", &table]));
@@ -57,7 +55,7 @@ impl Talkers {
             let few = ["--max-spp", "100", "--reference-spp", "4", "--out"];
             all.push(owned(&[&small[..], &few, &[self.path("compared").as_str()]].concat()));
         }
-        if cfg!(feature = "study") {
+        if cfg!(feature = "lab") {
             let stack = self.path("stack");
             let small = ["study", "stack", "bulb", "--size", "64x64", "--levels", "1,2", "--out", &stack];
             all.push(owned(&small));

@@ -78,16 +78,21 @@ fn slurm_renders_what_one_machine_renders() {
     sequence(&cluster, &path("sequence"));
 }
 
-/// Two frames that differ by their seeds.
+/// Two frames that differ by their scenes.
 fn sequence(cluster: &Cluster, dir: &Path) {
-    plan(dir, &["--frames", "5-6"], &SCENE.replace("--seed 5", "--seed {frame}"));
+    let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/../../fixtures/cornell-box.xml");
+    let box_ = std::fs::read_to_string(scene).unwrap();
+    let folder = tempdir().unwrap();
+    let xml = |frame: &str| folder.path().join(format!("box.{frame}.xml"));
+    std::fs::write(xml("5"), &box_).unwrap();
+    std::fs::write(xml("6"), box_.replacen("0.", "0.9", 1)).unwrap();
+    plan(dir, &["--frames", "5-6"], &SCENE.replace("cornell-box", text(&xml("{frame}"))));
     let args = ["farm", "run", text(dir), "--wait", "--every", "0.2"];
     let said = cluster.run(&mut command(&args));
-    assert!(said.contains("frame-0005: done") && said.contains("frame-0006: done"), "{said}");
+    assert!(said.contains("0005: done") && said.contains("0006: done"), "{said}");
     for frame in ["5", "6"] {
         let one = dir.join(format!("one-{frame}"));
-        let scene = SCENE.replace("--seed 5", &format!("--seed {frame}"));
-        render(&one, &scene);
-        assert_same(&one, &dir.join(format!("frame-000{frame}")));
+        render(&one, &SCENE.replace("cornell-box", text(&xml(frame))));
+        assert_same(&one, &dir.join(format!("000{frame}")));
     }
 }

@@ -1,10 +1,7 @@
 use crate::kit::{column, fail, run, succeed, text};
-#[cfg(feature = "adapters")]
 use noisefloor_denoise::OIDN;
 use noisefloor_image::{Picture, read_picture};
-#[cfg(feature = "adapters")]
 use noisefloor_sidecar::find;
-#[cfg(feature = "adapters")]
 use noisefloor_testkit::{Requirement, require};
 use std::collections::HashSet;
 use std::fs;
@@ -56,7 +53,7 @@ fn a_stack_holds_what_renders_hold() {
 /// All levels but the reference pass through the program; what it does wrong is said, and leaves no level
 /// that did not pass.
 #[test]
-#[cfg(all(unix, feature = "adapters"))]
+#[cfg(unix)]
 fn levels_are_denoised_by_any_program() {
     let folder = tempfile::tempdir().unwrap();
     let [plain, denoised, failed] = ["plain", "denoised", "failed"].map(|name| folder.path().join(name));
@@ -99,7 +96,6 @@ fn levels_are_denoised_by_any_program() {
 /// The protocol of docs/denoised-study.md, rehearsed: a denoised stack, the study file of that page, simulated
 /// observers, and their analysis.
 #[test]
-#[cfg(feature = "adapters")]
 fn a_denoised_stack_goes_through_a_whole_study() {
     let folder = tempfile::tempdir().unwrap();
     let design = include_str!("../../../../docs/studies/denoised.toml");

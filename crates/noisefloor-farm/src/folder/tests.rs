@@ -1,15 +1,6 @@
 use super::*;
+use crate::shard::ShardJob;
 use noisefloor::{FixedSpp, Params, Session, source::SourceIdentity};
-
-#[test]
-fn what_could_not_be_read_back_is_not_written() {
-    let mut text = Vec::new();
-    let mut to = UpTo { to: &mut text, left: 4 };
-    to.write_all(b"ab").unwrap();
-    assert_eq!(to.write_all(b"cde").unwrap_err().kind(), io::ErrorKind::FileTooLarge);
-    to.write_all(b"cd").unwrap();
-    assert_eq!(text, b"abcd");
-}
 
 /// How far a frame is does not outlive its job.
 #[test]
@@ -27,4 +18,21 @@ fn the_state_of_another_job_is_none() {
     assert_eq!(folder.state("frame").unwrap(), done);
     folder.write_frame_job("frame", &job("seed 2")).unwrap();
     assert_eq!(folder.state("frame").unwrap(), FrameState::default());
+}
+
+/// A plan of another release is refused by its version, and not by what it lacks.
+#[test]
+fn plans_of_other_releases_are_refused() {
+    let dir = tempfile::tempdir().unwrap();
+    let folder = FarmFolder::new(dir.path());
+    folder.write_plan(&FarmPlan::new("a job".to_owned(), None, 16, false)).unwrap();
+    assert_eq!(folder.plan::<String>().unwrap().job, "a job");
+    for (text, found) in [(r#"{"arguments": ["bulb"], "frames": null}"#, "1"), (r#"{"version": 9}"#, "9")] {
+        std::fs::write(dir.path().join("farm.json"), text).unwrap();
+        let said = folder.plan::<String>().unwrap_err().to_string();
+        assert!(
+            said.contains(&format!("format version {found}")) && said.contains("plan the farm anew"),
+            "{said}"
+        );
+    }
 }

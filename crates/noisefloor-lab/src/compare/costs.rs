@@ -6,7 +6,7 @@ use std::time::Instant;
 /// What sampling costs, tile by tile.
 pub(super) struct Costs {
     calls: usize,
-    /// Seconds of the call that sampled each tile alone.
+    /// For each tile, seconds of the call that sampled only this tile.
     alone: Vec<f64>,
     /// Seconds and pixel samples of the calls for all tiles together, the first one left out.
     seconds: f64,

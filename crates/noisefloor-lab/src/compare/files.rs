@@ -5,7 +5,8 @@ use super::page::page;
 use super::pictures::Pictures;
 use super::plots::{Cost, Plot};
 use crate::error::LabError;
-use crate::files::{make_folder, write_csv, write_json, write_text};
+use crate::files::{make_folder, write_json, write_text};
+use noisefloor_image::write_csv;
 use serde::Serialize;
 use std::path::Path;
 
@@ -67,8 +68,8 @@ pub fn write_scene(
 ) -> Result<(), LabError> {
     make_folder(folder)?;
     let scene = &comparison.scene;
-    write_csv(&folder.join("curve.csv"), comparison.curve.iter().map(|point| CurveRow::new(scene, point)))?;
-    write_csv(&folder.join("tiles.csv"), &comparison.tiles)?;
+    write_csv(folder.join("curve.csv"), comparison.curve.iter().map(|point| CurveRow::new(scene, point)))?;
+    write_csv(folder.join("tiles.csv"), &comparison.tiles)?;
     pictures.reference.save(folder.join("reference.png"))?;
     for (spec, canvas) in &pictures.criteria {
         canvas.save(folder.join(format!("{}.png", spec.replace([':', '='], "-"))))?;
@@ -97,7 +98,7 @@ pub fn write_page(
 ) -> Result<(), LabError> {
     let runs: Vec<&CriterionRun> = all.iter().flat_map(|comparison| &comparison.runs).collect();
     write_text(&folder.join("index.html"), &page(all, sections, scenes))?;
-    write_csv(&folder.join("runs.csv"), &runs)?;
+    write_csv(folder.join("runs.csv"), &runs)?;
     write_json(&folder.join("runs.json"), &runs)?;
     Ok(())
 }

@@ -1,8 +1,8 @@
 //! Criteria side by side on one run.
 //!
 //! The scene is rendered once, uniformly. Every criterion sees the same samples and takes those of a tile
-//! until it stops it. What it took, what that cost, and how far its picture is from the converged one is
-//! set beside uniform sampling.
+//! until it stops it. Its samples, their cost, and the distance of its picture from the converged one are
+//! compared with uniform sampling.
 
 mod costs;
 mod denoising;

@@ -21,7 +21,7 @@ use std::time::Instant;
 pub struct Entrant {
     /// As it was asked for: `cycles:0.01`.
     pub spec: String,
-    /// What it is one of: `cycles`. Entrants of one family differ in their constant alone.
+    /// What it is one of: `cycles`. Entrants of one family differ only in their constant.
     pub family: String,
     session: Session<Box<dyn StoppingCriterion + Send>>,
     /// Whether it is given samples of its own.
@@ -122,7 +122,7 @@ impl Race {
         costs.map(|(tile, seconds)| seconds * entrant.film().spp(tile) as f64).sum()
     }
 
-    /// Seconds in the source for so many samples of every pixel.
+    /// Seconds in the source for this many samples of every pixel.
     pub(super) fn uniform_seconds(&self, spp: f64) -> f64 {
         self.tile_seconds.iter().sum::<f64>() * spp
     }

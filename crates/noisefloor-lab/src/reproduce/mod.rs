@@ -35,9 +35,8 @@ pub enum ResultState {
     Kept,
 }
 
-/// Carries out all protocols. Each result is written whole into the folder, which is made, as soon as it is
-/// there, and those that are there already are not computed again. `on_result` is told of each result, with
-/// its file.
+/// Carries out all protocols. Creates the folder, and writes each result into it atomically as soon as it is
+/// there. Results that are there already are not computed again. `on_result` gets each result, with its file.
 ///
 /// # Errors
 /// [`LabError`] if a corpus cannot be read or has fewer than three groups of scenes, a machine cannot be

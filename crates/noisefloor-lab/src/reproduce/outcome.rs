@@ -66,16 +66,16 @@ impl Fingerprint {
     }
 }
 
-/// Pairs that were asked about, and those told right, by class.
+/// Pairs that were tested, and those classified right, by class.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Count {
     /// Pairs in which people see noise.
     pub noisy: usize,
-    /// Of them, told right.
+    /// Of these, classified right.
     pub noisy_right: usize,
     /// Pairs that people take for identical.
     pub identical: usize,
-    /// Of them, told right.
+    /// Of these, classified right.
     pub identical_right: usize,
 }
 

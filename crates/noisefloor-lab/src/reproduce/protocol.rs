@@ -19,7 +19,7 @@ pub enum PairProtocol {
     SceneLeftOut,
 }
 
-/// Every so many pairs one is held out.
+/// One of this many pairs is held out.
 const FIFTH: usize = 5;
 
 /// One machine: rows to learn and to ask about.

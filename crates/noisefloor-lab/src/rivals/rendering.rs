@@ -26,7 +26,7 @@ pub(super) struct SynthesisedRendering {
     converged: Reference,
 }
 
-/// Samples, and the mean of these samples alone for each zone.
+/// Samples, and the mean of only these samples for each zone.
 type Batch = (u64, Vec<Vec<Rgb>>);
 
 /// The samples of the batches of each stage, until `last` are reached: two batches each, so that the halves of a
@@ -142,7 +142,7 @@ impl SynthesisedRendering {
     }
 }
 
-/// Squares side by side; places that none fills are black.
+/// Squares side by side; empty places are black.
 fn mosaic(tiles: &[&[Rgb]], edge: usize, columns: usize) -> Reference {
     let (width, height) = (columns * edge, tiles.len().div_ceil(columns) * edge);
     let mut pixels = vec![[0.0; 3]; width * height];

@@ -1,4 +1,4 @@
-//! The images of zones, cut out with an apron.
+//! The images of zones, cut out with a halo.
 
 use super::error::CorpusError;
 use super::zone::{JudgedZone, ZoneImages};
@@ -34,9 +34,9 @@ pub struct Inner {
 /// A zone's pixels, and up to [`HALO`] pixels around them where the image has any.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Patch {
-    /// Width with apron, in pixels.
+    /// Width with halo, in pixels.
     pub width: usize,
-    /// Height with apron, in pixels.
+    /// Height with halo, in pixels.
     pub height: usize,
     /// Row-major, `width * height` values.
     pub pixels: Vec<Rgb>,
@@ -45,7 +45,7 @@ pub struct Patch {
 }
 
 impl Patch {
-    /// The zone's own pixels, row-major, without the apron.
+    /// The zone's own pixels, row-major, without the halo.
     pub fn inner_pixels(&self) -> impl Iterator<Item = Rgb> {
         let Inner { x, y, width, height } = self.inner;
         (y..y + height).flat_map(move |row| self.pixels[row * self.width + x..][..width].iter().copied())
@@ -144,7 +144,7 @@ impl<'a> JudgedImages<'a> {
             Picture::Display(image) => (Encoding::Display, &image.pixels),
         };
         for zone in &job.zones {
-            // A batch is the zone alone
+            // A batch is only the zone
             let (x, y) = if job.batch { (0, 0) } else { (zone.x, zone.y) };
             let (exact, inside) = (
                 (zone.width, zone.height) == (w, h),
@@ -187,9 +187,9 @@ pub(super) fn reference(zones: &[&JudgedZone]) -> Result<Option<Vec<Patch>>, Cor
             let (path, scene) = (path.clone(), zone.scene.clone());
             return Err(CorpusError::Zone { path, scene, zone: zone.zone, width, height });
         }
-        // A batch is the zone alone
-        let apron = if matches!(zone.stack, ZoneImages::Batches(_)) { 0 } else { HALO };
-        Ok(cut(&image.pixels, (width, height), Inner { x, y, width: w, height: h }, apron))
+        // A batch is only the zone
+        let halo = if matches!(zone.stack, ZoneImages::Batches(_)) { 0 } else { HALO };
+        Ok(cut(&image.pixels, (width, height), Inner { x, y, width: w, height: h }, halo))
     };
     zones.iter().map(cut_out).collect::<Result<_, _>>().map(Some)
 }
@@ -210,11 +210,11 @@ impl Iterator for JudgedImages<'_> {
     }
 }
 
-/// The rectangle and its apron, clipped to an image of the size given.
-fn cut(pixels: &[Rgb], (width, height): (usize, usize), zone: Inner, apron: usize) -> Patch {
-    let (left, top) = (zone.x.saturating_sub(apron), zone.y.saturating_sub(apron));
-    let right = (zone.x + zone.width + apron).min(width);
-    let bottom = (zone.y + zone.height + apron).min(height);
+/// The rectangle and its halo, clipped to an image of the size given.
+fn cut(pixels: &[Rgb], (width, height): (usize, usize), zone: Inner, halo: usize) -> Patch {
+    let (left, top) = (zone.x.saturating_sub(halo), zone.y.saturating_sub(halo));
+    let right = (zone.x + zone.width + halo).min(width);
+    let bottom = (zone.y + zone.height + halo).min(height);
     Patch {
         width: right - left,
         height: bottom - top,

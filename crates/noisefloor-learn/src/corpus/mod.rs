@@ -5,8 +5,8 @@
 //! layouts:
 //! - a folder a scene, named as in the table, with running means named by samples per pixel
 //!   (`<scene>/00100.png`), for any number of scenes; zones are rectangles of these images;
-//! - a folder a zone (`zone07/batch_00060_00100.exr`) with batch means, for one scene; an image is the zone
-//!   alone, and x, y say where it lay in the full picture.
+//! - a folder a zone (`zone07/batch_00060_00100.exr`) with batch means, for one scene; an image is only
+//!   the zone, and x, y say where it lay in the full picture.
 //!
 //! `reference_spp` says how many samples the picture has that people compared with, if it contains those of the
 //! pictures they judged, or `inf` if it has no noise. Without that column it is the last running mean, and

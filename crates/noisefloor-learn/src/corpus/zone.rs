@@ -10,7 +10,7 @@ pub const CENSORED_SPP: f64 = 10_000.0;
 pub enum ZoneImages {
     /// A folder of running means of the whole scene, shared by all its zones.
     RunningMeans(PathBuf),
-    /// A folder of batch means of this zone alone.
+    /// A folder of batch means of only this zone.
     Batches(PathBuf),
 }
 

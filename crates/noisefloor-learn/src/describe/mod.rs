@@ -48,7 +48,7 @@ impl<'a> Corpora<'a> {
     }
 }
 
-/// Describes every zone of the corpora, by the evidence given. `on_zone(done, all)` is told of progress. The
+/// Describes every zone of the corpora, by the evidence given. `on_zone(done, all)` reports progress. The
 /// zones of a scene are its picture.
 ///
 /// [`Evidence::Reference`] holds pictures against the scene's reference ([`Corpus::scene_reference`]); where
@@ -71,7 +71,7 @@ pub fn describe_corpora(
 /// Describes every zone as the paper does (Takouachet et al. 2017, §4.3): the `edge`×`edge` pixels at its
 /// centre, at `levels` levels with equal steps up to its most converged image, each held against the scene's
 /// reference, or that image. All these levels are synthesised, from the two realisations of the noise in
-/// turn; the real images, but for the most converged one, are there besides. `on_zone(done, all)` is told of
+/// turn; the real images, except the most converged one, are there besides. `on_zone(done, all)` reports
 /// progress.
 ///
 /// # Errors

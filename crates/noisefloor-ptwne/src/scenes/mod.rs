@@ -91,7 +91,7 @@ const STIFF: &[(BuiltInScene, Make)] = &[
     (
         BuiltInScene {
             name: "caustic",
-            description: "light of a small lamp through glass, found by chance alone",
+            description: "light of a small lamp through glass, found only by chance",
         },
         stiff::caustic,
     ),

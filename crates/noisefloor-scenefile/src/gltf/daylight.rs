@@ -10,7 +10,7 @@ const SUN: f32 = 24.0;
 /// Half of the sun's apparent diameter in degrees: as wide as a window, so that its shadows are soft.
 const SUN_RADIUS: f32 = 10.0;
 
-/// A dome that is brighter above than below, and a wide sun over the left shoulder of whoever looks: surfaces
+/// A dome that is brighter above than below, and a wide sun over the viewer's left shoulder: surfaces
 /// look different by how they face, and white ones do not vanish before a white background.
 pub(super) fn daylight(camera: &Camera) -> Environment {
     let [eye, target, up] = [camera.eye, camera.target, camera.up].map(Vec3::from);

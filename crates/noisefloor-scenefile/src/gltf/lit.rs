@@ -35,7 +35,7 @@ pub(super) fn missing_daylight(scene: &Scene, camera: &Camera) -> Option<Environ
     ((shown as f32) < SHARE * visible as f32).then_some(sky)
 }
 
-/// The luminance of each pixel, of paths of so many segments.
+/// The luminance of each pixel, of paths of this many segments.
 fn picture(scene: &Arc<Scene>, max_depth: u32) -> Option<Vec<f32>> {
     let options = RenderOptions { max_depth, ..RenderOptions::default() };
     let mut source = Ptwne::new(scene.clone(), EDGE, EDGE, options).ok()?;

@@ -275,7 +275,7 @@ impl<'m> Reader<'m, '_> {
             return Ok(None);
         };
         if transmission.transmission_texture.is_some() {
-            self.notes.warn(&self.place, "the texture of its transmission is ignored, its factor used alone");
+            self.notes.warn(&self.place, "its transmission texture is ignored, only its factor used");
         }
         let share = self.within(transmission.transmission_factor.0, "transmissionFactor", 0.0, 1.0);
         if share > 0.0 && share < 1.0 {

@@ -167,7 +167,7 @@ impl Loader<'_> {
             return Ok(camera::framing(self.bounds));
         }
         Err(if self.undrawn {
-            place.unsupported("a scene of points and lines alone")
+            place.unsupported("a scene of only points and lines")
         } else {
             place.bad("its scene has neither a camera nor a mesh")
         })

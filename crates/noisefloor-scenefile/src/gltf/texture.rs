@@ -199,7 +199,7 @@ impl<'a> Textures<'a> {
             let names = texture.extensions.iter().flat_map(|e| e.others.keys());
             let names: Vec<&str> = names.map(String::as_str).collect();
             if !names.is_empty() {
-                return Err(here.unsupported(format_args!("an image of {} alone", names.join(", "))));
+                return Err(here.unsupported(format_args!("an image of only {}", names.join(", "))));
             }
         }
         let Decoded { width, height, colour, .. } = self.decoded(texture.source, &here, notes)?;

@@ -34,7 +34,7 @@ impl<'d> Context<'d> {
     /// Adds a shape to the scene.
     pub(super) fn shape(&self, element: &'d Element, filling: &mut Filling) -> Result<(), LoadError> {
         match element.kind() {
-            // Seen through its instances alone
+            // Seen only through its instances
             "shapegroup" => Ok(()),
             "instance" => self.instance(element, filling),
             _ => self.simple(element, None, filling),

@@ -78,7 +78,7 @@ impl Reader<'_> {
         Ok(texture)
     }
 
-    /// η or k of a conductor. A little below 0, as fits of measurements come to, is 0.
+    /// η or k of a conductor. Values a little below 0, which fits of measurements have, count as 0.
     pub(super) fn metal_index(&mut self, d: &Definition, name: &str) -> Result<Option<Rgb>, LoadError> {
         let Some(index) = self.signed(&d.params, name)? else { return Ok(None) };
         let nearest = index.map(|x| x.clamp(0.0, 100.0));

@@ -231,7 +231,7 @@ pub(super) fn mean(texture: &Texture) -> Rgb {
     }
 }
 
-/// The pixels of a picture: as they are if they are `raw`, decoded from sRGB otherwise, or its alpha alone.
+/// The pixels of a picture: as they are if they are `raw`, decoded from sRGB otherwise, or only its alpha.
 fn texels(samples: Samples, raw: bool, alpha_alone: bool) -> Pixels {
     match samples {
         Samples::Eight(codes) if alpha_alone => Pixels::Linear8(codes.iter().map(|p| [p[3]; 3]).collect()),

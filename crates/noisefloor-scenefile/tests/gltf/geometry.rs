@@ -255,5 +255,5 @@ fn points_and_lines_alone_are_no_scene() {
     maker.root["meshes"][mesh]["primitives"][0]["mode"] = 1.into();
     maker.node(&format!(r#"{{"mesh": {mesh}}}"#));
     let error = maker.load().unwrap_err().to_string();
-    assert!(error.contains("a scene of points and lines alone is not supported"), "{error}");
+    assert!(error.contains("a scene of only points and lines is not supported"), "{error}");
 }

@@ -3,7 +3,7 @@
 use noisefloor_image::write_png;
 use noisefloor_study::analysis::{AnalysisOptions, Observer, StudyReport, report};
 use noisefloor_study::simulated::{Public, run};
-use noisefloor_study::{ParticipantSession, Study, grids};
+use noisefloor_study::{ParticipantSession, Plan, Study, grids};
 use std::sync::Arc;
 use tempfile::TempDir;
 
@@ -41,7 +41,7 @@ pub(crate) fn simulate(
     let grids = grids(study);
     let observe = |i: u64| {
         let seed = 1000 * seed + i;
-        let mut session = ParticipantSession::new(study.clone(), grids.clone(), seed);
+        let mut session = ParticipantSession::new(study.clone(), grids.clone(), Plan::draw(study, seed));
         run(&mut session, &mut public.draw(seed)).expect("simulated observers answer what is asked");
         Observer::of(&format!("simulated {i}"), "", &session)
     };

@@ -46,7 +46,7 @@ const say = (text) => {
   get("status").textContent = text;
 };
 
-/** Runs what a control asks for; what goes wrong is said. */
+/** Runs what a control asks for, and shows errors. */
 const does =
   (action) =>
   async (...given) => {

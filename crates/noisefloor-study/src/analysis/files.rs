@@ -1,13 +1,12 @@
 //! An analysis as files: tables, a corpus for `train`, plots, and the grid over the picture.
 
 use super::classes::ClassRow;
-use super::listing::ObserverRow;
 use super::plots;
 use super::report::StudyReport;
 use super::tiles::{CorpusThreshold, TileRow};
 use crate::config::Study;
 use crate::error::StudyError;
-use noisefloor_image::{write_atomic, write_png};
+use noisefloor_image::{write_atomic, write_csv, write_png};
 use serde::Serialize;
 use std::fs::{create_dir_all, read_link, remove_file};
 use std::io::Write;
@@ -63,7 +62,7 @@ struct ClassLine {
 }
 
 /// Writes `report.json`, `observers.csv` and, as the protocol has them, `tiles.csv`, `classes.csv`, plots,
-/// `grid-STACK.png` and the folder `corpus`, which `noisefloor train --corpus` takes. What was there is
+/// `grid-STACK.png` and the folder `corpus`, which `noisefloor-lab train --corpus` takes. What was there is
 /// replaced.
 ///
 /// # Errors
@@ -76,7 +75,7 @@ pub fn write(
 ) -> Result<(), StudyError> {
     folder(dir)?;
     write_atomic(dir.join("report.json"), |to| serde_json::to_writer_pretty(to, report))?;
-    table::<ObserverRow>(&dir.join("observers.csv"), report.observers.iter().cloned())?;
+    write_csv(dir.join("observers.csv"), &report.observers)?;
     if !report.classes.is_empty() {
         let line = |row: &ClassRow| ClassLine {
             class: format!("{:?}", row.class).to_lowercase(),
@@ -88,13 +87,13 @@ pub fn write(
             observers_low: row.observers_interval.map(|i| i[0]),
             observers_high: row.observers_interval.map(|i| i[1]),
         };
-        table(&dir.join("classes.csv"), report.classes.iter().map(line))?;
+        write_csv(dir.join("classes.csv"), report.classes.iter().map(line))?;
         svg(&dir.join("classes.svg"), plots::classes(&report.classes)?)?;
     }
     if report.tiles.is_empty() {
         return Ok(());
     }
-    table(&dir.join("tiles.csv"), report.tiles.iter().map(tile_line))?;
+    write_csv(dir.join("tiles.csv"), report.tiles.iter().map(tile_line))?;
     svg(&dir.join("thresholds.svg"), plots::thresholds(&report.tiles)?)?;
     // A model keeps the name of the corpus it is trained on.
     let corpus_dir = dir.join(if report.simulated { "corpus-simulated" } else { "corpus" });
@@ -114,17 +113,6 @@ pub fn write(
 
 fn folder(dir: &Path) -> Result<(), StudyError> {
     create_dir_all(dir).map_err(|source| StudyError::Io { path: dir.to_owned(), source })
-}
-
-fn table<T: Serialize>(path: &Path, rows: impl Iterator<Item = T>) -> Result<(), StudyError> {
-    write_atomic(path, |to| {
-        let mut csv = csv::Writer::from_writer(to);
-        for row in rows {
-            csv.serialize(row)?;
-        }
-        csv.flush().map_err(csv::Error::from)
-    })?;
-    Ok(())
 }
 
 fn svg(path: &Path, text: String) -> Result<(), StudyError> {
@@ -177,7 +165,7 @@ fn corpus(
         let human_spp = spp.clamp(first_spp.max(1) as f64, last_spp as f64);
         Some(CorpusRow { scene, renderer, zone, x, y, width, height, human_spp, first_spp, last_spp })
     };
-    table(&dir.join("thresholds.csv"), report.tiles.iter().filter_map(row))
+    Ok(write_csv(dir.join("thresholds.csv"), report.tiles.iter().filter_map(row))?)
 }
 
 /// The pictures of a stack in the corpus, as they were shown: a link to its folder, or PNGs where it is

@@ -4,7 +4,7 @@ use super::fit::Observation;
 use crate::config::Study;
 use crate::error::StudyError;
 use crate::questplus::Posterior;
-use crate::session::{CatchKind, Class, Stage, TrialOutcome, grids, replay};
+use crate::session::{CatchKind, Class, Haste, Stage, TrialOutcome, grids, replay};
 use crate::store::SessionRecord;
 use crate::viewing::{Conditions, ViewingProblem};
 use std::collections::BTreeMap;
@@ -30,8 +30,8 @@ pub struct Observer {
     pub viewing_problem: Option<ViewingProblem>,
     /// Catch trials, and whether they were passed.
     pub caught: Vec<(CatchKind, bool)>,
-    /// Trials after the practice, and how many of them were answered hastily.
-    pub hasty: [u32; 2],
+    /// How carefully trials were answered.
+    pub haste: Haste,
     /// Acquisition: the levels at which the observer left each tile, in order of showing.
     pub stops: BTreeMap<TileKey, Vec<u32>>,
     /// Forced choice: the posterior of ln(threshold) of each tile.
@@ -53,7 +53,7 @@ impl Observer {
             conditions: session.conditions().copied(),
             viewing_problem: session.viewing_problem(),
             caught: Vec::new(),
-            hasty: session.hasty(),
+            haste: session.haste(),
             stops: BTreeMap::new(),
             measured: BTreeMap::new(),
             judged: Vec::new(),

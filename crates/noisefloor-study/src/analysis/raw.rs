@@ -9,7 +9,7 @@ use super::report::StudyReport;
 use crate::config::Study;
 use crate::error::{StoreError, StudyError};
 use crate::event::{Choice, StudyEvent};
-use crate::session::{CatchKind, ParticipantSession, Trial, TrialRole, grids};
+use crate::session::{CatchKind, Trial, TrialRole, begin, grids};
 use crate::store::SessionRecord;
 use crate::viewing::Conditions;
 use noisefloor_image::write_atomic;
@@ -83,7 +83,7 @@ pub fn responses(study: &Arc<Study>, records: &[SessionRecord]) -> Result<Vec<Re
     let grids = grids(study);
     let mut rows = Vec::new();
     for (i, record) in records.iter().enumerate() {
-        let mut session = ParticipantSession::new(study.clone(), grids.clone(), record.seed);
+        let mut session = begin(study.clone(), grids.clone(), record)?;
         for envelope in &record.events {
             let shown = session.trial().zip(session.role());
             let conditions = session.conditions().copied();

@@ -3,7 +3,7 @@
 use super::observers::{Observer, places};
 use super::summary::median;
 use crate::config::{Study, StudyProtocol};
-use crate::session::{Class, Stage};
+use crate::session::{Class, Haste, Stage};
 use crate::viewing::ViewingProblem;
 use std::collections::BTreeSet;
 
@@ -38,7 +38,7 @@ pub fn individual(observer: &Observer, study: &Study) -> Vec<String> {
     if failed as f64 > rules.catch_errors * of as f64 {
         broken.push(format!("failed {failed} of {of} catch trials"));
     }
-    let [trials, hasty] = observer.hasty;
+    let Haste { trials, hasty } = observer.haste;
     if f64::from(hasty) > rules.hasty_share * f64::from(trials) {
         broken.push(format!("answered {hasty} of {trials} trials in less than {} ms", rules.hasty_ms));
     }

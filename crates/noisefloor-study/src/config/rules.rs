@@ -32,7 +32,7 @@ pub struct Texts {
     pub debriefing: String,
 }
 
-/// How participants arrive, and what they take away.
+/// How participants arrive, and what they are given at the end.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default, rename_all = "kebab-case")]
 pub struct Participants {

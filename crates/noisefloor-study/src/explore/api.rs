@@ -281,7 +281,7 @@ pub(crate) async fn blocking<T: Send + 'static>(
             StatusCode::INTERNAL_SERVER_ERROR,
             what,
             "server",
-            "look at what `noisefloor explore` printed",
+            "look at what `noisefloor-lab explore` printed",
         )
     };
     tokio::task::spawn_blocking(work).await.map_err(ended)
@@ -289,6 +289,6 @@ pub(crate) async fn blocking<T: Send + 'static>(
 
 impl From<StudyError> for Refusal {
     fn from(error: StudyError) -> Self {
-        refuse(error.to_string(), "pictures", "see docs/explore.md")
+        refuse(error.to_string(), "pictures", "see docs/studies.md")
     }
 }

@@ -153,7 +153,7 @@ struct Retraining {
 pub(crate) async fn retrain(State(app): Shared, body: Body) -> Answer {
     let at = threshold(read_json::<Retraining>(body).await?.threshold)?;
     let Some(table) = app.setup.table.clone() else {
-        let do_ = "start `noisefloor explore --table FILE`, with the project's fixtures/human-table.csv or a table \
+        let do_ = "start `noisefloor-lab explore --table FILE`, with the project's fixtures/human-table.csv or a table \
             written by `train --save-table`";
         return Err(refuse("there is no table of human thresholds to train on", "table", do_));
     };

@@ -10,7 +10,7 @@ use serde::Serialize;
 pub struct AnswerAgreement {
     /// Number of answers.
     pub of: usize,
-    /// Agreements of the model trained on the table alone.
+    /// Agreements of the model trained only on the table.
     pub before: usize,
     /// Agreements of the model trained on these answers as well: how well they are fitted, not how well it
     /// generalises.
@@ -22,7 +22,7 @@ pub struct AnswerAgreement {
 /// The effect of retraining.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Learned {
-    /// Leave-one-scene-out scores on the table, trained on the table alone. `None` if it has too few groups
+    /// Leave-one-scene-out scores on the table, trained only on the table. `None` if it has too few groups
     /// of scenes.
     pub before: Option<Scores>,
     /// The same, trained on the disagreements as well.
@@ -94,7 +94,7 @@ pub fn retrain(
     let base = match known {
         Some(model) => model.clone(),
         None => {
-            step("the table alone".into());
+            step("only the table".into());
             train(&plain, params, String::new(), None)?
         }
     };

@@ -20,7 +20,7 @@ pub(crate) struct Tiles {
     pub(crate) described: Vec<Described>,
     /// Pixels as displayed, row-major.
     pub(crate) shown: Vec<Rgb>,
-    /// Visible noise in 8-bit steps, row-major; `None` if the descriptor has no such map.
+    /// Visible noise as a multiple of what is just seen, row-major; `None` if the descriptor has no such map.
     pub(crate) noise: Option<Vec<f32>>,
 }
 

@@ -16,7 +16,7 @@ pub(crate) async fn read_json<T: DeserializeOwned>(body: Body) -> Result<T, Refu
     let bytes = read_bytes(body, MAX_BODY, BODY_TIME, "send one event at a time").await?;
     serde_json::from_slice(&bytes).map_err(|error| {
         let what = format!("not the JSON expected: {error}");
-        Refusal::new(StatusCode::BAD_REQUEST, what, "body", "docs/study.md lists what is sent")
+        Refusal::new(StatusCode::BAD_REQUEST, what, "body", "docs/studies.md lists what is sent")
     })
 }
 

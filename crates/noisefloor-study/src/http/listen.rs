@@ -158,7 +158,7 @@ fn connection(
         .serve_connection(Patient::new(TokioIo::new(stream), write_time), service);
     let watched = graceful.watch(served);
     async move {
-        // A peer that breaks off or is too slow is no error of the server
+        // A peer that hangs up or is too slow is not an error of the server
         drop(watched.await);
     }
 }

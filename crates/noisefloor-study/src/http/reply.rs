@@ -46,7 +46,7 @@ impl Refusal {
             StatusCode::CONFLICT,
             what,
             "seq",
-            "load the session again, and go on from its next_seq",
+            "load the session again, and continue from its next_seq",
         );
         refusal.body.next_seq = Some(next);
         refusal

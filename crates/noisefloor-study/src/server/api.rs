@@ -6,6 +6,7 @@ use crate::code;
 use crate::error::StoreError;
 use crate::event::Envelope;
 use crate::http::{Client, Refusal, read_json};
+use crate::session::Plan;
 use crate::store::NewSession;
 use axum::Json;
 use axum::body::Body;
@@ -43,7 +44,7 @@ pub(crate) async fn begin(State(app): Shared, body: Body) -> Answer {
         Err(Refusal::new(StatusCode::UNPROCESSABLE_ENTITY, what, place, do_))
     };
     if simulated && !app.simulated.load(Ordering::Relaxed) {
-        let do_ = "rehearse with `noisefloor study simulate`, or `study serve --admit-simulated`";
+        let do_ = "rehearse with `noisefloor-lab study simulate`, or `study serve --admit-simulated`";
         return refuse("simulated observers are not admitted", "simulated", do_.into());
     }
     let groups = &app.study.groups;
@@ -64,7 +65,9 @@ pub(crate) async fn begin(State(app): Shared, body: Body) -> Answer {
         return refuse("this study is open to invited participants", "link", "use your personal link".into());
     }
     let link = link.map(|typed| code::parse(&typed).ok_or(StoreError::NoLink)).transpose()?;
-    let session = NewSession { code: code::draw()?, seed: code::draw_seed()?, group, simulated, ids, link };
+    let (code, seed) = (code::draw()?, code::draw_seed()?);
+    let plan = Plan::draw(&app.study, seed);
+    let session = NewSession { code, seed, plan, group, simulated, ids, link };
     let code = app.store.begin(session).await?;
     let view = app.with(&code, |session| SessionView::of(&code, session)).await?;
     Ok((StatusCode::CREATED, Json(view)).into_response())

@@ -56,6 +56,7 @@ impl StudyServer {
         exposure: &Exposure,
     ) -> Result<Self, StudyError> {
         let store = AnswerStore::open(&study.database, &study.design())?;
+        store.keep_plans(Arc::clone(&study)).await?;
         let listening = Listening::bind(address, exposure).await?;
         let key = code::draw()?;
         let app = Arc::new(App {

@@ -59,7 +59,7 @@ pub(super) async fn overview(State(app): State<Arc<App>>, headers: HeaderMap) ->
     let sent = headers.get(AUTHORIZATION).and_then(|h| h.to_str().ok()?.strip_prefix("Bearer "));
     // Equality of digests takes the same time for every wrong key
     if !sent.is_some_and(|key| blake3::hash(key.as_bytes()) == blake3::hash(app.key.as_bytes())) {
-        let do_ = "open the address that `noisefloor study serve` printed for the experimenter";
+        let do_ = "open the address that `noisefloor-lab study serve` printed for the experimenter";
         return Err(Refusal::new(StatusCode::FORBIDDEN, "this page is for the experimenter", "key", do_));
     }
     let now_ms = now_ms();

@@ -119,7 +119,7 @@ pub struct SessionView {
     pub viewing_problem: Option<ViewingProblem>,
     /// The trial to show.
     pub trial: Option<Trial>,
-    /// After the session has ended: what the observer takes away.
+    /// After the session has ended: what the observer is given.
     pub completion: Option<CompletionView>,
 }
 

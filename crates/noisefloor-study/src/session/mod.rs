@@ -6,6 +6,8 @@ mod state;
 mod trial;
 mod view;
 
+pub use plan::Plan;
+pub(crate) use replay::begin;
 pub use replay::replay;
-pub use state::{EventMisfit, ParticipantSession, Stage, grids};
+pub use state::{EventMisfit, Haste, ParticipantSession, Stage, grids};
 pub use trial::{CatchKind, Class, Trial, TrialOutcome, TrialRole};

@@ -1,21 +1,34 @@
-//! The order of trials, drawn once per session from the seeds of the study and of the session.
+//! The order of trials, drawn once per session from the seeds of the study and of the session, and stored
+//! with it: another version of the random generator may draw another one.
 
 use super::trial::{CatchKind, Class, TrialRole};
 use crate::config::{Study, StudyProtocol};
 use crate::stack::StudyStack;
+use serde::{Deserialize, Serialize};
 
 /// Practice trials of a forced choice, all at the noisiest level.
 const PRACTICE_CHOICES: u32 = 4;
 
+/// The trials of a session. In JSON an object with `practice`, one round of it, and `trials`, all others in
+/// order.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Plan {
+    pub(super) practice: Vec<PlannedTrial>,
+    pub(super) trials: Vec<PlannedTrial>,
+}
+
 /// A trial as planned.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub(super) struct PlannedTrial {
     pub(super) task: Task,
     pub(super) role: TrialRole,
 }
 
 /// What is shown.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub(super) enum Task {
     Acquisition {
         stack: u32,
@@ -36,26 +49,46 @@ pub(super) enum Task {
 }
 
 /// What a validation shows beside the reference.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub(super) enum Pair {
     Class(Class),
     Obvious,
 }
 
-/// One round of practice, and all other trials in order.
-pub(super) fn draw_trials(study: &Study, random: &mut fastrand::Rng) -> [Vec<PlannedTrial>; 2] {
-    let (practice, mut data) = match study.protocol {
-        StudyProtocol::Acquisition => acquisition(study, random),
-        StudyProtocol::Validation => validation(study, random),
-        StudyProtocol::ForcedChoice => forced_choice(study, random),
-    };
-    for (task, kind) in catch_trials(study, random) {
-        // Never the first: nothing is expected there yet
-        let place = random.usize(1..=data.len());
-        data.insert(place, PlannedTrial { task, role: TrialRole::Catch(kind) });
+impl Plan {
+    /// Draws the trials of a session. The order depends on the seed of the study and this one.
+    pub fn draw(study: &Study, seed: u64) -> Self {
+        let random = &mut crate::random::seeded(study.seed.rotate_left(32) ^ seed);
+        let (practice, mut trials) = match study.protocol {
+            StudyProtocol::Acquisition => acquisition(study, random),
+            StudyProtocol::Validation => validation(study, random),
+            StudyProtocol::ForcedChoice => forced_choice(study, random),
+        };
+        for (task, kind) in catch_trials(study, random) {
+            // Never the first: nothing is expected there yet
+            let place = random.usize(1..=trials.len());
+            trials.insert(place, PlannedTrial { task, role: TrialRole::Catch(kind) });
+        }
+        let practice = practice.into_iter().map(|task| PlannedTrial { task, role: TrialRole::Practice });
+        Self { practice: practice.collect(), trials }
     }
-    let practice = practice.into_iter().map(|task| PlannedTrial { task, role: TrialRole::Practice });
-    [practice.collect(), data]
+
+    /// Whether every trial shows what the study has: a stored plan may have been edited.
+    pub(crate) fn fits(&self, study: &Study) -> bool {
+        let shown = |planned: &PlannedTrial| {
+            let (stack, tile, protocol) = match planned.task {
+                Task::Acquisition { stack, .. } => (stack, 0, StudyProtocol::Acquisition),
+                Task::Validation { stack, .. } => (stack, 0, StudyProtocol::Validation),
+                Task::ForcedChoice { stack, tile, .. } => (stack, tile, StudyProtocol::ForcedChoice),
+            };
+            let tiles = study.stacks.get(stack as usize).map_or(0, |stack| stack.grid().len());
+            protocol == study.protocol && (tile as usize) < tiles
+        };
+        let practice = |planned: &PlannedTrial| planned.role == TrialRole::Practice;
+        self.practice.iter().all(|planned| shown(planned) && practice(planned))
+            && self.trials.iter().all(|planned| shown(planned) && !practice(planned))
+    }
 }
 
 fn data(task: Task) -> PlannedTrial {

@@ -1,6 +1,6 @@
 //! The state of a session. Events move it on; replaying them rebuilds it, and nothing else is stored.
 
-use super::plan::{Pair, PlannedTrial, Task, draw_trials};
+use super::plan::{Pair, Plan, PlannedTrial, Task};
 use super::trial::{Class, TrialOutcome, TrialRole};
 use crate::config::Study;
 use crate::event::{Choice, StudyEvent, TrialTiming};
@@ -40,6 +40,51 @@ pub enum Stage {
     ScreenedOut,
 }
 
+/// Rounds of practice.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Practice {
+    /// Trials of the current round.
+    pub(super) first: u32,
+    /// The first trial after it.
+    pub(super) end: u32,
+    /// Rounds begun.
+    pub(super) rounds: u32,
+    /// Trials passed in the current round.
+    passed: u32,
+}
+
+/// How carefully trials were answered.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Haste {
+    /// Trials after the practice.
+    pub trials: u32,
+    /// How many of them were answered hastily.
+    pub hasty: u32,
+}
+
+/// The trial that is being shown.
+#[derive(Clone, Debug)]
+pub(super) enum Shown {
+    /// The level of each tile, and clicks so far.
+    Acquisition {
+        stack: u32,
+        identical: bool,
+        levels: Vec<u32>,
+        clicks: u64,
+    },
+    Validation {
+        stack: u32,
+        pair: Pair,
+        reference_left: bool,
+    },
+    ForcedChoice {
+        stack: u32,
+        tile: u32,
+        level: u32,
+        noise_first: bool,
+    },
+}
+
 /// The state of a session.
 #[derive(Clone, Debug)]
 pub struct ParticipantSession {
@@ -47,10 +92,7 @@ pub struct ParticipantSession {
     pub(super) grids: Arc<Vec<Arc<QuestGrid>>>,
     /// All trials, the rounds of practice first.
     pub(super) plan: Arc<Vec<PlannedTrial>>,
-    /// Where the current round of practice begins, and where the data begin.
-    pub(super) practice: [u32; 2],
-    /// Rounds of practice begun, and trials passed in the current one.
-    pub(super) attempts: [u32; 2],
+    pub(super) practice: Practice,
     pub(super) stage: Stage,
     pub(super) paused: bool,
     pub(super) events: u64,
@@ -60,11 +102,9 @@ pub struct ParticipantSession {
     pub(super) answers: BTreeMap<String, String>,
     /// Trials answered.
     pub(super) at: u32,
-    /// Acquisition: levels and clicks of the current trial. Forced choice: the level shown.
-    pub(super) levels: Vec<u32>,
-    pub(super) clicks: u64,
-    /// Trials after the practice, and those answered hastily.
-    pub(super) hasty: [u32; 2],
+    /// `None` after the last trial.
+    pub(super) shown: Option<Shown>,
+    pub(super) haste: Haste,
     pub(super) quests: BTreeMap<(u32, u32), QuestPlus>,
     pub(super) outcomes: Vec<TrialOutcome>,
     pub(super) simulated: bool,
@@ -80,17 +120,15 @@ fn misfit<T>(what: &str) -> Result<T, EventMisfit> {
 }
 
 impl ParticipantSession {
-    /// Starts a session. The order of trials depends on the seed of the study and this one.
-    pub fn new(study: Arc<Study>, grids: Arc<Vec<Arc<QuestGrid>>>, seed: u64) -> Self {
-        let mut random = crate::random::seeded(study.seed.rotate_left(32) ^ seed);
-        let [practice, data] = draw_trials(&study, &mut random);
+    /// Starts a session. `plan` is of the same study.
+    pub fn new(study: Arc<Study>, grids: Arc<Vec<Arc<QuestGrid>>>, plan: Plan) -> Self {
+        let Plan { practice, trials } = plan;
         let begin = practice.len() as u32;
         let mut session = Self {
             study,
             grids,
-            plan: Arc::new([practice, data].concat()),
-            practice: [0, begin],
-            attempts: [1, 0],
+            plan: Arc::new([practice, trials].concat()),
+            practice: Practice { first: 0, end: begin, rounds: 1, passed: 0 },
             stage: Stage::Consent,
             paused: false,
             events: 0,
@@ -99,9 +137,8 @@ impl ParticipantSession {
             language: None,
             answers: BTreeMap::new(),
             at: 0,
-            levels: Vec::new(),
-            clicks: 0,
-            hasty: [0, 0],
+            shown: None,
+            haste: Haste::default(),
             quests: BTreeMap::new(),
             outcomes: Vec::new(),
             simulated: false,
@@ -192,22 +229,32 @@ impl ParticipantSession {
                 self.at
             )));
         }
-        let PlannedTrial { task, role } = self.plan[self.at as usize];
-        match (task, event) {
-            (Task::Acquisition { stack, .. }, &StudyEvent::Step { tile, level, ms, .. }) => {
-                self.step(stack, tile, level, ms)
-            }
-            (Task::Acquisition { stack, identical }, StudyEvent::Done { timing, .. }) => {
-                self.check_time(timing)?;
-                let outcome = self.stops(stack);
-                let moved = self.levels.iter().filter(|level| **level > 0).count() as f64;
-                let share = moved / self.levels.len() as f64;
+        if let StudyEvent::Step { tile, level, ms, .. } = *event {
+            return self.step(tile, level, ms);
+        }
+        let (StudyEvent::Done { timing, .. } | StudyEvent::Answer { timing, .. }) = event else {
+            return misfit("this event is no answer");
+        };
+        self.check_time(timing)?;
+        let (outcome, passed) = self.outcome(event)?;
+        self.finish_trial(outcome, passed, timing)
+    }
+
+    /// What the answer to the trial that is shown says, and whether it is the expected one, as far as that is
+    /// known.
+    fn outcome(&self, event: &StudyEvent) -> Result<(TrialOutcome, bool), EventMisfit> {
+        match (&self.shown, event) {
+            (&Some(Shown::Acquisition { stack, identical, ref levels, clicks }), StudyEvent::Done { .. }) => {
+                let moved = levels.iter().filter(|level| **level > 0).count() as f64;
+                let share = moved / levels.len() as f64;
                 let [most, least] = CLICKED_SHARES;
                 let passed = if identical { share <= most } else { share >= least };
-                self.finish_trial(role, outcome, passed, timing)
+                let same =
+                    |o: &&TrialOutcome| matches!(o, TrialOutcome::Stops { stack: s, .. } if *s == stack);
+                let repeat = self.outcomes.iter().filter(same).count() as u32;
+                Ok((TrialOutcome::Stops { stack, repeat, levels: levels.clone(), clicks }, passed))
             }
-            (Task::Validation { stack, pair, .. }, StudyEvent::Answer { choice, timing, .. }) => {
-                self.check_time(timing)?;
+            (&Some(Shown::Validation { stack, pair, .. }), StudyEvent::Answer { choice, .. }) => {
                 let identical = match choice {
                     Choice::Identical => true,
                     Choice::Different => false,
@@ -216,20 +263,18 @@ impl ParticipantSession {
                 // A pair of references is identical; of others only the obvious ones have a known answer
                 let passed = identical == (pair == Pair::Class(Class::Reference));
                 let class = if let Pair::Class(class) = pair { class } else { Class::Noisy };
-                self.finish_trial(role, TrialOutcome::Judged { stack, class, identical }, passed, timing)
+                Ok((TrialOutcome::Judged { stack, class, identical }, passed))
             }
             (
-                Task::ForcedChoice { stack, tile, noise_first, .. },
-                StudyEvent::Answer { choice, timing, .. },
+                &Some(Shown::ForcedChoice { stack, tile, level, noise_first }),
+                StudyEvent::Answer { choice, .. },
             ) => {
-                self.check_time(timing)?;
                 let right = match choice {
                     Choice::First => noise_first,
                     Choice::Second => !noise_first,
                     _ => return misfit("this trial is answered by first or second"),
                 };
-                let outcome = TrialOutcome::Chosen { stack, tile, level: self.levels[0], right };
-                self.finish_trial(role, outcome, right, timing)
+                Ok((TrialOutcome::Chosen { stack, tile, level, right }, right))
             }
             _ => misfit("this kind of answer does not belong to the protocol of the study"),
         }
@@ -250,11 +295,14 @@ impl ParticipantSession {
         Ok(())
     }
 
-    fn step(&mut self, stack: u32, tile: u32, level: u32, ms: f64) -> Result<(), EventMisfit> {
-        let last = self.study.stacks[stack as usize].last();
-        let limit = MAX_ROUNDS * u64::from(last) * self.levels.len() as u64;
+    fn step(&mut self, tile: u32, level: u32, ms: f64) -> Result<(), EventMisfit> {
         self.check_time(&TrialTiming { onset: 0, ms, intervals: Vec::new() })?;
-        let Some(now) = self.levels.get_mut(tile as usize) else {
+        let Some(Shown::Acquisition { stack, levels, clicks, .. }) = &mut self.shown else {
+            return misfit("this kind of answer does not belong to the protocol of the study");
+        };
+        let last = self.study.stacks[*stack as usize].last();
+        let limit = MAX_ROUNDS * u64::from(last) * levels.len() as u64;
+        let Some(now) = levels.get_mut(tile as usize) else {
             return misfit("there is no such tile");
         };
         if level > last || now.abs_diff(level) != 1 {
@@ -262,29 +310,23 @@ impl ParticipantSession {
                 "tile {tile} is at level {now}: a step leads to an adjacent level, 0 to {last}, not to {level}"
             )));
         }
-        if self.clicks >= limit {
+        if *clicks >= limit {
             return misfit("more clicks than any observer needs: finish this trial");
         }
-        (*now, self.clicks) = (level, self.clicks + 1);
+        (*now, *clicks) = (level, *clicks + 1);
         Ok(())
     }
 
-    fn stops(&self, stack: u32) -> TrialOutcome {
-        let same = |o: &&TrialOutcome| matches!(o, TrialOutcome::Stops { stack: s, .. } if *s == stack);
-        let repeat = self.outcomes.iter().filter(same).count() as u32;
-        TrialOutcome::Stops { stack, repeat, levels: self.levels.clone(), clicks: self.clicks }
-    }
-
-    /// Stores the result of a trial and goes on to the next one.
+    /// Stores the result of a trial and shows the next one.
     fn finish_trial(
         &mut self,
-        role: TrialRole,
         outcome: TrialOutcome,
         passed: bool,
         timing: &TrialTiming,
     ) -> Result<(), EventMisfit> {
+        let role = self.plan[self.at as usize].role;
         match role {
-            TrialRole::Practice => self.attempts[1] += u32::from(passed),
+            TrialRole::Practice => self.practice.passed += u32::from(passed),
             TrialRole::Catch(kind) => self.outcomes.push(TrialOutcome::Caught { kind, passed }),
             TrialRole::Data => {
                 if let TrialOutcome::Chosen { stack, tile, level, right } = outcome {
@@ -294,11 +336,11 @@ impl ParticipantSession {
             }
         }
         if role != TrialRole::Practice {
-            let hasty = timing.ms < f64::from(self.study.screening.hasty_ms);
-            self.hasty = [self.hasty[0] + 1, self.hasty[1] + u32::from(hasty)];
+            self.haste.trials += 1;
+            self.haste.hasty += u32::from(timing.ms < f64::from(self.study.screening.hasty_ms));
         }
         self.at += 1;
-        if self.at == self.practice[1] && role == TrialRole::Practice {
+        if self.at == self.practice.end && role == TrialRole::Practice {
             self.end_practice();
         }
         if self.at as usize == self.plan.len() {
@@ -308,22 +350,20 @@ impl ParticipantSession {
         Ok(())
     }
 
-    /// After a round of practice: on to the data if all of it was passed, else another round, if there is
-    /// one.
+    /// After a round of practice: the data if all of it was passed, else another round, if there is one.
     fn end_practice(&mut self) {
-        let [from, to] = self.practice;
+        let Practice { first, end, rounds, passed } = self.practice;
         let most = self.study.screening.practice_attempts;
-        if self.attempts[1] == to - from || most == 0 {
+        if passed == end - first || most == 0 {
             return;
         }
-        if self.attempts[0] >= most {
+        if rounds >= most {
             self.stage = Stage::ScreenedOut;
             return;
         }
-        let round = self.plan[from as usize..to as usize].to_vec();
-        Arc::make_mut(&mut self.plan).splice(to as usize..to as usize, round);
-        self.practice = [to, to + (to - from)];
-        self.attempts = [self.attempts[0] + 1, 0];
+        let round = self.plan[first as usize..end as usize].to_vec();
+        Arc::make_mut(&mut self.plan).splice(end as usize..end as usize, round);
+        self.practice = Practice { first: end, end: end + (end - first), rounds: rounds + 1, passed: 0 };
     }
 
     fn quest(&mut self, stack: u32, tile: u32) -> &mut QuestPlus {
@@ -332,15 +372,19 @@ impl ParticipantSession {
     }
 
     fn begin_trial(&mut self) {
-        self.clicks = 0;
         let task = self.plan.get(self.at as usize).map(|planned| planned.task);
-        self.levels = match task {
-            Some(Task::Acquisition { stack, .. }) => {
-                vec![0; self.study.stacks[stack as usize].grid().len()]
+        self.shown = task.map(|task| match task {
+            Task::Acquisition { stack, identical } => {
+                let levels = vec![0; self.study.stacks[stack as usize].grid().len()];
+                Shown::Acquisition { stack, identical, levels, clicks: 0 }
             }
-            Some(Task::ForcedChoice { obvious: true, .. }) => vec![0],
-            Some(Task::ForcedChoice { stack, tile, .. }) => vec![self.quest(stack, tile).next_level()],
-            Some(Task::Validation { .. }) | None => Vec::new(),
-        };
+            Task::Validation { stack, pair, reference_left } => {
+                Shown::Validation { stack, pair, reference_left }
+            }
+            Task::ForcedChoice { stack, tile, noise_first, obvious } => {
+                let level = if obvious { 0 } else { self.quest(stack, tile).next_level() };
+                Shown::ForcedChoice { stack, tile, level, noise_first }
+            }
+        });
     }
 }

@@ -1,7 +1,7 @@
 //! What can be read from the state of a session.
 
-use super::plan::{Pair, PlannedTrial, Task};
-use super::state::{ParticipantSession, Stage};
+use super::plan::Pair;
+use super::state::{Haste, ParticipantSession, Practice, Shown, Stage};
 use super::trial::{Class, Trial, TrialOutcome, TrialRole};
 use crate::config::Study;
 use crate::questplus::{Posterior, QuestPlus};
@@ -42,17 +42,17 @@ impl ParticipantSession {
 
     /// Number of the current trial among those of practice or of data, from 1, and how many there are.
     pub fn ordinal(&self) -> (u32, u32) {
-        let [from, to] = self.practice;
-        if self.at < to {
-            (self.at - from + 1, to - from)
+        let Practice { first, end, .. } = self.practice;
+        if self.at < end {
+            (self.at - first + 1, end - first)
         } else {
-            (self.at - to + 1, self.plan.len() as u32 - to)
+            (self.at - end + 1, self.plan.len() as u32 - end)
         }
     }
 
     /// Rounds of practice begun.
     pub fn practice_rounds(&self) -> u32 {
-        self.attempts[0]
+        self.practice.rounds
     }
 
     /// What the current trial is for; `None` after the last one.
@@ -80,9 +80,9 @@ impl ParticipantSession {
         &self.answers
     }
 
-    /// Trials after the practice, and how many of them were answered hastily.
-    pub fn hasty(&self) -> [u32; 2] {
-        self.hasty
+    /// How carefully trials were answered so far.
+    pub fn haste(&self) -> Haste {
+        self.haste
     }
 
     /// Results of all trials after the practice, in order.
@@ -100,13 +100,12 @@ impl ParticipantSession {
         if self.stage != Stage::Trials {
             return None;
         }
-        let PlannedTrial { task, role } = *self.plan.get(self.at as usize)?;
-        let (number, practice) = (self.at, role == TrialRole::Practice);
-        Some(match task {
-            Task::Acquisition { stack, identical } => {
-                Trial::Acquisition { number, practice, stack, levels: self.levels.clone(), identical }
+        let (number, practice) = (self.at, self.role()? == TrialRole::Practice);
+        Some(match *self.shown.as_ref()? {
+            Shown::Acquisition { stack, identical, ref levels, .. } => {
+                Trial::Acquisition { number, practice, stack, levels: levels.clone(), identical }
             }
-            Task::Validation { stack, pair, reference_left } => {
+            Shown::Validation { stack, pair, reference_left } => {
                 let shown = &self.study.stacks[stack as usize];
                 let reference = vec![shown.last(); shown.grid().len()];
                 let other = match pair {
@@ -119,9 +118,9 @@ impl ParticipantSession {
                 let (left, right) = if reference_left { (reference, other) } else { (other, reference) };
                 Trial::Validation { number, practice, stack, left, right }
             }
-            Task::ForcedChoice { stack, tile, noise_first, .. } => {
-                let (noise, last) = (self.levels[0], self.study.stacks[stack as usize].last());
-                let (first, second) = if noise_first { (noise, last) } else { (last, noise) };
+            Shown::ForcedChoice { stack, tile, level, noise_first } => {
+                let last = self.study.stacks[stack as usize].last();
+                let (first, second) = if noise_first { (level, last) } else { (last, level) };
                 Trial::ForcedChoice { number, practice, stack, tile, first, second }
             }
         })

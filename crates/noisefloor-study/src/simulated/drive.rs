@@ -13,7 +13,7 @@ use thiserror::Error;
 #[derive(Debug, Error)]
 pub enum DriveError {
     /// The server did not answer.
-    #[error("{url}: no answer: {source}; is `noisefloor study serve` running there?")]
+    #[error("{url}: no answer: {source}; is `noisefloor-lab study serve` running there?")]
     Http {
         /// The address requested.
         url: String,

@@ -8,7 +8,9 @@ use std::time::{Duration, SystemTime, UNIX_EPOCH};
 /// `PRAGMA application_id`: "nfst".
 const APPLICATION: i32 = 0x6e66_7374;
 /// `PRAGMA user_version`: version of the tables below.
-const VERSION: i32 = 2;
+const VERSION: i32 = 3;
+/// Before the trials of sessions were stored.
+const WITHOUT_PLANS: i32 = 2;
 const TABLES: &str = "
 CREATE TABLE IF NOT EXISTS design (only INTEGER PRIMARY KEY CHECK (only = 1), text TEXT NOT NULL) STRICT;
 CREATE TABLE IF NOT EXISTS sessions (
@@ -18,6 +20,9 @@ CREATE TABLE IF NOT EXISTS sessions (
 CREATE TABLE IF NOT EXISTS links (
     token TEXT PRIMARY KEY, code TEXT REFERENCES sessions (code) ON DELETE SET NULL
 ) STRICT, WITHOUT ROWID;
+CREATE TABLE IF NOT EXISTS plans (
+    code TEXT PRIMARY KEY REFERENCES sessions (code) ON DELETE CASCADE, plan TEXT NOT NULL
+) STRICT, WITHOUT ROWID;
 CREATE TABLE IF NOT EXISTS events (
     code TEXT NOT NULL REFERENCES sessions (code), seq INTEGER NOT NULL, received_ms INTEGER NOT NULL,
     envelope TEXT NOT NULL, PRIMARY KEY (code, seq)
@@ -26,10 +31,12 @@ CREATE TABLE IF NOT EXISTS events (
 pub(super) fn open_existing(path: &Path, design: &str) -> Result<Connection, StoreError> {
     // Without the CREATE flag, a missing file is an error
     let flags = OpenFlags::SQLITE_OPEN_READ_WRITE | OpenFlags::SQLITE_OPEN_NO_MUTEX;
-    let made = Connection::open_with_flags(path, flags);
-    made.and_then(|c| settle(&c).map(|()| c))
-        .map_err(|source| StoreError::Database { path: path.to_owned(), source })
-        .and_then(|connection| check_design(&connection, path, design).map(|()| connection))
+    let failed = |source| StoreError::Database { path: path.to_owned(), source };
+    let connection = Connection::open_with_flags(path, flags).map_err(failed)?;
+    settle(&connection).map_err(failed)?;
+    check_design(&connection, path, design)?;
+    connection.execute_batch(TABLES).map_err(failed)?;
+    Ok(connection)
 }
 
 pub(super) fn open(path: &Path, design: &str) -> Result<Connection, StoreError> {
@@ -39,7 +46,8 @@ pub(super) fn open(path: &Path, design: &str) -> Result<Connection, StoreError> 
     let pragma = |name: &str| connection.pragma_query_value(None, name, |row| row.get::<_, i32>(0));
     let (application, version) =
         (pragma("application_id").map_err(failed)?, pragma("user_version").map_err(failed)?);
-    if (application, version) != (APPLICATION, VERSION) {
+    let known = application == APPLICATION && (WITHOUT_PLANS..=VERSION).contains(&version);
+    if !known {
         let tables: i64 = connection
             .query_row("SELECT count(*) FROM sqlite_schema", [], |row| row.get(0))
             .map_err(failed)?;
@@ -47,6 +55,8 @@ pub(super) fn open(path: &Path, design: &str) -> Result<Connection, StoreError> 
             return Err(StoreError::OtherStudy { path: path.to_owned() });
         }
         connection.pragma_update(None, "application_id", APPLICATION).map_err(failed)?;
+    }
+    if version != VERSION {
         connection.pragma_update(None, "user_version", VERSION).map_err(failed)?;
     }
     connection.execute_batch(TABLES).map_err(failed)?;

@@ -1,6 +1,7 @@
 //! Sessions as they are stored.
 
 use crate::event::Envelope;
+use crate::session::Plan;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -24,6 +25,10 @@ pub struct SessionRecord {
     /// When each event was stored, in milliseconds since 1970.
     #[serde(default)]
     pub received_ms: Vec<u64>,
+    /// The trials, as drawn when the session began; `None` in databases of before, which draw them again from
+    /// the seed.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub plan: Option<Plan>,
     /// All events, in order.
     pub events: Vec<Envelope>,
 }
@@ -41,12 +46,14 @@ mod seed_as_text {
 }
 
 /// A session about to begin.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct NewSession {
     /// The participant's code.
     pub code: String,
     /// Seed of the order of trials.
     pub seed: u64,
+    /// The trials, drawn with it.
+    pub plan: Plan,
     /// Group of observers; empty if the study defines none.
     pub group: String,
     /// Whether the observer is simulated.

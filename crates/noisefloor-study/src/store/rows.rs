@@ -2,8 +2,10 @@
 
 use super::database::now_ms;
 use super::record::{NewSession, SessionRecord};
+use crate::config::Study;
 use crate::error::StoreError;
 use crate::event::Envelope;
+use crate::session::Plan;
 use rusqlite::{Connection, OptionalExtension, Row, params};
 use std::path::Path;
 
@@ -18,7 +20,7 @@ pub(super) fn begin(
     session: &NewSession,
 ) -> Result<String, StoreError> {
     let failed = |source| StoreError::Database { path: path.to_owned(), source };
-    let NewSession { code, seed, group, simulated, ids, link } = session;
+    let NewSession { code, seed, plan, group, simulated, ids, link } = session;
     if let Some(token) = link {
         let query = "SELECT code FROM links WHERE token = ?1";
         let found = connection.query_row(query, [token], |row| row.get::<_, Option<String>>(0)).optional();
@@ -33,10 +35,31 @@ pub(super) fn begin(
     let insert = "INSERT INTO sessions VALUES (?1, ?2, ?3, ?4, ?5, ?6)";
     let row = params![code, *seed as i64, group, simulated, now_ms(), ids];
     connection.execute(insert, row).map_err(failed)?;
+    keep_plan(connection, code, plan).map_err(failed)?;
     if let Some(token) = link {
         connection.execute("UPDATE links SET code = ?2 WHERE token = ?1", [token, code]).map_err(failed)?;
     }
     Ok(code.clone())
+}
+
+fn keep_plan(connection: &Connection, code: &str, plan: &Plan) -> rusqlite::Result<()> {
+    let text = serde_json::to_string(plan).unwrap_or_default();
+    connection.execute("INSERT INTO plans VALUES (?1, ?2)", [code, &text]).map(drop)
+}
+
+/// Draws and keeps the plans of sessions that have only the seed of theirs.
+pub(super) fn keep_plans(connection: &Connection, path: &Path, study: &Study) -> Result<(), StoreError> {
+    let failed = |source| StoreError::Database { path: path.to_owned(), source };
+    let query = "SELECT code, seed FROM sessions WHERE code NOT IN (SELECT code FROM plans)";
+    let mut statement = connection.prepare(query).map_err(failed)?;
+    let without = statement
+        .query_map([], |row| Ok((row.get(0)?, row.get::<_, i64>(1)? as u64)))
+        .and_then(Iterator::collect::<rusqlite::Result<Vec<(String, u64)>>>)
+        .map_err(failed)?;
+    without
+        .iter()
+        .try_for_each(|(code, seed)| keep_plan(connection, code, &Plan::draw(study, *seed)))
+        .map_err(failed)
 }
 
 pub(super) fn append(
@@ -84,8 +107,11 @@ pub(super) fn parse(text: &str, code: &str, seq: u64) -> Result<Envelope, StoreE
 
 pub(super) fn load(connection: &Connection, path: &Path, code: &str) -> Result<SessionRecord, StoreError> {
     let failed = |source| StoreError::Database { path: path.to_owned(), source };
-    let query = "SELECT seed, observers, simulated, begun_ms, ids FROM sessions WHERE code = ?1";
+    let query = "SELECT seed, observers, simulated, begun_ms, ids, plan
+                 FROM sessions LEFT JOIN plans USING (code) WHERE code = ?1";
+    let mut plan = None;
     let record = |row: &Row<'_>| {
+        plan = row.get::<_, Option<String>>(5)?;
         Ok(SessionRecord {
             code: code.to_owned(),
             seed: row.get::<_, i64>(0)? as u64,
@@ -94,11 +120,14 @@ pub(super) fn load(connection: &Connection, path: &Path, code: &str) -> Result<S
             begun_ms: row.get(3)?,
             ids: serde_json::from_str(&row.get::<_, String>(4)?).unwrap_or_default(),
             received_ms: Vec::new(),
+            plan: None,
             events: Vec::new(),
         })
     };
     let found = connection.query_row(query, [code], record).optional().map_err(failed)?;
     let mut record = found.ok_or_else(|| StoreError::Unknown(code.to_owned()))?;
+    let parsed = plan.map(|text| serde_json::from_str(&text)).transpose();
+    record.plan = parsed.map_err(|_| StoreError::Plan { code: code.to_owned() })?;
     let query = "SELECT seq, received_ms, envelope FROM events WHERE code = ?1 ORDER BY seq";
     let mut statement = connection.prepare_cached(query).map_err(failed)?;
     let rows = statement

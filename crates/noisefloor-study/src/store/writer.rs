@@ -2,16 +2,17 @@
 
 use super::database::open;
 use super::record::{NewSession, SessionRecord};
-use super::rows::{all_codes, append, begin, erase, event, load, scrub};
+use super::rows::{all_codes, append, begin, erase, event, keep_plans, load, scrub};
+use crate::config::Study;
 use crate::error::StoreError;
 use crate::event::Envelope;
 use rusqlite::{Connection, TransactionBehavior};
 use std::ffi::{OsStr, OsString};
 use std::path::{Path, PathBuf};
-use std::sync::mpsc;
+use std::sync::{Arc, mpsc};
 use tokio::sync::oneshot;
 
-/// Most commands that share a commit; bounds what a failing disk can take with it.
+/// Most commands that share a commit; bounds what is lost if the disk fails.
 const MOST_AT_ONCE: usize = 512;
 /// The answers of a study, open for writing. Clones share one writer thread.
 #[derive(Clone, Debug)]
@@ -22,6 +23,7 @@ pub struct AnswerStore {
 type Reply<T> = oneshot::Sender<Result<T, StoreError>>;
 
 enum Command {
+    KeepPlans { study: Arc<Study>, reply: Reply<()> },
     Begin { session: Box<NewSession>, reply: Reply<String> },
     Append { code: String, envelope: Box<Envelope>, reply: Reply<()> },
     Load { code: String, reply: Reply<SessionRecord> },
@@ -50,6 +52,14 @@ impl AnswerStore {
         let work = move || write(&mut connection, &path, &received);
         std::thread::Builder::new().name("answers".into()).spawn(work).map_err(|_| StoreError::Closed)?;
         Ok(Self { commands })
+    }
+
+    /// Draws and stores the trials of sessions that were begun before trials were stored.
+    ///
+    /// # Errors
+    /// [`StoreError`] if they could not be stored.
+    pub async fn keep_plans(&self, study: Arc<Study>) -> Result<(), StoreError> {
+        self.ask(|reply| Command::KeepPlans { study, reply }).await
     }
 
     /// Begins a session and returns its code. A link that was used before leads to the session it began.
@@ -160,7 +170,9 @@ fn refuse(batch: Vec<Command>, path: &Path, error: &rusqlite::Error) {
     for command in batch {
         // A dropped receiver needs no reply
         match command {
-            Command::Append { reply, .. } | Command::Erase { reply, .. } => {
+            Command::Append { reply, .. }
+            | Command::Erase { reply, .. }
+            | Command::KeepPlans { reply, .. } => {
                 drop(reply.send(Err(failed())));
             }
             Command::Begin { reply, .. } => drop(reply.send(Err(failed()))),
@@ -185,6 +197,7 @@ fn hold<T: Send + 'static>(path: &Path, reply: Reply<T>, result: Result<T, Store
 fn run(connection: &Connection, path: &Path, command: Command) -> Held {
     let failed = |source| StoreError::Database { path: path.to_owned(), source };
     match command {
+        Command::KeepPlans { study, reply } => hold(path, reply, keep_plans(connection, path, &study)),
         Command::Begin { session, reply } => hold(path, reply, begin(connection, path, &session)),
         Command::Codes { reply } => hold(path, reply, all_codes(connection).map_err(failed)),
         Command::Append { code, envelope, reply } => {
@@ -207,7 +220,9 @@ mod tests {
 
     fn session(code: &str) -> NewSession {
         let ids = BTreeMap::from([("PROLIFIC_PID".to_owned(), IDENTIFIER.repeat(20))]);
-        NewSession { code: code.into(), seed: 1, group: String::new(), simulated: false, ids, link: None }
+        let plan = serde_json::from_str(r#"{"practice":[],"trials":[]}"#).unwrap();
+        let (code, group) = (code.into(), String::new());
+        NewSession { code, seed: 1, plan, group, simulated: false, ids, link: None }
     }
 
     /// The files of a database that still name the participant.
@@ -220,7 +235,7 @@ mod tests {
         files.filter(named).collect()
     }
 
-    /// When an erasure is acknowledged, nothing is left of it: whoever is killed then has nothing to hide.
+    /// When an erasure is acknowledged, nothing is left of it, even if the server is killed right then.
     #[tokio::test]
     async fn an_erasure_is_acknowledged_when_it_is_complete() {
         let folder = tempfile::tempdir().unwrap();

@@ -1,7 +1,7 @@
 use crate::kit::Folder;
 use noisefloor_study::analysis::{AnalysisOptions, Observer, StudyReport, report};
 use noisefloor_study::simulated::{Public, SpreadShape, run};
-use noisefloor_study::{ParticipantSession, Study, grids};
+use noisefloor_study::{ParticipantSession, Plan, Study, grids};
 use std::sync::Arc;
 
 /// A study of so many simulated observers, without a server.
@@ -9,7 +9,7 @@ fn simulated(study: &Arc<Study>, public: &Public, observers: u64, seed: u64) -> 
     let grids = grids(study);
     let observe = |i: u64| {
         let seed = 1000 * seed + i;
-        let mut session = ParticipantSession::new(study.clone(), grids.clone(), seed);
+        let mut session = ParticipantSession::new(study.clone(), grids.clone(), Plan::draw(study, seed));
         run(&mut session, &mut public.draw(seed)).unwrap();
         Observer::of(&format!("simulated {i}"), "", &session)
     };

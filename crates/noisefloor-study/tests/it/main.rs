@@ -39,6 +39,9 @@ mod proxy;
 /// The state of a session, without a server.
 #[cfg(test)]
 mod session;
+/// Databases of earlier versions, and the trials that are stored with a session.
+#[cfg(test)]
+mod stored;
 /// Study files and stacks, good and bad.
 #[cfg(test)]
 mod study;

@@ -3,7 +3,8 @@ use noisefloor::{Batch, ProgressiveSource, Repeats, Request, SourceError, Source
 use noisefloor_study::analysis::raw::{DICTIONARY, responses, write_raw};
 use noisefloor_study::analysis::{AnalysisOptions, analyse};
 use noisefloor_study::simulated::drive;
-use noisefloor_study::{AnswerStore, StoreError, render_stack, store};
+use noisefloor_study::{AnswerStore, NewSession, Plan, StoreError, render_stack, store};
+use std::collections::BTreeMap;
 use std::fs;
 
 /// Every response of three sessions is in the table, with all its columns described, and no code.
@@ -114,8 +115,9 @@ fn links_begin_one_session_each() {
     let links = store::make_links(&study.database, &study.design(), 2).unwrap();
     let answers = AnswerStore::open(&study.database, &study.design()).unwrap();
     let begin = |code: &str, link: &str| {
-        let mut session = noisefloor_study::NewSession::default();
-        (session.code, session.link) = (code.to_owned(), Some(link.to_owned()));
+        let (code, link, plan) = (code.to_owned(), Some(link.to_owned()), Plan::draw(&study, 1));
+        let (group, ids) = (String::new(), BTreeMap::new());
+        let session = NewSession { code, seed: 1, plan, group, simulated: false, ids, link };
         let runtime = tokio::runtime::Builder::new_current_thread().build().unwrap();
         runtime.block_on(answers.begin(session))
     };

@@ -1,8 +1,8 @@
 use crate::kit::{Folder, levels, public};
 use noisefloor_study::simulated::{Behaviour, run};
 use noisefloor_study::{
-    CatchKind, Choice, Conditions, ParticipantSession, Stage, StudyEvent, Trial, TrialOutcome, TrialRole,
-    TrialTiming, ViewingProblem, grids,
+    CatchKind, Choice, Conditions, Haste, ParticipantSession, Plan, Stage, StudyEvent, Trial, TrialOutcome,
+    TrialRole, TrialTiming, ViewingProblem, grids,
 };
 use std::collections::BTreeMap;
 
@@ -27,7 +27,7 @@ fn done(trial: u32) -> StudyEvent {
 fn begun(protocol: &str, extra: &str) -> (Folder, ParticipantSession) {
     let folder = Folder::new(protocol, &["wall", "door"], &levels(6, 2.0), extra);
     let study = folder.study();
-    let mut session = ParticipantSession::new(study.clone(), grids(&study), 5);
+    let mut session = ParticipantSession::new(study.clone(), grids(&study), Plan::draw(&study, 5));
     session.apply(&StudyEvent::Consent { language: "en".into() }).unwrap();
     session.apply(&StudyEvent::Conditions(conditions())).unwrap();
     (folder, session)
@@ -65,7 +65,10 @@ fn each_pair_is_shown_twice_between_practice_and_catch_trials() {
     assert_eq!(shown, [0, 0, 1, 1]);
     let catch = (TrialRole::Catch(CatchKind::Identical), true);
     assert_eq!(roles, [(TrialRole::Practice, false), (TrialRole::Practice, true), catch, catch]);
-    assert_eq!((session.stage(), session.progress(), session.hasty()), (Stage::Finished, (8, 8), [6, 0]));
+    assert_eq!(
+        (session.stage(), session.progress(), session.haste()),
+        (Stage::Finished, (8, 8), Haste { trials: 6, hasty: 0 })
+    );
     let caught = |o: &&TrialOutcome| matches!(o, TrialOutcome::Caught { passed: true, .. });
     assert_eq!(session.outcomes().iter().filter(caught).count(), 2);
     let stops = |o: &&TrialOutcome| matches!(o, TrialOutcome::Stops { levels, clicks: 2, repeat: 0 | 1, .. } if levels == &[1, 1]);
@@ -135,7 +138,7 @@ fn steps_are_reversible_and_one_at_a_time() {
 fn nothing_is_shown_before_consent_or_while_paused() {
     let folder = Folder::new("acquisition", &["wall"], &levels(4, 2.0), "");
     let study = folder.study();
-    let mut session = ParticipantSession::new(study.clone(), grids(&study), 5);
+    let mut session = ParticipantSession::new(study.clone(), grids(&study), Plan::draw(&study, 5));
     assert_eq!(session.trial(), None);
     assert!(session.apply(&StudyEvent::Conditions(conditions())).is_err());
     assert!(session.apply(&step(0, 0, 1)).is_err());
@@ -184,7 +187,7 @@ fn questions_come_between_consent_and_conditions() {
            option = [{ id = \"yes\", text = { en = \"yes\" } }, { id = \"no\", text = { en = \"no\" } }]\n";
     std::fs::write(&folder.file, text).unwrap();
     let study = folder.study();
-    let mut session = ParticipantSession::new(study.clone(), grids(&study), 5);
+    let mut session = ParticipantSession::new(study.clone(), grids(&study), Plan::draw(&study, 5));
     session.apply(&StudyEvent::Consent { language: "en".into() }).unwrap();
     assert_eq!(session.stage(), Stage::Questions);
     let answers = |pairs: &[(&str, &str)]| StudyEvent::Questions {
@@ -209,7 +212,7 @@ fn order_depends_on_the_seed_alone() {
     let folder = Folder::new("validation", &["wall", "door"], &levels(6, 2.0), "repeats = 10");
     let study = folder.study();
     let answered = |seed| {
-        let mut session = ParticipantSession::new(study.clone(), grids(&study), seed);
+        let mut session = ParticipantSession::new(study.clone(), grids(&study), Plan::draw(&study, seed));
         run(&mut session, &mut public(2, &[40.0, 40.0]).draw(1)).unwrap();
         format!("{:?}", session.outcomes())
     };
@@ -230,7 +233,8 @@ fn inattentive_observers_are_excluded() {
         let grids = grids(&study);
         let excluded = |behaviour| {
             let broken = |seed: u64| {
-                let mut session = ParticipantSession::new(study.clone(), grids.clone(), seed);
+                let mut session =
+                    ParticipantSession::new(study.clone(), grids.clone(), Plan::draw(&study, seed));
                 let public = public(2, &[120.0, 300.0]);
                 run(&mut session, &mut public.draw_as(seed, behaviour)).unwrap();
                 !screening::individual(&Observer::of("x", "", &session), &study).is_empty()

@@ -14,8 +14,7 @@ use noisefloor::{
 /// 32×32 pixels). Noise that does not depend on the seed is not found.
 ///
 /// # Panics
-/// If a tile has not converged, there is no reference, or it is none that
-/// [`check_source`](crate::check_source) accepts.
+/// If a tile has not converged, there is no reference, or [`check_source`](crate::check_source) rejects it.
 pub fn check_reference_is_free_of_noise<S: ProgressiveSource>(make: impl Fn(u64) -> S) {
     let [one, other] = [1, 2].map(|seed| {
         let mut source = make(seed);

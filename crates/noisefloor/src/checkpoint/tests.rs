@@ -1,6 +1,6 @@
 use super::*;
 use crate::blocks::{BlockRequest, BlockSamples};
-use crate::criterion::{FixedSpp, Resumable, StoppingCriterion};
+use crate::criterion::{CriterionError, FixedSpp, StoppingCriterion, Verdict, View};
 use crate::driver::{Driver, Event};
 use crate::oracle::Oracle;
 use crate::source::{Batch, ProgressiveSource, Repeats, Request, SourceError, SourceInfo};
@@ -79,9 +79,9 @@ fn broken_off_with<C: StoppingCriterion>(criterion: C, params: Params, batches: 
     driver
 }
 
-fn kept<C: Resumable>(driver: &Driver<Noise, C>) -> Vec<u8> {
+fn kept<C: StoppingCriterion>(driver: &Driver<Noise, C>) -> Vec<u8> {
     let mut bytes = Vec::new();
-    driver.session().checkpoint("noise").write(&mut bytes).unwrap();
+    driver.session().checkpoint("noise").unwrap().write(&mut bytes).unwrap();
     bytes
 }
 
@@ -140,12 +140,12 @@ fn blocks_keep_their_samples_and_shares() {
 fn an_oracle_takes_up_no_nonsense() {
     let driver = broken_off(Oracle::bundled(), 3);
     let grid = driver.session().film().grid();
-    let state = driver.session().criterion().state();
+    let state = driver.session().criterion().state().unwrap();
     let mut oracle = Oracle::bundled();
-    assert!(oracle.restore(grid, &state) && oracle.state() == state);
+    assert!(oracle.restore(grid, &state) && oracle.state().as_ref() == Some(&state));
     assert!(!oracle.restore(crate::TileGrid::new(16, 16, 16).unwrap(), &state));
     assert!(!oracle.restore(grid, &state[..state.len() - 1]) && !oracle.restore(grid, &[0xff; 64]));
-    assert!(oracle.state() == state);
+    assert!(oracle.state() == Some(state));
 }
 
 #[test]
@@ -222,7 +222,7 @@ fn another_source_is_refused() {
         now.add("hall.xml", contents);
         let mut kept = crate::source::SourceIdentity::new("noise");
         kept.add("hall.xml", b"lamps");
-        let mut checkpoint = driver.session().checkpoint("noise");
+        let mut checkpoint = driver.session().checkpoint("noise").unwrap();
         checkpoint.source = Cow::Owned(kept);
         let mut session = crate::Session::new(96, 48, FixedSpp(40), params()).unwrap();
         session.set_source(now);
@@ -238,7 +238,7 @@ fn another_source_is_refused() {
 fn what_does_not_hold_together_is_refused() {
     let driver = broken_off(FixedSpp(40), 1);
     let refused = |change: &dyn Fn(&mut Checkpoint<'_>)| {
-        let mut checkpoint = driver.session().checkpoint("noise");
+        let mut checkpoint = driver.session().checkpoint("noise").unwrap();
         change(&mut checkpoint);
         let driver = Driver::new(Noise(Repeats::Samples), FixedSpp(40), params()).unwrap();
         matches!(driver.resume("noise", checkpoint), Err(CheckpointError::Invalid(_)))
@@ -277,7 +277,7 @@ proptest! {
 #[test]
 fn a_film_is_believed_as_far_as_it_comes() {
     let driver = broken_off(FixedSpp(40), 1);
-    let mut checkpoint = driver.session().checkpoint("noise");
+    let mut checkpoint = driver.session().checkpoint("noise").unwrap();
     let mut file = Vec::new();
     checkpoint.film = Cow::Owned(Film::new(crate::TileGrid::new(96, 48, 16).unwrap()));
     checkpoint.write(&mut file).unwrap();
@@ -300,4 +300,30 @@ fn a_film_is_believed_as_far_as_it_comes() {
 /// Bytes before the pixels.
 fn head(file: &[u8]) -> usize {
     52 + u64::from_le_bytes(file[12..20].try_into().unwrap()) as usize
+}
+
+/// A criterion that does not say its state.
+struct Unsaid;
+
+impl StoppingCriterion for Unsaid {
+    fn name(&self) -> String {
+        "a whim".into()
+    }
+
+    fn fingerprint(&self) -> String {
+        self.name()
+    }
+
+    fn judge(&mut self, _: &View<'_>, tiles: &[Tile]) -> Result<Vec<Verdict>, CriterionError> {
+        Ok(vec![Verdict::default(); tiles.len()])
+    }
+}
+
+#[test]
+fn a_criterion_that_keeps_its_state_to_itself_is_not_resumed() {
+    let whim: Box<dyn StoppingCriterion + Send> = Box::new(Unsaid);
+    let driver: Driver<Noise> = broken_off(whim, 1);
+    let said = driver.session().checkpoint("noise").unwrap_err().to_string();
+    assert!(said.contains("a whim cannot be resumed"), "{said}");
+    assert!(!Unsaid.restore(driver.session().film().grid(), &[]));
 }

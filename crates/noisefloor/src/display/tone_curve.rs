@@ -89,7 +89,9 @@ impl<'de> Deserialize<'de> for ToneCurve {
         let hash = blake3::Hash::from_hex(text.as_bytes()).map_err(D::Error::custom)?;
         let digest = *hash.as_bytes();
         let map = curves().get(&digest).copied();
-        let unknown = || D::Error::custom(format_args!("this program has not made the tone curve {text}"));
+        let unknown = || {
+            D::Error::custom(format_args!("its tone curve {text} is another one: give the LUT that it had"))
+        };
         map.map(|map| Self { digest, map }).ok_or_else(unknown)
     }
 }

@@ -2,25 +2,29 @@
 
 use super::Session;
 use crate::checkpoint::{Checkpoint, CheckpointError};
-use crate::criterion::Resumable;
+use crate::criterion::StoppingCriterion;
 use crate::session::Stop;
 use std::borrow::Cow;
 
-impl<C: Resumable> Session<C> {
+impl<C: StoppingCriterion> Session<C> {
     /// A snapshot, for resuming the session later. `job` is how the caller identifies the job, beside what
     /// [`Session::set_source`] said.
-    pub fn checkpoint<'a>(&'a self, job: &'a str) -> Checkpoint<'a> {
-        Checkpoint {
+    ///
+    /// # Errors
+    /// [`CheckpointError::Criterion`] if the criterion keeps a state that cannot be saved.
+    pub fn checkpoint<'a>(&'a self, job: &'a str) -> Result<Checkpoint<'a>, CheckpointError> {
+        let unsaid = || CheckpointError::Criterion(self.criterion.name());
+        Ok(Checkpoint {
             job: job.into(),
             source: Cow::Borrowed(&self.source),
             criterion: self.criterion.fingerprint(),
-            state: self.criterion.state(),
+            state: self.criterion.state().ok_or_else(unsaid)?,
             params: self.params,
             display: self.display,
             film: Cow::Borrowed(&self.film),
             tiles: Cow::Borrowed(&self.tiles),
             shares: Cow::Borrowed(&self.shares),
-        }
+        })
     }
 
     /// Resumes another session of the same job where it stood. Tiles that were ended by a limit or a failure

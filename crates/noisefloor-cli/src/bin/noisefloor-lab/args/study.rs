@@ -1,0 +1,283 @@
+//! `noisefloor-lab study`.
+
+use crate::study::{
+    AnalyseJob, BackupJob, DataFolderJob, LinksJob, ObserverJob, ServeJob, SimulateJob, StackDenoiser,
+    StackJob, StudyJob,
+};
+use anyhow::Context;
+use clap::{Args, Subcommand, ValueEnum};
+use noisefloor_cli::options::renderer::RendererArgs;
+use noisefloor_denoise::OIDN;
+use noisefloor_sidecar::PictureCommand;
+use noisefloor_study::analysis::{AnalysisOptions, CorpusThreshold};
+use noisefloor_study::{Exposure, Study, parse_code};
+use std::ffi::OsString;
+use std::net::{IpAddr, SocketAddr};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::Duration;
+
+/// Ask people: collect thresholds in the browser, check what a model says, and train on the answers.
+///
+/// STUDY.toml names stacks of pictures (folders of NNNNN.png or NNNNN.exr, named by samples per pixel), the
+/// protocol, and the texts that observers read and agree to. docs/study.md explains it.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  noisefloor-lab study stack cornell-box --size 256x256 --out stacks/cornell-box
+  noisefloor-lab study stack cornell-box --size 256x256 --denoise oidn --out stacks/denoised-cornell-box
+  noisefloor-lab study serve hall.toml
+  noisefloor-lab study simulate hall.toml --observers 12      a rehearsal, kept apart from people's answers
+  noisefloor-lab study analyse hall.toml --out out/hall
+  noisefloor-lab train --corpus out/hall/corpus --corpus another-study --out my.nfm")]
+pub struct StudyArgs {
+    #[command(subcommand)]
+    command: StudyCommand,
+}
+
+#[derive(Debug, Subcommand)]
+enum StudyCommand {
+    Stack(StackArgs),
+    Serve(ServeArgs),
+    Analyse(AnalyseArgs),
+    Simulate(SimulateArgs),
+    Links(LinksArgs),
+    Data(DataFolderArgs),
+    Backup(BackupArgs),
+    /// Print everything that is stored about one observer, as JSON.
+    Export(ObserverArgs),
+    /// Erase everything that is stored about one observer, for good.
+    Erase(ObserverArgs),
+}
+
+/// Render a stack of pictures for a study in one go: each level goes on from the one before.
+#[derive(Debug, Args)]
+struct StackArgs {
+    /// Scene, as for `render`.
+    #[arg(value_name = "SCENE")]
+    scene: OsString,
+    #[command(flatten)]
+    renderer: RendererArgs,
+    /// Samples per pixel of the levels, increasing; the last one is the reference.
+    #[arg(
+        long,
+        value_name = "N,…",
+        value_delimiter = ',',
+        default_value = "8,16,32,64,128,256,512,1024,2048"
+    )]
+    levels: Vec<u64>,
+    /// Denoise every level but the last, the reference: `oidn` is Open Image Denoise (`noisefloor doctor
+    /// --install oidn`). Or name any program: {in} is the EXR that it reads, {out} the path, without
+    /// extension, of the EXR or PFM that it writes. Thresholds of such pictures hold for this denoiser; a
+    /// model cannot learn from them.
+    #[arg(long, value_name = "oidn|PROGRAM …")]
+    denoise: Option<String>,
+    /// Folder to write the levels into, as linear EXRs.
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+}
+
+/// Serve the pages of a study until Ctrl-C.
+///
+/// Only this machine can reach the server unless --listen says otherwise. Every answer is on disk before it
+/// is acknowledged, so the server may be killed and restarted at any time.
+#[derive(Debug, Args)]
+struct ServeArgs {
+    /// Study file.
+    #[arg(value_name = "STUDY.toml")]
+    study: PathBuf,
+    /// Address to listen on. Answers travel unencrypted: use it only in a network that you trust.
+    #[arg(long, value_name = "IP", default_value = "127.0.0.1")]
+    listen: IpAddr,
+    /// Port; 0 picks a free one.
+    #[arg(long, default_value_t = 8437)]
+    port: u16,
+    /// Another name that browsers may use for this server. Repeat for more.
+    #[arg(long, value_name = "HOST")]
+    allow_host: Vec<String>,
+    /// Trust X-Forwarded-For and X-Forwarded-Proto from a proxy at this address. Repeat for more.
+    #[arg(long, value_name = "IP")]
+    trust_proxy: Vec<IpAddr>,
+    /// Path under which the proxy serves the study, such as /noise.
+    #[arg(long, value_name = "PATH", default_value = "")]
+    base_path: String,
+    /// Admit simulated observers, for a rehearsal with a program of your own: they need no link, get no
+    /// completion code, and their answers are kept apart.
+    #[arg(long)]
+    admit_simulated: bool,
+}
+
+/// Make one-time links, one for each participant.
+#[derive(Debug, Args)]
+struct LinksArgs {
+    /// Study file.
+    #[arg(value_name = "STUDY.toml")]
+    study: PathBuf,
+    /// Number of links.
+    #[arg(long, default_value_t = 10, value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    count: u32,
+    /// Address of the study as participants open it.
+    #[arg(long, value_name = "URL", default_value = "http://127.0.0.1:8437/")]
+    url: String,
+}
+
+/// Write every response as data for others: one long table, and a BIDS-like folder with a data dictionary.
+#[derive(Debug, Args)]
+struct DataFolderArgs {
+    /// Study file.
+    #[arg(value_name = "STUDY.toml")]
+    study: PathBuf,
+    /// Folder to write into.
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// Write the responses of simulated observers instead of people.
+    #[arg(long)]
+    simulated: bool,
+}
+
+/// Copy the database of a study, even while it is being served. To restore it, put the copy in its place.
+#[derive(Debug, Args)]
+struct BackupArgs {
+    /// Study file.
+    #[arg(value_name = "STUDY.toml")]
+    study: PathBuf,
+    /// The copy, which must not exist yet.
+    #[arg(value_name = "FILE")]
+    to: PathBuf,
+}
+
+/// Analyse the answers: thresholds of tiles, agreement, groups, Table 2 of the paper, plots, and a corpus
+/// for `train`.
+#[derive(Debug, Args)]
+struct AnalyseArgs {
+    /// Study file.
+    #[arg(value_name = "STUDY.toml")]
+    study: PathBuf,
+    /// Folder to write into.
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// The threshold of a tile in the corpus and in the grid over the picture. `train` expects the mean: P
+    /// counts the scatter of observers around it.
+    #[arg(long, value_enum, default_value_t = ThresholdChoice::Mean)]
+    threshold: ThresholdChoice,
+    /// Keep observers whom the rules of the study exclude.
+    #[arg(long)]
+    keep_excluded: bool,
+    /// Analyse simulated observers instead of people.
+    #[arg(long)]
+    simulated: bool,
+    /// Seed of the bootstrap.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+}
+
+/// What the threshold of a tile is.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum ThresholdChoice {
+    /// Where 95 % of observers see no difference.
+    Level95,
+    /// The mean over observers.
+    Mean,
+}
+
+/// Rehearse a study: simulated observers with made-up thresholds answer it through a real server. Their
+/// answers are kept apart from people's.
+#[derive(Debug, Args)]
+struct SimulateArgs {
+    /// Study file.
+    #[arg(value_name = "STUDY.toml")]
+    study: PathBuf,
+    /// Number of observers.
+    #[arg(long, default_value_t = 12, value_parser = clap::value_parser!(u16).range(1..=1000))]
+    observers: u16,
+    /// Seed: the same seed draws the same observers.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+}
+
+/// One observer.
+#[derive(Debug, Args)]
+struct ObserverArgs {
+    /// Study file.
+    #[arg(value_name = "STUDY.toml")]
+    study: PathBuf,
+    /// The participant's code.
+    #[arg(value_name = "CODE")]
+    code: String,
+}
+
+impl StudyArgs {
+    /// A study that can be opened, and what to do with it.
+    pub fn check(self) -> anyhow::Result<StudyJob> {
+        Ok(match self.command {
+            StudyCommand::Stack(args) => StudyJob::Stack(stack(args)?),
+            StudyCommand::Serve(args) => StudyJob::Serve(ServeJob {
+                study: complete(&args.study)?,
+                address: SocketAddr::new(args.listen, args.port),
+                exposure: Exposure::named(&args.allow_host)
+                    .trusting(&args.trust_proxy)
+                    .under(&args.base_path),
+                admit_simulated: args.admit_simulated,
+            }),
+            StudyCommand::Analyse(args) => StudyJob::Analyse(AnalyseJob {
+                study: Arc::new(Study::open(&args.study)?),
+                out: args.out,
+                options: AnalysisOptions {
+                    keep_excluded: args.keep_excluded,
+                    seed: args.seed,
+                    simulated: args.simulated,
+                },
+                threshold: match args.threshold {
+                    ThresholdChoice::Level95 => CorpusThreshold::Level95,
+                    ThresholdChoice::Mean => CorpusThreshold::Mean,
+                },
+            }),
+            StudyCommand::Simulate(args) => StudyJob::Simulate(SimulateJob {
+                study: complete(&args.study)?,
+                observers: args.observers,
+                seed: args.seed,
+            }),
+            StudyCommand::Links(args) => StudyJob::Links(LinksJob {
+                study: Study::open(&args.study)?,
+                count: args.count,
+                url: args.url,
+            }),
+            StudyCommand::Data(args) => StudyJob::Data(DataFolderJob {
+                study: Arc::new(Study::open(&args.study)?),
+                out: args.out,
+                simulated: args.simulated,
+            }),
+            StudyCommand::Backup(args) => {
+                StudyJob::Backup(BackupJob { study: Study::open(&args.study)?, to: args.to })
+            }
+            StudyCommand::Export(args) => StudyJob::Export(observer(&args)?),
+            StudyCommand::Erase(args) => StudyJob::Erase(observer(&args)?),
+        })
+    }
+}
+
+fn stack(args: StackArgs) -> anyhow::Result<StackJob> {
+    let StackArgs { scene, renderer, levels, denoise, out } = args;
+    let (source, resources) = renderer.check(Some(&scene))?;
+    let denoise = denoise.map(|word| stack_denoiser(&word, resources.timeout)).transpose()?;
+    Ok(StackJob { source, resources, levels, denoise, out })
+}
+
+fn stack_denoiser(word: &str, timeout: Duration) -> anyhow::Result<StackDenoiser> {
+    if word == OIDN.name {
+        return Ok(StackDenoiser::Oidn { timeout });
+    }
+    Ok(StackDenoiser::Program(PictureCommand::new(word, timeout)?))
+}
+
+/// A study all of whose pictures can be shown.
+fn complete(path: &Path) -> anyhow::Result<Arc<Study>> {
+    let study = Study::open(path)?;
+    study.check_pictures()?;
+    Ok(Arc::new(study))
+}
+
+fn observer(args: &ObserverArgs) -> anyhow::Result<ObserverJob> {
+    let code = parse_code(&args.code)
+        .with_context(|| format!("{:?} cannot be a code: a code has twelve letters and digits", args.code))?;
+    Ok(ObserverJob { study: Study::open(&args.study)?, code })
+}

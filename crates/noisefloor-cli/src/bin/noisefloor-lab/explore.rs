@@ -1,0 +1,27 @@
+//! `noisefloor-lab explore`.
+
+use anyhow::Context;
+use noisefloor_cli::say::say;
+use noisefloor_study::explore::{ExploreServer, ExploreSetup};
+use noisefloor_study::{Exposure, interrupted};
+use std::net::SocketAddr;
+use tokio::runtime::Builder;
+
+/// What to serve, and where: checked.
+pub struct ExploreJob {
+    pub setup: ExploreSetup,
+    pub listen: SocketAddr,
+    pub allow_host: Vec<String>,
+}
+
+pub fn run(job: ExploreJob) -> anyhow::Result<()> {
+    let database = job.setup.database.clone();
+    let runtime = Builder::new_multi_thread().enable_all().build().context("no threads for the server")?;
+    runtime.block_on(async {
+        let explorer = ExploreServer::bind(job.setup, job.listen, &Exposure::named(&job.allow_host)).await?;
+        say!("open http://{} in a browser; Ctrl-C ends the server", explorer.address())?;
+        say!("disagreements are stored in {}", database.display())?;
+        explorer.run(interrupted()).await?;
+        Ok(())
+    })
+}

@@ -1,0 +1,90 @@
+//! What an analysis says, for people.
+
+use noisefloor_cli::say::{NotSaid, say};
+use noisefloor_study::analysis::StudyReport;
+use noisefloor_study::analysis::tiles::LEAST_OBSERVERS;
+
+pub(super) fn say_all(report: &StudyReport) -> Result<(), NotSaid> {
+    let who = if report.simulated { "simulated observers" } else { "observers" };
+    let finished = report.observers.iter().filter(|o| o.finished).count();
+    say!("{} {who}, of whom {finished} answered everything", report.observers.len())?;
+    for row in &report.observers {
+        if let Some(why) = &row.excluded {
+            say!("  {} is excluded: {why}", row.code)?;
+        }
+    }
+    say_tiles(report)?;
+    if let Some(r) = report.repeats {
+        say!(
+            "repeats: {} pairs, apart by a factor of {:.2} (median), {:.0} % within one level",
+            r.pairs,
+            r.factor,
+            100.0 * r.within_one_level
+        )?;
+    }
+    if let Some(b) = report.between {
+        say!(
+            "agreement of {} observers over {} tiles: ICC {:.2} for one, {:.2} for their mean",
+            b.observers,
+            b.tiles,
+            b.icc_single,
+            b.icc_mean
+        )?;
+    }
+    say_groups(report)?;
+    for c in &report.classes {
+        let [low, high] = c.identical.wilson.map(|v| 100.0 * v);
+        let class = format!("{:?}", c.class).to_lowercase();
+        say!(
+            "{class:9} identical in {:.1} % of {} answers (95 % interval {low:.1} to {high:.1} %)",
+            100.0 * c.identical.share,
+            c.identical.of
+        )?;
+    }
+    Ok(())
+}
+
+fn say_tiles(report: &StudyReport) -> Result<(), NotSaid> {
+    if !report.tiles.is_empty() {
+        say!("stack                tile      mean  95 % see none   95 % interval")?;
+    }
+    for t in &report.tiles {
+        let interval = match t.level95_interval {
+            Some([low, high]) => format!("{low:.0} to {high:.0}"),
+            None => format!("none: {} observers, fewer than {LEAST_OBSERVERS}", t.observers),
+        };
+        let beyond = if t.beyond { "  beyond the stack" } else { "" };
+        let doubt =
+            if t.fit_probability.is_some_and(|p| p < 0.01) { "  the spread does not fit" } else { "" };
+        say!("{:20} {:4} {:9.0} {:14.0}   {interval}{beyond}{doubt}", t.stack, t.tile, t.mean, t.level95)?;
+    }
+    Ok(())
+}
+
+fn say_groups(report: &StudyReport) -> Result<(), NotSaid> {
+    for g in &report.groups {
+        if let Some(line) = g.least_squares {
+            say!(
+                "{} against {}: T' = {:.3} T {:+.1}, {} tiles",
+                g.to,
+                g.from,
+                line.slope,
+                line.offset,
+                g.tiles
+            )?;
+        }
+        match (&g.robust, &g.problem) {
+            (Some(fit), _) => {
+                let r = fit.correlation.map_or("undefined".to_owned(), |r| format!("{r:.2}"));
+                say!(
+                    "  tolerating outliers: render --audience {:.4},{:.2} (r = {r})",
+                    fit.line.slope,
+                    fit.line.offset
+                )?;
+            }
+            (None, Some(problem)) => say!("  no line that tolerates outliers: {problem}")?,
+            (None, None) => {}
+        }
+    }
+    Ok(())
+}

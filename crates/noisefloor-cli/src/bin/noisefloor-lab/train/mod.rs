@@ -1,0 +1,76 @@
+//! `noisefloor-lab train`.
+
+mod disagreements;
+
+use crate::learning::{DataJob, SearchJob, held_out};
+use noisefloor::{Model, Threshold, model::Scores};
+use noisefloor_cli::say::{NotSaid, note, say};
+use noisefloor_image::{check_writable, write_atomic};
+use noisefloor_learn::{score, train, write_table};
+use std::path::{Path, PathBuf};
+
+/// What to train on, and how: checked.
+pub struct TrainJob {
+    pub data: DataJob,
+    pub search: SearchJob,
+    pub out: PathBuf,
+    pub save_table: Option<PathBuf>,
+    pub save_choices: Option<PathBuf>,
+    pub disagreements: Option<PathBuf>,
+    pub scores: bool,
+}
+
+pub fn run(job: &TrainJob) -> anyhow::Result<()> {
+    for path in job.save_table.iter().chain(&job.save_choices).chain([&job.out]) {
+        check_writable(path)?;
+    }
+    if let Some(path) = &job.save_choices {
+        let table = job.data.load_choices()?;
+        write_atomic(path, |to| write_table(&table, to))?;
+        note!("numbers for every choice written to {}", path.display());
+    }
+    let table = job.data.load()?;
+    if let Some(path) = &job.save_table {
+        write_atomic(path, |to| write_table(&table, to))?;
+        note!("table of {} zones written to {}", table.zones.len(), path.display());
+    }
+    let params = job.search.params(&table);
+    if let Some(database) = &job.disagreements {
+        return disagreements::run(job, &table, &params, database);
+    }
+
+    // Scores on scenes left out, where there are enough to leave one out and still choose among the others.
+    let scores = if !job.scores || table.groups().len() < 3 {
+        None
+    } else {
+        let predictions = held_out(&table, &params, Threshold::PAPER)?;
+        Some(score(predictions.iter()))
+    };
+    note!("training on all scenes");
+    let model = train(&table, &params, job.data.origin(), scores)?;
+    write_atomic(&job.out, |to| model.write(to))?;
+    say_model(&model, &job.out)?;
+    scores.map_or(Ok(()), |scores| say_scores("", scores))?;
+    Ok(())
+}
+
+fn say_model(model: &Model, out: &Path) -> Result<(), NotSaid> {
+    say!(
+        "{} support vectors of {} examples, C = {}, γ = {}; written to {}",
+        model.classifier().svm.coefficients.len(),
+        model.record().examples,
+        model.record().c,
+        model.record().gamma,
+        out.display()
+    )
+}
+
+fn say_scores(when: &str, s: Scores) -> Result<(), NotSaid> {
+    say!(
+        "{when}on left-out scenes: error factor {:.3}, bias factor {:.3}, {:.1} % of {} zones stopped below half",
+        s.error_factor,
+        s.bias_factor,
+        100.0 * s.early_share,
+        s.zones
+    )
+}

@@ -1,0 +1,242 @@
+//! `noisefloor farm`.
+
+use super::render::RenderArgs;
+use super::{Cli, Command, expand};
+use crate::farm::{self, FarmRender};
+use crate::job::RenderRun;
+use anyhow::bail;
+use clap::{Args, Subcommand};
+use noisefloor_cli::folder::Earlier;
+use noisefloor_cli::options::values;
+use noisefloor_cli::refuse;
+use noisefloor_farm::{FrameRange, Slurm};
+use std::ffi::OsString;
+use std::num::NonZeroUsize;
+use std::path::PathBuf;
+use std::time::Duration;
+
+/// Render a frame or a sequence on many machines, or in several processes on this one.
+///
+/// Work goes in rounds: a plan says which samples each tile is expected to need, tasks take them and write
+/// them into shards, and a merge adds the shards, judges, and plans again, until nobody sees noise. Picture
+/// and stops are those of `noisefloor render` with the same options, to the bit. The folder, on a file
+/// system that all machines share, is all the state there is: whatever is killed, `run` continues. Only
+/// renderers that repeat their samples can be divided: `ptwne`, `exr`, `cycles`, and `mitsuba` with
+/// libLLVM.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  noisefloor farm plan shots/hall -- hall.xml --size 3840x2160 --seed 7
+  noisefloor farm run shots/hall --local 4           in four processes on this machine
+  noisefloor farm run shots/hall --wait              as Slurm array jobs
+  noisefloor farm run shots/hall --sbatch=--partition=render --sbatch=--cpus-per-task=32
+  noisefloor farm status shots/hall
+  noisefloor farm plan shots/walk --frames 1-240 -- 'walk.{frame:04}.xml'     a sequence
+  noisefloor farm merge shots/hall/frame/merged/*.nfs --out hall              shards without their farm")]
+pub struct FarmArgs {
+    #[command(subcommand)]
+    command: FarmCommand,
+}
+
+#[derive(Debug, Subcommand)]
+enum FarmCommand {
+    /// Say what is to be rendered, or plan the next round of what is there.
+    ///
+    /// What follows `--` is as for `noisefloor render`, without --out and the like. Every scene is opened
+    /// once.
+    Plan(PlanArgs),
+    /// Render round after round: as Slurm array jobs that follow each other, or with --local here.
+    ///
+    /// On Slurm, each round is an array job, and a job that depends on it merges, judges and submits the
+    /// next round. No process waits in between. What preempted and failed tasks did not deliver is planned
+    /// again. After three rounds in a row that brought no samples, it ends with an error.
+    Run(RunArgs),
+    /// Merge the shards that are there, judge, and write the pictures as far as they are.
+    ///
+    /// With --out, files of shards are merged into one picture, without their farm. Those of the job that
+    /// the first one belongs to are added batch by batch, as on one machine: picture and stops are the same
+    /// to the bit, whatever their order, number and size. Shards that are damaged, cut short, of another
+    /// scene, seed, size or set of options, that overlap, or contradict each other, are named and not mixed
+    /// in. What is missing is named, too; the exit code is then 1, and `noisefloor render --resume` with
+    /// the same options and this output folder takes the missing samples.
+    Merge(MergeArgs),
+    /// Show how far each frame is, and what the round under way is doing.
+    Status(StatusArgs),
+    /// What each task of a round runs.
+    #[command(hide = true)]
+    Task(TaskArgs),
+    /// What follows a round on Slurm.
+    #[command(hide = true)]
+    Step(StepArgs),
+}
+
+#[derive(Debug, Args)]
+struct MergeArgs {
+    /// Folder of the farm; with --out, shards: files that tasks have written.
+    #[arg(required = true, value_name = "DIR|SHARD")]
+    paths: Vec<PathBuf>,
+    /// Merge files of shards into this output folder.
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Overwrite the render that is in the output folder.
+    #[arg(long, requires = "out")]
+    force: bool,
+}
+
+#[derive(Debug, Args)]
+struct PlanArgs {
+    /// Folder of the farm, on a file system that all machines share.
+    dir: PathBuf,
+    /// First and last frame. {frame} in the name of the scene, or {frame:04} for four digits, is the number
+    /// of the frame. All frames have the same seed.
+    #[arg(long, value_name = "A-B")]
+    frames: Option<FrameRange>,
+    /// Most tasks of a round over all frames, up to 1000; short rounds have fewer.
+    #[arg(long, default_value = "16", value_name = "N", value_parser = tasks)]
+    tasks: usize,
+    /// Keep shards once they are merged, in FRAME/merged: for `farm merge --out`.
+    #[arg(long)]
+    keep_shards: bool,
+    /// Scene and options, as for `noisefloor render`.
+    #[arg(last = true, value_name = "RENDER OPTIONS")]
+    render: Vec<OsString>,
+}
+
+#[derive(Debug, Args)]
+struct RunArgs {
+    /// Folder of the farm.
+    dir: PathBuf,
+    /// Run the tasks here, N at a time, and return when everything is done.
+    #[arg(long, value_name = "N")]
+    local: Option<NonZeroUsize>,
+    /// An option for `sbatch`, such as --sbatch=--partition=render. Can be given more than once.
+    #[arg(long, value_name = "OPTION", conflicts_with = "local", allow_hyphen_values = true)]
+    sbatch: Vec<String>,
+    /// Return when everything is done, not when the first round is submitted. Submits again if the jobs have
+    /// vanished.
+    #[arg(long, conflicts_with = "local")]
+    wait: bool,
+    /// With --wait: seconds between two looks.
+    #[arg(long, default_value = "10", value_name = "SECONDS", value_parser = values::seconds)]
+    every: Duration,
+    /// Say nothing but errors.
+    #[arg(short, long)]
+    quiet: bool,
+}
+
+#[derive(Debug, Args)]
+struct StatusArgs {
+    /// Folder of the farm.
+    dir: PathBuf,
+    /// As JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Debug, Args)]
+struct TaskArgs {
+    dir: PathBuf,
+    round: usize,
+    task: usize,
+}
+
+#[derive(Debug, Args)]
+struct StepArgs {
+    dir: PathBuf,
+    round: usize,
+    #[arg(long, allow_hyphen_values = true)]
+    sbatch: Vec<String>,
+}
+
+/// What a farm is asked to do: checked.
+pub enum FarmTask {
+    Plan(Box<PlanTask>),
+    Run(RunTask),
+    Merge(MergeTask),
+    Status { dir: PathBuf, json: bool },
+    Task { dir: PathBuf, round: usize, task: usize },
+    Step { dir: PathBuf, round: usize, sbatch: Vec<String> },
+}
+
+pub struct PlanTask {
+    pub dir: PathBuf,
+    pub frames: Option<FrameRange>,
+    pub tasks: usize,
+    pub keep: bool,
+    /// None to plan the next round of what is there.
+    pub render: Option<FarmRender>,
+}
+
+pub struct RunTask {
+    pub dir: PathBuf,
+    pub local: Option<usize>,
+    pub sbatch: Vec<String>,
+    pub wait: bool,
+    pub every: Duration,
+    pub quiet: bool,
+}
+
+pub enum MergeTask {
+    Farm(PathBuf),
+    Shards { shards: Vec<PathBuf>, out: PathBuf, force: bool },
+}
+
+fn tasks(text: &str) -> Result<usize, String> {
+    values::within(text, 1..=Slurm::most_tasks())
+}
+
+impl FarmArgs {
+    pub fn check(self) -> anyhow::Result<FarmTask> {
+        Ok(match self.command {
+            FarmCommand::Plan(PlanArgs { dir, frames, tasks, keep_shards: keep, render }) => {
+                let render = if render.is_empty() { None } else { Some(renders(render, frames.is_some())?) };
+                FarmTask::Plan(Box::new(PlanTask { dir, frames, tasks, keep, render }))
+            }
+            FarmCommand::Run(RunArgs { dir, local, sbatch, wait, every, quiet }) => {
+                let local = local.map(NonZeroUsize::get);
+                FarmTask::Run(RunTask { dir, local, sbatch, wait, every, quiet })
+            }
+            FarmCommand::Merge(MergeArgs { paths, out: Some(out), force }) => {
+                FarmTask::Merge(MergeTask::Shards { shards: paths, out, force })
+            }
+            FarmCommand::Merge(MergeArgs { paths, .. }) => match <[PathBuf; 1]>::try_from(paths) {
+                Ok([dir]) => FarmTask::Merge(MergeTask::Farm(dir)),
+                Err(_) => refuse!("one folder of a farm, or shards and --out for their picture"),
+            },
+            FarmCommand::Status(StatusArgs { dir, json }) => FarmTask::Status { dir, json },
+            FarmCommand::Task(TaskArgs { dir, round, task }) => FarmTask::Task { dir, round, task },
+            FarmCommand::Step(StepArgs { dir, round, sbatch }) => FarmTask::Step { dir, round, sbatch },
+        })
+    }
+}
+
+/// The render that follows `--`. Other machines know neither the current folder nor the file of --config.
+fn renders(typed: Vec<OsString>, frames: bool) -> anyhow::Result<FarmRender> {
+    let words = ["noisefloor".into(), "render".into()].into_iter().chain(typed);
+    let cli = Cli::parsed(expand(words.collect())?);
+    let cli = cli.map_err(|error| anyhow::anyhow!("after `--`: {error}"))?;
+    let Command::Render(args) = cli.command else { bail!("after `--`, options of `noisefloor render`") };
+    if args.is_sequence() {
+        refuse!("--frames: before `--`, as in `farm plan DIR --frames 1-240 -- 'hall.{{frame:04}}.xml'`");
+    }
+    let RenderRun { job, resources, out, time, against, earlier, tev, watch, .. } = RenderArgs::check(*args)?;
+    for (option, given) in [
+        ("--tev", tev.is_some()),
+        ("--watch", watch.is_some()),
+        ("--out", out.is_some()),
+        ("--time", time.is_some()),
+        ("--against", against.is_some()),
+        ("--resume and --force", earlier != Earlier::Keep),
+    ] {
+        if given {
+            refuse!(
+                "{option}: not for a farm, which renders into its own folder, to the end, on other machines; \
+                 leave it out"
+            );
+        }
+    }
+    farm::check(&job)?;
+    if frames {
+        job.source.check_frames()?;
+    }
+    Ok(FarmRender { job: job.absolute()?, resources })
+}

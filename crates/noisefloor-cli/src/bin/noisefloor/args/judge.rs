@@ -1,0 +1,162 @@
+//! `noisefloor judge`.
+
+use crate::judge::{DenoisedJob, JudgeJob, Question};
+use clap::Args;
+use noisefloor::{
+    evidence::{Evidence, Samples},
+    tile::DEFAULT_TILE,
+};
+use noisefloor_cli::options::oracle::OracleArgs;
+use noisefloor_cli::options::tone::ToneArgs;
+use noisefloor_cli::options::values;
+use noisefloor_cli::options::viewing::ViewingArgs;
+use noisefloor_cli::refuse;
+use noisefloor_denoise::DEFAULT_JODS_LOST;
+use std::path::PathBuf;
+
+/// Say for each tile of a picture whether people would see noise in it.
+///
+/// Noise shows where two renderings of one scene differ, so a second picture is needed: the same view with
+/// other samples. Several are pooled. The verdict is on IMAGE only: its noise follows from the difference
+/// and the sample counts. PNGs are judged as they are; EXRs are tone mapped first.
+///
+/// Two snapshots of one progressive rendering share samples. If the files say so (those of `render` do) or
+/// the pictures show it, the verdict takes it into account, and a note says so. If neither tells, the
+/// command asks for --nested or --independent, which also override what it finds.
+///
+/// With --denoised, the verdict is on what a denoiser makes of both pictures together: how many
+/// just-objectionable differences (JOD) it has lost against the converged picture, bias included. Nobody has
+/// been asked about denoised tiles: the limit is the vision model's.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  noisefloor judge a.exr --spp 256 --against b.exr --spp 256       two independent renderings
+  noisefloor judge out/a/image.exr --against out/b/image.exr       of `render`: the files say the rest
+  noisefloor judge 00100.png --spp 100 --against 00900.png --spp 900 --nested --heat-map verdict.png
+  noisefloor judge a.exr --spp 64 --against b.exr --spp 64 --noise-map noise.png
+  noisefloor judge a.exr --spp 64 --against b.exr --spp 64 --denoised a-denoised.exr b-denoised.exr
+  noisefloor judge a.exr --spp 64 --against b.exr --spp 64 --json > verdicts.json")]
+pub struct JudgeArgs {
+    /// Picture to judge, PNG or EXR.
+    #[arg(value_name = "IMAGE")]
+    image: PathBuf,
+    /// Samples per pixel: first of IMAGE, then of each --against, in their order [default: what the EXR
+    /// files say, as those of `render --criterion spp:N` and of pbrt do].
+    #[arg(long, value_name = "N")]
+    spp: Vec<f64>,
+    /// Another rendering of the same view. Repeat for more.
+    #[arg(long, required = true, value_name = "IMAGE")]
+    against: Vec<PathBuf>,
+    /// The pictures are snapshots of one progressive rendering: the later one contains the samples of the
+    /// earlier one.
+    #[arg(long)]
+    nested: bool,
+    /// The pictures share no samples, whatever they look like.
+    #[arg(long, conflicts_with = "nested")]
+    independent: bool,
+    /// Judge denoised pictures: what a denoiser has made of IMAGE, and of the one --against, each without a
+    /// look at the other.
+    #[arg(long, num_args = 2, value_names = ["IMAGE", "AGAINST"], conflicts_with_all = ["model", "threshold", "heat_map", "exr", "nested"])]
+    denoised: Vec<PathBuf>,
+    /// With --denoised: just-objectionable differences (JOD) that a tile may have lost.
+    #[arg(long, value_name = "JOD", requires = "denoised", default_value_t = DEFAULT_JODS_LOST, value_parser = values::jods)]
+    lost: f64,
+    #[command(flatten)]
+    oracle: OracleArgs,
+    #[command(flatten)]
+    tone: ToneArgs,
+    #[command(flatten)]
+    viewing: ViewingArgs,
+    /// Tile edge in pixels, 16…512.
+    #[arg(long, default_value_t = DEFAULT_TILE, value_name = "PIXELS")]
+    tile: usize,
+    /// Print JSON instead of a table.
+    #[arg(long)]
+    json: bool,
+    /// Write the probabilities as a heat map over the picture.
+    #[arg(long, value_name = "FILE.png")]
+    heat_map: Option<PathBuf>,
+    /// Write a map of the visible noise over the picture, in blocks of 8x8 pixels; with --denoised, of the
+    /// JODs lost.
+    #[arg(long, value_name = "FILE.png")]
+    noise_map: Option<PathBuf>,
+    /// Write the picture as linear EXR, with probability and visible noise (1 is just seen) as channels.
+    #[arg(long, value_name = "FILE.exr")]
+    exr: Option<PathBuf>,
+}
+
+impl JudgeArgs {
+    pub fn check(self) -> anyhow::Result<Question> {
+        match <[PathBuf; 2]>::try_from(self.denoised.clone()) {
+            Ok(denoised) => self.check_denoised(denoised).map(|job| Question::Denoised(Box::new(job))),
+            Err(_) => self.check_noise().map(|job| Question::Noise(Box::new(job))),
+        }
+    }
+
+    fn check_denoised(self, denoised: [PathBuf; 2]) -> anyhow::Result<DenoisedJob> {
+        let tone = self.tone.check()?.load()?;
+        let Ok([against]) = <[PathBuf; 1]>::try_from(self.against) else {
+            refuse!("--denoised compares two halves: give one picture with --against");
+        };
+        let spp = match self.spp.as_slice() {
+            [] => [None; 2],
+            [a, b] => [Some(*a), Some(*b)],
+            other => refuse!("--spp is needed once for each picture: {} given for 2 pictures", other.len()),
+        };
+        Ok(DenoisedJob {
+            noisy: [(self.image, spp[0]), (against, spp[1])],
+            denoised,
+            samples: self.independent.then_some(Samples::Independent),
+            lost: self.lost,
+            tone,
+            viewing: self.viewing.or_default(),
+            tile: self.tile,
+            json: self.json,
+            noise_map: self.noise_map,
+        })
+    }
+
+    fn check_noise(self) -> anyhow::Result<JudgeJob> {
+        let tone = self.tone.check()?.load()?;
+        let oracle = self.oracle.check()?;
+        let viewing = self.viewing.judged_by(&oracle)?;
+        if oracle.model().evidence() != Evidence::Halves {
+            refuse!(
+                "this model does not compare tiles with other samples, as `judge` does: use one that was trained on half buffers"
+            );
+        }
+        let pictures = 1 + self.against.len();
+        if !self.spp.is_empty() && self.spp.len() != pictures {
+            refuse!(
+                "--spp is needed once for each picture: {} given for {pictures} pictures",
+                self.spp.len()
+            );
+        }
+        if self.noise_map.is_some() && !oracle.maps_visible_noise() {
+            refuse!(
+                "--noise-map: a model with the {} descriptor has no map of visible noise; the bundled model has one",
+                oracle.model().descriptor().name()
+            );
+        }
+        let samples = match (self.nested, self.independent) {
+            (true, _) => Some(Samples::Nested),
+            (_, true) => Some(Samples::Independent),
+            _ => None,
+        };
+        let mut counts = self.spp.into_iter().map(Some).chain(std::iter::repeat(None));
+        let image = (self.image, counts.next().flatten());
+        let against = self.against.into_iter().zip(counts).collect();
+        Ok(JudgeJob {
+            image,
+            against,
+            samples,
+            oracle,
+            tone,
+            viewing,
+            tile: self.tile,
+            json: self.json,
+            heat_map: self.heat_map,
+            noise_map: self.noise_map,
+            exr: self.exr,
+        })
+    }
+}

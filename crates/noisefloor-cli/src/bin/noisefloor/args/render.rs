@@ -1,0 +1,252 @@
+//! `noisefloor render`.
+
+use super::verdicts::{CriterionChoice, Preset, VerdictArgs};
+use crate::job::{Autosave, CriterionJob, RenderJob, RenderRun, WatchPage};
+use crate::render::{SequenceRun, TEV_ADDRESS};
+use clap::{Args, Command};
+use noisefloor_cli::folder::Earlier;
+use noisefloor_cli::options::denoiser::DenoiserChoice;
+use noisefloor_cli::options::oracle::OracleArgs;
+use noisefloor_cli::options::renderer::RendererArgs;
+use noisefloor_cli::options::tone::ToneArgs;
+use noisefloor_cli::options::values;
+use noisefloor_cli::options::viewing::ViewingArgs;
+use noisefloor_cli::refuse;
+use noisefloor_cli::spell::JobPath;
+use noisefloor_farm::FrameRange;
+use std::ffi::OsString;
+use std::net::SocketAddr;
+use std::path::PathBuf;
+use std::time::Duration;
+
+/// Render a scene, and stop each tile when nobody sees noise in it any more.
+///
+/// Writes into the output folder: image.exr (linear radiance; samples, probability, stop and visible noise
+/// as channels), image.png, stops.csv (one line a tile), stops.png (heat map of the samples), noise.png
+/// (the noise that is left, and how visible it is), timeline.csv and report.json. Files appear complete or
+/// not at all, and are refreshed while rendering (--autosave).
+///
+/// With --denoise, each tile stops when nobody would see a difference between the denoised picture and the
+/// converged one. Nobody has been asked about denoised tiles: the limit is the vision model's.
+/// image-denoised.exr, image-denoised.png and denoised-error.png are written as well; and albedo.exr and
+/// normal.exr, which help the denoiser, if the renderer has them (ptwne, mitsuba and cycles do).
+///
+/// Ctrl-C stops all tiles and writes what there is (exit code 130). An interrupted or killed render
+/// continues with --resume.
+#[derive(Debug, Args)]
+#[command(args_override_self = true)]
+#[command(after_help = "Examples:
+  noisefloor render                                  the Cornell box, into out/cornell-box
+  noisefloor render glass-spheres --size 800x600 --seed 7    another scene; `noisefloor scenes` lists them
+  noisefloor render hall/scene.xml --out out/hall    a scene file: glTF, Mitsuba XML or pbrt
+  noisefloor render --source mitsuba hall/scene.xml  another renderer; `noisefloor doctor` lists them
+  noisefloor render --criterion spp:1000             for comparison: a fixed number of samples
+  noisefloor render --audience art-students          for more demanding viewers (more samples)
+  noisefloor render --denoise oidn                   for a picture that will be denoised (fewer samples)
+  noisefloor render --time 60 --against truth.exr    at most a minute; relMSE to a reference in timeline.csv
+  noisefloor render --time 60 --resume               another minute of the render in the output folder
+  noisefloor render --frames 1-240 'shots/hall.{frame:04}.xml'   a sequence, into out/hall/0001 and so on
+  noisefloor render --config shot.toml --preset draft     options from a file; a quick look
+  noisefloor render --watch                          the picture so far, in a browser
+  noisefloor render --force                          once more, over the render in the output folder")]
+pub struct RenderArgs {
+    /// Built-in scene (`noisefloor scenes` lists them) or scene file: glTF 2.0 (.gltf, .glb), Mitsuba XML
+    /// (.xml) or pbrt (.pbrt). With --source, whatever that source reads [default: cornell-box].
+    scene: Option<OsString>,
+    /// Output folder [default: out/SCENE].
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Be done after this many seconds, with all files written: tiles that are still open then stop.
+    #[arg(long, value_name = "SECONDS", value_parser = values::seconds)]
+    time: Option<Duration>,
+    /// Continue the render that Ctrl-C, --time or a kill interrupted in this output folder. Picture and
+    /// stops are those of an uninterrupted render. Options must be the same, and so must the contents of
+    /// the scene and of all files that it reads. Works with sources that repeat their samples: `ptwne`,
+    /// `exr`, `cycles`, and `mitsuba` with libLLVM; and with the oracle or `spp:N`.
+    #[arg(long)]
+    resume: bool,
+    /// Overwrite the render that is in the output folder, finished or not. Without it, a folder that holds
+    /// one is refused.
+    #[arg(long, conflicts_with = "resume")]
+    force: bool,
+    /// `draft` for a quarter of the samples that people ask for: noise that is twice as strong as what is
+    /// just seen (with --denoise, 0.9 JOD lost). `final` for two verdicts in a row, so that fewer tiles
+    /// stop by luck.
+    #[arg(long, value_enum)]
+    preset: Option<Preset>,
+    /// Judge the picture that this denoiser makes of the samples, and write it: `oidn`, Open Image Denoise
+    /// (`noisefloor doctor --install oidn`). Its error is measured from the two halves of the samples, bias
+    /// included. What both halves miss, such as a caustic that no sample has found, it cannot know.
+    #[arg(long, value_enum, conflicts_with_all = ["model", "threshold", "schedule", "criterion", "audience"])]
+    denoise: Option<DenoiserChoice>,
+    /// No progress bar and no summary.
+    #[arg(long, short)]
+    quiet: bool,
+    /// Render a sequence: SCENE holds {frame}, or {frame:04} for four digits, in place of the number; so
+    /// may --against and values of --define. Each frame goes into a folder of its own, and frames.csv sums
+    /// up. --resume goes on where the sequence was interrupted. All frames have the same seed: noise then
+    /// stays where it is on the screen, and flickers a third as much.
+    #[arg(long, value_name = "FIRST-LAST")]
+    frames: Option<FrameRange>,
+    /// Options from a file, as max-spp = 2000 or denoise = "oidn", a line each. What is typed as well wins.
+    #[arg(long, value_name = "FILE.toml")]
+    config: Option<PathBuf>,
+    /// Seconds between two refreshes of the files in the output folder while rendering; 0 for none [default:
+    /// 30, or as many as keep all refreshes within 2 % of the time].
+    #[arg(long, value_name = "SECONDS", value_parser = autosave)]
+    autosave: Option<Autosave>,
+    #[arg(long, hide = true, value_parser = no_spp)]
+    spp: Option<String>,
+    #[command(flatten, next_help_heading = "Renderer")]
+    renderer: RendererArgs,
+    #[command(flatten, next_help_heading = "Verdicts")]
+    oracle: OracleArgs,
+    #[command(flatten, next_help_heading = "Verdicts")]
+    verdicts: VerdictArgs,
+    #[command(flatten, next_help_heading = "What people see")]
+    tone: ToneArgs,
+    #[command(flatten, next_help_heading = "What people see")]
+    viewing: ViewingArgs,
+    #[command(flatten, next_help_heading = "To look on")]
+    look: LookArgs,
+}
+
+/// What people need first: all that `-h` shows.
+const FIRST: &[&str] = &[
+    "scene", "out", "time", "resume", "force", "preset", "denoise", "quiet", "source", "size", "seed",
+    "help", "version",
+];
+
+/// The command, with what people need first in its short help.
+pub fn brief(render: Command) -> Command {
+    render.mut_args(|arg| {
+        let first = FIRST.contains(&arg.get_id().as_str());
+        arg.hide_short_help(!first)
+    })
+}
+
+/// How a render is watched.
+#[derive(Debug, Args)]
+struct LookArgs {
+    /// Converged picture of the same size to compare with: relMSE in timeline.csv and report.json.
+    #[arg(long, value_name = "FILE.exr")]
+    against: Option<PathBuf>,
+    /// Show the picture in the viewer tev while it is rendered: samples and probabilities, too. A tev that
+    /// runs on this machine is found by itself.
+    #[arg(
+        long,
+        value_name = "HOST:PORT",
+        num_args = 0..=1,
+        require_equals = true,
+        default_missing_value = TEV_ADDRESS
+    )]
+    tev: Option<String>,
+    /// Serve a page with the picture so far, the tiles that are open, and the time left. It is for this
+    /// machine unless an address says otherwise.
+    #[arg(
+        long,
+        value_name = "IP:PORT",
+        num_args = 0..=1,
+        require_equals = true,
+        default_missing_value = "127.0.0.1:8439"
+    )]
+    watch: Option<SocketAddr>,
+    /// With --watch: another name of this machine that browsers may use. Repeat for more.
+    #[arg(long, value_name = "HOST", requires = "watch")]
+    allow_host: Vec<String>,
+}
+
+/// JODs that a tile of a draft may have lost: three times as many, as zones of the human data lose by twice
+/// the noise.
+const DRAFT_LOST: f64 = 0.9;
+
+/// As seconds, or 0 for never.
+fn autosave(text: &str) -> Result<Autosave, String> {
+    if text.parse() == Ok(0.0) { Ok(Autosave::Never) } else { values::seconds(text).map(Autosave::Every) }
+}
+
+/// `render --spp 100` is what people try first.
+fn no_spp(text: &str) -> Result<String, String> {
+    Err(format!(
+        "`render` stops each tile when nobody sees noise in it; for {text} samples everywhere, use --criterion \
+         spp:{text}"
+    ))
+}
+
+impl RenderArgs {
+    /// A render that can begin.
+    pub fn check(self) -> anyhow::Result<RenderRun> {
+        if cfg!(not(feature = "watch")) && self.look.watch.is_some() {
+            refuse!(
+                "this build has no 'render --watch': run `cargo run --release --features watch -- render --watch …`"
+            );
+        }
+        let limits =
+            self.verdicts.limits(self.denoise.is_some(), self.renderer.is_built_in(), self.preset)?;
+        let by_oracle = self.denoise.is_none() && self.verdicts.criterion == CriterionChoice::Oracle;
+        if limits.blocks > 0 && !(by_oracle && self.renderer.may_sample_blocks()) {
+            refuse!("--blocks is for the oracle, and for --source ptwne or mitsuba; leave it out")
+        }
+        let criterion = match (self.denoise, self.verdicts.criterion) {
+            (Some(_), _) if self.preset == Some(Preset::Draft) => {
+                CriterionJob::Denoised { lost: self.verdicts.lost.max(DRAFT_LOST) }
+            }
+            (Some(_), _) => CriterionJob::Denoised { lost: self.verdicts.lost },
+            (None, CriterionChoice::Oracle) => {
+                let OracleArgs { model, threshold } = self.oracle;
+                CriterionJob::Oracle { model: model.map(JobPath), threshold }
+            }
+            (None, CriterionChoice::Fixed(samples)) => CriterionJob::Spp(samples),
+            (None, CriterionChoice::Rival(spec)) => CriterionJob::Rival(spec),
+        };
+        let (source, resources) = self.renderer.check(self.scene.as_deref())?;
+        let (tone, viewing) = (self.tone.check()?, self.viewing.typed());
+        let hosts = self.look.allow_host;
+        Ok(RenderRun {
+            job: RenderJob { source, criterion, tone, viewing, limits },
+            resources,
+            out: self.out.map(JobPath),
+            time: self.time,
+            against: self.look.against.map(JobPath),
+            autosave: self.autosave.unwrap_or(Autosave::Paced),
+            earlier: Earlier::of(self.force, self.resume),
+            quiet: self.quiet,
+            tev: self.look.tev,
+            watch: self.look.watch.map(|address| WatchPage { address, hosts }),
+        })
+    }
+
+    /// Whether several frames are asked for.
+    pub fn is_sequence(&self) -> bool {
+        self.frames.is_some()
+    }
+
+    /// Frames that can begin.
+    pub fn check_frames(self) -> anyhow::Result<SequenceRun> {
+        let Some(frames) = self.frames else { refuse!("--frames is missing") };
+        let run = self.check()?;
+        let before = run.job.source.check_frames()?;
+        let out = run.out.as_deref().map_or_else(|| PathBuf::from("out").join(stem(&before)), PathBuf::from);
+        Ok(SequenceRun { frames, out, run })
+    }
+}
+
+/// A name for a sequence: that of its files, without number and ending.
+fn stem(before: &std::path::Path) -> String {
+    let text = before.to_string_lossy();
+    let name = text.rsplit('/').next().unwrap_or_default().trim_end_matches(['.', '-', '_']);
+    if name.is_empty() { "frames".to_owned() } else { name.to_owned() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::stem;
+
+    #[test]
+    fn a_sequence_is_named_by_its_files() {
+        assert_eq!(
+            ["shots/hall.", "shots/", ""].map(|before| stem(before.as_ref())),
+            ["hall", "frames", "frames"]
+        );
+    }
+}

@@ -1,0 +1,163 @@
+//! `noisefloor render`: what stops a tile, and when it is judged.
+
+use crate::job::Limits;
+use clap::{Args, ValueEnum};
+use noisefloor::{Audience, Params, Schedule, tile::DEFAULT_TILE};
+use noisefloor_cli::options::values;
+use noisefloor_cli::refuse;
+use noisefloor_rivals::RivalSpec;
+
+/// What stops a tile, and when it is judged.
+#[derive(Debug, Args)]
+pub struct VerdictArgs {
+    /// What stops a tile: `oracle`, `spp:N` for N samples per pixel everywhere, or a criterion of
+    /// `noisefloor-lab compare --help`.
+    #[arg(
+        long,
+        default_value = "oracle",
+        value_parser = criterion
+    )]
+    pub criterion: CriterionChoice,
+    /// With --denoise: just-objectionable differences (JOD) that a tile may have lost when it stops. At 1,
+    /// three of four people prefer the converged picture; the default is what zones had lost, on average,
+    /// where people stopped seeing noise in them.
+    #[arg(
+        long,
+        value_name = "JOD",
+        requires = "denoise",
+        default_value_t = DEFAULT_LOST,
+        value_parser = values::jods
+    )]
+    pub lost: f64,
+    /// For whom: `observers` (those of the training data), `art-students` (T' = 1.94 T - 346), or a,b for
+    /// T' = a T + b.
+    #[arg(
+        long,
+        default_value = "observers",
+        value_name = "WHO",
+        value_parser = values::audience
+    )]
+    pub audience: Audience,
+    /// No tile stops before this many samples per pixel [default: 100, or one batch with --batch or
+    /// --denoise; a quarter with --preset draft]. 50 saves more where little is needed, and light that is
+    /// seldom found is missed more often.
+    #[arg(long, value_name = "SPP")]
+    pub min_spp: Option<u64>,
+    /// Every tile stops at this many samples per pixel [default: 10000; N with --criterion spp:N].
+    #[arg(long, value_name = "SPP")]
+    pub max_spp: Option<u64>,
+    /// When tiles are judged: `spaced` by the samples that a tile is expected to need, or after `every`
+    /// batch, as in the paper: tiles then stop a quarter to two fifths later in ordinary scenes.
+    #[arg(
+        long,
+        value_enum,
+        default_value_t = ScheduleChoice::Spaced
+    )]
+    pub schedule: ScheduleChoice,
+    /// Samples per pixel between two verdicts on a tile, at the least [default: 10, or 100 with --schedule
+    /// every; with --denoise 48, or 16 of other renderers, and then half as many more each time, or more
+    /// where few tiles are open].
+    #[arg(long, value_name = "SPP")]
+    pub batch: Option<u64>,
+    /// Stop a tile only after K verdicts of "converged" in a row, each a quarter more samples after the
+    /// last.
+    #[arg(long, default_value_t = 1, value_name = "K")]
+    pub consecutive: u32,
+    /// Tile edge in pixels, 16…512; below 64, verdicts are less certain.
+    #[arg(
+        long,
+        default_value_t = DEFAULT_TILE,
+        value_name = "PIXELS"
+    )]
+    pub tile: usize,
+    /// Sample blocks of this many pixels (16 or 32) of a tile by their need: where the vision model sees
+    /// less noise, a block gets down to a quarter of the samples of the noisiest one. The verdict stays the
+    /// tile's. For the oracle, and for the sources `ptwne` and `mitsuba` (with libLLVM); 0 samples all of a
+    /// tile alike.
+    #[arg(long, default_value_t = 0, value_name = "PIXELS")]
+    pub blocks: usize,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum ScheduleChoice {
+    Spaced,
+    Every,
+}
+
+/// What a picture is for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Preset {
+    Draft,
+    Final,
+}
+
+/// A quarter of the samples: twice the noise.
+const DRAFT: Audience = Audience { slope: 0.25, offset: 0.0 };
+const DEFAULT_LOST: f64 = noisefloor_denoise::DEFAULT_JODS_LOST;
+
+#[derive(Clone, Debug, PartialEq)]
+pub enum CriterionChoice {
+    Oracle,
+    Fixed(u64),
+    Rival(RivalSpec),
+}
+
+fn criterion(text: &str) -> Result<CriterionChoice, String> {
+    match text.split_once(':') {
+        None if text == "oracle" => Ok(CriterionChoice::Oracle),
+        Some(("spp", n)) => match n.parse() {
+            Ok(n) if n > 0 => Ok(CriterionChoice::Fixed(n)),
+            _ => Err(format!("spp:{n} needs a positive whole number of samples, as in spp:1000")),
+        },
+        _ => match text.parse::<RivalSpec>() {
+            Ok(spec) if spec.against_converged() => Err(format!(
+                "{text} compares with the converged picture, which no render has; it is for `noisefloor-lab compare`"
+            )),
+            Ok(spec) => Ok(CriterionChoice::Rival(spec)),
+            Err(error) => Err(format!("{error}; or `oracle`")),
+        },
+    }
+}
+
+impl VerdictArgs {
+    /// When tiles are judged, with or without a denoiser, by the built-in renderer or a slower one.
+    pub fn limits(&self, denoise: bool, built_in: bool, preset: Option<Preset>) -> anyhow::Result<Limits> {
+        let step = |default: u64| self.batch.unwrap_or(default);
+        let schedule = match (denoise, self.schedule) {
+            // What two denoisings cost is worth more samples of the built-in renderer than of slower ones
+            (true, _) if built_in => Schedule::Growing { step: step(48) },
+            (true, _) => Schedule::Growing { step: step(16) },
+            (false, ScheduleChoice::Spaced) => Schedule::Spaced { step: step(10) },
+            (false, ScheduleChoice::Every) => Schedule::Every { step: step(100) },
+        };
+        let draft = preset == Some(Preset::Draft);
+        // With steps that were asked for, or that a denoiser has, the first one is a verdict
+        let first = match self.batch {
+            _ if denoise => 0,
+            Some(_) => 0,
+            None if draft => DRAFT.samples(Params::default().min_spp),
+            None => Params::default().min_spp,
+        };
+        let max_spp = match &self.criterion {
+            CriterionChoice::Oracle | CriterionChoice::Rival(_) => {
+                self.max_spp.unwrap_or(Params::default().max_spp)
+            }
+            // Exactly this many, not the next multiple of the batch
+            CriterionChoice::Fixed(samples) => self.max_spp.map_or(*samples, |most| most.min(*samples)),
+        };
+        let last = preset == Some(Preset::Final);
+        let limits = Limits {
+            tile: self.tile,
+            schedule,
+            min_spp: self.min_spp.unwrap_or(first.min(max_spp)),
+            max_spp,
+            consecutive: if last { self.consecutive.max(2) } else { self.consecutive },
+            audience: if draft { self.audience.then(DRAFT) } else { self.audience },
+            blocks: self.blocks,
+        };
+        match limits.params(Params::default()).check() {
+            Ok(()) => Ok(limits),
+            Err(error) => refuse!("{error}"),
+        }
+    }
+}

@@ -1,0 +1,131 @@
+//! `noisefloor inspect` and `noisefloor scenes`.
+
+use noisefloor::{
+    Audience, Model, ToneMapping,
+    descriptor::DescriptorSpec,
+    evidence::Evidence,
+    model::{Scores, TrainingRecord},
+};
+use noisefloor_cli::say::{NotSaid, say, say_json};
+use noisefloor_ptwne::scenes;
+use serde::Serialize;
+
+/// A model to show.
+pub struct InspectJob {
+    pub model: Model,
+    pub json: bool,
+}
+
+/// What there is to say of a model, without its numbers.
+#[derive(Serialize)]
+struct Summary<'a> {
+    digest: String,
+    descriptor: DescriptorSpec,
+    descriptor_version: u16,
+    numbers: usize,
+    evidence: Evidence,
+    tone_mapping: ToneMapping,
+    support_vectors: usize,
+    gamma: f32,
+    /// Zones whose texture is familiar, and how far around them it still is, in standard deviations; null
+    /// if all is.
+    familiar_zones: Option<usize>,
+    familiar_reach: Option<f32>,
+    audience: Audience,
+    record: &'a TrainingRecord,
+}
+
+impl<'a> Summary<'a> {
+    fn of(model: &'a Model) -> Self {
+        let (descriptor, svm, record) = (model.descriptor(), &model.classifier().svm, model.record());
+        Self {
+            digest: model.digest(),
+            descriptor: descriptor.spec(),
+            descriptor_version: descriptor.version(),
+            numbers: descriptor.dimensions(),
+            evidence: model.evidence(),
+            tone_mapping: model.tone_mapping(),
+            support_vectors: svm.coefficients.len(),
+            gamma: svm.gamma,
+            familiar_zones: model.familiarity().map(|f| f.zones.len()),
+            familiar_reach: model.familiarity().map(|f| f.reach),
+            audience: model.audience(),
+            record,
+        }
+    }
+}
+
+pub fn run(job: &InspectJob) -> anyhow::Result<()> {
+    let summary = Summary::of(&job.model);
+    if job.json {
+        say_json(&summary)?;
+    } else {
+        say_all(&summary)?;
+    }
+    Ok(())
+}
+
+fn say_all(summary: &Summary<'_>) -> Result<(), NotSaid> {
+    let Summary { descriptor, record, audience, .. } = summary;
+    say!("digest           {}", summary.digest)?;
+    say!(
+        "descriptor       {} (version {}), {} numbers",
+        descriptor.name,
+        summary.descriptor_version,
+        summary.numbers
+    )?;
+    say!(
+        "evidence         {}",
+        match summary.evidence {
+            Evidence::Halves => "the other half buffer",
+            Evidence::Alone => "none: the picture alone",
+            Evidence::Reference => "a ray-traced reference",
+        }
+    )?;
+    say!(
+        "trained through  {}",
+        match summary.tone_mapping {
+            ToneMapping::Srgb { exposure } => format!("plain sRGB, exposure {exposure}"),
+            ToneMapping::Custom { exposure, curve } =>
+                format!("a curve of its own ({}), exposure {exposure}", curve.digest()),
+            ToneMapping::Reinhard { key, white: None } => format!("Reinhard, key {key}"),
+            ToneMapping::Reinhard { key, white: Some(white) } =>
+                format!("Reinhard, key {key}, white {white}"),
+        }
+    )?;
+    // Logistic regression is kept as two support vectors of a kernel too wide to bend
+    let line = if summary.support_vectors == 2 { " (a straight line)" } else { "" };
+    say!(
+        "machine          RBF kernel, C = {}, γ = {}; {} support vectors{line}, of {} examples",
+        record.c,
+        record.gamma,
+        summary.support_vectors,
+        record.examples
+    )?;
+    if let (Some(zones), Some(reach)) = (summary.familiar_zones, summary.familiar_reach) {
+        say!("familiar         {zones} zones, and textures within {reach:.3} standard deviations of them")?;
+    }
+    say!("audience         T' = {} T + {}", audience.slope, audience.offset)?;
+    say!("trained on       {}", record.corpus)?;
+    say!("scenes           {}", record.scenes.join(", "))?;
+    say!("table            {}", record.table_digest)?;
+    match record.leave_one_scene_out {
+        Some(Scores { zones, error_factor, bias_factor, early_share }) => say!(
+            "left-out scenes  {zones} zones: error factor {error_factor:.3}, bias factor {bias_factor:.3}, {:.1} % stopped below half",
+            100.0 * early_share
+        ),
+        None => say!("left-out scenes  not scored"),
+    }
+}
+
+pub fn scenes() -> Result<(), NotSaid> {
+    let show = |heading, scenes: &mut dyn Iterator<Item = scenes::BuiltInScene>| {
+        say!("{heading}")?;
+        for scene in scenes {
+            say!("  {:16} {}", scene.name, scene.description)?;
+        }
+        Ok::<_, NotSaid>(())
+    };
+    show("Scenes to render:", &mut scenes::list())?;
+    show("Stiff scenes, each hard on a renderer:", &mut scenes::stiff())
+}

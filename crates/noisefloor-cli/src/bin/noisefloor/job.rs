@@ -1,0 +1,155 @@
+//! What a render is, as a value: arguments, frames, farm plans and shards are made of it.
+
+use noisefloor::viewing::Viewing;
+use noisefloor::{Audience, FixedSpp, Oracle, Params, Schedule, StoppingCriterion, Threshold};
+use noisefloor_cli::folder::Earlier;
+use noisefloor_cli::options::oracle::load_model;
+use noisefloor_cli::options::tone::Tone;
+use noisefloor_cli::options::viewing::judged_by;
+use noisefloor_cli::sources::{Resources, SourceJob};
+use noisefloor_cli::spell::JobPath;
+use noisefloor_rivals::RivalSpec;
+use serde::{Deserialize, Serialize};
+use std::net::SocketAddr;
+use std::time::Duration;
+
+/// What is rendered, who stops it, and until when: all that picture and stops depend on. Values are
+/// checked; what it names is read when it is set up.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct RenderJob {
+    pub source: SourceJob,
+    pub criterion: CriterionJob,
+    pub tone: Tone,
+    /// By default where the model was trained.
+    pub viewing: Option<Viewing>,
+    pub limits: Limits,
+}
+
+/// Who stops the tiles.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum CriterionJob {
+    Oracle {
+        /// By default the bundled one.
+        model: Option<JobPath>,
+        threshold: Threshold,
+    },
+    Spp(u64),
+    /// By the picture that Open Image Denoise makes, of which a tile may lose so many JODs.
+    Denoised {
+        lost: f64,
+    },
+    Rival(RivalSpec),
+}
+
+/// When tiles are judged, and what ends them; see [`Params`].
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Limits {
+    pub tile: usize,
+    pub blocks: usize,
+    pub schedule: Schedule,
+    pub min_spp: u64,
+    pub max_spp: u64,
+    pub consecutive: u32,
+    pub audience: Audience,
+}
+
+/// A job with everything read that it names, the scene excepted.
+pub struct Ready {
+    pub params: Params,
+    pub oracle: Option<Oracle>,
+}
+
+impl RenderJob {
+    /// The job of a frame of a sequence.
+    #[must_use]
+    pub fn of_frame(&self, frame: u32) -> Self {
+        Self { source: self.source.of_frame(frame), ..self.clone() }
+    }
+
+    /// The same from whatever folder it is rendered.
+    pub fn absolute(&self) -> anyhow::Result<Self> {
+        let mut all = Self { source: self.source.absolute()?, tone: self.tone.absolute()?, ..self.clone() };
+        if let CriterionJob::Oracle { model: Some(model), .. } = &mut all.criterion {
+            *model = model.absolute()?;
+        }
+        Ok(all)
+    }
+
+    /// Reads model and LUT.
+    pub fn read(&self) -> anyhow::Result<Ready> {
+        let oracle = match &self.criterion {
+            CriterionJob::Oracle { model, threshold } => {
+                Some(Oracle::new(load_model(model.as_deref())?, *threshold))
+            }
+            _ => None,
+        };
+        let viewing = match &oracle {
+            Some(oracle) => judged_by(self.viewing, oracle)?,
+            None => self.viewing.unwrap_or_default(),
+        };
+        let displayed = Params::default().with_viewing(viewing).with_tone_mapping(self.tone.load()?);
+        let params = self.limits.params(displayed);
+        params.check()?;
+        Ok(Ready { params, oracle })
+    }
+}
+
+impl Limits {
+    /// The parameters of a session that is displayed as `params` says.
+    pub fn params(&self, mut params: Params) -> Params {
+        let Self { tile, blocks, schedule, min_spp, max_spp, consecutive, audience } = *self;
+        (params.tile, params.blocks, params.schedule) = (tile, blocks, schedule);
+        (params.min_spp, params.max_spp) = (min_spp, max_spp);
+        (params.consecutive, params.audience) = (consecutive, audience);
+        params
+    }
+}
+
+impl CriterionJob {
+    /// The criterion; none if it needs a denoiser.
+    pub fn of(&self, oracle: Option<&Oracle>) -> Option<Box<dyn StoppingCriterion + Send>> {
+        match (self, oracle) {
+            (Self::Spp(spp), _) => Some(Box::new(FixedSpp(*spp))),
+            (Self::Rival(spec), _) => Some(spec.criterion()),
+            (_, oracle) => Some(Box::new(oracle?.clone())),
+        }
+    }
+}
+
+/// How often the user wants a render to be saved.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Autosave {
+    /// Only at the end.
+    Never,
+    /// After each pause of this length, whatever it costs.
+    Every(Duration),
+    /// After half a minute, or as soon as saving takes 2 % of the time.
+    Paced,
+}
+
+/// One run of a render: the job, and what picture and stops do not depend on.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct RenderRun {
+    pub job: RenderJob,
+    pub resources: Resources,
+    pub out: Option<JobPath>,
+    /// For everything, from the start of the command to the last file.
+    pub time: Option<Duration>,
+    pub against: Option<JobPath>,
+    pub autosave: Autosave,
+    pub earlier: Earlier,
+    pub quiet: bool,
+    /// Address of a viewer.
+    pub tev: Option<String>,
+    pub watch: Option<WatchPage>,
+}
+
+/// Where to serve a page with the picture so far.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct WatchPage {
+    pub address: SocketAddr,
+    /// Names that browsers may use beside addresses.
+    pub hosts: Vec<String>,
+}

@@ -1,0 +1,130 @@
+//! Denoised pictures made elsewhere.
+
+use super::read;
+use anyhow::{Context, bail};
+use noisefloor::{
+    Rgb, Tile, TileGrid, ToneMapping, Viewing,
+    evidence::{Evidence, Samples},
+    stills::{SnapshotPair, Still},
+};
+use noisefloor_cli::say::{note, say, say_json};
+use noisefloor_denoise::{DenoisedError, DenoisedHalves};
+use noisefloor_image::check_writable;
+use noisefloor_image::maps::{Canvas, draw_field};
+use noisefloor_vision::{VisionModel, VisionWorkspace};
+use serde::Serialize;
+use std::path::{Path, PathBuf};
+
+/// Two halves, and what a denoiser has made of each.
+pub struct DenoisedJob {
+    /// With their samples per pixel; without them, the files say how many.
+    pub noisy: [(PathBuf, Option<f64>); 2],
+    pub denoised: [PathBuf; 2],
+    /// If the user says so.
+    pub samples: Option<Samples>,
+    /// JODs that a tile may lose.
+    pub lost: f64,
+    pub tone: ToneMapping,
+    pub viewing: Viewing,
+    pub tile: usize,
+    pub json: bool,
+    pub noise_map: Option<PathBuf>,
+}
+
+#[derive(Serialize)]
+struct Row {
+    tile: usize,
+    x: usize,
+    y: usize,
+    width: usize,
+    height: usize,
+    jods_lost: f64,
+    converged: bool,
+}
+
+#[derive(Serialize)]
+struct Report<'a> {
+    images: [&'a Path; 2],
+    denoised: [&'a Path; 2],
+    limit: f64,
+    converged_tiles: usize,
+    tiles: &'a [Row],
+}
+
+pub fn run(job: &DenoisedJob) -> anyhow::Result<()> {
+    job.noise_map.iter().try_for_each(check_writable)?;
+    let [a, b] = [read(&job.noisy[0])?, read(&job.noisy[1])?];
+    let [da, db] = [denoised(&job.denoised[0], &a)?, denoised(&job.denoised[1], &b)?];
+    if da == db {
+        bail!(
+            "{} and {} are identical: each has to be made from its own half, by a denoiser that looks at it",
+            job.denoised[0].display(),
+            job.denoised[1].display()
+        );
+    }
+    let pair = SnapshotPair::new(Evidence::Halves, &a, &[&b], job.tone, job.samples)?;
+    if pair.samples() == Samples::Nested {
+        bail!(
+            "--denoised needs two halves that share no samples, and these are snapshots of one rendering: the later one contains \
+             the earlier one. Render one with another seed and denoise it again; --independent overrides what was found"
+        );
+    }
+    if a.spp.max(b.spp) > 2.0 * a.spp.min(b.spp) {
+        note!(
+            "note: one picture has more than twice the samples of the other ({} and {}): the verdict is on the mean of the two \
+             denoised pictures, and the worse one dominates it",
+            a.spp,
+            b.spp
+        );
+    }
+    let size = a.size;
+    let halves = DenoisedHalves { size, noisy: [&a.pixels, &b.pixels], denoised: [&da, &db] };
+    let error = DenoisedError::new(&halves, pair.display())?;
+    let rows = judge(job, &error)?;
+    say_all(job, &rows)?;
+    if let Some(path) = &job.noise_map {
+        let shown: Vec<Rgb> = error.shown().iter().map(|&shown| [shown; 3]).collect();
+        let map = error.map_of_jods_lost(&VisionModel::new(&job.viewing))?;
+        draw_field(&Canvas::of_picture(size.0, &shown), &map, &crate::output::ERROR_SCALE).save(path)?;
+    }
+    Ok(())
+}
+
+/// What a denoiser has made of a picture.
+fn denoised(path: &Path, of: &Still) -> anyhow::Result<Vec<Rgb>> {
+    let still = read(&(path.to_owned(), Some(of.spp)))?;
+    of.fits(&still)
+        .with_context(|| format!("{} beside the picture that it was made from", path.display()))?;
+    Ok(still.pixels)
+}
+
+fn judge(job: &DenoisedJob, error: &DenoisedError) -> anyhow::Result<Vec<Row>> {
+    let grid = TileGrid::new(error.size().0, error.size().1, job.tile)?;
+    let (eyes, mut room) = (VisionModel::new(&job.viewing), VisionWorkspace::default());
+    let mut row = |tile: Tile| {
+        let jods_lost = error.jods_lost(tile, &eyes, &mut room)?;
+        let Tile { index, x, y, width, height } = tile;
+        Ok(Row { tile: index, x, y, width, height, jods_lost, converged: jods_lost <= job.lost })
+    };
+    grid.tiles().map(&mut row).collect()
+}
+
+fn say_all(job: &DenoisedJob, rows: &[Row]) -> anyhow::Result<()> {
+    let converged_tiles = rows.iter().filter(|row| row.converged).count();
+    if job.json {
+        return say_json(&Report {
+            images: job.noisy.each_ref().map(|(path, _)| path.as_path()),
+            denoised: job.denoised.each_ref().map(PathBuf::as_path),
+            limit: job.lost,
+            converged_tiles,
+            tiles: rows,
+        });
+    }
+    say!("tile     x     y   size  JOD lost  verdict")?;
+    for Row { tile, x, y, width, height, jods_lost, converged } in rows {
+        let verdict = if *converged { "converged" } else { "error seen" };
+        say!("{tile:4} {x:5} {y:5} {:>8} {jods_lost:8.3}  {verdict}", format!("{width}×{height}"))?;
+    }
+    say!("{converged_tiles} of {} denoised tiles have lost at most {} JOD", rows.len(), job.lost)?;
+    Ok(say!("the limit is the vision model's: nobody has been asked about denoised tiles")?)
+}

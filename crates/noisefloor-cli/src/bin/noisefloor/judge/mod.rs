@@ -1,0 +1,196 @@
+//! `noisefloor judge`.
+
+mod denoised;
+mod report;
+
+pub use denoised::DenoisedJob;
+
+use anyhow::{Context, bail};
+use noisefloor::{
+    Oracle, Tile, TileGrid, ToneMapping, Verdict, Viewing,
+    evidence::{Evidence, Samples},
+    stills::{SnapshotPair, Still},
+};
+use noisefloor_cli::say::note;
+use noisefloor_image::maps::{Canvas, ColourScale, NOISE_SCALE, TileMark, draw_field, draw_tiles};
+use noisefloor_image::{
+    Plane, RenderLayers, SampleFacts, check_writable, read_facts, read_still, read_unread, write_exr,
+};
+use report::Row;
+use std::path::{Path, PathBuf};
+
+/// Pictures to judge: checked.
+pub struct JudgeJob {
+    /// With its samples per pixel; without them, the file says how many.
+    pub image: (PathBuf, Option<f64>),
+    /// At least one, in the same way.
+    pub against: Vec<(PathBuf, Option<f64>)>,
+    /// If the user says so.
+    pub samples: Option<Samples>,
+    /// Of a model that goes by halves; with a map of visible noise if one is to be drawn.
+    pub oracle: Oracle,
+    pub tone: ToneMapping,
+    pub viewing: Viewing,
+    pub tile: usize,
+    pub json: bool,
+    pub heat_map: Option<PathBuf>,
+    pub noise_map: Option<PathBuf>,
+    pub exr: Option<PathBuf>,
+}
+
+/// What `judge` is asked.
+pub enum Question {
+    Noise(Box<JudgeJob>),
+    Denoised(Box<DenoisedJob>),
+}
+
+pub fn run(question: &Question) -> anyhow::Result<()> {
+    match question {
+        Question::Noise(job) => judge_noise(job),
+        Question::Denoised(job) => denoised::run(job),
+    }
+}
+
+fn judge_noise(job: &JudgeJob) -> anyhow::Result<()> {
+    for path in [&job.heat_map, &job.noise_map, &job.exr].into_iter().flatten() {
+        check_writable(path)?;
+    }
+    let image = read(&job.image)?;
+    let others: Vec<Still> = job.against.iter().map(read).collect::<anyhow::Result<_>>()?;
+    for (other, (path, _)) in others.iter().zip(&job.against) {
+        let names = || format!("{} against {}", job.image.0.display(), path.display());
+        image.fits(other).with_context(names)?;
+    }
+    let (width, height) = image.size;
+    let grid = TileGrid::new(width, height, job.tile)?;
+
+    // Compare the picture with the others, and judge.
+    let others: Vec<&Still> = others.iter().collect();
+    let held =
+        SnapshotPair::new(Evidence::Halves, &image, &others, job.tone, job.samples)?.seen_on(job.viewing);
+    if job.samples.is_none() && held.samples() == Samples::Nested {
+        note!(
+            "note: the pictures share samples, as snapshots of one rendering do, and are judged as --nested; --independent overrides this"
+        );
+    }
+    let unlike = held.unlike_tiles(grid);
+    let count = unlike.iter().filter(|unlike| **unlike).count();
+    if count == grid.len() {
+        bail!(
+            "the pictures differ in brightness by more than noise explains, everywhere: they are no two renderings \
+             of one view with one exposure, and their difference says nothing about noise"
+        );
+    }
+    if count > 0 {
+        note!(
+            "warning: in {count} of {} tiles the pictures differ in brightness by more than noise explains, and \
+             these are not judged; compare renderings of one view with one exposure",
+            grid.len()
+        );
+    }
+    let rows = judge(&job.oracle, grid, &held, &unlike)?;
+    report::say_all((&job.image.0, image.spp), &job.oracle, &rows, job.json)?;
+    draw(job, &image, grid, &held, &rows)
+}
+
+/// A picture that can be judged; errors name it.
+fn read((path, spp): &(PathBuf, Option<f64>)) -> anyhow::Result<Still> {
+    let still = read_still(path, *spp)?;
+    if let (Some(typed), Some(said)) = (spp, read_facts(path)?.spp())
+        && *typed != said as f64
+    {
+        note!(
+            "note: {} says that it has {said} samples per pixel; --spp {typed} overrides it",
+            path.display()
+        );
+    }
+    for what in read_unread(path)?.warnings() {
+        note!("warning: {}: {what}", path.display());
+    }
+    still.check().with_context(|| format!("{}", path.display()))?;
+    Ok(still)
+}
+
+/// The verdicts; tiles that are `unlike` in both pictures get none, and count as not converged.
+fn judge(
+    oracle: &Oracle,
+    grid: TileGrid,
+    held: &SnapshotPair<'_>,
+    unlike: &[bool],
+) -> anyhow::Result<Vec<Row>> {
+    let row = |(tile, verdict): (Tile, Verdict)| {
+        let unlike = unlike[tile.index];
+        let verdict = if unlike { Verdict::default() } else { verdict };
+        let Verdict { converged, probability, threshold, expected_spp, unfamiliar, .. } = verdict;
+        let Tile { index, x, y, width, height } = tile;
+        let probability = probability.unwrap_or(0.0);
+        Row {
+            tile: index,
+            x,
+            y,
+            width,
+            height,
+            probability,
+            converged,
+            threshold,
+            expected_spp,
+            unfamiliar,
+            unlike,
+        }
+    };
+    let described = held.describe(oracle, grid)?;
+    Ok(grid.tiles().zip(oracle.judge_described(&described)).map(row).collect())
+}
+
+/// Draws what was asked for.
+fn draw(
+    job: &JudgeJob,
+    image: &Still,
+    grid: TileGrid,
+    held: &SnapshotPair<'_>,
+    rows: &[Row],
+) -> anyhow::Result<()> {
+    let width = grid.width();
+    let wants_noise = job.noise_map.is_some() || job.exr.is_some();
+    let noise =
+        if wants_noise { job.oracle.map_visible_noise(grid, |t| held.planes(t).map(Some))? } else { None };
+    if let (Some(path), Some(noise)) = (&job.noise_map, &noise) {
+        draw_field(&Canvas::of_picture(width, &held.shown()), noise, &NOISE_SCALE).save(path)?;
+    }
+    if let Some(path) = &job.exr {
+        write_channels(path, image, grid, rows, noise.as_deref())?;
+    }
+    if let Some(path) = &job.heat_map {
+        let mark = |row: &Row| TileMark {
+            tile: grid.tile(row.tile),
+            value: f64::from(row.probability),
+            label: format!("{:.2}", row.probability),
+            unfamiliar: row.unfamiliar,
+        };
+        let marks: Vec<TileMark> = rows.iter().map(mark).collect();
+        let (title, colours) = ("P(no noise\nis seen)", colorous::CIVIDIS);
+        let scale = ColourScale { title, low: 0.0, high: 1.0, log: false, colours, landmark: None };
+        draw_tiles(&Canvas::of_picture(width, &held.shown()), &marks, &scale).save(path)?;
+    }
+    Ok(())
+}
+
+fn write_channels(
+    path: &Path,
+    image: &Still,
+    grid: TileGrid,
+    rows: &[Row],
+    noise: Option<&[f32]>,
+) -> anyhow::Result<()> {
+    let (width, height) = image.size;
+    let probability = |pixel: usize| rows[grid.index_at(pixel % width, pixel / width)].probability;
+    let spp = (image.spp.fract() == 0.0 && image.spp < 1e15).then_some(image.spp as u64);
+    let facts = SampleFacts { samples: spp.map(|spp| (spp, spp)), origin: image.origin.clone() };
+    let layers = RenderLayers {
+        probability: Some(Plane::Computed(&probability)),
+        visible_noise: noise.map(Plane::from),
+        facts: Some(&facts),
+        ..RenderLayers::rgb(width, height, &image.pixels)
+    };
+    Ok(write_exr(path, &layers)?)
+}

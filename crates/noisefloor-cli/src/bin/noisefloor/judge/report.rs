@@ -1,0 +1,100 @@
+//! Verdicts as a table or as JSON.
+
+use noisefloor::{Oracle, Threshold, criterion::ExpectedThreshold};
+use noisefloor_cli::say::{NotSaid, say, say_json};
+use serde::Serialize;
+use std::path::Path;
+
+/// One line of the verdict.
+#[derive(Serialize)]
+pub(super) struct Row {
+    pub(super) tile: usize,
+    pub(super) x: usize,
+    pub(super) y: usize,
+    pub(super) width: usize,
+    pub(super) height: usize,
+    pub(super) probability: f32,
+    pub(super) converged: bool,
+    /// Where people are expected to stop seeing noise, in samples per pixel.
+    pub(super) threshold: Option<ExpectedThreshold>,
+    /// Samples per pixel at which the tile should be converged; null if that is out of sight.
+    pub(super) expected_spp: Option<u64>,
+    /// Whether its texture is unlike any that the model has been tested on; P is then that of half the
+    /// samples.
+    pub(super) unfamiliar: bool,
+    /// Whether the pictures differ there by more than noise: it is not judged then, and P is 0.
+    pub(super) unlike: bool,
+}
+
+#[derive(Serialize)]
+struct Report<'a> {
+    image: &'a Path,
+    spp: f64,
+    model: String,
+    threshold: Threshold,
+    converged_tiles: usize,
+    unfamiliar_tiles: usize,
+    tiles: &'a [Row],
+}
+
+/// Says what the verdicts are on a picture with that many samples per pixel.
+pub(super) fn say_all(
+    (image, spp): (&Path, f64),
+    oracle: &Oracle,
+    rows: &[Row],
+    json: bool,
+) -> anyhow::Result<()> {
+    let report = Report {
+        image,
+        spp,
+        model: oracle.model().digest(),
+        threshold: oracle.threshold(),
+        converged_tiles: rows.iter().filter(|r| r.converged).count(),
+        unfamiliar_tiles: rows.iter().filter(|r| r.unfamiliar).count(),
+        tiles: rows,
+    };
+    if json {
+        say_json(&report)?
+    } else {
+        say_table(&report)?
+    }
+    Ok(())
+}
+
+fn say_table(report: &Report<'_>) -> Result<(), NotSaid> {
+    say!(
+        "tile     x     y   size       P  verdict      stops at spp  people stop seeing noise at spp (80 %)"
+    )?;
+    for row in report.tiles {
+        let verdict = match row {
+            Row { unlike: true, .. } => "not judged",
+            Row { converged: true, .. } => "converged",
+            _ => "noise seen",
+        };
+        let expected = row.expected_spp.filter(|_| !row.converged).map_or(String::new(), |n| n.to_string());
+        let size = format!("{}×{}", row.width, row.height);
+        let range = row.threshold.map_or(String::new(), |t| format!("{}…{}", t.low, t.high));
+        say!(
+            "{:4} {:5} {:5} {size:>8} {:6.3}  {verdict:10} {expected:>14}  {range:>16}{}",
+            row.tile,
+            row.x,
+            row.y,
+            row.probability,
+            if row.unfamiliar { "  unfamiliar" } else { "" }
+        )?;
+    }
+    say!(
+        "{} of {} tiles converged at {} spp (P ≥ {})",
+        report.converged_tiles,
+        report.tiles.len(),
+        report.spp,
+        report.threshold
+    )?;
+    if report.unfamiliar_tiles > 0 {
+        say!(
+            "tiles with texture unlike any that the model was tested on: {}; their P is that of half the samples, and less certain",
+            report.unfamiliar_tiles
+        )?;
+    }
+    Ok(())
+}

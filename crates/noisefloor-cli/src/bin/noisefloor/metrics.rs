@@ -1,0 +1,153 @@
+//! `noisefloor metrics`.
+
+use anyhow::{Context, bail};
+use noisefloor::{Rgb, ToneMapping, Viewing, display::Display};
+use noisefloor_cli::say::{NotSaid, note, say};
+use noisefloor_image::maps::{Canvas, ColourScale, draw_field};
+use noisefloor_image::{Picture, check_writable, read_picture};
+use noisefloor_rivals::DifferenceMap;
+use noisefloor_rivals::metrics::{MetricPair, MetricScores};
+use noisefloor_vision::Eotf;
+use serde::Serialize;
+use std::path::{Path, PathBuf};
+
+/// What to type for the metrics that a build leaves out.
+pub const AGAIN: &str = "run `cargo run --release --features metrics -- metrics …`";
+
+/// Two pictures to compare: checked.
+pub struct MetricsJob {
+    pub image: PathBuf,
+    pub reference: PathBuf,
+    pub viewing: Viewing,
+    pub tone: ToneMapping,
+    pub json: bool,
+    pub map: Option<PathBuf>,
+    pub flip_map: Option<PathBuf>,
+    pub butteraugli_map: Option<PathBuf>,
+}
+
+#[derive(Serialize)]
+struct Report<'a> {
+    image: &'a Path,
+    reference: &'a Path,
+    width: usize,
+    height: usize,
+    viewing: Viewing,
+    #[serde(flatten)]
+    scores: MetricScores,
+}
+
+/// The scale of every map is fixed, so that maps of different pictures compare.
+const JODS: ColourScale = ColourScale {
+    title: "ColorVideoVDP\nJODs lost",
+    low: 0.1,
+    high: 10.0,
+    log: true,
+    colours: colorous::INFERNO,
+    landmark: None,
+};
+/// FLIP's own colours, over the differences that noise makes.
+const FLIP: ColourScale = ColourScale {
+    title: "FLIP\nof at most 1",
+    low: 0.0,
+    high: 0.2,
+    log: false,
+    colours: colorous::MAGMA,
+    landmark: None,
+};
+const BUTTERAUGLI: ColourScale = ColourScale {
+    title: "butteraugli\nfrom 1: seen",
+    low: 0.125,
+    high: 8.0,
+    log: true,
+    colours: colorous::INFERNO,
+    landmark: None,
+};
+
+pub fn run(job: &MetricsJob) -> anyhow::Result<()> {
+    for path in [&job.map, &job.flip_map, &job.butteraugli_map].into_iter().flatten() {
+        check_writable(path)?;
+    }
+    let (image, reference) = (read_picture(&job.image)?, read_picture(&job.reference)?);
+    let names = || format!("{} and {}", job.image.display(), job.reference.display());
+    let size = image.size();
+    if size != reference.size() {
+        let ((w, h), (rw, rh)) = (size, reference.size());
+        bail!("{}: the pictures have different sizes, {w}×{h} and {rw}×{rh}; scale or crop one", names());
+    }
+    let display_referred = matches!(reference, Picture::Display(_));
+    if matches!(image, Picture::Display(_)) != display_referred {
+        bail!("{}: one is a PNG and one is not; compare pictures of one kind", names());
+    }
+    if !display_referred {
+        check_codes(job)?;
+    }
+    let (image, reference) = (image.into_linear().pixels, reference.into_linear().pixels);
+    let display = if display_referred { Display::SRGB } else { job.tone.settle(&reference) };
+    let pair =
+        MetricPair { size, image: &image, reference: &reference, display: &display, viewing: &job.viewing };
+    let (scores, maps) = pair.measure().with_context(names)?;
+
+    let shown: Vec<Rgb> = image.iter().map(|&p| display.encode(p)).collect();
+    draw(job.map.as_deref(), size.0, &shown, Some(&maps.cvvdp), &JODS)?;
+    draw(job.flip_map.as_deref(), size.0, &shown, maps.flip.as_ref(), &FLIP)?;
+    draw(job.butteraugli_map.as_deref(), size.0, &shown, maps.butteraugli.as_ref(), &BUTTERAUGLI)?;
+    if cfg!(not(feature = "metrics")) {
+        note!("note: this build has no FLIP and butteraugli: {AGAIN}");
+    }
+    say_scores(job, size, scores)
+}
+
+/// What tone mapping makes must be what the display takes.
+fn check_codes(job: &MetricsJob) -> anyhow::Result<()> {
+    let makes_srgb = !matches!(job.tone, ToneMapping::Custom { .. });
+    let takes_srgb = matches!(job.viewing.params().eotf, Eotf::Srgb | Eotf::Gamma(_));
+    if makes_srgb && !takes_srgb {
+        bail!(
+            "--viewing {}: this display takes no sRGB values, which tone mapping makes; give a LUT that \
+             makes what it takes, or PNGs that hold it",
+            job.viewing
+        );
+    }
+    Ok(())
+}
+
+fn draw(
+    path: Option<&Path>,
+    width: usize,
+    shown: &[Rgb],
+    map: Option<&DifferenceMap>,
+    scale: &ColourScale,
+) -> anyhow::Result<()> {
+    if let (Some(path), Some(map)) = (path, map) {
+        draw_field(&Canvas::of_picture(width, shown), &map.values, scale).save(path)?;
+    }
+    Ok(())
+}
+
+fn say_scores(job: &MetricsJob, (width, height): (usize, usize), scores: MetricScores) -> anyhow::Result<()> {
+    if job.json {
+        let MetricsJob { image, reference, viewing, .. } = job;
+        let report = Report { image, reference, width, height, viewing: *viewing, scores };
+        say!("{}", serde_json::to_string_pretty(&report)?)?;
+        return Ok(());
+    }
+    let line = |name: &str, value: String, meaning: &str| -> Result<(), NotSaid> {
+        say!("{name:14} {value:>9}  {meaning}")
+    };
+    line(
+        "ColorVideoVDP",
+        format!("{:.3}", scores.cvvdp_jod),
+        "JOD; 10: no visible difference, 9: three of four people prefer the reference",
+    )?;
+    if let Some(flip) = scores.flip {
+        line("FLIP", format!("{flip:.4}"), "mean, of at most 1")?;
+    }
+    if let (Some(largest), Some(norm)) = (scores.butteraugli, scores.butteraugli_norm3) {
+        line("butteraugli", format!("{largest:.3}"), "largest; below 1 pictures look the same")?;
+        line("", format!("{norm:.3}"), "3-norm")?;
+    }
+    line("PSNR", format!("{:.2}", scores.psnr), "dB, of display values")?;
+    line("relMSE", format!("{:.3e}", scores.rel_mse), "of linear radiance")?;
+    Ok(())
+}

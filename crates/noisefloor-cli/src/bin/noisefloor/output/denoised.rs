@@ -1,0 +1,158 @@
+//! image-denoised.exr, image-denoised.png, denoised-error.png, albedo.exr and normal.exr, and what is said
+//! of them.
+
+use super::Output;
+use noisefloor::{Rgb, Session, source::FirstHits};
+use noisefloor_cli::say::{NotSaid, note, say};
+use noisefloor_denoise::{DenoisedRecord, Denoiser, NoisyPicture};
+use noisefloor_image::maps::{Canvas, ColourScale, draw_field};
+use noisefloor_image::{RenderLayers, write_exr};
+use noisefloor_vision::VisionModel;
+use serde::Serialize;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Instant;
+
+/// The denoiser of a render, and what its verdicts looked at.
+pub struct Denoised {
+    denoiser: Box<dyn Denoiser>,
+    /// Albedo and normals of both halves together.
+    guide: Option<FirstHits>,
+    record: Arc<Mutex<DenoisedRecord>>,
+    give_up: Arc<AtomicBool>,
+}
+
+/// What report.json says of it.
+#[derive(Serialize)]
+pub(super) struct DenoisedReport {
+    denoiser: String,
+    /// Whether the source gave it albedo and normals.
+    guided: bool,
+    /// Verdicts, each of two denoisings, and the seconds that they took.
+    verdicts: usize,
+    seconds: f64,
+    /// Just-objectionable differences lost, by the estimate when a tile was last judged: the most of any
+    /// tile.
+    jods_lost: Option<f64>,
+    /// Samples per pixel that the picture would need without denoising, on average, to lose as little as is
+    /// allowed; null if that is out of sight for a tile.
+    spp_without: Option<f64>,
+}
+
+impl Denoised {
+    /// The denoiser gives a call up once `give_up` is set.
+    pub fn new(
+        denoiser: impl Denoiser + 'static,
+        guides: Option<&[FirstHits; 2]>,
+        record: Arc<Mutex<DenoisedRecord>>,
+        give_up: Arc<AtomicBool>,
+    ) -> Self {
+        Self { denoiser: Box::new(denoiser), guide: guides.map(together), record, give_up }
+    }
+
+    /// Set by whoever wants the denoiser to give up.
+    pub fn give_up(&self) -> Arc<AtomicBool> {
+        Arc::clone(&self.give_up)
+    }
+
+    pub(super) fn is_given_up(&self) -> bool {
+        self.give_up.load(Ordering::Relaxed)
+    }
+
+    fn record(&self) -> MutexGuard<'_, DenoisedRecord> {
+        self.record.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    pub(super) fn report(&self, session: &Session) -> DenoisedReport {
+        let record = self.record();
+        let grid = session.film().grid();
+        let pixels = (grid.width() * grid.height()) as f64;
+        let needed = record.needed_without.iter().zip(grid.tiles());
+        let needed: Option<f64> = needed.map(|(spp, tile)| Some((*spp)? as f64 * tile.pixels() as f64)).sum();
+        let lost = record.jods_lost.iter().copied().filter(|lost| lost.is_finite());
+        DenoisedReport {
+            denoiser: self.denoiser.name(),
+            guided: self.guide.is_some(),
+            verdicts: record.verdicts,
+            seconds: record.seconds,
+            jods_lost: lost.max_by(f64::total_cmp),
+            spp_without: needed.filter(|_| record.verdicts > 0).map(|samples| samples / pixels),
+        }
+    }
+}
+
+/// The mean of two pictures of first hits.
+fn together([a, b]: &[FirstHits; 2]) -> FirstHits {
+    let mean = |a: &[Rgb], b: &[Rgb]| -> Vec<Rgb> {
+        a.iter().zip(b).map(|(a, b)| std::array::from_fn(|c| 0.5 * (a[c] + b[c]))).collect()
+    };
+    let (albedo, normal) = (mean(&a.albedo, &b.albedo), mean(&a.normal, &b.normal));
+    FirstHits { width: a.width, height: a.height, albedo, normal }
+}
+
+/// JODs lost, from nothing that people see to what three of four do.
+pub const ERROR_SCALE: ColourScale = ColourScale {
+    title: "error left\nJODs lost",
+    low: 0.01,
+    high: 1.0,
+    log: true,
+    colours: colorous::INFERNO,
+    landmark: None,
+};
+
+impl Output {
+    /// Denoises the picture, and writes it with the map of its error.
+    pub(super) fn write_denoised(&mut self, session: &Session) -> anyhow::Result<()> {
+        let Some(denoised) = &mut self.denoised else { return Ok(()) };
+        let grid = session.film().grid();
+        let (width, height) = (grid.width(), grid.height());
+        let began = Instant::now();
+        let (noisy, wants) = (session.film().image(), denoised.denoiser.wants());
+        let picture = NoisyPicture::new((width, height), &noisy);
+        let guide = denoised.guide.as_ref();
+        let image =
+            denoised.denoiser.denoise(&guide.map_or(picture, |guide| picture.guided(guide, wants)))?;
+        denoised.record().seconds += began.elapsed().as_secs_f64();
+
+        let display = session.display().copied();
+        let display = display.unwrap_or_else(|| session.params().tone_mapping.settle(&image));
+        let encoded: Vec<Rgb> = image.iter().map(|&p| display.encode(p)).collect();
+        let eyes = VisionModel::new(&session.params().viewing);
+        let map = denoised.record().error.as_ref().map(|error| error.map_of_jods_lost(&eyes)).transpose()?;
+        write_exr(self.path("image-denoised.exr"), &RenderLayers::rgb(width, height, &image))?;
+        if let Some(guide) = self.denoised.as_ref().and_then(|denoised| denoised.guide.as_ref()) {
+            write_exr(self.path("albedo.exr"), &RenderLayers::rgb(width, height, &guide.albedo))?;
+            write_exr(self.path("normal.exr"), &RenderLayers::rgb(width, height, &guide.normal))?;
+        }
+        let shown = Canvas::of_picture(width, &encoded);
+        shown.save(self.path("image-denoised.png"))?;
+        match map {
+            Some(map) => draw_field(&shown, &map, &ERROR_SCALE).save(self.path("denoised-error.png"))?,
+            None => note!(
+                "note: no tile was judged in this run, so the error of the denoised picture is not known"
+            ),
+        }
+        Ok(())
+    }
+
+    /// Says what denoising was worth.
+    pub(super) fn say_denoised(&self, session: &Session) -> Result<(), NotSaid> {
+        let Some(denoised) = &self.denoised else { return Ok(()) };
+        let DenoisedReport { denoiser, guided, verdicts, seconds, jods_lost, spp_without } =
+            denoised.report(session);
+        let grid = session.film().grid();
+        let spp = session.film().total_samples() as f64 / (grid.width() * grid.height()) as f64;
+        let without = spp_without.map_or_else(
+            || "out of sight without".to_owned(),
+            |spp| format!("about {spp:.0} without, as estimated from the same halves"),
+        );
+        let with = if guided { " with albedo and normals" } else { "" };
+        say!("{spp:.0} spp denoised by {denoiser}{with}; {without}")?;
+        if let Some(lost) = jods_lost {
+            say!(
+                "the worst tile lost {lost:.3} JOD when it was last judged; nobody has been asked about denoised tiles"
+            )?;
+        }
+        say!("{verdicts} verdicts on denoised halves, and the picture itself, took {seconds:.1} s")
+    }
+}

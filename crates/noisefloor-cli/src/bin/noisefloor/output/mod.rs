@@ -1,0 +1,279 @@
+//! The files that `render` writes.
+
+mod denoised;
+mod pictures;
+mod report;
+mod summary;
+mod tiles;
+
+pub use denoised::{Denoised, ERROR_SCALE};
+pub use summary::say_noise;
+
+use anyhow::Context;
+use noisefloor::{
+    Checkpoint, Rgb, Session,
+    criterion::ExpectedThreshold,
+    driver::{Clock, Progress},
+    stills::SampleOrigin,
+};
+use noisefloor_cli::end::Usage;
+use noisefloor_cli::files::write_json;
+use noisefloor_cli::folder::{Earlier, Folder};
+use noisefloor_cli::say::{note, one_line};
+use noisefloor_cli::sources::Source;
+use noisefloor_farm::Finished;
+use noisefloor_image::{check_writable, write_atomic, write_csv};
+use noisefloor_rivals::metrics::relative_mse;
+use report::Report;
+use serde::{Deserialize, Serialize};
+use std::fs::File;
+use std::io::{self, BufReader};
+use std::path::{Path, PathBuf};
+use tiles::TileState;
+
+/// One line of timeline.csv.
+#[derive(Clone, Copy, Serialize, Deserialize)]
+struct TimelineRow {
+    seconds: f64,
+    samples: u64,
+    active_tiles: usize,
+    rel_mse: Option<f64>,
+}
+
+/// The output folder, and what has been recorded for it.
+pub struct Output {
+    folder: Folder,
+    pub scene: String,
+    pub source: String,
+    seed: u64,
+    /// Digest of the model.
+    pub model: Option<String>,
+    /// To compare with: as many pixels as are rendered.
+    pub reference: Option<Vec<Rgb>>,
+    /// Where the samples come from, for whoever compares the picture with another.
+    pub origin: Option<SampleOrigin>,
+    /// Who denoises the picture, if it is judged and written denoised.
+    pub denoised: Option<Denoised>,
+    timeline: Vec<TimelineRow>,
+    seconds_before: f64,
+    /// Whether there is an earlier render in the folder, and it is not resumed.
+    overwrites: bool,
+}
+
+/// A run that is over: the time it took, and what counts samples, where that is here.
+pub type Over<'a> = (Clock, Option<&'a dyn Source>);
+
+/// Where an interrupted render continues, in its output folder.
+const CHECKPOINT: &str = "checkpoint.nfc";
+const REPORT: &str = "report.json";
+const PICTURE: &str = "image.exr";
+
+impl Output {
+    /// Makes sure that files can be written, and that no other render is lost by it, before hours are spent.
+    pub fn create(
+        folder: Folder,
+        earlier: Earlier,
+        scene: String,
+        source: String,
+        seed: u64,
+    ) -> anyhow::Result<Self> {
+        if let Some(occupied) = occupied(&folder, earlier) {
+            return Err(occupied.into());
+        }
+        check_writable(folder.path().join("image.exr"))?;
+        let (timeline, seconds_before) = (Vec::new(), 0.0);
+        let (model, reference, origin) = (None, None, None);
+        let overwrites = earlier == Earlier::Overwrite;
+        Ok(Self {
+            folder,
+            scene,
+            source,
+            seed,
+            model,
+            reference,
+            origin,
+            denoised: None,
+            timeline,
+            seconds_before,
+            overwrites,
+        })
+    }
+
+    /// The output folder, for people.
+    pub fn folder(&self) -> impl std::fmt::Display + '_ {
+        self.folder.path().display()
+    }
+
+    /// A file in the output folder.
+    fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    /// The file of the checkpoint, for people.
+    pub fn checkpoint_file(&self) -> String {
+        self.path(CHECKPOINT).display().to_string()
+    }
+
+    /// The checkpoint in the folder, if there is one.
+    pub fn checkpoint(&self) -> anyhow::Result<Option<Checkpoint<'static>>> {
+        let file = match File::open(self.path(CHECKPOINT)) {
+            Ok(file) => file,
+            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
+            Err(error) => return Err(error).with_context(|| self.checkpoint_file()),
+        };
+        let checkpoint = Checkpoint::read(BufReader::new(file))
+            .with_context(|| format!("{}: remove it to begin anew", self.checkpoint_file()))?;
+        Ok(Some(checkpoint))
+    }
+
+    /// Takes up the history of the render that is resumed, up to its samples. If it cannot be read, that is
+    /// no reason to throw samples away.
+    pub fn take_up(&mut self, samples: u64) {
+        let rows = csv::Reader::from_path(self.path("timeline.csv")).map(csv::Reader::into_deserialize);
+        let rows = rows.into_iter().flatten().map_while(Result::ok);
+        self.timeline = rows.take_while(|row: &TimelineRow| row.samples <= samples).collect();
+        self.seconds_before = self.timeline.last().map_or(0.0, |row| row.seconds);
+    }
+
+    /// Notes one batch.
+    pub fn record(&mut self, session: &Session, progress: &Progress) {
+        let rel_mse = self
+            .reference
+            .as_ref()
+            .and_then(|reference| relative_mse(&session.film().image(), reference).ok());
+        let noisefloor::driver::TimelinePoint { seconds, samples, active_tiles } = progress.now;
+        let seconds = self.seconds_before + seconds;
+        self.timeline.push(TimelineRow { seconds, samples, active_tiles, rel_mse });
+    }
+
+    /// Writes every file, with the time that the run took and what became of the samples: it is over.
+    pub fn write(
+        &mut self,
+        session: &Session,
+        checkpoint: Option<Checkpoint<'_>>,
+        over: Over<'_>,
+    ) -> anyhow::Result<()> {
+        self.write_pictures(session)?;
+        if self.denoised.is_some() {
+            // A denoiser that fails, or is killed, must not cost the samples
+            self.write_tables(session, checkpoint.clone(), None)?;
+            let denoised = self.write_denoised(session);
+            let given_up = self.denoised.as_ref().is_some_and(Denoised::is_given_up);
+            match denoised {
+                Err(error) if given_up => {
+                    note!("warning: the picture is not denoised: {}; --resume does it", one_line(&error));
+                    return Ok(());
+                }
+                denoised => denoised.context("everything else is saved; --resume denoises the picture")?,
+            }
+        }
+        self.write_tables(session, checkpoint, Some(over))
+    }
+
+    /// Writes what is known so far, pictures excepted: tables, and the checkpoint of a render that can be
+    /// resumed.
+    pub fn write_progress(
+        &mut self,
+        session: &Session,
+        checkpoint: Option<Checkpoint<'_>>,
+    ) -> anyhow::Result<()> {
+        self.write_tables(session, checkpoint, None)
+    }
+
+    fn write_tables(
+        &mut self,
+        session: &Session,
+        checkpoint: Option<Checkpoint<'_>>,
+        over: Option<Over<'_>>,
+    ) -> anyhow::Result<()> {
+        self.forget_earlier()?;
+        let tiles = tiles::states(session);
+        let range = |tile: &TileState| match session.params().blocks {
+            0 => (tile.stop.spp, tile.stop.spp),
+            _ => session.film().spp_range(tile.stop.tile.index),
+        };
+        write_csv(self.path("stops.csv"), tiles.iter().map(|tile| tile.row(range(tile))))?;
+        write_csv(self.path("timeline.csv"), self.timeline.iter())?;
+        // The report goes before a checkpoint is removed: whatever is killed in between, one of them says
+        // how far the render is A render whose pictures are not all there is not done, however its tiles
+        // stand
+        let done = over.is_some() && session.is_done() && tiles.iter().all(TileState::is_final);
+        let job = checkpoint.as_ref().map(Checkpoint::job_digest);
+        let kept = checkpoint.filter(|_| !done);
+        if let Some(checkpoint) = &kept {
+            write_atomic(self.path(CHECKPOINT), |to| checkpoint.write(to))?;
+        }
+        write_json(&self.path(REPORT), &Report::new(self, session, &tiles, (job.as_deref(), over)))?;
+        if kept.is_none() { remove(&self.path(CHECKPOINT)) } else { Ok(()) }
+    }
+
+    /// A report is of the pictures beside it: one of an earlier render is none any more.
+    fn forget_earlier(&mut self) -> anyhow::Result<()> {
+        if std::mem::take(&mut self.overwrites) { remove(&self.path(REPORT)) } else { Ok(()) }
+    }
+}
+
+/// By the digest of a job, compared with what the report in the folder says.
+pub fn finished(folder: &Path, job: &str) -> anyhow::Result<Finished> {
+    let path = folder.join(REPORT);
+    if folder.join(CHECKPOINT).exists() {
+        return Ok(Finished::Not);
+    }
+    let report = match std::fs::read(&path) {
+        Ok(report) => serde_json::from_slice::<serde_json::Value>(&report).unwrap_or_default(),
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Finished::Not),
+        Err(error) => return Err(error).with_context(|| path.display().to_string()),
+    };
+    let this = report["complete"] == true && report["job"] == job;
+    Ok(if this { Finished::This } else { Finished::Other })
+}
+
+/// The file that shows that a folder holds a render, whosever it is.
+pub fn render_in(folder: &Path) -> Option<&'static str> {
+    [CHECKPOINT, REPORT, PICTURE].into_iter().find(|name| folder.join(name).exists())
+}
+
+/// The render that must not be overwritten, if there is one.
+fn occupied(folder: &Folder, earlier: Earlier) -> Option<Usage> {
+    let (found, path) = (folder.first_of(&[CHECKPOINT, REPORT, PICTURE])?, folder.path().display());
+    let resumable = found == CHECKPOINT;
+    let what = match earlier {
+        Earlier::Overwrite => return None,
+        Earlier::Resume if found != REPORT => return None,
+        Earlier::Resume => {
+            "holds a render that is finished, or that cannot be resumed; --force overwrites it"
+        }
+        Earlier::Keep if resumable => {
+            "holds a render that is not finished; --resume resumes it, --force overwrites it"
+        }
+        Earlier::Keep => "holds a render; --force overwrites it",
+    };
+    Some(Usage(format!("{path}: {what}, and --out names another folder")))
+}
+
+/// Removes a file if it is there.
+fn remove(path: &Path) -> anyhow::Result<()> {
+    match std::fs::remove_file(path) {
+        Err(error) if error.kind() != io::ErrorKind::NotFound => {
+            Err(error).with_context(|| path.display().to_string())
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Where people are expected to stop seeing noise in the typical tile: that of median need. `None` if the
+/// criterion does not say.
+fn typical_threshold(session: &Session) -> Option<ExpectedThreshold> {
+    let tiles = 0..session.film().grid().len();
+    let mut thresholds: Vec<ExpectedThreshold> =
+        tiles.filter_map(|tile| session.verdict(tile)?.threshold).collect();
+    thresholds.sort_by_key(|threshold| threshold.median);
+    thresholds.get(thresholds.len() / 2).copied()
+}
+
+/// Samples that uniform rendering at the largest stop would take, over all pixels.
+fn uniform_samples(session: &Session) -> u64 {
+    let grid = session.film().grid();
+    let most = (0..grid.len()).map(|t| session.film().spp(t)).max().unwrap_or(0);
+    most * (grid.width() * grid.height()) as u64
+}

@@ -1,0 +1,116 @@
+//! report.json.
+
+use super::denoised::DenoisedReport;
+use super::tiles::TileState;
+use super::{Output, Over, typical_threshold, uniform_samples};
+use noisefloor::{Params, Session, criterion::ExpectedThreshold};
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+#[derive(Serialize)]
+pub(super) struct Report<'a> {
+    noisefloor: &'static str,
+    scene: &'a str,
+    /// Who rendered.
+    source: &'a str,
+    width: usize,
+    height: usize,
+    seed: u64,
+    criterion: String,
+    /// BLAKE3 of the model.
+    model: Option<&'a str>,
+    /// What samples and verdicts depend on ([`noisefloor::Checkpoint::job_digest`]); null for a render that
+    /// cannot be resumed.
+    job: Option<&'a str>,
+    params: &'a Params,
+    /// Display exposure that was settled.
+    exposure: Option<f32>,
+    /// Whether every tile has what it should have: false for a render that was interrupted or ran out of
+    /// time, and while it runs.
+    complete: bool,
+    tiles: usize,
+    stops: BTreeMap<String, usize>,
+    /// Tiles with texture unlike any that the model has been tried on.
+    unfamiliar_tiles: usize,
+    /// Where people are expected to stop seeing noise in the typical tile, in samples per pixel.
+    expected_threshold: Option<ExpectedThreshold>,
+    /// Over all pixels.
+    samples: u64,
+    /// What uniform rendering at the largest stop would take.
+    samples_uniform: u64,
+    /// Samples kept out by the film because they were not finite.
+    samples_rejected: u64,
+    /// Samples that the renderer counted as black because they were not finite.
+    samples_dropped: Option<u64>,
+    /// Samples that were scaled down to `--clamp`.
+    samples_clamped: Option<u64>,
+    /// Samples of tiles that see nothing but the background: no ray was traced for them.
+    samples_background: Option<u64>,
+    /// Of the ray-traced reference, if the criterion asked for one: samples of a pixel, and the deviation
+    /// of its noise mask as it estimates it, over all blocks and in the worst.
+    reference_samples: Option<f64>,
+    reference_deviation: Option<f32>,
+    reference_worst: Option<f32>,
+    /// Of the runs that this one resumes (`--resume`); the others are this run's.
+    seconds_before: f64,
+    seconds_source: Option<f64>,
+    seconds_oracle: Option<f64>,
+    seconds_total: Option<f64>,
+    rel_mse: Option<f64>,
+    /// With --denoise.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    denoised: Option<DenoisedReport>,
+}
+
+impl<'a> Report<'a> {
+    /// What is known now; with the time it took and what became of the samples when the run is over.
+    pub(super) fn new(
+        output: &'a Output,
+        session: &'a Session,
+        tiles: &[TileState],
+        (job, over): (Option<&'a str>, Option<Over<'_>>),
+    ) -> Self {
+        let (clock, source) = over.unzip();
+        let source = source.flatten();
+        let counts = source.and_then(|source| source.counts());
+        let noise = source.and_then(|source| source.reference_noise());
+        let grid = session.film().grid();
+        let mut stops = BTreeMap::new();
+        for tile in tiles {
+            *stops.entry(tile.reason()).or_insert(0) += 1;
+        }
+        Self {
+            noisefloor: env!("CARGO_PKG_VERSION"),
+            scene: &output.scene,
+            source: &output.source,
+            width: grid.width(),
+            height: grid.height(),
+            seed: output.seed,
+            criterion: session.criterion().name(),
+            model: output.model.as_deref(),
+            job,
+            params: session.params(),
+            exposure: session.display().map(noisefloor::display::Display::exposure),
+            complete: clock.is_some() && tiles.iter().all(TileState::is_final),
+            tiles: tiles.len(),
+            stops,
+            unfamiliar_tiles: tiles.iter().filter(|tile| tile.stop.unfamiliar).count(),
+            expected_threshold: typical_threshold(session),
+            samples: session.film().total_samples(),
+            samples_uniform: uniform_samples(session),
+            samples_rejected: session.film().rejected(),
+            samples_dropped: counts.map(|c| c.dropped),
+            samples_clamped: counts.map(|c| c.clamped),
+            samples_background: counts.map(|c| c.background),
+            reference_samples: noise.map(|n| n.samples),
+            reference_deviation: noise.map(|n| n.deviation()),
+            reference_worst: noise.map(|n| n.worst()),
+            seconds_before: output.seconds_before,
+            seconds_source: clock.map(|c| c.source_seconds),
+            seconds_oracle: clock.map(|c| c.criterion_seconds),
+            seconds_total: clock.map(|c| c.total_seconds),
+            rel_mse: output.timeline.last().and_then(|row| row.rel_mse),
+            denoised: output.denoised.as_ref().map(|denoised| denoised.report(session)),
+        }
+    }
+}

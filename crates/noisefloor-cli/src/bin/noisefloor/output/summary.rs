@@ -1,0 +1,91 @@
+//! A render in a few lines, for people.
+
+use super::{CHECKPOINT, Output, typical_threshold, uniform_samples};
+use noisefloor::{Session, driver::Clock};
+use noisefloor_cli::say::{NotSaid, say};
+use noisefloor_cli::sources::Source;
+use noisefloor_ptwne::ReferenceNoise;
+
+impl Output {
+    /// Says what came of the render.
+    pub fn summarise(&self, session: &Session, clock: Clock, source: &dyn Source) -> Result<(), NotSaid> {
+        self.say_stops(session)?;
+        self.say_denoised(session)?;
+        say!(
+            "{:.1} s, of which {:.2} s ({:.2} %) in the oracle",
+            clock.total_seconds,
+            clock.criterion_seconds,
+            100.0 * clock.criterion_seconds / clock.total_seconds.max(1e-9),
+        )?;
+        let counts = source.counts();
+        for (count, what) in [
+            (session.film().rejected(), "were not finite and were left out"),
+            (counts.map_or(0, |c| c.dropped), "were not finite and counted as black"),
+            (counts.map_or(0, |c| c.clamped), "were brighter than --clamp and scaled down"),
+        ] {
+            if count > 0 {
+                say!("{count} samples {what}")?;
+            }
+        }
+        if let Some(noise) = source.reference_noise() {
+            say_noise(noise)?;
+        }
+        say!("written to {}", self.folder())?;
+        if self.path(CHECKPOINT).exists() {
+            say!("to continue, repeat the command with --resume")?;
+        }
+        Ok(())
+    }
+
+    fn say_stops(&self, session: &Session) -> Result<(), NotSaid> {
+        let grid = session.film().grid();
+        let samples = session.film().total_samples() as f64;
+        let spp: Vec<u64> = session.stops().map(|s| s.spp).collect();
+        let satisfied = session.stops().filter(|s| s.reason.is_satisfied()).count();
+        // A count has looked at no noise
+        let counts = session.criterion().only_counts();
+        let as_wanted = if counts { "have the samples that were asked for" } else { "converged" };
+        let (least, most) = (spp.iter().min().unwrap_or(&0), spp.iter().max().unwrap_or(&0));
+        say!(
+            "{satisfied} of {} tiles {as_wanted}, after {least} to {most} samples per pixel ({:.0} on average: {:.0} % of uniform \
+             rendering at {most})",
+            spp.len(),
+            samples / (grid.width() * grid.height()) as f64,
+            100.0 * samples / uniform_samples(session).max(1) as f64,
+        )?;
+        if let Some(threshold) = typical_threshold(session) {
+            say!(
+                "in the typical tile, people stop seeing noise between {} and {} samples per pixel (80 %)",
+                threshold.low,
+                threshold.high
+            )?;
+        }
+        let unfamiliar = session.stops().filter(|s| s.unfamiliar).count();
+        if unfamiliar > 0 {
+            say!(
+                "tiles with texture unlike any that the model was tested on: {unfamiliar}; they got twice the samples it asks \
+                 for, and their verdicts are less certain"
+            )?;
+        }
+        Ok(())
+    }
+}
+
+/// What a reference is like.
+pub fn say_noise(noise: &ReferenceNoise) -> Result<(), NotSaid> {
+    say!(
+        "the reference took {:.0} samples a pixel; deviation of its noise mask {:.2}/255, {:.2}/255 in its worst block",
+        noise.samples,
+        255.0 * noise.deviation(),
+        255.0 * noise.worst(),
+    )?;
+    if noise.unsettled > 0 {
+        say!(
+            "warning: {} of {} blocks of the reference are noisier than it promises, so tiles there may stop too late; \
+             a model trained on half buffers needs no reference",
+            noise.unsettled,
+            noise.deviations.len()
+        )?;
+    }
+    Ok(())
+}

@@ -1,0 +1,87 @@
+//! What is known of each tile: stops.csv.
+
+use noisefloor::{Session, Stop, StopReason, Tile};
+use noisefloor_image::maps::{ColourScale, TileMark};
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+/// A tile's stop, or its state now if it is still open.
+pub(super) struct TileState {
+    pub(super) stop: Stop,
+    pub(super) open: bool,
+}
+
+/// One line of stops.csv.
+#[derive(Serialize)]
+pub(super) struct StopRow {
+    tile: usize,
+    x: usize,
+    y: usize,
+    width: usize,
+    height: usize,
+    spp: u64,
+    probability: Option<f32>,
+    reason: String,
+    unfamiliar: bool,
+    /// What its blocks have; `spp` twice where they were sampled alike.
+    spp_least: u64,
+    spp_most: u64,
+}
+
+/// All tiles, in their order.
+pub(super) fn states(session: &Session) -> Vec<TileState> {
+    let stops: BTreeMap<usize, Stop> = session.stops().map(|s| (s.tile.index, s)).collect();
+    let state = |tile: Tile| match stops.get(&tile.index) {
+        Some(&stop) => TileState { stop, open: false },
+        None => {
+            let verdict = session.verdict(tile.index);
+            let stop = Stop {
+                tile,
+                spp: session.film().spp(tile.index),
+                probability: verdict.and_then(|v| v.probability),
+                reason: StopReason::Cancelled,
+                unfamiliar: verdict.is_some_and(|v| v.unfamiliar),
+            };
+            TileState { stop, open: true }
+        }
+    };
+    session.film().grid().tiles().map(state).collect()
+}
+
+impl TileState {
+    /// Why it stopped; `open` if it has not.
+    pub(super) fn reason(&self) -> String {
+        if self.open { "open".into() } else { self.stop.reason.to_string() }
+    }
+
+    /// Whether no later run would add samples: the criterion is satisfied, or there are no more.
+    pub(super) fn is_final(&self) -> bool {
+        let reason = self.stop.reason;
+        !self.open && (reason.is_final() || reason == StopReason::SourceExhausted)
+    }
+
+    /// A line of the table; `range` is the fewest and the most samples per pixel that its blocks have.
+    pub(super) fn row(&self, (spp_least, spp_most): (u64, u64)) -> StopRow {
+        let Stop { tile: Tile { index, x, y, width, height }, spp, probability, unfamiliar, .. } = self.stop;
+        let (tile, reason) = (index, self.reason());
+        StopRow { tile, x, y, width, height, spp, probability, reason, unfamiliar, spp_least, spp_most }
+    }
+
+    fn mark(&self) -> TileMark {
+        TileMark {
+            tile: self.stop.tile,
+            value: self.stop.spp as f64,
+            label: format!("{}{}", self.stop.spp, if self.open { "+" } else { "" }),
+            unfamiliar: self.stop.unfamiliar,
+        }
+    }
+}
+
+/// Samples of each tile, and the scale from the least to the most.
+pub(super) fn marks(tiles: &[TileState]) -> (Vec<TileMark>, ColourScale) {
+    let spp = || tiles.iter().map(|tile| tile.stop.spp.max(1) as f64);
+    let (low, high) = (spp().fold(f64::INFINITY, f64::min), spp().fold(1.0, f64::max));
+    let (title, colours) = ("samples\nper pixel", colorous::VIRIDIS);
+    let scale = ColourScale { title, low, high, log: true, colours, landmark: None };
+    (tiles.iter().map(TileState::mark).collect(), scale)
+}

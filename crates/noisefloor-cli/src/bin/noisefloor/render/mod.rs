@@ -1,0 +1,235 @@
+//! `noisefloor render`.
+
+mod denoised;
+mod frames;
+mod progress;
+mod saving;
+mod tev;
+#[cfg(feature = "watch")]
+mod watch;
+
+use crate::job::{CriterionJob, Ready, RenderJob, RenderRun};
+use crate::output::Output;
+use anyhow::{Context, bail};
+use noisefloor::{
+    Checkpoint, Driver, DriverError, Event, ProgressiveSource, Repeats, Session, SourceInfo, StopReason,
+    driver::Progress,
+};
+use noisefloor_cli::bars::Log;
+use noisefloor_cli::files::read_reference;
+use noisefloor_cli::folder::{Earlier, Folder};
+use noisefloor_cli::note;
+use noisefloor_cli::say::one_line;
+use noisefloor_cli::signals::{AFTER_THIS_BATCH, INTERRUPTED, cancel_all_on_signal};
+use noisefloor_cli::sources::{Opened, Source};
+use saving::Pace;
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+use tev::Tev;
+
+pub use frames::{SequenceRun, one_frame, render_frames};
+pub use progress::reference_bar;
+pub use tev::ADDRESS as TEV_ADDRESS;
+
+/// All that must be the same for a render to be resumed, the library checks.
+pub const JOB: &str = "noisefloor render";
+/// Below this, edge of tiles in pixels, a verdict has few pixels to go by.
+const SMALL_TILE: usize = 64;
+
+type Rendering = Driver<Box<dyn Source>>;
+
+pub fn run(run: &RenderRun) -> anyhow::Result<ExitCode> {
+    // Whatever can be wrong is found before anything is rendered.
+    let began = Instant::now();
+    let RenderRun { job, resources, quiet, .. } = run;
+    let Ready { params, oracle } = job.read()?;
+    warn(job, *quiet);
+    resources.start_threads()?;
+    let opened = job.source.open(*resources)?;
+    opened.warn();
+    let Opened { mut source, scene, .. } = opened;
+    let info = source.info();
+    let SourceInfo { name, width, height, .. } = &info;
+    if params.blocks > 0 && source.sample_blocks(&[])?.is_none() {
+        bail!("{name} cannot sample blocks of a tile by their need: leave out --blocks");
+    }
+    let against = run.against.as_deref();
+    let reference = against.map(|path| read_reference(path, (*width, *height))).transpose()?;
+    let (criterion, denoised) = match (&job.criterion, job.criterion.of(oracle.as_ref())) {
+        (_, Some(criterion)) => (criterion, None),
+        (CriterionJob::Denoised { lost }, None) => {
+            let (criterion, denoised) = denoised::begin(&mut source, *lost, resources.timeout)?;
+            (criterion, Some(denoised))
+        }
+        (_, None) => bail!("no model was read"),
+    };
+    let mut driver = Driver::new(source, criterion, params)?;
+
+    // Only what can be resumed is kept
+    let resume = run.earlier == Earlier::Resume;
+    let keeps = info.repeats == Repeats::Samples && driver.session().checkpoint(JOB).is_ok();
+    if resume && info.repeats != Repeats::Samples {
+        bail!(
+            "--resume: {name} cannot be resumed, since it may repeat samples after a restart; leave it out"
+        );
+    }
+    if resume {
+        driver.session().checkpoint(JOB).context("--resume: leave it out")?;
+    }
+    let folder = run.out.as_deref().map_or_else(|| PathBuf::from("out").join(&scene), PathBuf::from);
+    let origin = job.source.origin(&scene, name, info.repeats == Repeats::Samples)?;
+    let folder = Folder::claim(folder)?;
+    let mut output = Output::create(folder, run.earlier, scene, name.clone(), job.source.seed)?;
+    output.model = oracle.map(|oracle| oracle.model().digest());
+    (output.reference, output.origin, output.denoised) = (reference, origin, denoised);
+    if resume {
+        driver = take_up(driver, &mut output, *quiet)?;
+    }
+    driver.set_time_limit(run.time.map(|time| sampling_time(time, began, width * height)));
+    let cancel = driver.cancel_flag();
+    let flags = [Some(Arc::clone(&cancel)), output.denoised.as_ref().map(|denoised| denoised.give_up())];
+    cancel_all_on_signal(flags.into_iter().flatten().collect(), AFTER_THIS_BATCH)?;
+    driver.source_mut().watch_reference(reference_bar(*quiet), Arc::clone(&cancel));
+    let mut views = Views::open(run, &output, (*width, *height))?;
+    let outcome = sample(&mut driver, &mut output, &mut views, keeps, run);
+    if let (Ok(()), Some(denoised)) = (&outcome, &output.denoised) {
+        // Ended between two verdicts, the denoiser answers: the last picture is denoised, too
+        denoised.give_up().store(false, Ordering::Relaxed);
+    }
+
+    // Write what there is, also after a failure.
+    let checkpoint = snapshot(driver.session(), keeps);
+    let over = (driver.clock(), Some(driver.source().as_ref()));
+    let written = output.write(driver.session(), checkpoint, over);
+    let interrupted = finish(&driver, outcome, &cancel)?;
+    written?;
+    if !quiet {
+        output.summarise(driver.session(), driver.clock(), driver.source().as_ref())?;
+    }
+    let stopped = driver.session().stops().any(|s| s.reason == StopReason::Cancelled);
+    Ok(if stopped || interrupted { ExitCode::from(INTERRUPTED) } else { ExitCode::SUCCESS })
+}
+
+/// Says what is unwise about a job.
+fn warn(job: &RenderJob, quiet: bool) {
+    let tile = job.limits.tile;
+    if tile < SMALL_TILE && !quiet && matches!(job.criterion, CriterionJob::Oracle { .. }) {
+        note!(
+            "warning: tiles of {tile} pixels are small: people judged zones of 100 to 300, and verdicts on tiles below \
+             {SMALL_TILE} are less certain"
+        );
+    }
+}
+
+/// Everything that has to be known to continue, if that is possible.
+fn snapshot(session: &Session, keeps: bool) -> Option<Checkpoint<'_>> {
+    if keeps { session.checkpoint(JOB).ok() } else { None }
+}
+
+/// The driver of the render that the output folder holds; as it is if there is none.
+fn take_up(driver: Rendering, output: &mut Output, quiet: bool) -> anyhow::Result<Rendering> {
+    let Some(checkpoint) = output.checkpoint()? else {
+        if !quiet {
+            note!("nothing to resume in {}: starting from the beginning", output.folder());
+        }
+        return Ok(driver);
+    };
+    let resumed = driver.resume(JOB, checkpoint);
+    let driver = resumed.with_context(|| format!("{} (--force renders anew)", output.checkpoint_file()))?;
+    output.take_up(driver.session().film().total_samples());
+    Ok(driver)
+}
+
+/// Where a render is watched.
+struct Views {
+    tev: Option<Tev>,
+    #[cfg(feature = "watch")]
+    page: Option<watch::Page>,
+}
+
+impl Views {
+    fn open(run: &RenderRun, output: &Output, size: (usize, usize)) -> anyhow::Result<Self> {
+        Ok(Self {
+            tev: run.tev.as_deref().map(|address| Tev::open(address, &output.scene, size)).transpose()?,
+            #[cfg(feature = "watch")]
+            page: run.watch.as_ref().map(|page| watch::Page::serve(page, output, run.quiet)).transpose()?,
+        })
+    }
+
+    fn show(&mut self, session: &Session, progress: &Progress) {
+        tev::show(&mut self.tev, session, false);
+        #[cfg(feature = "watch")]
+        if let Some(page) = &mut self.page {
+            page.show(session, progress);
+        }
+        #[cfg(not(feature = "watch"))]
+        let _ = progress;
+    }
+
+    fn close(&mut self, session: &Session) {
+        tev::show(&mut self.tev, session, true);
+        #[cfg(feature = "watch")]
+        if let Some(page) = &mut self.page {
+            page.close(session);
+        }
+    }
+}
+
+/// What is left for samples of the time for everything, once all is set up: the files are still to be
+/// written. At least half of it, so that there is something to write.
+fn sampling_time(time: Duration, began: Instant, pixels: usize) -> Duration {
+    let left = time.saturating_sub(began.elapsed());
+    left.saturating_sub(saving::last_save(pixels)).max(left / 2)
+}
+
+/// Renders. A failure to save along the way is reported at once, and rendering goes on: the disk may have
+/// room again.
+fn sample(
+    driver: &mut Rendering,
+    output: &mut Output,
+    views: &mut Views,
+    keeps: bool,
+    run: &RenderRun,
+) -> Result<(), DriverError> {
+    let bar = progress::bar(run.quiet);
+    let mut log = Log::new(run.quiet);
+    let grid = driver.session().film().grid();
+    let [mut checkpoints, mut pictures] = Pace::both(run.autosave, grid.width() * grid.height());
+    let outcome = driver.run(|session, event| {
+        let Event::BatchDone(progress) = event else { return };
+        output.record(session, progress);
+        progress::show(&bar, &mut log, session, progress);
+        bar.suspend(|| views.show(session, progress));
+        let mut save = |pace: &mut Pace, write: &mut dyn FnMut(&mut Output) -> anyhow::Result<()>| {
+            if pace.is_due() {
+                let began = Instant::now();
+                if let Err(error) = write(output) {
+                    bar.suspend(|| note!("warning: not saved: {}", one_line(&error)));
+                }
+                pace.pause_after(began.elapsed());
+            }
+        };
+        save(&mut pictures, &mut |output| output.write_pictures(session));
+        save(&mut checkpoints, &mut |output| output.write_progress(session, snapshot(session, keeps)));
+    });
+    bar.finish_and_clear();
+    views.close(driver.session());
+    outcome
+}
+
+/// Says what the user should know after the run, and whether Ctrl-C ended the source in the middle of a
+/// batch: in a terminal it ends a command that renders, too, which is no failure.
+fn finish(driver: &Rendering, outcome: Result<(), DriverError>, cancel: &AtomicBool) -> anyhow::Result<bool> {
+    driver.source().notes().iter().for_each(|text| note!("warning: {text}"));
+    match outcome {
+        Err(error) if cancel.load(Ordering::Relaxed) => {
+            let what = if matches!(error, DriverError::Criterion(_)) { "verdict" } else { "batch" };
+            note!("warning: the {what} under way is lost: {}", one_line(&error.into()));
+            Ok(true)
+        }
+        outcome => Ok(outcome.map(|()| false)?),
+    }
+}

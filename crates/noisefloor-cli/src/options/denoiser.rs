@@ -1,0 +1,10 @@
+//! Options about denoisers.
+
+use clap::ValueEnum;
+
+/// The denoisers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum DenoiserChoice {
+    /// Open Image Denoise, on the CPU.
+    Oidn,
+}

@@ -1,0 +1,56 @@
+//! Options about the model.
+
+use anyhow::Context;
+use clap::{Args, ValueEnum};
+use noisefloor::{Model, Oracle, Threshold, evidence::Evidence};
+use std::fs::File;
+use std::io::BufReader;
+use std::path::{Path, PathBuf};
+
+/// Which oracle.
+#[derive(Debug, Args)]
+pub struct OracleArgs {
+    /// Model file [default: the bundled model].
+    #[arg(long, value_name = "FILE")]
+    pub model: Option<PathBuf>,
+    /// A tile has converged when the probability that an observer sees no noise reaches P; higher values
+    /// stop later.
+    #[arg(long, default_value_t = Threshold::PAPER, value_name = "P")]
+    pub threshold: Threshold,
+}
+
+/// What a tile is compared with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum EvidenceChoice {
+    /// The other half of the samples: no reference is needed.
+    Halves,
+    /// A noise-free reference: SCENE/reference.exr of a corpus, or its most converged picture if there is
+    /// none.
+    Reference,
+    /// Nothing but the picture itself. For comparison.
+    Alone,
+}
+
+impl From<EvidenceChoice> for Evidence {
+    fn from(choice: EvidenceChoice) -> Self {
+        match choice {
+            EvidenceChoice::Halves => Self::Halves,
+            EvidenceChoice::Reference => Self::Reference,
+            EvidenceChoice::Alone => Self::Alone,
+        }
+    }
+}
+
+impl OracleArgs {
+    /// The oracle, loaded and checked.
+    pub fn check(&self) -> anyhow::Result<Oracle> {
+        Ok(Oracle::new(load_model(self.model.as_deref())?, self.threshold))
+    }
+}
+
+/// Reads a model file, or the bundled model.
+pub fn load_model(path: Option<&Path>) -> anyhow::Result<Model> {
+    let Some(path) = path else { return Ok(Model::bundled()) };
+    let file = File::open(path).with_context(|| format!("{}: cannot be opened", path.display()))?;
+    Model::read(BufReader::new(file)).with_context(|| format!("{}", path.display()))
+}

@@ -1,0 +1,123 @@
+//! Options about the way from radiance to the screen.
+
+use crate::refuse;
+use crate::spell::{JobPath, as_typed};
+use anyhow::Context;
+use clap::Args;
+use noisefloor::{ToneMapping, display::DEFAULT_KEY};
+use noisefloor_image::{LutInput, read_cube};
+use serde::{Deserialize, Serialize};
+use std::path::PathBuf;
+
+/// From radiance to the screen.
+#[derive(Debug, Args)]
+pub struct ToneArgs {
+    /// Tone mapping of linear pictures: `reinhard` (Reinhard et al. 2002, global operator), `srgb`
+    /// (multiply, clamp, encode), or `lut:FILE.cube` (multiply, then a LUT whose output the screen shows:
+    /// ACES, AgX, Filmic; see --lut-input).
+    #[arg(long, default_value = "reinhard", value_name = "HOW", value_parser = tone)]
+    tone_mapping: ToneChoice,
+    /// Reinhard: what the log-average luminance becomes [default: 0.18].
+    #[arg(long)]
+    key: Option<f32>,
+    /// Reinhard: the smallest luminance, after exposure, that becomes white [default: none burns out].
+    #[arg(long)]
+    white: Option<f32>,
+    /// sRGB and LUT: factor on radiance [default: 1].
+    #[arg(long)]
+    exposure: Option<f32>,
+    /// LUT: how radiance (Rec.709 primaries) is encoded before it: `linear` within the domain of the file,
+    /// `srgb`, `acescct`, or `log2:LOW,HIGH` in stops from middle grey (0.18), as AgX and Filmic want it
+    /// [default: linear].
+    #[arg(long, value_name = "ENCODING")]
+    lut_input: Option<LutInput>,
+}
+
+#[derive(Clone, Debug, PartialEq, Eq)]
+enum ToneChoice {
+    Reinhard,
+    Srgb,
+    Lut(PathBuf),
+}
+
+fn tone(text: &str) -> Result<ToneChoice, String> {
+    match (text, text.strip_prefix("lut:")) {
+        ("reinhard", _) => Ok(ToneChoice::Reinhard),
+        ("srgb", _) => Ok(ToneChoice::Srgb),
+        (_, Some(path)) if !path.is_empty() => Ok(ToneChoice::Lut(path.into())),
+        _ => Err("expected reinhard, srgb, or lut:FILE.cube".into()),
+    }
+}
+
+impl ToneArgs {
+    /// What was typed, checked.
+    pub fn check(&self) -> anyhow::Result<Tone> {
+        let reinhard = self.tone_mapping == ToneChoice::Reinhard;
+        let lut = matches!(self.tone_mapping, ToneChoice::Lut(_));
+        for (option, given, fits, wanted) in [
+            ("--key", self.key.is_some(), reinhard, "reinhard"),
+            ("--white", self.white.is_some(), reinhard, "reinhard"),
+            ("--exposure", self.exposure.is_some(), !reinhard, "srgb"),
+            ("--lut-input", self.lut_input.is_some(), lut, "lut:FILE.cube"),
+        ] {
+            if given && !fits {
+                refuse!("{option} needs --tone-mapping {wanted}");
+            }
+        }
+        let exposure = self.exposure.unwrap_or(1.0);
+        Ok(match &self.tone_mapping {
+            ToneChoice::Reinhard => {
+                Tone::Reinhard { key: self.key.unwrap_or(DEFAULT_KEY), white: self.white }
+            }
+            ToneChoice::Srgb => Tone::Srgb { exposure },
+            ToneChoice::Lut(file) => {
+                let (file, input) = (JobPath::from(file), self.lut_input.unwrap_or_default());
+                Tone::Lut { file, input, exposure }
+            }
+        })
+    }
+}
+
+/// A tone mapping as a value: a LUT is a file.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Tone {
+    Reinhard {
+        key: f32,
+        white: Option<f32>,
+    },
+    Srgb {
+        exposure: f32,
+    },
+    Lut {
+        file: JobPath,
+        #[serde(with = "as_typed")]
+        input: LutInput,
+        exposure: f32,
+    },
+}
+
+impl Tone {
+    /// The same from whatever folder it is read.
+    pub fn absolute(&self) -> anyhow::Result<Self> {
+        let mut tone = self.clone();
+        if let Self::Lut { file, .. } = &mut tone {
+            *file = file.absolute().context("the current folder")?;
+        }
+        Ok(tone)
+    }
+
+    /// The tone mapping, read and checked.
+    pub fn load(&self) -> anyhow::Result<ToneMapping> {
+        let tone = match self {
+            Self::Reinhard { key, white } => ToneMapping::Reinhard { key: *key, white: *white },
+            Self::Srgb { exposure } => ToneMapping::Srgb { exposure: *exposure },
+            Self::Lut { file, input, exposure } => ToneMapping::Custom {
+                exposure: *exposure,
+                curve: read_cube(&**file)?.into_tone_curve(*input),
+            },
+        };
+        tone.check()?;
+        Ok(tone)
+    }
+}

@@ -1,0 +1,442 @@
+//! A farm: planned once, then rounds of tasks and merges until every frame is done.
+
+use crate::error::FarmError;
+use crate::folder::{FarmFolder, FarmLock};
+use crate::frame::{Frame, Pictures};
+use crate::local::run_local;
+use crate::plan::{Task, split};
+use crate::shard::Shard;
+use crate::slurm::Slurm;
+use crate::state::{FarmPlan, FrameJob, FrameState, Round, RoundState};
+use crate::studio::{News, Studio};
+use crate::task::sample;
+use noisefloor::ProgressiveSource;
+use serde::Serialize;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
+
+/// Rounds in a row without samples after which a farm gives up.
+const MOST_BARREN: usize = 3;
+/// Seconds that a step waits for the lock of its folder.
+const LOCK_TRIES: usize = 600;
+
+/// A farm in its folder: to be looked at, and to take tasks from.
+pub struct Farm<'a, S: Studio> {
+    studio: &'a S,
+    folder: FarmFolder,
+    plan: FarmPlan<S::Job>,
+}
+
+/// The farm as the one process that plans and merges sees it.
+pub struct Coordinator<'a, S: Studio> {
+    farm: Farm<'a, S>,
+    _lock: FarmLock,
+}
+
+/// The samples that one process takes.
+pub struct Order<'a, J> {
+    folder: &'a FarmFolder,
+    name: String,
+    frame: FrameJob,
+    task: Task,
+    shard: PathBuf,
+    /// The render that they are of.
+    pub job: J,
+}
+
+/// What came of an order.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Delivery {
+    /// The frame.
+    pub frame: String,
+    /// Batches in the shard.
+    pub batches: usize,
+    /// Batches that were asked for.
+    pub of: usize,
+}
+
+/// How far a farm is.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct FarmProgress {
+    /// The round under way, or the last one.
+    pub round: usize,
+    /// Its tasks.
+    pub tasks: usize,
+    /// Tasks whose shards are there.
+    pub delivered: usize,
+    /// Jobs that Slurm has left.
+    pub slurm_left: Option<usize>,
+    /// Whether every frame is done.
+    pub done: bool,
+    /// Each frame.
+    pub frames: Vec<FrameProgress>,
+    /// Seconds since the round was planned.
+    #[serde(skip)]
+    pub seconds: f64,
+}
+
+/// How far a frame is.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct FrameProgress {
+    /// Its name.
+    pub frame: String,
+    /// Seconds left, at the pace of the last round.
+    pub eta_seconds: Option<f64>,
+    /// How far it is.
+    #[serde(flatten)]
+    pub state: FrameState,
+}
+
+/// Seconds since 1970.
+fn now() -> f64 {
+    SystemTime::now().duration_since(UNIX_EPOCH).map_or(0.0, |time| time.as_secs_f64())
+}
+
+impl<'a, S: Studio> Farm<'a, S> {
+    /// Says what is to be rendered in a folder, and opens every scene once.
+    ///
+    /// # Errors
+    /// [`FarmError`] if something was planned here already, or a frame cannot be divided.
+    pub fn plan(studio: &'a S, dir: &Path, plan: FarmPlan<S::Job>) -> Result<(), FarmError> {
+        let folder = FarmFolder::new(dir);
+        if folder.planned::<S::Job>()?.is_some() {
+            let what =
+                "a farm was planned here already; leave out what follows `--`, or choose another folder";
+            return Err(FarmError::Folder { path: dir.to_owned(), what: what.into() });
+        }
+        let _lock = folder.lock()?;
+        let farm = Self { studio, folder, plan };
+        for (index, name) in farm.plan.names().iter().enumerate() {
+            farm.frame(index, name).plan().map_err(FarmError::of(name))?;
+        }
+        // Last: a farm whose plan was killed is none
+        farm.folder.write_plan(&farm.plan)
+    }
+
+    /// The farm of a folder.
+    ///
+    /// # Errors
+    /// [`FarmError`] if there is none.
+    pub fn open(studio: &'a S, dir: &Path) -> Result<Self, FarmError> {
+        let folder = FarmFolder::new(dir);
+        let plan = folder.plan()?;
+        Ok(Self { studio, folder, plan })
+    }
+
+    /// Locks the folder, to plan and to merge.
+    ///
+    /// # Errors
+    /// [`FarmError::Locked`] if another process does.
+    pub fn claim(self) -> Result<Coordinator<'a, S>, FarmError> {
+        let lock = self.folder.lock()?;
+        Ok(Coordinator { farm: self, _lock: lock })
+    }
+
+    /// Its folder.
+    pub fn folder(&self) -> &FarmFolder {
+        &self.folder
+    }
+
+    fn frame<'b>(&'b self, index: usize, name: &'b str) -> Frame<'b, S> {
+        Frame { studio: self.studio, folder: &self.folder, name, job: self.job(index), keep: self.plan.keep }
+    }
+
+    /// The render of a frame.
+    fn job(&self, index: usize) -> S::Job {
+        match self.plan.frames {
+            Some(frames) => self.studio.of_frame(&self.plan.job, frames.first().saturating_add(index as u32)),
+            None => self.plan.job.clone(),
+        }
+    }
+
+    /// What a task of the round under way is to do.
+    ///
+    /// # Errors
+    /// [`FarmError::NoTask`] if the round is over or has no such task.
+    pub fn order(&self, number: usize, task: usize) -> Result<Order<'_, S::Job>, FarmError> {
+        let round = self.folder.round()?;
+        let names = self.plan.names();
+        let wanted = round.tasks.into_iter().nth(task).filter(|_| round.number == number);
+        let wanted = wanted.and_then(|wanted| Some((names.get(wanted.frame)?.clone(), wanted)));
+        let no_task = || FarmError::NoTask { path: self.folder.path().to_owned(), number, task };
+        let (name, wanted) = wanted.ok_or_else(no_task)?;
+        Ok(Order {
+            folder: &self.folder,
+            frame: self.folder.frame_job(&name)?,
+            shard: self.folder.shard(&name, number, task),
+            job: self.job(wanted.frame),
+            task: wanted,
+            name,
+        })
+    }
+
+    /// How far it is.
+    ///
+    /// # Errors
+    /// [`FarmError`] if a file of the folder cannot be read.
+    pub fn progress(&self) -> Result<FarmProgress, FarmError> {
+        let (round, names) = (self.folder.round()?, self.plan.names());
+        let is_there = |(index, task): (usize, &Task)| {
+            names.get(task.frame).is_some_and(|name| self.folder.shard(name, round.number, index).exists())
+        };
+        let delivered = round.tasks.iter().enumerate().filter(|task| is_there(*task)).count();
+        let mut frames = Vec::new();
+        for name in &names {
+            let state = self.folder.state(name)?;
+            let pace = (round.brought > 0 && round.took > 0.0).then(|| round.brought as f64 / round.took);
+            let eta_seconds = pace.zip(state.to_go).map(|(pace, samples)| samples as f64 / pace);
+            frames.push(FrameProgress { frame: name.clone(), eta_seconds, state });
+        }
+        let slurm_left = round.slurm().and_then(|jobs| match Slurm::left(jobs) {
+            Ok(left) => Some(left),
+            Err(error) => {
+                self.studio.tell(News::Unsure(round.number, &error));
+                None
+            }
+        });
+        Ok(FarmProgress {
+            round: round.number,
+            tasks: round.tasks.len(),
+            delivered,
+            slurm_left,
+            done: frames.iter().all(|frame| frame.state.done),
+            frames,
+            seconds: (now() - round.planned).max(0.0),
+        })
+    }
+
+    /// Looks after rounds on Slurm until all is done, every so often. Jobs can vanish: a node takes the
+    /// step with it, or somebody cancels them; they are submitted again.
+    ///
+    /// # Errors
+    /// [`FarmError::Barren`] if rounds bring nothing; [`FarmError`] if Slurm or the folder fails.
+    pub fn wait(self, slurm: &Slurm, every: Duration) -> Result<(), FarmError> {
+        let mut vanished = 0;
+        loop {
+            std::thread::sleep(every.max(Duration::from_millis(100)));
+            let states: Result<Vec<_>, _> =
+                self.plan.names().iter().map(|name| self.folder.state(name)).collect();
+            if states?.iter().all(|state| state.done) {
+                return Ok(());
+            }
+            let round = self.folder.round()?;
+            let left = round.slurm().map_or(Ok(0), Slurm::left)?;
+            // A step that has just ended may have submitted another round since the file was read
+            if left > 0 || self.folder.round()? != round {
+                vanished = 0;
+                continue;
+            }
+            self.check_fruitful(&round)?;
+            vanished += 1;
+            if vanished > MOST_BARREN {
+                let coordinator = Self::open(self.studio, self.folder.path())?.claim()?;
+                self.studio.tell(News::Vanished(round.number));
+                coordinator.submit(slurm)?;
+                vanished = 0;
+            }
+        }
+    }
+
+    fn check_fruitful(&self, round: &Round) -> Result<(), FarmError> {
+        match round.barren {
+            Some(rounds) if rounds >= MOST_BARREN => {
+                let log = self.folder.log(round.number.saturating_sub(1), 0);
+                Err(FarmError::Barren { path: self.folder.path().to_owned(), rounds, log })
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+impl<J: Serialize> Order<'_, J> {
+    /// Takes the samples, and writes them. Once `cancel` says so, it writes those that it has.
+    ///
+    /// # Errors
+    /// [`FarmError`] if the source is not the planned one, fails, or gives nothing before it is cancelled.
+    pub fn deliver(
+        self,
+        source: &mut impl ProgressiveSource,
+        cancel: impl Fn() -> bool,
+    ) -> Result<Delivery, FarmError> {
+        let FrameJob { scene, source: renderer, shards } = self.frame;
+        let shard: Shard = sample(source, shards, &self.task.batches, cancel)?;
+        if shard.is_empty() {
+            let what = "stopped before the first batch was there".into();
+            return Err(FarmError::Folder { path: self.folder.path().to_owned(), what });
+        }
+        let shard = shard.with_render(&self.job).with_names(scene, renderer);
+        shard.write(self.shard)?;
+        Ok(Delivery { frame: self.name, batches: shard.len(), of: self.task.batches.len() })
+    }
+}
+
+impl<S: Studio> Coordinator<'_, S> {
+    /// Merges what is there, judges, and plans the next round; it has no tasks if everything is done.
+    ///
+    /// # Errors
+    /// [`FarmError`] if Slurm works on the round, or a frame cannot be merged.
+    pub fn next_round(&self) -> Result<Round, FarmError> {
+        self.check_idle()?;
+        self.advance()
+    }
+
+    fn advance(&self) -> Result<Round, FarmError> {
+        let Farm { folder, plan, .. } = &self.farm;
+        let before = folder.round()?;
+        let (mut wanted, mut samples) = (Vec::new(), 0);
+        for (index, name) in plan.names().iter().enumerate() {
+            let grid = folder.frame_job(name)?.shards.grid().map_err(FarmError::Edited);
+            let merged = self.farm.frame(index, name).merge(Pictures::WhenDone);
+            let (state, batches) = merged.map_err(FarmError::of(name))?;
+            samples += state.samples;
+            wanted.push((grid.map_err(FarmError::of(name))?, batches));
+        }
+        let planned = now();
+        let (started, brought) = (before.is_started(), samples - before.samples.min(samples));
+        let barren = if started && brought == 0 { before.barren.map_or(0, |barren| barren + 1) } else { 0 };
+        let round = Round {
+            number: before.number + usize::from(started || before.number == 0),
+            tasks: split(wanted, plan.tasks),
+            planned,
+            took: if started { (planned - before.planned).max(0.0) } else { 0.0 },
+            samples,
+            brought,
+            barren: Some(barren),
+            state: RoundState::Planned,
+        };
+        folder.write_round(&round)?;
+        Ok(round)
+    }
+
+    /// Merges what is there, and writes the pictures as far as they are; how far each frame is.
+    ///
+    /// # Errors
+    /// [`FarmError`] if a frame cannot be merged.
+    pub fn merge(&self) -> Result<Vec<(String, FrameState)>, FarmError> {
+        let names = self.farm.plan.names();
+        let merge = |(index, name): (usize, String)| {
+            let merged = self.farm.frame(index, &name).merge(Pictures::Always);
+            let (state, _) = merged.map_err(FarmError::of(&name))?;
+            Ok((name, state))
+        };
+        names.into_iter().enumerate().map(merge).collect()
+    }
+
+    /// Refuses to work on a round that Slurm is working on.
+    fn check_idle(&self) -> Result<(), FarmError> {
+        let Round { number, state, .. } = self.farm.folder.round()?;
+        let RoundState::OnSlurm(jobs) = state else { return Ok(()) };
+        match Slurm::left(&jobs) {
+            Ok(0) => {}
+            Ok(left) => {
+                let path = self.farm.folder.path().to_owned();
+                return Err(FarmError::UnderWay { path, number, tasks: jobs.tasks, step: jobs.step, left });
+            }
+            Err(error) => self.farm.studio.tell(News::Unsure(number, &error)),
+        }
+        Ok(())
+    }
+
+    /// Begins rounds that somebody asked for: what was wrong has been mended, and a round that was killed
+    /// meanwhile is no sign of the contrary.
+    ///
+    /// # Errors
+    /// [`FarmError::UnderWay`] if Slurm works on the round.
+    pub fn begin(&self) -> Result<(), FarmError> {
+        self.check_idle()?;
+        let round = self.farm.folder.round()?;
+        let state = if round.is_started() { RoundState::Started } else { RoundState::Planned };
+        self.farm.folder.write_round(&Round { barren: None, state, ..round })
+    }
+
+    /// Renders round after round in `processes` at a time of `program`; see [`run_local`]. False if `cancel`
+    /// ended it.
+    ///
+    /// # Errors
+    /// [`FarmError::Barren`] if rounds bring nothing; [`FarmError`] if a frame cannot be merged.
+    pub fn run_local(
+        &self,
+        program: &Path,
+        processes: usize,
+        cancel: impl Fn() -> bool,
+    ) -> Result<bool, FarmError> {
+        let Farm { folder, studio, .. } = &self.farm;
+        loop {
+            let round = self.advance()?;
+            if round.tasks.is_empty() {
+                return Ok(true);
+            }
+            self.farm.check_fruitful(&round)?;
+            let round = Round { state: RoundState::Started, ..round };
+            folder.write_round(&round)?;
+            studio.tell(News::Round(&round));
+            let failed = run_local(program, folder, &round, processes, &cancel)?;
+            if cancel() {
+                self.advance()?;
+                return Ok(false);
+            }
+            if let Some(first) = failed.first() {
+                let (tasks, log) = (round.tasks.len(), folder.log(round.number, *first));
+                studio.tell(News::Failed { failed: failed.len(), tasks, log });
+            }
+        }
+    }
+
+    /// Merges, plans, and submits what is planned; false if everything is done.
+    ///
+    /// # Errors
+    /// [`FarmError::Barren`] if rounds bring nothing; [`FarmError`] if a frame cannot be merged or Slurm
+    /// refuses.
+    pub fn submit(&self, slurm: &Slurm) -> Result<bool, FarmError> {
+        let Farm { folder, studio, .. } = &self.farm;
+        let mut round = self.advance()?;
+        if round.tasks.is_empty() {
+            return Ok(false);
+        }
+        self.farm.check_fruitful(&round)?;
+        if round.tasks.len() > Slurm::most_tasks() {
+            // The rest comes with the next round
+            round.tasks.truncate(Slurm::most_tasks());
+            folder.write_round(&round)?;
+        }
+        round.state = RoundState::OnSlurm(slurm.submit(folder, &round)?);
+        folder.write_round(&round)?;
+        studio.tell(News::Round(&round));
+        Ok(true)
+    }
+
+    /// What follows a round on Slurm: merge, judge, and submit the next one; false if everything is done.
+    /// Waits for a `farm merge` that somebody has typed meanwhile: without this step nothing would go on.
+    /// `own` is its Slurm job.
+    ///
+    /// # Errors
+    /// [`FarmError::Superseded`] if another round is under way; else as [`Coordinator::submit`].
+    pub fn step<'a>(
+        farm: Farm<'a, S>,
+        number: usize,
+        own: Option<&str>,
+        slurm: &Slurm,
+    ) -> Result<bool, FarmError>
+    where
+        S: 'a,
+    {
+        let mut tries = 0;
+        let _lock = loop {
+            match farm.folder.lock() {
+                Err(FarmError::Locked(_)) if tries < LOCK_TRIES => {
+                    tries += 1;
+                    std::thread::sleep(Duration::from_secs(1));
+                }
+                claimed => break claimed?,
+            }
+        };
+        let coordinator = Coordinator { farm, _lock };
+        let round = coordinator.farm.folder.round()?;
+        // A step that Slurm started once more, or whose round was given up
+        let superseded = round.slurm().zip(own).is_some_and(|(jobs, own)| jobs.step != own);
+        if round.number != number || superseded {
+            return Err(FarmError::Superseded { number, now: round.number });
+        }
+        coordinator.submit(slurm)
+    }
+}
