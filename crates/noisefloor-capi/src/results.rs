@@ -3,7 +3,8 @@
 use crate::border;
 use crate::session::NfSession;
 use crate::status::{Failure, NfStatus, guard};
-use noisefloor::{StopReason, session::Interruption};
+use noisefloor::{StopReason, session::Interruption, source::PixelNoise};
+use std::ffi::c_char;
 
 /// The tile is open: it gets more samples.
 pub const NF_REASON_OPEN: u32 = 0;
@@ -132,6 +133,72 @@ pub unsafe extern "C" fn nf_session_expected_samples(
         let expected = expected.ok_or_else(|| Failure::new(NfStatus::Unavailable, unknown))?;
         // SAFETY: promised by the caller.
         unsafe { border::write(samples, expected, "samples") }
+    })
+}
+
+/// What samples were like that were pushed.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct NfSampleCounts {
+    /// Samples, over all pixels, that were left out because their batch was not finite.
+    pub rejected: u64,
+    /// Samples, over all pixels, whose batch had negative luminance; since a resume.
+    pub negative: u64,
+    /// Warnings: what is likely to be wrong with the samples, as of the last nf_session_judge. See
+    /// nf_session_warning.
+    pub warnings: usize,
+}
+
+/// Counts samples that are not as they should be.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn nf_session_sample_counts(
+    session: *const NfSession,
+    counts: *mut NfSampleCounts,
+) -> NfStatus {
+    guard(|| {
+        // SAFETY: promised by the caller.
+        let session = unsafe { border::object(session, "session") }?.lock()?;
+        let (rejected, negative) = (session.film().rejected(), session.negative_samples());
+        let found = NfSampleCounts { rejected, negative, warnings: session.warnings().len() };
+        // SAFETY: promised by the caller.
+        unsafe { border::write(counts, found, "counts") }
+    })
+}
+
+/// The text of a warning, 0 to NfSampleCounts.warnings - 1, in English, for people: cut to bytes - 1 bytes and
+/// ended by a zero. 400 bytes hold any.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn nf_session_warning(
+    session: *const NfSession,
+    index: usize,
+    text: *mut c_char,
+    bytes: usize,
+) -> NfStatus {
+    guard(|| {
+        // SAFETY: promised by the caller.
+        let session = unsafe { border::object(session, "session") }?.lock()?;
+        // SAFETY: promised by the caller.
+        let room = unsafe { border::room(text, bytes, bytes.max(1), "text") }?;
+        let unknown = || Failure::new(NfStatus::Argument, format!("there is no warning {index}"));
+        let warning = session.warnings().get(index).ok_or_else(unknown)?.to_string();
+        let most = warning.len().min(room.len() - 1);
+        let cut = (0..=most).rev().find(|&n| warning.is_char_boundary(n)).unwrap_or(0);
+        for (place, byte) in room.iter_mut().zip(warning.as_bytes()[..cut].iter().chain([&0])) {
+            *place = *byte as c_char;
+        }
+        Ok(())
+    })
+}
+
+/// Says whether neighbouring pixels have noise in common, by a pixel filter, a denoiser or a Markov chain: no
+/// warning says so then.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn nf_session_share_pixels(session: *const NfSession, shared: bool) -> NfStatus {
+    guard(|| {
+        let pixels = if shared { PixelNoise::Shared } else { PixelNoise::Independent };
+        // SAFETY: promised by the caller.
+        unsafe { border::object(session, "session") }?.lock()?.set_pixels(pixels);
+        Ok(())
     })
 }
 

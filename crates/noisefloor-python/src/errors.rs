@@ -19,6 +19,12 @@ create_exception!(
     Error,
     "A tile that does not exist, or a batch without new samples."
 );
+create_exception!(
+    noisefloor,
+    FaultError,
+    Error,
+    "Samples that cannot be what they are said to be, such as a batch that contains the one before."
+);
 create_exception!(noisefloor, ModelError, Error, "A model file is damaged, foreign, or of another version.");
 create_exception!(noisefloor, CriterionError, Error, "The model cannot judge this.");
 create_exception!(noisefloor, CheckpointError, Error, "A checkpoint is damaged, foreign, or of another job.");
@@ -59,6 +65,7 @@ impl Raise for noisefloor::SessionError {
             Self::Tile(error) => error.raise(),
             Self::Film(error) => error.raise(),
             Self::Criterion(error) => error.raise(),
+            Self::Fault(fault) => FaultError::new_err(fault.to_string()),
             other => ParameterError::new_err(other.to_string()),
         }
     }

@@ -26,8 +26,8 @@ use pyo3::prelude::*;
 mod _noisefloor {
     #[pymodule_export]
     use crate::errors::{
-        BatchError, CheckpointError, CriterionError, Error, ModelError, ParameterError, PictureError,
-        SizeError,
+        BatchError, CheckpointError, CriterionError, Error, FaultError, ModelError, ParameterError,
+        PictureError, SizeError,
     };
     #[pymodule_export]
     use crate::metrics::{PyMetrics, metrics};

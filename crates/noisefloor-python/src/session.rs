@@ -8,10 +8,13 @@ use crate::pool;
 use crate::verdicts::{PyBlocks, PyRequest, PyStop, PyVerdict, TileLike};
 use noisefloor::{
     Checkpoint, Oracle, Params, Request, Rgb, Session, StopReason, Tile, TileGrid, session::Interruption,
+    source::PixelNoise,
 };
 use numpy::{PyArray2, PyArray3};
+use pyo3::exceptions::PyUserWarning;
 use pyo3::prelude::*;
 use pyo3::sync::MutexExt;
+use std::ffi::CString;
 use std::fs::File;
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
@@ -21,6 +24,8 @@ use std::sync::{Mutex, MutexGuard};
 ///
 /// width, height: of the picture in pixels, each up to 65536, 2**28 in all. It takes 36 bytes a pixel.
 /// oracle: an Oracle; None is Oracle(). params: a Params; None is Params().
+/// shared_pixels: whether neighbouring pixels have noise in common, by a pixel filter, a denoiser or a Markov
+///     chain: no warning says so then.
 ///
 /// Threads may call any method at any time; calls take turns. The interpreter's lock is released while
 /// judging.
@@ -91,16 +96,20 @@ impl PySession {
 #[pymethods]
 impl PySession {
     #[new]
-    #[pyo3(signature = (width, height, oracle = None, params = None))]
+    #[pyo3(signature = (width, height, oracle = None, params = None, shared_pixels = false))]
     fn new(
         width: usize,
         height: usize,
         oracle: Option<PyRef<'_, PyOracle>>,
         params: Option<PyParams>,
+        shared_pixels: bool,
     ) -> PyResult<Self> {
         let oracle = oracle.map_or_else(Oracle::bundled, |oracle| oracle.0.clone());
         let params = params.map_or_else(Params::default, |params| params.0);
-        let session = Session::new(width, height, oracle, params).map_err(Raise::raise)?;
+        let mut session = Session::new(width, height, oracle, params).map_err(Raise::raise)?;
+        if shared_pixels {
+            session.set_pixels(PixelNoise::Shared);
+        }
         Ok(Self { grid: session.film().grid(), session: Mutex::new(session) })
     }
 
@@ -201,9 +210,18 @@ impl PySession {
     ///
     /// The first verdicts wait until every open tile has samples, unless tone_mapping is "srgb".
     ///
-    /// Raises CriterionError if the model cannot judge these tiles.
+    /// Warns of samples that are likely to be wrong, each kind once. Raises FaultError if they cannot be what
+    /// they are said to be: no tile is done then. Raises CriterionError if the model cannot judge these tiles.
     fn judge(&self, py: Python<'_>) -> PyResult<Vec<PyStop>> {
-        let stops = self.detached(py, |session| session.judge())?.map_err(Raise::raise)?;
+        let judge = |session: &mut Session<Oracle>| {
+            let known = session.warnings().len();
+            session.judge().map(|stops| (stops, session.warnings()[known..].to_vec()))
+        };
+        let (stops, warnings) = self.detached(py, judge)?.map_err(Raise::raise)?;
+        for warning in warnings {
+            let text = CString::new(warning.to_string()).unwrap_or_default();
+            PyErr::warn(py, &py.get_type::<PyUserWarning>(), &text, 1)?;
+        }
         Ok(stops.into_iter().map(PyStop::from).collect())
     }
 
@@ -229,6 +247,24 @@ impl PySession {
         let unknown = || ParameterError::new_err(format!("{reason:?} is no reason to end tiles"));
         let reason = found.ok_or_else(unknown)?;
         Ok(self.attached(py)?.close_all(reason).into_iter().map(PyStop::from).collect())
+    }
+
+    /// What is likely to be wrong with the samples pushed so far, as of the last judge(): a list of str.
+    #[getter]
+    fn warnings(&self, py: Python<'_>) -> PyResult<Vec<String>> {
+        Ok(self.attached(py)?.warnings().iter().map(ToString::to_string).collect())
+    }
+
+    /// Samples, over all pixels, that were left out because their batch was not finite.
+    #[getter]
+    fn rejected_samples(&self, py: Python<'_>) -> PyResult<u64> {
+        Ok(self.attached(py)?.film().rejected())
+    }
+
+    /// Samples, over all pixels, whose batch had negative luminance; since a resume.
+    #[getter]
+    fn negative_samples(&self, py: Python<'_>) -> PyResult<u64> {
+        Ok(self.attached(py)?.negative_samples())
     }
 
     /// Samples still to be taken, over all pixels, as the oracle expects; None while it cannot tell for a

@@ -5,7 +5,10 @@
 
 mod scene;
 
-use noisefloor::{Batch, Driver, Event, Oracle, Params, ProgressiveSource, Request, SourceError, SourceInfo};
+use noisefloor::{
+    Batch, Driver, Event, Oracle, Params, ProgressiveSource, Request, SourceError, SourceInfo,
+    source::PixelNoise,
+};
 use noisefloor_image::{RenderLayers, write_exr};
 use rayon::iter::{IntoParallelIterator, ParallelIterator};
 use rustic_zen::prelude::{ExportImage, Image, RenderConstraint};
@@ -35,7 +38,9 @@ impl Photons {
 
 impl ProgressiveSource for Photons {
     fn info(&self) -> SourceInfo {
-        SourceInfo::new("rustic-zen", self.width, self.height).with_aims(false)
+        SourceInfo::new("rustic-zen", self.width, self.height)
+            .with_aims(false)
+            .with_pixels(PixelNoise::Shared)
     }
 
     fn sample(&mut self, requests: &[Request]) -> Result<Vec<Batch>, SourceError> {

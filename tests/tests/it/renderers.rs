@@ -1,4 +1,5 @@
 use crate::kit::usable;
+use crate::watch::check_silence;
 use noisefloor::{Batch, ProgressiveSource, Request, Rgb, Tile, TileGrid};
 use noisefloor_luxcore::{Engine, Sampler};
 use noisefloor_ptwne::{Ptwne, RenderOptions, scenes};
@@ -28,6 +29,7 @@ fn cycles(width: usize, height: usize) -> Result<Sidecar, SidecarError> {
 fn cycles_keeps_the_contract() {
     if usable(&noisefloor_cycles::RENDERER) {
         check_source(|| cycles(48, 40).unwrap());
+        check_silence(cycles(48, 40).unwrap(), 80);
     }
 }
 
@@ -37,7 +39,9 @@ macro_rules! luxcore_keeps_the_contract {
         #[test]
         fn $name() {
             if usable(&noisefloor_luxcore::RENDERER) {
-                check_source(|| luxcore(Engine::$engine, Sampler::$sampler, 48, 40).unwrap());
+                let make = || luxcore(Engine::$engine, Sampler::$sampler, 48, 40).unwrap();
+                check_source(make);
+                check_silence(make(), 80);
             }
         }
     )*};

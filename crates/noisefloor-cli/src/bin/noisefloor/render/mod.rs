@@ -224,6 +224,7 @@ fn sample(
 /// batch: in a terminal it ends a command that renders, too, which is no failure.
 fn finish(driver: &Rendering, outcome: Result<(), DriverError>, cancel: &AtomicBool) -> anyhow::Result<bool> {
     driver.source().notes().iter().for_each(|text| note!("warning: {text}"));
+    driver.session().warnings().iter().for_each(|warning| note!("warning: {warning}"));
     match outcome {
         Err(error) if cancel.load(Ordering::Relaxed) => {
             let what = if matches!(error, DriverError::Criterion(_)) { "verdict" } else { "batch" };
