@@ -92,6 +92,9 @@ typedef enum {
     NF_STATUS_INTERNAL = 10,
     // There is not enough memory for the picture, or for work on all of it. The session is as it was.
     NF_STATUS_MEMORY = 11,
+    // Samples cannot be what they are said to be, such as a batch that contains the one before. No tile is done
+    // by them.
+    NF_STATUS_FAULT = 12,
 } NfStatus;
 
 // A trained model with the probability from which a tile counts as converged. It never changes, and any
@@ -199,6 +202,17 @@ typedef struct {
     // Whether the tile's texture is unlike all that the model was trained on: treat the verdict with care.
     bool unfamiliar;
 } NfTileState;
+
+// What samples were like that were pushed.
+typedef struct {
+    // Samples, over all pixels, that were left out because their batch was not finite.
+    uint64_t rejected;
+    // Samples, over all pixels, whose batch had negative luminance; since a resume.
+    uint64_t negative;
+    // Warnings: what is likely to be wrong with the samples, as of the last nf_session_judge. See
+    // nf_session_warning.
+    size_t warnings;
+} NfSampleCounts;
 
 #ifdef __cplusplus
 extern "C" {
@@ -332,6 +346,21 @@ NfStatus nf_session_close_all(const NfSession *session, uint32_t reason);
 // tile has no expectation.
 NfStatus nf_session_expected_samples(const NfSession *session,
                                      uint64_t *samples);
+
+// Counts samples that are not as they should be.
+NfStatus nf_session_sample_counts(const NfSession *session, NfSampleCounts *counts);
+
+// The text of a warning, 0 to NfSampleCounts.warnings - 1, in English, for people: cut to bytes - 1 bytes and
+// ended by a zero. 400 bytes hold any.
+NfStatus nf_session_warning(const NfSession *session,
+                            size_t index,
+                            char *text,
+                            size_t bytes);
+
+// Says whether neighbouring pixels have noise in common, by a pixel filter, a denoiser or a Markov chain: no
+// warning says so then.
+NfStatus nf_session_share_pixels(const NfSession *session,
+                                 bool shared);
 
 // The picture: the mean of all samples, floats = 3 * width * height of the image. Pixels without samples are
 // black.

@@ -87,8 +87,8 @@ impl Energies {
 pub(super) struct Sums {
     /// Of a − c and b − d.
     pub(super) batches: Correlation,
-    /// The same with what all pixels of a tile have in common.
-    pub(super) whole: Correlation,
+    /// The same without what all pixels of a tile have in common.
+    pub(super) apart: Correlation,
     /// Of a − b and a + b − 2c.
     pub(super) nested: Correlation,
     /// Of a − b and the same one pixel beside.
@@ -105,7 +105,7 @@ pub(super) struct Sums {
 impl Sums {
     pub(super) fn add(&mut self, more: &Self) {
         self.batches.add(&more.batches);
-        self.whole.add(&more.whole);
+        self.apart.add(&more.apart);
         self.nested.add(&more.nested);
         self.neighbours.add(&more.neighbours);
         self.counts.add(&more.counts);
@@ -125,8 +125,16 @@ impl Sums {
         correlation.z() / self.widening()
     }
 
+    /// The correlation of batches and its z: the smaller ones of all noise and of that which pixels have for
+    /// themselves, since a few noisy pixels decide what is in common.
+    fn of_batches(&self) -> (f64, f64) {
+        let smaller = |x: f64, y: f64| if x * y > 0.0 { x.abs().min(y.abs()).copysign(x) } else { 0.0 };
+        let value = smaller(self.batches.value(), self.apart.value());
+        (smaller(self.z(&self.batches), self.z(&self.apart)), value)
+    }
+
     pub(super) fn fault(&self) -> Result<(), Fault> {
-        let (z, correlation) = (self.z(&self.batches), self.batches.value());
+        let (z, correlation) = self.of_batches();
         if z < CERTAIN || correlation < STRONG {
             return Ok(());
         }
@@ -139,16 +147,16 @@ impl Sums {
 
     pub(super) fn warnings(&self, shared: bool) -> impl Iterator<Item = Warning> {
         let mut warnings = Vec::new();
-        let (z, value) = (self.z(&self.batches), self.batches.value());
+        let (z, value) = self.of_batches();
         if z > CERTAIN && value < STRONG {
             warnings.push(Warning::Shared(value));
         }
-        let whole = self.whole.value();
-        if !shared && self.whole.z() > CERTAIN && whole > STRONG && z < CERTAIN {
-            warnings.push(Warning::Changing(whole));
-        }
         if z < -CERTAIN && value < -NOTABLE {
             warnings.push(Warning::Anticorrelated(value));
+        }
+        let whole = self.batches.value();
+        if !shared && self.z(&self.batches) > CERTAIN && whole > STRONG && z < CERTAIN {
+            warnings.push(Warning::Changing(whole));
         }
         // With k times the energy in a, and as much in c as in b, it is (k − 1)/√((k + 1)(k + 5))
         let r = self.nested.value();

@@ -83,17 +83,12 @@ fn pair(a: &Seen, b: &Seen) -> Sums {
         return sums;
     }
     let difference = |place: usize| {
-        let values = a.light.iter().zip(&b.light);
-        let both = |(a, b): (&[f32; 3], &[f32; 3])| {
-            finite((f64::from(a[place] - b[place]), f64::from(a[place] + b[place])))
-        };
-        without_gain(&values.map(both).collect::<Vec<_>>())
+        a.light.iter().zip(&b.light).map(move |(a, b)| finite(f64::from(a[place]) - f64::from(b[place])))
     };
-    let (here, beside) = (difference(1), difference(0));
-    sums.neighbours = Correlation::of(here.iter().copied().zip(beside), false);
-    for row in here.chunks(4) {
+    sums.neighbours = Correlation::of(difference(1).zip(difference(0)), false);
+    for row in difference(1).collect::<Vec<_>>().chunks(4) {
         sums.rows[0] += row.iter().sum::<f64>().powi(2);
-        sums.rows[1] += row.iter().map(|x| x * x).sum::<f64>();
+        sums.rows[1] += energy(row);
     }
     if a.spp >= MANY {
         sums.ends = a.light.iter().zip(&b.light).map(|(a, b)| Ends::of(a[1], b[1])).sum();
@@ -103,56 +98,52 @@ fn pair(a: &Seen, b: &Seen) -> Sums {
 
 /// A whole group.
 fn four([a, b, c, d]: [&Seen; 4], shared: bool, sums: &mut Sums) {
-    let with_gain = |of: [f64; 4]| -> Vec<(f64, f64)> {
+    let combined = |of: [f64; 4]| -> Vec<f64> {
         let values = a.light.iter().zip(&b.light).zip(c.light.iter().zip(&d.light));
-        let combined = |((a, b), (c, d)): ((&[f32; 3], &[f32; 3]), (&[f32; 3], &[f32; 3]))| {
-            let four = [a[1], b[1], c[1], d[1]].map(f64::from);
-            finite((four.iter().zip(of).map(|(v, of)| v * of).sum(), four.iter().sum()))
+        let combine = |((a, b), (c, d)): ((&[f32; 3], &[f32; 3]), (&[f32; 3], &[f32; 3]))| {
+            finite([a, b, c, d].iter().zip(of).map(|(light, of)| f64::from(light[1]) * of).sum())
         };
-        values.map(combined).collect()
+        values.map(combine).collect()
     };
-    let combined = |of| without_gain(&with_gain(of));
     let alike = |one: &Seen, other: &Seen| {
         one.spp <= other.spp.saturating_mul(ALIKE) && other.spp <= one.spp.saturating_mul(ALIKE)
     };
+    let correlation =
+        |x: &[f64], y: &[f64]| Correlation::of(x.iter().copied().zip(y.iter().copied()), shared);
     if alike(a, c) && alike(b, d) {
-        let (ac, bd) = (with_gain([1.0, 0.0, -1.0, 0.0]), with_gain([0.0, 1.0, 0.0, -1.0]));
-        let pairs = without_gain(&ac).into_iter().zip(without_gain(&bd));
-        sums.batches = Correlation::of(pairs, shared);
-        sums.whole = Correlation::of(ac.iter().zip(&bd).map(|(x, y)| (x.0, y.0)), shared);
+        let (ac, bd) = (combined([1.0, 0.0, -1.0, 0.0]), combined([0.0, 1.0, 0.0, -1.0]));
+        sums.batches = correlation(&ac, &bd);
+        let picture = combined([1.0; 4]);
+        sums.apart = correlation(&without_gain(&ac, &picture), &without_gain(&bd, &picture));
     }
     if a.spp != b.spp {
         return;
     }
     let ab = combined([1.0, -1.0, 0.0, 0.0]);
     if alike(b, c) {
-        let pairs = ab.iter().copied().zip(combined([1.0, 1.0, -2.0, 0.0]));
-        sums.nested = Correlation::of(pairs, shared);
+        sums.nested = correlation(&ab, &combined([1.0, 1.0, -2.0, 0.0]));
     }
     if c.spp == d.spp && alike(a, c) {
-        let energy = |x: &[f64]| x.iter().map(|x| x * x).sum::<f64>();
-        let cd = combined([0.0, 0.0, 1.0, -1.0]);
-        for (ab, cd) in ab.chunks(BLOCK).zip(cd.chunks(BLOCK)) {
-            let (ab, cd) = (energy(ab), energy(cd));
-            let energies = if a.spp == c.spp { &mut sums.steps } else { &mut sums.counts };
-            energies.see(a.spp as f64 * ab, c.spp as f64 * cd);
+        let energies = if a.spp == c.spp { &mut sums.steps } else { &mut sums.counts };
+        for (ab, cd) in ab.chunks(BLOCK).zip(combined([0.0, 0.0, 1.0, -1.0]).chunks(BLOCK)) {
+            energies.see(a.spp as f64 * energy(ab), c.spp as f64 * energy(cd));
         }
     }
 }
 
-/// Differences less what they have in common with the picture, which varies for all pixels as one where a
-/// renderer estimates the brightness of all.
-fn without_gain(values: &[(f64, f64)]) -> Vec<f64> {
-    let (mut common, mut size) = (0.0, 0.0);
-    for (x, picture) in values {
-        common += x * picture;
-        size += picture * picture;
-    }
-    let gain = if size > 0.0 { common / size } else { 0.0 };
-    values.iter().map(|(x, picture)| x - gain * picture).collect()
+fn energy(x: &[f64]) -> f64 {
+    x.iter().map(|x| x * x).sum()
 }
 
-/// A difference beside the picture; nothing where one of them is not finite.
-fn finite((x, picture): (f64, f64)) -> (f64, f64) {
-    if x.is_finite() && picture.is_finite() { (x, picture) } else { (0.0, 0.0) }
+/// Differences less what they have in common with the picture, which varies for all pixels as one where a
+/// renderer estimates the brightness of all.
+fn without_gain(differences: &[f64], picture: &[f64]) -> Vec<f64> {
+    let common: f64 = differences.iter().zip(picture).map(|(x, picture)| x * picture).sum();
+    let gain = common / energy(picture).max(f64::MIN_POSITIVE);
+    differences.iter().zip(picture).map(|(x, picture)| x - gain * picture).collect()
+}
+
+/// Nothing in place of what is not finite.
+fn finite(x: f64) -> f64 {
+    if x.is_finite() { x } else { 0.0 }
 }

@@ -16,7 +16,7 @@
 //! | a − b against 0, where the tile is rough | two batches | [`Fault::Repeated`] |
 //! | correlation of a − c with b − d | a group | [`Fault::Shared`], [`Warning::Shared`], [`Warning::Anticorrelated`] |
 //! | the same, while (c − d)² is smaller than (a − b)² | a group | [`Fault::Running`] |
-//! | the same with what all pixels of a tile have in common | a group | [`Warning::Changing`] |
+//! | the same, but only with what all pixels of a tile have in common | a group | [`Warning::Changing`] |
 //! | correlation of a − b with a + b − 2c: is a noisier than b? | a group | [`Warning::Noise`] |
 //! | (a − b)²·n against (c − d)²·m | a group | [`Warning::Counts`] |
 //! | correlation of a − b with itself one pixel beside | two batches | [`Warning::Neighbours`] |
@@ -32,9 +32,10 @@
 //! 1963). So it is for the other correlations. Sums are looked at once before each round of verdicts, over all
 //! groups so far and over the new ones alone: in 10,000 rounds, and with three correlations of two signs, by
 //! chance with p < 10⁻⁴. Three things are not exact and were measured instead (`tests/tests/it/watch.rs`): sizes
-//! may differ by a factor of 2; what the noise of a tile has in common with its picture is taken out, since a
-//! Markov chain's brightness wanders as a whole; and z is divided by √R, where R is what the noise of four
-//! watched pixels in a row has more energy in sum than in each. A source that says that its pixels share samples
+//! may differ by a factor of 2. The z of batches has to be as large, and of the same sign, without what the noise
+//! of a tile has in common with its picture, since a Markov chain's brightness wanders as a whole. And z is
+//! divided by √R, where R is how much more energy the noise of four watched pixels in a row has in sum than
+//! in each. A source that says that its pixels share samples
 //! ([`PixelNoise::Shared`](crate::source::PixelNoise)) gives one term a tile. Certain is only what has, in
 //! addition, at least a fifth of the correlation that is possible; running means have 0.4 and more.
 //!
