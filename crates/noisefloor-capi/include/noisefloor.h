@@ -214,6 +214,10 @@ typedef struct {
     size_t warnings;
 } NfSampleCounts;
 
+// Renders the mean of spp new samples of each pixel of a tile, of which it has rendered first samples before:
+// mean has room for 3 * width * height floats of the tile. Returns 0, or anything else if it failed.
+typedef int32_t (*NfRender)(void *user, NfTile tile, uint64_t first, uint64_t spp, float *mean);
+
 #ifdef __cplusplus
 extern "C" {
 #endif // __cplusplus
@@ -387,6 +391,19 @@ NfStatus nf_session_save(const NfSession *session,
 NfStatus nf_session_resume(const NfSession *session,
                            const char *job,
                            const char *path);
+
+// Checks what sessions rely on: that samples of a renderer are new, independent of each other and, unless
+// shared_pixels is true, from pixel to pixel, and that their number means what it says. With repeats_samples,
+// also that they follow from pixel and sample number, however requests are cut. NF_STATUS_FAULT and
+// nf_last_error say what is wrong. render is called on this thread, some hundred times with tiles of 32 x 32
+// pixels; 48 x 40 pixels are enough, and several times over from first = 0, which must restart nothing unless
+// repeats_samples is true.
+NfStatus nf_check(NfRender render,
+                  void *user,
+                  size_t width,
+                  size_t height,
+                  bool repeats_samples,
+                  bool shared_pixels);
 
 #ifdef __cplusplus
 }  // extern "C"

@@ -187,6 +187,78 @@ class Sessions(unittest.TestCase):
             session.close_all("converged")
 
 
+class Faults(unittest.TestCase):
+    """Wrong samples are an error or a warning."""
+
+    def feed(self, batches, picture, **options):
+        session = nf.Session(128, 128, params=nf.Params(tile=64, min_spp=0, max_spp=10_000), **options)
+        for count in range(batches):
+            session.push_image(10, picture(count))
+            session.judge()
+        return session
+
+    def independent(self, count):
+        light = np.random.default_rng(count).exponential(1.0, (128, 128, 1)) ** 2
+        return np.broadcast_to(0.3 * light, (128, 128, 3)).astype(np.float32)
+
+    def test_certain_faults_are_errors(self):
+        def running(count):
+            return np.mean([self.independent(i) for i in range(count + 1)], axis=0)
+
+        cases = [
+            (r"contain the samples .* push_running", running),
+            ("same batch twice", lambda count: self.independent(0)),
+            ("8 bits", lambda count: np.round(np.minimum(self.independent(count), 1) * 255) / 255),
+            ("negative", lambda count: -1 - self.independent(count)),
+            ("not finite", lambda count: self.independent(count) * np.nan),
+        ]
+        for words, picture in cases:
+            with self.subTest(words):
+                with self.assertRaisesRegex(nf.FaultError, words):
+                    self.feed(12, picture)
+
+    def test_what_is_likely_is_warned_of_once(self):
+        def blurred(count):
+            image = self.independent(count)
+            return (image + np.roll(image, 1, axis=1) + np.roll(image, -1, axis=1)) / 3
+
+        with self.assertWarnsRegex(UserWarning, "neighbouring pixels") as caught:
+            session = self.feed(8, blurred)
+        self.assertEqual(len(caught.warnings), 1)
+        self.assertEqual(len(session.warnings), 1)
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            self.assertEqual(self.feed(8, blurred, shared_pixels=True).warnings, [])
+            right = self.feed(8, self.independent)
+        self.assertEqual((right.warnings, right.rejected_samples, right.negative_samples), ([], 0, 0))
+
+    def test_samples_that_are_left_out_or_negative_are_counted(self):
+        def holes(count):
+            image = self.independent(count)
+            image[0, :7] = np.nan
+            image[1, :5] = -1e-3
+            return image
+
+        session = self.feed(4, holes)
+        self.assertEqual((session.rejected_samples, session.negative_samples), (280, 200))
+
+    def test_renderers_are_checked(self):
+        def right(tile, first, spp):
+            mean = np.zeros((tile.height, tile.width, 3), np.float32)
+            for sample in range(first, first + spp):
+                mean += np.random.default_rng([tile.index, sample]).uniform(0, 1, mean.shape) / spp
+            return mean
+
+        nf.check(right)
+        nf.check(right, repeats_samples=True)
+        with self.assertRaisesRegex(nf.FaultError, "correlated"):
+            nf.check(lambda tile, first, spp: right(tile, first // (2 * spp) * (2 * spp), spp))
+        with self.assertRaisesRegex(nf.FaultError, r"shape \(1, 1, 3\)"):
+            nf.check(lambda tile, first, spp: np.zeros((1, 1, 3)))
+        with self.assertRaises(ZeroDivisionError):
+            nf.check(lambda tile, first, spp: 1 // 0)
+
+
 class Errors(unittest.TestCase):
     def test_every_error_is_typed_and_says_what_is_wrong(self):
         session = nf.Session(96, 80, params=PARAMS)

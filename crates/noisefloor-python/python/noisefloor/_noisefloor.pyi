@@ -1,6 +1,7 @@
 """Signatures for type checkers. Shapes, units and errors are in the docstrings: help(noisefloor.Session)."""
 
 import os
+from collections.abc import Callable
 from typing import Literal, final
 
 import numpy as np
@@ -140,6 +141,15 @@ class Stop:
     def unfamiliar(self) -> bool: ...
 
 @final
+def check(
+    render: Callable[[Tile, int, int], ArrayLike],
+    width: int = 48,
+    height: int = 40,
+    *,
+    repeats_samples: bool = False,
+    shared_pixels: bool = False,
+) -> None: ...
+
 class Session:
     def __new__(
         cls,

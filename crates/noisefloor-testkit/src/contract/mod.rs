@@ -19,6 +19,7 @@ use independence::check_independence;
 use noisefloor::{Counts, ProgressiveSource, Repeats, source::PixelNoise};
 use probe::{Round, Subject};
 use reference::check_reference;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 
 /// Rounds of 16 samples that are compared for independence.
 const ROUNDS: usize = 4;
@@ -115,6 +116,15 @@ pub fn check_source<S: ProgressiveSource>(make: impl Fn() -> S) {
     }
     check_reference_changes_nothing(&subject, four);
     check_end(&subject, if playback { MOST_OF_A_PLAYBACK } else { MOST_OF_A_RENDERER });
+}
+
+/// What [`check_source`] finds wrong with a source, in place of a panic: for other languages. The words also go
+/// where panics are reported.
+pub fn broken_promise<S: ProgressiveSource>(make: impl Fn() -> S) -> Option<String> {
+    let panic = catch_unwind(AssertUnwindSafe(|| check_source(make))).err()?;
+    let text = panic.downcast_ref::<String>().cloned();
+    let text = text.or_else(|| panic.downcast_ref::<&str>().map(|text| (*text).to_owned()));
+    Some(text.unwrap_or_else(|| "the check failed without words".into()))
 }
 
 /// How requests are cut changes no sample.
