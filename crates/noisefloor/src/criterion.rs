@@ -198,8 +198,8 @@ pub trait StoppingCriterion {
         false
     }
 
-    /// How visible the noise is at each pixel of the image, row-major, in 8-bit display steps; NaN where a
-    /// tile gives no evidence. `None`, the default, if the criterion cannot say. Costs as much as a verdict
+    /// How visible the noise is at each pixel of the image, row-major, as a multiple of what is just seen; NaN
+    /// where a tile gives no evidence. `None`, the default, if the criterion cannot say. Costs as much as a verdict
     /// on every tile; called where a map is wanted, never for a verdict.
     fn visible_noise(&self, _view: &View<'_>) -> Option<Vec<f32>> {
         None

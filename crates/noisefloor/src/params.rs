@@ -35,7 +35,7 @@ pub enum Schedule {
 
 impl Default for Schedule {
     /// Spaced, in steps of 10: a tile stops within a few percent of its need, where the paper's steps of 100
-    /// overshoot it by two fifths in ordinary scenes (docs/benchmarks/verdicts.md).
+    /// overshoot it by a fifth in ordinary scenes (docs/benchmarks/verdicts.md).
     fn default() -> Self {
         Self::Spaced { step: 10 }
     }

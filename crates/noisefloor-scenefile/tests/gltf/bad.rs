@@ -96,10 +96,10 @@ fn every_error_names_its_place() {
         ("/nodes/2/children", "[2]", "node 2: ", "reached twice"),
         ("/nodes/2/children", "[1]", "node 1: ", "reached twice"),
         ("/nodes/1/rotation", "[0, 0, 0, 0]", "node 1: ", "rotation"),
-        ("/nodes/1/rotation", "[1e39, 0, 0, 0]", "node 1: ", "rotation"),
+        ("/nodes/1/rotation", "[1e39, 0, 0, 0]", "line 1 of the JSON: ", "number out of range"),
         // What the renderer does not take
         ("/nodes/1/translation", "[1e9, 0, 0]", table, "outside"),
-        ("/nodes/1/scale", "[1e39, 0, 0]", table, "not finite"),
+        ("/nodes/1/scale", "[1e39, 0, 0]", "line 1 of the JSON: ", "number out of range"),
         ("/nodes/0/scale", "[0, 0, 0]", "scene.gltf", "camera has no orientation"),
         ("/cameras/0/perspective/yfov", "4", "scene.gltf", "field of view"),
         ("/extensions/KHR_lights_punctual/lights/0/intensity", "-1", "light 0", "outside"),

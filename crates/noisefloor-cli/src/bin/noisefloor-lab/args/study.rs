@@ -20,7 +20,7 @@ use std::time::Duration;
 /// Ask people: collect thresholds in the browser, check what a model says, and train on the answers.
 ///
 /// STUDY.toml names stacks of pictures (folders of NNNNN.png or NNNNN.exr, named by samples per pixel), the
-/// protocol, and the texts that observers read and agree to. docs/study.md explains it.
+/// protocol, and the texts that observers read and agree to. docs/studies.md explains it.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   noisefloor-lab study stack cornell-box --size 256x256 --out stacks/cornell-box

@@ -85,7 +85,7 @@ pub struct RenderArgs {
     /// Render a sequence: SCENE holds {frame}, or {frame:04} for four digits, in place of the number; so
     /// may --against and values of --define. Each frame goes into a folder of its own, and frames.csv sums
     /// up. --resume goes on where the sequence was interrupted. All frames have the same seed: noise then
-    /// stays where it is on the screen, and flickers a third as much.
+    /// stays where it is on the screen.
     #[arg(long, value_name = "FIRST-LAST")]
     frames: Option<FrameRange>,
     /// Options from a file, as max-spp = 2000 or denoise = "oidn", a line each. What is typed as well wins.

@@ -47,7 +47,7 @@ pub struct VerdictArgs {
     #[arg(long, value_name = "SPP")]
     pub max_spp: Option<u64>,
     /// When tiles are judged: `spaced` by the samples that a tile is expected to need, or after `every`
-    /// batch, as in the paper: tiles then stop a quarter to two fifths later in ordinary scenes.
+    /// batch, as in the paper: tiles then stop about a fifth later in ordinary scenes.
     #[arg(
         long,
         value_enum,
