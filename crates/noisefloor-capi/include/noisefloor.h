@@ -10,15 +10,16 @@
 // answers NF_STATUS_INTERNAL from then on and can only be freed. A picture that there is no memory for is
 // NF_STATUS_MEMORY; where the system has not even a few megabytes left, the process ends.
 //
-// Threads. Any thread may call any function on any object at any time, except that nothing else may use an
-// object while it is freed, or after. Calls on one session take turns: pushes wait while nf_session_judge
-// runs. Judging uses all cores. Stops do not depend on the number of threads, but each tile has to get its
-// own batches in the same order for results to be the same to the bit.
+// Handles are numbers in the shape of pointers, each given once: one that was freed, or is of another kind, is
+// NF_STATUS_HANDLE. What is freed while another thread uses it ends when that call returns.
+//
+// Threads. Any thread may call any function on any object at any time. Calls on one session take turns: pushes
+// wait while nf_session_judge runs. Judging uses all cores. Stops do not depend on the number of threads, but
+// each tile has to get its own batches in the same order for results to be the same to the bit.
 //
 // Pointers. A pointer that is NULL where it must not be is NF_STATUS_NULL_POINTER. Beside a pointer to an
 // array goes the number of its elements, which is checked. What cannot be checked: pointers must lead to as
-// many elements as said, or to one object; handles must come from this library and not be freed yet. Text
-// ends with a zero byte and is UTF-8. The library keeps no pointer after a call, and owns what it returns.
+// many elements as said, or to one object. Text ends with a zero byte and is UTF-8. The library keeps no pointer after a call, and owns what it returns.
 //
 // Pictures are rows from the top, pixels from the left, three floats a pixel: linear red, green and blue with
 // the primaries of Rec. 709. Floats that are not finite do not count as samples.
@@ -95,6 +96,8 @@ typedef enum {
     // Samples cannot be what they are said to be, such as a batch that contains the one before. No tile is done
     // by them.
     NF_STATUS_FAULT = 12,
+    // A handle that was freed, is of another kind, or does not come from this library.
+    NF_STATUS_HANDLE = 13,
 } NfStatus;
 
 // A trained model with the probability from which a tile counts as converged. It never changes, and any
@@ -238,8 +241,9 @@ NfStatus nf_oracle_bundled(float threshold,
 // As nf_oracle_bundled, with a model that "noisefloor-lab train" has written to a file.
 NfStatus nf_oracle_load(const char *path, float threshold, NfOracle **oracle);
 
-// Frees an oracle; sessions made from it do not need it. NULL is ignored.
-void nf_oracle_free(NfOracle *oracle);
+// Frees an oracle; sessions made from it do not need it. NULL is ignored, a second time is
+// NF_STATUS_HANDLE.
+NfStatus nf_oracle_free(NfOracle *oracle);
 
 // Fills in the defaults.
 NfStatus nf_params_default(NfParams *params);
@@ -253,8 +257,8 @@ NfStatus nf_session_new(size_t width,
                         const NfParams *params,
                         NfSession **session);
 
-// Frees a session. NULL is ignored.
-void nf_session_free(NfSession *session);
+// Frees a session, once calls on it have returned. NULL is ignored, a second time is NF_STATUS_HANDLE.
+NfStatus nf_session_free(NfSession *session);
 
 // The number of tiles; 0 if session is NULL.
 size_t nf_session_tile_count(const NfSession *session);

@@ -1,6 +1,7 @@
 //! What comes of a session: where its tiles stand, its picture, and the map of visible noise.
 
 use crate::border;
+use crate::handle;
 use crate::session::NfSession;
 use crate::status::{Failure, NfStatus, guard};
 use noisefloor::{StopReason, session::Interruption, source::PixelNoise};
@@ -62,8 +63,7 @@ pub unsafe extern "C" fn nf_session_states(
     capacity: usize,
 ) -> NfStatus {
     guard(|| {
-        // SAFETY: promised by the caller.
-        let session = unsafe { border::object(session, "session") }?;
+        let session = handle::get(session)?;
         // SAFETY: promised by the caller.
         let room = unsafe { border::array_mut(states, capacity, session.grid.len(), "states") }?;
         let locked = session.lock()?;
@@ -92,8 +92,7 @@ pub unsafe extern "C" fn nf_session_states(
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn nf_session_open_tiles(session: *const NfSession, open: *mut usize) -> NfStatus {
     guard(|| {
-        // SAFETY: promised by the caller.
-        let found = unsafe { border::object(session, "session") }?.lock()?.open_tiles();
+        let found = handle::get(session)?.lock()?.open_tiles();
         // SAFETY: promised by the caller.
         unsafe { border::write(open, found, "open") }
     })
@@ -101,10 +100,9 @@ pub unsafe extern "C" fn nf_session_open_tiles(session: *const NfSession, open: 
 
 /// Ends every open tile for NF_REASON_TIME_LIMIT, NF_REASON_CANCELLED or NF_REASON_FAILED.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn nf_session_close_all(session: *const NfSession, reason: u32) -> NfStatus {
+pub extern "C" fn nf_session_close_all(session: *const NfSession, reason: u32) -> NfStatus {
     guard(|| {
-        // SAFETY: promised by the caller.
-        let session = unsafe { border::object(session, "session") }?;
+        let session = handle::get(session)?;
         let reason = match reason {
             NF_REASON_TIME_LIMIT => Interruption::TimeLimit,
             NF_REASON_CANCELLED => Interruption::Cancelled,
@@ -127,8 +125,7 @@ pub unsafe extern "C" fn nf_session_expected_samples(
     samples: *mut u64,
 ) -> NfStatus {
     guard(|| {
-        // SAFETY: promised by the caller.
-        let expected = unsafe { border::object(session, "session") }?.lock()?.expected_samples_to_go();
+        let expected = handle::get(session)?.lock()?.expected_samples_to_go();
         let unknown = "there is a tile of which the oracle cannot yet say how many samples it needs";
         let expected = expected.ok_or_else(|| Failure::new(NfStatus::Unavailable, unknown))?;
         // SAFETY: promised by the caller.
@@ -156,8 +153,8 @@ pub unsafe extern "C" fn nf_session_sample_counts(
     counts: *mut NfSampleCounts,
 ) -> NfStatus {
     guard(|| {
-        // SAFETY: promised by the caller.
-        let session = unsafe { border::object(session, "session") }?.lock()?;
+        let session = handle::get(session)?;
+        let session = session.lock()?;
         let (rejected, negative) = (session.film().rejected(), session.negative_samples());
         let found = NfSampleCounts { rejected, negative, warnings: session.warnings().len() };
         // SAFETY: promised by the caller.
@@ -175,8 +172,8 @@ pub unsafe extern "C" fn nf_session_warning(
     bytes: usize,
 ) -> NfStatus {
     guard(|| {
-        // SAFETY: promised by the caller.
-        let session = unsafe { border::object(session, "session") }?.lock()?;
+        let session = handle::get(session)?;
+        let session = session.lock()?;
         // SAFETY: promised by the caller.
         let room = unsafe { border::room(text, bytes, bytes.max(1), "text") }?;
         let unknown = || Failure::new(NfStatus::Argument, format!("there is no warning {index}"));
@@ -193,11 +190,10 @@ pub unsafe extern "C" fn nf_session_warning(
 /// Says whether neighbouring pixels have noise in common, by a pixel filter, a denoiser or a Markov chain: no
 /// warning says so then.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn nf_session_share_pixels(session: *const NfSession, shared: bool) -> NfStatus {
+pub extern "C" fn nf_session_share_pixels(session: *const NfSession, shared: bool) -> NfStatus {
     guard(|| {
         let pixels = if shared { PixelNoise::Shared } else { PixelNoise::Independent };
-        // SAFETY: promised by the caller.
-        unsafe { border::object(session, "session") }?.lock()?.set_pixels(pixels);
+        handle::get(session)?.lock()?.set_pixels(pixels);
         Ok(())
     })
 }
@@ -211,8 +207,7 @@ pub unsafe extern "C" fn nf_session_image(
     floats: usize,
 ) -> NfStatus {
     guard(|| {
-        // SAFETY: promised by the caller.
-        let session = unsafe { border::object(session, "session") }?;
+        let session = handle::get(session)?;
         let wanted = 3 * session.grid.width() * session.grid.height();
         // SAFETY: promised by the caller.
         let room = unsafe { border::array_mut(image, floats, wanted, "image") }?;
@@ -237,8 +232,7 @@ pub unsafe extern "C" fn nf_session_visible_noise(
     floats: usize,
 ) -> NfStatus {
     guard(|| {
-        // SAFETY: promised by the caller.
-        let session = unsafe { border::object(session, "session") }?;
+        let session = handle::get(session)?;
         let wanted = session.grid.width() * session.grid.height();
         // SAFETY: promised by the caller.
         let room = unsafe { border::array_mut(map, floats, wanted, "map") }?;

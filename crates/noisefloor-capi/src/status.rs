@@ -40,6 +40,8 @@ pub enum NfStatus {
     /// Samples cannot be what they are said to be, such as a batch that contains the one before. No tile is done
     /// by them.
     Fault = 12,
+    /// A handle that was freed, is of another kind, or does not come from this library.
+    Handle = 13,
 }
 
 /// Why a call fails.

@@ -40,8 +40,7 @@ unsafe impl Send for Handle {}
 
 impl Drop for Handle {
     fn drop(&mut self) {
-        // SAFETY: made by `session`, and freed once.
-        unsafe { nf_session_free(self.0) };
+        nf_session_free(self.0);
     }
 }
 
@@ -56,7 +55,7 @@ fn session(params: &NfParams) -> Handle {
             "{}",
             message()
         );
-        nf_oracle_free(oracle); // the session does not need it
+        assert_eq!(nf_oracle_free(oracle), NfStatus::Ok); // the session does not need it
     }
     Handle(session)
 }
@@ -227,8 +226,7 @@ fn every_pointer_may_be_null_and_none_is_followed_then() {
     let mean = [0.5_f32; 3 * EDGE * EDGE];
     // SAFETY: null pointers are checked for; all others lead to variables of this function.
     unsafe {
-        nf_oracle_free(null_mut());
-        nf_session_free(null_mut());
+        assert_eq!((nf_oracle_free(null_mut()), nf_session_free(null_mut())), (NfStatus::Ok, NfStatus::Ok));
         assert_eq!(nf_session_tile_count(null()), 0);
         let mut oracle = null_mut();
         let made = [
@@ -314,6 +312,7 @@ fn sizes_tiles_and_parameters_are_checked() {
         let mut oracle = null_mut();
         assert_eq!(nf_oracle_bundled(1.5, &mut oracle), Argument);
         assert_eq!(nf_oracle_load(c"/nowhere/at/all".as_ptr(), 0.9, &mut oracle), Io);
+        assert_eq!(nf_oracle_load(c"/".as_ptr(), 0.9, &mut oracle), Io);
         assert_eq!(nf_oracle_load(c"\xff".as_ptr(), 0.9, &mut oracle), Argument);
         let here = CString::new(concat!(env!("CARGO_MANIFEST_DIR"), "/src/tests.rs")).unwrap();
         assert_eq!(nf_oracle_load(here.as_ptr(), 0.9, &mut oracle), Model);
@@ -342,10 +341,52 @@ fn sizes_tiles_and_parameters_are_checked() {
 fn a_caller_can_end_all_tiles() {
     let session = session(&params());
     round(&session, 1);
-    // SAFETY: a living handle.
-    assert_eq!(unsafe { nf_session_close_all(session.0, NF_REASON_TIME_LIMIT) }, NfStatus::Ok);
+    assert_eq!(nf_session_close_all(session.0, NF_REASON_TIME_LIMIT), NfStatus::Ok);
     assert_eq!(open(&session), 0);
     assert!(states(&session).iter().any(|state| state.reason == NF_REASON_TIME_LIMIT));
+}
+
+/// Nothing is followed: not what was freed, nor what is no session, nor what no call has given.
+#[test]
+fn handles_that_are_wrong_are_errors() {
+    let living = session(&params());
+    let (mut oracle, mut count) = (null_mut(), 0);
+    // SAFETY: pointers to variables of this function.
+    unsafe {
+        assert_eq!(nf_oracle_bundled(0.9, &mut oracle), NfStatus::Ok);
+        assert_eq!(nf_session_judge(oracle.cast(), &mut count), NfStatus::Handle);
+        assert_eq!(message(), "session is a handle of something else");
+        assert_eq!(nf_session_new(8, 8, living.0.cast(), null(), &mut null_mut()), NfStatus::Handle);
+        let mut local = 0_u64;
+        assert_eq!(nf_session_judge((&raw mut local).cast(), &mut count), NfStatus::Handle);
+        assert_eq!(nf_session_tile_count(oracle.cast()), 0);
+    }
+    assert_eq!(nf_session_free(oracle.cast()), NfStatus::Handle);
+    assert_eq!((nf_oracle_free(oracle), nf_oracle_free(oracle)), (NfStatus::Ok, NfStatus::Handle));
+    assert_eq!(message(), "oracle is no handle of this library, or was freed");
+    assert_eq!(open(&living), 9);
+}
+
+/// A session that is freed while others work on it ends when they have.
+#[test]
+fn freeing_beside_other_calls_is_safe() {
+    for _ in 0..20 {
+        let session = session(&params());
+        let handle = &session;
+        std::thread::scope(|threads| {
+            for tile in 0..4 {
+                threads.spawn(move || {
+                    let mean = [0.5_f32; 3 * EDGE * EDGE];
+                    for _ in 0..50 {
+                        // SAFETY: an array of the size given.
+                        let status = unsafe { nf_session_push(handle.0, tile, 1, mean.as_ptr(), mean.len()) };
+                        assert!(matches!(status, NfStatus::Ok | NfStatus::Handle), "{status:?}");
+                    }
+                });
+            }
+            threads.spawn(move || assert_eq!(nf_session_free(handle.0), NfStatus::Ok));
+        });
+    }
 }
 
 /// Pushes two batches to every tile, and returns how the verdict ends.
@@ -431,8 +472,7 @@ fn renderers_are_checked() {
 #[test]
 fn a_panic_is_a_status_and_breaks_only_its_session() {
     let (broken, whole) = (session(&params()), session(&params()));
-    // SAFETY: a living handle.
-    let inside = unsafe { &*broken.0 };
+    let inside = crate::handle::get(broken.0.cast_const()).ok().unwrap();
     let status = guard(|| {
         let _locked = inside.lock()?;
         panic!("tile {} is odd", 7)
