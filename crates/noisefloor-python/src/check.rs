@@ -1,7 +1,7 @@
 //! The contract of a renderer, for a function of Python.
 
-use crate::arrays::{Pixels, pixels};
-use crate::errors::{FaultError, ParameterError};
+use crate::arrays::Pixels;
+use crate::errors::{FaultError, ParameterError, whole};
 use crate::verdicts::PyTile;
 use noisefloor::{
     Batch, ProgressiveSource, Repeats, Request, SourceError, SourceInfo, source::PixelNoise, tile::TileGrid,
@@ -21,7 +21,7 @@ impl Callback<'_, '_> {
     fn batch(&self, &Request { tile, first, spp }: &Request) -> PyResult<Batch> {
         let mean = self.render.call1((PyTile::from(tile), first, spp))?;
         let mean = mean.extract::<Pixels<'_>>()?;
-        let (width, height, pixels) = pixels(&mean, "what render returned")?;
+        let (width, height, pixels) = mean.get();
         if (width, height) != (tile.width, tile.height) {
             let (h, w) = (tile.height, tile.width);
             let message = format!("render returned shape ({height}, {width}, 3) for a tile of ({h}, {w}, 3)");
@@ -61,8 +61,8 @@ impl ProgressiveSource for Callback<'_, '_> {
 #[pyo3(signature = (render, width = 48, height = 40, *, repeats_samples = false, shared_pixels = false))]
 pub(crate) fn check(
     render: &Bound<'_, PyAny>,
-    width: usize,
-    height: usize,
+    #[pyo3(from_py_with = whole)] width: usize,
+    #[pyo3(from_py_with = whole)] height: usize,
     repeats_samples: bool,
     shared_pixels: bool,
 ) -> PyResult<()> {

@@ -1,7 +1,8 @@
 //! Exceptions.
 
 use noisefloor_rivals::MetricError;
-use pyo3::exceptions::PyException;
+use pyo3::exceptions::{PyException, PyOverflowError};
+use pyo3::prelude::*;
 use pyo3::{PyErr, create_exception};
 use std::path::Path;
 
@@ -74,4 +75,18 @@ impl Raise for noisefloor::SessionError {
 /// OSError, or the one of its subclasses that fits, with the name of the file.
 pub(crate) fn file_error(path: &Path, error: &std::io::Error) -> PyErr {
     std::io::Error::new(error.kind(), format!("{}: {error}", path.display())).into()
+}
+
+/// A whole number that is not below 0, nor larger than its type holds.
+pub(crate) fn whole<'py, T>(value: &Bound<'py, PyAny>) -> PyResult<T>
+where
+    T: for<'a> FromPyObject<'a, 'py, Error = PyErr>,
+{
+    value.extract::<T>().map_err(|error| {
+        if error.is_instance_of::<PyOverflowError>(value.py()) {
+            ParameterError::new_err(format!("{value} is out of range: a whole number from 0 on is needed"))
+        } else {
+            error
+        }
+    })
 }

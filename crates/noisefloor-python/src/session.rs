@@ -1,7 +1,7 @@
 //! The push session.
 
-use crate::arrays::{Pixels, picture, pixels, plane};
-use crate::errors::{BatchError, CheckpointError, Error, ParameterError, Raise, SizeError, file_error};
+use crate::arrays::{Pixels, picture, plane};
+use crate::errors::{CheckpointError, Error, ParameterError, Raise, SizeError, file_error, whole};
 use crate::oracle::PyOracle;
 use crate::params::PyParams;
 use crate::pool;
@@ -62,17 +62,9 @@ impl PySession {
         (self.grid.width(), self.grid.height())
     }
 
-    fn tile(&self, tile: &TileLike<'_>) -> PyResult<Tile> {
-        let (index, all) = (tile.index(), self.grid.len());
-        if index < all {
-            return Ok(self.grid.tile(index));
-        }
-        Err(BatchError::new_err(format!("tile {index} does not exist: there are {all}")))
-    }
-
     /// Checks the shape of a batch.
     fn batch<'a>(&self, tile: Tile, mean: &'a Pixels<'_>) -> PyResult<std::borrow::Cow<'a, [Rgb]>> {
-        let (width, height, pixels) = pixels(mean, "mean")?;
+        let (width, height, pixels) = mean.get();
         if (width, height) != (tile.width, tile.height) {
             let Tile { index, width: w, height: h, .. } = tile;
             let message = format!("mean has shape ({height}, {width}, 3), and tile {index} is ({h}, {w}, 3)");
@@ -98,8 +90,8 @@ impl PySession {
     #[new]
     #[pyo3(signature = (width, height, oracle = None, params = None, shared_pixels = false))]
     fn new(
-        width: usize,
-        height: usize,
+        #[pyo3(from_py_with = whole)] width: usize,
+        #[pyo3(from_py_with = whole)] height: usize,
         oracle: Option<PyRef<'_, PyOracle>>,
         params: Option<PyParams>,
         shared_pixels: bool,
@@ -149,8 +141,14 @@ impl PySession {
     ///     as samples. Tiles that are done accept samples, too: they improve, and stay done.
     ///
     /// Raises SizeError if the shape is another, BatchError if the tile does not exist or spp is 0.
-    fn push(&self, py: Python<'_>, tile: TileLike<'_>, spp: u64, mean: Pixels<'_>) -> PyResult<()> {
-        let tile = self.tile(&tile)?;
+    fn push(
+        &self,
+        py: Python<'_>,
+        tile: TileLike,
+        #[pyo3(from_py_with = whole)] spp: u64,
+        mean: Pixels<'_>,
+    ) -> PyResult<()> {
+        let tile = tile.of(self.grid)?;
         let pixels = self.batch(tile, &mean)?;
         self.attached(py)?.push(tile.index, spp, &pixels).map_err(Raise::raise)
     }
@@ -161,7 +159,7 @@ impl PySession {
     ///
     /// Raises BatchError if the tile does not exist.
     fn blocks(&self, py: Python<'_>, request: &PyRequest) -> PyResult<Option<PyBlocks>> {
-        let tile = self.tile(&TileLike::Index(request.tile.index))?;
+        let tile = TileLike::Tile(request.tile).of(self.grid)?;
         let request = Request { tile, first: request.first, spp: request.spp };
         Ok(self.attached(py)?.block_request(&request).map(PyBlocks))
     }
@@ -180,8 +178,14 @@ impl PySession {
     /// new samples are what it has more than the session.
     ///
     /// Raises SizeError, BatchError also if there are no new samples.
-    fn push_running(&self, py: Python<'_>, tile: TileLike<'_>, total: u64, mean: Pixels<'_>) -> PyResult<()> {
-        let tile = self.tile(&tile)?;
+    fn push_running(
+        &self,
+        py: Python<'_>,
+        tile: TileLike,
+        #[pyo3(from_py_with = whole)] total: u64,
+        mean: Pixels<'_>,
+    ) -> PyResult<()> {
+        let tile = tile.of(self.grid)?;
         let pixels = self.batch(tile, &mean)?;
         self.attached(py)?.push_running(tile.index, total, &pixels).map_err(Raise::raise)
     }
@@ -191,8 +195,13 @@ impl PySession {
     /// image: array of shape (height, width, 3), linear radiance.
     ///
     /// Raises SizeError if the shape is another, BatchError if spp is 0.
-    fn push_image(&self, py: Python<'_>, spp: u64, image: Pixels<'_>) -> PyResult<()> {
-        let (width, height, pixels) = pixels(&image, "image")?;
+    fn push_image(
+        &self,
+        py: Python<'_>,
+        #[pyo3(from_py_with = whole)] spp: u64,
+        image: Pixels<'_>,
+    ) -> PyResult<()> {
+        let (width, height, pixels) = image.get();
         if (width, height) != self.size() {
             let (w, h) = self.size();
             let message = format!("image has shape ({height}, {width}, 3), and the session ({h}, {w}, 3)");
@@ -233,8 +242,8 @@ impl PySession {
     /// The last verdict on a tile (a Tile or its number); None before the first.
     ///
     /// Raises BatchError if the tile does not exist.
-    fn verdict(&self, py: Python<'_>, tile: TileLike<'_>) -> PyResult<Option<PyVerdict>> {
-        let tile = self.tile(&tile)?;
+    fn verdict(&self, py: Python<'_>, tile: TileLike) -> PyResult<Option<PyVerdict>> {
+        let tile = tile.of(self.grid)?;
         Ok(self.attached(py)?.verdict(tile.index).map(|verdict| PyVerdict::new(tile, verdict)))
     }
 

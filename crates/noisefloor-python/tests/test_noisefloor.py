@@ -263,6 +263,8 @@ class Errors(unittest.TestCase):
     def test_every_error_is_typed_and_says_what_is_wrong(self):
         session = nf.Session(96, 80, params=PARAMS)
         black = np.zeros((EDGE, EDGE, 3), np.float32)
+        bytes_of = np.zeros((EDGE, EDGE, 3), np.uint8)
+        elsewhere = nf.Session(200, 80, params=PARAMS).requests()[4].tile
         cases = [
             (nf.SizeError, r"\(16, 32, 3\), and tile 0 is \(32, 32, 3\)", lambda: session.push(0, 1, black[:16])),
             (nf.SizeError, r"\(height, width, 3\) is needed", lambda: session.push(0, 1, black[..., :2])),
@@ -286,6 +288,21 @@ class Errors(unittest.TestCase):
             (nf.ParameterError, "nested", lambda: nf.judge(black, 8, black + 1, 8, samples="both")),
             (nf.SizeError, "reference", lambda: nf.metrics(black, black[:16])),
             (nf.PictureError, "not finite", lambda: nf.metrics(black + np.inf, black)),
+            (nf.SizeError, r"shape \(32, 32\); \(height, width, 3\)", lambda: session.push(0, 1, black[..., 0])),
+            (nf.SizeError, r"shape \(\)", lambda: nf.judge(3.0, 8, black, 8)),
+            (nf.ParameterError, "-3 is out of range", lambda: session.push(0, -3, black)),
+            (nf.ParameterError, "-5 is out of range", lambda: session.push_running(0, -5, black)),
+            (nf.ParameterError, "-8 is out of range", lambda: nf.Session(-8, 8)),
+            (nf.ParameterError, "out of range", lambda: nf.Params(max_spp=2**64)),
+            (nf.BatchError, "tile -1 does not exist", lambda: session.push(-1, 1, black)),
+            (nf.BatchError, "of another session: here it is", lambda: session.push(elsewhere, 1, black)),
+            (nf.PictureError, "dtype uint8 are no radiance", lambda: session.push(0, 1, bytes_of)),
+            (nf.PictureError, "dtype int64", lambda: session.push(0, 1, bytes_of.astype(int))),
+            (nf.PictureError, "dtype uint8", lambda: nf.metrics(bytes_of, bytes_of)),
+            (nf.PictureError, "dtype uint8", lambda: nf.judge(bytes_of, 8, bytes_of, 8)),
+            (nf.PictureError, "dtype <U5|dtype str", lambda: nf.metrics([[["black"] * 3]], black)),
+            (nf.PictureError, "1.5 is not sRGB", lambda: nf.metrics(black + 1.5, black, encoding="srgb")),
+            (nf.ParameterError, "no encoding", lambda: nf.metrics(black, black, encoding="rec709")),
         ]
         for kind, words, call in cases:
             with self.subTest(words):
@@ -293,10 +310,15 @@ class Errors(unittest.TestCase):
                     call()
         for name in ("Parameter", "Size", "Batch", "Model", "Criterion", "Checkpoint", "Picture"):
             self.assertTrue(issubclass(getattr(nf, name + "Error"), nf.Error))
-        for wrong in (lambda: session.push(-1, 1, black), lambda: session.push("0", 1, black),
-                      lambda: session.push(0, 1, "black"), lambda: nf.Session("8", 8)):
-            with self.assertRaises((TypeError, ValueError, OverflowError, nf.Error)):
+        for wrong in (lambda: session.push("0", 1, black), lambda: nf.Session("8", 8),
+                      lambda: session.push(0, 1.5, black)):
+            with self.assertRaises(TypeError):
                 wrong()
+
+    def test_values_are_written_as_python_reads_them(self):
+        for params in (nf.Params(), nf.Params(tone_mapping="srgb", exposure=2.5, schedule="every", blocks=16),
+                       nf.Params(white=3.0, audience=(0.5, 2.25), viewing="tv,distance=2")):
+            self.assertEqual(eval(repr(params), vars(nf)), params)
 
 
 class Pictures(unittest.TestCase):
@@ -309,6 +331,9 @@ class Pictures(unittest.TestCase):
         self.assertGreater(clean.verdicts[0].probability, seen.verdicts[0].probability)
         self.assertGreater(seen.verdicts[0].expected_spp, 20)
         self.assertEqual(seen.samples, "independent")
+        shown = [np.uint8(np.clip(noisy(seed, 20), 0, 1) ** (1 / 2.2) * 255) for seed in (1, 2)]
+        shown = nf.judge(shown[0], 20, shown[1], 20, samples="independent", params=params, encoding="srgb")
+        self.assertEqual([verdict.converged for verdict in shown.verdicts], [False, False])
         noise = seen.visible_noise()
         self.assertEqual((noise.shape, noise.dtype), ((64, 96), np.float32))
 
@@ -318,6 +343,13 @@ class Pictures(unittest.TestCase):
         self.assertAlmostEqual(found.rel_mse, 0.01 / 0.05, places=5)
         encode = lambda linear: 1.055 * linear ** (1 / 2.4) - 0.055
         self.assertAlmostEqual(found.psnr, -20 * np.log10(encode(0.3) - encode(0.2)), places=3)
+        # The same by what screens show: in 8 bits, in 16, and in floats
+        shown = [np.round(encode(value) * 255) for value in (0.3, 0.2)]
+        for dtype, white in ((np.uint8, 1), (np.uint16, 257), (np.float32, 1 / 255)):
+            eight = [np.full((16, 12, 3), value * white, dtype) for value in shown]
+            seen = nf.metrics(*eight, encoding="srgb")
+            self.assertAlmostEqual(seen.psnr, -20 * np.log10((shown[0] - shown[1]) / 255), places=3)
+            self.assertLess(seen.rel_mse, 0.21)
         worse = nf.metrics(noisy(1, 100), noisy(1, 1e8))
         self.assertLess(worse.cvvdp_jod, 9.9)
         self.assertEqual(worse.cvvdp_map().shape, (64, 96))

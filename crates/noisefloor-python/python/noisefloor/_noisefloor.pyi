@@ -21,6 +21,7 @@ class CheckpointError(Error): ...
 class PictureError(Error): ...
 
 _ToneMapping = Literal["reinhard", "srgb"]
+_Encoding = Literal["linear", "srgb"]
 
 @final
 class Viewing:
@@ -140,7 +141,6 @@ class Stop:
     @property
     def unfamiliar(self) -> bool: ...
 
-@final
 def check(
     render: Callable[[Tile, int, int], ArrayLike],
     width: int = 48,
@@ -150,6 +150,7 @@ def check(
     shared_pixels: bool = False,
 ) -> None: ...
 
+@final
 class Session:
     def __new__(
         cls,
@@ -223,6 +224,7 @@ def judge(
     samples: Literal["independent", "nested"] | None = None,
     oracle: Oracle | None = None,
     params: Params | None = None,
+    encoding: _Encoding = "linear",
 ) -> Judged: ...
 def metrics(
     image: ArrayLike,
@@ -233,4 +235,5 @@ def metrics(
     white: float | None = None,
     exposure: float = 1.0,
     viewing: Viewing | str | None = None,
+    encoding: _Encoding = "linear",
 ) -> Metrics: ...

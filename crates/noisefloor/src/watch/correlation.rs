@@ -13,8 +13,7 @@ pub(super) struct Correlation {
 }
 
 impl Correlation {
-    /// Adds the terms of one tile, as one term if its pixels share samples.
-    pub(super) fn of(pairs: impl Iterator<Item = (f64, f64)>, as_one: bool) -> Self {
+    pub(super) fn of(pairs: impl Iterator<Item = (f64, f64)>) -> Self {
         let mut all = Self::default();
         for (x, y) in pairs {
             let term = x * y;
@@ -22,9 +21,6 @@ impl Correlation {
             all.squares += term * term;
             all.left += x * x;
             all.right += y * y;
-        }
-        if as_one {
-            all.squares = all.sum * all.sum;
         }
         all
     }
@@ -45,6 +41,49 @@ impl Correlation {
     fn value(&self) -> f64 {
         let size = (self.left * self.right).sqrt();
         if size > 0.0 { self.sum / size } else { 0.0 }
+    }
+}
+
+/// How often two differences x and y have the same sign: Σ sign(xy)·√|xy|. The root keeps a few outliers, which
+/// most noise of renderers has, from hiding what all other pixels say.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Concordance {
+    sum: f64,
+    squares: f64,
+    sizes: f64,
+}
+
+impl Concordance {
+    /// Of one tile, as one term if its pixels share samples.
+    pub(super) fn of(pairs: impl Iterator<Item = (f64, f64)>, as_one: bool) -> Self {
+        let mut all = Self::default();
+        for (x, y) in pairs {
+            let product = x * y;
+            let size = product.abs().sqrt();
+            all.sum += size.copysign(product);
+            all.squares += size * size;
+            all.sizes += size;
+        }
+        if as_one {
+            all.squares = all.sum * all.sum;
+        }
+        all
+    }
+
+    pub(super) fn add(&mut self, more: &Self) {
+        self.sum += more.sum;
+        self.squares += more.squares;
+        self.sizes += more.sizes;
+    }
+
+    /// Standard errors from 0.
+    fn z(&self) -> f64 {
+        if self.squares > 0.0 { self.sum / self.squares.sqrt() } else { 0.0 }
+    }
+
+    /// −1…1: 1 if all signs agree.
+    fn value(&self) -> f64 {
+        if self.sizes > 0.0 { self.sum / self.sizes } else { 0.0 }
     }
 }
 
@@ -86,9 +125,9 @@ impl Energies {
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Sums {
     /// Of a − c and b − d.
-    pub(super) batches: Correlation,
+    pub(super) batches: Concordance,
     /// The same without what all pixels of a tile have in common.
-    pub(super) apart: Correlation,
+    pub(super) apart: Concordance,
     /// Of a − b and a + b − 2c.
     pub(super) nested: Correlation,
     /// Of a − b and the same one pixel beside.
@@ -120,9 +159,9 @@ impl Sums {
         if all > 0.0 { (sums / all).max(1.0).sqrt() } else { 1.0 }
     }
 
-    /// Standard errors of a correlation from 0, with care.
-    fn z(&self, correlation: &Correlation) -> f64 {
-        correlation.z() / self.widening()
+    /// Standard errors from 0, with care.
+    fn z(&self, of: &Concordance) -> f64 {
+        of.z() / self.widening()
     }
 
     /// The correlation of batches and its z: the smaller ones of all noise and of that which pixels have for
@@ -161,7 +200,10 @@ impl Sums {
         // With k times the energy in a, and as much in c as in b, it is (k − 1)/√((k + 1)(k + 5))
         let r = self.nested.value();
         let noise = (1.0 + 3.0 * r * r + r * (12.0 + 4.0 * r * r).sqrt()) / (1.0 - r * r);
-        if self.z(&self.nested).abs() > CERTAIN && !(1.0 / FACTOR..FACTOR).contains(&noise) {
+        if !shared
+            && self.nested.z().abs() / self.widening() > CERTAIN
+            && !(1.0 / FACTOR..FACTOR).contains(&noise)
+        {
             warnings.push(Warning::Noise(noise.max(0.0)));
         }
         let (z, beside) = (self.neighbours.z(), self.neighbours.value());

@@ -1,6 +1,6 @@
 //! Four successive batches of a tile against each other.
 
-use super::correlation::{Correlation, Sums};
+use super::correlation::{Concordance, Correlation, Sums};
 use super::values::Ends;
 
 /// Values that differ by less, relative to their size, are the same but for rounding.
@@ -85,7 +85,7 @@ fn pair(a: &Seen, b: &Seen) -> Sums {
     let difference = |place: usize| {
         a.light.iter().zip(&b.light).map(move |(a, b)| finite(f64::from(a[place]) - f64::from(b[place])))
     };
-    sums.neighbours = Correlation::of(difference(1).zip(difference(0)), false);
+    sums.neighbours = Correlation::of(difference(1).zip(difference(0)));
     for row in difference(1).collect::<Vec<_>>().chunks(4) {
         sums.rows[0] += row.iter().sum::<f64>().powi(2);
         sums.rows[1] += energy(row);
@@ -108,20 +108,20 @@ fn four([a, b, c, d]: [&Seen; 4], shared: bool, sums: &mut Sums) {
     let alike = |one: &Seen, other: &Seen| {
         one.spp <= other.spp.saturating_mul(ALIKE) && other.spp <= one.spp.saturating_mul(ALIKE)
     };
-    let correlation =
-        |x: &[f64], y: &[f64]| Correlation::of(x.iter().copied().zip(y.iter().copied()), shared);
+    let pairs = |x: Vec<f64>, y: Vec<f64>| x.into_iter().zip(y);
     if alike(a, c) && alike(b, d) {
         let (ac, bd) = (combined([1.0, 0.0, -1.0, 0.0]), combined([0.0, 1.0, 0.0, -1.0]));
-        sums.batches = correlation(&ac, &bd);
         let picture = combined([1.0; 4]);
-        sums.apart = correlation(&without_gain(&ac, &picture), &without_gain(&bd, &picture));
+        let apart = pairs(without_gain(&ac, &picture), without_gain(&bd, &picture));
+        sums.apart = Concordance::of(apart, shared);
+        sums.batches = Concordance::of(pairs(ac, bd), shared);
     }
     if a.spp != b.spp {
         return;
     }
     let ab = combined([1.0, -1.0, 0.0, 0.0]);
     if alike(b, c) {
-        sums.nested = correlation(&ab, &combined([1.0, 1.0, -2.0, 0.0]));
+        sums.nested = Correlation::of(ab.iter().copied().zip(combined([1.0, 1.0, -2.0, 0.0])));
     }
     if c.spp == d.spp && alike(a, c) {
         let energies = if a.spp == c.spp { &mut sums.steps } else { &mut sums.counts };

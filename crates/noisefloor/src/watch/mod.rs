@@ -27,9 +27,9 @@
 //!
 //! # How often chance alone says so
 //! If samples are independent and a and c have equal sizes, exchanging a pixel's a and c leaves everything
-//! as likely and changes the sign of its term t = (a − c)(b − d). Given all |t| the signs are fair coins, and
+//! as likely and changes the sign of its term t = ±√|(a − c)(b − d)|. Given all |t| the signs are fair coins, and
 //! z = Σt/√Σt² exceeds 6.5 with p < exp(−6.5²/2) = 7·10⁻¹⁰, however the noise is distributed (Hoeffding
-//! 1963). So it is for the other correlations. Sums are looked at once before each round of verdicts, over all
+//! 1963); the root keeps a few fireflies from hiding the rest. So it is for the other correlations. Sums are looked at once before each round of verdicts, over all
 //! groups so far and over the new ones alone: in 10,000 rounds, and with three correlations of two signs, by
 //! chance with p < 10⁻⁴. Three things are not exact and were measured instead (`tests/tests/it/watch.rs`): sizes
 //! may differ by a factor of 2. The z of batches has to be as large, and of the same sign, without what the noise
@@ -37,7 +37,7 @@
 //! divided by √R, where R is how much more energy the noise of four watched pixels in a row has in sum than
 //! in each. A source that says that its pixels share samples
 //! ([`PixelNoise::Shared`](crate::source::PixelNoise)) gives one term a tile. Certain is only what has, in
-//! addition, at least a fifth of the correlation that is possible; running means have 0.4 and more.
+//! addition, a correlation Σt/Σ|t| of at least a fifth; running means have 0.4 and more.
 //!
 //! # What is not noticed
 //! Faults in fewer than four batches of a tile, but for repeated ones. Pictures encoded for a screen in floating
@@ -162,7 +162,8 @@ pub enum Warning {
     Shared(f64),
     /// Whole tiles become brighter or darker.
     #[error(
-        "the brightness of whole tiles changes from batch to batch (correlation {0:.2}): if the scene changes, render          each state by itself; if a Markov chain does, say that pixels share samples"
+        "the brightness of whole tiles changes from batch to batch (correlation {0:.2}): if the scene changes, render \
+         each state by itself; if a Markov chain does, say that pixels share samples"
     )]
     Changing(f64),
     /// Batches complement each other.
