@@ -46,7 +46,7 @@ impl Schedule {
     /// early verdict is cheap, late samples are not.
     const APPROACH: f64 = 0.75;
 
-    fn step(self) -> u64 {
+    pub(crate) fn step(self) -> u64 {
         match self {
             Self::Every { step } | Self::Spaced { step } | Self::Growing { step } => step,
         }

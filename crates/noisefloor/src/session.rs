@@ -246,10 +246,15 @@ impl<C: StoppingCriterion> Session<C> {
             return Ok(Vec::new());
         }
         self.watch.look()?;
-        let (early, due_now): (Vec<Tile>, Vec<Tile>) =
-            due.iter().partition(|t| self.film.spp(t.index) < self.params.first_verdict());
+        let (first, doubts) = (self.params.first_verdict(), self.watch.doubts());
+        let (early, due_now): (Vec<Tile>, Vec<Tile>) = due.iter().partition(|t| {
+            let (spp, waits) = (self.film.spp(t.index), self.tiles[t.index].target.is_some());
+            spp < first || (doubts && !waits && spp < self.params.max_spp)
+        });
         for tile in early {
-            self.tiles[tile.index].next = self.params.first_verdict();
+            let spp = self.film.spp(tile.index);
+            let next = if spp < first { first } else { spp + self.params.schedule.step() };
+            self.tiles[tile.index].next = next.min(self.params.max_spp);
         }
         let (judged, waited): (Vec<Tile>, Vec<Tile>) =
             due_now.into_iter().partition(|t| self.tiles[t.index].target.is_none());

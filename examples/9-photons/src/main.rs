@@ -106,7 +106,12 @@ mod tests {
         (mean, lights.iter().map(|light| (light - mean).powi(2)).sum::<f64>() / (15.0 * 16.0))
     }
 
-    /// Not `check_source`, which takes the noise of pixels to be independent; here a line crosses many.
+    /// Lines cross many pixels, as the source says.
+    #[test]
+    fn nothing_is_wrong_with_its_samples() {
+        noisefloor_testkit::check_silence(Photons { width: 48, height: 40, rays: 20 }, 80);
+    }
+
     #[test]
     fn light_does_not_depend_on_how_it_is_asked_for() {
         let ((few, error), (many, other)) = (light(2), light(16));

@@ -1,11 +1,10 @@
 use crate::kit::usable;
-use crate::watch::check_silence;
 use noisefloor::{ProgressiveSource, Repeats, Request, Rgb, SourceError, Tile, TileGrid};
 use noisefloor_image::{RenderLayers, write_exr};
 use noisefloor_mitsuba::{RENDERER, Variant, notes, open_as};
 use noisefloor_ptwne::{Ptwne, RenderOptions, scenes};
 use noisefloor_sidecar::{Job, Sidecar};
-use noisefloor_testkit::{Requirement, check_source, require};
+use noisefloor_testkit::{Requirement, check_silence, check_source, require};
 #[cfg(target_os = "linux")]
 use noisefloor_testkit::{is_running, resident_kib};
 use std::collections::HashSet;

@@ -1,12 +1,11 @@
 use crate::kit::usable;
-use crate::watch::check_silence;
 use noisefloor::{Batch, ProgressiveSource, Request, Rgb, Tile, TileGrid};
 use noisefloor_luxcore::{Engine, Sampler};
 use noisefloor_ptwne::{Ptwne, RenderOptions, scenes};
 use noisefloor_sidecar::{Job, Sidecar, SidecarError};
-use noisefloor_testkit::check_source;
 #[cfg(target_os = "linux")]
 use noisefloor_testkit::resident_kib;
+use noisefloor_testkit::{check_silence, check_source};
 use std::path::PathBuf;
 
 /// The Cornell box in another renderer's format.

@@ -1,24 +1,10 @@
 //! Nothing is said of samples that are right.
 
 use crate::kit::Synthetic;
-use noisefloor::{Driver, FixedSpp, Params, ProgressiveSource, Request, Schedule, Tile, watch::Warning};
+use noisefloor::{ProgressiveSource, Request, Tile};
 use noisefloor_image::{RenderLayers, StackSource, write_exr};
 use noisefloor_ptwne::{Filter, Ptwne, RenderOptions, Sampling, scenes};
-
-/// Renders with a look after every 20 samples at least. Fails if anything is said but that a picture has one value
-/// everywhere, as two of the scenes do, or that batches complement each
-/// other, as those of one Sobol sequence do.
-pub(crate) fn check_silence(source: impl ProgressiveSource, spp: u64) {
-    let name = source.info().name;
-    let params = Params::default().with_tile(32).with_schedule(Schedule::Every { step: 20 }).with_min_spp(0);
-    let mut driver = Driver::new(source, FixedSpp(spp), params.with_max_spp(spp)).unwrap();
-    driver.run(|_, _| ()).unwrap_or_else(|error| panic!("{name}: {error}"));
-    let said = driver.session().warnings().iter();
-    let said: Vec<_> = said
-        .filter(|warning| !matches!(warning, Warning::Anticorrelated(_) | Warning::Constant(_)))
-        .collect();
-    assert!(said.is_empty(), "{name}: {said:?}");
-}
+use noisefloor_testkit::check_silence;
 
 /// Every scene that the renderer has, with each of its samplers and filters.
 #[test]

@@ -8,8 +8,10 @@ mod independence;
 mod probe;
 mod reference;
 mod rounding;
+mod silence;
 
 pub use reference::check_reference_is_free_of_noise;
+pub use silence::check_silence;
 
 use blocks::check_blocks;
 use distribution::{LONG, check_distribution};
@@ -74,7 +76,8 @@ const MOST_OF_A_RENDERER: usize = 8;
 /// signs are left to chance, and those are independent from pixel to pixel. Then z = Σxy/√Σ(xy)² exceeds 6
 /// with p ≤ 2·exp(−6²/2) = 3.1e-8, whatever the distribution (Hoeffding 1963). There are six such z, and
 /// three more of first hits, where there are any: p < 2.8e-7 then. The batches of a playback differ in size;
-/// for them this holds as far as z is normal. Where pixels share samples, the signs are those of whole tiles, in 64 batches instead of 4.
+/// for them this holds as far as z is normal. Where pixels share samples, the signs are those of whole tiles, in
+/// 64 batches instead of 4.
 ///
 /// *Distribution:* p < 1e-7 a source. The mean of a batch over its pixels, and the mean square of its
 /// deviations (in units of each pixel's standard deviation over all batches), are compared by Welch's t

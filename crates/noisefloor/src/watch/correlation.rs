@@ -3,6 +3,11 @@
 use super::values::{Ends, Values};
 use super::{CERTAIN, FACTOR, Fault, LEAST_VALUES, NOTABLE, STRONG, Warning};
 
+/// Share of (a − b)² from which a seems much noisier than b: three times.
+const MUCH: f64 = 0.5;
+/// Standard errors from which it is worth to wait: p < 5·10⁻⁵, and there is one look.
+const DOUBTFUL: f64 = 4.5;
+
 /// The correlation of two differences x and y, each of mean 0: Σxy with what it is measured by.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Correlation {
@@ -130,6 +135,10 @@ pub(super) struct Sums {
     pub(super) apart: Concordance,
     /// Of a − b and a + b − 2c.
     pub(super) nested: Correlation,
+    /// Of a − b and a + b less the same of its neighbours: is a noisier than b, by two batches alone?
+    pub(super) early: Concordance,
+    /// Σ(a − b)(a + b − neighbours) and Σ(a − b)² of the same.
+    pub(super) early_energies: [f64; 2],
     /// Of a − b and the same one pixel beside.
     pub(super) neighbours: Correlation,
     /// n·(a − b)² of sixteen watched pixels, and m·(c − d)².
@@ -146,6 +155,8 @@ impl Sums {
         self.batches.add(&more.batches);
         self.apart.add(&more.apart);
         self.nested.add(&more.nested);
+        self.early.add(&more.early);
+        self.early_energies.iter_mut().zip(more.early_energies).for_each(|(sum, more)| *sum += more);
         self.neighbours.add(&more.neighbours);
         self.counts.add(&more.counts);
         self.steps.add(&more.steps);
@@ -172,12 +183,25 @@ impl Sums {
         (smaller(self.z(&self.batches), self.z(&self.apart)), value)
     }
 
+    /// How many times the noise energy of b a seems to have, if that is much and no four batches say more yet. It
+    /// is 99 if b is a running mean, which has (a − b)(a + b) = (a − b)² on average.
+    pub(super) fn doubt(&self) -> Option<f64> {
+        let share = self.falling().filter(|_| self.batches.sizes == 0.0)?.min(0.98);
+        Some((1.0 + share) / (1.0 - share))
+    }
+
+    /// By which share of (a − b)² a is noisier than b, if by much.
+    fn falling(&self) -> Option<f64> {
+        let [falls, all] = self.early_energies;
+        Some(falls / all).filter(|&share| share > MUCH && self.z(&self.early) > DOUBTFUL)
+    }
+
     pub(super) fn fault(&self) -> Result<(), Fault> {
         let (z, correlation) = self.of_batches();
         if z < CERTAIN || correlation < STRONG {
             return Ok(());
         }
-        Err(if self.steps.ratio() > FACTOR {
+        Err(if self.steps.ratio() > FACTOR || self.falling().is_some() {
             Fault::Running { correlation }
         } else {
             Fault::Shared { correlation }

@@ -47,8 +47,8 @@ impl TileWatch {
     /// What the last batch says together with those before in its group.
     pub(super) fn compare(&mut self, shared: bool) -> Option<Sums> {
         let mut found = match &self.group[..] {
-            [a, b] => pair(a, b),
-            [_, _, c, d] => pair(c, d),
+            [a, b] => pair(a, b, shared),
+            [_, _, c, d] => pair(c, d, shared),
             _ => return None,
         };
         if let [a, b, c, d] = &self.group[..] {
@@ -77,7 +77,7 @@ fn is_same(one: &[[f32; 3]], other: &[[f32; 3]]) -> bool {
 }
 
 /// Two batches, one for each half.
-fn pair(a: &Seen, b: &Seen) -> Sums {
+fn pair(a: &Seen, b: &Seen, shared: bool) -> Sums {
     let mut sums = Sums::default();
     if a.spp != b.spp {
         return sums;
@@ -89,6 +89,18 @@ fn pair(a: &Seen, b: &Seen) -> Sums {
     for row in difference(1).collect::<Vec<_>>().chunks(4) {
         sums.rows[0] += row.iter().sum::<f64>().powi(2);
         sums.rows[1] += energy(row);
+    }
+    if !shared {
+        let falls = a.light.iter().zip(&b.light).map(|(a, b)| {
+            let [left, here, right] = std::array::from_fn(|place| f64::from(a[place]) + f64::from(b[place]));
+            finite(here - (left + right) / 2.0)
+        });
+        let pairs: Vec<(f64, f64)> = difference(1).zip(falls).collect();
+        sums.early_energies =
+            [pairs.iter().map(|(x, y)| x * y).sum(), pairs.iter().map(|(x, _)| x * x).sum()];
+        // Where the neighbours differ by much more than noise, it is the picture that says which is larger
+        let level = |(x, y): (f64, f64)| (x, y * (x / y).powi(2).min(1.0));
+        sums.early = Concordance::of(pairs.into_iter().map(level).filter(|pair| pair.1.is_finite()), false);
     }
     if a.spp >= MANY {
         sums.ends = a.light.iter().zip(&b.light).map(|(a, b)| Ends::of(a[1], b[1])).sum();

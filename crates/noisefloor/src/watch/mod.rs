@@ -7,8 +7,8 @@
 //! of a session that gives no fault are those of one that does not watch, to the bit.
 //!
 //! # What is watched
-//! One pixel in each square of 8×8 pixels and its two neighbours, in small pictures one in 4×4: what is farther
-//! apart than a pixel filter reaches counts as independent. Four successive batches a, b, c, d of a tile make a
+//! One pixel in each square of 8×8 pixels and its two neighbours, in small pictures one in 4×4, and four times as
+//! many in the first four batches: what is farther apart than a pixel filter reaches counts as independent. Four successive batches a, b, c, d of a tile make a
 //! *group*.
 //!
 //! | watched | from | says |
@@ -18,6 +18,7 @@
 //! | the same, while (c − d)² is smaller than (a − b)² | a group | [`Fault::Running`] |
 //! | the same, but only with what all pixels of a tile have in common | a group | [`Warning::Changing`] |
 //! | correlation of a − b with a + b − 2c: is a noisier than b? | a group | [`Warning::Noise`] |
+//! | the same with the neighbours in place of c, until there is a group | two batches | [`Warning::Noise`], and no tile stops before there is one |
 //! | (a − b)²·n against (c − d)²·m | a group | [`Warning::Counts`] |
 //! | correlation of a − b with itself one pixel beside | two batches | [`Warning::Neighbours`] |
 //! | values that are k/255, or the sRGB decoding of one | two batches | [`Fault::Quantised`] |
@@ -240,23 +241,22 @@ impl Watch {
         spp: u64,
         mean: &[Rgb],
     ) -> Result<(), Fault> {
-        let fault = |light| Fault::Light { tile: tile.index, light };
-        let seen = self.points.of(tile);
-        let watched = || seen.clone().map(|pixel| mean[pixel]);
         // The watched pixels first, and all only if those look wrong
-        if self.light.check_finite(watched()).is_err() {
-            self.light.check_finite(mean.iter().copied()).map_err(fault)?;
-        }
-        if self.light.check_sign(watched()).is_err() {
+        let Err(seen) = self.light.check_all(self.points.of(tile).map(|pixel| mean[pixel])) else {
+            return Ok(());
+        };
+        let checked = if matches!(seen, ImpossibleLight::NotFinite { .. }) {
+            self.light.check_all(mean.iter().copied())
+        } else {
+            // New samples may be differences of stored pictures: all that there are have to be light together
             let had = film.spp(tile.index) as f64;
             let (old, new) = (had / (had + spp as f64), spp as f64 / (had + spp as f64));
-            let all = tile.rows(self.grid.width()).flatten().zip(mean).map(|(pixel, new_mean)| {
+            self.light.check_all(tile.rows(self.grid.width()).flatten().zip(mean).map(|(pixel, new_mean)| {
                 let before = film.pixel(tile.index, pixel);
                 std::array::from_fn(|c| (f64::from(before[c]) * old + f64::from(new_mean[c]) * new) as f32)
-            });
-            self.light.check_sign(all).map_err(fault)?;
-        }
-        Ok(())
+            }))
+        };
+        checked.map_err(|light| Fault::Light { tile: tile.index, light })
     }
 
     /// Takes notice of a batch that was added.
@@ -268,11 +268,13 @@ impl Watch {
         if group >= DENSE && !group.is_multiple_of(4) {
             return;
         }
-        let pixels = self.points.of(tile);
-        if batch < 4 {
-            pixels.clone().for_each(|pixel| self.values.see(mean[pixel]));
+        let light = |pixel| points::light(mean, pixel);
+        if group == 0 {
+            self.points.of(tile).for_each(|pixel| self.values.see(mean[pixel]));
+            watch.see(spp, self.points.at_first(tile).map(light).collect());
+        } else {
+            watch.see(spp, self.points.of(tile).map(light).collect());
         }
-        watch.see(spp, pixels.map(|pixel| points::light(mean, pixel)).collect());
         if let Some(found) = watch.compare(self.shared) {
             self.sums.iter_mut().for_each(|sums| sums.add(&found));
         }
@@ -288,6 +290,7 @@ impl Watch {
             sums.fault()?;
         }
         let found = self.sums.iter().flat_map(|sums| sums.warnings(self.shared));
+        let found = found.chain(self.sums[0].doubt().map(Warning::Noise));
         let found: Vec<Warning> =
             found.chain(self.sums[0].clipped(&self.values)).chain(self.values.constant()).collect();
         for warning in found {
@@ -298,6 +301,11 @@ impl Watch {
         }
         self.sums[1] = Sums::default();
         Ok(())
+    }
+
+    /// Whether the first two batches look like running means, which four will show: nothing may stop till then.
+    pub(crate) fn doubts(&self) -> bool {
+        self.sums[0].doubt().is_some()
     }
 
     /// Whether half of the noisy tiles got a batch twice.

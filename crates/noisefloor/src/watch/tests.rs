@@ -108,6 +108,34 @@ fn mistakes_are_faults_before_a_tile_can_stop() {
     assert!(matches!(nan, (Some(Fault::Light { light: ImpossibleLight::NotFinite { .. }, .. }), 0, _)));
 }
 
+/// Two batches to a tile's first verdict are too few to be sure by; no tile stops before more have come.
+#[test]
+fn running_means_in_the_batches_asked_for_stop_no_tile() {
+    let params = Params { tile: 64, ..Params::default() };
+    let mut session = Session::new(EDGE, EDGE, crate::Oracle::bundled(), params).unwrap();
+    let (mut sum, mut had) = (vec![[0.0; 3]; EDGE * EDGE], 0);
+    let fault = (1..).find_map(|seed| {
+        let spp = session.requests()[0].spp;
+        sum = mixed(1.0, &sum, spp as f32, &batch(seed, spp));
+        had += spp;
+        for tile in session.film().grid().tiles().collect::<Vec<_>>() {
+            let mean =
+                tile.rows(EDGE).flat_map(|row| mixed(1.0 / had as f32, &sum[row.clone()], 0.0, &sum[row]));
+            session.push(tile.index, spp, &mean.collect::<Vec<_>>()).unwrap();
+        }
+        match session.judge() {
+            Ok(stops) => {
+                assert_eq!(stops, [], "{had}");
+                None
+            }
+            Err(error) => Some(error),
+        }
+    });
+    assert!(matches!(fault, Some(SessionError::Fault(Fault::Running { .. }))), "{fault:?}");
+    assert!(had <= 150, "{had}");
+    assert!(matches!(session.warnings(), [Warning::Noise(times)] if *times > 10.0));
+}
+
 #[test]
 fn overlapping_batches_and_changing_scenes_are_faults() {
     // Seeds count samples, and batches begin where the last was half done
