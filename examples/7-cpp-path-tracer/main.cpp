@@ -160,6 +160,15 @@ static void run(std::size_t width, std::size_t height, std::uint32_t blocks, con
         check(nf_session_judge(session, &done));
     }
 
+    // What is certainly wrong with samples was an error above; what is likely wrong is said here.
+    NfSampleCounts counts;
+    check(nf_session_sample_counts(session, &counts));
+    for (std::size_t i = 0; i < counts.warnings; ++i) {
+        char text[400];
+        check(nf_session_warning(session, i, text, sizeof text));
+        std::fprintf(stderr, "warning: %s\n", text);
+    }
+
     double samples = 0;
     std::vector<NfTileState> states(requests.size());
     check(nf_session_states(session, states.data(), states.size()));

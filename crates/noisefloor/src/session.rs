@@ -13,7 +13,7 @@ use crate::watch::{Fault, Warning, Watch};
 use thiserror::Error;
 
 mod stop;
-pub(crate) use stop::TileState;
+pub(crate) use stop::{Goal, TileState};
 pub use stop::{Interruption, Stop, StopReason};
 
 /// Why a session failed.
@@ -96,7 +96,8 @@ impl<C: StoppingCriterion> Session<C> {
         if params.blocks > 0 {
             (film, first) = (film.by_blocks(params.blocks)?, first.min(PILOT));
         }
-        let tile = TileState { next: first, streak: 0, verdict: None, target: None, stop: None };
+        let goal = Goal::Verdict { spp: first, streak: 0 };
+        let tile = TileState { goal, verdict: None, stop: None };
         let tiles = vec![tile; grid.len()];
         // Only an exposure by log-average depends on the picture, and has to wait for one
         let display = match params.tone_mapping {
@@ -199,8 +200,7 @@ impl<C: StoppingCriterion> Session<C> {
                 return None;
             }
             let first = self.film.spp(index);
-            let goal = state.target.unwrap_or(state.next);
-            let wanted = self.wanted(self.film.half_counts(index), goal);
+            let wanted = self.wanted(self.film.half_counts(index), state.goal.spp());
             Some(Request { tile: self.film.grid().tile(index), first, spp: wanted.max(1) })
         };
         self.tiles.iter().enumerate().filter_map(wish).collect()
@@ -248,16 +248,16 @@ impl<C: StoppingCriterion> Session<C> {
         self.watch.look()?;
         let (first, doubts) = (self.params.first_verdict(), self.watch.doubts());
         let (early, due_now): (Vec<Tile>, Vec<Tile>) = due.iter().partition(|t| {
-            let (spp, waits) = (self.film.spp(t.index), self.tiles[t.index].target.is_some());
-            spp < first || (doubts && !waits && spp < self.params.max_spp)
+            let (spp, for_verdict) = (self.film.spp(t.index), self.is_for_verdict(t));
+            spp < first || (doubts && for_verdict && spp < self.params.max_spp)
         });
         for tile in early {
             let spp = self.film.spp(tile.index);
             let next = if spp < first { first } else { spp + self.params.schedule.step() };
-            self.tiles[tile.index].next = next.min(self.params.max_spp);
+            self.tiles[tile.index].goal = Goal::Verdict { spp: next.min(self.params.max_spp), streak: 0 };
         }
         let (judged, waited): (Vec<Tile>, Vec<Tile>) =
-            due_now.into_iter().partition(|t| self.tiles[t.index].target.is_none());
+            due_now.into_iter().partition(|t| self.is_for_verdict(t));
 
         // Tiles that had converged for the trained audience have now what this audience wants.
         let mut stops: Vec<Stop> =
@@ -282,8 +282,11 @@ impl<C: StoppingCriterion> Session<C> {
     /// Whether a tile has what its next verdict needs.
     pub(crate) fn is_due(&self, index: usize) -> bool {
         let state = &self.tiles[index];
-        let goal = state.target.unwrap_or(state.next);
-        state.stop.is_none() && self.has_enough(self.film.half_counts(index), goal)
+        state.stop.is_none() && self.has_enough(self.film.half_counts(index), state.goal.spp())
+    }
+
+    fn is_for_verdict(&self, tile: &Tile) -> bool {
+        matches!(self.tiles[tile.index].goal, Goal::Verdict { .. })
     }
 
     /// Settles exposure and reference; false if it is too early.
@@ -315,21 +318,21 @@ impl<C: StoppingCriterion> Session<C> {
         // A less demanding audience has enough where the others are still expected to need more
         let content = audience.slope < 1.0 && expected.is_some_and(|need| need <= samples);
         let converged = verdict.converged || content;
-        state.streak = if converged { state.streak + 1 } else { 0 };
-        if state.streak >= consecutive {
-            let target = audience.samples(samples);
-            if target <= samples {
+        let streak = match state.goal {
+            Goal::Verdict { streak, .. } if converged => streak + 1,
+            _ => 0,
+        };
+        // Asked again about much the same samples, a criterion would say the same
+        let expected = expected.filter(|_| streak == 0);
+        state.goal = Goal::Verdict { spp: schedule.next(samples, expected, open).min(max_spp), streak };
+        if streak >= consecutive {
+            let wanted = audience.samples(samples);
+            if wanted <= samples {
                 return Some(self.stop(index, self.satisfied()));
             }
-            state.target = Some(target.min(max_spp).max(samples + 1));
+            state.goal = Goal::Audience { spp: wanted.min(max_spp).max(samples + 1) };
         }
-        if samples >= max_spp {
-            return Some(self.stop(index, StopReason::MaxSpp));
-        }
-        // Asked again about much the same samples, a criterion would say the same
-        let expected = expected.filter(|_| state.streak == 0);
-        state.next = schedule.next(samples, expected, open).min(max_spp);
-        None
+        (samples >= max_spp).then(|| self.stop(index, StopReason::MaxSpp))
     }
 
     /// Where a verdict like this expects the next ones to say "converged": for a less demanding audience sooner.
@@ -425,11 +428,12 @@ impl<C: StoppingCriterion> Session<C> {
         self.tiles.iter().enumerate().filter(|(_, state)| state.stop.is_none()).try_fold(
             0,
             |sum, (index, state)| {
-                let expected = match state.target {
-                    Some(target) => target,
-                    None => audience.samples(state.verdict?.expected_spp?),
+                let goal = match state.goal {
+                    Goal::Audience { spp } => spp,
+                    Goal::Verdict { spp, .. } => {
+                        audience.samples(state.verdict?.expected_spp?).clamp(spp.min(max), max)
+                    }
                 };
-                let goal = expected.clamp(state.next.min(max), max);
                 let pixels = self.film.grid().tile(index).pixels() as u64;
                 Some(sum + goal.saturating_sub(self.film.spp(index)) * pixels)
             },

@@ -245,9 +245,13 @@ fn what_does_not_hold_together_is_refused() {
     };
     assert!(!refused(&|_| ()));
     assert!(refused(&|c| c.tiles.to_mut().truncate(3)));
-    assert!(refused(&|c| c.tiles.to_mut()[0].streak = u32::MAX));
-    assert!(refused(&|c| c.tiles.to_mut()[0].next = u64::MAX));
-    assert!(refused(&|c| c.tiles.to_mut()[0].target = Some(u64::MAX)));
+    for goal in [
+        Goal::Verdict { spp: 40, streak: u32::MAX },
+        Goal::Verdict { spp: u64::MAX, streak: 0 },
+        Goal::Audience { spp: u64::MAX },
+    ] {
+        assert!(refused(&|c| c.tiles.to_mut()[0].goal = goal));
+    }
     assert!(refused(&|c| c.tiles.to_mut().swap(0, 1)));
     assert!(refused(&|c| c.display = Some(crate::ToneMapping::Srgb { exposure: f32::NAN }.settle(&[]))));
     assert!(refused(&|c| c.state = vec![1, 2, 3]));
