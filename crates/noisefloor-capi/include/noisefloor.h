@@ -19,7 +19,8 @@
 //
 // Pointers. A pointer that is NULL where it must not be is NF_STATUS_NULL_POINTER. Beside a pointer to an
 // array goes the number of its elements, which is checked. What cannot be checked: pointers must lead to as
-// many elements as said, or to one object. Text ends with a zero byte and is UTF-8. The library keeps no pointer after a call, and owns what it returns.
+// many elements as said, or to one object. Text ends with a zero byte and is UTF-8. The library keeps no pointer
+// after a call, and owns what it returns.
 //
 // Pictures are rows from the top, pixels from the left, three floats a pixel: linear red, green and blue with
 // the primaries of Rec. 709. Floats that are not finite do not count as samples.
