@@ -111,11 +111,9 @@ fn pair(a: &Seen, b: &Seen, shared: bool) -> Sums {
 /// A whole group.
 fn four([a, b, c, d]: [&Seen; 4], shared: bool, sums: &mut Sums) {
     let combined = |of: [f64; 4]| -> Vec<f64> {
-        let values = a.light.iter().zip(&b.light).zip(c.light.iter().zip(&d.light));
-        let combine = |((a, b), (c, d)): ((&[f32; 3], &[f32; 3]), (&[f32; 3], &[f32; 3]))| {
-            finite([a, b, c, d].iter().zip(of).map(|(light, of)| f64::from(light[1]) * of).sum())
-        };
-        values.map(combine).collect()
+        let at =
+            |i: usize| [a, b, c, d].iter().zip(of).map(|(seen, of)| f64::from(seen.light[i][1]) * of).sum();
+        (0..a.light.len()).map(|i| finite(at(i))).collect()
     };
     let alike = |one: &Seen, other: &Seen| {
         one.spp <= other.spp.saturating_mul(ALIKE) && other.spp <= one.spp.saturating_mul(ALIKE)
