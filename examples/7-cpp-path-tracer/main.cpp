@@ -130,10 +130,10 @@ static void run(std::size_t width, std::size_t height, std::uint32_t blocks, con
     params.blocks = blocks;
     NfOracle *oracle;
     check(nf_oracle_bundled(0.9f, &oracle));
-    std::unique_ptr<NfOracle, void (*)(NfOracle *)> oracle_owner(oracle, nf_oracle_free);
+    std::unique_ptr<NfOracle, NfStatus (*)(NfOracle *)> oracle_owner(oracle, nf_oracle_free);
     NfSession *session;
     check(nf_session_new(width, height, oracle, &params, &session));
-    std::unique_ptr<NfSession, void (*)(NfSession *)> session_owner(session, nf_session_free);
+    std::unique_ptr<NfSession, NfStatus (*)(NfSession *)> session_owner(session, nf_session_free);
 
     std::vector<NfRequest> requests(nf_session_tile_count(session));
     for (;;) {
@@ -158,6 +158,15 @@ static void run(std::size_t width, std::size_t height, std::uint32_t blocks, con
         for (std::thread &thread : threads) thread.join();
         if (failed) throw std::runtime_error("a tile could not be pushed");
         check(nf_session_judge(session, &done));
+    }
+
+    // What is certainly wrong with samples was an error above; what is likely wrong is said here.
+    NfSampleCounts counts;
+    check(nf_session_sample_counts(session, &counts));
+    for (std::size_t i = 0; i < counts.warnings; ++i) {
+        char text[400];
+        check(nf_session_warning(session, i, text, sizeof text));
+        std::fprintf(stderr, "warning: %s\n", text);
     }
 
     double samples = 0;

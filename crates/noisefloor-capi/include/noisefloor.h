@@ -10,15 +10,17 @@
 // answers NF_STATUS_INTERNAL from then on and can only be freed. A picture that there is no memory for is
 // NF_STATUS_MEMORY; where the system has not even a few megabytes left, the process ends.
 //
-// Threads. Any thread may call any function on any object at any time, except that nothing else may use an
-// object while it is freed, or after. Calls on one session take turns: pushes wait while nf_session_judge
-// runs. Judging uses all cores. Stops do not depend on the number of threads, but each tile has to get its
-// own batches in the same order for results to be the same to the bit.
+// Handles are numbers in the shape of pointers, each given once: one that was freed, or is of another kind, is
+// NF_STATUS_HANDLE. What is freed while another thread uses it ends when that call returns.
+//
+// Threads. Any thread may call any function on any object at any time. Calls on one session take turns: pushes
+// wait while nf_session_judge runs. Judging uses all cores. Stops do not depend on the number of threads, but
+// each tile has to get its own batches in the same order for results to be the same to the bit.
 //
 // Pointers. A pointer that is NULL where it must not be is NF_STATUS_NULL_POINTER. Beside a pointer to an
 // array goes the number of its elements, which is checked. What cannot be checked: pointers must lead to as
-// many elements as said, or to one object; handles must come from this library and not be freed yet. Text
-// ends with a zero byte and is UTF-8. The library keeps no pointer after a call, and owns what it returns.
+// many elements as said, or to one object. Text ends with a zero byte and is UTF-8. The library keeps no pointer
+// after a call, and owns what it returns.
 //
 // Pictures are rows from the top, pixels from the left, three floats a pixel: linear red, green and blue with
 // the primaries of Rec. 709. Floats that are not finite do not count as samples.
@@ -92,6 +94,11 @@ typedef enum {
     NF_STATUS_INTERNAL = 10,
     // There is not enough memory for the picture, or for work on all of it. The session is as it was.
     NF_STATUS_MEMORY = 11,
+    // Samples cannot be what they are said to be, such as a batch that contains the one before. No tile is done
+    // by them.
+    NF_STATUS_FAULT = 12,
+    // A handle that was freed, is of another kind, or does not come from this library.
+    NF_STATUS_HANDLE = 13,
 } NfStatus;
 
 // A trained model with the probability from which a tile counts as converged. It never changes, and any
@@ -200,6 +207,21 @@ typedef struct {
     bool unfamiliar;
 } NfTileState;
 
+// What samples were like that were pushed.
+typedef struct {
+    // Samples, over all pixels, that were left out because their batch was not finite.
+    uint64_t rejected;
+    // Samples, over all pixels, whose batch had negative luminance; since a resume.
+    uint64_t negative;
+    // Warnings: what is likely to be wrong with the samples, as of the last nf_session_judge. See
+    // nf_session_warning.
+    size_t warnings;
+} NfSampleCounts;
+
+// Renders the mean of spp new samples of each pixel of a tile, of which it has rendered first samples before:
+// mean has room for 3 * width * height floats of the tile. Returns 0, or anything else if it failed.
+typedef int32_t (*NfRender)(void *user, NfTile tile, uint64_t first, uint64_t spp, float *mean);
+
 #ifdef __cplusplus
 extern "C" {
 #endif // __cplusplus
@@ -220,8 +242,9 @@ NfStatus nf_oracle_bundled(float threshold,
 // As nf_oracle_bundled, with a model that "noisefloor-lab train" has written to a file.
 NfStatus nf_oracle_load(const char *path, float threshold, NfOracle **oracle);
 
-// Frees an oracle; sessions made from it do not need it. NULL is ignored.
-void nf_oracle_free(NfOracle *oracle);
+// Frees an oracle; sessions made from it do not need it. NULL is ignored, a second time is
+// NF_STATUS_HANDLE.
+NfStatus nf_oracle_free(NfOracle *oracle);
 
 // Fills in the defaults.
 NfStatus nf_params_default(NfParams *params);
@@ -235,8 +258,8 @@ NfStatus nf_session_new(size_t width,
                         const NfParams *params,
                         NfSession **session);
 
-// Frees a session. NULL is ignored.
-void nf_session_free(NfSession *session);
+// Frees a session, once calls on it have returned. NULL is ignored, a second time is NF_STATUS_HANDLE.
+NfStatus nf_session_free(NfSession *session);
 
 // The number of tiles; 0 if session is NULL.
 size_t nf_session_tile_count(const NfSession *session);
@@ -333,6 +356,21 @@ NfStatus nf_session_close_all(const NfSession *session, uint32_t reason);
 NfStatus nf_session_expected_samples(const NfSession *session,
                                      uint64_t *samples);
 
+// Counts samples that are not as they should be.
+NfStatus nf_session_sample_counts(const NfSession *session, NfSampleCounts *counts);
+
+// The text of a warning, 0 to NfSampleCounts.warnings - 1, in English, for people: cut to bytes - 1 bytes and
+// ended by a zero. 400 bytes hold any.
+NfStatus nf_session_warning(const NfSession *session,
+                            size_t index,
+                            char *text,
+                            size_t bytes);
+
+// Says whether neighbouring pixels have noise in common, by a pixel filter, a denoiser or a Markov chain: no
+// warning says so then.
+NfStatus nf_session_share_pixels(const NfSession *session,
+                                 bool shared);
+
 // The picture: the mean of all samples, floats = 3 * width * height of the image. Pixels without samples are
 // black.
 NfStatus nf_session_image(const NfSession *session,
@@ -358,6 +396,19 @@ NfStatus nf_session_save(const NfSession *session,
 NfStatus nf_session_resume(const NfSession *session,
                            const char *job,
                            const char *path);
+
+// Checks what sessions rely on: that samples of a renderer are new, independent of each other and, unless
+// shared_pixels is true, from pixel to pixel, and that their number means what it says. With repeats_samples,
+// also that they follow from pixel and sample number, however requests are cut. NF_STATUS_FAULT and
+// nf_last_error say what is wrong. render is called on this thread, some hundred times with tiles of 32 x 32
+// pixels; 48 x 40 pixels are enough, and several times over from first = 0, which must restart nothing unless
+// repeats_samples is true.
+NfStatus nf_check(NfRender render,
+                  void *user,
+                  size_t width,
+                  size_t height,
+                  bool repeats_samples,
+                  bool shared_pixels);
 
 #ifdef __cplusplus
 }  // extern "C"

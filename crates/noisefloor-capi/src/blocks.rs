@@ -1,6 +1,7 @@
 //! Samples block by block: what each block of a tile is to get, and the batches that come of it.
 
 use crate::border;
+use crate::handle;
 use crate::session::NfSession;
 use crate::status::{Failure, NfStatus, guard};
 use noisefloor::{
@@ -60,8 +61,7 @@ pub unsafe extern "C" fn nf_session_block_request(
     capacity: usize,
 ) -> NfStatus {
     guard(|| {
-        // SAFETY: promised by the caller.
-        let session = unsafe { border::object(session, "session") }?;
+        let session = handle::get(session)?;
         let area = session.tile(tile)?;
         let asked = asked(&*session.lock()?, area, spp)?;
         // SAFETY: promised by the caller.
@@ -96,8 +96,7 @@ pub unsafe extern "C" fn nf_session_push_blocks(
     floats: usize,
 ) -> NfStatus {
     guard(|| {
-        // SAFETY: promised by the caller.
-        let session = unsafe { border::object(session, "session") }?;
+        let session = handle::get(session)?;
         let area = session.tile(tile)?;
         // SAFETY: promised by the caller.
         let mean = unsafe { border::array(mean, floats, 3 * area.pixels(), "mean") }?;

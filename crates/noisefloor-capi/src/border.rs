@@ -6,7 +6,7 @@ use crate::status::{Failure, NfStatus};
 use noisefloor::TileGrid;
 use std::ffi::{CStr, c_char};
 
-fn check<T>(pointer: *const T, what: &str) -> Result<(), Failure> {
+pub(crate) fn check<T>(pointer: *const T, what: &str) -> Result<(), Failure> {
     if pointer.is_null() {
         return Err(Failure::new(NfStatus::NullPointer, format!("{what} is NULL")));
     }
@@ -79,7 +79,7 @@ fn expect(got: usize, wanted: usize, what: &str) -> Result<(), Failure> {
 /// One object.
 ///
 /// # Safety
-/// `pointer` leads to an object that is not freed during `'a`, if it is neither null nor misaligned.
+/// `pointer` leads to an object that nothing changes during `'a`, if it is neither null nor misaligned.
 pub(crate) unsafe fn object<'a, T>(pointer: *const T, what: &str) -> Result<&'a T, Failure> {
     check(pointer, what)?;
     // SAFETY: not null, aligned, and alive by the caller's promise.
@@ -96,33 +96,6 @@ pub(crate) unsafe fn write<T>(pointer: *mut T, value: T, what: &str) -> Result<(
     // nothing is dropped.
     unsafe { pointer.write(value) };
     Ok(())
-}
-
-/// Makes an object and gives it to the caller. A pointer that cannot be written is noticed before `make`
-/// runs.
-///
-/// # Safety
-/// As [`write`].
-pub(crate) unsafe fn give<T>(
-    pointer: *mut *mut T,
-    what: &str,
-    make: impl FnOnce() -> Result<T, Failure>,
-) -> Result<(), Failure> {
-    check(pointer, what)?;
-    let made = Box::into_raw(Box::new(make()?));
-    // SAFETY: as for this function.
-    unsafe { write(pointer, made, what) }
-}
-
-/// Takes back an object that [`give`] gave. Null is nothing to take.
-///
-/// # Safety
-/// `pointer` is null or comes from [`give`], and nobody uses it any more.
-pub(crate) unsafe fn take_back<T>(pointer: *mut T) {
-    if !pointer.is_null() {
-        // SAFETY: `give` made it of a box of this type, and it is taken back once by the caller's promise.
-        drop(unsafe { Box::from_raw(pointer) });
-    }
 }
 
 /// Text.

@@ -1,6 +1,7 @@
 //! Checkpoints in files.
 
 use crate::border;
+use crate::handle;
 use crate::session::NfSession;
 use crate::status::{Failure, NfStatus, guard};
 use noisefloor::{Checkpoint, Session};
@@ -22,8 +23,9 @@ pub unsafe extern "C" fn nf_session_save(
     path: *const c_char,
 ) -> NfStatus {
     guard(|| {
+        let session = handle::get(session)?;
         // SAFETY: promised by the caller.
-        let (session, job) = unsafe { (border::object(session, "session")?, border::text(job, "job")?) };
+        let job = unsafe { border::text(job, "job") }?;
         // SAFETY: promised by the caller.
         let path = Path::new(unsafe { border::text(path, "path") }?);
         let failed = |error: io::Error| Failure::new(NfStatus::Io, format!("{}: {error}", path.display()));
@@ -49,8 +51,9 @@ pub unsafe extern "C" fn nf_session_resume(
     path: *const c_char,
 ) -> NfStatus {
     guard(|| {
+        let session = handle::get(session)?;
         // SAFETY: promised by the caller.
-        let (session, job) = unsafe { (border::object(session, "session")?, border::text(job, "job")?) };
+        let job = unsafe { border::text(job, "job") }?;
         // SAFETY: promised by the caller.
         let path = unsafe { border::text(path, "path") }?;
         let file = File::open(path).map_err(|e| Failure::new(NfStatus::Io, format!("{path}: {e}")))?;

@@ -1,10 +1,12 @@
 //! Oracles.
 
 use crate::border;
+use crate::handle;
 use crate::status::{Failure, NfStatus, guard};
-use noisefloor::{Model, Oracle, Threshold};
+use noisefloor::{Model, Oracle, Threshold, model::ModelError};
 use std::ffi::c_char;
 use std::fs::File;
+use std::io;
 
 /// A trained model with the probability from which a tile counts as converged. It never changes, and any
 /// number of sessions can be made from it.
@@ -18,7 +20,7 @@ pub unsafe extern "C" fn nf_oracle_bundled(threshold: f32, oracle: *mut *mut NfO
     guard(|| {
         let make = || Ok(NfOracle(Oracle::new(Model::bundled(), Threshold::new(threshold)?)));
         // SAFETY: promised by the caller.
-        unsafe { border::give(oracle, "oracle", make) }
+        unsafe { handle::give(oracle, make) }
     })
 }
 
@@ -33,21 +35,21 @@ pub unsafe extern "C" fn nf_oracle_load(
         // SAFETY: promised by the caller.
         let path = unsafe { border::text(path, "path") }?;
         let make = || {
-            let file =
-                File::open(path).map_err(|error| Failure::new(NfStatus::Io, format!("{path}: {error}")))?;
-            Ok(NfOracle(Oracle::new(Model::read(file)?, Threshold::new(threshold)?)))
+            let failed = |error: io::Error| Failure::new(NfStatus::Io, format!("{path}: {error}"));
+            let model = Model::read(File::open(path).map_err(failed)?).map_err(|error| match error {
+                ModelError::Io(error) => failed(error), // also a folder, which can be opened
+                other => other.into(),
+            })?;
+            Ok(NfOracle(Oracle::new(model, Threshold::new(threshold)?)))
         };
         // SAFETY: promised by the caller.
-        unsafe { border::give(oracle, "oracle", make) }
+        unsafe { handle::give(oracle, make) }
     })
 }
 
-/// Frees an oracle; sessions made from it do not need it. NULL is ignored.
+/// Frees an oracle; sessions made from it do not need it. NULL is ignored, a second time is
+/// NF_STATUS_HANDLE.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn nf_oracle_free(oracle: *mut NfOracle) {
-    guard(|| {
-        // SAFETY: promised by the caller.
-        unsafe { border::take_back(oracle) };
-        Ok(())
-    });
+pub extern "C" fn nf_oracle_free(oracle: *mut NfOracle) -> NfStatus {
+    guard(|| handle::free(oracle))
 }

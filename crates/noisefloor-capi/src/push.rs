@@ -1,6 +1,7 @@
 //! Samples of the renderer.
 
 use crate::border;
+use crate::handle;
 use crate::session::NfSession;
 use crate::status::{Failure, NfStatus, guard};
 use noisefloor::Rgb;
@@ -16,8 +17,7 @@ pub unsafe extern "C" fn nf_session_push(
     floats: usize,
 ) -> NfStatus {
     guard(|| {
-        // SAFETY: promised by the caller.
-        let session = unsafe { border::object(session, "session") }?;
+        let session = handle::get(session)?;
         let wanted = 3 * session.tile(tile)?.pixels();
         // SAFETY: promised by the caller.
         let mean = unsafe { border::array(mean, floats, wanted, "mean") }?;
@@ -36,8 +36,7 @@ pub unsafe extern "C" fn nf_session_push_running(
     floats: usize,
 ) -> NfStatus {
     guard(|| {
-        // SAFETY: promised by the caller.
-        let session = unsafe { border::object(session, "session") }?;
+        let session = handle::get(session)?;
         let wanted = 3 * session.tile(tile)?.pixels();
         // SAFETY: promised by the caller.
         let mean = unsafe { border::array(mean, floats, wanted, "mean") }?;
@@ -58,8 +57,7 @@ pub unsafe extern "C" fn nf_session_push_image(
     channels: usize,
 ) -> NfStatus {
     guard(|| {
-        // SAFETY: promised by the caller.
-        let session = unsafe { border::object(session, "session") }?;
+        let session = handle::get(session)?;
         if !(3..=64).contains(&channels) {
             return Err(Failure::new(
                 NfStatus::Argument,

@@ -1,9 +1,11 @@
 //! What comes of a session: where its tiles stand, its picture, and the map of visible noise.
 
 use crate::border;
+use crate::handle;
 use crate::session::NfSession;
 use crate::status::{Failure, NfStatus, guard};
-use noisefloor::{StopReason, session::Interruption};
+use noisefloor::{StopReason, session::Interruption, source::PixelNoise};
+use std::ffi::c_char;
 
 /// The tile is open: it gets more samples.
 pub const NF_REASON_OPEN: u32 = 0;
@@ -61,8 +63,7 @@ pub unsafe extern "C" fn nf_session_states(
     capacity: usize,
 ) -> NfStatus {
     guard(|| {
-        // SAFETY: promised by the caller.
-        let session = unsafe { border::object(session, "session") }?;
+        let session = handle::get(session)?;
         // SAFETY: promised by the caller.
         let room = unsafe { border::array_mut(states, capacity, session.grid.len(), "states") }?;
         let locked = session.lock()?;
@@ -91,8 +92,7 @@ pub unsafe extern "C" fn nf_session_states(
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn nf_session_open_tiles(session: *const NfSession, open: *mut usize) -> NfStatus {
     guard(|| {
-        // SAFETY: promised by the caller.
-        let found = unsafe { border::object(session, "session") }?.lock()?.open_tiles();
+        let found = handle::get(session)?.lock()?.open_tiles();
         // SAFETY: promised by the caller.
         unsafe { border::write(open, found, "open") }
     })
@@ -100,10 +100,9 @@ pub unsafe extern "C" fn nf_session_open_tiles(session: *const NfSession, open: 
 
 /// Ends every open tile for NF_REASON_TIME_LIMIT, NF_REASON_CANCELLED or NF_REASON_FAILED.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn nf_session_close_all(session: *const NfSession, reason: u32) -> NfStatus {
+pub extern "C" fn nf_session_close_all(session: *const NfSession, reason: u32) -> NfStatus {
     guard(|| {
-        // SAFETY: promised by the caller.
-        let session = unsafe { border::object(session, "session") }?;
+        let session = handle::get(session)?;
         let reason = match reason {
             NF_REASON_TIME_LIMIT => Interruption::TimeLimit,
             NF_REASON_CANCELLED => Interruption::Cancelled,
@@ -126,12 +125,76 @@ pub unsafe extern "C" fn nf_session_expected_samples(
     samples: *mut u64,
 ) -> NfStatus {
     guard(|| {
-        // SAFETY: promised by the caller.
-        let expected = unsafe { border::object(session, "session") }?.lock()?.expected_samples_to_go();
+        let expected = handle::get(session)?.lock()?.expected_samples_to_go();
         let unknown = "there is a tile of which the oracle cannot yet say how many samples it needs";
         let expected = expected.ok_or_else(|| Failure::new(NfStatus::Unavailable, unknown))?;
         // SAFETY: promised by the caller.
         unsafe { border::write(samples, expected, "samples") }
+    })
+}
+
+/// What samples were like that were pushed.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct NfSampleCounts {
+    /// Samples, over all pixels, that were left out because their batch was not finite.
+    pub rejected: u64,
+    /// Samples, over all pixels, whose batch had negative luminance; since a resume.
+    pub negative: u64,
+    /// Warnings: what is likely to be wrong with the samples, as of the last nf_session_judge. See
+    /// nf_session_warning.
+    pub warnings: usize,
+}
+
+/// Counts samples that are not as they should be.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn nf_session_sample_counts(
+    session: *const NfSession,
+    counts: *mut NfSampleCounts,
+) -> NfStatus {
+    guard(|| {
+        let session = handle::get(session)?;
+        let session = session.lock()?;
+        let (rejected, negative) = (session.film().rejected(), session.negative_samples());
+        let found = NfSampleCounts { rejected, negative, warnings: session.warnings().len() };
+        // SAFETY: promised by the caller.
+        unsafe { border::write(counts, found, "counts") }
+    })
+}
+
+/// The text of a warning, 0 to NfSampleCounts.warnings - 1, in English, for people: cut to bytes - 1 bytes and
+/// ended by a zero. 400 bytes hold any.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn nf_session_warning(
+    session: *const NfSession,
+    index: usize,
+    text: *mut c_char,
+    bytes: usize,
+) -> NfStatus {
+    guard(|| {
+        let session = handle::get(session)?;
+        let session = session.lock()?;
+        // SAFETY: promised by the caller.
+        let room = unsafe { border::room(text, bytes, bytes.max(1), "text") }?;
+        let unknown = || Failure::new(NfStatus::Argument, format!("there is no warning {index}"));
+        let warning = session.warnings().get(index).ok_or_else(unknown)?.to_string();
+        let most = warning.len().min(room.len() - 1);
+        let cut = (0..=most).rev().find(|&n| warning.is_char_boundary(n)).unwrap_or(0);
+        for (place, byte) in room.iter_mut().zip(warning.as_bytes()[..cut].iter().chain([&0])) {
+            *place = *byte as c_char;
+        }
+        Ok(())
+    })
+}
+
+/// Says whether neighbouring pixels have noise in common, by a pixel filter, a denoiser or a Markov chain: no
+/// warning says so then.
+#[unsafe(no_mangle)]
+pub extern "C" fn nf_session_share_pixels(session: *const NfSession, shared: bool) -> NfStatus {
+    guard(|| {
+        let pixels = if shared { PixelNoise::Shared } else { PixelNoise::Independent };
+        handle::get(session)?.lock()?.set_pixels(pixels);
+        Ok(())
     })
 }
 
@@ -144,8 +207,7 @@ pub unsafe extern "C" fn nf_session_image(
     floats: usize,
 ) -> NfStatus {
     guard(|| {
-        // SAFETY: promised by the caller.
-        let session = unsafe { border::object(session, "session") }?;
+        let session = handle::get(session)?;
         let wanted = 3 * session.grid.width() * session.grid.height();
         // SAFETY: promised by the caller.
         let room = unsafe { border::array_mut(image, floats, wanted, "image") }?;
@@ -170,8 +232,7 @@ pub unsafe extern "C" fn nf_session_visible_noise(
     floats: usize,
 ) -> NfStatus {
     guard(|| {
-        // SAFETY: promised by the caller.
-        let session = unsafe { border::object(session, "session") }?;
+        let session = handle::get(session)?;
         let wanted = session.grid.width() * session.grid.height();
         // SAFETY: promised by the caller.
         let room = unsafe { border::array_mut(map, floats, wanted, "map") }?;

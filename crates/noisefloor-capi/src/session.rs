@@ -1,6 +1,7 @@
 //! Sessions: pushed samples in, stops out.
 
 use crate::border;
+use crate::handle;
 use crate::oracle::NfOracle;
 use crate::params::NfParams;
 use crate::status::{Failure, NfStatus, guard};
@@ -78,8 +79,7 @@ pub unsafe extern "C" fn nf_session_new(
     session: *mut *mut NfSession,
 ) -> NfStatus {
     guard(|| {
-        // SAFETY: promised by the caller.
-        let oracle = unsafe { border::object(oracle, "oracle") }?;
+        let oracle = handle::get(oracle)?;
         let params = if params.is_null() {
             Params::default()
         } else {
@@ -88,27 +88,22 @@ pub unsafe extern "C" fn nf_session_new(
         };
         let make = || Ok(NfSession::new(Session::new(width, height, oracle.0.clone(), params)?));
         // SAFETY: promised by the caller.
-        unsafe { border::give(session, "session", make) }
+        unsafe { handle::give(session, make) }
     })
 }
 
-/// Frees a session. NULL is ignored.
+/// Frees a session, once calls on it have returned. NULL is ignored, a second time is NF_STATUS_HANDLE.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn nf_session_free(session: *mut NfSession) {
-    guard(|| {
-        // SAFETY: promised by the caller.
-        unsafe { border::take_back(session) };
-        Ok(())
-    });
+pub extern "C" fn nf_session_free(session: *mut NfSession) -> NfStatus {
+    guard(|| handle::free(session))
 }
 
 /// The number of tiles; 0 if session is NULL.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn nf_session_tile_count(session: *const NfSession) -> usize {
+pub extern "C" fn nf_session_tile_count(session: *const NfSession) -> usize {
     let mut count = 0;
     guard(|| {
-        // SAFETY: promised by the caller.
-        count = unsafe { border::object(session, "session") }?.grid.len();
+        count = handle::get(session)?.grid.len();
         Ok(())
     });
     count
@@ -122,8 +117,7 @@ pub unsafe extern "C" fn nf_session_tile(
     tile: *mut NfTile,
 ) -> NfStatus {
     guard(|| {
-        // SAFETY: promised by the caller.
-        let found = unsafe { border::object(session, "session") }?.tile(index)?;
+        let found = handle::get(session)?.tile(index)?;
         // SAFETY: promised by the caller.
         unsafe { border::write(tile, found.into(), "tile") }
     })
@@ -139,8 +133,7 @@ pub unsafe extern "C" fn nf_session_requests(
     count: *mut usize,
 ) -> NfStatus {
     guard(|| {
-        // SAFETY: promised by the caller.
-        let session = unsafe { border::object(session, "session") }?;
+        let session = handle::get(session)?;
         // SAFETY: promised by the caller.
         let room = unsafe { border::array_mut(requests, capacity, session.grid.len(), "requests") }?;
         let wanted = session.lock()?.requests();
@@ -159,8 +152,7 @@ pub unsafe extern "C" fn nf_session_requests(
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn nf_session_judge(session: *const NfSession, newly_done: *mut usize) -> NfStatus {
     guard(|| {
-        // SAFETY: promised by the caller.
-        let session = unsafe { border::object(session, "session") }?;
+        let session = handle::get(session)?;
         // A picture to settle the exposure by, and what verdicts take beside
         border::memory(session.grid, 2 * size_of::<Rgb>())?;
         let stops = session.lock()?.judge()?;

@@ -37,6 +37,11 @@ pub enum NfStatus {
     Internal = 10,
     /// There is not enough memory for the picture, or for work on all of it. The session is as it was.
     Memory = 11,
+    /// Samples cannot be what they are said to be, such as a batch that contains the one before. No tile is done
+    /// by them.
+    Fault = 12,
+    /// A handle that was freed, is of another kind, or does not come from this library.
+    Handle = 13,
 }
 
 /// Why a call fails.
@@ -148,6 +153,7 @@ impl From<SessionError> for Failure {
             SessionError::Tile(error) => error.into(),
             SessionError::Film(error) => error.into(),
             SessionError::Criterion(error) => error.into(),
+            SessionError::Fault(fault) => Self::new(NfStatus::Fault, fault.to_string()),
             other => Self::new(NfStatus::Argument, other.to_string()),
         }
     }

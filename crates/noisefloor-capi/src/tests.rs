@@ -1,6 +1,7 @@
 //! The functions, called as C calls them.
 
 use crate::blocks::*;
+use crate::check::*;
 use crate::files::*;
 use crate::oracle::*;
 use crate::params::*;
@@ -9,7 +10,7 @@ use crate::results::*;
 use crate::session::*;
 use crate::status::*;
 use noisefloor::{Oracle, Params, Rgb, Session, Tile, criterion::CriterionError};
-use std::ffi::{CStr, CString};
+use std::ffi::{CStr, CString, c_void};
 use std::ptr::{null, null_mut};
 
 mod blocks;
@@ -39,8 +40,7 @@ unsafe impl Send for Handle {}
 
 impl Drop for Handle {
     fn drop(&mut self) {
-        // SAFETY: made by `session`, and freed once.
-        unsafe { nf_session_free(self.0) };
+        nf_session_free(self.0);
     }
 }
 
@@ -55,7 +55,7 @@ fn session(params: &NfParams) -> Handle {
             "{}",
             message()
         );
-        nf_oracle_free(oracle); // the session does not need it
+        assert_eq!(nf_oracle_free(oracle), NfStatus::Ok); // the session does not need it
     }
     Handle(session)
 }
@@ -226,8 +226,7 @@ fn every_pointer_may_be_null_and_none_is_followed_then() {
     let mean = [0.5_f32; 3 * EDGE * EDGE];
     // SAFETY: null pointers are checked for; all others lead to variables of this function.
     unsafe {
-        nf_oracle_free(null_mut());
-        nf_session_free(null_mut());
+        assert_eq!((nf_oracle_free(null_mut()), nf_session_free(null_mut())), (NfStatus::Ok, NfStatus::Ok));
         assert_eq!(nf_session_tile_count(null()), 0);
         let mut oracle = null_mut();
         let made = [
@@ -313,6 +312,7 @@ fn sizes_tiles_and_parameters_are_checked() {
         let mut oracle = null_mut();
         assert_eq!(nf_oracle_bundled(1.5, &mut oracle), Argument);
         assert_eq!(nf_oracle_load(c"/nowhere/at/all".as_ptr(), 0.9, &mut oracle), Io);
+        assert_eq!(nf_oracle_load(c"/".as_ptr(), 0.9, &mut oracle), Io);
         assert_eq!(nf_oracle_load(c"\xff".as_ptr(), 0.9, &mut oracle), Argument);
         let here = CString::new(concat!(env!("CARGO_MANIFEST_DIR"), "/src/tests.rs")).unwrap();
         assert_eq!(nf_oracle_load(here.as_ptr(), 0.9, &mut oracle), Model);
@@ -341,17 +341,138 @@ fn sizes_tiles_and_parameters_are_checked() {
 fn a_caller_can_end_all_tiles() {
     let session = session(&params());
     round(&session, 1);
-    // SAFETY: a living handle.
-    assert_eq!(unsafe { nf_session_close_all(session.0, NF_REASON_TIME_LIMIT) }, NfStatus::Ok);
+    assert_eq!(nf_session_close_all(session.0, NF_REASON_TIME_LIMIT), NfStatus::Ok);
     assert_eq!(open(&session), 0);
     assert!(states(&session).iter().any(|state| state.reason == NF_REASON_TIME_LIMIT));
+}
+
+/// Nothing is followed: not what was freed, nor what is no session, nor what no call has given.
+#[test]
+fn handles_that_are_wrong_are_errors() {
+    let living = session(&params());
+    let (mut oracle, mut count) = (null_mut(), 0);
+    // SAFETY: pointers to variables of this function.
+    unsafe {
+        assert_eq!(nf_oracle_bundled(0.9, &mut oracle), NfStatus::Ok);
+        assert_eq!(nf_session_judge(oracle.cast(), &mut count), NfStatus::Handle);
+        assert_eq!(message(), "session is a handle of something else");
+        assert_eq!(nf_session_new(8, 8, living.0.cast(), null(), &mut null_mut()), NfStatus::Handle);
+        let mut local = 0_u64;
+        assert_eq!(nf_session_judge((&raw mut local).cast(), &mut count), NfStatus::Handle);
+        assert_eq!(nf_session_tile_count(oracle.cast()), 0);
+    }
+    assert_eq!(nf_session_free(oracle.cast()), NfStatus::Handle);
+    assert_eq!((nf_oracle_free(oracle), nf_oracle_free(oracle)), (NfStatus::Ok, NfStatus::Handle));
+    assert_eq!(message(), "oracle is no handle of this library, or was freed");
+    assert_eq!(open(&living), 9);
+}
+
+/// A session that is freed while others work on it ends when they have.
+#[test]
+fn freeing_beside_other_calls_is_safe() {
+    for _ in 0..20 {
+        let session = session(&params());
+        let handle = &session;
+        std::thread::scope(|threads| {
+            for tile in 0..4 {
+                threads.spawn(move || {
+                    let mean = [0.5_f32; 3 * EDGE * EDGE];
+                    for _ in 0..50 {
+                        // SAFETY: an array of the size given.
+                        let status = unsafe { nf_session_push(handle.0, tile, 1, mean.as_ptr(), mean.len()) };
+                        assert!(matches!(status, NfStatus::Ok | NfStatus::Handle), "{status:?}");
+                    }
+                });
+            }
+            threads.spawn(move || assert_eq!(nf_session_free(handle.0), NfStatus::Ok));
+        });
+    }
+}
+
+/// Pushes two batches to every tile, and returns how the verdict ends.
+fn fed_with(session: &Handle, value: impl Fn(usize, Vec<f32>) -> Vec<f32>) -> NfStatus {
+    for batch in 0..2 {
+        for request in requests(session) {
+            let (tile, mean) =
+                (tile(request.tile), value(batch, render(tile(request.tile), batch as u64, 50)));
+            // SAFETY: a living handle, and an array of the size given.
+            let status = unsafe { nf_session_push(session.0, tile.index, 50, mean.as_ptr(), mean.len()) };
+            assert_eq!(status, NfStatus::Ok, "{}", message());
+        }
+    }
+    // SAFETY: a living handle.
+    unsafe { nf_session_judge(session.0, null_mut()) }
+}
+
+/// One seed for every batch is noticed by the next verdict; what is likely is text.
+#[test]
+fn wrong_samples_are_a_status_or_a_warning() {
+    let again = session(&params());
+    let first =
+        |_, mean: Vec<f32>| mean.iter().enumerate().map(|(i, _)| 0.5 + (i * i % 17) as f32 / 40.0).collect();
+    assert_eq!(fed_with(&again, first), NfStatus::Fault);
+    assert!(message().contains("the same batch twice"), "{}", message());
+
+    let constant = session(&params());
+    assert_eq!(fed_with(&constant, |_, mean| vec![0.25; mean.len()]), NfStatus::Ok);
+    let (mut counts, mut text) = (NfSampleCounts::default(), [0; 400]);
+    // SAFETY: a living handle, and variables of this function.
+    unsafe {
+        assert_eq!(nf_session_sample_counts(constant.0, &mut counts), NfStatus::Ok);
+        assert_eq!(counts, NfSampleCounts { rejected: 0, negative: 0, warnings: 1 });
+        assert_eq!(nf_session_warning(constant.0, 0, text.as_mut_ptr(), text.len()), NfStatus::Ok);
+        assert!(CStr::from_ptr(text.as_ptr()).to_str().unwrap().contains("is 0.25"));
+        assert_eq!(nf_session_warning(constant.0, 0, text.as_mut_ptr(), 6), NfStatus::Ok);
+        assert_eq!(CStr::from_ptr(text.as_ptr()), c"every");
+        assert_eq!(nf_session_warning(constant.0, 1, text.as_mut_ptr(), text.len()), NfStatus::Argument);
+    }
+
+    let dark = session(&params());
+    let lit = |_, mean: Vec<f32>| {
+        mean.chunks(3).flat_map(|p| if p[0] < 0.47 { [-0.001; 3] } else { [p[0]; 3] }).collect()
+    };
+    assert_eq!(fed_with(&dark, lit), NfStatus::Ok);
+    // SAFETY: a living handle, and a variable of this function.
+    assert_eq!(unsafe { nf_session_sample_counts(dark.0, &mut counts) }, NfStatus::Ok);
+    assert!(counts.negative > 0 && counts.negative.is_multiple_of(50), "{counts:?}");
+}
+
+/// As a renderer of C is: `user` says what it does wrong.
+unsafe extern "C" fn rendered(user: *mut c_void, of: NfTile, first: u64, spp: u64, mean: *mut f32) -> i32 {
+    // SAFETY: the test gives a number.
+    let wrong = unsafe { *user.cast::<u64>() };
+    if wrong == 2 {
+        return 5;
+    }
+    let mut sum = vec![0.0; 3 * tile(of).pixels()];
+    for sample in first..first + spp {
+        let sample = if wrong == 1 { sample - first } else { sample };
+        sum.iter_mut().zip(render(tile(of), sample, 1)).for_each(|(sum, new)| *sum += new / spp as f32);
+    }
+    // SAFETY: there is room for as many.
+    unsafe { mean.copy_from_nonoverlapping(sum.as_ptr(), sum.len()) };
+    0
+}
+
+#[test]
+fn renderers_are_checked() {
+    let check = |mut wrong: u64, repeats| {
+        // SAFETY: the function's own number.
+        unsafe { nf_check(Some(rendered), (&raw mut wrong).cast(), 48, 40, repeats, false) }
+    };
+    assert_eq!((check(0, true), check(0, false)), (NfStatus::Ok, NfStatus::Ok), "{}", message());
+    assert_eq!(check(1, true), NfStatus::Fault);
+    assert!(message().contains("how requests are cut"), "{}", message());
+    assert_eq!(check(2, false), NfStatus::Fault);
+    assert!(message().contains("it returned 5"), "{}", message());
+    // SAFETY: nothing is called.
+    assert_eq!(unsafe { nf_check(None, null_mut(), 48, 40, false, false) }, NfStatus::NullPointer);
 }
 
 #[test]
 fn a_panic_is_a_status_and_breaks_only_its_session() {
     let (broken, whole) = (session(&params()), session(&params()));
-    // SAFETY: a living handle.
-    let inside = unsafe { &*broken.0 };
+    let inside = crate::handle::get(broken.0.cast_const()).ok().unwrap();
     let status = guard(|| {
         let _locked = inside.lock()?;
         panic!("tile {} is odd", 7)

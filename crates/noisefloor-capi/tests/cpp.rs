@@ -101,7 +101,8 @@ fn the_header_is_plain_c() {
     let strict = ["-std=c99", "-pedantic", "-Wall", "-Wextra", "-Werror"];
     let (include, lib) = (prefix.join("include"), prefix.join("lib"));
     let mut compiler = Command::new("cc");
-    compiler.args(strict).arg(source).arg("-I").arg(include).arg("-L").arg(&lib).args(["-lnoisefloor", "-o"]);
-    run(compiler.arg(&binary));
-    run(Command::new(binary).env("LD_LIBRARY_PATH", lib));
+    compiler.args(strict).arg(source).arg("-I").arg(include).arg("-L").arg(&lib).arg("-lnoisefloor");
+    // As in the README: the program finds the library when it starts
+    run(compiler.arg(format!("-Wl,-rpath,{}", lib.display())).arg("-o").arg(&binary));
+    run(&mut Command::new(binary));
 }

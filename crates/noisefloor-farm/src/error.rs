@@ -1,8 +1,8 @@
 //! What can go wrong with shards and farms. Every message says what, where, and what to do.
 
 use noisefloor::{
-    SourceError, checkpoint::CheckpointError, criterion::CriterionError, film::FilmError, internal::Fault,
-    source::IdentityChange, tile::TileError,
+    SessionError, SourceError, checkpoint::CheckpointError, internal::Fault, source::IdentityChange,
+    tile::TileError,
 };
 use noisefloor_image::WriteError;
 use std::error::Error;
@@ -143,12 +143,9 @@ pub enum FarmError {
     /// The source failed.
     #[error(transparent)]
     Source(#[from] SourceError),
-    /// The criterion does not fit.
+    /// The criterion does not fit, or samples cannot be what they are said to be.
     #[error(transparent)]
-    Criterion(#[from] CriterionError),
-    /// A batch does not fit the film.
-    #[error(transparent)]
-    Film(#[from] FilmError),
+    Session(#[from] SessionError),
     /// The scene or the options have changed since the plan.
     #[error(
         "the frame is not the one that was planned: {0}; restore it, or plan the farm anew in another folder"

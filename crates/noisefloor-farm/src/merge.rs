@@ -124,7 +124,7 @@ impl ShardSet {
     /// complete: the steps of a [`Driver`](noisefloor::Driver). Repeated, it adds nothing.
     ///
     /// # Errors
-    /// [`FarmError::Criterion`] if the criterion does not fit.
+    /// [`FarmError::Session`] if the criterion does not fit.
     pub fn merge_into<C: StoppingCriterion>(
         &mut self,
         session: &mut Session<C>,

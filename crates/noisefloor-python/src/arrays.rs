@@ -1,29 +1,123 @@
 //! Between numpy arrays and slices of pixels.
 
-use crate::errors::SizeError;
-use noisefloor::Rgb;
+use crate::errors::{ParameterError, PictureError, SizeError};
+use noisefloor::{Rgb, display::srgb_decode};
 use numpy::ndarray::{Array2, Array3};
-use numpy::{AllowTypeChange, IntoPyArray, PyArray2, PyArray3, PyArrayLike3};
+use numpy::{IntoPyArray, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray3};
 use pyo3::prelude::*;
 use std::borrow::Cow;
 
-/// An array of shape (height, width, 3), or whatever numpy makes one of.
-pub(crate) type Pixels<'py> = PyArrayLike3<'py, f32, AllowTypeChange>;
+/// Linear radiance: an array of floats of shape (height, width, 3), or whatever numpy makes one of.
+pub(crate) struct Pixels<'py>(PyReadonlyArray3<'py, f32>);
 
-/// The pixels of an array, row-major; where they lie, if float32 and C-contiguous.
-pub(crate) fn pixels<'a>(array: &'a Pixels<'_>, what: &str) -> PyResult<(usize, usize, Cow<'a, [Rgb]>)> {
-    let view = array.as_array();
-    let (height, width, channels) = view.dim();
-    if channels != 3 {
-        let message =
-            format!("{what} has shape ({height}, {width}, {channels}); (height, width, 3) is needed");
-        return Err(SizeError::new_err(message));
+impl<'py> FromPyObject<'_, 'py> for Pixels<'py> {
+    type Error = PyErr;
+
+    fn extract(object: Borrowed<'_, 'py, PyAny>) -> PyResult<Self> {
+        let array = array(object)?;
+        let (kind, name) = dtype(&array)?;
+        if kind != 'f' {
+            let message = format!(
+                "pixels of dtype {name} are no radiance: pass linear floats, or to judge() and metrics() also \
+                 encoding=\"srgb\""
+            );
+            return Err(PictureError::new_err(message));
+        }
+        Ok(Self(floats(&array)?))
     }
-    let pixels = match array.as_slice() {
-        Ok(values) => Cow::Borrowed(values.as_chunks().0),
-        Err(_) => Cow::Owned(view.iter().copied().collect::<Vec<f32>>().as_chunks().0.to_vec()),
-    };
-    Ok((width, height, pixels))
+}
+
+impl Pixels<'_> {
+    /// (width, height), and the pixels row-major; where they lie, if float32 and C-contiguous.
+    pub(crate) fn get(&self) -> (usize, usize, Cow<'_, [Rgb]>) {
+        let view = self.0.as_array();
+        let (height, width, _) = view.dim();
+        let pixels = match self.0.as_slice() {
+            Ok(values) => Cow::Borrowed(values.as_chunks().0),
+            Err(_) => Cow::Owned(view.iter().copied().collect::<Vec<f32>>().as_chunks().0.to_vec()),
+        };
+        (width, height, pixels)
+    }
+}
+
+/// A copy of a finished picture, which nobody changes while the interpreter is released.
+pub(crate) struct Picture {
+    /// (width, height).
+    pub(crate) size: (usize, usize),
+    /// Linear radiance, row-major.
+    pub(crate) pixels: Vec<Rgb>,
+    /// Whether it is what a screen shows: no tone mapping then.
+    pub(crate) display_referred: bool,
+    /// Variance of the rounding of display values: step²/12.
+    pub(crate) rounding: f32,
+}
+
+impl Picture {
+    /// `encoding` is "linear" for floats, or "srgb" for floats from 0 to 1 and for 8 or 16 unsigned bits.
+    pub(crate) fn new(object: &Bound<'_, PyAny>, encoding: &str) -> PyResult<Self> {
+        match encoding {
+            "linear" => Ok(Self::of(&object.extract()?, 0.0, |value| value)),
+            "srgb" => Self::of_display(object),
+            _ => Err(ParameterError::new_err(format!(
+                "{encoding:?} is no encoding: use \"linear\" or \"srgb\""
+            ))),
+        }
+    }
+
+    fn of_display(object: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let array = array(object.as_borrowed())?;
+        let (white, step) = match dtype(&array)? {
+            ('f', _) => (1.0, 0.0),
+            ('u', name) if name == "uint8" => (255.0, 1.0 / 255.0),
+            ('u', name) if name == "uint16" => (65535.0, 1.0 / 65535.0),
+            (_, name) => {
+                return Err(PictureError::new_err(format!(
+                    "pixels of dtype {name} are not sRGB: pass uint8, uint16, or floats from 0 to 1"
+                )));
+            }
+        };
+        let pixels = Pixels(floats(&array)?);
+        if let Some(value) =
+            pixels.get().2.as_flattened().iter().find(|value| !(0.0..=white).contains(*value))
+        {
+            return Err(PictureError::new_err(format!(
+                "{value} is not sRGB, which lies within 0 and {white}"
+            )));
+        }
+        let rounding = step * step / 12.0;
+        Ok(Self { display_referred: true, ..Self::of(&pixels, rounding, |value| srgb_decode(value / white)) })
+    }
+
+    fn of(pixels: &Pixels<'_>, rounding: f32, decode: impl Fn(f32) -> f32) -> Self {
+        let (width, height, pixels) = pixels.get();
+        let pixels = pixels.iter().map(|pixel| pixel.map(&decode)).collect();
+        Self { size: (width, height), pixels, display_referred: false, rounding }
+    }
+}
+
+/// An array of shape (height, width, 3) of any type.
+fn array<'py>(object: Borrowed<'_, 'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+    let py = object.py();
+    let array = py.import("numpy")?.call_method1("asarray", (object,));
+    let array = array.map_err(|error| SizeError::new_err(format!("no array of pixels: {error}")))?;
+    let shape = array.getattr("shape")?;
+    match shape.extract::<Vec<usize>>()?[..] {
+        [_, _, 3] => Ok(array),
+        _ => Err(SizeError::new_err(format!("pixels have shape {shape}; (height, width, 3) is needed"))),
+    }
+}
+
+/// What numpy calls the kind of the elements, and their name.
+fn dtype(array: &Bound<'_, PyAny>) -> PyResult<(char, String)> {
+    let dtype = array.getattr("dtype")?;
+    Ok((dtype.getattr("kind")?.extract()?, dtype.getattr("name")?.extract()?))
+}
+
+fn floats<'py>(array: &Bound<'py, PyAny>) -> PyResult<PyReadonlyArray3<'py, f32>> {
+    let options = pyo3::types::PyDict::new(array.py());
+    options.set_item("copy", false)?;
+    let floats = array.call_method("astype", ("float32",), Some(&options))?;
+    Ok(floats.cast_into::<PyArray3<f32>>().map_err(PyErr::from)?.readonly())
 }
 
 /// A new array of shape (height, width, 3), made of pixels without copying them.

@@ -1,7 +1,8 @@
 //! Exceptions.
 
 use noisefloor_rivals::MetricError;
-use pyo3::exceptions::PyException;
+use pyo3::exceptions::{PyException, PyOverflowError};
+use pyo3::prelude::*;
 use pyo3::{PyErr, create_exception};
 use std::path::Path;
 
@@ -18,6 +19,12 @@ create_exception!(
     BatchError,
     Error,
     "A tile that does not exist, or a batch without new samples."
+);
+create_exception!(
+    noisefloor,
+    FaultError,
+    Error,
+    "Samples that cannot be what they are said to be, such as a batch that contains the one before."
 );
 create_exception!(noisefloor, ModelError, Error, "A model file is damaged, foreign, or of another version.");
 create_exception!(noisefloor, CriterionError, Error, "The model cannot judge this.");
@@ -59,6 +66,7 @@ impl Raise for noisefloor::SessionError {
             Self::Tile(error) => error.raise(),
             Self::Film(error) => error.raise(),
             Self::Criterion(error) => error.raise(),
+            Self::Fault(fault) => FaultError::new_err(fault.to_string()),
             other => ParameterError::new_err(other.to_string()),
         }
     }
@@ -67,4 +75,18 @@ impl Raise for noisefloor::SessionError {
 /// OSError, or the one of its subclasses that fits, with the name of the file.
 pub(crate) fn file_error(path: &Path, error: &std::io::Error) -> PyErr {
     std::io::Error::new(error.kind(), format!("{}: {error}", path.display())).into()
+}
+
+/// A whole number that is not below 0, nor larger than its type holds.
+pub(crate) fn whole<'py, T>(value: &Bound<'py, PyAny>) -> PyResult<T>
+where
+    T: for<'a> FromPyObject<'a, 'py, Error = PyErr>,
+{
+    value.extract::<T>().map_err(|error| {
+        if error.is_instance_of::<PyOverflowError>(value.py()) {
+            ParameterError::new_err(format!("{value} is out of range: a whole number from 0 on is needed"))
+        } else {
+            error
+        }
+    })
 }

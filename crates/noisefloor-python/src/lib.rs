@@ -4,6 +4,7 @@
 //! - `errors.rs`: one exception for each kind of error;
 //! - `arrays.rs`: between numpy and slices;
 //! - `params.rs`, `oracle.rs`, `verdicts.rs`, `session.rs`: the push session;
+//! - `check.rs`: the contract of a renderer;
 //! - `stills.rs`, `metrics.rs`: finished pictures;
 //! - `pool.rs`: threads that survive a fork.
 //!
@@ -11,6 +12,7 @@
 //! their own.
 
 mod arrays;
+mod check;
 mod errors;
 mod metrics;
 mod oracle;
@@ -25,9 +27,11 @@ use pyo3::prelude::*;
 #[pymodule]
 mod _noisefloor {
     #[pymodule_export]
+    use crate::check::check;
+    #[pymodule_export]
     use crate::errors::{
-        BatchError, CheckpointError, CriterionError, Error, ModelError, ParameterError, PictureError,
-        SizeError,
+        BatchError, CheckpointError, CriterionError, Error, FaultError, ModelError, ParameterError,
+        PictureError, SizeError,
     };
     #[pymodule_export]
     use crate::metrics::{PyMetrics, metrics};

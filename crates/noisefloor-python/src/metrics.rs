@@ -1,10 +1,10 @@
 //! Metrics of a picture against a reference.
 
-use crate::arrays::{Pixels, pixels, plane};
+use crate::arrays::{Picture, plane};
 use crate::errors::{Raise, SizeError};
 use crate::params::{ViewingLike, tone_mapping};
 use crate::pool;
-use noisefloor::{Rgb, Viewing, display::Display};
+use noisefloor::{ToneMapping, Viewing, display::Display};
 use noisefloor_rivals::metrics::{MetricMaps, MetricPair, MetricScores};
 use numpy::PyArray2;
 use pyo3::prelude::*;
@@ -60,7 +60,9 @@ impl PyMetrics {
     }
 }
 
-/// Compares a picture with a reference, both of shape (height, width, 3), linear radiance: a Metrics.
+/// Compares a picture with a reference, both of shape (height, width, 3): a Metrics.
+///
+/// encoding: "linear" for radiance in floats, "srgb" for what screens show: uint8, uint16, or floats from 0 to 1.
 ///
 /// Both are shown through one tone mapping ("reinhard" or "srgb"), settled for the reference; see Params.
 /// viewing is a Viewing or its text, for ColorVideoVDP; None is "desk". The interpreter's lock is released
@@ -69,43 +71,40 @@ impl PyMetrics {
 /// Raises SizeError, ParameterError, and PictureError if a value is not finite or the pictures are too small.
 #[pyfunction]
 #[pyo3(signature = (image, reference, *, tone_mapping = "reinhard", key = 0.18, white = None, exposure = 1.0,
-    viewing = None))]
+    viewing = None, encoding = "linear"))]
 #[expect(clippy::too_many_arguments, reason = "Python names them")]
 pub(crate) fn metrics(
     py: Python<'_>,
-    image: Pixels<'_>,
-    reference: Pixels<'_>,
+    image: &Bound<'_, PyAny>,
+    reference: &Bound<'_, PyAny>,
     tone_mapping: &str,
     key: f32,
     white: Option<f32>,
     exposure: f32,
     viewing: Option<ViewingLike>,
+    encoding: &str,
 ) -> PyResult<PyMetrics> {
     let tone = self::tone_mapping(tone_mapping, key, white, exposure)?;
     let viewing = ViewingLike::checked(viewing)?;
-    let (width, height, image) = pixels(&image, "image")?;
-    let (other_width, other_height, reference) = pixels(&reference, "reference")?;
-    if (width, height) != (other_width, other_height) {
-        let message = format!(
-            "image has shape ({height}, {width}, 3), and reference ({other_height}, {other_width}, 3)"
-        );
-        return Err(SizeError::new_err(message));
+    let (image, reference) = (Picture::new(image, encoding)?, Picture::new(reference, encoding)?);
+    if image.size != reference.size {
+        let [(w, h), (rw, rh)] = [image.size, reference.size];
+        return Err(SizeError::new_err(format!(
+            "image has shape ({h}, {w}, 3), and reference ({rh}, {rw}, 3)"
+        )));
     }
-    // Copies, so that nobody changes them while they are compared without the interpreter
-    let (image, reference) = (image.into_owned(), reference.into_owned());
-    py.detach(|| {
-        pool::run(|| measure((width, height), &image, &reference, &tone.settle(&reference), &viewing))
-    })
+    py.detach(|| pool::run(|| measure(&image, &reference, tone, &viewing)))
 }
 
 fn measure(
-    size: (usize, usize),
-    image: &[Rgb],
-    reference: &[Rgb],
-    display: &Display,
+    image: &Picture,
+    reference: &Picture,
+    tone: ToneMapping,
     viewing: &Viewing,
 ) -> PyResult<PyMetrics> {
-    let pair = MetricPair { size, image, reference, display, viewing };
+    let shown = if reference.display_referred { Display::SRGB } else { tone.settle(&reference.pixels) };
+    let (image, reference, size) = (&image.pixels, &reference.pixels, image.size);
+    let pair = MetricPair { size, image, reference, display: &shown, viewing };
     let (scores, maps) = pair.measure().map_err(Raise::raise)?;
     Ok(PyMetrics { scores, maps })
 }

@@ -1,6 +1,6 @@
 //! Parameters, unchecked until a session or a picture uses them, and viewing conditions.
 
-use crate::errors::{ParameterError, Raise};
+use crate::errors::{ParameterError, Raise, whole};
 use noisefloor::{Audience, Params, Schedule, ToneMapping, Viewing};
 use pyo3::prelude::*;
 
@@ -121,19 +121,19 @@ impl PyParams {
         audience = None, blocks = 0))]
     #[expect(clippy::too_many_arguments, reason = "Python names them")]
     fn new(
-        tile: usize,
+        #[pyo3(from_py_with = whole)] tile: usize,
         tone_mapping: &str,
         key: f32,
         white: Option<f32>,
         exposure: f32,
         viewing: Option<ViewingLike>,
         schedule: &str,
-        step: u64,
-        min_spp: u64,
-        max_spp: u64,
-        consecutive: u32,
+        #[pyo3(from_py_with = whole)] step: u64,
+        #[pyo3(from_py_with = whole)] min_spp: u64,
+        #[pyo3(from_py_with = whole)] max_spp: u64,
+        #[pyo3(from_py_with = whole)] consecutive: u32,
         audience: Option<(f64, f64)>,
-        blocks: usize,
+        #[pyo3(from_py_with = whole)] blocks: usize,
     ) -> PyResult<Self> {
         let schedule = match schedule {
             "every" => Schedule::Every { step },
@@ -183,6 +183,30 @@ impl PyParams {
     }
 
     fn __repr__(&self) -> String {
-        format!("{:?}", self.0)
+        let params = &self.0;
+        let tone = match params.tone_mapping {
+            ToneMapping::Reinhard { key, white: None } => format!("\"reinhard\", key={key}"),
+            ToneMapping::Reinhard { key, white: Some(white) } => {
+                format!("\"reinhard\", key={key}, white={white}")
+            }
+            ToneMapping::Srgb { exposure } => format!("\"srgb\", exposure={exposure}"),
+            other => format!("{other:?}"), // Python makes none
+        };
+        let (schedule, step) = match params.schedule {
+            Schedule::Every { step } => ("every", step),
+            Schedule::Spaced { step } => ("spaced", step),
+            Schedule::Growing { step } => ("growing", step),
+        };
+        let Audience { slope, offset } = params.audience;
+        format!(
+            "Params(tile={}, tone_mapping={tone}, viewing={:?}, schedule={schedule:?}, step={step}, min_spp={}, \
+             max_spp={}, consecutive={}, audience=({slope}, {offset}), blocks={})",
+            params.tile,
+            params.viewing.to_string(),
+            params.min_spp,
+            params.max_spp,
+            params.consecutive,
+            params.blocks
+        )
     }
 }

@@ -1,17 +1,20 @@
 //! The push session.
 
-use crate::arrays::{Pixels, picture, pixels, plane};
-use crate::errors::{BatchError, CheckpointError, Error, ParameterError, Raise, SizeError, file_error};
+use crate::arrays::{Pixels, picture, plane};
+use crate::errors::{CheckpointError, Error, ParameterError, Raise, SizeError, file_error, whole};
 use crate::oracle::PyOracle;
 use crate::params::PyParams;
 use crate::pool;
 use crate::verdicts::{PyBlocks, PyRequest, PyStop, PyVerdict, TileLike};
 use noisefloor::{
     Checkpoint, Oracle, Params, Request, Rgb, Session, StopReason, Tile, TileGrid, session::Interruption,
+    source::PixelNoise,
 };
 use numpy::{PyArray2, PyArray3};
+use pyo3::exceptions::PyUserWarning;
 use pyo3::prelude::*;
 use pyo3::sync::MutexExt;
+use std::ffi::CString;
 use std::fs::File;
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
@@ -21,6 +24,8 @@ use std::sync::{Mutex, MutexGuard};
 ///
 /// width, height: of the picture in pixels, each up to 65536, 2**28 in all. It takes 36 bytes a pixel.
 /// oracle: an Oracle; None is Oracle(). params: a Params; None is Params().
+/// shared_pixels: whether neighbouring pixels have noise in common, by a pixel filter, a denoiser or a Markov
+///     chain: no warning says so then.
 ///
 /// Threads may call any method at any time; calls take turns. The interpreter's lock is released while
 /// judging.
@@ -57,17 +62,9 @@ impl PySession {
         (self.grid.width(), self.grid.height())
     }
 
-    fn tile(&self, tile: &TileLike<'_>) -> PyResult<Tile> {
-        let (index, all) = (tile.index(), self.grid.len());
-        if index < all {
-            return Ok(self.grid.tile(index));
-        }
-        Err(BatchError::new_err(format!("tile {index} does not exist: there are {all}")))
-    }
-
     /// Checks the shape of a batch.
     fn batch<'a>(&self, tile: Tile, mean: &'a Pixels<'_>) -> PyResult<std::borrow::Cow<'a, [Rgb]>> {
-        let (width, height, pixels) = pixels(mean, "mean")?;
+        let (width, height, pixels) = mean.get();
         if (width, height) != (tile.width, tile.height) {
             let Tile { index, width: w, height: h, .. } = tile;
             let message = format!("mean has shape ({height}, {width}, 3), and tile {index} is ({h}, {w}, 3)");
@@ -91,16 +88,20 @@ impl PySession {
 #[pymethods]
 impl PySession {
     #[new]
-    #[pyo3(signature = (width, height, oracle = None, params = None))]
+    #[pyo3(signature = (width, height, oracle = None, params = None, shared_pixels = false))]
     fn new(
-        width: usize,
-        height: usize,
+        #[pyo3(from_py_with = whole)] width: usize,
+        #[pyo3(from_py_with = whole)] height: usize,
         oracle: Option<PyRef<'_, PyOracle>>,
         params: Option<PyParams>,
+        shared_pixels: bool,
     ) -> PyResult<Self> {
         let oracle = oracle.map_or_else(Oracle::bundled, |oracle| oracle.0.clone());
         let params = params.map_or_else(Params::default, |params| params.0);
-        let session = Session::new(width, height, oracle, params).map_err(Raise::raise)?;
+        let mut session = Session::new(width, height, oracle, params).map_err(Raise::raise)?;
+        if shared_pixels {
+            session.set_pixels(PixelNoise::Shared);
+        }
         Ok(Self { grid: session.film().grid(), session: Mutex::new(session) })
     }
 
@@ -140,8 +141,14 @@ impl PySession {
     ///     as samples. Tiles that are done accept samples, too: they improve, and stay done.
     ///
     /// Raises SizeError if the shape is another, BatchError if the tile does not exist or spp is 0.
-    fn push(&self, py: Python<'_>, tile: TileLike<'_>, spp: u64, mean: Pixels<'_>) -> PyResult<()> {
-        let tile = self.tile(&tile)?;
+    fn push(
+        &self,
+        py: Python<'_>,
+        tile: TileLike,
+        #[pyo3(from_py_with = whole)] spp: u64,
+        mean: Pixels<'_>,
+    ) -> PyResult<()> {
+        let tile = tile.of(self.grid)?;
         let pixels = self.batch(tile, &mean)?;
         self.attached(py)?.push(tile.index, spp, &pixels).map_err(Raise::raise)
     }
@@ -152,7 +159,7 @@ impl PySession {
     ///
     /// Raises BatchError if the tile does not exist.
     fn blocks(&self, py: Python<'_>, request: &PyRequest) -> PyResult<Option<PyBlocks>> {
-        let tile = self.tile(&TileLike::Index(request.tile.index))?;
+        let tile = TileLike::Tile(request.tile).of(self.grid)?;
         let request = Request { tile, first: request.first, spp: request.spp };
         Ok(self.attached(py)?.block_request(&request).map(PyBlocks))
     }
@@ -171,8 +178,14 @@ impl PySession {
     /// new samples are what it has more than the session.
     ///
     /// Raises SizeError, BatchError also if there are no new samples.
-    fn push_running(&self, py: Python<'_>, tile: TileLike<'_>, total: u64, mean: Pixels<'_>) -> PyResult<()> {
-        let tile = self.tile(&tile)?;
+    fn push_running(
+        &self,
+        py: Python<'_>,
+        tile: TileLike,
+        #[pyo3(from_py_with = whole)] total: u64,
+        mean: Pixels<'_>,
+    ) -> PyResult<()> {
+        let tile = tile.of(self.grid)?;
         let pixels = self.batch(tile, &mean)?;
         self.attached(py)?.push_running(tile.index, total, &pixels).map_err(Raise::raise)
     }
@@ -182,8 +195,13 @@ impl PySession {
     /// image: array of shape (height, width, 3), linear radiance.
     ///
     /// Raises SizeError if the shape is another, BatchError if spp is 0.
-    fn push_image(&self, py: Python<'_>, spp: u64, image: Pixels<'_>) -> PyResult<()> {
-        let (width, height, pixels) = pixels(&image, "image")?;
+    fn push_image(
+        &self,
+        py: Python<'_>,
+        #[pyo3(from_py_with = whole)] spp: u64,
+        image: Pixels<'_>,
+    ) -> PyResult<()> {
+        let (width, height, pixels) = image.get();
         if (width, height) != self.size() {
             let (w, h) = self.size();
             let message = format!("image has shape ({height}, {width}, 3), and the session ({h}, {w}, 3)");
@@ -201,9 +219,18 @@ impl PySession {
     ///
     /// The first verdicts wait until every open tile has samples, unless tone_mapping is "srgb".
     ///
-    /// Raises CriterionError if the model cannot judge these tiles.
+    /// Warns of samples that are likely to be wrong, each kind once. Raises FaultError if they cannot be what
+    /// they are said to be: no tile is done then. Raises CriterionError if the model cannot judge these tiles.
     fn judge(&self, py: Python<'_>) -> PyResult<Vec<PyStop>> {
-        let stops = self.detached(py, |session| session.judge())?.map_err(Raise::raise)?;
+        let judge = |session: &mut Session<Oracle>| {
+            let known = session.warnings().len();
+            session.judge().map(|stops| (stops, session.warnings()[known..].to_vec()))
+        };
+        let (stops, warnings) = self.detached(py, judge)?.map_err(Raise::raise)?;
+        for warning in warnings {
+            let text = CString::new(warning.to_string()).unwrap_or_default();
+            PyErr::warn(py, &py.get_type::<PyUserWarning>(), &text, 1)?;
+        }
         Ok(stops.into_iter().map(PyStop::from).collect())
     }
 
@@ -215,8 +242,8 @@ impl PySession {
     /// The last verdict on a tile (a Tile or its number); None before the first.
     ///
     /// Raises BatchError if the tile does not exist.
-    fn verdict(&self, py: Python<'_>, tile: TileLike<'_>) -> PyResult<Option<PyVerdict>> {
-        let tile = self.tile(&tile)?;
+    fn verdict(&self, py: Python<'_>, tile: TileLike) -> PyResult<Option<PyVerdict>> {
+        let tile = tile.of(self.grid)?;
         Ok(self.attached(py)?.verdict(tile.index).map(|verdict| PyVerdict::new(tile, verdict)))
     }
 
@@ -229,6 +256,24 @@ impl PySession {
         let unknown = || ParameterError::new_err(format!("{reason:?} is no reason to end tiles"));
         let reason = found.ok_or_else(unknown)?;
         Ok(self.attached(py)?.close_all(reason).into_iter().map(PyStop::from).collect())
+    }
+
+    /// What is likely to be wrong with the samples pushed so far, as of the last judge(): a list of str.
+    #[getter]
+    fn warnings(&self, py: Python<'_>) -> PyResult<Vec<String>> {
+        Ok(self.attached(py)?.warnings().iter().map(ToString::to_string).collect())
+    }
+
+    /// Samples, over all pixels, that were left out because their batch was not finite.
+    #[getter]
+    fn rejected_samples(&self, py: Python<'_>) -> PyResult<u64> {
+        Ok(self.attached(py)?.film().rejected())
+    }
+
+    /// Samples, over all pixels, whose batch had negative luminance; since a resume.
+    #[getter]
+    fn negative_samples(&self, py: Python<'_>) -> PyResult<u64> {
+        Ok(self.attached(py)?.negative_samples())
     }
 
     /// Samples still to be taken, over all pixels, as the oracle expects; None while it cannot tell for a

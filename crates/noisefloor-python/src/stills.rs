@@ -1,6 +1,6 @@
 //! Finished pictures.
 
-use crate::arrays::{Pixels, pixels, plane};
+use crate::arrays::{Picture, plane};
 use crate::errors::{CriterionError, ParameterError, PictureError, Raise};
 use crate::oracle::PyOracle;
 use crate::params::PyParams;
@@ -49,7 +49,8 @@ impl PyJudged {
 
 /// Judges a picture by another rendering of the same view: a Judged with a verdict for each tile.
 ///
-/// image: array of shape (height, width, 3), linear radiance, all finite. spp: its samples per pixel, above
+/// image: array of shape (height, width, 3), all finite. encoding: "linear" for radiance in floats, "srgb" for what
+///     screens show: uint8, uint16, or floats from 0 to 1; tone mapping is left out then. spp: its samples per pixel, above
 /// 0. against: another rendering, of the same shape; against_spp: its samples per pixel. samples:
 /// "independent" (different seeds), "nested" (two stages of one rendering), or None: recognised from the
 ///     pictures, where they show it.
@@ -59,17 +60,19 @@ impl PyJudged {
 ///
 /// Raises SizeError, ParameterError, CriterionError, and PictureError if the pictures cannot be judged.
 #[pyfunction]
-#[pyo3(signature = (image, spp, against, against_spp, *, samples = None, oracle = None, params = None))]
+#[pyo3(signature = (image, spp, against, against_spp, *, samples = None, oracle = None, params = None,
+    encoding = "linear"))]
 #[expect(clippy::too_many_arguments, reason = "Python names them")]
 pub(crate) fn judge(
     py: Python<'_>,
-    image: Pixels<'_>,
+    image: &Bound<'_, PyAny>,
     spp: f64,
-    against: Pixels<'_>,
+    against: &Bound<'_, PyAny>,
     against_spp: f64,
     samples: Option<&str>,
     oracle: Option<PyRef<'_, PyOracle>>,
     params: Option<PyParams>,
+    encoding: &str,
 ) -> PyResult<PyJudged> {
     let samples = match samples {
         None => None,
@@ -82,16 +85,14 @@ pub(crate) fn judge(
     };
     let oracle = oracle.map_or_else(Oracle::bundled, |oracle| oracle.0.clone());
     let params = params.map_or_else(Params::default, |params| params.0);
-    let (image, other) = (still(&image, spp, "image")?, still(&against, against_spp, "against")?);
+    let still = |array, spp, what| still(Picture::new(array, encoding)?, spp, what);
+    let (image, other) = (still(image, spp, "image")?, still(against, against_spp, "against")?);
     py.detach(|| pool::run(|| judge_still(&oracle, &params, &image, &other, samples)))
 }
 
-/// A copy, so that nobody changes it while it is judged without the interpreter.
-fn still(array: &Pixels<'_>, spp: f64, what: &str) -> PyResult<Still> {
-    let (width, height, pixels) = pixels(array, what)?;
-    let pixels = pixels.into_owned();
-    let still =
-        Still { size: (width, height), pixels, spp, display_referred: false, rounding: 0.0, origin: None };
+fn still(picture: Picture, spp: f64, what: &str) -> PyResult<Still> {
+    let Picture { size, pixels, display_referred, rounding } = picture;
+    let still = Still { size, pixels, spp, display_referred, rounding, origin: None };
     still.check().map_err(|error| PictureError::new_err(format!("{what}: {error}")))?;
     Ok(still)
 }

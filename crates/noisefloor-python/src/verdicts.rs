@@ -1,11 +1,13 @@
 //! What a session says: tiles, requests, verdicts, stops.
 
 use crate::arrays::plane;
+use crate::errors::BatchError;
 use noisefloor::{
-    Request, Stop, Tile, Verdict,
+    Request, Stop, Tile, TileGrid, Verdict,
     source::{BlockRequest, BlockSamples},
 };
 use numpy::PyArray2;
+use pyo3::exceptions::PyOverflowError;
 use pyo3::prelude::*;
 
 /// A rectangle of pixels that stops as a whole.
@@ -48,17 +50,52 @@ impl From<Tile> for PyTile {
 }
 
 /// A tile, or its number.
-#[derive(FromPyObject)]
-pub(crate) enum TileLike<'py> {
+pub(crate) enum TileLike {
     Index(usize),
-    Tile(PyRef<'py, PyTile>),
+    Tile(PyTile),
 }
 
-impl TileLike<'_> {
-    pub(crate) fn index(&self) -> usize {
+impl<'py> FromPyObject<'_, 'py> for TileLike {
+    type Error = PyErr;
+
+    fn extract(object: Borrowed<'_, 'py, PyAny>) -> PyResult<Self> {
+        if let Ok(tile) = object.cast::<PyTile>() {
+            return Ok(Self::Tile(*tile.get()));
+        }
+        object.extract::<usize>().map(Self::Index).map_err(|error| {
+            if error.is_instance_of::<PyOverflowError>(object.py()) {
+                BatchError::new_err(format!(
+                    "tile {} does not exist: they are counted from 0",
+                    object.to_owned()
+                ))
+            } else {
+                error
+            }
+        })
+    }
+}
+
+impl TileLike {
+    /// The tile of a grid.
+    pub(crate) fn of(&self, grid: TileGrid) -> PyResult<Tile> {
+        let all = grid.len();
+        let found = |index: usize| {
+            let missing = || BatchError::new_err(format!("tile {index} does not exist: there are {all}"));
+            (index < all).then(|| grid.tile(index)).ok_or_else(missing)
+        };
         match self {
-            Self::Index(index) => *index,
-            Self::Tile(tile) => tile.index,
+            Self::Index(index) => found(*index),
+            Self::Tile(tile) => {
+                let here = found(tile.index)?;
+                let other = || {
+                    format!(
+                        "{} is of another session: here it is {}",
+                        tile.__repr__(),
+                        PyTile::from(here).__repr__()
+                    )
+                };
+                (PyTile::from(here) == *tile).then_some(here).ok_or_else(|| BatchError::new_err(other()))
+            }
         }
     }
 }

@@ -187,10 +187,84 @@ class Sessions(unittest.TestCase):
             session.close_all("converged")
 
 
+class Faults(unittest.TestCase):
+    """Wrong samples are an error or a warning."""
+
+    def feed(self, batches, picture, **options):
+        session = nf.Session(128, 128, params=nf.Params(tile=64, min_spp=0, max_spp=10_000), **options)
+        for count in range(batches):
+            session.push_image(10, picture(count))
+            session.judge()
+        return session
+
+    def independent(self, count):
+        light = np.random.default_rng(count).exponential(1.0, (128, 128, 1)) ** 2
+        return np.broadcast_to(0.3 * light, (128, 128, 3)).astype(np.float32)
+
+    def test_certain_faults_are_errors(self):
+        def running(count):
+            return np.mean([self.independent(i) for i in range(count + 1)], axis=0)
+
+        cases = [
+            (r"contain the samples .* push_running", running),
+            ("same batch twice", lambda count: self.independent(0)),
+            ("8 bits", lambda count: np.round(np.minimum(self.independent(count), 1) * 255) / 255),
+            ("negative", lambda count: -1 - self.independent(count)),
+            ("not finite", lambda count: self.independent(count) * np.nan),
+        ]
+        for words, picture in cases:
+            with self.subTest(words):
+                with self.assertRaisesRegex(nf.FaultError, words):
+                    self.feed(12, picture)
+
+    def test_what_is_likely_is_warned_of_once(self):
+        def blurred(count):
+            image = self.independent(count)
+            return (image + np.roll(image, 1, axis=1) + np.roll(image, -1, axis=1)) / 3
+
+        with self.assertWarnsRegex(UserWarning, "neighbouring pixels") as caught:
+            session = self.feed(8, blurred)
+        self.assertEqual(len(caught.warnings), 1)
+        self.assertEqual(len(session.warnings), 1)
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            self.assertEqual(self.feed(8, blurred, shared_pixels=True).warnings, [])
+            right = self.feed(8, self.independent)
+        self.assertEqual((right.warnings, right.rejected_samples, right.negative_samples), ([], 0, 0))
+
+    def test_samples_that_are_left_out_or_negative_are_counted(self):
+        def holes(count):
+            image = self.independent(count)
+            image[0, :7] = np.nan
+            image[1, :5] = -1e-3
+            return image
+
+        session = self.feed(4, holes)
+        self.assertEqual((session.rejected_samples, session.negative_samples), (280, 200))
+
+    def test_renderers_are_checked(self):
+        def right(tile, first, spp):
+            mean = np.zeros((tile.height, tile.width, 3), np.float32)
+            for sample in range(first, first + spp):
+                mean += np.random.default_rng([tile.index, sample]).uniform(0, 1, mean.shape) / spp
+            return mean
+
+        nf.check(right)
+        nf.check(right, repeats_samples=True)
+        with self.assertRaisesRegex(nf.FaultError, "correlated"):
+            nf.check(lambda tile, first, spp: right(tile, first // (2 * spp) * (2 * spp), spp))
+        with self.assertRaisesRegex(nf.FaultError, r"shape \(1, 1, 3\)"):
+            nf.check(lambda tile, first, spp: np.zeros((1, 1, 3)))
+        with self.assertRaises(ZeroDivisionError):
+            nf.check(lambda tile, first, spp: 1 // 0)
+
+
 class Errors(unittest.TestCase):
     def test_every_error_is_typed_and_says_what_is_wrong(self):
         session = nf.Session(96, 80, params=PARAMS)
         black = np.zeros((EDGE, EDGE, 3), np.float32)
+        bytes_of = np.zeros((EDGE, EDGE, 3), np.uint8)
+        elsewhere = nf.Session(200, 80, params=PARAMS).requests()[4].tile
         cases = [
             (nf.SizeError, r"\(16, 32, 3\), and tile 0 is \(32, 32, 3\)", lambda: session.push(0, 1, black[:16])),
             (nf.SizeError, r"\(height, width, 3\) is needed", lambda: session.push(0, 1, black[..., :2])),
@@ -214,6 +288,21 @@ class Errors(unittest.TestCase):
             (nf.ParameterError, "nested", lambda: nf.judge(black, 8, black + 1, 8, samples="both")),
             (nf.SizeError, "reference", lambda: nf.metrics(black, black[:16])),
             (nf.PictureError, "not finite", lambda: nf.metrics(black + np.inf, black)),
+            (nf.SizeError, r"shape \(32, 32\); \(height, width, 3\)", lambda: session.push(0, 1, black[..., 0])),
+            (nf.SizeError, r"shape \(\)", lambda: nf.judge(3.0, 8, black, 8)),
+            (nf.ParameterError, "-3 is out of range", lambda: session.push(0, -3, black)),
+            (nf.ParameterError, "-5 is out of range", lambda: session.push_running(0, -5, black)),
+            (nf.ParameterError, "-8 is out of range", lambda: nf.Session(-8, 8)),
+            (nf.ParameterError, "out of range", lambda: nf.Params(max_spp=2**64)),
+            (nf.BatchError, "tile -1 does not exist", lambda: session.push(-1, 1, black)),
+            (nf.BatchError, "of another session: here it is", lambda: session.push(elsewhere, 1, black)),
+            (nf.PictureError, "dtype uint8 are no radiance", lambda: session.push(0, 1, bytes_of)),
+            (nf.PictureError, "dtype int64", lambda: session.push(0, 1, bytes_of.astype(int))),
+            (nf.PictureError, "dtype uint8", lambda: nf.metrics(bytes_of, bytes_of)),
+            (nf.PictureError, "dtype uint8", lambda: nf.judge(bytes_of, 8, bytes_of, 8)),
+            (nf.PictureError, "dtype <U5|dtype str", lambda: nf.metrics([[["black"] * 3]], black)),
+            (nf.PictureError, "1.5 is not sRGB", lambda: nf.metrics(black + 1.5, black, encoding="srgb")),
+            (nf.ParameterError, "no encoding", lambda: nf.metrics(black, black, encoding="rec709")),
         ]
         for kind, words, call in cases:
             with self.subTest(words):
@@ -221,10 +310,15 @@ class Errors(unittest.TestCase):
                     call()
         for name in ("Parameter", "Size", "Batch", "Model", "Criterion", "Checkpoint", "Picture"):
             self.assertTrue(issubclass(getattr(nf, name + "Error"), nf.Error))
-        for wrong in (lambda: session.push(-1, 1, black), lambda: session.push("0", 1, black),
-                      lambda: session.push(0, 1, "black"), lambda: nf.Session("8", 8)):
-            with self.assertRaises((TypeError, ValueError, OverflowError, nf.Error)):
+        for wrong in (lambda: session.push("0", 1, black), lambda: nf.Session("8", 8),
+                      lambda: session.push(0, 1.5, black)):
+            with self.assertRaises(TypeError):
                 wrong()
+
+    def test_values_are_written_as_python_reads_them(self):
+        for params in (nf.Params(), nf.Params(tone_mapping="srgb", exposure=2.5, schedule="every", blocks=16),
+                       nf.Params(white=3.0, audience=(0.5, 2.25), viewing="tv,distance=2")):
+            self.assertEqual(eval(repr(params), vars(nf)), params)
 
 
 class Pictures(unittest.TestCase):
@@ -237,6 +331,9 @@ class Pictures(unittest.TestCase):
         self.assertGreater(clean.verdicts[0].probability, seen.verdicts[0].probability)
         self.assertGreater(seen.verdicts[0].expected_spp, 20)
         self.assertEqual(seen.samples, "independent")
+        shown = [np.uint8(np.clip(noisy(seed, 20), 0, 1) ** (1 / 2.2) * 255) for seed in (1, 2)]
+        shown = nf.judge(shown[0], 20, shown[1], 20, samples="independent", params=params, encoding="srgb")
+        self.assertEqual([verdict.converged for verdict in shown.verdicts], [False, False])
         noise = seen.visible_noise()
         self.assertEqual((noise.shape, noise.dtype), ((64, 96), np.float32))
 
@@ -246,6 +343,13 @@ class Pictures(unittest.TestCase):
         self.assertAlmostEqual(found.rel_mse, 0.01 / 0.05, places=5)
         encode = lambda linear: 1.055 * linear ** (1 / 2.4) - 0.055
         self.assertAlmostEqual(found.psnr, -20 * np.log10(encode(0.3) - encode(0.2)), places=3)
+        # The same by what screens show: in 8 bits, in 16, and in floats
+        shown = [np.round(encode(value) * 255) for value in (0.3, 0.2)]
+        for dtype, white in ((np.uint8, 1), (np.uint16, 257), (np.float32, 1 / 255)):
+            eight = [np.full((16, 12, 3), value * white, dtype) for value in shown]
+            seen = nf.metrics(*eight, encoding="srgb")
+            self.assertAlmostEqual(seen.psnr, -20 * np.log10((shown[0] - shown[1]) / 255), places=3)
+            self.assertLess(seen.rel_mse, 0.21)
         worse = nf.metrics(noisy(1, 100), noisy(1, 1e8))
         self.assertLess(worse.cvvdp_jod, 9.9)
         self.assertEqual(worse.cvvdp_map().shape, (64, 96))

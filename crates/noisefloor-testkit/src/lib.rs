@@ -51,7 +51,7 @@ mod process;
 mod requirement;
 
 pub use bilateral::bilateral;
-pub use contract::{check_reference_is_free_of_noise, check_source};
+pub use contract::{broken_promise, check_reference_is_free_of_noise, check_silence, check_source};
 pub use noise::Noise;
 #[cfg(target_os = "linux")]
 pub use process::{is_running, resident_kib};

@@ -4,8 +4,8 @@
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use noisefloor::{
-    Film, Oracle, Rgb, StoppingCriterion, TileGrid, Viewing, criterion::View, descriptor::NoiseMask,
-    display::Display, evidence::TilePlanes,
+    Film, Oracle, Params, Rgb, Session, StoppingCriterion, TileGrid, Viewing, criterion::View,
+    descriptor::NoiseMask, display::Display, evidence::TilePlanes,
 };
 use noisefloor_testkit::Noise;
 use std::hint::black_box;
@@ -54,6 +54,13 @@ fn verdict(c: &mut Criterion) {
             })
         });
     });
+    // A batch in a film, and in a session, which watches it
+    let (params, mut noise) = (Params::default().with_max_spp(1 << 30), Noise::new(2));
+    let batch: Vec<Rgb> = (0..128 * 128).map(|_| [0.2 + noise.uniform() as f32; 3]).collect();
+    let mut film = Film::new(TileGrid::new(384, 384, 128).expect("a valid grid"));
+    let mut session = Session::new(384, 384, Oracle::bundled(), params).expect("a valid size");
+    group.bench_function("batch in a film", |b| b.iter(|| film.add(4, 1, black_box(&batch))));
+    group.bench_function("batch in a session", |b| b.iter(|| session.push(4, 1, black_box(&batch))));
     group.finish();
 }
 

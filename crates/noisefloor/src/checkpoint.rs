@@ -4,7 +4,7 @@ use crate::container::{self, Fault, Format, MAX_PAYLOAD};
 use crate::display::Display;
 use crate::film::{Film, FilmHead};
 use crate::params::Params;
-use crate::session::TileState;
+use crate::session::{Goal, TileState};
 use crate::source::{IdentityChange, SourceIdentity};
 use crate::tile::Tile;
 use serde::{Deserialize, Serialize};
@@ -13,7 +13,7 @@ use std::io::{self, Read, Write};
 use thiserror::Error;
 
 const FORMAT: Format = Format { magic: *b"NFCHECK\0", version: VERSION };
-const VERSION: u32 = 8;
+const VERSION: u32 = 9;
 
 /// A snapshot of a session, for resuming it: samples, verdicts and the display. Made by
 /// [`Session::checkpoint`](crate::Session::checkpoint), resumed by
@@ -187,9 +187,9 @@ impl Checkpoint<'_> {
         let grid = fresh.grid();
         let fits = |(index, state): (usize, &TileState)| {
             let most = params.max_spp.max(self.film.spp(index) + 1);
-            state.streak <= params.consecutive
-                && state.next <= most
-                && state.target.is_none_or(|target| target <= most)
+            let streak = if let Goal::Verdict { streak, .. } = state.goal { streak } else { 0 };
+            streak <= params.consecutive
+                && state.goal.spp() <= most
                 && state.stop.is_none_or(|stop| stop.tile == grid.tile(index))
         };
         if self.tiles.len() != grid.len() || !self.tiles.iter().enumerate().all(fits) {

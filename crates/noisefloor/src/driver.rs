@@ -9,7 +9,7 @@ use crate::session::rounds::CALL_SAMPLES;
 use crate::session::{Interruption, Stop};
 use crate::session::{Session, SessionError};
 use crate::source::{Batch, ProgressiveSource, Repeats, Request, SourceError};
-use crate::watch::LightCheck;
+use crate::watch::Fault;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -20,15 +20,24 @@ use thiserror::Error;
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum DriverError {
-    /// The session could not be started.
+    /// The session could not be started, or its samples are wrong ([`Fault`]).
     #[error(transparent)]
-    Session(#[from] SessionError),
+    Session(SessionError),
     /// The source failed.
     #[error(transparent)]
     Source(#[from] SourceError),
     /// The criterion does not fit.
     #[error(transparent)]
     Criterion(#[from] CriterionError),
+}
+
+impl From<SessionError> for DriverError {
+    fn from(error: SessionError) -> Self {
+        match error {
+            SessionError::Criterion(error) => Self::Criterion(error),
+            error => Self::Session(error),
+        }
+    }
 }
 
 /// One point of a run's history.
@@ -112,7 +121,6 @@ pub struct Driver<S, C = Box<dyn StoppingCriterion + Send>> {
     clock: Clock,
     /// Samples in the film before the run.
     samples_before: u64,
-    light: LightCheck,
 }
 
 impl<S: ProgressiveSource, C: StoppingCriterion> Driver<S, C> {
@@ -125,10 +133,10 @@ impl<S: ProgressiveSource, C: StoppingCriterion> Driver<S, C> {
         let info = source.info();
         let mut session = Session::new(info.width, info.height, criterion, params)?;
         session.set_source(source.identity()?);
+        session.set_pixels(info.pixels);
         let cancel = Arc::new(AtomicBool::new(false));
         let (timeline, clock) = (Vec::new(), Clock::default());
-        let light = LightCheck::default();
-        Ok(Self { source, session, time_limit: None, cancel, timeline, clock, samples_before: 0, light })
+        Ok(Self { source, session, time_limit: None, cancel, timeline, clock, samples_before: 0 })
     }
 
     /// Stops all tiles once a run has taken this long. A call to the source that is under way is finished
@@ -310,8 +318,6 @@ impl<S: ProgressiveSource, C: StoppingCriterion> Driver<S, C> {
                 exhausted.push(batch.tile.index);
                 continue;
             }
-            let impossible = |error| broken(format!("in tile {}, {error}", request.tile.index));
-            self.light.check_finite(&batch.mean).map_err(impossible)?;
             let pushed = match by_blocks.map(|by_blocks| &by_blocks[place]) {
                 Some(asked) if asked.spp == batch.spp => self.session.push_blocks(asked, &batch.mean),
                 Some(asked) => {
@@ -322,12 +328,14 @@ impl<S: ProgressiveSource, C: StoppingCriterion> Driver<S, C> {
             };
             match pushed {
                 Ok(()) => {}
-                Err(error @ FilmError::Pixels { .. }) => return Err(broken(error.to_string()).into()),
-                Err(error) => return Err(SessionError::from(error).into()),
+                Err(SessionError::Film(error @ FilmError::Pixels { .. })) => {
+                    return Err(broken(error.to_string()).into());
+                }
+                Err(SessionError::Fault(Fault::Light { tile, light })) => {
+                    return Err(broken(format!("in tile {tile}, {light}")).into());
+                }
+                Err(error) => return Err(error.into()),
             }
-            let (film, tile) = (self.session.film(), request.tile);
-            let so_far = (0..tile.pixels()).map(|pixel| film.pixel(tile.index, pixel));
-            self.light.check_sign(so_far).map_err(impossible)?;
         }
         Ok(exhausted)
     }

@@ -2,7 +2,6 @@
 
 use crate::display::{Display, luma_row, luminance};
 use crate::film::Film;
-use crate::internal::HALO;
 use crate::rgb::Rgb;
 use crate::tile::Tile;
 use ndarray::Array2;
@@ -10,6 +9,10 @@ use noisefloor_vision::Viewing;
 use serde::{Deserialize, Serialize};
 use std::cell::RefCell;
 use std::ops::Range;
+
+/// How far filters read beyond a tile, in pixels, and the edge of the blocks that a tile is divided into.
+#[doc(hidden)]
+pub const HALO: usize = 8;
 
 /// What a noisy tile is compared with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]

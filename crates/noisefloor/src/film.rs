@@ -1,6 +1,7 @@
 //! The film: batches of every tile, in two independent halves.
 
 use crate::blocks::BlockCounts;
+use crate::display::luminance;
 use crate::rgb::Rgb;
 use crate::tile::{Tile, TileGrid};
 
@@ -86,6 +87,8 @@ pub struct Film {
     halves: Vec<Half>,
     counts: Vec<[u64; 2]>,
     rejected: u64,
+    /// Samples whose batch was below zero; not in files.
+    negative: u64,
     /// What the blocks have, if they are counted.
     blocks: Option<BlockCounts>,
 }
@@ -103,7 +106,7 @@ impl Film {
 
     fn with_halves(grid: TileGrid, halves: usize) -> Self {
         let halves = vec![Half::new(grid.width() * grid.height()); halves];
-        Self { grid, halves, counts: vec![[0; 2]; grid.len()], rejected: 0, blocks: None }
+        Self { grid, halves, counts: vec![[0; 2]; grid.len()], rejected: 0, negative: 0, blocks: None }
     }
 
     /// The grid.
@@ -140,6 +143,11 @@ impl Film {
         self.rejected
     }
 
+    /// Samples so far, over all pixels, whose batch had negative luminance; of a film that was read, since then.
+    pub fn negative(&self) -> u64 {
+        self.negative
+    }
+
     /// All samples taken, over all pixels.
     pub fn total_samples(&self) -> u64 {
         self.blocks.as_ref().map_or_else(|| self.averages(), BlockCounts::samples)
@@ -173,17 +181,20 @@ impl Film {
     fn accumulate(&mut self, tile: Tile, spp: u64, mean: &[Rgb]) -> usize {
         let [a, b] = self.counts[tile.index];
         let half = usize::from(self.has_halves() && b < a);
+        let mut below_zero = 0;
         for (row, values) in tile.rows(self.grid.width()).zip(mean.chunks_exact(tile.width)) {
             for (pixel, &value) in row.zip(values) {
                 if value.iter().all(|c| c.is_finite()) {
                     let before = self.counts[tile.index][half] - self.halves[half].rejected(pixel);
                     self.halves[half].add(pixel, value, spp, before);
+                    below_zero += u64::from(luminance(value) < 0.0);
                 } else {
                     self.halves[half].reject(pixel, spp);
                     self.rejected += spp;
                 }
             }
         }
+        self.negative += below_zero * spp;
         self.counts[tile.index][half] += spp;
         half
     }
@@ -195,6 +206,17 @@ impl Film {
     /// # Errors
     /// [`FilmError`] as [`Film::add`], and if `total` is not above the samples that the film has.
     pub fn add_running(&mut self, tile: usize, total: u64, mean: &[Rgb]) -> Result<(), FilmError> {
+        let (new, batch) = self.new_of_running(tile, total, mean)?;
+        self.add(tile, new, &batch)
+    }
+
+    /// The number of new samples in a running mean, and their mean.
+    pub(crate) fn new_of_running(
+        &self,
+        tile: usize,
+        total: u64,
+        mean: &[Rgb],
+    ) -> Result<(u64, Vec<Rgb>), FilmError> {
         let checked = self.check(tile, mean.len())?;
         let had = self.spp(tile);
         let new = total.checked_sub(had).filter(|&n| n > 0);
@@ -209,10 +231,10 @@ impl Film {
                 }));
             }
         }
-        self.add(tile, new, &batch)
+        Ok((new, batch))
     }
 
-    fn check(&self, tile: usize, pixels: usize) -> Result<Tile, FilmError> {
+    pub(crate) fn check(&self, tile: usize, pixels: usize) -> Result<Tile, FilmError> {
         if tile >= self.grid.len() {
             return Err(FilmError::Tile(tile, self.grid.len()));
         }

@@ -12,7 +12,7 @@ use std::borrow::Cow;
 use std::io::{self, Read, Write};
 use thiserror::Error;
 
-mod familiarity;
+pub(crate) mod familiarity;
 pub(crate) use familiarity::CAUTION;
 pub use familiarity::Familiarity;
 

@@ -1,11 +1,8 @@
 //! Whether one picture contains the samples of another.
 
 use crate::descriptor::NoiseMask;
-use crate::display::{Display, luminance};
-use crate::{
-    evidence::{Rendering, Samples},
-    internal::ROUNDING_LUMINANCE,
-};
+use crate::display::{Display, ROUNDING_LUMINANCE, luminance};
+use crate::evidence::{Rendering, Samples};
 use ndarray::Array2;
 
 /// Edge of the blocks that count as independent observations, in pixels: wider than any pixel filter.

@@ -7,16 +7,17 @@ use crate::film::{Film, FilmError};
 use crate::params::{Audience, Params, ParamsError};
 use crate::rgb::Rgb;
 use crate::source::SourceIdentity;
-use crate::source::{Reference, Request};
+use crate::source::{PixelNoise, Reference, Request};
 use crate::tile::{Tile, TileError, TileGrid};
+use crate::watch::{Fault, Warning, Watch};
 use thiserror::Error;
 
 mod stop;
-pub(crate) use stop::TileState;
+pub(crate) use stop::{Goal, TileState};
 pub use stop::{Interruption, Stop, StopReason};
 
 /// Why a session failed.
-#[derive(Debug, Error)]
+#[derive(Debug, Error, Clone, PartialEq)]
 #[non_exhaustive]
 pub enum SessionError {
     /// A parameter out of range.
@@ -42,6 +43,9 @@ pub enum SessionError {
     /// A display for a session that has judged with another one.
     #[error("tiles were judged already with another display: set it before the first verdict")]
     Judged,
+    /// Samples that cannot be what they are said to be.
+    #[error(transparent)]
+    Fault(#[from] Fault),
 }
 
 /// Film, criterion and limits, for a renderer that owns its main loop: it pushes batches, asks which tiles
@@ -74,6 +78,7 @@ pub struct Session<C = Box<dyn StoppingCriterion + Send>> {
     /// Of each tile, the share that each of its blocks gets of its samples; none if all get as many.
     shares: Vec<Option<Vec<f32>>>,
     source: SourceIdentity,
+    watch: Watch,
 }
 
 impl<C: StoppingCriterion> Session<C> {
@@ -91,7 +96,8 @@ impl<C: StoppingCriterion> Session<C> {
         if params.blocks > 0 {
             (film, first) = (film.by_blocks(params.blocks)?, first.min(PILOT));
         }
-        let tile = TileState { next: first, streak: 0, verdict: None, target: None, stop: None };
+        let goal = Goal::Verdict { spp: first, streak: 0 };
+        let tile = TileState { goal, verdict: None, stop: None };
         let tiles = vec![tile; grid.len()];
         // Only an exposure by log-average depends on the picture, and has to wait for one
         let display = match params.tone_mapping {
@@ -99,6 +105,7 @@ impl<C: StoppingCriterion> Session<C> {
             ToneMapping::Reinhard { .. } => None,
         };
         Ok(Self {
+            watch: Watch::new(grid),
             film,
             criterion,
             params,
@@ -151,6 +158,24 @@ impl<C: StoppingCriterion> Session<C> {
         self.source = source;
     }
 
+    /// Says that neighbouring pixels have noise in common, so that no warning needs to. A
+    /// [`Driver`](crate::Driver) does this by itself.
+    pub fn set_pixels(&mut self, pixels: PixelNoise) {
+        self.watch.set_pixels(pixels);
+    }
+
+    /// What is likely to be wrong with the samples pushed so far: each kind once, in the order found. Complete
+    /// after each [`Session::judge`]; see [`crate::watch`].
+    pub fn warnings(&self) -> &[Warning] {
+        self.watch.warnings()
+    }
+
+    /// Samples, over all pixels, of pixels of a batch that had negative luminance. A few are rounding, or lobes
+    /// of a filter. Counted since the session was made or resumed.
+    pub fn negative_samples(&self) -> u64 {
+        self.film.negative()
+    }
+
     /// Provides the quick noise-free reference, for criteria that need one.
     ///
     /// # Errors
@@ -175,8 +200,7 @@ impl<C: StoppingCriterion> Session<C> {
                 return None;
             }
             let first = self.film.spp(index);
-            let goal = state.target.unwrap_or(state.next);
-            let wanted = self.wanted(self.film.half_counts(index), goal);
+            let wanted = self.wanted(self.film.half_counts(index), state.goal.spp());
             Some(Request { tile: self.film.grid().tile(index), first, spp: wanted.max(1) })
         };
         self.tiles.iter().enumerate().filter_map(wish).collect()
@@ -186,17 +210,23 @@ impl<C: StoppingCriterion> Session<C> {
     /// samples, too: they improve, and keep their stop.
     ///
     /// # Errors
-    /// [`FilmError`] if it does not fit; nothing is changed then.
-    pub fn push(&mut self, tile: usize, spp: u64, mean: &[Rgb]) -> Result<(), FilmError> {
-        self.film.add(tile, spp, mean)
+    /// [`SessionError::Film`] if it does not fit, [`SessionError::Fault`] if it is no light; nothing is changed
+    /// then.
+    pub fn push(&mut self, tile: usize, spp: u64, mean: &[Rgb]) -> Result<(), SessionError> {
+        let place = self.film.check(tile, mean.len())?;
+        self.watch.check_light(&self.film, place, spp, mean)?;
+        self.film.add(tile, spp, mean)?;
+        self.watch.see(place, spp, mean);
+        Ok(())
     }
 
     /// Adds the new samples in a running mean of a tile; see [`Film::add_running`].
     ///
     /// # Errors
-    /// [`FilmError`] if it does not fit; nothing is changed then.
-    pub fn push_running(&mut self, tile: usize, total: u64, mean: &[Rgb]) -> Result<(), FilmError> {
-        self.film.add_running(tile, total, mean)
+    /// As of [`Session::push`].
+    pub fn push_running(&mut self, tile: usize, total: u64, mean: &[Rgb]) -> Result<(), SessionError> {
+        let (new, batch) = self.film.new_of_running(tile, total, mean)?;
+        self.push(tile, new, &batch)
     }
 
     /// Judges the tiles that are due, and returns those that are now done.
@@ -208,19 +238,26 @@ impl<C: StoppingCriterion> Session<C> {
     /// samples per pixel, and without a verdict where that is too early for one.
     ///
     /// # Errors
-    /// [`CriterionError`] if the criterion does not fit the job.
-    pub fn judge(&mut self) -> Result<Vec<Stop>, CriterionError> {
+    /// [`SessionError::Fault`] if the samples pushed cannot be what they are said to be: no tile stops then, now or
+    /// later. [`SessionError::Criterion`] if the criterion does not fit the job.
+    pub fn judge(&mut self) -> Result<Vec<Stop>, SessionError> {
         let due: Vec<Tile> = self.film.grid().tiles().filter(|t| self.is_due(t.index)).collect();
         if due.is_empty() || !self.settle_display() {
             return Ok(Vec::new());
         }
-        let (early, due_now): (Vec<Tile>, Vec<Tile>) =
-            due.iter().partition(|t| self.film.spp(t.index) < self.params.first_verdict());
+        self.watch.look()?;
+        let (first, doubts) = (self.params.first_verdict(), self.watch.doubts());
+        let (early, due_now): (Vec<Tile>, Vec<Tile>) = due.iter().partition(|t| {
+            let (spp, for_verdict) = (self.film.spp(t.index), self.is_for_verdict(t));
+            spp < first || (doubts && for_verdict && spp < self.params.max_spp)
+        });
         for tile in early {
-            self.tiles[tile.index].next = self.params.first_verdict();
+            let spp = self.film.spp(tile.index);
+            let next = if spp < first { first } else { spp + self.params.schedule.step() };
+            self.tiles[tile.index].goal = Goal::Verdict { spp: next.min(self.params.max_spp), streak: 0 };
         }
         let (judged, waited): (Vec<Tile>, Vec<Tile>) =
-            due_now.into_iter().partition(|t| self.tiles[t.index].target.is_none());
+            due_now.into_iter().partition(|t| self.is_for_verdict(t));
 
         // Tiles that had converged for the trained audience have now what this audience wants.
         let mut stops: Vec<Stop> =
@@ -245,8 +282,11 @@ impl<C: StoppingCriterion> Session<C> {
     /// Whether a tile has what its next verdict needs.
     pub(crate) fn is_due(&self, index: usize) -> bool {
         let state = &self.tiles[index];
-        let goal = state.target.unwrap_or(state.next);
-        state.stop.is_none() && self.has_enough(self.film.half_counts(index), goal)
+        state.stop.is_none() && self.has_enough(self.film.half_counts(index), state.goal.spp())
+    }
+
+    fn is_for_verdict(&self, tile: &Tile) -> bool {
+        matches!(self.tiles[tile.index].goal, Goal::Verdict { .. })
     }
 
     /// Settles exposure and reference; false if it is too early.
@@ -278,21 +318,21 @@ impl<C: StoppingCriterion> Session<C> {
         // A less demanding audience has enough where the others are still expected to need more
         let content = audience.slope < 1.0 && expected.is_some_and(|need| need <= samples);
         let converged = verdict.converged || content;
-        state.streak = if converged { state.streak + 1 } else { 0 };
-        if state.streak >= consecutive {
-            let target = audience.samples(samples);
-            if target <= samples {
+        let streak = match state.goal {
+            Goal::Verdict { streak, .. } if converged => streak + 1,
+            _ => 0,
+        };
+        // Asked again about much the same samples, a criterion would say the same
+        let expected = expected.filter(|_| streak == 0);
+        state.goal = Goal::Verdict { spp: schedule.next(samples, expected, open).min(max_spp), streak };
+        if streak >= consecutive {
+            let wanted = audience.samples(samples);
+            if wanted <= samples {
                 return Some(self.stop(index, self.satisfied()));
             }
-            state.target = Some(target.min(max_spp).max(samples + 1));
+            state.goal = Goal::Audience { spp: wanted.min(max_spp).max(samples + 1) };
         }
-        if samples >= max_spp {
-            return Some(self.stop(index, StopReason::MaxSpp));
-        }
-        // Asked again about much the same samples, a criterion would say the same
-        let expected = expected.filter(|_| state.streak == 0);
-        state.next = schedule.next(samples, expected, open).min(max_spp);
-        None
+        (samples >= max_spp).then(|| self.stop(index, StopReason::MaxSpp))
     }
 
     /// Where a verdict like this expects the next ones to say "converged": for a less demanding audience sooner.
@@ -388,11 +428,12 @@ impl<C: StoppingCriterion> Session<C> {
         self.tiles.iter().enumerate().filter(|(_, state)| state.stop.is_none()).try_fold(
             0,
             |sum, (index, state)| {
-                let expected = match state.target {
-                    Some(target) => target,
-                    None => audience.samples(state.verdict?.expected_spp?),
+                let goal = match state.goal {
+                    Goal::Audience { spp } => spp,
+                    Goal::Verdict { spp, .. } => {
+                        audience.samples(state.verdict?.expected_spp?).clamp(spp.min(max), max)
+                    }
                 };
-                let goal = expected.clamp(state.next.min(max), max);
                 let pixels = self.film.grid().tile(index).pixels() as u64;
                 Some(sum + goal.saturating_sub(self.film.spp(index)) * pixels)
             },

@@ -35,6 +35,18 @@ pub enum Repeats {
     Nothing,
 }
 
+/// Whether the samples of a batch are each of one pixel.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum PixelNoise {
+    /// Yes: the noise of pixels is independent. Verdicts are made for this.
+    #[default]
+    Independent,
+    /// No: a pixel filter, paths of light that are seen in many pixels, a Markov chain or a denoiser give
+    /// neighbours noise in common.
+    Shared,
+}
+
 /// How the numbers of samples that a source gives relate to those asked for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -84,6 +96,8 @@ pub struct SourceInfo {
     pub repeats: Repeats,
     /// Whether it gives as many samples as asked for.
     pub counts: Counts,
+    /// Whether the noise of pixels is independent.
+    pub pixels: PixelNoise,
 }
 
 impl SourceInfo {
@@ -98,12 +112,19 @@ impl SourceInfo {
             aims: true,
             repeats: Repeats::Nothing,
             counts: Counts::Asked,
+            pixels: PixelNoise::Independent,
         }
     }
 
-    /// The same with another [`SourceInfo::unit`].
+    /// The same with another [`SourceInfo::unit`]. Pixels share the mutations of a Markov chain.
     pub fn with_unit(self, unit: Unit) -> Self {
-        Self { unit, ..self }
+        let pixels = if unit == Unit::MutationsPerPixel { PixelNoise::Shared } else { self.pixels };
+        Self { unit, pixels, ..self }
+    }
+
+    /// The same with another [`SourceInfo::pixels`].
+    pub fn with_pixels(self, pixels: PixelNoise) -> Self {
+        Self { pixels, ..self }
     }
 
     /// The same with another [`SourceInfo::aims`].
@@ -227,8 +248,8 @@ pub enum SourceError {
 /// - The same seed should give the same samples, whatever the number of threads and however requests are
 ///   split into batches. [`SourceInfo::repeats`] says how much of this holds: a run is as reproducible as its
 ///   source.
-/// - Use no reconstruction filter wider than a pixel unless you document it: shared samples correlate the
-///   noise of neighbours, and the model has learned from independent noise.
+/// - Use no reconstruction filter wider than a pixel, or say [`PixelNoise::Shared`]: shared samples correlate
+///   the noise of neighbours, and the model has learned from independent noise.
 ///
 /// The crate `noisefloor-testkit` has `check_source`, the contract that every source of this project passes:
 /// run it on yours.

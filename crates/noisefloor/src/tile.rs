@@ -1,6 +1,5 @@
 //! The image as a grid of tiles.
 
-use crate::internal::check_image;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
@@ -14,6 +13,16 @@ pub const DEFAULT_TILE: usize = 128;
 pub const MAX_EDGE: usize = 65_536;
 /// Largest number of pixels that is accepted.
 pub const MAX_PIXELS: usize = 1 << 28;
+
+/// Checks an image's size against the limits, before anything of that size is allocated.
+///
+/// # Errors
+/// [`TileError::Image`] if it is empty or too large.
+#[doc(hidden)]
+pub fn check_image(width: usize, height: usize) -> Result<(), TileError> {
+    let fits = (1..=MAX_EDGE).contains(&width) && (1..=MAX_EDGE).contains(&height);
+    if fits && width * height <= MAX_PIXELS { Ok(()) } else { Err(TileError::Image(width, height)) }
+}
 
 /// One tile: its place in the row-major order of the grid, and its pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]

@@ -72,3 +72,16 @@ fn tell(progress: &Progress) {
         progress.now.seconds, progress.now.active_tiles, progress.tiles
     );
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use noisefloor_testkit::{check_silence, check_source};
+
+    #[test]
+    fn it_keeps_the_contract_of_a_source() {
+        let make = || Shadow { width: 48, height: 40, seed: 1 };
+        check_source(make);
+        check_silence(make(), 80);
+    }
+}

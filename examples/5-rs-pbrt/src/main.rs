@@ -56,12 +56,14 @@ fn run() -> Result<(), Box<dyn Error>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use noisefloor_testkit::check_source;
+    use noisefloor_testkit::{check_silence, check_source};
 
     #[test]
     fn both_integrators_keep_the_contract_of_a_source() {
         for integrator in ["path", "bdpt"] {
-            check_source(|| Pbrt::new(&cornell_box(24, 20, integrator), 3).unwrap());
+            let make = || Pbrt::new(&cornell_box(24, 20, integrator), 3).unwrap();
+            check_source(make);
+            check_silence(make(), 80);
         }
     }
 }

@@ -65,5 +65,6 @@ mod tests {
     #[test]
     fn it_keeps_the_contract_of_a_source() {
         noisefloor_testkit::check_source(|| WholeFrames::new(48, 40));
+        noisefloor_testkit::check_silence(WholeFrames::new(48, 40), 80);
     }
 }

@@ -5,7 +5,10 @@
 
 mod scene;
 
-use noisefloor::{Batch, Driver, Event, Oracle, Params, ProgressiveSource, Request, SourceError, SourceInfo};
+use noisefloor::{
+    Batch, Driver, Event, Oracle, Params, ProgressiveSource, Request, SourceError, SourceInfo,
+    source::PixelNoise,
+};
 use noisefloor_image::{RenderLayers, write_exr};
 use rayon::iter::{IntoParallelIterator, ParallelIterator};
 use rustic_zen::prelude::{ExportImage, Image, RenderConstraint};
@@ -35,7 +38,9 @@ impl Photons {
 
 impl ProgressiveSource for Photons {
     fn info(&self) -> SourceInfo {
-        SourceInfo::new("rustic-zen", self.width, self.height).with_aims(false)
+        SourceInfo::new("rustic-zen", self.width, self.height)
+            .with_aims(false)
+            .with_pixels(PixelNoise::Shared)
     }
 
     fn sample(&mut self, requests: &[Request]) -> Result<Vec<Batch>, SourceError> {
@@ -101,7 +106,12 @@ mod tests {
         (mean, lights.iter().map(|light| (light - mean).powi(2)).sum::<f64>() / (15.0 * 16.0))
     }
 
-    /// Not `check_source`, which takes the noise of pixels to be independent; here a line crosses many.
+    /// Lines cross many pixels, as the source says.
+    #[test]
+    fn nothing_is_wrong_with_its_samples() {
+        noisefloor_testkit::check_silence(Photons { width: 48, height: 40, rays: 20 }, 80);
+    }
+
     #[test]
     fn light_does_not_depend_on_how_it_is_asked_for() {
         let ((few, error), (many, other)) = (light(2), light(16));

@@ -1,11 +1,11 @@
 use crate::kit::{Altered, Synthetic};
 use noisefloor::{
     Batch, Counts, ProgressiveSource, Repeats, Request, SourceError, SourceInfo, Tile, Unit,
-    source::{BlockRequest, BlockSamples, FirstHits, Reference},
+    source::{BlockRequest, BlockSamples, FirstHits, PixelNoise, Reference},
 };
 use noisefloor_image::{RenderLayers, StackSource, write_exr};
 use noisefloor_ptwne::{Ptwne, RenderOptions, scenes};
-use noisefloor_testkit::{Noise, check_reference_is_free_of_noise, check_source};
+use noisefloor_testkit::{Noise, broken_promise, check_reference_is_free_of_noise, check_source};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -91,7 +91,7 @@ fn stacks_on_disk_keep_it() {
 
 /// What `check_source` says of a source.
 fn verdict<S: ProgressiveSource>(make: impl Fn() -> S) -> String {
-    outcome(|| check_source(make))
+    broken_promise(make).unwrap_or_else(|| "kept".into())
 }
 
 /// What a check says that panics if it has something to say.
@@ -200,12 +200,13 @@ fn late_renderers_give_more_within_bounds() {
     assert!(late(Counts::Late { overrun: 1 << 17 }, 100_000).contains("samples where 16 were asked for"));
 }
 
-/// Work in mutations: neighbouring pixels of a batch share their noise, which is no fault there.
+/// Neighbouring pixels of a batch share their noise, which is no fault of a source that says so: of a Markov chain,
+/// or of lines of light.
 #[test]
-fn noise_that_pixels_share_is_no_fault_of_a_markov_chain() {
-    let shared = |unit: Unit| {
+fn pixels_may_share_noise_if_they_say_so() {
+    let shared = |unit: Unit, pixels: PixelNoise| {
         verdict(move || {
-            let source = Synthetic { repeats: Repeats::Calls, unit, ..synthetic() };
+            let source = Synthetic { repeats: Repeats::Calls, unit, pixels, ..synthetic() };
             Altered::batches(source, |requests, batches| {
                 for (r, batch) in requests.iter().zip(batches) {
                     let mut noise = Noise::keyed(&[r.first, r.tile.index as u64, r.spp]);
@@ -216,7 +217,34 @@ fn noise_that_pixels_share_is_no_fault_of_a_markov_chain() {
             })
         })
     };
-    assert_eq!(shared(Unit::MutationsPerPixel), "kept");
+    assert_eq!(shared(Unit::MutationsPerPixel, PixelNoise::Independent), "kept");
+    assert_eq!(shared(Unit::SamplesPerPixel, PixelNoise::Shared), "kept");
+}
+
+/// A picture filtered by three pixels in a row.
+#[test]
+fn pixel_filters_have_to_be_announced() {
+    let filtered = |pixels: PixelNoise| {
+        verdict(move || {
+            let source = Synthetic { repeats: Repeats::Calls, pixels, ..synthetic() };
+            Altered::batches(source, |requests, batches| {
+                let mut sharp = Synthetic { repeats: Repeats::Calls, ..synthetic() };
+                *batches = sharp.sample(requests).unwrap();
+                for batch in batches {
+                    let (width, mean) = (batch.tile.width, batch.mean.clone());
+                    for (i, pixel) in batch.mean.iter_mut().enumerate() {
+                        let row = i / width * width;
+                        let at = |x: usize| mean[row + x.min(width - 1)];
+                        let (before, after) = (at((i - row).saturating_sub(1)), at(i - row + 1));
+                        *pixel = std::array::from_fn(|c| (before[c] + mean[i][c] + after[c]) / 3.0);
+                    }
+                }
+            })
+        })
+    };
+    let said = filtered(PixelNoise::Independent);
+    assert!(said.contains("neighbouring pixels have noise in common"), "{said}");
+    assert_eq!(filtered(PixelNoise::Shared), "kept");
 }
 
 /// A source that aims at blocks, with one thing changed in its answers to requests for them.

@@ -1,6 +1,6 @@
 use noisefloor::{
     Batch, Counts, ProgressiveSource, Repeats, Request, Rgb, SourceError, SourceInfo, Unit,
-    source::{BlockRequest, BlockSamples, FirstHits, Reference},
+    source::{BlockRequest, BlockSamples, FirstHits, PixelNoise, Reference},
 };
 use noisefloor_sidecar::{Renderer, find, probe};
 use noisefloor_testkit::{Noise, Requirement, require};
@@ -24,6 +24,7 @@ pub(crate) struct Synthetic {
     pub(crate) repeats: Repeats,
     pub(crate) counts: Counts,
     pub(crate) unit: Unit,
+    pub(crate) pixels: PixelNoise,
 }
 
 impl Synthetic {
@@ -42,6 +43,7 @@ impl Synthetic {
             repeats: Repeats::Samples,
             counts: Counts::Asked,
             unit: Unit::SamplesPerPixel,
+            pixels: PixelNoise::Independent,
         }
     }
 
@@ -74,6 +76,7 @@ impl ProgressiveSource for Synthetic {
     fn info(&self) -> SourceInfo {
         let (width, height) = self.size;
         SourceInfo::new("synthetic", width, height)
+            .with_pixels(self.pixels)
             .with_unit(self.unit)
             .with_aims(self.aims)
             .with_repeats(self.repeats)

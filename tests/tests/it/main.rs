@@ -33,3 +33,6 @@ mod people;
 /// LuxCore and Cycles, where they are installed.
 #[cfg(test)]
 mod renderers;
+/// Sessions say nothing of right samples.
+#[cfg(test)]
+mod watch;

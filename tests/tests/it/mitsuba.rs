@@ -4,7 +4,7 @@ use noisefloor_image::{RenderLayers, write_exr};
 use noisefloor_mitsuba::{RENDERER, Variant, notes, open_as};
 use noisefloor_ptwne::{Ptwne, RenderOptions, scenes};
 use noisefloor_sidecar::{Job, Sidecar};
-use noisefloor_testkit::{Requirement, check_source, require};
+use noisefloor_testkit::{Requirement, check_silence, check_source, require};
 #[cfg(target_os = "linux")]
 use noisefloor_testkit::{is_running, resident_kib};
 use std::collections::HashSet;
@@ -38,6 +38,7 @@ fn the_wavefront_keeps_the_contract() {
     let source = make();
     assert_eq!(source.info().repeats, Repeats::Samples, "{:?}", source.warnings());
     check_source(make);
+    check_silence(make(), 80);
 }
 
 #[test]
@@ -48,6 +49,7 @@ fn crop_windows_keep_the_contract() {
     let make = || open(CORNELL_BOX, SIZE, Variant::Scalar);
     assert_eq!(make().info().repeats, Repeats::Calls);
     check_source(make);
+    check_silence(make(), 80);
 }
 
 /// The same scene by two renderers: tile by tile the same mean. Each z exceeds 6 with p = 2e-9, and 24 are

@@ -1,6 +1,7 @@
 use crate::kit::{Altered, Synthetic};
 use noisefloor::{
-    Driver, Oracle, Params, ProgressiveSource, Rgb, Schedule, Session, Stop, StopReason, evidence::TilePlanes,
+    Driver, Oracle, Params, ProgressiveSource, Rgb, Schedule, Session, SessionError, Stop, StopReason,
+    evidence::TilePlanes, watch::Fault,
 };
 
 /// A run by the bundled oracle.
@@ -150,7 +151,8 @@ fn one_firefly_leaves_the_other_tiles_alone() {
     }
 }
 
-/// Where every sample was kept out there is no evidence of anything: that is not "converged".
+/// Where every sample of a pixel was kept out there is no evidence of anything: that is not "converged". A tile
+/// that has hardly any others is refused.
 #[test]
 fn a_tile_without_a_valid_sample_never_converges() {
     let mut source = Synthetic::new(64, 32);
@@ -158,7 +160,9 @@ fn a_tile_without_a_valid_sample_never_converges() {
     while !session.is_done() {
         for mut batch in source.sample(&session.requests()).unwrap() {
             if batch.tile.index == 0 {
-                batch.mean.fill([f32::NAN; 3]);
+                let refused = session.push(0, batch.spp, &[[f32::NAN; 3]; 32 * 32]);
+                assert!(matches!(refused, Err(SessionError::Fault(Fault::Light { tile: 0, .. }))));
+                batch.mean[..400].fill([f32::NAN; 3]);
             }
             session.push(batch.tile.index, batch.spp, &batch.mean).unwrap();
         }

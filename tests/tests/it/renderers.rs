@@ -3,9 +3,9 @@ use noisefloor::{Batch, ProgressiveSource, Request, Rgb, Tile, TileGrid};
 use noisefloor_luxcore::{Engine, Sampler};
 use noisefloor_ptwne::{Ptwne, RenderOptions, scenes};
 use noisefloor_sidecar::{Job, Sidecar, SidecarError};
-use noisefloor_testkit::check_source;
 #[cfg(target_os = "linux")]
 use noisefloor_testkit::resident_kib;
+use noisefloor_testkit::{check_silence, check_source};
 use std::path::PathBuf;
 
 /// The Cornell box in another renderer's format.
@@ -28,6 +28,7 @@ fn cycles(width: usize, height: usize) -> Result<Sidecar, SidecarError> {
 fn cycles_keeps_the_contract() {
     if usable(&noisefloor_cycles::RENDERER) {
         check_source(|| cycles(48, 40).unwrap());
+        check_silence(cycles(48, 40).unwrap(), 80);
     }
 }
 
@@ -37,7 +38,9 @@ macro_rules! luxcore_keeps_the_contract {
         #[test]
         fn $name() {
             if usable(&noisefloor_luxcore::RENDERER) {
-                check_source(|| luxcore(Engine::$engine, Sampler::$sampler, 48, 40).unwrap());
+                let make = || luxcore(Engine::$engine, Sampler::$sampler, 48, 40).unwrap();
+                check_source(make);
+                check_silence(make(), 80);
             }
         }
     )*};

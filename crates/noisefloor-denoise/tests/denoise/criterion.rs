@@ -1,7 +1,7 @@
 use crate::kit::{SIZE, Simple, noisy, truth};
 use noisefloor::{
-    Params, Rgb, Schedule, Session, StopReason, StoppingCriterion, ToneMapping, criterion::CriterionError,
-    source::FirstHits,
+    Params, Rgb, Schedule, Session, SessionError, StopReason, StoppingCriterion, ToneMapping,
+    criterion::CriterionError, source::FirstHits,
 };
 use noisefloor_denoise::{AuxiliaryPictures, DenoiseError, DenoisedQuality, Denoiser, NoisyPicture};
 use std::sync::{Arc, Mutex};
@@ -22,7 +22,7 @@ fn session<D: Denoiser>(denoiser: D) -> Session<DenoisedQuality<D>> {
 }
 
 /// Renders, and returns the stops' samples per pixel: 0 and 3 are striped, the others plain.
-fn run<D: Denoiser>(session: &mut Session<DenoisedQuality<D>>) -> Result<Vec<u64>, CriterionError> {
+fn run<D: Denoiser>(session: &mut Session<DenoisedQuality<D>>) -> Result<Vec<u64>, SessionError> {
     while !session.is_done() {
         for request in session.requests() {
             let seed = 1000 * request.first + request.tile.index as u64;
@@ -75,7 +75,9 @@ fn a_denoiser_may_be_shared() {
 #[test]
 fn failures_are_said() {
     let outcome = run(&mut session(Simple::Fails));
-    let Err(CriterionError::Failed { why, .. }) = outcome else { panic!("{outcome:?}") };
+    let Err(SessionError::Criterion(CriterionError::Failed { why, .. })) = outcome else {
+        panic!("{outcome:?}")
+    };
     assert!(why.contains("out of order"), "{why}");
 }
 

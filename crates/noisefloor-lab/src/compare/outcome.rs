@@ -132,6 +132,8 @@ pub struct Comparison {
     pub reference: String,
     /// Whether the run was cancelled: what is here is of the samples until then.
     pub cancelled: bool,
+    /// What is likely to be wrong with the samples ([`noisefloor::watch`]), as the criterion that saw the most says.
+    pub warnings: Vec<String>,
     /// The criteria, in the order in which they were given.
     pub runs: Vec<CriterionRun>,
     /// Uniform sampling, by increasing samples.
@@ -189,6 +191,7 @@ impl Comparison {
             size: (grid.width(), grid.height()),
             reference,
             cancelled: race.cancelled,
+            warnings: race.entrants.iter().map(Entrant::warnings).max_by_key(Vec::len).unwrap_or_default(),
             runs,
             curve: race.curve.iter().map(point).collect(),
             tiles,

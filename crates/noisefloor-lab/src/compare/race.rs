@@ -57,6 +57,11 @@ impl Entrant {
         self.session.film()
     }
 
+    /// What is likely to be wrong with the samples that it saw.
+    pub(super) fn warnings(&self) -> Vec<String> {
+        self.session.warnings().iter().map(ToString::to_string).collect()
+    }
+
     /// What it calls itself, with its constant.
     pub fn name(&self) -> String {
         self.session.criterion().name()

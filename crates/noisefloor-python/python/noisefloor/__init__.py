@@ -11,7 +11,7 @@ A renderer pushes samples into a Session, which names the tiles that need more a
         session.judge()
     picture = session.image()
 
-judge() judges finished pictures, and metrics() compares two. Pictures are arrays of shape (height, width, 3)
+check() tries a renderer before that, judge() judges finished pictures, and metrics() compares two. Pictures are arrays of shape (height, width, 3)
 with linear radiance, Rec. 709 primaries. C-contiguous float32 arrays are read where they lie; others are
 converted.
 Every error is a noisefloor.Error.
@@ -23,6 +23,7 @@ from ._noisefloor import (
     CheckpointError,
     CriterionError,
     Error,
+    FaultError,
     Judged,
     Metrics,
     ModelError,
@@ -38,6 +39,7 @@ from ._noisefloor import (
     Verdict,
     Viewing,
     __version__,
+    check,
     judge,
     metrics,
 )
@@ -48,6 +50,7 @@ __all__ = [
     "CheckpointError",
     "CriterionError",
     "Error",
+    "FaultError",
     "Judged",
     "Metrics",
     "ModelError",
@@ -62,6 +65,7 @@ __all__ = [
     "Tile",
     "Verdict",
     "Viewing",
+    "check",
     "judge",
     "metrics",
 ]

@@ -1,6 +1,7 @@
 """Signatures for type checkers. Shapes, units and errors are in the docstrings: help(noisefloor.Session)."""
 
 import os
+from collections.abc import Callable
 from typing import Literal, final
 
 import numpy as np
@@ -13,12 +14,14 @@ class Error(Exception): ...
 class ParameterError(Error): ...
 class SizeError(Error): ...
 class BatchError(Error): ...
+class FaultError(Error): ...
 class ModelError(Error): ...
 class CriterionError(Error): ...
 class CheckpointError(Error): ...
 class PictureError(Error): ...
 
 _ToneMapping = Literal["reinhard", "srgb"]
+_Encoding = Literal["linear", "srgb"]
 
 @final
 class Viewing:
@@ -138,10 +141,24 @@ class Stop:
     @property
     def unfamiliar(self) -> bool: ...
 
+def check(
+    render: Callable[[Tile, int, int], ArrayLike],
+    width: int = 48,
+    height: int = 40,
+    *,
+    repeats_samples: bool = False,
+    shared_pixels: bool = False,
+) -> None: ...
+
 @final
 class Session:
     def __new__(
-        cls, width: int, height: int, oracle: Oracle | None = None, params: Params | None = None
+        cls,
+        width: int,
+        height: int,
+        oracle: Oracle | None = None,
+        params: Params | None = None,
+        shared_pixels: bool = False,
     ) -> Session: ...
     @property
     def width(self) -> int: ...
@@ -151,6 +168,12 @@ class Session:
     def done(self) -> bool: ...
     @property
     def open_tiles(self) -> int: ...
+    @property
+    def warnings(self) -> list[str]: ...
+    @property
+    def rejected_samples(self) -> int: ...
+    @property
+    def negative_samples(self) -> int: ...
     @property
     def expected_samples(self) -> int | None: ...
     def requests(self) -> list[Request]: ...
@@ -201,6 +224,7 @@ def judge(
     samples: Literal["independent", "nested"] | None = None,
     oracle: Oracle | None = None,
     params: Params | None = None,
+    encoding: _Encoding = "linear",
 ) -> Judged: ...
 def metrics(
     image: ArrayLike,
@@ -211,4 +235,5 @@ def metrics(
     white: float | None = None,
     exposure: float = 1.0,
     viewing: Viewing | str | None = None,
+    encoding: _Encoding = "linear",
 ) -> Metrics: ...

@@ -3,7 +3,7 @@
 use super::probe::Round;
 use super::rounding::{LARGEST_Z, ROUNDING};
 use crate::noise::Noise;
-use noisefloor::{Rgb, Unit};
+use noisefloor::{Rgb, source::PixelNoise};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
 /// Batches of 32 samples that are compared with as many in four parts.
@@ -18,7 +18,7 @@ type Values = Vec<f64>;
 type Means = Vec<(f64, f64)>;
 
 /// Compares batches of 32 samples, asked for at once, with means of four batches of 8.
-pub(super) fn check_distribution(long: &[Round], short: &[Round], unit: Unit) {
+pub(super) fn check_distribution(long: &[Round], short: &[Round], pixels: PixelNoise) {
     let parts: Vec<Means> = short.iter().map(means).collect();
     let batches: Vec<Means> = long.iter().map(means).chain(parts.chunks(4).map(pool)).collect();
     let batches = deviations(&batches);
@@ -29,7 +29,7 @@ pub(super) fn check_distribution(long: &[Round], short: &[Round], unit: Unit) {
     let strength = |batch: &Values| batch.iter().map(|d| d * d).sum::<f64>() / batch.len() as f64;
     compare("mean", &batches.iter().map(level).collect::<Values>());
     compare("noise", &batches.iter().map(strength).collect::<Values>());
-    if unit == Unit::SamplesPerPixel {
+    if pixels == PixelNoise::Independent {
         check_ranks(&batches);
     }
 }

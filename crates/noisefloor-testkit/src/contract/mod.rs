@@ -8,22 +8,25 @@ mod independence;
 mod probe;
 mod reference;
 mod rounding;
+mod silence;
 
 pub use reference::check_reference_is_free_of_noise;
+pub use silence::check_silence;
 
 use blocks::check_blocks;
 use distribution::{LONG, check_distribution};
 use exact::{all_have, check_aiming, check_cut, same};
 use first_hits::check_first_hits;
 use independence::check_independence;
-use noisefloor::{Counts, ProgressiveSource, Repeats, Unit};
+use noisefloor::{Counts, ProgressiveSource, Repeats, source::PixelNoise};
 use probe::{Round, Subject};
 use reference::check_reference;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 
 /// Rounds of 16 samples that are compared for independence.
 const ROUNDS: usize = 4;
-/// The same where work is counted in mutations: each tile of a batch then gives one term.
-const ROUNDS_OF_MUTATIONS: usize = 64;
+/// The same where pixels share samples: each tile of a batch then gives one term.
+const ROUNDS_OF_TILES: usize = 64;
 /// Batches within which a playback that ends is seen to end.
 const MOST_OF_A_PLAYBACK: usize = 1000;
 /// Batches within which a renderer that ends is seen to end. Few renderers do.
@@ -53,6 +56,8 @@ const MOST_OF_A_RENDERER: usize = 8;
 /// - **The distribution** does not depend on how requests are cut: 12 batches of 32 samples against 12 of 8 +
 ///   8 + 8 + 8.
 /// - **Independence**: new samples are independent of those before, in the same tile and in others.
+/// - **Pixels**: the noise of neighbours is independent, unless
+///   [`SourceInfo::pixels`](noisefloor::SourceInfo::pixels) says that they share samples.
 /// - **The reference**, if there is one, has the image's size and is finite, and rendering it changes no
 ///   sample. Whether it is free of noise takes two seeds to tell: see [`check_reference_is_free_of_noise`].
 /// - **First hits**, if there are any, have the image's size, albedo in [0, 1] and normals no longer than 1.
@@ -66,17 +71,17 @@ const MOST_OF_A_RENDERER: usize = 8;
 /// The sources of this project are seeded wherever their renderers are, so that they always pass or always
 /// fail.
 ///
-/// *Independence:* p < 1.3e-7 a source. The noise of a pixel is the difference x of two batches of equal
+/// *Independence:* p < 1.9e-7 a source. The noise of a pixel is the difference x of two batches of equal
 /// size, which is symmetric around 0, and so is the difference y of two others. Given all |xy|, only their
 /// signs are left to chance, and those are independent from pixel to pixel. Then z = Σxy/√Σ(xy)² exceeds 6
-/// with p ≤ 2·exp(−6²/2) = 3.1e-8, whatever the distribution (Hoeffding 1963). There are four such z, and
-/// three more of first hits, where there are any: p < 2.2e-7 then. The batches of a playback differ in size;
-/// for them this holds as far as z is normal. Where work is counted in mutations, neighbouring pixels share a
-/// Markov chain, and the signs are those of whole tiles, in 64 batches instead of 4.
+/// with p ≤ 2·exp(−6²/2) = 3.1e-8, whatever the distribution (Hoeffding 1963). There are six such z, and
+/// three more of first hits, where there are any: p < 2.8e-7 then. The batches of a playback differ in size;
+/// for them this holds as far as z is normal. Where pixels share samples, the signs are those of whole tiles, in
+/// 64 batches instead of 4.
 ///
 /// *Distribution:* p < 1e-7 a source. The mean of a batch over its pixels, and the mean square of its
 /// deviations (in units of each pixel's standard deviation over all batches), are compared by Welch's t
-/// (1947) at p = 1e-8, two-sided. Where work is counted in samples, pixels are independent, and so are the
+/// (1947) at p = 1e-8, two-sided. Where pixels are independent, so are the
 /// ranks that the 12 long batches have among all 24 in each pixel. Their 23 cumulative frequencies (the
 /// Kolmogorov–Smirnov comparison, pixel by pixel) are each off by 6 standard errors with p < 2e-9, by the
 /// normal approximation.
@@ -86,8 +91,8 @@ const MOST_OF_A_RENDERER: usize = 8;
 pub fn check_source<S: ProgressiveSource>(make: impl Fn() -> S) {
     let subject = Subject::new(make);
     let playback = subject.info.counts == Counts::Stored;
-    let per_pixel = subject.info.unit == Unit::SamplesPerPixel;
-    let rounds = subject.rounds(&vec![16; if per_pixel { ROUNDS } else { ROUNDS_OF_MUTATIONS }]);
+    let per_pixel = subject.info.pixels == PixelNoise::Independent;
+    let rounds = subject.rounds(&vec![16; if per_pixel { ROUNDS } else { ROUNDS_OF_TILES }]);
     let four = &rounds[..4];
 
     let whole = if playback {
@@ -108,12 +113,21 @@ pub fn check_source<S: ProgressiveSource>(make: impl Fn() -> S) {
         check_aiming(subject.start(), four, subject.promises(Repeats::Samples));
     }
     check_blocks(&subject, four);
-    check_independence(&rounds, whole.as_ref(), subject.info.unit);
+    check_independence(&rounds, whole.as_ref(), subject.info.pixels);
     if !playback {
         check_cuts(&subject);
     }
     check_reference_changes_nothing(&subject, four);
     check_end(&subject, if playback { MOST_OF_A_PLAYBACK } else { MOST_OF_A_RENDERER });
+}
+
+/// What [`check_source`] finds wrong with a source, in place of a panic: for other languages. The words also go
+/// where panics are reported.
+pub fn broken_promise<S: ProgressiveSource>(make: impl Fn() -> S) -> Option<String> {
+    let panic = catch_unwind(AssertUnwindSafe(|| check_source(make))).err()?;
+    let text = panic.downcast_ref::<String>().cloned();
+    let text = text.or_else(|| panic.downcast_ref::<&str>().map(|text| (*text).to_owned()));
+    Some(text.unwrap_or_else(|| "the check failed without words".into()))
 }
 
 /// How requests are cut changes no sample.
@@ -130,7 +144,7 @@ fn check_cuts<S: ProgressiveSource>(subject: &Subject<impl Fn() -> S>) {
     let long: Vec<Round> = (0..LONG).map(|_| probe.ask_all(32)).collect();
     let short: Vec<Round> = (0..4 * LONG).map(|_| probe.ask_all(8)).collect();
     if !all_have(&short[4 * LONG - 1], 0) {
-        check_distribution(&long, &short, subject.info.unit);
+        check_distribution(&long, &short, subject.info.pixels);
     }
 }
 

@@ -3,7 +3,7 @@ use crate::blocks::{BlockRequest, BlockSamples};
 use crate::criterion::{CriterionError, FixedSpp, StoppingCriterion, Verdict, View};
 use crate::driver::{Driver, Event};
 use crate::oracle::Oracle;
-use crate::source::{Batch, Counts, ProgressiveSource, Repeats, Request, SourceError, SourceInfo, Unit};
+use crate::source::{Batch, ProgressiveSource, Repeats, Request, SourceError, SourceInfo};
 use proptest::prelude::*;
 use std::sync::atomic::Ordering;
 
@@ -12,15 +12,7 @@ struct Noise(Repeats);
 
 impl ProgressiveSource for Noise {
     fn info(&self) -> SourceInfo {
-        SourceInfo {
-            name: "noise".into(),
-            width: 96,
-            height: 48,
-            unit: Unit::SamplesPerPixel,
-            aims: true,
-            repeats: self.0,
-            counts: Counts::Asked,
-        }
+        SourceInfo::new("noise", 96, 48).with_repeats(self.0)
     }
 
     fn sample(&mut self, requests: &[Request]) -> Result<Vec<Batch>, SourceError> {
@@ -253,9 +245,13 @@ fn what_does_not_hold_together_is_refused() {
     };
     assert!(!refused(&|_| ()));
     assert!(refused(&|c| c.tiles.to_mut().truncate(3)));
-    assert!(refused(&|c| c.tiles.to_mut()[0].streak = u32::MAX));
-    assert!(refused(&|c| c.tiles.to_mut()[0].next = u64::MAX));
-    assert!(refused(&|c| c.tiles.to_mut()[0].target = Some(u64::MAX)));
+    for goal in [
+        Goal::Verdict { spp: 40, streak: u32::MAX },
+        Goal::Verdict { spp: u64::MAX, streak: 0 },
+        Goal::Audience { spp: u64::MAX },
+    ] {
+        assert!(refused(&|c| c.tiles.to_mut()[0].goal = goal));
+    }
     assert!(refused(&|c| c.tiles.to_mut().swap(0, 1)));
     assert!(refused(&|c| c.display = Some(crate::ToneMapping::Srgb { exposure: f32::NAN }.settle(&[]))));
     assert!(refused(&|c| c.state = vec![1, 2, 3]));

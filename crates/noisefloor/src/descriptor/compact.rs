@@ -14,8 +14,8 @@
 use super::kind::{Described, Descriptor, DescriptorError, DescriptorKind, TileDescriptor, mask};
 use crate::descriptor::NoiseMask;
 use crate::{
-    evidence::TilePlanes,
-    internal::{HALO, ROUNDING_LUMINANCE},
+    display::ROUNDING_LUMINANCE,
+    evidence::{HALO, TilePlanes},
 };
 use ndarray::Array2;
 use std::cell::RefCell;

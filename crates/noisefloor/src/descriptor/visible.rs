@@ -15,7 +15,7 @@
 use super::compact::texture_energy;
 use super::kind::{Described, Descriptor, DescriptorError, DescriptorKind, TileDescriptor};
 use crate::descriptor::NoiseMask;
-use crate::{evidence::TilePlanes, internal::ROUNDING_LUMINANCE};
+use crate::{display::ROUNDING_LUMINANCE, evidence::TilePlanes};
 use multiversion::multiversion;
 use ndarray::{Array2, ArrayView2, s};
 use noisefloor_vision::{

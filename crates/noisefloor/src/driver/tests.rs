@@ -1,7 +1,7 @@
 use super::*;
 use crate::criterion::{FixedSpp, Needs, Verdict, View};
 use crate::session::StopReason;
-use crate::source::{Counts, Repeats, SourceInfo, Unit};
+use crate::source::{Repeats, SourceInfo};
 use crate::tile::Tile;
 
 /// A grey source that can be told to misbehave.
@@ -17,16 +17,7 @@ struct Grey {
 
 impl ProgressiveSource for Grey {
     fn info(&self) -> SourceInfo {
-        let unit = Unit::SamplesPerPixel;
-        SourceInfo {
-            name: "grey".into(),
-            width: 70,
-            height: 32,
-            unit,
-            aims: !self.cannot_aim,
-            repeats: Repeats::Samples,
-            counts: Counts::Asked,
-        }
+        SourceInfo::new("grey", 70, 32).with_aims(!self.cannot_aim).with_repeats(Repeats::Samples)
     }
 
     fn sample(&mut self, requests: &[Request]) -> Result<Vec<Batch>, SourceError> {

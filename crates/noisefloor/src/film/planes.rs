@@ -70,7 +70,7 @@ impl Film {
             Ok(Half { mean, carry, rejected })
         };
         let halves = halves.iter().map(&mut half).collect::<io::Result<_>>()?;
-        Ok(Some(Self { grid, halves, counts, rejected, blocks }))
+        Ok(Some(Self { grid, halves, counts, rejected, negative: 0, blocks }))
     }
 }
 

@@ -39,7 +39,7 @@ fn counts_have_a_limit() {
         let mut blocks = asked.clone();
         (blocks.spp, blocks.blocks[3].spp) = (of_tile, of_block);
         let refused = session.push_blocks(&blocks, &[[1.0; 3]; 32 * 32]);
-        assert!(matches!(refused, Err(FilmError::TooMany { .. })), "{refused:?}");
+        assert!(matches!(refused, Err(crate::SessionError::Film(FilmError::TooMany { .. }))), "{refused:?}");
     }
     assert_eq!(session.film().total_samples(), 0);
 }

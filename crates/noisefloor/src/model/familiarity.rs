@@ -1,6 +1,5 @@
 //! The textures that a model has been tried on.
 
-use crate::internal::nearest;
 use serde::{Deserialize, Serialize};
 
 /// How many times the samples an unfamiliar tile gets: its P is that of the same tile with this fraction of
@@ -30,6 +29,13 @@ impl Familiarity {
     pub fn includes(&self, numbers: &[f32]) -> bool {
         nearest(&self.zones, numbers) <= self.reach
     }
+}
+
+/// Distance of `point` to the nearest of `others`, which have its length; infinite if there are none.
+pub fn nearest<'a>(others: impl IntoIterator<Item = &'a Vec<f32>>, point: &[f32]) -> f32 {
+    let distance =
+        |other: &Vec<f32>| other.iter().zip(point).map(|(a, b)| (a - b) * (a - b)).sum::<f32>().sqrt();
+    others.into_iter().map(distance).fold(f32::INFINITY, f32::min)
 }
 
 #[cfg(test)]

@@ -1,9 +1,8 @@
 //! How the samples of a tile are spread over its blocks.
 
-use super::Session;
+use super::{Session, SessionError};
 use crate::blocks::{BlockRequest, BlockSamples, shares, spread};
 use crate::criterion::{StoppingCriterion, View};
-use crate::film::FilmError;
 use crate::rgb::Rgb;
 use crate::source::Request;
 use crate::tile::Tile;
@@ -51,9 +50,13 @@ impl<C: StoppingCriterion> Session<C> {
     /// over the tile.
     ///
     /// # Errors
-    /// [`FilmError`] if it does not fit; nothing is changed then.
-    pub fn push_blocks(&mut self, request: &BlockRequest, mean: &[Rgb]) -> Result<(), FilmError> {
-        self.film.add_blocks(request, mean)
+    /// As of [`Session::push`].
+    pub fn push_blocks(&mut self, request: &BlockRequest, mean: &[Rgb]) -> Result<(), SessionError> {
+        let place = self.film.check(request.tile.index, mean.len())?;
+        self.watch.check_light(&self.film, place, request.spp, mean)?;
+        self.film.add_blocks(request, mean)?;
+        self.watch.see(place, request.spp, mean);
+        Ok(())
     }
 
     /// Decides the shares of the blocks of those of these tiles that are open.

@@ -3,7 +3,7 @@
 use super::Session;
 use crate::criterion::StoppingCriterion;
 use crate::params::Schedule;
-use crate::session::TileState;
+use crate::session::Goal;
 use crate::source::Request;
 
 /// Most pixel samples requested in one call. A fast renderer takes about a second for it, so that cancelling,
@@ -22,7 +22,7 @@ impl<C: StoppingCriterion> Session<C> {
     /// double, so that the whole picture is seen soon.
     pub fn next_batches(&self) -> Vec<Request> {
         let wish = |index: usize| {
-            let goal = self.goal(index);
+            let goal = self.tiles[index].goal.spp();
             let counts = self.film.half_counts(index);
             (!self.is_due(index)).then(|| self.batch(index, counts, goal))
         };
@@ -52,7 +52,7 @@ impl<C: StoppingCriterion> Session<C> {
             return batches;
         }
         let mut counts = self.film.half_counts(tile);
-        let (mut goal, last) = (self.goal(tile), self.look_ahead(tile));
+        let (mut goal, last) = (self.tiles[tile].goal.spp(), self.look_ahead(tile));
         loop {
             while !self.has_enough(counts, goal) {
                 let batch = self.batch(tile, counts, goal);
@@ -70,19 +70,15 @@ impl<C: StoppingCriterion> Session<C> {
 
     /// Samples up to which a tile is unlikely to stop.
     fn look_ahead(&self, tile: usize) -> u64 {
-        let TileState { next, streak, verdict, target, .. } = self.tiles[tile];
-        match (self.params.schedule, verdict.and_then(|v| self.expected(&v)), target) {
-            (Schedule::Every { step }, Some(expected), None) if streak == 0 && self.params.blocks == 0 => {
-                Schedule::Spaced { step }.next(self.film.spp(tile), Some(expected), 1.0).max(next)
+        let expected = self.tiles[tile].verdict.and_then(|verdict| self.expected(&verdict));
+        match (self.params.schedule, expected, self.tiles[tile].goal) {
+            (Schedule::Every { step }, Some(expected), Goal::Verdict { spp, streak: 0 })
+                if self.params.blocks == 0 =>
+            {
+                Schedule::Spaced { step }.next(self.film.spp(tile), Some(expected), 1.0).max(spp)
             }
-            _ => target.unwrap_or(next),
+            (_, _, goal) => goal.spp(),
         }
-    }
-
-    /// Samples that the next verdict on a tile needs.
-    fn goal(&self, tile: usize) -> u64 {
-        let TileState { next, target, .. } = self.tiles[tile];
-        target.unwrap_or(next)
     }
 
     /// The next batch of a tile that has these samples in its halves.

@@ -97,15 +97,30 @@ pub struct Stop {
     pub unfamiliar: bool,
 }
 
-/// Where a tile stands.
+/// Where a tile stands: open for its goal, or stopped. One that stopped at a limit has its goal still, for a session
+/// that is resumed.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub(crate) struct TileState {
-    /// Judge at this many samples.
-    pub(crate) next: u64,
-    /// Verdicts in a row that said "converged".
-    pub(crate) streak: u32,
+    pub(crate) goal: Goal,
+    /// The last.
     pub(crate) verdict: Option<Verdict>,
-    /// Samples per pixel that this audience needs, once the tile has converged for the trained one.
-    pub(crate) target: Option<u64>,
     pub(crate) stop: Option<Stop>,
+}
+
+/// What a tile gets samples for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub(crate) enum Goal {
+    /// Its next verdict, at so many samples per pixel, after a streak of verdicts in a row that said "converged".
+    Verdict { spp: u64, streak: u32 },
+    /// What this audience wants, once the tile has converged for the trained one.
+    Audience { spp: u64 },
+}
+
+impl Goal {
+    /// Samples per pixel.
+    pub(crate) fn spp(self) -> u64 {
+        match self {
+            Self::Verdict { spp, .. } | Self::Audience { spp } => spp,
+        }
+    }
 }

@@ -120,6 +120,7 @@ fn one(
     let (comparison, pictures) =
         compare::run(source.as_mut(), entrants, setting, labels, denoiser, cancel, &watch)?;
     bars.finish();
+    comparison.warnings.iter().for_each(|warning| note!("warning: {warning}"));
 
     let plot = |cost| Ok((cost, compare::plot(&comparison, cost)?));
     let plots: Vec<_> = Cost::ALL.into_iter().map(plot).collect::<anyhow::Result<_>>()?;

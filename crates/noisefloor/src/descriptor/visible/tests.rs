@@ -1,5 +1,5 @@
 use super::*;
-use crate::internal::HALO;
+use crate::evidence::HALO;
 use crate::tile::TileGrid;
 use noisefloor_testkit::Noise;
 use noisefloor_vision::Viewing;

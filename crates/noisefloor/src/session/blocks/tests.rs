@@ -2,6 +2,7 @@ use super::*;
 use crate::criterion::{CriterionError, FixedSpp, Needs, Verdict};
 use crate::display::ToneMapping;
 use crate::film::Film;
+use crate::film::FilmError;
 use crate::params::{Params, Schedule};
 use noisefloor_testkit::Noise;
 
@@ -282,13 +283,16 @@ fn batches_of_other_blocks_are_refused() {
     empty.blocks[2].spp = 0;
     wrong.push(empty);
     for request in wrong {
-        assert_eq!(session.push_blocks(&request, &mean), Err(FilmError::Blocks(0)), "{request:?}");
+        assert_eq!(session.push_blocks(&request, &mean), Err(FilmError::Blocks(0).into()), "{request:?}");
     }
-    assert!(matches!(session.push_blocks(&right, &mean[1..]), Err(FilmError::Pixels { .. })));
+    assert!(matches!(
+        session.push_blocks(&right, &mean[1..]),
+        Err(SessionError::Film(FilmError::Pixels { .. }))
+    ));
     assert_eq!(session.film().total_samples(), 0);
     assert_eq!(session.push_blocks(&right, &mean), Ok(()));
     let mut without = Session::new(56, 40, Bright(96), params(0)).unwrap();
-    assert_eq!(without.push_blocks(&right, &mean), Err(FilmError::Blocks(0)));
+    assert_eq!(without.push_blocks(&right, &mean), Err(FilmError::Blocks(0).into()));
 }
 
 /// Where nobody sees noise, there is nothing to spread.

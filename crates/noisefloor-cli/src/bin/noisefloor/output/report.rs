@@ -40,6 +40,10 @@ pub(super) struct Report<'a> {
     samples_uniform: u64,
     /// Samples kept out by the film because they were not finite.
     samples_rejected: u64,
+    /// Samples whose batch had negative luminance.
+    samples_negative: u64,
+    /// What is likely to be wrong with the samples ([`noisefloor::watch`]).
+    warnings: Vec<String>,
     /// Samples that the renderer counted as black because they were not finite.
     samples_dropped: Option<u64>,
     /// Samples that were scaled down to `--clamp`.
@@ -99,6 +103,8 @@ impl<'a> Report<'a> {
             samples: session.film().total_samples(),
             samples_uniform: uniform_samples(session),
             samples_rejected: session.film().rejected(),
+            samples_negative: session.negative_samples(),
+            warnings: session.warnings().iter().map(ToString::to_string).collect(),
             samples_dropped: counts.map(|c| c.dropped),
             samples_clamped: counts.map(|c| c.clamped),
             samples_background: counts.map(|c| c.background),

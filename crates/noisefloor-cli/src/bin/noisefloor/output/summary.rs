@@ -20,6 +20,7 @@ impl Output {
         let counts = source.counts();
         for (count, what) in [
             (session.film().rejected(), "were not finite and were left out"),
+            (session.negative_samples(), "were negative on average over their batch"),
             (counts.map_or(0, |c| c.dropped), "were not finite and counted as black"),
             (counts.map_or(0, |c| c.clamped), "were brighter than --clamp and scaled down"),
         ] {

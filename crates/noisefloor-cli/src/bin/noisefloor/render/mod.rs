@@ -198,7 +198,14 @@ fn sample(
     let mut log = Log::new(run.quiet);
     let grid = driver.session().film().grid();
     let [mut checkpoints, mut pictures] = Pace::both(run.autosave, grid.width() * grid.height());
+    let mut told = 0;
+    let mut warn = |session: &Session<_>| {
+        let new = session.warnings().iter().skip(told);
+        bar.suspend(|| new.for_each(|warning| note!("warning: {warning}")));
+        told = session.warnings().len();
+    };
     let outcome = driver.run(|session, event| {
+        warn(session);
         let Event::BatchDone(progress) = event else { return };
         output.record(session, progress);
         progress::show(&bar, &mut log, session, progress);
@@ -215,6 +222,7 @@ fn sample(
         save(&mut pictures, &mut |output| output.write_pictures(session));
         save(&mut checkpoints, &mut |output| output.write_progress(session, snapshot(session, keeps)));
     });
+    warn(driver.session());
     bar.finish_and_clear();
     views.close(driver.session());
     outcome

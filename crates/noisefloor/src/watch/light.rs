@@ -51,39 +51,28 @@ pub struct LightCheck {
 }
 
 impl LightCheck {
-    /// Both checks, of the pixels of a tile: new samples alone, which no light leaves negative.
+    /// Looks at pixels of a tile: new samples alone, which no light leaves negative.
     ///
     /// # Errors
     /// [`ImpossibleLight`].
     pub fn check(&mut self, pixels: &[Rgb]) -> Result<(), ImpossibleLight> {
-        self.check_finite(pixels)?;
-        self.check_sign(pixels.iter().copied())
+        self.check_all(pixels.iter().copied())
     }
 
-    /// Whether most pixels are finite.
-    ///
-    /// # Errors
-    /// [`ImpossibleLight::NotFinite`].
-    pub fn check_finite(&self, pixels: &[Rgb]) -> Result<(), ImpossibleLight> {
-        let lost = pixels.iter().filter(|pixel| !is_finite(pixel)).count();
-        let share = lost as f64 / pixels.len().max(1) as f64;
-        if share > MOST_NON_FINITE {
-            return Err(ImpossibleLight::NotFinite { percent: 100.0 * share });
+    /// Whether most pixels are finite, and the light of those on average not less than none.
+    pub(super) fn check_all(&mut self, pixels: impl Iterator<Item = Rgb>) -> Result<(), ImpossibleLight> {
+        let (mut sum, mut finite, mut all) = (0.0, 0usize, 0usize);
+        for pixel in pixels {
+            all += 1;
+            if is_finite(&pixel) {
+                let light = f64::from(luminance(pixel));
+                (sum, finite) = (sum + light, finite + 1);
+                self.brightest = self.brightest.max(light);
+            }
         }
-        Ok(())
-    }
-
-    /// Whether there is light on average, and not less than none. For sources whose batches are differences
-    /// of stored pictures, this holds of all their samples together.
-    ///
-    /// # Errors
-    /// [`ImpossibleLight::Negative`].
-    pub fn check_sign(&mut self, pixels: impl Iterator<Item = Rgb>) -> Result<(), ImpossibleLight> {
-        let (mut sum, mut finite) = (0.0, 0usize);
-        for pixel in pixels.filter(is_finite) {
-            let light = f64::from(luminance(pixel));
-            (sum, finite) = (sum + light, finite + 1);
-            self.brightest = self.brightest.max(light);
+        let lost = (all - finite) as f64 / all.max(1) as f64;
+        if lost > MOST_NON_FINITE {
+            return Err(ImpossibleLight::NotFinite { percent: 100.0 * lost });
         }
         let mean = sum / finite.max(1) as f64;
         if mean < -ROUNDING * self.brightest - f64::from(f32::EPSILON) {

@@ -1,0 +1,248 @@
+//! Correlations of differences of batches, over all that was seen.
+
+use super::values::{Ends, Values};
+use super::{CERTAIN, FACTOR, Fault, LEAST_VALUES, NOTABLE, STRONG, Warning};
+
+/// Share of (a − b)² from which a seems much noisier than b: three times.
+const MUCH: f64 = 0.5;
+/// Standard errors from which it is worth to wait: p < 5·10⁻⁵, and there is one look.
+const DOUBTFUL: f64 = 4.5;
+
+/// The correlation of two differences x and y, each of mean 0: Σxy with what it is measured by.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Correlation {
+    sum: f64,
+    squares: f64,
+    left: f64,
+    right: f64,
+}
+
+impl Correlation {
+    pub(super) fn of(pairs: impl Iterator<Item = (f64, f64)>) -> Self {
+        let mut all = Self::default();
+        for (x, y) in pairs {
+            let term = x * y;
+            all.sum += term;
+            all.squares += term * term;
+            all.left += x * x;
+            all.right += y * y;
+        }
+        all
+    }
+
+    pub(super) fn add(&mut self, more: &Self) {
+        self.sum += more.sum;
+        self.squares += more.squares;
+        self.left += more.left;
+        self.right += more.right;
+    }
+
+    /// Standard errors from 0.
+    fn z(&self) -> f64 {
+        if self.squares > 0.0 { self.sum / self.squares.sqrt() } else { 0.0 }
+    }
+
+    /// −1…1.
+    fn value(&self) -> f64 {
+        let size = (self.left * self.right).sqrt();
+        if size > 0.0 { self.sum / size } else { 0.0 }
+    }
+}
+
+/// How often two differences x and y have the same sign: Σ sign(xy)·√|xy|. The root keeps a few outliers, which
+/// most noise of renderers has, from hiding what all other pixels say.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Concordance {
+    sum: f64,
+    squares: f64,
+    sizes: f64,
+}
+
+impl Concordance {
+    /// Of one tile, as one term if its pixels share samples.
+    pub(super) fn of(pairs: impl Iterator<Item = (f64, f64)>, as_one: bool) -> Self {
+        let mut all = Self::default();
+        for (x, y) in pairs {
+            let product = x * y;
+            let size = product.abs().sqrt();
+            all.sum += size.copysign(product);
+            all.squares += size * size;
+            all.sizes += size;
+        }
+        if as_one {
+            all.squares = all.sum * all.sum;
+        }
+        all
+    }
+
+    pub(super) fn add(&mut self, more: &Self) {
+        self.sum += more.sum;
+        self.squares += more.squares;
+        self.sizes += more.sizes;
+    }
+
+    /// Standard errors from 0.
+    fn z(&self) -> f64 {
+        if self.squares > 0.0 { self.sum / self.squares.sqrt() } else { 0.0 }
+    }
+
+    /// −1…1: 1 if all signs agree.
+    fn value(&self) -> f64 {
+        if self.sizes > 0.0 { self.sum / self.sizes } else { 0.0 }
+    }
+}
+
+/// Energies e and f that should be equal: Σ(e − f), with what it is measured by.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Energies {
+    one: f64,
+    other: f64,
+    squares: f64,
+}
+
+impl Energies {
+    pub(super) fn see(&mut self, one: f64, other: f64) {
+        self.one += one;
+        self.other += other;
+        self.squares += (one - other) * (one - other);
+    }
+
+    /// How many times the energy of the other the one has.
+    fn ratio(&self) -> f64 {
+        self.one / self.other
+    }
+
+    fn add(&mut self, more: &Self) {
+        self.one += more.one;
+        self.other += more.other;
+        self.squares += more.squares;
+    }
+
+    /// The larger over the smaller, if that is neither chance nor nothing.
+    fn factor(&self) -> Option<f64> {
+        let z = (self.one - self.other).abs() / self.squares.sqrt();
+        let factor = self.ratio().max(1.0 / self.ratio());
+        (z > CERTAIN && factor > FACTOR).then_some(factor)
+    }
+}
+
+/// What was found in groups of batches.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Sums {
+    /// Of a − c and b − d.
+    pub(super) batches: Concordance,
+    /// The same without what all pixels of a tile have in common.
+    pub(super) apart: Concordance,
+    /// Of a − b and a + b − 2c.
+    pub(super) nested: Correlation,
+    /// Of a − b and a + b less the same of its neighbours: is a noisier than b, by two batches alone?
+    pub(super) early: Concordance,
+    /// Σ(a − b)(a + b − neighbours) and Σ(a − b)² of the same.
+    pub(super) early_energies: [f64; 2],
+    /// Of a − b and the same one pixel beside.
+    pub(super) neighbours: Correlation,
+    /// n·(a − b)² of sixteen watched pixels, and m·(c − d)².
+    pub(super) counts: Energies,
+    /// (a − b)² and (c − d)² of equal batches: steps of a running mean become smaller.
+    pub(super) steps: Energies,
+    /// (Σ(a − b))² of four watched pixels in a row, and Σ(a − b)².
+    pub(super) rows: [f64; 2],
+    pub(super) ends: Ends,
+}
+
+impl Sums {
+    pub(super) fn add(&mut self, more: &Self) {
+        self.batches.add(&more.batches);
+        self.apart.add(&more.apart);
+        self.nested.add(&more.nested);
+        self.early.add(&more.early);
+        self.early_energies.iter_mut().zip(more.early_energies).for_each(|(sum, more)| *sum += more);
+        self.neighbours.add(&more.neighbours);
+        self.counts.add(&more.counts);
+        self.steps.add(&more.steps);
+        self.rows.iter_mut().zip(more.rows).for_each(|(sum, more)| *sum += more);
+        self.ends.add(more.ends);
+    }
+
+    /// By how much watched pixels that are not independent widen z: at least 1.
+    fn widening(&self) -> f64 {
+        let [sums, all] = self.rows;
+        if all > 0.0 { (sums / all).max(1.0).sqrt() } else { 1.0 }
+    }
+
+    /// Standard errors from 0, with care.
+    fn z(&self, of: &Concordance) -> f64 {
+        of.z() / self.widening()
+    }
+
+    /// The correlation of batches and its z: the smaller ones of all noise and of that which pixels have for
+    /// themselves, since a few noisy pixels decide what is in common.
+    fn of_batches(&self) -> (f64, f64) {
+        let smaller = |x: f64, y: f64| if x * y > 0.0 { x.abs().min(y.abs()).copysign(x) } else { 0.0 };
+        let value = smaller(self.batches.value(), self.apart.value());
+        (smaller(self.z(&self.batches), self.z(&self.apart)), value)
+    }
+
+    /// How many times the noise energy of b a seems to have, if that is much and no four batches say more yet. It
+    /// is 99 if b is a running mean, which has (a − b)(a + b) = (a − b)² on average.
+    pub(super) fn doubt(&self) -> Option<f64> {
+        let share = self.falling().filter(|_| self.batches.sizes == 0.0)?.min(0.98);
+        Some((1.0 + share) / (1.0 - share))
+    }
+
+    /// By which share of (a − b)² a is noisier than b, if by much.
+    fn falling(&self) -> Option<f64> {
+        let [falls, all] = self.early_energies;
+        Some(falls / all).filter(|&share| share > MUCH && self.z(&self.early) > DOUBTFUL)
+    }
+
+    pub(super) fn fault(&self) -> Result<(), Fault> {
+        let (z, correlation) = self.of_batches();
+        if z < CERTAIN || correlation < STRONG {
+            return Ok(());
+        }
+        Err(if self.steps.ratio() > FACTOR || self.falling().is_some() {
+            Fault::Running { correlation }
+        } else {
+            Fault::Shared { correlation }
+        })
+    }
+
+    pub(super) fn warnings(&self, shared: bool) -> impl Iterator<Item = Warning> {
+        let mut warnings = Vec::new();
+        let (z, value) = self.of_batches();
+        if z > CERTAIN && value < STRONG {
+            warnings.push(Warning::Shared(value));
+        }
+        if z < -CERTAIN && value < -NOTABLE {
+            warnings.push(Warning::Anticorrelated(value));
+        }
+        let whole = self.batches.value();
+        if !shared && self.z(&self.batches) > CERTAIN && whole > STRONG && z < CERTAIN {
+            warnings.push(Warning::Changing(whole));
+        }
+        // With k times the energy in a, and as much in c as in b, it is (k − 1)/√((k + 1)(k + 5))
+        let r = self.nested.value();
+        let noise = (1.0 + 3.0 * r * r + r * (12.0 + 4.0 * r * r).sqrt()) / (1.0 - r * r);
+        if !shared
+            && self.nested.z().abs() / self.widening() > CERTAIN
+            && !(1.0 / FACTOR..FACTOR).contains(&noise)
+        {
+            warnings.push(Warning::Noise(noise.max(0.0)));
+        }
+        let (z, beside) = (self.neighbours.z(), self.neighbours.value());
+        if !shared && z.abs() > CERTAIN && beside.abs() > NOTABLE {
+            warnings.push(Warning::Neighbours(beside));
+        }
+        warnings.extend(self.counts.factor().map(Warning::Counts));
+        warnings.into_iter()
+    }
+
+    /// Noise that ends at 1, where nothing is above 1.
+    pub(super) fn clipped(&self, values: &Values) -> Option<Warning> {
+        let Ends { noisy, at_white } = self.ends;
+        let share = at_white as f64 / noisy.max(1) as f64;
+        let said = !values.above_one && at_white >= LEAST_VALUES / 4 && share > 0.05;
+        said.then_some(Warning::Clipped(100.0 * share))
+    }
+}

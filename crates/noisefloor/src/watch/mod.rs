@@ -1,0 +1,320 @@
+//! Notices when a session is fed wrongly: running means in place of new samples, one seed for every batch,
+//! pictures that were encoded for a screen, light that cannot be.
+//!
+//! A [`Session`](crate::Session) watches every push. What is certain is a [`Fault`], an error of the push or of
+//! the next verdicts, so that no tile says "converged" on the strength of it. What is likely is a [`Warning`],
+//! once, with the number it rests on ([`Session::warnings`](crate::Session::warnings)). Samples and verdicts
+//! of a session that gives no fault are those of one that does not watch, to the bit.
+//!
+//! # What is watched
+//! One pixel in each square of 8×8 pixels and its two neighbours, in small pictures one in 4×4, and four times as
+//! many in the first four batches: what is farther apart than a pixel filter reaches counts as independent. Four successive batches a, b, c, d of a tile make a
+//! *group*.
+//!
+//! | watched | from | says |
+//! |---|---|---|
+//! | a − b against 0, where the tile is rough | two batches | [`Fault::Repeated`] |
+//! | correlation of a − c with b − d | a group | [`Fault::Shared`], [`Warning::Shared`], [`Warning::Anticorrelated`] |
+//! | the same, while (c − d)² is smaller than (a − b)² | a group | [`Fault::Running`] |
+//! | the same, but only with what all pixels of a tile have in common | a group | [`Warning::Changing`] |
+//! | correlation of a − b with a + b − 2c: is a noisier than b? | a group | [`Warning::Noise`] |
+//! | the same with the neighbours in place of c, until there is a group | two batches | [`Warning::Noise`], and no tile stops before there is one |
+//! | (a − b)²·n against (c − d)²·m | a group | [`Warning::Counts`] |
+//! | correlation of a − b with itself one pixel beside | two batches | [`Warning::Neighbours`] |
+//! | values that are k/255, or the sRGB decoding of one | two batches | [`Fault::Quantised`] |
+//! | noise that ends at exactly 1 | two batches | [`Warning::Clipped`] |
+//! | one value everywhere | two batches | [`Warning::Constant`] |
+//! | infinities, NaN, light below 0 | a batch | [`Fault::Light`] |
+//!
+//! # How often chance alone says so
+//! If samples are independent and a and c have equal sizes, exchanging a pixel's a and c leaves everything
+//! as likely and changes the sign of its term t = ±√|(a − c)(b − d)|. Given all |t| the signs are fair coins, and
+//! z = Σt/√Σt² exceeds 6.5 with p < exp(−6.5²/2) = 7·10⁻¹⁰, however the noise is distributed (Hoeffding
+//! 1963); the root keeps a few fireflies from hiding the rest. So it is for the other correlations. Sums are looked at once before each round of verdicts, over all
+//! groups so far and over the new ones alone: in 10,000 rounds, and with three correlations of two signs, by
+//! chance with p < 10⁻⁴. Three things are not exact and were measured instead (`tests/tests/it/watch.rs`): sizes
+//! may differ by a factor of 2. The z of batches has to be as large, and of the same sign, without what the noise
+//! of a tile has in common with its picture, since a Markov chain's brightness wanders as a whole. And z is
+//! divided by √R, where R is how much more energy the noise of four watched pixels in a row has in sum than
+//! in each. A source that says that its pixels share samples
+//! ([`PixelNoise::Shared`](crate::source::PixelNoise)) gives one term a tile. Certain is only what has, in
+//! addition, a correlation Σt/Σ|t| of at least a fifth; running means have 0.4 and more.
+//!
+//! # What is not noticed
+//! Faults in fewer than four batches of a tile, but for repeated ones. Pictures encoded for a screen in floating
+//! point whose noise does not reach white: equal batches of them are as independent as any. Counts that are all
+//! wrong by one factor.
+
+mod correlation;
+mod group;
+mod light;
+mod points;
+mod values;
+
+pub use light::{ImpossibleLight, LightCheck};
+
+use crate::film::Film;
+use crate::rgb::Rgb;
+use crate::source::PixelNoise;
+use crate::tile::{Tile, TileGrid};
+use correlation::Sums;
+use group::TileWatch;
+use points::Points;
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+use values::Values;
+
+/// Standard errors that chance does not reach: p < 7·10⁻¹⁰.
+const CERTAIN: f64 = 6.5;
+/// Correlation from which a fault is certain. Running means have at least 0.4.
+const STRONG: f64 = 0.2;
+/// Correlation from which one of neighbours is worth a warning.
+const NOTABLE: f64 = 0.1;
+/// Ratio of two noise energies from which they are worth a warning.
+const FACTOR: f64 = 1.5;
+/// Watched values without which nothing is said about values.
+const LEAST_VALUES: u64 = 64;
+/// Groups of a tile of which each is watched; then every fourth.
+const DENSE: u64 = 4;
+
+/// A fault of what a session was fed with that leaves no doubt. Nothing can be judged by such samples.
+#[derive(Clone, Copy, Debug, Error, PartialEq)]
+#[non_exhaustive]
+pub enum Fault {
+    /// Light that cannot be. The batch was refused.
+    #[error("tile {tile}: {light}")]
+    Light {
+        /// The tile.
+        tile: usize,
+        /// What is wrong with it.
+        light: ImpossibleLight,
+    },
+    /// Batches equal to those before.
+    #[error(
+        "{tiles} of {of} tiles got the same batch twice: give every batch random numbers of its own, such as a \
+         seed that counts batches"
+    )]
+    Repeated {
+        /// Tiles that got one twice.
+        tiles: usize,
+        /// Tiles that got two batches and have noise.
+        of: usize,
+    },
+    /// Batches that contain the ones before.
+    #[error(
+        "batches contain the samples of the ones before (correlation {correlation:.2}): push means of new samples \
+         only, or running means by push_running"
+    )]
+    Running {
+        /// Correlation of what should be independent.
+        correlation: f64,
+    },
+    /// Batches that follow each other are more alike than others.
+    #[error(
+        "successive batches are alike (correlation {correlation:.2}): they share samples, because seeds repeat or \
+         overlap, or the scene changes while it is rendered"
+    )]
+    Shared {
+        /// Correlation of what should be independent.
+        correlation: f64,
+    },
+    /// Pictures of 8 bits a channel.
+    #[error(
+        "all values are {encoding} of 8 bits: push linear radiance in floating point, before it is converted"
+    )]
+    Quantised {
+        /// What 8-bit numbers they are.
+        encoding: Encoding,
+    },
+}
+
+/// How 8-bit numbers were turned into radiance.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Encoding {
+    /// k/255, or k.
+    Linear,
+    /// The sRGB decoding of k/255.
+    Srgb,
+}
+
+impl std::fmt::Display for Encoding {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Linear => "numbers",
+            Self::Srgb => "sRGB-decoded numbers",
+        })
+    }
+}
+
+/// A likely fault of what a session was fed with. Its text has the number that it rests on.
+#[derive(Clone, Copy, Debug, PartialEq, Error)]
+#[non_exhaustive]
+pub enum Warning {
+    /// Neighbouring pixels share samples.
+    #[error(
+        "the noise of neighbouring pixels is correlated ({0:.2}): by a pixel filter, a denoiser or splats; verdicts \
+         are made for independent pixels, and come too early or too late"
+    )]
+    Neighbours(f64),
+    /// Successive batches are a little alike.
+    #[error(
+        "successive batches are correlated ({0:.2}): verdicts take noise for smaller than it is, and come too early"
+    )]
+    Shared(f64),
+    /// Whole tiles become brighter or darker.
+    #[error(
+        "the brightness of whole tiles changes from batch to batch (correlation {0:.2}): if the scene changes, render \
+         each state by itself; if a Markov chain does, say that pixels share samples"
+    )]
+    Changing(f64),
+    /// Batches complement each other.
+    #[error(
+        "successive batches are anticorrelated ({0:.2}), as points of one quasi-random sequence are: verdicts take \
+         noise for larger than it is, and come late"
+    )]
+    Anticorrelated(f64),
+    /// Batches of one size have different noise.
+    #[error(
+        "batches of equal size differ in noise: the earlier has {0:.2} times the energy of the later; verdicts \
+         expect it to depend on the number of samples only"
+    )]
+    Noise(f64),
+    /// Noise does not fall with the number of samples.
+    #[error(
+        "the noise of batches does not follow their numbers of samples: times the number, its energy differs by a \
+         factor of {0:.2}; push with each batch the number of samples it really has"
+    )]
+    Counts(f64),
+    /// Noise is cut off at white.
+    #[error(
+        "no value is above 1, and the noise of {0:.0} % of the noisy pixels ends there: push linear radiance, not \
+         what is shown on a screen"
+    )]
+    Clipped(f64),
+    /// One value everywhere.
+    #[error("every pixel of every batch is {0}: is this what was rendered?")]
+    Constant(f32),
+}
+
+/// Watches what one session gets.
+#[derive(Clone, Debug)]
+pub(crate) struct Watch {
+    grid: TileGrid,
+    points: Points,
+    /// Pixels share samples, as their source says.
+    shared: bool,
+    tiles: Vec<TileWatch>,
+    light: LightCheck,
+    values: Values,
+    /// Of all groups, and of those since the last look.
+    sums: [Sums; 2],
+    warnings: Vec<Warning>,
+}
+
+impl Watch {
+    pub(crate) fn new(grid: TileGrid) -> Self {
+        Self {
+            grid,
+            points: Points::new(grid),
+            shared: false,
+            tiles: vec![TileWatch::default(); grid.len()],
+            light: LightCheck::default(),
+            values: Values::default(),
+            sums: [Sums::default(); 2],
+            warnings: Vec::new(),
+        }
+    }
+
+    pub(crate) fn set_pixels(&mut self, pixels: PixelNoise) {
+        self.shared = pixels == PixelNoise::Shared;
+    }
+
+    pub(crate) fn warnings(&self) -> &[Warning] {
+        &self.warnings
+    }
+
+    /// Whether a batch that fits its tile can be light at all, together with what the film has.
+    pub(crate) fn check_light(
+        &mut self,
+        film: &Film,
+        tile: Tile,
+        spp: u64,
+        mean: &[Rgb],
+    ) -> Result<(), Fault> {
+        // The watched pixels first, and all only if those look wrong
+        let Err(seen) = self.light.check_all(self.points.of(tile).map(|pixel| mean[pixel])) else {
+            return Ok(());
+        };
+        let checked = if matches!(seen, ImpossibleLight::NotFinite { .. }) {
+            self.light.check_all(mean.iter().copied())
+        } else {
+            // New samples may be differences of stored pictures: all that there are have to be light together
+            let had = film.spp(tile.index) as f64;
+            let (old, new) = (had / (had + spp as f64), spp as f64 / (had + spp as f64));
+            self.light.check_all(tile.rows(self.grid.width()).flatten().zip(mean).map(|(pixel, new_mean)| {
+                let before = film.pixel(tile.index, pixel);
+                std::array::from_fn(|c| (f64::from(before[c]) * old + f64::from(new_mean[c]) * new) as f32)
+            }))
+        };
+        checked.map_err(|light| Fault::Light { tile: tile.index, light })
+    }
+
+    /// Takes notice of a batch that was added.
+    pub(crate) fn see(&mut self, tile: Tile, spp: u64, mean: &[Rgb]) {
+        let watch = &mut self.tiles[tile.index];
+        let batch = watch.batches;
+        watch.batches += 1;
+        let group = batch / 4;
+        if group >= DENSE && !group.is_multiple_of(4) {
+            return;
+        }
+        let light = |pixel| points::light(mean, pixel);
+        if group == 0 {
+            self.points.of(tile).for_each(|pixel| self.values.see(mean[pixel]));
+            watch.see(spp, self.points.at_first(tile).map(light).collect());
+        } else {
+            watch.see(spp, self.points.of(tile).map(light).collect());
+        }
+        if let Some(found) = watch.compare(self.shared) {
+            self.sums.iter_mut().for_each(|sums| sums.add(&found));
+        }
+    }
+
+    /// Looks at all that was seen, before a verdict.
+    pub(crate) fn look(&mut self) -> Result<(), Fault> {
+        self.check_repeats()?;
+        if let Some(encoding) = self.values.quantised() {
+            return Err(Fault::Quantised { encoding });
+        }
+        for sums in self.sums {
+            sums.fault()?;
+        }
+        let found = self.sums.iter().flat_map(|sums| sums.warnings(self.shared));
+        let found = found.chain(self.sums[0].doubt().map(Warning::Noise));
+        let found: Vec<Warning> =
+            found.chain(self.sums[0].clipped(&self.values)).chain(self.values.constant()).collect();
+        for warning in found {
+            let kind = std::mem::discriminant(&warning);
+            if !self.warnings.iter().any(|known| std::mem::discriminant(known) == kind) {
+                self.warnings.push(warning);
+            }
+        }
+        self.sums[1] = Sums::default();
+        Ok(())
+    }
+
+    /// Whether the first two batches look like running means, which four will show: nothing may stop till then.
+    pub(crate) fn doubts(&self) -> bool {
+        self.sums[0].doubt().is_some()
+    }
+
+    /// Whether half of the noisy tiles got a batch twice.
+    fn check_repeats(&self) -> Result<(), Fault> {
+        let noisy = self.tiles.iter().filter(|tile| tile.noisy);
+        let (tiles, of) = noisy.fold((0, 0), |(n, of), tile| (n + usize::from(tile.repeated), of + 1));
+        if 2 * tiles > of { Err(Fault::Repeated { tiles, of }) } else { Ok(()) }
+    }
+}
+
+#[cfg(test)]
+mod tests;
