@@ -50,3 +50,12 @@ fn triangles_without_area_are_left_out() {
     let scene = b.build().unwrap();
     assert_eq!((scene.surfaces(), scene.lights()), (2, 1));
 }
+
+#[test]
+fn too_little_memory_is_an_error() {
+    let bytes = usize::MAX / 4;
+    assert_eq!(crate::check_memory(bytes), Err(SceneError::Memory { bytes }));
+    assert_eq!(crate::check_memory(1000), Ok(()));
+    let said = SceneError::Memory { bytes: 7 }.to_string();
+    assert!(said.starts_with("there is no memory for 7 bytes more"), "{said}");
+}
