@@ -16,7 +16,7 @@ pub(crate) const VERSION: u32 = 3;
 /// blocks each.
 pub(crate) const MAX_HEADER: u64 = 64 << 20;
 /// Version of the format of plans; the first one held words of a command line.
-pub(crate) const PLAN_VERSION: u64 = 2;
+pub(crate) const PLAN_VERSION: u64 = 3;
 
 /// Why a shard cannot be used.
 #[derive(Debug, Error)]

@@ -209,6 +209,25 @@ fn what_is_wrong_with_a_farm_is_said() {
     assert_eq!(json(&dir.join("frame/report.json"))["complete"], true);
 }
 
+/// Two builds on one farm would mix their samples: the plan knows who made it.
+#[test]
+fn another_build_is_refused() {
+    let folder = tempdir().unwrap();
+    let dir = folder.path().join("farm");
+    plan(&dir, &[], "bulb --size 32x32 --tile 32 --criterion spp:20");
+    let path = dir.join("farm.json");
+    let mut kept = json(&path);
+    let program = kept["job"]["program"].as_str().unwrap().to_owned();
+    assert_eq!(program, blake3::hash(&fs::read(env!("CARGO_BIN_EXE_noisefloor")).unwrap()).to_hex().as_str());
+    kept["job"]["program"] = "0".repeat(64).into();
+    fs::write(&path, kept.to_string()).unwrap();
+    fail(&["farm", "run", text(&dir), "--local", "1"], &["another build", "plan the farm anew"]);
+    fail(&["farm", "task", text(&dir), "1", "0"], &["another build"]);
+    kept["job"]["program"] = program.into();
+    fs::write(&path, kept.to_string()).unwrap();
+    succeed(&["farm", "run", text(&dir), "--local", "1", "--quiet"]);
+}
+
 /// A finished picture is the farm's only if it is of the farm's job: it is compared, always.
 #[test]
 fn a_finished_render_of_another_job_is_not_the_farms() {

@@ -19,10 +19,11 @@ use noisefloor_farm::{
 };
 use serde::{Deserialize, Serialize};
 use std::cell::Cell;
+use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, OnceLock};
 use std::time::Duration;
 
 /// What is missing is named so far.
@@ -33,6 +34,26 @@ const MOST_NAMED: usize = 5;
 pub struct FarmRender {
     pub job: RenderJob,
     pub resources: Resources,
+    /// BLAKE3 of the program that planned it. Another one may take other samples for the same job.
+    program: String,
+}
+
+impl FarmRender {
+    pub fn new(job: RenderJob, resources: Resources) -> anyhow::Result<Self> {
+        Ok(Self { job, resources, program: program_digest()? })
+    }
+
+    fn check_program(&self) -> anyhow::Result<()> {
+        let here = program_digest()?;
+        anyhow::ensure!(
+            here == self.program,
+            "this noisefloor is another build than the one that planned the farm ({:.8}, not {:.8}), and may take \
+             other samples: run that one on every node, or plan the farm anew in another folder",
+            here,
+            self.program
+        );
+        Ok(())
+    }
 }
 
 /// This command, as a farm sees it.
@@ -70,6 +91,19 @@ fn absolute(dir: &Path) -> anyhow::Result<PathBuf> {
 /// This command, for other processes and nodes.
 fn program() -> anyhow::Result<PathBuf> {
     std::env::current_exe().context("the path of this program")
+}
+
+/// BLAKE3 of this program, hexadecimal.
+fn program_digest() -> anyhow::Result<String> {
+    static DIGEST: OnceLock<String> = OnceLock::new();
+    if let Some(digest) = DIGEST.get() {
+        return Ok(digest.clone());
+    }
+    let path = program()?;
+    let mut hasher = blake3::Hasher::new();
+    let read = File::open(&path).and_then(|file| hasher.update_reader(file).map(|_| ()));
+    read.with_context(|| path.display().to_string())?;
+    Ok(DIGEST.get_or_init(|| hasher.finalize().to_hex().to_string()).clone())
 }
 
 fn plan(PlanTask { dir, frames, tasks, keep, render }: PlanTask) -> anyhow::Result<ExitCode> {
@@ -128,7 +162,8 @@ fn deliver(dir: &Path, round: usize, task: usize) -> anyhow::Result<ExitCode> {
     let here = Here::new(false);
     let farm = here.farm(dir)?;
     let order = farm.order(round, task)?;
-    let FarmRender { job, resources } = &order.job;
+    let FarmRender { job, resources, .. } = &order.job;
+    order.job.check_program()?;
     resources.start_threads()?;
     let opened = job.source.open(*resources)?;
     opened.warn();
@@ -179,10 +214,11 @@ impl Studio for Here {
     const CHECKPOINT: &'static str = JOB;
 
     fn of_frame(&self, render: &FarmRender, frame: u32) -> FarmRender {
-        FarmRender { job: render.job.of_frame(frame), resources: render.resources }
+        FarmRender { job: render.job.of_frame(frame), ..render.clone() }
     }
 
     fn open(&self, render: &FarmRender) -> Result<FrameSource, StudioError> {
+        render.check_program()?;
         let opened = render.job.source.open(render.resources)?;
         if !self.warned.replace(true) {
             opened.warn();
@@ -191,6 +227,7 @@ impl Studio for Here {
     }
 
     fn session(&self, render: &FarmRender, (width, height): (usize, usize)) -> Result<Session, StudioError> {
+        render.check_program()?;
         let Ready { params, oracle } = render.job.read()?;
         let criterion = render.job.criterion.of(oracle.as_ref()).context("a farm does not denoise")?;
         Ok(Session::new(width, height, criterion, params)?)

@@ -238,5 +238,5 @@ fn renders(typed: Vec<OsString>, frames: bool) -> anyhow::Result<FarmRender> {
     if frames {
         job.source.check_frames()?;
     }
-    Ok(FarmRender { job: job.absolute()?, resources })
+    FarmRender::new(job.absolute()?, resources)
 }
