@@ -5,12 +5,13 @@ use noisefloor_testkit::{Requirement, require};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// Runs a program to its end, and returns what it printed.
+/// Runs a program to its end, and returns what it printed. What it says beside must not be a warning of a session.
 fn run(command: &mut Command) -> String {
     let output = command.output().unwrap_or_else(|error| panic!("{command:?}: {error}"));
     let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
     let (out, err) = (text(&output.stdout), text(&output.stderr));
     assert!(output.status.success(), "{command:?}: {}\n{out}\n{err}", output.status);
+    assert!(!err.contains("warning: "), "{err}");
     out
 }
 

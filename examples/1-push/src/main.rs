@@ -61,3 +61,21 @@ fn random(n: u64) -> f32 {
     let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
     ((z ^ (z >> 31)) >> 40) as f32 / (1 << 24) as f32
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nothing_is_wrong_with_its_samples() {
+        let params = Params::default().with_tile(64).with_max_spp(200);
+        let mut session = Session::new(WIDTH, HEIGHT, Oracle::bundled(), params).unwrap();
+        while !session.is_done() {
+            for request in session.requests() {
+                session.push(request.tile.index, request.spp, &render(&request)).unwrap();
+            }
+            session.judge().unwrap();
+        }
+        assert_eq!(session.warnings(), []);
+    }
+}
