@@ -103,7 +103,7 @@ fn killed_farms_give_the_picture_of_one_machine() {
     assert!(output.status.success(), "{}", stderr(&output));
     assert_same(&one, &merged);
     // Scene and renderer are those of the render, whatever the folder is called
-    for key in ["scene", "source", "seed", "job"] {
+    for key in ["scene", "source", "seed", "job", "render"] {
         let said = |dir: &Path| json(&dir.join("report.json"))[key].clone();
         assert_eq!(said(&merged), said(&one), "{key}");
     }

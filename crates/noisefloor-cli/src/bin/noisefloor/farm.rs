@@ -250,8 +250,7 @@ impl Studio for Here {
     ) -> Result<Box<dyn RenderFiles>, StudioError> {
         let FrameJob { scene, source, .. } = frame;
         let (folder, earlier) = (Folder::claim(folder.to_owned())?, Earlier::of(force, false));
-        let seed = render.job.source.seed;
-        let mut output = Output::create(folder, earlier, scene.clone(), source.clone(), seed)?;
+        let mut output = Output::create(folder, earlier, scene.clone(), source.clone(), render.job.clone())?;
         // Only sources that repeat their samples are on a farm
         output.origin = render.job.source.origin(scene, source, true)?;
         output.model = render.job.read()?.oracle.map(|oracle| oracle.model().digest());

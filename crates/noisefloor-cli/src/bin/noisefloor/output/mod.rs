@@ -9,6 +9,7 @@ mod tiles;
 pub use denoised::{Denoised, ERROR_SCALE};
 pub use summary::say_noise;
 
+use crate::job::RenderJob;
 use anyhow::Context;
 use noisefloor::{
     Checkpoint, Rgb, Session,
@@ -45,7 +46,7 @@ pub struct Output {
     folder: Folder,
     pub scene: String,
     pub source: String,
-    seed: u64,
+    job: RenderJob,
     /// Digest of the model.
     pub model: Option<String>,
     /// To compare with: as many pixels as are rendered.
@@ -75,7 +76,7 @@ impl Output {
         earlier: Earlier,
         scene: String,
         source: String,
-        seed: u64,
+        job: RenderJob,
     ) -> anyhow::Result<Self> {
         if let Some(occupied) = occupied(&folder, earlier) {
             return Err(occupied.into());
@@ -88,7 +89,7 @@ impl Output {
             folder,
             scene,
             source,
-            seed,
+            job,
             model,
             reference,
             origin,

@@ -3,6 +3,7 @@
 use super::denoised::DenoisedReport;
 use super::tiles::TileState;
 use super::{Output, Over, typical_threshold, uniform_samples};
+use crate::job::RenderJob;
 use noisefloor::{Params, Session, criterion::ExpectedThreshold};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -22,6 +23,8 @@ pub(super) struct Report<'a> {
     /// What samples and verdicts depend on ([`noisefloor::Checkpoint::job_digest`]); null for a render that
     /// cannot be resumed.
     job: Option<&'a str>,
+    /// What was asked for, as farms keep it.
+    render: &'a RenderJob,
     params: &'a Params,
     /// Display exposure that was settled.
     exposure: Option<f32>,
@@ -89,10 +92,11 @@ impl<'a> Report<'a> {
             source: &output.source,
             width: grid.width(),
             height: grid.height(),
-            seed: output.seed,
+            seed: output.job.source.seed,
             criterion: session.criterion().name(),
             model: output.model.as_deref(),
             job,
+            render: &output.job,
             params: session.params(),
             exposure: session.display().map(noisefloor::display::Display::exposure),
             complete: clock.is_some() && tiles.iter().all(TileState::is_final),

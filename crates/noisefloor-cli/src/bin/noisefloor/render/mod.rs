@@ -82,7 +82,7 @@ pub fn run(run: &RenderRun) -> anyhow::Result<ExitCode> {
     let folder = run.out.as_deref().map_or_else(|| PathBuf::from("out").join(&scene), PathBuf::from);
     let origin = job.source.origin(&scene, name, info.repeats == Repeats::Samples)?;
     let folder = Folder::claim(folder)?;
-    let mut output = Output::create(folder, run.earlier, scene, name.clone(), job.source.seed)?;
+    let mut output = Output::create(folder, run.earlier, scene, name.clone(), job.clone())?;
     output.model = oracle.map(|oracle| oracle.model().digest());
     (output.reference, output.origin, output.denoised) = (reference, origin, denoised);
     if resume {
