@@ -9,8 +9,8 @@
 //! | [`Dammertz`] | `dammertz:0.0046` | the error of a block is small (Dammertz et al. 2010) |
 //! | [`CyclesAdaptive`] | `cycles:0.01` | the relative error of a pixel is small (Blender) |
 //! | [`LuxCoreHalt`] | `luxcore:0.31` | few displayed pixels have changed (LuxCoreRender) |
-//! | [`Myszkowski1998`] | `vdp-stages:0.55` | nobody sees a difference between successive stages |
-//! | [`Takouachet2007`] | `vdp-first:0.66` | the difference from the first, noisy picture stops growing |
+//! | [`Myszkowski1998`] | `vdp-stages:0.94` | nobody sees a difference between successive stages |
+//! | [`Takouachet2007`] | `vdp-first:0.74` | the difference from the first, noisy picture stops growing |
 //! | [`ConvergedCvvdp`] | `cvvdp:0.3` | it hardly differs from the *converged* picture: a yardstick |
 //!
 //! [`parse`] makes a criterion from such a spec; [`RIVALS`] lists those with one open constant, to be fitted

@@ -170,7 +170,7 @@ fn known() -> String {
 
 /// A criterion by its name, and after a colon its constant, or the default without one; `spp` needs its
 /// number: `"spp:256"`, `"time:30"` (seconds), `"relative-error:0.17"`, `"dammertz:0.0046"`,
-/// `"cycles:0.01"`, `"luxcore:0.31"`, `"vdp-stages:0.55"`, `"vdp-first:0.66"`, `"cvvdp:0.3"`. Checked when
+/// `"cycles:0.01"`, `"luxcore:0.31"`, `"vdp-stages:0.94"`, `"vdp-first:0.74"`, `"cvvdp:0.3"`. Checked when
 /// it is parsed; files keep the text.
 #[derive(Clone, Debug)]
 pub struct RivalSpec {
@@ -262,7 +262,7 @@ mod tests {
             ("cycles: 0.1", "Cycles, threshold 0.1"),
             ("luxcore:1e-2", "LuxCore, 0.01 of the pixels"),
             ("vdp-stages:0.6", "Myszkowski 1998, P 0.6"),
-            ("vdp-first", "Takouachet et al. 2007, P 0.66"),
+            ("vdp-first", "Takouachet et al. 2007, P 0.74"),
             ("cvvdp:0.5", "ColorVideoVDP against the converged picture, 0.5 JOD"),
         ] {
             assert_eq!(parse(spec).unwrap().name(), name, "{spec}");
