@@ -1,32 +1,12 @@
 // Requests to the server. An event is kept in this browser until the server has acknowledged it.
 
+import { ask, json, Refused } from "./ask.js";
+
 const RETRY_MS = [500, 1000, 2000, 4000];
 // Servers behind one name have one storage: the path keeps them apart
 const HERE = location.pathname;
 const CODE = `noisefloor.code.${HERE}`;
 const box = (code) => `noisefloor.outbox.${code}`;
-
-export class Refused extends Error {
-  constructor(status, body) {
-    super(body.what ?? `status ${status}`);
-    this.status = status;
-    this.body = body;
-  }
-}
-
-async function ask(path, options = {}) {
-  const answer = await fetch(path, { cache: "no-store", ...options });
-  if (answer.status === 204) return null;
-  const body = await answer.json();
-  if (!answer.ok) throw new Refused(answer.status, body);
-  return body;
-}
-
-const json = (method, body) => ({
-  method,
-  headers: { "content-type": "application/json" },
-  body: JSON.stringify(body),
-});
 
 // Paths are relative, so that the study may lie under any path of a proxy
 export const study = () => ask("api/study");

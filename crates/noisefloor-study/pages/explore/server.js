@@ -1,26 +1,6 @@
 // What is asked of the server and told to it.
 
-export class Refused extends Error {
-  constructor(status, body) {
-    super(body.what ?? `status ${status}`);
-    this.status = status;
-    this.body = body;
-  }
-}
-
-async function ask(path, options = {}) {
-  const answer = await fetch(path, { cache: "no-store", ...options });
-  if (answer.status === 204) return null;
-  const body = await answer.json();
-  if (!answer.ok) throw new Refused(answer.status, body);
-  return body;
-}
-
-const json = (method, body) => ({
-  method,
-  headers: { "content-type": "application/json" },
-  body: JSON.stringify(body),
-});
+import { ask, json, Refused } from "./ask.js";
 
 export const strings = (language) => ask(`api/texts/${language}`);
 export const state = () => ask("api/state");

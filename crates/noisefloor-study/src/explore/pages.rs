@@ -11,7 +11,8 @@ use axum::response::{IntoResponse, Response};
 const HTML: &str = include_str!("../../pages/explore/index.html");
 const SCRIPT: &str = "text/javascript; charset=utf-8";
 /// Name, type and text of each file.
-const FILES: [(&str, &str, &str); 8] = [
+const FILES: [(&str, &str, &str); 9] = [
+    ("ask.js", SCRIPT, include_str!("../../pages/ask.js")),
     ("explore.js", SCRIPT, include_str!("../../pages/explore/explore.js")),
     ("grid.js", SCRIPT, include_str!("../../pages/explore/grid.js")),
     ("learn.js", SCRIPT, include_str!("../../pages/explore/learn.js")),

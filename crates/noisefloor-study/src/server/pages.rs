@@ -14,8 +14,9 @@ macro_rules! page {
 
 const HTML: &str = include_str!("../../pages/index.html");
 /// Name, type and text of each file.
-const FILES: [(&str, &str, &str); 11] = [
+const FILES: [(&str, &str, &str); 12] = [
     page!("app.js", "text/javascript; charset=utf-8"),
+    page!("ask.js", "text/javascript; charset=utf-8"),
     page!("experimenter.css", "text/css; charset=utf-8"),
     page!("experimenter.html", "text/html; charset=utf-8"),
     page!("experimenter.js", "text/javascript; charset=utf-8"),
