@@ -15,13 +15,13 @@ fn shown(folder: &Path, spp: u64) -> (DisplayImage, f64) {
     }
 }
 
-/// How many zones of a picture have converged, by the difference to another stage of the same rendering.
+/// Which zones of a picture have converged, by the difference to another stage of the same rendering.
 fn converged(
     oracle: &Oracle,
     (image, spp): &(DisplayImage, f64),
     (other, of): &(DisplayImage, f64),
     zones: &[Tile],
-) -> usize {
+) -> Vec<bool> {
     let scale = residual_scale(*spp, *of, Samples::Nested).unwrap();
     let rounding = 2.0 * image.step * image.step / 12.0 * scale * scale;
     let describe = |&zone: &Tile| {
@@ -32,17 +32,17 @@ fn converged(
         oracle.describe(&TilePlanes { rounding, ..planes }, *spp).unwrap()
     };
     let described: Vec<_> = zones.iter().map(describe).collect();
-    oracle.judge_described(&described).iter().filter(|v| v.converged).count()
+    oracle.judge_described(&described).iter().map(|v| v.converged).collect()
 }
 
-/// Of what production renderers made: most zones of the first pictures are noisy, most of the last ones are
-/// not.
+/// Of what production renderers made: of the zones for which people asked for at least twice the samples of the first
+/// picture, no more than 2 % have converged in it, as the documentation says of stops; of the last pictures most have.
 #[test]
 fn early_pictures_are_noisy_and_last_ones_are_not() {
     let Some(dir) = require_shared("human/lisic9") else { return };
     let corpus = Corpus::open(&dir).unwrap();
     let oracle = Oracle::bundled();
-    let (mut zones, mut early, mut late) = (0, 0, 0);
+    let (mut zones, mut asked, mut early, mut late) = (0, 0, 0, 0);
     for scene in corpus.scenes() {
         let of_scene = || corpus.zones().iter().filter(|z| z.scene == scene);
         let ZoneImages::RunningMeans(folder) = &of_scene().next().unwrap().stack else { panic!("{scene}") };
@@ -56,10 +56,14 @@ fn early_pictures_are_noisy_and_last_ones_are_not() {
         let tile = |z: &JudgedZone| Tile { index: 0, x: z.x, y: z.y, width: z.width, height: z.height };
         let tiles: Vec<Tile> = of_scene().map(tile).collect();
         zones += tiles.len();
-        early += converged(&oracle, &first, &last, &tiles);
-        late += converged(&oracle, &last, &middle, &tiles);
+        let more: Vec<bool> = of_scene().map(|z| z.human_spp >= 2.0 * first.1).collect();
+        asked += more.iter().filter(|&&more| more).count();
+        let in_first = converged(&oracle, &first, &last, &tiles);
+        early += in_first.iter().zip(&more).filter(|&(&converged, &more)| converged && more).count();
+        late += converged(&oracle, &last, &middle, &tiles).iter().filter(|&&converged| converged).count();
     }
     assert_eq!(zones, 112);
-    assert!(early * 2 < zones, "{early} of {zones} zones have converged in the first pictures");
-    assert!(late * 5 > zones * 4, "{late} of {zones} zones have converged in the last pictures");
+    assert!(asked * 2 > zones, "people asked for more in {asked} of {zones} zones");
+    assert!(early * 50 <= asked, "{early} of {asked} zones are said to have converged far too early");
+    assert!(late * 10 > zones * 9, "{late} of {zones} zones have converged in the last pictures");
 }
