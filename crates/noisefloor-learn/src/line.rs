@@ -2,6 +2,7 @@
 //! together with noise.
 
 use crate::params::WIDE;
+use linfa_linalg::cholesky::SolveCInplace;
 use ndarray::{Array1, Array2, ArrayView2, Axis};
 use noisefloor::svm::Svm;
 
@@ -56,9 +57,10 @@ pub(crate) fn fit_line(
         let p = (x.dot(&weights) + &known).mapv(|f| 1.0 / (1.0 + (-f).exp()));
         let slope = x.t().dot(&(&p - &shares)) + &penalty * &weights;
         let curvature = p.mapv(|p| p * (1.0 - p)).insert_axis(Axis(1));
-        let hessian = x.t().dot(&(&x * &curvature)) + Array2::from_diag(&penalty);
-        let step = solve(hessian, slope);
+        let mut hessian = x.t().dot(&(&x * &curvature)) + Array2::from_diag(&penalty);
         // Classes that a line separates, and next to no penalty: as steep as numbers allow
+        let Ok(step) = hessian.solvec_into(slope.insert_axis(Axis(1))) else { break };
+        let step = step.remove_axis(Axis(1));
         if !step.iter().all(|s| s.is_finite()) {
             break;
         }
@@ -76,24 +78,6 @@ pub(crate) fn fit_line(
     }
     of_all[rows.ncols()] = weights[free];
     as_svm(&of_all)
-}
-
-/// Solves A·x = b for a symmetric, positive definite A, by Gaussian elimination.
-fn solve(mut a: Array2<f64>, mut b: Array1<f64>) -> Array1<f64> {
-    let n = b.len();
-    for i in 0..n {
-        for j in i + 1..n {
-            let factor = a[(j, i)] / a[(i, i)];
-            let row = a.row(i).to_owned();
-            a.row_mut(j).scaled_add(-factor, &row);
-            b[j] -= factor * b[i];
-        }
-    }
-    for i in (0..n).rev() {
-        let known: f64 = (i + 1..n).map(|j| a[(i, j)] * b[j]).sum();
-        b[i] = (b[i] - known) / a[(i, i)];
-    }
-    b
 }
 
 /// w·x + b as two support vectors of a wide kernel, opposite each other at u = ±[`REACH`]·w/|w|:

@@ -12,7 +12,7 @@ use noisefloor::{
 /// A corpus level: samples per pixel, where it comes from, and what is to be described of it.
 pub(super) type Shown = (f64, Origin, TilePlanes);
 
-/// Display-encoded pixels of a zone with its apron.
+/// Display-encoded pixels of a zone with its halo.
 type Pixels = Vec<Rgb>;
 
 /// One realisation of the noise: zero mean, variance that of a single sample.

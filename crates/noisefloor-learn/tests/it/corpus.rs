@@ -32,7 +32,7 @@ fn scenes(dir: &Path) {
 }
 
 #[test]
-fn running_means_with_aprons() {
+fn running_means_with_halos() {
     let folder = tempfile::tempdir().unwrap();
     scenes(folder.path());
     let corpus = Corpus::open(folder.path()).unwrap();
@@ -52,7 +52,7 @@ fn running_means_with_aprons() {
     let level = &levels[5];
     assert_eq!((level.first, level.last, level.encoding), (0, 50, Encoding::Display));
 
-    // JudgedZone 1 is the top right quarter: apron to the left and below
+    // JudgedZone 1 is the top right quarter: halo to the left and below
     let patch = &level.patch;
     assert_eq!((patch.width, patch.height), (28, 28));
     assert_eq!(patch.inner, Inner { x: 8, y: 0, width: 20, height: 20 });

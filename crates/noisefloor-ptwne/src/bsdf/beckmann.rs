@@ -2,6 +2,7 @@
 //! BSDFs using the Distribution of Visible Normals", supplement 2).
 
 use crate::math::Vec3;
+use libm::erff;
 use std::f32::consts::FRAC_2_SQRT_PI;
 
 /// Steps of the inversion; a fourth changes nothing that f32 resolves.
@@ -23,10 +24,10 @@ pub(super) fn visible_slopes(wo: Vec3, [u, v]: [f32; 2]) -> [f32; 2] {
     let (cot, tan) = (wo.z / sin, sin / wo.z.max(1e-6));
     let bump = |slope: f32| 0.5 * FRAC_2_SQRT_PI * tan * (-slope * slope).exp();
     // Slopes beyond cot θ face away
-    let most = erf(cot);
+    let most = erff(cot);
     let target = within(u) * (1.0 + most + bump(cot));
     // Newton's steps from what is exact at grazing angles, where the function is bent most
-    let mut t = most - (most + 1.0) * erf((-within(u).ln()).sqrt());
+    let mut t = most - (most + 1.0) * erff((-within(u).ln()).sqrt());
     for _ in 0..STEPS {
         let along = inverse_erf(t);
         let off = 1.0 + t + bump(along) - target;
@@ -36,15 +37,7 @@ pub(super) fn visible_slopes(wo: Vec3, [u, v]: [f32; 2]) -> [f32; 2] {
     [along * x - across * y, along * y + across * x]
 }
 
-/// The error function, to 1.5e-7 (Abramowitz, Stegun 1964, 7.1.26).
-fn erf(x: f32) -> f32 {
-    let t = 1.0 / (1.0 + 0.327_591_1 * x.abs());
-    let series =
-        t * (0.254_829_6 + t * (-0.284_496_74 + t * (1.421_413_7 + t * (-1.453_152 + t * 1.061_405_4))));
-    (1.0 - series * (-x * x).exp()).copysign(x)
-}
-
-/// Its inverse, to 3e-7 of the result (Giles 2012, "Approximating the erfinv Function", single precision).
+/// The inverse of the error function, to 3e-7 of the result (Giles 2012, "Approximating the erfinv Function", single precision).
 fn inverse_erf(x: f32) -> f32 {
     const MIDDLE: [f32; 9] = [
         2.810_226_4e-8,
@@ -81,10 +74,10 @@ mod tests {
     fn error_functions_are_inverse() {
         // From tables
         for (x, value) in [(0.1, 0.112_462_92), (0.5, 0.520_499_9), (1.0, 0.842_700_8), (2.0, 0.995_322_3)] {
-            assert!((erf(x) - value).abs() < 3e-7 && (erf(-x) + value).abs() < 3e-7);
+            assert!((erff(x) - value).abs() < 3e-7);
             assert!((inverse_erf(value) - x).abs() < 1e-5 && (inverse_erf(-value) + x).abs() < 1e-5);
         }
-        assert_eq!((erf(0.0).abs() < 1e-6, inverse_erf(0.0)), (true, 0.0));
+        assert_eq!(inverse_erf(0.0), 0.0);
         assert!(inverse_erf(-1.0).is_finite() && inverse_erf(1.0).is_finite());
     }
 
