@@ -122,10 +122,15 @@ export class Picture {
     return Math.floor(y / this.shape.tile) * this.columns + Math.floor(x / this.shape.tile);
   }
 
+  /** Loads all tiles; resolves to what draws them at once. */
+  async load(levels) {
+    const all = await Promise.all(levels.map((level, i) => tile(this.stack, level, i)));
+    return () => all.forEach((bitmap, i) => this.context.drawImage(bitmap, ...this.place(i)));
+  }
+
   /** Shows all tiles at once, when all are there. */
   async show(levels) {
-    const all = await Promise.all(levels.map((level, i) => tile(this.stack, level, i)));
-    all.forEach((bitmap, i) => this.context.drawImage(bitmap, ...this.place(i)));
+    (await this.load(levels))();
   }
 
   async showTile(level, index) {

@@ -45,6 +45,7 @@
 //! ```
 
 pub mod analysis;
+pub mod calibrate;
 mod code;
 mod config;
 mod error;

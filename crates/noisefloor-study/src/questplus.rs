@@ -1,4 +1,4 @@
-//! QUEST+ for one tile: which level to show next, and what is known about the threshold (Watson 2017,
+//! QUEST+ for one threshold: which level to show next, and what is known about the threshold (Watson 2017,
 //! "QUEST+: A general multidimensional Bayesian adaptive psychometric method", Journal of Vision 17(3):10).
 //!
 //! Implemented here because the server chooses the trials and no crate offers it. jsQuestPlus, which
@@ -27,7 +27,12 @@ pub fn sees(ln_spp: f64, ln_threshold: f64, scale: f64) -> f64 {
 
 /// Probability of a correct answer in a two-interval forced choice.
 pub fn right(ln_spp: f64, ln_threshold: f64, scale: f64) -> f64 {
-    GUESS + (1.0 - GUESS - LAPSE) * sees(ln_spp, ln_threshold, scale)
+    right_or_guessed(GUESS, sees(ln_spp, ln_threshold, scale))
+}
+
+/// Probability of a correct answer of somebody who sees with a probability of `sees`, and else guesses.
+pub(crate) fn right_or_guessed(guess: f64, sees: f64) -> f64 {
+    guess + (1.0 - guess - LAPSE) * sees
 }
 
 /// The part that does not change from trial to trial: the levels of a stack, the hypotheses, and the
@@ -47,20 +52,27 @@ impl QuestGrid {
     /// is the reference, which is never shown against itself.
     pub fn new(spp: &[u64]) -> Self {
         let ln: Vec<f64> = spp.iter().map(|&n| (n.max(1) as f64).ln()).collect();
+        Self::among(&ln, ln.len() - 1, GUESS)
+    }
+
+    /// The same for the logarithms of any levels, of which the first `stimuli` are shown, at least one, in a
+    /// task in which guessing is right with a probability of `guess`.
+    pub(crate) fn among(ln: &[f64], stimuli: usize, guess: f64) -> Self {
         let (low, high) = (ln[0] - MARGIN, ln[ln.len() - 1] + MARGIN);
         let hypothesis = |i: usize| {
             let threshold = low + (high - low) * (i / SCALES.len()) as f64 / (THRESHOLDS - 1) as f64;
             (threshold, SCALES[i % SCALES.len()])
         };
         let hypotheses: Vec<(f64, f64)> = (0..THRESHOLDS * SCALES.len()).map(hypothesis).collect();
-        let likelihood = |&x: &f64| hypotheses.iter().map(|&(t, s)| right(x, t, s)).collect();
+        let likelihood =
+            |&x: &f64| hypotheses.iter().map(|&(t, s)| right_or_guessed(guess, sees(x, t, s))).collect();
 
         // Levels evenly in ln(spp)
-        let (first, last) = (ln[0], ln[ln.len() - 2]);
+        let (first, last) = (ln[0], ln[stimuli - 1]);
         let nearest = |i: usize| {
             let goal = first + (last - first) * i as f64 / (MOST_STIMULI - 1) as f64;
             let distance = |&l: &usize| (ln[l] - goal).abs();
-            (0..ln.len() - 1).min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap_or(0) as u32
+            (0..stimuli).min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap_or(0) as u32
         };
         let mut levels: Vec<u32> = (0..MOST_STIMULI).map(nearest).collect();
         levels.dedup();
@@ -72,7 +84,7 @@ impl QuestGrid {
     }
 }
 
-/// What is known of one tile's threshold.
+/// What is known of a threshold.
 #[derive(Clone, Debug)]
 pub struct QuestPlus {
     grid: Arc<QuestGrid>,
@@ -85,6 +97,13 @@ impl QuestPlus {
     pub fn new(grid: Arc<QuestGrid>) -> Self {
         let n = grid.thresholds.len();
         Self { grid, posterior: vec![1.0 / n as f64; n] }
+    }
+
+    /// Starts with ln(threshold) normal about 0 with this standard deviation.
+    pub(crate) fn about_zero(grid: Arc<QuestGrid>, sd: f64) -> Self {
+        let prior: Vec<f64> = grid.thresholds.iter().map(|t| (-0.5 * (t / sd).powi(2)).exp()).collect();
+        let sum: f64 = prior.iter().sum();
+        Self { grid, posterior: prior.into_iter().map(|p| p / sum).collect() }
     }
 
     /// The level whose answer is expected to leave the least entropy about the threshold (Watson 2017, eqs.
@@ -119,6 +138,11 @@ impl QuestPlus {
         self.posterior.iter_mut().for_each(|p| *p /= sum);
     }
 
+    /// Mean scale.
+    pub(crate) fn scale(&self) -> f64 {
+        self.posterior.iter().zip(SCALES.iter().cycle()).map(|(p, scale)| p * scale).sum()
+    }
+
     /// The posterior of the threshold, with the scale marginalised.
     pub fn posterior(&self) -> Posterior {
         let thresholds = &self.grid.thresholds;
@@ -147,6 +171,19 @@ impl Posterior {
     /// The values.
     pub fn values(&self) -> impl Iterator<Item = f64> + '_ {
         (0..self.weights.len()).map(|i| self.low + self.step * i as f64)
+    }
+
+    /// The value below which ln(threshold) lies with this probability, within 0…1; the weight of a value is
+    /// spread evenly over its step.
+    pub fn quantile(&self, probability: f64) -> f64 {
+        let mut below = 0.0;
+        for (weight, value) in self.weights.iter().zip(self.values()) {
+            if below + weight >= probability && *weight > 0.0 {
+                return value + self.step * ((probability - below) / weight - 0.5);
+            }
+            below += weight;
+        }
+        self.low + self.step * (self.weights.len() as f64 - 0.5)
     }
 
     /// Mean and standard deviation.
@@ -212,6 +249,15 @@ mod tests {
             let best = quest.grid.levels.iter().map(|&l| expected(l)).fold(f64::INFINITY, f64::min);
             assert!((expected(chosen) - best).abs() < 1e-9);
             quest.learn(chosen, answer);
+        }
+    }
+
+    /// A uniform posterior on 0, 1, 2, 3 reaches from −½ to 3½.
+    #[test]
+    fn quantiles_lie_between_the_values() {
+        let even = Posterior { low: 0.0, step: 1.0, weights: [0.25; 4].into() };
+        for (probability, value) in [(0.0, -0.5), (0.5, 1.5), (0.125, 0.0), (1.0, 3.5)] {
+            assert!((even.quantile(probability) - value).abs() < 1e-12);
         }
     }
 

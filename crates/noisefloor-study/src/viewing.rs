@@ -16,6 +16,18 @@ pub enum Ambient {
     Glare,
 }
 
+impl Ambient {
+    /// As files name it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Dark => "dark",
+            Self::Dim => "dim",
+            Self::Bright => "bright",
+            Self::Glare => "glare",
+        }
+    }
+}
+
 /// Viewing conditions that a study accepts, as ranges with both ends included.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default, rename_all = "kebab-case")]

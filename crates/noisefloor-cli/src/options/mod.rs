@@ -1,6 +1,7 @@
 //! Options that several commands have.
 
 pub mod denoiser;
+pub mod eyes;
 pub mod oracle;
 pub mod renderer;
 pub mod scenes;

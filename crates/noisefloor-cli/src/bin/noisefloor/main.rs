@@ -3,6 +3,7 @@
 #![allow(missing_docs, unreachable_pub, reason = "a command has no public items")]
 
 mod args;
+mod calibrate;
 mod doctor;
 mod farm;
 mod inspect;
@@ -34,6 +35,7 @@ fn run(command: Command) -> anyhow::Result<ExitCode> {
         Command::Render(args) if args.is_sequence() => render::render_frames(&args.check_frames()?),
         Command::Render(args) => render::run(&args.check()?),
         Command::Frame => render::one_frame(),
+        Command::Calibrate(args) => calibrate::run(args.check()?).map(done),
         Command::Farm(args) => farm::run(args.check()?),
         Command::Reference(args) => reference::run(args.check()?),
         Command::Judge(args) => judge::run(&args.check()?).map(done),

@@ -3,9 +3,11 @@
 use crate::judge::{DenoisedJob, JudgeJob, Question};
 use clap::Args;
 use noisefloor::{
+    Audience,
     evidence::{Evidence, Samples},
     tile::DEFAULT_TILE,
 };
+use noisefloor_cli::options::eyes::EyesArgs;
 use noisefloor_cli::options::oracle::OracleArgs;
 use noisefloor_cli::options::tone::ToneArgs;
 use noisefloor_cli::options::values;
@@ -66,6 +68,8 @@ pub struct JudgeArgs {
     tone: ToneArgs,
     #[command(flatten)]
     viewing: ViewingArgs,
+    #[command(flatten)]
+    eyes: EyesArgs,
     /// Tile edge in pixels, 16…512.
     #[arg(long, default_value_t = DEFAULT_TILE, value_name = "PIXELS")]
     tile: usize,
@@ -118,7 +122,12 @@ impl JudgeArgs {
     fn check_noise(self) -> anyhow::Result<JudgeJob> {
         let tone = self.tone.check()?.load()?;
         let oracle = self.oracle.check()?;
-        let viewing = self.viewing.judged_by(&oracle)?;
+        let said = [("--viewing", self.viewing.typed().is_some())];
+        let eyes = self.eyes.of(self.oracle.model.as_deref(), &said)?;
+        let viewing = match &eyes {
+            Some(person) => person.viewing(),
+            None => self.viewing.judged_by(&oracle)?,
+        };
         if oracle.model().evidence() != Evidence::Halves {
             refuse!(
                 "this model does not compare tiles with other samples, as `judge` does: use one that was trained on half buffers"
@@ -152,6 +161,7 @@ impl JudgeArgs {
             oracle,
             tone,
             viewing,
+            audience: eyes.map_or(Audience::TRAINED, |person| person.audience()),
             tile: self.tile,
             json: self.json,
             heat_map: self.heat_map,

@@ -1,6 +1,7 @@
 //! What can be typed, one file a command. Each command's arguments become a checked job; nothing typed goes
 //! further.
 
+mod calibrate;
 mod config;
 mod doctor;
 mod farm;
@@ -12,6 +13,7 @@ mod render;
 mod scenes;
 mod verdicts;
 
+pub use calibrate::{CalibrateArgs, Simulated};
 pub use config::expand;
 pub use doctor::DoctorArgs;
 pub use farm::{FarmArgs, FarmTask, MergeTask, PlanTask, RunTask};
@@ -59,6 +61,7 @@ pub enum Command {
     Judge(JudgeArgs),
     Metrics(MetricsArgs),
     Inspect(InspectArgs),
+    Calibrate(CalibrateArgs),
     Doctor(DoctorArgs),
     /// List the built-in scenes, or check scene files.
     Scenes {

@@ -4,8 +4,10 @@ use super::verdicts::{CriterionChoice, Preset, VerdictArgs};
 use crate::job::{Autosave, CriterionJob, RenderJob, RenderRun, WatchPage};
 use crate::render::{SequenceRun, TEV_ADDRESS};
 use clap::{Args, Command};
+use noisefloor::Audience;
 use noisefloor_cli::folder::Earlier;
 use noisefloor_cli::options::denoiser::DenoiserChoice;
+use noisefloor_cli::options::eyes::EyesArgs;
 use noisefloor_cli::options::oracle::OracleArgs;
 use noisefloor_cli::options::renderer::RendererArgs;
 use noisefloor_cli::options::tone::ToneArgs;
@@ -13,6 +15,7 @@ use noisefloor_cli::options::values;
 use noisefloor_cli::options::viewing::ViewingArgs;
 use noisefloor_cli::refuse;
 use noisefloor_cli::spell::JobPath;
+use noisefloor_eyes::Person;
 use noisefloor_farm::FrameRange;
 use std::ffi::OsString;
 use std::net::SocketAddr;
@@ -107,6 +110,8 @@ pub struct RenderArgs {
     tone: ToneArgs,
     #[command(flatten, next_help_heading = "What people see")]
     viewing: ViewingArgs,
+    #[command(flatten, next_help_heading = "What people see")]
+    eyes: EyesArgs,
     #[command(flatten, next_help_heading = "To look on")]
     look: LookArgs,
 }
@@ -181,9 +186,17 @@ impl RenderArgs {
                 "this build has no 'render --watch': run `cargo run --release --features watch -- render --watch …`"
             );
         }
-        let limits =
-            self.verdicts.limits(self.denoise.is_some(), self.renderer.is_built_in(), self.preset)?;
         let by_oracle = self.denoise.is_none() && self.verdicts.criterion == CriterionChoice::Oracle;
+        let said =
+            [("--viewing", self.viewing.typed().is_some()), ("--audience", self.verdicts.audience.is_some())];
+        let eyes = if by_oracle { self.eyes.of(self.oracle.model.as_deref(), &said)? } else { None };
+        let audience = eyes.as_ref().map_or(Audience::TRAINED, Person::audience);
+        let limits = self.verdicts.limits(
+            self.denoise.is_some(),
+            self.renderer.is_built_in(),
+            self.preset,
+            audience,
+        )?;
         if limits.blocks > 0 && !(by_oracle && self.renderer.may_sample_blocks()) {
             refuse!("--blocks is for the oracle, and for --source ptwne or mitsuba; leave it out")
         }
@@ -200,7 +213,8 @@ impl RenderArgs {
             (None, CriterionChoice::Rival(spec)) => CriterionJob::Rival(spec),
         };
         let (source, resources) = self.renderer.check(self.scene.as_deref())?;
-        let (tone, viewing) = (self.tone.check()?, self.viewing.typed());
+        let viewing = self.viewing.typed().or_else(|| eyes.map(|person| person.viewing()));
+        let tone = self.tone.check()?;
         let hosts = self.look.allow_host;
         Ok(RenderRun {
             job: RenderJob { source, criterion, tone, viewing, limits },

@@ -30,14 +30,9 @@ pub struct VerdictArgs {
     )]
     pub lost: f64,
     /// For whom: `observers` (those of the training data), `art-students` (T' = 1.94 T - 346), or a,b for
-    /// T' = a T + b.
-    #[arg(
-        long,
-        default_value = "observers",
-        value_name = "WHO",
-        value_parser = values::audience
-    )]
-    pub audience: Audience,
+    /// T' = a T + b [default: see --eyes].
+    #[arg(long, value_name = "WHO", value_parser = values::audience)]
+    pub audience: Option<Audience>,
     /// No tile stops before this many samples per pixel [default: 100, or one batch with --batch or
     /// --denoise; a quarter with --preset draft]. 50 saves more where little is needed, and light that is
     /// seldom found is missed more often.
@@ -120,8 +115,16 @@ fn criterion(text: &str) -> Result<CriterionChoice, String> {
 }
 
 impl VerdictArgs {
-    /// When tiles are judged, with or without a denoiser, by the built-in renderer or a slower one.
-    pub fn limits(&self, denoise: bool, built_in: bool, preset: Option<Preset>) -> anyhow::Result<Limits> {
+    /// When tiles are judged, with or without a denoiser, by the built-in renderer or a slower one; for whom, if
+    /// no audience was typed.
+    pub fn limits(
+        &self,
+        denoise: bool,
+        built_in: bool,
+        preset: Option<Preset>,
+        otherwise: Audience,
+    ) -> anyhow::Result<Limits> {
+        let audience = self.audience.unwrap_or(otherwise);
         let step = |default: u64| self.batch.unwrap_or(default);
         let schedule = match (denoise, self.schedule) {
             // What two denoisings cost is worth more samples of the built-in renderer than of slower ones
@@ -152,7 +155,7 @@ impl VerdictArgs {
             min_spp: self.min_spp.unwrap_or(first.min(max_spp)),
             max_spp,
             consecutive: if last { self.consecutive.max(2) } else { self.consecutive },
-            audience: if draft { self.audience.then(DRAFT) } else { self.audience },
+            audience: if draft { audience.then(DRAFT) } else { audience },
             blocks: self.blocks,
         };
         match limits.params(Params::default()).check() {

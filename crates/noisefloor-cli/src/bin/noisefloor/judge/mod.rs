@@ -7,7 +7,7 @@ pub use denoised::DenoisedJob;
 
 use anyhow::{Context, bail};
 use noisefloor::{
-    Oracle, Tile, TileGrid, ToneMapping, Verdict, Viewing,
+    Audience, Oracle, Tile, TileGrid, ToneMapping, Verdict, Viewing,
     evidence::{Evidence, Samples},
     stills::{SnapshotPair, Still},
 };
@@ -31,6 +31,7 @@ pub struct JudgeJob {
     pub oracle: Oracle,
     pub tone: ToneMapping,
     pub viewing: Viewing,
+    pub audience: Audience,
     pub tile: usize,
     pub json: bool,
     pub heat_map: Option<PathBuf>,
@@ -88,7 +89,7 @@ fn judge_noise(job: &JudgeJob) -> anyhow::Result<()> {
             grid.len()
         );
     }
-    let rows = judge(&job.oracle, grid, &held, &unlike)?;
+    let rows = judge(job, grid, &held, &unlike)?;
     report::say_all((&job.image.0, image.spp), &job.oracle, &rows, job.json)?;
     draw(job, &image, grid, &held, &rows)
 }
@@ -113,7 +114,7 @@ fn read((path, spp): &(PathBuf, Option<f64>)) -> anyhow::Result<Still> {
 
 /// The verdicts; tiles that are `unlike` in both pictures get none, and count as not converged.
 fn judge(
-    oracle: &Oracle,
+    job: &JudgeJob,
     grid: TileGrid,
     held: &SnapshotPair<'_>,
     unlike: &[bool],
@@ -138,8 +139,11 @@ fn judge(
             unlike,
         }
     };
-    let described = held.describe(oracle, grid)?;
-    Ok(grid.tiles().zip(oracle.judge_described(&described)).map(row).collect())
+    let described = held.describe(&job.oracle, grid)?;
+    let verdicts = job.oracle.judge_described_for(&described, job.audience);
+    let verdicts = verdicts
+        .context("this model cannot judge for other eyes than those it has learned from; --eyes none")?;
+    Ok(grid.tiles().zip(verdicts).map(row).collect())
 }
 
 /// Draws what was asked for.

@@ -1,0 +1,81 @@
+//! Whose eyes.
+
+use super::oracle::load_model;
+use crate::refuse;
+use crate::say::note;
+use clap::Args;
+use noisefloor::Model;
+use noisefloor_eyes::{Eyes, Person};
+use std::convert::Infallible;
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+
+/// Whose eyes, as `noisefloor calibrate` has measured them.
+#[derive(Debug, Args)]
+pub struct EyesArgs {
+    /// Whose eyes: a file of `noisefloor calibrate`, of whose people nine of ten will be content, or `none`
+    /// for the observers of the training data [default: yours if you have calibrated them; none with --model
+    /// or other options that say who looks, and where].
+    #[arg(long, value_name = "FILE|none")]
+    eyes: Option<EyesChoice>,
+}
+
+#[derive(Clone, Debug, PartialEq, Eq)]
+enum EyesChoice {
+    Nobody,
+    File(PathBuf),
+}
+
+impl FromStr for EyesChoice {
+    type Err = Infallible;
+
+    fn from_str(text: &str) -> Result<Self, Infallible> {
+        Ok(if text == "none" { Self::Nobody } else { Self::File(text.into()) })
+    }
+}
+
+impl EyesArgs {
+    /// Whose eyes count, and says so in a line. `said` are other options that say who looks, or where: with
+    /// them, eyes must be asked for, and contradict them.
+    pub fn of(&self, model: Option<&Path>, said: &[(&str, bool)]) -> anyhow::Result<Option<Person>> {
+        let otherwise = said.iter().find(|(_, given)| *given);
+        let (eyes, asked) = match (&self.eyes, otherwise) {
+            (Some(EyesChoice::Nobody), _) => return Ok(None),
+            (Some(EyesChoice::File(_)), Some((option, _))) => {
+                refuse!("--eyes and {option} both say who looks, and where; leave one out")
+            }
+            (Some(EyesChoice::File(path)), None) => (Eyes::read(path)?, true),
+            (None, Some(_)) => return Ok(None),
+            (None, None) if model.is_some() => return Ok(None),
+            (None, None) => match Eyes::own() {
+                Ok(Some(own)) => (own, false),
+                Ok(None) => return Ok(None),
+                Err(error) => {
+                    refuse!("{error}; `noisefloor calibrate` writes it anew, --eyes none goes without")
+                }
+            },
+        };
+        let person = eyes.strictest();
+        let digest = match model {
+            None => Model::bundled().digest(),
+            Some(_) => load_model(model)?.digest(),
+        };
+        if person.model != digest {
+            let what = format!("the eyes of {} were measured beside another model", person.name);
+            if asked {
+                refuse!("--eyes: {what}; calibrate again");
+            }
+            note!("note: {what}, and are not used; `noisefloor calibrate` takes two minutes");
+            return Ok(None);
+        }
+        note!(
+            "note: for the eyes of {} ({:.2} times the samples of the model's observers, {:.0} pixels per degree, \
+             measured on {}); --eyes none for those of the observers",
+            person.name,
+            person.factor,
+            person.display.pixels_per_degree,
+            person.date
+        );
+        Ok(Some(person.clone()))
+    }
+}
