@@ -249,6 +249,15 @@ NfStatus nf_oracle_free(NfOracle *oracle);
 // Fills in the defaults.
 NfStatus nf_params_default(NfParams *params);
 
+// Reads what `noisefloor calibrate` has measured: for NfParams.audience_slope and NfParams.viewing. path is a
+// file, of whose people nine of ten will be content; NULL is the user's own, and if nobody is calibrated,
+// slope is 1 and viewing the default. viewing is cut to bytes - 1 bytes and ended by a zero; 200 bytes hold
+// any.
+NfStatus nf_eyes(const char *path,
+                 double *slope,
+                 char *viewing,
+                 size_t bytes);
+
 // Starts a session for a picture of width x height pixels: each edge up to 65536, 2^28 pixels in all. It
 // takes 36 bytes a pixel. params is NULL for the defaults. The caller frees the session with
 // nf_session_free.

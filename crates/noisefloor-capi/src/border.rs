@@ -109,6 +109,26 @@ pub(crate) unsafe fn text<'a>(pointer: *const c_char, what: &str) -> Result<&'a 
     text.to_str().map_err(|_| Failure::new(NfStatus::Argument, format!("{what} is not UTF-8")))
 }
 
+/// Writes text, cut to `bytes` - 1 bytes between two characters and ended by a zero.
+///
+/// # Safety
+/// As [`array_mut`], for `bytes` elements.
+pub(crate) unsafe fn write_text(
+    pointer: *mut c_char,
+    bytes: usize,
+    text: &str,
+    what: &str,
+) -> Result<(), Failure> {
+    // SAFETY: promised by the caller.
+    let room = unsafe { self::room(pointer, bytes, bytes.max(1), what) }?;
+    let most = text.len().min(room.len() - 1);
+    let cut = (0..=most).rev().find(|&n| text.is_char_boundary(n)).unwrap_or(0);
+    for (place, byte) in room.iter_mut().zip(text.as_bytes()[..cut].iter().chain([&0])) {
+        *place = *byte as c_char;
+    }
+    Ok(())
+}
+
 /// Checks that there is memory for so many bytes a pixel of the picture, which a call is going to take: where
 /// an allocation fails in the middle of one, the process ends.
 pub(crate) fn memory(grid: TileGrid, bytes_a_pixel: usize) -> Result<(), Failure> {

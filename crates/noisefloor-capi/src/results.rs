@@ -174,16 +174,10 @@ pub unsafe extern "C" fn nf_session_warning(
     guard(|| {
         let session = handle::get(session)?;
         let session = session.lock()?;
-        // SAFETY: promised by the caller.
-        let room = unsafe { border::room(text, bytes, bytes.max(1), "text") }?;
         let unknown = || Failure::new(NfStatus::Argument, format!("there is no warning {index}"));
         let warning = session.warnings().get(index).ok_or_else(unknown)?.to_string();
-        let most = warning.len().min(room.len() - 1);
-        let cut = (0..=most).rev().find(|&n| warning.is_char_boundary(n)).unwrap_or(0);
-        for (place, byte) in room.iter_mut().zip(warning.as_bytes()[..cut].iter().chain([&0])) {
-            *place = *byte as c_char;
-        }
-        Ok(())
+        // SAFETY: promised by the caller.
+        unsafe { border::write_text(text, bytes, &warning, "text") }
     })
 }
 

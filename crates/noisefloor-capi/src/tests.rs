@@ -2,6 +2,7 @@
 
 use crate::blocks::*;
 use crate::check::*;
+use crate::eyes::*;
 use crate::files::*;
 use crate::oracle::*;
 use crate::params::*;
@@ -402,6 +403,49 @@ fn fed_with(session: &Handle, value: impl Fn(usize, Vec<f32>) -> Vec<f32>) -> Nf
     }
     // SAFETY: a living handle.
     unsafe { nf_session_judge(session.0, null_mut()) }
+}
+
+/// What `noisefloor calibrate` has measured is what parameters take.
+#[test]
+fn eyes_are_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("eyes.toml");
+    let person = noisefloor_eyes::Person {
+        name: "anna".to_owned(),
+        factor: 1.4,
+        interval: [1.2, 1.65],
+        scatter: 0.3,
+        answers: 38,
+        date: "2026-11-24".to_owned(),
+        model: "a digest".to_owned(),
+        display: noisefloor_eyes::SeenDisplay {
+            pixels_per_degree: 44.0,
+            distance_mm: 600.0,
+            gamma: 2.2,
+            ambient: "dim".to_owned(),
+        },
+    };
+    noisefloor_eyes::Eyes::keep(&path, person).unwrap();
+    let (mut slope, mut viewing) = (0.0, [0; 200]);
+    let mut read = |path: &std::path::Path, bytes: usize| {
+        let path = CString::new(path.to_str().unwrap()).unwrap();
+        // SAFETY: variables of this function.
+        unsafe { nf_eyes(path.as_ptr(), &mut slope, viewing.as_mut_ptr(), bytes) }
+    };
+    assert_eq!(read(&folder.path().join("absent"), 200), NfStatus::Io);
+    assert_eq!(read(&path, 0), NfStatus::Size);
+    assert_eq!(read(&path, 200), NfStatus::Ok);
+    let used = session(&NfParams { audience_slope: slope, viewing: viewing.as_ptr(), ..params() });
+    assert_eq!(slope, 1.4);
+    drop(used);
+    // SAFETY: text that was written above.
+    assert!(unsafe { CStr::from_ptr(viewing.as_ptr()) }.to_str().unwrap().starts_with("ppd=44,"));
+    std::fs::write(&path, "colour = 1").unwrap();
+    let path = CString::new(path.to_str().unwrap()).unwrap();
+    // SAFETY: variables of this function.
+    let status = unsafe { nf_eyes(path.as_ptr(), &mut slope, viewing.as_mut_ptr(), 200) };
+    assert_eq!(status, NfStatus::Argument);
+    assert!(message().contains("noisefloor calibrate"), "{}", message());
 }
 
 /// One seed for every batch is noticed by the next verdict; what is likely is text.

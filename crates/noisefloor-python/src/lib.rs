@@ -5,6 +5,7 @@
 //! - `arrays.rs`: between numpy and slices;
 //! - `params.rs`, `oracle.rs`, `verdicts.rs`, `session.rs`: the push session;
 //! - `check.rs`: the contract of a renderer;
+//! - `eyes.rs`: what `noisefloor calibrate` has measured;
 //! - `stills.rs`, `metrics.rs`: finished pictures;
 //! - `pool.rs`: threads that survive a fork.
 //!
@@ -14,6 +15,7 @@
 mod arrays;
 mod check;
 mod errors;
+mod eyes;
 mod metrics;
 mod oracle;
 mod params;
@@ -33,6 +35,8 @@ mod _noisefloor {
         BatchError, CheckpointError, CriterionError, Error, FaultError, ModelError, ParameterError,
         PictureError, SizeError,
     };
+    #[pymodule_export]
+    use crate::eyes::{PyEyes, eyes};
     #[pymodule_export]
     use crate::metrics::{PyMetrics, metrics};
     #[pymodule_export]

@@ -40,6 +40,38 @@ def noisy(seed, spp, shape=(64, 96, 3)):
     return (ramp + np.random.default_rng(seed).normal(0, 1 / np.sqrt(spp), shape)).astype(np.float32)
 
 
+EYES = """version = 1
+[[person]]
+name = "anna"
+factor = 1.4
+interval = [1.2, 1.65]
+scatter = 0.3
+answers = 38
+date = "2026-11-24"
+model = "a digest"
+[person.display]
+pixels-per-degree = 44.0
+distance-mm = 600.0
+gamma = 2.2
+ambient = "dim"
+"""
+
+
+class EyesTest(unittest.TestCase):
+    def test_eyes_are_read_and_used(self):
+        with tempfile.TemporaryDirectory() as folder:
+            path = pathlib.Path(folder) / "eyes.toml"
+            self.assertRaises(OSError, nf.eyes, path)
+            path.write_text(EYES)
+            eyes = nf.eyes(path)
+            self.assertEqual((eyes.name, eyes.factor, eyes.interval, eyes.date), ("anna", 1.4, (1.2, 1.65), "2026-11-24"))
+            self.assertEqual(eyes.viewing.pixels_per_degree, 44)
+            params = nf.Params(viewing=eyes.viewing, audience=eyes.audience)
+            self.assertIn("audience=(1.4, 0)", repr(params))
+            path.write_text("colour = 1")
+            self.assertRaises(nf.ParameterError, nf.eyes, path)
+
+
 class Sessions(unittest.TestCase):
     def test_a_loop_ends_with_picture_stops_and_maps(self):
         session = nf.Session(96, 80, params=PARAMS)

@@ -180,3 +180,27 @@ export async function press(page, name, key = "Enter") {
 }
 
 export const test_picture = (page) => page.locator("canvas.picture").nth(1);
+
+/** Pixels of the screen where the picture is, against the pixels of the picture. */
+export async function unscaled(page, ratio) {
+  const canvas = page.locator("canvas.picture").first();
+  const box = await canvas.boundingBox();
+  for (const at of [box.x, box.y])
+    assert.ok(Math.abs(at * ratio - Math.round(at * ratio)) < 0.02, JSON.stringify(box));
+  // The whole window: clips are rounded to CSS pixels
+  const png = await page.screenshot({ scale: "device" });
+  return canvas.evaluate(
+    async (picture, [base64, x, y]) => {
+      const shown = await createImageBitmap(
+        new Blob([Uint8Array.from(atob(base64), (c) => c.charCodeAt(0))], { type: "image/png" }),
+      );
+      const screen = new OffscreenCanvas(shown.width, shown.height).getContext("2d");
+      screen.drawImage(shown, 0, 0);
+      const { width, height } = picture;
+      const a = screen.getImageData(x, y, width, height).data;
+      const b = picture.getContext("2d").getImageData(0, 0, width, height).data;
+      return a.reduce((count, v, i) => count + (v === b[i] ? 0 : 1), 0);
+    },
+    [png.toString("base64"), Math.round(box.x * ratio), Math.round(box.y * ratio)],
+  );
+}

@@ -18,6 +18,7 @@ import {
   settled,
   shot,
   test_picture,
+  unscaled,
   watch,
 } from "./kit.mjs";
 
@@ -258,30 +259,6 @@ describe("the pages of a study", SIDE_BY_SIDE, () => {
     await context.setOffline(false);
     assert.deepEqual(await levels(page), [2, 2, 0, 0, 0, 0]);
   });
-
-  /** Pixels of the screen where the picture is, against the pixels of the picture. */
-  async function unscaled(page, ratio) {
-    const canvas = page.locator("canvas.picture").first();
-    const box = await canvas.boundingBox();
-    for (const at of [box.x, box.y])
-      assert.ok(Math.abs(at * ratio - Math.round(at * ratio)) < 0.02, JSON.stringify(box));
-    // The whole window: clips are rounded to CSS pixels
-    const png = await page.screenshot({ scale: "device" });
-    return canvas.evaluate(
-      async (picture, [base64, x, y]) => {
-        const shown = await createImageBitmap(
-          new Blob([Uint8Array.from(atob(base64), (c) => c.charCodeAt(0))], { type: "image/png" }),
-        );
-        const screen = new OffscreenCanvas(shown.width, shown.height).getContext("2d");
-        screen.drawImage(shown, 0, 0);
-        const { width, height } = picture;
-        const a = screen.getImageData(x, y, width, height).data;
-        const b = picture.getContext("2d").getImageData(0, 0, width, height).data;
-        return a.reduce((count, v, i) => count + (v === b[i] ? 0 : 1), 0);
-      },
-      [png.toString("base64"), Math.round(box.x * ratio), Math.round(box.y * ratio)],
-    );
-  }
 
   for (const ratio of [1, 2]) {
     test(`one image pixel is one device pixel at ratio ${ratio}`, async (t) => {

@@ -8,6 +8,9 @@ mod audience;
 /// One line, no panic, nothing lost.
 #[cfg(test)]
 mod bad_input;
+/// One's own eyes.
+#[cfg(test)]
+mod calibrate;
 /// Criteria side by side.
 #[cfg(test)]
 #[cfg(feature = "lab")]

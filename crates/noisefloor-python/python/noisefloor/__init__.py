@@ -23,6 +23,7 @@ from ._noisefloor import (
     CheckpointError,
     CriterionError,
     Error,
+    Eyes,
     FaultError,
     Judged,
     Metrics,
@@ -40,6 +41,7 @@ from ._noisefloor import (
     Viewing,
     __version__,
     check,
+    eyes,
     judge,
     metrics,
 )
@@ -50,6 +52,7 @@ __all__ = [
     "CheckpointError",
     "CriterionError",
     "Error",
+    "Eyes",
     "FaultError",
     "Judged",
     "Metrics",
@@ -66,6 +69,7 @@ __all__ = [
     "Verdict",
     "Viewing",
     "check",
+    "eyes",
     "judge",
     "metrics",
 ]

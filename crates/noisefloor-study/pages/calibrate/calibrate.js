@@ -51,7 +51,7 @@ function watch() {
 
 async function elsewhere() {
   close();
-  const view = await ask("api/again", { method: "POST" });
+  const view = await ask("api/again", json("POST", {}));
   sheet(t.conditions, ...paragraphs(t.elsewhere), actions([t.go_on, () => show(view).catch(failed), true]));
 }
 
@@ -147,7 +147,7 @@ function found(view) {
 }
 
 function refused(view) {
-  const again = () => ask("api/again", { method: "POST" }).then(show).catch(failed);
+  const again = () => ask("api/again", json("POST", {})).then(show).catch(failed);
   sheet(t.refused, ...paragraphs(view.what), actions([t.again, again, true]));
 }
 

@@ -1,16 +1,19 @@
 use crate::explore::table;
 use crate::kit::{Running, Served, levels, stack};
 use noisefloor::{
-    Threshold,
+    Oracle, Threshold,
     descriptor::{Descriptor, NoiseMask},
     evidence::Evidence,
 };
+use noisefloor_eyes::Eyes;
 use noisefloor_learn::{Corpora, describe_corpora};
 use noisefloor_learn::{TrainParams, train};
 use noisefloor_learn::{predict, score};
+use noisefloor_study::Exposure;
 use noisefloor_study::analysis::CorpusThreshold;
 use noisefloor_study::analysis::files::write;
 use noisefloor_study::analysis::{AnalysisOptions, analyse};
+use noisefloor_study::calibrate::{CalibrateServer, CalibrateSetup};
 use noisefloor_study::explore::ExploreSetup;
 use noisefloor_study::simulated::{Public, SimulatedObserver, SpreadShape};
 use noisefloor_study::{StackView, Study, StudyEvent, Trial, store};
@@ -227,6 +230,48 @@ fn pictures_are_explored_in_a_browser() {
         ..ExploreSetup::new(dir.path().join("explore.sqlite"))
     });
     run("explore.test.mjs", &[("EXPLORER", &format!("http://{}", server.address)), ("STACK", &files)]);
+}
+
+/// Whole calibrations, with keys alone, by somebody who looks at the pixels and by somebody who does not:
+/// browser/calibrate.test.mjs.
+#[test]
+fn eyes_are_calibrated_in_a_browser() {
+    if browser(&[]).is_none() {
+        return;
+    }
+    let dir = tempfile::tempdir().unwrap();
+    let file = dir.path().join("eyes.toml");
+    let serve = |seed| {
+        let file = file.clone();
+        let keep = move |person| match Eyes::keep(&file, person) {
+            Ok(()) => Ok(file.display().to_string()),
+            Err(error) => Err(error.to_string()),
+        };
+        let setup = CalibrateSetup {
+            oracle: Oracle::bundled(),
+            name: "anna".to_owned(),
+            date: "2026-11-24".to_owned(),
+            seed,
+            keep: Box::new(keep),
+        };
+        let here = "127.0.0.1:0".parse().unwrap();
+        let server = CalibrateServer::bind(setup, here, &Exposure::default()).unwrap();
+        let address = format!("http://{}", server.address());
+        // It ends when it has found something, or with the test
+        std::thread::spawn(|| server.run());
+        address
+    };
+    let (looking, guessing) = (serve(1), serve(2));
+    run("calibrate.test.mjs", &[("LOOKING", &looking), ("GUESSING", &guessing)]);
+    let eyes = Eyes::read(&file).unwrap();
+    let [anna] = eyes.people() else { panic!("{eyes:?}") };
+    // The card is 324 CSS pixels wide, the eyes at 60 cm: 324/85.6 x 600 mm x 2 tan(1/2 degree) a degree
+    assert!((anna.display.pixels_per_degree - 39.64).abs() < 0.01, "{anna:?}");
+    assert!(
+        anna.model == noisefloor::Model::bundled().digest() && (24..=60).contains(&anna.answers),
+        "{anna:?}"
+    );
+    println!("{anna:?}");
 }
 
 /// Tiles that an observer clicks, in order, at one showing of a stack.

@@ -7,6 +7,7 @@ use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
 
 /// What is done: checked.
+#[cfg_attr(not(feature = "watch"), allow(dead_code, reason = "refused without web server"))]
 pub enum CalibrateTask {
     Show(PathBuf),
     Simulate(Simulated),
@@ -14,6 +15,7 @@ pub enum CalibrateTask {
 }
 
 /// Who is asked, and where that is kept.
+#[cfg_attr(not(feature = "watch"), allow(dead_code, reason = "refused without web server"))]
 pub struct AskJob {
     pub person: String,
     pub out: PathBuf,
@@ -53,18 +55,16 @@ mod page {
     use super::{AskJob, Simulated};
     use noisefloor_cli::refuse;
 
-    pub(super) fn simulate(observer: Simulated) -> anyhow::Result<()> {
-        let Simulated { factor, .. } = observer;
-        refuse!("{} --simulate factor={factor}`", MISSING)
+    pub(super) fn simulate(_: Simulated) -> anyhow::Result<()> {
+        refuse!("{MISSING}")
     }
 
-    pub(super) fn ask(job: AskJob) -> anyhow::Result<()> {
-        let AskJob { person, listen, .. } = job;
-        refuse!("{} --for {person} --listen {listen}`", MISSING)
+    pub(super) fn ask(_: AskJob) -> anyhow::Result<()> {
+        refuse!("{MISSING}")
     }
 
     const MISSING: &str =
-        "this build has no 'calibrate': run `cargo run --release --features watch -- calibrate";
+        "this build has no 'calibrate': run `cargo run --release --features watch -- calibrate …`";
 }
 
 #[cfg(feature = "watch")]

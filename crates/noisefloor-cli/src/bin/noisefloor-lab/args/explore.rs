@@ -2,9 +2,11 @@
 
 use clap::Args;
 use noisefloor::{Audience, tile::DEFAULT_TILE};
+use noisefloor_cli::options::eyes::EyesArgs;
 use noisefloor_cli::options::oracle::OracleArgs;
 use noisefloor_cli::options::values;
 use noisefloor_cli::options::viewing::ViewingArgs;
+use noisefloor_eyes::Person;
 use std::net::SocketAddr;
 use std::path::PathBuf;
 
@@ -32,9 +34,11 @@ pub struct ExploreArgs {
     oracle: OracleArgs,
     #[command(flatten)]
     viewing: ViewingArgs,
-    /// For whom: `observers`, `art-students`, or a,b for T' = a T + b.
-    #[arg(long, default_value = "observers", value_name = "WHO", value_parser = values::audience)]
-    audience: Audience,
+    /// For whom: `observers`, `art-students`, or a,b for T' = a T + b [default: see --eyes].
+    #[arg(long, value_name = "WHO", value_parser = values::audience)]
+    audience: Option<Audience>,
+    #[command(flatten)]
+    eyes: EyesArgs,
     /// Tile edge in pixels, 16…512.
     #[arg(long, default_value_t = DEFAULT_TILE, value_name = "PIXELS", value_parser = values::edge)]
     tile: usize,
@@ -57,11 +61,17 @@ pub struct ExploreArgs {
 impl ExploreArgs {
     pub fn check(self) -> anyhow::Result<crate::explore::ExploreJob> {
         let oracle = self.oracle.check()?;
+        let said = [("--viewing", self.viewing.typed().is_some()), ("--audience", self.audience.is_some())];
+        let eyes = self.eyes.of(self.oracle.model.as_deref(), &said)?;
+        let own = eyes.as_ref().map_or(Audience::TRAINED, Person::audience);
         let setup = noisefloor_study::explore::ExploreSetup {
             model: oracle.model().clone(),
             threshold: oracle.threshold(),
-            audience: self.audience,
-            viewing: self.viewing.judged_by(&oracle)?,
+            audience: self.audience.unwrap_or(own),
+            viewing: match &eyes {
+                Some(person) => person.viewing(),
+                None => self.viewing.judged_by(&oracle)?,
+            },
             tile: self.tile,
             database: self.database,
             table: self.table.as_deref().map(crate::learning::read_table_file).transpose()?,

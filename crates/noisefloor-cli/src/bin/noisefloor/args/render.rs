@@ -44,6 +44,7 @@ use std::time::Duration;
   noisefloor render hall/scene.xml --out out/hall    a scene file: glTF, Mitsuba XML or pbrt
   noisefloor render --source mitsuba hall/scene.xml  another renderer; `noisefloor doctor` lists them
   noisefloor render --criterion spp:1000             for comparison: a fixed number of samples
+  noisefloor calibrate                                once, two minutes: renders then stop for your eyes
   noisefloor render --audience art-students          for more demanding viewers (more samples)
   noisefloor render --denoise oidn                   for a picture that will be denoised (fewer samples)
   noisefloor render --time 60 --against truth.exr    at most a minute; relMSE to a reference in timeline.csv

@@ -1,7 +1,7 @@
 //! A render in a few lines, for people.
 
 use super::{CHECKPOINT, Output, typical_threshold, uniform_samples};
-use noisefloor::{Session, driver::Clock};
+use noisefloor::{Audience, Session, driver::Clock};
 use noisefloor_cli::say::{NotSaid, say};
 use noisefloor_cli::sources::Source;
 use noisefloor_ptwne::ReferenceNoise;
@@ -54,6 +54,12 @@ impl Output {
             samples / (grid.width() * grid.height()) as f64,
             100.0 * samples / uniform_samples(session).max(1) as f64,
         )?;
+        let audience = session.params().audience;
+        if audience != Audience::TRAINED && !counts {
+            let Audience { slope, offset } = audience;
+            let more = if offset == 0.0 { String::new() } else { format!(" {offset:+}") };
+            say!("tiles stop at {slope:.2} times the samples that the model's observers need{more}")?;
+        }
         if let Some(threshold) = typical_threshold(session) {
             say!(
                 "in the typical tile, people stop seeing noise between {} and {} samples per pixel (80 %)",
