@@ -53,8 +53,8 @@ mod tests {
     use super::*;
 
     /// Thresholds of the tiles at 60 cm before a Full HD display, and from a third nearer.
-    const DESK: [f64; 4] = [181.0, 1677.0, 114.0, 416.0];
-    const NEARER: [f64; 4] = [422.0, 3498.0, 292.0, 1130.0];
+    const DESK: [f64; 4] = [307.0, 349.0, 93.0, 294.0];
+    const NEARER: [f64; 4] = [718.0, 706.0, 246.0, 803.0];
 
     /// What calibrations of a simulated public find.
     #[derive(Debug)]
@@ -125,14 +125,14 @@ mod tests {
     #[test]
     fn a_display_described_wrongly_is_in_the_factor() {
         let display = DESK.iter().zip(NEARER).map(|(d, n)| (n / d).ln()).sum::<f64>() / 4.0;
-        let found = public(500, deviations(), [0.0, 0.05], NEARER, display.exp());
+        let found = public(300, deviations(), [0.0, 0.05], NEARER, display.exp());
         println!("nearer than said: {found:?}");
         assert!(found.within > 0.8 && found.bias.ln().abs() < 0.08, "{found:?}");
     }
 
     #[test]
     fn guessers_are_refused() {
-        let found = public(1000, deviations(), [1.0, 1.0], DESK, 1.0);
+        let found = public(500, deviations(), [1.0, 1.0], DESK, 1.0);
         println!("guessers: {found:?}");
         assert!(found.refused >= 0.95, "{found:?}");
     }

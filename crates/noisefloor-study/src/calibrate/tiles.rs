@@ -1,8 +1,10 @@
 //! The pictures of a calibration: small converged ones, and how noisy each of their pixels is.
 //!
-//! They are crops of the built-in scenes, rendered by `examples/calibration_tiles.rs`. Of each pixel, a file has
-//! the converged colour as displayed and the standard deviation of one sample, relative to its light. From
-//! these, pictures of any number of samples are made on the spot.
+//! They are crops of the built-in scenes, rendered by `examples/calibration_tiles.rs`. One file has the converged
+//! colours as displayed, the other the standard deviation of one sample of each pixel and channel, relative to
+//! its light. From these, pictures of any number of samples are made on the spot. Noise has the colour that it has there:
+//! where light comes from coloured walls, channels correlate by as little as 0.58, and grey noise of the same strength
+//! would ask for a fifth more samples.
 
 use crate::random::seeded;
 use noisefloor::display::{ToneMapping, srgb_decode, srgb_encode};
@@ -19,11 +21,28 @@ const CODES: (f32, f32) = (16.0, 128.0);
 const LOOKS: u64 = 8;
 const GUESS_SPP: f64 = 200.0;
 
-const FILES: [(&str, &[u8]); 4] = [
-    ("smooth", include_bytes!("../../tiles/smooth.png")),
-    ("dark", include_bytes!("../../tiles/dark.png")),
-    ("textured", include_bytes!("../../tiles/textured.png")),
-    ("edge", include_bytes!("../../tiles/edge.png")),
+/// A tile as it is kept: its name, the two files, and how the noise of its channels correlates (red with green,
+/// red with blue, green with blue).
+type Files = (&'static str, [&'static [u8]; 2], [f64; 3]);
+
+macro_rules! files {
+    ($name:literal, $correlations:expr) => {
+        (
+            $name,
+            [
+                include_bytes!(concat!("../../tiles/", $name, ".png")) as &[u8],
+                include_bytes!(concat!("../../tiles/", $name, "-noise.png")) as &[u8],
+            ],
+            $correlations,
+        )
+    };
+}
+
+const FILES: [Files; 4] = [
+    files!("smooth", [0.58, 0.80, 0.76]),
+    files!("dark", [0.76, 0.79, 0.96]),
+    files!("textured", [0.82, 0.65, 0.95]),
+    files!("edge", [0.96, 0.89, 0.96]),
 ];
 
 /// A converged picture of [`EDGE`]² pixels, and its noise.
@@ -36,30 +55,33 @@ pub struct CalibrationTile {
     /// The same as light, linear in [0, 1], with the fractions of a code value that rounding has taken.
     light: Vec<Rgb>,
     /// Standard deviation of one sample, relative to the light.
-    deviation: Vec<f32>,
+    deviation: Vec<Rgb>,
+    /// Lower triangle by rows: what makes independent numbers correlate as the channels do (Cholesky).
+    triangle: [f64; 6],
 }
 
 impl CalibrationTile {
     /// All of them.
     pub fn all() -> &'static [Self] {
         static TILES: OnceLock<Vec<CalibrationTile>> = OnceLock::new();
-        TILES.get_or_init(|| FILES.into_iter().filter_map(|(name, png)| Self::read(name, png)).collect())
+        TILES.get_or_init(|| FILES.into_iter().filter_map(Self::read).collect())
     }
 
-    fn read(name: &'static str, png: &[u8]) -> Option<Self> {
-        let image = image::load_from_memory(png).ok()?.into_rgba8();
+    fn read((name, files, correlations): Files) -> Option<Self> {
+        let [clean, noise] = files.map(|png| image::load_from_memory(png).map(|image| image.into_rgb8()));
+        let (clean, noise) = (clean.ok()?, noise.ok()?);
         let mut random = seeded(name.len() as u64);
         // In a picture that was not rounded, fractions are evenly spread; without noise, rounding gives the
         // picture back, and with noise it does to it what it does to a rendering
-        let mut light = |[r, g, b, _]: [u8; 4]| {
-            [r, g, b]
-                .map(|code| srgb_decode((f32::from(code) + 0.998 * (random.f32() - 0.5)).max(0.0) / 255.0))
-        };
+        let mut light =
+            |code: u8| srgb_decode((f32::from(code) + 0.998 * (random.f32() - 0.5)).max(0.0) / 255.0);
+        let deviation = |code: u8| ((f32::from(code) - CODES.1) / CODES.0).exp2();
         Some(Self {
             name,
-            clean: image.pixels().map(|p| [p[0], p[1], p[2]]).collect(),
-            light: image.pixels().map(|p| light(p.0)).collect(),
-            deviation: image.pixels().map(|p| ((f32::from(p[3]) - CODES.1) / CODES.0).exp2()).collect(),
+            clean: clean.pixels().map(|p| p.0).collect(),
+            light: clean.pixels().map(|p| p.0.map(&mut light)).collect(),
+            deviation: noise.pixels().map(|p| p.0.map(deviation)).collect(),
+            triangle: cholesky(correlations),
         })
     }
 
@@ -70,19 +92,23 @@ impl CalibrationTile {
 
     /// A picture of `spp` samples per pixel, sRGB code values, row-major; each seed has noise of its own.
     pub fn noisy(&self, spp: f64, seed: u64) -> Vec<[u8; 3]> {
-        let round = |code: f32| (255.0 * code).round() as u8;
+        let round = |light: f32| (255.0 * srgb_encode(light)).round() as u8;
         self.rendered(spp, seed).into_iter().map(|pixel| pixel.map(round)).collect()
     }
 
-    /// The same before rounding, display values in [0, 1]. A pixel's light is multiplied by a log-normal number
-    /// of mean 1: noise of the right variance that is never negative and has no colour, as that of light on
-    /// surfaces has none.
+    /// The same before rounding, as light, linear in [0, 1]. A pixel's light is multiplied by log-normal numbers
+    /// of mean 1, one for each channel: noise of the right variance and colour that is never negative.
     fn rendered(&self, spp: f64, seed: u64) -> Vec<Rgb> {
         let mut random = seeded(seed);
-        let noisy = |(light, deviation): (&Rgb, &f32)| {
-            let variance = (f64::from(*deviation).powi(2) / spp).ln_1p();
-            let factor = (variance.sqrt() * normal(&mut random) - 0.5 * variance).exp() as f32;
-            light.map(|value| srgb_encode((value * factor).min(1.0)))
+        let [a, b, c, d, e, f] = self.triangle;
+        let noisy = |(light, deviation): (&Rgb, &Rgb)| {
+            let [x, y, z] = [(); 3].map(|()| normal(&mut random));
+            let correlated = [a * x, b * x + c * y, d * x + e * y + f * z];
+            std::array::from_fn(|channel| {
+                let variance = (f64::from(deviation[channel]).powi(2) / spp).ln_1p();
+                let factor = (variance.sqrt() * correlated[channel] - 0.5 * variance).exp() as f32;
+                (light[channel] * factor).min(1.0)
+            })
         };
         self.light.iter().zip(&self.deviation).map(noisy).collect()
     }
@@ -124,6 +150,14 @@ impl CalibrationTile {
     }
 }
 
+/// The lower triangle, by rows, whose product with its transpose has ones on the diagonal and these
+/// correlations beside it.
+fn cholesky([rg, rb, gb]: [f64; 3]) -> [f64; 6] {
+    let green = (1.0 - rg * rg).sqrt();
+    let shared = (gb - rg * rb) / green;
+    [1.0, rg, green, rb, shared, (1.0 - rb * rb - shared * shared).max(0.0).sqrt()]
+}
+
 /// Box and Muller 1958.
 fn normal(random: &mut fastrand::Rng) -> f64 {
     let radius = (-2.0 * (1.0 - random.f64()).ln()).sqrt();
@@ -133,12 +167,10 @@ fn normal(random: &mut fastrand::Rng) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use noisefloor::display::luminance;
-
     #[test]
     fn all_are_there_and_small() {
         assert_eq!(CalibrationTile::all().len(), FILES.len());
-        assert!(FILES.iter().map(|(_, png)| png.len()).sum::<usize>() <= 200_000);
+        assert!(FILES.iter().flat_map(|(_, files, _)| files).map(|png| png.len()).sum::<usize>() <= 200_000);
         assert!(CalibrationTile::all().iter().all(|tile| tile.clean.len() == EDGE * EDGE));
     }
 
@@ -150,39 +182,53 @@ mod tests {
         }
     }
 
-    /// Over 200 pictures the light of every pixel has the mean of the converged picture and a variance of
-    /// σ²/n. Each pixel errs by √(2/200) = 10 % of its variance, more for a skewed distribution, and all 16384 of
-    /// them by 0.1 %; of their standardised means, the mean square is 1 within √(2/16384) = 1.1 %. Tolerances are
-    /// four times that.
+    /// Over 200 pictures the light of every pixel and channel has the mean of the converged picture and a
+    /// variance of σ²/n. Each errs by √(2/200) = 10 % of its variance, more for a skewed distribution, and all
+    /// 16384 of them by 0.1 %; of their standardised means, the mean square is 1 within √(2/16384) = 1.1 %, and
+    /// mean correlations err by 0.01/√… = 10⁻³. Tolerances are four times that, but for correlations of strong noise,
+    /// which log-normal numbers lower.
     #[test]
-    fn noise_has_the_variance_of_its_samples() {
-        for tile in CalibrationTile::all() {
-            for spp in [50.0, 800.0] {
-                let (count, mut ratio, mut means) = (200, 0.0, 0.0);
-                let mut moments = vec![[0.0f64; 2]; EDGE * EDGE];
+    fn noise_has_the_variance_and_colour_of_its_samples() {
+        for (tile, (.., correlations)) in CalibrationTile::all().iter().zip(FILES) {
+            for spp in [100.0, 1600.0] {
+                let count = 200;
+                let mut means = vec![[0.0f64; 3]; EDGE * EDGE];
+                let mut products = vec![[[0.0f64; 3]; 3]; EDGE * EDGE];
                 for seed in 0..count {
-                    for (m, code) in moments.iter_mut().zip(tile.rendered(spp, seed)) {
-                        let light = f64::from(luminance(code.map(srgb_decode)));
-                        m[0] += light / count as f64;
-                        m[1] += light * light / count as f64;
+                    for (i, light) in tile.rendered(spp, seed).into_iter().enumerate() {
+                        let light = light.map(f64::from);
+                        for c in 0..3 {
+                            means[i][c] += light[c] / count as f64;
+                            (0..3).for_each(|d| products[i][c][d] += light[c] * light[d] / count as f64);
+                        }
                     }
                 }
-                let dark = |light: &Rgb| luminance(*light) < 1e-3; // f32 has no digits for their squares
-                let mut used = 0.0;
-                for ((m, light), deviation) in moments.iter().zip(&tile.light).zip(&tile.deviation) {
-                    if dark(light) {
-                        continue;
+                let covariance = |i: usize, c: usize, d: usize| products[i][c][d] - means[i][c] * means[i][d];
+                let unbiased = count as f64 / (count - 1) as f64;
+                for c in 0..3 {
+                    let (mut variance, mut mean, mut used) = (0.0, 0.0, 0.0);
+                    for i in 0..EDGE * EDGE {
+                        let light = f64::from(tile.light[i][c]);
+                        // f32 has no digits for the squares of the darkest
+                        if light > 1e-3 {
+                            let expected = (light * f64::from(tile.deviation[i][c])).powi(2) / spp;
+                            variance += covariance(i, c, c) * unbiased / expected;
+                            mean += (means[i][c] - light).powi(2) / (expected / count as f64);
+                            used += 1.0;
+                        }
                     }
-                    let light = f64::from(luminance(*light));
-                    let variance = (light * f64::from(*deviation)).powi(2) / spp;
-                    ratio += (m[1] - m[0] * m[0]) * count as f64 / (count - 1) as f64 / variance;
-                    means += (m[0] - light).powi(2) / (variance / count as f64);
-                    used += 1.0;
+                    let (variance, mean) = (variance / used, mean / used);
+                    println!("{} {c} at {spp} spp: variance {variance:.4}, means {mean:.4}", tile.name);
+                    assert!((variance - 1.0).abs() < 0.01 && (mean - 1.0).abs() < 0.045, "{} {c}", tile.name);
                 }
-                let (ratio, means) = (ratio / used, means / used);
-                println!("{} at {spp} spp: variance {ratio:.4}, means {means:.4}, {used} pixels", tile.name);
-                assert!((ratio - 1.0).abs() < 0.01, "{} at {spp}: {ratio}", tile.name);
-                assert!((means - 1.0).abs() < 0.045, "{} at {spp}: {means}", tile.name);
+                for (k, (c, d)) in [(0, 1), (0, 2), (1, 2)].into_iter().enumerate() {
+                    let all = (0..EDGE * EDGE).map(|i| {
+                        covariance(i, c, d) / (covariance(i, c, c) * covariance(i, d, d)).max(1e-24).sqrt()
+                    });
+                    let mean = all.sum::<f64>() / (EDGE * EDGE) as f64;
+                    println!("{} {c}{d} at {spp} spp: {mean:.3}, {:.3}", tile.name, correlations[k]);
+                    assert!((mean - correlations[k]).abs() < 0.03, "{} {c}{d} at {spp}: {mean}", tile.name);
+                }
             }
         }
     }

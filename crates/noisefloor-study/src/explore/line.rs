@@ -170,6 +170,39 @@ mod tests {
         assert_eq!(fit_line(&model, threshold, &[]), None);
     }
 
+    /// Forty answers of simulated people, yes or no, about tiles of random noise around the observers' threshold:
+    /// beside the figures of calibrations (`calibrate/simulate.rs`), which choose the noise and ask which of four.
+    /// Offset and slope trade places, so what counts is the need at the middle of what was asked. Of 200 people, a
+    /// share near 0.75 errs by 0.03.
+    #[test]
+    fn forty_answers_give_a_rough_factor() {
+        let (model, threshold) = (Model::bundled(), Threshold::PAPER);
+        let mut errors = Vec::new();
+        for seed in 0..200 {
+            let mut random = crate::random::seeded(seed);
+            let factor = 0.5 * 6f64.powf(random.f64());
+            let scale = (0.15 + 0.35 * random.f64()) * 3f64.sqrt() / std::f64::consts::PI;
+            let slips = 0.05 * random.f64();
+            let mut asked = answers(&model, threshold, 1.0, 201);
+            random.shuffle(&mut asked);
+            asked.truncate(40);
+            for answer in &mut asked {
+                let u = random.f64().clamp(1e-9, 1.0 - 1e-9);
+                let own = (100.0 * factor).ln() + scale * (u / (1.0 - u)).ln();
+                answer.sees_noise =
+                    if random.f64() < slips { random.bool() } else { answer.spp.ln() < own };
+            }
+            let line = fit_line(&model, threshold, &asked).unwrap();
+            let need = line.slope * 100.0 + line.offset;
+            errors.push((need / (100.0 * factor)).ln());
+        }
+        let n = errors.len() as f64;
+        let within = errors.iter().filter(|e| e.abs() <= 1.25f64.ln()).count() as f64 / n;
+        let bias = (errors.iter().sum::<f64>() / n).exp();
+        println!("explore, 40 answers: within {within:.2}, bias {bias:.3}");
+        assert!(within > 0.6 && (0.85..1.15).contains(&bias), "{within} {bias}");
+    }
+
     /// Twelve times "I see none" of tiles that the model calls noisy: verdicts turn, at once.
     #[test]
     fn a_dozen_answers_turn_verdicts_in_no_time() {
