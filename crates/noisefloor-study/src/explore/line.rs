@@ -189,8 +189,7 @@ mod tests {
             for answer in &mut asked {
                 let u = random.f64().clamp(1e-9, 1.0 - 1e-9);
                 let own = (100.0 * factor).ln() + scale * (u / (1.0 - u)).ln();
-                answer.sees_noise =
-                    if random.f64() < slips { random.bool() } else { answer.spp.ln() < own };
+                answer.sees_noise = if random.f64() < slips { random.bool() } else { answer.spp.ln() < own };
             }
             let line = fit_line(&model, threshold, &asked).unwrap();
             let need = line.slope * 100.0 + line.offset;
