@@ -1,4 +1,5 @@
-//! Models and checkpoints: the bytes are the payload; magic, version, length and checksum are right.
+//! Models and checkpoints: the bytes are the payload, of a checkpoint after its length and before the film; magic,
+//! version, lengths and checksums are right.
 
 use noisefloor::{Checkpoint, FixedSpp, Model, Params, Session};
 
@@ -14,13 +15,14 @@ fn wrap(head: &[u8], payload: &[u8]) -> Vec<u8> {
     [&head[..HEAD], &length, blake3::hash(payload).as_bytes(), payload].concat()
 }
 
-pub(crate) fn model(payload: &[u8]) {
+pub(crate) fn model(payload: &[u8]) -> bool {
     thread_local!(static HEAD: Vec<u8> = small_model());
-    let Ok(model) = HEAD.with(|head| Model::read(wrap(head, payload).as_slice())) else { return };
+    let Ok(model) = HEAD.with(|head| Model::read(wrap(head, payload).as_slice())) else { return false };
     // What can be read can be used, and written so that it reads back
     let mut again = Vec::new();
     model.write(&mut again).expect("a model that was read can be written");
     assert_eq!(Model::read(again.as_slice()).expect("and read again").digest(), model.digest());
+    true
 }
 
 pub(crate) fn model_seeds() -> Vec<Vec<u8>> {
@@ -42,23 +44,32 @@ fn small_model() -> Vec<u8> {
     bytes
 }
 
-pub(crate) fn checkpoint(payload: &[u8]) {
+pub(crate) fn checkpoint(bytes: &[u8]) -> bool {
     thread_local!(static HEAD: Vec<u8> = kept(&session()));
-    let Ok(checkpoint) = HEAD.with(|head| Checkpoint::read(wrap(head, payload).as_slice())) else { return };
-    let Ok(mut session) = fresh().resume(JOB, checkpoint) else { return };
+    let Some((length, rest)) = bytes.split_first_chunk() else { return false };
+    let (payload, film) = rest.split_at(usize::from(u16::from_le_bytes(*length)).min(rest.len()));
+    let whole = HEAD.with(|head| [&wrap(head, payload), film, blake3::hash(film).as_bytes()].concat());
+    let Ok(checkpoint) = Checkpoint::read(whole.as_slice()) else { return false };
+    let Ok(mut session) = fresh().resume(JOB, checkpoint) else { return false };
     // A session that resumes can go on
     let requests = session.requests();
     for request in requests {
         let grey = vec![[0.5; 3]; request.tile.pixels()];
         if session.push(request.tile.index, request.spp, &grey).is_err() {
-            return;
+            return false;
         }
     }
-    let _ = session.judge();
+    session.judge().is_ok()
 }
 
 pub(crate) fn checkpoint_seeds() -> Vec<Vec<u8>> {
-    vec![kept(&fresh()).split_off(HEADER), kept(&session()).split_off(HEADER)]
+    let seed = |whole: Vec<u8>| {
+        let length: [u8; 8] = whole[HEAD..HEAD + 8].try_into().expect("eight bytes");
+        let payload = u64::from_le_bytes(length) as usize;
+        let film = &whole[HEADER + payload..whole.len() - 32];
+        [&(payload as u16).to_le_bytes(), &whole[HEADER..HEADER + payload], film].concat()
+    };
+    vec![seed(kept(&fresh())), seed(kept(&session()))]
 }
 
 fn fresh() -> Session<FixedSpp> {

@@ -22,9 +22,9 @@ mod texts;
 pub struct Target {
     /// Its name on the command line, and of its folder of inputs.
     pub name: &'static str,
-    /// Parses the bytes, and uses what it gets a little.
-    pub run: fn(&[u8]),
-    /// Small valid inputs.
+    /// Parses the bytes, uses what it gets a little, and says whether they were valid.
+    pub run: fn(&[u8]) -> bool,
+    /// Small inputs, of which the first is valid at least.
     pub seeds: fn() -> Vec<Vec<u8>>,
 }
 
@@ -48,6 +48,7 @@ pub const TARGETS: &[Target] = &[
     Target { name: "table", run: texts::table, seeds: texts::table_seeds },
     Target { name: "cube", run: texts::cube, seeds: texts::cube_seeds },
     Target { name: "wire", run: texts::wire, seeds: texts::wire_seeds },
+    Target { name: "eyes", run: texts::eyes, seeds: texts::eyes_seeds },
     Target { name: "study", run: texts::study, seeds: texts::study_seeds },
 ];
 

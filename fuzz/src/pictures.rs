@@ -8,17 +8,18 @@ use std::fs;
 /// Signature of a PNG.
 const SIGNATURE: usize = 8;
 
-fn read(name: &str, bytes: &[u8]) {
+fn read(name: &str, bytes: &[u8]) -> bool {
     thread_local!(static FOLDER: Folder = Folder::new());
     let path = FOLDER.with(|folder| folder.write(name, bytes));
     let _ = read_facts(&path);
-    let Ok(picture) = read_picture(path) else { return };
+    let Ok(picture) = read_picture(path) else { return false };
     let (width, height) = picture.size();
     assert_eq!(picture.into_linear().pixels.len(), width * height);
+    true
 }
 
-pub(crate) fn exr(bytes: &[u8]) {
-    read("picture.exr", bytes);
+pub(crate) fn exr(bytes: &[u8]) -> bool {
+    read("picture.exr", bytes)
 }
 
 pub(crate) fn exr_seeds() -> Vec<Vec<u8>> {
@@ -37,8 +38,9 @@ pub(crate) fn exr_seeds() -> Vec<Vec<u8>> {
         bytes[at] = compression;
         bytes
     };
-    (0..8)
-        .map(other)
+    [plain.clone()]
+        .into_iter()
+        .chain((0..8).map(other))
         .chain([EXR_B44.to_vec(), EXR_PIZ.to_vec(), EXR_RLE.to_vec(), EXR_PXR24.to_vec()])
         .collect()
 }
@@ -48,8 +50,8 @@ const EXR_PIZ: &[u8] = include_bytes!("../seeds/piz.exr");
 const EXR_RLE: &[u8] = include_bytes!("../seeds/rle.exr");
 const EXR_PXR24: &[u8] = include_bytes!("../seeds/pxr24.exr");
 
-pub(crate) fn pfm(bytes: &[u8]) {
-    read("picture.pfm", bytes);
+pub(crate) fn pfm(bytes: &[u8]) -> bool {
+    read("picture.pfm", bytes)
 }
 
 pub(crate) fn pfm_seeds() -> Vec<Vec<u8>> {
@@ -57,8 +59,8 @@ pub(crate) fn pfm_seeds() -> Vec<Vec<u8>> {
     vec![of("PF\n3 2\n-1.0\n", 18), of("Pf\n2 2\n1.0\n", 4)]
 }
 
-pub(crate) fn png(bytes: &[u8]) {
-    read("picture.png", &repaired(bytes));
+pub(crate) fn png(bytes: &[u8]) -> bool {
+    read("picture.png", &repaired(bytes))
 }
 
 /// Chunks as far as they go, each with the checksum of its content.

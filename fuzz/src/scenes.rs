@@ -10,21 +10,23 @@ use std::io::Write;
 
 thread_local!(static FOLDER: Folder = Folder::new());
 
-fn read(name: &str, bytes: &[u8]) {
+fn read(name: &str, bytes: &[u8]) -> bool {
     let path = FOLDER.with(|folder| folder.write(name, bytes));
     // Errors and warnings can be said
-    match load(&path) {
+    let loaded = load(&path);
+    match &loaded {
         Ok(loaded) => assert!(loaded.warnings.iter().all(|warning| !warning.to_string().is_empty())),
         Err(error) => assert!(!error.to_string().is_empty()),
     }
+    loaded.is_ok()
 }
 
 /// Loads a scene with the mesh in it.
-fn read_mesh(name: &str, kind: &str, bytes: &[u8]) {
+fn read_mesh(name: &str, kind: &str, bytes: &[u8]) -> bool {
     FOLDER.with(|folder| folder.write(name, bytes));
     let shape = format!(r#"<shape type="{kind}"><string name="filename" value="{name}"/></shape>"#);
     let scene = format!(r#"<scene version="3.0.0"><sensor type="perspective"/>{shape}</scene>"#);
-    read("mesh.xml", scene.as_bytes());
+    read("mesh.xml", scene.as_bytes())
 }
 
 /// A triangle under a lamp, seen by a camera; `uri` names or holds its positions.
@@ -54,8 +56,8 @@ fn positions() -> Vec<u8> {
     bytes
 }
 
-pub(crate) fn gltf(bytes: &[u8]) {
-    read("scene.gltf", bytes);
+pub(crate) fn gltf(bytes: &[u8]) -> bool {
+    read("scene.gltf", bytes)
 }
 
 pub(crate) fn gltf_seeds() -> Vec<Vec<u8>> {
@@ -98,7 +100,7 @@ fn dressed(uri: &str) -> String {
 }
 
 /// The JSON up to the first zero byte, and the binary chunk after it.
-pub(crate) fn glb(bytes: &[u8]) {
+pub(crate) fn glb(bytes: &[u8]) -> bool {
     let at = bytes.iter().position(|&b| b == 0).unwrap_or(bytes.len());
     let (json, binary) = (&bytes[..at], bytes.get(at + 1..).unwrap_or_default());
     let pad = |bytes: &[u8], with: u8| {
@@ -116,15 +118,15 @@ pub(crate) fn glb(bytes: &[u8]) {
     file.extend((binary.len() as u32).to_le_bytes());
     file.extend(b"BIN\0");
     file.extend(&binary);
-    read("scene.glb", &file);
+    read("scene.glb", &file)
 }
 
 pub(crate) fn glb_seeds() -> Vec<Vec<u8>> {
     vec![[triangle("").as_bytes(), &[0], &positions()].concat()]
 }
 
-pub(crate) fn xml(bytes: &[u8]) {
-    read("scene.xml", bytes);
+pub(crate) fn xml(bytes: &[u8]) -> bool {
+    read("scene.xml", bytes)
 }
 
 pub(crate) fn xml_seeds() -> Vec<Vec<u8>> {
@@ -143,7 +145,7 @@ pub(crate) fn xml_seeds() -> Vec<Vec<u8>> {
 <shape type="cube"><bsdf type="dielectric"><string name="int_ior" value="bk7"/></bsdf></shape>
 <shape type="cube"><bsdf type="roughdiffuse"><float name="alpha" value="0.3"/></bsdf></shape>
 <shape type="sphere"><float name="radius" value="$r"/><ref id="c"/></shape>
-<shape type="cylinder"><point name="p0" value="0,0,1"/><ref id="b"/></shape>
+<shape type="cylinder"><point name="p0" value="0,0,2"/><ref id="b"/></shape>
 <shape type="disk"><emitter type="area"><rgb name="radiance" value="9"/></emitter></shape>
 <texture type="checkerboard" id="t"/>
 <emitter type="constant"/><emitter type="point"/><emitter type="directional"/>
@@ -151,8 +153,8 @@ pub(crate) fn xml_seeds() -> Vec<Vec<u8>> {
     vec![scene.as_bytes().to_vec(), include_bytes!("../../fixtures/cornell-box.xml").to_vec()]
 }
 
-pub(crate) fn pbrt(bytes: &[u8]) {
-    read("scene.pbrt", bytes);
+pub(crate) fn pbrt(bytes: &[u8]) -> bool {
+    read("scene.pbrt", bytes)
 }
 
 pub(crate) fn pbrt_seeds() -> Vec<Vec<u8>> {
@@ -178,14 +180,14 @@ pub(crate) fn pbrt_seeds() -> Vec<Vec<u8>> {
 }
 
 /// A file of a spectrum.
-pub(crate) fn spectrum(bytes: &[u8]) {
+pub(crate) fn spectrum(bytes: &[u8]) -> bool {
     FOLDER.with(|folder| folder.write("a.spd", bytes));
-    read(
+    let xml = read(
         "spectrum.xml",
         br#"<scene version="3.0.0"><sensor type="perspective"/><emitter type="point">
 <spectrum name="intensity" filename="a.spd"/></emitter></scene>"#,
     );
-    read("spectrum.pbrt", b"WorldBegin LightSource \"point\" \"spectrum I\" \"a.spd\"");
+    read("spectrum.pbrt", b"WorldBegin LightSource \"point\" \"spectrum I\" \"a.spd\"") && xml
 }
 
 pub(crate) fn spectrum_seeds() -> Vec<Vec<u8>> {
@@ -193,14 +195,14 @@ pub(crate) fn spectrum_seeds() -> Vec<Vec<u8>> {
 }
 
 /// A picture on a surface and around the scene: those without a mark are tried as TGA.
-pub(crate) fn texture(bytes: &[u8]) {
+pub(crate) fn texture(bytes: &[u8]) -> bool {
     FOLDER.with(|folder| folder.write("a.tga", bytes));
     read(
         "texture.xml",
         br#"<scene version="3.0.0"><sensor type="perspective"/><shape type="rectangle"><bsdf type="bumpmap">
 <texture type="bitmap"><string name="filename" value="a.tga"/></texture><bsdf type="diffuse"/></bsdf></shape>
 <emitter type="envmap"><string name="filename" value="a.tga"/></emitter></scene>"#,
-    );
+    )
 }
 
 pub(crate) fn texture_seeds() -> Vec<Vec<u8>> {
@@ -211,8 +213,8 @@ pub(crate) fn texture_seeds() -> Vec<Vec<u8>> {
     vec![tga, packed, hdr, include_bytes!("../seeds/two.png").to_vec()]
 }
 
-pub(crate) fn ply(bytes: &[u8]) {
-    read_mesh("mesh.ply", "ply", bytes);
+pub(crate) fn ply(bytes: &[u8]) -> bool {
+    read_mesh("mesh.ply", "ply", bytes)
 }
 
 pub(crate) fn ply_seeds() -> Vec<Vec<u8>> {
@@ -237,8 +239,8 @@ pub(crate) fn ply_seeds() -> Vec<Vec<u8>> {
     vec![text.into_bytes(), little, big]
 }
 
-pub(crate) fn obj(bytes: &[u8]) {
-    read_mesh("mesh.obj", "obj", bytes);
+pub(crate) fn obj(bytes: &[u8]) -> bool {
+    read_mesh("mesh.obj", "obj", bytes)
 }
 
 pub(crate) fn obj_seeds() -> Vec<Vec<u8>> {
@@ -248,13 +250,15 @@ pub(crate) fn obj_seeds() -> Vec<Vec<u8>> {
 }
 
 /// The first four bytes are the version; the rest is compressed, by storing it.
-pub(crate) fn serialized(bytes: &[u8]) {
+pub(crate) fn serialized(bytes: &[u8]) -> bool {
     let (head, inside) = bytes.split_at(bytes.len().min(4));
     let mut encoder = ZlibEncoder::new(head.to_vec(), Compression::none());
     let packed = encoder.write_all(inside).and_then(|()| encoder.finish());
     let mut file = packed.expect("memory takes all");
-    file.extend([0u32, 1].map(u32::to_le_bytes).concat());
-    read_mesh("mesh.serialized", "serialized", &file);
+    // Where the mesh begins, which version 4 says in eight bytes, and how many there are
+    file.extend(vec![0; if head.get(2) == Some(&4) { 8 } else { 4 }]);
+    file.extend(1u32.to_le_bytes());
+    read_mesh("mesh.serialized", "serialized", &file)
 }
 
 pub(crate) fn serialized_seeds() -> Vec<Vec<u8>> {

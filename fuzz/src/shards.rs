@@ -20,13 +20,12 @@ fn header_of(whole: &[u8]) -> &[u8] {
     &whole[PREFIX..][..length as usize]
 }
 
-pub(crate) fn shard(header: &[u8]) {
+pub(crate) fn shard(header: &[u8]) -> bool {
     thread_local!(static BEFORE: (Folder, [Vec<u8>; 2]) = (Folder::new(), [written(0), written(16)]));
     BEFORE.with(|(folder, wholes)| {
-        for (blocks, whole) in [0, 16].into_iter().zip(wholes) {
-            merge(folder, blocks, &wrap(whole, header));
-        }
-    });
+        let all = [0, 16].into_iter().zip(wholes);
+        all.map(|(blocks, whole)| merge(folder, blocks, &wrap(whole, header))).sum::<u64>() > 0
+    })
 }
 
 /// Samples that come of a shard.

@@ -1,16 +1,19 @@
 //! Tables, replies of renderers, and what browsers send.
 
+use noisefloor::Params;
+use noisefloor_eyes::Eyes;
 use noisefloor_image::parse_cube;
 use noisefloor_learn::{read_table, write_table};
 use noisefloor_study::{Beginning, Envelope, ParticipantSession, Plan, Study, grids, parse_code};
 use std::sync::Arc;
 
-pub(crate) fn table(bytes: &[u8]) {
-    let Ok(table) = read_table(bytes) else { return };
+pub(crate) fn table(bytes: &[u8]) -> bool {
+    let Ok(table) = read_table(bytes) else { return false };
     // What can be read can be written so that it reads back
     let mut again = Vec::new();
     write_table(&table, &mut again).expect("a table that was read can be written");
     read_table(again.as_slice()).expect("and read again");
+    true
 }
 
 pub(crate) fn table_seeds() -> Vec<Vec<u8>> {
@@ -19,11 +22,12 @@ pub(crate) fn table_seeds() -> Vec<Vec<u8>> {
 }
 
 /// A LUT: what it makes of colours is finite.
-pub(crate) fn cube(bytes: &[u8]) {
-    let Ok(lut) = parse_cube(bytes) else { return };
+pub(crate) fn cube(bytes: &[u8]) -> bool {
+    let Ok(lut) = parse_cube(bytes) else { return false };
     for colour in [[0.0; 3], [0.3, 0.9, 2.0], [-1.0, f32::MAX, f32::NAN]] {
         assert!(lut.map(colour).iter().all(|c| !c.is_nan()));
     }
+    true
 }
 
 pub(crate) fn cube_seeds() -> Vec<Vec<u8>> {
@@ -35,8 +39,8 @@ pub(crate) fn cube_seeds() -> Vec<Vec<u8>> {
     ]
 }
 
-pub(crate) fn wire(bytes: &[u8]) {
-    noisefloor_sidecar::read_any_reply(bytes);
+pub(crate) fn wire(bytes: &[u8]) -> bool {
+    noisefloor_sidecar::read_any_reply(bytes)
 }
 
 pub(crate) fn wire_seeds() -> Vec<Vec<u8>> {
@@ -54,10 +58,28 @@ pub(crate) fn wire_seeds() -> Vec<Vec<u8>> {
     ]
 }
 
+/// What `noisefloor calibrate` keeps.
+pub(crate) fn eyes(bytes: &[u8]) -> bool {
+    let Some(eyes) = std::str::from_utf8(bytes).ok().and_then(|text| Eyes::parse(text).ok()) else {
+        return false;
+    };
+    let person = eyes.strictest();
+    let params = Params::default().with_audience(person.audience()).with_viewing(person.viewing());
+    assert!(params.check().is_ok(), "{person:?}");
+    true
+}
+
+pub(crate) fn eyes_seeds() -> Vec<Vec<u8>> {
+    let person = "[[person]]\nname = \"a\"\nfactor = 1.5\ninterval = [1.25, 2]\nscatter = 0.25\nanswers = 40\n\
+        date = \"2026-11-24\"\nmodel = \"b\"\n[person.display]\npixels-per-degree = 60\ndistance-mm = 500\n\
+        gamma = 2.2\nambient = \"dim\"\n";
+    vec![format!("version = 1\n{person}{person}").into_bytes()]
+}
+
 /// A body a line: a beginning, a code, or an event, which moves a session on.
-pub(crate) fn study(bytes: &[u8]) {
+pub(crate) fn study(bytes: &[u8]) -> bool {
     thread_local!(static FRESH: ParticipantSession = fresh());
-    let mut session = FRESH.with(Clone::clone);
+    let (mut session, mut moved) = (FRESH.with(Clone::clone), false);
     for line in bytes.split(|&b| b == b'\n') {
         let _ = serde_json::from_slice::<Beginning>(line);
         let _ = std::str::from_utf8(line).map(parse_code);
@@ -65,8 +87,11 @@ pub(crate) fn study(bytes: &[u8]) {
         let before = (session.stage(), session.progress());
         if !envelope.has_sane_clock() || session.apply(&envelope.event).is_err() {
             assert_eq!((session.stage(), session.progress()), before, "a refused event changes nothing");
+        } else {
+            moved = true;
         }
     }
+    moved
 }
 
 /// A session of a small study by forced choice.

@@ -7,12 +7,12 @@ use noisefloor::{Counts, Request, Tile};
 
 const LATE: Counts = Counts::Late { overrun: 1 << 17 };
 
-/// Reads bytes as a renderer's reply to each request there is. Not for other use.
+/// Reads bytes as a renderer's reply to each request there is, and says whether it is one. Not for other use.
 #[doc(hidden)]
-pub fn read_any_reply(mut bytes: &[u8]) {
+pub fn read_any_reply(mut bytes: &[u8]) -> bool {
     const PAYLOAD: usize = 12 * 64;
-    let Ok(reply) = frame::read(&mut bytes, PAYLOAD) else { return };
-    let _ = serde_json::from_slice::<Status>(&reply.header);
+    let Ok(reply) = frame::read(&mut bytes, PAYLOAD) else { return false };
+    let valid = serde_json::from_slice::<Status>(&reply.header).is_ok();
     if let Ok(hello) = serde_json::from_slice::<Hello>(&reply.header)
         && let Ok(Described { info, .. }) = describe(hello)
     {
@@ -29,4 +29,5 @@ pub fn read_any_reply(mut bytes: &[u8]) {
             );
         }
     }
+    valid
 }

@@ -1,6 +1,6 @@
 //! One emitter, and samples of points on it.
 
-use super::punctual::Cone;
+use super::cone::Cone;
 use crate::accel::Shape;
 use crate::environment::Map;
 use crate::geometry::NO;

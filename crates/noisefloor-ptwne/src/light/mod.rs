@@ -2,6 +2,7 @@
 
 mod choice;
 mod cluster;
+mod cone;
 mod emitter;
 mod node;
 mod punctual;
@@ -12,6 +13,7 @@ mod tree;
 mod tests;
 
 pub(crate) use choice::Lights;
+pub use cone::Falloff;
 pub(crate) use emitter::{Light, LightSample, LightShape};
-pub use punctual::{Falloff, Profile, Punctual};
+pub use punctual::{Profile, Punctual};
 pub(crate) use receiver::Receiver;

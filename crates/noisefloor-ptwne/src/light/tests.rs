@@ -1,8 +1,9 @@
 //! Choice, densities and solid angles of lights.
 
 use super::choice::Lights;
+use super::cone::Falloff;
 use super::emitter::Light;
-use super::punctual::{Falloff, Punctual};
+use super::punctual::Punctual;
 use super::receiver::Receiver;
 use crate::accel::Shape;
 use crate::math::{self, Vec3};
