@@ -8,7 +8,7 @@ use std::sync::Once;
 use std::time::{Duration, Instant};
 
 /// How long each target runs on mutants if NOISEFLOOR_FUZZ_SECONDS does not say.
-const SECONDS: f64 = 1.0;
+const SECONDS: f64 = 0.5;
 /// Longest mutant, in bytes.
 const LONGEST: usize = 1 << 16;
 

@@ -107,32 +107,32 @@ mod tests {
         [0.15, 0.5].map(|sd| sd * 3f64.sqrt() / std::f64::consts::PI)
     }
 
-    /// Of 1000 people, a share near 0.9 has a standard error of 0.01, the mean of ln errors near 0.12 one of
-    /// 0.004; tolerances are three of them below what 2000 others gave.
+    /// Of 600 people, a share near 0.95 has a standard error of 0.009, and the mean of errors near 0.12 in ln one
+    /// of 0.005; 2000 others gave 0.96 and ×1.00, and with the larger scatter 0.87 and ×0.99.
     #[test]
     fn the_factor_is_found() {
-        let found = public(1000, deviations(), [0.0, 0.05], DESK, 1.0);
+        let found = public(600, deviations(), [0.0, 0.05], DESK, 1.0);
         println!("standard deviations of 0.15 to 0.5: {found:?}");
         assert!(found.within >= 0.9 && (found.bias.ln()).abs() < 0.05 && found.answers <= 40, "{found:?}");
         assert!((0.8..0.93).contains(&found.covered) && found.refused < 0.03, "{found:?}");
         // With scales of 0.15 to 0.5, standard deviations of 0.27 to 0.9, sixty answers are too few
-        let found = public(1000, [0.15, 0.5], [0.0, 0.05], DESK, 1.0);
+        let found = public(600, [0.15, 0.5], [0.0, 0.05], DESK, 1.0);
         println!("scales of 0.15 to 0.5: {found:?}");
-        assert!((0.83..0.9).contains(&found.within) && (found.bias.ln()).abs() < 0.05, "{found:?}");
+        assert!((0.81..0.92).contains(&found.within) && (found.bias.ln()).abs() < 0.05, "{found:?}");
     }
 
     /// Somebody who sits a third nearer than they say needs 2.4 times the samples in truth, and is told so.
     #[test]
     fn a_display_described_wrongly_is_in_the_factor() {
         let display = DESK.iter().zip(NEARER).map(|(d, n)| (n / d).ln()).sum::<f64>() / 4.0;
-        let found = public(300, deviations(), [0.0, 0.05], NEARER, display.exp());
+        let found = public(200, deviations(), [0.0, 0.05], NEARER, display.exp());
         println!("nearer than said: {found:?}");
         assert!(found.within > 0.8 && found.bias.ln().abs() < 0.08, "{found:?}");
     }
 
     #[test]
     fn guessers_are_refused() {
-        let found = public(500, deviations(), [1.0, 1.0], DESK, 1.0);
+        let found = public(300, deviations(), [1.0, 1.0], DESK, 1.0);
         println!("guessers: {found:?}");
         assert!(found.refused >= 0.95, "{found:?}");
     }
