@@ -8,6 +8,7 @@
 //! - [`analysis`] makes thresholds, agreements and tables of the answers, and a corpus for `noisefloor
 //!   train`.
 //! - [`explore`] judges one's own pictures in the browser, keeps disagreements, and learns from them.
+//! - [`calibrate`] measures how many samples one's own eyes need, in two minutes.
 //! - [`watch`] shows a render while it runs.
 //! - [`simulated`] are observers made of numbers, who drive the same server: to test the whole chain, and
 //!   to plan a study.

@@ -3,11 +3,10 @@
 //! Whoever renders [publishes](LiveRender::publish) states and pictures; a [`WatchServer`] hands out the latest ones.
 
 use crate::error::StudyError;
-use crate::http::{self, Exposure, Guard, Listening, Refusal};
+use crate::http::{self, Exposure, Guard, HTML, Listening, PageFile, SCRIPT, STYLE, absent, page_file};
 use axum::Router;
 use axum::body::Bytes;
 use axum::extract::{Path, State};
-use axum::http::StatusCode;
 use axum::http::header::CONTENT_TYPE;
 use axum::middleware::{from_fn, from_fn_with_state};
 use axum::response::{IntoResponse, Response};
@@ -22,10 +21,8 @@ use std::time::{Duration, Instant};
 /// A page that has asked for nothing for so long is closed.
 const GONE: Duration = Duration::from_secs(10);
 
-const SCRIPT: &str = "text/javascript; charset=utf-8";
-const STYLE: &str = "text/css; charset=utf-8";
-const HTML: &str = include_str!("../pages/watch/index.html");
-const FILES: [(&str, &str, &str); 3] = [
+const PAGE: &str = include_str!("../pages/watch/index.html");
+const FILES: [PageFile; 3] = [
     ("watch.js", SCRIPT, include_str!("../pages/watch/watch.js")),
     ("style.css", STYLE, include_str!("../pages/style.css")),
     ("watch.css", STYLE, include_str!("../pages/watch/watch.css")),
@@ -165,7 +162,7 @@ impl WatchServer {
 
 fn router(live: Arc<LiveRender>, guard: Arc<Guard>) -> Router {
     Router::new()
-        .route("/", get(|| async { ([(CONTENT_TYPE, "text/html; charset=utf-8")], HTML) }))
+        .route("/", get(|| async { ([(CONTENT_TYPE, HTML)], PAGE) }))
         .route("/{file}", get(file))
         .route("/api/state", get(state))
         .route("/api/picture.png", get(picture))
@@ -177,10 +174,7 @@ fn router(live: Arc<LiveRender>, guard: Arc<Guard>) -> Router {
 }
 
 async fn file(Path(name): Path<String>) -> Response {
-    match FILES.iter().find(|(known, ..)| *known == name) {
-        Some((_, kind, text)) => ([(CONTENT_TYPE, *kind)], *text).into_response(),
-        None => nothing("there is no such page").into_response(),
-    }
+    page_file(&FILES, &name)
 }
 
 async fn state(State(live): State<Arc<LiveRender>>) -> Response {
@@ -188,20 +182,16 @@ async fn state(State(live): State<Arc<LiveRender>>) -> Response {
     latest.asked = Some(Instant::now());
     match &latest.state {
         Some((state, since)) => axum::Json(state.after(since.elapsed())).into_response(),
-        None => nothing("the render has not begun").into_response(),
+        None => absent("the render has not begun").into_response(),
     }
 }
 
 async fn picture(State(live): State<Arc<LiveRender>>) -> Response {
     let png = live.png();
     if png.is_empty() {
-        return nothing("there is no picture yet").into_response();
+        return absent("there is no picture yet").into_response();
     }
     ([(CONTENT_TYPE, "image/png")], png).into_response()
-}
-
-fn nothing(what: &str) -> Refusal {
-    Refusal::new(StatusCode::NOT_FOUND, what, "path", "go to /")
 }
 
 #[cfg(test)]

@@ -2,7 +2,10 @@
 
 use super::{CHOICES, Calibration, CalibrationStage, CalibrationTile, EDGE, Factor};
 use crate::error::StudyError;
-use crate::http::{self, Exposure, Guard, Listening, Refusal, interrupted, read_json};
+use crate::http::{
+    self, Exposure, Guard, HTML, Listening, PageFile, Refusal, SCRIPT, STYLE, absent, interrupted, page_file,
+    read_json,
+};
 use crate::languages::{parse_language, read_languages};
 use crate::viewing::{Conditions, ViewingLimits, ViewingProblem};
 use axum::body::Body;
@@ -24,11 +27,8 @@ use std::net::SocketAddr;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use tokio::sync::Notify;
 
-const HTML: &str = include_str!("../../pages/calibrate/index.html");
-const SCRIPT: &str = "text/javascript; charset=utf-8";
-const STYLE: &str = "text/css; charset=utf-8";
-/// Name, type and text of each file.
-const FILES: [(&str, &str, &str); 7] = [
+const PAGE: &str = include_str!("../../pages/calibrate/index.html");
+const FILES: [PageFile; 7] = [
     ("ask.js", SCRIPT, include_str!("../../pages/ask.js")),
     ("calibrate.css", STYLE, include_str!("../../pages/calibrate/calibrate.css")),
     ("calibrate.js", SCRIPT, include_str!("../../pages/calibrate/calibrate.js")),
@@ -143,7 +143,7 @@ impl CalibrateServer {
 
 fn router(app: Arc<App>, guard: Arc<Guard>) -> Router {
     Router::new()
-        .route("/", get(|| async { ([(CONTENT_TYPE, "text/html; charset=utf-8")], HTML) }))
+        .route("/", get(|| async { ([(CONTENT_TYPE, HTML)], PAGE) }))
         .route("/{file}", get(file))
         .route("/api/texts/{language}", get(texts))
         .route("/api/state", get(state))
@@ -161,25 +161,18 @@ fn router(app: Arc<App>, guard: Arc<Guard>) -> Router {
 
 type Shared = State<Arc<App>>;
 
-fn nothing(what: &str) -> Refusal {
-    Refusal::new(StatusCode::NOT_FOUND, what, "path", "go to /")
-}
-
 fn stale() -> Refusal {
     Refusal::new(StatusCode::CONFLICT, "that is not what is asked now", "trial", "load the page again")
 }
 
 async fn file(Path(name): Path<String>) -> Response {
-    match FILES.iter().find(|(known, ..)| *known == name) {
-        Some((_, kind, text)) => ([(CONTENT_TYPE, *kind)], *text).into_response(),
-        None => nothing("there is no such page").into_response(),
-    }
+    page_file(&FILES, &name)
 }
 
 async fn texts(Path(code): Path<String>) -> Result<Json<BTreeMap<String, String>>, Refusal> {
     let own = TEXTS.iter().find(|(known, _)| *known == code);
     let (Some((_, own)), Ok(mut studies)) = (own, read_languages(None)) else {
-        return Err(nothing("the page is not in that language"));
+        return Err(absent("the page is not in that language"));
     };
     let mut text = studies.remove(&code).map(|language| language.text).unwrap_or_default();
     text.extend(parse_language(own, std::path::Path::new(&code)).map(|own| own.text).unwrap_or_default());
@@ -325,6 +318,6 @@ async fn picture(
     let edge = EDGE as u32;
     let written =
         PngEncoder::new(&mut png).write_image(pixels.as_flattened(), edge, edge, ExtendedColorType::Rgb8);
-    written.map_err(|_| nothing("the picture cannot be written"))?;
+    written.map_err(|_| absent("the picture cannot be written"))?;
     Ok(([(CONTENT_TYPE, "image/png"), (CACHE_CONTROL, "no-store")], png).into_response())
 }

@@ -1,6 +1,6 @@
 //! The page, embedded in the program.
 
-use crate::http::Refusal;
+use crate::http::{HTML, PageFile, Refusal, SCRIPT, STYLE, page_file};
 use crate::languages::parse_language;
 use axum::Json;
 use axum::extract::Path;
@@ -8,10 +8,8 @@ use axum::http::StatusCode;
 use axum::http::header::CONTENT_TYPE;
 use axum::response::{IntoResponse, Response};
 
-const HTML: &str = include_str!("../../pages/explore/index.html");
-const SCRIPT: &str = "text/javascript; charset=utf-8";
-/// Name, type and text of each file.
-const FILES: [(&str, &str, &str); 9] = [
+const PAGE: &str = include_str!("../../pages/explore/index.html");
+const FILES: [PageFile; 9] = [
     ("ask.js", SCRIPT, include_str!("../../pages/ask.js")),
     ("explore.js", SCRIPT, include_str!("../../pages/explore/explore.js")),
     ("grid.js", SCRIPT, include_str!("../../pages/explore/grid.js")),
@@ -19,13 +17,13 @@ const FILES: [(&str, &str, &str); 9] = [
     ("line.js", SCRIPT, include_str!("../../pages/explore/line.js")),
     ("parts.js", SCRIPT, include_str!("../../pages/explore/parts.js")),
     ("server.js", SCRIPT, include_str!("../../pages/explore/server.js")),
-    ("style.css", "text/css; charset=utf-8", include_str!("../../pages/style.css")),
-    ("explore.css", "text/css; charset=utf-8", include_str!("../../pages/explore/explore.css")),
+    ("style.css", STYLE, include_str!("../../pages/style.css")),
+    ("explore.css", STYLE, include_str!("../../pages/explore/explore.css")),
 ];
 
 /// The page.
 pub(crate) async fn page() -> Response {
-    ([(CONTENT_TYPE, "text/html; charset=utf-8")], HTML).into_response()
+    ([(CONTENT_TYPE, HTML)], PAGE).into_response()
 }
 
 const LANGUAGES: [(&str, &str); 2] = [
@@ -47,10 +45,5 @@ pub(crate) async fn texts(Path(code): Path<String>) -> Response {
 
 /// A file of the page.
 pub(crate) async fn file(Path(name): Path<String>) -> Response {
-    match FILES.iter().find(|(known, ..)| *known == name) {
-        Some((_, kind, text)) => ([(CONTENT_TYPE, *kind)], *text).into_response(),
-        None => {
-            Refusal::new(StatusCode::NOT_FOUND, "there is no such page", "path", "go to /").into_response()
-        }
-    }
+    page_file(&FILES, &name)
 }

@@ -3,6 +3,7 @@
 mod body;
 mod exposure;
 mod fallback;
+mod files;
 mod guard;
 mod listen;
 mod patience;
@@ -11,6 +12,7 @@ mod reply;
 pub(crate) use body::{read_bytes, read_json};
 pub use exposure::Exposure;
 pub(crate) use fallback::{nothing_here, wrong_method};
+pub(crate) use files::{HTML, PageFile, SCRIPT, STYLE, absent, page_file};
 pub(crate) use guard::{Client, Guard, check, security_headers};
 pub(crate) use listen::Listening;
 pub use listen::interrupted;
