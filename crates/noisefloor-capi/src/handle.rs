@@ -2,54 +2,21 @@
 //! one of another kind, and one that never was are errors, whatever threads do.
 
 use crate::border;
-use crate::oracle::NfOracle;
-use crate::session::NfSession;
 use crate::status::{Failure, NfStatus};
+use std::any::Any;
 use std::collections::BTreeMap;
 use std::ptr::without_provenance_mut;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, PoisonError, RwLock};
 
-/// What a handle stands for.
-#[derive(Clone)]
-pub(crate) enum Object {
-    Oracle(Arc<NfOracle>),
-    Session(Arc<NfSession>),
-}
-
-static ALIVE: RwLock<BTreeMap<usize, Object>> = RwLock::new(BTreeMap::new());
+static ALIVE: RwLock<BTreeMap<usize, Arc<dyn Any + Send + Sync>>> = RwLock::new(BTreeMap::new());
 /// Numbers are multiples of 64, as pointers to objects are. They begin where no page is.
 static NEXT: AtomicUsize = AtomicUsize::new(64);
 
 /// Objects that C has handles of.
-pub(crate) trait Handle: Sized {
+pub(crate) trait Handle: Any + Send + Sync {
+    /// What errors call them.
     const NAME: &str;
-    fn into_object(self) -> Object;
-    fn of(object: Object) -> Option<Arc<Self>>;
-}
-
-impl Handle for NfOracle {
-    const NAME: &str = "oracle";
-
-    fn into_object(self) -> Object {
-        Object::Oracle(Arc::new(self))
-    }
-
-    fn of(object: Object) -> Option<Arc<Self>> {
-        if let Object::Oracle(oracle) = object { Some(oracle) } else { None }
-    }
-}
-
-impl Handle for NfSession {
-    const NAME: &str = "session";
-
-    fn into_object(self) -> Object {
-        Object::Session(Arc::new(self))
-    }
-
-    fn of(object: Object) -> Option<Arc<Self>> {
-        if let Object::Session(session) = object { Some(session) } else { None }
-    }
 }
 
 /// Makes an object and gives the caller its handle. A pointer that cannot be written is noticed before `make` runs.
@@ -61,7 +28,7 @@ pub(crate) unsafe fn give<T: Handle>(
     make: impl FnOnce() -> Result<T, Failure>,
 ) -> Result<(), Failure> {
     border::check(place, T::NAME)?;
-    let object = make()?.into_object();
+    let object = Arc::new(make()?);
     let number = NEXT.fetch_add(64, Ordering::Relaxed);
     // SAFETY: as for this function.
     unsafe { border::write(place, without_provenance_mut(number), T::NAME) }?;
@@ -76,8 +43,8 @@ pub(crate) fn get<T: Handle>(handle: *const T) -> Result<Arc<T>, Failure> {
     }
     let object = ALIVE.read().unwrap_or_else(PoisonError::into_inner).get(&handle.addr()).cloned();
     let wrong = |why: &str| Failure::new(NfStatus::Handle, format!("{} is {why}", T::NAME));
-    T::of(object.ok_or_else(|| wrong("no handle of this library, or was freed"))?)
-        .ok_or_else(|| wrong("a handle of something else"))
+    let object = object.ok_or_else(|| wrong("no handle of this library, or was freed"))?;
+    object.downcast().map_err(|_| wrong("a handle of something else"))
 }
 
 /// Takes a handle back. Null is nothing to take.

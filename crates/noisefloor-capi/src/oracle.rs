@@ -12,6 +12,10 @@ use std::io;
 /// number of sessions can be made from it.
 pub struct NfOracle(pub(crate) Oracle);
 
+impl handle::Handle for NfOracle {
+    const NAME: &str = "oracle";
+}
+
 /// Makes an oracle from the model inside the library, which was trained on human data and judges by half
 /// buffers. threshold lies between 0 and 1; 0.9 is that of the paper. The caller frees the oracle with
 /// nf_oracle_free.

@@ -14,6 +14,10 @@ pub struct NfSession {
     pub(crate) grid: TileGrid,
 }
 
+impl handle::Handle for NfSession {
+    const NAME: &str = "session";
+}
+
 /// A rectangle of pixels that stops as a whole. Tiles lie in rows from the top left.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

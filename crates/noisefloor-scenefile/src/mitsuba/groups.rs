@@ -1,23 +1,14 @@
 //! Groups of shapes, and their instances.
 
 use super::context::Context;
-use super::shapes::Filling;
+use super::filling::{Filling, Group};
 use super::xml::Element;
 use crate::error::LoadError;
 use crate::mesh::rows;
-use noisefloor_ptwne::{ObjectId, SceneError};
+use noisefloor_ptwne::SceneError;
 
 /// Most triangles that are made: of round shapes, and of lamps in instances. A short file can ask for any number.
 const MAX_MADE: u64 = 1 << 23;
-
-/// A group that has been shown.
-#[derive(Clone, Debug)]
-pub(super) struct Group<'d> {
-    /// What its instances share.
-    shared: ObjectId,
-    /// The shapes that shine, which they do not share.
-    shining: Vec<&'d Element>,
-}
 
 impl<'d> Context<'d> {
     /// Shows the shapes of a group, moved.

@@ -11,6 +11,7 @@ mod colours;
 mod context;
 mod document;
 mod emitters;
+mod filling;
 mod glossy;
 mod groups;
 mod points;
@@ -29,9 +30,9 @@ use crate::error::{Errors, LoadError, Place};
 use crate::options::LoadOptions;
 use context::Context;
 use document::Document;
+use filling::Filling;
 use noisefloor_ptwne::SceneBuilder;
 use sensor::View;
-use shapes::Filling;
 use std::path::Path;
 
 /// Loads the scene in `path`.

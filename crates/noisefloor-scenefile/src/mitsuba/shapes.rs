@@ -1,44 +1,19 @@
 //! Shapes.
 
 use super::context::Context;
-use super::groups::Group;
+use super::filling::Filling;
 use super::surface::{Body, Surface};
 use super::xml::Element;
 use crate::error::{LoadError, Place};
 use crate::files::MAX_FILE_BYTES;
 use crate::mesh::{Triangles, normal_matrix, obj, ply, serialized, solids};
 use glam::{DMat3, DMat4, DQuat, DVec3};
-use noisefloor_ptwne::{Emission, Material, MaterialId, MaterialOptions, ObjectId, SceneBuilder, SceneError};
-use std::collections::HashMap;
+use noisefloor_ptwne::{Emission, Material, MaterialId, MaterialOptions, SceneBuilder, SceneError};
 use std::rc::Rc;
-
-/// The scene that is being filled.
-pub(super) struct Filling<'d> {
-    pub(super) builder: SceneBuilder,
-    /// Materials in it, by the serial number of their element, and whether they are inside out.
-    materials: HashMap<(usize, bool), MaterialId>,
-    /// Meshes of groups that shine, by the serial number of their element.
-    meshes: HashMap<usize, Rc<Triangles>>,
-    /// Triangles that are not in a file but made of what is.
-    pub(super) made: u64,
-    /// Spheres that ellipsoids of a material share.
-    balls: HashMap<MaterialId, ObjectId>,
-    /// Whether shapes are added to what the instances of a group share.
-    pub(super) in_group: bool,
-    /// Groups that have been shown, by the serial number of their element; none if one cannot be.
-    pub(super) groups: HashMap<usize, Option<Group<'d>>>,
-}
 
 /// Centre and axes of a disk, whose front is where their cross product points, and whether the angle of its
 /// texture runs the other way.
 type DiskFrame = ([f32; 3], [[f32; 3]; 2], bool);
-
-impl Filling<'_> {
-    pub(super) fn new(builder: SceneBuilder) -> Self {
-        let (materials, meshes, balls, groups) = Default::default();
-        Self { builder, materials, meshes, made: 0, balls, in_group: false, groups }
-    }
-}
 
 impl<'d> Context<'d> {
     /// Adds a shape to the scene.
