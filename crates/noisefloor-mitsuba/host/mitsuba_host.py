@@ -48,7 +48,6 @@ class Mitsuba:
             "height": film["height"],
             "unit": "samples-per-pixel",
             "repeats": self.renderer.repeats,
-            "blocks": self.renderer.blocks,
             "warnings": warnings,
         }
 
@@ -208,8 +207,6 @@ class Wavefront:
     the sample)."""
 
     repeats = "samples"
-    # Rectangles of any size in one call cost no more than one
-    blocks = True
 
     def __init__(self, mi, scene, sensor, integrator, film, seed):
         import drjit as dr
@@ -336,7 +333,6 @@ class Scalar:
     before, by a seed that is worked out from them."""
 
     repeats = "calls"
-    blocks = False
 
     def __init__(self, mi, scene, sensor, integrator, film, seed):
         import numpy as np

@@ -48,7 +48,7 @@ mod _noisefloor {
     #[pymodule_export]
     use crate::stills::{PyJudged, judge};
     #[pymodule_export]
-    use crate::verdicts::{PyBlocks, PyRequest, PyStop, PyTile, PyVerdict};
+    use crate::verdicts::{PyRequest, PyStop, PyTile, PyVerdict};
     use pyo3::prelude::*;
 
     #[pymodule_init]

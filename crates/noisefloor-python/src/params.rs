@@ -70,8 +70,6 @@ impl PyViewing {
 /// consecutive: verdicts in a row that must say "converged".
 /// audience: (slope, offset) of the line from thresholds of the training data to those of your viewers;
 ///     None is (1, 0).
-/// blocks: edge in pixels, 16 or 32, of the blocks of a tile that get samples by their need; 0 for none. See
-///     Session.blocks.
 ///
 /// Raises ParameterError if a value is out of range.
 #[pyclass(frozen, eq, name = "Params", module = "noisefloor", from_py_object)]
@@ -117,8 +115,8 @@ pub(crate) fn tone_mapping(name: &str, key: f32, white: Option<f32>, exposure: f
 impl PyParams {
     #[new]
     #[pyo3(signature = (*, tile = 128, tone_mapping = "reinhard", key = 0.18, white = None, exposure = 1.0,
-        viewing = None, schedule = "spaced", step = 10, min_spp = 100, max_spp = 10_000, consecutive = 1,
-        audience = None, blocks = 0))]
+        viewing = None, schedule = "spaced", step = 8, min_spp = 16, max_spp = 10_000, consecutive = 1,
+        audience = None))]
     #[expect(clippy::too_many_arguments, reason = "Python names them")]
     fn new(
         #[pyo3(from_py_with = whole)] tile: usize,
@@ -133,7 +131,6 @@ impl PyParams {
         #[pyo3(from_py_with = whole)] max_spp: u64,
         #[pyo3(from_py_with = whole)] consecutive: u32,
         audience: Option<(f64, f64)>,
-        #[pyo3(from_py_with = whole)] blocks: usize,
     ) -> PyResult<Self> {
         let schedule = match schedule {
             "every" => Schedule::Every { step },
@@ -152,8 +149,7 @@ impl PyParams {
             .with_min_spp(min_spp)
             .with_max_spp(max_spp)
             .with_consecutive(consecutive)
-            .with_audience(audience.map_or(Audience::TRAINED, |(slope, offset)| Audience { slope, offset }))
-            .with_blocks(blocks);
+            .with_audience(audience.map_or(Audience::TRAINED, |(slope, offset)| Audience { slope, offset }));
         params.check().map_err(Raise::raise)?;
         Ok(Self(params))
     }
@@ -200,13 +196,12 @@ impl PyParams {
         let Audience { slope, offset } = params.audience;
         format!(
             "Params(tile={}, tone_mapping={tone}, viewing={:?}, schedule={schedule:?}, step={step}, min_spp={}, \
-             max_spp={}, consecutive={}, audience=({slope}, {offset}), blocks={})",
+             max_spp={}, consecutive={}, audience=({slope}, {offset}))",
             params.tile,
             params.viewing.to_string(),
             params.min_spp,
             params.max_spp,
-            params.consecutive,
-            params.blocks
+            params.consecutive
         )
     }
 }

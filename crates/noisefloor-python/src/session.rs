@@ -5,9 +5,9 @@ use crate::errors::{CheckpointError, Error, ParameterError, Raise, SizeError, fi
 use crate::oracle::PyOracle;
 use crate::params::PyParams;
 use crate::pool;
-use crate::verdicts::{PyBlocks, PyRequest, PyStop, PyVerdict, TileLike};
+use crate::verdicts::{PyRequest, PyStop, PyVerdict, TileLike};
 use noisefloor::{
-    Checkpoint, Oracle, Params, Request, Rgb, Session, StopReason, Tile, TileGrid, session::Interruption,
+    Checkpoint, Oracle, Params, Rgb, Session, StopReason, Tile, TileGrid, session::Interruption,
     source::PixelNoise,
 };
 use numpy::{PyArray2, PyArray3};
@@ -153,27 +153,6 @@ impl PySession {
         self.attached(py)?.push(tile.index, spp, &pixels).map_err(Raise::raise)
     }
 
-    /// What each pixel of a request is to get, for a renderer that can give some pixels more samples than
-    /// others: a Blocks, or None unless Params.blocks is set. Push what comes of it with push_blocks, before
-    /// anything else is pushed to the tile or judged. A renderer that cannot answers the request with push.
-    ///
-    /// Raises BatchError if the tile does not exist.
-    fn blocks(&self, py: Python<'_>, request: &PyRequest) -> PyResult<Option<PyBlocks>> {
-        let tile = TileLike::Tile(request.tile).of(self.grid)?;
-        let request = Request { tile, first: request.first, spp: request.spp };
-        Ok(self.attached(py)?.block_request(&request).map(PyBlocks))
-    }
-
-    /// Adds the means of the samples that Blocks.samples asked for.
-    ///
-    /// mean: array of shape (tile.height, tile.width, 3), for each pixel the mean of its own new samples.
-    ///
-    /// Raises SizeError if the shape is another, BatchError if the blocks are none of this session.
-    fn push_blocks(&self, py: Python<'_>, blocks: &PyBlocks, mean: Pixels<'_>) -> PyResult<()> {
-        let pixels = self.batch(blocks.0.tile, &mean)?;
-        self.attached(py)?.push_blocks(&blocks.0, &pixels).map_err(Raise::raise)
-    }
-
     /// As push, for a renderer that keeps running means: the mean of all total samples per pixel so far. The
     /// new samples are what it has more than the session.
     ///
@@ -288,14 +267,13 @@ impl PySession {
         picture(py, self.size(), self.detached(py, |session| session.film().image())?)
     }
 
-    /// Samples of each pixel: uint64 of shape (height, width). Those of its block, where blocks have different
-    /// numbers; Stop.spp is the average of the tile.
+    /// Samples of each pixel: uint64 of shape (height, width).
     fn spp<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<u64>>> {
         let (session, width) = (self.attached(py)?, self.grid.width());
         let mut all = vec![0; width * self.grid.height()];
         for tile in self.grid.tiles() {
             for pixel in tile.rows(width).flatten() {
-                all[pixel] = session.film().samples_at(tile.index, pixel);
+                all[pixel] = session.film().spp(tile.index);
             }
         }
         plane(py, self.size(), all)

@@ -1,12 +1,7 @@
 //! What a session says: tiles, requests, verdicts, stops.
 
-use crate::arrays::plane;
 use crate::errors::BatchError;
-use noisefloor::{
-    Request, Stop, Tile, TileGrid, Verdict,
-    source::{BlockRequest, BlockSamples},
-};
-use numpy::PyArray2;
+use noisefloor::{Request, Stop, Tile, TileGrid, Verdict};
 use pyo3::exceptions::PyOverflowError;
 use pyo3::prelude::*;
 
@@ -110,63 +105,27 @@ pub(crate) struct PyRequest {
     pub(crate) first: u64,
     /// New samples per pixel. Fewer or more are fine.
     pub(crate) spp: u64,
+    /// For quasi-random points: which sequence of the pixel the samples belong to, 0 or 1. Scramble the two
+    /// independently.
+    pub(crate) sequence: u32,
+    /// Index of the first new point in that sequence.
+    pub(crate) point: u64,
 }
 
 #[pymethods]
 impl PyRequest {
     fn __repr__(&self) -> String {
-        format!("Request(tile={}, first={}, spp={})", self.tile.__repr__(), self.first, self.spp)
+        let Self { tile, first, spp, sequence, point } = self;
+        format!(
+            "Request(tile={}, first={first}, spp={spp}, sequence={sequence}, point={point})",
+            tile.__repr__()
+        )
     }
 }
 
 impl From<Request> for PyRequest {
-    fn from(Request { tile, first, spp }: Request) -> Self {
-        Self { tile: tile.into(), first, spp }
-    }
-}
-
-/// What each pixel of a tile is to get, where Params.blocks is set; made by Session.blocks.
-#[pyclass(frozen, name = "Blocks", module = "noisefloor")]
-pub(crate) struct PyBlocks(pub(crate) BlockRequest);
-
-#[pymethods]
-impl PyBlocks {
-    /// The tile.
-    #[getter]
-    fn tile(&self) -> PyTile {
-        self.0.tile.into()
-    }
-
-    /// New samples per pixel, on average over the tile.
-    #[getter]
-    fn spp(&self) -> u64 {
-        self.0.spp
-    }
-
-    /// Number of the first new sample of each pixel: uint64 of shape (tile.height, tile.width).
-    fn first<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<u64>>> {
-        self.plane(py, |samples| samples.first)
-    }
-
-    /// New samples of each pixel, at least 1: uint64 of shape (tile.height, tile.width).
-    fn samples<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<u64>>> {
-        self.plane(py, |samples| samples.spp)
-    }
-
-    fn __repr__(&self) -> String {
-        format!("Blocks(tile={}, spp={}, edge={})", self.tile().__repr__(), self.0.spp, self.0.edge)
-    }
-}
-
-impl PyBlocks {
-    fn plane<'py>(
-        &self,
-        py: Python<'py>,
-        value: impl Fn(BlockSamples) -> u64,
-    ) -> PyResult<Bound<'py, PyArray2<u64>>> {
-        let Tile { width, height, .. } = self.0.tile;
-        let values = (0..width * height).map(|at| value(self.0.at(at % width, at / width)));
-        plane(py, (width, height), values.collect())
+    fn from(Request { tile, first, spp, sequence, .. }: Request) -> Self {
+        Self { tile: tile.into(), first, spp, sequence: sequence.number, point: sequence.first }
     }
 }
 

@@ -104,33 +104,6 @@ class Sessions(unittest.TestCase):
         whole.push_running(0, 2, np.full((EDGE, EDGE, 3), 7.0))
         np.testing.assert_allclose(whole.image()[:EDGE, :EDGE], 7.0, rtol=1e-4)
 
-    def test_blocks_get_samples_by_their_need(self):
-        params = nf.Params(tile=EDGE, max_spp=400, blocks=16)
-        session, plain = nf.Session(64, 32, params=params), nf.Session(64, 32, params=PARAMS)
-        self.assertIsNone(plain.blocks(plain.requests()[0]))
-        while not session.done:
-            for request in session.requests():
-                blocks = session.blocks(request)
-                first, samples = blocks.first(), blocks.samples()
-                self.assertEqual((blocks.tile, blocks.spp), (request.tile, request.spp))
-                self.assertEqual((samples.shape, samples.dtype), ((EDGE, EDGE), np.uint64))
-                self.assertTrue((first == session.spp()[request.tile.slices]).all())
-                self.assertLess(abs(float(samples.mean()) - request.spp), 0.51)
-                # Only the left half of a tile is noisy
-                random = np.random.default_rng([request.tile.index, request.first])
-                noise = random.uniform(-1, 1, (EDGE, EDGE, 3)) / np.sqrt(samples)[..., None]
-                noise[:, 16:] = 0
-                session.push_blocks(blocks, 0.5 + 0.4 * noise)
-            session.judge()
-        spp = session.spp()
-        for stop in session.stops():
-            of_tile = spp[stop.tile.slices]
-            self.assertGreater(of_tile[0, 0], of_tile[0, 16])
-        with self.assertRaises(nf.SizeError):
-            plain.push_blocks(blocks, np.zeros((3, 3, 3)))
-        with self.assertRaises(nf.BatchError):
-            plain.push_blocks(blocks, np.zeros((EDGE, EDGE, 3)))
-
     def test_a_float32_array_is_read_where_it_lies(self):
         statm = pathlib.Path("/proc/self/statm")
         if not statm.exists():
@@ -348,7 +321,7 @@ class Errors(unittest.TestCase):
                 wrong()
 
     def test_values_are_written_as_python_reads_them(self):
-        for params in (nf.Params(), nf.Params(tone_mapping="srgb", exposure=2.5, schedule="every", blocks=16),
+        for params in (nf.Params(), nf.Params(tone_mapping="srgb", exposure=2.5, schedule="every"),
                        nf.Params(white=3.0, audience=(0.5, 2.25), viewing="tv,distance=2")):
             self.assertEqual(eval(repr(params), vars(nf)), params)
 

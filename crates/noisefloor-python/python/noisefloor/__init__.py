@@ -19,7 +19,6 @@ Every error is a noisefloor.Error.
 
 from ._noisefloor import (
     BatchError,
-    Blocks,
     CheckpointError,
     CriterionError,
     Error,
@@ -48,7 +47,6 @@ from ._noisefloor import (
 
 __all__ = [
     "BatchError",
-    "Blocks",
     "CheckpointError",
     "CriterionError",
     "Error",

@@ -186,8 +186,7 @@ fn large_pictures_take_turns() {
     let grid = crate::TileGrid::new(7680, 4320, 512).unwrap();
     let mut spp = vec![0; grid.len()];
     for call in 0..60 {
-        let mut requests: Vec<_> =
-            grid.tiles().map(|tile| Request { tile, first: spp[tile.index], spp: 1 }).collect();
+        let mut requests: Vec<_> = grid.tiles().map(|tile| Request::new(tile, spp[tile.index], 1)).collect();
         keep_rearmost(&mut requests);
         let samples: u64 = requests.iter().map(|r| r.tile.pixels() as u64).sum();
         assert!(samples <= CALL_SAMPLES && samples > CALL_SAMPLES - 512 * 512, "{call}: {samples}");
