@@ -235,12 +235,15 @@ class Sessions(unittest.TestCase):
 class Faults(unittest.TestCase):
     """Wrong samples are an error or a warning."""
 
-    def feed(self, batches, picture, **options):
-        session = nf.Session(128, 128, params=nf.Params(tile=64, min_spp=0, max_spp=10_000), **options)
+    def feed(self, batches, picture, session=None):
+        session = session or self.session()
         for count in range(batches):
             session.push_image(10, picture(count))
             session.judge()
         return session
+
+    def session(self, **options):
+        return nf.Session(128, 128, params=nf.Params(tile=64, min_spp=0, max_spp=10_000), **options)
 
     def independent(self, count):
         light = np.random.default_rng(count).exponential(1.0, (128, 128, 1)) ** 2
@@ -273,7 +276,13 @@ class Faults(unittest.TestCase):
         self.assertEqual(len(session.warnings), 1)
         with warnings.catch_warnings():
             warnings.simplefilter("error")
-            self.assertEqual(self.feed(8, blurred, shared_pixels=True).warnings, [])
+            shared = self.session(shared_pixels=True)
+            # Neither pickle nor a file forgets it
+            with tempfile.TemporaryDirectory() as folder:
+                shared.save(pathlib.Path(folder) / "checkpoint", "a job")
+                shared.resume(pathlib.Path(folder) / "checkpoint", "a job")
+            for session in (copy.copy(shared), shared):
+                self.assertEqual(self.feed(8, blurred, session).warnings, [])
             right = self.feed(8, self.independent)
         self.assertEqual((right.warnings, right.rejected_samples, right.negative_samples), ([], 0, 0))
 
