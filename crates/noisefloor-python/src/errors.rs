@@ -85,7 +85,11 @@ impl Raise for noisefloor_image::WriteError {
     fn raise(self) -> PyErr {
         match &self {
             Self::Folder { source, .. } => std::io::Error::new(source.kind(), self.to_string()).into(),
-            Self::NotAFile { .. } | Self::Failed { .. } => PyOSError::new_err(self.to_string()),
+            Self::Failed { source, .. } => {
+                let kind = source.downcast_ref().map_or(std::io::ErrorKind::Other, std::io::Error::kind);
+                std::io::Error::new(kind, self.to_string()).into()
+            }
+            Self::NotAFile { .. } => PyOSError::new_err(self.to_string()),
             _ => PictureError::new_err(self.to_string()),
         }
     }

@@ -11,7 +11,7 @@ use noisefloor::{
     Checkpoint, Oracle, Params, Request, Rgb, Session, StopReason, Tile, TileGrid,
     checkpoint::CheckpointError, session::Interruption, source::PixelNoise,
 };
-use noisefloor_image::write_atomic;
+use noisefloor_image::{WriteError, write_atomic};
 use numpy::{PyArray2, PyArray3};
 use pyo3::exceptions::PyUserWarning;
 use pyo3::prelude::*;
@@ -394,7 +394,13 @@ fn fresh(
 
 fn save(session: &Session<Oracle>, path: &Path, job: &str) -> PyResult<()> {
     let checkpoint = session.checkpoint(job).map_err(Raise::raise)?;
-    write_atomic(path, |writer| checkpoint.write(writer)).map_err(Raise::raise)
+    write_atomic(path, |writer| checkpoint.write(writer)).map_err(|error| match error {
+        WriteError::Failed { path, source } => match source.downcast() {
+            Ok(error) => raise(&path, *error),
+            Err(source) => WriteError::Failed { path, source }.raise(),
+        },
+        other => other.raise(),
+    })
 }
 
 fn resume(session: &mut Session<Oracle>, pixels: PixelNoise, path: &Path, job: &str) -> PyResult<()> {
