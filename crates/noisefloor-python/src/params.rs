@@ -3,6 +3,7 @@
 use crate::errors::{ParameterError, Raise, whole};
 use noisefloor::{Audience, Params, Schedule, ToneMapping, Viewing};
 use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyTuple};
 
 /// Viewing(conditions="desk") --
 ///
@@ -47,6 +48,10 @@ impl PyViewing {
     #[getter]
     fn ambient(&self) -> f64 {
         self.0.params().ambient
+    }
+
+    fn __getnewargs__(&self) -> (String,) {
+        (self.0.to_string(),)
     }
 
     fn __str__(&self) -> String {
@@ -178,30 +183,53 @@ impl PyParams {
         self.0.max_spp
     }
 
-    fn __repr__(&self) -> String {
+    fn __getnewargs_ex__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyTuple>, Bound<'py, PyDict>)> {
+        Ok((PyTuple::empty(py), self.arguments(py)?))
+    }
+
+    fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
+        let arguments = self.arguments(py)?.into_iter();
+        let arguments = arguments.map(|(name, value)| Ok(format!("{name}={}", value.repr()?)));
+        Ok(format!("Params({})", arguments.collect::<PyResult<Vec<_>>>()?.join(", ")))
+    }
+}
+
+impl PyParams {
+    /// What Python makes the same parameters from.
+    fn arguments<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let params = &self.0;
-        let tone = match params.tone_mapping {
-            ToneMapping::Reinhard { key, white: None } => format!("\"reinhard\", key={key}"),
-            ToneMapping::Reinhard { key, white: Some(white) } => {
-                format!("\"reinhard\", key={key}, white={white}")
+        let arguments = PyDict::new(py);
+        arguments.set_item("tile", params.tile)?;
+        match params.tone_mapping {
+            ToneMapping::Reinhard { key, white } => {
+                arguments.set_item("tone_mapping", "reinhard")?;
+                arguments.set_item("key", short(key))?;
+                arguments.set_item("white", white.map(short))?;
             }
-            ToneMapping::Srgb { exposure } => format!("\"srgb\", exposure={exposure}"),
-            other => format!("{other:?}"), // Python makes none
-        };
+            ToneMapping::Srgb { exposure } => {
+                arguments.set_item("tone_mapping", "srgb")?;
+                arguments.set_item("exposure", short(exposure))?;
+            }
+            other => arguments.set_item("tone_mapping", format!("{other:?}"))?, // Python makes none
+        }
+        arguments.set_item("viewing", params.viewing.to_string())?;
         let (schedule, step) = match params.schedule {
             Schedule::Every { step } => ("every", step),
             Schedule::Spaced { step } => ("spaced", step),
             Schedule::Growing { step } => ("growing", step),
         };
+        arguments.set_item("schedule", schedule)?;
+        arguments.set_item("step", step)?;
+        arguments.set_item("min_spp", params.min_spp)?;
+        arguments.set_item("max_spp", params.max_spp)?;
+        arguments.set_item("consecutive", params.consecutive)?;
         let Audience { slope, offset } = params.audience;
-        format!(
-            "Params(tile={}, tone_mapping={tone}, viewing={:?}, schedule={schedule:?}, step={step}, min_spp={}, \
-             max_spp={}, consecutive={}, audience=({slope}, {offset}))",
-            params.tile,
-            params.viewing.to_string(),
-            params.min_spp,
-            params.max_spp,
-            params.consecutive
-        )
+        arguments.set_item("audience", (slope, offset))?;
+        Ok(arguments)
     }
+}
+
+/// The double with the digits of a float: 0.18, not 0.18000000715255737. It is rounded to the same float.
+fn short(value: f32) -> f64 {
+    value.to_string().parse().unwrap_or(f64::from(value))
 }

@@ -1,12 +1,14 @@
-//! What a session says: tiles, requests, verdicts, stops.
+//! What a session says: tiles, requests, verdicts, stops. Other processes get them pickled, and make them.
 
-use crate::errors::BatchError;
+use crate::errors::{BatchError, whole};
 use noisefloor::{Request, Stop, Tile, TileGrid, Verdict};
 use pyo3::exceptions::PyOverflowError;
 use pyo3::prelude::*;
 
+/// Tile(index, x, y, width, height) --
+///
 /// A rectangle of pixels that stops as a whole.
-#[pyclass(frozen, eq, hash, get_all, name = "Tile", module = "noisefloor")]
+#[pyclass(frozen, eq, hash, get_all, name = "Tile", module = "noisefloor", from_py_object)]
 #[derive(Clone, Copy, PartialEq, Eq, Hash)]
 pub(crate) struct PyTile {
     /// Its number, in rows from the top left.
@@ -23,6 +25,21 @@ pub(crate) struct PyTile {
 
 #[pymethods]
 impl PyTile {
+    #[new]
+    fn new(
+        #[pyo3(from_py_with = whole)] index: usize,
+        #[pyo3(from_py_with = whole)] x: usize,
+        #[pyo3(from_py_with = whole)] y: usize,
+        #[pyo3(from_py_with = whole)] width: usize,
+        #[pyo3(from_py_with = whole)] height: usize,
+    ) -> Self {
+        Self { index, x, y, width, height }
+    }
+
+    fn __getnewargs__(&self) -> (usize, usize, usize, usize, usize) {
+        (self.index, self.x, self.y, self.width, self.height)
+    }
+
     /// The slices that cut the tile out of an array of the whole picture: image[tile.slices].
     #[getter]
     fn slices<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
@@ -35,6 +52,12 @@ impl PyTile {
     fn __repr__(&self) -> String {
         let Self { index, x, y, width, height } = self;
         format!("Tile(index={index}, x={x}, y={y}, width={width}, height={height})")
+    }
+}
+
+impl From<PyTile> for Tile {
+    fn from(PyTile { index, x, y, width, height }: PyTile) -> Self {
+        Self { index, x, y, width, height }
     }
 }
 
@@ -95,9 +118,11 @@ impl TileLike {
     }
 }
 
+/// Request(tile, first, spp) --
+///
 /// What an open tile needs next.
-#[pyclass(frozen, get_all, name = "Request", module = "noisefloor")]
-#[derive(Clone, Copy)]
+#[pyclass(frozen, eq, hash, get_all, name = "Request", module = "noisefloor")]
+#[derive(Clone, Copy, PartialEq, Eq, Hash)]
 pub(crate) struct PyRequest {
     /// The tile.
     pub(crate) tile: PyTile,
@@ -114,6 +139,21 @@ pub(crate) struct PyRequest {
 
 #[pymethods]
 impl PyRequest {
+    #[new]
+    fn new(
+        tile: PyTile,
+        #[pyo3(from_py_with = whole)] first: u64,
+        #[pyo3(from_py_with = whole)] spp: u64,
+        #[pyo3(from_py_with = whole)] sequence: u32,
+        #[pyo3(from_py_with = whole)] point: u64,
+    ) -> Self {
+        Self { tile, first, spp, sequence, point }
+    }
+
+    fn __getnewargs__(&self) -> (PyTile, u64, u64, u32, u64) {
+        (self.tile, self.first, self.spp, self.sequence, self.point)
+    }
+
     fn __repr__(&self) -> String {
         let Self { tile, first, spp, sequence, point } = self;
         format!(
@@ -129,9 +169,12 @@ impl From<Request> for PyRequest {
     }
 }
 
+/// The 10 %, 50 % and 90 % points of a threshold, in samples per pixel.
+type Points = (u64, u64, u64);
+
 /// What the oracle says about one tile.
-#[pyclass(frozen, get_all, name = "Verdict", module = "noisefloor")]
-#[derive(Clone, Copy)]
+#[pyclass(frozen, eq, get_all, name = "Verdict", module = "noisefloor", from_py_object)]
+#[derive(Clone, Copy, PartialEq)]
 pub(crate) struct PyVerdict {
     /// The tile.
     tile: PyTile,
@@ -143,13 +186,30 @@ pub(crate) struct PyVerdict {
     expected_spp: Option<u64>,
     /// Where people are expected to stop seeing noise, in samples per pixel: the 10 %, 50 % and 90 % points.
     /// ``expected_spp`` is where the tile stops, which is later.
-    threshold: Option<(u64, u64, u64)>,
+    threshold: Option<Points>,
     /// Whether the tile is unlike all that the model was trained on: treat the verdict with care.
     unfamiliar: bool,
 }
 
 #[pymethods]
 impl PyVerdict {
+    #[new]
+    fn new(
+        tile: PyTile,
+        converged: bool,
+        probability: Option<f32>,
+        expected_spp: Option<u64>,
+        threshold: Option<Points>,
+        unfamiliar: bool,
+    ) -> Self {
+        Self { tile, converged, probability, expected_spp, threshold, unfamiliar }
+    }
+
+    fn __getnewargs__(&self) -> (PyTile, bool, Option<f32>, Option<u64>, Option<Points>, bool) {
+        let Self { tile, converged, probability, expected_spp, threshold, unfamiliar } = *self;
+        (tile, converged, probability, expected_spp, threshold, unfamiliar)
+    }
+
     fn __repr__(&self) -> String {
         let said = if self.converged { "converged" } else { "noise seen" };
         let p = self.probability.map_or("unknown".to_owned(), |p| format!("{p:.3}"));
@@ -158,7 +218,7 @@ impl PyVerdict {
 }
 
 impl PyVerdict {
-    pub(crate) fn new(tile: Tile, verdict: Verdict) -> Self {
+    pub(crate) fn of(tile: Tile, verdict: Verdict) -> Self {
         let Verdict { converged, probability, threshold, expected_spp, unfamiliar, .. } = verdict;
         let threshold = threshold.map(|t| (t.low, t.median, t.high));
         Self { tile: tile.into(), converged, probability, threshold, expected_spp, unfamiliar }
@@ -166,8 +226,8 @@ impl PyVerdict {
 }
 
 /// A tile that is done.
-#[pyclass(frozen, get_all, name = "Stop", module = "noisefloor")]
-#[derive(Clone)]
+#[pyclass(frozen, eq, get_all, name = "Stop", module = "noisefloor")]
+#[derive(Clone, PartialEq)]
 pub(crate) struct PyStop {
     /// The tile.
     tile: PyTile,
@@ -183,6 +243,15 @@ pub(crate) struct PyStop {
 
 #[pymethods]
 impl PyStop {
+    #[new]
+    fn new(tile: PyTile, spp: u64, probability: Option<f32>, reason: String, unfamiliar: bool) -> Self {
+        Self { tile, spp, probability, reason, unfamiliar }
+    }
+
+    fn __getnewargs__(&self) -> (PyTile, u64, Option<f32>, String, bool) {
+        (self.tile, self.spp, self.probability, self.reason.clone(), self.unfamiliar)
+    }
+
     fn __repr__(&self) -> String {
         format!("<noisefloor.Stop: tile {}, {} at {} spp>", self.tile.index, self.reason, self.spp)
     }

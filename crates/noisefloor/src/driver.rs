@@ -1,5 +1,7 @@
 //! The pull loop: requests samples from a source until the criterion is satisfied or a limit is reached.
 
+#![expect(clippy::disallowed_methods, reason = "a driver keeps a limit of time, and says where time went")]
+
 use crate::checkpoint::{Checkpoint, CheckpointError};
 use crate::criterion::{CriterionError, StoppingCriterion};
 use crate::film::FilmError;
