@@ -23,10 +23,10 @@ pub enum Schedule {
         /// The finest spacing, in samples per pixel, at least 2.
         step: u64,
     },
-    /// After `step` samples per pixel, then whenever a tile has half as many more, in multiples of `step`: for
-    /// criteria that take long however few tiles they judge, such as those that denoise. Where few tiles are
-    /// open, each gets more between two verdicts, up to twice what it has: as many samples in all as `step`
-    /// for each pixel of the picture.
+    /// After `step` samples per pixel, then where the criterion expects to be satisfied, after half as many more at
+    /// the least and as many at the most, in multiples of `step`: for criteria that take long however few tiles
+    /// they judge, such as those that denoise. Where few tiles are open, each gets more between two verdicts, up to
+    /// twice what it has: as many samples in all as `step` for each pixel of the picture.
     Growing {
         /// The finest spacing, in samples per pixel, at least 2.
         step: u64,
@@ -73,7 +73,9 @@ impl Schedule {
             }
             Self::Growing { .. } => {
                 let whole = (step as f64 / open.max(f64::MIN_POSITIVE)) as u64;
-                on_grid(samples + whole.min(samples).max(samples / 2))
+                let missing =
+                    expected.map_or(0, |e| e.div_ceil(step).saturating_mul(step).saturating_sub(samples));
+                on_grid(samples + whole.max(missing).clamp(samples / 2, samples))
             }
         }
     }
@@ -296,8 +298,10 @@ mod tests {
     #[test]
     fn growing_steps_grow() {
         let schedule = Schedule::Growing { step: 16 };
-        let next = |n: u64, open: f64| schedule.next(n, Some(5000), open);
+        let next = |n: u64, open: f64| schedule.next(n, None, open);
         assert_eq!([0, 16, 32, 48, 64, 96].map(|n| next(n, 1.0)), [16, 32, 48, 64, 96, 144]);
+        // To the expected need, and at most twice what the tile has
+        assert_eq!([50, 96, 110, 500].map(|e| schedule.next(64, Some(e), 1.0)), [96, 96, 112, 128]);
         assert_eq!(next(17, 1.0), 32);
         // With a quarter of the tiles open 64 more, but no more than the tile has
         assert_eq!([0, 16, 48, 64, 96, 128, 160].map(|n| next(n, 0.25)), [16, 32, 96, 128, 160, 192, 240]);
@@ -309,7 +313,7 @@ mod tests {
         let ok = Params::default();
         assert_eq!(ok.check(), Ok(()));
         assert!(Params { schedule: Schedule::Every { step: 1 }, ..ok }.check().is_err());
-        assert!(Params { max_spp: 50, ..ok }.check().is_err());
+        assert!(Params { max_spp: 15, ..ok }.check().is_err());
         assert!(Params { max_spp: 1, min_spp: 0, ..ok }.check().is_err());
         assert!(Params { consecutive: 0, ..ok }.check().is_err());
         assert!(Params { audience: Audience { slope: f64::NAN, offset: 0.0 }, ..ok }.check().is_err());

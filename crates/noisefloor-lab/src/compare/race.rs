@@ -8,7 +8,9 @@ use crate::advance::{Advance, Watch};
 use crate::error::LabError;
 use noisefloor::{
     Batch, Film, Params, ProgressiveSource, Request, Rgb, Schedule, Session, StoppingCriterion, Tile,
-    TileGrid, session::Interruption, source::Reference,
+    TileGrid,
+    session::Interruption,
+    source::{Reference, Sequence},
 };
 use noisefloor_denoise::Denoiser;
 use noisefloor_vision::VisionModel;
@@ -180,7 +182,12 @@ impl Course<'_> {
     ) -> Result<(Race, Yardstick), LabError> {
         let info = source.info();
         let grid = TileGrid::new(info.width, info.height, self.params.tile)?;
-        let mut field = Field { entrants, film: Film::new(grid), costs: Costs::new(grid.len()) };
+        let mut field = Field {
+            entrants,
+            film: Film::without_halves(grid),
+            points: [0; 2],
+            costs: Costs::new(grid.len()),
+        };
         field.show_converged(self.truth)?;
         let mut yardstick: Option<Yardstick> = None;
         let mut curve: Vec<UniformPoint> = Vec::new();
@@ -237,6 +244,8 @@ impl Course<'_> {
 struct Field {
     entrants: Vec<Entrant>,
     film: Film,
+    /// Samples per pixel of either half.
+    points: [u64; 2],
     costs: Costs,
 }
 
@@ -264,12 +273,16 @@ impl Field {
 
     /// Gives everybody the next samples of every tile, of whichever half has fewer; `false` if the source has no more.
     fn step(&mut self, source: &mut dyn ProgressiveSource, samples: u64) -> Result<bool, LabError> {
-        let request = |tile: Tile| self.film.request(tile.index, samples);
+        // As sessions ask for them: their halves in turn, each a sequence of its own
+        let half = usize::from(self.points[1] < self.points[0]);
+        let sequence = Sequence { number: half as u32, first: self.points[half] };
+        let request = |tile: Tile| Request::new(tile, self.film.spp(0), samples).in_sequence(sequence);
         let requests: Vec<Request> = self.film.grid().tiles().map(request).collect();
         let batches = self.costs.sample(source, &requests)?;
         if batches.len() < requests.len() || batches.iter().any(|b| b.spp == 0) {
             return Ok(false);
         }
+        self.points[half] += samples;
         for Batch { tile, spp: samples, mean } in &batches {
             self.film.add(tile.index, *samples, mean)?;
             let watching = |e: &&mut Entrant| !e.apart && e.session.is_open(tile.index);

@@ -1,5 +1,6 @@
 use super::*;
 use crate::criterion::{FixedSpp, Needs, Verdict, View};
+use crate::params::Schedule;
 use crate::session::StopReason;
 use crate::source::{Repeats, SourceInfo};
 use crate::tile::Tile;
@@ -41,7 +42,9 @@ impl ProgressiveSource for Grey {
 }
 
 fn driver(source: Grey, samples: u64) -> Driver<Grey, FixedSpp> {
-    Driver::new(source, FixedSpp(samples), Params { tile: 32, ..Params::default() }).unwrap()
+    let params =
+        Params::default().with_tile(32).with_schedule(Schedule::Spaced { step: 10 }).with_min_spp(100);
+    Driver::new(source, FixedSpp(samples), params).unwrap()
 }
 
 fn reasons<C: StoppingCriterion>(driver: &Driver<Grey, C>) -> Vec<(u64, StopReason)> {
