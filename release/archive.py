@@ -92,13 +92,23 @@ def linked(host):
 
 
 def licences(packages):
-    """The licences of what is linked in, as one text."""
-    parts = [f"The commands contain {len(packages)} packages of others, and Rust's standard library."]
+    """The licences of what is linked in, as one text: each once, below the packages that it is of."""
+    said, texts, bare = [], {}, []
     for package in packages:
-        parts.append(f"{package['name']} {package['version']}: {package['license']}\n{package['repository'] or ''}")
+        name = f"{package['name']} {package['version']}"
+        said.append(f"{name}: {package['license']}")
         folder = pathlib.Path(package["manifest_path"]).parent
-        files = [path for path in folder.rglob("*") if path.name.lower().startswith(LICENCES) and path.is_file()]
-        parts += sorted({path.read_text(errors="replace").strip() for path in files if path.suffix not in (".rs", ".py")})
+        files = [path for path in folder.rglob("*") if path.name.lower().startswith(LICENCES)]
+        files = sorted(path for path in files if path.is_file() and path.suffix not in (".rs", ".py"))
+        if not files:
+            bare.append(f"{name}, by {', '.join(package['authors']) or 'its authors'}: {package['repository'] or 'no repository named'}")
+        for path in files:
+            users = texts.setdefault(path.read_text(errors="replace").strip(), [])
+            if name not in users:
+                users.append(name)
+    parts = ["The commands contain Rust's standard library, and these packages of others:\n\n" + "\n".join(said)]
+    parts.append("The packages of these have no text of their licence:\n\n" + "\n".join(bare))
+    parts += [", ".join(users) + ":\n\n" + text for text, users in texts.items()]
     return f"\n\n{'-' * 78}\n\n".join(parts).encode()
 
 
