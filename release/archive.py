@@ -4,12 +4,12 @@
     release/archive.py FOLDER
 
 What is committed is built, not what lies in the work tree: a copy of HEAD, with link-time optimisation, in
-target/archive. The archive is unpacked into a prefix, `tar -xzf ARCHIVE -C /usr/local --strip-components 1`, and holds
+target/archive. The archive is unpacked into a prefix, `tar -xzf ARCHIVE -C /usr/local --strip-components 1`:
 
     bin/                                      noisefloor and noisefloor-lab
     share/man/man1/                           a page for each command
     share/bash-completion, zsh, fish          completions
-    share/doc/noisefloor/                     README, changes, both licences, those of all that is linked in, and
+    share/doc/noisefloor/                     README, changes, licences, also of all that is linked in
     share/doc/noisefloor/noisefloor.cdx.json  a bill of materials (CycloneDX 1.5)
 
 It is unpacked into an empty folder at last, and both commands are run there with an empty environment. The same
@@ -70,8 +70,8 @@ def build(environment):
         "CFLAGS": to_c,
         "CXXFLAGS": to_c,
     }
-    run("cargo", "build", "--profile", "dist", "--locked", "--features", "lab", "--bins", "--manifest-path", CLI,
-        env=environment)
+    run("cargo", "build", "--profile", "dist", "--locked", "--features", "lab", "--bins",
+        "--manifest-path", CLI, env=environment)
     return WORK / "build/dist"
 
 
@@ -92,13 +92,24 @@ def linked(host):
 
 
 def licences(packages):
-    """The licences of what is linked in, as one text."""
-    parts = [f"The commands contain {len(packages)} packages of others, and Rust's standard library."]
+    """The licences of what is linked in, as one text: each once, below the packages that it is of."""
+    said, texts, bare = [], {}, []
     for package in packages:
-        parts.append(f"{package['name']} {package['version']}: {package['license']}\n{package['repository'] or ''}")
+        name = f"{package['name']} {package['version']}"
+        said.append(f"{name}: {package['license']}")
         folder = pathlib.Path(package["manifest_path"]).parent
-        files = [path for path in folder.rglob("*") if path.name.lower().startswith(LICENCES) and path.is_file()]
-        parts += sorted({path.read_text(errors="replace").strip() for path in files if path.suffix not in (".rs", ".py")})
+        files = [path for path in folder.rglob("*") if path.name.lower().startswith(LICENCES)]
+        files = sorted(path for path in files if path.is_file() and path.suffix not in (".rs", ".py"))
+        if not files:
+            authors = ", ".join(package["authors"]) or "its authors"
+            bare.append(f"{name}, by {authors}: {package['repository'] or 'no repository named'}")
+        for path in files:
+            users = texts.setdefault(path.read_text(errors="replace").strip(), [])
+            if name not in users:
+                users.append(name)
+    parts = ["The commands contain Rust's standard library, and these packages of others:\n\n" + "\n".join(said)]
+    parts.append("The packages of these have no text of their licence:\n\n" + "\n".join(bare))
+    parts += [", ".join(users) + ":\n\n" + text for text, users in texts.items()]
     return f"\n\n{'-' * 78}\n\n".join(parts).encode()
 
 
@@ -107,10 +118,10 @@ def materials(host, environment):
     tools = WORK / "tools"
     run("cargo", "install", "cargo-cyclonedx", "--version", CYCLONEDX, "--locked", "--quiet", "--root", tools,
         env=os.environ | {"CARGO_TARGET_DIR": str(WORK / "tools-build")})
-    run(tools / "bin/cargo-cyclonedx", "cyclonedx", "--manifest-path", CLI, "--features", "lab", "--target", host,
-        "--format", "json", "--spec-version", "1.5", "--quiet", env=environment)
-    text = CLI.with_name("noisefloor-cli.cdx.json").read_text().replace(f"file://{SOURCE}", "file:///noisefloor")
-    bill = json.loads(text)
+    run(tools / "bin/cargo-cyclonedx", "cyclonedx", "--manifest-path", CLI, "--features", "lab",
+        "--target", host, "--format", "json", "--spec-version", "1.5", "--quiet", env=environment)
+    text = CLI.with_name("noisefloor-cli.cdx.json").read_text()
+    bill = json.loads(text.replace(f"file://{SOURCE}", "file:///noisefloor"))
     bill.pop("serialNumber", None)
     bill["metadata"].pop("timestamp", None)
     return json.dumps(bill, indent=1).encode()
@@ -167,7 +178,8 @@ def main():
     folder = parser.parse_args().folder
     committed = copy_head()
     host = next(line[6:] for line in run("rustc", "-vV").decode().splitlines() if line.startswith("host: "))
-    version = run("cargo", "pkgid", "--manifest-path", CLI).decode().strip().rpartition("#")[2].rpartition("@")[2]
+    version = run("cargo", "pkgid", "--manifest-path", CLI).decode().strip().rpartition("#")[2]
+    version = version.rpartition("@")[2]
     name = f"noisefloor-{version}-{host}"
 
     packed = pack(name, contents(host, os.environ | {"SOURCE_DATE_EPOCH": str(committed)}), committed)

@@ -72,6 +72,15 @@ impl Raise for noisefloor::SessionError {
     }
 }
 
+impl Raise for noisefloor_eyes::EyesError {
+    fn raise(self) -> PyErr {
+        match &self {
+            Self::Io { path, source } => file_error(path, source),
+            other => ParameterError::new_err(other.to_string()),
+        }
+    }
+}
+
 impl Raise for noisefloor_image::PictureError {
     fn raise(self) -> PyErr {
         match &self {

@@ -79,6 +79,8 @@ class EyesTest(unittest.TestCase):
             eyes = nf.eyes(path)
             self.assertEqual((eyes.name, eyes.factor, eyes.interval, eyes.date), ("anna", 1.4, (1.2, 1.65), "2026-11-24"))
             self.assertEqual(eyes.viewing.pixels_per_degree, 44)
+            sent = pickle.loads(pickle.dumps(eyes))
+            self.assertEqual((repr(sent), sent.viewing, sent.interval), (repr(eyes), eyes.viewing, eyes.interval))
             params = nf.Params(viewing=eyes.viewing, audience=eyes.audience)
             self.assertIn("audience=(1.4, 0.0)", repr(params))
             path.write_text("colour = 1")
