@@ -40,11 +40,16 @@ pub(super) struct Node {
 }
 
 /// The importance of four clusters.
+#[derive(Clone, Copy, Debug)]
 pub(super) struct Importance {
     /// An estimate of the light that the receiver scatters to where it is seen from, were nothing in between.
     pub(super) scattered: Vec4,
     /// By position and direction only, regardless of intensity.
     pub(super) geometric: Vec4,
+}
+
+impl Importance {
+    pub(super) const NONE: Self = Self { scattered: Vec4::ZERO, geometric: Vec4::ZERO };
 }
 
 impl Node {

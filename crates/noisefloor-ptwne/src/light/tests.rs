@@ -108,15 +108,17 @@ fn lights_are_chosen_with_their_probabilities() {
             let receiver = draw.receiver();
             let mut counts = vec![0; lights.all.len()];
             for i in 0..N {
-                if let Some((light, pmf)) = lights.choose(&receiver, (i as f32 + 0.5) / N as f32, 0.0) {
-                    let again = lights.pmf(&receiver, light);
+                if let Some((light, pmf)) =
+                    lights.choose(&lights.prospect(receiver), (i as f32 + 0.5) / N as f32, 0.0)
+                {
+                    let again = lights.pmf(&lights.prospect(receiver), light);
                     assert!((again - pmf).abs() <= 1e-5 * pmf, "{again} {pmf}");
                     counts[light] += 1;
                 }
             }
             let mut sum = 0.0;
             for (light, count) in counts.iter().enumerate() {
-                let pmf = f64::from(lights.pmf(&receiver, light));
+                let pmf = f64::from(lights.pmf(&lights.prospect(receiver), light));
                 assert!((pmf * N as f64 - f64::from(*count)).abs() < 2.1, "{light}: {count}, {pmf}");
                 sum += pmf;
             }
@@ -135,7 +137,7 @@ fn only_lights_without_effect_have_no_probability() {
             let receiver = draw.receiver();
             for (i, light) in lights.all.iter().enumerate() {
                 // Maps have no samples without their image, and all have a probability
-                if lights.pmf(&receiver, i) > 0.0 || light.power_pmf == 0.0 {
+                if lights.pmf(&lights.prospect(receiver), i) > 0.0 || light.power_pmf == 0.0 {
                     continue;
                 }
                 idle += 1;
@@ -158,13 +160,13 @@ fn near_lights_that_face_the_receiver_are_preferred() {
     let bounds = [Vec3::splat(-8.0), Vec3::splat(8.0)];
     let lights = Lights::new((-5..=5).map(|i| ceiling([i as f32, 2.0, -0.5], 1.0)).collect(), bounds, &[]);
     let receiver = Receiver::diffuse(Vec3::new(2.5, 0.0, 0.0), Vec3::Y);
-    let pmf: Vec<f32> = (0..11).map(|i| lights.pmf(&receiver, i)).collect();
+    let pmf: Vec<f32> = (0..11).map(|i| lights.pmf(&lights.prospect(receiver), i)).collect();
     assert!((0..11).all(|i| pmf[i] <= pmf[7]), "{pmf:?}");
     assert!(pmf[7] > 4.0 * pmf[0], "{pmf:?}");
     // Half of a metal's lobe points at the last lamp
     let mirror = Vec3::new(3.0, 2.0, 0.0).normalize();
     let metal = Receiver { diffuse: 0.0, glossy: 1.0, mirror, alpha2: 0.01, ..receiver };
-    assert!(lights.pmf(&metal, 10) > 3.0 * lights.pmf(&receiver, 10));
+    assert!(lights.pmf(&lights.prospect(metal), 10) > 3.0 * lights.pmf(&lights.prospect(receiver), 10));
 }
 
 /// Power decides what the reference's guide begins with.
@@ -203,7 +205,11 @@ fn lights_that_face_away_from_everything_are_not_chosen() {
     let bounds = [Vec3::NEG_ONE, Vec3::ONE];
     let receiver = Receiver::diffuse(Vec3::ZERO, Vec3::Y);
     let lights = Lights::new(vec![below(), ceiling([-1.0, 1.0, -1.0], 1.0)], bounds, &[]);
-    assert_eq!((lights.pmf(&receiver, 0), lights.pmf(&receiver, 1)), (0.0, 1.0));
+    assert_eq!(
+        (lights.pmf(&lights.prospect(receiver), 0), lights.pmf(&lights.prospect(receiver), 1)),
+        (0.0, 1.0)
+    );
     assert_eq!(lights.all[0].power_pmf, 0.0);
-    assert!(Lights::new(vec![below()], bounds, &[]).choose(&receiver, 0.5, 0.0).is_none());
+    let lights = Lights::new(vec![below()], bounds, &[]);
+    assert!(lights.choose(&lights.prospect(receiver), 0.5, 0.0).is_none());
 }
