@@ -77,9 +77,16 @@ impl Lights {
     #[inline]
     pub(crate) fn prospect(&self, receiver: Receiver) -> Prospect {
         let mut prospect = Prospect::unknown(receiver);
+        self.look(&mut prospect);
+        prospect
+    }
+
+    #[inline]
+    fn look(&self, prospect: &mut Prospect) {
         if self.only.is_some() {
-            return prospect;
+            return;
         }
+        let receiver = prospect.receiver;
         for far in &self.far {
             prospect.far.scattered += far.weight(&receiver, false);
             prospect.far.geometric += far.weight(&receiver, true);
@@ -90,7 +97,6 @@ impl Lights {
             prospect.tree.geometric = if prospect.far.geometric > 0.0 { prospect.far.geometric } else { 1.0 };
             prospect.root = root;
         }
-        prospect
     }
 
     /// Chooses a light for a receiver by two numbers uniform in [0, 1), of which the second only extends the
