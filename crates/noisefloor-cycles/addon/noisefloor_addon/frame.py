@@ -6,10 +6,11 @@ import bpy
 import noisefloor
 import numpy
 
-from . import passes, sampling, settings
+from . import denoise, passes, sampling, settings
 from .host import rectangles
 
 SAMPLES, NOISE = "noisefloor Samples", "noisefloor Visible Noise"
+NOISY, ALBEDO, NORMAL = "Noisy Image", "Denoising Albedo", "Denoising Normal"
 
 
 class Frame:
@@ -41,7 +42,21 @@ class Frame:
         self.sums = passes.Sums(*self.size)
         self.begun, self.sampled = time.monotonic(), 0
         self.tiles = self.session.open_tiles
-        self.denoise = self.scene.cycles.use_denoising
+        self.denoiser = self._denoiser(depsgraph) if self.scene.cycles.use_denoising else None
+
+    def _denoiser(self, depsgraph):
+        """The library that denoises the picture; Cycles is told to render what it needs."""
+        found = denoise.library()
+        if found is None:
+            self.engine.report({"WARNING"}, "noisefloor does not denoise: this Blender has no Open Image Denoise")
+            return None
+        if self.scene.cycles.denoising_input_passes != "RGB":
+            depsgraph.view_layer_eval.cycles.denoising_store_passes = True
+            rendered = self.engine.get_result().layers[self.layer].passes.keys()
+            for name, channels in [(NORMAL, "XYZ"), (ALBEDO, "RGB")]:
+                if name not in rendered:
+                    self.engine.add_pass(name, 3, channels, layer=self.layer)
+        return found
 
     def run(self, report):
         """Renders until every tile is done; calls report(frame) after each batch."""
@@ -89,7 +104,11 @@ class Frame:
         sampling.choose(self.scene.cycles, self.seed, block)
         sampling.aim(self.engine.render, (self.across, self.down), (x + self.corner[0], y + self.corner[1], width, height))
         self.cycles()
-        return passes.read(self.engine, self.layer, (width, height))
+        pictures = passes.read(self.engine, self.layer, (width, height))
+        if NOISY in pictures:
+            # Where Cycles was to denoise, it leaves the picture for that empty
+            pictures["Combined"] = pictures[NOISY]
+        return pictures
 
     def _show(self, region):
         """Puts the picture so far where people look at it: in the region, and in the corner where Cycles has left the batch."""
@@ -104,8 +123,13 @@ class Frame:
     def finish(self):
         """Puts all passes into the result, with the two maps; returns the maps."""
         pictures = self.sums.means()
-        if "Combined" in pictures:
+        if pictures:
             pictures["Combined"][..., :3] = self.session.image()
+            if NOISY in pictures:
+                pictures[NOISY] = pictures["Combined"].copy()
+            if self.denoiser:
+                guides = pictures.get(ALBEDO), pictures.get(NORMAL)
+                pictures["Combined"][..., :3] = denoise.denoise(self.denoiser, pictures["Combined"][..., :3], *guides)
         visible = self.session.visible_noise()
         if visible is None:
             visible = numpy.full(self.size[::-1], numpy.nan, numpy.float32)

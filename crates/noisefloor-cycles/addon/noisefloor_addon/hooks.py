@@ -11,6 +11,7 @@ import threading
 import traceback
 
 import bpy
+import numpy
 from bpy.app.handlers import persistent
 
 from . import maps
@@ -43,14 +44,11 @@ def update(engine, data, depsgraph):
         original["free"](engine)
         engine.session = None
     engine.noisefloor = on
-    if on and not engine.session:
-        _headless(True)
-        try:
-            original["update"](engine, data, depsgraph)
-        finally:
-            _headless(bpy.app.background)
-    else:
+    _headless(on or bpy.app.background)
+    try:
         original["update"](engine, data, depsgraph)
+    finally:
+        _headless(bpy.app.background)
 
 
 def render(engine, depsgraph):
@@ -69,7 +67,7 @@ def render(engine, depsgraph):
 
 def _render(engine, depsgraph):
     def cycles():
-        original["update"](engine, bpy.data, depsgraph)
+        update(engine, bpy.data, depsgraph)
         original["render"](engine, depsgraph)
 
     # Cycles reads its settings anew only if something of the scene has changed: here the camera has, to the same. Everything else
@@ -164,15 +162,18 @@ def ended(scene, *_):
     if scene.noisefloor.use and scene.render.engine == "CYCLES":
         # Setting it, to whatever, frees what the engine has kept if it is off
         scene.render.use_persistent_data = scene.render.use_persistent_data
-        state.still = None if state.written else scene.name
+        state.still = None if state.written or not scene.noisefloor.write_maps else scene.name
     if bpy.app.background:
         deliver()
 
 
 def deliver():
-    """Shows the maps as images; in the thread with the windows."""
+    """Shows the maps as images, and writes a still that Blender has not written; in the thread with the windows."""
     with state.lock:
         images, state.images = state.images, {}
+        still, state.still = bpy.data.scenes.get(state.still or ""), None
+    if still:
+        bpy.data.images["Render Result"].save_render(output(still) + still.render.file_extension, scene=still)
     for name, picture in images.items():
         height, width = picture.shape[:2]
         image = bpy.data.images.get(name)
@@ -180,8 +181,6 @@ def deliver():
             if image is not None:
                 bpy.data.images.remove(image)
             image = bpy.data.images.new(name, width, height)
-        import numpy
-
         pixels = numpy.ones((height, width, 4), numpy.float32)
         pixels[..., :3] = picture[::-1] / numpy.float32(255)
         image.pixels.foreach_set(pixels.ravel())
@@ -190,7 +189,7 @@ def deliver():
 
 def tick():
     """Tells people how far it is."""
-    if state.images and not state.rendering:
+    if (state.images or state.still) and not state.rendering:
         deliver()
     text = state.status if state.rendering else None
     if text != tick.shown:

@@ -11,6 +11,7 @@ class RENDER_PT_noisefloor(bpy.types.Panel):
     bl_region_type = "WINDOW"
     bl_context = "render"
     bl_parent_id = "CYCLES_RENDER_PT_sampling"
+    bl_order = -1  # before Cycles' own settings, which it replaces
     COMPAT_ENGINES = {"CYCLES"}
 
     @classmethod
@@ -34,5 +35,5 @@ class RENDER_PT_noisefloor(bpy.types.Panel):
         column.prop(settings, "write_maps")
         if hooks.state.summary:
             box = column.box()
-            for part in hooks.state.summary.split("; "):
+            for part in hooks.state.summary.replace("), ", "); ").split("; "):
                 box.label(text=part)
