@@ -83,7 +83,7 @@ class Frame:
         ]
         for region, (block,), members in rectangles(tiles, ["block"]):
             pictures = self._sample(region, block)
-            if self.engine.test_break():
+            if self._cancelled():
                 return "cancelled"
             self.sums.add(region, sampling.BLOCK, pictures)
             self.sampled += region[2] * region[3] * sampling.BLOCK
@@ -98,6 +98,10 @@ class Frame:
                 return "time-limit"
         self.session.judge()
         return None
+
+    def _cancelled(self):
+        """Whether Esc was hit: the last batch may be incomplete then."""
+        return self.engine.test_break()
 
     def _sample(self, region, block):
         x, y, width, height = region

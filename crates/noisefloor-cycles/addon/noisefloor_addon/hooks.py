@@ -62,7 +62,7 @@ def render(engine, depsgraph):
         _render(engine, depsgraph)
     except Exception as error:
         traceback.print_exc()
-        engine.error_set(f"noisefloor: {error}")
+        engine.report({"ERROR"}, f"noisefloor: {error}")
 
 
 def _render(engine, depsgraph):

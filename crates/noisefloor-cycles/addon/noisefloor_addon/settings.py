@@ -49,7 +49,7 @@ def params(scene, block):
     tone = {"tone_mapping": "reinhard"}
     if view.view_transform in ("Standard", "Raw"):
         tone = {"tone_mapping": "srgb", "exposure": 2.0**view.exposure}
+    blocks = max(settings.max_samples // block, 2)
     return noisefloor.Params(
-        tile=settings.tile, viewing=settings.viewing, step=block, min_spp=6 * block,
-        max_spp=max(settings.max_samples // block, 2) * block, **tone,
+        tile=settings.tile, viewing=settings.viewing, step=block, min_spp=min(6, blocks) * block, max_spp=blocks * block, **tone,
     )
