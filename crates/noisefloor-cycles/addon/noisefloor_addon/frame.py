@@ -42,6 +42,8 @@ class Frame:
         self.sums = passes.Sums(*self.size)
         self.begun, self.sampled = time.monotonic(), 0
         self.tiles = self.session.open_tiles
+        # What the windows draw meanwhile, and how often it has changed
+        self.shown, self.shows = numpy.zeros((*self.size[::-1], 4), numpy.float32), 0
         self.denoiser = self._denoiser(depsgraph) if self.scene.cycles.use_denoising else None
 
     def _denoiser(self, depsgraph):
@@ -92,7 +94,8 @@ class Frame:
                 tile = requests[member].tile
                 x, y = tile.x - region[0], tile.y - region[1]
                 self.session.push(tile, sampling.BLOCK, picture[y : y + tile.height, x : x + tile.width])
-            self._show(region)
+            if not bpy.app.background:
+                self._show(region)
             report(self)
             if 0 < self.settings.time_limit < time.monotonic() - self.begun:
                 return "time-limit"
@@ -115,14 +118,11 @@ class Frame:
         return pictures
 
     def _show(self, region):
-        """Puts the picture so far where people look at it: in the region, and in the corner where Cycles has left the batch."""
-        if bpy.app.background:
-            return
+        """Brings the picture that people look at up to date."""
         x, y, width, height = region
-        for left, top in {(x, y), (0, self.size[1] - height)}:
-            here = slice(top, top + height), slice(left, left + width)
-            combined = self.sums.sums["Combined"][here] / numpy.maximum(self.sums.samples[here], 1)
-            passes.write(self.engine, self.layer, {"Combined": combined}, left, self.size[1] - top - height)
+        here = slice(y, y + height), slice(x, x + width)
+        self.shown[here] = self.sums.sums["Combined"][here] / numpy.maximum(self.sums.samples[here], 1)
+        self.shows += 1
 
     def finish(self):
         """Puts all passes into the result, with the two maps; returns the maps."""

@@ -11,8 +11,10 @@ import threading
 import traceback
 
 import bpy
+import gpu
 import numpy
 from bpy.app.handlers import persistent
+from gpu_extras.presets import draw_texture_2d
 
 from . import maps
 from .frame import Frame
@@ -27,7 +29,7 @@ class State:
         self.lock = threading.Lock()
         self.status, self.images, self.summary, self.still = None, {}, "", None
         self.rendering = self.written = False
-        self.borrowed = None
+        self.borrowed = self.frame = self.texture = None
 
 
 state = State()
@@ -51,6 +53,21 @@ def update(engine, data, depsgraph):
         _headless(bpy.app.background)
 
 
+def draw(engine, context, depsgraph):
+    """While it renders, the Image Editor asks the engine for the picture, not the Render Result."""
+    frame = state.frame
+    if frame is None:
+        return original["draw"](engine, context, depsgraph)
+    if frame.shows == 0:
+        return
+    if state.texture is None or state.texture[0] != (id(frame), frame.shows):
+        height, width = frame.shown.shape[:2]
+        data = gpu.types.Buffer("FLOAT", width * height * 4, numpy.ascontiguousarray(frame.shown[::-1]).ravel())
+        state.texture = (id(frame), frame.shows), gpu.types.GPUTexture((width, height), format="RGBA16F", data=data)
+    texture = state.texture[1]
+    draw_texture_2d(texture, (0, 0), texture.width, texture.height)
+
+
 def render(engine, depsgraph):
     if not wanted(engine, depsgraph):
         return original["render"](engine, depsgraph)
@@ -63,6 +80,8 @@ def render(engine, depsgraph):
     except Exception as error:
         traceback.print_exc()
         engine.report({"ERROR"}, f"noisefloor: {error}")
+    finally:
+        state.frame = None
 
 
 def _render(engine, depsgraph):
@@ -74,7 +93,7 @@ def _render(engine, depsgraph):
     # has been read when the layer began
     depsgraph.update()
     depsgraph.scene_eval.camera.update_tag(refresh={"OBJECT"})
-    frame = Frame(engine, depsgraph, cycles)
+    frame = state.frame = Frame(engine, depsgraph, cycles)
 
     def report(frame):
         text, share = _progress(frame)
@@ -191,6 +210,8 @@ def tick():
     """Tells people how far it is."""
     if (state.images or state.still) and not state.rendering:
         deliver()
+    if not state.rendering:
+        state.texture = None
     text = state.status if state.rendering else None
     if text != tick.shown:
         for window in bpy.context.window_manager.windows:
@@ -208,8 +229,8 @@ def register():
     import cycles
 
     engine = cycles.CyclesRender
-    original.update(update=engine.update, render=engine.render, free=cycles.engine.free)
-    engine.update, engine.render = update, render
+    original.update(update=engine.update, render=engine.render, draw=engine.draw, free=cycles.engine.free)
+    engine.update, engine.render, engine.draw = update, render, draw
     for event, handler in HANDLERS:
         getattr(bpy.app.handlers, event).append(handler)
     if not bpy.app.background:
@@ -220,7 +241,7 @@ def unregister():
     import cycles
 
     engine = cycles.CyclesRender
-    engine.update, engine.render = original["update"], original["render"]
+    engine.update, engine.render, engine.draw = original["update"], original["render"], original["draw"]
     for event, handler in HANDLERS:
         getattr(bpy.app.handlers, event).remove(handler)
     if not bpy.app.background and bpy.app.timers.is_registered(tick):

@@ -11,7 +11,6 @@ class RENDER_PT_noisefloor(bpy.types.Panel):
     bl_region_type = "WINDOW"
     bl_context = "render"
     bl_parent_id = "CYCLES_RENDER_PT_sampling"
-    bl_order = -1  # before Cycles' own settings, which it replaces
     COMPAT_ENGINES = {"CYCLES"}
 
     @classmethod

@@ -21,10 +21,10 @@ def read(engine, layer, region):
     return pictures
 
 
-def write(engine, layer, pictures, left=0, bottom=0):
-    """Puts pictures into the passes of these names, and 0 into the others, from this pixel on (rows from below)."""
+def write(engine, layer, pictures):
+    """Puts pictures of the whole frame into the passes of these names, and 0 into the others."""
     height, width = next(iter(pictures.values())).shape[:2]
-    result = engine.begin_result(left, bottom, width, height, layer=layer)
+    result = engine.begin_result(0, 0, width, height, layer=layer)
     for rendered in result.layers[0].passes:
         if rendered.name in pictures:
             picture = pictures[rendered.name].reshape(height, width, rendered.channels)[::-1]
