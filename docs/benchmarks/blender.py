@@ -2,9 +2,9 @@
 """Renders a scene in Blender with and without the add-on, for blender.md: blender.py ADDON.zip SCENE.py SIZE WHO OUT.exr
 
 WHO is `cycles`: Cycles' defaults (noise threshold 0.01, at most 4,096 samples, Open Image Denoise); `noisefloor`: the add-on with tiles
-of 64; `noisefloor-denoised`: the same with Denoise on; or `reference`: 4,096 samples with another seed. Filter, clamping and light
+of 64; `noisefloor-denoised`: the same with Denoise on; or `reference`: 2,048 samples with another seed. Filter, clamping and light
 threshold are Blender's defaults in all of them. Prints user seconds of the render, its wall seconds and its summary or samples.
-Run it in an environment that has bpy and the wheel of noisefloor; then `at_the_stop.py OUT.exr:0 REFERENCE.exr:4096`.
+Run it in an environment that has bpy and the wheel of noisefloor; then `at_the_stop.py OUT.exr:0 REFERENCE.exr:2048`.
 """
 
 import resource
@@ -23,7 +23,7 @@ render, cycles = scene.render, scene.cycles
 cycles.device = "CPU"
 render.resolution_x = render.resolution_y = int(size)
 render.resolution_percentage = 100
-cycles.samples, cycles.seed = 4096, 77 if who == "reference" else 5
+cycles.samples, cycles.seed = (2048, 77) if who == "reference" else (4096, 5)
 cycles.use_adaptive_sampling, cycles.adaptive_threshold = who != "reference", 0.01
 cycles.use_denoising = who in ("cycles", "noisefloor-denoised")
 layer = scene.view_layers[0]
