@@ -9,6 +9,7 @@ VIEWING = [
     ("tv", "TV", "A television in a living room"),
     ("phone", "Phone", "A phone"),
     ("cinema", "Cinema", "A cinema"),
+    ("mine", "My Eyes", "By your eyes and on your display, as `noisefloor calibrate` has measured them"),
 ]
 
 
@@ -46,10 +47,16 @@ def oracle(settings):
 def params(scene, block):
     """How tiles are judged. Verdicts come after whole blocks of samples."""
     settings, view = scene.noisefloor, scene.view_settings
+    people = {"viewing": settings.viewing}
+    if settings.viewing == "mine":
+        eyes = noisefloor.eyes()
+        if eyes is None:
+            raise ValueError("your eyes are unknown: run `noisefloor calibrate`, or choose where the picture is seen")
+        people = {"viewing": eyes.viewing, "audience": eyes.audience}
     tone = {"tone_mapping": "reinhard"}
     if view.view_transform in ("Standard", "Raw"):
         tone = {"tone_mapping": "srgb", "exposure": 2.0**view.exposure}
     blocks = max(settings.max_samples // block, 2)
     return noisefloor.Params(
-        tile=settings.tile, viewing=settings.viewing, step=block, min_spp=min(6, blocks) * block, max_spp=blocks * block, **tone,
+        tile=settings.tile, step=block, min_spp=min(6, blocks) * block, max_spp=blocks * block, **people, **tone,
     )
