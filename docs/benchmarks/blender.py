@@ -1,10 +1,12 @@
 #!/usr/bin/env python3
-"""Renders a scene in Blender with and without the add-on, for blender.md: blender.py ADDON.zip SCENE.py SIZE WHO OUT.exr
+"""Renders a scene in Blender with and without the add-on, for blender.md: blender.py ADDON.zip SCENE.py SIZE
+WHO OUT.exr
 
-WHO is `cycles`: Cycles' defaults (noise threshold 0.01, at most 4,096 samples, Open Image Denoise); `noisefloor`: the add-on with tiles
-of 64; `noisefloor-denoised`: the same with Denoise on; or `reference`: 2,048 samples with another seed. Filter, clamping and light
-threshold are Blender's defaults in all of them. Prints user seconds of the render, its wall seconds and its summary or samples.
-Run it in an environment that has bpy and the wheel of noisefloor; then `at_the_stop.py OUT.exr:0 REFERENCE.exr:2048`.
+WHO is `cycles`: Cycles' defaults (noise threshold 0.01, at most 4,096 samples, Open Image Denoise);
+`noisefloor`: the add-on with tiles of 64; `noisefloor-denoised`: the same with Denoise on; or `reference`:
+2,048 samples with another seed. Filter, clamping and light threshold are Blender's defaults in all of them.
+Prints user seconds of the render, its wall seconds and its summary or samples. Run it in an environment that
+has bpy and the wheel of noisefloor; then `at_the_stop.py OUT.exr:0 REFERENCE.exr:2048`.
 """
 
 import resource

@@ -1,8 +1,9 @@
 #!/usr/bin/env python3
-"""User seconds of the add-on against Cycles alone at equal samples, for blender.md: blender_overhead.py ADDON.zip WIDTH HEIGHT SAMPLES RUNS
+"""User seconds of the add-on against Cycles alone at equal samples, for blender.md: blender_overhead.py
+ADDON.zip WIDTH HEIGHT SAMPLES RUNS
 
-Renders Blender's default scene, in turns, without denoising and adaptive sampling. Run it in an environment that has bpy and the
-wheel of noisefloor.
+Renders Blender's default scene, in turns, without denoising and adaptive sampling. Run it in an environment
+that has bpy and the wheel of noisefloor.
 """
 
 import resource

@@ -1,8 +1,9 @@
 #!/usr/bin/env python3
 """Packs the add-on for Blender: build.py OUT.zip WHEEL...
 
-WHEEL is what `pip wheel --no-deps crates/noisefloor-python` makes, one for each platform. OUT.zip is an extension for Blender 4.2
-and later, and an add-on for versions before; both are installed from the file. Needs only the standard library.
+WHEEL is what `pip wheel --no-deps crates/noisefloor-python` makes, one for each platform. OUT.zip is an
+extension for Blender 4.2 and later, and an add-on for versions before; both are installed from the file.
+Needs only the standard library.
 """
 
 import pathlib
@@ -29,8 +30,12 @@ wheels = [{wheels}]
 files = "Write maps and a summary beside rendered pictures"
 """
 PLATFORMS = {
-    ("linux", "x86_64"): "linux-x64", ("linux", "aarch64"): "linux-arm64", ("win", "amd64"): "windows-x64",
-    ("win", "arm64"): "windows-arm64", ("macosx", "x86_64"): "macos-x64", ("macosx", "arm64"): "macos-arm64",
+    ("linux", "x86_64"): "linux-x64",
+    ("linux", "aarch64"): "linux-arm64",
+    ("win", "amd64"): "windows-x64",
+    ("win", "arm64"): "windows-arm64",
+    ("macosx", "x86_64"): "macos-x64",
+    ("macosx", "arm64"): "macos-arm64",
 }
 
 

@@ -10,7 +10,10 @@ scene = bpy.context.scene
 scene.render.engine = "CYCLES"
 scene.render.resolution_x = scene.render.resolution_y = 128
 
-for name, at, power, size, turn in [("key", (-2.5, -2, 3.5), 160, 1.2, (40, 0, -50)), ("fill", (3, -2.5, 2), 40, 2.5, (60, 0, 50))]:
+for name, at, power, size, turn in [
+    ("key", (-2.5, -2, 3.5), 160, 1.2, (40, 0, -50)),
+    ("fill", (3, -2.5, 2), 40, 2.5, (60, 0, 50)),
+]:
     lamp = bpy.data.objects.new(name, bpy.data.lights.new(name, "AREA"))
     lamp.data.energy, lamp.data.size, lamp.location = power, size, at
     lamp.rotation_euler = [math.radians(angle) for angle in turn]
@@ -31,7 +34,10 @@ wood = material("wood", (0.3, 0.15, 0.06), Roughness=0.3, Coat_Weight=0.5)
 rings = wood.node_tree.nodes.new("ShaderNodeTexWave")
 rings.inputs["Scale"].default_value, rings.inputs["Distortion"].default_value = 3, 6
 ramp = wood.node_tree.nodes.new("ShaderNodeValToRGB")
-ramp.color_ramp.elements[0].color, ramp.color_ramp.elements[1].color = (0.12, 0.05, 0.02, 1), (0.4, 0.22, 0.1, 1)
+ramp.color_ramp.elements[0].color, ramp.color_ramp.elements[1].color = (
+    (0.12, 0.05, 0.02, 1),
+    (0.4, 0.22, 0.1, 1),
+)
 wood.node_tree.links.new(rings.outputs["Color"], ramp.inputs[0])
 wood.node_tree.links.new(ramp.outputs[0], wood.node_tree.nodes["Principled BSDF"].inputs["Base Color"])
 paper = material("paper", (0.7, 0.68, 0.65), Roughness=0.95)

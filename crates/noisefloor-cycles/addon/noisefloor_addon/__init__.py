@@ -15,7 +15,8 @@ bl_info = {
     "category": "Render",
 }
 
-# Blender 4.2 and later installs the wheels of extensions. For versions before, the wheel is unpacked beside this file, once
+# Blender 4.2 and later installs the wheels of extensions. For versions before, the wheel is unpacked beside
+# this file, once
 try:
     import noisefloor
 except ImportError:

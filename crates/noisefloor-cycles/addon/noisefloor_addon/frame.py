@@ -1,4 +1,5 @@
-"""One view layer of one frame: Cycles renders blocks of samples of the open tiles, and noisefloor says which tiles stay open."""
+"""One view layer of one frame: Cycles renders blocks of samples of the open tiles, and noisefloor says which
+tiles stay open."""
 
 import time
 
@@ -14,10 +15,11 @@ NOISY, ALBEDO, NORMAL = "Noisy Image", "Denoising Albedo", "Denoising Normal"
 
 
 class Frame:
-    """engine: Cycles' RenderEngine, which Blender has asked for a layer. cycles: renders what the evaluated scene says.
+    """engine: Cycles' RenderEngine, which Blender has asked for a layer. cycles: renders what the evaluated
+    scene says.
 
-    Only the evaluated scene and the engine's own copy of the render settings are changed. They are gone after the frame, and no
-    file, undo step or window ever sees them."""
+    Only the evaluated scene and the engine's own copy of the render settings are changed. They are gone
+    after the frame, and no file, undo step or window ever sees them."""
 
     def __init__(self, engine, depsgraph, cycles):
         self.engine, self.cycles = engine, cycles
@@ -35,7 +37,9 @@ class Frame:
             top = self.down - int(render.border_min_y * self.down) - self.size[1]
         self.corner = left, top
         seed = self.scene.cycles.seed
-        self.seed = f"{seed} frame {self.scene.frame_current}" if self.scene.cycles.use_animated_seed else seed
+        self.seed = (
+            f"{seed} frame {self.scene.frame_current}" if self.scene.cycles.use_animated_seed else seed
+        )
         self.session = noisefloor.Session(
             *self.size, settings.oracle(self.settings), settings.params(self.scene, sampling.BLOCK)
         )
@@ -50,7 +54,9 @@ class Frame:
         """The library that denoises the picture; Cycles is told to render what it needs."""
         found = denoise.library()
         if found is None:
-            self.engine.report({"WARNING"}, "noisefloor does not denoise: this Blender has no Open Image Denoise")
+            self.engine.report(
+                {"WARNING"}, "noisefloor does not denoise: this Blender has no Open Image Denoise"
+            )
             return None
         if self.scene.cycles.denoising_input_passes != "RGB":
             depsgraph.view_layer_eval.cycles.denoising_store_passes = True
@@ -63,7 +69,14 @@ class Frame:
     def run(self, report):
         """Renders until every tile is done; calls report(frame) after each batch."""
         render = self.engine.render
-        border = ["use_border", "use_crop_to_border", "border_min_x", "border_max_x", "border_min_y", "border_max_y"]
+        border = [
+            "use_border",
+            "use_crop_to_border",
+            "border_min_x",
+            "border_max_x",
+            "border_min_y",
+            "border_max_y",
+        ]
         before = {name: getattr(render, name) for name in border}
         sampling.independent(self.scene.cycles)
         try:
@@ -76,12 +89,20 @@ class Frame:
                 setattr(render, name, value)
 
     def _round(self, report):
-        """A block of samples for each open tile, and verdicts on those that are due; returns why to end, if so."""
+        """A block of samples for each open tile, and verdicts on those that are due; returns why to end, if
+        so."""
         # Tiles are open from the first round on, so they have samples alike
         requests = self.session.requests()
         tiles = [
-            {"x": t.x, "y": t.y, "width": t.width, "height": t.height, "block": request.first // sampling.BLOCK}
-            for request in requests for t in [request.tile]
+            {
+                "x": t.x,
+                "y": t.y,
+                "width": t.width,
+                "height": t.height,
+                "block": request.first // sampling.BLOCK,
+            }
+            for request in requests
+            for t in [request.tile]
         ]
         for region, (block,), members in rectangles(tiles, ["block"]):
             pictures = self._sample(region, block)
@@ -109,7 +130,11 @@ class Frame:
     def _sample(self, region, block):
         x, y, width, height = region
         sampling.choose(self.scene.cycles, self.seed, block)
-        sampling.aim(self.engine.render, (self.across, self.down), (x + self.corner[0], y + self.corner[1], width, height))
+        sampling.aim(
+            self.engine.render,
+            (self.across, self.down),
+            (x + self.corner[0], y + self.corner[1], width, height),
+        )
         self.cycles()
         pictures = passes.read(self.engine, self.layer, (width, height))
         if NOISY in pictures:
@@ -133,7 +158,9 @@ class Frame:
                 pictures[NOISY] = pictures["Combined"].copy()
             if self.denoiser:
                 guides = pictures.get(ALBEDO), pictures.get(NORMAL)
-                pictures["Combined"][..., :3] = denoise.denoise(self.denoiser, pictures["Combined"][..., :3], *guides)
+                pictures["Combined"][..., :3] = denoise.denoise(
+                    self.denoiser, pictures["Combined"][..., :3], *guides
+                )
         visible = self.session.visible_noise()
         if visible is None:
             visible = numpy.full(self.size[::-1], numpy.nan, numpy.float32)
@@ -161,8 +188,9 @@ class Frame:
             if stop.reason != "converged":
                 reasons[stop.reason] = reasons.get(stop.reason, 0) + 1
         others = "".join(f"; {count} ended: {reason}" for reason, count in reasons.items())
+        seen = f"P {self.settings.share:.2g}, {self.settings.viewing}"
         return (
-            f"{done} of {len(stops)} tiles without visible noise (P {self.settings.share:.2g}, {self.settings.viewing}), "
+            f"{done} of {len(stops)} tiles without visible noise ({seen}), "
             f"{spp.min()} to {spp.max()} samples per pixel, {spp.mean():.0f} on average{others}; "
             f"{time.monotonic() - self.begun:.0f} s"
         )

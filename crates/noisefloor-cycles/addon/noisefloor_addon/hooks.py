@@ -1,9 +1,11 @@
-"""How the add-on gets into Cycles: its render of a layer is replaced where the panel's box is ticked, and nothing else.
+"""How the add-on gets into Cycles: its render of a layer is replaced where the panel's box is ticked, and
+nothing else.
 
-F12, Render Animation, menus and the command line all end in the method `render` of Cycles' RenderEngine, in which Python calls
-Cycles. Calling it again and again, with other settings in the evaluated copy of the scene, is what Blender itself does for
-several layers, if Persistent Data is on. An engine of our own would lose Cycles' panels; an operator over F12 would block the
-window, show every batch, and be unknown to the command line.
+F12, Render Animation, menus and the command line all end in the method `render` of Cycles' RenderEngine, in
+which Python calls Cycles. Calling it again and again, with other settings in the evaluated copy of the
+scene, is what Blender itself does for several layers, if Persistent Data is on. An engine of our own would
+lose Cycles' panels; an operator over F12 would block the window, show every batch, and be unknown to the
+command line.
 """
 
 import os
@@ -40,7 +42,8 @@ def wanted(engine, depsgraph):
 
 
 def update(engine, data, depsgraph):
-    """Before each layer. A session of ours must not show its batches, and one of Cycles' own has to show them."""
+    """Before each layer. A session of ours must not show its batches, and one of Cycles' own has to show
+    them."""
     on = wanted(engine, depsgraph)
     if engine.session and getattr(engine, "noisefloor", False) != on:
         original["free"](engine)
@@ -62,8 +65,13 @@ def draw(engine, context, depsgraph):
         return
     if state.texture is None or state.texture[0] != (id(frame), frame.shows):
         height, width = frame.shown.shape[:2]
-        data = gpu.types.Buffer("FLOAT", width * height * 4, numpy.ascontiguousarray(frame.shown[::-1]).ravel())
-        state.texture = (id(frame), frame.shows), gpu.types.GPUTexture((width, height), format="RGBA16F", data=data)
+        data = gpu.types.Buffer(
+            "FLOAT", width * height * 4, numpy.ascontiguousarray(frame.shown[::-1]).ravel()
+        )
+        state.texture = (
+            (id(frame), frame.shows),
+            gpu.types.GPUTexture((width, height), format="RGBA16F", data=data),
+        )
     texture = state.texture[1]
     draw_texture_2d(texture, (0, 0), texture.width, texture.height)
 
@@ -73,7 +81,9 @@ def render(engine, depsgraph):
         return original["render"](engine, depsgraph)
     if not engine.render.use_persistent_data or engine.render.use_multiview:
         why = "stereoscopy" if engine.render.use_multiview else "scenes rendered for another scene"
-        engine.report({"WARNING"}, f"noisefloor does not know {why}: Cycles renders by its own sampling settings")
+        engine.report(
+            {"WARNING"}, f"noisefloor does not know {why}: Cycles renders by its own sampling settings"
+        )
         return original["render"](engine, depsgraph)
     try:
         _render(engine, depsgraph)
@@ -89,8 +99,8 @@ def _render(engine, depsgraph):
         update(engine, bpy.data, depsgraph)
         original["render"](engine, depsgraph)
 
-    # Cycles reads its settings anew only if something of the scene has changed: here the camera has, to the same. Everything else
-    # has been read when the layer began
+    # Cycles reads its settings anew only if something of the scene has changed: here the camera has, to the
+    # same. Everything else has been read when the layer began
     depsgraph.update()
     depsgraph.scene_eval.camera.update_tag(refresh={"OBJECT"})
     frame = state.frame = Frame(engine, depsgraph, cycles)
@@ -145,7 +155,8 @@ def _write(path, data):
 
 
 def _headless(yes):
-    """Whether sessions of Cycles that are made from now on keep batches to themselves until they are complete."""
+    """Whether sessions of Cycles that are made from now on keep batches to themselves until they are
+    complete."""
     import _cycles
     import cycles
 
@@ -153,8 +164,8 @@ def _headless(yes):
     _cycles.init(os.path.dirname(cycles.__file__), user, yes)
 
 
-# Blender copies the render settings between these two handlers. The copy, not the scene, has to say that Cycles keeps its scene
-# from one call to the next.
+# Blender copies the render settings between these two handlers. The copy, not the scene, has to say that
+# Cycles keeps its scene from one call to the next.
 @persistent
 def before_copy(scene, *_):
     state.rendering, state.written = True, False
@@ -187,12 +198,15 @@ def ended(scene, *_):
 
 
 def deliver():
-    """Shows the maps as images, and writes a still that Blender has not written; in the thread with the windows."""
+    """Shows the maps as images, and writes a still that Blender has not written; in the thread with the
+    windows."""
     with state.lock:
         images, state.images = state.images, {}
         still, state.still = bpy.data.scenes.get(state.still or ""), None
     if still:
-        bpy.data.images["Render Result"].save_render(output(still) + still.render.file_extension, scene=still)
+        bpy.data.images["Render Result"].save_render(
+            output(still) + still.render.file_extension, scene=still
+        )
     for name, picture in images.items():
         height, width = picture.shape[:2]
         image = bpy.data.images.get(name)
@@ -221,8 +235,13 @@ def tick():
 
 
 tick.shown = None
-HANDLERS = [("render_init", before_copy), ("render_pre", after_copy), ("render_write", written),
-            ("render_complete", ended), ("render_cancel", ended)]
+HANDLERS = [
+    ("render_init", before_copy),
+    ("render_pre", after_copy),
+    ("render_write", written),
+    ("render_complete", ended),
+    ("render_cancel", ended),
+]
 
 
 def register():

@@ -1,4 +1,5 @@
-"""Heat maps, and PNG files without Blender: files are written while it renders, in a thread where its images are out of bounds."""
+"""Heat maps, and PNG files without Blender: files are written while it renders, in a thread where its images
+are out of bounds."""
 
 import struct
 import zlib
@@ -6,11 +7,14 @@ import zlib
 import numpy
 
 # Dark blue to yellow over equal steps of lightness, so that the order is seen without colours
-RAMP = numpy.array([(13, 8, 60), (84, 20, 110), (160, 45, 95), (220, 95, 55), (248, 165, 45), (250, 240, 150)], float)
+RAMP = numpy.array(
+    [(13, 8, 60), (84, 20, 110), (160, 45, 95), (220, 95, 55), (248, 165, 45), (250, 240, 150)], float
+)
 
 
 def heat(values, low, high):
-    """Colours (height, width, 3), uint8, of values on a logarithmic scale from low to high; grey where there are none."""
+    """Colours (height, width, 3), uint8, of values on a logarithmic scale from low to high; grey where there
+    are none."""
     known = numpy.isfinite(values) & (values > 0)
     logs = numpy.log2(numpy.where(known, values, low) / low)
     place = numpy.clip(logs / max(numpy.log2(high / low), 1e-9), 0, 1) * (len(RAMP) - 1)
@@ -39,10 +43,12 @@ def png(colours, text):
         return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
 
     comment = b"Comment\0\0\0\0\0" + text.encode()
-    return b"".join([
-        b"\x89PNG\r\n\x1a\n",
-        chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)),
-        chunk(b"iTXt", comment),
-        chunk(b"IDAT", zlib.compress(rows.tobytes(), 6)),
-        chunk(b"IEND", b""),
-    ])
+    return b"".join(
+        [
+            b"\x89PNG\r\n\x1a\n",
+            chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)),
+            chunk(b"iTXt", comment),
+            chunk(b"IDAT", zlib.compress(rows.tobytes(), 6)),
+            chunk(b"IEND", b""),
+        ]
+    )

@@ -1,4 +1,5 @@
-"""Pictures out of a render result of Blender's and into it, as arrays of shape (height, width, channels), rows from the top."""
+"""Pictures out of a render result of Blender's and into it, as arrays of shape (height, width, channels),
+rows from the top."""
 
 import bpy
 import numpy
@@ -8,8 +9,8 @@ LABELS = ("Depth", "Object Index", "Material Index", "IndexOB", "IndexMA", "Cryp
 
 
 def read(engine, layer, region):
-    """The passes of a layer, by name, as a render of a region of this width and height left them: Cycles puts it into the
-    lower left corner."""
+    """The passes of a layer, by name, as a render of a region of this width and height left them: Cycles
+    puts it into the lower left corner."""
     result = engine.get_result()
     across, (width, height) = result.resolution_x, region
     pictures = {}
@@ -63,4 +64,6 @@ class Sums:
     def means(self):
         """The passes by name; 0 where there are no samples."""
         samples = numpy.maximum(self.samples, 1)
-        return {name: total if name.startswith(LABELS) else total / samples for name, total in self.sums.items()}
+        return {
+            name: total if name.startswith(LABELS) else total / samples for name, total in self.sums.items()
+        }

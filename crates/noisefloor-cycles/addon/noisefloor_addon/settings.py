@@ -16,26 +16,42 @@ VIEWING = [
 class Settings(bpy.types.PropertyGroup):
     use: bpy.props.BoolProperty(
         name="Render until nobody sees noise",
-        description="Sample each tile until people stop seeing noise in it, instead of by Cycles' sampling settings",
+        description="Sample each tile until people stop seeing noise in it, instead of by Cycles' settings",
     )
-    viewing: bpy.props.EnumProperty(name="Seen on", description="Where the picture will be looked at", items=VIEWING)
+    viewing: bpy.props.EnumProperty(
+        name="Seen on", description="Where the picture will be looked at", items=VIEWING
+    )
     share: bpy.props.FloatProperty(
         name="People",
         description="Probability that an observer sees no noise in a tile, at which it stops",
-        default=0.9, min=0.5, max=0.99, subtype="FACTOR",
+        default=0.9,
+        min=0.5,
+        max=0.99,
+        subtype="FACTOR",
     )
     max_samples: bpy.props.IntProperty(
-        name="Max Samples", description="Samples per pixel at which every tile stops", default=4096, min=32, soft_max=16384,
+        name="Max Samples",
+        description="Samples per pixel at which every tile stops",
+        default=4096,
+        min=32,
+        soft_max=16384,
     )
     time_limit: bpy.props.FloatProperty(
-        name="Time Limit", description="Seconds after which a frame stops; 0 is no limit", min=0, unit="TIME_ABSOLUTE",
+        name="Time Limit",
+        description="Seconds after which a frame stops; 0 is no limit",
+        min=0,
+        unit="TIME_ABSOLUTE",
     )
     tile: bpy.props.IntProperty(
-        name="Tile", description="Edge in pixels of the tiles that stop as a whole", default=128, min=64, max=512,
+        name="Tile",
+        description="Edge in pixels of the tiles that stop as a whole",
+        default=128,
+        min=64,
+        max=512,
     )
     write_maps: bpy.props.BoolProperty(
         name="Write Maps and Summary",
-        description="Write maps of the samples and of the noise that is left, and a summary, beside the rendered files",
+        description="Write maps of samples and of the noise that is left, and a summary, beside the frames",
         default=True,
     )
 
@@ -51,12 +67,19 @@ def params(scene, block):
     if settings.viewing == "mine":
         eyes = noisefloor.eyes()
         if eyes is None:
-            raise ValueError("your eyes are unknown: run `noisefloor calibrate`, or choose where the picture is seen")
+            raise ValueError(
+                "your eyes are unknown: run `noisefloor calibrate`, or choose where the picture is seen"
+            )
         people = {"viewing": eyes.viewing, "audience": eyes.audience}
     tone = {"tone_mapping": "reinhard"}
     if view.view_transform in ("Standard", "Raw"):
         tone = {"tone_mapping": "srgb", "exposure": 2.0**view.exposure}
     blocks = max(settings.max_samples // block, 2)
     return noisefloor.Params(
-        tile=settings.tile, step=block, min_spp=min(6, blocks) * block, max_spp=blocks * block, **people, **tone,
+        tile=settings.tile,
+        step=block,
+        min_spp=min(6, blocks) * block,
+        max_spp=blocks * block,
+        **people,
+        **tone,
     )
