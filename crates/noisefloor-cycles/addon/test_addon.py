@@ -181,6 +181,7 @@ class Addon(unittest.TestCase):
         self.assertEqual(facts(scene), before)
         self.assertGreater(len(rendered(scene)[1]), 5)
 
+    @unittest.skipIf(bpy.app.binary_path, "the host of the command needs Blender as a module")
     def test_samples_are_those_of_the_command(self):
         scene = room()
         blend = FOLDER / "room.blend"

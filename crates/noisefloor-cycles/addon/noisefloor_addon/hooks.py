@@ -118,7 +118,8 @@ def _render(engine, depsgraph):
     engine.get_result().stamp_data_add_field(f"noisefloor.{frame.layer}", summary)
     print(f"noisefloor: {frame.layer}, frame {frame.scene.frame_current}: {summary}", flush=True)
     pictures = {"samples": maps.samples_map(spp), "visible noise": maps.noise_map(visible)}
-    many = sum(layer.use for layer in frame.scene.view_layers) > 1
+    # An evaluated scene can have only the layer that is rendered
+    many = sum(layer.use for layer in depsgraph.scene.view_layers) > 1
     with state.lock:
         state.summary = summary
         for name, picture in pictures.items():
