@@ -2,13 +2,9 @@
 
 A scene is a .blend file; scripts inside are not run. Or it is a .py file, which is run, and builds the scene. No options.
 
-Samples come in blocks of 16, each block a pattern of its own: the first 16 points of Cycles' Sobol table, scrambled by a seed
-that follows from the block. Sample k of a pixel thereby follows from seed, pixel and k, however requests are cut, and batches
-of whole blocks are independent. Successive subsets of one long pattern, which Cycles offers too, are not: each fills the gaps
-of those before, so that halves made of them differ by more than the error of their mean.
+The file that is run begins with addon/noisefloor_addon/sampling.py, which says what samples are: see src/lib.rs.
 """
 
-import hashlib
 import os
 import runpy
 import sys
@@ -16,9 +12,6 @@ import tempfile
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 import host
-
-# Samples of a block. Longer patterns have less noise at edges of lamps, and nowhere else; they would have to be cut more often
-BLOCK = 16
 
 
 class Cycles:
@@ -71,21 +64,12 @@ class Cycles:
             own = getattr(render, f"resolution_{axis}") * render.resolution_percentage // 100
             setattr(render, f"resolution_{axis}", init.get(side) or own)
         render.resolution_percentage = 100
-        render.use_border = render.use_crop_to_border = True
-        cycles.use_auto_tile = False
 
         # Every sample counts in only one pixel, and in full
         cycles.pixel_filter_type, cycles.filter_width = "BOX", 1.0
         cycles.sample_clamp_direct = cycles.sample_clamp_indirect = 0.0
         cycles.light_sampling_threshold = 0.0
-        cycles.use_adaptive_sampling = cycles.use_denoising = cycles.use_guiding = False
-        cycles.time_limit = 0.0
-        cycles.use_layer_samples = "IGNORE"
-        # The other patterns and scramblings make neighbouring pixels alike, or unlike, on purpose
-        cycles.sampling_pattern = "TABULATED_SOBOL"
-        cycles.auto_scrambling_distance, cycles.scrambling_distance = False, 1.0
-        cycles.use_animated_seed = False
-        cycles.samples, cycles.use_sample_subset = BLOCK, True
+        independent(cycles)
 
         depth = init.get("max_depth")
         if depth is not None:
@@ -145,8 +129,10 @@ class Cycles:
         return [self.np.ascontiguousarray(part, self.np.float32) for part in (self.np.clip(albedo, 0, 1), normal)]
 
     def _mean(self, region, first, samples, stream=""):
-        """Mean of samples first…first + samples of a region, block by block. Streams share no patterns."""
-        self._aim(*region)
+        """Mean of samples first…first + samples of a region, block by block."""
+        render = self.scene.render
+        aim(render, (render.resolution_x, render.resolution_y), region)
+        self.shape = (*region[:1:-1], 3)
         total, done = 0.0, 0
         while done < samples:
             block, offset = divmod(first + done, BLOCK)
@@ -155,22 +141,10 @@ class Cycles:
             done += length
         return total / samples
 
-    def _aim(self, x, y, width, height):
-        """Confines renders to a region; its y counts from the top, Blender's from the bottom."""
-        render = self.scene.render
-        across, down = render.resolution_x, render.resolution_y
-        bottom = down - y - height
-        # Blender cuts edges down to whole pixels: a quarter keeps them clear of rounding
-        render.border_min_x, render.border_max_x = (x + 0.25) / across, min(1.0, (x + width + 0.25) / across)
-        render.border_min_y, render.border_max_y = (bottom + 0.25) / down, min(1.0, (bottom + height + 0.25) / down)
-        self.shape = (height, width, 3)
-
     def _render(self, stream, block, offset, length):
         """Mean of some samples of a block, rows from the top, as float64."""
-        cycles, images = self.scene.cycles, self.bpy.data.images
-        digest = hashlib.blake2b(f"{self.seed}{stream} {block}".encode(), digest_size=4).digest()
-        cycles.seed = int.from_bytes(digest, "little") >> 1
-        cycles.sample_offset, cycles.sample_subset_length = offset, length
+        images = self.bpy.data.images
+        choose(self.scene.cycles, self.seed, block, offset, length, stream)
         self.bpy.ops.render.render()
         # The pixels of a render result are out of a script's reach: only a file has them. It is there for milliseconds, because
         # a process whose parent is gone ends at once and cleans nothing up

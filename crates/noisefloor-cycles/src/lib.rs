@@ -35,7 +35,12 @@ use noisefloor_sidecar::{HostOptions, Job, Renderer, Sidecar, SidecarError};
 pub const RENDERER: Renderer = Renderer {
     name: "cycles",
     title: "Cycles 5.0.1",
-    script: include_str!("../host/cycles_host.py"),
+    // One file: the host needs no more modules than those of other renderers
+    script: concat!(
+        include_str!("../addon/noisefloor_addon/sampling.py"),
+        "\n\n",
+        include_str!("../host/cycles_host.py")
+    ),
     requirements: include_str!("../requirements.txt"),
     pythons: &[11],
     probe: "import bpy; print(bpy.app.version_string)",

@@ -1,0 +1,268 @@
+"""How the add-on gets into Cycles: its render of a layer is replaced where the panel's box is ticked, and
+nothing else.
+
+F12, Render Animation, menus and the command line all end in the method `render` of Cycles' RenderEngine, in
+which Python calls Cycles. Calling it again and again, with other settings in the evaluated copy of the
+scene, is what Blender itself does for several layers, if Persistent Data is on. An engine of our own would
+lose Cycles' panels; an operator over F12 would block the window, show every batch, and be unknown to the
+command line.
+"""
+
+import os
+import threading
+import traceback
+
+import bpy
+import gpu
+import numpy
+from bpy.app.handlers import persistent
+from gpu_extras.presets import draw_texture_2d
+
+from . import maps
+from .frame import Frame
+
+original = {}
+
+
+class State:
+    """What the threads that render tell the one with the windows."""
+
+    def __init__(self):
+        self.lock = threading.Lock()
+        self.status, self.images, self.summary, self.still = None, {}, "", None
+        self.rendering = self.written = False
+        self.borrowed = self.frame = self.texture = None
+
+
+state = State()
+
+
+def wanted(engine, depsgraph):
+    return not engine.is_preview and depsgraph.scene_eval.noisefloor.use
+
+
+def update(engine, data, depsgraph):
+    """Before each layer. A session of ours must not show its batches, and one of Cycles' own has to show
+    them."""
+    on = wanted(engine, depsgraph)
+    if engine.session and getattr(engine, "noisefloor", False) != on:
+        original["free"](engine)
+        engine.session = None
+    engine.noisefloor = on
+    _headless(on or bpy.app.background)
+    try:
+        original["update"](engine, data, depsgraph)
+    finally:
+        _headless(bpy.app.background)
+
+
+def draw(engine, context, depsgraph):
+    """While it renders, the Image Editor asks the engine for the picture, not the Render Result."""
+    frame = state.frame
+    if frame is None:
+        return original["draw"](engine, context, depsgraph)
+    if frame.shows == 0:
+        return
+    if state.texture is None or state.texture[0] != (id(frame), frame.shows):
+        height, width = frame.shown.shape[:2]
+        data = gpu.types.Buffer(
+            "FLOAT", width * height * 4, numpy.ascontiguousarray(frame.shown[::-1]).ravel()
+        )
+        state.texture = (
+            (id(frame), frame.shows),
+            gpu.types.GPUTexture((width, height), format="RGBA16F", data=data),
+        )
+    texture = state.texture[1]
+    draw_texture_2d(texture, (0, 0), texture.width, texture.height)
+
+
+def render(engine, depsgraph):
+    if not wanted(engine, depsgraph):
+        return original["render"](engine, depsgraph)
+    if not engine.render.use_persistent_data or engine.render.use_multiview:
+        why = "stereoscopy" if engine.render.use_multiview else "scenes rendered for another scene"
+        engine.report(
+            {"WARNING"}, f"noisefloor does not know {why}: Cycles renders by its own sampling settings"
+        )
+        return original["render"](engine, depsgraph)
+    try:
+        _render(engine, depsgraph)
+    except Exception as error:
+        traceback.print_exc()
+        engine.report({"ERROR"}, f"noisefloor: {error}")
+    finally:
+        state.frame = None
+
+
+def _render(engine, depsgraph):
+    def cycles():
+        update(engine, bpy.data, depsgraph)
+        original["render"](engine, depsgraph)
+
+    # Cycles reads its settings anew only if something of the scene has changed: here the camera has, to the
+    # same. Everything else has been read when the layer began
+    depsgraph.update()
+    depsgraph.scene_eval.camera.update_tag(refresh={"OBJECT"})
+    frame = state.frame = Frame(engine, depsgraph, cycles)
+
+    def report(frame):
+        text, share = _progress(frame)
+        state.status = text
+        engine.update_stats("noisefloor", text)
+        if share is not None:
+            engine.update_progress(share)
+
+    frame.run(report)
+    spp, visible = frame.finish()
+    summary = frame.summary()
+    engine.get_result().stamp_data_add_field(f"noisefloor.{frame.layer}", summary)
+    print(f"noisefloor: {frame.layer}, frame {frame.scene.frame_current}: {summary}", flush=True)
+    pictures = {"samples": maps.samples_map(spp), "visible noise": maps.noise_map(visible)}
+    # An evaluated scene can have only the layer that is rendered
+    many = sum(layer.use for layer in depsgraph.scene.view_layers) > 1
+    with state.lock:
+        state.summary = summary
+        for name, picture in pictures.items():
+            state.images[f"noisefloor {name}" + (f", {frame.layer}" if many else "")] = picture
+    if frame.settings.write_maps:
+        stem = output(frame.scene) + (f"-{frame.layer}" if many else "")
+        for name, picture in pictures.items():
+            _write(f"{stem}-{name.replace(' ', '-')}.png", maps.png(picture, summary))
+        _write(f"{stem}-noisefloor.txt", (summary + "\n").encode())
+
+
+def _progress(frame):
+    share, left = frame.progress()
+    done = frame.tiles - frame.session.open_tiles
+    spp = frame.sampled // (frame.size[0] * frame.size[1])
+    text = f"noisefloor: {spp} samples per pixel, {done} of {frame.tiles} tiles done"
+    if left is not None:
+        text += f", about {int(left) // 60}:{int(left) % 60:02} left"
+    return text, share
+
+
+def output(scene):
+    """Path of the rendered frame without its extension."""
+    path = bpy.path.abspath(scene.render.frame_path(frame=scene.frame_current))
+    return os.path.splitext(path)[0]
+
+
+def _write(path, data):
+    """Files are complete or absent."""
+    os.makedirs(os.path.dirname(path) or ".", exist_ok=True)
+    with open(path + ".part", "wb") as file:
+        file.write(data)
+    os.replace(path + ".part", path)
+
+
+def _headless(yes):
+    """Whether sessions of Cycles that are made from now on keep batches to themselves until they are
+    complete."""
+    import _cycles
+    import cycles
+
+    user = os.path.dirname(os.path.abspath(bpy.utils.user_resource("CONFIG", path="")))
+    _cycles.init(os.path.dirname(cycles.__file__), user, yes)
+
+
+# Blender copies the render settings between these two handlers. The copy, not the scene, has to say that
+# Cycles keeps its scene from one call to the next.
+@persistent
+def before_copy(scene, *_):
+    state.rendering, state.written = True, False
+    if scene.noisefloor.use and scene.render.engine == "CYCLES":
+        state.borrowed = scene.render.use_persistent_data
+        scene.render.use_persistent_data = True
+
+
+@persistent
+def after_copy(scene, *_):
+    if state.borrowed is not None:
+        scene.render.use_persistent_data, state.borrowed = state.borrowed, None
+
+
+@persistent
+def written(scene, *_):
+    state.written = True
+
+
+@persistent
+def ended(scene, *_):
+    after_copy(scene)
+    state.rendering, state.status = False, None
+    if scene.noisefloor.use and scene.render.engine == "CYCLES":
+        # Setting it, to whatever, frees what the engine has kept if it is off
+        scene.render.use_persistent_data = scene.render.use_persistent_data
+        state.still = None if state.written or not scene.noisefloor.write_maps else scene.name
+    if bpy.app.background:
+        deliver()
+
+
+def deliver():
+    """Shows the maps as images, and writes a still that Blender has not written; in the thread with the
+    windows."""
+    with state.lock:
+        images, state.images = state.images, {}
+        still, state.still = bpy.data.scenes.get(state.still or ""), None
+    if still:
+        bpy.data.images["Render Result"].save_render(
+            output(still) + still.render.file_extension, scene=still
+        )
+    for name, picture in images.items():
+        height, width = picture.shape[:2]
+        image = bpy.data.images.get(name)
+        if image is None or tuple(image.size) != (width, height):
+            if image is not None:
+                bpy.data.images.remove(image)
+            image = bpy.data.images.new(name, width, height)
+        pixels = numpy.ones((height, width, 4), numpy.float32)
+        pixels[..., :3] = picture[::-1] / numpy.float32(255)
+        image.pixels.foreach_set(pixels.ravel())
+        image.update()
+
+
+def tick():
+    """Tells people how far it is."""
+    if (state.images or state.still) and not state.rendering:
+        deliver()
+    if not state.rendering:
+        state.texture = None
+    text = state.status if state.rendering else None
+    if text != tick.shown:
+        for window in bpy.context.window_manager.windows:
+            window.workspace.status_text_set(text)
+        tick.shown = text
+    return 0.5
+
+
+tick.shown = None
+HANDLERS = [
+    ("render_init", before_copy),
+    ("render_pre", after_copy),
+    ("render_write", written),
+    ("render_complete", ended),
+    ("render_cancel", ended),
+]
+
+
+def register():
+    import cycles
+
+    engine = cycles.CyclesRender
+    original.update(update=engine.update, render=engine.render, draw=engine.draw, free=cycles.engine.free)
+    engine.update, engine.render, engine.draw = update, render, draw
+    for event, handler in HANDLERS:
+        getattr(bpy.app.handlers, event).append(handler)
+    if not bpy.app.background:
+        bpy.app.timers.register(tick, first_interval=1, persistent=True)
+
+
+def unregister():
+    import cycles
+
+    engine = cycles.CyclesRender
+    engine.update, engine.render, engine.draw = original["update"], original["render"], original["draw"]
+    for event, handler in HANDLERS:
+        getattr(bpy.app.handlers, event).remove(handler)
+    if not bpy.app.background and bpy.app.timers.is_registered(tick):
+        bpy.app.timers.unregister(tick)

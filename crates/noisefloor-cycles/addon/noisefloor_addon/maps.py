@@ -1,0 +1,54 @@
+"""Heat maps, and PNG files without Blender: files are written while it renders, in a thread where its images
+are out of bounds."""
+
+import struct
+import zlib
+
+import numpy
+
+# Dark blue to yellow over equal steps of lightness, so that the order is seen without colours
+RAMP = numpy.array(
+    [(13, 8, 60), (84, 20, 110), (160, 45, 95), (220, 95, 55), (248, 165, 45), (250, 240, 150)], float
+)
+
+
+def heat(values, low, high):
+    """Colours (height, width, 3), uint8, of values on a logarithmic scale from low to high; grey where there
+    are none."""
+    known = numpy.isfinite(values) & (values > 0)
+    logs = numpy.log2(numpy.where(known, values, low) / low)
+    place = numpy.clip(logs / max(numpy.log2(high / low), 1e-9), 0, 1) * (len(RAMP) - 1)
+    steps = numpy.arange(len(RAMP))
+    colours = numpy.stack([numpy.interp(place, steps, RAMP[:, channel]) for channel in range(3)], -1)
+    return numpy.where(known[..., None], colours.round(), 128).astype(numpy.uint8)
+
+
+def samples_map(spp):
+    """Heat map of samples per pixel, from the fewest to the most."""
+    some = spp[spp > 0]
+    return heat(spp.astype(float), *((some.min(), max(some.max(), some.min() * 2)) if some.size else (1, 2)))
+
+
+def noise_map(visible):
+    """Map of visible noise, from ¼ to 4 times what is just seen, so that maps can be compared."""
+    return heat(visible, 0.25, 4.0)
+
+
+def png(colours, text):
+    """A PNG file with a comment."""
+    height, width = colours.shape[:2]
+    rows = numpy.concatenate([numpy.zeros((height, 1), numpy.uint8), colours.reshape(height, -1)], 1)
+
+    def chunk(kind, data):
+        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+
+    comment = b"Comment\0\0\0\0\0" + text.encode()
+    return b"".join(
+        [
+            b"\x89PNG\r\n\x1a\n",
+            chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)),
+            chunk(b"iTXt", comment),
+            chunk(b"IDAT", zlib.compress(rows.tobytes(), 6)),
+            chunk(b"IEND", b""),
+        ]
+    )

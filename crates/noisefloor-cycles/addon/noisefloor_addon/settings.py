@@ -1,0 +1,85 @@
+"""What the panel sets, kept in the scene and saved with the file."""
+
+import bpy
+import noisefloor
+
+VIEWING = [
+    ("desk", "Desk", "24 inches, Full HD, seen from 60 cm, in an office"),
+    ("laptop", "Laptop", "A laptop"),
+    ("tv", "TV", "A television in a living room"),
+    ("phone", "Phone", "A phone"),
+    ("cinema", "Cinema", "A cinema"),
+    ("mine", "My Eyes", "By your eyes and on your display, as `noisefloor calibrate` has measured them"),
+]
+
+
+class Settings(bpy.types.PropertyGroup):
+    use: bpy.props.BoolProperty(
+        name="Render until nobody sees noise",
+        description="Sample each tile until people stop seeing noise in it, instead of by Cycles' settings",
+    )
+    viewing: bpy.props.EnumProperty(
+        name="Seen on", description="Where the picture will be looked at", items=VIEWING
+    )
+    share: bpy.props.FloatProperty(
+        name="People",
+        description="Probability that an observer sees no noise in a tile, at which it stops",
+        default=0.9,
+        min=0.5,
+        max=0.99,
+        subtype="FACTOR",
+    )
+    max_samples: bpy.props.IntProperty(
+        name="Max Samples",
+        description="Samples per pixel at which every tile stops",
+        default=4096,
+        min=32,
+        soft_max=16384,
+    )
+    time_limit: bpy.props.FloatProperty(
+        name="Time Limit",
+        description="Seconds after which a frame stops; 0 is no limit",
+        min=0,
+        unit="TIME_ABSOLUTE",
+    )
+    tile: bpy.props.IntProperty(
+        name="Tile",
+        description="Edge in pixels of the tiles that stop as a whole",
+        default=128,
+        min=64,
+        max=512,
+    )
+    write_maps: bpy.props.BoolProperty(
+        name="Write Maps and Summary",
+        description="Write maps of samples and of the noise that is left, and a summary, beside the frames",
+        default=True,
+    )
+
+
+def oracle(settings):
+    return noisefloor.Oracle(settings.share)
+
+
+def params(scene, block):
+    """How tiles are judged. Verdicts come after whole blocks of samples."""
+    settings, view = scene.noisefloor, scene.view_settings
+    people = {"viewing": settings.viewing}
+    if settings.viewing == "mine":
+        eyes = noisefloor.eyes()
+        if eyes is None:
+            raise ValueError(
+                "your eyes are unknown: run `noisefloor calibrate`, or choose where the picture is seen"
+            )
+        people = {"viewing": eyes.viewing, "audience": eyes.audience}
+    tone = {"tone_mapping": "reinhard"}
+    if view.view_transform in ("Standard", "Raw"):
+        tone = {"tone_mapping": "srgb", "exposure": 2.0**view.exposure}
+    blocks = max(settings.max_samples // block, 2)
+    return noisefloor.Params(
+        tile=settings.tile,
+        step=block,
+        min_spp=min(6, blocks) * block,
+        max_spp=blocks * block,
+        **people,
+        **tone,
+    )
