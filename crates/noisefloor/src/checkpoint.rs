@@ -12,7 +12,7 @@ use std::io::{self, Read, Write};
 use thiserror::Error;
 
 const FORMAT: Format = Format { magic: *b"NFCHECK\0", version: VERSION };
-const VERSION: u32 = 9;
+const VERSION: u32 = 10;
 
 /// A snapshot of a session, for resuming it: samples, verdicts and the display. Made by
 /// [`Session::checkpoint`](crate::Session::checkpoint), resumed by
