@@ -207,7 +207,7 @@ fn binary(boxes: &[Aabb]) -> Bvh2 {
     let params = BvhBuildParams {
         pre_split: false,      // would need triangles
         max_prims_per_leaf: 1, // leaves are made of the tree
-        // A second round, and more in the first, take half of the time of loading, and rays are no faster
+        // More, and a second pass, take most of the time of loading for little: docs/benchmarks/bvh.md
         reinsertion_batch_ratio: 0.05,
         post_collapse_reinsertion_batch_ratio_multiplier: 0.0,
         ..BvhBuildParams::medium_build()

@@ -31,8 +31,11 @@ pub(super) struct Node {
     cos_spread: Vec4,
     sin_spread: Vec4,
     cos_emission: Vec4,
+    sin_emission: Vec4,
     /// One or zero.
     two_sided: Vec4,
+    /// One for what shines alike in all directions, and has no axis; or zero.
+    round: Vec4,
     /// Whether all lights shine in all directions, so that cones do not matter.
     all_round: bool,
     /// Relative to that of all lights.
@@ -71,7 +74,9 @@ impl Node {
             cos_spread: Vec4::ONE,
             sin_spread: Vec4::ZERO,
             cos_emission: Vec4::ZERO,
+            sin_emission: Vec4::ONE,
             two_sided: Vec4::ZERO,
+            round: Vec4::ZERO,
             all_round: true,
             intensity: Vec4::ZERO,
             area: Vec4::ZERO,
@@ -84,9 +89,10 @@ impl Node {
     /// Puts a cluster into a lane. `scale` makes intensities relative; no distance counts as less than
     /// `least`.
     pub(super) fn set(&mut self, lane: usize, cluster: &Cluster, scale: f64, least: f32, child: u32) {
+        let round = cluster.spread >= PI;
         for axis in 0..3 {
             self.centre[axis][lane] = cluster.centre[axis];
-            self.axis[axis][lane] = cluster.axis[axis];
+            self.axis[axis][lane] = if round { 0.0 } else { cluster.axis[axis] };
             self.half[axis][lane] = 0.5 * cluster.size()[axis] * 1.001;
         }
         // Rounding must not lose a light
@@ -94,10 +100,11 @@ impl Node {
         self.behind[lane] = cluster.behind + SLACK * cluster.radius;
         self.most_inverse[lane] = 1.0 / self.radius[lane].max(least);
         (self.sin_spread[lane], self.cos_spread[lane]) = cluster.spread.sin_cos();
-        self.cos_emission[lane] = cluster.emission.cos();
+        (self.sin_emission[lane], self.cos_emission[lane]) = cluster.emission.sin_cos();
         self.two_sided[lane] = if cluster.two_sided { 1.0 } else { 0.0 };
         self.intensity[lane] = (cluster.intensity * scale) as f32;
-        self.all_round &= cluster.spread >= PI;
+        self.all_round &= round;
+        self.round[lane] = if round { 1.0 } else { 0.0 };
         self.area[lane] = cluster.area;
         self.count[lane] = cluster.count as f32;
         self.child[lane] = child;
@@ -121,31 +128,36 @@ impl Node {
             sin: Vec4::select(inside, Vec4::ZERO, sin),
         };
 
-        // The smallest angle at the receiver, and the smallest at the lights
+        let near = inverse.min(self.most_inverse);
+        let squared = near * near;
+
+        // Height above the receiver's horizon: of the middle, and of the highest corner of the box
         let height = dot(&to, receiver.normal);
-        let horizon = Angle::new(height * inverse).minus(&sphere).cos;
-        // The sphere of a large light reaches farther than the light
         let top = height + dot(&self.half, receiver.normal.abs());
-        let mut visible = horizon.cmpge(Vec4::splat(-SLACK)) & top.cmpge(self.radius * -SLACK);
+        let mut visible = top.cmpge(self.radius * -SLACK);
+        let horizon = middling(height * near, top * near);
         let mut facing = Vec4::ONE;
         if !self.all_round {
             let along = self.axis[0] * to[0] + self.axis[1] * to[1] + self.axis[2] * to[2];
-            let cos = along * -inverse;
+            let cos = along * -inverse + self.round;
             let cos = Vec4::select(self.two_sided.cmpgt(Vec4::ZERO), cos.abs(), cos);
-            let spread = Angle { cos: self.cos_spread, sin: self.sin_spread };
-            facing = Angle::new(cos).minus(&spread).minus(&sphere).cos;
-            visible &= facing.cmpge(self.cos_emission - SLACK) & along.cmple(self.behind);
+            // The receiver may be off the axis by the spread of normals, the sphere and the emission together
+            let (cos_wide, sin_wide) = (
+                self.cos_spread * sphere.cos - self.sin_spread * sphere.sin,
+                self.sin_spread * sphere.cos + self.cos_spread * sphere.sin,
+            );
+            let always = inside | cos_wide.cmple(-self.cos_emission) | sin_wide.cmplt(Vec4::ZERO);
+            let least = cos_wide * self.cos_emission - sin_wide * self.sin_emission;
+            visible &= (always | cos.cmpge(least - SLACK)) & along.cmple(self.behind);
+            facing = middling(cos, cos + Vec4::select(always, Vec4::ONE, sin_wide));
         }
 
-        let near = inverse.min(self.most_inverse);
-        let squared = near * near;
-        let mut scattering = receiver.diffuse * horizon.max(Vec4::ZERO);
+        let mut scattering = receiver.diffuse * horizon;
         if receiver.glossy > 0.0 {
             let mirror = Angle::new(dot(&to, receiver.mirror) * inverse).minus(&sphere).cos;
             scattering +=
                 receiver.glossy * lobe(mirror, receiver.alpha2, self.radius * self.radius * squared);
         }
-        let facing = facing.max(Vec4::ZERO);
         // The share of rays scattered by the receiver that find the lights: they need fewer samples
         let found = self.area * facing * scattering * squared * receiver.share;
         let keep = |x: Vec4| Vec4::select(visible, x, Vec4::ZERO);
@@ -167,6 +179,13 @@ fn lobe(cos: Vec4, alpha2: f32, size: Vec4) -> Vec4 {
     // D/4 = a/πk², over 1 + D/4·π·size
     let a = 0.25 * alpha2;
     Vec4::splat(a / PI) / (k * k + a * size)
+}
+
+/// A cosine for a light of which only a part may be above a horizon: that of its middle, or half of the largest,
+/// of its top.
+#[inline]
+fn middling(middle: Vec4, top: Vec4) -> Vec4 {
+    middle.max(0.5 * top).clamp(Vec4::ZERO, Vec4::ONE)
 }
 
 /// Cosines and sines of four angles of 0 to π.
