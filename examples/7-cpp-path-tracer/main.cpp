@@ -1,8 +1,6 @@
 // A path tracer in C++ with threads of its own. They push tiles into a session, which says when to stop.
 //
-//     path-tracer [--blocks 16] [width height [out.pfm]]
-//
-// With --blocks, the blocks of a tile get samples by their need.
+//     path-tracer [width height [out.pfm]]
 #include <noisefloor.h>
 
 #include <algorithm>
@@ -81,53 +79,29 @@ static void check(NfStatus status) {
     if (status != NF_STATUS_OK) throw std::runtime_error(nf_last_error());
 }
 
-// What the blocks of a tile are to get, row by row; without --blocks, a tile is one block.
-struct Plan { NfBlocks layout; std::vector<NfBlockSamples> blocks; };
-
-static Plan plan(const NfSession *session, const NfParams &params, const NfRequest &request) {
-    if (params.blocks == 0) return {{params.tile, 1, 1}, {{request.first, request.spp}}};
-    std::size_t most = params.tile / params.blocks;
-    Plan plan = {{}, std::vector<NfBlockSamples>(most * most)};
-    check(nf_session_block_request(session, request.tile.index, request.spp, &plan.layout,
-                                   plan.blocks.data(), plan.blocks.size()));
-    plan.blocks.resize(plan.layout.columns * plan.layout.rows);
-    return plan;
-}
-
 // The mean of the new samples of each pixel of a tile, row by row.
-static std::vector<float> render(NfTile tile, const Plan &plan, std::size_t width, std::size_t height) {
+static std::vector<float> render(const NfRequest &request, std::size_t width, std::size_t height) {
+    NfTile tile = request.tile;
     std::vector<float> mean;
     for (std::size_t y = tile.y; y < tile.y + tile.height; ++y)
         for (std::size_t x = tile.x; x < tile.x + tile.width; ++x) {
-            std::size_t row = (y - tile.y) / plan.layout.edge, column = (x - tile.x) / plan.layout.edge;
-            NfBlockSamples samples = plan.blocks[row * plan.layout.columns + column];
             Vec sum = {0, 0, 0};
-            for (std::uint64_t n = samples.first; n < samples.first + samples.spp; ++n) {
+            for (std::uint64_t n = request.first; n < request.first + request.spp; ++n) {
                 Random random = {((y * width + x) << 32 | n) * 0xd1342543de82ef95};
                 float u = (x + random.next() - 0.5f * width) / height;
                 float v = (y + random.next()) / height - 0.5f;
                 sum = sum + radiance({0, 1.2f, -1}, unit({u, -v, 1.1f}), random);
             }
-            for (float c : {sum.x, sum.y, sum.z}) mean.push_back(c / samples.spp);
+            for (float c : {sum.x, sum.y, sum.z}) mean.push_back(c / request.spp);
         }
     return mean;
 }
 
-static void push(const NfSession *session, const NfParams &params, const NfRequest &request, const Plan &plan,
-                 const std::vector<float> &mean) {
-    std::size_t tile = request.tile.index;
-    check(params.blocks == 0
-              ? nf_session_push(session, tile, request.spp, mean.data(), mean.size())
-              : nf_session_push_blocks(session, tile, request.spp, plan.blocks.data(), plan.blocks.size(),
-                                       mean.data(), mean.size()));
-}
-
-static void run(std::size_t width, std::size_t height, std::uint32_t blocks, const char *file) {
+static void run(std::size_t width, std::size_t height, const char *file) {
     NfParams params;
     check(nf_params_default(&params));
     params.tile = 64;
     params.max_spp = 2000;
-    params.blocks = blocks;
     NfOracle *oracle;
     check(nf_oracle_bundled(0.9f, &oracle));
     std::unique_ptr<NfOracle, NfStatus (*)(NfOracle *)> oracle_owner(oracle, nf_oracle_free);
@@ -145,8 +119,8 @@ static void run(std::size_t width, std::size_t height, std::uint32_t blocks, con
         std::atomic<bool> failed = false;
         auto work = [&] {
             for (std::size_t i; (i = next++) < count && !failed;) try {
-                Plan planned = plan(session, params, requests[i]);
-                push(session, params, requests[i], planned, render(requests[i].tile, planned, width, height));
+                std::vector<float> mean = render(requests[i], width, height);
+                check(nf_session_push(session, requests[i].tile.index, requests[i].spp, mean.data(), mean.size()));
             } catch (const std::exception &error) {
                 std::fprintf(stderr, "%s\n", error.what());
                 failed = true;
@@ -177,12 +151,8 @@ static void run(std::size_t width, std::size_t height, std::uint32_t blocks, con
         check(nf_session_tile(session, i, &tile));
         const char *why = states[i].reason == NF_REASON_CONVERGED ? "converged" : "at the limit";
         auto spp = static_cast<unsigned long long>(states[i].spp);
-        auto least = static_cast<unsigned long long>(states[i].spp_least);
-        auto most = static_cast<unsigned long long>(states[i].spp_most);
-        std::printf("tile %2zu at (%3zu, %3zu): %s with %4llu samples per pixel, P = %.3f", i, tile.x,
+        std::printf("tile %2zu at (%3zu, %3zu): %s with %4llu samples per pixel, P = %.3f\n", i, tile.x,
                     tile.y, why, spp, static_cast<double>(states[i].probability));
-        if (blocks) std::printf(", blocks %llu to %llu", least, most);
-        std::printf("\n");
         samples += double(states[i].spp) * tile.width * tile.height;
     }
     std::printf("%.0f samples per pixel on average\n", samples / (width * height));
@@ -199,12 +169,9 @@ static void run(std::size_t width, std::size_t height, std::uint32_t blocks, con
 }
 
 int main(int argc, char **argv) try {
-    std::uint32_t blocks = 0;
-    if (argc >= 3 && std::string_view(argv[1]) == "--blocks")
-        blocks = std::strtoul(argv[2], nullptr, 10), argc -= 2, argv += 2;
     bool sized = argc >= 3;
     run(sized ? std::strtoul(argv[1], nullptr, 10) : 320, sized ? std::strtoul(argv[2], nullptr, 10) : 256,
-        blocks, argc >= 4 ? argv[3] : nullptr);
+        argc >= 4 ? argv[3] : nullptr);
 } catch (const std::exception &error) {
     std::fprintf(stderr, "error: %s\n", error.what());
     return 1;

@@ -21,27 +21,24 @@ fn header_of(whole: &[u8]) -> &[u8] {
 }
 
 pub(crate) fn shard(header: &[u8]) -> bool {
-    thread_local!(static BEFORE: (Folder, [Vec<u8>; 2]) = (Folder::new(), [written(0), written(16)]));
-    BEFORE.with(|(folder, wholes)| {
-        let all = [0, 16].into_iter().zip(wholes);
-        all.map(|(blocks, whole)| merge(folder, blocks, &wrap(whole, header))).sum::<u64>() > 0
-    })
+    thread_local!(static BEFORE: (Folder, Vec<u8>) = (Folder::new(), written()));
+    BEFORE.with(|(folder, whole)| merge(folder, &wrap(whole, header)) > 0)
 }
 
 /// Samples that come of a shard.
-fn merge(folder: &Folder, blocks: usize, bytes: &[u8]) -> u64 {
+fn merge(folder: &Folder, bytes: &[u8]) -> u64 {
     let path = folder.write("shard.nfs", bytes);
-    let mut session = session(blocks);
+    let mut session = session();
     let mut shards = ShardSet::gather(&job(&session), &[path]);
     shards.merge_into(&mut session).map_or(0, |merged| merged.samples)
 }
 
 pub(crate) fn shard_seeds() -> Vec<Vec<u8>> {
-    [0, 16].map(|blocks| header_of(&written(blocks)).to_vec()).into()
+    vec![header_of(&written()).to_vec()]
 }
 
-fn session(blocks: usize) -> Session<FixedSpp> {
-    let params = Params::default().with_tile(32).with_blocks(blocks);
+fn session() -> Session<FixedSpp> {
+    let params = Params::default().with_tile(32);
     Session::new(40, 32, FixedSpp(100), params).expect("a small picture")
 }
 
@@ -50,15 +47,12 @@ fn job(session: &Session<FixedSpp>) -> ShardJob {
 }
 
 /// A shard with samples for both tiles.
-fn written(blocks: usize) -> Vec<u8> {
-    let session = session(blocks);
+fn written() -> Vec<u8> {
+    let session = session();
     let mut shard = Shard::new(job(&session));
-    for PlannedBatch { tile, first, spp, .. } in PlannedBatch::ahead(&session) {
-        let place = session.film().grid().tile(tile);
-        // By blocks, so that mutants have some
-        let count = if blocks > 0 { place.width.div_ceil(blocks) * place.height.div_ceil(blocks) } else { 0 };
-        let batch = PlannedBatch { tile, first, spp, blocks: vec![(first, spp); count] };
-        shard.add(batch, spp, vec![[0.5; 3]; place.pixels()]);
+    for batch in PlannedBatch::ahead(&session) {
+        let (spp, pixels) = (batch.spp, session.film().grid().tile(batch.tile).pixels());
+        shard.add(batch, spp, vec![[0.5; 3]; pixels]);
     }
     let folder = Folder::new();
     let path = folder.write("new.nfs", "");
@@ -72,12 +66,10 @@ mod tests {
 
     #[test]
     fn seeds_are_merged() {
-        for blocks in [0, 16] {
-            let whole = written(blocks);
-            let again = wrap(&whole, header_of(&whole));
-            let planned: u64 = PlannedBatch::ahead(&session(blocks)).iter().map(|b| b.spp).sum();
-            // Two tiles of 32 and of 8 by 32 pixels, with as many samples per pixel
-            assert_eq!(merge(&Folder::new(), blocks, &again), planned / 2 * 40 * 32);
-        }
+        let whole = written();
+        let again = wrap(&whole, header_of(&whole));
+        let planned: u64 = PlannedBatch::ahead(&session()).iter().map(|b| b.spp).sum();
+        // Two tiles of 32 and of 8 by 32 pixels, with as many samples per pixel
+        assert_eq!(merge(&Folder::new(), &again), planned / 2 * 40 * 32);
     }
 }

@@ -77,7 +77,7 @@ impl ProgressiveSource for Rare {
 
     fn sample(&mut self, requests: &[Request]) -> Result<Vec<Batch>, SourceError> {
         let mut batches = Vec::new();
-        for &Request { tile, first, spp: samples } in requests {
+        for &Request { tile, first, spp: samples, .. } in requests {
             let mut state = self.seed ^ (first << 20) ^ ((tile.index as u64) << 50);
             let mut mean = vec![[0.0; 3]; tile.pixels()];
             let n = samples as f64;

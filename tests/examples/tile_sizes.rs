@@ -1,6 +1,5 @@
 //! What smaller tiles do: `tile_sizes [SCENE]…` renders built-in scenes with one model at tiles of 128, 64,
-//! 32 and 16 pixels, and prints a Markdown table of samples, agreement with tiles of 128, and seams. The last
-//! row has tiles of 128 whose blocks of 16 are sampled by their need, and seams between these.
+//! 32 and 16 pixels, and prints a Markdown table of samples, agreement with tiles of 128, and seams.
 #![allow(clippy::print_stdout, reason = "an example prints")]
 
 use ndarray::Array2;
@@ -14,8 +13,8 @@ use noisefloor_ptwne::{Ptwne, RenderOptions, scenes};
 use std::error::Error;
 
 const EDGE: usize = 256;
-/// Edges of the tiles, and of their blocks.
-const TILES: [(usize, usize); 5] = [(DEFAULT_TILE, 0), (64, 0), (32, 0), (16, 0), (DEFAULT_TILE, 16)];
+/// Edges of the tiles.
+const TILES: [usize; 4] = [DEFAULT_TILE, 64, 32, 16];
 /// The largest stop.
 const MOST: u64 = 2000;
 /// Samples of the picture that all others are held against.
@@ -46,13 +45,13 @@ fn measure(name: &str) -> Result<(), Box<dyn Error>> {
     let (even, also_even) = (even(3)?, even(4)?);
     let converged = converged.film().image();
     let mut at_128: Vec<f64> = Vec::new();
-    for (tile, blocks) in TILES {
-        let session = render(name, 1, Oracle::bundled(), (tile, blocks), MOST)?;
+    for tile in TILES {
+        let session = render(name, 1, Oracle::bundled(), tile, MOST)?;
         let display = *session.display().ok_or("no verdict was given")?;
         let mut spp = vec![0.0; EDGE * EDGE];
         for Stop { tile, .. } in session.stops() {
-            let samples = |pixel| session.film().samples_at(tile.index, pixel) as f64;
-            tile.rows(EDGE).flatten().for_each(|pixel| spp[pixel] = samples(pixel));
+            let samples = session.film().spp(tile.index) as f64;
+            tile.rows(EDGE).flatten().for_each(|pixel| spp[pixel] = samples);
         }
         if at_128.is_empty() {
             at_128.clone_from(&spp);
@@ -64,7 +63,7 @@ fn measure(name: &str) -> Result<(), Box<dyn Error>> {
 
         // Noise beside the borders against noise deeper in the tile; the same places of a picture without
         // borders take out what scene and geometry do.
-        let edges = borders(if blocks > 0 { blocks } else { tile }, &spp);
+        let edges = borders(tile, &spp);
         let energy = |image: &[Rgb]| noise_energy(image, &converged, &display);
         let (tiled, plain) = (energy(&session.film().image()), energy(&even));
         let seams = beside(&edges, &tiled) / beside(&edges, &plain);
@@ -72,8 +71,7 @@ fn measure(name: &str) -> Result<(), Box<dyn Error>> {
         let steps = edges.iter().map(|e| (spp[e.near] / spp[e.beyond]).ln().abs());
         let step = (0.5 * steps.sum::<f64>() / edges.len().max(1) as f64).exp();
         println!(
-            "| {name} | {tile}{} | {:.0} | {:+.0} % | {:.0} % | {:.2} | {seams:.2} | {chance:.2} | ×{step:.2} |",
-            if blocks > 0 { format!(", blocks of {blocks}") } else { String::new() },
+            "| {name} | {tile} | {:.0} | {:+.0} % | {:.0} % | {:.2} | {seams:.2} | {chance:.2} | ×{step:.2} |",
             total(&spp) / spp.len() as f64,
             100.0 * (total(&spp) / total(&at_128) - 1.0),
             100.0 * within as f64 / ratios.len() as f64,
@@ -87,16 +85,12 @@ fn render<C: StoppingCriterion>(
     name: &str,
     seed: u64,
     criterion: C,
-    (tile, blocks): (usize, usize),
+    tile: usize,
     max_spp: u64,
 ) -> Result<Session<C>, Box<dyn Error>> {
     let scene = scenes::by_name(name).ok_or_else(|| format!("no built-in scene {name:?}"))?;
     let source = Ptwne::new(scene, EDGE, EDGE, RenderOptions { seed, ..RenderOptions::default() })?;
-    let mut driver = Driver::new(
-        source,
-        criterion,
-        Params::default().with_tile(tile).with_blocks(blocks).with_max_spp(max_spp),
-    )?;
+    let mut driver = Driver::new(source, criterion, Params::default().with_tile(tile).with_max_spp(max_spp))?;
     driver.run(|_, _| ())?;
     Ok(driver.into_parts().1)
 }

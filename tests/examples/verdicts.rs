@@ -1,7 +1,7 @@
 //! When tiles are judged, and how early or late they stop by it: `verdicts SEEDS SCENE…` renders built-in
 //! scenes with many seeds, lets sessions with different schedules watch, and prints a Markdown table.
 //!
-//! What a tile needs is where half of all seeds are judged converged from, at every tenth sample. The
+//! What a tile needs is where half of all seeds are judged converged from, at every fourth sample. The
 //! sessions see the same samples, so that they differ in nothing but when they judge.
 #![allow(clippy::print_stdout, reason = "an example prints")]
 
@@ -16,7 +16,7 @@ use std::error::Error;
 const EDGE: usize = 128;
 const TILE: usize = 32;
 /// Samples of a step, half of them for either half.
-const STEP: u64 = 10;
+const STEP: u64 = 4;
 const MOST: u64 = 600;
 
 /// What is compared: a name, and what is set.
@@ -26,14 +26,11 @@ fn rules() -> Vec<(&'static str, Params)> {
     let fine = |min_spp, consecutive| params.with_min_spp(min_spp).with_consecutive(consecutive);
     vec![
         ("every 100", every(100)),
-        ("every 20", every(20)),
-        ("every 20, from 100", every(20).with_min_spp(100)),
-        ("every 10", every(10)),
-        ("every 10, from 50", every(10).with_min_spp(50)),
-        ("fine, from 20", fine(20, 1)),
-        ("fine, from 50", fine(50, 1)),
+        ("every 8", every(8)),
+        ("fine, from 16", fine(16, 1)),
+        ("fine, from 48", fine(48, 1)),
         ("fine, from 100", fine(100, 1)),
-        ("fine, from 50, two in a row", fine(50, 2)),
+        ("fine, from 16, two in a row", fine(16, 2)),
     ]
 }
 
@@ -132,10 +129,10 @@ fn watch(
     let mut onlooker = session(params.with_consecutive(u32::MAX))?;
     let tiles: Vec<Tile> = onlooker.film().grid().tiles().collect();
     for step in 0..(MOST / STEP) as usize {
-        for half in 0..2 {
-            let first = step as u64 * STEP + half * STEP / 2;
+        for _half in 0..2 {
+            let film = onlooker.film();
             let requests: Vec<Request> =
-                tiles.iter().map(|&tile| Request { tile, first, spp: STEP / 2 }).collect();
+                tiles.iter().map(|tile| film.request(tile.index, STEP / 2)).collect();
             for batch in source.sample(&requests)? {
                 for session in sessions.iter_mut().filter(|s| s.is_open(batch.tile.index)) {
                     session.push(batch.tile.index, batch.spp, &batch.mean)?;

@@ -122,9 +122,6 @@ typedef struct {
     uint64_t max_spp;
     // Verdicts in a row that must say "converged" before a tile stops, at least 1. Default: 1.
     uint32_t consecutive;
-    // Edge in pixels of the blocks of a tile that get samples by their need (nf_session_block_request): at
-    // least 16, and a divisor of tile; use 16 or 32. 0 (default) samples all of a tile alike.
-    uint32_t blocks;
     // How radiance is displayed: NF_TONE_REINHARD (default) or NF_TONE_SRGB. What people see depends on it.
     uint32_t tone_mapping;
     // For NF_TONE_REINHARD: what the log-average luminance becomes, above 0. Default: 0.18.
@@ -166,35 +163,17 @@ typedef struct {
     uint64_t first;
     // New samples per pixel. Fewer or more are fine.
     uint64_t spp;
+    // For quasi-random points: which sequence of the pixel the samples belong to, 0 or 1. Scramble the two
+    // independently.
+    uint32_t sequence;
+    // Index of the first new point in that sequence.
+    uint64_t point;
 } NfRequest;
-
-// How a tile is cut into blocks, which are counted in rows from the top left of the tile.
-typedef struct {
-    // Edge of a block in pixels; blocks of the last column and the last row may be smaller.
-    size_t edge;
-    // Blocks in a row.
-    size_t columns;
-    // Rows of blocks. The pixel (x, y) of the tile lies in block y / edge * columns + x / edge.
-    size_t rows;
-} NfBlocks;
-
-// What one block is to get.
-typedef struct {
-    // Samples per pixel that the block already has: the number of its first new one.
-    uint64_t first;
-    // New samples per pixel, at least 1.
-    uint64_t spp;
-} NfBlockSamples;
 
 // Where a tile stands.
 typedef struct {
-    // Samples per pixel, on average over the tile; if the tile is done, when it stopped.
+    // Samples per pixel; if the tile is done, when it stopped.
     uint64_t spp;
-    // The fewest samples per pixel that a block of the tile has now; those of the tile if NfParams.blocks is
-    // 0.
-    uint64_t spp_least;
-    // The most samples per pixel that a block of the tile has now.
-    uint64_t spp_most;
     // Samples per pixel at which the oracle expects the tile to be free of visible noise; 0 if it cannot
     // tell.
     uint64_t expected_spp;
@@ -314,39 +293,6 @@ NfStatus nf_session_push_image(const NfSession *session,
                                const float *image,
                                size_t floats,
                                size_t channels);
-
-// Spreads spp new samples per pixel of a tile over its blocks, for renderers that can give each block its own
-// number of samples. tile and spp are those of an NfRequest; as there, fewer or more samples are fine.
-//
-// layout becomes how the tile is cut, and blocks what each block is to get, row by row: spp on average over
-// the pixels of the tile, except for rounding. capacity says how many elements blocks has: columns * rows or
-// more. (tile / blocks)^2, of NfParams, are enough for every tile.
-//
-// Push the answer with nf_session_push_blocks. A renderer that cannot aim at blocks answers the request with
-// nf_session_push. NF_STATUS_UNAVAILABLE if NfParams.blocks is 0.
-NfStatus nf_session_block_request(const NfSession *session,
-                                  size_t tile,
-                                  uint64_t spp,
-                                  NfBlocks *layout,
-                                  NfBlockSamples *blocks,
-                                  size_t capacity);
-
-// Adds the samples that nf_session_block_request asked for with the same tile and spp: for each pixel of the
-// tile the mean of the new samples of its block, laid out as for nf_session_push. blocks is what was asked
-// for, unchanged, and count its number of elements: columns * rows. first is not read.
-//
-// Every pixel of the batch counts as spp samples, however many its block got. Do not weight the means
-// yourself: this is what keeps the picture free of bias.
-//
-// NF_STATUS_BATCH if these are not the numbers of samples that the session asks of these blocks. Judging a
-// tile changes them, so push what was asked for before that.
-NfStatus nf_session_push_blocks(const NfSession *session,
-                                size_t tile,
-                                uint64_t spp,
-                                const NfBlockSamples *blocks,
-                                size_t count,
-                                const float *mean,
-                                size_t floats);
 
 // Where all tiles stand, in their order, into an array for as many states as there are tiles (capacity says
 // how many).

@@ -26,7 +26,7 @@ impl ProgressiveSource for Callback {
     }
 
     fn sample(&mut self, requests: &[Request]) -> Result<Vec<Batch>, SourceError> {
-        let batch = |&Request { tile, first, spp }: &Request| {
+        let batch = |&Request { tile, first, spp, .. }: &Request| {
             let mut mean: Vec<Rgb> = vec![[0.0; 3]; tile.pixels()];
             // SAFETY: there is as much room as the function is told; the rest is its promise.
             let status = unsafe {

@@ -34,9 +34,6 @@ pub struct NfParams {
     pub max_spp: u64,
     /// Verdicts in a row that must say "converged" before a tile stops, at least 1. Default: 1.
     pub consecutive: u32,
-    /// Edge in pixels of the blocks of a tile that get samples by their need (nf_session_block_request): at
-    /// least 16, and a divisor of tile; use 16 or 32. 0 (default) samples all of a tile alike.
-    pub blocks: u32,
     /// How radiance is displayed: NF_TONE_REINHARD (default) or NF_TONE_SRGB. What people see depends on it.
     pub tone_mapping: u32,
     /// For NF_TONE_REINHARD: what the log-average luminance becomes, above 0. Default: 0.18.
@@ -64,8 +61,7 @@ pub unsafe extern "C" fn nf_params_default(params: *mut NfParams) -> NfStatus {
 
 impl Default for NfParams {
     fn default() -> Self {
-        let Params { tile, schedule, min_spp, max_spp, consecutive, audience, blocks, .. } =
-            Params::default();
+        let Params { tile, schedule, min_spp, max_spp, consecutive, audience, .. } = Params::default();
         let (schedule, step) = match schedule {
             Schedule::Every { step } => (NF_SCHEDULE_EVERY, step),
             Schedule::Spaced { step } => (NF_SCHEDULE_SPACED, step),
@@ -78,7 +74,6 @@ impl Default for NfParams {
             min_spp,
             max_spp,
             consecutive,
-            blocks: blocks as u32,
             tone_mapping: NF_TONE_REINHARD,
             key: noisefloor::display::DEFAULT_KEY,
             white: 0.0,
@@ -125,7 +120,6 @@ impl NfParams {
             .with_min_spp(self.min_spp)
             .with_max_spp(self.max_spp)
             .with_consecutive(self.consecutive)
-            .with_blocks(self.blocks as usize)
             .with_audience(Audience { slope: self.audience_slope, offset: self.audience_offset }))
     }
 }

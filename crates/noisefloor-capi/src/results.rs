@@ -24,13 +24,8 @@ pub const NF_REASON_FAILED: u32 = 5;
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct NfTileState {
-    /// Samples per pixel, on average over the tile; if the tile is done, when it stopped.
+    /// Samples per pixel; if the tile is done, when it stopped.
     pub spp: u64,
-    /// The fewest samples per pixel that a block of the tile has now; those of the tile if NfParams.blocks is
-    /// 0.
-    pub spp_least: u64,
-    /// The most samples per pixel that a block of the tile has now.
-    pub spp_most: u64,
     /// Samples per pixel at which the oracle expects the tile to be free of visible noise; 0 if it cannot
     /// tell.
     pub expected_spp: u64,
@@ -69,10 +64,7 @@ pub unsafe extern "C" fn nf_session_states(
         let locked = session.lock()?;
         for (tile, state) in room.iter_mut().enumerate() {
             let verdict = locked.verdict(tile);
-            let (spp_least, spp_most) = locked.film().spp_range(tile);
             *state = NfTileState {
-                spp_least,
-                spp_most,
                 spp: locked.film().spp(tile),
                 expected_spp: verdict.and_then(|v| v.expected_spp).unwrap_or(0),
                 probability: verdict.and_then(|v| v.probability).unwrap_or(f32::NAN),

@@ -45,6 +45,11 @@ pub struct NfRequest {
     pub first: u64,
     /// New samples per pixel. Fewer or more are fine.
     pub spp: u64,
+    /// For quasi-random points: which sequence of the pixel the samples belong to, 0 or 1. Scramble the two
+    /// independently.
+    pub sequence: u32,
+    /// Index of the first new point in that sequence.
+    pub point: u64,
 }
 
 impl NfSession {
@@ -143,8 +148,9 @@ pub unsafe extern "C" fn nf_session_requests(
         let wanted = session.lock()?.requests();
         // SAFETY: promised by the caller.
         unsafe { border::write(count, wanted.len(), "count") }?;
-        for (place, Request { tile, first, spp }) in room.iter_mut().zip(wanted) {
-            *place = NfRequest { tile: tile.into(), first, spp };
+        for (place, Request { tile, first, spp, sequence, .. }) in room.iter_mut().zip(wanted) {
+            let (sequence, point) = (sequence.number, sequence.first);
+            *place = NfRequest { tile: tile.into(), first, spp, sequence, point };
         }
         Ok(())
     })

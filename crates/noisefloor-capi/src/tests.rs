@@ -1,6 +1,5 @@
 //! The functions, called as C calls them.
 
-use crate::blocks::*;
 use crate::check::*;
 use crate::eyes::*;
 use crate::files::*;
@@ -14,7 +13,6 @@ use noisefloor::{Oracle, Params, Rgb, Session, Tile, criterion::CriterionError};
 use std::ffi::{CStr, CString, c_void};
 use std::ptr::{null, null_mut};
 
-mod blocks;
 #[cfg(target_os = "linux")]
 mod memory;
 
@@ -244,8 +242,6 @@ fn every_pointer_may_be_null_and_none_is_followed_then() {
             nf_session_push(null(), 0, 1, mean.as_ptr(), mean.len()),
             nf_session_push_running(null(), 0, 1, mean.as_ptr(), mean.len()),
             nf_session_push_image(null(), 0, 1, mean.as_ptr(), mean.len(), 3),
-            nf_session_block_request(null(), 0, 1, &mut NfBlocks::default(), null_mut(), 4),
-            nf_session_push_blocks(null(), 0, 1, null(), 4, mean.as_ptr(), mean.len()),
             nf_session_judge(null(), &mut n),
             nf_session_open_tiles(null(), &mut n),
             nf_session_states(null(), null_mut(), 0),
@@ -256,7 +252,7 @@ fn every_pointer_may_be_null_and_none_is_followed_then() {
             nf_session_save(null(), c"".as_ptr(), c"".as_ptr()),
             nf_session_resume(null(), c"".as_ptr(), c"".as_ptr()),
         ];
-        assert_eq!(without_session, [NullPointer; 16]);
+        assert_eq!(without_session, [NullPointer; 14]);
         let without_place = [
             nf_session_tile(s, 0, null_mut()),
             nf_session_requests(s, null_mut(), 9, &mut n),
@@ -329,10 +325,6 @@ fn sizes_tiles_and_parameters_are_checked() {
         assert_eq!(new(64, &NfParams { tone_mapping: 7, ..ok }), Argument);
         assert_eq!(new(64, &NfParams { key: f32::NAN, ..ok }), Argument);
         assert_eq!(new(64, &NfParams { step: 1, ..ok }), Argument);
-        for blocks in [1, 8, 24, 64, u32::MAX] {
-            assert_eq!(new(64, &NfParams { blocks, ..ok }), Argument);
-            assert!(message().starts_with(&format!("blocks of {blocks} pixels")), "{}", message());
-        }
         assert_eq!(new(64, &NfParams { viewing: c"moon".as_ptr(), ..ok }), Argument);
         nf_oracle_free(oracle);
     }

@@ -6,6 +6,7 @@ pub mod bars;
 pub mod end;
 pub mod files;
 pub mod folder;
+pub mod manual;
 pub mod options;
 pub mod say;
 pub mod signals;

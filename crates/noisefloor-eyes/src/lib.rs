@@ -212,6 +212,23 @@ impl Eyes {
         toml::from_str(text).map_err(|error| EyesError::Text(one_line(&error)))
     }
 
+    /// A file of one person.
+    ///
+    /// # Errors
+    /// [`EyesError::Text`] if a number or a text of it is out of range.
+    pub fn of(person: Person) -> Result<Self, EyesError> {
+        person.check().map_err(EyesError::Text)?;
+        Ok(Self(vec![person]))
+    }
+
+    /// The text of the file, as [`Eyes::parse`] reads it.
+    ///
+    /// # Errors
+    /// [`EyesError::Text`] if TOML cannot say it.
+    pub fn to_text(&self) -> Result<String, EyesError> {
+        toml::to_string(self).map_err(|error| EyesError::Text(error.to_string()))
+    }
+
     /// Puts a person into a file, which is made if it is not there, in place of whoever has the same name.
     /// The file changes as a whole or not at all.
     ///
@@ -226,7 +243,7 @@ impl Eyes {
         };
         people.retain(|other| other.name != person.name);
         people.push(person);
-        let text = toml::to_string(&Self(people)).map_err(|error| EyesError::Text(error.to_string()))?;
+        let text = Self(people).to_text()?;
         let write = || -> io::Result<()> {
             let folder = path.parent().filter(|f| !f.as_os_str().is_empty()).unwrap_or(Path::new("."));
             std::fs::create_dir_all(folder)?;
@@ -293,6 +310,8 @@ mod tests {
         assert_eq!(eyes.strictest().viewing().params().pixels_per_degree, 52.0);
         assert!(Eyes::keep(&path, person("", 1.0)).is_err() && Eyes::keep(&path, person("x", 1e9)).is_err());
         assert_eq!(Eyes::read(&path).unwrap(), eyes);
+        let text = Eyes::of(person("me", 1.25)).unwrap().to_text().unwrap();
+        assert_eq!(Eyes::parse(&text).unwrap().people(), [person("me", 1.25)]);
         // A file of something else stays
         std::fs::write(&path, "colour = 1").unwrap();
         assert!(Eyes::keep(&path, person("me", 1.0)).is_err());

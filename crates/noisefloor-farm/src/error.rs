@@ -11,12 +11,12 @@ use std::path::PathBuf;
 use thiserror::Error;
 
 /// Version of the format of shards.
-pub(crate) const VERSION: u32 = 3;
+pub(crate) const VERSION: u32 = 4;
 /// Longest header of a shard that is read: some 300,000 batches, or 50,000 with different samples in 100
 /// blocks each.
 pub(crate) const MAX_HEADER: u64 = 64 << 20;
 /// Version of the format of plans; the first one held words of a command line.
-pub(crate) const PLAN_VERSION: u64 = 3;
+pub(crate) const PLAN_VERSION: u64 = 4;
 
 /// Why a shard cannot be used.
 #[derive(Debug, Error)]
@@ -124,9 +124,6 @@ pub enum FarmError {
          `noisefloor render` renders it on one machine"
     )]
     Repeats(String),
-    /// The source cannot sample blocks.
-    #[error("{0} cannot sample blocks of a tile by their need: leave out --blocks")]
-    Blocks(String),
     /// A batch that no plan asks for.
     #[error(
         "the plan asks for {spp} samples of tile {tile} from sample {first} on, which no plan of a farm does: \

@@ -43,15 +43,12 @@ impl<S: Studio> Frame<'_, S> {
             );
             return Err(FarmError::Folder { path, what });
         }
-        let FrameSource { mut source, scene } = self.studio.open(&self.job)?;
+        let FrameSource { source, scene } = self.studio.open(&self.job)?;
         let (info, identity) = (source.info(), source.identity()?);
         if info.repeats != Repeats::Samples {
             return Err(FarmError::Repeats(info.name));
         }
         let session = self.session((info.width, info.height), identity.clone())?;
-        if session.params().blocks > 0 && source.sample_blocks(&[])?.is_none() {
-            return Err(FarmError::Blocks(info.name));
-        }
         if session.criterion().needs().reference {
             return Err(FarmError::Reference);
         }

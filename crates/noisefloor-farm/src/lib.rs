@@ -1,7 +1,7 @@
 //! A frame or a sequence over many machines.
 //!
-//! - A [`Shard`] is a file of batches, each the samples of one tile in one range, or in one range for each of
-//!   its blocks ([`PlannedBatch`]). It says which job they are of ([`ShardJob`]).
+//! - A [`Shard`] is a file of batches, each the samples of one tile in one range
+//!   ([`PlannedBatch`]). It says which job they are of ([`ShardJob`]).
 //! - [`sample`] takes the samples of a shard; [`split`] divides work into tasks of about equal length.
 //! - [`ShardSet`] merges shards into a [`Session`](noisefloor::Session), batch by batch as a
 //!   [`Driver`](noisefloor::Driver) on one machine would take them. So the film, every verdict and every stop

@@ -3,7 +3,7 @@
 use crate::batch::PlannedBatch;
 use crate::error::FarmError;
 use crate::shard::{BatchEntry, ShardFile, ShardJob};
-use noisefloor::{Request, Rgb, Session, StoppingCriterion, session::Interruption, source::BlockRequest};
+use noisefloor::{Request, Rgb, Session, StoppingCriterion, session::Interruption};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -133,14 +133,13 @@ impl ShardSet {
         while !session.is_done() {
             let before = merged.batches;
             for request in session.next_batches() {
-                let by_blocks = session.block_request(&request);
-                let Some((spp, mean)) = self.take(&request, by_blocks.as_ref()) else { continue };
+                let Some((spp, mean)) = self.take(&request) else { continue };
                 let tile = request.tile.index;
                 merged.batches += 1;
-                match &by_blocks {
-                    _ if spp == 0 => drop(session.close(tile, Interruption::SourceExhausted)),
-                    Some(by_blocks) => session.push_blocks(by_blocks, &mean)?,
-                    None => session.push(tile, spp, &mean)?,
+                if spp == 0 {
+                    session.close(tile, Interruption::SourceExhausted);
+                } else {
+                    session.push(tile, spp, &mean)?;
                 }
             }
             if session.is_round_complete() {
@@ -154,18 +153,11 @@ impl ShardSet {
         Ok(merged)
     }
 
-    /// The samples of a batch; none if it is not there, or damaged or spread over blocks in another way in
-    /// every file that has it.
-    fn take(&mut self, request: &Request, by_blocks: Option<&BlockRequest>) -> Option<(u64, Vec<Rgb>)> {
+    /// The samples of a batch; none if it is not there, or damaged in every file that has it.
+    fn take(&mut self, request: &Request) -> Option<(u64, Vec<Rgb>)> {
         let key = (request.tile.index, request.first, request.spp);
         while let Some(&(file, batch)) = self.index.get(&key).and_then(|places| places.first()) {
             let shard = &self.files[file];
-            if shard.by_blocks(&shard.batches()[batch]).as_ref() != by_blocks {
-                // Counts and shares of blocks follow from the samples before
-                let what = "is spread over the blocks in another way than in this job";
-                self.discard(file, format!("it belongs to another job: {} {what}", name(&key)));
-                continue;
-            }
             match shard.read(batch) {
                 Ok(mean) => {
                     self.merged.insert(key);

@@ -61,7 +61,7 @@ mod tests {
     fn every_batch_is_in_one_task_and_tasks_are_even() {
         let grid = TileGrid::new(1024, 512, 128).unwrap();
         let of_frame: Vec<PlannedBatch> =
-            (0..32).flat_map(|t| [PlannedBatch::even(t, 0, 50), PlannedBatch::even(t, 50, 50)]).collect();
+            (0..32).flat_map(|t| [PlannedBatch::new(t, 0, 50), PlannedBatch::new(t, 50, 50)]).collect();
         let all = vec![(grid, of_frame.clone()), (grid, of_frame)];
         for tasks in [1, 2, 3, 7, 20, 64, 1000] {
             let split = split(all.clone(), tasks);

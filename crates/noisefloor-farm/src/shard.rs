@@ -6,13 +6,12 @@
 //! merge reads only the batch it needs. Where blocks of a tile got different numbers of samples, it has
 //! these, too.
 
-use crate::batch::{PlannedBatch, by_blocks, fit};
+use crate::batch::PlannedBatch;
 use crate::error::{MAX_HEADER, ShardError, VERSION};
 use crate::file::open_regular;
 use noisefloor::{
-    ProgressiveSource, Request, Rgb, Session, SourceError, StoppingCriterion, Tile, TileGrid,
-    internal::Format,
-    source::{BlockRequest, SourceIdentity},
+    ProgressiveSource, Rgb, Session, SourceError, StoppingCriterion, Tile, TileGrid, internal::Format,
+    source::SourceIdentity,
 };
 use noisefloor_image::{WriteError, write_atomic};
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
@@ -36,9 +35,6 @@ pub struct ShardJob {
     pub height: usize,
     /// Edge of the tiles in pixels.
     pub tile: usize,
-    /// Edge of the blocks of a tile in pixels; 0 if all of a tile is sampled alike.
-    #[serde(default, skip_serializing_if = "is_zero")]
-    pub blocks: usize,
     /// Fingerprint of the criterion.
     pub criterion: String,
     /// Parameters of the session, as files keep them.
@@ -65,7 +61,6 @@ impl ShardJob {
             width: grid.width(),
             height: grid.height(),
             tile: params.tile,
-            blocks: params.blocks,
             criterion: session.criterion().fingerprint(),
             // None of them fails to be written
             params: serde_json::to_value(params).unwrap_or_default(),
@@ -94,7 +89,6 @@ impl ShardJob {
         let size = |job: &Self| format!("{}×{} in tiles of {}", job.width, job.height, job.tile);
         for (what, kept, now) in [
             ("picture", size(kept), size(self)),
-            ("edge of blocks", kept.blocks.to_string(), self.blocks.to_string()),
             ("criterion", kept.criterion.clone(), self.criterion.clone()),
         ] {
             if kept != now {
@@ -112,11 +106,6 @@ impl ShardJob {
     }
 }
 
-#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde calls it so")]
-fn is_zero(n: &usize) -> bool {
-    *n == 0
-}
-
 /// One batch of a shard.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct BatchEntry {
@@ -128,24 +117,15 @@ pub struct BatchEntry {
     pub asked: u64,
     /// Samples per pixel that the source gave; 0 if it has no more.
     pub spp: u64,
-    /// First sample and number of samples of each block; see [`PlannedBatch::blocks`].
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub blocks: Vec<(u64, u64)>,
     /// BLAKE3 of its pixels.
     digest: String,
 }
 
 impl BatchEntry {
-    /// Whether it can be a batch of these tiles, with blocks of this edge if that is not 0.
-    fn is_possible(&self, grid: &TileGrid, edge: usize) -> bool {
-        let &Self { tile, first, asked, spp, ref blocks, .. } = self;
-        let possible = |n: u64| n < 1 << 34;
-        tile < grid.len()
-            && [first, asked, spp].into_iter().all(possible)
-            && fit(grid.tile(tile), edge, blocks)
-            && blocks.iter().all(|&(first, spp)| possible(first) && possible(spp))
-            // Blocks get exactly what is asked for
-            && (edge == 0 || spp == 0 || spp == asked)
+    /// Whether it can be a batch of these tiles.
+    fn is_possible(&self, grid: &TileGrid) -> bool {
+        let &Self { tile, first, asked, spp, .. } = self;
+        tile < grid.len() && [first, asked, spp].into_iter().all(|n| n < 1 << 34)
     }
 }
 
@@ -202,9 +182,9 @@ impl Shard {
     /// Adds what came of `batch`: `spp` samples per pixel, as many as asked for or fewer, and none at the
     /// source's end; `mean` is row-major over the tile.
     pub fn add(&mut self, batch: PlannedBatch, spp: u64, mean: Vec<Rgb>) {
-        let PlannedBatch { tile, first, spp: asked, blocks } = batch;
+        let PlannedBatch { tile, first, spp: asked, .. } = batch;
         let digest = digest(&bytes(&mean));
-        self.header.batches.push(BatchEntry { tile, first, asked, spp, blocks, digest });
+        self.header.batches.push(BatchEntry { tile, first, asked, spp, digest });
         self.pixels.push(mean);
     }
 
@@ -270,7 +250,7 @@ impl ShardFile {
         let grid = header.job.grid()?;
         let (mut offsets, mut end) = (Vec::new(), begin);
         for entry in &header.batches {
-            if !entry.is_possible(&grid, header.job.blocks) {
+            if !entry.is_possible(&grid) {
                 return Err(ShardError::Damaged(format!(
                     "it has an impossible batch of tile {}",
                     entry.tile
@@ -319,18 +299,8 @@ impl ShardFile {
 
     /// Its samples, over all pixels.
     pub fn samples(&self) -> u64 {
-        let samples = |entry: &BatchEntry| match self.by_blocks(entry) {
-            Some(request) if entry.spp > 0 => request.samples(),
-            _ => entry.spp * self.grid.tile(entry.tile).pixels() as u64,
-        };
+        let samples = |entry: &BatchEntry| entry.spp * self.grid.tile(entry.tile).pixels() as u64;
         self.header.batches.iter().map(samples).sum()
-    }
-
-    /// What was asked for in a batch of this shard, block by block; none without blocks.
-    pub(crate) fn by_blocks(&self, entry: &BatchEntry) -> Option<BlockRequest> {
-        let &BatchEntry { tile, first, asked, ref blocks, .. } = entry;
-        let request = Request { tile: self.grid.tile(tile), first, spp: asked };
-        by_blocks(&request, self.header.job.blocks, blocks)
     }
 
     /// Its batches.

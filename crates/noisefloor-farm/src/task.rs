@@ -1,6 +1,6 @@
 //! Taking the samples of a shard.
 
-use crate::batch::{PlannedBatch, by_blocks, fit};
+use crate::batch::PlannedBatch;
 use crate::error::FarmError;
 use crate::shard::{Shard, ShardJob};
 use noisefloor::{Batch, ProgressiveSource, Request, SourceError, SourceInfo, Tile, watch::LightCheck};
@@ -19,23 +19,18 @@ const COUNTABLE: u64 = 1 << 34;
 /// into one call. A damaged plan must not keep a node busy for a year.
 ///
 /// [`Session::next_batches`]: noisefloor::Session::next_batches
-fn is_planned(batch: &PlannedBatch, tile: Tile, edge: usize) -> bool {
-    let &PlannedBatch { first, spp, ref blocks, .. } = batch;
+fn is_planned(batch: &PlannedBatch, tile: Tile) -> bool {
+    let &PlannedBatch { first, spp, sequence, point, .. } = batch;
     let pixels = tile.pixels() as u64;
-    // The largest share of a block is the number of blocks, and those at an edge are smaller
-    let most = 4 * CALL.max(pixels);
-    let block =
-        |&(first, spp): &(u64, u64)| first < COUNTABLE && spp.saturating_mul((edge * edge) as u64) <= most;
-    let even = spp > 0 && spp.saturating_mul(pixels) <= CALL.max(pixels);
-    even && first < COUNTABLE && fit(tile, edge, blocks) && blocks.iter().all(block)
+    let fits = spp > 0 && spp.saturating_mul(pixels) <= CALL.max(pixels);
+    fits && first < COUNTABLE && sequence < 2 && point <= first
 }
 
 /// Takes these batches from a source. Once `cancel` says so, it returns with what it has: that is a shard,
 /// too.
 ///
 /// # Errors [`FarmError::Edited`] if the source is not that of `job`, [`FarmError::Plan`] if no plan asks for
-/// such a batch, [`FarmError::Blocks`] if it cannot sample the blocks that the job has,
-/// [`FarmError::Source`] if it fails or breaks its contract, or a batch is no light.
+/// such a batch, [`FarmError::Source`] if it fails or breaks its contract, or a batch is no light.
 pub fn sample(
     source: &mut impl ProgressiveSource,
     job: ShardJob,
@@ -46,14 +41,13 @@ pub fn sample(
     let now = ShardJob { source: source.identity()?, width: info.width, height: info.height, ..job.clone() };
     now.check(&job).map_err(FarmError::Edited)?;
     let grid = job.grid().map_err(FarmError::Edited)?;
-    let edge = job.blocks;
     let mut wanted: Vec<Wanted<'_>> = Vec::new();
     for batch in batches {
         let &PlannedBatch { tile, first, spp, .. } = batch;
-        if tile >= grid.len() || !is_planned(batch, grid.tile(tile), edge) {
+        if tile >= grid.len() || !is_planned(batch, grid.tile(tile)) {
             return Err(FarmError::Plan { tile, first, spp });
         }
-        wanted.push((Request { tile: grid.tile(tile), first, spp }, batch));
+        wanted.push((batch.request(grid.tile(tile)), batch));
     }
     // So that different tiles share calls
     wanted.sort_by_key(|(request, _)| request.first);
@@ -62,13 +56,14 @@ pub fn sample(
     while !wanted.is_empty() && !cancel() {
         let call = next_call(&mut wanted);
         let began = Instant::now();
-        let given = ask(source, &call, edge)?;
+        let requests: Vec<Request> = call.iter().map(|(request, _)| *request).collect();
+        let given = source.sample(&requests)?;
         shard.add_seconds(began.elapsed().as_secs_f64());
         if given.len() != call.len() {
             return Err(broken(&info, format!("{} batches for {} requests", given.len(), call.len())));
         }
         for ((request, planned), batch) in call.into_iter().zip(given) {
-            check(&info, &request, edge, &batch)?;
+            check(&info, &request, &batch)?;
             let lit = if batch.spp == 0 { Ok(()) } else { light.check(&batch.mean) };
             lit.map_err(|error| broken(&info, format!("in tile {}, {error}", request.tile.index)))?;
             shard.add(planned.clone(), batch.spp, batch.mean);
@@ -77,29 +72,10 @@ pub fn sample(
     Ok(shard)
 }
 
-/// Asks for the batches of one call, block by block if the job has blocks of this edge.
-fn ask(
-    source: &mut impl ProgressiveSource,
-    call: &[Wanted<'_>],
-    edge: usize,
-) -> Result<Vec<Batch>, FarmError> {
-    if edge == 0 {
-        let requests: Vec<Request> = call.iter().map(|(request, _)| *request).collect();
-        return Ok(source.sample(&requests)?);
-    }
-    let requests = call.iter().filter_map(|(request, batch)| by_blocks(request, edge, &batch.blocks));
-    let given = source.sample_blocks(&requests.collect::<Vec<_>>())?;
-    given.ok_or_else(|| FarmError::Blocks(source.info().name))
-}
-
 /// Checks that a batch is of what was asked for.
-fn check(info: &SourceInfo, request: &Request, edge: usize, batch: &Batch) -> Result<(), FarmError> {
+fn check(info: &SourceInfo, request: &Request, batch: &Batch) -> Result<(), FarmError> {
     let pixels = if batch.spp == 0 { 0 } else { request.tile.pixels() };
-    let counted = match edge {
-        0 => batch.spp <= info.counts.most(request),
-        _ => batch.spp == request.spp || batch.spp == 0,
-    };
-    if counted && batch.tile == request.tile && batch.mean.len() == pixels {
+    if batch.spp <= info.counts.most(request) && batch.tile == request.tile && batch.mean.len() == pixels {
         return Ok(());
     }
     let (pixels, spp, index) = (batch.mean.len(), batch.spp, request.tile.index);

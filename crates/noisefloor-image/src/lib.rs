@@ -28,7 +28,7 @@
 //! // Played back, they are two batches: samples 1…10, and the 30 samples after them.
 //! let mut stack = StackSource::open(folder.path())?;
 //! let tile = TileGrid::new(16, 16, 16)?.tile(0);
-//! let batch = stack.sample(&[Request { tile, first: 10, spp: 100 }])?.remove(0);
+//! let batch = stack.sample(&[Request::new(tile, 10, 100)])?.remove(0);
 //! assert_eq!((batch.spp, batch.mean[0]), (30, [2.0; 3]));
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```

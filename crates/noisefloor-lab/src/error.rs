@@ -71,9 +71,6 @@ pub enum LabError {
     /// A plot could not be drawn.
     #[error("the plot cannot be drawn: {0}")]
     Plot(String),
-    /// The source cannot sample blocks of a tile by their need.
-    #[error("{0} cannot sample blocks of a tile by their need: leave blocks out, or choose another source")]
-    Blocks(String),
     /// The source gave no samples at all.
     #[error("the source gave no samples")]
     NoSamples,

@@ -48,7 +48,6 @@ class Mitsuba:
             "height": film["height"],
             "unit": "samples-per-pixel",
             "repeats": self.renderer.repeats,
-            "blocks": self.renderer.blocks,
             "warnings": warnings,
         }
 
@@ -204,12 +203,11 @@ def read_film(props, init, warnings):
 
 
 class Wavefront:
-    """All pixels of all tiles in one wavefront. Every sample has a random stream of its own, which follows from (seed, pixel, index of
-    the sample)."""
+    """All pixels of all tiles in one wavefront, with Owen-scrambled Sobol points (Burley 2020, "Practical Hash-based Owen
+    Scrambling"), two dimensions at a time. Scrambling and order follow from (seed, pixel, sequence, number of the draw): sequences
+    of one pixel are independent, and so are pixels."""
 
     repeats = "samples"
-    # Rectangles of any size in one call cost no more than one
-    blocks = True
 
     def __init__(self, mi, scene, sensor, integrator, film, seed):
         import drjit as dr
@@ -219,20 +217,48 @@ class Wavefront:
         self.scene, self.sensor, self.integrator, self.film = scene, sensor, integrator, film
         self.seed = np.uint64(seed)
 
-        class Streams(mi.Sampler):
+        class Points(mi.Sampler):
             """A sampler whose lanes are seeded one by one; Mitsuba's own number theirs."""
 
             def __init__(self):
                 super().__init__(mi.Properties())
-                self.rng = mi.PCG32()
+                self.key, self.index = mi.UInt64(0), mi.UInt32(0)
+
+            def place(self, active):
+                """The place of this draw in the sequence, shuffled, and a word to scramble it by."""
+                key = mix(self.key + mi.UInt64(GOLDEN), mi.UInt64)
+                self.key = dr.select(active, key, self.key)
+                word = mix(key ^ mi.UInt64(SECOND), mi.UInt64)
+                return shuffle(dr.brev(self.index), mi.UInt32(key)), mi.UInt32(word), mi.UInt32(word >> 32)
 
             def next_1d(self, active=True):
-                return self.rng.next_float32(mi.Bool(active))
+                place, first, _ = self.place(mi.Bool(active))
+                return unit(shuffle(dr.brev(place), first))
 
             def next_2d(self, active=True):
-                return mi.Point2f(self.next_1d(active), self.next_1d(active))
+                place, first, second = self.place(mi.Bool(active))
+                place = dr.brev(place)
+                return mi.Point2f(unit(shuffle(place, first)), unit(shuffle(pascal(place), second)))
 
-        self.sampler = Streams()
+        def shuffle(x, seed):
+            """The hash of Laine and Karras (2011) with Burley's constants: each bit changes by those below it."""
+            x = x + seed
+            for factor in (0x6C50B47C, 0xB82F1E52, 0xC7AFE638, 0x8D22F6E6):
+                x = x ^ (x * mi.UInt32(factor))
+            return x
+
+        def pascal(x):
+            """The generator matrix of Sobol's second dimension, Pascal's triangle modulo 2, is the fifth Kronecker power of one of
+            2 by 2."""
+            for shift, mask in ((1, 0x55555555), (2, 0x33333333), (4, 0x0F0F0F0F), (8, 0x00FF00FF), (16, 0x0000FFFF)):
+                x = x ^ ((x >> shift) & mi.UInt32(mask))
+            return x
+
+        def unit(x):
+            """In [0, 1), of the reversed bits."""
+            return mi.Float(dr.brev(x) >> 8) * (1 / (1 << 24))
+
+        self.sampler = Points()
 
     def sample(self, tiles):
         # Tiles that want equally many samples share wavefronts.
@@ -248,7 +274,7 @@ class Wavefront:
 
     def means(self, tiles, samples):
         np = self.np
-        x, y, first = (np.concatenate(column) for column in zip(*(self.pixels(tile) for tile in tiles)))
+        x, y, point, sequence = (np.concatenate(column) for column in zip(*(self.pixels(tile) for tile in tiles)))
         # Parts of samples and of pixels that fit a wavefront. Parts of samples depend on nothing but their number, so that
         # sums are the same in any company.
         part = min(samples, 1 << 12)
@@ -258,19 +284,19 @@ class Wavefront:
             some = slice(start, start + rows)
             for done in range(0, samples, part):
                 number = min(part, samples - done)
-                sums[some] += self.wavefront(x[some], y[some], first[some] + np.uint64(done), number)
+                sums[some] += self.wavefront(x[some], y[some], sequence[some], point[some] + np.uint64(done), number)
         means = (sums / samples).astype(np.float32)
         ends = np.cumsum([tile["width"] * tile["height"] for tile in tiles])
         return np.split(means, ends[:-1])
 
     def pixels(self, tile):
-        """Column and row of each pixel of a tile, row by row, and the index of its first sample."""
+        """Column and row of each pixel of a tile, row by row, index of its first point, and number of the sequence."""
         np = self.np
         y, x = np.mgrid[tile["y"] : tile["y"] + tile["height"], tile["x"] : tile["x"] + tile["width"]]
-        first = np.full(x.size, tile["first"], np.uint64)
-        return x.ravel().astype(np.uint32), y.ravel().astype(np.uint32), first
+        point, sequence = (np.full(x.size, tile[name], np.uint64) for name in ("point", "sequence"))
+        return x.ravel().astype(np.uint32), y.ravel().astype(np.uint32), point, sequence
 
-    def wavefront(self, x, y, first, samples):
+    def wavefront(self, x, y, sequence, point, samples):
         """Sums of this many samples of these pixels."""
         mi, dr, np = self.mi, self.dr, self.np
         # Opaque: numbers that were part of the kernel would have it compiled anew for every other.
@@ -284,29 +310,25 @@ class Wavefront:
 
         column_x, column_y = dr.gather(mi.UInt32, mi.UInt32(x), row), dr.gather(mi.UInt32, mi.UInt32(y), row)
         pixel = mix(y.astype(np.uint64) << np.uint64(32) | x.astype(np.uint64), np.uint64)
-        key = dr.gather(mi.UInt64, mi.UInt64(mix(pixel ^ self.seed, np.uint64)), row)
-        index = dr.gather(mi.UInt64, mi.UInt64(first), row) + mi.UInt64(begin)
+        pixel = mix(mix(pixel ^ self.seed, np.uint64) + sequence * np.uint64(GOLDEN), np.uint64)
+        key = dr.gather(mi.UInt64, mi.UInt64(pixel), row)
+        index = dr.gather(mi.UInt64, mi.UInt64(point), row) + mi.UInt64(begin)
 
         def one_more(done, sum):
-            self.seed_streams(key, index + mi.UInt64(done))
+            self.seed_points(key, index + mi.UInt64(done))
             return done + 1, sum + self.radiance(column_x, column_y)
 
         start = (mi.UInt32(0), mi.Color3f(0))
         _, sum = dr.while_loop(start, lambda done, sum: done < count, one_more)
         # What was drawn in the loop has no meaning outside of it.
-        self.sampler.rng = mi.PCG32()
+        self.seed_points(mi.UInt64(0), mi.UInt64(0))
         dr.eval(sum)
         runs = [channel.numpy().reshape(len(x), lanes) for channel in sum]
         return np.stack([run.sum(axis=1, dtype=np.float64) for run in runs], axis=-1)
 
-    def seed_streams(self, key, index):
-        """A stream for (seed, pixel, index of the sample). The mix is a bijection: no two samples of a pixel share a stream, and
-        those of different pixels do by chance, once in 2^127."""
-        mi = self.mi
-        state = mix(key + index * mi.UInt64(GOLDEN), mi.UInt64)
-        # Not by the constructor, which adds the number of the lane in a loop.
-        self.sampler.rng = mi.PCG32()
-        self.sampler.rng.seed(state, mix(state ^ mi.UInt64(SECOND), mi.UInt64))
+    def seed_points(self, key, index):
+        """Point `index` of the sequence with that key."""
+        self.sampler.key, self.sampler.index = key, self.mi.UInt32(index)
 
     def radiance(self, x, y):
         """What comes through a uniform place in each pixel: that is the box filter."""
@@ -336,7 +358,6 @@ class Scalar:
     before, by a seed that is worked out from them."""
 
     repeats = "calls"
-    blocks = False
 
     def __init__(self, mi, scene, sensor, integrator, film, seed):
         import numpy as np

@@ -7,18 +7,19 @@
 //! ```
 //!
 //! # What is rendered
-//! The scene as its XML file describes it, with a box filter, independent samples, and size and depth from
+//! The scene as its XML file describes it, with a box filter, and size and depth from
 //! the [`Job`] if given. Integrators that sample single rays are used as they are (`path`, `volpath`,
 //! `volpathmis`, `direct`, also inside `aov` and the like); others are replaced by `path`, with a warning.
 //! The first sensor is used.
 //!
 //! # Variants
-//! - [`Variant::Llvm`]: one wavefront over the pixels of all tiles of a call. Each sample has its own random
-//!   stream, which depends only on (seed, pixel, index): samples repeat however requests are cut. Needs
+//! - [`Variant::Llvm`]: one wavefront over the pixels of all tiles of a call. Samples are Owen-scrambled
+//!   Sobol points of the request's sequence, which depend only on seed, pixel, sequence and place in it: they
+//!   repeat however requests are cut. Needs
 //!   libLLVM 17 or newer, from `DRJIT_LIBLLVM_PATH` or else the newest in the usual places. Mitsuba refuses
 //!   version 14, and versions 15 and 16 crash it; without a newer one the scalar variant is used, with a
 //!   warning.
-//! - [`Variant::Scalar`]: tile by tile, as crop windows. The source repeats calls. Mitsuba numbers streams
+//! - [`Variant::Scalar`]: tile by tile, as crop windows, with independent samples. The source repeats calls. Mitsuba numbers streams
 //!   with 32 bits here, one per pixel and call: after 2³² of them (16,384 batches of a picture of 512×512
 //!   pixels) streams recur, in other places.
 

@@ -22,7 +22,7 @@ fn render(c: &mut Criterion) {
         group.bench_function(entry.name, |b| {
             b.iter(|| {
                 let requests: Vec<Request> =
-                    grid.tiles().map(|tile| Request { tile, first, spp: SAMPLES }).collect();
+                    grid.tiles().map(|tile| Request::new(tile, first, SAMPLES)).collect();
                 first += SAMPLES;
                 source.sample(&requests)
             });

@@ -53,7 +53,7 @@ fn row(scene: &Arc<Scene>, rounds: usize) -> Result<String, Box<dyn Error>> {
 fn seconds(source: &mut Ptwne, round: usize) -> Result<f64, Box<dyn Error>> {
     let first = round as u64 * SAMPLES;
     let tiles = TileGrid::new(SIZE, SIZE, 64)?.tiles();
-    let requests: Vec<Request> = tiles.map(|tile| Request { tile, first, spp: SAMPLES }).collect();
+    let requests: Vec<Request> = tiles.map(|tile| Request::new(tile, first, SAMPLES)).collect();
     let start = Instant::now();
     source.sample(&requests)?;
     Ok(start.elapsed().as_secs_f64())

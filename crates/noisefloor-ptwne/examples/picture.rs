@@ -24,7 +24,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         eprint!(", reference in {:.2} s", start.elapsed().as_secs_f64());
     } else {
         let tiles = TileGrid::new(size, size, 128)?.tiles();
-        let requests: Vec<Request> = tiles.map(|tile| Request { tile, first: 0, spp }).collect();
+        let requests: Vec<Request> = tiles.map(|tile| Request::new(tile, 0, spp)).collect();
         for batch in source.sample(&requests)? {
             for (row, values) in batch.tile.rows(size).zip(batch.mean.chunks(batch.tile.width)) {
                 image[row].copy_from_slice(values);

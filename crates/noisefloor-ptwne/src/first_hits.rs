@@ -5,7 +5,7 @@ use crate::filter::Filter;
 use crate::intersection::OpacityTest;
 use crate::math::{Ray, Vec3};
 use crate::rng::{Key, mix};
-use crate::sampler::{Sampler, Sampling};
+use crate::sampler::{Place, Sampler, Sampling};
 use crate::scene::Scene;
 use noisefloor::{Rgb, source::FirstHits};
 use rayon::prelude::*;
@@ -27,7 +27,7 @@ pub(crate) fn render(
     let pixel = |x: usize, y: usize, stack: &mut Stack| {
         let mut sums = (glam::DVec3::ZERO, glam::DVec3::ZERO);
         for k in 0..spp {
-            let mut sampler = Sampler::new(Sampling::Sobol, key, (y * width + x) as u64, k);
+            let mut sampler = Sampler::new(Sampling::Sobol, key, (y * width + x) as u64, Place::only(k));
             let [u, v, lens_u, lens_v] = sampler.four();
             let [dx, dy] = filter.offset([u, v]);
             let ray = lens.ray(x as f32 + dx, y as f32 + dy, [lens_u, lens_v]);

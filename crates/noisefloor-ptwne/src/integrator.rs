@@ -3,7 +3,7 @@
 use crate::accel::{Hit, Stack};
 use crate::bsdf;
 use crate::intersection::{Intersection, OpacityTest};
-use crate::light::{LightSample, Receiver};
+use crate::light::{LightSample, Prospect, Receiver};
 use crate::material::Bsdf;
 use crate::math::{self, DELTA, Frame, Ray, Vec3, power_heuristic};
 use crate::sampler::Sampler;
@@ -56,8 +56,8 @@ fn radiance<const OPACITY: bool>(
     stack: &mut Stack,
 ) -> Vec3 {
     let seed = if OPACITY { sampler.seed() } else { 0 };
-    let receiver = Receiver::diffuse(ray.origin, ray.dir);
-    Path::<OPACITY> { scene, settings, sampler, stack, seed, receiver }.radiance(ray)
+    let prospect = Prospect::unknown(Receiver::diffuse(ray.origin, ray.dir));
+    Path::<OPACITY> { scene, settings, sampler, stack, seed, prospect }.radiance(ray)
 }
 
 /// One path.
@@ -68,8 +68,8 @@ struct Path<'a, const OPACITY: bool> {
     stack: &'a mut Stack,
     /// Seed of opacity tests; another one for each ray.
     seed: u64,
-    /// The last surface that sampled a light.
-    receiver: Receiver,
+    /// Of the last surface that sampled a light.
+    prospect: Prospect,
 }
 
 /// A new direction, its weight f·cos θ / density, its density, and a number left over for Russian roulette.
@@ -165,7 +165,7 @@ impl<'a, const OPACITY: bool> Path<'a, OPACITY> {
     fn hit_weight(&self, pdf: f32, light: usize, light_pdf: f32) -> f32 {
         match self.settings.estimator {
             _ if pdf == DELTA => 1.0,
-            Estimator::Mis => power_heuristic(pdf, light_pdf * self.scene.lights.pmf(&self.receiver, light)),
+            Estimator::Mis => power_heuristic(pdf, light_pdf * self.scene.lights.pmf(&self.prospect, light)),
             Estimator::NextEvents => 0.0,
             Estimator::BruteForce => 1.0,
         }
@@ -209,8 +209,8 @@ impl<'a, const OPACITY: bool> Path<'a, OPACITY> {
             return Vec3::ZERO;
         }
         let [pick, u, v, more] = self.sampler.four();
-        self.receiver = receiver;
-        let Some((light, pmf)) = scene.lights.choose(&receiver, pick, more) else { return Vec3::ZERO };
+        self.prospect = scene.lights.prospect(receiver);
+        let Some((light, pmf)) = scene.lights.choose(&self.prospect, pick, more) else { return Vec3::ZERO };
         let (light, mut origin) = (&scene.lights.all[light], receiver.position);
         let sample = scene.sample_light(light, origin, [u, v, more]);
         let Some(LightSample { dir, distance, value, pdf, .. }) =

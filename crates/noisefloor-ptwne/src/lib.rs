@@ -16,7 +16,7 @@
 //! let scene = scenes::by_name("cornell-box").ok_or("no such scene")?;
 //! let mut source = Ptwne::new(scene, 64, 64, RenderOptions { seed: 7, ..RenderOptions::default() })?;
 //! let requests: Vec<_> =
-//!     TileGrid::new(64, 64, 32)?.tiles().map(|tile| Request { tile, first: 0, spp: 4 }).collect();
+//!     TileGrid::new(64, 64, 32)?.tiles().map(|tile| Request::new(tile, 0, 4)).collect();
 //! let batches = source.sample(&requests)?;
 //! assert!(batches.iter().all(|batch| batch.mean.len() == 32 * 32));
 //! # Ok::<(), Box<dyn std::error::Error>>(())

@@ -8,12 +8,12 @@ use crate::integrator::{Estimator, SampleRadiance, Settings, integrator};
 use crate::math::Vec3;
 use crate::reference::{self, ReferenceNoise, Watch};
 use crate::rng::Key;
-use crate::sampler::{Sampler, Sampling};
+use crate::sampler::{Place, Sampler, Sampling};
 use crate::scene::Scene;
 use noisefloor::{
     Batch, ProgressiveSource, Repeats, Request, Rgb, SourceError, SourceInfo, Tile, ToneMapping,
     display::Display,
-    source::{BlockRequest, BlockSamples, FirstHits, Reference, SourceIdentity},
+    source::{FirstHits, Reference, SourceIdentity},
 };
 use rayon::prelude::*;
 use serde::Serialize;
@@ -56,14 +56,14 @@ pub struct RenderOptions {
 
 impl Default for RenderOptions {
     /// Seed 0, paths of up to 65 segments, Russian roulette from the fifth, multiple importance sampling,
-    /// independent samples, a box filter, no clamping, the caller's threads.
+    /// Sobol points, a box filter, no clamping, the caller's threads.
     fn default() -> Self {
         Self {
             seed: 0,
             max_depth: 65,
             roulette: 5,
             estimator: Estimator::Mis,
-            sampling: Sampling::Independent,
+            sampling: Sampling::default(),
             filter: Filter::Box,
             clamp: None,
             threads: None,
@@ -205,8 +205,9 @@ impl Ptwne {
 
     /// Renders one row of a tile: the mean of the samples of each pixel.
     fn render_row(&self, lens: &Lens, job: Job<'_>) {
-        let Job { tile, counts, y, empty, out } = job;
+        let Job { request: Request { tile, first, spp, sequence }, y, empty, out } = job;
         let key = Key::new(self.options.seed);
+        let place = Place { sample: first, sequence };
         let RenderOptions { max_depth, roulette, estimator, sampling, filter, clamp, .. } = self.options;
         let settings = Settings { max_depth, roulette, estimator };
         let mut stack = self.scene.bvh.stack();
@@ -214,13 +215,9 @@ impl Ptwne {
         for (i, mean) in out.iter_mut().enumerate() {
             let x = tile.x + i;
             let pixel = (y * self.width + x) as u64;
-            let BlockSamples { first, spp } = match counts {
-                Counted::Alike(all) => all,
-                Counted::ByBlocks(request) => request.at(i, y - tile.y),
-            };
             let mut sum = glam::DVec3::ZERO;
             for k in 0..spp {
-                let mut sampler = Sampler::new(sampling, key, pixel, first.wrapping_add(k));
+                let mut sampler = Sampler::new(sampling, key, pixel, place.plus(k));
                 let [u, v, lens_u, lens_v] = sampler.four();
                 let [dx, dy] = filter.offset([u, v]);
                 let ray = lens.ray(x as f32 + dx, y as f32 + dy, [lens_u, lens_v]);
@@ -250,10 +247,9 @@ impl Ptwne {
         add(&self.tally.clamped, clamped);
     }
 
-    /// Renders batches of tiles, each with its number of samples.
-    fn render(&self, requests: Vec<(Tile, u64, Counted<'_>)>) -> Result<Vec<Batch>, SourceError> {
+    fn render(&self, requests: &[Request]) -> Result<Vec<Batch>, SourceError> {
         let (width, height) = (self.width, self.height);
-        for (tile, ..) in &requests {
+        for Request { tile, .. } in requests {
             let (right, bottom) = (tile.x.saturating_add(tile.width), tile.y.saturating_add(tile.height));
             if right > width || bottom > height {
                 return Err(self.fail(
@@ -262,7 +258,7 @@ impl Ptwne {
                 ));
             }
         }
-        let batch = |&(tile, spp, _): &(Tile, u64, Counted<'_>)| {
+        let batch = |&Request { tile, spp, .. }: &Request| {
             let pixels = if spp == 0 { 0 } else { tile.pixels() };
             Batch { tile, spp, mean: vec![[0.0; 3]; pixels] }
         };
@@ -270,12 +266,13 @@ impl Ptwne {
         // Rows of tiles are the jobs: so small that no thread waits long for the last one
         let lens = self.scene.lens(width, height);
         let jobs: Vec<Job<'_>> = requests
-            .into_iter()
+            .iter()
             .zip(&mut batches)
-            .flat_map(|((tile, _, counts), batch)| {
+            .flat_map(|(&request, batch)| {
+                let tile = request.tile;
                 let empty = self.is_empty(&lens, &tile);
                 let rows = batch.mean.chunks_mut(tile.width.max(1)).enumerate();
-                rows.map(move |(row, out)| Job { tile, counts, y: tile.y + row, empty, out })
+                rows.map(move |(row, out)| Job { request, y: tile.y + row, empty, out })
             })
             .collect();
         self.on_threads(|| jobs.into_par_iter().with_max_len(1).for_each(|job| self.render_row(&lens, job)));
@@ -298,7 +295,7 @@ impl Ptwne {
         let mut small =
             Self::new(self.scene.clone(), width, height, options).map_err(|e| self.fail(None, e))?;
         let tile = Tile { index: 0, x: 0, y: 0, width, height };
-        let batches = self.on_threads(|| small.sample(&[Request { tile, first: 0, spp: 8 }]))?;
+        let batches = self.on_threads(|| small.sample(&[Request::new(tile, 0, 8)]))?;
         Ok(ToneMapping::default().settle(&batches[0].mean))
     }
 
@@ -323,17 +320,9 @@ impl fmt::Debug for Ptwne {
     }
 }
 
-/// How many samples the pixels of a tile get.
-#[derive(Clone, Copy)]
-enum Counted<'a> {
-    Alike(BlockSamples),
-    ByBlocks(&'a BlockRequest),
-}
-
 /// A row of a tile to render.
 struct Job<'a> {
-    tile: Tile,
-    counts: Counted<'a>,
+    request: Request,
     y: usize,
     /// Whether the tile sees only the background.
     empty: bool,
@@ -358,17 +347,7 @@ impl ProgressiveSource for Ptwne {
     /// # Errors
     /// [`SourceError::Failed`] if a tile is partly outside the image.
     fn sample(&mut self, requests: &[Request]) -> Result<Vec<Batch>, SourceError> {
-        let alike = |&Request { tile, first, spp }: &Request| {
-            (tile, spp, Counted::Alike(BlockSamples { first, spp }))
-        };
-        self.render(requests.iter().map(alike).collect())
-    }
-
-    /// # Errors
-    /// [`SourceError::Failed`] if a tile is partly outside the image.
-    fn sample_blocks(&mut self, requests: &[BlockRequest]) -> Result<Option<Vec<Batch>>, SourceError> {
-        let by_blocks = requests.iter().map(|r| (r.tile, r.spp, Counted::ByBlocks(r)));
-        self.render(by_blocks.collect()).map(Some)
+        self.render(requests)
     }
 
     /// # Errors

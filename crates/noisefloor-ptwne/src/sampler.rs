@@ -1,6 +1,7 @@
 //! Where the random numbers of a path come from.
 
 use crate::rng::{GOLDEN, Key, Rng, mix};
+use noisefloor::source::Sequence;
 use serde::{Deserialize, Serialize};
 
 /// How the samples of a pixel are distributed.
@@ -8,13 +9,13 @@ use serde::{Deserialize, Serialize};
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum Sampling {
-    /// Independent samples. Their noise is that which people saw in the training data.
-    #[default]
+    /// Independent samples.
     Independent,
     /// Owen-scrambled Sobol points (Burley 2020, "Practical Hash-based Owen Scrambling"), four dimensions at
-    /// a time, scrambled and shuffled differently for each pixel. They have less noise, but the halves of a
-    /// pixel are no longer independent, and the bundled model has not seen such noise: see
-    /// `docs/accuracy.md` of the project.
+    /// a time, scrambled and shuffled differently for each pixel and each [`Sequence`]. So noise is white over
+    /// the pixels and independent between the halves, as of independent samples, and falls faster with their
+    /// number.
+    #[default]
     Sobol,
 }
 
@@ -32,15 +33,39 @@ pub(crate) enum Sampler {
 /// Length of a Sobol sequence. After it another one begins, with its own scrambling.
 const POINTS: u64 = 1 << 16;
 
+/// Which sample of a pixel: its index among all, and in its sequence.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Place {
+    pub(crate) sample: u64,
+    pub(crate) sequence: Sequence,
+}
+
+impl Place {
+    /// The sample after this one by `k`.
+    #[inline]
+    pub(crate) fn plus(self, k: u64) -> Self {
+        let Sequence { number, first } = self.sequence;
+        let first = first.wrapping_add(k);
+        Self { sample: self.sample.wrapping_add(k), sequence: Sequence { number, first } }
+    }
+
+    /// A sample of a pixel that has only one sequence.
+    pub(crate) fn only(sample: u64) -> Self {
+        Self { sample, sequence: Sequence { number: 0, first: sample } }
+    }
+}
+
 impl Sampler {
     #[inline]
-    pub(crate) fn new(sampling: Sampling, key: Key, pixel: u64, sample: u64) -> Self {
+    pub(crate) fn new(sampling: Sampling, key: Key, pixel: u64, place: Place) -> Self {
         match sampling {
-            Sampling::Independent => Self::Independent(Rng::new(key, pixel, sample)),
-            Sampling::Sobol => Self::Sobol {
-                index: (sample % POINTS) as u32,
-                seed: Rng::new(key, pixel, sample / POINTS).next(),
-            },
+            Sampling::Independent => Self::Independent(Rng::new(key, pixel, place.sample)),
+            Sampling::Sobol => {
+                let Sequence { number, first } = place.sequence;
+                // Odd numbers are the sequences of half B
+                let scrambling = 2 * (first / POINTS) + u64::from(number);
+                Self::Sobol { index: (first % POINTS) as u32, seed: Rng::new(key, pixel, scrambling).next() }
+            }
         }
     }
 
@@ -87,7 +112,7 @@ mod tests {
             let side = 1usize << k;
             let mut cells = vec![[0; 2]; side * side];
             for sample in 0..(side * side) as u64 {
-                let mut sampler = Sampler::new(Sampling::Sobol, key, 17, sample);
+                let mut sampler = Sampler::new(Sampling::Sobol, key, 17, Place::only(sample));
                 let mut point = sampler.four();
                 (0..set).for_each(|_| point = sampler.four());
                 for (plane, xy) in [[point[0], point[1]], [point[2], point[3]]].iter().enumerate() {
@@ -106,8 +131,8 @@ mod tests {
         let (key, n) = (Key::new(4), 1u64 << 16);
         let (mut pixels, mut fours) = (0.0, 0.0);
         for pixel in 0..n {
-            let mut one = Sampler::new(Sampling::Sobol, key, pixel, 5);
-            let mut other = Sampler::new(Sampling::Sobol, key, pixel + 1, 5);
+            let mut one = Sampler::new(Sampling::Sobol, key, pixel, Place::only(5));
+            let mut other = Sampler::new(Sampling::Sobol, key, pixel + 1, Place::only(5));
             let (a, b, c) = (one.four()[0], one.four()[0], other.four()[0]);
             fours += (f64::from(a) - 0.5) * (f64::from(b) - 0.5);
             pixels += (f64::from(a) - 0.5) * (f64::from(c) - 0.5);

@@ -40,6 +40,31 @@ impl Pixels<'_> {
     }
 }
 
+/// What the values of a picture are.
+#[derive(Clone, Copy)]
+pub(crate) enum Encoding {
+    /// Linear radiance.
+    Linear,
+    /// What screens show.
+    Srgb,
+}
+
+impl Encoding {
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::Linear => "linear",
+            Self::Srgb => "srgb",
+        }
+    }
+
+    fn named(name: &str) -> PyResult<Self> {
+        let known = [Self::Linear, Self::Srgb].into_iter().find(|encoding| encoding.name() == name);
+        known.ok_or_else(|| {
+            ParameterError::new_err(format!("{name:?} is no encoding: use \"linear\" or \"srgb\""))
+        })
+    }
+}
+
 /// A copy of a finished picture, which nobody changes while the interpreter is released.
 pub(crate) struct Picture {
     /// (width, height).
@@ -55,12 +80,9 @@ pub(crate) struct Picture {
 impl Picture {
     /// `encoding` is "linear" for floats, or "srgb" for floats from 0 to 1 and for 8 or 16 unsigned bits.
     pub(crate) fn new(object: &Bound<'_, PyAny>, encoding: &str) -> PyResult<Self> {
-        match encoding {
-            "linear" => Ok(Self::of(&object.extract()?, 0.0, |value| value)),
-            "srgb" => Self::of_display(object),
-            _ => Err(ParameterError::new_err(format!(
-                "{encoding:?} is no encoding: use \"linear\" or \"srgb\""
-            ))),
+        match Encoding::named(encoding)? {
+            Encoding::Linear => Ok(Self::of(&object.extract()?, 0.0, |value| value)),
+            Encoding::Srgb => Self::of_display(object),
         }
     }
 
@@ -123,10 +145,19 @@ fn floats<'py>(array: &Bound<'py, PyAny>) -> PyResult<PyReadonlyArray3<'py, f32>
 /// A new array of shape (height, width, 3), made of pixels without copying them.
 pub(crate) fn picture<'py>(
     py: Python<'py>,
-    (width, height): (usize, usize),
+    size: (usize, usize),
     pixels: Vec<Rgb>,
 ) -> PyResult<Bound<'py, PyArray3<f32>>> {
-    let shaped = Array3::from_shape_vec((height, width, 3), pixels.into_flattened());
+    array3(py, size, pixels.into_flattened())
+}
+
+/// The same of single values.
+pub(crate) fn array3<'py, T: numpy::Element>(
+    py: Python<'py>,
+    (width, height): (usize, usize),
+    values: Vec<T>,
+) -> PyResult<Bound<'py, PyArray3<T>>> {
+    let shaped = Array3::from_shape_vec((height, width, 3), values);
     Ok(shaped.map_err(|error| SizeError::new_err(error.to_string()))?.into_pyarray(py))
 }
 

@@ -18,7 +18,7 @@ struct Callback<'a, 'py> {
 }
 
 impl Callback<'_, '_> {
-    fn batch(&self, &Request { tile, first, spp }: &Request) -> PyResult<Batch> {
+    fn batch(&self, &Request { tile, first, spp, .. }: &Request) -> PyResult<Batch> {
         let mean = self.render.call1((PyTile::from(tile), first, spp))?;
         let mean = mean.extract::<Pixels<'_>>()?;
         let (width, height, pixels) = mean.get();

@@ -1,7 +1,7 @@
 //! Exceptions.
 
 use noisefloor_rivals::MetricError;
-use pyo3::exceptions::{PyException, PyOverflowError};
+use pyo3::exceptions::{PyException, PyOSError, PyOverflowError};
 use pyo3::prelude::*;
 use pyo3::{PyErr, create_exception};
 use std::path::Path;
@@ -68,6 +68,38 @@ impl Raise for noisefloor::SessionError {
             Self::Criterion(error) => error.raise(),
             Self::Fault(fault) => FaultError::new_err(fault.to_string()),
             other => ParameterError::new_err(other.to_string()),
+        }
+    }
+}
+
+impl Raise for noisefloor_eyes::EyesError {
+    fn raise(self) -> PyErr {
+        match &self {
+            Self::Io { path, source } => file_error(path, source),
+            other => ParameterError::new_err(other.to_string()),
+        }
+    }
+}
+
+impl Raise for noisefloor_image::PictureError {
+    fn raise(self) -> PyErr {
+        match &self {
+            Self::Io { path, source } => file_error(path, source),
+            _ => PictureError::new_err(self.to_string()),
+        }
+    }
+}
+
+impl Raise for noisefloor_image::WriteError {
+    fn raise(self) -> PyErr {
+        match &self {
+            Self::Folder { source, .. } => std::io::Error::new(source.kind(), self.to_string()).into(),
+            Self::Failed { source, .. } => {
+                let kind = source.downcast_ref().map_or(std::io::ErrorKind::Other, std::io::Error::kind);
+                std::io::Error::new(kind, self.to_string()).into()
+            }
+            Self::NotAFile { .. } => PyOSError::new_err(self.to_string()),
+            _ => PictureError::new_err(self.to_string()),
         }
     }
 }

@@ -1,9 +1,11 @@
 //! Whose eyes, as `noisefloor calibrate` has measured them.
 
-use crate::errors::{ParameterError, file_error};
+use crate::errors::Raise;
 use crate::params::PyViewing;
-use noisefloor_eyes::{Eyes, EyesError, Person};
+use crate::pickle::reduced;
+use noisefloor_eyes::{Eyes, Person};
 use pyo3::prelude::*;
+use pyo3::types::PyType;
 use std::path::PathBuf;
 
 /// What `noisefloor calibrate` has measured of somebody's eyes and display, from eyes():
@@ -52,6 +54,17 @@ impl PyEyes {
         PyViewing(self.0.viewing())
     }
 
+    /// What pickle makes it from: the text of a file.
+    #[classmethod]
+    fn _restore(_class: &Bound<'_, PyType>, text: &str) -> PyResult<Self> {
+        Ok(Self(Eyes::parse(text).map_err(Raise::raise)?.strictest().clone()))
+    }
+
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let text = Eyes::of(self.0.clone()).and_then(|eyes| eyes.to_text()).map_err(Raise::raise)?;
+        reduced::<Self>(py, (text,))
+    }
+
     fn __repr__(&self) -> String {
         format!("<Eyes of {}: {:.2} times the samples>", self.0.name, self.0.factor)
     }
@@ -70,9 +83,6 @@ pub(crate) fn eyes(path: Option<PathBuf>) -> PyResult<Option<PyEyes>> {
         Some(path) => Eyes::read(&path).map(Some),
         None => Eyes::own(),
     };
-    let eyes = read.map_err(|error| match &error {
-        EyesError::Io { path, source } => file_error(path, source),
-        other => ParameterError::new_err(other.to_string()),
-    })?;
+    let eyes = read.map_err(Raise::raise)?;
     Ok(eyes.map(|eyes| PyEyes(eyes.strictest().clone())))
 }

@@ -6,7 +6,8 @@
 //! - `params.rs`, `oracle.rs`, `verdicts.rs`, `session.rs`: the push session;
 //! - `check.rs`: the contract of a renderer;
 //! - `eyes.rs`: what `noisefloor calibrate` has measured;
-//! - `stills.rs`, `metrics.rs`: finished pictures;
+//! - `files.rs`, `stills.rs`, `metrics.rs`: finished pictures;
+//! - `pickle.rs`: how objects go to other processes;
 //! - `pool.rs`: threads that survive a fork.
 //!
 //! What takes long runs without the interpreter's lock. Its types never change, or stand behind a lock of
@@ -16,9 +17,11 @@ mod arrays;
 mod check;
 mod errors;
 mod eyes;
+mod files;
 mod metrics;
 mod oracle;
 mod params;
+mod pickle;
 mod pool;
 mod session;
 mod stills;
@@ -38,6 +41,8 @@ mod _noisefloor {
     #[pymodule_export]
     use crate::eyes::{PyEyes, eyes};
     #[pymodule_export]
+    use crate::files::{read, write};
+    #[pymodule_export]
     use crate::metrics::{PyMetrics, metrics};
     #[pymodule_export]
     use crate::oracle::PyOracle;
@@ -48,7 +53,7 @@ mod _noisefloor {
     #[pymodule_export]
     use crate::stills::{PyJudged, judge};
     #[pymodule_export]
-    use crate::verdicts::{PyBlocks, PyRequest, PyStop, PyTile, PyVerdict};
+    use crate::verdicts::{PyRequest, PyStop, PyTile, PyVerdict};
     use pyo3::prelude::*;
 
     #[pymodule_init]

@@ -3,17 +3,25 @@
 use crate::arrays::{Picture, plane};
 use crate::errors::{Raise, SizeError};
 use crate::params::{ViewingLike, tone_mapping};
+use crate::pickle::reduced;
 use crate::pool;
 use noisefloor::{ToneMapping, Viewing, display::Display};
-use noisefloor_rivals::metrics::{MetricMaps, MetricPair, MetricScores};
-use numpy::PyArray2;
+use noisefloor_rivals::{
+    DifferenceMap,
+    metrics::{MetricPair, MetricScores},
+};
+use numpy::{PyArray2, PyReadonlyArray2};
 use pyo3::prelude::*;
+use pyo3::types::PyType;
 
 /// How far a picture is from a reference.
 #[pyclass(frozen, name = "Metrics", module = "noisefloor")]
 pub(crate) struct PyMetrics {
     scores: MetricScores,
-    maps: MetricMaps,
+    /// JODs lost.
+    cvvdp: DifferenceMap,
+    /// FLIP.
+    flip: Option<DifferenceMap>,
 }
 
 #[pymethods]
@@ -50,14 +58,46 @@ impl PyMetrics {
 
     /// The JODs that ColorVideoVDP takes off at each pixel: float32 of shape (height, width).
     fn cvvdp_map<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f32>>> {
-        let map = &self.maps.cvvdp;
-        plane(py, (map.width, map.height), map.values.clone())
+        map(py, &self.cvvdp)
+    }
+
+    /// FLIP of each pixel, 0 to 1: float32 of shape (height, width); None without the feature "flip".
+    fn flip_map<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray2<f32>>>> {
+        self.flip.as_ref().map(|flip| map(py, flip)).transpose()
+    }
+
+    #[classmethod]
+    fn _restore(
+        _class: &Bound<'_, PyType>,
+        scores: (f64, Option<f64>, Option<f64>, Option<f64>, f64, f64),
+        cvvdp: PyReadonlyArray2<'_, f32>,
+        flip: Option<PyReadonlyArray2<'_, f32>>,
+    ) -> Self {
+        let (cvvdp_jod, flip_mean, butteraugli, butteraugli_norm3, psnr, rel_mse) = scores;
+        let scores =
+            MetricScores { cvvdp_jod, flip: flip_mean, butteraugli, butteraugli_norm3, psnr, rel_mse };
+        Self { scores, cvvdp: restored(&cvvdp), flip: flip.as_ref().map(restored) }
+    }
+
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let MetricScores { cvvdp_jod, flip, butteraugli, butteraugli_norm3, psnr, rel_mse } = self.scores;
+        let scores = (cvvdp_jod, flip, butteraugli, butteraugli_norm3, psnr, rel_mse);
+        reduced::<Self>(py, (scores, self.cvvdp_map(py)?, self.flip_map(py)?))
     }
 
     fn __repr__(&self) -> String {
         let MetricScores { cvvdp_jod, psnr, rel_mse, .. } = self.scores;
         format!("<noisefloor.Metrics: {cvvdp_jod:.3} JOD, {psnr:.2} dB, relMSE {rel_mse:.3e}>")
     }
+}
+
+fn map<'py>(py: Python<'py>, map: &DifferenceMap) -> PyResult<Bound<'py, PyArray2<f32>>> {
+    plane(py, (map.width, map.height), map.values.clone())
+}
+
+fn restored(map: &PyReadonlyArray2<'_, f32>) -> DifferenceMap {
+    let (map, (height, width)) = (map.as_array(), map.as_array().dim());
+    DifferenceMap { width, height, values: map.iter().copied().collect() }
 }
 
 /// Compares a picture with a reference, both of shape (height, width, 3): a Metrics.
@@ -106,5 +146,5 @@ fn measure(
     let (image, reference, size) = (&image.pixels, &reference.pixels, image.size);
     let pair = MetricPair { size, image, reference, display: &shown, viewing };
     let (scores, maps) = pair.measure().map_err(Raise::raise)?;
-    Ok(PyMetrics { scores, maps })
+    Ok(PyMetrics { scores, cvvdp: maps.cvvdp, flip: maps.flip })
 }

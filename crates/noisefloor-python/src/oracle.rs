@@ -1,8 +1,10 @@
 //! Oracles.
 
 use crate::errors::{Raise, file_error};
+use crate::pickle::reduced;
 use noisefloor::{Model, Oracle, StoppingCriterion, Threshold, evidence::Evidence};
 use pyo3::prelude::*;
+use pyo3::types::{PyBytes, PyType};
 use std::fs::File;
 use std::path::PathBuf;
 
@@ -53,6 +55,19 @@ impl PyOracle {
             Evidence::Reference => "reference",
             Evidence::Alone => "alone",
         }
+    }
+
+    /// What pickle makes it from in another process, which has no file of the model.
+    #[classmethod]
+    fn _restore(_class: &Bound<'_, PyType>, threshold: f32, model: &[u8]) -> PyResult<Self> {
+        let threshold = Threshold::new(threshold).map_err(Raise::raise)?;
+        Ok(Self(Oracle::new(Model::read(model).map_err(Raise::raise)?, threshold)))
+    }
+
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let mut model = Vec::new();
+        self.0.model().write(&mut model).map_err(Raise::raise)?;
+        reduced::<Self>(py, (self.threshold(), PyBytes::new(py, &model)))
     }
 
     fn __repr__(&self) -> String {

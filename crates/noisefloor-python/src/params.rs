@@ -3,6 +3,7 @@
 use crate::errors::{ParameterError, Raise, whole};
 use noisefloor::{Audience, Params, Schedule, ToneMapping, Viewing};
 use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyTuple};
 
 /// Viewing(conditions="desk") --
 ///
@@ -49,6 +50,10 @@ impl PyViewing {
         self.0.params().ambient
     }
 
+    fn __getnewargs__(&self) -> (String,) {
+        (self.0.to_string(),)
+    }
+
     fn __str__(&self) -> String {
         self.0.to_string()
     }
@@ -70,8 +75,6 @@ impl PyViewing {
 /// consecutive: verdicts in a row that must say "converged".
 /// audience: (slope, offset) of the line from thresholds of the training data to those of your viewers;
 ///     None is (1, 0).
-/// blocks: edge in pixels, 16 or 32, of the blocks of a tile that get samples by their need; 0 for none. See
-///     Session.blocks.
 ///
 /// Raises ParameterError if a value is out of range.
 #[pyclass(frozen, eq, name = "Params", module = "noisefloor", from_py_object)]
@@ -117,8 +120,8 @@ pub(crate) fn tone_mapping(name: &str, key: f32, white: Option<f32>, exposure: f
 impl PyParams {
     #[new]
     #[pyo3(signature = (*, tile = 128, tone_mapping = "reinhard", key = 0.18, white = None, exposure = 1.0,
-        viewing = None, schedule = "spaced", step = 10, min_spp = 100, max_spp = 10_000, consecutive = 1,
-        audience = None, blocks = 0))]
+        viewing = None, schedule = "spaced", step = 8, min_spp = 16, max_spp = 10_000, consecutive = 1,
+        audience = None))]
     #[expect(clippy::too_many_arguments, reason = "Python names them")]
     fn new(
         #[pyo3(from_py_with = whole)] tile: usize,
@@ -133,7 +136,6 @@ impl PyParams {
         #[pyo3(from_py_with = whole)] max_spp: u64,
         #[pyo3(from_py_with = whole)] consecutive: u32,
         audience: Option<(f64, f64)>,
-        #[pyo3(from_py_with = whole)] blocks: usize,
     ) -> PyResult<Self> {
         let schedule = match schedule {
             "every" => Schedule::Every { step },
@@ -152,8 +154,7 @@ impl PyParams {
             .with_min_spp(min_spp)
             .with_max_spp(max_spp)
             .with_consecutive(consecutive)
-            .with_audience(audience.map_or(Audience::TRAINED, |(slope, offset)| Audience { slope, offset }))
-            .with_blocks(blocks);
+            .with_audience(audience.map_or(Audience::TRAINED, |(slope, offset)| Audience { slope, offset }));
         params.check().map_err(Raise::raise)?;
         Ok(Self(params))
     }
@@ -182,31 +183,53 @@ impl PyParams {
         self.0.max_spp
     }
 
-    fn __repr__(&self) -> String {
+    fn __getnewargs_ex__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyTuple>, Bound<'py, PyDict>)> {
+        Ok((PyTuple::empty(py), self.arguments(py)?))
+    }
+
+    fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
+        let arguments = self.arguments(py)?.into_iter();
+        let arguments = arguments.map(|(name, value)| Ok(format!("{name}={}", value.repr()?)));
+        Ok(format!("Params({})", arguments.collect::<PyResult<Vec<_>>>()?.join(", ")))
+    }
+}
+
+impl PyParams {
+    /// What Python makes the same parameters from.
+    fn arguments<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let params = &self.0;
-        let tone = match params.tone_mapping {
-            ToneMapping::Reinhard { key, white: None } => format!("\"reinhard\", key={key}"),
-            ToneMapping::Reinhard { key, white: Some(white) } => {
-                format!("\"reinhard\", key={key}, white={white}")
+        let arguments = PyDict::new(py);
+        arguments.set_item("tile", params.tile)?;
+        match params.tone_mapping {
+            ToneMapping::Reinhard { key, white } => {
+                arguments.set_item("tone_mapping", "reinhard")?;
+                arguments.set_item("key", short(key))?;
+                arguments.set_item("white", white.map(short))?;
             }
-            ToneMapping::Srgb { exposure } => format!("\"srgb\", exposure={exposure}"),
-            other => format!("{other:?}"), // Python makes none
-        };
+            ToneMapping::Srgb { exposure } => {
+                arguments.set_item("tone_mapping", "srgb")?;
+                arguments.set_item("exposure", short(exposure))?;
+            }
+            other => arguments.set_item("tone_mapping", format!("{other:?}"))?, // Python makes none
+        }
+        arguments.set_item("viewing", params.viewing.to_string())?;
         let (schedule, step) = match params.schedule {
             Schedule::Every { step } => ("every", step),
             Schedule::Spaced { step } => ("spaced", step),
             Schedule::Growing { step } => ("growing", step),
         };
+        arguments.set_item("schedule", schedule)?;
+        arguments.set_item("step", step)?;
+        arguments.set_item("min_spp", params.min_spp)?;
+        arguments.set_item("max_spp", params.max_spp)?;
+        arguments.set_item("consecutive", params.consecutive)?;
         let Audience { slope, offset } = params.audience;
-        format!(
-            "Params(tile={}, tone_mapping={tone}, viewing={:?}, schedule={schedule:?}, step={step}, min_spp={}, \
-             max_spp={}, consecutive={}, audience=({slope}, {offset}), blocks={})",
-            params.tile,
-            params.viewing.to_string(),
-            params.min_spp,
-            params.max_spp,
-            params.consecutive,
-            params.blocks
-        )
+        arguments.set_item("audience", (slope, offset))?;
+        Ok(arguments)
     }
+}
+
+/// The double with the digits of a float: 0.18, not 0.18000000715255737. It is rounded to the same float.
+fn short(value: f32) -> f64 {
+    value.to_string().parse().unwrap_or(f64::from(value))
 }

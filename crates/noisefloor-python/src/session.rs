@@ -1,19 +1,22 @@
 //! The push session.
 
 use crate::arrays::{Pixels, picture, plane};
-use crate::errors::{CheckpointError, Error, ParameterError, Raise, SizeError, file_error, whole};
+use crate::errors::{Error, ParameterError, Raise, SizeError, file_error, whole};
 use crate::oracle::PyOracle;
 use crate::params::PyParams;
+use crate::pickle::reduced;
 use crate::pool;
-use crate::verdicts::{PyBlocks, PyRequest, PyStop, PyVerdict, TileLike};
+use crate::verdicts::{PyRequest, PyStop, PyVerdict, TileLike};
 use noisefloor::{
-    Checkpoint, Oracle, Params, Request, Rgb, Session, StopReason, Tile, TileGrid, session::Interruption,
-    source::PixelNoise,
+    Checkpoint, Oracle, Params, Rgb, Session, StopReason, Tile, TileGrid, checkpoint::CheckpointError,
+    session::Interruption, source::PixelNoise,
 };
+use noisefloor_image::{WriteError, write_atomic};
 use numpy::{PyArray2, PyArray3};
 use pyo3::exceptions::PyUserWarning;
 use pyo3::prelude::*;
 use pyo3::sync::MutexExt;
+use pyo3::types::{PyBytes, PyType};
 use std::ffi::CString;
 use std::fs::File;
 use std::io::BufReader;
@@ -28,18 +31,24 @@ use std::sync::{Mutex, MutexGuard};
 ///     chain: no warning says so then.
 ///
 /// Threads may call any method at any time; calls take turns. The interpreter's lock is released while
-/// judging.
+/// judging. A copy, or what pickle makes of a session elsewhere, is one that was saved and resumed: tiles that
+/// close_all ended are open in it.
 ///
 /// Raises SizeError if the picture or a tile has an impossible size.
 #[pyclass(frozen, name = "Session", module = "noisefloor")]
 pub(crate) struct PySession {
     session: Mutex<Session<Oracle>>,
     grid: TileGrid,
+    pixels: PixelNoise,
 }
 
 const BROKEN: &str = "the session cannot be used since an error inside the library";
 
 impl PySession {
+    fn made(session: Session<Oracle>, pixels: PixelNoise) -> PyResult<Self> {
+        Ok(Self { grid: session.film().grid(), session: Mutex::new(session), pixels })
+    }
+
     /// The session, for something short. Others may have the interpreter while this waits.
     fn attached(&self, py: Python<'_>) -> PyResult<MutexGuard<'_, Session<Oracle>>> {
         self.session.lock_py_attached(py).map_err(|_| Error::new_err(BROKEN))
@@ -98,11 +107,8 @@ impl PySession {
     ) -> PyResult<Self> {
         let oracle = oracle.map_or_else(Oracle::bundled, |oracle| oracle.0.clone());
         let params = params.map_or_else(Params::default, |params| params.0);
-        let mut session = Session::new(width, height, oracle, params).map_err(Raise::raise)?;
-        if shared_pixels {
-            session.set_pixels(PixelNoise::Shared);
-        }
-        Ok(Self { grid: session.film().grid(), session: Mutex::new(session) })
+        let pixels = noise(shared_pixels);
+        Self::made(fresh((width, height), oracle, params, pixels)?, pixels)
     }
 
     /// Width of the picture in pixels.
@@ -151,27 +157,6 @@ impl PySession {
         let tile = tile.of(self.grid)?;
         let pixels = self.batch(tile, &mean)?;
         self.attached(py)?.push(tile.index, spp, &pixels).map_err(Raise::raise)
-    }
-
-    /// What each pixel of a request is to get, for a renderer that can give some pixels more samples than
-    /// others: a Blocks, or None unless Params.blocks is set. Push what comes of it with push_blocks, before
-    /// anything else is pushed to the tile or judged. A renderer that cannot answers the request with push.
-    ///
-    /// Raises BatchError if the tile does not exist.
-    fn blocks(&self, py: Python<'_>, request: &PyRequest) -> PyResult<Option<PyBlocks>> {
-        let tile = TileLike::Tile(request.tile).of(self.grid)?;
-        let request = Request { tile, first: request.first, spp: request.spp };
-        Ok(self.attached(py)?.block_request(&request).map(PyBlocks))
-    }
-
-    /// Adds the means of the samples that Blocks.samples asked for.
-    ///
-    /// mean: array of shape (tile.height, tile.width, 3), for each pixel the mean of its own new samples.
-    ///
-    /// Raises SizeError if the shape is another, BatchError if the blocks are none of this session.
-    fn push_blocks(&self, py: Python<'_>, blocks: &PyBlocks, mean: Pixels<'_>) -> PyResult<()> {
-        let pixels = self.batch(blocks.0.tile, &mean)?;
-        self.attached(py)?.push_blocks(&blocks.0, &pixels).map_err(Raise::raise)
     }
 
     /// As push, for a renderer that keeps running means: the mean of all total samples per pixel so far. The
@@ -244,7 +229,7 @@ impl PySession {
     /// Raises BatchError if the tile does not exist.
     fn verdict(&self, py: Python<'_>, tile: TileLike) -> PyResult<Option<PyVerdict>> {
         let tile = tile.of(self.grid)?;
-        Ok(self.attached(py)?.verdict(tile.index).map(|verdict| PyVerdict::new(tile, verdict)))
+        Ok(self.attached(py)?.verdict(tile.index).map(|verdict| PyVerdict::of(tile, verdict)))
     }
 
     /// Ends every open tile for "time-limit", "cancelled" or "failed", and returns them as a list of Stop.
@@ -288,14 +273,13 @@ impl PySession {
         picture(py, self.size(), self.detached(py, |session| session.film().image())?)
     }
 
-    /// Samples of each pixel: uint64 of shape (height, width). Those of its block, where blocks have different
-    /// numbers; Stop.spp is the average of the tile.
+    /// Samples of each pixel: uint64 of shape (height, width).
     fn spp<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<u64>>> {
         let (session, width) = (self.attached(py)?, self.grid.width());
         let mut all = vec![0; width * self.grid.height()];
         for tile in self.grid.tiles() {
             for pixel in tile.rows(width).flatten() {
-                all[pixel] = session.film().samples_at(tile.index, pixel);
+                all[pixel] = session.film().spp(tile.index);
             }
         }
         plane(py, self.size(), all)
@@ -331,7 +315,35 @@ impl PySession {
     /// Raises OSError if the file cannot be read, CheckpointError if it is damaged or of another job; the
     /// session is then as it was.
     fn resume(&self, py: Python<'_>, path: PathBuf, job: &str) -> PyResult<()> {
-        self.detached(py, |session| resume(session, &path, job))?
+        self.detached(py, |session| resume(session, self.pixels, &path, job))?
+    }
+
+    /// What pickle makes it from: a checkpoint, in memory.
+    #[classmethod]
+    fn _restore(
+        _class: &Bound<'_, PyType>,
+        size: (usize, usize),
+        oracle: PyRef<'_, PyOracle>,
+        params: PyParams,
+        shared_pixels: bool,
+        checkpoint: &[u8],
+    ) -> PyResult<Self> {
+        let pixels = noise(shared_pixels);
+        let session = fresh(size, oracle.0.clone(), params.0, pixels)?;
+        let checkpoint = Checkpoint::read(checkpoint).map_err(Raise::raise)?;
+        Self::made(session.resume(PICKLED, checkpoint).map_err(Raise::raise)?, pixels)
+    }
+
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let mut kept = Vec::new();
+        let (oracle, params) = self
+            .detached(py, |session| {
+                session.checkpoint(PICKLED)?.write(&mut kept)?;
+                Ok((PyOracle(session.criterion().clone()), PyParams(*session.params())))
+            })?
+            .map_err(|error: CheckpointError| error.raise())?;
+        let shared_pixels = self.pixels == PixelNoise::Shared;
+        reduced::<Self>(py, (self.size(), oracle, params, shared_pixels, PyBytes::new(py, &kept)))
     }
 
     fn __repr__(&self) -> String {
@@ -340,31 +352,47 @@ impl PySession {
     }
 }
 
-fn save(session: &Session<Oracle>, path: &Path, job: &str) -> PyResult<()> {
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
-    // A file beside it takes its place once it is complete
-    let mut file = tempfile::NamedTempFile::new_in(folder.unwrap_or(Path::new(".")))
-        .map_err(|error| file_error(path, &error))?;
-    // No buffer: what is left in one when it is dropped fails without a word
-    let written = session.checkpoint(job).and_then(|checkpoint| checkpoint.write(&mut file));
-    written.map_err(|error| raise(path, error))?;
-    file.as_file().sync_all().map_err(|error| file_error(path, &error))?;
-    file.persist(path).map_err(|error| file_error(path, &error.error))?;
-    Ok(())
+/// The job of a session on its way to another process, which names none.
+const PICKLED: &str = "pickled";
+
+fn noise(shared: bool) -> PixelNoise {
+    if shared { PixelNoise::Shared } else { PixelNoise::Independent }
 }
 
-fn resume(session: &mut Session<Oracle>, path: &Path, job: &str) -> PyResult<()> {
+fn fresh(
+    (width, height): (usize, usize),
+    oracle: Oracle,
+    params: Params,
+    pixels: PixelNoise,
+) -> PyResult<Session<Oracle>> {
+    let mut session = Session::new(width, height, oracle, params).map_err(Raise::raise)?;
+    session.set_pixels(pixels);
+    Ok(session)
+}
+
+fn save(session: &Session<Oracle>, path: &Path, job: &str) -> PyResult<()> {
+    let checkpoint = session.checkpoint(job).map_err(Raise::raise)?;
+    write_atomic(path, |writer| checkpoint.write(writer)).map_err(|error| match error {
+        WriteError::Failed { path, source } => match source.downcast() {
+            Ok(error) => raise(&path, *error),
+            Err(source) => WriteError::Failed { path, source }.raise(),
+        },
+        other => other.raise(),
+    })
+}
+
+fn resume(session: &mut Session<Oracle>, pixels: PixelNoise, path: &Path, job: &str) -> PyResult<()> {
     let file = File::open(path).map_err(|error| file_error(path, &error))?;
     let checkpoint = Checkpoint::read(BufReader::new(file)).map_err(|error| raise(path, error))?;
     let grid = session.film().grid();
-    let fresh = Session::new(grid.width(), grid.height(), session.criterion().clone(), *session.params());
-    *session = fresh.map_err(Raise::raise)?.resume(job, checkpoint).map_err(|error| raise(path, error))?;
+    let fresh = fresh((grid.width(), grid.height()), session.criterion().clone(), *session.params(), pixels)?;
+    *session = fresh.resume(job, checkpoint).map_err(|error| raise(path, error))?;
     Ok(())
 }
 
-fn raise(path: &Path, error: noisefloor::checkpoint::CheckpointError) -> PyErr {
+fn raise(path: &Path, error: CheckpointError) -> PyErr {
     match error {
-        noisefloor::checkpoint::CheckpointError::Io(error) => file_error(path, &error),
-        other => CheckpointError::new_err(other.to_string()),
+        CheckpointError::Io(error) => file_error(path, &error),
+        other => other.raise(),
     }
 }

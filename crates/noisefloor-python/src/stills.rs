@@ -4,6 +4,7 @@ use crate::arrays::{Picture, plane};
 use crate::errors::{CriterionError, ParameterError, PictureError, Raise};
 use crate::oracle::PyOracle;
 use crate::params::PyParams;
+use crate::pickle::reduced;
 use crate::pool;
 use crate::verdicts::PyVerdict;
 use noisefloor::{
@@ -11,8 +12,9 @@ use noisefloor::{
     evidence::{Evidence, Samples},
     stills::{SnapshotPair, Still},
 };
-use numpy::PyArray2;
+use numpy::{PyArray2, PyReadonlyArray2};
 use pyo3::prelude::*;
+use pyo3::types::PyType;
 
 /// What judge() found out about a picture.
 #[pyclass(frozen, name = "Judged", module = "noisefloor")]
@@ -45,6 +47,22 @@ impl PyJudged {
     fn visible_noise<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray2<f32>>>> {
         self.visible_noise.clone().map(|map| plane(py, self.size, map)).transpose()
     }
+
+    #[classmethod]
+    fn _restore(
+        _class: &Bound<'_, PyType>,
+        size: (usize, usize),
+        verdicts: Vec<PyVerdict>,
+        samples: &str,
+        visible_noise: Option<PyReadonlyArray2<'_, f32>>,
+    ) -> PyResult<Self> {
+        let visible_noise = visible_noise.map(|map| map.as_array().iter().copied().collect());
+        Ok(Self { size, verdicts, samples: sharing(samples)?, visible_noise })
+    }
+
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        reduced::<Self>(py, (self.size, self.verdicts(), self.samples(), self.visible_noise(py)?))
+    }
 }
 
 /// Judges a picture by another rendering of the same view: a Judged with a verdict for each tile.
@@ -74,20 +92,22 @@ pub(crate) fn judge(
     params: Option<PyParams>,
     encoding: &str,
 ) -> PyResult<PyJudged> {
-    let samples = match samples {
-        None => None,
-        Some("independent") => Some(Samples::Independent),
-        Some("nested") => Some(Samples::Nested),
-        Some(other) => {
-            let message = format!("samples are \"independent\" or \"nested\", not {other:?}");
-            return Err(ParameterError::new_err(message));
-        }
-    };
+    let samples = samples.map(sharing).transpose()?;
     let oracle = oracle.map_or_else(Oracle::bundled, |oracle| oracle.0.clone());
     let params = params.map_or_else(Params::default, |params| params.0);
     let still = |array, spp, what| still(Picture::new(array, encoding)?, spp, what);
     let (image, other) = (still(image, spp, "image")?, still(against, against_spp, "against")?);
     py.detach(|| pool::run(|| judge_still(&oracle, &params, &image, &other, samples)))
+}
+
+fn sharing(name: &str) -> PyResult<Samples> {
+    match name {
+        "independent" => Ok(Samples::Independent),
+        "nested" => Ok(Samples::Nested),
+        other => {
+            Err(ParameterError::new_err(format!("samples are \"independent\" or \"nested\", not {other:?}")))
+        }
+    }
 }
 
 fn still(picture: Picture, spp: f64, what: &str) -> PyResult<Still> {
@@ -120,7 +140,7 @@ fn judge_still(
     };
     Ok(PyJudged {
         size: image.size,
-        verdicts: grid.tiles().zip(verdicts).map(|(tile, verdict)| PyVerdict::new(tile, verdict)).collect(),
+        verdicts: grid.tiles().zip(verdicts).map(|(tile, verdict)| PyVerdict::of(tile, verdict)).collect(),
         samples: pair.samples(),
         visible_noise: visible_noise.map_err(Raise::raise)?,
     })

@@ -1,17 +1,14 @@
-//! What a session says: tiles, requests, verdicts, stops.
+//! What a session says: tiles, requests, verdicts, stops. Other processes get them pickled, and make them.
 
-use crate::arrays::plane;
-use crate::errors::BatchError;
-use noisefloor::{
-    Request, Stop, Tile, TileGrid, Verdict,
-    source::{BlockRequest, BlockSamples},
-};
-use numpy::PyArray2;
+use crate::errors::{BatchError, whole};
+use noisefloor::{Request, Stop, Tile, TileGrid, Verdict};
 use pyo3::exceptions::PyOverflowError;
 use pyo3::prelude::*;
 
+/// Tile(index, x, y, width, height) --
+///
 /// A rectangle of pixels that stops as a whole.
-#[pyclass(frozen, eq, hash, get_all, name = "Tile", module = "noisefloor")]
+#[pyclass(frozen, eq, hash, get_all, name = "Tile", module = "noisefloor", from_py_object)]
 #[derive(Clone, Copy, PartialEq, Eq, Hash)]
 pub(crate) struct PyTile {
     /// Its number, in rows from the top left.
@@ -28,6 +25,21 @@ pub(crate) struct PyTile {
 
 #[pymethods]
 impl PyTile {
+    #[new]
+    fn new(
+        #[pyo3(from_py_with = whole)] index: usize,
+        #[pyo3(from_py_with = whole)] x: usize,
+        #[pyo3(from_py_with = whole)] y: usize,
+        #[pyo3(from_py_with = whole)] width: usize,
+        #[pyo3(from_py_with = whole)] height: usize,
+    ) -> Self {
+        Self { index, x, y, width, height }
+    }
+
+    fn __getnewargs__(&self) -> (usize, usize, usize, usize, usize) {
+        (self.index, self.x, self.y, self.width, self.height)
+    }
+
     /// The slices that cut the tile out of an array of the whole picture: image[tile.slices].
     #[getter]
     fn slices<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
@@ -40,6 +52,12 @@ impl PyTile {
     fn __repr__(&self) -> String {
         let Self { index, x, y, width, height } = self;
         format!("Tile(index={index}, x={x}, y={y}, width={width}, height={height})")
+    }
+}
+
+impl From<PyTile> for Tile {
+    fn from(PyTile { index, x, y, width, height }: PyTile) -> Self {
+        Self { index, x, y, width, height }
     }
 }
 
@@ -100,9 +118,11 @@ impl TileLike {
     }
 }
 
+/// Request(tile, first, spp) --
+///
 /// What an open tile needs next.
-#[pyclass(frozen, get_all, name = "Request", module = "noisefloor")]
-#[derive(Clone, Copy)]
+#[pyclass(frozen, eq, hash, get_all, name = "Request", module = "noisefloor")]
+#[derive(Clone, Copy, PartialEq, Eq, Hash)]
 pub(crate) struct PyRequest {
     /// The tile.
     pub(crate) tile: PyTile,
@@ -110,69 +130,51 @@ pub(crate) struct PyRequest {
     pub(crate) first: u64,
     /// New samples per pixel. Fewer or more are fine.
     pub(crate) spp: u64,
+    /// For quasi-random points: which sequence of the pixel the samples belong to, 0 or 1. Scramble the two
+    /// independently.
+    pub(crate) sequence: u32,
+    /// Index of the first new point in that sequence.
+    pub(crate) point: u64,
 }
 
 #[pymethods]
 impl PyRequest {
+    #[new]
+    fn new(
+        tile: PyTile,
+        #[pyo3(from_py_with = whole)] first: u64,
+        #[pyo3(from_py_with = whole)] spp: u64,
+        #[pyo3(from_py_with = whole)] sequence: u32,
+        #[pyo3(from_py_with = whole)] point: u64,
+    ) -> Self {
+        Self { tile, first, spp, sequence, point }
+    }
+
+    fn __getnewargs__(&self) -> (PyTile, u64, u64, u32, u64) {
+        (self.tile, self.first, self.spp, self.sequence, self.point)
+    }
+
     fn __repr__(&self) -> String {
-        format!("Request(tile={}, first={}, spp={})", self.tile.__repr__(), self.first, self.spp)
+        let Self { tile, first, spp, sequence, point } = self;
+        format!(
+            "Request(tile={}, first={first}, spp={spp}, sequence={sequence}, point={point})",
+            tile.__repr__()
+        )
     }
 }
 
 impl From<Request> for PyRequest {
-    fn from(Request { tile, first, spp }: Request) -> Self {
-        Self { tile: tile.into(), first, spp }
+    fn from(Request { tile, first, spp, sequence, .. }: Request) -> Self {
+        Self { tile: tile.into(), first, spp, sequence: sequence.number, point: sequence.first }
     }
 }
 
-/// What each pixel of a tile is to get, where Params.blocks is set; made by Session.blocks.
-#[pyclass(frozen, name = "Blocks", module = "noisefloor")]
-pub(crate) struct PyBlocks(pub(crate) BlockRequest);
-
-#[pymethods]
-impl PyBlocks {
-    /// The tile.
-    #[getter]
-    fn tile(&self) -> PyTile {
-        self.0.tile.into()
-    }
-
-    /// New samples per pixel, on average over the tile.
-    #[getter]
-    fn spp(&self) -> u64 {
-        self.0.spp
-    }
-
-    /// Number of the first new sample of each pixel: uint64 of shape (tile.height, tile.width).
-    fn first<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<u64>>> {
-        self.plane(py, |samples| samples.first)
-    }
-
-    /// New samples of each pixel, at least 1: uint64 of shape (tile.height, tile.width).
-    fn samples<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<u64>>> {
-        self.plane(py, |samples| samples.spp)
-    }
-
-    fn __repr__(&self) -> String {
-        format!("Blocks(tile={}, spp={}, edge={})", self.tile().__repr__(), self.0.spp, self.0.edge)
-    }
-}
-
-impl PyBlocks {
-    fn plane<'py>(
-        &self,
-        py: Python<'py>,
-        value: impl Fn(BlockSamples) -> u64,
-    ) -> PyResult<Bound<'py, PyArray2<u64>>> {
-        let Tile { width, height, .. } = self.0.tile;
-        let values = (0..width * height).map(|at| value(self.0.at(at % width, at / width)));
-        plane(py, (width, height), values.collect())
-    }
-}
+/// The 10 %, 50 % and 90 % points of a threshold, in samples per pixel.
+type Points = (u64, u64, u64);
 
 /// What the oracle says about one tile.
-#[pyclass(frozen, get_all, name = "Verdict", module = "noisefloor")]
-#[derive(Clone, Copy)]
+#[pyclass(frozen, eq, get_all, name = "Verdict", module = "noisefloor", from_py_object)]
+#[derive(Clone, Copy, PartialEq)]
 pub(crate) struct PyVerdict {
     /// The tile.
     tile: PyTile,
@@ -184,13 +186,30 @@ pub(crate) struct PyVerdict {
     expected_spp: Option<u64>,
     /// Where people are expected to stop seeing noise, in samples per pixel: the 10 %, 50 % and 90 % points.
     /// ``expected_spp`` is where the tile stops, which is later.
-    threshold: Option<(u64, u64, u64)>,
+    threshold: Option<Points>,
     /// Whether the tile is unlike all that the model was trained on: treat the verdict with care.
     unfamiliar: bool,
 }
 
 #[pymethods]
 impl PyVerdict {
+    #[new]
+    fn new(
+        tile: PyTile,
+        converged: bool,
+        probability: Option<f32>,
+        expected_spp: Option<u64>,
+        threshold: Option<Points>,
+        unfamiliar: bool,
+    ) -> Self {
+        Self { tile, converged, probability, expected_spp, threshold, unfamiliar }
+    }
+
+    fn __getnewargs__(&self) -> (PyTile, bool, Option<f32>, Option<u64>, Option<Points>, bool) {
+        let Self { tile, converged, probability, expected_spp, threshold, unfamiliar } = *self;
+        (tile, converged, probability, expected_spp, threshold, unfamiliar)
+    }
+
     fn __repr__(&self) -> String {
         let said = if self.converged { "converged" } else { "noise seen" };
         let p = self.probability.map_or("unknown".to_owned(), |p| format!("{p:.3}"));
@@ -199,7 +218,7 @@ impl PyVerdict {
 }
 
 impl PyVerdict {
-    pub(crate) fn new(tile: Tile, verdict: Verdict) -> Self {
+    pub(crate) fn of(tile: Tile, verdict: Verdict) -> Self {
         let Verdict { converged, probability, threshold, expected_spp, unfamiliar, .. } = verdict;
         let threshold = threshold.map(|t| (t.low, t.median, t.high));
         Self { tile: tile.into(), converged, probability, threshold, expected_spp, unfamiliar }
@@ -207,8 +226,8 @@ impl PyVerdict {
 }
 
 /// A tile that is done.
-#[pyclass(frozen, get_all, name = "Stop", module = "noisefloor")]
-#[derive(Clone)]
+#[pyclass(frozen, eq, get_all, name = "Stop", module = "noisefloor")]
+#[derive(Clone, PartialEq)]
 pub(crate) struct PyStop {
     /// The tile.
     tile: PyTile,
@@ -224,6 +243,15 @@ pub(crate) struct PyStop {
 
 #[pymethods]
 impl PyStop {
+    #[new]
+    fn new(tile: PyTile, spp: u64, probability: Option<f32>, reason: String, unfamiliar: bool) -> Self {
+        Self { tile, spp, probability, reason, unfamiliar }
+    }
+
+    fn __getnewargs__(&self) -> (PyTile, u64, Option<f32>, String, bool) {
+        (self.tile, self.spp, self.probability, self.reason.clone(), self.unfamiliar)
+    }
+
     fn __repr__(&self) -> String {
         format!("<noisefloor.Stop: tile {}, {} at {} spp>", self.tile.index, self.reason, self.spp)
     }

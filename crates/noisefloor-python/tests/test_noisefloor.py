@@ -1,14 +1,20 @@
 """Tests of the installed module: python -m unittest discover crates/noisefloor-python/tests"""
 
 import ast
+import concurrent.futures
+import copy
 import inspect
+import multiprocessing
 import os
 import pathlib
+import pickle
+import struct
 import tempfile
 import threading
 import time
 import unittest
 import warnings
+import zlib
 
 import numpy as np
 
@@ -22,6 +28,13 @@ def batch(tile, first, spp):
     """A wall with noise that shrinks as it should; the same for the same samples."""
     noise = np.random.default_rng([tile.index, first]).uniform(-1, 1, (tile.height, tile.width, 3))
     return (0.5 + 0.4 * noise / np.sqrt(spp)).astype(np.float32)
+
+
+def render(request):
+    """What a pool of processes runs."""
+    if request.spp == 0:
+        raise nf.FaultError("nothing to render")
+    return batch(request.tile, request.first, request.spp)
 
 
 def finish(session):
@@ -66,8 +79,10 @@ class EyesTest(unittest.TestCase):
             eyes = nf.eyes(path)
             self.assertEqual((eyes.name, eyes.factor, eyes.interval, eyes.date), ("anna", 1.4, (1.2, 1.65), "2026-11-24"))
             self.assertEqual(eyes.viewing.pixels_per_degree, 44)
+            sent = pickle.loads(pickle.dumps(eyes))
+            self.assertEqual((repr(sent), sent.viewing, sent.interval), (repr(eyes), eyes.viewing, eyes.interval))
             params = nf.Params(viewing=eyes.viewing, audience=eyes.audience)
-            self.assertIn("audience=(1.4, 0)", repr(params))
+            self.assertIn("audience=(1.4, 0.0)", repr(params))
             path.write_text("colour = 1")
             self.assertRaises(nf.ParameterError, nf.eyes, path)
 
@@ -103,33 +118,6 @@ class Sessions(unittest.TestCase):
         np.testing.assert_array_equal(whole.image(), frame)
         whole.push_running(0, 2, np.full((EDGE, EDGE, 3), 7.0))
         np.testing.assert_allclose(whole.image()[:EDGE, :EDGE], 7.0, rtol=1e-4)
-
-    def test_blocks_get_samples_by_their_need(self):
-        params = nf.Params(tile=EDGE, max_spp=400, blocks=16)
-        session, plain = nf.Session(64, 32, params=params), nf.Session(64, 32, params=PARAMS)
-        self.assertIsNone(plain.blocks(plain.requests()[0]))
-        while not session.done:
-            for request in session.requests():
-                blocks = session.blocks(request)
-                first, samples = blocks.first(), blocks.samples()
-                self.assertEqual((blocks.tile, blocks.spp), (request.tile, request.spp))
-                self.assertEqual((samples.shape, samples.dtype), ((EDGE, EDGE), np.uint64))
-                self.assertTrue((first == session.spp()[request.tile.slices]).all())
-                self.assertLess(abs(float(samples.mean()) - request.spp), 0.51)
-                # Only the left half of a tile is noisy
-                random = np.random.default_rng([request.tile.index, request.first])
-                noise = random.uniform(-1, 1, (EDGE, EDGE, 3)) / np.sqrt(samples)[..., None]
-                noise[:, 16:] = 0
-                session.push_blocks(blocks, 0.5 + 0.4 * noise)
-            session.judge()
-        spp = session.spp()
-        for stop in session.stops():
-            of_tile = spp[stop.tile.slices]
-            self.assertGreater(of_tile[0, 0], of_tile[0, 16])
-        with self.assertRaises(nf.SizeError):
-            plain.push_blocks(blocks, np.zeros((3, 3, 3)))
-        with self.assertRaises(nf.BatchError):
-            plain.push_blocks(blocks, np.zeros((EDGE, EDGE, 3)))
 
     def test_a_float32_array_is_read_where_it_lies(self):
         statm = pathlib.Path("/proc/self/statm")
@@ -222,12 +210,15 @@ class Sessions(unittest.TestCase):
 class Faults(unittest.TestCase):
     """Wrong samples are an error or a warning."""
 
-    def feed(self, batches, picture, **options):
-        session = nf.Session(128, 128, params=nf.Params(tile=64, min_spp=0, max_spp=10_000), **options)
+    def feed(self, batches, picture, session=None):
+        session = session or self.session()
         for count in range(batches):
             session.push_image(10, picture(count))
             session.judge()
         return session
+
+    def session(self, **options):
+        return nf.Session(128, 128, params=nf.Params(tile=64, min_spp=0, max_spp=10_000), **options)
 
     def independent(self, count):
         light = np.random.default_rng(count).exponential(1.0, (128, 128, 1)) ** 2
@@ -260,7 +251,13 @@ class Faults(unittest.TestCase):
         self.assertEqual(len(session.warnings), 1)
         with warnings.catch_warnings():
             warnings.simplefilter("error")
-            self.assertEqual(self.feed(8, blurred, shared_pixels=True).warnings, [])
+            shared = self.session(shared_pixels=True)
+            # Neither pickle nor a file forgets it
+            with tempfile.TemporaryDirectory() as folder:
+                shared.save(pathlib.Path(folder) / "checkpoint", "a job")
+                shared.resume(pathlib.Path(folder) / "checkpoint", "a job")
+            for session in (copy.copy(shared), shared):
+                self.assertEqual(self.feed(8, blurred, session).warnings, [])
             right = self.feed(8, self.independent)
         self.assertEqual((right.warnings, right.rejected_samples, right.negative_samples), ([], 0, 0))
 
@@ -348,7 +345,7 @@ class Errors(unittest.TestCase):
                 wrong()
 
     def test_values_are_written_as_python_reads_them(self):
-        for params in (nf.Params(), nf.Params(tone_mapping="srgb", exposure=2.5, schedule="every", blocks=16),
+        for params in (nf.Params(), nf.Params(tone_mapping="srgb", exposure=2.5, schedule="every"),
                        nf.Params(white=3.0, audience=(0.5, 2.25), viewing="tv,distance=2")):
             self.assertEqual(eval(repr(params), vars(nf)), params)
 
@@ -387,6 +384,135 @@ class Pictures(unittest.TestCase):
         self.assertEqual(worse.cvvdp_map().shape, (64, 96))
         near = nf.metrics(noisy(1, 100), noisy(1, 1e8), viewing=nf.Viewing("desk,distance=5"))
         self.assertGreater(near.cvvdp_jod, worse.cvvdp_jod)
+
+
+class Files(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.folder = pathlib.Path(folder.name)
+
+    def test_pictures_come_back_as_they_were_written(self):
+        path = self.folder / "picture.EXR"
+        picture = noisy(1, 20)
+        picture[0, 0] = [-3.0, np.inf, 1e30]
+        nf.write(path, picture)
+        back, encoding = nf.read(path)
+        self.assertEqual((back.dtype, encoding), (np.float32, "linear"))
+        np.testing.assert_array_equal(back, picture)
+        # Every code of 8 bits
+        codes = np.arange(256 * 3, dtype=np.uint8).reshape(16, 16, 3)
+        nf.write(str(self.folder / "codes.png"), codes, encoding="srgb")
+        back, encoding = nf.read(self.folder / "codes.png")
+        self.assertEqual((back.dtype, encoding), (np.uint8, "srgb"))
+        np.testing.assert_array_equal(back, codes)
+        # Radiance as screens show it, and back, by the formula of IEC 61966-2-1
+        nf.write(self.folder / "grey.png", np.full((2, 3, 3), 0.2))
+        nf.write(self.folder / "grey.exr", np.full((2, 3, 3), 124, np.uint8), encoding="srgb")
+        # 1.055·0.2^(1/2.4) − 0.055 is 123.6/255
+        self.assertTrue((nf.read(self.folder / "grey.png")[0] == 124).all())
+        linear = ((124 / 255 + 0.055) / 1.055) ** 2.4
+        np.testing.assert_allclose(nf.read(self.folder / "grey.exr")[0], linear, rtol=1e-5)
+        image, encoding = nf.read(self.folder / "codes.png")
+        self.assertEqual(nf.metrics(image, image, encoding=encoding).psnr, np.inf)
+
+    def test_a_png_that_others_wrote_is_read(self):
+        """16 bits, by the chunks of the format and zlib alone."""
+        codes = np.arange(2 * 3 * 3, dtype=np.uint16).reshape(2, 3, 3) * 3000
+        def chunk(name, data):
+            return struct.pack(">I", len(data)) + name + data + struct.pack(">I", zlib.crc32(name + data))
+        rows = b"".join(b"\0" + row.astype(">u2").tobytes() for row in codes)
+        head = chunk(b"IHDR", struct.pack(">IIBBBBB", 3, 2, 16, 2, 0, 0, 0))
+        path = self.folder / "deep.png"
+        body = chunk(b"IDAT", zlib.compress(rows)) + chunk(b"IEND", b"")
+        path.write_bytes(b"\x89PNG\r\n\x1a\n" + head + body)
+        back, encoding = nf.read(path)
+        self.assertEqual((back.dtype, encoding), (np.uint16, "srgb"))
+        np.testing.assert_array_equal(back, codes)
+
+    def test_files_that_cannot_be_are_errors(self):
+        black = np.zeros((4, 4, 3), np.float32)
+        foreign, huge, folder = (self.folder / name for name in ("text.exr", "huge.pfm", "folder.exr"))
+        folder.mkdir()
+        foreign.write_text("no picture")
+        huge.write_bytes(b"PF\n65536 65536\n-1\n")
+        cases = [
+            (FileNotFoundError, "nowhere.exr", lambda: nf.read(self.folder / "nowhere.exr")),
+            (nf.PictureError, "text.exr", lambda: nf.read(foreign)),
+            (nf.PictureError, "65536", lambda: nf.read(huge)),
+            (FileNotFoundError, "choose a folder", lambda: nf.write(self.folder / "no/a.exr", black)),
+            (OSError, "is a folder", lambda: nf.write(folder, black)),
+            (nf.ParameterError, "name the file .exr or .png", lambda: nf.write(self.folder / "a.jpg", black)),
+            (nf.PictureError, "dtype uint8", lambda: nf.write(self.folder / "a.png", black.astype(np.uint8))),
+            (nf.SizeError, r"\(4, 4, 1\)", lambda: nf.write(self.folder / "a.png", black[..., :1])),
+        ]
+        for kind, words, call in cases:
+            with self.subTest(words):
+                with self.assertRaisesRegex(kind, words):
+                    call()
+        left = {path.name for path in self.folder.iterdir()}
+        self.assertEqual(left, {"text.exr", "huge.pfm", "folder.exr"})
+
+
+class Processes(unittest.TestCase):
+    def test_a_pool_of_processes_renders(self):
+        alone, session = nf.Session(96, 80, params=PARAMS), nf.Session(96, 80, params=PARAMS)
+        finish(alone)
+        spawn = multiprocessing.get_context("spawn")
+        with concurrent.futures.ProcessPoolExecutor(2, mp_context=spawn) as pool:
+            while not session.done:
+                requests = session.requests()
+                for request, mean in zip(requests, pool.map(render, requests)):
+                    session.push(request.tile, request.spp, mean)
+                session.judge()
+            with self.assertRaisesRegex(nf.FaultError, "nothing to render"):
+                list(pool.map(render, [nf.Request(alone.stops()[0].tile, 0, 0, 0, 0)]))
+        self.assertEqual(session.stops(), alone.stops())
+        np.testing.assert_array_equal(session.image(), alone.image())
+
+    def test_what_is_pickled_comes_back_the_same(self):
+        session = nf.Session(64, 64, params=nf.Params(tile=EDGE, white=3.3))
+        requests = session.requests()
+        session.push_image(100, noisy(1, 100, (64, 64, 3)))
+        session.push_image(100, noisy(2, 100, (64, 64, 3)))
+        session.judge()
+        finish(done := nf.Session(64, 64, params=PARAMS))
+        values = [requests[0], requests[0].tile, session.verdict(0), done.stops()[0],
+                  nf.Viewing("desk,distance=1.3"), nf.Params(white=3.3),
+                  nf.Params(tile=64, tone_mapping="srgb", exposure=0.3, audience=(1.5, 2), step=50)]
+        for value in values:
+            for protocol in range(2, pickle.HIGHEST_PROTOCOL + 1):
+                self.assertEqual(pickle.loads(pickle.dumps(value, protocol)), value)
+            self.assertIsNot(copy.copy(value), value)
+        self.assertNotEqual(values[0], requests[1])
+        self.assertEqual(len(set(requests + pickle.loads(pickle.dumps(requests)))), len(requests))
+        oracle = pickle.loads(pickle.dumps(nf.Oracle(0.8)))
+        self.assertEqual((oracle.threshold, oracle.digest), (np.float32(0.8), nf.Oracle().digest))
+
+    def test_a_pickled_session_goes_on_as_the_first_would(self):
+        first = nf.Session(96, 80, nf.Oracle(0.95), PARAMS, shared_pixels=True)
+        for request in first.requests():
+            first.push(request.tile, request.spp, batch(request.tile, request.first, request.spp))
+        first.judge()
+        second = copy.deepcopy(first)
+        self.assertEqual(second.requests(), first.requests())
+        finish(first)
+        self.assertNotEqual(second.stops(), first.stops())
+        finish(second)
+        self.assertEqual(second.stops(), first.stops())
+        np.testing.assert_array_equal(second.image(), first.image())
+
+    def test_results_are_pickled(self):
+        judged = nf.judge(noisy(1, 20), 20, noisy(2, 20), 20, samples="independent")
+        back = pickle.loads(pickle.dumps(judged))
+        self.assertEqual((back.verdicts, back.samples), (judged.verdicts, "independent"))
+        np.testing.assert_array_equal(back.visible_noise(), judged.visible_noise())
+        found = nf.metrics(noisy(1, 100), noisy(1, 1e8))
+        back = pickle.loads(pickle.dumps(found))
+        for name in ("cvvdp_jod", "psnr", "rel_mse", "flip", "butteraugli"):
+            self.assertEqual(getattr(back, name), getattr(found, name))
+        np.testing.assert_array_equal(back.cvvdp_map(), found.cvvdp_map())
+        np.testing.assert_array_equal(back.flip_map(), found.flip_map())
 
 
 class Documentation(unittest.TestCase):

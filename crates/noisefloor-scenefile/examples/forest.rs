@@ -42,7 +42,7 @@ fn measure(path: &Path, spp: u64) -> Result<(), Box<dyn Error>> {
 
     let mut source = Ptwne::new(scene, EDGE, EDGE, RenderOptions::default())?;
     let requests: Vec<Request> =
-        TileGrid::new(EDGE, EDGE, 64)?.tiles().map(|tile| Request { tile, first: 0, spp }).collect();
+        TileGrid::new(EDGE, EDGE, 64)?.tiles().map(|tile| Request::new(tile, 0, spp)).collect();
     let start = Instant::now();
     let batches = source.sample(&requests)?;
     let seconds = start.elapsed().as_secs_f64() / spp as f64;

@@ -24,7 +24,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             RenderOptions { seed, max_depth: loaded.max_depth.unwrap_or(65), ..RenderOptions::default() };
         let mut source = Ptwne::new(scene.clone(), width, height, options)?;
         let tile = TileGrid::new(width, height, width.max(height))?.tile(0);
-        let batches = source.sample(&[Request { tile, first: 0, spp: spp.parse()? }])?;
+        let batches = source.sample(&[Request::new(tile, 0, spp.parse()?)])?;
         let layers = RenderLayers::rgb(width, height, &batches[0].mean);
         write_exr(format!("{out}-{seed}.exr"), &layers)?;
     }

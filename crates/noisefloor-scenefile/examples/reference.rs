@@ -54,9 +54,8 @@ fn row(scene: &Arc<Scene>, size: usize) -> Result<String, Box<dyn Error>> {
     }
     let seconds = start.elapsed().as_secs_f64() / 2.0;
     let tile = Tile { index: 0, x: 0, y: 0, width: size, height: size };
-    let rendered = |samples| {
-        source(1)?.sample(&[Request { tile, first: 0, spp: samples }]).map_err(Into::<Box<dyn Error>>::into)
-    };
+    let rendered =
+        |samples| source(1)?.sample(&[Request::new(tile, 0, samples)]).map_err(Into::<Box<dyn Error>>::into);
     let start = Instant::now();
     let preview = rendered(PREVIEW)?;
     let spp = seconds / start.elapsed().as_secs_f64() * PREVIEW as f64;

@@ -8,7 +8,7 @@ A host script defines a class and hands it to `serve`:
 
     class Renderer:
         def __init__(self, init): ...   # imports the renderer, loads init["scene"]
-        info = {...}                    # name, width, height, unit, repeats, warnings; blocks, if parts of tiles may be asked for
+        info = {...}                    # name, width, height, unit, repeats, warnings
         def sample(self, tiles): ...    # [(samples, array of height x width x 3 float32), ...], in the order of the tiles
         def reference(self): ...        # None, or an array of the whole image
         def first_hits(self, index, samples): ...   # optional: arrays of the albedo and the normals of the whole image

@@ -55,13 +55,12 @@ pub(crate) fn ask<T: DeserializeOwned>(
 pub(crate) struct Described {
     pub(crate) info: SourceInfo,
     /// Whether parts of tiles may be asked for.
-    pub(crate) blocks: bool,
     pub(crate) warnings: Vec<String>,
 }
 
 /// What the renderer says of itself, checked.
 pub(crate) fn describe(hello: Hello) -> Result<Described, Blame> {
-    let Hello { name, width, height, unit, repeats, late, blocks, warnings } = hello;
+    let Hello { name, width, height, unit, repeats, late, warnings } = hello;
     let wrong = |what: String| (None, SidecarCause::Wrong { what });
     check_image(width, height).map_err(|e| wrong(e.to_string()))?;
     let name: String = name.chars().filter(|c| !c.is_control()).take(NAME).collect();
@@ -72,8 +71,7 @@ pub(crate) fn describe(hello: Hello) -> Result<Described, Blame> {
     let warnings = warnings.iter().map(|warning| printable(warning).into_owned()).collect();
     let counts = if late > 0 { Counts::Late { overrun: late } } else { Counts::Asked };
     let info = SourceInfo::new(name, width, height).with_unit(unit).with_repeats(repeats).with_counts(counts);
-    let blocks = blocks && counts == Counts::Asked;
-    Ok(Described { info, blocks, warnings })
+    Ok(Described { info, warnings })
 }
 
 /// The batches of a reply: as many as requests, none with more samples than `counts` allows.

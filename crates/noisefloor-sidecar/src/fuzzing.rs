@@ -21,7 +21,7 @@ pub fn read_any_reply(mut bytes: &[u8]) -> bool {
     let _ = serde_json::from_slice::<Referenced>(&reply.header);
     if let Ok(header) = serde_json::from_slice::<Sampled>(&reply.header) {
         let tile = |index| Tile { index, x: 4 * index, y: 0, width: 4, height: 4 };
-        let requests = [0, 1].map(|index| Request { tile: tile(index), first: 0, spp: 8 });
+        let requests = [0, 1].map(|index| Request::new(tile(index), 0, 8));
         if let Ok(batches) = batches(&requests, LATE, Reply { header, payload: reply.payload }) {
             assert!(
                 batches.iter().all(|b| b.spp <= LATE.most(&requests[0])

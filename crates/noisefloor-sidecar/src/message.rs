@@ -35,6 +35,9 @@ pub(crate) struct TileRequest {
     pub(crate) height: usize,
     pub(crate) first: u64,
     pub(crate) samples: u64,
+    /// Number of the sequence that they belong to, and index of the first of them in it.
+    pub(crate) sequence: u32,
+    pub(crate) point: u64,
 }
 
 /// In every reply.
@@ -56,9 +59,6 @@ pub(crate) struct Hello {
     /// time.
     #[serde(default)]
     pub(crate) late: u64,
-    /// Whether it takes requests for parts of tiles, each with samples of its own.
-    #[serde(default)]
-    pub(crate) blocks: bool,
     #[serde(default)]
     pub(crate) warnings: Vec<String>,
 }

@@ -9,7 +9,7 @@ use crate::renderer::{HostOptions, Job, Renderer};
 use crate::setup;
 use noisefloor::{
     Batch, ProgressiveSource, Request, Rgb, SourceError, SourceInfo,
-    source::{BlockRequest, FirstHits, Reference, SourceIdentity},
+    source::{FirstHits, Reference, SourceIdentity},
     watch::LightCheck,
 };
 use serde::Serialize;
@@ -33,7 +33,6 @@ pub struct Sidecar {
     process: Option<Process>,
     info: SourceInfo,
     /// Whether it is asked for parts of tiles.
-    blocks: bool,
     identity: SourceIdentity,
     warnings: Vec<String>,
     restarts: Vec<SidecarError>,
@@ -57,11 +56,11 @@ impl Sidecar {
             .map_err(|cause| SidecarError::at_the_start(renderer, cause))?;
         // Before the scene is loaded: an edit in between is then noticed, if not now
         let identity = launch.contents()?;
-        let (process, Described { info, blocks, warnings: said }) = launch.start()?;
+        let (process, Described { info, warnings: said }) = launch.start()?;
         let identity = identity.with_options(&info.name);
         let warnings = options.warnings.into_iter().chain(said).collect();
         let (process, restarts, light) = (Some(process), Vec::new(), LightCheck::default());
-        Ok(Self { launch, process, info, blocks, identity, warnings, restarts, light })
+        Ok(Self { launch, process, info, identity, warnings, restarts, light })
     }
 
     /// As [`Sidecar::open`], with the interpreter that [`find`](crate::find) returns.
@@ -167,7 +166,8 @@ impl Sidecar {
     fn sample_some(&mut self, requests: &[Request]) -> Result<Vec<Batch>, SidecarError> {
         let tile = |r: &Request| {
             let noisefloor::Tile { index, x, y, width, height } = r.tile;
-            TileRequest { index, x, y, width, height, first: r.first, samples: r.spp }
+            let (sequence, point) = (r.sequence.number, r.sequence.first);
+            TileRequest { index, x, y, width, height, first: r.first, samples: r.spp, sequence, point }
         };
         let request = Sample { op: "sample", tiles: requests.iter().map(tile).collect() };
         let doing = match requests {
@@ -224,34 +224,6 @@ impl ProgressiveSource for Sidecar {
             rest = later;
         }
         Ok(batches)
-    }
-
-    /// Asks for each block as if it were a tile.
-    fn sample_blocks(&mut self, requests: &[BlockRequest]) -> Result<Option<Vec<Batch>>, SourceError> {
-        if !self.blocks {
-            return Ok(None);
-        }
-        let asked: Vec<Request> = requests.iter().flat_map(Request::of_blocks).collect();
-        let given = self.sample(&asked)?;
-        if let Some(part) = asked.iter().zip(&given).position(|(asked, given)| asked.spp != given.spp) {
-            let (name, tile) = (self.info.name.clone(), asked[part].tile.index);
-            let what =
-                format!("{} samples for a block of tile {tile}, not {}", given[part].spp, asked[part].spp);
-            return Err(SourceError::Contract { name, what });
-        }
-        let mut parts = given.iter();
-        let join = |request: &BlockRequest| {
-            let &BlockRequest { tile, spp, .. } = request;
-            let mut mean = vec![[0.0; 3]; tile.pixels()];
-            for part in parts.by_ref().take(request.blocks.len()) {
-                for (row, values) in part.mean.chunks_exact(part.tile.width).enumerate() {
-                    let start = (part.tile.y - tile.y + row) * tile.width + part.tile.x - tile.x;
-                    mean[start..start + values.len()].copy_from_slice(values);
-                }
-            }
-            Batch { tile, spp, mean }
-        };
-        Ok(Some(requests.iter().map(join).collect()))
     }
 
     fn reference(&mut self) -> Result<Option<Reference>, SourceError> {

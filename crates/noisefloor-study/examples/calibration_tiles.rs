@@ -54,7 +54,7 @@ fn render(scene: &str, [x, y]: [usize; 2]) -> Result<Rendered, Box<dyn Error>> {
         Ptwne::new(scene, PICTURE, PICTURE, RenderOptions { seed: 1, ..RenderOptions::default() })?;
     let whole: Vec<Tile> = TileGrid::new(PICTURE, PICTURE, PICTURE)?.tiles().collect();
     let mut mean = |tile: Tile, first, spp| -> Result<Vec<Rgb>, Box<dyn Error>> {
-        let batch = source.sample(&[Request { tile, first, spp }])?.into_iter().next();
+        let batch = source.sample(&[Request::new(tile, first, spp)])?.into_iter().next();
         Ok(batch.ok_or("no samples")?.mean)
     };
     let display = ToneMapping::default().settle(&mean(whole[0], 0, PREVIEW)?);

@@ -43,8 +43,7 @@ pub fn render_stack(
                 return Ok(());
             }
             let spp = (level - have).min(MOST_AT_ONCE);
-            let requests: Vec<Request> =
-                grid.tiles().map(|tile| Request { tile, first: have, spp }).collect();
+            let requests: Vec<Request> = grid.tiles().map(|tile| Request::new(tile, have, spp)).collect();
             let batches = source.sample(&requests).map_err(|e| bad(e.to_string()))?;
             for batch in batches {
                 if batch.spp != spp {

@@ -25,7 +25,7 @@
 //!
 //!     fn sample(&mut self, requests: &[Request]) -> Result<Vec<Batch>, SourceError> {
 //!         let mut batches = Vec::new();
-//!         for &Request { tile, first, spp } in requests {
+//!         for &Request { tile, first, spp, .. } in requests {
 //!             let mut mean = Vec::new();
 //!             for y in tile.y..tile.y + tile.height {
 //!                 for x in tile.x..tile.x + tile.width {

@@ -1,6 +1,7 @@
 //! What a verdict on one tile of 128×128 pixels costs, and its parts; and verdicts on whole pictures, by
 //! their size.
 #![allow(missing_docs, reason = "a benchmark")]
+#![expect(clippy::disallowed_methods, reason = "it measures time")]
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use noisefloor::{

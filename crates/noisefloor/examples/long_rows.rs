@@ -2,6 +2,7 @@
 //! says what each takes:
 //! `cargo run --release -p noisefloor --features train --example long_rows -- ROWS NUMBERS`
 #![allow(clippy::print_stdout, reason = "an example prints")]
+#![expect(clippy::disallowed_methods, reason = "it measures time")]
 
 use linfa::prelude::*;
 use ndarray::{Array1, Array2};

@@ -6,14 +6,13 @@ use crate::film::{Film, FilmHead};
 use crate::params::Params;
 use crate::session::{Goal, TileState};
 use crate::source::{IdentityChange, SourceIdentity};
-use crate::tile::Tile;
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 use std::io::{self, Read, Write};
 use thiserror::Error;
 
 const FORMAT: Format = Format { magic: *b"NFCHECK\0", version: VERSION };
-const VERSION: u32 = 9;
+const VERSION: u32 = 10;
 
 /// A snapshot of a session, for resuming it: samples, verdicts and the display. Made by
 /// [`Session::checkpoint`](crate::Session::checkpoint), resumed by
@@ -32,8 +31,6 @@ pub struct Checkpoint<'a> {
     pub(crate) display: Option<Display>,
     pub(crate) film: Cow<'a, Film>,
     pub(crate) tiles: Cow<'a, [TileState]>,
-    /// Of each tile, the shares of its blocks.
-    pub(crate) shares: Cow<'a, [Option<Vec<f32>>]>,
 }
 
 /// A checkpoint in its file, without the pixels of its film, which follow.
@@ -47,7 +44,6 @@ struct Head<'a> {
     display: Option<Display>,
     film: FilmHead,
     tiles: Cow<'a, [TileState]>,
-    shares: Cow<'a, [Option<Vec<f32>>]>,
 }
 
 /// Why a checkpoint cannot be used.
@@ -115,11 +111,11 @@ impl Checkpoint<'_> {
     /// [`CheckpointError`] if it is foreign, damaged, oversized, or of another version.
     pub fn read(from: impl Read) -> Result<Checkpoint<'static>, CheckpointError> {
         let whole = |head: Head<'static>, from: &mut dyn Read| {
-            let Head { job, source, criterion, state, params, display, film, tiles, shares } = head;
+            let Head { job, source, criterion, state, params, display, film, tiles } = head;
             let film = Film::read_pixels(film, from).map_err(ended)?;
             let film = film.ok_or_else(|| Fault::Damaged("there is no such film".into()))?;
             let (criterion, state, film) = (criterion.into_owned(), state.into_owned(), Cow::Owned(film));
-            Ok(Checkpoint { job, source, criterion, state, params, display, film, tiles, shares })
+            Ok(Checkpoint { job, source, criterion, state, params, display, film, tiles })
         };
         Ok(FORMAT.read_with_body(from, whole)?)
     }
@@ -152,7 +148,6 @@ impl Checkpoint<'_> {
             display: self.display,
             film: self.film.head(),
             tiles: Cow::Borrowed(&self.tiles),
-            shares: Cow::Borrowed(&self.shares),
         };
         Ok(FORMAT.write_with_body(&head, to, |to| self.film.write_pixels(to))?)
     }
@@ -194,17 +189,6 @@ impl Checkpoint<'_> {
         };
         if self.tiles.len() != grid.len() || !self.tiles.iter().enumerate().all(fits) {
             return Err(CheckpointError::Invalid("its tiles are not those of its picture"));
-        }
-        let possible = |tile: Tile| match &self.shares[tile.index] {
-            None => true,
-            Some(shares) => {
-                let blocks = self.film.block_counts(tile.index).map_or(0, Iterator::count);
-                // No block gets more than there is, and each something
-                shares.len() == blocks && shares.iter().all(|share| (0.0..=blocks as f32).contains(share))
-            }
-        };
-        if self.shares.len() != grid.len() || !grid.tiles().all(possible) {
-            return Err(CheckpointError::Invalid("the shares of its blocks are impossible"));
         }
         Ok(())
     }

@@ -205,14 +205,6 @@ pub trait StoppingCriterion {
         None
     }
 
-    /// How many samples each block of `edge` pixels of the given tiles needs, relative to the others of its
-    /// tile, row-major; `None` for a tile without evidence, and, the default, if the criterion cannot say:
-    /// blocks are then sampled alike. An estimate: nothing depends on it but how samples are spread. Costs
-    /// about as much as a verdict.
-    fn block_needs(&self, _view: &View<'_>, _tiles: &[Tile], _edge: usize) -> Option<Vec<Option<Vec<f64>>>> {
-        None
-    }
-
     /// Judges the given tiles, all of which have samples.
     ///
     /// # Errors

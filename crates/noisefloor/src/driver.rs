@@ -1,6 +1,7 @@
 //! The pull loop: requests samples from a source until the criterion is satisfied or a limit is reached.
 
-use crate::blocks::BlockRequest;
+#![expect(clippy::disallowed_methods, reason = "a driver keeps a limit of time, and says where time went")]
+
 use crate::checkpoint::{Checkpoint, CheckpointError};
 use crate::criterion::{CriterionError, StoppingCriterion};
 use crate::film::FilmError;
@@ -220,10 +221,9 @@ impl<S: ProgressiveSource, C: StoppingCriterion> Driver<S, C> {
             let requests = self.plan();
             let began = Instant::now();
             // Nothing is missing where an earlier run failed to judge
-            let (batches, by_blocks) =
-                if requests.is_empty() { (Vec::new(), None) } else { self.sample(&requests)? };
+            let batches = if requests.is_empty() { Vec::new() } else { self.source.sample(&requests)? };
             self.clock.source_seconds += began.elapsed().as_secs_f64();
-            let exhausted = self.take(&requests, by_blocks.as_deref(), batches)?;
+            let exhausted = self.take(&requests, batches)?;
 
             let mut stops = self.close_exhausted(&exhausted);
 
@@ -264,22 +264,7 @@ impl<S: ProgressiveSource, C: StoppingCriterion> Driver<S, C> {
         let film = self.session.film();
         let pixels = (film.grid().width() * film.grid().height()) as u64;
         let spp = requests.iter().map(|r| r.spp).max().unwrap_or(1).min((CALL_SAMPLES / pixels).max(1));
-        film.grid().tiles().map(|tile| Request { tile, first: film.spp(tile.index), spp }).collect()
-    }
-
-    /// The batches that are asked for; block by block where that is wanted and the source can, and then how.
-    fn sample(
-        &mut self,
-        requests: &[Request],
-    ) -> Result<(Vec<Batch>, Option<Vec<BlockRequest>>), SourceError> {
-        let by_blocks: Option<Vec<BlockRequest>> =
-            requests.iter().map(|request| self.session.block_request(request)).collect();
-        if let Some(by_blocks) = by_blocks.filter(|_| self.source.info().aims)
-            && let Some(batches) = self.source.sample_blocks(&by_blocks)?
-        {
-            return Ok((batches, Some(by_blocks)));
-        }
-        Ok((self.source.sample(requests)?, None))
+        film.grid().tiles().map(|tile| film.request(tile.index, spp)).collect()
     }
 
     /// Ends the tiles of which the source has no more, unless they have enough for a verdict.
@@ -292,19 +277,14 @@ impl<S: ProgressiveSource, C: StoppingCriterion> Driver<S, C> {
     }
 
     /// Files the batches of one call; returns the tiles that have no more.
-    fn take(
-        &mut self,
-        requests: &[Request],
-        by_blocks: Option<&[BlockRequest]>,
-        batches: Vec<Batch>,
-    ) -> Result<Vec<usize>, DriverError> {
+    fn take(&mut self, requests: &[Request], batches: Vec<Batch>) -> Result<Vec<usize>, DriverError> {
         let broken = |what| SourceError::Contract { name: self.source.info().name, what };
         if batches.len() != requests.len() {
             let what = format!("{} batches for {} requests", batches.len(), requests.len());
             return Err(broken(what).into());
         }
         let mut exhausted = Vec::new();
-        for (place, (request, batch)) in requests.iter().zip(batches).enumerate() {
+        for (request, batch) in requests.iter().zip(batches) {
             if batch.tile != request.tile {
                 let what = format!("a batch of tile {} for tile {}", batch.tile.index, request.tile.index);
                 return Err(broken(what).into());
@@ -318,14 +298,7 @@ impl<S: ProgressiveSource, C: StoppingCriterion> Driver<S, C> {
                 exhausted.push(batch.tile.index);
                 continue;
             }
-            let pushed = match by_blocks.map(|by_blocks| &by_blocks[place]) {
-                Some(asked) if asked.spp == batch.spp => self.session.push_blocks(asked, &batch.mean),
-                Some(asked) => {
-                    let what = format!("{} samples for blocks that were asked for {}", batch.spp, asked.spp);
-                    return Err(broken(what).into());
-                }
-                None => self.session.push(batch.tile.index, batch.spp, &batch.mean),
-            };
+            let pushed = self.session.push(batch.tile.index, batch.spp, &batch.mean);
             match pushed {
                 Ok(()) => {}
                 Err(SessionError::Film(error @ FilmError::Pixels { .. })) => {

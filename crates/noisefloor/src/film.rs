@@ -1,11 +1,10 @@
 //! The film: batches of every tile, in two independent halves.
 
-use crate::blocks::BlockCounts;
 use crate::display::luminance;
 use crate::rgb::Rgb;
+use crate::source::{Request, Sequence};
 use crate::tile::{Tile, TileGrid};
 
-mod blocks;
 mod error;
 mod planes;
 pub use error::FilmError;
@@ -74,11 +73,6 @@ impl Half {
 /// Each batch goes to whichever half of its tile has fewer samples, so that the two stay as even as the
 /// batches allow. Non-finite pixels of a batch are rejected and counted.
 ///
-/// Where [blocks](crate::Params::blocks) of a tile got different numbers of samples, its numbers of samples
-/// are those that it got on average, and each batch counts by that in every block: see
-/// [`BlockRequest::spp`](crate::source::BlockRequest::spp). Batches of the two halves come in pairs with equal
-/// numbers in every block, so that the halves of a block are as alike as those of a tile.
-///
 /// Memory: 36 bytes per pixel, 18 without halves.
 #[derive(Clone, Debug)]
 pub struct Film {
@@ -89,8 +83,6 @@ pub struct Film {
     rejected: u64,
     /// Samples whose batch was below zero; not in files.
     negative: u64,
-    /// What the blocks have, if they are counted.
-    blocks: Option<BlockCounts>,
 }
 
 impl Film {
@@ -106,7 +98,7 @@ impl Film {
 
     fn with_halves(grid: TileGrid, halves: usize) -> Self {
         let halves = vec![Half::new(grid.width() * grid.height()); halves];
-        Self { grid, halves, counts: vec![[0; 2]; grid.len()], rejected: 0, negative: 0, blocks: None }
+        Self { grid, halves, counts: vec![[0; 2]; grid.len()], rejected: 0, negative: 0 }
     }
 
     /// The grid.
@@ -127,14 +119,33 @@ impl Film {
         self.counts[tile]
     }
 
-    /// Samples per pixel of a tile, both halves together; the average where its blocks have different
-    /// numbers.
+    /// Samples per pixel of a tile, both halves together.
     ///
     /// # Panics
     /// If the tile does not exist.
     pub fn spp(&self, tile: usize) -> u64 {
         let [a, b] = self.counts[tile];
         a + b
+    }
+
+    /// A request for the next samples of a tile, which belong to the half with fewer.
+    ///
+    /// # Panics
+    /// If the tile does not exist.
+    pub fn request(&self, tile: usize, spp: u64) -> Request {
+        self.request_after(tile, self.counts[tile], spp)
+    }
+
+    /// The same once the halves of the tile have these samples.
+    pub(crate) fn request_after(&self, tile: usize, counts: [u64; 2], spp: u64) -> Request {
+        let half = self.half_with_fewer(counts);
+        let sequence = Sequence { number: half as u32, first: counts[half] };
+        Request::new(self.grid.tile(tile), counts[0] + counts[1], spp).in_sequence(sequence)
+    }
+
+    /// The half that the next batch goes to, of a tile whose halves have these samples.
+    fn half_with_fewer(&self, [a, b]: [u64; 2]) -> usize {
+        usize::from(self.has_halves() && b < a)
     }
 
     /// Samples rejected so far, over all pixels, because their batch was not finite. They count as their
@@ -150,11 +161,6 @@ impl Film {
 
     /// All samples taken, over all pixels.
     pub fn total_samples(&self) -> u64 {
-        self.blocks.as_ref().map_or_else(|| self.averages(), BlockCounts::samples)
-    }
-
-    /// Samples per pixel of each tile, over all its pixels.
-    fn averages(&self) -> u64 {
         self.grid.tiles().map(|t| self.spp(t.index) * t.pixels() as u64).sum()
     }
 
@@ -170,17 +176,7 @@ impl Film {
             return Err(FilmError::NothingNew { tile: tile.index, had: a + b, now: a + b });
         }
         Self::countable(tile, a + b, spp)?;
-        let half = self.accumulate(tile, spp, mean);
-        if let Some(blocks) = &mut self.blocks {
-            blocks.count(tile, half, std::iter::repeat(spp));
-        }
-        Ok(())
-    }
-
-    /// Adds a batch to the half of its tile that has fewer samples, and returns which.
-    fn accumulate(&mut self, tile: Tile, spp: u64, mean: &[Rgb]) -> usize {
-        let [a, b] = self.counts[tile.index];
-        let half = usize::from(self.has_halves() && b < a);
+        let half = self.half_with_fewer(self.counts[tile.index]);
         let mut below_zero = 0;
         for (row, values) in tile.rows(self.grid.width()).zip(mean.chunks_exact(tile.width)) {
             for (pixel, &value) in row.zip(values) {
@@ -196,7 +192,7 @@ impl Film {
         }
         self.negative += below_zero * spp;
         self.counts[tile.index][half] += spp;
-        half
+        Ok(())
     }
 
     /// Adds the new samples in a running mean of `total` samples per pixel, for renderers that keep one of
@@ -276,12 +272,7 @@ impl Film {
                     .flatten()
                     .all(|pixel| halves().all(|(half, count)| half.rejected(pixel) <= count))
         };
-        if !self.counts_blocks_like(fresh) {
-            return Err("its film counts other blocks");
-        }
-        let mut of_blocks = self.blocks.iter().flat_map(|blocks| &blocks.counts).flatten();
-        let countable = of_blocks.all(|&count| count < COUNTABLE);
-        if !countable || !self.grid.tiles().all(possible) || self.rejected > self.averages() {
+        if !self.grid.tiles().all(possible) || self.rejected > self.total_samples() {
             return Err("its film counts samples that there cannot be");
         }
         Ok(())

@@ -30,7 +30,6 @@
 //! # Ok::<(), noisefloor::SessionError>(())
 //! ```
 
-mod blocks;
 pub mod checkpoint;
 mod container;
 pub mod criterion;

@@ -1,6 +1,5 @@
 //! The oracle: a trained model as a stopping criterion.
 
-use crate::blocks::blocks_of;
 use crate::container;
 use crate::criterion::{CriterionError, ExpectedThreshold, Needs, StoppingCriterion, Verdict, View};
 use crate::descriptor::{Described, DescriptorError};
@@ -8,8 +7,8 @@ use crate::evidence::{Evidence, TilePlanes};
 use crate::model::{Model, ProbabilityCurve};
 use crate::params::Audience;
 use crate::tile::{Tile, TileGrid};
-use ndarray::s;
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 mod threshold;
 pub use threshold::{Threshold, ThresholdError};
@@ -18,13 +17,31 @@ pub use threshold::{Threshold, ThresholdError};
 /// converged.
 const NO_EVIDENCE: usize = 16;
 
+/// Samples per pixel from which noise is trusted however it is distributed.
+const TRUSTED_SPP: u64 = 100;
+
+/// Share of the pixels of a tile that have to carry its noise for it to be trusted sooner.
+const EVEN: f32 = 1.0 / 32.0;
+
 /// Judges tiles by a trained model.
+///
+/// In a session, a tile with fewer than 100 samples per pixel is not called converged unless its noise is spread
+/// over many pixels: noise that a few samples have made is not known yet, and neither is light that no sample has
+/// found.
 #[derive(Clone, Debug)]
 pub struct Oracle {
     model: Model,
     threshold: Threshold,
     /// What tiles of the picture were like when last described, for the picture's numbers; of tiles by index.
-    described: Vec<Option<Described>>,
+    described: Vec<Option<Seen>>,
+}
+
+/// A tile as it was when last described.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+struct Seen {
+    tile: Described,
+    /// Share of its pixels that carry its noise.
+    spread: f32,
 }
 
 impl Oracle {
@@ -283,29 +300,6 @@ impl StoppingCriterion for Oracle {
         self.map_visible_noise(view.film.grid(), |tile| self.planes(view, tile)).ok()?
     }
 
-    /// In proportion to the map of visible noise, pooled over each block by a mean of order 4, since people
-    /// look for the worst place. The map tells the noise of weak places as too weak: their differences grow
-    /// as contrast^2.26, and it takes the 1.3 of the worst place for all. A difference that is x times that
-    /// of the worst place is noise of x^(1/2.26) times its amplitude, which is the map to the power of
-    /// 1.3/2.26 = 0.58; samples go as the square of that, 1.15, and so nearly as the map itself.
-    fn block_needs(&self, view: &View<'_>, tiles: &[Tile], edge: usize) -> Option<Vec<Option<Vec<f64>>>> {
-        let needs = |&tile: &Tile| -> Option<Option<Vec<f64>>> {
-            // What makes tiles impossible to judge is said by the verdict
-            let Some(planes) = self.planes(view, tile).ok().flatten() else { return Some(None) };
-            let map = self.model.descriptor().visible_noise(&planes);
-            planes.recycle();
-            let map = map?;
-            let need = |block: Tile| {
-                let (x, y) = (block.x - tile.x, block.y - tile.y);
-                let noise = map.slice(s![y..y + block.height, x..x + block.width]);
-                let powers: f64 = noise.iter().map(|&v| f64::from(v).powi(4)).sum();
-                (powers / block.pixels() as f64).sqrt().sqrt()
-            };
-            Some(Some(blocks_of(tile, edge).map(need).collect()))
-        };
-        tiles.par_iter().map(needs).collect()
-    }
-
     /// Tiles that are not named count for the picture as they were when last described; they are described
     /// again if their samples have changed since.
     fn judge(&mut self, view: &View<'_>, tiles: &[Tile]) -> Result<Vec<Verdict>, CriterionError> {
@@ -318,26 +312,37 @@ impl StoppingCriterion for Oracle {
         let this: &Self = self;
         let describe = |tile: Tile| {
             let spp = view.film.spp(tile.index) as f64;
-            let known = this.described[tile.index].as_ref().filter(|d| d.spp == spp && !due[tile.index]);
+            let known = this.described[tile.index].as_ref().filter(|d| d.tile.spp == spp && !due[tile.index]);
             if known.is_some() {
                 return Ok(known.cloned());
             }
             let Some(planes) = this.planes(view, tile)? else { return Ok(None) };
             let described = this.describe(&planes, spp);
+            let spread = planes.noise_spread();
             planes.recycle();
-            described.map(Some)
+            described.map(|tile| Some(Seen { tile, spread }))
         };
         let all: Vec<Tile> = grid.tiles().collect();
         self.described = all.into_par_iter().map(describe).collect::<Result<_, _>>()?;
 
         // Judge all that can be seen, and hand out what was asked for.
-        let seen: Vec<Described> = self.described.iter().flatten().cloned().collect();
+        let seen: Vec<Described> = self.described.iter().flatten().map(|seen| seen.tile.clone()).collect();
         let mut judged = self.model.descriptor().in_picture(&seen).into_iter();
         let numbers: Vec<Option<Vec<f32>>> =
             self.described.iter().map(|d| d.as_ref().and_then(|_| judged.next())).collect();
         let asked: Vec<Option<Vec<f32>>> = tiles.iter().map(|t| numbers[t.index].clone()).collect();
         let judge = |(tile, raw): (&Tile, Option<Vec<f32>>)| match raw {
-            Some(raw) => self.verdict(&raw, view.film.spp(tile.index)),
+            Some(raw) => {
+                let spp = view.film.spp(tile.index);
+                let verdict = self.verdict(&raw, spp);
+                let spread = self.described[tile.index].as_ref().map_or(0.0, |seen| seen.spread);
+                let doubted = verdict.converged && spp < TRUSTED_SPP && spread < EVEN;
+                if doubted {
+                    Verdict { converged: false, expected_spp: Some(TRUSTED_SPP), ..verdict }
+                } else {
+                    verdict
+                }
+            }
             None => Verdict {
                 probability: Some(0.0),
                 probability_without_penalty: Some(0.0),
@@ -354,9 +359,10 @@ impl StoppingCriterion for Oracle {
     }
 
     fn restore(&mut self, grid: TileGrid, state: &[u8]) -> bool {
-        let Ok(described) = container::unpack::<Vec<Option<Described>>>(state) else { return false };
-        let sound = |d: &Described| {
-            d.own.len() == self.model.descriptor().own_len()
+        let Ok(described) = container::unpack::<Vec<Option<Seen>>>(state) else { return false };
+        let sound = |Seen { tile: d, spread }: &Seen| {
+            spread.is_finite()
+                && d.own.len() == self.model.descriptor().own_len()
                 && d.own.iter().all(|v| v.is_finite())
                 && [d.spp, d.area].iter().all(|v| v.is_finite() && *v > 0.0)
         };

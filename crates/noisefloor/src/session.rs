@@ -1,6 +1,5 @@
 //! The push loop: for a renderer that owns its main loop.
 
-use crate::blocks::PILOT;
 use crate::criterion::{CriterionError, StoppingCriterion, Verdict, View};
 use crate::display::{Display, ToneMapping};
 use crate::film::{Film, FilmError};
@@ -75,8 +74,6 @@ pub struct Session<C = Box<dyn StoppingCriterion + Send>> {
     /// The reference as displayed, once the display is settled.
     displayed_reference: Option<Vec<Rgb>>,
     tiles: Vec<TileState>,
-    /// Of each tile, the share that each of its blocks gets of its samples; none if all get as many.
-    shares: Vec<Option<Vec<f32>>>,
     source: SourceIdentity,
     watch: Watch,
 }
@@ -91,12 +88,8 @@ impl<C: StoppingCriterion> Session<C> {
         let grid = TileGrid::new(width, height, params.tile)?;
         Film::check_memory(grid, if criterion.needs().halves { 2 } else { 1 })?;
         criterion.begin(grid);
-        let mut film = if criterion.needs().halves { Film::new(grid) } else { Film::without_halves(grid) };
-        let mut first = params.first_verdict();
-        if params.blocks > 0 {
-            (film, first) = (film.by_blocks(params.blocks)?, first.min(PILOT));
-        }
-        let goal = Goal::Verdict { spp: first, streak: 0 };
+        let film = if criterion.needs().halves { Film::new(grid) } else { Film::without_halves(grid) };
+        let goal = Goal::Verdict { spp: params.first_verdict(), streak: 0 };
         let tile = TileState { goal, verdict: None, stop: None };
         let tiles = vec![tile; grid.len()];
         // Only an exposure by log-average depends on the picture, and has to wait for one
@@ -112,7 +105,6 @@ impl<C: StoppingCriterion> Session<C> {
             display,
             reference: None,
             displayed_reference: None,
-            shares: vec![None; tiles.len()],
             tiles,
             source: SourceIdentity::default(),
         })
@@ -199,9 +191,9 @@ impl<C: StoppingCriterion> Session<C> {
             if state.stop.is_some() {
                 return None;
             }
-            let first = self.film.spp(index);
-            let wanted = self.wanted(self.film.half_counts(index), state.goal.spp());
-            Some(Request { tile: self.film.grid().tile(index), first, spp: wanted.max(1) })
+            let counts = self.film.half_counts(index);
+            let wanted = self.wanted(counts, state.goal.spp());
+            Some(self.film.request_after(index, counts, wanted.max(1)))
         };
         self.tiles.iter().enumerate().filter_map(wish).collect()
     }
@@ -233,9 +225,6 @@ impl<C: StoppingCriterion> Session<C> {
     ///
     /// The first verdicts wait until every open tile has samples: the exposure is settled then, once and for
     /// all, unless the tone mapping is plain sRGB or [`Session::set_display`] was called.
-    ///
-    /// With [`Params::blocks`], the shares of the blocks are decided here, too: for the first time at 32
-    /// samples per pixel, and without a verdict where that is too early for one.
     ///
     /// # Errors
     /// [`SessionError::Fault`] if the samples pushed cannot be what they are said to be: no tile stops then, now or
@@ -275,7 +264,6 @@ impl<C: StoppingCriterion> Session<C> {
                 stops.extend(self.take(tile.index, verdict, open));
             }
         }
-        self.share_out(due);
         Ok(stops)
     }
 
@@ -446,7 +434,6 @@ impl<C: StoppingCriterion> Session<C> {
     }
 }
 
-mod blocks;
 mod resume;
 pub(crate) mod rounds;
 #[cfg(test)]

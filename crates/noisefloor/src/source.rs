@@ -1,6 +1,5 @@
 //! What a renderer offers: samples on request.
 
-use crate::blocks::blocks_of;
 use crate::rgb::Rgb;
 use crate::tile::Tile;
 use auto_impl::auto_impl;
@@ -8,7 +7,6 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 mod identity;
-pub use crate::blocks::{BlockRequest, BlockSamples};
 pub use identity::{IdentityChange, SourceIdentity};
 
 /// What a source counts.
@@ -154,19 +152,33 @@ pub struct Request {
     pub first: u64,
     /// New samples per pixel wanted, at least 1.
     pub spp: u64,
+    /// Where they lie among the sequences of a pixel, for sources of quasi-random points.
+    pub sequence: Sequence,
+}
+
+/// The place of new samples in one of the independent sequences of a pixel; a session takes one sequence for
+/// each half buffer.
+///
+/// A source of independent samples needs only [`Request::first`]. One of quasi-random points (Sobol, Halton,
+/// stratified) takes points `first`, `first` + 1, … of sequence `number`, scrambled independently of every other
+/// sequence. The samples of a sequence then complete each other, and the halves stay independent.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Sequence {
+    /// Which sequence: that of half A is 0, that of half B is 1.
+    pub number: u32,
+    /// Samples per pixel that the sequence already has: the index of the first new point.
+    pub first: u64,
 }
 
 impl Request {
-    /// Each block of a request as a request of its own, for renderers that sample rectangles. Their tiles are
-    /// the blocks, with the index of the tile that they are parts of.
-    pub fn of_blocks(request: &BlockRequest) -> impl Iterator<Item = Self> {
-        let index = request.tile.index;
-        let blocks = blocks_of(request.tile, request.edge).zip(&request.blocks);
-        blocks.map(move |(block, &BlockSamples { first, spp })| Self {
-            tile: Tile { index, ..block },
-            first,
-            spp,
-        })
+    /// A request whose samples are one sequence: that of a source which is asked for nothing else.
+    pub fn new(tile: Tile, first: u64, spp: u64) -> Self {
+        Self { tile, first, spp, sequence: Sequence { number: 0, first } }
+    }
+
+    /// The same at another place of the sequences.
+    pub fn in_sequence(self, sequence: Sequence) -> Self {
+        Self { sequence, ..self }
     }
 }
 
@@ -273,22 +285,6 @@ pub trait ProgressiveSource {
     /// [`SourceError`] if the renderer failed; samples of this call are then lost, all earlier ones stay
     /// valid.
     fn sample(&mut self, requests: &[Request]) -> Result<Vec<Batch>, SourceError>;
-
-    /// Adds samples to the blocks of the tiles named, if this source can give blocks of one tile different
-    /// numbers of samples; `None`, the default, if not: it is then asked by [`ProgressiveSource::sample`].
-    ///
-    /// Batches are as of [`ProgressiveSource::sample`]: their [`Batch::mean`] has for each pixel the mean of
-    /// as many new samples as its block was asked for ([`BlockRequest::at`]), and [`Batch::spp`] is
-    /// [`BlockRequest::spp`]. Only for sources that give exactly as many samples as asked for
-    /// ([`Counts::Asked`]). Where blocks are asked for equal numbers, the samples are those of
-    /// [`ProgressiveSource::sample`].
-    ///
-    /// # Errors
-    /// [`SourceError`] as [`ProgressiveSource::sample`].
-    fn sample_blocks(&mut self, requests: &[BlockRequest]) -> Result<Option<Vec<Batch>>, SourceError> {
-        let _ = requests;
-        Ok(None)
-    }
 
     /// Renders the quick noise-free reference, if this source has one. Called at most once, and only if the
     /// criterion needs it.

@@ -30,7 +30,7 @@ fn main() -> Result<(), SessionError> {
 }
 
 /// The renderer: the mean of the new samples of each pixel, row-major over the tile.
-fn render(Request { tile, first, spp: samples }: &Request) -> Vec<Rgb> {
+fn render(Request { tile, first, spp: samples, .. }: &Request) -> Vec<Rgb> {
     let pixel = |i: usize| {
         let (x, y) = (tile.x + i % tile.width, tile.y + i / tile.width);
         let sample = |n: u64| radiance(x as f32, y as f32, ((y * WIDTH + x) as u64) << 32 | (first + n));

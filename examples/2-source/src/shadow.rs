@@ -37,7 +37,7 @@ impl ProgressiveSource for Shadow {
 impl Shadow {
     /// What the driver wants: the mean of the *new* samples alone, and how many they are.
     fn batch(&self, request: &Request) -> Batch {
-        let &Request { tile, first, spp: samples } = request;
+        let &Request { tile, first, spp: samples, .. } = request;
         let pixel = |i: usize| {
             let (x, y) = (tile.x + i % tile.width, tile.y + i / tile.width);
             let mut sum = [0.0; 3];

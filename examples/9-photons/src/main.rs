@@ -97,7 +97,7 @@ mod tests {
         let mut source = Photons { width: 48, height: 40, rays: 20 };
         let tile = TileGrid::new(48, 40, 48).unwrap().tile(0);
         let mut batch = || {
-            let batch = source.sample(&[Request { tile, first: 0, spp }]).unwrap().remove(0);
+            let batch = source.sample(&[Request::new(tile, 0, spp)]).unwrap().remove(0);
             assert!(batch.spp == spp && batch.mean.len() == 48 * 40);
             batch.mean.iter().flatten().map(|&c| f64::from(c)).sum::<f64>()
         };

@@ -1,7 +1,7 @@
 use crate::kit::{Altered, Synthetic};
 use noisefloor::{
     Batch, Counts, ProgressiveSource, Repeats, Request, SourceError, SourceInfo, Tile, Unit,
-    source::{BlockRequest, BlockSamples, FirstHits, PixelNoise, Reference},
+    source::{FirstHits, PixelNoise, Reference},
 };
 use noisefloor_image::{RenderLayers, StackSource, write_exr};
 use noisefloor_ptwne::{Ptwne, RenderOptions, scenes};
@@ -74,7 +74,7 @@ fn stacks_on_disk_keep_it() {
     let ends = [20u64, 60, 100, 140, 180];
     for (i, last) in ends.into_iter().enumerate() {
         let first = if i == 0 { 0 } else { ends[i - 1] };
-        let request = Request { tile, first, spp: last - first };
+        let request = Request::new(tile, first, last - first);
         let batch = source.sample(&[request]).unwrap().remove(0);
         for (sum, value) in sum.iter_mut().flatten().zip(batch.mean.iter().flatten()) {
             *sum += f64::from(*value) * (last - first) as f64;
@@ -245,54 +245,6 @@ fn pixel_filters_have_to_be_announced() {
     let said = filtered(PixelNoise::Independent);
     assert!(said.contains("neighbouring pixels have noise in common"), "{said}");
     assert_eq!(filtered(PixelNoise::Shared), "kept");
-}
-
-/// A source that aims at blocks, with one thing changed in its answers to requests for them.
-struct ByBlocks<F>(Synthetic, F);
-
-impl<F: Fn(&[BlockRequest], &mut Vec<Batch>)> ProgressiveSource for ByBlocks<F> {
-    fn info(&self) -> SourceInfo {
-        self.0.info()
-    }
-
-    fn sample(&mut self, requests: &[Request]) -> Result<Vec<Batch>, SourceError> {
-        self.0.sample(requests)
-    }
-
-    fn sample_blocks(&mut self, requests: &[BlockRequest]) -> Result<Option<Vec<Batch>>, SourceError> {
-        let mut batches = self.0.sample_blocks(requests)?.expect("synthetic sources aim at blocks");
-        (self.1)(requests, &mut batches);
-        Ok(Some(batches))
-    }
-}
-
-#[test]
-fn broken_promises_about_blocks_are_noticed() {
-    fn said(change: impl Fn(&[BlockRequest], &mut Vec<Batch>) + Copy, expected: &str) {
-        let said = verdict(|| ByBlocks(synthetic(), change));
-        assert!(said.contains(expected), "{said:?}, not {expected:?}");
-    }
-    said(|_, _| (), "kept");
-    said(|_, b| drop(b.pop()), "the number of batches");
-    said(|_, b| b.reverse(), "order of the requests for blocks");
-    said(|_, b| b.iter_mut().for_each(|b| b.spp += 1), "another shape");
-    // Whoever gives all blocks what the first is asked for
-    let same_for_all = |requests: &[BlockRequest], batches: &mut Vec<Batch>| {
-        for (r, batch) in requests.iter().zip(batches) {
-            let BlockSamples { first, spp } = r.blocks[0];
-            batch.mean = synthetic().sample(&[Request { tile: r.tile, first, spp }]).unwrap().remove(0).mean;
-        }
-    };
-    said(same_for_all, "got other samples than its tile would have got");
-    // Whoever begins anew in every call
-    let again = |requests: &[BlockRequest], batches: &mut Vec<Batch>| {
-        for (r, batch) in requests.iter().zip(batches) {
-            let spp = r.blocks[0].spp;
-            batch.mean =
-                synthetic().sample(&[Request { tile: r.tile, first: 0, spp }]).unwrap().remove(0).mean;
-        }
-    };
-    said(again, "others than their tile");
 }
 
 /// A playback of running means that forgets to take the difference.

@@ -123,7 +123,7 @@ fn a_fixed_number_of_samples_is_that_everywhere() {
 
     // Which is the picture that one call gives, but for rounding; no halves were kept
     let tile = noisefloor::Tile { index: 0, x: 0, y: 0, width: 96, height: 96 };
-    let whole = cornell().sample(&[noisefloor::Request { tile, first: 0, spp: 200 }]).unwrap().remove(0);
+    let whole = cornell().sample(&[noisefloor::Request::new(tile, 0, 200)]).unwrap().remove(0);
     assert!(fixed.halves.iter().all(|&h| h == [200, 0]));
     for (a, b) in fixed.image.iter().flatten().zip(whole.mean.iter().flatten()) {
         assert!((a - b).abs() <= 1e-6 * b.abs(), "{a} {b}");
@@ -225,7 +225,7 @@ fn the_reference_is_rendered_once_where_it_is_needed_and_never_elsewhere() {
     let converged = {
         let mut exact = Synthetic { noise: |_, _| 0.0, ..Synthetic::new(64, 32) };
         let tile = noisefloor::Tile { index: 0, x: 0, y: 0, width: 64, height: 32 };
-        exact.sample(&[noisefloor::Request { tile, first: 0, spp: 1 }]).unwrap().remove(0).mean
+        exact.sample(&[noisefloor::Request::new(tile, 0, 1)]).unwrap().remove(0).mean
     };
     let source = Altered::reference(Synthetic::new(64, 32), move || {
         *count.borrow_mut() += 1;

@@ -1,6 +1,6 @@
 use noisefloor::{
     Batch, Counts, ProgressiveSource, Repeats, Request, Rgb, SourceError, SourceInfo, Unit,
-    source::{BlockRequest, BlockSamples, FirstHits, PixelNoise, Reference},
+    source::{FirstHits, PixelNoise, Reference},
 };
 use noisefloor_sidecar::{Renderer, find, probe};
 use noisefloor_testkit::{Noise, Requirement, require};
@@ -92,22 +92,6 @@ impl ProgressiveSource for Synthetic {
             Batch { tile: r.tile, spp: samples, mean }
         };
         Ok(requests.iter().map(batch).collect())
-    }
-
-    /// As long as it has enough.
-    fn sample_blocks(&mut self, requests: &[BlockRequest]) -> Result<Option<Vec<Batch>>, SourceError> {
-        if self.counts != Counts::Asked || self.store < u64::MAX {
-            return Ok(None);
-        }
-        let batch = |r: &BlockRequest| {
-            let pixel = |i: usize| {
-                let (column, row) = (i % r.tile.width, i / r.tile.width);
-                let BlockSamples { first, spp } = r.at(column, row);
-                self.mean(r.tile.x + column, r.tile.y + row, first, spp)
-            };
-            Batch { tile: r.tile, spp: r.spp, mean: (0..r.tile.pixels()).map(pixel).collect() }
-        };
-        Ok(Some(requests.iter().map(batch).collect()))
     }
 }
 

@@ -78,8 +78,7 @@ fn moments(mut source: impl ProgressiveSource) -> Vec<[(f64, f64); 3]> {
     let mut sums = vec![[(0.0, 0.0); 3]; 4];
     for batch in 0..BATCHES {
         let tiles = TileGrid::new(SIZE.0, SIZE.1, 32).unwrap();
-        let requests: Vec<_> =
-            tiles.tiles().map(|tile| Request { tile, first: 16 * batch, spp: 16 }).collect();
+        let requests: Vec<_> = tiles.tiles().map(|tile| Request::new(tile, 16 * batch, 16)).collect();
         for (batch, sums) in source.sample(&requests).unwrap().iter().zip(&mut sums) {
             for (c, sum) in sums.iter_mut().enumerate() {
                 let mean = batch.mean.iter().map(|p| f64::from(p[c])).sum::<f64>() / batch.mean.len() as f64;
@@ -103,11 +102,7 @@ fn depth_and_size_are_those_asked_for() {
         (job.size, job.max_depth) = (Some((33, 31)), Some(1));
         let mut source = open_as(&job, variant).unwrap();
         assert_eq!((source.info().width, source.info().height), (33, 31));
-        let half = |index, y, height| Request {
-            tile: Tile { index, x: 0, y, width: 33, height },
-            first: 0,
-            spp: 16,
-        };
+        let half = |index, y, height| Request::new(Tile { index, x: 0, y, width: 33, height }, 0, 16);
         let batches = source.sample(&[half(0, 0, 15), half(1, 15, 16)]).unwrap();
         let light = |i: usize| batches[i].mean.iter().flatten().filter(|&&c| c > 0.0).count();
         assert!(light(0) > 0 && light(1) == 0, "{variant:?}: {} {}", light(0), light(1));
@@ -142,7 +137,7 @@ fn plane(folder: &Path) -> PathBuf {
 }
 
 fn request(index: usize, (x, y): (usize, usize), (width, height): (usize, usize), first: u64) -> Request {
-    Request { tile: Tile { index, x, y, width, height }, first, spp: 1 }
+    Request::new(Tile { index, x, y, width, height }, first, 1)
 }
 
 fn values(source: &mut Sidecar, request: Request) -> Vec<[u32; 3]> {
@@ -275,7 +270,7 @@ fn a_killed_process_is_replaced_and_none_is_left() {
     let mut source = open(CORNELL_BOX, SIZE, variants()[0]);
     let tile = TileGrid::new(SIZE.0, SIZE.1, 32).unwrap().tile(0);
     let sample = |source: &mut Sidecar, first| -> Result<Vec<Rgb>, SourceError> {
-        Ok(source.sample(&[Request { tile, first, spp: 4 }])?.remove(0).mean)
+        Ok(source.sample(&[Request::new(tile, first, 4)])?.remove(0).mean)
     };
     let before = sample(&mut source, 4).unwrap();
     let first = source.process_id().unwrap();
@@ -299,11 +294,11 @@ fn memory_is_flat_over_a_thousand_calls() {
     for variant in variants() {
         let mut source = open(CORNELL_BOX, SIZE, variant);
         let tile = TileGrid::new(SIZE.0, SIZE.1, 32).unwrap().tile(0);
-        let mut call = |first| source.sample(&[Request { tile, first, spp: 4 }]).map(|_| ()).unwrap();
+        let mut call = |first| source.sample(&[Request::new(tile, first, 4)]).map(|_| ()).unwrap();
         (0..100).for_each(&mut call);
         let process = source.process_id().unwrap();
         let before = resident_kib(process);
-        let mut call = |first| source.sample(&[Request { tile, first, spp: 4 }]).map(|_| ()).unwrap();
+        let mut call = |first| source.sample(&[Request::new(tile, first, 4)]).map(|_| ()).unwrap();
         (100..1100).for_each(&mut call);
         let after = resident_kib(process);
         assert!(

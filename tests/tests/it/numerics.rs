@@ -114,7 +114,7 @@ fn uneven_halves_have_the_noise_of_their_mean() {
         let tile = session.film().grid().tile(0);
         let mut first = 0;
         for samples in batches {
-            let request = noisefloor::Request { tile, first, spp: samples };
+            let request = noisefloor::Request::new(tile, first, samples);
             let batch = source().sample(&[request]).unwrap().remove(0);
             session.push(0, samples, &batch.mean).unwrap();
             first += samples;

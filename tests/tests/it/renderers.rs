@@ -63,7 +63,7 @@ fn picture(mut source: impl ProgressiveSource, samples: u64) -> Vec<Rgb> {
     let tiles: Vec<Tile> = TileGrid::new(SIZE.0, SIZE.1, 32).unwrap().tiles().collect();
     let mut picture = vec![[0.0; 3]; SIZE.0 * SIZE.1];
     for first in [0, samples] {
-        let requests: Vec<_> = tiles.iter().map(|&tile| Request { tile, first, spp: samples }).collect();
+        let requests: Vec<_> = tiles.iter().map(|&tile| Request::new(tile, first, samples)).collect();
         for Batch { tile, mean, .. } in source.sample(&requests).unwrap() {
             for (i, value) in mean.iter().enumerate() {
                 let pixel = &mut picture[(tile.y + i / tile.width) * SIZE.0 + tile.x + i % tile.width];
@@ -130,11 +130,11 @@ fn the_cornell_box_is_the_same_in_luxcore() {
 fn memory_is_flat_over_a_thousand_calls() {
     let flat = |mut source: Sidecar, calls: u64| {
         let tile = Tile { index: 0, x: 8, y: 8, width: 16, height: 16 };
-        let mut call = |first| drop(source.sample(&[Request { tile, first, spp: 1 }]).unwrap());
+        let mut call = |first| drop(source.sample(&[Request::new(tile, first, 1)]).unwrap());
         (0..calls / 10).for_each(&mut call);
         let process = source.process_id().unwrap();
         let before = resident_kib(process);
-        let mut call = |first| drop(source.sample(&[Request { tile, first, spp: 1 }]).unwrap());
+        let mut call = |first| drop(source.sample(&[Request::new(tile, first, 1)]).unwrap());
         (calls / 10..calls).for_each(&mut call);
         let after = resident_kib(process);
         let name = source.info().name;

@@ -28,7 +28,7 @@ fn stacks_on_disk_are_silent() {
     let tile = Tile { index: 0, x: 0, y: 0, width, height };
     for first in (0..400).step_by(20) {
         let last = first + 20;
-        let mean = source.sample(&[Request { tile, first, spp: 20 }]).unwrap().remove(0).mean;
+        let mean = source.sample(&[Request::new(tile, first, 20)]).unwrap().remove(0).mean;
         let pixels = sum.iter_mut().zip(&mean);
         pixels.for_each(|(sum, new)| sum.iter_mut().zip(new).for_each(|(s, n)| *s += 20.0 * f64::from(*n)));
         let running: Vec<_> = sum.iter().map(|p| p.map(|c| (c / last as f64) as f32)).collect();

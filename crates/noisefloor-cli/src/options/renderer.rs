@@ -43,8 +43,7 @@ pub struct RendererArgs {
     /// estimation of the paper.
     #[arg(long)]
     no_mis: bool,
-    /// Built-in renderer: how samples are distributed. The model was trained on independent ones [default:
-    /// independent].
+    /// Built-in renderer: how samples are distributed [default: sobol].
     #[arg(long, value_enum)]
     sampler: Option<SamplerChoice>,
     /// Built-in renderer: reconstruction filter [default: box].
@@ -62,7 +61,7 @@ pub struct RendererArgs {
 enum SamplerChoice {
     /// Each sample on its own.
     Independent,
-    /// Owen-scrambled Sobol points: less noise, but of a kind that the model has not seen.
+    /// Owen-scrambled Sobol points, independent for each pixel and half: about half as many samples do.
     Sobol,
 }
 
@@ -96,8 +95,8 @@ impl RendererArgs {
             SourceKind::Ptwne(_) => SourceKind::Ptwne(PtwneOptions {
                 estimator: if self.no_mis { Estimator::NextEvents } else { Estimator::Mis },
                 sampling: match self.sampler {
-                    None | Some(SamplerChoice::Independent) => Sampling::Independent,
-                    Some(SamplerChoice::Sobol) => Sampling::Sobol,
+                    Some(SamplerChoice::Independent) => Sampling::Independent,
+                    None | Some(SamplerChoice::Sobol) => Sampling::Sobol,
                 },
                 filter: match self.filter {
                     None | Some(FilterChoice::Box) => Filter::Box,
@@ -120,9 +119,18 @@ impl RendererArgs {
         matches!(self.source, SourceKind::Ptwne(_))
     }
 
-    /// Whether it may sample blocks of a tile by their need. Mitsuba can if it is compiled here.
-    pub fn may_sample_blocks(&self) -> bool {
-        self.is_built_in() || self.source.name() == "mitsuba"
+    /// With independent samples in the built-in renderer, unless others were asked for.
+    #[must_use]
+    pub fn independent_by_default(mut self) -> Self {
+        if self.is_built_in() {
+            self.sampler.get_or_insert(SamplerChoice::Independent);
+        }
+        self
+    }
+
+    /// Samples per pixel between two verdicts, at the least.
+    pub fn step(&self) -> u64 {
+        self.source.step()
     }
 
     /// Refuses options that the source would ignore.

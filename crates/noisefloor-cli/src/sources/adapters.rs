@@ -2,6 +2,7 @@
 
 use super::{Opened, Resources, Source, SourceJob, stem};
 use anyhow::Context;
+use noisefloor::Schedule;
 use noisefloor_luxcore::{Engine, Sampler};
 use noisefloor_sidecar::{CommandOptions, CommandSource, Job, Renderer, Sidecar, SidecarError};
 use std::fmt;
@@ -13,6 +14,8 @@ pub struct Adapter {
     pub name: &'static str,
     pub renderer: &'static Renderer,
     open: fn(&Job) -> Result<Sidecar, SidecarError>,
+    /// Samples per pixel between verdicts, at the least: both halves are then made of whole patterns.
+    pub step: u64,
     /// What keeps it from being all it could be here, and what mends that.
     pub notes: fn() -> Vec<String>,
 }
@@ -23,22 +26,29 @@ pub const ADAPTERS: &[Adapter] = &[
         name: "mitsuba",
         renderer: &noisefloor_mitsuba::RENDERER,
         open: noisefloor_mitsuba::open,
+        step: Schedule::STEP,
         notes: noisefloor_mitsuba::notes,
     },
     luxcore("luxcore", |job| noisefloor_luxcore::open(job, Engine::Path, Sampler::Random)),
-    luxcore("luxcore-sobol", |job| noisefloor_luxcore::open(job, Engine::Path, Sampler::Sobol)),
+    // Sobol points in blocks of 8
+    Adapter {
+        step: 16,
+        ..luxcore("luxcore-sobol", |job| noisefloor_luxcore::open(job, Engine::Path, Sampler::Sobol))
+    },
     luxcore("luxcore-metropolis", |job| noisefloor_luxcore::open(job, Engine::Path, Sampler::Metropolis)),
     luxcore("luxcore-bidir", |job| noisefloor_luxcore::open(job, Engine::Bidir, Sampler::Random)),
     Adapter {
         name: "cycles",
         renderer: &noisefloor_cycles::RENDERER,
         open: noisefloor_cycles::open,
+        // Sobol points in blocks of 16
+        step: 32,
         notes: Vec::new,
     },
 ];
 
 const fn luxcore(name: &'static str, open: fn(&Job) -> Result<Sidecar, SidecarError>) -> Adapter {
-    Adapter { name, renderer: &noisefloor_luxcore::RENDERER, open, notes: Vec::new }
+    Adapter { name, renderer: &noisefloor_luxcore::RENDERER, open, step: Schedule::STEP, notes: Vec::new }
 }
 
 /// An adapter by its name: its functions have other addresses in every run.

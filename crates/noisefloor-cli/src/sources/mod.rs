@@ -9,7 +9,7 @@ use crate::say::note;
 use crate::spell::{JobPath, as_typed};
 use anyhow::{Context, bail};
 use indicatif::ProgressBar;
-use noisefloor::{ProgressiveSource, stills::SampleOrigin};
+use noisefloor::{ProgressiveSource, Schedule, stills::SampleOrigin};
 use noisefloor_image::StackSource;
 use noisefloor_ptwne::{
     Estimator, Filter, Ptwne, ReferenceNoise, RenderOptions, SampleCounts, Sampling, scenes,
@@ -75,6 +75,14 @@ pub struct PtwneOptions {
 }
 
 impl SourceKind {
+    /// Samples per pixel between two verdicts, at the least.
+    pub fn step(&self) -> u64 {
+        match self {
+            Self::Adapter(adapter) => adapter.step,
+            Self::Ptwne(_) | Self::Exr | Self::Command(_) => Schedule::STEP,
+        }
+    }
+
     /// As it is typed.
     pub fn name(&self) -> &'static str {
         match self {

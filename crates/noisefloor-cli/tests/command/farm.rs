@@ -119,30 +119,6 @@ fn killed_farms_give_the_picture_of_one_machine() {
     assert_same(&one, &partial);
 }
 
-/// With blocks, too, files are those of one machine to the byte; so are those from the shards alone.
-#[test]
-fn blocks_on_a_farm_are_those_of_one_machine() {
-    const BLOCKS: &str =
-        "softbox --size 128x64 --tile 32 --blocks 16 --batch 40 --max-spp 120 --seed 5 --threads 1";
-    let folder = tempdir().unwrap();
-    let [one, dir, merged] = ["one", "farm", "merged"].map(|name| folder.path().join(name));
-    render(&one, BLOCKS);
-    plan(&dir, &["--keep-shards"], BLOCKS);
-    succeed(&["farm", "run", text(&dir), "--local", "2", "--quiet"]);
-    let frame = dir.join("frame");
-    let kept = shards(&frame.join("merged"));
-    succeed(
-        &[&["farm", "merge", "--out", text(&merged)], &kept.iter().map(|p| text(p)).collect::<Vec<_>>()[..]]
-            .concat(),
-    );
-    let files = |dir: &Path| ["image.exr", "stops.csv"].map(|name| fs::read(dir.join(name)).unwrap());
-    assert!(files(&one) == files(&frame), "{} and {} differ", one.display(), frame.display());
-    assert_same(&one, &merged);
-    let uneven = |line: &str| line.rsplit(',').next() != line.rsplit(',').nth(1);
-    let stops = fs::read_to_string(one.join("stops.csv")).unwrap();
-    assert!(stops.lines().skip(1).any(uneven), "{stops}");
-}
-
 /// A shard of rubbish, and one that was cut short, are put aside and rendered again.
 #[test]
 fn rubbish_is_named_and_rendered_again() {

@@ -123,4 +123,12 @@ fn shells_and_man_know_the_command() {
     succeed(&["man", folder.path().to_str().unwrap()]);
     let page = std::fs::read_to_string(folder.path().join("noisefloor-render.1")).unwrap();
     assert!(page.contains("max\\-spp") && folder.path().join("noisefloor-farm-plan.1").exists(), "{page}");
+    #[cfg(feature = "lab")]
+    {
+        let lab = || std::process::Command::new(env!("CARGO_BIN_EXE_noisefloor-lab"));
+        let bash = lab().args(["completions", "bash"]).output().unwrap().stdout;
+        assert!(String::from_utf8(bash).unwrap().contains("--leave-one-scene-out"));
+        assert!(lab().arg("man").arg(folder.path()).status().unwrap().success());
+        assert!(folder.path().join("noisefloor-lab-study-serve.1").exists());
+    }
 }

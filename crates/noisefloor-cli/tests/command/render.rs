@@ -1,9 +1,9 @@
-use crate::kit::{FILES, channel, column, fail, json, succeed, table, text, tiny};
+use crate::kit::{FILES, column, json, succeed, table, text, tiny};
 use noisefloor_image::{Picture, read_exr, read_picture};
 use std::path::Path;
 use tempfile::tempdir;
 
-const STOPS: &str = "tile,x,y,width,height,spp,probability,reason,unfamiliar,spp_least,spp_most";
+const STOPS: &str = "tile,x,y,width,height,spp,probability,reason,unfamiliar";
 
 // Long: one run, looked at from all sides
 #[test]
@@ -93,58 +93,13 @@ fn the_same_seed_gives_the_same_files_whatever_the_threads() {
     assert!(one != render("other", "4", "2"), "the same picture from another seed");
 }
 
-/// Blocks get different numbers of samples; tables and channels say which, whatever the threads and however
-/// often the render is interrupted.
-#[test]
-fn blocks_are_sampled_by_their_need() {
-    let folder = tempdir().unwrap();
-    let render = |name: &str, more: &[&str]| {
-        let out = folder.path().join(name);
-        let blocks = ["softbox", "--blocks", "16", "--batch", "40", "--autosave", "0"];
-        succeed(&tiny(text(&out), &[&blocks[..], more].concat()));
-        out
-    };
-    let whole = render("whole", &["--threads", "1"]);
-    let (_, rows) = table(&whole.join("stops.csv"));
-    let number = |row: &Vec<String>, column: usize| row[column].parse::<u64>().unwrap();
-    assert!(rows.iter().all(|row| number(row, 9) <= number(row, 5) && number(row, 5) <= number(row, 10)));
-    assert!(rows.iter().any(|row| number(row, 9) < number(row, 10)), "{rows:?}");
-    // Nobody gets less than a quarter of the most, and the first 32 samples go everywhere
-    assert!(rows.iter().all(|row| 4 * number(row, 9) + 4 >= number(row, 10)), "{rows:?}");
-    let spp = channel(&whole.join("image.exr"), "oracle.spp");
-    let samples = json(&whole.join("report.json"))["samples"].as_f64().unwrap();
-    assert_eq!(spp.iter().map(|&n| f64::from(n)).sum::<f64>(), samples);
-    let average = rows.iter().map(|row| number(row, 5)).sum::<u64>() as f64 / 4.0;
-    assert!((samples / 4096.0 - average).abs() < 1.0, "{samples} {average}");
-
-    let files = |out: &Path| ["image.exr", "stops.csv"].map(|name| std::fs::read(out.join(name)).unwrap());
-    assert!(files(&whole) == files(&render("two", &["--threads", "2"])), "another picture on two threads");
-    let mut out = render("parts", &["--time", "0.001"]);
-    for _ in 0..50 {
-        if json(&out.join("report.json"))["complete"] == true {
-            break;
-        }
-        out = render("parts", &["--time", "0.001", "--resume"]);
-    }
-    assert!(files(&whole) == files(&out), "another picture in parts");
-
-    // Where it cannot be
-    for (more, words) in [
-        (&["--blocks", "24"][..], &["24", "32"][..]),
-        (&["--blocks", "16", "--criterion", "spp:100"], &["--blocks", "oracle"]),
-        (&["--blocks", "16", "--source", "exr"], &["--blocks", "ptwne"]),
-    ] {
-        fail(&tiny(text(&folder.path().join("none")), more), words);
-    }
-}
-
 /// Spaced verdicts stop tiles sooner, and a render may be interrupted between them.
 #[test]
 fn spaced_verdicts_stop_tiles_sooner() {
     let folder = tempdir().unwrap();
     let render = |name: &str, more: &[&str]| {
         let out = folder.path().join(name);
-        // From a little further away, tiles need 100 to 200 samples
+        // From a little further away, tiles need 50 to 100 samples
         let far = ["cornell-box", "--autosave", "0", "--viewing", "desk,distance=0.8"];
         succeed(&tiny(text(&out), &[&far[..], more].concat()));
         out
@@ -154,7 +109,7 @@ fn spaced_verdicts_stop_tiles_sooner() {
     assert!(samples(&spaced) < samples(&every), "{} {}", samples(&spaced), samples(&every));
     let (_, rows) = table(&spaced.join("stops.csv"));
     let stops: Vec<u64> = rows.iter().map(|row| row[5].parse().unwrap()).collect();
-    assert!(stops.iter().all(|spp| *spp >= 100 && spp.is_multiple_of(10)), "{stops:?}");
+    assert!(stops.iter().all(|spp| *spp >= 16 && spp.is_multiple_of(8)), "{stops:?}");
     assert!(stops.iter().any(|spp| !spp.is_multiple_of(100)), "{stops:?}");
 
     let files = |out: &Path| ["image.exr", "stops.csv"].map(|name| std::fs::read(out.join(name)).unwrap());

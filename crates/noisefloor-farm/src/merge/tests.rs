@@ -1,8 +1,8 @@
 use super::*;
 use crate::{Shard, sample, split};
 use noisefloor::{
-    Batch, Driver, Oracle, Params, ProgressiveSource, Repeats, Schedule, SourceError, SourceInfo, Tile,
-    source::{BlockRequest, BlockSamples, SourceIdentity},
+    Batch, Driver, Oracle, Params, ProgressiveSource, Repeats, Schedule, SourceError, SourceInfo,
+    source::SourceIdentity,
 };
 use noisefloor_testkit::Noise;
 use proptest::prelude::*;
@@ -24,30 +24,20 @@ impl ProgressiveSource for Wall {
     }
 
     fn sample(&mut self, requests: &[Request]) -> Result<Vec<Batch>, SourceError> {
-        let batch = |&Request { tile, first, spp }: &Request| {
-            let all = BlockSamples { first, spp };
-            Batch { tile, spp, mean: self.mean(tile, |_, _| all) }
-        };
+        let batch = |r: &Request| Batch { tile: r.tile, spp: r.spp, mean: self.mean(r) };
         Ok(requests.iter().map(batch).collect())
-    }
-
-    fn sample_blocks(&mut self, requests: &[BlockRequest]) -> Result<Option<Vec<Batch>>, SourceError> {
-        let batch = |request: &BlockRequest| {
-            let &BlockRequest { tile, spp, .. } = request;
-            Batch { tile, spp, mean: self.mean(tile, |column, row| request.at(column, row)) }
-        };
-        Ok(Some(requests.iter().map(batch).collect()))
     }
 }
 
 impl Wall {
-    fn mean(&self, tile: Tile, samples: impl Fn(usize, usize) -> BlockSamples) -> Vec<Rgb> {
+    fn mean(&self, &Request { tile, spp, sequence, .. }: &Request) -> Vec<Rgb> {
         let mut mean = Vec::new();
         for pixel in 0..tile.pixels() {
-            let (column, row) = (pixel % tile.width, pixel / tile.width);
-            let (x, y, BlockSamples { first, spp }) = (tile.x + column, tile.y + row, samples(column, row));
+            let (x, y) = (tile.x + pixel % tile.width, tile.y + pixel / tile.width);
             // Sums of pairs of samples would do as well; a mean has the noise of its number of samples
-            let noise = Noise::keyed(&[self.seed, x as u64, y as u64, first, spp]).normal() as f32;
+            let noise =
+                Noise::keyed(&[self.seed, x as u64, y as u64, sequence.number.into(), sequence.first, spp])
+                    .normal() as f32;
             let deviation = 0.004 * x as f32 / (spp as f32).sqrt();
             mean.push([0.3 + deviation * noise; 3]);
         }
@@ -55,36 +45,27 @@ impl Wall {
     }
 }
 
-fn params(spaced: bool, blocks: usize) -> Params {
+fn params(spaced: bool) -> Params {
     let schedule = if spaced { Schedule::Spaced { step: 10 } } else { Schedule::Every { step: 10 } };
-    // The first shares come before the first verdict
-    let min_spp = if blocks == 0 { 10 } else { 40 };
-    Params::default()
-        .with_tile(32)
-        .with_schedule(schedule)
-        .with_min_spp(min_spp)
-        .with_max_spp(200)
-        .with_blocks(blocks)
+    Params::default().with_tile(32).with_schedule(schedule).with_min_spp(10).with_max_spp(200)
 }
 
-fn session(spaced: bool, blocks: usize) -> Session<Oracle> {
-    let mut session = Session::new(80, 48, Oracle::bundled(), params(spaced, blocks)).unwrap();
+fn session(spaced: bool) -> Session<Oracle> {
+    let mut session = Session::new(80, 48, Oracle::bundled(), params(spaced)).unwrap();
     session.set_source(Wall { seed: 3 }.identity().unwrap());
     session
 }
 
-/// Picture, samples of all blocks and all decisions, as the bytes of a checkpoint.
+/// Picture and all decisions, as the bytes of a checkpoint.
 fn outcome(session: &Session<Oracle>) -> Vec<u8> {
     let mut bytes = Vec::new();
     session.checkpoint("farm").unwrap().write(&mut bytes).unwrap();
     bytes
 }
 
-fn one_machine(spaced: bool, blocks: usize) -> Vec<u8> {
-    let mut driver = Driver::new(Wall { seed: 3 }, Oracle::bundled(), params(spaced, blocks)).unwrap();
+fn one_machine(spaced: bool) -> Vec<u8> {
+    let mut driver = Driver::new(Wall { seed: 3 }, Oracle::bundled(), params(spaced)).unwrap();
     driver.run(|_, _| ()).unwrap();
-    let ranges: Vec<(u64, u64)> = (0..6).map(|tile| driver.session().film().spp_range(tile)).collect();
-    assert_eq!(ranges.iter().any(|(least, most)| least < most), blocks > 0, "{ranges:?}");
     outcome(driver.session())
 }
 
@@ -129,12 +110,11 @@ impl Pieces {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 12, ..ProptestConfig::default() })]
 
-    /// However work is split, in whatever order and after how many interruptions shards are merged, with
-    /// blocks or without: picture, stops and all else are those of `Driver` on one machine, to the bit.
+    /// However work is split, in whatever order and after how many interruptions shards are
+    /// merged: picture, stops and all else are those of `Driver` on one machine, to the bit.
     #[test]
-    fn shards_give_the_picture_of_one_machine(seed: u64, spaced: bool, by_blocks: bool) {
-        let blocks = if by_blocks { 16 } else { 0 };
-        let begin = || session(spaced, blocks);
+    fn shards_give_the_picture_of_one_machine(seed: u64, spaced: bool) {
+        let begin = || session(spaced);
         let mut pieces = Pieces::new(seed);
         let mut farm = begin();
         let job = ShardJob::of(Wall { seed: 3 }.identity().unwrap(), &farm);
@@ -153,7 +133,7 @@ proptest! {
             prop_assert_eq!(again, Merged::default(), "a merge repeated adds something");
             prop_assert!(all.problems().is_empty(), "{:?}", all.problems());
         }
-        prop_assert!(outcome(&farm) == one_machine(spaced, blocks));
+        prop_assert!(outcome(&farm) == one_machine(spaced));
         // From scratch, too
         let mut whole = begin();
         let mut shards = ShardSet::gather(&job, &pieces.paths());
@@ -162,14 +142,14 @@ proptest! {
         let taken: u64 = shards.files().iter().map(ShardFile::samples).sum();
         prop_assert!(merged.samples == whole.film().total_samples() && merged.samples <= taken);
         // Nothing is taken ahead of the verdicts that share it out
-        prop_assert!(blocks == 0 || merged.samples == taken);
+        prop_assert_eq!(merged.samples, taken);
     }
 }
 
 /// Whatever is wrong is named, none of it is mixed in, and the rest is merged.
 #[test]
 fn what_is_wrong_is_named_and_never_mixed_in() {
-    let mut farm = session(false, 0);
+    let mut farm = session(false);
     let job = ShardJob::of(Wall { seed: 3 }.identity().unwrap(), &farm);
     let mut pieces = Pieces::new(1);
     while !farm.is_done() {
@@ -183,12 +163,12 @@ fn what_is_wrong_is_named_and_never_mixed_in() {
     let wrong_light = |name: &str, job: ShardJob, batch: (usize, u64, u64)| {
         let mut shard = Shard::new(job);
         let (tile, first, spp) = batch;
-        shard.add(PlannedBatch::even(tile, first, spp), spp, vec![[9.0; 3]; 32 * 32]);
+        shard.add(PlannedBatch::new(tile, first, spp), spp, vec![[9.0; 3]; 32 * 32]);
         shard.write(path(name)).unwrap();
     };
 
     // Damaged in its samples and cut short: of batches that other shards have, too
-    let again = pieces.write(&job, &[PlannedBatch::even(0, 0, 5), PlannedBatch::even(1, 0, 5)]);
+    let again = pieces.write(&job, &[PlannedBatch::new(0, 0, 5), PlannedBatch::new(1, 0, 5)]);
     fs::copy(&again, path("doubled.nfs")).unwrap();
     let mut bytes = fs::read(&again).unwrap();
     fs::remove_file(&again).unwrap();
@@ -208,11 +188,11 @@ fn what_is_wrong_is_named_and_never_mixed_in() {
 
     let names = ["damaged", "doubled", "cut", "rubbish", "seed", "size", "params", "overlap"];
     let bad: Vec<PathBuf> = names.iter().map(|name| path(&format!("{name}.nfs"))).collect();
-    let mut merged = session(false, 0);
+    let mut merged = session(false);
     let mut shards = ShardSet::gather(&job, &[&bad[..], &good].concat());
     shards.merge_into(&mut merged).unwrap();
     shards.find_overlaps(&merged);
-    assert!(outcome(&merged) == one_machine(false, 0));
+    assert!(outcome(&merged) == one_machine(false));
     let said: Vec<String> = shards.problems().iter().map(ToString::to_string).collect();
     for (name, word) in [
         ("damaged", "checksum of tile 1 from sample 0 on differs"),
@@ -230,66 +210,22 @@ fn what_is_wrong_is_named_and_never_mixed_in() {
 
     // Two that contradict each other: neither is used, and what is missing keeps the tile open
     wrong_light("liar.nfs", job.clone(), (0, 0, 5));
-    let mut open = session(false, 0);
+    let mut open = session(false);
     let mut shards = ShardSet::gather(&job, &[&good[..], &[path("liar.nfs")]].concat());
     shards.merge_into(&mut open).unwrap();
     assert!(shards.problems().iter().filter(|p| p.what.contains("contradicts") && p.useless).count() == 2);
     assert_eq!(open.film().spp(0), 0);
 }
 
-/// A batch that is spread over the blocks in another way than the session would spread it is refused, and so
-/// is one of other blocks.
-#[test]
-fn samples_of_other_blocks_are_not_taken() {
-    let mut farm = session(false, 16);
-    let job = ShardJob::of(Wall { seed: 3 }.identity().unwrap(), &farm);
-    let mut pieces = Pieces::new(3);
-    let uneven = loop {
-        let there = ShardSet::gather(&job, &pieces.paths());
-        pieces.render(&job, &farm, &there);
-        ShardSet::gather(&job, &pieces.paths()).merge_into(&mut farm).unwrap();
-        let ahead = PlannedBatch::ahead(&farm);
-        if let Some(batch) = ahead.into_iter().find(|batch| !batch.blocks.is_empty()) {
-            break batch;
-        }
-    };
-    let tile = uneven.tile;
-    let before = farm.film().half_counts(tile);
-    let mut blocks = uneven.blocks.clone();
-    (blocks[0].1, blocks[1].1) = (blocks[1].1 + 1, blocks[0].1);
-    let others = [blocks, uneven.blocks.iter().map(|(first, spp)| (first + 1, *spp)).collect(), vec![]];
-    let path = |name: &str| pieces.folder.path().join(name);
-    for blocks in others {
-        let mut shard = Shard::new(job.clone());
-        let pixels = job.grid().unwrap().tile(tile).pixels();
-        shard.add(PlannedBatch { blocks, ..uneven.clone() }, uneven.spp, vec![[9.0; 3]; pixels]);
-        shard.write(path("other.nfs")).unwrap();
-        let mut shards = ShardSet::gather(&job, &[path("other.nfs")]);
-        assert_eq!(shards.merge_into(&mut farm).unwrap().batches, 0);
-        let [problem] = shards.problems() else { panic!("{:?}", shards.problems()) };
-        assert!(problem.useless && problem.what.contains("over the blocks in another way"), "{problem}");
-    }
-    assert_eq!(farm.film().half_counts(tile), before);
-
-    let coarse = ShardJob { blocks: 32, ..job.clone() };
-    Shard::new(coarse).write(path("coarse.nfs")).unwrap();
-    let shards = ShardSet::gather(&job, &[path("coarse.nfs")]);
-    assert!(shards.problems()[0].what.contains("its edge of blocks is 32, not 16"));
-    // The right one is taken
-    let right = pieces.write(&job, std::slice::from_ref(&uneven));
-    let merged = ShardSet::gather(&job, &[right]).merge_into(&mut farm).unwrap();
-    assert_eq!(merged.batches, 1);
-}
-
 /// Nothing of a shard is needed once its tiles are done or have its samples.
 #[test]
 fn shards_are_used_up() {
-    let mut farm = session(false, 0);
+    let mut farm = session(false);
     let job = ShardJob::of(Wall { seed: 3 }.identity().unwrap(), &farm);
     let mut pieces = Pieces::new(2);
     let tasks = split(vec![(job.grid().unwrap(), PlannedBatch::ahead(&farm))], 1);
     pieces.write(&job, &tasks[0].batches);
-    pieces.write(&job, &[PlannedBatch::even(0, 1000, 5)]);
+    pieces.write(&job, &[PlannedBatch::new(0, 1000, 5)]);
     let mut shards = ShardSet::gather(&job, &pieces.paths());
     assert!(shards.used_up(&farm).is_empty());
     let merged = shards.merge_into(&mut farm).unwrap();

@@ -8,9 +8,9 @@ fn job() -> ShardJob {
 
 fn shard() -> Shard {
     let mut shard = Shard::new(job()).with_render(&"bulb");
-    shard.add(PlannedBatch::even(0, 0, 4), 4, vec![[0.25, f32::NAN, -1.5]; 256]);
-    shard.add(PlannedBatch::even(5, 4, 4), 2, vec![[1e-40, 3.0, f32::MAX]; 32]);
-    shard.add(PlannedBatch::even(1, 8, 4), 0, vec![]);
+    shard.add(PlannedBatch::new(0, 0, 4), 4, vec![[0.25, f32::NAN, -1.5]; 256]);
+    shard.add(PlannedBatch::new(5, 4, 4), 2, vec![[1e-40, 3.0, f32::MAX]; 32]);
+    shard.add(PlannedBatch::new(1, 8, 4), 0, vec![]);
     shard.add_seconds(1.5);
     shard
 }
@@ -77,61 +77,12 @@ fn another_version_is_named() {
     assert!(matches!(ShardFile::open(&path), Err(ShardError::Version(9))));
 }
 
-/// What blocks of a tile got is read as it was written, and a shard without blocks does not mention them.
+/// Plans are short, and are read again as they are.
 #[test]
-fn samples_of_blocks_are_kept() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("a.nfs");
-    // Tiles of 32 with blocks of 16; the second is 8×20 pixels
-    let job = ShardJob { tile: 32, blocks: 16, ..job() };
-    let mut shard = Shard::new(job.clone());
-    let uneven = PlannedBatch { blocks: vec![(9, 5), (7, 2)], ..PlannedBatch::even(1, 8, 4) };
-    shard.add(uneven.clone(), 4, vec![[0.5; 3]; 8 * 20]);
-    shard.add(PlannedBatch::even(0, 0, 3), 3, vec![[0.5; 3]; 32 * 20]);
-    shard.add(PlannedBatch::even(0, 3, 3), 0, vec![]);
-    shard.write(&path).unwrap();
-    let file = ShardFile::open(&path).unwrap();
-    assert_eq!((file.job(), &file.batches()[0].blocks), (&job, &uneven.blocks));
-    assert_eq!(file.samples(), 5 * 8 * 16 + 2 * 8 * 4 + 3 * 32 * 20);
-
-    shard = self::shard();
-    shard.write(&path).unwrap();
-    let text = String::from_utf8_lossy(&std::fs::read(&path).unwrap()).into_owned();
-    assert!(text.contains("\"first\"") && !text.contains("\"blocks\":["));
-}
-
-/// Blocks that a tile does not have, without samples or with too many, and counts that no source of blocks
-/// gives.
-#[test]
-fn impossible_blocks_are_refused() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("a.nfs");
-    let refused = |edge: usize, blocks: &[(u64, u64)], spp: u64| {
-        let mut shard = Shard::new(ShardJob { tile: 32, blocks: edge, ..job() });
-        let batch = PlannedBatch { blocks: blocks.to_vec(), ..PlannedBatch::even(1, 8, 4) };
-        shard.add(batch, spp, vec![[0.5; 3]; 8 * 20]);
-        shard.write(&path).unwrap();
-        match ShardFile::open(&path) {
-            Ok(file) => file.samples() == 0,
-            Err(error) => error.to_string().contains("an impossible batch of tile 1"),
-        }
-    };
-    assert!(!refused(16, &[(9, 5), (7, 2)], 4) && !refused(16, &[], 4) && !refused(0, &[], 3));
-    assert!(refused(0, &[(9, 5), (7, 2)], 4), "blocks of a job without blocks");
-    assert!(refused(32, &[(9, 5), (7, 2)], 4) && refused(16, &[(9, 5)], 4), "another number of blocks");
-    assert!(refused(16, &[(9, 5), (7, 0)], 4), "a block without samples");
-    assert!(refused(16, &[(9, 5), (u64::MAX, 2)], 4) && refused(16, &[(9, 1 << 34), (7, 2)], 4));
-    assert!(refused(16, &[(9, 5), (7, 2)], 3), "fewer samples than asked for");
-}
-
-/// Plans are short where nothing is to be said of blocks, and are read again as they are.
-#[test]
-fn plans_name_blocks_only_where_they_differ() {
-    let plan = [
-        PlannedBatch::even(3, 8, 4),
-        PlannedBatch { blocks: vec![(9, 5), (7, 3)], ..PlannedBatch::even(1, 8, 4) },
-    ];
+fn plans_are_lists_of_numbers() {
+    let plan =
+        [PlannedBatch::new(3, 8, 4), PlannedBatch { sequence: 1, point: 2, ..PlannedBatch::new(1, 8, 4) }];
     let text = serde_json::to_string(&plan).unwrap();
-    assert_eq!(text, "[[3,8,4],[1,8,4,[[9,5],[7,3]]]]");
+    assert_eq!(text, "[[3,8,4,0,8],[1,8,4,1,2]]");
     assert_eq!(serde_json::from_str::<Vec<PlannedBatch>>(&text).unwrap(), plan);
 }

@@ -47,7 +47,7 @@ fn running_means_give_the_batches_back() {
     assert_eq!((info.width, info.height, info.aims), (SIZE.0, SIZE.1, true));
     for (first, last, mean) in &batches {
         for tile in tiles() {
-            let got = stack.sample(&[Request { tile, first: *first, spp: 1 }]).unwrap().remove(0);
+            let got = stack.sample(&[Request::new(tile, *first, 1)]).unwrap().remove(0);
             assert_eq!((got.tile, got.spp), (tile, last - first));
             let want = tile.rows(SIZE.0).flat_map(|row| mean[row].to_vec());
             for (got, want) in got.mean.iter().flatten().zip(want.flatten()) {
@@ -68,7 +68,7 @@ fn pngs_are_linearised_before_the_difference() {
         write_png(folder.path().join(name), SIZE.0, SIZE.1, &vec![code; SIZE.0 * SIZE.1 * 3]).unwrap();
     }
     let mut stack = StackSource::open_running_means(folder.path()).unwrap();
-    let got = stack.sample(&[Request { tile: tiles()[0], first: 10, spp: 10 }]).unwrap().remove(0);
+    let got = stack.sample(&[Request::new(tiles()[0], 10, 10)]).unwrap().remove(0);
     let linear = |code: u8| noisefloor::display::srgb_decode(f32::from(code) / 255.0);
     let want = 2.0 * linear(late) - linear(early);
     assert!((got.mean[0][0] - want).abs() < 1e-6 && (want - 0.6).abs() < 0.01);
@@ -82,7 +82,7 @@ fn batches_are_handed_out_as_they_are() {
     batch(folder.path(), 60, 61, f32::NAN);
     let mut stack = StackSource::open(folder.path()).unwrap();
     let tiles = tiles();
-    let ask = |tile: usize, first, samples| Request { tile: tiles[tile], first, spp: samples };
+    let ask = |tile: usize, first, samples| Request::new(tiles[tile], first, samples);
 
     // Tiles at different depths, answered in the order of the requests; the end is an empty batch
     let got = stack.sample(&[ask(1, 60, 5), ask(0, 0, 1000), ask(1, 20, 1), ask(0, 61, 1)]).unwrap();
@@ -107,14 +107,14 @@ fn requests_that_cannot_be_met() {
     batch(folder.path(), 20, 60, 2.0);
     let mut stack = StackSource::open(folder.path()).unwrap();
     for (first, nearest) in [(7, 0), (15, 20), (1000, 60)] {
-        let error = cause(stack.sample(&[Request { tile: tiles()[0], first, spp: 1 }]).unwrap_err());
+        let error = cause(stack.sample(&[Request::new(tiles()[0], first, 1)]).unwrap_err());
         assert!(matches!(error, StackError::Boundary { near, .. } if near == nearest), "{error}");
     }
     let tile = Tile { x: usize::MAX, ..tiles()[0] };
-    let error = cause(stack.sample(&[Request { tile, first: 0, spp: 1 }]).unwrap_err());
+    let error = cause(stack.sample(&[Request::new(tile, 0, 1)]).unwrap_err());
     assert!(matches!(error, StackError::Tile { .. }), "{error}");
     // What failed before does not spoil what comes after
-    assert_eq!(stack.sample(&[Request { tile: tiles()[0], first: 0, spp: 1 }]).unwrap()[0].spp, 20);
+    assert_eq!(stack.sample(&[Request::new(tiles()[0], 0, 1)]).unwrap()[0].spp, 20);
 }
 
 #[test]
@@ -173,12 +173,12 @@ fn odd_images_are_named_when_they_are_reached() {
     flat_exr(&folder.path().join("batch_00020_00040.exr"), (8, 8), 1.0);
     std::fs::write(folder.path().join("batch_00040_00060.exr"), "not an image").unwrap();
     let mut stack = StackSource::open(folder.path()).unwrap();
-    let error = cause(stack.sample(&[Request { tile: tiles()[0], first: 20, spp: 1 }]).unwrap_err());
+    let error = cause(stack.sample(&[Request::new(tiles()[0], 20, 1)]).unwrap_err());
     assert!(
         matches!(&error, StackError::Size { path, .. } if path.ends_with("batch_00020_00040.exr")),
         "{error}"
     );
-    let error = cause(stack.sample(&[Request { tile: tiles()[0], first: 40, spp: 1 }]).unwrap_err());
+    let error = cause(stack.sample(&[Request::new(tiles()[0], 40, 1)]).unwrap_err());
     assert!(matches!(error, StackError::Picture(PictureError::Foreign { .. })), "{error}");
 }
 

@@ -76,7 +76,7 @@ pub fn render_reference(
     while kept.spp() < job.spp {
         let (first, tiles) = (kept.spp(), kept.film.grid().tiles());
         let spp = (job.spp - first).min(STEP);
-        let requests: Vec<Request> = tiles.map(|tile| Request { tile, first, spp }).collect();
+        let requests: Vec<Request> = tiles.map(|tile| Request::new(tile, first, spp)).collect();
         for batch in source.sample(&requests)? {
             if batch.spp == 0 {
                 return Err(LabError::ShortOfSamples { spp: first });

@@ -10,7 +10,7 @@ use noisefloor::{
     Batch, Film, Params, ProgressiveSource, Request, Rgb, Schedule, Session, StoppingCriterion, Tile,
     TileGrid,
     session::Interruption,
-    source::{BlockRequest, Reference},
+    source::{Reference, Sequence},
 };
 use noisefloor_denoise::Denoiser;
 use noisefloor_vision::VisionModel;
@@ -35,8 +35,7 @@ pub struct Entrant {
 impl Entrant {
     /// A criterion that is about to watch a run of that size. `spec` is how it was asked for.
     ///
-    /// With [blocks](Params::blocks), or with verdicts that are [spaced](Schedule::Spaced) for each tile by
-    /// its need, it does not watch: it renders as a driver would, from the same source.
+    /// With verdicts that are [spaced](Schedule::Spaced) for each tile by its need, it does not watch: it renders as a driver would, from the same source.
     ///
     /// # Errors
     /// [`LabError::Session`] if the parameters are out of range.
@@ -48,7 +47,7 @@ impl Entrant {
     ) -> Result<Self, LabError> {
         let family = spec.split(':').next().unwrap_or_default().to_owned();
         let session = Session::new(width, height, criterion, *params)?;
-        let apart = params.blocks > 0 || matches!(params.schedule, Schedule::Spaced { .. });
+        let apart = matches!(params.schedule, Schedule::Spaced { .. });
         Ok(Self { spec, family, session, apart, own_seconds: 0.0, criterion_seconds: 0.0 })
     }
 
@@ -76,20 +75,14 @@ impl Entrant {
     /// have what they need; `false` if the source has no more.
     fn sample_apart(&mut self, source: &mut dyn ProgressiveSource) -> Result<bool, LabError> {
         let requests = self.session.next_batches();
-        let by_blocks: Option<Vec<BlockRequest>> =
-            requests.iter().map(|request| self.session.block_request(request)).collect();
         let began = Instant::now();
-        let batches = match &by_blocks {
-            Some(blocks) => source.sample_blocks(blocks)?.ok_or_else(|| LabError::Blocks(source.info().name)),
-            None => Ok(source.sample(&requests)?),
-        };
+        let batches = source.sample(&requests)?;
         self.own_seconds += began.elapsed().as_secs_f64();
-        for (place, Batch { tile, spp, mean }) in batches?.into_iter().enumerate() {
-            match by_blocks.as_ref().map(|blocks| &blocks[place]) {
-                _ if spp == 0 => return Ok(false),
-                Some(request) => self.session.push_blocks(request, &mean)?,
-                None => self.session.push(tile.index, spp, &mean)?,
+        for Batch { tile, spp, mean } in batches {
+            if spp == 0 {
+                return Ok(false);
             }
+            self.session.push(tile.index, spp, &mean)?;
         }
         if self.session.is_round_complete() {
             self.judge()?;
@@ -188,12 +181,13 @@ impl Course<'_> {
         denoiser: &mut Option<&mut dyn Denoiser>,
     ) -> Result<(Race, Yardstick), LabError> {
         let info = source.info();
-        let by_blocks = entrants.iter().any(|e| e.session.params().blocks > 0);
-        if by_blocks && source.sample_blocks(&[])?.is_none() {
-            return Err(LabError::Blocks(info.name));
-        }
         let grid = TileGrid::new(info.width, info.height, self.params.tile)?;
-        let mut field = Field { entrants, film: Film::without_halves(grid), costs: Costs::new(grid.len()) };
+        let mut field = Field {
+            entrants,
+            film: Film::without_halves(grid),
+            points: [0; 2],
+            costs: Costs::new(grid.len()),
+        };
         field.show_converged(self.truth)?;
         let mut yardstick: Option<Yardstick> = None;
         let mut curve: Vec<UniformPoint> = Vec::new();
@@ -202,7 +196,7 @@ impl Course<'_> {
             cancelled = self.cancel.load(Ordering::Relaxed);
             let samples = (self.params.max_spp - done).min(self.step);
             // The end of a recording, or of somebody's patience
-            if cancelled || !field.step(source, done, samples)? {
+            if cancelled || !field.step(source, samples)? {
                 break;
             }
             done = field.film.spp(0);
@@ -250,6 +244,8 @@ impl Course<'_> {
 struct Field {
     entrants: Vec<Entrant>,
     film: Film,
+    /// Samples per pixel of either half.
+    points: [u64; 2],
     costs: Costs,
 }
 
@@ -275,19 +271,18 @@ impl Field {
         self.entrants.iter().filter(|e| e.apart && !e.session.is_done()).count()
     }
 
-    /// Gives everybody the next samples of every tile; `false` if the source has no more.
-    fn step(
-        &mut self,
-        source: &mut dyn ProgressiveSource,
-        first: u64,
-        samples: u64,
-    ) -> Result<bool, LabError> {
-        let request = |tile: Tile| Request { tile, first, spp: samples };
+    /// Gives everybody the next samples of every tile, of whichever half has fewer; `false` if the source has no more.
+    fn step(&mut self, source: &mut dyn ProgressiveSource, samples: u64) -> Result<bool, LabError> {
+        // As sessions ask for them: their halves in turn, each a sequence of its own
+        let half = usize::from(self.points[1] < self.points[0]);
+        let sequence = Sequence { number: half as u32, first: self.points[half] };
+        let request = |tile: Tile| Request::new(tile, self.film.spp(0), samples).in_sequence(sequence);
         let requests: Vec<Request> = self.film.grid().tiles().map(request).collect();
         let batches = self.costs.sample(source, &requests)?;
         if batches.len() < requests.len() || batches.iter().any(|b| b.spp == 0) {
             return Ok(false);
         }
+        self.points[half] += samples;
         for Batch { tile, spp: samples, mean } in &batches {
             self.film.add(tile.index, *samples, mean)?;
             let watching = |e: &&mut Entrant| !e.apart && e.session.is_open(tile.index);

@@ -20,7 +20,7 @@ fn lisic9_is_read() {
     let mut stack = StackSource::open(dir.join("Selles")).unwrap();
     let (tile, mut sum, mut first) = (TileGrid::new(800, 800, 128).unwrap().tile(10), 0.0, 0);
     loop {
-        let batch = stack.sample(&[Request { tile, first, spp: 100 }]).unwrap().remove(0);
+        let batch = stack.sample(&[Request::new(tile, first, 100)]).unwrap().remove(0);
         if batch.spp == 0 {
             break;
         }

@@ -1,8 +1,10 @@
 //! The hierarchy against a loop over all surfaces.
 
+use super::tree::is_crowded;
 use super::{Bvh, Hierarchy, Shape};
 use crate::math::{self, Ray, Vec3};
 use crate::rng::{Key, Rng};
+use obvhs::aabb::Aabb;
 
 fn alone_in_scene(own: Bvh) -> Hierarchy {
     Hierarchy::new(own, vec![], vec![])
@@ -71,4 +73,16 @@ fn crowds_make_no_deep_trees() {
         let Shape::Sphere { radius, .. } = shapes[3999] else { unreachable!() };
         assert!((hit.t - (10.0 - radius)).abs() < 1e-5, "{}", hit.t);
     }
+}
+
+/// A crowd is found among more boxes than are looked at, and a lattice of as many boxes is none.
+#[test]
+fn crowds_are_found_by_a_sample() {
+    let cube = |at: Vec3| Aabb::new(at - 0.4, at + 0.4);
+    let lattice = |i: u32| cube(Vec3::new((i % 64) as f32, (i / 64 % 64) as f32, (i / 4096) as f32));
+    let mut boxes: Vec<Aabb> = (0..150_000).map(lattice).collect();
+    assert!(!is_crowded(&boxes));
+    // One of 75 boxes: 2000 that a ray through them meets, more than the 500 that are allowed
+    boxes.iter_mut().step_by(75).for_each(|crowded| *crowded = cube(Vec3::ZERO));
+    assert!(is_crowded(&boxes));
 }

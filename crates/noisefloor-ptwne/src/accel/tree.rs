@@ -3,6 +3,7 @@
 use super::median;
 use super::node::{LEAF, Node, WideRay};
 use crate::math::Vec3;
+use crate::rng;
 use obvhs::{BvhBuildParams, aabb::Aabb, bvh2::Bvh2, bvh2::builder::build_bvh2};
 
 /// Nodes still to visit, with the distance at which each begins.
@@ -19,6 +20,8 @@ impl Waiting {
 /// A ray meets so many boxes of a subtree at most, in the mean, if the tree is to be a good one: to find one
 /// takes time in proportion to that number. Meshes have about 2, forests 20, and n equal boxes have n.
 const CROWDED: f32 = 500.0;
+/// Most boxes that are looked at to tell.
+const SAMPLE: usize = 1 << 16;
 
 #[derive(Clone, Debug)]
 pub(super) struct Tree {
@@ -63,7 +66,7 @@ impl Tree {
                     self.nodes[at].bounds[axis][1][lane] = node.aabb().max[axis];
                 }
                 self.nodes[at].child[lane] = if let Some(prims) = at_most(most, tree, child) {
-                    LEAF | leaf(&prims)
+                    LEAF | leaf(prims.as_slice())
                 } else {
                     let first = node.first_index as usize;
                     let index = self.nodes.len();
@@ -198,33 +201,70 @@ impl Tree {
 
 /// A binary tree over boxes, of which there is at least one.
 fn binary(boxes: &[Aabb]) -> Bvh2 {
-    let halved = median::tree(boxes);
-    if median::crowding(&halved) > CROWDED {
-        return halved;
+    if is_crowded(boxes) {
+        return median::tree(boxes);
     }
-    drop(halved);
     let params = BvhBuildParams {
         pre_split: false,      // would need triangles
         max_prims_per_leaf: 1, // leaves are made of the tree
-        ..BvhBuildParams::slow_build()
+        // A second round, and more in the first, take half of the time of loading, and rays are no faster
+        reinsertion_batch_ratio: 0.05,
+        post_collapse_reinsertion_batch_ratio_multiplier: 0.0,
+        ..BvhBuildParams::medium_build()
     };
     build_bvh2(boxes, params, &mut std::time::Duration::default())
 }
 
-/// The boxes below a node, if there are at most `most`.
-fn at_most(most: usize, tree: &Bvh2, root: usize) -> Option<Vec<u32>> {
-    let (mut found, mut todo) = (vec![], vec![root]);
-    while let Some(index) = todo.pop() {
-        let node = &tree.nodes[index];
-        let first = node.first_index as usize;
-        if node.is_leaf() {
-            found.extend(&tree.primitive_indices[first..first + node.prim_count as usize]);
-        } else {
-            todo.extend([first, first + 1]);
-        }
-        if found.len() + todo.len() > most {
-            return None;
-        }
+/// Whether too many boxes overlap, judged by a sample of them: in a sample of one in n, a ray meets an n-th of
+/// the boxes of a crowd. Crowds of less than a few n boxes are not found, and are too small to matter.
+pub(super) fn is_crowded(boxes: &[Aabb]) -> bool {
+    let step = boxes.len().div_ceil(SAMPLE);
+    let limit = (CROWDED / step as f32).max(8.0);
+    if step == 1 {
+        return median::crowding(&median::tree(boxes)) > limit;
     }
-    Some(found)
+    // One of each `step`, at random, so that no order of a file can hide a crowd
+    let sample = boxes.chunks(step).enumerate();
+    let sample: Vec<Aabb> =
+        sample.map(|(i, part)| part[(rng::hash(0, i as u32) * part.len() as f32) as usize]).collect();
+    median::crowding(&median::tree(&sample)) > limit
+}
+
+/// Up to four boxes, by index.
+#[derive(Clone, Copy, Default)]
+struct Few {
+    boxes: [u32; 4],
+    len: usize,
+}
+
+impl Few {
+    fn as_slice(&self) -> &[u32] {
+        &self.boxes[..self.len]
+    }
+}
+
+/// The boxes below a node, if there are at most `most` ≤ 4.
+fn at_most(most: usize, tree: &Bvh2, root: usize) -> Option<Few> {
+    let mut found = Few::default();
+    gather(most, tree, root, &mut found).then_some(found)
+}
+
+/// Adds the boxes below a node to `found`. Returns whether there are at most `most` in all.
+fn gather(most: usize, tree: &Bvh2, root: usize, found: &mut Few) -> bool {
+    let node = &tree.nodes[root];
+    let first = node.first_index as usize;
+    if !node.is_leaf() {
+        // Each child has one box at least
+        return found.len + 2 <= most
+            && gather(most - 1, tree, first, found)
+            && gather(most, tree, first + 1, found);
+    }
+    for index in &tree.primitive_indices[first..first + node.prim_count as usize] {
+        if found.len >= most {
+            return false;
+        }
+        found.boxes[found.len] = *index;
+        found.len += 1;
+    }
+    true
 }

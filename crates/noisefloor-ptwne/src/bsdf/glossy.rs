@@ -322,7 +322,7 @@ impl<'a> Glossy<'a> {
         };
         let glossy = if self.smooth { 0.0 } else { math::luminance(self.reflectance(wo.z)) / wo.z.max(0.1) };
         let mirror = frame.to_world(Vec3::new(-wo.x, -wo.y, wo.z));
-        Receiver { position, normal, diffuse, glossy, mirror, alpha2: self.ggx.alpha * self.ggx.alpha }
+        Receiver::new(position, normal, diffuse, glossy, mirror, self.ggx.alpha * self.ggx.alpha)
     }
 
     /// f·|cos θᵢ|, and the density of [`Glossy::sample`].

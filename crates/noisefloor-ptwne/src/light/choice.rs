@@ -2,6 +2,7 @@
 
 use super::cluster::Cluster;
 use super::emitter::{Light, LightShape};
+use super::node::Importance;
 use super::receiver::Receiver;
 use super::tree::{LightTree, Pmf};
 use crate::math::{self, Vec3};
@@ -20,6 +21,17 @@ pub(crate) struct Lights {
     only: Option<usize>,
     tree: LightTree,
     far: Vec<FarLight>,
+}
+
+/// What a receiver can expect of all lights: the first step of every choice, and of every probability.
+#[derive(Clone, Debug)]
+pub(crate) struct Prospect {
+    receiver: Receiver,
+    /// Of the clusters at the top of the tree.
+    root: Importance,
+    /// Weights of all far lights, and of the tree beside them.
+    far: Pmf,
+    tree: Pmf,
 }
 
 /// A light that is infinitely far away.
@@ -61,11 +73,37 @@ impl Lights {
         Self { only, tree: LightTree::new(clusters, all.len(), scale, extent), far, all }
     }
 
+    /// What a receiver can expect of the lights.
+    #[inline]
+    pub(crate) fn prospect(&self, receiver: Receiver) -> Prospect {
+        let mut prospect = Prospect::unknown(receiver);
+        self.look(&mut prospect);
+        prospect
+    }
+
+    #[inline]
+    fn look(&self, prospect: &mut Prospect) {
+        if self.only.is_some() {
+            return;
+        }
+        let receiver = prospect.receiver;
+        for far in &self.far {
+            prospect.far.scattered += far.weight(&receiver, false);
+            prospect.far.geometric += far.weight(&receiver, true);
+        }
+        if let Some(root) = self.tree.root(&receiver) {
+            prospect.tree.scattered = root.scattered.element_sum();
+            // By geometry, half of the choices go to far lights
+            prospect.tree.geometric = if prospect.far.geometric > 0.0 { prospect.far.geometric } else { 1.0 };
+            prospect.root = root;
+        }
+    }
+
     /// Chooses a light for a receiver by two numbers uniform in [0, 1), of which the second only extends the
     /// first. Returns its index and the probability of the choice; none if no light was found that can
     /// matter.
     #[inline]
-    pub(crate) fn choose(&self, receiver: &Receiver, u: f32, more: f32) -> Option<(usize, f32)> {
+    pub(crate) fn choose(&self, prospect: &Prospect, u: f32, more: f32) -> Option<(usize, f32)> {
         if let Some(only) = self.only {
             return Some((only, 1.0));
         }
@@ -75,80 +113,65 @@ impl Lights {
         let u = if geometric { u / share } else { (u - share) / (1.0 - share) };
 
         // Far lights first, then the tree
-        let shares = self.shares(receiver);
-        let of_tree = if geometric { shares.geometric } else { shares.scattered };
-        let mut rest = u * f64::from(self.far_weight(receiver, geometric) + of_tree);
+        let of = |weights: Pmf| f64::from(if geometric { weights.geometric } else { weights.scattered });
+        let of_tree = of(prospect.tree);
+        let mut rest = u * (of(prospect.far) + of_tree);
         for far in &self.far {
-            let weight = f64::from(far.weight(receiver, geometric));
+            let weight = f64::from(far.weight(&prospect.receiver, geometric));
             if rest < weight {
-                return Some((far.light, self.pmf(receiver, far.light)));
+                return Some((far.light, prospect.mixed(far.weights(&prospect.receiver))));
             }
             rest -= weight;
         }
         if of_tree <= 0.0 {
             return None;
         }
-        let u = (rest / f64::from(of_tree)).clamp(0.0, 1.0 - f64::EPSILON);
-        let (light, pmf) = self.tree.choose(receiver, u, geometric)?;
-        Some((light, self.combined(receiver, &shares, pmf)))
+        let u = (rest / of_tree).clamp(0.0, 1.0 - f64::EPSILON);
+        let (light, pmf) = self.tree.choose(&prospect.receiver, &prospect.root, u, geometric)?;
+        Some((light, prospect.of_tree(pmf)))
     }
 
     /// The probability with which [`Lights::choose`] chooses a light for a receiver.
     #[inline]
-    pub(crate) fn pmf(&self, receiver: &Receiver, light: usize) -> f32 {
+    pub(crate) fn pmf(&self, prospect: &Prospect, light: usize) -> f32 {
         if let Some(only) = self.only {
             return if only == light { 1.0 } else { 0.0 };
         }
-        let shares = self.shares(receiver);
         if self.tree.contains(light) {
-            return self.combined(receiver, &shares, self.tree.pmf(receiver, light));
+            return prospect.of_tree(self.tree.pmf(&prospect.receiver, &prospect.root, light));
         }
-        let Some(far) = self.far.iter().find(|far| far.light == light) else { return 0.0 };
-        let pmf = Pmf { scattered: far.weight(receiver, false), geometric: far.weight(receiver, true) };
-        self.mixed(receiver, &shares, pmf)
+        let far = self.far.iter().find(|far| far.light == light);
+        far.map_or(0.0, |far| prospect.mixed(far.weights(&prospect.receiver)))
     }
 
     /// Memory that it takes, in bytes.
     pub(crate) fn bytes(&self) -> usize {
         size_of_val(self.all.as_slice()) + self.tree.bytes()
     }
+}
 
-    /// The weights of the tree beside those of [`FarLight::weight`].
+impl Prospect {
+    /// Of lights that are not known.
     #[inline]
-    fn shares(&self, receiver: &Receiver) -> Pmf {
-        match (self.tree.is_empty(), self.far.is_empty()) {
-            (true, _) => Pmf { scattered: 0.0, geometric: 0.0 },
-            (false, true) => Pmf { scattered: 1.0, geometric: 1.0 },
-            // By geometry, half of the choices go to far lights
-            (false, false) => {
-                let geometric = self.far_weight(receiver, true);
-                let geometric = if geometric > 0.0 { geometric } else { 1.0 };
-                Pmf { scattered: self.tree.scattered(receiver), geometric }
-            }
-        }
-    }
-
-    #[inline]
-    fn far_weight(&self, receiver: &Receiver, geometric: bool) -> f32 {
-        self.far.iter().map(|far| far.weight(receiver, geometric)).sum()
+    pub(crate) fn unknown(receiver: Receiver) -> Self {
+        let none = Pmf { scattered: 0.0, geometric: 0.0 };
+        Self { receiver, root: Importance::NONE, far: none, tree: none }
     }
 
     /// The probability of a light of the tree, given that the tree was chosen with the probability `pmf`.
     #[inline]
-    fn combined(&self, receiver: &Receiver, shares: &Pmf, pmf: Pmf) -> f32 {
-        if self.far.is_empty() {
-            return (1.0 - GEOMETRIC_SHARE) * pmf.scattered + GEOMETRIC_SHARE * pmf.geometric;
-        }
-        let (scattered, geometric) = (pmf.scattered * shares.scattered, pmf.geometric * shares.geometric);
-        self.mixed(receiver, shares, Pmf { scattered, geometric })
+    fn of_tree(&self, pmf: Pmf) -> f32 {
+        let (scattered, geometric) =
+            (pmf.scattered * self.tree.scattered, pmf.geometric * self.tree.geometric);
+        self.mixed(Pmf { scattered, geometric })
     }
 
     /// The probability of what has these weights beside all other lights.
     #[inline]
-    fn mixed(&self, receiver: &Receiver, shares: &Pmf, weights: Pmf) -> f32 {
+    fn mixed(&self, weights: Pmf) -> f32 {
         let of = |weight: f32, all: f32| if all > 0.0 { weight / all } else { 0.0 };
-        let scattered = of(weights.scattered, self.far_weight(receiver, false) + shares.scattered);
-        let geometric = of(weights.geometric, self.far_weight(receiver, true) + shares.geometric);
+        let scattered = of(weights.scattered, self.far.scattered + self.tree.scattered);
+        let geometric = of(weights.geometric, self.far.geometric + self.tree.geometric);
         (1.0 - GEOMETRIC_SHARE) * scattered + GEOMETRIC_SHARE * geometric
     }
 }
@@ -168,6 +191,11 @@ impl FarLight {
         };
         let irradiance = f64::from(math::luminance(emitter.radiance)) * f64::from(solid_angle) * scale;
         Some(Self { light, irradiance: irradiance as f32, dir, sin })
+    }
+
+    #[inline]
+    fn weights(&self, receiver: &Receiver) -> Pmf {
+        Pmf { scattered: self.weight(receiver, false), geometric: self.weight(receiver, true) }
     }
 
     /// Its weight for a receiver: an estimate of the light that the receiver scatters, or one, by geometry.

@@ -19,8 +19,13 @@ pub(super) struct Cluster {
     /// Largest angle between a normal and a direction in which its light shines, in radians.
     pub(super) emission: f32,
     pub(super) two_sided: bool,
+    /// How far behind the centre, along the axis, the farthest receiver is. Infinite but for one surface, which
+    /// shines only to the front of its plane.
+    pub(super) behind: f32,
     /// Sum of the intensities along the normals.
     pub(super) intensity: f64,
+    /// Sum of the areas, as seen along the normals.
+    pub(super) area: f32,
     /// Number of lights.
     pub(super) count: u32,
 }
@@ -40,22 +45,40 @@ impl Cluster {
                 (centre, Vec3::splat(radius), radius, everywhere, PI * radius * radius)
             }
             LightShape::Point { position, cone, .. } if cone.inner < -1.0 => {
-                (position, Vec3::ZERO, 0.0, everywhere, 1.0)
+                (position, Vec3::ZERO, 0.0, everywhere, 0.0)
             }
             LightShape::Point { position, axis, cone } => {
                 let (inner, outer) = (cone.inner.acos(), cone.outer.acos());
-                (position, Vec3::ZERO, 0.0, (axis, inner, outer - inner), 1.0)
+                (position, Vec3::ZERO, 0.0, (axis, inner, outer - inner), 0.0)
             }
             LightShape::Projector { position, u, v, axis, .. } => {
                 // All directions up to the corners count alike
                 let corner = u.length_recip().hypot(v.length_recip()).atan();
-                (position, Vec3::ZERO, 0.0, (axis, corner, 0.02), 1.0)
+                (position, Vec3::ZERO, 0.0, (axis, corner, 0.02), 0.0)
             }
             LightShape::Sun { .. } | LightShape::Map | LightShape::Distant { .. } => return None,
         };
-        let intensity = luminance * f64::from(area);
+        // The radiance of lights without size is their intensity
+        let intensity = luminance * if area > 0.0 { f64::from(area) } else { 1.0 };
         let (low, high, two_sided) = (centre - half, centre + half, light.two_sided);
-        Some(Self { low, high, centre, radius, axis, spread, emission, two_sided, intensity, count: 1 })
+        let behind = match light.shape {
+            LightShape::Planar { corner, .. } if !two_sided => axis.dot(centre - corner),
+            _ => f32::INFINITY,
+        };
+        Some(Self {
+            low,
+            high,
+            centre,
+            radius,
+            axis,
+            spread,
+            emission,
+            two_sided,
+            behind,
+            intensity,
+            area,
+            count: 1,
+        })
     }
 
     /// The bounds of both.
@@ -73,7 +96,9 @@ impl Cluster {
             spread,
             emission: self.emission.max(other.emission),
             two_sided: self.two_sided || other.two_sided,
+            behind: f32::INFINITY,
             intensity: self.intensity + other.intensity,
+            area: self.area + other.area,
             count: self.count + other.count,
         }
     }

@@ -12,7 +12,7 @@ mod tree;
 #[cfg(test)]
 mod tests;
 
-pub(crate) use choice::Lights;
+pub(crate) use choice::{Lights, Prospect};
 pub use cone::Falloff;
 pub(crate) use emitter::{Light, LightSample, LightShape};
 pub use punctual::{Profile, Punctual};

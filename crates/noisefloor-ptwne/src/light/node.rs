@@ -23,6 +23,10 @@ pub(super) struct Node {
     radius: Vec4,
     /// The largest reciprocal of a distance: no closer than the radius.
     most_inverse: Vec4,
+    /// Half the edges of the bounding box.
+    half: [Vec4; 3],
+    /// How far behind the centre, along the axis, receivers can be.
+    behind: Vec4,
     axis: [Vec4; 3],
     cos_spread: Vec4,
     sin_spread: Vec4,
@@ -33,6 +37,8 @@ pub(super) struct Node {
     all_round: bool,
     /// Relative to that of all lights.
     intensity: Vec4,
+    /// Seen along the normals.
+    area: Vec4,
     count: Vec4,
     pub(super) child: [u32; 4],
     /// Four times the parent's index, plus its lane; [`NONE`] for the root.
@@ -40,11 +46,16 @@ pub(super) struct Node {
 }
 
 /// The importance of four clusters.
+#[derive(Clone, Copy, Debug)]
 pub(super) struct Importance {
     /// An estimate of the light that the receiver scatters to where it is seen from, were nothing in between.
     pub(super) scattered: Vec4,
     /// By position and direction only, regardless of intensity.
     pub(super) geometric: Vec4,
+}
+
+impl Importance {
+    pub(super) const NONE: Self = Self { scattered: Vec4::ZERO, geometric: Vec4::ZERO };
 }
 
 impl Node {
@@ -54,6 +65,8 @@ impl Node {
             centre: zero,
             radius: Vec4::ZERO,
             most_inverse: Vec4::ZERO,
+            half: zero,
+            behind: Vec4::ZERO,
             axis: zero,
             cos_spread: Vec4::ONE,
             sin_spread: Vec4::ZERO,
@@ -61,6 +74,7 @@ impl Node {
             two_sided: Vec4::ZERO,
             all_round: true,
             intensity: Vec4::ZERO,
+            area: Vec4::ZERO,
             count: Vec4::ZERO,
             child: [NONE; 4],
             parent,
@@ -73,15 +87,18 @@ impl Node {
         for axis in 0..3 {
             self.centre[axis][lane] = cluster.centre[axis];
             self.axis[axis][lane] = cluster.axis[axis];
+            self.half[axis][lane] = 0.5 * cluster.size()[axis] * 1.001;
         }
         // Rounding must not lose a light
         self.radius[lane] = cluster.radius * 1.001;
+        self.behind[lane] = cluster.behind + SLACK * cluster.radius;
         self.most_inverse[lane] = 1.0 / self.radius[lane].max(least);
         (self.sin_spread[lane], self.cos_spread[lane]) = cluster.spread.sin_cos();
         self.cos_emission[lane] = cluster.emission.cos();
         self.two_sided[lane] = if cluster.two_sided { 1.0 } else { 0.0 };
         self.intensity[lane] = (cluster.intensity * scale) as f32;
         self.all_round &= cluster.spread >= PI;
+        self.area[lane] = cluster.area;
         self.count[lane] = cluster.count as f32;
         self.child[lane] = child;
     }
@@ -105,8 +122,11 @@ impl Node {
         };
 
         // The smallest angle at the receiver, and the smallest at the lights
-        let horizon = Angle::new(dot(&to, receiver.normal) * inverse).minus(&sphere).cos;
-        let mut visible = horizon.cmpge(Vec4::splat(-SLACK));
+        let height = dot(&to, receiver.normal);
+        let horizon = Angle::new(height * inverse).minus(&sphere).cos;
+        // The sphere of a large light reaches farther than the light
+        let top = height + dot(&self.half, receiver.normal.abs());
+        let mut visible = horizon.cmpge(Vec4::splat(-SLACK)) & top.cmpge(self.radius * -SLACK);
         let mut facing = Vec4::ONE;
         if !self.all_round {
             let along = self.axis[0] * to[0] + self.axis[1] * to[1] + self.axis[2] * to[2];
@@ -114,7 +134,7 @@ impl Node {
             let cos = Vec4::select(self.two_sided.cmpgt(Vec4::ZERO), cos.abs(), cos);
             let spread = Angle { cos: self.cos_spread, sin: self.sin_spread };
             facing = Angle::new(cos).minus(&spread).minus(&sphere).cos;
-            visible &= facing.cmpge(self.cos_emission - SLACK);
+            visible &= facing.cmpge(self.cos_emission - SLACK) & along.cmple(self.behind);
         }
 
         let near = inverse.min(self.most_inverse);
@@ -125,10 +145,13 @@ impl Node {
             scattering +=
                 receiver.glossy * lobe(mirror, receiver.alpha2, self.radius * self.radius * squared);
         }
+        let facing = facing.max(Vec4::ZERO);
+        // The share of rays scattered by the receiver that find the lights: they need fewer samples
+        let found = self.area * facing * scattering * squared * receiver.share;
         let keep = |x: Vec4| Vec4::select(visible, x, Vec4::ZERO);
         let least = |x: Vec4| x.max(Vec4::splat(LEAST_COSINE));
         Importance {
-            scattered: keep(self.intensity * facing.max(Vec4::ZERO) * scattering * squared),
+            scattered: keep(self.intensity * facing * scattering * squared / (1.0 + found)),
             geometric: keep(self.count * least(facing) * least(horizon) * squared),
         }
     }

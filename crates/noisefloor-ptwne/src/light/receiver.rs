@@ -1,7 +1,7 @@
 //! A point that receives light, as the choice of a light sees it.
 
 use crate::math::Vec3;
-use std::f32::consts::PI;
+use std::f32::consts::{FRAC_1_PI, PI};
 
 /// A point of a surface, and roughly how the surface scatters the light that it receives.
 #[derive(Clone, Copy, Debug)]
@@ -17,20 +17,44 @@ pub(crate) struct Receiver {
     pub(crate) mirror: Vec3,
     /// Square of GGX's α, for the width of the lobe.
     pub(crate) alpha2: f32,
+    /// One over all that it scatters of light from everywhere.
+    pub(super) share: f32,
 }
 
 impl Receiver {
+    /// A receiver with a diffuse part and a lobe; see the fields.
+    #[inline]
+    pub(crate) fn new(
+        position: Vec3,
+        normal: Vec3,
+        diffuse: f32,
+        glossy: f32,
+        mirror: Vec3,
+        alpha2: f32,
+    ) -> Self {
+        let all = PI * diffuse + glossy;
+        Self {
+            position,
+            normal,
+            diffuse,
+            glossy,
+            mirror,
+            alpha2,
+            share: if all > 0.0 { all.recip() } else { 0.0 },
+        }
+    }
+
     /// A Lambertian surface.
     #[inline]
     pub(crate) fn diffuse(position: Vec3, normal: Vec3) -> Self {
-        Self { position, normal, diffuse: 1.0, glossy: 0.0, mirror: normal, alpha2: 1.0 }
+        Self { position, normal, diffuse: 1.0, glossy: 0.0, mirror: normal, alpha2: 1.0, share: FRAC_1_PI }
     }
 
     /// A surface that light from all around reaches, scattered alike: no side is below its horizon.
     #[inline]
     pub(crate) fn all_round(position: Vec3) -> Self {
         let none = Vec3::ZERO;
-        Self { position, normal: none, diffuse: 0.0, glossy: 1.0, mirror: none, alpha2: 1.0 }
+        Self { position, normal: none, diffuse: 0.0, glossy: 1.0, mirror: none, alpha2: 1.0, share: 1.0 }
     }
 }
 

@@ -65,9 +65,9 @@ impl Draw {
         let mut receiver = Receiver::diffuse(self.point(5.0).into(), self.direction());
         if self.0.one() < 0.5 {
             let alpha = 0.01 + self.0.one();
-            receiver.diffuse = self.0.one() - 0.5;
-            receiver.diffuse = receiver.diffuse.max(0.0);
-            (receiver.glossy, receiver.alpha2, receiver.mirror) = (1.0, alpha * alpha, self.direction());
+            let diffuse = (self.0.one() - 0.5).max(0.0);
+            let (position, normal) = (receiver.position, receiver.normal);
+            receiver = Receiver::new(position, normal, diffuse, 1.0, self.direction(), alpha * alpha);
         }
         receiver
     }
@@ -108,15 +108,17 @@ fn lights_are_chosen_with_their_probabilities() {
             let receiver = draw.receiver();
             let mut counts = vec![0; lights.all.len()];
             for i in 0..N {
-                if let Some((light, pmf)) = lights.choose(&receiver, (i as f32 + 0.5) / N as f32, 0.0) {
-                    let again = lights.pmf(&receiver, light);
+                if let Some((light, pmf)) =
+                    lights.choose(&lights.prospect(receiver), (i as f32 + 0.5) / N as f32, 0.0)
+                {
+                    let again = lights.pmf(&lights.prospect(receiver), light);
                     assert!((again - pmf).abs() <= 1e-5 * pmf, "{again} {pmf}");
                     counts[light] += 1;
                 }
             }
             let mut sum = 0.0;
             for (light, count) in counts.iter().enumerate() {
-                let pmf = f64::from(lights.pmf(&receiver, light));
+                let pmf = f64::from(lights.pmf(&lights.prospect(receiver), light));
                 assert!((pmf * N as f64 - f64::from(*count)).abs() < 2.1, "{light}: {count}, {pmf}");
                 sum += pmf;
             }
@@ -135,7 +137,7 @@ fn only_lights_without_effect_have_no_probability() {
             let receiver = draw.receiver();
             for (i, light) in lights.all.iter().enumerate() {
                 // Maps have no samples without their image, and all have a probability
-                if lights.pmf(&receiver, i) > 0.0 || light.power_pmf == 0.0 {
+                if lights.pmf(&lights.prospect(receiver), i) > 0.0 || light.power_pmf == 0.0 {
                     continue;
                 }
                 idle += 1;
@@ -158,13 +160,52 @@ fn near_lights_that_face_the_receiver_are_preferred() {
     let bounds = [Vec3::splat(-8.0), Vec3::splat(8.0)];
     let lights = Lights::new((-5..=5).map(|i| ceiling([i as f32, 2.0, -0.5], 1.0)).collect(), bounds, &[]);
     let receiver = Receiver::diffuse(Vec3::new(2.5, 0.0, 0.0), Vec3::Y);
-    let pmf: Vec<f32> = (0..11).map(|i| lights.pmf(&receiver, i)).collect();
+    let pmf: Vec<f32> = (0..11).map(|i| lights.pmf(&lights.prospect(receiver), i)).collect();
     assert!((0..11).all(|i| pmf[i] <= pmf[7]), "{pmf:?}");
     assert!(pmf[7] > 4.0 * pmf[0], "{pmf:?}");
     // Half of a metal's lobe points at the last lamp
     let mirror = Vec3::new(3.0, 2.0, 0.0).normalize();
-    let metal = Receiver { diffuse: 0.0, glossy: 1.0, mirror, alpha2: 0.01, ..receiver };
-    assert!(lights.pmf(&metal, 10) > 3.0 * lights.pmf(&receiver, 10));
+    let metal = Receiver::new(receiver.position, receiver.normal, 0.0, 1.0, mirror, 0.01);
+    assert!(lights.pmf(&lights.prospect(metal), 10) > 3.0 * lights.pmf(&lights.prospect(receiver), 10));
+}
+
+/// A huge dim panel behind whose plane a receiver lies, or that lies below the receiver's horizon, takes no
+/// samples of two small lamps, although the sphere around it holds the receiver.
+#[test]
+fn panels_that_do_not_reach_the_receiver_take_no_samples() {
+    let panel = |corner, e1, e2| {
+        Light::surface(&Shape::Planar { corner, e1, e2, whole: true }, Vec3::splat(0.5), false, 0)
+    };
+    let (up, far) = (glam::Vec3::Y * 40.0, glam::Vec3::Z * 40.0);
+    // At x = −1 in the back of the receiver, facing −x; and a floor that faces up, half a unit below
+    let wall = panel(glam::Vec3::new(-1.0, -20.0, -20.0), far, up);
+    let floor = panel(glam::Vec3::new(-20.0, -0.5, -20.0), far, glam::Vec3::X * 40.0);
+    let receiver = Receiver::diffuse(Vec3::ZERO, Vec3::Y);
+    for large in [wall, floor] {
+        let lamps = [ceiling([1.0, 3.0, 0.0], 20.0), ceiling([3.0, 3.0, 0.0], 20.0)];
+        let lights = [large].into_iter().chain(lamps).collect();
+        let lights = Lights::new(lights, [Vec3::splat(-20.0), Vec3::splat(20.0)], &[]);
+        assert!(lights.all[0].power_pmf > 0.9, "{}", lights.all[0].power_pmf);
+        let prospect = lights.prospect(receiver);
+        let [panel, near, distant] = [0, 1, 2].map(|i| lights.pmf(&prospect, i));
+        assert_eq!(panel, 0.0);
+        assert!((near + distant - 1.0).abs() < 1e-6 && near > distant, "{near} {distant}");
+    }
+}
+
+/// Two balls in the zenith send as much light. The large one covers r²/d² = 0.16 of what a diffuse receiver
+/// scatters, so it is worth 1/1.16 of the small one; by geometry both are alike.
+#[test]
+fn lights_that_scattered_rays_find_need_fewer_samples() {
+    let ball = |radius: f32| {
+        let centre = glam::Vec3::new(0.0, 8.0, 0.0);
+        Light::surface(&Shape::Sphere { centre, radius }, Vec3::splat(radius.powi(-2)), false, 0)
+    };
+    let lights = Lights::new(vec![ball(3.2), ball(1e-3)], [Vec3::splat(-9.0), Vec3::splat(9.0)], &[]);
+    let prospect = lights.prospect(Receiver::diffuse(Vec3::ZERO, Vec3::Y));
+    let [large, small] = [0, 1].map(|i| lights.pmf(&prospect, i));
+    let expected = 0.8 * 1.16 / 2.16 + 0.2 * 0.5;
+    assert!((small - expected).abs() < 1e-5 && (large - (1.0 - expected)).abs() < 1e-5, "{small} {large}");
 }
 
 /// Power decides what the reference's guide begins with.
@@ -203,7 +244,11 @@ fn lights_that_face_away_from_everything_are_not_chosen() {
     let bounds = [Vec3::NEG_ONE, Vec3::ONE];
     let receiver = Receiver::diffuse(Vec3::ZERO, Vec3::Y);
     let lights = Lights::new(vec![below(), ceiling([-1.0, 1.0, -1.0], 1.0)], bounds, &[]);
-    assert_eq!((lights.pmf(&receiver, 0), lights.pmf(&receiver, 1)), (0.0, 1.0));
+    assert_eq!(
+        (lights.pmf(&lights.prospect(receiver), 0), lights.pmf(&lights.prospect(receiver), 1)),
+        (0.0, 1.0)
+    );
     assert_eq!(lights.all[0].power_pmf, 0.0);
-    assert!(Lights::new(vec![below()], bounds, &[]).choose(&receiver, 0.5, 0.0).is_none());
+    let lights = Lights::new(vec![below()], bounds, &[]);
+    assert!(lights.choose(&lights.prospect(receiver), 0.5, 0.0).is_none());
 }

@@ -58,30 +58,31 @@ impl LightTree {
         tree
     }
 
-    /// Whether it has no lights.
-    pub(super) fn is_empty(&self) -> bool {
-        self.nodes.is_empty()
-    }
-
     /// Whether the light is in the tree.
     pub(super) fn contains(&self, light: usize) -> bool {
         self.slot[light] != NONE
     }
 
-    /// An estimate of the light that the receiver scatters, from all lights.
+    /// The importance of the clusters at the top; none if there are no lights.
     #[inline]
-    pub(super) fn scattered(&self, receiver: &Receiver) -> f32 {
-        self.nodes[0].importance(receiver).scattered.element_sum()
+    pub(super) fn root(&self, receiver: &Receiver) -> Option<Importance> {
+        Some(self.nodes.first()?.importance(receiver))
     }
 
-    /// Chooses a light by `u`, uniform in [0, 1): by geometry, or by scattered light. Returns its index and
-    /// both probabilities; none if the number leads to lights that send no light to the receiver.
+    /// Chooses a light by `u`, uniform in [0, 1): by geometry, or by scattered light. `root` is that of
+    /// [`LightTree::root`]. Returns its index and both probabilities; none if the number leads to lights that
+    /// send no light to the receiver.
     #[inline(never)]
-    pub(super) fn choose(&self, receiver: &Receiver, mut u: f64, geometric: bool) -> Option<(usize, Pmf)> {
+    pub(super) fn choose(
+        &self,
+        receiver: &Receiver,
+        root: &Importance,
+        mut u: f64,
+        geometric: bool,
+    ) -> Option<(usize, Pmf)> {
         let mut pmf = Pmf { scattered: 1.0, geometric: 1.0 };
-        let mut node = &self.nodes[0];
+        let (mut node, mut importance) = (&self.nodes[0], *root);
         loop {
-            let importance = node.importance(receiver);
             let weights = if geometric { importance.geometric } else { importance.scattered };
             let (lane, rest) = pick(weights.to_array(), u)?;
             u = rest;
@@ -91,20 +92,24 @@ impl LightTree {
                 return Some(((child & !LIGHT) as usize, pmf));
             }
             node = &self.nodes[child as usize];
+            importance = node.importance(receiver);
         }
     }
 
     /// The probabilities with which [`LightTree::choose`] chooses a light.
     #[inline(never)]
-    pub(super) fn pmf(&self, receiver: &Receiver, light: usize) -> Pmf {
+    pub(super) fn pmf(&self, receiver: &Receiver, root: &Importance, light: usize) -> Pmf {
         let mut pmf = Pmf { scattered: 1.0, geometric: 1.0 };
         let mut slot = self.slot[light];
-        while slot != NONE {
-            let node = &self.nodes[(slot >> 2) as usize];
-            pmf.times(&node.importance(receiver), (slot & 3) as usize);
+        loop {
+            let (node, lane) = (&self.nodes[(slot >> 2) as usize], (slot & 3) as usize);
+            if node.parent == NONE {
+                pmf.times(root, lane);
+                return pmf;
+            }
+            pmf.times(&node.importance(receiver), lane);
             slot = node.parent;
         }
-        pmf
     }
 
     /// Memory that it takes, in bytes.

@@ -37,7 +37,7 @@ fn tiles_and_batches_change_nothing_but_rounding() {
             }
         }
         let tiles = TileGrid::new(40, 40, 16).unwrap().tiles();
-        let mut requests: Vec<Request> = tiles.map(|tile| Request { tile, first: 0, spp: 32 }).collect();
+        let mut requests: Vec<Request> = tiles.map(|tile| Request::new(tile, 0, 32)).collect();
         requests.reverse();
         let batches = source.sample(&requests).unwrap();
         for (request, batch) in requests.iter().zip(&batches) {
@@ -146,9 +146,9 @@ fn bad_options_and_tiles_are_errors() {
     let options = RenderOptions { threads: NonZeroUsize::new(1 << 20), ..RenderOptions::default() };
     assert!(matches!(Ptwne::new(scene(), 10, 10, options), Err(RenderError::Option { name: "threads", .. })));
     let tile = TileGrid::new(64, 64, 32).unwrap().tile(3);
-    assert!(cornell(RenderOptions::default()).sample(&[Request { tile, first: 0, spp: 1 }]).is_err());
+    assert!(cornell(RenderOptions::default()).sample(&[Request::new(tile, 0, 1)]).is_err());
     let tile = TileGrid::new(40, 40, 32).unwrap().tile(3);
-    let none = cornell(RenderOptions::default()).sample(&[Request { tile, first: 0, spp: 0 }]).unwrap();
+    let none = cornell(RenderOptions::default()).sample(&[Request::new(tile, 0, 0)]).unwrap();
     assert!(none[0].spp == 0 && none[0].mean.is_empty());
 }
 
@@ -169,7 +169,7 @@ fn background_tiles_trace_no_rays() {
     let whole = batch(&mut source, 0, 4);
     assert_eq!(source.counts().background, 0);
     let tiles = TileGrid::new(96, 96, 32).unwrap().tiles();
-    let requests: Vec<Request> = tiles.map(|tile| Request { tile, first: 0, spp: 4 }).collect();
+    let requests: Vec<Request> = tiles.map(|tile| Request::new(tile, 0, 4)).collect();
     for batch in source.sample(&requests).unwrap() {
         let part: Vec<_> = batch.tile.rows(96).flat_map(|row| whole[row].to_vec()).collect();
         assert_eq!(batch.mean, part);

@@ -17,7 +17,7 @@ pub(crate) fn scene(camera: Camera, fill: impl FnOnce(&mut SceneBuilder)) -> Sce
 pub(crate) fn batch(source: &mut Ptwne, first: u64, samples: u64) -> Vec<Rgb> {
     let (width, height) = (source.info().width, source.info().height);
     let tile = Tile { index: 0, x: 0, y: 0, width, height };
-    let mut batches = source.sample(&[Request { tile, first, spp: samples }]).unwrap();
+    let mut batches = source.sample(&[Request::new(tile, first, samples)]).unwrap();
     assert_eq!((batches.len(), batches[0].spp), (1, samples));
     batches.remove(0).mean
 }

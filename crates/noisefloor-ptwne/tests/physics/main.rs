@@ -20,5 +20,6 @@ mod mis; // next events, scattering, and both
 mod models; // glTF's, Mitsuba's and pbrt's layered surfaces
 mod points; // spots and projectors
 mod reference; // how free of noise the reference is
-mod relief; // normal maps, bumps, coats, colours of corners
+mod relief;
+mod sampling; // normal maps, bumps, coats, colours of corners
 mod stiff; // scenes with known trouble

@@ -11,15 +11,14 @@ A renderer pushes samples into a Session, which names the tiles that need more a
         session.judge()
     picture = session.image()
 
-check() tries a renderer before that, judge() judges finished pictures, and metrics() compares two. Pictures are arrays of shape (height, width, 3)
-with linear radiance, Rec. 709 primaries. C-contiguous float32 arrays are read where they lie; others are
-converted.
-Every error is a noisefloor.Error.
+check() tries a renderer before that, judge() judges finished pictures, metrics() compares two, and read()
+and write() know EXR and PNG files. Pictures are arrays of shape (height, width, 3) with linear radiance,
+Rec. 709 primaries. C-contiguous float32 arrays are read where they lie; others are converted. Requests can
+be pickled, so that other processes can render. Every error is a noisefloor.Error.
 """
 
 from ._noisefloor import (
     BatchError,
-    Blocks,
     CheckpointError,
     CriterionError,
     Error,
@@ -44,11 +43,12 @@ from ._noisefloor import (
     eyes,
     judge,
     metrics,
+    read,
+    write,
 )
 
 __all__ = [
     "BatchError",
-    "Blocks",
     "CheckpointError",
     "CriterionError",
     "Error",
@@ -72,4 +72,6 @@ __all__ = [
     "eyes",
     "judge",
     "metrics",
+    "read",
+    "write",
 ]

@@ -40,6 +40,6 @@ fn picture(scene: &Arc<Scene>, max_depth: u32) -> Option<Vec<f32>> {
     let options = RenderOptions { max_depth, ..RenderOptions::default() };
     let mut source = Ptwne::new(scene.clone(), EDGE, EDGE, options).ok()?;
     let tile = Tile { index: 0, x: 0, y: 0, width: EDGE, height: EDGE };
-    let batches = source.sample(&[Request { tile, first: 0, spp: SAMPLES }]).ok()?;
+    let batches = source.sample(&[Request::new(tile, 0, SAMPLES)]).ok()?;
     Some(batches.first()?.mean.iter().map(|pixel| luminance(*pixel)).collect())
 }

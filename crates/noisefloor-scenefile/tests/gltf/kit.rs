@@ -196,7 +196,7 @@ pub(crate) fn render(loaded: Loaded, size: usize, samples: u64, max_depth: u32) 
     let options = RenderOptions { max_depth, seed: 5, ..RenderOptions::default() };
     let mut source = Ptwne::new(loaded.scene, size, size, options).unwrap();
     let tile = Tile { index: 0, x: 0, y: 0, width: size, height: size };
-    source.sample(&[Request { tile, first: 0, spp: samples }]).unwrap().remove(0).mean
+    source.sample(&[Request::new(tile, 0, samples)]).unwrap().remove(0).mean
 }
 
 /// What is seen directly of the red channel, as a drawing: `#` above ½, `.` below.

@@ -82,7 +82,7 @@ pub(crate) fn look(loaded: Loaded) -> Rgb {
     let mut source =
         Ptwne::new(loaded.scene, 1, 1, RenderOptions { seed: 1, ..RenderOptions::default() }).unwrap();
     let tile = TileGrid::new(1, 1, 16).unwrap().tile(0);
-    source.sample(&[Request { tile, first: 0, spp: 4096 }]).unwrap()[0].mean[0]
+    source.sample(&[Request::new(tile, 0, 4096)]).unwrap()[0].mean[0]
 }
 
 /// Compares two colours to a relative tolerance.

@@ -300,7 +300,7 @@ fn windows_are_parts_of_the_picture() {
         let ((width, height), scene) = picture(film);
         let mut source = Ptwne::new(scene, width, height, RenderOptions::default()).unwrap();
         let tile = Tile { index: 0, x: 0, y: 0, width, height };
-        let mean = source.sample(&[Request { tile, first: 0, spp: 64 }]).unwrap().remove(0).mean;
+        let mean = source.sample(&[Request::new(tile, 0, 64)]).unwrap().remove(0).mean;
         (width, height, mean.iter().map(|p| p[0]).collect::<Vec<f32>>())
     };
     let (_, _, whole) = lit("");

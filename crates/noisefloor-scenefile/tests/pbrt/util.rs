@@ -50,7 +50,7 @@ pub(crate) fn look(loaded: Loaded, side: usize) -> Vec<Rgb> {
     let options = RenderOptions { seed: 1, ..RenderOptions::default() };
     let mut source = Ptwne::new(loaded.scene, side, side, options).unwrap();
     let tile = TileGrid::new(side, side, 64).unwrap().tile(0);
-    source.sample(&[Request { tile, first: 0, spp: 4096 }]).unwrap()[0].mean.clone()
+    source.sample(&[Request::new(tile, 0, 4096)]).unwrap()[0].mean.clone()
 }
 
 /// Compares two colours to a relative tolerance.

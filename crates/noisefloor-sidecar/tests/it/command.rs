@@ -55,7 +55,7 @@ fn a_command_that_aims_renders_tiles() {
         let info = source.info();
         assert_eq!((info.width, info.height, info.aims), (SIZE.0, SIZE.1, true));
         let requests = [(tile(4, 3, 5, 7, 6), 9), (tile(0, 0, 0, 20, 12), 2), (tile(4, 3, 5, 7, 6), 9)]
-            .map(|(tile, samples)| Request { tile, first: 0, spp: samples });
+            .map(|(tile, samples)| Request::new(tile, 0, samples));
         for (request, batch) in requests.iter().zip(source.sample(&requests).unwrap()) {
             assert_eq!((batch.tile, batch.spp), (request.tile, request.spp));
             assert_eq!(batch.mean, expected(&request.tile, request.spp), "{how}");
@@ -75,7 +75,7 @@ fn a_command_that_cannot_aim_renders_all_tiles_at_once() {
     let info = source.info();
     assert_eq!((info.width, info.height, info.aims), (SIZE.0, SIZE.1, false));
     let tiles: Vec<_> = TileGrid::new(SIZE.0, SIZE.1, 16).unwrap().tiles().collect();
-    let requests: Vec<_> = tiles.iter().map(|&tile| Request { tile, first: 0, spp: 5 }).collect();
+    let requests: Vec<_> = tiles.iter().map(|&tile| Request::new(tile, 0, 5)).collect();
     for batch in source.sample(&requests).unwrap() {
         assert_eq!((batch.spp, batch.mean), (5, expected(&batch.tile, 5)));
     }
@@ -126,7 +126,7 @@ fn failures_are_told_with_the_last_words() {
         (options.size, options.timeout) = (Some(SIZE), timeout);
         let mut source = CommandSource::new(&template(&python, folder.path(), &more), options).unwrap();
         let tile = tile(2, 4, 4, 4, 4);
-        let error = source.sample(&[Request { tile, first: 0, spp: 1 }]).unwrap_err();
+        let error = source.sample(&[Request::new(tile, 0, 1)]).unwrap_err();
         let SourceError::Failed { tile: Some(2), cause, .. } = &error else { panic!("{error:?}") };
         assert!(cause.to_string().contains(words), "{how}: {cause}");
     }
@@ -145,14 +145,14 @@ fn a_command_leaves_nothing_and_takes_any_name() {
     let mut options = options(None);
     (options.scene, options.size) = (Some(scene), Some(SIZE));
     let mut source = CommandSource::new(&template(&python, folder.path(), more), options.clone()).unwrap();
-    source.sample(&[Request { tile: tile(0, 0, 0, 4, 4), first: 0, spp: 1 }]).unwrap();
+    source.sample(&[Request::new(tile(0, 0, 0, 4, 4), 0, 1)]).unwrap();
     let pid = std::fs::read_to_string(folder.path().join("log.fork")).unwrap();
     let pid = pid.parse().unwrap();
     assert!(crate::life::gone_within(pid, Duration::from_secs(10)), "process {pid} is left behind");
 
     let more = "x0={x0} x1={x1} y0={y0} y1={y1} exists={scene} how=paint";
     let mut source = CommandSource::new(&template(&python, folder.path(), more), options).unwrap();
-    let error = source.sample(&[Request { tile: tile(0, 0, 0, 4, 4), first: 0, spp: 1 }]).unwrap_err();
+    let error = source.sample(&[Request::new(tile(0, 0, 0, 4, 4), 0, 1)]).unwrap_err();
     let said = error.source().unwrap().to_string();
     assert!(said.contains("\\u{1b}]0;owned\\u{7}") && !said.contains('\x1b'), "{said:?}");
 }

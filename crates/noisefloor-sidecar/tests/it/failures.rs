@@ -57,7 +57,7 @@ fn the_last_words_are_told() {
     let Some(fake) = Fake::new("die") else { return };
     let mut source = fake.open().unwrap();
     source.sample(&requests(0, 1)).unwrap();
-    let one = Request { tile: tiles()[3], first: 1, spp: 1 };
+    let one = Request::new(tiles()[3], 1, 1);
     let error = source.sample(&[one]).unwrap_err();
     let SourceError::Failed { name, tile, .. } = &error else { panic!("{error:?}") };
     assert_eq!((name.as_str(), *tile), ("Fake 1", Some(3)));

@@ -80,8 +80,6 @@ class Fake:
             host._end = lambda: time.sleep(1000)
         if self.told("stop late"):
             self.info["late"] = 1 << 17
-        if self.options.get("how") in ("sample blocks", "be exhausted"):
-            self.info["blocks"] = True
         if self.options.get("how") == "change" and starts > 1:
             self.info["width"] += 1
 

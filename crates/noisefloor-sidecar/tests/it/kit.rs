@@ -68,12 +68,12 @@ pub(crate) fn tiles() -> Vec<Tile> {
 }
 
 pub(crate) fn requests(first: u64, samples: u64) -> Vec<Request> {
-    tiles().into_iter().map(|tile| Request { tile, first, spp: samples }).collect()
+    tiles().into_iter().map(|tile| Request::new(tile, first, samples)).collect()
 }
 
 /// What fake_host.py renders.
 pub(crate) fn expected(seed: u64, request: &Request) -> Vec<Rgb> {
-    let Request { tile, first, spp: samples } = *request;
+    let Request { tile, first, spp: samples, .. } = *request;
     let value = |x: usize, y: usize, s: u64, c: usize| {
         let mixed = (seed * 31 + x as u64 * 7 + y as u64 * 13 + s * 17 + c as u64 * 5) % 97;
         mixed as f64 / 97.0

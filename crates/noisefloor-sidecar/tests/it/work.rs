@@ -1,8 +1,5 @@
 use crate::kit::{Fake, SIZE, expected, requests, tiles};
-use noisefloor::{
-    ProgressiveSource, Repeats, Request, SourceError, Tile, Unit,
-    source::{BlockRequest, BlockSamples, Reference},
-};
+use noisefloor::{ProgressiveSource, Repeats, Request, Tile, Unit, source::Reference};
 use std::num::NonZeroUsize;
 
 #[test]
@@ -29,38 +26,6 @@ fn samples_come_as_they_were_rendered() {
     assert!(source.restarts().is_empty());
 }
 
-/// Blocks are asked for as tiles of their own, and come back in their places.
-#[test]
-fn blocks_get_what_was_asked_for() {
-    let requests = |first: u64| -> Vec<BlockRequest> {
-        let request = |tile: Tile| {
-            let count = tile.width.div_ceil(16) * tile.height.div_ceil(16);
-            let samples = |block| BlockSamples { first: first + block, spp: 1 + block % 3 };
-            BlockRequest { tile, spp: 2, edge: 16, blocks: (0..count as u64).map(samples).collect() }
-        };
-        tiles().into_iter().map(request).collect()
-    };
-    let Some(fake) = Fake::new("sample blocks") else { return };
-    let batches = fake.open().unwrap().sample_blocks(&requests(7)).unwrap().unwrap();
-    for (request, batch) in requests(7).iter().zip(&batches) {
-        assert_eq!((batch.tile, batch.spp), (request.tile, request.spp));
-        for (at, mean) in batch.mean.iter().enumerate() {
-            let (column, row) = (at % request.tile.width, at / request.tile.width);
-            let BlockSamples { first, spp } = request.at(column, row);
-            let (x, y) = (request.tile.x + column, request.tile.y + row);
-            let pixel = Tile { x, y, width: 1, height: 1, ..request.tile };
-            assert_eq!(expected(5, &Request { tile: pixel, first, spp }), [*mean], "{x} {y}");
-        }
-    }
-
-    // A renderer that does not say so is not asked, and one that gives something else is at fault
-    let Some(other) = Fake::new("work") else { return };
-    assert!(other.open().unwrap().sample_blocks(&requests(0)).unwrap().is_none());
-    let Some(exhausted) = Fake::new("be exhausted") else { return };
-    let error = exhausted.open().unwrap().sample_blocks(&requests(1)).unwrap_err();
-    assert!(matches!(&error, SourceError::Contract { what, .. } if what.contains("tile 1")), "{error}");
-}
-
 #[test]
 fn what_is_asked_for_reaches_the_renderer() {
     let Some(mut fake) = Fake::new("work") else { return };
@@ -73,7 +38,7 @@ fn what_is_asked_for_reaches_the_renderer() {
     assert_eq!(source.warnings(), ["max_depth 4, threads 2"]);
     assert_eq!((source.info().width, source.info().height), (33, 17));
     let tile = Tile { index: 0, x: 1, y: 2, width: 5, height: 3 };
-    let request = Request { tile, first: 0, spp: 1 };
+    let request = Request::new(tile, 0, 1);
     let mean = source.sample(&[request]).unwrap().remove(0).mean;
     // Seeds go through JSON whole: 64 bits, where a double has 53
     let seed = ((u128::from(u64::MAX / 31) * 31) % 97) as u64;
@@ -95,8 +60,7 @@ fn a_reference_comes_whole() {
 fn many_tiles_are_several_calls() {
     let Some(fake) = Fake::new("work") else { return };
     let tile = |i: usize| Tile { index: i, x: i % SIZE.0, y: i / SIZE.0 % SIZE.1, width: 1, height: 1 };
-    let requests: Vec<Request> =
-        (0..10_000).map(|i| Request { tile: tile(i), first: i as u64, spp: 1 }).collect();
+    let requests: Vec<Request> = (0..10_000).map(|i| Request::new(tile(i), i as u64, 1)).collect();
     let batches = fake.open().unwrap().sample(&requests).unwrap();
     assert!(batches.iter().zip(&requests).all(|(b, r)| b.mean == expected(5, r)));
     assert_eq!(batches.len(), requests.len());

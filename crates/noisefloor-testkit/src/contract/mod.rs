@@ -1,6 +1,5 @@
 //! The contract of a source of samples.
 
-mod blocks;
 mod distribution;
 mod exact;
 mod first_hits;
@@ -13,7 +12,6 @@ mod silence;
 pub use reference::check_reference_is_free_of_noise;
 pub use silence::check_silence;
 
-use blocks::check_blocks;
 use distribution::{LONG, check_distribution};
 use exact::{all_have, check_aiming, check_cut, same};
 use first_hits::check_first_hits;
@@ -50,9 +48,6 @@ const MOST_OF_A_RENDERER: usize = 8;
 ///   of the same construction give the same samples to the bit. [`Repeats::Samples`]: in addition, 8 and then
 ///   24 samples are, but for rounding, the 32 samples asked for at once; and a tile gets the same samples
 ///   when it is asked for alone or at another depth than its neighbours.
-/// - **Blocks**, if the source takes requests for them
-///   ([`ProgressiveSource::sample_blocks`]): batches have the right shape, and with [`Repeats::Samples`] each block
-///   gets, to the bit, the samples that its tile would have got.
 /// - **The distribution** does not depend on how requests are cut: 12 batches of 32 samples against 12 of 8 +
 ///   8 + 8 + 8.
 /// - **Independence**: new samples are independent of those before, in the same tile and in others.
@@ -112,7 +107,6 @@ pub fn check_source<S: ProgressiveSource>(make: impl Fn() -> S) {
     if subject.info.aims {
         check_aiming(subject.start(), four, subject.promises(Repeats::Samples));
     }
-    check_blocks(&subject, four);
     check_independence(&rounds, whole.as_ref(), subject.info.pixels);
     if !playback {
         check_cuts(&subject);

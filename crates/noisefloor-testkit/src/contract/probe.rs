@@ -75,7 +75,7 @@ impl<S: ProgressiveSource> Probe<S> {
 
     /// Asks for the next samples of some tiles, and checks the shape of the answer.
     pub(super) fn ask(&mut self, tiles: &[usize], spp: u64) -> Vec<Batch> {
-        let request = |&i: &usize| Request { tile: self.tiles[i], first: self.taken[i], spp };
+        let request = |&i: &usize| Request::new(self.tiles[i], self.taken[i], spp);
         let requests: Vec<Request> = tiles.iter().map(request).collect();
         let answer = self.source.sample(&requests);
         let batches = answer.unwrap_or_else(|e| panic!("sampling failed: {e} ({e:?})"));

@@ -1,9 +1,9 @@
 use super::*;
-use crate::blocks::{BlockRequest, BlockSamples};
 use crate::criterion::{CriterionError, FixedSpp, StoppingCriterion, Verdict, View};
 use crate::driver::{Driver, Event};
 use crate::oracle::Oracle;
 use crate::source::{Batch, ProgressiveSource, Repeats, Request, SourceError, SourceInfo};
+use crate::tile::Tile;
 use proptest::prelude::*;
 use std::sync::atomic::Ordering;
 
@@ -20,7 +20,7 @@ impl ProgressiveSource for Noise {
             let noise = noisefloor_testkit::Noise::keyed(&[(y * 96 + x) as u64, n]).uniform();
             0.2 + 0.01 * x as f32 * (noise as f32 - 0.5)
         };
-        let batch = |&Request { tile, first, spp: samples }: &Request| {
+        let batch = |&Request { tile, first, spp: samples, .. }: &Request| {
             let pixel = |i: usize| {
                 let (x, y) = (tile.x + i % tile.width, tile.y + i / tile.width);
                 [(first..first + samples).map(|n| sample(x, y, n)).sum::<f32>() / samples as f32; 3]
@@ -28,26 +28,6 @@ impl ProgressiveSource for Noise {
             Batch { tile, spp: samples, mean: (0..tile.pixels()).map(pixel).collect() }
         };
         Ok(requests.iter().map(batch).collect())
-    }
-
-    fn sample_blocks(&mut self, requests: &[BlockRequest]) -> Result<Option<Vec<Batch>>, SourceError> {
-        let mut batches = Vec::new();
-        for request in requests {
-            let (tile, mut mean) = (request.tile, Vec::new());
-            for i in 0..tile.pixels() {
-                let BlockSamples { first, spp } = request.at(i % tile.width, i / tile.width);
-                let pixel = Tile {
-                    x: tile.x + i % tile.width,
-                    y: tile.y + i / tile.width,
-                    width: 1,
-                    height: 1,
-                    ..tile
-                };
-                mean.extend(self.sample(&[Request { tile: pixel, first, spp }])?.remove(0).mean);
-            }
-            batches.push(Batch { tile, spp: request.spp, mean });
-        }
-        Ok(Some(batches))
     }
 }
 
@@ -101,37 +81,6 @@ fn a_run_that_was_broken_off_goes_on_to_the_bit() {
         assert!(!driver.session().is_done(), "{batches}");
         driver.run(|_, _| ()).unwrap();
         assert!(kept(&driver) == kept(&whole), "{batches} batches");
-    }
-}
-
-#[cfg(feature = "bundled-model")]
-#[test]
-fn blocks_keep_their_samples_and_shares() {
-    let params = Params { tile: 48, blocks: 16, schedule: crate::Schedule::Every { step: 40 }, ..params() };
-    let whole = broken_off_with(Oracle::bundled(), params, usize::MAX);
-    let film = whole.session().film();
-    assert!(film.grid().tiles().any(|t| film.spp_range(t.index).0 < film.spp_range(t.index).1));
-    let n = whole.timeline().len();
-    for batches in [1, 2, n / 2, n - 1] {
-        let bytes = kept(&broken_off_with(Oracle::bundled(), params, batches));
-        let checkpoint = Checkpoint::read(&bytes[..]).unwrap();
-        let driver = Driver::new(Noise(Repeats::Samples), Oracle::bundled(), params).unwrap();
-        let mut driver = driver.resume("noise", checkpoint).unwrap();
-        driver.run(|_, _| ()).unwrap();
-        assert!(kept(&driver) == kept(&whole), "{batches} of {n} batches");
-    }
-
-    // What cannot be is refused: too few tiles, too few blocks, no number, more than there is
-    let bytes = kept(&broken_off_with(Oracle::bundled(), params, n - 1));
-    for wrong in [vec![], vec![1.0; 8], vec![f32::NAN; 9], vec![1e9; 9]] {
-        let mut checkpoint = Checkpoint::read(&bytes[..]).unwrap();
-        match wrong.len() {
-            0 => drop(checkpoint.shares.to_mut().pop()),
-            _ => checkpoint.shares.to_mut()[0] = Some(wrong.clone()),
-        }
-        let driver = Driver::new(Noise(Repeats::Samples), Oracle::bundled(), params).unwrap();
-        let said = driver.resume("noise", checkpoint).map(|_| ()).unwrap_err().to_string();
-        assert!(said.contains("shares"), "{wrong:?}: {said}");
     }
 }
 

@@ -1,5 +1,6 @@
 use super::*;
 use crate::criterion::{FixedSpp, Needs, Verdict, View};
+use crate::params::Schedule;
 use crate::session::StopReason;
 use crate::source::{Repeats, SourceInfo};
 use crate::tile::Tile;
@@ -41,7 +42,9 @@ impl ProgressiveSource for Grey {
 }
 
 fn driver(source: Grey, samples: u64) -> Driver<Grey, FixedSpp> {
-    Driver::new(source, FixedSpp(samples), Params { tile: 32, ..Params::default() }).unwrap()
+    let params =
+        Params::default().with_tile(32).with_schedule(Schedule::Spaced { step: 10 }).with_min_spp(100);
+    Driver::new(source, FixedSpp(samples), params).unwrap()
 }
 
 fn reasons<C: StoppingCriterion>(driver: &Driver<Grey, C>) -> Vec<(u64, StopReason)> {
@@ -186,8 +189,7 @@ fn large_pictures_take_turns() {
     let grid = crate::TileGrid::new(7680, 4320, 512).unwrap();
     let mut spp = vec![0; grid.len()];
     for call in 0..60 {
-        let mut requests: Vec<_> =
-            grid.tiles().map(|tile| Request { tile, first: spp[tile.index], spp: 1 }).collect();
+        let mut requests: Vec<_> = grid.tiles().map(|tile| Request::new(tile, spp[tile.index], 1)).collect();
         keep_rearmost(&mut requests);
         let samples: u64 = requests.iter().map(|r| r.tile.pixels() as u64).sum();
         assert!(samples <= CALL_SAMPLES && samples > CALL_SAMPLES - 512 * 512, "{call}: {samples}");

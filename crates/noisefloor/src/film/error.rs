@@ -28,9 +28,6 @@ pub enum FilmError {
         /// Samples claimed now.
         now: u64,
     },
-    /// Block by block, the batch is none that a session of this film asks for.
-    #[error("a batch for blocks of tile {0} that the film does not have, or without samples in one of them")]
-    Blocks(usize),
     /// The system has less memory for a film than it would take.
     #[error("a film of {width}×{height} pixels takes {bytes} bytes of memory, which are not to be had")]
     Memory {

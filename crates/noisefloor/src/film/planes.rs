@@ -1,7 +1,6 @@
 //! A film in a file: what it knows of its tiles, and then its pixels, which memory need not hold twice.
 
 use super::{Film, FilmError, Half};
-use crate::blocks::BlockCounts;
 use crate::rgb::Rgb;
 use crate::tile::TileGrid;
 use serde::{Deserialize, Serialize};
@@ -20,13 +19,12 @@ pub(crate) struct FilmHead {
     halves: Vec<bool>,
     counts: Vec<[u64; 2]>,
     rejected: u64,
-    blocks: Option<BlockCounts>,
 }
 
 #[cfg(test)]
 impl FilmHead {
     pub(crate) fn announcing(grid: TileGrid) -> Self {
-        Self { grid, halves: vec![true; 2], counts: Vec::new(), rejected: 0, blocks: None }
+        Self { grid, halves: vec![true; 2], counts: Vec::new(), rejected: 0 }
     }
 }
 
@@ -41,8 +39,7 @@ impl Film {
 
     pub(crate) fn head(&self) -> FilmHead {
         let halves = self.halves.iter().map(|half| !half.rejected.is_empty()).collect();
-        let (counts, blocks) = (self.counts.clone(), self.blocks.clone());
-        FilmHead { grid: self.grid, halves, counts, rejected: self.rejected, blocks }
+        FilmHead { grid: self.grid, halves, counts: self.counts.clone(), rejected: self.rejected }
     }
 
     /// Writes the pixels: for each half the means (three f32), the carries (three i16) and, if there are any, the
@@ -58,7 +55,7 @@ impl Film {
 
     /// Reads what [`Film::write_pixels`] wrote. Memory grows with what arrives. None if there cannot be such a film.
     pub(crate) fn read_pixels(head: FilmHead, from: &mut dyn Read) -> io::Result<Option<Self>> {
-        let FilmHead { grid, halves, counts, rejected, blocks } = head;
+        let FilmHead { grid, halves, counts, rejected } = head;
         if TileGrid::new(grid.width(), grid.height(), grid.edge()).ok() != Some(grid) || halves.len() > 2 {
             return Ok(None);
         }
@@ -70,7 +67,7 @@ impl Film {
             Ok(Half { mean, carry, rejected })
         };
         let halves = halves.iter().map(&mut half).collect::<io::Result<_>>()?;
-        Ok(Some(Self { grid, halves, counts, rejected, negative: 0, blocks }))
+        Ok(Some(Self { grid, halves, counts, rejected, negative: 0 }))
     }
 }
 

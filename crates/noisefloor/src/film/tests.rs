@@ -1,6 +1,4 @@
 use super::*;
-use crate::blocks::BlockRequest;
-use crate::{FixedSpp, Params, Session};
 use proptest::prelude::*;
 
 fn small() -> Film {
@@ -31,17 +29,6 @@ fn counts_have_a_limit() {
         assert!(film.add_running(1, u64::MAX, &grey).is_err());
     }
     assert_eq!(film.spp(1), (1 << 34) - 1);
-
-    let params = Params { tile: 32, blocks: 16, ..Params::default() };
-    let mut session = Session::new(32, 32, FixedSpp(100), params).unwrap();
-    let asked = session.block_request(&session.requests()[0]).unwrap();
-    for (of_tile, of_block) in [(u64::MAX, 8), (8, u64::MAX)] {
-        let mut blocks = asked.clone();
-        (blocks.spp, blocks.blocks[3].spp) = (of_tile, of_block);
-        let refused = session.push_blocks(&blocks, &[[1.0; 3]; 32 * 32]);
-        assert!(matches!(refused, Err(crate::SessionError::Film(FilmError::TooMany { .. }))), "{refused:?}");
-    }
-    assert_eq!(session.film().total_samples(), 0);
 }
 
 #[test]
@@ -59,22 +46,6 @@ fn non_finite_pixels_are_kept_out_and_counted() {
     assert_eq!(film.rejected(), 10);
     assert_eq!(film.unsampled_pixels(1), 0);
     assert!(image.iter().flatten().all(|c| c.is_finite()));
-}
-
-#[test]
-fn blocks_with_as_many_samples_each_are_a_tile() {
-    let (mut plain, mut blocks) = (small(), small().by_blocks(16).unwrap());
-    let tile = plain.grid().tile(0);
-    for (n, value) in [(5, 0.1f32), (3, 0.7), (40, 0.33)] {
-        let mean: Vec<Rgb> = (0..256).map(|i| [value + i as f32 * 1e-3, value, 0.1 * value]).collect();
-        plain.add(0, n, &mean).unwrap();
-        let alike = vec![crate::blocks::BlockSamples { first: 0, spp: n }];
-        blocks.add_blocks(&BlockRequest { tile, spp: n, edge: 16, blocks: alike }, &mean).unwrap();
-    }
-    assert_eq!(plain.image(), blocks.image());
-    assert_eq!(plain.half_counts(0), blocks.half_counts(0));
-    assert_eq!(plain.total_samples(), blocks.total_samples());
-    assert_eq!(blocks.spp_range(0), (48, 48));
 }
 
 #[test]

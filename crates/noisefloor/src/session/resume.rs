@@ -23,7 +23,6 @@ impl<C: StoppingCriterion> Session<C> {
             display: self.display,
             film: Cow::Borrowed(&self.film),
             tiles: Cow::Borrowed(&self.tiles),
-            shares: Cow::Borrowed(&self.shares),
         })
     }
 
@@ -47,7 +46,6 @@ impl<C: StoppingCriterion> Session<C> {
             state.stop = state.stop.filter(|stop: &Stop| stop.reason.is_final());
         }
         let film = checkpoint.film.into_owned();
-        let shares = checkpoint.shares.into_owned();
-        Ok(Self { film, tiles, shares, display: checkpoint.display, displayed_reference: None, ..self })
+        Ok(Self { film, tiles, display: checkpoint.display, displayed_reference: None, ..self })
     }
 }

@@ -41,9 +41,6 @@ impl<C: StoppingCriterion> Session<C> {
     /// of the verdicts, on other machines. Batches beyond a stop are never asked for by
     /// [`Session::next_batches`].
     ///
-    /// With [`Params::blocks`](crate::Params::blocks) they end at the next verdict, which may change how
-    /// samples are spread over the blocks ([`Session::block_requests_ahead`]).
-    ///
     /// # Panics
     /// If the tile does not exist.
     pub fn batches_ahead(&self, tile: usize) -> Vec<Request> {
@@ -56,7 +53,7 @@ impl<C: StoppingCriterion> Session<C> {
         loop {
             while !self.has_enough(counts, goal) {
                 let batch = self.batch(tile, counts, goal);
-                counts[usize::from(self.film.has_halves() && counts[1] < counts[0])] += batch.spp;
+                counts[batch.sequence.number as usize] += batch.spp;
                 batches.push(batch);
             }
             let samples = counts[0] + counts[1];
@@ -72,9 +69,7 @@ impl<C: StoppingCriterion> Session<C> {
     fn look_ahead(&self, tile: usize) -> u64 {
         let expected = self.tiles[tile].verdict.and_then(|verdict| self.expected(&verdict));
         match (self.params.schedule, expected, self.tiles[tile].goal) {
-            (Schedule::Every { step }, Some(expected), Goal::Verdict { spp, streak: 0 })
-                if self.params.blocks == 0 =>
-            {
+            (Schedule::Every { step }, Some(expected), Goal::Verdict { spp, streak: 0 }) => {
                 Schedule::Spaced { step }.next(self.film.spp(tile), Some(expected), 1.0).max(spp)
             }
             (_, _, goal) => goal.spp(),
@@ -88,7 +83,7 @@ impl<C: StoppingCriterion> Session<C> {
         let had = if self.film.has_halves() { counts[0].min(counts[1]) } else { counts[0] };
         let most = had.max(CALL_SAMPLES / pixels as u64).min(CALL_SAMPLES / tile.pixels() as u64);
         let spp = self.wanted(counts, goal).min(most).max(1);
-        Request { tile, first: counts[0] + counts[1], spp }
+        self.film.request_after(index, counts, spp)
     }
 
     /// Samples that one half of a tile lacks for a verdict at `goal`.

@@ -1,7 +1,7 @@
 //! What is said of each mistake, and that nothing is said of what is right.
 
 use super::*;
-use crate::{FixedSpp, Params, Session, SessionError, source::PixelNoise};
+use crate::{FixedSpp, Params, Schedule, Session, SessionError, source::PixelNoise};
 use noisefloor_testkit::Noise;
 
 const EDGE: usize = 128;
@@ -22,7 +22,8 @@ fn batch(seed: u64, spp: u64) -> Vec<Rgb> {
 
 /// Pushes pictures until `spp` are there or something is said: what, and at how many samples per pixel.
 fn feed(spp: u64, mut picture: impl FnMut(u64) -> (u64, Vec<Rgb>)) -> (Option<Fault>, u64, Vec<Warning>) {
-    let params = Params { tile: 64, max_spp: 1 << 30, min_spp: 0, ..Params::default() };
+    let schedule = Schedule::Spaced { step: 10 };
+    let params = Params { tile: 64, max_spp: 1 << 30, min_spp: 0, schedule, ..Params::default() };
     let mut session = Session::new(EDGE, EDGE, FixedSpp(1 << 29), params).unwrap();
     let mut had = 0;
     for count in 0.. {

@@ -14,8 +14,8 @@ mod study;
 mod train;
 
 use args::{Cli, Command, ELSEWHERE};
-use clap::Parser;
-use noisefloor_cli::end;
+use clap::{CommandFactory, Parser};
+use noisefloor_cli::{end, manual};
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
@@ -37,5 +37,7 @@ fn run(command: Command) -> anyhow::Result<ExitCode> {
         Command::Audience(args) => audience::fit(&args.check()).map(done),
         Command::Explore(args) => explore::run(args.check()?).map(done),
         Command::Study(args) => study::run(args.check()?).map(done),
+        Command::Completions { shell } => manual::completions(Cli::command(), shell).map(done),
+        Command::Man { dir } => manual::man(Cli::command(), &dir).map(done),
     }
 }

@@ -46,7 +46,6 @@ pub enum CriterionJob {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Limits {
     pub tile: usize,
-    pub blocks: usize,
     pub schedule: Schedule,
     pub min_spp: u64,
     pub max_spp: u64,
@@ -98,8 +97,8 @@ impl RenderJob {
 impl Limits {
     /// The parameters of a session that is displayed as `params` says.
     pub fn params(&self, mut params: Params) -> Params {
-        let Self { tile, blocks, schedule, min_spp, max_spp, consecutive, audience } = *self;
-        (params.tile, params.blocks, params.schedule) = (tile, blocks, schedule);
+        let Self { tile, schedule, min_spp, max_spp, consecutive, audience } = *self;
+        (params.tile, params.schedule) = (tile, schedule);
         (params.min_spp, params.max_spp) = (min_spp, max_spp);
         (params.consecutive, params.audience) = (consecutive, audience);
         params

@@ -9,7 +9,6 @@ mod farm;
 mod inspect;
 mod job;
 mod judge;
-mod manual;
 mod metrics;
 mod output;
 mod reference;
@@ -17,7 +16,7 @@ mod render;
 mod scenes;
 
 use args::{Cli, Command, ELSEWHERE, ScenesCommand};
-use noisefloor_cli::end;
+use noisefloor_cli::{end, manual};
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
@@ -44,8 +43,8 @@ fn run(command: Command) -> anyhow::Result<ExitCode> {
         Command::Scenes { command: None } => Ok(inspect::scenes().map(done)?),
         Command::Scenes { command: Some(ScenesCommand::Check(args)) } => scenes::check(args),
         Command::Doctor(args) => doctor::run(&args.check()),
-        Command::Completions { shell } => manual::completions(shell).map(done),
-        Command::Man { dir } => manual::man(dir).map(done),
+        Command::Completions { shell } => manual::completions(Cli::known(), shell).map(done),
+        Command::Man { dir } => manual::man(Cli::known(), &dir).map(done),
     }
 }
 

@@ -73,7 +73,7 @@ proptest! {
 /// What is asked for ahead is what will be asked for, in that order, as long as nothing stops.
 #[test]
 fn batches_ahead_are_those_to_come() {
-    let params = Params { tile: 512, max_spp: 1000, ..Params::default() };
+    let params = Params { tile: 512, min_spp: 100, max_spp: 1000, ..Params::default() };
     let mut session = Session::new(2048, 1024, Neighbours, params).unwrap();
     let mut asked: Vec<Vec<Request>> = vec![Vec::new(); 8];
     let mut ahead = vec![Vec::new(); 8];
@@ -107,9 +107,9 @@ fn batches_ahead_are_those_to_come() {
 
 #[test]
 fn a_count_without_halves_has_batches_too() {
-    let params = Params { tile: 64, max_spp: 250, ..Params::default() };
+    let params = Params { tile: 64, min_spp: 100, max_spp: 250, ..Params::default() };
     let session = Session::new(64, 64, FixedSpp(250), params).unwrap();
     let batches = session.batches_ahead(0);
-    assert_eq!(batches.iter().map(|b| (b.first, b.spp)).collect::<Vec<_>>(), [(0, 100)]);
+    assert_eq!(batches.iter().map(|b| (b.first, b.spp)).collect::<Vec<_>>(), [(0, 104)]);
     assert_eq!(session.next_batches(), batches);
 }

@@ -33,10 +33,10 @@ use std::time::Duration;
 /// has lost at most so many JODs against the converged picture: a yardstick that no render has.
 /// `denoised:JODS` stops a tile as `render --denoise --lost JODS` does.
 ///
-/// `oracle:schedule=spaced:batch=10:min-spp=50:blocks=16` is the oracle with options of `render` in its
-/// words: schedule, batch, min-spp, consecutive and blocks, as many of them as you like. `fine` is what
-/// `render` does, schedule=spaced:batch=10:min-spp=100; without options it judges as often as the rivals
-/// do. With blocks or spaced verdicts it renders by itself, from the same source and seed.
+/// `oracle:schedule=spaced:batch=10:min-spp=50` is the oracle with options of `render` in its words:
+/// schedule, batch, min-spp and consecutive, as many of them as you like. `fine` is what
+/// `render` does, schedule=spaced:batch=8:min-spp=16; without options it judges as often as the rivals
+/// do. With spaced verdicts it renders by itself, from the same source and seed.
 ///
 /// Writes into the output folder: index.html with everything (one file that opens without a server),
 /// runs.csv, runs.json, and for each scene curve.csv, tiles.csv, plots (SVG and PNG), crops with error
@@ -210,23 +210,24 @@ fn criterion(
     Ok(Named { spec: spec.to_owned(), criterion, params })
 }
 
-/// The words of `oracle:batch=100:blocks=16`.
+/// The words of `oracle:batch=100:min-spp=50`.
 fn oracle_params(words: &str, mut params: Params) -> anyhow::Result<Params> {
     let Schedule::Every { step: mut batch } = params.schedule else { bail!("criteria have one schedule") };
     let mut spaced = false;
     for word in words.split(':').filter(|word| !word.is_empty()) {
         let (name, value) = word.split_once('=').unwrap_or((word, ""));
         match (name, value, value.parse::<u32>()) {
-            ("fine", "", _) => (spaced, batch, params.min_spp) = (true, 10, Params::default().min_spp),
+            ("fine", "", _) => {
+                (spaced, batch, params.min_spp) = (true, Schedule::STEP, Params::default().min_spp)
+            }
             ("schedule", "spaced", _) => spaced = true,
             ("schedule", "every", _) => spaced = false,
             ("batch", _, Ok(step)) => batch = step.into(),
-            ("blocks", _, Ok(edge)) => params.blocks = edge as usize,
             ("min-spp", _, Ok(samples)) => params.min_spp = samples.into(),
             ("consecutive", _, Ok(verdicts)) => params.consecutive = verdicts,
             _ => refuse!(
-                "{word:?} is none of fine, schedule=spaced, batch=100, min-spp=50, consecutive=2 and blocks=16, or \
-                 of other numbers"
+                "{word:?} is none of fine, schedule=spaced, batch=100, min-spp=50 and consecutive=2, or of \
+                 other numbers"
             ),
         }
     }

@@ -19,6 +19,8 @@ pub use study::StudyArgs;
 pub use train::TrainArgs;
 
 use clap::{Parser, Subcommand};
+use clap_complete::Shell;
+use std::path::PathBuf;
 
 /// Trains the models of noisefloor, compares stopping criteria, and asks people.
 ///
@@ -47,6 +49,18 @@ pub enum Command {
     Reproduce(ReproduceArgs),
     Study(StudyArgs),
     Explore(ExploreArgs),
+    /// Print completions for a shell.
+    #[command(after_help = "Examples:
+  noisefloor-lab completions bash > ~/.local/share/bash-completion/completions/noisefloor-lab")]
+    Completions {
+        shell: Shell,
+    },
+    /// Write man pages into a folder.
+    #[command(after_help = "Examples:
+  noisefloor-lab man ~/.local/share/man/man1")]
+    Man {
+        dir: PathBuf,
+    },
 }
 
 /// Commands of the other binary.

@@ -257,7 +257,8 @@ impl StudyArgs {
 
 fn stack(args: StackArgs) -> anyhow::Result<StackJob> {
     let StackArgs { scene, renderer, levels, denoise, out } = args;
-    let (source, resources) = renderer.check(Some(&scene))?;
+    // Levels between those rendered are synthesised: their noise has to fall as 1/√n
+    let (source, resources) = renderer.independent_by_default().check(Some(&scene))?;
     let denoise = denoise.map(|word| stack_denoiser(&word, resources.timeout)).transpose()?;
     Ok(StackJob { source, resources, levels, denoise, out })
 }

@@ -192,15 +192,7 @@ impl RenderArgs {
             [("--viewing", self.viewing.typed().is_some()), ("--audience", self.verdicts.audience.is_some())];
         let eyes = if by_oracle { self.eyes.of(self.oracle.model.as_deref(), &said)? } else { None };
         let audience = eyes.as_ref().map_or(Audience::TRAINED, Person::audience);
-        let limits = self.verdicts.limits(
-            self.denoise.is_some(),
-            self.renderer.is_built_in(),
-            self.preset,
-            audience,
-        )?;
-        if limits.blocks > 0 && !(by_oracle && self.renderer.may_sample_blocks()) {
-            refuse!("--blocks is for the oracle, and for --source ptwne or mitsuba; leave it out")
-        }
+        let limits = self.verdicts.limits(self.denoise.is_some(), &self.renderer, self.preset, audience)?;
         let criterion = match (self.denoise, self.verdicts.criterion) {
             (Some(_), _) if self.preset == Some(Preset::Draft) => {
                 CriterionJob::Denoised { lost: self.verdicts.lost.max(DRAFT_LOST) }

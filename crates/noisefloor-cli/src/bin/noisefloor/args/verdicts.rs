@@ -3,7 +3,7 @@
 use crate::job::Limits;
 use clap::{Args, ValueEnum};
 use noisefloor::{Audience, Params, Schedule, tile::DEFAULT_TILE};
-use noisefloor_cli::options::values;
+use noisefloor_cli::options::{renderer::RendererArgs, values};
 use noisefloor_cli::refuse;
 use noisefloor_rivals::RivalSpec;
 
@@ -33,9 +33,9 @@ pub struct VerdictArgs {
     /// T' = a T + b [default: see --eyes].
     #[arg(long, value_name = "WHO", value_parser = values::audience)]
     pub audience: Option<Audience>,
-    /// No tile stops before this many samples per pixel [default: 100, or one batch with --batch or
-    /// --denoise; a quarter with --preset draft]. 50 saves more where little is needed, and light that is
-    /// seldom found is missed more often.
+    /// No tile stops before this many samples per pixel [default: 16, or one batch with --batch or
+    /// --denoise]. Below 100, only tiles stop whose noise is spread over many pixels. More find more of the
+    /// light that is seldom found.
     #[arg(long, value_name = "SPP")]
     pub min_spp: Option<u64>,
     /// Every tile stops at this many samples per pixel [default: 10000; N with --criterion spp:N].
@@ -49,8 +49,8 @@ pub struct VerdictArgs {
         default_value_t = ScheduleChoice::Spaced
     )]
     pub schedule: ScheduleChoice,
-    /// Samples per pixel between two verdicts on a tile, at the least [default: 10, or 100 with --schedule
-    /// every; with --denoise 48, or 16 of other renderers, and then half as many more each time, or more
+    /// Samples per pixel between two verdicts on a tile, at the least [default: 8, more for renderers with
+    /// patterns, or 100 with --schedule every; with --denoise 48, or 16 of other renderers, and then half as many more each time, or more
     /// where few tiles are open].
     #[arg(long, value_name = "SPP")]
     pub batch: Option<u64>,
@@ -65,12 +65,6 @@ pub struct VerdictArgs {
         value_name = "PIXELS"
     )]
     pub tile: usize,
-    /// Sample blocks of this many pixels (16 or 32) of a tile by their need: where the vision model sees
-    /// less noise, a block gets down to a quarter of the samples of the noisiest one. The verdict stays the
-    /// tile's. For the oracle, and for the sources `ptwne` and `mitsuba` (with libLLVM); 0 samples all of a
-    /// tile alike.
-    #[arg(long, default_value_t = 0, value_name = "PIXELS")]
-    pub blocks: usize,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -115,12 +109,11 @@ fn criterion(text: &str) -> Result<CriterionChoice, String> {
 }
 
 impl VerdictArgs {
-    /// When tiles are judged, with or without a denoiser, by the built-in renderer or a slower one; for whom, if
-    /// no audience was typed.
+    /// When tiles of a renderer are judged, with or without a denoiser; for whom, if no audience was typed.
     pub fn limits(
         &self,
         denoise: bool,
-        built_in: bool,
+        renderer: &RendererArgs,
         preset: Option<Preset>,
         otherwise: Audience,
     ) -> anyhow::Result<Limits> {
@@ -128,9 +121,9 @@ impl VerdictArgs {
         let step = |default: u64| self.batch.unwrap_or(default);
         let schedule = match (denoise, self.schedule) {
             // What two denoisings cost is worth more samples of the built-in renderer than of slower ones
-            (true, _) if built_in => Schedule::Growing { step: step(48) },
+            (true, _) if renderer.is_built_in() => Schedule::Growing { step: step(48) },
             (true, _) => Schedule::Growing { step: step(16) },
-            (false, ScheduleChoice::Spaced) => Schedule::Spaced { step: step(10) },
+            (false, ScheduleChoice::Spaced) => Schedule::Spaced { step: step(renderer.step()) },
             (false, ScheduleChoice::Every) => Schedule::Every { step: step(100) },
         };
         let draft = preset == Some(Preset::Draft);
@@ -138,7 +131,6 @@ impl VerdictArgs {
         let first = match self.batch {
             _ if denoise => 0,
             Some(_) => 0,
-            None if draft => DRAFT.samples(Params::default().min_spp),
             None => Params::default().min_spp,
         };
         let max_spp = match &self.criterion {
@@ -156,7 +148,6 @@ impl VerdictArgs {
             max_spp,
             consecutive: if last { self.consecutive.max(2) } else { self.consecutive },
             audience: if draft { audience.then(DRAFT) } else { audience },
-            blocks: self.blocks,
         };
         match limits.params(Params::default()).check() {
             Ok(()) => Ok(limits),

@@ -189,11 +189,7 @@ impl Output {
     ) -> anyhow::Result<()> {
         self.forget_earlier()?;
         let tiles = tiles::states(session);
-        let range = |tile: &TileState| match session.params().blocks {
-            0 => (tile.stop.spp, tile.stop.spp),
-            _ => session.film().spp_range(tile.stop.tile.index),
-        };
-        write_csv(self.path("stops.csv"), tiles.iter().map(|tile| tile.row(range(tile))))?;
+        write_csv(self.path("stops.csv"), tiles.iter().map(TileState::row))?;
         write_csv(self.path("timeline.csv"), self.timeline.iter())?;
         // The report goes before a checkpoint is removed: whatever is killed in between, one of them says
         // how far the render is A render whose pictures are not all there is not done, however its tiles

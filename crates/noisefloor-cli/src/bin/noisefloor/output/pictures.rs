@@ -18,12 +18,7 @@ impl Output {
         // image.exr: what each pixel's tile knows, as channels. A picture can be large: nothing is copied.
         let tile = |pixel: usize| grid.index_at(pixel % width, pixel / width);
         let radiance = |pixel: usize| film.pixel(tile(pixel), pixel);
-        let blocks = session.params().blocks;
-        let samples = |pixel: usize| match blocks {
-            0 => tiles[tile(pixel)].stop.spp,
-            _ => film.samples_at(tile(pixel), pixel),
-        };
-        let spp = |pixel: usize| u32::try_from(samples(pixel)).unwrap_or(u32::MAX);
+        let spp = |pixel: usize| u32::try_from(tiles[tile(pixel)].stop.spp).unwrap_or(u32::MAX);
         let probability = |pixel: usize| tiles[tile(pixel)].stop.probability.unwrap_or(f32::NAN);
         let stopped = |pixel: usize| !tiles[tile(pixel)].open;
         let noise = session.visible_noise();

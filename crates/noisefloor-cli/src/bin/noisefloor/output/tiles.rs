@@ -23,9 +23,6 @@ pub(super) struct StopRow {
     probability: Option<f32>,
     reason: String,
     unfamiliar: bool,
-    /// What its blocks have; `spp` twice where they were sampled alike.
-    spp_least: u64,
-    spp_most: u64,
 }
 
 /// All tiles, in their order.
@@ -60,11 +57,11 @@ impl TileState {
         !self.open && (reason.is_final() || reason == StopReason::SourceExhausted)
     }
 
-    /// A line of the table; `range` is the fewest and the most samples per pixel that its blocks have.
-    pub(super) fn row(&self, (spp_least, spp_most): (u64, u64)) -> StopRow {
+    /// A line of the table.
+    pub(super) fn row(&self) -> StopRow {
         let Stop { tile: Tile { index, x, y, width, height }, spp, probability, unfamiliar, .. } = self.stop;
         let (tile, reason) = (index, self.reason());
-        StopRow { tile, x, y, width, height, spp, probability, reason, unfamiliar, spp_least, spp_most }
+        StopRow { tile, x, y, width, height, spp, probability, reason, unfamiliar }
     }
 
     fn mark(&self) -> TileMark {

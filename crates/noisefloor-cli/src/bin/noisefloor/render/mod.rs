@@ -53,9 +53,6 @@ pub fn run(run: &RenderRun) -> anyhow::Result<ExitCode> {
     let Opened { mut source, scene, .. } = opened;
     let info = source.info();
     let SourceInfo { name, width, height, .. } = &info;
-    if params.blocks > 0 && source.sample_blocks(&[])?.is_none() {
-        bail!("{name} cannot sample blocks of a tile by their need: leave out --blocks");
-    }
     let against = run.against.as_deref();
     let reference = against.map(|path| read_reference(path, (*width, *height))).transpose()?;
     let (criterion, denoised) = match (&job.criterion, job.criterion.of(oracle.as_ref())) {
