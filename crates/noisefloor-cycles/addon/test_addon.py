@@ -60,7 +60,8 @@ def room(closed=False):
         "32",
         "NONE",
     )
-    scene.noisefloor.use, scene.noisefloor.tile, scene.noisefloor.max_samples = True, 64, 160
+    scene.noisefloor.use, scene.noisefloor.tile = True, 64
+    scene.noisefloor.min_samples, scene.noisefloor.max_samples = 96, 160
     return scene
 
 
