@@ -69,8 +69,9 @@ impl Rng {
     }
 }
 
+/// 24 bits as a number in [0, 1).
 #[inline]
-fn unit(bits: u32) -> f32 {
+pub(crate) fn unit(bits: u32) -> f32 {
     bits as i32 as f32 * (1.0 / (1 << 24) as f32)
 }
 

@@ -1,6 +1,6 @@
 //! Where the random numbers of a path come from.
 
-use crate::rng::{GOLDEN, Key, Rng, mix};
+use crate::rng::{GOLDEN, Key, Rng, mix, unit};
 use noisefloor::source::Sequence;
 use serde::{Deserialize, Serialize};
 
@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 pub enum Sampling {
     /// Independent samples.
     Independent,
-    /// Owen-scrambled Sobol points (Burley 2020, "Practical Hash-based Owen Scrambling"), four dimensions at
+    /// Owen-scrambled Sobol points (Burley 2020, "Practical Hash-based Owen Scrambling"), two dimensions at
     /// a time, scrambled and shuffled differently for each pixel and each [`Sequence`]. So noise is white over
     /// the pixels and independent between the halves, as of independent samples, and falls faster with their
     /// number.
@@ -23,7 +23,7 @@ pub enum Sampling {
 #[derive(Clone, Debug)]
 pub(crate) enum Sampler {
     Independent(Rng),
-    /// Point `index` of the sequence of `seed`, which changes every four numbers.
+    /// Point `index` of the sequences of `seed`, which changes every four numbers.
     Sobol {
         index: u32,
         seed: u64,
@@ -77,7 +77,10 @@ impl Sampler {
                 let ([a, b], [c, d]) = (rng.two(), rng.two());
                 [a, b, c, d]
             }
-            Self::Sobol { index, seed } => sobol(*index, seed),
+            Self::Sobol { index, seed } => {
+                *seed = mix(seed.wrapping_add(GOLDEN));
+                sobol(*index, *seed)
+            }
         }
     }
 
@@ -92,11 +95,37 @@ impl Sampler {
     }
 }
 
-/// Padding (Burley 2020): the same four dimensions repeatedly, each time with another seed.
-#[inline(never)]
-fn sobol(index: u32, seed: &mut u64) -> [f32; 4] {
-    *seed = mix(seed.wrapping_add(GOLDEN));
-    sobol_burley::sample_4d(index, 0, *seed as u32)
+/// Two points, by padding (Burley 2020): the same two dimensions, shuffled and scrambled with other seeds.
+#[inline]
+pub(crate) fn sobol(index: u32, seed: u64) -> [f32; 4] {
+    let ([a, b], [c, d]) = (sobol_2d(index, seed), sobol_2d(index, !seed));
+    [a, b, c, d]
+}
+
+/// Point `index` of the first two dimensions of the Sobol sequence, shuffled and scrambled by a seed whose bits are
+/// random.
+#[inline]
+pub(crate) fn sobol_2d(index: u32, seed: u64) -> [f32; 2] {
+    let word = mix(seed ^ GOLDEN);
+    let place = laine_karras(index.reverse_bits(), seed as u32).reverse_bits();
+    // Both without the reversal of bits that Owen scrambling begins with
+    [(place, word as u32), (pascal(place), (word >> 32) as u32)]
+        .map(|(bits, seed)| unit(laine_karras(bits, seed).reverse_bits() >> 8))
+}
+
+/// The hash of Laine and Karras (2011) with Burley's constants: each bit changes by those below it.
+#[inline]
+fn laine_karras(bits: u32, seed: u32) -> u32 {
+    let factors = [0x6c50_b47c, 0xb82f_1e52, 0xc7af_e638, 0x8d22_f6e6];
+    factors.into_iter().fold(bits.wrapping_add(seed), |x: u32, factor| x ^ x.wrapping_mul(factor))
+}
+
+/// The generator matrix of Sobol's second dimension is Pascal's triangle modulo 2, the fifth Kronecker power of one
+/// of 2×2: so five steps multiply it with the bits of an index.
+#[inline]
+fn pascal(index: u32) -> u32 {
+    let steps = [(1, 0x5555_5555), (2, 0x3333_3333), (4, 0x0f0f_0f0f), (8, 0x00ff_00ff), (16, 0x0000_ffff)];
+    steps.into_iter().fold(index, |x, (shift, mask)| x ^ ((x >> shift) & mask))
 }
 
 #[cfg(test)]
@@ -121,6 +150,34 @@ mod tests {
                 }
             }
             assert!(cells.iter().all(|c| c[0] == 1), "{cells:?}");
+        }
+    }
+
+    /// Sobol's second dimension by its direction numbers, vⱼ = vⱼ₋₁ xor vⱼ₋₁/2 (Joe and Kuo 2008).
+    #[test]
+    fn pascal_s_triangle_is_the_second_dimension() {
+        let mut directions = [1u32 << 31; 32];
+        for j in 1..32 {
+            directions[j] = directions[j - 1] ^ (directions[j - 1] >> 1);
+        }
+        for index in [0, 1, 2, 3, 77, 123_456, u32::MAX] {
+            let of_bits = (0..32).filter(|j| index >> j & 1 == 1).map(|j| directions[j]);
+            assert_eq!(pascal(index).reverse_bits(), of_bits.fold(0, |x, v| x ^ v), "{index}");
+        }
+    }
+
+    /// Of the first 64 points, each of the 64 elementary intervals of every shape has one.
+    #[test]
+    fn scrambled_points_stay_a_net() {
+        for seed in 0..20 {
+            for wide in 0..=6 {
+                let cell = |index| {
+                    let [x, y] = sobol_2d(index, mix(seed));
+                    ((x * (1 << wide) as f32) as u32, (y * (64 >> wide) as f32) as u32)
+                };
+                let cells: std::collections::BTreeSet<_> = (0..64).map(cell).collect();
+                assert_eq!(cells.len(), 64, "seed {seed}, {wide}");
+            }
         }
     }
 

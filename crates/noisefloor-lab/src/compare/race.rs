@@ -219,7 +219,7 @@ impl Course<'_> {
         while !cancelled && field.apart() > 0 && field.step_apart(source)? {
             cancelled = self.cancel.load(Ordering::Relaxed);
         }
-        let Field { mut entrants, film, costs } = field;
+        let Field { mut entrants, film, costs, .. } = field;
         for entrant in &mut entrants {
             entrant.session.close_all(if cancelled { Interruption::Cancelled } else { Interruption::MaxSpp });
         }
