@@ -60,7 +60,8 @@ def room(closed=False):
         "32",
         "NONE",
     )
-    scene.noisefloor.use, scene.noisefloor.tile, scene.noisefloor.max_samples = True, 64, 160
+    scene.noisefloor.use, scene.noisefloor.tile = True, 64
+    scene.noisefloor.min_samples, scene.noisefloor.max_samples = 96, 160
     return scene
 
 
@@ -299,6 +300,23 @@ class Addon(unittest.TestCase):
         left, bottom = int(0.3 * SIZE[0]), int(0.2 * SIZE[1])
         top = SIZE[1] - bottom - part.shape[0]
         assert_same(part, whole[top : top + part.shape[0], left : left + part.shape[1]], 96)
+
+    def test_what_moves_is_blurred_as_by_cycles(self):
+        scene = room()
+        scene.noisefloor.max_samples, scene.render.use_motion_blur, cube = 96, True, bpy.data.objects["Cube"]
+        for frame_number in (1, 3):
+            cube.location.x = frame_number - 2
+            cube.keyframe_insert("location", frame=frame_number)
+            scene.cycles.samples = frame_number
+            scene.cycles.keyframe_insert("samples", frame=frame_number)
+        scene.frame_set(2)
+        picture, blocks = rendered(scene)
+        self.assertGreater(numpy.abs(blocks[0][2] - blocks[1][2]).mean(), 0)
+        scene.animation_data_clear()
+        scene.noisefloor.use, scene.cycles.samples, scene.cycles.use_adaptive_sampling = False, 96, False
+        plain, still = rendered(scene)[0], numpy.abs(blocks[0][2] - picture).mean()
+        # Both have a sixth of the variance of a block: they differ by √(2/6) of what a block does, or less
+        self.assertLess(numpy.abs(picture - plain).mean(), still)
 
     def test_every_layer_has_its_own_stops(self):
         scene = room()

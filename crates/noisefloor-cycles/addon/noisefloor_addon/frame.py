@@ -22,7 +22,7 @@ class Frame:
     after the frame, and no file, undo step or window ever sees them."""
 
     def __init__(self, engine, depsgraph, cycles):
-        self.engine, self.cycles = engine, cycles
+        self.engine, self.cycles, self.depsgraph = engine, cycles, depsgraph
         self.scene, self.layer = depsgraph.scene_eval, depsgraph.view_layer_eval.name
         self.settings = self.scene.noisefloor
         result = engine.get_result()
@@ -78,7 +78,6 @@ class Frame:
             "border_max_y",
         ]
         before = {name: getattr(render, name) for name in border}
-        sampling.independent(self.scene.cycles)
         try:
             while not self.session.done:
                 ended = self._round(report)
@@ -129,7 +128,10 @@ class Frame:
 
     def _sample(self, region, block):
         x, y, width, height = region
-        sampling.choose(self.scene.cycles, self.seed, block)
+        # For motion blur, Cycles evaluates other frames, and settings that move are as in the file again
+        cycles = self.depsgraph.scene_eval.cycles
+        sampling.independent(cycles)
+        sampling.choose(cycles, self.seed, block)
         sampling.aim(
             self.engine.render,
             (self.across, self.down),

@@ -112,7 +112,12 @@ def _render(engine, depsgraph):
         if share is not None:
             engine.update_progress(share)
 
-    frame.run(report)
+    error = None
+    try:
+        frame.run(report)
+    except Exception as caught:  # what there is, is kept
+        error = caught
+        frame.session.close_all("failed")
     spp, visible = frame.finish()
     summary = frame.summary()
     engine.get_result().stamp_data_add_field(f"noisefloor.{frame.layer}", summary)
@@ -129,6 +134,11 @@ def _render(engine, depsgraph):
         for name, picture in pictures.items():
             _write(f"{stem}-{name.replace(' ', '-')}.png", maps.png(picture, summary))
         _write(f"{stem}-noisefloor.txt", (summary + "\n").encode())
+    if error:
+        try:
+            raise error
+        finally:
+            error = None  # or the engine, and all that Cycles has loaded, outlives the render with it
 
 
 def _progress(frame):
@@ -142,9 +152,10 @@ def _progress(frame):
 
 
 def output(scene):
-    """Path of the rendered frame without its extension."""
+    """Path of the rendered frame without its extension; movies have one file for all frames."""
     path = bpy.path.abspath(scene.render.frame_path(frame=scene.frame_current))
-    return os.path.splitext(path)[0]
+    stem = os.path.splitext(path)[0]
+    return f"{stem}-{scene.frame_current:04}" if scene.render.is_movie_format else stem
 
 
 def _write(path, data):
@@ -204,10 +215,12 @@ def deliver():
     with state.lock:
         images, state.images = state.images, {}
         still, state.still = bpy.data.scenes.get(state.still or ""), None
-    if still:
-        bpy.data.images["Render Result"].save_render(
-            output(still) + still.render.file_extension, scene=still
-        )
+    if still and not still.render.is_movie_format:
+        path = output(still) + still.render.file_extension
+        try:
+            bpy.data.images["Render Result"].save_render(path, scene=still)
+        except RuntimeError as error:
+            print(f"noisefloor: {path} cannot be written: {error}", flush=True)
     for name, picture in images.items():
         height, width = picture.shape[:2]
         image = bpy.data.images.get(name)

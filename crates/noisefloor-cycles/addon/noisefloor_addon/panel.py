@@ -27,6 +27,7 @@ class RENDER_PT_noisefloor(bpy.types.Panel):
         column.active = settings.use
         column.prop(settings, "viewing")
         column.prop(settings, "share", slider=True)
+        column.prop(settings, "min_samples")
         column.prop(settings, "max_samples")
         column.prop(settings, "time_limit")
         column.prop(context.scene.cycles, "use_denoising", text="Denoise", toggle=False)

@@ -29,6 +29,13 @@ class Settings(bpy.types.PropertyGroup):
         max=0.99,
         subtype="FACTOR",
     )
+    min_samples: bpy.props.IntProperty(
+        name="Min Samples",
+        description="Samples per pixel before a tile can stop; more find more light that is seldom found",
+        default=32,
+        min=32,
+        soft_max=1024,
+    )
     max_samples: bpy.props.IntProperty(
         name="Max Samples",
         description="Samples per pixel at which every tile stops",
@@ -74,12 +81,12 @@ def params(scene, block):
     tone = {"tone_mapping": "reinhard"}
     if view.view_transform in ("Standard", "Raw"):
         tone = {"tone_mapping": "srgb", "exposure": 2.0**view.exposure}
-    blocks = max(settings.max_samples // block, 2)
+    most = max(settings.max_samples // block, 2) * block
     return noisefloor.Params(
         tile=settings.tile,
         step=block,
-        min_spp=min(6, blocks) * block,
-        max_spp=blocks * block,
+        min_spp=min(-(-settings.min_samples // block) * block, most),
+        max_spp=most,
         **people,
         **tone,
     )
