@@ -10,9 +10,6 @@ import sys
 
 SHOWN = {
     "oracle:fine": "oracle",
-    "oracle:fine:min-spp=50": "from 50",
-    "oracle:fine:blocks=16": "blocks of 16",
-    "oracle:fine:min-spp=50:blocks=16": "both",
     "cycles:0.081": "Cycles",
     "dammertz:0.0046": "Dammertz",
     "relative-error:0.17": "rel. error",
