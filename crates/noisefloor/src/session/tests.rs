@@ -56,7 +56,7 @@ fn run(session: &mut Session<From>) -> Vec<(u64, StopReason)> {
 }
 
 /// Verdicts from 100 samples on, in steps of 10.
-fn params() -> Params {
+fn steps_of_10() -> Params {
     Params::default().with_schedule(Schedule::Spaced { step: 10 }).with_min_spp(100)
 }
 
@@ -64,17 +64,17 @@ fn params() -> Params {
 fn each_tile_stops_when_it_has_enough() {
     use StopReason::Converged;
     let expected = [(300, Converged), (600, Converged), (900, Converged)];
-    let mut s = session(300, true, params());
+    let mut s = session(300, true, steps_of_10());
     assert_eq!(run(&mut s), expected);
     assert!(s.stops().map(|stop| stop.unfamiliar).eq([false, true, false]));
     assert_eq!(s.film().half_counts(1), [300, 300]);
-    assert_eq!(run(&mut session(300, false, params())), expected);
+    assert_eq!(run(&mut session(300, false, steps_of_10())), expected);
 }
 
 #[test]
 fn spaced_verdicts_stop_at_the_same_samples_with_fewer_looks() {
-    let params = Params { schedule: Schedule::Every { step: 10 }, ..params() };
-    let (mut every, mut spaced) = (session(2000, true, params), session(2000, true, params()));
+    let params = Params { schedule: Schedule::Every { step: 10 }, ..steps_of_10() };
+    let (mut every, mut spaced) = (session(2000, true, params), session(2000, true, steps_of_10()));
     assert_eq!(run(&mut every), run(&mut spaced));
     assert!(spaced.criterion.asked.len() * 2 < every.criterion.asked.len());
 }
@@ -82,13 +82,13 @@ fn spaced_verdicts_stop_at_the_same_samples_with_fewer_looks() {
 #[test]
 fn limits_hold() {
     use StopReason::{Converged, MaxSpp};
-    let params = Params { min_spp: 400, max_spp: 750, ..params() };
+    let params = Params { min_spp: 400, max_spp: 750, ..steps_of_10() };
     assert_eq!(run(&mut session(300, true, params)), [(400, Converged), (600, Converged), (750, MaxSpp)]);
 }
 
 #[test]
 fn one_verdict_is_not_a_streak() {
-    let params = Params { consecutive: 3, ..params() };
+    let params = Params { consecutive: 3, ..steps_of_10() };
     // Each time a quarter more, in steps of 10
     assert_eq!(run(&mut session(300, true, params)).map_samples(), [460, 930, 1400]);
     let params = Params { schedule: Schedule::Every { step: 100 }, ..params };
@@ -97,7 +97,7 @@ fn one_verdict_is_not_a_streak() {
 
 #[test]
 fn a_demanding_audience_gets_more() {
-    let params = Params { audience: Audience::ART_STUDENTS, max_spp: 1200, ..params() };
+    let params = Params { audience: Audience::ART_STUDENTS, max_spp: 1200, ..steps_of_10() };
     // 1.94·300 − 346 = 236 → 300; 1.94·600 − 346 = 818; 1.94·900 − 346 = 1400 → the limit.
     let mut s = session(300, true, params);
     let stops = run(&mut s);
@@ -109,14 +109,14 @@ fn a_demanding_audience_gets_more() {
 #[test]
 fn a_less_demanding_audience_gets_less() {
     let audience = Audience { slope: 0.5, offset: 0.0 };
-    let mut s = session(300, true, Params { audience, ..params() });
+    let mut s = session(300, true, Params { audience, ..steps_of_10() });
     // Half of 300, 600 and 900, and no verdict on the way beyond
     assert_eq!(run(&mut s).map_samples(), [150, 300, 450]);
 }
 
 #[test]
 fn nothing_is_judged_before_every_tile_has_samples() {
-    let mut s = session(100, true, params());
+    let mut s = session(100, true, steps_of_10());
     for _ in 0..2 {
         s.push(0, 50, &[[0.3; 3]; 32 * 32]).unwrap();
     }
@@ -128,7 +128,7 @@ fn nothing_is_judged_before_every_tile_has_samples() {
 
 #[test]
 fn the_exposure_is_frozen_at_the_first_verdict() {
-    let mut s = session(500, false, params());
+    let mut s = session(500, false, steps_of_10());
     for (n, value) in [(100, 0.3), (100, 3.0)] {
         for tile in 0..3 {
             let pixels = s.film().grid().tile(tile).pixels();
@@ -141,7 +141,7 @@ fn the_exposure_is_frozen_at_the_first_verdict() {
 
 #[test]
 fn closing_keeps_what_is_done() {
-    let mut s = session(100, true, params());
+    let mut s = session(100, true, steps_of_10());
     for _ in 0..2 {
         for r in s.requests() {
             s.push(r.tile.index, r.spp, &vec![[0.3; 3]; r.tile.pixels()]).unwrap();
@@ -156,10 +156,11 @@ fn closing_keeps_what_is_done() {
 
 #[test]
 fn bad_input_is_an_error() {
-    let new = |w, h, tile| Session::new(w, h, crate::FixedSpp(1), Params { tile, ..params() }).map(|_| ());
+    let new =
+        |w, h, tile| Session::new(w, h, crate::FixedSpp(1), Params { tile, ..steps_of_10() }).map(|_| ());
     assert!(matches!(new(0, 10, 32), Err(SessionError::Tile(_))));
     assert!(matches!(new(10, 10, 0), Err(SessionError::Tile(_))));
-    let mut s = session(100, true, params());
+    let mut s = session(100, true, steps_of_10());
     let reference = Reference { width: 70, height: 32, pixels: vec![] };
     assert!(matches!(s.set_reference(reference), Err(SessionError::Reference { .. })));
     assert!(s.push(9, 1, &[]).is_err());
