@@ -79,7 +79,7 @@ fn a_fixed_number_of_samples_lies_on_the_curve_of_uniform_sampling() {
 #[test]
 fn an_oracle_that_renders_by_itself_is_that_of_a_render() {
     let folder = tempdir().unwrap();
-    let spec = "oracle:schedule=every:batch=40:min-spp=80";
+    let spec = "oracle:schedule=spaced:batch=40:min-spp=40";
     succeed(&small(text(folder.path()), &["--criteria", &format!("oracle,{spec},spp:200"), "--batch", "40"]));
     let runs = |name: &str| column(&folder.path().join("runs.csv"), name);
     assert_eq!(runs("criterion")[1], spec);
@@ -87,7 +87,7 @@ fn an_oracle_that_renders_by_itself_is_that_of_a_render() {
     let out = folder.path().join("render");
     let same =
         ["render", "cornell-box", "--size", "64x64", "--tile", "32", "--max-spp", "200", "--batch", "40"];
-    let more = ["--schedule", "every", "--min-spp", "80", "--key", "0.18", "--out", text(&out), "--quiet"];
+    let more = ["--min-spp", "40", "--key", "0.18", "--out", text(&out), "--quiet"];
     succeed(&[&same[..], &more].concat());
     let rendered = json(&out.join("report.json"))["samples"].as_f64().unwrap() / 4096.0;
     // The same source, seed and verdicts: the very samples of the render
