@@ -9,7 +9,6 @@ use crate::light::LightSample;
 use crate::material::Bsdf;
 use crate::math::{self, DELTA, Frame, Ray, Vec3};
 use crate::rng::{GOLDEN, mix};
-use crate::sampler::{sobol, sobol_2d};
 use crate::scene::{Scene, Sky};
 use std::f32::consts::FRAC_1_PI;
 
@@ -67,7 +66,7 @@ impl<'a> Tracer<'a> {
     /// Sample `index` of the pixel `at` in the sequence of `seed`, which has 2¹⁶/[`LIGHT_SAMPLES`].
     pub(crate) fn sample(&mut self, lens: &Lens, at: [usize; 2], index: u32, seed: u64) -> Vec3 {
         (self.index, self.seed) = (index, seed);
-        let [u, v, lens_u, lens_v] = sobol(index, mix(seed));
+        let [u, v, lens_u, lens_v] = sobol_burley::sample_4d(index, 0, seed as u32);
         let ray = lens.ray(at[0] as f32 + u, at[1] as f32 + v, [lens_u, lens_v]);
         self.radiance(Branch {
             ray,
@@ -181,7 +180,7 @@ impl<'a> Tracer<'a> {
     /// A rough boundary: one sampled direction, by which lights are found, too.
     fn rough_glass(&mut self, ray: &Ray, surface: &Intersection<'_>, weight: Vec3, code: u64) -> Vec3 {
         let frame = surface.frame();
-        let numbers = sobol(self.index, self.seed(code, Use::Facets));
+        let numbers = sobol_burley::sample_4d(self.index, 0, self.seed(code, Use::Facets) as u32);
         let sampled = surface
             .rough_glass()
             .and_then(|glass| glass.sample(frame.to_local(-ray.dir), [numbers[2], numbers[0], numbers[1]]));
@@ -198,7 +197,7 @@ impl<'a> Tracer<'a> {
         let frame = surface.frame();
         let wo = frame.to_local(-ray.dir);
         let Some(glossy) = surface.glossy(wo.z) else { return Vec3::ZERO };
-        let [u, v] = sobol_2d(self.index, self.seed(code, Use::Facets));
+        let [u, v] = pair(self.index, self.seed(code, Use::Facets));
         // Must not depend on where the facets reflect to, which light samples could not know
         let follows = (2 * code) >> MAX_SPECULAR == 0;
         let directions = self.directions() as f32;
@@ -249,8 +248,7 @@ impl<'a> Tracer<'a> {
         let seed = self.seed(code, Use::Lights);
         let mut sum = Vec3::ZERO;
         for index in self.index * LIGHT_SAMPLES..(self.index + 1) * LIGHT_SAMPLES {
-            let Some(GuidedSample { light, sample, stratum }) =
-                self.guide.sample(origin, sobol_2d(index, seed))
+            let Some(GuidedSample { light, sample, stratum }) = self.guide.sample(origin, pair(index, seed))
             else {
                 continue;
             };
@@ -285,7 +283,7 @@ impl<'a> Tracer<'a> {
         let (frame, seed) = (Frame::new(surface.normal), self.seed(code, Use::Hemisphere));
         let mut sum = Vec3::ZERO;
         for index in self.index * n..(self.index + 1) * n {
-            let local = math::cosine_hemisphere(sobol_2d(index, seed));
+            let local = math::cosine_hemisphere(pair(index, seed));
             let dir = frame.to_world(local);
             let density = local.z * FRAC_1_PI;
             if dir.dot(surface.flat) <= 0.0 || density <= 0.0 {
@@ -351,6 +349,12 @@ impl<'a> Tracer<'a> {
             found.note(stratum, light);
         }
     }
+}
+
+/// Point `index` of the sequence of `seed`.
+fn pair(index: u32, seed: u64) -> [f32; 2] {
+    let [u, v, ..] = sobol_burley::sample_4d(index, 0, seed as u32);
+    [u, v]
 }
 
 /// Balance heuristic (Veach 1997, §9.2.2): the weight of a sample that another technique takes with density

@@ -7,7 +7,6 @@ use crate::material::{Bsdf, CompiledMaterial};
 use crate::math::{Frame, Ray, Vec3};
 use crate::relief::{self, Relief};
 use crate::rng;
-use crate::sampler::sobol_2d;
 use crate::scene::Scene;
 
 /// What a coat with an index of refraction of 1.5 reflects at normal incidence.
@@ -106,7 +105,7 @@ impl Scene {
                 let number = match test {
                     OpacityTest::Random(seed) => rng::hash(seed ^ side, prim),
                     OpacityTest::Stratified { index, seed } => {
-                        sobol_2d(index, rng::mix(seed ^ side ^ u64::from(prim)))[0]
+                        sobol_burley::sample(index, 0, rng::mix(seed ^ side ^ u64::from(prim)) as u32)
                     }
                 };
                 number < (c.x + c.y + c.z) * (1.0 / 3.0)

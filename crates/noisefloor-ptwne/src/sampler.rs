@@ -97,7 +97,7 @@ impl Sampler {
 
 /// Two points, by padding (Burley 2020): the same two dimensions, shuffled and scrambled with other seeds.
 #[inline]
-pub(crate) fn sobol(index: u32, seed: u64) -> [f32; 4] {
+fn sobol(index: u32, seed: u64) -> [f32; 4] {
     let ([a, b], [c, d]) = (sobol_2d(index, seed), sobol_2d(index, !seed));
     [a, b, c, d]
 }
@@ -105,7 +105,7 @@ pub(crate) fn sobol(index: u32, seed: u64) -> [f32; 4] {
 /// Point `index` of the first two dimensions of the Sobol sequence, shuffled and scrambled by a seed whose bits are
 /// random.
 #[inline]
-pub(crate) fn sobol_2d(index: u32, seed: u64) -> [f32; 2] {
+fn sobol_2d(index: u32, seed: u64) -> [f32; 2] {
     let word = mix(seed ^ GOLDEN);
     let place = laine_karras(index.reverse_bits(), seed as u32).reverse_bits();
     // Both without the reversal of bits that Owen scrambling begins with

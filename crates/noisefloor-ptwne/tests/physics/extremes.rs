@@ -78,7 +78,7 @@ fn clamps_bound_samples_and_are_counted() {
     let run = |clamp| {
         let scene = scenes::by_name("glass-spheres").unwrap();
         let mut source =
-            Ptwne::new(scene, 32, 32, RenderOptions { clamp, ..RenderOptions::default() }).unwrap();
+            Ptwne::new(scene, 48, 48, RenderOptions { clamp, ..RenderOptions::default() }).unwrap();
         (batch(&mut source, 0, 1), source.counts().clamped)
     };
     assert_eq!(RenderOptions::default().clamp, None);
