@@ -15,7 +15,7 @@
 //! use noisefloor_farm::{PlannedBatch, ShardJob, ShardSet, sample, split};
 //! use noisefloor_ptwne::{Ptwne, RenderOptions, scenes};
 //!
-//! let (criterion, params) = (FixedSpp(100), Params::default().with_tile(32));
+//! let (criterion, params) = (FixedSpp(100), Params::default().with_tile(32).with_min_spp(100));
 //! let mut source = Ptwne::new(scenes::by_name("bulb").unwrap(), 64, 32, RenderOptions::default())?;
 //! let mut session = Session::new(64, 32, criterion, params)?;
 //! let job = ShardJob::new(&source, &session)?;

@@ -108,9 +108,9 @@ pub struct Clock {
 /// }
 ///
 /// let params = Params::default().with_tile(32);
-/// let mut driver = Driver::new(Wall, FixedSpp(300), params)?;
+/// let mut driver = Driver::new(Wall, FixedSpp(304), params)?;
 /// driver.run(|_session, event| if let Event::TileStopped(stop) = event { println!("{} {}", stop.tile.index, stop.spp) })?;
-/// assert!(driver.session().stops().all(|stop| stop.spp == 300 && stop.reason == StopReason::ReachedSpp));
+/// assert!(driver.session().stops().all(|stop| stop.spp == 304 && stop.reason == StopReason::ReachedSpp));
 /// # Ok::<(), DriverError>(())
 /// ```
 pub struct Driver<S, C = Box<dyn StoppingCriterion + Send>> {

@@ -26,7 +26,8 @@
 //!     }
 //!     session.judge()?;
 //! }
-//! assert!(session.stops().all(|stop| stop.reason == StopReason::Converged && stop.spp == 100));
+//! // Where no sample has shown noise yet, the oracle waits for 100 samples: the first verdict from there on
+//! assert!(session.stops().all(|stop| stop.reason == StopReason::Converged && stop.spp == 104));
 //! # Ok::<(), noisefloor::SessionError>(())
 //! ```
 

@@ -23,6 +23,9 @@ const TRUSTED_SPP: u64 = 100;
 /// Share of the pixels of a tile that have to carry its noise for it to be trusted sooner.
 const EVEN: f32 = 1.0 / 32.0;
 
+/// How many pixels that has to be at least: the energy of their noise is then known to about a sixth.
+const CARRIERS: f64 = 32.0;
+
 /// Judges tiles by a trained model.
 ///
 /// In a session, a tile with fewer than 100 samples per pixel is not called converged unless its noise is spread
@@ -336,7 +339,8 @@ impl StoppingCriterion for Oracle {
                 let spp = view.film.spp(tile.index);
                 let verdict = self.verdict(&raw, spp);
                 let spread = self.described[tile.index].as_ref().map_or(0.0, |seen| seen.spread);
-                let doubted = verdict.converged && spp < TRUSTED_SPP && spread < EVEN;
+                let even = spread >= EVEN && f64::from(spread) * tile.pixels() as f64 >= CARRIERS;
+                let doubted = verdict.converged && spp < TRUSTED_SPP && !even;
                 if doubted {
                     Verdict { converged: false, expected_spp: Some(TRUSTED_SPP), ..verdict }
                 } else {

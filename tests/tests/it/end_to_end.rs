@@ -3,7 +3,7 @@ use noisefloor::{
     Batch, Driver, Event, FixedSpp, Model, Oracle, Params, ProgressiveSource, Rgb, Schedule, Session, Stop,
     StopReason, StoppingCriterion, Threshold, evidence::Evidence, model::ModelParts, source::Reference,
 };
-use noisefloor_ptwne::{Ptwne, RenderOptions, scenes};
+use noisefloor_ptwne::{Ptwne, RenderOptions, Sampling, scenes};
 use std::cell::RefCell;
 use std::rc::Rc;
 use std::sync::atomic::Ordering;
@@ -13,8 +13,9 @@ fn small_tiles() -> Params {
     Params::default().with_tile(32).with_max_spp(3000)
 }
 
+/// With independent samples, since tiles then differ most in what they need.
 fn cornell() -> Ptwne {
-    let options = RenderOptions { seed: 1, ..RenderOptions::default() };
+    let options = RenderOptions { seed: 1, sampling: Sampling::Independent, ..RenderOptions::default() };
     Ptwne::new(scenes::by_name("cornell-box").unwrap(), 96, 96, options).unwrap()
 }
 
@@ -133,11 +134,12 @@ fn a_fixed_number_of_samples_is_that_everywhere() {
 /// Spaced verdicts see fewer pictures: they stop on the same grid, hardly earlier, and late by no more than a look
 /// at three quarters of the way to an expectation that errs by a third. Earlier is possible since a tile is judged in
 /// its picture, and the picture's noise is here the second or third noisiest of six tiles of 32 pixels as they were
-/// last seen, at other samples in the two schedules: a twentieth of its amplitude is a tenth of the samples.
+/// last seen, at other samples in the two schedules: a twentieth of its amplitude is a tenth of the samples. From the
+/// default's 16 samples on, the two schedules part sooner, and one tile stopped at 700 instead of 860.
 #[test]
 fn spaced_verdicts_stop_about_where_frequent_ones_do() {
     let count = |schedule: Schedule| {
-        let params = small_tiles().with_schedule(schedule).with_max_spp(10_000);
+        let params = small_tiles().with_schedule(schedule).with_min_spp(100).with_max_spp(10_000);
         // Much noise on smooth walls, so that there are rounds to save
         let source = Synthetic {
             radiance: |x, _| 0.2 + 0.003 * x as f32,
@@ -186,7 +188,7 @@ fn limits_have_their_reasons() {
         })
         .unwrap();
     let outcome = Outcome::of(driver.session());
-    assert!(outcome.stops.iter().all(|s| s.reason == StopReason::Cancelled && s.spp == 50), "{outcome:?}");
+    assert!(outcome.stops.iter().all(|s| s.reason == StopReason::Cancelled && s.spp == 8), "{outcome:?}");
     assert!(outcome.image.iter().flatten().any(|&c| c > 0.0));
 }
 

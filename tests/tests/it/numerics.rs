@@ -51,7 +51,8 @@ fn what_is_constant_or_black_has_converged_at_once() {
     for source in [constant(|_, _| 0.4), constant(|_, _| 0.0), constant(|_, _| 1e8), constant(|_, _| 1e-20)] {
         let stops = run(source, tiles_of(32)).stops;
         for stop in stops {
-            assert_eq!((stop.spp, stop.reason), (100, StopReason::Converged));
+            // Without noise the oracle waits for 100 samples, in steps of 8
+            assert_eq!((stop.spp, stop.reason), (104, StopReason::Converged));
             assert!(stop.probability.unwrap() > 0.99, "{stop:?}");
         }
     }
@@ -77,7 +78,8 @@ fn samples_that_are_not_finite_are_kept_out() {
         let dirty = run(source, tiles_of(32));
         assert!(dirty.image.iter().flatten().all(|c| c.is_finite()));
         assert_eq!(dirty.image[5], [0.0; 3]);
-        assert_eq!(dirty.rejected, dirty.stops[0].spp + 50);
+        // The first batch is half of the 16 samples before the first verdict
+        assert_eq!(dirty.rejected, dirty.stops[0].spp + 8);
         for (clean, dirty) in clean.stops.iter().zip(&dirty.stops) {
             assert_eq!(dirty.reason, StopReason::Converged);
             assert!(clean.spp.abs_diff(dirty.spp) <= 100, "{clean:?} {dirty:?}");
@@ -95,7 +97,9 @@ fn every_size_is_judged() {
         assert_eq!(stops.len(), tiles);
         for stop in stops {
             let reasons = [StopReason::Converged, StopReason::MaxSpp];
-            assert!(reasons.contains(&stop.reason) && (100..=4000).contains(&stop.spp), "{stop:?}");
+            // Tiles of so few pixels have no noise that could be known sooner
+            let least = if stop.tile.pixels() < 32 { 100 } else { 16 };
+            assert!(reasons.contains(&stop.reason) && (least..=4000).contains(&stop.spp), "{stop:?}");
         }
     }
 }
