@@ -35,17 +35,18 @@ def main():
         with open(path) as file:
             for run in csv.DictReader(file):
                 scenes.setdefault(run["scene"], {})[run["criterion"]] = run
-    line("scene", SHOWN.values())
-    print("|---" * (len(SHOWN) + 1) + "|")
+    shown = [spec for spec in SHOWN if all(spec in runs for runs in scenes.values())]
+    line("scene", [SHOWN[spec] for spec in shown])
+    print("|---" * (len(shown) + 1) + "|")
     for scene, runs in scenes.items():
-        line(scene, [cell(runs[spec]) for spec in SHOWN])
+        line(scene, [cell(runs[spec]) for spec in shown])
     for title, key, of in [
         ("*median, by JOD*", JOD, statistics.median),
         ("*lowest, by JOD*", JOD, min),
         ("*median, by FLIP*", FLIP, statistics.median),
     ]:
-        ratios = {spec: [float(runs[spec][key]) for runs in scenes.values() if runs[spec][key]] for spec in SHOWN}
-        line(title, [f"{of(ratios[spec]):.2f}" for spec in SHOWN])
+        ratios = {spec: [float(runs[spec][key]) for runs in scenes.values() if runs[spec][key]] for spec in shown}
+        line(title, [f"{of(ratios[spec]):.2f}" if ratios[spec] else "–" for spec in shown])
 
 
 if __name__ == "__main__":
