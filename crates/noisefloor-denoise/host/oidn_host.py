@@ -1,17 +1,19 @@
 """Serves Open Image Denoise (the package mitsuba-oidn, which has the library and its weights) to noisefloor-denoise.
 
 Pictures: "radiance", linear and not negative; optionally "albedo" in [0, 1], and with it "normal" in [-1, 1]. Runs on the CPU,
-always with as many threads: the last bits of its results depend on their number. Processors with other instructions may round
-otherwise, too.
+with a number of threads that depends on the size of the picture alone: the last bits of its results depend on it. Processors
+with other instructions may round otherwise, too.
 """
 
 import os
 import sys
+from concurrent.futures import ThreadPoolExecutor
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 import host
 
-# More do not change the result: 3, 4 and 8 agree to the bit
+# In small pictures, threads wait for each other more than they compute: there, frames are denoised at once, by one thread each
+SMALL = 512 * 512
 THREADS = 4
 
 
@@ -21,21 +23,44 @@ class Oidn:
         import numpy
 
         self.oidn, self.np = mitsuba_oidn, numpy
-        self.device = mitsuba_oidn.Device(mitsuba_oidn.DeviceType.CPU)
-        self.device.num_threads = THREADS
-        self.device.commit()
-        self.info = {"name": f"Open Image Denoise {self.device.version}"}
+        self.filters = {}
+        self.pool = ThreadPoolExecutor(2)
+        self.info = {"name": f"Open Image Denoise {mitsuba_oidn.Device(mitsuba_oidn.DeviceType.CPU).version}"}
 
-    def filter(self, width, height, pictures):
+    def filter(self, width, height, frames):
+        small = width * height <= SMALL
+        # One filter for each frame at work: it is busy meanwhile
+        slots = range(len(frames)) if small else [0] * len(frames)
+        run = self.pool.map if small else map
+        return list(run(lambda slot, frame: self.one(slot, width, height, frame), slots, frames))
+
+    def one(self, slot, width, height, frame):
         def array(name):
-            if name not in pictures:
-                return None
-            return self.np.frombuffer(pictures[name], "<f4").reshape(height, width, 3).astype(self.np.float32)
+            return self.np.frombuffer(frame[name], "<f4").reshape(height, width, 3).astype(self.np.float32)
 
+        made = self.np.empty((height, width, 3), self.np.float32)
+        filter = self.filter_for(slot, width * height <= SMALL, (width, height, *frame))
         # Radiance is never negative; rounding may make it so
-        radiance = self.np.maximum(array("radiance"), 0.0)
-        made = self.oidn.denoise(radiance, array("albedo"), array("normal"), hdr=True, device=self.device)
-        return self.np.ascontiguousarray(made, self.np.float32)
+        filter.set_image("color", self.np.maximum(array("radiance"), 0.0))
+        for name in frame.keys() & {"albedo", "normal"}:
+            filter.set_image(name, array(name))
+        filter.set_image("output", made)
+        filter.execute()
+        return made
+
+    def filter_for(self, slot, small, what):
+        """The filter of a slot, as it was for the last picture if that was alike: it reads its weights only once."""
+        last, filter = self.filters.get(slot, (None, None))
+        if last != what:
+            device = self.oidn.Device(self.oidn.DeviceType.CPU)
+            device.num_threads = 1 if small else THREADS
+            # Threads that are bound to cores would share them with those of the other frame
+            device.set_bool("setAffinity", False)
+            device.commit()
+            filter = device.new_filter("RT")
+            filter.hdr, filter.quality = True, self.oidn.Quality.High
+            self.filters[slot] = what, filter
+        return filter
 
 
 if __name__ == "__main__":

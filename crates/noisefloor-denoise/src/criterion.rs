@@ -4,7 +4,7 @@ use crate::denoiser::{DenoiseError, Denoiser, NoisyPicture};
 use crate::estimate::{DenoisedError, DenoisedHalves};
 use crate::record::DenoisedRecord;
 use noisefloor::{
-    Film, Rgb, StoppingCriterion, Tile, TileGrid, Verdict,
+    Film, Rgb, StoppingCriterion, Tile, TileGrid, Verdict, Viewing,
     criterion::{CriterionError, Needs, View},
     display::Display,
     evidence::TilePlanes,
@@ -25,8 +25,9 @@ const DENOISED_DECAY: f64 = 0.38;
 /// JODs that a tile may lose, unless one says otherwise. Where people stopped seeing *noise*, zones had lost as much,
 /// on average over the human data; 0.08 to 0.38 by scene (`docs/benchmarks/criteria.md`).
 pub const DEFAULT_JODS_LOST: f64 = 0.3;
-/// Limits of the contrast at which an error is sought that is just allowed.
+/// Contrasts between which an error is sought that is just allowed, and how well it is found.
 const CONTRASTS: (f64, f64) = (1.0 / 64.0, 8.0);
+const CONTRAST_TOLERANCE: f64 = 1.05;
 
 /// Stops a tile when the *denoised* picture has lost little against the converged one, in the eyes of the
 /// vision model.
@@ -69,12 +70,12 @@ impl<D: Denoiser> DenoisedQuality<D> {
         let size = (grid.width(), grid.height());
         let [a, b] = film_halves(view.film);
         let wants = self.denoiser.wants();
-        let mut denoise = |half: &[Rgb], which: usize| {
-            let picture = NoisyPicture::new(size, half);
-            let guide = self.guides.as_ref().map(|guides| &guides[which]);
-            self.denoiser.denoise(&guide.map_or(picture, |guide| picture.guided(guide, wants)))
-        };
-        let (da, db) = (denoise(&a, 0)?, denoise(&b, 1)?);
+        let mut pictures = [&a, &b].map(|half| NoisyPicture::new(size, half));
+        if let Some(guides) = &self.guides {
+            let guided = pictures.iter_mut().zip(guides.iter());
+            guided.for_each(|(picture, guide)| *picture = picture.guided(guide, wants));
+        }
+        let [da, db] = self.denoiser.denoise_both(pictures.each_ref())?;
         DenoisedError::new(&DenoisedHalves { size, noisy: [&a, &b], denoised: [&da, &db] }, view.display)
     }
 
@@ -129,10 +130,8 @@ impl<D: Denoiser> StoppingCriterion for DenoisedQuality<D> {
 
         let count = view.film.grid().len();
         let mut record = self.record.lock().unwrap_or_else(PoisonError::into_inner);
-        record.needed_without.resize(count, None);
         record.jods_lost.resize(count, f64::NAN);
         for (tile, judged) in tiles.iter().zip(&judged) {
-            record.needed_without[tile.index] = judged.needed_without;
             record.jods_lost[tile.index] = judged.lost;
         }
         record.error = Some(error);
@@ -157,7 +156,6 @@ impl<D: Denoiser> StoppingCriterion for DenoisedQuality<D> {
 struct Judged {
     verdict: Verdict,
     lost: f64,
-    needed_without: Option<u64>,
 }
 
 /// The vision model, and room for it.
@@ -166,24 +164,60 @@ struct Eyes<'a> {
     room: &'a mut VisionWorkspace,
 }
 
+impl Eyes<'_> {
+    /// JODs lost by an error of so many times its strength. What cannot be compared stays open.
+    fn lost(&mut self, error: &DenoisedError, contrast: f64) -> f64 {
+        error.jods_lost_at(contrast as f32, self.model, self.room).unwrap_or(10.0)
+    }
+
+    /// The samples per pixel at which no more than `limit` is lost, of an error of `spp` samples that falls as
+    /// n^−`decay`; `None` if it has to be weaker than [`CONTRASTS`] allow. No fewer than those of the strongest.
+    fn needed(&mut self, error: &DenoisedError, limit: f64, (spp, decay): (u64, f64)) -> Option<u64> {
+        let (mut low, mut high) = CONTRASTS;
+        if self.lost(error, low) > limit {
+            return None;
+        }
+        while high / low > CONTRAST_TOLERANCE {
+            let middle = (low * high).sqrt();
+            if self.lost(error, middle) <= limit { low = middle } else { high = middle }
+        }
+        Some((spp as f64 * low.powf(-1.0 / decay)).clamp(1.0, 1e15).ceil() as u64)
+    }
+}
+
 fn judge_tile(view: &View<'_>, error: &DenoisedError, tile: Tile, limit: f64, eyes: &mut Eyes<'_>) -> Judged {
     let spp = view.film.spp(tile.index);
-    let mut lost = |error: &DenoisedError, contrast: f64| {
-        // What cannot be compared stays open
-        error.jods_lost_at(contrast as f32, eyes.model, eyes.room).unwrap_or(10.0)
-    };
-    let mut needed = |error: &DenoisedError, decay: f64| {
-        let contrast = just_allowed(limit, |contrast| lost(error, contrast))?;
-        Some((spp as f64 * contrast.powf(-1.0 / decay)).clamp(1.0, 1e15).ceil() as u64)
-    };
     let here = error.part(tile);
-    let noise = here.with_residual(noise_of(view.film, view.display, tile));
-    let (expected_spp, needed_without) = (needed(&here, DENOISED_DECAY), needed(&noise, DECAY));
-    let now = lost(&here, 1.0);
+    let lost = eyes.lost(&here, 1.0);
+    let expected_spp =
+        if lost <= limit { Some(spp) } else { eyes.needed(&here, limit, (spp, DENOISED_DECAY)) };
     let evidence = view.film.unsampled_pixels(tile.index) <= tile.pixels() / NO_EVIDENCE;
-    let converged = evidence && now <= limit;
-    let expected_spp = if converged { Some(spp) } else { expected_spp };
-    Judged { verdict: Verdict::new(converged).expecting(expected_spp), lost: now, needed_without }
+    let converged = evidence && lost <= limit;
+    Judged { verdict: Verdict::new(converged).expecting(expected_spp), lost }
+}
+
+/// Samples per pixel, on average, that a picture would take without denoising until no tile has lost more than `limit`
+/// JODs, estimated from the noise of its halves. `denoised` is what the noise is seen on,
+/// row-major. `None` if that is out of sight for a tile.
+pub fn spp_without_denoising(
+    film: &Film,
+    display: &Display,
+    denoised: &[Rgb],
+    viewing: Viewing,
+    limit: f64,
+) -> Option<f64> {
+    let (grid, model) = (film.grid(), VisionModel::new(&viewing));
+    let tiles: Vec<Tile> = grid.tiles().collect();
+    let samples = tiles.par_iter().map_init(VisionWorkspace::default, |room, &tile| {
+        let shown = tile.rows(grid.width()).flatten().map(|pixel| display.luma(denoised[pixel])).collect();
+        let noise =
+            DenoisedError::of((tile.width, tile.height), shown, noise_of(film, display, tile), display);
+        let mut eyes = Eyes { model: &model, room };
+        let spp = eyes.needed(&noise, limit, (film.spp(tile.index), DECAY))?;
+        Some(spp as f64 * tile.pixels() as f64)
+    });
+    let samples: Option<Vec<f64>> = samples.collect();
+    Some(samples?.iter().sum::<f64>() / (grid.width() * grid.height()) as f64)
 }
 
 /// The noise of a tile of the film, as displayed.
@@ -193,20 +227,4 @@ fn noise_of(film: &Film, display: &Display, tile: Tile) -> Vec<f32> {
     let rows =
         (inner.y..inner.y + inner.height).flat_map(|y| (inner.x..inner.x + inner.width).map(move |x| (y, x)));
     rows.map(|at| planes.residual[at]).collect()
-}
-
-/// The contrast at which no more than `limit` is lost, within 3 %; `None` if it lies beyond [`CONTRASTS`].
-fn just_allowed(limit: f64, mut lost: impl FnMut(f64) -> f64) -> Option<f64> {
-    let (mut low, mut high) = CONTRASTS;
-    if lost(low) > limit {
-        return None;
-    }
-    if lost(high) <= limit {
-        return Some(high);
-    }
-    while high / low > 1.03 {
-        let middle = (low * high).sqrt();
-        if lost(middle) <= limit { low = middle } else { high = middle }
-    }
-    Some(low)
 }

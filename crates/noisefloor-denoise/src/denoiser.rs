@@ -101,6 +101,15 @@ pub trait Denoiser {
     /// # Errors
     /// [`DenoiseError`] if the pictures differ in size, or the denoiser fails.
     fn denoise(&mut self, picture: &NoisyPicture<'_>) -> Result<Vec<Rgb>, DenoiseError>;
+
+    /// Denoises two pictures of the same size, each as if it were alone; at once, where that saves time.
+    ///
+    /// # Errors
+    /// As for one.
+    fn denoise_both(&mut self, pictures: [&NoisyPicture<'_>; 2]) -> Result<[Vec<Rgb>; 2], DenoiseError> {
+        let [a, b] = pictures;
+        Ok([self.denoise(a)?, self.denoise(b)?])
+    }
 }
 
 /// One denoiser for a criterion and for whoever writes the picture.
@@ -115,5 +124,9 @@ impl<D: Denoiser> Denoiser for Arc<Mutex<D>> {
 
     fn denoise(&mut self, picture: &NoisyPicture<'_>) -> Result<Vec<Rgb>, DenoiseError> {
         self.lock().unwrap_or_else(PoisonError::into_inner).denoise(picture)
+    }
+
+    fn denoise_both(&mut self, pictures: [&NoisyPicture<'_>; 2]) -> Result<[Vec<Rgb>; 2], DenoiseError> {
+        self.lock().unwrap_or_else(PoisonError::into_inner).denoise_both(pictures)
     }
 }

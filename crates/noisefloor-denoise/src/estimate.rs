@@ -176,10 +176,9 @@ impl DenoisedError {
         Self { size: (tile.width, tile.height), shown, residual, light, display: self.display }
     }
 
-    /// The same picture with something else wrong with it: as many pixels.
-    pub(crate) fn with_residual(&self, residual: Vec<f32>) -> Self {
-        let (shown, light) = (self.shown.clone(), Vec::new());
-        Self { size: self.size, shown, residual, light, display: self.display }
+    /// A picture as displayed with this wrong with it, whose brightness is not in question.
+    pub(crate) fn of(size: (usize, usize), shown: Vec<f32>, residual: Vec<f32>, display: &Display) -> Self {
+        Self { size, shown, residual, light: Vec::new(), display: *display }
     }
 
     /// A map of just-objectionable differences lost, row-major.
@@ -217,15 +216,16 @@ fn displayed(display: &Display, noisy: [Rgb; 2], denoised: [Rgb; 2]) -> Displaye
 /// Adds, scale by scale, the share of the mean of two residuals that they have in common.
 fn add_common(sum: &mut [f32], mut residuals: [Plane; 2]) {
     for scale in 0..=SCALES {
-        let [a, b] = if scale < SCALES {
-            residuals.each_mut().map(|residual| residual.split(scale))
-        } else {
-            residuals.clone()
-        };
+        let [ra, rb] = &mut residuals;
+        let part =
+            |residual: &mut Plane| if scale < SCALES { residual.split(scale) } else { residual.clone() };
+        let (a, b) = rayon::join(|| part(ra), || part(rb));
         let pairs = || a.values.iter().zip(&b.values);
-        let product = Plane::new(a.size, pairs().map(|(a, b)| a * b).collect()).local_mean(RADIUS);
-        let energy = pairs().map(|(a, b)| 0.25 * (a + b) * (a + b)).collect();
-        let energy = Plane::new(a.size, energy).local_mean(RADIUS);
+        let mean_of = |of: fn(f32, f32) -> f32| {
+            Plane::new(a.size, pairs().map(|(&a, &b)| of(a, b)).collect()).local_mean(RADIUS)
+        };
+        let (product, energy) =
+            rayon::join(|| mean_of(|a, b| a * b), || mean_of(|a, b| 0.25 * (a + b) * (a + b)));
         let local = product.values.iter().zip(&energy.values);
         for ((sum, (a, b)), (&common, &energy)) in sum.iter_mut().zip(pairs()).zip(local) {
             // Chance makes the mean product negative, too: nothing in common then. The estimate is that much too

@@ -18,8 +18,8 @@ pub const OIDN: Renderer = Renderer {
 };
 
 /// [Open Image Denoise](https://www.openimagedenoise.org) on the CPU: its filter `RT` for linear pictures, in
-/// its highest quality. It always runs with four threads, whatever [`FilterPlan::threads`] says: the last bits
-/// of its results depend on their number.
+/// its highest quality. Pictures of up to 512×512 pixels take one thread each, larger ones four, whatever
+/// [`FilterPlan::threads`] says: the last bits of its results depend on their number.
 #[derive(Debug)]
 pub struct Oidn(PictureFilter);
 
@@ -55,16 +55,31 @@ impl Denoiser for Oidn {
     }
 
     fn denoise(&mut self, picture: &NoisyPicture<'_>) -> Result<Vec<Rgb>, DenoiseError> {
-        if !picture.fits() {
-            return Err(DenoiseError::Pixels { size: picture.size, got: picture.radiance.len() });
+        let [made] = self.apply([picture])?;
+        Ok(made)
+    }
+
+    fn denoise_both(&mut self, pictures: [&NoisyPicture<'_>; 2]) -> Result<[Vec<Rgb>; 2], DenoiseError> {
+        self.apply(pictures)
+    }
+}
+
+impl Oidn {
+    fn apply<const N: usize>(&mut self, all: [&NoisyPicture<'_>; N]) -> Result<[Vec<Rgb>; N], DenoiseError> {
+        let size = all[0].size;
+        if let Some(odd) = all.iter().find(|picture| !picture.fits() || picture.size != size) {
+            return Err(DenoiseError::Pixels { size, got: odd.radiance.len() });
         }
-        let mut pictures = vec![("radiance", picture.radiance)];
-        // Its filter takes normals only beside albedo
-        if let Some(albedo) = picture.albedo {
-            pictures.push(("albedo", albedo));
-            pictures.extend(picture.normal.map(|normal| ("normal", normal)));
-        }
-        let made = self.0.apply(picture.size, &pictures);
+        let frames = all.map(|picture| {
+            let mut pictures = vec![("radiance", picture.radiance)];
+            // Its filter takes normals only beside albedo
+            if let Some(albedo) = picture.albedo {
+                pictures.push(("albedo", albedo));
+                pictures.extend(picture.normal.map(|normal| ("normal", normal)));
+            }
+            pictures
+        });
+        let made = self.0.apply(size, frames.each_ref().map(Vec::as_slice));
         made.map_err(|error| DenoiseError::Failed { name: self.name(), cause: Box::new(error) })
     }
 }

@@ -9,9 +9,6 @@ pub struct DenoisedRecord {
     pub error: Option<DenoisedError>,
     /// For each tile, the just-objectionable differences lost when it was last judged; NaN before that.
     pub jods_lost: Vec<f64>,
-    /// For each tile, the samples per pixel at which the picture without denoising would lose as little as is
-    /// allowed, estimated when it was last judged; `None` where that is out of sight.
-    pub needed_without: Vec<Option<u64>>,
     /// Seconds spent on denoising and on the estimates from it.
     pub seconds: f64,
     /// Verdicts so far: each takes two denoisings.
@@ -19,16 +16,13 @@ pub struct DenoisedRecord {
 }
 
 impl DenoisedRecord {
-    /// Everything but the error picture: the number of verdicts, the seconds, then loss and need of each tile,
-    /// in eight bytes each, little-endian. A need of zero is none.
+    /// Everything but the error picture: the number of verdicts, the seconds, then the loss of each tile, in eight
+    /// bytes each, little-endian.
     pub(crate) fn to_bytes(&self) -> Vec<u8> {
-        let mut bytes = Vec::with_capacity(16 + 16 * self.jods_lost.len());
+        let mut bytes = Vec::with_capacity(16 + 8 * self.jods_lost.len());
         bytes.extend((self.verdicts as u64).to_le_bytes());
         bytes.extend(self.seconds.to_le_bytes());
-        for (lost, needed) in self.jods_lost.iter().zip(&self.needed_without) {
-            bytes.extend(lost.to_le_bytes());
-            bytes.extend(needed.unwrap_or(0).to_le_bytes());
-        }
+        self.jods_lost.iter().for_each(|lost| bytes.extend(lost.to_le_bytes()));
         bytes
     }
 
@@ -38,17 +32,13 @@ impl DenoisedRecord {
         let [verdicts, seconds, rest @ ..] = words else { return None };
         let (verdicts, seconds) = (u64::from_le_bytes(*verdicts), f64::from_le_bytes(*seconds));
         // Before the first verdict there are no tiles
-        let expected = if verdicts == 0 { 0 } else { 2 * tiles };
+        let expected = if verdicts == 0 { 0 } else { tiles };
         if rest.len() != expected || !(seconds >= 0.0 && seconds.is_finite()) {
             return None;
         }
-        let (mut jods_lost, mut needed_without) = (Vec::new(), Vec::new());
-        for tile in rest.chunks_exact(2) {
-            jods_lost.push(f64::from_le_bytes(tile[0]));
-            needed_without.push(Some(u64::from_le_bytes(tile[1])).filter(|&needed| needed > 0));
-        }
+        let jods_lost = rest.iter().map(|lost| f64::from_le_bytes(*lost)).collect();
         let verdicts = usize::try_from(verdicts).ok()?;
-        Some(Self { error: None, jods_lost, needed_without, seconds, verdicts })
+        Some(Self { error: None, jods_lost, seconds, verdicts })
     }
 }
 
@@ -58,17 +48,10 @@ mod tests {
 
     #[test]
     fn what_is_kept_is_restored_and_nothing_else_is() {
-        let record = DenoisedRecord {
-            jods_lost: vec![0.25, 0.5],
-            needed_without: vec![None, Some(70)],
-            seconds: 1.5,
-            verdicts: 3,
-            error: None,
-        };
+        let record = DenoisedRecord { jods_lost: vec![0.25, 0.5], seconds: 1.5, verdicts: 3, error: None };
         let bytes = record.to_bytes();
         let again = DenoisedRecord::from_bytes(2, &bytes).unwrap();
-        assert_eq!((again.jods_lost, again.needed_without), (record.jods_lost, record.needed_without));
-        assert_eq!((again.seconds, again.verdicts), (1.5, 3));
+        assert_eq!((again.jods_lost, again.seconds, again.verdicts), (record.jods_lost, 1.5, 3));
         assert!(DenoisedRecord::from_bytes(2, &DenoisedRecord::default().to_bytes()).is_some());
         for length in 0..bytes.len() {
             assert!(DenoisedRecord::from_bytes(2, &bytes[..length]).is_none(), "{length}");

@@ -17,7 +17,7 @@ A host script defines a class and hands it to `serve`:
 
 A filter, such as a denoiser, has a name in `info`, and one method instead:
 
-        def filter(self, width, height, pictures): ...   # an array; pictures: bytes of float32 RGB by name
+        def filter(self, width, height, frames): ...   # an array each; a frame: bytes of float32 RGB by name
 
 `TileError` blames a failure on a tile; `rectangles` joins tiles for renderers to which every piece costs a start.
 Import the renderer in `__init__`, not at the top: what it prints while it loads must not get into the stream of frames.
@@ -170,12 +170,13 @@ def _answer(Host, renderer, request, data):
         width, height = renderer.info["width"], renderer.info["height"]
         return renderer, {"ok": True, "first_hits": True}, [_bytes(albedo, width, height), _bytes(normal, width, height)]
     if op == "filter":
-        width, height, names = request["width"], request["height"], request["pictures"]
-        if len(data) != 12 * width * height * len(names):
-            raise ValueError(f"{len(data)} bytes for {len(names)} pictures of {width}x{height}")
+        width, height, names, count = (request[key] for key in ["width", "height", "pictures", "frames"])
         size = 12 * width * height
-        pictures = {name: memoryview(data)[i * size : (i + 1) * size] for i, name in enumerate(names)}
-        return renderer, {"ok": True}, [_bytes(renderer.filter(width, height, pictures), width, height)]
+        if len(data) != size * len(names) * count:
+            raise ValueError(f"{len(data)} bytes for {count} times {len(names)} pictures of {width}x{height}")
+        pieces = iter(memoryview(data)[start : start + size] for start in range(0, len(data), size))
+        frames = [{name: next(pieces) for name in names} for _ in range(count)]
+        return renderer, {"ok": True}, [_bytes(made, width, height) for made in renderer.filter(width, height, frames)]
     raise ValueError(f"{op!r} is no operation")
 
 

@@ -82,16 +82,17 @@ pub(crate) struct FilterHello {
     pub(crate) name: String,
 }
 
-/// The pictures follow as payload, in this order.
+/// The pictures of each frame follow as payload, in this order.
 #[derive(Serialize)]
 pub(crate) struct Filtering<'a> {
     pub(crate) op: &'static str,
     pub(crate) width: usize,
     pub(crate) height: usize,
+    pub(crate) frames: usize,
     pub(crate) pictures: &'a [&'a str],
 }
 
-/// One picture is its payload.
+/// A picture for each frame is its payload.
 #[derive(Deserialize)]
 pub(crate) struct Filtered {}
 

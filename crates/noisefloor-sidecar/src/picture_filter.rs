@@ -79,48 +79,56 @@ impl PictureFilter {
         &self.name
     }
 
-    /// What the filter makes of named pictures of `width`×`height` pixels: a picture of the same size.
+    /// What the filter makes of each frame, of named pictures of `width`×`height` pixels: a picture of the same
+    /// size, as if the frame were alone. All frames have pictures of the same names.
     ///
     /// # Errors
-    /// [`SidecarError`] if the pictures are too large or have another size, the process fails twice, the
-    /// filter refuses, or the result is not finite.
-    pub fn apply(
+    /// [`SidecarError`] if the pictures are too large, have another size or other names, the process fails twice,
+    /// the filter refuses, or the result is not finite.
+    pub fn apply<const N: usize>(
         &mut self,
         (width, height): (usize, usize),
-        pictures: &[(&str, &[Rgb])],
-    ) -> Result<Vec<Rgb>, SidecarError> {
+        frames: [&[(&str, &[Rgb])]; N],
+    ) -> Result<[Vec<Rgb>; N], SidecarError> {
         let pixels = width.saturating_mul(height);
-        if pixels == 0 || pixels > MAX_PIXELS || pixels.saturating_mul(12 * pictures.len()) > MOST {
-            let what =
-                format!("{} pictures of {width}×{height} pixels do not fit into a call", pictures.len());
+        let pictures: usize = frames.iter().map(|pictures| pictures.len()).sum();
+        if pixels == 0 || pixels > MAX_PIXELS || pixels.saturating_mul(12 * pictures.max(N)) > MOST {
+            let what = format!("{pictures} pictures of {width}×{height} pixels do not fit into a call");
             return Err(self.error(SidecarCause::Refused(what), String::new()));
         }
-        if let Some((name, picture)) = pictures.iter().find(|(_, picture)| picture.len() != pixels) {
+        if let Some((name, picture)) = frames.concat().iter().find(|(_, picture)| picture.len() != pixels) {
             let what = format!("its picture {name} has {} pixels, not {width}×{height}", picture.len());
             return Err(self.error(SidecarCause::Refused(what), String::new()));
         }
-        match self.attempt((width, height), pictures) {
-            Err(error) if error.cause.deserves_a_restart() => self.attempt((width, height), pictures),
+        let names = |frame: &[(&str, &[Rgb])]| frame.iter().map(|(name, _)| (*name).to_owned()).collect();
+        let names: [Vec<String>; N] = frames.map(names);
+        if names.iter().any(|of_frame| *of_frame != names[0]) {
+            let what = format!("its frames have pictures of different names: {names:?}");
+            return Err(self.error(SidecarCause::Refused(what), String::new()));
+        }
+        match self.attempt((width, height), frames) {
+            Err(error) if error.cause.deserves_a_restart() => self.attempt((width, height), frames),
             outcome => outcome,
         }
     }
 
-    fn attempt(
+    fn attempt<const N: usize>(
         &mut self,
         (width, height): (usize, usize),
-        pictures: &[(&str, &[Rgb])],
-    ) -> Result<Vec<Rgb>, SidecarError> {
+        frames: [&[(&str, &[Rgb])]; N],
+    ) -> Result<[Vec<Rgb>; N], SidecarError> {
         let mut process = match self.process.take() {
             Some(process) => process,
             None => self.start()?,
         };
-        let names: Vec<&str> = pictures.iter().map(|(name, _)| *name).collect();
-        let request = Filtering { op: "filter", width, height, pictures: &names };
-        let values = pictures.iter().flat_map(|(_, picture)| picture.as_flattened());
+        let names: Vec<&str> = frames.iter().take(1).flat_map(|f| f.iter().map(|(name, _)| *name)).collect();
+        let request = Filtering { op: "filter", width, height, frames: N, pictures: &names };
+        let values =
+            frames.iter().flat_map(|frame| frame.iter().flat_map(|(_, picture)| picture.as_flattened()));
         let payload: Vec<u8> = values.flat_map(|value| value.to_le_bytes()).collect();
         let outcome = serde_json::to_vec(&request)
             .map_err(|e| (None, SidecarCause::Refused(e.to_string())))
-            .and_then(|header| ask(&mut process, header, payload, width * height, self.timeout))
+            .and_then(|header| ask(&mut process, header, payload, N * width * height, self.timeout))
             .and_then(|reply| read(reply, width * height));
         let stays = outcome.as_ref().err().is_none_or(|(_, cause)| !cause.deserves_a_restart());
         let outcome = outcome.map_err(|(_, cause)| self.error(cause, process.last_words()));
@@ -151,12 +159,15 @@ impl PictureFilter {
     }
 }
 
-/// The picture of a reply.
-fn read(Reply { payload, .. }: Reply<Filtered>, pixels: usize) -> Result<Vec<Rgb>, Blame> {
-    exactly(&payload, pixels)?;
-    let picture: Vec<Rgb> = rgb(&payload).collect();
-    if picture.as_flattened().iter().all(|value| value.is_finite()) {
-        return Ok(picture);
+/// The pictures of a reply.
+fn read<const N: usize>(
+    Reply { payload, .. }: Reply<Filtered>,
+    pixels: usize,
+) -> Result<[Vec<Rgb>; N], Blame> {
+    exactly(&payload, N * pixels)?;
+    let values: Vec<Rgb> = rgb(&payload).collect();
+    if values.as_flattened().iter().all(|value| value.is_finite()) {
+        return Ok(std::array::from_fn(|frame| values[frame * pixels..][..pixels].to_vec()));
     }
     Err((None, SidecarCause::Refused("its picture is not finite".to_owned())))
 }

@@ -181,7 +181,9 @@ while True:
     if asked["op"] == "filter":
         while os.path.exists(sys.argv[1]):
             time.sleep(0.05)
-        payload = payload[: asked["width"] * asked["height"] * 12]
+        size = asked["width"] * asked["height"] * 12
+        step = size * len(asked["pictures"])
+        payload = b"".join(payload[i * step :][:size] for i in range(asked["frames"]))
     reply = json.dumps(reply).encode()
     sink.write(struct.pack("<II", len(reply), len(payload)) + reply + payload)
     sink.flush()

@@ -13,7 +13,10 @@ class Fake:
     def __init__(self, init):
         self.info = {"name": "Fake filter, threads %s" % init["threads"]}
 
-    def filter(self, width, height, pictures):
+    def filter(self, width, height, frames):
+        return [self.one(pictures) for pictures in frames]
+
+    def one(self, pictures):
         values = array.array("f", bytes(pictures["radiance"]))
         if values[0] == -1:
             os._exit(3)

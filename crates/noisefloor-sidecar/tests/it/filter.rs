@@ -15,7 +15,8 @@ const FILTER: Renderer = Renderer {
 
 /// A picture of 2×1 pixels.
 fn apply(filter: &mut PictureFilter, first: f32) -> Result<Vec<Rgb>, SidecarError> {
-    filter.apply((2, 1), &[("radiance", &[[first, 1.0, 2.0], [3.0; 3]])])
+    let [made] = filter.apply((2, 1), [&[("radiance", &[[first, 1.0, 2.0], [3.0; 3]])]])?;
+    Ok(made)
 }
 
 #[test]
@@ -26,8 +27,13 @@ fn a_filter_turns_pictures_into_one_whatever_happened_before() {
     let doubled = vec![[0.5, 2.0, 4.0], [6.0; 3]];
     assert_eq!(apply(&mut filter, 0.25).unwrap(), doubled);
     let albedo = [[0.0; 3]; 2];
-    let two = filter.apply((2, 1), &[("radiance", &[[0.0; 3]; 2]), ("albedo", &albedo)]).unwrap();
+    let [two] = filter.apply((2, 1), [&[("radiance", &[[0.0; 3]; 2]), ("albedo", &albedo)]]).unwrap();
     assert_eq!(two, [[1.0; 3]; 2]);
+    // Frames are told apart
+    let frame = |value: f32| [("radiance", [[value; 3]; 2])];
+    let frames = [frame(1.0), frame(2.0)];
+    let [one, other] = frames.each_ref().map(|[(name, pixels)]| [(*name, pixels.as_slice())]);
+    assert_eq!(filter.apply((2, 1), [&one, &other]).unwrap(), [vec![[2.0; 3]; 2], vec![[4.0; 3]; 2]]);
 
     let cause = |outcome: Result<Vec<Rgb>, SidecarError>| *outcome.unwrap_err().cause;
     for (first, said) in [(-2.0, "this picture is refused"), (-3.0, "not finite"), (-4.0, "12 bytes for 2x1")]
@@ -41,7 +47,10 @@ fn a_filter_turns_pictures_into_one_whatever_happened_before() {
 
     // Nothing is sent that does not fit
     for (size, pixels) in [((2, 2), 2), ((0, 5), 0), ((usize::MAX, 2), 2)] {
-        let outcome = filter.apply(size, &[("radiance", &vec![[0.0; 3]; pixels])]);
+        let outcome = filter.apply(size, [&[("radiance", &vec![[0.0; 3]; pixels])]]).map(|[made]| made);
         assert!(matches!(cause(outcome), SidecarCause::Refused(_)), "{size:?}");
     }
+    let outcome =
+        filter.apply((2, 1), [&[("radiance", &albedo)], &[("albedo", &albedo)]]).map(|[made, _]| made);
+    assert!(matches!(cause(outcome), SidecarCause::Refused(why) if why.contains("different names")));
 }

@@ -4,7 +4,7 @@
 use super::Output;
 use noisefloor::{Rgb, Session, source::FirstHits};
 use noisefloor_cli::say::{NotSaid, note, say};
-use noisefloor_denoise::{DenoisedRecord, Denoiser, NoisyPicture};
+use noisefloor_denoise::{DenoisedRecord, Denoiser, NoisyPicture, spp_without_denoising};
 use noisefloor_image::maps::{Canvas, ColourScale, draw_field};
 use noisefloor_image::{RenderLayers, write_exr};
 use noisefloor_vision::VisionModel;
@@ -20,6 +20,11 @@ pub struct Denoised {
     guide: Option<FirstHits>,
     record: Arc<Mutex<DenoisedRecord>>,
     give_up: Arc<AtomicBool>,
+    /// JODs that a tile may lose.
+    lost: f64,
+    /// What the picture would need without, once it has been denoised, and the seconds that that took.
+    spp_without: Option<f64>,
+    picture_seconds: f64,
 }
 
 /// What report.json says of it.
@@ -31,6 +36,8 @@ pub(super) struct DenoisedReport {
     /// Verdicts, each of two denoisings, and the seconds that they took.
     verdicts: usize,
     seconds: f64,
+    /// Seconds for the picture itself.
+    picture_seconds: f64,
     /// Just-objectionable differences lost, by the estimate when a tile was last judged: the most of any
     /// tile.
     jods_lost: Option<f64>,
@@ -46,8 +53,18 @@ impl Denoised {
         guides: Option<&[FirstHits; 2]>,
         record: Arc<Mutex<DenoisedRecord>>,
         give_up: Arc<AtomicBool>,
+        lost: f64,
     ) -> Self {
-        Self { denoiser: Box::new(denoiser), guide: guides.map(together), record, give_up }
+        let guide = guides.map(together);
+        Self {
+            denoiser: Box::new(denoiser),
+            guide,
+            record,
+            give_up,
+            lost,
+            spp_without: None,
+            picture_seconds: 0.0,
+        }
     }
 
     /// Set by whoever wants the denoiser to give up.
@@ -63,20 +80,17 @@ impl Denoised {
         self.record.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    pub(super) fn report(&self, session: &Session) -> DenoisedReport {
+    pub(super) fn report(&self) -> DenoisedReport {
         let record = self.record();
-        let grid = session.film().grid();
-        let pixels = (grid.width() * grid.height()) as f64;
-        let needed = record.needed_without.iter().zip(grid.tiles());
-        let needed: Option<f64> = needed.map(|(spp, tile)| Some((*spp)? as f64 * tile.pixels() as f64)).sum();
         let lost = record.jods_lost.iter().copied().filter(|lost| lost.is_finite());
         DenoisedReport {
             denoiser: self.denoiser.name(),
             guided: self.guide.is_some(),
             verdicts: record.verdicts,
             seconds: record.seconds,
+            picture_seconds: self.picture_seconds,
             jods_lost: lost.max_by(f64::total_cmp),
-            spp_without: needed.filter(|_| record.verdicts > 0).map(|samples| samples / pixels),
+            spp_without: self.spp_without,
         }
     }
 }
@@ -112,12 +126,14 @@ impl Output {
         let guide = denoised.guide.as_ref();
         let image =
             denoised.denoiser.denoise(&guide.map_or(picture, |guide| picture.guided(guide, wants)))?;
-        denoised.record().seconds += began.elapsed().as_secs_f64();
-
         let display = session.display().copied();
         let display = display.unwrap_or_else(|| session.params().tone_mapping.settle(&image));
         let encoded: Vec<Rgb> = image.iter().map(|&p| display.encode(p)).collect();
-        let eyes = VisionModel::new(&session.params().viewing);
+        let viewing = session.params().viewing;
+        denoised.spp_without =
+            spp_without_denoising(session.film(), &display, &image, viewing, denoised.lost);
+        denoised.picture_seconds = began.elapsed().as_secs_f64();
+        let eyes = VisionModel::new(&viewing);
         let map = denoised.record().error.as_ref().map(|error| error.map_of_jods_lost(&eyes)).transpose()?;
         write_exr(self.path("image-denoised.exr"), &RenderLayers::rgb(width, height, &image))?;
         if let Some(guide) = self.denoised.as_ref().and_then(|denoised| denoised.guide.as_ref()) {
@@ -138,8 +154,8 @@ impl Output {
     /// Says what denoising was worth.
     pub(super) fn say_denoised(&self, session: &Session) -> Result<(), NotSaid> {
         let Some(denoised) = &self.denoised else { return Ok(()) };
-        let DenoisedReport { denoiser, guided, verdicts, seconds, jods_lost, spp_without } =
-            denoised.report(session);
+        let DenoisedReport { denoiser, guided, verdicts, seconds, picture_seconds, jods_lost, spp_without } =
+            denoised.report();
         let grid = session.film().grid();
         let spp = session.film().total_samples() as f64 / (grid.width() * grid.height()) as f64;
         let without = spp_without.map_or_else(
@@ -153,6 +169,8 @@ impl Output {
                 "the worst tile lost {lost:.3} JOD when it was last judged; nobody has been asked about denoised tiles"
             )?;
         }
-        say!("{verdicts} verdicts on denoised halves, and the picture itself, took {seconds:.1} s")
+        say!(
+            "{verdicts} verdicts on denoised halves took {seconds:.1} s, the picture itself {picture_seconds:.1} s"
+        )
     }
 }

@@ -24,7 +24,7 @@ pub(super) fn begin(
     if let Some(guides) = &guides {
         criterion = criterion.guided_by(Arc::clone(guides));
     }
-    let denoised = Denoised::new(denoiser, guides.as_deref(), criterion.record(), give_up);
+    let denoised = Denoised::new(denoiser, guides.as_deref(), criterion.record(), give_up, lost);
     Ok((Box::new(criterion), denoised))
 }
 
