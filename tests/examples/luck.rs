@@ -134,12 +134,12 @@ fn main() -> Result<(), Box<dyn Error>> {
         "| light | chance | tile | guard | stops at, median | stopped without having found it | noise left, median | 95 % |"
     );
     println!("|---|---|---|---|---|---|---|---|");
-    let spaced = Schedule::default();
+    let (spaced, first) = (Schedule::default(), Params::default().min_spp);
     let guards = [
-        ("none", spaced, 100, 1),
-        ("--consecutive 2", spaced, 100, 2),
-        ("--consecutive 3", spaced, 100, 3),
-        ("--min-spp 50", spaced, 50, 1),
+        ("none", spaced, first, 1),
+        ("--consecutive 2", spaced, first, 2),
+        ("--consecutive 3", spaced, first, 3),
+        ("--min-spp 100", spaced, 100, 1),
         ("--min-spp 1000", spaced, 1000, 1),
         ("--schedule every", Schedule::Every { step: 100 }, 100, 1),
         ("--schedule every --consecutive 3", Schedule::Every { step: 100 }, 100, 3),
