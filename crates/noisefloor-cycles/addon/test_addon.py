@@ -23,16 +23,16 @@ WORK = tempfile.TemporaryDirectory(prefix="noisefloor-addon-")
 FOLDER = pathlib.Path(WORK.name)
 SIZE = (128, 96)
 
-# What the host of the command renders: blocks 0 to 5 of the frame, and block 3 of a part of it
+# What the host of the command renders: the first six batches of the frame, and the fourth of a part of it
 HOST = """
 import runpy, sys
 import numpy
 script, scene, out = sys.argv[1:]
 host = runpy.run_path(script, run_name="tested")["Cycles"]({"scene": scene, "seed": 5})
 frame = {"index": 0, "x": 0, "y": 0, "width": 128, "height": 96, "samples": 16}
-part = {"index": 1, "x": 64, "y": 32, "width": 40, "height": 64, "first": 48, "samples": 16}
-blocks = [host.sample([{**frame, "first": 16 * k}])[0][1] for k in range(6)]
-numpy.savez(out, part=host.sample([part])[0][1], blocks=numpy.array(blocks))
+part = {"index": 1, "x": 64, "y": 32, "width": 40, "height": 64, "sequence": 1, "point": 16, "samples": 16}
+batches = [host.sample([{**frame, "sequence": k % 2, "point": k // 2 * 16}])[0][1] for k in range(6)]
+numpy.savez(out, part=host.sample([part])[0][1], batches=numpy.array(batches))
 """
 
 
@@ -75,14 +75,18 @@ def pixels(path):
     return flat.reshape(height, width, -1)[::-1]
 
 
-def rendered(scene):
-    """The picture, and the pictures of all blocks with their regions, in the order in which Cycles rendered
-    them."""
-    blocks, sample = [], frame.Frame._sample
+# Sequence and first point of a frame's batches, in order
+POINTS = [(k % 2, k // 2 * 16) for k in range(6)]
 
-    def record(self, region, block):
-        pictures = sample(self, region, block)
-        blocks.append((region, block, pictures["Combined"].copy()))
+
+def rendered(scene):
+    """The picture, and the pictures of all batches with their regions and points, in the order in which Cycles
+    rendered them."""
+    batches, sample = [], frame.Frame._sample
+
+    def record(self, region, points):
+        pictures = sample(self, region, points)
+        batches.append((region, points, pictures["Combined"].copy()))
         return pictures
 
     frame.Frame._sample = record
@@ -90,7 +94,7 @@ def rendered(scene):
         bpy.ops.render.render(write_still=True)
     finally:
         frame.Frame._sample = sample
-    return pixels(scene.render.filepath + ".exr"), blocks
+    return pixels(scene.render.filepath + ".exr"), batches
 
 
 def facts(scene):
@@ -132,23 +136,23 @@ class Addon(unittest.TestCase):
     def test_off_it_changes_nothing(self):
         scene = room()
         scene.noisefloor.use = False
-        with_it, blocks = rendered(scene)
+        with_it, batches = rendered(scene)
         noisefloor_addon.unregister()
         try:
             without = rendered(scene)[0]
         finally:
             noisefloor_addon.register()
-        self.assertEqual(blocks, [])
+        self.assertEqual(batches, [])
         assert_same(with_it, without, scene.cycles.samples)
 
     def test_no_setting_changes_nor_is_saved_while_it_renders(self):
         scene, seen = room(), []
         before, saved, sample = facts(scene), FOLDER / "saved.blend", frame.Frame._sample
 
-        def look(self, region, block):
-            pictures = sample(self, region, block)
+        def look(self, region, points):
+            pictures = sample(self, region, points)
             seen.append(facts(scene))
-            if block == 2:
+            if points == POINTS[2]:
                 bpy.data.libraries.write(str(saved), {scene})
             return pictures
 
@@ -168,10 +172,10 @@ class Addon(unittest.TestCase):
         scene, sample = room(), frame.Frame._sample
         before = facts(scene)
 
-        def fail(self, region, block):
-            if block == 2:
+        def fail(self, region, points):
+            if points == POINTS[2]:
                 raise ValueError("on purpose")
-            return sample(self, region, block)
+            return sample(self, region, points)
 
         frame.Frame._sample = fail
         try:
@@ -187,7 +191,7 @@ class Addon(unittest.TestCase):
         scene = room()
         blend = FOLDER / "room.blend"
         bpy.ops.wm.save_as_mainfile(filepath=str(blend), copy=True)
-        blocks = rendered(scene)[1]
+        batches = rendered(scene)[1]
         script, out = FOLDER / "host" / "cycles_host.py", FOLDER / "host.npz"
         script.parent.mkdir(exist_ok=True)
         host = (ADDON.parent / "host" / "cycles_host.py").read_text()
@@ -196,19 +200,19 @@ class Addon(unittest.TestCase):
         (FOLDER / "run.py").write_text(HOST)
         subprocess.run([sys.executable, FOLDER / "run.py", script, blend, out], check=True)
         with numpy.load(out) as theirs:
-            for k, (region, block, picture) in enumerate(blocks[:6]):
-                self.assertEqual((region, block), ((0, 0, *SIZE), k))
-                assert_same(picture[..., :3], theirs["blocks"][k], 16, f"block {k}")
-            assert_same(blocks[3][2][32:96, 64:104, :3], theirs["part"], 16)
-        self.assertGreater(numpy.abs(blocks[0][2] - blocks[1][2]).max(), 0.01)
+            for k, (region, points, picture) in enumerate(batches[:6]):
+                self.assertEqual((region, points), ((0, 0, *SIZE), POINTS[k]))
+                assert_same(picture[..., :3], theirs["batches"][k], 16, f"batch {k}")
+            assert_same(batches[3][2][32:96, 64:104, :3], theirs["part"], 16)
+        self.assertGreater(numpy.abs(batches[0][2] - batches[1][2]).max(), 0.01)
 
-    def test_the_picture_is_the_mean_of_its_blocks(self):
+    def test_the_picture_is_the_mean_of_its_batches(self):
         scene = room(closed=True)
         scene.noisefloor.max_samples = 2048
-        picture, blocks = rendered(scene)
+        picture, batches = rendered(scene)
         total, count = numpy.zeros((*SIZE[::-1], 4)), numpy.zeros((*SIZE[::-1], 1))
-        for (x, y, width, height), _, block in blocks:
-            total[y : y + height, x : x + width] += block
+        for (x, y, width, height), _, batch in batches:
+            total[y : y + height, x : x + width] += batch
             count[y : y + height, x : x + width] += 1
         # A film in float32 rounds each of at most 128 batches
         numpy.testing.assert_allclose(picture, total / count, rtol=128 * 2**-24, atol=1e-6)
@@ -244,17 +248,17 @@ class Addon(unittest.TestCase):
             shown = bpy.data.images["noisefloor " + name.replace("-", " ")]
             self.assertEqual(tuple(shown.size), SIZE)
             self.assertEqual(pixels(f"{stem}-{name}.png").shape[:2], SIZE[::-1])
-        # Depth is a label: that of the plane and the cube, not a mean over blocks with the far background
+        # Depth is a label: that of the plane and the cube, not a mean over batches with the far background
         self.assertGreater(picture[..., :3].std(), 0.01)
 
     def test_limits_and_esc_keep_what_there_is(self):
         scene = room()
         scene.noisefloor.max_samples, scene.noisefloor.share = 64, 0.99
-        _, blocks = rendered(scene)
-        self.assertEqual([block for _, block, _ in blocks], [0, 1, 2, 3])
+        _, batches = rendered(scene)
+        self.assertEqual([points for _, points, _ in batches], POINTS[:4])
         scene.noisefloor.time_limit = 1e-3
-        picture, blocks = rendered(scene)
-        numpy.testing.assert_allclose(picture, blocks[0][2], rtol=1e-6)
+        picture, batches = rendered(scene)
+        numpy.testing.assert_allclose(picture, batches[0][2], rtol=1e-6)
         self.assertIn("4 ended: time-limit", hooks.state.summary)
         scene.noisefloor.time_limit, calls = 0, []
 
@@ -264,11 +268,11 @@ class Addon(unittest.TestCase):
 
         cancelled, frame.Frame._cancelled = frame.Frame._cancelled, esc
         try:
-            picture, blocks = rendered(scene)
+            picture, batches = rendered(scene)
         finally:
             frame.Frame._cancelled = cancelled
-        self.assertEqual(len(blocks), 3)
-        numpy.testing.assert_allclose(picture, (blocks[0][2] + blocks[1][2]) / 2, rtol=1e-6)
+        self.assertEqual(len(batches), 3)
+        numpy.testing.assert_allclose(picture, (batches[0][2] + batches[1][2]) / 2, rtol=1e-6)
         self.assertIn("4 ended: cancelled", hooks.state.summary)
 
     def test_animations_resume_frame_by_frame(self):
@@ -310,20 +314,20 @@ class Addon(unittest.TestCase):
             scene.cycles.samples = frame_number
             scene.cycles.keyframe_insert("samples", frame=frame_number)
         scene.frame_set(2)
-        picture, blocks = rendered(scene)
-        self.assertGreater(numpy.abs(blocks[0][2] - blocks[1][2]).mean(), 0)
+        picture, batches = rendered(scene)
+        self.assertGreater(numpy.abs(batches[0][2] - batches[1][2]).mean(), 0)
         scene.animation_data_clear()
         scene.noisefloor.use, scene.cycles.samples, scene.cycles.use_adaptive_sampling = False, 96, False
-        plain, still = rendered(scene)[0], numpy.abs(blocks[0][2] - picture).mean()
-        # Both have a sixth of the variance of a block: they differ by √(2/6) of what a block does, or less
+        plain, still = rendered(scene)[0], numpy.abs(batches[0][2] - picture).mean()
+        # Both have at most a sixth of the variance of a batch: they differ by √(2/6) of what a batch does, or less
         self.assertLess(numpy.abs(picture - plain).mean(), still)
 
     def test_every_layer_has_its_own_stops(self):
         scene = room()
         scene.noisefloor.max_samples = 96
         scene.view_layers.new("second").use_sky = False
-        _, blocks = rendered(scene)
-        self.assertEqual([block for _, block, _ in blocks], [0, 1, 2, 3, 4, 5] * 2)
+        _, batches = rendered(scene)
+        self.assertEqual([points for _, points, _ in batches], POINTS * 2)
         self.assertIn("noisefloor samples, second", bpy.data.images)
 
     def test_denoised_pictures_have_less_noise(self):
@@ -333,8 +337,8 @@ class Addon(unittest.TestCase):
         scene.cycles.use_denoising = True
         if denoise.library() is None:
             self.skipTest("this Blender has no Open Image Denoise")
-        picture, blocks = rendered(scene)
-        mean = sum(block for _, _, block in blocks) / len(blocks)
+        picture, batches = rendered(scene)
+        mean = sum(batch for _, _, batch in batches) / len(batches)
         numpy.testing.assert_allclose(mean, noisy, rtol=1e-5, atol=1e-6)
 
         def roughness(image):

@@ -88,8 +88,8 @@ class Cycles:
 
     def sample(self, tiles):
         answers = [None] * len(tiles)
-        for region, (first, samples), members in host.rectangles(tiles, ["first", "samples"]):
-            mean = self._mean(region, first, samples)
+        for region, (sequence, point, samples), members in host.rectangles(tiles, ["sequence", "point", "samples"]):
+            mean = self._mean(region, sequence, point, samples)
             for member in members:
                 t = tiles[member]
                 x, y = t["x"] - region[0], t["y"] - region[1]
@@ -119,7 +119,7 @@ class Cycles:
             for name in ["Denoising Albedo", "Denoising Normal"]:
                 tree.links.clear()
                 tree.links.new(node.outputs[name], out.inputs[0])
-                pictures.append(self._mean(region, 0, samples, f" first hits {index}"))
+                pictures.append(self._mean(region, 0, 0, samples, f" first hits {index}"))
         finally:
             scene.compositing_node_group, render.use_compositing = None, False
             groups.remove(tree)
@@ -128,23 +128,23 @@ class Cycles:
         # A lamp's albedo is its radiance
         return [self.np.ascontiguousarray(part, self.np.float32) for part in (self.np.clip(albedo, 0, 1), normal)]
 
-    def _mean(self, region, first, samples, stream=""):
-        """Mean of samples first…first + samples of a region, block by block."""
+    def _mean(self, region, sequence, point, samples, stream=""):
+        """Mean of samples of a sequence from a point on, of a region, pattern by pattern."""
         render = self.scene.render
         aim(render, (render.resolution_x, render.resolution_y), region)
         self.shape = (*region[:1:-1], 3)
         total, done = 0.0, 0
         while done < samples:
-            block, offset = divmod(first + done, BLOCK)
-            length = min(BLOCK - offset, samples - done)
-            total = total + self._render(stream, block, offset, length) * length
+            whole = longest(self.scene.cycles)
+            length = min(whole - (point + done) % whole, samples - done)
+            choose(self.scene.cycles, self.seed, sequence, point + done, length, stream)
+            total = total + self._render() * length
             done += length
         return total / samples
 
-    def _render(self, stream, block, offset, length):
-        """Mean of some samples of a block, rows from the top, as float64."""
+    def _render(self):
+        """Mean of the samples chosen, rows from the top, as float64."""
         images = self.bpy.data.images
-        choose(self.scene.cycles, self.seed, block, offset, length, stream)
         self.bpy.ops.render.render()
         # The pixels of a render result are out of a script's reach: only a file has them. It is there for milliseconds, because
         # a process whose parent is gone ends at once and cleans nothing up

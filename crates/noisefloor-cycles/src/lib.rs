@@ -17,17 +17,15 @@
 //! trust.
 //!
 //! # Samples
-//! The source repeats samples, however requests are cut. They come in blocks of 16 points of Cycles' own
-//! Sobol table, each block with its own seed: batches of whole blocks are independent. Batches that are not
-//! multiples of 16 share a block with the previous one, whose parts fill each other's gaps: halves made of
-//! them differ a little more than they should, and much more at edges of lamps. Cycles renders one block of
-//! one rectangle of tiles at a time, at a cost of 5 ms beside the samples.
+//! The source repeats samples, however requests are cut. Each [`sequence`](noisefloor::Request::sequence) is a
+//! pattern of Cycles' own Sobol table with its own seed, and another after 8,192 samples: halves are independent,
+//! and the batches of one half fill each other's gaps. Cycles renders one rectangle of tiles at a time, at a cost
+//! of 5 ms beside the samples.
 //!
 //! Albedo and normals (`first_hits`) are those that Cycles gives its own
 //! denoisers: where a mirror or glass is hit first, they are of what is seen in it.
 //!
-//! In nearly all pixels noise decreases with the number of samples as that of independent ones does. At edges
-//! of lamps it decreases faster inside a block.
+//! Noise decreases faster with the number of samples than that of independent ones.
 
 use noisefloor_sidecar::{HostOptions, Job, Renderer, Sidecar, SidecarError};
 

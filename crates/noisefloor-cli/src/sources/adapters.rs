@@ -14,7 +14,7 @@ pub struct Adapter {
     pub name: &'static str,
     pub renderer: &'static Renderer,
     open: fn(&Job) -> Result<Sidecar, SidecarError>,
-    /// Samples per pixel between verdicts, at the least: both halves are then made of whole patterns.
+    /// Samples per pixel between verdicts, at the least.
     pub step: u64,
     /// What keeps it from being all it could be here, and what mends that.
     pub notes: fn() -> Vec<String>,
@@ -41,7 +41,7 @@ pub const ADAPTERS: &[Adapter] = &[
         name: "cycles",
         renderer: &noisefloor_cycles::RENDERER,
         open: noisefloor_cycles::open,
-        // Sobol points in blocks of 16
+        // Each call costs it a start
         step: 32,
         notes: Vec::new,
     },

@@ -1,4 +1,4 @@
-"""One view layer of one frame: Cycles renders blocks of samples of the open tiles, and noisefloor says which
+"""One view layer of one frame: Cycles renders batches of samples of the open tiles, and noisefloor says which
 tiles stay open."""
 
 import time
@@ -41,7 +41,7 @@ class Frame:
             f"{seed} frame {self.scene.frame_current}" if self.scene.cycles.use_animated_seed else seed
         )
         self.session = noisefloor.Session(
-            *self.size, settings.oracle(self.settings), settings.params(self.scene, sampling.BLOCK)
+            *self.size, settings.oracle(self.settings), settings.params(self.scene, sampling.BATCH)
         )
         self.sums = passes.Sums(*self.size)
         self.begun, self.sampled = time.monotonic(), 0
@@ -88,7 +88,7 @@ class Frame:
                 setattr(render, name, value)
 
     def _round(self, report):
-        """A block of samples for each open tile, and verdicts on those that are due; returns why to end, if
+        """A batch of samples for each open tile, and verdicts on those that are due; returns why to end, if
         so."""
         # Tiles are open from the first round on, so they have samples alike
         requests = self.session.requests()
@@ -98,22 +98,22 @@ class Frame:
                 "y": t.y,
                 "width": t.width,
                 "height": t.height,
-                "block": request.first // sampling.BLOCK,
+                "points": (request.sequence, request.point),
             }
             for request in requests
             for t in [request.tile]
         ]
-        for region, (block,), members in rectangles(tiles, ["block"]):
-            pictures = self._sample(region, block)
+        for region, (points,), members in rectangles(tiles, ["points"]):
+            pictures = self._sample(region, points)
             if self._cancelled():
                 return "cancelled"
-            self.sums.add(region, sampling.BLOCK, pictures)
-            self.sampled += region[2] * region[3] * sampling.BLOCK
+            self.sums.add(region, sampling.BATCH, pictures)
+            self.sampled += region[2] * region[3] * sampling.BATCH
             picture = numpy.ascontiguousarray(pictures["Combined"][..., :3])
             for member in members:
                 tile = requests[member].tile
                 x, y = tile.x - region[0], tile.y - region[1]
-                self.session.push(tile, sampling.BLOCK, picture[y : y + tile.height, x : x + tile.width])
+                self.session.push(tile, sampling.BATCH, picture[y : y + tile.height, x : x + tile.width])
             if not bpy.app.background:
                 self._show(region)
             report(self)
@@ -126,12 +126,13 @@ class Frame:
         """Whether Esc was hit: the last batch may be incomplete then."""
         return self.engine.test_break()
 
-    def _sample(self, region, block):
+    def _sample(self, region, points):
+        """A batch of samples; points: a sequence, and the first of it."""
         x, y, width, height = region
         # For motion blur, Cycles evaluates other frames, and settings that move are as in the file again
         cycles = self.depsgraph.scene_eval.cycles
         sampling.independent(cycles)
-        sampling.choose(cycles, self.seed, block)
+        sampling.choose(cycles, self.seed, *points, sampling.BATCH)
         sampling.aim(
             self.engine.render,
             (self.across, self.down),

@@ -4,7 +4,7 @@ rows from the top."""
 import bpy
 import numpy
 
-# Not a mean over samples, as the others are: what the first block found stays
+# Not a mean over samples, as the others are: what the first batch found stays
 LABELS = ("Depth", "Object Index", "Material Index", "IndexOB", "IndexMA", "Crypto")
 
 

@@ -1,23 +1,23 @@
 """Which samples Cycles takes. The host of noisefloor-cycles and the add-on share this file, so that both
 take the same.
 
-Samples come in blocks of 16, each block a pattern of its own: the first 16 points of Cycles' Sobol table,
-scrambled by a seed that follows from the block. Sample k of a pixel thereby follows from seed, pixel and k,
-however requests are cut, and batches of whole blocks are independent. Successive subsets of one long
-pattern, which Cycles offers too, are not: each fills the gaps of those before, so that halves made of them
-differ by more than the error of their mean.
+Each of the two halves of a tile's samples is one pattern of Cycles' Sobol table, scrambled by a seed that
+follows from the number of the half: sample k of a half thereby follows from seed, pixel, half and k, however
+requests are cut. Halves are independent; successive subsets of one pattern are not, since each fills the gaps
+of those before.
 """
 
 import hashlib
 
-# Samples of a block. Longer patterns have less noise at edges of lamps, and nowhere else; they would have to
-# be cut more often
-BLOCK = 16
+# Points of Cycles' table; a pattern of its own follows. Blender before 5.0 renders no part of a longer pattern
+LONGEST, WITHOUT_PARTS = 8192, 16
+# Samples of a call: each costs Cycles a start
+BATCH = 16
 
 
 def independent(cycles):
-    """Makes samples independent from pixel to pixel and from block to block. cycles: the Cycles settings of
-    a scene."""
+    """Makes samples independent from pixel to pixel and from pattern to pattern. cycles: the Cycles settings
+    of a scene."""
     cycles.use_adaptive_sampling = cycles.use_denoising = cycles.use_guiding = False
     cycles.time_limit = 0.0
     cycles.use_layer_samples = "IGNORE"
@@ -32,12 +32,19 @@ def independent(cycles):
     cycles.use_auto_tile = False
 
 
-def choose(cycles, seed, block, offset=0, length=BLOCK, stream=""):
-    """Chooses samples of a block. Streams share no patterns."""
-    digest = hashlib.blake2b(f"{seed}{stream} {block}".encode(), digest_size=4).digest()
+def longest(cycles):
+    """Samples of a half until the next pattern begins."""
+    return LONGEST if hasattr(cycles, "use_sample_subset") else WITHOUT_PARTS
+
+
+def choose(cycles, seed, sequence, point, length, stream=""):
+    """Chooses samples of a sequence, from a point on; no more than are left of the pattern. Streams share no
+    patterns."""
+    pattern, offset = divmod(point, longest(cycles))
+    digest = hashlib.blake2b(f"{seed}{stream} {sequence} {pattern}".encode(), digest_size=4).digest()
     cycles.seed = int.from_bytes(digest, "little") >> 1
     if hasattr(cycles, "use_sample_subset"):
-        cycles.samples, cycles.use_sample_subset = BLOCK, True
+        cycles.samples, cycles.use_sample_subset = LONGEST, True
         cycles.sample_offset, cycles.sample_subset_length = offset, length
     else:
         cycles.samples, cycles.sample_offset = length, offset

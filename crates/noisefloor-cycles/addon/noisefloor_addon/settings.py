@@ -67,8 +67,8 @@ def oracle(settings):
     return noisefloor.Oracle(settings.share)
 
 
-def params(scene, block):
-    """How tiles are judged. Verdicts come after whole blocks of samples."""
+def params(scene, batch):
+    """How tiles are judged. Verdicts come after whole batches."""
     settings, view = scene.noisefloor, scene.view_settings
     people = {"viewing": settings.viewing}
     if settings.viewing == "mine":
@@ -81,11 +81,11 @@ def params(scene, block):
     tone = {"tone_mapping": "reinhard"}
     if view.view_transform in ("Standard", "Raw"):
         tone = {"tone_mapping": "srgb", "exposure": 2.0**view.exposure}
-    most = max(settings.max_samples // block, 2) * block
+    most = max(settings.max_samples // batch, 2) * batch
     return noisefloor.Params(
         tile=settings.tile,
-        step=block,
-        min_spp=min(-(-settings.min_samples // block) * block, most),
+        step=batch,
+        min_spp=min(-(-settings.min_samples // batch) * batch, most),
         max_spp=most,
         **people,
         **tone,
