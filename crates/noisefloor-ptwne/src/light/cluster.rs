@@ -81,6 +81,11 @@ impl Cluster {
         })
     }
 
+    /// Whether it is one flat surface.
+    pub(super) fn is_flat(&self) -> bool {
+        self.area > 0.0 && self.spread == 0.0
+    }
+
     /// The bounds of both.
     pub(super) fn union(&self, other: &Self) -> Self {
         let (low, high) = (self.low.min(other.low), self.high.max(other.high));

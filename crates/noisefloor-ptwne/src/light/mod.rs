@@ -5,6 +5,7 @@ mod cluster;
 mod cone;
 mod emitter;
 mod node;
+mod patch;
 mod punctual;
 mod receiver;
 mod tree;

@@ -8,8 +8,8 @@ use std::f32::consts::PI;
 
 /// "No node" and "no slot".
 pub(super) const NONE: u32 = u32::MAX;
-/// Flags a child that is a light; the other bits are its index.
-pub(super) const LIGHT: u32 = 1 << 31;
+/// Flags a child that is a patch of lights; the other bits are its index.
+pub(super) const LEAF: u32 = 1 << 31;
 /// Cosines below this count as this in the geometric importance, which must not starve lights at grazing
 /// angles.
 const LEAST_COSINE: f32 = 0.1;

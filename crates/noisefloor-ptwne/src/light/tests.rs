@@ -2,7 +2,7 @@
 
 use super::choice::Lights;
 use super::cone::Falloff;
-use super::emitter::Light;
+use super::emitter::{Light, LightShape};
 use super::punctual::Punctual;
 use super::receiver::Receiver;
 use crate::accel::Shape;
@@ -60,6 +60,18 @@ impl Draw {
         Light::surface(&shape, radiance, i.is_multiple_of(4), 0)
     }
 
+    /// A lamp that faces down, of so many triangles within 0.03 of its middle that differ in size and a
+    /// little in direction: one patch of a scene of the size 5.
+    fn lamp(&mut self, middle: glam::Vec3, radiance: f32, triangles: usize) -> Vec<Light> {
+        let mut triangle = || {
+            let corner = middle + self.point(0.02);
+            let (e1, e2) = (glam::Vec3::X * 0.01 * self.0.one(), glam::Vec3::Z * 0.01);
+            let shape = Shape::Planar { corner, e1, e2: e2 + self.point(0.003), whole: false };
+            Light::surface(&shape, Vec3::splat(radiance), false, 0)
+        };
+        (0..triangles).map(|_| triangle()).collect()
+    }
+
     /// A diffuse or glossy receiver.
     fn receiver(&mut self) -> Receiver {
         let mut receiver = Receiver::diffuse(self.point(5.0).into(), self.direction());
@@ -73,13 +85,18 @@ impl Draw {
     }
 }
 
-/// Scenes of 1 to 300 lights, also with a distant light, a sun or an environment map.
+/// Scenes of 1 to 300 lights and up to three lamps of many triangles, also with a distant light, a sun or an
+/// environment map.
 fn scenes() -> Vec<Lights> {
     let mut draw = Draw::new(3);
     let mut all = vec![];
     for (seed, count) in [2, 3, 4, 5, 17, 300].into_iter().enumerate() {
         for far in 0..4 {
             let mut lights: Vec<Light> = (0..count).map(|i| draw.light(i + seed)).collect();
+            for radiance in (0..seed.min(3)).map(|i| 10f32.powi(i as i32)) {
+                let middle = draw.point(4.0);
+                lights.extend(draw.lamp(middle, radiance, 20));
+            }
             let direction = draw.direction();
             if far == 1 || far == 2 {
                 let (direction, irradiance) = (direction.to_array(), [0.1; 3]);
@@ -167,6 +184,30 @@ fn near_lights_that_face_the_receiver_are_preferred() {
     let mirror = Vec3::new(3.0, 2.0, 0.0).normalize();
     let metal = Receiver::new(receiver.position, receiver.normal, 0.0, 1.0, mirror, 0.01);
     assert!(lights.pmf(&lights.prospect(metal), 10) > 3.0 * lights.pmf(&lights.prospect(receiver), 10));
+}
+
+/// A lamp of many triangles is chosen as often as one of a single surface of the same power, and each of its
+/// triangles by its area. Both halves of the choices count: the geometric one, too, takes the lamp as one.
+#[test]
+fn lamps_of_many_triangles_count_as_one() {
+    let mut draw = Draw::new(6);
+    let mut lights = draw.lamp(glam::Vec3::new(-1.0, 2.0, 0.0), 1.0, 100);
+    let area = |light: &Light| match light.shape {
+        LightShape::Planar { area, .. } => area,
+        _ => 0.0,
+    };
+    let areas: Vec<f32> = lights.iter().map(area).collect();
+    let sum: f32 = areas.iter().sum();
+    lights.push(ceiling([0.5, 2.0, -0.5], sum));
+    let lights = Lights::new(lights, [Vec3::splat(-2.5), Vec3::splat(2.5)], &[]);
+    let prospect = lights.prospect(Receiver::diffuse(Vec3::ZERO, Vec3::Y));
+    let pmf: Vec<f32> = (0..=100).map(|i| lights.pmf(&prospect, i)).collect();
+    let lamp: f32 = pmf[..100].iter().sum();
+    // The large one covers a part of the receiver's sky, so it needs fewer samples
+    assert!((lamp + pmf[100] - 1.0).abs() < 1e-5 && (0.5..0.6).contains(&lamp), "{lamp} {}", pmf[100]);
+    for (pmf, area) in pmf.iter().zip(&areas) {
+        assert!((pmf / lamp - area / sum).abs() < 1e-5, "{pmf} {area}");
+    }
 }
 
 /// A huge dim panel behind whose plane a receiver lies, or that lies below the receiver's horizon, takes no

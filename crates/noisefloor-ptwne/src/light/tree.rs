@@ -1,9 +1,11 @@
 //! A hierarchy of lights (Conty Estevez, Kulla 2018), four children to a node.
 
 use super::cluster::Cluster;
-use super::node::{Importance, LIGHT, NONE, Node};
+use super::node::{Importance, LEAF, NONE, Node};
+use super::patch::{Patch, patches};
 use super::receiver::Receiver;
 use glam::Vec4;
+use std::ops::Range;
 
 /// Buckets along each axis in which splits are tried.
 const BUCKETS: usize = 12;
@@ -12,8 +14,21 @@ const BUCKETS: usize = 12;
 #[derive(Clone, Debug, Default)]
 pub(super) struct LightTree {
     nodes: Vec<Node>,
-    /// Four times the node of each light, plus its lane; [`NONE`] if it is not in the tree.
-    slot: Vec<u32>,
+    /// Of each light.
+    places: Vec<Place>,
+    /// Where the lights of each patch begin in `lights`, and where those of the last end.
+    first: Vec<u32>,
+    /// The lights by patch, each with the power of those of its patch up to it, relative to all of them.
+    lights: Vec<(u32, f64)>,
+}
+
+/// Where a light is in the tree.
+#[derive(Clone, Copy, Debug)]
+struct Place {
+    /// Four times the node of its patch, plus the lane; [`NONE`] if it is not in the tree.
+    slot: u32,
+    /// Its probability within the patch.
+    share: f32,
 }
 
 /// Two probabilities: by scattered light and by geometry.
@@ -23,7 +38,7 @@ pub(super) struct Pmf {
     pub(super) geometric: f32,
 }
 
-/// A light with its bounds.
+/// The index of a light, or a patch of lights, with its bounds.
 type Item = (u32, Cluster);
 
 impl LightTree {
@@ -32,24 +47,28 @@ impl LightTree {
     pub(super) fn new(mut items: Vec<Item>, lights: usize, scale: f64, extent: f32) -> Self {
         // So that no importance overflows
         let least = (1e-6 * extent).max(f32::MIN_POSITIVE.sqrt());
-        let mut tree = Self { nodes: vec![], slot: vec![NONE; lights] };
-        if items.is_empty() {
+        let patches = patches(&mut items, extent);
+        let mut tree = Self::of_patches(&patches, &items, lights);
+        let mut patches: Vec<Item> = (0..).zip(patches.iter().map(|patch| patch.bounds)).collect();
+        if patches.is_empty() {
             return tree;
         }
         tree.nodes.push(Node::new(NONE));
-        let mut todo = vec![(0usize, items.as_mut_slice())];
-        while let Some((at, items)) = todo.pop() {
-            for (lane, group) in four_groups(items).into_iter().enumerate() {
+        let mut todo = vec![(0usize, patches.as_mut_slice())];
+        while let Some((at, patches)) = todo.pop() {
+            for (lane, group) in four_groups(patches).into_iter().enumerate() {
                 let slot = 4 * at as u32 + lane as u32;
                 let child = match group {
-                    [(light, _)] => {
-                        tree.slot[*light as usize] = slot;
-                        LIGHT | *light
+                    [(patch, _)] => {
+                        for (light, _) in &tree.lights[tree.of_patch(*patch)] {
+                            tree.places[*light as usize].slot = slot;
+                        }
+                        LEAF | *patch
                     }
                     _ => tree.nodes.len() as u32,
                 };
-                tree.nodes[at].set(lane, &bounds(group), scale, least, child);
-                if child & LIGHT == 0 {
+                tree.nodes[at].set(lane, &union(group), scale, least, child);
+                if child & LEAF == 0 {
                     tree.nodes.push(Node::new(slot));
                     todo.push((child as usize, group));
                 }
@@ -58,9 +77,41 @@ impl LightTree {
         tree
     }
 
+    /// Without nodes.
+    fn of_patches(patches: &[Patch], items: &[Item], lights: usize) -> Self {
+        let mut tree = Self { places: vec![Place { slot: NONE, share: 1.0 }; lights], ..Self::default() };
+        tree.first.push(0);
+        for patch in patches {
+            let (mut sum, mut before) = (0.0, 0.0);
+            for (light, bounds) in &items[patch.lights.clone()] {
+                sum += bounds.intensity;
+                let until = sum / patch.bounds.intensity;
+                tree.places[*light as usize].share = (until - before) as f32;
+                tree.lights.push((*light, until));
+                before = until;
+            }
+            tree.first.push(tree.lights.len() as u32);
+        }
+        tree
+    }
+
+    /// Where the lights of a patch are in `lights`.
+    #[inline]
+    fn of_patch(&self, patch: u32) -> Range<usize> {
+        self.first[patch as usize] as usize..self.first[patch as usize + 1] as usize
+    }
+
+    /// Chooses one of the lights of a patch by `u`, uniform in [0, 1).
+    #[inline]
+    fn choose_in(&self, patch: u32, u: f64) -> usize {
+        let lights = &self.lights[self.of_patch(patch)];
+        let at = lights.partition_point(|(_, until)| *until <= u).min(lights.len() - 1);
+        lights[at].0 as usize
+    }
+
     /// Whether the light is in the tree.
     pub(super) fn contains(&self, light: usize) -> bool {
-        self.slot[light] != NONE
+        self.places[light].slot != NONE
     }
 
     /// The importance of the clusters at the top; none if there are no lights.
@@ -88,8 +139,9 @@ impl LightTree {
             u = rest;
             pmf.times(&importance, lane);
             let child = node.child[lane];
-            if child & LIGHT != 0 {
-                return Some(((child & !LIGHT) as usize, pmf));
+            if child & LEAF != 0 {
+                let light = self.choose_in(child & !LEAF, u);
+                return Some((light, pmf.scaled(self.places[light].share)));
             }
             node = &self.nodes[child as usize];
             importance = node.importance(receiver);
@@ -100,12 +152,12 @@ impl LightTree {
     #[inline(never)]
     pub(super) fn pmf(&self, receiver: &Receiver, root: &Importance, light: usize) -> Pmf {
         let mut pmf = Pmf { scattered: 1.0, geometric: 1.0 };
-        let mut slot = self.slot[light];
+        let Place { mut slot, share } = self.places[light];
         loop {
             let (node, lane) = (&self.nodes[(slot >> 2) as usize], (slot & 3) as usize);
             if node.parent == NONE {
                 pmf.times(root, lane);
-                return pmf;
+                return pmf.scaled(share);
             }
             pmf.times(&node.importance(receiver), lane);
             slot = node.parent;
@@ -114,11 +166,19 @@ impl LightTree {
 
     /// Memory that it takes, in bytes.
     pub(super) fn bytes(&self) -> usize {
-        size_of_val(self.nodes.as_slice()) + size_of_val(self.slot.as_slice())
+        size_of_val(self.nodes.as_slice())
+            + size_of_val(self.places.as_slice())
+            + size_of_val(self.first.as_slice())
+            + size_of_val(self.lights.as_slice())
     }
 }
 
 impl Pmf {
+    #[inline]
+    fn scaled(self, by: f32) -> Self {
+        Self { scattered: self.scattered * by, geometric: self.geometric * by }
+    }
+
     /// Multiplies by the shares of a lane.
     #[inline]
     fn times(&mut self, importance: &Importance, lane: usize) {
@@ -150,7 +210,7 @@ fn pick(weights: [f32; 4], u: f64) -> Option<(usize, f64)> {
 }
 
 /// The bounds of a group, which must not be empty.
-fn bounds(items: &[Item]) -> Cluster {
+pub(super) fn union(items: &[Item]) -> Cluster {
     let rest = items[1..].iter();
     rest.fold(items[0].1, |all, (_, cluster)| all.union(cluster))
 }
@@ -159,7 +219,7 @@ fn bounds(items: &[Item]) -> Cluster {
 fn four_groups(items: &mut [Item]) -> Vec<&mut [Item]> {
     let mut groups = vec![items];
     while groups.len() < 4 {
-        let cost = |i: &usize| bounds(groups[*i]).cost();
+        let cost = |i: &usize| union(groups[*i]).cost();
         let large = (0..groups.len()).filter(|i| groups[*i].len() > 1);
         let Some(open) = large.max_by(|a, b| cost(a).total_cmp(&cost(b))) else { break };
         let group = groups.swap_remove(open);
@@ -172,11 +232,11 @@ fn four_groups(items: &mut [Item]) -> Vec<&mut [Item]> {
 
 /// Orders a group of at least two lights so that the first `split` and the others have the least cost, by the
 /// surface area orientation heuristic (§4.4).
-fn split(items: &mut [Item]) -> usize {
+pub(super) fn split(items: &mut [Item]) -> usize {
     let centres = || items.iter().map(|(_, cluster)| cluster.centre);
     let low = centres().fold(items[0].1.centre, |a, b| a.min(b));
     let high = centres().fold(items[0].1.centre, |a, b| a.max(b));
-    let (extent, size) = (high - low, bounds(items).size());
+    let (extent, size) = (high - low, union(items).size());
     let longest = size.max_element();
     let bucket = |cluster: &Cluster, axis: usize| {
         let at = (cluster.centre[axis] - low[axis]) / extent[axis] * BUCKETS as f32;
