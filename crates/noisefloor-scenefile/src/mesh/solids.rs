@@ -1,7 +1,7 @@
 //! Curved and simple solids as triangles.
 
 use super::{Triangles, rows};
-use glam::{DMat4, Vec3};
+use glam::{DMat4, DQuat, DVec2, DVec3, Vec3};
 use noisefloor_ptwne::{MaterialId, ObjectId, SceneBuilder, SceneError};
 use std::f32::consts::{PI, TAU};
 
@@ -80,13 +80,19 @@ pub(crate) fn cylinder() -> Triangles {
     mesh
 }
 
-/// The disk of radius 1 around the origin in the plane of x and y, from radius `inner` on; its front is +z. u
-/// runs around z from +x over +y, v from the outside to the inside.
-pub(crate) fn disk(inner: f32) -> Triangles {
-    let mut mesh = grid(1, |u, v| {
-        let (y, x) = (TAU * u).sin_cos();
-        let r = inner + (1.0 - inner) * (1.0 - v);
-        ([r * x, r * y, 0.0], [0.0, 0.0, 1.0])
+/// What a curve leaves as it turns around z, from azimuth 0 up to `sweep` in radians, as pbrt's quadrics are
+/// made. `curve` gives a point at v of 0 to 1, and the direction in which it goes on; the front is that to the
+/// right of it as seen along the turn. u runs along the turn. `straight` if the curve is a line in a plane
+/// through z.
+pub(crate) fn turned(sweep: f64, straight: bool, curve: impl Fn(f64) -> [DVec3; 2]) -> Triangles {
+    let along = if straight { 1 } else { ALONG };
+    let mut mesh = grid(along, |u, v| {
+        let turn = DQuat::from_rotation_z(sweep * f64::from(u));
+        let [at, onward] = curve(f64::from(v));
+        // On the axis, that of its neighbours
+        let around = if at.truncate() == DVec2::ZERO { DVec2::X } else { at.truncate() };
+        let normal = around.perp().extend(0.0).cross(onward).normalize_or_zero();
+        ((turn * at).as_vec3().to_array(), (turn * normal).as_vec3().to_array())
     });
     mesh.indices.iter_mut().for_each(|triangle| triangle.swap(1, 2));
     mesh
@@ -121,12 +127,25 @@ mod tests {
     /// Corners run counter-clockwise as seen from where the normals point, and all fits together.
     #[test]
     fn fronts_are_outside() {
+        // A cap of height 1/2, a cone, a paraboloid and a hyperboloid that is a cylinder, of parts of a turn
+        let cap = turned(PI.into(), false, |v| {
+            let (sin, cos) = (f64::from(PI) / 3.0 * (1.0 - v)).sin_cos();
+            [DVec3::new(sin, 0.0, cos), DVec3::new(-cos, 0.0, sin)]
+        });
+        let cone = turned(TAU.into(), true, |v| [DVec3::new(1.0 - v, 0.0, v), DVec3::new(-1.0, 0.0, 1.0)]);
+        let bowl = turned(1.0, false, |v| [DVec3::new(v, 0.0, v * v), DVec3::new(1.0, 0.0, 2.0 * v)]);
+        let ring = turned(TAU.into(), true, |v| [DVec3::new(1.0 - 0.5 * v, 0.0, 0.0), DVec3::NEG_X]);
+        let tube = turned(2.0, true, |v| [DVec3::new(0.6, 0.8, v), DVec3::Z]);
         for (mesh, area) in [
+            (cap, PI * 0.5),
+            (cone, PI * 2f32.sqrt()),
+            (bowl, (5f32.powf(1.5) - 1.0) / 12.0),
+            (tube, 2.0),
             (sphere(), 4.0 * PI),
             (cylinder(), TAU),
             (cube(), 24.0),
             (rectangle(), 4.0),
-            (disk(0.5), 0.75 * PI),
+            (ring, 0.75 * PI),
         ] {
             let mut sum = 0.0;
             for triangle in &mesh.indices {

@@ -7,7 +7,7 @@ use super::state::{Form, Part, Wear};
 use crate::error::{LoadError, Place};
 use crate::files::{MAX_FILE_BYTES, has_memory};
 use crate::mesh::{Triangles, ply, solids, subdivide};
-use glam::{DMat4, DQuat, DVec3};
+use glam::{DMat4, DVec3, Vec3};
 use noisefloor_ptwne::Texture;
 
 /// Most triangles that subdivision makes of a mesh, beside three levels of it, which are usual: a short file can
@@ -85,29 +85,8 @@ impl Reader<'_> {
             "bilinearmesh" => (self.bilinear_mesh(params)?, DMat4::IDENTITY),
             "loopsubdiv" => (self.subdivision(params)?, DMat4::IDENTITY),
             "plymesh" => (self.ply_mesh(params)?, DMat4::IDENTITY),
-            "sphere" => {
-                self.whole(params, &["zmin", "zmax", "phimax"]);
-                let radius = positive(params, "radius", 1.0)?;
-                self.solid(&params.place, solids::sphere(), DMat4::from_scale(DVec3::splat(radius)))?
-            }
-            "cylinder" => {
-                self.whole(params, &["phimax"]);
-                let radius = positive(params, "radius", 1.0)?;
-                let low = params.float("zmin")?.unwrap_or(-1.0);
-                let high = params.float("zmax")?.unwrap_or(1.0);
-                let scale = DVec3::new(radius, radius, high - low);
-                let at = DVec3::new(0.0, 0.0, low);
-                let own = DMat4::from_scale_rotation_translation(scale, DQuat::IDENTITY, at);
-                self.solid(&params.place, solids::cylinder(), own)?
-            }
-            "disk" => {
-                self.whole(params, &["phimax"]);
-                let radius = positive(params, "radius", 1.0)?;
-                let inner = params.float("innerradius")?.unwrap_or(0.0) / radius;
-                let at = DVec3::new(0.0, 0.0, params.float("height")?.unwrap_or(0.0));
-                let scale = DVec3::splat(radius);
-                let own = DMat4::from_scale_rotation_translation(scale, DQuat::IDENTITY, at);
-                self.solid(&params.place, solids::disk(inner.clamp(0.0, 0.999) as f32), own)?
+            "sphere" | "cylinder" | "disk" | "cone" | "paraboloid" | "hyperboloid" => {
+                self.solid(&params.place, quadric(kind, params)?, DMat4::IDENTITY)?
             }
             _ => return Err(params.place.clone().unsupported(format!("Shape \"{kind}\""))),
         })
@@ -122,13 +101,6 @@ impl Reader<'_> {
     ) -> Result<(Triangles, DMat4), LoadError> {
         self.count_made(place, mesh.indices.len() as u64)?;
         Ok((mesh, own))
-    }
-
-    /// Warns that a part of a round shape is whole here.
-    fn whole(&mut self, params: &Params, names: &[&str]) {
-        if names.iter().any(|name| params.get(name).is_some()) {
-            self.approximated(&params.place, "a part of a round shape is replaced by the whole");
-        }
     }
 
     /// Where the shape is: a number or a texture, and what to call it.
@@ -219,6 +191,64 @@ impl Reader<'_> {
         }
         Ok(mesh)
     }
+}
+
+/// A quadric as triangles, or a part of it.
+fn quadric(kind: &str, params: &Params) -> Result<Triangles, LoadError> {
+    let number = |name: &str, missing: f64| Ok(params.float(name)?.unwrap_or(missing));
+    let sweep = number("phimax", 360.0)?.clamp(0.0, 360.0).to_radians();
+    if kind == "hyperboloid" {
+        let point = |name, missing| {
+            Ok(params.rows::<3>(name)?.and_then(|rows| rows.first().copied()).unwrap_or(missing))
+        };
+        let [from, to] = [point("p1", [0.0; 3])?, point("p2", [1.0; 3])?].map(|p| Vec3::from(p).as_dvec3());
+        return Ok(solids::turned(sweep, false, |v| [from.lerp(to, v), to - from]));
+    }
+    let radius = positive(params, "radius", 1.0)?;
+    Ok(match kind {
+        "sphere" => {
+            let (low, high) = (number("zmin", -radius)?, number("zmax", radius)?);
+            let angle = |z: f64| (z / radius).clamp(-1.0, 1.0).acos();
+            let (bottom, top) = (angle(low.min(high)), angle(low.max(high)));
+            solids::turned(sweep, false, |v| {
+                let (sin, cos) = (bottom + (top - bottom) * v).sin_cos();
+                [DVec3::new(sin, 0.0, cos) * radius, DVec3::new(-cos, 0.0, sin)]
+            })
+        }
+        "cylinder" => {
+            let (low, high) = (number("zmin", -1.0)?, number("zmax", 1.0)?);
+            let (low, high) = (low.min(high), low.max(high));
+            solids::turned(sweep, true, |v| [DVec3::new(radius, 0.0, low + (high - low) * v), DVec3::Z])
+        }
+        "disk" => {
+            let (inner, height) =
+                (number("innerradius", 0.0)?.clamp(0.0, 0.999 * radius), number("height", 0.0)?);
+            solids::turned(sweep, true, |v| {
+                [DVec3::new(radius + (inner - radius) * v, 0.0, height), DVec3::NEG_X]
+            })
+        }
+        "cone" => {
+            let height = number("height", 1.0)?;
+            solids::turned(sweep, true, |v| {
+                [DVec3::new(radius * (1.0 - v), 0.0, height * v), DVec3::new(-radius, 0.0, height)]
+            })
+        }
+        // A paraboloid, whose radius is that at the height zmax
+        _ => {
+            let (low, high) = (number("zmin", 0.0)?, number("zmax", 1.0)?);
+            let (low, high) = (low.min(high), low.max(high));
+            if !(low >= 0.0 && high > low) {
+                return Err(params.bad(format!("a paraboloid from {low} to {high}; it must lie above 0")));
+            }
+            solids::turned(sweep, false, |v| {
+                let z = low + (high - low) * v;
+                [
+                    DVec3::new(radius * (z / high).sqrt(), 0.0, z),
+                    DVec3::new(radius, 0.0, 2.0 * (z * high).sqrt()),
+                ]
+            })
+        }
+    })
 }
 
 /// A number above 0.
