@@ -17,7 +17,7 @@
 //! trust.
 //!
 //! # Samples
-//! The source repeats samples, however requests are cut. Each [`sequence`](noisefloor::Request::sequence) is a
+//! The source repeats samples, however requests are cut. Each `Request::sequence` is a
 //! pattern of Cycles' own Sobol table with its own seed, and another after 8,192 samples: halves are independent,
 //! and the batches of one half fill each other's gaps. Cycles renders one rectangle of tiles at a time, at a cost
 //! of 5 ms beside the samples.
