@@ -17,6 +17,9 @@ pub const OIDN: Renderer = Renderer {
     probe: "import mitsuba_oidn; print(mitsuba_oidn.oidn_version())",
 };
 
+/// Pixels up to which two pictures are denoised at once, by one thread each: as in `oidn_host.py`.
+const SMALL: usize = 512 * 512;
+
 /// [Open Image Denoise](https://www.openimagedenoise.org) on the CPU: its filter `RT` for linear pictures, in
 /// its highest quality. Pictures of up to 512×512 pixels take one thread each, larger ones four, whatever
 /// [`FilterPlan::threads`] says: the last bits of its results depend on their number.
@@ -60,6 +63,12 @@ impl Denoiser for Oidn {
     }
 
     fn denoise_both(&mut self, pictures: [&NoisyPicture<'_>; 2]) -> Result<[Vec<Rgb>; 2], DenoiseError> {
+        let (width, height) = pictures[0].size;
+        if width.saturating_mul(height) > SMALL {
+            // One call has no room for large ones
+            let [a, b] = pictures;
+            return Ok([self.denoise(a)?, self.denoise(b)?]);
+        }
         self.apply(pictures)
     }
 }

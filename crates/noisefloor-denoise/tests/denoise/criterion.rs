@@ -47,7 +47,7 @@ fn a_plain_wall_is_done_sooner_when_denoised_and_a_smeared_one_is_not() {
     let reasons: Vec<StopReason> = denoised.stops().map(|stop| stop.reason).collect();
     assert_eq!([reasons[0], reasons[3]], [StopReason::MaxSpp; 2], "{stops:?}");
 
-    // What is recorded beside: the error at the end, and, of the plain wall, the need of the noisy picture
+    // What is recorded beside: the error at the end
     let record = denoised.criterion().record();
     let record = record.lock().unwrap();
     assert_eq!(record.error.as_ref().unwrap().size(), SIZE);
@@ -61,7 +61,7 @@ fn the_need_without_denoising_is_that_of_the_noisy_picture() {
     let mut noisy = session(Simple::Nothing);
     let stops = run(&mut noisy).unwrap();
     let needed = stops.iter().sum::<u64>() as f64 / stops.len() as f64;
-    for (spp, decimals) in [(40, 0.4), (200, 0.2)] {
+    for (spp, tolerance) in [(40, 0.4), (200, 0.2)] {
         let mut session = session(Simple::Fails);
         let requests: Vec<_> = session.film().grid().tiles().collect();
         for half in [0, 1] {
@@ -73,7 +73,7 @@ fn the_need_without_denoising_is_that_of_the_noisy_picture() {
         }
         let (display, viewing) = (session.params().tone_mapping.settle(&truth()), session.params().viewing);
         let found = spp_without_denoising(session.film(), &display, &truth(), viewing, 0.1).unwrap();
-        assert!((found / needed).ln().abs() < decimals, "{found} by {spp}, and {needed}");
+        assert!((found / needed).ln().abs() < tolerance, "{found} by {spp}, and {needed}");
     }
 }
 
