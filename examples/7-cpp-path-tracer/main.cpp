@@ -103,7 +103,7 @@ static void run(std::size_t width, std::size_t height, const char *file) {
     params.tile = 64;
     params.max_spp = 2000;
     NfOracle *oracle;
-    check(nf_oracle_bundled(0.9f, &oracle));
+    check(nf_oracle_bundled(0.95f, &oracle));
     std::unique_ptr<NfOracle, NfStatus (*)(NfOracle *)> oracle_owner(oracle, nf_oracle_free);
     NfSession *session;
     check(nf_session_new(width, height, oracle, &params, &session));

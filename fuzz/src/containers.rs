@@ -29,13 +29,9 @@ pub(crate) fn model_seeds() -> Vec<Vec<u8>> {
     vec![small_model().split_off(HEADER)]
 }
 
-/// The bundled model with few support vectors, so that mutants differ in what matters.
+/// The bundled model with few familiar zones, so that mutants differ in what matters.
 fn small_model() -> Vec<u8> {
     let mut parts = Model::bundled().into_parts();
-    let svm = &mut parts.classifier.svm;
-    let dimensions = svm.dimensions();
-    svm.coefficients.truncate(3);
-    svm.vectors.truncate(3 * dimensions);
     if let Some(familiarity) = &mut parts.familiarity {
         familiarity.zones.truncate(3);
     }

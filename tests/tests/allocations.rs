@@ -12,7 +12,13 @@ fn of_a_second_verdict(edge: usize, tiles: usize) -> AllocationInfo {
             film.add(tile.index, 50, &vec![[value; 3]; tile.pixels()]).expect("it fits");
         }
     }
-    let view = View { film: &film, display: &Display::SRGB, viewing: Viewing::default(), reference: None };
+    let view = View {
+        film: &film,
+        display: &Display::SRGB,
+        viewing: Viewing::default(),
+        audience: noisefloor::Audience::TRAINED,
+        reference: None,
+    };
     let mut oracle = Oracle::bundled();
     let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread");
     let mut judge = || drop(oracle.judge(&view, &tiles).expect("verdicts"));

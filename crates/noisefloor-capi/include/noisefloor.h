@@ -1,6 +1,6 @@
 // noisefloor tells a progressive renderer, tile by tile, when people stop seeing noise.
 //
-// An oracle (a trained model and a threshold) judges the tiles of a session. The renderer asks the session
+// An oracle (a trained model and a share of people) judges the tiles of a session. The renderer asks the session
 // which tiles are open, pushes the mean of new samples of each, lets the session judge, and ends when no tile
 // is open.
 //
@@ -101,7 +101,7 @@ typedef enum {
     NF_STATUS_HANDLE = 13,
 } NfStatus;
 
-// A trained model with the probability from which a tile counts as converged. It never changes, and any
+// A trained model with the share of people who are to see no noise. It never changes, and any
 // number of sessions can be made from it.
 typedef struct NfOracle NfOracle;
 
@@ -213,13 +213,14 @@ const char *nf_last_error(void);
 const char *nf_version(void);
 
 // Makes an oracle from the model inside the library, which was trained on human data and judges by half
-// buffers. threshold lies between 0 and 1; 0.9 is that of the paper. The caller frees the oracle with
-// nf_oracle_free.
-NfStatus nf_oracle_bundled(float threshold,
+// buffers. people, between 0 and 1, is the share of people who are to see no noise where a tile stops, in a
+// scene like those that people were asked about: 0.95 is that of the paper, and the default of all other
+// languages. The caller frees the oracle with nf_oracle_free.
+NfStatus nf_oracle_bundled(float people,
                            NfOracle **oracle);
 
 // As nf_oracle_bundled, with a model that "noisefloor-lab train" has written to a file.
-NfStatus nf_oracle_load(const char *path, float threshold, NfOracle **oracle);
+NfStatus nf_oracle_load(const char *path, float people, NfOracle **oracle);
 
 // Frees an oracle; sessions made from it do not need it. NULL is ignored, a second time is
 // NF_STATUS_HANDLE.

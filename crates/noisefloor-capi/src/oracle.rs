@@ -3,12 +3,12 @@
 use crate::border;
 use crate::handle;
 use crate::status::{Failure, NfStatus, guard};
-use noisefloor::{Model, Oracle, Threshold, model::ModelError};
+use noisefloor::{Model, Oracle, People, model::ModelError};
 use std::ffi::c_char;
 use std::fs::File;
 use std::io;
 
-/// A trained model with the probability from which a tile counts as converged. It never changes, and any
+/// A trained model with the share of people who are to see no noise. It never changes, and any
 /// number of sessions can be made from it.
 pub struct NfOracle(pub(crate) Oracle);
 
@@ -17,12 +17,13 @@ impl handle::Handle for NfOracle {
 }
 
 /// Makes an oracle from the model inside the library, which was trained on human data and judges by half
-/// buffers. threshold lies between 0 and 1; 0.9 is that of the paper. The caller frees the oracle with
-/// nf_oracle_free.
+/// buffers. people, between 0 and 1, is the share of people who are to see no noise where a tile stops, in a
+/// scene like those that people were asked about: 0.95 is that of the paper, and the default of all other
+/// languages. The caller frees the oracle with nf_oracle_free.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn nf_oracle_bundled(threshold: f32, oracle: *mut *mut NfOracle) -> NfStatus {
+pub unsafe extern "C" fn nf_oracle_bundled(people: f32, oracle: *mut *mut NfOracle) -> NfStatus {
     guard(|| {
-        let make = || Ok(NfOracle(Oracle::new(Model::bundled(), Threshold::new(threshold)?)));
+        let make = || Ok(NfOracle(Oracle::new(Model::bundled(), People::new(people)?)));
         // SAFETY: promised by the caller.
         unsafe { handle::give(oracle, make) }
     })
@@ -32,7 +33,7 @@ pub unsafe extern "C" fn nf_oracle_bundled(threshold: f32, oracle: *mut *mut NfO
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn nf_oracle_load(
     path: *const c_char,
-    threshold: f32,
+    people: f32,
     oracle: *mut *mut NfOracle,
 ) -> NfStatus {
     guard(|| {
@@ -44,7 +45,7 @@ pub unsafe extern "C" fn nf_oracle_load(
                 ModelError::Io(error) => failed(error), // also a folder, which can be opened
                 other => other.into(),
             })?;
-            Ok(NfOracle(Oracle::new(model, Threshold::new(threshold)?)))
+            Ok(NfOracle(Oracle::new(model, People::new(people)?)))
         };
         // SAFETY: promised by the caller.
         unsafe { handle::give(oracle, make) }

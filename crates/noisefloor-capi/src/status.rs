@@ -2,7 +2,7 @@
 
 use noisefloor::{
     SessionError, checkpoint::CheckpointError, criterion::CriterionError, film::FilmError, model::ModelError,
-    oracle::ThresholdError, params::ParamsError, tile::TileError, viewing::ViewingTextError,
+    oracle::PeopleError, params::ParamsError, tile::TileError, viewing::ViewingTextError,
 };
 use std::any::Any;
 use std::cell::RefCell;
@@ -100,8 +100,8 @@ impl From<ParamsError> for Failure {
     }
 }
 
-impl From<ThresholdError> for Failure {
-    fn from(error: ThresholdError) -> Self {
+impl From<PeopleError> for Failure {
+    fn from(error: PeopleError) -> Self {
         Self::new(NfStatus::Argument, error.to_string())
     }
 }

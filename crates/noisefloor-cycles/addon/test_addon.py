@@ -253,7 +253,7 @@ class Addon(unittest.TestCase):
 
     def test_limits_and_esc_keep_what_there_is(self):
         scene = room()
-        scene.noisefloor.max_samples, scene.noisefloor.share = 64, 0.99
+        scene.noisefloor.max_samples, scene.noisefloor.people = 64, 0.99
         _, batches = rendered(scene)
         self.assertEqual([points for _, points, _ in batches], POINTS[:4])
         scene.noisefloor.time_limit = 1e-3

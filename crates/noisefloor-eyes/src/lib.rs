@@ -159,6 +159,13 @@ impl Person {
         Audience { slope: self.factor, offset: 0.0 }
     }
 
+    /// For [`noisefloor::Oracle::with_scatter`]: the standard deviation of ln(samples) that the measurement leaves.
+    pub fn uncertainty(&self) -> f64 {
+        // The middle 80 % of a normal distribution are 2.563 deviations wide; an interval may reach down to 0
+        let [low, high] = self.interval.map(|factor| factor.max(1e-3).ln());
+        ((high - low) / 2.563).clamp(0.01, 5.0)
+    }
+
     /// For sessions: the default display, at the person's pixels per degree.
     pub fn viewing(&self) -> Viewing {
         let params = Viewing::default().params();

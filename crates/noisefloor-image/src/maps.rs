@@ -67,7 +67,7 @@ impl ColourScale {
 /// The scale of visible noise, as multiples of what is just seen: always the same, so that maps of different
 /// pictures and stages compare.
 pub const NOISE_SCALE: ColourScale = ColourScale {
-    title: "visible noise\n1 = just seen",
+    title: "visible noise\n1 = not seen",
     low: 0.25,
     high: 4.0,
     log: true,

@@ -1,6 +1,6 @@
 //! What one person said of one tile.
 
-use noisefloor::{Model, Threshold};
+use noisefloor::{Model, People};
 use serde::{Deserialize, Serialize};
 
 /// One person's answer about a tile at one number of samples. A threshold seen from one side: above `spp` if
@@ -27,8 +27,8 @@ impl Answer {
         model.judge(&self.descriptor).probability
     }
 
-    /// Whether a verdict at P ≥ `threshold` says the same.
-    pub fn agrees(&self, probability: f32, threshold: Threshold) -> bool {
-        threshold.is_reached_by(probability) != self.sees_noise
+    /// Whether a verdict for that share of `people` says the same.
+    pub fn agrees(&self, probability: f32, people: People) -> bool {
+        people.are_satisfied_by(probability) != self.sees_noise
     }
 }

@@ -4,15 +4,14 @@
 use crate::describe::{Alone, in_picture};
 use crate::table::{Table, Zone};
 use noisefloor::{
+    Tile,
     descriptor::{Described, Descriptor, DescriptorError, DescriptorKind, DescriptorSpec, TileDescriptor},
     evidence::TilePlanes,
 };
 use std::collections::BTreeMap;
 
-/// Orders of the mean over a tile: 4 is that of most vision models, 8 looks for the worst spot.
-const ORDERS: [u32; 2] = [4, 8];
-/// Pooled difference at which noise is just too strong: near what people just see.
-const DIFFERENCE: u32 = 20;
+/// Edges of the windows in which people look for noise, in degrees: 20, 28 and 36 pixels on a monitor.
+const WINDOWS: [f64; 3] = [0.5, 0.75, 1.0];
 /// Quantiles of noise over the tiles that are the noise of the picture: that of the typical tile, or what a quarter or
 /// an eighth of the picture exceeds.
 const PICTURE_QUANTILES: [f64; 3] = [0.5, 0.75, 0.875];
@@ -37,19 +36,15 @@ struct VisibleChoices {
     descriptors: Vec<Descriptor>,
 }
 
-fn visible(order: u32, picture_quantile: f64) -> Result<Descriptor, DescriptorError> {
-    let numbers = [
-        ("order", f64::from(order)),
-        ("difference", f64::from(DIFFERENCE)),
-        ("picture_quantile", picture_quantile),
-    ];
+fn visible(window: f64, picture_quantile: f64) -> Result<Descriptor, DescriptorError> {
+    let numbers = [("window", window), ("picture_quantile", picture_quantile)];
     let parameters = numbers.map(|(name, number)| (name.to_owned(), number)).into();
     Descriptor::from_spec(&DescriptorSpec { name: "visible".to_owned(), parameters }, &[])
 }
 
 impl VisibleChoices {
     fn new() -> Result<Self, DescriptorError> {
-        let descriptors = ORDERS.iter().map(|&order| visible(order, PICTURE_QUANTILES[0]));
+        let descriptors = WINDOWS.iter().map(|&window| visible(window, PICTURE_QUANTILES[0]));
         Ok(Self { descriptors: descriptors.collect::<Result<_, _>>()? })
     }
 }
@@ -68,7 +63,7 @@ impl TileDescriptor for VisibleChoices {
     }
 
     fn number_names(&self) -> Vec<String> {
-        let noise = ORDERS.iter().map(|order| format!("noise_{order}_{DIFFERENCE}"));
+        let noise = WINDOWS.iter().map(|window| format!("noise_{window}"));
         noise.chain(["texture".to_owned(), "light".to_owned()]).collect()
     }
 
@@ -98,10 +93,10 @@ pub fn choices(table: &Table) -> Result<Vec<Choice>, DescriptorError> {
         return Err(DescriptorError::Unknown { name, known: VISIBLE_CHOICES.name.to_owned() });
     }
     let mut choices = Vec::new();
-    for (column, order) in ORDERS.into_iter().enumerate() {
+    for (column, window) in WINDOWS.into_iter().enumerate() {
         for quantile in PICTURE_QUANTILES {
-            let name = format!("order {order}, picture quantile {quantile}");
-            let table = chosen(table, column, &visible(order, quantile)?);
+            let name = format!("window {window}°, picture quantile {quantile}");
+            let table = chosen(table, column, &visible(window, quantile)?);
             choices.push(Choice { name, table });
         }
     }
@@ -116,7 +111,8 @@ fn chosen(table: &Table, column: usize, descriptor: &Descriptor) -> Table {
             let rest = &level.descriptor[level.descriptor.len() - 2..];
             let own = vec![level.descriptor[column], rest[0], rest[1]];
             // Zones of a scene are of one size
-            let described = Described { own, spp: level.spp, area: 1.0 };
+            let place = Tile { index: 0, x: 0, y: 0, width: 1, height: 1 };
+            let described = Described { own, spp: level.spp, place, window: 1, blocks: Vec::new() };
             Alone { spp: level.spp, origin: level.origin, noise: level.noise, described }
         });
         let empty = Zone { levels: Vec::new(), ..zone.clone() };

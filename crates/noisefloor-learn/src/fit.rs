@@ -1,15 +1,16 @@
 //! Choosing C and γ, and calibrating P, by leaving groups of scenes out.
 
 use crate::answer::Answer;
-use crate::machine::Machine;
+use crate::machine::Fitted;
 use crate::params::{TrainError, TrainParams};
 use crate::predict::{Prediction, predict};
 use crate::score::score;
 use crate::table::{Table, Zone};
 use noisefloor::{
-    Audience, Threshold,
+    Audience, People,
     internal::nearest,
     model::{Familiarity, ModelParts, TrainingRecord},
+    oracle::Spread,
     svm::{Classifier, Platt, Scaler, SvmParams, fit_platt},
 };
 use rayon::prelude::*;
@@ -26,7 +27,7 @@ struct Material<'a> {
 
 /// A machine that has not seen one group, and the zones of that group.
 struct Fold<'a> {
-    machine: Machine,
+    machine: Fitted,
     zones: Vec<&'a Zone>,
 }
 
@@ -48,12 +49,12 @@ impl<'a> Material<'a> {
     }
 
     /// A machine trained on everything but one group.
-    fn fit_without(&self, group: Option<&str>, svm: SvmParams) -> Result<Machine, TrainError> {
+    fn fit_without(&self, group: Option<&str>, svm: SvmParams) -> Result<Fitted, TrainError> {
         let zones: Vec<&Zone> = self.zones.iter().copied().filter(|z| Some(&*z.group) != group).collect();
         let answers: Vec<&Answer> =
             self.answers.iter().copied().filter(|a| Some(&*a.group) != group).collect();
         let least = self.table.descriptor.least_deviation();
-        Machine::fit(&zones, &answers, svm, self.params, least, &weighed(self.table, self.params))
+        Fitted::fit(&zones, &answers, svm, self.params, least, &weighed(self.table, self.params))
     }
 
     /// Machines that have not seen one group judge that group; one sigmoid is fitted to all of that.
@@ -81,7 +82,7 @@ impl<'a> Material<'a> {
         let mut predictions: Vec<Prediction> = Vec::new();
         for Fold { machine, zones } in folds {
             let fold = parts(self.table, machine.calibrated(platt), None, TrainingRecord::default());
-            predictions.extend(zones.iter().map(|z| predict(|raw| fold.judge(raw), Threshold::PAPER, z)));
+            predictions.extend(zones.iter().map(|z| predict(|raw| fold.judge(raw), People::DEFAULT, z)));
         }
         Ok((predictions, platt))
     }
@@ -149,6 +150,7 @@ pub(crate) fn parts(
     record: TrainingRecord,
 ) -> ModelParts {
     ModelParts {
+        spread: spread(table, &classifier),
         descriptor: table.descriptor.clone(),
         evidence: table.evidence,
         tone_mapping: table.tone_mapping,
@@ -158,6 +160,27 @@ pub(crate) fn parts(
         audience: Audience::TRAINED,
         record,
     }
+}
+
+/// How the mean thresholds of scenes scatter around what a machine expects: P is a logistic function of ln(samples), as
+/// steep as predictions for scenes that were left out are good. `None` if the descriptor does not separate noise from
+/// picture, or numbers were taken away from it.
+fn spread(table: &Table, classifier: &Classifier) -> Option<Spread> {
+    let noisy = classifier.scaler.mean.clone();
+    if noisy.len() != table.descriptor.dimensions() {
+        return None;
+    }
+    // Far above any floor of noise, where noise falls by ½ with ln(samples)
+    let log_odds = |samples: f32| {
+        let mut raw: Vec<f32> = noisy.iter().map(|_| 3.0).collect();
+        table.descriptor.project(&mut raw, samples).then(|| {
+            let scaled = classifier.scaler.scaled(&raw);
+            classifier.platt.log_odds(classifier.machine.decision(&scaled))
+        })
+    };
+    let slope = log_odds(std::f32::consts::E)? - log_odds(1.0)?;
+    let scenes = std::f64::consts::PI / 3f64.sqrt() / slope;
+    Some(Spread { scenes: scenes.clamp(0.01, 10.0), people: Spread::PEOPLE })
 }
 
 /// Share of the zones of left-out scenes that are familiar to the others.

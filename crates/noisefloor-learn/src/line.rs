@@ -1,17 +1,14 @@
 //! Logistic regression: a machine that decides on a straight line, for few numbers that are made to fall
 //! together with noise.
 
-use crate::params::WIDE;
 use linfa_linalg::cholesky::SolveCInplace;
 use ndarray::{Array1, Array2, ArrayView2, Axis};
-use noisefloor::svm::Svm;
+use noisefloor::svm::Line;
 
 /// Newton steps at most; four to seven are enough on the human data.
 const STEPS: usize = 30;
 /// A step smaller than this ends the search.
 const SMALL: f64 = 1e-6;
-/// How far the two support vectors lie from the mean of the data, in standard deviations.
-const REACH: f32 = 100.0;
 
 /// A number that a line weighs.
 pub(crate) struct Weighed {
@@ -34,8 +31,8 @@ pub(crate) fn fit_line(
     weighed: &[Weighed],
     shares: &[f64],
     (spread, c): (f64, f64),
-) -> Svm {
-    let Some((noise, others)) = weighed.split_first() else { return as_svm(&vec![0.0; rows.ncols() + 1]) };
+) -> Line {
+    let Some((noise, others)) = weighed.split_first() else { return line(&vec![0.0; rows.ncols() + 1]) };
     let examples = rows.nrows();
     // Nothing is known beforehand of numbers that do not measure noise
     let steepness = if noise.growth == 0.0 { 0.0 } else { 1.0 / (noise.growth * spread) };
@@ -77,36 +74,18 @@ pub(crate) fn fit_line(
         of_all[noise.number] -= weight * ratio(other);
     }
     of_all[rows.ncols()] = weights[free];
-    as_svm(&of_all)
+    line(&of_all)
 }
 
-/// w·x + b as two support vectors of a wide kernel, opposite each other at u = ±[`REACH`]·w/|w|:
-/// exp(−γ|x − u|²) − exp(−γ|x + u|²) = 2·exp(−γ(|x|² + |u|²))·sinh(2γ u·x), which is straight within 1 % up to
-/// ten standard deviations from the mean. Models need no other kind of machine for it.
-fn as_svm(weights: &[f64]) -> Svm {
-    let (bias, slope) = weights.split_last().map_or((0.0, weights), |(b, w)| (*b, w));
-    let steepness = slope.iter().map(|w| w * w).sum::<f64>().sqrt();
-    let unit = slope.iter().map(|w| if steepness > 0.0 { (w / steepness) as f32 } else { 0.0 });
-    let one: Vec<f32> = unit.map(|u| REACH * u).collect();
-    let (gamma, reach) = (WIDE, f64::from(REACH));
-    let amplitude = (steepness * (gamma * reach * reach).exp() / (4.0 * gamma * reach)) as f32;
-    let vectors = one.iter().copied().chain(one.iter().map(|u| -u)).collect();
-    Svm { gamma: gamma as f32, rho: -bias as f32, coefficients: vec![amplitude, -amplitude], vectors }
+/// The line of these weights, the last of which is b.
+fn line(weights: &[f64]) -> Line {
+    let (bias, weights) = weights.split_last().map_or((0.0, weights), |(b, w)| (*b, w));
+    Line { weights: weights.iter().map(|&w| w as f32).collect(), bias: bias as f32 }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn two_support_vectors_are_a_straight_line() {
-        let svm = as_svm(&[1.5, -2.0, 0.5, 0.25]);
-        for x in [[0.0, 0.0, 0.0], [1.0, 1.0, 1.0], [-3.0, 2.0, 0.5], [4.0, -4.0, 1.0]] {
-            let exact = 1.5 * x[0] - 2.0 * x[1] + 0.5 * x[2] + 0.25;
-            let f = svm.decision(&x);
-            assert!((f - exact).abs() < 1e-3 + 0.01 * exact.abs(), "{f} {exact}");
-        }
-    }
 
     /// Shares that follow a logistic function exactly are found exactly, where nothing is penalised. The first number
     /// falls by ½ with ln(samples), the second by ¼, and shares go from noisy to converged with a spread of ⅔.
@@ -118,10 +97,10 @@ mod tests {
         let shares: Vec<f64> =
             rows.rows().into_iter().map(|r| 1.0 / (1.0 + (-line(&[r[0], r[1]])).exp())).collect();
         let weighed = [(0, -0.5), (1, -0.25)].map(|(number, growth)| Weighed { number, growth });
-        let svm = fit_line(rows.view(), &weighed, &shares, (1.0 / 1.5, 1e12));
+        let fitted = fit_line(rows.view(), &weighed, &shares, (1.0 / 1.5, 1e12));
         // The third number is not weighed
         for x in [[0.5, -0.5, 9.0], [-1.0, 1.0, 0.0], [0.0, 0.0, -9.0]] {
-            let f = f64::from(svm.decision(&[x[0] as f32, x[1] as f32, x[2] as f32]));
+            let f = f64::from(fitted.decision(&[x[0] as f32, x[1] as f32, x[2] as f32]));
             assert!((f - line(&x[..2])).abs() < 0.02, "{f} {}", line(&x[..2]));
         }
         // Nothing is left but the vision model where all else is penalised

@@ -1,4 +1,4 @@
-//! A support vector machine trained on the examples of some zones and answers.
+//! A line or a support vector machine trained on the examples of some zones and answers.
 
 use crate::answer::Answer;
 use crate::line::{Weighed, fit_line};
@@ -6,17 +6,17 @@ use crate::observers::observers_agreeing;
 use crate::params::{Learner, TrainError, TrainParams};
 use crate::table::Zone;
 use ndarray::Array2;
-use noisefloor::svm::{Classifier, Platt, Scaler, Svm, SvmParams, check_examples, fit_svm};
+use noisefloor::svm::{Classifier, Machine, Platt, Scaler, SvmParams, check_examples, fit_svm};
 
 /// Machine and scaler, before calibration.
-pub(crate) struct Machine {
+pub(crate) struct Fitted {
     pub(crate) scaler: Scaler,
-    svm: Svm,
+    machine: Machine,
     /// How many examples one answer counts as.
     weight: usize,
 }
 
-impl Machine {
+impl Fitted {
     pub(crate) fn fit(
         zones: &[&Zone],
         answers: &[&Answer],
@@ -50,8 +50,8 @@ impl Machine {
             row.iter_mut().zip(&scaled).for_each(|(to, &from)| *to = f64::from(from));
         }
         let labels: Vec<bool> = examples.iter().map(|e| e.1).collect();
-        let svm = match params.learner {
-            Learner::Svm => fit_svm(rows.view(), &labels, svm)?,
+        let machine = match params.learner {
+            Learner::Svm => Machine::Svm(fit_svm(rows.view(), &labels, svm)?),
             Learner::Line => {
                 check_examples(rows.view(), &labels, svm)?;
                 let shares: Vec<f64> = examples.iter().map(|e| e.2).collect();
@@ -60,14 +60,14 @@ impl Machine {
                     growth: growth * f64::from(scaler.scale[number]),
                 };
                 let weighed: Vec<Weighed> = weighed.iter().map(scaled).collect();
-                fit_line(rows.view(), &weighed, &shares, (params.spread, svm.c))
+                Machine::Line(fit_line(rows.view(), &weighed, &shares, (params.spread, svm.c)))
             }
         };
-        Ok(Self { scaler, weight, svm })
+        Ok(Self { scaler, weight, machine })
     }
 
     fn decide(&self, descriptor: &[f32]) -> f32 {
-        self.svm.decision(&self.scaler.scaled(descriptor))
+        self.machine.decision(&self.scaler.scaled(descriptor))
     }
 
     /// (decision value, 0 or 1) of an answer, as often as it counts.
@@ -86,7 +86,7 @@ impl Machine {
     }
 
     pub(crate) fn calibrated(self, platt: Platt) -> Classifier {
-        Classifier { scaler: self.scaler, svm: self.svm, platt }
+        Classifier { scaler: self.scaler, machine: self.machine, platt }
     }
 }
 

@@ -5,7 +5,7 @@ use crate::fit::{familiarity, fit_groups, held_out, parts};
 use crate::params::{TrainError, TrainParams};
 use crate::predict::{Prediction, predict};
 use crate::score::score;
-use noisefloor::{Threshold, model::TrainingRecord, svm::SvmParams};
+use noisefloor::{People, model::TrainingRecord, svm::SvmParams};
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -33,7 +33,7 @@ pub struct Chosen {
 pub fn choose_and_leave_out(
     choices: &[Choice],
     params: &TrainParams,
-    threshold: Threshold,
+    people: People,
     mut on_fold: impl FnMut(&str),
 ) -> Result<(Vec<Prediction>, Vec<Chosen>), TrainError> {
     let first = &choices.first().ok_or(TrainError::Params)?.table;
@@ -59,7 +59,7 @@ pub fn choose_and_leave_out(
         let known = familiarity(table, &others, &classifier.scaler);
         let model = parts(table, classifier, known, TrainingRecord::default());
         let zones = table.zones.iter().filter(|z| z.group == left_out);
-        predictions.extend(zones.map(|z| predict(|raw| model.judge(raw), threshold, z)));
+        predictions.extend(zones.map(|z| predict(|raw| model.judge(raw), people, z)));
         let (without, choice, error_factor) = (left_out.to_owned(), name.clone(), errors[best]);
         all_chosen.push(Chosen { without, choice, c, gamma, error_factor });
     }

@@ -2,7 +2,7 @@
 
 use crate::stimulus::as_difference;
 use crate::table::{Origin, Zone};
-use noisefloor::{Threshold, model::Judgement};
+use noisefloor::{People, model::Judgement};
 use serde::{Deserialize, Serialize};
 
 /// Samples at which a quantity, known at increasing levels, first reaches `goal`, interpolated in ln(spp);
@@ -93,21 +93,20 @@ impl Prediction {
 }
 
 /// Predicts what people say of a zone: the samples at which P first reaches one half, without the penalty of unfamiliar
-/// tiles, and those at which it reaches `threshold` and a render would stop. P is that of noise; both are turned into the samples of a picture that
-/// differs as much from what people compared with. `judge` judges a raw descriptor, as [`noisefloor::Model::judge`]
+/// tiles, for the mean observer, and those at which that share of `people` is satisfied and a render would stop. P is
+/// that of noise; both are turned into the samples of a picture that differs as much from what people compared with. `judge` judges a raw descriptor, as [`noisefloor::Model::judge`]
 /// does.
-pub fn predict(judge: impl Fn(&[f32]) -> Judgement, threshold: Threshold, zone: &Zone) -> Prediction {
+pub fn predict(judge: impl Fn(&[f32]) -> Judgement, people: People, zone: &Zone) -> Prediction {
     let judged: Vec<Judgement> = zone.levels.iter().map(|level| judge(&level.descriptor)).collect();
-    let expected = zone.path(|i| log_odds(f64::from(judged[i].probability_without_penalty)));
+    let expected = zone.path(|i| log_odds(f64::from(judged[i].mean_observer)));
     let stopping = zone.path(|i| log_odds(f64::from(judged[i].probability)));
     let reaches = |odds: &[(f64, f64)], p: f64| {
         let as_noise = crossing(odds, log_odds(p)).unwrap_or(f64::INFINITY);
         as_difference(as_noise, zone.reference_spp)
     };
-    let probabilities =
-        zone.levels.iter().zip(&judged).map(|(l, j)| (l.spp, j.probability_without_penalty)).collect();
+    let probabilities = zone.levels.iter().zip(&judged).map(|(l, j)| (l.spp, j.mean_observer)).collect();
     let unfamiliar = zone.at_threshold().is_some_and(|level| judge(&level.descriptor).unfamiliar);
-    let (threshold, stop) = (reaches(&expected, 0.5), reaches(&stopping, f64::from(threshold.get())));
+    let (threshold, stop) = (reaches(&expected, 0.5), reaches(&stopping, f64::from(people.share())));
     Prediction { probabilities, unfamiliar, ..Prediction::new(zone, threshold, stop) }
 }
 

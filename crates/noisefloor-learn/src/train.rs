@@ -6,7 +6,7 @@ use crate::params::{TrainError, TrainParams};
 use crate::predict::{Prediction, predict};
 use crate::table::Table;
 use noisefloor::{
-    Model, Threshold,
+    Model, People,
     model::{Scores, TrainingRecord},
     svm::SvmParams,
 };
@@ -27,7 +27,7 @@ fn check(table: &Table, params: &TrainParams, needed: usize) -> Result<(), Train
     }
 }
 
-/// Predicts every zone, at P = `threshold`, by a model that has seen nothing of its group, not even to choose
+/// Predicts every zone, at that share of people, by a model that has seen nothing of its group, not even to choose
 /// C, γ or the sigmoid. `on_fold` is called before each group with its name.
 ///
 /// # Errors
@@ -35,7 +35,7 @@ fn check(table: &Table, params: &TrainParams, needed: usize) -> Result<(), Train
 pub fn leave_one_scene_out(
     table: &Table,
     params: &TrainParams,
-    threshold: Threshold,
+    people: People,
     mut on_fold: impl FnMut(&str),
 ) -> Result<Vec<Prediction>, TrainError> {
     check(table, params, 3)?;
@@ -48,7 +48,7 @@ pub fn leave_one_scene_out(
         let known = familiarity(table, &others, &classifier.scaler);
         let model = parts(table, classifier, known, TrainingRecord::default());
         let zones = table.zones.iter().filter(|z| z.group == left_out);
-        predictions.extend(zones.map(|z| predict(|raw| model.judge(raw), threshold, z)));
+        predictions.extend(zones.map(|z| predict(|raw| model.judge(raw), people, z)));
     }
     Ok(predictions)
 }
@@ -172,7 +172,7 @@ mod tests {
     }
 
     fn finds_the_rule(params: &TrainParams) {
-        let predictions = leave_one_scene_out(&table(4), params, Threshold::PAPER, |_| ()).unwrap();
+        let predictions = leave_one_scene_out(&table(4), params, People::DEFAULT, |_| ()).unwrap();
         assert_eq!(predictions.len(), 24);
         let errors = predictions.iter().map(|p| (p.predicted_spp / p.human_spp).ln().abs());
         let error_factor = (errors.sum::<f64>() / 24.0).exp();
@@ -209,7 +209,7 @@ mod tests {
                 ..plain.clone()
             };
             let of = |table: &Table| {
-                let all = leave_one_scene_out(table, &params, Threshold::PAPER, |_| ()).unwrap();
+                let all = leave_one_scene_out(table, &params, People::DEFAULT, |_| ()).unwrap();
                 all.into_iter().filter(|p| p.scene == "scene0").collect::<Vec<_>>()
             };
             assert_eq!(of(&same), of(&plain));
@@ -250,7 +250,7 @@ mod tests {
     #[test]
     fn too_few_groups_are_an_error() {
         assert!(matches!(
-            leave_one_scene_out(&table(2), &TrainParams::default(), Threshold::PAPER, |_| ()),
+            leave_one_scene_out(&table(2), &TrainParams::default(), People::DEFAULT, |_| ()),
             Err(TrainError::Groups { .. })
         ));
         assert!(matches!(

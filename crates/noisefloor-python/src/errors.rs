@@ -48,7 +48,7 @@ macro_rules! raised_as {
 
 raised_as! {
     noisefloor::params::ParamsError => ParameterError,
-    noisefloor::oracle::ThresholdError => ParameterError,
+    noisefloor::oracle::PeopleError => ParameterError,
     noisefloor::viewing::ViewingTextError => ParameterError,
     noisefloor::tile::TileError => SizeError,
     noisefloor::film::FilmError => BatchError,

@@ -2,16 +2,17 @@
 
 use crate::errors::{Raise, file_error};
 use crate::pickle::reduced;
-use noisefloor::{Model, Oracle, StoppingCriterion, Threshold, evidence::Evidence};
+use noisefloor::{Model, Oracle, People, StoppingCriterion, evidence::Evidence};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyType};
 use std::fs::File;
 use std::path::PathBuf;
 
-/// A trained model with the probability from which a tile counts as converged. It never changes; any number
+/// A trained model with the share of people who are to see no noise. It never changes; any number
 /// of sessions can be made from it.
 ///
-/// threshold: between 0 and 1; 0.9 is that of the paper. model: path of a model that "noisefloor-lab train" has
+/// people: the share of people who see no noise where a tile stops, in a scene like those that people were asked
+///     about, between 0 and 1; 0.95 is that of the paper. model: path of a model that "noisefloor-lab train" has
 /// written; None is the model inside the library, trained on
 ///     human data.
 ///
@@ -22,9 +23,9 @@ pub(crate) struct PyOracle(pub(crate) Oracle);
 #[pymethods]
 impl PyOracle {
     #[new]
-    #[pyo3(signature = (threshold = 0.9, *, model = None))]
-    fn new(threshold: f32, model: Option<PathBuf>) -> PyResult<Self> {
-        let threshold = Threshold::new(threshold).map_err(Raise::raise)?;
+    #[pyo3(signature = (people = 0.95, *, model = None))]
+    fn new(people: f32, model: Option<PathBuf>) -> PyResult<Self> {
+        let people = People::new(people).map_err(Raise::raise)?;
         let model = match model {
             None => Model::bundled(),
             Some(path) => {
@@ -32,13 +33,13 @@ impl PyOracle {
                 Model::read(file).map_err(Raise::raise)?
             }
         };
-        Ok(Self(Oracle::new(model, threshold)))
+        Ok(Self(Oracle::new(model, people)))
     }
 
-    /// P from which a tile counts as converged.
+    /// Share of people who are to see no noise.
     #[getter]
-    fn threshold(&self) -> f32 {
-        self.0.threshold().get()
+    fn people(&self) -> f32 {
+        self.0.people().share()
     }
 
     /// BLAKE3 of the model, hexadecimal: identifies it in reports.
@@ -59,18 +60,18 @@ impl PyOracle {
 
     /// What pickle makes it from in another process, which has no file of the model.
     #[classmethod]
-    fn _restore(_class: &Bound<'_, PyType>, threshold: f32, model: &[u8]) -> PyResult<Self> {
-        let threshold = Threshold::new(threshold).map_err(Raise::raise)?;
-        Ok(Self(Oracle::new(Model::read(model).map_err(Raise::raise)?, threshold)))
+    fn _restore(_class: &Bound<'_, PyType>, people: f32, model: &[u8]) -> PyResult<Self> {
+        let people = People::new(people).map_err(Raise::raise)?;
+        Ok(Self(Oracle::new(Model::read(model).map_err(Raise::raise)?, people)))
     }
 
     fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let mut model = Vec::new();
         self.0.model().write(&mut model).map_err(Raise::raise)?;
-        reduced::<Self>(py, (self.threshold(), PyBytes::new(py, &model)))
+        reduced::<Self>(py, (self.people(), PyBytes::new(py, &model)))
     }
 
     fn __repr__(&self) -> String {
-        format!("<noisefloor.Oracle: {}, P ≥ {}>", self.0.name(), self.0.threshold())
+        format!("<noisefloor.Oracle: {}, {} of people>", self.0.name(), self.0.people())
     }
 }

@@ -135,13 +135,13 @@ fn judge_still(
         )
     })?;
     let visible_noise = match evidence {
-        Evidence::Halves => oracle.map_visible_noise(grid, |tile| pair.planes(tile).map(Some)),
-        _ => Ok(None),
+        Evidence::Halves => oracle.map_visible_noise(grid, &described, params.audience),
+        _ => None,
     };
     Ok(PyJudged {
         size: image.size,
         verdicts: grid.tiles().zip(verdicts).map(|(tile, verdict)| PyVerdict::of(tile, verdict)).collect(),
         samples: pair.samples(),
-        visible_noise: visible_noise.map_err(Raise::raise)?,
+        visible_noise,
     })
 }

@@ -308,7 +308,7 @@ class Errors(unittest.TestCase):
             (nf.ParameterError, "schedule", lambda: nf.Params(schedule="never")),
             (nf.ParameterError, "moon", lambda: nf.Viewing("moon")),
             (nf.ParameterError, "moon", lambda: nf.Params(viewing="moon")),
-            (nf.ParameterError, "threshold", lambda: nf.Oracle(1.0)),
+            (nf.ParameterError, "share of people", lambda: nf.Oracle(1.0)),
             (nf.ModelError, "model", lambda: nf.Oracle(model=__file__)),
             (FileNotFoundError, "nowhere", lambda: nf.Oracle(model="/nowhere/at/all")),
             (nf.PictureError, "identical", lambda: nf.judge(black, 8, black, 8)),
@@ -487,7 +487,7 @@ class Processes(unittest.TestCase):
         self.assertNotEqual(values[0], requests[1])
         self.assertEqual(len(set(requests + pickle.loads(pickle.dumps(requests)))), len(requests))
         oracle = pickle.loads(pickle.dumps(nf.Oracle(0.8)))
-        self.assertEqual((oracle.threshold, oracle.digest), (np.float32(0.8), nf.Oracle().digest))
+        self.assertEqual((oracle.people, oracle.digest), (np.float32(0.8), nf.Oracle().digest))
 
     def test_a_pickled_session_goes_on_as_the_first_would(self):
         first = nf.Session(96, 80, nf.Oracle(0.95), PARAMS, shared_pixels=True)

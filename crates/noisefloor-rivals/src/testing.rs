@@ -10,7 +10,13 @@ static SRGB: Display = Display::SRGB;
 
 /// A look at a film through plain sRGB.
 pub(crate) fn view(film: &Film) -> View<'_> {
-    View { film, display: &SRGB, viewing: Viewing::default(), reference: None }
+    View {
+        film,
+        display: &SRGB,
+        viewing: Viewing::default(),
+        audience: noisefloor::Audience::TRAINED,
+        reference: None,
+    }
 }
 
 /// An empty film of 64×64 pixels in four tiles.

@@ -1,7 +1,7 @@
 //! From visible differences to just-objectionable differences (Mantiuk et al. 2024, §3.7), with the constants
 //! of `cvvdp_parameters.json` 0.5.7.
 
-use crate::masking::{EPSILON, grown};
+use crate::masking::{EPSILON, EXPONENT, grown};
 use crate::math::pow;
 use crate::photometry::CHANNELS;
 use multiversion::multiversion;
@@ -96,6 +96,16 @@ pub(crate) fn across_row<const N: usize>(planes: [&[f32]; N], growth: f32, weigh
         }
     }
     out.iter_mut().for_each(|out| *out = weight * out.sqrt().sqrt());
+}
+
+/// Squares of contrasts from differences that are not limited, which grow as contrast^[`EXPONENT`].
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx2", "x86_64+avx2"))]
+pub(crate) fn energy_row(row: &mut [f32]) {
+    const POWER: f32 = 2.0 / EXPONENT;
+    for value in row {
+        // A logarithm of 0 is finite here, and no number that means something
+        *value = if *value > 1e-30 { pow(*value, POWER) } else { 0.0 };
+    }
 }
 
 #[cfg(test)]

@@ -9,7 +9,7 @@ use crate::masking::{BLUR_RADIUS, EXPONENT, LARGEST, grown};
 use crate::model::VisionModel;
 use crate::part::Part;
 use crate::photometry::CHANNELS;
-use crate::pooling::{STILL, across_row};
+use crate::pooling::{STILL, across_row, energy_row};
 use crate::pyramid::Size;
 use crate::workspace::{Sizes, VisionWorkspace};
 use std::ops::Range;
@@ -167,14 +167,34 @@ impl VisibleDifference<'_> {
     /// differences are up to 5 % lower at half the contrast, 11 % with colour; a noisy picture that has lost
     /// noise masks less, so that they are higher.
     pub fn map_at(&mut self, contrast: f32) -> DifferenceBand<'_> {
-        let growth = contrast.clamp(1e-6, 1e6).powf(EXPONENT);
+        self.draw(contrast.clamp(1e-6, 1e6).powf(EXPONENT), 1.0);
+        self.plane(self.bands.start, &self.workspace.map[self.bands.start])
+    }
+
+    /// The square of the visible contrast at each place: the map before differences are limited, to the power of
+    /// 2/2.26. At a contrast of 1, noise is about at the threshold. It grows as the variance of the residual does, so
+    /// that means of it over any place are worth samples, as variances are; that holds exactly if the picture masks
+    /// as before, up to contrasts of some 700.
+    pub fn contrast_energy(&mut self) -> DifferenceBand<'_> {
+        // So weak a residual is nowhere near the limit; what it is weaker by is taken back
+        const WEAK: f32 = 1e-4;
+        self.draw(WEAK, 1.0 / WEAK);
+        let first = self.bands.start;
+        let (part, width) = (self.part.at(first), self.sizes[first].width);
+        for y in part.rows() {
+            energy_row(&mut self.workspace.map[first][y * width..][part.columns()]);
+        }
+        self.plane(first, &self.workspace.map[first])
+    }
+
+    /// Draws the map of a residual whose differences grow by `growth`, times `scale`.
+    fn draw(&mut self, growth: f32, scale: f32) {
         let bands = self.bands.clone();
         if self.channels == 1 {
-            draw::<1>(&self.sizes, bands, self.part, growth, self.workspace);
+            draw::<1>(&self.sizes, bands, self.part, (growth, scale), self.workspace);
         } else {
-            draw::<CHANNELS>(&self.sizes, bands, self.part, growth, self.workspace);
+            draw::<CHANNELS>(&self.sizes, bands, self.part, (growth, scale), self.workspace);
         }
-        self.plane(self.bands.start, &self.workspace.map[self.bands.start])
     }
 
     /// The bands of a channel, finest first; none for chromatic channels that were not computed.
@@ -266,14 +286,14 @@ fn draw<const N: usize>(
     sizes: &Sizes,
     bands: Range<usize>,
     part: Part,
-    growth: f32,
+    (growth, scale): (f32, f32),
     workspace: &mut VisionWorkspace,
 ) {
     let VisionWorkspace { differences, map, rows, .. } = workspace;
     let parts = |band: usize| part.at(band).wider(MARGIN, sizes[band]);
     for band in bands.clone() {
         // The pyramid halves contrasts between its finest and its coarsest band
-        let weight = STILL as f32 * if band == 0 { 1.0 } else { 0.5 };
+        let weight = scale * STILL as f32 * if band == 0 { 1.0 } else { 0.5 };
         for y in parts(band).rows() {
             let Range { start, end } = parts(band).columns();
             let here = y * sizes[band].width + start..y * sizes[band].width + end;

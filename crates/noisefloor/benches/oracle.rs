@@ -43,7 +43,13 @@ fn verdict(c: &mut Criterion) {
     group.bench_function("query", |b| {
         b.iter(|| oracle.model().judge(black_box(&numbers)));
     });
-    let view = View { film: &film, display: &display, viewing: Viewing::default(), reference: None };
+    let view = View {
+        film: &film,
+        display: &display,
+        viewing: Viewing::default(),
+        audience: Audience::TRAINED,
+        reference: None,
+    };
     // All on one core, as the rest
     let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread");
     group.bench_function("verdict", |b| {
@@ -73,7 +79,13 @@ fn pictures(c: &mut Criterion) {
         let (film, display) = (film(edge), Display::SRGB);
         let tiles: Vec<_> = film.grid().tiles().collect();
         let mut oracle = Oracle::bundled();
-        let view = View { film: &film, display: &display, viewing: Viewing::default(), reference: None };
+        let view = View {
+            film: &film,
+            display: &display,
+            viewing: Viewing::default(),
+            audience: Audience::TRAINED,
+            reference: None,
+        };
         group.throughput(Throughput::Elements((edge * edge) as u64));
         group.bench_function(format!("{edge}x{edge}"), |b| b.iter(|| oracle.judge(&view, black_box(&tiles))));
     }

@@ -20,6 +20,9 @@ pub struct View<'a> {
     pub display: &'a Display,
     /// On which display, and from how far.
     pub viewing: Viewing,
+    /// Whose thresholds, relative to those that the criterion stands for: a session sees to them, and a map of
+    /// visible noise has to know.
+    pub audience: Audience,
     /// The quick reference, display-encoded, row-major over the image; present if [`Needs::reference`] is
     /// set.
     pub reference: Option<&'a [Rgb]>,
@@ -34,7 +37,8 @@ impl<'a> View<'a> {
         reference: &'a Option<Vec<Rgb>>,
     ) -> Option<Self> {
         let (display, reference) = (display.as_ref()?, reference.as_deref());
-        Some(Self { film, display, viewing: params.viewing, reference })
+        let Params { viewing, audience, .. } = *params;
+        Some(Self { film, display, viewing, audience, reference })
     }
 }
 

@@ -83,6 +83,8 @@ pub struct TilePlanes {
     pub viewing: Viewing,
     /// The tile itself within the planes: rows and columns of the planes that belong to it.
     pub inner: Tile,
+    /// The tile in its picture.
+    pub place: Tile,
 }
 
 impl TilePlanes {
@@ -167,7 +169,7 @@ impl TilePlanes {
         let [image, residual] =
             [image, residual].map(|values| Array2::from_shape_vec(shape, values).expect("one value a pixel"));
         let inner = Tile { x: HALO, y: HALO, ..tile };
-        Self { image, residual, rounding: 0.0, viewing: Viewing::default(), inner }
+        Self { image, residual, rounding: 0.0, viewing: Viewing::default(), inner, place: tile }
     }
 
     /// Returns its memory to this thread's buffers, so that the next verdict does not allocate.

@@ -67,7 +67,7 @@ pub use criterion::{FixedSpp, StoppingCriterion, Verdict};
 pub use display::ToneMapping;
 pub use film::Film;
 pub use model::Model;
-pub use oracle::{Oracle, Threshold};
+pub use oracle::{Oracle, People};
 pub use params::{Audience, Params, Schedule};
 pub use rgb::Rgb;
 pub use session::{Session, SessionError, Stop, StopReason};

@@ -4,8 +4,9 @@ use crate::container::{self, Fault, Format, MAX_PAYLOAD};
 use crate::descriptor::{Descriptor, DescriptorError, DescriptorKind, DescriptorSpec};
 use crate::display::ToneMapping;
 use crate::evidence::Evidence;
+use crate::oracle::Spread;
 use crate::params::Audience;
-use crate::svm::Classifier;
+use crate::svm::{Classifier, Machine, platt::from_log_odds};
 use noisefloor_vision::Viewing;
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
@@ -17,7 +18,7 @@ pub(crate) use familiarity::CAUTION;
 pub use familiarity::Familiarity;
 
 const FORMAT: Format = Format { magic: *b"NFMODEL\0", version: VERSION };
-const VERSION: u32 = 4;
+const VERSION: u32 = 5;
 #[cfg(feature = "bundled-model")]
 static BUNDLED: &[u8] = include_bytes!("../models/human.nfm");
 
@@ -136,6 +137,9 @@ pub struct ModelParts {
     /// The texture that the model has been tried on; `None` if the descriptor does not separate noise from
     /// picture.
     pub familiarity: Option<Familiarity>,
+    /// How thresholds scatter around what it expects; `None` if the descriptor does not separate noise from picture,
+    /// so that nothing is known in samples: P is then the machine's, for the mean observer.
+    pub spread: Option<Spread>,
     /// Whose thresholds it predicts, as a line from those of the training data.
     pub audience: Audience,
     /// Where it comes from.
@@ -156,6 +160,7 @@ struct ModelFile<'a> {
     viewing: Viewing,
     classifier: Cow<'a, Classifier>,
     familiarity: Cow<'a, Option<Familiarity>>,
+    spread: Option<Spread>,
     audience: Audience,
     record: Cow<'a, TrainingRecord>,
 }
@@ -163,11 +168,14 @@ struct ModelFile<'a> {
 /// What a model says about one tile.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Judgement {
-    /// Probability in [0, 1] that an observer sees no difference. For an unfamiliar tile, that with half of
-    /// the samples.
+    /// Share of people, in [0, 1], in a scene like those seen, who see no difference. For an unfamiliar tile, that
+    /// with fewer samples than it has: with half of them, if it is unlike all that the model was tried on.
     pub probability: f32,
     /// The same without the penalty for unfamiliar tiles.
     pub probability_without_penalty: f32,
+    /// Probability that the mean observer sees no difference, without the penalty: one half where a mean threshold
+    /// is expected.
+    pub mean_observer: f32,
     /// Whether the tile shows texture that the model has not been tried on.
     pub unfamiliar: bool,
 }
@@ -216,6 +224,7 @@ impl Model {
             viewing: file.viewing,
             classifier: file.classifier.into_owned(),
             familiarity: file.familiarity.into_owned(),
+            spread: file.spread,
             audience: file.audience,
             record: file.record.into_owned(),
         })
@@ -237,6 +246,7 @@ impl Model {
             viewing,
             classifier,
             familiarity,
+            spread,
             audience,
             record,
         } = &self.0;
@@ -248,6 +258,7 @@ impl Model {
             viewing: *viewing,
             classifier: Cow::Borrowed(classifier),
             familiarity: Cow::Borrowed(familiarity),
+            spread: *spread,
             audience: *audience,
             record: Cow::Borrowed(record),
         }
@@ -294,6 +305,11 @@ impl Model {
         self.0.familiarity.as_ref()
     }
 
+    /// How thresholds scatter around what it expects.
+    pub fn spread(&self) -> Option<Spread> {
+        self.0.spread
+    }
+
     /// Whose thresholds it predicts, as a line from those of the training data.
     pub fn audience(&self) -> Audience {
         self.0.audience
@@ -312,8 +328,8 @@ impl Model {
         self.0.judge(raw)
     }
 
-    pub(crate) fn curve<'a>(&'a self, raw: &'a [f32]) -> ProbabilityCurve<'a> {
-        self.0.curve(raw)
+    pub(crate) fn curve<'a>(&'a self, raw: &'a [f32], people: Option<f64>) -> ProbabilityCurve<'a> {
+        self.0.curve(raw, people)
     }
 }
 
@@ -324,26 +340,42 @@ impl ModelParts {
     /// # Panics
     /// If the descriptor does not have the classifier's dimensionality.
     pub fn judge(&self, raw: &[f32]) -> Judgement {
-        self.curve(raw).judgement()
+        self.curve(raw, None).judgement()
     }
 
-    /// P of a tile as a function of its samples.
-    fn curve<'a>(&'a self, raw: &'a [f32]) -> ProbabilityCurve<'a> {
+    /// P of a tile as a function of its samples, for people whose thresholds scatter by `people`, or as the model says.
+    fn curve<'a>(&'a self, raw: &'a [f32], people: Option<f64>) -> ProbabilityCurve<'a> {
         let scaled = self.classifier.scaler.scaled(raw);
         let texture = || self.descriptor.texture().iter().map(|&i| scaled[i]).collect::<Vec<f32>>();
-        let unfamiliar = self.familiarity.as_ref().is_some_and(|known| !known.includes(&texture()));
-        ProbabilityCurve { parts: self, raw, unfamiliar, projected: scaled }
+        let strangeness = self.familiarity.as_ref().map_or(0.0, |known| known.strangeness(&texture()));
+        let spread = self.spread.map(|s| Spread { people: people.unwrap_or(s.people), ..s });
+        ProbabilityCurve { parts: self, raw, spread, strangeness, projected: scaled }
     }
 
     fn check(&self) -> Result<(), ModelError> {
         let invalid = |what: &str| Err(ModelError::Invalid(what.into()));
         let n = self.descriptor.dimensions();
-        let Classifier { scaler, svm, platt } = &self.classifier;
+        let Classifier { scaler, machine, platt } = &self.classifier;
         if scaler.mean.len() != n || scaler.scale.len() != n {
             return invalid("scaler and descriptor differ in length");
         }
-        if svm.coefficients.is_empty() || svm.vectors.len() != svm.coefficients.len() * n {
-            return invalid("support vectors and descriptor differ in length");
+        let (weights, scalars): ([&[f32]; 2], [f32; 2]) = match machine {
+            Machine::Line(line) => ([&line.weights, &[]], [line.bias, 0.0]),
+            Machine::Svm(svm) => ([&svm.vectors, &svm.coefficients], [svm.rho, svm.gamma]),
+        };
+        let fits = match machine {
+            Machine::Line(line) => line.weights.len() == n,
+            Machine::Svm(svm) => {
+                !svm.coefficients.is_empty() && svm.vectors.len() == svm.coefficients.len() * n
+            }
+        };
+        if !fits {
+            return invalid("the machine and the descriptor differ in length");
+        }
+        if let Some(Spread { scenes, people }) = self.spread
+            && ![scenes, people].iter().all(|sd| (1e-6..=100.0).contains(sd))
+        {
+            return invalid("the spread of thresholds is out of range");
         }
         if let Some(Familiarity { zones, reach }) = &self.familiarity {
             let known = self.descriptor.texture().len();
@@ -354,12 +386,11 @@ impl ModelParts {
                 return invalid("what is familiar is not a finite number");
             }
         }
-        let numbers = [&scaler.mean, &scaler.scale, &svm.coefficients, &svm.vectors];
-        let scalars = [svm.rho, svm.gamma, platt.a, platt.b];
-        if !numbers.into_iter().flatten().chain(&scalars).all(|v| v.is_finite()) {
+        let numbers: [&[f32]; 5] = [&scaler.mean, &scaler.scale, weights[0], weights[1], &scalars];
+        if !numbers.into_iter().flatten().chain(&[platt.a, platt.b]).all(|v| v.is_finite()) {
             return invalid("a number is not finite");
         }
-        if svm.gamma <= 0.0 {
+        if matches!(machine, Machine::Svm(svm) if svm.gamma <= 0.0) {
             return invalid("γ is not positive");
         }
         if self.tone_mapping.check().is_err() {
@@ -370,11 +401,12 @@ impl ModelParts {
 }
 
 /// P of one tile as a function of its samples: noise falls as 1/√n, nothing else changes. Texture decides
-/// once whether the tile is familiar.
+/// once how familiar the tile is.
 pub(crate) struct ProbabilityCurve<'a> {
     parts: &'a ModelParts,
     raw: &'a [f32],
-    unfamiliar: bool,
+    spread: Option<Spread>,
+    strangeness: f32,
     /// Room for the descriptor at another number of samples.
     projected: Vec<f32>,
 }
@@ -382,22 +414,34 @@ pub(crate) struct ProbabilityCurve<'a> {
 impl ProbabilityCurve<'_> {
     pub(crate) fn judgement(&mut self) -> Judgement {
         self.projected.copy_from_slice(self.raw);
-        let free = self.parts.classifier.probability_in_place(&mut self.projected);
-        let probability = if self.unfamiliar { self.at(1.0).unwrap_or(free) } else { free };
-        Judgement { probability, probability_without_penalty: free, unfamiliar: self.unfamiliar }
+        let log_odds = self.parts.classifier.log_odds_in_place(&mut self.projected);
+        let free = self.share(log_odds);
+        let probability = if self.strangeness > 0.0 { self.at(1.0).unwrap_or(free) } else { free };
+        Judgement {
+            probability,
+            probability_without_penalty: free,
+            mean_observer: from_log_odds(log_odds),
+            unfamiliar: self.strangeness > 0.0,
+        }
+    }
+
+    fn share(&self, log_odds: f64) -> f32 {
+        self.spread.map_or_else(|| from_log_odds(log_odds), |spread| spread.share(log_odds) as f32)
     }
 
     /// P with `factor` times the samples; `None` if the descriptor does not separate noise from picture.
     pub(crate) fn at(&mut self, factor: f32) -> Option<f32> {
-        let penalty = if self.unfamiliar { CAUTION } else { 1.0 };
-        self.without_penalty(factor / penalty)
+        self.without_penalty(factor / CAUTION.powf(self.strangeness))
     }
 
     /// The same without the penalty for an unfamiliar tile.
     pub(crate) fn without_penalty(&mut self, factor: f32) -> Option<f32> {
         self.projected.copy_from_slice(self.raw);
         let known = self.parts.descriptor.project(&mut self.projected, factor);
-        known.then(|| self.parts.classifier.probability_in_place(&mut self.projected))
+        known.then(|| {
+            let log_odds = self.parts.classifier.log_odds_in_place(&mut self.projected);
+            self.share(log_odds)
+        })
     }
 }
 

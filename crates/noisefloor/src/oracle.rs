@@ -7,11 +7,12 @@ use crate::evidence::{Evidence, TilePlanes};
 use crate::model::{Model, ProbabilityCurve};
 use crate::params::Audience;
 use crate::tile::{Tile, TileGrid};
+use noisefloor_vision::Viewing;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-mod threshold;
-pub use threshold::{Threshold, ThresholdError};
+mod people;
+pub use people::{People, PeopleError, Spread};
 
 /// A tile with more than one in this many pixels without valid samples gives no evidence, and is not called
 /// converged.
@@ -34,7 +35,9 @@ const CARRIERS: f64 = 32.0;
 #[derive(Clone, Debug)]
 pub struct Oracle {
     model: Model,
-    threshold: Threshold,
+    people: People,
+    /// How much the thresholds of these people scatter, where they were measured.
+    scatter: Option<f64>,
     /// What tiles of the picture were like when last described, for the picture's numbers; of tiles by index.
     described: Vec<Option<Seen>>,
 }
@@ -48,15 +51,21 @@ struct Seen {
 }
 
 impl Oracle {
-    /// An oracle that calls a tile converged where P reaches the threshold.
-    pub fn new(model: Model, threshold: Threshold) -> Self {
-        Self { model, threshold, described: Vec::new() }
+    /// An oracle that calls a tile converged where that share of people sees no noise in it.
+    pub fn new(model: Model, people: People) -> Self {
+        Self { model, people, scatter: None, described: Vec::new() }
     }
 
-    /// The bundled model at P ≥ 0.9.
+    /// The bundled model, for 95 % of people.
     #[cfg(feature = "bundled-model")]
     pub fn bundled() -> Self {
-        Self::new(Model::bundled(), Threshold::PAPER)
+        Self::new(Model::bundled(), People::DEFAULT)
+    }
+
+    /// For people whose eyes were measured: the standard deviation of ln(samples) that this leaves, above 0, instead
+    /// of that between people. What they were measured to need is [`crate::Params::audience`].
+    pub fn with_scatter(self, scatter: f64) -> Self {
+        Self { scatter: Some(scatter.clamp(1e-3, 10.0)), ..self }
     }
 
     /// The model.
@@ -64,9 +73,19 @@ impl Oracle {
         &self.model
     }
 
-    /// P from which a tile counts as converged.
-    pub fn threshold(&self) -> Threshold {
-        self.threshold
+    /// The share of people who are to see no noise.
+    pub fn people(&self) -> People {
+        self.people
+    }
+
+    /// The share of people who see no noise *anywhere* in a picture, from the tiles' [`Verdict::probability`] and
+    /// pixels; `None` if the model knows nothing of how thresholds scatter. See [`Spread::share_in_picture`].
+    pub fn share_in_picture(&self, viewing: Viewing, tiles: &[(f32, usize)]) -> Option<f64> {
+        let spread = self.model.spread()?;
+        let spread = Spread { people: self.scatter.unwrap_or(spread.people), ..spread };
+        let places =
+            |&(share, pixels): &(f32, usize)| (share, Spread::places(pixels, viewing.pixels_per_degree()));
+        Some(spread.share_in_picture(tiles.iter().map(places)))
     }
 
     /// Describes one tile of a picture by its planes, which have `spp` samples per pixel, above 0.
@@ -136,77 +155,71 @@ impl Oracle {
 
     /// A verdict by a whole, raw descriptor.
     fn verdict(&self, raw: &[f32], spp: u64) -> Verdict {
-        let mut curve = self.model.curve(raw);
+        let mut curve = self.model.curve(raw, self.scatter);
         let judgement = curve.judgement();
-        let converged = self.threshold.is_reached_by(judgement.probability);
+        let converged = self.people.are_satisfied_by(judgement.probability);
         Verdict {
             converged,
             probability: Some(judgement.probability),
             threshold: expected_threshold(&mut curve, spp),
-            expected_spp: if converged { Some(spp) } else { self.expect(&mut curve, spp) },
+            expected_spp: if converged {
+                Some(spp)
+            } else {
+                // If only the noise changes, as noise does: σ ∝ 1/√n
+                self.crossing(|factor| curve.at(factor)).map(|f| (spp as f64 * f64::from(f)).ceil() as u64)
+            },
             unfamiliar: judgement.unfamiliar,
             probability_without_penalty: Some(judgement.probability_without_penalty),
         }
     }
 
-    /// The visible noise, in the descriptor's unit, from which it is seen: of an even noise in a tile like the
-    /// mean of the training data, where P crosses the threshold. `None` if the descriptor does not tell noise
-    /// from picture.
-    fn just_visible(&self) -> Option<f32> {
-        let descriptor = self.model.descriptor();
-        let mean = &self.model.classifier().scaler.mean;
-        let at = |doublings: f32| {
-            let mut raw = mean.clone();
-            descriptor.project(&mut raw, doublings.exp2());
-            raw
-        };
-        let (mut noisy, mut clean) = (-20.0f32, 20.0f32);
-        while clean - noisy > 0.01 {
-            let middle = 0.5 * (noisy + clean);
-            let seen = !self.threshold.is_reached_by(self.model.judge(&at(middle)).probability);
-            if seen { noisy = middle } else { clean = middle }
-        }
-        descriptor.pooled_visible_noise(&at(clean))
-    }
-
     /// Whether [`Oracle::map_visible_noise`] can tell noise from picture.
     pub fn maps_visible_noise(&self) -> bool {
-        self.just_visible().is_some()
+        self.model.descriptor().visible_noise(&[]).is_some()
     }
 
-    /// The visible noise of a whole image, row-major, from the planes of its tiles; NaN where `planes` has
-    /// none. 1 is the amplitude from which an even noise is seen, in a tile like the mean of the training
-    /// data. `None` if the descriptor does not tell noise from picture.
-    ///
-    /// # Errors
-    /// Those of `planes`.
-    pub fn map_visible_noise<E: Send>(
+    /// The visible noise of a whole image, row-major, from its tiles as described; NaN where there is none of them.
+    /// 1 is the amplitude at which [`Oracle::people`] of that audience see none: a tile that is converged is nowhere above 1, and one
+    /// that is not is above 1 somewhere. `None` if the descriptor does not tell noise from picture.
+    pub fn map_visible_noise(
         &self,
         grid: TileGrid,
-        planes: impl Fn(Tile) -> Result<Option<TilePlanes>, E> + Sync,
-    ) -> Result<Option<Vec<f32>>, E> {
-        let Some(just_visible) = self.just_visible() else { return Ok(None) };
-        let tiles: Vec<Tile> = grid.tiles().collect();
-        let map_of = |&tile: &Tile| {
-            Ok(planes(tile)?.map(|planes| {
-                let map = self.model.descriptor().visible_noise(&planes);
-                planes.recycle();
-                map
-            }))
-        };
-        let maps: Vec<_> = tiles.par_iter().map(map_of).collect::<Result<_, _>>()?;
+        tiles: &[Described],
+        audience: Audience,
+    ) -> Option<Vec<f32>> {
+        let maps = self.model.descriptor().visible_noise(tiles)?;
+        let numbers = self.model.descriptor().in_picture(tiles);
         let mut image = vec![f32::NAN; grid.width() * grid.height()];
-        for (tile, map) in tiles.iter().zip(maps) {
-            match map {
-                Some(Some(map)) => {
-                    let pixels = tile.rows(grid.width()).flatten();
-                    pixels.zip(&map).for_each(|(pixel, &value)| image[pixel] = value / just_visible);
-                }
-                Some(None) => return Ok(None),
-                None => {}
+        for ((tile, map), raw) in tiles.iter().zip(&maps).zip(&numbers) {
+            let mut curve = self.model.curve(raw, self.scatter);
+            // Noise as strong as in the worst window needs this many times the samples
+            let needed = self.crossing(|factor| curve.at(factor)).map_or(f32::INFINITY, |trained| {
+                let wanted = audience.needed(f64::from(trained) * tile.spp) / tile.spp;
+                wanted as f32
+            });
+            let worst = map.iter().copied().fold(f32::MIN_POSITIVE, f32::max);
+            let pixels = tile.place.rows(grid.width()).flatten();
+            pixels.zip(map).for_each(|(pixel, &value)| image[pixel] = value / worst * needed.sqrt());
+        }
+        Some(image)
+    }
+
+    /// How many times the samples P reaches what is asked for, within 2±²⁰, to a hundredth of a doubling; `None` if
+    /// 2²⁰ are not enough, or it cannot be told.
+    fn crossing(&self, mut probability: impl FnMut(f32) -> Option<f32>) -> Option<f32> {
+        let (mut low, mut high) = (-20.0f32, 20.0f32);
+        if !self.people.are_satisfied_by(probability(high.exp2())?) {
+            return None;
+        }
+        while high - low > 0.01 {
+            let middle = 0.5 * (low + high);
+            if self.people.are_satisfied_by(probability(middle.exp2())?) {
+                high = middle
+            } else {
+                low = middle
             }
         }
-        Ok(Some(image))
+        Some(high.exp2())
     }
 
     /// What a tile is judged by; `None` if too many of its pixels have no evidence.
@@ -233,27 +246,6 @@ impl Oracle {
             other => CriterionError::Descriptor(other),
         }
     }
-
-    /// Samples per pixel at which P crosses the threshold if only the noise changes, as noise does: σ ∝ 1/√n.
-    /// Found by doubling, then bisecting ln n; `None` if the descriptor does not separate noise from picture,
-    /// or 2²⁰ times the samples are not enough.
-    fn expect(&self, curve: &mut ProbabilityCurve<'_>, spp: u64) -> Option<u64> {
-        let mut satisfied =
-            |doublings: f32| curve.at(doublings.exp2()).map(|p| self.threshold.is_reached_by(p));
-        let mut high = 1.0;
-        while !satisfied(high)? {
-            high += 1.0;
-            if high > 20.0 {
-                return None;
-            }
-        }
-        let mut low = high - 1.0;
-        while high - low > 0.02 {
-            let middle = 0.5 * (low + high);
-            if satisfied(middle)? { high = middle } else { low = middle }
-        }
-        Some((spp as f64 * f64::from(high).exp2()).ceil() as u64)
-    }
 }
 
 /// Samples per pixel at which P is 10, 50 and 90 %, if only the noise changes; `None` if the descriptor does not separate
@@ -276,11 +268,12 @@ fn expected_threshold(curve: &mut ProbabilityCurve<'_>, spp: u64) -> Option<Expe
 
 impl StoppingCriterion for Oracle {
     fn name(&self) -> String {
-        format!("svm oracle ({})", self.model.descriptor().name())
+        format!("{} oracle ({})", self.model.classifier().machine.name(), self.model.descriptor().name())
     }
 
     fn fingerprint(&self) -> String {
-        format!("model {}, P ≥ {}", self.model.digest(), self.threshold)
+        let scatter = self.scatter.map(|s| format!(", measured within {s}")).unwrap_or_default();
+        format!("model {}, {} of people{scatter}", self.model.digest(), self.people)
     }
 
     fn begin(&mut self, grid: TileGrid) {
@@ -300,7 +293,17 @@ impl StoppingCriterion for Oracle {
     }
 
     fn visible_noise(&self, view: &View<'_>) -> Option<Vec<f32>> {
-        self.map_visible_noise(view.film.grid(), |tile| self.planes(view, tile)).ok()?
+        let grid = view.film.grid();
+        let describe = |tile: Tile| {
+            let planes = self.planes(view, tile).ok()??;
+            let described = self.describe(&planes, view.film.spp(tile.index) as f64).ok();
+            planes.recycle();
+            described
+        };
+        let tiles: Vec<Tile> = grid.tiles().collect();
+        let described: Vec<Option<Described>> = tiles.into_par_iter().map(describe).collect();
+        let audience = self.audience().then(view.audience);
+        self.map_visible_noise(grid, &described.into_iter().flatten().collect::<Vec<_>>(), audience)
     }
 
     /// Tiles that are not named count for the picture as they were when last described; they are described
@@ -364,13 +367,15 @@ impl StoppingCriterion for Oracle {
 
     fn restore(&mut self, grid: TileGrid, state: &[u8]) -> bool {
         let Ok(described) = container::unpack::<Vec<Option<Seen>>>(state) else { return false };
-        let sound = |Seen { tile: d, spread }: &Seen| {
+        let sound = |(tile, seen): (Tile, &Option<Seen>)| {
+            let Some(Seen { tile: d, spread }) = seen else { return true };
             spread.is_finite()
-                && d.own.len() == self.model.descriptor().own_len()
-                && d.own.iter().all(|v| v.is_finite())
-                && [d.spp, d.area].iter().all(|v| v.is_finite() && *v > 0.0)
+                && d.place == tile
+                && d.spp.is_finite()
+                && d.spp > 0.0
+                && self.model.descriptor().is_sound(d)
         };
-        let fits = [0, grid.len()].contains(&described.len()) && described.iter().flatten().all(sound);
+        let fits = [0, grid.len()].contains(&described.len()) && grid.tiles().zip(&described).all(sound);
         if fits {
             self.described = described;
         }

@@ -72,7 +72,7 @@ fn run() -> Result<(), Box<dyn Error>> {
         );
         converged += usize::from(verdict.converged);
     }
-    println!("{converged} of {} tiles need no more samples (P ≥ {})", grid.len(), oracle.threshold());
+    println!("{converged} of {} tiles need no more samples (P ≥ {})", grid.len(), oracle.people());
     Ok(())
 }
 

@@ -1,7 +1,7 @@
 //! Train: learns a model from human thresholds, and scores it on scenes it has not seen.
 #![allow(clippy::print_stdout, reason = "an example prints")]
 
-use noisefloor::{Model, Threshold, descriptor::Descriptor, evidence::Evidence};
+use noisefloor::{Model, People, descriptor::Descriptor, evidence::Evidence};
 use noisefloor_image::write_atomic;
 use noisefloor_learn::{Corpora, describe_corpora, read_table};
 use noisefloor_learn::{Prediction, Table, constant_noise_baseline, score};
@@ -53,7 +53,7 @@ fn run() -> Result<(), Box<dyn Error>> {
 
     // How good is it where it matters: on scenes the model has never seen, beside a plain limit on the noise.
     let params = TrainParams::for_descriptor(&table.descriptor);
-    let predictions = leave_one_scene_out(&table, &params, Threshold::PAPER, |group| {
+    let predictions = leave_one_scene_out(&table, &params, People::DEFAULT, |group| {
         eprintln!("training without {group} …");
     })?;
     report(&table, &predictions);
@@ -68,11 +68,7 @@ fn run() -> Result<(), Box<dyn Error>> {
 
     // Read it back, as `noisefloor render --model` and `Oracle::new(Model::read(…)?, …)` do.
     let read = Model::read(BufReader::new(File::open(OUT)?))?;
-    println!(
-        "{OUT}: {} support vectors, digest {}",
-        read.classifier().svm.coefficients.len(),
-        &read.digest()[..12]
-    );
+    println!("{OUT}: a {}, digest {}", read.classifier().machine.name(), &read.digest()[..12]);
     Ok(())
 }
 

@@ -1,4 +1,4 @@
-use noisefloor::{Model, Threshold, svm::SvmParams};
+use noisefloor::{Model, People, svm::SvmParams};
 use noisefloor_learn::{
     Table, VISIBLE_CHOICES, choices, choose_and_leave_out, constant_noise_baseline, read_table_with,
     scene_median_baseline, score,
@@ -35,7 +35,7 @@ fn left_out_scenes_are_predicted_better_than_by_one_noise_level() {
     let table = table();
     assert_eq!((table.zones.len(), table.scenes().len(), table.groups().len()), (167, 11, 10));
     let params = TrainParams::for_descriptor(&table.descriptor);
-    let predictions = leave_one_scene_out(&table, &params, Threshold::PAPER, |_| ()).unwrap();
+    let predictions = leave_one_scene_out(&table, &params, People::DEFAULT, |_| ()).unwrap();
     let (ours, constant) = (score(predictions.iter()), score(constant_noise_baseline(&table).iter()));
     assert!(ours.error_factor < 1.33 && ours.early_share <= 0.02, "{ours:?}");
     assert!((0.9..1.1).contains(&ours.bias_factor), "{ours:?}");
@@ -49,14 +49,13 @@ fn left_out_scenes_are_predicted_better_than_by_one_noise_level() {
     );
 }
 
-/// A support vector machine on the compact descriptor, with one C and γ: the search takes minutes.
+/// The paper's machine on the same numbers, with one C and γ: the search takes minutes.
 #[test]
-fn the_compact_descriptor_predicts_left_out_scenes_too() {
-    let compact = fixture("human-compact.csv");
+fn a_support_vector_machine_predicts_left_out_scenes_too() {
     let params = TrainParams { candidates: vec![SvmParams { c: 0.3, gamma: 0.01 }], ..TrainParams::svm() };
-    let predictions = leave_one_scene_out(&compact, &params, Threshold::PAPER, |_| ()).unwrap();
+    let predictions = leave_one_scene_out(&table(), &params, People::DEFAULT, |_| ()).unwrap();
     let scores = score(predictions.iter());
-    assert!(scores.error_factor < 1.38 && scores.early_share <= 0.03, "{scores:?}");
+    assert!(scores.error_factor < 1.5 && scores.early_share <= 0.05, "{scores:?}");
 }
 
 /// The score in `docs/accuracy.md` with everything chosen without the scene that is predicted.
@@ -66,7 +65,7 @@ fn with_blind_choices_the_vision_model_errs_less_than_one_noise_level() {
     let params = TrainParams::for_descriptor(&every.descriptor);
     assert_eq!((every.zones.len(), every.groups().len()), (167, 10));
     let all = choices(&every).unwrap();
-    let (predictions, chosen) = choose_and_leave_out(&all, &params, Threshold::PAPER, |_| ()).unwrap();
+    let (predictions, chosen) = choose_and_leave_out(&all, &params, People::DEFAULT, |_| ()).unwrap();
     assert_eq!(chosen.len(), 10);
     let (ours, constant) = (score(predictions.iter()), score(constant_noise_baseline(&every).iter()));
     assert!(ours.error_factor < 1.33 && ours.early_share <= 0.02, "{ours:?} {chosen:?}");

@@ -1,7 +1,7 @@
 use crate::kit::{Altered, Synthetic};
 use noisefloor::{
-    Batch, Driver, Event, FixedSpp, Model, Oracle, Params, ProgressiveSource, Rgb, Schedule, Session, Stop,
-    StopReason, StoppingCriterion, Threshold, evidence::Evidence, model::ModelParts, source::Reference,
+    Batch, Driver, Event, FixedSpp, Model, Oracle, Params, People, ProgressiveSource, Rgb, Schedule, Session,
+    Stop, StopReason, StoppingCriterion, evidence::Evidence, model::ModelParts, source::Reference,
 };
 use noisefloor_ptwne::{Ptwne, RenderOptions, Sampling, scenes};
 use std::cell::RefCell;
@@ -221,7 +221,7 @@ fn the_reference_is_rendered_once_where_it_is_needed_and_never_elsewhere() {
     // The same machine, held against a reference: here, the converged picture itself
     let parts = ModelParts { evidence: Evidence::Reference, ..Model::bundled().into_parts() };
     let model = Model::new(parts).unwrap();
-    let oracle = || Oracle::new(model.clone(), Threshold::PAPER);
+    let oracle = || Oracle::new(model.clone(), People::DEFAULT);
     let calls = Rc::new(RefCell::new(0));
     let count = Rc::clone(&calls);
     let converged = {

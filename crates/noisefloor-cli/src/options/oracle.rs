@@ -2,7 +2,7 @@
 
 use anyhow::Context;
 use clap::{Args, ValueEnum};
-use noisefloor::{Model, Oracle, Threshold, evidence::Evidence};
+use noisefloor::{Model, Oracle, People, evidence::Evidence};
 use std::fs::File;
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
@@ -13,10 +13,25 @@ pub struct OracleArgs {
     /// Model file [default: the bundled model].
     #[arg(long, value_name = "FILE")]
     pub model: Option<PathBuf>,
-    /// A tile has converged when the probability that an observer sees no noise reaches P; higher values
-    /// stop later.
-    #[arg(long, default_value_t = Threshold::PAPER, value_name = "P")]
-    pub threshold: Threshold,
+    /// Share of people who are to see no noise in a tile, in a scene like those that people were asked about. More
+    /// people stop later.
+    #[arg(long, default_value_t = People::DEFAULT, value_name = "SHARE")]
+    pub people: People,
+    #[command(flatten)]
+    renamed: Renamed,
+}
+
+/// What options were called before.
+#[derive(Clone, Debug, Default, PartialEq, Args)]
+pub struct Renamed {
+    #[arg(long, hide = true, value_parser = threshold)]
+    threshold: Option<String>,
+}
+
+fn threshold(_: &str) -> Result<String, &'static str> {
+    Err(
+        "--threshold P is --people SHARE now, and P the share of people who see no noise: --people 95% is the default",
+    )
 }
 
 /// What a tile is compared with.
@@ -44,7 +59,7 @@ impl From<EvidenceChoice> for Evidence {
 impl OracleArgs {
     /// The oracle, loaded and checked.
     pub fn check(&self) -> anyhow::Result<Oracle> {
-        Ok(Oracle::new(load_model(self.model.as_deref())?, self.threshold))
+        Ok(Oracle::new(load_model(self.model.as_deref())?, self.people))
     }
 }
 

@@ -42,11 +42,12 @@ pub fn audience(text: &str) -> Result<Audience, String> {
         "observers" => Ok(Audience::TRAINED),
         "art-students" => Ok(Audience::ART_STUDENTS),
         line => {
-            let parts = line
-                .split_once(',')
-                .and_then(|(a, b)| Some((a.trim().parse().ok()?, b.trim().parse().ok()?)));
-            let (slope, offset) =
-                parts.ok_or("expected `observers`, `art-students`, or a,b for T' = a T + b")?;
+            let (factor, offset) = line.split_once(',').unwrap_or((line, "0"));
+            let number = |text: &str| text.trim().parse().ok();
+            let parts = number(factor).zip(number(offset));
+            let (slope, offset) = parts.ok_or(
+                "expected `observers`, `art-students`, a factor on samples, or a,b for T' = a T + b",
+            )?;
             Ok(Audience { slope, offset })
         }
     }

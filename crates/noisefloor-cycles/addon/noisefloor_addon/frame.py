@@ -191,7 +191,7 @@ class Frame:
             if stop.reason != "converged":
                 reasons[stop.reason] = reasons.get(stop.reason, 0) + 1
         others = "".join(f"; {count} ended: {reason}" for reason, count in reasons.items())
-        seen = f"P {self.settings.share:.2g}, {self.settings.viewing}"
+        seen = f"{self.settings.people:.0%} of people, {self.settings.viewing}"
         return (
             f"{done} of {len(stops)} tiles without visible noise ({seen}), "
             f"{spp.min()} to {spp.max()} samples per pixel, {spp.mean():.0f} on average{others}; "

@@ -26,7 +26,7 @@ class RENDER_PT_noisefloor(bpy.types.Panel):
         column = layout.column()
         column.active = settings.use
         column.prop(settings, "viewing")
-        column.prop(settings, "share", slider=True)
+        column.prop(settings, "people", slider=True)
         column.prop(settings, "min_samples")
         column.prop(settings, "max_samples")
         column.prop(settings, "time_limit")

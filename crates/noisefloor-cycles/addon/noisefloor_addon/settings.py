@@ -21,10 +21,10 @@ class Settings(bpy.types.PropertyGroup):
     viewing: bpy.props.EnumProperty(
         name="Seen on", description="Where the picture will be looked at", items=VIEWING
     )
-    share: bpy.props.FloatProperty(
+    people: bpy.props.FloatProperty(
         name="People",
-        description="Probability that an observer sees no noise in a tile, at which it stops",
-        default=0.9,
+        description="Share of people who see no noise in a tile when it stops",
+        default=0.95,
         min=0.5,
         max=0.99,
         subtype="FACTOR",
@@ -64,7 +64,7 @@ class Settings(bpy.types.PropertyGroup):
 
 
 def oracle(settings):
-    return noisefloor.Oracle(settings.share)
+    return noisefloor.Oracle(settings.people)
 
 
 def params(scene, batch):

@@ -167,6 +167,8 @@ fn describe_zone(
     let mut levels = Vec::with_capacity(shown.len());
     for (spp, origin, planes) in shown {
         let described = descriptor.describe_tile(&planes, spp).map_err(|e| does_not_fit(zone, e))?;
+        // People judged each zone by itself: no window reaches over its edge
+        let described = Described { blocks: Vec::new(), ..described };
         levels.push(Alone { spp, origin, noise: noise_level(&planes), described });
     }
     levels.sort_by(|a, b| a.spp.total_cmp(&b.spp));

@@ -118,14 +118,14 @@ function audience() {
 
 const question = () => ({
   picture: levels[level].id,
-  threshold: Number(get("threshold").value),
+  people: Number(get("people").value),
   audience: audience(),
   retrained,
 });
 
 /** Asks for the verdicts on the picture that is looked at; of answers that overtake one another, the last question's counts. */
 async function look() {
-  get("threshold-now").textContent = Number(get("threshold").value).toFixed(2);
+  get("people-now").textContent = `${Math.round(100 * Number(get("people").value))} %`;
   get("line").hidden = get("audience").value !== "line";
   const picture = levels[level];
   const order = ++turn;
@@ -152,7 +152,7 @@ function blank() {
   say("");
   for (const id of ["verdict", "answers", "yours", "learn", "frame"]) get(id).hidden = true;
   get("welcome").hidden = false;
-  // With pictures and nothing judged, the threshold and the level would have nothing to act on
+  // With pictures and nothing judged, the share of people and the level would have nothing to act on
   if (levels.length > 1) get("verdict").hidden = false;
 }
 
@@ -298,7 +298,7 @@ function listen() {
     }),
   );
   for (const id of ["audience", "slope", "offset"]) get(id).addEventListener("input", does(look));
-  get("threshold").addEventListener(
+  get("people").addEventListener(
     "input",
     does(async () => {
       await line.learn(false);
@@ -361,11 +361,11 @@ async function start() {
     }),
     problem,
   );
-  line = new PersonalLine(t, () => Number(get("threshold").value));
-  learning.threshold = () => Number(get("threshold").value);
+  line = new PersonalLine(t, () => Number(get("people").value));
+  learning.people = () => Number(get("people").value);
   listen();
   const first = await server.state();
-  get("threshold").value = first.threshold;
+  get("people").value = first.people;
   const [slope, offset] = first.audience;
   if (slope !== 1 || offset !== 0) {
     get("audience").value =

@@ -96,7 +96,7 @@ export class Learning {
     get("outcome").hidden = true;
     this.onUse(false);
     try {
-      await server.retrain(this.threshold());
+      await server.retrain(this.people());
       await this.follow();
     } catch (error) {
       get("retrain").disabled = false;

@@ -9,9 +9,9 @@ const converged = ({ tiles }) => tiles.filter((tile) => tile.converged).length;
 const need = ({ tiles }) => tiles.reduce((sum, tile) => sum + (tile.expected_spp ?? NaN), 0) / tiles.length;
 
 export class PersonalLine {
-  /** `threshold()` is the P from which a tile counts as converged. */
-  constructor(t, threshold) {
-    Object.assign(this, { t, threshold, learned: null });
+  /** `people()` is the share of people who are to see no noise. */
+  constructor(t, people) {
+    Object.assign(this, { t, people, learned: null });
   }
 
   /** Slope and offset. */
@@ -22,7 +22,7 @@ export class PersonalLine {
   /** Learns from all answers; `use` chooses the line as the audience when it is first there. */
   async learn(use) {
     const first = this.learned === null;
-    this.learned = await server.line(this.threshold());
+    this.learned = await server.line(this.people());
     const audience = get("audience");
     audience.querySelector('[value="you"]').disabled = this.learned === null;
     if (this.learned === null && audience.value === "you") audience.value = "observers";

@@ -18,8 +18,8 @@ export const verdicts = (question) => ask("api/verdicts", json("POST", question)
 export const disagree = (question, tile, seesNoise) =>
   ask("api/disagreements", json("POST", { question, tile, sees_noise: seesNoise }));
 export const takeBack = (id) => ask(`api/disagreements/${id}`, { method: "DELETE" });
-export const line = (threshold) => ask("api/line", json("POST", { threshold }));
-export const retrain = (threshold) => ask("api/retrain", json("POST", { threshold }));
+export const line = (people) => ask("api/line", json("POST", { people }));
+export const retrain = (people) => ask("api/retrain", json("POST", { people }));
 export const progress = () => ask("api/retrain");
 
 /** A picture's PNG, its values as they are: no profile of the screen may touch them. */

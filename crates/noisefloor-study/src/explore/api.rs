@@ -15,7 +15,7 @@ use axum::http::header::{CONTENT_LENGTH, CONTENT_TYPE};
 use axum::http::{HeaderMap, StatusCode};
 use axum::response::{IntoResponse, Response};
 use noisefloor::{
-    Audience, Threshold,
+    Audience, People,
     evidence::{Evidence, Samples},
     stills::StillError,
 };
@@ -80,7 +80,7 @@ struct StateView {
     tile: usize,
     /// `nested`, `independent`, or null to detect it from the pictures.
     samples: Option<&'static str>,
-    threshold: Threshold,
+    people: People,
     audience: [f64; 2],
     art_students: [f64; 2],
     model: ModelView,
@@ -111,7 +111,7 @@ pub(crate) async fn state(State(app): Shared) -> Answer {
         named: gallery.named.clone(),
         tile: gallery.tile,
         samples: gallery.samples.map(|s| if s == Samples::Nested { "nested" } else { "independent" }),
-        threshold: setup.threshold,
+        people: setup.people,
         audience: [slope, offset],
         art_students: [students.slope, students.offset],
         model: ModelView {
@@ -236,7 +236,7 @@ pub(crate) async fn noise(State(app): Shared, id: Named) -> Answer {
             StatusCode::NOT_FOUND,
             "this model has no map of visible noise",
             "model",
-            "use one with the compact descriptor",
+            "use one with the visible descriptor",
         ));
     }
     png(move || images::noise(&tiles).unwrap_or_else(|| Ok(Vec::new()))).await

@@ -15,7 +15,7 @@ pub struct ExploreSetup {
     /// The model that judges.
     pub model: Model,
     /// Initial probability from which a tile counts as converged.
-    pub threshold: noisefloor::Threshold,
+    pub people: noisefloor::People,
     /// Initial audience.
     pub audience: Audience,
     /// On which display pictures are seen, and from how far.
@@ -35,7 +35,7 @@ impl ExploreSetup {
     pub fn new(database: impl AsRef<Path>) -> Self {
         Self {
             model: Model::bundled(),
-            threshold: noisefloor::Threshold::PAPER,
+            people: noisefloor::People::DEFAULT,
             audience: Audience::TRAINED,
             viewing: Model::bundled().viewing(),
             tile: DEFAULT_TILE,

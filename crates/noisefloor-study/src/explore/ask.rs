@@ -15,7 +15,7 @@ use axum::extract::{Path, State};
 use axum::http::StatusCode;
 use axum::http::header::{CONTENT_DISPOSITION, CONTENT_TYPE};
 use axum::response::{IntoResponse, Response};
-use noisefloor::{Model, Threshold};
+use noisefloor::{Model, People};
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
 
@@ -36,12 +36,15 @@ fn model(app: &App, retrained: bool) -> Result<Model, Refusal> {
 
 fn judge(app: &App, question: &Question) -> Result<Judge, Refusal> {
     let model = model(app, question.retrained)?;
-    let made = Judge::new(model, threshold(question.threshold)?, question.audience);
-    made.map_err(|what| refuse(what, "threshold", "P lies between 0 and 1, an audience line rises"))
+    let made = Judge::new(model, people(question.people)?, question.audience);
+    made.map_err(|what| {
+        refuse(what, "people", "a share of people lies between 0 and 1, an audience line rises")
+    })
 }
 
-fn threshold(p: f32) -> Result<Threshold, Refusal> {
-    Threshold::new(p).map_err(|_| refuse("P lies between 0 and 1", "threshold", "move the slider"))
+fn people(share: f32) -> Result<People, Refusal> {
+    People::new(share)
+        .map_err(|_| refuse("a share of people lies between 0 and 1", "people", "move the slider"))
 }
 
 /// `POST /api/verdicts`
@@ -102,7 +105,7 @@ pub(crate) async fn disagree(State(app): Shared, body: Body) -> Answer {
         tile: [at.x, at.y, at.width, at.height],
         sees_noise,
         probability: verdict.probability.unwrap_or(0.0),
-        threshold: question.threshold,
+        threshold: question.people,
         audience: question.audience,
         model: judge.oracle.model().digest(),
         descriptor: descriptor.spec(),
@@ -119,16 +122,16 @@ pub(crate) async fn disagree(State(app): Shared, body: Body) -> Answer {
     Ok((StatusCode::CREATED, Json(done.await?)).into_response())
 }
 
-/// `POST /api/line`: the line of the person who answered, at the model and threshold of a question.
+/// `POST /api/line`: the line of the person who answered, at the model and share of people of a question.
 pub(crate) async fn line(State(app): Shared, body: Body) -> Answer {
-    let Retraining { threshold: p } = read_json(body).await?;
-    let threshold = threshold(p)?;
+    let Retraining { people: share } = read_json(body).await?;
+    let people = people(share)?;
     let all = kept(&app, |kept| kept.all()).await?;
     let model = app.setup.model.clone();
     let work = move || {
         let fitting = all.iter().filter(|d| d.said.fits(model.descriptor(), model.evidence()));
         let answers: Vec<_> = fitting.map(|d| d.said.answer()).collect();
-        fit_line(&model, threshold, &answers)
+        fit_line(&model, people, &answers)
     };
     Ok(Json(blocking(work).await?).into_response())
 }
@@ -146,12 +149,12 @@ pub(crate) async fn take_back(State(app): Shared, id: Named) -> Answer {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Retraining {
-    threshold: f32,
+    people: f32,
 }
 
 /// `POST /api/retrain`
 pub(crate) async fn retrain(State(app): Shared, body: Body) -> Answer {
-    let at = threshold(read_json::<Retraining>(body).await?.threshold)?;
+    let at = people(read_json::<Retraining>(body).await?.people)?;
     let Some(table) = app.setup.table.clone() else {
         let do_ = "start `noisefloor-lab explore --table FILE`, with the project's fixtures/human-table.csv or a table \
             written by `train --save-table`";

@@ -1,7 +1,7 @@
 //! Retraining in the background, one job at a time.
 
 use super::learn::{LearnStep, Learned, retrain};
-use noisefloor::{Model, Threshold};
+use noisefloor::{Model, People};
 use noisefloor_learn::Answer;
 use noisefloor_learn::Table;
 use noisefloor_learn::TrainParams;
@@ -50,13 +50,7 @@ impl Job {
 }
 
 /// Starts retraining. The caller marks the job as running first.
-pub(crate) fn begin(
-    job: Arc<Mutex<Job>>,
-    table: Table,
-    answers: Vec<Answer>,
-    model: Model,
-    threshold: Threshold,
-) {
+pub(crate) fn begin(job: Arc<Mutex<Job>>, table: Table, answers: Vec<Answer>, model: Model, people: People) {
     let set = move |to: Job| *job.lock().unwrap_or_else(PoisonError::into_inner) = to;
     // The model's corpus names this table only if their digests agree
     let corpus = if model.record().table_digest == table.digest() {
@@ -69,7 +63,7 @@ pub(crate) fn begin(
         let work = || {
             let on_step = |step| set(Job::Running(step));
             let params = TrainParams::for_descriptor(&table.descriptor);
-            retrain(&table, answers, &params, (&model, threshold), &corpus, on_step)
+            retrain(&table, answers, &params, (&model, people), &corpus, on_step)
         };
         // A panic in the solver must not leave the page waiting
         let outcome = std::panic::catch_unwind(std::panic::AssertUnwindSafe(work));

@@ -1,6 +1,6 @@
 //! Retraining on disagreements, and what that costs and gains.
 
-use noisefloor::{Model, Threshold, model::Scores};
+use noisefloor::{Model, People, model::Scores};
 use noisefloor_learn::{Answer, TrainError, TrainParams, leave_answers_out, leave_one_scene_out, train};
 use noisefloor_learn::{Table, score};
 use serde::Serialize;
@@ -49,7 +49,7 @@ pub struct LearnStep {
 }
 
 /// Trains on a table together with answers, and scores both. Half of the work is skipped if `model` was
-/// trained on this table and holds its scores. An answer agrees if the verdict at P ≥ `threshold` is the
+/// trained on this table and holds its scores. An answer agrees if the verdict for that share of people is the
 /// same. Deterministic.
 ///
 /// # Errors
@@ -58,7 +58,7 @@ pub fn retrain(
     table: &Table,
     answers: Vec<Answer>,
     params: &TrainParams,
-    (model, threshold): (&Model, Threshold),
+    (model, share): (&Model, People),
     corpus: &str,
     mut on_step: impl FnMut(LearnStep),
 ) -> Result<(Model, Learned), TrainError> {
@@ -83,7 +83,7 @@ pub fn retrain(
             return Ok(None);
         }
         let on_fold = |group: &str| step(format!("{what}: {group} left out"));
-        let predictions = leave_one_scene_out(table, params, Threshold::PAPER, on_fold)?;
+        let predictions = leave_one_scene_out(table, params, People::DEFAULT, on_fold)?;
         Ok(Some(score(predictions.iter())))
     };
     let before = match known_scores {
@@ -107,7 +107,7 @@ pub fn retrain(
     );
     let new = train(&told, params, corpus, after)?;
 
-    let agreement = agreement(&told.answers, threshold, [&base, &new], &left_out);
+    let agreement = agreement(&told.answers, share, [&base, &new], &left_out);
     let scenes = told.answer_groups().into_iter().map(str::to_owned).collect();
     let worse = worse(before, after);
     let learned = Learned { before, after, agreement, scenes, worse, model: new.digest() };
@@ -117,12 +117,12 @@ pub fn retrain(
 /// Answers that the model before, the one after, and those that left the scene out agree with.
 fn agreement(
     answers: &[Answer],
-    threshold: Threshold,
+    people: People,
     [before, after]: [&Model; 2],
     left_out: &[f32],
 ) -> AnswerAgreement {
     let agree = |p: &dyn Fn(usize, &Answer) -> f32| {
-        answers.iter().enumerate().filter(|(i, a)| a.agrees(p(*i, a), threshold)).count()
+        answers.iter().enumerate().filter(|(i, a)| a.agrees(p(*i, a), people)).count()
     };
     AnswerAgreement {
         of: answers.len(),

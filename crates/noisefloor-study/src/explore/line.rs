@@ -5,7 +5,7 @@
 //! §7.3). The line is the mean of its posterior: with few answers it stays near the model, with many it
 //! follows the person.
 
-use noisefloor::{Audience, Model, Threshold};
+use noisefloor::{Audience, Model, People};
 use noisefloor_learn::Answer;
 use serde::Serialize;
 
@@ -68,11 +68,11 @@ fn logit(p: f64) -> f64 {
 
 /// Learns the line of one person from answers whose descriptors are the model's. `None` without answers, or
 /// if the descriptor does not tell noise from picture.
-pub fn fit_line(model: &Model, threshold: Threshold, answers: &[Answer]) -> Option<PersonalLine> {
+pub fn fit_line(model: &Model, people: People, answers: &[Answer]) -> Option<PersonalLine> {
     let curves: Vec<Curve<'_>> = answers.iter().map(|answer| curve(model, answer)).collect::<Option<_>>()?;
     let n = curves.len() as f64;
     let middle = (answers.iter().map(|a| a.spp.ln()).sum::<f64>() / n).exp();
-    let threshold = logit(f64::from(threshold.get()));
+    let threshold = logit(f64::from(people.share()));
     if curves.is_empty() {
         return None;
     }
@@ -139,13 +139,13 @@ mod tests {
 
     /// Answers of a person whose thresholds are `slope` times those of the observers, about tiles of the mean
     /// texture of the training data around the observers' threshold.
-    fn answers(model: &Model, threshold: Threshold, slope: f32, count: usize) -> Vec<Answer> {
+    fn answers(model: &Model, people: People, slope: f32, count: usize) -> Vec<Answer> {
         let at = |factor: f32| {
             let mut raw = model.classifier().scaler.mean.clone();
             assert!(model.descriptor().project(&mut raw, factor));
             raw
         };
-        let none = |factor: f32| threshold.is_reached_by(model.judge(&at(factor)).probability);
+        let none = |factor: f32| people.are_satisfied_by(model.judge(&at(factor)).probability);
         let just = (-200..200).map(|i| (i as f32 * 0.05).exp()).find(|f| none(*f)).unwrap();
         let answer = |i: usize| {
             // From an eighth of the observers' threshold to eight times
@@ -158,16 +158,16 @@ mod tests {
 
     #[test]
     fn a_persons_line_is_learned_and_shrunk() {
-        let (model, threshold) = (Model::bundled(), Threshold::PAPER);
+        let (model, people) = (Model::bundled(), People::DEFAULT);
         for slope in [0.4f32, 1.0, 2.5] {
-            let fit = |count| fit_line(&model, threshold, &answers(&model, threshold, slope, count)).unwrap();
+            let fit = |count| fit_line(&model, people, &answers(&model, people, slope, count)).unwrap();
             let [few, many] = [fit(4), fit(40)];
             let truth = f64::from(slope).ln();
             assert!((many.slope.ln() - truth).abs() < 0.35, "{slope}: {many:?}");
             assert!(few.slope.ln().abs() < many.slope.ln().abs() + 0.2, "{slope}: {few:?} {many:?}");
             assert!(many.agree_now >= many.agreed_before && many.agree_now >= 37, "{slope}: {many:?}");
         }
-        assert_eq!(fit_line(&model, threshold, &[]), None);
+        assert_eq!(fit_line(&model, people, &[]), None);
     }
 
     /// Forty answers of simulated people, yes or no, about tiles of random noise around the observers' threshold:
@@ -176,14 +176,14 @@ mod tests {
     /// share near 0.75 errs by 0.03.
     #[test]
     fn forty_answers_give_a_rough_factor() {
-        let (model, threshold) = (Model::bundled(), Threshold::PAPER);
+        let (model, people) = (Model::bundled(), People::DEFAULT);
         let mut errors = Vec::new();
         for seed in 0..200 {
             let mut random = crate::random::seeded(seed);
             let factor = 0.5 * 6f64.powf(random.f64());
             let scale = (0.15 + 0.35 * random.f64()) * 3f64.sqrt() / std::f64::consts::PI;
             let slips = 0.05 * random.f64();
-            let mut asked = answers(&model, threshold, 1.0, 201);
+            let mut asked = answers(&model, people, 1.0, 201);
             random.shuffle(&mut asked);
             asked.truncate(40);
             for answer in &mut asked {
@@ -191,7 +191,7 @@ mod tests {
                 let own = (100.0 * factor).ln() + scale * (u / (1.0 - u)).ln();
                 answer.sees_noise = if random.f64() < slips { random.bool() } else { answer.spp.ln() < own };
             }
-            let line = fit_line(&model, threshold, &asked).unwrap();
+            let line = fit_line(&model, people, &asked).unwrap();
             let need = line.slope * 100.0 + line.offset;
             errors.push((need / (100.0 * factor)).ln());
         }
@@ -205,14 +205,14 @@ mod tests {
     /// Twelve times "I see none" of tiles that the model calls noisy: verdicts turn, at once.
     #[test]
     fn a_dozen_answers_turn_verdicts_in_no_time() {
-        let (model, threshold) = (Model::bundled(), Threshold::PAPER);
-        let all = answers(&model, threshold, 1.0, 25);
+        let (model, people) = (Model::bundled(), People::DEFAULT);
+        let all = answers(&model, people, 1.0, 25);
         let mut twelve: Vec<Answer> = all.into_iter().filter(|a| a.sees_noise).collect();
         twelve.truncate(12);
         twelve.iter_mut().for_each(|a| a.sees_noise = false);
         assert_eq!(twelve.len(), 12);
         let begun = std::time::Instant::now();
-        let line = fit_line(&model, threshold, &twelve).unwrap();
+        let line = fit_line(&model, people, &twelve).unwrap();
         println!("{line:?} in {:?}", begun.elapsed());
         assert!(begun.elapsed().as_secs_f64() < 1.0);
         assert!(line.agreed_before == 0 && line.agree_now >= 8 && line.slope < 0.5, "{line:?}");

@@ -1,8 +1,8 @@
-//! Verdicts on a picture. It is described once, and judged again whenever threshold or audience change.
+//! Verdicts on a picture. It is described once, and judged again whenever the people change.
 
 use super::gallery::{Gallery, GalleryError, GalleryPicture};
 use noisefloor::{
-    Audience, Model, Oracle, Rgb, Threshold, TileGrid, ToneMapping, Verdict, Viewing,
+    Audience, Model, Oracle, People, Rgb, TileGrid, ToneMapping, Verdict, Viewing,
     descriptor::{Described, Descriptor},
     evidence::{Evidence, Samples},
     stills::{SnapshotPair, Still},
@@ -68,10 +68,10 @@ fn describe(gallery: &Gallery, id: &str, model: &Model, viewing: Viewing) -> Res
     .seen_on(viewing);
     let (width, height) = picture.still.size;
     let grid = TileGrid::new(width, height, gallery.tile)?;
-    // The threshold affects verdicts only; 1 in the map is seen at that of the paper
-    let oracle = Oracle::new(model.clone(), Threshold::PAPER);
+    // Other people change verdicts only; 1 in the map is where the default share of them sees noise
+    let oracle = Oracle::new(model.clone(), People::DEFAULT);
     let described = held.describe(&oracle, grid)?;
-    let noise = oracle.map_visible_noise(grid, |tile| held.planes(tile).map(Some))?;
+    let noise = oracle.map_visible_noise(grid, &described, model.audience());
     Ok(Tiles { grid, spp, samples: held.samples(), described, shown: held.shown(), noise })
 }
 
@@ -80,8 +80,8 @@ fn describe(gallery: &Gallery, id: &str, model: &Model, viewing: Viewing) -> Res
 #[serde(deny_unknown_fields)]
 pub(crate) struct Question {
     pub(crate) picture: String,
-    /// Probability from which a tile counts as converged.
-    pub(crate) threshold: f32,
+    /// Share of people who are to see no noise.
+    pub(crate) people: f32,
     /// Slope and offset of the audience.
     pub(crate) audience: [f64; 2],
     /// Whether to ask the retrained model.
@@ -122,7 +122,7 @@ pub(crate) struct VerdictView {
     pub(crate) has_noise_map: bool,
 }
 
-/// A model with threshold and audience.
+/// A model with a share of people and their audience.
 #[derive(Debug)]
 pub(crate) struct Judge {
     pub(crate) oracle: Oracle,
@@ -131,13 +131,13 @@ pub(crate) struct Judge {
 
 impl Judge {
     /// Errors name the value out of range.
-    pub(crate) fn new(model: Model, threshold: Threshold, [slope, offset]: [f64; 2]) -> Result<Self, String> {
+    pub(crate) fn new(model: Model, people: People, [slope, offset]: [f64; 2]) -> Result<Self, String> {
         let sound = (0.0..=100.0).contains(&slope) && (-1e9..=1e9).contains(&offset);
         if !sound {
             return Err(format!("the audience line T' = {slope} T + {offset} needs a slope of 0 to 100"));
         }
         let audience = model.audience().then(Audience { slope, offset });
-        Ok(Self { oracle: Oracle::new(model, threshold), audience })
+        Ok(Self { oracle: Oracle::new(model, people), audience })
     }
 
     pub(crate) fn verdicts(&self, tiles: &Tiles) -> Result<Vec<Verdict>, String> {
@@ -145,7 +145,7 @@ impl Judge {
         verdicts.ok_or_else(|| {
             let name = self.oracle.model().descriptor().name();
             format!(
-                "a model with the {name} descriptor cannot follow an audience; use the compact descriptor"
+                "a model with the {name} descriptor cannot follow an audience; use the visible descriptor"
             )
         })
     }

@@ -1,10 +1,6 @@
 use crate::explore::table;
 use crate::kit::{Running, Served, levels, stack};
-use noisefloor::{
-    Oracle, Threshold,
-    descriptor::{Descriptor, NoiseMask},
-    evidence::Evidence,
-};
+use noisefloor::{Oracle, People, descriptor::Descriptor, evidence::Evidence};
 use noisefloor_eyes::Eyes;
 use noisefloor_learn::{Corpora, describe_corpora};
 use noisefloor_learn::{TrainParams, train};
@@ -359,20 +355,21 @@ fn simulated_observers_drive_the_pages_and_a_model_learns_from_them() {
     // Eight observers of scale 0.27: their median is known to 0.27·2/√8 = 0.19, times 3.
     assert!(f64::abs(means) < 0.57, "{means}");
 
-    // Of the corpus, a model. Two scenes do not show how light counts, so not the default one.
+    // Of the corpus, a model. Two scenes do not show how light counts, so only the noise of the tile is weighed.
     let out = dir.path().join("out");
     write(&out, &study, &report, CorpusThreshold::Level95).unwrap();
     let table = describe_corpora(
         Corpora::new(&[out.join("corpus")]),
-        &Descriptor::compact(NoiseMask::default()),
+        &Descriptor::visible(),
         Evidence::Halves,
         |_, _| (),
     )
     .unwrap();
     assert_eq!((table.groups().len(), table.zones.len()), (2, 8));
-    let model = train(&table, &TrainParams::svm(), "simulated".into(), None).unwrap();
+    let params = TrainParams { weighed: Some(vec!["visible_noise".into()]), ..TrainParams::default() };
+    let model = train(&table, &params, "simulated".into(), None).unwrap();
     let learned: Vec<_> =
-        table.zones.iter().map(|z| predict(|raw| model.judge(raw), Threshold::PAPER, z)).collect();
+        table.zones.iter().map(|z| predict(|raw| model.judge(raw), People::DEFAULT, z)).collect();
     let scores = score(learned.iter());
     println!("{scores:?}");
     assert!(scores.error_factor < 1.6, "{scores:?}");

@@ -1,6 +1,6 @@
 use crate::kit::{Picturing, Served, stack};
 use noisefloor::{
-    Model, Oracle, Threshold, TileGrid, ToneMapping, Viewing,
+    Model, Oracle, People, TileGrid, ToneMapping, Viewing,
     descriptor::Descriptor,
     evidence::{Evidence, Samples},
     model::ModelParts,
@@ -23,7 +23,7 @@ pub(crate) fn setup(dir: &Path) -> ExploreSetup {
 }
 
 pub(crate) fn question(picture: &Value) -> Value {
-    json!({ "picture": picture["id"], "threshold": 0.9, "audience": [1.0, 0.0], "retrained": false })
+    json!({ "picture": picture["id"], "people": 0.9, "audience": [1.0, 0.0], "retrained": false })
 }
 
 /// What `judge` computes: the picture held against the others, all tiles described and judged in their
@@ -132,13 +132,13 @@ fn texts_are_complete_in_both_languages() {
 /// Threshold and audience act on what is described: a higher P, or people who look harder, leave no more
 /// tiles converged.
 #[test]
-fn threshold_and_audience_move_verdicts() {
+fn people_and_audience_move_verdicts() {
     let dir = tempfile::tempdir().unwrap();
     let server = Served::explorer(setup(dir.path()));
     let picture = server.get("/api/state")["pictures"][1].clone();
-    let ask = |threshold: f64, audience: [f64; 2]| {
+    let ask = |people: f64, audience: [f64; 2]| {
         let mut asked = question(&picture);
-        asked["threshold"] = json!(threshold);
+        asked["people"] = json!(people);
         asked["audience"] = json!(audience);
         server.post("/api/verdicts", &asked)
     };
@@ -154,10 +154,9 @@ fn threshold_and_audience_move_verdicts() {
         harder["tiles"][0]["expected_spp"].as_u64().unwrap()
             > own["tiles"][0]["expected_spp"].as_u64().unwrap()
     );
-    for (threshold, audience) in
-        [(0.0, [1.0, 0.0]), (1.0, [1.0, 0.0]), (0.9, [-1.0, 0.0]), (0.9, [1.0, 1e300])]
+    for (people, audience) in [(0.0, [1.0, 0.0]), (1.0, [1.0, 0.0]), (0.9, [-1.0, 0.0]), (0.9, [1.0, 1e300])]
     {
-        assert_eq!(ask(threshold, audience).0, 422, "{threshold} {audience:?}");
+        assert_eq!(ask(people, audience).0, 422, "{people} {audience:?}");
     }
 }
 
@@ -166,7 +165,7 @@ fn threshold_and_audience_move_verdicts() {
 fn answers_become_a_line() {
     let dir = tempfile::tempdir().unwrap();
     let server = Served::explorer(setup(dir.path()));
-    let line = || server.post("/api/line", &json!({ "threshold": 0.9 }));
+    let line = || server.post("/api/line", &json!({ "people": 0.9 }));
     assert_eq!(line(), (200, Value::Null));
     let state = server.get("/api/state");
     for (picture, tile) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
@@ -184,7 +183,7 @@ fn answers_become_a_line() {
         server.post("/api/verdicts", &asked).1["tiles"][0]["probability"].as_f64().unwrap()
     };
     assert!(p(json!([learned["slope"], learned["offset"]])) > p(json!([1.0, 0.0])), "{learned}");
-    assert_eq!(server.post("/api/line", &json!({ "threshold": 1.5 })).0, 422);
+    assert_eq!(server.post("/api/line", &json!({ "people": 1.5 })).0, 422);
 }
 
 /// A single picture has nothing to be held against, and is told what is missing; a model that looks at
@@ -331,7 +330,7 @@ pub(crate) fn table() -> Table {
 fn retraining_moves_p_and_says_what_it_costs() {
     let dir = tempfile::tempdir().unwrap();
     let server = Served::explorer(ExploreSetup { table: Some(table()), ..setup(dir.path()) });
-    let (status, said) = server.post("/api/retrain", &json!({ "threshold": 0.9 }));
+    let (status, said) = server.post("/api/retrain", &json!({ "people": 0.9 }));
     assert!(status == 422 && said["where"] == "disagreements", "{said}");
     let state = server.get("/api/state");
     let picture = &state["pictures"][0];
@@ -340,7 +339,7 @@ fn retraining_moves_p_and_says_what_it_costs() {
         assert_eq!(server.post("/api/disagreements", &said).0, 201);
     };
     let learn = || {
-        let (status, begun) = server.post("/api/retrain", &json!({ "threshold": 0.9 }));
+        let (status, begun) = server.post("/api/retrain", &json!({ "people": 0.9 }));
         assert!(status == 202 && begun["state"] == "running", "{begun}");
         let begun = std::time::Instant::now();
         loop {
@@ -401,6 +400,6 @@ fn retraining_moves_p_and_says_what_it_costs() {
     // Another table than the bundled model's is not called by its name.
     let corpus = format!("a table of {}", table().scenes().join(", "));
     assert!(model.record().corpus.starts_with(&corpus), "{}", model.record().corpus);
-    let again = retrain(&table(), answers, &params, (&bundled, Threshold::PAPER), &corpus, |_| ()).unwrap();
+    let again = retrain(&table(), answers, &params, (&bundled, People::DEFAULT), &corpus, |_| ()).unwrap();
     assert_eq!(again.0.digest(), model.digest());
 }

@@ -2,7 +2,7 @@
 
 use crate::descriptor::NoiseMask;
 use crate::evidence::TilePlanes;
-use crate::tile::MAX_TILE;
+use crate::tile::{MAX_TILE, Tile};
 use ndarray::Array2;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -19,7 +19,7 @@ use thiserror::Error;
 /// audience follow, and
 /// [`TileDescriptor::texture`], by which unfamiliar tiles are recognised.
 pub trait TileDescriptor: fmt::Debug + Send + Sync {
-    /// The name in model files and tables, such as `"compact"`.
+    /// The name in model files and tables, such as `"visible"`.
     fn name(&self) -> &'static str;
 
     /// Version of the formulas. Raise it whenever a number changes: models trained with another version are
@@ -49,15 +49,25 @@ pub trait TileDescriptor: fmt::Debug + Send + Sync {
         tiles.iter().map(|t| t.own.clone()).collect()
     }
 
-    /// How visible the noise is at each pixel of the tile (rows × columns), as an amplitude in a unit of the
-    /// descriptor's own; [`crate::Oracle::map_visible_noise`] knows from where it is seen. `None` if the
-    /// descriptor does not separate noise from picture.
-    fn visible_noise(&self, _planes: &TilePlanes) -> Option<Array2<f32>> {
-        None
+    /// The tile's own numbers, and what places them in their picture; `spp` is the samples per pixel of the tile,
+    /// above 0. The default is for a descriptor that looks at tiles one by one.
+    ///
+    /// # Errors
+    /// As of [`TileDescriptor::describe`].
+    fn describe_tile(&self, planes: &TilePlanes, spp: f64) -> Result<Described, DescriptorError> {
+        let (own, place) = (self.describe(planes)?, planes.place);
+        Ok(Described { own, spp, place, window: 1, blocks: Vec::new() })
     }
 
-    /// The amplitude of [`TileDescriptor::visible_noise`] that a raw descriptor has pooled.
-    fn pooled_visible_noise(&self, _raw: &[f32]) -> Option<f32> {
+    /// Whether a described tile, which may come from a file, is one that this descriptor can have made.
+    fn is_sound(&self, tile: &Described) -> bool {
+        tile.own.len() == self.own_len() && tile.own.iter().all(|v| v.is_finite()) && tile.blocks.is_empty()
+    }
+
+    /// How visible the noise is at each pixel of the tiles that make up a picture (rows × columns each), as an
+    /// amplitude in a unit of the descriptor's own, whose largest value in a tile is what the tile is judged by.
+    /// `None` if the descriptor does not separate noise from picture.
+    fn visible_noise(&self, _tiles: &[Described]) -> Option<Vec<Array2<f32>>> {
         None
     }
 
@@ -102,15 +112,18 @@ pub struct DescriptorKind {
 /// let checker = |x: usize, y: usize| if (x + y) % 2 == 0 { [0.01; 3] } else { [-0.01; 3] };
 /// let noise_at_the_left = |x, y| ([0.5; 3], if x < 16 { checker(x, y) } else { [0.0; 3] });
 /// let planes = TilePlanes::gather((32, 16), tile, noise_at_the_left);
-/// let map = Descriptor::default().visible_noise(&planes).unwrap();
+/// let descriptor = Descriptor::default();
+/// let described = descriptor.describe_tile(&planes, 100.0)?;
+/// let map = &descriptor.visible_noise(&[described]).unwrap()[0];
 /// assert_eq!(map.dim(), (16, 32));
-/// assert!(map[(8, 0)] > 10.0 * map[(8, 31)]);
-/// # Ok::<(), noisefloor::tile::TileError>(())
+/// // Windows of three quarters of a degree reach a little over the edge
+/// assert!(map[(8, 0)] > 1.2 * map[(8, 31)]);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Debug)]
 pub struct Descriptor(Arc<dyn TileDescriptor>);
 
-/// A descriptor as files name it: `{"compact": {"mask": 1.0}}` in JSON.
+/// A descriptor as files name it: `{"mask-pair": {"edge": 128, "mask": 1.0}}` in JSON.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Named", into = "Named")]
 pub struct DescriptorSpec {
@@ -161,8 +174,14 @@ pub struct Described {
     pub own: Vec<f32>,
     /// Samples per pixel of the tile, above 0; not an integer where a level is synthesised.
     pub spp: f64,
-    /// Pixels of the tile: its weight in the picture.
-    pub area: f64,
+    /// Where it lies in its picture.
+    pub place: Tile,
+    /// Edge of the windows in which noise is looked for, in blocks of the picture.
+    pub window: usize,
+    /// Sums over the blocks of the picture that the tile has pixels of, of what windows are means of, row by row.
+    /// Empty for a descriptor without windows, and for a tile that is to be taken by its own numbers: apart from
+    /// its neighbours.
+    pub blocks: Vec<f32>,
 }
 
 impl Descriptor {
@@ -179,14 +198,6 @@ impl Descriptor {
     /// Dimensionality of the whole descriptor, the picture's numbers included.
     pub fn dimensions(&self) -> usize {
         self.number_names().len()
-    }
-
-    /// Describes a tile, which has `spp` samples per pixel, on its own.
-    ///
-    /// # Errors
-    /// [`DescriptorError::TileSize`] if the descriptor is not for tiles of that size.
-    pub fn describe_tile(&self, planes: &TilePlanes, spp: f64) -> Result<Described, DescriptorError> {
-        Ok(Described { own: self.describe(planes)?, spp, area: planes.inner.pixels() as f64 })
     }
 }
 

@@ -5,17 +5,18 @@
 //! hand it to
 //! [`Model::read_with`](crate::Model::read_with).
 
-mod compact;
 mod kind;
 mod mask;
 mod pair;
+mod texture;
 mod visible;
+mod windows;
 
 pub use kind::{Described, Descriptor, DescriptorError, DescriptorKind, DescriptorSpec, TileDescriptor};
 pub use mask::{NoiseMask, SigmaError};
 
 /// The built-in descriptors.
-const KINDS: [DescriptorKind; 4] = [visible::KIND, compact::KIND, pair::MASKS, pair::LUMINANCES];
+const KINDS: [DescriptorKind; 3] = [visible::KIND, pair::MASKS, pair::LUMINANCES];
 
 impl Descriptor {
     /// Five numbers, whatever the tile size: how many times too strong the noise is by a model of human vision,
@@ -23,13 +24,6 @@ impl Descriptor {
     /// Knows viewing conditions.
     pub fn visible() -> Self {
         Self::new(visible::Visible::default())
-    }
-
-    /// Six numbers, whatever the tile size: how visible the noise is where it is most visible, how much
-    /// texture hides it, and the same for the whole picture. By constants of our own; knows no viewing
-    /// conditions.
-    pub fn compact(mask: NoiseMask) -> Self {
-        Self::new(compact::Compact { mask })
     }
 
     /// The paper's: the noise mask of the tile and of what it is compared with, pixel by pixel (Takouachet et

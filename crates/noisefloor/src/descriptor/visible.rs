@@ -1,26 +1,25 @@
 //! The descriptor on the vision model: how many times too strong the noise is, by a model of contrast
 //! sensitivity and masking that was fitted to other pictures and other people.
 //!
-//! The vision model says how visible the residual is on its picture, place by place. The mean of high order
-//! over the tile is one number, since observers look for the worst place. What counts is the contrast that
-//! the residual would need for this number to reach a fixed difference: 0.5 says that the noise is twice too
-//! strong. Its logarithm falls with samples exactly as that of the noise does, so that the expected need
-//! follows without looking at the picture again.
+//! The vision model says how visible the residual is on its picture, place by place. People look for the worst
+//! place: what counts is the root mean square of the visible contrast in windows of three quarters of a degree, and of
+//! these the worst one that lies around a pixel of the tile. Windows lie in the picture and reach over the borders of
+//! tiles, so that a verdict hardly hangs on how the picture is divided. In windows, visible contrast is as strong as
+//! the noise is: it falls as 1/√n, and the expected need follows without looking at the picture again.
 //!
 //! Two more numbers say what the tile is made of, its texture and its brightness: unfamiliar tiles are told by
 //! them. Two are the picture's, its noise and its brightness: people judge a tile in its picture, and ask for more
 //! samples in bright pictures than the vision model expects. The noise of a picture is a quantile over its
 //! tiles, not a mean of high order, so that one bad spot does not make all tiles wait. `docs/accuracy.md` has the scores, with all of this chosen without the scenes that are scored.
 
-use super::compact::texture_energy;
 use super::kind::{Described, Descriptor, DescriptorError, DescriptorKind, TileDescriptor};
+use super::texture::texture_energy;
+use super::windows::{BLOCK, PictureContrast, block_count, block_sums};
 use crate::descriptor::NoiseMask;
 use crate::{display::ROUNDING_LUMINANCE, evidence::TilePlanes};
-use multiversion::multiversion;
 use ndarray::{Array2, ArrayView2, s};
 use noisefloor_vision::{
-    DifferenceBand, ResidualPatch, ResidualPixels, VisibleDifference, VisionDetail, VisionModel,
-    VisionWorkspace,
+    ResidualPatch, ResidualPixels, VisibleDifference, VisionDetail, VisionModel, VisionWorkspace,
 };
 use std::cell::RefCell;
 use std::collections::BTreeMap;
@@ -38,18 +37,16 @@ const TEXTURE: [usize; 2] = [1, 2];
 /// picture's numbers hardly differ, and a machine would make much of it.
 const LEAST_DEVIATION: f64 = 0.3;
 
-/// Least amplitude of noise that is told from none, in units of the amplitude that is just too strong.
+/// Visible contrast, in units of the vision model's threshold, that counts as noise of strength 1: near what people
+/// just see in a window. A unit; what is learned takes care of the rest.
+const UNIT: f64 = 3.75;
+/// Least amplitude of noise that is told from none, in that unit.
 const NOISE_FLOOR: f64 = 0.03;
 /// Least light that is told from black, as a share of white.
 const LIGHT_FLOOR: f32 = 0.002;
 /// Exponent from display luminance Y′ to a share of the light of white; close to sRGB's curve, and the same
 /// for all displays.
 const GAMMA: f32 = 2.2;
-/// How often the contrast is corrected; the last correction is not checked. What is left is 8 % at a tenth of the
-/// noise that is too strong, and below 2 % near it.
-const CORRECTIONS: usize = 3;
-/// How a pooled difference grows with contrast before that is known: between weak noise (2.26) and strong.
-const USUAL_GROWTH: f64 = 1.3;
 
 pub(super) const KIND: DescriptorKind = DescriptorKind {
     name: "visible",
@@ -59,55 +56,35 @@ pub(super) const KIND: DescriptorKind = DescriptorKind {
 /// See [`Descriptor::visible`].
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Visible {
-    /// Order of the mean over a tile.
-    order: Order,
-    /// Pooled difference at which noise is just too strong, in units of the vision model.
-    difference: f64,
+    /// Edge of a window, in degrees of visual angle.
+    window: f64,
     /// Share of the picture that is less noisy than what counts as its noise.
     picture_quantile: f64,
 }
 
-/// The order of a mean: 2 to the power of this.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Order(u32);
-
-impl Order {
-    fn number(self) -> f64 {
-        f64::from(1u32 << self.0)
-    }
-
-    fn power(self, x: f64) -> f64 {
-        (0..self.0).fold(x, |x, _| x * x)
-    }
-
-    fn root(self, x: f64) -> f64 {
-        (0..self.0).fold(x, |x, _| x.sqrt())
-    }
-}
-
 impl Default for Visible {
     fn default() -> Self {
-        Self { order: Order(2), difference: 20.0, picture_quantile: 0.875 }
+        Self { window: 0.75, picture_quantile: 0.875 }
     }
 }
 
 impl Visible {
     fn from_parameters(parameters: &BTreeMap<String, f64>) -> Result<Self, String> {
-        let given = |name: &str| parameters.get(name).copied().ok_or(format!("its {name} is missing"));
-        let order = |name: &str| {
-            let number = given(name)?;
-            let order = (0..5).map(Order).find(|order| order.number() == number);
-            order.ok_or(format!("its {name} is {number}, and not 1, 2, 4, 8 or 16"))
+        let within = |name: &str, (low, high): (f64, f64)| {
+            let given = *parameters.get(name).ok_or(format!("its {name} is missing"))?;
+            let fits = (low..=high).contains(&given);
+            if fits { Ok(given) } else { Err(format!("its {name} of {given} is not within {low}…{high}")) }
         };
-        let difference = given("difference")?;
-        if !(1.0..=300.0).contains(&difference) {
-            return Err(format!("its difference of {difference} is not within 1…300"));
-        }
-        let picture_quantile = given("picture_quantile")?;
-        if !(0.0..=1.0).contains(&picture_quantile) {
-            return Err(format!("its picture_quantile of {picture_quantile} is not within 0…1"));
-        }
-        Ok(Self { order: order("order")?, difference, picture_quantile })
+        Ok(Self {
+            window: within("window", (0.1, 10.0))?,
+            picture_quantile: within("picture_quantile", (0.0, 1.0))?,
+        })
+    }
+
+    /// The edge of a window in blocks: odd, so that a block has a window around it.
+    fn window_blocks(self, pixels_per_degree: f64) -> usize {
+        let blocks = self.window * pixels_per_degree / BLOCK as f64;
+        2 * ((blocks - 1.0) / 2.0).round().max(0.0) as usize + 1
     }
 }
 
@@ -117,15 +94,11 @@ impl TileDescriptor for Visible {
     }
 
     fn version(&self) -> u16 {
-        2
+        3
     }
 
     fn parameters(&self) -> BTreeMap<String, f64> {
-        let numbers = [
-            ("order", self.order.number()),
-            ("difference", self.difference),
-            ("picture_quantile", self.picture_quantile),
-        ];
+        let numbers = [("window", self.window), ("picture_quantile", self.picture_quantile)];
         numbers.map(|(name, number)| (name.to_owned(), number)).into()
     }
 
@@ -138,25 +111,68 @@ impl TileDescriptor for Visible {
     }
 
     fn describe(&self, planes: &TilePlanes) -> Result<Vec<f32>, DescriptorError> {
-        // What is not finite is never converged
-        let noise =
-            with_differences(planes, |differences| self.noise(differences).0).unwrap_or(f64::INFINITY);
-        let noise = noise * without_rounding(planes);
-        Ok(vec![noise_number(noise), texture_energy(planes, NoiseMask::default()), light(planes)])
+        Ok(self.describe_tile(planes, 1.0)?.own)
+    }
+
+    /// The first number is that of windows within the tile, until it is seen in its picture.
+    fn describe_tile(&self, planes: &TilePlanes, spp: f64) -> Result<Described, DescriptorError> {
+        let known = without_rounding(planes);
+        let place = planes.place;
+        let blocks = with_differences(planes, |differences| block_sums(differences.contrast_energy(), place));
+        let mut described = Described {
+            own: vec![0.0, texture_energy(planes, NoiseMask::default()), light(planes)],
+            spp,
+            place,
+            window: self.window_blocks(planes.viewing.pixels_per_degree()),
+            blocks: Vec::new(),
+        };
+        // What is not finite is never converged, and says nothing about its neighbours
+        let Some(mut blocks) = blocks else {
+            described.own[0] = noise_number(f64::INFINITY);
+            return Ok(described);
+        };
+        blocks.iter_mut().for_each(|sum| *sum *= (known * known) as f32);
+        described.blocks = blocks;
+        described.own[0] = noise_number(self.worst(std::slice::from_ref(&described))[0]);
+        Ok(described)
+    }
+
+    fn is_sound(&self, tile: &Described) -> bool {
+        let blocks = tile.blocks.is_empty() || tile.blocks.len() == block_count(tile.place);
+        let all_finite = tile.own.iter().chain(&tile.blocks).all(|v| v.is_finite());
+        // A window of ten degrees on a display of 2000 pixels a degree has 5000 blocks
+        tile.own.len() == OWN && blocks && all_finite && (1..10_000).contains(&tile.window)
     }
 
     fn in_picture(&self, tiles: &[Described]) -> Vec<Vec<f32>> {
-        Visible::in_picture(*self, tiles)
+        let mut tiles = tiles.to_vec();
+        let worst = self.worst(&tiles);
+        for (tile, worst) in tiles.iter_mut().zip(worst) {
+            if !tile.blocks.is_empty() {
+                tile.own[0] = noise_number(worst);
+            }
+        }
+        Visible::in_picture(*self, &tiles)
     }
 
-    fn visible_noise(&self, planes: &TilePlanes) -> Option<Array2<f32>> {
-        let (height, width) = (planes.inner.height, planes.inner.width);
-        let map = with_differences(planes, |differences| self.map(differences, (height, width)));
-        Some(map.unwrap_or_else(|| Array2::from_elem((height, width), f32::INFINITY)))
-    }
-
-    fn pooled_visible_noise(&self, raw: &[f32]) -> Option<f32> {
-        Some(amplitude(raw[0]) as f32)
+    fn visible_noise(&self, tiles: &[Described]) -> Option<Vec<Array2<f32>>> {
+        let picture = PictureContrast::new(tiles);
+        let map = |tile: &Described| {
+            let (size, place) = ((tile.place.height, tile.place.width), tile.place);
+            if tile.blocks.is_empty() {
+                return Array2::from_elem(size, f32::INFINITY);
+            }
+            let window = |y, x| picture.around((place.y + y) / BLOCK, (place.x + x) / BLOCK, tile.window);
+            // All pixels of a block have one window around them
+            let mut known = f32::NAN;
+            Array2::from_shape_fn(size, |(y, x)| {
+                if x == 0 || (place.x + x).is_multiple_of(BLOCK) {
+                    known = (window(y, x) / tile.spp).sqrt() as f32;
+                }
+                known
+            })
+        };
+        Some(tiles.iter().map(map).collect())
     }
 
     fn texture(&self) -> &[usize] {
@@ -180,61 +196,25 @@ impl TileDescriptor for Visible {
 }
 
 impl Visible {
-    /// How many times stronger the noise is than noise whose pooled difference is [`Visible::difference`], 0
-    /// without noise; and how differences grow with contrast there. Found on logarithms, by secants:
-    /// differences grow nearly as a power of contrast.
-    fn noise(self, differences: &mut VisibleDifference<'_>) -> (f64, f64) {
-        let mut excess = |contrast: f64| {
-            let pooled = self.pooled(differences.map_at(contrast.exp() as f32));
-            (pooled > 0.0).then(|| (pooled / self.difference).ln())
+    /// How strong the noise is in the worst window around a pixel of each tile, with the samples of the tile.
+    fn worst(self, tiles: &[Described]) -> Vec<f64> {
+        let picture = PictureContrast::new(tiles);
+        let worst = |tile: &Described| {
+            let (rows, columns) = picture.blocks(tile.place);
+            let windows = rows.flat_map(|y| columns.clone().map(move |x| (y, x)));
+            let worst = windows.map(|(y, x)| picture.around(y, x, tile.window)).fold(0.0, f64::max);
+            (worst / tile.spp).sqrt() / UNIT
         };
-        let (mut at, mut growth) = (0.0, USUAL_GROWTH);
-        let Some(mut above) = excess(0.0) else { return (0.0, growth) };
-        for correction in 0..CORRECTIONS {
-            // Beyond ±6, four hundred times too strong or weak, a projection says nothing
-            let next = (at - above / growth).clamp(-6.0, 6.0);
-            if (next - at).abs() < 1e-3 || correction + 1 == CORRECTIONS {
-                return ((-next).exp(), growth);
-            }
-            let Some(there) = excess(next) else { return ((-next).exp(), growth) };
-            growth = ((there - above) / (next - at)).clamp(0.3, 2.3);
-            (at, above) = (next, there);
-        }
-        ((-at).exp(), growth)
-    }
-
-    /// How many times too strong the noise is at each pixel, rows × columns. Its mean of the order `order` ·
-    /// growth is that of the tile. Where noise is much weaker than in the tile's worst place, differences grow
-    /// faster with contrast than they do there, and the map says too little.
-    fn map(self, differences: &mut VisibleDifference<'_>, size: (usize, usize)) -> Array2<f32> {
-        let (noise, growth) = self.noise(differences);
-        // What cannot be told from none is not drawn
-        if noise < NOISE_FLOOR {
-            return Array2::zeros(size);
-        }
-        let band = differences.map_at(noise.recip() as f32);
-        let rows: Vec<&[f32]> = band.rows().collect();
-        let times = |x: f32| (noise * (f64::from(x) / self.difference).powf(growth.recip())) as f32;
-        Array2::from_shape_fn(size, |(y, x)| {
-            let row = rows[(y / band.step).min(rows.len() - 1)];
-            times(row[(x / band.step).min(row.len() - 1)])
-        })
-    }
-
-    /// The mean of high order of a map.
-    fn pooled(self, map: DifferenceBand<'_>) -> f64 {
-        let (columns, rows) = map.size();
-        let sum: f64 = map.rows().map(|row| powers(self.order, row)).sum();
-        self.order.root(sum / (columns * rows) as f64)
+        tiles.iter().map(worst).collect()
     }
 
     /// Appends to each tile's own numbers those of the picture that the tiles make up: a quantile of the amplitudes
     /// of their noise, and the mean of their light, both by area. Noise is what the tile at hand has with its own
     /// samples and the picture would have with as many.
     fn in_picture(self, tiles: &[Described]) -> Vec<Vec<f32>> {
-        let area: f64 = tiles.iter().map(|t| t.area).sum();
-        let light = tiles.iter().map(|t| t.area * f64::from(t.own[2])).sum::<f64>() / area;
-        let of_one_sample = |t: &Described| (amplitude(t.own[0]) * t.spp.sqrt(), t.area);
+        let area: f64 = tiles.iter().map(|t| t.place.pixels() as f64).sum();
+        let light = tiles.iter().map(|t| t.place.pixels() as f64 * f64::from(t.own[2])).sum::<f64>() / area;
+        let of_one_sample = |t: &Described| (amplitude(t.own[0]) * t.spp.sqrt(), t.place.pixels() as f64);
         let mut noises: Vec<(f64, f64)> = tiles.iter().map(of_one_sample).collect();
         noises.sort_by(|a, b| a.0.total_cmp(&b.0));
         let noise = quantile(&noises, self.picture_quantile);
@@ -262,19 +242,6 @@ fn quantile(sorted: &[(f64, f64)], q: f64) -> f64 {
         middle += step;
     }
     last.0
-}
-
-/// The sum of the powers of a row, in eight sums that processors take side by side.
-#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx2", "x86_64+avx2"))]
-fn powers(order: Order, row: &[f32]) -> f64 {
-    let (chunks, rest) = row.as_chunks::<8>();
-    let mut sums = [0.0; 8];
-    for chunk in chunks {
-        let mut powers = chunk.map(f64::from);
-        (0..order.0).for_each(|_| powers.iter_mut().for_each(|x| *x *= *x));
-        sums.iter_mut().zip(powers).for_each(|(sum, x)| *sum += x);
-    }
-    sums.iter().sum::<f64>() + rest.iter().map(|&x| order.power(f64::from(x))).sum::<f64>()
 }
 
 /// What a thread keeps for its next tile: what is constant for a display, and room.

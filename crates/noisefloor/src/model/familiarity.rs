@@ -2,8 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-/// How many times the samples an unfamiliar tile gets: its P is that of the same tile with this fraction of
-/// its samples. Noise falls with samples whatever the texture, so such a tile stops too, at twice what the
+/// How many times the samples a tile gets that is unlike all known ones: its P is that of the same tile with this
+/// fraction of its samples. Noise falls with samples whatever the texture, so such a tile stops too, at twice what the
 /// model expects.
 pub(crate) const CAUTION: f32 = 2.0;
 
@@ -29,6 +29,14 @@ impl Familiarity {
     pub fn includes(&self, numbers: &[f32]) -> bool {
         nearest(&self.zones, numbers) <= self.reach
     }
+
+    /// How unlike all training zones scaled texture numbers are: 0 within reach, 1 from twice the reach on, and in
+    /// proportion between, so that of two tiles that look the same one does not get twice the samples of the other.
+    pub(crate) fn strangeness(&self, numbers: &[f32]) -> f32 {
+        let beyond = nearest(&self.zones, numbers) / self.reach.max(f32::MIN_POSITIVE) - 1.0;
+        // Numbers that are not finite are as strange as can be
+        if beyond.is_nan() { 1.0 } else { beyond.clamp(0.0, 1.0) }
+    }
 }
 
 /// Distance of `point` to the nearest of `others`, which have its length; infinite if there are none.
@@ -50,6 +58,10 @@ mod tests {
             !known.includes(&[1.5, 2.0])
                 && !known.includes(&[f32::NAN, 0.0])
                 && !known.includes(&[1e30, 0.0])
+        );
+        assert_eq!(
+            [1.0, 1.25, 2.0, 7.0, f32::NAN].map(|x| known.strangeness(&[-x, 0.0])),
+            [0.0, 0.25, 1.0, 1.0, 1.0]
         );
         assert_eq!(nearest(&known.zones, &[3.0, 0.0]), 3.0);
         assert_eq!(nearest(&[] as &[Vec<f32>], &[3.0, 0.0]), f32::INFINITY);

@@ -1,16 +1,16 @@
 use super::*;
-use crate::svm::{Platt, Scaler, Svm};
+use crate::svm::{Line, Machine, Platt, Scaler, Svm};
 use proptest::prelude::*;
 
 /// A model that goes by the first number of the default descriptor alone.
 pub(crate) fn small() -> Model {
     let descriptor = Descriptor::default();
     let n = descriptor.dimensions();
-    let mut vectors = vec![0.0; 2 * n];
-    (vectors[0], vectors[n]) = (-1.0, 1.0);
+    let mut weights = vec![0.0; n];
+    weights[0] = -1.0;
     let classifier = Classifier {
         scaler: Scaler::identity(n),
-        svm: Svm { gamma: 0.1, rho: 0.0, coefficients: vec![1.0, -1.0], vectors },
+        machine: Machine::Line(Line { weights, bias: 0.0 }),
         platt: Platt { a: -2.0, b: 0.0 },
     };
     let parts = ModelParts {
@@ -20,6 +20,7 @@ pub(crate) fn small() -> Model {
         tone_mapping: ToneMapping::default(),
         classifier,
         familiarity: None,
+        spread: Some(Spread { scenes: 0.4, people: 0.5 }),
         audience: Audience::TRAINED,
         record: TrainingRecord::default(),
     };
@@ -74,7 +75,8 @@ fn what_is_unfamiliar_is_judged_as_if_it_had_half_the_samples() {
     assert!(!cautious.judge(&tile).unfamiliar && !small().judge(&tile).unfamiliar);
     assert_eq!(cautious.judge(&tile), small().judge(&tile));
 
-    tile[1] += 0.11;
+    // Twice as far as what is familiar
+    tile[1] += 0.21;
     let (careful, careless) = (cautious.judge(&tile), small().judge(&tile));
     assert!(careful.unfamiliar && !careless.unfamiliar);
     let mut halved = tile.clone();
@@ -82,6 +84,13 @@ fn what_is_unfamiliar_is_judged_as_if_it_had_half_the_samples() {
     assert_eq!(careful.probability, small().judge(&halved).probability);
     assert!(careful.probability < careless.probability);
     assert_eq!(careful.probability_without_penalty, careless.probability);
+
+    // Half of the way there, of the penalty too
+    tile[1] -= 0.06;
+    let between = cautious.judge(&tile);
+    let mut fewer = tile.clone();
+    small().descriptor().project(&mut fewer, 0.5f32.sqrt());
+    assert!((between.probability - small().judge(&fewer).probability).abs() < 1e-3, "{between:?}");
 }
 
 #[test]
@@ -127,9 +136,24 @@ fn each_fault_has_its_error() {
 #[test]
 fn contradictions_are_refused() {
     let fails = |change: fn(&mut ModelParts)| changed(small(), change).unwrap_err();
-    assert!(matches!(fails(|m| m.classifier.svm.rho = f32::NAN), ModelError::Invalid(_)));
-    assert!(matches!(fails(|m| m.classifier.svm.gamma = 0.0), ModelError::Invalid(_)));
-    assert!(matches!(fails(|m| m.classifier.svm.vectors.truncate(3)), ModelError::Invalid(_)));
+    let line = |m: &mut ModelParts, weights: Vec<f32>, bias: f32| {
+        m.classifier.machine = Machine::Line(Line { weights, bias })
+    };
+    let svm = |m: &mut ModelParts, gamma: f32, numbers: usize| {
+        let vectors = vec![0.0; numbers];
+        m.classifier.machine = Machine::Svm(Svm { gamma, rho: 0.0, coefficients: vec![1.0], vectors });
+    };
+    let n = small().descriptor().dimensions();
+    let broken = [
+        changed(small(), |m| line(m, vec![0.0; n], f32::NAN)),
+        changed(small(), |m| line(m, vec![0.0; n - 1], 0.0)),
+        changed(small(), |m| svm(m, 0.0, n)),
+        changed(small(), |m| svm(m, 1.0, n - 1)),
+        changed(small(), |m| m.spread = Some(Spread { scenes: 0.0, people: 0.5 })),
+        changed(small(), |m| m.spread = Some(Spread { scenes: 0.3, people: f64::NAN })),
+    ];
+    assert!(broken.into_iter().all(|model| matches!(model, Err(ModelError::Invalid(_)))));
+    assert!(changed(small(), |m| svm(m, 1.0, n)).is_ok());
     assert!(matches!(fails(|m| m.classifier.scaler.mean.clear()), ModelError::Invalid(_)));
     let n = small().descriptor().texture().len();
     let known = |zone: Vec<f32>, reach| Some(Familiarity { zones: vec![zone], reach });
@@ -155,11 +179,11 @@ fn a_descriptor_that_is_not_here_is_refused() {
     assert!(matches!(read(|f| f.descriptor_version = 99), ModelError::Descriptor { needed: 99, .. }));
     let unknown = read(|f| f.descriptor.name = "tea-leaves".into());
     assert!(
-        unknown.to_string().contains("tea-leaves") && unknown.to_string().contains("compact"),
+        unknown.to_string().contains("tea-leaves") && unknown.to_string().contains("mask-pair"),
         "{unknown}"
     );
     let empty = read(|f| f.descriptor.parameters.clear());
-    assert!(empty.to_string().contains("difference"), "{empty}");
+    assert!(empty.to_string().contains("window"), "{empty}");
 }
 
 proptest! {

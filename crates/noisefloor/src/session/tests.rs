@@ -97,7 +97,8 @@ fn one_verdict_is_not_a_streak() {
 
 #[test]
 fn a_demanding_audience_gets_more() {
-    let params = Params { audience: Audience::ART_STUDENTS, max_spp: 1200, ..steps_of_10() };
+    let params =
+        Params { audience: Audience { slope: 1.94, offset: -346.0 }, max_spp: 1200, ..steps_of_10() };
     // 1.94·300 − 346 = 236 → 300; 1.94·600 − 346 = 818; 1.94·900 − 346 = 1400 → the limit.
     let mut s = session(300, true, params);
     let stops = run(&mut s);

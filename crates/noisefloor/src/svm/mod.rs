@@ -1,18 +1,20 @@
-//! The support vector machine: prediction; training behind the feature `train`.
+//! What decides, a line or a support vector machine: prediction; training of the latter behind the feature `train`.
 
 mod classifier;
 #[cfg(feature = "train")]
 mod gram;
+mod line;
 #[cfg(feature = "train")]
 mod params;
-mod platt;
+pub(crate) mod platt;
 mod predict;
 #[cfg(feature = "train")]
 mod solver;
 #[cfg(feature = "train")]
 mod train;
 
-pub use classifier::Classifier;
+pub use classifier::{Classifier, Machine};
+pub use line::Line;
 pub use platt::Platt;
 pub use predict::{Scaler, Svm};
 #[cfg(feature = "train")]

@@ -14,9 +14,17 @@ pub struct Platt {
 impl Platt {
     /// Probability in [0, 1].
     pub fn probability(&self, decision: f32) -> f32 {
-        let z = f64::from(self.a) * f64::from(decision) + f64::from(self.b);
-        (1.0 / (1.0 + z.exp())) as f32
+        from_log_odds(self.log_odds(decision))
     }
+
+    /// ln(P/(1 − P)).
+    pub fn log_odds(&self, decision: f32) -> f64 {
+        -(f64::from(self.a) * f64::from(decision) + f64::from(self.b))
+    }
+}
+
+pub(crate) fn from_log_odds(log_odds: f64) -> f32 {
+    (1.0 / (1.0 + (-log_odds).exp())) as f32
 }
 
 #[cfg(test)]

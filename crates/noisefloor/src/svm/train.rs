@@ -60,14 +60,16 @@ fn fit_linfa(
 const OBSERVERS: usize = 40;
 
 /// Fits the sigmoid to (decision value, probability that an observer sees no difference) of examples that the
-/// machine has not been trained on: each is put to 40 observers, of whom that share agrees (Platt 1999;
-/// Newton's method of Lin, Lin and Weng 2007 in linfa).
+/// machine has not been trained on: each is put to 40 observers, of whom that share agrees, or to one if all shares are
+/// 0 or 1 (Platt 1999; Newton's method of Lin, Lin and Weng 2007 in linfa).
 ///
 /// # Errors
 /// [`SvmTrainError::Platt`] if the fit does not converge.
 pub fn fit_platt(examples: &[(f32, f64)]) -> Result<Platt, SvmTrainError> {
+    // The fewer there are, the less do sums round: linfa takes a gradient of 10⁻⁵ for the minimum, however many add to it
+    let observers = if examples.iter().all(|&(_, p)| p == 0.0 || p == 1.0) { 1 } else { OBSERVERS };
     let each = |&(decision, p): &(f32, f64)| {
-        (0..OBSERVERS).map(move |i| (f64::from(decision), (i as f64 + 0.5) / (OBSERVERS as f64) < p))
+        (0..observers).map(move |i| (f64::from(decision), (i as f64 + 0.5) / (observers as f64) < p))
     };
     let (decisions, agree): (Vec<f64>, Vec<bool>) = examples.iter().flat_map(each).unzip();
     let params = LinfaPlatt::<f64, ()>::params();

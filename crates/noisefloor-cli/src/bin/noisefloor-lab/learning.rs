@@ -3,7 +3,7 @@
 use anyhow::Context;
 use indicatif::ProgressBar;
 use noisefloor::{
-    Threshold, Viewing,
+    People, Viewing,
     descriptor::{Descriptor, DescriptorSpec},
     evidence::Evidence,
     svm::SvmParams,
@@ -131,13 +131,9 @@ fn open(path: &Path) -> anyhow::Result<BufReader<File>> {
 }
 
 /// Predictions on left-out scenes, with a bar.
-pub fn held_out(
-    table: &Table,
-    params: &TrainParams,
-    threshold: Threshold,
-) -> anyhow::Result<Vec<Prediction>> {
+pub fn held_out(table: &Table, params: &TrainParams, people: People) -> anyhow::Result<Vec<Prediction>> {
     let bar = LeftOut::new(table);
-    let predictions = leave_one_scene_out(table, params, threshold, |group| bar.show(group))?;
+    let predictions = leave_one_scene_out(table, params, people, |group| bar.show(group))?;
     bar.0.finish_and_clear();
     Ok(predictions)
 }
@@ -146,10 +142,10 @@ pub fn held_out(
 pub fn chosen_and_held_out(
     table: &Table,
     params: &TrainParams,
-    threshold: Threshold,
+    people: People,
 ) -> anyhow::Result<(Vec<Prediction>, Vec<Chosen>)> {
     let bar = LeftOut::new(table);
-    let result = choose_and_leave_out(&choices(table)?, params, threshold, |group| bar.show(group))?;
+    let result = choose_and_leave_out(&choices(table)?, params, people, |group| bar.show(group))?;
     bar.0.finish_and_clear();
     Ok(result)
 }

@@ -1,5 +1,7 @@
 //! `noisefloor inspect` and `noisefloor scenes`.
 
+use noisefloor::oracle::Spread;
+use noisefloor::svm::Machine;
 use noisefloor::{
     Audience, Model, ToneMapping,
     descriptor::DescriptorSpec,
@@ -25,8 +27,12 @@ struct Summary<'a> {
     numbers: usize,
     evidence: Evidence,
     tone_mapping: ToneMapping,
-    support_vectors: usize,
-    gamma: f32,
+    /// `line` or `svm`.
+    machine: &'static str,
+    /// Of an svm.
+    support_vectors: Option<usize>,
+    /// How thresholds scatter around what the model expects, as standard deviations of ln(samples).
+    spread: Option<Spread>,
     /// Zones whose texture is familiar, and how far around them it still is, in standard deviations; null
     /// if all is.
     familiar_zones: Option<usize>,
@@ -37,7 +43,7 @@ struct Summary<'a> {
 
 impl<'a> Summary<'a> {
     fn of(model: &'a Model) -> Self {
-        let (descriptor, svm, record) = (model.descriptor(), &model.classifier().svm, model.record());
+        let (descriptor, machine, record) = (model.descriptor(), &model.classifier().machine, model.record());
         Self {
             digest: model.digest(),
             descriptor: descriptor.spec(),
@@ -45,8 +51,12 @@ impl<'a> Summary<'a> {
             numbers: descriptor.dimensions(),
             evidence: model.evidence(),
             tone_mapping: model.tone_mapping(),
-            support_vectors: svm.coefficients.len(),
-            gamma: svm.gamma,
+            machine: machine.name(),
+            support_vectors: match machine {
+                Machine::Line(_) => None,
+                Machine::Svm(svm) => Some(svm.coefficients.len()),
+            },
+            spread: model.spread(),
             familiar_zones: model.familiarity().map(|f| f.zones.len()),
             familiar_reach: model.familiarity().map(|f| f.reach),
             audience: model.audience(),
@@ -94,14 +104,16 @@ fn say_all(summary: &Summary<'_>) -> Result<(), NotSaid> {
         }
     )?;
     // Logistic regression is kept as two support vectors of a kernel too wide to bend
-    let line = if summary.support_vectors == 2 { " (a straight line)" } else { "" };
-    say!(
-        "machine          RBF kernel, C = {}, γ = {}; {} support vectors{line}, of {} examples",
-        record.c,
-        record.gamma,
-        summary.support_vectors,
-        record.examples
-    )?;
+    let machine = match summary.support_vectors {
+        None => "straight line".to_owned(),
+        Some(count) => format!("RBF kernel with {count} support vectors, γ = {}", record.gamma),
+    };
+    say!("machine          {machine}, C = {}, of {} examples", record.c, record.examples)?;
+    if let Some(Spread { scenes, people }) = summary.spread {
+        say!(
+            "thresholds       scatter by {scenes:.2} between scenes and {people:.2} between people, in ln(samples)"
+        )?;
+    }
     if let (Some(zones), Some(reach)) = (summary.familiar_zones, summary.familiar_reach) {
         say!("familiar         {zones} zones, and textures within {reach:.3} standard deviations of them")?;
     }

@@ -1,7 +1,7 @@
 //! What a render is, as a value: arguments, frames, farm plans and shards are made of it.
 
 use noisefloor::viewing::Viewing;
-use noisefloor::{Audience, FixedSpp, Oracle, Params, Schedule, StoppingCriterion, Threshold};
+use noisefloor::{Audience, FixedSpp, Oracle, Params, People, Schedule, StoppingCriterion};
 use noisefloor_cli::folder::Earlier;
 use noisefloor_cli::options::oracle::load_model;
 use noisefloor_cli::options::tone::Tone;
@@ -32,7 +32,10 @@ pub enum CriterionJob {
     Oracle {
         /// By default the bundled one.
         model: Option<JobPath>,
-        threshold: Threshold,
+        people: People,
+        /// How much the thresholds of these people scatter, where they were measured.
+        #[serde(default)]
+        scatter: Option<f64>,
     },
     Spp(u64),
     /// By the picture that Open Image Denoise makes, of which a tile may lose so many JODs.
@@ -78,8 +81,12 @@ impl RenderJob {
     /// Reads model and LUT.
     pub fn read(&self) -> anyhow::Result<Ready> {
         let oracle = match &self.criterion {
-            CriterionJob::Oracle { model, threshold } => {
-                Some(Oracle::new(load_model(model.as_deref())?, *threshold))
+            CriterionJob::Oracle { model, people, scatter } => {
+                let oracle = Oracle::new(load_model(model.as_deref())?, *people);
+                Some(match scatter {
+                    Some(scatter) => oracle.with_scatter(*scatter),
+                    None => oracle,
+                })
             }
             _ => None,
         };

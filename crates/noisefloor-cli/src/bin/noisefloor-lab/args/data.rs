@@ -1,9 +1,9 @@
 //! Options about human thresholds, and about training on them.
 
 use crate::learning::{DataJob, DataSource, SearchJob};
-use anyhow::{Context, bail};
+use anyhow::bail;
 use clap::{Args, ValueEnum};
-use noisefloor::descriptor::{Descriptor, NoiseMask};
+use noisefloor::descriptor::Descriptor;
 use noisefloor_cli::options::oracle::EvidenceChoice;
 use noisefloor_cli::options::viewing::ViewingArgs;
 use noisefloor_learn::Learner;
@@ -24,15 +24,9 @@ pub struct DataArgs {
 /// How to train.
 #[derive(Debug, Args)]
 pub struct SearchArgs {
-    /// What is computed from a tile (for --corpus; a table has its own).
-    #[arg(long, value_enum, default_value_t = DescriptorChoice::Visible)]
-    pub(super) descriptor: DescriptorChoice,
     /// What is trained [default: line for the visible descriptor, svm for others].
     #[arg(long, value_enum)]
     pub(super) machine: Option<MachineChoice>,
-    /// σ of the noise mask of the compact descriptor, 0.3…1.5 pixels (for --corpus; a table has its own).
-    #[arg(long, default_value_t = 1.0, value_name = "PIXELS")]
-    pub(super) sigma: f32,
     /// What tiles are compared with (for --corpus; a table has its own).
     #[arg(long, value_enum, default_value_t = EvidenceChoice::Halves)]
     pub(super) evidence: EvidenceChoice,
@@ -55,26 +49,13 @@ pub enum MachineChoice {
     Line,
 }
 
-/// The descriptors that models can be trained with.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum DescriptorChoice {
-    /// How many times too strong the noise is by a model of human vision, in the tile and its picture.
-    Visible,
-    /// Visible noise by constants of our own; knows no viewing conditions.
-    Compact,
-}
-
 /// What to learn from or to score, and how to train on it.
 pub(super) fn check_data(data: DataArgs, search: SearchArgs) -> anyhow::Result<(DataJob, SearchJob)> {
-    let mask = NoiseMask::try_from(search.sigma).context("--sigma")?;
     let source = match data.table {
         Some(path) => DataSource::Table(path),
         None => DataSource::Corpora(data.corpus),
     };
-    let descriptor = match search.descriptor {
-        DescriptorChoice::Visible => Descriptor::visible(),
-        DescriptorChoice::Compact => Descriptor::compact(mask),
-    };
+    let descriptor = Descriptor::visible();
     let (evidence, viewing) = (search.evidence.into(), search.viewing.or_default());
     let learner = search.machine.map(|machine| match machine {
         MachineChoice::Svm => Learner::Svm,

@@ -2,7 +2,7 @@
 
 use super::data::{DataArgs, SearchArgs};
 use clap::Args;
-use noisefloor::Threshold;
+use noisefloor::People;
 use noisefloor_cli::options::values;
 use noisefloor_rivals::Rival;
 use std::path::PathBuf;
@@ -35,9 +35,9 @@ pub struct EvaluateArgs {
     /// or a corpus.
     #[arg(long, conflicts_with_all = ["model", "leave_one_scene_out", "without", "rivals"])]
     nested: bool,
-    /// A tile has converged when P reaches this.
-    #[arg(long, default_value_t = Threshold::PAPER, value_name = "P")]
-    threshold: Threshold,
+    /// Share of people who are to see no noise where a tile stops.
+    #[arg(long, default_value_t = People::DEFAULT, value_name = "SHARE")]
+    people: People,
     /// Write the scores as JSON.
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
@@ -79,7 +79,7 @@ impl EvaluateArgs {
             data,
             search,
             model,
-            threshold: self.threshold,
+            people: self.people,
             json: self.json,
             csv: self.csv,
             figures: self.figures,

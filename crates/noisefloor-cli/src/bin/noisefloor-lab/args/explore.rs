@@ -34,7 +34,7 @@ pub struct ExploreArgs {
     oracle: OracleArgs,
     #[command(flatten)]
     viewing: ViewingArgs,
-    /// For whom: `observers`, `art-students`, or a,b for T' = a T + b [default: see --eyes].
+    /// For whom: `observers`, `art-students`, a factor on samples, or a,b for T' = a T + b [default: see --eyes].
     #[arg(long, value_name = "WHO", value_parser = values::audience)]
     audience: Option<Audience>,
     #[command(flatten)]
@@ -66,7 +66,7 @@ impl ExploreArgs {
         let own = eyes.as_ref().map_or(Audience::TRAINED, Person::audience);
         let setup = noisefloor_study::explore::ExploreSetup {
             model: oracle.model().clone(),
-            threshold: oracle.threshold(),
+            people: oracle.people(),
             audience: self.audience.unwrap_or(own),
             viewing: match &eyes {
                 Some(person) => person.viewing(),

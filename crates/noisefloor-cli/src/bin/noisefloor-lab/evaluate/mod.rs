@@ -5,7 +5,7 @@ mod tables;
 
 use crate::learning::{DataJob, SearchJob, chosen_and_held_out, held_out};
 use anyhow::{anyhow, bail};
-use noisefloor::{Model, Threshold};
+use noisefloor::{Model, People};
 use noisefloor_cli::files::write_json;
 use noisefloor_cli::say::say;
 use noisefloor_image::{check_writable, write_csv};
@@ -21,7 +21,7 @@ pub struct EvaluateJob {
     pub search: SearchJob,
     /// None to leave out one scene after the other.
     pub model: Option<Model>,
-    pub threshold: Threshold,
+    pub people: People,
     pub json: Option<PathBuf>,
     pub csv: Option<PathBuf>,
     pub figures: Option<PathBuf>,
@@ -87,11 +87,11 @@ fn table(job: &EvaluateJob) -> anyhow::Result<Table> {
 /// Who predicts, and what.
 fn predict_zones(job: &EvaluateJob, table: &Table, params: &TrainParams) -> anyhow::Result<Predicted> {
     if job.nested {
-        let (predictions, choices) = chosen_and_held_out(table, params, job.threshold)?;
+        let (predictions, choices) = chosen_and_held_out(table, params, job.people)?;
         return Ok(Predicted { by: "nested leave-one-scene-out".to_owned(), predictions, choices });
     }
     let Some(model) = &job.model else {
-        let predictions = held_out(table, params, job.threshold)?;
+        let predictions = held_out(table, params, job.people)?;
         return Ok(Predicted { by: "leave-one-scene-out".to_owned(), predictions, choices: Vec::new() });
     };
     if (model.descriptor(), model.evidence()) != (&table.descriptor, table.evidence) {
@@ -104,7 +104,7 @@ fn predict_zones(job: &EvaluateJob, table: &Table, params: &TrainParams) -> anyh
             table.evidence
         );
     }
-    let predictions = table.zones.iter().map(|z| predict(|raw| model.judge(raw), job.threshold, z)).collect();
+    let predictions = table.zones.iter().map(|z| predict(|raw| model.judge(raw), job.people, z)).collect();
     Ok(Predicted { by: model.digest(), predictions, choices: Vec::new() })
 }
 

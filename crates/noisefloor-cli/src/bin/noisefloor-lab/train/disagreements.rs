@@ -2,7 +2,7 @@
 
 use super::{TrainJob, say_model, say_scores};
 use anyhow::bail;
-use noisefloor::{Model, Threshold};
+use noisefloor::{Model, People};
 use noisefloor_cli::bars::bar;
 use noisefloor_cli::say::{note, say};
 use noisefloor_image::write_atomic;
@@ -40,7 +40,7 @@ pub(super) fn run(
         bar.set_position(step.done as u64);
         bar.set_message(step.doing);
     };
-    let base = (&Model::bundled(), Threshold::PAPER);
+    let base = (&Model::bundled(), People::DEFAULT);
     let (model, learned) = retrain(table, answers, params, base, &job.data.origin(), on_step)?;
     bar.finish_and_clear();
     write_atomic(&job.out, |to| model.write(to))?;

@@ -3,7 +3,7 @@
 mod disagreements;
 
 use crate::learning::{DataJob, SearchJob, held_out};
-use noisefloor::{Model, Threshold, model::Scores};
+use noisefloor::{Model, People, model::Scores, svm::Machine};
 use noisefloor_cli::say::{NotSaid, note, say};
 use noisefloor_image::{check_writable, write_atomic};
 use noisefloor_learn::{score, train, write_table};
@@ -43,7 +43,7 @@ pub fn run(job: &TrainJob) -> anyhow::Result<()> {
     let scores = if !job.scores || table.groups().len() < 3 {
         None
     } else {
-        let predictions = held_out(&table, &params, Threshold::PAPER)?;
+        let predictions = held_out(&table, &params, People::DEFAULT)?;
         Some(score(predictions.iter()))
     };
     note!("training on all scenes");
@@ -56,8 +56,11 @@ pub fn run(job: &TrainJob) -> anyhow::Result<()> {
 
 fn say_model(model: &Model, out: &Path) -> Result<(), NotSaid> {
     say!(
-        "{} support vectors of {} examples, C = {}, γ = {}; written to {}",
-        model.classifier().svm.coefficients.len(),
+        "{} from {} examples, C = {}, γ = {}; written to {}",
+        match &model.classifier().machine {
+            Machine::Line(_) => "a line".to_owned(),
+            Machine::Svm(svm) => format!("{} support vectors", svm.coefficients.len()),
+        },
         model.record().examples,
         model.record().c,
         model.record().gamma,

@@ -124,6 +124,10 @@ impl JudgeArgs {
         let oracle = self.oracle.check()?;
         let said = [("--viewing", self.viewing.typed().is_some())];
         let eyes = self.eyes.of(self.oracle.model.as_deref(), &said)?;
+        let oracle = match &eyes {
+            Some(person) => oracle.with_scatter(person.uncertainty()),
+            None => oracle,
+        };
         let viewing = match &eyes {
             Some(person) => person.viewing(),
             None => self.viewing.judged_by(&oracle)?,

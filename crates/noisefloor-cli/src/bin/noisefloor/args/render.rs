@@ -200,8 +200,9 @@ impl RenderArgs {
             }
             (Some(_), _) => CriterionJob::Denoised { lost: self.verdicts.lost },
             (None, CriterionChoice::Oracle) => {
-                let OracleArgs { model, threshold } = self.oracle;
-                CriterionJob::Oracle { model: model.map(JobPath), threshold }
+                let OracleArgs { model, people, .. } = self.oracle;
+                let scatter = eyes.as_ref().map(Person::uncertainty);
+                CriterionJob::Oracle { model: model.map(JobPath), people, scatter }
             }
             (None, CriterionChoice::Fixed(samples)) => CriterionJob::Spp(samples),
             (None, CriterionChoice::Rival(spec)) => CriterionJob::Rival(spec),

@@ -29,8 +29,8 @@ pub struct VerdictArgs {
         value_parser = values::jods
     )]
     pub lost: f64,
-    /// For whom: `observers` (those of the training data), `art-students` (T' = 1.94 T - 346), or a,b for
-    /// T' = a T + b [default: see --eyes].
+    /// For whom: `observers` (those of the training data), `art-students` (1.8 times the samples), a
+    /// factor on samples, or a,b for T' = a T + b [default: see --eyes].
     #[arg(long, value_name = "WHO", value_parser = values::audience)]
     pub audience: Option<Audience>,
     /// No tile stops before this many samples per pixel [default: 16, or one batch with --batch or

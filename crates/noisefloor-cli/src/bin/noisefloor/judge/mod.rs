@@ -6,6 +6,7 @@ mod report;
 pub use denoised::DenoisedJob;
 
 use anyhow::{Context, bail};
+use noisefloor::descriptor::Described;
 use noisefloor::{
     Audience, Oracle, Tile, TileGrid, ToneMapping, Verdict, Viewing,
     evidence::{Evidence, Samples},
@@ -89,9 +90,10 @@ fn judge_noise(job: &JudgeJob) -> anyhow::Result<()> {
             grid.len()
         );
     }
-    let rows = judge(job, grid, &held, &unlike)?;
+    let described = held.describe(&job.oracle, grid)?;
+    let rows = judge(job, grid, &described, &unlike)?;
     report::say_all((&job.image.0, image.spp), &job.oracle, &rows, job.json)?;
-    draw(job, &image, grid, &held, &rows)
+    draw(job, &image, grid, (&held, &described), &rows)
 }
 
 /// A picture that can be judged; errors name it.
@@ -116,7 +118,7 @@ fn read((path, spp): &(PathBuf, Option<f64>)) -> anyhow::Result<Still> {
 fn judge(
     job: &JudgeJob,
     grid: TileGrid,
-    held: &SnapshotPair<'_>,
+    described: &[Described],
     unlike: &[bool],
 ) -> anyhow::Result<Vec<Row>> {
     let row = |(tile, verdict): (Tile, Verdict)| {
@@ -139,8 +141,7 @@ fn judge(
             unlike,
         }
     };
-    let described = held.describe(&job.oracle, grid)?;
-    let verdicts = job.oracle.judge_described_for(&described, job.audience);
+    let verdicts = job.oracle.judge_described_for(described, job.audience);
     let verdicts = verdicts
         .context("this model cannot judge for other eyes than those it has learned from; --eyes none")?;
     Ok(grid.tiles().zip(verdicts).map(row).collect())
@@ -151,13 +152,12 @@ fn draw(
     job: &JudgeJob,
     image: &Still,
     grid: TileGrid,
-    held: &SnapshotPair<'_>,
+    (held, described): (&SnapshotPair<'_>, &[Described]),
     rows: &[Row],
 ) -> anyhow::Result<()> {
     let width = grid.width();
     let wants_noise = job.noise_map.is_some() || job.exr.is_some();
-    let noise =
-        if wants_noise { job.oracle.map_visible_noise(grid, |t| held.planes(t).map(Some))? } else { None };
+    let noise = wants_noise.then(|| job.oracle.map_visible_noise(grid, described, job.audience)).flatten();
     if let (Some(path), Some(noise)) = (&job.noise_map, &noise) {
         draw_field(&Canvas::of_picture(width, &held.shown()), noise, &NOISE_SCALE).save(path)?;
     }

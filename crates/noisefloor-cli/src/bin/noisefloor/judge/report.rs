@@ -1,6 +1,6 @@
 //! Verdicts as a table or as JSON.
 
-use noisefloor::{Oracle, Threshold, criterion::ExpectedThreshold};
+use noisefloor::{Oracle, People, criterion::ExpectedThreshold};
 use noisefloor_cli::say::{NotSaid, say, say_json};
 use serde::Serialize;
 use std::path::Path;
@@ -31,7 +31,7 @@ struct Report<'a> {
     image: &'a Path,
     spp: f64,
     model: String,
-    threshold: Threshold,
+    people: People,
     converged_tiles: usize,
     unfamiliar_tiles: usize,
     tiles: &'a [Row],
@@ -48,7 +48,7 @@ pub(super) fn say_all(
         image,
         spp,
         model: oracle.model().digest(),
-        threshold: oracle.threshold(),
+        people: oracle.people(),
         converged_tiles: rows.iter().filter(|r| r.converged).count(),
         unfamiliar_tiles: rows.iter().filter(|r| r.unfamiliar).count(),
         tiles: rows,
@@ -84,11 +84,11 @@ fn say_table(report: &Report<'_>) -> Result<(), NotSaid> {
         )?;
     }
     say!(
-        "{} of {} tiles converged at {} spp (P ≥ {})",
+        "{} of {} tiles converged at {} spp: {} of people see no noise there",
         report.converged_tiles,
         report.tiles.len(),
         report.spp,
-        report.threshold
+        report.people
     )?;
     if report.unfamiliar_tiles > 0 {
         say!(

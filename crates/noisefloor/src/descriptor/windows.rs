@@ -1,0 +1,184 @@
+//! Means of the squared visible contrast over windows of the picture, whatever tiles it is divided into.
+//!
+//! Squares of contrast are summed over blocks of the picture; a tile keeps its share of each block that it has pixels
+//! of. The blocks of all tiles make up those of the picture, and summed-area tables (Crow 1984, "Summed-area tables
+//! for texture mapping") give the mean over any window of them.
+
+use super::kind::Described;
+use crate::tile::Tile;
+use noisefloor_vision::DifferenceBand;
+use std::ops::Range;
+
+/// Edge of a block in pixels of the picture, from its top left on: a seventh of a window on a monitor.
+pub(super) const BLOCK: usize = 4;
+
+/// Columns or rows of blocks that pixels from..from + count lie in.
+fn blocks_of(from: usize, count: usize) -> Range<usize> {
+    from / BLOCK..(from + count).div_ceil(BLOCK)
+}
+
+/// How many blocks a tile has pixels of.
+pub(super) fn block_count(place: Tile) -> usize {
+    blocks_of(place.x, place.width).len() * blocks_of(place.y, place.height).len()
+}
+
+/// The sums of a map over the pixels of a tile, by block of the picture, row by row.
+pub(super) fn block_sums(map: DifferenceBand<'_>, place: Tile) -> Vec<f32> {
+    let columns = blocks_of(place.x, place.width);
+    let mut sums = vec![0.0; block_count(place)];
+    let rows: Vec<&[f32]> = map.rows().collect();
+    for y in 0..place.height {
+        // A map may have a value for several pixels, and begin up to a value before the tile
+        let row = rows[(y / map.step).min(rows.len() - 1)];
+        let of_row = ((place.y + y) / BLOCK - place.y / BLOCK) * columns.len();
+        let sums = &mut sums[of_row..of_row + columns.len()];
+        for x in 0..place.width {
+            sums[(place.x + x) / BLOCK - columns.start] += row[(x / map.step).min(row.len() - 1)];
+        }
+    }
+    sums
+}
+
+/// Squared visible contrast, of one sample per pixel, over a picture.
+pub(super) struct PictureContrast {
+    rows: Range<usize>,
+    columns: Range<usize>,
+    /// Sums of squares, and pixels, of all blocks above and to the left: one row and column more than blocks.
+    tables: Vec<[f64; 2]>,
+}
+
+impl PictureContrast {
+    /// Of the tiles that there are. Where none is known, windows are means of what they have of others.
+    pub(super) fn new(tiles: &[Described]) -> Self {
+        let known = || tiles.iter().filter(|t| !t.blocks.is_empty());
+        let hull = |of: fn(Tile) -> Range<usize>| {
+            let start = known().map(|t| of(t.place).start).min().unwrap_or(0);
+            start..known().map(|t| of(t.place).end).max().unwrap_or(0)
+        };
+        let rows = hull(|t| blocks_of(t.y, t.height));
+        let columns = hull(|t| blocks_of(t.x, t.width));
+        let stride = columns.len() + 1;
+        let mut tables = vec![[0.0; 2]; (rows.len() + 1) * stride];
+        for tile in known() {
+            let place = tile.place;
+            let (of_rows, of_columns) = (blocks_of(place.y, place.height), blocks_of(place.x, place.width));
+            let mut sums = tile.blocks.iter();
+            for y in of_rows {
+                let height = overlap(y, place.y, place.height);
+                for x in of_columns.clone() {
+                    let entry = &mut tables[(y - rows.start + 1) * stride + x - columns.start + 1];
+                    let sum = sums.next().copied().unwrap_or(0.0);
+                    entry[0] += f64::from(sum) * tile.spp;
+                    entry[1] += (height * overlap(x, place.x, place.width)) as f64;
+                }
+            }
+        }
+        for y in 1..=rows.len() {
+            let mut along = [0.0; 2];
+            for x in 1..stride {
+                let at = y * stride + x;
+                for of in 0..2 {
+                    along[of] += tables[at][of];
+                    tables[at][of] = along[of] + tables[at - stride][of];
+                }
+            }
+        }
+        Self { rows, columns, tables }
+    }
+
+    /// The blocks of a tile, as rows and columns.
+    pub(super) fn blocks(&self, place: Tile) -> (Range<usize>, Range<usize>) {
+        (blocks_of(place.y, place.height), blocks_of(place.x, place.width))
+    }
+
+    /// The mean over a window of `edge` blocks around a block; at the edge of the picture, over the nearest window
+    /// that lies in it.
+    pub(super) fn around(&self, row: usize, column: usize, edge: usize) -> f64 {
+        let span = |at: usize, of: &Range<usize>| {
+            let edge = edge.min(of.len());
+            let start = (at - of.start).saturating_sub(edge / 2).min(of.len() - edge);
+            (start, start + edge)
+        };
+        if self.rows.is_empty() || !self.rows.contains(&row) || !self.columns.contains(&column) {
+            return 0.0;
+        }
+        let ((top, bottom), (left, right)) = (span(row, &self.rows), span(column, &self.columns));
+        let stride = self.columns.len() + 1;
+        let sum = |of: usize| {
+            let at = |y: usize, x: usize| self.tables[y * stride + x][of];
+            at(bottom, right) - at(top, right) - at(bottom, left) + at(top, left)
+        };
+        let pixels = sum(1);
+        // Differences of sums may miss 0 by their rounding
+        if pixels > 0.0 { (sum(0) / pixels).max(0.0) } else { 0.0 }
+    }
+}
+
+/// Pixels of a block that lie within from..from + count.
+fn overlap(block: usize, from: usize, count: usize) -> usize {
+    ((block + 1) * BLOCK).min(from + count) - (block * BLOCK).max(from)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tile::TileGrid;
+    use proptest::prelude::*;
+
+    /// A picture of these squares, divided into tiles of `edge`, with samples of their own.
+    fn divided(size: (usize, usize), edge: usize, square: impl Fn(usize, usize) -> f32) -> Vec<Described> {
+        let describe = |place: Tile| {
+            let spp = 16.0 * (place.index % 3 + 1) as f64;
+            let mut blocks = vec![0.0; block_count(place)];
+            let columns = blocks_of(place.x, place.width);
+            for y in place.y..place.y + place.height {
+                for x in place.x..place.x + place.width {
+                    let row = (y / BLOCK - place.y / BLOCK) * columns.len();
+                    blocks[row + x / BLOCK - columns.start] += square(x, y) / spp as f32;
+                }
+            }
+            Described { own: vec![0.0; 3], spp, place, window: 7, blocks }
+        };
+        TileGrid::new(size.0, size.1, edge).unwrap().tiles().map(describe).collect()
+    }
+
+    proptest! {
+        /// Whatever the tiles and their samples, a window has the mean of its pixels.
+        #[test]
+        fn windows_do_not_know_tiles(
+            (width, height) in (1usize..90, 1usize..70), edge in 16usize..50, window in 0usize..6, seed: u32,
+        ) {
+            let window = 2 * window + 1;
+            let square = |x: usize, y: usize| {
+                let hash = (x as u32 * 92_821 ^ y as u32 * 68_917 ^ seed).wrapping_mul(0x9E37_79B1) >> 16;
+                hash as f32 / 65_536.0
+            };
+            let picture = PictureContrast::new(&divided((width, height), edge, square));
+            let (rows, columns) = (height.div_ceil(BLOCK), width.div_ceil(BLOCK));
+            for (row, column) in [(0, 0), (rows / 2, columns / 3), (rows - 1, columns - 1)] {
+                let span = |at: usize, all: usize| {
+                    let edge = window.min(all);
+                    let start = at.saturating_sub(window.min(all) / 2).min(all - edge);
+                    start * BLOCK..(start + edge) * BLOCK
+                };
+                let (ys, xs) = (span(row, rows), span(column, columns));
+                let inside = ys.flat_map(|y| xs.clone().map(move |x| (x, y)));
+                let values: Vec<f64> =
+                    inside.filter(|&(x, y)| x < width && y < height).map(|(x, y)| square(x, y).into()).collect();
+                let mean = values.iter().sum::<f64>() / values.len() as f64;
+                let found = picture.around(row, column, window);
+                prop_assert!((found - mean).abs() < 1e-5 * mean.max(1e-3), "{found} {mean}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_gap_is_not_noise_and_a_picture_without_tiles_has_none() {
+        let mut tiles = divided((64, 32), 32, |_, _| 2.0);
+        tiles[0].blocks.clear();
+        let picture = PictureContrast::new(&tiles);
+        assert_eq!(picture.around(0, 0, 7), 0.0);
+        assert!((picture.around(0, 8, 7) - 2.0).abs() < 1e-6);
+        assert_eq!(PictureContrast::new(&[]).around(0, 0, 7), 0.0);
+    }
+}
