@@ -62,12 +62,6 @@ def unseen():
     return evaluate("--leave-one-scene-out")[0]
 
 
-def compact():
-    """The compact descriptor, with one C and γ: the search takes a minute."""
-    options = ["--leave-one-scene-out", "--c", "0.3", "--gamma", "0.01"]
-    return evaluate(*options, table="fixtures/human-compact.csv")[0]
-
-
 def nine_scenes():
     """Error over the scenes of LISIC."""
     zones = [z for z in evaluate("--nested", table="fixtures/human-choices.csv")[1] if "-view" not in z["scene"]]
@@ -160,6 +154,19 @@ def scores_of(prefix, scores):
     }
 
 
+def below_the_mean():
+    """Share of zones that stop below what the mean person asked for."""
+    zones = evaluate("--nested", table="fixtures/human-choices.csv")[1]
+    return share(statistics.mean(float(z["stop_spp"]) < float(z["human_spp"]) for z in zones))
+
+
+def to_95_percent(people):
+    """From the mean observer to 95 % of people, in samples: thresholds are normal in ln(spp), and their mean exp(s^2/2)
+    of the median's."""
+    spread = math.hypot(inspect()["spread"]["scenes"], people)
+    return factor(math.exp(statistics.NormalDist().inv_cdf(0.95) * spread - people**2 / 2))
+
+
 VALUES = {
     **scores_of("nested", nested),
     **scores_of("constant", lambda: nested()["baselines"]["constant"]),
@@ -174,9 +181,13 @@ VALUES = {
     "table.scenes": lambda: f"{len(unseen()['scenes'])}",
     "table.real": lambda: f"{unseen()['levels_real']:,}",
     "table.synthesised": lambda: f"{unseen()['levels_synthesised']:,}",
-    "compact.error": lambda: factor(compact()["error_factor"]),
     "inspect.error": lambda: factor(inspect()["record"]["leave_one_scene_out"]["error_factor"]),
     "inspect.familiar": lambda: f"{inspect()['familiar_reach']:.2f}",
+    "inspect.scenes": lambda: f"{inspect()['spread']['scenes']:.2f}",
+    "inspect.to95": lambda: to_95_percent(inspect()["spread"]["people"]),
+    "inspect.to95low": lambda: to_95_percent(0.4),
+    "inspect.to95high": lambda: to_95_percent(0.7),
+    "nested.below": below_the_mean,
     "nested.low": lambda: factor(nested()["error_interval"][0]),
     "nested.high": lambda: factor(nested()["error_interval"][1]),
     "tables.scenes": scene_table,

@@ -209,6 +209,12 @@ pub trait StoppingCriterion {
         None
     }
 
+    /// The share of people who see no noise *anywhere* in a picture, from the last [`Verdict::probability`] of each
+    /// tile and its pixels. `None`, the default, if the criterion knows nothing of people.
+    fn share_in_picture(&self, _viewing: Viewing, _tiles: &[(f32, usize)]) -> Option<f64> {
+        None
+    }
+
     /// Judges the given tiles, all of which have samples.
     ///
     /// # Errors

@@ -78,16 +78,6 @@ impl Oracle {
         self.people
     }
 
-    /// The share of people who see no noise *anywhere* in a picture, from the tiles' [`Verdict::probability`] and
-    /// pixels; `None` if the model knows nothing of how thresholds scatter. See [`Spread::share_in_picture`].
-    pub fn share_in_picture(&self, viewing: Viewing, tiles: &[(f32, usize)]) -> Option<f64> {
-        let spread = self.model.spread()?;
-        let spread = Spread { people: self.scatter.unwrap_or(spread.people), ..spread };
-        let places =
-            |&(share, pixels): &(f32, usize)| (share, Spread::places(pixels, viewing.pixels_per_degree()));
-        Some(spread.share_in_picture(tiles.iter().map(places)))
-    }
-
     /// Describes one tile of a picture by its planes, which have `spp` samples per pixel, above 0.
     /// [`Oracle::judge_described`] wants all tiles of the picture.
     ///
@@ -290,6 +280,15 @@ impl StoppingCriterion for Oracle {
 
     fn audience(&self) -> Audience {
         self.model.audience()
+    }
+
+    /// See [`Spread::share_in_picture`]; `None` if the model knows nothing of how thresholds scatter.
+    fn share_in_picture(&self, viewing: Viewing, tiles: &[(f32, usize)]) -> Option<f64> {
+        let spread = self.model.spread()?;
+        let spread = Spread { people: self.scatter.unwrap_or(spread.people), ..spread };
+        let places =
+            |&(share, pixels): &(f32, usize)| (share, Spread::places(pixels, viewing.pixels_per_degree()));
+        Some(spread.share_in_picture(tiles.iter().map(places)))
     }
 
     fn visible_noise(&self, view: &View<'_>) -> Option<Vec<f32>> {

@@ -409,6 +409,15 @@ impl<C: StoppingCriterion> Session<C> {
         self.criterion.visible_noise(&view)
     }
 
+    /// The share of people who see no noise *anywhere* in the picture, by the last verdicts on its tiles: less than of
+    /// the worst tile, and more than if people saw each tile by chance. `None` before all tiles have one, or if
+    /// the criterion knows nothing of people.
+    pub fn share_in_picture(&self) -> Option<f64> {
+        let seen = |(tile, state): (Tile, &TileState)| Some((state.verdict?.probability?, tile.pixels()));
+        let tiles: Vec<_> = self.film.grid().tiles().zip(&self.tiles).map(seen).collect::<Option<_>>()?;
+        self.criterion.share_in_picture(self.params.viewing, &tiles)
+    }
+
     /// Samples still to be taken, over all pixels, by the criterion's expectations; `None` while it has none
     /// for an open tile.
     pub fn expected_samples_to_go(&self) -> Option<u64> {

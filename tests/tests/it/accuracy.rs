@@ -4,6 +4,7 @@ use noisefloor_learn::{
     scene_median_baseline, score,
 };
 use noisefloor_learn::{TrainParams, leave_one_scene_out, train};
+use noisefloor_testkit::Noise;
 
 fn fixture(name: &str) -> Table {
     let path = format!("{}/../fixtures/{name}", env!("CARGO_MANIFEST_DIR"));
@@ -47,6 +48,35 @@ fn left_out_scenes_are_predicted_better_than_by_one_noise_level() {
         (median.error_factor - 1.40).abs() < 0.06 && (median.early_share - 0.02).abs() < 0.01,
         "{median:?}"
     );
+}
+
+/// P is the share of people: of simulated ones, 400 a zone, whose thresholds scatter by 0.5 in ln(samples) around the mean
+/// that real people gave. Models that have not seen the scene say how many of them see no noise in each of its levels
+/// near that mean. Shares of 400 are known to 0.025 each; what is left are some 1,000 levels in ten bins.
+#[test]
+fn p_is_the_share_of_simulated_people() {
+    let (table, mut noise) = (table(), Noise::new(2));
+    let params = TrainParams::for_descriptor(&table.descriptor);
+    let mut bins = [(0.0, 0.0, 0usize); 10];
+    for group in table.groups() {
+        let (rest, left_out): (Vec<_>, Vec<_>) = table.zones.iter().cloned().partition(|z| z.group != group);
+        let rest = Table { zones: rest, ..table.clone() };
+        let model = train(&rest, &params, String::new(), None).unwrap();
+        for zone in left_out {
+            let mean = zone.human_as_noise();
+            // Log-normal, of that mean
+            let people: Vec<f64> = (0..400).map(|_| mean * (0.5 * noise.normal() - 0.125).exp()).collect();
+            for level in zone.levels.iter().filter(|l| (l.spp / mean).ln().abs() < 8f64.ln()) {
+                let p = f64::from(model.judge(&level.descriptor).probability_without_penalty);
+                let content = people.iter().filter(|&&needs| needs <= level.spp).count();
+                let bin = &mut bins[((p * 10.0) as usize).min(9)];
+                *bin = (bin.0 + p, bin.1 + content as f64 / people.len() as f64, bin.2 + 1);
+            }
+        }
+    }
+    let levels: usize = bins.iter().map(|b| b.2).sum();
+    let error = bins.iter().map(|b| (b.0 - b.1).abs()).sum::<f64>() / levels as f64;
+    assert!(levels > 1000 && error < 0.03, "{levels} {error} {bins:?}");
 }
 
 /// The paper's machine on the same numbers, with one C and γ: the search takes minutes.

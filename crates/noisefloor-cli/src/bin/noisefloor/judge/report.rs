@@ -92,7 +92,7 @@ fn say_table(report: &Report<'_>) -> Result<(), NotSaid> {
     )?;
     if report.unfamiliar_tiles > 0 {
         say!(
-            "tiles with texture unlike any that the model was tested on: {}; their P is that of half the samples, and less certain",
+            "tiles with texture or light unlike any that the model was tested on: {}; their P is that of fewer samples, down to half, and less certain",
             report.unfamiliar_tiles
         )?;
     }

@@ -37,6 +37,8 @@ pub(super) struct Report<'a> {
     unfamiliar_tiles: usize,
     /// Where people are expected to stop seeing noise in the typical tile, in samples per pixel.
     expected_threshold: Option<ExpectedThreshold>,
+    /// Share of people who see no noise anywhere in the picture, by the last verdicts on its tiles.
+    people_in_picture: Option<f64>,
     /// Over all pixels.
     samples: u64,
     /// What uniform rendering at the largest stop would take.
@@ -104,6 +106,7 @@ impl<'a> Report<'a> {
             stops,
             unfamiliar_tiles: tiles.iter().filter(|tile| tile.stop.unfamiliar).count(),
             expected_threshold: typical_threshold(session),
+            people_in_picture: session.share_in_picture(),
             samples: session.film().total_samples(),
             samples_uniform: uniform_samples(session),
             samples_rejected: session.film().rejected(),

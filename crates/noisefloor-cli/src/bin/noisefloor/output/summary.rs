@@ -62,16 +62,19 @@ impl Output {
         }
         if let Some(threshold) = typical_threshold(session) {
             say!(
-                "in the typical tile, people stop seeing noise between {} and {} samples per pixel (80 %)",
+                "in the typical tile, people stop seeing noise between {} and {} samples per pixel (80 % of them)",
                 threshold.low,
                 threshold.high
             )?;
         }
+        if let Some(share) = session.share_in_picture() {
+            say!("{:.0} % of people see no noise anywhere in the picture", 100.0 * share)?;
+        }
         let unfamiliar = session.stops().filter(|s| s.unfamiliar).count();
         if unfamiliar > 0 {
             say!(
-                "tiles with texture unlike any that the model was tested on: {unfamiliar}; they got twice the samples it asks \
-                 for, and their verdicts are less certain"
+                "tiles with texture or light unlike any that the model was tested on: {unfamiliar}; they got up to twice the \
+                 samples it asks for, and their verdicts are less certain"
             )?;
         }
         Ok(())
