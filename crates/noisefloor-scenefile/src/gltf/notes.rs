@@ -57,6 +57,9 @@ impl Notes {
 
     /// All warnings, with those for the extensions that the file uses but no element that was read.
     pub(super) fn finish(mut self, asset: &Asset<'_>) -> Vec<Warning> {
+        for (place, property) in &asset.unread {
+            self.warn(&Place::part(asset.path, place), format_args!("the property `{property}` is ignored"));
+        }
         let place = Place::part(asset.path, "extensionsUsed");
         for name in &asset.root.extensions_used {
             if !KNOWN.contains(&name.as_str()) && !self.extensions.contains(name) {

@@ -184,7 +184,7 @@ impl<'d> Context<'d> {
                 let samples = values.iter().enumerate().map(|(i, v)| (low + step * i as f64, *v));
                 self.of_samples(element, &samples.collect::<Vec<_>>(), quantity)
             }
-            _ => Err(self.unsupported(element, element.species())),
+            _ => Err(self.unsupported_kind(element)),
         }
     }
 

@@ -43,7 +43,7 @@ impl<'d> Context<'d> {
     pub(super) fn camera(&self, sensor: &'d Element) -> Result<View, LoadError> {
         let kind = sensor.kind();
         if !matches!(kind, "perspective" | "thinlens" | "orthographic") {
-            return Err(self.unsupported(sensor, sensor.species()));
+            return Err(self.unsupported_kind(sensor));
         }
         self.no_media(sensor)?;
         sensor.ignore(&["far_clip", "shutter_open", "shutter_close", "srf"]);

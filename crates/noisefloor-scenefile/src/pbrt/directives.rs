@@ -8,6 +8,22 @@ use crate::error::{LoadError, Place};
 use glam::DMat4;
 use std::rc::Rc;
 
+/// Options that change noise, speed or what is printed, but not what samples are of.
+const NO_OPTION_OF_PICTURES: [&str; 12] = [
+    "disablepixeljitter",
+    "disabletexturefiltering",
+    "disablewavelengthjitter",
+    "displacementedgescale",
+    "gpu",
+    "msereferenceimage",
+    "msereferenceout",
+    "nthreads",
+    "pixelstats",
+    "rendercoordsys",
+    "seed",
+    "wavefront",
+];
+
 impl Reader<'_> {
     /// Executes a directive in a file that is included `depth` deep.
     pub(super) fn directive(
@@ -27,7 +43,12 @@ impl Reader<'_> {
             }
             "WorldEnd" => {}
             // A parameter alone, in version 4 of a type and a name, and otherwise of a name
-            "Option" => args.option()?,
+            "Option" => {
+                let name = args.option()?;
+                if !NO_OPTION_OF_PICTURES.contains(&name.as_str()) {
+                    self.ignored(&args.place(), format!("the option `{name}` is ignored"));
+                }
+            }
             "ReverseOrientation" => self.state.reversed = !self.state.reversed,
             "ObjectInstance" => {
                 let name = args.text()?;
@@ -149,7 +170,12 @@ impl Reader<'_> {
             "Film" => {
                 self.view.film(params)?;
                 // Names and formats of files
-                params.ignore(&["filename", "diagonal", "savefp16", "maxcomponentvalue"]);
+                params.ignore(&["filename", "diagonal", "savefp16"]);
+                if self.view.clamp.is_some() {
+                    let what = "`maxcomponentvalue` bounds red, green and blue, where the sensor of pbrt \
+                        bounds X, Y and Z";
+                    self.approximated(&params.place, what);
+                }
                 self.say_unused(params, called);
             }
             "Integrator" => {
@@ -159,11 +185,15 @@ impl Reader<'_> {
                     let what = format!("the integrator `{kind}` is replaced by path tracing");
                     self.approximated(&params.place, what);
                 }
+                // How samples are taken
+                params.ignore(&["lightsampler", "lightsamplestrategy", "strategy", "rrthreshold"]);
+                self.say_unused(params, called);
             }
             "ColorSpace" if kind != "srgb" => {
                 let what = format!("the colour space `{kind}` is ignored: colours are taken for sRGB's");
                 self.ignored(&params.place, what);
             }
+            // Noise, speed, and the filter of the picture, which is the caller's
             "Sampler" | "PixelFilter" | "Accelerator" | "ColorSpace" | "SurfaceIntegrator" | "Renderer"
             | "VolumeIntegrator" => {}
             _ => return Ok(false),
