@@ -4,8 +4,11 @@
 //! read, so that nothing is read twice; what is left is counted here.
 
 use crate::error::{LoadError, Place};
+use noisefloor_ptwne::{Facets, Material};
 use std::cell::{Cell, RefCell};
+use std::collections::HashSet;
 use std::fmt;
+use std::mem::{Discriminant, discriminant};
 
 /// How deep surfaces, textures and materials may nest.
 const MAX_NESTED: u64 = 16;
@@ -13,11 +16,19 @@ const MAX_NESTED: u64 = 16;
 /// searched. Some ten seconds.
 const MAX_WORK: u64 = 1 << 32;
 
+/// Steps of the tables of a coat: some milliseconds, and that for each of the roughnesses of one that varies.
+const COAT: usize = 1 << 20;
+const ROUGHNESSES: usize = 25;
+
+/// Index and roughness of a coat, by their bits, and its facets; no roughness if it varies.
+type CoatKey = (u32, Option<u32>, Discriminant<Facets>);
+
 /// What is being read, one in another, and what all has cost so far.
 #[derive(Debug, Default)]
 pub(crate) struct Bounds {
     open: RefCell<Vec<usize>>,
     spent: Cell<u64>,
+    coats: RefCell<HashSet<CoatKey>>,
 }
 
 impl Bounds {
@@ -44,6 +55,24 @@ impl Bounds {
     /// Ends what began last.
     pub(crate) fn end(&self) {
         self.open.borrow_mut().pop();
+    }
+
+    /// Counts the tables of a material under a coat, which equal coats share.
+    ///
+    /// # Errors
+    /// As [`Self::spend`].
+    pub(crate) fn coat(
+        &self,
+        material: &Material,
+        (varies, facets): (bool, Facets),
+        place: &Place,
+    ) -> Result<(), LoadError> {
+        let Material::Plastic { ior, roughness, .. } = material else { return Ok(()) };
+        let key = (ior.to_bits(), (!varies).then(|| roughness.to_bits()), discriminant(&facets));
+        match self.coats.borrow_mut().insert(key) {
+            true => self.spend(if varies { ROUGHNESSES * COAT } else { COAT }, place),
+            false => Ok(()),
+        }
     }
 
     /// Counts work.
@@ -77,5 +106,16 @@ mod tests {
         bounds.begin(99, "<a>", &place).unwrap();
         bounds.spend(1 << 31, &place).unwrap();
         assert!(matches!(bounds.spend(usize::MAX, &place), Err(LoadError::TooLarge { .. })));
+
+        // Any number of equal coats, but not of different ones
+        let bounds = Bounds::default();
+        let coat = |roughness: f32| {
+            let (diffuse, specular) = (noisefloor_ptwne::Texture::Colour([0.5; 3]), [1.0; 3]);
+            let material = Material::Plastic { diffuse, specular, ior: 1.5, roughness, nonlinear: false };
+            bounds.coat(&material, (false, Facets::default()), &place)
+        };
+        (0..10_000).try_for_each(|_| coat(0.5)).unwrap();
+        let error = (0..10_000).try_for_each(|i| coat(i as f32 * 1e-4));
+        assert!(matches!(error, Err(LoadError::TooLarge { .. })));
     }
 }

@@ -173,6 +173,12 @@ impl<'d> Context<'d> {
 
     /// A clear coat over a surface: exact over a diffuse base, left out over any other.
     fn coating(&self, element: &'d Element) -> Result<Surface, LoadError> {
+        if element.has("sigma_a") {
+            self.approximated(
+                element,
+                format!("`sigma_a` of {} is left out: its coat is clear", element.species()),
+            );
+        }
         element.ignore(&["thickness", "sigma_a", "specular_sampling_weight"]);
         let rough = element.kind() == "roughcoating";
         let inside = self.surface(self.nested(element)?)?;

@@ -10,7 +10,7 @@ use crate::channels::Means;
 use crate::error::{LoadError, Place, Warning};
 use crate::options::LoadOptions;
 use crate::options::NO_MEDIA;
-use noisefloor_ptwne::{SceneError, Texture};
+use noisefloor_ptwne::{Facets, Material, SceneError, Texture};
 use std::cell::{Cell, RefCell};
 use std::collections::{HashMap, HashSet};
 use std::fmt;
@@ -18,26 +18,25 @@ use std::path::PathBuf;
 
 /// Most warnings that are kept.
 const MAX_WARNINGS: usize = 10_000;
-/// Kinds of shapes, surfaces, emitters and sensors that Mitsuba 3.9 has and this reader has not.
-const MITSUBAS_OWN: [&str; 18] = [
-    "batch",
-    "bsplinecurve",
-    "circular",
-    "directionalarea",
-    "distant",
-    "ellipsoids",
-    "ellipsoidsmesh",
-    "hair",
-    "irradiancemeter",
-    "linearcurve",
-    "measured",
-    "measured_polarized",
-    "polarizer",
-    "radiancemeter",
-    "retarder",
-    "sdfgrid",
-    "timed_sunsky",
-    "volume",
+/// Kinds of elements that Mitsuba 3.9 has and this reader has not.
+const MITSUBAS_OWN: [(&str, &str); 17] = [
+    ("bsdf", "circular"),
+    ("bsdf", "hair"),
+    ("bsdf", "measured"),
+    ("bsdf", "measured_polarized"),
+    ("bsdf", "polarizer"),
+    ("bsdf", "retarder"),
+    ("emitter", "directionalarea"),
+    ("sensor", "batch"),
+    ("sensor", "distant"),
+    ("sensor", "irradiancemeter"),
+    ("sensor", "radiancemeter"),
+    ("shape", "bsplinecurve"),
+    ("shape", "ellipsoids"),
+    ("shape", "ellipsoidsmesh"),
+    ("shape", "linearcurve"),
+    ("shape", "sdfgrid"),
+    ("texture", "volume"),
 ];
 /// Most aliases in a row.
 const MAX_ALIASES: usize = 16;
@@ -121,7 +120,8 @@ impl<'d> Context<'d> {
 
     /// The kind of `element` is not read here: whether Mitsuba has it, which is one word away.
     pub(super) fn unsupported_kind(&self, element: &Element) -> LoadError {
-        let note = if MITSUBAS_OWN.contains(&element.kind()) { " (`--source mitsuba` has it)" } else { "" };
+        let own = MITSUBAS_OWN.contains(&(element.tag.as_str(), element.kind()));
+        let note = if own { " (`--source mitsuba` has it)" } else { "" };
         self.unsupported(element, element.species() + note)
     }
 
@@ -208,6 +208,16 @@ impl<'d> Context<'d> {
         let result = read();
         self.bounds.end();
         result
+    }
+
+    /// Counts the tables of a material under a coat.
+    pub(super) fn coat(
+        &self,
+        element: &Element,
+        material: &Material,
+        facets: (bool, Facets),
+    ) -> Result<(), LoadError> {
+        self.bounds.coat(material, facets, &self.place(element))
     }
 
     /// Counts work that is done for `element`.

@@ -129,7 +129,7 @@ impl<'d> Context<'d> {
             scales,
             sun_diameter,
         };
-        element.ignore(&["resolution", "sun_resolution", "complex_sun", "stretch", "extend"]);
+        element.ignore(&["resolution", "sun_resolution"]);
         if scales[1] > 0.0 {
             self.approximated(element, "the sun is drawn into a map of the sky");
         }

@@ -155,7 +155,10 @@ impl<'d> Context<'d> {
         let options =
             MaterialOptions { opacity, one_sided, facets, roughness, relief, ..MaterialOptions::default() };
         match body {
-            Body::Plain(material) => builder.material_with(material, options).map_err(self.refused(element)),
+            Body::Plain(material) => {
+                self.coat(element, &material, (options.roughness.is_some(), facets))?;
+                builder.material_with(material, options).map_err(self.refused(element))
+            }
             Body::Blend(parts, share) => {
                 let [first, second] = *parts;
                 let first = self.add_surface(element, first, builder)?;

@@ -121,8 +121,7 @@ impl Reader<'_> {
         }
         match word {
             "Shape" => {
-                let defaults = self.defaults("shape", &params);
-                let params = params.or(&defaults);
+                let params = self.with_defaults("shape", params)?;
                 self.shape(kind, &params)?;
                 self.say_unused(&params, &called);
             }
@@ -133,8 +132,7 @@ impl Reader<'_> {
                 self.named_materials.insert(kind.to_owned(), definition);
             }
             "LightSource" => {
-                let defaults = self.defaults("light", &params);
-                let params = params.or(&defaults);
+                let params = self.with_defaults("light", params)?;
                 self.light_source(kind, &params)?;
                 self.say_unused(&params, &called);
             }
@@ -145,7 +143,7 @@ impl Reader<'_> {
                 self.state.area_light = Some(Rc::new(params));
             }
             "Attribute" => {
-                let all = params.or(&self.defaults(kind, &Params::none(Place::file(&self.path))));
+                let all = self.with_defaults(kind, params)?;
                 self.state.defaults.insert(kind.to_owned(), Rc::new(all));
             }
             "MakeNamedMedium" => {
@@ -201,12 +199,12 @@ impl Reader<'_> {
         Ok(true)
     }
 
-    /// The parameters that `Attribute` gave for things of a kind, but for colour spaces.
-    fn defaults(&self, kind: &str, params: &Params) -> Params {
-        match self.state.defaults.get(kind) {
-            Some(defaults) => (**defaults).clone(),
-            None => Params::none(params.place.clone()),
-        }
+    /// Parameters with those that `Attribute` gave for all things of a kind, but for colour spaces.
+    fn with_defaults(&self, kind: &str, params: Params) -> Result<Params, LoadError> {
+        let Some(defaults) = self.state.defaults.get(kind) else { return Ok(params) };
+        // Each is copied, and compared with each
+        self.bounds.spend((16 + params.len()).saturating_mul(defaults.len()), &params.place)?;
+        Ok(params.or(defaults))
     }
 
     fn definition(&self, kind: &str, params: Params) -> Rc<Definition> {

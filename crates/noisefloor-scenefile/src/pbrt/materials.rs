@@ -87,7 +87,11 @@ impl Reader<'_> {
         definition.params.ignore(&["type"]);
         self.say_unused(&definition.params, &format!("the material `{}`", definition.kind));
         match made {
-            Made::Plain(material) => self.builder.material_with(material, options).map_err(refused),
+            Made::Plain(material) => {
+                let facets = (options.roughness.is_some(), options.facets);
+                self.bounds.coat(&material, facets, &definition.params.place)?;
+                self.builder.material_with(material, options).map_err(refused)
+            }
             Made::Nothing => {
                 let options = MaterialOptions { opacity: Some([0.0; 3].into()), ..options };
                 self.builder.material_with(Material::diffuse([0.0; 3]), options).map_err(refused)

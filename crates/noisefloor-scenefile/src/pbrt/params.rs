@@ -149,6 +149,10 @@ impl Params {
         find(one).is_some() && find(one) == find(other)
     }
 
+    pub(super) fn len(&self) -> usize {
+        self.all.len()
+    }
+
     /// How many numbers there are.
     pub(super) fn numbers_in_all(&self) -> usize {
         let count = |p: &Param| if let Values::Numbers(numbers) = &*p.values { numbers.len() } else { 1 };

@@ -86,6 +86,10 @@ fn odd_spellings_are_read_and_losses_are_named() {
     for (world, want) in [
         ("Shape \"trianglemesh\" \"point3 P\" [] \"integer indices\" []", "the mesh has no faces"),
         (
+            "Shape \"trianglemesh\" \"point3 P\" [0 0 0 1 0 0 2 0 0] \"integer indices\" [0 1 2]",
+            "a shape is left out: none of its faces has an area",
+        ),
+        (
             "Material \"glass\" \"rgb Kr\" [0.5 0.5 0.5] Shape \"sphere\"",
             "`Kr` of the material `glass` is taken for 1",
         ),
