@@ -19,8 +19,8 @@ pub(crate) struct Group {
     pub(crate) light: u32,
     /// Index of the first surface's corners; [`NO`] if the group is flat and has no texture coordinates.
     pub(crate) corners: u32,
-    /// Where the group's normals and texture coordinates begin in [`Vertices`]; [`NO`] if there are none. Both
-    /// pairs of coordinates are in one list.
+    /// Where the group's normals and texture coordinates begin in [`Vertices`]; [`NO`] if there are none.
+    /// Both pairs of coordinates are in one list.
     pub(crate) normals: u32,
     pub(crate) uvs: u32,
     pub(crate) second_uvs: u32,
@@ -119,8 +119,8 @@ impl Geometry {
         (a * (1.0 - u - v) + b * u + c * v).clamp(0.0, 1.0)
     }
 
-    /// The tangent between the corners of a planar surface of `group`, which has tangents, and the sign of its
-    /// bitangent.
+    /// The tangent between the corners of a planar surface of `group`, which has tangents, and the sign of
+    /// its bitangent.
     pub(crate) fn tangent(&self, group: &Group, prim: u32, [u, v]: [f32; 2]) -> (Vec3, f32) {
         let corners = self.vertices.corners[(group.corners + prim - group.first) as usize];
         let rows = corners.map(|i| self.vertices.tangents[(group.tangents + i) as usize]);

@@ -101,7 +101,11 @@ impl Scene {
                     }
                 };
                 let c = opacity.eval(at);
-                let mut opacity = (c.x + c.y + c.z) * (1.0 / 3.0);
+                // Of equal channels the mean is rounded, which a cutoff would notice
+                let mut opacity = match material.cutoff {
+                    Some(_) => c.max_element(),
+                    None => (c.x + c.y + c.z) * (1.0 / 3.0),
+                };
                 if let (Some(Texture::Corners(_)), Spot::Plane { uv, .. }) = (&material.opacity, spot)
                     && group.alphas != NO
                 {

@@ -18,8 +18,8 @@ impl Scene {
         Some(along.map(|edge| instance.edge(edge)))
     }
 
-    /// The tangent of the mesh where a ray hit, and the bitangent; none if it has none. `normal` is the shading
-    /// normal of the front.
+    /// The tangent of the mesh where a ray hit, and the bitangent; none if it has none. `normal` is the
+    /// shading normal of the front.
     pub(crate) fn given_tangents(&self, hit: &Hit, normal: Vec3) -> Option<[Vec3; 2]> {
         let (prim, _) = self.bvh.shape_at::<true>(hit);
         let group = self.geometry.group(prim);

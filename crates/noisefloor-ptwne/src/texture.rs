@@ -41,10 +41,10 @@ pub enum Texture {
     },
     /// An image.
     Image(ImageTexture),
-    /// The colours of the mesh's corners ([`Mesh::colours`](crate::Mesh::colours)), interpolated, times a texture
-    /// if there is one. Of an opacity, their [alphas](crate::Mesh::alphas). Only for the colour and the opacity of a
-    /// material, the share of a mix, and what a surface emits: anywhere else, and on surfaces without such
-    /// colours, corners are white.
+    /// The colours of the mesh's corners ([`Mesh::colours`](crate::Mesh::colours)), interpolated, times a
+    /// texture if there is one. Of an opacity, their [alphas](crate::Mesh::alphas). Only for the colour and
+    /// the opacity of a material, the share of a mix, and what a surface emits: anywhere else, and on
+    /// surfaces without such colours, corners are white.
     Corners(Option<Box<Texture>>),
 }
 
@@ -65,7 +65,8 @@ pub struct ImageTexture {
     pub wrap: [Wrap; 2],
     /// Whether each pixel has one colour, instead of interpolating between pixels.
     pub nearest: bool,
-    /// Whether (u, v) are the second texture coordinates of the mesh, [`Mesh::second_uvs`](crate::Mesh::second_uvs).
+    /// Whether (u, v) are the second texture coordinates of the mesh,
+    /// [`Mesh::second_uvs`](crate::Mesh::second_uvs).
     pub second: bool,
 }
 

@@ -12,12 +12,12 @@ use std::mem::{Discriminant, discriminant};
 
 /// How deep surfaces, textures and materials may nest.
 const MAX_NESTED: u64 = 16;
-/// Most steps of a load: pixels that are looked at, corners of shapes, surfaces of mixtures, elements that are
-/// searched. Some ten seconds.
+/// Most steps of a load: pixels that are looked at, corners of shapes, surfaces of mixtures, elements that
+/// are searched. Some ten seconds.
 const MAX_WORK: u64 = 1 << 32;
 
-/// Steps of the tables of a coat: some milliseconds, and that for each of the roughnesses of one that varies.
-const COAT: usize = 1 << 20;
+/// Steps of the tables of a coat, some twenty milliseconds; and how many times that if its roughness varies.
+const COAT: usize = 1 << 22;
 const ROUGHNESSES: usize = 25;
 
 /// Index and roughness of a coat, by their bits, and its facets; no roughness if it varies.
@@ -32,8 +32,8 @@ pub(crate) struct Bounds {
 }
 
 impl Bounds {
-    /// Begins what has the number `key`, is `called` so and may hold others. [`Self::end`] ends it, unless this
-    /// is an error.
+    /// Begins what has the number `key`, is `called` so and may hold others. [`Self::end`] ends it, unless
+    /// this is an error.
     ///
     /// # Errors
     /// [`LoadError`] if it holds itself, or if too many are open.

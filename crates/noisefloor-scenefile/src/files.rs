@@ -17,7 +17,7 @@ const EACH_BYTE_OF_TREES: u64 = 32;
 /// Longest mesh or picture that is read, in bytes.
 pub(crate) const MAX_FILE_BYTES: u64 = 1 << 28;
 /// Most bytes of all files, each counted as often as it is read.
-const MAX_BYTES: u64 = 1 << 36;
+const MAX_BYTES: u64 = 1 << 34;
 /// Most folders that a scene may add to those where its files are looked for.
 const MAX_FOLDERS: u64 = 64;
 

@@ -113,8 +113,8 @@ fn depth_and_size_are_those_asked_for() {
     }
 }
 
-/// A crop shows the same part of the scene at any size, as in the built-in renderer: here the upper right quarter,
-/// which a lamp fills.
+/// A crop shows the same part of the scene at any size, as in the built-in renderer: here the upper right
+/// quarter, which a lamp fills.
 #[test]
 fn crops_show_the_same_part_at_any_size() {
     if !usable(&RENDERER) {

@@ -57,9 +57,9 @@ pub struct Mesh<'a> {
     /// A second pair of texture coordinates per position for images that are
     /// [`second`](crate::ImageTexture::second), or none. Only beside `uvs`.
     pub second_uvs: &'a [[f32; 2]],
-    /// One tangent per position for a [`Relief::Normals`](crate::Relief::Normals), or none: its red is along x, y and
-    /// z, its green along the cross product of the shading normal and that, times the fourth number, 1 or −1
-    /// (glTF 2.0, §3.7.2.1).
+    /// One tangent per position for a [`Relief::Normals`](crate::Relief::Normals), or none: its red is along
+    /// x, y and z, its green along the cross product of the shading normal and that, times the fourth number,
+    /// 1 or −1 (glTF 2.0, §3.7.2.1).
     pub tangents: &'a [[f32; 4]],
     /// Three indices per triangle, counter-clockwise as seen from the front.
     pub indices: &'a [[u32; 3]],

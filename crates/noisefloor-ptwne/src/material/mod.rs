@@ -120,8 +120,8 @@ pub struct MaterialOptions {
     /// The mean of the channels is the probability that the surface stops a ray; other rays pass straight
     /// through. `None`: opaque everywhere.
     pub opacity: Option<Texture>,
-    /// The least opacity that stops rays: where there is less, all pass, and elsewhere none. `None`: they pass
-    /// at random.
+    /// The least opacity, by the largest channel, that stops rays: where there is less, all pass, and
+    /// elsewhere none. `None`: they pass at random.
     pub cutoff: Option<f32>,
     /// Whether the back absorbs all light.
     pub one_sided: bool,

@@ -339,7 +339,8 @@ impl<'m> Reader<'m, '_> {
         true
     }
 
-    /// The opacity, and the least that counts as opaque: the alphas of factor, texture and corners, multiplied.
+    /// The opacity, and the least that counts as opaque: the alphas of factor, texture and corners,
+    /// multiplied.
     fn opacity(&mut self, base: Option<&Info>) -> Result<(Option<Texture>, Option<f32>), LoadError> {
         let [.., alpha] = match self.extensions().and_then(|e| e.pbr_specular_glossiness.as_ref()) {
             Some(gloss) => gloss.diffuse_factor.0,

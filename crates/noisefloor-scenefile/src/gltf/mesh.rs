@@ -206,8 +206,8 @@ fn turned(n: [f32; 3], matrix: &DMat3) -> [f32; 3] {
     (*matrix * DVec3::from_array(n.map(f64::from))).normalize_or_zero().as_vec3().to_array()
 }
 
-/// A tangent goes along with the surface. In a mirror image, so does the bitangent, where the cross product that
-/// it is made by would turn round.
+/// A tangent goes along with the surface. In a mirror image, so does the bitangent, where the cross product
+/// that it is made by would turn round.
 fn turned_tangent([x, y, z, side]: [f32; 4], to_world: &DMat3) -> [f32; 4] {
     let t = (*to_world * DVec3::from_array([x, y, z].map(f64::from))).normalize_or_zero().as_vec3();
     let side = if (side < 0.0) != (to_world.determinant() < 0.0) { -1.0 } else { 1.0 };

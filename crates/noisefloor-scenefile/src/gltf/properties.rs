@@ -22,12 +22,13 @@ const KINDS: [(&str, &str); 15] = [
     ("extensionsUsed", "extension"),
 ];
 
-/// What each kind of object may have besides `name` and `extensions`: what is read, and what makes no difference
-/// to a path tracer: bounds, targets, hints and authors (min, max, target, skeleton, copyright, generator), mip
-/// maps (minFilter), what rasterisers clip (znear, zfar), and the aspect of a picture, which the caller gives.
-/// What makes one is said where it is met. Objects of other extensions are not looked into: those are named whole.
+/// What each kind of object may have besides `name` and `extensions`: what is read, and what makes no
+/// difference to a path tracer: bounds, targets, hints and authors (min, max, target, skeleton, copyright,
+/// generator), mip maps (minFilter), what rasterisers clip (znear, zfar), and the aspect of a picture, which
+/// the caller gives. What makes one is said where it is met. Objects of other extensions are not looked into:
+/// those are named whole.
 #[rustfmt::skip]
-const KNOWN: [(&str, &[&str]); 42] = [
+const KNOWN: [(&str, &[&str]); 43] = [
     ("", &["accessors", "animations", "asset", "bufferViews", "buffers", "cameras", "extensionsRequired",
         "extensionsUsed", "images", "materials", "meshes", "nodes", "samplers", "scene", "scenes", "skins", "textures"]),
     ("accessors", &["bufferView", "byteOffset", "componentType", "count", "max", "min", "normalized", "sparse", "type"]),
@@ -67,6 +68,7 @@ const KNOWN: [(&str, &[&str]); 42] = [
         "thicknessTexture"]),
     ("meshes", &["primitives", "weights"]),
     ("meshes/primitives", &["attributes", "indices", "material", "mode", "targets"]),
+    ("meshes/primitives/targets", &["NORMAL", "POSITION", "TANGENT"]),
     ("nodes", &["camera", "children", "matrix", "mesh", "rotation", "scale", "skin", "translation", "weights"]),
     ("nodes/KHR_lights_punctual", &["light"]),
     ("samplers", &["magFilter", "minFilter", "wrapS", "wrapT"]),
@@ -93,8 +95,8 @@ const ATTRIBUTES: [&str; 10] = [
     "TEXCOORD",
 ];
 
-/// Brings JSON that glTF allows to the types of the crate, which are stricter: `extras` may be anything, so they
-/// are dropped; so are channels of animations, which need no node; and a scene need not have nodes.
+/// Brings JSON that glTF allows to the types of the crate, which are stricter: `extras` may be anything, so
+/// they are dropped; so are channels of animations, which need no node; and a scene need not have nodes.
 pub(super) fn tidy(root: &mut Value) {
     drop_extras(root);
     let arrays = |root: &mut Value, key: &str| match root.get_mut(key) {

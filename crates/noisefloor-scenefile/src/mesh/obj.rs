@@ -18,7 +18,8 @@ const MAX_UNREAD: usize = 8;
 /// Position, texture coordinates and normal of a corner, as indices.
 type Corner = (u32, Option<u32>, Option<u32>);
 
-/// Statements that change nothing: groups and names, and materials, in whose place a scene gives the shape one.
+/// Statements that change nothing: groups and names, and materials, in whose place a scene gives the shape
+/// one.
 const IRRELEVANT: [&str; 7] = ["g", "o", "s", "mg", "usemtl", "mtllib", "call"];
 
 /// Reads the OBJ file `bytes`, which came from `path`. Corners that agree in all their indices become one
@@ -42,10 +43,17 @@ pub(crate) fn parse(bytes: &[u8], path: &Path) -> Result<Triangles, LoadError> {
         has_uvs: false,
         has_normals: false,
     };
+    // A backslash at its end continues a line; what is said of it names the last of its lines
+    let mut begun = String::new();
     for (index, line) in files::lines(&text).enumerate() {
         reader.line = index + 1;
-        reader.line(line)?;
+        match line.trim_end().strip_suffix('\\') {
+            Some(part) => begun = begun + part + " ",
+            None if begun.is_empty() => reader.line(line)?,
+            None => reader.line(&(std::mem::take(&mut begun) + line))?,
+        }
     }
+    reader.line(&begun)?;
 
     let mut mesh = reader.mesh;
     if mesh.indices.is_empty() {
@@ -222,6 +230,14 @@ mod tests {
         assert_eq!(mesh.uvs, [[0.25, 0.5], [0.75, 0.0], [0.0, 0.0], [0.0, 0.0], [0.75, 0.0]]);
         let (up, none) = ([0.0, 0.0, 2.0], [0.0; 3]);
         assert_eq!(mesh.normals, [up, up, up, none, none]);
+    }
+
+    #[test]
+    fn lines_may_be_continued() {
+        for text in ["f 1 2 \\\n3\nf 1 2 4\n", "f 1 2 3 \nf \\\n 1 \\\n 2 4", "f 1 2 3\nf 1 2 4 \\"] {
+            let mesh = parse_text(&format!("{CORNERS}{text}")).unwrap();
+            assert_eq!(mesh.indices, [[0, 1, 2], [0, 1, 3]], "{text}");
+        }
     }
 
     #[test]

@@ -1,8 +1,8 @@
-//! PLY, text and binary: positions, normals, texture coordinates, faces, triangle strips and one attribute. Other
-//! elements are named; other properties are those of a mesh that a scene does not ask for.
+//! PLY, text and binary: positions, normals, texture coordinates, faces, triangle strips and one attribute.
+//! Other elements are named; other properties are those of a mesh that a scene does not ask for.
 //!
-//! Read here and not by a crate: ply-rs-bw 4.0.1 refuses numbers such as `.5`, `1.` and `5.e-1`, the version `1`,
-//! and lines that are indented, and makes all the elements that a header asks for.
+//! Read here and not by a crate: ply-rs-bw 4.0.1 refuses numbers such as `.5`, `1.` and `5.e-1`, the version
+//! `1`, and lines that are indented, and makes all the elements that a header asks for.
 
 use super::Triangles;
 use super::polygon::Cutter;
@@ -19,8 +19,8 @@ const MAX_WORD: usize = 40;
 /// Reads the PLY file `bytes`, which came from `path`.
 ///
 /// # Errors
-/// [`LoadError::Bad`] if the file is cut short or corrupt, its header asks for more than the file holds, or it has
-/// no faces although its header does not say so. [`LoadError::TooLarge`] as of [`Cutter::cut`].
+/// [`LoadError::Bad`] if the file is cut short or corrupt, its header asks for more than the file holds, or
+/// it has no faces although its header does not say so. [`LoadError::TooLarge`] as of [`Cutter::cut`].
 pub(crate) fn parse(bytes: &[u8], path: &Path) -> Result<Triangles, LoadError> {
     parse_with(bytes, path, None)
 }

@@ -3,10 +3,11 @@
 use crate::error::{LoadError, Place};
 use glam::{DVec2, DVec3, Vec3};
 
-/// Most tests of a corner against an ear, of all polygons of a mesh: those of a hostile one would be as many as
-/// the cube of its corners.
+/// Most tests of a corner against an ear, of all polygons of a mesh: those of a hostile one would be as many
+/// as the cube of its corners.
 const MAX_TESTS: u64 = 1 << 31;
-/// Sine of the angle from which on a corner counts as reflex: what single precision leaves of a straight line.
+/// Sine of the angle from which on a corner counts as reflex: what single precision leaves of a straight
+/// line.
 const STRAIGHT: f64 = 1e-5;
 
 /// Cuts the polygons of a mesh.
@@ -16,9 +17,9 @@ pub(crate) struct Cutter {
 }
 
 impl Cutter {
-    /// The triangles of a polygon, as numbers of its corners, which run as those of the polygon. A convex one is
-    /// a fan from its first corner; of others, ears are cut off (Meisters 1975). A polygon that crosses itself
-    /// is cut as far as that goes.
+    /// The triangles of a polygon, as numbers of its corners, which run as those of the polygon. A convex one
+    /// is a fan from its first corner; of others, ears are cut off (Meisters 1975). A polygon that crosses
+    /// itself is cut as far as that goes.
     ///
     /// # Errors
     /// [`LoadError::TooLarge`] if the polygons so far were too large and too bent.

@@ -1,8 +1,8 @@
 //! Tags of XML, as pugixml reads them for Mitsuba: more than XML allows.
 //!
-//! Comments may have `--` in them, an `&` may stand alone, an attribute may come twice (the first counts), and a
-//! DOCTYPE is passed over with all that it defines, so that no entity can multiply. Text between tags says
-//! nothing in a scene. roxmltree 0.21, which was used before, refuses all of it, as it should.
+//! Comments may have `--` in them, an `&` may stand alone, an attribute may come twice (the first counts),
+//! and a DOCTYPE is passed over with all that it defines, so that no entity can multiply. Text between tags
+//! says nothing in a scene. roxmltree 0.21, which was used before, refuses all of it, as it should.
 
 use crate::error::{LoadError, Place};
 use std::path::Path;

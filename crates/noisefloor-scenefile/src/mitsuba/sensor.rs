@@ -46,8 +46,8 @@ impl<'d> Context<'d> {
             return Err(self.unsupported_kind(sensor));
         }
         self.no_media(sensor)?;
-        // Exporters write a far_clip beyond all that is there; a shutter moves nothing, and a sensor's response is of
-        // spectra
+        // Exporters write a far_clip beyond all that is there; a shutter moves nothing, and a sensor's
+        // response is of spectra
         sensor.ignore(&["far_clip", "shutter_open", "shutter_close", "srf"]);
         sensor.children.iter().filter(|c| c.tag == "sampler").for_each(Element::irrelevant);
         let (size, mut window) = self.film_size(sensor)?;

@@ -82,8 +82,8 @@ impl Context<'_> {
     }
 }
 
-/// Rodrigues' formula for an axis of any length, which Mitsuba 3 does not bring to 1 (version 0.6 did): cos θ·I +
-/// (1 − cos θ)·a·aᵀ + sin θ·[a]×.
+/// Rodrigues' formula for an axis of any length, which Mitsuba 3 does not bring to 1 (version 0.6 did): cos
+/// θ·I + (1 − cos θ)·a·aᵀ + sin θ·[a]×.
 fn stretched(a: DVec3, angle: f64) -> DMat3 {
     let (sin, cos) = angle.sin_cos();
     let outer = DMat3::from_cols(a * a.x, a * a.y, a * a.z);

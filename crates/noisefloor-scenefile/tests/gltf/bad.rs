@@ -215,8 +215,8 @@ fn nothing_is_allocated_for_what_is_only_claimed() {
     assert!(error.contains("line 1 of the JSON"), "{error}");
 }
 
-/// glTF allows all of it: any type of `extras`, anywhere, channels of animations without a node, scenes without
-/// nodes, `byteStride` and the like aside. The scene stays what it is.
+/// glTF allows all of it: any type of `extras`, anywhere, channels of animations without a node, scenes
+/// without nodes, `byteStride` and the like aside. The scene stays what it is.
 #[test]
 fn what_gltf_allows_is_read() {
     let places = [

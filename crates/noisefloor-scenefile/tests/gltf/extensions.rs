@@ -104,8 +104,9 @@ fn colours_of_vertices_multiply_unlit_surfaces() {
     }
 }
 
-/// Red is along TANGENT, green along the cross product of the normal and that, times its fourth number (glTF 2.0,
-/// §3.7.2.1): here +y, and −x or +x. In a mirror image all of it is mirrored. Without normals, it does not count.
+/// Red is along TANGENT, green along the cross product of the normal and that, times its fourth number (glTF
+/// 2.0, §3.7.2.1): here +y, and −x or +x. In a mirror image all of it is mirrored. Without normals, it does
+/// not count.
 #[test]
 fn tangents_of_a_mesh_are_the_tangent_space() {
     let n = [160u8, 90, 245].map(|c| f32::from(c) / 255.0 * 2.0 - 1.0);

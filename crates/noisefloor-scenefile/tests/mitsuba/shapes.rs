@@ -290,8 +290,8 @@ fn long_axes_stretch_as_in_mitsuba_3() {
     close(look(folder.load(&old).unwrap()), [0.0; 3], 1e-4, "ends at x = −0.5");
 }
 
-/// A black U of one polygon before a white sky, over [−1, 1]²: it covers 1 − 0.5·0.75 = 0.625 of 4. Five standard
-/// errors are 5·√(0.156·0.844/4096) = 0.028; a fan from its first corner would cover 0.052 more.
+/// A black U of one polygon before a white sky, over [−1, 1]²: it covers 1 − 0.5·0.75 = 0.625 of 4. Five
+/// standard errors are 5·√(0.156·0.844/4096) = 0.028; a fan from its first corner would cover 0.052 more.
 #[test]
 fn concave_polygons_cover_what_they_enclose() {
     let corners = [

@@ -379,9 +379,9 @@ fn triangles_without_coordinates_are_mapped_by_their_corners() {
     }
 }
 
-/// pbrt 3 takes spectra as they are: XYZ is the integral of the matching functions over that of ȳ, so that a flat
-/// one of 2 is XYZ (2, 2, 2). Of (1, 1, 1), Rec.709 has [1.2048 0.9483 0.9089], the sums of the rows of its matrix.
-/// pbrt 4 brings it to a luminance of 1, which it nearly has.
+/// pbrt 3 takes spectra as they are: XYZ is the integral of the matching functions over that of ȳ, so that a
+/// flat one of 2 is XYZ (2, 2, 2). Of (1, 1, 1), Rec.709 has [1.2048 0.9483 0.9089], the sums of the rows of
+/// its matrix. pbrt 4 brings it to a luminance of 1, which it nearly has.
 #[test]
 fn spectra_of_lights_are_those_of_their_version() {
     let folder = Folder::new().with("flat.spd", "# nm, value\r300 2\r800 2\r");
