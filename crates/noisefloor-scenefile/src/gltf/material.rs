@@ -11,8 +11,8 @@ use gltf::json::extensions::material::PbrSpecularGlossiness;
 use gltf::json::material::{AlphaMode, Material as Source};
 use gltf::json::texture::Info;
 use gltf::json::validation::Checked;
-use gltf::json::{Index, extensions};
-use noisefloor::Rgb;
+use gltf::json::{Index, Value, extensions};
+use noisefloor::{Rgb, display::luminance};
 use noisefloor_ptwne::{
     Emission, ImageTexture, Material, MaterialId, MaterialOptions, Relief, SceneBuilder, Texture,
 };
@@ -21,6 +21,9 @@ use std::collections::HashMap;
 /// Indices of refraction that the renderer takes for a material that is not transparent.
 const MIN_OPAQUE_IOR: f32 = 1.0;
 const MAX_IOR: f32 = 4.0;
+
+/// `KHR_materials_specular`, which the types of the JSON leave among unknown extensions.
+const SPECULAR: &str = "KHR_materials_specular";
 
 /// A material in the scene.
 #[derive(Clone, Debug)]
@@ -115,7 +118,8 @@ impl<'m> Reader<'m, '_> {
             self.notes.warn(&self.place, "an occlusion map is ignored: light is traced");
         }
         let others = source.extensions.iter().flat_map(|e| e.others.keys());
-        self.notes.extensions(&self.place, others.filter(|name| *name != clearcoat::NAME));
+        let known = [clearcoat::NAME, SPECULAR];
+        self.notes.extensions(&self.place, others.filter(|name| !known.contains(&name.as_str())));
         self.notes.extensions(&self.place, pbr.extensions.iter().flat_map(|e| e.others.keys()));
 
         // The first texture chooses the first set of texture coordinates, the first with another the second
@@ -224,7 +228,8 @@ impl<'m> Reader<'m, '_> {
         let (base, metallic_roughness) =
             self.textures.gloss(factor, [of_diffuse, of_specular], &self.place, self.notes)?;
         let base = self.tinted(base);
-        Ok(Material::MetallicRoughness { base, metallic_roughness, ior: self.ior(MIN_OPAQUE_IOR) })
+        let ior = self.dielectric();
+        Ok(Material::MetallicRoughness { base, metallic_roughness, ior })
     }
 
     /// Times the colours of corners, if the mesh has any.
@@ -276,7 +281,7 @@ impl<'m> Reader<'m, '_> {
         let roughness = self.within(pbr.roughness_factor.0, "roughnessFactor", 0.0, 1.0);
         let metallic = self.within(pbr.metallic_factor.0, "metallicFactor", 0.0, 1.0);
         let metallic_roughness = self.colour([1.0, roughness, metallic], metal, Encoding::Linear)?;
-        let ior = self.ior(MIN_OPAQUE_IOR);
+        let ior = self.dielectric();
         Ok(Material::MetallicRoughness { base, metallic_roughness, ior })
     }
 
@@ -390,6 +395,29 @@ impl<'m> Reader<'m, '_> {
             None => None,
         };
         Ok(Some(Emission { radiance, texture, two_sided }))
+    }
+
+    /// Index of refraction of what is no metal; with `KHR_materials_specular` that of the same grey
+    /// reflection at normal incidence.
+    fn dielectric(&mut self) -> f32 {
+        let ior = self.ior(MIN_OPAQUE_IOR);
+        let Some(value) = self.extensions().and_then(|e| e.others.get(SPECULAR)) else { return ior };
+        let number = |value: Option<&Value>| value.and_then(Value::as_f64).map_or(1.0, |x| x as f32);
+        let share = number(value.get("specularFactor"));
+        let colour = [0, 1, 2].map(|i| number(value.get("specularColorFactor").and_then(|c| c.get(i))));
+        if value.get("specularTexture").or(value.get("specularColorTexture")).is_some() {
+            self.notes.warn(&self.place, "the textures of its KHR_materials_specular are ignored");
+        }
+        if share == 1.0 && colour == [1.0; 3] {
+            return ior;
+        }
+        let f0 = ((ior - 1.0) / (ior + 1.0)).powi(2) * share * luminance(colour);
+        let root = f0.clamp(0.0, 1.0).sqrt();
+        let nearest = ((1.0 + root) / (1.0 - root)).min(MAX_IOR);
+        let what =
+            format_args!("its KHR_materials_specular is replaced by an index of refraction of {nearest:.3}");
+        self.notes.near(&self.place, what);
+        nearest
     }
 
     /// Index of refraction.

@@ -7,12 +7,13 @@ use std::fmt;
 
 /// Extensions that a file may require. `KHR_mesh_quantization` is but a wider choice of accessors, all of which are
 /// read.
-const KNOWN: [&str; 10] = [
+const KNOWN: [&str; 11] = [
     "KHR_lights_punctual",
     "KHR_materials_clearcoat",
     "KHR_materials_emissive_strength",
     "KHR_materials_ior",
     "KHR_materials_pbrSpecularGlossiness",
+    "KHR_materials_specular",
     "KHR_materials_transmission",
     "KHR_materials_unlit",
     "KHR_materials_volume",

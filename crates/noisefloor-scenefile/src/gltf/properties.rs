@@ -28,7 +28,7 @@ const KINDS: [(&str, &str); 15] = [
 /// the caller gives. What makes one is said where it is met. Objects of other extensions are not looked into:
 /// those are named whole.
 #[rustfmt::skip]
-const KNOWN: [(&str, &[&str]); 43] = [
+const KNOWN: [(&str, &[&str]); 44] = [
     ("", &["accessors", "animations", "asset", "bufferViews", "buffers", "cameras", "extensionsRequired",
         "extensionsUsed", "images", "materials", "meshes", "nodes", "samplers", "scene", "scenes", "skins", "textures"]),
     ("accessors", &["bufferView", "byteOffset", "componentType", "count", "max", "min", "normalized", "sparse", "type"]),
@@ -61,6 +61,8 @@ const KNOWN: [(&str, &[&str]); 43] = [
         "specularFactor", "specularGlossinessTexture"]),
     ("materials/KHR_materials_pbrSpecularGlossiness/diffuseTexture", &["index", "texCoord"]),
     ("materials/KHR_materials_pbrSpecularGlossiness/specularGlossinessTexture", &["index", "texCoord"]),
+    ("materials/KHR_materials_specular", &["specularColorFactor", "specularColorTexture", "specularFactor",
+        "specularTexture"]),
     ("materials/KHR_materials_transmission", &["transmissionFactor", "transmissionTexture"]),
     ("materials/KHR_materials_unlit", &[]),
     // Of a traced volume, the thickness is that of the mesh

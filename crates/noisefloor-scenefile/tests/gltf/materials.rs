@@ -70,6 +70,14 @@ fn colours_are_texture_times_factor() {
     // The index of refraction says how much: ((2 − 1)/(2 + 1))²
     half.root["materials"][0]["extensions"] = json(r#"{"KHR_materials_ior": {"ior": 2}}"#);
     assert_close(mean(&half, 4096, 9), [0.5 / 9.0; 3], 2e-3);
+    // And KHR_materials_specular: a factor on it, head on; its colour counts as grey
+    let specular = r#"{"KHR_materials_specular": {"specularFactor": 0.5}, "KHR_materials_ior": {"ior": 2}}"#;
+    half.root["materials"][0]["extensions"] = json(specular);
+    assert_close(mean(&half, 4096, 9), [0.25 / 9.0; 3], 1.5e-3);
+    assert_warns(&half.load().unwrap(), &["material 0", "KHR_materials_specular is replaced by an index"]);
+    // Of factors of 1 there is nothing to say
+    half.root["materials"][0]["extensions"] = json(r#"{"KHR_materials_specular": {"specularFactor": 1}}"#);
+    assert_eq!(half.load().unwrap().warnings, []);
 }
 
 #[test]
