@@ -80,6 +80,8 @@ pub fn read_cube(path: impl AsRef<Path>) -> Result<ColourLut, PictureError> {
 /// [`CubeError`] if it is broken.
 pub fn parse_cube(text: &[u8]) -> Result<ColourLut, CubeError> {
     let mut head = Head::default();
+    // A byte order mark, as Windows writes it
+    let text = text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(text);
     let lines = text.split(|&b| b == b'\n').enumerate().map(|(i, line)| {
         let line = line.split(|&b| b == b'#').next().unwrap_or_default();
         (i + 1, String::from_utf8_lossy(line).trim().to_owned())

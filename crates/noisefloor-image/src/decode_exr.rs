@@ -93,7 +93,11 @@ fn decode_unguarded(
 
     // Headers: which part, which channels, how large; nothing that the file is too short for
     let most = opened.most_pixels;
-    let reader = exr::block::read(opened.reader, false).map_err(|e| broken(e.to_string()))?;
+    let reader = exr::block::read(opened.reader, false).map_err(|e| match e {
+        // The decoder refuses a whole file for it
+        exr::error::Error::NotSupported(what) if what.contains("subsampl") => subsampled(path),
+        e => broken(e.to_string()),
+    })?;
     let choice = choose(path, reader.headers())?;
     let part = reader.headers()[choice.part].clone();
     check_part(path, &part, most)?;
@@ -215,13 +219,19 @@ fn layers(names: &[String]) -> Vec<&str> {
     layers
 }
 
+/// Pictures of luminance and chroma have a quarter of their chroma.
+fn subsampled(path: &Path) -> PictureError {
+    let what = "subsampled channels, as of luminance and chroma (Y, RY, BY), are not read";
+    PictureError::Unsupported { path: path.to_owned(), what, advice: "save R, G and B at full resolution" }
+}
+
 fn check_part(path: &Path, part: &Header, most: usize) -> Result<(), PictureError> {
     let unsupported = |what, advice| Err(PictureError::Unsupported { path: path.to_owned(), what, advice });
     if part.deep {
         return unsupported("deep pixels are not read", "flatten the image");
     }
     if part.channels.list.iter().any(|channel| channel.sampling.0 != 1 || channel.sampling.1 != 1) {
-        return unsupported("subsampled channels are not read", "save every channel at full resolution");
+        return Err(subsampled(path));
     }
     check_size(path, (part.layer_size.width(), part.layer_size.height()), most)?;
     let block = part.max_block_pixel_size();

@@ -195,10 +195,15 @@ def read_film(props, init, warnings):
     film |= {"width": props.get("crop_width", width), "height": props.get("crop_height", height)}
     film |= {"x": props.get("crop_offset_x", 0), "y": props.get("crop_offset_y", 0)}
     if init["width"] is not None:
-        if (film["width"], film["height"]) != (width, height):
-            warnings.append("the crop window of the scene is not used, since another size is asked for")
-        width, height = init["width"], init["height"]
-        film = {"full_width": width, "full_height": height, "width": width, "height": height, "x": 0, "y": 0}
+        # The same part of the scene in more or fewer pixels, as the built-in renderer shows it: the whole grows with it
+        for size, offset in (("width", "x"), ("height", "y")):
+            scale, wanted = init[size] / film[size], init[size]
+            exact = film["full_" + size] * scale, film[offset] * scale
+            film[offset] = round(exact[1])
+            film["full_" + size] = max(round(exact[0]), film[offset] + wanted)
+            film[size] = wanted
+            if (film["full_" + size], film[offset]) != exact:
+                warnings.append(f"the crop window has no whole pixels at this {size}: it is moved by up to one")
     return film
 
 

@@ -1,6 +1,7 @@
 //! Surfaces in groups, and what they have at their corners.
 
 use crate::math::Vec3;
+use crate::texture::{Coordinates, twice};
 
 /// "None" among indices.
 pub(crate) const NO: u32 = u32::MAX;
@@ -19,10 +20,14 @@ pub(crate) struct Group {
     /// Index of the first surface's corners; [`NO`] if the group is flat and has no texture coordinates.
     pub(crate) corners: u32,
     /// Where the group's normals and texture coordinates begin in [`Vertices`]; [`NO`] if there are none.
+    /// Both pairs of coordinates are in one list.
     pub(crate) normals: u32,
     pub(crate) uvs: u32,
-    /// Where its colours of corners begin there; [`NO`] if there are none.
+    pub(crate) second_uvs: u32,
+    /// Where its colours and alphas of corners, and its tangents begin there; [`NO`] if there are none.
     pub(crate) colours: u32,
+    pub(crate) alphas: u32,
+    pub(crate) tangents: u32,
     /// The axes of a sphere's texture coordinates, or how those of a disk run; [`NO`] for the usual ones.
     pub(crate) frame: u32,
 }
@@ -34,6 +39,8 @@ pub(crate) struct Vertices {
     pub(crate) normals: Vec<[f32; 3]>,
     pub(crate) uvs: Vec<[f32; 2]>,
     pub(crate) colours: Vec<[f32; 3]>,
+    pub(crate) alphas: Vec<f32>,
+    pub(crate) tangents: Vec<[f32; 4]>,
 }
 
 /// All surfaces of a scene, apart from their shapes.
@@ -56,16 +63,24 @@ impl Geometry {
 
     /// Texture coordinates of a planar surface of `group`, at `uv` along its edges.
     #[inline]
-    pub(crate) fn texture_coordinates(&self, group: &Group, prim: u32, [u, v]: [f32; 2]) -> [f32; 2] {
+    pub(crate) fn texture_coordinates(&self, group: &Group, prim: u32, [u, v]: [f32; 2]) -> Coordinates {
         if group.uvs == NO {
-            return match group.frame {
+            return twice(match group.frame {
                 RINGS | RINGS_REVERSED => rings(group.frame, u, v),
                 _ => [u, v],
-            };
+            });
         }
         let corners = self.vertices.corners[(group.corners + prim - group.first) as usize];
-        let [a, b, c] = corners.map(|i| self.vertices.uvs[(group.uvs + i) as usize]);
-        std::array::from_fn(|i| a[i] + (b[i] - a[i]) * u + (c[i] - a[i]) * v)
+        let pair = |uvs: u32| -> [f32; 2] {
+            let [a, b, c] = corners.map(|i| self.vertices.uvs[(uvs + i) as usize]);
+            std::array::from_fn(|i| a[i] + (b[i] - a[i]) * u + (c[i] - a[i]) * v)
+        };
+        let first = pair(group.uvs);
+        if group.second_uvs == NO {
+            return twice(first);
+        }
+        let second = pair(group.second_uvs);
+        [first[0], first[1], second[0], second[1]]
     }
 
     /// A sphere's normal along the axes of its texture coordinates, of which the second points up.
@@ -96,15 +111,34 @@ impl Geometry {
         (a * (1.0 - u - v) + b * u + c * v).clamp(Vec3::ZERO, Vec3::ONE)
     }
 
+    /// The alpha between the corners of a planar surface of `group`, which has alphas.
+    #[inline(never)]
+    pub(crate) fn alpha(&self, group: &Group, prim: u32, [u, v]: [f32; 2]) -> f32 {
+        let corners = self.vertices.corners[(group.corners + prim - group.first) as usize];
+        let [a, b, c] = corners.map(|i| self.vertices.alphas[(group.alphas + i) as usize]);
+        (a * (1.0 - u - v) + b * u + c * v).clamp(0.0, 1.0)
+    }
+
+    /// The tangent between the corners of a planar surface of `group`, which has tangents, and the sign of
+    /// its bitangent.
+    pub(crate) fn tangent(&self, group: &Group, prim: u32, [u, v]: [f32; 2]) -> (Vec3, f32) {
+        let corners = self.vertices.corners[(group.corners + prim - group.first) as usize];
+        let rows = corners.map(|i| self.vertices.tangents[(group.tangents + i) as usize]);
+        let [a, b, c] = rows.map(|[x, y, z, _]| Vec3::new(x, y, z));
+        (a * (1.0 - u - v) + b * u + c * v, rows[0][3])
+    }
+
     /// Memory that it takes, in bytes.
     pub(crate) fn bytes(&self) -> usize {
-        let Vertices { corners, normals, uvs, colours } = &self.vertices;
+        let Vertices { corners, normals, uvs, colours, alphas, tangents } = &self.vertices;
         size_of_val(self.group_of.as_slice())
             + size_of_val(self.groups.as_slice())
             + size_of_val(corners.as_slice())
             + size_of_val(normals.as_slice())
             + size_of_val(uvs.as_slice())
             + size_of_val(colours.as_slice())
+            + size_of_val(alphas.as_slice())
+            + size_of_val(tangents.as_slice())
             + size_of_val(self.frames.as_slice())
     }
 }

@@ -6,6 +6,7 @@ use crate::intersection::Intersection;
 use crate::light::{Light, LightSample, LightShape};
 use crate::math::Vec3;
 use crate::scene::{Scene, Sky};
+use crate::texture::{Texture, twice};
 
 /// Light that a ray hit.
 #[derive(Clone, Copy, Debug)]
@@ -76,11 +77,16 @@ impl Scene {
         match self.emission_textures.get(light.texture as usize) {
             None => Vec3::ONE,
             // The picture of a projector
-            Some(texture) if light.prim == NO => texture.eval(uv[0], uv[1]),
+            Some(texture) if light.prim == NO => texture.eval(twice(uv)),
             Some(texture) => {
                 let group = self.geometry.group(light.prim);
-                let [u, v] = self.geometry.texture_coordinates(group, light.prim, uv);
-                texture.eval(u, v)
+                let factor = texture.eval(self.geometry.texture_coordinates(group, light.prim, uv));
+                match texture {
+                    Texture::Corners(_) if group.colours != NO => {
+                        factor * self.geometry.tint(group, light.prim, uv)
+                    }
+                    _ => factor,
+                }
             }
         }
     }

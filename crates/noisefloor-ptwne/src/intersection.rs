@@ -8,6 +8,7 @@ use crate::math::{Frame, Ray, Vec3};
 use crate::relief::{self, Relief};
 use crate::rng;
 use crate::scene::Scene;
+use crate::texture::{Coordinates, Texture, twice};
 
 /// What a coat with an index of refraction of 1.5 reflects at normal incidence.
 const COAT: f32 = 0.04;
@@ -36,7 +37,7 @@ pub(crate) struct Intersection<'a> {
     pub(crate) normal: Vec3,
     /// Whether the ray hit the front.
     pub(crate) front: bool,
-    pub(crate) uv: [f32; 2],
+    pub(crate) uv: Coordinates,
     /// Along growing u, of any length; 0 if that does not count.
     pub(crate) along: Vec3,
     /// The colour between its corners; white if they have none.
@@ -93,13 +94,26 @@ impl Scene {
         match &material.opacity {
             None => true,
             Some(opacity) => {
-                let ([u, v], far) = match spot {
+                let (at, far) = match spot {
                     Spot::Plane { uv, .. } => (self.geometry.texture_coordinates(group, prim, uv), false),
                     Spot::Sphere { normal, far, .. } => {
-                        (sphere_coordinates(self.geometry.to_local(group, normal)), far)
+                        (twice(sphere_coordinates(self.geometry.to_local(group, normal))), far)
                     }
                 };
-                let c = opacity.eval(u, v);
+                let c = opacity.eval(at);
+                // Of equal channels the mean is rounded, which a cutoff would notice
+                let mut opacity = match material.cutoff {
+                    Some(_) => c.max_element(),
+                    None => (c.x + c.y + c.z) * (1.0 / 3.0),
+                };
+                if let (Some(Texture::Corners(_)), Spot::Plane { uv, .. }) = (&material.opacity, spot)
+                    && group.alphas != NO
+                {
+                    opacity *= self.geometry.alpha(group, prim, uv);
+                }
+                if let Some(cutoff) = material.cutoff {
+                    return opacity >= cutoff;
+                }
                 // The two sides of a sphere decide for themselves, and so do instances
                 let side = u64::from(far) << 63 | u64::from(instance.wrapping_add(1)) << 32;
                 let number = match test {
@@ -108,7 +122,7 @@ impl Scene {
                         sobol_burley::sample(index, 0, rng::mix(seed ^ side ^ u64::from(prim)) as u32)
                     }
                 };
-                number < (c.x + c.y + c.z) * (1.0 / 3.0)
+                number < opacity
             }
         }
     }
@@ -138,7 +152,7 @@ impl Scene {
             }
         };
         let uv = match shape {
-            HitShape::Sphere { .. } => sphere_coordinates(self.geometry.to_local(group, flat)),
+            HitShape::Sphere { .. } => twice(sphere_coordinates(self.geometry.to_local(group, flat))),
             HitShape::Plane { .. } => self.geometry.texture_coordinates(group, prim, hit.uv),
         };
         let mut normal = flat;
@@ -190,7 +204,8 @@ impl Scene {
         let Sides { flat, normal, front, uv, shiny } = sides;
         // Relief is that of the front; from behind its bumps are dents
         let sign = if front { 1.0 } else { -1.0 };
-        let along = self.tangents(hit, flat * sign);
+        let given = if relief.is_of_normals() { self.given_tangents(hit, normal * sign) } else { None };
+        let along = given.or_else(|| self.tangents(hit, flat * sign, relief.is_second()));
         match along.and_then(|along| relief.turned(normal * sign, along, uv)) {
             Some(turned) => relief::bent(turned * sign, flat, -dir, shiny),
             None => normal,
@@ -201,7 +216,7 @@ impl Scene {
     #[cold]
     #[inline(never)]
     fn growing_u(&self, hit: &Hit, flat: Vec3) -> Vec3 {
-        self.tangents(hit, flat).map_or(Vec3::ZERO, |[along, _]| along.normalize_or_zero())
+        self.tangents(hit, flat, false).map_or(Vec3::ZERO, |[along, _]| along.normalize_or_zero())
     }
 }
 
@@ -210,7 +225,7 @@ struct Sides {
     flat: Vec3,
     normal: Vec3,
     front: bool,
-    uv: [f32; 2],
+    uv: Coordinates,
     /// Whether it mirrors.
     shiny: bool,
 }

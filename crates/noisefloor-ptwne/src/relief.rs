@@ -3,7 +3,7 @@
 use crate::checks::check_range;
 use crate::error::SceneError;
 use crate::math::Vec3;
-use crate::texture::Texture;
+use crate::texture::{Coordinates, Texture, twice};
 
 /// Largest factor on a relief.
 const MAX_SCALE: f32 = 1e6;
@@ -43,14 +43,25 @@ impl Relief {
         map.check()
     }
 
+    /// Whether it is along growing coordinates, so that tangents of a mesh can stand for these.
+    pub(crate) fn is_of_normals(&self) -> bool {
+        matches!(self, Self::Normals { .. })
+    }
+
+    /// Whether it takes the second texture coordinates.
+    pub(crate) fn is_second(&self) -> bool {
+        let (Self::Normals { map, .. } | Self::Heights { map, .. }) = self;
+        map.is_second()
+    }
+
     /// The shading normal `n` of the front, turned. `along` are the derivatives of the position by u and v.
     /// `None` if it stays as it is.
-    pub(crate) fn turned(&self, n: Vec3, along: [Vec3; 2], [u, v]: [f32; 2]) -> Option<Vec3> {
+    pub(crate) fn turned(&self, n: Vec3, along: [Vec3; 2], at: Coordinates) -> Option<Vec3> {
         // Along the plane of the shading normal
         let [du, dv] = along.map(|d| d - n * n.dot(d));
         match self {
             Self::Normals { map, scale, mirrors } => {
-                let c = map.eval(u, v) * 2.0 - Vec3::ONE;
+                let c = map.eval(at) * 2.0 - Vec3::ONE;
                 let (x, mut y) = (c.x * scale, c.y * scale);
                 if x == 0.0 && y == 0.0 {
                     return None;
@@ -63,7 +74,7 @@ impl Relief {
                 (s * x + t * y + n * c.z).try_normalize()
             }
             Self::Heights { map, scale } => {
-                let [hu, hv] = slope(map, u, v).map(|slope| slope * scale);
+                let [hu, hv] = slope(map, at).map(|slope| slope * scale);
                 if hu == 0.0 && hv == 0.0 {
                     return None;
                 }
@@ -76,15 +87,17 @@ impl Relief {
 }
 
 /// The slopes of a texture's mean channel along u and v.
-fn slope(map: &Texture, u: f32, v: f32) -> [f32; 2] {
+fn slope(map: &Texture, at: Coordinates) -> [f32; 2] {
     let height = |c: Vec3| (c.x + c.y + c.z) * (1.0 / 3.0);
     let Texture::Image(image) = map else {
         const STEP: f32 = 1e-3;
-        let rise = |[u1, v1]: [f32; 2], [u0, v0]: [f32; 2]| {
-            (height(map.eval(u1, v1)) - height(map.eval(u0, v0))) / (2.0 * STEP)
+        let [u, v, ..] = at;
+        let rise = |to: [f32; 2], from: [f32; 2]| {
+            (height(map.eval(twice(to))) - height(map.eval(twice(from)))) / (2.0 * STEP)
         };
         return [rise([u + STEP, v], [u - STEP, v]), rise([u, v + STEP], [u, v - STEP])];
     };
+    let [u, v] = image.own(at);
     // An eighth of a pixel, so that nearly all differences are those of bilinear interpolation
     let [x, y] = image.to_uv.map(|row| row[0] * u + row[1] * v + row[2]);
     let (dx, dy) = (0.125 / image.width as f32, 0.125 / image.height as f32);
@@ -132,7 +145,7 @@ mod tests {
     #[test]
     fn normals_are_those_of_the_frame() {
         let along = [Vec3::X * 3.0, Vec3::Y * 0.1];
-        let turned = |relief: Relief, along| relief.turned(Vec3::Z, along, [0.3, 0.7]);
+        let turned = |relief: Relief, along| relief.turned(Vec3::Z, along, twice([0.3, 0.7]));
         assert_eq!(turned(normals([0.5, 0.5, 1.0], 1.0, false), along), None);
         // (0.6, 0, 0.8) and (0, −0.6, 0.8)
         let close = |a: Option<Vec3>, b: [f32; 3]| (a.unwrap() - Vec3::from(b)).length() < 1e-6;
@@ -158,12 +171,12 @@ mod tests {
         let relief = Relief::Heights { map: Texture::Image(image), scale: 2.0 };
         // u runs 4 units along x, over which the height grows by 2: a slope of 1/2
         for dv in [Vec3::Y, -Vec3::Y] {
-            let turned = relief.turned(Vec3::Z, [Vec3::X * 4.0, dv], [0.4, 0.5]).unwrap();
+            let turned = relief.turned(Vec3::Z, [Vec3::X * 4.0, dv], twice([0.4, 0.5])).unwrap();
             let expected = Vec3::new(-0.5, 0.0, 1.0).normalize();
             assert!((turned - expected).length() < 1e-4, "{turned}");
         }
         let flat = Relief::Heights { map: Texture::Colour([0.3; 3]), scale: 2.0 };
-        assert_eq!(flat.turned(Vec3::Z, [Vec3::X, Vec3::Y], [0.4, 0.5]), None);
+        assert_eq!(flat.turned(Vec3::Z, [Vec3::X, Vec3::Y], twice([0.4, 0.5])), None);
     }
 
     #[test]

@@ -41,9 +41,10 @@ pub enum Texture {
     },
     /// An image.
     Image(ImageTexture),
-    /// The colours of the mesh's corners ([`Mesh::colours`](crate::Mesh::colours)), interpolated, times a texture
-    /// if there is one. Only for the colour of a material and the share of a mix: anywhere else, and on surfaces
-    /// without such colours, corners are white.
+    /// The colours of the mesh's corners ([`Mesh::colours`](crate::Mesh::colours)), interpolated, times a
+    /// texture if there is one. Of an opacity, their [alphas](crate::Mesh::alphas). Only for the colour and
+    /// the opacity of a material, the share of a mix, and what a surface emits: anywhere else, and on
+    /// surfaces without such colours, corners are white.
     Corners(Option<Box<Texture>>),
 }
 
@@ -64,7 +65,13 @@ pub struct ImageTexture {
     pub wrap: [Wrap; 2],
     /// Whether each pixel has one colour, instead of interpolating between pixels.
     pub nearest: bool,
+    /// Whether (u, v) are the second texture coordinates of the mesh,
+    /// [`Mesh::second_uvs`](crate::Mesh::second_uvs).
+    pub second: bool,
 }
+
+/// The first and the second texture coordinates of a point, which are equal if there is one pair.
+pub(crate) type Coordinates = [f32; 4];
 
 /// Pixels of an image, shared by all textures that use it.
 #[derive(Clone, Debug, PartialEq)]
@@ -190,12 +197,19 @@ impl Texture {
         }
         const SIDE: u32 = 64;
         let centre = |i: u32| (i as f32 + 0.5) / SIDE as f32;
-        let points = (0..SIDE * SIDE).map(|i| self.eval(centre(i % SIDE), centre(i / SIDE)));
+        let point = |i: u32| [centre(i % SIDE), centre(i / SIDE)];
+        let points = (0..SIDE * SIDE).map(|i| self.eval(twice(point(i))));
         points.sum::<Vec3>() / (SIDE * SIDE) as f32
     }
 
-    /// The colour at (u, v).
-    pub(crate) fn eval(&self, u: f32, v: f32) -> Vec3 {
+    /// Whether it takes the second texture coordinates.
+    pub(crate) fn is_second(&self) -> bool {
+        matches!(self, Texture::Image(image) if image.second)
+    }
+
+    /// The colour at texture coordinates.
+    pub(crate) fn eval(&self, at: Coordinates) -> Vec3 {
+        let [u, v, ..] = at;
         match self {
             Texture::Colour(c) => Vec3::from_array(*c),
             Texture::Checker { colours, scale } => {
@@ -221,9 +235,9 @@ impl Texture {
                 let t = (sum * (16.0 / 15.0)).clamp(0.0, 1.0);
                 Vec3::from_array(colours[0]).lerp(Vec3::from_array(colours[1]), t)
             }
-            Texture::Image(image) => image.eval(u, v),
+            Texture::Image(image) => image.eval(at),
             Texture::Corners(None) => Vec3::ONE,
-            Texture::Corners(Some(texture)) => texture.eval(u, v),
+            Texture::Corners(Some(texture)) => texture.eval(at),
         }
     }
 }
@@ -235,7 +249,7 @@ impl ImageTexture {
     /// An image that covers the unit square and repeats outside of it.
     pub fn new(width: usize, height: usize, pixels: Pixels) -> Self {
         let (factor, wrap) = ([1.0; 3], [Wrap::Repeat; 2]);
-        Self { width, height, pixels, to_uv: Self::IDENTITY, factor, wrap, nearest: false }
+        Self { width, height, pixels, to_uv: Self::IDENTITY, factor, wrap, nearest: false, second: false }
     }
 
     /// The mean colour of its pixels, times the factor.
@@ -261,7 +275,14 @@ impl ImageTexture {
         }
     }
 
-    fn eval(&self, u: f32, v: f32) -> Vec3 {
+    /// The pair of texture coordinates that it takes.
+    #[inline]
+    pub(crate) fn own(&self, [u, v, second_u, second_v]: Coordinates) -> [f32; 2] {
+        if self.second { [second_u, second_v] } else { [u, v] }
+    }
+
+    fn eval(&self, at: Coordinates) -> Vec3 {
+        let [u, v] = self.own(at);
         let place = |row: [f32; 3]| row[0] * u + row[1] * v + row[2];
         self.at(place(self.to_uv[0]), place(self.to_uv[1]))
     }
@@ -292,6 +313,12 @@ impl ImageTexture {
         };
         a.lerp(b, fx).lerp(c.lerp(d, fx), fy) * factor
     }
+}
+
+/// Texture coordinates of which there is one pair.
+#[inline]
+pub(crate) fn twice([u, v]: [f32; 2]) -> Coordinates {
+    [u, v, u, v]
 }
 
 /// A fixed pseudo-random number in [0, 1) for each lattice point.
@@ -327,7 +354,7 @@ mod tests {
         ] {
             texture.check().unwrap();
             for i in -500..500 {
-                let c = texture.eval(i as f32 * 0.037, i as f32 * -0.11);
+                let c = texture.eval(twice([i as f32 * 0.037, i as f32 * -0.11]));
                 assert!(c.min_element() >= 0.0999 && c.max_element() <= 0.9001, "{texture:?}: {c}");
             }
         }
@@ -340,7 +367,7 @@ mod tests {
         assert_eq!(error, SceneError::Image { width: 2, height: 2, found: 3 });
         let top_white = Pixels::Srgb8([[255; 3], [255; 3], [0; 3], [0; 3]].into());
         let mut image = ImageTexture::new(2, 2, top_white);
-        let at = |image: &ImageTexture, v: f32| Texture::Image(image.clone()).eval(0.5, v).x;
+        let at = |image: &ImageTexture, v: f32| Texture::Image(image.clone()).eval(twice([0.5, v])).x;
         assert_eq!((at(&image, 0.75), at(&image, 0.25)), (1.0, 0.0));
         assert_eq!(at(&image, 0.5), 0.5);
         image.nearest = true;

@@ -2,6 +2,35 @@
 
 use noisefloor::{Rgb, display::srgb_decode};
 use noisefloor_ptwne::{ImageTexture, Pixels, Texture};
+use std::cell::RefCell;
+use std::collections::HashMap;
+
+/// The mean colours of pictures, each found once: any number of surfaces can ask for one.
+#[derive(Debug, Default)]
+pub(crate) struct Means {
+    /// By the address of the pixels, which stay here so that no other ones get it.
+    known: RefCell<HashMap<usize, (Pixels, Rgb)>>,
+}
+
+impl Means {
+    /// The mean colour of a texture.
+    pub(crate) fn of(&self, texture: &Texture) -> Rgb {
+        let image = match texture {
+            Texture::Colour(colour) => return *colour,
+            Texture::Image(image) => image,
+            // The readers make no others
+            _ => return [0.5; 3],
+        };
+        let key = match &image.pixels {
+            Pixels::Srgb8(codes) | Pixels::Linear8(codes) => codes.as_ptr().addr(),
+            Pixels::Float(values) => values.as_ptr().addr(),
+        };
+        let mut known = self.known.borrow_mut();
+        let plain = || ImageTexture { factor: [1.0; 3], ..image.clone() }.mean();
+        let (_, mean) = known.entry(key).or_insert_with(|| (image.pixels.clone(), plain()));
+        std::array::from_fn(|i| mean[i] * image.factor[i])
+    }
+}
 
 /// Linear values of pixels.
 pub(crate) fn linear(pixels: &Pixels) -> Vec<Rgb> {

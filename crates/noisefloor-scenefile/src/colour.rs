@@ -5,6 +5,8 @@ use noisefloor::Rgb;
 /// First wavelength of [`CIE`] in nanometres, and the step between its rows.
 const FIRST: f64 = 360.0;
 const STEP: f64 = 5.0;
+/// Wavelengths of the first and the last row in nanometres.
+pub(crate) const VISIBLE: [f64; 2] = [FIRST, 830.0];
 /// Integral of the second column of [`CIE`], which is what turns a spectrum of 1 into a Y of 1.
 const Y_INTEGRAL: f64 = 106.857;
 /// Temperatures that black bodies may have, in kelvin.
@@ -58,6 +60,12 @@ pub(crate) fn peak_of_black_body(temperature: f64) -> f64 {
     planck(2.897_772e6 / temperature, temperature)
 }
 
+/// The colour of a standard illuminant of luminance 1, by its name without `stdillum-` or `illum-`.
+pub(crate) fn of_illuminant(name: &str) -> Option<Rgb> {
+    let (_, [x, y]) = ILLUMINANTS.iter().find(|illuminant| illuminant.0 == name)?;
+    Some(of_xyz([x / y, 1.0, (1.0 - x - y) / y]))
+}
+
 /// XYZ as a linear Rec.709 colour; what is negative becomes 0.
 pub(crate) fn of_xyz(xyz: [f64; 3]) -> Rgb {
     linear(xyz).map(|c| c.max(0.0) as f32)
@@ -98,6 +106,27 @@ const RGB_OF_XYZ: [[f64; 3]; 3] = [
     [3.240_479, -1.537_15, -0.498_535],
     [-0.969_256, 1.875_991, 0.041_556],
     [0.055_648, -0.204_043, 1.057_311],
+];
+
+/// Chromaticities x and y of the CIE's standard illuminants (CIE 15:2004, tables T.3 and T.8), and of the D60
+/// of ACES (SMPTE ST 2065-1).
+const ILLUMINANTS: [(&str, [f64; 2]); 16] = [
+    ("A", [0.447_57, 0.407_45]),
+    ("D50", [0.345_67, 0.358_50]),
+    ("D65", [0.312_72, 0.329_03]),
+    ("acesD60", [0.321_68, 0.337_67]),
+    ("F1", [0.313_10, 0.337_27]),
+    ("F2", [0.372_08, 0.375_29]),
+    ("F3", [0.409_10, 0.394_30]),
+    ("F4", [0.440_18, 0.403_29]),
+    ("F5", [0.313_79, 0.345_31]),
+    ("F6", [0.377_90, 0.388_35]),
+    ("F7", [0.312_92, 0.329_33]),
+    ("F8", [0.345_88, 0.358_75]),
+    ("F9", [0.374_17, 0.372_81]),
+    ("F10", [0.346_09, 0.359_86]),
+    ("F11", [0.380_52, 0.377_13]),
+    ("F12", [0.436_95, 0.404_41]),
 ];
 
 /// The colour matching functions x̄, ȳ and z̄ of the CIE 1931 standard observer (CIE 018:2019), and the

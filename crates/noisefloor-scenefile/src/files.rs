@@ -3,7 +3,8 @@
 use crate::error::{LoadError, Place};
 use noisefloor::source::SourceIdentity;
 use noisefloor_ptwne::check_memory;
-use std::cell::RefCell;
+use std::borrow::Cow;
+use std::cell::{Cell, RefCell};
 use std::fs::File;
 use std::io::{self, Read};
 use std::path::{Component, Path, PathBuf};
@@ -15,6 +16,8 @@ const EACH_BYTE_OF_TREES: u64 = 32;
 
 /// Longest mesh or picture that is read, in bytes.
 pub(crate) const MAX_FILE_BYTES: u64 = 1 << 28;
+/// Most bytes of all files, each counted as often as it is read.
+const MAX_BYTES: u64 = 1 << 34;
 /// Most folders that a scene may add to those where its files are looked for.
 const MAX_FOLDERS: u64 = 64;
 
@@ -27,6 +30,8 @@ pub(crate) struct Folder {
     searched: Vec<PathBuf>,
     /// Digests of all files that were read.
     contents: RefCell<SourceIdentity>,
+    /// Bytes that were read, those of a file that is read again counted again.
+    bytes: Cell<u64>,
 }
 
 impl Folder {
@@ -40,7 +45,8 @@ impl Folder {
             _ => PathBuf::from("."),
         };
         let root = root.map_or_else(|| shared(&path), Path::to_owned);
-        Self { root, searched: vec![path], contents: RefCell::new(SourceIdentity::new(options)) }
+        let contents = RefCell::new(SourceIdentity::new(options));
+        Self { root, searched: vec![path], contents, bytes: Cell::new(0) }
     }
 
     /// Adds a folder, relative to the scene's own, in which to look for files.
@@ -93,6 +99,11 @@ impl Folder {
     /// Reads a regular file of at most `limit` bytes that is named at `place`, and notes what is in it.
     pub(crate) fn read(&self, path: &Path, limit: u64, place: &Place) -> Result<Vec<u8>, LoadError> {
         let bytes = read(path, limit, place)?;
+        self.bytes.set(self.bytes.get().saturating_add(bytes.len() as u64));
+        place.clone().at_most("bytes of files so far", self.bytes.get(), MAX_BYTES)?;
+        if let Some(instead) = stand_in(&bytes) {
+            return Err(Place::file(path).bad(instead));
+        }
         // As seen from the scene, which may be moved with its files
         let name = path.strip_prefix(&self.searched[0]).unwrap_or(path).display().to_string();
         self.contents.borrow_mut().add(name, &bytes);
@@ -157,6 +168,44 @@ fn is_private_to_a_collection(folder: &Path, home: Option<&Path>) -> bool {
 pub(crate) fn has_memory(bytes: u64, each: u64, place: &Place) -> Result<(), LoadError> {
     let bytes = usize::try_from(bytes.saturating_mul(each)).unwrap_or(usize::MAX);
     check_memory(bytes).map_err(|cause| LoadError::Scene { place: place.clone(), cause })
+}
+
+/// What a file holds instead of itself, if that is known, and what to do.
+fn stand_in(bytes: &[u8]) -> Option<&'static str> {
+    // The first line of a pointer (git-lfs, docs/spec.md); of a locked file of git-annex, its key
+    if bytes.starts_with(b"version https://git-lfs.github.com/spec/") {
+        return Some("this is a Git LFS pointer, not the file itself: run `git lfs pull`");
+    }
+    if bytes.len() < 1024 && bytes.starts_with(b"/annex/objects/") {
+        return Some("this is a pointer of git-annex, not the file itself: run `git annex get`");
+    }
+    let start = bytes.trim_ascii_start();
+    let is = |word: &[u8]| start.get(..word.len()).is_some_and(|found| found.eq_ignore_ascii_case(word));
+    (is(b"<!doctype html") || is(b"<html"))
+        .then_some("this is a web page (HTML), not the file itself: download that again")
+}
+
+/// The text of a file: UTF-8, or UTF-16 with a byte order mark, or else Latin-1, in which any bytes are text.
+pub(crate) fn text(bytes: &[u8]) -> Cow<'_, str> {
+    let words = |word: fn([u8; 2]) -> u16| -> String {
+        let words = bytes[2..].chunks_exact(2).map(|pair| word([pair[0], pair[1]]));
+        char::decode_utf16(words).map(|c| c.unwrap_or(char::REPLACEMENT_CHARACTER)).collect()
+    };
+    match bytes {
+        [0xff, 0xfe, ..] => words(u16::from_le_bytes).into(),
+        [0xfe, 0xff, ..] => words(u16::from_be_bytes).into(),
+        _ => {
+            let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+            let latin_1 = || bytes.iter().map(|b| *b as char).collect::<String>();
+            std::str::from_utf8(bytes).map_or_else(|_| latin_1().into(), Cow::Borrowed)
+        }
+    }
+}
+
+/// The lines of a text, which end by \n, \r\n, or by \r alone, as on old Macs.
+pub(crate) fn lines(text: &str) -> impl Iterator<Item = &str> {
+    let end = if text.contains('\n') { '\n' } else { '\r' };
+    text.split(end).map(|line| line.strip_suffix('\r').unwrap_or(line))
 }
 
 /// Reads a regular file.

@@ -4,6 +4,7 @@
 //! Files are hostile until parsed: every length is checked before anything is allocated, every error says
 //! which file and where, and what is not supported is named, with whether it was ignored or is fatal.
 
+mod bounds;
 mod channels;
 mod colour;
 mod error;
@@ -32,6 +33,8 @@ pub struct Loaded {
     pub size: Option<(usize, usize)>,
     /// Longest path, in segments, that the file asks for.
     pub max_depth: Option<u32>,
+    /// Largest channel of a sample that the file asks for: brighter ones are scaled down to it.
+    pub clamp: Option<f32>,
     /// What was ignored or replaced.
     pub warnings: Vec<Warning>,
 }

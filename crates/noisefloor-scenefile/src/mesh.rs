@@ -2,6 +2,7 @@
 
 pub(crate) mod obj;
 pub(crate) mod ply;
+pub(crate) mod polygon;
 pub(crate) mod serialized;
 pub(crate) mod solids;
 pub(crate) mod subdivide;
@@ -25,6 +26,8 @@ pub(crate) struct Triangles {
     pub(crate) face_colours: Vec<[f32; 3]>,
     /// Corners of each triangle; the front is where they run counter-clockwise.
     pub(crate) indices: Vec<[u32; 3]>,
+    /// What else its file has, which nobody reads.
+    pub(crate) unread: Vec<String>,
 }
 
 impl Triangles {
@@ -150,7 +153,11 @@ impl Triangles {
             return Ok(0);
         }
         let Self { positions, normals, uvs, colours, indices, .. } = self;
-        builder.mesh(&Mesh { positions, normals, uvs, colours, indices }, material, emission)
+        builder.mesh(
+            &Mesh { positions, normals, uvs, colours, indices, ..Mesh::default() },
+            material,
+            emission,
+        )
     }
 
     /// The parallelogram of one colour that the mesh consists of, as two flat triangles.

@@ -75,6 +75,12 @@ pub(crate) fn decode(bytes: &[u8], place: &Place) -> Result<Picture, LoadError> 
 /// As [`decode`], of a format that is known, or else has a mark.
 fn decode_as(bytes: &[u8], format: Option<ImageFormat>, place: &Place) -> Result<Picture, LoadError> {
     let broken = |e: image::ImageError| place.clone().bad(format!("the picture is broken: {e}"));
+    // A Radiance picture begins with `#?` and any word: RGBE, RADIANCE, rtrace. The decoder knows one
+    let renamed = bytes.strip_prefix(b"#?").map(|rest| {
+        let line = rest.iter().position(|b| *b == b'\n').unwrap_or(rest.len());
+        [b"#?RADIANCE".as_slice(), &rest[line..]].concat()
+    });
+    let bytes = renamed.as_deref().unwrap_or(bytes);
     let format = image::guess_format(bytes).ok().or(format);
     let (reader, length) = (Cursor::new(bytes), bytes.len());
     // The decoders are other people's code over hostile bytes: where one of them panics, the file is broken,

@@ -113,6 +113,37 @@ fn depth_and_size_are_those_asked_for() {
     }
 }
 
+/// A crop shows the same part of the scene at any size, as in the built-in renderer: here the upper right
+/// quarter, which a lamp fills.
+#[test]
+fn crops_show_the_same_part_at_any_size() {
+    if !usable(&RENDERER) {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let scene = folder.path().join("crop.xml");
+    let text = r#"<scene version="3.0.0"><integrator type="path"/><sensor type="orthographic">
+        <transform name="to_world"><lookat origin="0, 0, 5" target="0, 0, 0" up="0, 1, 0"/></transform>
+        <film type="hdrfilm"><integer name="width" value="64"/><integer name="height" value="48"/>
+        <integer name="crop_offset_x" value="32"/><integer name="crop_offset_y" value="0"/>
+        <integer name="crop_width" value="32"/><integer name="crop_height" value="24"/></film></sensor>
+        <shape type="rectangle"><transform name="to_world"><scale x="0.5" y="0.375"/>
+        <translate x="0.5" y="0.375"/></transform>
+        <emitter type="area"><rgb name="radiance" value="1"/></emitter></shape></scene>"#;
+    std::fs::write(&scene, text).unwrap();
+    for size in [(32, 24), (16, 12), (96, 72)] {
+        let mut source = open(&scene, size, Variant::Scalar);
+        assert_eq!(source.info().width, size.0);
+        let tile = Tile { index: 0, x: 0, y: 0, width: size.0, height: size.1 };
+        let mean = source.sample(&[Request::new(tile, 0, 16)]).unwrap().remove(0).mean;
+        assert!(
+            mean.iter().all(|p| (p[0] - 1.0).abs() < 1e-3),
+            "{size:?}: {:?}",
+            mean.iter().min_by(|a, b| a[0].total_cmp(&b[0]))
+        );
+    }
+}
+
 /// A plane under a sky, seen from infinity: what a pixel gets follows from its random numbers alone, not from
 /// its place.
 fn plane(folder: &Path) -> PathBuf {

@@ -249,7 +249,7 @@ impl SourceJob {
     }
 
     fn open_ptwne(&self, options: PtwneOptions) -> anyhow::Result<Opened> {
-        let Loaded { scene, size, max_depth, warnings } =
+        let Loaded { scene, size, max_depth, clamp: asked, warnings } =
             load(self.scene().unwrap_or(OsStr::new(DEFAULT_SCENE)), &self.scene_files)?;
         let (width, height) = self.size.or(size).unwrap_or(DEFAULT_SIZE);
         let name = scene.name().to_owned();
@@ -260,7 +260,7 @@ impl SourceJob {
             estimator,
             sampling,
             filter,
-            clamp,
+            clamp: clamp.or(asked),
             ..RenderOptions::default()
         };
         let source = Box::new(Ptwne::new(scene, width, height, options)?);
@@ -272,7 +272,7 @@ impl SourceJob {
 /// A built-in scene of that name, or the scene in that file.
 fn load(scene: &OsStr, options: &LoadOptions) -> anyhow::Result<Loaded> {
     if let Some(scene) = scene.to_str().and_then(scenes::by_name) {
-        return Ok(Loaded { scene, size: None, max_depth: None, warnings: vec![] });
+        return Ok(Loaded { scene, size: None, max_depth: None, clamp: None, warnings: vec![] });
     }
     let path = Path::new(scene);
     if path.extension().is_none() && !path.exists() {

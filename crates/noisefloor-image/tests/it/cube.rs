@@ -23,6 +23,9 @@ fn a_cube_that_changes_nothing_changes_nothing() {
         assert!(near(lut.map(colour), colour), "{colour:?}: {:?}", lut.map(colour));
     }
     assert!(near(lut.map([-1.0, 7.0, f32::NAN]), [0.0, 1.0, 0.0]));
+    // As Windows writes it, with a byte order mark
+    let marked = [b"\xef\xbb\xbfLUT_3D_SIZE 2\n".as_slice(), "1 1 1\n".repeat(8).as_bytes()].concat();
+    assert!(near(parse_cube(&marked).unwrap().map([0.0; 3]), [1.0; 3]));
 }
 
 /// What is linear in each channel is interpolated exactly.

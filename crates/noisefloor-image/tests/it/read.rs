@@ -1,4 +1,4 @@
-use crate::util::{exr_claiming, f32s, make_exr};
+use crate::util::{exr_claiming, exr_header, f32s, make_exr};
 use exr::prelude::{Compression, FlatSamples, IntegerBounds, f16};
 use image::{DynamicImage, ImageBuffer, ImageFormat};
 use noisefloor_image::{Picture, PictureError, read_exr, read_picture, read_png, write_png};
@@ -105,6 +105,16 @@ fn the_display_window_is_the_picture() {
     // Apart
     let error = read((5, 0), IntegerBounds::new((0, 0), (4, 3))).unwrap_err();
     assert!(matches!(error, PictureError::Unsupported { .. }), "{error}");
+}
+
+/// Luminance with a quarter of the chroma (OpenEXR, RgbaYca): refused by name, not as broken.
+#[test]
+fn luminance_and_chroma_are_refused_by_name() {
+    let (_folder, path) = scratch();
+    std::fs::write(&path, exr_header(4, 4, [("BY", 2), ("RY", 2), ("Y", 1)])).unwrap();
+    let error = read_exr(&path).unwrap_err();
+    assert!(matches!(error, PictureError::Unsupported { .. }), "{error}");
+    assert!(error.to_string().contains("luminance and chroma (Y, RY, BY)"), "{error}");
 }
 
 #[test]

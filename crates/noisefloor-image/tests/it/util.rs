@@ -41,6 +41,11 @@ pub(crate) fn flat_exr(path: &Path, size: (usize, usize), value: f32) {
 
 /// Bytes of an EXR header whose window is as large as its numbers allow, and nothing after it.
 pub(crate) fn exr_claiming(width: i32, height: i32) -> Vec<u8> {
+    exr_header(width, height, [("B", 1), ("G", 1), ("R", 1)])
+}
+
+/// The same with channels that have every so many pixels' values.
+pub(crate) fn exr_header(width: i32, height: i32, named: [(&str, i32); 3]) -> Vec<u8> {
     let mut bytes = vec![0x76, 0x2f, 0x31, 0x01, 2, 0, 0, 0];
     let mut attribute = |name: &str, kind: &str, value: &[u8]| {
         bytes.extend_from_slice(name.as_bytes());
@@ -52,10 +57,10 @@ pub(crate) fn exr_claiming(width: i32, height: i32) -> Vec<u8> {
     };
     let window: Vec<u8> = [0, 0, width - 1, height - 1].iter().flat_map(|v: &i32| v.to_le_bytes()).collect();
     let mut channels = Vec::new();
-    for name in ["B", "G", "R"] {
+    for (name, sampling) in named {
         channels.extend_from_slice(name.as_bytes());
         channels.push(0);
-        for v in [2i32, 0, 1, 1] {
+        for v in [2i32, 0, sampling, sampling] {
             channels.extend_from_slice(&v.to_le_bytes());
         }
     }

@@ -113,7 +113,7 @@ fn zoo() -> Vec<(Material, CompiledMaterial)> {
 
 /// The microfacets and coat of a material, seen from `wo`.
 fn seen(material: &CompiledMaterial, wo: Vec3) -> Glossy<'_> {
-    let (position, up, uv) = (Vec3::ZERO, Vec3::Z, [0.0; 2]);
+    let (position, up, uv) = (Vec3::ZERO, Vec3::Z, [0.0; 4]);
     let surface = Intersection {
         position,
         flat: up,

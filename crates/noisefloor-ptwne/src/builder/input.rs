@@ -52,6 +52,15 @@ pub struct Mesh<'a> {
     pub uvs: &'a [[f32; 2]],
     /// One colour per position for [`Texture::Corners`], each channel in 0…1, or none.
     pub colours: &'a [[f32; 3]],
+    /// One opacity of 0…1 per position for an opacity of [`Texture::Corners`], or none.
+    pub alphas: &'a [f32],
+    /// A second pair of texture coordinates per position for images that are
+    /// [`second`](crate::ImageTexture::second), or none. Only beside `uvs`.
+    pub second_uvs: &'a [[f32; 2]],
+    /// One tangent per position for a [`Relief::Normals`](crate::Relief::Normals), or none: its red is along
+    /// x, y and z, its green along the cross product of the shading normal and that, times the fourth number,
+    /// 1 or −1 (glTF 2.0, §3.7.2.1).
+    pub tangents: &'a [[f32; 4]],
     /// Three indices per triangle, counter-clockwise as seen from the front.
     pub indices: &'a [[u32; 3]],
 }
@@ -64,18 +73,25 @@ impl Mesh<'_> {
             ("normals", self.normals.len()),
             ("texture coordinates", self.uvs.len()),
             ("colours", self.colours.len()),
+            ("alphas", self.alphas.len()),
+            ("second texture coordinates", self.second_uvs.len()),
+            ("tangents", self.tangents.len()),
         ] {
             if found != 0 && found != vertices {
                 return Err(SceneError::Lengths { what, positions: vertices, found });
             }
         }
-        if !self.uvs.iter().flatten().all(|x| x.is_finite()) {
+        if !self.uvs.iter().chain(self.second_uvs).flatten().all(|x| x.is_finite()) {
             return Err(SceneError::NotFinite { what: "a texture coordinate" });
         }
         for p in self.positions.iter().chain(self.normals) {
             position(*p)?;
         }
         self.colours.iter().try_for_each(|c| check_reflectance(*c))?;
+        self.alphas.iter().try_for_each(|a| check_reflectance([*a; 3]))?;
+        for [x, y, z, _] in self.tangents {
+            position([*x, *y, *z])?;
+        }
         match self.indices.iter().flatten().find(|i| **i as usize >= vertices) {
             Some(&index) => Err(SceneError::Index { index, vertices }),
             None => Ok(()),

@@ -232,7 +232,9 @@ impl SceneBuilder {
         emission: Option<Emission>,
     ) -> Result<usize, SceneError> {
         mesh.check()?;
-        let with_vertices = [mesh.normals.len(), mesh.uvs.len(), mesh.colours.len()] != [0; 3];
+        let rows =
+            [mesh.normals.len(), mesh.uvs.len(), mesh.colours.len(), mesh.alphas.len(), mesh.tangents.len()];
+        let with_vertices = rows != [0; 5];
         let (mut group, group_emission) = self.group(material, emission.as_ref())?;
         if with_vertices {
             let vertices = &mut self.parts.geometry.vertices;
@@ -247,11 +249,26 @@ impl SceneBuilder {
                 group.uvs = index(vertices.uvs.len())?;
                 room(&mut vertices.uvs, mesh.uvs.len())?;
                 vertices.uvs.extend(mesh.uvs);
+                if !mesh.second_uvs.is_empty() {
+                    group.second_uvs = index(vertices.uvs.len())?;
+                    room(&mut vertices.uvs, mesh.second_uvs.len())?;
+                    vertices.uvs.extend(mesh.second_uvs);
+                }
             }
             if !mesh.colours.is_empty() {
                 group.colours = index(vertices.colours.len())?;
                 room(&mut vertices.colours, mesh.colours.len())?;
                 vertices.colours.extend(mesh.colours);
+            }
+            if !mesh.alphas.is_empty() {
+                group.alphas = index(vertices.alphas.len())?;
+                room(&mut vertices.alphas, mesh.alphas.len())?;
+                vertices.alphas.extend(mesh.alphas);
+            }
+            if !mesh.tangents.is_empty() {
+                group.tangents = index(vertices.tangents.len())?;
+                room(&mut vertices.tangents, mesh.tangents.len())?;
+                vertices.tangents.extend(mesh.tangents);
             }
         }
         let surfaces = self.parts.shapes.len() + mesh.indices.len();
@@ -330,7 +347,10 @@ impl SceneBuilder {
                 corners: NO,
                 normals: NO,
                 uvs: NO,
+                second_uvs: NO,
                 colours: NO,
+                alphas: NO,
+                tangents: NO,
                 frame: NO,
             },
             group_emission,

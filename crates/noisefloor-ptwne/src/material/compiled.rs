@@ -5,7 +5,7 @@ use crate::bsdf::{Coat, Facets, Fresnel, Ggx, Interior, MIN_ROUGHNESS, OrenNayar
 use crate::error::SceneError;
 use crate::math::Vec3;
 use crate::relief::Relief;
-use crate::texture::Texture;
+use crate::texture::{Coordinates, Texture};
 use std::sync::Arc;
 
 /// A material and its options, prepared for the inner loop.
@@ -13,6 +13,7 @@ use std::sync::Arc;
 pub(crate) struct CompiledMaterial {
     pub(crate) bsdf: Bsdf,
     pub(crate) opacity: Option<Texture>,
+    pub(crate) cutoff: Option<f32>,
     pub(crate) one_sided: bool,
     pub(crate) culled: bool,
     /// α along and across growing u.
@@ -100,7 +101,7 @@ pub(crate) enum Bsdf {
 impl Bsdf {
     /// What colour a denoiser should take the surface for: of diffuse and metallic parts their albedo, of
     /// glass its tint.
-    pub(crate) fn colour(&self, uv: [f32; 2], tint: Vec3) -> Vec3 {
+    pub(crate) fn colour(&self, uv: Coordinates, tint: Vec3) -> Vec3 {
         match self {
             Self::Diffuse { albedo: colour }
             | Self::Mirror { colour, .. }
@@ -131,18 +132,18 @@ impl Reflectance {
 
     /// The colour at `uv`, where that of the corners does not count.
     #[inline]
-    pub(crate) fn at(&self, uv: [f32; 2]) -> Vec3 {
+    pub(crate) fn at(&self, uv: Coordinates) -> Vec3 {
         self.tinted(uv, Vec3::ONE)
     }
 
     /// The colour at `uv`, between corners of the colour `tint`.
     #[inline]
-    pub(crate) fn tinted(&self, uv: [f32; 2], tint: Vec3) -> Vec3 {
+    pub(crate) fn tinted(&self, uv: Coordinates, tint: Vec3) -> Vec3 {
         match self {
             Self::Constant(colour) => *colour,
-            Self::Textured(texture) => texture.eval(uv[0], uv[1]),
+            Self::Textured(texture) => texture.eval(uv),
             Self::Corners(None) => tint,
-            Self::Corners(Some(texture)) => tint * texture.eval(uv[0], uv[1]),
+            Self::Corners(Some(texture)) => tint * texture.eval(uv),
         }
     }
 }
@@ -237,7 +238,7 @@ impl CompiledMaterial {
     }
 
     fn with(bsdf: Bsdf, options: MaterialOptions) -> Self {
-        let MaterialOptions { opacity, one_sided, culled, roughness, relief, .. } = options;
+        let MaterialOptions { opacity, cutoff, one_sided, culled, roughness, relief, .. } = options;
         // An opacity of one everywhere is none
         let opacity = opacity.filter(|o| o.constant() != Some(Vec3::ONE));
         let directional = match &bsdf {
@@ -245,7 +246,7 @@ impl CompiledMaterial {
             _ => roughness.is_some(),
         };
         let (alphas, relief) = (roughness.map(Box::new), relief.map(Box::new));
-        Self { bsdf, opacity, one_sided, culled, alphas, directional, relief }
+        Self { bsdf, opacity, cutoff, one_sided, culled, alphas, directional, relief }
     }
 
     /// Whether rays may pass it.
@@ -261,11 +262,11 @@ impl CompiledMaterial {
 
     /// The microfacets at `uv`, which are `own` unless α varies.
     #[inline]
-    pub(crate) fn facets(&self, own: Ggx, uv: [f32; 2]) -> Ggx {
+    pub(crate) fn facets(&self, own: Ggx, uv: Coordinates) -> Ggx {
         match &self.alphas {
             None => own,
             Some(alphas) => {
-                let c = alphas.eval(uv[0], uv[1]).max(Vec3::splat(MIN_ROUGHNESS));
+                let c = alphas.eval(uv).max(Vec3::splat(MIN_ROUGHNESS));
                 own.stretched([c.x, c.y])
             }
         }

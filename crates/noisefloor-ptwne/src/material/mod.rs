@@ -120,6 +120,9 @@ pub struct MaterialOptions {
     /// The mean of the channels is the probability that the surface stops a ray; other rays pass straight
     /// through. `None`: opaque everywhere.
     pub opacity: Option<Texture>,
+    /// The least opacity, by the largest channel, that stops rays: where there is less, all pass, and
+    /// elsewhere none. `None`: they pass at random.
+    pub cutoff: Option<f32>,
     /// Whether the back absorbs all light.
     pub one_sided: bool,
     /// Whether there is no back: rays that come from there pass, as where renderers cull it.
@@ -190,6 +193,9 @@ impl Material {
 impl MaterialOptions {
     fn check(&self) -> Result<(), SceneError> {
         self.opacity.as_ref().map_or(Ok(()), Texture::check)?;
+        if self.cutoff.is_some_and(f32::is_nan) {
+            return Err(SceneError::NotFinite { what: "the cutoff of an opacity" });
+        }
         self.roughness.as_ref().map_or(Ok(()), Texture::check)?;
         self.relief.as_ref().map_or(Ok(()), Relief::check)
     }

@@ -67,7 +67,9 @@ impl Sheet {
     fn add(&self, builder: &mut SceneBuilder, smooth: bool, material: MaterialId) {
         let Self { positions, normals, uvs, colours, indices } = self;
         let normals = if smooth { normals.as_slice() } else { &[] };
-        builder.mesh(&Mesh { positions, normals, uvs, colours, indices }, material, None).unwrap();
+        builder
+            .mesh(&Mesh { positions, normals, uvs, colours, indices, ..Mesh::default() }, material, None)
+            .unwrap();
     }
 }
 

@@ -1,10 +1,10 @@
 //! A glTF file as it is: its JSON, and the bytes that it names.
 
-use super::uri;
+use super::{properties, uri};
 use crate::files::Folder;
 use crate::{LoadError, Place};
 use gltf::json::root::Get;
-use gltf::json::{Buffer, Index, Root, buffer, deserialize};
+use gltf::json::{Buffer, Index, Root, Value, buffer, deserialize};
 use std::cell::{Cell, OnceCell};
 use std::path::Path;
 
@@ -19,6 +19,8 @@ pub(super) struct Asset<'a> {
     pub(super) path: &'a Path,
     folder: &'a Folder,
     pub(super) root: Root,
+    /// Properties that nobody knows, each with what has it.
+    pub(super) unread: Vec<(String, String)>,
     binary: Option<&'a [u8]>,
     /// Those that are not the binary chunk, filled when first asked for.
     buffers: Vec<OnceCell<Vec<u8>>>,
@@ -29,14 +31,31 @@ impl<'a> Asset<'a> {
     /// Parses `file`, the bytes of `path`: JSON or GLB. What it names lies in `folder`.
     pub(super) fn parse(path: &'a Path, folder: &'a Folder, file: &'a [u8]) -> Result<Self, LoadError> {
         let (json, binary) = if file.starts_with(b"glTF") { split_glb(path, file)? } else { (file, None) };
+        let json = json.strip_prefix(b"\xef\xbb\xbf").unwrap_or(json);
         let values = json.iter().filter(|b| matches!(b, b'{' | b'[' | b',')).count() as u64;
         Place::file(path).at_most("JSON values", values, MAX_VALUES)?;
-        let root: Root = deserialize::from_slice(json).map_err(|e| {
-            Place::part(path, format_args!("line {} of the JSON", e.line()))
-                .bad(format_args!("not the JSON of a glTF file: {e}"))
-        })?;
+        let parsed = || {
+            let mut root: Value = deserialize::from_slice(json).map_err(|e| {
+                Place::part(path, format_args!("line {} of the JSON", e.line()))
+                    .bad(format_args!("not the JSON of a glTF file: {e}"))
+            })?;
+            properties::tidy(&mut root);
+            Ok::<_, LoadError>(root)
+        };
+        let root = parsed()?;
+        let unread = properties::unread(&root);
+        let root: Root = match deserialize::from_value(root) {
+            Ok(root) => root,
+            Err(e) => {
+                let place = match properties::culprit(&parsed()?) {
+                    Some(part) => Place::part(path, part),
+                    None => Place::file(path),
+                };
+                return Err(place.bad(format_args!("not the JSON of a glTF file: {e}")));
+            }
+        };
         let buffers = root.buffers.iter().map(|_| OnceCell::new()).collect();
-        Ok(Self { path, folder, root, binary, buffers, bytes: Cell::new(file.len() as u64) })
+        Ok(Self { path, folder, root, unread, binary, buffers, bytes: Cell::new(file.len() as u64) })
     }
 
     /// The element of that index, named by `place`; `kind` is what to call it.
@@ -127,6 +146,8 @@ fn split_glb<'a>(path: &Path, file: &'a [u8]) -> Result<(&'a [u8], Option<&'a [u
     if kind != *b"JSON" {
         return Err(place.bad("the first chunk is not JSON"));
     }
+    // It is to be padded with spaces, but some programs write zeros
+    let json = &json[..json.iter().rposition(|b| *b != 0).map_or(0, |last| last + 1)];
     if chunks.is_empty() {
         return Ok((json, None));
     }

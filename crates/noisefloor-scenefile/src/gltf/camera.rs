@@ -7,7 +7,7 @@ use crate::{LoadError, Place};
 use glam::DVec3;
 use gltf::json::camera::Type;
 use gltf::json::validation::Checked;
-use noisefloor_ptwne::Camera;
+use noisefloor_ptwne::{Camera, Optics};
 
 /// Vertical field of view in degrees where the file has no camera.
 const DEFAULT_FOV: f64 = 40.0;
@@ -17,7 +17,7 @@ pub(super) fn first(
     asset: &Asset<'_>,
     placed: &[Placed<'_>],
     notes: &mut Notes,
-) -> Result<Option<Camera>, LoadError> {
+) -> Result<Option<(Camera, Optics)>, LoadError> {
     let mut cameras = placed.iter().filter_map(|p| p.node.camera.map(|camera| (p, camera)));
     let Some((at, index)) = cameras.next() else { return Ok(None) };
     for (other, _) in cameras {
@@ -25,17 +25,19 @@ pub(super) fn first(
     }
     let source = asset.get(index, "camera", &at.place)?;
     let place = Place::part(asset.path, name("camera", index.value(), source.name.as_deref()));
-    let perspective = match (&source.type_, &source.perspective) {
-        (Checked::Valid(Type::Orthographic), _) => {
-            return Err(place.unsupported("an orthographic projection"));
+    let (fov, parallel_height) = match (&source.type_, &source.perspective, &source.orthographic) {
+        (Checked::Valid(Type::Perspective), Some(perspective), _) => {
+            (f64::from(perspective.yfov).to_degrees(), None)
         }
-        (Checked::Valid(Type::Perspective), Some(perspective)) => perspective,
-        _ => return Err(place.bad("it is not a perspective camera with its properties")),
+        // Half the height that is seen; the width follows from the picture
+        (Checked::Valid(Type::Orthographic), _, Some(seen)) => (DEFAULT_FOV, Some(2.0 * seen.ymag.abs())),
+        _ => return Err(place.bad("it is no perspective or orthographic camera with its properties")),
     };
     notes.extensions(&place, source.extensions.iter().flat_map(|e| e.others.keys()));
     let axes = at.to_world.matrix3;
     let [view, up] = [-axes.z_axis, axes.y_axis].map(DVec3::normalize_or_zero);
-    Ok(Some(camera(at.to_world.translation, view, up, f64::from(perspective.yfov).to_degrees())))
+    let optics = Optics { parallel_height, ..Optics::default() };
+    Ok(Some((camera(at.to_world.translation, view, up, fov), optics)))
 }
 
 /// Any camera, until there is one that sees the scene.

@@ -61,12 +61,12 @@ impl Coat {
         cover: MaterialOptions,
         builder: &mut SceneBuilder,
     ) -> Result<MaterialId, SceneError> {
-        let MaterialOptions { opacity, culled, roughness, relief, .. } = cover;
+        let MaterialOptions { opacity, cutoff, culled, roughness, relief, .. } = cover;
         let sides = MaterialOptions { culled, ..MaterialOptions::default() };
         let base = builder.material_with(material, MaterialOptions { roughness, relief, ..sides.clone() })?;
         let film = Material::RoughConductor { reflectance: [1.0; 3].into(), roughness: self.roughness };
         let coat = MaterialOptions { roughness: self.alphas, ..sides.clone() };
         let film = builder.material_with(film, coat)?;
-        builder.coated_material(base, film, self.share, MaterialOptions { opacity, ..sides })
+        builder.coated_material(base, film, self.share, MaterialOptions { opacity, cutoff, ..sides })
     }
 }

@@ -3,6 +3,7 @@
 use super::asset::{Asset, name};
 use super::clearcoat::{self, Clearcoat, Coat};
 use super::gloss::Gloss;
+use super::mesh::Corners;
 use super::notes::Notes;
 use super::texture::{Encoding, Textures, normal_info, set};
 use crate::{LoadError, Place};
@@ -10,8 +11,8 @@ use gltf::json::extensions::material::PbrSpecularGlossiness;
 use gltf::json::material::{AlphaMode, Material as Source};
 use gltf::json::texture::Info;
 use gltf::json::validation::Checked;
-use gltf::json::{Index, extensions};
-use noisefloor::Rgb;
+use gltf::json::{Index, Value, extensions};
+use noisefloor::{Rgb, display::luminance};
 use noisefloor_ptwne::{
     Emission, ImageTexture, Material, MaterialId, MaterialOptions, Relief, SceneBuilder, Texture,
 };
@@ -21,6 +22,9 @@ use std::collections::HashMap;
 const MIN_OPAQUE_IOR: f32 = 1.0;
 const MAX_IOR: f32 = 4.0;
 
+/// `KHR_materials_specular`, which the types of the JSON leave among unknown extensions.
+const SPECULAR: &str = "KHR_materials_specular";
+
 /// A material in the scene.
 #[derive(Clone, Debug)]
 pub(super) struct Look {
@@ -28,8 +32,10 @@ pub(super) struct Look {
     pub(super) emission: Option<Emission>,
     /// Whether it shows its colour without any light.
     pub(super) unlit: bool,
-    /// The set of texture coordinates of its textures, if it has any.
-    pub(super) set: Option<u32>,
+    /// The sets of texture coordinates of its textures, if it has any.
+    pub(super) sets: [Option<u32>; 2],
+    /// Whether it has a map of normals, which lies along tangents.
+    pub(super) normal_map: bool,
 }
 
 /// Materials, added to the scene when first asked for.
@@ -37,8 +43,8 @@ pub(super) struct Look {
 pub(super) struct Materials<'a> {
     asset: &'a Asset<'a>,
     textures: Textures<'a>,
-    /// By index, and whether the mesh has colours.
-    looks: HashMap<(Option<usize>, bool), Look>,
+    /// By index, and what the corners of the mesh have.
+    looks: HashMap<(Option<usize>, Corners), Look>,
 }
 
 impl<'a> Materials<'a> {
@@ -46,17 +52,16 @@ impl<'a> Materials<'a> {
         Self { asset, textures: Textures::new(asset), looks: HashMap::new() }
     }
 
-    /// The material of that index, named by `place`; or glTF's default material. `coloured` multiplies it with the
-    /// colours of corners.
+    /// The material of that index, named by `place`; or glTF's default material; times what `corners` have.
     pub(super) fn look(
         &mut self,
         index: Option<Index<Source>>,
-        coloured: bool,
+        corners: Corners,
         place: &Place,
         builder: &mut SceneBuilder,
         notes: &mut Notes,
     ) -> Result<Look, LoadError> {
-        let key = (index.map(|index| index.value()), coloured);
+        let key = (index.map(|index| index.value()), corners);
         if let Some(look) = self.looks.get(&key) {
             return Ok(look.clone());
         }
@@ -69,17 +74,19 @@ impl<'a> Materials<'a> {
             None => (&default, "default material".to_owned()),
         };
         let place = Place::part(self.asset.path, called);
-        let mut reader = Reader { source, place, set: None, coloured, textures: &mut self.textures, notes };
+        let mut reader =
+            Reader { source, place, sets: [None; 2], corners, textures: &mut self.textures, notes };
         let read = reader.read()?;
         let coat = if read.unlit { None } else { reader.coat()? };
-        let (set, place) = (reader.set, reader.place);
+        let (sets, place) = (reader.sets, reader.place);
         let Read { material, cover, emission, unlit } = read;
+        let normal_map = cover.relief.is_some();
         let refused = |cause| LoadError::Scene { place: place.clone(), cause };
         let id = match coat {
             None => builder.material_with(material, cover).map_err(refused)?,
             Some(coat) => coat.over(material, cover, builder).map_err(refused)?,
         };
-        let look = Look { id, emission, unlit, set };
+        let look = Look { id, emission, unlit, sets, normal_map };
         self.looks.insert(key, look.clone());
         Ok(look)
     }
@@ -89,8 +96,8 @@ impl<'a> Materials<'a> {
 struct Reader<'m, 'a> {
     source: &'m Source,
     place: Place,
-    set: Option<u32>,
-    coloured: bool,
+    sets: [Option<u32>; 2],
+    corners: Corners,
     textures: &'m mut Textures<'a>,
     notes: &'m mut Notes,
 }
@@ -111,10 +118,11 @@ impl<'m> Reader<'m, '_> {
             self.notes.warn(&self.place, "an occlusion map is ignored: light is traced");
         }
         let others = source.extensions.iter().flat_map(|e| e.others.keys());
-        self.notes.extensions(&self.place, others.filter(|name| *name != clearcoat::NAME));
+        let known = [clearcoat::NAME, SPECULAR];
+        self.notes.extensions(&self.place, others.filter(|name| !known.contains(&name.as_str())));
         self.notes.extensions(&self.place, pbr.extensions.iter().flat_map(|e| e.others.keys()));
 
-        // The first texture chooses the set of texture coordinates
+        // The first texture chooses the first set of texture coordinates, the first with another the second
         let gloss = self.extensions().and_then(|e| e.pbr_specular_glossiness.as_ref());
         let (base_texture, metal_texture) = match gloss {
             Some(gloss) => (&gloss.diffuse_texture, &gloss.specular_glossiness_texture),
@@ -124,7 +132,8 @@ impl<'m> Reader<'m, '_> {
             [base_texture, metal_texture, &source.emissive_texture].map(Option::as_ref);
         let normals = source.normal_texture.as_ref().map(|normals| (normal_info(normals), normals.scale));
         let all = [base_texture, metal_texture, normals.as_ref().map(|n| &n.0), emissive_texture];
-        self.set = all.into_iter().flatten().map(set).next();
+        self.sets[0] = all.into_iter().flatten().map(set).next();
+        self.textures.first_set = self.sets[0].unwrap_or_default();
 
         if self.extensions().is_some_and(|e| e.unlit.is_some()) {
             return self.unlit(base_texture);
@@ -144,8 +153,10 @@ impl<'m> Reader<'m, '_> {
         };
         // The inside of glass is part of it, and a pane has no inside
         let glass = matches!(material, Material::RoughGlass { .. } | Material::ThinGlass { .. });
+        let (opacity, cutoff) = self.opacity(base_texture)?;
         let cover = MaterialOptions {
-            opacity: self.opacity(base_texture)?,
+            opacity,
+            cutoff,
             culled: !source.double_sided && !glass,
             roughness,
             relief,
@@ -181,17 +192,14 @@ impl<'m> Reader<'m, '_> {
 
     /// `KHR_materials_unlit`: shows its colour, and reflects nothing. In a traced scene that is light.
     fn unlit(&mut self, base: Option<&Info>) -> Result<Read, LoadError> {
-        if self.coloured {
-            self.notes.warn(&self.place, "the colours of corners are ignored: it is unlit");
-        }
         let [r, g, b, _] = self.source.pbr_metallic_roughness.base_color_factor.0;
         let radiance = [r, g, b].map(|x| self.within(x, "baseColorFactor", 0.0, 1.0));
-        let texture = match base {
-            Some(_) => Some(self.colour([1.0; 3], base, Encoding::Srgb)?),
-            None => None,
-        };
+        let texture = self.colour([1.0; 3], base, Encoding::Srgb)?;
+        let texture = Some(self.tinted(texture)).filter(|texture| *texture != Texture::Colour([1.0; 3]));
+        let (opacity, cutoff) = self.opacity(base)?;
         let cover = MaterialOptions {
-            opacity: self.opacity(base)?,
+            opacity,
+            cutoff,
             culled: !self.source.double_sided,
             ..MaterialOptions::default()
         };
@@ -209,16 +217,24 @@ impl<'m> Reader<'m, '_> {
         let factor = Gloss { diffuse, specular, glossiness };
         self.notes.near(&self.place, "its specular colour and glossiness become metal and roughness");
         let of_diffuse = gloss.diffuse_texture.as_ref().filter(|info| self.fits(info));
-        let of_specular = gloss.specular_glossiness_texture.as_ref().filter(|info| self.fits(info));
+        let of_specular = gloss.specular_glossiness_texture.as_ref();
+        // Both become one picture
+        let apart = of_specular.zip(of_diffuse).is_some_and(|(one, other)| set(one) != set(other));
+        if apart {
+            let what = "its specularGlossinessTexture is ignored: it uses another set of texture coordinates";
+            self.notes.warn(&self.place, what);
+        }
+        let of_specular = of_specular.filter(|info| !apart && self.fits(info));
         let (base, metallic_roughness) =
             self.textures.gloss(factor, [of_diffuse, of_specular], &self.place, self.notes)?;
         let base = self.tinted(base);
-        Ok(Material::MetallicRoughness { base, metallic_roughness, ior: self.ior(MIN_OPAQUE_IOR) })
+        let ior = self.dielectric();
+        Ok(Material::MetallicRoughness { base, metallic_roughness, ior })
     }
 
     /// Times the colours of corners, if the mesh has any.
     fn tinted(&self, base: Texture) -> Texture {
-        match (self.coloured, &base) {
+        match (self.corners != Corners::Nothing, &base) {
             (false, _) => base,
             (true, Texture::Colour([1.0, 1.0, 1.0])) => Texture::Corners(None),
             (true, _) => Texture::Corners(Some(Box::new(base))),
@@ -237,15 +253,19 @@ impl<'m> Reader<'m, '_> {
         Ok(Texture::Image(ImageTexture { factor, ..image }))
     }
 
-    /// Whether a texture uses the material's set of texture coordinates: meshes have one.
+    /// Whether a texture uses one of the material's sets of texture coordinates: there can be two.
     fn fits(&mut self, info: &Info) -> bool {
-        let fits = *self.set.get_or_insert(set(info)) == set(info);
+        let set = set(info);
+        if self.sets[0].is_none() {
+            self.textures.first_set = set;
+        }
+        let first = *self.sets[0].get_or_insert(set);
+        let fits = first == set || *self.sets[1].get_or_insert(set) == set;
         if !fits {
             let what = format_args!(
-                "texture {} is ignored: it uses set {} of texture coordinates, another texture set {}",
+                "texture {} is ignored: it uses set {set} of texture coordinates, others the sets {first} and {}",
                 info.index.value(),
-                set(info),
-                self.set.unwrap_or_default()
+                self.sets[1].unwrap_or_default()
             );
             self.notes.warn(&self.place, what);
         }
@@ -261,7 +281,7 @@ impl<'m> Reader<'m, '_> {
         let roughness = self.within(pbr.roughness_factor.0, "roughnessFactor", 0.0, 1.0);
         let metallic = self.within(pbr.metallic_factor.0, "metallicFactor", 0.0, 1.0);
         let metallic_roughness = self.colour([1.0, roughness, metallic], metal, Encoding::Linear)?;
-        let ior = self.ior(MIN_OPAQUE_IOR);
+        let ior = self.dielectric();
         Ok(Material::MetallicRoughness { base, metallic_roughness, ior })
     }
 
@@ -288,6 +308,9 @@ impl<'m> Reader<'m, '_> {
         let pbr = &self.source.pbr_metallic_roughness;
         if base.is_some() {
             self.notes.warn(&self.place, "its base colour texture is ignored: glass has one tint");
+        }
+        if self.corners != Corners::Nothing {
+            self.notes.warn(&self.place, "the colours of corners are ignored: glass has one tint");
         }
         let [r, g, b, _] = pbr.base_color_factor.0;
         let tint = [r, g, b].map(|x| self.within(x, "baseColorFactor", 0.0, 1.0));
@@ -321,39 +344,36 @@ impl<'m> Reader<'m, '_> {
         true
     }
 
-    fn opacity(&mut self, base: Option<&Info>) -> Result<Option<Texture>, LoadError> {
+    /// The opacity, and the least that counts as opaque: the alphas of factor, texture and corners,
+    /// multiplied.
+    fn opacity(&mut self, base: Option<&Info>) -> Result<(Option<Texture>, Option<f32>), LoadError> {
         let [.., alpha] = match self.extensions().and_then(|e| e.pbr_specular_glossiness.as_ref()) {
             Some(gloss) => gloss.diffuse_factor.0,
             None => self.source.pbr_metallic_roughness.base_color_factor.0,
         };
-        let (alpha, cutoff) = match self.source.alpha_mode {
-            Checked::Valid(AlphaMode::Opaque) => return Ok(None),
-            Checked::Valid(AlphaMode::Blend) => {
-                (self.within(alpha, "alpha of baseColorFactor", 0.0, 1.0), None)
-            }
-            Checked::Valid(AlphaMode::Mask) => (alpha, Some(self.source.alpha_cutoff.unwrap_or_default().0)),
+        let cutoff = match self.source.alpha_mode {
+            Checked::Valid(AlphaMode::Opaque) => return Ok((None, None)),
+            Checked::Valid(AlphaMode::Blend) => None,
+            Checked::Valid(AlphaMode::Mask) => Some(self.source.alpha_cutoff.unwrap_or_default().0),
             Checked::Invalid => return Err(self.place.clone().bad("its alphaMode is not one of glTF's")),
         };
-        // The texture's own alpha is opaque where alpha·texture ≥ cutoff
-        let threshold = cutoff.map(|cutoff| if alpha > 0.0 { cutoff / alpha } else { f32::INFINITY });
-        let image = match base.filter(|info| Some(set(info)) == self.set) {
-            Some(info) => self.textures.opacity(info, threshold, &self.place)?,
+        let factor = self.within(alpha, "alpha of baseColorFactor", 0.0, 1.0);
+        let image = match base.filter(|info| self.sets.contains(&Some(set(info)))) {
+            Some(info) => self.textures.opacity(info, &self.place)?,
             None => None,
         };
-        let factor = match cutoff {
-            None => alpha,
-            // With an image, its pixels have the answer
-            Some(cutoff) => {
-                if image.is_some() || alpha >= cutoff {
-                    1.0
-                } else {
-                    0.0
-                }
-            }
+        let opacity = match image {
+            Some(image) => Texture::Image(ImageTexture { factor: [factor; 3], ..image }),
+            None => Texture::Colour([factor; 3]),
         };
-        Ok(match image {
-            Some(image) => Some(Texture::Image(ImageTexture { factor: [factor; 3], ..image })),
-            None => (factor < 1.0).then_some(Texture::Colour([factor; 3])),
+        if self.corners == Corners::ColoursAndAlphas {
+            return Ok((Some(Texture::Corners(Some(Box::new(opacity)))), cutoff));
+        }
+        Ok(match (opacity, cutoff) {
+            // The same everywhere, and often 1
+            (Texture::Colour(_), None) if factor >= 1.0 => (None, None),
+            (Texture::Colour(_), Some(cutoff)) if factor >= cutoff => (None, None),
+            (opacity, cutoff) => (Some(opacity), cutoff),
         })
     }
 
@@ -375,6 +395,29 @@ impl<'m> Reader<'m, '_> {
             None => None,
         };
         Ok(Some(Emission { radiance, texture, two_sided }))
+    }
+
+    /// Index of refraction of what is no metal; with `KHR_materials_specular` that of the same grey
+    /// reflection at normal incidence.
+    fn dielectric(&mut self) -> f32 {
+        let ior = self.ior(MIN_OPAQUE_IOR);
+        let Some(value) = self.extensions().and_then(|e| e.others.get(SPECULAR)) else { return ior };
+        let number = |value: Option<&Value>| value.and_then(Value::as_f64).map_or(1.0, |x| x as f32);
+        let share = number(value.get("specularFactor"));
+        let colour = [0, 1, 2].map(|i| number(value.get("specularColorFactor").and_then(|c| c.get(i))));
+        if value.get("specularTexture").or(value.get("specularColorTexture")).is_some() {
+            self.notes.warn(&self.place, "the textures of its KHR_materials_specular are ignored");
+        }
+        if share == 1.0 && colour == [1.0; 3] {
+            return ior;
+        }
+        let f0 = ((ior - 1.0) / (ior + 1.0)).powi(2) * share * luminance(colour);
+        let root = f0.clamp(0.0, 1.0).sqrt();
+        let nearest = ((1.0 + root) / (1.0 - root)).min(MAX_IOR);
+        let what =
+            format_args!("its KHR_materials_specular is replaced by an index of refraction of {nearest:.3}");
+        self.notes.near(&self.place, what);
+        nearest
     }
 
     /// Index of refraction.

@@ -2,6 +2,7 @@
 
 use super::accessor::{floats, indices};
 use super::asset::Asset;
+use super::material::Look;
 use crate::{LoadError, Place};
 use glam::{DAffine3, DMat3, DVec3};
 use gltf::json::accessor::Type;
@@ -9,14 +10,18 @@ use gltf::json::mesh::{Mode, Primitive, Semantic};
 use gltf::json::validation::Checked;
 use gltf::json::{Accessor, Index};
 
-/// An indexed mesh, as the renderer takes it. `normals`, `uvs` and `colours` may be empty.
+/// An indexed mesh, as the renderer takes it. All but `positions` and `indices` may be empty.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Triangles {
     pub(super) positions: Vec<[f32; 3]>,
     pub(super) normals: Vec<[f32; 3]>,
     pub(super) uvs: Vec<[f32; 2]>,
+    pub(super) second_uvs: Vec<[f32; 2]>,
     /// One a corner, or none.
     pub(super) colours: Vec<[f32; 3]>,
+    pub(super) alphas: Vec<f32>,
+    /// Of a triangle's corners; the fourth number is the sign of the bitangent.
+    pub(super) tangents: Vec<[f32; 4]>,
     pub(super) indices: Vec<[u32; 3]>,
 }
 
@@ -35,12 +40,27 @@ pub(super) fn positions(
     floats(asset, positions, place)
 }
 
-/// The triangles of a primitive, before its node's transform, with the texture coordinates of that set.
+/// What the corners of a mesh multiply its colour with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(super) enum Corners {
+    Nothing,
+    Colours,
+    ColoursAndAlphas,
+}
+
+/// What a primitive has in `COLOR_0`.
+pub(super) fn corners(asset: &Asset<'_>, primitive: &Primitive, place: &Place) -> Result<Corners, LoadError> {
+    let Some(index) = attribute(primitive, Semantic::Colors(0)) else { return Ok(Corners::Nothing) };
+    let four = asset.get(index, "accessor", place)?.type_ == Checked::Valid(Type::Vec4);
+    Ok(if four { Corners::ColoursAndAlphas } else { Corners::Colours })
+}
+
+/// The triangles of a primitive, before its node's transform, with what its material needs.
 pub(super) fn triangles(
     asset: &Asset<'_>,
     primitive: &Primitive,
     mode: Mode,
-    set: Option<u32>,
+    look: &Look,
     place: &Place,
 ) -> Result<Triangles, LoadError> {
     let positions = positions(asset, primitive, place)?;
@@ -60,32 +80,50 @@ pub(super) fn triangles(
         Some(normals) => floats(asset, normals, place)?,
         None => vec![],
     };
-    let set = set.and_then(|set| attribute(primitive, Semantic::TexCoords(set)));
-    let uvs = match alike(set, "texture coordinates")? {
-        // The first row of an image is at v = 0 in glTF, at v = 1 in the renderer
-        Some(uvs) => floats(asset, uvs, place)?.into_iter().map(|[u, v]: [f32; 2]| [u, 1.0 - v]).collect(),
-        None => vec![],
+    let coordinates = |set: Option<u32>| {
+        let set = set.and_then(|set| attribute(primitive, Semantic::TexCoords(set)));
+        Ok(match alike(set, "texture coordinates")? {
+            // The first row of an image is at v = 0 in glTF, at v = 1 in the renderer
+            Some(uvs) => {
+                floats(asset, uvs, place)?.into_iter().map(|[u, v]: [f32; 2]| [u, 1.0 - v]).collect()
+            }
+            None => vec![],
+        })
     };
-    let colours = match alike(attribute(primitive, Semantic::Colors(0)), "colours")? {
+    let [uvs, second_uvs] = [coordinates(look.sets[0])?, coordinates(look.sets[1])?];
+    let (colours, alphas) = match alike(attribute(primitive, Semantic::Colors(0)), "colours")? {
         Some(colours) => colours_of(asset, colours, place)?,
+        None => (vec![], vec![]),
+    };
+    // Without normals, tangents are to be ignored (glTF 2.0, §3.7.2.1)
+    let tangents =
+        attribute(primitive, Semantic::Tangents).filter(|_| look.normal_map && !normals.is_empty());
+    let tangents = match alike(tangents, "tangents")? {
+        Some(tangents) => floats::<4>(asset, tangents, place)?,
         None => vec![],
     };
     let corners = match primitive.indices {
         Some(accessor) => indices(asset, accessor, place)?,
         None => (0..u32::try_from(positions.len()).unwrap_or(u32::MAX)).collect(),
     };
-    Ok(Triangles { positions, normals, uvs, colours, indices: assemble(mode, &corners) })
+    let indices = assemble(mode, &corners);
+    Ok(Triangles { positions, normals, uvs, second_uvs, colours, alphas, tangents, indices })
 }
 
-/// Colours with or without an alpha, which has no part in it.
-fn colours_of(asset: &Asset<'_>, index: Index<Accessor>, place: &Place) -> Result<Vec<[f32; 3]>, LoadError> {
+/// Colours, and their alphas if they have any.
+fn colours_of(
+    asset: &Asset<'_>,
+    index: Index<Accessor>,
+    place: &Place,
+) -> Result<(Vec<[f32; 3]>, Vec<f32>), LoadError> {
     // Also false for NaN
     let inside = |x: f32| if x > 0.0 { x.min(1.0) } else { 0.0 };
     let colour = |[r, g, b]: [f32; 3]| [r, g, b].map(inside);
     Ok(if asset.get(index, "accessor", place)?.type_ == Checked::Valid(Type::Vec4) {
-        floats::<4>(asset, index, place)?.into_iter().map(|[r, g, b, _]| colour([r, g, b])).collect()
+        let rows = floats::<4>(asset, index, place)?;
+        rows.into_iter().map(|[r, g, b, a]| (colour([r, g, b]), inside(a))).unzip()
     } else {
-        floats::<3>(asset, index, place)?.into_iter().map(colour).collect()
+        (floats::<3>(asset, index, place)?.into_iter().map(colour).collect(), vec![])
     })
 }
 
@@ -124,6 +162,9 @@ impl Triangles {
         for n in &mut self.normals {
             *n = turned(*n, &matrix);
         }
+        for tangent in &mut self.tangents {
+            *tangent = turned_tangent(*tangent, &to_world.matrix3);
+        }
         if to_world.matrix3.determinant() < 0.0 {
             self.mirror();
         }
@@ -136,6 +177,9 @@ impl Triangles {
         }
         for (n, to_world) in self.normals.iter_mut().zip(moves) {
             *n = turned(*n, &normal_matrix(to_world));
+        }
+        for (tangent, to_world) in self.tangents.iter_mut().zip(moves) {
+            *tangent = turned_tangent(*tangent, &to_world.matrix3);
         }
         if moves.first().is_some_and(|to_world| to_world.matrix3.determinant() < 0.0) {
             self.mirror();
@@ -160,6 +204,14 @@ fn normal_matrix(to_world: &DAffine3) -> DMat3 {
 
 fn turned(n: [f32; 3], matrix: &DMat3) -> [f32; 3] {
     (*matrix * DVec3::from_array(n.map(f64::from))).normalize_or_zero().as_vec3().to_array()
+}
+
+/// A tangent goes along with the surface. In a mirror image, so does the bitangent, where the cross product
+/// that it is made by would turn round.
+fn turned_tangent([x, y, z, side]: [f32; 4], to_world: &DMat3) -> [f32; 4] {
+    let t = (*to_world * DVec3::from_array([x, y, z].map(f64::from))).normalize_or_zero().as_vec3();
+    let side = if (side < 0.0) != (to_world.determinant() < 0.0) { -1.0 } else { 1.0 };
+    [t.x, t.y, t.z, side]
 }
 
 /// A point in the world.

@@ -15,6 +15,7 @@ mod material;
 mod mesh;
 mod nodes;
 mod notes;
+mod properties;
 mod rest;
 mod shared;
 mod texture;
@@ -54,13 +55,14 @@ pub(crate) fn load(path: &Path, root: Option<&Path>) -> Result<Loaded, LoadError
 
     let mut notes = Notes::default();
     let whole = Place::file(path);
-    let camera = camera::first(&asset, &placed, &mut notes)?;
+    let (camera, optics) = camera::first(&asset, &placed, &mut notes)?.unzip();
     if camera.is_none() {
         notes.warn(&whole, "it has no camera: all of it is seen from the front, above and to the right");
     }
     let title = crate::title(path);
     let refused = |cause| LoadError::Scene { place: whole.clone(), cause };
-    let builder = SceneBuilder::new(title, camera.unwrap_or_else(camera::anywhere)).map_err(refused)?;
+    let mut builder = SceneBuilder::new(title, camera.unwrap_or_else(camera::anywhere)).map_err(refused)?;
+    builder.optics(optics.unwrap_or_default()).map_err(refused)?;
 
     let mut loader = Loader {
         asset: &asset,
@@ -110,7 +112,7 @@ pub(crate) fn load(path: &Path, root: Option<&Path>) -> Result<Loaded, LoadError
         }
     }
     let scene = scene.with_identity(folder.contents());
-    Ok(Loaded { scene, size: None, max_depth: None, warnings: notes.finish(&asset) })
+    Ok(Loaded { scene, size: None, max_depth: None, clamp: None, warnings: notes.finish(&asset) })
 }
 
 /// Fills a scene node by node.
@@ -209,6 +211,21 @@ impl Loader<'_> {
         }
     }
 
+    /// Checks that positions are there: without data they would all be 0, and the mesh gone.
+    fn has_data(&self, primitive: &Primitive, place: &Place) -> Result<(), LoadError> {
+        let Some(index) = mesh::attribute(primitive, Semantic::Positions) else { return Ok(()) };
+        let accessor = self.asset.get(index, "accessor", place)?;
+        if accessor.buffer_view.is_some() || accessor.sparse.is_some() || accessor.count.0 == 0 {
+            return Ok(());
+        }
+        let extensions = primitive.extensions.iter().flat_map(|e| e.others.keys());
+        let names: Vec<&str> = extensions.map(String::as_str).collect();
+        Err(match names.as_slice() {
+            [] => place.clone().bad(format_args!("its positions, accessor {}, have no data", index.value())),
+            names => place.clone().unsupported(format_args!("a mesh of only {}", names.join(", "))),
+        })
+    }
+
     /// Adds a primitive; warns only if it is the `first` time. The result is whether it shines; then it is not
     /// added `in_object`.
     fn primitive(
@@ -228,22 +245,30 @@ impl Loader<'_> {
             self.undrawn = true;
             return Ok(false);
         }
-        let coloured = has_colours(primitive);
+        self.has_data(primitive, place)?;
+        let corners = mesh::corners(self.asset, primitive, place)?;
         let (builder, notes) = (&mut self.builder, &mut self.notes);
-        let look = self.materials.look(primitive.material, coloured, place, builder, notes)?;
+        let look = self.materials.look(primitive.material, corners, place, builder, notes)?;
         let shines = look.emission.is_some();
         if shines && in_object {
             return Ok(true);
         }
-        let mut triangles = mesh::triangles(self.asset, primitive, mode, look.set, place)?;
+        let mut triangles = mesh::triangles(self.asset, primitive, mode, &look, place)?;
         if triangles.indices.is_empty() {
+            if first && mesh::attribute(primitive, Semantic::Positions).is_some() {
+                self.notes.warn(place, "it has no whole triangle");
+            }
             return Ok(false);
         }
-        if let Some(set) = look.set.filter(|_| triangles.uvs.is_empty()) {
-            if first {
-                self.notes.warn(place, format_args!("it has no set {set} of texture coordinates: all are 0"));
+        let count = triangles.positions.len();
+        for (set, uvs) in look.sets.iter().zip([&mut triangles.uvs, &mut triangles.second_uvs]) {
+            if let Some(set) = set.filter(|_| uvs.is_empty()) {
+                if first {
+                    let what = format_args!("it has no set {set} of texture coordinates: all are 0");
+                    self.notes.warn(place, what);
+                }
+                *uvs = vec![[0.0, 1.0]; count];
             }
-            triangles.uvs = vec![[0.0, 1.0]; triangles.positions.len()];
         }
         pose.strike(self.asset, primitive, &mut triangles, place)?;
         for p in &triangles.positions {
@@ -256,6 +281,9 @@ impl Loader<'_> {
             normals: &triangles.normals,
             uvs: &triangles.uvs,
             colours: &triangles.colours,
+            alphas: &triangles.alphas,
+            second_uvs: &triangles.second_uvs,
+            tangents: &triangles.tangents,
             indices: &triangles.indices,
         };
         match self.builder.mesh(&mesh, look.id, look.emission) {
@@ -299,10 +327,6 @@ impl Pose<'_> {
         triangles.place(self.to_world);
         Ok(())
     }
-}
-
-fn has_colours(primitive: &Primitive) -> bool {
-    mesh::attribute(primitive, Semantic::Colors(0)).is_some()
 }
 
 fn mode(primitive: &Primitive, place: &Place) -> Result<Mode, LoadError> {

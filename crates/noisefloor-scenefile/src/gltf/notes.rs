@@ -7,12 +7,13 @@ use std::fmt;
 
 /// Extensions that a file may require. `KHR_mesh_quantization` is but a wider choice of accessors, all of which are
 /// read.
-const KNOWN: [&str; 10] = [
+const KNOWN: [&str; 11] = [
     "KHR_lights_punctual",
     "KHR_materials_clearcoat",
     "KHR_materials_emissive_strength",
     "KHR_materials_ior",
     "KHR_materials_pbrSpecularGlossiness",
+    "KHR_materials_specular",
     "KHR_materials_transmission",
     "KHR_materials_unlit",
     "KHR_materials_volume",
@@ -57,6 +58,9 @@ impl Notes {
 
     /// All warnings, with those for the extensions that the file uses but no element that was read.
     pub(super) fn finish(mut self, asset: &Asset<'_>) -> Vec<Warning> {
+        for (place, property) in &asset.unread {
+            self.warn(&Place::part(asset.path, place), format_args!("the property `{property}` is ignored"));
+        }
         let place = Place::part(asset.path, "extensionsUsed");
         for name in &asset.root.extensions_used {
             if !KNOWN.contains(&name.as_str()) && !self.extensions.contains(name) {

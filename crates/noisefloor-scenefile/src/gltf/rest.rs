@@ -99,6 +99,14 @@ pub(super) fn morph(
                 *to = std::array::from_fn(|i| to[i] + weight * by[i]);
             }
         }
+        if let Some(by) = target.tangents.filter(|_| !triangles.tangents.is_empty()) {
+            let deltas = rows::<3>(asset, by, triangles.tangents.len(), place)?;
+            for ([x, y, z, _], by) in triangles.tangents.iter_mut().zip(deltas) {
+                *x += weight * by[0];
+                *y += weight * by[1];
+                *z += weight * by[2];
+            }
+        }
     }
     Ok(())
 }

@@ -49,14 +49,16 @@ struct Decoded {
 pub(super) struct Textures<'a> {
     asset: &'a Asset<'a>,
     images: HashMap<usize, Decoded>,
-    /// By image, and the smallest alpha that is opaque if there is such a threshold.
-    opacities: HashMap<(usize, Option<u16>), Codes>,
+    /// By image.
+    opacities: HashMap<usize, Codes>,
+    /// The set of texture coordinates that comes first in the material that is read.
+    pub(super) first_set: u32,
     pixels: u64,
 }
 
 impl<'a> Textures<'a> {
     pub(super) fn new(asset: &'a Asset<'a>) -> Self {
-        Self { asset, images: HashMap::new(), opacities: HashMap::new(), pixels: 0 }
+        Self { asset, images: HashMap::new(), opacities: HashMap::new(), first_set: 0, pixels: 0 }
     }
 
     /// The colours of a texture, that the element at `place` uses.
@@ -74,29 +76,19 @@ impl<'a> Textures<'a> {
         Ok(texture)
     }
 
-    /// Alpha of a texture, if it is not opaque all over. With a threshold, 1 where alpha reaches it, and 0
-    /// elsewhere.
-    pub(super) fn opacity(
-        &mut self,
-        info: &Info,
-        threshold: Option<f32>,
-        place: &Place,
-    ) -> Result<Option<ImageTexture>, LoadError> {
+    /// Alpha of a texture, if it is not opaque all over.
+    pub(super) fn opacity(&mut self, info: &Info, place: &Place) -> Result<Option<ImageTexture>, LoadError> {
         // What it has to say of extensions has been said for the colours
         let (image, mut texture) = self.texture(info, place, &mut Notes::default())?;
         let Some(alpha) = self.images.get(&image).and_then(|decoded| decoded.alpha.clone()) else {
             return Ok(None);
         };
-        let threshold = threshold.map(|t| (0..=255).find(|a| f32::from(*a) / 255.0 >= t).unwrap_or(256));
-        let opacity = match self.opacities.get(&(image, threshold)) {
+        let opacity = match self.opacities.get(&image) {
             Some(opacity) => opacity.clone(),
             None => {
                 self.count(alpha.len(), place)?;
-                let opacity: Codes = match threshold {
-                    Some(t) => alpha.iter().map(|a| [if u16::from(*a) >= t { 255 } else { 0 }; 3]).collect(),
-                    None => alpha.iter().map(|a| [*a; 3]).collect(),
-                };
-                self.opacities.insert((image, threshold), opacity.clone());
+                let opacity: Codes = alpha.iter().map(|a| [*a; 3]).collect();
+                self.opacities.insert(image, opacity.clone());
                 opacity
             }
         };
@@ -219,7 +211,8 @@ impl<'a> Textures<'a> {
         let transform = info.extensions.as_ref().and_then(|e| e.texture_transform.as_ref());
         let to_uv = transform.map_or(ImageTexture::IDENTITY, to_uv);
         let (pixels, factor) = (Pixels::Srgb8(colour), [1.0; 3]);
-        let shown = ImageTexture { width, height, pixels, to_uv, factor, wrap, nearest };
+        let second = set(info) != self.first_set;
+        let shown = ImageTexture { width, height, pixels, to_uv, factor, wrap, nearest, second };
         Ok((texture.source.value(), shown))
     }
 

@@ -1,4 +1,4 @@
-//! Wavefront OBJ: positions, normals, texture coordinates and faces; all else is left out.
+//! Wavefront OBJ: positions, normals, texture coordinates and faces; what else is there is named.
 //!
 //! Read here and not by a crate: tobj 4.0.5 panics where a texture coordinate or normal is out of range (in
 //! builds that check for overflow; in others it takes the wrong one), gives vertices the normals of others
@@ -6,21 +6,30 @@
 //! it takes as much code as to read it.
 
 use super::Triangles;
+use super::polygon::Cutter;
 use crate::error::{LoadError, Place};
+use crate::files;
 use std::collections::HashMap;
 use std::path::Path;
+
+/// Most kinds of statements that are named as not read.
+const MAX_UNREAD: usize = 8;
 
 /// Position, texture coordinates and normal of a corner, as indices.
 type Corner = (u32, Option<u32>, Option<u32>);
 
-/// Reads the OBJ file `bytes`, which came from `path`. Polygons become fans. Corners that agree in all their
-/// indices become one vertex. Where some corners have no normal or texture coordinates, these are 0.
+/// Statements that change nothing: groups and names, and materials, in whose place a scene gives the shape
+/// one.
+const IRRELEVANT: [&str; 7] = ["g", "o", "s", "mg", "usemtl", "mtllib", "call"];
+
+/// Reads the OBJ file `bytes`, which came from `path`. Corners that agree in all their indices become one
+/// vertex. Where some corners have no normal or texture coordinates, these are 0.
 ///
 /// # Errors
-/// [`LoadError::Bad`] if a number or an index is.
+/// [`LoadError::Bad`] if a number or an index is, or if there are no faces.
+/// [`LoadError::TooLarge`] as of [`Cutter::cut`].
 pub(crate) fn parse(bytes: &[u8], path: &Path) -> Result<Triangles, LoadError> {
-    // Names and comments may be in any encoding
-    let text = String::from_utf8_lossy(bytes);
+    let text = files::text(bytes);
     let mut reader = Reader {
         path,
         line: 0,
@@ -29,16 +38,29 @@ pub(crate) fn parse(bytes: &[u8], path: &Path) -> Result<Triangles, LoadError> {
         normals: vec![],
         vertices: HashMap::new(),
         polygon: vec![],
+        cutter: Cutter::default(),
         mesh: Triangles::default(),
         has_uvs: false,
         has_normals: false,
     };
-    for (index, line) in text.lines().enumerate() {
+    // A backslash at its end continues a line; what is said of it names the last of its lines
+    let mut begun = String::new();
+    for (index, line) in files::lines(&text).enumerate() {
         reader.line = index + 1;
-        reader.line(line)?;
+        match line.trim_end().strip_suffix('\\') {
+            Some(part) => begun = begun + part + " ",
+            None if begun.is_empty() => reader.line(line)?,
+            None => reader.line(&(std::mem::take(&mut begun) + line))?,
+        }
     }
+    reader.line(&begun)?;
 
     let mut mesh = reader.mesh;
+    if mesh.indices.is_empty() {
+        let what =
+            "the OBJ file has no faces: it is another kind of file, or has only curves, lines or points";
+        return Err(Place::file(path).bad(what));
+    }
     if !reader.has_normals {
         mesh.normals.clear();
     }
@@ -60,6 +82,7 @@ struct Reader<'a> {
     vertices: HashMap<Corner, u32>,
     /// Vertices of the face that is being read.
     polygon: Vec<u32>,
+    cutter: Cutter,
     mesh: Triangles,
     has_uvs: bool,
     has_normals: bool,
@@ -88,6 +111,14 @@ impl Reader<'_> {
                 self.uvs.push([u, v]);
             }
             Some("f") => self.face(words)?,
+            Some(word) if !word.starts_with('#') && !IRRELEVANT.contains(&word) => {
+                let word: String = word.chars().take(20).collect();
+                let same = format!("`{word}`");
+                let unread = &mut self.mesh.unread;
+                if unread.len() < MAX_UNREAD && !unread.iter().any(|said| said.ends_with(&same)) {
+                    unread.push(format!("line {}: {same}", self.line));
+                }
+            }
             _ => {}
         }
         Ok(())
@@ -122,9 +153,14 @@ impl Reader<'_> {
         if self.polygon.len() < 3 {
             return Err(self.bad(format!("a face of {} corners; at least 3 are needed", self.polygon.len())));
         }
-        for pair in self.polygon[1..].windows(2) {
-            self.mesh.indices.push([self.polygon[0], pair[0], pair[1]]);
+        if let Ok(triangle) = <[u32; 3]>::try_from(self.polygon.as_slice()) {
+            self.mesh.indices.push(triangle);
+            return Ok(());
         }
+        let corners: Vec<_> = self.polygon.iter().map(|i| self.mesh.positions[*i as usize]).collect();
+        let place = Place::part(self.path, format_args!("line {}", self.line));
+        let triangles = self.cutter.cut(&corners, &place)?;
+        self.mesh.indices.extend(triangles.iter().map(|triangle| triangle.map(|i| self.polygon[i])));
         Ok(())
     }
 
@@ -194,6 +230,33 @@ mod tests {
         assert_eq!(mesh.uvs, [[0.25, 0.5], [0.75, 0.0], [0.0, 0.0], [0.0, 0.0], [0.75, 0.0]]);
         let (up, none) = ([0.0, 0.0, 2.0], [0.0; 3]);
         assert_eq!(mesh.normals, [up, up, up, none, none]);
+    }
+
+    #[test]
+    fn lines_may_be_continued() {
+        for text in ["f 1 2 \\\n3\nf 1 2 4\n", "f 1 2 3 \nf \\\n 1 \\\n 2 4", "f 1 2 3\nf 1 2 4 \\"] {
+            let mesh = parse_text(&format!("{CORNERS}{text}")).unwrap();
+            assert_eq!(mesh.indices, [[0, 1, 2], [0, 1, 3]], "{text}");
+        }
+    }
+
+    #[test]
+    fn lines_end_in_any_way_and_text_may_be_wide() {
+        let text = format!("# x\n{CORNERS}f 1 2 3\n");
+        let wide: Vec<u8> =
+            "\u{feff}".encode_utf16().chain(text.encode_utf16()).flat_map(u16::to_le_bytes).collect();
+        for bytes in [text.replace('\n', "\r").into_bytes(), text.replace('\n', "\r\n").into_bytes(), wide] {
+            assert_eq!(parse(&bytes, Path::new("a.obj")).unwrap().indices, [[0, 1, 2]]);
+        }
+    }
+
+    /// A mesh that is lost is an error, and what is not read is said once, with its line.
+    #[test]
+    fn nothing_is_lost_in_silence() {
+        let error = parse_text("<svg/>\n").unwrap_err();
+        assert!(error.contains("a.obj: the OBJ file has no faces"), "{error}");
+        let mesh = parse_text(&format!("{CORNERS}mtllib a.mtl\nl 1 2\nl 2 3\nf 1 2 3\nsurf 0 1\n")).unwrap();
+        assert_eq!(mesh.unread, ["line 6: `l`", "line 9: `surf`"]);
     }
 
     #[test]

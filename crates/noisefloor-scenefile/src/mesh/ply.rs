@@ -1,23 +1,26 @@
-//! PLY, text and binary: positions, normals, texture coordinates, faces and one attribute; all else is left out.
+//! PLY, text and binary: positions, normals, texture coordinates, faces, triangle strips and one attribute.
+//! Other elements are named; other properties are those of a mesh that a scene does not ask for.
+//!
+//! Read here and not by a crate: ply-rs-bw 4.0.1 refuses numbers such as `.5`, `1.` and `5.e-1`, the version
+//! `1`, and lines that are indented, and makes all the elements that a header asks for.
 
 use super::Triangles;
+use super::polygon::Cutter;
 use crate::error::{LoadError, Place};
-use ply_rs_bw::parser::{Parser, Reader};
-use ply_rs_bw::ply::{
-    ElementDef, Encoding, KeyMap, Property, PropertyAccess, PropertyAccessResult, PropertyType, ScalarType,
-};
+use std::fmt;
 use std::path::Path;
 
-/// Most characters of a message of the parser that are passed on.
-const MAX_MESSAGE: usize = 200;
+/// Most elements of a header, and most properties of all of them.
+const MAX_ELEMENTS: u64 = 64;
+const MAX_PROPERTIES: u64 = 1024;
+/// Most characters of a word of a file that an error repeats.
+const MAX_WORD: usize = 40;
 
-/// Names of the properties that hold the attribute that is asked for: no file has a space in a name.
-const ATTRIBUTE: [&str; 3] = ["attribute 0", "attribute 1", "attribute 2"];
-
-/// Reads the PLY file `bytes`, which came from `path`. Polygons become fans.
+/// Reads the PLY file `bytes`, which came from `path`.
 ///
 /// # Errors
-/// [`LoadError::Bad`] if the file is cut short or corrupt, or its header asks for more than the file holds.
+/// [`LoadError::Bad`] if the file is cut short or corrupt, its header asks for more than the file holds, or
+/// it has no faces although its header does not say so. [`LoadError::TooLarge`] as of [`Cutter::cut`].
 pub(crate) fn parse(bytes: &[u8], path: &Path) -> Result<Triangles, LoadError> {
     parse_with(bytes, path, None)
 }
@@ -29,219 +32,408 @@ pub(crate) fn parse(bytes: &[u8], path: &Path) -> Result<Triangles, LoadError> {
 /// As [`parse`]; and if the mesh has no such attribute.
 pub(crate) fn parse_with(bytes: &[u8], path: &Path, attribute: Option<&str>) -> Result<Triangles, LoadError> {
     let place = Place::file(path);
-    // Its messages repeat whole lines, however long
-    let bad = |e: ply_rs_bw::parser::ParseError| {
-        let message: String =
-            e.to_string().chars().map(|c| if c.is_control() { ' ' } else { c }).take(MAX_MESSAGE).collect();
-        place.clone().bad(format!("the PLY file is broken: {message}"))
-    };
+    let Header { elements, format, length } = Header::read(bytes, path)?;
+    let mut body = Body { bytes, at: length, format, path };
 
-    let mut reader = Reader::new(bytes);
-    let mut header = Parser::<Skipped>::new().read_header(&mut reader).map_err(bad)?;
-    // The parser makes as many elements as the header says, even of elements that take no bytes
-    let needed = header.elements.iter().try_fold(0u64, |sum, (_, element)| {
-        sum.checked_add(least_bytes(element, header.encoding).checked_mul(element.count as u64)?)
+    // Nothing is allocated for elements that the file cannot hold
+    let needed = elements.iter().try_fold(0u64, |sum, element| {
+        sum.checked_add(element.least_bytes(format).checked_mul(element.count)?)
     });
-    let empty = header.elements.iter().any(|(_, e)| e.properties.is_empty() && e.count > 0);
+    let empty = elements.iter().any(|element| element.properties.is_empty() && element.count > 0);
     if empty || needed.is_none_or(|needed| needed > bytes.len() as u64) {
-        return Err(place.clone().bad("the header asks for more elements than the file holds"));
+        return Err(place.bad("the header asks for more elements than the file holds"));
     }
-
-    if let Some(attribute) = attribute {
-        let found = attribute.split_once('_').is_some_and(|(element, name)| {
-            header.elements.get_mut(element).is_some_and(|element| mark(element, name))
-        });
-        if !found {
-            return Err(place.clone().bad(format!("the mesh has no attribute `{attribute}`")));
-        }
+    let wanted = attribute.and_then(|attribute| attribute.split_once('_'));
+    let has = |(of, name): (&str, &str)| {
+        let found = elements.iter().find(|element| element.name == of);
+        let at = |i| found.is_some_and(|e| e.properties.iter().any(|p| channel(&p.name, name) == Some(i)));
+        (at(0) && at(1) == at(2)).then(|| at(1))
+    };
+    let coloured = wanted.and_then(has);
+    if let Some(attribute) = attribute.filter(|_| coloured.is_none()) {
+        return Err(place.bad(format_args!("the mesh has no attribute `{attribute}`")));
     }
+    let of = |element: &Element| wanted.filter(|(of, _)| *of == element.name).map(|(_, name)| name);
+    let colour = |values: [f32; 3]| if coloured == Some(true) { values } else { [values[0]; 3] };
 
     let mut mesh = Triangles::default();
-    for (name, element) in &header.elements {
-        match name.as_str() {
+    let mut faces = Faces::default();
+    for element in &elements {
+        match element.name.as_str() {
             "vertex" => {
-                let vertices =
-                    Parser::<Vertex>::new().read_payload_for_element(&mut reader, element, &header);
-                add_vertices(&mut mesh, element, &vertices.map_err(bad)?, &place)?;
+                let has =
+                    |names: &[&str]| names.iter().all(|n| element.properties.iter().any(|p| p.name == *n));
+                if !has(&["x", "y", "z"]) {
+                    return Err(place.bad("its vertices have no x, y and z"));
+                }
+                let normals = has(&["nx", "ny", "nz"]);
+                let uvs = UVS.iter().find(|names| has(&names[..]));
+                let slots = element.slots(|name| match name {
+                    "x" | "y" | "z" => Some(usize::from(name.as_bytes()[0] - b'x')),
+                    "nx" | "ny" | "nz" => Some(3 + usize::from(name.as_bytes()[1] - b'x')),
+                    _ => match uvs.and_then(|names| names.iter().position(|n| *n == name)) {
+                        Some(at) => Some(6 + at),
+                        None => of(element).and_then(|of| channel(name, of)).map(|at| 8 + at),
+                    },
+                });
+                for index in 0..element.count {
+                    let mut row = [0.0; 11];
+                    for (property, slot) in element.properties.iter().zip(&slots) {
+                        body.property(element, index, property, |value| {
+                            if let Some(slot) = slot {
+                                row[*slot] = value as f32;
+                            }
+                            Ok(())
+                        })?;
+                    }
+                    let [x, y, z, nx, ny, nz, u, v, r, g, b] = row;
+                    mesh.positions.push([x, y, z]);
+                    mesh.normals.extend(normals.then_some([nx, ny, nz]));
+                    mesh.uvs.extend(uvs.map(|_| [u, v]));
+                    mesh.colours.extend(of(element).map(|_| colour([r, g, b])));
+                }
             }
-            "face" => {
-                let faces = Parser::<Face>::new().read_payload_for_element(&mut reader, element, &header);
-                add_faces(&mut mesh, element, &faces.map_err(bad)?, &place)?;
+            "face" | "tristrips" => {
+                let strips = element.name == "tristrips";
+                let slots = element.slots(|name| of(element).and_then(|of| channel(name, of)));
+                for index in 0..element.count {
+                    let (mut row, start) = ([0.0; 3], faces.corners.len());
+                    for (property, slot) in element.properties.iter().zip(&slots) {
+                        let corners = matches!(property.name.as_str(), "vertex_indices" | "vertex_index");
+                        let corners = corners && property.count.is_some();
+                        body.property(element, index, property, |value| {
+                            match slot {
+                                Some(slot) => row[*slot] = value as f32,
+                                None if corners && strips && value == -1.0 => faces.end_strip(),
+                                None if corners => match value as u32 {
+                                    corner if f64::from(corner) == value => faces.corners.push(corner),
+                                    _ => return Err(format!("{value} is no number of a vertex")),
+                                },
+                                None => {}
+                            }
+                            Ok(())
+                        })?;
+                    }
+                    if strips {
+                        faces.end_strip();
+                    } else if faces.corners.len() - start < 3 {
+                        let what = format!("face {index} has no `vertex_indices`, or fewer than 3");
+                        return Err(place.bad(what));
+                    } else {
+                        faces.ends.push(faces.corners.len());
+                        faces.colours.extend(of(element).map(|_| colour(row)));
+                    }
+                }
             }
             _ => {
-                let skipped =
-                    Parser::<Skipped>::new().read_payload_for_element(&mut reader, element, &header);
-                skipped.map_err(bad)?;
+                for index in 0..element.count {
+                    for property in &element.properties {
+                        body.property(element, index, property, |_| Ok(()))?;
+                    }
+                }
+                if element.count > 0 {
+                    mesh.unread.push(format!("the element `{}`", element.name));
+                }
             }
         }
+    }
+    faces.add_to(&mut mesh, &place)?;
+    let says_so = elements.iter().any(|e| matches!(e.name.as_str(), "face" | "tristrips") && e.count == 0);
+    if mesh.indices.is_empty() && !says_so {
+        return Err(
+            place.bad("the PLY file has no faces: it is a cloud of points, or has faces of another name")
+        );
     }
     Ok(mesh)
 }
 
-/// Renames the properties of the attribute called `name` to [`ATTRIBUTE`]. Returns whether it has one number or
-/// three.
-fn mark(element: &mut ElementDef, name: &str) -> bool {
-    let colour = |property: &str| ["r", "g", "b"].iter().position(|c| name == "color" && *c == property);
-    let number = |property: &str| {
-        let number = property.strip_prefix(name)?.strip_prefix('_')?;
-        ["0", "1", "2"].iter().position(|n| *n == number)
-    };
-    let mut renamed = KeyMap::new();
-    for (_, mut property) in std::mem::take(&mut element.properties) {
-        if let Some(at) = number(&property.name).or_else(|| colour(&property.name)) {
-            ATTRIBUTE[at].clone_into(&mut property.name);
-        }
-        renamed.insert(property.name.clone(), property);
-    }
-    element.properties = renamed;
-    let has = |at: usize| element.properties.contains_key(ATTRIBUTE[at]);
-    has(0) && has(1) == has(2)
+/// Names of texture coordinates.
+const UVS: [[&str; 2]; 4] = [["u", "v"], ["s", "t"], ["texture_u", "texture_v"], ["texture_s", "texture_t"]];
+
+/// Which channel of the attribute called `name` a property is.
+fn channel(property: &str, name: &str) -> Option<usize> {
+    let numbered = property.strip_prefix(name).and_then(|rest| rest.strip_prefix('_'));
+    let number = numbered.and_then(|number| ["0", "1", "2"].iter().position(|n| *n == number));
+    number.or_else(|| ["r", "g", "b"].iter().position(|c| name == "color" && *c == property))
 }
 
-/// The attribute of something, if the element has it.
-fn colour(element: &ElementDef, values: [f32; 3]) -> Option<[f32; 3]> {
-    let has = |at: usize| element.properties.contains_key(ATTRIBUTE[at]);
-    has(0).then(|| if has(1) { values } else { [values[0]; 3] })
+/// Polygons, until all vertices are known.
+#[derive(Debug, Default)]
+struct Faces {
+    corners: Vec<u32>,
+    /// Where in `corners` each face ends.
+    ends: Vec<usize>,
+    colours: Vec<[f32; 3]>,
+    strip: Vec<u32>,
 }
 
-fn add_vertices(
-    mesh: &mut Triangles,
-    element: &ElementDef,
-    vertices: &[Vertex],
-    place: &Place,
-) -> Result<(), LoadError> {
-    let has = |names: &[&str]| names.iter().all(|name| element.properties.contains_key(*name));
-    if !has(&["x", "y", "z"]) {
-        return Err(place.clone().bad("its vertices have no x, y and z"));
-    }
-    mesh.positions.extend(vertices.iter().map(|v| v.position));
-    if has(&["nx", "ny", "nz"]) {
-        mesh.normals.extend(vertices.iter().map(|v| v.normal));
-    }
-    if has(&["u", "v"]) || has(&["s", "t"]) {
-        mesh.uvs.extend(vertices.iter().map(|v| v.uv));
-    }
-    mesh.colours.extend(vertices.iter().filter_map(|v| colour(element, v.attribute)));
-    Ok(())
-}
-
-fn add_faces(
-    mesh: &mut Triangles,
-    element: &ElementDef,
-    faces: &[Face],
-    place: &Place,
-) -> Result<(), LoadError> {
-    for (index, face) in faces.iter().enumerate() {
-        let Some(corners) = face.corners.as_deref().filter(|corners| corners.len() >= 3) else {
-            let what = format!("face {index} has no `vertex_indices`, or fewer than 3");
-            return Err(place.clone().bad(what));
-        };
-        for pair in corners[1..].windows(2) {
-            mesh.indices.push([corners[0], pair[0], pair[1]]);
-            mesh.face_colours.extend(colour(element, face.attribute));
+impl Faces {
+    /// Makes triangles of the strip that ends here: every second one runs the other way.
+    fn end_strip(&mut self) {
+        let start = self.ends.last().copied().unwrap_or(0);
+        self.strip.clear();
+        self.strip.extend(self.corners.drain(start..));
+        for (number, corners) in self.strip.windows(3).enumerate() {
+            let [a, b, c] = [corners[0], corners[1], corners[2]];
+            self.corners.extend(if number % 2 == 0 { [a, b, c] } else { [b, a, c] });
+            self.ends.push(self.corners.len());
         }
     }
-    Ok(())
-}
 
-/// The fewest bytes that an element takes.
-fn least_bytes(element: &ElementDef, encoding: Encoding) -> u64 {
-    let size = |scalar: &ScalarType| match (encoding, scalar) {
-        // A digit and what parts it from the next
-        (Encoding::Ascii, _) => 2,
-        (_, ScalarType::Char | ScalarType::UChar) => 1,
-        (_, ScalarType::Short | ScalarType::UShort) => 2,
-        (_, ScalarType::Int | ScalarType::UInt | ScalarType::Float) => 4,
-        (_, ScalarType::Double) => 8,
-    };
-    let bytes: u64 = element
-        .properties
-        .iter()
-        .map(|(_, property)| match &property.data_type {
-            PropertyType::Scalar(scalar) => size(scalar),
-            PropertyType::List(count, _) => size(count),
-        })
-        .sum();
-    // The last line of a text may lack its end
-    if encoding == Encoding::Ascii { bytes.saturating_sub(1) } else { bytes }
-}
-
-#[derive(Default)]
-struct Vertex {
-    position: [f32; 3],
-    normal: [f32; 3],
-    uv: [f32; 2],
-    attribute: [f32; 3],
-}
-
-impl PropertyAccess for Vertex {
-    fn new() -> Self {
-        Self::default()
-    }
-
-    fn set_property(&mut self, name: &str, value: Property) -> PropertyAccessResult {
-        let slot = match name {
-            "x" => &mut self.position[0],
-            "y" => &mut self.position[1],
-            "z" => &mut self.position[2],
-            "nx" => &mut self.normal[0],
-            "ny" => &mut self.normal[1],
-            "nz" => &mut self.normal[2],
-            "u" | "s" => &mut self.uv[0],
-            "v" | "t" => &mut self.uv[1],
-            _ => match ATTRIBUTE.iter().position(|attribute| *attribute == name) {
-                Some(at) => &mut self.attribute[at],
-                None => return PropertyAccessResult::Ignored,
-            },
-        };
-        set(slot, &value)
-    }
-}
-
-fn set(slot: &mut f32, value: &Property) -> PropertyAccessResult {
-    match value.to_f32_lossy() {
-        Some(value) => {
-            *slot = value;
-            PropertyAccessResult::Set
-        }
-        None => PropertyAccessResult::UnsupportedType,
-    }
-}
-
-#[derive(Default)]
-struct Face {
-    corners: Option<Vec<u32>>,
-    attribute: [f32; 3],
-}
-
-impl PropertyAccess for Face {
-    fn new() -> Self {
-        Self::default()
-    }
-
-    fn set_property(&mut self, name: &str, value: Property) -> PropertyAccessResult {
-        if let Some(at) = ATTRIBUTE.iter().position(|attribute| *attribute == name) {
-            return set(&mut self.attribute[at], &value);
-        }
-        if name != "vertex_indices" && name != "vertex_index" {
-            return PropertyAccessResult::Ignored;
-        }
-        match value.to_u32_list() {
-            Some(corners) => {
-                self.corners = Some(corners);
-                PropertyAccessResult::Set
+    fn add_to(&self, mesh: &mut Triangles, place: &Place) -> Result<(), LoadError> {
+        let mut cutter = Cutter::default();
+        let starts = [0].iter().chain(&self.ends);
+        for (number, (start, end)) in starts.zip(&self.ends).enumerate() {
+            let face = &self.corners[*start..*end];
+            let colour = self.colours.get(number);
+            if let Ok(triangle) = <[u32; 3]>::try_from(face) {
+                mesh.indices.push(triangle);
+                mesh.face_colours.extend(colour);
+                continue;
             }
-            None => PropertyAccessResult::UnsupportedType,
+            // What is out of range is said when the mesh is checked
+            let corners = face.iter().map(|i| mesh.positions.get(*i as usize).copied().unwrap_or([0.0; 3]));
+            for triangle in cutter.cut(&corners.collect::<Vec<_>>(), place)? {
+                mesh.indices.push(triangle.map(|i| face[i]));
+                mesh.face_colours.extend(colour);
+            }
+        }
+        Ok(())
+    }
+}
+
+/// How numbers are written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Format {
+    Ascii,
+    LittleEndian,
+    BigEndian,
+}
+
+/// The type of a number.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Scalar {
+    I8,
+    U8,
+    I16,
+    U16,
+    I32,
+    U32,
+    F32,
+    F64,
+}
+
+impl Scalar {
+    fn named(name: &str) -> Option<Self> {
+        Some(match name {
+            "char" | "int8" => Self::I8,
+            "uchar" | "uint8" => Self::U8,
+            "short" | "int16" => Self::I16,
+            "ushort" | "uint16" => Self::U16,
+            "int" | "int32" => Self::I32,
+            "uint" | "uint32" => Self::U32,
+            "float" | "float32" => Self::F32,
+            "double" | "float64" => Self::F64,
+            _ => return None,
+        })
+    }
+
+    fn size(self) -> usize {
+        match self {
+            Self::I8 | Self::U8 => 1,
+            Self::I16 | Self::U16 => 2,
+            Self::I32 | Self::U32 | Self::F32 => 4,
+            Self::F64 => 8,
+        }
+    }
+
+    /// The number that little-endian bytes stand for.
+    fn value(self, bytes: [u8; 8]) -> f64 {
+        let [a, b, c, d, ..] = bytes;
+        match self {
+            Self::I8 => f64::from(a as i8),
+            Self::U8 => f64::from(a),
+            Self::I16 => f64::from(i16::from_le_bytes([a, b])),
+            Self::U16 => f64::from(u16::from_le_bytes([a, b])),
+            Self::I32 => f64::from(i32::from_le_bytes([a, b, c, d])),
+            Self::U32 => f64::from(u32::from_le_bytes([a, b, c, d])),
+            Self::F32 => f64::from(f32::from_le_bytes([a, b, c, d])),
+            Self::F64 => f64::from_le_bytes(bytes),
         }
     }
 }
 
-/// An element that is passed over.
-struct Skipped;
+#[derive(Debug)]
+struct PropertyDef {
+    name: String,
+    scalar: Scalar,
+    /// The type of the count of a list.
+    count: Option<Scalar>,
+}
 
-impl PropertyAccess for Skipped {
-    fn new() -> Self {
-        Self
+#[derive(Debug)]
+struct Element {
+    name: String,
+    count: u64,
+    properties: Vec<PropertyDef>,
+}
+
+impl Element {
+    /// What `slot` says of each property.
+    fn slots(&self, slot: impl Fn(&str) -> Option<usize>) -> Vec<Option<usize>> {
+        self.properties.iter().map(|property| slot(&property.name)).collect()
+    }
+
+    /// The fewest bytes that one takes.
+    fn least_bytes(&self, format: Format) -> u64 {
+        let sizes = self.properties.iter().map(|property| property.count.unwrap_or(property.scalar).size());
+        match format {
+            // A digit and what parts it from the next; the last line may lack its end
+            Format::Ascii => (2 * self.properties.len() as u64).saturating_sub(1),
+            _ => sizes.sum::<usize>() as u64,
+        }
+    }
+}
+
+#[derive(Debug)]
+struct Header {
+    elements: Vec<Element>,
+    format: Format,
+    /// In bytes.
+    length: usize,
+}
+
+impl Header {
+    fn read(bytes: &[u8], path: &Path) -> Result<Self, LoadError> {
+        let (mut at, mut number) = (0, 0);
+        let (mut elements, mut format, mut properties) = (Vec::<Element>::new(), None, 0);
+        // As the first line ends: what is binary may begin as the other half of an end
+        let mut wide = None;
+        loop {
+            number += 1;
+            let here = Place::part(path, format_args!("line {number}"));
+            let rest = &bytes[at..];
+            let Some(end) = rest.iter().position(|b| matches!(b, b'\n' | b'\r')) else {
+                return Err(here.bad("the PLY file is broken: its header does not end"));
+            };
+            let line = String::from_utf8_lossy(&rest[..end]);
+            let wide = *wide.get_or_insert(rest[end..].starts_with(b"\r\n"));
+            at += end + if wide && rest[end..].starts_with(b"\r\n") { 2 } else { 1 };
+            let words: Vec<&str> = line.split_ascii_whitespace().collect();
+            if number == 1 && words != ["ply"] {
+                return Err(here.bad("the PLY file is broken: its first line is not `ply`"));
+            }
+            let scalar = |name: &str| {
+                let unknown = || here.clone().bad(format_args!("`{}` is no type of a PLY file", cut(name)));
+                Scalar::named(name).ok_or_else(unknown)
+            };
+            match (words.as_slice(), elements.last_mut()) {
+                ([] | ["comment" | "obj_info", ..], _) => {}
+                (["ply"], _) if number == 1 => {}
+                (["format", "ascii", "1.0" | "1"], _) => format = Some(Format::Ascii),
+                (["format", "binary_little_endian", "1.0" | "1"], _) => format = Some(Format::LittleEndian),
+                (["format", "binary_big_endian", "1.0" | "1"], _) => format = Some(Format::BigEndian),
+                (["element", name, count], _) => {
+                    let count = count.parse().ok().ok_or_else(|| {
+                        here.clone().bad(format_args!("`{}` is no number of elements", cut(count)))
+                    })?;
+                    elements.push(Element { name: (*name).to_owned(), count, properties: vec![] });
+                    here.at_most("elements", elements.len() as u64, MAX_ELEMENTS)?;
+                }
+                (["property", "list", count, kind, name], Some(element)) => {
+                    let (count, scalar) = (Some(scalar(count)?), scalar(kind)?);
+                    element.properties.push(PropertyDef { name: (*name).to_owned(), scalar, count });
+                    properties += 1;
+                }
+                (["property", kind, name], Some(element)) => {
+                    let scalar = scalar(kind)?;
+                    element.properties.push(PropertyDef { name: (*name).to_owned(), scalar, count: None });
+                    properties += 1;
+                }
+                (["end_header"], _) => {
+                    let format = format
+                        .ok_or_else(|| here.bad("the PLY file is broken: its header gives no `format`"))?;
+                    return Ok(Self { elements, format, length: at });
+                }
+                _ => {
+                    let what = format_args!("`{}` is no line of the header of a PLY file", cut(&line));
+                    return Err(here.bad(what));
+                }
+            }
+            Place::file(path).at_most("properties", properties, MAX_PROPERTIES)?;
+        }
+    }
+}
+
+/// The beginning of a text, for an error.
+fn cut(text: &str) -> String {
+    text.trim().chars().map(|c| if c.is_control() { ' ' } else { c }).take(MAX_WORD).collect()
+}
+
+/// What follows the header.
+#[derive(Debug)]
+struct Body<'a> {
+    bytes: &'a [u8],
+    at: usize,
+    format: Format,
+    path: &'a Path,
+}
+
+impl Body<'_> {
+    /// Takes a property: each of its numbers goes to `put`.
+    fn property(
+        &mut self,
+        element: &Element,
+        index: u64,
+        property: &PropertyDef,
+        mut put: impl FnMut(f64) -> Result<(), String>,
+    ) -> Result<(), LoadError> {
+        let count = match property.count {
+            None => 1,
+            Some(kind) => {
+                let count = self.number(kind).map_err(|what| self.bad(element, index, what))?;
+                let whole = count as u32;
+                if f64::from(whole) != count {
+                    return Err(self.bad(element, index, format!("{count} is no length of a list")));
+                }
+                whole
+            }
+        };
+        for _ in 0..count {
+            let put = self.number(property.scalar).and_then(&mut put);
+            put.map_err(|what| self.bad(element, index, what))?;
+        }
+        Ok(())
+    }
+
+    fn number(&mut self, kind: Scalar) -> Result<f64, String> {
+        let ends = || "it ends too early".to_owned();
+        let rest = &self.bytes[self.at..];
+        if self.format != Format::Ascii {
+            let found = rest.get(..kind.size()).ok_or_else(ends)?;
+            let mut bytes = [0; 8];
+            bytes[..found.len()].copy_from_slice(found);
+            if self.format == Format::BigEndian {
+                bytes[..found.len()].reverse();
+            }
+            self.at += found.len();
+            return Ok(kind.value(bytes));
+        }
+        let start = rest.iter().position(|b| !b.is_ascii_whitespace()).ok_or_else(ends)?;
+        let word = &rest[start..];
+        let word = &word[..word.iter().position(u8::is_ascii_whitespace).unwrap_or(word.len())];
+        self.at += start + word.len();
+        let number = std::str::from_utf8(word).ok().and_then(|word| word.parse().ok());
+        number.ok_or_else(|| format!("`{}` is no number", cut(&String::from_utf8_lossy(word))))
+    }
+
+    fn bad(&self, element: &Element, index: u64, what: impl fmt::Display) -> LoadError {
+        let what = format_args!("the PLY file is broken: {} {index}: {what}", element.name);
+        if self.format != Format::Ascii {
+            return Place::file(self.path).bad(what);
+        }
+        let line = 1 + self.bytes[..self.at].iter().filter(|b| **b == b'\n').count();
+        Place::part(self.path, format_args!("line {line}")).bad(what)
     }
 }
 
@@ -296,6 +488,62 @@ mod tests {
         }
     }
 
+    const QUAD: &str = "element vertex 4\nproperty float x\nproperty float y\nproperty float z\n";
+
+    fn parse_text(text: &str) -> Result<Triangles, String> {
+        parse(text.as_bytes(), Path::new("a.ply")).map_err(|e| e.to_string())
+    }
+
+    /// Numbers as `strtod` reads them, and headers as people write them.
+    #[test]
+    fn numbers_and_headers_are_read_in_all_their_forms() {
+        let body = ".5 -.5 0.\n1. 5.e-1 +2E0\n1\t1 0\n\n0 1 0 4\n0 1 2 3";
+        let header =
+            format!("{QUAD}element face 1\nproperty list uchar int vertex_index\nend_header\n{body}");
+        for text in [
+            format!("ply\nformat ascii 1.0\n{header}"),
+            format!("ply\nformat ascii 1\n  comment a b c\n\tobj_info x\n{header}"),
+            format!("ply\nformat ascii 1.0\n{header}").replace('\n', "\r\n"),
+            format!("ply\nformat ascii 1.0\n{header}").replace('\n', "\r"),
+        ] {
+            let mesh = parse_text(&text).unwrap();
+            assert_eq!(mesh.positions[..2], [[0.5, -0.5, 0.0], [1.0, 0.5, 2.0]], "{text}");
+            assert_eq!(mesh.indices.len(), 2, "{text}");
+        }
+        let text = format!("ply\nformat ascii 1.0\n{header}").replace("-.5", "-.5x");
+        let error = parse_text(&text).unwrap_err();
+        assert!(
+            error.ends_with("a.ply: line 10: the PLY file is broken: vertex 0: `-.5x` is no number"),
+            "{error}"
+        );
+        let error = parse_text("ply\nformat ascii 1.0\nelemant face 1\n").unwrap_err();
+        assert!(error.contains("a.ply: line 3: `elemant face 1` is no line of the header"), "{error}");
+    }
+
+    /// Two strips, parted by −1: every second triangle of each is turned round, so that all face alike.
+    #[test]
+    fn strips_become_triangles() {
+        let body = "0 0 0 1 0 0 0 1 0 1 1 0\n8 0 1 2 3 -1 2 1 3\n";
+        let strips = "element tristrips 1\nproperty list int int vertex_indices\nend_header\n";
+        let mesh = parse_text(&format!("ply\nformat ascii 1.0\n{QUAD}{strips}{body}")).unwrap();
+        assert_eq!(mesh.indices, [[0, 1, 2], [2, 1, 3], [2, 1, 3]]);
+    }
+
+    /// A mesh that is lost is an error, unless its header says that it is empty.
+    #[test]
+    fn meshes_without_faces_are_errors_unless_they_say_so() {
+        let points = format!("ply\nformat ascii 1.0\n{QUAD}end_header\n0 0 0 1 0 0 0 1 0 1 1 0\n");
+        assert!(parse_text(&points).unwrap_err().contains("the PLY file has no faces: it is a cloud"));
+        let faces = "element face 0\nproperty list int int vertex_indices\nend_header";
+        assert!(parse_text(&points.replace("end_header", faces)).unwrap().indices.is_empty());
+        let strips = "element tristrips 1\nproperty list int int vertex_indices\nend_header";
+        let strips = points.replace("end_header", strips) + "2 0 1\n";
+        assert!(parse_text(&strips).unwrap_err().contains("has no faces"));
+        let edges = "element edge 1\nproperty int vertex1\nelement face 0\nproperty int x\nend_header";
+        let mesh = parse_text(&(points.replace("end_header", edges) + "0\n")).unwrap();
+        assert_eq!(mesh.unread, ["the element `edge`"]);
+    }
+
     #[test]
     fn every_cut_is_an_error() {
         for bytes in [text().into_bytes(), binary(true), binary(false)] {
@@ -319,14 +567,14 @@ mod tests {
             ("element nothing 18446744073709551615\n".to_owned(), "more elements than the file holds"),
             (
                 format!("element vertex 0\n{vertex}element face 1\nproperty list uint int vertex_indices\n"),
-                "file is broken",
+                "face 0: -1 is no number of a vertex",
             ),
             ("element vertex 1\nproperty float x\nproperty float y\n".to_owned(), "no x, y and z"),
             (
                 format!(
                     "element vertex 0\n{vertex}element face 1\nproperty list uchar float vertex_indices\n"
                 ),
-                "file is broken",
+                "face 0: NaN is no number of a vertex",
             ),
             (
                 format!("element vertex 0\n{vertex}element face 1\nproperty int other\n"),

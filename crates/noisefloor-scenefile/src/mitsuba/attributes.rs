@@ -4,7 +4,6 @@ use super::context::Context;
 use super::xml::Element;
 use crate::error::LoadError;
 use crate::mesh::{Triangles, ply};
-use std::collections::HashSet;
 use std::path::Path;
 
 /// An attribute that a surface takes its colour from.
@@ -17,39 +16,35 @@ pub(super) struct Attribute {
 }
 
 impl<'d> Context<'d> {
-    /// The attribute that the surfaces of a shape use, if they use one.
+    /// The attribute that the surfaces in an element use, if they use one.
     ///
     /// # Errors
     /// [`LoadError`] if they use several.
-    pub(super) fn attribute_of(&self, shape: &'d Element) -> Result<Option<Attribute>, LoadError> {
-        let (mut found, mut seen) = (None, HashSet::new());
-        self.find_attribute(shape, &mut found, &mut seen)?;
-        Ok(found)
-    }
-
-    fn find_attribute(
-        &self,
-        element: &'d Element,
-        found: &mut Option<Attribute>,
-        seen: &mut HashSet<usize>,
-    ) -> Result<(), LoadError> {
+    pub(super) fn attribute_of(&self, element: &'d Element) -> Result<Option<Attribute>, LoadError> {
+        if let Some(known) = self.attributes.borrow().get(&element.serial) {
+            return Ok(known.clone());
+        }
+        self.spend(element, element.children.len())?;
+        let mut found = None;
         for child in &element.children {
             let part = self.resolve(child)?;
-            if !matches!(part.tag.as_str(), "bsdf" | "texture") || !seen.insert(part.serial) {
-                continue;
-            }
-            if part.tag == "texture" && part.kind() == "mesh_attribute" {
-                let name = self.string(part, "name")?;
-                let name = name.ok_or_else(|| self.bad(part, "a mesh attribute needs a `name`"))?.to_owned();
-                let attribute = Attribute { name, scale: self.float(part, "scale")?.unwrap_or(1.0) };
-                if found.as_ref().is_some_and(|found| *found != attribute) {
-                    return Err(self.unsupported(part, "a second attribute of one mesh"));
+            let attribute = match part.tag.as_str() {
+                "texture" if part.kind() == "mesh_attribute" => {
+                    let name = self.string(part, "name")?;
+                    let name =
+                        name.ok_or_else(|| self.bad(part, "a mesh attribute needs a `name`"))?.to_owned();
+                    Some(Attribute { name, scale: self.float(part, "scale")?.unwrap_or(1.0) })
                 }
-                *found = Some(attribute);
+                "bsdf" | "texture" => self.nested_in(part, || self.attribute_of(part))?,
+                _ => None,
+            };
+            if found.is_some() && attribute.is_some() && found != attribute {
+                return Err(self.unsupported(part, "a second attribute of one mesh"));
             }
-            self.find_attribute(part, found, seen)?;
+            found = found.or(attribute);
         }
-        Ok(())
+        self.attributes.borrow_mut().insert(element.serial, found.clone());
+        Ok(found)
     }
 
     /// A PLY mesh with the colours of an attribute, brought into 0…1.

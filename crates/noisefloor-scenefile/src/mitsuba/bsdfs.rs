@@ -10,6 +10,9 @@ use noisefloor::Rgb;
 use noisefloor_ptwne::{Facets, Lobes, Material, Relief, Texture};
 use std::f32::consts::FRAC_1_SQRT_2;
 
+/// Most surfaces that one mixes, whatever they are mixed of.
+const MAX_MIXED: u64 = 256;
+
 impl<'d> Context<'d> {
     /// A `bsdf`.
     ///
@@ -18,11 +21,26 @@ impl<'d> Context<'d> {
     pub(super) fn surface(&self, element: &'d Element) -> Result<Surface, LoadError> {
         let serial = element.serial;
         if let Some(known) = self.surfaces.borrow().get(&serial) {
+            self.spend(element, known.parts())?;
             return Ok(known.clone());
         }
         let surface = self.nested_in(element, || self.of_kind(element))?;
         self.surfaces.borrow_mut().insert(serial, surface.clone());
         Ok(surface)
+    }
+
+    /// `share` of the second surface, and the rest of the first.
+    fn blended(
+        &self,
+        element: &Element,
+        first: Surface,
+        second: Surface,
+        share: Texture,
+    ) -> Result<Surface, LoadError> {
+        let parts = first.parts() + second.parts();
+        self.spend(element, parts)?;
+        self.place(element).at_most("surfaces that are mixed", parts as u64, MAX_MIXED)?;
+        Ok(Surface::blend(first, second, share))
     }
 
     fn of_kind(&self, element: &'d Element) -> Result<Surface, LoadError> {
@@ -43,7 +61,7 @@ impl<'d> Context<'d> {
             "mixturebsdf" => self.mixture(element),
             "coating" | "roughcoating" => self.coating(element),
             "bumpmap" | "bump" | "normalmap" | "normal" => self.relief(element),
-            _ => Err(self.unsupported(element, element.species())),
+            _ => Err(self.unsupported_kind(element)),
         }
     }
 
@@ -105,7 +123,7 @@ impl<'d> Context<'d> {
             return Err(self.bad(element, format!("{} needs two <bsdf> in it", element.label())));
         };
         let share = self.luminance(element, self.factor(element, "weight", 0.5)?)?;
-        Ok(Surface::blend(self.surface(first)?, self.surface(second)?, share))
+        self.blended(element, self.surface(first)?, self.surface(second)?, share)
     }
 
     /// Bumps on a surface: by heights or by normals.
@@ -145,14 +163,22 @@ impl<'d> Context<'d> {
             let next = self.surface(part)?;
             taken += weight / whole;
             let share = (weight / whole / taken) as f32;
-            mixed =
-                if share > 0.9999 { next } else { Surface::blend(mixed, next, Texture::Colour([share; 3])) };
+            mixed = match share > 0.9999 {
+                true => next,
+                false => self.blended(element, mixed, next, Texture::Colour([share; 3]))?,
+            };
         }
         Ok(mixed)
     }
 
     /// A clear coat over a surface: exact over a diffuse base, left out over any other.
     fn coating(&self, element: &'d Element) -> Result<Surface, LoadError> {
+        if element.has("sigma_a") {
+            self.approximated(
+                element,
+                format!("`sigma_a` of {} is left out: its coat is clear", element.species()),
+            );
+        }
         element.ignore(&["thickness", "sigma_a", "specular_sampling_weight"]);
         let rough = element.kind() == "roughcoating";
         let inside = self.surface(self.nested(element)?)?;
@@ -208,6 +234,9 @@ impl<'d> Context<'d> {
         (roughness, alphas): (f32, Option<Texture>),
     ) -> Result<Surface, LoadError> {
         let gloss = specular.into_iter().fold(0.0, f32::max);
+        if let Texture::Image(image) = &diffuse {
+            self.spend(element, image.width * image.height)?;
+        }
         let base = peak(&diffuse);
         if gloss == 0.0 {
             return Ok(Surface::one_sided(Material::Diffuse { albedo: diffuse }));

@@ -4,7 +4,7 @@ use super::context::Context;
 use super::xml::Element;
 use crate::colour::{self, EQUAL_ENERGY, Quantity, TEMPERATURES};
 use crate::error::LoadError;
-use crate::files::MAX_FILE_BYTES;
+use crate::files::{self, MAX_FILE_BYTES};
 use noisefloor::{Rgb, display::srgb_decode};
 
 /// Elements that are colours.
@@ -138,8 +138,8 @@ impl<'d> Context<'d> {
         let place = self.place(element);
         let path = self.document.folder.find(name, &place)?;
         let bytes = self.document.folder.read(&path, MAX_FILE_BYTES, &place)?;
-        let text = String::from_utf8_lossy(&bytes);
-        let lines = text.lines().map(|line| line.split('#').next().unwrap_or_default().trim());
+        let text = files::text(&bytes);
+        let lines = files::lines(&text).map(|line| line.split('#').next().unwrap_or_default().trim());
         let mut samples = Vec::new();
         for line in lines.filter(|line| !line.is_empty()) {
             match self.numbers(element, line)?.as_slice() {
@@ -184,7 +184,7 @@ impl<'d> Context<'d> {
                 let samples = values.iter().enumerate().map(|(i, v)| (low + step * i as f64, *v));
                 self.of_samples(element, &samples.collect::<Vec<_>>(), quantity)
             }
-            _ => Err(self.unsupported(element, element.species())),
+            _ => Err(self.unsupported_kind(element)),
         }
     }
 

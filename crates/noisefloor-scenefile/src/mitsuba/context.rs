@@ -1,13 +1,16 @@
 //! What the readers of all parts of a scene share.
 
+use super::attributes::Attribute;
 use super::document::{Document, unset};
 use super::raster::Raster;
 use super::surface::Surface;
 use super::xml::Element;
+use crate::bounds::Bounds;
+use crate::channels::Means;
 use crate::error::{LoadError, Place, Warning};
 use crate::options::LoadOptions;
 use crate::options::NO_MEDIA;
-use noisefloor_ptwne::SceneError;
+use noisefloor_ptwne::{Facets, Material, SceneError, Texture};
 use std::cell::{Cell, RefCell};
 use std::collections::{HashMap, HashSet};
 use std::fmt;
@@ -15,8 +18,26 @@ use std::path::PathBuf;
 
 /// Most warnings that are kept.
 const MAX_WARNINGS: usize = 10_000;
-/// How deep surfaces and textures may nest by reference.
-const MAX_NESTED: u64 = 16;
+/// Kinds of elements that Mitsuba 3.9 has and this reader has not.
+const MITSUBAS_OWN: [(&str, &str); 17] = [
+    ("bsdf", "circular"),
+    ("bsdf", "hair"),
+    ("bsdf", "measured"),
+    ("bsdf", "measured_polarized"),
+    ("bsdf", "polarizer"),
+    ("bsdf", "retarder"),
+    ("emitter", "directionalarea"),
+    ("sensor", "batch"),
+    ("sensor", "distant"),
+    ("sensor", "irradiancemeter"),
+    ("sensor", "radiancemeter"),
+    ("shape", "bsplinecurve"),
+    ("shape", "ellipsoids"),
+    ("shape", "ellipsoidsmesh"),
+    ("shape", "linearcurve"),
+    ("shape", "sdfgrid"),
+    ("texture", "volume"),
+];
 /// Most aliases in a row.
 const MAX_ALIASES: usize = 16;
 /// Most pixels that the pictures of a scene have together, where they are kept more than once counted as
@@ -32,8 +53,13 @@ pub(super) struct Context<'d> {
     pub(super) rasters: RefCell<HashMap<(PathBuf, bool), Raster>>,
     /// Surfaces that have been read, by the serial number of their element.
     pub(super) surfaces: RefCell<HashMap<usize, Surface>>,
-    /// Serial numbers of the surfaces and textures that are being read, one in another.
-    open: RefCell<Vec<usize>>,
+    /// Textures that have been read, by the serial number of their element and whether they are light.
+    pub(super) textures: RefCell<HashMap<(usize, bool), (f32, Texture)>>,
+    /// The attributes of meshes that surfaces use, by the serial number of their element.
+    pub(super) attributes: RefCell<HashMap<usize, Option<Attribute>>>,
+    pub(super) means: Means,
+    /// Of surfaces, textures and shapes, one in another.
+    bounds: Bounds,
     pixels: Cell<u64>,
     identified: HashMap<&'d str, &'d Element>,
     aliases: HashMap<&'d str, &'d str>,
@@ -49,7 +75,10 @@ impl<'d> Context<'d> {
             options,
             rasters: RefCell::default(),
             surfaces: RefCell::default(),
-            open: RefCell::default(),
+            textures: RefCell::default(),
+            attributes: RefCell::default(),
+            means: Means::default(),
+            bounds: Bounds::default(),
             pixels: Cell::new(0),
             identified: HashMap::new(),
             aliases: HashMap::new(),
@@ -87,6 +116,13 @@ impl<'d> Context<'d> {
             Some(name) => self.place(element).bad(unset(name)),
             None => self.place(element).unsupported(what),
         }
+    }
+
+    /// The kind of `element` is not read here: whether Mitsuba has it, which is one word away.
+    pub(super) fn unsupported_kind(&self, element: &Element) -> LoadError {
+        let own = MITSUBAS_OWN.contains(&(element.tag.as_str(), element.kind()));
+        let note = if own { " (`--source mitsuba` has it)" } else { "" };
+        self.unsupported(element, element.species() + note)
     }
 
     /// The error that the renderer does not take what `element` asks for.
@@ -168,14 +204,25 @@ impl<'d> Context<'d> {
         element: &'d Element,
         read: impl FnOnce() -> Result<T, LoadError>,
     ) -> Result<T, LoadError> {
-        if self.open.borrow().contains(&element.serial) {
-            return Err(self.bad(element, format!("{} refers to itself", element.label())));
-        }
-        self.open.borrow_mut().push(element.serial);
-        let depth = self.open.borrow().len() as u64;
-        let result = self.place(element).at_most("nested surfaces", depth, MAX_NESTED).and_then(|()| read());
-        self.open.borrow_mut().pop();
+        self.bounds.begin(element.serial, element.label(), &self.place(element))?;
+        let result = read();
+        self.bounds.end();
         result
+    }
+
+    /// Counts the tables of a material under a coat.
+    pub(super) fn coat(
+        &self,
+        element: &Element,
+        material: &Material,
+        facets: (bool, Facets),
+    ) -> Result<(), LoadError> {
+        self.bounds.coat(material, facets, &self.place(element))
+    }
+
+    /// Counts work that is done for `element`.
+    pub(super) fn spend(&self, element: &Element, work: usize) -> Result<(), LoadError> {
+        self.bounds.spend(work, &self.place(element))
     }
 
     /// Refuses the participating media in `object`, or warns that they are left out.
@@ -188,7 +235,7 @@ impl<'d> Context<'d> {
             }
             child.read();
             if !self.options.ignore_volumes {
-                return Err(self.unsupported(child, NO_MEDIA));
+                return Err(self.unsupported(child, format_args!("{NO_MEDIA}; `--source mitsuba` has them")));
             }
             medium.into_iter().for_each(Element::irrelevant);
             self.ignored(child, "the participating medium is ignored");
@@ -204,14 +251,16 @@ impl<'d> Context<'d> {
         if let Some(element) = self.document.root.read_unset() {
             return Err(self.bad(element, "a parameter has no value"));
         }
-        let mut unread = Vec::new();
-        self.document.root.unread(&mut unread);
-        for element in unread {
-            // Definitions that nothing refers to change nothing
-            if element.attribute("id").is_none() {
+        self.document.root.visit(&mut |element, read| {
+            if read {
+                for name in element.unread_attributes() {
+                    self.ignored(element, format!("the attribute `{name}` of <{}> is ignored", element.tag));
+                }
+            } else if element.attribute("id").is_none() {
+                // Definitions that nothing refers to change nothing
                 self.ignored(element, format!("{} is ignored", element.species()));
             }
-        }
+        });
         Ok(())
     }
 }

@@ -1,25 +1,22 @@
 //! A scene file and the files that it includes, as one tree of elements.
 
-use super::xml::{Element, Origin};
+use super::markup::{Start, Tag, Tags};
+use super::xml::{Attribute, Element, Origin};
 use crate::error::{LoadError, Place};
-use crate::files::Folder;
+use crate::files::{self, Folder};
 use crate::options::LoadOptions;
-use roxmltree::{Node, ParsingOptions};
+use std::borrow::Cow;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 /// Most bytes of a scene file and all that it includes, and most bytes that `$parameters` may add up to.
 const MAX_XML_BYTES: u64 = 64 << 20;
-/// Most elements, texts and comments of a file, and most elements of all files together.
-const MAX_NODES: u32 = 1 << 20;
+/// Most elements of all files together.
+const MAX_ELEMENTS: u64 = 1 << 20;
 /// How deep elements may nest, and how deep files may include each other.
 const MAX_DEPTH: u32 = 32;
 /// Most files.
 const MAX_FILES: u64 = 1000;
-/// Most attributes of an element.
-const MAX_ATTRIBUTES: usize = 64;
-/// Most mentions of XML name spaces, of which Mitsuba has none.
-const MAX_NAMESPACES: usize = 16;
 /// Longest name of a `$parameter`.
 const MAX_PARAMETER: usize = 64;
 
@@ -91,7 +88,6 @@ struct Source<'a> {
     path: &'a Path,
     file: usize,
     old: bool,
-    lines: Lines,
 }
 
 impl Builder {
@@ -100,21 +96,14 @@ impl Builder {
         place.clone().at_most("files", self.files.len() as u64 + 1, MAX_FILES)?;
         let bytes = self.folder.read(path, MAX_XML_BYTES - self.bytes, place)?;
         self.bytes += bytes.len() as u64;
-        let bad = |what: String| Place::file(path).bad(what);
-        let text = std::str::from_utf8(&bytes).map_err(|e| bad(format!("the file is not UTF-8: {e}")))?;
-        check_attributes(text, path)?;
-        // Without a DTD, entities cannot multiply
-        let options =
-            ParsingOptions { allow_dtd: false, nodes_limit: MAX_NODES, ..ParsingOptions::default() };
-        let tree = roxmltree::Document::parse_with_options(text, options).map_err(|e| {
-            let place = Place::part(path, format_args!("line {}", e.pos().row));
-            place.bad(format!("the XML is broken: {e}"))
-        })?;
-
-        let root = tree.root_element();
+        let text = text(&bytes);
+        let mut tags = Tags::new(&text, path);
+        let Some(Tag::Start(root)) = tags.next()? else {
+            return Err(tags.broken("it has no element"));
+        };
         let version = root.attribute("version").unwrap_or_default();
         let major = version.split('.').next().and_then(|major| major.parse::<u32>().ok());
-        let old = match (root.tag_name().name(), major) {
+        let old = match (root.name.as_str(), major) {
             ("scene", Some(0 | 1)) => true,
             ("scene", Some(2 | 3)) => false,
             ("scene", Some(_)) => {
@@ -126,40 +115,61 @@ impl Builder {
         };
         let file = self.files.len();
         self.files.push(path.to_owned());
-        let source = Source { path, file, old, lines: Lines::of(text) };
-        Ok((old, self.element(root, &source, depth)?))
+        let source = Source { path, file, old };
+        let root = self.element(root, &mut tags, &source, depth)?;
+        match tags.next()? {
+            None => Ok((old, root)),
+            Some(_) => Err(tags.broken("something follows its last element")),
+        }
     }
 
     /// An element, `depth` levels down, and what is in it.
-    fn element(&mut self, node: Node<'_, '_>, source: &Source<'_>, depth: u32) -> Result<Element, LoadError> {
-        let origin = Origin { file: source.file, line: source.lines.at(node.range().start) };
+    fn element(
+        &mut self,
+        start: Start,
+        tags: &mut Tags<'_>,
+        source: &Source<'_>,
+        depth: u32,
+    ) -> Result<Element, LoadError> {
+        let origin = Origin { file: source.file, line: start.line };
         let place = Place::part(source.path, format_args!("line {}", origin.line));
         place.clone().at_most("levels of elements", u64::from(depth), u64::from(MAX_DEPTH))?;
         self.elements += 1;
-        place.clone().at_most("elements", self.elements as u64, u64::from(MAX_NODES))?;
-        let mut element = Element::new(node.tag_name().name().to_owned(), origin, self.elements - 1);
-        for attribute in node.attributes() {
-            let (mut value, unset) = self.substitute(attribute.value(), &place)?;
-            if source.old && attribute.name() == "name" {
+        place.clone().at_most("elements", self.elements as u64, MAX_ELEMENTS)?;
+        let mut element = Element::new(start.name.clone(), origin, self.elements - 1);
+        for (name, value) in &start.attributes {
+            let (mut value, unset) = self.substitute(value, &place)?;
+            if source.old && name == "name" {
                 value = snake_case(&value);
             }
             element.unset = element.unset.or(unset);
-            element.attributes.push((attribute.name().to_owned(), value));
+            element.attributes.push(Attribute::new(name.clone(), value));
         }
         match element.tag.as_str() {
-            "default" => self.default(&element, node.attribute("name"), &place)?,
+            "default" => self.default(&element, start.attribute("name"), &place)?,
             "path" => self.search_path(&element, &place)?,
             _ => {}
         }
-        for child in node.children().filter(Node::is_element) {
-            let child = self.element(child, source, depth + 1)?;
-            if child.tag == "include" {
-                self.include(&child, source, &mut element.children, depth + 1)?;
-            } else {
-                element.children.push(child);
+        if start.empty {
+            return Ok(element);
+        }
+        loop {
+            match tags.next()? {
+                Some(Tag::Start(child)) => {
+                    let child = self.element(child, tags, source, depth + 1)?;
+                    if child.tag == "include" {
+                        self.include(&child, source, &mut element.children, depth + 1)?;
+                    } else {
+                        element.children.push(child);
+                    }
+                }
+                Some(Tag::End(name)) if name == start.name => return Ok(element),
+                Some(Tag::End(name)) => {
+                    return Err(tags.broken(format_args!("</{name}> ends <{}>", start.name)));
+                }
+                None => return Err(tags.broken(format_args!("<{}> does not end", start.name))),
             }
         }
-        Ok(element)
     }
 
     /// Notes the value of a parameter, unless it has one.
@@ -237,30 +247,14 @@ pub(super) fn unset(name: &str) -> String {
     format!("`${name}` has no value: no <default> gives it one, and it was not set by `-D {name}=…`")
 }
 
-/// Checks what the parser takes quadratic time for: attributes of one element, and name spaces.
-fn check_attributes(text: &str, path: &Path) -> Result<(), LoadError> {
-    let place = Place::file(path);
-    let namespaces = text.matches("xmlns").take(MAX_NAMESPACES + 1).count();
-    place.clone().at_most("name spaces", namespaces as u64, MAX_NAMESPACES as u64)?;
-    // No attribute contains `<`, and each has two quotes
-    let quotes = |tag: &str| tag.bytes().filter(|b| matches!(b, b'"' | b'\'')).count();
-    let most = text.split('<').filter(|tag| !tag.starts_with("!--")).map(quotes).max().unwrap_or(0);
-    place.at_most("attributes of one element", most as u64 / 2, MAX_ATTRIBUTES as u64)
-}
-
-/// Finds the line of a position by bisection: to count from the start each time would take quadratic time.
-struct Lines {
-    starts: Vec<usize>,
-}
-
-impl Lines {
-    fn of(text: &str) -> Self {
-        Self { starts: text.bytes().enumerate().filter(|(_, b)| *b == b'\n').map(|(at, _)| at + 1).collect() }
+/// The text of a file. What says that it is in Latin-1 is, though it may look like UTF-8.
+fn text(bytes: &[u8]) -> Cow<'_, str> {
+    let head = String::from_utf8_lossy(&bytes[..bytes.len().min(200)]).to_ascii_lowercase();
+    let declared = head.split_once("encoding").and_then(|(_, rest)| rest.split(['"', '\'']).nth(1));
+    if matches!(declared, Some("latin1" | "iso-8859-1")) {
+        return bytes.iter().map(|b| *b as char).collect::<String>().into();
     }
-
-    fn at(&self, position: usize) -> u32 {
-        self.starts.partition_point(|start| *start <= position) as u32 + 1
-    }
+    files::text(bytes)
 }
 
 /// The name that Mitsuba 2 and 3 have for one of older versions: `toWorld` is `to_world`, `intIOR` is

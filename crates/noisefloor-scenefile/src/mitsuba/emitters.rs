@@ -9,27 +9,20 @@ use noisefloor::Rgb;
 use noisefloor_ptwne::{Emission, Environment, EnvironmentMap, Punctual, SceneBuilder};
 
 impl<'d> Context<'d> {
-    /// Adds an emitter to the scene. The result is whether it surrounds the scene.
-    pub(super) fn emitter(
-        &self,
-        element: &'d Element,
-        builder: &mut SceneBuilder,
-    ) -> Result<bool, LoadError> {
+    /// Adds an emitter to the scene.
+    pub(super) fn emitter(&self, element: &'d Element, builder: &mut SceneBuilder) -> Result<(), LoadError> {
         element.ignore(&["sampling_weight"]);
         let refused = self.refused(element);
         match element.kind() {
             "constant" => {
                 let radiance = self.plain_light(element, "radiance")?;
                 builder.environment(Environment::constant(radiance)).map_err(refused)?;
-                return Ok(true);
             }
             "envmap" => {
                 builder.environment_map(self.environment_map(element)?).map_err(refused)?;
-                return Ok(true);
             }
             "sky" | "sun" | "sunsky" => {
                 builder.environment_map(self.clear_sky(element)?).map_err(refused)?;
-                return Ok(true);
             }
             "point" => {
                 let (position, _) = self.position_and_direction(element)?;
@@ -50,9 +43,9 @@ impl<'d> Context<'d> {
             // A definition for shapes that refer to it
             "area" if element.attribute("id").is_some() => element.irrelevant(),
             "area" => return Err(self.bad(element, "an area emitter belongs into a shape")),
-            _ => return Err(self.unsupported(element, element.species())),
+            _ => return Err(self.unsupported_kind(element)),
         }
-        Ok(false)
+        Ok(())
     }
 
     /// The light of a shape, if it gives off any.
@@ -136,7 +129,7 @@ impl<'d> Context<'d> {
             scales,
             sun_diameter,
         };
-        element.ignore(&["resolution", "sun_resolution", "complex_sun", "stretch", "extend"]);
+        element.ignore(&["resolution", "sun_resolution"]);
         if scales[1] > 0.0 {
             self.approximated(element, "the sun is drawn into a map of the sky");
         }

@@ -9,8 +9,9 @@ use std::rc::Rc;
 /// The scene that is being filled.
 pub(super) struct Filling<'d> {
     pub(super) builder: SceneBuilder,
-    /// Materials in it, by the serial number of their element, and whether they are inside out.
-    pub(super) materials: HashMap<(usize, bool), MaterialId>,
+    /// Materials in it, by the serial number of their element, and whether they are inside out; and whether
+    /// they have a texture.
+    pub(super) materials: HashMap<(usize, bool), (MaterialId, bool)>,
     /// Meshes of groups that shine, by the serial number of their element.
     pub(super) meshes: HashMap<usize, Rc<Triangles>>,
     /// Triangles that are not in a file but made of what is.

@@ -2,7 +2,6 @@
 
 use super::context::Context;
 use super::surface::Surface;
-use super::textures::mean;
 use super::xml::Element;
 use crate::colour::Quantity;
 use crate::error::LoadError;
@@ -137,7 +136,7 @@ impl<'d> Context<'d> {
             Texture::Colour([u, v, _]) if u == v => (u, None),
             Texture::Colour([u, v, _]) => ((u * v).sqrt(), Some(alphas)),
             other => {
-                let [u, v, _] = mean(&other);
+                let [u, v, _] = self.means.of(&other);
                 ((u * v).sqrt(), Some(other))
             }
         })

@@ -43,7 +43,7 @@ impl<'d> Context<'d> {
     /// Adds the shapes of a group that its instances share.
     fn group(&self, group: &'d Element, filling: &mut Filling<'d>) -> Result<Group<'d>, LoadError> {
         let (mut shining, mut plain) = (vec![], vec![]);
-        for shape in group.all("shape") {
+        for shape in self.merged(group)? {
             if matches!(shape.kind(), "shapegroup" | "instance") {
                 return Err(self.unsupported(shape, "an instance in a group"));
             }
@@ -56,6 +56,19 @@ impl<'d> Context<'d> {
         filling.in_group = false;
         let shared = filling.builder.end_object().map_err(self.refused(group))?;
         added.map(|()| Group { shared, shining })
+    }
+
+    /// The shapes in an element; of those that are a `merge`, the shapes in them.
+    pub(super) fn merged(&self, element: &'d Element) -> Result<Vec<&'d Element>, LoadError> {
+        let mut all = Vec::new();
+        for shape in self.parts(element, "shape")? {
+            match shape.kind() {
+                "merge" => all.extend(self.nested_in(shape, || self.merged(shape))?),
+                _ => all.push(shape),
+            }
+            self.spend(element, all.len())?;
+        }
+        Ok(all)
     }
 
     /// Counts triangles that are made, and refuses more than [`MAX_MADE`].

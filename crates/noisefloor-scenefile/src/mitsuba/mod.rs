@@ -1,9 +1,9 @@
 //! Mitsuba XML, versions 0.5 to 3.
 //!
-//! `document` makes a tree of the files, with includes and parameters resolved; `context` follows references
-//! and notes what nobody has read, which becomes warnings; `values`, `colours` and `transforms` read the
-//! leaves. Each part of a scene has a module. The README lists what is read. Errors of shapes and emitters
-//! are collected, so that one load names all.
+//! `markup` splits text into tags, `document` makes a tree of the files, with includes and parameters
+//! resolved; `context` follows references and notes what nobody has read, which becomes warnings; `values`,
+//! `colours` and `transforms` read the leaves. Each part of a scene has a module. The README lists what is
+//! read. Errors of shapes and emitters are collected, so that one load names all.
 
 mod attributes;
 mod bsdfs;
@@ -14,6 +14,7 @@ mod emitters;
 mod filling;
 mod glossy;
 mod groups;
+mod markup;
 mod points;
 mod principled;
 mod raster;
@@ -61,13 +62,15 @@ pub(crate) fn load(path: &Path, options: &LoadOptions) -> Result<Loaded, LoadErr
     for shape in root.all("shape") {
         errors.take(context.shape(shape, &mut filling))?;
     }
-    let mut surroundings = 0;
+    let mut surrounded = false;
     for emitter in root.all("emitter") {
-        let surrounds = errors.take(context.emitter(emitter, &mut filling.builder))?.unwrap_or(false);
-        surroundings += usize::from(surrounds);
-        if surrounds && surroundings > 1 {
+        // A sky takes long to make: a second one is refused before it is
+        let surrounds = matches!(emitter.kind(), "constant" | "envmap" | "sky" | "sun" | "sunsky");
+        if surrounds && std::mem::replace(&mut surrounded, true) {
             let what = "a second emitter surrounds the scene; there can be only one";
             errors.take(Err::<(), _>(context.bad(emitter, what)))?;
+        } else {
+            errors.take(context.emitter(emitter, &mut filling.builder))?;
         }
     }
     errors.take(context.finish())?;
@@ -76,5 +79,5 @@ pub(crate) fn load(path: &Path, options: &LoadOptions) -> Result<Loaded, LoadErr
     let scene =
         filling.builder.build().map_err(|cause| LoadError::Scene { place: Place::file(path), cause })?;
     let scene = scene.with_identity(document.folder.contents());
-    Ok(Loaded { scene, size, max_depth, warnings: context.into_warnings() })
+    Ok(Loaded { scene, size, max_depth, clamp: None, warnings: context.into_warnings() })
 }

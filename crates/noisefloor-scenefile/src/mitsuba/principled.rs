@@ -2,7 +2,6 @@
 
 use super::context::Context;
 use super::surface::Surface;
-use super::textures::mean;
 use super::xml::Element;
 use crate::error::LoadError;
 use noisefloor_ptwne::{Dialect, Material, Principled, Texture};
@@ -94,8 +93,8 @@ impl<'d> Context<'d> {
         if matches!(surface.base, Texture::Image(_)) {
             self.approximated(element, "the tint of transmitted light is the mean of `base_color`");
         }
-        let tint = mean(&surface.base).map(f32::sqrt);
-        let metallic = mean(metal)[0];
+        let tint = self.means.of(&surface.base).map(f32::sqrt);
+        let metallic = self.means.of(metal)[0];
         let share = (1.0 - metallic) * share as f32;
         let aspect = (1.0 - 0.9 * surface.anisotropic).sqrt();
         let square = |r: f32| [r * r / aspect, r * r * aspect, 0.0];
@@ -106,7 +105,7 @@ impl<'d> Context<'d> {
                 Surface::two_sided(Material::RoughGlass { ior, tint, roughness: u })
             }
             alphas => {
-                let body = Material::RoughGlass { ior, tint, roughness: mean(&alphas)[0] };
+                let body = Material::RoughGlass { ior, tint, roughness: self.means.of(&alphas)[0] };
                 Surface { alphas: Some(alphas), ..Surface::two_sided(body) }
             }
         };

@@ -43,9 +43,11 @@ impl<'d> Context<'d> {
     pub(super) fn camera(&self, sensor: &'d Element) -> Result<View, LoadError> {
         let kind = sensor.kind();
         if !matches!(kind, "perspective" | "thinlens" | "orthographic") {
-            return Err(self.unsupported(sensor, sensor.species()));
+            return Err(self.unsupported_kind(sensor));
         }
         self.no_media(sensor)?;
+        // Exporters write a far_clip beyond all that is there; a shutter moves nothing, and a sensor's
+        // response is of spectra
         sensor.ignore(&["far_clip", "shutter_open", "shutter_close", "srf"]);
         sensor.children.iter().filter(|c| c.tag == "sampler").for_each(Element::irrelevant);
         let (size, mut window) = self.film_size(sensor)?;

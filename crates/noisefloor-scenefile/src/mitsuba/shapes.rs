@@ -19,6 +19,7 @@ impl<'d> Context<'d> {
     /// Adds a shape to the scene.
     pub(super) fn shape(&self, element: &'d Element, filling: &mut Filling<'d>) -> Result<(), LoadError> {
         match element.kind() {
+            "merge" => self.merged(element)?.into_iter().try_for_each(|shape| self.shape(shape, filling)),
             // Seen only through its instances
             "shapegroup" => Ok(()),
             "instance" => self.instance(element, filling),
@@ -33,6 +34,10 @@ impl<'d> Context<'d> {
         instance: Option<DMat4>,
         filling: &mut Filling<'d>,
     ) -> Result<(), LoadError> {
+        self.spend(element, element.children.len())?;
+        if instance.is_some() {
+            self.count_made(element, 1, filling)?;
+        }
         self.no_media(element)?;
         element.ignore(&["silhouette_sampling_weight"]);
         let emission = self.emission(element, &mut filling.builder)?;
@@ -96,7 +101,7 @@ impl<'d> Context<'d> {
                 mesh.place(to_world);
                 self.add(element, &mesh, filling, material, emission)
             }
-            _ => Err(self.unsupported(element, element.species())),
+            _ => Err(self.unsupported_kind(element)),
         }
     }
 
@@ -108,7 +113,12 @@ impl<'d> Context<'d> {
         inside_out: bool,
         filling: &mut Filling<'d>,
     ) -> Result<(MaterialId, bool), LoadError> {
-        let (serial, surface) = match self.parts(element, "bsdf")?.as_slice() {
+        let parts = self.parts(element, "bsdf")?;
+        let serial = parts.first().map(|part| part.serial);
+        if let Some(known) = serial.and_then(|serial| filling.materials.get(&(serial, inside_out))) {
+            return Ok(*known);
+        }
+        let (serial, surface) = match parts.as_slice() {
             [] => (None, Surface::missing(shines)),
             // What lets all light through can shine, as Blender writes lamps
             [one] if shines && one.kind() == "null" => {
@@ -118,9 +128,6 @@ impl<'d> Context<'d> {
             [_, second, ..] => return Err(self.bad(second, "a shape has at most one bsdf")),
         };
         let textured = surface.is_textured();
-        if let Some(known) = serial.and_then(|serial| filling.materials.get(&(serial, inside_out))) {
-            return Ok((*known, textured));
-        }
         let surface = if inside_out {
             if surface.one_sided {
                 let what = "the sphere is seen from outside, too, though its surface is one-sided";
@@ -132,7 +139,7 @@ impl<'d> Context<'d> {
         };
         let id = self.add_surface(element, surface, &mut filling.builder)?;
         if let Some(serial) = serial {
-            filling.materials.insert((serial, inside_out), id);
+            filling.materials.insert((serial, inside_out), (id, textured));
         }
         Ok((id, textured))
     }
@@ -148,7 +155,10 @@ impl<'d> Context<'d> {
         let options =
             MaterialOptions { opacity, one_sided, facets, roughness, relief, ..MaterialOptions::default() };
         match body {
-            Body::Plain(material) => builder.material_with(material, options).map_err(self.refused(element)),
+            Body::Plain(material) => {
+                self.coat(element, &material, (options.roughness.is_some(), facets))?;
+                builder.material_with(material, options).map_err(self.refused(element))
+            }
             Body::Blend(parts, share) => {
                 let [first, second] = *parts;
                 let first = self.add_surface(element, first, builder)?;
@@ -234,6 +244,9 @@ impl<'d> Context<'d> {
             }
         };
         mesh.check(&Place::file(&path))?;
+        for unread in &mesh.unread {
+            self.ignored(element, format!("{unread} of `{name}` is ignored"));
+        }
         if let Some(angle) = self.float(element, "max_smooth_angle")? {
             self.approximated(element, format!("edges sharper than {angle}° are smoothed, too"));
         }
@@ -251,7 +264,7 @@ impl<'d> Context<'d> {
         let added = mesh.add_to(&mut filling.builder, material, emission);
         let left_out = added.map_err(self.refused(element))?;
         if mesh.indices.is_empty() {
-            self.ignored(element, "the mesh has no faces");
+            self.ignored(element, "the mesh has no faces, as its file says");
         }
         // The poles of our own spheres have none either
         if left_out > 0 && element.kind() != "sphere" {

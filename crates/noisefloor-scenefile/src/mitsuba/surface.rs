@@ -45,6 +45,14 @@ impl Surface {
         Self { body, opacity: None, one_sided, facets: Facets::default(), alphas: None, relief: None }
     }
 
+    /// How many surfaces it is mixed of.
+    pub(super) fn parts(&self) -> usize {
+        match &self.body {
+            Body::Plain(_) => 1,
+            Body::Blend(parts, _) => parts.iter().map(Self::parts).sum(),
+        }
+    }
+
     /// What Mitsuba gives shapes without a surface: grey, or, if they shine, black.
     pub(super) fn missing(shines: bool) -> Self {
         Self::one_sided(Material::diffuse([if shines { 0.0 } else { 0.5 }; 3]))

@@ -29,7 +29,8 @@ impl<'d> Context<'d> {
     ) -> Result<Rgb, LoadError> {
         if let Some(texture) = self.texture(object, name)? {
             self.approximated(texture, format!("the texture of `{name}` is replaced by its mean"));
-            return Ok(mean(&self.varying(texture, self.image(texture, Quantity::Factor)?.1)?));
+            let image = self.varying(texture, self.image(texture, Quantity::Factor)?.1)?;
+            return Ok(self.means.of(&image));
         }
         let colour = self.colour(object, name, Quantity::Factor)?.unwrap_or([default; 3]);
         if colour.iter().any(|c| *c > 1.0) {
@@ -72,6 +73,16 @@ impl<'d> Context<'d> {
         element: &'d Element,
         quantity: Quantity,
     ) -> Result<(f32, Texture), LoadError> {
+        let key = (element.serial, quantity == Quantity::Light);
+        if let Some(known) = self.textures.borrow().get(&key) {
+            return Ok(known.clone());
+        }
+        let made = self.nested_in(element, || self.image_of_kind(element, quantity))?;
+        self.textures.borrow_mut().insert(key, made.clone());
+        Ok(made)
+    }
+
+    fn image_of_kind(&self, element: &'d Element, quantity: Quantity) -> Result<(f32, Texture), LoadError> {
         let (scale, image) = match element.kind() {
             "bitmap" => self.bitmap(element, quantity)?,
             "checkerboard" => (1.0, self.checkerboard(element)?),
@@ -92,7 +103,7 @@ impl<'d> Context<'d> {
                 let scale = colour.into_iter().fold(1.0, f32::max);
                 return Ok((scale, Texture::Colour(colour.map(|c| c.max(0.0) / scale))));
             }
-            _ => return Err(self.unsupported(element, element.species())),
+            _ => return Err(self.unsupported_kind(element)),
         };
         Ok((scale, Texture::Image(image)))
     }
@@ -125,7 +136,7 @@ impl<'d> Context<'d> {
         let [inside] = parts.as_slice() else {
             return Err(self.bad(element, "<texture type=\"scale\"> needs one <texture> in it"));
         };
-        let (scale, texture) = self.nested_in(element, || self.image(inside, quantity))?;
+        let (scale, texture) = self.image(inside, quantity)?;
         let peak = factor.into_iter().fold(0.0, f32::max).max(f32::MIN_POSITIVE);
         if quantity == Quantity::Factor && peak > 1.0 {
             return Ok((scale, self.scaled(element, texture, peak)?));
@@ -259,7 +270,7 @@ impl<'d> Context<'d> {
         parts: [&Texture; N],
         put: impl Fn([f32; N]) -> Rgb,
     ) -> Result<Texture, LoadError> {
-        let (texture, replaced) = channels::joined(parts, mean, put);
+        let (texture, replaced) = channels::joined(parts, |texture| self.means.of(texture), put);
         if replaced {
             self.approximated(element, "a second texture of another layout is replaced by its mean");
         }
@@ -296,20 +307,6 @@ impl<'d> Context<'d> {
         let raster = Raster { width, height, pixels };
         self.rasters.borrow_mut().insert(key, raster.clone());
         Ok(raster)
-    }
-}
-
-/// The mean colour of a texture.
-pub(super) fn mean(texture: &Texture) -> Rgb {
-    match texture {
-        Texture::Colour(colour) => *colour,
-        Texture::Image(image) => {
-            let pixels = linear(&image.pixels);
-            let sum = |i: usize| pixels.iter().map(|p| f64::from(p[i])).sum::<f64>();
-            std::array::from_fn(|i| image.factor[i] * (sum(i) / pixels.len().max(1) as f64) as f32)
-        }
-        // This reader makes no others
-        _ => [0.5; 3],
     }
 }
 

@@ -30,9 +30,16 @@ impl Context<'_> {
                 let angle =
                     step.attribute("angle").ok_or_else(|| self.bad(step, "a rotation needs an angle"))?;
                 let angle = self.number(step, angle)?;
-                let axis = self.triple(step, 0.0)?.try_normalize();
+                let given = self.triple(step, 0.0)?;
+                let axis = given.try_normalize();
                 let axis = axis.ok_or_else(|| self.bad(step, "a rotation needs an axis that is not 0"))?;
-                Ok(DMat4::from_axis_angle(axis, angle.to_radians()))
+                let length = given.length();
+                if self.document.old || (length - 1.0).abs() < 1e-3 {
+                    return Ok(DMat4::from_axis_angle(axis, angle.to_radians()));
+                }
+                let what = format!("an axis of length {length:.3} stretches what it turns, as in Mitsuba 3");
+                self.approximated(step, what);
+                Ok(DMat4::from_mat3(stretched(given, angle.to_radians())))
             }
             "matrix" => self.matrix(step),
             "lookat" | "lookAt" => self.look_at(step),
@@ -73,4 +80,14 @@ impl Context<'_> {
         let up = view.cross(left);
         Ok(DMat4::from_cols(left.extend(0.0), up.extend(0.0), view.extend(0.0), origin.extend(1.0)))
     }
+}
+
+/// Rodrigues' formula for an axis of any length, which Mitsuba 3 does not bring to 1 (version 0.6 did): cos
+/// θ·I + (1 − cos θ)·a·aᵀ + sin θ·[a]×.
+fn stretched(a: DVec3, angle: f64) -> DMat3 {
+    let (sin, cos) = angle.sin_cos();
+    let outer = DMat3::from_cols(a * a.x, a * a.y, a * a.z);
+    let cross = DMat3::from_cols(a.cross(DVec3::X), a.cross(DVec3::Y), a.cross(DVec3::Z));
+    // a × e is the column of [a]× for e
+    DMat3::IDENTITY * cos + outer * (1.0 - cos) + cross * sin
 }

@@ -11,6 +11,23 @@ enum Seen {
     Irrelevant,
 }
 
+/// An attribute, and whether anything has read it.
+#[derive(Debug)]
+pub(super) struct Attribute {
+    name: String,
+    value: String,
+    read: Cell<bool>,
+}
+
+impl Attribute {
+    pub(super) fn new(name: String, value: String) -> Self {
+        Self { name, value, read: Cell::new(false) }
+    }
+}
+
+/// Attributes that only say what an element is, or what it is called.
+const NAMES: [&str; 4] = ["id", "name", "type", "version"];
+
 /// Where an element begins.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Origin {
@@ -30,7 +47,7 @@ pub(super) struct Element {
     pub(super) serial: usize,
     /// Elements in it.
     pub(super) children: Vec<Element>,
-    pub(super) attributes: Vec<(String, String)>,
+    pub(super) attributes: Vec<Attribute>,
     /// A `$parameter` in its attributes that has no value.
     pub(super) unset: Option<String>,
     seen: Cell<Seen>,
@@ -43,9 +60,17 @@ impl Element {
         Self { tag, origin, serial, children, attributes, unset: None, seen: Cell::new(Seen::No) }
     }
 
-    /// The attribute called `name`.
+    /// The attribute called `name`, which is now read.
     pub(super) fn attribute(&self, name: &str) -> Option<&str> {
-        self.attributes.iter().find(|(key, _)| key == name).map(|(_, value)| value.as_str())
+        let found = self.attributes.iter().find(|attribute| attribute.name == name)?;
+        found.read.set(true);
+        Some(&found.value)
+    }
+
+    /// Attributes that nobody has read, but for those that are names.
+    pub(super) fn unread_attributes(&self) -> impl Iterator<Item = &str> {
+        let unread = self.attributes.iter().filter(|attribute| !attribute.read.get());
+        unread.map(|attribute| attribute.name.as_str()).filter(|name| !NAMES.contains(name))
     }
 
     /// The plugin that it names: the attribute `type`.
@@ -86,13 +111,16 @@ impl Element {
         self.children.iter().filter(ignored).for_each(Element::irrelevant);
     }
 
-    /// Collects the elements below this one that nobody has read. An element that is not read stands for all
-    /// in it.
-    pub(super) fn unread<'a>(&'a self, found: &mut Vec<&'a Element>) {
+    /// Tells `visit` of the elements below this one, and whether they were read. An element that is not read
+    /// stands for all in it.
+    pub(super) fn visit<'a>(&'a self, visit: &mut impl FnMut(&'a Element, bool)) {
         for child in &self.children {
             match child.seen.get() {
-                Seen::No => found.push(child),
-                Seen::Read => child.unread(found),
+                Seen::No => visit(child, false),
+                Seen::Read => {
+                    visit(child, true);
+                    child.visit(visit);
+                }
                 Seen::Irrelevant => {}
             }
         }

@@ -50,10 +50,11 @@ impl<'a, 't> Arguments<'a, 't> {
         self.skip().map(drop)
     }
 
-    /// Passes over an option: a declaration or a name in quotes, and its values.
-    pub(super) fn option(&mut self) -> Result<(), LoadError> {
-        self.text()?;
-        params::values(self.tokens, self.path, &self.place(), "Option").map(drop)
+    /// Passes over an option: a declaration or a name in quotes, and its values. Returns its name.
+    pub(super) fn option(&mut self) -> Result<String, LoadError> {
+        let declaration = self.text()?;
+        params::values(self.tokens, self.path, &self.place(), "Option")?;
+        Ok(declaration.split_ascii_whitespace().next_back().unwrap_or_default().to_owned())
     }
 
     pub(super) fn params(&mut self) -> Result<Params, LoadError> {

@@ -23,6 +23,8 @@ pub(super) struct View {
     window: [[f64; 2]; 2],
     /// Factor on all light.
     pub(super) exposure: f32,
+    /// Largest channel of a sample.
+    pub(super) clamp: Option<f32>,
 }
 
 impl Default for View {
@@ -36,6 +38,7 @@ impl Default for View {
             size: (1280, 720),
             window: [[0.0, 1.0]; 2],
             exposure: 1.0,
+            clamp: None,
         }
     }
 }
@@ -91,6 +94,10 @@ impl View {
         };
         self.size = (edge("xresolution", self.size.0)?, edge("yresolution", self.size.1)?);
         self.window = self.crop(params)?;
+        if let Some(most) = params.float("maxcomponentvalue")? {
+            let most = Some(most as f32).filter(|most| *most > 0.0 && most.is_finite());
+            self.clamp = Some(most.ok_or_else(|| params.bad("`maxcomponentvalue` must be above 0"))?);
+        }
         // pbrt 3 has a factor, pbrt 4 a sensor
         let scale = params.float("scale")?.unwrap_or(1.0);
         let exposure =

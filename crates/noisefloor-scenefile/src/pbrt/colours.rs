@@ -4,7 +4,7 @@ use super::params::{Param, Params, Values};
 use super::reader::Reader;
 use crate::colour::{self, Quantity, TEMPERATURES};
 use crate::error::LoadError;
-use crate::files::MAX_FILE_BYTES;
+use crate::files::{self, MAX_FILE_BYTES};
 use crate::indices;
 use noisefloor::{Rgb, display::luminance};
 
@@ -17,7 +17,7 @@ impl Reader<'_> {
     /// The same as it is, which may be below 0.
     pub(super) fn signed(&self, params: &Params, name: &str) -> Result<Option<Rgb>, LoadError> {
         let Some(param) = params.get(name) else { return Ok(None) };
-        let colour = match (param.kind.as_str(), &param.values) {
+        let colour = match (param.kind.as_str(), &*param.values) {
             (_, Values::Numbers(numbers)) => self.of_numbers(params, param, numbers, Quantity::Factor)?,
             (_, Values::Texts(texts)) => self.named_spectrum(params, texts, Quantity::Factor)?,
             _ => return Err(params.bad(format!("`{name}` is not a colour"))),
@@ -25,8 +25,8 @@ impl Reader<'_> {
         Ok(Some(colour))
     }
 
-    /// The radiance of a light. pbrt 4 brings spectra other than `rgb` to a luminance of 1; pbrt 3 takes them
-    /// as they are, but black bodies with a peak of 1.
+    /// The radiance of a light. pbrt 4 brings spectra to a luminance of 1; pbrt 3 takes them as they are, but
+    /// black bodies with a peak of 1. Both take `rgb` and `xyz` as they are.
     pub(super) fn light(&self, params: &Params, name: &str) -> Result<Rgb, LoadError> {
         let scale = match params.numbers("scale")? {
             None => [1.0; 3],
@@ -39,7 +39,7 @@ impl Reader<'_> {
             let level = luminance(colour);
             if level > 0.0 { colour.map(|c| c / level) } else { colour }
         };
-        let colour = match (param.kind.as_str(), &param.values) {
+        let colour = match (param.kind.as_str(), &*param.values) {
             ("blackbody", Values::Numbers(numbers)) => match numbers.as_slice() {
                 [temperature] => normalised(self.black_body(params, *temperature)?),
                 [temperature, scale] => {
@@ -49,13 +49,14 @@ impl Reader<'_> {
                 }
                 _ => return Err(params.bad(format!("`{name}` is not a temperature"))),
             },
-            ("rgb" | "color", Values::Numbers(numbers)) => {
-                self.of_numbers(params, param, numbers, Quantity::Light)?
+            (kind, Values::Numbers(numbers)) => {
+                let colour = self.of_numbers(params, param, numbers, Quantity::Light)?;
+                if kind == "spectrum" && !self.version_3 { normalised(colour) } else { colour }
             }
-            (_, Values::Numbers(numbers)) => {
-                normalised(self.of_numbers(params, param, numbers, Quantity::Light)?)
+            (_, Values::Texts(texts)) => {
+                let colour = self.named_spectrum(params, texts, Quantity::Light)?;
+                if self.version_3 { colour } else { normalised(colour) }
             }
-            (_, Values::Texts(texts)) => normalised(self.named_spectrum(params, texts, Quantity::Light)?),
             _ => return Err(params.bad(format!("`{name}` is not a colour"))),
         };
         let light = std::array::from_fn(|i| colour[i] * scale[i]);
@@ -86,7 +87,7 @@ impl Reader<'_> {
             ("rgb" | "color", [r, g, b]) => Ok([*r as f32, *g as f32, *b as f32]),
             ("spectrum", pairs) if pairs.len() % 2 == 0 => {
                 let samples: Vec<_> = pairs.chunks_exact(2).map(|pair| (pair[0], pair[1])).collect();
-                spectrum(params, &samples, quantity)
+                self.spectrum(params, samples, quantity)
             }
             _ => {
                 let what = format!("`{}` has {} numbers, which is no colour", param.name, numbers.len());
@@ -113,27 +114,51 @@ impl Reader<'_> {
         if let Some((_, index)) = GLASSES.iter().find(|glass| glass.0 == name) {
             return Ok([*index; 3]);
         }
-        if name.starts_with("stdillum-") || name.starts_with("illum-") {
-            return Ok([1.0; 3]);
+        let illuminant = name.strip_prefix("stdillum-").or_else(|| name.strip_prefix("illum-"));
+        if let Some(colour) = illuminant.and_then(colour::of_illuminant) {
+            return match quantity {
+                Quantity::Light => Ok(colour),
+                Quantity::Factor => Err(params.place.clone().unsupported(format!("`{name}` as a factor"))),
+            };
         }
         let path = self.folder.find(name, &params.place)?;
         let bytes = self.folder.read(&path, MAX_FILE_BYTES, &params.place)?;
-        let text = String::from_utf8_lossy(&bytes);
-        let words =
-            text.lines().flat_map(|line| line.split('#').next().unwrap_or_default().split_ascii_whitespace());
+        let text = files::text(&bytes);
+        let words = files::lines(&text)
+            .flat_map(|line| line.split('#').next().unwrap_or_default().split_ascii_whitespace());
         let numbers = words.map(|word| super::params::number(word, &params.place));
         let numbers = numbers.collect::<Result<Vec<_>, _>>()?;
         let samples: Vec<_> = numbers.chunks_exact(2).map(|pair| (pair[0], pair[1])).collect();
-        // Files of metals pbrt 3 ships: their names say which
-        spectrum(params, &samples, quantity)
+        self.spectrum(params, samples, quantity)
     }
-}
 
-fn spectrum(params: &Params, samples: &[(f64, f64)], quantity: Quantity) -> Result<Rgb, LoadError> {
-    if samples.is_empty() || samples.windows(2).any(|pair| pair[0].0 >= pair[1].0) {
-        return Err(params.bad("a spectrum needs samples at rising wavelengths"));
+    /// The colour of samples. pbrt 3 sorts them, takes the first and the last for all beyond, and gives
+    /// factors the colour that they would have as lights (`RGBSpectrum::FromSampled`).
+    fn spectrum(
+        &self,
+        params: &Params,
+        mut samples: Vec<(f64, f64)>,
+        quantity: Quantity,
+    ) -> Result<Rgb, LoadError> {
+        if self.version_3 {
+            samples.sort_by(|a, b| a.0.total_cmp(&b.0));
+        }
+        let [Some((first, low)), Some((last, high))] =
+            [samples.first(), samples.last()].map(Option::<&_>::copied)
+        else {
+            return Err(params.bad("a spectrum needs samples"));
+        };
+        if samples.windows(2).any(|pair| pair[0].0 >= pair[1].0) {
+            return Err(params.bad("a spectrum needs samples at rising wavelengths"));
+        }
+        if !self.version_3 {
+            return Ok(colour::of_spectrum(&samples, quantity));
+        }
+        let [shortest, longest] = colour::VISIBLE;
+        samples.insert(0, (shortest.min(first) - 1.0, low));
+        samples.push((longest.max(last) + 1.0, high));
+        Ok(colour::of_spectrum(&samples, Quantity::Light))
     }
-    Ok(colour::of_spectrum(samples, quantity))
 }
 
 /// η + ik of brass.

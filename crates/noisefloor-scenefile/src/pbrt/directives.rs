@@ -8,6 +8,22 @@ use crate::error::{LoadError, Place};
 use glam::DMat4;
 use std::rc::Rc;
 
+/// Options that change noise, speed or what is printed, but not what samples are of.
+const NO_OPTION_OF_PICTURES: [&str; 12] = [
+    "disablepixeljitter",
+    "disabletexturefiltering",
+    "disablewavelengthjitter",
+    "displacementedgescale",
+    "gpu",
+    "msereferenceimage",
+    "msereferenceout",
+    "nthreads",
+    "pixelstats",
+    "rendercoordsys",
+    "seed",
+    "wavefront",
+];
+
 impl Reader<'_> {
     /// Executes a directive in a file that is included `depth` deep.
     pub(super) fn directive(
@@ -27,7 +43,12 @@ impl Reader<'_> {
             }
             "WorldEnd" => {}
             // A parameter alone, in version 4 of a type and a name, and otherwise of a name
-            "Option" => args.option()?,
+            "Option" => {
+                let name = args.option()?;
+                if !NO_OPTION_OF_PICTURES.contains(&name.as_str()) {
+                    self.ignored(&args.place(), format!("the option `{name}` is ignored"));
+                }
+            }
             "ReverseOrientation" => self.state.reversed = !self.state.reversed,
             "ObjectInstance" => {
                 let name = args.text()?;
@@ -100,8 +121,7 @@ impl Reader<'_> {
         }
         match word {
             "Shape" => {
-                let defaults = self.defaults("shape", &params);
-                let params = params.or(&defaults);
+                let params = self.with_defaults("shape", params)?;
                 self.shape(kind, &params)?;
                 self.say_unused(&params, &called);
             }
@@ -112,8 +132,7 @@ impl Reader<'_> {
                 self.named_materials.insert(kind.to_owned(), definition);
             }
             "LightSource" => {
-                let defaults = self.defaults("light", &params);
-                let params = params.or(&defaults);
+                let params = self.with_defaults("light", params)?;
                 self.light_source(kind, &params)?;
                 self.say_unused(&params, &called);
             }
@@ -124,7 +143,7 @@ impl Reader<'_> {
                 self.state.area_light = Some(Rc::new(params));
             }
             "Attribute" => {
-                let all = params.or(&self.defaults(kind, &Params::none(Place::file(&self.path))));
+                let all = self.with_defaults(kind, params)?;
                 self.state.defaults.insert(kind.to_owned(), Rc::new(all));
             }
             "MakeNamedMedium" => {
@@ -149,7 +168,12 @@ impl Reader<'_> {
             "Film" => {
                 self.view.film(params)?;
                 // Names and formats of files
-                params.ignore(&["filename", "diagonal", "savefp16", "maxcomponentvalue"]);
+                params.ignore(&["filename", "diagonal", "savefp16"]);
+                if self.view.clamp.is_some() {
+                    let what = "`maxcomponentvalue` bounds red, green and blue, where the sensor of pbrt \
+                        bounds X, Y and Z";
+                    self.approximated(&params.place, what);
+                }
                 self.say_unused(params, called);
             }
             "Integrator" => {
@@ -159,11 +183,15 @@ impl Reader<'_> {
                     let what = format!("the integrator `{kind}` is replaced by path tracing");
                     self.approximated(&params.place, what);
                 }
+                // How samples are taken
+                params.ignore(&["lightsampler", "lightsamplestrategy", "strategy", "rrthreshold"]);
+                self.say_unused(params, called);
             }
             "ColorSpace" if kind != "srgb" => {
                 let what = format!("the colour space `{kind}` is ignored: colours are taken for sRGB's");
                 self.ignored(&params.place, what);
             }
+            // Noise, speed, and the filter of the picture, which is the caller's
             "Sampler" | "PixelFilter" | "Accelerator" | "ColorSpace" | "SurfaceIntegrator" | "Renderer"
             | "VolumeIntegrator" => {}
             _ => return Ok(false),
@@ -171,12 +199,12 @@ impl Reader<'_> {
         Ok(true)
     }
 
-    /// The parameters that `Attribute` gave for things of a kind, but for colour spaces.
-    fn defaults(&self, kind: &str, params: &Params) -> Params {
-        match self.state.defaults.get(kind) {
-            Some(defaults) => (**defaults).clone(),
-            None => Params::none(params.place.clone()),
-        }
+    /// Parameters with those that `Attribute` gave for all things of a kind, but for colour spaces.
+    fn with_defaults(&self, kind: &str, params: Params) -> Result<Params, LoadError> {
+        let Some(defaults) = self.state.defaults.get(kind) else { return Ok(params) };
+        // Each is copied, and compared with each
+        self.bounds.spend((16 + params.len()).saturating_mul(defaults.len()), &params.place)?;
+        Ok(params.or(defaults))
     }
 
     fn definition(&self, kind: &str, params: Params) -> Rc<Definition> {

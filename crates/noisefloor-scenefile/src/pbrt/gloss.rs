@@ -3,7 +3,6 @@
 use super::materials::Made;
 use super::reader::Reader;
 use super::state::Definition;
-use super::textures::mean;
 use crate::channels;
 use crate::error::LoadError;
 use noisefloor::Rgb;
@@ -49,7 +48,7 @@ impl Reader<'_> {
             }
         };
         let found = self.joined(d, [&u, &v], |[u, v]| [alpha(u), alpha(v), 0.0])?;
-        let [u, v, _] = mean(&found);
+        let [u, v, _] = self.means.of(&found);
         *alphas = Some(found).filter(|found| u != v || !matches!(found, Texture::Colour(_)));
         Ok((u * v).max(0.0).sqrt().min(1.0))
     }
@@ -68,7 +67,7 @@ impl Reader<'_> {
         parts: [&Texture; N],
         put: impl Fn([f32; N]) -> Rgb,
     ) -> Result<Texture, LoadError> {
-        let (texture, replaced) = channels::joined(parts, mean, put);
+        let (texture, replaced) = channels::joined(parts, |texture| self.means.of(texture), put);
         if replaced {
             self.approximated(&d.params.place, "a second texture of another layout is replaced by its mean");
         }
@@ -121,7 +120,7 @@ impl Reader<'_> {
 
         // With metal m and transmission t, glass has the share s = (1 − m)t and the rest is of metal m/(1 −
         // s)
-        let metallic = mean(&metal)[0];
+        let metallic = self.means.of(&metal)[0];
         let share = (1.0 - metallic) * transmission;
         let metal =
             if share > 0.0 && share < 1.0 { Texture::Colour([metallic / (1.0 - share); 3]) } else { metal };
@@ -132,8 +131,8 @@ impl Reader<'_> {
         }
         self.approximated(&d.params.place, "transmission of `disney` has its mean roughness and tint");
         let refused = Self::refused(&d.params.place);
-        let roughness = mean(&roughness)[0].powi(2);
-        let tint = mean(&base).map(f32::sqrt);
+        let roughness = self.means.of(&roughness)[0].powi(2);
+        let tint = self.means.of(&base).map(f32::sqrt);
         let glass = Material::RoughGlass { ior: ior.clamp(0.25, 4.0), tint, roughness };
         if share >= 1.0 {
             return Ok(Made::Plain(glass));

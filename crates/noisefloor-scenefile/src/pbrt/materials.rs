@@ -2,16 +2,12 @@
 
 use super::reader::Reader;
 use super::state::{Definition, Height, Look, plain};
-use super::textures::mean;
 use crate::error::{LoadError, Place};
 use noisefloor::Rgb;
 use noisefloor_ptwne::{
     Gloss, ImageTexture, Lobes, MIN_ROUGHNESS, Material, MaterialId, MaterialOptions, Relief, Texture,
 };
 use std::rc::Rc;
-
-/// How deep materials may refer to others.
-const MAX_NESTED: u32 = 16;
 
 /// What a material becomes.
 pub(super) enum Made {
@@ -38,14 +34,28 @@ impl Reader<'_> {
             let refused = Self::refused(place);
             return self.builder.material(Material::Nothing).map_err(refused);
         }
-        let key = (format!("{:p}", Rc::as_ptr(&definition)), alpha.as_ref().map(|alpha| alpha.0.clone()));
+        self.known_or_made(&definition, alpha, place)
+    }
+
+    /// The material of a definition, made when first asked for.
+    fn known_or_made(
+        &mut self,
+        definition: &Rc<Definition>,
+        alpha: Option<(String, Texture)>,
+        place: &Place,
+    ) -> Result<MaterialId, LoadError> {
+        let address = Rc::as_ptr(definition).addr();
+        let (called, alpha) = alpha.unzip();
         // What is given stays in `kept`, so that no address is used twice
-        if let Some(known) = self.materials.get(&key) {
+        if let Some(known) = self.materials.get(&(address, called.clone())) {
             return Ok(*known);
         }
         self.kept.push(definition.clone());
-        let id = self.material(&definition, alpha.map(|alpha| alpha.1), place, 0)?;
-        self.materials.insert(key, id);
+        self.bounds.begin(address, format_args!("the material `{}`", definition.kind), place)?;
+        let id = self.material(definition, alpha);
+        self.bounds.end();
+        let id = id?;
+        self.materials.insert((address, called), id);
         Ok(id)
     }
 
@@ -63,24 +73,25 @@ impl Reader<'_> {
         found.ok_or_else(|| place.clone().bad(format!("there is no material `{name}`")))
     }
 
-    pub(super) fn material(
+    fn material(
         &mut self,
         definition: &Definition,
         opacity: Option<Texture>,
-        place: &Place,
-        depth: u32,
     ) -> Result<MaterialId, LoadError> {
-        place.clone().at_most("nested materials", u64::from(depth), u64::from(MAX_NESTED))?;
         let relief = self.relief(definition)?;
         let opacity = self.opacity(definition, opacity)?;
         let refused = Self::refused(&definition.params.place);
         let mut alphas = None;
-        let made = self.made(definition, depth, &mut alphas)?;
+        let made = self.made(definition, &mut alphas)?;
         let options = MaterialOptions { opacity, relief, roughness: alphas, ..MaterialOptions::default() };
         definition.params.ignore(&["type"]);
         self.say_unused(&definition.params, &format!("the material `{}`", definition.kind));
         match made {
-            Made::Plain(material) => self.builder.material_with(material, options).map_err(refused),
+            Made::Plain(material) => {
+                let facets = (options.roughness.is_some(), options.facets);
+                self.bounds.coat(&material, facets, &definition.params.place)?;
+                self.builder.material_with(material, options).map_err(refused)
+            }
             Made::Nothing => {
                 let options = MaterialOptions { opacity: Some([0.0; 3].into()), ..options };
                 self.builder.material_with(Material::diffuse([0.0; 3]), options).map_err(refused)
@@ -94,7 +105,7 @@ impl Reader<'_> {
     /// The opacity of `uber`, times that of the shape.
     fn opacity(&mut self, d: &Definition, of_shape: Option<Texture>) -> Result<Option<Texture>, LoadError> {
         let own = if d.kind == "uber" { self.texture_or_colour(d, "opacity")? } else { None };
-        if own.as_ref().map(mean).is_some_and(|[r, g, b]| r != g || g != b) {
+        if own.as_ref().map(|texture| self.means.of(texture)).is_some_and(|[r, g, b]| r != g || g != b) {
             self.approximated(&d.params.place, "the colour of `opacity` is replaced by its mean");
         }
         Ok(match (own, of_shape) {
@@ -126,7 +137,7 @@ impl Reader<'_> {
     }
 
     /// What a material becomes, and its α along and across u if they are no number.
-    fn made(&mut self, d: &Definition, depth: u32, alphas: &mut Option<Texture>) -> Result<Made, LoadError> {
+    fn made(&mut self, d: &Definition, alphas: &mut Option<Texture>) -> Result<Made, LoadError> {
         let near = |what| replaced(d, what);
         Ok(Made::Plain(match d.kind.as_str() {
             "diffuse" => Material::Diffuse { albedo: self.colour(d, "reflectance", [0.5; 3])? },
@@ -148,10 +159,13 @@ impl Reader<'_> {
             }
             "plastic" | "uber" | "substrate" | "translucent" => self.lobes(d, alphas)?.into(),
             "conductor" | "metal" | "coatedconductor" => self.conductor(d, alphas)?,
-            "mirror" => Material::Mirror { reflectance: mean(&self.colour(d, "Kr", [0.9; 3])?) },
+            "mirror" => Material::Mirror { reflectance: self.means.of(&self.colour(d, "Kr", [0.9; 3])?) },
             "dielectric" | "glass" | "thindielectric" => {
-                let tint = mean(&self.colour(d, "Kt", [1.0; 3])?);
-                d.params.ignore(&["Kr"]);
+                let tint = self.means.of(&self.colour(d, "Kt", [1.0; 3])?);
+                if self.texture_or_colour(d, "Kr")?.is_some_and(|k| self.means.of(&k) != [1.0; 3]) {
+                    let what = format!("`Kr` of the material `{}` is taken for 1", d.kind);
+                    self.approximated(&d.params.place, what);
+                }
                 let ior = self.index(d, 1.5)?;
                 if d.kind == "thindielectric" {
                     Material::ThinGlass { ior, tint }
@@ -176,7 +190,7 @@ impl Reader<'_> {
                 self.plastic(self.colour(d, "Kd", [0.5; 3])?, [1.0; 3], self.index(d, 1.33)?, roughness)
             }
             "interface" | "none" | "" => return Ok(Made::Nothing),
-            "mix" => return self.mix(d, depth),
+            "mix" => return self.mix(d),
             other => return Err(d.params.place.clone().unsupported(format!("the material `{other}`"))),
         }))
     }
@@ -193,7 +207,7 @@ impl Reader<'_> {
             "plastic" => Lobes { gloss: dielectric(1.0 / 1.5), ..lobes },
             "substrate" => Lobes { gloss: Gloss::AshikhminShirley, ..lobes },
             "uber" => {
-                if self.texture_or_colour(d, "Kt")?.is_some_and(|k| mean(&k) != [0.0; 3]) {
+                if self.texture_or_colour(d, "Kt")?.is_some_and(|k| self.means.of(&k) != [0.0; 3]) {
                     self.approximated(&d.params.place, "`Kt` of the material `uber` is left out");
                 }
                 let mirror = self.colour(d, "Kr", [0.0; 3])?;
@@ -202,7 +216,7 @@ impl Reader<'_> {
             _ => {
                 let [reflect, transmit] =
                     [self.colour(d, "reflect", [0.5; 3])?, self.colour(d, "transmit", [0.5; 3])?];
-                if mean(&lobes.specular) != [0.0; 3] && mean(&transmit) != [0.0; 3] {
+                if self.means.of(&lobes.specular) != [0.0; 3] && self.means.of(&transmit) != [0.0; 3] {
                     let what = "the glossy transmission of the material `translucent` is left out";
                     self.approximated(&d.params.place, what);
                 }
@@ -249,9 +263,9 @@ impl Reader<'_> {
         Ok(Material::Conductor { eta, k, reflectance: [1.0; 3].into(), roughness })
     }
 
-    fn mix(&mut self, d: &Definition, depth: u32) -> Result<Made, LoadError> {
+    fn mix(&mut self, d: &Definition) -> Result<Made, LoadError> {
         use super::params::Values;
-        let names: Vec<String> = match d.params.get("materials").map(|p| &p.values) {
+        let names: Vec<String> = match d.params.get("materials").map(|p| &*p.values) {
             Some(Values::Texts(names)) => names.clone(),
             _ => ["namedmaterial1", "namedmaterial2"]
                 .iter()
@@ -263,7 +277,7 @@ impl Reader<'_> {
         };
         let mut part = |name: &str| {
             let definition = self.named(name, &d.params.place)?;
-            self.material(&definition, None, &d.params.place, depth + 1)
+            self.known_or_made(&definition, None, &d.params.place)
         };
         let (first, second) = (part(first)?, part(second)?);
         let share = self.colour(d, "amount", [0.5; 3])?;
@@ -299,7 +313,8 @@ impl Reader<'_> {
                     &d.params.place,
                     format!("the texture of `{name}` is replaced by its mean"),
                 );
-                let colour = self.texture_or_colour(d, name)?.map_or([0.5; 3], |texture| mean(&texture));
+                let colour =
+                    self.texture_or_colour(d, name)?.map_or([0.5; 3], |texture| self.means.of(&texture));
                 Ok(f64::from(colour.iter().sum::<f32>() / 3.0))
             }
             Some(_) => Ok(d.params.float(name)?.unwrap_or(missing)),

@@ -103,7 +103,13 @@ impl Reader<'_> {
 
     fn add_mesh(&mut self, mesh: &Triangles, wear: Wear, place: &Place) -> Result<(), LoadError> {
         match mesh.add_to(&mut self.builder, wear.material, wear.emission) {
-            Ok(_) => Ok(()),
+            Ok(left_out) => {
+                // The poles of our own round shapes have no area either
+                if left_out > 0 && left_out == mesh.indices.len() {
+                    self.ignored(place, "a shape is left out: none of its faces has an area");
+                }
+                Ok(())
+            }
             Err(SceneError::EmptyEmitter) => {
                 self.ignored(place, "a shape is left out: it shines, but has no area");
                 Ok(())

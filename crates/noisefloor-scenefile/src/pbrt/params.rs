@@ -5,6 +5,7 @@ use crate::error::{LoadError, Place};
 use std::cell::Cell;
 use std::collections::HashMap;
 use std::path::Path;
+use std::rc::Rc;
 
 /// Values of a parameter.
 #[derive(Clone, Debug, PartialEq)]
@@ -20,7 +21,7 @@ pub(super) struct Param {
     /// `float`, `rgb`, `texture`, …
     pub(super) kind: String,
     pub(super) name: String,
-    pub(super) values: Values,
+    pub(super) values: Rc<Values>,
     used: Cell<bool>,
 }
 
@@ -46,7 +47,7 @@ pub(super) fn read(tokens: &mut Tokens<'_>, path: &Path, line: u32) -> Result<Pa
         let (kind, name) = (kind.to_owned(), name.to_owned());
         tokens.next().map_err(open)?;
         let values = values(tokens, path, &here, &name)?;
-        all.push(Param { kind, name, values, used: Cell::new(false) });
+        all.push(Param { kind, name, values: Rc::new(values), used: Cell::new(false) });
     }
     Ok(Params { place, all })
 }
@@ -109,7 +110,7 @@ impl Params {
     /// Those of `all` that texture parameters name.
     pub(super) fn named_in<T: Clone>(&self, all: &HashMap<String, T>) -> HashMap<String, T> {
         let textures = self.all.iter().filter(|param| param.kind == "texture");
-        let names = textures.flat_map(|param| match &param.values {
+        let names = textures.flat_map(|param| match &*param.values {
             Values::Texts(names) => names.as_slice(),
             _ => &[],
         });
@@ -142,6 +143,22 @@ impl Params {
         Some(found)
     }
 
+    /// Whether both parameters are given and say the same.
+    pub(super) fn same(&self, one: &str, other: &str) -> bool {
+        let find = |name: &str| self.all.iter().find(|p| p.name == name).map(|p| (&p.kind, &p.values));
+        find(one).is_some() && find(one) == find(other)
+    }
+
+    pub(super) fn len(&self) -> usize {
+        self.all.len()
+    }
+
+    /// How many numbers there are.
+    pub(super) fn numbers_in_all(&self) -> usize {
+        let count = |p: &Param| if let Values::Numbers(numbers) = &*p.values { numbers.len() } else { 1 };
+        self.all.iter().map(count).sum()
+    }
+
     /// Whether any parameter is a texture.
     pub(super) fn has_texture(&self) -> bool {
         self.all.iter().any(|p| p.kind == "texture")
@@ -159,7 +176,7 @@ impl Params {
 
     /// All numbers of a parameter.
     pub(super) fn numbers(&self, name: &str) -> Result<Option<&[f64]>, LoadError> {
-        match self.get(name).map(|p| &p.values) {
+        match self.get(name).map(|p| &*p.values) {
             None => Ok(None),
             Some(Values::Numbers(numbers)) => Ok(Some(numbers)),
             Some(_) => Err(self.bad(format!("`{name}` must be numbers"))),
@@ -195,7 +212,7 @@ impl Params {
 
     /// The one text of a parameter.
     pub(super) fn text(&self, name: &str) -> Result<Option<&str>, LoadError> {
-        match self.get(name).map(|p| &p.values) {
+        match self.get(name).map(|p| &*p.values) {
             None => Ok(None),
             Some(Values::Texts(texts)) if texts.len() == 1 => Ok(Some(&texts[0])),
             Some(_) => Err(self.bad(format!("`{name}` must be one text"))),
@@ -204,7 +221,7 @@ impl Params {
 
     /// A switch.
     pub(super) fn switch(&self, name: &str, missing: bool) -> Result<bool, LoadError> {
-        match self.get(name).map(|p| &p.values) {
+        match self.get(name).map(|p| &*p.values) {
             None => Ok(missing),
             Some(Values::Switches(all)) if all.len() == 1 => Ok(all[0]),
             Some(_) => Err(self.bad(format!("`{name}` must be true or false"))),

@@ -6,8 +6,10 @@ use super::params::{Params, at};
 use super::state::{Definition, Object, Part, State};
 use super::tokens::{Kind, Tokens};
 use crate::Loaded;
+use crate::bounds::Bounds;
+use crate::channels::Means;
 use crate::error::{Errors, LoadError, Place, Warning};
-use crate::files::{Folder, MAX_FILE_BYTES, has_memory};
+use crate::files::{self, Folder, MAX_FILE_BYTES, has_memory};
 use crate::options::LoadOptions;
 use flate2::read::GzDecoder;
 use glam::DMat4;
@@ -17,7 +19,7 @@ use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
-/// How deep files may include each other, transforms nest and materials refer to others.
+/// How deep files may include each other, and transforms nest.
 pub(super) const MAX_DEPTH: u32 = 64;
 /// Most bytes of all files of directives.
 const MAX_BYTES: u64 = 1 << 29;
@@ -41,7 +43,7 @@ pub(super) struct Reader<'a> {
     /// Collected parts of the scene. Its camera is set at the end.
     pub(super) builder: SceneBuilder,
     pub(super) named_materials: HashMap<String, Rc<Definition>>,
-    pub(super) materials: HashMap<(String, Option<String>), MaterialId>,
+    pub(super) materials: HashMap<(usize, Option<String>), MaterialId>,
     /// Definitions whose addresses are keys of `materials`.
     pub(super) kept: Vec<Rc<Definition>>,
     pub(super) objects: HashMap<String, Object>,
@@ -52,6 +54,9 @@ pub(super) struct Reader<'a> {
     pub(super) surrounded: bool,
     pub(super) max_depth: Option<u32>,
     pub(super) pixels: u64,
+    /// Of materials in materials, and of all work.
+    pub(super) bounds: Bounds,
+    pub(super) means: Means,
     /// Triangles that are not in the file but made of what is.
     pub(super) made: u64,
     pub(super) stack: Vec<State>,
@@ -87,6 +92,8 @@ impl<'a> Reader<'a> {
             surrounded: false,
             max_depth: None,
             pixels: 0,
+            bounds: Bounds::default(),
+            means: Means::default(),
             made: 0,
             stack: vec![],
             transforms: vec![],
@@ -109,10 +116,9 @@ impl<'a> Reader<'a> {
         place.clone().at_most("files of directives", self.files, MAX_FILES)?;
         let bytes = self.bytes_of(path, MAX_BYTES - self.bytes, &place)?;
         self.bytes += bytes.len() as u64;
-        let text =
-            std::str::from_utf8(&bytes).map_err(|e| place.bad(format!("the file is not UTF-8: {e}")))?;
-        self.version_3 |= depth == 0 && text.contains("WorldEnd");
-        let mut tokens = Tokens::new(text);
+        let text = files::text(&bytes);
+        self.version_3 |= depth == 0 && has_world_end(&text);
+        let mut tokens = Tokens::new(&text);
         loop {
             let open = |line: u32| at(path, line).bad("a quote does not end");
             let Some(token) = tokens.next().map_err(open)? else { return Ok(()) };
@@ -192,6 +198,14 @@ impl<'a> Reader<'a> {
         let scene = builder.build().map_err(&refused)?;
         let scene = scene.with_camera(view.look()).map_err(&refused)?.with_identity(folder.contents());
         // One more segment than bounces
-        Ok(Loaded { scene, size: Some(view.size()), max_depth, warnings })
+        Ok(Loaded { scene, size: Some(view.size()), max_depth, clamp: view.clamp, warnings })
     }
+}
+
+/// Whether a file has the directive `WorldEnd`, which version 4 has not: a comment may have the word.
+fn has_world_end(text: &str) -> bool {
+    let mut tokens = Tokens::new(text);
+    text.contains("WorldEnd")
+        && std::iter::from_fn(|| tokens.next().ok().flatten())
+            .any(|token| matches!(token.kind, Kind::Word(word) if word == "WorldEnd"))
 }

@@ -26,6 +26,7 @@ impl Reader<'_> {
             }
             self.ignored(&params.place, "the participating medium is ignored");
         }
+        self.bounds.spend(params.numbers_in_all(), &params.place)?;
         let alpha = self.alpha(params)?;
         let emission = self.emission()?;
         let material = self.current_material(alpha, emission.is_some(), &params.place)?;
@@ -47,7 +48,11 @@ impl Reader<'_> {
                 &place,
             );
         } else {
-            Form::Mesh(self.mesh(kind, params)?)
+            let mesh = self.mesh(kind, params)?;
+            if mesh.indices.is_empty() {
+                self.ignored(&place, "the mesh has no faces");
+            }
+            Form::Mesh(mesh)
         };
         let part = Part { form, wear, place };
         match &mut self.open_object {
@@ -105,7 +110,10 @@ impl Reader<'_> {
 
     /// Where the shape is: a number or a texture, and what to call it.
     fn alpha(&mut self, params: &Params) -> Result<Option<(String, Texture)>, LoadError> {
-        params.ignore(&["shadowalpha"]);
+        // The same for shadows is no other; what differs is said to be ignored
+        if params.same("alpha", "shadowalpha") {
+            params.ignore(&["shadowalpha"]);
+        }
         let Some(param) = params.get("alpha") else { return Ok(None) };
         if param.kind == "texture" {
             let name = params.text("alpha")?.unwrap_or_default();
@@ -118,7 +126,8 @@ impl Reader<'_> {
     }
 
     fn triangle_mesh(&self, params: &Params) -> Result<Triangles, LoadError> {
-        params.ignore(&["S", "faceIndices"]);
+        // Of textures that count faces, which are not read
+        params.ignore(&["faceIndices"]);
         let positions = params.rows::<3>("P")?.ok_or_else(|| params.bad("a mesh needs its points `P`"))?;
         let uvs = match params.rows::<2>("uv")? {
             Some(uvs) => Some(uvs),
@@ -133,7 +142,6 @@ impl Reader<'_> {
 
     /// Squares, each as two triangles.
     fn bilinear_mesh(&mut self, params: &Params) -> Result<Triangles, LoadError> {
-        params.ignore(&["emissionfilename"]);
         let positions = params.rows::<3>("P")?.ok_or_else(|| params.bad("a mesh needs its points `P`"))?;
         let corners = corners::<4>(params, "indices")?.unwrap_or_else(|| vec![[0, 1, 2, 3]]);
         // Corners come in rows
@@ -178,7 +186,11 @@ impl Reader<'_> {
         }
         let path = self.folder.find(name, &params.place)?;
         let bytes = self.bytes_of(&path, MAX_FILE_BYTES, &params.place)?;
-        ply::parse(&bytes, &path)
+        let mesh = ply::parse(&bytes, &path)?;
+        for unread in &mesh.unread {
+            self.ignored(&Place::file(&path), format!("{unread} is ignored"));
+        }
+        Ok(mesh)
     }
 
     /// Checks that normals and texture coordinates are as many as points.

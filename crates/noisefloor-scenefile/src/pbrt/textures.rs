@@ -49,7 +49,7 @@ impl Reader<'_> {
                     (self.operand(params, "tex1", &known)?, self.operand(params, "tex2", &known)?);
                 let amount = params.float("amount").ok().flatten().unwrap_or(0.5) as f32;
                 self.approximated(&params.place, "a mixed texture is replaced by its mean");
-                let (a, b) = (mean(&first), mean(&second));
+                let (a, b) = (self.means.of(&first), self.means.of(&second));
                 plain(std::array::from_fn(|i| a[i] + (b[i] - a[i]) * amount))
             }
             _ => {
@@ -70,6 +70,10 @@ impl Reader<'_> {
             Rc::make_mut(&mut self.state.heights).insert(name.to_owned(), height);
         }
         let textures = if floats { &mut self.state.float_textures } else { &mut self.state.colour_textures };
+        // A copy, if an outer block has them, too
+        if Rc::strong_count(textures) > 1 {
+            self.bounds.spend(100 * textures.len(), &params.place)?;
+        }
         Rc::make_mut(textures).insert(name.to_owned(), texture);
         Ok(())
     }
@@ -77,11 +81,13 @@ impl Reader<'_> {
     fn checkerboard(&mut self, params: &Params, known: &Named) -> Result<Texture, LoadError> {
         let first = self.operand(params, "tex1", known)?;
         let second = self.operand(params, "tex2", known)?;
-        let (a, b) = (mean(&first), mean(&second));
+        let (a, b) = (self.means.of(&first), self.means.of(&second));
         let image = ImageTexture::new(2, 2, Pixels::Float(Arc::new([b, a, a, b])));
         // pbrt's squares have the size 1, a picture of ours has two
-        let to_uv = uv_map(params)?.map(|row| row.map(|x| 0.5 * x));
-        params.ignore(&["dimension"]);
+        let to_uv = self.uv_map(params)?.map(|row| row.map(|x| 0.5 * x));
+        if params.count("dimension")?.is_some_and(|dimension| dimension != 2) {
+            self.approximated(&params.place, "a checkerboard in space is laid on by texture coordinates");
+        }
         Ok(Texture::Image(ImageTexture { to_uv, nearest: true, ..image }))
     }
 
@@ -131,7 +137,7 @@ impl Reader<'_> {
                     &params.place,
                     "of a product of two pictures the second is replaced by its mean",
                 );
-                self.scaled(params, image, mean(&other))?
+                self.scaled(params, image, self.means.of(&other))?
             }
             // This reader makes no others
             (other, _) => other,
@@ -180,10 +186,7 @@ impl Reader<'_> {
             }
         };
         let nearest = params.text("filter")? == Some("point");
-        if params.text("mapping")?.is_some_and(|mapping| mapping != "uv") {
-            self.approximated(&params.place, "the texture is laid on by texture coordinates");
-        }
-        let to_uv = uv_map(params)?;
+        let to_uv = self.uv_map(params)?;
         let image = ImageTexture::new(picture.width, picture.height, pixels);
         let image = ImageTexture { to_uv, wrap: [wrap; 2], nearest, ..image };
         let scale = params.float("scale")?.unwrap_or(1.0) as f32;
@@ -200,6 +203,19 @@ impl Reader<'_> {
 }
 
 impl Reader<'_> {
+    /// `uscale`, `vscale`, `udelta` and `vdelta`.
+    fn uv_map(&mut self, params: &Params) -> Result<[[f32; 3]; 2], LoadError> {
+        if params.text("mapping")?.is_some_and(|mapping| mapping != "uv") {
+            self.approximated(&params.place, "the texture is laid on by texture coordinates");
+            params.ignore(&["v1", "v2"]);
+        }
+        let number =
+            |name: &str, missing: f64| Ok::<_, LoadError>(params.float(name)?.unwrap_or(missing) as f32);
+        let (us, vs) = (number("uscale", 1.0)?, number("vscale", 1.0)?);
+        let (ud, vd) = (number("udelta", 0.0)?, number("vdelta", 0.0)?);
+        Ok([[us, 0.0, ud], [0.0, vs, vd]])
+    }
+
     /// A picture of normals, whose codes are linear.
     pub(super) fn normal_map(&mut self, d: &Definition, name: &str) -> Result<Texture, LoadError> {
         let place = &d.params.place;
@@ -208,29 +224,6 @@ impl Reader<'_> {
         self.count_pixels(place, picture.width * picture.height)?;
         let pixels = texels(picture.samples, true, false);
         Ok(Texture::Image(ImageTexture::new(picture.width, picture.height, pixels)))
-    }
-}
-
-/// `uscale`, `vscale`, `udelta` and `vdelta`.
-fn uv_map(params: &Params) -> Result<[[f32; 3]; 2], LoadError> {
-    let number = |name: &str, missing: f64| Ok::<_, LoadError>(params.float(name)?.unwrap_or(missing) as f32);
-    let (us, vs) = (number("uscale", 1.0)?, number("vscale", 1.0)?);
-    let (ud, vd) = (number("udelta", 0.0)?, number("vdelta", 0.0)?);
-    params.ignore(&["v1", "v2"]);
-    Ok([[us, 0.0, ud], [0.0, vs, vd]])
-}
-
-/// The mean colour of a texture.
-pub(super) fn mean(texture: &Texture) -> Rgb {
-    match texture {
-        Texture::Colour(colour) => *colour,
-        Texture::Image(image) => {
-            let pixels = linear(&image.pixels);
-            let sum = |i: usize| pixels.iter().map(|p| f64::from(p[i])).sum::<f64>();
-            std::array::from_fn(|i| image.factor[i] * (sum(i) / pixels.len().max(1) as f64) as f32)
-        }
-        // This reader makes no others
-        _ => [0.5; 3],
     }
 }
 

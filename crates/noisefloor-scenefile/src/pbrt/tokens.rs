@@ -63,7 +63,7 @@ impl<'a> Tokens<'a> {
             '"' => {
                 let body = &self.rest[1..];
                 let end = body.find('"').ok_or(line)?;
-                self.line += body[..end].matches('\n').count() as u32;
+                self.line += lines(&body[..end]);
                 self.rest = &body[end + 1..];
                 Kind::Text(body[..end].to_owned())
             }
@@ -83,14 +83,20 @@ impl<'a> Tokens<'a> {
         loop {
             // Exporters of version 3 put commas between numbers
             let trimmed = self.rest.trim_start_matches(|c: char| c.is_whitespace() || c == ',');
-            self.line += self.rest[..self.rest.len() - trimmed.len()].matches('\n').count() as u32;
+            self.line += lines(&self.rest[..self.rest.len() - trimmed.len()]);
             self.rest = trimmed;
             if !self.rest.starts_with('#') {
                 return;
             }
-            self.rest = &self.rest[self.rest.find('\n').unwrap_or(self.rest.len())..];
+            self.rest = &self.rest[self.rest.find(['\n', '\r']).unwrap_or(self.rest.len())..];
         }
     }
+}
+
+/// How many lines end in a text: by \n, \r\n, or a \r alone, as on old Macs.
+fn lines(text: &str) -> u32 {
+    let alone = text.matches('\r').count() - text.matches("\r\n").count();
+    (text.matches('\n').count() + alone) as u32
 }
 
 #[cfg(test)]
@@ -121,5 +127,9 @@ mod tests {
             ]
         );
         assert_eq!(Tokens::new("\n\"open").next(), Err(2));
+        // A comment ends with its line, however that ends
+        let mut tokens = Tokens::new("# a\rShape # b\r\n\"x\"");
+        assert_eq!(tokens.next(), Ok(Some(Token { kind: word("Shape"), line: 2 })));
+        assert_eq!(tokens.next(), Ok(Some(Token { kind: quoted("x"), line: 3 })));
     }
 }

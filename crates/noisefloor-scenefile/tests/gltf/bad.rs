@@ -78,6 +78,13 @@ fn every_error_names_its_place() {
         ("/samplers/0/magFilter", "1", "texture 0: ", "magFilter"),
         ("/materials/0/alphaMode", r#""FOG""#, r#"material 0 "Oak": "#, "alphaMode"),
         ("/cameras/0/type", r#""fisheye""#, "camera 0: ", "perspective"),
+        // A mesh that is lost is an error
+        (
+            "/accessors/0",
+            r#"{"componentType": 5126, "type": "VEC3", "count": 4}"#,
+            table,
+            "its positions, accessor 0, have no data",
+        ),
         ("/extensions/KHR_lights_punctual/lights/0/type", r#""spot""#, "light 0: ", "spot light"),
         // Lengths
         ("/accessors/0/count", "5", table, "accessor 0: 5 elements of 12 bytes"),
@@ -96,10 +103,11 @@ fn every_error_names_its_place() {
         ("/nodes/2/children", "[2]", "node 2: ", "reached twice"),
         ("/nodes/2/children", "[1]", "node 1: ", "reached twice"),
         ("/nodes/1/rotation", "[0, 0, 0, 0]", "node 1: ", "rotation"),
-        ("/nodes/1/rotation", "[1e39, 0, 0, 0]", "line 1 of the JSON: ", "number out of range"),
+        ("/nodes/1/rotation", "[1e39, 0, 0, 0]", "node 1: ", "rotation"),
+        ("/nodes/1/rotation", "[\"a\", 0, 0, 0]", "node 1: ", "not the JSON of a glTF file"),
         // What the renderer does not take
         ("/nodes/1/translation", "[1e9, 0, 0]", table, "outside"),
-        ("/nodes/1/scale", "[1e39, 0, 0]", "line 1 of the JSON: ", "number out of range"),
+        ("/nodes/1/scale", "[1e39, 0, 0]", table, "not finite"),
         ("/nodes/0/scale", "[0, 0, 0]", "scene.gltf", "camera has no orientation"),
         ("/cameras/0/perspective/yfov", "4", "scene.gltf", "field of view"),
         ("/extensions/KHR_lights_punctual/lights/0/intensity", "-1", "light 0", "outside"),
@@ -132,7 +140,7 @@ fn every_error_names_its_place() {
         // The whole
         ("/asset/version", r#""1.0""#, "asset: ", "version \"1.0\""),
         ("/asset/minVersion", r#""2.1""#, "asset: ", "version \"2.1\""),
-        ("/asset/version", "2", "line 1 of the JSON: ", "not the JSON of a glTF file"),
+        ("/asset/version", "2", "asset: ", "not the JSON of a glTF file"),
         (
             "/extensionsRequired",
             r#"["KHR_draco_mesh_compression"]"#,
@@ -166,11 +174,15 @@ fn a_file_must_have_something_to_see() {
 
 #[test]
 fn nothing_is_allocated_for_what_is_only_claimed() {
-    // Zeros without data: a gigabyte of positions from a few hundred bytes
+    // Zeros without data: a gigabyte of positions from a few hundred bytes, but for one that is given
     let mut maker = good();
+    let (at, value) = (maker.view(&[0], ""), maker.view(&[0; 12], ""));
     let accessor = &mut maker.root["accessors"][0];
     accessor.as_object_mut().unwrap().remove("bufferView");
     accessor["count"] = 90_000_000.into();
+    accessor["sparse"] = json(&format!(
+        r#"{{"count": 1, "indices": {{"bufferView": {at}, "componentType": 5121}}, "values": {{"bufferView": {value}}}}}"#
+    ));
     let error = maker.load().unwrap_err();
     assert!(matches!(error, LoadError::TooLarge { what: "elements without data", .. }), "{error}");
 
@@ -201,6 +213,81 @@ fn nothing_is_allocated_for_what_is_only_claimed() {
     let text = format!(r#"{{"asset": {{"version": "2.0", "extras": {}}}}}"#, "[".repeat(1 << 20));
     let error = load("a.gltf", text.as_bytes()).unwrap_err().to_string();
     assert!(error.contains("line 1 of the JSON"), "{error}");
+}
+
+/// glTF allows all of it: any type of `extras`, anywhere, channels of animations without a node, scenes
+/// without nodes, `byteStride` and the like aside. The scene stays what it is.
+#[test]
+fn what_gltf_allows_is_read() {
+    let places = [
+        "/asset",
+        "/scenes/0",
+        "/nodes/1",
+        "/meshes/0",
+        "/meshes/0/primitives/0",
+        "/materials/0",
+        "/accessors/0",
+        "/materials/0/pbrMetallicRoughness",
+        "/materials/0/pbrMetallicRoughness/baseColorTexture",
+        "/bufferViews/0",
+        "/cameras/0",
+        "/cameras/0/perspective",
+        "/images/0",
+        "/textures/0",
+        "/samplers/0",
+        "/extensions/KHR_lights_punctual/lights/0",
+        "",
+    ];
+    for extras in [r#""note""#, "1", "true", "null", "[1, {}]", "{}"] {
+        let mut maker = good();
+        for place in places {
+            maker.root.pointer_mut(place).unwrap()["extras"] = json(extras);
+        }
+        let loaded = maker.load().unwrap_or_else(|e| panic!("{extras}: {e}"));
+        assert_eq!(
+            (loaded.scene.surfaces(), loaded.warnings.len()),
+            (2, 0),
+            "{extras}: {:?}",
+            loaded.warnings
+        );
+    }
+    let mut maker = good();
+    maker.root["animations"] = json(
+        r#"[{"name": "Walk", "extras": "x", "channels": [{"sampler": 0, "target": {"path": "pointer",
+            "extensions": {"KHR_animation_pointer": {"pointer": "/nodes/0"}}}}], "samplers": []}]"#,
+    );
+    maker.root["scenes"].as_array_mut().unwrap().push(json(r#"{"name": "Empty"}"#));
+    let loaded = maker.load().unwrap();
+    crate::kit::assert_warns(&loaded, &["animation 0 \"Walk\"", "it is ignored"]);
+    maker.root["scene"] = 1.into();
+    assert!(maker.load().unwrap_err().to_string().contains("neither a camera nor a mesh"));
+}
+
+/// As some programs write them: a mark before JSON, and zeros after that of a GLB.
+#[test]
+fn marks_and_padding_are_passed_over() {
+    let marked = [b"\xef\xbb\xbf".as_slice(), &good().gltf()].concat();
+    assert_eq!(load("a.gltf", &marked).unwrap().scene.surfaces(), 2);
+    let mut file = good().glb();
+    let words = |file: &[u8], at: usize| u32::from_le_bytes(std::array::from_fn(|i| file[at + i]));
+    let (length, json) = (words(&file, 8), words(&file, 12));
+    file.splice(20 + json as usize..20 + json as usize, [0; 4]);
+    file[8..12].copy_from_slice(&(length + 4).to_le_bytes());
+    file[12..16].copy_from_slice(&(json + 4).to_le_bytes());
+    assert_eq!(load("a.glb", &file).unwrap().scene.surfaces(), 2);
+}
+
+/// What no list knows is named, with what has it.
+#[test]
+fn unknown_properties_are_warned_of() {
+    let mut maker = good();
+    maker.root["materials"][0]["metalness"] = 1.into();
+    maker.root["meshes"][0]["primitives"][0]["attributes"]["NORMALS"] = 0.into();
+    maker.root["meshes"][0]["primitives"][0]["attributes"]["_ID"] = 0.into();
+    let loaded = maker.load().unwrap();
+    crate::kit::assert_warns(&loaded, &["material 0 \"Oak\": the property `metalness` is ignored"]);
+    crate::kit::assert_warns(&loaded, &["mesh 0 \"Table\": the property `NORMALS` is ignored"]);
+    assert_eq!(loaded.warnings.len(), 2, "{:?}", loaded.warnings);
 }
 
 #[test]

@@ -84,6 +84,59 @@ fn unlit_surfaces_show_their_colour() {
     assert_close(mean(&maker, 16, 9), [0.5 * seen, seen, 0.25 * seen], 1e-4);
 }
 
+/// Also what shows its colour without light.
+#[test]
+fn colours_of_vertices_multiply_unlit_surfaces() {
+    let unlit = r#"{"extensions": {"KHR_materials_unlit": {}},
+        "pbrMetallicRoughness": {"baseColorFactor": [0.5, 1, 0.25, 1]}}"#;
+    let mut maker = sunlit(unlit);
+    let colours = maker.floats(&[[1.0f32, 0.5, 0.25]; 4]);
+    maker.root["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"] = colours.into();
+    assert_close(mean(&maker, 16, 9), [0.5, 0.5, 0.0625], 1e-4);
+    assert_eq!(maker.load().unwrap().warnings, []);
+    // From black on the left to white on the right: 1/4 and 3/4 in the mean over each half
+    let [black, white] = [[0.0f32; 3], [1.0; 3]];
+    let colours = maker.floats(&[black, white, white, black]);
+    maker.root["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"] = colours.into();
+    let pixels = render(maker.load().unwrap(), 2, 4096, 1);
+    for (x, share) in [(0, 0.25), (1, 0.75)] {
+        assert_close(pixels[x], [0.5 * share, share, 0.25 * share], 0.01);
+    }
+}
+
+/// Red is along TANGENT, green along the cross product of the normal and that, times its fourth number (glTF
+/// 2.0, §3.7.2.1): here +y, and −x or +x. In a mirror image all of it is mirrored. Without normals, it does
+/// not count.
+#[test]
+fn tangents_of_a_mesh_are_the_tangent_space() {
+    let n = [160u8, 90, 245].map(|c| f32::from(c) / 255.0 * 2.0 - 1.0);
+    let lambert = |[x, y, z]: [f32; 3]| {
+        let length = (x * x + y * y + z * z).sqrt();
+        3.0 / std::f32::consts::PI * ((x + z) / (2f32.sqrt() * length)).max(0.0)
+    };
+    for (side, mirrored, normals, want) in [
+        (1.0f32, false, true, [-n[1], n[0], n[2]]),
+        (-1.0, false, true, [n[1], n[0], n[2]]),
+        (1.0, true, true, [n[1], n[0], n[2]]),
+        (1.0, false, false, [n[0], n[1], n[2]]),
+    ] {
+        let mut maker = sunlit(&format!(r#"{{"normalTexture": {{"index": 0}}, {CHALK}}}"#));
+        maker.texture(1, &[[160, 90, 245, 255]], "{}");
+        let tangents = maker.floats(&[[0.0f32, 1.0, 0.0, side]; 4]);
+        let up = maker.floats(&[[0.0f32, 0.0, 1.0]; 4]);
+        let attributes = &mut maker.root["meshes"][0]["primitives"][0]["attributes"];
+        attributes["TANGENT"] = tangents.into();
+        if normals {
+            attributes["NORMAL"] = up.into();
+        }
+        if mirrored {
+            maker.root["nodes"][1]["scale"] = json("[-1, 1, 1]");
+        }
+        let expected = lambert(want);
+        assert_close(mean(&near(maker), 16, 9), [expected; 3], 5e-3 * expected + 1e-4);
+    }
+}
+
 #[test]
 fn colours_of_vertices_multiply() {
     let chalk =
@@ -180,6 +233,12 @@ fn compressed_pictures_and_meshes_are_refused_by_name() {
     maker.push("textures", r#"{"extensions": {"KHR_texture_basisu": {"source": 0}}}"#);
     let error = maker.load().unwrap_err().to_string();
     assert!(error.contains("texture 0: an image of only KHR_texture_basisu is not supported"), "{error}");
+    // Used but not required, and nothing to fall back on
+    let mut maker = wall("{}");
+    maker.root["meshes"][0]["primitives"][0]["extensions"] = json(r#"{"KHR_draco_mesh_compression": {}}"#);
+    maker.root["accessors"][0].as_object_mut().unwrap().remove("bufferView");
+    let error = maker.load().unwrap_err().to_string();
+    assert!(error.contains("a mesh of only KHR_draco_mesh_compression is not supported"), "{error}");
     let mut maker = wall("{}");
     maker.root["extensionsRequired"] = json(r#"["KHR_draco_mesh_compression", "EXT_meshopt_compression"]"#);
     let error = maker.load().unwrap_err().to_string();

@@ -128,6 +128,18 @@ fn nodes_move_meshes() {
     assert_eq!(quad(&[r#"{"mesh": 0, "scale": [1, 1, -1], "translation": [0, 0, -2]}"#]), NOTHING);
 }
 
+/// Half the height that is seen is ymag, at any distance.
+#[test]
+fn orthographic_cameras_see_parallels() {
+    let mut maker = lamp(&[0, 1, 2, 0, 2, 3], |_| String::new());
+    maker.root["cameras"][0] =
+        json(r#"{"type": "orthographic", "orthographic": {"xmag": 1, "ymag": 1, "znear": 0.1, "zfar": 99}}"#);
+    for z in [0, -5] {
+        maker.root["nodes"][1]["translation"] = json(&format!("[0, 0, {z}]"));
+        assert_eq!(drawing(maker.load().unwrap(), 4), CORNER, "{z}");
+    }
+}
+
 #[test]
 fn what_has_no_area_is_left_out() {
     let mut maker = lamp(&[0, 1, 2, 0, 0, 1], |_| String::new());
@@ -152,11 +164,10 @@ fn the_first_camera_is_used() {
     assert_warns(&loaded, &["node 3", "its camera is ignored"]);
     assert_eq!(drawing(loaded, 4), NOTHING);
     assert!(drawing(turned.load().unwrap(), 16).contains('#'));
-    let mut orthographic = maker;
-    orthographic.root["cameras"][0] =
-        json(r#"{"type": "orthographic", "orthographic": {"xmag": 1, "ymag": 1, "zfar": 9, "znear": 0}}"#);
-    let error = orthographic.load().unwrap_err().to_string();
-    assert!(error.contains("camera 0: an orthographic projection is not supported"), "{error}");
+    let mut without = maker;
+    without.root["cameras"][0] = json(r#"{"type": "orthographic"}"#);
+    let error = without.load().err().map(|e| e.to_string()).unwrap_or_default();
+    assert!(error.contains("camera 0: it is no perspective or orthographic camera with its"), "{error}");
 }
 
 #[test]

@@ -79,7 +79,7 @@ impl Maker {
 
     pub(crate) fn floats<const N: usize>(&mut self, elements: &[[f32; N]]) -> usize {
         let bytes: Vec<u8> = elements.iter().flatten().flat_map(|x| x.to_le_bytes()).collect();
-        let shape = ["", "SCALAR", "VEC2", "VEC3"][N];
+        let shape = ["", "SCALAR", "VEC2", "VEC3", "VEC4"][N];
         self.accessor(5126, shape, elements.len(), &bytes, "")
     }
 

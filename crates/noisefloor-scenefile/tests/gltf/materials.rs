@@ -70,6 +70,14 @@ fn colours_are_texture_times_factor() {
     // The index of refraction says how much: ((2 − 1)/(2 + 1))²
     half.root["materials"][0]["extensions"] = json(r#"{"KHR_materials_ior": {"ior": 2}}"#);
     assert_close(mean(&half, 4096, 9), [0.5 / 9.0; 3], 2e-3);
+    // And KHR_materials_specular: a factor on it, head on; its colour counts as grey
+    let specular = r#"{"KHR_materials_specular": {"specularFactor": 0.5}, "KHR_materials_ior": {"ior": 2}}"#;
+    half.root["materials"][0]["extensions"] = json(specular);
+    assert_close(mean(&half, 4096, 9), [0.25 / 9.0; 3], 1.5e-3);
+    assert_warns(&half.load().unwrap(), &["material 0", "KHR_materials_specular is replaced by an index"]);
+    // Of factors of 1 there is nothing to say
+    half.root["materials"][0]["extensions"] = json(r#"{"KHR_materials_specular": {"specularFactor": 1}}"#);
+    assert_eq!(half.load().unwrap().warnings, []);
 }
 
 #[test]
@@ -168,14 +176,25 @@ fn the_set_of_texture_coordinates_is_the_materials() {
     });
     assert_eq!(drawn, ["bw", "rg"]);
 
-    // Another texture with another set cannot be shown
+    // Each texture takes its own set: the picture is upside down, and the hole of the mask on the left
     let mut maker = wall(
-        r#"{"emissiveFactor": [1, 1, 1], "emissiveTexture": {"index": 0, "texCoord": 1},
-            "pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}"#,
+        r#"{"emissiveFactor": [1, 1, 1], "emissiveTexture": {"index": 0, "texCoord": 1}, "alphaMode": "MASK",
+            "pbrMetallicRoughness": {"baseColorTexture": {"index": 1}}}"#,
     );
     maker.texture(2, &FOUR, NEAREST);
-    let loaded = maker.load().unwrap();
-    assert_warns(&loaded, &["material 0", "texture 0 is ignored", "set 1"]);
+    maker.texture(2, &[[0; 4], [0, 0, 0, 255]], NEAREST);
+    second(&mut maker);
+    assert_eq!(maker.load().unwrap().warnings, []);
+    let pixels = render(maker.load().unwrap(), 2, 16, 1);
+    assert_eq!(pixels, [[1.0; 3], [1.0; 3], [1.0; 3], [0.0, 1.0, 0.0]]);
+
+    // A third set cannot be shown
+    maker.root["materials"][0]["pbrMetallicRoughness"]["metallicRoughnessTexture"] =
+        json(r#"{"index": 0, "texCoord": 2}"#);
+    assert_warns(
+        &maker.load().unwrap(),
+        &["material 0", "texture 0 is ignored", "set 1", "the sets 0 and 2"],
+    );
 
     // Nor one without coordinates
     let mut maker = wall(r#"{"emissiveFactor": [1, 1, 1], "emissiveTexture": {"index": 0, "texCoord": 7}}"#);
@@ -224,6 +243,48 @@ fn blended_surfaces_cover_by_alpha() {
     let texture = maker.texture(1, &[[255, 255, 255, 102]], NEAREST);
     maker.root["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"]["index"] = texture.into();
     assert_close(mean(&maker, 4096, 1), [0.2 + 0.8 * 3.0; 3], 9e-3);
+}
+
+/// COLOR_0 multiplies the alpha, too (glTF 2.0, §3.9.4), in all its types.
+#[test]
+fn alphas_of_corners_multiply() {
+    let material = |mode: &str| {
+        format!(
+            r#"{{"emissiveFactor": [1, 1, 1], "alphaMode": "{mode}",
+                "pbrMetallicRoughness": {{"baseColorFactor": [0, 0, 0, 0.5]}}}}"#
+        )
+    };
+    let with = |mode: &str, colours: &dyn Fn(&mut Maker) -> usize| {
+        let mut maker = veil(&material(mode));
+        let colours = colours(&mut maker);
+        maker.root["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"] = colours.into();
+        maker
+    };
+    let quarter = |maker: &mut Maker| maker.floats(&[[1.0f32, 1.0, 1.0, 0.25]; 4]);
+    let bytes = |maker: &mut Maker| {
+        maker.accessor(5121, "VEC4", 4, &[255, 255, 255, 51].repeat(4), r#", "normalized": true"#)
+    };
+    let words = |maker: &mut Maker| {
+        let row: Vec<u8> = [65535u16, 65535, 65535, 13107].iter().flat_map(|w| w.to_le_bytes()).collect();
+        maker.accessor(5123, "VEC4", 4, &row.repeat(4), r#", "normalized": true"#)
+    };
+    // 0.5·0.25 and 0.5·51/255 of 1, the rest of 3; a standard error of 2·√(0.125·0.875/64/4096) = 1.3e-3
+    for (colours, alpha) in [(&quarter as &dyn Fn(&mut Maker) -> usize, 0.125), (&bytes, 0.1), (&words, 0.1)]
+    {
+        let maker = with("BLEND", colours);
+        assert_close(mean(&maker, 4096, 1), [3.0 - 2.0 * alpha; 3], 7e-3);
+        assert_eq!(maker.load().unwrap().warnings, []);
+        assert_close(mean(&with("OPAQUE", colours), 16, 1), [1.0; 3], 1e-5);
+        assert_close(mean(&with("MASK", colours), 16, 1), [3.0; 3], 1e-5);
+    }
+    // From 0 on the left to 1 on the right: half of it reaches a cutoff of 0.25
+    let mut maker = with("MASK", &|maker| {
+        let [left, right] = [0.0f32, 1.0].map(|alpha| [1.0, 1.0, 1.0, alpha]);
+        maker.floats(&[left, right, right, left])
+    });
+    maker.root["materials"][0]["alphaCutoff"] = json("0.25");
+    let pixels = render(maker.load().unwrap(), 2, 64, 1);
+    assert_eq!(pixels.iter().map(|p| p[0]).collect::<Vec<_>>(), [3.0, 1.0, 3.0, 1.0]);
 }
 
 #[test]

@@ -7,6 +7,15 @@ fn folder() -> Folder {
         .with("broken.png", b"\x89PNG\r\n\x1a\nand so on")
         .with("text.png", "not a picture")
         .with("empty.obj", "")
+        .with("curves.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\ncurv 0 1 1 2\n")
+        .with(
+            "empty.ply",
+            "ply\nformat ascii 1.0\nelement vertex 0\nproperty float x\nproperty float y\nproperty float z\n\
+             element face 0\nproperty list uchar int vertex_indices\nend_header\n",
+        )
+        .with("pointer.obj", "version https://git-lfs.github.com/spec/v1\noid sha256:4d7a\nsize 12345\n")
+        .with("pointer.png", "version https://git-lfs.github.com/spec/v1\noid sha256:4d7a\nsize 12345\n")
+        .with("page.obj", "\n<!DOCTYPE html>\n<html><body>404</body></html>\n")
         .with("bad.obj", "v 0 0 0\nf 1 2 3\n")
         .with("flat.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nf 1 1 2\nf 1 2 2\n")
         .with("short.ply", "ply\nformat ascii 1.0\nelement vertex 99\nproperty float x\nend_header\n0\n")
@@ -67,6 +76,16 @@ fn missing_and_broken_files_are_named() {
         (mesh("ply", "short.ply"), "short.ply: the header asks for more elements than the file holds"),
         (mesh("serialized", "bad.serialized"), "bad.serialized: mesh 0: the file is cut short"),
         (mesh("obj", "missing.obj"), "line 3 cannot be read"),
+        (mesh("obj", "empty.obj"), "empty.obj: the OBJ file has no faces"),
+        (
+            mesh("obj", "pointer.obj"),
+            "pointer.obj: this is a Git LFS pointer, not the file itself: run `git lfs pull`",
+        ),
+        (
+            bitmap("pointer.png"),
+            "pointer.png: this is a Git LFS pointer, not the file itself: run `git lfs pull`",
+        ),
+        (mesh("obj", "page.obj"), "page.obj: this is a web page (HTML), not the file itself"),
         ("<shape type=\"obj\"/>".to_owned(), "line 2: <shape type=\"obj\"> needs a `filename`"),
         (format!("<include filename=\"b.xml\"/>{RECTANGLE}"), "line 2 cannot be read"),
     ]);
@@ -76,7 +95,10 @@ fn missing_and_broken_files_are_named() {
 fn unsupported_kinds_are_named() {
     all_fail(&[
         ("\n<shape type=\"hair\"/>".to_owned(), "line 3: <shape type=\"hair\"> is not supported"),
-        (bsdf("<bsdf type=\"hair\"/>"), "line 3: <bsdf type=\"hair\"> is not supported"),
+        (
+            bsdf("<bsdf type=\"hair\"/>"),
+            "line 3: <bsdf type=\"hair\"> (`--source mitsuba` has it) is not supported",
+        ),
         (bsdf("<bsdf type=\"twosided\"/>"), "line 3: <bsdf type=\"twosided\"> needs a <bsdf> in it"),
         (
             bsdf("<bsdf type=\"mask\"><bsdf type=\"diffuse\"/><bsdf type=\"diffuse\"/></bsdf>"),
@@ -252,8 +274,16 @@ fn warnings_say_what_is_left_out() {
             "line 2: 2 of 3 faces have no area and are left out",
         ),
         (
-            "<shape type=\"obj\"><string name=\"filename\" value=\"empty.obj\"/></shape>",
-            "line 2: the mesh has no faces",
+            "<shape type=\"ply\"><string name=\"filename\" value=\"empty.ply\"/></shape>",
+            "line 2: the mesh has no faces, as its file says",
+        ),
+        (
+            "<shape type=\"obj\"><string name=\"filename\" value=\"curves.obj\"/></shape>",
+            "line 2: line 5: `curv` of `curves.obj` is ignored",
+        ),
+        (
+            "<shape type=\"cube\">\n<transform name=\"to_world\"><scale value=\"2\" x=\"3\"/></transform></shape>",
+            "line 3: the attribute `x` of <scale> is ignored",
         ),
         (
             "<shape type=\"cube\">\n<float name=\"unheard_of\" value=\"1\"/></shape>",
@@ -295,7 +325,11 @@ fn what_is_no_scene_is_an_error() {
         ("<scene/>", "expected <scene version=\"…\"> of Mitsuba"),
         ("<scene version=\"new\"/>", "expected <scene version=\"…\"> of Mitsuba"),
         ("<scene version=\"4.0.0\"/>", "version 4.0.0 of Mitsuba's scenes is not supported"),
-        ("<!DOCTYPE x [<!ENTITY a \"b\">]><scene version=\"3.0.0\"/>", "the XML is broken"),
+        ("<!DOCTYPE x [<!ENTITY a \"b\">]><scene version=\"3.0.0\"/>", "the scene has no <sensor>"),
+        (
+            "<scene version=\"3.0.0\"/>\n<scene version=\"3.0.0\"/>",
+            "line 2: the XML is broken: something follows",
+        ),
         (
             "<scene version=\"3.0.0\">\n<default name=\"a\"/></scene>",
             "line 2: a <default> needs a name and a value",
@@ -306,7 +340,7 @@ fn what_is_no_scene_is_an_error() {
     }
     std::fs::write(folder.path().join("bytes.xml"), [0xff, 0xfe]).unwrap();
     let error = noisefloor_scenefile::load(&folder.path().join("bytes.xml")).unwrap_err();
-    assert!(error.to_string().contains("not UTF-8"));
+    assert!(error.to_string().contains("the XML is broken: it has no element"), "{error}");
     assert!(
         noisefloor_scenefile::load(&folder.path().join("none.xml"))
             .unwrap_err()
@@ -330,8 +364,10 @@ fn what_is_too_large_is_an_error() {
             .contains("attributes of one element, more than 64")
     );
     let spaces: String = (0..3000).map(|i| format!("<a xmlns:n{i}='u{i}'>")).collect();
-    assert!(folder.load(&scene(&spaces)).unwrap_err().contains("17 name spaces, more than 16"));
-    assert!(folder.load(&scene(&"<a/>".repeat(1 << 20))).unwrap_err().contains("the XML is broken"));
+    assert!(folder.load(&scene(&spaces)).unwrap_err().contains("33 levels of elements, more than 32"));
+    assert!(
+        folder.load(&scene(&"<a/>".repeat(1 << 20))).unwrap_err().contains("elements, more than 1048576")
+    );
 
     // Twenty doublings of a hundred bytes
     let mut bomb = format!("<default name='p0' value='{}'/>", "x".repeat(100));
@@ -358,5 +394,93 @@ fn what_is_too_large_is_an_error() {
             .body("<emitter type=\"envmap\"><string name=\"filename\" value=\"a.png\"/></emitter>")
             .unwrap_err();
         assert!(error.contains(want), "{error}");
+    }
+}
+
+/// A few hundred bytes can ask for what never ends: depth, cycles and cost of all that nests are bounded.
+#[test]
+fn what_nests_is_bounded() {
+    let folder = Folder::new().with_png("a.png", 1, &[[9; 4]]);
+    let checkers = |count: usize, last: &str| {
+        let mut all = String::new();
+        for i in 0..count {
+            let next = if i + 1 == count { last.to_owned() } else { format!("c{}", i + 1) };
+            all += &format!(
+                "<texture type=\"checkerboard\" id=\"c{i}\"><ref name=\"color0\" id=\"{next}\"/>\
+                 <ref name=\"color1\" id=\"{next}\"/></texture>\n"
+            );
+        }
+        let leaf =
+            "<texture type=\"bitmap\" id=\"leaf\"><string name=\"filename\" value=\"a.png\"/></texture>";
+        let shape = "<shape type=\"cube\"><bsdf type=\"diffuse\"><ref name=\"reflectance\" id=\"c0\"/></bsdf></shape>";
+        format!("{all}{leaf}{shape}")
+    };
+    let mixture = |count: usize, part: &str| {
+        let weights = vec!["0.001"; count].join(", ");
+        format!(
+            "<bsdf type=\"mixturebsdf\" id=\"{count}\"><string name=\"weights\" value=\"{weights}\"/>{}</bsdf>",
+            part.repeat(count)
+        )
+    };
+    let grey = "<bsdf type=\"diffuse\"/>";
+    let worn = |bsdf: &str| format!("<shape type=\"cube\">{bsdf}</shape>");
+    let sky = "<emitter type=\"sky\"/>\n";
+    let blends = (0..20).fold(grey.to_owned(), |inside, i| {
+        format!("<bsdf type=\"blendbsdf\" id=\"b{i}\">{inside}<ref id=\"b{}\"/></bsdf>", i - 1)
+            .replace("<ref id=\"b-1\"/>", grey)
+    });
+    for (body, want) in [
+        (checkers(1, "c0"), "<texture type=\"checkerboard\" id=\"c0\"> refers to itself"),
+        (checkers(3, "c1"), "refers to itself"),
+        (checkers(40, "leaf"), "17 nested surfaces and textures, more than 16"),
+        (worn(&mixture(3500, grey)), "257 surfaces that are mixed, more than 256"),
+        (
+            mixture(100, grey) + &worn(&mixture(50, "<ref id=\"100\"/>")),
+            "surfaces that are mixed, more than 256",
+        ),
+        (worn(&blends), "17 nested surfaces and textures, more than 16"),
+        ("<shape type=\"merge\" id=\"m\"><ref id=\"m\"/></shape>".to_owned(), "refers to itself"),
+        (sky.repeat(50), "a second emitter surrounds the scene; there can be only one (49 times"),
+    ] {
+        let start = std::time::Instant::now();
+        let error = folder.body(&body).unwrap_err();
+        assert!(error.contains(want), "{error}");
+        // Fifty skies took 42 s, and 2^40 checkerboards would never end
+        assert!(start.elapsed() < std::time::Duration::from_secs(20), "{want}: {:?}", start.elapsed());
+    }
+    // As deep as may be is well
+    folder.body(&checkers(14, "leaf")).unwrap();
+    folder.body(&worn(&mixture(200, grey))).unwrap();
+}
+
+/// What Mitsuba reads and XML does not allow.
+#[test]
+fn xml_is_read_as_mitsuba_reads_it() {
+    let lamp = "<shape type=\"rectangle\"><emitter type=\"area\"><rgb name=\"radiance\" value=\"0.5\"/></emitter></shape>";
+    let text = format!("<scene version=\"3.0.0\">{CAMERA}\n<!-- ---- lamp ---- --->\n{lamp}</scene>");
+    let declared = |encoding: &str| format!("<?xml version=\"1.0\" encoding=\"{encoding}\"?>{text}");
+    let wide = |word: fn(u16) -> [u8; 2], text: &str| -> Vec<u8> {
+        "\u{feff}".encode_utf16().chain(text.encode_utf16()).flat_map(word).collect()
+    };
+    let latin: Vec<u8> =
+        declared("iso-8859-1").replace("lamp ----", "l\u{e4}mp").chars().map(|c| c as u8).collect();
+    for bytes in [
+        text.clone().into_bytes(),
+        declared("utf-8").into_bytes(),
+        format!("\n \n{}", declared("utf-8")).into_bytes(),
+        format!("\u{feff}{}", declared("utf-8")).into_bytes(),
+        format!("<!DOCTYPE scene>{text}").into_bytes(),
+        format!("<!DOCTYPE scene SYSTEM \"a>b\" [\n<!ELEMENT scene ANY>\n]>{text}").into_bytes(),
+        text.replace("\"rectangle\"", "\"rectangle\" type=\"cube\"").into_bytes(),
+        text.replace("<shape", "<shape id=\"salt & pepper\"").into_bytes(),
+        format!("{text}\0").into_bytes(),
+        latin,
+        wide(u16::to_le_bytes, &text),
+        wide(u16::to_be_bytes, &declared("utf-16")),
+    ] {
+        let folder = Folder::new().with("a.xml", &bytes);
+        let loaded = noisefloor_scenefile::load(&folder.path().join("a.xml"));
+        let loaded = loaded.unwrap_or_else(|e| panic!("{}: {e}", String::from_utf8_lossy(&bytes)));
+        crate::util::close(crate::util::look(loaded), [0.5; 3], 1e-4, &String::from_utf8_lossy(&bytes));
     }
 }

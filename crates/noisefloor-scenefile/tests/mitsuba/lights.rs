@@ -230,3 +230,16 @@ fn spots_in_shapes_shine() {
     let beam = format!(r#"{floor}<emitter type="collimated"/>"#);
     assert!(folder.body(&beam).unwrap().warnings[0].what.contains("the beam is ignored"));
 }
+
+/// A Radiance picture begins with `#?` and any word (Ward 1991). Codes 128 with an exponent of 129 are
+/// 128·2^(129 − 136) = 1; 64 are 0.5.
+#[test]
+fn radiance_pictures_begin_with_any_word() {
+    for word in ["RADIANCE", "RGBE", "rtrace 5.4 -vp 0 0 1", ""] {
+        let text = format!("#?{word}\n# made by hand\nFORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 2\n");
+        let sky = [text.as_bytes(), &[128, 64, 0, 129, 128, 64, 0, 129]].concat();
+        let folder = Folder::new().with("sky.hdr", sky);
+        let body = r#"<emitter type="envmap"><string name="filename" value="sky.hdr"/></emitter>"#;
+        close(folder.see(body), [1.0, 0.5, 0.0], 1e-4, word);
+    }
+}

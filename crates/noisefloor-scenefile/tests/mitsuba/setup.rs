@@ -199,7 +199,7 @@ fn references_may_come_first_and_must_not_go_round() {
     let error = folder.body(&format!(
         r#"{chain}<bsdf type="diffuse" id="10000"/><shape type="cube"><ref id="0"/></shape>"#
     ));
-    assert!(error.unwrap_err().contains("17 nested surfaces, more than 16"));
+    assert!(error.unwrap_err().contains("17 nested surfaces and textures, more than 16"));
     // In a texture that is referred to, what is not read is warned of
     let texture = r#"<texture type="checkerboard" id="t"><float name="x" value="1"/></texture>
         <shape type="cube"><bsdf type="diffuse"><ref name="reflectance" id="t"/></bsdf></shape>"#;

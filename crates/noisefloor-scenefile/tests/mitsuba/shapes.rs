@@ -1,4 +1,4 @@
-use crate::util::{Folder, close};
+use crate::util::{CAMERA, Folder, close, look};
 
 const LIGHT: &str = r#"<emitter type="area"><rgb name="radiance" value="1, 2, 3"/></emitter>"#;
 
@@ -255,5 +255,74 @@ fn meshes_without_coordinates_are_mapped_by_their_corners() {
             <string name="filter_type" value="nearest"/></texture></emitter></shape>"#
         ));
         close(seen, [want[0], want[1], 0.0], 1e-3, &format!("{x} {y}"));
+    }
+}
+
+/// The shapes in a `merge` are shapes of the scene, also in groups and by reference.
+#[test]
+fn merged_shapes_are_shapes() {
+    let folder = Folder::new();
+    let lamp = r#"<shape type="rectangle" id="lamp"><emitter type="area"><rgb name="radiance" value="0.5"/></emitter></shape>"#;
+    let aside = r#"<shape type="cube"><transform name="to_world"><translate x="9"/></transform></shape>"#;
+    let merge = format!(r#"<shape type="merge">{lamp}<shape type="merge">{aside}</shape></shape>"#);
+    close(folder.see(&merge), [0.5; 3], 1e-4, "merge");
+    assert_eq!(folder.body(&merge).unwrap().scene.surfaces(), 1 + 12);
+    let group = format!(
+        r#"<shape type="shapegroup" id="g">{merge}</shape><shape type="instance"><ref id="g"/></shape>"#
+    );
+    close(folder.see(&group), [0.5; 3], 1e-4, "group");
+}
+
+/// Mitsuba 3 does not bring the axis of a rotation to the length 1: about 2z, a quarter turn takes (x, y) to
+/// (−2y, 2x), as mitsuba.ScalarTransform4f().rotate([0, 0, 2], 90) says. Version 0.6 does.
+#[test]
+fn long_axes_stretch_as_in_mitsuba_3() {
+    let body = r#"<shape type="rectangle"><transform name="to_world"><rotate z="2" angle="90"/>
+        <translate x="-1.5"/></transform><emitter type="area"><rgb name="radiance" value="0.5"/></emitter></shape>"#;
+    let folder = Folder::new();
+    close(folder.see(body), [0.5; 3], 1e-4, "stretched to x = 0.5");
+    let warnings = folder.body(body).unwrap().warnings;
+    assert!(
+        warnings.len() == 1 && warnings[0].what.contains("an axis of length 2.000 stretches"),
+        "{warnings:?}"
+    );
+    let old = format!("<scene version=\"0.6.0\">{CAMERA}\n{body}</scene>").replace("to_world", "toWorld");
+    close(look(folder.load(&old).unwrap()), [0.0; 3], 1e-4, "ends at x = −0.5");
+}
+
+/// A black U of one polygon before a white sky, over [−1, 1]²: it covers 1 − 0.5·0.75 = 0.625 of 4. Five
+/// standard errors are 5·√(0.156·0.844/4096) = 0.028; a fan from its first corner would cover 0.052 more.
+#[test]
+fn concave_polygons_cover_what_they_enclose() {
+    let corners = [
+        [-0.5, -0.5],
+        [0.5, -0.5],
+        [0.5, 0.5],
+        [0.25, 0.5],
+        [0.25, -0.25],
+        [-0.25, -0.25],
+        [-0.25, 0.5],
+        [-0.5, 0.5],
+    ];
+    let rows: Vec<String> = corners.iter().map(|[x, y]: &[f32; 2]| format!("{x} {y} 0\n")).collect();
+    let obj = rows.iter().map(|row| format!("v {row}")).collect::<String>() + "f 1 2 3 4 5 6 7 8\n";
+    let ply = format!(
+        "ply\nformat ascii 1.0\nelement vertex 8\nproperty float x\nproperty float y\nproperty float z\n\
+         element face 1\nproperty list uchar int vertex_indices\nend_header\n{}8 0 1 2 3 4 5 6 7\n",
+        rows.concat()
+    );
+    let folder = Folder::new().with("u.obj", obj).with("u.ply", ply);
+    let sensor = CAMERA.replace("perspective", "orthographic").replace(
+        r#"<float name="fov" value="0.1"/>"#,
+        r#"<film type="hdrfilm"><integer name="width" value="64"/><integer name="height" value="64"/></film>"#,
+    );
+    for kind in ["obj", "ply"] {
+        let scene = format!(
+            r#"<scene version="3.0.0">{sensor}<emitter type="constant"><rgb name="radiance" value="1"/></emitter>
+            <shape type="{kind}"><string name="filename" value="u.{kind}"/><bsdf type="twosided"><bsdf type="diffuse">
+            <rgb name="reflectance" value="0"/></bsdf></bsdf></shape></scene>"#
+        );
+        let [seen, ..] = look(folder.load(&scene).unwrap());
+        assert!((seen - 0.84375).abs() < 0.028, "{kind}: {seen}");
     }
 }

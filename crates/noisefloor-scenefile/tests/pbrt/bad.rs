@@ -82,6 +82,42 @@ fn odd_spellings_are_read_and_losses_are_named() {
     assert_eq!(loaded.warnings, []);
     let loaded = folder.load_with(&text.replace("\"srgb\"", "\"rec2020\""), &LoadOptions::default()).unwrap();
     assert!(loaded.warnings[0].what.contains("the colour space `rec2020` is ignored"));
+    // What is not read is said, whatever it is a parameter of
+    for (world, want) in [
+        ("Shape \"trianglemesh\" \"point3 P\" [] \"integer indices\" []", "the mesh has no faces"),
+        (
+            "Shape \"trianglemesh\" \"point3 P\" [0 0 0 1 0 0 2 0 0] \"integer indices\" [0 1 2]",
+            "a shape is left out: none of its faces has an area",
+        ),
+        (
+            "Material \"glass\" \"rgb Kr\" [0.5 0.5 0.5] Shape \"sphere\"",
+            "`Kr` of the material `glass` is taken for 1",
+        ),
+        (
+            "Shape \"bilinearmesh\" \"point3 P\" [0 0 0 1 0 0 0 1 0 1 1 0] \"string emissionfilename\" \"a.exr\"",
+            "`emissionfilename` of Shape \"bilinearmesh\" is ignored",
+        ),
+        (
+            "Texture \"t\" \"spectrum\" \"checkerboard\" \"integer dimension\" 3",
+            "a checkerboard in space is laid on by texture coordinates",
+        ),
+        (
+            "Texture \"t\" \"spectrum\" \"checkerboard\" \"string mapping\" \"planar\" \"vector3 v1\" [1 0 0]",
+            "the texture is laid on by texture coordinates",
+        ),
+        (
+            "Shape \"sphere\" \"float alpha\" 0.5 \"float shadowalpha\" 1",
+            "`shadowalpha` of Shape \"sphere\" is ignored",
+        ),
+        ("Option \"bool forcediffuse\" true", "the option `forcediffuse` is ignored"),
+        ("Integrator \"path\" \"bool regularize\" true", "`regularize` of Integrator \"path\" is ignored"),
+    ] {
+        let warnings =
+            folder.world(&format!("{lit}{world}")).unwrap_or_else(|e| panic!("{world}: {e}")).warnings;
+        assert!(warnings.iter().any(|w| w.what == want), "{world}: {warnings:?}");
+    }
+    let same = "Shape \"sphere\" \"float alpha\" 0.5 \"float shadowalpha\" 0.5";
+    assert_eq!(folder.world(&format!("{lit}{same}")).unwrap().warnings, []);
     let metal = "Material \"metal\" \"rgb eta\" [-0.01 1 1] \"rgb k\" [3 3 3] Shape \"sphere\"";
     let loaded = folder.world(&format!("{lit}{metal}")).unwrap();
     assert!(loaded.warnings[0].what.contains("brought into 0…100"), "{:?}", loaded.warnings);

@@ -1,5 +1,6 @@
 use crate::util::Folder;
 use noisefloor_scenefile::load;
+use std::time::{Duration, Instant};
 
 const SCENE: &str = "# everything
 Integrator \"path\" \"integer maxdepth\" [8] Option \"bool disablepixeljitter\" true
@@ -73,7 +74,26 @@ fn what_is_too_large_is_an_error() {
         );
     }
     let bomb = folder.world(&format!("{bomb}NamedMaterial \"0\" Shape \"sphere\"")).unwrap_err();
-    assert!(bomb.contains("17 nested materials, more than 16"), "{bomb}");
+    assert!(bomb.contains("17 nested surfaces and textures, more than 16"), "{bomb}");
+    let itself = "MakeNamedMaterial \"a\" \"string type\" \"mix\" \"string materials\" [\"a\" \"a\"] NamedMaterial \"a\"
+        Shape \"sphere\"";
+    let itself = folder.world(itself).unwrap_err();
+    assert!(itself.contains("the material `mix` refers to itself"), "{itself}");
+    // As deep as may be: each is made once, not twice for each above it, and so is the mean of its picture
+    image::RgbImage::from_pixel(2000, 2000, image::Rgb([99; 3])).save(folder.path().join("a.png")).unwrap();
+    let mut deep = "Texture \"t\" \"spectrum\" \"imagemap\" \"string filename\" \"a.png\"
+        MakeNamedMaterial \"15\" \"string type\" \"dielectric\" \"texture Kt\" \"t\"\n"
+        .to_owned();
+    for i in (0..15).rev() {
+        deep += &format!(
+            "MakeNamedMaterial \"{i}\" \"string type\" \"mix\" \"string materials\" [\"{0}\" \"{0}\"]\n",
+            i + 1
+        );
+    }
+    let start = Instant::now();
+    folder.world(&format!("{deep}NamedMaterial \"0\" Shape \"sphere\"")).unwrap();
+    // 2^15 means of four million pixels took minutes
+    assert!(start.elapsed() < Duration::from_secs(20), "{:?}", start.elapsed());
 
     // 11 levels of one triangle, and ten files in each of eleven that include each other
     let levels = "Shape \"loopsubdiv\" \"integer indices\" [0 1 2] \"point3 P\" [0 0 0 1 0 0 0 1 0] \

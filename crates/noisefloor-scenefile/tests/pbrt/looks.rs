@@ -378,3 +378,117 @@ fn triangles_without_coordinates_are_mapped_by_their_corners() {
         assert!(seen(x, y) < 1e-3, "{x} {y}");
     }
 }
+
+/// pbrt 3 takes spectra as they are: XYZ is the integral of the matching functions over that of ȳ, so that a
+/// flat one of 2 is XYZ (2, 2, 2). Of (1, 1, 1), Rec.709 has [1.2048 0.9483 0.9089], the sums of the rows of
+/// its matrix. pbrt 4 brings it to a luminance of 1, which it nearly has.
+#[test]
+fn spectra_of_lights_are_those_of_their_version() {
+    let folder = Folder::new().with("flat.spd", "# nm, value\r300 2\r800 2\r");
+    let equal = [1.2048f32, 0.9483, 0.9089];
+    let flat = "\"spectrum L\" [300 2 800 2]";
+    let third = equal.map(|c| 2.0 * c);
+    for (light, want) in [
+        (flat, third),
+        ("\"spectrum L\" \"flat.spd\"", third),
+        ("\"xyz L\" [2 2 2]", third),
+        // Its ends stand for all beyond, in any order
+        ("\"spectrum L\" [600 2 500 2]", third),
+        (&format!("{flat} \"rgb scale\" [0.5 1 2]"), [0.5 * third[0], third[1], 2.0 * third[2]]),
+        ("\"rgb L\" [2 2 2]", [2.0; 3]),
+    ] {
+        let sky = format!("LightSource \"infinite\" {light}\n");
+        close(folder.see(&format!("{sky}WorldEnd")), want, 1e-3, light);
+        let area = format!("AreaLightSource \"diffuse\" {light}\n{SQUARE}WorldEnd");
+        close(folder.see(&area), want, 1e-3, light);
+        let distant = format!("LightSource \"distant\" {light} \"point from\" [0 0 1] \"point to\" [0 0 0]");
+        let reflected = want.map(|c| c * 0.5 / std::f32::consts::PI);
+        close(folder.see(&format!("{distant}\n{SQUARE}WorldEnd")), reflected, 2e-3, light);
+        let point = distant.replace("distant", "point").replace("L\"", "I\"");
+        close(folder.see(&format!("{point}\n{SQUARE}WorldEnd")), reflected, 2e-3, light);
+    }
+    // Version 4 has no WorldEnd, but comments and names may
+    let luminance = noisefloor::display::luminance(equal);
+    for text in ["# WorldEnd\n", "Texture \"WorldEnd\" \"float\" \"constant\"\n"] {
+        let sky = format!("{text}LightSource \"infinite\" {flat}");
+        close(folder.see(&sky), equal.map(|c| c / luminance), 1e-3, text);
+    }
+    // So are factors: seen under a white of 1, and of version 4 under D65
+    let kd = format!("{SKY}Material \"matte\" \"spectrum Kd\" [300 0.5 800 0.5]\n{SQUARE}");
+    close(folder.see(&format!("{kd}WorldEnd")), equal.map(|c| 0.5 * c), 5e-3, "matte");
+    let albedo = kd.replace("matte", "diffuse").replace("Kd", "reflectance");
+    close(folder.see(&albedo), [0.5; 3], 5e-3, "diffuse");
+}
+
+/// Rec.709 of their chromaticities (CIE 15:2004) at a luminance of 1: [X Y Z] = [x/y 1 (1 − x − y)/y].
+#[test]
+fn illuminants_have_their_colours() {
+    let folder = Folder::new();
+    for (name, want) in [
+        ("stdillum-A", [1.845, 0.826, 0.233]),
+        ("stdillum-D50", [1.176, 0.976, 0.722]),
+        ("stdillum-D65", [1.0, 1.0, 1.0]),
+        ("stdillum-F2", [1.340, 0.943, 0.563]),
+        ("stdillum-F7", [1.0, 1.0, 0.997]),
+        ("stdillum-F11", [1.412, 0.925, 0.532]),
+        ("illum-acesD60", [1.047, 0.995, 0.916]),
+    ] {
+        let light = format!("\"spectrum L\" \"{name}\" \"float scale\" 2");
+        let want = want.map(|c| 2.0 * c);
+        close(folder.see(&format!("LightSource \"infinite\" {light}")), want, 2e-3, name);
+        close(folder.see(&format!("AreaLightSource \"diffuse\" {light}\n{SQUARE}")), want, 2e-3, name);
+    }
+    let error = folder.world("LightSource \"infinite\" \"spectrum L\" \"stdillum-G\"").unwrap_err();
+    assert!(error.contains("stdillum-G"), "{error}");
+    let albedo = "Material \"diffuse\" \"spectrum reflectance\" \"stdillum-A\" Shape \"sphere\"";
+    let error = folder.world(albedo).unwrap_err();
+    assert!(error.contains("`stdillum-A` as a factor is not supported"), "{error}");
+}
+
+/// Every sample is scaled down to its largest component.
+#[test]
+fn samples_are_bounded_as_the_film_says() {
+    let film = "Film \"rgb\" \"float maxcomponentvalue\" 2\n";
+    let light = "AreaLightSource \"diffuse\" \"rgb L\" [8 1 1]\n";
+    let text = |film: &str| format!("{CAMERA}{film}WorldBegin {light}{SQUARE}");
+    let load = |film: &str| Folder::new().load_with(&text(film), &LoadOptions::default());
+    let loaded = load(film).unwrap();
+    assert_eq!((loaded.clamp, loaded.warnings.len()), (Some(2.0), 1));
+    close(look(loaded, 1)[0], [2.0, 0.25, 0.25], 1e-4, film);
+    close(look(load("").unwrap(), 1)[0], [8.0, 1.0, 1.0], 1e-4, "no film");
+    let error = load("Film \"rgb\" \"float maxcomponentvalue\" 0\n").unwrap_err();
+    assert!(error.contains("`maxcomponentvalue` must be above 0"), "{error}");
+}
+
+/// Files as old programs, Windows and clones write them.
+#[test]
+fn files_are_read_in_any_text_or_named() {
+    let world = format!("# a lamp\n{LIGHT}# its shape\n{SQUARE}");
+    let folder = Folder::new();
+    close(folder.see(&world.replace('\n', "\r")), [1.0, 2.0, 3.0], 1e-4, "CR");
+    close(folder.see(&world.replace('\n', "\r\n")), [1.0, 2.0, 3.0], 1e-4, "CRLF");
+    let wide: Vec<u8> =
+        "\u{feff}".encode_utf16().chain(world.encode_utf16()).flat_map(u16::to_be_bytes).collect();
+    let pointer = "version https://git-lfs.github.com/spec/v1\noid sha256:4d7a\nsize 12345\n";
+    let folder = Folder::new()
+        .with("wide.pbrt", wide)
+        .with("latin.pbrt", [b"# caf\xe9\n".as_slice(), world.as_bytes()].concat())
+        .with("pointer.pbrt", pointer)
+        .with("pointer.ply", pointer)
+        .with(
+            "points.ply",
+            "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\n\
+            property float z\nend_header\n0 0 0\n",
+        );
+    for name in ["wide", "latin"] {
+        close(folder.see(&format!("Include \"{name}.pbrt\"")), [1.0, 2.0, 3.0], 1e-4, name);
+    }
+    for (world, want) in [
+        ("Include \"pointer.pbrt\"", "pointer.pbrt: this is a Git LFS pointer"),
+        ("Shape \"plymesh\" \"string filename\" \"pointer.ply\"", "pointer.ply: this is a Git LFS pointer"),
+        ("Shape \"plymesh\" \"string filename\" \"points.ply\"", "points.ply: the PLY file has no faces"),
+    ] {
+        let error = folder.world(world).unwrap_err();
+        assert!(error.contains(want), "{world}: {error}");
+    }
+}

@@ -47,7 +47,7 @@ impl Folder {
 
 /// What the camera of a scene sees, in `side`×`side` pixels.
 pub(crate) fn look(loaded: Loaded, side: usize) -> Vec<Rgb> {
-    let options = RenderOptions { seed: 1, ..RenderOptions::default() };
+    let options = RenderOptions { seed: 1, clamp: loaded.clamp, ..RenderOptions::default() };
     let mut source = Ptwne::new(loaded.scene, side, side, options).unwrap();
     let tile = TileGrid::new(side, side, 64).unwrap().tile(0);
     source.sample(&[Request::new(tile, 0, 4096)]).unwrap()[0].mean.clone()
