@@ -1,0 +1,82 @@
+// A page that renders a glTF model with three-gpu-pathtracer, and stops when nobody sees noise. What noisefloor costs
+// stands between the two lines; the rest is what such a page has anyway, and the map of tiles.
+
+import { ACESFilmicToneMapping, Color, PerspectiveCamera, Scene, WebGLRenderer } from "three";
+import { GLTFLoader } from "three/addons/loaders/GLTFLoader.js";
+import { GradientEquirectTexture, WebGLPathTracer } from "three-gpu-pathtracer";
+import { toneMappingOf, viewing } from "noisefloor";
+import { drawTiles } from "./tiles.js";
+
+const query = new URLSearchParams(location.search);
+const size = Number(query.get("size") ?? 512);
+const status = document.querySelector("#status");
+
+const renderer = new WebGLRenderer({ antialias: false });
+renderer.setPixelRatio(devicePixelRatio);
+renderer.setSize(size, size);
+renderer.toneMapping = ACESFilmicToneMapping;
+document.querySelector("#picture").prepend(renderer.domElement);
+
+const pathTracer = new WebGLPathTracer(renderer);
+pathTracer.tiles.set(1, 1); // every pixel has as many samples when it is read
+pathTracer.bounces = 3;
+pathTracer.transmissiveBounces = 0;
+pathTracer.multipleImportanceSampling = false; // a sky without a sun needs none
+pathTracer.renderDelay = 0;
+pathTracer.fadeDuration = 0;
+pathTracer.minSamples = 1;
+
+const { scene: model, cameras } = await new GLTFLoader().loadAsync(new URL("./model.gltf", import.meta.url).href);
+const scene = new Scene().add(model);
+const sky = new GradientEquirectTexture(16);
+sky.topColor.set(0xdfe9f5);
+sky.bottomColor.set(0x8d8478);
+sky.update();
+scene.environment = sky;
+scene.background = new Color(0xc8d0da);
+const camera = cameras[0] ?? new PerspectiveCamera();
+camera.aspect = 1;
+camera.updateProjectionMatrix();
+pathTracer.setScene(scene, camera);
+
+// ---- noisefloor
+const { width, height } = renderer.domElement;
+const judge = new Worker(new URL("./judge.js", import.meta.url), { type: "module" });
+const options = { toneMapping: toneMappingOf(renderer), viewing: viewing({ canvas: renderer.domElement }) };
+judge.postMessage({ width, height, options: { ...options, tile: Number(query.get("tile") ?? 64) } });
+let next = Infinity; // samples per pixel at which the judge wants to see the picture
+judge.onmessage = ({ data }) => {
+  next = data.next;
+  pathTracer.pausePathTracing ||= data.isDone;
+  show(data);
+};
+function read() {
+  if (pathTracer.samples < next) return;
+  next = Infinity;
+  const pixels = new Float32Array(4 * width * height);
+  renderer.readRenderTargetPixels(pathTracer.target, 0, 0, width, height, pixels);
+  judge.postMessage({ pixels, spp: pathTracer.samples }, [pixels.buffer]);
+}
+// ----
+
+let state = { states: [], warnings: [] };
+function show(data) {
+  state = data;
+  const done = data.states.filter(({ reason }) => reason !== "open").length;
+  status.dataset.done = data.isDone ?? false;
+  drawTiles(document.querySelector("#tiles"), width, height, data.states);
+  window.noisefloor = { ...data, done, samples: pathTracer.samples };
+}
+
+function frame() {
+  pathTracer.renderSample();
+  read();
+  const { states, error, warnings, isDone } = state;
+  const done = states.filter(({ reason }) => reason !== "open").length;
+  const progress = `${Math.round(pathTracer.samples)} samples per pixel, ${done} of ${states.length} tiles done`;
+  status.textContent = [error ?? progress, ...warnings].join(" · ") + (isDone ? " · finished" : "");
+  if (!error) requestAnimationFrame(frame);
+}
+const checkbox = document.querySelector("#show");
+checkbox.onchange = () => document.querySelector("#tiles").classList.toggle("hidden", !checkbox.checked);
+frame();
