@@ -19,8 +19,7 @@ document.querySelector("#picture").prepend(renderer.domElement);
 
 const pathTracer = new WebGLPathTracer(renderer);
 pathTracer.tiles.set(1, 1); // every pixel has as many samples when it is read
-pathTracer.bounces = 3;
-pathTracer.transmissiveBounces = 0;
+pathTracer.bounces = 4;
 pathTracer.multipleImportanceSampling = false; // a sky without a sun needs none
 pathTracer.renderDelay = 0;
 pathTracer.fadeDuration = 0;
@@ -40,6 +39,8 @@ camera.updateProjectionMatrix();
 pathTracer.setScene(scene, camera);
 
 // ---- noisefloor
+// By default all pixels have the same random numbers, turned by a blue noise: 1 is Sobol points, 0 independent numbers
+pathTracer._pathTracer.material.setDefine("RANDOM_TYPE", 0);
 const { width, height } = renderer.domElement;
 const judge = new Worker(new URL("./judge.js", import.meta.url), { type: "module" });
 const options = { toneMapping: toneMappingOf(renderer), viewing: viewing({ canvas: renderer.domElement }) };
