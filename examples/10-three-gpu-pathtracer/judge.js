@@ -3,14 +3,11 @@
 import { Session } from "noisefloor";
 
 let session;
-onmessage = async ({ data }) => {
-  try {
-    if (data.options) session = await Session.open(data.width, data.height, data.options);
-    else session.pushRunning(data.pixels, { spp: data.spp, fromBottom: true });
-    session.judge();
-    const next = Math.min(...session.requests().map(({ first, spp }) => first + spp));
-    postMessage({ next, states: session.states(), warnings: session.warnings(), isDone: session.isDone });
-  } catch (error) {
-    postMessage({ next: Infinity, states: [], warnings: [], error: error.message });
-  }
+onmessage = async ({ data: { open, pixels, spp } }) => {
+  session ??= await Session.open(...open);
+  if (pixels) session.pushRunning(pixels, { spp, fromBottom: true });
+  session.judge();
+  const { nextSpp: next, isDone } = session;
+  postMessage({ next, isDone, states: session.states(), warnings: session.warnings() });
 };
+addEventListener("unhandledrejection", ({ reason }) => postMessage({ next: Infinity, error: reason.message }));

@@ -19,7 +19,7 @@ document.querySelector("#picture").prepend(renderer.domElement);
 
 const pathTracer = new WebGLPathTracer(renderer);
 pathTracer.tiles.set(1, 1); // every pixel has as many samples when it is read
-pathTracer.bounces = 4;
+pathTracer.bounces = 3;
 pathTracer.multipleImportanceSampling = false; // a sky without a sun needs none
 pathTracer.renderDelay = 0;
 pathTracer.fadeDuration = 0;
@@ -28,8 +28,8 @@ pathTracer.minSamples = 1;
 const { scene: model, cameras } = await new GLTFLoader().loadAsync(new URL("./model.gltf", import.meta.url).href);
 const scene = new Scene().add(model);
 const sky = new GradientEquirectTexture(16);
-sky.topColor.set(0xdfe9f5);
-sky.bottomColor.set(0x8d8478);
+sky.topColor.set(0xdde6f0);
+sky.bottomColor.set(0xb5afa6);
 sky.update();
 scene.environment = sky;
 scene.background = new Color(0xc8d0da);
@@ -37,41 +37,35 @@ const camera = cameras[0] ?? new PerspectiveCamera();
 camera.aspect = 1;
 camera.updateProjectionMatrix();
 pathTracer.setScene(scene, camera);
+const { width, height } = renderer.domElement;
 
 // ---- noisefloor
 // By default all pixels have the same random numbers, turned by a blue noise: 1 is Sobol points, 0 independent numbers
 pathTracer._pathTracer.material.setDefine("RANDOM_TYPE", 0);
-const { width, height } = renderer.domElement;
 const judge = new Worker(new URL("./judge.js", import.meta.url), { type: "module" });
-const options = { toneMapping: toneMappingOf(renderer), viewing: viewing({ canvas: renderer.domElement }) };
-judge.postMessage({ width, height, options: { ...options, tile: Number(query.get("tile") ?? 64) } });
+const seen = viewing({ canvas: renderer.domElement, distance: Number(query.get("distance") ?? 0.6) });
+const options = { toneMapping: toneMappingOf(renderer), viewing: seen, tile: Number(query.get("tile") ?? 64) };
+judge.postMessage({ open: [width, height, options] });
 let next = Infinity; // samples per pixel at which the judge wants to see the picture
-judge.onmessage = ({ data }) => {
-  next = data.next;
-  pathTracer.pausePathTracing ||= data.isDone;
-  show(data);
-};
+judge.onmessage = ({ data }) => ({ next, isDone: pathTracer.pausePathTracing = false } = data);
+const pixels = new Float32Array(4 * width * height);
 function read() {
-  if (pathTracer.samples < next) return;
-  next = Infinity;
-  const pixels = new Float32Array(4 * width * height);
+  next = Infinity; // until the judge has answered
   renderer.readRenderTargetPixels(pathTracer.target, 0, 0, width, height, pixels);
-  judge.postMessage({ pixels, spp: pathTracer.samples }, [pixels.buffer]);
+  judge.postMessage({ pixels, spp: pathTracer.samples });
 }
 // ----
 
 let state = { states: [], warnings: [] };
-function show(data) {
-  state = data;
-  const done = data.states.filter(({ reason }) => reason !== "open").length;
-  status.dataset.done = data.isDone ?? false;
-  drawTiles(document.querySelector("#tiles"), width, height, data.states);
-  window.noisefloor = { ...data, done, samples: pathTracer.samples };
-}
+judge.addEventListener("message", ({ data }) => {
+  state = { ...state, ...data };
+  drawTiles(document.querySelector("#tiles"), width, height, state.states);
+  window.noisefloor = state; // for the test
+});
 
 function frame() {
   pathTracer.renderSample();
-  read();
+  if (pathTracer.samples >= next) read(); // noisefloor
   const { states, error, warnings, isDone } = state;
   const done = states.filter(({ reason }) => reason !== "open").length;
   const progress = `${Math.round(pathTracer.samples)} samples per pixel, ${done} of ${states.length} tiles done`;

@@ -159,6 +159,8 @@ export class Session {
   readonly tiles: readonly Tile[];
   /** What the open tiles need next. */
   requests(): Request[];
+  /** For renderers of whole frames: samples per pixel at which a tile wants the next push; Infinity when all are done. */
+  readonly nextSpp: number;
   /** Adds the mean of `spp` new samples per pixel. */
   push(pixels: ArrayLike<number>, batch: Layout & { spp: number }): void;
   /** Adds what is new in the mean of all `spp` samples per pixel so far. */

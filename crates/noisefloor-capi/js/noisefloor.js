@@ -451,6 +451,10 @@ export class Session {
     return this.#many("NfRequest", "nf_session_requests", false);
   }
 
+  get nextSpp() {
+    return Math.min(...this.requests().map(({ first, spp }) => first + spp));
+  }
+
   push(pixels, { spp, ...place }) {
     this.#push("nf_session_push", pixels, whole(spp, "spp"), place);
   }

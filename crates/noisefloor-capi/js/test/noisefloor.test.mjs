@@ -39,6 +39,8 @@ test("a picture is rendered until all tiles are done", () => {
   assert.deepEqual(session.tiles[8], { index: 8, x: 64, y: 64, width: 32, height: 16 });
   const random = noise(7);
   const stops = [];
+  const [{ first, spp }] = session.requests();
+  assert.equal(session.nextSpp, first + spp);
   while (!session.isDone) {
     for (const { tile, first, spp } of session.requests()) {
       assert.equal(first, session.states()[tile.index].spp);
@@ -52,6 +54,7 @@ test("a picture is rendered until all tiles are done", () => {
     stops.sort((a, b) => a.tile.index - b.tile.index),
   );
   assert.ok(stops.every(({ reason }) => ["converged", "maxSpp"].includes(reason)));
+  assert.equal(session.nextSpp, Infinity);
   const [image, map] = [session.image(), session.visibleNoise()];
   assert.deepEqual([image.length, map.length], [3 * 96 * 80, 96 * 80]);
   assert.ok(Math.abs(image.reduce((sum, x) => sum + x) / image.length - 0.5) < 1e-3);
