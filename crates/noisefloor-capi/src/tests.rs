@@ -266,9 +266,7 @@ fn a_tone_table_shows_what_it_says() {
     let table: Vec<f32> = places.flatten().map(entry).collect();
     let set = |session: &Handle, exposure, toe, top, edge| {
         // SAFETY: a living handle, and an array of the size given.
-        unsafe {
-            nf_session_set_tone_table(session.0, exposure, toe, top, table.as_ptr(), table.len(), edge)
-        }
+        unsafe { nf_session_set_tone_table(session.0, exposure, toe, top, table.as_ptr(), table.len(), edge) }
     };
     let by_table = session(&params());
     for (exposure, toe, top, edge, said) in [

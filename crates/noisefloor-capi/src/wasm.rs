@@ -31,6 +31,8 @@ pub unsafe extern "C" fn nf_dealloc(pointer: *mut u8, bytes: usize) {
 pub(crate) fn keep_last_words() {
     static HOOK: Once = Once::new();
     HOOK.call_once(|| {
-        std::panic::set_hook(Box::new(|panic| set_last_error(&format!("noisefloor made a mistake: {panic}"))));
+        std::panic::set_hook(Box::new(|panic| {
+            set_last_error(&format!("noisefloor made a mistake: {panic}"))
+        }));
     });
 }

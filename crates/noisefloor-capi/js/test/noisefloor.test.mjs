@@ -129,6 +129,46 @@ test("running means are what single batches are", () => {
   running.close();
 });
 
+/** As three-gpu-pathtracer blends samples on the GPU: mean += (sample - mean) / n, rounded to single precision. */
+test("a mean that was blended sample by sample is as good as batches", () => {
+  const pixels = 64 * 64;
+  const light = Float32Array.from({ length: 3 * pixels }, (_, i) => 0.05 + ((i / 3) % 64) / 80);
+  const [batches, blended] = [0, 1].map(() => new Session(64, 64, { tile: 32, maxSpp: 3000 }));
+  const [mean, sum] = [new Float32Array(3 * pixels), new Float64Array(3 * pixels)];
+  const random = noise(11);
+  let [spp, pushed, largest] = [0, 0, 0];
+  while (!batches.isDone) {
+    spp++;
+    for (let i = 0; i < mean.length; i++) {
+      // One sample in four finds the light
+      const u = random();
+      const sample = u > 0.5 ? Math.fround(8 * light[i] * (u - 0.5)) : 0;
+      sum[i] += sample;
+      mean[i] = Math.fround(mean[i] * Math.fround(1 - 1 / spp)) + Math.fround(sample * Math.fround(1 / spp));
+    }
+    if (spp < batches.nextSpp) continue;
+    batches.push(sum.map((x) => x / (spp - pushed)), { spp: spp - pushed });
+    blended.pushRunning(mean, { spp });
+    sum.fill(0);
+    pushed = spp;
+    batches.judge();
+    blended.judge();
+    const states = blended.states();
+    for (const { tile, probability, reason } of batches.states()) {
+      assert.equal(states[tile.index].reason, reason);
+      if (probability === null) continue;
+      largest = Math.max(largest, Math.abs(probability - states[tile.index].probability));
+    }
+  }
+  const stops = batches.stops().map((stop) => stop.spp);
+  console.log(`stops after ${stops} samples; P differs by ${largest.toExponential(1)}`);
+  assert.ok(batches.stops().every(({ reason }) => reason === "converged") && Math.min(...stops) > 300);
+  // Rounding of the mean is 2^-24 of it, and of a batch in it at most n / batch times that: nothing beside noise
+  assert.ok(largest < 1e-3);
+  batches.close();
+  blended.close();
+});
+
 test("errors have the words of Rust", () => {
   const session = new Session(64, 32, options);
   const floats = new Float32Array(3 * 64 * 32).fill(0.5);

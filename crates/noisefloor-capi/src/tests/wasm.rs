@@ -94,7 +94,8 @@ fn record(seed: u64, transcript: &mut Transcript) {
         exposure: if srgb { exposure } else { 1.0 },
         ..NfParams::default()
     };
-    let tone = if srgb { format!("{{\"curve\": \"linear\", \"exposure\": {exposure}}}") } else { "{}".into() };
+    let tone =
+        if srgb { format!("{{\"curve\": \"linear\", \"exposure\": {exposure}}}") } else { "{}".into() };
     let schedule = ["every", "spaced", "growing"][schedule as usize];
     transcript.words(&[width as u32, height as u32]);
     transcript.text(&format!(
