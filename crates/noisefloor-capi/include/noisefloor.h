@@ -114,9 +114,9 @@ typedef struct {
     uint32_t tile;
     // When tiles are judged: NF_SCHEDULE_SPACED (default), _EVERY or _GROWING.
     uint32_t schedule;
-    // The step of the schedule in samples per pixel, at least 2. Default: 10.
+    // The step of the schedule in samples per pixel, at least 2. Default: 8.
     uint64_t step;
-    // Fewest samples per pixel at which a tile may stop. Default: 100.
+    // Fewest samples per pixel at which a tile may stop. Default: 16.
     uint64_t min_spp;
     // Samples per pixel at which every tile stops, at least 2. Default: 10000.
     uint64_t max_spp;

@@ -79,9 +79,9 @@ export interface SessionOptions {
   tile?: number;
   /** When tiles are judged: "spaced" unless given. */
   schedule?: "every" | "spaced" | "growing";
-  /** The step of the schedule in samples per pixel. */
+  /** The step of the schedule in samples per pixel: 8 unless given. */
   step?: number;
-  /** Fewest samples per pixel at which a tile may stop: 100 unless given. */
+  /** Fewest samples per pixel at which a tile may stop: 16 unless given. */
   minSpp?: number;
   /** Samples per pixel at which every tile stops: 10000 unless given. */
   maxSpp?: number;

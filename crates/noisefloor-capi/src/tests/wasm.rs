@@ -132,7 +132,6 @@ fn record(seed: u64, transcript: &mut Transcript) {
                 }
             }
             let floats = mean.len();
-            // SAFETY: a living handle, and arrays of the sizes given.
             let status = if running && !holes {
                 let (total, sum): &mut (u64, Vec<f64>) = &mut sums[tile.index];
                 *total += spp;
@@ -141,10 +140,12 @@ fn record(seed: u64, transcript: &mut Transcript) {
                 let mean: Vec<f32> = sum.iter().map(|sum| (sum / *total as f64) as f32).collect();
                 transcript.words(&[2, tile.index as u32, *total as u32]);
                 transcript.floats(&mean);
+                // SAFETY: a living handle, and an array of the size given.
                 unsafe { nf_session_push_running(session.0, tile.index, *total, mean.as_ptr(), floats) }
             } else {
                 transcript.words(&[1, tile.index as u32, spp as u32]);
                 transcript.floats(&mean);
+                // SAFETY: as above.
                 unsafe { nf_session_push(session.0, tile.index, spp, mean.as_ptr(), floats) }
             };
             assert_eq!(status, NfStatus::Ok, "{}", message());
