@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
-# Makes the package for npm from the work tree: release/npm.sh FOLDER [--debian]. The second word goes to build.sh of
-# crates/noisefloor-capi/js. The package is installed into an empty folder at last, and judges a tile there.
+# Makes the package for npm from the work tree: release/npm.sh FOLDER [--debian]. The second word goes to
+# build.sh of crates/noisefloor-capi/js. The package is installed into an empty folder at last, and judges a
+# tile there.
 set -euo pipefail
 folder=$(mkdir -p "$1" && cd "$1" && pwd)
 js=$(cd "$(dirname "$0")/../crates/noisefloor-capi/js" && pwd)
@@ -33,6 +34,7 @@ while (!session.isDone) {
 const [{ reason, spp }] = session.stops();
 session.close();
 const { version: packed } = JSON.parse(readFileSync("node_modules/noisefloor/package.json"));
-if (reason !== "converged" || version() !== packed) throw new Error(`${reason} at ${spp}, ${version()} in ${packed}`);
+const isRight = reason === "converged" && version() === packed;
+if (!isRight) throw new Error(`${reason} at ${spp}, ${version()} in ${packed}`);
 '
 echo "$folder/$file"

@@ -10,4 +10,4 @@ onmessage = async ({ data: { open, pixels, spp } }) => {
   const { nextSpp: next, isDone } = session;
   postMessage({ next, isDone, states: session.states(), warnings: session.warnings() });
 };
-addEventListener("unhandledrejection", ({ reason }) => postMessage({ next: Infinity, error: reason.message }));
+addEventListener("unhandledrejection", ({ reason }) => postMessage({ error: reason.message }));

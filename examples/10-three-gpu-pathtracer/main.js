@@ -1,5 +1,6 @@
-// A page that renders a glTF model with three-gpu-pathtracer, and stops when nobody sees noise. What noisefloor costs
-// stands between the two lines; the rest is what such a page has anyway, and the map of tiles.
+// A page that renders a glTF model with three-gpu-pathtracer, and stops when nobody sees noise. What
+// noisefloor costs stands between the two lines; the rest is what such a page has anyway, and the map of
+// tiles.
 
 import { ACESFilmicToneMapping, Color, PerspectiveCamera, Scene, WebGLRenderer } from "three";
 import { GLTFLoader } from "three/addons/loaders/GLTFLoader.js";
@@ -9,6 +10,7 @@ import { drawTiles } from "./tiles.js";
 
 const query = new URLSearchParams(location.search);
 const size = Number(query.get("size") ?? 512);
+const tile = Number(query.get("tile") ?? 64);
 const status = document.querySelector("#status");
 
 const renderer = new WebGLRenderer({ antialias: false });
@@ -25,7 +27,9 @@ pathTracer.renderDelay = 0;
 pathTracer.fadeDuration = 0;
 pathTracer.minSamples = 1;
 
-const { scene: model, cameras } = await new GLTFLoader().loadAsync(new URL("./model.gltf", import.meta.url).href);
+const { scene: model, cameras } = await new GLTFLoader().loadAsync(
+  new URL("./model.gltf", import.meta.url).href,
+);
 const scene = new Scene().add(model);
 const sky = new GradientEquirectTexture(16);
 sky.topColor.set(0xdde6f0);
@@ -40,11 +44,11 @@ pathTracer.setScene(scene, camera);
 const { width, height } = renderer.domElement;
 
 // ---- noisefloor
-// By default all pixels have the same random numbers, turned by a blue noise: 1 is Sobol points, 0 independent numbers
+// Independent random numbers; by default all pixels have the same ones, turned by a blue noise
 pathTracer._pathTracer.material.setDefine("RANDOM_TYPE", 0);
 const judge = new Worker(new URL("./judge.js", import.meta.url), { type: "module" });
 const seen = viewing({ canvas: renderer.domElement, distance: Number(query.get("distance") ?? 0.6) });
-const options = { toneMapping: toneMappingOf(renderer), viewing: seen, tile: Number(query.get("tile") ?? 64) };
+const options = { toneMapping: toneMappingOf(renderer), viewing: seen, tile };
 judge.postMessage({ open: [width, height, options] });
 let next = Infinity; // samples per pixel at which the judge wants to see the picture
 judge.onmessage = ({ data }) => ({ next, isDone: pathTracer.pausePathTracing = false } = data);
@@ -68,7 +72,8 @@ function frame() {
   if (pathTracer.samples >= next) read(); // noisefloor
   const { states, error, warnings, isDone } = state;
   const done = states.filter(({ reason }) => reason !== "open").length;
-  const progress = `${Math.round(pathTracer.samples)} samples per pixel, ${done} of ${states.length} tiles done`;
+  const samples = Math.round(pathTracer.samples);
+  const progress = `${samples} samples per pixel, ${done} of ${states.length} tiles done`;
   status.textContent = [error ?? progress, ...warnings].join(" · ") + (isDone ? " · finished" : "");
   if (!error) requestAnimationFrame(frame);
 }

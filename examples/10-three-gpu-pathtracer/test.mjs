@@ -1,5 +1,5 @@
-// The example as Vite builds it, the package without a bundler, and its tone curves against three.js' own shader: in
-// Chromium, whose SwiftShader needs no GPU.
+// The example as Vite builds it, the package without a bundler, and its tone curves against three.js' own
+// shader: in Chromium, whose SwiftShader needs no GPU.
 
 import assert from "node:assert/strict";
 import { spawnSync } from "node:child_process";
@@ -182,7 +182,9 @@ test("tone curves are those of three.js' shader", async (t) => {
       let worst = 0;
       for (let i = 0; i < size * size; i++) {
         const colour = [0, 1, 2].map((c) => exposure * colours[4 * i + c]);
-        ours(colour).forEach((x, c) => (worst = Math.max(worst, Math.abs(clamp(x) - clamp(shown[4 * i + c])))));
+        ours(colour).forEach(
+          (x, c) => (worst = Math.max(worst, Math.abs(clamp(x) - clamp(shown[4 * i + c])))),
+        );
       }
       found[name] = worst;
     }
@@ -191,5 +193,6 @@ test("tone curves are those of three.js' shader", async (t) => {
   console.log(largest);
   assert.equal(Object.keys(largest).length, 6);
   // Shaders compute in single precision, and powers less exactly
-  for (const [name, difference] of Object.entries(largest)) assert.ok(difference < 2e-4, `${name}: ${difference}`);
+  for (const [name, difference] of Object.entries(largest))
+    assert.ok(difference < 2e-4, `${name}: ${difference}`);
 });

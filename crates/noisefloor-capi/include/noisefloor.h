@@ -271,9 +271,9 @@ NfStatus nf_session_judge(const NfSession *session,
 // Displays radiance by a table of the caller's own, such as a filmic curve, before the first verdict: then
 // tone_mapping and exposure of NfParams count no more. table has edge entries along each axis, 2 to 65, red
 // fastest: floats = 3 * edge^3 display values (sRGB-encoded red, green and blue, 0 to 1). Radiance x, times
-// exposure, lies at s(1 + x / toe) / s(1 + top / toe) of an axis, where s(2^n * (1 + f)) = n + f is log2 made
-// linear between powers of two: 0 is the first entry and top, or more, the last. Between entries values are
-// interpolated linearly. Tables are kept until the program ends, each once.
+// exposure, lies at s(1 + x / toe) / s(1 + top / toe) of an axis, where s(2^n * (1 + f)) = n + f is log2
+// made linear between powers of two: 0 is the first entry and top, or more, the last. Between entries
+// values are interpolated linearly. Tables are kept until the program ends, each once.
 NfStatus nf_session_set_tone_table(const NfSession *session,
                                    float exposure,
                                    float toe,

@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
-# Builds noisefloor.wasm beside noisefloor.js, with the standard library of `rustup target add wasm32-unknown-unknown`.
-# Where that cannot be downloaded: `build.sh --debian` takes a compiler and the sources of its standard library from
-# Debian's packages (rustc-web), unpacks them below target/ and compiles both.
+# Builds noisefloor.wasm beside noisefloor.js, with the standard library of `rustup target add
+# wasm32-unknown-unknown`. Where that cannot be downloaded: `build.sh --debian` takes a compiler and the
+# sources of its standard library from Debian's packages (rustc-web), unpacks them below target/ and
+# compiles both.
 set -euo pipefail
 here=$(cd "$(dirname "$0")" && pwd)
 cd "$here/../../.."

@@ -11,7 +11,10 @@ export function version(): string;
 
 /** What Rust says went wrong. */
 export class NoisefloorError extends Error {
-  /** Without the prefix, an NfStatus of noisefloor.h, such as "FAULT" if samples cannot be what they should be. */
+  /**
+   * Without the prefix, an NfStatus of noisefloor.h, such as "FAULT" if samples cannot be what they should
+   * be.
+   */
   readonly code:
     | "NULL_POINTER"
     | "ARGUMENT"
@@ -42,7 +45,9 @@ export const curves: Readonly<Record<"reinhard" | "cineon" | "aces" | "agx" | "n
 export type ToneMapping =
   /** A curve of three.js, or one of your own, and its exposure (1 unless given). */
   | { curve: "linear" | keyof typeof curves | Curve; exposure?: number }
-  /** The photographic operator, with an exposure by the log-average of the picture (key 0.18 unless given). */
+  /**
+   * The photographic operator, with an exposure by the log-average of the picture (key 0.18 unless given).
+   */
   | { curve?: undefined; key?: number; white?: number };
 
 /** The tone mapping of a renderer of three.js. */
@@ -89,7 +94,9 @@ export interface SessionOptions {
   consecutive?: number;
   /** Whose thresholds, as a line from those of the observers in the training data. */
   audience?: { slope: number; offset: number };
-  /** On which screen the picture is seen, and from how far: "desk" (unless given), `viewing()`, or any text. */
+  /**
+   * On which screen the picture is seen, and from how far: "desk" (unless given), `viewing()`, or any text.
+   */
   viewing?: string;
   toneMapping?: ToneMapping;
   /** Whether neighbouring pixels have noise in common, as with a pixel filter: no warning says so then. */
@@ -135,7 +142,10 @@ export interface TileState {
 
 /** How pixels lie in an array. */
 export interface Layout {
-  /** The tile that the pixels are of, or its number. Without: the whole picture, and every tile takes its part. */
+  /**
+   * The tile that the pixels are of, or its number. Without: the whole picture, and every tile takes its
+   * part.
+   */
   tile?: Tile | number;
   /** Floats of a pixel, of which the first three are red, green and blue: by the length unless given. */
   channels?: 3 | 4;
@@ -146,8 +156,9 @@ export interface Layout {
 }
 
 /**
- * Film, oracle and limits of one picture. It belongs to the thread that made it; a worker may have one of its own.
- * Memory is freed by `close()`, by `using`, or, with a warning on the console, some time after it was forgotten.
+ * Film, oracle and limits of one picture. It belongs to the thread that made it; a worker may have one of
+ * its own. Memory is freed by `close()`, by `using`, or, with a warning on the console, some time after it
+ * was forgotten.
  */
 export class Session {
   /** Loads the module if need be. */
@@ -159,7 +170,10 @@ export class Session {
   readonly tiles: readonly Tile[];
   /** What the open tiles need next. */
   requests(): Request[];
-  /** For renderers of whole frames: samples per pixel at which a tile wants the next push; Infinity when all are done. */
+  /**
+   * For renderers of whole frames: samples per pixel at which a tile wants the next push; Infinity when all
+   * are done.
+   */
   readonly nextSpp: number;
   /** Adds the mean of `spp` new samples per pixel. */
   push(pixels: ArrayLike<number>, batch: Layout & { spp: number }): void;

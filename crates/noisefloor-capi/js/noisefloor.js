@@ -1,5 +1,5 @@
-// noisefloor for JavaScript: sessions, over the WebAssembly of noisefloor-capi. noisefloor.d.ts documents what is
-// exported. In this order: the module and its memory, errors, viewing, tone mappings, sessions.
+// noisefloor for JavaScript: sessions, over the WebAssembly of noisefloor-capi. noisefloor.d.ts documents
+// what is exported. In this order: the module and its memory, errors, viewing, tone mappings, sessions.
 
 /** The module: what noisefloor.h declares, and `nf_alloc` and `nf_dealloc`. */
 let wasm = null;
@@ -141,8 +141,11 @@ function out(type, call) {
 
 // Errors
 
-const STATUS =
-  "OK NULL_POINTER ARGUMENT SIZE BATCH MODEL CRITERION CHECKPOINT IO UNAVAILABLE INTERNAL MEMORY FAULT HANDLE";
+/** By number, as NfStatus has them. */
+export const STATUS = [
+  ..."OK NULL_POINTER ARGUMENT SIZE BATCH MODEL CRITERION CHECKPOINT".split(" "),
+  ..."IO UNAVAILABLE INTERNAL MEMORY FAULT HANDLE".split(" "),
+];
 
 export class NoisefloorError extends Error {
   constructor(code, message, options) {
@@ -162,7 +165,7 @@ function call(name, ...values) {
     // A panic, which cannot unwind here
     throw new NoisefloorError("INTERNAL", text(wasm.nf_last_error()) || cause.message, { cause });
   }
-  if (status) throw new NoisefloorError(STATUS.split(" ")[status] ?? "INTERNAL", text(wasm.nf_last_error()));
+  if (status) throw new NoisefloorError(STATUS[status] ?? "INTERNAL", text(wasm.nf_last_error()));
 }
 
 // Viewing
@@ -240,10 +243,13 @@ function agx(colour) {
   // Stops around middle grey: 0.18 * 2^-10 to 0.18 * 2^6.5
   const [low, high] = [-12.47393, 4.026069];
   const sigmoid = (x) =>
-    ((((((15.5 * x - 40.14) * x + 31.96) * x - 6.868) * x + 0.4298) * x + 0.1191) * x) - 0.00232;
+    (((((15.5 * x - 40.14) * x + 31.96) * x - 6.868) * x + 0.4298) * x + 0.1191) * x - 0.00232;
   const logarithm = (x) => clamp((Math.log2(Math.max(x, 1e-10)) - low) / (high - low));
   const looked = each(times(inset, times(toRec2020, colour)), (x) => sigmoid(logarithm(x)));
-  return times(fromRec2020, each(times(outset, looked), (x) => Math.max(0, x) ** 2.2));
+  return times(
+    fromRec2020,
+    each(times(outset, looked), (x) => Math.max(0, x) ** 2.2),
+  );
 }
 
 /** Khronos PBR Neutral (2024). */
@@ -268,7 +274,10 @@ const OF_THREE = ["linear", "linear", "reinhard", "cineon", "aces", undefined, "
 export function toneMappingOf({ toneMapping, toneMappingExposure }) {
   const curve = OF_THREE[toneMapping];
   if (!curve) {
-    throw new NoisefloorError("ARGUMENT", `tone mapping ${toneMapping} of three.js has no curve: give your own`);
+    throw new NoisefloorError(
+      "ARGUMENT",
+      `tone mapping ${toneMapping} of three.js has no curve: give your own`,
+    );
   }
   return { curve, exposure: toneMapping === 0 ? 1 : toneMappingExposure };
 }
@@ -309,7 +318,9 @@ export function toneTable(curve) {
 
 // Sessions
 
-/** Share of people who see no noise in a tile that is done. What the header calls it today stands here alone. */
+/**
+ * Share of people who see no noise in a tile that is done. What the header calls it today stands here alone.
+ */
 const PEOPLE = 0.95;
 const withOracle = (people, use) => {
   const oracle = out("size_t", (at) => call("nf_oracle_bundled", people, at));
@@ -320,8 +331,9 @@ const withOracle = (people, use) => {
   }
 };
 
-const SCHEDULES = ["every", "spaced", "growing"];
-const REASONS = ["open", "converged", "maxSpp", "timeLimit", "cancelled", "failed"];
+/** By number, as the header has them; so are reasons. */
+export const SCHEDULES = ["every", "spaced", "growing"];
+export const REASONS = ["open", "converged", "maxSpp", "timeLimit", "cancelled", "failed"];
 const SRGB = 1;
 
 const position = (names, name, what) => {
@@ -385,7 +397,11 @@ export class Session {
         });
       }),
     );
-    forgotten.register(this, { handle: this.#handle, name: `a session of ${width}x${height} pixels` }, this);
+    forgotten.register(
+      this,
+      { handle: this.#handle, name: `a session of ${width}x${height} pixels` },
+      this,
+    );
     try {
       if (options.sharedPixels) this.#call("nf_session_share_pixels", 1);
       if (options.toneMapping?.curve) this.#setCurve(options.toneMapping);
@@ -463,9 +479,12 @@ export class Session {
     this.#push("nf_session_push_running", pixels, whole(spp, "spp"), place);
   }
 
-  /** Takes tiles out of the caller's pixels, the way C reads them: rows from the top, three floats a pixel. */
+  /**
+   * Takes tiles out of the caller's pixels, the way C reads them: rows from the top, three floats a pixel.
+   */
   #push(name, pixels, spp, { tile, channels, stride, fromBottom = false }) {
-    const source = tile === undefined ? { x: 0, y: 0, width: this.width, height: this.height } : this.#tile(tile);
+    const source =
+      tile === undefined ? { x: 0, y: 0, width: this.width, height: this.height } : this.#tile(tile);
     const [got, needed] = [pixels.length, source.width * source.height];
     if (channels === undefined && stride === undefined) channels = got / needed;
     channels ??= 3;

@@ -12,9 +12,9 @@ const EDGES: std::ops::RangeInclusive<usize> = 2..=65;
 /// Displays radiance by a table of the caller's own, such as a filmic curve, before the first verdict: then
 /// tone_mapping and exposure of NfParams count no more. table has edge entries along each axis, 2 to 65, red
 /// fastest: floats = 3 * edge^3 display values (sRGB-encoded red, green and blue, 0 to 1). Radiance x, times
-/// exposure, lies at s(1 + x / toe) / s(1 + top / toe) of an axis, where s(2^n * (1 + f)) = n + f is log2 made
-/// linear between powers of two: 0 is the first entry and top, or more, the last. Between entries values are
-/// interpolated linearly. Tables are kept until the program ends, each once.
+/// exposure, lies at s(1 + x / toe) / s(1 + top / toe) of an axis, where s(2^n * (1 + f)) = n + f is log2
+/// made linear between powers of two: 0 is the first entry and top, or more, the last. Between entries
+/// values are interpolated linearly. Tables are kept until the program ends, each once.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn nf_session_set_tone_table(
     session: *const NfSession,
@@ -55,8 +55,8 @@ struct Table {
     values: Vec<f32>,
 }
 
-/// log2 of 1 and more, made linear between powers of two: as good for a table, faster, and the same to the bit on
-/// every machine.
+/// log2 of 1 and more, made linear between powers of two: as good for a table, faster, and the same to the
+/// bit on every machine.
 fn stops(x: f32) -> f32 {
     const ONE: u32 = 1.0_f32.to_bits();
     (x.max(1.0).to_bits() - ONE) as f32 / (1 << 23) as f32

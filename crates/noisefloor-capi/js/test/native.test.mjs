@@ -1,4 +1,5 @@
-// Sessions that ran in native code run here with the same samples: ../../src/tests/wasm.rs writes the transcript.
+// Sessions that ran in native code run here with the same samples: ../../src/tests/wasm.rs writes the
+// transcript.
 
 import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";

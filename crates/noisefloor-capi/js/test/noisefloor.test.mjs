@@ -3,7 +3,17 @@
 import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
 import { test } from "node:test";
-import { NoisefloorError, STRUCTS, Session, load, version, viewing } from "../noisefloor.js";
+import {
+  NoisefloorError,
+  REASONS,
+  SCHEDULES,
+  STATUS,
+  STRUCTS,
+  Session,
+  load,
+  version,
+  viewing,
+} from "../noisefloor.js";
 
 await load();
 
@@ -103,7 +113,15 @@ test("pixels may lie in any way", () => {
   const { width: w, height: h } = session.tiles[3];
   const tile = Float32Array.from({ length: 4 * w * h }, (_, i) => Math.floor(i / 4 / w));
   session.push(tile, { spp: 50, tile: 3, fromBottom: true });
-  assert.deepEqual([...session.image().slice(3 * (32 * width + 32)).slice(0, 3)], Array(3).fill(h - 1));
+  assert.deepEqual(
+    [
+      ...session
+        .image()
+        .slice(3 * (32 * width + 32))
+        .slice(0, 3),
+    ],
+    Array(3).fill(h - 1),
+  );
   session.close();
 });
 
@@ -115,7 +133,10 @@ test("running means are what single batches are", () => {
     const mean = batch(64 * 32, 50, random);
     mean.forEach((x, i) => (sum[i] += 50 * x));
     single.push(mean, { spp: 50 });
-    running.pushRunning(Float32Array.from(sum, (x) => x / total), { spp: total });
+    running.pushRunning(
+      Float32Array.from(sum, (x) => x / total),
+      { spp: total },
+    );
     single.judge();
     running.judge();
   }
@@ -129,7 +150,10 @@ test("running means are what single batches are", () => {
   running.close();
 });
 
-/** As three-gpu-pathtracer blends samples on the GPU: mean += (sample - mean) / n, rounded to single precision. */
+/**
+ * As three-gpu-pathtracer blends samples on the GPU: mean += (sample - mean) / n, rounded to single
+ * precision.
+ */
 test("a mean that was blended sample by sample is as good as batches", () => {
   const pixels = 64 * 64;
   const light = Float32Array.from({ length: 3 * pixels }, (_, i) => 0.05 + ((i / 3) % 64) / 80);
@@ -144,10 +168,14 @@ test("a mean that was blended sample by sample is as good as batches", () => {
       const u = random();
       const sample = u > 0.5 ? Math.fround(8 * light[i] * (u - 0.5)) : 0;
       sum[i] += sample;
-      mean[i] = Math.fround(mean[i] * Math.fround(1 - 1 / spp)) + Math.fround(sample * Math.fround(1 / spp));
+      mean[i] =
+        Math.fround(mean[i] * Math.fround(1 - 1 / spp)) + Math.fround(sample * Math.fround(1 / spp));
     }
     if (spp < batches.nextSpp) continue;
-    batches.push(sum.map((x) => x / (spp - pushed)), { spp: spp - pushed });
+    batches.push(
+      sum.map((x) => x / (spp - pushed)),
+      { spp: spp - pushed },
+    );
     blended.pushRunning(mean, { spp });
     sum.fill(0);
     pushed = spp;
@@ -163,10 +191,31 @@ test("a mean that was blended sample by sample is as good as batches", () => {
   const stops = batches.stops().map((stop) => stop.spp);
   console.log(`stops after ${stops} samples; P differs by ${largest.toExponential(1)}`);
   assert.ok(batches.stops().every(({ reason }) => reason === "converged") && Math.min(...stops) > 300);
-  // Rounding of the mean is 2^-24 of it, and of a batch in it at most n / batch times that: nothing beside noise
+  // Rounding of the mean is 2^-24 of it, and of a batch in it at most n / batch times that: nothing beside
+  // noise
   assert.ok(largest < 1e-3);
   batches.close();
   blended.close();
+});
+
+test("what is likely wrong is a warning", () => {
+  const warnings = (sharedPixels) => {
+    const session = new Session(128, 128, { tile: 64, sharedPixels });
+    const random = noise(9);
+    for (let i = 0; i < 6; i++) {
+      // A filter of three pixels, along rows
+      const samples = batch(128 * 128, 1, random);
+      const filtered = samples.map((x, at) => (x + (samples[at - 3] ?? x) + (samples[at + 3] ?? x)) / 3);
+      session.push(filtered, { spp: 20 });
+      session.judge();
+    }
+    const said = session.warnings();
+    assert.equal(session.sampleCounts().warnings, said.length);
+    session.close();
+    return said;
+  };
+  assert.match(warnings(false).join(), /neighbouring pixels/);
+  assert.deepEqual(warnings(true), []);
 });
 
 test("errors have the words of Rust", () => {
@@ -194,7 +243,10 @@ test("errors have the words of Rust", () => {
     () => {
       for (let n = 1; n <= 20; n++) {
         batch(64 * 32, 10, random).forEach((x, i) => (sum[i] += x));
-        session.push(Float32Array.from(sum, (x) => x / n), { spp: 10 });
+        session.push(
+          Float32Array.from(sum, (x) => x / n),
+          { spp: 10 },
+        );
         session.judge();
       }
     },
@@ -214,7 +266,10 @@ test("a session is resumed to the bit", () => {
   const checkpoint = first.checkpoint("wall");
   first.close();
   const second = new Session(96, 80, options);
-  assert.throws(() => second.resume("hall", checkpoint), { code: "CHECKPOINT", message: /its job is wall/ });
+  assert.throws(() => second.resume("hall", checkpoint), {
+    code: "CHECKPOINT",
+    message: /its job is wall/,
+  });
   assert.throws(() => second.resume("wall", checkpoint.slice(0, -9)), { code: "CHECKPOINT" });
   second.resume("wall", checkpoint);
   assert.deepEqual(render(second, random), whole);
@@ -242,7 +297,10 @@ test("memory is freed by closing and after forgetting", async () => {
   const after = await grown(() => {});
   console.warn = warn;
   if (globalThis.gc) {
-    assert.ok(said.length > 20 && /512x512 pixels was forgotten/.test(said[0]), `${said.length} were found`);
+    assert.ok(
+      said.length > 20 && /512x512 pixels was forgotten/.test(said[0]),
+      `${said.length} were found`,
+    );
     assert.ok(after < before + 100e6, `${(after - before) / 1e6} MB more`);
   }
 });
@@ -258,7 +316,7 @@ test("pixels of a page have a size", () => {
   new Session(32, 32, { viewing: viewing({ canvas, peak: 300 }) }).close();
 });
 
-test("structs are those of the header", () => {
+test("structs and numbers are those of the header", () => {
   const header = readFileSync(new URL("../../include/noisefloor.h", import.meta.url), "utf8");
   for (const [name, { places }] of Object.entries(STRUCTS)) {
     const [, body] = new RegExp(`typedef struct \\{([^}]*)\\} ${name};`).exec(header);
@@ -268,4 +326,13 @@ test("structs are those of the header", () => {
       fields.map(([, type, star, name]) => `${type}${star} ${name}`),
     );
   }
+  const constants = (pattern) =>
+    [...header.matchAll(pattern)].map(([, name, value]) => [name, Number(value)]);
+  const named = (names) => names.map((name, value) => [name.replace(/[A-Z]/, "_$&").toUpperCase(), value]);
+  assert.deepEqual(
+    constants(/ NF_STATUS_(\w+) = (\d+)/g),
+    [...STATUS.entries()].map(([i, name]) => [name, i]),
+  );
+  assert.deepEqual(constants(/define NF_SCHEDULE_(\w+) (\d+)/g), named(SCHEDULES));
+  assert.deepEqual(constants(/define NF_REASON_(\w+) (\d+)/g), named(REASONS));
 });

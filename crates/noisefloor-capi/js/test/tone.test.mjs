@@ -1,5 +1,5 @@
-// What the table of a curve, interpolated as Rust does, says of that curve. That the curves are those of three.js is
-// tested in a browser, by three.js itself: examples/10-three-gpu-pathtracer/test.mjs.
+// What the table of a curve, interpolated as Rust does, says of that curve. That the curves are those of
+// three.js is tested in a browser, by three.js itself: examples/10-three-gpu-pathtracer/test.mjs.
 
 import assert from "node:assert/strict";
 import { test } from "node:test";
@@ -49,7 +49,9 @@ for (const [name, curve] of Object.entries(curves)) {
       sum += Math.max(...differences);
       largest = Math.max(largest, ...differences);
     }
-    console.log(`${name}: ${((255 * sum) / count).toFixed(3)} of 255 on average, ${(255 * largest).toFixed(2)}`);
+    console.log(
+      `${name}: ${((255 * sum) / count).toFixed(3)} of 255 on average, ${(255 * largest).toFixed(2)}`,
+    );
     assert.ok(sum / count < 0.5 / 255 && largest < 7 / 255);
   });
 }
@@ -69,7 +71,10 @@ test("curves reach the session", async () => {
     let state = 1;
     const random = () => (state = (Math.imul(state, 1664525) + 1013904223) >>> 0) / 2 ** 32;
     for (let i = 0; i < 10; i++) {
-      session.push(Float32Array.from({ length: 3072 }, () => 0.2 + 0.3 * random()), { spp: 10 });
+      session.push(
+        Float32Array.from({ length: 3072 }, () => 0.2 + 0.3 * random()),
+        { spp: 10 },
+      );
       session.judge();
     }
     const [{ probability }] = session.states();

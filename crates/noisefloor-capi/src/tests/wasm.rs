@@ -1,5 +1,5 @@
-//! The package for JavaScript, whose module `js/build.sh` has built: its own tests, what it makes of sessions that
-//! ran here, and the example in a browser.
+//! The package for JavaScript, whose module `js/build.sh` has built: its own tests, what it makes of
+//! sessions that ran here, and the example in a browser.
 
 use super::*;
 use noisefloor_testkit::{Noise, Requirement, require};
@@ -42,7 +42,8 @@ fn the_package_keeps_its_promises_in_node() {
     node(&js(), "test/tone.test.mjs", &[]);
 }
 
-/// What a session was told, and what it said: sizes and options, then pushes (1), running means (2) and verdicts (3).
+/// What a session was told, and what it said: sizes and options, then pushes (1), running means (2) and
+/// verdicts (3).
 struct Transcript(Vec<u8>);
 
 impl Transcript {
@@ -67,8 +68,8 @@ impl Transcript {
     }
 }
 
-/// A session of random shape and options, with random light, pushed in random portions until it is done. Its options
-/// are written as JavaScript has them.
+/// A session of random shape and options, with random light, pushed in random portions until it is done.
+/// Its options are written as JavaScript has them.
 fn record(seed: u64, transcript: &mut Transcript) {
     let mut noise = Noise::keyed(&[54, seed]);
     let mut between = |low: usize, high: usize| low + noise.below(high - low + 1);
@@ -158,8 +159,8 @@ fn record(seed: u64, transcript: &mut Transcript) {
     transcript.words(&[0]);
 }
 
-/// Logarithms come from another library there, so P may differ by 10⁻⁵. With a P that near to the threshold a stop
-/// could differ, too; none of these seeds has one.
+/// Logarithms come from another library there, so P may differ by 10⁻⁵. With a P that near to the threshold
+/// a stop could differ, too; none of these seeds has one.
 #[test]
 fn random_sessions_stop_in_node_where_they_stop_here() {
     let Some(()) = package() else { return };
