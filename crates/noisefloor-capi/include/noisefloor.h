@@ -114,9 +114,9 @@ typedef struct {
     uint32_t tile;
     // When tiles are judged: NF_SCHEDULE_SPACED (default), _EVERY or _GROWING.
     uint32_t schedule;
-    // The step of the schedule in samples per pixel, at least 2. Default: 10.
+    // The step of the schedule in samples per pixel, at least 2. Default: 8.
     uint64_t step;
-    // Fewest samples per pixel at which a tile may stop. Default: 100.
+    // Fewest samples per pixel at which a tile may stop. Default: 16.
     uint64_t min_spp;
     // Samples per pixel at which every tile stops, at least 2. Default: 10000.
     uint64_t max_spp;
@@ -269,6 +269,20 @@ NfStatus nf_session_requests(const NfSession *session,
 NfStatus nf_session_judge(const NfSession *session,
                           size_t *newly_done);
 
+// Displays radiance by a table of the caller's own, such as a filmic curve, before the first verdict: then
+// tone_mapping and exposure of NfParams count no more. table has edge entries along each axis, 2 to 65, red
+// fastest: floats = 3 * edge^3 display values (sRGB-encoded red, green and blue, 0 to 1). Radiance x, times
+// exposure, lies at s(1 + x / toe) / s(1 + top / toe) of an axis, where s(2^n * (1 + f)) = n + f is log2
+// made linear between powers of two: 0 is the first entry and top, or more, the last. Between entries
+// values are interpolated linearly. Tables are kept until the program ends, each once.
+NfStatus nf_session_set_tone_table(const NfSession *session,
+                                   float exposure,
+                                   float toe,
+                                   float top,
+                                   const float *table,
+                                   size_t floats,
+                                   size_t edge);
+
 // Adds the mean of spp new samples per pixel of a tile: rows of the tile from the top, floats = 3 * width *
 // height of the tile. Tiles that are done accept samples, too: they improve, and stay done.
 NfStatus nf_session_push(const NfSession *session,
@@ -352,6 +366,20 @@ NfStatus nf_session_save(const NfSession *session,
 NfStatus nf_session_resume(const NfSession *session,
                            const char *job,
                            const char *path);
+
+// As nf_session_save, into memory instead of a file: size becomes the number of bytes. bytes has room for
+// capacity; if it is NULL, only size is written.
+NfStatus nf_session_checkpoint(const NfSession *session,
+                               const char *job,
+                               uint8_t *bytes,
+                               size_t capacity,
+                               size_t *size);
+
+// As nf_session_resume, from the bytes of nf_session_checkpoint or of a file of nf_session_save.
+NfStatus nf_session_restore(const NfSession *session,
+                            const char *job,
+                            const uint8_t *bytes,
+                            size_t size);
 
 // Checks what sessions rely on: that samples of a renderer are new, independent of each other and, unless
 // shared_pixels is true, from pixel to pixel, and that their number means what it says. With repeats_samples,

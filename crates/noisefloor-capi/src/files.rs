@@ -1,4 +1,4 @@
-//! Checkpoints in files.
+//! Checkpoints in files and in memory.
 
 use crate::border;
 use crate::handle;
@@ -7,7 +7,7 @@ use crate::status::{Failure, NfStatus, guard};
 use noisefloor::{Checkpoint, Session};
 use std::ffi::c_char;
 use std::fs::File;
-use std::io::{self, BufReader};
+use std::io::{self, BufReader, Read};
 use std::path::Path;
 use tempfile::NamedTempFile;
 
@@ -57,13 +57,60 @@ pub unsafe extern "C" fn nf_session_resume(
         // SAFETY: promised by the caller.
         let path = unsafe { border::text(path, "path") }?;
         let file = File::open(path).map_err(|e| Failure::new(NfStatus::Io, format!("{path}: {e}")))?;
-        // The film that is read, and the one that it is checked against
-        border::memory(session.grid, 2 * FILM)?;
-        let checkpoint = Checkpoint::read(BufReader::new(file))?;
-        let mut locked = session.lock()?;
-        let grid = locked.film().grid();
-        let fresh = Session::new(grid.width(), grid.height(), locked.criterion().clone(), *locked.params())?;
-        *locked = fresh.resume(job, checkpoint)?;
-        Ok(())
+        resume(&session, job, BufReader::new(file))
     })
+}
+
+/// As nf_session_save, into memory instead of a file: size becomes the number of bytes. bytes has room for
+/// capacity; if it is NULL, only size is written.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn nf_session_checkpoint(
+    session: *const NfSession,
+    job: *const c_char,
+    bytes: *mut u8,
+    capacity: usize,
+    size: *mut usize,
+) -> NfStatus {
+    guard(|| {
+        let session = handle::get(session)?;
+        // SAFETY: promised by the caller.
+        let job = unsafe { border::text(job, "job") }?;
+        border::memory(session.grid, FILM)?;
+        let mut written = Vec::new();
+        session.lock()?.checkpoint(job)?.write(&mut written)?;
+        if !bytes.is_null() {
+            // SAFETY: promised by the caller.
+            unsafe { border::room(bytes, capacity, written.len(), "bytes") }?.copy_from_slice(&written);
+        }
+        // SAFETY: promised by the caller.
+        unsafe { border::write(size, written.len(), "size") }
+    })
+}
+
+/// As nf_session_resume, from the bytes of nf_session_checkpoint or of a file of nf_session_save.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn nf_session_restore(
+    session: *const NfSession,
+    job: *const c_char,
+    bytes: *const u8,
+    size: usize,
+) -> NfStatus {
+    guard(|| {
+        let session = handle::get(session)?;
+        // SAFETY: promised by the caller.
+        let job = unsafe { border::text(job, "job") }?;
+        // SAFETY: promised by the caller.
+        resume(&session, job, unsafe { border::array(bytes, size, size, "bytes") }?)
+    })
+}
+
+fn resume(session: &NfSession, job: &str, from: impl Read) -> Result<(), Failure> {
+    // The film that is read, and the one that it is checked against
+    border::memory(session.grid, 2 * FILM)?;
+    let checkpoint = Checkpoint::read(from)?;
+    let mut locked = session.lock()?;
+    let grid = locked.film().grid();
+    let fresh = Session::new(grid.width(), grid.height(), locked.criterion().clone(), *locked.params())?;
+    *locked = fresh.resume(job, checkpoint)?;
+    Ok(())
 }

@@ -10,7 +10,8 @@ fn the_header_is_that_of_the_sources() {
     let package = Path::new(env!("CARGO_MANIFEST_DIR"));
     let config = cbindgen::Config::from_file(package.join("cbindgen.toml")).unwrap();
     // In the order in which one reads a header
-    let sources = ["status", "oracle", "params", "eyes", "session", "push", "results", "files", "check"];
+    let sources =
+        ["status", "oracle", "params", "eyes", "session", "tone", "push", "results", "files", "check"];
     let builder = cbindgen::Builder::new().with_config(config);
     let builder = sources.iter().fold(builder, |b, name| b.with_src(package.join(format!("src/{name}.rs"))));
     let mut made = Vec::new();
@@ -23,4 +24,26 @@ fn the_header_is_that_of_the_sources() {
     }
     let kept = std::fs::read_to_string(&path).unwrap();
     assert!(kept == made, "include/noisefloor.h is not that of the sources; see header.rs");
+}
+
+/// The defaults that the header names are those of Rust, which change.
+#[test]
+fn the_header_names_the_defaults() {
+    use crate::params::NfParams;
+    let header =
+        std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("include/noisefloor.h")).unwrap();
+    let NfParams { tile, step, min_spp, max_spp, consecutive, key, exposure, .. } = NfParams::default();
+    for (field, value) in [
+        ("uint32_t tile;", tile.to_string()),
+        ("uint64_t step;", step.to_string()),
+        ("uint64_t min_spp;", min_spp.to_string()),
+        ("uint64_t max_spp;", max_spp.to_string()),
+        ("uint32_t consecutive;", consecutive.to_string()),
+        ("float key;", key.to_string()),
+        ("float exposure;", exposure.to_string()),
+    ] {
+        let (before, _) = header.split_once(field).unwrap();
+        let said = before.lines().rev().find(|line| line.contains("//")).unwrap();
+        assert!(said.ends_with(&format!("Default: {value}.")), "{field} {value}, but: {said}");
+    }
 }

@@ -65,13 +65,19 @@ thread_local! {
 /// Nothing half done is seen after a panic: sessions stand behind a lock that a panic poisons, oracles never
 /// change, and results are written last.
 pub(crate) fn guard(body: impl FnOnce() -> Result<(), Failure>) -> NfStatus {
+    #[cfg(target_family = "wasm")]
+    crate::wasm::keep_last_words();
     let outcome = catch_unwind(AssertUnwindSafe(body)).unwrap_or_else(|panic| {
         Err(Failure::new(NfStatus::Internal, format!("noisefloor made a mistake: {}", words(&*panic))))
     });
     let Err(failure) = outcome else { return NfStatus::Ok };
-    let message = CString::new(failure.message.replace('\0', "?")).unwrap_or_default();
-    LAST_ERROR.with(|last| *last.borrow_mut() = message);
+    set_last_error(&failure.message);
     failure.status
+}
+
+pub(crate) fn set_last_error(message: &str) {
+    let message = CString::new(message.replace('\0', "?")).unwrap_or_default();
+    LAST_ERROR.with(|last| *last.borrow_mut() = message);
 }
 
 /// What a panic says.

@@ -9,12 +9,14 @@ use crate::push::*;
 use crate::results::*;
 use crate::session::*;
 use crate::status::*;
+use crate::tone::*;
 use noisefloor::{Oracle, Params, Rgb, Session, Tile, criterion::CriterionError};
 use std::ffi::{CStr, CString, c_void};
 use std::ptr::{null, null_mut};
 
 #[cfg(target_os = "linux")]
 mod memory;
+mod wasm;
 
 const WIDTH: usize = 96;
 const HEIGHT: usize = 80;
@@ -218,6 +220,84 @@ fn a_resumed_session_ends_as_the_uninterrupted_one() {
 }
 
 #[test]
+fn a_checkpoint_in_memory_is_that_of_a_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = CString::new(folder.path().join("session.nfc").to_str().unwrap()).unwrap();
+    let whole = session(&params());
+    round(&whole, 1);
+    let mut size = 0;
+    // SAFETY: living handles, text, and arrays of the sizes given.
+    unsafe {
+        assert_eq!(nf_session_save(whole.0, c"wall".as_ptr(), path.as_ptr()), NfStatus::Ok, "{}", message());
+        let saved = std::fs::read(folder.path().join("session.nfc")).unwrap();
+        let job = c"wall".as_ptr();
+        assert_eq!(nf_session_checkpoint(whole.0, job, null_mut(), 0, &mut size), NfStatus::Ok);
+        assert_eq!(size, saved.len());
+        let mut bytes = vec![0; size];
+        let short = nf_session_checkpoint(whole.0, job, bytes.as_mut_ptr(), size - 1, &mut size);
+        assert_eq!(short, NfStatus::Size, "{}", message());
+        assert_eq!(
+            nf_session_checkpoint(whole.0, job, bytes.as_mut_ptr(), bytes.len(), &mut size),
+            NfStatus::Ok
+        );
+        assert!(bytes == saved);
+        let other = session(&params());
+        let cut = nf_session_restore(other.0, job, bytes.as_ptr(), size - 1);
+        assert_eq!(cut, NfStatus::Checkpoint, "{}", message());
+        assert_eq!(states(&other)[0].spp, 0, "a failure changes nothing");
+        assert_eq!(nf_session_restore(other.0, job, bytes.as_ptr(), size), NfStatus::Ok, "{}", message());
+        // Without a verdict P is NaN, which is not equal to itself
+        assert_eq!(format!("{:?}", states(&whole)), format!("{:?}", states(&other)));
+        assert_eq!(image(&whole), image(&other));
+    }
+}
+
+/// A table of plain sRGB makes the verdicts of plain sRGB, but for what lies between its entries.
+#[test]
+fn a_tone_table_shows_what_it_says() {
+    let (edge, toe, top) = (33, 0.01_f32, 4.0_f32);
+    let entry = |place: usize| {
+        // 1 + 4 / 0.01 is 2^8 * (1 + 145 / 256)
+        let stops = (8.0 + 145.0 / 256.0) * place as f32 / (edge - 1) as f32;
+        let x = toe * (stops.floor().exp2() * (1.0 + stops.fract()) - 1.0);
+        noisefloor::display::srgb_encode(x.min(1.0))
+    };
+    let places = (0..edge).flat_map(|b| (0..edge).flat_map(move |g| (0..edge).map(move |r| [r, g, b])));
+    let table: Vec<f32> = places.flatten().map(entry).collect();
+    let set = |session: &Handle, exposure, toe, top, edge| {
+        // SAFETY: a living handle, and an array of the size given.
+        unsafe { nf_session_set_tone_table(session.0, exposure, toe, top, table.as_ptr(), table.len(), edge) }
+    };
+    let by_table = session(&params());
+    for (exposure, toe, top, edge, said) in [
+        (1.0, 0.0, 4.0, 33, "0 < toe < top"),
+        (1.0, 0.01, f32::INFINITY, 33, "0 < toe < top"),
+        (1.0, 0.01, 4.0, 1, "2 to 65 entries"),
+        (f32::NAN, 0.01, 4.0, 33, "positive finite"),
+    ] {
+        assert_eq!(set(&by_table, exposure, toe, top, edge), NfStatus::Argument);
+        assert!(message().contains(said), "{}", message());
+    }
+    assert_eq!(set(&by_table, 1.0, toe, top, 32), NfStatus::Size);
+    assert_eq!(set(&by_table, 0.5, toe, top, edge), NfStatus::Ok, "{}", message());
+    let plain = session(&NfParams { tone_mapping: NF_TONE_SRGB, exposure: 0.5, ..params() });
+    let brighter = session(&NfParams { tone_mapping: NF_TONE_SRGB, exposure: 1.5, ..params() });
+    for session in [&by_table, &plain, &brighter] {
+        for _ in 0..3 {
+            round(session, 1);
+        }
+    }
+    assert_eq!(set(&by_table, 1.0, toe, top, edge), NfStatus::Argument, "after a verdict it is too late");
+    // 0.36 stops between entries: the table's slope is wrong by less than 2 %, and so is the noise
+    let differ = |a: &Handle, b: &Handle| {
+        let [a, b] = [a, b].map(states);
+        a.iter().zip(&b).map(|(a, b)| (a.probability - b.probability).abs()).fold(0.0, f32::max)
+    };
+    let (near, far) = (differ(&by_table, &plain), differ(&brighter, &plain));
+    assert!(near < 0.02 && far > 2.0 * near, "{near} {far}");
+}
+
+#[test]
 fn every_pointer_may_be_null_and_none_is_followed_then() {
     use NfStatus::NullPointer;
     let session = session(&params());
@@ -251,8 +331,11 @@ fn every_pointer_may_be_null_and_none_is_followed_then() {
             nf_session_visible_noise(null(), null_mut(), 0),
             nf_session_save(null(), c"".as_ptr(), c"".as_ptr()),
             nf_session_resume(null(), c"".as_ptr(), c"".as_ptr()),
+            nf_session_checkpoint(null(), c"".as_ptr(), null_mut(), 0, &mut n),
+            nf_session_restore(null(), c"".as_ptr(), null(), 0),
+            nf_session_set_tone_table(null(), 1.0, 0.01, 4.0, null(), 24, 2),
         ];
-        assert_eq!(without_session, [NullPointer; 14]);
+        assert_eq!(without_session, [NullPointer; 17]);
         let without_place = [
             nf_session_tile(s, 0, null_mut()),
             nf_session_requests(s, null_mut(), 9, &mut n),
@@ -268,8 +351,11 @@ fn every_pointer_may_be_null_and_none_is_followed_then() {
             nf_session_save(s, c"x".as_ptr(), null()),
             nf_session_resume(s, null(), c"x".as_ptr()),
             nf_session_resume(s, c"x".as_ptr(), null()),
+            nf_session_checkpoint(s, c"x".as_ptr(), null_mut(), 0, null_mut()),
+            nf_session_restore(s, c"x".as_ptr(), null(), 9),
+            nf_session_set_tone_table(s, 1.0, 0.01, 4.0, null(), 24, 2),
         ];
-        assert_eq!(without_place, [NullPointer; 14]);
+        assert_eq!(without_place, [NullPointer; 17]);
         let odd = mean.as_ptr().cast::<u8>().add(1).cast();
         assert_eq!(nf_session_push(s, 0, 1, odd, mean.len()), NullPointer);
         assert_eq!(message(), "mean is not aligned");

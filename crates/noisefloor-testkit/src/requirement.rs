@@ -27,13 +27,23 @@ pub enum Requirement {
     Browser,
     /// `slurm`: the daemons of Slurm and Munge, and the right to start them.
     Slurm,
+    /// `wasm`: Node, and the module that `crates/noisefloor-capi/js/build.sh` builds.
+    Wasm,
     /// `shared`: data that are not part of the repository, such as what observers said.
     Shared,
 }
 
 impl Requirement {
-    const ALL: [Self; 7] =
-        [Self::Renderers, Self::Llvm, Self::Python, Self::Cmake, Self::Browser, Self::Slurm, Self::Shared];
+    const ALL: [Self; 8] = [
+        Self::Renderers,
+        Self::Llvm,
+        Self::Python,
+        Self::Cmake,
+        Self::Browser,
+        Self::Slurm,
+        Self::Wasm,
+        Self::Shared,
+    ];
 
     fn word(self) -> &'static str {
         match self {
@@ -43,6 +53,7 @@ impl Requirement {
             Self::Cmake => "cmake",
             Self::Browser => "browser",
             Self::Slurm => "slurm",
+            Self::Wasm => "wasm",
             Self::Shared => "shared",
         }
     }
@@ -71,7 +82,7 @@ impl Display for Requirement {
 /// # Panics
 /// If the environment variable `NOISEFLOOR_REQUIRE` names the requirement, and nothing was found: where
 /// everything has been set up, a test that cannot run has failed. The variable holds words with commas
-/// between them: `renderers`, `llvm`, `python`, `cmake`, `browser`, `slurm`, `shared`. Any other word is a
+/// between them: `renderers`, `llvm`, `python`, `cmake`, `browser`, `slurm`, `wasm`, `shared`. Any other word is a
 /// panic, too, since a misspelt one would require nothing.
 pub fn require<T>(requirement: Requirement, found: Result<T, impl Display>) -> Option<T> {
     let required = is_required(requirement, std::env::var_os(REQUIRED).as_deref());
@@ -148,7 +159,7 @@ mod tests {
         assert_eq!(required(None), []);
         assert_eq!(required(Some("")), []);
         assert_eq!(required(Some("shared, python")), [Requirement::Python, Requirement::Shared]);
-        assert_eq!(required(Some("renderers,llvm,python,cmake,browser,slurm,shared")), Requirement::ALL);
+        assert_eq!(required(Some("renderers,llvm,python,cmake,browser,slurm,wasm,shared")), Requirement::ALL);
     }
 
     #[test]

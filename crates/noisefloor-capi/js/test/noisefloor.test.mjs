@@ -1,0 +1,338 @@
+// What the package promises, in Node. ../../tests/wasm.rs runs this with the module built.
+
+import assert from "node:assert/strict";
+import { readFileSync } from "node:fs";
+import { test } from "node:test";
+import {
+  NoisefloorError,
+  REASONS,
+  SCHEDULES,
+  STATUS,
+  STRUCTS,
+  Session,
+  load,
+  version,
+  viewing,
+} from "../noisefloor.js";
+
+await load();
+
+/** Of the same session always the same: a wall with noise that shrinks as it should. */
+function noise(seed) {
+  let state = seed;
+  return () => {
+    state = (Math.imul(state, 1664525) + 1013904223) | 0;
+    const mixed = Math.imul(state ^ (state >>> 15), 0x2c1b3c6d);
+    return ((mixed ^ (mixed >>> 12)) >>> 8) / 2 ** 23 - 1;
+  };
+}
+
+function batch(pixels, spp, random, level = 0.5) {
+  return Float32Array.from({ length: 3 * pixels }, () => level + (0.4 * random()) / Math.sqrt(spp));
+}
+
+const options = { tile: 32, maxSpp: 400 };
+
+function render(session, random = noise(7)) {
+  while (!session.isDone) {
+    for (const { tile, spp } of session.requests()) {
+      session.push(batch(tile.width * tile.height, spp, random), { spp, tile });
+    }
+    session.judge();
+  }
+  return session.states();
+}
+
+test("a picture is rendered until all tiles are done", () => {
+  const session = new Session(96, 80, options);
+  assert.equal(session.tiles.length, 9);
+  assert.deepEqual(session.tiles[8], { index: 8, x: 64, y: 64, width: 32, height: 16 });
+  const random = noise(7);
+  const stops = [];
+  const [{ first, spp }] = session.requests();
+  assert.equal(session.nextSpp, first + spp);
+  while (!session.isDone) {
+    for (const { tile, first, spp } of session.requests()) {
+      assert.equal(first, session.states()[tile.index].spp);
+      session.push(batch(tile.width * tile.height, spp, random), { spp, tile });
+    }
+    stops.push(...session.judge());
+  }
+  assert.deepEqual(new Set(stops.map((stop) => stop.tile.index)).size, 9, "each is reported once");
+  assert.deepEqual(
+    session.stops(),
+    stops.sort((a, b) => a.tile.index - b.tile.index),
+  );
+  assert.ok(stops.every(({ reason }) => ["converged", "maxSpp"].includes(reason)));
+  assert.equal(session.nextSpp, Infinity);
+  const [image, map] = [session.image(), session.visibleNoise()];
+  assert.deepEqual([image.length, map.length], [3 * 96 * 80, 96 * 80]);
+  assert.ok(Math.abs(image.reduce((sum, x) => sum + x) / image.length - 0.5) < 1e-3);
+  assert.ok(map.every((seen) => seen >= 0));
+  assert.deepEqual(session.warnings(), []);
+  session.close();
+  session.close();
+  assert.throws(() => session.judge(), { code: "HANDLE" });
+  assert.match(version(), /^\d+\.\d+\.\d+/);
+});
+
+/** The same picture in every shape that renderers have. */
+test("pixels may lie in any way", () => {
+  const [width, height] = [50, 40];
+  const plain = batch(width * height, 50, noise(3));
+  const shape = (channels, stride, fromBottom) => {
+    const floats = new Float32Array(stride * height).fill(NaN);
+    for (let y = 0; y < height; y++) {
+      for (let x = 0; x < width; x++) {
+        const to = (fromBottom ? height - 1 - y : y) * stride + x * channels;
+        floats.set(plain.subarray(3 * (y * width + x), 3 * (y * width + x) + 3), to);
+      }
+    }
+    return floats;
+  };
+  const pushed = (floats, layout) => {
+    const session = new Session(width, height, options);
+    session.push(floats, { spp: 50, ...layout });
+    const image = session.image();
+    session.close();
+    return image;
+  };
+  const expected = pushed(plain);
+  assert.deepEqual(expected, plain);
+  for (const channels of [3, 4]) {
+    for (const fromBottom of [false, true]) {
+      const near = shape(channels, channels * width, fromBottom);
+      assert.deepEqual(pushed(near, { fromBottom }), expected, `${channels} channels, by length`);
+      const wide = shape(channels, channels * width + 7, fromBottom);
+      const layout = { fromBottom, channels, stride: channels * width + 7 };
+      assert.deepEqual(pushed(wide, layout), expected, `${channels} channels with a stride`);
+    }
+  }
+  // One tile of its own, upside down with an alpha
+  const session = new Session(width, height, options);
+  const { width: w, height: h } = session.tiles[3];
+  const tile = Float32Array.from({ length: 4 * w * h }, (_, i) => Math.floor(i / 4 / w));
+  session.push(tile, { spp: 50, tile: 3, fromBottom: true });
+  assert.deepEqual(
+    [
+      ...session
+        .image()
+        .slice(3 * (32 * width + 32))
+        .slice(0, 3),
+    ],
+    Array(3).fill(h - 1),
+  );
+  session.close();
+});
+
+test("running means are what single batches are", () => {
+  const [single, running] = [new Session(64, 32, options), new Session(64, 32, options)];
+  const random = noise(5);
+  const sum = new Float64Array(3 * 64 * 32);
+  for (let total = 50; total <= 400 && !single.isDone; total += 50) {
+    const mean = batch(64 * 32, 50, random);
+    mean.forEach((x, i) => (sum[i] += 50 * x));
+    single.push(mean, { spp: 50 });
+    running.pushRunning(
+      Float32Array.from(sum, (x) => x / total),
+      { spp: total },
+    );
+    single.judge();
+    running.judge();
+  }
+  const states = [single, running].map((session) => session.states());
+  states[0].forEach((state, i) => {
+    assert.ok(state.probability !== null);
+    assert.ok(Math.abs(state.probability - states[1][i].probability) < 1e-3);
+    assert.equal(state.spp, states[1][i].spp);
+  });
+  single.close();
+  running.close();
+});
+
+/**
+ * As three-gpu-pathtracer blends samples on the GPU: mean += (sample - mean) / n, rounded to single
+ * precision.
+ */
+test("a mean that was blended sample by sample is as good as batches", () => {
+  const pixels = 64 * 64;
+  const light = Float32Array.from({ length: 3 * pixels }, (_, i) => 0.05 + ((i / 3) % 64) / 80);
+  const [batches, blended] = [0, 1].map(() => new Session(64, 64, { tile: 32, maxSpp: 3000 }));
+  const [mean, sum] = [new Float32Array(3 * pixels), new Float64Array(3 * pixels)];
+  const random = noise(11);
+  let [spp, pushed, largest] = [0, 0, 0];
+  while (!batches.isDone) {
+    spp++;
+    for (let i = 0; i < mean.length; i++) {
+      // One sample in four finds the light
+      const u = random();
+      const sample = u > 0.5 ? Math.fround(8 * light[i] * (u - 0.5)) : 0;
+      sum[i] += sample;
+      mean[i] =
+        Math.fround(mean[i] * Math.fround(1 - 1 / spp)) + Math.fround(sample * Math.fround(1 / spp));
+    }
+    if (spp < batches.nextSpp) continue;
+    batches.push(
+      sum.map((x) => x / (spp - pushed)),
+      { spp: spp - pushed },
+    );
+    blended.pushRunning(mean, { spp });
+    sum.fill(0);
+    pushed = spp;
+    batches.judge();
+    blended.judge();
+    const states = blended.states();
+    for (const { tile, probability, reason } of batches.states()) {
+      assert.equal(states[tile.index].reason, reason);
+      if (probability === null) continue;
+      largest = Math.max(largest, Math.abs(probability - states[tile.index].probability));
+    }
+  }
+  const stops = batches.stops().map((stop) => stop.spp);
+  console.log(`stops after ${stops} samples; P differs by ${largest.toExponential(1)}`);
+  assert.ok(batches.stops().every(({ reason }) => reason === "converged") && Math.min(...stops) > 300);
+  // Rounding of the mean is 2^-24 of it, and of a batch in it at most n / batch times that: nothing beside
+  // noise
+  assert.ok(largest < 1e-3);
+  batches.close();
+  blended.close();
+});
+
+test("what is likely wrong is a warning", () => {
+  const warnings = (sharedPixels) => {
+    const session = new Session(128, 128, { tile: 64, sharedPixels });
+    const random = noise(9);
+    for (let i = 0; i < 6; i++) {
+      // A filter of three pixels, along rows
+      const samples = batch(128 * 128, 1, random);
+      const filtered = samples.map((x, at) => (x + (samples[at - 3] ?? x) + (samples[at + 3] ?? x)) / 3);
+      session.push(filtered, { spp: 20 });
+      session.judge();
+    }
+    const said = session.warnings();
+    assert.equal(session.sampleCounts().warnings, said.length);
+    session.close();
+    return said;
+  };
+  assert.match(warnings(false).join(), /neighbouring pixels/);
+  assert.deepEqual(warnings(true), []);
+});
+
+test("errors have the words of Rust", () => {
+  const session = new Session(64, 32, options);
+  const floats = new Float32Array(3 * 64 * 32).fill(0.5);
+  const says = (code, message) => (error) =>
+    error instanceof NoisefloorError && error.code === code && message.test(error.message);
+  assert.throws(() => new Session(64, 32, { tile: 7 }), says("SIZE", /tile size 7 is outside 16…512/));
+  assert.throws(() => new Session(64, 32, { tile: 0.5 }), says("ARGUMENT", /whole number/));
+  assert.throws(() => new Session(64, 32, { people: 2 }), says("ARGUMENT", /between 0 and 1/));
+  assert.throws(() => new Session(64, 32, { viewing: "moon" }), says("ARGUMENT", /"moon"/));
+  assert.throws(() => new Session(64, 32, { schedule: "never" }), says("ARGUMENT", /spaced/));
+  assert.throws(() => new Session(0, 32), says("SIZE", /0/));
+  assert.throws(() => session.push(floats, { spp: 0 }), says("BATCH", /./));
+  assert.throws(() => session.push(floats, { spp: 1.5 }), says("ARGUMENT", /1.5/));
+  assert.throws(() => session.push(floats.subarray(1), { spp: 1 }), says("SIZE", /64x32/));
+  assert.throws(() => session.push(floats, { spp: 1, channels: 4 }), says("SIZE", /64x32/));
+  assert.throws(() => session.push(floats, { spp: 1, stride: 1 }), says("SIZE", /stride of 1/));
+  assert.throws(() => session.push(floats, { spp: 1, tile: 2 }), says("BATCH", /tile 2 does not exist/));
+  assert.throws(() => session.visibleNoise(), says("UNAVAILABLE", /./));
+  // The running mean instead of new samples
+  const sum = new Float64Array(floats.length);
+  const random = noise(1);
+  assert.throws(
+    () => {
+      for (let n = 1; n <= 20; n++) {
+        batch(64 * 32, 10, random).forEach((x, i) => (sum[i] += x));
+        session.push(
+          Float32Array.from(sum, (x) => x / n),
+          { spp: 10 },
+        );
+        session.judge();
+      }
+    },
+    says("FAULT", /./),
+  );
+  session.close();
+});
+
+test("a session is resumed to the bit", () => {
+  const whole = render(new Session(96, 80, options));
+  const first = new Session(96, 80, options);
+  const random = noise(7);
+  for (const { tile, spp } of first.requests()) {
+    first.push(batch(tile.width * tile.height, spp, random), { spp, tile });
+  }
+  first.judge();
+  const checkpoint = first.checkpoint("wall");
+  first.close();
+  const second = new Session(96, 80, options);
+  assert.throws(() => second.resume("hall", checkpoint), {
+    code: "CHECKPOINT",
+    message: /its job is wall/,
+  });
+  assert.throws(() => second.resume("wall", checkpoint.slice(0, -9)), { code: "CHECKPOINT" });
+  second.resume("wall", checkpoint);
+  assert.deepEqual(render(second, random), whole);
+  second.close();
+});
+
+test("memory is freed by closing and after forgetting", async () => {
+  const grown = async (use) => {
+    for (let i = 0; i < 30; i++) {
+      use(new Session(512, 512, options));
+      globalThis.gc?.();
+      await new Promise((resolve) => setTimeout(resolve));
+    }
+    return process.memoryUsage().arrayBuffers + process.memoryUsage().external;
+  };
+  // 30 sessions take 280 MB if nothing is freed
+  const close = (session) => session.close();
+  await grown(close);
+  const before = await grown(close);
+  const dispose = Symbol.dispose ?? Symbol.for("Symbol.dispose");
+  assert.ok((await grown((session) => session[dispose]())) < before + 40e6);
+  const said = [];
+  const { warn } = console;
+  console.warn = (message) => said.push(message);
+  const after = await grown(() => {});
+  console.warn = warn;
+  if (globalThis.gc) {
+    assert.ok(
+      said.length > 20 && /512x512 pixels was forgotten/.test(said[0]),
+      `${said.length} were found`,
+    );
+    assert.ok(after < before + 100e6, `${(after - before) / 1e6} MB more`);
+  }
+});
+
+test("pixels of a page have a size", () => {
+  const ppd = (options) => Number(/ppd=([^,]+)/.exec(viewing(options))[1]);
+  // CSS defines its pixel as 1/96 inch, which 28 inches away spans 0.0213 degrees
+  assert.ok(Math.abs(1 / ppd({ distance: 28 * 0.0254 }) - 0.0213) < 1e-4);
+  assert.ok(Math.abs(ppd({ pixelRatio: 2 }) / ppd({}) - 2) < 1e-4);
+  const canvas = { width: 600, getBoundingClientRect: () => ({ width: 400 }) };
+  assert.equal(ppd({ canvas }), ppd({ pixelRatio: 1.5 }));
+  assert.match(viewing({ peak: 300, ambient: 50 }), /^ppd=[\d.]+,peak=300,ambient=50$/);
+  new Session(32, 32, { viewing: viewing({ canvas, peak: 300 }) }).close();
+});
+
+test("structs and numbers are those of the header", () => {
+  const header = readFileSync(new URL("../../include/noisefloor.h", import.meta.url), "utf8");
+  for (const [name, { places }] of Object.entries(STRUCTS)) {
+    const [, body] = new RegExp(`typedef struct \\{([^}]*)\\} ${name};`).exec(header);
+    const fields = [...body.matchAll(/^ +(?:const )?(\w+) (\*?)(\w+);/gm)];
+    assert.deepEqual(
+      places.map(({ type, name }) => `${type} ${name}`),
+      fields.map(([, type, star, name]) => `${type}${star} ${name}`),
+    );
+  }
+  const constants = (pattern) =>
+    [...header.matchAll(pattern)].map(([, name, value]) => [name, Number(value)]);
+  const named = (names) => names.map((name, value) => [name.replace(/[A-Z]/, "_$&").toUpperCase(), value]);
+  assert.deepEqual(
+    constants(/ NF_STATUS_(\w+) = (\d+)/g),
+    [...STATUS.entries()].map(([i, name]) => [name, i]),
+  );
+  assert.deepEqual(constants(/define NF_SCHEDULE_(\w+) (\d+)/g), named(SCHEDULES));
+  assert.deepEqual(constants(/define NF_REASON_(\w+) (\d+)/g), named(REASONS));
+});
