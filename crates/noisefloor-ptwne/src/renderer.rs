@@ -11,7 +11,8 @@ use crate::rng::Key;
 use crate::sampler::{Place, Sampler, Sampling};
 use crate::scene::Scene;
 use noisefloor::{
-    Batch, Film, ProgressiveSource, Repeats, Request, Rgb, SourceError, SourceInfo, Tile, TileGrid, ToneMapping,
+    Batch, Film, ProgressiveSource, Repeats, Request, Rgb, SourceError, SourceInfo, Tile, TileGrid,
+    ToneMapping,
     display::Display,
     source::{FirstHits, Reference, SourceIdentity},
 };

@@ -1,15 +1,16 @@
-//! At which exposure tiles may first stop: `exposure WIDTHxHEIGHT SPP SCENE…`, scenes by name or file; prints a table
-//! in Markdown (docs/benchmarks/exposure.md).
+//! At which exposure tiles may first stop: `exposure WIDTHxHEIGHT SPP SCENE…`, scenes by name or file;
+//! prints a table in Markdown (docs/benchmarks/exposure.md).
 //!
-//! Each row is a render whose criterion is satisfied with anything, so that the first tile stops as soon as the
-//! exposure counts as known. *Off* is by how much it is wrong then, against the log-average of the same view at SPP
-//! samples per pixel of another seed, pixel by pixel.
+//! Each row is a render whose criterion is satisfied with anything, so that the first tile stops as soon
+//! as the exposure counts as known. *Off* is by how much it is wrong then, against the log-average of the
+//! same view at SPP samples per pixel of another seed, pixel by pixel.
 
 #![expect(clippy::print_stdout, reason = "a table for people")]
 
 use noisefloor::criterion::{CriterionError, Needs, View};
 use noisefloor::{
-    Driver, Event, FixedSpp, Params, Schedule, StoppingCriterion, Tile, ToneMapping, Verdict, display::Display,
+    Driver, Event, FixedSpp, Params, Schedule, StoppingCriterion, Tile, ToneMapping, Verdict,
+    display::Display,
 };
 use noisefloor_ptwne::{Ptwne, RenderOptions, Scene, scenes};
 use std::error::Error;
@@ -41,7 +42,9 @@ impl StoppingCriterion for Hasty {
 
 fn main() -> Result<(), Box<dyn Error>> {
     let args: Vec<String> = std::env::args().skip(1).collect();
-    let [size, spp, names @ ..] = args.as_slice() else { return Err("exposure WIDTHxHEIGHT SPP SCENE…".into()) };
+    let [size, spp, names @ ..] = args.as_slice() else {
+        return Err("exposure WIDTHxHEIGHT SPP SCENE…".into());
+    };
     let (width, height) = size.split_once('x').ok_or("WIDTHxHEIGHT")?;
     let (size, spp): ((usize, usize), u64) = ((width.parse()?, height.parse()?), spp.parse()?);
     let batch = |step| Params::default().with_schedule(Schedule::Spaced { step });

@@ -235,11 +235,11 @@ impl<C: StoppingCriterion> Session<C> {
 
     /// Judges the tiles that are due, and returns those that are now done.
     ///
-    /// The first verdicts wait until every open tile has samples: the exposure is settled then, as that of the
-    /// converged picture, unless the tone mapping has one or [`Session::set_display`] was called. It is settled
-    /// again as samples come. No tile converges before its standard error is below 1.5 %, and when it moves by
-    /// more than 2 %, all tiles are judged again: one that had converged can be open again, so that
-    /// [`Session::requests`] has it, and is returned a second time when it is done.
+    /// The first verdicts wait until every open tile has samples: the exposure is settled then, as that of
+    /// the converged picture, unless the tone mapping has one or [`Session::set_display`] was called. It is
+    /// settled again as samples come. No tile converges before its standard error is below 1.5 %, and when
+    /// it moves by more than 2 %, all tiles are judged again: one that had converged can be open again, so
+    /// that [`Session::requests`] has it, and is returned a second time when it is done.
     ///
     /// # Errors
     /// [`SessionError::Fault`] if the samples pushed cannot be what they are said to be: no tile stops then, now or
@@ -264,7 +264,8 @@ impl<C: StoppingCriterion> Session<C> {
         }
         let (judged, waited): (Vec<Tile>, Vec<Tile>) =
             due_now.into_iter().partition(|t| self.is_for_verdict(t));
-        // What was judged under another exposure is judged again: all that is, as criteria look at neighbours, too
+        // What was judged under another exposure is judged again: all that is, as criteria look at
+        // neighbours, too
         let again: Vec<Tile> = match moved {
             true => self.film.grid().tiles().filter(|t| self.is_judged_again(t, &judged)).collect(),
             false => Vec::new(),
@@ -293,7 +294,8 @@ impl<C: StoppingCriterion> Session<C> {
             }
         }
 
-        // Tiles that had converged for the trained audience, and still have, have now what this audience wants.
+        // Tiles that had converged for the trained audience, and still have, have now what this audience
+        // wants.
         for tile in waited {
             if !self.is_for_verdict(&tile) {
                 stops.push(self.stop(tile.index, self.audience_reason(tile.index)));
@@ -318,8 +320,8 @@ impl<C: StoppingCriterion> Session<C> {
             && judged.binary_search_by_key(&tile.index, |t| t.index).is_err()
     }
 
-    /// Settles exposure and reference; says whether the exposure is another than that of earlier verdicts. `None`
-    /// if it is too early.
+    /// Settles exposure and reference; says whether the exposure is another than that of earlier verdicts.
+    /// `None` if it is too early.
     fn settle_display(&mut self) -> Option<bool> {
         let samples = self.film.total_samples();
         let due = match (self.display, self.settling) {
@@ -356,13 +358,14 @@ impl<C: StoppingCriterion> Session<C> {
     /// Whether the criterion has what it wants, or a less demanding audience has enough where the others are
     /// still expected to need more; and at an exposure that is known.
     fn is_satisfied(&self, verdict: &Verdict, samples: u64) -> bool {
-        let content = self.audience().slope < 1.0 && self.expected(verdict).is_some_and(|need| need <= samples);
+        let content =
+            self.audience().slope < 1.0 && self.expected(verdict).is_some_and(|need| need <= samples);
         let known = self.criterion.only_counts() || self.settling.is_none_or(|settling| settling.is_known());
         known && (verdict.converged || content)
     }
 
-    /// Files a verdict at another exposure on a tile that is not due: what is done stays done, or is open again.
-    /// Returns the stop if it has become another.
+    /// Files a verdict at another exposure on a tile that is not due: what is done stays done, or is open
+    /// again. Returns the stop if it has become another.
     fn take_again(&mut self, index: usize, verdict: Verdict, open: f64) -> Option<Stop> {
         let samples = self.film.spp(index);
         let (satisfied, max_spp) = (self.is_satisfied(&verdict, samples), self.params.max_spp);

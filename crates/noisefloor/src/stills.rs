@@ -172,8 +172,8 @@ impl<'a> SnapshotPair<'a> {
     /// how the pictures were made; with `None`, their origins tell, and where these do not, it is recognised
     /// from the pictures, where they show it.
     ///
-    /// An exposure by log-average is that of the converged picture, estimated from all samples compared; with a
-    /// reference, its own.
+    /// An exposure by log-average is that of the converged picture, estimated from all samples compared;
+    /// with a reference, its own.
     ///
     /// # Errors
     /// [`StillError`] if they do not fit, or there is nothing to hold the picture against.

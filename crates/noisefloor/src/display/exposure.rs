@@ -1,32 +1,38 @@
-//! The log-average luminance of a picture that is still noisy: what it will be once the picture has converged.
+//! The log-average luminance of a picture that is still noisy: what it will be once the picture has
+//! converged.
 //!
-//! The mean of a logarithm is bent by noise: a pixel whose light has not been met is left out or counts as nearly
-//! black, and a noisy one counts as too dark. So a logarithm is taken only of what is known. A pixel that is known
-//! by itself counts by itself. Those of a block of 2×2 that are not are pooled; if their mean is not known either,
-//! they go on to 4×4, 8×8 and so on. Dark pixels beside bright ones are so pooled with other dark pixels. Sums are
-//! kept on the way, so that sorting pixels by their own noisy values bends the result by the second order at most.
+//! The mean of a logarithm is bent by noise: a pixel whose light has not been met is left out or counts
+//! as nearly black, and a noisy one counts as too dark. So a logarithm is taken only of what is known. A
+//! pixel that is known by itself counts by itself. Those of a block of 2×2 that are not are pooled; if
+//! their mean is not known either, they go on to 4×4, 8×8 and so on. Dark pixels beside bright ones are
+//! so pooled with other dark pixels. Sums are kept on the way, so that sorting pixels by their own noisy
+//! values bends the result by the second order at most.
 
 use super::{DELTA, luminance};
 use crate::rgb::Rgb;
 use rayon::prelude::*;
 
-/// Squared ratio of a mean to its standard error from which it is known. With a larger one, blocks are larger, and
-/// what the picture changes by within them counts as too bright; with a smaller one, pixels are sorted by their
-/// noise, and count as too dark. Of 6 to 48, 6 to 9 did best (docs/benchmarks/exposure.md).
+/// Squared ratio of a mean to its standard error from which it is known. With a larger one, blocks are
+/// larger, and what the picture changes by within them counts as too bright; with a smaller one, pixels
+/// are sorted by their noise, and count as too dark. Of 6 to 48, 6 to 9 did best
+/// (docs/benchmarks/exposure.md).
 const ENOUGH: f64 = 8.0;
 /// Edge of the blocks that are pooled first, pixel by pixel.
 const BLOCK: usize = 8;
-/// Edge of the blocks that tell of the noise of a pixel. One difference of two halves says little by itself: halves
-/// that met the same light once differ by nothing.
+/// Edge of the blocks that tell of the noise of a pixel. One difference of two halves says little by
+/// itself: halves that met the same light once differ by nothing.
 const AROUND: usize = 4;
-/// Black pixels are taken for unmet light if no more than this is missing: where as much light as in the pixels
-/// beside them is expected to be met three times, it is missed once in 20.
+/// Black pixels are taken for unmet light if no more than this is missing: where as much light as in the
+/// pixels beside them is expected to be met three times, it is missed once in 20.
 const MISSED: f64 = 3.0;
 /// Blocks without any light, from [`BLOCK`] pixels on, are black unless all three beside them are lit.
 const LIT_BESIDE: usize = 3;
-/// Pixels that are left between known ones, below this share, are brighter by chance: a sample that few paths find
-/// is spread over more pixels than those that have it.
+/// Pixels that are left between known ones, below this share, are brighter by chance: a sample that few
+/// paths find is spread over more pixels than those that have it.
 const SCATTERED: f64 = 0.125;
+/// What the picture changes by within blocks bends the estimate as by this share of what twice as large a
+/// limit changes.
+const BENT: f64 = 1.0 / 3.0;
 /// Logarithm by which a pixel may be off whose light is not known.
 const UNKNOWN: f64 = 1.0;
 
@@ -78,8 +84,8 @@ impl Pool {
         Self { lit: 1.0, sum, variance, expected: sum * sum * noise.relative, ..Self::default() }
     }
 
-    /// What is left of up to four blocks. Black pixels join if light like that of the others may have missed them,
-    /// and if so many blocks are lit.
+    /// What is left of up to four blocks. Black pixels join if light like that of the others may have
+    /// missed them, and if so many blocks are lit.
     fn of(blocks: impl Iterator<Item = Self> + Clone, least: usize) -> Self {
         let mut all = blocks.clone().fold(Self::default(), |all, one| Self {
             lit: all.lit + one.lit,
@@ -102,11 +108,11 @@ impl Pool {
         all
     }
 
-    /// Counts the pixels if their mean is known: by its own variance, and by that of the pixels around it, which
-    /// grows with the light or with its square.
+    /// Counts the pixels if their mean is known: by its own variance, and by that of the pixels around
+    /// it, which grows with the light or with its square.
     fn count(&mut self, noise: Noise, tally: &mut Tally) {
         let variance = self.variance.max(self.expected.min(self.sum * noise.of_light));
-        if !(self.lit > 0.0 && self.sum > 0.0 && certainty(self.sum, variance) >= ENOUGH) {
+        if !(self.lit > 0.0 && self.sum > 0.0 && certainty(self.sum, variance) >= tally.enough) {
             return;
         }
         // E ln X ≈ ln E X − Var X/(2·(E X)²)
@@ -135,7 +141,8 @@ struct Noise {
 }
 
 impl Noise {
-    /// Of luminances and their variances. The noisiest pixel is left out of the first: it knows of no other.
+    /// Of luminances and their variances. The noisiest pixel is left out of the first: it knows of no
+    /// other.
     fn of(pixels: impl Iterator<Item = [f64; 2]>) -> Self {
         let (mut light, mut variance, mut relative, mut lit) = (0.0, 0.0, 0.0, 0.0);
         let mut worst = [0.0; 2];
@@ -163,6 +170,8 @@ const BINS: i32 = 256;
 /// Known pixels by their logarithms.
 #[derive(Clone, Debug)]
 struct Tally {
+    /// [`ENOUGH`], or another.
+    enough: f64,
     /// Pixels, and the sum of their logarithms.
     bins: Vec<[f64; 2]>,
     /// Squared standard error of the sum of all logarithms.
@@ -170,8 +179,8 @@ struct Tally {
 }
 
 impl Tally {
-    fn new() -> Self {
-        Self { bins: vec![[0.0; 2]; BINS as usize], variance: 0.0 }
+    fn new(enough: f64) -> Self {
+        Self { enough, bins: vec![[0.0; 2]; BINS as usize], variance: 0.0 }
     }
 
     fn add(&mut self, pixels: f64, log: f64, relative: f64) {
@@ -213,22 +222,37 @@ pub(crate) fn estimate(
 ) -> Option<LogAverage> {
     let row = |y: usize| (0..width).map(|x| pixel(x, y).filter(|p| p.luminance.is_finite())).collect();
     let rows: Vec<Vec<Option<NoisyPixel>>> = (0..height).into_par_iter().map(row).collect();
-    let found: Vec<LogAverage> = GRIDS.iter().filter_map(|&grid| on_grid(width, &rows, grid)).collect();
+    let on_grids = |enough| -> Vec<LogAverage> {
+        GRIDS.iter().filter_map(|&grid| on_grid(width, &rows, grid, enough)).collect()
+    };
+    let (found, coarse) = (on_grids(ENOUGH), on_grids(2.0 * ENOUGH));
+    let mean = mean_log(&found)?;
     let count = found.len() as f64;
-    let mean = found.iter().map(|one| one.value.ln()).sum::<f64>() / count;
     let scatter = found.iter().map(|one| (one.value.ln() - mean).powi(2)).sum::<f64>() / count;
     let error = found.iter().map(|one| one.error * one.error).sum::<f64>() / count;
-    (!found.is_empty()).then(|| LogAverage { value: mean.exp(), error: (error + scatter / count).sqrt() })
+    let bent = BENT * (mean_log(&coarse)? - mean);
+    Some(LogAverage { value: mean.exp(), error: (error + scatter / count + bent * bent).sqrt() })
+}
+
+fn mean_log(found: &[LogAverage]) -> Option<f64> {
+    let sum = found.iter().map(|one| one.value.ln()).sum::<f64>();
+    (!found.is_empty()).then(|| sum / found.len() as f64)
 }
 
 /// The same by blocks that begin at (`dx`, `dy`).
-fn on_grid(width: usize, rows: &[Vec<Option<NoisyPixel>>], (dx, dy): (usize, usize)) -> Option<LogAverage> {
+fn on_grid(
+    width: usize,
+    rows: &[Vec<Option<NoisyPixel>>],
+    (dx, dy): (usize, usize),
+    enough: f64,
+) -> Option<LogAverage> {
     let (mut across, mut down) = ((width + dx).div_ceil(BLOCK), (rows.len() + dy).div_ceil(BLOCK));
     let row_of_blocks = |top: usize| {
-        let mut tally = Tally::new();
+        let mut tally = Tally::new(enough);
         let block = |left: usize| {
             let at = |x: usize, y: usize| *rows.get(y.checked_sub(dy)?)?.get(x.checked_sub(dx)?)?;
-            let pixels = std::array::from_fn(|y| std::array::from_fn(|x| at(left * BLOCK + x, top * BLOCK + y)));
+            let pixels =
+                std::array::from_fn(|y| std::array::from_fn(|x| at(left * BLOCK + x, top * BLOCK + y)));
             pool_block(&pixels, &mut tally)
         };
         let pools: Vec<Pool> = (0..across).map(block).collect();
@@ -236,7 +260,7 @@ fn on_grid(width: usize, rows: &[Vec<Option<NoisyPixel>>], (dx, dy): (usize, usi
     };
     let parts: Vec<(Vec<Pool>, Tally)> = (0..down).into_par_iter().map(row_of_blocks).collect();
     // In their order, so that the sums are the same with any number of threads
-    let (mut pools, mut tally) = (Vec::with_capacity(across * down), Tally::new());
+    let (mut pools, mut tally) = (Vec::with_capacity(across * down), Tally::new(enough));
     for (part, counted) in parts {
         pools.extend(part);
         tally.merge(&counted);
@@ -305,8 +329,9 @@ fn pool_block(pixels: &Block<NoisyPixel>, tally: &mut Tally) -> Pool {
     pools[0]
 }
 
-/// Luminance and its variance. Where that is not given, it is the sample variance of 2×2 pixels: where the picture
-/// changes as much as it does from pixel to pixel, it counts as noise, and is known in larger blocks only.
+/// Luminance and its variance. Where that is not given, it is the sample variance of 2×2 pixels: where
+/// the picture changes as much as it does from pixel to pixel, it counts as noise, and is known in larger
+/// blocks only.
 fn with_variances(pixels: &Block<NoisyPixel>) -> Block<[f64; 2]> {
     let beside = |x: usize, y: usize| {
         let (x, y) = (x & !1, y & !1);
@@ -319,7 +344,8 @@ fn with_variances(pixels: &Block<NoisyPixel>) -> Block<[f64; 2]> {
     std::array::from_fn(|y| {
         std::array::from_fn(|x| {
             pixels[y][x].map(|NoisyPixel { luminance, deviation }| {
-                let variance = deviation.map_or_else(|| beside(x, y), |deviation| f64::from(deviation).powi(2));
+                let variance =
+                    deviation.map_or_else(|| beside(x, y), |deviation| f64::from(deviation).powi(2));
                 [f64::from(luminance), variance]
             })
         })
@@ -335,7 +361,8 @@ pub(crate) fn of_halves([(a, na), (b, nb)]: [(Rgb, f64); 2]) -> Option<NoisyPixe
     }
     let [a, b] = [a, b].map(|half| f64::from(luminance(half)));
     let mean = (na * a + nb * b) / all;
-    // A − B has σ²·(n_A + n_B)/(n_A·n_B), the mean of all σ²/(n_A + n_B). One half alone says nothing of its noise.
+    // A − B has σ²·(n_A + n_B)/(n_A·n_B), the mean of all σ²/(n_A + n_B). One half alone says nothing of
+    // its noise.
     let deviation = if na > 0.0 && nb > 0.0 { (a - b).abs() * (na * nb).sqrt() / all } else { mean };
     Some(NoisyPixel { luminance: mean as f32, deviation: Some(deviation as f32) })
 }

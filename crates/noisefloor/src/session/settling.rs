@@ -7,8 +7,8 @@ use serde::{Deserialize, Serialize};
 const KNOWN: f64 = 0.015;
 /// Change of the exposure, as a share of it, from which on earlier verdicts are looked at again.
 const MOVED: f64 = 0.02;
-/// Growth of all samples after which it is settled again: a pass over the film, as often as its noise has fallen by
-/// a tenth.
+/// Growth of all samples after which it is settled again: a pass over the film, as often as its noise has
+/// fallen by a tenth.
 const GROWTH: f64 = 1.25;
 
 /// What the exposure was settled from.
