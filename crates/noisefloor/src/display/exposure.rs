@@ -34,7 +34,7 @@ const SCATTERED: f64 = 0.125;
 const FAR: f64 = 100.0;
 /// What the picture changes by within blocks bends the estimate as by this share of what twice as large a
 /// limit changes.
-const BENT: f64 = 1.0 / 3.0;
+const BENT: f64 = 0.5;
 /// Logarithm by which a pixel may be off whose light is not known.
 const UNKNOWN: f64 = 1.0;
 

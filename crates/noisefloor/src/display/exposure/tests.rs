@@ -89,7 +89,7 @@ fn noise_and_zeros_do_not_bend_it() {
         let halves = met(&truth, |_| share, seed as u64);
         let found = of_pair(&halves);
         assert_sound(found, &truth, share);
-        assert!(found.error < 0.06, "{share}: {found:?}");
+        assert!(found.error < 0.1, "{share}: {found:?}");
         // The mean of the logarithms of pixels is what it is tested against: it is far away
         let naive = log_average(&rgb(&mean(&halves))).unwrap() - 1.0;
         assert!(share > 0.06 || naive.abs() > 0.15, "{share}: {naive}");
