@@ -150,9 +150,12 @@ struct LateLight;
 
 impl LateLight {
     fn push<C: StoppingCriterion>(session: &mut Session<C>, late: f32) {
-        for Request { tile, spp, .. } in session.requests() {
-            let value = if tile.index == 0 { late } else { 1.0 };
-            session.push(tile.index, spp, &vec![[value; 3]; tile.pixels()]).unwrap();
+        // Either half
+        for _ in 0..2 {
+            for Request { tile, spp, .. } in session.requests() {
+                let value = if tile.index == 0 { late } else { 1.0 };
+                session.push(tile.index, spp, &vec![[value; 3]; tile.pixels()]).unwrap();
+            }
         }
     }
 }
@@ -167,6 +170,10 @@ impl StoppingCriterion for ByExposure {
 
     fn fingerprint(&self) -> String {
         self.name()
+    }
+
+    fn needs(&self) -> Needs {
+        Needs::HALVES
     }
 
     fn judge(&mut self, view: &View<'_>, tiles: &[Tile]) -> Result<Vec<Verdict>, CriterionError> {
