@@ -81,7 +81,8 @@ fn certainty(sum: f64, variance: f64) -> f64 {
 impl Pool {
     fn pixel([sum, variance]: [f64; 2], noise: Noise) -> Self {
         if sum == 0.0 {
-            return Self { black: 1.0, ..Self::default() };
+            // Of one picture alone, the pixels beside it say that there is noise
+            return Self { black: 1.0, variance, ..Self::default() };
         }
         Self { lit: 1.0, sum, variance, expected: sum * sum * noise.relative, ..Self::default() }
     }
@@ -149,9 +150,12 @@ impl Noise {
     /// Of luminances and their variances.
     fn of(pixels: impl Iterator<Item = [f64; 2]>) -> Self {
         let (mut light, mut variance, mut relative, mut lit) = (0.0, 0.0, 0.0, 0.0);
-        for [luminance, noise] in pixels.filter(|[luminance, _]| *luminance != 0.0) {
+        for [luminance, noise] in pixels {
             light += luminance;
             variance += noise;
+            if luminance == 0.0 {
+                continue;
+            }
             relative += (noise / (luminance * luminance)).min(1.0);
             lit += 1.0;
         }
