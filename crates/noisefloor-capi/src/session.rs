@@ -158,7 +158,8 @@ pub unsafe extern "C" fn nf_session_requests(
 
 /// Judges the tiles that are due. newly_done, which may be NULL, becomes the number of tiles that are now
 /// done and were not before. The first verdicts wait until every open tile has samples, unless tone_mapping
-/// is NF_TONE_SRGB.
+/// is NF_TONE_SRGB. When the exposure of the finished picture turns out to be another than was estimated,
+/// tiles that were done can be open again: render until there are no requests.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn nf_session_judge(session: *const NfSession, newly_done: *mut usize) -> NfStatus {
     guard(|| {

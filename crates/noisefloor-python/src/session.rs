@@ -202,7 +202,9 @@ impl PySession {
 
     /// Judges the tiles that are due, on all cores, and returns a list of Stop: those that are now done.
     ///
-    /// The first verdicts wait until every open tile has samples, unless tone_mapping is "srgb".
+    /// The first verdicts wait until every open tile has samples, unless tone_mapping is "srgb". When the
+    /// exposure of the finished picture turns out to be another than was estimated, tiles that were done
+    /// can be open again: render until done is true.
     ///
     /// Warns of samples that are likely to be wrong, each kind once. Raises FaultError if they cannot be what
     /// they are said to be: no tile is done then. Raises CriterionError if the model cannot judge these tiles.

@@ -4,7 +4,7 @@ use crate::container::{self, Fault, Format, MAX_PAYLOAD};
 use crate::display::Display;
 use crate::film::{Film, FilmHead};
 use crate::params::Params;
-use crate::session::{Goal, TileState};
+use crate::session::{Goal, Settling, TileState};
 use crate::source::{IdentityChange, SourceIdentity};
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
@@ -12,7 +12,7 @@ use std::io::{self, Read, Write};
 use thiserror::Error;
 
 const FORMAT: Format = Format { magic: *b"NFCHECK\0", version: VERSION };
-const VERSION: u32 = 10;
+const VERSION: u32 = 11;
 
 /// A snapshot of a session, for resuming it: samples, verdicts and the display. Made by
 /// [`Session::checkpoint`](crate::Session::checkpoint), resumed by
@@ -29,6 +29,7 @@ pub struct Checkpoint<'a> {
     pub(crate) state: Vec<u8>,
     pub(crate) params: Params,
     pub(crate) display: Option<Display>,
+    pub(crate) settling: Option<Settling>,
     pub(crate) film: Cow<'a, Film>,
     pub(crate) tiles: Cow<'a, [TileState]>,
 }
@@ -42,6 +43,7 @@ struct Head<'a> {
     state: Cow<'a, [u8]>,
     params: Params,
     display: Option<Display>,
+    settling: Option<Settling>,
     film: FilmHead,
     tiles: Cow<'a, [TileState]>,
 }
@@ -111,11 +113,11 @@ impl Checkpoint<'_> {
     /// [`CheckpointError`] if it is foreign, damaged, oversized, or of another version.
     pub fn read(from: impl Read) -> Result<Checkpoint<'static>, CheckpointError> {
         let whole = |head: Head<'static>, from: &mut dyn Read| {
-            let Head { job, source, criterion, state, params, display, film, tiles } = head;
+            let Head { job, source, criterion, state, params, display, settling, film, tiles } = head;
             let film = Film::read_pixels(film, from).map_err(ended)?;
             let film = film.ok_or_else(|| Fault::Damaged("there is no such film".into()))?;
             let (criterion, state, film) = (criterion.into_owned(), state.into_owned(), Cow::Owned(film));
-            Ok(Checkpoint { job, source, criterion, state, params, display, film, tiles })
+            Ok(Checkpoint { job, source, criterion, state, params, display, settling, film, tiles })
         };
         Ok(FORMAT.read_with_body(from, whole)?)
     }
@@ -146,6 +148,7 @@ impl Checkpoint<'_> {
             state: Cow::Borrowed(&self.state),
             params: self.params,
             display: self.display,
+            settling: self.settling,
             film: self.film.head(),
             tiles: Cow::Borrowed(&self.tiles),
         };
@@ -178,6 +181,12 @@ impl Checkpoint<'_> {
         let exposed = |display: &Display| display.exposure().is_finite() && display.exposure() > 0.0;
         if !self.display.as_ref().is_none_or(exposed) {
             return Err(CheckpointError::Invalid("its exposure is not a positive finite number"));
+        }
+        let sound = |settling: &Settling| {
+            self.display.is_some() && settling.error >= 0.0 && settling.samples <= self.film.total_samples()
+        };
+        if !self.settling.as_ref().is_none_or(sound) {
+            return Err(CheckpointError::Invalid("it does not say how well its exposure is known"));
         }
         let grid = fresh.grid();
         let fits = |(index, state): (usize, &TileState)| {

@@ -1,10 +1,12 @@
 //! From linear radiance to what a screen shows: exposure, tone mapping, luminance.
 
 use crate::rgb::Rgb;
+use exposure::{LogAverage, NoisyPixel};
 use multiversion::multiversion;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
+pub(crate) mod exposure;
 mod srgb;
 mod tone_curve;
 pub use srgb::{srgb_decode, srgb_encode};
@@ -36,8 +38,8 @@ pub enum ToneMapping {
     Reinhard {
         /// What the log-average luminance becomes, above 0; 0.18 for an average scene.
         key: f32,
-        /// Smallest luminance that becomes white, after exposure, above 0; `None` compresses without burning
-        /// out (eq. 3).
+        /// Smallest luminance that becomes white, after exposure, above 0; `None` compresses without
+        /// burning out (eq. 3).
         white: Option<f32>,
     },
     /// Plain sRGB: multiply, clamp to [0, 1], encode.
@@ -97,24 +99,56 @@ impl ToneMapping {
         }
     }
 
-    /// Settles the exposure for a picture. Use the result for this picture, its halves and its reference
-    /// alike: if the log-average drifted, the drift would look like noise. `pixels` are linear radiance;
-    /// those that are black or not finite are skipped. A black picture gets exposure 1.
+    /// Settles the exposure for a converged picture. Use the result for this picture, its halves and its
+    /// reference alike: if the log-average drifted, the drift would look like noise. `pixels` are linear
+    /// radiance; those that are black or not finite are skipped. A black picture gets exposure 1.
+    ///
+    /// Noise bends a log-average, by a factor of 20 where most pixels have met no light yet: see
+    /// [`ToneMapping::settle_noisy`].
     pub fn settle(&self, pixels: &[Rgb]) -> Display {
+        self.settle_by(|| log_average(pixels).map(|value| LogAverage { value, error: 0.0 })).display
+    }
+
+    /// Settles the exposure that a noisy picture of this width will have once it has converged, from the
+    /// picture alone: what differs among 2×2 pixels counts as noise. Two renderings tell noise from
+    /// texture: see [`Film::settle`](crate::Film::settle).
+    pub fn settle_noisy(&self, width: usize, pixels: &[Rgb]) -> Settled {
+        let height = pixels.len().checked_div(width).unwrap_or(0);
+        let pixel = |x: usize, y: usize| {
+            Some(NoisyPixel { luminance: luminance(pixels[y * width + x]), deviation: None })
+        };
+        self.settle_by(|| exposure::estimate((width, height), pixel))
+    }
+
+    /// The display, by the log-average where it depends on that.
+    pub(crate) fn settle_by(&self, log_average: impl FnOnce() -> Option<LogAverage>) -> Settled {
+        let known = |exposure, curve| Settled { display: Display { exposure, curve }, error: 0.0 };
         match *self {
             Self::Reinhard { key, white } => {
-                let exposure = log_average(pixels).map_or(1.0, |average| (f64::from(key) / average) as f32);
-                Display { exposure, curve: Curve::Reinhard { white } }
+                let curve = Curve::Reinhard { white };
+                let Some(LogAverage { value, error }) = log_average() else { return known(1.0, curve) };
+                Settled { display: Display { exposure: (f64::from(key) / value) as f32, curve }, error }
             }
-            Self::Srgb { exposure } => Display { exposure, curve: Curve::Clamp },
-            Self::Custom { exposure, curve } => Display { exposure, curve: Curve::Custom(curve) },
+            Self::Srgb { exposure } => known(exposure, Curve::Clamp),
+            Self::Custom { exposure, curve } => known(exposure, Curve::Custom(curve)),
         }
     }
 }
 
-/// exp(mean ln(δ + L)), Reinhard et al. 2002, eq. 1 with the 1/N inside the exponential as their text has it,
-/// over the pixels that are not black: a model on black would else be shown the brighter the smaller it is,
-/// until it burns out. `None` if there is none.
+/// A display, and how well its exposure is known.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct Settled {
+    /// The display.
+    pub display: Display,
+    /// Standard error of the exposure, as a share of it; 0 if it does not depend on the picture, or the
+    /// picture is black.
+    pub error: f64,
+}
+
+/// exp(mean ln(δ + L)), Reinhard et al. 2002, eq. 1 with the 1/N inside the exponential as their text has
+/// it, over the pixels that are not black: a model on black would else be shown the brighter the smaller
+/// it is, until it burns out. `None` if there is none.
 fn log_average(pixels: &[Rgb]) -> Option<f64> {
     let lit = || pixels.iter().map(|&p| f64::from(luminance(p))).filter(|&l| l > 0.0 && l.is_finite());
     let geometric_mean = |delta: f64| {
@@ -217,8 +251,8 @@ impl Display {
     }
 }
 
-/// [`Display::luma`] of many pixels. The arithmetic is that of IEEE 754 with any instructions: all processors
-/// agree to the bit.
+/// [`Display::luma`] of many pixels. The arithmetic is that of IEEE 754 with any instructions: all
+/// processors agree to the bit.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx2", "x86_64+avx2"))]
 pub(crate) fn luma_row(display: &Display, linear: &[Rgb], shown: &mut [f32]) {
     if let Curve::Custom(_) = display.curve {

@@ -1,6 +1,7 @@
 //! The film: batches of every tile, in two independent halves.
 
-use crate::display::luminance;
+use crate::display::exposure::{self, NoisyPixel};
+use crate::display::{Settled, ToneMapping, luminance};
 use crate::rgb::Rgb;
 use crate::source::{Request, Sequence};
 use crate::tile::{Tile, TileGrid};
@@ -353,6 +354,19 @@ impl Film {
             // The difference of two huge values may be none
             *mean = if near.is_finite() { near } else { a * weight + b * (1.0 - weight) };
         });
+    }
+
+    /// Settles the exposure that the picture will have once it has converged. The halves tell noise from
+    /// texture; without them, [`ToneMapping::settle_noisy`] says what does. Pixels without samples are left
+    /// out.
+    pub fn settle(&self, tone: &ToneMapping) -> Settled {
+        let (grid, halves) = (self.grid, self.has_halves());
+        let pixel = |x: usize, y: usize| {
+            let [a, b] = self.pixel_halves(grid.index_at(x, y), y * grid.width() + x);
+            let pixel = exposure::of_halves([a, b].map(|(mean, spp)| (mean, spp as f64)))?;
+            Some(NoisyPixel { deviation: pixel.deviation.filter(|_| halves), ..pixel })
+        };
+        tone.settle_by(|| exposure::estimate((grid.width(), grid.height()), pixel))
     }
 
     /// The picture so far: mean linear radiance, row-major.

@@ -1,7 +1,7 @@
 //! The push loop: for a renderer that owns its main loop.
 
 use crate::criterion::{CriterionError, StoppingCriterion, Verdict, View};
-use crate::display::{Display, ToneMapping};
+use crate::display::{Display, Settled, ToneMapping};
 use crate::film::{Film, FilmError};
 use crate::params::{Audience, Params, ParamsError};
 use crate::rgb::Rgb;
@@ -11,7 +11,10 @@ use crate::tile::{Tile, TileError, TileGrid};
 use crate::watch::{Fault, Warning, Watch};
 use thiserror::Error;
 
+mod settling;
 mod stop;
+pub(crate) use settling::Settling;
+use settling::is_another;
 pub(crate) use stop::{Goal, TileState};
 pub use stop::{Interruption, Stop, StopReason};
 
@@ -70,6 +73,8 @@ pub struct Session<C = Box<dyn StoppingCriterion + Send>> {
     criterion: C,
     params: Params,
     display: Option<Display>,
+    /// What the display was settled from; `None` if it was set, or is not there yet.
+    settling: Option<Settling>,
     reference: Option<Reference>,
     /// The reference as displayed, once the display is settled.
     displayed_reference: Option<Vec<Rgb>>,
@@ -103,6 +108,7 @@ impl<C: StoppingCriterion> Session<C> {
             criterion,
             params,
             display,
+            settling: None,
             reference: None,
             displayed_reference: None,
             tiles,
@@ -125,9 +131,15 @@ impl<C: StoppingCriterion> Session<C> {
         &self.params
     }
 
-    /// How radiance is displayed; `None` until it is settled.
+    /// How radiance is displayed; `None` until it is settled. All verdicts that stand were given with it. An
+    /// exposure by log-average is settled again as samples come: until no tile is open, it can change.
     pub fn display(&self) -> Option<&Display> {
         self.display.as_ref()
+    }
+
+    /// How the picture is to be shown so far: [`Session::display`], or as it would be settled now.
+    pub fn display_so_far(&self) -> Display {
+        self.display.unwrap_or_else(|| self.film.settle(&self.params.tone_mapping).display)
     }
 
     /// Fixes how radiance is displayed before that is settled automatically: for renderers with an exposure
@@ -139,7 +151,7 @@ impl<C: StoppingCriterion> Session<C> {
         if self.tiles.iter().any(|tile| tile.verdict.is_some()) {
             return Err(SessionError::Judged);
         }
-        self.display = Some(display);
+        (self.display, self.settling) = (Some(display), None);
         self.displayed_reference = None;
         Ok(())
     }
@@ -223,17 +235,22 @@ impl<C: StoppingCriterion> Session<C> {
 
     /// Judges the tiles that are due, and returns those that are now done.
     ///
-    /// The first verdicts wait until every open tile has samples: the exposure is settled then, once and for
-    /// all, unless the tone mapping is plain sRGB or [`Session::set_display`] was called.
+    /// The first verdicts wait until every open tile has samples: the exposure is settled then, as that of
+    /// the converged picture, unless the tone mapping has one or [`Session::set_display`] was called. It is
+    /// settled again as samples come. No tile converges before its standard error is below 1.5 %, and when
+    /// it moves by more than 2 %, all tiles are judged again: one that had converged can be open again, so
+    /// that [`Session::requests`] has it, and is returned a second time when it is done.
     ///
     /// # Errors
     /// [`SessionError::Fault`] if the samples pushed cannot be what they are said to be: no tile stops then, now or
     /// later. [`SessionError::Criterion`] if the criterion does not fit the job.
     pub fn judge(&mut self) -> Result<Vec<Stop>, SessionError> {
         let due: Vec<Tile> = self.film.grid().tiles().filter(|t| self.is_due(t.index)).collect();
-        if due.is_empty() || !self.settle_display() {
+        if due.is_empty() {
             return Ok(Vec::new());
         }
+        let before = (self.display, self.settling);
+        let Some(moved) = self.settle_display() else { return Ok(Vec::new()) };
         self.watch.look()?;
         let (first, doubts) = (self.params.first_verdict(), self.watch.doubts());
         let (early, due_now): (Vec<Tile>, Vec<Tile>) = due.iter().partition(|t| {
@@ -247,21 +264,41 @@ impl<C: StoppingCriterion> Session<C> {
         }
         let (judged, waited): (Vec<Tile>, Vec<Tile>) =
             due_now.into_iter().partition(|t| self.is_for_verdict(t));
+        // What was judged under another exposure is judged again: all that is, as criteria look at
+        // neighbours, too
+        let again: Vec<Tile> = match moved {
+            true => self.film.grid().tiles().filter(|t| self.is_judged_again(t, &judged)).collect(),
+            false => Vec::new(),
+        };
 
-        // Tiles that had converged for the trained audience have now what this audience wants.
-        let mut stops: Vec<Stop> =
-            waited.iter().map(|t| self.stop(t.index, self.audience_reason(t.index))).collect();
-
-        // Ask the criterion for the others.
-        if !judged.is_empty() {
+        // Ask the criterion.
+        let mut stops = Vec::new();
+        if !(judged.is_empty() && again.is_empty()) {
             let Some(view) = View::of(&self.film, &self.display, &self.params, &self.displayed_reference)
             else {
                 return Ok(stops);
             };
-            let verdicts = self.criterion.judge(&view, &judged)?;
+            let asked: Vec<Tile> = again.iter().chain(&judged).copied().collect();
+            let verdicts = self.criterion.judge(&view, &asked);
+            if verdicts.is_err() {
+                // Nothing was looked at again yet
+                (self.display, self.settling, self.displayed_reference) = (before.0, before.1, None);
+            }
+            let mut verdicts = verdicts?.into_iter();
             let open = self.open_tiles() as f64 / self.tiles.len() as f64;
+            for (tile, verdict) in again.into_iter().zip(&mut verdicts) {
+                stops.extend(self.take_again(tile.index, verdict, open));
+            }
             for (tile, verdict) in judged.into_iter().zip(verdicts) {
                 stops.extend(self.take(tile.index, verdict, open));
+            }
+        }
+
+        // Tiles that had converged for the trained audience, and still have, have now what this audience
+        // wants.
+        for tile in waited {
+            if !self.is_for_verdict(&tile) {
+                stops.push(self.stop(tile.index, self.audience_reason(tile.index)));
             }
         }
         Ok(stops)
@@ -277,42 +314,104 @@ impl<C: StoppingCriterion> Session<C> {
         matches!(self.tiles[tile.index].goal, Goal::Verdict { .. })
     }
 
-    /// Settles exposure and reference; false if it is too early.
-    fn settle_display(&mut self) -> bool {
-        if self.display.is_none() {
-            // A tile that is done without samples has none to wait for.
-            let waits = |(t, state): (usize, &TileState)| state.stop.is_none() && self.film.spp(t) == 0;
-            if self.tiles.iter().enumerate().any(waits) {
-                return false;
+    /// Whether a tile has been judged, or looked at with its neighbours, and is not going to be now.
+    fn is_judged_again(&self, tile: &Tile, judged: &[Tile]) -> bool {
+        self.has_enough(self.film.half_counts(tile.index), 1)
+            && judged.binary_search_by_key(&tile.index, |t| t.index).is_err()
+    }
+
+    /// Settles exposure and reference; says whether the exposure is another than that of earlier verdicts.
+    /// `None` if it is too early.
+    fn settle_display(&mut self) -> Option<bool> {
+        let samples = self.film.total_samples();
+        let due = match (self.display, self.settling) {
+            (Some(_), None) => false,
+            (Some(_), Some(settling)) => settling.is_due(samples),
+            (None, _) => {
+                // A tile that is done without samples has none to wait for.
+                let waits = |(t, state): (usize, &TileState)| state.stop.is_none() && self.film.spp(t) == 0;
+                if self.tiles.iter().enumerate().any(waits) {
+                    return None;
+                }
+                true
             }
-            self.display = Some(self.params.tone_mapping.settle(&self.film.image()));
+        };
+        let mut moved = false;
+        if due {
+            let Settled { display, error, .. } = self.film.settle(&self.params.tone_mapping);
+            self.settling = Some(Settling { samples, error });
+            if self.display.is_none_or(|before| is_another(&before, &display)) {
+                moved = self.display.is_some();
+                self.display = Some(display);
+                self.displayed_reference = None;
+            }
         }
         if let (Some(display), Some(reference), None) =
             (&self.display, &self.reference, &self.displayed_reference)
         {
             self.displayed_reference = Some(reference.pixels.iter().map(|&p| display.encode(p)).collect());
         }
-        true
+        // A criterion that only counts says the same of any picture
+        Some(moved && !self.criterion.only_counts())
+    }
+
+    /// Whether the criterion has what it wants, or a less demanding audience has enough where the others are
+    /// still expected to need more; and at an exposure that is known.
+    fn is_satisfied(&self, verdict: &Verdict, samples: u64) -> bool {
+        let content =
+            self.audience().slope < 1.0 && self.expected(verdict).is_some_and(|need| need <= samples);
+        let known = self.criterion.only_counts() || self.settling.is_none_or(|settling| settling.is_known());
+        known && (verdict.converged || content)
+    }
+
+    /// Files a verdict at another exposure on a tile that is not due: what is done stays done, or is open
+    /// again. Returns the stop if it has become another.
+    fn take_again(&mut self, index: usize, verdict: Verdict, open: f64) -> Option<Stop> {
+        let samples = self.film.spp(index);
+        let (satisfied, max_spp) = (self.is_satisfied(&verdict, samples), self.params.max_spp);
+        let next = self.next_verdict(samples, self.expected(&verdict), open);
+        let state = &mut self.tiles[index];
+        state.verdict = Some(verdict);
+        if let Some(stop) = &mut state.stop {
+            (stop.probability, stop.unfamiliar) = (verdict.probability, verdict.unfamiliar);
+        }
+        let converged = state.stop.is_some_and(|stop| stop.reason == StopReason::Converged);
+        match state.goal {
+            _ if satisfied => None,
+            Goal::Verdict { spp, .. } if state.stop.is_none() => {
+                state.goal = Goal::Verdict { spp, streak: 0 };
+                None
+            }
+            _ if state.stop.is_none() || converged => {
+                (state.stop, state.goal) = (None, Goal::Verdict { spp: next, streak: 0 });
+                (samples >= max_spp).then(|| self.stop(index, StopReason::MaxSpp))
+            }
+            _ => None,
+        }
+    }
+
+    /// Samples at which a tile is judged next that is not satisfied now.
+    fn next_verdict(&self, samples: u64, expected: Option<u64>, open: f64) -> u64 {
+        // Where the exposure is not known yet, what the criterion expects may have come
+        let ahead = expected.filter(|&need| need > samples);
+        self.params.schedule.next(samples, ahead, open).min(self.params.max_spp)
     }
 
     /// Files one verdict, with the share of tiles that were open before; returns the stop if the tile is done by
     /// it.
     fn take(&mut self, index: usize, verdict: Verdict, open: f64) -> Option<Stop> {
         let samples = self.film.spp(index);
-        let Params { schedule, consecutive, max_spp, .. } = self.params;
-        let (audience, expected) = (self.audience(), self.expected(&verdict));
-        let state = &mut self.tiles[index];
-        state.verdict = Some(verdict);
-        // A less demanding audience has enough where the others are still expected to need more
-        let content = audience.slope < 1.0 && expected.is_some_and(|need| need <= samples);
-        let converged = verdict.converged || content;
-        let streak = match state.goal {
-            Goal::Verdict { streak, .. } if converged => streak + 1,
+        let Params { consecutive, max_spp, .. } = self.params;
+        let (audience, satisfied) = (self.audience(), self.is_satisfied(&verdict, samples));
+        let streak = match self.tiles[index].goal {
+            Goal::Verdict { streak, .. } if satisfied => streak + 1,
             _ => 0,
         };
         // Asked again about much the same samples, a criterion would say the same
-        let expected = expected.filter(|_| streak == 0);
-        state.goal = Goal::Verdict { spp: schedule.next(samples, expected, open).min(max_spp), streak };
+        let expected = self.expected(&verdict).filter(|_| streak == 0);
+        let spp = self.next_verdict(samples, expected, open);
+        let state = &mut self.tiles[index];
+        (state.verdict, state.goal) = (Some(verdict), Goal::Verdict { spp, streak });
         if streak >= consecutive {
             let wanted = audience.samples(samples);
             if wanted <= samples {

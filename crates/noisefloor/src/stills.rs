@@ -2,8 +2,9 @@
 
 use crate::criterion::CriterionError;
 use crate::descriptor::Described;
+use crate::display::exposure::{self, NoisyPixel};
 use crate::display::{Display, ToneMapping, luminance};
-use crate::evidence::{Evidence, Rendering, Samples, TilePlanes};
+use crate::evidence::{Evidence, Rendering, Samples, TilePlanes, residual_scale};
 use crate::nested::shared_samples;
 use crate::oracle::Oracle;
 use crate::rgb::Rgb;
@@ -171,6 +172,9 @@ impl<'a> SnapshotPair<'a> {
     /// how the pictures were made; with `None`, their origins tell, and where these do not, it is recognised
     /// from the pictures, where they show it.
     ///
+    /// An exposure by log-average is that of the converged picture, estimated from all samples compared;
+    /// with a reference, its own.
+    ///
     /// # Errors
     /// [`StillError`] if they do not fit, or there is nothing to hold the picture against.
     pub fn new(
@@ -181,11 +185,12 @@ impl<'a> SnapshotPair<'a> {
         samples: Option<Samples>,
     ) -> Result<Self, StillError> {
         others.iter().try_for_each(|other| image.fits(other))?;
-        let display = if image.display_referred { Display::SRGB } else { tone.settle(&image.pixels) };
+        let alone = || tone.settle_noisy(image.size.0, &image.pixels).display;
         let (samples, others) = match samples {
             _ if evidence != Evidence::Halves => (Samples::Independent, others.to_vec()),
             Some(samples) => (samples, others.to_vec()),
-            None => recognise(image, others, &display)?,
+            None if image.display_referred => recognise(image, others, &Display::SRGB)?,
+            None => recognise(image, others, &alone())?,
         };
         if evidence == Evidence::Halves && samples == Samples::Independent {
             check_apart(&others)?;
@@ -198,6 +203,12 @@ impl<'a> SnapshotPair<'a> {
                 let cleanest = others.iter().max_by(|a, b| a.spp.total_cmp(&b.spp));
                 Some(Cow::Borrowed(*cleanest.ok_or(StillError::Nothing)?))
             }
+        };
+        let display = match (&other, evidence) {
+            _ if image.display_referred => Display::SRGB,
+            (None, _) => alone(),
+            (Some(reference), Evidence::Reference) => tone.settle(&reference.pixels),
+            (Some(other), _) => settle(&tone, image, other, samples),
         };
         Ok(Self { image, other, evidence, samples, display, viewing: Viewing::default() })
     }
@@ -282,6 +293,23 @@ impl<'a> SnapshotPair<'a> {
         let describe = |&tile: &Tile| Ok(oracle.describe(&self.planes(tile)?, self.image.spp.max(1.0))?);
         tiles.par_iter().map(describe).collect()
     }
+}
+
+/// The exposure of the converged picture, from both renderings of it: the same, whichever is judged.
+fn settle(tone: &ToneMapping, image: &Still, other: &Still, samples: Samples) -> Display {
+    let (fewer, more) = if image.spp <= other.spp { (image, other) } else { (other, image) };
+    let pixel = |x: usize, y: usize| {
+        let [a, b] = [fewer, more].map(|still| still.pixels[y * image.size.0 + x]);
+        match samples {
+            Samples::Independent => exposure::of_halves([(a, fewer.spp), (b, more.spp)]),
+            Samples::Nested => {
+                let [a, b] = [a, b].map(luminance);
+                let scale = residual_scale(more.spp, fewer.spp, samples);
+                Some(NoisyPixel { luminance: b, deviation: scale.map(|scale| (b - a).abs() * scale) })
+            }
+        }
+    };
+    tone.settle_by(|| exposure::estimate(image.size, pixel)).display
 }
 
 /// Whether rows of differences have a mean that their changes from pixel to pixel do not explain.

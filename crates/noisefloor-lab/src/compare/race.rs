@@ -231,9 +231,9 @@ impl Course<'_> {
         Ok((Race { entrants, curve, tile_seconds, cancelled }, yardstick))
     }
 
-    /// All judge by one way to the screen, settled as a session would.
+    /// All judge by one way to the screen: that of the converged picture.
     fn settle(&self, field: &mut Field) -> Result<Yardstick, LabError> {
-        let display = self.params.tone_mapping.settle(&field.film.image());
+        let display = self.params.tone_mapping.settle(self.truth);
         field.entrants.iter_mut().try_for_each(|e| e.session.set_display(display))?;
         let eye = Eye { pixels_per_degree: self.pixels_per_degree, vision: self.vision.clone() };
         Yardstick::new(field.film.grid(), display, self.truth.to_vec(), eye)

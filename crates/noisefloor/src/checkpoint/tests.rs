@@ -203,6 +203,9 @@ fn what_does_not_hold_together_is_refused() {
     }
     assert!(refused(&|c| c.tiles.to_mut().swap(0, 1)));
     assert!(refused(&|c| c.display = Some(crate::ToneMapping::Srgb { exposure: f32::NAN }.settle(&[]))));
+    for (samples, error) in [(1, f64::NAN), (u64::MAX, 0.0)] {
+        assert!(refused(&|c| c.settling = Some(Settling { samples, error })));
+    }
     assert!(refused(&|c| c.state = vec![1, 2, 3]));
     assert!(refused(&|c| c.film.to_mut().corrupt(0)));
     assert!(refused(&|c| c.film.to_mut().corrupt(1)));

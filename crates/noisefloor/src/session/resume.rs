@@ -21,6 +21,7 @@ impl<C: StoppingCriterion> Session<C> {
             state: self.criterion.state().ok_or_else(unsaid)?,
             params: self.params,
             display: self.display,
+            settling: self.settling,
             film: Cow::Borrowed(&self.film),
             tiles: Cow::Borrowed(&self.tiles),
         })
@@ -46,6 +47,7 @@ impl<C: StoppingCriterion> Session<C> {
             state.stop = state.stop.filter(|stop: &Stop| stop.reason.is_final());
         }
         let film = checkpoint.film.into_owned();
-        Ok(Self { film, tiles, display: checkpoint.display, displayed_reference: None, ..self })
+        let Checkpoint { display, settling, .. } = checkpoint;
+        Ok(Self { film, tiles, display, settling, displayed_reference: None, ..self })
     }
 }

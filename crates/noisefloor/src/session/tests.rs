@@ -128,19 +128,6 @@ fn nothing_is_judged_before_every_tile_has_samples() {
 }
 
 #[test]
-fn the_exposure_is_frozen_at_the_first_verdict() {
-    let mut s = session(500, false, steps_of_10());
-    for (n, value) in [(100, 0.3), (100, 3.0)] {
-        for tile in 0..3 {
-            let pixels = s.film().grid().tile(tile).pixels();
-            s.push(tile, n, &vec![[value; 3]; pixels]).unwrap();
-        }
-        s.judge().unwrap();
-        assert!((s.display().unwrap().exposure() - 0.18 / 0.3).abs() < 1e-4);
-    }
-}
-
-#[test]
 fn closing_keeps_what_is_done() {
     let mut s = session(100, true, steps_of_10());
     for _ in 0..2 {

@@ -126,8 +126,7 @@ impl Output {
         let guide = denoised.guide.as_ref();
         let image =
             denoised.denoiser.denoise(&guide.map_or(picture, |guide| picture.guided(guide, wants)))?;
-        let display = session.display().copied();
-        let display = display.unwrap_or_else(|| session.params().tone_mapping.settle(&image));
+        let display = session.display_so_far();
         let encoded: Vec<Rgb> = image.iter().map(|&p| display.encode(p)).collect();
         let viewing = session.params().viewing;
         denoised.spp_without =

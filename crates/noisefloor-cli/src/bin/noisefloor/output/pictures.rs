@@ -38,8 +38,7 @@ impl Output {
         write_exr(self.path("image.exr"), &layers)?;
 
         // image.png, stops.png and noise.png: as the oracle saw it
-        let settle = || session.params().tone_mapping.settle(&film.image());
-        let display = session.display().copied().unwrap_or_else(settle);
+        let display = session.display_so_far();
         let shown = Canvas::of_pixels(width, height, |pixel| display.encode(radiance(pixel)));
         shown.save(self.path("image.png"))?;
         let (marks, scale) = marks(&tiles);

@@ -83,8 +83,7 @@ fn reduced(session: &Session) -> Canvas {
     let grid = film.grid();
     let step = grid.width().max(grid.height()).div_ceil(EDGE);
     let (width, height) = (grid.width().div_ceil(step), grid.height().div_ceil(step));
-    let display = session.display().copied();
-    let display = display.unwrap_or_else(|| session.params().tone_mapping.settle(&film.image()));
+    let display = session.display_so_far();
     let mean = |pixel: usize| -> Rgb {
         let (left, top) = (pixel % width * step, pixel / width * step);
         let (mut sum, mut count) = ([0.0; 3], 0.0);
