@@ -25,16 +25,16 @@ pub struct DataArgs {
 #[derive(Debug, Args)]
 pub struct SearchArgs {
     /// What is computed from a tile (for --corpus; a table has its own).
-    #[arg(long, value_enum, default_value_t = DescriptorChoice::Visible)]
+    #[arg(long, value_enum, default_value_t = DescriptorChoice::Visible, conflicts_with = "table")]
     pub(super) descriptor: DescriptorChoice,
     /// What is trained [default: line for the visible descriptor, svm for others].
     #[arg(long, value_enum)]
     pub(super) machine: Option<MachineChoice>,
     /// σ of the noise mask of the compact descriptor, 0.3…1.5 pixels (for --corpus; a table has its own).
-    #[arg(long, default_value_t = 1.0, value_name = "PIXELS")]
+    #[arg(long, default_value_t = 1.0, value_name = "PIXELS", conflicts_with = "table")]
     pub(super) sigma: f32,
     /// What tiles are compared with (for --corpus; a table has its own).
-    #[arg(long, value_enum, default_value_t = EvidenceChoice::Halves)]
+    #[arg(long, value_enum, default_value_t = EvidenceChoice::Halves, conflicts_with = "table")]
     pub(super) evidence: EvidenceChoice,
     #[command(flatten)]
     pub(super) viewing: ViewingArgs,
