@@ -223,7 +223,8 @@ impl Eyes {
     /// Reads a file.
     ///
     /// # Errors
-    /// [`EyesError`] if it cannot be read, is no regular file or longer than a megabyte, or holds something else.
+    /// [`EyesError`] if it cannot be read, is no regular file or longer than a megabyte, or holds something
+    /// else.
     pub fn read(path: &Path) -> Result<Self, EyesError> {
         let io = |source| EyesError::Io { path: path.to_owned(), source };
         let refused = |what| EyesError::File { path: path.to_owned(), what };
@@ -255,7 +256,8 @@ impl Eyes {
             && version > VERSION
         {
             return Err(EyesError::Text(format!(
-                "version {version} of a newer noisefloor, and this one reads {VERSION}: use that one, or calibrate again"
+                "version {version} of a newer noisefloor, and this one reads {VERSION}: use that one, or \
+                 calibrate again"
             )));
         }
         toml::from_str(text).map_err(|error| EyesError::Text(one_line(&error)))
@@ -279,8 +281,8 @@ impl Eyes {
     }
 
     /// Puts a person into a file, which is made if it is not there, in place of whoever has the same name.
-    /// The file changes as a whole or not at all; its permissions stay, and a link stays one. Several processes
-    /// may do so at once.
+    /// The file changes as a whole or not at all; its permissions stay, and a link stays one. Several
+    /// processes may do so at once.
     ///
     /// # Errors
     /// [`EyesError`] if the file holds something else, which stays, or cannot be written.
@@ -354,16 +356,16 @@ impl Eyes {
         &self.0
     }
 
-    /// Those who were measured beside the model with this digest, to whose observers their factors refer; `None`
-    /// if nobody was.
+    /// Those who were measured beside the model with this digest, to whose observers their factors refer;
+    /// `None` if nobody was.
     pub fn beside(&self, model: &str) -> Option<Self> {
         let people: Vec<Person> = self.0.iter().filter(|person| person.model == model).cloned().collect();
         (!people.is_empty()).then_some(Self(people))
     }
 
-    /// Whoever needs so many samples that nine of ten are content: of fewer than ten, the one who needs most. Each
-    /// at the display that they sat at: finer pixels hide noise, and whoever is less demanding at a coarser
-    /// display may need more.
+    /// Whoever needs so many samples that nine of ten are content: of fewer than ten, the one who needs most.
+    /// Each at the display that they sat at: finer pixels hide noise, and whoever is less demanding at a
+    /// coarser display may need more.
     pub fn strictest(&self) -> &Person {
         let mut people: Vec<(u64, &Person)> = self.needs().into_iter().zip(&self.0).collect();
         people.sort_by(|(need, a), (other, b)| need.cmp(other).then(a.factor.total_cmp(&b.factor)));

@@ -188,7 +188,8 @@ impl Stated {
     /// The code of an sRGB display for light.
     fn shown(&self, mut light: Rgb) -> Rgb {
         if self.curve == Curve::Hlg {
-            // BT.2100, table 5: the display's light has the scene's colours and its luminance to the power of γ
+            // BT.2100, table 5: the display's light has the colours of the scene, and its luminance to the
+            // power of γ
             let weights = [0.2627, 0.6780, 0.0593];
             let y: f64 = light.iter().zip(weights).map(|(v, weight)| f64::from(*v) * weight).sum();
             let gain = (HLG_PEAK / HDR_WHITE * y.powf(HLG_GAMMA - 1.0)) as f32;
@@ -199,8 +200,8 @@ impl Stated {
     }
 }
 
-/// Whether these are sRGB, rounded: wherever the codes are, they differ by less than half a code of 8 bits, or
-/// their light by less than 1/2000 of white: digits of profiles end there.
+/// Whether these are sRGB, rounded: wherever the codes are, they differ by less than half a code of 8 bits,
+/// or their light by less than 1/2000 of white: digits of profiles end there.
 pub(crate) fn is_srgb(stated: &Stated) -> bool {
     let codes = (0..9 * 9 * 9).map(|i| [i % 9, i / 9 % 9, i / 81].map(|v| v as f64 / 8.0));
     codes.into_iter().all(|codes| {

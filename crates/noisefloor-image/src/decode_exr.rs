@@ -38,9 +38,9 @@ const NAMES_SHOWN: usize = 20;
 /// The picture is the display window. Where the data window is smaller, pixels are black; where it is larger
 /// (overscan), it is cropped. Of mip maps, the full resolution is read. Non-finite values are kept.
 ///
-/// Colours become linear Rec.709 with a white of D65. A file says by its attribute `chromaticities` that it has
-/// others, such as ACES AP0 or AP1, XYZ, P3 or Rec.2020; what is white there, or its `adoptedNeutral`, is white
-/// afterwards (Bradford's adaptation). Without the attribute, colours are Rec.709.
+/// Colours become linear Rec.709 with a white of D65. A file says by its attribute `chromaticities` that it
+/// has others, such as ACES AP0 or AP1, XYZ, P3 or Rec.2020; what is white there, or its `adoptedNeutral`, is
+/// white afterwards (Bradford's adaptation). Without the attribute, colours are Rec.709.
 ///
 /// # Errors
 /// [`PictureError`] if the file is not an EXR, is too long, too large (by its header) or broken, has no

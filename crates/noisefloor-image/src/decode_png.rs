@@ -26,8 +26,9 @@ const PIXELS_A_BYTE: u64 = 1032 * 8;
 /// # Colours
 /// A file that states no colours is taken for sRGB. Colours that it states are converted to sRGB, and clipped
 /// to what that can show: `cICP` (the curves of sRGB, gamma, linear light, PQ and HLG; any primaries that a
-/// number stands for), a profile of primaries and curves in `iCCP`, or `gAMA` and `cHRM`. Of several, the first
-/// of these that is there is believed, as in the third edition of PNG (§4.3); `sRGB` comes after the profile.
+/// number stands for), a profile of primaries and curves in `iCCP`, or `gAMA` and `cHRM`. Of several, the
+/// first of these that is there is believed, as in the third edition of PNG (§4.3); `sRGB` comes after the
+/// profile.
 /// `gAMA` of 1/2.2 without other primaries means sRGB, as programs that write no `sRGB` intend. The white of
 /// PQ and HLG is that of ITU-R BT.2408: 203 cd/m².
 ///
@@ -142,7 +143,8 @@ fn code_points(points: CodingIndependentCodePoints) -> String {
     let CodingIndependentCodePoints { color_primaries, transfer_function, matrix_coefficients, .. } = points;
     let range = if points.is_video_full_range_image { "full" } else { "narrow" };
     format!(
-        "those of cICP {color_primaries}/{transfer_function}/{matrix_coefficients} in {range} range, which are not known here"
+        "those of cICP {color_primaries}/{transfer_function}/{matrix_coefficients} in {range} range, which \
+         are not known here"
     )
 }
 

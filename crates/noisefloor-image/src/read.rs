@@ -17,12 +17,13 @@ pub fn read_picture(path: impl AsRef<Path>) -> Result<Picture, PictureError> {
     read_picture_within(path, noisefloor::tile::MAX_PIXELS)
 }
 
-/// [`read_picture_within`], to be shown on a display other than the usual one. It takes the codes of a PNG that states
-/// no colours, states sRGB, or states what the display takes, such as PQ; all others are converted to sRGB if
-/// it takes that.
+/// [`read_picture_within`], to be shown on a display other than the usual one. It takes the codes of a PNG
+/// that states no colours, states sRGB, or states what the display takes, such as PQ; all others are
+/// converted to sRGB if it takes that.
 ///
 /// # Errors
-/// Those of [`read_picture_within`], and [`PictureError::Colours`] if this display does not take the colours of a PNG.
+/// Those of [`read_picture_within`], and [`PictureError::Colours`] if this display does not take the colours
+/// of a PNG.
 pub fn read_picture_on(
     path: impl AsRef<Path>,
     viewing: &Viewing,

@@ -161,8 +161,8 @@ impl Ptwne {
     }
 
     /// Names the build of the program that this renderer is part of, such as a digest of its file. It becomes
-    /// part of [`identity`](ProgressiveSource::identity): another build may take other samples, and is then not
-    /// to resume what this one has begun.
+    /// part of [`identity`](ProgressiveSource::identity): another build may take other samples, and is then
+    /// not to resume what this one has begun.
     #[must_use]
     pub fn with_program(mut self, build: impl Into<String>) -> Self {
         self.program = Some(build.into());

@@ -20,7 +20,8 @@ pub use origin::{OriginRelation, SampleOrigin};
 const UNLIKE: f64 = 0.1;
 /// Edge of the blocks in which pictures are compared for [`StillWarning`], in pixels.
 const BLOCK: usize = 8;
-/// Standard errors that chance does not reach, and the correlation worth a warning: those of [`crate::watch`].
+/// Standard errors that chance does not reach, and the correlation worth a warning: those of
+/// [`crate::watch`].
 const CERTAIN: f64 = 6.5;
 const NOTABLE: f64 = 0.1;
 /// Ratio of brightness worth a warning. Where one picture has few samples, most of its blocks are darker than
@@ -121,13 +122,16 @@ pub enum StillError {
 pub enum StillWarning {
     /// Their difference is no independent noise of pixels.
     #[error(
-        "the noise of neighbouring pixels is correlated ({0:.2}): the pictures were denoised, blurred, scaled, or \
-         rendered with a wide pixel filter; verdicts are made for independent pixels, and come too early or too late"
+        "the noise of neighbouring pixels is correlated ({0:.2}): the pictures were denoised, blurred, \
+         scaled, or \
+         rendered with a wide pixel filter; verdicts are made for independent pixels, and come too early or \
+         too late"
     )]
     Neighbours(f64),
     /// One has another exposure.
     #[error(
-        "the picture is {0:.2} times as bright as what it is compared with, nearly everywhere: render both with one \
+        "the picture is {0:.2} times as bright as what it is compared with, nearly everywhere: render both \
+         with one \
          exposure, as their difference is not noise alone"
     )]
     Brightness(f64),
@@ -307,9 +311,9 @@ impl<'a> SnapshotPair<'a> {
     /// What the whole pictures say against a verdict on them: none if there is nothing to compare with.
     ///
     /// Neighbours: the correlation of the displayed difference with itself one pixel beside or below, within
-    /// blocks and without their means, which a picture of few samples has below the mean. Brightness: the mean
-    /// radiance and the median of blocks both differ, in one direction; a few bright pixels make the one, and
-    /// noise of many dark ones the other.
+    /// blocks and without their means, which a picture of few samples has below the mean. Brightness: the
+    /// mean radiance and the median of blocks both differ, in one direction; a few bright pixels make the
+    /// one, and noise of many dark ones the other.
     pub fn warnings(&self) -> Vec<StillWarning> {
         let Some(other) = &self.other else { return Vec::new() };
         let neighbours = self.correlation_of_neighbours(other).map(StillWarning::Neighbours);
@@ -340,8 +344,8 @@ impl<'a> SnapshotPair<'a> {
         (sum.abs() > CERTAIN * (2.0 * squares).sqrt() && correlation.abs() > NOTABLE).then_some(correlation)
     }
 
-    /// Describes all tiles, in their order, for [`Oracle::judge_described`]. Of a picture of less than one sample per
-    /// pixel they are described as if it had one; needs are then in multiples of what it has.
+    /// Describes all tiles, in their order, for [`Oracle::judge_described`]. Of a picture of less than one
+    /// sample per pixel they are described as if it had one; needs are then in multiples of what it has.
     ///
     /// # Errors
     /// [`StillError`] if there is nothing to judge by, or the model is for tiles of another size.

@@ -74,9 +74,9 @@ pub enum TileError {
     Image(usize, usize),
 }
 
-/// A grid of square tiles over an image, row-major from the top left. Those of the last column and row take what
-/// is left: they have half to one and a half times the edge of the others, since nobody judges slivers, whose few
-/// pixels say little of noise. In an image of less than half an edge, they have what there is.
+/// A grid of square tiles over an image, row-major from the top left. Those of the last column and row take
+/// what is left: they have half to one and a half times the edge of the others, since nobody judges slivers,
+/// whose few pixels say little of noise. In an image of less than half an edge, they have what there is.
 ///
 /// ```
 /// let grid = noisefloor::TileGrid::new(800, 600, 128)?;

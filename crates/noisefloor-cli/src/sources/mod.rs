@@ -287,7 +287,8 @@ fn load(scene: &OsStr, options: &LoadOptions) -> anyhow::Result<Loaded> {
         let near = names.min_by_key(|name| edits(&typed, name)).filter(|name| edits(&typed, name) <= 2);
         let meant = near.map_or(String::new(), |name| format!("did you mean {name}? "));
         bail!(
-            "there is no built-in scene {scene:?}, and no file of that name; {meant}`noisefloor scenes` lists the scenes"
+            "there is no built-in scene {scene:?}, and no file of that name; {meant}`noisefloor scenes` \
+             lists the scenes"
         );
     }
     Ok(noisefloor_scenefile::load_with(path, options)?)

@@ -44,7 +44,8 @@ pub enum SvmTrainError {
     Linfa(#[from] linfa_svm::SvmError),
     /// Platt scaling failed.
     #[error(
-        "no curve of probability fits the decision values: whether noise was seen does not follow what was measured of \
+        "no curve of probability fits the decision values: whether noise was seen does not follow what was \
+         measured of \
          it; check that every threshold stands beside its own zone, and that they are not all alike"
     )]
     Platt(#[from] linfa::composing::platt_scaling::PlattError),

@@ -285,7 +285,8 @@ impl Watch {
     /// Looks at all that was seen, before a verdict.
     pub(crate) fn look(&mut self) -> Result<(), Fault> {
         self.check_repeats()?;
-        // A picture without noise may be of 8-bit numbers: an unlit texture is. Noise of them is an 8-bit picture's
+        // A picture without noise may be of 8-bit numbers: an unlit texture is. Noise of them is an 8-bit
+        // picture's
         if let Some(encoding) = self.values.quantised().filter(|_| self.tiles.iter().any(|tile| tile.varies))
         {
             return Err(Fault::Quantised { encoding });

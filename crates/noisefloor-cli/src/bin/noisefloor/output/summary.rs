@@ -49,7 +49,8 @@ impl Output {
         let (least, most) = (spp.iter().min().unwrap_or(&0), spp.iter().max().unwrap_or(&0));
         let range = if least == most { format!("{most}") } else { format!("{least} to {most}") };
         say!(
-            "{satisfied} of {} tiles {as_wanted}, after {range} samples per pixel ({:.0} on average: {:.0} % of uniform \
+            "{satisfied} of {} tiles {as_wanted}, after {range} samples per pixel ({:.0} on average: {:.0} \
+             % of uniform \
              rendering at {most})",
             spp.len(),
             samples / (grid.width() * grid.height()) as f64,
@@ -71,7 +72,8 @@ impl Output {
         let unfamiliar = session.stops().filter(|s| s.unfamiliar).count();
         if unfamiliar > 0 {
             say!(
-                "tiles with texture unlike any that the model was tested on: {unfamiliar}; they get twice the samples it asks \
+                "tiles with texture unlike any that the model was tested on: {unfamiliar}; they get twice \
+                 the samples it asks \
                  for, up to --max-spp, and their verdicts are less certain"
             )?;
         }

@@ -112,7 +112,8 @@ fn elsewhere(run: &RenderRun) -> anyhow::Result<ExitStatus> {
     let program = std::env::current_exe().context("this program does not find itself")?;
     let mut process = Command::new(program).arg("frame").stdin(Stdio::piped()).spawn()?;
     let job = serde_json::to_vec(run)?;
-    // A process that has ended says more than a broken pipe. The pipe stays open as long as this process lives
+    // A process that has ended says more than a broken pipe. The pipe stays open as long as this process
+    // lives
     let mut stdin = process.stdin.take();
     drop(stdin.as_mut().map(|stdin| stdin.write_all(&job).and_then(|()| stdin.flush())));
     let ended = process.wait();

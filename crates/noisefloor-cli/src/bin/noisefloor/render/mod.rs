@@ -78,7 +78,8 @@ fn render(run: &RenderRun, is_frame: bool) -> anyhow::Result<ExitCode> {
         match finished_frame(&folder, digest.as_deref(), job)? {
             Finished::This => return Ok(ExitCode::SUCCESS),
             Finished::Other => bail!(
-                "{}: holds a finished picture of other options, of a scene that has changed since, or of another \
+                "{}: holds a finished picture of other options, of a scene that has changed since, or of \
+                 another \
                  build; --force renders all frames anew, --out names another folder",
                 folder.display()
             ),
@@ -265,18 +266,23 @@ fn finish(driver: &Rendering, outcome: Result<(), DriverError>, cancel: &AtomicB
 fn in_a_user_s_words(fault: &Fault) -> String {
     match fault {
         Fault::Repeated { tiles, of } => format!(
-            "{tiles} of {of} tiles got the same samples twice: the renderer repeats its random numbers, or two of the \
+            "{tiles} of {of} tiles got the same samples twice: the renderer repeats its random numbers, or \
+             two of the \
              pictures are one"
         ),
-        Fault::Running { .. } => "its batches contain the samples of the ones before: name running means by their \
-             samples per pixel (00100.exr), and batches by their first and last sample (batch_00060_00100.exr)"
+        Fault::Running { .. } => "its batches contain the samples of the ones before: name running means by \
+        their \
+             samples per pixel (00100.exr), and batches by their first and last sample \
+             (batch_00060_00100.exr)"
             .to_owned(),
         Fault::Shared { correlation } => format!(
-            "its successive batches share samples (correlation {correlation:.2}): its seeds repeat or overlap, or its \
+            "its successive batches share samples (correlation {correlation:.2}): its seeds repeat or \
+             overlap, or its \
              scene changes from one to the next"
         ),
         Fault::Quantised { encoding } => format!(
-            "all values are {encoding} of 8 bits: let it write linear radiance in floating point, as EXR or PFM"
+            "all values are {encoding} of 8 bits: let it write linear radiance in floating point, as EXR or \
+             PFM"
         ),
         other => other.to_string(),
     }
