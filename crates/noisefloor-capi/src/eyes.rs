@@ -2,7 +2,7 @@
 
 use crate::border;
 use crate::status::{Failure, NfStatus, guard};
-use noisefloor::{Audience, Viewing};
+use noisefloor::{Audience, Model, Viewing};
 use noisefloor_eyes::{Eyes, EyesError};
 use std::ffi::c_char;
 use std::path::Path;
@@ -25,6 +25,7 @@ pub unsafe extern "C" fn nf_eyes(
             // SAFETY: promised by the caller.
             Some(Eyes::read(Path::new(unsafe { border::text(path, "path") }?))?)
         };
+        let eyes = eyes.map(|eyes| eyes.beside(&Model::bundled().digest()).unwrap_or(eyes));
         let (audience, seen) = match &eyes {
             Some(eyes) => (eyes.strictest().audience(), eyes.strictest().viewing()),
             None => (Audience::TRAINED, Viewing::default()),

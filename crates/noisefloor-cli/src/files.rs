@@ -4,12 +4,28 @@ use anyhow::bail;
 use noisefloor::Rgb;
 use noisefloor_image::{read_exr, write_atomic};
 use serde::Serialize;
+use std::fs::File;
+use std::io::Read;
 use std::path::Path;
 
 /// Writes JSON.
 pub fn write_json(path: &Path, value: &impl Serialize) -> anyhow::Result<()> {
     write_atomic(path, |to| serde_json::to_writer_pretty(to, value))?;
     Ok(())
+}
+
+/// Reads a small text that somebody has typed: a regular file, since a pipe might never end.
+pub fn read_small(path: &Path) -> anyhow::Result<String> {
+    const MOST: u64 = 1 << 20;
+    if !std::fs::metadata(path)?.is_file() {
+        bail!("is a folder, a pipe or a device; name a file");
+    }
+    let mut text = String::new();
+    File::open(path)?.take(MOST + 1).read_to_string(&mut text)?;
+    if text.len() as u64 > MOST {
+        bail!("is longer than a megabyte; name the file that was meant");
+    }
+    Ok(text)
 }
 
 /// A picture to compare a render of that size with: linear radiance, row-major, all of it finite.

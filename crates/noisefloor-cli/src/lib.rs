@@ -3,6 +3,7 @@
 #![allow(missing_docs, reason = "parts of two commands, which have no public interface")]
 
 pub mod bars;
+pub mod build;
 pub mod end;
 pub mod files;
 pub mod folder;

@@ -35,6 +35,18 @@ pub fn end_on_signal(says: &'static str) -> anyhow::Result<()> {
     })
 }
 
+/// Ends this process as SIGTERM does: with everything written, if that was prepared for.
+pub fn terminate_self() {
+    #[cfg(unix)]
+    let sent =
+        rustix::process::kill_process(rustix::process::getpid(), rustix::process::Signal::TERM).is_ok();
+    #[cfg(not(unix))]
+    let sent = false;
+    if !sent {
+        end();
+    }
+}
+
 fn on_signal(handler: impl FnMut() + Send + 'static) -> anyhow::Result<()> {
     ctrlc::set_handler(handler).context("the handler for Ctrl-C could not be set")
 }

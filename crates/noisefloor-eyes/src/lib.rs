@@ -27,9 +27,11 @@
 //! # Ok::<(), noisefloor_eyes::EyesError>(())
 //! ```
 
-use noisefloor::{Audience, Viewing, viewing::ViewingParams};
+use noisefloor::evidence::{Evidence, Samples};
+use noisefloor::stills::{SnapshotPair, Still};
+use noisefloor::{Audience, Oracle, TileGrid, ToneMapping, Viewing, viewing::ViewingParams};
 use serde::{Deserialize, Serialize};
-use std::fs::File;
+use std::fs::{File, OpenOptions};
 use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
 
@@ -83,6 +85,12 @@ pub struct SeenDisplay {
     pub ambient: String,
 }
 
+/// What every version of the file begins with.
+#[derive(Deserialize)]
+struct Version {
+    version: u32,
+}
+
 #[derive(Clone, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Contents {
@@ -100,6 +108,14 @@ pub enum EyesError {
         path: PathBuf,
         /// Why.
         source: io::Error,
+    },
+    /// It is no file that could be read as a whole.
+    #[error("{}: {what}", path.display())]
+    File {
+        /// Which file.
+        path: PathBuf,
+        /// What it is.
+        what: &'static str,
     },
     /// Its contents are not what `noisefloor calibrate` writes.
     #[error("no eyes as `noisefloor calibrate` writes them: {0}")]
@@ -144,7 +160,10 @@ impl Person {
         within("pixels-per-degree", self.display.pixels_per_degree, [1.0, 2000.0])?;
         within("distance-mm", self.display.distance_mm, [1.0, 1e6])?;
         within("gamma", self.display.gamma, [1.0, 4.0])?;
-        let texts = [&self.name, &self.date, &self.model, &self.display.ambient];
+        Self::check_texts([&self.name, &self.date, &self.model, &self.display.ambient].map(String::as_str))
+    }
+
+    fn check_texts<const N: usize>(texts: [&str; N]) -> Result<(), String> {
         match texts
             .iter()
             .find(|text| text.is_empty() || text.len() > MAX_TEXT || text.contains(char::is_control))
@@ -164,6 +183,17 @@ impl Person {
         // The middle 80 % of a normal distribution are 2.563 deviations wide; an interval may reach down to 0
         let [low, high] = self.interval.map(|factor| factor.max(1e-3).ln());
         ((high - low) / 2.563).clamp(0.01, 5.0)
+    }
+
+    /// Samples per pixel that this person needs of a tile of even noise on grey, by the bundled model: people
+    /// compare by it, each at their own display.
+    fn need(&self, oracle: &Oracle, [one, other]: &[Still; 2]) -> Option<u64> {
+        let grid = TileGrid::new(one.size.0, one.size.1, one.size.0).ok()?;
+        let (tone, samples) = (ToneMapping::default(), Some(Samples::Independent));
+        let pair = SnapshotPair::new(Evidence::Halves, one, &[other], tone, samples).ok()?;
+        let described = pair.seen_on(self.viewing()).describe(oracle, grid).ok()?;
+        let verdicts = oracle.judge_described_for(&described, self.audience())?;
+        verdicts.first()?.threshold.map(|threshold| threshold.median)
     }
 
     /// For sessions: the default display, at the person's pixels per degree.
@@ -200,11 +230,23 @@ impl Eyes {
     /// Reads a file.
     ///
     /// # Errors
-    /// [`EyesError`] if it cannot be read, is longer than a megabyte, or holds something else.
+    /// [`EyesError`] if it cannot be read, is no regular file or longer than a megabyte, or holds something
+    /// else.
     pub fn read(path: &Path) -> Result<Self, EyesError> {
         let io = |source| EyesError::Io { path: path.to_owned(), source };
+        let refused = |what| EyesError::File { path: path.to_owned(), what };
+        // A pipe might never end
+        let about = std::fs::metadata(path).map_err(io)?;
+        if !about.is_file() {
+            return Err(refused(
+                "is a folder, a pipe or a device; name the file that `noisefloor calibrate` wrote",
+            ));
+        }
         let mut text = String::new();
-        File::open(path).map_err(io)?.take(MAX_FILE).read_to_string(&mut text).map_err(io)?;
+        File::open(path).map_err(io)?.take(MAX_FILE + 1).read_to_string(&mut text).map_err(io)?;
+        if text.len() as u64 > MAX_FILE {
+            return Err(refused("is longer than a megabyte; divide its people among several files"));
+        }
         Self::parse(&text).map_err(|error| match error {
             EyesError::Text(what) => EyesError::Text(format!("{}: {what}", path.display())),
             other => other,
@@ -216,6 +258,15 @@ impl Eyes {
     /// # Errors
     /// [`EyesError::Text`] with what is wrong.
     pub fn parse(text: &str) -> Result<Self, EyesError> {
+        // A newer file may have other fields: its version says more than they do
+        if let Ok(Version { version }) = toml::from_str(text)
+            && version > VERSION
+        {
+            return Err(EyesError::Text(format!(
+                "version {version} of a newer noisefloor, and this one reads {VERSION}: use that one, or \
+                 calibrate again"
+            )));
+        }
         toml::from_str(text).map_err(|error| EyesError::Text(one_line(&error)))
     }
 
@@ -237,30 +288,74 @@ impl Eyes {
     }
 
     /// Puts a person into a file, which is made if it is not there, in place of whoever has the same name.
-    /// The file changes as a whole or not at all.
+    /// The file changes as a whole or not at all; its permissions stay, and a link stays one. Several
+    /// processes may do so at once.
     ///
     /// # Errors
     /// [`EyesError`] if the file holds something else, which stays, or cannot be written.
     pub fn keep(path: &Path, person: Person) -> Result<(), EyesError> {
         person.check().map_err(EyesError::Text)?;
-        let mut people = match Self::read(path) {
-            Ok(eyes) => eyes.0,
-            Err(EyesError::Io { source, .. }) if source.kind() == io::ErrorKind::NotFound => Vec::new(),
-            Err(error) => return Err(error),
+        Self::change(path, Some(person))
+    }
+
+    /// Whether somebody of this name could be kept in a file: before questions are asked. Nothing is changed.
+    ///
+    /// # Errors
+    /// Those of [`Eyes::keep`].
+    pub fn check_keep(path: &Path, name: &str) -> Result<(), EyesError> {
+        Person::check_texts([name]).map_err(EyesError::Text)?;
+        Self::change(path, None)
+    }
+
+    /// Reads, changes and writes a file, while nobody else does; for nobody, all but the last.
+    fn change(path: &Path, person: Option<Person>) -> Result<(), EyesError> {
+        let io = |source| EyesError::Io { path: path.to_owned(), source };
+        let read = || match Self::read(path) {
+            Ok(eyes) => Ok(Some(eyes.0)),
+            Err(EyesError::Io { source, .. }) if source.kind() == io::ErrorKind::NotFound => Ok(None),
+            Err(error) => Err(error),
         };
+        read()?;
+        // Where a link leads to, the file is replaced, and not the link
+        let target = std::fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
+        let folder = target.parent().filter(|f| !f.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        std::fs::create_dir_all(folder).map_err(io)?;
+        let name = target.file_name().unwrap_or_default().to_string_lossy();
+        let lock = folder.join(format!(".{name}.lock"));
+        let lock = OpenOptions::new().create(true).truncate(false).write(true).open(lock).map_err(io)?;
+        // Where there are no locks, two that end at once are the smaller evil
+        drop(lock.lock());
+        let people = read()?;
+        let there = people.is_some();
+        if there {
+            // Replaced it could be even so; whoever has made it read-only did not want that
+            OpenOptions::new().write(true).open(&target).map_err(io)?;
+        }
+        let mut file = tempfile::Builder::new();
+        let permissions = there.then(|| std::fs::metadata(&target)).transpose().map_err(io)?;
+        #[cfg(unix)]
+        let shared = {
+            use std::os::unix::fs::PermissionsExt;
+            std::fs::Permissions::from_mode(0o666)
+        };
+        #[cfg(unix)]
+        file.permissions(shared);
+        let mut file = file.tempfile_in(folder).map_err(io)?;
+        let Some(person) = person else { return Ok(()) };
+        let mut people = people.unwrap_or_default();
         people.retain(|other| other.name != person.name);
         people.push(person);
         let text = Self(people).to_text()?;
         let write = || -> io::Result<()> {
-            let folder = path.parent().filter(|f| !f.as_os_str().is_empty()).unwrap_or(Path::new("."));
-            std::fs::create_dir_all(folder)?;
-            let mut file = tempfile::NamedTempFile::new_in(folder)?;
             file.write_all(text.as_bytes())?;
+            if let Some(permissions) = permissions {
+                file.as_file().set_permissions(permissions.permissions())?;
+            }
             file.as_file().sync_all()?;
-            file.persist(path)?;
+            file.persist(&target)?;
             Ok(())
         };
-        write().map_err(|source| EyesError::Io { path: path.to_owned(), source })
+        write().map_err(io)
     }
 
     /// Everybody.
@@ -268,13 +363,48 @@ impl Eyes {
         &self.0
     }
 
-    /// Whoever needs so many samples that nine of ten are content: of fewer than ten, the one who needs most.
-    pub fn strictest(&self) -> &Person {
-        let mut people: Vec<&Person> = self.0.iter().collect();
-        people.sort_by(|a, b| a.factor.total_cmp(&b.factor));
-        let at = (CONTENT * people.len() as f64).ceil() as usize;
-        people[at.clamp(1, people.len()) - 1]
+    /// Those who were measured beside the model with this digest, to whose observers their factors refer;
+    /// `None` if nobody was.
+    pub fn beside(&self, model: &str) -> Option<Self> {
+        let people: Vec<Person> = self.0.iter().filter(|person| person.model == model).cloned().collect();
+        (!people.is_empty()).then_some(Self(people))
     }
+
+    /// Whoever needs so many samples that nine of ten are content: of fewer than ten, the one who needs most.
+    /// Each at the display that they sat at: finer pixels hide noise, and whoever is less demanding at a
+    /// coarser display may need more.
+    pub fn strictest(&self) -> &Person {
+        let mut people: Vec<(u64, &Person)> = self.needs().into_iter().zip(&self.0).collect();
+        people.sort_by(|(need, a), (other, b)| need.cmp(other).then(a.factor.total_cmp(&b.factor)));
+        let at = (CONTENT * people.len() as f64).ceil() as usize;
+        people[at.clamp(1, people.len()) - 1].1
+    }
+
+    /// Samples that each needs of the same tile; all alike at one display, where factors tell.
+    fn needs(&self) -> Vec<u64> {
+        let first = self.0[0].viewing();
+        if self.0.iter().all(|person| person.viewing() == first) {
+            return vec![0; self.0.len()];
+        }
+        let (oracle, noise) = (Oracle::bundled(), [1, 2].map(even_noise));
+        self.0.iter().map(|person| person.need(&oracle, &noise).unwrap_or(u64::MAX)).collect()
+    }
+}
+
+/// Noise of a tenth on grey, as of 64 samples per pixel.
+fn even_noise(seed: u32) -> Still {
+    const EDGE: u32 = 128;
+    // Any numbers without a pattern do: those of a multiplicative hash, twelve of which make a normal one
+    let hash = |i: u32| {
+        let h = i.wrapping_mul(0x9E37_79B1) ^ seed.wrapping_mul(0x85EB_CA77);
+        let h = (h ^ (h >> 15)).wrapping_mul(0x2C1B_3C6D);
+        let h = (h ^ (h >> 12)).wrapping_mul(0x297A_2D39);
+        f64::from(h ^ (h >> 15)) / f64::from(u32::MAX)
+    };
+    let normal = |pixel: u32| (0..12).map(|i| hash(12 * pixel + i)).sum::<f64>() - 6.0;
+    let pixels = (0..EDGE * EDGE).map(|pixel| [(0.2 * (1.0 + 0.1 * normal(pixel))) as f32; 3]).collect();
+    let edge = EDGE as usize;
+    Still { size: (edge, edge), pixels, spp: 64.0, display_referred: true, rounding: 0.0, origin: None }
 }
 
 /// What a parser says, without its picture of the place.
@@ -325,6 +455,76 @@ mod tests {
         assert_eq!(std::fs::read_to_string(&path).unwrap(), "colour = 1");
     }
 
+    /// Whoever sits nearer to coarser pixels sees more noise than one who is more demanding elsewhere.
+    #[test]
+    fn the_strictest_is_found_at_each_ones_display() {
+        let at = |name: &str, factor: f64, pixels_per_degree: f64| {
+            let person = person(name, factor);
+            Person { display: SeenDisplay { pixels_per_degree, ..person.display.clone() }, ..person }
+        };
+        let (near, far) = (at("near", 1.0, 25.0), at("far", 1.5, 90.0));
+        let noise = [1, 2].map(even_noise);
+        let [one, other] = [&near, &far].map(|p| p.need(&Oracle::bundled(), &noise).unwrap());
+        assert!(one > 2 * other && other > 8, "{one} {other}");
+        assert_eq!(Eyes(vec![near.clone(), far.clone()]).strictest().name, "near");
+        assert_eq!(Eyes(vec![far, near]).strictest().name, "near");
+        let other = Person { model: "another".to_owned(), ..at("old", 9.0, 20.0) };
+        let eyes = Eyes(vec![other, at("me", 1.0, 52.0)]);
+        assert_eq!(eyes.beside("abc").unwrap().people(), &eyes.people()[1..]);
+        assert_eq!(eyes.beside("none"), None);
+    }
+
+    #[test]
+    #[cfg(unix)]
+    fn links_and_permissions_stay() {
+        use std::os::unix::fs::{PermissionsExt, symlink};
+        let folder = tempfile::tempdir().unwrap();
+        let (file, link) = (folder.path().join("studio.toml"), folder.path().join("eyes.toml"));
+        Eyes::keep(&file, person("a", 1.0)).unwrap();
+        let mode = |mode| std::fs::set_permissions(&file, std::fs::Permissions::from_mode(mode)).unwrap();
+        mode(0o664);
+        symlink(&file, &link).unwrap();
+        Eyes::keep(&link, person("b", 1.0)).unwrap();
+        assert!(std::fs::symlink_metadata(&link).unwrap().is_symlink());
+        assert_eq!(std::fs::metadata(&file).unwrap().permissions().mode() & 0o777, 0o664);
+        assert_eq!(Eyes::read(&file).unwrap().people().len(), 2);
+    }
+
+    /// Two that end at once are both kept.
+    #[test]
+    fn nobody_is_lost_between_two_who_are_kept() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("eyes.toml");
+        std::thread::scope(|scope| {
+            for i in 0..8 {
+                let path = &path;
+                scope.spawn(move || Eyes::keep(path, person(&format!("p{i}"), 1.0)).unwrap());
+            }
+        });
+        assert_eq!(Eyes::read(&path).unwrap().people().len(), 8);
+    }
+
+    /// Before sixty questions, and not after them.
+    #[test]
+    fn what_could_not_be_kept_is_found_before() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("new/eyes.toml");
+        Eyes::check_keep(&path, "me").unwrap();
+        assert!(!path.exists(), "nobody is in it yet");
+        Eyes::keep(&path, person("me", 1.0)).unwrap();
+        let before = std::fs::read(&path).unwrap();
+        Eyes::check_keep(&path, "you").unwrap();
+        assert_eq!(std::fs::read(&path).unwrap(), before);
+        let said = |path: &Path, name| Eyes::check_keep(path, name).unwrap_err().to_string();
+        assert!(said(&path, "").contains("empty") && said(&path, "a\nb").contains("printable"));
+        assert!(said(folder.path(), "me").contains("a folder"));
+        std::fs::write(&path, "version = 2\nwho = \"me\"").unwrap();
+        assert!(said(&path, "me").contains("version 2 of a newer noisefloor"), "{}", said(&path, "me"));
+        let long = format!("{}\n#{}", String::from_utf8(before).unwrap(), "x".repeat(1 << 20));
+        std::fs::write(&path, long).unwrap();
+        assert!(said(&path, "me").contains("longer than a megabyte"));
+    }
+
     #[test]
     fn nine_of_ten_are_content() {
         let of = |count: u32| {
@@ -340,6 +540,7 @@ mod tests {
         assert!(Eyes::parse(&good).is_ok());
         let cases = [
             ("version = 1", "version = 2", "calibrate again"),
+            ("version = 1", "version = 0", "calibrate again"),
             ("factor = 1.5", "factor = nan", "factor"),
             ("factor = 1.5", "factor = 9.0", "interval"),
             ("factor = 1.5", "vector = 1.5", "vector"),

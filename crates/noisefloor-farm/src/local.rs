@@ -12,8 +12,8 @@ use std::time::Duration;
 const PAUSE: Duration = Duration::from_millis(50);
 
 /// Runs the tasks of a round, `processes` at a time, as `PROGRAM farm task DIR ROUND TASK`; returns those
-/// that failed. Once `cancel` says so, no more are started. Those that run are waited for: a terminal's
-/// Ctrl-C reaches them as well, and they end with what they have.
+/// that failed. Once `cancel` says so or one cannot be started, no more are started. Those that run are
+/// waited for: a terminal's Ctrl-C reaches them as well, and they end with what they have.
 ///
 /// # Errors
 /// [`FarmError`] if a process cannot be started or its log cannot be written.
@@ -25,14 +25,17 @@ pub fn run_local(
     cancel: impl Fn() -> bool,
 ) -> Result<Vec<usize>, FarmError> {
     let (mut failed, mut running): (Vec<usize>, Vec<(usize, Child)>) = (Vec::new(), Vec::new());
-    let mut waiting = 0..round.tasks.len();
+    let (mut waiting, mut refused) = (0..round.tasks.len(), None);
     loop {
-        while running.len() < processes.max(1) && !cancel() {
+        while running.len() < processes.max(1) && refused.is_none() && !cancel() {
             let Some(task) = waiting.next() else { break };
-            running.push((task, start(program, folder, round.number, task, processes)?));
+            match start(program, folder, round.number, task, processes) {
+                Ok(process) => running.push((task, process)),
+                Err(error) => refused = Some(error),
+            }
         }
         if running.is_empty() {
-            return Ok(failed);
+            return refused.map_or(Ok(failed), Err);
         }
         std::thread::sleep(PAUSE);
         let mut left = Vec::new();
@@ -69,4 +72,28 @@ fn start(
         program: program.display().to_string(),
         what: format!("cannot be started: {error}"),
     })
+}
+
+#[cfg(all(test, unix))]
+mod tests {
+    use super::*;
+    use crate::plan::Task;
+    use std::os::unix::fs::PermissionsExt;
+
+    /// Where the second cannot be started, the first is still waited for.
+    #[test]
+    fn nothing_runs_on_after_a_failure_to_start() {
+        let scratch = tempfile::tempdir().unwrap();
+        let program = scratch.path().join("program");
+        std::fs::write(&program, "#!/bin/sh\nsleep 1\ntouch \"$3/ended\"\n").unwrap();
+        std::fs::set_permissions(&program, std::fs::Permissions::from_mode(0o755)).unwrap();
+        let folder = FarmFolder::new(scratch.path());
+        let task = || Task { frame: 0, batches: Vec::new() };
+        let round = Round { number: 1, tasks: vec![task(), task()], ..Round::default() };
+        // A folder where the log of the second would be
+        std::fs::create_dir_all(folder.log(1, 1)).unwrap();
+        let error = run_local(&program, &folder, &round, 2, || false).unwrap_err();
+        assert!(matches!(&error, FarmError::Read { path, .. } if *path == folder.log(1, 1)), "{error}");
+        assert!(scratch.path().join("ended").exists(), "a task still runs");
+    }
 }

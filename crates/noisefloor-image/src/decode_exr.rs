@@ -4,6 +4,7 @@
 //! after the header and before the pixels, only the blocks of one part are decoded, and the data window can
 //! be placed in the display window.
 
+use crate::colours::ToRec709;
 use crate::error::PictureError;
 use crate::open::{Format, Opened, check_size, guarded};
 use crate::picture::LinearImage;
@@ -12,7 +13,7 @@ use exr::block::reader::ChunksReader;
 use exr::meta::attribute::SampleType;
 use exr::meta::header::Header;
 use exr::prelude::f16;
-use noisefloor::Rgb;
+use noisefloor::{Rgb, viewing::Chromaticities};
 use std::collections::HashSet;
 use std::path::Path;
 
@@ -36,11 +37,14 @@ const NAMES_SHOWN: usize = 20;
 ///
 /// The picture is the display window. Where the data window is smaller, pixels are black; where it is larger
 /// (overscan), it is cropped. Of mip maps, the full resolution is read. Non-finite values are kept.
-/// Chromaticities are assumed to be Rec.709.
+///
+/// Colours become linear Rec.709 with a white of D65. A file says by its attribute `chromaticities` that it
+/// has others, such as ACES AP0 or AP1, XYZ, P3 or Rec.2020; what is white there, or its `adoptedNeutral`, is
+/// white afterwards (Bradford's adaptation). Without the attribute, colours are Rec.709.
 ///
 /// # Errors
 /// [`PictureError`] if the file is not an EXR, is too long, too large (by its header) or broken, has no
-/// colour channels, or holds deep or subsampled pixels.
+/// colour channels, holds deep or subsampled pixels, or states chromaticities that no colours have.
 pub fn read_exr(path: impl AsRef<Path>) -> Result<LinearImage, PictureError> {
     let path = path.as_ref();
     let opened = Opened::open(path)?;
@@ -105,6 +109,7 @@ fn decode_unguarded(
     if blocks.and_then(|n| n.checked_mul(8)).is_none_or(|table| table as u64 > opened.bytes) {
         return Err(broken(format!("{} bytes cannot hold as many blocks as the header says", opened.bytes)));
     }
+    let colours = if choice.is_grey() { None } else { to_rec709(path, &part)? };
     let window = Window::of(path, &part, most)?;
     let decoded = (part.layer_size.area() as u64).saturating_mul(part.channels.bytes_per_pixel.max(1) as u64);
     let shown = (window.width * window.height) as u64;
@@ -137,7 +142,23 @@ fn decode_unguarded(
     if area != part.layer_size.area() {
         return Err(broken(format!("it holds {area} of {} pixels", part.layer_size.area())));
     }
+    if let Some(colours) = colours {
+        pixels.iter_mut().for_each(|pixel| *pixel = colours.convert(*pixel));
+    }
     Ok(LinearImage { width: window.width, height: window.height, pixels })
+}
+
+/// How the colours of a part become those of Rec.709, if they are others.
+fn to_rec709(path: &Path, part: &Header) -> Result<Option<ToRec709>, PictureError> {
+    let Some(stated) = &part.shared_attributes.chromaticities else { return Ok(None) };
+    let [red, green, blue, white] =
+        [&stated.red, &stated.green, &stated.blue, &stated.white].map(|c| [f64::from(c.0), f64::from(c.1)]);
+    let neutral = part.own_attributes.adopted_neutral.map(|c| [f64::from(c.0), f64::from(c.1)]);
+    ToRec709::new(&Chromaticities { red, green, blue, white }, neutral).map_err(|()| PictureError::Colours {
+        path: path.to_owned(),
+        stated: format!("chromaticities that no colours have: {red:?}, {green:?}, {blue:?}, white {white:?}"),
+        advice: "correct the attribute, or remove it if the colours are Rec.709",
+    })
 }
 
 /// A part of the file, and the indices of R, G and B in its list of channels.
@@ -145,6 +166,13 @@ fn decode_unguarded(
 struct Choice {
     part: usize,
     channels: [usize; 3],
+}
+
+impl Choice {
+    /// One channel for all three: Y or alpha.
+    fn is_grey(&self) -> bool {
+        self.channels[0] == self.channels[1]
+    }
 }
 
 /// The names of the channels of each part.

@@ -1,10 +1,16 @@
 //! PNG to display values.
 
+use crate::colours::{Curve, Stated, ToRec709, Treatment, is_srgb};
 use crate::error::PictureError;
 use crate::open::{Format, Opened, check_size, guarded};
 use crate::picture::DisplayImage;
 use image::codecs::png::PngDecoder;
 use image::{DynamicImage, ImageDecoder, Limits};
+use moxcms::{ColorProfile, DataColorSpace, ProfileText, ToneReprCurve};
+use noisefloor::internal::printable;
+use noisefloor::viewing::{Chromaticities, Viewing};
+use png::{CodingIndependentCodePoints, SourceChromaticities};
+use std::io::Seek;
 use std::path::Path;
 
 /// Memory for everything in a PNG that is not pixels: rows, profiles, text.
@@ -14,19 +20,33 @@ const PIXELS_A_BYTE: u64 = 1032 * 8;
 
 /// Reads a PNG as display values: sRGB-encoded RGB in 0…1, 8- or 16-bit codes divided by 255 or 65535.
 ///
-/// Grey becomes three equal values; a palette is resolved. Alpha is dropped, not composited. Gamma,
-/// chromaticity and colour profile chunks are ignored: values are assumed to be sRGB. Of an animation, the
-/// first picture is read.
+/// Grey becomes three equal values; a palette is resolved. Alpha is dropped, not composited. Of an animation,
+/// the first picture is read.
+///
+/// # Colours
+/// A file that states no colours is taken for sRGB. Colours that it states are converted to sRGB, and clipped
+/// to what that can show: `cICP` (the curves of sRGB, gamma, linear light, PQ and HLG; any primaries that a
+/// number stands for), a profile of primaries and curves in `iCCP`, or `gAMA` and `cHRM`. Of several, the
+/// first of these that is there is believed, as in the third edition of PNG (§4.3); `sRGB` comes after the
+/// profile.
+/// `gAMA` of 1/2.2 without other primaries means sRGB, as programs that write no `sRGB` intend. The white of
+/// PQ and HLG is that of ITU-R BT.2408: 203 cd/m².
 ///
 /// # Errors
-/// [`PictureError`] if the file is not a PNG, is too long, too large (by its header) or broken.
+/// [`PictureError`] if the file is not a PNG, is too long, too large (by its header) or broken, or states
+/// colours that cannot be converted.
 pub fn read_png(path: impl AsRef<Path>) -> Result<DisplayImage, PictureError> {
     let path = path.as_ref();
     let opened = Opened::open(path)?;
     if opened.format != Format::Png {
         return Err(opened.foreign(path, "a PNG file"));
     }
-    decode(path, opened)
+    decode(path, opened, &Viewing::default())
+}
+
+/// The colours of a file that states others than sRGB.
+pub(crate) fn stated_colours(path: &Path, mut opened: Opened) -> Result<Option<Stated>, PictureError> {
+    guarded(path, "PNG", || stated(path, &mut opened))
 }
 
 /// Alpha in 0…1, if there is any.
@@ -39,18 +59,158 @@ pub(crate) fn decode_alpha(path: &Path, opened: Opened) -> Result<Option<Vec<f32
     })
 }
 
-pub(crate) fn decode(path: &Path, opened: Opened) -> Result<DisplayImage, PictureError> {
+pub(crate) fn decode(
+    path: &Path,
+    mut opened: Opened,
+    viewing: &Viewing,
+) -> Result<DisplayImage, PictureError> {
     guarded(path, "PNG", || {
+        let stated = stated(path, &mut opened)?;
         let image = decode_raw(path, opened)?;
         let (width, height) = (image.width() as usize, image.height() as usize);
         let deep = image.color().bytes_per_pixel() > image.color().channel_count();
-        let (pixels, codes) = if deep {
+        let (mut pixels, codes): (Vec<_>, _) = if deep {
             (image.into_rgb16().pixels().map(|p| p.0.map(|v| f32::from(v) / 65535.0)).collect(), 65535.0)
         } else {
             (image.into_rgb8().pixels().map(|p| p.0.map(|v| f32::from(v) / 255.0)).collect(), 255.0)
         };
-        Ok(DisplayImage { width, height, pixels, step: 1.0 / codes })
+        let mut step = 1.0 / codes;
+        match stated.as_ref().map_or(Treatment::Keep, |stated| stated.on(viewing)) {
+            Treatment::Keep => {}
+            Treatment::Convert(stated) => step = stated.to_srgb(&mut pixels, step),
+            Treatment::Refuse(stated) => {
+                let (stated, advice) =
+                    (stated.describe(), "save it with the colours that this display takes");
+                return Err(PictureError::Colours { path: path.to_owned(), stated, advice });
+            }
+        }
+        Ok(DisplayImage { width, height, pixels, step })
     })
+}
+
+/// The colours that the chunks before the pixels state; none if they are those of sRGB.
+fn stated(path: &Path, opened: &mut Opened) -> Result<Option<Stated>, PictureError> {
+    let broken = |reason: String| PictureError::Broken { path: path.to_owned(), format: "PNG", reason };
+    let refused = |stated: String| PictureError::Colours {
+        path: path.to_owned(),
+        stated,
+        advice: "save it with the colours of sRGB",
+    };
+    let limits = png::Limits { bytes: MAX_PNG_EXTRA as usize };
+    let reader = png::Decoder::new_with_limits(&mut opened.reader, limits).read_info();
+    let reader = reader.map_err(|e| broken(e.to_string()))?;
+    let info = reader.info();
+    let found = if let Some(points) = info.coding_independent_code_points {
+        Some(by_points(points).ok_or_else(|| refused(code_points(points)))?)
+    } else if let Some(profile) = &info.icc_profile {
+        Some(by_profile(profile).map_err(refused)?)
+    } else if info.srgb.is_some() {
+        None
+    } else {
+        let gamma = info.gama_chunk.map(|gamma| f64::from(gamma.into_scaled()) / 1e5);
+        let gamut = info.chrm_chunk.map(chromaticities);
+        by_gamma(gamma, gamut).map_err(refused)?
+    };
+    drop(reader);
+    opened.reader.rewind().map_err(|source| PictureError::Io { path: path.to_owned(), source })?;
+    Ok(found.filter(|found| !is_srgb(found)))
+}
+
+/// ITU-T H.273, tables 2 and 3. The curves of cameras are left out: programs disagree on how to show them.
+fn by_points(points: CodingIndependentCodePoints) -> Option<Stated> {
+    const DCI: Chromaticities = Chromaticities { white: [0.314, 0.351], ..Chromaticities::DISPLAY_P3 };
+    let gamut = match points.color_primaries {
+        1 => Chromaticities::REC709,
+        9 => Chromaticities::REC2020,
+        11 => DCI,
+        12 => Chromaticities::DISPLAY_P3,
+        _ => return None,
+    };
+    let curve = match points.transfer_function {
+        4 => Curve::Power(2.2),
+        5 => Curve::Power(2.8),
+        8 => Curve::Power(1.0),
+        13 => Curve::Srgb,
+        16 => Curve::Pq,
+        18 => Curve::Hlg,
+        _ => return None,
+    };
+    let as_stored = points.matrix_coefficients == 0 && points.is_video_full_range_image;
+    as_stored.then_some(Stated { gamut: Some(gamut), matrix: ToRec709::new(&gamut, None).ok()?, curve })
+}
+
+fn code_points(points: CodingIndependentCodePoints) -> String {
+    let CodingIndependentCodePoints { color_primaries, transfer_function, matrix_coefficients, .. } = points;
+    let range = if points.is_video_full_range_image { "full" } else { "narrow" };
+    format!(
+        "those of cICP {color_primaries}/{transfer_function}/{matrix_coefficients} in {range} range, which \
+         are not known here"
+    )
+}
+
+/// A profile of three primaries and their curves, or of a grey.
+fn by_profile(profile: &[u8]) -> Result<Stated, String> {
+    let unreadable = |reason: &dyn std::fmt::Display| format!("those of a broken profile ({reason})");
+    let profile = ColorProfile::new_from_slice(profile).map_err(|e| unreadable(&e))?;
+    let name = match &profile.description {
+        Some(ProfileText::PlainString(name)) => printable(name),
+        Some(ProfileText::Localizable(names)) => {
+            names.first().map(|n| printable(&n.value)).unwrap_or_default()
+        }
+        Some(ProfileText::Description(name)) => printable(&name.ascii_string),
+        None => "without a name".into(),
+    };
+    let tables =
+        [&profile.lut_a_to_b_perceptual, &profile.lut_a_to_b_colorimetric, &profile.lut_a_to_b_saturation];
+    let grey = profile.color_space == DataColorSpace::Gray;
+    let curves = match (&profile.red_trc, &profile.green_trc, &profile.blue_trc, &profile.gray_trc) {
+        (_, _, _, Some(k)) if grey => [k, k, k],
+        (Some(r), Some(g), Some(b), _) if profile.is_matrix_shaper() => [r, g, b],
+        _ => return Err(format!("those of the profile “{name}”, which is no three primaries with curves")),
+    };
+    if tables.iter().any(|table| table.is_some()) {
+        return Err(format!("those of the profile “{name}”, which is a table rather than primaries"));
+    }
+    let matrix = if grey {
+        None
+    } else {
+        let colorants = [profile.red_colorant, profile.green_colorant, profile.blue_colorant];
+        let rows = [colorants.map(|c| c.x), colorants.map(|c| c.y), colorants.map(|c| c.z)];
+        Some(ToRec709::of_profile(rows).ok_or_else(|| unreadable(&"its primaries are no colours"))?)
+    };
+    let [r, g, b] = curves.map(table);
+    let curve = || Some(Curve::Table(Box::new([r?, g?, b?])));
+    let curve = curve().ok_or_else(|| unreadable(&"its curves are none"))?;
+    Ok(Stated { gamut: None, matrix, curve })
+}
+
+/// The light of every code of 16 bits, and of 8, which are among them.
+fn table(curve: &ToneReprCurve) -> Option<Vec<f32>> {
+    let curve = curve.make_linear_evaluator().ok()?;
+    let table: Vec<f32> = (0..=65535).map(|code| curve.evaluate_value(code as f32 / 65535.0)).collect();
+    table.iter().all(|v| (-1.0..=2.0).contains(v)).then_some(table)
+}
+
+fn chromaticities(stated: SourceChromaticities) -> Chromaticities {
+    let xy = |(x, y): (png::ScaledFloat, png::ScaledFloat)| [x, y].map(|v| f64::from(v.into_scaled()) / 1e5);
+    let SourceChromaticities { white, red, green, blue } = stated;
+    Chromaticities { red: xy(red), green: xy(green), blue: xy(blue), white: xy(white) }
+}
+
+/// `gAMA` and `cHRM`, of which either may be missing.
+fn by_gamma(gamma: Option<f64>, gamut: Option<Chromaticities>) -> Result<Option<Stated>, String> {
+    let colours = gamut.unwrap_or(Chromaticities::REC709);
+    let matrix = ToRec709::new(&colours, None)
+        .map_err(|()| "primaries or a white (cHRM) that no colours have".to_owned())?;
+    let curve = match gamma {
+        None => Curve::Srgb,
+        // What sRGB stands for beside its own primaries (PNG, third edition, §11.3.2.5), or none
+        Some(gamma) if matrix.is_none() && (gamma - 0.454_55).abs() < 1e-3 => Curve::Srgb,
+        Some(gamma) if (0.1..=10.0).contains(&gamma) => Curve::Power(1.0 / gamma),
+        Some(gamma) => return Err(format!("a gamma (gAMA) of {gamma}, which no display has")),
+    };
+    let nothing = gamma.is_none() && gamut.is_none();
+    Ok((!nothing).then_some(Stated { gamut: Some(colours), matrix, curve }))
 }
 
 /// The pixels as they are stored.

@@ -119,6 +119,16 @@ pub enum PictureError {
         /// Most samples per pixel of a tile.
         most: u64,
     },
+    /// It states colours that are not converted.
+    #[error("{}: states {stated}; {advice}", path.display())]
+    Colours {
+        /// The file.
+        path: PathBuf,
+        /// The colours.
+        stated: String,
+        /// What to do about it.
+        advice: &'static str,
+    },
     /// A valid file that uses a feature this crate does not read.
     #[error("{}: {what}; {advice}", path.display())]
     Unsupported {

@@ -1,8 +1,8 @@
 //! Pictures on disk, and stacks of them played back as a source of samples.
 //!
 //! - [`read_picture`], [`read_exr`], [`read_pfm`], [`read_png`]: linear EXR and PFM, display-encoded PNG. The
-//!   content tells the format. Files may be hostile: sizes are checked before pixels are allocated, and a
-//!   broken file is a [`PictureError`].
+//!   content tells the format. Colours that a file states become those of Rec.709 or sRGB. Files may be
+//!   hostile: sizes are checked before pixels are allocated, and a broken file is a [`PictureError`].
 //! - [`read_facts`], [`read_still`]: what an EXR says of its samples, and a picture with them.
 //! - [`read_unread`]: what is ignored of a file: alpha and further layers.
 //! - [`write_exr`], [`write_png`], [`write_atomic`], [`check_writable`]: files that appear complete or not at
@@ -34,6 +34,7 @@
 //! ```
 
 mod atomic;
+mod colours;
 mod cube;
 mod decode_exr;
 mod decode_pfm;
@@ -66,7 +67,7 @@ pub use lut::{ColourLut, LutInput, LutInputError};
 pub use open::MAX_FILE_BYTES;
 pub use picture::{DisplayImage, LinearImage, Picture};
 pub use plane::Plane;
-pub use read::{read_picture, read_picture_within, read_still};
+pub use read::{read_picture, read_picture_on, read_picture_within, read_still, read_still_on};
 pub use stack::StackSource;
 #[cfg(feature = "tables")]
 pub use table::write_csv;

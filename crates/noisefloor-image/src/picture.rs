@@ -23,7 +23,8 @@ pub struct DisplayImage {
     pub height: usize,
     /// Row-major, `width * height` values.
     pub pixels: Vec<Rgb>,
-    /// Distance between neighbouring codes: 1/255 or 1/65535. Values are rounded to multiples of it.
+    /// Distance between neighbouring codes: 1/255 or 1/65535, of which values are multiples. Of a picture
+    /// whose colours were converted, the root mean square of the distances.
     pub step: f32,
 }
 

@@ -1,5 +1,6 @@
 //! What a picture's file holds beside the colours that are read, for a warning.
 
+use crate::colours::Stated;
 use crate::decode_exr::{Layout, alpha_of, layout_of};
 use crate::error::PictureError;
 use crate::open::{Format, Opened};
@@ -15,6 +16,8 @@ pub struct Unread {
     pub layers: Vec<String>,
     /// Least and largest alpha, if there is alpha.
     pub alpha: Option<RangeInclusive<f32>>,
+    /// The colours of a PNG that are for a display with light above the white of sRGB.
+    pub hdr: Option<String>,
 }
 
 impl Unread {
@@ -41,6 +44,12 @@ impl Unread {
             ),
             _ => {}
         }
+        if let Some(colours) = &self.hdr {
+            all.push(format!(
+                "it states {colours}; on a display without HDR, its white is 203 cd/m², and lighter parts \
+                 are clipped"
+            ));
+        }
         all
     }
 }
@@ -57,11 +66,17 @@ pub fn read_unread(path: impl AsRef<Path>) -> Result<Unread, PictureError> {
             let Layout { layers, has_alpha } = layout_of(path, opened)?;
             let layers = if layers.len() > 1 { layers } else { Vec::new() };
             let alpha = if has_alpha { Some(alpha_of(path, Opened::open(path)?)?) } else { None };
-            Ok(Unread { layers, alpha: alpha.map(|image| range(image.pixels.iter().map(|p| p[0]))) })
+            Ok(Unread {
+                layers,
+                alpha: alpha.map(|image| range(image.pixels.iter().map(|p| p[0]))),
+                hdr: None,
+            })
         }
         Format::Png => {
             let alpha = decode_png::decode_alpha(path, opened)?;
-            Ok(Unread { layers: Vec::new(), alpha: alpha.map(|alpha| range(alpha.into_iter())) })
+            let colours = decode_png::stated_colours(path, Opened::open(path)?)?;
+            let hdr = colours.filter(Stated::is_hdr).map(|colours| colours.describe());
+            Ok(Unread { layers: Vec::new(), alpha: alpha.map(|alpha| range(alpha.into_iter())), hdr })
         }
         // PFM has colours only, and anything else is refused there
         _ => read_picture(path).map(|_| Unread::default()),

@@ -88,6 +88,7 @@ pub struct Ptwne {
     tally: Tally,
     watch: Box<Watch>,
     reference_noise: Option<ReferenceNoise>,
+    program: Option<String>,
 }
 
 /// Counts of the samples taken so far.
@@ -156,7 +157,17 @@ impl Ptwne {
             tally: Tally::default(),
             watch: Box::new(|_, _| ControlFlow::Continue(())),
             reference_noise: None,
+            program: None,
         })
+    }
+
+    /// Names the build of the program that this renderer is part of, such as a digest of its file. It becomes
+    /// part of [`identity`](ProgressiveSource::identity): another build may take other samples, and is then
+    /// not to resume what this one has begun.
+    #[must_use]
+    pub fn with_program(mut self, build: impl Into<String>) -> Self {
+        self.program = Some(build.into());
+        self
     }
 
     /// Renders with opacity tests even if the scene has no partly transparent surfaces. Pictures are the
@@ -347,7 +358,11 @@ impl ProgressiveSource for Ptwne {
         let options = RenderOptions { threads: None, ..self.options };
         let kept = serde_json::to_string(&(options, self.scene.camera()))
             .map_err(|error| SourceError::Failed { name: "ptwne".into(), tile: None, cause: error.into() })?;
-        Ok(self.scene.identity().clone().with_options(&format!("ptwne, {kept}")))
+        let mut identity = self.scene.identity().clone().with_options(&format!("ptwne, {kept}"));
+        if let Some(build) = &self.program {
+            identity.add("the build of this program", build.as_bytes());
+        }
+        Ok(identity)
     }
 
     /// # Errors

@@ -65,7 +65,8 @@ impl PyViewing {
 
 /// When tiles are judged, how the picture is displayed, and the limits that end tiles.
 ///
-/// tile: edge of a tile in pixels, 16 to 512.
+/// tile: edge of a tile in pixels, 16 to 512; tiles of the last column and row have half to one and a half
+///     times as many.
 /// tone_mapping: "reinhard" (exposure by the log-average of the picture, with key and white) or "srgb" (with
 ///     exposure, a factor on radiance).
 /// viewing: on which display the picture is seen, and from how far; a Viewing or its text.

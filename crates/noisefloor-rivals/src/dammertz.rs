@@ -87,12 +87,15 @@ impl Block {
     /// Cuts across the longer side (in pixels), where the errors on either side are most alike; at least two
     /// tiles.
     fn cut(&self, grid: TileGrid, errors: &[Errors]) -> [Self; 2] {
-        let pixels = |tiles: &Range<usize>, edge: usize| {
-            (tiles.end * grid.edge()).min(edge) - tiles.start * grid.edge()
+        // The last tile may be longer or shorter than the others
+        let pixels = |tiles: &Range<usize>, count: usize, length: usize| {
+            let end = if tiles.end == count { length } else { tiles.end * grid.edge() };
+            end - tiles.start * grid.edge()
         };
         let wide = self.rows.len() == 1
             || self.columns.len() > 1
-                && pixels(&self.columns, grid.width()) >= pixels(&self.rows, grid.height());
+                && pixels(&self.columns, grid.columns(), grid.width())
+                    >= pixels(&self.rows, grid.rows(), grid.height());
         let at = |place: usize| {
             let (columns, rows) = (self.columns.clone(), self.rows.clone());
             if wide {

@@ -67,8 +67,10 @@ export class Picture {
   constructor(study, stack, label, onMisfit = () => {}) {
     this.stack = stack;
     this.shape = study.stacks[stack];
-    this.columns = Math.ceil(this.shape.width / this.shape.tile);
-    this.count = this.columns * Math.ceil(this.shape.height / this.shape.tile);
+    // As the server cuts them: what is left of less than half a tile belongs to the last one
+    const along = (length) => Math.max(1, Math.round(length / this.shape.tile));
+    [this.columns, this.rows] = [along(this.shape.width), along(this.shape.height)];
+    this.count = this.columns * this.rows;
     this.canvas = document.createElement("canvas");
     this.canvas.className = "picture";
     this.canvas.width = this.shape.width;
@@ -119,7 +121,8 @@ export class Picture {
 
   /** The tile at a place in image pixels. */
   at(x, y) {
-    return Math.floor(y / this.shape.tile) * this.columns + Math.floor(x / this.shape.tile);
+    const place = (at, count) => Math.min(Math.floor(at / this.shape.tile), count - 1);
+    return place(y, this.rows) * this.columns + place(x, this.columns);
   }
 
   /** Loads all tiles; resolves to what draws them at once. */
@@ -141,7 +144,8 @@ export class Picture {
   mark(index) {
     const [x, y] = this.place(index);
     const { width, height, tile: edge } = this.shape;
-    const [right, bottom] = [Math.min(x + edge, width), Math.min(y + edge, height)];
+    const end = (at, count, length) => (at === (count - 1) * edge ? length : at + edge);
+    const [right, bottom] = [end(x, this.columns, width), end(y, this.rows, height)];
     this.context.fillStyle = "rgb(20 20 20)";
     const reach = Math.round(edge / 8);
     const corners = [

@@ -47,7 +47,7 @@ fn verdict(c: &mut Criterion) {
         film: &film,
         display: &display,
         viewing: Viewing::default(),
-        audience: Audience::TRAINED,
+        audience: noisefloor::Audience::TRAINED,
         reference: None,
     };
     // All on one core, as the rest
@@ -83,7 +83,7 @@ fn pictures(c: &mut Criterion) {
             film: &film,
             display: &display,
             viewing: Viewing::default(),
-            audience: Audience::TRAINED,
+            audience: noisefloor::Audience::TRAINED,
             reference: None,
         };
         group.throughput(Throughput::Elements((edge * edge) as u64));

@@ -3,7 +3,7 @@
 use crate::container::{self, Fault, Format, MAX_PAYLOAD};
 use crate::display::Display;
 use crate::film::{Film, FilmHead};
-use crate::params::Params;
+use crate::params::{Audience, Params, Schedule};
 use crate::session::{Goal, Settling, TileState};
 use crate::source::{IdentityChange, SourceIdentity};
 use serde::{Deserialize, Serialize};
@@ -171,9 +171,8 @@ impl Checkpoint<'_> {
         same("job", self.job.to_string(), job.to_owned())?;
         source.change_since(&self.source).map_or(Ok(()), Err)?;
         same("criterion", self.criterion.clone(), criterion.to_owned())?;
-        if self.params != *params {
-            let [kept, now] = [&self.params, params].map(|params| format!("{params:?}"));
-            return Err(CheckpointError::Other { what: "set of parameters", kept, now });
+        if let Some((what, kept, now)) = changed_param(&self.params, params) {
+            return Err(CheckpointError::Other { what, kept, now });
         }
         let size = |film: &Film| format!("{}×{} pixels", film.grid().width(), film.grid().height());
         same("picture", size(&self.film), size(fresh))?;
@@ -200,6 +199,37 @@ impl Checkpoint<'_> {
             return Err(CheckpointError::Invalid("its tiles are not those of its picture"));
         }
         Ok(())
+    }
+}
+
+/// The first parameter that differs, as it was and as it is.
+fn changed_param(kept: &Params, now: &Params) -> Option<(&'static str, String, String)> {
+    let words = |params: &Params| {
+        // A new parameter does not compile until it is here
+        let Params { tile, tone_mapping, viewing, schedule, min_spp, max_spp, consecutive, audience } =
+            *params;
+        let Audience { slope, offset } = audience;
+        [
+            ("tile edge", format!("{tile} pixels")),
+            ("audience", format!("one of {slope} times the samples {offset:+}")),
+            ("viewing", viewing.to_string()),
+            ("schedule", schedule_in_words(schedule)),
+            ("fewest samples per pixel", min_spp.to_string()),
+            ("most samples per pixel", max_spp.to_string()),
+            ("number of verdicts in a row", consecutive.to_string()),
+            ("tone mapping", format!("{tone_mapping:?}")),
+        ]
+    };
+    let differs =
+        |((what, kept), (_, now)): ((_, String), (_, String))| (kept != now).then_some((what, kept, now));
+    words(kept).into_iter().zip(words(now)).find_map(differs)
+}
+
+fn schedule_in_words(schedule: Schedule) -> String {
+    match schedule {
+        Schedule::Spaced { step } => format!("spaced by {step} samples or more"),
+        Schedule::Growing { step } => format!("growing from {step} samples"),
+        Schedule::Every { step } => format!("every {step} samples"),
     }
 }
 

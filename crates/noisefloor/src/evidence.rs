@@ -380,9 +380,9 @@ mod tests {
 
     #[test]
     fn the_halo_reads_neighbours_and_mirrors_the_image_beyond_its_edge() {
-        let grid = TileGrid::new(100, 40, 32).unwrap();
+        let grid = TileGrid::new(112, 48, 32).unwrap();
         let plane =
-            |i: usize| TilePlanes::gather((100, 40), grid.tile(i), |x, y| ([x as f32; 3], [y as f32; 3]));
+            |i: usize| TilePlanes::gather((112, 48), grid.tile(i), |x, y| ([x as f32; 3], [y as f32; 3]));
         let close = |a: f32, b: f32| (a - b).abs() < 1e-4;
         let first = plane(0);
         assert_eq!(first.image.dim(), (48, 48));
@@ -391,12 +391,12 @@ mod tests {
                 && close(first.image[(8, 7)], 1.0)
                 && close(first.image[(8, 40)], 32.0)
         );
-        let last = plane(7); // rows 32…39, columns 96…99
-        assert_eq!((last.image.dim(), last.inner.width), ((24, 24), 4));
+        let last = plane(7); // rows 32…47, columns 96…111
+        assert_eq!((last.image.dim(), last.inner.width), ((32, 32), 16));
         assert!(close(last.image[(8, 8)], 96.0) && close(last.residual[(8, 8)], 32.0));
         assert!(
-            close(last.image[(8, 12)], 98.0) && close(last.residual[(16, 8)], 38.0),
-            "mirrored at 99 and 39"
+            close(last.image[(8, 24)], 110.0) && close(last.residual[(24, 8)], 46.0),
+            "mirrored at 111 and 47"
         );
         // Images smaller than the halo are mirrored more than once.
         assert!((0..200).all(|place| mirror(place, 1) == 0 && mirror(place, 3) < 3));

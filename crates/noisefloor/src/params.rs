@@ -140,7 +140,8 @@ impl Audience {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct Params {
-    /// Tile edge in pixels, 16…512. A tile stops as a whole. In a Cornell box of 256×256, tiles of 128, 64 and 32
+    /// Tile edge in pixels, 16…512; see [`crate::TileGrid`] for the last column and row. A tile stops as a
+    /// whole. In a Cornell box of 256×256, tiles of 128, 64 and 32
     /// pixels took 828, 801 and 698 independent samples per pixel, and the worst crop of 64×64 had lost 0.65, 0.47 and 0.50 JOD
     /// (`docs/benchmarks/tiles.md`). People judged zones of 128 and 200 pixels; below 64 the model knows less.
     pub tile: usize,

@@ -19,6 +19,15 @@ pub use origin::{OriginRelation, SampleOrigin};
 
 /// Mean difference of a tile from which it may be unlike, as a share of the display's range.
 const UNLIKE: f64 = 0.1;
+/// Edge of the blocks in which pictures are compared for [`StillWarning`], in pixels.
+const BLOCK: usize = 8;
+/// Standard errors that chance does not reach, and the correlation worth a warning: those of
+/// [`crate::watch`].
+const CERTAIN: f64 = 6.5;
+const NOTABLE: f64 = 0.1;
+/// Ratio of brightness worth a warning. Where one picture has few samples, most of its blocks are darker than
+/// the mean, since few pixels have found what light is seldom found.
+const BRIGHTER: f64 = 1.25;
 
 /// A picture with its samples per pixel.
 #[derive(Clone, Debug, PartialEq)]
@@ -106,6 +115,27 @@ pub enum StillError {
     /// The model does not fit the tiles.
     #[error(transparent)]
     Criterion(#[from] CriterionError),
+}
+
+/// What is likely wrong with pictures that are compared: verdicts on them come too early or too late.
+#[derive(Clone, Copy, Debug, Error, PartialEq)]
+#[non_exhaustive]
+pub enum StillWarning {
+    /// Their difference is no independent noise of pixels.
+    #[error(
+        "the noise of neighbouring pixels is correlated ({0:.2}): the pictures were denoised, blurred, \
+         scaled, or \
+         rendered with a wide pixel filter; verdicts are made for independent pixels, and come too early or \
+         too late"
+    )]
+    Neighbours(f64),
+    /// One has another exposure.
+    #[error(
+        "the picture is {0:.2} times as bright as what it is compared with, nearly everywhere: render both \
+         with one \
+         exposure, as their difference is not noise alone"
+    )]
+    Brightness(f64),
 }
 
 impl Still {
@@ -223,6 +253,11 @@ impl<'a> SnapshotPair<'a> {
         self.samples
     }
 
+    /// Samples per pixel of the picture. Fewer than one is described as one: see [`SnapshotPair::describe`].
+    pub fn image_spp(&self) -> f64 {
+        self.image.spp
+    }
+
     /// How the picture is shown.
     pub fn display(&self) -> &Display {
         &self.display
@@ -284,7 +319,44 @@ impl<'a> SnapshotPair<'a> {
         grid.tiles().collect::<Vec<_>>().par_iter().map(unlike).collect()
     }
 
-    /// Describes all tiles, in their order, for [`Oracle::judge_described`].
+    /// What the whole pictures say against a verdict on them: none if there is nothing to compare with.
+    ///
+    /// Neighbours: the correlation of the displayed difference with itself one pixel beside or below, within
+    /// blocks and without their means, which a picture of few samples has below the mean. Brightness: the
+    /// mean radiance and the median of blocks both differ, in one direction; a few bright pixels make the
+    /// one, and noise of many dark ones the other.
+    pub fn warnings(&self) -> Vec<StillWarning> {
+        let Some(other) = &self.other else { return Vec::new() };
+        let neighbours = self.correlation_of_neighbours(other).map(StillWarning::Neighbours);
+        let brightness = ratio_of_brightness(self.image, other).map(StillWarning::Brightness);
+        neighbours.into_iter().chain(brightness).collect()
+    }
+
+    fn correlation_of_neighbours(&self, other: &Still) -> Option<f64> {
+        let light =
+            |still: &Still, pixel: usize| f64::from(luminance(self.display.encode(still.pixels[pixel])));
+        const PAIRS: usize = 2 * (BLOCK - 1) * (BLOCK - 1);
+        let (mut sum, mut squares, mut energy) = (0.0, 0.0, 0.0);
+        for block in blocks(self.image.size) {
+            let differences: Vec<f64> =
+                block.iter().map(|&pixel| light(self.image, pixel) - light(other, pixel)).collect();
+            let mean = differences.iter().sum::<f64>() / differences.len() as f64;
+            let at = |x: usize, y: usize| differences[y * BLOCK + x] - mean;
+            for (x, y) in (0..BLOCK - 1).flat_map(|y| (0..BLOCK - 1).map(move |x| (x, y))) {
+                for beside in [at(x + 1, y), at(x, y + 1)] {
+                    let product = at(x, y) * beside;
+                    (sum, squares) = (sum + product, squares + product * product);
+                }
+            }
+            energy += differences.iter().map(|d| (d - mean) * (d - mean)).sum::<f64>();
+        }
+        // By Hoeffding's bound, as in `watch`, with care: two pairs share each pixel
+        let correlation = sum / PAIRS as f64 / (energy / (BLOCK * BLOCK) as f64);
+        (sum.abs() > CERTAIN * (2.0 * squares).sqrt() && correlation.abs() > NOTABLE).then_some(correlation)
+    }
+
+    /// Describes all tiles, in their order, for [`Oracle::judge_described`]. Of a picture of less than one
+    /// sample per pixel they are described as if it had one; needs are then in multiples of what it has.
     ///
     /// # Errors
     /// [`StillError`] if there is nothing to judge by, or the model is for tiles of another size.
@@ -322,6 +394,32 @@ fn is_unlike(differences: &[Vec<f32>]) -> bool {
     // Of two independent pixels, the difference has twice the variance of one
     let variance = steps.iter().sum::<f64>() / (2 * steps.len().max(1)) as f64;
     !steps.is_empty() && mean.abs() > UNLIKE && mean.abs() > 3.0 * variance.sqrt()
+}
+
+/// The pixels of each whole block, row by row.
+fn blocks((width, height): (usize, usize)) -> impl Iterator<Item = Vec<usize>> {
+    let corners =
+        (0..height / BLOCK).flat_map(move |y| (0..width / BLOCK).map(move |x| (x * BLOCK, y * BLOCK)));
+    corners.map(move |(x, y)| (0..BLOCK * BLOCK).map(|i| (y + i / BLOCK) * width + x + i % BLOCK).collect())
+}
+
+/// How many times as bright one picture is as the other, if that is neither chance nor a few pixels.
+fn ratio_of_brightness(one: &Still, other: &Still) -> Option<f64> {
+    let light = |still: &Still, pixel: usize| f64::from(luminance(still.pixels[pixel]));
+    let (mut sums, mut squares, mut ratios) = ([0.0; 2], 0.0, Vec::new());
+    for block in blocks(one.size) {
+        let of = |still: &Still| block.iter().map(|&pixel| light(still, pixel)).sum::<f64>();
+        let (a, b) = (of(one), of(other));
+        squares += block.iter().map(|&p| (light(one, p) - light(other, p)).powi(2)).sum::<f64>();
+        (sums[0], sums[1]) = (sums[0] + a, sums[1] + b);
+        // Black in both says nothing
+        ratios.extend((a > 0.0 || b > 0.0).then_some(a / b));
+    }
+    ratios.sort_by(f64::total_cmp);
+    let (mean, median) = (sums[0] / sums[1], *ratios.get(ratios.len() / 2)?);
+    let differs =
+        (mean > BRIGHTER && median > BRIGHTER) || (mean < 1.0 / BRIGHTER && median < 1.0 / BRIGHTER);
+    ((sums[0] - sums[1]).abs() > CERTAIN * squares.sqrt() && differs).then_some(mean)
 }
 
 /// Whether the pictures share samples, as far as their origins say or they show it: never a guess. Beside

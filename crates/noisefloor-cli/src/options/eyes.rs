@@ -35,6 +35,15 @@ impl FromStr for EyesChoice {
 }
 
 impl EyesArgs {
+    /// Beside what looks with other eyes, a file has no effect: it is read even so, and that is said.
+    pub fn unused(&self, beside: &str) -> anyhow::Result<()> {
+        if let Some(EyesChoice::File(path)) = &self.eyes {
+            Eyes::read(path)?;
+            note!("warning: --eyes has no effect with {beside}");
+        }
+        Ok(())
+    }
+
     /// Whose eyes count, and says so in a line. `said` are other options that say who looks, or where: with
     /// them, eyes must be asked for, and contradict them.
     pub fn of(&self, model: Option<&Path>, said: &[(&str, bool)]) -> anyhow::Result<Option<Person>> {
@@ -55,19 +64,24 @@ impl EyesArgs {
                 }
             },
         };
-        let person = eyes.strictest();
         let digest = match model {
             None => Model::bundled().digest(),
             Some(_) => load_model(model)?.digest(),
         };
-        if person.model != digest {
-            let what = format!("the eyes of {} were measured beside another model", person.name);
+        let others: Vec<&str> =
+            eyes.people().iter().filter(|p| p.model != digest).map(|p| p.name.as_str()).collect();
+        let what = format!("the eyes of {} were measured beside another model", others.join(", "));
+        let Some(eyes) = eyes.beside(&digest) else {
             if asked {
                 refuse!("--eyes: {what}; calibrate again");
             }
             note!("note: {what}, and are not used; `noisefloor calibrate` takes two minutes");
             return Ok(None);
+        };
+        if !others.is_empty() {
+            note!("warning: {what}, and are left out; calibrate them again");
         }
+        let person = eyes.strictest();
         note!(
             "note: for the eyes of {} ({:.2} times the samples of the model's observers, {:.0} pixels per degree, \
              measured on {}); --eyes none for those of the observers",

@@ -1,10 +1,10 @@
 //! Options about the model.
 
-use anyhow::Context;
+use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
 use noisefloor::{Model, Oracle, People, evidence::Evidence};
 use std::fs::File;
-use std::io::BufReader;
+use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 
 /// Which oracle.
@@ -67,5 +67,10 @@ impl OracleArgs {
 pub fn load_model(path: Option<&Path>) -> anyhow::Result<Model> {
     let Some(path) = path else { return Ok(Model::bundled()) };
     let file = File::open(path).with_context(|| format!("{}: cannot be opened", path.display()))?;
-    Model::read(BufReader::new(file)).with_context(|| format!("{}", path.display()))
+    let mut reader = BufReader::new(file);
+    let begins = reader.fill_buf().unwrap_or_default();
+    if [&b"\x76\x2f\x31\x01"[..], b"\x89PNG", b"PF"].iter().any(|magic| begins.starts_with(magic)) {
+        bail!("{}: is a picture, not a model; `noisefloor judge` looks at pictures", path.display());
+    }
+    Model::read(reader).with_context(|| format!("{}", path.display()))
 }

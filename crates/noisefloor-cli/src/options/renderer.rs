@@ -5,7 +5,7 @@ use super::values;
 use crate::refuse;
 use crate::sources::{PtwneOptions, Resources, SourceJob, SourceKind};
 use crate::spell::JobPath;
-use clap::{Args, ValueEnum};
+use clap::{Args, ValueEnum, ValueHint};
 use noisefloor_ptwne::{Estimator, Filter, Sampling};
 use std::ffi::OsStr;
 use std::num::NonZeroUsize;
@@ -19,7 +19,7 @@ pub struct RendererArgs {
     /// which plays back a folder of pictures; or `command: PROGRAM …`, any program that renders into an EXR
     /// or PFM file. In its arguments, {scene} {seed} {spp} {out} are filled in, and {x0} {x1} {y0} {y1} if
     /// it can render tiles (x1 and y1 are exclusive).
-    #[arg(long, default_value = "ptwne", value_name = "SOURCE", value_parser = source)]
+    #[arg(long, default_value = "ptwne", value_name = "SOURCE", value_parser = source, value_hint = ValueHint::Other)]
     source: SourceKind,
     /// Other renderers, and denoisers: abort a call after this many seconds.
     #[arg(long, default_value = "1800", value_name = "SECONDS", value_parser = values::seconds)]

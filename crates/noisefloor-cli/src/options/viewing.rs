@@ -1,7 +1,7 @@
 //! Where pictures are seen.
 
 use crate::refuse;
-use clap::Args;
+use clap::{Args, ValueHint};
 use noisefloor::{Oracle, Viewing};
 
 /// On which display, and from how far.
@@ -12,7 +12,7 @@ pub struct ViewingArgs {
     /// (pixels per degree, cd/m², lux); or a preset with changes, `desk,distance=1.2` (metres),
     /// `desk,primaries=p3`, `desk,white=d50` (or `white=5500K`, or x:y) [default: what the model was trained
     /// for; `desk` for the bundled one, and without a model].
-    #[arg(long, value_name = "WHERE")]
+    #[arg(long, value_name = "WHERE", value_hint = ValueHint::Other)]
     viewing: Option<Viewing>,
 }
 

@@ -4,6 +4,7 @@ mod adapters;
 
 pub use adapters::{ADAPTERS, Adapter};
 
+use crate::build::program_digest;
 use crate::refuse;
 use crate::say::note;
 use crate::spell::{JobPath, as_typed};
@@ -171,11 +172,16 @@ impl Opened {
 impl Resources {
     /// Makes the pool of threads that was asked for.
     pub fn start_threads(&self) -> anyhow::Result<()> {
-        if let Some(threads) = self.threads {
-            rayon::ThreadPoolBuilder::new().num_threads(threads.get()).build_global().context("--threads")?;
-        }
-        Ok(())
+        start_threads(self.threads)
     }
+}
+
+/// Starts that many threads, for everything that shares work; by default as many as there are cores.
+pub fn start_threads(threads: Option<NonZeroUsize>) -> anyhow::Result<()> {
+    if let Some(threads) = threads {
+        rayon::ThreadPoolBuilder::new().num_threads(threads.get()).build_global().context("--threads")?;
+    }
+    Ok(())
 }
 
 impl SourceJob {
@@ -263,7 +269,7 @@ impl SourceJob {
             clamp: clamp.or(asked),
             ..RenderOptions::default()
         };
-        let source = Box::new(Ptwne::new(scene, width, height, options)?);
+        let source = Box::new(Ptwne::new(scene, width, height, options)?.with_program(program_digest()?));
         let warnings = group_warnings(&warnings).iter().map(ToString::to_string).collect();
         Ok(Opened { source, scene: name, warnings })
     }
@@ -276,11 +282,31 @@ fn load(scene: &OsStr, options: &LoadOptions) -> anyhow::Result<Loaded> {
     }
     let path = Path::new(scene);
     if path.extension().is_none() && !path.exists() {
+        let typed = scene.to_string_lossy();
+        let names = scenes::list().chain(scenes::stiff()).map(|scene| scene.name);
+        let near = names.min_by_key(|name| edits(&typed, name)).filter(|name| edits(&typed, name) <= 2);
+        let meant = near.map_or(String::new(), |name| format!("did you mean {name}? "));
         bail!(
-            "there is no built-in scene {scene:?}, and no file of that name; `noisefloor scenes` lists the scenes"
+            "there is no built-in scene {scene:?}, and no file of that name; {meant}`noisefloor scenes` \
+             lists the scenes"
         );
     }
     Ok(noisefloor_scenefile::load_with(path, options)?)
+}
+
+/// Letters to add, leave out or replace to make one word of the other (Levenshtein 1966).
+fn edits(one: &str, other: &str) -> usize {
+    let other: Vec<char> = other.chars().collect();
+    let mut row: Vec<usize> = (0..=other.len()).collect();
+    for (i, a) in one.chars().enumerate() {
+        let mut before = std::mem::replace(&mut row[0], i + 1);
+        for (j, b) in other.iter().enumerate() {
+            let replaced = before + usize::from(a != *b);
+            before = row[j + 1];
+            row[j + 1] = replaced.min(before + 1).min(row[j] + 1);
+        }
+    }
+    row[other.len()]
 }
 
 /// `hall` of `rooms/hall.xml`, and of `rooms/hall/`.

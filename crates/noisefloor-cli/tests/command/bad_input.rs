@@ -289,3 +289,33 @@ fn a_scene_may_have_any_name() {
     });
     assert!(pixels[0] == pixels[1]);
 }
+
+/// What was meant is said, where it is likely.
+#[test]
+fn near_misses_are_recognised() {
+    let folder = tempfile::tempdir().unwrap();
+    let picture = folder.path().join("a.exr");
+    crate::kit::grey_exr(&picture, (8, 8), 1, 0.4);
+    fail(&["inspect", text(&picture)], &["a.exr", "is a picture", "`noisefloor judge`"]);
+    fail(&["render", "cornel-box"], &["did you mean cornell-box?"]);
+    let output = crate::kit::run(&["render", "xyzzy"]);
+    assert!(!crate::kit::stderr(&output).contains("did you mean"));
+    let plan = folder.path().join("farm");
+    fail(
+        &["farm", "plan", text(&plan), "--", text(folder.path()), "--source", "exr"],
+        &["--source exr` plays them"],
+    );
+}
+
+/// Completions offer files only where files are meant.
+#[test]
+fn names_are_not_completed_as_files() {
+    let script = succeed(&["completions", "zsh"]);
+    for option in ["--source", "--criterion", "--viewing", "--install"] {
+        let lines: Vec<&str> = script.lines().filter(|line| line.contains(&format!("'{option}="))).collect();
+        assert!(
+            !lines.is_empty() && lines.iter().all(|line| !line.contains("_files")),
+            "{option}: {lines:?}"
+        );
+    }
+}

@@ -80,6 +80,16 @@ fn renders_stop_for_the_eyes_that_are_kept() {
     let shown = succeed(&["calibrate", "--show", "--out", text(&studio)]);
     assert!(shown.contains("b: 3.00 times") && shown.lines().count() == 4, "{shown}");
 
+    // Somebody of another model is left out, by name, and is no reason against the others
+    keep(&studio, "old", 9.0, "another");
+    let (_, said, _) = render("left-out", &["--eyes", text(&studio)]);
+    assert!(said.contains("the eyes of old were measured") && said.contains("for the eyes of b"), "{said}");
+    // Beside other criteria it is opened, and said to have no effect
+    let (_, said, _) = render("unused", &["--eyes", text(&studio), "--criterion", "spp:8"]);
+    assert!(said.contains("--eyes has no effect"), "{said}");
+    let absent = home.path().join("absent");
+    fail(&tiny("x", &["--eyes", text(&absent), "--criterion", "spp:8"]), &["absent"]);
+
     // Of another model: not used by default, an error when asked for
     let other = home.path().join("other.toml");
     keep(&other, "me", 2.0, "another");
@@ -94,4 +104,19 @@ fn renders_stop_for_the_eyes_that_are_kept() {
     std::fs::write(&own, "colour = 1").unwrap();
     let output = command(&tiny(text(&out), &[])).env("XDG_CONFIG_HOME", home.path()).output().unwrap();
     assert!(stderr(&output).contains("--eyes none goes without"), "{}", stderr(&output));
+}
+
+/// Before the first question, and not after the last.
+#[test]
+#[cfg(feature = "watch")]
+fn what_could_not_be_kept_is_said_at_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let ask = |out: &Path, more: &[&str], words: &[&str]| {
+        fail(&[&["calibrate", "--listen", "127.0.0.1:0", "--out", text(out)], more].concat(), words);
+    };
+    ask(folder.path(), &[], &["could not be kept", "is a folder"]);
+    let file = folder.path().join("eyes.toml");
+    ask(&file, &["--for", ""], &["empty"]);
+    std::fs::write(&file, "version = 9\neyes = 2").unwrap();
+    ask(&file, &[], &["version 9 of a newer noisefloor"]);
 }

@@ -55,6 +55,63 @@ fn a_sequence_is_rendered_and_resumed_frame_by_frame() {
     assert!(picture(1) == picture(2) && picture(2) == picture(3));
 }
 
+/// A finished frame is this sequence's only if its job is, and if its pictures are there.
+#[test]
+fn finished_frames_of_another_job_are_not_taken() {
+    let folder = shots();
+    let (out, shot) = (folder.path().join("out"), folder.path().join("shot.toml"));
+    let scene = folder.path().join("hall.{frame:04}.xml");
+    let render = ["render", "--config", text(&shot), "--frames", "1-2", text(&scene), "--out", text(&out)];
+    let resume = |more: &[&'static str]| [&render[..], &["--resume", "--quiet"], more].concat();
+    let refused = |args: &[&str]| {
+        let output = command(args).output().unwrap();
+        assert_eq!(output.status.code(), Some(1), "{}", stderr(&output));
+        assert!(stderr(&output).contains("holds a finished picture of other options"), "{}", stderr(&output));
+    };
+    succeed(&render);
+    refused(&resume(&["--seed", "2"]));
+    refused(&resume(&["--size", "48x32"]));
+    // A picture that somebody has removed is made again, and no other
+    let pictures = [1, 2].map(|frame| out.join(format!("{frame:04}/image.exr")));
+    let kept = fs::read(&pictures[1]).unwrap();
+    let first = fs::metadata(&pictures[0]).unwrap().modified().unwrap();
+    fs::remove_file(&pictures[1]).unwrap();
+    succeed(&resume(&[]));
+    assert!(fs::read(&pictures[1]).unwrap() == kept);
+    assert_eq!(fs::metadata(&pictures[0]).unwrap().modified().unwrap(), first);
+    // The scene has changed since
+    let second = folder.path().join("hall.0002.xml");
+    fs::write(&second, fs::read_to_string(&second).unwrap() + "<!-- brighter -->").unwrap();
+    refused(&resume(&[]));
+}
+
+/// Whoever kills the sequence has killed its frame, which ends as by SIGTERM.
+#[test]
+#[cfg(unix)]
+fn a_killed_sequence_leaves_no_frame_rendering() {
+    let folder = shots();
+    let (out, shot) = (folder.path().join("out"), folder.path().join("shot.toml"));
+    let scene = folder.path().join("hall.{frame:04}.xml");
+    let long = ["--criterion", "spp:100000000", "--max-spp", "100000000"];
+    let render = ["render", "--config", text(&shot), "--frames", "1-1", text(&scene), "--out", text(&out)];
+    let mut parent =
+        command(&[&render[..], &long].concat()).stderr(std::process::Stdio::null()).spawn().unwrap();
+    let wait = |what: &str, done: &dyn Fn() -> bool| {
+        let began = std::time::Instant::now();
+        while !done() {
+            assert!(began.elapsed().as_secs() < 120, "{what}");
+            std::thread::sleep(std::time::Duration::from_millis(50));
+        }
+    };
+    let lock = out.join("0001/.noisefloor.lock");
+    let locked = || fs::File::open(&lock).is_ok_and(|lock| lock.try_lock().is_err());
+    wait("the frame begins", &locked);
+    parent.kill().unwrap();
+    parent.wait().unwrap();
+    wait("the frame ends", &|| !locked());
+    assert!(out.join("0001/checkpoint.nfc").exists(), "it has written what it had");
+}
+
 #[test]
 fn what_is_typed_wins_over_a_file_and_nonsense_is_refused() {
     let folder = shots();

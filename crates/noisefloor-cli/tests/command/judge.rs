@@ -325,3 +325,59 @@ fn what_is_not_read_of_a_picture_is_said() {
     let layers = said(&with(&[("key.R", 0.1), ("key.G", 0.1), ("key.B", 0.1)]));
     assert!(layers.contains("the unnamed one is read, and not key"), "{layers}");
 }
+
+/// Noise that pixels share, and exposures that differ, are said; two renders are judged without a word.
+#[test]
+fn pictures_that_were_filtered_or_exposed_otherwise_are_noticed() {
+    let folder = tempdir().unwrap();
+    let size = (64, 64);
+    let noise = |seed: u64| -> Vec<f32> {
+        let mut random = crate::kit::random(seed);
+        (0..64 * 64).map(|i| (0.3 + 0.004 * (i % 64) as f32) * (1.0 + 0.2 * random() as f32)).collect()
+    };
+    let write = |name: &str, values: &[f32]| {
+        let path = folder.path().join(name);
+        let rgb: Vec<[f32; 3]> = values.iter().map(|&v| [v; 3]).collect();
+        write_exr(&path, &RenderLayers::rgb(size.0, size.1, &rgb)).unwrap();
+        path
+    };
+    let blurred = |values: &[f32]| -> Vec<f32> {
+        let at = |i: usize| values[i.min(values.len() - 1)];
+        (0..values.len()).map(|i| (at(i.saturating_sub(1)) + at(i) + at(i + 1)) / 3.0).collect()
+    };
+    let judge = |a: &PathBuf, b: &PathBuf| {
+        let args = ["judge", text(a), "--against", text(b), "--independent", "--tile", "32"];
+        let output = run(&[&args[..], &["--spp", "64", "--spp", "64", "--threads", "1"]].concat());
+        assert!(output.status.success(), "{}", stderr(&output));
+        stderr(&output)
+    };
+    let (a, b) = (noise(1), noise(2));
+    let sharp = [write("a.exr", &a), write("b.exr", &b)];
+    assert_eq!(judge(&sharp[0], &sharp[1]), "");
+    let soft = [write("c.exr", &blurred(&a)), write("d.exr", &blurred(&b))];
+    let said = judge(&soft[0], &soft[1]);
+    assert!(
+        said.contains("the noise of neighbouring pixels is correlated") && said.lines().count() == 1,
+        "{said}"
+    );
+    let bright = write("e.exr", &b.iter().map(|v| 1.5 * v).collect::<Vec<_>>());
+    let said = judge(&sharp[0], &bright);
+    assert!(said.contains("the picture is 0.67 times as bright"), "{said}");
+}
+
+/// The same noise at a quarter of a sample as at one: it needs a quarter of the samples.
+#[test]
+fn needs_of_less_than_a_sample_are_its_own() {
+    let folder = tempdir().unwrap();
+    let [a, b] = ["a.exr", "b.exr"].map(|name| folder.path().join(name));
+    grey_exr(&a, (64, 64), 1, 0.4);
+    grey_exr(&b, (64, 64), 2, 0.4);
+    let need = |spp: &str| {
+        let args = ["judge", text(&a), "--against", text(&b), "--independent", "--tile", "64", "--json"];
+        let report: Value =
+            serde_json::from_str(&succeed(&[&args[..], &["--spp", spp, "--spp", spp]].concat())).unwrap();
+        report["tiles"][0]["expected_spp"].as_f64().unwrap()
+    };
+    let (one, quarter) = (need("1"), need("0.25"));
+    assert!(one > 8.0 && (quarter - one / 4.0).abs() <= 1.0, "{one} {quarter}");
+}

@@ -150,3 +150,35 @@ fn what_cannot_be_compared_is_said() {
     fail(&["metrics", text(&a), text(&a), "--viewing", "standard_hdr_pq"], &["standard_hdr_pq", "sRGB"]);
     fail(&["metrics", text(&a)], &["REFERENCE"]);
 }
+
+/// What is not read is said, as `judge` says it.
+#[test]
+fn what_is_not_read_is_said() {
+    use exr::prelude::*;
+    let folder = tempdir().unwrap();
+    let layers = folder.path().join("layers.exr");
+    let names = ["A", "B", "G", "R", "albedo.B", "albedo.G", "albedo.R", "beauty.B", "beauty.G", "beauty.R"];
+    let channels = |names: &[&str]| {
+        let all = names.iter().map(|&name| AnyChannel::new(name, FlatSamples::F32(vec![0.5; 64])));
+        Image::from_channels((8, 8), AnyChannels::sort(all.collect()))
+    };
+    channels(&names[4..]).write().to_file(&layers).unwrap();
+    let plain = folder.path().join("plain.exr");
+    channels(&names[..4]).write().to_file(&plain).unwrap();
+    let output = run(&["metrics", text(&layers), text(&plain)]);
+    assert!(output.status.success(), "{}", stderr(&output));
+    let said = stderr(&output);
+    assert!(said.contains("of its layers, albedo is read, and not beauty"), "{said}");
+    assert!(said.contains("plain.exr: it is transparent in places"), "{said}");
+}
+
+/// A small file may claim more pixels than there is memory for; 8K is enough for a picture.
+#[test]
+fn huge_pictures_are_refused() {
+    let folder = tempdir().unwrap();
+    let path = folder.path().join("a.png");
+    let (width, height) = (7680, 4321);
+    write_png(&path, width, height, &vec![128; 3 * width * height]).unwrap();
+    assert!(std::fs::metadata(&path).unwrap().len() < 1 << 20);
+    fail(&["metrics", text(&path), text(&path)], &["a.png", "7680×4321 pixels exceed the limit"]);
+}

@@ -1,4 +1,4 @@
-use crate::kit::{FILES, command, fail, json, succeed, table, text};
+use crate::kit::{FILES, command, fail, json, stderr, succeed, table, text};
 #[cfg(feature = "lab")]
 use crate::learn::Corpora;
 use noisefloor_image::{read_exr, read_picture};
@@ -182,7 +182,8 @@ fn a_checkpoint_of_another_render_is_refused() {
     succeed(&short(out, &["--time", "0.01"]));
     let refused = |more: &[&str], says: &str| fail(&short(out, more), &[says]);
     refused(&["--resume", "--seed", "2"], "belongs to another job");
-    refused(&["--resume", "--batch", "50"], "set of parameters");
+    refused(&["--resume", "--batch", "50"], "its schedule is spaced by");
+    refused(&["--resume", "--audience", "2,0"], "its audience is one of 1 times the samples");
     let rival = ["render", "--size", "64x64", "--resume", "--out", out, "--criterion", "cycles:0.01"];
     fail(&rival, &["leave it out"]);
     let source = [
@@ -222,4 +223,23 @@ fn the_page_of_an_interrupted_comparison_says_so() {
     // A fast machine may have finished
     let done = !page().unwrap().contains("Not finished");
     assert_eq!(code, Some(if done { 0 } else { 130 }));
+}
+
+/// Another build may take other samples: what one has begun, the other does not resume.
+#[test]
+#[cfg(target_os = "linux")]
+fn a_checkpoint_of_another_build_is_refused() {
+    use std::os::unix::fs::PermissionsExt;
+    let folder = tempdir().unwrap();
+    let (out, other) = (folder.path().join("out"), folder.path().join("noisefloor"));
+    succeed(&short(text(&out), &["--time", "0.01"]));
+    // What follows the end of an executable does not change what it does
+    let program = std::fs::read(env!("CARGO_BIN_EXE_noisefloor")).unwrap();
+    std::fs::write(&other, [&program[..], b"."].concat()).unwrap();
+    std::fs::set_permissions(&other, std::fs::Permissions::from_mode(0o755)).unwrap();
+    let mut resume = std::process::Command::new(&other);
+    resume.args(short(text(&out), &["--resume"])).env("XDG_CONFIG_HOME", "/nowhere");
+    let said = resume.output().unwrap();
+    assert_eq!(said.status.code(), Some(1));
+    assert!(stderr(&said).contains("`the build of this program` has changed"), "{}", stderr(&said));
 }

@@ -2,14 +2,14 @@ use super::*;
 use noisefloor::{FixedSpp, Params};
 
 fn job() -> ShardJob {
-    let session = Session::new(40, 20, FixedSpp(8), Params::default().with_tile(16)).unwrap();
+    let session = Session::new(40, 24, FixedSpp(8), Params::default().with_tile(16)).unwrap();
     ShardJob::of(SourceIdentity::new("grey"), &session)
 }
 
 fn shard() -> Shard {
     let mut shard = Shard::new(job()).with_render(&"bulb");
     shard.add(PlannedBatch::new(0, 0, 4), 4, vec![[0.25, f32::NAN, -1.5]; 256]);
-    shard.add(PlannedBatch::new(5, 4, 4), 2, vec![[1e-40, 3.0, f32::MAX]; 32]);
+    shard.add(PlannedBatch::new(5, 4, 4), 2, vec![[1e-40, 3.0, f32::MAX]; 64]);
     shard.add(PlannedBatch::new(1, 8, 4), 0, vec![]);
     shard.add_seconds(1.5);
     shard
@@ -31,7 +31,7 @@ fn what_is_written_is_read() {
     );
     let first = file.read(0).unwrap();
     assert!(first.len() == 256 && first[7][1].is_nan() && first[7][2] == -1.5);
-    assert_eq!(file.read(1).unwrap(), vec![[1e-40, 3.0, f32::MAX]; 32]);
+    assert_eq!(file.read(1).unwrap(), vec![[1e-40, 3.0, f32::MAX]; 64]);
     assert!(file.read(2).unwrap().is_empty());
 }
 

@@ -1,5 +1,8 @@
 //! Tests of noisefloor-image, one module a subject.
 
+/// Colours that files state.
+#[cfg(test)]
+mod colours;
 /// LUTs: known answers, and what is refused.
 #[cfg(test)]
 mod cube;

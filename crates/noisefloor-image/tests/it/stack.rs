@@ -3,7 +3,7 @@ use noisefloor::{ProgressiveSource, Request, SourceError, Tile, TileGrid};
 use noisefloor_image::{PictureError, RenderLayers, StackError, StackSource, write_exr, write_png};
 use std::path::Path;
 
-const SIZE: (usize, usize) = (40, 20);
+const SIZE: (usize, usize) = (48, 20);
 
 /// Two tiles: 32 and 8 pixels wide.
 fn tiles() -> Vec<Tile> {
@@ -90,7 +90,7 @@ fn batches_are_handed_out_as_they_are() {
         got.iter().map(|b| (b.tile.index, b.spp)).collect::<Vec<_>>(),
         [(1, 1), (0, 20), (1, 40), (0, 0)]
     );
-    assert_eq!(got.iter().map(|b| b.mean.len()).collect::<Vec<_>>(), [8 * 20, 32 * 20, 8 * 20, 0]);
+    assert_eq!(got.iter().map(|b| b.mean.len()).collect::<Vec<_>>(), [16 * 20, 32 * 20, 16 * 20, 0]);
     assert!(got[0].mean[0][0].is_nan());
     assert_eq!((got[1].mean[0], got[2].mean[0]), ([1.0; 3], [2.0; 3]));
 

@@ -147,7 +147,7 @@ fn bad_options_and_tiles_are_errors() {
     assert!(matches!(Ptwne::new(scene(), 10, 10, options), Err(RenderError::Option { name: "threads", .. })));
     let tile = TileGrid::new(64, 64, 32).unwrap().tile(3);
     assert!(cornell(RenderOptions::default()).sample(&[Request::new(tile, 0, 1)]).is_err());
-    let tile = TileGrid::new(40, 40, 32).unwrap().tile(3);
+    let tile = TileGrid::new(40, 40, 16).unwrap().tile(3);
     let none = cornell(RenderOptions::default()).sample(&[Request::new(tile, 0, 0)]).unwrap();
     assert!(none[0].spp == 0 && none[0].mean.is_empty());
 }

@@ -64,7 +64,7 @@ pub(crate) fn pids(file: &Path) -> Vec<u32> {
 }
 
 pub(crate) fn tiles() -> Vec<Tile> {
-    TileGrid::new(SIZE.0, SIZE.1, 32).unwrap().tiles().collect()
+    TileGrid::new(SIZE.0, SIZE.1, 26).unwrap().tiles().collect()
 }
 
 pub(crate) fn requests(first: u64, samples: u64) -> Vec<Request> {

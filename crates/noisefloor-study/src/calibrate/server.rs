@@ -216,12 +216,16 @@ async fn state(State(app): Shared) -> Json<PageView> {
     view(&app.state())
 }
 
-/// `POST /api/conditions`: begins.
+/// `POST /api/conditions`: begins, unless something was begun.
 async fn conditions(State(app): Shared, body: Body) -> Result<Json<PageView>, Refusal> {
     let refuse = |what: String| {
         Refusal::new(StatusCode::UNPROCESSABLE_ENTITY, what, "conditions", "change it, and measure again")
     };
     let seen: Conditions = read_json(body).await?;
+    // A second tab goes on with what the first has begun; `again` begins anew
+    if app.state().calibration.is_some() {
+        return Ok(view(&app.state()));
+    }
     seen.check().map_err(refuse)?;
     if let Some(problem) = seen.outside(&ViewingLimits::default()) {
         let what = match problem {
@@ -320,4 +324,42 @@ async fn picture(
         PngEncoder::new(&mut png).write_image(pixels.as_flattened(), edge, edge, ExtendedColorType::Rgb8);
     written.map_err(|_| absent("the picture cannot be written"))?;
     Ok(([(CONTENT_TYPE, "image/png"), (CACHE_CONTROL, "no-store")], png).into_response())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::{Value, json};
+
+    /// A second tab goes on with the answers of the first; only `again` throws them away.
+    #[test]
+    fn a_second_tab_joins_the_first() {
+        let setup = CalibrateSetup {
+            oracle: Oracle::bundled(),
+            name: "me".to_owned(),
+            date: "2026-11-25".to_owned(),
+            seed: 1,
+            keep: Box::new(|_| Ok(String::new())),
+        };
+        let server = CalibrateServer::bind(setup, ([127, 0, 0, 1], 0).into(), &Exposure::default()).unwrap();
+        let url = format!("http://{}/api", server.address());
+        std::thread::spawn(move || server.run());
+        let post = |path: &str, body: &Value| -> Value {
+            let request = ureq::post(format!("{url}/{path}")).header("content-type", "application/json");
+            let mut reply = request.send(body.to_string()).unwrap();
+            serde_json::from_str(&reply.body_mut().read_to_string().unwrap()).unwrap()
+        };
+        let seen = json!({
+            "pixels-per-mm": 3.78, "distance-mm": 600, "pixel-ratio": 1, "zoom": 1, "colour-depth": 24,
+            "screen-width": 1920, "screen-height": 1080, "gamma": 2.2, "ambient": "dim",
+        });
+        let begun = post("conditions", &seen);
+        assert_eq!(begun["stage"], "trial", "{begun}");
+        let first = begun["number"].clone();
+        let answered = post("answer", &json!({ "trial": first, "choice": 0 }));
+        assert_ne!(answered["number"], first, "{answered}");
+        assert_eq!(post("conditions", &seen), answered);
+        assert_eq!(post("again", &json!({}))["stage"], "conditions");
+        assert_eq!(post("conditions", &seen)["number"], first);
+    }
 }

@@ -130,7 +130,10 @@ pub(crate) async fn state(State(app): Shared) -> Answer {
 /// `POST /api/pictures/{name}`: the file as it is.
 pub(crate) async fn add(State(app): Shared, name: Named, headers: HeaderMap, body: Body) -> Answer {
     let name = name.map(|Path(name)| name).unwrap_or_default();
-    if name.is_empty() || name.len() > MAX_NAME || name.chars().any(|c| c.is_control() || c == '/') {
+    if name.is_empty()
+        || name.len() > MAX_NAME
+        || name.chars().any(|c| c.is_control() || c == '/' || c == '\\')
+    {
         return Err(refuse(
             format!("a file name of 1 to {MAX_NAME} bytes is needed"),
             "path",

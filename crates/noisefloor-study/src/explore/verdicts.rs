@@ -186,7 +186,7 @@ impl Judge {
             spp: tiles.spp,
             nested: tiles.samples == Samples::Nested,
             model: self.oracle.model().digest(),
-            columns: tiles.grid.width().div_ceil(tiles.grid.edge()),
+            columns: tiles.grid.columns(),
             tiles: tiles.grid.tiles().zip(self.verdicts(tiles)?).map(view).collect(),
             has_noise_map: tiles.noise.is_some(),
         })

@@ -18,7 +18,9 @@ const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; i
 /// Different wrong codes that one address may try in [`WINDOW`].
 const WRONG_CODES: usize = 30;
 const WINDOW: Duration = Duration::from_secs(60);
-/// Most addresses whose wrong codes are counted.
+/// Sessions that one address may begin in [`WINDOW`]: a class behind one router, and no program.
+const SESSIONS: usize = 60;
+/// Most addresses that are counted.
 const MOST_ADDRESSES: usize = 10_000;
 
 /// Names of the server, and wrong codes by address.
@@ -28,6 +30,7 @@ pub(crate) struct Guard {
     any_address: Option<u16>,
     exposure: Exposure,
     wrong: Mutex<HashMap<IpAddr, (Instant, HashSet<String>)>>,
+    begun: Mutex<HashMap<IpAddr, (Instant, usize)>>,
 }
 
 /// The address a request comes from: of the participant, if a trusted proxy passed it on.
@@ -41,6 +44,7 @@ impl Guard {
             any_address: address.ip().is_unspecified().then(|| address.port()),
             exposure: exposure.clone(),
             wrong: Mutex::default(),
+            begun: Mutex::default(),
         }
     }
 
@@ -49,10 +53,12 @@ impl Guard {
         let host = headers.get(HOST)?.to_str().ok()?.to_lowercase();
         let without_port = host.rsplit_once(':').filter(|(_, port)| port.parse::<u16>().is_ok());
         let name = without_port.map_or(&host[..], |(name, _)| name);
+        // Browsers leave out the port that is usual
+        let full = if without_port.is_some() { host.clone() } else { format!("{host}:80") };
         // A page elsewhere can make its name resolve to this machine, but an address is no name
         let of_machine =
             |host: &str| host.parse().is_ok_and(|at: SocketAddr| Some(at.port()) == self.any_address);
-        (of_machine(&host) || self.hosts.iter().any(|h| *h == host || h == name)).then_some(host)
+        (of_machine(&full) || self.hosts.iter().any(|h| *h == full || h == name)).then_some(host)
     }
 
     /// Where a request comes from, and the scheme of the page: a proxy that is trusted says both.
@@ -67,6 +73,24 @@ impl Guard {
         let client = hops.into_iter().find(|hop| !self.exposure.proxies.contains(hop)).unwrap_or(peer);
         let secure = text("x-forwarded-proto").next_back().is_some_and(|v| v.trim() == "https");
         (client, if secure { "https" } else { "http" })
+    }
+
+    /// Counts a session without a link, which anybody can begin.
+    pub(crate) fn begins(&self, client: Client) -> Result<(), Refusal> {
+        let mut begun = self.begun.lock().unwrap_or_else(PoisonError::into_inner);
+        if begun.len() >= MOST_ADDRESSES {
+            begun.retain(|_, (since, _)| since.elapsed() < WINDOW);
+        }
+        let (since, count) = begun.entry(client.0).or_insert_with(|| (Instant::now(), 0));
+        if since.elapsed() >= WINDOW {
+            (*since, *count) = (Instant::now(), 0);
+        }
+        *count += 1;
+        if *count <= SESSIONS {
+            return Ok(());
+        }
+        let what = format!("{SESSIONS} sessions were begun from this address within a minute");
+        Err(Refusal::new(StatusCode::TOO_MANY_REQUESTS, what, "session", "wait a minute, and begin again"))
     }
 
     /// Counts a wrong code. After [`WRONG_CODES`] different ones from an address, its guesses are refused for
@@ -208,6 +232,31 @@ mod tests {
             assert_eq!(knows([0, 0, 0, 0], host), known, "{host}");
         }
         assert!(!knows([127, 0, 0, 1], "192.168.1.5:8437"));
+    }
+
+    /// Browsers name no port where it is 80.
+    #[test]
+    fn the_usual_port_needs_no_name() {
+        for (listening, host, known) in [
+            ([127, 0, 0, 1], "localhost", true),
+            ([127, 0, 0, 1], "[::1]", true),
+            ([127, 0, 0, 1], "localhost:80", true),
+            ([127, 0, 0, 1], "192.168.1.5", false),
+            ([0, 0, 0, 0], "192.168.1.5", true),
+            ([0, 0, 0, 0], "evil.example", false),
+        ] {
+            let guard = Guard::new((listening, 80).into(), &Exposure::default());
+            assert_eq!(guard.known_host(&headers(&[("host", host)])).is_some(), known, "{host}");
+        }
+    }
+
+    #[test]
+    fn one_address_begins_few_sessions_a_minute() {
+        let guard = Guard::new(([127, 0, 0, 1], 1).into(), &Exposure::default());
+        let client = Client([203, 0, 113, 9].into());
+        assert!((0..SESSIONS).all(|_| guard.begins(client).is_ok()));
+        assert!(guard.begins(client).is_err());
+        assert!(guard.begins(Client([203, 0, 113, 10].into())).is_ok());
     }
 
     #[test]

@@ -38,7 +38,7 @@ pub(crate) async fn texts(State(app): Shared, code: Result<Path<String>, PathRej
 }
 
 /// `POST /api/sessions`
-pub(crate) async fn begin(State(app): Shared, body: Body) -> Answer {
+pub(crate) async fn begin(State(app): Shared, Extension(client): Peer, body: Body) -> Answer {
     let Beginning { group, simulated, link, ids } = read_json(body).await?;
     let refuse = |what: &str, place: &str, do_: String| {
         Err(Refusal::new(StatusCode::UNPROCESSABLE_ENTITY, what, place, do_))
@@ -63,6 +63,9 @@ pub(crate) async fn begin(State(app): Shared, body: Body) -> Answer {
     }
     if participants.links_only && link.is_none() && !simulated {
         return refuse("this study is open to invited participants", "link", "use your personal link".into());
+    }
+    if link.is_none() && !simulated {
+        app.guard.begins(client)?;
     }
     let link = link.map(|typed| code::parse(&typed).ok_or(StoreError::NoLink)).transpose()?;
     let (code, seed) = (code::draw()?, code::draw_seed()?);

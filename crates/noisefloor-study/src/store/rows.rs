@@ -144,6 +144,8 @@ pub(super) fn load(connection: &Connection, path: &Path, code: &str) -> Result<S
 pub(super) fn erase(connection: &Connection, path: &Path, code: &str) -> Result<(), StoreError> {
     let failed = |source| StoreError::Database { path: path.to_owned(), source };
     connection.execute("DELETE FROM events WHERE code = ?1", [code]).map_err(failed)?;
+    // Used up: it does not begin another session
+    connection.execute("DELETE FROM links WHERE code = ?1", [code]).map_err(failed)?;
     match connection.execute("DELETE FROM sessions WHERE code = ?1", [code]).map_err(failed)? {
         0 => Err(StoreError::Unknown(code.to_owned())),
         _ => Ok(()),

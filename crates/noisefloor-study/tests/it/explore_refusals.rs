@@ -30,6 +30,7 @@ fn malformed_pictures_are_refused() {
     let whole = std::fs::read(dir.path().join("wall/00100.png")).unwrap();
     refused(file("a.png", &whole[..whole.len() / 2]), 422);
     refused(file("..%2fa.png", &whole), 422);
+    refused(file("..%5Ca.png", &whole), 422);
     refused(file("a%00.png", &whole), 422);
     refused(file(&"a".repeat(300), &whole), 422);
     // A header, whole but for its size, that announces 8000×8000 pixels: refused before any is allocated

@@ -126,4 +126,8 @@ fn links_begin_one_session_each() {
     assert_eq!(begin("C", &links[1]).unwrap(), "C");
     assert!(matches!(begin("D", "0"), Err(StoreError::NoLink)));
     assert_eq!(store::read_all(&study.database, &study.design()).unwrap().len(), 2);
+    // What was erased does not begin again
+    store::erase_one(&study.database, &study.design(), "A").unwrap();
+    assert!(matches!(begin("E", &links[0]), Err(StoreError::NoLink)));
+    assert_eq!(begin("F", &links[1]).unwrap(), "C");
 }

@@ -4,7 +4,8 @@ use noisefloor::{
     Batch, Counts, ProgressiveSource, Repeats, Request, SourceInfo, Tile, TileGrid, internal::check_image,
 };
 
-/// Tile edge that sources are asked in: an image of 48×40 pixels has ragged tiles to the right and below.
+/// Tile edge that sources are asked in: an image of 48×40 pixels has a narrower tile to the right, and both
+/// are higher than this.
 pub(super) const EDGE: usize = 32;
 
 /// The answer to one call that asks for every tile, in the order of the grid.

@@ -113,7 +113,7 @@ fn another_job_is_refused() {
         let driver = Driver::new(Noise(repeats), FixedSpp(samples), params).unwrap();
         driver.resume(job, Checkpoint::read(&bytes[..]).unwrap()).err().map(|e| e.to_string())
     };
-    let other = |what: &str| format!("the checkpoint belongs to another job: its {what} is");
+    let other = |what: &str| format!("the checkpoint belongs to another job: its {what}");
     let begins = |error: Option<String>, with: &str| {
         let error = error.unwrap();
         assert!(error.starts_with(with), "{error}");
@@ -123,7 +123,7 @@ fn another_job_is_refused() {
     begins(refused(Repeats::Samples, 50, params(), "noise"), &other("criterion"));
     begins(
         refused(Repeats::Samples, 40, Params { consecutive: 2, ..params() }, "noise"),
-        &other("set of parameters"),
+        &other("number of verdicts in a row is 1, not 2"),
     );
     let other_model = {
         let driver = broken_off(Oracle::bundled(), 1);
@@ -156,7 +156,7 @@ fn a_tone_curve_is_resumed_with_its_function() {
     assert_eq!(resumed.session().display().unwrap().encode([0.25; 3]), [0.5; 3]);
     let other = ToneCurve::new(b"another root", |exposed| exposed.map(f32::sqrt));
     let refused = resume(params(root), None, params(other));
-    assert!(matches!(refused, Err(CheckpointError::Other { what: "set of parameters", .. })));
+    assert!(matches!(refused, Err(CheckpointError::Other { what: "tone mapping", .. })));
     let own = ToneMapping::Custom { exposure: 1.0, curve: other }.settle(&[]);
     let resumed = resume(params(root), Some(own), params(root)).unwrap();
     assert_eq!(resumed.session().display(), Some(&own));

@@ -18,7 +18,7 @@ struct Grey {
 
 impl ProgressiveSource for Grey {
     fn info(&self) -> SourceInfo {
-        SourceInfo::new("grey", 70, 32).with_aims(!self.cannot_aim).with_repeats(Repeats::Samples)
+        SourceInfo::new("grey", 80, 32).with_aims(!self.cannot_aim).with_repeats(Repeats::Samples)
     }
 
     fn sample(&mut self, requests: &[Request]) -> Result<Vec<Batch>, SourceError> {
@@ -71,7 +71,7 @@ fn events_and_timeline_tell_the_whole_run() {
         })
         .unwrap();
     assert_eq!((stops, batches), (3, driver.timeline().len()));
-    assert_eq!(driver.timeline().last().unwrap().samples, 300 * 70 * 32);
+    assert_eq!(driver.timeline().last().unwrap().samples, 300 * 80 * 32);
     assert!(driver.timeline().is_sorted_by_key(|p| p.samples));
     let clock = driver.clock();
     assert!(clock.source_seconds + clock.criterion_seconds <= clock.total_seconds);
@@ -192,7 +192,8 @@ fn large_pictures_take_turns() {
         let mut requests: Vec<_> = grid.tiles().map(|tile| Request::new(tile, spp[tile.index], 1)).collect();
         keep_rearmost(&mut requests);
         let samples: u64 = requests.iter().map(|r| r.tile.pixels() as u64).sum();
-        assert!(samples <= CALL_SAMPLES && samples > CALL_SAMPLES - 512 * 512, "{call}: {samples}");
+        // What does not fit is a tile; those of the last row have 736 lines
+        assert!(samples <= CALL_SAMPLES && samples > CALL_SAMPLES - 512 * 736, "{call}: {samples}");
         assert!(requests.is_sorted_by_key(|r| r.tile.index), "{call}");
         requests.iter().for_each(|r| spp[r.tile.index] += 1);
         let (least, most) = (spp.iter().min().unwrap(), spp.iter().max().unwrap());

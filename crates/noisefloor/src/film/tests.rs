@@ -2,25 +2,25 @@ use super::*;
 use proptest::prelude::*;
 
 fn small() -> Film {
-    Film::new(TileGrid::new(20, 16, 16).unwrap())
+    Film::new(TileGrid::new(24, 16, 16).unwrap())
 }
 
 #[test]
 fn batches_go_to_the_lighter_half() {
     let mut film = small();
     for n in [50, 50, 100, 30, 30] {
-        film.add(1, n, &[[1.0; 3]; 4 * 16]).unwrap();
+        film.add(1, n, &[[1.0; 3]; 8 * 16]).unwrap();
     }
     // 50|0 → 50|50 → 150|50 → 150|80 → 150|110
     assert_eq!(film.half_counts(1), [150, 110]);
     assert_eq!(film.spp(0), 0);
-    assert_eq!(film.total_samples(), 260 * 64);
+    assert_eq!(film.total_samples(), 260 * 128);
 }
 
 /// No caller can make counts overflow, whatever it claims to have sampled.
 #[test]
 fn counts_have_a_limit() {
-    let grey = [[1.0; 3]; 64];
+    let grey = [[1.0; 3]; 128];
     let mut film = small();
     film.add(1, (1 << 33) - 1, &grey).unwrap();
     film.add(1, 1 << 33, &grey).unwrap();
@@ -34,13 +34,13 @@ fn counts_have_a_limit() {
 #[test]
 fn non_finite_pixels_are_kept_out_and_counted() {
     let mut film = small();
-    let mut first = [[1.0f32; 3]; 64];
+    let mut first = [[1.0f32; 3]; 128];
     first[3] = [f32::NAN, 1.0, 1.0];
     film.add(1, 10, &first).unwrap();
-    film.add(1, 10, &[[2.0; 3]; 64]).unwrap();
-    film.add(1, 10, &[[3.0; 3]; 64]).unwrap(); // half A again
+    film.add(1, 10, &[[2.0; 3]; 128]).unwrap();
+    film.add(1, 10, &[[3.0; 3]; 128]).unwrap(); // half A again
     let image = film.image();
-    let pixel = |i: usize| image[(i / 4) * 20 + 16 + i % 4][0];
+    let pixel = |i: usize| image[(i / 8) * 24 + 16 + i % 8][0];
     assert!((pixel(0) - 2.0).abs() < 1e-6);
     assert!((pixel(3) - 2.5).abs() < 1e-6, "mean of the two that count: {}", pixel(3));
     assert_eq!(film.rejected(), 10);
@@ -53,8 +53,8 @@ fn refuses_what_does_not_fit() {
     let mut film = small();
     assert_eq!(film.add(2, 1, &[]), Err(FilmError::Tile(2, 2)));
     assert!(matches!(film.add(1, 1, &[[0.0; 3]; 3]), Err(FilmError::Pixels { .. })));
-    assert!(matches!(film.add(1, 0, &[[0.0; 3]; 64]), Err(FilmError::NothingNew { .. })));
-    assert!(matches!(film.add_running(1, 0, &[[0.0; 3]; 64]), Err(FilmError::NothingNew { .. })));
+    assert!(matches!(film.add(1, 0, &[[0.0; 3]; 128]), Err(FilmError::NothingNew { .. })));
+    assert!(matches!(film.add_running(1, 0, &[[0.0; 3]; 128]), Err(FilmError::NothingNew { .. })));
 }
 
 #[test]
@@ -62,10 +62,10 @@ fn running_means_equal_batches() {
     let (mut batches, mut running) = (small(), small());
     let (mut sum, mut total) = (0.0f64, 0u64);
     for (n, v) in [(10u64, 1.0f32), (20, 4.0), (7, 0.5)] {
-        batches.add(1, n, &[[v; 3]; 64]).unwrap();
+        batches.add(1, n, &[[v; 3]; 128]).unwrap();
         sum += n as f64 * f64::from(v);
         total += n;
-        running.add_running(1, total, &[[(sum / total as f64) as f32; 3]; 64]).unwrap();
+        running.add_running(1, total, &[[(sum / total as f64) as f32; 3]; 128]).unwrap();
     }
     assert_eq!(batches.half_counts(1), running.half_counts(1));
     for (a, b) in batches.image().iter().zip(running.image()) {
@@ -96,12 +96,12 @@ fn stays_accurate_at_a_billion_samples() {
 
 #[test]
 fn a_film_that_was_kept_goes_on_to_the_bit() {
-    let batch = |n: u64| (0..64).map(|i| [0.1 * n as f32, (i as f32).sin(), 1e-3]).collect::<Vec<_>>();
+    let batch = |n: u64| (0..128).map(|i| [0.1 * n as f32, (i as f32).sin(), 1e-3]).collect::<Vec<_>>();
     let mut film = small();
     for n in 1..=9 {
         film.add(1, 10 * n, &batch(n)).unwrap();
     }
-    film.add(1, 5, &[[f32::NAN; 3]; 64]).unwrap();
+    film.add(1, 5, &[[f32::NAN; 3]; 128]).unwrap();
     let bytes = |film: &Film| {
         let mut kept = Vec::new();
         film.write_pixels(&mut kept).unwrap();
@@ -135,7 +135,7 @@ proptest! {
     fn image_is_the_weighted_mean(batches in prop::collection::vec((1u64..1000, -10.0f32..1000.0), 1..20)) {
         let mut film = small();
         for &(n, v) in &batches {
-            film.add(1, n, &[[v; 3]; 64]).unwrap();
+            film.add(1, n, &[[v; 3]; 128]).unwrap();
         }
         let total: f64 = batches.iter().map(|b| b.0 as f64).sum();
         let exact = batches.iter().map(|b| b.0 as f64 * f64::from(b.1)).sum::<f64>() / total;

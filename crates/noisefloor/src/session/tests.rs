@@ -41,7 +41,7 @@ impl StoppingCriterion for From {
 }
 
 fn session(samples: u64, halves: bool, params: Params) -> Session<From> {
-    Session::new(70, 32, From { samples, halves, asked: vec![] }, Params { tile: 32, ..params }).unwrap()
+    Session::new(80, 32, From { samples, halves, asked: vec![] }, Params { tile: 32, ..params }).unwrap()
 }
 
 fn run(session: &mut Session<From>) -> Vec<(u64, StopReason)> {
@@ -149,7 +149,7 @@ fn bad_input_is_an_error() {
     assert!(matches!(new(0, 10, 32), Err(SessionError::Tile(_))));
     assert!(matches!(new(10, 10, 0), Err(SessionError::Tile(_))));
     let mut s = session(100, true, steps_of_10());
-    let reference = Reference { width: 70, height: 32, pixels: vec![] };
+    let reference = Reference { width: 80, height: 32, pixels: vec![] };
     assert!(matches!(s.set_reference(reference), Err(SessionError::Reference { .. })));
     assert!(s.push(9, 1, &[]).is_err());
 }

@@ -43,7 +43,11 @@ pub enum SvmTrainError {
     #[error("linfa-svm could not train the machine")]
     Linfa(#[from] linfa_svm::SvmError),
     /// Platt scaling failed.
-    #[error("Platt scaling of the decision values failed")]
+    #[error(
+        "no curve of probability fits the decision values: whether noise was seen does not follow what was \
+         measured of \
+         it; check that every threshold stands beside its own zone, and that they are not all alike"
+    )]
     Platt(#[from] linfa::composing::platt_scaling::PlattError),
 }
 

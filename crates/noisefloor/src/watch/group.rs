@@ -2,6 +2,7 @@
 
 use super::correlation::{Concordance, Correlation, Sums};
 use super::values::Ends;
+use crate::rgb::Rgb;
 
 /// Values that differ by less, relative to their size, are the same but for rounding.
 const ROUNDING: f32 = 1.0 / (1 << 18) as f32;
@@ -32,6 +33,10 @@ pub(super) struct TileWatch {
     pub(super) noisy: bool,
     /// Whether a noisy batch came twice.
     pub(super) repeated: bool,
+    /// Whether values by themselves differ from batch to batch by more than rounding: they have noise.
+    pub(super) varies: bool,
+    /// Those of the first batch, while the first group lasts.
+    first: Vec<Rgb>,
     group: Vec<Seen>,
 }
 
@@ -44,6 +49,16 @@ impl TileWatch {
         self.group.push(Seen { spp, light });
     }
 
+    /// Takes notice of the values of a batch of the first group.
+    pub(super) fn see_values(&mut self, values: Vec<Rgb>) {
+        if self.first.is_empty() {
+            self.first = values;
+        } else {
+            let pairs = self.first.as_flattened().iter().zip(values.as_flattened());
+            self.varies |= pairs.into_iter().any(|pair| !is_same_value(pair));
+        }
+    }
+
     /// What the last batch says together with those before in its group.
     pub(super) fn compare(&mut self, shared: bool) -> Option<Sums> {
         let mut found = match &self.group[..] {
@@ -54,6 +69,7 @@ impl TileWatch {
         if let [a, b, c, d] = &self.group[..] {
             four([a, b, c, d], shared, &mut found);
             self.group.clear();
+            self.first = Vec::new();
         }
         Some(found)
     }
@@ -71,9 +87,11 @@ fn is_rough(light: &[[f32; 3]]) -> bool {
 }
 
 fn is_same(one: &[[f32; 3]], other: &[[f32; 3]]) -> bool {
-    let same =
-        |(a, b): (&f32, &f32)| a.to_bits() == b.to_bits() || (a - b).abs() <= ROUNDING * a.abs().max(b.abs());
-    one.as_flattened().iter().zip(other.as_flattened()).all(same)
+    one.as_flattened().iter().zip(other.as_flattened()).all(is_same_value)
+}
+
+fn is_same_value((a, b): (&f32, &f32)) -> bool {
+    a.to_bits() == b.to_bits() || (a - b).abs() <= ROUNDING * a.abs().max(b.abs())
 }
 
 /// Two batches, one for each half.

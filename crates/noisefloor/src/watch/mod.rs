@@ -21,7 +21,7 @@
 //! | the same with the neighbours in place of c, until there is a group | two batches | [`Warning::Noise`], and no tile stops before there is one |
 //! | (a − b)²·n against (c − d)²·m | a group | [`Warning::Counts`] |
 //! | correlation of a − b with itself one pixel beside | two batches | [`Warning::Neighbours`] |
-//! | values that are k/255, or the sRGB decoding of one | two batches | [`Fault::Quantised`] |
+//! | values that are k/255, or the sRGB decoding of one, and have noise | two batches | [`Fault::Quantised`] |
 //! | noise that ends at exactly 1 | two batches | [`Warning::Clipped`] |
 //! | one value everywhere | two batches | [`Warning::Constant`] |
 //! | infinities, NaN, light below 0 | a batch | [`Fault::Light`] |
@@ -270,7 +270,9 @@ impl Watch {
         }
         let light = |pixel| points::light(mean, pixel);
         if group == 0 {
-            self.points.of(tile).for_each(|pixel| self.values.see(mean[pixel]));
+            let values: Vec<Rgb> = self.points.of(tile).map(|pixel| mean[pixel]).collect();
+            values.iter().for_each(|&value| self.values.see(value));
+            watch.see_values(values);
             watch.see(spp, self.points.at_first(tile).map(light).collect());
         } else {
             watch.see(spp, self.points.of(tile).map(light).collect());
@@ -283,7 +285,10 @@ impl Watch {
     /// Looks at all that was seen, before a verdict.
     pub(crate) fn look(&mut self) -> Result<(), Fault> {
         self.check_repeats()?;
-        if let Some(encoding) = self.values.quantised() {
+        // A picture without noise may be of 8-bit numbers: an unlit texture is. Noise of them is an 8-bit
+        // picture's
+        if let Some(encoding) = self.values.quantised().filter(|_| self.tiles.iter().any(|tile| tile.varies))
+        {
             return Err(Fault::Quantised { encoding });
         }
         for sums in self.sums {

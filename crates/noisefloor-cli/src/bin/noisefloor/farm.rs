@@ -8,10 +8,11 @@ use anyhow::{Context, bail};
 use indicatif::HumanDuration;
 use noisefloor::driver::{Clock, Progress};
 use noisefloor::{Checkpoint, Session};
+use noisefloor_cli::build::{program, program_digest};
 use noisefloor_cli::folder::{Earlier, Folder};
 use noisefloor_cli::say::{NotSaid, one_line, say_json};
 use noisefloor_cli::signals::{AFTER_THIS_BATCH, INTERRUPTED, cancel_on_signal};
-use noisefloor_cli::sources::Resources;
+use noisefloor_cli::sources::{Resources, SourceKind};
 use noisefloor_cli::{note, say};
 use noisefloor_farm::{
     Coordinator, Farm, FarmPlan, Finished, FrameJob, FrameProgress, FrameSource, FrameState, News,
@@ -19,11 +20,10 @@ use noisefloor_farm::{
 };
 use serde::{Deserialize, Serialize};
 use std::cell::Cell;
-use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, OnceLock};
 use std::time::Duration;
 
 /// What is missing is named so far.
@@ -86,24 +86,6 @@ impl Here {
 
 fn absolute(dir: &Path) -> anyhow::Result<PathBuf> {
     std::path::absolute(dir).with_context(|| dir.display().to_string())
-}
-
-/// This command, for other processes and nodes.
-fn program() -> anyhow::Result<PathBuf> {
-    std::env::current_exe().context("the path of this program")
-}
-
-/// BLAKE3 of this program, hexadecimal.
-fn program_digest() -> anyhow::Result<String> {
-    static DIGEST: OnceLock<String> = OnceLock::new();
-    if let Some(digest) = DIGEST.get() {
-        return Ok(digest.clone());
-    }
-    let path = program()?;
-    let mut hasher = blake3::Hasher::new();
-    let read = File::open(&path).and_then(|file| hasher.update_reader(file).map(|_| ()));
-    read.with_context(|| path.display().to_string())?;
-    Ok(DIGEST.get_or_init(|| hasher.finalize().to_hex().to_string()).clone())
 }
 
 fn plan(PlanTask { dir, frames, tasks, keep, render }: PlanTask) -> anyhow::Result<ExitCode> {
@@ -314,6 +296,12 @@ impl RenderFiles for Output {
 
 /// What a farm cannot do.
 pub fn check(job: &RenderJob) -> anyhow::Result<()> {
+    if job.source.kind == SourceKind::Exr {
+        bail!(
+            "pictures on disk hold the batches that they hold, and a farm plans others; `noisefloor render \
+             --source exr` plays them"
+        );
+    }
     match job.criterion {
         CriterionJob::Oracle { .. } | CriterionJob::Spp(_) => Ok(()),
         _ => bail!(

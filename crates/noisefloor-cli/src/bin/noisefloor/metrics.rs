@@ -1,10 +1,11 @@
 //! `noisefloor metrics`.
 
-use anyhow::{Context, bail};
+use crate::judge::warn_unread;
+use anyhow::{Context, anyhow, bail};
 use noisefloor::{Rgb, ToneMapping, Viewing, display::Display};
 use noisefloor_cli::say::{NotSaid, note, say};
 use noisefloor_image::maps::{Canvas, ColourScale, draw_field};
-use noisefloor_image::{Picture, check_writable, read_picture};
+use noisefloor_image::{Picture, check_writable, read_picture_on};
 use noisefloor_rivals::DifferenceMap;
 use noisefloor_rivals::metrics::{MetricPair, MetricScores};
 use noisefloor_vision::Eotf;
@@ -13,6 +14,11 @@ use std::path::{Path, PathBuf};
 
 /// What to type for the metrics that a build leaves out.
 pub const AGAIN: &str = "run `cargo run --release --features metrics -- metrics …`";
+
+/// Most pixels of a picture, those of 8K: a file of a few kilobytes may claim many more.
+const MOST_PIXELS: usize = 7680 * 4320;
+/// Memory that the metrics take, measured at 1.6 and at 65 megapixels.
+const BYTES_A_PIXEL: usize = if cfg!(feature = "metrics") { 300 } else { 120 };
 
 /// Two pictures to compare: checked.
 pub struct MetricsJob {
@@ -68,7 +74,8 @@ pub fn run(job: &MetricsJob) -> anyhow::Result<()> {
     for path in [&job.map, &job.flip_map, &job.butteraugli_map].into_iter().flatten() {
         check_writable(path)?;
     }
-    let (image, reference) = (read_picture(&job.image)?, read_picture(&job.reference)?);
+    let read = |path| read_picture_on(path, &job.viewing, MOST_PIXELS);
+    let (image, reference) = (read(&job.image)?, read(&job.reference)?);
     let names = || format!("{} and {}", job.image.display(), job.reference.display());
     let size = image.size();
     if size != reference.size() {
@@ -82,6 +89,10 @@ pub fn run(job: &MetricsJob) -> anyhow::Result<()> {
     if !display_referred {
         check_codes(job)?;
     }
+    for path in [&job.image, &job.reference] {
+        warn_unread(path)?;
+    }
+    check_memory(size).with_context(names)?;
     let (image, reference) = (image.into_linear().pixels, reference.into_linear().pixels);
     let display = if display_referred { Display::SRGB } else { job.tone.settle(&reference) };
     let pair =
@@ -96,6 +107,13 @@ pub fn run(job: &MetricsJob) -> anyhow::Result<()> {
         note!("note: this build has no FLIP and butteraugli: {AGAIN}");
     }
     say_scores(job, size, scores)
+}
+
+/// Libraries of metrics end the program where memory ends: so it is asked for before, all at once.
+fn check_memory((width, height): (usize, usize)) -> anyhow::Result<()> {
+    let bytes = width * height * BYTES_A_PIXEL;
+    let refused = |_| anyhow!("no memory for the metrics, {} MB; crop the pictures", bytes >> 20);
+    Vec::<u8>::new().try_reserve_exact(bytes).map_err(refused)
 }
 
 /// What tone mapping makes must be what the display takes.

@@ -28,7 +28,7 @@ pub struct SearchArgs {
     #[arg(long, value_enum)]
     pub(super) machine: Option<MachineChoice>,
     /// What tiles are compared with (for --corpus; a table has its own).
-    #[arg(long, value_enum, default_value_t = EvidenceChoice::Halves)]
+    #[arg(long, value_enum, default_value_t = EvidenceChoice::Halves, conflicts_with = "table")]
     pub(super) evidence: EvidenceChoice,
     #[command(flatten)]
     pub(super) viewing: ViewingArgs,

@@ -3,11 +3,11 @@
 use super::Cli;
 use anyhow::Context;
 use clap::error::ErrorKind;
+use noisefloor_cli::files::read_small;
 use noisefloor_cli::refuse;
 use std::collections::BTreeMap;
 use std::error::Error;
 use std::ffi::OsString;
-use std::fs;
 use std::path::{Path, PathBuf};
 use toml::{Spanned, Value};
 
@@ -37,7 +37,7 @@ fn config(typed: &[OsString]) -> Option<PathBuf> {
 
 /// The options of a file, checked one by one: what is wrong is said in the words of the file.
 fn options(path: &Path) -> anyhow::Result<Vec<OsString>> {
-    let text = fs::read_to_string(path)?;
+    let text = read_small(path)?;
     let line = |at: usize| 1 + text.as_bytes()[..at].iter().filter(|byte| **byte == b'\n').count();
     let table: BTreeMap<Spanned<String>, Spanned<Value>> = match toml::from_str(&text) {
         Ok(table) => table,
@@ -99,6 +99,7 @@ fn problem(name: &str, value: Option<&str>) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::fs;
 
     fn words(typed: &[&str]) -> Vec<OsString> {
         typed.iter().map(OsString::from).collect()
@@ -132,5 +133,10 @@ mod tests {
             let error = format!("{:#}", expand(typed.clone()).unwrap_err());
             assert!(error.contains(&format!("shot.toml: line {line}: ")) && error.contains(words), "{error}");
         }
+        fs::write(&path, "#".repeat((1 << 20) + 1)).unwrap();
+        let error = format!("{:#}", expand(typed).unwrap_err());
+        assert!(error.contains("longer than a megabyte"), "{error}");
+        let folder = words(&["noisefloor", "render", "--config", folder.path().to_str().unwrap()]);
+        assert!(format!("{:#}", expand(folder).unwrap_err()).contains("is a folder"));
     }
 }

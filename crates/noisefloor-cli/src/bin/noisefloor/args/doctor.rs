@@ -1,7 +1,7 @@
 //! `noisefloor doctor`.
 
 use crate::doctor::DoctorJob;
-use clap::Args;
+use clap::{Args, ValueHint};
 use noisefloor_cli::sources::Adapter;
 use noisefloor_denoise::OIDN;
 use noisefloor_sidecar::Renderer;
@@ -18,7 +18,7 @@ use noisefloor_sidecar::Renderer;
   noisefloor doctor --install mitsuba                 or luxcore, cycles, or the denoiser oidn")]
 pub struct DoctorArgs {
     /// Install this renderer or denoiser, if it is not there yet.
-    #[arg(long, value_name = "NAME", value_parser = installable)]
+    #[arg(long, value_name = "NAME", value_parser = installable, value_hint = ValueHint::Other)]
     install: Option<&'static Renderer>,
 }
 

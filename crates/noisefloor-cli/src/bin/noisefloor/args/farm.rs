@@ -21,8 +21,7 @@ use std::time::Duration;
 /// them into shards, and a merge adds the shards, judges, and plans again, until nobody sees noise. Picture
 /// and stops are those of `noisefloor render` with the same options, to the bit. The folder, on a file
 /// system that all machines share, is all the state there is: whatever is killed, `run` continues. Only
-/// renderers that repeat their samples can be divided: `ptwne`, `exr`, `cycles`, and `mitsuba` with
-/// libLLVM.
+/// renderers that repeat their samples can be divided: `ptwne`, `cycles`, and `mitsuba` with libLLVM.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   noisefloor farm plan shots/hall -- hall.xml --size 3840x2160 --seed 7

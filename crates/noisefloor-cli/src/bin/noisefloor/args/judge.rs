@@ -14,6 +14,7 @@ use noisefloor_cli::options::values;
 use noisefloor_cli::options::viewing::ViewingArgs;
 use noisefloor_cli::refuse;
 use noisefloor_denoise::DEFAULT_JODS_LOST;
+use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
 /// Say for each tile of a picture whether people would see noise in it.
@@ -57,7 +58,7 @@ pub struct JudgeArgs {
     independent: bool,
     /// Judge denoised pictures: what a denoiser has made of IMAGE, and of the one --against, each without a
     /// look at the other.
-    #[arg(long, num_args = 2, value_names = ["IMAGE", "AGAINST"], conflicts_with_all = ["model", "threshold", "heat_map", "exr", "nested"])]
+    #[arg(long, num_args = 2, value_names = ["IMAGE", "AGAINST"], conflicts_with_all = ["model", "threshold", "heat_map", "exr", "nested", "threads"])]
     denoised: Vec<PathBuf>,
     /// With --denoised: just-objectionable differences (JOD) that a tile may have lost.
     #[arg(long, value_name = "JOD", requires = "denoised", default_value_t = DEFAULT_JODS_LOST, value_parser = values::jods)]
@@ -73,6 +74,9 @@ pub struct JudgeArgs {
     /// Tile edge in pixels, 16…512.
     #[arg(long, default_value_t = DEFAULT_TILE, value_name = "PIXELS")]
     tile: usize,
+    /// Threads [default: one a core].
+    #[arg(long, value_name = "N", value_parser = values::threads)]
+    threads: Option<NonZeroUsize>,
     /// Print JSON instead of a table.
     #[arg(long)]
     json: bool,
@@ -97,6 +101,7 @@ impl JudgeArgs {
     }
 
     fn check_denoised(self, denoised: [PathBuf; 2]) -> anyhow::Result<DenoisedJob> {
+        self.eyes.unused("--denoised")?;
         let tone = self.tone.check()?.load()?;
         let Ok([against]) = <[PathBuf; 1]>::try_from(self.against) else {
             refuse!("--denoised compares two halves: give one picture with --against");
@@ -167,6 +172,7 @@ impl JudgeArgs {
             viewing,
             audience: eyes.map_or(Audience::TRAINED, |person| person.audience()),
             tile: self.tile,
+            threads: self.threads,
             json: self.json,
             heat_map: self.heat_map,
             noise_map: self.noise_map,

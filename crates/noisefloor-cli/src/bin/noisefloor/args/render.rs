@@ -191,7 +191,12 @@ impl RenderArgs {
         let by_oracle = self.denoise.is_none() && self.verdicts.criterion == CriterionChoice::Oracle;
         let said =
             [("--viewing", self.viewing.typed().is_some()), ("--audience", self.verdicts.audience.is_some())];
-        let eyes = if by_oracle { self.eyes.of(self.oracle.model.as_deref(), &said)? } else { None };
+        let eyes = if by_oracle {
+            self.eyes.of(self.oracle.model.as_deref(), &said)?
+        } else {
+            self.eyes.unused(if self.denoise.is_some() { "--denoise" } else { "this --criterion" })?;
+            None
+        };
         let audience = eyes.as_ref().map_or(Audience::TRAINED, Person::audience);
         let limits = self.verdicts.limits(self.denoise.is_some(), &self.renderer, self.preset, audience)?;
         let criterion = match (self.denoise, self.verdicts.criterion) {

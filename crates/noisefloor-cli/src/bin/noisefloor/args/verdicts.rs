@@ -1,7 +1,7 @@
 //! `noisefloor render`: what stops a tile, and when it is judged.
 
 use crate::job::Limits;
-use clap::{Args, ValueEnum};
+use clap::{Args, ValueEnum, ValueHint};
 use noisefloor::{Audience, Params, Schedule, tile::DEFAULT_TILE};
 use noisefloor_cli::options::{renderer::RendererArgs, values};
 use noisefloor_cli::refuse;
@@ -15,7 +15,8 @@ pub struct VerdictArgs {
     #[arg(
         long,
         default_value = "oracle",
-        value_parser = criterion
+        value_parser = criterion,
+        value_hint = ValueHint::Other
     )]
     pub criterion: CriterionChoice,
     /// With --denoise: just-objectionable differences (JOD) that a tile may have lost when it stops. At 1,

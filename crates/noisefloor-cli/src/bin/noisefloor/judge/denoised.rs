@@ -1,6 +1,6 @@
 //! Denoised pictures made elsewhere.
 
-use super::read;
+use super::{read, warn_of};
 use anyhow::{Context, bail};
 use noisefloor::{
     Rgb, Tile, TileGrid, ToneMapping, Viewing,
@@ -53,7 +53,8 @@ struct Report<'a> {
 
 pub fn run(job: &DenoisedJob) -> anyhow::Result<()> {
     job.noise_map.iter().try_for_each(check_writable)?;
-    let [a, b] = [read(&job.noisy[0])?, read(&job.noisy[1])?];
+    let [a, b] = [read(&job.noisy[0], &job.viewing)?, read(&job.noisy[1], &job.viewing)?];
+    let denoised = |path, of| denoised(path, of, &job.viewing);
     let [da, db] = [denoised(&job.denoised[0], &a)?, denoised(&job.denoised[1], &b)?];
     if da == db {
         bail!(
@@ -69,6 +70,7 @@ pub fn run(job: &DenoisedJob) -> anyhow::Result<()> {
              the earlier one. Render one with another seed and denoise it again; --independent overrides what was found"
         );
     }
+    warn_of(&pair);
     if a.spp.max(b.spp) > 2.0 * a.spp.min(b.spp) {
         note!(
             "note: one picture has more than twice the samples of the other ({} and {}): the verdict is on the mean of the two \
@@ -91,8 +93,8 @@ pub fn run(job: &DenoisedJob) -> anyhow::Result<()> {
 }
 
 /// What a denoiser has made of a picture.
-fn denoised(path: &Path, of: &Still) -> anyhow::Result<Vec<Rgb>> {
-    let still = read(&(path.to_owned(), Some(of.spp)))?;
+fn denoised(path: &Path, of: &Still, viewing: &Viewing) -> anyhow::Result<Vec<Rgb>> {
+    let still = read(&(path.to_owned(), Some(of.spp)), viewing)?;
     of.fits(&still)
         .with_context(|| format!("{} beside the picture that it was made from", path.display()))?;
     Ok(still.pixels)

@@ -9,15 +9,18 @@ use anyhow::{Context, bail};
 use noisefloor::descriptor::Described;
 use noisefloor::{
     Audience, Oracle, Tile, TileGrid, ToneMapping, Verdict, Viewing,
+    criterion::ExpectedThreshold,
     evidence::{Evidence, Samples},
     stills::{SnapshotPair, Still},
 };
 use noisefloor_cli::say::note;
+use noisefloor_cli::sources::start_threads;
 use noisefloor_image::maps::{Canvas, ColourScale, NOISE_SCALE, TileMark, draw_field, draw_tiles};
 use noisefloor_image::{
-    Plane, RenderLayers, SampleFacts, check_writable, read_facts, read_still, read_unread, write_exr,
+    Plane, RenderLayers, SampleFacts, check_writable, read_facts, read_still_on, read_unread, write_exr,
 };
 use report::Row;
+use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
 /// Pictures to judge: checked.
@@ -34,6 +37,7 @@ pub struct JudgeJob {
     pub viewing: Viewing,
     pub audience: Audience,
     pub tile: usize,
+    pub threads: Option<NonZeroUsize>,
     pub json: bool,
     pub heat_map: Option<PathBuf>,
     pub noise_map: Option<PathBuf>,
@@ -47,6 +51,9 @@ pub enum Question {
 }
 
 pub fn run(question: &Question) -> anyhow::Result<()> {
+    if let Question::Noise(job) = question {
+        start_threads(job.threads)?;
+    }
     match question {
         Question::Noise(job) => judge_noise(job),
         Question::Denoised(job) => denoised::run(job),
@@ -57,6 +64,7 @@ fn judge_noise(job: &JudgeJob) -> anyhow::Result<()> {
     for path in [&job.heat_map, &job.noise_map, &job.exr].into_iter().flatten() {
         check_writable(path)?;
     }
+    let read = |picture: &_| read(picture, &job.viewing);
     let image = read(&job.image)?;
     let others: Vec<Still> = job.against.iter().map(read).collect::<anyhow::Result<_>>()?;
     for (other, (path, _)) in others.iter().zip(&job.against) {
@@ -90,15 +98,16 @@ fn judge_noise(job: &JudgeJob) -> anyhow::Result<()> {
             grid.len()
         );
     }
+    warn_of(&held);
     let described = held.describe(&job.oracle, grid)?;
-    let rows = judge(job, grid, &described, &unlike)?;
+    let rows = judge(job, grid, (image.spp, &described), &unlike)?;
     report::say_all((&job.image.0, image.spp), &job.oracle, &rows, job.json)?;
     draw(job, &image, grid, (&held, &described), &rows)
 }
 
 /// A picture that can be judged; errors name it.
-fn read((path, spp): &(PathBuf, Option<f64>)) -> anyhow::Result<Still> {
-    let still = read_still(path, *spp)?;
+fn read((path, spp): &(PathBuf, Option<f64>), viewing: &Viewing) -> anyhow::Result<Still> {
+    let still = read_still_on(path, *spp, viewing)?;
     if let (Some(typed), Some(said)) = (spp, read_facts(path)?.spp())
         && *typed != said as f64
     {
@@ -107,20 +116,36 @@ fn read((path, spp): &(PathBuf, Option<f64>)) -> anyhow::Result<Still> {
             path.display()
         );
     }
+    warn_unread(path)?;
+    still.check().with_context(|| format!("{}", path.display()))?;
+    Ok(still)
+}
+
+/// Says what is not read of a picture.
+pub(crate) fn warn_unread(path: &Path) -> anyhow::Result<()> {
     for what in read_unread(path)?.warnings() {
         note!("warning: {}: {what}", path.display());
     }
-    still.check().with_context(|| format!("{}", path.display()))?;
-    Ok(still)
+    Ok(())
+}
+
+/// Says what is likely wrong with two pictures.
+fn warn_of(pair: &SnapshotPair<'_>) {
+    for what in pair.warnings() {
+        note!("warning: {what}");
+    }
 }
 
 /// The verdicts; tiles that are `unlike` in both pictures get none, and count as not converged.
 fn judge(
     job: &JudgeJob,
     grid: TileGrid,
-    described: &[Described],
+    (spp, described): (f64, &[Described]),
     unlike: &[bool],
 ) -> anyhow::Result<Vec<Row>> {
+    // Of less than one sample, the tile was judged as if it had one: what it needs is in its own samples
+    let fewer = spp.min(1.0);
+    let samples = |n: u64| (n as f64 * fewer).ceil() as u64;
     let row = |(tile, verdict): (Tile, Verdict)| {
         let unlike = unlike[tile.index];
         let verdict = if unlike { Verdict::default() } else { verdict };
@@ -135,8 +160,12 @@ fn judge(
             height,
             probability,
             converged,
-            threshold,
-            expected_spp,
+            threshold: threshold.map(|t| ExpectedThreshold {
+                low: samples(t.low),
+                median: samples(t.median),
+                high: samples(t.high),
+            }),
+            expected_spp: expected_spp.map(samples),
             unfamiliar,
             unlike,
         }

@@ -10,7 +10,7 @@ pub use denoised::{Denoised, ERROR_SCALE};
 pub use summary::say_noise;
 
 use crate::job::RenderJob;
-use anyhow::Context;
+use anyhow::{Context, bail};
 use noisefloor::{
     Checkpoint, Rgb, Session,
     criterion::ExpectedThreshold,
@@ -22,11 +22,11 @@ use noisefloor_cli::files::write_json;
 use noisefloor_cli::folder::{Earlier, Folder};
 use noisefloor_cli::say::{note, one_line};
 use noisefloor_cli::sources::Source;
-use noisefloor_farm::Finished;
 use noisefloor_image::{check_writable, write_atomic, write_csv};
 use noisefloor_rivals::metrics::relative_mse;
 use report::Report;
 use serde::{Deserialize, Serialize};
+use serde_json::Value;
 use std::fs::File;
 use std::io::{self, BufReader};
 use std::path::{Path, PathBuf};
@@ -68,6 +68,7 @@ pub type Over<'a> = (Clock, Option<&'a dyn Source>);
 const CHECKPOINT: &str = "checkpoint.nfc";
 const REPORT: &str = "report.json";
 const PICTURE: &str = "image.exr";
+const SHOWN: &str = "image.png";
 
 impl Output {
     /// Makes sure that files can be written, and that no other render is lost by it, before hours are spent.
@@ -117,11 +118,14 @@ impl Output {
 
     /// The checkpoint in the folder, if there is one.
     pub fn checkpoint(&self) -> anyhow::Result<Option<Checkpoint<'static>>> {
-        let file = match File::open(self.path(CHECKPOINT)) {
-            Ok(file) => file,
+        // Opening a pipe might never end
+        match std::fs::metadata(self.path(CHECKPOINT)) {
+            Ok(about) if about.is_file() => {}
+            Ok(_) => bail!("{}: is no regular file; remove it to begin anew", self.checkpoint_file()),
             Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
             Err(error) => return Err(error).with_context(|| self.checkpoint_file()),
-        };
+        }
+        let file = File::open(self.path(CHECKPOINT)).with_context(|| self.checkpoint_file())?;
         let checkpoint = Checkpoint::read(BufReader::new(file))
             .with_context(|| format!("{}: remove it to begin anew", self.checkpoint_file()))?;
         Ok(Some(checkpoint))
@@ -210,19 +214,53 @@ impl Output {
     }
 }
 
+/// What a folder holds of a job.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Finished {
+    /// Nothing, or a render under way.
+    Not,
+    /// All of it.
+    This,
+    /// All of it but a picture, which somebody has removed.
+    Lost,
+    /// A picture of another job, or one whose job nobody knows.
+    Other,
+}
+
 /// By the digest of a job, compared with what the report in the folder says.
-pub fn finished(folder: &Path, job: &str) -> anyhow::Result<Finished> {
+pub fn finished(folder: &Path, job: &str) -> anyhow::Result<noisefloor_farm::Finished> {
+    Ok(match finished_by(folder, |report| report["job"] == job)? {
+        Finished::Not => noisefloor_farm::Finished::Not,
+        Finished::This => noisefloor_farm::Finished::This,
+        Finished::Lost | Finished::Other => noisefloor_farm::Finished::Other,
+    })
+}
+
+/// The same of a frame; a render that has no digest, since it cannot be resumed, is compared by its options.
+pub fn finished_frame(folder: &Path, digest: Option<&str>, job: &RenderJob) -> anyhow::Result<Finished> {
+    let asked = serde_json::to_value(job)?;
+    finished_by(folder, |report| match digest {
+        Some(digest) => report["job"] == digest,
+        None => report["job"].is_null() && report["render"] == asked,
+    })
+}
+
+fn finished_by(folder: &Path, is_this: impl Fn(&Value) -> bool) -> anyhow::Result<Finished> {
     let path = folder.join(REPORT);
     if folder.join(CHECKPOINT).exists() {
         return Ok(Finished::Not);
     }
     let report = match std::fs::read(&path) {
-        Ok(report) => serde_json::from_slice::<serde_json::Value>(&report).unwrap_or_default(),
+        Ok(report) => serde_json::from_slice::<Value>(&report).unwrap_or_default(),
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Finished::Not),
         Err(error) => return Err(error).with_context(|| path.display().to_string()),
     };
-    let this = report["complete"] == true && report["job"] == job;
-    Ok(if this { Finished::This } else { Finished::Other })
+    let pictures = [PICTURE, SHOWN].iter().all(|name| folder.join(name).is_file());
+    Ok(match report["complete"] == true && is_this(&report) {
+        true if pictures => Finished::This,
+        true => Finished::Lost,
+        false => Finished::Other,
+    })
 }
 
 /// The file that shows that a folder holds a render, whosever it is.

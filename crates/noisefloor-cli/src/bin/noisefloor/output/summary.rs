@@ -47,8 +47,10 @@ impl Output {
         let counts = session.criterion().only_counts();
         let as_wanted = if counts { "have the samples that were asked for" } else { "converged" };
         let (least, most) = (spp.iter().min().unwrap_or(&0), spp.iter().max().unwrap_or(&0));
+        let range = if least == most { format!("{most}") } else { format!("{least} to {most}") };
         say!(
-            "{satisfied} of {} tiles {as_wanted}, after {least} to {most} samples per pixel ({:.0} on average: {:.0} % of uniform \
+            "{satisfied} of {} tiles {as_wanted}, after {range} samples per pixel ({:.0} on average: {:.0} \
+             % of uniform \
              rendering at {most})",
             spp.len(),
             samples / (grid.width() * grid.height()) as f64,
@@ -73,8 +75,8 @@ impl Output {
         let unfamiliar = session.stops().filter(|s| s.unfamiliar).count();
         if unfamiliar > 0 {
             say!(
-                "tiles with texture or light unlike any that the model was tested on: {unfamiliar}; they got up to twice the \
-                 samples it asks for, and their verdicts are less certain"
+                "tiles with texture or light unlike any that the model was tested on: {unfamiliar}; they get up to twice \
+                 the samples it asks for, up to --max-spp, and their verdicts are less certain"
             )?;
         }
         Ok(())

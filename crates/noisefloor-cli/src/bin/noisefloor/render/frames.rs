@@ -6,7 +6,7 @@ use crate::job::RenderRun;
 use anyhow::Context;
 use indicatif::HumanDuration;
 use noisefloor_cli::folder::Earlier;
-use noisefloor_cli::signals::{INTERRUPTED, cancel_on_signal};
+use noisefloor_cli::signals::{self, INTERRUPTED, cancel_on_signal};
 use noisefloor_cli::{note, say};
 use noisefloor_farm::FrameRange;
 use noisefloor_image::write_csv;
@@ -35,9 +35,16 @@ impl SequenceRun {
     }
 }
 
-/// Renders one frame, as another process says on standard input.
+/// Renders one frame, as another process says on standard input. Where that ends, its process was killed: the
+/// frame then ends as by SIGTERM, with everything written.
 pub fn one_frame() -> anyhow::Result<ExitCode> {
-    super::run(&serde_json::from_reader(std::io::stdin().lock())?)
+    let mut jobs = serde_json::Deserializer::from_reader(std::io::stdin()).into_iter::<RenderRun>();
+    let run = jobs.next().context("no frame was named")??;
+    std::thread::spawn(move || {
+        drop(jobs.next());
+        signals::terminate_self();
+    });
+    super::render(&run, true)
 }
 
 /// One line of frames.csv.
@@ -74,14 +81,13 @@ pub fn render_frames(sequence: &SequenceRun) -> anyhow::Result<ExitCode> {
     let (began, mut rows, mut rendered) = (Instant::now(), Vec::new(), 0);
     for frame in frames.iter() {
         let folder = out.join(FrameRange::folder(frame));
+        // Whether that is this frame, its own process knows: it reads the scene
         let done = run.earlier == Earlier::Resume && read(&folder).is_some_and(|report| report.complete);
-        if !done {
-            let status = elsewhere(&sequence.of_frame(frame)).with_context(|| format!("frame {frame}"))?;
-            rendered += 1;
-            if !status.success() && status.code() != Some(INTERRUPTED.into()) {
-                note!("frame {frame} of {first} to {last} failed; --resume goes on from it");
-                return Ok(ExitCode::from(status.code().and_then(|code| code.try_into().ok()).unwrap_or(1)));
-            }
+        let status = elsewhere(&sequence.of_frame(frame)).with_context(|| format!("frame {frame}"))?;
+        rendered += u32::from(!done);
+        if !status.success() && status.code() != Some(INTERRUPTED.into()) {
+            note!("frame {frame} of {first} to {last} failed; --resume goes on from it");
+            return Ok(ExitCode::from(status.code().and_then(|code| code.try_into().ok()).unwrap_or(1)));
         }
         rows.extend(read(&folder).map(|report| row(frame, &report)));
         write_csv(out.join("frames.csv"), &rows)?;
@@ -106,9 +112,13 @@ fn elsewhere(run: &RenderRun) -> anyhow::Result<ExitStatus> {
     let program = std::env::current_exe().context("this program does not find itself")?;
     let mut process = Command::new(program).arg("frame").stdin(Stdio::piped()).spawn()?;
     let job = serde_json::to_vec(run)?;
-    // A process that has ended says more than a broken pipe
-    drop(process.stdin.take().map(|mut stdin| stdin.write_all(&job)));
-    Ok(process.wait()?)
+    // A process that has ended says more than a broken pipe. The pipe stays open as long as this process
+    // lives
+    let mut stdin = process.stdin.take();
+    drop(stdin.as_mut().map(|stdin| stdin.write_all(&job).and_then(|()| stdin.flush())));
+    let ended = process.wait();
+    drop(stdin);
+    Ok(ended?)
 }
 
 fn read(out: &Path) -> Option<FrameReport> {

@@ -9,11 +9,11 @@ mod tev;
 mod watch;
 
 use crate::job::{CriterionJob, Ready, RenderJob, RenderRun};
-use crate::output::Output;
-use anyhow::{Context, bail};
+use crate::output::{Finished, Output, finished_frame};
+use anyhow::{Context, anyhow, bail};
 use noisefloor::{
-    Checkpoint, Driver, DriverError, Event, ProgressiveSource, Repeats, Session, SourceInfo, StopReason,
-    driver::Progress,
+    Checkpoint, Driver, DriverError, Event, ProgressiveSource, Repeats, Session, SessionError, SourceInfo,
+    StopReason, driver::Progress, watch::Fault,
 };
 use noisefloor_cli::bars::Log;
 use noisefloor_cli::files::read_reference;
@@ -42,6 +42,11 @@ const SMALL_TILE: usize = 64;
 type Rendering = Driver<Box<dyn Source>>;
 
 pub fn run(run: &RenderRun) -> anyhow::Result<ExitCode> {
+    render(run, false)
+}
+
+/// Renders; a frame of a sequence that is resumed may be finished already.
+fn render(run: &RenderRun, is_frame: bool) -> anyhow::Result<ExitCode> {
     // Whatever can be wrong is found before anything is rendered.
     let began = Instant::now();
     let RenderRun { job, resources, quiet, .. } = run;
@@ -66,7 +71,23 @@ pub fn run(run: &RenderRun) -> anyhow::Result<ExitCode> {
     let mut driver = Driver::new(source, criterion, params)?;
 
     // Only what can be resumed is kept
-    let resume = run.earlier == Earlier::Resume;
+    let mut earlier = run.earlier;
+    let folder = run.out.as_deref().map_or_else(|| PathBuf::from("out").join(&scene), PathBuf::from);
+    if is_frame && earlier == Earlier::Resume {
+        let digest = driver.session().checkpoint(JOB).ok().map(|checkpoint| checkpoint.job_digest());
+        match finished_frame(&folder, digest.as_deref(), job)? {
+            Finished::This => return Ok(ExitCode::SUCCESS),
+            Finished::Other => bail!(
+                "{}: holds a finished picture of other options, of a scene that has changed since, or of \
+                 another \
+                 build; --force renders all frames anew, --out names another folder",
+                folder.display()
+            ),
+            Finished::Lost => earlier = Earlier::Overwrite,
+            Finished::Not => {}
+        }
+    }
+    let resume = earlier == Earlier::Resume;
     let keeps = info.repeats == Repeats::Samples && driver.session().checkpoint(JOB).is_ok();
     if resume && info.repeats != Repeats::Samples {
         bail!(
@@ -76,10 +97,9 @@ pub fn run(run: &RenderRun) -> anyhow::Result<ExitCode> {
     if resume {
         driver.session().checkpoint(JOB).context("--resume: leave it out")?;
     }
-    let folder = run.out.as_deref().map_or_else(|| PathBuf::from("out").join(&scene), PathBuf::from);
     let origin = job.source.origin(&scene, name, info.repeats == Repeats::Samples)?;
     let folder = Folder::claim(folder)?;
-    let mut output = Output::create(folder, run.earlier, scene, name.clone(), job.clone())?;
+    let mut output = Output::create(folder, earlier, scene, name.clone(), job.clone())?;
     output.model = oracle.map(|oracle| oracle.model().digest());
     (output.reference, output.origin, output.denoised) = (reference, origin, denoised);
     if resume {
@@ -235,6 +255,35 @@ fn finish(driver: &Rendering, outcome: Result<(), DriverError>, cancel: &AtomicB
             note!("warning: the {what} under way is lost: {}", one_line(&error.into()));
             Ok(true)
         }
+        Err(DriverError::Session(SessionError::Fault(fault))) => {
+            Err(anyhow!("{}: {}", driver.source().info().name, in_a_user_s_words(&fault)))
+        }
         outcome => Ok(outcome.map(|()| false)?),
+    }
+}
+
+/// Whoever uses the command does not push samples.
+fn in_a_user_s_words(fault: &Fault) -> String {
+    match fault {
+        Fault::Repeated { tiles, of } => format!(
+            "{tiles} of {of} tiles got the same samples twice: the renderer repeats its random numbers, or \
+             two of the \
+             pictures are one"
+        ),
+        Fault::Running { .. } => "its batches contain the samples of the ones before: name running means by \
+        their \
+             samples per pixel (00100.exr), and batches by their first and last sample \
+             (batch_00060_00100.exr)"
+            .to_owned(),
+        Fault::Shared { correlation } => format!(
+            "its successive batches share samples (correlation {correlation:.2}): its seeds repeat or \
+             overlap, or its \
+             scene changes from one to the next"
+        ),
+        Fault::Quantised { encoding } => format!(
+            "all values are {encoding} of 8 bits: let it write linear radiance in floating point, as EXR or \
+             PFM"
+        ),
+        other => other.to_string(),
     }
 }
