@@ -114,9 +114,9 @@ typedef struct {
     uint32_t tile;
     // When tiles are judged: NF_SCHEDULE_SPACED (default), _EVERY or _GROWING.
     uint32_t schedule;
-    // The step of the schedule in samples per pixel, at least 2. Default: 10.
+    // The step of the schedule in samples per pixel, at least 2. Default: 8.
     uint64_t step;
-    // Fewest samples per pixel at which a tile may stop. Default: 100.
+    // Fewest samples per pixel at which a tile may stop. Default: 16.
     uint64_t min_spp;
     // Samples per pixel at which every tile stops, at least 2. Default: 10000.
     uint64_t max_spp;
@@ -347,7 +347,8 @@ NfStatus nf_session_save(const NfSession *session,
 
 // Puts a session back where nf_session_save found it. The session must have been made with the same size,
 // parameters and oracle, and job must be the same. If the renderer repeats its samples, all that follows is
-// the same to the bit as without the interruption. On failure the session is as it was.
+// the same to the bit as without the interruption, warnings included. Pixels share samples if either session was
+// told so by nf_session_share_pixels. On failure the session is as it was.
 NfStatus nf_session_resume(const NfSession *session,
                            const char *job,
                            const char *path);

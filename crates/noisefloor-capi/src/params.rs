@@ -26,9 +26,9 @@ pub struct NfParams {
     pub tile: u32,
     /// When tiles are judged: NF_SCHEDULE_SPACED (default), _EVERY or _GROWING.
     pub schedule: u32,
-    /// The step of the schedule in samples per pixel, at least 2. Default: 10.
+    /// The step of the schedule in samples per pixel, at least 2. Default: 8.
     pub step: u64,
-    /// Fewest samples per pixel at which a tile may stop. Default: 100.
+    /// Fewest samples per pixel at which a tile may stop. Default: 16.
     pub min_spp: u64,
     /// Samples per pixel at which every tile stops, at least 2. Default: 10000.
     pub max_spp: u64,

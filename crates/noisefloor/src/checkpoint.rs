@@ -6,15 +6,16 @@ use crate::film::{Film, FilmHead};
 use crate::params::Params;
 use crate::session::{Goal, TileState};
 use crate::source::{IdentityChange, SourceIdentity};
+use crate::watch::Watch;
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 use std::io::{self, Read, Write};
 use thiserror::Error;
 
 const FORMAT: Format = Format { magic: *b"NFCHECK\0", version: VERSION };
-const VERSION: u32 = 10;
+const VERSION: u32 = 11;
 
-/// A snapshot of a session, for resuming it: samples, verdicts and the display. Made by
+/// A snapshot of a session, for resuming it: samples, verdicts, the display, and what was noticed of the samples. Made by
 /// [`Session::checkpoint`](crate::Session::checkpoint), resumed by
 /// [`Session::resume`](crate::Session::resume) and
 /// [`Driver::resume`](crate::Driver::resume). Its file has 18 bytes per pixel for each half that is kept; writing it
@@ -31,6 +32,7 @@ pub struct Checkpoint<'a> {
     pub(crate) display: Option<Display>,
     pub(crate) film: Cow<'a, Film>,
     pub(crate) tiles: Cow<'a, [TileState]>,
+    pub(crate) watch: Cow<'a, Watch>,
 }
 
 /// A checkpoint in its file, without the pixels of its film, which follow.
@@ -44,6 +46,7 @@ struct Head<'a> {
     display: Option<Display>,
     film: FilmHead,
     tiles: Cow<'a, [TileState]>,
+    watch: Cow<'a, Watch>,
 }
 
 /// Why a checkpoint cannot be used.
@@ -111,11 +114,11 @@ impl Checkpoint<'_> {
     /// [`CheckpointError`] if it is foreign, damaged, oversized, or of another version.
     pub fn read(from: impl Read) -> Result<Checkpoint<'static>, CheckpointError> {
         let whole = |head: Head<'static>, from: &mut dyn Read| {
-            let Head { job, source, criterion, state, params, display, film, tiles } = head;
+            let Head { job, source, criterion, state, params, display, film, tiles, watch } = head;
             let film = Film::read_pixels(film, from).map_err(ended)?;
             let film = film.ok_or_else(|| Fault::Damaged("there is no such film".into()))?;
             let (criterion, state, film) = (criterion.into_owned(), state.into_owned(), Cow::Owned(film));
-            Ok(Checkpoint { job, source, criterion, state, params, display, film, tiles })
+            Ok(Checkpoint { job, source, criterion, state, params, display, film, tiles, watch })
         };
         Ok(FORMAT.read_with_body(from, whole)?)
     }
@@ -148,6 +151,7 @@ impl Checkpoint<'_> {
             display: self.display,
             film: self.film.head(),
             tiles: Cow::Borrowed(&self.tiles),
+            watch: Cow::Borrowed(&self.watch),
         };
         Ok(FORMAT.write_with_body(&head, to, |to| self.film.write_pixels(to))?)
     }

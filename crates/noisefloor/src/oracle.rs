@@ -129,6 +129,7 @@ impl Oracle {
                 high: audience.samples(t.high),
             }),
             expected_spp,
+            doubted: trained.doubted,
             unfamiliar: trained.unfamiliar,
             probability_without_penalty: seen(trained.probability_without_penalty),
         })
@@ -144,6 +145,7 @@ impl Oracle {
             probability: Some(judgement.probability),
             threshold: expected_threshold(&mut curve, spp),
             expected_spp: if converged { Some(spp) } else { self.expect(&mut curve, spp) },
+            doubted: false,
             unfamiliar: judgement.unfamiliar,
             probability_without_penalty: Some(judgement.probability_without_penalty),
         }
@@ -340,9 +342,10 @@ impl StoppingCriterion for Oracle {
                 let verdict = self.verdict(&raw, spp);
                 let spread = self.described[tile.index].as_ref().map_or(0.0, |seen| seen.spread);
                 let even = spread >= EVEN && f64::from(spread) * tile.pixels() as f64 >= CARRIERS;
-                let doubted = verdict.converged && spp < TRUSTED_SPP && !even;
+                let doubted = spp < TRUSTED_SPP && !even;
                 if doubted {
-                    Verdict { converged: false, expected_spp: Some(TRUSTED_SPP), ..verdict }
+                    let expected_spp = verdict.expected_spp.map(|need| need.max(TRUSTED_SPP));
+                    Verdict { converged: false, expected_spp, doubted, ..verdict }
                 } else {
                     verdict
                 }

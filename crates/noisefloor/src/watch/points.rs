@@ -42,3 +42,11 @@ impl Points {
 pub(super) fn light(mean: &[Rgb], pixel: usize) -> [f32; 3] {
     [mean[pixel - 1], mean[pixel], mean[pixel + 1]].map(luminance)
 }
+
+/// A typical one of these values: the geometric mean of those above 0, which a few lamps and fireflies hardly move.
+/// 1 if there is none.
+pub(super) fn level(values: &[f64]) -> f64 {
+    let lit = values.iter().filter(|&&value| value > 0.0 && value.is_finite());
+    let (sum, count) = lit.fold((0.0, 0u64), |(sum, count), value| (sum + value.ln(), count + 1));
+    if count > 0 { (sum / count as f64).exp() } else { 1.0 }
+}
