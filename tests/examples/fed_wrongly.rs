@@ -1,5 +1,6 @@
-//! What a session says of each mistake in a picture with a lamp in view, the built-in Cornell box: `fed_wrongly [EDGE
-//! [SEEDS]]` prints the table of docs/embedding.md, for square pictures in tiles of 64 pixels and up to 512 samples.
+//! What a session says of each mistake in a picture with a lamp in view, the built-in Cornell box:
+//! `fed_wrongly [EDGE [SEEDS]]` prints the table of docs/embedding.md, for square pictures in tiles of 64
+//! pixels and up to 512 samples.
 #![allow(clippy::print_stdout, reason = "an example prints")]
 
 use noisefloor_ptwne::{Ptwne, RenderOptions, Sampling, scenes};

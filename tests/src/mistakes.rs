@@ -1,5 +1,5 @@
-//! What renderers push by mistake in place of means of new samples: for the test `watch`, and for the table in
-//! docs/embedding.md, which the example `fed_wrongly` makes.
+//! What renderers push by mistake in place of means of new samples: for the test `watch`, and for the table
+//! in docs/embedding.md, which the example `fed_wrongly` makes.
 
 use noisefloor::{
     Oracle, Params, ProgressiveSource, Request, Rgb, Session, SessionError, Tile, TileGrid,
@@ -144,8 +144,8 @@ pub struct Outcome {
     pub fault: Option<(u64, Fault)>,
 }
 
-/// Feeds a session of the bundled oracle, in passes of so many samples, or in the batches that it asks for, until
-/// samples are used up, all tiles have stopped or there is a fault. Tiles have to be square.
+/// Feeds a session of the bundled oracle, in passes of so many samples, or in the batches that it asks for,
+/// until samples are used up, all tiles have stopped or there is a fault. Tiles have to be square.
 ///
 /// # Panics
 /// If the session fails otherwise.

@@ -43,8 +43,8 @@ pub unsafe extern "C" fn nf_session_save(
 
 /// Puts a session back where nf_session_save found it. The session must have been made with the same size,
 /// parameters and oracle, and job must be the same. If the renderer repeats its samples, all that follows is
-/// the same to the bit as without the interruption, warnings included. Pixels share samples if either session was
-/// told so by nf_session_share_pixels. On failure the session is as it was.
+/// the same to the bit as without the interruption, warnings included. Pixels share samples if either
+/// session was told so by nf_session_share_pixels. On failure the session is as it was.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn nf_session_resume(
     session: *const NfSession,

@@ -10,7 +10,7 @@ use std::path::Path;
 fn defaults_are_as_the_header_says() {
     let header =
         std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("include/noisefloor.h")).unwrap();
-    let fields = header.split("typedef struct NfParams {").nth(1).unwrap().split('}').next().unwrap();
+    let fields = header.split("} NfParams;").next().unwrap().rsplit('{').next().unwrap();
     let said: Vec<(&str, f64)> = fields
         .split(';')
         .filter_map(|field| {

@@ -62,7 +62,8 @@ impl Sampler {
             Sampling::Independent => Self::Independent(Rng::new(key, pixel, place.sample)),
             Sampling::Sobol => {
                 let Sequence { number, first } = place.sequence;
-                // Odd numbers are the sequences of half B; those from 2 on, which no session asks for, have the upper bits
+                // Odd numbers are the sequences of half B; those from 2 on, which no session asks for, have
+                // the upper bits
                 let (half, others) = (u64::from(number & 1), u64::from(number >> 1) << 33);
                 let scrambling = (2 * (first / POINTS) + half).wrapping_add(others);
                 Self::Sobol { index: (first % POINTS) as u32, seed: Rng::new(key, pixel, scrambling).next() }

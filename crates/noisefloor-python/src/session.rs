@@ -304,8 +304,9 @@ impl PySession {
         self.detached(py, |session| save(session, &path, job))?
     }
 
-    /// Puts the session back where save() found it, with its warnings. Size, parameters, oracle and job must be the same. If the
-    /// renderer repeats its samples, all that follows is the same to the bit as without the interruption.
+    /// Puts the session back where save() found it, with its warnings. Size, parameters, oracle and job must
+    /// be the same. If the renderer repeats its samples, all that follows is the same to the bit as without
+    /// the interruption.
     ///
     /// Raises OSError if the file cannot be read, CheckpointError if it is damaged or of another job; the
     /// session is then as it was.

@@ -15,11 +15,10 @@ use thiserror::Error;
 const FORMAT: Format = Format { magic: *b"NFCHECK\0", version: VERSION };
 const VERSION: u32 = 11;
 
-/// A snapshot of a session, for resuming it: samples, verdicts, the display, and what was noticed of the samples. Made by
-/// [`Session::checkpoint`](crate::Session::checkpoint), resumed by
-/// [`Session::resume`](crate::Session::resume) and
-/// [`Driver::resume`](crate::Driver::resume). Its file has 18 bytes per pixel for each half that is kept; writing it
-/// takes next to no memory.
+/// A snapshot of a session, for resuming it: samples, verdicts, the display, and what was noticed of the
+/// samples. Made by [`Session::checkpoint`](crate::Session::checkpoint), resumed by
+/// [`Session::resume`](crate::Session::resume) and [`Driver::resume`](crate::Driver::resume). Its file has 18
+/// bytes per pixel for each half that is kept; writing it takes next to no memory.
 #[derive(Clone, Debug)]
 pub struct Checkpoint<'a> {
     pub(crate) job: Cow<'a, str>,

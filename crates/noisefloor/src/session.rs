@@ -188,8 +188,8 @@ impl<C: StoppingCriterion> Session<C> {
         self.watch.warnings()
     }
 
-    /// The warnings that this has not returned yet: for a loop that prints them. A session that was resumed returns all
-    /// again.
+    /// The warnings that this has not returned yet: for a loop that prints them. A session that was resumed
+    /// returns all again.
     pub fn new_warnings(&mut self) -> Vec<Warning> {
         let warnings = self.watch.warnings();
         let new = warnings[self.told.min(warnings.len())..].to_vec();
@@ -251,8 +251,8 @@ impl<C: StoppingCriterion> Session<C> {
     /// Adds the mean of `spp` new samples per pixel of the whole image, row-major, to every open tile.
     ///
     /// # Errors
-    /// [`SessionError::Image`] if its size is not the image's, and as of [`Session::push`]: tiles before the one that
-    /// is refused have the samples then.
+    /// [`SessionError::Image`] if its size is not the image's, and as of [`Session::push`]: tiles before the
+    /// one that is refused have the samples then.
     pub fn push_image(&mut self, spp: u64, image: &[Rgb]) -> Result<(), SessionError> {
         let grid = self.film.grid();
         let expected = grid.width() * grid.height();
@@ -384,8 +384,8 @@ impl<C: StoppingCriterion> Session<C> {
         (samples >= max_spp).then(|| self.stop(index, StopReason::MaxSpp))
     }
 
-    /// Where a verdict like this expects the next ones to say "converged": for a less demanding audience sooner, but
-    /// not where the noise itself is not known yet.
+    /// Where a verdict like this expects the next ones to say "converged": for a less demanding audience
+    /// sooner, but not where the noise itself is not known yet.
     fn expected(&self, verdict: &Verdict) -> Option<u64> {
         let audience = self.audience();
         let sooner = audience.slope < 1.0 && !verdict.doubted;

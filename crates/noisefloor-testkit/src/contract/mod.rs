@@ -122,7 +122,8 @@ thread_local! {
     static QUIET: Cell<bool> = const { Cell::new(false) };
 }
 
-/// Catches a panic that is reported nowhere. Panics of other threads, and later ones of this, are reported as before.
+/// Catches a panic that is reported nowhere. Panics of other threads, and later ones of this, are reported as
+/// before.
 fn quietly(work: impl FnOnce()) -> std::thread::Result<()> {
     static HOOK: Once = Once::new();
     HOOK.call_once(|| {
@@ -139,8 +140,8 @@ fn quietly(work: impl FnOnce()) -> std::thread::Result<()> {
     outcome
 }
 
-/// What [`check_source`] finds wrong with a source, in place of a panic: for other languages. Nothing goes where panics
-/// are reported.
+/// What [`check_source`] finds wrong with a source, in place of a panic: for other languages. Nothing goes
+/// where panics are reported.
 pub fn broken_promise<S: ProgressiveSource>(make: impl Fn() -> S) -> Option<String> {
     let panic = quietly(|| check_source(make)).err()?;
     let text = panic.downcast_ref::<String>().cloned();

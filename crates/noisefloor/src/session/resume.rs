@@ -31,8 +31,8 @@ impl<C: StoppingCriterion> Session<C> {
     /// are open again; those that have converged, or have as many samples as are allowed, are not.
     ///
     /// If the same samples are pushed, everything that follows equals the session that was not interrupted,
-    /// to the bit: its [warnings](Session::warnings) and faults, too. Pixels share samples if either session was told
-    /// so ([`Session::set_pixels`]).
+    /// to the bit: its [warnings](Session::warnings) and faults, too. Pixels share samples if either session
+    /// was told so ([`Session::set_pixels`]).
     ///
     /// # Errors
     /// [`CheckpointError`] if job, source, criterion (its [fingerprint](crate::StoppingCriterion::fingerprint):

@@ -11,9 +11,9 @@ use std::fmt;
 const BLOCK: usize = 4;
 /// Terms without which nothing is said.
 const LEAST_BLOCKS: usize = 16;
-// No theory says how pictures vary along lines of pixels. In 3,290 looks at 16 scenes in five sizes, rendered right, no
-// mix-up left 0.7 or less of the misfit at 2 standard errors or more; of 120 renders with tiles mixed up, all four
-// bounds together say so of 103.
+// No theory says how pictures vary along lines of pixels. In 3,290 looks at 16 scenes in five sizes, rendered
+// right, no mix-up left 0.7 or less of the misfit at 2 standard errors or more; of 120 renders with tiles
+// mixed up, all four bounds together say so of 103.
 /// Standard errors by which borders have to fit better otherwise.
 const CLEAR: f64 = 2.0;
 /// What is left then of the misfit, at most.
@@ -22,7 +22,8 @@ const BETTER: f64 = 0.5;
 const WORSE: f64 = 1.2;
 /// How much of white a pixel of a border varies by, at least, on average.
 const ROUGH: f64 = 1e-3;
-/// How much of what the picture varies by along the borders it would vary by then, at least: black fits to black.
+/// How much of what the picture varies by along the borders it would vary by then, at least: black fits to
+/// black.
 const ALIKE: f64 = 0.5;
 
 /// How tiles seem to have been mixed up: what they would have to be for their borders to fit.
@@ -70,8 +71,8 @@ type Edge = (usize, Side);
 /// Two sides that lie beside each other.
 type Border = [Edge; 2];
 
-/// The borders between tiles as they lie, and between the same tiles if they had been mixed up; as many of each. Where
-/// tiles have moved by one, the borders left of column `torn` do not fit.
+/// The borders between tiles as they lie, and between the same tiles if they had been mixed up; as many of
+/// each. Where tiles have moved by one, the borders left of column `torn` do not fit.
 fn borders(grid: TileGrid, mix_up: MixUp, torn: usize) -> (Vec<Border>, Vec<Border>) {
     use Side::{Bottom, Left, Right, Top};
     let (columns, rows) = (grid.columns(), grid.rows());
@@ -135,8 +136,8 @@ impl Misfit {
     }
 }
 
-/// Of blocks of pixels along two lines of one length. What one is brighter by as a whole says nothing: it may be a
-/// horizon.
+/// Of blocks of pixels along two lines of one length. What one is brighter by as a whole says nothing: it may
+/// be a horizon.
 fn misfit(one: &[f64], other: &[f64]) -> Option<Vec<Misfit>> {
     if one.len() != other.len() {
         return None;
@@ -153,7 +154,8 @@ fn misfit(one: &[f64], other: &[f64]) -> Option<Vec<Misfit>> {
     Some(one.chunks(BLOCK).zip(other.chunks(BLOCK)).map(block).collect())
 }
 
-/// The picture along the four sides of each tile, compressed as a screen shows it, and along the pixels one further in.
+/// The picture along the four sides of each tile, compressed as a screen shows it, and along the pixels one
+/// further in.
 struct Sides(Vec<[[Vec<f64>; 2]; 4]>);
 
 impl Sides {
@@ -184,8 +186,8 @@ impl Sides {
         self.0.get(tile).map(|sides| &sides[side as usize])
     }
 
-    /// What would be left of the misfit if tiles were mixed up so; none if that is not much less, or borders fit now as
-    /// lines of pixels within tiles do.
+    /// What would be left of the misfit if tiles were mixed up so; none if that is not much less, or borders
+    /// fit now as lines of pixels within tiles do.
     fn improvement(&self, grid: TileGrid, mix_up: MixUp, torn: usize) -> Option<f64> {
         let (mut sum, mut squares, mut blocks) = (0.0, 0.0, 0);
         let [mut now, mut then, mut inside] = [Misfit::default(); 3];

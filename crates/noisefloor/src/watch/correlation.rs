@@ -7,8 +7,11 @@ use serde::{Deserialize, Serialize};
 
 /// Share of (a − b)² from which a seems much noisier than b: three times.
 const MUCH: f64 = 0.5;
-/// Standard errors from which it is worth to wait: p < 5·10⁻⁵, and there is one look.
-const DOUBTFUL: f64 = 4.5;
+/// Standard errors from which it is worth a warning: p < 5·10⁻⁵, and there is one look.
+pub(super) const DOUBTFUL: f64 = 4.5;
+/// Standard errors from which it is worth to wait for two batches more, and that tell which of two faults it
+/// is: p < 0.01, and less where many pixels are watched, since a is not much noisier by chance then.
+pub(super) const LIKELY: f64 = 2.5;
 
 /// The correlation of two differences x and y, each of mean 0: Σxy with what it is measured by.
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
@@ -51,8 +54,8 @@ impl Correlation {
     }
 }
 
-/// How often two differences x and y have the same sign: Σ sign(xy)·√|xy|. The root keeps a few outliers, which
-/// most noise of renderers has, from hiding what all other pixels say.
+/// How often two differences x and y have the same sign: Σ sign(xy)·√|xy|. The root keeps a few outliers,
+/// which most noise of renderers has, from hiding what all other pixels say.
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub(super) struct Concordance {
     sum: f64,
@@ -120,8 +123,8 @@ impl Energies {
         self.squares += more.squares;
     }
 
-    /// How many times the energy of the one the other has, if that is neither chance nor little; with z divided by
-    /// what pixels that are not independent widen it by.
+    /// How many times the energy of the one the other has, if that is neither chance nor little; with z
+    /// divided by what pixels that are not independent widen it by.
     fn excess(&self, widening: f64) -> Option<f64> {
         let z = (self.other - self.one) / self.squares.sqrt() / widening;
         let factor = 1.0 / self.ratio();
@@ -144,7 +147,8 @@ pub(super) struct Sums {
     pub(super) early_energies: [f64; 2],
     /// Of a − b and the same one pixel beside.
     pub(super) neighbours: Correlation,
-    /// Noise of the smaller two batches, and of the larger two, each times what their numbers of samples make of it.
+    /// Noise of the smaller two batches, and of the larger two, each times what their numbers of samples make
+    /// of it.
     pub(super) counts: Energies,
     /// (a − b)² and (c − d)² of equal batches: steps of a running mean become smaller.
     pub(super) steps: Energies,
@@ -189,19 +193,20 @@ impl Sums {
         (smaller(self.z(&self.batches), self.z(&self.apart)), value)
     }
 
-    /// How many times the noise energy of b a seems to have, if that is much and four batches do not say that it is no
-    /// matter: they are not correlated if a is merely noisier. In small pictures one group is too little to be sure of
-    /// running means. It is 99 if b is a running mean, which has (a − b)(a + b) = (a − b)² on average.
-    pub(super) fn doubt(&self) -> Option<f64> {
+    /// How many times the noise energy of b a seems to have, if that is much and four batches do not say that
+    /// it is no matter: they are not correlated if a is merely noisier. In small pictures one group is too
+    /// little to be sure of running means. It is 99 if b is a running mean, which has (a − b)(a + b) = (a −
+    /// b)² on average.
+    pub(super) fn doubt(&self, by: f64) -> Option<f64> {
         let open = self.batches.sizes == 0.0 || self.of_batches().1 > STRONG / 2.0;
-        let share = self.falling().filter(|_| open)?.min(0.98);
+        let share = self.falling(by).filter(|_| open)?.min(0.98);
         Some((1.0 + share) / (1.0 - share))
     }
 
-    /// By which share of (a − b)² a is noisier than b, if by much.
-    fn falling(&self) -> Option<f64> {
+    /// By which share of (a − b)² a is noisier than b, if by much and by so many standard errors.
+    fn falling(&self, by: f64) -> Option<f64> {
         let [falls, all] = self.early_energies;
-        Some(falls / all).filter(|&share| share > MUCH && self.z(&self.early) > DOUBTFUL)
+        Some(falls / all).filter(|&share| share > MUCH && self.z(&self.early) > by)
     }
 
     pub(super) fn fault(&self) -> Result<(), Fault> {
@@ -209,7 +214,7 @@ impl Sums {
         if z < CERTAIN || correlation < STRONG {
             return Ok(());
         }
-        Err(if self.steps.ratio() > FACTOR || self.falling().is_some() {
+        Err(if self.steps.ratio() > FACTOR || self.falling(LIKELY).is_some() {
             Fault::Running { correlation }
         } else {
             Fault::Shared { correlation }
@@ -243,7 +248,8 @@ impl Sums {
         if !shared && z.abs() > CERTAIN && beside.abs() > NOTABLE {
             warnings.push(Warning::Neighbours(beside));
         }
-        // More noise than the number says, if equal numbers have equal noise. Points of a quasi-random sequence have less
+        // More noise than the number says, if equal numbers have equal noise. Points of a quasi-random
+        // sequence have less
         if !noisier {
             warnings.extend(self.counts.excess(self.widening()).map(Warning::Counts));
         }

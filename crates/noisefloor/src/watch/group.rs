@@ -13,9 +13,9 @@ const ROUGH: f32 = 1e-3;
 const LEAST_ROUGH: usize = 4;
 /// Sizes of batches that may differ by this factor at most to be compared.
 const ALIKE: u64 = 2;
-/// Factor by which the sizes of two pairs of batches may differ whose noise is compared. If few fireflies make all
-/// noise, the larger pair has k times as many of them, and the smaller one by chance none: that is z = √N if the
-/// other has N, and p = exp(−N/k). At z = 6.5 that is 7·10⁻⁷ for k = 3.
+/// Factor by which the sizes of two pairs of batches may differ whose noise is compared. If few fireflies
+/// make all noise, the larger pair has k times as many of them, and the smaller one by chance none: that is z
+/// = √N if the other has N, and p = exp(−N/k). At z = 6.5 that is 7·10⁻⁷ for k = 3.
 const NEAR: f64 = 3.0;
 /// Samples a pixel from which a value of exactly 1 is no sample of a light.
 const MANY: u64 = 8;
@@ -40,7 +40,8 @@ pub(super) struct TileWatch {
 }
 
 impl TileWatch {
-    /// Whether what was read can be what was written of a tile, which has so many watched pixels at first and later.
+    /// Whether what was read can be what was written of a tile, which has so many watched pixels at first and
+    /// later.
     pub(super) fn fits(&self, at_first: usize, later: usize) -> bool {
         let points = if self.batches <= 4 { at_first } else { later };
         self.group.len() < 4 && self.group.iter().all(|seen| seen.spp > 0 && seen.light.len() == points)
@@ -86,12 +87,12 @@ fn is_same(one: &[[f32; 3]], other: &[[f32; 3]]) -> bool {
     one.as_flattened().iter().zip(other.as_flattened()).all(same)
 }
 
-/// What differences at each watched pixel are multiplied by, 1/(t + m): m is the mean of these batches there, and t
-/// that of a typical pixel. It is how much v/(t + v), as screens show light, changes with v, but for a factor. Without
-/// it, the dozen pixels at the edge of a lamp outweigh the picture.
+/// What differences at each watched pixel are multiplied by, 1/(t + m): m is the mean of these batches there,
+/// and t that of a typical pixel. It is how much v/(t + v), as screens show light, changes with v, but for a
+/// factor. Without it, the dozen pixels at the edge of a lamp outweigh the picture.
 ///
-/// All samples count alike in m. Which of them lie in which batch is chance if they are independent, whatever m is,
-/// so that differences have the mean 0 with their weights as well.
+/// All samples count alike in m. Which of them lie in which batch is chance if they are independent, whatever
+/// m is, so that differences have the mean 0 with their weights as well.
 fn weights(batches: &[&Seen], place: usize) -> Vec<f64> {
     let all: f64 = batches.iter().map(|seen| seen.spp as f64).sum();
     let mean = |i: usize| -> f64 {

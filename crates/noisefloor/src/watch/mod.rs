@@ -1,16 +1,19 @@
 //! Notices when a session is fed wrongly: running means in place of new samples, one seed for every batch,
 //! pictures that were encoded for a screen, tiles that were mixed up, light that cannot be.
 //!
-//! A [`Session`](crate::Session) watches every push. What is certain is a [`Fault`], an error of the push or of
-//! the next verdicts, so that no tile says "converged" on the strength of it. What is likely is a [`Warning`],
-//! once, with the number it rests on ([`Session::warnings`](crate::Session::warnings)). Samples and verdicts
-//! of a session that gives no fault are those of one that does not watch, to the bit.
+//! A [`Session`](crate::Session) watches every push. What is certain is a [`Fault`], an error of the push or
+//! of the next verdicts, so that no tile says "converged" on the strength of it. What is likely is a
+//! [`Warning`], once, with the number it rests on ([`Session::warnings`](crate::Session::warnings)). Samples
+//! and verdicts of a session that gives no fault are those of one that does not watch, to the bit, but that
+//! the first stops wait for two more batches where the first two look like running means: by chance in less
+//! than 1 of 100 small pictures.
 //!
 //! # What is watched
-//! One pixel in each square of 8×8 pixels and its two neighbours, in small pictures one in 4×4, and four times as
-//! many in the first four batches: what is farther apart than a pixel filter reaches counts as independent. Four
-//! successive batches a, b, c, d of a tile make a *group*. Their differences are weighted by how bright a pixel is, much as
-//! a screen shows them: else a dozen pixels at the edge of a lamp would decide.
+//! One pixel in each square of 8×8 pixels and its two neighbours, in small pictures one in 4×4, and four
+//! times as many in the first four batches: what is farther apart than a pixel filter reaches counts as
+//! independent. Four successive batches a, b, c, d of a tile make a *group*. Their differences are weighted
+//! by how bright a pixel is, much as a screen shows them: else a dozen pixels at the edge of a lamp would
+//! decide.
 //!
 //! | watched | from | says |
 //! |---|---|---|
@@ -31,24 +34,24 @@
 //!
 //! # How often chance alone says so
 //! If samples are independent and a and c have equal sizes, exchanging a pixel's a and c leaves everything
-//! as likely and changes the sign of its term t = ±√|(a − c)(b − d)|. Given all |t| the signs are fair coins, and
-//! z = Σt/√Σt² exceeds 6.5 with p < exp(−6.5²/2) = 7·10⁻¹⁰, however the noise is distributed (Hoeffding
-//! 1963); the root keeps a few fireflies from hiding the rest. Weights change nothing about it: they depend on the mean
-//! of all four. So it is for the other correlations. Sums are looked at once before each round of verdicts, over all
-//! groups so far and over the new ones alone: in 10,000 rounds, and with three correlations of two signs, by
-//! chance with p < 10⁻⁴. Three things are not exact and were measured instead (`tests/tests/it/watch.rs`): sizes
-//! may differ by a factor of 2. The z of batches has to be as large, and of the same sign, without what the noise
-//! of a tile has in common with its picture, since a Markov chain's brightness wanders as a whole. And z is
-//! divided by √R, where R is how much more energy the noise of four watched pixels in a row has in sum than
-//! in each. A source that says that its pixels share samples
+//! as likely and changes the sign of its term t = ±√|(a − c)(b − d)|. Given all |t| the signs are fair coins,
+//! and z = Σt/√Σt² exceeds 6.5 with p < exp(−6.5²/2) = 7·10⁻¹⁰, however the noise is distributed (Hoeffding
+//! 1963); the root keeps a few fireflies from hiding the rest. Weights change nothing about it: they depend
+//! on the mean of all four. So it is for the other correlations. Sums are looked at once before each round of
+//! verdicts, over all groups so far and over the new ones alone: in 10,000 rounds, and with three
+//! correlations of two signs, by chance with p < 10⁻⁴. Three things are not exact and were measured instead
+//! (`tests/tests/it/watch.rs`): sizes may differ by a factor of 2. The z of batches has to be as large, and
+//! of the same sign, without what the noise of a tile has in common with its picture, since a Markov chain's
+//! brightness wanders as a whole. And z is divided by √R, where R is how much more energy the noise of four
+//! watched pixels in a row has in sum than in each. A source that says that its pixels share samples
 //! ([`PixelNoise::Shared`](crate::source::PixelNoise)) gives one term a tile. Certain is only what has, in
 //! addition, a correlation Σt/Σ|t| of at least a fifth; running means have 0.4 and more.
 //!
 //! # What is not noticed
-//! Faults in fewer than four batches of a tile, but for repeated ones. Pictures encoded for a screen in floating
-//! point, or sums, in batches of one size whose noise does not reach white: equal batches of them are as independent as
-//! any. Counts that are all wrong by one factor. Tiles that were mixed up where the picture hardly varies along their
-//! borders, and a whole picture that is upside down.
+//! Faults in fewer than four batches of a tile, but for repeated ones. Pictures encoded for a screen in
+//! floating point, or sums, in batches of one size whose noise does not reach white: equal batches of them
+//! are as independent as any. Counts that are all wrong by one factor. Tiles that were mixed up where the
+//! picture hardly varies along their borders, and a whole picture that is upside down.
 
 mod borders;
 mod correlation;
@@ -65,7 +68,7 @@ use crate::film::Film;
 use crate::rgb::Rgb;
 use crate::source::PixelNoise;
 use crate::tile::{Tile, TileGrid};
-use correlation::Sums;
+use correlation::{DOUBTFUL, LIKELY, Sums};
 use group::TileWatch;
 use points::Points;
 use serde::{Deserialize, Serialize};
@@ -265,8 +268,8 @@ impl Watch {
         &self.warnings
     }
 
-    /// Goes on with what a checkpoint holds, which has to be of a picture like this one; false if it is not. Pixels
-    /// share samples if either says so.
+    /// Goes on with what a checkpoint holds, which has to be of a picture like this one; false if it is not.
+    /// Pixels share samples if either says so.
     pub(crate) fn restore(&mut self, kept: Self) -> bool {
         let points = self.points();
         let fits = |(tile, watch): (Tile, &TileWatch)| {
@@ -353,7 +356,7 @@ impl Watch {
             sums.fault()?;
         }
         let found = self.sums.iter().flat_map(|sums| sums.warnings(self.shared));
-        let found = found.chain(self.sums[0].doubt().map(Warning::Noise));
+        let found = found.chain(self.sums[0].doubt(DOUBTFUL).map(Warning::Noise));
         let samples = film.total_samples();
         let mixed_up = if samples >= self.borders_at { borders::mix_up(film) } else { None };
         if samples >= self.borders_at {
@@ -372,9 +375,10 @@ impl Watch {
         Ok(())
     }
 
-    /// Whether the first two batches look like running means, and four do not say otherwise: nothing may stop till then.
+    /// Whether the first two batches look like running means, and four do not say otherwise: nothing may stop
+    /// till then.
     pub(crate) fn doubts(&self) -> bool {
-        self.sums[0].doubt().is_some()
+        self.sums[0].doubt(LIKELY).is_some()
     }
 
     /// Whether half of the noisy tiles got a batch twice.

@@ -15,14 +15,14 @@ const BLOCK: usize = 4;
 /// Relative brightness that is no rounding, as sums of a thousand samples in single precision have it.
 const LEAST: f64 = 5e-4;
 
-/// The expected mean of linear radiance is the same for any number n of samples. That of a curve f of it is not:
-/// E f(mean) − f(E) ≈ f″·σ²/2n (Jensen 1906), which is below 0 for curves that brighten the dark or cut off light, so
-/// that larger batches are brighter. Sums grow with n itself.
+/// The expected mean of linear radiance is the same for any number n of samples. That of a curve f of it is
+/// not: E f(mean) − f(E) ≈ f″·σ²/2n (Jensen 1906), which is below 0 for curves that brighten the dark or cut
+/// off light, so that larger batches are brighter. Sums grow with n itself.
 ///
-/// Watched is Σd, where d is a batch less the picture before it, of batches much larger than those that the picture is
-/// made of. If all samples are alike and independent, d has the mean 0 at each pixel. Fireflies skew it, but not
-/// towards an alarm: if N of them make all noise, the batch, which has at most as many samples as the picture, has
-/// them all with p ≤ 2⁻ᴺ, and then z = √N.
+/// Watched is Σd, where d is a batch less the picture before it, of batches much larger than those that the
+/// picture is made of. If all samples are alike and independent, d has the mean 0 at each pixel. Fireflies
+/// skew it, but not towards an alarm: if N of them make all noise, the batch, which has at most as many
+/// samples as the picture, has them all with p ≤ 2⁻ᴺ, and then z = √N.
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub(crate) struct Shift {
     sum: f64,
@@ -71,8 +71,8 @@ impl Shift {
         self.light += more.light;
     }
 
-    /// By how many per cent larger batches are brighter, if that is neither chance nor rounding; with z divided by
-    /// what pixels that are not independent widen it by.
+    /// By how many per cent larger batches are brighter, if that is neither chance nor rounding; with z
+    /// divided by what pixels that are not independent widen it by.
     pub(super) fn brighter(&self, widening: f64) -> Option<f64> {
         let share = self.sum / self.light;
         (self.sum / self.squares.sqrt() / widening > CERTAIN && share > LEAST).then_some(100.0 * share)

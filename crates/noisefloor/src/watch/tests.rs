@@ -69,8 +69,8 @@ fn independent_samples_are_silent() {
     assert_eq!(feed(200, |count| (sizes(count), batch(count + 1, sizes(count)))).2, Vec::new());
 }
 
-/// The mistakes of issue 31, with the samples per pixel at which they are noticed; without this watch the tiles
-/// of a Cornell box stopped at 170, 100, 540 and 100.
+/// The mistakes of issue 31, with the samples per pixel at which they are noticed; without this watch the
+/// tiles of a Cornell box stopped at 170, 100, 540 and 100.
 #[test]
 fn mistakes_are_faults_before_a_tile_can_stop() {
     let mut sum = vec![[0.0; 3]; EDGE * EDGE];
@@ -256,8 +256,8 @@ enum Kind {
     Fireflies(f64),
 }
 
-/// A room of `edge`×`edge` pixels on linear radiance from 0.1 to 0.7, with a lamp of radiance 18 in view, whose edges
-/// pixels share with the wall behind.
+/// A room of `edge`×`edge` pixels on linear radiance from 0.1 to 0.7, with a lamp of radiance 18 in view,
+/// whose edges pixels share with the wall behind.
 #[derive(Clone, Copy)]
 struct Room {
     edge: usize,
@@ -301,8 +301,8 @@ impl Room {
     }
 }
 
-/// What is said of a picture in tiles of half its edge, pushed in batches of these sizes: `batch` is given first sample
-/// and number of samples and returns what is pushed, and said to be its number of samples.
+/// What is said of a picture in tiles of half its edge, pushed in batches of these sizes: `batch` is given
+/// first sample and number of samples and returns what is pushed, and said to be its number of samples.
 fn said(
     edge: usize,
     sizes: &[u64],
@@ -342,7 +342,8 @@ fn filtered(image: &[Rgb], edge: usize, kernel: [f32; 3]) -> Vec<Rgb> {
     (0..edge * edge).map(pixel).collect()
 }
 
-/// The first picture that everybody tries is small, with a lamp in it. Its edge has most of the noise, in a dozen pixels.
+/// The first picture that everybody tries is small, with a lamp in it. Its edge has most of the noise, in a
+/// dozen pixels.
 #[test]
 fn a_lamp_in_view_hides_no_mistake() {
     for (kind, seed) in [Kind::Exponential, Kind::Dark].into_iter().flat_map(|k| (0..3).map(move |s| (k, s)))
@@ -370,7 +371,8 @@ fn a_lamp_in_view_hides_no_mistake() {
     }
 }
 
-/// However noise is distributed. All is seeded, so that this fails always or never; of other seeds one in 10⁴ may.
+/// However noise is distributed. All is seeded, so that this fails always or never; of other seeds one in 10⁴
+/// may.
 #[test]
 fn right_samples_are_silent() {
     right_ones_are_silent(3);
