@@ -4,9 +4,7 @@
 //! A [`Session`](crate::Session) watches every push. What is certain is a [`Fault`], an error of the push or
 //! of the next verdicts, so that no tile says "converged" on the strength of it. What is likely is a
 //! [`Warning`], once, with the number it rests on ([`Session::warnings`](crate::Session::warnings)). Samples
-//! and verdicts of a session that gives no fault are those of one that does not watch, to the bit, but that
-//! the first stops wait for two more batches where the first two look like running means: by chance in less
-//! than 1 of 100 small pictures.
+//! and verdicts of a session that gives no fault are those of one that does not watch, to the bit.
 //!
 //! # What is watched
 //! One pixel in each square of 8×8 pixels and its two neighbours, in small pictures one in 4×4, and four
@@ -68,7 +66,7 @@ use crate::film::Film;
 use crate::rgb::Rgb;
 use crate::source::PixelNoise;
 use crate::tile::{Tile, TileGrid};
-use correlation::{DOUBTFUL, LIKELY, Sums};
+use correlation::Sums;
 use group::TileWatch;
 use points::Points;
 use serde::{Deserialize, Serialize};
@@ -356,7 +354,7 @@ impl Watch {
             sums.fault()?;
         }
         let found = self.sums.iter().flat_map(|sums| sums.warnings(self.shared));
-        let found = found.chain(self.sums[0].doubt(DOUBTFUL).map(Warning::Noise));
+        let found = found.chain(self.sums[0].doubt().map(Warning::Noise));
         let samples = film.total_samples();
         let mixed_up = if samples >= self.borders_at { borders::mix_up(film) } else { None };
         if samples >= self.borders_at {
@@ -378,7 +376,7 @@ impl Watch {
     /// Whether the first two batches look like running means, and four do not say otherwise: nothing may stop
     /// till then.
     pub(crate) fn doubts(&self) -> bool {
-        self.sums[0].doubt(LIKELY).is_some()
+        self.sums[0].doubt().is_some()
     }
 
     /// Whether half of the noisy tiles got a batch twice.
