@@ -364,7 +364,8 @@ NfStatus nf_session_save(const NfSession *session,
 
 // Puts a session back where nf_session_save found it. The session must have been made with the same size,
 // parameters and oracle, and job must be the same. If the renderer repeats its samples, all that follows is
-// the same to the bit as without the interruption. On failure the session is as it was.
+// the same to the bit as without the interruption, warnings included. Pixels share samples if either
+// session was told so by nf_session_share_pixels. On failure the session is as it was.
 NfStatus nf_session_resume(const NfSession *session,
                            const char *job,
                            const char *path);

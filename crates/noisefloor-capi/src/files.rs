@@ -43,7 +43,8 @@ pub unsafe extern "C" fn nf_session_save(
 
 /// Puts a session back where nf_session_save found it. The session must have been made with the same size,
 /// parameters and oracle, and job must be the same. If the renderer repeats its samples, all that follows is
-/// the same to the bit as without the interruption. On failure the session is as it was.
+/// the same to the bit as without the interruption, warnings included. Pixels share samples if either
+/// session was told so by nf_session_share_pixels. On failure the session is as it was.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn nf_session_resume(
     session: *const NfSession,
@@ -110,7 +111,8 @@ fn resume(session: &NfSession, job: &str, from: impl Read) -> Result<(), Failure
     let checkpoint = Checkpoint::read(from)?;
     let mut locked = session.lock()?;
     let grid = locked.film().grid();
-    let fresh = Session::new(grid.width(), grid.height(), locked.criterion().clone(), *locked.params())?;
+    let mut fresh = Session::new(grid.width(), grid.height(), locked.criterion().clone(), *locked.params())?;
+    fresh.set_pixels(locked.pixels());
     *locked = fresh.resume(job, checkpoint)?;
     Ok(())
 }

@@ -5,6 +5,37 @@
 
 use std::path::Path;
 
+/// A number that a comment calls a default is that of [`NfParams::default`](crate::params::NfParams).
+#[test]
+fn defaults_are_as_the_header_says() {
+    let header =
+        std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("include/noisefloor.h")).unwrap();
+    let fields = header.split("} NfParams;").next().unwrap().rsplit('{').next().unwrap();
+    let said: Vec<(&str, f64)> = fields
+        .split(';')
+        .filter_map(|field| {
+            let number = field.split("Default: ").nth(1)?.split_whitespace().next()?.trim_end_matches('.');
+            Some((field.split_whitespace().last()?, number.parse().ok()?))
+        })
+        .collect();
+    let p = crate::params::NfParams::default();
+    let are = [
+        ("tile", f64::from(p.tile)),
+        ("step", p.step as f64),
+        ("min_spp", p.min_spp as f64),
+        ("max_spp", p.max_spp as f64),
+        ("consecutive", f64::from(p.consecutive)),
+        ("key", f64::from(p.key)),
+        ("exposure", f64::from(p.exposure)),
+        ("audience_slope", p.audience_slope),
+        ("audience_offset", p.audience_offset),
+    ];
+    assert_eq!(said.len(), are.len(), "{said:?}");
+    for (said, are) in said.into_iter().zip(are) {
+        assert!(said.0 == are.0 && (said.1 - are.1).abs() < 1e-6, "{said:?} {are:?}");
+    }
+}
+
 #[test]
 fn the_header_is_that_of_the_sources() {
     let package = Path::new(env!("CARGO_MANIFEST_DIR"));

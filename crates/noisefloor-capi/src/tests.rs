@@ -219,6 +219,28 @@ fn a_resumed_session_ends_as_the_uninterrupted_one() {
     }
 }
 
+/// Of the session that resumes, and of the one that was saved.
+#[test]
+fn shared_pixels_stay_shared_after_a_resume() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = CString::new(folder.path().join("session.nfc").to_str().unwrap()).unwrap();
+    for [saved, resuming] in [[false, false], [true, false], [false, true]] {
+        let [one, other] = [saved, resuming].map(|shared| {
+            let session = session(&params());
+            assert_eq!(nf_session_share_pixels(session.0, shared), NfStatus::Ok);
+            session
+        });
+        // SAFETY: living handles, and text.
+        unsafe {
+            assert_eq!(nf_session_save(one.0, c"wall".as_ptr(), path.as_ptr()), NfStatus::Ok);
+            assert_eq!(nf_session_resume(other.0, c"wall".as_ptr(), path.as_ptr()), NfStatus::Ok);
+        }
+        let resumed = crate::handle::get(other.0.cast_const()).ok().unwrap();
+        let shares = resumed.lock().ok().unwrap().pixels() == noisefloor::source::PixelNoise::Shared;
+        assert_eq!(shares, saved || resuming);
+    }
+}
+
 #[test]
 fn a_checkpoint_in_memory_is_that_of_a_file() {
     let folder = tempfile::tempdir().unwrap();

@@ -62,8 +62,10 @@ impl Sampler {
             Sampling::Independent => Self::Independent(Rng::new(key, pixel, place.sample)),
             Sampling::Sobol => {
                 let Sequence { number, first } = place.sequence;
-                // Odd numbers are the sequences of half B
-                let scrambling = 2 * (first / POINTS) + u64::from(number);
+                // Odd numbers are the sequences of half B; those from 2 on, which no session asks for, have
+                // the upper bits
+                let (half, others) = (u64::from(number & 1), u64::from(number >> 1) << 33);
+                let scrambling = (2 * (first / POINTS) + half).wrapping_add(others);
                 Self::Sobol { index: (first % POINTS) as u32, seed: Rng::new(key, pixel, scrambling).next() }
             }
         }
@@ -151,6 +153,23 @@ mod tests {
             }
             assert!(cells.iter().all(|c| c[0] == 1), "{cells:?}");
         }
+    }
+
+    /// Whoever asks for more than a session's two gets new ones.
+    #[test]
+    fn no_sequence_repeats_another() {
+        let seed = |number, first| {
+            let place = Place { sample: 0, sequence: Sequence { number, first } };
+            Sampler::new(Sampling::Sobol, Key::new(3), 17, place).seed()
+        };
+        let mut seeds = Vec::new();
+        for number in [0, 1, 2, 3, 4, 5, 1 << 16, u32::MAX] {
+            seeds.extend([0, 1, 2, 1 << 20].map(|part| seed(number, part * POINTS)));
+        }
+        let all = seeds.len();
+        seeds.sort_unstable();
+        seeds.dedup();
+        assert_eq!(seeds.len(), all);
     }
 
     /// Sobol's second dimension by its direction numbers, vⱼ = vⱼ₋₁ xor vⱼ₋₁/2 (Joe and Kuo 2008).

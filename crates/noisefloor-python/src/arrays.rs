@@ -32,9 +32,10 @@ impl Pixels<'_> {
     pub(crate) fn get(&self) -> (usize, usize, Cow<'_, [Rgb]>) {
         let view = self.0.as_array();
         let (height, width, _) = view.dim();
-        let pixels = match self.0.as_slice() {
-            Ok(values) => Cow::Borrowed(values.as_chunks().0),
-            Err(_) => Cow::Owned(view.iter().copied().collect::<Vec<f32>>().as_chunks().0.to_vec()),
+        // That of ndarray: the one of numpy also takes arrays in Fortran order, as they lie
+        let pixels = match view.to_slice() {
+            Some(values) => Cow::Borrowed(values.as_chunks().0),
+            None => Cow::Owned(view.iter().copied().collect::<Vec<f32>>().as_chunks().0.to_vec()),
         };
         (width, height, pixels)
     }

@@ -192,12 +192,7 @@ impl PySession {
             let message = format!("image has shape ({height}, {width}, 3), and the session ({h}, {w}, 3)");
             return Err(SizeError::new_err(message));
         }
-        let mut session = self.attached(py)?;
-        for tile in self.grid.tiles().filter(|tile| session.is_open(tile.index)).collect::<Vec<_>>() {
-            let mean: Vec<Rgb> = tile.rows(width).flat_map(|row| pixels[row].to_vec()).collect();
-            session.push(tile.index, spp, &mean).map_err(Raise::raise)?;
-        }
-        Ok(())
+        self.attached(py)?.push_image(spp, &pixels).map_err(Raise::raise)
     }
 
     /// Judges the tiles that are due, on all cores, and returns a list of Stop: those that are now done.
@@ -311,8 +306,9 @@ impl PySession {
         self.detached(py, |session| save(session, &path, job))?
     }
 
-    /// Puts the session back where save() found it. Size, parameters, oracle and job must be the same. If the
-    /// renderer repeats its samples, all that follows is the same to the bit as without the interruption.
+    /// Puts the session back where save() found it, with its warnings. Size, parameters, oracle and job must
+    /// be the same. If the renderer repeats its samples, all that follows is the same to the bit as without
+    /// the interruption.
     ///
     /// Raises OSError if the file cannot be read, CheckpointError if it is damaged or of another job; the
     /// session is then as it was.

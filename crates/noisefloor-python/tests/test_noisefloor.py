@@ -141,6 +141,40 @@ class Sessions(unittest.TestCase):
         watcher.join()
         self.assertLess(peak[0] - before, frame.nbytes // 2)
 
+    def test_arrays_in_any_order_of_memory_are_the_same_picture(self):
+        picture = noisy(3, 50)
+        planes = np.ascontiguousarray(picture.T)  # (3, width, height), as some renderers keep them
+        wide = np.zeros((64, 2 * 96, 3), np.float32)
+        wide[:, ::2] = picture
+        orders = {
+            "Fortran": np.asfortranarray(picture),
+            "planes.T": planes.T,
+            "rows apart": wide[:, ::2],
+            "upside down": np.ascontiguousarray(picture[::-1])[::-1],
+            "float64": np.asfortranarray(picture.astype(np.float64)),
+        }
+        other = noisy(4, 50)
+        encoded = np.asfortranarray(np.clip(picture, 0, 1))
+        for name, array in orders.items():
+            with self.subTest(name):
+                self.assertTrue(np.array_equal(array, picture))
+                session = nf.Session(96, 64, params=PARAMS)
+                session.push_image(50, array)
+                self.assertTrue(np.array_equal(session.image(), picture))
+                session = nf.Session(96, 64, params=PARAMS)
+                for tile in range(6):
+                    at = nf.Session(96, 64, params=PARAMS).requests()[tile].tile
+                    rows, columns = slice(at.y, at.y + at.height), slice(at.x, at.x + at.width)
+                    session.push(tile, 50, array[rows, columns])
+                self.assertTrue(np.array_equal(session.image(), picture))
+                self.assertEqual(nf.metrics(array, picture).psnr, np.inf)
+                same = nf.judge(array, 50, other, 50), nf.judge(picture, 50, other, 50)
+                self.assertEqual(*([(v.tile.index, v.probability) for v in found] for found in same))
+                path = pathlib.Path(tempfile.mkdtemp()) / "picture.exr"
+                nf.write(path, array)
+                self.assertTrue(np.array_equal(nf.read(path), picture))
+        self.assertEqual(nf.metrics(encoded, np.ascontiguousarray(encoded), encoding="srgb").psnr, np.inf)
+
     def test_a_resumed_session_ends_as_the_uninterrupted_one(self):
         whole, other = (nf.Session(64, 64, params=PARAMS) for _ in range(2))
         for request in whole.requests():

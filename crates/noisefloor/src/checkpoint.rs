@@ -6,6 +6,7 @@ use crate::film::{Film, FilmHead};
 use crate::params::{Audience, Params, Schedule};
 use crate::session::{Goal, Settling, TileState};
 use crate::source::{IdentityChange, SourceIdentity};
+use crate::watch::Watch;
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 use std::io::{self, Read, Write};
@@ -14,11 +15,10 @@ use thiserror::Error;
 const FORMAT: Format = Format { magic: *b"NFCHECK\0", version: VERSION };
 const VERSION: u32 = 11;
 
-/// A snapshot of a session, for resuming it: samples, verdicts and the display. Made by
-/// [`Session::checkpoint`](crate::Session::checkpoint), resumed by
-/// [`Session::resume`](crate::Session::resume) and
-/// [`Driver::resume`](crate::Driver::resume). Its file has 18 bytes per pixel for each half that is kept; writing it
-/// takes next to no memory.
+/// A snapshot of a session, for resuming it: samples, verdicts, the display, and what was noticed of the
+/// samples. Made by [`Session::checkpoint`](crate::Session::checkpoint), resumed by
+/// [`Session::resume`](crate::Session::resume) and [`Driver::resume`](crate::Driver::resume). Its file has 18
+/// bytes per pixel for each half that is kept; writing it takes next to no memory.
 #[derive(Clone, Debug)]
 pub struct Checkpoint<'a> {
     pub(crate) job: Cow<'a, str>,
@@ -32,6 +32,7 @@ pub struct Checkpoint<'a> {
     pub(crate) settling: Option<Settling>,
     pub(crate) film: Cow<'a, Film>,
     pub(crate) tiles: Cow<'a, [TileState]>,
+    pub(crate) watch: Cow<'a, Watch>,
 }
 
 /// A checkpoint in its file, without the pixels of its film, which follow.
@@ -46,6 +47,7 @@ struct Head<'a> {
     settling: Option<Settling>,
     film: FilmHead,
     tiles: Cow<'a, [TileState]>,
+    watch: Cow<'a, Watch>,
 }
 
 /// Why a checkpoint cannot be used.
@@ -113,11 +115,11 @@ impl Checkpoint<'_> {
     /// [`CheckpointError`] if it is foreign, damaged, oversized, or of another version.
     pub fn read(from: impl Read) -> Result<Checkpoint<'static>, CheckpointError> {
         let whole = |head: Head<'static>, from: &mut dyn Read| {
-            let Head { job, source, criterion, state, params, display, settling, film, tiles } = head;
+            let Head { job, source, criterion, state, params, display, settling, film, tiles, watch } = head;
             let film = Film::read_pixels(film, from).map_err(ended)?;
             let film = film.ok_or_else(|| Fault::Damaged("there is no such film".into()))?;
             let (criterion, state, film) = (criterion.into_owned(), state.into_owned(), Cow::Owned(film));
-            Ok(Checkpoint { job, source, criterion, state, params, display, settling, film, tiles })
+            Ok(Checkpoint { job, source, criterion, state, params, display, settling, film, tiles, watch })
         };
         Ok(FORMAT.read_with_body(from, whole)?)
     }
@@ -151,6 +153,7 @@ impl Checkpoint<'_> {
             settling: self.settling,
             film: self.film.head(),
             tiles: Cow::Borrowed(&self.tiles),
+            watch: Cow::Borrowed(&self.watch),
         };
         Ok(FORMAT.write_with_body(&head, to, |to| self.film.write_pixels(to))?)
     }

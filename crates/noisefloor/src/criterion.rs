@@ -85,6 +85,10 @@ pub struct Verdict {
     pub threshold: Option<ExpectedThreshold>,
     /// Samples per pixel at which the criterion expects to be satisfied, if it can tell.
     pub expected_spp: Option<u64>,
+    /// Whether so few samples make up the noise of the tile that it is not known yet: nobody is satisfied
+    /// then, however undemanding. `converged` is false, and `expected_spp` where that changes at the latest,
+    /// or later.
+    pub doubted: bool,
     /// Whether the tile is unlike everything the criterion was made for: treat the verdict with care.
     pub unfamiliar: bool,
     /// What `probability` would be without the penalty for an unfamiliar tile; equal to it where there is no

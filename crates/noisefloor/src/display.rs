@@ -224,7 +224,8 @@ impl Display {
         let l = luminance(exposed).min(1e30);
         // eq. 4; without a white point eq. 3. Colours keep their ratios: L_d / L.
         let (burn, compress) = self.curve.terms();
-        let scale = (1.0 + burn * l) / (1.0 + compress * l);
+        // Finite: what a channel without light is multiplied by
+        let scale = ((1.0 + burn * l) / (1.0 + compress * l)).min(f32::MAX);
         exposed.map(|c| (c * scale).min(1.0))
     }
 
@@ -366,6 +367,9 @@ mod tests {
                     assert!((0.0..=1.0 + 1e-6).contains(&shown), "{curve:?}, {exposure}, {value}: {shown}");
                     assert!(value > 0.0 || shown == 0.0, "{curve:?}, {exposure}, {value}: {shown}");
                 }
+                // Red stays red
+                let red = Display { exposure, curve }.encode([1.0, 0.0, 0.0]);
+                assert_eq!((red[1], red[2]), (0.0, 0.0), "{curve:?}, {exposure}");
             }
         }
     }

@@ -12,13 +12,16 @@ use crate::session::{Session, SessionError};
 use crate::source::{Batch, ProgressiveSource, Repeats, Request, SourceError};
 use crate::watch::Fault;
 use serde::{Deserialize, Serialize};
+use std::fmt;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 use thiserror::Error;
 
 /// Why a run failed. All samples taken before are in the session's film.
-#[derive(Debug, Error)]
+///
+/// Its `Debug` is its text, so that a `main` that returns it prints what to do.
+#[derive(Error)]
 #[non_exhaustive]
 pub enum DriverError {
     /// The session could not be started, or its samples are wrong ([`Fault`]).
@@ -30,6 +33,18 @@ pub enum DriverError {
     /// The criterion does not fit.
     #[error(transparent)]
     Criterion(#[from] CriterionError),
+}
+
+impl fmt::Debug for DriverError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{self}")?;
+        let mut cause = std::error::Error::source(self);
+        while let Some(error) = cause {
+            write!(f, ": {error}")?;
+            cause = error.source();
+        }
+        Ok(())
+    }
 }
 
 impl From<SessionError> for DriverError {
@@ -44,7 +59,7 @@ impl From<SessionError> for DriverError {
 /// One point of a run's history.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TimelinePoint {
-    /// Seconds since the run began.
+    /// Seconds that the driver has run.
     pub seconds: f64,
     /// Samples so far, over all pixels.
     pub samples: u64,
@@ -77,7 +92,7 @@ pub struct Progress {
     pub eta_seconds: Option<f64>,
 }
 
-/// How the time of a run was spent.
+/// How the time of all runs of a driver was spent.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Clock {
     /// Seconds in the source, including its reference.
@@ -122,6 +137,8 @@ pub struct Driver<S, C = Box<dyn StoppingCriterion + Send>> {
     clock: Clock,
     /// Samples in the film before the run.
     samples_before: u64,
+    /// Seconds of the runs before.
+    seconds_before: f64,
 }
 
 impl<S: ProgressiveSource, C: StoppingCriterion> Driver<S, C> {
@@ -137,7 +154,16 @@ impl<S: ProgressiveSource, C: StoppingCriterion> Driver<S, C> {
         session.set_pixels(info.pixels);
         let cancel = Arc::new(AtomicBool::new(false));
         let (timeline, clock) = (Vec::new(), Clock::default());
-        Ok(Self { source, session, time_limit: None, cancel, timeline, clock, samples_before: 0 })
+        Ok(Self {
+            source,
+            session,
+            time_limit: None,
+            cancel,
+            timeline,
+            clock,
+            samples_before: 0,
+            seconds_before: 0.0,
+        })
     }
 
     /// Stops all tiles once a run has taken this long. A call to the source that is under way is finished
@@ -202,6 +228,7 @@ impl<S: ProgressiveSource, C: StoppingCriterion> Driver<S, C> {
     fn run_until_done(&mut self, on_event: &mut impl FnMut(&Session<C>, &Event)) -> Result<(), DriverError> {
         let start = Instant::now();
         self.samples_before = self.session.film().total_samples();
+        self.seconds_before = self.clock.total_seconds;
         if self.session.criterion().needs().reference {
             self.fetch_reference(on_event)?;
         }
@@ -229,14 +256,17 @@ impl<S: ProgressiveSource, C: StoppingCriterion> Driver<S, C> {
 
             // Judge when every tile has what it needs.
             let began = Instant::now();
-            if self.session.is_round_complete() {
-                stops.extend(self.session.judge()?);
-            }
+            let judged = if self.session.is_round_complete() { self.session.judge() } else { Ok(Vec::new()) };
             self.clock.criterion_seconds += began.elapsed().as_secs_f64();
-            self.clock.total_seconds = start.elapsed().as_secs_f64();
+            self.clock.total_seconds = self.seconds_before + start.elapsed().as_secs_f64();
+            // What is done is said, even if no verdict comes
+            let failed = judged.map(|judged| stops.extend(judged)).err();
             self.report(stops, on_event);
+            if let Some(error) = failed {
+                return Err(error.into());
+            }
         }
-        self.clock.total_seconds = start.elapsed().as_secs_f64();
+        self.clock.total_seconds = self.seconds_before + start.elapsed().as_secs_f64();
         Ok(())
     }
 
@@ -320,7 +350,8 @@ impl<S: ProgressiveSource, C: StoppingCriterion> Driver<S, C> {
             active_tiles: self.session.open_tiles(),
         };
         self.timeline.push(now);
-        let seconds_a_sample = now.seconds / (now.samples - self.samples_before).max(1) as f64;
+        let seconds_a_sample =
+            (now.seconds - self.seconds_before) / (now.samples - self.samples_before).max(1) as f64;
         let eta_seconds = self.session.expected_samples_to_go().map(|n| n as f64 * seconds_a_sample);
         let tiles = self.session.film().grid().len();
         on_event(&self.session, &Event::BatchDone(Progress { now, tiles, eta_seconds }));

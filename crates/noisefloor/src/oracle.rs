@@ -138,6 +138,7 @@ impl Oracle {
                 high: audience.samples(t.high),
             }),
             expected_spp,
+            doubted: trained.doubted,
             unfamiliar: trained.unfamiliar,
             probability_without_penalty: seen(trained.probability_without_penalty),
         })
@@ -158,6 +159,7 @@ impl Oracle {
                 // If only the noise changes, as noise does: σ ∝ 1/√n
                 self.crossing(|factor| curve.at(factor)).map(|f| (spp as f64 * f64::from(f)).ceil() as u64)
             },
+            doubted: false,
             unfamiliar: judgement.unfamiliar,
             probability_without_penalty: Some(judgement.probability_without_penalty),
         }
@@ -342,9 +344,10 @@ impl StoppingCriterion for Oracle {
                 let verdict = self.verdict(&raw, spp);
                 let spread = self.described[tile.index].as_ref().map_or(0.0, |seen| seen.spread);
                 let even = spread >= EVEN && f64::from(spread) * tile.pixels() as f64 >= CARRIERS;
-                let doubted = verdict.converged && spp < TRUSTED_SPP && !even;
+                let doubted = spp < TRUSTED_SPP && !even;
                 if doubted {
-                    Verdict { converged: false, expected_spp: Some(TRUSTED_SPP), ..verdict }
+                    let expected_spp = verdict.expected_spp.map(|need| need.max(TRUSTED_SPP));
+                    Verdict { converged: false, expected_spp, doubted, ..verdict }
                 } else {
                     verdict
                 }

@@ -57,7 +57,7 @@ impl Schedule {
 
     /// Samples per pixel at the first verdict: the first step that has `least`.
     fn first(self, least: u64) -> u64 {
-        least.div_ceil(self.step()).max(1) * self.step()
+        least.div_ceil(self.step()).max(1).saturating_mul(self.step())
     }
 
     /// Samples per pixel at the next verdict. `open` is the share of tiles that are open.
@@ -299,6 +299,7 @@ mod tests {
             [Schedule::Every { step: 10 }, Schedule::Spaced { step: 10 }, Schedule::Growing { step: 10 }]
         {
             assert_eq!([0, 10, 95, 100, 1001].map(|n| schedule.first(n)), [10, 10, 100, 100, 1010]);
+            assert_eq!(schedule.first(u64::MAX - 3), u64::MAX); // and not 4, which it is modulo 2⁶⁴
         }
     }
 

@@ -9,6 +9,7 @@ use crate::source::SourceIdentity;
 use crate::source::{PixelNoise, Reference, Request};
 use crate::tile::{Tile, TileError, TileGrid};
 use crate::watch::{Fault, Warning, Watch};
+use std::fmt;
 use thiserror::Error;
 
 mod settling;
@@ -19,7 +20,9 @@ pub(crate) use stop::{Goal, TileState};
 pub use stop::{Interruption, Stop, StopReason};
 
 /// Why a session failed.
-#[derive(Debug, Error, Clone, PartialEq)]
+///
+/// Its `Debug` is its text, so that a `main` that returns it prints what to do.
+#[derive(Error, Clone, PartialEq)]
 #[non_exhaustive]
 pub enum SessionError {
     /// A parameter out of range.
@@ -42,12 +45,26 @@ pub enum SessionError {
         /// Pixels of the image.
         expected: usize,
     },
+    /// A picture of another size than the image.
+    #[error("the picture has {got} pixels, the image {expected}")]
+    Image {
+        /// Pixels of the picture.
+        got: usize,
+        /// Pixels of the image.
+        expected: usize,
+    },
     /// A display for a session that has judged with another one.
     #[error("tiles were judged already with another display: set it before the first verdict")]
     Judged,
     /// Samples that cannot be what they are said to be.
     #[error(transparent)]
     Fault(#[from] Fault),
+}
+
+impl fmt::Debug for SessionError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{self}")
+    }
 }
 
 /// Film, criterion and limits, for a renderer that owns its main loop: it pushes batches, asks which tiles
@@ -64,6 +81,7 @@ pub enum SessionError {
 ///         session.push(request.tile.index, request.spp, &mean)?;
 ///     }
 ///     session.judge()?;
+///     session.new_warnings().iter().for_each(|warning| eprintln!("warning: {warning}"));
 /// }
 /// assert!(session.stops().all(|stop| stop.spp == 200));
 /// # Ok::<(), noisefloor::SessionError>(())
@@ -81,6 +99,8 @@ pub struct Session<C = Box<dyn StoppingCriterion + Send>> {
     tiles: Vec<TileState>,
     source: SourceIdentity,
     watch: Watch,
+    /// Warnings that were handed over.
+    told: usize,
 }
 
 impl<C: StoppingCriterion> Session<C> {
@@ -104,6 +124,7 @@ impl<C: StoppingCriterion> Session<C> {
         };
         Ok(Self {
             watch: Watch::new(grid),
+            told: 0,
             film,
             criterion,
             params,
@@ -168,10 +189,24 @@ impl<C: StoppingCriterion> Session<C> {
         self.watch.set_pixels(pixels);
     }
 
+    /// Whether neighbouring pixels have noise in common, as [`Session::set_pixels`] said.
+    pub fn pixels(&self) -> PixelNoise {
+        self.watch.pixels()
+    }
+
     /// What is likely to be wrong with the samples pushed so far: each kind once, in the order found. Complete
     /// after each [`Session::judge`]; see [`crate::watch`].
     pub fn warnings(&self) -> &[Warning] {
         self.watch.warnings()
+    }
+
+    /// The warnings that this has not returned yet: for a loop that prints them. A session that was resumed
+    /// returns all again.
+    pub fn new_warnings(&mut self) -> Vec<Warning> {
+        let warnings = self.watch.warnings();
+        let new = warnings[self.told.min(warnings.len())..].to_vec();
+        self.told = warnings.len();
+        new
     }
 
     /// Samples, over all pixels, of pixels of a batch that had negative luminance. A few are rounding, or lobes
@@ -219,8 +254,29 @@ impl<C: StoppingCriterion> Session<C> {
     pub fn push(&mut self, tile: usize, spp: u64, mean: &[Rgb]) -> Result<(), SessionError> {
         let place = self.film.check(tile, mean.len())?;
         self.watch.check_light(&self.film, place, spp, mean)?;
+        let shift = self.watch.compare(&self.film, place, spp, mean);
         self.film.add(tile, spp, mean)?;
-        self.watch.see(place, spp, mean);
+        self.watch.see(place, spp, mean, shift);
+        Ok(())
+    }
+
+    /// Adds the mean of `spp` new samples per pixel of the whole image, row-major, to every open tile.
+    ///
+    /// # Errors
+    /// [`SessionError::Image`] if its size is not the image's, and as of [`Session::push`]: tiles before the
+    /// one that is refused have the samples then.
+    pub fn push_image(&mut self, spp: u64, image: &[Rgb]) -> Result<(), SessionError> {
+        let grid = self.film.grid();
+        let expected = grid.width() * grid.height();
+        if image.len() != expected {
+            return Err(SessionError::Image { got: image.len(), expected });
+        }
+        for tile in grid.tiles() {
+            if self.is_open(tile.index) {
+                let mean: Vec<Rgb> = tile.rows(grid.width()).flat_map(|row| image[row].to_vec()).collect();
+                self.push(tile.index, spp, &mean)?;
+            }
+        }
         Ok(())
     }
 
@@ -251,7 +307,7 @@ impl<C: StoppingCriterion> Session<C> {
         }
         let before = (self.display, self.settling);
         let Some(moved) = self.settle_display() else { return Ok(Vec::new()) };
-        self.watch.look()?;
+        self.watch.look(&self.film)?;
         let (first, doubts) = (self.params.first_verdict(), self.watch.doubts());
         let (early, due_now): (Vec<Tile>, Vec<Tile>) = due.iter().partition(|t| {
             let (spp, for_verdict) = (self.film.spp(t.index), self.is_for_verdict(t));
@@ -302,6 +358,12 @@ impl<C: StoppingCriterion> Session<C> {
             }
         }
         Ok(stops)
+    }
+
+    /// Looks at the samples as before a verdict, without one.
+    #[cfg(test)]
+    pub(crate) fn look(&mut self) -> Result<(), SessionError> {
+        Ok(self.watch.look(&self.film)?)
     }
 
     /// Whether a tile has what its next verdict needs.
@@ -422,10 +484,12 @@ impl<C: StoppingCriterion> Session<C> {
         (samples >= max_spp).then(|| self.stop(index, StopReason::MaxSpp))
     }
 
-    /// Where a verdict like this expects the next ones to say "converged": for a less demanding audience sooner.
+    /// Where a verdict like this expects the next ones to say "converged": for a less demanding audience
+    /// sooner, but not where the noise itself is not known yet.
     fn expected(&self, verdict: &Verdict) -> Option<u64> {
         let audience = self.audience();
-        verdict.expected_spp.map(|need| if audience.slope < 1.0 { audience.samples(need) } else { need })
+        let sooner = audience.slope < 1.0 && !verdict.doubted;
+        verdict.expected_spp.map(|need| if sooner { audience.samples(need) } else { need })
     }
 
     /// The line from the thresholds of the training data to those wanted.

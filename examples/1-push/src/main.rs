@@ -20,9 +20,9 @@ fn main() -> Result<(), SessionError> {
         for stop in session.judge()? {
             println!("tile {:2}: {} at {} samples per pixel", stop.tile.index, stop.reason, stop.spp);
         }
+        // What is certainly wrong with samples is an error above; what is likely wrong is said here.
+        session.new_warnings().iter().for_each(|warning| println!("warning: {warning}"));
     }
-    // What is certainly wrong with samples is an error above; what is likely wrong is said here.
-    session.warnings().iter().for_each(|warning| println!("warning: {warning}"));
     let most = session.stops().map(|stop| stop.spp).max().unwrap_or(0);
     let mean = session.film().total_samples() as f64 / (WIDTH * HEIGHT) as f64;
     println!("{mean:.0} samples per pixel on average, where the worst tile needed {most}");

@@ -1,10 +1,12 @@
-//! Nothing is said of samples that are right.
+//! Nothing is said of samples that are right, and soon something of those that are wrong.
 
 use crate::kit::Synthetic;
+use noisefloor::watch::{Fault, MixUp, Warning};
 use noisefloor::{ProgressiveSource, Request, Tile};
 use noisefloor_image::{RenderLayers, StackSource, write_exr};
 use noisefloor_ptwne::{Filter, Ptwne, RenderOptions, Sampling, scenes};
 use noisefloor_testkit::check_silence;
+use noisefloor_tests::mistakes::{Mistake, Outcome, Samples, feed};
 
 /// Every scene that the renderer has, with its samplers and filters in turn.
 #[test]
@@ -39,4 +41,67 @@ fn stacks_on_disk_are_silent() {
     }
     check_silence(StackSource::open_batches(batches.path()).unwrap(), 400);
     check_silence(StackSource::open_running_means(means.path()).unwrap(), 400);
+}
+
+/// The built-in Cornell box has its lamp in view. Whatever is said is said before a tile stops.
+#[test]
+fn mistakes_in_a_picture_with_a_lamp_are_noticed_before_a_tile_stops() {
+    for (edge, seed) in [(64, 7), (64, 8), (64, 9), (128, 7)] {
+        let options = RenderOptions { sampling: Sampling::Independent, seed, ..RenderOptions::default() };
+        let scene = scenes::by_name("cornell-box").unwrap();
+        let samples = Samples::of(Ptwne::new(scene, edge, edge, options).unwrap(), 160);
+        for passes in [None, Some(16)] {
+            let fed = |mistake| feed(&samples, 64, mistake, passes);
+            let silent = |Outcome { warnings, fault, .. }: &Outcome| warnings.is_empty() && fault.is_none();
+            let right = fed(Mistake::None);
+            assert!(silent(&right), "{edge}, {passes:?}: {right:?}");
+
+            let running = fed(Mistake::RunningMeans);
+            let sure = matches!(running.fault, Some((..=64, Fault::Running { .. })));
+            assert!(sure, "{edge}, {passes:?}: {running:?}");
+            let again = fed(Mistake::OneSeed);
+            assert!(
+                matches!(again.fault, Some((..=32, Fault::Repeated { .. }))),
+                "{edge}, {passes:?}: {again:?}"
+            );
+            assert_eq!((running.first_stop, again.first_stop), (None, None));
+
+            for (mistake, correlation) in [(Mistake::GaussianFilter, 0.37), (Mistake::Blur, 0.67)] {
+                let filtered = fed(mistake);
+                let near = |c: f64| (c - correlation).abs() < 0.15;
+                let said = matches!(filtered.warnings[..], [(..=32, Warning::Neighbours(c))] if near(c));
+                assert!(
+                    said && filtered.first_stop.is_none_or(|stop| stop > 32),
+                    "{edge}, {passes:?}: {filtered:?}"
+                );
+            }
+        }
+        let sizes_vary = feed(&samples, 64, Mistake::Srgb, None);
+        assert!(matches!(sizes_vary.warnings[..], [(_, Warning::Encoded(_))]), "{edge}: {sizes_vary:?}");
+    }
+}
+
+/// Of four tiles of 64 pixels, and of 24 of 32.
+#[test]
+fn tiles_that_are_mixed_up_are_noticed() {
+    for (width, height, tile) in [(128, 128, 64), (192, 128, 32)] {
+        let scene = scenes::by_name("courtyard").unwrap();
+        let options = RenderOptions { sampling: Sampling::Independent, ..RenderOptions::default() };
+        let samples = Samples::of(Ptwne::new(scene, width, height, options).unwrap(), 64);
+        let fed = |mistake| feed(&samples, tile, mistake, None).warnings;
+        assert_eq!(fed(Mistake::None), []);
+        let mixed_up = |mistake, how: MixUp| {
+            let said = fed(mistake);
+            assert!(
+                matches!(said[..], [(_, Warning::MixedUp(found))] if found == how),
+                "{mistake:?}: {said:?}"
+            );
+        };
+        mixed_up(Mistake::Transposed, MixUp::Transposed);
+        mixed_up(Mistake::Neighbour, MixUp::Shifted);
+        if tile == 32 {
+            // The sky's upper edge is too plain to show it in four tiles
+            mixed_up(Mistake::RowsFlipped, MixUp::UpsideDown);
+        }
+    }
 }

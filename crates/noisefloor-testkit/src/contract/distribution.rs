@@ -27,8 +27,10 @@ pub(super) fn check_distribution(long: &[Round], short: &[Round], pixels: PixelN
     }
     let level = |batch: &Values| batch.iter().sum::<f64>() / batch.len() as f64;
     let strength = |batch: &Values| batch.iter().map(|d| d * d).sum::<f64>() / batch.len() as f64;
-    compare("mean", &batches.iter().map(level).collect::<Values>());
-    compare("noise", &batches.iter().map(strength).collect::<Values>());
+    let linear = "are values encoded for a screen, tone mapped, clamped, or sums instead of means";
+    compare("mean", linear, &batches.iter().map(level).collect::<Values>());
+    let counted = "has each batch as many samples as were asked for";
+    compare("noise", counted, &batches.iter().map(strength).collect::<Values>());
     if pixels == PixelNoise::Independent {
         check_ranks(&batches);
     }
@@ -70,12 +72,15 @@ fn deviations(batches: &[Means]) -> Vec<Values> {
 }
 
 /// Compares one number of each long batch with that of each batch in parts.
-fn compare(what: &str, numbers: &[f64]) {
+fn compare(what: &str, question: &str, numbers: &[f64]) {
     let (long, short) = numbers.split_at(LONG);
+    let mean = |numbers: &[f64]| numbers.iter().sum::<f64>() / numbers.len() as f64;
     assert!(
         welch(long, short) > FALSE_ALARM,
-        "the {what} of 32 samples depends on how requests are cut: {long:.3?} at once, {short:.3?} in four \
-         parts"
+        "the {what} of 32 samples depends on how requests are cut: {question}? It is {:.3} at once and {:.3} in four \
+         parts of 8, on average over {LONG} batches each, where the noise of 32 samples is 1",
+        mean(long),
+        mean(short),
     );
 }
 

@@ -19,7 +19,9 @@ use independence::check_independence;
 use noisefloor::{Counts, ProgressiveSource, Repeats, source::PixelNoise};
 use probe::{Round, Subject};
 use reference::check_reference;
-use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::cell::Cell;
+use std::panic::{self, AssertUnwindSafe, catch_unwind};
+use std::sync::Once;
 
 /// Rounds of 16 samples that are compared for independence.
 const ROUNDS: usize = 4;
@@ -115,10 +117,33 @@ pub fn check_source<S: ProgressiveSource>(make: impl Fn() -> S) {
     check_end(&subject, if playback { MOST_OF_A_PLAYBACK } else { MOST_OF_A_RENDERER });
 }
 
-/// What [`check_source`] finds wrong with a source, in place of a panic: for other languages. The words also go
+thread_local! {
+    /// Whether a panic of this thread is an answer, which is not reported.
+    static QUIET: Cell<bool> = const { Cell::new(false) };
+}
+
+/// Catches a panic that is reported nowhere. Panics of other threads, and later ones of this, are reported as
+/// before.
+fn quietly(work: impl FnOnce()) -> std::thread::Result<()> {
+    static HOOK: Once = Once::new();
+    HOOK.call_once(|| {
+        let report = panic::take_hook();
+        panic::set_hook(Box::new(move |info| {
+            if !QUIET.get() {
+                report(info);
+            }
+        }));
+    });
+    QUIET.set(true);
+    let outcome = catch_unwind(AssertUnwindSafe(work));
+    QUIET.set(false);
+    outcome
+}
+
+/// What [`check_source`] finds wrong with a source, in place of a panic: for other languages. Nothing goes
 /// where panics are reported.
 pub fn broken_promise<S: ProgressiveSource>(make: impl Fn() -> S) -> Option<String> {
-    let panic = catch_unwind(AssertUnwindSafe(|| check_source(make))).err()?;
+    let panic = quietly(|| check_source(make)).err()?;
     let text = panic.downcast_ref::<String>().cloned();
     let text = text.or_else(|| panic.downcast_ref::<&str>().map(|text| (*text).to_owned()));
     Some(text.unwrap_or_else(|| "the check failed without words".into()))

@@ -84,6 +84,118 @@ fn a_run_that_was_broken_off_goes_on_to_the_bit() {
     }
 }
 
+/// What may be wrong with a source.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Habit {
+    None,
+    /// Its first batch of each tile is noisier.
+    Learns,
+    /// It returns the mean of all samples so far.
+    Lies,
+    /// Each pixel shares samples with those beside it.
+    Filters,
+}
+
+struct Habitual(Habit);
+
+impl ProgressiveSource for Habitual {
+    fn info(&self) -> SourceInfo {
+        SourceInfo::new("habitual", 96, 48).with_repeats(Repeats::Samples)
+    }
+
+    fn sample(&mut self, requests: &[Request]) -> Result<Vec<Batch>, SourceError> {
+        let batch = |&Request { tile, first, spp, .. }: &Request| {
+            let from = if self.0 == Habit::Lies { 0 } else { first };
+            let noisy = if self.0 == Habit::Learns && first == 0 { 3.0 } else { 1.0 };
+            let pixel = |x: usize, y: usize| {
+                let sample = |n| noisefloor_testkit::Noise::keyed(&[(y * 128 + x) as u64, n]).uniform();
+                let mean = (from..first + spp).map(sample).sum::<f64>() / (first + spp - from) as f64;
+                0.3 + 0.5 * noisy * (mean - 0.5) + 0.003 * x as f64
+            };
+            let filtered = |i: usize| {
+                let (x, y) = (tile.x + i % tile.width, tile.y + i / tile.width);
+                match self.0 {
+                    Habit::Filters => (pixel(x, y) + pixel(x + 1, y) + pixel(x + 2, y)) / 3.0,
+                    _ => pixel(x, y),
+                }
+            };
+            Batch { tile, spp, mean: (0..tile.pixels()).map(|i| [filtered(i) as f32; 3]).collect() }
+        };
+        Ok(requests.iter().map(batch).collect())
+    }
+}
+
+/// Runs up to so many batches; what it says at the end, if that is wrong.
+fn run_for<C: StoppingCriterion>(driver: &mut Driver<Habitual, C>, batches: usize) -> Option<String> {
+    let (cancel, mut left) = (driver.cancel_flag(), batches);
+    let outcome = driver.run(|_, event| {
+        if matches!(event, Event::BatchDone(_)) {
+            left = left.saturating_sub(1);
+            cancel.store(left == 0, Ordering::Relaxed);
+        }
+    });
+    outcome.err().map(|error| error.to_string())
+}
+
+/// For every batch k, a checkpoint at k equals none: samples, stops, warnings and faults.
+fn a_checkpoint_equals_none<C: StoppingCriterion>(criterion: impl Fn() -> C, habit: Habit) -> Vec<String> {
+    let params = Params { tile: 16, max_spp: 96, ..Params::default() };
+    let new = || Driver::new(Habitual(habit), criterion(), params).unwrap();
+    let kept = |driver: &Driver<Habitual, C>| {
+        let mut bytes = Vec::new();
+        driver.session().checkpoint("job").unwrap().write(&mut bytes).unwrap();
+        bytes
+    };
+    let mut whole = new();
+    let outcome = run_for(&mut whole, usize::MAX);
+    let said: Vec<String> =
+        whole.session().warnings().iter().map(ToString::to_string).chain(outcome.clone()).collect();
+    for k in 1..whole.timeline().len() {
+        let mut first = new();
+        assert_eq!(run_for(&mut first, k), None);
+        let checkpoint = kept(&first);
+        let mut resumed = new().resume("job", Checkpoint::read(&checkpoint[..]).unwrap()).unwrap();
+        assert_eq!(run_for(&mut resumed, usize::MAX), outcome, "{habit:?}, batch {k}");
+        assert_eq!(resumed.session().warnings(), whole.session().warnings(), "{habit:?}, batch {k}");
+        assert!(kept(&resumed) == kept(&whole), "{habit:?}, batch {k}");
+    }
+    said
+}
+
+/// With halves and without, and whatever is said meanwhile.
+#[cfg(feature = "bundled-model")]
+#[test]
+fn at_every_batch_a_checkpoint_equals_none() {
+    let habits = [
+        (Habit::None, ""),
+        (Habit::Learns, "differ in noise"),
+        (Habit::Lies, "contain the samples of the ones before"),
+        (Habit::Filters, "neighbouring pixels"),
+    ];
+    for (habit, noticed) in habits {
+        a_checkpoint_equals_none(|| FixedSpp(96), habit);
+        let said = a_checkpoint_equals_none(Oracle::bundled, habit);
+        assert_eq!(said.is_empty(), habit == Habit::None, "{said:?}");
+        assert!(said.last().is_none_or(|text| text.contains(noticed)), "{said:?}");
+    }
+}
+
+/// A session that was told that pixels share samples need not be told again.
+#[test]
+fn shared_pixels_are_kept() {
+    use crate::source::PixelNoise;
+    let resumed = |kept: PixelNoise, now: PixelNoise| {
+        let [mut one, mut other] =
+            [0; 2].map(|_| crate::Session::new(96, 48, FixedSpp(40), params()).unwrap());
+        one.set_pixels(kept);
+        other.set_pixels(now);
+        other.resume("job", one.checkpoint("job").unwrap()).unwrap().pixels()
+    };
+    use PixelNoise::{Independent, Shared};
+    assert_eq!(resumed(Independent, Independent), Independent);
+    assert_eq!([resumed(Shared, Independent), resumed(Independent, Shared)], [Shared; 2]);
+}
+
 #[cfg(feature = "bundled-model")]
 #[test]
 fn an_oracle_takes_up_no_nonsense() {
@@ -207,6 +319,8 @@ fn what_does_not_hold_together_is_refused() {
         assert!(refused(&|c| c.settling = Some(Settling { samples, error })));
     }
     assert!(refused(&|c| c.state = vec![1, 2, 3]));
+    assert!(refused(&|c| c.watch = Cow::Owned(Watch::new(crate::TileGrid::new(96, 48, 32).unwrap()))));
+    assert!(refused(&|c| c.watch.to_mut().corrupt()));
     assert!(refused(&|c| c.film.to_mut().corrupt(0)));
     assert!(refused(&|c| c.film.to_mut().corrupt(1)));
     assert!(refused(&|c| c.film.to_mut().corrupt(2)));

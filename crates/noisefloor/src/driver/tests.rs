@@ -184,6 +184,56 @@ fn a_missing_reference_is_an_error_before_any_sample() {
 }
 
 /// The tiles of a picture too large for one call grow together, in calls that are full.
+/// A criterion that fails.
+struct Broken;
+
+impl StoppingCriterion for Broken {
+    fn name(&self) -> String {
+        "broken".into()
+    }
+
+    fn fingerprint(&self) -> String {
+        self.name()
+    }
+
+    fn judge(&mut self, _: &View<'_>, _: &[Tile]) -> Result<Vec<Verdict>, CriterionError> {
+        Err(CriterionError::NoReference(self.name()))
+    }
+}
+
+/// Tile 0 has no samples at all, and no verdict comes on the others.
+#[test]
+fn stops_are_told_even_if_a_verdict_fails() {
+    let nothing_in_tile_0 = |mut batches: Vec<Batch>| {
+        for batch in batches.iter_mut().filter(|batch| batch.tile.index == 0) {
+            (batch.spp, batch.mean) = (0, Vec::new());
+        }
+        batches
+    };
+    let source = Grey { lie: Some(nothing_in_tile_0), ..Grey::default() };
+    let mut driver = Driver::new(source, Broken, Params::default().with_tile(32)).unwrap();
+    let mut told = Vec::new();
+    let outcome = driver.run(|_, event| {
+        if let Event::TileStopped(stop) = event {
+            told.push((stop.tile.index, stop.reason));
+        }
+    });
+    assert!(matches!(outcome, Err(DriverError::Criterion(_))));
+    let (exhausted, failed) = (StopReason::SourceExhausted, StopReason::Failed);
+    assert_eq!(told, [(0, exhausted), (1, failed), (2, failed)]);
+}
+
+#[test]
+fn a_second_run_counts_on() {
+    let mut driver = driver(Grey::default(), 300);
+    driver.run(|_, _| ()).unwrap();
+    let first = driver.clock();
+    driver.run(|_, _| ()).unwrap();
+    let clock = driver.clock();
+    assert!(clock.total_seconds >= first.total_seconds);
+    assert!(clock.source_seconds + clock.criterion_seconds <= clock.total_seconds, "{clock:?}");
+}
+
 #[test]
 fn large_pictures_take_turns() {
     let grid = crate::TileGrid::new(7680, 4320, 512).unwrap();

@@ -173,6 +173,27 @@ fn another_audience_sees_the_noise_of_fewer_samples() {
     assert_eq!(Audience { slope: 0.0, offset: 101.0 }.seen_as(100.0), 0.0);
 }
 
+/// Nothing is known yet of a tile in which no sample has shown noise, whoever asks.
+#[cfg(feature = "bundled-model")]
+#[test]
+fn what_is_not_known_yet_satisfies_nobody() {
+    for slope in [1.0, 0.25, 0.01] {
+        let audience = Audience { slope, offset: 0.0 };
+        let params = crate::Params::default().with_tile(32).with_audience(audience);
+        let mut session = crate::Session::new(64, 32, Oracle::bundled(), params).unwrap();
+        while !session.is_done() {
+            for request in session.requests() {
+                session.push(request.tile.index, request.spp, &[[0.3; 3]; 32 * 32]).unwrap();
+            }
+            session.judge().unwrap();
+            if let Some(verdict) = session.verdict(0).filter(|_| session.is_open(0)) {
+                assert!(verdict.doubted && verdict.expected_spp == Some(TRUSTED_SPP), "{slope}: {verdict:?}");
+            }
+        }
+        assert!(session.stops().all(|stop| stop.spp == 104), "{slope}: {:?}", session.stops().next());
+    }
+}
+
 /// A film of two tiles, the second much noisier, with `samples` samples.
 fn two_tiles(samples: u64) -> Film {
     let mut film = Film::new(TileGrid::new(128, 64, 64).unwrap());

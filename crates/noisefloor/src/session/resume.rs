@@ -24,6 +24,7 @@ impl<C: StoppingCriterion> Session<C> {
             settling: self.settling,
             film: Cow::Borrowed(&self.film),
             tiles: Cow::Borrowed(&self.tiles),
+            watch: Cow::Borrowed(&self.watch),
         })
     }
 
@@ -31,7 +32,8 @@ impl<C: StoppingCriterion> Session<C> {
     /// are open again; those that have converged, or have as many samples as are allowed, are not.
     ///
     /// If the same samples are pushed, everything that follows equals the session that was not interrupted,
-    /// to the bit.
+    /// to the bit: its [warnings](Session::warnings) and faults, too. Pixels share samples if either session
+    /// was told so ([`Session::set_pixels`]).
     ///
     /// # Errors
     /// [`CheckpointError`] if job, source, criterion (its [fingerprint](crate::StoppingCriterion::fingerprint):
@@ -41,6 +43,9 @@ impl<C: StoppingCriterion> Session<C> {
         checkpoint.check(job, &self.source, &self.criterion.fingerprint(), &self.params, &self.film)?;
         if !self.criterion.restore(self.film.grid(), &checkpoint.state) {
             return Err(CheckpointError::Invalid("the state of its criterion is not valid"));
+        }
+        if !self.watch.restore(checkpoint.watch.into_owned()) {
+            return Err(CheckpointError::Invalid("what it says of the samples is not of its picture"));
         }
         let mut tiles = checkpoint.tiles.into_owned();
         for state in &mut tiles {

@@ -115,6 +115,82 @@ fn a_less_demanding_audience_gets_less() {
     assert_eq!(run(&mut s).map_samples(), [150, 300, 450]);
 }
 
+/// Satisfied at once, but fails at one call.
+struct Moody {
+    fails_at: u32,
+    calls: u32,
+}
+
+impl StoppingCriterion for Moody {
+    fn name(&self) -> String {
+        "moody".into()
+    }
+
+    fn fingerprint(&self) -> String {
+        self.name()
+    }
+
+    fn judge(&mut self, view: &View<'_>, tiles: &[Tile]) -> Result<Vec<Verdict>, CriterionError> {
+        self.calls += 1;
+        if self.calls == self.fails_at {
+            return Err(CriterionError::NoReference(self.name()));
+        }
+        Ok(tiles.iter().map(|tile| Verdict::new(tile.index == 0 || view.film.spp(0) > 200)).collect())
+    }
+}
+
+/// Tile 0 waits for what a demanding audience wants, and has it when the verdict on the others fails.
+#[test]
+fn a_stop_is_filed_only_if_it_is_returned() {
+    let audience = Audience { slope: 1.1, offset: 0.0 };
+    let params = Params { tile: 32, audience, ..steps_of_10() };
+    let mut s = Session::new(70, 32, Moody { fails_at: 2, calls: 0 }, params).unwrap();
+    let push = |s: &mut Session<Moody>| {
+        for r in s.requests() {
+            s.push(r.tile.index, r.spp, &vec![[0.3; 3]; r.tile.pixels()]).unwrap();
+        }
+        s.judge()
+    };
+    assert_eq!(push(&mut s), Ok(Vec::new()));
+    assert!(matches!(push(&mut s), Err(SessionError::Criterion(_))));
+    assert_eq!(s.stops().count(), 0);
+    assert_eq!(s.judge().unwrap().len(), 1);
+}
+
+#[test]
+fn whole_images_are_pushed_to_open_tiles() {
+    let mut s = session(100, true, steps_of_10());
+    let image: Vec<Rgb> = (0..70 * 32).map(|i| [0.1 + i as f32 / 1e4; 3]).collect();
+    s.push_image(50, &image).unwrap();
+    s.push_image(50, &image).unwrap();
+    assert_eq!(s.film().image(), image);
+    assert_eq!(s.judge().unwrap().len(), 1);
+    s.push_image(50, &image).unwrap();
+    assert_eq!([0, 1, 2].map(|tile| s.film().spp(tile)), [100, 150, 150]);
+    let wrong = s.push_image(50, &image[1..]);
+    assert_eq!(wrong, Err(SessionError::Image { got: 70 * 32 - 1, expected: 70 * 32 }));
+}
+
+/// What a `main` that returns a `Result` prints.
+#[test]
+fn errors_are_debugged_as_what_to_do() {
+    let error = SessionError::Fault(Fault::Running { correlation: 0.5 });
+    assert!(format!("{error:?}").contains("push means of new samples only"), "{error:?}");
+    let error = crate::DriverError::from(error);
+    assert!(format!("{error:?}").contains("push means of new samples only"), "{error:?}");
+}
+
+#[test]
+fn warnings_are_handed_over_once() {
+    let mut s = session(1000, true, steps_of_10());
+    for _ in 0..2 {
+        s.push_image(50, &[[0.3; 3]; 70 * 32]).unwrap();
+    }
+    s.judge().unwrap();
+    assert_eq!(s.new_warnings(), [Warning::Constant(0.3)]);
+    assert_eq!((s.new_warnings(), s.warnings().len()), (Vec::new(), 1));
+}
+
 #[test]
 fn nothing_is_judged_before_every_tile_has_samples() {
     let mut s = session(100, true, steps_of_10());

@@ -1,8 +1,10 @@
 //! Four successive batches of a tile against each other.
 
 use super::correlation::{Concordance, Correlation, Sums};
+use super::points::level;
 use super::values::Ends;
 use crate::rgb::Rgb;
+use serde::{Deserialize, Serialize};
 
 /// Values that differ by less, relative to their size, are the same but for rounding.
 const ROUNDING: f32 = 1.0 / (1 << 18) as f32;
@@ -12,20 +14,22 @@ const ROUGH: f32 = 1e-3;
 const LEAST_ROUGH: usize = 4;
 /// Sizes of batches that may differ by this factor at most to be compared.
 const ALIKE: u64 = 2;
-/// Watched pixels whose energies are one term.
-const BLOCK: usize = 16;
+/// Factor by which the sizes of two pairs of batches may differ whose noise is compared. If few fireflies
+/// make all noise, the larger pair has k times as many of them, and the smaller one by chance none: that is z
+/// = √N if the other has N, and p = exp(−N/k). At z = 6.5 that is 7·10⁻⁷ for k = 3.
+const NEAR: f64 = 3.0;
 /// Samples a pixel from which a value of exactly 1 is no sample of a light.
 const MANY: u64 = 8;
 
 /// A batch at the watched pixels: the luminance of each, between that of its neighbours.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 struct Seen {
     spp: u64,
     light: Vec<[f32; 3]>,
 }
 
 /// What is kept of one tile.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub(super) struct TileWatch {
     /// Batches so far.
     pub(super) batches: u64,
@@ -41,6 +45,13 @@ pub(super) struct TileWatch {
 }
 
 impl TileWatch {
+    /// Whether what was read can be what was written of a tile, which has so many watched pixels at first and
+    /// later.
+    pub(super) fn fits(&self, at_first: usize, later: usize) -> bool {
+        let points = if self.batches <= 4 { at_first } else { later };
+        self.group.len() < 4 && self.group.iter().all(|seen| seen.spp > 0 && seen.light.len() == points)
+    }
+
     pub(super) fn see(&mut self, spp: u64, light: Vec<[f32; 3]>) {
         if !self.group.is_empty() && is_rough(&light) {
             self.noisy = true;
@@ -94,26 +105,44 @@ fn is_same_value((a, b): (&f32, &f32)) -> bool {
     a.to_bits() == b.to_bits() || (a - b).abs() <= ROUNDING * a.abs().max(b.abs())
 }
 
+/// What differences at each watched pixel are multiplied by, 1/(t + m): m is the mean of these batches there,
+/// and t that of a typical pixel. It is how much v/(t + v), as screens show light, changes with v, but for a
+/// factor. Without it, the dozen pixels at the edge of a lamp outweigh the picture.
+///
+/// All samples count alike in m. Which of them lie in which batch is chance if they are independent, whatever
+/// m is, so that differences have the mean 0 with their weights as well.
+fn weights(batches: &[&Seen], place: usize) -> Vec<f64> {
+    let all: f64 = batches.iter().map(|seen| seen.spp as f64).sum();
+    let mean = |i: usize| -> f64 {
+        batches.iter().map(|seen| f64::from(seen.light[i][place]) * (seen.spp as f64 / all)).sum()
+    };
+    let means: Vec<f64> = (0..batches[0].light.len()).map(|i| mean(i).abs()).collect();
+    let typical = level(&means);
+    means.into_iter().map(|mean| finite(1.0 / (typical + mean))).collect()
+}
+
 /// Two batches, one for each half.
 fn pair(a: &Seen, b: &Seen, shared: bool) -> Sums {
     let mut sums = Sums::default();
     if a.spp != b.spp {
         return sums;
     }
-    let difference = |place: usize| {
-        a.light.iter().zip(&b.light).map(move |(a, b)| finite(f64::from(a[place]) - f64::from(b[place])))
+    let difference = |place: usize| -> Vec<f64> {
+        let batches = a.light.iter().zip(&b.light).zip(weights(&[a, b], place));
+        batches.map(|((a, b), w)| finite((f64::from(a[place]) - f64::from(b[place])) * w)).collect()
     };
-    sums.neighbours = Correlation::of(difference(1).zip(difference(0)));
-    for row in difference(1).collect::<Vec<_>>().chunks(4) {
+    let (here, left) = (difference(1), difference(0));
+    sums.neighbours = Correlation::of(here.iter().copied().zip(left));
+    for row in here.chunks(4) {
         sums.rows[0] += row.iter().sum::<f64>().powi(2);
         sums.rows[1] += energy(row);
     }
     if !shared {
-        let falls = a.light.iter().zip(&b.light).map(|(a, b)| {
+        let falls = a.light.iter().zip(&b.light).zip(weights(&[a, b], 1)).map(|((a, b), w)| {
             let [left, here, right] = std::array::from_fn(|place| f64::from(a[place]) + f64::from(b[place]));
-            finite(here - (left + right) / 2.0)
+            finite((here - (left + right) / 2.0) * w)
         });
-        let pairs: Vec<(f64, f64)> = difference(1).zip(falls).collect();
+        let pairs: Vec<(f64, f64)> = here.into_iter().zip(falls).collect();
         sums.early_energies =
             [pairs.iter().map(|(x, y)| x * y).sum(), pairs.iter().map(|(x, _)| x * x).sum()];
         // Where the neighbours differ by much more than noise, it is the picture that says which is larger
@@ -128,15 +157,18 @@ fn pair(a: &Seen, b: &Seen, shared: bool) -> Sums {
 
 /// A whole group.
 fn four([a, b, c, d]: [&Seen; 4], shared: bool, sums: &mut Sums) {
+    let weights = weights(&[a, b, c, d], 1);
     let combined = |of: [f64; 4]| -> Vec<f64> {
-        let at =
-            |i: usize| [a, b, c, d].iter().zip(of).map(|(seen, of)| f64::from(seen.light[i][1]) * of).sum();
-        (0..a.light.len()).map(|i| finite(at(i))).collect()
+        let at = |i: usize| -> f64 {
+            [a, b, c, d].iter().zip(of).map(|(seen, of)| f64::from(seen.light[i][1]) * of).sum()
+        };
+        weights.iter().enumerate().map(|(i, w)| finite(at(i) * w)).collect()
     };
     let alike = |one: &Seen, other: &Seen| {
         one.spp <= other.spp.saturating_mul(ALIKE) && other.spp <= one.spp.saturating_mul(ALIKE)
     };
     let pairs = |x: Vec<f64>, y: Vec<f64>| x.into_iter().zip(y);
+    let (ab, cd) = (combined([1.0, -1.0, 0.0, 0.0]), combined([0.0, 0.0, 1.0, -1.0]));
     if alike(a, c) && alike(b, d) {
         let (ac, bd) = (combined([1.0, 0.0, -1.0, 0.0]), combined([0.0, 1.0, 0.0, -1.0]));
         let picture = combined([1.0; 4]);
@@ -144,18 +176,19 @@ fn four([a, b, c, d]: [&Seen; 4], shared: bool, sums: &mut Sums) {
         sums.apart = Concordance::of(apart, shared);
         sums.batches = Concordance::of(pairs(ac, bd), shared);
     }
-    if a.spp != b.spp {
-        return;
-    }
-    let ab = combined([1.0, -1.0, 0.0, 0.0]);
-    if alike(b, c) {
+    if a.spp == b.spp && alike(b, c) {
         sums.nested = Correlation::of(ab.iter().copied().zip(combined([1.0, 1.0, -2.0, 0.0])));
     }
-    if c.spp == d.spp && alike(a, c) {
-        let energies = if a.spp == c.spp { &mut sums.steps } else { &mut sums.counts };
-        for (ab, cd) in ab.chunks(BLOCK).zip(combined([0.0, 0.0, 1.0, -1.0]).chunks(BLOCK)) {
-            energies.see(a.spp as f64 * energy(ab), c.spp as f64 * energy(cd));
-        }
+    // Noise of n samples against that of m has 1/n + 1/m of the energy that one sample has
+    let size = |one: &Seen, other: &Seen| 1.0 / (1.0 / one.spp as f64 + 1.0 / other.spp as f64);
+    let (first, last) = (size(a, b), size(c, d));
+    let energies = ab.iter().map(|ab| ab * ab).zip(cd.iter().map(|cd| cd * cd));
+    if first == last && a.spp == b.spp {
+        energies.for_each(|(ab, cd)| sums.steps.see(ab, cd));
+    } else if first < last && last <= NEAR * first {
+        energies.for_each(|(ab, cd)| sums.counts.see(first * ab, last * cd));
+    } else if last < first && first <= NEAR * last {
+        energies.for_each(|(ab, cd)| sums.counts.see(last * cd, first * ab));
     }
 }
 
@@ -174,4 +207,12 @@ fn without_gain(differences: &[f64], picture: &[f64]) -> Vec<f64> {
 /// Nothing in place of what is not finite.
 fn finite(x: f64) -> f64 {
     if x.is_finite() { x } else { 0.0 }
+}
+
+#[cfg(test)]
+impl TileWatch {
+    /// A batch without watched pixels.
+    pub(super) fn corrupt(&mut self) {
+        self.group.push(Seen { spp: 1, light: Vec::new() });
+    }
 }

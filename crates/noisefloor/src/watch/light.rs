@@ -2,6 +2,7 @@
 
 use crate::display::luminance;
 use crate::rgb::Rgb;
+use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 /// Share of a tile's pixels that may be non-finite. The film keeps single ones out, and the report counts
@@ -45,7 +46,7 @@ pub enum ImpossibleLight {
 ///
 /// Single channels may be negative: colours outside Rec.709 are. Luminance is not, but for rounding, whose
 /// scale is that of the brightest pixel seen.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub struct LightCheck {
     brightest: f64,
 }

@@ -1,15 +1,17 @@
 //! Notices when a session is fed wrongly: running means in place of new samples, one seed for every batch,
-//! pictures that were encoded for a screen, light that cannot be.
+//! pictures that were encoded for a screen, tiles that were mixed up, light that cannot be.
 //!
-//! A [`Session`](crate::Session) watches every push. What is certain is a [`Fault`], an error of the push or of
-//! the next verdicts, so that no tile says "converged" on the strength of it. What is likely is a [`Warning`],
-//! once, with the number it rests on ([`Session::warnings`](crate::Session::warnings)). Samples and verdicts
-//! of a session that gives no fault are those of one that does not watch, to the bit.
+//! A [`Session`](crate::Session) watches every push. What is certain is a [`Fault`], an error of the push or
+//! of the next verdicts, so that no tile says "converged" on the strength of it. What is likely is a
+//! [`Warning`], once, with the number it rests on ([`Session::warnings`](crate::Session::warnings)). Samples
+//! and verdicts of a session that gives no fault are those of one that does not watch, to the bit.
 //!
 //! # What is watched
-//! One pixel in each square of 8×8 pixels and its two neighbours, in small pictures one in 4×4, and four times as
-//! many in the first four batches: what is farther apart than a pixel filter reaches counts as independent. Four successive batches a, b, c, d of a tile make a
-//! *group*.
+//! One pixel in each square of 8×8 pixels and its two neighbours, in small pictures one in 4×4, and four
+//! times as many in the first four batches: what is farther apart than a pixel filter reaches counts as
+//! independent. Four successive batches a, b, c, d of a tile make a *group*. Their differences are weighted
+//! by how bright a pixel is, much as a screen shows them: else a dozen pixels at the edge of a lamp would
+//! decide.
 //!
 //! | watched | from | says |
 //! |---|---|---|
@@ -18,8 +20,10 @@
 //! | the same, while (c − d)² is smaller than (a − b)² | a group | [`Fault::Running`] |
 //! | the same, but only with what all pixels of a tile have in common | a group | [`Warning::Changing`] |
 //! | correlation of a − b with a + b − 2c: is a noisier than b? | a group | [`Warning::Noise`] |
-//! | the same with the neighbours in place of c, until there is a group | two batches | [`Warning::Noise`], and no tile stops before there is one |
-//! | (a − b)²·n against (c − d)²·m | a group | [`Warning::Counts`] |
+//! | the same with the neighbours in place of c | two batches | [`Warning::Noise`], and no tile stops before a group says that it is no running mean |
+//! | energy of a − b against that of c − d, of the larger batches relative to their numbers of samples | a group | [`Warning::Counts`] |
+//! | all pixels of a batch against the picture before, made of smaller batches: is it brighter? | a batch | [`Warning::Encoded`] |
+//! | steps across the borders of tiles, beside those if tiles lay otherwise | a batch of each tile | [`Warning::MixedUp`] |
 //! | correlation of a − b with itself one pixel beside | two batches | [`Warning::Neighbours`] |
 //! | values that are k/255, or the sRGB decoding of one, and have noise | two batches | [`Fault::Quantised`] |
 //! | noise that ends at exactly 1 | two batches | [`Warning::Clipped`] |
@@ -28,29 +32,34 @@
 //!
 //! # How often chance alone says so
 //! If samples are independent and a and c have equal sizes, exchanging a pixel's a and c leaves everything
-//! as likely and changes the sign of its term t = ±√|(a − c)(b − d)|. Given all |t| the signs are fair coins, and
-//! z = Σt/√Σt² exceeds 6.5 with p < exp(−6.5²/2) = 7·10⁻¹⁰, however the noise is distributed (Hoeffding
-//! 1963); the root keeps a few fireflies from hiding the rest. So it is for the other correlations. Sums are looked at once before each round of verdicts, over all
-//! groups so far and over the new ones alone: in 10,000 rounds, and with three correlations of two signs, by
-//! chance with p < 10⁻⁴. Three things are not exact and were measured instead (`tests/tests/it/watch.rs`): sizes
-//! may differ by a factor of 2. The z of batches has to be as large, and of the same sign, without what the noise
-//! of a tile has in common with its picture, since a Markov chain's brightness wanders as a whole. And z is
-//! divided by √R, where R is how much more energy the noise of four watched pixels in a row has in sum than
-//! in each. A source that says that its pixels share samples
+//! as likely and changes the sign of its term t = ±√|(a − c)(b − d)|. Given all |t| the signs are fair coins,
+//! and z = Σt/√Σt² exceeds 6.5 with p < exp(−6.5²/2) = 7·10⁻¹⁰, however the noise is distributed (Hoeffding
+//! 1963); the root keeps a few fireflies from hiding the rest. Weights change nothing about it: they depend
+//! on the mean of all four. So it is for the other correlations. Sums are looked at once before each round of
+//! verdicts, over all groups so far and over the new ones alone: in 10,000 rounds, and with three
+//! correlations of two signs, by chance with p < 10⁻⁴. Three things are not exact and were measured instead
+//! (`tests/tests/it/watch.rs`): sizes may differ by a factor of 2. The z of batches has to be as large, and
+//! of the same sign, without what the noise of a tile has in common with its picture, since a Markov chain's
+//! brightness wanders as a whole. And z is divided by √R, where R is how much more energy the noise of four
+//! watched pixels in a row has in sum than in each. A source that says that its pixels share samples
 //! ([`PixelNoise::Shared`](crate::source::PixelNoise)) gives one term a tile. Certain is only what has, in
 //! addition, a correlation Σt/Σ|t| of at least a fifth; running means have 0.4 and more.
 //!
 //! # What is not noticed
-//! Faults in fewer than four batches of a tile, but for repeated ones. Pictures encoded for a screen in floating
-//! point whose noise does not reach white: equal batches of them are as independent as any. Counts that are all
-//! wrong by one factor.
+//! Faults in fewer than four batches of a tile, but for repeated ones. Pictures encoded for a screen in
+//! floating point, or sums, in batches of one size whose noise does not reach white: equal batches of them
+//! are as independent as any. Counts that are all wrong by one factor. Tiles that were mixed up where the
+//! picture hardly varies along their borders, and a whole picture that is upside down.
 
+mod borders;
 mod correlation;
 mod group;
 mod light;
 mod points;
+mod shift;
 mod values;
 
+pub use borders::MixUp;
 pub use light::{ImpossibleLight, LightCheck};
 
 use crate::film::Film;
@@ -61,6 +70,8 @@ use correlation::Sums;
 use group::TileWatch;
 use points::Points;
 use serde::{Deserialize, Serialize};
+use shift::Shift;
+use std::fmt;
 use thiserror::Error;
 use values::Values;
 
@@ -78,7 +89,9 @@ const LEAST_VALUES: u64 = 64;
 const DENSE: u64 = 4;
 
 /// A fault of what a session was fed with that leaves no doubt. Nothing can be judged by such samples.
-#[derive(Clone, Copy, Debug, Error, PartialEq)]
+///
+/// Its `Debug` is its text, so that a `main` that returns it prints what to do.
+#[derive(Clone, Copy, Error, PartialEq)]
 #[non_exhaustive]
 pub enum Fault {
     /// Light that cannot be. The batch was refused.
@@ -128,6 +141,12 @@ pub enum Fault {
     },
 }
 
+impl fmt::Debug for Fault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{self}")
+    }
+}
+
 /// How 8-bit numbers were turned into radiance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Encoding {
@@ -137,8 +156,8 @@ pub enum Encoding {
     Srgb,
 }
 
-impl std::fmt::Display for Encoding {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+impl fmt::Display for Encoding {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Self::Linear => "numbers",
             Self::Srgb => "sRGB-decoded numbers",
@@ -147,7 +166,7 @@ impl std::fmt::Display for Encoding {
 }
 
 /// A likely fault of what a session was fed with. Its text has the number that it rests on.
-#[derive(Clone, Copy, Debug, PartialEq, Error)]
+#[derive(Clone, Copy, Debug, PartialEq, Error, Serialize, Deserialize)]
 #[non_exhaustive]
 pub enum Warning {
     /// Neighbouring pixels share samples.
@@ -181,10 +200,19 @@ pub enum Warning {
     Noise(f64),
     /// Noise does not fall with the number of samples.
     #[error(
-        "the noise of batches does not follow their numbers of samples: times the number, its energy differs by a \
-         factor of {0:.2}; push with each batch the number of samples it really has"
+        "batches that are said to have more samples have {0:.2} times the noise energy that their numbers say: push \
+         with each batch the number of its own samples, and not of all so far"
     )]
     Counts(f64),
+    /// The brightness depends on the number of samples.
+    #[error(
+        "batches of more samples are brighter, by {0:.2} %, and means of linear radiance are not: are the values \
+         encoded for a screen, tone mapped or clamped, or sums instead of means?"
+    )]
+    Encoded(f64),
+    /// The tiles do not fit together.
+    #[error("the borders between tiles do not fit; they would if the tiles were {0}")]
+    MixedUp(MixUp),
     /// Noise is cut off at white.
     #[error(
         "no value is above 1, and the noise of {0:.0} % of the noisy pixels ends there: push linear radiance, not \
@@ -197,10 +225,9 @@ pub enum Warning {
 }
 
 /// Watches what one session gets.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub(crate) struct Watch {
     grid: TileGrid,
-    points: Points,
     /// Pixels share samples, as their source says.
     shared: bool,
     tiles: Vec<TileWatch>,
@@ -208,6 +235,8 @@ pub(crate) struct Watch {
     values: Values,
     /// Of all groups, and of those since the last look.
     sums: [Sums; 2],
+    /// Samples from which it is worth to look at the borders of tiles again.
+    borders_at: u64,
     warnings: Vec<Warning>,
 }
 
@@ -215,12 +244,12 @@ impl Watch {
     pub(crate) fn new(grid: TileGrid) -> Self {
         Self {
             grid,
-            points: Points::new(grid),
             shared: false,
             tiles: vec![TileWatch::default(); grid.len()],
             light: LightCheck::default(),
             values: Values::default(),
             sums: [Sums::default(); 2],
+            borders_at: 0,
             warnings: Vec::new(),
         }
     }
@@ -229,8 +258,32 @@ impl Watch {
         self.shared = pixels == PixelNoise::Shared;
     }
 
+    pub(crate) fn pixels(&self) -> PixelNoise {
+        if self.shared { PixelNoise::Shared } else { PixelNoise::Independent }
+    }
+
     pub(crate) fn warnings(&self) -> &[Warning] {
         &self.warnings
+    }
+
+    /// Goes on with what a checkpoint holds, which has to be of a picture like this one; false if it is not.
+    /// Pixels share samples if either says so.
+    pub(crate) fn restore(&mut self, kept: Self) -> bool {
+        let points = self.points();
+        let fits = |(tile, watch): (Tile, &TileWatch)| {
+            watch.fits(points.at_first(tile).count(), points.of(tile).count())
+        };
+        let fits = kept.grid == self.grid
+            && kept.tiles.len() == self.grid.len()
+            && self.grid.tiles().zip(&kept.tiles).all(fits);
+        if fits {
+            *self = Self { shared: self.shared || kept.shared, ..kept };
+        }
+        fits
+    }
+
+    fn points(&self) -> Points {
+        Points::new(self.grid)
     }
 
     /// Whether a batch that fits its tile can be light at all, together with what the film has.
@@ -242,7 +295,7 @@ impl Watch {
         mean: &[Rgb],
     ) -> Result<(), Fault> {
         // The watched pixels first, and all only if those look wrong
-        let Err(seen) = self.light.check_all(self.points.of(tile).map(|pixel| mean[pixel])) else {
+        let Err(seen) = self.light.check_all(self.points().of(tile).map(|pixel| mean[pixel])) else {
             return Ok(());
         };
         let checked = if matches!(seen, ImpossibleLight::NotFinite { .. }) {
@@ -259,8 +312,19 @@ impl Watch {
         checked.map_err(|light| Fault::Light { tile: tile.index, light })
     }
 
-    /// Takes notice of a batch that was added.
-    pub(crate) fn see(&mut self, tile: Tile, spp: u64, mean: &[Rgb]) {
+    /// What a batch says beside the picture that it is going to be added to.
+    pub(crate) fn compare(&self, film: &Film, tile: Tile, spp: u64, mean: &[Rgb]) -> Option<Shift> {
+        if self.shared {
+            return None;
+        }
+        Shift::of(film, tile, self.tiles[tile.index].batches, spp, mean)
+    }
+
+    /// Takes notice of a batch that was added, and of what it said before.
+    pub(crate) fn see(&mut self, tile: Tile, spp: u64, mean: &[Rgb], shift: Option<Shift>) {
+        let points = self.points();
+        let shift = shift.unwrap_or_default();
+        self.sums.iter_mut().for_each(|sums| sums.shift.add(&shift));
         let watch = &mut self.tiles[tile.index];
         let batch = watch.batches;
         watch.batches += 1;
@@ -270,12 +334,12 @@ impl Watch {
         }
         let light = |pixel| points::light(mean, pixel);
         if group == 0 {
-            let values: Vec<Rgb> = self.points.of(tile).map(|pixel| mean[pixel]).collect();
+            let values: Vec<Rgb> = points.of(tile).map(|pixel| mean[pixel]).collect();
             values.iter().for_each(|&value| self.values.see(value));
             watch.see_values(values);
-            watch.see(spp, self.points.at_first(tile).map(light).collect());
+            watch.see(spp, points.at_first(tile).map(light).collect());
         } else {
-            watch.see(spp, self.points.of(tile).map(light).collect());
+            watch.see(spp, points.of(tile).map(light).collect());
         }
         if let Some(found) = watch.compare(self.shared) {
             self.sums.iter_mut().for_each(|sums| sums.add(&found));
@@ -283,7 +347,7 @@ impl Watch {
     }
 
     /// Looks at all that was seen, before a verdict.
-    pub(crate) fn look(&mut self) -> Result<(), Fault> {
+    pub(crate) fn look(&mut self, film: &Film) -> Result<(), Fault> {
         self.check_repeats()?;
         // A picture without noise may be of 8-bit numbers: an unlit texture is. Noise of them is an 8-bit
         // picture's
@@ -296,6 +360,12 @@ impl Watch {
         }
         let found = self.sums.iter().flat_map(|sums| sums.warnings(self.shared));
         let found = found.chain(self.sums[0].doubt().map(Warning::Noise));
+        let samples = film.total_samples();
+        let mixed_up = if samples >= self.borders_at { borders::mix_up(film) } else { None };
+        if samples >= self.borders_at {
+            self.borders_at = samples + samples / 2;
+        }
+        let found = found.chain(mixed_up.map(Warning::MixedUp));
         let found: Vec<Warning> =
             found.chain(self.sums[0].clipped(&self.values)).chain(self.values.constant()).collect();
         for warning in found {
@@ -308,7 +378,8 @@ impl Watch {
         Ok(())
     }
 
-    /// Whether the first two batches look like running means, which four will show: nothing may stop till then.
+    /// Whether the first two batches look like running means, and four do not say otherwise: nothing may stop
+    /// till then.
     pub(crate) fn doubts(&self) -> bool {
         self.sums[0].doubt().is_some()
     }
@@ -318,6 +389,14 @@ impl Watch {
         let noisy = self.tiles.iter().filter(|tile| tile.noisy);
         let (tiles, of) = noisy.fold((0, 0), |(n, of), tile| (n + usize::from(tile.repeated), of + 1));
         if 2 * tiles > of { Err(Fault::Repeated { tiles, of }) } else { Ok(()) }
+    }
+}
+
+#[cfg(test)]
+impl Watch {
+    /// Loses a watched pixel.
+    pub(crate) fn corrupt(&mut self) {
+        self.tiles[0].corrupt();
     }
 }
 

@@ -18,8 +18,8 @@ impl Points {
         Self { step: if grid.width() * grid.height() <= SMALL { 4 } else { 8 } }
     }
 
-    /// Places in a batch of this tile, row-major; each has a neighbour to the left and to the right. None of a
-    /// tile that is narrower than three pixels.
+    /// Places in a batch of this tile, row-major; each has a neighbour to the left and to the right. None of
+    /// a tile that is narrower than three pixels.
     pub(super) fn of(self, tile: Tile) -> impl Iterator<Item = usize> + Clone {
         Self::every(self.step, tile)
     }
@@ -41,4 +41,12 @@ impl Points {
 #[inline]
 pub(super) fn light(mean: &[Rgb], pixel: usize) -> [f32; 3] {
     [mean[pixel - 1], mean[pixel], mean[pixel + 1]].map(luminance)
+}
+
+/// A typical one of these values: the geometric mean of those above 0, which a few lamps and fireflies hardly
+/// move. 1 if there is none.
+pub(super) fn level(values: &[f64]) -> f64 {
+    let lit = values.iter().filter(|&&value| value > 0.0 && value.is_finite());
+    let (sum, count) = lit.fold((0.0, 0u64), |(sum, count), value| (sum + value.ln(), count + 1));
+    if count > 0 { (sum / count as f64).exp() } else { 1.0 }
 }

@@ -69,8 +69,8 @@ fn independent_samples_are_silent() {
     assert_eq!(feed(200, |count| (sizes(count), batch(count + 1, sizes(count)))).2, Vec::new());
 }
 
-/// The mistakes of issue 31, with the samples per pixel at which they are noticed; without this watch the tiles
-/// of a Cornell box stopped at 170, 100, 540 and 100.
+/// The mistakes of issue 31, with the samples per pixel at which they are noticed; without this watch the
+/// tiles of a Cornell box stopped at 170, 100, 540 and 100.
 #[test]
 fn mistakes_are_faults_before_a_tile_can_stop() {
     let mut sum = vec![[0.0; 3]; EDGE * EDGE];
@@ -250,5 +250,231 @@ fn noise_in_common_is_no_fault() {
             (SPP, image)
         });
         assert_eq!(fault, None, "seed {seed}");
+    }
+}
+
+/// How the noise of a pixel is distributed.
+#[derive(Clone, Copy, Debug)]
+enum Kind {
+    /// Skewed, as of most paths.
+    Exponential,
+    /// Two samples in three find no light.
+    Dark,
+    /// One sample in so many has most of the light.
+    Fireflies(f64),
+}
+
+/// A room of `edge`×`edge` pixels on linear radiance from 0.1 to 0.7, with a lamp of radiance 18 in view,
+/// whose edges pixels share with the wall behind.
+#[derive(Clone, Copy)]
+struct Room {
+    edge: usize,
+    kind: Kind,
+    seed: u64,
+}
+
+impl Room {
+    /// The mean of samples `first` to `first + spp`: the same samples however they are cut.
+    fn mean(&self, first: u64, spp: u64) -> Vec<Rgb> {
+        let mut sum = vec![[0.0; 3]; self.edge * self.edge];
+        for sample in first..first + spp {
+            let mut noise = Noise::keyed(&[self.seed, sample]);
+            for (i, pixel) in sum.iter_mut().enumerate() {
+                let light = self.sample(i % self.edge, i / self.edge, &mut noise) / spp as f64;
+                pixel.iter_mut().zip([1.0, 0.9, 0.7]).for_each(|(c, tint)| *c += (tint * light) as f32);
+            }
+        }
+        sum
+    }
+
+    fn sample(&self, x: usize, y: usize, noise: &mut Noise) -> f64 {
+        // The lamp covers from 0.3 to 0.55 of the width: of its outer pixels 0.4
+        let within = |at: usize, from: f64, to: f64| {
+            let (at, edge) = (at as f64, self.edge as f64);
+            ((to * edge - at).clamp(0.0, 1.0) - (from * edge - at).clamp(0.0, 1.0)).clamp(0.0, 1.0)
+        };
+        let covered =
+            within(x, 0.3 + 0.6 / self.edge as f64, 0.55) * within(y, 0.08, 0.2 + 0.4 / self.edge as f64);
+        if covered > 0.0 && noise.uniform() < covered {
+            return 18.0;
+        }
+        let stripes = if (x / 7 + y / 9).is_multiple_of(2) { 0.2 } else { 0.0 };
+        let level = 0.1 + stripes + 0.4 * x as f64 / self.edge as f64;
+        level
+            * match self.kind {
+                Kind::Exponential => -noise.uniform().max(1e-12).ln(),
+                Kind::Dark => 3.0 * f64::from(u8::from(noise.uniform() < 1.0 / 3.0)),
+                Kind::Fireflies(share) => 0.3 + 0.7 / share * f64::from(u8::from(noise.uniform() < share)),
+            }
+    }
+}
+
+/// What is said of a picture in tiles of half its edge, pushed in batches of these sizes: `batch` is given
+/// first sample and number of samples and returns what is pushed, and said to be its number of samples.
+fn said(
+    edge: usize,
+    sizes: &[u64],
+    mut batch: impl FnMut(u64, u64) -> (u64, Vec<Rgb>),
+) -> (Option<Fault>, u64, Vec<Warning>) {
+    let params = Params { tile: (edge / 2).max(16), max_spp: 1 << 30, min_spp: 0, ..Params::default() };
+    let mut session = Session::new(edge, edge, FixedSpp(1 << 29), params).unwrap();
+    let mut had = 0;
+    for &size in sizes {
+        let (spp, image) = batch(had, size);
+        had += size;
+        session.push_image(spp, &image).unwrap();
+        let Err(error) = session.look() else { continue };
+        let SessionError::Fault(fault) = error else { panic!("{error}") };
+        return (Some(fault), had, session.warnings().to_vec());
+    }
+    (None, had, session.warnings().to_vec())
+}
+
+/// As a session asks for them, in a small picture.
+const ASKED: [u64; 10] = [8, 8, 8, 8, 16, 16, 32, 32, 64, 64];
+/// As renderers have them that refine in passes.
+const PASSES: [u64; 8] = [16; 8];
+
+fn filtered(image: &[Rgb], edge: usize, kernel: [f32; 3]) -> Vec<Rgb> {
+    let sum: f32 = kernel.iter().sum();
+    let pixel = |i: usize| {
+        let mut pixel = [0.0; 3];
+        for (dy, dx) in (0..9).map(|k| (k / 3, k % 3)) {
+            let near = |at: usize, d: usize| (at + d).saturating_sub(1).min(edge - 1);
+            let from = image[near(i / edge, dy) * edge + near(i % edge, dx)];
+            let weight = kernel[dy] * kernel[dx] / (sum * sum);
+            pixel.iter_mut().zip(from).for_each(|(c, from)| *c += weight * from);
+        }
+        pixel
+    };
+    (0..edge * edge).map(pixel).collect()
+}
+
+/// The first picture that everybody tries is small, with a lamp in it. Its edge has most of the noise, in a
+/// dozen pixels.
+#[test]
+fn a_lamp_in_view_hides_no_mistake() {
+    for (kind, seed) in [Kind::Exponential, Kind::Dark].into_iter().flat_map(|k| (0..3).map(move |s| (k, s)))
+    {
+        let room = Room { edge: 64, kind, seed };
+        let right = |first, spp| (spp, room.mean(first, spp));
+        for sizes in [&ASKED[..], &PASSES] {
+            let what = format!("{kind:?}, seed {seed}, {sizes:?}");
+            assert_eq!(said(64, sizes, right).2, [], "{what}");
+            let (fault, at, warnings) = said(64, sizes, |first, spp| (spp, room.mean(0, first + spp)));
+            assert!(matches!(fault, Some(Fault::Running { .. })), "{what}: {fault:?}");
+            // Told after two batches, and sure after four
+            assert!(at <= 64 && matches!(warnings[..], [Warning::Noise(_)]), "{what}: {at}, {warnings:?}");
+            let (fault, at, _) = said(64, sizes, |_, spp| (spp, room.mean(0, spp)));
+            assert!(matches!(fault, Some(Fault::Repeated { .. })) && at <= 32, "{what}: {fault:?}");
+            // Mitsuba's Gaussian correlates neighbours by e⁻¹, and so does this kernel; a box by two thirds
+            for (kernel, correlation) in [([0.2, 1.0, 0.2], 0.37), ([1.0; 3], 0.67)] {
+                let two = |first, spp| (spp, filtered(&room.mean(first, spp), 64, kernel));
+                let (_, _, warnings) = said(64, &sizes[..2], two);
+                let found =
+                    |w: &Warning| matches!(w, Warning::Neighbours(c) if (c - correlation).abs() < 0.1);
+                assert!(matches!(&warnings[..], [w] if found(w)), "{what}: {warnings:?}");
+            }
+        }
+    }
+}
+
+/// However noise is distributed. All is seeded, so that this fails always or never; of other seeds one in 10⁴
+/// may.
+#[test]
+fn right_samples_are_silent() {
+    right_ones_are_silent(3);
+}
+
+#[test]
+#[ignore = "for measuring how often chance alone says something: a minute"]
+fn right_samples_are_silent_in_22500_sessions() {
+    right_ones_are_silent(1500);
+}
+
+fn right_ones_are_silent(seeds: u64) {
+    // From one sample on, as in large pictures
+    let doubling = [1, 1, 2, 2, 4, 4, 8, 8, 16, 16, 32, 32];
+    let kinds =
+        [Kind::Exponential, Kind::Dark, Kind::Fireflies(0.1), Kind::Fireflies(0.01), Kind::Fireflies(1e-3)];
+    let (mut sessions, mut accused) = (0, Vec::new());
+    for (seed, kind) in (0..seeds).flat_map(|seed| kinds.map(|kind| (seed, kind))) {
+        let room = Room { edge: 32, kind, seed: 100 + seed };
+        for sizes in [&ASKED[..], &PASSES, &doubling] {
+            let (fault, _, warnings) = said(room.edge, sizes, |first, spp| (spp, room.mean(first, spp)));
+            sessions += 1;
+            if fault.is_some() || !warnings.is_empty() {
+                accused.push((kind, seed, sizes, fault, warnings));
+            }
+        }
+    }
+    assert!(accused.is_empty(), "{} of {sessions}: {:?}", accused.len(), &accused[..accused.len().min(9)]);
+}
+
+/// Values that are no means of linear radiance have a mean that depends on the size of the batch.
+#[test]
+fn values_whose_mean_depends_on_the_size_of_a_batch_are_noticed() {
+    let room = Room { edge: 128, kind: Kind::Exponential, seed: 5 };
+    let pushed = |change: &dyn Fn(f32, u64) -> f32| {
+        let batch = |first, spp| {
+            (spp, room.mean(first, spp).into_iter().map(|p| p.map(|c| change(c, spp))).collect())
+        };
+        said(128, &ASKED[..6], batch).2
+    };
+    let encoded = |warnings: &[Warning]| warnings.iter().any(|w| matches!(w, Warning::Encoded(_)));
+    assert!(encoded(&pushed(&|c, _| crate::display::srgb_encode(c.clamp(0.0, 1.0)))));
+    assert!(encoded(&pushed(&|c, _| c.min(0.4))), "clamped");
+    assert!(encoded(&pushed(&|c, _| c / (1.0 + c))), "tone mapped");
+    assert!(encoded(&pushed(&|c, spp| c * spp as f32)), "sums");
+    assert_eq!(pushed(&|c, _| c), []);
+}
+
+/// 16 new samples each time, pushed as 16, 32, 48, 64.
+#[test]
+fn totals_in_place_of_new_samples_are_noticed() {
+    for seed in 0..3 {
+        let room = Room { edge: 128, kind: Kind::Exponential, seed };
+        let (fault, _, warnings) = said(128, &PASSES, |first, spp| (first + spp, room.mean(first, spp)));
+        assert_eq!(fault, None);
+        assert!(matches!(warnings[..], [Warning::Counts(f)] if (1.5..4.0).contains(&f)), "{warnings:?}");
+    }
+}
+
+#[test]
+fn tiles_that_were_mixed_up_do_not_fit() {
+    use borders::MixUp::{Mirrored, Shifted, Transposed, UpsideDown};
+    const EDGE: usize = 96;
+    // Nothing repeats with the tiles: hills, and a bright stripe across
+    let light = |x: usize, y: usize| {
+        let (x, y) = (x as f64 / 96.0, y as f64 / 96.0);
+        let hills = 0.4 + 0.2 * (9.0 * x + 4.0 * y * y).sin() + 0.2 * (5.0 * y - 13.0 * x * x).cos();
+        hills + if (x - 1.3 * y + 0.2).abs() < 0.06 { 1.0 } else { 0.0 }
+    };
+    let said = |from: &dyn Fn(Tile, TileGrid, usize, usize) -> (usize, usize)| {
+        let params = Params { tile: 32, max_spp: 1 << 30, min_spp: 0, ..Params::default() };
+        let mut session = Session::new(EDGE, EDGE, FixedSpp(1 << 29), params).unwrap();
+        let grid = session.film().grid();
+        for (round, tile) in (0..8).flat_map(|round| grid.tiles().map(move |tile| (round, tile))) {
+            let pixel = |i: usize| {
+                let (x, y) = from(tile, grid, i % tile.width, i / tile.width);
+                let noise = Noise::keyed(&[round, tile.index as u64, i as u64]).uniform();
+                [(light(x, y) * (0.8 + 0.4 * noise)) as f32; 3]
+            };
+            session.push(tile.index, 16, &(0..tile.pixels()).map(pixel).collect::<Vec<_>>()).unwrap();
+        }
+        session.look().unwrap();
+        session.warnings().to_vec()
+    };
+    let mixed_up = |how| vec![Warning::MixedUp(how)];
+    assert_eq!(said(&|t, _, x, y| (t.x + x, t.y + y)), []);
+    assert_eq!(said(&|t, _, x, y| (t.x + x, t.y + t.height - 1 - y)), mixed_up(UpsideDown));
+    assert_eq!(said(&|t, _, x, y| (t.x + x, EDGE - t.y - t.height + y)), mixed_up(UpsideDown));
+    assert_eq!(said(&|t, _, x, y| (t.x + t.width - 1 - x, t.y + y)), mixed_up(Mirrored));
+    assert_eq!(said(&|t, _, x, y| (t.x + y, t.y + x)), mixed_up(Transposed));
+    assert_eq!(said(&|t, _, x, y| (t.y + x, t.x + y)), mixed_up(Transposed));
+    let neighbour = |t: Tile, grid: TileGrid, by: usize| grid.tile((t.index + by) % grid.len());
+    for by in [1, 8] {
+        let moved = said(&|t, grid, x, y| (neighbour(t, grid, by).x + x, neighbour(t, grid, by).y + y));
+        assert_eq!(moved, mixed_up(Shifted), "{by}");
     }
 }

@@ -3,6 +3,7 @@
 use super::{Encoding, LEAST_VALUES, Warning};
 use crate::display::srgb_encode;
 use crate::rgb::Rgb;
+use serde::{Deserialize, Serialize};
 use std::iter::Sum;
 
 /// Distance from a whole number of 255ths that is rounding.
@@ -11,7 +12,7 @@ const NEAR: f32 = 4e-3;
 const LEAST_LEVELS: u32 = 8;
 
 /// What the watched values of the first batches have in common.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub(super) struct Values {
     seen: u64,
     /// How many are 8-bit numbers, and which: divided by 255, sRGB-decoded, whole.
@@ -21,7 +22,7 @@ pub(super) struct Values {
     pub(super) above_one: bool,
 }
 
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 struct Levels {
     count: u64,
     which: [u64; 4],
@@ -81,7 +82,7 @@ impl Values {
 }
 
 /// Noisy pixels, and those of them of which one batch of two is exactly 1.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub(super) struct Ends {
     pub(super) noisy: u64,
     pub(super) at_white: u64,
