@@ -101,7 +101,7 @@ static void run(std::size_t width, std::size_t height, const char *file) {
     NfParams params;
     check(nf_params_default(&params));
     params.tile = 64;
-    params.max_spp = 2000;
+    params.max_spp = 4000;
     NfOracle *oracle;
     check(nf_oracle_bundled(0.95f, &oracle));
     std::unique_ptr<NfOracle, NfStatus (*)(NfOracle *)> oracle_owner(oracle, nf_oracle_free);

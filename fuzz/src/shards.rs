@@ -39,7 +39,7 @@ pub(crate) fn shard_seeds() -> Vec<Vec<u8>> {
 
 fn session() -> Session<FixedSpp> {
     let params = Params::default().with_tile(32);
-    Session::new(40, 32, FixedSpp(100), params).expect("a small picture")
+    Session::new(48, 32, FixedSpp(100), params).expect("a small picture")
 }
 
 fn job(session: &Session<FixedSpp>) -> ShardJob {
@@ -69,7 +69,7 @@ mod tests {
         let whole = written();
         let again = wrap(&whole, header_of(&whole));
         let planned: u64 = PlannedBatch::ahead(&session()).iter().map(|b| b.spp).sum();
-        // Two tiles of 32 and of 8 by 32 pixels, with as many samples per pixel
-        assert_eq!(merge(&Folder::new(), &again), planned / 2 * 40 * 32);
+        // Two tiles of 32 and of 16 by 32 pixels, with as many samples per pixel
+        assert_eq!(merge(&Folder::new(), &again), planned / 2 * 48 * 32);
     }
 }

@@ -110,8 +110,8 @@ typedef struct NfSession NfSession;
 
 // Parameters of a session. Let nf_params_default fill them in, then change some.
 typedef struct {
-    // Edge of a tile in pixels, 16 to 512. Default: 128. Tiles of the last column and row have half to one
-    // and a half times as many.
+    // Edge of a tile in pixels, 16 to 512; tiles of the last column and row have half to one and a half times
+    // as many. Default: 128.
     uint32_t tile;
     // When tiles are judged: NF_SCHEDULE_SPACED (default), _EVERY or _GROWING.
     uint32_t schedule;

@@ -22,8 +22,8 @@ pub const NF_TONE_SRGB: u32 = 1;
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct NfParams {
-    /// Edge of a tile in pixels, 16 to 512. Default: 128. Tiles of the last column and row have half to one
-    /// and a half times as many.
+    /// Edge of a tile in pixels, 16 to 512; tiles of the last column and row have half to one and a half times
+    /// as many. Default: 128.
     pub tile: u32,
     /// When tiles are judged: NF_SCHEDULE_SPACED (default), _EVERY or _GROWING.
     pub schedule: u32,

@@ -49,7 +49,7 @@ fn session(params: &NfParams) -> Handle {
     let (mut oracle, mut session) = (null_mut(), null_mut());
     // SAFETY: pointers to variables of this function, and a handle that was just made.
     unsafe {
-        assert_eq!(nf_oracle_bundled(0.9, &mut oracle), NfStatus::Ok);
+        assert_eq!(nf_oracle_bundled(0.95, &mut oracle), NfStatus::Ok);
         assert_eq!(
             nf_session_new(WIDTH, HEIGHT, oracle, params, &mut session),
             NfStatus::Ok,
@@ -332,7 +332,7 @@ fn every_pointer_may_be_null_and_none_is_followed_then() {
         let mut oracle = null_mut();
         let made = [
             nf_params_default(null_mut()),
-            nf_oracle_bundled(0.9, null_mut()),
+            nf_oracle_bundled(0.95, null_mut()),
             nf_oracle_load(null(), 0.9, &mut oracle),
             nf_session_new(8, 8, null(), null(), &mut null_mut()),
         ];
@@ -422,7 +422,7 @@ fn sizes_tiles_and_parameters_are_checked() {
         let here = CString::new(concat!(env!("CARGO_MANIFEST_DIR"), "/src/tests.rs")).unwrap();
         assert_eq!(nf_oracle_load(here.as_ptr(), 0.9, &mut oracle), Model);
         assert!(oracle.is_null());
-        assert_eq!(nf_oracle_bundled(0.9, &mut oracle), NfStatus::Ok);
+        assert_eq!(nf_oracle_bundled(0.95, &mut oracle), NfStatus::Ok);
         let new =
             |size: usize, params: &NfParams| nf_session_new(size, size, oracle, params, &mut null_mut());
         let ok = params();
@@ -454,7 +454,7 @@ fn handles_that_are_wrong_are_errors() {
     let (mut oracle, mut count) = (null_mut(), 0);
     // SAFETY: pointers to variables of this function.
     unsafe {
-        assert_eq!(nf_oracle_bundled(0.9, &mut oracle), NfStatus::Ok);
+        assert_eq!(nf_oracle_bundled(0.95, &mut oracle), NfStatus::Ok);
         assert_eq!(nf_session_judge(oracle.cast(), &mut count), NfStatus::Handle);
         assert_eq!(message(), "session is a handle of something else");
         assert_eq!(nf_session_new(8, 8, living.0.cast(), null(), &mut null_mut()), NfStatus::Handle);

@@ -11,8 +11,7 @@ use crate::rng::Key;
 use crate::sampler::{Place, Sampler, Sampling};
 use crate::scene::Scene;
 use noisefloor::{
-    Batch, Film, ProgressiveSource, Repeats, Request, Rgb, SourceError, SourceInfo, Tile, TileGrid,
-    ToneMapping,
+    Batch, ProgressiveSource, Repeats, Request, Rgb, SourceError, SourceInfo, Tile, ToneMapping,
     display::Display,
     source::{FirstHits, Reference, SourceIdentity},
 };
@@ -306,14 +305,9 @@ impl Ptwne {
         let options = RenderOptions { threads: None, ..self.options };
         let mut small =
             Self::new(self.scene.clone(), width, height, options).map_err(|e| self.fail(None, e))?;
-        // Two halves, so that noise is told from texture
-        let mut film = Film::new(TileGrid::new(width, height, PREVIEW).map_err(|e| self.fail(None, e))?);
-        for _ in 0..2 {
-            for batch in self.on_threads(|| small.sample(&[film.request(0, 4)]))? {
-                film.add(0, batch.spp, &batch.mean).map_err(|e| self.fail(None, e))?;
-            }
-        }
-        Ok(film.settle(&ToneMapping::default()).display)
+        let tile = Tile { index: 0, x: 0, y: 0, width, height };
+        let batches = self.on_threads(|| small.sample(&[Request::new(tile, 0, 8)]))?;
+        Ok(ToneMapping::default().settle(&batches[0].mean))
     }
 
     /// An error of this source.

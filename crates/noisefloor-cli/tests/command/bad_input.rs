@@ -176,9 +176,6 @@ fn corpora() {
     train(&["--table", "absent.csv"], &["absent.csv"]);
     train(&[], &["--corpus"]);
     train(&["--corpus", text(folder), "--table", "x.csv"], &["--table"]);
-    for sigma in ["0.29", "1.51", "nan"] {
-        train(&["--corpus", text(folder), "--sigma", sigma], &["--sigma", "0.3", "1.5"]);
-    }
     train(&["--corpus", text(folder), "--c", "0"], &["positive"]);
     let table = case.path("text.exr");
     train(&["--table", text(&table)], &["text.exr", "line 1"]);

@@ -71,7 +71,7 @@ fn every_subcommand_explains_itself() {
         "--against",
         "--autosave",
         "--schedule",
-        "--threshold",
+        "--people",
         "--viewing",
         "--lut-input",
     ] {
@@ -101,7 +101,7 @@ fn at_least_six_scenes_are_listed() {
 #[cfg(feature = "lab")]
 fn every_command_of_the_lab_explains_itself() {
     let options: [(&str, &[&str]); 6] = [
-        ("explore", &["IMAGE", "--model", "--threshold", "--audience", "--database", "--table", "--listen"]),
+        ("explore", &["IMAGE", "--model", "--people", "--audience", "--database", "--table", "--listen"]),
         ("train", &["--corpus", "--table", "--out", "--save-table", "--sigma", "--disagreements"]),
         ("evaluate", &["--corpus", "--model", "--leave-one-scene-out", "--json", "--csv", "--rivals"]),
         ("audience", &["fit"]),

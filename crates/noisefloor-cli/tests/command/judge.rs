@@ -24,8 +24,8 @@ fn two_renders_with_two_seeds() {
     let noisy = [render("1", "spp:100"), render("2", "spp:100")];
     let report: Value = serde_json::from_str(&judge(&noisy[0], &noisy[1], "100", &["--json"])).unwrap();
     assert_eq!(
-        (report["spp"].as_f64(), report["threshold"].as_f64().map(|t| t as f32)),
-        (Some(100.0), Some(0.9))
+        (report["spp"].as_f64(), report["people"].as_f64().map(|t| t as f32)),
+        (Some(100.0), Some(0.95))
     );
     assert_eq!(report["model"].as_str().map(str::len), Some(64));
     let tiles = report["tiles"].as_array().unwrap();

@@ -151,7 +151,7 @@ fn train_inspect_evaluate() {
     let mut args = corpora.args("train");
     args.extend(["--out", text(&model), "--save-table", text(&saved)]);
     let said = succeed(&args);
-    assert!(said.contains("support vectors") && said.contains("on left-out scenes"), "{said}");
+    assert!(said.contains("a line from") && said.contains("on left-out scenes"), "{said}");
     let table_args =
         ["train", "--table", text(&saved), "--c", "1", "--gamma", "0.01,0.03", "--out", text(&again)];
     succeed(&table_args);
@@ -220,8 +220,8 @@ fn disagreements_are_learned_beside_the_table() {
     let learn = ["train", "--table", text(&saved), "--c", "1", "--gamma", "0.01,0.03", "--out", text(&model)];
     let learn = [&learn[..], &["--disagreements", text(&database)]].concat();
     fail(&learn, &["explore.sqlite", "none of 0 disagreements"]);
-    // A table has a descriptor of its own
-    fail(&[&learn[..], &["--descriptor", "compact"]].concat(), &["--descriptor", "cannot be used with"]);
+    // A table has an evidence of its own
+    fail(&[&learn[..], &["--evidence", "halves"]].concat(), &["--evidence", "cannot be used with"]);
     let table = read_table(std::fs::File::open(&saved).unwrap()).unwrap();
     // Noise is seen where the table's people were far beyond their threshold.
     let clean = table.zones[0].levels.last().unwrap();

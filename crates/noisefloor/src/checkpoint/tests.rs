@@ -240,7 +240,7 @@ fn another_job_is_refused() {
     let other_model = {
         let driver = broken_off(Oracle::bundled(), 1);
         let checkpoint = Checkpoint::read(&kept(&driver)[..]).unwrap();
-        let stricter = Oracle::new(crate::Model::bundled(), crate::People::new(0.95).unwrap());
+        let stricter = Oracle::new(crate::Model::bundled(), crate::People::new(0.99).unwrap());
         let driver = Driver::new(Noise(Repeats::Samples), stricter, params()).unwrap();
         driver.resume("noise", checkpoint).err().map(|e| e.to_string())
     };

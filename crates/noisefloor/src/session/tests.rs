@@ -160,7 +160,7 @@ fn a_stop_is_filed_only_if_it_is_returned() {
 #[test]
 fn whole_images_are_pushed_to_open_tiles() {
     let mut s = session(100, true, steps_of_10());
-    let image: Vec<Rgb> = (0..70 * 32).map(|i| [0.1 + i as f32 / 1e4; 3]).collect();
+    let image: Vec<Rgb> = (0..80 * 32).map(|i| [0.1 + i as f32 / 1e4; 3]).collect();
     s.push_image(50, &image).unwrap();
     s.push_image(50, &image).unwrap();
     assert_eq!(s.film().image(), image);
@@ -168,7 +168,7 @@ fn whole_images_are_pushed_to_open_tiles() {
     s.push_image(50, &image).unwrap();
     assert_eq!([0, 1, 2].map(|tile| s.film().spp(tile)), [100, 150, 150]);
     let wrong = s.push_image(50, &image[1..]);
-    assert_eq!(wrong, Err(SessionError::Image { got: 70 * 32 - 1, expected: 70 * 32 }));
+    assert_eq!(wrong, Err(SessionError::Image { got: 80 * 32 - 1, expected: 80 * 32 }));
 }
 
 /// What a `main` that returns a `Result` prints.
@@ -184,7 +184,7 @@ fn errors_are_debugged_as_what_to_do() {
 fn warnings_are_handed_over_once() {
     let mut s = session(1000, true, steps_of_10());
     for _ in 0..2 {
-        s.push_image(50, &[[0.3; 3]; 70 * 32]).unwrap();
+        s.push_image(50, &[[0.3; 3]; 80 * 32]).unwrap();
     }
     s.judge().unwrap();
     assert_eq!(s.new_warnings(), [Warning::Constant(0.3)]);

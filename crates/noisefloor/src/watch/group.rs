@@ -2,7 +2,7 @@
 
 use super::correlation::{Concordance, Correlation, Sums};
 use super::points::level;
-use super::values::Ends;
+use super::values::{Ends, Values};
 use crate::rgb::Rgb;
 use serde::{Deserialize, Serialize};
 
@@ -39,6 +39,10 @@ pub(super) struct TileWatch {
     pub(super) repeated: bool,
     /// Whether values by themselves differ from batch to batch by more than rounding: they have noise.
     pub(super) varies: bool,
+    /// What was found since the last look.
+    pub(super) sums: Sums,
+    /// What the values of the first group have in common.
+    pub(super) values: Values,
     /// Those of the first batch, while the first group lasts.
     first: Vec<Rgb>,
     group: Vec<Seen>,
@@ -80,6 +84,7 @@ impl TileWatch {
         if let [a, b, c, d] = &self.group[..] {
             four([a, b, c, d], shared, &mut found);
             self.group.clear();
+            self.first = Vec::new();
             self.first = Vec::new();
         }
         Some(found)

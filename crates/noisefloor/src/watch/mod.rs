@@ -232,8 +232,7 @@ pub(crate) struct Watch {
     shared: bool,
     tiles: Vec<TileWatch>,
     light: LightCheck,
-    values: Values,
-    /// Of all groups, and of those since the last look.
+    /// Of all groups, and of those between the last two looks.
     sums: [Sums; 2],
     /// Samples from which it is worth to look at the borders of tiles again.
     borders_at: u64,
@@ -247,7 +246,6 @@ impl Watch {
             shared: false,
             tiles: vec![TileWatch::default(); grid.len()],
             light: LightCheck::default(),
-            values: Values::default(),
             sums: [Sums::default(); 2],
             borders_at: 0,
             warnings: Vec::new(),
@@ -324,8 +322,8 @@ impl Watch {
     pub(crate) fn see(&mut self, tile: Tile, spp: u64, mean: &[Rgb], shift: Option<Shift>) {
         let points = self.points();
         let shift = shift.unwrap_or_default();
-        self.sums.iter_mut().for_each(|sums| sums.shift.add(&shift));
         let watch = &mut self.tiles[tile.index];
+        watch.sums.shift.add(&shift);
         let batch = watch.batches;
         watch.batches += 1;
         let group = batch / 4;
@@ -335,23 +333,37 @@ impl Watch {
         let light = |pixel| points::light(mean, pixel);
         if group == 0 {
             let values: Vec<Rgb> = points.of(tile).map(|pixel| mean[pixel]).collect();
-            values.iter().for_each(|&value| self.values.see(value));
+            values.iter().for_each(|&value| watch.values.see(value));
             watch.see_values(values);
             watch.see(spp, points.at_first(tile).map(light).collect());
         } else {
             watch.see(spp, points.of(tile).map(light).collect());
         }
         if let Some(found) = watch.compare(self.shared) {
-            self.sums.iter_mut().for_each(|sums| sums.add(&found));
+            watch.sums.add(&found);
         }
+    }
+
+    /// Adds up what tiles have found since the last look, in their order: a sum of floating-point numbers depends on
+    /// it, and the order in which tiles are sampled is nobody's business.
+    fn gather(&mut self) -> Values {
+        self.sums[1] = Sums::default();
+        let mut values = Values::default();
+        for tile in &mut self.tiles {
+            let found = std::mem::take(&mut tile.sums);
+            self.sums.iter_mut().for_each(|sums| sums.add(&found));
+            values.add(&tile.values);
+        }
+        values
     }
 
     /// Looks at all that was seen, before a verdict.
     pub(crate) fn look(&mut self, film: &Film) -> Result<(), Fault> {
+        let values = self.gather();
         self.check_repeats()?;
         // A picture without noise may be of 8-bit numbers: an unlit texture is. Noise of them is an 8-bit
         // picture's
-        if let Some(encoding) = self.values.quantised().filter(|_| self.tiles.iter().any(|tile| tile.varies))
+        if let Some(encoding) = values.quantised().filter(|_| self.tiles.iter().any(|tile| tile.varies))
         {
             return Err(Fault::Quantised { encoding });
         }
@@ -367,14 +379,13 @@ impl Watch {
         }
         let found = found.chain(mixed_up.map(Warning::MixedUp));
         let found: Vec<Warning> =
-            found.chain(self.sums[0].clipped(&self.values)).chain(self.values.constant()).collect();
+            found.chain(self.sums[0].clipped(&values)).chain(values.constant()).collect();
         for warning in found {
             let kind = std::mem::discriminant(&warning);
             if !self.warnings.iter().any(|known| std::mem::discriminant(known) == kind) {
                 self.warnings.push(warning);
             }
         }
-        self.sums[1] = Sums::default();
         Ok(())
     }
 

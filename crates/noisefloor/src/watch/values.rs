@@ -66,6 +66,19 @@ impl Values {
         }
     }
 
+    /// Takes together what was seen of other tiles.
+    pub(super) fn add(&mut self, more: &Self) {
+        self.seen += more.seen;
+        for (levels, more) in self.levels.iter_mut().zip(more.levels) {
+            levels.count += more.count;
+            levels.which.iter_mut().zip(more.which).for_each(|(which, more)| *which |= more);
+        }
+        let differs = |(one, other): (Rgb, Rgb)| one.map(f32::to_bits) != other.map(f32::to_bits);
+        self.varied |= more.varied || self.first.zip(more.first).is_some_and(differs);
+        self.first = self.first.or(more.first);
+        self.above_one |= more.above_one;
+    }
+
     /// How all values are 8-bit numbers, if they are.
     pub(super) fn quantised(&self) -> Option<Encoding> {
         if self.seen < LEAST_VALUES {

@@ -53,9 +53,9 @@ fn the_worst_window_counts_wherever_tiles_end() {
         descriptor.in_picture(&tiles).iter().map(|raw| amplitude(raw[0])).collect()
     };
     let everywhere = worst(0..128, 64);
-    // Windows of 28 pixels fit into 48 columns
+    // Windows of 28 pixels fit into 48 columns; of fewer windows, the worst is a little less bad
     let at_left = worst(0..48, 64);
-    assert!((at_left[0] / everywhere[0] - 1.0).abs() < 0.1, "{at_left:?} {everywhere:?}");
+    assert!((0.85..1.01).contains(&(at_left[0] / everywhere[0])), "{at_left:?} {everywhere:?}");
     assert!(at_left[1] < 0.1 * at_left[0], "{at_left:?}");
     // Columns 50 to 78 are the middle of the picture
     let middle = worst(50..78, 64);
