@@ -166,19 +166,19 @@ pub(crate) fn parts(
 /// steep as predictions for scenes that were left out are good. `None` if the descriptor does not separate noise from
 /// picture, or numbers were taken away from it.
 fn spread(table: &Table, classifier: &Classifier) -> Option<Spread> {
-    let noisy = classifier.scaler.mean.clone();
+    let noisy = &classifier.scaler.mean;
     if noisy.len() != table.descriptor.dimensions() {
         return None;
     }
-    // Far above any floor of noise, where noise falls by ½ with ln(samples)
+    // As steep as at the mean of the examples, around the thresholds
     let log_odds = |samples: f32| {
-        let mut raw: Vec<f32> = noisy.iter().map(|_| 3.0).collect();
+        let mut raw = noisy.clone();
         table.descriptor.project(&mut raw, samples).then(|| {
             let scaled = classifier.scaler.scaled(&raw);
             classifier.platt.log_odds(classifier.machine.decision(&scaled))
         })
     };
-    let slope = log_odds(std::f32::consts::E)? - log_odds(1.0)?;
+    let slope = log_odds(0.5f32.exp())? - log_odds((-0.5f32).exp())?;
     let scenes = std::f64::consts::PI / 3f64.sqrt() / slope;
     Some(Spread { scenes: scenes.clamp(0.01, 10.0), people: Spread::PEOPLE })
 }

@@ -66,11 +66,11 @@ fn the_cornell_box_stops_by_itself_whatever_the_threads_and_whoever_owns_the_loo
     assert_eq!(outcome.stops.len(), 9);
     for stop in &outcome.stops {
         assert_eq!(stop.reason, StopReason::Converged, "{stop:?}");
-        assert!(stop.probability.is_some_and(|p| (0.9..=1.0).contains(&p)), "{stop:?}");
+        assert!(stop.probability.is_some_and(|p| (0.95..=1.0).contains(&p)), "{stop:?}");
     }
     let samples = outcome.samples();
     let (least, most) = (samples.iter().min().unwrap(), samples.iter().max().unwrap());
-    assert!(*most >= 2 * least, "tiles hardly differ: {samples:?}");
+    assert!(2 * most >= 3 * least, "tiles hardly differ: {samples:?}");
 
     // Four threads: the same to the bit
     let (four, _) = recorded(4);
@@ -168,9 +168,9 @@ fn limits_have_their_reasons() {
     let limited = run(cornell(), Oracle::bundled(), small_tiles().with_max_spp(150));
     for stop in &limited.stops {
         match stop.reason {
-            StopReason::Converged => assert!(stop.probability >= Some(0.9), "{stop:?}"),
+            StopReason::Converged => assert!(stop.probability >= Some(0.95), "{stop:?}"),
             StopReason::MaxSpp => {
-                assert!(stop.spp == 150 && stop.probability < Some(0.9), "{stop:?}")
+                assert!(stop.spp == 150 && stop.probability < Some(0.95), "{stop:?}")
             }
             _ => panic!("{stop:?}"),
         }

@@ -1,5 +1,5 @@
 use noisefloor::{
-    Oracle, Tile,
+    Model, Oracle, People, Tile,
     evidence::{Samples, TilePlanes, residual_scale},
 };
 use noisefloor_image::{DisplayImage, Picture, read_picture};
@@ -36,12 +36,14 @@ fn converged(
 }
 
 /// Of what production renderers made: of the zones for which people asked for at least twice the samples of the first
-/// picture, no more than 2 % have converged in it, as the documentation says of stops; of the last pictures most have.
+/// picture, no more than 2 % have converged in it, as the documentation says of stops; in the last pictures most have for
+/// half of the people. (Not for 95 % of them: a last picture has noise of its own, which nobody could compare it with.)
 #[test]
 fn early_pictures_are_noisy_and_last_ones_are_not() {
     let Some(dir) = require_shared("human/lisic9") else { return };
     let corpus = Corpus::open(&dir).unwrap();
     let oracle = Oracle::bundled();
+    let for_half = Oracle::new(Model::bundled(), People::new(0.5).unwrap());
     let (mut zones, mut asked, mut early, mut late) = (0, 0, 0, 0);
     for scene in corpus.scenes() {
         let of_scene = || corpus.zones().iter().filter(|z| z.scene == scene);
@@ -60,7 +62,7 @@ fn early_pictures_are_noisy_and_last_ones_are_not() {
         asked += more.iter().filter(|&&more| more).count();
         let in_first = converged(&oracle, &first, &last, &tiles);
         early += in_first.iter().zip(&more).filter(|&(&converged, &more)| converged && more).count();
-        late += converged(&oracle, &last, &middle, &tiles).iter().filter(|&&converged| converged).count();
+        late += converged(&for_half, &last, &middle, &tiles).iter().filter(|&&converged| converged).count();
     }
     assert_eq!(zones, 112);
     assert!(asked * 2 > zones, "people asked for more in {asked} of {zones} zones");

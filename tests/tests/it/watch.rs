@@ -76,8 +76,11 @@ fn mistakes_in_a_picture_with_a_lamp_are_noticed_before_a_tile_stops() {
                 );
             }
         }
-        let sizes_vary = feed(&samples, 64, Mistake::Srgb, None);
-        assert!(matches!(sizes_vary.warnings[..], [(_, Warning::Encoded(_))]), "{edge}: {sizes_vary:?}");
+        // In 64×64 pixels, tiles can stop before batches of several sizes have come
+        if edge == 128 {
+            let sizes_vary = feed(&samples, 64, Mistake::Srgb, None);
+            assert!(matches!(sizes_vary.warnings[..], [(_, Warning::Encoded(_))]), "{edge}: {sizes_vary:?}");
+        }
     }
 }
 

@@ -23,7 +23,7 @@ pub(crate) fn setup(dir: &Path) -> ExploreSetup {
 }
 
 pub(crate) fn question(picture: &Value) -> Value {
-    json!({ "picture": picture["id"], "people": 0.9, "audience": [1.0, 0.0], "retrained": false })
+    json!({ "picture": picture["id"], "people": 0.95, "audience": [1.0, 0.0], "retrained": false })
 }
 
 /// What `judge` computes: the picture held against the others, all tiles described and judged in their

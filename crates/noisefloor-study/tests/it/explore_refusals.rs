@@ -77,8 +77,8 @@ fn malformed_questions_are_refused() {
     refused(server.post("/api/verdicts", &json!("x".repeat(20_000))), 413);
 
     // Retraining without a table, without answers; models that are not there
-    refused(server.post("/api/retrain", &json!({ "threshold": 0.9 })), 422);
-    refused(server.post("/api/retrain", &json!({ "threshold": 2 })), 422);
+    refused(server.post("/api/retrain", &json!({ "people": 0.9 })), 422);
+    refused(server.post("/api/retrain", &json!({ "people": 2 })), 422);
     let (status, _, body) = server.raw("GET", "/api/retrained.nfm", "", b"");
     refused((status, serde_json::from_slice(&body).unwrap()), 404);
 }

@@ -117,7 +117,7 @@ pub struct DescriptorKind {
 /// let map = &descriptor.visible_noise(&[described]).unwrap()[0];
 /// assert_eq!(map.dim(), (16, 32));
 /// // Windows of three quarters of a degree reach a little over the edge
-/// assert!(map[(8, 0)] > 1.2 * map[(8, 31)]);
+/// assert!(map[(8, 0)] > 1.1 * map[(8, 31)]);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Debug)]

@@ -145,14 +145,12 @@ impl TileDescriptor for Visible {
     }
 
     fn in_picture(&self, tiles: &[Described]) -> Vec<Vec<f32>> {
-        let mut tiles = tiles.to_vec();
-        let worst = self.worst(&tiles);
-        for (tile, worst) in tiles.iter_mut().zip(worst) {
-            if !tile.blocks.is_empty() {
-                tile.own[0] = noise_number(worst);
-            }
-        }
-        Visible::in_picture(*self, &tiles)
+        let number = |(tile, worst): (&Described, f64)| {
+            // A tile that is apart, or not finite, is as it was described
+            if tile.blocks.is_empty() { tile.own[0] } else { noise_number(worst) }
+        };
+        let noises: Vec<f32> = tiles.iter().zip(self.worst(tiles)).map(number).collect();
+        self.with_picture(tiles, &noises)
     }
 
     fn visible_noise(&self, tiles: &[Described]) -> Option<Vec<Array2<f32>>> {
@@ -208,21 +206,22 @@ impl Visible {
         tiles.iter().map(worst).collect()
     }
 
-    /// Appends to each tile's own numbers those of the picture that the tiles make up: a quantile of the amplitudes
-    /// of their noise, and the mean of their light, both by area. Noise is what the tile at hand has with its own
+    /// Appends to each tile's own numbers, of which the first is that of `noises`, those of the picture that the tiles
+    /// make up: a quantile of the amplitudes of their noise, and the mean of their light, both by area. Noise is what the tile at hand has with its own
     /// samples and the picture would have with as many.
-    fn in_picture(self, tiles: &[Described]) -> Vec<Vec<f32>> {
+    fn with_picture(self, tiles: &[Described], noises: &[f32]) -> Vec<Vec<f32>> {
         let area: f64 = tiles.iter().map(|t| t.place.pixels() as f64).sum();
         let light = tiles.iter().map(|t| t.place.pixels() as f64 * f64::from(t.own[2])).sum::<f64>() / area;
-        let of_one_sample = |t: &Described| (amplitude(t.own[0]) * t.spp.sqrt(), t.place.pixels() as f64);
-        let mut noises: Vec<(f64, f64)> = tiles.iter().map(of_one_sample).collect();
-        noises.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let noise = quantile(&noises, self.picture_quantile);
-        let complete = |tile: &Described| {
-            let picture = [noise_number(noise / tile.spp.sqrt()), light as f32];
-            tile.own.iter().copied().chain(picture).collect()
+        let of_one_sample =
+            |(t, &noise): (&Described, &f32)| (amplitude(noise) * t.spp.sqrt(), t.place.pixels() as f64);
+        let mut all: Vec<(f64, f64)> = tiles.iter().zip(noises).map(of_one_sample).collect();
+        all.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let of_picture = quantile(&all, self.picture_quantile);
+        let complete = |(tile, &noise): (&Described, &f32)| {
+            let picture = [noise_number(of_picture / tile.spp.sqrt()), light as f32];
+            [noise].into_iter().chain(tile.own[1..].iter().copied()).chain(picture).collect()
         };
-        tiles.iter().map(complete).collect()
+        tiles.iter().zip(noises).map(complete).collect()
     }
 }
 
