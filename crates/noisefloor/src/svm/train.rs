@@ -77,10 +77,8 @@ pub fn fit_platt(examples: &[(f32, f64)]) -> Result<Platt, SvmTrainError> {
     }
     let scale = if deviation > 0.0 { deviation } else { 1.0 };
     let [high, low] = [(agree + 1.0) / (agree + 2.0), 1.0 / (differ + 2.0)];
-    let scaled: Vec<(f64, f64)> = examples
-        .iter()
-        .map(|&(d, p)| ((f64::from(d) - mean) / scale, p * high + (1.0 - p) * low))
-        .collect();
+    let scaled: Vec<(f64, f64)> =
+        examples.iter().map(|&(d, p)| ((f64::from(d) - mean) / scale, p * high + (1.0 - p) * low)).collect();
 
     // Minus the likelihood of log-odds slope·x + offset, ln(1 + exp(z)) − t·z a term
     let loss = |slope: f64, offset: f64| -> f64 {
@@ -107,7 +105,8 @@ pub fn fit_platt(examples: &[(f32, f64)]) -> Result<Platt, SvmTrainError> {
             (h11 * gradient[1] - h12 * gradient[0]) / determinant,
         ];
         let here = loss(slope, offset);
-        let lower = |k: &i32| loss(slope - step[0] * 0.5f64.powi(*k), offset - step[1] * 0.5f64.powi(*k)) < here;
+        let lower =
+            |k: &i32| loss(slope - step[0] * 0.5f64.powi(*k), offset - step[1] * 0.5f64.powi(*k)) < here;
         // Where no step descends any more, rounding hides what is left
         let Some(halvings) = (0..60).find(lower) else { break };
         let share = 0.5f64.powi(halvings);
@@ -291,9 +290,12 @@ mod tests {
     /// With other shares beside it, a share is as many classes.
     #[test]
     fn a_share_is_as_many_observers() {
-        let shares: Vec<(f32, f64)> = (-20..20).map(|i| (i as f32 / 4.0, if i < 0 { 0.25 } else { 0.75 })).collect();
-        let classes: Vec<(f32, f64)> =
-            shares.iter().flat_map(|&(f, p)| (0..400).map(move |k| (f, f64::from(u8::from(f64::from(k) < 400.0 * p))))).collect();
+        let shares: Vec<(f32, f64)> =
+            (-20..20).map(|i| (i as f32 / 4.0, if i < 0 { 0.25 } else { 0.75 })).collect();
+        let classes: Vec<(f32, f64)> = shares
+            .iter()
+            .flat_map(|&(f, p)| (0..400).map(move |k| (f, f64::from(u8::from(f64::from(k) < 400.0 * p)))))
+            .collect();
         let (one, other) = (fit_platt(&shares).unwrap(), fit_platt(&classes).unwrap());
         // Targets of 40 observers are 2 % short of 0 and 1
         assert!((one.a - other.a).abs() < 0.05 && (one.b - other.b).abs() < 0.05, "{one:?} {other:?}");

@@ -363,8 +363,7 @@ impl Watch {
         self.check_repeats()?;
         // A picture without noise may be of 8-bit numbers: an unlit texture is. Noise of them is an 8-bit
         // picture's
-        if let Some(encoding) = values.quantised().filter(|_| self.tiles.iter().any(|tile| tile.varies))
-        {
+        if let Some(encoding) = values.quantised().filter(|_| self.tiles.iter().any(|tile| tile.varies)) {
             return Err(Fault::Quantised { encoding });
         }
         for sums in self.sums {
