@@ -8,6 +8,7 @@ use crate::score::score;
 use noisefloor::{People, model::TrainingRecord, svm::SvmParams};
 use rayon::prelude::*;
 use serde::Serialize;
+use std::collections::BTreeSet;
 
 /// What was chosen without a group of scenes.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -25,7 +26,9 @@ pub struct Chosen {
 }
 
 /// Predicts every zone with everything chosen without its group: first one of the choices, by its error on the
-/// other groups, with each of them held out in turn (with the candidate of C and γ in the middle); then C, γ
+/// other groups, with each of them held out in turn (with the candidate of C and γ in the middle): the first one that
+/// is worse than the best by no more than the standard error of their difference over groups (Breiman et al. 1984,
+/// "Classification and Regression Trees", §3.4.3), so that choices are to be given with what is to stay first. Then C, γ
 /// and the calibration of P, in the same way. `on_fold` is called before each group with its name.
 ///
 /// # Errors
@@ -48,11 +51,22 @@ pub fn choose_and_leave_out(
         let others: Vec<&str> = groups.iter().copied().filter(|&g| g != left_out).collect();
         let error = |choice: &Choice| {
             let predictions = held_out(&choice.table, &others, params, middle)?;
-            Ok(score(predictions.iter()).error_factor)
+            let of_group = |group: &&str| {
+                let scenes: BTreeSet<&str> = choice
+                    .table
+                    .zones
+                    .iter()
+                    .filter(|z| z.group == *group)
+                    .map(|z| z.scene.as_str())
+                    .collect();
+                score(predictions.iter().filter(|p| scenes.contains(p.scene.as_str()))).error_factor.ln()
+            };
+            let by_group: Vec<f64> = others.iter().map(of_group).collect();
+            Ok((score(predictions.iter()).error_factor, by_group))
         };
-        let errors: Vec<f64> = choices.par_iter().map(error).collect::<Result<_, TrainError>>()?;
-        let best =
-            (0..errors.len()).min_by(|&i, &j| errors[i].total_cmp(&errors[j])).ok_or(TrainError::Params)?;
+        let errors: Vec<(f64, Vec<f64>)> =
+            choices.par_iter().map(error).collect::<Result<_, TrainError>>()?;
+        let best = chosen_of(&errors).ok_or(TrainError::Params)?;
         let Choice { name, table } = &choices[best];
 
         let (classifier, SvmParams { c, gamma }) = fit_groups(table, &others, params)?;
@@ -60,8 +74,41 @@ pub fn choose_and_leave_out(
         let model = parts(table, classifier, known, TrainingRecord::default());
         let zones = table.zones.iter().filter(|z| z.group == left_out);
         predictions.extend(zones.map(|z| predict(|raw| model.judge(raw), people, z)));
-        let (without, choice, error_factor) = (left_out.to_owned(), name.clone(), errors[best]);
+        let (without, choice, error_factor) = (left_out.to_owned(), name.clone(), errors[best].0);
         all_chosen.push(Chosen { without, choice, c, gamma, error_factor });
     }
     Ok((predictions, all_chosen))
+}
+
+/// The first of the choices, with their errors over all zones and by group, that is not worse than the best by more than
+/// one standard error.
+fn chosen_of(errors: &[(f64, Vec<f64>)]) -> Option<usize> {
+    let best = errors.iter().min_by(|a, b| a.0.total_cmp(&b.0))?;
+    let as_good = |(_, by_group): &(f64, Vec<f64>)| {
+        let differences: Vec<f64> = by_group.iter().zip(&best.1).map(|(one, best)| one - best).collect();
+        let n = differences.len() as f64;
+        let mean = differences.iter().sum::<f64>() / n;
+        let variance = differences.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / (n - 1.0);
+        mean <= (variance / n).sqrt()
+    };
+    errors.iter().position(as_good)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_as_good_as_the_best_stays() {
+        let of = |error: f64, by_group: [f64; 4]| (error, by_group.to_vec());
+        let best = of(1.2, [0.1, 0.2, 0.2, 0.2]);
+        // Worse by 0.05 on average, in one group by much, in the others not at all: 0.05 is its standard error
+        let nearly = of(1.25, [0.3, 0.2, 0.2, 0.2]);
+        // Worse by 0.04 everywhere
+        let worse = of(1.24, [0.14, 0.24, 0.24, 0.24]);
+        assert_eq!(chosen_of(&[worse.clone(), nearly.clone(), best.clone()]), Some(1));
+        assert_eq!(chosen_of(&[worse.clone(), best.clone(), nearly]), Some(1));
+        assert_eq!(chosen_of(&[worse, best]), Some(1));
+        assert_eq!(chosen_of(&[]), None);
+    }
 }

@@ -102,7 +102,7 @@ fn at_least_six_scenes_are_listed() {
 fn every_command_of_the_lab_explains_itself() {
     let options: [(&str, &[&str]); 6] = [
         ("explore", &["IMAGE", "--model", "--people", "--audience", "--database", "--table", "--listen"]),
-        ("train", &["--corpus", "--table", "--out", "--save-table", "--sigma", "--disagreements"]),
+        ("train", &["--corpus", "--table", "--out", "--save-table", "--machine", "--disagreements"]),
         ("evaluate", &["--corpus", "--model", "--leave-one-scene-out", "--json", "--csv", "--rivals"]),
         ("audience", &["fit"]),
         ("reproduce", &["--corpus", "--out", "--edge", "--levels", "--dump-subset"]),

@@ -37,7 +37,7 @@ fn two_renders_with_two_seeds() {
     );
     for tile in tiles {
         let p = tile["probability"].as_f64().unwrap();
-        assert_eq!(p as f32 >= 0.9, converged(tile), "{tile}");
+        assert_eq!(p as f32 >= 0.95, converged(tile), "{tile}");
         let expected = tile["expected_spp"].as_u64().unwrap();
         assert!(
             (0.0..=1.0).contains(&p) && if converged(tile) { expected == 100 } else { expected > 100 },

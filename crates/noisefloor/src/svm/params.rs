@@ -45,9 +45,10 @@ pub enum SvmTrainError {
     /// Platt scaling failed.
     #[error(
         "no curve of probability fits the decision values: whether noise was seen does not follow what was \
-         measured of it; check that every threshold stands beside its own zone, and that they are not all alike"
+         measured of \
+         it; check that every threshold stands beside its own zone, and that they are not all alike"
     )]
-    Platt,
+    Platt(#[from] linfa::composing::platt_scaling::PlattError),
 }
 
 /// Duality gap at which the solver ends; LIBSVM's default.

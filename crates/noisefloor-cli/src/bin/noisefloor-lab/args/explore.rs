@@ -14,7 +14,7 @@ use std::path::PathBuf;
 ///
 /// Drop renderings of one view on the page, or name them here: two with different seeds, snapshots of one
 /// rendering, or a picture and its converged reference (PNG, EXR or PFM). The page shows what `judge` says
-/// of each tile, a map of visible noise, and the predicted samples; threshold and audience follow a slider.
+/// of each tile, a map of visible noise, and the predicted samples; the share of people and the audience follow a slider.
 /// A click on a tile says that the verdict is wrong. It is stored in the database before it is
 /// acknowledged; `train --disagreements` learns from it, and so does the page itself with --table.
 ///
