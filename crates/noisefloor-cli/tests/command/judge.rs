@@ -20,12 +20,12 @@ fn two_renders_with_two_seeds() {
         succeed(&args)
     };
 
-    // As JSON: noisy at 100, and what is expected lies above
-    let noisy = [render("1", "spp:100"), render("2", "spp:100")];
-    let report: Value = serde_json::from_str(&judge(&noisy[0], &noisy[1], "100", &["--json"])).unwrap();
+    // As JSON: noisy at 16, and what is expected lies above
+    let noisy = [render("1", "spp:16"), render("2", "spp:16")];
+    let report: Value = serde_json::from_str(&judge(&noisy[0], &noisy[1], "16", &["--json"])).unwrap();
     assert_eq!(
         (report["spp"].as_f64(), report["people"].as_f64().map(|t| t as f32)),
-        (Some(100.0), Some(0.95))
+        (Some(16.0), Some(0.95))
     );
     assert_eq!(report["model"].as_str().map(str::len), Some(64));
     let tiles = report["tiles"].as_array().unwrap();
@@ -40,7 +40,7 @@ fn two_renders_with_two_seeds() {
         assert_eq!(p as f32 >= 0.95, converged(tile), "{tile}");
         let expected = tile["expected_spp"].as_u64().unwrap();
         assert!(
-            (0.0..=1.0).contains(&p) && if converged(tile) { expected == 100 } else { expected > 100 },
+            (0.0..=1.0).contains(&p) && if converged(tile) { expected == 16 } else { expected > 16 },
             "{tile}"
         );
     }
@@ -48,7 +48,7 @@ fn two_renders_with_two_seeds() {
 
     // As a table, with a heat map
     let map = folder.path().join("map.png");
-    let said = judge(&noisy[0], &noisy[1], "100", &["--heat-map", text(&map)]);
+    let said = judge(&noisy[0], &noisy[1], "16", &["--heat-map", text(&map)]);
     assert_eq!(said.lines().count(), 6, "{said}");
     assert!(said.contains("noise seen") && said.contains("of 4 tiles"), "{said}");
     assert!(std::fs::read(&map).unwrap().starts_with(b"\x89PNG\r\n\x1a\n"));
@@ -57,7 +57,7 @@ fn two_renders_with_two_seeds() {
 
     // Where noise is seen: as a map, and as channels of an EXR of the picture
     let (map, exr) = (folder.path().join("noise.png"), folder.path().join("noise.exr"));
-    judge(&noisy[0], &noisy[1], "100", &["--noise-map", text(&map), "--exr", text(&exr)]);
+    judge(&noisy[0], &noisy[1], "16", &["--noise-map", text(&map), "--exr", text(&exr)]);
     let Picture::Display(map) = read_picture(&map).unwrap() else { panic!("a PNG") };
     assert!(map.width > 64 && map.height >= 64);
     assert_eq!(read_exr(&exr).unwrap().pixels, read_exr(&noisy[0]).unwrap().pixels);

@@ -40,6 +40,8 @@ const LEAST_DEVIATION: f64 = 0.3;
 /// Visible contrast, in units of the vision model's threshold, that counts as noise of strength 1: near what people
 /// just see in a window. A unit; what is learned takes care of the rest.
 const UNIT: f64 = 3.75;
+/// Edge of the zones that people judged, in windows: 200 pixels of LISIC's pictures, at 28 a window.
+const ZONE: usize = 7;
 /// Least amplitude of noise that is told from none, in that unit.
 const NOISE_FLOOR: f64 = 0.03;
 /// Least light that is told from black, as a share of white.
@@ -209,12 +211,22 @@ impl Visible {
     /// Appends to each tile's own numbers, of which the first is that of `noises`, those of the picture that the tiles
     /// make up: a quantile of the amplitudes of their noise, and the mean of their light, both by area. Noise is what the tile at hand has with its own
     /// samples and the picture would have with as many.
+    ///
+    /// The quantile is over parts of the picture as large as the zones that people judged, each by its worst window:
+    /// over tiles, it would hang on their size. Where tiles are apart from each other, they are such zones.
     fn with_picture(self, tiles: &[Described], noises: &[f32]) -> Vec<Vec<f32>> {
         let area: f64 = tiles.iter().map(|t| t.place.pixels() as f64).sum();
         let light = tiles.iter().map(|t| t.place.pixels() as f64 * f64::from(t.own[2])).sum::<f64>() / area;
         let of_one_sample =
             |(t, &noise): (&Described, &f32)| (amplitude(noise) * t.spp.sqrt(), t.place.pixels() as f64);
-        let mut all: Vec<(f64, f64)> = tiles.iter().zip(noises).map(of_one_sample).collect();
+        let window = tiles.iter().find(|t| !t.blocks.is_empty()).map(|t| t.window);
+        let mut all: Vec<(f64, f64)> = match window {
+            None => tiles.iter().zip(noises).map(of_one_sample).collect(),
+            Some(window) => {
+                let zones = PictureContrast::new(tiles).zones(ZONE * window, window);
+                zones.into_iter().map(|(worst, blocks)| (worst.sqrt() / UNIT, blocks as f64)).collect()
+            }
+        };
         all.sort_by(|a, b| a.0.total_cmp(&b.0));
         let of_picture = quantile(&all, self.picture_quantile);
         let complete = |(tile, &noise): (&Described, &f32)| {

@@ -91,6 +91,26 @@ impl PictureContrast {
         (blocks_of(place.y, place.height), blocks_of(place.x, place.width))
     }
 
+    /// The worst window around a block of each of the zones that the picture divides into, with as many blocks as it has:
+    /// of equal size, near `edge` blocks.
+    pub(super) fn zones(&self, edge: usize, window: usize) -> Vec<(f64, usize)> {
+        let divide = |all: &Range<usize>| {
+            let count = ((all.len() as f64 / edge as f64).round() as usize).max(1);
+            let (start, length) = (all.start, all.len());
+            (0..count).map(move |i| start + i * length / count..start + (i + 1) * length / count)
+        };
+        let zone = |(rows, columns): (Range<usize>, Range<usize>)| {
+            let blocks = rows.len() * columns.len();
+            let windows = rows.flat_map(|y| columns.clone().map(move |x| (y, x)));
+            (windows.map(|(y, x)| self.around(y, x, window)).fold(0.0, f64::max), blocks)
+        };
+        let (rows, columns) = (&self.rows, &self.columns);
+        divide(rows)
+            .flat_map(|rows| divide(columns).map(move |columns| (rows.clone(), columns)))
+            .map(zone)
+            .collect()
+    }
+
     /// The mean over a window of `edge` blocks around a block; at the edge of the picture, over the nearest window
     /// that lies in it.
     pub(super) fn around(&self, row: usize, column: usize, edge: usize) -> f64 {
@@ -170,6 +190,18 @@ mod tests {
                 prop_assert!((found - mean).abs() < 1e-5 * mean.max(1e-3), "{found} {mean}");
             }
         }
+    }
+
+    /// Two zones of 25 blocks make up 50: the worst window of one lies in it, of the other it is what reaches over.
+    #[test]
+    fn zones_divide_the_picture_evenly() {
+        let noisy =
+            |x: usize, y: usize| if (20..24).contains(&x) && (20..24).contains(&y) { 3.0 } else { 0.0 };
+        let picture = PictureContrast::new(&divided((200, 100), 40, noisy));
+        let zones = picture.zones(24, 1);
+        assert_eq!(zones.iter().map(|zone| zone.1).collect::<Vec<_>>(), [625, 625]);
+        assert!((zones[0].0 - 3.0).abs() < 1e-6 && zones[1].0 == 0.0, "{zones:?}");
+        assert_eq!(picture.zones(1000, 1).len(), 1);
     }
 
     #[test]

@@ -50,7 +50,12 @@ fn the_worst_window_counts_wherever_tiles_end() {
             descriptor.describe_tile(&planes, 50.0).unwrap()
         };
         let tiles: Vec<Described> = grid.tiles().map(describe).collect();
-        descriptor.in_picture(&tiles).iter().map(|raw| amplitude(raw[0])).collect()
+        let numbers = descriptor.in_picture(&tiles);
+        // The picture's noise is that of its worst window here, which is smaller than a zone, whatever the tiles
+        let of_tiles: Vec<f64> = numbers.iter().map(|raw| amplitude(raw[0])).collect();
+        let most = of_tiles.iter().copied().fold(0.0, f64::max);
+        assert!(numbers.iter().all(|raw| (amplitude(raw[3]) / most - 1.0).abs() < 1e-3), "{numbers:?}");
+        of_tiles
     };
     let everywhere = worst(0..128, 64);
     // Windows of 28 pixels fit into 48 columns; of fewer windows, the worst is a little less bad
