@@ -1,0 +1,132 @@
+#!/usr/bin/env python3
+"""Looks at a stopped picture as its viewers do, with the package `cvvdp` and no code of this project:
+
+    pip install cvvdp pillow scipy OpenEXR
+    look.py people FOLDER-WITH-lisic9-AND-lisic-two     what the worst places of zones had lost where people stopped
+    look.py picture STOPPED REFERENCE                   the same of a picture
+    look.py pairs STOPPED REFERENCE OUT                 twenty blind pairs; answer before you open OUT/key.json
+
+STOPPED and REFERENCE are folders of `noisefloor render`, with different seeds. Both are shown at the exposure
+of the reference. The difference is scaled by sqrt(N / (N + n)) for the noise of the reference, except in pairs."""
+import csv, json, math, pathlib, random, secrets, sys
+import numpy as np, torch
+from PIL import Image
+from scipy.ndimage import uniform_filter
+import pycvvdp
+from at_the_stop import load, shown
+
+torch.set_num_threads(1)
+mapped = pycvvdp.cvvdp(display_name="standard_fhd", heatmap="raw", quiet=True)
+plain = pycvvdp.cvvdp(display_name="standard_fhd", quiet=True)
+
+
+def contrast(test, truth, edge):
+    """Root mean square of visible contrast in a window around each pixel (Mantiuk et al. 2024, 3.7, turned back)."""
+    _, stats = mapped.predict(test, truth, dim_order="HWC")
+    lost = np.maximum(10 * stats["heatmap"].squeeze().float().cpu().numpy(), 0)
+    difference = np.where(lost > 0.04396 * 0.1 ** 0.9302, (lost / 0.04396) ** (1 / 0.9302),
+                          lost / (0.04396 * 0.1 ** (0.9302 - 1)))
+    return np.sqrt(uniform_filter(difference ** (2 / 2.2644), edge))
+
+
+def lost(test, truth):
+    """JOD that a crop has lost, as an 8-bit picture of its own."""
+    bits = lambda a: np.round(np.clip(a, 0, 1) * 255).astype(np.uint8)
+    return 10 - float(plain.predict(bits(test), bits(truth), dim_order="HWC")[0])
+
+
+def inside(box, edge):
+    x, y, w, h = box
+    half = edge // 2
+    return slice(y + half, y + h - half), slice(x + half, x + w - half)
+
+
+def people(root):
+    print("| scene | contrast, worst window of a zone | JOD lost by its worst 64×64 | by the zone |")
+    print("|---|---|---|---|")
+    for folder in ("lisic9", "lisic-two"):
+        rows = list(csv.DictReader(open(root / folder / "thresholds.csv")))
+        for scene in sorted({r["scene"] for r in rows}):
+            files = sorted((root / folder / scene).glob("*.png"), key=lambda p: int(p.stem))
+            read = lambda p: np.asarray(Image.open(p).convert("RGB"), dtype=np.float32) / 255
+            last, many = read(files[-1]), int(files[-1].stem)
+            early = [p for p in files if int(p.stem) <= many / 3][-1]
+            of_one = (read(early) - last) / math.sqrt(1 / int(early.stem) - 1 / many)
+            zones = [r for r in rows if r["scene"] == scene]
+            # The last picture contains the samples of the earlier ones
+            noise = [1 / max(1 / min(float(r["human_spp"]), 0.999 * many) - 1 / many, 1e-9) for r in zones]
+            typical = math.exp(np.mean(np.log(noise)))
+            noisy = np.clip(last + of_one / math.sqrt(typical), 0, 1)
+            narrow, wide = contrast(noisy, last, 28), contrast(noisy, last, 64)
+            c, crops, whole = [], [], []
+            for r, m in zip(zones, noise):
+                x, y, w, h = box = [int(r[k]) for k in ("x", "y", "width", "height")]
+                c.append(narrow[inside(box, 28)].max() * math.sqrt(typical / m))
+                field = wide[inside(box, 64)]
+                v, u = np.unravel_index(field.argmax(), field.shape)
+                test = last + of_one / math.sqrt(m)
+                part = slice(y + v, y + v + 64), slice(x + u, x + u + 64)
+                crops.append(lost(test[part], last[part]))
+                zone = slice(y, y + h), slice(x, x + w)
+                whole.append(lost(test[zone], last[zone]))
+            print(f"| {scene} | {math.exp(np.mean(np.log(c))):.2f} ({min(c):.2f} to {max(c):.2f}) | {np.mean(crops):.2f} "
+                  f"({min(crops):.2f} to {max(crops):.2f}) | {np.mean(whole):.2f} |", flush=True)
+
+
+def pictures(stopped, reference, scaled):
+    gain = json.load(open(pathlib.Path(reference) / "report.json"))["exposure"]
+    (rgb, n), (truth, many) = load(stopped), load(reference)
+    scale = np.sqrt(many / (many + n))[..., None] if scaled else 1
+    return [np.asarray(shown(a, gain), dtype=np.float32) / 255 for a in (truth + (rgb - truth) * scale, truth)]
+
+
+def picture(stopped, reference):
+    for scaled in (True, False):
+        test, truth = pictures(stopped, reference, scaled)
+        h, w = truth.shape[:2]
+        narrow = contrast(test, truth, 28)[inside((0, 0, w, h), 28)]
+        crop = lambda x, y: lost(test[y:y + 64, x:x + 64], truth[y:y + 64, x:x + 64])
+        at = {(x, y): crop(x, y) for y in range(0, h - 63, 16) for x in range(0, w - 63, 16)}
+        tiles = [v for (x, y), v in at.items() if x % 64 == 0 and y % 64 == 0]
+        worst = max(at, key=at.get)
+        print(f"{'scaled' if scaled else 'as it is'}: contrast in the worst window {narrow.max():.2f}; JOD lost by crops of 64: "
+              f"worst {at[worst]:.2f} at {worst}; of those that are tiles worst {max(tiles):.2f}, median {np.median(tiles):.2f}")
+
+
+def pairs(stopped, reference, out):
+    test, truth = pictures(stopped, reference, False)
+    h, w = truth.shape[:2]
+    noisy, seed, places = contrast(test, truth, 28), secrets.randbits(64), []
+    chance = random.Random(seed)
+    # The ten worst places, apart by 32 pixels or more, and ten more anywhere
+    for i in np.argsort(-noisy, axis=None):
+        y, x = (int(v) for v in np.unravel_index(i, noisy.shape))
+        x, y = min(max(x - 32, 0), w - 64), min(max(y - 32, 0), h - 64)
+        if all(max(abs(x - a), abs(y - b)) >= 32 for a, b in places):
+            places.append((x, y))
+        if len(places) == 10:
+            break
+    places += [(chance.randrange(w - 63), chance.randrange(h - 63)) for _ in range(10)]
+    chance.shuffle(places)
+    out.mkdir(parents=True, exist_ok=True)
+    key = []
+    for i, (x, y) in enumerate(places, 1):
+        canvas, left = Image.new("RGB", (320, 160), (118, 118, 118)), chance.random() < 0.5
+        for picture, at in ((test, 64 if left else 192), (truth, 192 if left else 64)):
+            part = np.round(picture[y:y + 64, x:x + 64] * 255).astype(np.uint8)
+            canvas.paste(Image.fromarray(part), (at, 48))
+        canvas.save(out / f"pair{i:02}.png")
+        key.append(dict(pair=i, x=x, y=y, noisy="left" if left else "right"))
+    (out / "key.json").write_text(json.dumps(dict(seed=seed, key=key)))
+
+
+if __name__ == "__main__":
+    match sys.argv[1:]:
+        case ["people", root]:
+            people(pathlib.Path(root))
+        case ["picture", stopped, reference]:
+            picture(stopped, reference)
+        case ["pairs", stopped, reference, out]:
+            pairs(stopped, reference, pathlib.Path(out))
+        case _:
+            sys.exit(__doc__)
