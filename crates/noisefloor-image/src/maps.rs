@@ -64,15 +64,15 @@ impl ColourScale {
     }
 }
 
-/// The scale of visible noise, as multiples of what is just seen: always the same, so that maps of different
+/// The scale of visible noise, as multiples of what the asked share of people does not see: always the same, so that maps of different
 /// pictures and stages compare.
 pub const NOISE_SCALE: ColourScale = ColourScale {
-    title: "visible noise\n1 = not seen",
+    title: "visible noise\nseen above 1",
     low: 0.25,
     high: 4.0,
     log: true,
     colours: INFERNO,
-    landmark: Some((1.0, "seen")),
+    landmark: Some((1.0, "limit")),
 };
 
 /// An RGB picture to draw on, also with `embedded_graphics`. Whatever lies outside is left out.

@@ -134,7 +134,8 @@ mod tests {
                         let spp = 20.0 * 1.3f64.powi(i);
                         let noise = noise_at_one / (spp as f32).sqrt();
                         let mut descriptor: Vec<f32> = (0..dimensions).map(|_| uniform()).collect();
-                        descriptor[0] = noise.ln();
+                        // In a unit in which people stop at 1: the descriptor has a floor of noise
+                        descriptor[0] = (100.0 * noise).ln();
                         Level { spp, origin: Origin::Real, noise, descriptor }
                     })
                     .collect();
@@ -189,7 +190,7 @@ mod tests {
         let before = train(&plain, &params, String::new(), None).unwrap();
         for (noise, sees_noise) in [(0.005f32, true), (0.02, false)] {
             let mut descriptor = vec![0.5; Descriptor::default().dimensions()];
-            descriptor[0] = noise.ln();
+            descriptor[0] = (100.0 * noise).ln();
             let answer = Answer { group: "mine".into(), spp: 100.0, descriptor, sees_noise };
             let told = Table { answers: vec![answer.clone(); 3], ..plain.clone() };
             assert_ne!(told.digest(), plain.digest());

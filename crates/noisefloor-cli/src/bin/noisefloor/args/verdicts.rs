@@ -2,7 +2,7 @@
 
 use crate::job::Limits;
 use clap::{Args, ValueEnum, ValueHint};
-use noisefloor::{Audience, Params, Schedule, tile::DEFAULT_TILE};
+use noisefloor::{Audience, Params, Schedule};
 use noisefloor_cli::options::{renderer::RendererArgs, values};
 use noisefloor_cli::refuse;
 use noisefloor_rivals::RivalSpec;
@@ -62,7 +62,7 @@ pub struct VerdictArgs {
     /// Tile edge in pixels, 16…512; below 64, verdicts are less certain.
     #[arg(
         long,
-        default_value_t = DEFAULT_TILE,
+        default_value_t = TILE,
         value_name = "PIXELS"
     )]
     pub tile: usize,
@@ -80,6 +80,10 @@ pub enum Preset {
     Draft,
     Final,
 }
+
+/// Windows are what is judged, whatever the tiles, and in smaller tiles fewer samples go where no window asks for them:
+/// tiles of 64 pixels take two thirds of what tiles of 128 take to the same worst window (docs/benchmarks/tiles.md).
+const TILE: usize = 64;
 
 /// A quarter of the samples: twice the noise.
 const DRAFT: Audience = Audience { slope: 0.25, offset: 0.0 };
