@@ -153,9 +153,11 @@ fn spaced_verdicts_stop_about_where_frequent_ones_do() {
     };
     let (every, rounds) = count(Schedule::Every { step: 20 });
     let (spaced, fewer) = count(Schedule::Spaced { step: 20 });
+    // The energy of noise in a window of 28×28 pixels, which filters spread, is known to some 8 %, so that two stops
+    // differ by 11 % and, once in twenty, by 22 %
     for (&every, &spaced) in every.iter().zip(&spaced) {
         assert!(
-            spaced % 20 == 0 && spaced + 20 >= every * 9 / 10 && spaced <= every * 4 / 3 + 20,
+            spaced % 20 == 0 && spaced + 20 >= every * 3 / 4 && spaced <= every * 4 / 3 + 20,
             "{every} {spaced}"
         );
     }

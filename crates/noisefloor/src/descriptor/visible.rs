@@ -135,7 +135,8 @@ impl TileDescriptor for Visible {
         };
         blocks.iter_mut().for_each(|sum| *sum *= (known * known) as f32);
         described.blocks = blocks;
-        described.own[0] = noise_number(self.worst(std::slice::from_ref(&described))[0]);
+        let alone = std::slice::from_ref(&described);
+        described.own[0] = noise_number(worst(&PictureContrast::new(alone), alone)[0]);
         Ok(described)
     }
 
@@ -151,8 +152,9 @@ impl TileDescriptor for Visible {
             // A tile that is apart, or not finite, is as it was described
             if tile.blocks.is_empty() { tile.own[0] } else { noise_number(worst) }
         };
-        let noises: Vec<f32> = tiles.iter().zip(self.worst(tiles)).map(number).collect();
-        self.with_picture(tiles, &noises)
+        let picture = PictureContrast::new(tiles);
+        let noises: Vec<f32> = tiles.iter().zip(worst(&picture, tiles)).map(number).collect();
+        self.with_picture(&picture, tiles, &noises)
     }
 
     fn visible_noise(&self, tiles: &[Described]) -> Option<Vec<Array2<f32>>> {
@@ -196,25 +198,13 @@ impl TileDescriptor for Visible {
 }
 
 impl Visible {
-    /// How strong the noise is in the worst window around a pixel of each tile, with the samples of the tile.
-    fn worst(self, tiles: &[Described]) -> Vec<f64> {
-        let picture = PictureContrast::new(tiles);
-        let worst = |tile: &Described| {
-            let (rows, columns) = picture.blocks(tile.place);
-            let windows = rows.flat_map(|y| columns.clone().map(move |x| (y, x)));
-            let worst = windows.map(|(y, x)| picture.around(y, x, tile.window)).fold(0.0, f64::max);
-            (worst / tile.spp).sqrt() / UNIT
-        };
-        tiles.iter().map(worst).collect()
-    }
-
     /// Appends to each tile's own numbers, of which the first is that of `noises`, those of the picture that the tiles
     /// make up: a quantile of the amplitudes of their noise, and the mean of their light, both by area. Noise is what the tile at hand has with its own
     /// samples and the picture would have with as many.
     ///
     /// The quantile is over parts of the picture as large as the zones that people judged, each by its worst window:
     /// over tiles, it would hang on their size. Where tiles are apart from each other, they are such zones.
-    fn with_picture(self, tiles: &[Described], noises: &[f32]) -> Vec<Vec<f32>> {
+    fn with_picture(self, contrast: &PictureContrast, tiles: &[Described], noises: &[f32]) -> Vec<Vec<f32>> {
         let area: f64 = tiles.iter().map(|t| t.place.pixels() as f64).sum();
         let light = tiles.iter().map(|t| t.place.pixels() as f64 * f64::from(t.own[2])).sum::<f64>() / area;
         let of_one_sample =
@@ -223,7 +213,7 @@ impl Visible {
         let mut all: Vec<(f64, f64)> = match window {
             None => tiles.iter().zip(noises).map(of_one_sample).collect(),
             Some(window) => {
-                let zones = PictureContrast::new(tiles).zones(ZONE * window, window);
+                let zones = contrast.zones(ZONE * window, window);
                 zones.into_iter().map(|(worst, blocks)| (worst.sqrt() / UNIT, blocks as f64)).collect()
             }
         };
@@ -235,6 +225,17 @@ impl Visible {
         };
         tiles.iter().zip(noises).map(complete).collect()
     }
+}
+
+/// How strong the noise is in the worst window around a pixel of each tile of a picture, with the samples of the tile.
+fn worst(picture: &PictureContrast, tiles: &[Described]) -> Vec<f64> {
+    let of_tile = |tile: &Described| {
+        let (rows, columns) = picture.blocks(tile.place);
+        let windows = rows.flat_map(|y| columns.clone().map(move |x| (y, x)));
+        let worst = windows.map(|(y, x)| picture.around(y, x, tile.window)).fold(0.0, f64::max);
+        (worst / tile.spp).sqrt() / UNIT
+    };
+    tiles.iter().map(of_tile).collect()
 }
 
 /// The quantile `q` of values with weights, by increasing value: linear between the middles of the weights, from the
