@@ -170,7 +170,7 @@ mod tests {
         ) {
             let window = 2 * window + 1;
             let square = |x: usize, y: usize| {
-                let hash = (x as u32 * 92_821 ^ y as u32 * 68_917 ^ seed).wrapping_mul(0x9E37_79B1) >> 16;
+                let hash = ((x as u32 * 92_821) ^ (y as u32 * 68_917) ^ seed).wrapping_mul(0x9E37_79B1) >> 16;
                 hash as f32 / 65_536.0
             };
             let picture = PictureContrast::new(&divided((width, height), edge, square));

@@ -167,9 +167,9 @@ fn it_says_how_well_it_is_known() {
 fn fireflies_do_not_lift_it() {
     let (truth, mut noise) = (waves(), Noise::keyed(&[49]));
     let mut halves = met(&truth, |_| 0.9, 30);
-    for i in 0..truth.len() {
+    for value in &mut halves[0] {
         if noise.uniform() < 0.002 {
-            halves[0][i] += 1000.0;
+            *value += 1000.0;
         }
     }
     let found = of_pair(&halves);
