@@ -85,7 +85,7 @@ mod tests {
     fn nothing_runs_on_after_a_failure_to_start() {
         let scratch = tempfile::tempdir().unwrap();
         let program = scratch.path().join("program");
-        std::fs::write(&program, "#!/bin/sh\nsleep 1\ntouch \"$3/ended\"\n").unwrap();
+        std::fs::write(&program, "#!/bin/sh\n/bin/sleep 1\n: >\"$3/ended\"\n").unwrap();
         std::fs::set_permissions(&program, std::fs::Permissions::from_mode(0o755)).unwrap();
         let folder = FarmFolder::new(scratch.path());
         let task = || Task { frame: 0, batches: Vec::new() };

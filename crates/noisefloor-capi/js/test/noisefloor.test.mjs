@@ -78,7 +78,7 @@ test("a picture is rendered until all tiles are done", () => {
 
 /** The same picture in every shape that renderers have. */
 test("pixels may lie in any way", () => {
-  const [width, height] = [50, 40];
+  const [width, height] = [50, 50];
   const plain = batch(width * height, 50, noise(3));
   const shape = (channels, stride, fromBottom) => {
     const floats = new Float32Array(stride * height).fill(NaN);
