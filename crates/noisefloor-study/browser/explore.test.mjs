@@ -80,7 +80,7 @@ test("pictures are dropped, judged and disagreed with by mouse, in a small windo
   await page.locator("#level").fill("0");
   await page.getByText("0 of 6").waitFor();
 
-  // The threshold changes verdicts at once, and the audience what is needed
+  // The share of people changes verdicts at once, and the audience what is needed
   const probability = async () => Number(/P (\d\.\d+)/.exec(await label(page, 0))[1]);
   const need = async () => Number(/, (\d+) spp predicted/.exec(await label(page, 0))?.[1]);
   const before = await need();
@@ -93,11 +93,11 @@ test("pictures are dropped, judged and disagreed with by mouse, in a small windo
   await page.getByText("at 3000 spp").waitFor();
   const p = await probability();
   assert.ok(p > 0.05 && p < 0.99, `P ${p}`);
-  await page.locator("#threshold").fill(Math.max(p - 0.02, 0.05).toFixed(2));
-  await until("a lower threshold converges", async () => (await label(page, 0)).includes(": converged"));
-  await page.locator("#threshold").fill(Math.min(p + 0.02, 0.99).toFixed(2));
+  await page.locator("#people").fill(Math.max(p - 0.02, 0.05).toFixed(2));
+  await until("fewer people are content sooner", async () => (await label(page, 0)).includes(": converged"));
+  await page.locator("#people").fill(Math.min(p + 0.02, 0.99).toFixed(2));
   await until("a higher one does not", async () => (await label(page, 0)).includes(": noise seen"));
-  await page.locator("#threshold").fill("0.9");
+  await page.locator("#people").fill("0.9");
 
   // Disagree, take back by clicking again, and by undoing
   await until("noise at P = 0.9", async () => (await label(page, 0)).includes(": noise seen"));

@@ -75,9 +75,9 @@ fn it_renders_what_our_renderer_does() {
 /// Mean of each tile and channel over 64 batches of 16 samples, and the variance of that mean.
 fn moments(mut source: impl ProgressiveSource) -> Vec<[(f64, f64); 3]> {
     const BATCHES: u64 = 64;
-    let mut sums = vec![[(0.0, 0.0); 3]; 4];
+    let tiles = TileGrid::new(SIZE.0, SIZE.1, 32).unwrap();
+    let mut sums = vec![[(0.0, 0.0); 3]; tiles.len()];
     for batch in 0..BATCHES {
-        let tiles = TileGrid::new(SIZE.0, SIZE.1, 32).unwrap();
         let requests: Vec<_> = tiles.tiles().map(|tile| Request::new(tile, 16 * batch, 16)).collect();
         for (batch, sums) in source.sample(&requests).unwrap().iter().zip(&mut sums) {
             for (c, sum) in sums.iter_mut().enumerate() {
