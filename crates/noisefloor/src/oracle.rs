@@ -171,7 +171,8 @@ impl Oracle {
     }
 
     /// The visible noise of a whole image, row-major, from its tiles as described; NaN where there is none of them.
-    /// 1 is the amplitude at which [`Oracle::people`] of that audience see none: a tile that is converged is nowhere above 1, and one
+    /// 1 is the amplitude at which [`Oracle::people`] of that audience see none: a tile that these
+    /// numbers call converged is nowhere above 1, and one
     /// that is not is above 1 somewhere. `None` if the descriptor does not tell noise from picture.
     pub fn map_visible_noise(
         &self,

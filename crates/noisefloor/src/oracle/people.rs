@@ -112,8 +112,8 @@ impl Spread {
     /// Of that, the part that differs from place to place in one picture: whole pictures scatter by 0.36, single
     /// places by 0.5 (above), and the squares of independent parts add up.
     const PEOPLE_BY_PLACE: f64 = 0.347;
-    /// The share of the variance between scenes that differs from place to place in one scene: a third, by
-    /// predictions for scenes that were left out (`docs/accuracy.md`).
+    /// The share of the variance between scenes that differs from place to place in one scene: an assumption.
+    /// Predictions for scenes that were left out give 0.39 (2026-11-25).
     const SCENES_BY_PLACE: f64 = 1.0 / 3.0;
 
     /// How far ln(samples) lies above the median person's threshold, by the odds of the mean observer's.
