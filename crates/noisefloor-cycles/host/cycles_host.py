@@ -14,6 +14,25 @@ sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 import host
 
 
+# Settings of the scene that samples of a session are not taken by, and those of `adaptive` are
+OWN = [
+    "pixel_filter_type",
+    "filter_width",
+    "sample_clamp_direct",
+    "sample_clamp_indirect",
+    "light_sampling_threshold",
+    "use_guiding",
+    "sampling_pattern",
+    "auto_scrambling_distance",
+    "scrambling_distance",
+    "adaptive_min_samples",
+    "samples",
+    "use_auto_tile",
+    "use_sample_subset",
+    "sample_offset",
+]
+
+
 class Cycles:
     def __init__(self, init):
         if init.get("options"):
@@ -65,6 +84,9 @@ class Cycles:
             setattr(render, f"resolution_{axis}", init.get(side) or own)
         render.resolution_percentage = 100
 
+        # What `adaptive` renders with is the user's own
+        self.own = {name: getattr(cycles, name) for name in OWN if hasattr(cycles, name)}
+
         # Every sample counts in only one pixel, and in full
         cycles.pixel_filter_type, cycles.filter_width = "BOX", 1.0
         cycles.sample_clamp_direct = cycles.sample_clamp_indirect = 0.0
@@ -97,8 +119,28 @@ class Cycles:
                 answers[member] = (samples, self.np.ascontiguousarray(part, self.np.float32))
         return answers
 
-    def reference(self):
-        return None
+    def adaptive(self, threshold, samples, seed):
+        """The picture as Cycles renders it by the settings of the scene, until this noise threshold; not denoised. Its pixel
+        filter is sampled, so that the noise of neighbours stays independent."""
+        cycles, render = self.scene.cycles, self.scene.render
+        names = [*self.own, "use_adaptive_sampling", "adaptive_threshold", "seed"]
+        before = {name: getattr(cycles, name) for name in names}
+        try:
+            for name, value in self.own.items():
+                setattr(cycles, name, value)
+            if hasattr(cycles, "use_sample_subset"):
+                cycles.use_sample_subset = False
+            cycles.sample_offset = 0
+            cycles.use_adaptive_sampling, cycles.adaptive_threshold, cycles.seed = True, threshold, seed
+            if samples:
+                cycles.samples = samples
+            size = render.resolution_x, render.resolution_y
+            aim(render, size, (0, 0, *size))
+            self.shape = (*size[::-1], 3)
+            return self.np.ascontiguousarray(self._render(), self.np.float32)
+        finally:
+            for name, value in before.items():
+                setattr(cycles, name, value)
 
     def first_hits(self, index, samples):
         """Albedo and normals as Cycles gives them to its own denoisers: where a mirror or glass is hit, of what is seen in it."""

@@ -99,9 +99,6 @@ class LuxCore:
             return self._continue_chains(tiles)
         return self._in_blocks(tiles) if self.sobol else self._fresh_sessions(tiles)
 
-    def reference(self):
-        return None
-
     # Setting up
 
     def _configure(self, path, init, engine, sampler):

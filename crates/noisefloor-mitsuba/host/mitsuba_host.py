@@ -54,9 +54,6 @@ class Mitsuba:
     def sample(self, tiles):
         return self.renderer.sample(tiles)
 
-    def reference(self):
-        return None
-
     def first_hits(self, index, samples):
         """Albedo and shading normals, from passes that are seeded apart. Mitsuba has no albedo for some materials: it is black."""
         mi, np, renderer = self.mi, self.np, self.renderer

@@ -7,6 +7,7 @@
 //! - `check.rs`: the contract of a renderer;
 //! - `eyes.rs`: what `noisefloor calibrate` has measured;
 //! - `files.rs`, `stills.rs`, `metrics.rs`: finished pictures;
+//! - `tone.rs`, `tune.rs`: how pictures are shown, and the search for a renderer's own setting;
 //! - `pickle.rs`: how objects go to other processes;
 //! - `pool.rs`: threads that survive a fork.
 //!
@@ -25,6 +26,8 @@ mod pickle;
 mod pool;
 mod session;
 mod stills;
+mod tone;
+mod tune;
 mod verdicts;
 
 use pyo3::prelude::*;
@@ -52,6 +55,10 @@ mod _noisefloor {
     use crate::session::PySession;
     #[pymodule_export]
     use crate::stills::{PyJudged, judge};
+    #[pymodule_export]
+    use crate::tone::PyToneTable;
+    #[pymodule_export]
+    use crate::tune::{PyExcess, PyTuning, excess};
     #[pymodule_export]
     use crate::verdicts::{PyRequest, PyStop, PyTile, PyVerdict};
     use pyo3::prelude::*;

@@ -2,7 +2,7 @@
 
 use crate::arrays::{Picture, plane};
 use crate::errors::{Raise, SizeError};
-use crate::params::{ViewingLike, tone_mapping};
+use crate::params::{ToneLike, ViewingLike, tone_mapping};
 use crate::pickle::reduced;
 use crate::pool;
 use noisefloor::{ToneMapping, Viewing, display::Display};
@@ -110,14 +110,14 @@ fn restored(map: &PyReadonlyArray2<'_, f32>) -> DifferenceMap {
 ///
 /// Raises SizeError, ParameterError, and PictureError if a value is not finite or the pictures are too small.
 #[pyfunction]
-#[pyo3(signature = (image, reference, *, tone_mapping = "reinhard", key = 0.18, white = None, exposure = 1.0,
+#[pyo3(signature = (image, reference, *, tone_mapping = None, key = 0.18, white = None, exposure = 1.0,
     viewing = None, encoding = "linear"))]
 #[expect(clippy::too_many_arguments, reason = "Python names them")]
 pub(crate) fn metrics(
     py: Python<'_>,
     image: &Bound<'_, PyAny>,
     reference: &Bound<'_, PyAny>,
-    tone_mapping: &str,
+    tone_mapping: Option<ToneLike>,
     key: f32,
     white: Option<f32>,
     exposure: f32,

@@ -1,6 +1,7 @@
 //! Parameters, unchecked until a session or a picture uses them, and viewing conditions.
 
 use crate::errors::{ParameterError, Raise, whole};
+use crate::tone::PyToneTable;
 use noisefloor::{Audience, Params, Schedule, ToneMapping, Viewing};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
@@ -67,8 +68,8 @@ impl PyViewing {
 ///
 /// tile: edge of a tile in pixels, 16 to 512; tiles of the last column and row have half to one and a half
 ///     times as many.
-/// tone_mapping: "reinhard" (exposure by the log-average of the picture, with key and white) or "srgb" (with
-///     exposure, a factor on radiance).
+/// tone_mapping: "reinhard" (None as well; exposure by the log-average of the picture, with key and white), "srgb"
+///     (with exposure, a factor on radiance), or a ToneTable (with exposure).
 /// viewing: on which display the picture is seen, and from how far; a Viewing or its text.
 /// schedule: "spaced" by the expected need, "growing" by half of what a tile has (both in multiples of step),
 ///     or "every" step samples per pixel.
@@ -102,14 +103,28 @@ impl ViewingLike {
     }
 }
 
-/// Tone mapping by its name.
-pub(crate) fn tone_mapping(name: &str, key: f32, white: Option<f32>, exposure: f32) -> PyResult<ToneMapping> {
-    let tone = match name {
-        "reinhard" => ToneMapping::Reinhard { key, white },
-        "srgb" => ToneMapping::Srgb { exposure },
-        _ => {
+/// "reinhard", "srgb", or a table.
+#[derive(FromPyObject)]
+pub(crate) enum ToneLike {
+    Table(PyToneTable),
+    Name(String),
+}
+
+/// Tone mapping by its name, or a table; the first without any.
+pub(crate) fn tone_mapping(
+    tone: Option<ToneLike>,
+    key: f32,
+    white: Option<f32>,
+    exposure: f32,
+) -> PyResult<ToneMapping> {
+    let tone = match tone {
+        None => ToneMapping::Reinhard { key, white },
+        Some(ToneLike::Table(table)) => ToneMapping::Custom { exposure, curve: table.curve },
+        Some(ToneLike::Name(name)) if name == "reinhard" => ToneMapping::Reinhard { key, white },
+        Some(ToneLike::Name(name)) if name == "srgb" => ToneMapping::Srgb { exposure },
+        Some(ToneLike::Name(name)) => {
             return Err(ParameterError::new_err(format!(
-                "{name:?} is no tone mapping: use \"reinhard\" or \"srgb\""
+                "{name:?} is no tone mapping: use \"reinhard\", \"srgb\" or a ToneTable"
             )));
         }
     };
@@ -120,13 +135,13 @@ pub(crate) fn tone_mapping(name: &str, key: f32, white: Option<f32>, exposure: f
 #[pymethods]
 impl PyParams {
     #[new]
-    #[pyo3(signature = (*, tile = 128, tone_mapping = "reinhard", key = 0.18, white = None, exposure = 1.0,
+    #[pyo3(signature = (*, tile = 128, tone_mapping = None, key = 0.18, white = None, exposure = 1.0,
         viewing = None, schedule = "spaced", step = 8, min_spp = 16, max_spp = 10_000, consecutive = 1,
         audience = None))]
     #[expect(clippy::too_many_arguments, reason = "Python names them")]
     fn new(
         #[pyo3(from_py_with = whole)] tile: usize,
-        tone_mapping: &str,
+        tone_mapping: Option<ToneLike>,
         key: f32,
         white: Option<f32>,
         exposure: f32,
@@ -211,7 +226,10 @@ impl PyParams {
                 arguments.set_item("tone_mapping", "srgb")?;
                 arguments.set_item("exposure", short(exposure))?;
             }
-            other => arguments.set_item("tone_mapping", format!("{other:?}"))?, // Python makes none
+            ToneMapping::Custom { exposure, curve } => {
+                arguments.set_item("tone_mapping", PyToneTable::of(curve))?;
+                arguments.set_item("exposure", short(exposure))?;
+            }
         }
         arguments.set_item("viewing", params.viewing.to_string())?;
         let (schedule, step) = match params.schedule {

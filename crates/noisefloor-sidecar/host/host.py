@@ -10,8 +10,8 @@ A host script defines a class and hands it to `serve`:
         def __init__(self, init): ...   # imports the renderer, loads init["scene"]
         info = {...}                    # name, width, height, unit, repeats, warnings
         def sample(self, tiles): ...    # [(samples, array of height x width x 3 float32), ...], in the order of the tiles
-        def reference(self): ...        # None, or an array of the whole image
         def first_hits(self, index, samples): ...   # optional: arrays of the albedo and the normals of the whole image
+        def adaptive(self, threshold, samples, seed): ...   # optional: the whole image, by the renderer's own sampling
 
     host.serve(Renderer)
 
@@ -155,12 +155,6 @@ def _answer(Host, renderer, request, data):
             if samples > 0:
                 payload.append(_bytes(mean, tile["width"], tile["height"]))
         return renderer, {"ok": True, "samples": [int(samples) for samples, _ in batches]}, payload
-    if op == "reference":
-        image = renderer.reference()
-        if image is None:
-            return renderer, {"ok": True, "reference": False}, []
-        payload = [_bytes(image, renderer.info["width"], renderer.info["height"])]
-        return renderer, {"ok": True, "reference": True}, payload
     if op == "first_hits":
         render = getattr(renderer, "first_hits", lambda index, samples: None)
         pictures = render(request["index"], request["samples"])
@@ -169,6 +163,12 @@ def _answer(Host, renderer, request, data):
         albedo, normal = pictures
         width, height = renderer.info["width"], renderer.info["height"]
         return renderer, {"ok": True, "first_hits": True}, [_bytes(albedo, width, height), _bytes(normal, width, height)]
+    if op == "adaptive":
+        render = getattr(renderer, "adaptive", lambda threshold, samples, seed: None)
+        image = render(request["threshold"], request["samples"], request["seed"])
+        if image is None:
+            return renderer, {"ok": True, "adaptive": False}, []
+        return renderer, {"ok": True, "adaptive": True}, [_bytes(image, renderer.info["width"], renderer.info["height"])]
     if op == "filter":
         width, height, names, count = (request[key] for key in ["width", "height", "pictures", "frames"])
         size = 12 * width * height

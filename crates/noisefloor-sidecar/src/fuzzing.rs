@@ -2,7 +2,7 @@
 
 use crate::call::{Described, Reply, batches, describe};
 use crate::frame;
-use crate::message::{Hello, Referenced, Sampled, Status};
+use crate::message::{Adapted, Hello, Sampled, Status};
 use noisefloor::{Counts, Request, Tile};
 
 const LATE: Counts = Counts::Late { overrun: 1 << 17 };
@@ -18,7 +18,7 @@ pub fn read_any_reply(mut bytes: &[u8]) -> bool {
     {
         assert!(!info.name.chars().any(char::is_control));
     }
-    let _ = serde_json::from_slice::<Referenced>(&reply.header);
+    let _ = serde_json::from_slice::<Adapted>(&reply.header);
     if let Ok(header) = serde_json::from_slice::<Sampled>(&reply.header) {
         let tile = |index| Tile { index, x: 4 * index, y: 0, width: 4, height: 4 };
         let requests = [0, 1].map(|index| Request::new(tile(index), 0, 8));

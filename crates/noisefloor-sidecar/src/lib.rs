@@ -37,7 +37,8 @@
 //! |---|---|
 //! | `init` | `name`, `width`, `height`, `unit`, `repeats`, `late` (optional), `warnings` |
 //! | `sample` | `samples`; payload: the means of the new samples of each tile that has any |
-//! | `reference` | `reference` (true or false); payload: the whole image if true |
+//! | `first_hits` | `first_hits` (true or false); payload: albedo and normals of the whole image if true |
+//! | `adaptive` | `adaptive` (true or false); payload: the whole image if true |
 //! | `filter` | payload: one picture |
 //! | `quit` | the process ends after its reply |
 //!
@@ -45,6 +46,9 @@
 //! `options`. `sample` has `tiles`, each with `index`, `x`, `y`, `width`, `height`, `first` and `samples`;
 //! the reply's `samples` has a count for each: at most as many as requested, unless `late` in the reply to
 //! `init` says how many samples, over all pixels of a tile, the renderer takes before it can stop.
+//!
+//! `first_hits` has `index` and `samples`. `adaptive` has `threshold`, `samples` (the most per pixel, or null for
+//! what the scene says) and `seed`: the renderer samples as it likes, until its own noise threshold.
 //!
 //! A host that filters pictures gets `init` with `protocol` and `threads` only, and replies with its `name`. `filter`
 //! has `width`, `height` and `pictures`, the names of the pictures in the payload.
@@ -74,6 +78,7 @@ mod scratch;
 mod setup;
 mod sidecar;
 mod template;
+mod threshold_command;
 
 pub use command::{CommandOptions, CommandSource};
 pub use error::{CommandError, SetupError, SidecarCause, SidecarError};
@@ -85,3 +90,4 @@ pub use picture_filter::{FilterPlan, PictureFilter};
 pub use renderer::{DEFAULT_TIMEOUT, HostOptions, Job, Renderer};
 pub use setup::{HOST, find, install, private_folder, probe};
 pub use sidecar::Sidecar;
+pub use threshold_command::ThresholdCommand;

@@ -96,11 +96,6 @@ pub(crate) struct Filtering<'a> {
 #[derive(Deserialize)]
 pub(crate) struct Filtered {}
 
-#[derive(Deserialize)]
-pub(crate) struct Referenced {
-    pub(crate) reference: bool,
-}
-
 #[derive(Serialize)]
 pub(crate) struct HitFirst {
     pub(crate) op: &'static str,
@@ -112,4 +107,19 @@ pub(crate) struct HitFirst {
 #[derive(Deserialize)]
 pub(crate) struct FirstHitsMade {
     pub(crate) first_hits: bool,
+}
+
+/// A whole picture, sampled by the renderer's own adaptive sampling.
+#[derive(Serialize)]
+pub(crate) struct Adaptive {
+    pub(crate) op: &'static str,
+    pub(crate) threshold: f64,
+    pub(crate) samples: Option<u64>,
+    pub(crate) seed: u32,
+}
+
+/// The picture is its payload, if the renderer has such a threshold.
+#[derive(Deserialize)]
+pub(crate) struct Adapted {
+    pub(crate) adaptive: bool,
 }

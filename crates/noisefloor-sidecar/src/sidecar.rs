@@ -3,13 +3,13 @@
 use crate::call::{Blame, Described, Reply, ask, batches, exactly, rgb};
 use crate::error::{SidecarCause, SidecarError};
 use crate::launch::Launch;
-use crate::message::{FirstHitsMade, HitFirst, Referenced, Sample, TileRequest};
+use crate::message::{Adapted, Adaptive, FirstHitsMade, HitFirst, Sample, TileRequest};
 use crate::process::Process;
 use crate::renderer::{HostOptions, Job, Renderer};
 use crate::setup;
 use noisefloor::{
     Batch, ProgressiveSource, Request, Rgb, SourceError, SourceInfo,
-    source::{FirstHits, Reference, SourceIdentity},
+    source::{FirstHits, SourceIdentity},
     watch::LightCheck,
 };
 use serde::Serialize;
@@ -87,6 +87,28 @@ impl Sidecar {
     /// Its process id, for monitoring; `None` between a failure and the next call.
     pub fn process_id(&self) -> Option<u32> {
         self.process.as_ref().map(Process::id)
+    }
+
+    /// A whole picture as the renderer itself samples it, by its own settings, until its own noise threshold: linear
+    /// radiance, row-major; `None` if this renderer has no such threshold. `samples` is the most per pixel; without
+    /// it, what the scene says. Pictures of two seeds below 2³¹ are independent.
+    ///
+    /// # Errors
+    /// [`SidecarError`] as for samples.
+    pub fn adaptive(
+        &mut self,
+        threshold: f64,
+        samples: Option<u64>,
+        seed: u32,
+    ) -> Result<Option<Vec<Rgb>>, SidecarError> {
+        let pixels = self.info.width * self.info.height;
+        let request = Adaptive { op: "adaptive", threshold, samples, seed };
+        let read = |Reply { header: Adapted { adaptive }, payload }: Reply<Adapted>| {
+            exactly(&payload, if adaptive { pixels } else { 0 })?;
+            Ok(adaptive.then(|| rgb(&payload).collect::<Vec<Rgb>>()))
+        };
+        let doing = format!("rendering until a noise threshold of {threshold}");
+        self.call(&doing, &[], &request, pixels, read)
     }
 
     /// One call, repeated in a new process if that may help.
@@ -224,18 +246,6 @@ impl ProgressiveSource for Sidecar {
             rest = later;
         }
         Ok(batches)
-    }
-
-    fn reference(&mut self) -> Result<Option<Reference>, SourceError> {
-        let SourceInfo { width, height, .. } = self.info;
-        let request = serde_json::json!({"op": "reference"});
-        let read = |Reply { header: Referenced { reference }, payload }: Reply<Referenced>| {
-            let pixels = if reference { width * height } else { 0 };
-            exactly(&payload, pixels)?;
-            Ok(reference.then(|| Reference { width, height, pixels: rgb(&payload).collect() }))
-        };
-        self.call("rendering the reference", &[], &request, width * height, read)
-            .map_err(|error| self.failed(error))
     }
 
     /// Albedo is cut to [0, 1], and what is not finite becomes 0.

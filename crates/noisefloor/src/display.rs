@@ -9,8 +9,10 @@ use thiserror::Error;
 pub(crate) mod exposure;
 mod srgb;
 mod tone_curve;
+mod tone_table;
 pub use srgb::{srgb_decode, srgb_encode};
 pub use tone_curve::ToneCurve;
+pub use tone_table::{ToneTable, ToneTableError};
 
 /// Luminance weights, squared and summed: variance of Y′ for unit variance of R′, G′ and B′.
 #[doc(hidden)]

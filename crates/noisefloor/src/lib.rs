@@ -12,7 +12,8 @@
 //!
 //! What these three need is at the top; the rest is in modules by subject, which lead from samples to a
 //! verdict: [`source`], [`film`], [`display`], [`evidence`], [`descriptor`], [`svm`], [`model`] and
-//! [`oracle`]. [`stills`] judges pictures rendered elsewhere.
+//! [`oracle`]. [`stills`] judges pictures rendered elsewhere, and [`tune`] finds the setting of a renderer at which
+//! nobody sees noise.
 //!
 //! ```
 //! use noisefloor::{Counts, Oracle, Params, Session, StopReason};
@@ -51,6 +52,7 @@ pub mod source;
 pub mod stills;
 pub mod svm;
 pub mod tile;
+pub mod tune;
 pub mod watch;
 
 /// Displays, and how far people sit from them.

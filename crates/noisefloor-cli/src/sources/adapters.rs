@@ -2,7 +2,7 @@
 
 use super::{Opened, Resources, Source, SourceJob, stem};
 use anyhow::Context;
-use noisefloor::Schedule;
+use noisefloor::{Rgb, Schedule};
 use noisefloor_luxcore::{Engine, Sampler};
 use noisefloor_sidecar::{CommandOptions, CommandSource, Job, Renderer, Sidecar, SidecarError};
 use std::fmt;
@@ -16,6 +16,8 @@ pub struct Adapter {
     open: fn(&Job) -> Result<Sidecar, SidecarError>,
     /// Samples per pixel between verdicts, at the least.
     pub step: u64,
+    /// Whether it has a noise threshold of its own, and samples where the noise is above it.
+    pub adapts: bool,
     /// What keeps it from being all it could be here, and what mends that.
     pub notes: fn() -> Vec<String>,
 }
@@ -27,6 +29,7 @@ pub const ADAPTERS: &[Adapter] = &[
         renderer: &noisefloor_mitsuba::RENDERER,
         open: noisefloor_mitsuba::open,
         step: Schedule::STEP,
+        adapts: false,
         notes: noisefloor_mitsuba::notes,
     },
     luxcore("luxcore", |job| noisefloor_luxcore::open(job, Engine::Path, Sampler::Random)),
@@ -43,12 +46,14 @@ pub const ADAPTERS: &[Adapter] = &[
         open: noisefloor_cycles::open,
         // Each call costs it a start
         step: 32,
+        adapts: true,
         notes: Vec::new,
     },
 ];
 
 const fn luxcore(name: &'static str, open: fn(&Job) -> Result<Sidecar, SidecarError>) -> Adapter {
-    Adapter { name, renderer: &noisefloor_luxcore::RENDERER, open, step: Schedule::STEP, notes: Vec::new }
+    let (renderer, step) = (&noisefloor_luxcore::RENDERER, Schedule::STEP);
+    Adapter { name, renderer, open, step, adapts: false, notes: Vec::new }
 }
 
 /// An adapter by its name: its functions have other addresses in every run.
@@ -81,6 +86,10 @@ impl FromStr for &'static Adapter {
 }
 
 impl Source for Sidecar {
+    fn adaptive(&mut self, threshold: f64, most: Option<u64>, seed: u32) -> anyhow::Result<Option<Vec<Rgb>>> {
+        Ok(Sidecar::adaptive(self, threshold, most, seed)?)
+    }
+
     fn notes(&self) -> Vec<String> {
         let note = |error| format!("the renderer was started again: {error}").replace('\n', " ");
         self.restarts().iter().map(note).collect()

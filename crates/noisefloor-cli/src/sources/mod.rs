@@ -10,7 +10,7 @@ use crate::say::note;
 use crate::spell::{JobPath, as_typed};
 use anyhow::{Context, bail};
 use indicatif::ProgressBar;
-use noisefloor::{ProgressiveSource, Schedule, stills::SampleOrigin};
+use noisefloor::{ProgressiveSource, Rgb, Schedule, stills::SampleOrigin};
 use noisefloor_image::StackSource;
 use noisefloor_ptwne::{
     Estimator, Filter, Ptwne, ReferenceNoise, RenderOptions, SampleCounts, Sampling, scenes,
@@ -123,6 +123,17 @@ pub trait Source: ProgressiveSource {
     /// What noise its reference was left with, where it has rendered one and can tell.
     fn reference_noise(&self) -> Option<&ReferenceNoise> {
         None
+    }
+
+    /// A whole picture of this seed as the renderer itself samples it, until its own noise threshold; `None` if it
+    /// has none.
+    fn adaptive(
+        &mut self,
+        _threshold: f64,
+        _most: Option<u64>,
+        _seed: u32,
+    ) -> anyhow::Result<Option<Vec<Rgb>>> {
+        Ok(None)
     }
 
     /// What the user should know after the run.

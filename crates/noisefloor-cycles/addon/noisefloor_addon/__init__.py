@@ -1,4 +1,5 @@
-"""Render until nobody sees noise: an add-on for Blender, 3.4 and 4.2 to 5.x."""
+"""Find the noise threshold at which nobody sees noise, or render until nobody does: an add-on for Blender, 3.4 and 4.2
+to 5.x."""
 
 import glob
 import os
@@ -29,9 +30,9 @@ except ImportError:
 
 import bpy
 
-from . import hooks, panel, settings
+from . import hooks, panel, settings, tune
 
-CLASSES = (settings.Settings, panel.RENDER_PT_noisefloor)
+CLASSES = (settings.Settings, tune.RENDER_OT_noisefloor_threshold, panel.RENDER_PT_noisefloor)
 
 
 def register():
@@ -39,9 +40,13 @@ def register():
         bpy.utils.register_class(each)
     bpy.types.Scene.noisefloor = bpy.props.PointerProperty(type=settings.Settings)
     hooks.register()
+    if hasattr(bpy.types, "CYCLES_RENDER_PT_sampling_render"):
+        bpy.types.CYCLES_RENDER_PT_sampling_render.append(tune.draw)
 
 
 def unregister():
+    if hasattr(bpy.types, "CYCLES_RENDER_PT_sampling_render"):
+        bpy.types.CYCLES_RENDER_PT_sampling_render.remove(tune.draw)
     hooks.unregister()
     del bpy.types.Scene.noisefloor
     for each in reversed(CLASSES):

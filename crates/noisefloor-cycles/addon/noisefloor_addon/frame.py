@@ -16,12 +16,12 @@ NOISY, ALBEDO, NORMAL = "Noisy Image", "Denoising Albedo", "Denoising Normal"
 
 class Frame:
     """engine: Cycles' RenderEngine, which Blender has asked for a layer. cycles: renders what the evaluated
-    scene says.
+    scene says. shown: how the picture is displayed, see display.py.
 
     Only the evaluated scene and the engine's own copy of the render settings are changed. They are gone
     after the frame, and no file, undo step or window ever sees them."""
 
-    def __init__(self, engine, depsgraph, cycles):
+    def __init__(self, engine, depsgraph, cycles, shown):
         self.engine, self.cycles, self.depsgraph = engine, cycles, depsgraph
         self.scene, self.layer = depsgraph.scene_eval, depsgraph.view_layer_eval.name
         self.settings = self.scene.noisefloor
@@ -41,7 +41,7 @@ class Frame:
             f"{seed} frame {self.scene.frame_current}" if self.scene.cycles.use_animated_seed else seed
         )
         self.session = noisefloor.Session(
-            *self.size, settings.oracle(self.settings), settings.params(self.scene, sampling.BATCH)
+            *self.size, settings.oracle(self.settings), settings.params(self.scene, sampling.BATCH, shown)
         )
         self.sums = passes.Sums(*self.size)
         self.begun, self.sampled = time.monotonic(), 0

@@ -18,7 +18,7 @@ import numpy
 from bpy.app.handlers import persistent
 from gpu_extras.presets import draw_texture_2d
 
-from . import maps
+from . import display, maps, passes
 from .frame import Frame
 
 original = {}
@@ -32,6 +32,10 @@ class State:
         self.status, self.images, self.summary, self.still = None, {}, "", None
         self.rendering = self.written = False
         self.borrowed = self.frame = self.texture = None
+        # How the picture is displayed
+        self.shown = None
+        # Of a search for the threshold: whether pictures are wanted, those of each layer, and how a render ended
+        self.wanted, self.rendered, self.ended = False, {}, None
 
 
 state = State()
@@ -78,7 +82,13 @@ def draw(engine, context, depsgraph):
 
 def render(engine, depsgraph):
     if not wanted(engine, depsgraph):
-        return original["render"](engine, depsgraph)
+        original["render"](engine, depsgraph)
+        if state.wanted and not engine.is_preview and not engine.test_break():
+            layer, result = depsgraph.view_layer_eval.name, engine.get_result()
+            size = result.resolution_x, result.resolution_y
+            pictures = passes.read(engine, layer, size)
+            state.rendered[layer] = {name: picture.copy() for name, picture in pictures.items()}
+        return None
     if not engine.render.use_persistent_data or engine.render.use_multiview:
         why = "stereoscopy" if engine.render.use_multiview else "scenes rendered for another scene"
         engine.report(
@@ -103,7 +113,7 @@ def _render(engine, depsgraph):
     # same. Everything else has been read when the layer began
     depsgraph.update()
     depsgraph.scene_eval.camera.update_tag(refresh={"OBJECT"})
-    frame = state.frame = Frame(engine, depsgraph, cycles)
+    frame = state.frame = Frame(engine, depsgraph, cycles, state.shown)
 
     def report(frame):
         text, share = _progress(frame)
@@ -184,6 +194,7 @@ def before_copy(scene, *_):
     if scene.noisefloor.use and scene.render.engine == "CYCLES":
         state.borrowed = scene.render.use_persistent_data
         scene.render.use_persistent_data = True
+        state.shown = display.table(scene)
 
 
 @persistent
@@ -198,7 +209,18 @@ def written(scene, *_):
 
 
 @persistent
-def ended(scene, *_):
+def completed(scene, *_):
+    state.ended = "completed"
+    ended(scene)
+
+
+@persistent
+def cancelled(scene, *_):
+    state.ended = "cancelled"
+    ended(scene)
+
+
+def ended(scene):
     after_copy(scene)
     state.rendering, state.status = False, None
     if scene.noisefloor.use and scene.render.engine == "CYCLES":
@@ -253,8 +275,8 @@ HANDLERS = [
     ("render_init", before_copy),
     ("render_pre", after_copy),
     ("render_write", written),
-    ("render_complete", ended),
-    ("render_cancel", ended),
+    ("render_complete", completed),
+    ("render_cancel", cancelled),
 ]
 
 

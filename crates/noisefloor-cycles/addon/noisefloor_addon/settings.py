@@ -67,26 +67,33 @@ def oracle(settings):
     return noisefloor.Oracle(settings.people)
 
 
-def params(scene, batch):
-    """How tiles are judged. Verdicts come after whole batches."""
-    settings, view = scene.noisefloor, scene.view_settings
-    people = {"viewing": settings.viewing}
-    if settings.viewing == "mine":
-        eyes = noisefloor.eyes()
-        if eyes is None:
-            raise ValueError(
-                "your eyes are unknown: run `noisefloor calibrate`, or choose where the picture is seen"
-            )
-        people = {"viewing": eyes.viewing, "audience": eyes.audience}
-    tone = {"tone_mapping": "reinhard"}
-    if view.view_transform in ("Standard", "Raw"):
-        tone = {"tone_mapping": "srgb", "exposure": 2.0**view.exposure}
+def people(scene):
+    """Who looks, and where."""
+    settings = scene.noisefloor
+    if settings.viewing != "mine":
+        return {"viewing": settings.viewing}
+    eyes = noisefloor.eyes()
+    if eyes is None:
+        raise ValueError(
+            "your eyes are unknown: run `noisefloor calibrate`, or choose where the picture is seen"
+        )
+    return {"viewing": eyes.viewing, "audience": eyes.audience}
+
+
+def params(scene, batch, shown):
+    """How tiles are judged; shown: as display.table() says. Verdicts come after whole batches."""
+    settings = scene.noisefloor
     most = max(settings.max_samples // batch, 2) * batch
     return noisefloor.Params(
         tile=settings.tile,
         step=batch,
         min_spp=min(-(-settings.min_samples // batch) * batch, most),
         max_spp=most,
-        **people,
-        **tone,
+        tone_mapping=shown,
+        **people(scene),
     )
+
+
+def still_params(scene, shown):
+    """How finished pictures are judged."""
+    return noisefloor.Params(tile=64, tone_mapping=shown, **people(scene))

@@ -12,7 +12,8 @@ A renderer pushes samples into a Session, which names the tiles that need more a
     picture = session.image()
 
 check() tries a renderer before that, judge() judges finished pictures, metrics() compares two, and read()
-and write() know EXR and PNG files. Pictures are arrays of shape (height, width, 3) with linear radiance,
+and write() know EXR and PNG files. Tuning finds a renderer's own noise threshold, or its samples, at which
+nobody sees noise. Pictures are arrays of shape (height, width, 3) with linear radiance,
 Rec. 709 primaries. C-contiguous float32 arrays are read where they lie; others are converted. Requests can
 be pickled, so that other processes can render. Every error is a noisefloor.Error.
 """
@@ -22,6 +23,7 @@ from ._noisefloor import (
     CheckpointError,
     CriterionError,
     Error,
+    Excess,
     Eyes,
     FaultError,
     Judged,
@@ -36,10 +38,13 @@ from ._noisefloor import (
     SizeError,
     Stop,
     Tile,
+    ToneTable,
+    Tuning,
     Verdict,
     Viewing,
     __version__,
     check,
+    excess,
     eyes,
     judge,
     metrics,
@@ -52,6 +57,7 @@ __all__ = [
     "CheckpointError",
     "CriterionError",
     "Error",
+    "Excess",
     "Eyes",
     "FaultError",
     "Judged",
@@ -66,9 +72,12 @@ __all__ = [
     "SizeError",
     "Stop",
     "Tile",
+    "ToneTable",
+    "Tuning",
     "Verdict",
     "Viewing",
     "check",
+    "excess",
     "eyes",
     "judge",
     "metrics",

@@ -20,8 +20,17 @@ class CriterionError(Error): ...
 class CheckpointError(Error): ...
 class PictureError(Error): ...
 
-_ToneMapping = Literal["reinhard", "srgb"]
 _Encoding = Literal["linear", "srgb"]
+
+@final
+class ToneTable:
+    def __new__(cls, table: ArrayLike, toe: float = 0.001, top: float = 1000.0) -> ToneTable: ...
+    @staticmethod
+    def radiances(n: int, toe: float = 0.001, top: float = 1000.0) -> NDArray[np.float32]: ...
+    def __eq__(self, value: object, /) -> bool: ...
+    def __ne__(self, value: object, /) -> bool: ...
+
+_ToneMapping = Literal["reinhard", "srgb"] | ToneTable
 
 @final
 class Viewing:
@@ -59,7 +68,7 @@ class Params:
         cls,
         *,
         tile: int = 128,
-        tone_mapping: _ToneMapping = "reinhard",
+        tone_mapping: _ToneMapping | None = None,
         key: float = 0.18,
         white: float | None = None,
         exposure: float = 1.0,
@@ -224,6 +233,41 @@ class Session:
     def resume(self, path: str | os.PathLike[str], job: str) -> None: ...
 
 @final
+class Excess:
+    @property
+    def ratio(self) -> float: ...
+    @property
+    def place(self) -> tuple[int, int] | None: ...
+    def map(self) -> NDArray[np.float32]: ...
+
+def excess(
+    a: ArrayLike,
+    b: ArrayLike,
+    *,
+    oracle: Oracle | None = None,
+    params: Params | None = None,
+    denoised: tuple[ArrayLike, ArrayLike] | None = None,
+    lost: float = 0.3,
+    spp: float = 128.0,
+) -> Excess: ...
+@final
+class Tuning:
+    def __new__(
+        cls,
+        *,
+        threshold: tuple[float, float] | None = None,
+        samples: tuple[int, int] | None = None,
+    ) -> Tuning: ...
+    def next(self) -> float | None: ...
+    def tell(self, excess: Excess | float) -> None: ...
+    @property
+    def ending(self) -> Literal["found", "at-finest", "unchanged", "not-falling"] | None: ...
+    @property
+    def setting(self) -> float | None: ...
+    @property
+    def steps(self) -> list[tuple[float, float]]: ...
+
+@final
 class Judged:
     @property
     def verdicts(self) -> list[Verdict]: ...
@@ -261,7 +305,7 @@ def metrics(
     image: ArrayLike,
     reference: ArrayLike,
     *,
-    tone_mapping: _ToneMapping = "reinhard",
+    tone_mapping: _ToneMapping | None = None,
     key: float = 0.18,
     white: float | None = None,
     exposure: float = 1.0,

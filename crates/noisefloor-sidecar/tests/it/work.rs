@@ -1,5 +1,5 @@
 use crate::kit::{Fake, SIZE, expected, requests, tiles};
-use noisefloor::{ProgressiveSource, Repeats, Request, Tile, Unit, source::Reference};
+use noisefloor::{ProgressiveSource, Repeats, Request, Tile, Unit};
 use std::num::NonZeroUsize;
 
 #[test]
@@ -48,11 +48,14 @@ fn what_is_asked_for_reaches_the_renderer() {
 }
 
 #[test]
-fn a_reference_comes_whole() {
-    let Some(fake) = Fake::new("have a reference") else { return };
-    let reference = fake.open().unwrap().reference().unwrap();
-    let pixels = vec![[0.25; 3]; SIZE.0 * SIZE.1];
-    assert_eq!(reference, Some(Reference { width: SIZE.0, height: SIZE.1, pixels }));
+fn an_adaptive_picture_comes_whole() {
+    let Some(fake) = Fake::new("sample adaptively") else { return };
+    let picture = fake.open().unwrap().adaptive(0.25, Some(64), 7).unwrap();
+    assert_eq!(picture, Some(vec![[0.25, 64.0, 7.0]; SIZE.0 * SIZE.1]));
+    let picture = fake.open().unwrap().adaptive(0.5, None, 0).unwrap();
+    assert_eq!(picture, Some(vec![[0.5, 0.0, 0.0]; SIZE.0 * SIZE.1]));
+    let Some(fake) = Fake::new("work") else { return };
+    assert_eq!(fake.open().unwrap().adaptive(0.5, None, 0).unwrap(), None);
 }
 
 /// More tiles than one header may name: as many calls as it takes, and nothing of it shows.

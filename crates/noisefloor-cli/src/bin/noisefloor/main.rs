@@ -14,6 +14,7 @@ mod output;
 mod reference;
 mod render;
 mod scenes;
+mod tune;
 
 use args::{Cli, Command, ELSEWHERE, ScenesCommand};
 use noisefloor_cli::{end, manual};
@@ -34,6 +35,7 @@ fn run(command: Command) -> anyhow::Result<ExitCode> {
         Command::Render(args) if args.is_sequence() => render::render_frames(&args.check_frames()?),
         Command::Render(args) => render::run(&args.check()?),
         Command::Frame => render::one_frame(),
+        Command::Tune(args) => tune::run(args.check()?),
         Command::Calibrate(args) => calibrate::run(args.check()?).map(done),
         Command::Farm(args) => farm::run(args.check()?),
         Command::Reference(args) => reference::run(args.check()?),

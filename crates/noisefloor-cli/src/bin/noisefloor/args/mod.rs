@@ -11,6 +11,7 @@ mod metrics;
 mod reference;
 mod render;
 mod scenes;
+mod tune;
 mod verdicts;
 
 pub use calibrate::{CalibrateArgs, Simulated};
@@ -23,6 +24,7 @@ pub use metrics::MetricsArgs;
 pub use reference::ReferenceArgs;
 pub use render::RenderArgs;
 pub use scenes::{CheckArgs, ScenesCommand};
+pub use tune::TuneArgs;
 
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use clap_complete::Shell;
@@ -33,7 +35,8 @@ use std::path::PathBuf;
 ///
 /// noisefloor has learned from people when to stop: observers said at how many samples per pixel (spp) they
 /// could no longer tell parts of real renders from the converged picture. `render` stops each tile of the
-/// built-in path tracer, or of another renderer. `judge` looks at pictures rendered elsewhere. `metrics`
+/// built-in path tracer, or of another renderer. `tune` finds the noise threshold of a renderer, or its
+/// samples, at which nobody sees noise. `judge` looks at pictures rendered elsewhere. `metrics`
 /// compares a picture with its reference. Another command, `noisefloor-lab`, trains models, compares
 /// criteria and asks people.
 #[derive(Debug, Parser)]
@@ -56,6 +59,7 @@ pub enum Command {
     /// One frame of a sequence, as another process says.
     #[command(hide = true)]
     Frame,
+    Tune(Box<TuneArgs>),
     Farm(FarmArgs),
     Reference(ReferenceArgs),
     Judge(JudgeArgs),

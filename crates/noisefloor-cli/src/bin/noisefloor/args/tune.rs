@@ -1,0 +1,171 @@
+//! `noisefloor tune`.
+
+use crate::tune::{KnobChoice, TuneCriterion, TuneJob};
+use clap::Args;
+use noisefloor::Audience;
+use noisefloor::tune::{Knob, Tuning};
+use noisefloor_cli::folder::Earlier;
+use noisefloor_cli::options::denoiser::DenoiserChoice;
+use noisefloor_cli::options::eyes::EyesArgs;
+use noisefloor_cli::options::oracle::OracleArgs;
+use noisefloor_cli::options::renderer::RendererArgs;
+use noisefloor_cli::options::tone::ToneArgs;
+use noisefloor_cli::options::values;
+use noisefloor_cli::options::viewing::ViewingArgs;
+use noisefloor_cli::refuse;
+use noisefloor_cli::sources::SourceKind;
+use noisefloor_denoise::DEFAULT_JODS_LOST;
+use std::ffi::OsString;
+use std::path::PathBuf;
+
+/// Find the renderer's own setting at which nobody sees noise: a noise threshold, or samples per pixel.
+///
+/// Renderers with a noise threshold (Cycles, and any program) know better than tiles where samples go; what
+/// nobody knows is the number. From a coarse setting on, two pictures of different seeds are rendered, and the
+/// noise that both leave is judged where it is worst; the next setting follows from how it falls, until nobody
+/// sees noise. That takes two to four steps, each a fraction of the next. The mean of the last two pictures is
+/// as good as one with the setting found; --keep writes it.
+///
+/// With --denoise, the denoised picture is judged: how many just-objectionable differences (JOD) its worst
+/// square of 64 pixels has lost. Nobody has been asked about denoised pictures: the limit is the vision model's.
+///
+/// Without a noise threshold (`ptwne`, `mitsuba`, `luxcore`), samples per pixel are sought, the same everywhere;
+/// `render` takes fewer, since it stops tile by tile.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  noisefloor tune shot.blend --source cycles                  Cycles' noise threshold
+  noisefloor tune shot.blend --source cycles --denoise oidn   for a picture that will be denoised
+  noisefloor tune shot.blend --source cycles --tone-mapping lut:agx.cube --lut-input log2:-10,6.5
+  noisefloor tune hall/scene.xml --source mitsuba             samples per pixel
+  noisefloor tune --source 'command: myrender {scene} --noise {threshold} --seed {seed} -o {out}.exr' hall.ass
+  noisefloor tune cornell-box --size 192x192 --keep out/tuned --json")]
+pub struct TuneArgs {
+    /// Scene, as for `render`.
+    #[arg(value_name = "SCENE")]
+    scene: Option<OsString>,
+    /// What is sought [default: the noise threshold, where the renderer has one].
+    #[arg(long, value_enum)]
+    knob: Option<KnobChoice>,
+    /// Where the search begins: the coarsest threshold, or the fewest samples [default: 0.2, or 16].
+    #[arg(long, value_name = "SETTING")]
+    from: Option<f64>,
+    /// Where it ends: the finest threshold, or the most samples [default: 0.001, or 16384].
+    #[arg(long, value_name = "SETTING")]
+    to: Option<f64>,
+    /// With a threshold: the most samples per pixel of one picture, whatever the threshold [default: what the
+    /// scene says; for a program 16384].
+    #[arg(long, value_name = "SPP")]
+    max_spp: Option<u64>,
+    /// Judge the picture that this denoiser makes of the samples: `oidn`, Open Image Denoise (`noisefloor doctor
+    /// --install oidn`).
+    #[arg(long, value_enum, conflicts_with_all = ["model", "threshold", "people"])]
+    denoise: Option<DenoiserChoice>,
+    /// With --denoise: just-objectionable differences (JOD) that a square of 64 pixels may have lost.
+    #[arg(long, value_name = "JOD", requires = "denoise", default_value_t = DEFAULT_JODS_LOST, value_parser = values::jods)]
+    lost: f64,
+    /// Write the mean of the last two pictures, what is left in it, and tune.json into this folder.
+    #[arg(long, value_name = "DIR")]
+    keep: Option<PathBuf>,
+    /// With --keep: overwrite what is in the folder.
+    #[arg(long, requires = "keep")]
+    force: bool,
+    /// Print JSON instead of lines.
+    #[arg(long)]
+    json: bool,
+    /// No progress, and nothing but the setting on standard output.
+    #[arg(long, short, conflicts_with = "json")]
+    quiet: bool,
+    #[command(flatten, next_help_heading = "Renderer")]
+    renderer: RendererArgs,
+    #[command(flatten, next_help_heading = "What people see")]
+    oracle: OracleArgs,
+    #[command(flatten, next_help_heading = "What people see")]
+    tone: ToneArgs,
+    #[command(flatten, next_help_heading = "What people see")]
+    viewing: ViewingArgs,
+    #[command(flatten, next_help_heading = "What people see")]
+    eyes: EyesArgs,
+}
+
+impl TuneArgs {
+    pub fn check(self) -> anyhow::Result<TuneJob> {
+        let tone = self.tone.check()?.load()?;
+        let (source, resources) = self.renderer.check(self.scene.as_deref())?;
+        let (adapts, name) = match &source.kind {
+            SourceKind::Adapter(adapter) => (adapter.adapts, adapter.name),
+            SourceKind::Command(template) => (template.contains("{threshold}"), "command"),
+            SourceKind::Ptwne(_) => (false, "ptwne"),
+            SourceKind::Exr => refuse!("--source exr plays back pictures, and has no setting to find"),
+        };
+        let choice = self.knob.unwrap_or(if adapts { KnobChoice::Threshold } else { KnobChoice::Samples });
+        match (choice, &source.kind, adapts) {
+            (KnobChoice::Threshold, SourceKind::Command(_), false) => {
+                refuse!("--knob threshold: the command does not hold {{threshold}}")
+            }
+            (KnobChoice::Threshold, _, false) => refuse!(
+                "--source {name} has no noise threshold that could be tuned; --knob samples finds samples per pixel"
+            ),
+            (KnobChoice::Samples, SourceKind::Command(_), true) => {
+                refuse!("--knob samples: the command holds {{threshold}}; leave it out")
+            }
+            (KnobChoice::Samples, _, _) if self.max_spp.is_some() => {
+                refuse!("--max-spp bounds a search for a threshold; with --knob samples, --to does")
+            }
+            _ => {}
+        }
+        let whole = |option, value: Option<f64>, default: u64| -> anyhow::Result<u64> {
+            match value {
+                None => Ok(default),
+                Some(n) if n.fract() == 0.0 && (2.0..1e15).contains(&n) => Ok(n as u64),
+                Some(n) => refuse!("{option} {n}: a whole number of samples is needed, at least 2"),
+            }
+        };
+        let knob = match choice {
+            KnobChoice::Threshold => {
+                Knob::Threshold { coarsest: self.from.unwrap_or(0.2), finest: self.to.unwrap_or(0.001) }
+            }
+            KnobChoice::Samples => Knob::Samples {
+                least: whole("--from", self.from, 16)?,
+                most: whole("--to", self.to, 16_384)?,
+            },
+        };
+        let tuning = match Tuning::new(knob) {
+            Ok(tuning) => tuning,
+            Err(error) => refuse!("--from, --to: {error}"),
+        };
+        let (criterion, viewing, audience) = if self.denoise.is_some() {
+            self.eyes.unused("--denoise")?;
+            (TuneCriterion::Denoised { lost: self.lost }, self.viewing.or_default(), Audience::TRAINED)
+        } else {
+            let said = [("--viewing", self.viewing.typed().is_some())];
+            let eyes = self.eyes.of(self.oracle.model.as_deref(), &said)?;
+            let oracle = self.oracle.check()?;
+            if !oracle.maps_visible_noise() {
+                refuse!("this model does not say how strong noise is; the bundled model does");
+            }
+            let viewing = match &eyes {
+                Some(person) => person.viewing(),
+                None => self.viewing.judged_by(&oracle)?,
+            };
+            let (oracle, audience) = match eyes {
+                Some(person) => (oracle.with_scatter(person.uncertainty()), person.audience()),
+                None => (oracle, Audience::TRAINED),
+            };
+            (TuneCriterion::Noise(Box::new(oracle)), viewing, audience)
+        };
+        Ok(TuneJob {
+            source,
+            resources,
+            tuning,
+            most_spp: self.max_spp,
+            criterion,
+            tone,
+            viewing,
+            audience,
+            keep: self.keep,
+            earlier: Earlier::of(self.force, false),
+            json: self.json,
+            quiet: self.quiet,
+        })
+    }
+}

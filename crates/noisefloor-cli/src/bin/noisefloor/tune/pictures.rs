@@ -1,0 +1,244 @@
+//! Two pictures of a setting, and how far they are from what may be seen.
+
+use super::TuneCriterion;
+use anyhow::{Context, bail};
+use indicatif::ProgressBar;
+use noisefloor::source::FirstHits;
+use noisefloor::stills::StillError;
+use noisefloor::tune::{Excess, Knob, PicturePair};
+use noisefloor::{Film, Params, ProgressiveSource, Rgb, TileGrid, display::Display};
+use noisefloor_cli::say::note;
+use noisefloor_cli::sources::{FIRST_HITS_SPP, Opened, Resources, Source, SourceJob, SourceKind};
+use noisefloor_denoise::{DenoisedError, DenoisedHalves, Denoiser, NoisyPicture, Oidn};
+use noisefloor_sidecar::{FilterPlan, ThresholdCommand};
+use std::time::Duration;
+
+/// Samples per pixel between two looks at the signals.
+const BATCH: u64 = 64;
+/// Most samples per pixel of a program that nobody has told how many.
+const MOST_SPP: u64 = 16_384;
+
+/// Who renders pairs.
+pub enum Pictures {
+    /// Samples per pixel, everywhere alike; of each half of a film, which grows.
+    Samples { source: Box<dyn Source>, film: Film },
+    /// By the renderer's own noise threshold.
+    Adaptive { source: Box<dyn Source>, most: Option<u64>, seeds: [u32; 2] },
+    /// By that of a program.
+    Program { command: ThresholdCommand, most: u64, seeds: [u32; 2] },
+}
+
+/// A pair as it was rendered.
+pub struct Pair {
+    size: (usize, usize),
+    pictures: [Vec<Rgb>; 2],
+    /// Of each, where it is known.
+    spp: Option<f64>,
+}
+
+/// What was found of a pair, and the picture that people would look at.
+pub struct Judged {
+    pub excess: Excess,
+    pub size: (usize, usize),
+    /// Mean of both, as rendered.
+    pub mean: Vec<Rgb>,
+    /// That denoised, if it was to be.
+    pub denoised: Option<Vec<Rgb>>,
+    pub display: Display,
+    /// What is left: noise, 1 is the limit; or JODs lost.
+    pub map: Vec<f32>,
+    /// Samples per pixel of the mean.
+    pub spp: Option<f64>,
+}
+
+impl Pictures {
+    pub fn open(
+        job: &SourceJob,
+        resources: Resources,
+        knob: Knob,
+        most: Option<u64>,
+    ) -> anyhow::Result<Self> {
+        let seeds = seeds(job.seed);
+        if let (SourceKind::Command(template), Knob::Threshold { .. }) = (&job.kind, knob) {
+            let scene = job.scene.as_deref().map(Into::into);
+            let command = ThresholdCommand::new(template, scene, job.size, resources.timeout)?;
+            return Ok(Self::Program { command, most: most.unwrap_or(MOST_SPP), seeds });
+        }
+        let opened = job.open(resources)?;
+        opened.warn();
+        let Opened { source, .. } = opened;
+        if let Knob::Threshold { .. } = knob {
+            return Ok(Self::Adaptive { source, most, seeds });
+        }
+        let info = source.info();
+        let film = Film::new(TileGrid::new(info.width, info.height, super::TILE)?);
+        Ok(Self::Samples { source, film })
+    }
+
+    /// Albedo and normals, if the source has them.
+    fn guides(&mut self) -> anyhow::Result<Option<[FirstHits; 2]>> {
+        let (Self::Samples { source, .. } | Self::Adaptive { source, .. }) = self else { return Ok(None) };
+        let Some(a) = source.first_hits(0, FIRST_HITS_SPP)? else { return Ok(None) };
+        Ok(source.first_hits(1, FIRST_HITS_SPP)?.map(|b| [a, b]))
+    }
+
+    /// What the user should know afterwards.
+    pub fn notes(&self) -> Vec<String> {
+        match self {
+            Self::Samples { source, .. } | Self::Adaptive { source, .. } => source.notes(),
+            Self::Program { .. } => Vec::new(),
+        }
+    }
+
+    /// Two pictures, each with this setting.
+    pub fn pair(&mut self, each: f64, bar: &ProgressBar) -> anyhow::Result<Pair> {
+        match self {
+            Self::Samples { source, film } => grow(source.as_mut(), film, each as u64, bar),
+            Self::Adaptive { source, most, seeds } => {
+                let info = source.info();
+                let mut one = |seed| {
+                    let picture = source.adaptive(each, *most, seed)?;
+                    picture.with_context(|| format!("{} has no noise threshold", info.name))
+                };
+                let pictures = [one(seeds[0])?, one(seeds[1])?];
+                Ok(Pair { size: (info.width, info.height), pictures, spp: None })
+            }
+            Self::Program { command, most, seeds } => {
+                let (a, b) = (command.render(each, *most, seeds[0])?, command.render(each, *most, seeds[1])?);
+                if (a.width, a.height) != (b.width, b.height) {
+                    bail!(
+                        "the program wrote {}×{} and then {}×{} pixels",
+                        a.width,
+                        a.height,
+                        b.width,
+                        b.height
+                    );
+                }
+                Ok(Pair { size: (a.width, a.height), pictures: [a.pixels, b.pixels], spp: None })
+            }
+        }
+    }
+}
+
+/// Two seeds in 31 bits that follow from one; scattered, since some programs derive correlated random numbers from
+/// neighbouring seeds.
+fn seeds(seed: u64) -> [u32; 2] {
+    let scatter = |n: u64| {
+        // The finaliser of SplitMix64 (Steele et al. 2014)
+        let mut z = seed.wrapping_mul(2).wrapping_add(n).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((z ^ (z >> 31)) >> 33) as u32
+    };
+    [scatter(0), scatter(1)]
+}
+
+/// Samples the whole picture until each half has so many samples per pixel.
+fn grow(source: &mut dyn Source, film: &mut Film, each: u64, bar: &ProgressBar) -> anyhow::Result<Pair> {
+    let grid = film.grid();
+    loop {
+        let have = film.spp(0);
+        let Some(missing) = (2 * each).checked_sub(have).filter(|missing| *missing > 0) else { break };
+        bar.set_message(format!("{have} of {} samples per pixel", 2 * each));
+        // A request belongs to the half with fewer: in pairs, both stay alike
+        let spp = missing.div_ceil(2).min(BATCH);
+        let requests: Vec<_> = grid.tiles().map(|tile| film.request(tile.index, spp)).collect();
+        for batch in source.sample(&requests)? {
+            if batch.spp == 0 {
+                bail!("the source has no more samples");
+            }
+            film.add(batch.tile.index, batch.spp, &batch.mean)?;
+        }
+    }
+    let mut pictures = [0, 1].map(|_| vec![[0.0; 3]; grid.width() * grid.height()]);
+    for tile in grid.tiles() {
+        for pixel in tile.rows(grid.width()).flatten() {
+            let [(a, _), (b, _)] = film.pixel_halves(tile.index, pixel);
+            (pictures[0][pixel], pictures[1][pixel]) = (a, b);
+        }
+    }
+    Ok(Pair { size: (grid.width(), grid.height()), pictures, spp: Some(each as f64) })
+}
+
+/// What judges pairs.
+pub struct Judges<'a> {
+    criterion: &'a TuneCriterion,
+    params: Params,
+    denoiser: Option<(Oidn, Option<[FirstHits; 2]>)>,
+    /// The first pair warns.
+    warned: bool,
+}
+
+impl<'a> Judges<'a> {
+    pub fn begin(
+        criterion: &'a TuneCriterion,
+        params: Params,
+        pictures: &mut Pictures,
+        timeout: Duration,
+    ) -> anyhow::Result<Self> {
+        let denoiser = match criterion {
+            TuneCriterion::Noise(_) => None,
+            TuneCriterion::Denoised { .. } => {
+                let mut plan = FilterPlan::default();
+                plan.timeout = timeout;
+                Some((Oidn::start(plan)?, pictures.guides()?))
+            }
+        };
+        Ok(Self { criterion, params, denoiser, warned: false })
+    }
+
+    /// What the verdict is about, in words.
+    pub fn said(&self) -> String {
+        match (self.criterion, &self.denoiser) {
+            (TuneCriterion::Denoised { lost }, Some((denoiser, _))) => format!(
+                "at most {lost} JOD lost after {}, by the vision model: nobody has been asked",
+                denoiser.name()
+            ),
+            (TuneCriterion::Noise(oracle), _) => {
+                format!("for {} of people, {}", oracle.people(), self.params.viewing)
+            }
+            (TuneCriterion::Denoised { lost }, None) => format!("at most {lost} JOD lost"),
+        }
+    }
+
+    pub fn judge(&mut self, pair: Pair) -> anyhow::Result<Judged> {
+        let Pair { size, pictures, spp } = pair;
+        let halves = PicturePair::new(size, pictures.clone(), spp.unwrap_or(128.0));
+        let halves = halves.map_err(|error| match error {
+            StillError::Same => anyhow::anyhow!(
+                "two pictures of different seeds are the same: the renderer does not look at the seed, or the scene \
+                 has no noise"
+            ),
+            other => other.into(),
+        })?;
+        let compared = halves.compare(&self.params)?;
+        if !std::mem::replace(&mut self.warned, true) {
+            compared.warnings().iter().for_each(|warning| note!("warning: {warning}"));
+        }
+        let display = *compared.display();
+        let spp = spp.map(|each| 2.0 * each);
+        let mean = halves.mean().to_vec();
+        match (self.criterion, &mut self.denoiser) {
+            (TuneCriterion::Denoised { lost }, Some((denoiser, guides))) => {
+                let wants = denoiser.wants();
+                let guided = |pixels, half: usize| {
+                    let picture = NoisyPicture::new(size, pixels);
+                    guides.as_ref().map_or(picture, |guides| picture.guided(&guides[half], wants))
+                };
+                let noisy = [pictures[0].as_slice(), &pictures[1]];
+                let [a, b] = denoiser.denoise_both([&guided(noisy[0], 0), &guided(noisy[1], 1)])?;
+                let error =
+                    DenoisedError::new(&DenoisedHalves { size, noisy, denoised: [&a, &b] }, &display)?;
+                let (excess, map) = error.excess(*lost, &self.params.viewing)?;
+                let excess = Excess { pictures: halves.digest(), ..excess };
+                let denoised = Some(denoiser.denoise(&guided(&mean, 0))?);
+                Ok(Judged { excess, size, mean, denoised, display, map, spp })
+            }
+            (TuneCriterion::Noise(oracle), _) => {
+                let (excess, map) = halves.noise(oracle, &self.params)?;
+                Ok(Judged { excess, size, mean, denoised: None, display, map, spp })
+            }
+            (TuneCriterion::Denoised { .. }, None) => bail!("the denoiser was not started"),
+        }
+    }
+}

@@ -1,0 +1,202 @@
+"""Find Noise Threshold: the setting of Cycles' own adaptive sampling at which nobody sees noise.
+
+Cycles renders two pictures of different seeds with a coarse threshold, noisefloor says how far their mean is from what
+people would see, and the next threshold follows, until it passes. Then the threshold is written into the scene, as if it
+had been typed: Blender renders as ever, on any device, on any farm."""
+
+import time
+
+import bpy
+import noisefloor
+
+from . import denoise, display, hooks, settings
+
+COARSEST, FINEST = 0.2, 0.001
+ALBEDO, NORMAL = "Denoising Albedo", "Denoising Normal"
+ENDINGS = {
+    "at-finest": "even the finest threshold tried is not enough",
+    "unchanged": "a finer threshold changes nothing: Max Samples is reached first, raise it",
+    "not-falling": "more samples do not help: what is wrong is no noise",
+}
+
+
+class Search:
+    """A search, step by step. Settings of the scene are borrowed while a picture is rendered, and given back."""
+
+    def __init__(self, scene):
+        self.scene, self.denoised = scene, scene.cycles.use_denoising
+        self.library = denoise.library() if self.denoised else None
+        if self.denoised and self.library is None:
+            raise ValueError("this Blender has no Open Image Denoise: turn Denoise off")
+        self.tuning = noisefloor.Tuning(threshold=(COARSEST, FINEST))
+        self.oracle = settings.oracle(scene.noisefloor)
+        self.params = settings.still_params(scene, display.table(scene))
+        self.pictures, self.excess, self.begun, self.seconds = [], None, 0.0, 0.0
+        self.borrowed = []
+
+    @property
+    def done(self):
+        return self.tuning.next() is None
+
+    def borrow(self):
+        """What the next picture is rendered with."""
+        scene, layers = self.scene, self.scene.view_layers
+        cycles = scene.cycles
+        wanted = [
+            (scene.noisefloor, "use", False),
+            (cycles, "use_adaptive_sampling", True),
+            (cycles, "adaptive_threshold", self.tuning.next()),
+            (cycles, "seed", (cycles.seed * 2 + len(self.pictures) + 1) % 2**31),
+            (cycles, "use_animated_seed", False),
+            (cycles, "use_denoising", False),
+            (scene.render, "use_compositing", False),
+            (scene.render, "use_sequencer", False),
+        ]
+        if self.denoised:
+            wanted += [(layer.cycles, "denoising_store_passes", True) for layer in layers]
+        self.borrowed = [(group, name, getattr(group, name)) for group, name, _ in wanted]
+        for group, name, value in wanted:
+            setattr(group, name, value)
+        hooks.state.wanted = True
+        self.begun = time.monotonic()
+
+    def give_back(self):
+        """Settings as they were."""
+        hooks.state.wanted = False
+        for group, name, value in self.borrowed:
+            setattr(group, name, value)
+        self.borrowed = []
+
+    def take(self):
+        """The picture that was rendered; after the second, what they say."""
+        rendered, hooks.state.rendered = hooks.state.rendered, {}
+        self.give_back()
+        if not rendered:
+            raise ValueError("nothing was rendered; is there a view layer that is used for rendering?")
+        # The layer that people see first stands for the frame
+        self.pictures.append(next(iter(rendered.values())))
+        self.seconds += time.monotonic() - self.begun
+        if len(self.pictures) < 2:
+            return
+        pictures, self.pictures = self.pictures, []
+        noisy = [picture["Combined"][..., :3] for picture in pictures]
+        denoised = None
+        if self.denoised:
+            denoised = tuple(
+                denoise.denoise(self.library, radiance, picture.get(ALBEDO), picture.get(NORMAL))
+                for radiance, picture in zip(noisy, pictures)
+            )
+        try:
+            self.excess = noisefloor.excess(*noisy, oracle=self.oracle, params=self.params, denoised=denoised)
+        except noisefloor.PictureError as error:
+            if "identical" not in str(error):
+                raise
+            raise ValueError("two pictures of different seeds are the same: there is no noise to see") from error
+        self.last, self.seconds = self.seconds, 0.0
+        self.tuning.tell(self.excess)
+
+    def status(self):
+        """One line on how far it is."""
+        steps = self.tuning.steps
+        text = f"noisefloor: picture {len(self.pictures) + 1} of 2"
+        if steps:
+            text += f"; {steps[-1][0]:.3g} leaves {steps[-1][1]:.2f} times what may be seen"
+        return text
+
+    def finish(self):
+        """Writes what was found into the scene; returns what it says."""
+        if self.tuning.setting is None:
+            raise ValueError(ENDINGS[self.tuning.ending])
+        cycles = self.scene.cycles
+        cycles.use_adaptive_sampling, cycles.adaptive_threshold = True, self.tuning.setting
+        people = (
+            "nobody would see what is wrong with the denoised picture, by the vision model"
+            if self.denoised
+            else f"{self.scene.noisefloor.people:.0%} of people see no noise"
+        )
+        # One picture with the setting takes what both took with a coarser one
+        share = (self.tuning.steps[-1][0] / self.tuning.setting) ** 2
+        return f"{self.tuning.setting:.3g}: {people}; about {self.last * share:.0f} s a frame"
+
+
+class RENDER_OT_noisefloor_threshold(bpy.types.Operator):
+    """Render small steps until people stop seeing noise, and set Cycles' noise threshold to what that took"""
+
+    bl_idname = "render.noisefloor_threshold"
+    bl_label = "Find Noise Threshold"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context):
+        scene = context.scene
+        return scene.render.engine == "CYCLES" and scene.camera is not None
+
+    def execute(self, context):
+        """All at once: without windows, and from scripts."""
+        try:
+            search = Search(context.scene)
+            while not search.done:
+                search.borrow()
+                try:
+                    bpy.ops.render.render()
+                finally:
+                    search.give_back()
+                search.take()
+                print(search.status(), flush=True)
+            self.report({"INFO"}, self.tell(search.finish()))
+        except (ValueError, noisefloor.Error) as error:
+            self.report({"ERROR"}, f"noisefloor: {error}")
+            return {"CANCELLED"}
+        return {"FINISHED"}
+
+    def tell(self, text):
+        hooks.state.summary = text
+        return text
+
+    def invoke(self, context, event):
+        if bpy.app.background:
+            return self.execute(context)
+        try:
+            self.search = Search(context.scene)
+        except (ValueError, noisefloor.Error) as error:
+            self.report({"ERROR"}, f"noisefloor: {error}")
+            return {"CANCELLED"}
+        self.timer = context.window_manager.event_timer_add(0.25, window=context.window)
+        context.window_manager.modal_handler_add(self)
+        self.start(context)
+        return {"RUNNING_MODAL"}
+
+    def start(self, context):
+        hooks.state.ended = None
+        self.search.borrow()
+        context.workspace.status_text_set(self.search.status() + "; Esc stops")
+        bpy.ops.render.render("INVOKE_DEFAULT")
+
+    def modal(self, context, event):
+        if event.type != "TIMER" or hooks.state.ended is None:
+            return {"PASS_THROUGH"}
+        try:
+            if hooks.state.ended == "cancelled":
+                self.search.give_back()
+                return self.end(context, {"CANCELLED"})
+            self.search.take()
+            if not self.search.done:
+                self.start(context)
+                return {"RUNNING_MODAL"}
+            self.report({"INFO"}, self.tell(self.search.finish()))
+            return self.end(context, {"FINISHED"})
+        except (ValueError, noisefloor.Error) as error:
+            self.search.give_back()
+            self.report({"ERROR"}, f"noisefloor: {error}")
+            return self.end(context, {"CANCELLED"})
+
+    def end(self, context, how):
+        context.window_manager.event_timer_remove(self.timer)
+        context.workspace.status_text_set(None)
+        return how
+
+
+def draw(panel, context):
+    """Beside Cycles' own field."""
+    if context.scene.cycles.use_adaptive_sampling:
+        panel.layout.operator(RENDER_OT_noisefloor_threshold.bl_idname, icon="VIEWZOOM")

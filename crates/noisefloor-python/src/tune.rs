@@ -1,0 +1,228 @@
+//! The search for a renderer's own setting.
+
+use crate::arrays::{Pixels, plane};
+use crate::errors::{CriterionError, ParameterError, PictureError, Raise, SizeError, whole};
+use crate::oracle::PyOracle;
+use crate::params::PyParams;
+use crate::pool;
+use noisefloor::tune::{Ending, Excess, Knob, Next, PairError, PicturePair, Tuning};
+use noisefloor::{Oracle, Params, Rgb};
+use noisefloor_denoise::{DEFAULT_JODS_LOST, DenoisedError, DenoisedHalves};
+use numpy::PyArray2;
+use pyo3::prelude::*;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+/// Edge of the tiles in which noise is described.
+const TILE: usize = 64;
+
+/// How far the mean of two pictures is from what may be seen, in its worst place.
+#[pyclass(frozen, name = "Excess", module = "noisefloor")]
+pub(crate) struct PyExcess {
+    excess: Excess,
+    size: (usize, usize),
+    map: Vec<f32>,
+}
+
+#[pymethods]
+impl PyExcess {
+    /// What is wrong in the worst place over what may be wrong: 1 or less passes. Infinite where it cannot be told.
+    #[getter]
+    fn ratio(&self) -> f64 {
+        self.excess.ratio
+    }
+
+    /// The worst place, (x, y).
+    #[getter]
+    fn place(&self) -> Option<(usize, usize)> {
+        self.excess.place
+    }
+
+    /// map() --
+    ///
+    /// What is left, an array of shape (height, width): visible noise, of which 1 is the limit; or of denoised pictures
+    /// the JODs lost.
+    fn map<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f32>>> {
+        plane(py, self.size, self.map.clone())
+    }
+
+    fn __repr__(&self) -> String {
+        format!("<Excess ratio={:.3} place={:?}>", self.excess.ratio, self.excess.place)
+    }
+}
+
+/// Tuning(*, threshold=None, samples=None) --
+///
+/// The search for the setting of a renderer at which nobody sees noise: its noise threshold, or samples per pixel.
+///
+/// threshold: (coarsest, finest), such as (0.2, 0.001). samples: (least, most), such as (16, 4096). One of both.
+///
+///     tuning = noisefloor.Tuning(threshold=(0.2, 0.001))
+///     while (each := tuning.next()) is not None:
+///         tuning.tell(noisefloor.excess(render(each, seed=1), render(each, seed=2)))
+///     print(tuning.ending, tuning.setting)
+///
+/// The mean of the last two pictures is as good as one with the setting found.
+///
+/// Raises ParameterError if the range is empty.
+#[pyclass(frozen, name = "Tuning", module = "noisefloor")]
+pub(crate) struct PyTuning(Mutex<Tuning>);
+
+impl PyTuning {
+    fn lock(&self) -> MutexGuard<'_, Tuning> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn end(&self) -> Option<Ending> {
+        match self.lock().next() {
+            Next::Done(ending) => Some(ending),
+            Next::Render { .. } => None,
+        }
+    }
+}
+
+#[pymethods]
+impl PyTuning {
+    #[new]
+    #[pyo3(signature = (*, threshold = None, samples = None))]
+    fn new(threshold: Option<(f64, f64)>, samples: Option<(u64, u64)>) -> PyResult<Self> {
+        let knob = match (threshold, samples) {
+            (Some((coarsest, finest)), None) => Knob::Threshold { coarsest, finest },
+            (None, Some((least, most))) => Knob::Samples { least, most },
+            _ => {
+                return Err(ParameterError::new_err(
+                    "give threshold=(coarsest, finest) or samples=(least, most)",
+                ));
+            }
+        };
+        let tuning = Tuning::new(knob).map_err(|error| ParameterError::new_err(error.to_string()))?;
+        Ok(Self(Mutex::new(tuning)))
+    }
+
+    /// next() --
+    ///
+    /// What two pictures are to be rendered with, each with a seed of its own, the same seeds in every step; None at the
+    /// end. The same until tell().
+    fn next(&self) -> Option<f64> {
+        match self.lock().next() {
+            Next::Render { each, .. } => Some(each),
+            Next::Done(_) => None,
+        }
+    }
+
+    /// tell(excess) --
+    ///
+    /// What was found of the two pictures: an Excess, or its ratio.
+    fn tell(&self, excess: ExcessLike<'_>) {
+        let excess = match excess {
+            ExcessLike::Whole(whole) => whole.excess,
+            ExcessLike::Ratio(ratio) => Excess::new(ratio),
+        };
+        self.lock().tell(excess);
+    }
+
+    /// How it ended: "found", "at-finest" (even the finest setting is not enough), "unchanged" (two settings gave the
+    /// same pictures), or "not-falling" (more samples do not make it better); None before that.
+    #[getter]
+    fn ending(&self) -> Option<&'static str> {
+        Some(match self.end()? {
+            Ending::Found { .. } => "found",
+            Ending::AtFinest { .. } => "at-finest",
+            Ending::Unchanged => "unchanged",
+            Ending::NotFalling { .. } => "not-falling",
+        })
+    }
+
+    /// The setting that is just enough; None unless one was found.
+    #[getter]
+    fn setting(&self) -> Option<f64> {
+        match self.end()? {
+            Ending::Found { setting, .. } => Some(setting),
+            _ => None,
+        }
+    }
+
+    /// What was tried: (setting, ratio) of each step. One picture with the setting is as good as the mean of the two
+    /// that were rendered for it.
+    #[getter]
+    fn steps(&self) -> Vec<(f64, f64)> {
+        self.lock().steps().iter().map(|step| (step.setting, step.excess.ratio)).collect()
+    }
+}
+
+/// An Excess, or its ratio.
+#[derive(FromPyObject)]
+enum ExcessLike<'py> {
+    Whole(PyRef<'py, PyExcess>),
+    Ratio(f64),
+}
+
+/// How far the mean of two pictures is from what may be seen, in its worst place: an Excess.
+///
+/// a, b: arrays of shape (height, width, 3) with linear radiance, all finite, rendered with the same setting and
+///     different seeds.
+/// oracle: an Oracle; None is Oracle(). params: display and audience; None is Params(). Windows are judged, whatever the
+///     tile.
+/// denoised: what a denoiser makes of a and of b, each without a look at the other. Then the ratio is that of the
+///     just-objectionable differences (JOD) that the worst square of 64 pixels has lost to lost; nobody has been asked
+///     about denoised pictures.
+/// spp: samples per pixel of each, for an audience that is no factor.
+///
+/// The interpreter's lock is released.
+///
+/// Raises SizeError, CriterionError, and PictureError if the pictures cannot be judged: the same twice, for example.
+#[pyfunction]
+#[pyo3(signature = (a, b, *, oracle = None, params = None, denoised = None, lost = DEFAULT_JODS_LOST, spp = 128.0))]
+#[expect(clippy::too_many_arguments, reason = "Python names them")]
+pub(crate) fn excess(
+    py: Python<'_>,
+    a: Pixels<'_>,
+    b: Pixels<'_>,
+    oracle: Option<PyRef<'_, PyOracle>>,
+    params: Option<PyParams>,
+    denoised: Option<(Pixels<'_>, Pixels<'_>)>,
+    lost: f64,
+    spp: f64,
+) -> PyResult<PyExcess> {
+    if !(lost > 0.0 && lost.is_finite()) {
+        return Err(ParameterError::new_err(format!("lost must be a positive number of JOD, not {lost}")));
+    }
+    let oracle = oracle.map_or_else(Oracle::bundled, |oracle| oracle.0.clone());
+    let params = params.map_or_else(|| Params::default().with_tile(TILE), |params| params.0);
+    let copy = |pixels: &Pixels<'_>| {
+        let (width, height, pixels) = pixels.get();
+        ((width, height), pixels.into_owned())
+    };
+    let (size, a) = copy(&a);
+    let (other, b) = copy(&b);
+    if size != other {
+        return Err(SizeError::new_err(format!("the pictures have different sizes, {size:?} and {other:?}")));
+    }
+    let denoised = denoised.map(|(a, b)| [copy(&a).1, copy(&b).1]);
+    py.detach(|| pool::run(|| compare(&oracle, &params, size, [a, b], denoised, lost, spp)))
+}
+
+fn compare(
+    oracle: &Oracle,
+    params: &Params,
+    size: (usize, usize),
+    pictures: [Vec<Rgb>; 2],
+    denoised: Option<[Vec<Rgb>; 2]>,
+    lost: f64,
+    spp: f64,
+) -> PyResult<PyExcess> {
+    let pair = PicturePair::new(size, pictures.clone(), spp).map_err(Raise::raise)?;
+    let Some([da, db]) = denoised else {
+        let (excess, map) = pair.noise(oracle, params).map_err(|error| match error {
+            PairError::Still(error) => error.raise(),
+            PairError::Size(error) => error.raise(),
+            other => CriterionError::new_err(other.to_string()),
+        })?;
+        return Ok(PyExcess { excess, size, map });
+    };
+    let failed = |error: &dyn std::error::Error| PictureError::new_err(error.to_string());
+    let compared = pair.compare(params).map_err(Raise::raise)?;
+    let halves = DenoisedHalves { size, noisy: [&pictures[0], &pictures[1]], denoised: [&da, &db] };
+    let error = DenoisedError::new(&halves, compared.display()).map_err(|error| failed(&error))?;
+    let (excess, map) = error.excess(lost, &params.viewing).map_err(|error| failed(&error))?;
+    Ok(PyExcess { excess: Excess { pictures: pair.digest(), ..excess }, size, map })
+}

@@ -1,0 +1,66 @@
+//! Any program that samples until a noise threshold of its own.
+
+use crate::error::CommandError;
+use crate::picture_run::PictureRun;
+use crate::template::Template;
+use noisefloor_image::LinearImage;
+use std::ffi::OsString;
+use std::path::PathBuf;
+use std::time::Duration;
+
+/// A program that renders a whole picture until a noise threshold, into an EXR or PFM file.
+///
+/// The command is a template, split into words as a POSIX shell does; no shell is run. `{threshold}`, `{seed}` (a
+/// number in 0…2³¹−1) and `{out}` (a path without extension, in an empty folder) are required; `{spp}`, the most
+/// samples per pixel, `{scene}`, `{width}` and `{height}` are optional.
+#[derive(Debug)]
+pub struct ThresholdCommand {
+    template: Template,
+    scene: Option<PathBuf>,
+    size: Option<(usize, usize)>,
+    timeout: Duration,
+}
+
+impl ThresholdCommand {
+    /// Checks the template; a run may take `timeout`.
+    ///
+    /// # Errors
+    /// [`CommandError::Template`] if it is not a command or lacks a placeholder, [`CommandError::Size`] if it needs
+    /// a size that is not given.
+    pub fn new(
+        template: &str,
+        scene: Option<PathBuf>,
+        size: Option<(usize, usize)>,
+        timeout: Duration,
+    ) -> Result<Self, CommandError> {
+        let known = ["scene", "threshold", "spp", "seed", "width", "height", "out"];
+        let parsed = Template::parse(template, &known, &["threshold", "seed", "out"])?;
+        if size.is_none() && (parsed.has("width") || parsed.has("height")) {
+            return Err(CommandError::Size("the command needs it".to_owned()));
+        }
+        Ok(Self { template: parsed, scene, size, timeout })
+    }
+
+    /// Renders until the threshold, with at most so many samples per pixel.
+    ///
+    /// # Errors
+    /// [`CommandError`] if the program fails, or writes no picture or one that is not finite.
+    pub fn render(&self, threshold: f64, most: u64, seed: u32) -> Result<LinearImage, CommandError> {
+        let run = PictureRun::new()?;
+        let (out, (width, height)) = (run.out(), self.size.unwrap_or_default());
+        let words = self.template.fill(|name| match name {
+            "scene" => self.scene.clone().unwrap_or_default().into_os_string(),
+            "threshold" => OsString::from(threshold.to_string()),
+            "spp" => OsString::from(most.to_string()),
+            "seed" => OsString::from(seed.to_string()),
+            "width" => OsString::from(width.to_string()),
+            "height" => OsString::from(height.to_string()),
+            _ => out.clone().into_os_string(),
+        });
+        let (made, command) = run.finish(&words, self.timeout)?;
+        if !made.pixels.iter().flatten().all(|c| c.is_finite()) {
+            return Err(CommandError::NotFinite { command });
+        }
+        Ok(made)
+    }
+}

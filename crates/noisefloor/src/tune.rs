@@ -1,0 +1,570 @@
+//! The search for a renderer's own setting, such as its noise threshold, at which nobody sees noise.
+//!
+//! Renderers that sample adaptively know better than tiles *where* samples go; what they cannot know is
+//! *when* people stop seeing noise. A [`Tuning`] finds the setting that says so: it names settings, the
+//! caller renders two pictures of different seeds with each, and says how far they are from what may be
+//! seen ([`Excess`]). It is a state machine: no files, no renderer, no clock.
+//!
+//! ```
+//! use noisefloor::tune::{Excess, Ending, Knob, Next, Tuning};
+//!
+//! let mut tuning = Tuning::new(Knob::Threshold { coarsest: 0.1, finest: 0.001 })?;
+//! let ending = loop {
+//!     match tuning.next() {
+//!         // A renderer whose noise is seen as soon as its threshold is above 0.03
+//!         Next::Render { setting, .. } => tuning.tell(Excess::new(setting / 0.03)),
+//!         Next::Done(ending) => break ending,
+//!     }
+//! };
+//! let Ending::Found { setting, .. } = ending else { panic!("{ending:?}") };
+//! assert!(setting > 0.02 && setting <= 0.03);
+//! # Ok::<(), noisefloor::tune::KnobError>(())
+//! ```
+
+use crate::criterion::CriterionError;
+use crate::evidence::{Evidence, Samples};
+use crate::oracle::Oracle;
+use crate::params::Params;
+use crate::rgb::Rgb;
+use crate::stills::{SnapshotPair, Still, StillError};
+use crate::tile::{TileError, TileGrid};
+use thiserror::Error;
+
+/// What is aimed at, as a share of what may be seen: an estimate that is a tenth too high does not cost
+/// another step.
+const AIM: f64 = 0.9;
+/// log(excess) over log(effort): noise falls with the root of the samples, until two steps show otherwise.
+const NOISE: f64 = 0.5;
+/// Slopes that are believed. What denoisers leave falls by 0.3 to 0.7 (`docs/denoising.md`); JODs of strong
+/// noise, which saturate, by less.
+const SLOPES: (f64, f64) = (0.15, 1.0);
+/// A step makes at least this many times the effort, and none more than [`LEAP`]: a coarse picture does not
+/// know the light that it has not met, and a step too far cannot be taken back.
+const LEAST_STEP: f64 = 1.25;
+const LEAP: f64 = 12.0;
+/// The next effort, times, where nothing says how far it is.
+const BLIND_STEP: f64 = 8.0;
+/// Below this slope, twice in a row, noise does not fall: twice the effort takes less than 4 % of it.
+const FLAT: f64 = 0.06;
+/// Steps are counted as evidence for that from this many times the effort on.
+const EVIDENT: f64 = 1.5;
+
+/// A setting of a renderer that trades time for noise, and its range.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Knob {
+    /// Samples per pixel.
+    Samples {
+        /// Where the search begins, at least 2.
+        least: u64,
+        /// Where it ends.
+        most: u64,
+    },
+    /// A threshold on the noise of pixels, to which the noise that is left is about proportional, and the
+    /// samples to its inverse square.
+    Threshold {
+        /// Where the search begins.
+        coarsest: f64,
+        /// Where it ends: a lower threshold, above 0.
+        finest: f64,
+    },
+}
+
+/// A range that cannot be searched.
+#[derive(Clone, Copy, Debug, Error, PartialEq)]
+#[non_exhaustive]
+pub enum KnobError {
+    /// Samples.
+    #[error("samples are sought between {least} and {most}: at least 2, and the second not below the first")]
+    Samples {
+        /// The least.
+        least: u64,
+        /// The most.
+        most: u64,
+    },
+    /// Thresholds.
+    #[error(
+        "a threshold is sought from {coarsest} down to {finest}: both positive, the first not below the second"
+    )]
+    Threshold {
+        /// The coarsest.
+        coarsest: f64,
+        /// The finest.
+        finest: f64,
+    },
+}
+
+impl Knob {
+    fn check(self) -> Result<(), KnobError> {
+        match self {
+            Self::Samples { least, most } if least < 2 || most < least => {
+                Err(KnobError::Samples { least, most })
+            }
+            Self::Threshold { coarsest, finest }
+                if !(finest > 0.0 && coarsest >= finest && coarsest.is_finite()) =>
+            {
+                Err(KnobError::Threshold { coarsest, finest })
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// What each of two pictures is rendered with, if their mean is to be as good as one with `setting`.
+    pub fn of_each(self, setting: f64) -> f64 {
+        match self {
+            Self::Samples { .. } => (setting / 2.0).ceil(),
+            Self::Threshold { .. } => setting * std::f64::consts::SQRT_2,
+        }
+    }
+
+    /// Samples that a setting takes, in any unit.
+    fn effort(self, setting: f64) -> f64 {
+        match self {
+            Self::Samples { .. } => setting,
+            Self::Threshold { coarsest, .. } => (coarsest / setting).powi(2),
+        }
+    }
+
+    /// The setting of an effort, within the range, in numbers that people type.
+    fn setting(self, effort: f64) -> f64 {
+        match self {
+            Self::Samples { most, .. } => ((effort / 2.0).ceil() * 2.0).min(most as f64),
+            Self::Threshold { coarsest, finest } => {
+                let exact = coarsest / effort.sqrt();
+                // Three digits, rounded to the nearest: within 1 % of the effort. As text, since a product of decimal
+                // digits is no decimal number
+                let rounded = format!("{exact:.2e}").parse().unwrap_or(exact);
+                f64::clamp(rounded, finest, coarsest)
+            }
+        }
+    }
+
+    fn coarsest(self) -> f64 {
+        match self {
+            Self::Samples { least, .. } => least as f64,
+            Self::Threshold { coarsest, .. } => coarsest,
+        }
+    }
+
+    fn finest(self) -> f64 {
+        match self {
+            Self::Samples { most, .. } => most as f64,
+            Self::Threshold { finest, .. } => finest,
+        }
+    }
+}
+
+/// How far the mean of two pictures is from what may be seen, in its worst place.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Excess {
+    /// What is wrong there over what may be wrong: 1 passes, 2 is twice as much. Not negative; infinite
+    /// where it cannot be told.
+    pub ratio: f64,
+    /// The worst pixel, as x and y; `None` if nobody asked where.
+    pub place: Option<(usize, usize)>,
+    /// A number that follows from the pictures, the same for the same pictures; 0 if it is not known.
+    pub pictures: u64,
+}
+
+impl Excess {
+    /// From a ratio alone.
+    pub fn new(ratio: f64) -> Self {
+        let ratio = if ratio >= 0.0 { ratio } else { f64::INFINITY };
+        Self { ratio, place: None, pictures: 0 }
+    }
+}
+
+/// Two pictures of one view, rendered with the same setting and different seeds, and their mean: what is
+/// shown in the end, and what is judged.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PicturePair {
+    mean: Still,
+    one: Still,
+}
+
+/// Why two pictures could not be judged.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum PairError {
+    /// They cannot be compared.
+    #[error(transparent)]
+    Still(#[from] StillError),
+    /// They are too small or too large.
+    #[error(transparent)]
+    Size(#[from] TileError),
+    /// The model cannot judge them.
+    #[error(transparent)]
+    Criterion(#[from] CriterionError),
+    /// The model cannot say how much noise is too much.
+    #[error("a model with this descriptor does not tell noise from picture; the bundled model does")]
+    NoMap,
+}
+
+impl PicturePair {
+    /// Linear radiance, row-major, width × height values each. `spp`, samples per pixel of each, is used for
+    /// audiences that are not factors only; 128, say, where it is not known.
+    ///
+    /// # Errors
+    /// [`StillError`] if a pixel is not finite, the sizes do not fit, or the pictures are the same.
+    pub fn new(size: (usize, usize), pictures: [Vec<Rgb>; 2], spp: f64) -> Result<Self, StillError> {
+        let [one, other] = pictures;
+        let still =
+            |pixels, spp| Still { size, pixels, spp, display_referred: false, rounding: 0.0, origin: None };
+        // Halved first: the sum of two large numbers may be none
+        let mean = one.iter().zip(&other).map(|(a, b)| std::array::from_fn(|c| 0.5 * a[c] + 0.5 * b[c]));
+        let (mean, one) = (still(mean.collect(), 2.0 * spp), still(one, spp));
+        if size.0.checked_mul(size.1) != Some(one.pixels.len()) || one.pixels.len() != other.len() {
+            return Err(StillError::Sizes { image: size, other: (other.len(), 1) });
+        }
+        one.check()?;
+        mean.check()?;
+        if one.pixels == other { Err(StillError::Same) } else { Ok(Self { mean, one }) }
+    }
+
+    /// Width and height.
+    pub fn size(&self) -> (usize, usize) {
+        self.mean.size
+    }
+
+    /// The mean of both, row-major.
+    pub fn mean(&self) -> &[Rgb] {
+        &self.mean.pixels
+    }
+
+    /// The mean beside one of its halves, whose difference has as much noise as the mean has, whatever the
+    /// samples of single pixels. With the exposure of the converged picture.
+    ///
+    /// # Errors
+    /// None that [`PicturePair::new`] has not found.
+    pub fn compare(&self, params: &Params) -> Result<SnapshotPair<'_>, StillError> {
+        let halves = [&self.one];
+        let nested = Some(Samples::Nested);
+        let pair = SnapshotPair::new(Evidence::Halves, &self.mean, &halves, params.tone_mapping, nested)?;
+        Ok(pair.seen_on(params.viewing))
+    }
+
+    /// How far the noise of the mean is from what the share of people asked for does not see, and the map of
+    /// it, row-major, 1 where it is just that.
+    ///
+    /// # Errors
+    /// [`PairError`].
+    pub fn noise(&self, oracle: &Oracle, params: &Params) -> Result<(Excess, Vec<f32>), PairError> {
+        let grid = TileGrid::new(self.size().0, self.size().1, params.tile)?;
+        let described = self.compare(params)?.describe(oracle, grid)?;
+        let map = oracle.map_visible_noise(grid, &described, params.audience).ok_or(PairError::NoMap)?;
+        let worst = (0..map.len()).max_by(|&a, &b| map[a].total_cmp(&map[b]));
+        let ratio = worst.map_or(0.0, |worst| f64::from(map[worst]));
+        let place = worst.map(|worst| (worst % self.size().0, worst / self.size().0));
+        Ok((Excess { place, pictures: self.digest(), ..Excess::new(ratio) }, map))
+    }
+
+    /// A number that follows from the pictures (FNV-1a); not 0.
+    pub fn digest(&self) -> u64 {
+        let bits = self.one.pixels.iter().flatten().map(|c| u64::from(c.to_bits()));
+        let step = |hash: u64, bits: u64| (hash ^ bits).wrapping_mul(0x0000_0100_0000_01b3);
+        bits.fold(0xcbf2_9ce4_8422_2325, step).max(1)
+    }
+}
+
+/// A setting that was tried.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Step {
+    /// One picture with this setting would be as good as the mean of the two.
+    pub setting: f64,
+    /// What each of the two was rendered with.
+    pub each: f64,
+    /// What was found.
+    pub excess: Excess,
+}
+
+/// What to do next.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Next {
+    /// Render two pictures with the same setting and different seeds, the same seeds in every step.
+    Render {
+        /// What each is rendered with.
+        each: f64,
+        /// One picture with this setting would be as good as their mean.
+        setting: f64,
+    },
+    /// Nothing: the search has ended.
+    Done(Ending),
+}
+
+/// How a search ended.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Ending {
+    /// In the mean of the last two pictures nothing is seen that should not be.
+    Found {
+        /// The setting that is just enough: the one tried last, or between that and the one before, if that
+        /// was far more than enough.
+        setting: f64,
+        /// The setting tried last, which was enough.
+        enough: f64,
+        /// The coarser one tried before, which was not; `None` if the coarsest of all is enough.
+        too_coarse: Option<f64>,
+    },
+    /// Even the finest setting leaves this much too much.
+    AtFinest {
+        /// Over what may be seen.
+        ratio: f64,
+    },
+    /// Two settings gave the same pictures: the renderer ignores the setting, or has reached another limit,
+    /// such as its most samples.
+    Unchanged,
+    /// More effort does not make less noise: what is wrong is no noise, or the pictures are not independent.
+    NotFalling {
+        /// Over what may be seen.
+        ratio: f64,
+    },
+}
+
+/// A search in progress.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Tuning {
+    knob: Knob,
+    steps: Vec<Step>,
+}
+
+impl Tuning {
+    /// A search that has not begun.
+    ///
+    /// # Errors
+    /// [`KnobError`] if the range is empty.
+    pub fn new(knob: Knob) -> Result<Self, KnobError> {
+        knob.check()?;
+        Ok(Self { knob, steps: Vec::new() })
+    }
+
+    /// What is searched.
+    pub fn knob(&self) -> Knob {
+        self.knob
+    }
+
+    /// What was tried, in order.
+    pub fn steps(&self) -> &[Step] {
+        &self.steps
+    }
+
+    /// The setting to try, or how it ended. The same until [`Tuning::tell`].
+    pub fn next(&self) -> Next {
+        let Some(last) = self.steps.last() else { return self.render(self.knob.coarsest()) };
+        if last.excess.ratio <= 1.0 {
+            return Next::Done(self.found(last));
+        }
+        let before = self.steps.iter().rev().nth(1);
+        if before.is_some_and(|b| b.excess.pictures == last.excess.pictures && last.excess.pictures != 0) {
+            return Next::Done(Ending::Unchanged);
+        }
+        let ratio = last.excess.ratio;
+        if last.setting == self.knob.finest() {
+            return Next::Done(Ending::AtFinest { ratio });
+        }
+        if self.is_flat() {
+            return Next::Done(Ending::NotFalling { ratio });
+        }
+        let more = self.step_from(last);
+        let next = self.knob.setting(self.knob.effort(last.setting) * more);
+        // Rounding must not stand still
+        self.render(if next == last.setting { self.knob.finest() } else { next })
+    }
+
+    /// What was found with the setting that [`Tuning::next`] named; without one, nothing happens.
+    pub fn tell(&mut self, excess: Excess) {
+        if let Next::Render { each, setting } = self.next() {
+            self.steps.push(Step { setting, each, excess });
+        }
+    }
+
+    fn render(&self, setting: f64) -> Next {
+        Next::Render { each: self.knob.of_each(setting), setting }
+    }
+
+    /// How many times the effort comes next.
+    fn step_from(&self, last: &Step) -> f64 {
+        let slope = self.slopes().last().map_or(NOISE, |(slope, _)| slope).clamp(SLOPES.0, SLOPES.1);
+        let ratio = last.excess.ratio;
+        if !ratio.is_finite() {
+            return BLIND_STEP;
+        }
+        let all = (ratio / AIM).powf(1.0 / slope).max(LEAST_STEP);
+        // Two steps alike waste less than a leap and a hop
+        if all > LEAP { all.sqrt().min(LEAP) } else { all }
+    }
+
+    /// By how much log(excess) fell for log(effort), step by step, and how many times the effort that was.
+    fn slopes(&self) -> impl DoubleEndedIterator<Item = (f64, f64)> {
+        let effort = |step: &Step| self.knob.effort(step.setting);
+        self.steps.windows(2).filter_map(move |pair| {
+            let times = effort(&pair[1]) / effort(&pair[0]);
+            let slope = (pair[0].excess.ratio / pair[1].excess.ratio).ln() / times.ln();
+            slope.is_finite().then_some((slope, times))
+        })
+    }
+
+    fn is_flat(&self) -> bool {
+        let mut last_two = self.slopes().rev().take(2);
+        let flat = |step: Option<(f64, f64)>| step.is_some_and(|(s, times)| s < FLAT && times >= EVIDENT);
+        flat(last_two.next()) && flat(last_two.next())
+    }
+
+    fn found(&self, last: &Step) -> Ending {
+        let too_coarse = self.steps.iter().rev().nth(1);
+        let enough = last.setting;
+        let between = |before: &Step| {
+            let [a, b] = [before, last].map(|step| step.excess.ratio.ln());
+            let [from, to] = [before, last].map(|step| self.knob.effort(step.setting).ln());
+            // Where the line between both meets what is aimed at
+            let share = ((a - AIM.ln()) / (a - b)).clamp(0.0, 1.0);
+            let setting = self.knob.setting((from + share * (to - from)).exp());
+            // Nothing is claimed outside of what was tried
+            setting.clamp(enough.min(before.setting), enough.max(before.setting))
+        };
+        let setting = match too_coarse {
+            Some(before) if last.excess.ratio < AIM && before.excess.ratio.is_finite() => between(before),
+            _ => enough,
+        };
+        Ending::Found { setting, enough, too_coarse: too_coarse.map(|step| step.setting) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use noisefloor_testkit::Noise;
+    use proptest::prelude::*;
+
+    const THRESHOLD: Knob = Knob::Threshold { coarsest: 0.1, finest: 0.001 };
+    const SAMPLES: Knob = Knob::Samples { least: 16, most: 65_536 };
+
+    fn search(knob: Knob, excess: impl Fn(f64) -> Excess) -> (Ending, Vec<Step>) {
+        let mut tuning = Tuning::new(knob).unwrap();
+        for _ in 0..20 {
+            match tuning.next() {
+                Next::Render { setting, .. } => tuning.tell(excess(setting)),
+                Next::Done(ending) => return (ending, tuning.steps),
+            }
+        }
+        panic!("no end after {:?}", tuning.steps);
+    }
+
+    #[test]
+    fn noise_that_falls_as_noise_does_takes_two_steps() {
+        for (needed, found) in [(0.04, 0.036), (0.085, 0.0765)] {
+            let (ending, steps) = search(THRESHOLD, |setting| Excess::new(setting / needed));
+            let Ending::Found { setting, enough, too_coarse } = ending else { panic!("{ending:?}") };
+            assert_eq!((steps.len(), too_coarse), (2, Some(0.1)), "{steps:?}");
+            assert_eq!((setting, enough), (found, found));
+        }
+        let (ending, steps) = search(SAMPLES, |n| Excess::new((100.0 / n).sqrt()));
+        // 100/0.9² = 123.5
+        assert_eq!(ending, Ending::Found { setting: 124.0, enough: 124.0, too_coarse: Some(16.0) });
+        assert_eq!(steps[1].each, 62.0);
+    }
+
+    #[test]
+    fn the_coarsest_setting_is_tried_first_and_may_be_enough() {
+        let (ending, steps) = search(THRESHOLD, |_| Excess::new(0.2));
+        assert_eq!(ending, Ending::Found { setting: 0.1, enough: 0.1, too_coarse: None });
+        assert_eq!(steps.len(), 1);
+        assert!((steps[0].each - 0.141_42).abs() < 1e-5);
+    }
+
+    #[test]
+    fn a_step_too_far_is_interpolated() {
+        // Falls much faster than noise: 0.1 is twice too coarse, and 0.045 far more than enough
+        let (ending, steps) = search(THRESHOLD, |t| Excess::new((t / 0.08).powf(3.1)));
+        let Ending::Found { setting, enough, too_coarse: Some(0.1) } = ending else { panic!("{ending:?}") };
+        assert!(steps.len() == 2 && steps[1].excess.ratio < 0.5, "{steps:?}");
+        assert!(setting > enough && setting <= 0.08 && setting > 0.075, "{setting}");
+    }
+
+    #[test]
+    fn ends_are_told_apart() {
+        let unchanged = Excess { pictures: 7, ..Excess::new(3.0) };
+        assert_eq!(search(THRESHOLD, |_| unchanged).0, Ending::Unchanged);
+        assert_eq!(search(THRESHOLD, |_| Excess::new(3.0)).0, Ending::NotFalling { ratio: 3.0 });
+        let hard = |t: f64| Excess::new(t / 1e-4);
+        let Ending::AtFinest { ratio } = search(THRESHOLD, hard).0 else { panic!() };
+        assert!((ratio - 10.0).abs() < 1e-9);
+        // Nothing can be told, and then all is well
+        let blind = |t: f64| Excess::new(if t > 0.02 { f64::NAN } else { 0.95 });
+        let (ending, _) = search(THRESHOLD, blind);
+        assert!(matches!(ending, Ending::Found { setting, enough, .. } if setting == enough), "{ending:?}");
+        for knob in [
+            Knob::Samples { least: 0, most: 10 },
+            Knob::Samples { least: 20, most: 10 },
+            Knob::Threshold { coarsest: 0.1, finest: 0.2 },
+            Knob::Threshold { coarsest: f64::INFINITY, finest: 0.2 },
+            Knob::Threshold { coarsest: f64::NAN, finest: 0.2 },
+            Knob::Threshold { coarsest: 0.1, finest: 0.0 },
+        ] {
+            assert!(Tuning::new(knob).is_err(), "{knob:?}");
+        }
+    }
+
+    /// A grey picture of this noise, in which one quarter has three times as much.
+    fn noisy(seed: u64, sigma: f64) -> Vec<Rgb> {
+        let mut noise = Noise::new(seed);
+        let pixel = |i: usize| {
+            let worst = i % 256 >= 128 && i / 256 >= 128;
+            let value = 0.4 + sigma * if worst { 3.0 } else { 1.0 } * noise.normal();
+            [value as f32; 3]
+        };
+        (0..256 * 256).map(pixel).collect()
+    }
+
+    #[test]
+    fn the_noise_of_a_mean_is_found_where_it_is_worst_and_falls_with_its_amplitude() {
+        let (oracle, params) = (Oracle::bundled(), Params::default().with_tile(64));
+        let ratio = |sigma| {
+            let pair = PicturePair::new((256, 256), [noisy(1, sigma), noisy(2, sigma)], 64.0).unwrap();
+            let (excess, map) = pair.noise(&oracle, &params).unwrap();
+            let (x, y) = excess.place.unwrap();
+            // Windows reach over the border by half of their width
+            assert!(x >= 112 && y >= 112, "{x}, {y}");
+            assert_eq!(map.iter().copied().fold(0.0, f32::max), excess.ratio as f32);
+            excess.ratio
+        };
+        let [strong, weak] = [0.04, 0.01].map(ratio);
+        // A quarter of the amplitude, within what the line's other numbers and the crossing's steps do
+        assert!((strong / weak / 4.0).ln().abs() < 0.25, "{strong} {weak}");
+        // What two halves of one film say is the same: a session stops where the mean of two passes
+        assert!(strong > 1.0, "{strong}");
+    }
+
+    #[test]
+    fn pictures_that_say_nothing_are_refused() {
+        let picture = noisy(1, 0.1);
+        let new = |a: &[Rgb], b: &[Rgb]| PicturePair::new((256, 256), [a.to_vec(), b.to_vec()], 1.0);
+        assert!(matches!(new(&picture, &picture), Err(StillError::Same)));
+        assert!(matches!(new(&picture, &picture[1..]), Err(StillError::Sizes { .. })));
+        assert!(matches!(new(&picture[1..], &picture[1..]), Err(StillError::Sizes { .. })));
+        let mut other = noisy(2, 0.1);
+        other[300] = [f32::NAN; 3];
+        assert!(matches!(new(&picture, &other), Err(StillError::NotFinite { x: 44, y: 1 })));
+    }
+
+    proptest! {
+        /// Whatever the law by which what is wrong falls, the setting found is enough and not much more, and
+        /// what the steps before the last cost is bounded.
+        #[test]
+        fn every_law_is_found(slope in 0.2..0.9f64, excess in 0.5..40.0f64, threshold in any::<bool>()) {
+            let knob = if threshold {
+                Knob::Threshold { coarsest: 0.5, finest: 1e-9 }
+            } else {
+                Knob::Samples { least: 16, most: 1 << 50 }
+            };
+            let begin = knob.effort(knob.coarsest());
+            let law = |setting: f64| excess * (knob.effort(setting) / begin).powf(-slope);
+            let (ending, steps) = search(knob, |setting| Excess::new(law(setting)));
+            let Ending::Found { setting, enough, .. } = ending else { panic!("{ending:?}") };
+            prop_assert!(law(enough) <= 1.0 && law(setting) <= 1.0);
+            if steps.len() > 1 {
+                // An effort of ×1.25 more than needed at the most, and what rounding adds
+                prop_assert!(law(setting) > 0.9 * 1.3f64.powf(-slope), "{} of {steps:?}", law(setting));
+                let efforts: Vec<f64> = steps.iter().map(|step| knob.effort(step.setting)).collect();
+                prop_assert!(efforts.windows(2).all(|pair| pair[1] > pair[0]));
+            }
+        }
+    }
+}
