@@ -120,8 +120,8 @@ impl PyTuning {
         self.lock().tell(excess);
     }
 
-    /// How it ended: "found", "at-finest" (even the finest setting is not enough), "unchanged" (two settings gave the
-    /// same pictures), or "not-falling" (more samples do not make it better); None before that.
+    /// How it ended: "found", "at-finest" (even the finest setting is not enough), "unchanged" (finer settings give
+    /// the same pictures), or "not-falling" (more samples do not make it better); None before that.
     #[getter]
     fn ending(&self) -> Option<&'static str> {
         Some(match self.end()? {

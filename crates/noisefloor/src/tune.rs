@@ -44,6 +44,9 @@ const LEAST_STEP: f64 = 1.25;
 const LEAP: f64 = 12.0;
 /// The next effort, times, where nothing says how far it is.
 const BLIND_STEP: f64 = 8.0;
+/// So many finer settings in a row that give the same pictures are enough to say that no setting does otherwise. One is
+/// not: above some threshold, every pixel has the fewest samples that the renderer takes.
+const UNCHANGED: usize = 2;
 /// Below this slope, twice in a row, noise does not fall: twice the effort takes less than 4 % of it.
 const FLAT: f64 = 0.06;
 /// Steps are counted as evidence for that from this many times the effort on.
@@ -276,6 +279,13 @@ pub struct Step {
     pub excess: Excess,
 }
 
+impl Step {
+    /// Whether the pictures are known to be the same.
+    fn draws_as(&self, other: &Self) -> bool {
+        self.excess.pictures == other.excess.pictures && self.excess.pictures != 0
+    }
+}
+
 /// What to do next.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Next {
@@ -308,7 +318,7 @@ pub enum Ending {
         /// Over what may be seen.
         ratio: f64,
     },
-    /// Two settings gave the same pictures: the renderer ignores the setting, or has reached another limit,
+    /// Settings that differ much gave the same pictures: the renderer ignores the setting, or has reached another limit,
     /// such as its most samples.
     Unchanged,
     /// More effort does not make less noise: what is wrong is no noise, or the pictures are not independent.
@@ -351,8 +361,8 @@ impl Tuning {
         if last.excess.ratio <= 1.0 {
             return Next::Done(self.found(last));
         }
-        let before = self.steps.iter().rev().nth(1);
-        if before.is_some_and(|b| b.excess.pictures == last.excess.pictures && last.excess.pictures != 0) {
+        let alike = self.steps.iter().rev().take_while(|step| step.draws_as(last)).count();
+        if alike > UNCHANGED {
             return Next::Done(Ending::Unchanged);
         }
         let ratio = last.excess.ratio;
@@ -362,7 +372,7 @@ impl Tuning {
         if self.is_flat() {
             return Next::Done(Ending::NotFalling { ratio });
         }
-        let more = self.step_from(last);
+        let more = if alike > 1 { BLIND_STEP } else { self.step_from(last) };
         let next = self.knob.setting(self.knob.effort(last.setting) * more);
         // Rounding must not stand still
         self.render(if next == last.setting { self.knob.finest() } else { next })
@@ -394,7 +404,8 @@ impl Tuning {
     /// By how much log(excess) fell for log(effort), step by step, and how many times the effort that was.
     fn slopes(&self) -> impl DoubleEndedIterator<Item = (f64, f64)> {
         let effort = |step: &Step| self.knob.effort(step.setting);
-        self.steps.windows(2).filter_map(move |pair| {
+        let changed = self.steps.windows(2).filter(|pair| !pair[0].draws_as(&pair[1]));
+        changed.filter_map(move |pair| {
             let times = effort(&pair[1]) / effort(&pair[0]);
             let slope = (pair[0].excess.ratio / pair[1].excess.ratio).ln() / times.ln();
             slope.is_finite().then_some((slope, times))
@@ -482,6 +493,12 @@ mod tests {
     fn ends_are_told_apart() {
         let unchanged = Excess { pictures: 7, ..Excess::new(3.0) };
         assert_eq!(search(THRESHOLD, |_| unchanged).0, Ending::Unchanged);
+        // The fewest samples that the renderer takes are too few, and the coarsest thresholds do not ask for more
+        let (ending, steps) = search(THRESHOLD, |t| match t {
+            t if t > 0.05 => unchanged,
+            t => Excess { pictures: t.to_bits(), ..Excess::new(t / 0.016_67) },
+        });
+        assert!(matches!(ending, Ending::Found { setting, .. } if (setting - 0.015).abs() < 0.001), "{steps:?}");
         assert_eq!(search(THRESHOLD, |_| Excess::new(3.0)).0, Ending::NotFalling { ratio: 3.0 });
         let hard = |t: f64| Excess::new(t / 1e-4);
         let Ending::AtFinest { ratio } = search(THRESHOLD, hard).0 else { panic!() };

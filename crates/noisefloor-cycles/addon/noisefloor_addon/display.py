@@ -8,8 +8,9 @@ import bpy
 import noisefloor
 import numpy
 
-# Entries along each axis, the radiance from which they are logarithmic, and the last: 25 stops, 0.4 apart
-EDGE, TOE, TOP = 65, 2.0**-13, 2.0**12
+# Entries along each axis, the radiance from which they are logarithmic, and the last: 3/8 of a stop apart, and one at 1,
+# where plain sRGB has its edge
+EDGE, TOE, TOP = 65, 2.0**-12, 2.0**12
 # What a PNG of 16 bits is saved by
 FILE = {
     "file_format": "PNG",

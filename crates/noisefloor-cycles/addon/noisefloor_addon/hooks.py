@@ -82,9 +82,11 @@ def draw(engine, context, depsgraph):
 
 def render(engine, depsgraph):
     if not wanted(engine, depsgraph):
+        # Cycles frees what it has evaluated
+        layer = depsgraph.view_layer_eval.name
         original["render"](engine, depsgraph)
         if state.wanted and not engine.is_preview and not engine.test_break():
-            layer, result = depsgraph.view_layer_eval.name, engine.get_result()
+            result = engine.get_result()
             size = result.resolution_x, result.resolution_y
             pictures = passes.read(engine, layer, size)
             state.rendered[layer] = {name: picture.copy() for name, picture in pictures.items()}

@@ -221,7 +221,7 @@ fn say_all(job: &TuneJob, report: &Report, ending: Ending) -> anyhow::Result<()>
             report.steps.last().map_or(0.0, |step| step.setting)
         ),
         Ending::Unchanged => note!(
-            "error: the last two settings gave the same pictures: the renderer does not look at the {name}, or has \
+            "error: finer settings give the same pictures: the renderer does not look at the {name}, or has \
              reached its most samples (--max-spp)"
         ),
         Ending::NotFalling { ratio } => note!(
