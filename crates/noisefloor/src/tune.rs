@@ -498,7 +498,10 @@ mod tests {
             t if t > 0.05 => unchanged,
             t => Excess { pictures: t.to_bits(), ..Excess::new(t / 0.016_67) },
         });
-        assert!(matches!(ending, Ending::Found { setting, .. } if (setting - 0.015).abs() < 0.001), "{steps:?}");
+        assert!(
+            matches!(ending, Ending::Found { setting, .. } if (setting - 0.015).abs() < 0.001),
+            "{steps:?}"
+        );
         assert_eq!(search(THRESHOLD, |_| Excess::new(3.0)).0, Ending::NotFalling { ratio: 3.0 });
         let hard = |t: f64| Excess::new(t / 1e-4);
         let Ending::AtFinest { ratio } = search(THRESHOLD, hard).0 else { panic!() };

@@ -79,6 +79,9 @@ mod study;
 /// What the screen shows: LUTs.
 #[cfg(test)]
 mod tone;
+/// A renderer's own setting.
+#[cfg(test)]
+mod tune;
 /// Renders that are watched.
 #[cfg(test)]
 mod watch;

@@ -1,0 +1,121 @@
+#!/usr/bin/env python3
+"""Cycles' noise threshold: defaults, guesses, fixed samples, and what Find Noise Threshold finds, for blender.md.
+
+    tune.py render ADDON.zip SCENE(.py|.blend) WIDTHxHEIGHT FOLDER [REFERENCE_SPP]   in an environment that has bpy
+    tune.py measure FOLDER...                                                       pip install cvvdp pillow
+
+`render` writes what Blender shows (view transform included) as PNGs of 16 bits, denoised by Cycles' own Open Image
+Denoise, two seeds a setting, beside times.json with the processor seconds of each render and of the search; it goes on
+where it was interrupted. `measure` says what the worst square of 64 pixels has lost against the reference, by the package
+`cvvdp`, no code of this project: on average over two seeds, and of the worse one."""
+import json
+import pathlib
+import resource
+import runpy
+import sys
+import tempfile
+import time
+import zipfile
+
+SETTINGS = [("threshold", t) for t in (0.2, 0.1, 0.05, 0.03, 0.01)] + [("samples", n) for n in (64, 128, 256, 512, 1024)]
+
+
+def render(addon, path, size, folder, reference=4096):
+    import bpy
+
+    folder = pathlib.Path(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    if path.endswith(".py"):
+        runpy.run_path(path)
+    else:
+        bpy.ops.wm.open_mainfile(filepath=path)
+    width, height = map(int, size.split("x"))
+    unpacked = tempfile.mkdtemp()
+    zipfile.ZipFile(addon).extractall(unpacked)
+    sys.path.insert(0, unpacked)
+    import noisefloor_addon
+
+    noisefloor_addon.register()
+    scene = bpy.context.scene
+    cycles, shot, settings = scene.cycles, scene.render, scene.render.image_settings
+    cycles.device, cycles.use_denoising, scene.noisefloor.use = "CPU", True, False
+    shot.resolution_x, shot.resolution_y, shot.resolution_percentage = width, height, 100
+    if hasattr(settings, "media_type"):
+        settings.media_type = "IMAGE"
+    settings.file_format, settings.color_mode, settings.color_depth = "PNG", "RGB", "16"
+    times = folder / "times.json"
+    done = json.loads(times.read_text()) if times.exists() else {}
+
+    def used():
+        return resource.getrusage(resource.RUSAGE_SELF).ru_utime
+
+    def one(kind, value, seed):
+        name = f"{kind}-{value:g}-{seed}"
+        if name in done:
+            return
+        cycles.use_adaptive_sampling, cycles.seed = kind != "samples", seed
+        cycles.adaptive_threshold, cycles.samples = (value, 4096) if kind != "samples" else (0.01, int(value))
+        before, begun = used(), time.time()
+        bpy.ops.render.render()
+        done[name] = {"user": used() - before, "wall": time.time() - begun}
+        bpy.data.images["Render Result"].save_render(str(folder / f"{name}.png"), scene=scene)
+        times.write_text(json.dumps(done, indent=1))
+        print(name, done[name], flush=True)
+
+    if "search" not in done:
+        cycles.use_adaptive_sampling, cycles.seed, cycles.adaptive_threshold, cycles.samples = True, 3, 0.01, 4096
+        before = used()
+        try:
+            bpy.ops.render.noisefloor_threshold()
+            found = cycles.adaptive_threshold
+        except RuntimeError as error:
+            print(error)
+            found = None
+        done["search"] = {"user": used() - before, "found": found, "said": noisefloor_addon.hooks.state.summary}
+        times.write_text(json.dumps(done, indent=1))
+        print("search", done["search"], flush=True)
+    for seed in (1, 2):
+        if done["search"]["found"]:
+            one("tuned", done["search"]["found"], seed)
+        for kind, value in SETTINGS:
+            one(kind, value, seed)
+    one("samples", reference, 77)
+
+
+def measure(folders):
+    import numpy
+    import pycvvdp
+    from PIL import Image
+
+    metric = pycvvdp.cvvdp(display_name="standard_fhd", quiet=True)
+
+    def read(path):
+        return numpy.asarray(Image.open(path).convert("RGB"), dtype=numpy.float32) / 255
+
+    def places(side):
+        return [*range(0, max(side - 64, 0), 32), max(side - 64, 0)]
+
+    for folder in map(pathlib.Path, folders):
+        done = json.loads((folder / "times.json").read_text())
+        reference = read(next(folder.glob("samples-*-77.png")))
+        print(f"\n{folder.name}: search {done['search']}\n| setting | seconds | JOD lost, mean of two seeds | worse |\n|---|---|---|---|")
+        for name in [name[:-2] for name in done if name.endswith("-1")]:
+            lost = []
+            for seed in (1, 2):
+                path = folder / f"{name}-{seed}.png"
+                if path.exists():
+                    picture = read(path)
+                    squares = [(slice(y, y + 64), slice(x, x + 64)) for y in places(picture.shape[0]) for x in places(picture.shape[1])]
+                    lost.append(max(10 - float(metric.predict(picture[s], reference[s], dim_order="HWC")[0]) for s in squares))
+            seconds = numpy.mean([done[f"{name}-{seed}"]["user"] for seed in (1, 2) if f"{name}-{seed}" in done])
+            print(f"| {name} | {seconds:.1f} | {numpy.mean(lost):.2f} | {max(lost):.2f} |", flush=True)
+
+
+if __name__ == "__main__":
+    if sys.argv[1:2] == ["render"]:
+        addon, scene, size, folder, *more = sys.argv[2:]
+        render(addon, scene, size, folder, *map(int, more))
+    elif sys.argv[1:2] == ["measure"]:
+        measure(sys.argv[2:])
+    else:
+        raise SystemExit(__doc__)
