@@ -653,5 +653,93 @@ class Forks(unittest.TestCase):
         self.assertEqual(codes, [0] * 5)
 
 
+class Settings(unittest.TestCase):
+    """The search for a renderer's own setting, and tables of what screens show."""
+
+    @staticmethod
+    def noisy(seed, sigma, size=128):
+        draw = np.random.default_rng(seed)
+        return np.float32(0.4 + sigma * draw.standard_normal((size, size, 3)))
+
+    def test_the_threshold_of_a_renderer_is_found(self):
+        params = nf.Params(tone_mapping="srgb")
+        tuning = nf.Tuning(threshold=(0.05, 0.0001))
+        while (each := tuning.next()) is not None:
+            found = nf.excess(self.noisy(1, each), self.noisy(2, each), params=params)
+            self.assertEqual(found.map().shape, (128, 128))
+            self.assertAlmostEqual(found.map().max(), found.ratio, places=5)
+            tuning.tell(found)
+        self.assertEqual(tuning.ending, "found")
+        # A mean of two is as good as one picture of half the variance
+        other = nf.excess(
+            self.noisy(3, tuning.setting * 2**0.5), self.noisy(4, tuning.setting * 2**0.5), params=params
+        )
+        self.assertTrue(0.75 < other.ratio < 1.15, other)
+        self.assertEqual(tuning.steps[-1][1], found.ratio)
+
+    def test_denoised_pictures_are_judged_by_what_they_have_lost(self):
+        def blur(picture, by):
+            return sum(np.roll(picture, (dy, dx), (0, 1)) for dy in by for dx in by) / np.float32(len(by) ** 2)
+
+        pair, params = (self.noisy(1, 0.2), self.noisy(2, 0.2)), nf.Params(tone_mapping="srgb")
+        little, much = range(-1, 2), range(-6, 7)
+        ratios = [
+            nf.excess(*pair, params=params, denoised=tuple(blur(p, by) for p in pair)).ratio
+            for by in (little, much)
+        ]
+        self.assertGreater(ratios[0], 2 * ratios[1])
+        half = nf.excess(*pair, params=params, denoised=tuple(blur(p, little) for p in pair), lost=0.6)
+        self.assertAlmostEqual(half.ratio, ratios[0] / 2)
+
+    def test_ends_are_told_and_nonsense_is_refused(self):
+        tuning = nf.Tuning(samples=(16, 64))
+        while (each := tuning.next()) is not None:
+            self.assertEqual(each, tuning.next())
+            tuning.tell(100.0)
+        self.assertEqual((tuning.ending, tuning.setting), ("at-finest", None))
+        for bad in ({}, {"samples": (16, 4)}, {"threshold": (0.1, 0.2)}, {"samples": (2, 4), "threshold": (1, 0.1)}):
+            with self.assertRaises(nf.ParameterError):
+                nf.Tuning(**bad)
+        picture = self.noisy(1, 0.1)
+        with self.assertRaises(nf.PictureError):
+            nf.excess(picture, picture)
+        with self.assertRaises(nf.SizeError):
+            nf.excess(picture, picture[:64])
+        with self.assertRaises(nf.ParameterError):
+            nf.excess(picture, self.noisy(2, 0.1), lost=-1)
+
+    def test_a_table_shows_what_it_says(self):
+        # Plain sRGB at half the exposure, as a table: the verdicts of plain sRGB, but for what lies between entries
+        axis = nf.ToneTable.radiances(65, 0.001, 10)
+        shown = np.minimum(axis / 2, 1)
+        shown = np.where(shown <= 0.0031308, 12.92 * shown, 1.055 * shown ** (1 / 2.4) - 0.055)
+        blue, green, red = np.meshgrid(shown, shown, shown, indexing="ij")
+        table = nf.ToneTable(np.stack([red, green, blue], -1), 0.001, 10)
+        pair = self.noisy(1, 0.05), self.noisy(2, 0.05)
+        ratio = {
+            name: nf.excess(*pair, params=nf.Params(**tone)).ratio
+            for name, tone in {
+                "table": {"tone_mapping": table},
+                "plain": {"tone_mapping": "srgb", "exposure": 0.5},
+                "brighter": {"tone_mapping": "srgb", "exposure": 2.0},
+            }.items()
+        }
+        self.assertAlmostEqual(ratio["table"] / ratio["plain"], 1, delta=0.02)
+        self.assertNotAlmostEqual(ratio["brighter"] / ratio["plain"], 1, delta=0.06)
+        params = nf.Params(tone_mapping=table, exposure=0.5)
+        again = pickle.loads(pickle.dumps(params))
+        self.assertEqual(again, params)
+        self.assertNotEqual(again, nf.Params(tone_mapping=table))
+        self.assertEqual(pickle.loads(pickle.dumps(table)), table)
+        for bad, error in [
+            (np.zeros((33, 33, 33)), nf.SizeError),
+            (np.zeros((3, 4, 3, 3)), nf.SizeError),
+            (np.zeros((66, 66, 66, 3)), nf.ParameterError),
+            (np.full((2, 2, 2, 3), np.nan), nf.ParameterError),
+        ]:
+            with self.assertRaises(error):
+                nf.ToneTable(bad)
+
+
 if __name__ == "__main__":
     unittest.main()
