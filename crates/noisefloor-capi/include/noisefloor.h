@@ -68,6 +68,21 @@
 // Closed by the caller: the renderer failed.
 #define NF_REASON_FAILED 5
 
+// The search goes on.
+#define NF_TUNING_SEARCHING 0
+
+// In the mean of the last two pictures nothing is seen that should not be: setting is just enough.
+#define NF_TUNING_FOUND 1
+
+// Even the finest setting is not enough.
+#define NF_TUNING_AT_FINEST 2
+
+// Finer settings give the same pictures: the renderer ignores the setting, or reaches another limit first.
+#define NF_TUNING_UNCHANGED 3
+
+// More samples do not make it better: what is wrong is no noise, or the pictures are not independent.
+#define NF_TUNING_NOT_FALLING 4
+
 // How a call ended. nf_last_error has the words.
 typedef enum {
     // Done.
@@ -107,6 +122,9 @@ typedef struct NfOracle NfOracle;
 
 // Film, oracle and limits of one picture.
 typedef struct NfSession NfSession;
+
+// The search for the setting of a renderer at which nobody sees noise: its noise threshold, or samples per pixel.
+typedef struct NfTuning NfTuning;
 
 // Parameters of a session. Let nf_params_default fill them in, then change some.
 typedef struct {
@@ -201,6 +219,29 @@ typedef struct {
 // Renders the mean of spp new samples of each pixel of a tile, of which it has rendered first samples before:
 // mean has room for 3 * width * height floats of the tile. Returns 0, or anything else if it failed.
 typedef int32_t (*NfRender)(void *user, NfTile tile, uint64_t first, uint64_t spp, float *mean);
+
+// What to do next in a search, or how it ended.
+typedef struct {
+    // One of NF_TUNING_...
+    uint32_t ending;
+    // While searching: what two pictures are to be rendered with, each with a seed of its own, the same seeds in
+    // every step.
+    double each;
+    // While searching: one picture with this setting is as good as the mean of the two. At NF_TUNING_FOUND: the
+    // setting that is just enough.
+    double setting;
+} NfTuningStep;
+
+// How far the mean of two pictures is from what may be seen, in its worst place.
+typedef struct {
+    // What is wrong over what may be wrong: 1 or less passes. Infinite where it cannot be told.
+    double ratio;
+    // The worst place, a column and a row.
+    uint32_t x;
+    uint32_t y;
+    // A number that follows from the pictures, by which settings without effect are noticed; 0 if it is not known.
+    uint64_t pictures;
+} NfExcess;
 
 #ifdef __cplusplus
 extern "C" {
@@ -396,6 +437,50 @@ NfStatus nf_check(NfRender render,
                   size_t height,
                   bool repeats_samples,
                   bool shared_pixels);
+
+// Searches a noise threshold, such as from 0.2 down to 0.001. The caller frees it with nf_tuning_free.
+NfStatus nf_tuning_of_threshold(double coarsest,
+                                double finest,
+                                NfTuning **tuning);
+
+// Searches samples per pixel, such as from 16 to 4096. The caller frees it with nf_tuning_free.
+NfStatus nf_tuning_of_samples(uint64_t least, uint64_t most, NfTuning **tuning);
+
+// What to render next, or how the search ended. The same until nf_tuning_tell.
+NfStatus nf_tuning_next(const NfTuning *tuning, NfTuningStep *step);
+
+// Says what was found of the two pictures that nf_tuning_next asked for.
+NfStatus nf_tuning_tell(const NfTuning *tuning, NfExcess excess);
+
+// Frees a search. NULL is ignored, a second time is NF_STATUS_HANDLE.
+NfStatus nf_tuning_free(NfTuning *tuning);
+
+// How far the noise of the mean of two pictures is from what people do not see, where it is worst. a and b are
+// linear radiance, floats = 3 * width * height values each, rendered with the same setting and different seeds. Of
+// params, display and audience count; params may be NULL for the defaults. NF_STATUS_ARGUMENT if the pictures are
+// the same, or not finite.
+NfStatus nf_excess(const NfOracle *oracle,
+                   const NfParams *params,
+                   uint32_t width,
+                   uint32_t height,
+                   const float *a,
+                   const float *b,
+                   size_t floats,
+                   NfExcess *excess);
+
+// As nf_excess, for pictures that are denoised: denoised_a is what a denoiser makes of a, and denoised_b of b, each
+// without a look at the other. The ratio is that of the just-objectionable differences (JOD) that the worst square of
+// 64 pixels has lost to lost, 0.3 say. Nobody has been asked about denoised pictures: the limit is a vision model's.
+NfStatus nf_excess_denoised(double lost,
+                            const NfParams *params,
+                            uint32_t width,
+                            uint32_t height,
+                            const float *a,
+                            const float *b,
+                            const float *denoised_a,
+                            const float *denoised_b,
+                            size_t floats,
+                            NfExcess *excess);
 
 #ifdef __cplusplus
 }  // extern "C"

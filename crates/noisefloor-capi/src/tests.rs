@@ -10,6 +10,7 @@ use crate::results::*;
 use crate::session::*;
 use crate::status::*;
 use crate::tone::*;
+use crate::tune::*;
 use noisefloor::{Oracle, Params, Rgb, Session, Tile, criterion::CriterionError};
 use std::ffi::{CStr, CString, c_void};
 use std::ptr::{null, null_mut};
@@ -649,4 +650,60 @@ fn messages_belong_to_their_thread() {
     assert_eq!(message(), "here?!");
     // SAFETY: text of this library.
     assert_eq!(unsafe { CStr::from_ptr(nf_version()) }.to_str(), Ok(env!("CARGO_PKG_VERSION")));
+}
+
+/// A renderer whose noise is in proportion to its threshold, and a denoiser that removes nine tenths of it.
+#[test]
+fn a_threshold_is_found() {
+    let (width, height) = (96_u32, 64_u32);
+    let floats = (3 * width * height) as usize;
+    let render = |sigma: f64, seed: u64| -> Vec<f32> {
+        let mut noise = noisefloor_testkit::Noise::new(seed);
+        (0..floats).map(|_| (0.4 + sigma * noise.normal()) as f32).collect()
+    };
+    let by_srgb = NfParams { tone_mapping: NF_TONE_SRGB, ..params() };
+    let mut oracle = null_mut();
+    let (mut tuning, mut step) = (null_mut(), NfTuningStep::default());
+    // SAFETY: living handles, and arrays of the size given.
+    unsafe {
+        assert_eq!(nf_oracle_bundled(0.95, &mut oracle), NfStatus::Ok);
+        assert_eq!(nf_tuning_of_threshold(0.1, 0.2, &mut tuning), NfStatus::Argument);
+        assert_eq!(nf_tuning_of_samples(1, 2, &mut tuning), NfStatus::Argument);
+        assert_eq!(nf_tuning_of_threshold(0.03, 0.0001, &mut tuning), NfStatus::Ok);
+        let mut last = NfExcess::default();
+        loop {
+            assert_eq!(nf_tuning_next(tuning, &mut step), NfStatus::Ok);
+            if step.ending != NF_TUNING_SEARCHING {
+                break;
+            }
+            let (a, b) = (render(step.each, 1), render(step.each, 2));
+            let (a, b) = (a.as_ptr(), b.as_ptr());
+            let status = nf_excess(oracle, &by_srgb, width, height, a, b, floats, &mut last);
+            assert_eq!(status, NfStatus::Ok, "{}", message());
+            assert!(last.x < width && last.y < height && last.pictures != 0);
+            assert_eq!(nf_tuning_tell(tuning, last), NfStatus::Ok);
+        }
+        assert!(step.ending == NF_TUNING_FOUND && last.ratio <= 1.0 && last.ratio > 0.5, "{step:?} {last:?}");
+        assert_eq!((nf_tuning_free(tuning), nf_tuning_free(tuning)), (NfStatus::Ok, NfStatus::Handle));
+
+        let (a, b) = (render(0.1, 1), render(0.1, 2));
+        let blur = |picture: &[f32]| picture.iter().map(|v| 0.4 + 0.1 * (v - 0.4)).collect::<Vec<f32>>();
+        let (da, db) = (blur(&a), blur(&b));
+        let denoised = |lost: f64, excess: &mut NfExcess| {
+            let (a, b, da, db) = (a.as_ptr(), b.as_ptr(), da.as_ptr(), db.as_ptr());
+            nf_excess_denoised(lost, &by_srgb, width, height, a, b, da, db, floats, excess)
+        };
+        let mut other = NfExcess::default();
+        assert_eq!((denoised(0.3, &mut last), denoised(0.6, &mut other)), (NfStatus::Ok, NfStatus::Ok));
+        assert!((last.ratio / other.ratio - 2.0).abs() < 1e-9 && last.ratio > 0.0, "{last:?} {other:?}");
+        assert_eq!(denoised(f64::NAN, &mut other), NfStatus::Argument);
+        let (a, b) = (a.as_ptr(), null());
+        let same = nf_excess(oracle, null(), width, height, a, a, floats, &mut other);
+        assert_eq!(same, NfStatus::Argument);
+        assert!(message().contains("identical"), "{}", message());
+        assert_eq!(nf_excess(oracle, null(), width, height, a, b, floats, &mut other), NfStatus::NullPointer);
+        assert_eq!(nf_excess(oracle, null(), 0, height, a, a, floats, &mut other), NfStatus::Size);
+        assert_eq!(nf_excess(oracle, null(), width, height, a, a, floats - 3, &mut other), NfStatus::Size);
+        assert_eq!(nf_oracle_free(oracle), NfStatus::Ok);
+    }
 }

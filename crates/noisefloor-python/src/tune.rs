@@ -1,7 +1,7 @@
 //! The search for a renderer's own setting.
 
 use crate::arrays::{Pixels, plane};
-use crate::errors::{CriterionError, ParameterError, PictureError, Raise, SizeError, whole};
+use crate::errors::{CriterionError, ParameterError, PictureError, Raise, SizeError};
 use crate::oracle::PyOracle;
 use crate::params::PyParams;
 use crate::pool;

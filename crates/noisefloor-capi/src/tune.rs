@@ -1,0 +1,241 @@
+//! The search for a renderer's own setting.
+
+use crate::border;
+use crate::handle;
+use crate::oracle::NfOracle;
+use crate::params::NfParams;
+use crate::status::{Failure, NfStatus, guard};
+use noisefloor::stills::StillError;
+use noisefloor::tune::{Ending, Excess, Knob, KnobError, Next, PairError, PicturePair, Tuning};
+use noisefloor::{Params, Rgb, internal::check_image};
+use noisefloor_denoise::{DenoisedError, DenoisedHalves};
+use std::sync::{Mutex, PoisonError};
+
+/// The search goes on.
+pub const NF_TUNING_SEARCHING: u32 = 0;
+/// In the mean of the last two pictures nothing is seen that should not be: setting is just enough.
+pub const NF_TUNING_FOUND: u32 = 1;
+/// Even the finest setting is not enough.
+pub const NF_TUNING_AT_FINEST: u32 = 2;
+/// Finer settings give the same pictures: the renderer ignores the setting, or reaches another limit first.
+pub const NF_TUNING_UNCHANGED: u32 = 3;
+/// More samples do not make it better: what is wrong is no noise, or the pictures are not independent.
+pub const NF_TUNING_NOT_FALLING: u32 = 4;
+
+/// The search for the setting of a renderer at which nobody sees noise: its noise threshold, or samples per pixel.
+pub struct NfTuning(Mutex<Tuning>);
+
+impl handle::Handle for NfTuning {
+    const NAME: &str = "tuning";
+}
+
+/// What to do next in a search, or how it ended.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default)]
+pub struct NfTuningStep {
+    /// One of NF_TUNING_...
+    pub ending: u32,
+    /// While searching: what two pictures are to be rendered with, each with a seed of its own, the same seeds in
+    /// every step.
+    pub each: f64,
+    /// While searching: one picture with this setting is as good as the mean of the two. At NF_TUNING_FOUND: the
+    /// setting that is just enough.
+    pub setting: f64,
+}
+
+/// How far the mean of two pictures is from what may be seen, in its worst place.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default)]
+pub struct NfExcess {
+    /// What is wrong over what may be wrong: 1 or less passes. Infinite where it cannot be told.
+    pub ratio: f64,
+    /// The worst place, a column and a row.
+    pub x: u32,
+    pub y: u32,
+    /// A number that follows from the pictures, by which settings without effect are noticed; 0 if it is not known.
+    pub pictures: u64,
+}
+
+impl From<KnobError> for Failure {
+    fn from(error: KnobError) -> Self {
+        Self::new(NfStatus::Argument, error.to_string())
+    }
+}
+
+/// Searches a noise threshold, such as from 0.2 down to 0.001. The caller frees it with nf_tuning_free.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn nf_tuning_of_threshold(
+    coarsest: f64,
+    finest: f64,
+    tuning: *mut *mut NfTuning,
+) -> NfStatus {
+    // SAFETY: promised by the caller.
+    guard(|| unsafe { give(tuning, Knob::Threshold { coarsest, finest }) })
+}
+
+/// Searches samples per pixel, such as from 16 to 4096. The caller frees it with nf_tuning_free.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn nf_tuning_of_samples(least: u64, most: u64, tuning: *mut *mut NfTuning) -> NfStatus {
+    // SAFETY: promised by the caller.
+    guard(|| unsafe { give(tuning, Knob::Samples { least, most }) })
+}
+
+/// # Safety
+/// As [`handle::give`].
+unsafe fn give(place: *mut *mut NfTuning, knob: Knob) -> Result<(), Failure> {
+    // SAFETY: as for this function.
+    unsafe { handle::give(place, || Ok(NfTuning(Mutex::new(Tuning::new(knob)?)))) }
+}
+
+/// What to render next, or how the search ended. The same until nf_tuning_tell.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn nf_tuning_next(tuning: *const NfTuning, step: *mut NfTuningStep) -> NfStatus {
+    guard(|| {
+        let tuning = handle::get(tuning)?;
+        let next = tuning.0.lock().unwrap_or_else(PoisonError::into_inner).next();
+        let over = |ending| NfTuningStep { ending, ..NfTuningStep::default() };
+        let next = match next {
+            Next::Render { each, setting } => NfTuningStep { ending: NF_TUNING_SEARCHING, each, setting },
+            Next::Done(Ending::Found { setting, .. }) => NfTuningStep { setting, ..over(NF_TUNING_FOUND) },
+            Next::Done(Ending::AtFinest { .. }) => over(NF_TUNING_AT_FINEST),
+            Next::Done(Ending::Unchanged) => over(NF_TUNING_UNCHANGED),
+            Next::Done(Ending::NotFalling { .. }) => over(NF_TUNING_NOT_FALLING),
+        };
+        // SAFETY: promised by the caller.
+        unsafe { border::write(step, next, "step") }
+    })
+}
+
+/// Says what was found of the two pictures that nf_tuning_next asked for.
+#[unsafe(no_mangle)]
+pub extern "C" fn nf_tuning_tell(tuning: *const NfTuning, excess: NfExcess) -> NfStatus {
+    guard(|| {
+        let NfExcess { ratio, x, y, pictures } = excess;
+        let place = Some((x as usize, y as usize));
+        let excess = Excess { place, pictures, ..Excess::new(ratio) };
+        handle::get(tuning)?.0.lock().unwrap_or_else(PoisonError::into_inner).tell(excess);
+        Ok(())
+    })
+}
+
+/// Frees a search. NULL is ignored, a second time is NF_STATUS_HANDLE.
+#[unsafe(no_mangle)]
+pub extern "C" fn nf_tuning_free(tuning: *mut NfTuning) -> NfStatus {
+    guard(|| handle::free(tuning))
+}
+
+/// How far the noise of the mean of two pictures is from what people do not see, where it is worst. a and b are
+/// linear radiance, floats = 3 * width * height values each, rendered with the same setting and different seeds. Of
+/// params, display and audience count; params may be NULL for the defaults. NF_STATUS_ARGUMENT if the pictures are
+/// the same, or not finite.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn nf_excess(
+    oracle: *const NfOracle,
+    params: *const NfParams,
+    width: u32,
+    height: u32,
+    a: *const f32,
+    b: *const f32,
+    floats: usize,
+    excess: *mut NfExcess,
+) -> NfStatus {
+    guard(|| {
+        let oracle = handle::get(oracle)?;
+        // SAFETY: promised by the caller.
+        let (params, [a, b]) = unsafe { pictures(params, (width, height), [a, b], floats) }?;
+        let size = (width as usize, height as usize);
+        let pair = PicturePair::new(size, [a, b], UNKNOWN_SPP).map_err(unfit)?;
+        let (found, _) = pair.noise(&oracle.0, &params).map_err(|error| match error {
+            PairError::Still(error) => unfit(error),
+            PairError::Size(error) => error.into(),
+            PairError::Criterion(error) => error.into(),
+            other => Failure::new(NfStatus::Criterion, other.to_string()),
+        })?;
+        // SAFETY: promised by the caller.
+        unsafe { write(excess, found) }
+    })
+}
+
+/// As nf_excess, for pictures that are denoised: denoised_a is what a denoiser makes of a, and denoised_b of b, each
+/// without a look at the other. The ratio is that of the just-objectionable differences (JOD) that the worst square of
+/// 64 pixels has lost to lost, 0.3 say. Nobody has been asked about denoised pictures: the limit is a vision model's.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn nf_excess_denoised(
+    lost: f64,
+    params: *const NfParams,
+    width: u32,
+    height: u32,
+    a: *const f32,
+    b: *const f32,
+    denoised_a: *const f32,
+    denoised_b: *const f32,
+    floats: usize,
+    excess: *mut NfExcess,
+) -> NfStatus {
+    guard(|| {
+        if !(lost > 0.0 && lost.is_finite()) {
+            return Err(Failure::new(
+                NfStatus::Argument,
+                format!("lost must be a positive number, not {lost}"),
+            ));
+        }
+        let all = [a, b, denoised_a, denoised_b];
+        // SAFETY: promised by the caller.
+        let (params, [a, b, da, db]) = unsafe { pictures(params, (width, height), all, floats) }?;
+        let size = (width as usize, height as usize);
+        let pair = PicturePair::new(size, [a.clone(), b.clone()], UNKNOWN_SPP).map_err(unfit)?;
+        let halves = DenoisedHalves { size, noisy: [&a, &b], denoised: [&da, &db] };
+        let wrong = |error: &dyn std::error::Error| Failure::new(NfStatus::Size, error.to_string());
+        let compared = pair.compare(&params).map_err(unfit)?;
+        let error = DenoisedError::new(&halves, compared.display()).map_err(|error| wrong(&error))?;
+        let (found, _) = error.excess(lost, &params.viewing).map_err(|error| wrong(&error))?;
+        // SAFETY: promised by the caller.
+        unsafe { write(excess, Excess { pictures: pair.digest(), ..found }) }
+    })
+}
+
+/// Samples per pixel, which C is not asked for: they matter to audiences that are no factor.
+const UNKNOWN_SPP: f64 = 128.0;
+/// Edge of the tiles in which noise is described: windows are what is judged, whatever the tiles.
+const TILE: usize = 64;
+
+fn unfit(error: StillError) -> Failure {
+    Failure::new(NfStatus::Argument, error.to_string())
+}
+
+/// Parameters, and copies of pictures.
+///
+/// # Safety
+/// As [`border::object`] and [`border::array`], of pointers that are not null.
+unsafe fn pictures<const N: usize>(
+    params: *const NfParams,
+    (width, height): (u32, u32),
+    pictures: [*const f32; N],
+    floats: usize,
+) -> Result<(Params, [Vec<Rgb>; N]), Failure> {
+    let params = if params.is_null() {
+        Params::default()
+    } else {
+        // SAFETY: not null, and as for this function.
+        unsafe { border::object(params, "params")?.to_params() }?
+    };
+    let params = params.with_tile(TILE);
+    params.check()?;
+    check_image(width as usize, height as usize)?;
+    let wanted = 3 * width as usize * height as usize;
+    let mut copies = std::array::from_fn(|_| Vec::new());
+    for (copy, picture) in copies.iter_mut().zip(pictures) {
+        // SAFETY: as for this function.
+        *copy = unsafe { border::array(picture, floats, wanted, "a picture") }?.as_chunks().0.to_vec();
+    }
+    Ok((params, copies))
+}
+
+/// # Safety
+/// As [`border::write`].
+unsafe fn write(place: *mut NfExcess, excess: Excess) -> Result<(), Failure> {
+    let Excess { ratio, place: at, pictures } = excess;
+    let (x, y) = at.unwrap_or_default();
+    // SAFETY: as for this function.
+    unsafe { border::write(place, NfExcess { ratio, x: x as u32, y: y as u32, pictures }, "excess") }
+}
