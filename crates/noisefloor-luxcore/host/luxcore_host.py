@@ -38,6 +38,11 @@ FORCED = {
     "film.outputs.1.type": "SAMPLECOUNT",
     "film.outputs.1.filename": "unused.exr",
 }
+# Settings of the scene that batches are not rendered by, and pictures of `adaptive` are
+OWN = ["film.filter.", "path.clamping.", "sampler.random.adaptive.", "sampler.sobol.adaptive.", "path.hybridbackforward."]
+# Samples per pixel between two looks at the noise, and before the first: LuxCore's own step is 64, which is more than many
+# pictures need
+HALT_STEP = 16
 SIDES = ["x", "y", "width", "height"]
 # Most seconds between two looks at how far a session is
 POLL = 0.01
@@ -99,6 +104,41 @@ class LuxCore:
             return self._continue_chains(tiles)
         return self._in_blocks(tiles) if self.sobol else self._fresh_sessions(tiles)
 
+    def adaptive(self, threshold, samples, seed):
+        """The picture as LuxCore samples it where there is noise, until its halt condition: no pixel, as displayed, changes
+        by more than the threshold between two looks. Not denoised."""
+        if self.metropolis:
+            return None
+        config = self.lux.Properties()
+        config.Set(self.config)
+        for key in FORCED:
+            if not key.startswith("film.outputs."):
+                config.Delete(key)
+        config.Set(self.own)
+        halt = {
+            "batch.haltthreshold": threshold,
+            "batch.haltthreshold.step": HALT_STEP,
+            "batch.haltthreshold.warmup": HALT_STEP,
+            "batch.haltspp": samples or 0,
+            "film.noiseestimation.step": HALT_STEP,
+            "film.noiseestimation.warmup": HALT_STEP,
+            "renderengine.seed": seed,
+            "film.width": self.width,
+            "film.height": self.height,
+        }
+        for key, value in halt.items():
+            config.Set(self.lux.Property(key, [value]))
+        session = self.lux.RenderSession(self.lux.RenderConfig(config, self.scene))
+        session.Start()
+        while not session.HasDone():
+            time.sleep(POLL)
+            # The halt condition is looked at here
+            session.UpdateStats()
+        film = session.GetFilm()
+        picture = self.np.ascontiguousarray(self._picture(film))
+        session.Stop()
+        return picture
+
     # Setting up
 
     def _configure(self, path, init, engine, sampler):
@@ -119,6 +159,10 @@ class LuxCore:
             if config.IsDefined(key) and config.Get(key).GetBool():
                 warnings.append(f"{key} is turned off: batches that share a photon cache are not independent")
             config.Set(self.lux.Property(key, [False]))
+        # What `adaptive` renders with is the user's own
+        self.own = self.lux.Properties()
+        for prefix in OWN:
+            self.own.Set(config.GetAllProperties(prefix))
         for prefix in REMOVED:
             config.DeleteAll(config.GetAllNames(prefix))
         self.width, self.height = (

@@ -150,6 +150,47 @@ fn memory_is_flat_over_a_thousand_calls() {
 }
 
 /// A file that Blender saved, with an image inside, is the scene that the script made.
+/// By its own noise threshold a renderer renders the same scene; a finer one leaves less noise, which is that of other
+/// random numbers with another seed; and samples are as before.
+fn adapts(mut source: Sidecar, repeats: bool) {
+    let info = source.info();
+    let whole = Tile { index: 0, x: 0, y: 0, width: info.width, height: info.height };
+    let mean = |picture: &[Rgb]| {
+        picture.iter().flatten().map(|&c| f64::from(c)).sum::<f64>() / (3 * picture.len()) as f64
+    };
+    let apart = |a: &[Rgb], b: &[Rgb]| {
+        let pairs = a.iter().flatten().zip(b.iter().flatten());
+        let squares = pairs.map(|(a, b)| f64::from(a.min(1.0) - b.min(1.0)).powi(2)).sum::<f64>();
+        (squares / (3 * a.len()) as f64).sqrt()
+    };
+    let sample = |source: &mut Sidecar| source.sample(&[Request::new(whole, 0, 64)]).unwrap().remove(0).mean;
+    let before = sample(&mut source);
+    let mut adaptive = |threshold, seed| source.adaptive(threshold, Some(4096), seed).unwrap().unwrap();
+    let [coarse, fine] = [0.4, 0.04].map(|threshold| [1, 2].map(|seed| adaptive(threshold, seed)));
+    assert!(apart(&coarse[0], &coarse[1]) > 0.0);
+    let (much, little) = (apart(&coarse[0], &coarse[1]), apart(&fine[0], &fine[1]));
+    assert!(little < 0.7 * much, "{little} {much}");
+    // Another pixel filter has the same mean, up to the edge of the picture. Noise is a third of a pixel, in 4,096
+    let (a, b) = (mean(&fine[0]), mean(&before));
+    assert!((a / b - 1.0).abs() < 0.02, "{a} {b}");
+    let after = sample(&mut source);
+    assert!(if repeats { apart(&before, &after) < 1e-5 } else { apart(&before, &after) > 0.0 });
+}
+
+#[test]
+fn cycles_samples_by_its_own_threshold() {
+    if usable(&noisefloor_cycles::RENDERER) {
+        adapts(cycles(64, 64).unwrap(), true);
+    }
+}
+
+#[test]
+fn luxcore_samples_by_its_own_threshold() {
+    if usable(&noisefloor_luxcore::RENDERER) {
+        adapts(luxcore(Engine::Path, Sampler::Sobol, 64, 64).unwrap(), false);
+    }
+}
+
 #[test]
 fn a_blend_file_is_what_was_saved() {
     if !usable(&noisefloor_cycles::RENDERER) {

@@ -38,7 +38,13 @@ pub const ADAPTERS: &[Adapter] = &[
         step: 16,
         ..luxcore("luxcore-sobol", |job| noisefloor_luxcore::open(job, Engine::Path, Sampler::Sobol))
     },
-    luxcore("luxcore-metropolis", |job| noisefloor_luxcore::open(job, Engine::Path, Sampler::Metropolis)),
+    // A chain has no pixels of its own
+    Adapter {
+        adapts: false,
+        ..luxcore("luxcore-metropolis", |job| {
+            noisefloor_luxcore::open(job, Engine::Path, Sampler::Metropolis)
+        })
+    },
     luxcore("luxcore-bidir", |job| noisefloor_luxcore::open(job, Engine::Bidir, Sampler::Random)),
     Adapter {
         name: "cycles",
@@ -53,7 +59,7 @@ pub const ADAPTERS: &[Adapter] = &[
 
 const fn luxcore(name: &'static str, open: fn(&Job) -> Result<Sidecar, SidecarError>) -> Adapter {
     let (renderer, step) = (&noisefloor_luxcore::RENDERER, Schedule::STEP);
-    Adapter { name, renderer, open, step, adapts: false, notes: Vec::new }
+    Adapter { name, renderer, open, step, adapts: true, notes: Vec::new }
 }
 
 /// An adapter by its name: its functions have other addresses in every run.

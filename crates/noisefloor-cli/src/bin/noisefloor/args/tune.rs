@@ -20,7 +20,7 @@ use std::path::PathBuf;
 
 /// Find the renderer's own setting at which nobody sees noise: a noise threshold, or samples per pixel.
 ///
-/// Renderers with a noise threshold (Cycles, and any program) know better than tiles where samples go; what
+/// Renderers with a noise threshold (Cycles, LuxCore, and any program) know better than tiles where samples go; what
 /// nobody knows is the number. From a coarse setting on, two pictures of different seeds are rendered, and the
 /// noise that both leave is judged where it is worst; the next setting follows from how it falls, until nobody
 /// sees noise. That takes two to four steps, each a fraction of the next. The mean of the last two pictures is
@@ -29,7 +29,7 @@ use std::path::PathBuf;
 /// With --denoise, the denoised picture is judged: how many just-objectionable differences (JOD) its worst
 /// square of 64 pixels has lost. Nobody has been asked about denoised pictures: the limit is the vision model's.
 ///
-/// Without a noise threshold (`ptwne`, `mitsuba`, `luxcore`), samples per pixel are sought, the same everywhere;
+/// Without a noise threshold (`ptwne`, `mitsuba`), samples per pixel are sought, the same everywhere;
 /// `render` takes fewer, since it stops tile by tile.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
