@@ -434,4 +434,32 @@ fn images_come_from_views_and_files_too() {
     let loaded = noisefloor_scenefile::load(&folder.path().join("a.gltf")).unwrap();
     let pixels = render(loaded, 2, 1, 1);
     assert!(pixels.iter().all(|p| (p[0] - linear(188)).abs() < 1e-5), "{pixels:?}");
+
+    // Spaces around a name are part of it, unless there is no such file
+    std::fs::copy(folder.path().join("maps/grey map.png"), folder.path().join(" a.png ")).unwrap();
+    let black = image::RgbImage::new(8, 8);
+    black.save_with_format(folder.path().join("a.png"), image::ImageFormat::Png).unwrap();
+    for (uri, grey) in
+        [("%20a.png%20", linear(188)), (" a.png ", linear(188)), ("a.png", 0.0), ("a.png ", 0.0)]
+    {
+        maker.root["images"][0] = json(&format!(r#"{{"uri": "{uri}"}}"#));
+        std::fs::write(folder.path().join("a.gltf"), maker.gltf()).unwrap();
+        let loaded = noisefloor_scenefile::load(&folder.path().join("a.gltf")).unwrap();
+        let pixels = render(loaded, 2, 1, 1);
+        assert!(pixels.iter().all(|p| (p[0] - grey).abs() < 1e-5), "{uri:?}: {pixels:?}");
+    }
+}
+
+/// A file that requires variants shows its materials without one.
+#[test]
+fn variants_are_left_at_their_default() {
+    let mut maker = wall(r#"{"emissiveFactor": [1, 1, 1]}"#);
+    maker.push("materials", r#"{"emissiveFactor": [0, 0, 0]}"#);
+    let mapping = r#"{"KHR_materials_variants": {"mappings": [{"material": 1, "variants": [0]}]}}"#;
+    maker.root["meshes"][0]["primitives"][0]["extensions"] = json(mapping);
+    maker.root["extensions"] = json(r#"{"KHR_materials_variants": {"variants": [{"name": "Night"}]}}"#);
+    maker.root["extensionsUsed"] = json(r#"["KHR_materials_variants"]"#);
+    maker.root["extensionsRequired"] = json(r#"["KHR_materials_variants"]"#);
+    assert_close(mean(&maker, 4, 1), [1.0; 3], 1e-5);
+    assert_warns(&maker.load().unwrap(), &["KHR_materials_variants is ignored"]);
 }
