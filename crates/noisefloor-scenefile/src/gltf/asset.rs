@@ -96,6 +96,28 @@ impl<'a> Asset<'a> {
         Ok(bytes)
     }
 
+    /// Adds bytes that the file stands for as a buffer of its own, and returns the view of all of them.
+    #[cfg(feature = "draco")]
+    pub(super) fn add_view(&mut self, bytes: Vec<u8>) -> Index<buffer::View> {
+        let byte_length = (bytes.len() as u64).into();
+        // Any name will do: it is there already
+        let uri = Some(String::new());
+        let extras = Default::default;
+        let whole = Buffer { byte_length, name: None, uri, extensions: None, extras: extras() };
+        self.buffers.push(OnceCell::from(bytes));
+        let view = buffer::View {
+            buffer: Index::push(&mut self.root.buffers, whole),
+            byte_length,
+            byte_offset: None,
+            byte_stride: None,
+            name: None,
+            target: None,
+            extensions: None,
+            extras: extras(),
+        };
+        Index::push(&mut self.root.buffer_views, view)
+    }
+
     fn buffer(&self, index: Index<Buffer>, place: &Place) -> Result<&[u8], LoadError> {
         let buffer = self.get(index, "buffer", place)?;
         let place = || Place::part(self.path, name("buffer", index.value(), buffer.name.as_deref()));

@@ -7,7 +7,9 @@ use std::fmt;
 
 /// Extensions that a file may require. `KHR_mesh_quantization` is but a wider choice of accessors, all of which are
 /// read; of `KHR_materials_variants` the material without a variant is shown, as its specification has it.
-const KNOWN: [&str; 12] = [
+const KNOWN: &[&str] = &[
+    #[cfg(feature = "draco")]
+    super::draco::NAME,
     "KHR_lights_punctual",
     "KHR_materials_clearcoat",
     "KHR_materials_emissive_strength",
