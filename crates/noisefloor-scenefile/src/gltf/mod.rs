@@ -15,6 +15,7 @@ mod light;
 mod lit;
 mod material;
 mod mesh;
+mod meshopt;
 mod nodes;
 mod notes;
 mod properties;
@@ -49,9 +50,9 @@ const BYTES_EACH: u64 = 64;
 pub(crate) fn load(path: &Path, root: Option<&Path>) -> Result<Loaded, LoadError> {
     let folder = Folder::of(path, root, String::new());
     let file = folder.read(path, MAX_BYTES, &Place::file(path))?;
-    #[cfg_attr(not(feature = "draco"), expect(unused_mut, reason = "only to inflate meshes"))]
     let mut asset = Asset::parse(path, &folder, &file)?;
     notes::check_required(&asset)?;
+    meshopt::inflate(&mut asset)?;
     #[cfg(feature = "draco")]
     draco::inflate(&mut asset)?;
     let placed = nodes::placed(&asset)?;

@@ -10,6 +10,7 @@ use std::fmt;
 const KNOWN: &[&str] = &[
     #[cfg(feature = "draco")]
     super::draco::NAME,
+    super::meshopt::NAME,
     super::texture::WEBP,
     "KHR_lights_punctual",
     "KHR_materials_clearcoat",

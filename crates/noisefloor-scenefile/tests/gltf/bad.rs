@@ -143,9 +143,9 @@ fn every_error_names_its_place() {
         ("/asset/version", "2", "asset: ", "not the JSON of a glTF file"),
         (
             "/extensionsRequired",
-            r#"["EXT_meshopt_compression"]"#,
+            r#"["EXT_mesh_gpu_instancing"]"#,
             "extensionsRequired: ",
-            "EXT_meshopt_compression",
+            "EXT_mesh_gpu_instancing",
         ),
         ("/scenes", "[]", "scene.gltf: ", "scene 0 does not exist"),
     ] {

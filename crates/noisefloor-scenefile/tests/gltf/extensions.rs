@@ -240,9 +240,9 @@ fn compressed_pictures_and_meshes_are_refused_by_name() {
     let error = maker.load().unwrap_err().to_string();
     assert!(error.contains("a mesh of only EXT_other_compression is not supported"), "{error}");
     let mut maker = wall("{}");
-    maker.root["extensionsRequired"] = json(r#"["KHR_texture_basisu", "EXT_meshopt_compression"]"#);
+    maker.root["extensionsRequired"] = json(r#"["KHR_texture_basisu", "EXT_mesh_gpu_instancing"]"#);
     let error = maker.load().unwrap_err().to_string();
-    assert!(error.contains("KHR_texture_basisu, EXT_meshopt_compression"), "{error}");
+    assert!(error.contains("KHR_texture_basisu, EXT_mesh_gpu_instancing"), "{error}");
 }
 
 /// WebP pictures, losslessly compressed, with a PNG for other readers or without.

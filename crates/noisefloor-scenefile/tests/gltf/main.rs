@@ -16,3 +16,4 @@ mod geometry; // where triangles and cameras are
 mod kit;
 mod lights; // lights without size
 mod materials; // what surfaces look like
+mod meshopt; // compressed buffer views
