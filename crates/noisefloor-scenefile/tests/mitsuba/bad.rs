@@ -69,7 +69,7 @@ fn missing_and_broken_files_are_named() {
         (bitmap("broken.png"), "broken.png: the picture is broken"),
         (
             bitmap("text.png"),
-            "text.png: a picture that is neither PNG, JPEG, BMP, TGA, PFM, OpenEXR nor Radiance is not",
+            "text.png: a picture that is neither PNG, JPEG, WebP, BMP, TGA, PFM, OpenEXR nor Radiance is not",
         ),
         (bitmap("nan.exr"), "line 3: the picture has values that are not finite"),
         (mesh("obj", "bad.obj"), "bad.obj: line 2: `2`: there is no position 2"),
