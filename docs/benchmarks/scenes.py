@@ -83,7 +83,8 @@ def boxed(text):
 
 
 def prepared(args, file):
-    """Mitsuba's scene of a file with independent samples and a box filter, and the path depth that the file asks for."""
+    """Mitsuba's scene of a file with independent samples and a box filter, the path depth that the file asks for, and the
+    size of the picture."""
     import mitsuba as mi
 
     config = mi.parser.ParserConfig(args.variant)
@@ -102,7 +103,7 @@ def prepared(args, file):
         beside.unlink()
     mi.parser.transform_all(config, state)
     # Its own default where a file has none
-    depth = 65
+    depth, size = 65, [8, 8]
 
     def become(node, plugin, keep=()):
         for name in list(node.props.keys()):
@@ -122,10 +123,15 @@ def prepared(args, file):
         elif node.type == mi.ObjectType.ReconstructionFilter:
             become(node, "box")
         elif node.type == mi.ObjectType.Film:
-            become(node, "hdrfilm", ("width", "height", "rfilter"))
+            # Before there is a sensor: later it would keep the field of view that it has across, whatever the shape
+            width, height = (int(node.props.get(name, 768 if name == "width" else 576)) for name in ("width", "height"))
+            scale = args.edge / max(width, height)
+            size = [max(8, round(width * scale / 8) * 8), max(8, round(height * scale / 8) * 8)]
+            become(node, "hdrfilm", ("rfilter",))
+            node.props["width"], node.props["height"] = size
             node.props["pixel_format"] = "rgb"
     scene = mi.parser.instantiate(config, state)
-    return (scene[0] if isinstance(scene, list) else scene), depth
+    return (scene[0] if isinstance(scene, list) else scene), depth, size
 
 
 def ours(args, file, size, spp, root):
@@ -149,16 +155,8 @@ def theirs(args, file, spp):
     import mitsuba as mi
     import numpy as np
 
-    scene, depth = prepared(args, file)
+    scene, depth, size = prepared(args, file)
     sensor = scene.sensors()[0]
-    params = mi.traverse(sensor)
-    width, height = (int(x) for x in params["film.size"])
-    scale = args.edge / max(width, height)
-    size = [max(8, round(width * scale / 8) * 8), max(8, round(height * scale / 8) * 8)]
-    params["film.size"] = size
-    if "film.crop_size" in params:
-        params["film.crop_size"], params["film.crop_offset"] = size, [0, 0]
-    params.update()
     integrator = mi.load_dict({"type": "path", "max_depth": depth, "rr_depth": 5})
 
     def render():

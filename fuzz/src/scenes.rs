@@ -122,8 +122,21 @@ pub(crate) fn glb(bytes: &[u8]) -> bool {
 }
 
 pub(crate) fn glb_seeds() -> Vec<Vec<u8>> {
-    vec![[triangle("").as_bytes(), &[0], &positions()].concat()]
+    vec![
+        [triangle("").as_bytes(), &[0], &positions()].concat(),
+        [COMPRESSED.as_bytes(), &[0], include_bytes!("../seeds/square.drc")].concat(),
+    ]
 }
+
+/// Eight triangles that Draco compressed, which are the binary chunk.
+const COMPRESSED: &str = r#"{"asset":{"version":"2.0"},"scenes":[{"nodes":[0]}],"nodes":[{"mesh":0}],
+"extensionsRequired":["KHR_draco_mesh_compression"],
+"meshes":[{"primitives":[{"attributes":{"POSITION":0,"NORMAL":0,"COLOR_0":1},"indices":2,"extensions":
+{"KHR_draco_mesh_compression":{"bufferView":0,"attributes":{"POSITION":3,"NORMAL":2,"COLOR_0":0}}}}]}],
+"accessors":[{"componentType":5126,"count":9,"type":"VEC3"},
+{"componentType":5121,"count":9,"type":"VEC4","normalized":true},
+{"componentType":5123,"count":24,"type":"SCALAR"}],
+"bufferViews":[{"buffer":0,"byteLength":262}],"buffers":[{"byteLength":262}]}"#;
 
 pub(crate) fn xml(bytes: &[u8]) -> bool {
     read("scene.xml", bytes)

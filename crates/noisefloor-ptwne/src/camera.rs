@@ -39,7 +39,7 @@ pub enum FovAxis {
 pub struct Optics {
     /// The edge that the field of view spans.
     pub fov_axis: FovAxis,
-    /// Radius of the lens in scene units, 0…1e6; 0 has everything in focus.
+    /// Radius of the lens in scene units, 0…1e8; 0 has everything in focus.
     pub aperture_radius: f32,
     /// Distance of what is in focus, along the view, in scene units: above 0 if there is a lens.
     pub focus_distance: f32,
@@ -51,7 +51,7 @@ pub struct Optics {
     /// The part of the picture that is shown, as shares of its width from the left and of its height from
     /// the top: −100…100. The field of view is that of the whole. [[0, 1], [0, 1]] is all of it.
     pub window: [[f32; 2]; 2],
-    /// What is nearer along the view is not seen, in scene units, 0…1e6.
+    /// What is nearer along the view is not seen, in scene units, 0…1e8.
     pub near: f32,
 }
 
@@ -82,14 +82,14 @@ impl Optics {
             }
             check_range("the size of the camera's window", to - from, [1e-5, 200.0], "1e-5…200")?;
         }
-        check_range("the nearest distance that is seen", self.near, [0.0, MAX_COORDINATE], "0…1e6")?;
-        check_range("the radius of the lens", self.aperture_radius, [0.0, MAX_COORDINATE], "0…1e6")?;
+        check_range("the nearest distance that is seen", self.near, [0.0, MAX_COORDINATE], "0…1e8")?;
+        check_range("the radius of the lens", self.aperture_radius, [0.0, MAX_COORDINATE], "0…1e8")?;
         if self.aperture_radius > 0.0 {
             let (what, range) = ("the focus distance", "1e-6…1e9");
             check_range(what, self.focus_distance, [1e-6, 1e9], range)?;
         }
         let height = self.parallel_height.unwrap_or(1.0);
-        check_range("the height of a parallel projection", height, [1e-6, MAX_COORDINATE], "1e-6…1e6")
+        check_range("the height of a parallel projection", height, [1e-6, MAX_COORDINATE], "1e-6…1e8")
     }
 }
 

@@ -5,8 +5,10 @@ use crate::math;
 use glam::Vec3;
 use noisefloor::Rgb;
 
-/// Largest absolute value of a coordinate: squares and their sums stay far from the limits of `f32`.
-pub const MAX_COORDINATE: f32 = 1e6;
+/// Largest absolute value of a coordinate: the squared area of a parallelogram, 10³⁴, and sums of such
+/// stay far from the limits of `f32`. What is smaller than 10⁻⁶ of the scene is lost in its offsets long
+/// before.
+pub const MAX_COORDINATE: f32 = 1e8;
 /// Largest radiance that is accepted: sums of products stay far from the limits of `f32`.
 pub(crate) const MAX_RADIANCE: f32 = 1e12;
 
@@ -54,7 +56,7 @@ pub(crate) fn position(p: [f32; 3]) -> Result<Vec3, SceneError> {
             return Err(SceneError::NotFinite { what: "a position or normal" });
         }
         if value.abs() > MAX_COORDINATE {
-            return Err(SceneError::Range { what: "a position or normal", value, range: "−1e6…1e6" });
+            return Err(SceneError::Range { what: "a position or normal", value, range: "−1e8…1e8" });
         }
     }
     Ok(p.into())

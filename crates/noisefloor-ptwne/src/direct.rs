@@ -44,6 +44,7 @@ pub(crate) struct Tracer<'a> {
 }
 
 /// A ray of a sample.
+#[derive(Clone, Copy)]
 struct Branch {
     ray: Ray,
     /// Where its direction was sampled, and how far it has come since, through surfaces of nothing.
@@ -53,6 +54,8 @@ struct Branch {
     density: f32,
     /// Factor on its light.
     weight: Vec3,
+    /// Its medium's index of refraction over the camera's, squared.
+    eta2: f32,
     /// One at the camera, doubled at each surface, plus one for light that glass transmits: unique among the
     /// rays of a sample.
     code: u64,
@@ -74,6 +77,7 @@ impl<'a> Tracer<'a> {
             passed: 0.0,
             density: DELTA,
             weight: Vec3::ONE,
+            eta2: 1.0,
             code: 1,
         })
     }
@@ -95,7 +99,7 @@ impl<'a> Tracer<'a> {
 
     /// Radiance along a ray, times its weight.
     fn radiance(&mut self, branch: Branch) -> Vec3 {
-        let Branch { ray, from, passed, density, weight, code } = branch;
+        let Branch { ray, from, passed, density, weight, eta2, code } = branch;
         let scene = self.scene;
         let test = self.opacity_test(code, Use::Ray);
         let hit = scene.closest::<true>(&ray, &mut self.stack, test);
@@ -121,12 +125,13 @@ impl<'a> Tracer<'a> {
         }
         let cos = (-ray.dir.dot(surface.normal)).clamp(0.0, 1.0);
         let mirrored = math::reflect(ray.dir, surface.normal);
-        // Both branches of glass
-        let mut split = |reflectance: f32, dir: Vec3, tint: Vec3| {
-            let mut both = self.follow(&surface, mirrored, DELTA, weight * reflectance, 2 * code);
+        // Both branches of glass. Radiance that crosses a boundary spreads over η² of its solid angle
+        let mut split = |reflectance: f32, dir: Vec3, tint: Vec3, by: f32| {
+            let mut both = self.follow(&surface, mirrored, DELTA, (weight * reflectance, eta2), 2 * code);
             // Not what a shading normal sends through the surface, and yet to its front
             if reflectance < 1.0 && dir.dot(surface.flat) < 0.0 {
-                both += self.follow(&surface, dir, DELTA, weight * tint * (1.0 - reflectance), 2 * code + 1);
+                let through = weight * tint * ((1.0 - reflectance) / by);
+                both += self.follow(&surface, dir, DELTA, (through, eta2 * by), 2 * code + 1);
             }
             both
         };
@@ -142,58 +147,61 @@ impl<'a> Tracer<'a> {
             }
             Bsdf::Mirror { fresnel, colour } => {
                 let factor = fresnel.at(colour.tinted(surface.uv, surface.tint), cos);
-                self.follow(&surface, mirrored, DELTA, weight * factor, 2 * code)
+                self.follow(&surface, mirrored, DELTA, (weight * factor, eta2), 2 * code)
             }
             Bsdf::Glass { ior, tint } => {
                 let eta = if surface.front { *ior } else { 1.0 / ior };
                 let (reflectance, cos_t) = bsdf::fresnel(cos, eta);
-                split(reflectance, bsdf::refract(ray.dir, surface.normal, cos, cos_t, eta), *tint)
+                split(reflectance, bsdf::refract(ray.dir, surface.normal, cos, cos_t, eta), *tint, eta * eta)
             }
-            Bsdf::ThinGlass { ior, tint } => split(bsdf::pane(cos, *ior), ray.dir, *tint),
-            Bsdf::RoughGlass { .. } => self.rough_glass(&ray, &surface, weight, code),
+            Bsdf::ThinGlass { ior, tint } => split(bsdf::pane(cos, *ior), ray.dir, *tint, 1.0),
+            Bsdf::RoughGlass { .. } => self.rough_glass(&surface, &branch),
             // Rays pass it, and intersections have one of its parts
             Bsdf::Nothing | Bsdf::Mix { .. } => Vec3::ZERO,
             Bsdf::Metal { .. }
             | Bsdf::Plastic { .. }
             | Bsdf::Gltf { .. }
             | Bsdf::Principled { .. }
-            | Bsdf::Lobes { .. } => self.glossy(&ray, &surface, weight, code),
+            | Bsdf::Lobes { .. } => self.glossy(&surface, &branch),
         }
     }
 
-    /// Radiance from `dir`, times the weight, if the chain may continue.
+    /// Radiance from `dir`, times the weight, if the chain may continue. With the weight comes
+    /// [`Branch::eta2`].
     fn follow(
         &mut self,
         surface: &Intersection<'_>,
         dir: Vec3,
         density: f32,
-        weight: Vec3,
+        (weight, eta2): (Vec3, f32),
         code: u64,
     ) -> Vec3 {
-        if code >> MAX_SPECULAR != 0 || weight.max_element() < MIN_WEIGHT {
+        // By basic radiance L/η², so that what is inside glass is not cut sooner
+        if code >> MAX_SPECULAR != 0 || weight.max_element() * eta2 < MIN_WEIGHT {
             return Vec3::ZERO;
         }
         let ray = Ray { origin: surface.leave(dir), dir };
-        self.radiance(Branch { ray, from: ray.origin, passed: 0.0, density, weight, code })
+        self.radiance(Branch { ray, from: ray.origin, passed: 0.0, density, weight, eta2, code })
     }
 
     /// A rough boundary: one sampled direction, by which lights are found, too.
-    fn rough_glass(&mut self, ray: &Ray, surface: &Intersection<'_>, weight: Vec3, code: u64) -> Vec3 {
+    fn rough_glass(&mut self, surface: &Intersection<'_>, branch: &Branch) -> Vec3 {
+        let &Branch { ray, weight, eta2, code, .. } = branch;
+        let Some(glass) = surface.rough_glass() else { return Vec3::ZERO };
         let frame = surface.frame();
         let numbers = sobol_burley::sample_4d(self.index, 0, self.seed(code, Use::Facets) as u32);
-        let sampled = surface
-            .rough_glass()
-            .and_then(|glass| glass.sample(frame.to_local(-ray.dir), [numbers[2], numbers[0], numbers[1]]));
+        let sampled = glass.sample(frame.to_local(-ray.dir), [numbers[2], numbers[0], numbers[1]]);
         let Some((wi, factor, _)) = sampled else { return Vec3::ZERO };
         let dir = frame.to_world(wi).normalize();
         if !surface.is_consistent(dir, wi) {
             return Vec3::ZERO;
         }
-        self.follow(surface, dir, DELTA, weight * factor, 2 * code)
+        self.follow(surface, dir, DELTA, (weight * factor, eta2 * glass.eta2(wi)), 2 * code)
     }
 
     /// Microfacets and coats: direct light, and what the facets reflect.
-    fn glossy(&mut self, ray: &Ray, surface: &Intersection<'_>, weight: Vec3, code: u64) -> Vec3 {
+    fn glossy(&mut self, surface: &Intersection<'_>, branch: &Branch) -> Vec3 {
+        let &Branch { ray, weight, eta2, code, .. } = branch;
         let frame = surface.frame();
         let wo = frame.to_local(-ray.dir);
         let Some(glossy) = surface.glossy(wo.z) else { return Vec3::ZERO };
@@ -222,13 +230,13 @@ impl<'a> Tracer<'a> {
         if let Some(factor) = glossy.mirror() {
             let dir = math::reflect(ray.dir, surface.normal);
             if dir.dot(surface.flat) > 0.0 {
-                sum += self.follow(surface, dir, DELTA, weight * factor, 2 * code + 1);
+                sum += self.follow(surface, dir, DELTA, (weight * factor, eta2), 2 * code + 1);
             }
         }
         if let Some((wi, factor, density)) = glossy.reflect(wo, [u, v]) {
             let dir = frame.to_world(wi).normalize();
             if dir.dot(surface.flat) > 0.0 {
-                sum += self.follow(surface, dir, density, weight * factor, 2 * code);
+                sum += self.follow(surface, dir, density, (weight * factor, eta2), 2 * code);
             }
         }
         sum

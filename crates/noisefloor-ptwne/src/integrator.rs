@@ -76,6 +76,8 @@ struct Path<'a, const OPACITY: bool> {
 struct Scattered {
     dir: Vec3,
     weight: Vec3,
+    /// η² of the boundary it crosses, by which its weight was divided; 1 if it crosses none.
+    eta2: f32,
     pdf: f32,
     roulette: f32,
 }
@@ -86,6 +88,8 @@ impl<'a, const OPACITY: bool> Path<'a, OPACITY> {
         let scene = self.scene;
         let mut sum = Vec3::ZERO;
         let mut throughput = Vec3::ONE;
+        // The medium's index of refraction over the camera's, squared
+        let mut eta2 = 1.0;
         // Density with which the ray's direction was sampled
         let mut pdf = DELTA;
         // Where it was sampled, and how far the ray has come since, through surfaces of nothing
@@ -121,11 +125,13 @@ impl<'a, const OPACITY: bool> Path<'a, OPACITY> {
             // Scatter: next event estimation, then a new direction
             let Some(next) = self.scatter(&ray, &surface, throughput, &mut sum) else { return sum };
             throughput *= next.weight;
+            eta2 *= next.eta2;
             pdf = next.pdf;
 
-            // Russian roulette (Arvo, Kirk 1990)
+            // Russian roulette (Arvo, Kirk 1990), by basic radiance L/η²: what paths lose on entering glass
+            // they win back on leaving it
             if depth >= self.settings.roulette {
-                let survive = throughput.max_element().min(0.95);
+                let survive = (throughput.max_element() * eta2).min(0.95);
                 if next.roulette >= survive {
                     return sum;
                 }
@@ -256,7 +262,7 @@ impl<'a, const OPACITY: bool> Path<'a, OPACITY> {
         if dir.dot(surface.flat) <= 0.0 {
             return None;
         }
-        Some(Scattered { dir, weight: albedo, pdf: local.z * FRAC_1_PI, roulette })
+        Some(Scattered { dir, weight: albedo, eta2: 1.0, pdf: local.z * FRAC_1_PI, roulette })
     }
 
     /// Microfacets, coats and diffuse lobes. `THROUGH` also sends light through the surface.
@@ -293,7 +299,7 @@ impl<'a, const OPACITY: bool> Path<'a, OPACITY> {
         if !surface.is_consistent(dir, wi) {
             return None;
         }
-        Some(Scattered { dir: dir.normalize(), weight, pdf, roulette })
+        Some(Scattered { dir: dir.normalize(), weight, eta2: 1.0, pdf, roulette })
     }
 
     /// A rough dielectric boundary.
@@ -322,7 +328,8 @@ impl<'a, const OPACITY: bool> Path<'a, OPACITY> {
         let [pick, u, v, roulette] = self.sampler.four();
         let (wi, weight, pdf) = glass.sample(wo, [pick, u, v])?;
         let dir = frame.to_world(wi).normalize();
-        surface.is_consistent(dir, wi).then_some(Scattered { dir, weight, pdf, roulette })
+        let eta2 = glass.eta2(wi);
+        surface.is_consistent(dir, wi).then_some(Scattered { dir, weight, eta2, pdf, roulette })
     }
 
     /// Mirrors and glass. Glass reflects with the probability of its Fresnel term.
@@ -331,6 +338,7 @@ impl<'a, const OPACITY: bool> Path<'a, OPACITY> {
         let n = surface.normal;
         let cos = (-ray.dir.dot(n)).clamp(0.0, 1.0);
         let [pick, roulette, ..] = self.sampler.four();
+        let mut eta2 = 1.0;
         let (dir, weight) = match &surface.material.bsdf {
             Bsdf::Glass { ior, tint } => {
                 let eta = if surface.front { *ior } else { 1.0 / ior };
@@ -343,7 +351,9 @@ impl<'a, const OPACITY: bool> Path<'a, OPACITY> {
                     if dir.dot(surface.flat) >= 0.0 {
                         return None;
                     }
-                    (dir, *tint)
+                    // Radiance spreads over η² of its solid angle (Veach 1997, §5.2)
+                    eta2 = eta * eta;
+                    (dir, *tint / eta2)
                 }
             }
             Bsdf::ThinGlass { ior, tint } => {
@@ -358,6 +368,6 @@ impl<'a, const OPACITY: bool> Path<'a, OPACITY> {
             }
             _ => (ray.dir, Vec3::ZERO),
         };
-        Some(Scattered { dir, weight, pdf: DELTA, roulette })
+        Some(Scattered { dir, weight, eta2, pdf: DELTA, roulette })
     }
 }

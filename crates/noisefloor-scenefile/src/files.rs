@@ -61,7 +61,8 @@ impl Folder {
     }
 
     /// The file called `name` at `place`: the first there is, as seen from the scene's folder and those added
-    /// to it. Backslashes separate folders, too.
+    /// to it. Backslashes separate folders, too, and where no file has spaces around its name, they do not
+    /// count.
     ///
     /// # Errors
     /// [`LoadError::Outside`] if the name, or a link on the way, leads out of the root; [`LoadError::Read`]
@@ -69,12 +70,15 @@ impl Folder {
     pub(crate) fn find(&self, name: &str, place: &Place) -> Result<PathBuf, LoadError> {
         let outside = || LoadError::Outside { place: place.clone(), name: name.to_owned() };
         let failed = |cause| LoadError::Read { place: place.clone(), cause };
-        let name = name.trim().replace('\\', "/");
-        let relative = Path::new(&name);
+        let name = name.replace('\\', "/");
+        let bare = Some(name.trim()).filter(|bare| *bare != name);
+        let names = [Some(name.as_str()), bare].into_iter().flatten().map(Path::new);
 
         // Names, whether or not the files exist
         let mut first_missing = None;
-        for folder in &self.searched {
+        for (relative, folder) in
+            names.flat_map(|name| self.searched.iter().map(move |folder| (name, folder)))
+        {
             if !self.stays_inside(folder, relative) {
                 continue;
             }

@@ -7,6 +7,7 @@ use image::codecs::hdr::HdrDecoder;
 use image::codecs::jpeg::JpegDecoder;
 use image::codecs::png::PngDecoder;
 use image::codecs::tga::TgaDecoder;
+use image::codecs::webp::WebPDecoder;
 use image::{DynamicImage, ImageDecoder, ImageFormat, Limits};
 use noisefloor::Rgb;
 use noisefloor_ptwne::MAX_TEXTURE_PIXELS;
@@ -17,7 +18,7 @@ use std::path::Path;
 /// Memory for what a decoder keeps besides the pixels: rows, profiles, text.
 const MAX_EXTRA: u64 = 64 << 20;
 /// Most pixels that a byte of a file can stand for: deflate packs at best 1032:1, and a pixel has at least
-/// one bit. The other formats pack less.
+/// one bit. The other formats pack less, but for WebP, of which a picture of one colour has no bits.
 const PIXELS_A_BYTE: u64 = 1032 * 8;
 
 /// A picture as its file has it.
@@ -42,7 +43,7 @@ pub(crate) enum Samples {
     Linear(Vec<Rgb>),
 }
 
-/// Reads the EXR, PFM, Radiance, PNG, JPEG, BMP or TGA file in `path`, named at `place`. Its content says
+/// Reads the EXR, PFM, Radiance, PNG, JPEG, WebP, BMP or TGA file in `path`, named at `place`. Its content says
 /// which it is, not its name, but for TGA, which has no mark.
 ///
 /// # Errors
@@ -64,7 +65,7 @@ pub(crate) fn read(folder: &Folder, path: &Path, place: &Place) -> Result<Pictur
     Ok(Picture { width: image.width, height: image.height, samples: Samples::Linear(image.pixels) })
 }
 
-/// Decodes the Radiance, PNG, JPEG or BMP file `bytes`, which are at `place`.
+/// Decodes the Radiance, PNG, JPEG, WebP or BMP file `bytes`, which are at `place`.
 ///
 /// # Errors
 /// As [`read`].
@@ -93,13 +94,13 @@ fn decode_as(bytes: &[u8], format: Option<ImageFormat>, place: &Place) -> Result
         }
         Some(ImageFormat::Jpeg) => pixels(JpegDecoder::new(reader).map_err(broken)?, length, place),
         Some(ImageFormat::Hdr) => pixels(HdrDecoder::new(reader).map_err(broken)?, length, place),
+        Some(ImageFormat::WebP) => pixels(WebPDecoder::new(reader).map_err(broken)?, usize::MAX, place),
         Some(ImageFormat::Bmp) => pixels(BmpDecoder::new(reader).map_err(broken)?, length, place),
         Some(ImageFormat::Tga) => pixels(TgaDecoder::new(reader).map_err(broken)?, length, place),
         _ => {
             let what = match bytes {
                 [0xab, b'K', b'T', b'X', ..] => "a KTX2 picture (KHR_texture_basisu)",
-                [b'R', b'I', b'F', b'F', ..] => "a WebP picture (EXT_texture_webp)",
-                _ => "a picture that is neither PNG, JPEG, BMP, TGA, PFM, OpenEXR nor Radiance",
+                _ => "a picture that is neither PNG, JPEG, WebP, BMP, TGA, PFM, OpenEXR nor Radiance",
             };
             Err(place.clone().unsupported(what))
         }

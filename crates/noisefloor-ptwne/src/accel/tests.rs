@@ -86,3 +86,36 @@ fn crowds_are_found_by_a_sample() {
     boxes.iter_mut().step_by(75).for_each(|crowded| *crowded = cube(Vec3::ZERO));
     assert!(is_crowded(&boxes));
 }
+
+/// Discs cut into triangles that share a corner, as CAD programs cut them: their tree is deeper than the 96 levels
+/// that `obvhs` expects, and deeper still after reinsertion.
+#[test]
+fn fans_are_no_trouble() {
+    for count in [400, 3000] {
+        let rim = |i: u32| {
+            let (sin, cos) = (std::f32::consts::TAU * i as f32 / (count + 2) as f32).sin_cos();
+            glam::Vec3::new(cos, sin, 0.0)
+        };
+        let fan = |i: u32| {
+            let (e1, e2) = (rim(i + 1) - rim(0), rim(i + 2) - rim(0));
+            Shape::Planar { corner: rim(0), e1, e2, whole: false }
+        };
+        let shapes: Vec<Shape> = (0..count).map(fan).collect();
+        let all: Vec<u32> = (0..count).collect();
+        let bvh = Bvh::new(&shapes, &all);
+        assert!(bvh.tree.waiting > 96, "{}", bvh.tree.waiting);
+        let disc = alone_in_scene(bvh);
+        let mut stack = disc.stack();
+        for i in 0..2000 {
+            let mut rng = Rng::new(Key::new(9), i, 0);
+            let [x, y] = rng.two().map(|u| 2.0 * u - 1.0);
+            let ray = Ray { origin: Vec3::new(x, y, 2.0), dir: Vec3::NEG_Z };
+            // The polygon of so many sides, but for its rim
+            let inside = x.hypot(y);
+            if (inside - 1.0).abs() > 1e-3 {
+                let hit = disc.closest(&ray, &mut stack, |_, _, _| true);
+                assert_eq!(hit.t.is_finite(), inside < 1.0, "{x} {y}");
+            }
+        }
+    }
+}

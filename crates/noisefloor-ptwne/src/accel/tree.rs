@@ -4,7 +4,9 @@ use super::median;
 use super::node::{LEAF, Node, WideRay};
 use crate::math::Vec3;
 use crate::rng;
-use obvhs::{BvhBuildParams, aabb::Aabb, bvh2::Bvh2, bvh2::builder::build_bvh2};
+use obvhs::aabb::Aabb;
+use obvhs::bvh2::{Bvh2, reinsertion::ReinsertionOptimizer};
+use obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};
 
 /// Nodes still to visit, with the distance at which each begins.
 #[derive(Clone, Debug)]
@@ -22,6 +24,9 @@ impl Waiting {
 const CROWDED: f32 = 500.0;
 /// Most boxes that are looked at to tell.
 const SAMPLE: usize = 1 << 16;
+/// Share of the nodes that are reinserted. More, and a second run, take most of the time of loading for little:
+/// docs/benchmarks/bvh.md
+const REINSERTED: f32 = 0.05;
 
 #[derive(Clone, Debug)]
 pub(super) struct Tree {
@@ -204,15 +209,19 @@ fn binary(boxes: &[Aabb]) -> Bvh2 {
     if is_crowded(boxes) {
         return median::tree(boxes);
     }
-    let params = BvhBuildParams {
-        pre_split: false,      // would need triangles
-        max_prims_per_leaf: 1, // leaves are made of the tree
-        // More, and a second pass, take most of the time of loading for little: docs/benchmarks/bvh.md
-        reinsertion_batch_ratio: 0.05,
-        post_collapse_reinsertion_batch_ratio_multiplier: 0.0,
-        ..BvhBuildParams::medium_build()
-    };
-    build_bvh2(boxes, params, &mut std::time::Duration::default())
+    let indices = (0..boxes.len() as u32).collect();
+    // What the library calls a medium build, for leaves of one box
+    let mut tree = PlocBuilder::with_capacity(boxes.len()).build(
+        PlocSearchDistance::Medium,
+        boxes,
+        indices,
+        SortPrecision::U64,
+        3,
+    );
+    // It makes trees deeper, those of fans by a tenth, and panics where one is deeper than twice this
+    tree.max_depth *= 8;
+    ReinsertionOptimizer::default().run(&mut tree, REINSERTED, None);
+    tree
 }
 
 /// Whether too many boxes overlap, judged by a sample of them: in a sample of one in n, a ray meets an n-th of

@@ -4,19 +4,19 @@ use super::fresnel::{fresnel, refract};
 use super::ggx::Ggx;
 use crate::math::Vec3;
 
-/// Microfacets that reflect and refract, seen from one side. Radiance is that of paths, L/η².
+/// Microfacets that reflect and refract, seen from one side.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct RoughGlass {
     ggx: Ggx,
     /// Index of refraction of the far side over that of the near side.
     eta: f32,
-    /// Factor on refracted light.
+    /// Factor on refracted radiance, which spreads over η² of its solid angle.
     tint: Vec3,
 }
 
 impl RoughGlass {
     pub(crate) fn new(ggx: Ggx, eta: f32, tint: Vec3) -> Self {
-        Self { ggx, eta, tint }
+        Self { ggx, eta, tint: tint / (eta * eta) }
     }
 
     /// f·cos θᵢ, and the density of [`RoughGlass::sample`]. `wi` may lie on either side.
@@ -40,12 +40,18 @@ impl RoughGlass {
             let f = reflectance * d * g / (4.0 * wo.z);
             (Vec3::splat(f), reflectance * visible / (4.0 * cos_o))
         } else {
-            // Eqs. 17 and 21; η² of eq. 21 turns radiance into L/η²
+            // Eqs. 17 and 21; the η² of eq. 21 is that of directions, and the tint divides by it
             let scale = cos_o + self.eta * cos_i;
             let jacobian = self.eta * self.eta * -cos_i / (scale * scale).max(1e-12);
             let f = (1.0 - reflectance) * d * g * cos_o / wo.z * jacobian;
             (self.tint * f, (1.0 - reflectance) * visible * jacobian)
         }
+    }
+
+    /// η² of a boundary that light from `wi` crosses; 1 if it is reflected.
+    #[inline]
+    pub(crate) fn eta2(&self, wi: Vec3) -> f32 {
+        if wi.z > 0.0 { 1.0 } else { self.eta * self.eta }
     }
 
     /// A direction, its weight f·cos θᵢ / density, and its density; `None` if nothing is scattered.

@@ -183,7 +183,7 @@ impl SceneBuilder {
     /// Adds a sphere. Texture coordinates are azimuth and polar angle in 0…1; v = 1 is the top.
     ///
     /// # Errors
-    /// [`SceneError`] if a number is not finite or too large, the radius is not in 1e-9…1e6, or the material
+    /// [`SceneError`] if a number is not finite or too large, the radius is not in 1e-9…1e8, or the material
     /// is of another builder.
     pub fn sphere(
         &mut self,
@@ -193,7 +193,7 @@ impl SceneBuilder {
         emission: Option<Emission>,
     ) -> Result<(), SceneError> {
         let centre = position(centre)?;
-        check_range("the radius of a sphere", radius, [1e-9, MAX_COORDINATE], "1e-9…1e6")?;
+        check_range("the radius of a sphere", radius, [1e-9, MAX_COORDINATE], "1e-9…1e8")?;
         self.single(Shape::Sphere { centre, radius }, None, NO, material, emission)
     }
 
@@ -214,7 +214,7 @@ impl SceneBuilder {
             position(axis)?;
         }
         let centre = position(centre)?;
-        check_range("the radius of a sphere", radius, [1e-9, MAX_COORDINATE], "1e-9…1e6")?;
+        check_range("the radius of a sphere", radius, [1e-9, MAX_COORDINATE], "1e-9…1e8")?;
         let frame = index(self.parts.geometry.frames.len())?;
         self.parts.geometry.frames.push(axes.map(glam::Vec3A::from_array));
         self.single(Shape::Sphere { centre, radius }, None, frame, material, emission)

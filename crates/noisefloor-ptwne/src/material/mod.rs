@@ -35,8 +35,8 @@ pub enum Material {
     },
     /// A smooth dielectric boundary: unpolarised Fresnel reflection and refraction.
     ///
-    /// Paths carry basic radiance L/η², which is exact as long as the camera and all emitters lie outside the
-    /// glass.
+    /// A path that enters a medium of index η finds radiance there that counts 1/η², and η² again where it
+    /// leaves (Veach 1997, §5.2): closed glass shows no difference, a lamp inside does.
     Glass {
         /// Index of refraction on the back (where the normal does not point), over that on the front: 0.25…4.
         ior: f32,

@@ -55,6 +55,27 @@ fn tiny_bright_lights_and_grazing_cameras_stay_finite() {
     }
 }
 
+/// Surfaces as far and as large as they may be.
+#[test]
+fn the_largest_coordinates_stay_finite() {
+    let far = 1e8;
+    check(
+        scene(look([0.0, 1e7, 9e7], [0.0; 3], [0.0, 1.0, 0.0], 90.0), |b| {
+            let floor = b.material(Material::diffuse([1.0; 3])).unwrap();
+            let glass =
+                b.material(Material::RoughGlass { ior: 1.5, tint: [1.0; 3], roughness: 0.2 }).unwrap();
+            let light = Some(Emission::two_sided([1e12, 1.0, 0.0]));
+            let (corner, across, along) = ([-far, 0.0, -far], [0.0, 0.0, far], [far, 0.0, 0.0]);
+            b.parallelogram(corner, across, along, floor, None).unwrap();
+            b.parallelogram([-far, 5e7, -far], along, across, floor, light.clone()).unwrap();
+            b.sphere([far, far, -far], far, glass, None).unwrap();
+            b.sphere([-far, -far, far], far, floor, light).unwrap();
+            assert!(b.sphere([1.01 * far, 0.0, 0.0], 1.0, floor, None).is_err());
+        }),
+        64,
+    );
+}
+
 #[test]
 fn built_in_scenes_stay_finite() {
     for entry in scenes::list().chain(scenes::stiff()) {

@@ -16,6 +16,7 @@ mod first_hits; // colours and normals of a known surface
 mod furnace; // energy neither made nor lost
 mod instances; // objects shown many times: as their copies are seen
 mod kit;
+mod media;
 mod mis; // next events, scattering, and both
 mod models; // glTF's, Mitsuba's and pbrt's layered surfaces
 mod points; // spots and projectors

@@ -75,12 +75,23 @@ impl<'a> Asset<'a> {
     /// The bytes of a buffer view that `place` names.
     pub(super) fn view(&self, index: Index<buffer::View>, place: &Place) -> Result<&[u8], LoadError> {
         let view = self.get(index, "buffer view", place)?;
+        let called = || Place::part(self.path, format_args!("buffer view {}", index.value()));
+        self.bytes_of(view, place, called)
+    }
+
+    /// The bytes of a view at `called`, which `place` names.
+    pub(super) fn bytes_of(
+        &self,
+        view: &buffer::View,
+        place: &Place,
+        called: impl Fn() -> Place,
+    ) -> Result<&[u8], LoadError> {
         let bytes = self.buffer(view.buffer, place)?;
         let start = view.byte_offset.unwrap_or_default().0;
         let end = start.checked_add(view.byte_length.0);
         let range = usize::try_from(start).ok().zip(end.and_then(|end| usize::try_from(end).ok()));
         range.and_then(|(start, end)| bytes.get(start..end)).ok_or_else(|| {
-            Place::part(self.path, format_args!("buffer view {}", index.value())).bad(format_args!(
+            called().bad(format_args!(
                 "{} bytes from byte {start} reach past the end of buffer {}, which has {}",
                 view.byte_length.0,
                 view.buffer.value(),
@@ -94,6 +105,27 @@ impl<'a> Asset<'a> {
         let bytes = uri::read(uri, self.folder, place, MAX_BYTES.saturating_sub(self.bytes()))?;
         self.bytes.set(self.bytes() + bytes.len() as u64);
         Ok(bytes)
+    }
+
+    /// Adds bytes that the file stands for as a buffer of its own, and returns the view of all of them.
+    pub(super) fn add_view(&mut self, bytes: Vec<u8>) -> Index<buffer::View> {
+        let byte_length = (bytes.len() as u64).into();
+        // Any name will do: it is there already
+        let uri = Some(String::new());
+        let extras = Default::default;
+        let whole = Buffer { byte_length, name: None, uri, extensions: None, extras: extras() };
+        self.buffers.push(OnceCell::from(bytes));
+        let view = buffer::View {
+            buffer: Index::push(&mut self.root.buffers, whole),
+            byte_length,
+            byte_offset: None,
+            byte_stride: None,
+            name: None,
+            target: None,
+            extensions: None,
+            extras: extras(),
+        };
+        Index::push(&mut self.root.buffer_views, view)
     }
 
     fn buffer(&self, index: Index<Buffer>, place: &Place) -> Result<&[u8], LoadError> {

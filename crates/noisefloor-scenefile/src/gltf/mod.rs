@@ -8,11 +8,14 @@ mod asset;
 mod camera;
 mod clearcoat;
 mod daylight;
+#[cfg(feature = "draco")]
+mod draco;
 mod gloss;
 mod light;
 mod lit;
 mod material;
 mod mesh;
+mod meshopt;
 mod nodes;
 mod notes;
 mod properties;
@@ -47,8 +50,11 @@ const BYTES_EACH: u64 = 64;
 pub(crate) fn load(path: &Path, root: Option<&Path>) -> Result<Loaded, LoadError> {
     let folder = Folder::of(path, root, String::new());
     let file = folder.read(path, MAX_BYTES, &Place::file(path))?;
-    let asset = Asset::parse(path, &folder, &file)?;
+    let mut asset = Asset::parse(path, &folder, &file)?;
     notes::check_required(&asset)?;
+    meshopt::inflate(&mut asset)?;
+    #[cfg(feature = "draco")]
+    draco::inflate(&mut asset)?;
     let placed = nodes::placed(&asset)?;
     let sharing = shared::sharing(&placed);
     check_size(&asset, &placed, &sharing)?;

@@ -6,8 +6,12 @@ use std::collections::{BTreeSet, HashSet};
 use std::fmt;
 
 /// Extensions that a file may require. `KHR_mesh_quantization` is but a wider choice of accessors, all of which are
-/// read.
-const KNOWN: [&str; 11] = [
+/// read; of `KHR_materials_variants` the material without a variant is shown, as its specification has it.
+const KNOWN: &[&str] = &[
+    #[cfg(feature = "draco")]
+    super::draco::NAME,
+    super::meshopt::NAME,
+    super::texture::WEBP,
     "KHR_lights_punctual",
     "KHR_materials_clearcoat",
     "KHR_materials_emissive_strength",
@@ -16,6 +20,7 @@ const KNOWN: [&str; 11] = [
     "KHR_materials_specular",
     "KHR_materials_transmission",
     "KHR_materials_unlit",
+    "KHR_materials_variants",
     "KHR_materials_volume",
     "KHR_mesh_quantization",
     "KHR_texture_transform",

@@ -19,6 +19,8 @@ use noisefloor_ptwne::{ImageTexture, MAX_TEXTURE_PIXELS, Pixels, Texture, Wrap};
 use std::collections::HashMap;
 use std::sync::Arc;
 
+/// The extension of textures whose image is WebP.
+pub(super) const WEBP: &str = "EXT_texture_webp";
 /// Most pixels of all images together: a small file can make a large image, and a file can name many.
 const MAX_PIXELS: u64 = 4 * MAX_TEXTURE_PIXELS as u64;
 
@@ -184,17 +186,23 @@ impl<'a> Textures<'a> {
         let asset = self.asset;
         let texture = asset.get(info.index, "texture", place)?;
         let here = Place::part(asset.path, name("texture", info.index.value(), texture.name.as_deref()));
-        notes.extensions(&here, texture.extensions.iter().flat_map(|e| e.others.keys()));
+        let others = texture.extensions.iter().flat_map(|e| &e.others);
+        notes.extensions(&here, others.map(|(name, _)| name).filter(|name| *name != WEBP));
         notes.extensions(place, info.extensions.iter().flat_map(|e| e.others.keys()));
         // A texture without a source is one of an extension
-        if texture.source.value() >= asset.root.images.len() {
+        let mut source = texture.source;
+        if source.value() >= asset.root.images.len() {
+            let webp = texture.extensions.as_ref().and_then(|e| e.others.get(WEBP)?.get("source")?.as_u64());
+            source = webp.and_then(|index| u32::try_from(index).ok()).map_or(source, Index::new);
+        }
+        if source.value() >= asset.root.images.len() {
             let names = texture.extensions.iter().flat_map(|e| e.others.keys());
             let names: Vec<&str> = names.map(String::as_str).collect();
             if !names.is_empty() {
                 return Err(here.unsupported(format_args!("an image of only {}", names.join(", "))));
             }
         }
-        let Decoded { width, height, colour, .. } = self.decoded(texture.source, &here, notes)?;
+        let Decoded { width, height, colour, .. } = self.decoded(source, &here, notes)?;
         let default = Sampler::default();
         let sampler = match texture.sampler {
             Some(sampler) => asset.get(sampler, "sampler", &here)?,
@@ -213,7 +221,7 @@ impl<'a> Textures<'a> {
         let (pixels, factor) = (Pixels::Srgb8(colour), [1.0; 3]);
         let second = set(info) != self.first_set;
         let shown = ImageTexture { width, height, pixels, to_uv, factor, wrap, nearest, second };
-        Ok((texture.source.value(), shown))
+        Ok((source.value(), shown))
     }
 
     fn decoded(
@@ -236,7 +244,7 @@ impl<'a> Textures<'a> {
         let rgba = match picture.samples {
             Samples::Eight(rgba) => rgba,
             Samples::Sixteen(rgba) => rgba.into_iter().map(|p| p.map(eight_bits)).collect(),
-            Samples::Linear(_) => return Err(here.unsupported("an image that is neither PNG nor JPEG")),
+            Samples::Linear(_) => return Err(here.unsupported("an image that is neither PNG, JPEG nor WebP")),
         };
         self.count(rgba.len(), &here)?;
         let opaque = rgba.iter().all(|[.., a]| *a == 255);

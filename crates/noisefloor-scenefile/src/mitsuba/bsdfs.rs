@@ -113,7 +113,7 @@ impl<'d> Context<'d> {
             return Err(self.unsupported(element, "a mask in a mask"));
         }
         let opacity = self.varying(element, self.factor(element, "opacity", 0.5)?)?;
-        let opacity = self.luminance(element, opacity)?;
+        let opacity = self.one_channel(element, opacity)?;
         Ok(Surface { opacity: Some(opacity), ..surface })
     }
 
@@ -122,7 +122,7 @@ impl<'d> Context<'d> {
         let [first, second] = parts.as_slice() else {
             return Err(self.bad(element, format!("{} needs two <bsdf> in it", element.label())));
         };
-        let share = self.luminance(element, self.factor(element, "weight", 0.5)?)?;
+        let share = self.one_channel(element, self.factor(element, "weight", 0.5)?)?;
         self.blended(element, self.surface(first)?, self.surface(second)?, share)
     }
 

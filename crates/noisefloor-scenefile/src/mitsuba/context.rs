@@ -235,7 +235,8 @@ impl<'d> Context<'d> {
             }
             child.read();
             if !self.options.ignore_volumes {
-                return Err(self.unsupported(child, format_args!("{NO_MEDIA}; `--source mitsuba` has them")));
+                let what = NO_MEDIA.replace(')', ", `--source mitsuba` renders them)");
+                return Err(self.unsupported(child, what));
             }
             medium.into_iter().for_each(Element::irrelevant);
             self.ignored(child, "the participating medium is ignored");

@@ -168,7 +168,7 @@ impl<'d> Context<'d> {
             }
         };
         let texture = self.varying(element, texture)?;
-        self.luminance(element, texture)
+        self.one_channel(element, texture)
     }
 
     /// An index of refraction of a conductor, at least 0, with a warning if it is not.
@@ -180,10 +180,10 @@ impl<'d> Context<'d> {
         nearest
     }
 
-    /// A number; of a texture its mean, with a warning.
+    /// A number; of a colour the mean of its channels, as in Mitsuba; of a texture its mean, with a warning.
     pub(super) fn mean_float(&self, element: &'d Element, name: &str) -> Result<Option<f64>, LoadError> {
-        let tag = |child: &&Element| child.tag == "texture" || child.tag == "ref" || child.tag == "spectrum";
-        match element.get(name).filter(tag) {
+        let number = |child: &&Element| matches!(child.tag.as_str(), "float" | "integer");
+        match element.get(name).filter(|child| !number(child)) {
             Some(_) => {
                 let mean = self.constant_factor(element, name, 0.0)?;
                 Ok(Some(f64::from(mean.iter().sum::<f32>() / 3.0)))

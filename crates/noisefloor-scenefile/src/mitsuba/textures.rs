@@ -248,11 +248,14 @@ impl<'d> Context<'d> {
         Ok([[a, -b, b + c], [-d, e, 1.0 - e - f]].map(|row| row.map(|x| x as f32)))
     }
 
-    /// The luminance of a texture: Mitsuba's opacity. The alpha of a picture has no part in it.
-    pub(super) fn luminance(&self, element: &Element, texture: Texture) -> Result<Texture, LoadError> {
+    /// What Mitsuba takes for a number where something else is given: the mean of a colour's channels, and
+    /// the luminance of a picture. Its alpha has no part in it.
+    pub(super) fn one_channel(&self, element: &Element, texture: Texture) -> Result<Texture, LoadError> {
         let grey = |colour: Rgb| [noisefloor::display::luminance(colour).clamp(0.0, 1.0); 3];
         Ok(match texture {
-            Texture::Colour(colour) => Texture::Colour(grey(colour)),
+            Texture::Colour(colour) => {
+                Texture::Colour([(colour.iter().sum::<f32>() / 3.0).clamp(0.0, 1.0); 3])
+            }
             Texture::Image(image) => {
                 self.count_pixels(element, image.width * image.height)?;
                 let pixels = Pixels::Float(linear(&image.pixels).into_iter().map(grey).collect());

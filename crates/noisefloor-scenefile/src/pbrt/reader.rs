@@ -23,8 +23,9 @@ use std::rc::Rc;
 pub(super) const MAX_DEPTH: u32 = 64;
 /// Most bytes of all files of directives.
 const MAX_BYTES: u64 = 1 << 29;
-/// Most files of directives, where those that are included more than once count as often.
-const MAX_FILES: u64 = 10_000;
+/// Most files of directives, where those that are included more than once count as often: a sponge of
+/// instances has 160,000. Empty ones count no bytes, and files that include others twice would have 2⁶⁴.
+const MAX_FILES: u64 = 1 << 18;
 /// Most triangles that are made: by subdivision, of round shapes, and of lamps in instances. A short file can ask
 /// for any number.
 const MAX_MADE: u64 = 1 << 23;

@@ -143,9 +143,9 @@ fn every_error_names_its_place() {
         ("/asset/version", "2", "asset: ", "not the JSON of a glTF file"),
         (
             "/extensionsRequired",
-            r#"["KHR_draco_mesh_compression"]"#,
+            r#"["EXT_mesh_gpu_instancing"]"#,
             "extensionsRequired: ",
-            "KHR_draco_mesh_compression",
+            "EXT_mesh_gpu_instancing",
         ),
         ("/scenes", "[]", "scene.gltf: ", "scene 0 does not exist"),
     ] {

@@ -215,12 +215,12 @@ fn what_glows_a_little_does_not_light_the_scene() {
     assert!(left > 1.5 * right && left > 1.3 * sky, "{left} {right} {sky}");
 }
 
-/// What is compressed by other means than PNG and JPEG is refused by the name of its extension.
+/// What is compressed by other means than those we read is refused by the name of its extension.
 #[test]
 fn compressed_pictures_and_meshes_are_refused_by_name() {
     for (bytes, what) in [
         (&b"\xabKTX 20\xbb\r\n\x1a\n\0\0\0\0"[..], "a KTX2 picture (KHR_texture_basisu)"),
-        (&b"RIFF\0\0\0\0WEBPVP8 "[..], "a WebP picture (EXT_texture_webp)"),
+        (&b"RIFF\0\0\0\0WEBPVP8 "[..], "the picture is broken"),
     ] {
         let mut maker = wall(r#"{"emissiveFactor": [1, 1, 1], "emissiveTexture": {"index": 0}}"#);
         let view = maker.view(bytes, "");
@@ -235,12 +235,36 @@ fn compressed_pictures_and_meshes_are_refused_by_name() {
     assert!(error.contains("texture 0: an image of only KHR_texture_basisu is not supported"), "{error}");
     // Used but not required, and nothing to fall back on
     let mut maker = wall("{}");
-    maker.root["meshes"][0]["primitives"][0]["extensions"] = json(r#"{"KHR_draco_mesh_compression": {}}"#);
+    maker.root["meshes"][0]["primitives"][0]["extensions"] = json(r#"{"EXT_other_compression": {}}"#);
     maker.root["accessors"][0].as_object_mut().unwrap().remove("bufferView");
     let error = maker.load().unwrap_err().to_string();
-    assert!(error.contains("a mesh of only KHR_draco_mesh_compression is not supported"), "{error}");
+    assert!(error.contains("a mesh of only EXT_other_compression is not supported"), "{error}");
     let mut maker = wall("{}");
-    maker.root["extensionsRequired"] = json(r#"["KHR_draco_mesh_compression", "EXT_meshopt_compression"]"#);
+    maker.root["extensionsRequired"] = json(r#"["KHR_texture_basisu", "EXT_mesh_gpu_instancing"]"#);
     let error = maker.load().unwrap_err().to_string();
-    assert!(error.contains("KHR_draco_mesh_compression, EXT_meshopt_compression"), "{error}");
+    assert!(error.contains("KHR_texture_basisu, EXT_mesh_gpu_instancing"), "{error}");
+}
+
+/// WebP pictures, losslessly compressed, with a PNG for other readers or without.
+#[test]
+fn webp_pictures_are_read() {
+    let mut webp = std::io::Cursor::new(vec![]);
+    let picture = image::RgbImage::from_pixel(64, 64, image::Rgb([188, 10, 250]));
+    picture.write_to(&mut webp, image::ImageFormat::WebP).unwrap();
+    for fallback in [false, true] {
+        let mut maker = wall(r#"{"emissiveFactor": [1, 1, 1], "emissiveTexture": {"index": 0}}"#);
+        if fallback {
+            maker.texture(1, &[[188, 10, 250, 255]], "{}");
+        } else {
+            maker.push("textures", "{}");
+        }
+        let view = maker.view(webp.get_ref(), "");
+        let image = maker.push("images", &format!(r#"{{"bufferView": {view}, "mimeType": "image/webp"}}"#));
+        let extension = format!(r#"{{"EXT_texture_webp": {{"source": {image}}}}}"#);
+        maker.root["textures"][0]["extensions"] = json(&extension);
+        maker.root["extensionsRequired"] = json(r#"["EXT_texture_webp"]"#);
+        maker.root["extensionsUsed"] = json(r#"["EXT_texture_webp"]"#);
+        assert_close(mean(&maker, 4, 1), [188, 10, 250].map(linear), 1e-5);
+        assert_eq!(maker.load().unwrap().warnings, []);
+    }
 }

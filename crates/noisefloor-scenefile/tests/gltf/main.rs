@@ -8,9 +8,12 @@
 )]
 
 mod bad; // bad files, and what is said of them
+#[cfg(feature = "draco")]
+mod draco; // compressed meshes
 mod extensions; // normal maps, coats, colours of vertices, daylight
 mod fuzz; // thousands of files with damage
 mod geometry; // where triangles and cameras are
 mod kit;
 mod lights; // lights without size
 mod materials; // what surfaces look like
+mod meshopt; // compressed buffer views

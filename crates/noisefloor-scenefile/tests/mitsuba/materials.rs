@@ -178,7 +178,8 @@ fn surfaces_reflect_a_white_sky_as_they_should() {
         (r#"<bsdf type="conductor"><string name="material" value="none"/></bsdf>"#.to_owned(), white, black),
         (format!(r#"<bsdf type="conductor">{metal}</bsdf>"#), copper, black),
         (format!(r#"<bsdf type="twosided"><bsdf type="conductor">{metal}</bsdf></bsdf>"#), copper, copper),
-        (r#"<bsdf type="dielectric"/>"#.to_owned(), white, white),
+        // F of bk7 in air, and η² fold: Mitsuba 3.9.1 has 0.467 and 2.20 with an index of 1.5
+        (r#"<bsdf type="dielectric"/>"#.to_owned(), [0.4646; 3], [2.211; 3]),
         (
             r#"<bsdf type="thindielectric"><string name="int_ior" value="diamond"/></bsdf>"#.to_owned(),
             white,
@@ -294,6 +295,34 @@ fn masks_take_the_luminance_of_pictures() {
     }
 }
 
+/// What is a number may be a colour: Mitsuba 3.9.1 takes the mean of its channels, 0.5 here.
+#[test]
+fn colours_in_place_of_numbers_are_their_mean() {
+    let folder = folder();
+    let black = r#"<bsdf type="diffuse"><float name="reflectance" value="0"/></bsdf>"#;
+    let white = r#"<bsdf type="diffuse"><float name="reflectance" value="1"/></bsdf>"#;
+    let rgb = |name: &str| format!(r#"<rgb name="{name}" value="0.2 0.5 0.8"/>"#);
+    for bsdf in [
+        format!(r#"<bsdf type="mask">{}{black}</bsdf>"#, rgb("opacity")),
+        format!(r#"<bsdf type="blendbsdf">{}{black}{white}</bsdf>"#, rgb("weight")),
+    ] {
+        let got = folder.see(&format!("<shape type=\"rectangle\">{bsdf}</shape>{SKY}"));
+        // Four standard deviations of 4096 samples; the luminance is 0.458
+        assert!((got[0] - 0.5).abs() < 0.03, "{bsdf}: {got:?}");
+    }
+    let names = ["spec_tint", "sheen", "sheen_tint", "clearcoat", "clearcoat_gloss", "flatness", "metallic"];
+    for name in names.into_iter().chain(["anisotropic", "roughness"]) {
+        let see = |number: &str| {
+            let base = r#"<rgb name="base_color" value="0.5 0.1 0.1"/><float name="clearcoat" value="0.5"/>"#;
+            let base = if name == "clearcoat" { "" } else { base };
+            let bsdf = format!(r#"<bsdf type="principled">{base}{number}</bsdf>"#);
+            folder.see(&format!("<shape type=\"rectangle\">{bsdf}</shape>{SKY}"))
+        };
+        let number = see(&format!(r#"<float name="{name}" value="0.5"/>"#));
+        close(see(&rgb(name)), number, 1e-5, name);
+    }
+}
+
 /// Surfaces that are replaced by others say so, and load.
 #[test]
 fn near_surfaces_are_warned_of() {
@@ -405,9 +434,10 @@ fn blends_and_mixtures_keep_their_shares() {
     }
 }
 
-/// A rough pane in a white sky stays white, but for what facets hide: paths carry L/η².
+/// A single rough boundary before a white sky shows what it does in Mitsuba 3.9.1: behind it, radiance is that of
+/// the sky over 1.5².
 #[test]
-fn rough_glass_keeps_most_light() {
+fn rough_glass_shows_the_sky_as_in_mitsuba() {
     let folder = folder();
     let glass = |ior: f32, alpha: f32| {
         folder.see(&format!(
@@ -416,9 +446,7 @@ fn rough_glass_keeps_most_light() {
             <float name="alpha" value="{alpha}"/></bsdf></shape>{SKY}"#
         ))[0]
     };
-    // Mitsuba 3.9.1, whose radiance shrinks by 1.5² behind the pane, has 0.466 and 0.447 with Fresnel's 4 %
     for (alpha, mitsuba) in [(0.1, 0.466), (0.5, 0.447)] {
-        let want = 0.04 + (mitsuba - 0.04) * 2.25;
-        assert!((glass(1.5, alpha) - want).abs() < 0.02, "{alpha}: {} {want}", glass(1.5, alpha));
+        assert!((glass(1.5, alpha) - mitsuba).abs() < 0.01, "{alpha}: {} {mitsuba}", glass(1.5, alpha));
     }
 }

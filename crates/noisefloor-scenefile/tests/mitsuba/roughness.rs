@@ -38,19 +38,20 @@ fn roughness_may_be_a_picture_and_differ_by_direction() {
 }
 
 /// A transmission of ½ is half of a surface and half of glass: along the normal F = 0.04 is reflected by both, and of
-/// a white sky √0.81 comes through the glass.
+/// a white sky √0.81/1.5² comes through the boundary. Mitsuba 3.9.1 has 0.629.
 #[test]
 fn principled_surfaces_transmit() {
     let folder = Folder::new();
     let bsdf = r#"<bsdf type="principled"><rgb name="base_color" value="0.81 0 0"/>
-        <float name="eta" value="1.5"/>        <float name="roughness" value="0"/><float name="spec_trans" value="0.5"/></bsdf>"#;
+        <float name="eta" value="1.5"/>
+        <float name="roughness" value="0"/><float name="spec_trans" value="0.5"/></bsdf>"#;
     let body = format!(r#"<shape type="rectangle">{bsdf}</shape>{SKY}"#);
     let seen = folder.see(&body);
     // Green is reflection alone; its standard error is that of a share of 4 % in 4096 samples
     assert!((seen[1] - 0.04).abs() < 0.013, "{seen:?}");
     // Burley's diffuse reflection of a smooth surface along the normal: ∫(1 − F_d/2)·cos/π with F_d = (1 − cos)⁵ is
     // 1 − 1/42
-    let want = 0.04 + 0.5 * 0.81 * (1.0 - 1.0 / 42.0) + 0.5 * 0.96 * 0.9;
+    let want = 0.04 + 0.5 * 0.81 * (1.0 - 1.0 / 42.0) + 0.5 * 0.96 * 0.9 / 2.25;
     assert!((seen[0] - want).abs() < 0.03, "{seen:?}, want {want}");
     assert_eq!(folder.body(&body).unwrap().warnings, []);
 }
