@@ -6,7 +6,7 @@
 
 `render` writes what Blender shows (view transform included) as PNGs of 16 bits, denoised by Cycles' own Open Image
 Denoise, two seeds a setting, beside times.json with the processor seconds of each render and of the search; it goes on
-where it was interrupted. `measure` says what the worst square of 64 pixels has lost against the reference, by the package
+where it was interrupted. `measure` says what the worst square of 64 pixels, side by side, has lost against the reference, by the package
 `cvvdp`, no code of this project: on average over two seeds, and of the worse one."""
 import json
 import pathlib
@@ -93,7 +93,7 @@ def measure(folders):
         return numpy.asarray(Image.open(path).convert("RGB"), dtype=numpy.float32) / 255
 
     def places(side):
-        return [*range(0, max(side - 64, 0), 32), max(side - 64, 0)]
+        return [*range(0, max(side - 64, 0), 64), max(side - 64, 0)]
 
     for folder in map(pathlib.Path, folders):
         done = json.loads((folder / "times.json").read_text())
