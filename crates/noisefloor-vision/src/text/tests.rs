@@ -127,10 +127,11 @@ proptest! {
             (1.0f64..4.0).prop_map(Eotf::Gamma),
         ],
         primaries in primaries(),
+        frames_per_second in proptest::option::of(10.0f64..1000.0),
     ) {
         let params = ViewingParams {
             pixels_per_degree: ppd, peak, black: black * peak, ambient, reflectivity: share, eotf,
-            primaries,
+            primaries, frames_per_second,
         };
         let viewing = params.check().unwrap();
         prop_assert_eq!(viewing.to_string().parse(), Ok(viewing));
