@@ -113,12 +113,12 @@ impl Engine {
                 std::array::from_fn(|i| if blurs { reflected(y + i, size.height) } else { y });
             let smaller: [_; N] =
                 std::array::from_fn(|c| around.map(|y| &smaller[c][y * size.width..][columns.clone()]));
-            let count = if self.film.is_some() { ALL_CHANNELS } else { N };
-            let mut planes =
-                planes[..count].iter_mut().map(|bands| &mut bands[band][y * size.width..][columns.clone()]);
-            let rows: [&mut [f32]; N] =
-                std::array::from_fn(|_| planes.next().expect("at most three channels"));
-            let transient = self.film.and(planes.last());
+            let [a, b, c, transient] = &mut *planes;
+            let mut still = [a, b, c].into_iter();
+            let rows: [_; N] = std::array::from_fn(|_| still.next().expect("at most three channels"));
+            let from = y * size.width;
+            let rows = rows.map(|bands| &mut bands[band][from..][columns.clone()]);
+            let transient = self.film.map(|_| &mut transient[band][from..][columns.clone()]);
             mask_row(&self.masking, blurs.then_some(&self.blur), smaller, rows, transient);
         }
     }

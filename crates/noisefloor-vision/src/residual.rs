@@ -311,3 +311,38 @@ fn draw<const N: usize>(
     }
     collapse(map, bands, sizes, |band| parts(band).rows(), &mut rows.narrow, &mut rows.places);
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::viewing::Viewing;
+
+    /// All channels of a film, the transient one included, are those that the metric pools.
+    #[test]
+    fn a_residual_of_a_film_differs_as_its_frame_does() {
+        let model = VisionModel::new(&"desk,fps=24".parse::<Viewing>().unwrap());
+        let size = (96, 64);
+        let random = |i: usize| ((i as u32).wrapping_mul(0x9E37_79B1) >> 8) as f32 / (1 << 24) as f32;
+        let picture: Vec<[f32; 3]> = (0..96 * 64).map(|i| [0.3 + 0.2 * random(i / 7), 0.4, 0.5]).collect();
+        let test: Vec<[f32; 3]> = picture
+            .iter()
+            .enumerate()
+            .map(|(i, p)| std::array::from_fn(|c| p[c] + 0.1 * random(3 * i + c)))
+            .collect();
+        let residual: Vec<[f32; 3]> =
+            test.iter().zip(&picture).map(|(t, p)| std::array::from_fn(|c| t[c] - p[c])).collect();
+        let (mut whole, mut tile) = (VisionWorkspace::default(), VisionWorkspace::default());
+        model.compare(&test, &picture, size, &mut whole).unwrap();
+        let pixels = ResidualPixels::Rgb { picture: &picture, residual: &residual };
+        let patch = ResidualPatch { pixels, size, columns: 0..96, rows: 0..64 };
+        let bands = model.residual(&patch, VisionDetail::FULL, &mut tile).unwrap().bands;
+        for (channel, (whole, tile)) in whole.differences.iter().zip(&tile.differences).enumerate() {
+            for band in bands.clone() {
+                let pairs = || whole[band].iter().zip(&tile[band]);
+                let largest = pairs().map(|(a, _)| *a).fold(0.0, f32::max);
+                // The sum of picture and residual is rounded
+                assert!(largest > 0.0 && pairs().all(|(a, b)| (a - b).abs() < 1e-3 * largest), "{channel}, {band}");
+            }
+        }
+    }
+}
