@@ -1,7 +1,8 @@
 //! What a picture is seen on, and from where: the display's light and its pixels per degree.
 
 use crate::chromaticity::{Chromaticities, ChromaticityError};
-use serde::{Deserialize, Serialize};
+use serde::ser::SerializeStruct;
+use serde::{Deserialize, Serialize, Serializer};
 use std::f64::consts::PI;
 use thiserror::Error;
 
@@ -60,7 +61,7 @@ impl From<Chromaticities> for Primaries {
 }
 
 /// Unchecked viewing conditions. [`ViewingParams::check`] makes them a [`Viewing`].
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
 pub struct ViewingParams {
     /// Pixels per degree of visual angle in the centre of the picture, within 1…2000.
     pub pixels_per_degree: f64,
@@ -77,8 +78,27 @@ pub struct ViewingParams {
     /// Their primaries and white.
     pub primaries: Primaries,
     /// In a film whose noise is new in every frame, its frames per second; `None` for a still.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(default)]
     pub frames_per_second: Option<f64>,
+}
+
+impl Serialize for ViewingParams {
+    fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
+        // Where fields have names, a still says nothing of films: digests of what was written before stay as they are
+        let says = self.frames_per_second.is_some() || !to.is_human_readable();
+        let mut fields = to.serialize_struct("ViewingParams", 7 + usize::from(says))?;
+        fields.serialize_field("pixels_per_degree", &self.pixels_per_degree)?;
+        fields.serialize_field("peak", &self.peak)?;
+        fields.serialize_field("black", &self.black)?;
+        fields.serialize_field("ambient", &self.ambient)?;
+        fields.serialize_field("reflectivity", &self.reflectivity)?;
+        fields.serialize_field("eotf", &self.eotf)?;
+        fields.serialize_field("primaries", &self.primaries)?;
+        if says {
+            fields.serialize_field("frames_per_second", &self.frames_per_second)?;
+        }
+        fields.end()
+    }
 }
 
 /// Viewing conditions that no display has.
