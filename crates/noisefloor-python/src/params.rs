@@ -7,11 +7,12 @@ use pyo3::types::{PyDict, PyTuple};
 
 /// Viewing(conditions="desk") --
 ///
-/// A display, the light in the room, and how far away the display is.
+/// A display, the light in the room, how far away the display is, and whether it shows a still or a film.
 ///
 /// conditions is a preset ("desk", "laptop", "tv", "phone", "cinema", or a display of ColorVideoVDP such as
 /// "standard_4k"), numbers ("ppd=60,peak=300,black=0.3,ambient=100": pixels per degree, cd/m², cd/m², lux),
-/// or a preset with changes ("desk,distance=1.2": metres).
+/// or a preset with changes ("desk,distance=1.2": metres). "desk,fps=24" is for a frame of a film whose noise is
+/// new in every frame.
 ///
 /// Raises ParameterError if there are no such conditions, or a number is out of range.
 #[pyclass(frozen, eq, name = "Viewing", module = "noisefloor", from_py_object)]
@@ -48,6 +49,12 @@ impl PyViewing {
     #[getter]
     fn ambient(&self) -> f64 {
         self.0.params().ambient
+    }
+
+    /// Frames per second of a film whose noise is new in every frame; None for a still.
+    #[getter]
+    fn frames_per_second(&self) -> Option<f64> {
+        self.0.frames_per_second()
     }
 
     fn __getnewargs__(&self) -> (String,) {
