@@ -5,6 +5,7 @@ command, which is what is measured).
     pip install cvvdp==0.5.7 OpenEXR pillow
     docs/benchmarks/film.py render FOLDER NOISEFLOOR     renders that are there are kept; on two cores an hour
     docs/benchmarks/film.py table FOLDER NOISEFLOOR
+    docs/benchmarks/film.py denoised FOLDER NOISEFLOOR   needs mitsuba-oidn==0.1.2 as well
 
 Frames are renders of a still view with one seed each. The truth is the mean of all of them, each by its samples. All are
 shown by Reinhard's operator at the exposure of the truth, in 8 bits. Of a film, what is lost is pooled over its frames as
@@ -93,12 +94,65 @@ def contrast_of(test, reference, lost):
     return math.sqrt(low * high)
 
 
-rows, moving = [], []
-for scene, levels in SCENES.items():
+def truth_of(scene):
+    """The mean of all renders, what it looks like, and at which exposure."""
+    levels = SCENES[scene]
     pictures = {spp: [read(scene, spp, seed) for seed in range(1, FRAMES + 1)] for spp in levels}
     truth = sum(spp * np.sum(of, axis=0) for spp, of in pictures.items()) / (FRAMES * sum(levels))
     exposure = 0.18 / math.exp(np.mean(np.log(truth @ weights + 1e-6)))
-    reference = shown(truth, exposure)
+    return pictures, shown(truth, exposure), exposure
+
+
+if task == "denoised":
+    import mitsuba_oidn as oidn
+
+    device = oidn.Device(oidn.DeviceType.CPU)
+    device.num_threads = 1
+    device.commit()
+    filter = device.new_filter("RT")
+    filter.hdr, filter.quality = True, oidn.Quality.High
+
+    def denoise(picture):
+        """Of radiance alone."""
+        made = np.empty((EDGE, EDGE, 3), np.float32)
+        filter.set_image("color", np.maximum(picture, 0).astype(np.float32))
+        filter.set_image("output", made)
+        filter.execute()
+        return made
+
+    def write(path, picture):
+        header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+        OpenEXR.File(header, {"RGB": np.ascontiguousarray(picture, np.float32)}).write(str(path))
+
+    def estimate(halves, cleaned, exposure, spp, viewing):
+        """JODs lost by the mean of two denoised halves, from the halves alone: by the command."""
+        with tempfile.TemporaryDirectory() as scratch:
+            paths = [str(pathlib.Path(scratch) / f"{name}.exr") for name in ("a", "b", "da", "db")]
+            for path, picture in zip(paths, (*halves, *cleaned)):
+                write(path, picture)
+            a, b, da, db = paths
+            judge = [program, "judge", a, "--spp", str(spp), "--against", b, "--spp", str(spp), "--independent"]
+            options = ["--denoised", da, db, "--tile", str(EDGE), "--exposure", str(exposure), "--viewing", viewing, "--json"]
+            said = subprocess.run(judge + options, check=True, capture_output=True, text=True).stdout
+            return json.loads(said)["tiles"][0]["jods_lost"]
+
+    print("| denoised | spp | still: package, here | 24 fps: package, here |\n|---|---|---|---|")
+    for scene in ("cornell-box", "arcade"):
+        pictures, reference, exposure = truth_of(scene)
+        for spp, of in pictures.items():
+            pairs = [(of[2 * i], of[2 * i + 1]) for i in range(FRAMES // 2)]
+            cleaned = [tuple(map(denoise, pair)) for pair in pairs]
+            frames = [shown((a + b) / 2, exposure) for a, b in cleaned]
+            alone = np.mean([still(one, reference) for one in frames[::3]])
+            together = film(frames, [reference] * len(frames), 24.0)
+            found = [np.mean([estimate(pair, made, exposure, spp, f"{DISPLAY}{rate}") for pair, made in
+                              list(zip(pairs, cleaned))[::3]]) for rate in ("", ",fps=24")]
+            print(f"| {scene} | {2 * spp} | {alone:.2f}, {found[0]:.2f} | {together:.2f}, {found[1]:.2f} |", flush=True)
+    sys.exit()
+
+rows, moving = [], []
+for scene in SCENES:
+    pictures, reference, exposure = truth_of(scene)
     for spp, of in pictures.items():
         frames = [shown(picture, exposure) for picture in of]
         few = frames[:: FRAMES // JUDGED]
@@ -126,7 +180,7 @@ print("|---|---|---|" + "---|" * (len(RATES) + 1))
 for row, _, _ in rows:
     cells = [f"{row[f'package {rate}']:.2f}, {row[f'here {rate}']:.2f}" for rate in RATES]
     print(f"| {row['scene']} | {row['spp']} | {row['still']:.2f} | " + " | ".join(cells) + f" | {row['same']:.2f} |")
-print("\n| fps | off by at most, on average (JOD) | samples of a still that lose as much: least, mean, most |"
+print("\n| fps | off by at most, on average (JOD) | samples that a film needs, of a still's: least, mean, most |"
       " a factor instead: off by at most, on average |")
 print("|---|---|---|---|")
 for rate in RATES:

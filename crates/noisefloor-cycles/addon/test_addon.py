@@ -289,6 +289,28 @@ class Addon(unittest.TestCase):
         self.assertTrue(pathlib.Path(scene.render.filepath + "0003-samples.png").exists())
         self.assertFalse(pathlib.Path(scene.render.filepath + "0002-samples.png").exists())
 
+    def test_animations_are_judged_as_films_and_stills_as_stills(self):
+        scene, judged, made = room(), [], settings.params
+
+        def record(*arguments):
+            params = made(*arguments)
+            judged.append(params.viewing.frames_per_second)
+            return params
+
+        scene.frame_start, scene.frame_end, scene.noisefloor.max_samples = 1, 2, 96
+        scene.render.fps, scene.render.fps_base = 24, 1.001
+        settings.params = record
+        try:
+            for animated in (True, False):
+                scene.cycles.use_animated_seed = animated
+                bpy.ops.render.render(animation=True)
+                self.assertEqual("23.976 frames a second" in hooks.state.summary, animated, hooks.state.summary)
+            scene.cycles.use_animated_seed = True
+            rendered(scene)
+        finally:
+            settings.params = made
+        self.assertEqual(judged, [23.976, 23.976, None, None, None])
+
     def test_a_region_is_a_part_of_the_frame(self):
         scene = room()
         scene.noisefloor.max_samples = 96
@@ -353,7 +375,7 @@ arguments = sys.argv[sys.argv.index("--") + 1 :] if "--" in sys.argv else sys.ar
 zipfile.ZipFile(arguments[0]).extractall(FOLDER)
 sys.path.insert(0, str(FOLDER))
 import noisefloor_addon
-from noisefloor_addon import denoise, frame, hooks
+from noisefloor_addon import denoise, frame, hooks, settings
 
 noisefloor_addon.register()
 result = unittest.main(argv=["test_addon.py", *arguments[1:]], exit=False).result

@@ -40,8 +40,9 @@ class Frame:
         self.seed = (
             f"{seed} frame {self.scene.frame_current}" if self.scene.cycles.use_animated_seed else seed
         )
+        self.film = self._film()
         self.session = noisefloor.Session(
-            *self.size, settings.oracle(self.settings), settings.params(self.scene, sampling.BATCH)
+            *self.size, settings.oracle(self.settings), settings.params(self.scene, sampling.BATCH, self.film)
         )
         self.sums = passes.Sums(*self.size)
         self.begun, self.sampled = time.monotonic(), 0
@@ -49,6 +50,23 @@ class Frame:
         # What the windows draw meanwhile, and how often it has changed
         self.shown, self.shows = numpy.zeros((*self.size[::-1], 4), numpy.float32), 0
         self.denoiser = self._denoiser(depsgraph) if self.scene.cycles.use_denoising else None
+
+    def _film(self):
+        """The frames per second of the animation that is rendered, whose noise is new in every frame; None for a
+        still."""
+        if not self.engine.is_animation:
+            return None
+        if not self.scene.cycles.use_animated_seed:
+            self.engine.report(
+                {"WARNING"},
+                "All frames have the same seed: their noise stands still on the screen, and takes two to three times "
+                "the samples to vanish. Use Animated Seed (the clock beside Seed), so that noisefloor judges them as a film",
+            )
+            return None
+        render = self.scene.render
+        rate = render.fps / render.fps_base
+        # What is slower is a row of stills
+        return rate if rate >= 10 else None
 
     def _denoiser(self, depsgraph):
         """The library that denoises the picture; Cycles is told to render what it needs."""
@@ -191,7 +209,8 @@ class Frame:
             if stop.reason != "converged":
                 reasons[stop.reason] = reasons.get(stop.reason, 0) + 1
         others = "".join(f"; {count} ended: {reason}" for reason, count in reasons.items())
-        seen = f"{self.settings.people:.0%} of people, {self.settings.viewing}"
+        film = f", {self.film:g} frames a second" if self.film else ""
+        seen = f"{self.settings.people:.0%} of people, {self.settings.viewing}{film}"
         return (
             f"{done} of {len(stops)} tiles without visible noise ({seen}), "
             f"{spp.min()} to {spp.max()} samples per pixel, {spp.mean():.0f} on average{others}; "

@@ -67,8 +67,8 @@ def oracle(settings):
     return noisefloor.Oracle(settings.people)
 
 
-def params(scene, batch):
-    """How tiles are judged. Verdicts come after whole batches."""
+def params(scene, batch, film=None):
+    """How tiles are judged; film: frames per second, or None for a still. Verdicts come after whole batches."""
     settings, view = scene.noisefloor, scene.view_settings
     people = {"viewing": settings.viewing}
     if settings.viewing == "mine":
@@ -78,6 +78,8 @@ def params(scene, batch):
                 "your eyes are unknown: run `noisefloor calibrate`, or choose where the picture is seen"
             )
         people = {"viewing": eyes.viewing, "audience": eyes.audience}
+    if film:
+        people["viewing"] = f"{people['viewing']},fps={film:.6g}"
     tone = {"tone_mapping": "reinhard"}
     if view.view_transform in ("Standard", "Raw"):
         tone = {"tone_mapping": "srgb", "exposure": 2.0**view.exposure}
