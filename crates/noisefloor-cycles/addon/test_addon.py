@@ -306,10 +306,16 @@ class Addon(unittest.TestCase):
                 bpy.ops.render.render(animation=True)
                 self.assertEqual("23.976 frames a second" in hooks.state.summary, animated, hooks.state.summary)
             scene.cycles.use_animated_seed = True
-            rendered(scene)
+            bpy.ops.render.render(animation=True)
+            both = [pixels(scene.render.frame_path(frame=frame_number)) for frame_number in (1, 2)]
+            scene.frame_set(2)
+            alone = rendered(scene)[0]
         finally:
             settings.params = made
-        self.assertEqual(judged, [23.976, 23.976, None, None, None])
+        # Each frame has a seed of its own, whatever was rendered before it
+        assert_same(both[1], alone, 96)
+        self.assertGreater(numpy.abs(both[0] - both[1]).max(), 0.01)
+        self.assertEqual(judged, [23.976, 23.976, None, None, 23.976, 23.976, None])
 
     def test_a_region_is_a_part_of_the_frame(self):
         scene = room()

@@ -341,7 +341,10 @@ mod tests {
                 let pairs = || whole[band].iter().zip(&tile[band]);
                 let largest = pairs().map(|(a, _)| *a).fold(0.0, f32::max);
                 // The sum of picture and residual is rounded
-                assert!(largest > 0.0 && pairs().all(|(a, b)| (a - b).abs() < 1e-3 * largest), "{channel}, {band}");
+                assert!(
+                    largest > 0.0 && pairs().all(|(a, b)| (a - b).abs() < 1e-3 * largest),
+                    "{channel}, {band}"
+                );
             }
         }
     }

@@ -18,8 +18,8 @@ class Frame:
     """engine: Cycles' RenderEngine, which Blender has asked for a layer. cycles: renders what the evaluated
     scene says.
 
-    Only the evaluated scene and the engine's own copy of the render settings are changed. They are gone
-    after the frame, and no file, undo step or window ever sees them."""
+    Only the evaluated scene and the engine's own copy of the render settings are changed, and changed back
+    after the layer. No file, undo step or window ever sees them."""
 
     def __init__(self, engine, depsgraph, cycles):
         self.engine, self.cycles, self.depsgraph = engine, cycles, depsgraph
@@ -86,7 +86,7 @@ class Frame:
 
     def run(self, report):
         """Renders until every tile is done; calls report(frame) after each batch."""
-        render = self.engine.render
+        render, cycles = self.engine.render, self.scene.cycles
         border = [
             "use_border",
             "use_crop_to_border",
@@ -95,15 +95,19 @@ class Frame:
             "border_min_y",
             "border_max_y",
         ]
-        before = {name: getattr(render, name) for name in border}
+        # The evaluated scene is the same in the next frame of an animation, and in the next layer
+        every = [prop.identifier for prop in cycles.bl_rna.properties if not prop.is_readonly]
+        owned = [(render, name) for name in border] + [(cycles, name) for name in every]
+        before = [(owner, name, getattr(owner, name)) for owner, name in owned]
         try:
             while not self.session.done:
                 ended = self._round(report)
                 if ended:
                     self.session.close_all(ended)
         finally:
-            for name, value in before.items():
-                setattr(render, name, value)
+            for owner, name, value in before:
+                if getattr(owner, name) != value:
+                    setattr(owner, name, value)
 
     def _round(self, report):
         """A batch of samples for each open tile, and verdicts on those that are due; returns why to end, if

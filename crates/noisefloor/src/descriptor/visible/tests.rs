@@ -40,7 +40,8 @@ fn noise_is_as_strong_as_its_contrast() {
 #[test]
 fn noise_of_a_film_is_weaker() {
     let planes = tile(0.5, 0.008);
-    let [still, slow, fast] = ["desk", "desk,fps=24", "desk,fps=60"].map(|viewing| own(&on(viewing, &planes)));
+    let [still, slow, fast] =
+        ["desk", "desk,fps=24", "desk,fps=60"].map(|viewing| own(&on(viewing, &planes)));
     let strength = |own: &[f32]| amplitude(own[0]) / amplitude(still[0]);
     assert!((0.6..0.95).contains(&strength(&slow)), "{}", strength(&slow));
     assert!((0.4..0.7).contains(&strength(&fast)), "{}", strength(&fast));
