@@ -59,7 +59,7 @@ class Frame:
         if not self.scene.cycles.use_animated_seed:
             self.engine.report(
                 {"WARNING"},
-                "All frames have the same seed: their noise stands still on the screen, and takes two to three times "
+                "All frames have the same seed: their noise stands still on the screen, and takes about three times "
                 "the samples to vanish. Use Animated Seed (the clock beside Seed), so that noisefloor judges them as a film",
             )
             return None

@@ -97,7 +97,7 @@ pub struct RenderArgs {
     #[arg(long, value_name = "FIRST-LAST")]
     frames: Option<FrameRange>,
     /// Give all frames the same seed. Their noise then stands still on the screen, like dirt on the lens, and
-    /// takes two to three times the samples to vanish.
+    /// takes about three times the samples to vanish.
     #[arg(long, conflicts_with = "fps")]
     same_seed: bool,
     /// Options from a file, as max-spp = 2000 or denoise = "oidn", a line each. What is typed as well wins.

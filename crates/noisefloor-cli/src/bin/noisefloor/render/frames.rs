@@ -203,7 +203,7 @@ pub fn render_frames(sequence: &SequenceRun) -> anyhow::Result<ExitCode> {
 }
 
 /// What is unwise about one seed for all frames.
-pub const ONE_SEED: &str = "with one seed for all frames, their noise stands still on the screen, like dirt on the lens: it takes two to three \
+pub const ONE_SEED: &str = "with one seed for all frames, their noise stands still on the screen, like dirt on the lens: it takes about three \
      times the samples to vanish. Leave out --same-seed";
 
 /// Says what is unwise about a sequence.
