@@ -74,8 +74,8 @@ impl PyViewing {
 ///
 /// tile: edge of a tile in pixels, 16 to 512; tiles of the last column and row have half to one and a half
 ///     times as many.
-/// tone_mapping: "reinhard" (exposure by the log-average of the picture, with key and white) or "srgb" (with
-///     exposure, a factor on radiance).
+/// tone_mapping: "reinhard" (with white, and exposure by key and the log-average of the picture) or "srgb".
+/// exposure: a factor on radiance; 1 for "srgb" by default. With "reinhard", frames of a film should have one.
 /// viewing: on which display the picture is seen, and from how far; a Viewing or its text.
 /// schedule: "spaced" by the expected need, "growing" by half of what a tile has (both in multiples of step),
 ///     or "every" step samples per pixel.
@@ -110,10 +110,16 @@ impl ViewingLike {
 }
 
 /// Tone mapping by its name.
-pub(crate) fn tone_mapping(name: &str, key: f32, white: Option<f32>, exposure: f32) -> PyResult<ToneMapping> {
-    let tone = match name {
-        "reinhard" => ToneMapping::Reinhard { key, white },
-        "srgb" => ToneMapping::Srgb { exposure },
+pub(crate) fn tone_mapping(
+    name: &str,
+    key: f32,
+    white: Option<f32>,
+    exposure: Option<f32>,
+) -> PyResult<ToneMapping> {
+    let tone = match (name, exposure) {
+        ("reinhard", None) => ToneMapping::Reinhard { key, white },
+        ("reinhard", Some(exposure)) => ToneMapping::ReinhardAt { exposure, white },
+        ("srgb", exposure) => ToneMapping::Srgb { exposure: exposure.unwrap_or(1.0) },
         _ => {
             return Err(ParameterError::new_err(format!(
                 "{name:?} is no tone mapping: use \"reinhard\" or \"srgb\""
@@ -127,7 +133,7 @@ pub(crate) fn tone_mapping(name: &str, key: f32, white: Option<f32>, exposure: f
 #[pymethods]
 impl PyParams {
     #[new]
-    #[pyo3(signature = (*, tile = 128, tone_mapping = "reinhard", key = 0.18, white = None, exposure = 1.0,
+    #[pyo3(signature = (*, tile = 128, tone_mapping = "reinhard", key = 0.18, white = None, exposure = None,
         viewing = None, schedule = "spaced", step = 8, min_spp = 16, max_spp = 10_000, consecutive = 1,
         audience = None))]
     #[expect(clippy::too_many_arguments, reason = "Python names them")]
@@ -136,7 +142,7 @@ impl PyParams {
         tone_mapping: &str,
         key: f32,
         white: Option<f32>,
-        exposure: f32,
+        exposure: Option<f32>,
         viewing: Option<ViewingLike>,
         schedule: &str,
         #[pyo3(from_py_with = whole)] step: u64,
@@ -212,6 +218,11 @@ impl PyParams {
             ToneMapping::Reinhard { key, white } => {
                 arguments.set_item("tone_mapping", "reinhard")?;
                 arguments.set_item("key", short(key))?;
+                arguments.set_item("white", white.map(short))?;
+            }
+            ToneMapping::ReinhardAt { exposure, white } => {
+                arguments.set_item("tone_mapping", "reinhard")?;
+                arguments.set_item("exposure", short(exposure))?;
                 arguments.set_item("white", white.map(short))?;
             }
             ToneMapping::Srgb { exposure } => {

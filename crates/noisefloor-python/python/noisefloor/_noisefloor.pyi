@@ -64,7 +64,7 @@ class Params:
         tone_mapping: _ToneMapping = "reinhard",
         key: float = 0.18,
         white: float | None = None,
-        exposure: float = 1.0,
+        exposure: float | None = None,
         viewing: Viewing | str | None = None,
         schedule: Literal["every", "spaced", "growing"] = "spaced",
         step: int = 8,
@@ -266,7 +266,7 @@ def metrics(
     tone_mapping: _ToneMapping = "reinhard",
     key: float = 0.18,
     white: float | None = None,
-    exposure: float = 1.0,
+    exposure: float | None = None,
     viewing: Viewing | str | None = None,
     encoding: _Encoding = "linear",
 ) -> Metrics: ...

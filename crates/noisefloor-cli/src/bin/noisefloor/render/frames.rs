@@ -2,7 +2,7 @@
 //!
 //! A frame that fails or is killed takes nothing else with it, and memory is that of one frame.
 
-use crate::job::RenderRun;
+use crate::job::{CriterionJob, RenderRun};
 use anyhow::{Context, bail};
 use indicatif::HumanDuration;
 use noisefloor_cli::files::write_json;
@@ -214,6 +214,13 @@ fn warn(sequence: &SequenceRun) {
     }
     if job.source.same_seed {
         note!("warning: {ONE_SEED}");
+    }
+    let in_film = job.frames_per_second.or(job.viewing.and_then(|viewing| viewing.frames_per_second()));
+    if in_film.is_none() && !job.source.same_seed && matches!(job.criterion, CriterionJob::Oracle { .. }) {
+        note!(
+            "each frame is judged as a still; as a frame of a film, whose noise is new in each, it needs about half of \
+             the samples or less: --fps 24"
+        );
     }
     if sequence.exposure == SequenceExposure::Each && job.tone.settles() {
         note!(
