@@ -228,6 +228,46 @@ fn a_killed_sequence_leaves_no_frame_rendering() {
     assert!(out.join("0001/checkpoint.nfc").exists(), "it has written what it had");
 }
 
+/// Killed in the frame whose exposure all have, and resumed, a sequence has the pictures, stops and exposure of one that
+/// was not.
+#[test]
+#[cfg(unix)]
+fn a_killed_sequence_is_resumed_as_if_it_had_not_been() {
+    let folder = shots();
+    let scene = folder.path().join("hall.{frame:04}.xml");
+    let options = ["--size", "64x64", "--tile", "32", "--batch", "16", "--max-spp", "4000", "--threads", "1"];
+    let render = |out: &Path, more: &[&str]| {
+        let args = ["render", "--frames", "1-2", text(&scene), "--out", text(out), "--quiet"];
+        command(&[&args[..], &options, more].concat())
+    };
+    let (whole, out) = (folder.path().join("whole"), folder.path().join("out"));
+    assert!(render(&whole, &[]).status().unwrap().success());
+    let mut killed = render(&out, &[]).stderr(std::process::Stdio::null()).spawn().unwrap();
+    let lock = out.join("0001/.noisefloor.lock");
+    let locked = || fs::File::open(&lock).is_ok_and(|lock| lock.try_lock().is_err());
+    let began = std::time::Instant::now();
+    while !locked() {
+        assert!(began.elapsed().as_secs() < 60, "the first frame begins");
+        std::thread::sleep(std::time::Duration::from_millis(2));
+    }
+    killed.kill().unwrap();
+    killed.wait().unwrap();
+    while locked() {
+        assert!(began.elapsed().as_secs() < 120, "the first frame ends");
+        std::thread::sleep(std::time::Duration::from_millis(5));
+    }
+    assert!(!out.join("exposure.json").exists(), "it was killed before its exposure was known");
+    assert!(render(&out, &["--resume"]).status().unwrap().success());
+    for frame in 1..=2 {
+        let read = |out: &Path, name: &str| fs::read(out.join(format!("{frame:04}/{name}"))).unwrap();
+        assert!(["image.exr", "stops.csv"].iter().all(|name| read(&whole, name) == read(&out, name)), "{frame}");
+        let exposure = |out: &Path| json(&out.join(format!("{frame:04}/report.json")))["exposure"].clone();
+        assert_eq!(exposure(&whole), exposure(&out));
+    }
+    let kept = |out: &Path| json(&out.join("exposure.json"));
+    assert_eq!(kept(&whole), kept(&out));
+}
+
 #[test]
 fn what_is_typed_wins_over_a_file_and_nonsense_is_refused() {
     let folder = shots();
